@@ -178,8 +178,7 @@ class SensorMonitor(NamedTuple):
     that ratio; worst_test: the numbers of that test. isolated_sensor_index: -1 for none;
     is_reading_unused (sensors,): the reading is not used any more. sample_time_s: between two samples.
     gust_change_mps (poles,): bound on the changes of a gust through the filters.
-    predicted_reading, reading_bound (sensors,): SI. engine_commands (2,): engine speed rpm,
-    manifold pressure inHg, which the engine's sensors should read.
+    predicted_reading, reading_bound (sensors,): SI; the engine's readings are predicted by its commands.
     """
 
     enabled: bool
@@ -193,7 +192,6 @@ class SensorMonitor(NamedTuple):
     gust_change_mps: np.ndarray
     predicted_reading: np.ndarray
     reading_bound: np.ndarray
-    engine_commands: np.ndarray
 
 
 class DiagnosisReadout:
@@ -441,5 +439,5 @@ def read_sensor_monitor(mon: np.void) -> SensorMonitor:
         bool(mon["config"]["enabled"]), bool(o["alarmed"]), j,
         float(o["top_ratio"]), worst, int(o["isolated_sensor"]),
         o["is_reading_unused"].astype(bool), float(red["h"]),
-        *(red[name].copy() for name in ("gust_change", "y_pred", "e", "command")),
+        *(red[name].copy() for name in ("gust_change", "y_pred", "e")),
     )  # fmt: skip

@@ -43,6 +43,7 @@ from beaver_ftc.plant.instruments import (
     ALTITUDE,
     AX,
     ENGINE_SPEED,
+    MANIFOLD,
     N_SENSORS,
     PHI,
     SENSORS,
@@ -52,31 +53,25 @@ from beaver_ftc.plant.instruments import (
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.sensors import N_IN_EQUATIONS, ROWS, frames_apart, sensor_words
 
-TURN_TEST = 0
-ANGLE_TEST = 3
-SPEED_TEST = 6
-ALPHA_TEST = 7
-BETA_TEST = 8
-DENSITY_TEST = 9
-CLIMB_TEST = 10
-RPM_TEST = 11
-PRESSURE_TEST = 12
-N_EQUATIONS = 13  # tests with an equation; then those of sensors that should equal another reading
+# The tests by number; 0 to 2 are of turning about axis 0 to 2, 3 to 5 of phi, theta, psi. In each, a jump of
+# one reading appears at once: the rows of the sensors name it.
+TEST_NAMES = (
+    "roll", "pitch", "yaw", "bank angle", "pitch angle", "heading", "speed", "incidence", "sideslip",
+    "density", "climb", "engine speed", "manifold pressure",
+)  # fmt: skip
+TURN_TEST, ANGLE_TEST, SPEED_TEST, ALPHA_TEST, BETA_TEST, DENSITY_TEST, CLIMB_TEST = 0, 3, 6, 7, 8, 9, 10
+RPM_TEST, PRESSURE_TEST = 11, 12
+N_EQUATIONS = len(TEST_NAMES)  # then the tests of sensors that should equal another reading
+_NAMED = [row.test for row in ROWS]
+SENSOR_OF = tuple(_NAMED.index(name) for name in TEST_NAMES)
 DUPLICATES = tuple((SENSORS.index(row.name), row.equal) for row in ROWS if row.equal is not None)
 N_TESTS = N_EQUATIONS + len(DUPLICATES)
-# The test in which a jump of a reading appears at once, as the rows of the sensors name it.
-TEST_BY_NAME = {
-    "roll": TURN_TEST, "pitch": TURN_TEST + 1, "yaw": TURN_TEST + 2,
-    "bank angle": ANGLE_TEST, "pitch angle": ANGLE_TEST + 1, "heading": ANGLE_TEST + 2,
-    "speed": SPEED_TEST, "incidence": ALPHA_TEST, "sideslip": BETA_TEST, "density": DENSITY_TEST,
-    "climb": CLIMB_TEST, "engine speed": RPM_TEST, "manifold pressure": PRESSURE_TEST,
-}  # fmt: skip
 # Of each sensor that should equal another reading (its row in scenario/sensors.py says which): its place in
 # the readings, the place of that reading, the test that an error of that reading exceeds, and the largest
 # difference of the two quantities, SI.
 DUPLICATE = np.array([i for i, _ in DUPLICATES], np.int64)
 COUNTERPART = np.array([SENSORS.index(equal.reading) for _, equal in DUPLICATES], np.int64)
-COUNTERPART_TEST = np.array([TEST_BY_NAME[ROWS[i].test] for i in COUNTERPART], np.int64)
+COUNTERPART_TEST = np.array([TEST_NAMES.index(_NAMED[i]) for i in COUNTERPART], np.int64)
 DUPLICATE_TOLERANCE = np.array([equal.within for _, equal in DUPLICATES], float)
 FILTER_POLES_PER_S = (1e6, 10.0, 1.0)  # of the filters of each test; the first is the residual itself
 N_POLES = len(FILTER_POLES_PER_S)
@@ -95,7 +90,7 @@ P, Q, R, ALPHA, BETA, AIRSPEED, QDYN = range(len(SIGNALS))
 THETA, PSI = PHI + 1, PHI + 2
 
 # Hypotheses of initial_errors.py: this sensor has been broken since the monitor began
-H_ALPHA, H_BETA, H_AIRSPEED, H_PHI, H_THETA = range(5)
+H_AIRSPEED, H_ALPHA, H_BETA, H_PHI, H_THETA = range(5)
 N_INITIAL = 5
 # What bounds such an error: its hypothesis, and the tests, first to last, in which its effect shows
 EVIDENCE = (
@@ -124,8 +119,7 @@ REDUNDANCY_RECORD = record(
     # m/s2: |a| in the elapsed step and in the two before it; of a_past
     a_size=3, a_size_past=float,
     e_first=float,  # m/s2, in the first step only: no sample precedes it
-    y_pred=N_SENSORS,
-    command=2,  # engine speed rpm, manifold pressure inHg
+    y_pred=N_SENSORS,  # of the engine's readings: the commands
     # By test, in the unit of the residual. per_s, per_sample: parts of the bound on the residual of one
     # sample, the first for each second of it; past: per_sample of the sample before. gust: effect on the
     # residual of 1 m/s that a gust changes by. r: filtered residual. B: bound on |r|; e_sum: the part of it
@@ -209,7 +203,7 @@ def configure_sensor_monitor(monitor: np.void, declared: Declared, design: np.vo
     config["D_size"] = np.where(np.eye(3) > 0.0, -D, abs(D))
     monitor["memory"]["substep"] = declared.substeps - 1  # the first JSBSim frame ends a frame of the loop
     if config["has_engine"]:
-        red["command"] = initial.engine_rpm, initial.manifold_pressure_inhg
+        red["y_pred"][[ENGINE_SPEED, MANIFOLD]] = initial.engine_rpm, initial.manifold_pressure_inhg
     configure_tests(red, declared)
     configure_errors(config, red, declared)
 
@@ -291,11 +285,6 @@ MIN_SPEED_MPS = 1e-3  # at least so much where a predicted speed divides
 # of a reading that its constant error leaves, at least, under a logarithm
 MIN_SHARE_LEFT = 0.01
 READING_ROUNDING = 1e-10  # of a reading: the part of each bound that covers rounding
-# of a test that compares a reading with its prediction: that reading
-READING_OF = (
-    (ANGLE_TEST, PHI), (ANGLE_TEST + 1, THETA), (ANGLE_TEST + 2, PSI),
-    (SPEED_TEST, AIRSPEED), (ALPHA_TEST, ALPHA), (BETA_TEST, BETA), (CLIMB_TEST, ALTITUDE),
-)  # fmt: skip
 COMPARISON_ROUNDING = 1e-6  # in the unit of the reading: the same where two readings are compared directly
 # JSBSim integrates the velocity by Adams and Bashforth's second order, v + h (3/2 a - 1/2 a_before).
 AB_NOW, AB_PAST = 1.5, 0.5
@@ -361,6 +350,12 @@ def combined(a, v, b, w):
 def vector_length(v):
     """|v| of a vector (3,)."""
     return np.sqrt(dot(v, v))
+
+
+@kernel
+def speed(y):
+    """V, m/s, of a reading: where it divides."""
+    return max(y[AIRSPEED], MIN_AIRSPEED_MPS)
 
 
 @kernel
@@ -441,8 +436,8 @@ def fill_residuals(red, y, q):
     z1, z2 = times(inverse(q), attitude(y))
     side = 2.0 if z1.real >= 0.0 else -2.0
     red.residual[:ANGLE_TEST] = side * z1.imag, side * z2.real, side * z2.imag
-    for j, i in READING_OF:
-        r = y[i] - red.y_pred[i]
+    for j in range(ANGLE_TEST, RPM_TEST):
+        r = y[SENSOR_OF[j]] - red.y_pred[SENSOR_OF[j]]
         red.residual[j] = wrapped(r) if j < SPEED_TEST else r
     red.residual[DENSITY_TEST] = np.log(half_density(y) / half_density(red.y_past))
 
@@ -508,8 +503,8 @@ def bound_attitude(red, y, w_max, e_w):
     s_theta, s_phi = abs(np.sin(y[THETA])) + n[THETA], abs(np.sin(y[PHI])) + n[PHI]
     coupled = s_theta * n[PSI], s_phi * n[PSI], s_phi * n[THETA]
     for i in range(3):
-        red.per_s[TURN_TEST + i] = EARTH_TURN_RAD_S + 2.0 * red.drift + e[P + i] + axes
-        red.per_sample[TURN_TEST + i] = n[PHI + i] + coupled[i]
+        red.per_s[i] = EARTH_TURN_RAD_S + 2.0 * red.drift + e[i] + axes
+        red.per_sample[i] = n[PHI + i] + coupled[i]
         red.per_s[ANGLE_TEST + i] = sec * angles + red.drift
 
 
@@ -564,11 +559,11 @@ def bound_residuals(red, y):
     for i in range(3):
         e_w += red.e_past[i]
         w_max += abs(red.y_past[i]) + red.e_past[i]
+    for j in range(ANGLE_TEST, RPM_TEST):
+        red.per_sample[j] = red.n[SENSOR_OF[j]]
     bound_attitude(red, y, w_max, e_w)
     bound_flow(red, y, w_max, e_w)
     bound_density(red, y)
-    for j, i in READING_OF:
-        red.per_sample[j] = red.n[i]
 
 
 @kernel
@@ -646,6 +641,6 @@ def run_tests(red, y, has_engine):
     for j in range(first, RPM_TEST):
         filter_test(red, j)
     if has_engine:
-        for i in range(2):
-            k = ENGINE_SPEED + i
-            compare(red, RPM_TEST + i, y[k] - red.command[i], red.e[k])
+        for j in (RPM_TEST, PRESSURE_TEST):
+            i = SENSOR_OF[j]
+            compare(red, j, y[i] - red.y_pred[i], red.e[i])

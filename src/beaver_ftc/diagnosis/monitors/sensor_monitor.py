@@ -58,6 +58,7 @@ from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.detection import attitude
 from beaver_ftc.diagnosis.detection.filters import bank_axis, leak
 from beaver_ftc.diagnosis.monitors.initial_errors import (
+    CHANGE_TEST,
     explains_exceeded,
     latch_refuted,
     start_bounds,
@@ -82,8 +83,6 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     GYRO_OPEN,
     GYRO_REFUTED,
     H_AIRSPEED,
-    H_ALPHA,
-    H_BETA,
     H_PHI,
     MIN_AIRSPEED_MPS,
     N_EQUATIONS,
@@ -94,20 +93,20 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     PSI,
     QDYN,
     RPM_TEST,
+    SENSOR_OF,
     SPEED_TEST,
     THETA,
-    TURN_TEST,
     compare_duplicates,
     dot,
     exceeds,
     run_tests,
+    speed,
     start_tests,
     store_sample,
     too_steep,
     turn_share,
 )
 from beaver_ftc.plant.instruments import (
-    ALTITUDE,
     AX,
     ENGINE_SPEED,
     MANIFOLD,
@@ -156,14 +155,8 @@ RATE_ROUNDING = 1e-6  # rad/s, and rad/s2: the part of the bounds that covers ro
 # For the gyro that turns the flow by all of its error, also the margin on the bound of the flow's test.
 HIDDEN_FACTOR = 2.0
 
-# By the test of the flow, from SPEED_TEST on: the flow sensor that it compares with the accelerometers, and
-# the hypothesis that this sensor was broken when the monitor began (initial_errors.py)
-FLOW_SENSOR, FLOW_HYPOTHESIS = (AIRSPEED, ALPHA, BETA), (H_AIRSPEED, H_ALPHA, H_BETA)
-# The sensor of each such hypothesis
-INITIAL_SENSOR = ALPHA, BETA, AIRSPEED, PHI, THETA
 ANGLES, FORCES = (PHI, THETA, PSI), (AX, AX + 1, AX + 2)
-# By the test from DENSITY_TEST on: the sensor that takes part in no other test
-LONE_SENSOR = QDYN, ALTITUDE, ENGINE_SPEED, MANIFOLD
+INITIAL_SENSOR = tuple(SENSOR_OF[j] for j in CHANGE_TEST)  # of each hypothesis of initial_errors.py
 
 
 @kernel
@@ -266,7 +259,7 @@ def follow_gyro_errors(M, red):
         shown[1] = shown[0]
         shown[0, MOST:] = 0.0
     for i in range(3):
-        w = -red.residual[TURN_TEST + i] / red.h
+        w = -red.residual[i] / red.h
         if M.substep == 0:
             shown[0, SHOWN, i] = w
         else:
@@ -306,7 +299,7 @@ def exclude_gyros(mon):
     """
     M, red = mon.memory, mon.redundancy
     for i in range(3):
-        j, w = TURN_TEST + i, M.w[i]
+        j, w = i, M.w[i]
         leak(M.gap[i], red.decay, red.residual[j] + red.h * w)
         leak(M.gap_bound[i], red.decay, red.h * (M.w_bound[i] + attitude.DAMPING_TOLERANCE * abs(w)))
         if exceeds(M.gap[i], 1.0, M.gap_bound[i], 1.0, red.B[j]):
@@ -381,7 +374,7 @@ def filter_beyond(M, red, y):
         for j in range(3):
             c = turn_share(y, j, i)
             M.c_max[i, j] = max(M.c_max[i, j], abs(c))
-            leak(M.beyond[i, j], red.decay, red.residual[TURN_TEST + j] - c * r)
+            leak(M.beyond[i, j], red.decay, red.residual[j] - c * r)
 
 
 @kernel
@@ -410,7 +403,7 @@ def judge_gyros(mon, bank, bound, dt):
         w, past, known = abs(shown[0, SHOWN, i]), abs(shown[1, SHOWN, i]), M.w_bound[i] + abs(M.w[i])
         peak, older = shown[1, MOST, i], shown[2, MOST, i]
         # of w, rad/s, by the attitude's noise
-        noise = SAMPLES_IN_JUMP * red.per_sample[TURN_TEST + i] / red.h
+        noise = SAMPLES_IN_JUMP * red.per_sample[i] / red.h
         nu_max = bound.nu_max[i] + RATE_ROUNDING
         estimated = abs(M.w[i]) > M.w_bound[i] + RATE_ROUNDING
         shows = abs(nu[i]) > nu_max or bank_axis(bank) >= 0 or estimated
@@ -443,7 +436,7 @@ def latch_exceeded(mon):
 def clear_sensors(mon, y):
     """Clear the flow sensor, or the accelerometers, by this sample, that of the alarm or a later one."""
     M, alarm = mon.memory, mon.output.alarm_test
-    flow = FLOW_SENSOR[alarm - SPEED_TEST]
+    flow = SENSOR_OF[alarm]
     by_density = alarm == SPEED_TEST and M.exceeded[DENSITY_TEST]
     if is_frozen(mon, flow) or flow_jumped(mon, y, flow) or by_density:
         M.cleared[AX:] = 1
@@ -461,7 +454,7 @@ def flow_jumped(mon, y, i):
     per_a: residual for an acceleration error of 1 m/s2 in one sample. ddy: second difference of the reading.
     """
     j, red, M = mon.output.alarm_test, mon.redundancy, mon.memory
-    per_a = red.h / (1.0 if j == SPEED_TEST else max(red.y_past[AIRSPEED], MIN_AIRSPEED_MPS))
+    per_a = red.h / (1.0 if j == SPEED_TEST else speed(red.y_past))
     ddy, r = abs(y[i] - 2.0 * red.y_past[i] + red.y_older[i]), abs(red.residual[j])
     soon = M.n_since * red.h < JUMP_WINDOW_S - TIME_ROUNDING_S
     leaps = r > red.B[j, 0] + FORCE_JUMP_M_S2 * per_a
@@ -477,7 +470,8 @@ def sum_flow(mon, y):
     """
     red, M, ini = mon.redundancy, mon.memory, mon.initial_errors
     for n in range(3):
-        j, y_n, k = SPEED_TEST + n, y[FLOW_SENSOR[n]], FLOW_HYPOTHESIS[n]
+        j = SPEED_TEST + n
+        y_n = y[SENSOR_OF[j]]
         if M.n_since == 0:
             M.y_min[n] = M.y_max[n] = y_n
             # noise of the first and of the last sample
@@ -485,7 +479,7 @@ def sum_flow(mon, y):
             continue
         M.r_sum[n] += red.residual[j]
         M.B_sum[n] += red.h * red.per_s[j]
-        M.e_sum[n] += ini.e_alarm[k] * ini.H[k, j]
+        M.e_sum[n] += ini.e_alarm[n] * ini.H[n, j]
         M.y_min[n], M.y_max[n] = min(M.y_min[n], y_n), max(M.y_max[n], y_n)
     alpha = np.sign(M.r_sum[1]) * max(abs(M.r_sum[1]) - M.B_sum[1] - M.e_sum[1], 0.0)
     leak(M.climb, red.decay, red.h * y[AIRSPEED] * alpha * np.cos(y[PHI]) * np.cos(y[THETA]))
@@ -507,12 +501,12 @@ def contradicted(mon, y):
     other = DENSITY_TEST if alarm == SPEED_TEST else CLIMB_TEST
     if alarm == BETA_TEST or mon.memory.exceeded[other]:
         return False
-    h = FLOW_HYPOTHESIS[alarm - SPEED_TEST]
+    h = alarm - SPEED_TEST
     e, H, B = ini.e_alarm[h], ini.H_m[h, other], red.B[other]
     if alarm == ALPHA_TEST:
         return exceeds(mon.memory.climb, CLEAR_FACTOR, B, CLEAR_FACTOR * e, H)
     # log(density) changes by twice the relative change of the airspeed
-    k = CLEAR_FACTOR * max(y[AIRSPEED], MIN_AIRSPEED_MPS) / (2.0 * (1.0 - min(e, 1.0)))
+    k = CLEAR_FACTOR * speed(y) / (2.0 * (1.0 - min(e, 1.0)))
     for m in range(B.size):
         if abs(red.r[SPEED_TEST, m]) - red.B[SPEED_TEST, m] > k * (B[m] + e * H[m]):
             return True
@@ -531,7 +525,7 @@ def clear_gyros(mon, y):
     if alarm == SPEED_TEST or too_steep(red, y) or not 0.0 < M.turn_max < least:
         return
     for i in range(3):
-        M.cleared[i] |= abs(red.residual[TURN_TEST + i]) < M.turn_max
+        M.cleared[i] |= abs(red.residual[i]) < M.turn_max
 
 
 @kernel
@@ -610,13 +604,13 @@ def explains_turns(mon, i):
     initial = ini.e_alarm[h] if i < 2 else 0.0
     tilt = red.e[PHI] + red.e[THETA]
     for j in range(3):
-        r, c = red.r[TURN_TEST + j], abs(turn_share(red.y_past, j, i)) + tilt
+        r, c = red.r[j], abs(turn_share(red.y_past, j, i)) + tilt
         for m in range(r.size):
             B = red.B[own, m]
-            sound = red.B[TURN_TEST + j, m] + initial * ini.H_m[h, TURN_TEST + j, m]
+            sound = red.B[j, m] + initial * ini.H_m[h, j, m]
             now = abs(r[m]) > c * (abs(red.r[own, m]) + B) + sound
             since = abs(M.beyond[i, j, m]) > sound + M.c_max[i, j] * B + tilt * M.swing[i, m]
-            if M.exceeded[TURN_TEST + j] and now and since:
+            if M.exceeded[j] and now and since:
                 return False
     return True
 
@@ -626,7 +620,7 @@ def suspect_flow(mon, alarm):
     """Suspect a flow sensor, an accelerometer, or a gyro whose error may be hidden in the tests of the
     attitude. No flow sensor moves the attitude's tests.
     """
-    M, suspect, sensor = mon.memory, mon.output.suspect, FLOW_SENSOR[alarm - SPEED_TEST]
+    M, suspect, sensor = mon.memory, mon.output.suspect, SENSOR_OF[alarm]
     turns = M.exceeded[:ANGLE_TEST]
     n = turns.sum() if alarm > SPEED_TEST else 0
     if alarm > SPEED_TEST:
@@ -651,7 +645,7 @@ def gyro_hidden(mon, j, i):
         s, c = np.sin(alpha), np.cos(alpha)
         k, share = 1.0, share * abs(s if j == BETA_TEST else np.tan(beta) * (c if i == 0 else s))
     acts = i != 1 or j == ALPHA_TEST
-    return acts and not exceeds(red.r[j], k, red.B[j], share, red.B[TURN_TEST + i])
+    return acts and not exceeds(red.r[j], k, red.B[j], share, red.B[i])
 
 
 @kernel
@@ -661,7 +655,7 @@ def suspect_accelerometers(mon):
     sensors.
     """
     M, y, r, B = mon.memory, mon.redundancy.y_past, mon.memory.r_sum, mon.memory.B_sum
-    alpha, beta, V = y[ALPHA], y[BETA], max(y[AIRSPEED], MIN_AIRSPEED_MPS)
+    alpha, beta, V = y[ALPHA], y[BETA], speed(y)
     plane = complex(r[0], V * r[2]) * complex(np.cos(beta), np.sin(beta))
     body = complex(plane.real, V * np.cos(beta) * r[1]) * complex(np.cos(alpha), np.sin(alpha))
     dv = abs(body.real), abs(plane.imag), abs(body.imag)
@@ -676,11 +670,11 @@ def suspect_lone(mon, alarm):
     """Suspect the sensor that takes part in no other test, of kinematics if none is exceeded; and the
     airspeed, unless the error that the density shows would exceed the bound of the airspeed's own test."""
     M, red, ini, suspect = mon.memory, mon.redundancy, mon.initial_errors, mon.output.suspect
-    suspect[LONE_SENSOR[alarm - DENSITY_TEST]] = alarm >= RPM_TEST or alone(M.exceeded[:RPM_TEST], alarm)
+    suspect[SENSOR_OF[alarm]] = alarm >= RPM_TEST or alone(M.exceeded[:RPM_TEST], alarm)
     if alarm == DENSITY_TEST:
         e, H = ini.e_alarm[H_AIRSPEED], ini.H_m[H_AIRSPEED, alarm]
         # a relative change of the airspeed changes log(density) by twice as much
-        k = 2.0 * HIDDEN_FACTOR * (1.0 + e) / max(red.y_past[AIRSPEED], MIN_AIRSPEED_MPS)
+        k = 2.0 * HIDDEN_FACTOR * (1.0 + e) / speed(red.y_past)
         hidden = not exceeds(red.r[alarm], k, red.B[SPEED_TEST], e, H)
         # its test need not show an error if it is frozen
         suspect[AIRSPEED] = M.exceeded[SPEED_TEST] == 1 or hidden or M.n_same[AIRSPEED] > 0
@@ -694,7 +688,7 @@ def add_turn(mon, att, y):
         attitude.restart(att)
         return
     for i in range(3):
-        attitude.add_turn(att, i, mon.redundancy.residual[TURN_TEST + i])
+        attitude.add_turn(att, i, mon.redundancy.residual[i])
     mon.memory.turn_max = att.turn_max
 
 
@@ -712,12 +706,6 @@ def name_gyro(mon, found, i, t):
 def rule_out_gyros(mon):
     """No gyro can be broken: a surface may be isolated."""
     mon.memory.gyros_excluded = 1
-
-
-@kernel
-def expect_pressure(mon, pressure):
-    """Predict the engine's manifold pressure from the command of the law in charge of the engine."""
-    mon.redundancy.command[1] = pressure
 
 
 @kernel
@@ -779,8 +767,6 @@ def estimate_reading(mon, pred, y, i):
     red = mon.redundancy
     if i < 3:
         return estimate_rate(mon, pred, i)
-    if i >= ENGINE_SPEED:
-        return red.command[i - ENGINE_SPEED]
     rho = 2.0 * red.y_past[QDYN] / red.y_past[AIRSPEED] ** 2
     if i == AIRSPEED:
         return np.sqrt(max(2.0 * y[QDYN] / rho, MIN_AIRSPEED_MPS**2))
@@ -803,8 +789,8 @@ def estimate_rate(mon, pred, i):
         acc += pred.G[i, s] * u[s]
     if mon.output.keeps_surface:
         acc += pred.F_known[i] - pred.means.F[i]
-    rate = gain * red.residual[TURN_TEST + i] / red.h
+    rate = gain * red.residual[i] / red.h
     if not M.replaced[i] and gain < 1.0:
-        rate = FILTER_POLES_PER_S[RATE_POLE] * red.r[TURN_TEST + i, RATE_POLE]
+        rate = FILTER_POLES_PER_S[RATE_POLE] * red.r[i, RATE_POLE]
     M.replaced[i] = 1
     return red.y_past[i] + rate + red.h * acc

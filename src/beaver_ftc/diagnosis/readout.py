@@ -178,8 +178,7 @@ class SensorMonitor(NamedTuple):
     that ratio; worst_test: the numbers of that test. isolated_sensor_index: -1 for none;
     is_reading_unused (sensors,): the reading is not used any more. sample_time_s: between two samples.
     gust_change_mps (poles,): bound on the changes of a gust through the filters.
-    predicted_reading, reading_bound (sensors,): SI. engine_commands (2,): engine speed rpm,
-    manifold pressure inHg, which the engine's sensors should read.
+    predicted_reading, reading_bound (sensors,): SI; the engine's readings are predicted by its commands.
     """
 
     enabled: bool
@@ -193,7 +192,6 @@ class SensorMonitor(NamedTuple):
     gust_change_mps: np.ndarray
     predicted_reading: np.ndarray
     reading_bound: np.ndarray
-    engine_commands: np.ndarray
 
 
 class DiagnosisReadout:
@@ -432,19 +430,14 @@ def _read_hypothesis(hyp: np.void) -> StatisticalHypothesis:
 def read_sensor_monitor(mon: np.void) -> SensorMonitor:
     """The sensor monitor, of its record (dtype SENSOR_MONITOR_RECORD)."""
     o, red = mon["output"], mon["redundancy"]
-    c, M = red["config"], red["memory"]
     j = int(o["worst_test_index"])
-    test = red["test"][j]
     worst = SensorTest(
-        float(test["residual"]), float(test["bound_per_s"]),
-        float(test["bound_per_sample"]),
-        float(test["gust_gain"]),
-        test["r"].copy(), test["B"].copy(),
+        *(float(red[name][j]) for name in ("residual", "per_s", "per_sample", "gust")),
+        red["r"][j].copy(), red["B"][j].copy(),
     )  # fmt: skip
     return SensorMonitor(
         bool(mon["config"]["enabled"]), bool(o["alarmed"]), j,
         float(o["top_ratio"]), worst, int(o["isolated_sensor"]),
-        o["is_reading_unused"].astype(bool), float(c["sample_time_s"]),
-        c["gust_change"].copy(), M["predicted_reading"].copy(),
-        M["reading_bound"].copy(), M["engine_commands"].copy(),
+        o["is_reading_unused"].astype(bool), float(red["h"]),
+        *(red[name].copy() for name in ("gust_change", "y_pred", "e")),
     )  # fmt: skip

@@ -8,7 +8,7 @@ import numpy as np
 
 from beaver_ftc.diagnosis import SensorMonitor
 from beaver_ftc.diagnosis.monitors import COMPARISON_ROUNDING, N_EQUATIONS, RPM_TEST
-from beaver_ftc.plant import ENGINE_SPEED, SENSORS
+from beaver_ftc.plant import SENSORS
 from beaver_ftc.results import Document
 from beaver_ftc.scenario import sensor_words
 
@@ -52,13 +52,12 @@ def _looks(monitor: SensorMonitor) -> Iterator[list[float]]:
     """Triples (reading, prediction, largest difference with sound instruments) in the residual's unit: of the
     last sample; then what the filter and its bound keep of all samples before."""
     test, number = monitor.worst_test, monitor.worst_test_index
-    if number >= RPM_TEST:
-        predicted = float(monitor.engine_commands[number - RPM_TEST])
-        bound = float(monitor.reading_bound[ENGINE_SPEED + number - RPM_TEST]) + COMPARISON_ROUNDING
-        yield [predicted + test.residual, predicted, bound]
-        return
     reading = TESTS[number]
     predicted = float(monitor.predicted_reading[SENSORS.index(reading)]) if reading in SENSORS else 0.0
+    if number >= RPM_TEST:
+        bound = float(monitor.reading_bound[SENSORS.index(reading)]) + COMPARISON_ROUNDING
+        yield [predicted + test.residual, predicted, bound]
+        return
     pole = int(np.argmax(np.abs(test.filtered_residual) / test.filtered_bound))
     sample_bound = float(
         monitor.sample_time_s * test.bound_per_s

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from kernels import fill
 from true_flight import UNITS, new_monitor, true_flight
 
 from beaver_ftc.diagnosis.monitors import redundancy
@@ -19,7 +20,6 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     QDYN,
     RPM_TEST,
     SPEED_TEST,
-    TEST_RECORD,
     THETA,
     TURN_TEST,
 )
@@ -33,7 +33,7 @@ def compared(monitor, readings):
     for y in readings[1:]:
         redundancy.run_tests(red, y, True)
         redundancy.store_sample(red, y, y[AX:])
-        yield red["test"]["ratio"].copy(), red["test"]["residual"].copy()
+        yield red["ratio"].copy(), red["residual"].copy()
 
 
 @pytest.mark.parametrize("h", [0.05, 0.01, 0.002])
@@ -48,7 +48,7 @@ def test_sound_sensors_stay_within_every_bound(seed, swiftly, h):
     drift[np.abs(np.arange(N_SENSORS) - PHI - 1) > 1] = 0.0
     noise = rng.choice([0.0, 0.2, 1.0], N_SENSORS) * UNITS
     monitor = new_monitor(h, np.abs(bias) + noise, np.abs(bias))
-    config = monitor["redundancy"]["config"]
+    config = monitor["redundancy"]
     config["e_slope"], config["drift"] = np.abs(slope), np.abs(drift).max()
     readings = (1.0 + slope) * true + bias + noise * rng.choice([-1.0, 1.0], true.shape)
     readings += h * np.arange(n)[:, None] * drift
@@ -96,28 +96,27 @@ def test_a_declared_error_is_of_the_reading_and_what_is_steady_does_not_change()
     """|reading - truth| <= offset + slope |truth|, and |truth| <= (|reading| + offset) / (1 - slope)."""
     red, signal = new_monitor(0.02, 0.3, 0.25)["redundancy"], np.full(N_SENSORS, -3.0)
     signal[PHI + 2] += 2.0 * np.pi  # a heading is off by its slope of the angle from north
-    red["config"]["e_slope"] = 0.1
+    red["e_slope"] = 0.1
     redundancy.bound_readings(red, signal)
     truth = (3.0 + 0.3) / 0.9
-    assert red["memory"]["reading_bound"] == pytest.approx(truth - 3.0)
-    assert red["memory"]["e_new"] == pytest.approx(truth - 3.0 - 0.25 + 3e-10, rel=1e-9)
+    assert red["e"] == pytest.approx(truth - 3.0)
+    assert red["n"] == pytest.approx(truth - 3.0 - 0.25 + 3e-10, rel=1e-9)
 
 
 def test_filters_sum_what_was_with_what_each_pole_keeps():
     rng, n, h = np.random.default_rng(2), 30, 0.02
-    test, red = np.zeros(1, TEST_RECORD)[0], new_monitor(h)["redundancy"]
-    red["config"]["decay"] = keep = np.array([0.0, 0.8, 0.97])
-    gust = np.array([0.1, 0.2, 0.3])
-    red["config"]["gust_change"], test["gust_gain"] = gust, 0.5
+    keep, gust = np.array([0.0, 0.8, 0.97]), np.array([0.1, 0.2, 0.3])
+    red = fill(new_monitor(h)["redundancy"], decay=keep, gust_change=gust, gust=0.5)
     residual, rate, noise = rng.normal(size=n), rng.uniform(1, 2, n), rng.uniform(1, 2, n)
     for values in zip(residual, rate, noise, strict=True):
-        test["residual"], test["bound_per_s"], test["bound_per_sample"] = values
-        redundancy.filter_test(red, test)
+        red["residual"][1], red["per_s"][1], red["per_sample"][1] = values
+        redundancy.filter_test(red, 1)
     weight = keep[:, None] ** np.arange(n)[::-1]
     changes = (1.0 - keep) * (weight[:, 1:] @ noise[:-1]) + noise[-1]
-    assert test["r"] == pytest.approx(weight @ residual)
-    assert test["B"] == pytest.approx(h * weight @ rate + changes + 0.5 * gust)
-    assert test["ratio"] == pytest.approx(np.max(np.abs(test["r"]) / test["B"]))
+    r, B = red["r"][1], red["B"][1]
+    assert r == pytest.approx(weight @ residual)
+    assert pytest.approx(h * weight @ rate + changes + 0.5 * gust) == B
+    assert red["ratio"][1] == pytest.approx(np.max(np.abs(r) / B))
 
 
 def test_near_the_vertical_the_tests_of_the_attitude_begin_anew():
@@ -127,7 +126,7 @@ def test_near_the_vertical_the_tests_of_the_attitude_begin_anew():
     ratios = [ratio[ANGLE_TEST + 1] for ratio, _ in compared(monitor, readings)]
     assert ratios[0] > 1.0  # 0.03 rad in a sample, and no rates
     assert ratios[1:3] == [0.0, 0.0]  # that of now, or that of before, is beyond 1.3 rad
-    assert monitor["redundancy"]["test"]["r"][ANGLE_TEST + 1] == pytest.approx([-0.03] * 3)
+    assert monitor["redundancy"]["r"][ANGLE_TEST + 1] == pytest.approx([-0.03] * 3)
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -139,6 +138,6 @@ def test_momentary_errors_of_the_attitude_stay_within_bounds_that_remember_long(
     readings[:, :3] = readings[:, PHI] = 0.0
     readings[:, PHI : PHI + 3] += e[PHI : PHI + 3] * rng.choice([-1.0, 0.0, 1.0], (400, 3))
     monitor = new_monitor(0.02, e)
-    monitor["redundancy"]["config"]["decay"] = 0.0, 0.99, 0.9999
+    monitor["redundancy"]["decay"] = 0.0, 0.99, 0.9999
     for ratio, _ in compared(monitor, readings):
         assert (ratio[TURN_TEST : TURN_TEST + 3] <= 1.0).all()

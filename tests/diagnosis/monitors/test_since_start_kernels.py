@@ -34,7 +34,7 @@ def samples(signal, h):
     for k in range(1, len(signal)):
         redundancy.run_tests(red, signal[k], 0)
         initial_errors.update_bounds(red, initial, signal[k])
-        exceeded |= red["test"]["ratio"] > 1.0
+        exceeded |= red["ratio"] > 1.0
         initial_errors.latch_refuted(red, initial, exceeded)
         yield k, initial, exceeded
         redundancy.store_sample(red, signal[k], signal[k, AX:])

@@ -52,10 +52,9 @@ def true_flight(rng, n, h, swiftly=True, theta=(-0.2, 0.3)):
 def new_monitor(h, e_zero=0.0, const=0.0, **fields):
     """A monitor of one sample a frame that is declared these errors."""
     monitor = np.zeros(1, SENSOR_MONITOR_RECORD).view(np.recarray)[0]
-    config = monitor["redundancy"]["config"]
-    fill(monitor["redundancy"], sample_time_s=h, decay=np.exp(-h * np.array(FILTER_POLES_PER_S)), g=GRAVITY)
-    config["e_zero"], config["const"] = e_zero, const
-    config["max_airspeed_mps"], config["wind_max"] = 80.0, 1.0
-    monitor["redundancy"]["memory"]["engine_commands"] = 1800.0, 20.0
+    red = monitor["redundancy"]
+    fill(red, h=h, decay=np.exp(-h * np.array(FILTER_POLES_PER_S)), g=GRAVITY)
+    fill(red, e_zero=e_zero, const=const, max_airspeed_mps=80.0, wind_max=1.0)
+    red["y_pred"][[ENGINE_SPEED, MANIFOLD]] = 1800.0, 20.0
     fill(monitor, enabled=1, substeps=1, has_engine=1, rate_gain=1.0, n_frozen=3, isolated_sensor=NO_SENSOR)
     return fill(monitor, alarmed_at_s=-1.0, isolated_at_s=-1.0, **fields)

@@ -63,7 +63,6 @@ import numpy as np
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.detection.filters import leak
 from beaver_ftc.diagnosis.monitors.redundancy import (
-    AIRSPEED,
     ALPHA,
     ALPHA_TEST,
     ANGLE_TEST,
@@ -77,7 +76,6 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     H_BETA,
     H_PHI,
     H_THETA,
-    MIN_AIRSPEED_MPS,
     MIN_QDYN_PA,
     N_INITIAL,
     N_TESTS,
@@ -86,9 +84,13 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     SPEED_TEST,
     THETA,
     TURN_TEST,
+    P,
+    Q,
+    R,
     down,
     exceeds,
     secant,
+    speed,
     too_steep,
     vector_length,
 )
@@ -106,9 +108,9 @@ SLOW_POLE = 2  # index in redundancy.FILTER_POLES_PER_S
 # Of each hypothesis, the tests that react at once to a change of its error; the residual of the first is that
 # change
 AT_ONCE = (
+    (SPEED_TEST, DENSITY_TEST),
     (ALPHA_TEST,),
     (BETA_TEST,),
-    (SPEED_TEST, DENSITY_TEST),
     (ANGLE_TEST, TURN_TEST, TURN_TEST + 1, TURN_TEST + 2),
     (ANGLE_TEST + 1, TURN_TEST, TURN_TEST + 1, TURN_TEST + 2),
 )
@@ -129,41 +131,38 @@ def start_bounds(ini, y):
     T: temperature of the standard troposphere, over that at sea level. V_air: airspeed by dynamic pressure
     and standard density, m/s; most, least: reading over truth in the thickest and in the thinnest air.
     """
-    e = ini.e_start
-    for h, i in ((H_ALPHA, ALPHA), (H_BETA, BETA)):
-        e[h] = 2.0 * np.sin(0.5 * min(abs(y[i]) + MAX_FLOW_ANGLE_RAD, np.pi))
     T = max(1.0 - 2.25577e-5 * y[ALTITUDE], MIN_TEMPERATURE_RATIO)
     V_air = np.sqrt(2.0 * max(y[QDYN], MIN_QDYN_PA) / (1.225 * T**4.2559))
-    ratio = max(y[AIRSPEED], MIN_AIRSPEED_MPS) / V_air
-    most, least = ratio * np.sqrt(1.0 + DENSITY_SHARE), ratio * np.sqrt(1.0 - DENSITY_SHARE)
-    e[H_AIRSPEED] = min(max(most - 1.0, 1.0 - least), MAX_SPEED_RATIO - 1.0)
-    e[H_PHI] = e[H_THETA] = MAX_CHORD
-    ini.e[:] = e
+    most, least = np.sqrt(1.0 + DENSITY_SHARE), np.sqrt(1.0 - DENSITY_SHARE)
+    off = max(speed(y) / V_air * most - 1.0, 1.0 - speed(y) / V_air * least)
+    ini.e_start[H_AIRSPEED] = min(off, MAX_SPEED_RATIO - 1.0)
+    ini.e_start[H_ALPHA] = 2.0 * np.sin(0.5 * min(abs(y[ALPHA]) + MAX_FLOW_ANGLE_RAD, np.pi))
+    ini.e_start[H_BETA] = 2.0 * np.sin(0.5 * min(abs(y[BETA]) + MAX_FLOW_ANGLE_RAD, np.pi))
+    ini.e_start[H_PHI:] = MAX_CHORD
+    ini.e[:] = ini.e_start
 
 
 @kernel
 def allowed_effect(red, j, m):
     """r + B: bound on the effect of any error on a test through a filter, in the unit of the residual."""
-    test = red.test[j]
-    return abs(test.r[m]) + test.B[m]
+    return abs(red.r[j, m]) + red.B[j, m]
 
 
 @kernel
 def widen_bounds(red, ini):
     """Update d, and widen e by the part of it that the slowest filter forgets in a sample."""
-    lost, e = 1.0 - red.config.decay[SLOW_POLE], ini.e
-    for i in range(N_INITIAL):
-        j = CHANGE_TEST[i]
-        d = allowed_effect(red, j, SLOW_POLE) + e[i] * ini.H_m[i, j, SLOW_POLE]
-        if i == H_AIRSPEED:  # from m/s to a share of the truth, which is at least V / (1 + e)
-            d *= (1.0 + e[i]) / max(red.memory.y_past[AIRSPEED], MIN_AIRSPEED_MPS)
-        ini.d[i] = min(d, ini.e_start[i])
-        e[i] = min(e[i] + lost * ini.d[i], ini.e_start[i])
+    m, e = SLOW_POLE, ini.e
+    for h, j in enumerate(CHANGE_TEST):
+        d = allowed_effect(red, j, m) + e[h] * ini.H_m[h, j, m]
+        if h == H_AIRSPEED:  # from m/s to a share of the truth, which is at least V / (1 + e)
+            d *= (1.0 + e[h]) / speed(red.y_past)
+        ini.d[h] = min(d, ini.e_start[h])
+        e[h] = min(e[h] + (1.0 - red.decay[m]) * ini.d[h], ini.e_start[h])
 
 
 @kernel
-def fill_attitude_effects(ini, h, w, y):
-    """Fill H for the tests of the attitude; w (3,) rad/s.
+def fill_attitude_effects(ini, h, y):
+    """Fill H for the tests of the attitude.
 
     Body axes. phi off by e: (q, r) is turned by e about the first axis, which changes it by
     2 sin(e / 2) |(q, r)|. theta off: the vertical, about which the aircraft turns at psi', likewise.
@@ -173,18 +172,16 @@ def fill_attitude_effects(ini, h, w, y):
     secants, of reading and truth differ by at most 2 sin(e / 2) over both cosines; in
     theta' = q cos(phi) - r sin(phi) there is no theta.
     """
-    H = ini.H
     # 1 / cos(theta) by its reading, and the largest one if theta is off
     sec, sec_max = secant(y[THETA]), secant(abs(y[THETA]) + angle_of_chord(ini.e[H_THETA]))
-    second = (h * (abs(w[0]) + abs(w[1]) + abs(w[2]))) ** 2  # rad2: the axes turn during the step
+    second = (h * (abs(y[P]) + abs(y[Q]) + abs(y[R]))) ** 2  # rad2: the axes turn during the step
     # Rotation in a step, rad: about the body's second and third axes; about the vertical, psi' h
-    qr = h * np.hypot(w[1], w[2])
-    heading = h * abs(w[1] * np.sin(y[PHI]) + w[2] * np.cos(y[PHI])) * sec_max
-    for i in range(3):
-        H[H_PHI, TURN_TEST + i] = second + (qr if i > 0 else 0.0)
-        H[H_THETA, TURN_TEST + i] = second + heading
-        H[H_PHI, ANGLE_TEST + i] = sec * (qr + sec * second)
-        H[H_THETA, ANGLE_TEST + i] = sec * ((heading if i != 1 else 0.0) + sec_max * second)
+    qr = h * np.hypot(y[Q], y[R])
+    heading = h * abs(y[Q] * np.sin(y[PHI]) + y[R] * np.cos(y[PHI])) * sec_max
+    by_phi, by_theta = sec * (qr + sec * second), sec * sec_max * second
+    ini.H[H_PHI, :SPEED_TEST] = second, second + qr, second + qr, by_phi, by_phi, by_phi
+    ini.H[H_THETA, :ANGLE_TEST] = second + heading
+    ini.H[H_THETA, ANGLE_TEST:SPEED_TEST] = sec * heading + by_theta, by_theta, sec * heading + by_theta
 
 
 @kernel
@@ -192,8 +189,8 @@ def fill_effects(red, ini, y_now):
     """Fill H (N_INITIAL, RPM_TEST) and C, taken at the sample before, y, from which y_now is predicted.
 
     h2: h and the second order in h. A, n: bound on |a| in the step, and over V; G: gravity; P: |(p, r)|; each
-    times h2. sa, ca, sb, cb, ct: sines and cosines of alpha, beta, theta; d0, d1, d2: the vertical; sec,
-    sec_max: 1 / cos(beta) by its reading, and the largest if beta is off. x: the error of the hypothesis.
+    times h2. ct, sb, cb: sines and cosines of theta, beta; d0, d1, d2: the vertical; sec, sec_max: 1 /
+    cos(beta) by its reading, and the largest if beta is off. x: the error of the hypothesis.
 
     alpha off    V' = a . v / V, the direction of v is turned by alpha and changes by x at most; in alpha'
                  (a_z, a_x) / (V cos(beta)) and tan(beta) (p, r) are turned by alpha, in beta' (p, r) and
@@ -211,40 +208,30 @@ def fill_effects(red, ini, y_now):
                  take at most all of it, beta' the part sin(phi) along the second axis, and sin(beta) of the
                  rest. The vertical is turned, against v
     """
-    M, h, g, e, H = red.memory, red.config.sample_time_s, red.config.g, ini.e, ini.H
-    y, a = M.y_past, M.a
-    p, q, r = y[0], y[1], y[2]
-    V = max(y[AIRSPEED], MIN_AIRSPEED_MPS)
-    sa, ca = np.sin(y[ALPHA]), np.cos(y[ALPHA])
-    sb, cb = np.sin(y[BETA]), np.cos(y[BETA])
-    ct, (d0, d1, d2) = np.cos(y[THETA]), down(y)
+    h, g, e, H, y, a = red.h, red.g, ini.e, ini.H, red.y_past, red.a
+    V, ct, s_phi, sb, cb = speed(y), np.cos(y[THETA]), np.sin(y[PHI]), np.sin(y[BETA]), np.cos(y[BETA])
+    d0, d1, d2 = down(y)
     beta_max = abs(y[BETA]) + angle_of_chord(e[H_BETA])
     sec, sec_max = secant(y[BETA]), secant(beta_max)
-    # m/s2: a across the flow, downwards and sideways
-    a_normal = a[2] * ca - a[0] * sa
-    a_side = a[1] * cb - (a[0] * ca + a[2] * sa) * sb
-    # rad/s: rate about the flow's projection on the plane of symmetry; minus that about the axis across it
-    roll, yaw = p * ca + r * sa, p * sa - r * ca
-    a_max = max(M.a_size[0], vector_length(a))
-    h2 = h * (1.0 + h * (a_max / V + abs(p) + abs(q) + abs(r)))
-    A, n, G, P = h2 * a_max, h2 * a_max / V, h2 * g, h2 * np.hypot(p, r)
-    vert, across = h * V * cb * np.hypot(d0, d2), ct * np.hypot(sb, sa * cb)
-    climb = abs(M.predicted_reading[ALTITUDE] - y[ALTITUDE])
+    # Along the flow's projection on the plane of symmetry, and (imaginary) against the axis across it: rates
+    # rad/s, acceleration m/s2, the vertical
+    z = complex(np.cos(y[ALPHA]), np.sin(y[ALPHA]))
+    rate, acc, vertical = z * complex(y[P], -y[R]), z * complex(a[0], -a[2]), z * complex(d0, -d2)
+    a_max = max(red.a_size[0], vector_length(a))
+    h2 = h * (1.0 + h * (a_max / V + abs(y[P]) + abs(y[Q]) + abs(y[R])))
+    A, n, G, P_h = h2 * a_max, h2 * a_max / V, h2 * g, h2 * abs(rate)
+    vert, across = h * V * cb * abs(vertical), ct * np.hypot(sb, z.imag * cb)
+    climb = abs(red.y_pred[ALTITUDE] - y[ALTITUDE])
     slower = 1.0 - min(e[H_AIRSPEED], 1.0 - 1.0 / MAX_SPEED_RATIO)
-    fill_attitude_effects(ini, h, (p, q, r), y)
-    # By hypothesis: alpha, beta, V, phi, theta
-    density = 2.0 * np.log(max(y_now[AIRSPEED], MIN_AIRSPEED_MPS) / V)
-    H[:, SPEED_TEST] = A, A, 0.0, G * across, G
-    H[:, ALPHA_TEST] = (
-        sec * (n + P * abs(sb)), sec * sec_max * (h2 * abs(roll) + n), sec * n, sec * G * ct / V, sec * G / V,
-    )  # fmt: skip
-    H[:, BETA_TEST] = (
-        P + n * abs(sb), n, sec * n, sec * G * ct / V, G * (abs(np.sin(y[PHI])) + abs(sb)) / V,
-    )  # fmt: skip
+    density = 2.0 * np.log(speed(y_now) / V)
+    fill_attitude_effects(ini, h, y)
+    # By hypothesis: V, alpha, beta, phi, theta
+    by_beta, by_phi, by_theta = sec * sec_max * (h2 * abs(rate.real) + n), sec * G * ct / V, sec * G / V
+    H[:, SPEED_TEST] = 0.0, A, A, G * across, G
+    H[:, ALPHA_TEST] = sec * n, sec * (n + P_h * abs(sb)), by_beta, by_phi, by_theta
+    H[:, BETA_TEST] = sec * n, P_h + n * abs(sb), n, by_phi, G * (abs(s_phi) + abs(sb)) / V
     H[H_AIRSPEED, DENSITY_TEST] = abs(density)
-    H[:, CLIMB_TEST] = (
-        vert, h * V * np.hypot(ca * d0 + sa * d2, d1), climb / slower, h * V * across, h * V,
-    )  # fmt: skip
+    H[:, CLIMB_TEST] = climb / slower, vert, h * V * np.hypot(vertical.real, d1), h * V * across, h * V
     # theta: along the first axis, g (sin(reading) - sin(truth)) = x g cos(mean of both). The mean is at most
     # half the error away from the reading, and at most (reading + a right angle) / 2
     pitch = abs(y[THETA])
@@ -252,23 +239,23 @@ def fill_effects(red, ini, y_now):
     # alpha: altitude' = V cos(beta) vert sin(gamma - alpha) + ..., where
     # tan(gamma) = tan(theta) / cos(phi). The sines of reading and truth differ by x cos(mean of gamma -
     # alpha)
-    path = abs(np.arctan2(-d0, d2) - y[ALPHA]) + 0.5 * angle_of_chord(e[H_ALPHA])
+    path = abs(np.arctan2(vertical.real, -vertical.imag)) + 0.5 * angle_of_chord(e[H_ALPHA])
     # phi: (q, r), and gravity g cos(theta) (sin(phi), cos(phi)) across the first axis, are turned by it.
     # alpha off by e: beta' changes by x (roll cos(e / 2) + yaw sin(e / 2)). beta off by e: alpha' changes by
     # x cos(e / 2) roll over both cosines. The part of the force in both, of either sign, comes last
     ini.C[:] = (
-        h * complex(q, r),
+        h * complex(y[Q], y[R]),
         h * g * complex(d2, d1),
-        complex(h * (q * np.sin(y[PHI]) + r * np.cos(y[PHI]))),
+        complex(h * (y[Q] * s_phi + y[R] * np.cos(y[PHI]))),
         complex(h * g * np.cos(mean)),
-        h * complex(roll, yaw),
-        complex(h * roll),
+        h * rate,
+        complex(h * rate.real),
         complex(vert * np.cos(min(path, 0.5 * np.pi))),
-        complex(h * a_normal * sec / V),
-        complex(h * a_side / V),
+        complex(-h * acc.imag * sec / V),
+        complex(h * (a[1] * cb - acc.real * sb) / V),
         complex(density),
         complex(h * abs(sb) * a_max / V),
-        complex(h * np.sin(min(beta_max, 0.5 * np.pi)) * sec * sec_max * abs(a_normal) / V),
+        complex(h * np.sin(min(beta_max, 0.5 * np.pi)) * sec * sec_max * abs(acc.imag) / V),
     )
 
 
@@ -284,25 +271,22 @@ def tighten_bounds(red, ini):
     The tests of the flow have bounds for a right airspeed: a true one that is 1 + e times smaller makes them
     larger by that. The density shows changes of its error in addition: those are in the airspeed's own test.
     """
-    e, V = ini.e, max(red.memory.y_past[AIRSPEED], MIN_AIRSPEED_MPS)
-    for m in range(red.config.decay.size):
+    e, V = ini.e, speed(red.y_past)
+    for m in range(red.decay.size):
         ratio = 1.0 + e[H_AIRSPEED]
-        for n in range(len(EVIDENCE)):
-            h, first, last = EVIDENCE[n]
-            C, s = ini.C_m[n, m], 0.0
+        for n, (h, first, last) in enumerate(EVIDENCE):
+            C, s2 = ini.C_m[n, m], 0.0
             for j in range(first, last + 1):
                 effect = allowed_effect(red, j, m) + 2.0 * ini.d[h] * ini.H_m[h, j, m]
-                s += (effect * V if j > first == SPEED_TEST else effect) ** 2
-            s, c = np.sqrt(s), abs(C)
-            if h == H_AIRSPEED:
-                s = (
-                    ratio * s
-                    if first < DENSITY_TEST
-                    else s + 2.0 * ratio * allowed_effect(red, SPEED_TEST, m) / V
-                )
+                s2 += (effect * V if j > first == SPEED_TEST else effect) ** 2
+            s, c = np.sqrt(s2), abs(C)
+            if first == DENSITY_TEST:
+                s += 2.0 * ratio * allowed_effect(red, SPEED_TEST, m) / V
+            elif h == H_AIRSPEED:
+                s *= ratio
             elif h <= H_BETA and first < CLIMB_TEST:
                 half = 0.5 * angle_of_chord(e[h])
-                force = ini.C_m[len(EVIDENCE) + h, m].real
+                force = ini.C_m[len(EVIDENCE) + h - H_ALPHA, m].real
                 c = np.cos(half) * abs(C.real) - np.sin(half) * abs(C.imag) - force
             if c > 0.0:
                 e[h] = min(e[h], s / (EFFECT_LEFT * c))
@@ -316,11 +300,11 @@ def update_bounds(red, ini, y):
         return
     widen_bounds(red, ini)
     fill_effects(red, ini, y)
-    for n in range(ini.C.size):
-        leak(ini.C_m[n], red.config.decay, ini.C[n])
-    for i in range(N_INITIAL):
+    for n, C in enumerate(ini.C):
+        leak(ini.C_m[n], red.decay, C)
+    for h in range(N_INITIAL):
         for j in range(RPM_TEST):
-            leak(ini.H_m[i, j], red.config.decay, ini.H[i, j])
+            leak(ini.H_m[h, j], red.decay, ini.H[h, j])
     tighten_bounds(red, ini)
 
 
@@ -330,21 +314,19 @@ def refutes_initial(red, ini, h, j):
     pole m, r > factor B + x H_m, x = e + d. No hypothesis has an effect on the engine's tests and later
     ones.
     """
-    test = red.test[j]
     if j >= RPM_TEST:
-        return test.ratio > 1.0
+        return red.ratio[j] > 1.0
     x = ini.e[h] + ini.d[h]
     factor = 1.0 + x if h == H_AIRSPEED and j >= SPEED_TEST else 1.0
-    return exceeds(test.r, factor, test.B, x, ini.H_m[h, j])
+    return exceeds(red.r[j], factor, red.B[j], x, ini.H_m[h, j])
 
 
 @kernel
 def latch_refuted(red, ini, exceeded):
     """Record by which of `exceeded` (N_TESTS,) each hypothesis is refuted."""
-    for i in range(N_INITIAL):
+    for h in range(N_INITIAL):
         for j in range(N_TESTS):
-            if exceeded[j] and not ini.refuted[i, j]:
-                ini.refuted[i, j] = refutes_initial(red, ini, i, j)
+            ini.refuted[h, j] |= exceeded[j] and refutes_initial(red, ini, h, j)
 
 
 @kernel

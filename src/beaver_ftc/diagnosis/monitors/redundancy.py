@@ -15,7 +15,7 @@ its gusts within a filter's memory.
 
     y, y_past, y_pred  (N_SENSORS,)  readings now, in the sample before, as predicted from that; SI
     e, e_past, e_older (N_SENSORS,)  bounds on their errors: now, in the sample before, in that before it
-    e_new              (N_SENSORS,)  bound on the part of an error that changes from sample to sample
+    n                  (N_SENSORS,)  bound on the part of an error that changes from sample to sample
     w, w_max                         body rates (3,), bound on |p| + |q| + |r|; rad/s
     e_w                              sum of the bounds on the errors of the three gyros, rad/s
     v, a, a_past       (3,)          velocity m/s, acceleration m/s2 with gravity, that of the sample before
@@ -23,7 +23,7 @@ its gusts within a filter's memory.
                                      axes
     h                                time between two samples, s: a JSBSim frame
     i, j, m, d                       sensor or axis, test, pole of a filter, duplicate sensor
-    red, c, M                        record of the tests, its configuration, its memory
+    red                              record of the tests
 
 This file also has the records of the sensor monitor, their configuration, and its finding in words.
 """
@@ -43,6 +43,7 @@ from beaver_ftc.plant.instruments import (
     ALTITUDE,
     AX,
     ENGINE_SPEED,
+    MANIFOLD,
     N_SENSORS,
     PHI,
     SENSORS,
@@ -52,31 +53,25 @@ from beaver_ftc.plant.instruments import (
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.sensors import N_IN_EQUATIONS, ROWS, frames_apart, sensor_words
 
-TURN_TEST = 0
-ANGLE_TEST = 3
-SPEED_TEST = 6
-ALPHA_TEST = 7
-BETA_TEST = 8
-DENSITY_TEST = 9
-CLIMB_TEST = 10
-RPM_TEST = 11
-PRESSURE_TEST = 12
-N_EQUATIONS = 13  # tests with an equation; then those of sensors that should equal another reading
+# The tests by number; 0 to 2 are of turning about axis 0 to 2, 3 to 5 of phi, theta, psi. In each, a jump of
+# one reading appears at once: the rows of the sensors name it.
+TEST_NAMES = (
+    "roll", "pitch", "yaw", "bank angle", "pitch angle", "heading", "speed", "incidence", "sideslip",
+    "density", "climb", "engine speed", "manifold pressure",
+)  # fmt: skip
+TURN_TEST, ANGLE_TEST, SPEED_TEST, ALPHA_TEST, BETA_TEST, DENSITY_TEST, CLIMB_TEST = 0, 3, 6, 7, 8, 9, 10
+RPM_TEST, PRESSURE_TEST = 11, 12
+N_EQUATIONS = len(TEST_NAMES)  # then the tests of sensors that should equal another reading
+_NAMED = [row.test for row in ROWS]
+SENSOR_OF = tuple(_NAMED.index(name) for name in TEST_NAMES)
 DUPLICATES = tuple((SENSORS.index(row.name), row.equal) for row in ROWS if row.equal is not None)
 N_TESTS = N_EQUATIONS + len(DUPLICATES)
-# The test in which a jump of a reading appears at once, as the rows of the sensors name it.
-TEST_BY_NAME = {
-    "roll": TURN_TEST, "pitch": TURN_TEST + 1, "yaw": TURN_TEST + 2,
-    "bank angle": ANGLE_TEST, "pitch angle": ANGLE_TEST + 1, "heading": ANGLE_TEST + 2,
-    "speed": SPEED_TEST, "incidence": ALPHA_TEST, "sideslip": BETA_TEST, "density": DENSITY_TEST,
-    "climb": CLIMB_TEST, "engine speed": RPM_TEST, "manifold pressure": PRESSURE_TEST,
-}  # fmt: skip
 # Of each sensor that should equal another reading (its row in scenario/sensors.py says which): its place in
 # the readings, the place of that reading, the test that an error of that reading exceeds, and the largest
 # difference of the two quantities, SI.
 DUPLICATE = np.array([i for i, _ in DUPLICATES], np.int64)
 COUNTERPART = np.array([SENSORS.index(equal.reading) for _, equal in DUPLICATES], np.int64)
-COUNTERPART_TEST = np.array([TEST_BY_NAME[ROWS[i].test] for i in COUNTERPART], np.int64)
+COUNTERPART_TEST = np.array([TEST_NAMES.index(_NAMED[i]) for i in COUNTERPART], np.int64)
 DUPLICATE_TOLERANCE = np.array([equal.within for _, equal in DUPLICATES], float)
 FILTER_POLES_PER_S = (1e6, 10.0, 1.0)  # of the filters of each test; the first is the residual itself
 N_POLES = len(FILTER_POLES_PER_S)
@@ -95,7 +90,7 @@ P, Q, R, ALPHA, BETA, AIRSPEED, QDYN = range(len(SIGNALS))
 THETA, PSI = PHI + 1, PHI + 2
 
 # Hypotheses of initial_errors.py: this sensor has been broken since the monitor began
-H_ALPHA, H_BETA, H_AIRSPEED, H_PHI, H_THETA = range(5)
+H_AIRSPEED, H_ALPHA, H_BETA, H_PHI, H_THETA = range(5)
 N_INITIAL = 5
 # What bounds such an error: its hypothesis, and the tests, first to last, in which its effect shows
 EVIDENCE = (
@@ -107,38 +102,30 @@ EVIDENCE = (
 )  # fmt: skip
 N_EFFECTS = len(EVIDENCE) + 2  # and the parts of the force
 
-# One test; units: of the residual. bound_per_s, bound_per_sample: parts of the bound on the residual of one
-# sample, the first for each second of it; past_bound: bound_per_sample of the sample before. gust_gain:
-# effect on the residual of 1 m/s that a gust changes by. r: filtered residual. B: bound on |r|; e: the
-# part of it that the filter sums. ratio: largest |r| / B over the poles.
-TEST_RECORD = record(
-    residual=float, bound_per_s=float, bound_per_sample=float, past_bound=float, gust_gain=float,
-    r=N_POLES, B=N_POLES, e=N_POLES, ratio=float,
-)  # fmt: skip
-
+# Symbols: above.
 REDUNDANCY_RECORD = record(
-    config=record(
-        sample_time_s=float, decay=N_POLES, g=float,  # of each filter per sample; m/s2
-        # Declared turbulence, m/s: bound on a gust's speed; bound on its changes through each filter, which
-        # holds up to max_airspeed_mps, and above low_m: below it a gust changes faster
-        gust_max=float, gust_change=N_POLES, max_airspeed_mps=float, low_m=float,
-        wind_max=float,  # of the vertical wind, m/s
-        # Declared errors, SI: |error| <= e_zero + e_slope |y|, of which const does not change; of the
-        # attitude, rad/s
-        e_zero=N_SENSORS, e_slope=N_SENSORS, const=N_SENSORS, drift=float,
-    ),
-    memory=record(
-        # bounds on the error of each reading: e; part of it that changes; part of it by drift, rad; before
-        reading_bound=N_SENSORS, e_new=N_SENSORS, e_drift=float, e_past=N_SENSORS, e_older=N_SENSORS,
-        # of the sample before; predict_readings turns a_past into the present axes
-        y_past=N_SENSORS, a=3, a_past=3,
-        # m/s2: |a| in the elapsed step and in the two before it; of a_past
-        a_size=3, a_size_past=float,
-        e_first=float,  # m/s2, in the first step only: no sample precedes it
-        predicted_reading=N_SENSORS,
-        engine_commands=2,  # engine speed rpm, manifold pressure inHg
-    ),
-    test=(TEST_RECORD, N_TESTS),
+    h=float, decay=N_POLES, g=float,  # decay: of each filter per sample; g m/s2
+    # Declared turbulence, m/s: bound on a gust's speed; bound on its changes through each filter, which
+    # holds up to max_airspeed_mps, and above low_m: below it a gust changes faster
+    gust_max=float, gust_change=N_POLES, max_airspeed_mps=float, low_m=float,
+    wind_max=float,  # of the vertical wind, m/s
+    # Declared errors, SI: |error| <= e_zero + e_slope |y|, of which const does not change; of the attitude,
+    # rad/s
+    e_zero=N_SENSORS, e_slope=N_SENSORS, const=N_SENSORS, drift=float,
+    # Bounds on the error of each reading; e_drift: part of them by drift, rad
+    e=N_SENSORS, n=N_SENSORS, e_drift=float, e_past=N_SENSORS, e_older=N_SENSORS,
+    # of the sample before; predict_readings turns a_past into the present axes
+    y_past=N_SENSORS, y_older=N_SENSORS, a=3, a_past=3,
+    # m/s2: |a| in the elapsed step and in the two before it; of a_past
+    a_size=3, a_size_past=float,
+    e_first=float,  # m/s2, in the first step only: no sample precedes it
+    y_pred=N_SENSORS,  # of the engine's readings: the commands
+    # By test, in the unit of the residual. per_s, per_sample: parts of the bound on the residual of one
+    # sample, the first for each second of it; past: per_sample of the sample before. gust: effect on the
+    # residual of 1 m/s that a gust changes by. r: filtered residual. B: bound on |r|; e_sum: the part of it
+    # that the filter sums. ratio: largest |r| / B over the poles.
+    residual=N_TESTS, per_s=N_TESTS, per_sample=N_TESTS, past=N_TESTS, gust=N_TESTS,
+    r=(N_TESTS, N_POLES), B=(N_TESTS, N_POLES), e_sum=(N_TESTS, N_POLES), ratio=N_TESTS,
 )  # fmt: skip
 
 INITIAL_ERRORS_RECORD = record(
@@ -164,17 +151,16 @@ MONITOR_MEMORY_RECORD = record(
     # angle's own residual; by angle and pole, filtered size of the angle's residual; by angle and body axis,
     # largest size of turn_share
     beyond=(3, 3, N_POLES), swing=(3, N_POLES), c_max=(3, 3),
-    # by axis, rad/s: error of the gyro if the attitude is right, as this frame and the one before began; its
-    # largest size in the other samples of this frame, of the one before, of the one before that; its smallest
-    # size there, of this frame and the one before
-    w_att=3, w_att_past=3, peak=3, peak_past=3, peak_older=3, floor=3, floor_past=3,
+    # by frame (this one, the one before, that before it), kind (SHOWN, MOST, LEAST of sensor_monitor.py) and
+    # axis, rad/s: error of the gyro if the attitude is right
+    shown=(3, 3, 3),
     # by axis, rad/s: error of the gyro if the dynamics are right (w of sensor_monitor.py), and its bound
     w=3, w_bound=3,
     agreed=(int, max(len(DUPLICATES), 1)),  # a sensor with the reading that it should equal
     # by axis and pole, rad: filtered difference of the turn that the attitude and w show, and its bound;
     # beyond it no gyro can be broken
     gyros_excluded=int, gap=(3, N_POLES), gap_bound=(3, N_POLES), gyro_verdict=(int, 3), replaced=(int, 3),
-    n_same=(int, N_SENSORS), y_older=N_SENSORS, cleared=(int, N_SENSORS), turn_max=float,
+    n_same=(int, N_SENSORS), cleared=(int, N_SENSORS), turn_max=float,
     jump=float,  # of the accelerometers, m/s2, which fades
     # since the alarm, of speed, incidence, sideslip: number of samples; sums of the residuals, of the part of
     # sound sensors, of the part of an initial error; range of the readings
@@ -205,7 +191,7 @@ def configure_sensor_monitor(monitor: np.void, declared: Declared, design: np.vo
 
     A monitor that is not declared has found nothing, and its record holds no more than that.
     """
-    output, config = monitor["output"], monitor["config"]
+    output, config, red = monitor["output"], monitor["config"], monitor["redundancy"]
     output["isolated_sensor"], output["alarmed_at_s"], output["isolated_at_s"] = NO_SENSOR, -1.0, -1.0
     config["enabled"] = declared.monitors_sensors
     if not declared.monitors_sensors:
@@ -217,41 +203,34 @@ def configure_sensor_monitor(monitor: np.void, declared: Declared, design: np.vo
     config["D_size"] = np.where(np.eye(3) > 0.0, -D, abs(D))
     monitor["memory"]["substep"] = declared.substeps - 1  # the first JSBSim frame ends a frame of the loop
     if config["has_engine"]:
-        monitor["redundancy"]["memory"]["engine_commands"] = (
-            initial.engine_rpm,
-            initial.manifold_pressure_inhg,
-        )
-    configure_tests(monitor["redundancy"]["config"], declared)
-    configure_errors(monitor, declared, monitor["redundancy"]["config"]["sample_time_s"])
+        red["y_pred"][[ENGINE_SPEED, MANIFOLD]] = initial.engine_rpm, initial.manifold_pressure_inhg
+    configure_tests(red, declared)
+    configure_errors(config, red, declared)
 
 
-def configure_tests(config: np.void, declared: Declared) -> None:
+def configure_tests(red: np.void, declared: Declared) -> None:
     """Fill the constants of the equations of motion and of the gusts; a sample is a JSBSim frame."""
-    initial, h = declared.initial, 1.0 / declared.rate_hz / declared.substeps
-    config["sample_time_s"] = h
-    config["decay"] = [exp(-lam * h) for lam in FILTER_POLES_PER_S]
-    config["g"] = GRAVITY_MPS2 * (1.0 + initial.altitude_m / EARTH_RADIUS_M) ** -2
-    config["gust_max"], config["gust_change"] = bound_gusts(declared.air, initial.airspeed_mps, h)
-    config["max_airspeed_mps"] = MAX_AIRSPEED_OVER_TRIM * initial.airspeed_mps
-    config["low_m"] = declared.air.low_m
-    config["wind_max"] = declared.vertical_wind_mps
+    initial, air = declared.initial, declared.air
+    red["h"] = h = 1.0 / declared.rate_hz / declared.substeps
+    red["decay"] = [exp(-lam * h) for lam in FILTER_POLES_PER_S]
+    red["g"] = GRAVITY_MPS2 * (1.0 + initial.altitude_m / EARTH_RADIUS_M) ** -2
+    red["gust_max"], red["gust_change"] = bound_gusts(air, initial.airspeed_mps, h)
+    red["max_airspeed_mps"] = MAX_AIRSPEED_OVER_TRIM * initial.airspeed_mps
+    red["low_m"], red["wind_max"] = air.low_m, declared.vertical_wind_mps
 
 
-def configure_errors(mon: np.void, declared: Declared, h: float) -> None:
+def configure_errors(config: np.void, red: np.void, declared: Declared) -> None:
     """Fill the declared errors of the readings, and from how many identical samples each is frozen; a sample
     is a JSBSim frame."""
-    tests = mon["redundancy"]["config"]
-    c = mon["config"]
-    sensors = declared.sensors
+    sensors, h = declared.sensors, float(red["h"])
     for i, name in enumerate(SENSORS):
         e = sensors[name]
-        (tests["e_zero"][i], tests["e_slope"][i], tests["const"][i]) = (e.worst, e.slope, e.steady)
-        c["n_frozen"][i] = n_frozen(e.noise, e.resolution) * frames_apart(i, h)
+        red["e_zero"][i], red["e_slope"][i], red["const"][i] = e.worst, e.slope, e.steady
+        config["n_frozen"][i] = n_frozen(e.noise, e.resolution) * frames_apart(i, h)
         drift = getattr(getattr(sensors.declared, name), "drift_rad_s", 0.0)
-        tests["drift"] = max(tests["drift"], abs(drift))
-    attitude = slice(PHI, PHI + 3)
-    c["noisy"] = np.any(tests["e_zero"][attitude] > tests["const"][attitude])
-    c["rate_gain"] = min(1.0, h * RATE_GAIN_PER_S) if c["noisy"] else 1.0
+        red["drift"] = max(red["drift"], abs(drift))
+    config["noisy"] = np.any((red["e_zero"] > red["const"])[PHI : PHI + 3])
+    config["rate_gain"] = min(1.0, h * RATE_GAIN_PER_S) if config["noisy"] else 1.0
 
 
 def n_frozen(noise: float, resolution: float) -> int:
@@ -306,8 +285,6 @@ MIN_SPEED_MPS = 1e-3  # at least so much where a predicted speed divides
 # of a reading that its constant error leaves, at least, under a logarithm
 MIN_SHARE_LEFT = 0.01
 READING_ROUNDING = 1e-10  # of a reading: the part of each bound that covers rounding
-# of a test that compares a reading with its prediction: that reading
-READING_OF = ((SPEED_TEST, AIRSPEED), (ALPHA_TEST, ALPHA), (BETA_TEST, BETA), (CLIMB_TEST, ALTITUDE))
 COMPARISON_ROUNDING = 1e-6  # in the unit of the reading: the same where two readings are compared directly
 # JSBSim integrates the velocity by Adams and Bashforth's second order, v + h (3/2 a - 1/2 a_before).
 AB_NOW, AB_PAST = 1.5, 0.5
@@ -331,18 +308,10 @@ def inverse(q):
 @kernel
 def attitude(y):
     """q of the Euler angles: psi about the third axis, theta about the second, phi about the first."""
-    c2, s2 = np.cos(y[THETA] / 2), np.sin(y[THETA] / 2)
-    c3, s3 = np.cos(y[PSI] / 2), np.sin(y[PSI] / 2)
-    z = complex(np.cos(y[PHI] / 2), np.sin(y[PHI] / 2))
-    return complex(c2 * c3, -s2 * s3) * z, complex(s2 * c3, c2 * s3) * z.conjugate()
-
-
-@kernel
-def turn_of_step(w, h):
-    """The turn by h w in one Euler step: (1, h w / 2) / |...|."""
-    x, y, z = 0.5 * h * w[0], 0.5 * h * w[1], 0.5 * h * w[2]
-    norm = np.sqrt(1.0 + x * x + y * y + z * z)
-    return complex(1.0, x) / norm, complex(y, z) / norm
+    phi, theta, psi = 0.5 * y[PHI], 0.5 * y[THETA], 0.5 * y[PSI]
+    heading = complex(np.cos(psi)), complex(0.0, np.sin(psi))
+    pitch = complex(np.cos(theta)), complex(np.sin(theta))
+    return times(times(heading, pitch), (complex(np.cos(phi), np.sin(phi)), 0j))
 
 
 @kernel
@@ -353,18 +322,16 @@ def turned(q, v):
 
 
 @kernel
-def turn_share(y, i, j):
-    """c: rotation about body axis i for a change of phi, theta or psi (j 0, 1, 2), rad/rad, at attitude y."""
-    if j == 2:
-        return down(y)[i]
-    return (1.0, 0.0, 0.0)[i] if j == 0 else (0.0, np.cos(y[PHI]), -np.sin(y[PHI]))[i]
-
-
-@kernel
 def down(y):
     """The vertical unit vector, downwards, in body axes."""
     c = np.cos(y[THETA])
     return -np.sin(y[THETA]), np.sin(y[PHI]) * c, np.cos(y[PHI]) * c
+
+
+@kernel
+def turn_share(y, i, j):
+    """c: rotation about body axis i for a change of phi, theta or psi (j 0, 1, 2), rad/rad, at attitude y."""
+    return ((1.0, 0.0, 0.0), (0.0, np.cos(y[PHI]), -np.sin(y[PHI])), down(y))[j][i]
 
 
 @kernel
@@ -386,6 +353,12 @@ def vector_length(v):
 
 
 @kernel
+def speed(y):
+    """V, m/s, of a reading: where it divides."""
+    return max(y[AIRSPEED], MIN_AIRSPEED_MPS)
+
+
+@kernel
 def exceeds(r, k, B, x, H):
     """Whether no error of a set explains a filtered residual: |r_m| > k B_m + x H_m for some pole m.
 
@@ -399,56 +372,54 @@ def exceeds(r, k, B, x, H):
 
 @kernel
 def bound_readings(red, y):
-    """Bounds by declaration: e = (e_zero + e_slope |y|) / (1 - e_slope), and e_new = e - const."""
-    c, M = red.config, red.memory
+    """Bounds by declaration: e = (e_zero + e_slope |y|) / (1 - e_slope), and n = e - const."""
     for i in range(N_SENSORS):
         size = abs(wrapped(y[i]) if i == PSI else y[i])
-        e = (c.e_zero[i] + c.e_slope[i] * size) / (1.0 - c.e_slope[i])
-        M.e_new[i] = e - c.const[i] + READING_ROUNDING * abs(y[i])
-        M.reading_bound[i] = e + M.e_drift if PHI <= i <= PSI else e
+        e = (red.e_zero[i] + red.e_slope[i] * size) / (1.0 - red.e_slope[i])
+        red.n[i] = e - red.const[i] + READING_ROUNDING * abs(y[i])
+        red.e[i] = e + red.e_drift if PHI <= i <= PSI else e
 
 
 @kernel
 def store_sample(red, y, force):
     """Take y and the specific force (3,) m/s2 as the sample before, for the next one."""
-    M = red.memory
-    M.y_past[:] = y
-    M.e_older[:] = M.e_past
-    M.e_past[:] = M.reading_bound
-    M.a[:] = combined(1.0, force, red.config.g, down(y))
+    red.y_older[:] = red.y_past
+    red.y_past[:] = y
+    red.e_older[:] = red.e_past
+    red.e_past[:] = red.e
+    red.a[:] = combined(1.0, force, red.g, down(y))
 
 
 @kernel
 def predict_readings(red):
     """Fill y_pred: attitude, flow and altitude now, from the sample before. Returns the attitude.
 
-    v <- v + h (3/2 a - 1/2 a_past), turned by -h w, as a_past is then. Of q = z1 + z2 j
+    q <- q (1, h w / 2) / |...|: the turn of an Euler step; v <- v + h (3/2 a - 1/2 a_past), turned by -h w,
+    as a_past is then. Of q = z1 + z2 j
 
         phi = arg(z1^2 - z2*^2),    2 z1 z2 = sin(theta) + i cos(theta) sin(psi)
     """
-    M, h = red.memory, red.config.sample_time_s
-    y, y_past = M.predicted_reading, M.y_past
-    step = turn_of_step(y_past, h)
-    q = times(attitude(y_past), step)
-    roll = q[0] * q[0] - (q[1] * q[1]).conjugate()
-    nose = 2.0 * q[0] * q[1]
+    h, y, past = red.h, red.y_pred, red.y_past
+    s1, s2 = complex(1.0, 0.5 * h * past[P]), 0.5 * h * complex(past[Q], past[R])
+    size = np.hypot(abs(s1), abs(s2))
+    step = s1 / size, s2 / size
+    z1, z2 = times(attitude(past), step)
+    roll, nose = z1**2 - z2.conjugate() ** 2, 2.0 * z1 * z2
     y[PHI] = np.arctan2(roll.imag, roll.real)
     y[THETA] = np.arcsin(min(max(nose.real, -1.0), 1.0))
-    y[PSI] = np.arctan2(nose.imag, abs(q[0]) ** 2 - abs(q[1]) ** 2)
-    alpha, beta, V = y_past[ALPHA], y_past[BETA], y_past[AIRSPEED]
-    v = V * np.cos(alpha) * np.cos(beta), V * np.sin(beta), V * np.sin(alpha) * np.cos(beta)
-    y[ALTITUDE] = y_past[ALTITUDE] - h * dot(v, down(y_past))
-    a = combined(AB_NOW, M.a, -AB_PAST, M.a_past)
-    M.a_size_past = vector_length(M.a_past)
-    M.a_size[2] = M.a_size[1]
-    M.a_size[1] = M.a_size[0]
-    M.a_size[0] = vector_length(a)
-    M.a_past[:] = turned(step, M.a)
+    y[PSI] = np.arctan2(nose.imag, abs(z1) ** 2 - abs(z2) ** 2)
+    V, along = past[AIRSPEED], past[AIRSPEED] * np.cos(past[BETA])
+    v = along * np.cos(past[ALPHA]), V * np.sin(past[BETA]), along * np.sin(past[ALPHA])
+    y[ALTITUDE] = past[ALTITUDE] - h * dot(v, down(past))
+    a = combined(AB_NOW, red.a, -AB_PAST, red.a_past)
+    red.a_size_past = vector_length(red.a_past)
+    red.a_size[:] = vector_length(a), red.a_size[0], red.a_size[1]
+    red.a_past[:] = turned(step, red.a)
     v = turned(step, combined(1.0, v, h, a))
     y[AIRSPEED] = vector_length(v)
     y[ALPHA] = np.arctan2(v[2], v[0])
     y[BETA] = np.arcsin(v[1] / max(y[AIRSPEED], MIN_SPEED_MPS))
-    return q
+    return z1, z2
 
 
 @kernel
@@ -462,29 +433,25 @@ def fill_residuals(red, y, q):
     """Fill the residual of each test: y - y_pred; of turning 2 (q* q_now); of the density
     log(rho / rho_past), rho = qdyn / V^2. q: the attitude as predicted.
     """
-    tests, y_pred = red.test, red.memory.predicted_reading
     z1, z2 = times(inverse(q), attitude(y))
     side = 2.0 if z1.real >= 0.0 else -2.0
-    for i, turn in enumerate((z1.imag, z2.real, z2.imag)):
-        tests[TURN_TEST + i].residual = side * turn
-        tests[ANGLE_TEST + i].residual = wrapped(y[PHI + i] - y_pred[PHI + i])
-    for j, i in READING_OF:
-        tests[j].residual = y[i] - y_pred[i]
-    tests[DENSITY_TEST].residual = np.log(half_density(y) / half_density(red.memory.y_past))
+    red.residual[:ANGLE_TEST] = side * z1.imag, side * z2.real, side * z2.imag
+    for j in range(ANGLE_TEST, RPM_TEST):
+        r = y[SENSOR_OF[j]] - red.y_pred[SENSOR_OF[j]]
+        red.residual[j] = wrapped(r) if j < SPEED_TEST else r
+    red.residual[DENSITY_TEST] = np.log(half_density(y) / half_density(red.y_past))
 
 
 @kernel
 def highest(red, y, i):
     """Bound |y_i| in this sample and the one before: |y| + e."""
-    M = red.memory
-    return max(abs(y[i]) + M.reading_bound[i], abs(M.y_past[i]) + M.e_past[i])
+    return max(abs(y[i]) + red.e[i], abs(red.y_past[i]) + red.e_past[i])
 
 
 @kernel
 def lowest(red, y, i):
     """Lower bound on y_i in this sample and the one before: y - e."""
-    M = red.memory
-    return min(y[i] - M.reading_bound[i], M.y_past[i] - M.e_past[i])
+    return min(y[i] - red.e[i], red.y_past[i] - red.e_past[i])
 
 
 @kernel
@@ -507,18 +474,16 @@ def bound_acceleration(red, w_max, e_w):
     and the attitude, which gives gravity its direction. Turning the previous acceleration into the present
     axes adds more.
     """
-    c, M = red.config, red.memory
-    e_force2, e_tilt, e_const = 0.0, 0.0, 0.0
+    e_a, force2 = EARTH_M_S2 + red.e_first + red.h * AB_PAST * e_w * red.a_size_past, 0.0
     for i in (PHI, THETA, AX, AX + 1, AX + 2):
-        e = AB_NOW * M.e_past[i] + AB_PAST * M.e_older[i] - c.const[i]
+        e = AB_NOW * red.e_past[i] + AB_PAST * red.e_older[i] - red.const[i]
+        e_turn = red.h * w_max * red.const[i]
         if i < AX:
-            e_tilt += e
-            e_const += c.g * c.const[i]
+            e_a += red.g * (e + e_turn)
         else:
-            e_force2 += e**2
-            e_const += c.const[i]
-    e_turn = c.sample_time_s * (w_max * e_const + AB_PAST * e_w * M.a_size_past)
-    return EARTH_M_S2 + M.e_first + c.g * e_tilt + np.sqrt(e_force2) + e_turn
+            e_a += e_turn
+            force2 += e**2
+    return e_a + np.sqrt(force2)
 
 
 @kernel
@@ -526,24 +491,21 @@ def bound_attitude(red, y, w_max, e_w):
     """Fill the bounds of `bound_residuals` for the tests of the attitude.
 
     A constant error of the attitude turns with the aircraft: in the rates J(phi, theta) (phi', theta', psi')
-    it changes J. A momentary error (e_brief) turns an axis when it begins, and back when it ends with another
-    J. sec: largest 1 / cos(theta); n: e_new of phi, theta, psi.
+    it changes J. A momentary error (brief) turns an axis when it begins, and back when it ends with another
+    J. sec: largest 1 / cos(theta).
     """
-    tests, c, M = red.test, red.config, red.memory
-    e, n = M.e_past, M.e_new[PHI:]
-    sec = secant(highest(red, y, THETA))
-    turn = c.sample_time_s * w_max
-    tilt = abs(y[PHI] - M.y_past[PHI]) + abs(y[THETA] - M.y_past[THETA])
-    e_brief = e[THETA] - c.const[THETA] + e[PSI] - c.const[PSI] + n[1] + n[2]
-    e_axes = w_max * (e[PHI] + e[THETA] + e[PSI] + sec * e[THETA]) + tilt * e_brief / c.sample_time_s
-    e_rate = EARTH_TURN_RAD_S + (1.0 + sec * turn) * e_w + 2.0 * sec * w_max * (e[PHI] + e[THETA])
-    s_theta = abs(np.sin(y[THETA])) + n[1]
-    s_phi = abs(np.sin(y[PHI])) + n[0]
-    for i, coupled in enumerate((s_theta * n[2], s_phi * n[2], s_phi * n[1])):
-        tests[TURN_TEST + i].bound_per_s = EARTH_TURN_RAD_S + 2.0 * c.drift + e[P + i] + turn * e_w + e_axes
-        tests[TURN_TEST + i].bound_per_sample = n[i] + coupled
-        tests[ANGLE_TEST + i].bound_per_s = sec * e_rate + c.drift
-        tests[ANGLE_TEST + i].bound_per_sample = n[i]
+    h, e, n, past, const = red.h, red.e_past, red.n, red.y_past, red.const
+    sec, turn = secant(highest(red, y, THETA)), h * w_max
+    tilt = abs(y[PHI] - past[PHI]) + abs(y[THETA] - past[THETA])
+    brief = e[THETA] - const[THETA] + e[PSI] - const[PSI] + n[THETA] + n[PSI]
+    axes = w_max * (e[PHI] + (1.0 + sec) * e[THETA] + e[PSI]) + tilt * brief / h + turn * e_w
+    angles = EARTH_TURN_RAD_S + (1.0 + sec * turn) * e_w + 2.0 * sec * w_max * (e[PHI] + e[THETA])
+    s_theta, s_phi = abs(np.sin(y[THETA])) + n[THETA], abs(np.sin(y[PHI])) + n[PHI]
+    coupled = s_theta * n[PSI], s_phi * n[PSI], s_phi * n[THETA]
+    for i in range(3):
+        red.per_s[i] = EARTH_TURN_RAD_S + 2.0 * red.drift + e[i] + axes
+        red.per_sample[i] = n[PHI + i] + coupled[i]
+        red.per_s[ANGLE_TEST + i] = sec * angles + red.drift
 
 
 @kernel
@@ -553,31 +515,20 @@ def bound_flow(red, y, w_max, e_w):
 
     sec: largest 1 / cos(beta); second: 1 and the second order in h; gust: how much faster a gust changes.
     """
-    tests, c, M = red.test, red.config, red.memory
-    e, h = M.e_past, c.sample_time_s
+    h, e, a_size = red.h, red.e_past, red.a_size
     V = max(lowest(red, y, AIRSPEED), MIN_AIRSPEED_MPS)
     sec = secant(highest(red, y, BETA))
-    e_vane, e_V = e[ALPHA] + e[BETA], e[AIRSPEED]
+    vane, e_V = e[ALPHA] + e[BETA], e[AIRSPEED]
     e_a = bound_acceleration(red, w_max, e_w)
-    a = M.a_size[0] + e_a
-    second = 1.0 + h * (2.0 * M.a_size[0] / V + w_max)
+    a, second = a_size[0] + e_a, 1.0 + h * (2.0 * a_size[0] / V + w_max)
     low = max(lowest(red, y, ALTITUDE), LEAST_HEIGHT_M)
-    gust = np.sqrt(max(y[AIRSPEED] / c.max_airspeed_mps, 1.0) * max(c.low_m / low, 1.0))
-    e_flow = sec**2 * ((e_a + a * (e_vane + e_V / V)) / V + w_max * e_vane) + sec * e_w
-    tests[SPEED_TEST].gust_gain = gust
-    tests[SPEED_TEST].bound_per_s = e_a + second * a * e_vane + h * (a / V) ** 2 * e_V
-    for j in (ALPHA_TEST, BETA_TEST):
-        tests[j].gust_gain = gust * sec / V
-        tests[j].bound_per_s = second * e_flow
-    tests[CLIMB_TEST].bound_per_s = (
-        c.wind_max
-        + c.gust_max
-        + (M.y_past[AIRSPEED] + e_V) * (e[PHI] + e[THETA] + e_vane)
-        + e_V
-        + POSITION_FACTOR * h * max(a, M.a_size[1], M.a_size[2])
-    )
-    for j, i in READING_OF:
-        tests[j].bound_per_sample = M.e_new[i]
+    gust = np.sqrt(max(y[AIRSPEED] / red.max_airspeed_mps, 1.0) * max(red.low_m / low, 1.0))
+    flow = second * (sec**2 * ((e_a + a * (vane + e_V / V)) / V + w_max * vane) + sec * e_w)
+    red.per_s[SPEED_TEST:DENSITY_TEST] = e_a + second * a * vane + h * (a / V) ** 2 * e_V, flow, flow
+    red.gust[SPEED_TEST:DENSITY_TEST] = gust, gust * sec / V, gust * sec / V
+    path = (red.y_past[AIRSPEED] + e_V) * (e[PHI] + e[THETA] + vane)
+    bend = POSITION_FACTOR * h * max(a, a_size[1], a_size[2])
+    red.per_s[CLIMB_TEST] = red.wind_max + red.gust_max + path + e_V + bend
 
 
 @kernel
@@ -587,62 +538,66 @@ def bound_density(red, y):
 
         e |1 / y - 1 / y_past| / (1 - e / y_min)
     """
-    test, c, M = red.test[DENSITY_TEST], red.config, red.memory
-    climb = M.y_past[AIRSPEED] + M.e_past[AIRSPEED] + c.wind_max + c.gust_max
-    test.bound_per_s, test.bound_per_sample = climb / DENSITY_SCALE_HEIGHT_M, 0.0
-    for i, n, least in ((QDYN, 1.0, MIN_QDYN_PA), (AIRSPEED, 2.0, MIN_AIRSPEED_MPS)):
-        e, now, past = c.const[i], max(y[i], least), max(M.y_past[i], least)
-        e_log = e * abs(1.0 / now - 1.0 / past) / max(1.0 - e / min(now, past), MIN_SHARE_LEFT)
-        test.bound_per_s += n * e_log / c.sample_time_s
-        test.bound_per_sample += n * M.e_new[i] / max(y[i] - M.reading_bound[i], least)
+    j, past = DENSITY_TEST, red.y_past
+    climb = past[AIRSPEED] + red.e_past[AIRSPEED] + red.wind_max + red.gust_max
+    red.per_s[j], red.per_sample[j] = climb / DENSITY_SCALE_HEIGHT_M, 0.0
+    for i, k, least in ((QDYN, 1.0, MIN_QDYN_PA), (AIRSPEED, 2.0, MIN_AIRSPEED_MPS)):
+        e, y1, y0 = red.const[i], max(y[i], least), max(past[i], least)
+        e_log = e * abs(1.0 / y1 - 1.0 / y0) / max(1.0 - e / min(y1, y0), MIN_SHARE_LEFT)
+        red.per_s[j] += k * e_log / red.h
+        red.per_sample[j] += k * red.n[i] / max(y[i] - red.e[i], least)
 
 
 @kernel
 def bound_residuals(red, y):
-    """Fill bound_per_s and bound_per_sample of each test: the largest effect of sound sensors with the
-    declared errors.
+    """Fill per_s and per_sample of each test: the largest effect of sound sensors with the declared errors.
 
     The errors of the sample before act through the prediction, those of this sample through the reading that
     is compared with it.
     """
-    e, w = red.memory.e_past, red.memory.y_past
-    e_w = e[P] + e[Q] + e[R]
-    w_max = abs(w[P]) + abs(w[Q]) + abs(w[R]) + e_w
+    e_w = w_max = 0.0
+    for i in range(3):
+        e_w += red.e_past[i]
+        w_max += abs(red.y_past[i]) + red.e_past[i]
+    for j in range(ANGLE_TEST, RPM_TEST):
+        red.per_sample[j] = red.n[SENSOR_OF[j]]
     bound_attitude(red, y, w_max, e_w)
     bound_flow(red, y, w_max, e_w)
     bound_density(red, y)
 
 
 @kernel
-def filter_test(red, test):
-    """Pass one test's residual through its filters, a = exp(-pole h); find its largest ratio to the bound:
+def filter_test(red, j):
+    """Pass the residual of test j through its filters, a = exp(-pole h); find its largest ratio to the bound:
 
-    r <- a r + residual,    B = e + bound_per_sample + gust_gain gust_change,    ratio = max |r| / B
+    r <- a r + residual,    B = e_sum + per_sample + gust gust_change,    ratio = max |r| / B
 
-    e, the part that the filter sums, as that of a detection filter.
+    e_sum, the part that the filter sums, as that of a detection filter.
     """
-    c, test.ratio = red.config, 0.0
-    leak(test.r, c.decay, test.residual)
-    for m, a in enumerate(c.decay):
-        test.e[m] = advance_bound(test.e[m], test.bound_per_s, a, c.sample_time_s, test.past_bound)
-        test.B[m] = test.e[m] + test.bound_per_sample + test.gust_gain * c.gust_change[m]
-        test.ratio = max(test.ratio, abs(test.r[m]) / test.B[m])
-    test.past_bound = test.bound_per_sample
+    r, e, B, n = red.r[j], red.e_sum[j], red.B[j], red.per_sample[j]
+    red.ratio[j] = 0.0
+    leak(r, red.decay, red.residual[j])
+    for m, a in enumerate(red.decay):
+        e[m] = advance_bound(e[m], red.per_s[j], a, red.h, red.past[j])
+        B[m] = e[m] + n + red.gust[j] * red.gust_change[m]
+        red.ratio[j] = max(red.ratio[j], abs(r[m]) / B[m])
+    red.past[j] = n
 
 
 @kernel
-def restart_test(test):
-    """Restart a test with this sample: its filters are empty, and the whole bound per sample is still due."""
-    test.ratio = test.residual = 0.0
-    test.r[:] = 0.0
-    test.e[:] = test.past_bound = test.bound_per_sample
+def restart_tests(red, n):
+    """Restart the first n tests with this sample: their filters are empty, and the whole bound per sample is
+    still due."""
+    red.ratio[:n] = red.residual[:n] = red.r[:n] = 0.0
+    for j in range(n):
+        red.e_sum[j] = red.past[j] = red.per_sample[j]
 
 
 @kernel
-def compare(test, residual, bound):
-    """Judge a residual alone, without a filter, by the bound on it."""
-    test.residual, test.B[0] = residual, bound + COMPARISON_ROUNDING
-    test.ratio = abs(residual) / test.B[0]
+def compare(red, j, residual, bound):
+    """Judge the residual of test j alone, without a filter, by the bound on it."""
+    red.residual[j], red.B[j, 0] = residual, bound + COMPARISON_ROUNDING
+    red.ratio[j] = abs(residual) / red.B[j, 0]
 
 
 @kernel
@@ -651,46 +606,41 @@ def compare_duplicates(red, y, fresh):
     fresh; fresh (sampled sensors,). One of the two is broken if they differ by more than tolerance + e_i +
     e_j.
     """
-    e = red.memory.reading_bound
     for d in range(DUPLICATE.size):
-        i, j, test = DUPLICATE[d], COUNTERPART[d], red.test[N_EQUATIONS + d]
-        test.ratio = 0.0
+        i, j = DUPLICATE[d], COUNTERPART[d]
+        red.ratio[N_EQUATIONS + d] = 0.0
         if fresh[i - N_IN_EQUATIONS]:
-            r = y[i] - y[j]
-            compare(test, wrapped(r) if PHI <= j <= PSI else r, DUPLICATE_TOLERANCE[d] + e[i] + e[j])
+            r = wrapped(y[i] - y[j]) if PHI <= j <= PSI else y[i] - y[j]
+            compare(red, N_EQUATIONS + d, r, DUPLICATE_TOLERANCE[d] + red.e[i] + red.e[j])
 
 
 @kernel
 def start_tests(red, y, force):
     """Start with the first sample, before which no reading is known; force (3,) m/s2."""
-    M = red.memory
     bound_readings(red, y)
     store_sample(red, y, force)
-    M.e_older[:] = M.e_past
-    M.a_past[:] = M.a
-    M.a_size[:2] = vector_length(M.a) + FORCE_JUMP_M_S2
-    M.e_first = AB_PAST * FORCE_JUMP_M_S2
+    red.y_older[:] = y
+    red.e_older[:] = red.e_past
+    red.a_past[:] = red.a
+    red.a_size[:2] = vector_length(red.a) + FORCE_JUMP_M_S2
+    red.e_first = AB_PAST * FORCE_JUMP_M_S2
     bound_residuals(red, y)
-    for j in range(RPM_TEST):
-        restart_test(red.test[j])
+    restart_tests(red, RPM_TEST)
 
 
 @kernel
 def run_tests(red, y, has_engine):
     """Compare this sample y with the one before."""
-    c, M = red.config, red.memory
-    M.e_drift += c.sample_time_s * c.drift
+    red.e_drift += red.h * red.drift
     bound_readings(red, y)
     fill_residuals(red, y, predict_readings(red))
     bound_residuals(red, y)
-    M.e_first = 0.0
-    steep = too_steep(red, y)
-    for j in range(RPM_TEST):
-        if steep and j < SPEED_TEST:
-            restart_test(red.test[j])
-        else:
-            filter_test(red, red.test[j])
+    red.e_first = 0.0
+    first = SPEED_TEST if too_steep(red, y) else 0
+    restart_tests(red, first)
+    for j in range(first, RPM_TEST):
+        filter_test(red, j)
     if has_engine:
-        for i in range(2):
-            k = ENGINE_SPEED + i
-            compare(red.test[RPM_TEST + i], y[k] - M.engine_commands[i], M.reading_bound[k])
+        for j in (RPM_TEST, PRESSURE_TEST):
+            i = SENSOR_OF[j]
+            compare(red, j, y[i] - red.y_pred[i], red.e[i])

@@ -58,6 +58,7 @@ from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.detection import attitude
 from beaver_ftc.diagnosis.detection.filters import bank_axis, leak
 from beaver_ftc.diagnosis.monitors.initial_errors import (
+    CHANGE_TEST,
     explains_exceeded,
     latch_refuted,
     start_bounds,
@@ -82,8 +83,6 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     GYRO_OPEN,
     GYRO_REFUTED,
     H_AIRSPEED,
-    H_ALPHA,
-    H_BETA,
     H_PHI,
     MIN_AIRSPEED_MPS,
     N_EQUATIONS,
@@ -91,22 +90,23 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     N_INITIAL,
     N_TESTS,
     NO_SENSOR,
+    PSI,
     QDYN,
     RPM_TEST,
+    SENSOR_OF,
     SPEED_TEST,
     THETA,
-    TURN_TEST,
     compare_duplicates,
     dot,
     exceeds,
     run_tests,
+    speed,
     start_tests,
     store_sample,
     too_steep,
     turn_share,
 )
 from beaver_ftc.plant.instruments import (
-    ALTITUDE,
     AX,
     ENGINE_SPEED,
     MANIFOLD,
@@ -137,6 +137,7 @@ FULL_STAGE = 3
 MIN_LEAD_S = 0.5  # before the alarm: a surface detected earlier was detected with sound sensors
 INITIAL_WINDOW_S = 1.0  # from the start: an alarm of the surfaces may be caused by an initial error
 VANE_RETURN_S = 20.0  # of the return to trim of a replaced vane: kinematics alone drift
+SHOWN, MOST, LEAST = range(3)  # of a gyro's error: follow_gyro_errors
 # index in FILTER_POLES_PER_S: of the filter that gives the first value of a replaced rate
 RATE_POLE = 1
 
@@ -154,13 +155,8 @@ RATE_ROUNDING = 1e-6  # rad/s, and rad/s2: the part of the bounds that covers ro
 # For the gyro that turns the flow by all of its error, also the margin on the bound of the flow's test.
 HIDDEN_FACTOR = 2.0
 
-# By the test of the flow, from SPEED_TEST on: the flow sensor that it compares with the accelerometers, and
-# the hypothesis that this sensor was broken when the monitor began (initial_errors.py)
-FLOW_SENSOR, FLOW_HYPOTHESIS = (AIRSPEED, ALPHA, BETA), (H_AIRSPEED, H_ALPHA, H_BETA)
-# The sensor of each such hypothesis
-INITIAL_SENSOR = ALPHA, BETA, AIRSPEED, PHI, THETA
-# By the test from DENSITY_TEST on: the sensor that takes part in no other test
-LONE_SENSOR = QDYN, ALTITUDE, ENGINE_SPEED, MANIFOLD
+ANGLES, FORCES = (PHI, THETA, PSI), (AX, AX + 1, AX + 2)
+INITIAL_SENSOR = tuple(SENSOR_OF[j] for j in CHANGE_TEST)  # of each hypothesis of initial_errors.py
 
 
 @kernel
@@ -171,11 +167,9 @@ def check_sensors(mon, pred, measured, found, bank, bound, dt, t):
     """
     M, red, y = mon.memory, mon.redundancy, measured.signal
     if not M.stage:  # the first sample: there is none to compare it with
-        M.stage, M.t_start = 1, t
-        red.memory.e_drift = red.config.drift * t
+        M.stage, M.t_start, red.e_drift = 1, t, red.drift * t
         start_tests(red, y, measured.force)
         start_bounds(mon.initial_errors, y)
-        M.y_older[:] = red.memory.y_past
     else:
         if M.substep == 0:
             advance_gyro_estimate(mon, bank.output.innovation, bound.eta_bar, dt)
@@ -185,16 +179,15 @@ def check_sensors(mon, pred, measured, found, bank, bound, dt, t):
             latch_agreed(mon, measured.fresh)
         update_bounds(red, mon.initial_errors, y)
         count_same(mon, y)
-        follow_gyro_errors(mon)
+        follow_gyro_errors(M, red)
         if too_steep(red, y):
             restart_comparison(M)
         else:
-            advance_stage(mon)
+            advance_stage(M)
             if mon.config.noisy:
                 exclude_gyros(mon)
         isolate_sensor(mon, measured, found, bank, bound, dt, t)
         replace_readings(mon, pred, measured)
-        M.y_older[:] = red.memory.y_past
         store_sample(red, y, measured.force)
     M.substep = (M.substep + 1) % mon.config.substeps
 
@@ -207,20 +200,19 @@ def advance_gyro_estimate(mon, nu, eta, dt):
 
     nu, eta (3,): innovation and its bound, rad/s2.
     """
-    w, B, D = mon.memory.w, mon.memory.w_bound, mon.config.D
-    w_past, B_past = (w[0], w[1], w[2]), (B[0], B[1], B[2])
+    c, w, B = mon.config, mon.memory.w, mon.memory.w_bound
+    w0, B0 = (w[0], w[1], w[2]), (B[0], B[1], B[2])
     for i in range(3):
-        w[i] += dt * (nu[i] - dot(D[i], w_past))
-        B[i] = max(B[i] + dt * (eta[i] + dot(mon.config.D_size[i], B_past)), 0.0)
+        w[i] += dt * (nu[i] - dot(c.D[i], w0))
+        B[i] = max(B[i] + dt * (eta[i] + dot(c.D_size[i], B0)), 0.0)
 
 
 @kernel
 def latch_agreed(mon, fresh):
     """Record which sensors have agreed, before any alarm, with the reading that they should equal."""
-    for d in range(DUPLICATE.size):
-        agrees = mon.redundancy.test[N_EQUATIONS + d].ratio <= 1.0
-        if fresh[DUPLICATE[d] - N_IN_EQUATIONS] and agrees and not mon.output.alarmed:
-            mon.memory.agreed[d] = 1
+    for d, i in enumerate(DUPLICATE):
+        agrees = mon.redundancy.ratio[N_EQUATIONS + d] <= 1.0 and not mon.output.alarmed
+        mon.memory.agreed[d] |= fresh[i - N_IN_EQUATIONS] and agrees
 
 
 @kernel
@@ -228,12 +220,12 @@ def count_same(mon, y):
     """Count the samples for which each reading has been the very same, and find the largest jump of an
     accelerometer from one sample to the next, m/s2, which fades within JUMP_MEMORY_S.
     """
-    M, y_past = mon.memory, mon.redundancy.memory.y_past
-    M.jump *= 1.0 - mon.redundancy.config.sample_time_s / JUMP_MEMORY_S
+    M, past = mon.memory, mon.redundancy.y_past
+    M.jump *= 1.0 - mon.redundancy.h / JUMP_MEMORY_S
     for i in range(N_SENSORS):
-        M.n_same[i] = M.n_same[i] + 1 if y[i] == y_past[i] else 0
-        if AX <= i < N_IN_EQUATIONS:
-            M.jump = max(M.jump, abs(y[i] - y_past[i]))
+        M.n_same[i] = M.n_same[i] + 1 if y[i] == past[i] else 0
+    for i in FORCES:
+        M.jump = max(M.jump, abs(y[i] - past[i]))
 
 
 @kernel
@@ -243,29 +235,36 @@ def is_frozen(mon, i):
 
 
 @kernel
-def stands_still(mon, i):
-    """Whether a sensor is frozen at a reading that is not zero: a sound one may read zero."""
-    return mon.redundancy.memory.y_past[i] != 0.0 and is_frozen(mon, i)
+def last_frozen(mon, sensors):
+    """The last of these sensors that is frozen, or NO_SENSOR."""
+    last = NO_SENSOR
+    for i in sensors:
+        last = i if is_frozen(mon, i) else last
+    return last
 
 
 @kernel
-def follow_gyro_errors(mon):
-    """Keep the error of each gyro, if the attitude is right: as a frame begins, and its largest and smallest
-    size in the other samples of the frame."""
-    M, red = mon.memory, mon.redundancy
+def stands_still(mon, i):
+    """Whether a sensor is frozen at a reading that is not zero: a sound one may read zero."""
+    return mon.redundancy.y_past[i] != 0.0 and is_frozen(mon, i)
+
+
+@kernel
+def follow_gyro_errors(M, red):
+    """Keep what the attitude shows of each gyro's error, if it is right itself: SHOWN as a frame begins, MOST
+    and LEAST of its size in the other samples of the frame. shown[1], shown[2]: of the two frames before."""
+    shown = M.shown
     if M.substep == 0:
-        M.w_att_past[:] = M.w_att
-        M.peak_older[:] = M.peak_past
-        M.peak_past[:] = M.peak
-        M.floor_past[:] = M.floor
-        M.peak[:] = M.floor[:] = 0.0
+        shown[2] = shown[1]
+        shown[1] = shown[0]
+        shown[0, MOST:] = 0.0
     for i in range(3):
-        w = -red.test[TURN_TEST + i].residual / red.config.sample_time_s
+        w = -red.residual[i] / red.h
         if M.substep == 0:
-            M.w_att[i] = w
+            shown[0, SHOWN, i] = w
         else:
-            M.peak[i] = max(M.peak[i], abs(w))
-            M.floor[i] = abs(w) if M.substep == 1 else min(M.floor[i], abs(w))
+            shown[0, MOST, i] = max(shown[0, MOST, i], abs(w))
+            shown[0, LEAST, i] = abs(w) if M.substep == 1 else min(shown[0, LEAST, i], abs(w))
 
 
 @kernel
@@ -274,24 +273,22 @@ def restart_comparison(M):
     shows neither an error nor its absence.
     """
     M.stage = 1
-    M.gap[:] = 0.0
-    M.gap_bound[:] = 0.0
+    M.gap[:] = M.gap_bound[:] = 0.0
     M.beyond[:] = 0.0
     M.swing[:] = 0.0
     M.c_max[:] = 0.0
 
 
 @kernel
-def advance_stage(mon):
+def advance_stage(M):
     """Widen the bound on w by a gyro's error of the first sample, which has caused no innovation. The first
     frame shows no change of an error.
     """
-    M = mon.memory
     if M.stage < FULL_STAGE and M.substep == 0:
         M.stage += 1
-        if M.stage == FULL_STAGE - 1:
-            for i in range(3):
-                M.w_bound[i] += abs(M.w_att[i])
+        for i in range(3):
+            if M.stage < FULL_STAGE:
+                M.w_bound[i] += abs(M.shown[0, SHOWN, i])
 
 
 @kernel
@@ -300,25 +297,24 @@ def exclude_gyros(mon):
 
     gap <- a gap + residual + h w. Where the attitude is noisy, a surface is isolated only after that.
     """
-    M, c = mon.memory, mon.redundancy.config
-    h = c.sample_time_s
+    M, red = mon.memory, mon.redundancy
     for i in range(3):
-        test = mon.redundancy.test[TURN_TEST + i]
-        leak(M.gap[i], c.decay, test.residual + h * M.w[i])
-        leak(M.gap_bound[i], c.decay, h * (M.w_bound[i] + attitude.DAMPING_TOLERANCE * abs(M.w[i])))
-        if exceeds(M.gap[i], 1.0, M.gap_bound[i], 1.0, test.B):
+        j, w = i, M.w[i]
+        leak(M.gap[i], red.decay, red.residual[j] + red.h * w)
+        leak(M.gap_bound[i], red.decay, red.h * (M.w_bound[i] + attitude.DAMPING_TOLERANCE * abs(w)))
+        if exceeds(M.gap[i], 1.0, M.gap_bound[i], 1.0, red.B[j]):
             rule_out_gyros(mon)
 
 
 @kernel
 def isolate_sensor(mon, measured, found, bank, bound, dt, t):
     """Raise the alarm, and isolate the sensor once it is the only suspect."""
-    o, M = mon.output, mon.memory
+    o, M, red = mon.output, mon.memory, mon.redundancy
     if M.substep == 0:  # the test with the largest ratio, of the samples of this frame
         o.worst_test_index, o.top_ratio = 0, 0.0
-    for j, test in enumerate(mon.redundancy.test):
-        if test.ratio > o.top_ratio:
-            o.worst_test_index, o.top_ratio = j, test.ratio
+    for j, ratio in enumerate(red.ratio):
+        if ratio > o.top_ratio:
+            o.worst_test_index, o.top_ratio = j, ratio
     for i in range(N_SENSORS):
         if measured.missing[i] and o.isolated_sensor == NO_SENSOR:
             raise_alarm(mon, found, t)
@@ -330,18 +326,15 @@ def isolate_sensor(mon, measured, found, bank, bound, dt, t):
         o.alarm_test = o.worst_test_index
         mon.initial_errors.e_alarm[:] = mon.initial_errors.e
     if o.alarmed:
-        filter_beyond(mon, measured.signal)
+        filter_beyond(M, red, measured.signal)
         if M.substep == 0 and M.stage == FULL_STAGE:
             judge_gyros(mon, bank, bound, dt)
         latch_exceeded(mon)
-        clear_sensors(mon, measured.signal)
+        if SPEED_TEST <= o.alarm_test <= BETA_TEST:
+            clear_sensors(mon, measured.signal)
         find_suspects(mon)
-        n, last = 0, NO_SENSOR
-        for i in range(N_SENSORS):
-            if o.suspect[i]:
-                n, last = n + 1, i
-        if n == 1:
-            mark_isolated(mon, last, t)
+        if o.suspect.sum() == 1:
+            mark_isolated(mon, np.argmax(o.suspect), t)
 
 
 @kernel
@@ -369,20 +362,19 @@ def mark_isolated(mon, i, t):
 
 
 @kernel
-def filter_beyond(mon, y):
+def filter_beyond(M, red, y):
     """Filter what the tests of turning show beyond an error of one angle i, for each of phi, theta and psi.
 
     An error that changes by x within a sample moves the residual of its angle by x and that of body axis j by
     c_j x (turn_share). If this angle alone is wrong, r_j - c_j r_i contains noise alone.
     """
-    M, tests, a = mon.memory, mon.redundancy.test, mon.redundancy.config.decay
     for i in range(3):
-        r = tests[ANGLE_TEST + i].residual
-        leak(M.swing[i], a, abs(r))
+        r = red.residual[ANGLE_TEST + i]
+        leak(M.swing[i], red.decay, abs(r))
         for j in range(3):
             c = turn_share(y, j, i)
             M.c_max[i, j] = max(M.c_max[i, j], abs(c))
-            leak(M.beyond[i, j], a, tests[TURN_TEST + j].residual - c * r)
+            leak(M.beyond[i, j], red.decay, red.residual[j] - c * r)
 
 
 @kernel
@@ -403,23 +395,23 @@ def judge_gyros(mon, bank, bound, dt):
     and varies between them, as noise does (varies), the innovation cannot be compared with its jump: the
     innovation contains the errors as the frames begin, and the attitude shows those of the samples before.
     """
-    M, c, nu, axis = mon.memory, mon.redundancy.config, bank.output.innovation, bank_axis(bank)
+    M, red, nu, shown = mon.memory, mon.redundancy, bank.output.innovation, mon.memory.shown
     for i in range(3):
         if M.gyro_verdict[i] != GYRO_OPEN:
             continue
-        w, past, estimate = abs(M.w_att[i]), abs(M.w_att_past[i]), abs(M.w[i])
-        peak, B = M.peak_past[i], M.w_bound[i]
-        jump = (M.w_att[i] - M.w_att_past[i]) / dt  # rad/s2
+        jump = (shown[0, SHOWN, i] - shown[1, SHOWN, i]) / dt  # rad/s2
+        w, past, known = abs(shown[0, SHOWN, i]), abs(shown[1, SHOWN, i]), M.w_bound[i] + abs(M.w[i])
+        peak, older = shown[1, MOST, i], shown[2, MOST, i]
         # of w, rad/s, by the attitude's noise
-        noise = SAMPLES_IN_JUMP * mon.redundancy.test[TURN_TEST + i].bound_per_sample / c.sample_time_s
+        noise = SAMPLES_IN_JUMP * red.per_sample[i] / red.h
         nu_max = bound.nu_max[i] + RATE_ROUNDING
-        shows = abs(nu[i]) > nu_max or axis >= 0 or estimate > B + RATE_ROUNDING
-        late = max(past, peak, w)
-        brief = late < TRANSIENT_LEFT * M.peak_older[i] and M.peak_older[i] > MIN_TRANSIENT * noise
+        estimated = abs(M.w[i]) > M.w_bound[i] + RATE_ROUNDING
+        shows = abs(nu[i]) > nu_max or bank_axis(bank) >= 0 or estimated
+        brief = max(past, peak, w) < TRANSIENT_LEFT * older and older > MIN_TRANSIENT * noise
         tol = MAX_DYNAMICS_PER_S * max(w, past) + JUMP_TOLERANCE * abs(jump)
         fits = abs(nu[i] - jump) <= nu_max + tol + noise / dt
-        varies = noise < M.floor_past[i] < peak / (1.0 + JUMP_TOLERANCE)
-        allowed = MIN_ESTIMATED_SHARE * w <= B + estimate + noise
+        varies = noise < shown[1, LEAST, i] < peak / (1.0 + JUMP_TOLERANCE)
+        allowed = MIN_ESTIMATED_SHARE * w <= known + noise
         if not (fits or varies) or (not shows and (brief or not allowed)):
             M.gyro_verdict[i] = GYRO_REFUTED
         elif shows and fits:
@@ -431,32 +423,25 @@ def latch_exceeded(mon):
     """Record the tests that have exceeded their bounds since the alarm; of turning, and of the angles, those
     that exceed them by more than an error on another axis explains.
     """
-    tests, exceeded = mon.redundancy.test, mon.memory.exceeded
+    red, exceeded = mon.redundancy, mon.memory.exceeded
     for j in range(N_TESTS):
-        most, first = 0.0, j - j % 3
-        for i in range(first, min(first + 3, SPEED_TEST)):
-            most = max(most, abs(tests[i].r[0]))
-        coupled = j < SPEED_TEST and abs(tests[j].r[0]) <= COUPLING_SHARE * most
-        if tests[j].ratio > 1.0 and not coupled:
-            exceeded[j] = 1
-    latch_refuted(mon.redundancy, mon.initial_errors, exceeded)
+        least = 0.0
+        for i in range(j - j % 3, j - j % 3 + 3):
+            least = max(least, COUPLING_SHARE * abs(red.r[i, 0])) if j < SPEED_TEST else -1.0
+        exceeded[j] |= red.ratio[j] > 1.0 and abs(red.r[j, 0]) > least
+    latch_refuted(red, mon.initial_errors, exceeded)
 
 
 @kernel
 def clear_sensors(mon, y):
     """Clear the flow sensor, or the accelerometers, by this sample, that of the alarm or a later one."""
     M, alarm = mon.memory, mon.output.alarm_test
-    if not SPEED_TEST <= alarm <= BETA_TEST:
-        return
-    flow = FLOW_SENSOR[alarm - SPEED_TEST]
-    sound = is_frozen(mon, flow) or flow_jumped(mon, y, flow)
-    if sound or (alarm == SPEED_TEST and M.exceeded[DENSITY_TEST]):
+    flow = SENSOR_OF[alarm]
+    by_density = alarm == SPEED_TEST and M.exceeded[DENSITY_TEST]
+    if is_frozen(mon, flow) or flow_jumped(mon, y, flow) or by_density:
         M.cleared[AX:] = 1
     sum_flow(mon, y)
-    broken = sum_exceeds_range(mon) or other_test_contradicts(mon, y)
-    for i in range(AX, N_IN_EQUATIONS):
-        broken = broken or is_frozen(mon, i)
-    if broken:
+    if sum_exceeds_range(M, alarm - SPEED_TEST) or contradicted(mon, y) or last_frozen(mon, FORCES) >= 0:
         M.cleared[flow] = 1
     clear_gyros(mon, y)
 
@@ -468,13 +453,11 @@ def flow_jumped(mon, y, i):
 
     per_a: residual for an acceleration error of 1 m/s2 in one sample. ddy: second difference of the reading.
     """
-    alarm, red, M = mon.output.alarm_test, mon.redundancy, mon.memory
-    y_past, test, h = red.memory.y_past, red.test[alarm], red.config.sample_time_s
-    per_a = h if alarm == SPEED_TEST else h / max(y_past[AIRSPEED], MIN_AIRSPEED_MPS)
-    ddy = abs(y[i] - 2.0 * y_past[i] + M.y_older[i])
-    r = abs(test.residual)
-    soon = M.n_since * h < JUMP_WINDOW_S - TIME_ROUNDING_S
-    leaps = r > test.B[0] + FORCE_JUMP_M_S2 * per_a
+    j, red, M = mon.output.alarm_test, mon.redundancy, mon.memory
+    per_a = red.h / (1.0 if j == SPEED_TEST else speed(red.y_past))
+    ddy, r = abs(y[i] - 2.0 * red.y_past[i] + red.y_older[i]), abs(red.residual[j])
+    soon = M.n_since * red.h < JUMP_WINDOW_S - TIME_ROUNDING_S
+    leaps = r > red.B[j, 0] + FORCE_JUMP_M_S2 * per_a
     return soon and leaps and ddy >= MIN_JUMP_SHARE * r > AB_NOW * M.jump * per_a
 
 
@@ -486,49 +469,46 @@ def sum_flow(mon, y):
     alpha: error of the incidence that the sums leave unexplained, rad; climb: its effect in a sample, m.
     """
     red, M, ini = mon.redundancy, mon.memory, mon.initial_errors
-    h = red.config.sample_time_s
     for n in range(3):
-        j, y_n, k = SPEED_TEST + n, y[FLOW_SENSOR[n]], FLOW_HYPOTHESIS[n]
-        test = red.test[j]
+        j = SPEED_TEST + n
+        y_n = y[SENSOR_OF[j]]
         if M.n_since == 0:
             M.y_min[n] = M.y_max[n] = y_n
             # noise of the first and of the last sample
-            M.B_sum[n] = 2.0 * test.bound_per_sample + test.gust_gain * red.config.gust_max
+            M.B_sum[n] = 2.0 * red.per_sample[j] + red.gust[j] * red.gust_max
             continue
-        M.r_sum[n] += test.residual
-        M.B_sum[n] += h * test.bound_per_s
-        M.e_sum[n] += ini.e_alarm[k] * ini.H[k, j]
-        M.y_min[n] = min(M.y_min[n], y_n)
-        M.y_max[n] = max(M.y_max[n], y_n)
+        M.r_sum[n] += red.residual[j]
+        M.B_sum[n] += red.h * red.per_s[j]
+        M.e_sum[n] += ini.e_alarm[n] * ini.H[n, j]
+        M.y_min[n], M.y_max[n] = min(M.y_min[n], y_n), max(M.y_max[n], y_n)
     alpha = np.sign(M.r_sum[1]) * max(abs(M.r_sum[1]) - M.B_sum[1] - M.e_sum[1], 0.0)
-    leak(M.climb, red.config.decay, h * y[AIRSPEED] * alpha * np.cos(y[PHI]) * np.cos(y[THETA]))
+    leak(M.climb, red.decay, red.h * y[AIRSPEED] * alpha * np.cos(y[PHI]) * np.cos(y[THETA]))
     M.n_since += 1
 
 
 @kernel
-def sum_exceeds_range(mon):
+def sum_exceeds_range(M, n):
     """Whether the residuals add up to more than an error of a flow sensor whose reading has this range."""
-    M, j = mon.memory, mon.output.alarm_test - SPEED_TEST
-    span = M.y_max[j] - M.y_min[j]
-    return span > 0.0 and abs(M.r_sum[j]) > MIN_SUM_RATIO * span + CLEAR_FACTOR * (M.B_sum[j] + M.e_sum[j])
+    span = M.y_max[n] - M.y_min[n]
+    return span > 0.0 and abs(M.r_sum[n]) > MIN_SUM_RATIO * span + CLEAR_FACTOR * (M.B_sum[n] + M.e_sum[n])
 
 
 @kernel
-def other_test_contradicts(mon, y):
+def contradicted(mon, y):
     """Whether an airspeed of this error would exceed the test of the density, or an incidence that of the
     climb, while that test is within its bound."""
     red, ini, alarm = mon.redundancy, mon.initial_errors, mon.output.alarm_test
     other = DENSITY_TEST if alarm == SPEED_TEST else CLIMB_TEST
     if alarm == BETA_TEST or mon.memory.exceeded[other]:
         return False
-    h = FLOW_HYPOTHESIS[alarm - SPEED_TEST]
-    e, H, B = ini.e_alarm[h], ini.H_m[h, other], red.test[other].B
+    h = alarm - SPEED_TEST
+    e, H, B = ini.e_alarm[h], ini.H_m[h, other], red.B[other]
     if alarm == ALPHA_TEST:
         return exceeds(mon.memory.climb, CLEAR_FACTOR, B, CLEAR_FACTOR * e, H)
     # log(density) changes by twice the relative change of the airspeed
-    speed, per_V = red.test[SPEED_TEST], 2.0 * (1.0 - min(e, 1.0)) / max(y[AIRSPEED], MIN_AIRSPEED_MPS)
+    k = CLEAR_FACTOR * speed(y) / (2.0 * (1.0 - min(e, 1.0)))
     for m in range(B.size):
-        if per_V * (abs(speed.r[m]) - speed.B[m]) > CLEAR_FACTOR * (B[m] + e * H[m]):
+        if abs(red.r[SPEED_TEST, m]) - red.B[SPEED_TEST, m] > k * (B[m] + e * H[m]):
             return True
     return False
 
@@ -541,20 +521,19 @@ def clear_gyros(mon, y):
     turn_max, rad: by noise and constant errors with the declared probability (attitude.py), 0 if unknown.
     """
     M, red, alarm = mon.memory, mon.redundancy, mon.output.alarm_test
-    if alarm == SPEED_TEST or too_steep(red, y) or M.turn_max == 0.0:
+    least = abs(red.residual[alarm]) - red.B[alarm, 0]
+    if alarm == SPEED_TEST or too_steep(red, y) or not 0.0 < M.turn_max < least:
         return
     for i in range(3):
-        turn = abs(red.test[TURN_TEST + i].residual)
-        if turn < M.turn_max < abs(red.test[alarm].residual) - red.test[alarm].B[0]:
-            M.cleared[i] = 1
+        M.cleared[i] |= abs(red.residual[i]) < M.turn_max
 
 
 @kernel
 def find_suspects(mon):
     """Fill suspect (N_SENSORS,): the sensors whose error explains all tests. An error of another sensor from
     the start does not explain a frozen suspect."""
-    o, alarm = mon.output, mon.output.alarm_test
-    o.suspect[:] = 0
+    suspect, alarm = mon.output.suspect, mon.output.alarm_test
+    suspect[:] = 0
     if alarm >= N_EQUATIONS:
         suspect_duplicate(mon, alarm - N_EQUATIONS)
         return
@@ -565,11 +544,10 @@ def find_suspects(mon):
     else:
         suspect_lone(mon, alarm)
     for i in range(N_SENSORS):
-        if o.suspect[i] and stands_still(mon, i):
+        if suspect[i] and stands_still(mon, i):
             return
-    for i in range(N_INITIAL):
-        if explains_exceeded(mon.initial_errors, i, alarm):
-            o.suspect[INITIAL_SENSOR[i]] = 1
+    for h, i in enumerate(INITIAL_SENSOR):
+        suspect[i] |= explains_exceeded(mon.initial_errors, h, alarm)
 
 
 @kernel
@@ -582,47 +560,38 @@ def suspect_duplicate(mon, d):
     No test shows an error that a reading has had from the first sample on, nor a frozen reading.
     """
     red, M, suspect = mon.redundancy, mon.memory, mon.output.suspect
-    i, j = COUNTERPART[d], COUNTERPART_TEST[d]
-    test = red.test[N_EQUATIONS + d]
+    i, own, j = COUNTERPART[d], COUNTERPART_TEST[d], N_EQUATIONS + d
     # of the reading, if it is the broken one
-    least = abs(test.residual) - test.B[0]
-    hidden = least <= HIDDEN_FACTOR * max(red.test[j].B[0], red.memory.reading_bound[i])
-    suspect[DUPLICATE[d]] = not M.exceeded[j]
-    suspect[i] = M.exceeded[j] == 1 or hidden or is_frozen(mon, i) or not M.agreed[d]
+    least = abs(red.residual[j]) - red.B[j, 0]
+    hidden = least <= HIDDEN_FACTOR * max(red.B[own, 0], red.e[i])
+    suspect[DUPLICATE[d]] = not M.exceeded[own]
+    suspect[i] = M.exceeded[own] == 1 or hidden or is_frozen(mon, i) or not M.agreed[d]
+
+
+@kernel
+def alone(shown, i):
+    """Whether none of these tests but test i shows an error."""
+    return shown.sum() == shown[i]
 
 
 @kernel
 def suspect_attitude(mon):
-    """Suspect gyros and attitude: one axis alone, or one angle alone. A gyro's error may appear in an angle
-    first. A frozen angle excludes the gyros; it is suspected until it is known not to be frozen."""
-    M, suspect, tests = mon.memory, mon.output.suspect, mon.redundancy.test
-    n, frozen = 0, False
+    """Suspect gyros and attitude: one axis alone, or one angle alone, but for what an error of phi or theta
+    from the start explains. A gyro's error may appear in an angle first. A frozen angle excludes the gyros;
+    it is suspected until it is known not to be frozen."""
+    M, suspect, ratio = mon.memory, mon.output.suspect, mon.redundancy.ratio[:ANGLE_TEST]
+    turns, angles = M.exceeded[:ANGLE_TEST], M.exceeded[ANGLE_TEST:SPEED_TEST]
+    refuted = mon.initial_errors.refuted[H_PHI:, ANGLE_TEST:SPEED_TEST]
+    frozen, worst = last_frozen(mon, ANGLES) >= 0, np.argmax(ratio)
     for i in range(3):
-        n += M.exceeded[TURN_TEST + i]
-        frozen = frozen or is_frozen(mon, PHI + i)
-    for i in range(3):
-        alone = n == 0 or (n == 1 and M.exceeded[TURN_TEST + i] == 1)
-        suspect[i] = alone and M.gyro_verdict[i] != GYRO_REFUTED and not frozen
-        explains, axis = explains_turns(mon, i), i
-        for j in range(3):
-            if tests[TURN_TEST + j].ratio > tests[TURN_TEST + axis].ratio:
-                axis = j
-        only = explains_angles(mon, i) and (explains or M.exceeded[ANGLE_TEST + i] == 1)
+        suspect[i] = alone(turns, i) and M.gyro_verdict[i] != GYRO_REFUTED and not frozen
+        explains, k = explains_turns(mon, i), PHI + i
+        unshared = alone(angles, i) if i == 2 else alone(refuted[i], i)
+        only = unshared and (explains or angles[i] == 1)
+        axis = worst if ratio[worst] > ratio[i] else i
         # too early to say
-        early = 0 < M.n_same[PHI + i] < mon.config.n_frozen[PHI + i] < N_FROZEN_NEVER
-        suspect[PHI + i] = (only and M.gyro_verdict[axis] != GYRO_CONFIRMED) or (explains and early)
-
-
-@kernel
-def explains_angles(mon, i):
-    """Whether no test of another angle shows an error that one of angle i (phi, theta, psi) from the start
-    does not explain.
-    """
-    exceeded, refuted = mon.memory.exceeded[ANGLE_TEST:], mon.initial_errors.refuted[:, ANGLE_TEST:]
-    for j in range(3):
-        if j != i and (exceeded[j] if i == 2 else refuted[H_PHI + i, j]):
-            return False
-    return True
+        early = 0 < M.n_same[k] < mon.config.n_frozen[k] < N_FROZEN_NEVER
+        suspect[k] = (only and M.gyro_verdict[axis] != GYRO_CONFIRMED) or (explains and early)
 
 
 @kernel
@@ -631,17 +600,17 @@ def explains_turns(mon, i):
     residual of the angle's own test allows now, or as its residuals since the alarm have shown.
     """
     M, red, ini = mon.memory, mon.redundancy, mon.initial_errors
-    angle, h = red.test[ANGLE_TEST + i], min(H_PHI + i, N_INITIAL - 1)
+    own, h = ANGLE_TEST + i, min(H_PHI + i, N_INITIAL - 1)
     initial = ini.e_alarm[h] if i < 2 else 0.0
-    tilt = red.memory.reading_bound[PHI] + red.memory.reading_bound[THETA]
+    tilt = red.e[PHI] + red.e[THETA]
     for j in range(3):
-        turn = red.test[TURN_TEST + j]
-        c = abs(turn_share(red.memory.y_past, j, i)) + tilt
-        for m in range(turn.r.size):
-            sound = turn.B[m] + initial * ini.H_m[h, TURN_TEST + j, m]
-            now = abs(turn.r[m]) > c * (abs(angle.r[m]) + angle.B[m]) + sound
-            since = abs(M.beyond[i, j, m]) > sound + M.c_max[i, j] * angle.B[m] + tilt * M.swing[i, m]
-            if M.exceeded[TURN_TEST + j] and now and since:
+        r, c = red.r[j], abs(turn_share(red.y_past, j, i)) + tilt
+        for m in range(r.size):
+            B = red.B[own, m]
+            sound = red.B[j, m] + initial * ini.H_m[h, j, m]
+            now = abs(r[m]) > c * (abs(red.r[own, m]) + B) + sound
+            since = abs(M.beyond[i, j, m]) > sound + M.c_max[i, j] * B + tilt * M.swing[i, m]
+            if M.exceeded[j] and now and since:
                 return False
     return True
 
@@ -651,16 +620,16 @@ def suspect_flow(mon, alarm):
     """Suspect a flow sensor, an accelerometer, or a gyro whose error may be hidden in the tests of the
     attitude. No flow sensor moves the attitude's tests.
     """
-    M, suspect, sensor = mon.memory, mon.output.suspect, FLOW_SENSOR[alarm - SPEED_TEST]
-    n = 0
+    M, suspect, sensor = mon.memory, mon.output.suspect, SENSOR_OF[alarm]
+    turns = M.exceeded[:ANGLE_TEST]
+    n = turns.sum() if alarm > SPEED_TEST else 0
     if alarm > SPEED_TEST:
         for i in range(3):
-            n += M.exceeded[TURN_TEST + i]
-        for i in range(3):
-            explains = gyro_hidden(mon, alarm, i) if n == 0 else n == 1 and M.exceeded[TURN_TEST + i] == 1
+            explains = gyro_hidden(mon, alarm, i) if n == 0 else n == 1 and turns[i] == 1
             suspect[i] = explains and not M.cleared[i]
-    suspect_accelerometers(mon, n > 0)
-    suspect[sensor] = n == 0 and not M.cleared[sensor]
+    if n == 0:
+        suspect_accelerometers(mon)
+        suspect[sensor] = not M.cleared[sensor]
 
 
 @kernel
@@ -669,34 +638,31 @@ def gyro_hidden(mon, j, i):
     its axis. All of the error of the gyro across the flow (full) turns it; of another a share, by kinematics;
     q does not act on the sideslip.
     """
-    red, flow = mon.redundancy, mon.redundancy.test[j]
-    alpha, beta = red.memory.y_past[ALPHA], red.memory.y_past[BETA]
-    full = i == j - SPEED_TEST
-    share = abs(np.sin(alpha))
-    if j == ALPHA_TEST:
-        share = abs(np.tan(beta) * (np.cos(alpha) if i == 0 else np.sin(alpha)))
-    k, x = (HIDDEN_FACTOR, HIDDEN_FACTOR) if full else (1.0, HIDDEN_FACTOR * share)
+    red = mon.redundancy
+    alpha, beta = red.y_past[ALPHA], red.y_past[BETA]
+    k = share = HIDDEN_FACTOR
+    if i != j - SPEED_TEST:
+        s, c = np.sin(alpha), np.cos(alpha)
+        k, share = 1.0, share * abs(s if j == BETA_TEST else np.tan(beta) * (c if i == 0 else s))
     acts = i != 1 or j == ALPHA_TEST
-    return acts and not exceeds(flow.r, k, flow.B, x, red.test[TURN_TEST + i].B)
+    return acts and not exceeds(red.r[j], k, red.B[j], share, red.B[i])
 
 
 @kernel
-def suspect_accelerometers(mon, by_gyro):
-    """Suspect the accelerometers along whose axis most of the spurious velocity dv is, unless a gyro explains
-    it. In flow axes dv is r_sum, m/s and rad; plane: turned by beta; body: then by alpha. least: less the
-    bound on |dv| of sound sensors.
+def suspect_accelerometers(mon):
+    """Suspect the accelerometers along whose axis most of the spurious velocity dv is. In flow axes dv is
+    r_sum, m/s and rad; plane: turned by beta; body: then by alpha. least: less the bound on |dv| of sound
+    sensors.
     """
-    M, y, r, B = mon.memory, mon.redundancy.memory.y_past, mon.memory.r_sum, mon.memory.B_sum
-    alpha, beta, V = y[ALPHA], y[BETA], max(y[AIRSPEED], MIN_AIRSPEED_MPS)
+    M, y, r, B = mon.memory, mon.redundancy.y_past, mon.memory.r_sum, mon.memory.B_sum
+    alpha, beta, V = y[ALPHA], y[BETA], speed(y)
     plane = complex(r[0], V * r[2]) * complex(np.cos(beta), np.sin(beta))
     body = complex(plane.real, V * np.cos(beta) * r[1]) * complex(np.cos(alpha), np.sin(alpha))
     dv = abs(body.real), abs(plane.imag), abs(body.imag)
-    least, frozen = MIN_AXIS_SHARE * max(dv) - B[0] - V * (B[1] + B[2]), NO_SENSOR
-    for i in range(AX, N_IN_EQUATIONS):
-        frozen = i if is_frozen(mon, i) else frozen
-    for i in range(AX, N_IN_EQUATIONS):
+    least, frozen = MIN_AXIS_SHARE * max(dv) - B[0] - V * (B[1] + B[2]), last_frozen(mon, FORCES)
+    for i in FORCES:
         cause = frozen == i or (frozen < 0 and dv[i - AX] >= least)
-        mon.output.suspect[i] = cause and not by_gyro and not M.cleared[i]
+        mon.output.suspect[i] = cause and not M.cleared[i]
 
 
 @kernel
@@ -704,15 +670,12 @@ def suspect_lone(mon, alarm):
     """Suspect the sensor that takes part in no other test, of kinematics if none is exceeded; and the
     airspeed, unless the error that the density shows would exceed the bound of the airspeed's own test."""
     M, red, ini, suspect = mon.memory, mon.redundancy, mon.initial_errors, mon.output.suspect
-    alone = True
-    for j in range(RPM_TEST):
-        alone = alone and (j == alarm or alarm >= RPM_TEST or not M.exceeded[j])
-    suspect[LONE_SENSOR[alarm - DENSITY_TEST]] = alone
+    suspect[SENSOR_OF[alarm]] = alarm >= RPM_TEST or alone(M.exceeded[:RPM_TEST], alarm)
     if alarm == DENSITY_TEST:
-        e, H = ini.e_alarm[H_AIRSPEED], ini.H_m[H_AIRSPEED, DENSITY_TEST]
+        e, H = ini.e_alarm[H_AIRSPEED], ini.H_m[H_AIRSPEED, alarm]
         # a relative change of the airspeed changes log(density) by twice as much
-        k = 2.0 * HIDDEN_FACTOR * (1.0 + e) / max(red.memory.y_past[AIRSPEED], MIN_AIRSPEED_MPS)
-        hidden = not exceeds(red.test[DENSITY_TEST].r, k, red.test[SPEED_TEST].B, e, H)
+        k = 2.0 * HIDDEN_FACTOR * (1.0 + e) / speed(red.y_past)
+        hidden = not exceeds(red.r[alarm], k, red.B[SPEED_TEST], e, H)
         # its test need not show an error if it is frozen
         suspect[AIRSPEED] = M.exceeded[SPEED_TEST] == 1 or hidden or M.n_same[AIRSPEED] > 0
 
@@ -725,7 +688,7 @@ def add_turn(mon, att, y):
         attitude.restart(att)
         return
     for i in range(3):
-        attitude.add_turn(att, i, mon.redundancy.test[TURN_TEST + i].residual)
+        attitude.add_turn(att, i, mon.redundancy.residual[i])
     mon.memory.turn_max = att.turn_max
 
 
@@ -743,12 +706,6 @@ def name_gyro(mon, found, i, t):
 def rule_out_gyros(mon):
     """No gyro can be broken: a surface may be isolated."""
     mon.memory.gyros_excluded = 1
-
-
-@kernel
-def expect_pressure(mon, pressure):
-    """Predict the engine's manifold pressure from the command of the law in charge of the engine."""
-    mon.redundancy.memory.engine_commands[1] = pressure
 
 
 @kernel
@@ -789,18 +746,17 @@ def has_alarm(mon):
 def replace_readings(mon, pred, measured):
     """Replace the readings of isolated or missing sensors by estimates from the others. Accelerometers are
     not replaced: none of them is used once one of them may be broken."""
-    o, any_replaced, slipstream = mon.output, False, False
+    o, unused = mon.output, mon.output.is_reading_unused
     for i in range(N_SENSORS):
-        if measured.missing[i]:
-            o.is_reading_unused[i] = 1
-        if AX <= i < N_IN_EQUATIONS and (o.is_reading_unused[i] or (o.alarmed and o.suspect[i])):
-            set_inertial(measured, 0)
-        if o.is_reading_unused[i] and i < AX:
+        unused[i] |= measured.missing[i]
+        if unused[i] and i < AX:
             measured.signal[i] = estimate_reading(mon, pred, measured.signal, i)
-            any_replaced = True
-            slipstream = slipstream or i in (AIRSPEED, QDYN, ENGINE_SPEED, MANIFOLD)
-    if any_replaced:
+    for i in FORCES:
+        if unused[i] or (o.alarmed and o.suspect[i]):
+            set_inertial(measured, 0)
+    if unused[:AX].any():
         share_out(measured)
+    slipstream = unused[AIRSPEED] or unused[QDYN] or unused[ENGINE_SPEED] or unused[MANIFOLD]
     if slipstream and mon.config.has_engine:
         note_slipstream(measured)
 
@@ -808,18 +764,16 @@ def replace_readings(mon, pred, measured):
 @kernel
 def estimate_reading(mon, pred, y, i):
     """The estimate of a sensor's reading from the other sensors, in its unit."""
-    M = mon.redundancy.memory
+    red = mon.redundancy
     if i < 3:
         return estimate_rate(mon, pred, i)
-    if i >= ENGINE_SPEED:
-        return M.engine_commands[i - ENGINE_SPEED]
-    rho = 2.0 * M.y_past[QDYN] / M.y_past[AIRSPEED] ** 2
+    rho = 2.0 * red.y_past[QDYN] / red.y_past[AIRSPEED] ** 2
     if i == AIRSPEED:
         return np.sqrt(max(2.0 * y[QDYN] / rho, MIN_AIRSPEED_MPS**2))
     if i == QDYN:
         return 0.5 * rho * y[AIRSPEED] ** 2
-    back = mon.redundancy.config.sample_time_s / VANE_RETURN_S if i in (ALPHA, BETA) else 0.0
-    return M.predicted_reading[i] + back * (mon.config.y_trim[i] - M.predicted_reading[i])
+    back = red.h / VANE_RETURN_S if i in (ALPHA, BETA) else 0.0
+    return red.y_pred[i] + back * (mon.config.y_trim[i] - red.y_pred[i])
 
 
 @kernel
@@ -829,15 +783,14 @@ def estimate_rate(mon, pred, i):
 
     The rate itself is used for the next sample: its own error shows there.
     """
-    h, test = mon.redundancy.config.sample_time_s, mon.redundancy.test[TURN_TEST + i]
-    u = pred.u_old if mon.memory.substep == 0 else pred.u
-    acc = pred.f[i]
+    red, M, gain = mon.redundancy, mon.memory, mon.config.rate_gain
+    acc, u = pred.f[i], pred.u_old if M.substep == 0 else pred.u
     for s in range(u.size):
         acc += pred.G[i, s] * u[s]
     if mon.output.keeps_surface:
         acc += pred.F_known[i] - pred.means.F[i]
-    turn = mon.config.rate_gain * test.residual
-    if not mon.memory.replaced[i] and mon.config.rate_gain < 1.0:
-        turn = h * FILTER_POLES_PER_S[RATE_POLE] * test.r[RATE_POLE]
-    mon.memory.replaced[i] = 1
-    return mon.redundancy.memory.y_past[i] + turn / h + h * acc
+    rate = gain * red.residual[i] / red.h
+    if not M.replaced[i] and gain < 1.0:
+        rate = FILTER_POLES_PER_S[RATE_POLE] * red.r[i, RATE_POLE]
+    M.replaced[i] = 1
+    return red.y_past[i] + rate + red.h * acc

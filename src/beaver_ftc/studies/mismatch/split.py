@@ -18,7 +18,7 @@ from beaver_ftc.results.metrics import measure
 from beaver_ftc.results.model import Metrics
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.studies.mismatch.models import LOGGED, Columns, States, states_of
+from beaver_ftc.studies.mismatch.models import LOGGED, Columns, States, acceleration, states_of
 from beaver_ftc.studies.mismatch.sources import SOURCES, Contributions, Models, instantaneous, integration
 
 UNEXPLAINED, TOTAL, ETA_BAR, FAULT = "unexplained", "total", "eta_bar", "fault"
@@ -95,7 +95,7 @@ def _over_frames(m: Models, states: States) -> Stretch:
 
 def _at_end(m: Models, last: States) -> Stretch:
     """The flight's last row: nothing follows, so JSBSim's acceleration then stands for the frame."""
-    designed = m.design_model.acceleration(last.x_measured, last.y_measured, last.u)
+    designed = acceleration(m.design, last.x_measured, last.y_measured, last.u)
     return _stretch(m, last, np.zeros_like(last.x), last.xdot - designed, last.eta_bar)
 
 

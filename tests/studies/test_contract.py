@@ -30,7 +30,7 @@ MISTAKES = {  # of each study a line that it cannot answer, and what is said of 
 QUICK = {  # of each study that has one: a line that is answered within seconds, and its result folder
     "decay": (["short.yaml", "--flights", "1", "--workers", "1", "--out", "runs"], "short-decay"),
     "detectability": (["short.yaml", "--airspeed", "45", "--altitude", "500"], "short-detectability"),
-    "verify": (["--hours", "0", "--faults", "1", "--workers", "1", "--out", "runs/flights"], ""),
+    "verify": (["--hours", "0", "--faults", "1", "--workers", "1"], "verification"),
 }
 
 
@@ -71,8 +71,7 @@ def test_an_answer_is_one_document_its_files_and_the_same_again(name, call, tmp_
     expected = 0 if document.get("passed", document.get("kept", True)) else 1
     assert (done.returncode, text.returncode) == (expected, expected)
     assert text.stdout.strip()
-    if folder:
-        written = {path.name for path in (tmp_path / "runs" / folder).iterdir()}
-        assert written == {*STUDIES[name].FILES}
-        kept = json.loads((tmp_path / "runs" / folder / f"{name}.json").read_text())
-        assert {key: document[key] for key in kept} == kept
+    written = {path.name for path in (tmp_path / "runs" / folder).iterdir()}
+    assert written == {*STUDIES[name].FILES}
+    kept = json.loads((tmp_path / "runs" / folder / f"{name}.json").read_text())
+    assert {key: document[key] for key in kept} == kept

@@ -130,7 +130,7 @@ def test_rows_of_another_question_or_other_code_are_not_used(tmp_path, monkeypat
 def test_a_part_that_is_damaged_is_flown_again(tmp_path, content):
     with pytest.raises(KeyboardInterrupt):
         rows_of(tmp_path / "study", range(6), square, progress=stopped_after(4))
-    (tmp_path / ".study.flown" / "parts" / "000002.json").write_text(content)
+    (tmp_path / ".study.flown" / "parts" / "000000-000002.json").write_text(content)
     assert rows_of(tmp_path / "study", range(6), square) == list(map(square, range(6)))
 
 

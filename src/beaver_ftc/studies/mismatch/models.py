@@ -1,4 +1,4 @@
-"""A stretch of the log as arrays, and the acceleration that a design model expects there."""
+"""The log as arrays, and the acceleration that a design model expects there."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from beaver_ftc.aircraft import AXES
 from beaver_ftc.design.fdc import SURFACES
 from beaver_ftc.design.model import responses_at
 
-Columns = Mapping[str, np.ndarray]
+Log = Mapping[str, np.ndarray]
 
 
 def measured_name(column: str) -> str:
@@ -39,7 +39,6 @@ _TOGETHER = {
     "eta_bar": tuple(f"{axis}_eta_bar_rad_s2" for axis in AXES),
     "design_mean": tuple(f"{axis}_design_rad_s2" for axis in AXES),
 }  # fmt: skip
-LOGGED = frozenset((*_ALONE, *(column for columns in _TOGETHER.values() for column in columns)))
 
 
 @dataclass(frozen=True)
@@ -69,11 +68,8 @@ class States:
     eta_bar: np.ndarray
     design_mean: np.ndarray
 
-    def __getitem__(self, rows: slice) -> "States":
-        return States(**{name: values[rows] for name, values in vars(self).items()})
 
-
-def states_of(log: Columns) -> States:
+def states_of(log: Log) -> States:
     """The states in log columns (name -> (n,)). A log without a measured column measured the truth."""
     together = {
         name: np.column_stack([log[column if column in log else _TRUE[column]] for column in columns])

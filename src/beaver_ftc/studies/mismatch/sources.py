@@ -79,31 +79,20 @@ ENGINE_TERMS = tuple(term.name for term in load().moments if "dpt" in dict(term.
 Contributions = dict[str, np.ndarray]
 
 
-class HealthyActuators:
-    """A scenario's actuators, before the first command: `follow` moves them on, some commands at a time."""
-
-    def __init__(self, scenario: Scenario) -> None:
-        dt = 1.0 / (scenario.rate_hz * scenario.substeps)
-        each = [getattr(scenario.actuators, surface) for surface in SURFACES]
-        off = [getattr(scenario.uncertainty.actuators, surface) for surface in SURFACES]
-        bandwidths = [a.bandwidth_rad_s * b.bandwidth for a, b in zip(each, off, strict=True)]
-        rates = [radians(a.rate_limit_deg_s * b.rate_limit) for a, b in zip(each, off, strict=True)]
-        share = [1.0 - exp(-bandwidth * dt) if bandwidth else 1.0 for bandwidth in bandwidths]
-        reach = [rate * dt if rate else inf for rate in rates]
-        self._share, self._reach = np.array(share), np.array(reach)  # of the way, rad; in a JSBSim frame
-        self._band = np.array([radians(one.dead_band_deg) for one in off])
-        self._low, self._high = np.array([_stops(*both) for both in zip(SURFACES, each, strict=True)]).T
-        self._runs = scenario.substeps
-        self._at_rad: np.ndarray | None = None
-
-    def follow(self, commands: np.ndarray) -> np.ndarray:
-        """Positions (n, 4) rad at rows with these commands (n, 4) rad, following those given before."""
-        if self._at_rad is None:
-            self._at_rad = np.clip(commands[0], self._low, self._high)
-        positions, stops = np.empty_like(commands), (self._low, self._high)
-        moves = self._share, self._reach, self._band
-        _follow(commands, *moves, *stops, self._runs, self._at_rad, positions)
-        return positions
+def healthy_positions(scenario: Scenario, commands: np.ndarray) -> np.ndarray:
+    """Positions (n, 4) rad of a scenario's healthy actuators at rows with these commands (n, 4) rad."""
+    dt = 1.0 / (scenario.rate_hz * scenario.substeps)
+    each = [getattr(scenario.actuators, surface) for surface in SURFACES]
+    off = [getattr(scenario.uncertainty.actuators, surface) for surface in SURFACES]
+    bandwidths = [a.bandwidth_rad_s * b.bandwidth for a, b in zip(each, off, strict=True)]
+    rates = [radians(a.rate_limit_deg_s * b.rate_limit) for a, b in zip(each, off, strict=True)]
+    share = np.array([1.0 - exp(-bandwidth * dt) if bandwidth else 1.0 for bandwidth in bandwidths])
+    reach = np.array([rate * dt if rate else inf for rate in rates])  # rad; in a JSBSim frame
+    band = np.array([radians(one.dead_band_deg) for one in off])
+    low, high = np.array([_stops(*both) for both in zip(SURFACES, each, strict=True)]).T
+    positions = np.empty_like(commands)
+    _follow(commands, share, reach, band, low, high, scenario.substeps, positions)
+    return positions
 
 
 def _stops(surface: str, dynamics: ActuatorDynamics) -> tuple[float, float]:
@@ -113,8 +102,9 @@ def _stops(surface: str, dynamics: ActuatorDynamics) -> tuple[float, float]:
 
 
 @kernel
-def _follow(commands, share, reach, band, low, high, runs, at, positions):
-    """Fill positions (n, 4) rad, `runs` JSBSim frames a row, and leave `at` (4,) rad at the last."""
+def _follow(commands, share, reach, band, low, high, runs, positions):
+    """Fill positions (n, 4) rad, `runs` JSBSim frames a row."""
+    at = np.minimum(np.maximum(commands[0], low), high)
     for k in range(commands.shape[0]):
         for s in range(4):
             demand = min(max(commands[k, s], low[s]), high[s])
@@ -149,8 +139,7 @@ def earth_rotation(
 
 
 class Models:
-    """Of a flight: the actuators, and moment models from the one in use to the truth, each with one error
-    less.
+    """Of a flight: moment models from the one in use to the truth, each with one error less.
 
     design: in use, tied to the trim where it is linearised or frozen. untied: without that. whole: with the
     engine's terms, as in the table. turning: with the truth's coefficients. truth: with its inertia as well.
@@ -159,8 +148,7 @@ class Models:
 
     def __init__(self, scenario: Scenario) -> None:
         model, true = scenario.design_model, scenario.uncertainty.coefficients
-        self.scenario, self.actuators = scenario, HealthyActuators(scenario)
-        self.design, mass = design_of(model)[0], mass_of(model)
+        self.scenario, self.design, mass = scenario, design_of(model)[0], mass_of(model)
         anchor(self.design, *known_trim(Declared.of(scenario)))
         kept = {k: v for k, v in model.coefficients.items() if model.engine_terms or k not in ENGINE_TERMS}
         self.untied = design_record(engine_terms=model.engine_terms, scale=model.coefficients, mass=mass)[0]
@@ -267,7 +255,7 @@ def earth(m: Models, s: States) -> np.ndarray:
 
 def instantaneous(m: Models, s: States) -> tuple[Contributions, dict[str, Contributions]]:
     """All sources but the integration at every frame, and the single faults and single coefficients."""
-    healthy, (_, G) = m.actuators.follow(s.u), responses_at(m.design, s.x, s.y)
+    healthy, (_, G) = healthy_positions(m.scenario, s.u), responses_at(m.design, s.x, s.y)
     faults, nothing = fault_effects(m, s, G, healthy), np.zeros_like(s.x)
     measured = acceleration(m.design, s.x_measured, s.y_measured, s.u)
     ways = (m.design, m.untied, m.whole, m.turning, m.truth)
@@ -289,14 +277,3 @@ def instantaneous(m: Models, s: States) -> tuple[Contributions, dict[str, Contri
     }
     errors = {name: acceleration(one, s.x, s.y, s.effective) - on_the_way[2] for name, one in m.parts.items()}
     return contributions, {"fault": faults, "coefficients": errors}
-
-
-def integration(m: Models, s: States, following: States) -> np.ndarray:
-    """How the rates moved over a frame less JSBSim's acceleration at its start; the design's likewise.
-
-    The design model's mean over a frame is the diagnosis': over all its JSBSim frames. With one JSBSim frame
-    a frame it is the sample at the start. following: the same frames, each one later.
-    """
-    moved = (following.x - s.x) * m.scenario.rate_hz - s.xdot
-    sampled = acceleration(m.design, s.x_measured, s.y_measured, s.u)
-    return moved - (following.design_mean - sampled)

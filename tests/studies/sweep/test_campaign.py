@@ -13,6 +13,7 @@ from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.studies.engine import workers
 from beaver_ftc.studies.sweep.campaign import Options, SweepStopped, replay, run_sweep
 from beaver_ftc.studies.sweep.one_flight import Keep
+from beaver_ftc.studies.sweep.pictures import FIGURES
 
 from .conftest import SHORT, parts_in, sweep_of
 
@@ -40,9 +41,7 @@ def test_the_folder_holds_what_it_should(reference):
     assert {path.name for path in folder.iterdir()} == {
         "sweep.json", "results.parquet", "summary.json", "report.html", "figures",
     }  # fmt: skip
-    assert {"detection-probability.png", "parallel-coordinates.png"} <= {
-        p.name for p in (folder / "figures").iterdir()
-    }
+    assert {path.stem for path in (folder / "figures").iterdir()} == {*FIGURES} - {"search"}
 
 
 def test_the_worker_count_does_not_show(reference, tmp_path, small_batches):

@@ -16,8 +16,6 @@ PICTURES = {
     "mismatch-sources": "What the mismatch is made of, in time",
     "mismatch-bound": "How much of the bound each source uses",
     "mismatch-linear": "Poles and frequency responses: truth, FDC equations, design model",
-    "mismatch-zeros": "Zeros from each surface to its rate",
-    "mismatch-response": "Pulse responses of the linear models",
 }
 Table = tuple[str, list[str], list[list[str]]]
 

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from beaver_ftc.results.model import Document
-from beaver_ftc.results.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION
+from beaver_ftc.results.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY
 from beaver_ftc.studies.engine.statistics import wilson
 from beaver_ftc.studies.present.figures import GRID, heat_map, new_figure
 from beaver_ftc.studies.present.page import save
 from beaver_ftc.studies.sweep.outcomes import Flights
-from beaver_ftc.studies.sweep.summary import NO_ALARM, OUTCOMES
+from beaver_ftc.studies.sweep.summary import OUTCOMES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -37,7 +37,6 @@ _UNITS = {  # the longest ending first
     "_rad_s": "rad/s", "_deg_s": "deg/s", "_deg": "deg", "_rad": "rad", "_mps": "m/s", "_hz": "Hz",
     "_m": "m", "_s": "s",
 }  # fmt: skip
-MOST_LINES = 400  # of parallel coordinates: more is a grey block
 _FAULT_LOOKS = (
     (BLUE, "o", "-"),
     (ORANGE, "s", "--"),
@@ -220,95 +219,6 @@ def sensitivity_bars(flights: Flights, summary: Document) -> "Figure | None":
     return figure
 
 
-def parallel_coordinates(flights: Flights, summary: Document) -> "Figure | None":
-    """Each flight a line through its varied values and its delay, the bad ones on top."""
-    ranked = [entry["key"] for entry in summary["sensitivity"]["detection_delay"]]
-    keys = (ranked or list(flights.vary))[:8]
-    if not keys:
-        return None
-    chosen = _spread(flights)
-    size = (max(7.0, 1.7 * len(keys) + 3), 5.0)
-    figure, axes = _axes(f"{chosen.size} of {len(flights)} flights, a line each", size=size)
-    axes.grid(visible=False)
-    scaled = np.column_stack([*(_scaled(axes, i, flights, key)[chosen] for i, key in enumerate(keys)),
-                              _scaled_delay(axes, len(keys), flights)[chosen]])  # fmt: skip
-    for label, which, colour, alpha in _outcomes(flights):
-        lines = scaled[which[chosen]]
-        if lines.size:
-            axes.plot(lines.T, color=colour, alpha=alpha, linewidth=0.8)
-            axes.plot([], [], color=colour, label=label)
-    names = [*(in_words(key).replace(": ", ":\n").replace(" (", "\n(") for key in keys), "detection\ndelay"]
-    axes.set_xticks(range(len(keys) + 1), names, fontsize=8)
-    axes.set_yticks([])
-    axes.set_ylim(-0.06, 1.06)
-    axes.set_xlim(-0.3, len(keys) + 0.45)
-    for place in range(len(keys) + 1):
-        axes.axvline(place, color=BLACK, linewidth=0.8)
-    figure.legend(loc="outside lower center", ncols=4, fontsize=8, frameon=False)
-    return figure
-
-
-def _spread(flights: Flights) -> np.ndarray:
-    """Positions of the flights to draw: every bad one as far as there is room, and of the others evenly."""
-    bad = np.flatnonzero((flights.faulted & ~flights.detected) | flights.departed | flights["false_alarm"])
-    bad = bad[:: max(1, -(-bad.size // (MOST_LINES // 2)))]
-    return np.union1d(bad, np.arange(0, len(flights), max(1, -(-len(flights) // MOST_LINES))))
-
-
-def _outcomes(flights: Flights) -> list[tuple[str, np.ndarray, str, float]]:
-    """(label, which, colour, alpha), drawn in this order."""
-    bad = flights["false_alarm"] | flights.departed | ~flights.measured
-    wrong = flights.detected & (flights["isolation.fault"] != "") & ~flights["isolation.correct"]
-    missed = flights.faulted & ~flights.detected
-    return [
-        ("detected, or nothing to detect", ~bad & ~missed & ~wrong, BLUE, 0.25),
-        (NO_ALARM, missed & ~bad, ORANGE, 0.5),
-        ("named wrongly", wrong & ~bad, PURPLE, 0.7),
-        ("false alarm, lost or not flown", bad, VERMILION, 0.8),
-    ]
-
-
-def _scaled(axes: "Axes", place: int, flights: Flights, key: str) -> np.ndarray:
-    """A key's values from 0 to 1, its ends or its names written beside its axis."""
-    values = flights[key]
-    if not flights.is_number(key):
-        names, group = np.unique(values.astype(str), return_inverse=True)
-        for i, name in enumerate(names):
-            _say(axes, place, i / max(names.size - 1, 1), _short(name))
-        return group / max(names.size - 1, 1)
-    low, high = float(values.min()), float(values.max())
-    _say(axes, place, 0.0, f"{low:.3g}")
-    _say(axes, place, 1.0, f"{high:.3g}")
-    if flights.vary[key].loguniform:
-        values, low, high = np.log(values), np.log(low), np.log(high)
-    return (values - low) / max(high - low, 1e-300)
-
-
-def _short(name: str) -> str:
-    """A choice as there is room for it: of a section, the words in it."""
-    words = re.findall(r': "([^"]+)"', name)
-    return (" ".join(words) or name.replace("[]", "none"))[:28].replace("_", " ")
-
-
-def _scaled_delay(axes: "Axes", place: int, flights: Flights) -> np.ndarray:
-    """The delay from 0 to 0.9 on a logarithm, never at 1; without a fault there is no point."""
-    delays = flights.detection_delay_s
-    seen = delays[flights.detected & (delays > 0)]
-    low, high = (float(seen.min()), float(seen.max())) if seen.size else (0.01, 1.0)
-    if seen.size:
-        _say(axes, place, 0.0, f"{low:.2g} s")
-        _say(axes, place, 0.9, f"{high:.2g} s")
-    if (flights.faulted & ~flights.detected).any():
-        _say(axes, place, 1.0, "never")
-    with np.errstate(divide="ignore", invalid="ignore"):
-        share = 0.9 * (np.log(np.maximum(delays, low)) - np.log(low)) / max(np.log(high / low), 1e-12)
-    return np.where(flights.faulted, np.where(flights.detected, share, 1.0), np.nan)
-
-
-def _say(axes: "Axes", place: int, height: float, text: str) -> None:
-    axes.annotate(text, (place, height), xytext=(4, 0), textcoords="offset points", fontsize=7, va="center")
-
-
 def search_history(flights: Flights, summary: Document) -> "Figure | None":
     """The worst flight found so far, generation by generation."""
     if "search" not in summary:
@@ -328,5 +238,4 @@ FIGURES: dict[str, tuple[str, Drawer]] = {
     "delay-distribution": ("Detection delay", delay_distribution),
     "confusion-matrix": ("Faults and diagnoses", confusion_matrix),
     "sensitivity": ("Sensitivity", sensitivity_bars),
-    "parallel-coordinates": ("Parallel coordinates", parallel_coordinates),
 }

@@ -9,7 +9,7 @@ import time
 import pyarrow.parquet as pq
 import pytest
 
-from beaver_ftc.documents.errors import BadInput, SimulationFailed
+from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.studies.engine import workers
 from beaver_ftc.studies.sweep.campaign import Options, SweepStopped, replay, run_sweep
 from beaver_ftc.studies.sweep.one_flight import Keep
@@ -146,12 +146,6 @@ def test_the_report_leads_to_a_flight_once_it_is_replayed(tmp_path, small_batche
     assert link not in page.read_text()
     replay(sweep_of(), Options(out=tmp_path), worst["run"])
     assert link in page.read_text()
-
-
-@pytest.mark.parametrize("index", [-1, 48])
-def test_a_flight_that_is_not_there_is_refused(tmp_path, index):
-    with pytest.raises(BadInput, match="allowed: 0 to 47"):
-        replay(sweep_of(), Options(out=tmp_path), index)
 
 
 def test_asked_for_flights_leave_their_logs(tmp_path, small_batches):

@@ -21,7 +21,7 @@ from beaver_ftc.plant.conditions import trimmed
 from beaver_ftc.plant.linear import LinearModel, differences
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.linear_systems import CLASSICAL, Mode, modes
-from beaver_ftc.studies.present.tables import aligned, finite, number
+from beaver_ftc.studies.present.tables import aligned, finite, grouped, number
 
 WORSE = 4  # than level 3
 N_AIRSPEEDS = 5
@@ -168,17 +168,15 @@ def as_rows(found: list[Quality]) -> list[Document]:
     return [{key: finite(value) for key, value in asdict(each).items()} for each in found]
 
 
-def as_text(found: list[Quality]) -> str:
+def as_text(rows: list[Document]) -> str:
     """A line a flight condition, a column a quantity, the level in brackets; then the worst level."""
     head = [["aircraft alone,", *(limit.mode for limit in LIMITS), ""]]
     head += [["airspeed, m/s", *(f"{each.quantity} {each.unit}".strip() for each in LIMITS), "level"]]
     lines = []
-    for start in range(0, len(found), len(LIMITS)):
-        row = found[start : start + len(LIMITS)]
-        first, *_ = row
-        ended = " at the end" if first.where == "at the end" else ""
-        cells = [f"{number(each.value)} ({said(each.level)})" for each in row]
-        lines.append([f"{first.airspeed_mps:.1f}{ended}", *cells, said(max(each.level for each in row))])
+    for (where, airspeed_mps), of in grouped(rows, "where", "airspeed_mps").items():
+        ended = " at the end" if where == "at the end" else ""
+        cells = [f"{number(each['value'], none='never')} ({said(each['level'])})" for each in of]
+        lines.append([f"{airspeed_mps:.1f}{ended}", *cells, said(max(each["level"] for each in of))])
     clauses = ", ".join(dict.fromkeys(f"{each.clause} {each.table}".strip() for each in LIMITS))
     says = f"in brackets: level of MIL-F-8785C, class I, category B:\n{clauses}"
     return f"{aligned([*head, *lines])}\n\n{says}"

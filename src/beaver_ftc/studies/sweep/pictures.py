@@ -165,8 +165,6 @@ def confusion_matrix(flights: Flights, summary: Document) -> "Figure | None":
     counts, rows, columns = np.array(confusion["counts"]), confusion["faults"], confusion["diagnoses"]
     if not counts.size:
         return None
-    if len(rows) == 1:  # a matrix of one row is no picture
-        return _diagnoses(rows[0], columns, counts[0])
     size = (2.6 + 1.15 * len(columns), 1.7 + 0.55 * len(rows))
     figure, axes = _axes("What broke (rows) against what the diagnosis said (columns)", size=size)
     axes.grid(visible=False)
@@ -177,24 +175,6 @@ def confusion_matrix(flights: Flights, summary: Document) -> "Figure | None":
         ink = "white" if share > 0.6 else BLACK
         labels[row, column] = (f"{counts[row, column]}\n{share:.0%}", ink)
     heat_map(axes, shares, labels, columns, rows, cmap="Blues", vmin=0, vmax=1.15)
-    for border in range(1, len(rows)):
-        axes.axhline(border - 0.5, color="white", linewidth=2)
-    for border in range(1, len(columns)):
-        axes.axvline(border - 0.5, color="white", linewidth=2)
-    return figure
-
-
-def _diagnoses(fault: str, diagnoses: list[str], counts: np.ndarray) -> "Figure":
-    """What the diagnosis said of one fault, as bars."""
-    size = (8.0, 1.5 + 0.45 * len(diagnoses))
-    figure, axes = _axes(f"{fault}: what the diagnosis said", "share of the flights", size=size)
-    shares = counts / counts.sum()
-    axes.barh(range(len(diagnoses)), shares, 0.6, color=BLUE)
-    for row, (count, share) in enumerate(zip(counts, shares, strict=True)):
-        axes.annotate(f" {count} ({share:.0%})", (share, row), va="center", fontsize=8)
-    axes.set_yticks(range(len(diagnoses)), diagnoses)
-    axes.invert_yaxis()
-    axes.set_xlim(0, 1.18)
     return figure
 
 

@@ -128,9 +128,9 @@ def point_at(traces: Sequence[Trace], level: float) -> Document:
     return {"level": level, "false_alarms_per_h": per_h, "detection_rate": rate, "delay_median_s": median_s}
 
 
-def matched(points: Sequence[Document], per_hour: float = 0.0) -> Document:
-    """The most sensitive level with no more false alarms than this."""
-    return min((p for p in points if p["false_alarms_per_h"] <= per_hour), key=itemgetter("level"))
+def matched(points: Sequence[Document]) -> Document:
+    """The most sensitive level without a false alarm."""
+    return min((p for p in points if p["false_alarms_per_h"] <= 0.0), key=itemgetter("level"))
 
 
 # What is held against ours in `better_than_ours`: of each key of a line, what it is called.

@@ -33,11 +33,11 @@ def widened(constant_rad_s2: PerAxis) -> PerAxis:
     return {axis: rounded_up(max(1.2 * c, LEAST_RAD_S2)) for axis, c in constant_rad_s2.items()}
 
 
-def rounded_up(value: float, digits: int = 2) -> float:
-    """The next number of this many significant digits that is not below `value`."""
+def rounded_up(value: float) -> float:
+    """The next number of two significant digits that is not below `value`."""
     if value <= 0.0:
         return 0.0
-    step = digits - 1 - floor(log10(value))
+    step = 1 - floor(log10(value))
     scaled = value * 10.0**step
     return ceil(scaled - 1e-9 * scaled) / 10.0**step if step >= 0 else ceil(scaled) * 10.0**-step
 

@@ -1,14 +1,13 @@
 """The mismatch as tables and sentences, for the terminal and as a section of `report.html`."""
 
-from html import escape
 from pathlib import Path
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.documents.files import read_json
 from beaver_ftc.results.model import Document
 from beaver_ftc.results.report import register_section
-from beaver_ftc.studies.present.page import picture_data
-from beaver_ftc.studies.present.tables import html_table, number, plain, printed, seconds
+from beaver_ftc.studies.present import page
+from beaver_ftc.studies.present.tables import number, plain, printed, seconds
 
 WIDTH = 150
 
@@ -175,21 +174,9 @@ def mismatch_section(folder: Path) -> str:
     if not path.exists():
         return ""
     found = read_json(path)
-    pictures = [_picture(folder / "figures" / f"{name}.png", says) for name, says in PICTURES.items()]
-    shown = [html_table(head, rows, caption) for caption, head, rows in tables(found)]
-    parts = [_heading(found), *shown, *pictures]
-    return f"<section>{''.join(parts)}</section>"
-
-
-def _heading(found: Document) -> str:
-    said = "".join(f"<p>{escape(line)}</p>" for line in findings(found))
-    return f"<h2>Truth against design: {escape(found['scenario'])}</h2>{said}"
-
-
-def _picture(path: Path, says: str) -> str:
-    if not path.exists():
-        return ""
-    image = (
-        f'<img style="max-width: 100%" alt="{escape(says)}" src="data:image/png;base64,{picture_data(path)}">'
-    )
-    return f"<figure>{image}<figcaption>{escape(says)}</figcaption></figure>"
+    drawn = {name: folder / "figures" / f"{name}.png" for name in PICTURES}
+    there = {name: picture for name, picture in drawn.items() if picture.exists()}
+    shown = [part for caption, *table in tables(found) for part in (caption, page.Table(*table))]
+    heading = page.Heading(f"Truth against design: {found['scenario']}")
+    pictures = page.Pictures([(PICTURES[name], name) for name in there])
+    return f"<section>{page.html_of([heading, *findings(found), *shown, pictures], there)}</section>"

@@ -179,4 +179,5 @@ def mismatch_section(folder: Path) -> str:
     shown = [part for caption, *table in tables(found) for part in (caption, page.Table(*table))]
     heading = page.Heading(f"Truth against design: {found['scenario']}")
     pictures = page.Pictures([(PICTURES[name], name) for name in there])
-    return f"<section>{page.html_of([heading, *findings(found), *shown, pictures], there)}</section>"
+    body = page.html_of([heading, *findings(found), *shown, pictures], there)
+    return f"<section><style>.figures img {{ max-width: 100% }}</style>{body}</section>"

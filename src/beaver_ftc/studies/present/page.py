@@ -108,7 +108,7 @@ def _html(part: Part, figures: Mapping[str, Path]) -> str:
 
 def _picture(title: str, path: Path) -> str:
     data = b64encode(path.read_bytes()).decode("ascii")
-    return f'<img style="max-width: 100%" alt="{escape(title)}" src="data:image/png;base64,{data}">'
+    return f'<img alt="{escape(title)}" src="data:image/png;base64,{data}">'
 
 
 def study_files(

@@ -4,17 +4,16 @@ Each function takes the flights and returns a figure, or None where the flights 
 """
 
 import re
-from collections.abc import Callable, Iterator
-from itertools import cycle
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from beaver_ftc.results.model import Document
-from beaver_ftc.results.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY
+from beaver_ftc.results.style import BLACK, BLUE, GREY
 from beaver_ftc.studies.engine.statistics import wilson
-from beaver_ftc.studies.present.figures import GRID, heat_map, new_figure
+from beaver_ftc.studies.present.figures import GRID, curve_look, heat_map, marker, new_figure
 from beaver_ftc.studies.present.page import save
 from beaver_ftc.studies.sweep.outcomes import Flights
 from beaver_ftc.studies.sweep.summary import OUTCOMES
@@ -37,13 +36,6 @@ _UNITS = {  # the longest ending first
     "_rad_s": "rad/s", "_deg_s": "deg/s", "_deg": "deg", "_rad": "rad", "_mps": "m/s", "_hz": "Hz",
     "_m": "m", "_s": "s",
 }  # fmt: skip
-_FAULT_LOOKS = (
-    (BLUE, "o", "-"),
-    (ORANGE, "s", "--"),
-    (GREEN, "^", "-."),
-    (PURPLE, "D", ":"),
-    (SKY, "v", "-"),
-)
 
 
 def write_figures(flights: Flights, summary: Document, folder: Path) -> list[Path]:
@@ -97,15 +89,15 @@ def detection_probability(flights: Flights, summary: Document) -> "Figure | None
     if key is None or not flights.faulted.any():
         return None
     figure, axes = _axes("Detection probability (bars: 95 % intervals)", in_words(key), "share detected")
-    for (colour, marker, dash), label, group in _faults(flights):
+    for place, (label, group) in enumerate(_faults(flights)):
         values, hits = flights[key][group], flights.detected[group]
         bins = _levels(values) if flights.vary[key].count else _bins(values)
         found = [wilson(int(hits[bin].sum()), bin.size) for bin in bins]
         shares = np.array([estimate.value for estimate in found])
         reach = np.array([[e.value - e.low, e.high - e.value] for e in found]).T
         axes.errorbar(
-            [values[bin].mean() for bin in bins], shares, np.maximum(reach, 0), label=label, color=colour,
-            marker=marker, linestyle=dash, markersize=4.5, linewidth=1.3, elinewidth=0.8, capsize=2,
+            [values[bin].mean() for bin in bins], shares, np.maximum(reach, 0), label=label,
+            marker=marker(place), markersize=4.5, elinewidth=0.8, capsize=2, **curve_look(place),
         )  # fmt: skip
     if flights.vary[key].loguniform:
         _log_of_numbers(axes)
@@ -114,11 +106,10 @@ def detection_probability(flights: Flights, summary: Document) -> "Figure | None
     return figure
 
 
-def _faults(flights: Flights) -> Iterator[tuple[tuple[str, str, str], str, np.ndarray]]:
-    """(look, label, which flights) of each fault."""
+def _faults(flights: Flights) -> list[tuple[str, np.ndarray]]:
+    """(label, which flights) of each fault."""
     labels = flights.fault_labels
-    for look, label in zip(cycle(_FAULT_LOOKS), sorted(set(labels[flights.faulted])), strict=False):
-        yield look, label, flights.faulted & (labels == label)
+    return [(label, flights.faulted & (labels == label)) for label in sorted(set(labels[flights.faulted]))]
 
 
 def _levels(values: np.ndarray) -> list[np.ndarray]:
@@ -141,11 +132,11 @@ def delay_distribution(flights: Flights, summary: Document) -> "Figure | None":
         return None
     figure, axes = _axes("", "detection delay (s)", "share of faults detected within the delay")
     axes.set_title("Detection delay", fontsize=10, loc="left")
-    for (colour, _, dash), label, group in _faults(flights):
+    for place, (label, group) in enumerate(_faults(flights)):
         delays = np.sort(flights.detection_delay_s[group & flights.detected])
         if delays.size:
             shares = np.arange(1, delays.size + 1) / group.sum()
-            axes.step(delays, shares, where="post", label=label, color=colour, linestyle=dash, linewidth=1.4)
+            axes.step(delays, shares, where="post", label=label, **curve_look(place))
     for q, says in ((0.5, "half"), (0.95, "95 %")):
         axes.axhline(q, color=GREY, linewidth=0.8, linestyle=":")
         axes.annotate(says, (1.0, q), xycoords=("axes fraction", "data"), ha="right", va="bottom", fontsize=7)
@@ -165,38 +156,40 @@ def confusion_matrix(flights: Flights, summary: Document) -> "Figure | None":
     counts, rows, columns = np.array(confusion["counts"]), confusion["faults"], confusion["diagnoses"]
     if not counts.size:
         return None
-    size = (2.6 + 1.15 * len(columns), 1.7 + 0.55 * len(rows))
-    figure, axes = _axes("What broke (rows) against what the diagnosis said (columns)", size=size)
-    axes.grid(visible=False)
     shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
-    labels = dict.fromkeys(np.ndindex(*counts.shape), ("0", GREY))
-    for row, column in np.argwhere(counts).tolist():
-        share = shares[row, column]
-        ink = "white" if share > 0.6 else BLACK
-        labels[row, column] = (f"{counts[row, column]}\n{share:.0%}", ink)
+
+    def text(at: Place) -> str:
+        return f"{counts[at]}\n{shares[at]:.0%}" if counts[at] else "0"
+
+    title = "What broke (rows) against what the diagnosis said (columns)"
+    return _shaded(title, shares, text, columns, rows)
+
+
+Place = tuple[int, ...]
+
+
+def _shaded(
+    title: str, shares: np.ndarray, text: Callable[[Place], str], columns: Sequence[str], rows: Sequence[str]
+) -> "Figure":
+    """A heat map of shares with a text on each cell."""
+    figure, axes = _axes(title, size=(max(7.0, 2.6 + 1.15 * len(columns)), 1.7 + 0.55 * len(rows)))
+    axes.grid(visible=False)
+    labels = {at: (text(at), "white" if shares[at] > 0.6 else BLACK) for at in np.ndindex(*shares.shape)}
     heat_map(axes, shares, labels, columns, rows, cmap="Blues", vmin=0, vmax=1.15)
     return figure
 
 
-def sensitivity_bars(flights: Flights, summary: Document) -> "Figure | None":
+def sensitivity(flights: Flights, summary: Document) -> "Figure | None":
     """How much of each outcome each varied key explains."""
-    rankings = {OUTCOMES[name]: ranking for name, ranking in summary["sensitivity"].items() if ranking}
+    rankings = {name: ranking for name, ranking in summary["sensitivity"].items() if ranking}
     if not rankings:
         return None
     keys = [entry["key"] for entry in next(iter(rankings.values()))][:12]
+    explained = [{entry["key"]: entry["explained"] for entry in ranking} for ranking in rankings.values()]
+    shares = np.array([[of[key] for of in explained] for key in keys])
     title = "Sensitivity: share of an outcome that a key explains by rank correlation"
-    figure, axes = _axes(title, size=(8.0, 1.8 + 0.5 * len(keys)))
-    height = 0.8 / len(rankings)
-    colours = (BLUE, ORANGE, GREEN, PURPLE)
-    for position, (name, ranking) in enumerate(rankings.items()):
-        explained = {entry["key"]: entry["explained"] for entry in ranking}
-        places = np.arange(len(keys)) + (position + 0.5) * height - 0.4
-        axes.barh(places, [explained[key] for key in keys], height, label=name, color=colours[position])
-    axes.set_yticks(range(len(keys)), [in_words(key) for key in keys])
-    axes.invert_yaxis()
-    axes.set_xlim(0, 1)
-    figure.legend(loc="outside lower center", ncols=4, fontsize=8, frameon=False)
-    return figure
+    outcomes = [OUTCOMES[name] for name in rankings]
+    return _shaded(title, shares, lambda at: f"{shares[at]:.2f}", outcomes, list(map(in_words, keys)))
 
 
 def search_history(flights: Flights, summary: Document) -> "Figure | None":
@@ -217,5 +210,5 @@ FIGURES: dict[str, tuple[str, Drawer]] = {
     "detection-probability": ("Detection probability against magnitude", detection_probability),
     "delay-distribution": ("Detection delay", delay_distribution),
     "confusion-matrix": ("Faults and diagnoses", confusion_matrix),
-    "sensitivity": ("Sensitivity", sensitivity_bars),
+    "sensitivity": ("Sensitivity", sensitivity),
 }

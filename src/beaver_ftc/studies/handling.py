@@ -21,10 +21,10 @@ from beaver_ftc.plant.conditions import trimmed
 from beaver_ftc.plant.linear import LinearModel, differences
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.linear_systems import CLASSICAL, Mode, modes
+from beaver_ftc.studies.margins import N_AIRSPEEDS, over_envelope
 from beaver_ftc.studies.present.tables import aligned, finite, grouped, number
 
 WORSE = 4  # than level 3
-N_AIRSPEEDS = 5
 _STATES = ("alpha_rad", "beta_rad", "p_rad_s", "q_rad_s", "r_rad_s", "phi_rad", "theta_rad", "psi_rad")
 
 
@@ -153,8 +153,7 @@ def over_airspeeds(scenario: Scenario) -> list[Quality]:
     from beaver_ftc.loop.loop import fly
     from beaver_ftc.results.log import MemoryLog
 
-    speeds = np.linspace(*scenario.airframe.envelope.airspeed_mps, N_AIRSPEEDS)
-    flights = (scenario.with_({"initial.airspeed_mps": float(V)}) for V in speeds)
+    flights = over_envelope(scenario, N_AIRSPEEDS)
     found = [quality for flight in flights for quality in where_trimmed(flight)]
     if scenario.faults:
         log = MemoryLog()

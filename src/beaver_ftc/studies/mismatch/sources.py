@@ -1,4 +1,4 @@
-"""The sources of mismatch, each by its own formula: what it adds to truth minus design, (n, 3) rad/s2.
+"""The sources of mismatch: what each adds to truth minus design, (n, 3) rad/s2.
 
 They are the steps from the design model, at what was measured and commanded, to the truth: each changes
 one thing and leaves the rest as the steps before it left it, so that all of them together make the whole

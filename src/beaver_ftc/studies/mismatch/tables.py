@@ -176,7 +176,7 @@ def mismatch_section(folder: Path) -> str:
     found = read_json(path)
     drawn = {name: folder / "figures" / f"{name}.png" for name in PICTURES}
     there = {name: picture for name, picture in drawn.items() if picture.exists()}
-    shown = [part for caption, *table in tables(found) for part in (caption, page.Table(*table))]
+    shown = [part for caption, head, rows in tables(found) for part in (caption, page.Table(head, rows))]
     heading = page.Heading(f"Truth against design: {found['scenario']}")
     pictures = page.Pictures([(PICTURES[name], name) for name in there])
     body = page.html_of([heading, *findings(found), *shown, pictures], there)

@@ -1,6 +1,5 @@
 """A page from its parts, as Markdown and as one HTML file that needs nothing else; a study's files."""
 
-import json
 from base64 import b64encode
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
@@ -9,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.results.metrics import as_json
 from beaver_ftc.studies.present.tables import Rows, as_csv, html_table, markdown_table
 
 if TYPE_CHECKING:
@@ -121,7 +121,7 @@ def study_files(
         return lambda folder: as_html(*page(document), {stem: folder / f"{stem}.png" for stem in figures})
 
     return {
-        f"{name}.json": lambda document: json.dumps(document, indent=1) + "\n",
+        f"{name}.json": as_json,
         **{f"{stem}.csv": partial(_csv, rows_of) for stem, rows_of in rows.items()},
         **{f"{stem}.png": draw for stem, draw in figures.items()},
         f"{name}.html": html,

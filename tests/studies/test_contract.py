@@ -27,10 +27,11 @@ MISTAKES = {  # of each study a line that it cannot answer, and what is said of 
     "verify": (["--faults", "-1"], "--faults"),
     "detectability": (["short.yaml", "--surface", "flap"], "allowed: aileron, elevator, rudder"),
 }
-QUICK = {  # of each study that has one: a line that is answered within seconds, and its result folder
+QUICK = {  # of each study that has one: a line that is answered within seconds, and its result folder, if any
+    "linearise": (["short.yaml"], ""),
     "decay": (["short.yaml", "--flights", "1", "--workers", "1", "--out", "runs"], "short-decay"),
     "detectability": (["short.yaml", "--airspeed", "45", "--altitude", "500"], "short-detectability"),
-    "verify": (["--hours", "0", "--faults", "1", "--workers", "1", "--out", "runs/flights"], ""),
+    "verify": (["--hours", "0", "--faults", "1", "--workers", "1"], "verification"),
 }
 
 

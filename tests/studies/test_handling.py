@@ -11,10 +11,7 @@ from beaver_ftc.results.log import MemoryLog
 from beaver_ftc.studies.handling import (
     LIMITS,
     WORSE,
-    as_rows,
-    as_text,
     of_model,
-    over_airspeeds,
     where_ended,
     where_trimmed,
 )
@@ -64,18 +61,10 @@ def test_the_quantities_of_made_up_modes():
 @pytest.mark.parametrize(
     ("changed", "row", "level"),
     [
-        ({"short": (3.0, 0.29)}, 0, 2), ({"short": (3.0, 0.19)}, 0, 3), ({"short": (3.0, 0.14)}, 0, WORSE),
-        ({"short": (5.0, 0.6)}, 1, 2), ({"short": (0.65, 0.6), "Z_alpha": -1.5}, 1, 2),
-        ({"dutch": (1.2, 0.05)}, 2, 2), ({"dutch": (1.2, 0.01)}, 2, 3), ({"dutch": (1.2, -0.01)}, 2, WORSE),
-        ({"dutch": (0.5, 0.2)}, 3, 2), ({"dutch": (0.39, 0.9)}, 4, WORSE),
-        ({"T_roll": 1.5}, 5, 2), ({"T_roll": 3.1}, 5, 3), ({"T_roll": 11.0}, 5, WORSE),
-        ({"spiral": math.log(2) / 19}, 6, 2), ({"spiral": math.log(2) / 7}, 6, 3),
-        ({"spiral": math.log(2) / 3}, 6, WORSE),
-        ({"phugoid": (0.2, 0.05)}, 7, 1), ({"phugoid": (0.2, 0.03)}, 7, 2), ({"phugoid": (0.2, -0.01)}, 7, 3),
-        ({"phugoid": (0.2, -math.log(2) / 0.2 / 56)}, 8, 1),
-        ({"phugoid": (0.2, -math.log(2) / 0.2 / 54)}, 8, WORSE),
-        ({"coupled": 0.9, "spiral": -0.6}, 9, 1), ({"coupled": 0.9, "spiral": -0.4}, 9, 2),
-        ({"coupled": 0.9, "spiral": -0.2}, 9, 3), ({"coupled": 0.9, "spiral": -0.1}, 9, WORSE),
+        ({"short": (3.0, 0.14)}, 0, WORSE), ({"short": (5.0, 0.6)}, 1, 2), ({"dutch": (1.2, 0.01)}, 2, 3),
+        ({"dutch": (0.5, 0.2)}, 3, 2), ({"dutch": (0.39, 0.9)}, 4, WORSE), ({"T_roll": 3.1}, 5, 3),
+        ({"spiral": math.log(2) / 7}, 6, 3), ({"phugoid": (0.2, 0.03)}, 7, 2),
+        ({"phugoid": (0.2, -math.log(2) / 0.2 / 54)}, 8, WORSE), ({"coupled": 0.9, "spiral": -0.2}, 9, 3),
         ({"coupled": 0.9, "spiral": -0.2}, 5, 1), ({"coupled": 0.9, "spiral": 0.1}, 6, 1),
     ],
 )  # fmt: skip
@@ -103,12 +92,3 @@ def _as_row(flown):
 
     point = trim(flown)
     return {**point.as_dict(), **{f"{s}_effective_rad": angle for s, angle in point.surfaces_rad.items()}}
-
-
-def test_the_beaver_over_its_envelope_as_it_is_shown(changed):
-    found = over_airspeeds(scenario())
-    assert [each.airspeed_mps for each in found[:: len(LIMITS)]] == pytest.approx(
-        [30, 36.25, 42.5, 48.75, 55]
-    )
-    assert not changed(as_text(found).splitlines(), "text")
-    assert not changed(as_rows(found[: len(LIMITS)]))

@@ -9,7 +9,6 @@ from beaver_ftc.studies.linear_systems import (
     deviation,
     held_over_frame,
     modes,
-    pulse_response,
     response,
     zeros,
 )
@@ -25,9 +24,6 @@ def test_python_control_gives_the_same():
     for ours, theirs in zip(held_over_frame(A, b[:, None], 0.05), (held.A, held.B), strict=True):
         assert ours == pytest.approx(theirs, rel=1e-9, abs=1e-12)
     assert np.sort_complex(zeros(A, b, 2)) == pytest.approx(np.sort_complex(control.zeros(system)), rel=1e-6)
-    t_s = 0.05 * np.arange(40)
-    stepped = control.forced_response(held, t_s, (t_s < 0.475).astype(float)).outputs
-    assert pulse_response(A, b, 2, t_s, 0.5) == pytest.approx(np.array(stepped), rel=1e-9, abs=1e-12)
 
 
 def pair(real, imaginary):
@@ -63,21 +59,11 @@ def test_each_mode_by_its_name(seed):
     assert deviation(3 + 4j, 3 + 0j) == pytest.approx(4 / 3)
 
 
-# x'' + 0.4 x' + 4 x = u + 3 u': states x and what is fed by u alone
-A = np.array([[0.0, 1.0], [-4.0, -0.4]])
-B = np.array([0.0, 1.0])
-
-
-def test_zeros_of_a_transfer_function_slowest_first():
-    """(s + 0.5)(s - 3) over a cubic, in companion form: the output is 1.5 of the first state."""
-    a = np.array([[-6.0, -11.0, -6.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-    # y = s^2 - 2.5 s - 1.5 over it is the new first state
-    T = np.array([[1.0, -2.5, -1.5], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
-    found = zeros(T @ a @ np.linalg.inv(T), T @ np.array([1.0, 0.0, 0.0]), 0)
-    np.testing.assert_allclose(found, [-0.5, 3.0], atol=1e-9)
-    assert zeros(A, B, 0).size == 0
-    # s^2 + 2 s + 5 over s^3 + 6 s^2 + 11 s + 6: -1 +- 2j, in the order of every machine
-    T[0] = [1.0, 2.0, 5.0]
-    pair = zeros(T @ a @ np.linalg.inv(T), T @ np.array([1.0, 0.0, 0.0]), 0)
-    np.testing.assert_allclose(pair, [-1.0 + 2.0j, -1.0 - 2.0j], atol=1e-9)
-    np.testing.assert_allclose(zeros(A, B, 1), [0.0], atol=1e-9)
+def test_zeros_come_slowest_first_and_of_a_pair_the_upper_one():
+    """Of (s^2 + 2 s + 5)(s + 0.5) over a quartic, in companion form; and of a system that has none."""
+    a = np.vstack([[-10.0, -35.0, -50.0, -24.0], np.eye(3, 4)])
+    T = np.eye(4)
+    T[0] = np.convolve([1.0, 2.0, 5.0], [1.0, 0.5])
+    found = zeros(T @ a @ np.linalg.inv(T), T @ np.eye(4)[0], 0)
+    np.testing.assert_allclose(found, [-0.5, -1.0 + 2.0j, -1.0 - 2.0j], atol=1e-9)
+    assert zeros(np.array([[0.0, 1.0], [-4.0, -0.4]]), np.array([0.0, 1.0]), 0).size == 0

@@ -5,25 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from beaver_ftc.documents.errors import BadInput, SimulationFailed
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies import verify
-from beaver_ftc.studies.verify import (
-    CHUNK,
-    Campaign,
-    Draw,
-    conduct,
-    fly_draw,
-    judge,
-)
-
-
-@pytest.mark.parametrize("kind", ["healthy", "faulty"])
-def test_every_draw_of_a_seed_is_what_it_was(kind, changed):
-    """A campaign goes on with the flights of an earlier one: they must stay the same flights."""
-    drawn = [Draw(11, kind, index).scenario().model_dump(mode="json") for index in (0, 1, 2, 40)]
-    parts = ("name", "duration_s", "rate_hz", "substeps", "initial", "reference", "faults", "uncertainty")
-    assert not changed([{part: found[part] for part in parts} for found in drawn])
+from beaver_ftc.studies.verify import Draw, fly_draw, judge
 
 
 def landing(at_s=4.995, rate_hz=50.0, **changes):
@@ -86,25 +71,6 @@ def test_the_error_of_an_estimate_is_of_what_has_grown_by_the_end():
     assert found["estimate_error"] == pytest.approx(0.5 * (1 - np.exp(-0.1 * 15.0)) - 0.3)
     assert judge(landing(isolated="elevator"))["estimate_error"] is None
     assert judge(landing(isolated="rudder", estimate=-0.3))["estimate_error"] is None
-
-
-@pytest.fixture
-def unflown(monkeypatch):
-    """Rows without flights."""
-    monkeypatch.setattr(verify, "fly_draw", row_of)
-    return Campaign(hours=0.0, faults=CHUNK + 3, seed=2)
-
-
-def row_of(draw, schemes):
-    return {"index": draw.index, "flown": draw.seed, "schemes": list(schemes)}
-
-
-def test_a_folder_that_cannot_be_used_is_said(unflown, tmp_path):
-    (tmp_path / "campaign.json").write_text("{")
-    with pytest.raises(SimulationFailed, match="cannot be used for a campaign"):
-        conduct(unflown, tmp_path, 1)
-    with pytest.raises(SimulationFailed, match="faulty flight 7 of seed 3: killed"):
-        verify._crashed(Draw(3, "faulty", 7), "killed")
 
 
 def test_a_draw_without_a_trim_is_said(monkeypatch):

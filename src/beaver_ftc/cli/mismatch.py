@@ -23,7 +23,7 @@ from beaver_ftc.documents.errors import BadInput
 
 if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario
-    from beaver_ftc.studies.mismatch.split import Tally
+    from beaver_ftc.studies.mismatch.split import Split
 
 Say = Callable[[str], None]
 
@@ -89,29 +89,29 @@ def _variants(scenario: "Scenario", text: str) -> list["Scenario"]:
     return wanted
 
 
-def _split(scenario: "Scenario", out: Path, report: bool, say: Say) -> tuple[Document, "Tally"]:
-    """Fly and split one: its document, and its tally."""
+def _split(scenario: "Scenario", out: Path, report: bool, say: Say) -> tuple[Document, "Split"]:
+    """Fly and split one: its document, and the split."""
     from beaver_ftc.studies.mismatch.study import run_mismatch
     from beaver_ftc.studies.mismatch.tables import mismatch_text
 
     for warning in scenario.warnings():
         complain(f"{scenario.name}: warning: {warning}")
     with progress_bar(scenario.name) as progress:
-        document, tally = run_mismatch(scenario, out, report, progress)
+        document, split = run_mismatch(scenario, out, report, progress)
     folder = str(out / scenario.name)
     say(mismatch_text(document, folder, sys.stdout.isatty()))
-    return document | {"folder": folder}, tally
+    return document | {"folder": folder}, split
 
 
 def _compare(
-    scenarios: list["Scenario"], found: list[tuple[Document, "Tally"]], out: Path, report: bool, say: Say
+    scenarios: list["Scenario"], found: list[tuple[Document, "Split"]], out: Path, report: bool, say: Say
 ) -> Document:
     from beaver_ftc.studies.mismatch.bound import recommended_for
     from beaver_ftc.studies.mismatch.study import entry, write_comparison
     from beaver_ftc.studies.mismatch.tables import comparison_text
 
     entries = [entry(document) for document, _ in found]
-    recommended = recommended_for(scenarios, [tally for _, tally in found])
+    recommended = recommended_for(scenarios, [split for _, split in found])
     folder = write_comparison(out, entries, recommended, report)
     say(comparison_text(entries, recommended, str(folder), sys.stdout.isatty()))
     return recommended

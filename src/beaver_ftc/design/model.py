@@ -44,7 +44,7 @@ from collections import namedtuple
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -491,29 +491,6 @@ def anchor(design: np.void, x: np.ndarray, y: np.ndarray, u: np.ndarray) -> None
     design["f0"], design["G0"], design["f_x"], design["f_y"][:, : y.size] = f, G, f_x, f_y
 
 
-class Anchored(NamedTuple):
-    """How a design model is tied to a trim: linearised about it, or with its angle of attack frozen there.
-
-    x0 (3,) rad/s, y0: the trim. f0 (3,) rad/s2, G0 (3, surfaces) rad/s2 per rad, f_x (3, 3), f_y: the model
-    and its derivatives there; zero where it is not tied.
-    """
-
-    linearised: bool
-    frozen_alpha: bool
-    x0: np.ndarray
-    y0: np.ndarray
-    f0: np.ndarray
-    G0: np.ndarray
-    f_x: np.ndarray
-    f_y: np.ndarray
-
-
-def anchored(design: np.void) -> Anchored:
-    """How this design model is tied to a trim; of a record of `design_dtype`."""
-    arrays = {name: design[name].copy() for name in Anchored._fields[2:]}
-    return Anchored(bool(design["linearised"]), bool(design["frozen_alpha"]), **arrays)
-
-
 def jacobian(
     design: np.void, x: np.ndarray, y: np.ndarray, u: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -556,6 +533,20 @@ def coefficient_slopes(design: np.void, x: np.ndarray, y: np.ndarray, u: np.ndar
     plain(surface_sums)(table, power, per_rad)
     free = np.array([plain(free_sum)(table, i, power) for i in range(3)])
     return (free + np.einsum("isk,s->ik", per_rad, u)).imag / _STEP
+
+
+def responses_at(design: np.void, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """f (n, 3) rad/s2 and G (n, 3, surfaces) rad/s2 per rad at many states, without compiled code: what
+    `response` gives at each of x (n, 3) rad/s and y (n, 4 + declared)."""
+    m = y.shape[1]
+    if design["linearised"]:
+        away = (x - design["x0"]) @ design["f_x"].T + (y - design["y0"][:m]) @ design["f_y"][:, :m].T
+        return design["f0"] + away, np.broadcast_to(design["G0"], (len(x), *design["G0"].shape))
+    if design["frozen_alpha"]:
+        y = y.copy()
+        y[:, ALPHA] = design["y0"][ALPHA]
+    f, G = _split(design, x.T, y.T)
+    return f.real.T, np.moveaxis(G.real, -1, 0)
 
 
 def effectiveness(design: np.void, y: np.ndarray) -> np.ndarray:

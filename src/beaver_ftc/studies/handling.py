@@ -21,10 +21,10 @@ from beaver_ftc.plant.conditions import trimmed
 from beaver_ftc.plant.linear import LinearModel, differences
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.linear_systems import CLASSICAL, Mode, modes
-from beaver_ftc.studies.present.tables import aligned, finite, number
+from beaver_ftc.studies.margins import N_AIRSPEEDS, over_envelope
+from beaver_ftc.studies.present.tables import aligned, finite, grouped, number
 
 WORSE = 4  # than level 3
-N_AIRSPEEDS = 5
 _STATES = ("alpha_rad", "beta_rad", "p_rad_s", "q_rad_s", "r_rad_s", "phi_rad", "theta_rad", "psi_rad")
 
 
@@ -153,8 +153,7 @@ def over_airspeeds(scenario: Scenario) -> list[Quality]:
     from beaver_ftc.loop.loop import fly
     from beaver_ftc.results.log import MemoryLog
 
-    speeds = np.linspace(*scenario.airframe.envelope.airspeed_mps, N_AIRSPEEDS)
-    flights = (scenario.with_({"initial.airspeed_mps": float(V)}) for V in speeds)
+    flights = over_envelope(scenario, N_AIRSPEEDS)
     found = [quality for flight in flights for quality in where_trimmed(flight)]
     if scenario.faults:
         log = MemoryLog()
@@ -168,17 +167,15 @@ def as_rows(found: list[Quality]) -> list[Document]:
     return [{key: finite(value) for key, value in asdict(each).items()} for each in found]
 
 
-def as_text(found: list[Quality]) -> str:
+def as_text(rows: list[Document]) -> str:
     """A line a flight condition, a column a quantity, the level in brackets; then the worst level."""
     head = [["aircraft alone,", *(limit.mode for limit in LIMITS), ""]]
     head += [["airspeed, m/s", *(f"{each.quantity} {each.unit}".strip() for each in LIMITS), "level"]]
     lines = []
-    for start in range(0, len(found), len(LIMITS)):
-        row = found[start : start + len(LIMITS)]
-        first, *_ = row
-        ended = " at the end" if first.where == "at the end" else ""
-        cells = [f"{number(each.value)} ({said(each.level)})" for each in row]
-        lines.append([f"{first.airspeed_mps:.1f}{ended}", *cells, said(max(each.level for each in row))])
+    for (where, airspeed_mps), of in grouped(rows, "where", "airspeed_mps").items():
+        ended = " at the end" if where == "at the end" else ""
+        cells = [f"{number(each['value'], none='never')} ({said(each['level'])})" for each in of]
+        lines.append([f"{airspeed_mps:.1f}{ended}", *cells, said(max(each["level"] for each in of))])
     clauses = ", ".join(dict.fromkeys(f"{each.clause} {each.table}".strip() for each in LIMITS))
     says = f"in brackets: level of MIL-F-8785C, class I, category B:\n{clauses}"
     return f"{aligned([*head, *lines])}\n\n{says}"

@@ -1,11 +1,11 @@
-"""Linear systems, and a linear aircraft as one: modes by name, zeros, frequency and pulse responses.
+"""Linear systems, and a linear aircraft as one: modes by name, zeros, frequency responses.
 
 Classical eight states: position, altitude and heading are left out. On a flat Earth nothing depends on
 heading; on a turning one lift does a little (2 Omega cos(latitude) per rad), which moves the slow spiral
 root by up to 7e-4 1/s.
 
-python-control gives the same zeros, responses and held systems (tests/studies/test_linear_systems.py). It is
-no dependency for these twenty lines: it imports matplotlib, and with it a command begins a second later.
+python-control gives the same (tests/studies/test_linear_systems.py). It is no dependency for these twenty
+lines: it imports matplotlib, and with it a command begins a second later.
 """
 
 from dataclasses import dataclass
@@ -84,14 +84,3 @@ def held_over_frame(A: np.ndarray, B: np.ndarray, dt_s: float) -> tuple[np.ndarr
     n, m = B.shape
     whole = expm(np.block([[A, B], [np.zeros((m, n + m))]]) * dt_s)
     return whole[:n, :n], whole[:n, n:]
-
-
-def pulse_response(A: np.ndarray, b: np.ndarray, row: int, t_s: np.ndarray, pulse_s: float) -> np.ndarray:
-    """State `row` at evenly spaced times t_s (n,) after a unit pulse of length pulse_s at time 0; exact."""
-    dt = t_s[1] - t_s[0]
-    step, push = held_over_frame(A, b[:, None], dt)
-    state, out = np.zeros(len(A)), []
-    for t in t_s:
-        out.append(state[row])
-        state = step @ state + push[:, 0] * (t < pulse_s - 0.5 * dt)
-    return np.array(out)

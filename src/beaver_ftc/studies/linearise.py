@@ -1,7 +1,6 @@
 """The command `linearise`: margins of the closed loop, and handling qualities of the aircraft alone."""
 
 from dataclasses import dataclass
-from math import inf
 from typing import Annotated
 
 import typer
@@ -41,12 +40,4 @@ class Linearise(StudyCommand):
 
     def as_text(self, document: Document, colour: bool) -> str:
         """A line a fault and surface, then a line a flight condition."""
-        found = [margins.Margin(**_numbers(row, leave_out="keeps")) for row in document["margins"]]
-        modes = [handling.Quality(**_numbers(row)) for row in document["handling"]]
-        asked = document["gain_margin_db"], document["phase_margin_deg"]
-        return f"{margins.as_text(found, asked)}\n\n{handling.as_text(modes)}"
-
-
-def _numbers(row: Document, leave_out: str = "") -> Document:
-    """A row of the document with its numbers: null stands for one without end."""
-    return {key: inf if value is None else value for key, value in row.items() if key != leave_out}
+        return f"{margins.as_text(document)}\n\n{handling.as_text(document['handling'])}"

@@ -13,7 +13,7 @@ scales the surface and what the law takes it for alike; of a surface that is giv
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from itertools import product
-from math import exp
+from math import exp, inf
 from typing import Any
 
 import numpy as np
@@ -32,7 +32,7 @@ from beaver_ftc.plant.conditions import trimmed
 from beaver_ftc.plant.linear import LinearModel, differences
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.linear_systems import held_over_frame
-from beaver_ftc.studies.present.tables import aligned, finite
+from beaver_ftc.studies.present.tables import aligned, finite, grouped
 
 N_FREQUENCIES = 600
 LOWEST_RAD_S = 0.3  # below, the autopilot flies: a body rate says little of a phugoid
@@ -159,6 +159,7 @@ def frequencies(dt_s: float) -> np.ndarray:
 
 
 N_AIRSPEEDS = 5
+NUMBERS = ("up_db", "down_db", "phase_deg")
 REMAINING = (0.5, 0.1, 0.0)  # effectiveness after the losses that are judged; 0: given up
 LEAST_LOOP = 1e-3  # of a surface that hardly moves there is no loop to speak of
 
@@ -185,9 +186,13 @@ def study(scenario: Scenario) -> list[Margin]:
     Raises BadInput for another law: its loop is not this one.
     """
     refuse_other_laws(scenario)
-    airspeeds_mps = np.linspace(*scenario.airframe.envelope.airspeed_mps, N_AIRSPEEDS)
-    flights = (scenario.with_({"initial.airspeed_mps": float(V)}) for V in airspeeds_mps)
-    return [margin for flight in flights for margin in at(flight)]
+    return [margin for flight in over_envelope(scenario, N_AIRSPEEDS) for margin in at(flight)]
+
+
+def over_envelope(scenario: Scenario, count: int) -> Iterator[Scenario]:
+    """The scenario at so many airspeeds of the envelope, evenly spaced from its slowest to its fastest."""
+    airspeeds_mps = np.linspace(*scenario.airframe.envelope.airspeed_mps, count)
+    return (scenario.with_({"initial.airspeed_mps": float(V)}) for V in airspeeds_mps)
 
 
 def refuse_other_laws(scenario: Scenario) -> None:
@@ -273,14 +278,13 @@ def as_document(found: list[Margin], required: tuple[float, float]) -> Document:
     return {"gain_margin_db": required[0], "phase_margin_deg": required[1], "margins": rows}
 
 
-def as_text(found: list[Margin], required: tuple[float, float]) -> str:
+def as_text(document: Document) -> str:
     """A line for each fault and surface, the least over the airspeeds."""
     table = [["fault", "surface", "gain up, dB", "down, dB", "phase, deg", "least at, m/s"]]
-    for fault, surface in dict.fromkeys((each.fault, each.surface) for each in found):
-        rows = [each for each in found if (each.fault, each.surface) == (fault, surface)]
-        least = min(rows, key=lambda each: each.phase_deg)
-        numbers = [min(getattr(each, of) for each in rows) for of in ("up_db", "down_db", "phase_deg")]
-        table.append([fault, surface, *(f"{n:.1f}" for n in numbers), f"{least.airspeed_mps:.0f}"])
-    short = sum(not each.keeps(*required) for each in found)
-    end = f"{len(found)} loops, {short} with less than {required[0]:g} dB or {required[1]:g} deg"
-    return f"{aligned(table)}\n\n{end}"
+    for place, rows in grouped(document["margins"], "fault", "surface").items():
+        numbers = {of: [inf if row[of] is None else row[of] for row in rows] for of in NUMBERS}
+        least = rows[int(np.argmin(numbers["phase_deg"]))]
+        table.append([*place, *(f"{min(n):.1f}" for n in numbers.values()), f"{least['airspeed_mps']:.0f}"])
+    short = sum(not row["keeps"] for row in document["margins"])
+    asked = f"{document['gain_margin_db']:g} dB or {document['phase_margin_deg']:g} deg"
+    return f"{aligned(table)}\n\n{len(document['margins'])} loops, {short} with less than {asked}"

@@ -1,12 +1,10 @@
 """The promises of the theory, on random flights inside everything the diagnosis declares: the flight
 condition, the references, the uncertainty, the fault.
 
-Flight number i of a seed is the same whatever else is flown, by whom, and in which order. A campaign that was
-stopped goes on where it was, and a longer one builds on a shorter one.
+Flight number i of a seed is the same whatever else is flown, by whom, and in which order.
 """
 
-import json
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import product
@@ -17,22 +15,19 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from beaver_ftc import __version__
 from beaver_ftc.aircraft import AXES, load
 from beaver_ftc.commands import Reporter, StudyCommand, WorkersOption
-from beaver_ftc.documents.errors import BadInput, SimulationFailed
-from beaver_ftc.documents.files import Document, read_json
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.documents.files import Document
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.loop.outcome import Landing
-from beaver_ftc.results.metrics import Truth, fault_free_s, is_late
+from beaver_ftc.results.metrics import Truth, as_json, fault_free_s, is_late
 from beaver_ftc.scenario.faults import LossOfEffectiveness
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.signals import grown_share
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial_upper, poisson_bound, share_within
-from beaver_ftc.studies.engine.store import UNREADABLE, Parts, RowsAsJson, fingerprint, set_aside, write_whole
-from beaver_ftc.studies.engine.study import GO_ON, Batches, Progress
-from beaver_ftc.studies.engine.study import conduct as fly_missing
-from beaver_ftc.studies.engine.workers import Batch, Work
+from beaver_ftc.studies.engine.study import Study, run_study
+from beaver_ftc.studies.present.page import Makers
 from beaver_ftc.studies.present.tables import finite, number
 
 HEALTHY_S = 100.0  # attitude is open loop: a longer flight wanders out of the validated envelope
@@ -49,16 +44,11 @@ KINDS = ("healthy", "faulty")
 
 @dataclass(frozen=True)
 class Draw:
-    """One flight's place in a campaign: kind is `healthy` or `faulty`, index counts from 0."""
+    """One flight of a seed: kind is `healthy` or `faulty`, index counts from 0."""
 
     seed: int
     kind: str
     index: int
-
-    @property
-    def run(self) -> tuple[str, int]:
-        """What it is known by in its campaign."""
-        return self.kind, self.index
 
     def scenario(self, fdi: Document | None = None) -> Scenario:
         """The flight, diagnosed as `fdi` says."""
@@ -138,6 +128,7 @@ STEPS: dict[str, Document] = {
     SHARPENED: SCHEMES[SHARPENED],
     "constant": {"fault_profile": "abrupt"},
 }
+NAME, TOGETHER = "verification", 50  # flights that are kept together
 _CONSTANT_ONLY = "constant"  # for faults that are: one that grows is outside what this step declares
 
 Row = Document
@@ -203,101 +194,6 @@ def _estimate_error(flight: Landing) -> float | None:
     return abs(flight.estimate + fault.magnitude * grown)
 
 
-CHUNK = 50
-
-
-@dataclass(frozen=True)
-class Campaign:
-    """Flight hours without a fault, flights with one, and whether each step of sharpening flies these too."""
-
-    hours: float
-    faults: int
-    seed: int
-    steps: bool = False
-
-    @property
-    def schemes(self) -> Schemes:
-        """The diagnoses each faulty flight is flown with."""
-        return STEPS if self.steps else SCHEMES
-
-    def wanted(self, kind: str) -> int:
-        """Number of flights of a kind."""
-        return ceil(self.hours * 3600.0 / HEALTHY_S) if kind == "healthy" else self.faults
-
-
-def conduct(
-    campaign: Campaign, folder: Path, workers: int, progress: Progress | None = None
-) -> dict[str, list[Row]]:
-    """Fly what `folder` does not hold yet; return the rows of every flight wanted, in order, by kind.
-
-    Raises BadInput if the folder holds another seed's flights, or another version's.
-    """
-    _open(folder, campaign)
-    rows = {kind: _kept(folder, kind) for kind in KINDS}
-    chunks = [chunk for kind in KINDS for chunk in _missing(campaign, kind, rows[kind])]
-    done, total = sum(map(len, rows.values())), sum(campaign.wanted(kind) for kind in KINDS)
-
-    def note(batch: Batch, flown: list[Row]) -> None:
-        nonlocal done
-        kind = batch.cases[0].kind
-        parts.land(batch.number, flown)
-        rows[kind].update((row["index"], row) for row in flown)
-        done += len(flown)
-        if progress is not None:
-            progress(done / total)
-
-    batches, parts = Batches(iter(chunks), total - done, note), Parts(folder, RowsAsJson(dict), GO_ON)
-    fly_missing(batches, Work(partial(fly_draw, schemes=campaign.schemes)), workers, _crashed)
-    return {kind: [rows[kind][i] for i in range(campaign.wanted(kind))] for kind in KINDS}
-
-
-def _open(folder: Path, campaign: Campaign) -> None:
-    """Raise BadInput unless the rows there belong with these: of one seed, version and code that flies."""
-    manifest = folder / "campaign.json"
-    mine = {
-        "seed": campaign.seed,
-        "schemes": list(campaign.schemes),
-        "version": __version__,
-        "code": fingerprint(),
-    }
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        if not manifest.exists():
-            write_whole(manifest, json.dumps(mine).encode())
-        theirs = read_json(manifest)
-    except (OSError, ValueError) as error:
-        raise SimulationFailed(f"{folder}: cannot be used for a campaign: {error}") from error
-    if not isinstance(theirs, dict):
-        raise BadInput(f"{manifest}: {UNREADABLE}, allowed: a new folder")
-    if theirs != mine:
-        differs = ", ".join(key for key in mine if theirs.get(key) != mine[key])
-        raise BadInput(f"--out {folder}: holds flights of another {differs}, allowed: a new folder")
-
-
-def _kept(folder: Path, kind: str) -> dict[int, Row]:
-    """What has landed; what cannot be read is set aside, to be flown again."""
-    rows: dict[int, Row] = {}
-    for file in sorted(folder.glob(f"{kind}-*.json")):
-        try:
-            rows.update((row["index"], row) for row in read_json(file))
-        except (ValueError, KeyError, TypeError):
-            set_aside(file, UNREADABLE)
-    return rows
-
-
-def _missing(campaign: Campaign, kind: str, kept: dict[int, Row]) -> Iterator[Batch]:
-    """Chunks of what is still to be flown, each called as its file is."""
-    indices = [i for i in range(campaign.wanted(kind)) if i not in kept]
-    for start in range(0, len(indices), CHUNK):
-        chunk = indices[start : start + CHUNK]
-        name = f"{kind}-{chunk[0]:07d}-{chunk[-1]:07d}"
-        yield Batch(name, tuple(Draw(campaign.seed, kind, i) for i in chunk))
-
-
-def _crashed(draw: Draw, why: str) -> Row:
-    raise SimulationFailed(f"{draw.kind} flight {draw.index} of seed {draw.seed}: {why}")
-
-
 # What breaks each promise, in the row of a scheme.
 _BROKEN = {
     "false_alarms": "false_alarm", "true_fault_exclusions": "excluded", "wrong_isolations": "wrong",
@@ -313,7 +209,7 @@ _SPREADS = {
 
 
 def summarise(rows: dict[str, list[Row]]) -> Document:
-    """The document of a campaign; `kept`: whether every promise of the sharpened scheme, the default, held.
+    """The document of all flights; `kept`: whether every promise of the sharpened scheme, the default, held.
 
     The published one is there for comparison: its isolation threshold presumes a constant parameter.
     """
@@ -427,6 +323,9 @@ def _line(label: str, cells: Iterable[str]) -> str:
     return f"  {label:<32}" + "".join(f"{cell:>18}" for cell in cells)
 
 
+FILES: Makers = {"verify.json": as_json}
+
+
 @dataclass(frozen=True)
 class Verify(StudyCommand):
     """Test the guarantees on flights within the declared bounds.
@@ -453,15 +352,25 @@ class Verify(StudyCommand):
     faults: Annotated[int, typer.Option(min=0, max=10_000_000)] = 200
     seed: Annotated[int, typer.Option(min=0)] = 1
     workers: WorkersOption = None
-    out: Path = Path("runs/verification")
+    out: Path = Path("runs")
     steps: bool = False
 
+    FILES = FILES
     PLUGINS = False
 
     def run(self, reporter: Reporter) -> Document:
-        """Fly what the folder does not hold yet."""
-        asked = Campaign(self.hours, self.faults, self.seed, self.steps)
-        return {"seed": self.seed, **summarise(conduct(asked, self.out, self.processes, reporter.progress))}
+        """Fly all hours and all faults."""
+        wanted = {"healthy": ceil(self.hours * 3600.0 / HEALTHY_S), "faulty": self.faults}
+        draws = [Draw(self.seed, kind, i) for kind in KINDS for i in range(wanted[kind])]
+        schemes = STEPS if self.steps else SCHEMES
+
+        def document(rows: list[Row]) -> Document:
+            healthy = wanted["healthy"]
+            return {"seed": self.seed, **summarise({"healthy": rows[:healthy], "faulty": rows[healthy:]})}
+
+        flying = partial(fly_draw, schemes=schemes)
+        study = Study(NAME, draws, flying, document, FILES, follows_from=schemes, part=TOGETHER)
+        return run_study(study, self.out, self.processes, reporter.progress)
 
     def as_text(self, document: Document, colour: bool) -> str:
         """The counts, and whether every promise was kept."""

@@ -10,9 +10,7 @@ from beaver_ftc.cli.main import app
 from beaver_ftc.diagnosis.rivals import FLIGHT_GRADES
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sweeps import load_sweep
-from beaver_ftc.studies.compare.leaderboard import (
-    as_text,
-)
+from beaver_ftc.studies.compare.leaderboard import MARK, as_text, write_leaderboard
 from beaver_ftc.studies.compare.scores import document_of
 from beaver_ftc.studies.compare.trial import (
     CALIBRATION,
@@ -85,6 +83,17 @@ def test_a_comparison_has_everything_asked_for(compared):
     page = (folder / "comparison.html").read_text()
     assert "augmented-ekf" in page
     assert "http" not in page.replace("http://www.w3.org", "")
+
+
+def test_the_board_is_written_below_its_mark_and_what_stands_above_stays(compared, tmp_path):
+    document, board = compared[0], tmp_path / "board.md"
+    board.write_text(f"# Mine\n\nWords.\n\n{MARK}\n\nold\n\n{MARK}\n\nolder\n")
+    write_leaderboard(document, board)
+    text = board.read_text()
+    assert text.startswith(f"# Mine\n\nWords.\n\n{MARK}\n\nMade with ")
+    assert "old" not in text
+    said = document["sets"]["few"]["who_is_better"].values()
+    assert all(sentence in text and sentence in as_text(document) for sentence in said)
 
 
 @pytest.mark.parametrize(

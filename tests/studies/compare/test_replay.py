@@ -55,14 +55,6 @@ def test_the_statistical_detector_alarms_on_the_recording_as_in_flight():
     assert not seen.false_alarm(1.0)
 
 
-def test_the_recording_changes_nothing(recorded):
-    silent = fly(scenario(duration_s=9, faults=[FAULT], fdi={"scheme": "none"}, control={"law": "nominal"}))
-    assert len(recorded.seen) == silent.frames
-    last, _ = recorded.seen[-1]
-    assert np.isfinite(last.x).all()
-    assert recorded.fault_at_s == 6.0
-
-
 def test_a_trace_answers_as_the_whole_series_would(recorded):
     rng = np.random.default_rng(0)
     statistic = np.abs(rng.normal(size=len(recorded.seen))).cumsum() ** 0.5 * rng.random(len(recorded.seen))

@@ -2,8 +2,6 @@
 
 import os
 import sys
-from concurrent.futures import Future
-from concurrent.futures.process import BrokenProcessPool
 from functools import partial
 from types import SimpleNamespace
 
@@ -11,7 +9,7 @@ import pytest
 
 from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.studies.engine import ray_workers, store, workers
-from beaver_ftc.studies.engine.workers import Batch, Case, LocalWorkers, Outcome, Work
+from beaver_ftc.studies.engine.workers import Batch, Case, Outcome, Work
 
 
 def test_a_file_is_whole_or_as_it_was(tmp_path):
@@ -40,71 +38,6 @@ def double(case):
 
 
 CASES = tuple(Case(run, 10 + run) for run in range(3))
-
-
-class Hired:
-    """A worker whose flights end as it is told: with rows, or with an error."""
-
-    all, errors, stillborn = (), (), 0
-    has_begun = workers._Worker.has_begun
-
-    def __init__(self, work):
-        self.work, self.ended, self.pid = work, False, Future()
-        self.pid.set_result(1)
-        Hired.all.append(self)
-
-    def fly(self, task):
-        flying, error = Future(), self.errors.pop(0) if self.errors else None
-        if isinstance(error, KeyError):
-            raise BrokenProcessPool
-        if error:
-            flying.set_exception(error)
-        else:
-            flying.set_result(self.work.all(task.cases))
-        return flying
-
-    def end(self):
-        self.ended = True
-
-
-@pytest.fixture
-def hired(monkeypatch):
-    monkeypatch.setattr(Hired, "all", [])
-    monkeypatch.setattr(Hired, "errors", [])
-    monkeypatch.setattr(workers, "_Worker", Hired)
-    return Hired
-
-
-def test_a_failure_that_is_no_flights_ends_the_study(hired):
-    local = LocalWorkers(Work(double), 1)
-    hired.errors[:] = [ValueError("x")]
-    local.submit(Batch(1, CASES))
-    with pytest.raises(SimulationFailed, match="cannot go on: x"):
-        local.outcomes(1.0)
-    assert len(local._idle) == 1
-
-
-def test_a_worker_killed_before_its_first_flight_is_replaced_but_not_for_ever(hired):
-    """Eight in a row give up; one that had begun, and dies, begins the count anew. Only that one has lost its
-    task: what a worker has never come to fly goes to the next."""
-    local = LocalWorkers(Work(double), 1)
-
-    def dies(has_begun):
-        local._idle[0].pid = Future()
-        if has_begun:
-            local._idle[0].pid.set_result(1)
-        hired.errors[:] = [BrokenProcessPool()]
-        local.submit(Batch(1, CASES))
-        return local.outcomes(1.0)
-
-    for has_begun in (*[False] * 7, True, *[False] * 7):
-        assert dies(has_begun) == ([Outcome(Batch(1, CASES), None)] if has_begun else [])
-        if not has_begun:
-            assert local.outcomes(1.0)[0].rows == [double(case) for case in CASES]
-    says = "a worker process cannot start: 8 in a row ended before their first flight"
-    with pytest.raises(SimulationFailed, match=says):
-        dies(has_begun=False)
-    assert len(local._idle) == 1
 
 
 class RayError(Exception):

@@ -7,63 +7,10 @@ from beaver_ftc.studies.engine.statistics import (
     binomial,
     median,
     poisson,
-    poisson_bound,
     quantile,
     quantile_bound,
-    sign_test,
-    wilson,
     wilson_bound,
 )
-
-
-@pytest.mark.parametrize(
-    ("successes", "trials", "low", "high"),
-    [(81, 263, 0.2553, 0.3662), (15, 148, 0.0624, 0.1605), (0, 20, 0.0, 0.1611), (1, 29, 0.0061, 0.1718)],
-)
-def test_rates_have_the_intervals_of_newcombes_table(successes, trials, low, high):
-    """R.G. Newcombe, Statistics in Medicine 17 (1998), table I, method 3."""
-    found = wilson(successes, trials)
-    assert (round(found.low, 4), round(found.high, 4)) == (low, high)
-    assert found.value == successes / trials
-
-
-@pytest.mark.parametrize(("successes", "trials"), [(81, 263), (1, 29), (7, 8)])
-def test_beyond_an_exact_interval_so_few_or_so_many_are_improbable(successes, trials):
-    """At each end the tail of the binomial distribution, added up term by term, is 2.5 %."""
-
-    def tail(p, counts):
-        return sum(math.comb(trials, k) * p**k * (1 - p) ** (trials - k) for k in counts)
-
-    found = binomial(successes, trials)
-    assert tail(found.low, range(successes, trials + 1)) == pytest.approx(0.025)
-    assert tail(found.high, range(successes + 1)) == pytest.approx(0.025)
-    assert found.low < found.value < found.high
-
-
-def test_none_of_twenty_leaves_the_lower_end_at_nothing():
-    found = binomial(0, 20)
-    assert (found.low, found.high) == (0.0, pytest.approx(1 - 0.025 ** (1 / 20)))
-    assert binomial(20, 20).low == pytest.approx(0.025 ** (1 / 20))
-
-
-def test_between_equals_the_sign_test_counts_coin_throws():
-    assert sign_test(6, 0) == sign_test(0, 6) == pytest.approx(2 / 64)
-    assert sign_test(1, 7) == pytest.approx(2 * 9 / 256)
-    assert sign_test(5, 5) == sign_test(0, 0) == 1.0
-
-
-@pytest.mark.parametrize(
-    ("events", "low", "high"), [(0, 0.0, 3.689), (1, 0.0253, 5.572), (10, 4.795, 18.390)]
-)
-def test_counts_have_the_exact_poisson_intervals_of_the_tables(events, low, high):
-    """F. Garwood, Biometrika 28 (1936), the table for 95 %."""
-    found = poisson(events, 2.0)
-    assert found.low * 2 == pytest.approx(low, abs=6e-4)
-    assert found.high * 2 == pytest.approx(high, abs=6e-4)
-
-
-def test_no_event_in_three_units_bounds_the_rate_at_one():
-    assert poisson_bound(0, 2.9957, 0.95, upper=True) == pytest.approx(1.0, abs=1e-4)  # the rule of three
 
 
 def test_wilks_number_of_flights_bounds_a_quantile():

@@ -90,6 +90,13 @@ def test_a_case_that_kills_every_process_is_said_and_the_rest_is_kept(tmp_path):
     assert [row.delay_s for row in lost] == [*(square(i).delay_s for i in range(5)), -1.0]
 
 
+def test_a_case_that_kills_every_process_is_found_among_those_that_fly_with_it(tmp_path):
+    fly = partial(kills_itself, marks=tmp_path, always=5)
+    options = {"lost": lambda case, why: Row(case.what, -1.0), "part": 4}
+    rows = rows_of(tmp_path / "study", range(8), fly, workers=2, **options)
+    assert [row.delay_s for row in rows] == [-1.0 if i == 5 else square(i).delay_s for i in range(8)]
+
+
 def stopped_after(count):
     def progress(share):
         if share * 6 > count - 0.5:
@@ -130,7 +137,7 @@ def test_rows_of_another_question_or_other_code_are_not_used(tmp_path, monkeypat
 def test_a_part_that_is_damaged_is_flown_again(tmp_path, content):
     with pytest.raises(KeyboardInterrupt):
         rows_of(tmp_path / "study", range(6), square, progress=stopped_after(4))
-    (tmp_path / ".study.flown" / "parts" / "000002.json").write_text(content)
+    (tmp_path / ".study.flown" / "parts" / "000000-000002.json").write_text(content)
     assert rows_of(tmp_path / "study", range(6), square) == list(map(square, range(6)))
 
 

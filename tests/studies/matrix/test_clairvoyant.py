@@ -5,12 +5,12 @@ import pytest
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.design.model import DesignFunctions, design_of, inertia_coefficients, inertial
-from beaver_ftc.diagnosis.informed_test import healthy_positions, term_acceleration
+from beaver_ftc.diagnosis.informed_test import term_acceleration
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import Columns
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.matrix.clairvoyant import columns_of, seen_when_told
-from beaver_ftc.studies.matrix.fault_matrix import AT_S, FaultCase, beside_told, scenario_of, trimmed_deg
+from beaver_ftc.studies.matrix.fault_matrix import FaultCase, beside_told, scenario_of, trimmed_deg
 from telling import apart
 
 AIRCRAFT = load()
@@ -53,21 +53,6 @@ def test_terms_add_up_to_what_the_design_model_makes_of_a_surface_and_of_none():
         found = sum(term.value * term_acceleration(AIRCRAFT, term, kept, deflection) for term in of_it)
         expected = [model.G(one)[:, s] * u for one, u in zip(y, deflection, strict=True)]
         assert found == pytest.approx(np.array(expected), rel=1e-9)
-
-
-def test_a_healthy_surface_is_where_the_truth_has_it(lost):
-    """Until the fault strikes, and one that is not broken for all of the flight."""
-    from beaver_ftc.studies.matrix.clairvoyant import _declared
-
-    scenario, kept = lost
-    context, coefficients = _declared(scenario)
-    assert coefficients == pytest.approx([0.05 * abs(term.value) for term in AIRCRAFT.moments])
-    assert not context.declared.coefficients.any()
-    for surface, until_s in (("elevator", AT_S), ("rudder", np.inf)):
-        before = kept["t_s"] < until_s
-        true = kept[f"{surface}_effective_rad"]
-        step = context.declared.rate_limit_rad_s[0] * context.dt_s
-        assert np.abs(healthy_positions(context, kept, surface) - true)[before].max() <= step
 
 
 def test_a_loss_of_what_stands_at_neutral_is_seen_by_nobody(lost):

@@ -1,6 +1,6 @@
 """The split on flights of JSBSim: it must account for all that was declared, and for nothing that was not."""
 
-from itertools import pairwise
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from beaver_ftc.scenario.builtin import builtin_names
 from beaver_ftc.scenario.schema import load_scenario
 from beaver_ftc.studies.mismatch.sources import SOURCES
 from beaver_ftc.studies.mismatch.split import split
-from beaver_ftc.studies.mismatch.study import tally_of_flight, variant_of
+from beaver_ftc.studies.mismatch.study import split_flight, variant_of
 from flying import flown, loss, scenario
 
 PUBLISHED_BOUND = 0.02  # rad/s2
@@ -19,16 +19,19 @@ ROUNDING = 5e-8  # rad/s2: what unit conversions and rounding of the aircraft's 
 NOTHING = {"inertia_coupling": {"p": 0, "q": 0, "r": 0}, "sinusoid": {}}
 
 
-def stretch_of(case, log):
-    """The whole flight in one stretch, its last row left out."""
-    first, _ = split(case, [{name: log[name] for name in log.columns}])
-    return first
+def frames_of(case, log):
+    """The split flight, its last row left out."""
+    whole = split(case, {name: log[name] for name in log.columns})
+    cut = {name: getattr(whole, name)[:-1] for name in ("t_s", "total", "eta_bar", "place")}
+    parts = {name: values[:-1] for name, values in whole.contributions.items()}
+    details = {of: {name: v[:-1] for name, v in each.items()} for of, each in whole.details.items()}
+    return replace(whole, **cut, contributions=parts, details=details)
 
 
-def split_flight(**keys):
+def frames_with(**keys):
     case = scenario(**keys)
     _, log = flown(**keys)
-    return stretch_of(case, log)
+    return frames_of(case, log)
 
 
 def largest(values):
@@ -45,19 +48,19 @@ STILL_AIR = [
 
 @pytest.mark.parametrize("name", STILL_AIR)
 def test_unexplained_is_at_most_one_percent_of_every_built_in_scenario(name):
-    kept, _ = tally_of_flight(load_scenario(name))
-    assert (kept.rms("unexplained") <= 0.01 * kept.rms("total")).all()
-    assert kept.figures["unexplained"].largest.max() <= 1e-6
+    kept, _ = split_flight(load_scenario(name))
+    assert all(kept.figures(kept.named["unexplained"], axis)["share"] <= 0.01 for axis in range(3))
+    assert largest(kept.named["unexplained"]) <= 1e-6
 
 
 @pytest.mark.parametrize(
     "initial", [{}, {"airspeed_mps": 33, "altitude_m": 500, "flap_deg": 10}, {"airspeed_mps": 54}]
 )
 def test_with_nothing_declared_truth_and_design_differ_by_the_earth_alone(initial):
-    found = split_flight(uncertainty=NOTHING, initial=initial, duration_s=10)
+    found = frames_with(uncertainty=NOTHING, initial=initial, duration_s=10)
     assert largest(found.total) <= 0.02 * PUBLISHED_BOUND
-    assert largest(found.unexplained) <= 0.02 * PUBLISHED_BOUND
-    assert largest(found.unexplained) <= ROUNDING
+    assert largest(found.named["unexplained"]) <= 0.02 * PUBLISHED_BOUND
+    assert largest(found.named["unexplained"]) <= ROUNDING
     others = [name for name in SOURCES if name not in ("earth_rotation", "integration")]
     assert all(largest(found.contributions[name]) == 0.0 for name in others)
 
@@ -79,23 +82,23 @@ DECLARED = {
 
 @pytest.mark.parametrize(("source", "keys"), DECLARED.items())
 def test_each_declaration_shows_in_its_own_source_alone_and_leaves_nothing(source, keys):
-    found = split_flight(**{"uncertainty": NOTHING, "duration_s": 8, **keys})
+    found = frames_with(**{"uncertainty": NOTHING, "duration_s": 8, **keys})
     assert largest(found.contributions[source]) > 1e-5
     allowed = {source, "earth_rotation", "integration"}
     assert all(largest(found.contributions[name]) == 0.0 for name in SOURCES if name not in allowed)
-    assert largest(found.unexplained) <= ROUNDING
+    assert largest(found.named["unexplained"]) <= ROUNDING
 
 
 def test_a_coarse_frame_means_the_mismatch_over_its_jsbsim_frames():
     """A sinusoid at the frame's start, and its mean over five JSBSim frames: the rest is integration."""
     wave = {"sinusoid": {"q": {"amplitude_rad_s2": 0.02, "frequency_rad_s": 15}}}
-    found = split_flight(uncertainty=wave, substeps=5, duration_s=4)
+    found = frames_with(uncertainty=wave, substeps=5, duration_s=4)
     within = found.t_s[:, None] + np.arange(5) / 500
     mean = (0.02 * np.sin(15 * within)).mean(axis=1)
     assert found.total[:, 1] == pytest.approx(mean, abs=2e-5)
     integration = mean - 0.02 * np.sin(15 * found.t_s)
     assert found.contributions["integration"][:, 1] == pytest.approx(integration, abs=2e-5)
-    assert largest(found.unexplained) <= ROUNDING
+    assert largest(found.named["unexplained"]) <= ROUNDING
 
 
 FAULTS = {
@@ -121,14 +124,14 @@ FAULTS = {
 @pytest.mark.parametrize("actuators", ["ideal", "servo"])
 @pytest.mark.parametrize("faults", FAULTS.values(), ids=FAULTS)
 def test_every_fault_is_accounted_for_part_by_part(faults, actuators):
-    found = split_flight(uncertainty=NOTHING, faults=faults, actuators=actuators, duration_s=7)
+    found = frames_with(uncertainty=NOTHING, faults=faults, actuators=actuators, duration_s=7)
     parts = found.details["fault"]
     assert len(parts) == len(faults)
     assert all(largest(part) > 1e-4 for part in parts.values())
     assert sum(parts.values()) == pytest.approx(found.contributions["fault"], abs=1e-15)
     before = found.t_s < 3.0 - 1e-9
     assert all(largest(part[before]) == 0.0 for part in parts.values())
-    assert largest(found.unexplained) <= ROUNDING
+    assert largest(found.named["unexplained"]) <= ROUNDING
 
 
 def test_what_nobody_declared_is_unexplained(monkeypatch):
@@ -141,30 +144,17 @@ def test_what_nobody_declared_is_unexplained(monkeypatch):
     monkeypatch.setattr(conditions, "configure", tampered)
     keys = {"uncertainty": NOTHING, "duration_s": 5}
     _, log = flown(**keys)
-    found = stretch_of(scenario(**keys), log)
+    found = frames_of(scenario(**keys), log)
     term = 0.1 * -0.6028 * log["alpha_rad"] * log["qdyn_pa"] * 23.23 * 1.5875 / 6928.93
-    assert found.unexplained[:, 1] == pytest.approx(term[:-1], abs=ROUNDING)
-    assert largest(found.unexplained[:, [0, 2]]) <= ROUNDING
-
-
-def test_the_split_does_not_depend_on_the_pieces_the_log_comes_in():
-    keys = {"actuators": "servo", "faults": [loss(at_s=2)], "duration_s": 4}
-    case = scenario(**keys)
-    _, log = flown(**keys)
-    edges = [0, 1, 2, 150, 151, 399, 400]
-    pieces = [{name: log[name][a:b] for name in log.columns} for a, b in pairwise(edges)]
-    joined, whole = list(split(case, pieces)), list(split(case, [{name: log[name] for name in log.columns}]))
-    for name in SOURCES:
-        together = [np.concatenate([s.contributions[name] for s in parts]) for parts in (joined, whole)]
-        assert np.array_equal(*together)
-    assert np.array_equal(np.concatenate([s.t_s for s in joined]), log["t_s"])
+    assert found.named["unexplained"][:, 1] == pytest.approx(term[:-1], abs=ROUNDING)
+    assert largest(found.named["unexplained"][:, [0, 2]]) <= ROUNDING
 
 
 def test_total_is_jsbsims_acceleration_less_f_and_G_u():
     """One JSBSim frame a frame: what the log's own columns say, but for the Earth within a frame."""
     keys = {"faults": [loss(at_s=2)], "duration_s": 4}
     _, log = flown(**keys)
-    found = stretch_of(scenario(**keys), log)
+    found = frames_of(scenario(**keys), log)
     for i, axis in enumerate("pqr"):
         assert found.total[:, i] == pytest.approx(
             log[f"{axis}dot_rad_s2"][:-1] - log[f"{axis}_design_rad_s2"][1:], abs=1e-7
@@ -173,9 +163,9 @@ def test_total_is_jsbsims_acceleration_less_f_and_G_u():
 
 def test_neglecting_the_engine_is_the_dominant_source_of_the_published_case_and_alarms_falsely():
     case = load_scenario("engine-neglected")
-    kept, flown_as = tally_of_flight(case)
-    shares = {name: kept.figures[name].bound_share[1] for name in SOURCES if name != "fault"}
+    kept, flown_as = split_flight(case)
+    shares = {name: kept.shares(kept.contributions[name])[:, 1].max() for name in SOURCES if name != "fault"}
     assert max(shares, key=shares.get) == "engine"
     assert shares["engine"] > 10.0
     assert flown_as.false_alarm
-    assert not tally_of_flight(variant_of(case, "engine_terms=true"))[1].false_alarm
+    assert not split_flight(variant_of(case, "engine_terms=true"))[1].false_alarm

@@ -1,14 +1,11 @@
-"""A short flight with all that is declared at once: what each source adds, and the document."""
+"""A short flight with all that is declared at once."""
 
-import numpy as np
 import pytest
 
 from beaver_ftc.results.metrics import measure
-from beaver_ftc.studies.mismatch import split, study
-from beaver_ftc.studies.mismatch.models import LOGGED
-from beaver_ftc.studies.mismatch.split import UNEXPLAINED, Tally
+from beaver_ftc.studies.mismatch import study
+from beaver_ftc.studies.mismatch.split import UNEXPLAINED, split
 from flying import Memory, fly, loss, scenario
-from kept import in_short
 
 FAULTS = [
     {"type": "bias", "actuator": "elevator", "bias_deg": 1, "at_s": 0.4, "end_s": 0.8},
@@ -43,45 +40,10 @@ def flown(case):
     return fly(case, log), log
 
 
-@pytest.fixture(scope="module")
-def stretches(case, flown):
-    _, log = flown
-    columns = {name: log[name] for name in log.columns if name in LOGGED}
-    return list(
-        split.split(case, [{name: of[a:b] for name, of in columns.items()} for a, b in ((0, 33), (33, 80))])
-    )
-
-
-@pytest.fixture(scope="module")
-def tally(case, stretches):
-    return Tally.of(case, stretches)
-
-
-def test_what_each_source_adds(stretches, changed):
-    assert [stretch.t_s.size for stretch in stretches] == [32, 47, 1]
-    assert max(np.abs(stretch.unexplained).max() for stretch in stretches) < 1e-9
-    assert not changed([
-        {
-            **held(stretch.named),
-            "parts": {name: held(parts) for name, parts in stretch.details.items()},
-            **held({name: getattr(stretch, name) for name in ("place", "eta_bar", "t_s")}),
-        }
-        for stretch in stretches
-    ])  # fmt: skip
-
-
-def held(arrays):
-    """In short, but for what rounding leaves."""
-    return {name: in_short(of) for name, of in arrays.items() if UNEXPLAINED not in name}
-
-
-def without_rest(document):
-    """What rounding leaves is no number to hold."""
+def test_what_each_source_adds(case, flown, changed):
+    """But for what rounding leaves, which is no number to hold."""
+    found = split(case, {name: flown[1][name] for name in flown[1].columns})
+    document = study.document(case, found, measure(flown[0]))
     assert 0.0 < document.pop("closure") < 1e-9
-    for axis in document["axes"].values():
-        assert axis.pop(UNEXPLAINED)["max"] < 1e-9
-    return document
-
-
-def test_the_document(case, flown, tally, changed):
-    assert not changed(without_rest(study.document(case, tally, measure(flown[0]))))
+    assert all(axis.pop(UNEXPLAINED)["max"] < 1e-9 for axis in document["axes"].values())
+    assert not changed(document)

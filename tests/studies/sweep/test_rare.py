@@ -15,7 +15,7 @@ from beaver_ftc.results.flight import fly
 from beaver_ftc.scenario.sweeps import load_sweep
 from beaver_ftc.studies.engine import study
 from beaver_ftc.studies.sweep import rare
-from beaver_ftc.studies.sweep.rare import Chains, as_text, lognormal_mean, run_rare, scored
+from beaver_ftc.studies.sweep.rare import Chains, as_text, run_rare, scored
 
 
 @pytest.mark.parametrize("problem", ANALYTIC)
@@ -30,17 +30,6 @@ def test_intervals_hold_in_ninety_of_a_hundred_repeats(problem):
 def biased(tmp_path):
     (tmp_path / "biased.yaml").write_text(yaml.safe_dump(BIASED))
     return load_sweep(tmp_path / "biased.yaml")
-
-
-def test_the_same_seed_gives_the_same_numbers():
-    score, keys, _ = ANALYTIC["a sum of two"]
-    found = []
-    for _ in range(2):
-        chains = Chains(keys, 7)
-        chains.go(lambda _, points: score(points))
-        found.append(chains.estimate())
-    assert found[0] == found[1]
-    assert found[0].plain["of"] == rare.RUNS * rare.MEMBERS
 
 
 def test_the_likeliest_event_is_near_the_design_point():
@@ -78,14 +67,6 @@ def test_where_it_cannot_get_there_it_says_so(score, why):
     assert found.levels == (0 if "stops" in why else 10)
     assert found.flights == rare.RUNS * rare.MEMBERS + found.levels * rare.RUNS * 9 * 22
     assert (found.high == 1.0) if "stops" in why else (1e-10 <= found.high < 1e-9)
-
-
-def test_the_mean_of_lognormals_in_its_interval():
-    rng, held = np.random.default_rng(1), 0
-    for _ in range(200):
-        _, low, high = lognormal_mean(np.exp(0.7 * rng.standard_normal(8) - 0.245))
-        held += low <= 1.0 <= high
-    assert held >= 180
 
 
 SWEEP = {
@@ -195,13 +176,3 @@ def test_a_score_is_below_zero_until_the_event_has_come(name, bias, event, drift
     base = {"duration_s": 4.0} if name == "no_departure" else {}
     flown = drift.scenario({"faults[0].bias_deg": bias}, name="x", seed=1, **base)
     assert (rare.score_of(flown, name) >= 0.0) is event
-
-
-def test_a_score_rises_towards_the_event(drift):
-    scores = [
-        rare.score_of(drift.scenario({"faults[0].bias_deg": bias}, name="x", seed=1), name)
-        for name in ("no_departure", "post_fault_rms_deg_s.q")
-        for bias in (0.5, 1.0, 2.0)
-    ]
-    assert scores[:3] == sorted(scores[:3])
-    assert scores[3:] == sorted(scores[3:])

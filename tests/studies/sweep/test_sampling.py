@@ -5,7 +5,7 @@ from scipy import stats
 from beaver_ftc.scenario.sweeps import Variation
 from beaver_ftc.studies.sweep.sampling import Plan, flight_seed, value_at
 
-from .conftest import SHORT, sweep_of
+from .conftest import sweep_of
 
 DRAWN = """\
 base: fault-free
@@ -33,13 +33,6 @@ def test_a_flight_has_its_values_whichever_are_asked_for(method):
     whole = Plan(sweep).assignments(range(64))
     for some in ([17], [3, 4, 5, 40], range(50, 64)):
         assert Plan(sweep).assignments(some) == [whole[index] for index in some]
-
-
-@pytest.mark.parametrize("method", ["random", "lhs", "sobol"])
-def test_another_seed_gives_other_values(method):
-    first = Plan(sweep_of(DRAWN, METHOD=method)).assignments(range(8))
-    other = Plan(sweep_of(DRAWN.replace("seed: 5", "seed: 6"), METHOD=method)).assignments(range(8))
-    assert all(a.values != b.values for a, b in zip(first, other, strict=True))
 
 
 def test_a_latin_hypercube_has_one_flight_in_each_slice_of_each_key():
@@ -96,21 +89,3 @@ def test_flights_have_seeds_of_their_own():
     seeds = {flight_seed(sweep, index) for sweep in (0, 1) for index in range(2000)}
     assert len(seeds) == 4000
     assert all(0 <= seed < 2**63 for seed in seeds)
-
-
-@pytest.mark.parametrize("sampling", ["random", "lhs", "sobol", "grid"])
-def test_what_is_drawn_is_what_it_was(sampling, changed):
-    """A sweep that is resumed goes on with the same flights."""
-    vary = "  duration_s: {linspace: [1, 2, 3]}\n  faults[0].at_s: {loguniform: [0.1, 0.9]}\n"
-    if sampling == "grid":
-        text = SHORT[: SHORT.index("vary")].replace("runs: 48\n", "sampling: grid\n") + (
-            "vary:\n  duration_s: {linspace: [1, 2, 3]}\n  faults[0].actuator: {choice: [aileron, rudder]}\n"
-        )
-    else:
-        text = SHORT.replace("runs: 48", f"runs: 12\nsampling: {sampling}") + vary
-    sweep = sweep_of(text)
-    plan = Plan(sweep)
-    indices = [0, 1, 2, 5]
-    assert not changed([list(flight.values.values()) for flight in plan.assignments(indices)])
-    assert plan.assignments([2, 5]) == plan.assignments(indices)[2:]
-    assert plan.assignments([]) == []

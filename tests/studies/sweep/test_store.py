@@ -31,14 +31,6 @@ def tabulated(sweep, runs):
     return table_of(sweep, schema_of(sweep), batch_of(sweep, runs))
 
 
-def test_what_has_landed_is_there(store, short):
-    with store:
-        store.begin(identity_of(short), resume=False)
-        store.parts.land(0, batch_of(short, range(3)))
-        assert store.landed(0, range(3)).column("run").to_pylist() == [0, 1, 2]
-        assert store.landed(1, range(3, 6)) is None
-
-
 @pytest.mark.parametrize("damage", ["truncate", "garbage", "other runs", "other columns"])
 def test_a_damaged_part_is_set_aside_and_missing(store, short, damage):
     with store:
@@ -81,14 +73,6 @@ def test_a_damaged_identity_loses_nothing(store, short, text, capsys):
     assert "set aside as parts.damaged; what was in it is flown again" in capsys.readouterr().err
     with store:  # and may be resumed
         store.begin(identity_of(short), resume=True)
-
-
-def test_a_second_process_is_kept_out(store, short):
-    other = Store(store.folder, short)
-    with store, pytest.raises(SimulationFailed, match="another beaver-ftc is flying"), other:
-        pass
-    with other:
-        pass
 
 
 def test_a_strangers_folder_is_left_alone(store):

@@ -1,55 +1,11 @@
 import pytest
-from pydantic import ValidationError
 
 from beaver_ftc.documents.validation import ScenarioError, parse_key, with_values
 from beaver_ftc.scenario.airframe import checked_against
 from beaver_ftc.scenario.builtin import builtin_sweeps
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.scenario.sweeps import SweepFile, load_sweep, load_sweep_text
+from beaver_ftc.scenario.sweeps import load_sweep
 from beaver_ftc.studies.sweep.sampling import Plan
-
-HEAD = "base: elevator-partial-loss\nruns: 3\nvary:\n  "
-SPEED = "vary.initial.airspeed_mps"
-
-
-@pytest.mark.parametrize(
-    ("text", "line", "key", "says"),
-    [
-        (HEAD + "faults[0].magnitude: {uniform: [0.1, 1.5]}", 4, "vary.faults[0].magnitude", "1.5 is out"),
-        (HEAD + "faults[1].magnitude: {uniform: [0.1, 1]}", 4, "vary.faults[1].magnitude", "no faults[1]"),
-        (HEAD + "initial.airspeed: {uniform: [40, 50]}", 4, "vary.initial.airspeed", "airspeed_mps?"),
-        (HEAD + "initial.airspeed_mps: {uniform: [50, 40]}", 4, SPEED + ".uniform", "out of order"),
-        (HEAD + "initial.airspeed_mps: {}", 4, SPEED, "exactly one of"),
-        (HEAD + "initial.airspeed_mps: {loguniform: [0, 4]}", 4, SPEED + ".loguniform", "over 0"),
-        (HEAD + "seed: {choice: [1, 2]}", 4, "vary.seed", "follows from the sweep's seed"),
-        (HEAD + "faults[0].at_s: {normal: [40, 1]}", 4, "vary.faults[0].at_s", "after the end"),
-        (HEAD + "actuators.bandwidth_rad_s: {choice: [-1]}", 4, "vary.actuators.bandwidth_rad_s", "out of"),
-        (HEAD + "..: {choice: [1]}", 4, "vary...", "is no dotted key"),
-        (
-            HEAD + "faults[0].at_s: {choice: [1]}\n  faults: {choice: [[]]}",
-            5, "vary.faults", "varied twice",
-        ),
-        ("base: elevator\nruns: 1", 1, "base", "no such file or built-in scenario"),
-        ("base: nothing/here.yaml\nruns: 1", 1, "base", "no such file"),
-        ("base:\n  duration_s: -1\nruns: 1", 2, "base.duration_s", "-1 is out of range"),
-        ("base: fault-free\nset: {duration: 3}\nruns: 1", 2, "set.duration", "did you mean duration_s?"),
-        ("base: fault-free", 1, "runs", "required key is missing"),
-        ("base: fault-free\nruns: 2\nexpect: {detection_rate: {}}", 3, "expect.detection_rate", "bounds"),
-        ("base: fault-free\nruns: 2\nsamplings: lhs", 3, "samplings", "did you mean sampling?"),
-        (
-            "base: fault-free\nsampling: grid\nvary: {initial.airspeed_mps: {uniform: [40, 50]}}",
-            3, SPEED, "cannot be counted",
-        ),
-    ],
-)  # fmt: skip
-def test_a_mistake_is_named_with_its_line(text, line, key, says):
-    with pytest.raises(ScenarioError) as caught:
-        load_sweep_text(text, "sweep.yaml")
-    messages = [str(entry) for entry in caught.value.lines]
-    assert any(entry.startswith(f"sweep.yaml:{line}: {key}") and says in entry for entry in messages), (
-        messages
-    )
-    assert caught.value.exit_code == 2
 
 
 @pytest.mark.parametrize("name", builtin_sweeps())
@@ -98,66 +54,3 @@ def test_a_base_stays_in_the_folder_of_its_sweep(tmp_path, base):
         ScenarioError, match=r"many\.yaml:1: base: .* is outside, allowed: a file in the sweep"
     ):
         load_sweep(folder / "many.yaml")
-
-
-def _file(**given):
-    return SweepFile.model_validate({"name": "limits", "base": "fault-free", "runs": 3, **given})
-
-
-def _vary(**how):
-    return {"vary": {"initial.airspeed_mps": how}}
-
-
-@pytest.mark.parametrize(
-    ("inside", "outside"),
-    [
-        ({"runs": 1}, {"runs": 0}), ({"runs": 10_000_000}, {"runs": 10_000_001}),
-        ({"seed": 0}, {"seed": -1}), ({"seed": 2**63 - 1}, {"seed": 2**63}),
-        ({"name": "n" * 70}, {"name": "n" * 71}), ({"description": "d" * 2000}, {"description": "d" * 2001}),
-        (_vary(linspace=(1, 2, 1)), _vary(linspace=(1, 2, 0))),
-        (_vary(linspace=(1, 2, 1_000_000)), _vary(linspace=(1, 2, 1_000_001))),
-        (_vary(choice=(1,)), _vary(choice=())),
-        (_vary(uniform=(1, 2)), _vary(uniform=(2, 2))),
-        (_vary(normal=(1, 1e-9)), _vary(normal=(1, 0))),
-        (_vary(loguniform=(1e-9, 2)), _vary(loguniform=(0, 2))),
-        (_vary(normal=(1, 1), within=(0, 2)), _vary(uniform=(0, 3), within=(0, 2))),
-        *(
-            (
-                {"expect": {"detection_rate": {"at_least": 0.5, "confidence": inside}}},
-                {"expect": {"detection_rate": {"at_least": 0.5, "confidence": outside}}},
-            )
-            for inside, outside in ((0.5, 0.49), (0.999, 1.0))
-        ),
-        *(
-            (
-                {"expect": {"detection_delay_s": {"at_most": 0.5, "quantile": inside}}},
-                {"expect": {"detection_delay_s": {"at_most": 0.5, "quantile": outside}}},
-            )
-            for inside, outside in ((0.001, 0.0), (0.999, 1.0))
-        ),
-    ],
-)  # fmt: skip
-def test_what_is_at_a_limit_is_read_and_what_is_beyond_is_not(inside, outside):
-    _file(**inside)
-    with pytest.raises(ValidationError):
-        _file(**outside)
-
-
-@pytest.mark.parametrize(
-    ("given", "flights"),
-    [
-        ({"vary": {"a": {"linspace": (1, 2, 5)}, "b": {"uniform": (1, 2)}}}, 5),
-        ({"vary": {"a": {"linspace": (1, 2, 5)}, "b": {"choice": (1, 2)}}}, 5),
-        ({"sampling": "grid", "vary": {"a": {"linspace": (1, 2, 5)}, "b": {"choice": (1, 2)}}}, 10),
-        ({"runs": 7, "sampling": "grid", "vary": {"a": {"linspace": (1, 2, 5)}}}, 7),
-    ],
-)
-def test_a_grid_gives_the_number_of_flights_unless_it_is_said(given, flights):
-    assert SweepFile.model_validate({"name": "grid", "base": "fault-free", **given}).flights == flights
-
-
-def test_without_a_grid_the_number_of_flights_is_asked_for_and_a_huge_one_is_refused():
-    huge = {"a": {"linspace": (1, 2, 1_000_000)}, "b": {"linspace": (1, 2, 11)}}
-    for vary in ({"a": {"uniform": (1, 2)}}, huge):
-        with pytest.raises(ValidationError, match="contradictory"):
-            SweepFile.model_validate({"name": "grid", "base": "fault-free", "vary": vary})

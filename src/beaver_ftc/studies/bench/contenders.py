@@ -34,12 +34,7 @@ def quartiles(values: np.ndarray) -> list[float]:
     return [float(np.quantile(values, share)) for share in (0.25, 0.5, 0.75)]
 
 
-Clock = Callable[[], int]  # ns
-
-
-def interleave(
-    contenders: Sequence[Contender], rounds: int, frames: int, clock: Clock = time.process_time_ns
-) -> np.ndarray:
+def interleave(contenders: Sequence[Contender], rounds: int, frames: int) -> np.ndarray:
     """Time all contenders in turn, A B C then C B A; microseconds a frame, (rounds, contenders).
 
     What is to be compared is formed within a round, which lasts some milliseconds, and condensed afterwards.
@@ -52,9 +47,9 @@ def interleave(
         for round_ in us:
             for i in order:
                 contenders[i].prepare()
-                start_ns = clock()
+                start_ns = time.process_time_ns()
                 contenders[i].fly(frames)
-                round_[i] = (clock() - start_ns) / (1e3 * frames)
+                round_[i] = (time.process_time_ns() - start_ns) / (1e3 * frames)
             order.reverse()
     finally:
         if collecting:

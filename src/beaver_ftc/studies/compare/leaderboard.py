@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.diagnosis.rivals import TunedValuesByGrade
-from beaver_ftc.results.metrics import as_json
 from beaver_ftc.results.model import Document
 from beaver_ftc.results.style import BLUE, GREY
 from beaver_ftc.studies.compare.scores import document_of
@@ -15,7 +14,6 @@ from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.engine.workers import Case
 from beaver_ftc.studies.present import page
 from beaver_ftc.studies.present.figures import curve_look, marker, panels
-from beaver_ftc.studies.present.page import Makers
 from beaver_ftc.studies.present.tables import aligned, percent
 
 if TYPE_CHECKING:
@@ -109,11 +107,11 @@ _SAYS = (
 _FIGURE = "Detection rate and delay against false alarms, and tracking against the oracle"
 
 
-def page_of(document: Document, title: str, folder: Path) -> str:
-    """The page; the figure in the folder goes into it."""
+def page_of(document: Document, name: str) -> tuple[str, list[page.Part]]:
+    """Title and parts of the page."""
     versions = page.versions_line(document["versions"])
     parts = [_SAYS, page.Pictures([(_FIGURE, "comparison")]), *_sets(document), versions]
-    return page.as_html(title, parts, {"comparison": folder / "comparison.png"})
+    return f"Comparison: {name}", parts
 
 
 def write_leaderboard(document: Document, path: Path) -> None:
@@ -194,21 +192,13 @@ def run_comparison(
 
     chosen: values of schemes and laws, as in trial.py.
     """
+    files = page.study_files("comparison", partial(page_of, name=name), {}, {"comparison": figure_of})
     study = Study(
         name, cases, partial(fly_case, entries=tuple(entries), chosen=chosen),
-        partial(document_of, entries=entries), makers_of(name), row=Trial,
+        partial(document_of, entries=entries), files, row=Trial,
         follows_from=entries if chosen is None else (entries, chosen), lost=lost,
     )  # fmt: skip
     return run_study(study, out, workers, progress)
-
-
-def makers_of(name: str) -> Makers:
-    """The document, its figure and the page of this name."""
-    return {
-        "comparison.json": as_json,
-        "comparison.png": figure_of,
-        "comparison.html": lambda document: partial(page_of, document, f"Comparison: {name}"),
-    }
 
 
 def lost(case: Case, why: str) -> Trial:

@@ -32,8 +32,7 @@ NO_MARGIN = 0.0, 0.0, 0.0
 def margins_of(scenario: Scenario) -> list[Margin]:
     """The margins of a scenario's law over the airspeeds of the envelope, of the surfaces that lead an
     axis."""
-    airspeeds_mps = np.linspace(*scenario.airframe.envelope.airspeed_mps, N_AIRSPEEDS)
-    flights = (scenario.with_({"initial.airspeed_mps": float(V)}) for V in airspeeds_mps)
+    flights = closed_form.over_envelope(scenario, N_AIRSPEEDS)
     if scenario.control.law in flown_by("rejecting"):
         return [margin for flight in flights for margin in takewhile(_is_healthy, closed_form.at(flight))]
     return [margin for flight in flights for margin in _measured(flight)]

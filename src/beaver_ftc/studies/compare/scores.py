@@ -5,9 +5,7 @@ what tables, figure, page and `--format json` are made from.
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from math import inf
 from operator import itemgetter
-from statistics import median
-
-import numpy as np
+from statistics import median as middle
 
 from beaver_ftc.results.metrics import versions
 from beaver_ftc.results.model import Document
@@ -16,8 +14,8 @@ from beaver_ftc.studies.compare.trial import LAW, ORACLE, SCHEME, Entry, Result,
 from beaver_ftc.studies.engine.statistics import (
     CONFIDENCE,
     Estimate,
+    median,
     poisson_bound,
-    quantile_bound,
     share_within,
     sign_test,
     wilson,
@@ -63,7 +61,7 @@ def line_of(
         "detected": detected,
         "isolated": sum(r.correct for r in faulted),
         "departures": sum(r.departed for r in mine),
-        "us": median(r.us for r in mine) if mine else 0.0,
+        "us": middle(r.us for r in mine) if mine else 0.0,
         **_spread("before", [r.before_deg_s for r in mine]),
         **_spread("after", [r.after_deg_s for r in faulted]),
         **_spread("travel", [r.travel_deg_s for r in mine], ("median",)),
@@ -96,12 +94,8 @@ def _spread(name: str, values: Sequence[float], which: Sequence[str] = ("median"
 
 def _interval(name: str, values: Sequence[float], unit: str = "") -> Document:
     """The two-sided interval of a median, free of any distribution."""
-    ordered = np.sort(values)
-    limits = {"low": False, "high": True}
-    bounds = {
-        side: quantile_bound(ordered, 0.5, (1 + CONFIDENCE) / 2, upper) for side, upper in limits.items()
-    }
-    return {f"{name}_{side}{unit}": bound for side, bound in bounds.items()} if values else {}
+    found = median(values)
+    return {f"{name}_{side}{unit}": found[side] for side in ("low", "high")} if values else {}
 
 
 def lines_of(trials: Sequence[Trial], entries: Sequence[Entry]) -> list[Document]:
@@ -134,9 +128,9 @@ def point_at(traces: Sequence[Trace], level: float) -> Document:
     return {"level": level, "false_alarms_per_h": per_h, "detection_rate": rate, "delay_median_s": median_s}
 
 
-def matched(points: Sequence[Document], per_hour: float = 0.0) -> Document:
-    """The most sensitive level with no more false alarms than this."""
-    return min((p for p in points if p["false_alarms_per_h"] <= per_hour), key=itemgetter("level"))
+def matched(points: Sequence[Document]) -> Document:
+    """The most sensitive level without a false alarm."""
+    return min((p for p in points if p["false_alarms_per_h"] <= 0.0), key=itemgetter("level"))
 
 
 # What is held against ours in `better_than_ours`: of each key of a line, what it is called.

@@ -54,9 +54,9 @@ def wilson_bound(successes: int, trials: int, confidence: float, upper: bool) ->
     return found.high if upper else found.low
 
 
-def binomial_upper(events: int, trials: int, confidence: float = CONFIDENCE) -> float:
+def binomial_upper(events: int, trials: int) -> float:
     """Exact upper limit of a probability after `events` in `trials` [ClopperPearson1934]."""
-    return binomial(events, trials, 2.0 * confidence - 1.0).high
+    return binomial(events, trials, 2.0 * CONFIDENCE - 1.0).high
 
 
 def sign_test(wins: int, losses: int) -> float:
@@ -66,11 +66,11 @@ def sign_test(wins: int, losses: int) -> float:
     return float(binomtest(wins, wins + losses).pvalue) if wins + losses else 1.0
 
 
-def poisson(events: int, exposure: float, confidence: float = CONFIDENCE) -> Estimate:
+def poisson(events: int, exposure: float) -> Estimate:
     """Events per unit of exposure with their two-sided exact interval [Garwood1936]."""
     if exposure <= 0:
         return Estimate(math.nan, 0.0, math.inf)
-    low, high = (poisson_bound(events, exposure, (1.0 + confidence) / 2, upper) for upper in (False, True))
+    low, high = (poisson_bound(events, exposure, (1.0 + CONFIDENCE) / 2, upper) for upper in (False, True))
     return Estimate(events / exposure, low, high)
 
 

@@ -130,7 +130,8 @@ class Study:
     name: of the result folder. fly: from a case to its row, a value of the type `row`; it can be pickled, as
     the cases can. document: of all rows. files: their names, with what makes the content of each from the
     document. follows_from: what the rows follow from beside the cases. lost: the row of a case that kills
-    its process each time; without it that is a SimulationFailed. warm_up: of the workers that fly rounds.
+    its process each time; without it that is a SimulationFailed. warm_up: of the workers. part: how many
+    cases are kept together.
     """
 
     name: str
@@ -142,6 +143,7 @@ class Study:
     follows_from: Any = None
     lost: Lost | None = None
     warm_up: Nothing | None = None
+    part: int = 1
 
 
 def run_study(study: Study, out: Path, workers: int = 1, progress: Progress | None = None) -> Any:
@@ -155,35 +157,51 @@ def run_study(study: Study, out: Path, workers: int = 1, progress: Progress | No
 @contextlib.contextmanager
 def flown(study: Study, out: Path, workers: int = 1, progress: Progress | None = None) -> Iterator[list[Any]]:
     """Yield the rows of all cases, in their order whatever the number of workers; on success they go."""
-    with _keeping(study, out) as parts:
-        yield _all_rows(study.fly, study.cases, workers, progress, parts, study.lost)
+    with in_rounds(study, out, workers, study.part, progress) as fly:
+        yield fly(0, study.cases)
 
 
 FlyRound = Callable[[int, Sequence[Any]], list[Any]]
 
 
 @contextlib.contextmanager
-def in_rounds(study: Study, out: Path, workers: int = 1) -> Iterator[FlyRound]:
+def in_rounds(
+    study: Study, out: Path, workers: int = 1, part: int | None = None, progress: Progress | None = None
+) -> Iterator[FlyRound]:
     """Yield what flies one round of cases after the other, by its number, and gives their rows in order: what
-    to fly next may follow from the rows before. Kept as they land; on success they go."""
+    to fly next may follow from the rows before. Kept as they land, a part of cases at a time; on success they
+    go. What has landed is read from there: the same rows, whenever they were flown."""
     with _keeping(study, out) as parts, contextlib.ExitStack() as at_work:
         flying: list[Workers] = []
 
         def fly(number: int, cases: Sequence[Any]) -> list[Any]:
-            pieces = {f"{number:06}-{n:06}": runs for n, runs in store.batches_of(len(cases), OF_A_PART)}
-            found = {piece: parts.landed(piece, runs) for piece, runs in pieces.items()}
-            missing = {piece: pieces[piece] for piece, rows in found.items() if rows is None}
+            pieces = {
+                f"{number:06}-{n:06}": runs for n, runs in store.batches_of(len(cases), part or OF_A_PART)
+            }
+            found: dict[Number, list[Any]] = {}
+
+            def take(piece: Any) -> None:
+                rows = parts.landed(piece, pieces[piece])
+                if rows is not None:
+                    found[piece] = rows
+                    if progress:
+                        progress(len(found) / len(pieces))
+
+            def land(batch: Batch, rows: list[Row]) -> None:
+                parts.land(batch.number, rows)
+                take(batch.number)
+
+            for piece in pieces:
+                take(piece)
+            missing = [piece for piece in pieces if piece not in found]
             if missing:
+                left = sum(len(pieces[piece]) for piece in missing)
                 if not flying:
-                    work = Work(partial(_fly_case, study.fly), study.warm_up)
-                    made = LocalWorkers(work, workers) if workers > 1 else ThisProcess(work)
+                    made = _workers(Work(partial(_fly_case, study.fly), study.warm_up), workers, left)
                     flying.append(at_work.enter_context(contextlib.closing(made)))
-                left = sum(map(len, missing.values()))
-                coming = (Batch(piece, tuple(Case(n, cases[n]) for n in missing[piece])) for piece in missing)
-                batches = Batches(coming, left, lambda batch, rows: parts.land(batch.number, rows))
-                Campaign(batches, flying[0], study.lost or _fail).fly()
-                found |= {piece: parts.landed(piece, runs) for piece, runs in missing.items()}
-            return [row for rows in found.values() for row in rows]
+                coming = (Batch(piece, tuple(Case(n, cases[n]) for n in pieces[piece])) for piece in missing)
+                Campaign(Batches(coming, left, land), flying[0], study.lost or _fail).fly()
+            return [row for piece in pieces for row in found[piece]]
 
         yield fly
 
@@ -212,15 +230,24 @@ def _keeping(study: Study, out: Path) -> Iterator[store.Parts]:
 
 def fly_all(fly: Fly, cases: Sequence[Any], workers: int, progress: Progress | None = None) -> list[Any]:
     """fly(case) of every case, in order, kept nowhere."""
-    return _all_rows(fly, cases, workers, progress)
+    rows: dict[Number, Any] = {}
+
+    def land(batch: Batch, flown: list[Row]) -> None:
+        rows[batch.number] = flown[0]
+        if progress:
+            progress(len(rows) / len(cases))
+
+    batches = Batches((Batch(n, (Case(n, case),)) for n, case in enumerate(cases)), len(cases), land)
+    if cases:
+        made = _workers(Work(partial(_fly_case, fly)), workers, len(cases))
+        with contextlib.closing(made) as flying:
+            Campaign(batches, flying, _fail).fly()
+    return [rows[n] for n in range(len(cases))]
 
 
-def conduct(batches: Batches, work: Work, workers: int, lost: Lost) -> None:
-    """Fly all batches: in this process if but one worker is asked for."""
-    if batches.left:
-        flying = LocalWorkers(work, min(workers, batches.left)) if workers > 1 else ThisProcess(work)
-        with contextlib.closing(flying):
-            Campaign(batches, flying, lost).fly()
+def _workers(work: Work, workers: int, cases: int) -> Workers:
+    """This process if but one worker is asked for."""
+    return LocalWorkers(work, min(workers, cases)) if workers > 1 else ThisProcess(work)
 
 
 def _begin(kept: Path, study: Study) -> store.Parts:
@@ -240,34 +267,6 @@ def _begin(kept: Path, study: Study) -> store.Parts:
         store.remove_leftovers(kept)
         parts.folder.mkdir(exist_ok=True)
     return parts
-
-
-def _all_rows(
-    fly: Fly, cases: Sequence[Any], workers: int, progress: Progress | None,
-    parts: store.Parts | None = None, lost: Lost | None = None,
-) -> list[Any]:  # fmt: skip
-    """What has landed in the parts is read from there: the same rows, whenever they were flown."""
-    rows: dict[int, Any] = {}
-
-    def take(number: int, found: list[Any] | None) -> None:
-        if found is not None:
-            rows[number] = found[0]
-            if progress:
-                progress(len(rows) / len(cases))
-
-    def land(batch: Batch, flown: list[Any]) -> None:
-        if parts is not None:
-            parts.land(batch.number, flown)
-            flown = parts.landed(batch.number, [batch.cases[0].run])
-        take(batch.cases[0].run, flown)
-
-    if parts is not None:
-        for number in range(len(cases)):
-            take(number, parts.landed(number, [number]))
-    missing = [Batch(n, (Case(n, case),)) for n, case in enumerate(cases) if n not in rows]
-    batches = Batches(iter(missing), len(missing), land)
-    conduct(batches, Work(partial(_fly_case, fly)), workers, lost or _fail)
-    return [rows[number] for number in range(len(cases))]
 
 
 def _fly_case(fly: Fly, case: Case) -> Any:

@@ -8,7 +8,7 @@ from collections import Counter
 from functools import lru_cache
 from math import degrees
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -19,14 +19,14 @@ from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.trim import trim
 from beaver_ftc.results.metrics import as_json, measure
 from beaver_ftc.results.model import Document, Metrics
-from beaver_ftc.results.style import CRIMSON, VERMILION
+from beaver_ftc.results.style import VERMILION
 from beaver_ftc.scenario.airframe import air_of, find_aircraft, initial_of
 from beaver_ftc.scenario.faults import TYPES
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.schema import load as load_scenario
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.matrix.clairvoyant import columns_of, seen_when_told
-from beaver_ftc.studies.present.figures import heat_map, panels
+from beaver_ftc.studies.present.figures import heat_map, label_edges, panels
 from beaver_ftc.studies.present.page import Makers
 from beaver_ftc.studies.reproduce.choices import SETTING
 
@@ -373,35 +373,20 @@ def _told(told: Document) -> str:
 
 
 def heat_map_of(document: Document) -> "Figure":
-    """Colour and symbol give the verdict, a red frame the loss of the aircraft, small text delay and
-    tracking."""
+    """Colour and symbol give the verdict, the line below delay and tracking."""
     from matplotlib.colors import ListedColormap
-    from matplotlib.patches import Patch, Rectangle
 
     names, (surfaces, cells) = [fault for fault, _ in FAULTS], _table(document)
     grid = np.array([[VERDICTS.index(cells[fault, s]["verdict"]) for s in surfaces] for fault in names])
-    figure, panel = panels(1, 1, 11.0, 0.5 * len(names) + 1.8)
-    axes, colours = panel[0, 0], [LOOKS[verdict][1] for verdict in VERDICTS]
-    look: dict[str, Any] = {"cmap": ListedColormap(colours), "vmin": -0.5, "vmax": len(VERDICTS) - 0.5}
-    heat_map(axes, grid, {}, surfaces, names, 9, **look)
-    for (i, j), _ in np.ndenumerate(grid):
+    labels = {}
+    for i, j in np.ndindex(grid.shape):
         cell = cells[names[i], surfaces[j]]
         ink = "white" if cell["verdict"] == "WRONG" else "black"
-        axes.text(j, i - 0.12, _label(cell), ha="center", va="center", fontsize=9, color=ink)
-        axes.text(j, i + 0.27, _small(cell), ha="center", va="center", fontsize=7, color=ink)
-        if cell["lost"]:
-            frame: dict[str, Any] = {"fill": False, "edgecolor": CRIMSON, "linewidth": 2.5, "zorder": 3}
-            axes.add_patch(Rectangle((j - 0.47, i - 0.45), 0.94, 0.9, **frame))
-    axes.set_title(
-        "Each fault on each surface: verdict, alarm delay, tracking RMS / that of the informed law"
-    )
-    axes.set_xticks(np.arange(0.5, len(surfaces) - 1), minor=True)
-    axes.set_yticks(np.arange(0.5, len(names) - 1), minor=True)
-    axes.grid(which="minor", color="white", linewidth=1.5)
-    axes.tick_params(which="minor", length=0)
-    key = [Patch(facecolor=LOOKS[of][1], label=f"{LOOKS[of][0]} {SHOWN[of]}") for of in reversed(VERDICTS)]
-    key.append(Patch(fill=False, edgecolor=CRIMSON, linewidth=2.5, label="aircraft lost"))
-    figure.legend(handles=key, loc="outside lower center", ncols=len(key), fontsize=9, frameon=False)
+        labels[i, j] = f"{_label(cell)}\n{_small(cell)}", ink
+    figure, panel = panels(1, 1, 11.0, 0.5 * len(names) + 1.8)
+    colours = ListedColormap([LOOKS[verdict][1] for verdict in VERDICTS])
+    heat_map(panel[0, 0], grid, labels, surfaces, names, cmap=colours, vmin=-0.5, vmax=len(VERDICTS) - 0.5)
+    label_edges(panel, titles=["Each fault on each surface: alarm delay, tracking RMS / the informed law's"])
     return figure
 
 

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from beaver_ftc.control.laws.rejecting import margins as margins_of
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.linear import LinearModel, differences, engine_slope
@@ -26,6 +27,7 @@ from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.linear_systems import zeros
 from beaver_ftc.studies.matrix.fault_matrix import AIRSPEEDS_MPS, AT_S, REFERENCE, UNCERTAINTY, trimmed_deg
 from beaver_ftc.studies.present.page import Makers
+from beaver_ftc.studies.present.tables import finite
 
 NAME = "pitch-lost"
 DURATION_S = 100.0
@@ -135,14 +137,14 @@ def margins(airspeed_mps: float, config: EnginePower) -> Document:
     worth_deg: pitching moment of the throttle closed and opened, in deg of elevator.
     """
     model, power, trim_inhg = about_trim(airspeed_mps)
-    A, q = model.A, STATES.index("q")
-    gain_db, phase_deg = _least_margins(loop_response(A, power, config))
+    A, q, (F, b, k) = model.A, STATES.index("q"), with_law(model.A, power, config)
+    upper_db, lower_db, phase_deg = margins_of(loop_response(F, b, k))
     ends = np.array([config.lowest_inhg, config.highest_inhg]) - trim_inhg
     return {
         "airspeed_mps": airspeed_mps,
-        "phugoid_damping": [_phugoid_damping(system) for system in (A, closed_loop(A, power, config))],
-        "gain_margin_db": gain_db,
-        "phase_margin_deg": phase_deg,
+        "phugoid_damping": [_phugoid_damping(system) for system in (A, F + np.outer(b, k))],
+        "gain_margin_db": finite(float(min(upper_db, lower_db))),
+        "phase_margin_deg": finite(float(phase_deg)),
         "attitude_zero_rad_s": float(zeros(A, power, STATES.index("theta")).real.max()),
         "worth_deg": np.rad2deg(ends * power[q] / model.B[q, model.inputs.index("elevator")]).tolist(),
     }
@@ -156,32 +158,23 @@ def about_trim(airspeed_mps: float) -> tuple[LinearModel, np.ndarray, float]:
     return model.of(STATES), engine_slope(plant, point)[rows], point.manifold_pressure_inhg
 
 
-def _law(config: EnginePower) -> tuple[float, float]:
-    """Gains: inHg per m/s, inHg per rad."""
-    return config.speed_gain_inhg_per_mps, float(np.rad2deg(config.attitude_gain_inhg_per_deg))
-
-
-def loop_response(A: np.ndarray, power: np.ndarray, config: EnginePower) -> np.ndarray:
-    """The loop cut at the manifold pressure, over FREQUENCIES_RAD_S; 1 + L = 0 is the closed loop's."""
-    speed_gain, attitude_gain = _law(config)
-    s = 1j * FREQUENCIES_RAD_S
-    x = np.linalg.solve(s[:, None, None] * np.eye(4) - A, np.broadcast_to(power, (len(s), 4))[..., None])
-    V, q = x[:, STATES.index("airspeed"), 0], x[:, STATES.index("q"), 0]
-    smooth, slow = 1.0 / (1.0 + s * config.smoothing_s), 1.0 / (1.0 + s * config.washout_s)
-    remembered = 1.0 / (s + 1.0 / config.attitude_memory_s)
-    return speed_gain * smooth * (1.0 - slow) * V - attitude_gain * remembered * q
-
-
-def closed_loop(A: np.ndarray, power: np.ndarray, config: EnginePower) -> np.ndarray:
-    """System matrix (7, 7) of the aircraft, the smoothed airspeed, its slow mean, and the attitude missed."""
-    speed_gain, attitude_gain = _law(config)
-    F = np.zeros((7, 7))
-    F[:4, :4] = A
+def with_law(A: np.ndarray, power: np.ndarray, config: EnginePower) -> tuple[np.ndarray, ...]:
+    """The aircraft, the smoothed airspeed, its slow mean and the attitude missed: system matrix F (7, 7), the
+    column b (7,) of manifold pressure in inHg, and the pressure k (7,) that the law asks for."""
+    F, b, k = np.zeros((7, 7)), np.zeros(7), np.zeros(7)
+    F[:4, :4], b[:4] = A, power
     F[4, [0, 4]] = np.array([1.0, -1.0]) / config.smoothing_s
     F[5, [4, 5]] = np.array([1.0, -1.0]) / config.washout_s
     F[6, 2], F[6, 6] = 1.0, -1.0 / config.attitude_memory_s
-    F[:4] += np.outer(power, [0, 0, 0, 0, -speed_gain, speed_gain, attitude_gain])
-    return F
+    speed_gain, attitude_gain = config.speed_gain_inhg_per_mps, np.rad2deg(config.attitude_gain_inhg_per_deg)
+    k[4:] = -speed_gain, speed_gain, attitude_gain
+    return F, b, k
+
+
+def loop_response(F: np.ndarray, b: np.ndarray, k: np.ndarray) -> np.ndarray:
+    """The loop cut at the manifold pressure, over FREQUENCIES_RAD_S; 1 + L = 0 is the closed loop's."""
+    s = 1j * FREQUENCIES_RAD_S[:, None, None]
+    return -np.linalg.solve(s * np.eye(len(F)) - F, b[:, None])[..., 0] @ k
 
 
 def _phugoid_damping(system: np.ndarray) -> float:
@@ -189,15 +182,6 @@ def _phugoid_damping(system: np.ndarray) -> float:
     poles = np.linalg.eigvals(system)
     slow = poles[(np.abs(poles) < SLOW_RAD_S) & (poles.imag > 1e-6)]
     return float(min(-slow.real / np.abs(slow), default=1.0))
-
-
-def _least_margins(response: np.ndarray) -> tuple[float | None, float | None]:
-    """Gain margin (dB, either way) and phase margin (deg) over all crossings."""
-    through = (np.diff(np.sign(response.imag)) != 0) & (response.real[1:] < 0.0)
-    gains = np.abs(20.0 * np.log10(np.abs(response.real[1:][through])))
-    crossed = np.diff(np.sign(np.abs(response) - 1.0)) != 0
-    phases = np.abs(np.rad2deg(np.angle(-response[1:][crossed])))
-    return (float(gains.min()) if gains.size else None), (float(phases.min()) if phases.size else None)
 
 
 LEGEND = (

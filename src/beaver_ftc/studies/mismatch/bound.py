@@ -8,7 +8,7 @@ from beaver_ftc.documents.files import Document
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.metrics import Truth
 from beaver_ftc.scenario.schema import Scenario, load_scenario
-from beaver_ftc.studies.mismatch.split import Tally, tally_of_flight
+from beaver_ftc.studies.mismatch.split import Split, split_flight
 
 PUBLISHED_CASE = "elevator-partial-loss"
 MAX_ROUNDS = 10  # of flights with a larger bound
@@ -16,15 +16,15 @@ LEAST_RAD_S2 = 1e-4  # of a bound that is widened
 PerAxis = dict[str, float]
 
 
-def recommend(tallies: Sequence[Tally], at_least: PerAxis | None = None) -> PerAxis:
+def recommend(flights: Sequence[Split], at_least: PerAxis | None = None) -> PerAxis:
     """The smallest constant parts of eta_bar, rad/s2 per axis, that would have covered every run.
 
     Rounded up to two digits; none below `at_least`.
     """
     found = dict(at_least or dict.fromkeys(AXES, 0.0))
     for i, axis in enumerate(AXES):
-        needed = max(tally.bounds[i].smallest_constant_rad_s2 for tally in tallies)
-        found[axis] = max(found[axis], rounded_up(needed))
+        needed = max(flight.smallest_constant[i] for flight in flights)
+        found[axis] = max(found[axis], rounded_up(float(needed)))
     return found
 
 
@@ -33,11 +33,11 @@ def widened(constant_rad_s2: PerAxis) -> PerAxis:
     return {axis: rounded_up(max(1.2 * c, LEAST_RAD_S2)) for axis, c in constant_rad_s2.items()}
 
 
-def rounded_up(value: float, digits: int = 2) -> float:
-    """The next number of this many significant digits that is not below `value`."""
+def rounded_up(value: float) -> float:
+    """The next number of two significant digits that is not below `value`."""
     if value <= 0.0:
         return 0.0
-    step = digits - 1 - floor(log10(value))
+    step = 1 - floor(log10(value))
     scaled = value * 10.0**step
     return ceil(scaled - 1e-9 * scaled) / 10.0**step if step >= 0 else ceil(scaled) * 10.0**-step
 
@@ -70,7 +70,7 @@ def with_bound(scenario: Scenario, constant_rad_s2: PerAxis) -> Scenario:
     return scenario.model_copy(update={"fdi": scenario.fdi.model_copy(update={"bounds": bounds})})
 
 
-def recommended_for(scenarios: Sequence[Scenario], kept: Sequence[Tally]) -> Document:
+def recommended_for(scenarios: Sequence[Scenario], kept: Sequence[Split]) -> Document:
     """The bound that covers these flights, and the published elevator case flown with it and the design.
 
     The case is one of the flights to be covered: a bound that suits calmer air alone would raise a false
@@ -82,7 +82,7 @@ def recommended_for(scenarios: Sequence[Scenario], kept: Sequence[Tally]) -> Doc
     first, runs = scenarios[0], len(scenarios)
     declared = first.fdi.bounds.constant_rad_s2.model_dump()
     case = published_case(declared, first)
-    constant, settled = settle([*scenarios, case], [*kept, tally_of_flight(case)[0]])
+    constant, settled = settle([*scenarios, case], [*kept, split_flight(case)[0]])
     return {
         "recommended": {
             "constant_rad_s2": constant, "runs": runs, "coverage": runs / (runs + 1), "settled": settled,
@@ -93,19 +93,19 @@ def recommended_for(scenarios: Sequence[Scenario], kept: Sequence[Tally]) -> Doc
     }  # fmt: skip
 
 
-def settle(scenarios: Sequence[Scenario], kept: Sequence[Tally]) -> tuple[PerAxis, bool]:
+def settle(scenarios: Sequence[Scenario], kept: Sequence[Split]) -> tuple[PerAxis, bool]:
     """The recommended bound, flown with until no flight exceeds it or alarms falsely; whether so.
 
     A bound too small raises an alarm, after which another law flies; without that alarm the flight, and its
     mismatch, is another. So every flight is flown again with what is recommended.
     """
-    tallies, constant = list(kept), recommend(kept)
+    flights, constant = list(kept), recommend(kept)
     for _ in range(MAX_ROUNDS):
-        again = [tally_of_flight(with_bound(scenario, constant)) for scenario in scenarios]
-        short = [tally for tally, flown in again if tally.exceeded or flown.false_alarm]
+        again = [split_flight(with_bound(scenario, constant)) for scenario in scenarios]
+        short = [flight for flight, flown in again if flight.exceeded or flown.false_alarm]
         if not short:
             return constant, True
-        tallies += short
-        larger = recommend(tallies, constant)
+        flights += short
+        larger = recommend(flights, constant)
         constant = larger if larger != constant else widened(larger)
     return constant, False

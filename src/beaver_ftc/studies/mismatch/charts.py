@@ -14,7 +14,7 @@ from beaver_ftc.results.log import StoredLog
 from beaver_ftc.results.model import Metrics
 from beaver_ftc.results.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION, Mark, marks
 from beaver_ftc.results.views import series_of
-from beaver_ftc.studies.linear_systems import CHANNELS, pulse_response, response, zeros
+from beaver_ftc.studies.linear_systems import CHANNELS, response
 from beaver_ftc.studies.mismatch.linear import LinearAnalysis
 from beaver_ftc.studies.mismatch.sources import SOURCES
 from beaver_ftc.studies.mismatch.split import CAUSES, ETA_BAR, FAULT, TOTAL, UNEXPLAINED, column
@@ -51,13 +51,10 @@ MODEL_LOOKS: dict[str, dict[str, Any]] = {
 
 def figures(folder: Path, found: Document, flown: Metrics, analysis: LinearAnalysis) -> Files:
     """Of the mismatch of a result folder that holds `mismatch.parquet`, by the name of their files."""
-    name = found["scenario"]
     return {
         "mismatch-sources.png": sources_figure(folder / "mismatch.parquet", found, marks(flown)),
         "mismatch-bound.png": bound_figure(found),
-        "mismatch-linear.png": linear_figure(analysis, name),
-        "mismatch-zeros.png": zeros_figure(analysis, name),
-        "mismatch-response.png": response_figure(analysis, name),
+        "mismatch-linear.png": linear_figure(analysis, found["scenario"]),
     }
 
 
@@ -186,14 +183,9 @@ def linear_figure(analysis: LinearAnalysis, name: str) -> "Figure":
     grid[1, 0].set_xlabel("real part (1/s)", fontsize=9)
     grid[0, 1].set_ylabel("magnitude (dB, rad/s per rad)", fontsize=9)
     grid[1, 1].set_ylabel("phase (deg)", fontsize=9)
-    _name_models(figure, grid[0, 1])
-    return figure
-
-
-def _name_models(figure: "Figure", axes: "Axes") -> None:
-    """One legend for all panels."""
-    named = axes.get_legend_handles_labels()
+    named = grid[0, 1].get_legend_handles_labels()
     figure.legend(*named, loc="outside lower center", ncols=len(MODEL_LOOKS), fontsize=9, frameon=False)
+    return figure
 
 
 def _draw_poles(axes: "Axes", analysis: LinearAnalysis) -> None:
@@ -217,41 +209,6 @@ def _draw_bode(magnitude: "Axes", phase: "Axes", analysis: LinearAnalysis, surfa
 
 def _line(look: dict[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in look.items() if key != "marker"}
-
-
-def zeros_figure(analysis: LinearAnalysis, name: str) -> "Figure":
-    """Zeros from each surface to its rate, over the truth's poles: what cancels, what is misplaced."""
-    title = f"Zeros from surface to rate, over the truth's poles (grey dots)\n{name}"
-    figure, grid = panels(1, 3, 14.0, 4.8, title)
-    poles = np.linalg.eigvals(analysis.models["truth"].A)
-    for (surface, rate), axes in zip(CHANNELS, grid[0], strict=True):
-        axes.scatter(poles.real, poles.imag, color=GREY, s=14)
-        for model, look in MODEL_LOOKS.items():
-            found = zeros(*analysis.channel(model, surface, rate))
-            hollow = {"facecolors": "none", "edgecolors": look["color"]}
-            ink: dict[str, Any] = hollow if look["marker"] == "o" else {"color": look["color"]}
-            axes.scatter(found.real, found.imag, marker=look["marker"], s=80, label=look["label"], **ink)
-        axes.axvline(0.0, color=GREY, linewidth=0.8)
-        _dress(axes)
-    titles = [f"{surface} to {rate}" for surface, rate in CHANNELS]
-    label_edges(grid, "real part (1/s)", ["imaginary part (rad/s)"], titles)
-    _name_models(figure, grid[0, 0])
-    return figure
-
-
-def response_figure(analysis: LinearAnalysis, name: str) -> "Figure":
-    """Each rate after a pulse of its surface: 1 deg for 1 s."""
-    t, pulse = np.arange(0.0, 15.0, 0.02), np.radians(1.0)
-    title = f"Rates after 1 deg of the surface for 1 s, linear models\n{name}"
-    figure, grid = panels(3, 1, 11.0, 6.4, title, sharex=True)
-    for (surface, rate), axes in zip(CHANNELS, grid[:, 0], strict=True):
-        for model, look in MODEL_LOOKS.items():
-            found = pulse_response(*analysis.channel(model, surface, rate), t, 1.0)
-            axes.plot(t, np.degrees(pulse * found), **_line(look))
-        _dress(axes)
-    label_edges(grid, "time (s)", [f"{rate} after {surface} (deg/s)" for surface, rate in CHANNELS])
-    _name_models(figure, grid[0, 0])
-    return figure
 
 
 def map_figure(entries: Sequence[Document], name: str) -> "Figure":

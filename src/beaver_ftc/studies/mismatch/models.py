@@ -1,37 +1,15 @@
-"""A stretch of the log as arrays, and angular accelerations there: the truth's and the designer's.
+"""The log as arrays, and the acceleration that a design model expects there."""
 
-The same physics as `design.model`, by another road: each term is its table entry's value times the product of
-its factors, turned into an acceleration by the inertia [FDC]. Nothing is summed that one may want apart.
-"""
-
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from math import prod
 
 import numpy as np
 
-from beaver_ftc.aircraft import AXES, Term
-from beaver_ftc.aircraft.aircraft import MOMENTS
-from beaver_ftc.design.fdc import GEOMETRY, MASS, SURFACES, TERMS
-from beaver_ftc.design.model import (
-    ALPHA,
-    Anchored,
-    InertiaCoefficients,
-    anchor,
-    anchored,
-    design_of,
-    inertia_coefficients,
-    inertial,
-    mass_of,
-)
-from beaver_ftc.plant.conditions import known_trim
-from beaver_ftc.scenario.declared import Declared
-from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.aircraft import AXES
+from beaver_ftc.design.fdc import SURFACES
+from beaver_ftc.design.model import responses_at
 
-MOMENT_TERMS: dict[str, Term] = {name: term for name, term in TERMS.items() if term.coefficient in MOMENTS}
-ENGINE_TERMS = tuple(name for name, term in MOMENT_TERMS.items() if "dpt" in term.factors)
-RATES = ("ph", "qh", "rh")
-Columns = Mapping[str, np.ndarray]
+Log = Mapping[str, np.ndarray]
 
 
 def measured_name(column: str) -> str:
@@ -61,7 +39,6 @@ _TOGETHER = {
     "eta_bar": tuple(f"{axis}_eta_bar_rad_s2" for axis in AXES),
     "design_mean": tuple(f"{axis}_design_rad_s2" for axis in AXES),
 }  # fmt: skip
-LOGGED = frozenset((*_ALONE, *(column for columns in _TOGETHER.values() for column in columns)))
 
 
 @dataclass(frozen=True)
@@ -91,11 +68,8 @@ class States:
     eta_bar: np.ndarray
     design_mean: np.ndarray
 
-    def __getitem__(self, rows: slice) -> "States":
-        return States(**{name: values[rows] for name, values in vars(self).items()})
 
-
-def states_of(log: Columns) -> States:
+def states_of(log: Log) -> States:
     """The states in log columns (name -> (n,)). A log without a measured column measured the truth."""
     together = {
         name: np.column_stack([log[column if column in log else _TRUE[column]] for column in columns])
@@ -104,98 +78,7 @@ def states_of(log: Columns) -> States:
     return States(**{name: log[name] for name in _ALONE}, **together)
 
 
-def quantities(x: np.ndarray, y: np.ndarray, u: np.ndarray) -> dict[str, np.ndarray]:
-    """What the terms multiply, (n,) each, from x (n, 3) rad/s, y (n, 5), u (n, 4) rad."""
-    alpha, beta, V, _, dpt = y.T
-    b, c = GEOMETRY.span_m, GEOMETRY.chord_m
-    rates = {"ph": x[:, 0] * b / (2 * V), "qh": x[:, 1] * c / V, "rh": x[:, 2] * b / (2 * V)}
-    return {"alpha": alpha, "beta": beta, "dpt": dpt, **rates, **dict(zip(SURFACES, u.T, strict=True))}
-
-
-def weights(inertia: InertiaCoefficients, coefficient: str, qdyn: np.ndarray) -> np.ndarray:
-    """The angular acceleration (n, 3) rad/s2 of a unit of Cl, Cm or Cn at dynamic pressure qdyn (n,) Pa."""
-    length, per_axis = {
-        "Cl": (GEOMETRY.span_m, (inertia.Pl, 0.0, inertia.Rl)),
-        "Cm": (GEOMETRY.chord_m, (0.0, inertia.Qm, 0.0)),
-        "Cn": (GEOMETRY.span_m, (inertia.Pn, 0.0, inertia.Rn)),
-    }[coefficient]
-    return np.outer(qdyn * GEOMETRY.wing_area_m2 * length, per_axis)
-
-
-def term(name: str, value: float, inertia: InertiaCoefficients, of: Columns, qdyn: np.ndarray) -> np.ndarray:
-    """The angular acceleration (n, 3) rad/s2 of one term with this coefficient."""
-    regressor = prod((of[factor] for factor in TERMS[name].factors), start=np.ones_like(qdyn))
-    return value * regressor[:, None] * weights(inertia, MOMENT_TERMS[name].coefficient, qdyn)
-
-
-@dataclass(frozen=True)
-class MomentModel:
-    """Coefficient of each moment term, and the inertia coefficients: a nonlinear moment model in numbers.
-
-    x (n, 3) rad/s, y (n, 5), u (n, 4) rad throughout; accelerations (n, 3) rad/s2.
-    """
-
-    coefficients: dict[str, float]
-    inertia: InertiaCoefficients
-
-    def acceleration(self, x: np.ndarray, y: np.ndarray, u: np.ndarray) -> np.ndarray:
-        """f + G u."""
-        return inertial(self.inertia, x) + self.aerodynamic(x, y, u)
-
-    def aerodynamic(
-        self, x: np.ndarray, y: np.ndarray, u: np.ndarray, names: Iterable[str] = MOMENT_TERMS
-    ) -> np.ndarray:
-        """Of the moments alone, terms `names` of them."""
-        of = quantities(x, y, u)
-        each = (term(name, self.coefficients[name], self.inertia, of, y[:, 3]) for name in names)
-        return sum(each, np.zeros((len(x), 3)))
-
-
-def true_moments(scenario: Scenario) -> MomentModel:
-    """The truth's moments as the scenario declares them."""
-    return MomentModel(_scaled(scenario.uncertainty.coefficients), inertia_coefficients(MASS))
-
-
-def designed_moments(scenario: Scenario) -> MomentModel:
-    """The designer's, before freezing or linearising."""
-    model = scenario.design_model
-    neglected = {} if model.engine_terms else dict.fromkeys(ENGINE_TERMS, 0.0)
-    return MomentModel(_scaled(model.coefficients) | neglected, inertia_coefficients(mass_of(model)))
-
-
-def _scaled(ratio: Mapping[str, float]) -> dict[str, float]:
-    """The table's coefficients, some of them multiplied."""
-    return {name: term.value * ratio.get(name, 1.0) for name, term in MOMENT_TERMS.items()}
-
-
-@dataclass(frozen=True)
-class DesignModelOfFlight:
-    """The design model in use: nonlinear, frozen or linearised at the designer's trim."""
-
-    moments: MomentModel
-    design: Anchored
-
-    def acceleration(self, x: np.ndarray, y: np.ndarray, u: np.ndarray) -> np.ndarray:
-        """f + G u (n, 3) rad/s2."""
-        d, m = self.design, y.shape[1]
-        if d.linearised:
-            away = (x - d.x0) @ d.f_x.T + (y - d.y0[:m]) @ d.f_y[:, :m].T
-            return d.f0 + away + u @ d.G0.T
-        if d.frozen_alpha:
-            y = y.copy()
-            y[:, ALPHA] = d.y0[ALPHA]
-        return self.moments.acceleration(x, y, u)
-
-    def effectiveness(self, y: np.ndarray) -> np.ndarray:
-        """G (n, 3, 4) rad/s2 per rad."""
-        still = np.zeros((len(y), 3))
-        neutral = self.acceleration(still, y, np.zeros((len(y), 4)))
-        deflected = (np.broadcast_to(one, (len(y), 4)) for one in np.eye(4))
-        return np.stack([self.acceleration(still, y, u) - neutral for u in deflected], axis=-1)
-
-
-def design_model_of_flight(scenario: Scenario) -> DesignModelOfFlight:
-    """The scenario's design model, linearised or frozen where the designer knows the trim."""
-    design = design_of(scenario.design_model)[0]
-    anchor(design, *known_trim(Declared.of(scenario)))
-    return DesignModelOfFlight(designed_moments(scenario), anchored(design))
+def acceleration(design: np.void, x: np.ndarray, y: np.ndarray, u: np.ndarray) -> np.ndarray:
+    """f + G u (n, 3) rad/s2 of a design model's record; x (n, 3) rad/s, y (n, 5), u (n, 4) rad."""
+    f, G = responses_at(design, x, y)
+    return f + np.einsum("kas,ks->ka", G, u)

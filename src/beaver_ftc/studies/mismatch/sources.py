@@ -1,4 +1,4 @@
-"""The sources of mismatch, each by its own formula: what it adds to truth minus design, (n, 3) rad/s2.
+"""The sources of mismatch: what each adds to truth minus design, (n, 3) rad/s2.
 
 They are the steps from the design model, at what was measured and commanded, to the truth: each changes
 one thing and leaves the rest as the steps before it left it, so that all of them together make the whole
@@ -45,62 +45,54 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.aircraft import AXES
+from beaver_ftc.aircraft import AXES, load
 from beaver_ftc.aircraft.aircraft import EARTH_RADIUS_M, EARTH_RATE_RAD_S
 from beaver_ftc.compiled import kernel
-from beaver_ftc.design.fdc import GEOMETRY, SURFACES, TRAVEL
-from beaver_ftc.design.model import InertiaCoefficients, inertial
+from beaver_ftc.design.fdc import SURFACES, TRAVEL
+from beaver_ftc.design.model import (
+    ALPHA,
+    QDYN,
+    InertiaCoefficients,
+    anchor,
+    design_of,
+    design_record,
+    inertia_of,
+    inertial,
+    mass_of,
+    responses_at,
+)
 from beaver_ftc.plant.adapter import START_LATITUDE_DEG
+from beaver_ftc.plant.conditions import known_trim
 from beaver_ftc.scenario.airframe import ActuatorDynamics
+from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.faults import UNANTICIPATED, place_of
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.signals import grown_share, is_before, is_in_force
-from beaver_ftc.studies.mismatch.models import (
-    ENGINE_TERMS,
-    MOMENT_TERMS,
-    RATES,
-    DesignModelOfFlight,
-    MomentModel,
-    States,
-    design_model_of_flight,
-    quantities,
-    term,
-    true_moments,
-)
+from beaver_ftc.studies.mismatch.models import States, acceleration
 
 SOURCES = (
     "sensors", "actuators", "fault", "simplification", "engine", "coefficients", "inertia",
     "inertia_coupling", "sinusoids", "wind_turbulence", "earth_rotation", "integration",
 )  # fmt: skip
 LOSS = "loss_of_effectiveness"
+ENGINE_TERMS = tuple(term.name for term in load().moments if "dpt" in dict(term.of))
 Contributions = dict[str, np.ndarray]
 
 
-class HealthyActuators:
-    """A scenario's actuators, before the first command: `follow` moves them on, some commands at a time."""
-
-    def __init__(self, scenario: Scenario) -> None:
-        dt = 1.0 / (scenario.rate_hz * scenario.substeps)
-        each = [getattr(scenario.actuators, surface) for surface in SURFACES]
-        off = [getattr(scenario.uncertainty.actuators, surface) for surface in SURFACES]
-        bandwidths = [a.bandwidth_rad_s * b.bandwidth for a, b in zip(each, off, strict=True)]
-        rates = [radians(a.rate_limit_deg_s * b.rate_limit) for a, b in zip(each, off, strict=True)]
-        share = [1.0 - exp(-bandwidth * dt) if bandwidth else 1.0 for bandwidth in bandwidths]
-        reach = [rate * dt if rate else inf for rate in rates]
-        self._share, self._reach = np.array(share), np.array(reach)  # of the way, rad; in a JSBSim frame
-        self._band = np.array([radians(one.dead_band_deg) for one in off])
-        self._low, self._high = np.array([_stops(*both) for both in zip(SURFACES, each, strict=True)]).T
-        self._runs = scenario.substeps
-        self._at_rad: np.ndarray | None = None
-
-    def follow(self, commands: np.ndarray) -> np.ndarray:
-        """Positions (n, 4) rad at rows with these commands (n, 4) rad, following those given before."""
-        if self._at_rad is None:
-            self._at_rad = np.clip(commands[0], self._low, self._high)
-        positions, stops = np.empty_like(commands), (self._low, self._high)
-        moves = self._share, self._reach, self._band
-        _follow(commands, *moves, *stops, self._runs, self._at_rad, positions)
-        return positions
+def healthy_positions(scenario: Scenario, commands: np.ndarray) -> np.ndarray:
+    """Positions (n, 4) rad of a scenario's healthy actuators at rows with these commands (n, 4) rad."""
+    dt = 1.0 / (scenario.rate_hz * scenario.substeps)
+    each = [getattr(scenario.actuators, surface) for surface in SURFACES]
+    off = [getattr(scenario.uncertainty.actuators, surface) for surface in SURFACES]
+    bandwidths = [a.bandwidth_rad_s * b.bandwidth for a, b in zip(each, off, strict=True)]
+    rates = [radians(a.rate_limit_deg_s * b.rate_limit) for a, b in zip(each, off, strict=True)]
+    share = np.array([1.0 - exp(-bandwidth * dt) if bandwidth else 1.0 for bandwidth in bandwidths])
+    reach = np.array([rate * dt if rate else inf for rate in rates])  # rad; in a JSBSim frame
+    band = np.array([radians(one.dead_band_deg) for one in off])
+    low, high = np.array([_stops(*both) for both in zip(SURFACES, each, strict=True)]).T
+    positions = np.empty_like(commands)
+    _follow(commands, share, reach, band, low, high, scenario.substeps, positions)
+    return positions
 
 
 def _stops(surface: str, dynamics: ActuatorDynamics) -> tuple[float, float]:
@@ -110,8 +102,9 @@ def _stops(surface: str, dynamics: ActuatorDynamics) -> tuple[float, float]:
 
 
 @kernel
-def _follow(commands, share, reach, band, low, high, runs, at, positions):
-    """Fill positions (n, 4) rad, `runs` JSBSim frames a row, and leave `at` (4,) rad at the last."""
+def _follow(commands, share, reach, band, low, high, runs, positions):
+    """Fill positions (n, 4) rad, `runs` JSBSim frames a row."""
+    at = np.minimum(np.maximum(commands[0], low), high)
     for k in range(commands.shape[0]):
         for s in range(4):
             demand = min(max(commands[k, s], low[s]), high[s])
@@ -146,11 +139,27 @@ def earth_rotation(
 
 
 class Models:
-    """Of a flight: the design model in use, the truth, and the actuators."""
+    """Of a flight: moment models from the one in use to the truth, each with one error less.
+
+    design: in use, tied to the trim where it is linearised or frozen. untied: without that. whole: with the
+    engine's terms, as in the table. turning: with the truth's coefficients. truth: with its inertia as well.
+    parts: `whole` with one of the truth's coefficients that differ, by name.
+    """
 
     def __init__(self, scenario: Scenario) -> None:
-        self.scenario, self.actuators = scenario, HealthyActuators(scenario)
-        self.design_model, self.truth = design_model_of_flight(scenario), true_moments(scenario)
+        model, true = scenario.design_model, scenario.uncertainty.coefficients
+        self.scenario, self.design, mass = scenario, design_of(model)[0], mass_of(model)
+        anchor(self.design, *known_trim(Declared.of(scenario)))
+        kept = {k: v for k, v in model.coefficients.items() if model.engine_terms or k not in ENGINE_TERMS}
+        self.untied = design_record(engine_terms=model.engine_terms, scale=model.coefficients, mass=mass)[0]
+        self.whole, self.turning = (design_record(scale=scale, mass=mass)[0] for scale in (kept, true))
+        self.truth = design_record(scale=true)[0]
+        self.inertia = inertia_of(self.truth)
+        self.parts = {
+            term.name: design_record(scale=kept | {term.name: true.get(term.name, 1.0)}, mass=mass)[0]
+            for term in load().moments
+            if true.get(term.name, 1.0) != kept.get(term.name, 1.0)
+        }
 
 
 def fault_effects(m: Models, states: States, G: np.ndarray, healthy: np.ndarray) -> Contributions:
@@ -166,7 +175,7 @@ def fault_effects(m: Models, states: States, G: np.ndarray, healthy: np.ndarray)
             effects[name] = effects.get(name, 0.0) + G[:, :, s] * by_rad[:, None]
     for fault in m.scenario.faults:
         if fault.type == UNANTICIPATED:
-            effects[name_of(fault)] = unanticipated(fault, m.design_model, states)
+            effects[name_of(fault)] = unanticipated(fault, m.design, states)
     return effects
 
 
@@ -182,10 +191,10 @@ def share(fault: Any, t_s: np.ndarray) -> np.ndarray:
     return np.where(is_in_force(fault, t_s), grown, 0.0)
 
 
-def unanticipated(fault: Any, design_model: DesignModelOfFlight, states: States) -> np.ndarray:
+def unanticipated(fault: Any, design: np.void, states: States) -> np.ndarray:
     """The extra pitching moment on alpha^3 as an acceleration (n, 3) rad/s2 [Zhang2005]."""
-    moment = states.y[:, 3] * GEOMETRY.wing_area_m2 * GEOMETRY.chord_m * states.y[:, 0] ** 3
-    pitch = fault.Cm_alpha3 * share(fault, states.t_s) * design_model.moments.inertia.Qm * moment
+    moment = states.y[:, QDYN] * design["S"] * design["c"] * states.y[:, ALPHA] ** 3
+    pitch = fault.Cm_alpha3 * share(fault, states.t_s) * design["Qm"] * moment
     return np.column_stack([0.0 * pitch, pitch, 0.0 * pitch])
 
 
@@ -213,47 +222,10 @@ def _displaced(faults: list, t_s: np.ndarray, way: np.ndarray) -> Iterator[tuple
         yield fault, np.where(owner == i, way, 0.0)
 
 
-def engine(m: Models, s: States) -> np.ndarray:
-    """The slipstream's moments where the design model neglects them, with the table's coefficients."""
-    if m.scenario.design_model.engine_terms:
-        return np.zeros_like(s.x)
-    table = {name: MOMENT_TERMS[name].value for name in ENGINE_TERMS}
-    neglected = MomentModel(table, m.design_model.moments.inertia)
-    return neglected.aerodynamic(s.x, s.y, s.effective, ENGINE_TERMS)
-
-
-def coefficient_errors(m: Models, s: States) -> Contributions:
-    """Each term whose coefficient differs between truth and design, neglected engine terms aside."""
-    of = quantities(s.x, s.y, s.effective)
-    neglected = () if m.scenario.design_model.engine_terms else ENGINE_TERMS
-    designed = m.design_model.moments.coefficients | {name: MOMENT_TERMS[name].value for name in neglected}
-    return {
-        name: term(name, error, m.design_model.moments.inertia, of, s.y[:, 3])
-        for name in MOMENT_TERMS
-        if (error := m.truth.coefficients[name] - designed[name]) != 0.0
-    }
-
-
-def inertia(m: Models, s: States, extra_moment: np.ndarray) -> np.ndarray:
-    """The truth's moments and rate products by the truth's inertia less by the designer's.
-
-    extra_moment (n, 3) rad/s2: the pitching moment of unanticipated faults, as the designer's inertia
-    weighs it.
-    """
-    true, designed = m.truth.inertia, m.design_model.moments.inertia
-    if true == designed:
-        return np.zeros_like(s.x)
-    by_true, by_designed = (
-        MomentModel(m.truth.coefficients, inertia).acceleration(s.x, s.y, s.effective)
-        for inertia in (true, designed)
-    )
-    return by_true - by_designed + extra_moment * (true.Qm / designed.Qm - 1.0)
-
-
 def inertia_coupling(m: Models, s: States) -> np.ndarray:
     """The declared relative errors of the rate products [Zhang2005, sec. VII]."""
     p, q, r = s.x.T
-    theta, of = m.scenario.uncertainty.inertia_coupling, m.truth.inertia
+    theta, of = m.scenario.uncertainty.inertia_coupling, m.inertia
     return np.column_stack([theta.p * of.Pqr * q * r, theta.q * of.Qpr * p * r, theta.r * of.Rpq * p * q])
 
 
@@ -268,50 +240,40 @@ def wind_turbulence(m: Models, s: States) -> np.ndarray:
 
     Wind that does not turn reaches the moments only through alpha, beta and V, which are measured.
     """
-    if np.array_equal(s.x_air, s.x):
-        return np.zeros_like(s.x)
-    names = [name for name, t in MOMENT_TERMS.items() if set(t.factors) & set(RATES)]
-    in_air, over_earth = (m.truth.aerodynamic(rates, s.y, s.effective, names) for rates in (s.x_air, s.x))
+    in_air, over_earth = (
+        acceleration(m.truth, rates, s.y, s.effective) - inertial(m.inertia, rates)
+        for rates in (s.x_air, s.x)
+    )
     return in_air - over_earth
 
 
 def earth(m: Models, s: States) -> np.ndarray:
     """The Earth's rotation on the flight's path; real gravity makes no moment about the centre of gravity."""
     latitude = radians(START_LATITUDE_DEG) + s.north_m / (EARTH_RADIUS_M + m.scenario.initial.altitude_m)
-    return earth_rotation(m.truth.inertia, s.x, s.attitude, latitude)
+    return earth_rotation(m.inertia, s.x, s.attitude, latitude)
 
 
 def instantaneous(m: Models, s: States) -> tuple[Contributions, dict[str, Contributions]]:
     """All sources but the integration at every frame, and the single faults and single coefficients."""
-    design_model, healthy = m.design_model, m.actuators.follow(s.u)
-    G = design_model.effectiveness(s.y)
-    faults, errors = fault_effects(m, s, G, healthy), coefficient_errors(m, s)
-    nothing = np.zeros_like(s.x)
+    healthy, (_, G) = healthy_positions(m.scenario, s.u), responses_at(m.design, s.x, s.y)
+    faults, nothing = fault_effects(m, s, G, healthy), np.zeros_like(s.x)
+    measured = acceleration(m.design, s.x_measured, s.y_measured, s.u)
+    ways = (m.design, m.untied, m.whole, m.turning, m.truth)
+    on_the_way = [acceleration(model, s.x, s.y, s.effective) for model in ways]
+    simplification, engine, coefficients, inertia = np.diff(on_the_way, axis=0)
     extra = sum((effect for name, effect in faults.items() if name.startswith("unanticipated")), nothing)
-    measured = design_model.acceleration(s.x_measured, s.y_measured, s.u)
-    exact = design_model.moments.acceleration(s.x, s.y, s.effective)
     contributions = {
-        "sensors": design_model.acceleration(s.x, s.y, s.u) - measured,
+        "sensors": acceleration(m.design, s.x, s.y, s.u) - measured,
         "actuators": np.einsum("kas,ks->ka", G, healthy - s.u),
         "fault": sum(faults.values(), nothing),
-        "simplification": exact - design_model.acceleration(s.x, s.y, s.effective),
-        "engine": engine(m, s),
-        "coefficients": sum(errors.values(), nothing),
-        "inertia": inertia(m, s, extra),
+        "simplification": simplification,
+        "engine": engine,
+        "coefficients": coefficients,
+        "inertia": inertia + extra * (m.truth["Qm"] / m.design["Qm"] - 1.0),  # of the extra moment, too
         "inertia_coupling": inertia_coupling(m, s),
         "sinusoids": sinusoids(m, s),
         "wind_turbulence": wind_turbulence(m, s),
         "earth_rotation": earth(m, s),
     }
+    errors = {name: acceleration(one, s.x, s.y, s.effective) - on_the_way[2] for name, one in m.parts.items()}
     return contributions, {"fault": faults, "coefficients": errors}
-
-
-def integration(m: Models, s: States, following: States) -> np.ndarray:
-    """How the rates moved over a frame less JSBSim's acceleration at its start; the design's likewise.
-
-    The design model's mean over a frame is the diagnosis': over all its JSBSim frames. With one JSBSim frame
-    a frame it is the sample at the start. following: the same frames, each one later.
-    """
-    moved = (following.x - s.x) * m.scenario.rate_hz - s.xdot
-    sampled = m.design_model.acceleration(s.x_measured, s.y_measured, s.u)
-    return moved - (following.design_mean - sampled)

@@ -19,7 +19,7 @@ import yaml
 from beaver_ftc.aircraft import AXES, load
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import fly
-from beaver_ftc.results.log import ParquetLog
+from beaver_ftc.results.log import ParquetLog, read
 from beaver_ftc.results.metrics import as_json, measure
 from beaver_ftc.results.model import Document, Metrics
 from beaver_ftc.results.writer import result_folder, write_documents, write_report_files
@@ -31,12 +31,12 @@ from beaver_ftc.studies.mismatch.linear import analyse, linear_document
 from beaver_ftc.studies.mismatch.sources import SOURCES
 from beaver_ftc.studies.mismatch.split import (
     CAUSES,
+    COLUMNS,
     TOTAL,
     UNEXPLAINED,
-    Figures,
-    Tally,
-    tally_of_flight,
-    tally_of_log,
+    Split,
+    split,
+    split_flight,
 )
 from beaver_ftc.studies.mismatch.tables import show_in_reports
 from beaver_ftc.studies.present.page import Files, write_files
@@ -59,7 +59,7 @@ VARIANTS: dict[str, Document] = {
 
 def run_mismatch(
     scenario: Scenario, out: Path, report: bool = True, progress: Progress | None = None
-) -> tuple[Document, Tally]:
+) -> tuple[Document, Split]:
     """Fly `scenario` and write `out/<name>/`: a run's result folder with the mismatch in it.
 
     Raises BadInput for a flight that cannot be trimmed, SimulationFailed for one not completed or kept.
@@ -68,7 +68,10 @@ def run_mismatch(
         with ParquetLog(folder / "log.parquet") as log:
             flight = fly(scenario, log, progress)
         flown = measure(flight)
-        kept = tally_of_log(scenario, folder / "log.parquet", folder / "mismatch.parquet")
+        kept = split(scenario, read(folder / "log.parquet"))
+        with ParquetLog(folder / "mismatch.parquet") as frames:
+            frames.open(COLUMNS)
+            frames.write(kept.rows())
         analysis = analyse(scenario)
         recommended = recommended_for([scenario], [kept])
         found = document(scenario, kept, flown) | recommended | {"linear": linear_document(analysis)}
@@ -91,63 +94,39 @@ def refuse_other_aircraft(scenarios: Iterable[Scenario]) -> None:
             )
 
 
-def document(scenario: Scenario, tally: Tally, metrics: Metrics) -> Document:
+def document(scenario: Scenario, flight: Split, metrics: Metrics) -> Document:
     """What the split of a flight amounts to."""
     return {
         "scenario": scenario.name,
-        "frames": tally.frames,
+        "frames": len(flight.t_s),
         "unit": "rad/s2",
         "design_model": scenario.design_model.model_dump(mode="json"),
-        "axes": {axis: _axis(tally, i) for i, axis in enumerate(AXES)},
-        "dominant": dominant(tally),
-        "bound": {axis: _bound(tally, i) for i, axis in enumerate(AXES)},
-        "closure": float(tally.figures[UNEXPLAINED].largest.max()),
+        "axes": {axis: _axis(flight, i) for i, axis in enumerate(AXES)},
+        "dominant": dominant(flight),
+        "bound": {axis: flight.bound(i) for i, axis in enumerate(AXES)},
+        "closure": float(np.abs(flight.named[UNEXPLAINED]).max()),
         "false_alarm": metrics.false_alarm,
         "detection": metrics.detection.document(),
         "isolation": {key: getattr(metrics.isolation, key) for key in ("fault", "delay_s", "correct")},
     }
 
 
-def _axis(tally: Tally, i: int) -> Document:
-    found = {name: _figures(tally.figures[name], tally, i) for name in (*SOURCES, UNEXPLAINED, TOTAL)}
-    for source, details in tally.details.items():
+def _axis(flight: Split, i: int) -> Document:
+    named = flight.named
+    found = {name: flight.figures(named[name], i) for name in (*SOURCES, UNEXPLAINED, TOTAL)}
+    for source, details in flight.details.items():
         if details:
-            found[source]["parts"] = {name: _figures(figures, tally, i) for name, figures in details.items()}
+            found[source]["parts"] = {name: flight.figures(values, i) for name, values in details.items()}
     return found
 
 
-def _figures(figures: Figures, tally: Tally, i: int) -> Document:
-    rms = float(np.sqrt(figures.square_sum[i] / max(tally.frames, 1)))
-    whole = float(tally.rms(TOTAL)[i])
-    return {
-        "rms": rms,
-        "max": float(figures.largest[i]),
-        "share": rms / whole if whole > 0.0 else 0.0,
-        "bound_share": finite(figures.bound_share[i]),
-    }
-
-
-def dominant(tally: Tally) -> Document | None:
+def dominant(flight: Split) -> Document | None:
     """The source, faults aside, that has used most of a bound: the reason for most of the threshold."""
-    used = np.array([np.nan_to_num(tally.figures[name].bound_share, posinf=1e300) for name in CAUSES])
+    used = np.array([flight.shares(flight.contributions[name]).max(axis=0) for name in CAUSES])
     if not used.any():
         return None
     which, i = np.unravel_index(int(used.argmax()), used.shape)
-    source = CAUSES[which]
-    return {"source": source, "axis": AXES[i], "bound_share": finite(tally.figures[source].bound_share[i])}
-
-
-def _bound(tally: Tally, i: int) -> Document:
-    bound = tally.bounds[i]
-    return {
-        "constant_rad_s2": float(tally.constant[i]),
-        "smallest_constant_rad_s2": bound.smallest_constant_rad_s2,
-        "worst_ratio": finite(bound.worst_ratio),
-        "worst_at_s": bound.worst_at_s,
-        "exceeded_s": bound.exceeded_frames * tally.frame_s,
-        "exceeded_times": bound.stays,
-        "exceedances": [stay | {"peak_ratio": finite(stay["peak_ratio"])} for stay in bound.exceedances],
-    }
+    return {"source": CAUSES[which], "axis": AXES[i], "bound_share": finite(float(used[which, i]))}
 
 
 # Columns of mismatch.csv: which part of which source, and what of it under which key of the document.
@@ -221,7 +200,7 @@ def _cell(scenario: Scenario, condition: tuple[float, float]) -> list[Document]:
     place = dict(zip(("airspeed_mps", "altitude_m"), condition, strict=True))
     there = {"initial": scenario.initial.model_copy(update=place), "faults": ()}
     try:
-        kept, flight = tally_of_flight(scenario.model_copy(update=there))
+        kept, flight = split_flight(scenario.model_copy(update=there))
     except BadInput:
         return [{**place, "axis": axis, **dict.fromkeys(_OF_MAP)} for axis in AXES]
     found = document(scenario, kept, flight)

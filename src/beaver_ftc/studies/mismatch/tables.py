@@ -1,14 +1,13 @@
 """The mismatch as tables and sentences, for the terminal and as a section of `report.html`."""
 
-from html import escape
 from pathlib import Path
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.documents.files import read_json
 from beaver_ftc.results.model import Document
 from beaver_ftc.results.report import register_section
-from beaver_ftc.studies.present.page import picture_data
-from beaver_ftc.studies.present.tables import html_table, number, plain, printed, seconds
+from beaver_ftc.studies.present import page
+from beaver_ftc.studies.present.tables import number, plain, printed, seconds
 
 WIDTH = 150
 
@@ -16,8 +15,6 @@ PICTURES = {
     "mismatch-sources": "What the mismatch is made of, in time",
     "mismatch-bound": "How much of the bound each source uses",
     "mismatch-linear": "Poles and frequency responses: truth, FDC equations, design model",
-    "mismatch-zeros": "Zeros from each surface to its rate",
-    "mismatch-response": "Pulse responses of the linear models",
 }
 Table = tuple[str, list[str], list[list[str]]]
 
@@ -177,21 +174,10 @@ def mismatch_section(folder: Path) -> str:
     if not path.exists():
         return ""
     found = read_json(path)
-    pictures = [_picture(folder / "figures" / f"{name}.png", says) for name, says in PICTURES.items()]
-    shown = [html_table(head, rows, caption) for caption, head, rows in tables(found)]
-    parts = [_heading(found), *shown, *pictures]
-    return f"<section>{''.join(parts)}</section>"
-
-
-def _heading(found: Document) -> str:
-    said = "".join(f"<p>{escape(line)}</p>" for line in findings(found))
-    return f"<h2>Truth against design: {escape(found['scenario'])}</h2>{said}"
-
-
-def _picture(path: Path, says: str) -> str:
-    if not path.exists():
-        return ""
-    image = (
-        f'<img style="max-width: 100%" alt="{escape(says)}" src="data:image/png;base64,{picture_data(path)}">'
-    )
-    return f"<figure>{image}<figcaption>{escape(says)}</figcaption></figure>"
+    drawn = {name: folder / "figures" / f"{name}.png" for name in PICTURES}
+    there = {name: picture for name, picture in drawn.items() if picture.exists()}
+    shown = [part for caption, head, rows in tables(found) for part in (caption, page.Table(head, rows))]
+    heading = page.Heading(f"Truth against design: {found['scenario']}")
+    pictures = page.Pictures([(PICTURES[name], name) for name in there])
+    body = page.html_of([heading, *findings(found), *shown, pictures], there)
+    return f"<section><style>.figures img {{ max-width: 100% }}</style>{body}</section>"

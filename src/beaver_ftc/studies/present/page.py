@@ -1,6 +1,5 @@
 """A page from its parts, as Markdown and as one HTML file that needs nothing else; a study's files."""
 
-import json
 from base64 import b64encode
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
@@ -9,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.results.metrics import as_json
 from beaver_ftc.studies.present.tables import Rows, as_csv, html_table, markdown_table
 
 if TYPE_CHECKING:
@@ -36,13 +36,20 @@ class Bullets(NamedTuple):
     sentences: Sequence[str]
 
 
+class Links(NamedTuple):
+    """Links in a line: (text, address)."""
+
+    lead: str
+    links: Sequence[tuple[str, str]]
+
+
 class Pictures(NamedTuple):
     """Pictures side by side: (title, stem of the file)."""
 
     shown: Sequence[tuple[str, str]]
 
 
-Part = str | Heading | Table | Bullets | Pictures
+Part = str | Heading | Table | Bullets | Links | Pictures
 
 
 def as_markdown(parts: Sequence[Part], figures: str = "") -> str:
@@ -59,6 +66,8 @@ def _markdown(part: Part, figures: str) -> Iterator[str]:
         case Bullets():
             yield part.lead
             yield "\n".join(f"- {sentence}" for sentence in part.sentences)
+        case Links():
+            yield part.lead + ", ".join(f"[{text}]({to})" for text, to in part.links)
         case Pictures():
             yield from (f"![{title}]({figures}/{stem}.png)" for title, stem in part.shown)
         case _:
@@ -67,9 +76,14 @@ def _markdown(part: Part, figures: str) -> Iterator[str]:
 
 def as_html(title: str, parts: Sequence[Part], figures: Mapping[str, Path]) -> str:
     """The page as HTML; figures: stem to file of the pictures, which go into it."""
-    body = "\n".join(_html(part, figures) for part in parts if part)
+    body = html_of(parts, figures)
     page = (Path(__file__).parent / "page.html").read_text(encoding="utf-8")
     return page.format(title=escape(title), body=body)
+
+
+def html_of(parts: Sequence[Part], figures: Mapping[str, Path]) -> str:
+    """The parts as HTML, for a page of others."""
+    return "\n".join(_html(part, figures) for part in parts if part)
 
 
 def _html(part: Part, figures: Mapping[str, Path]) -> str:
@@ -82,6 +96,9 @@ def _html(part: Part, figures: Mapping[str, Path]) -> str:
         case Bullets():
             items = "".join(f"<li>{escape(sentence)}</li>" for sentence in part.sentences)
             return f"<p>{escape(part.lead)}</p><ul>{items}</ul>"
+        case Links():
+            links = ", ".join(f'<a href="{escape(to)}">{escape(text)}</a>' for text, to in part.links)
+            return f"<p>{escape(part.lead)}{links}</p>"
         case Pictures():
             shown = "".join(_picture(name, figures[stem]) for name, stem in part.shown)
             return f'<div class="figures">{shown}</div>'
@@ -90,12 +107,8 @@ def _html(part: Part, figures: Mapping[str, Path]) -> str:
 
 
 def _picture(title: str, path: Path) -> str:
-    return f'<img alt="{escape(title)}" src="data:image/png;base64,{picture_data(path)}">'
-
-
-def picture_data(path: Path) -> str:
-    """A picture as it stands in a page."""
-    return b64encode(path.read_bytes()).decode("ascii")
+    data = b64encode(path.read_bytes()).decode("ascii")
+    return f'<img alt="{escape(title)}" src="data:image/png;base64,{data}">'
 
 
 def study_files(
@@ -108,7 +121,7 @@ def study_files(
         return lambda folder: as_html(*page(document), {stem: folder / f"{stem}.png" for stem in figures})
 
     return {
-        f"{name}.json": lambda document: json.dumps(document, indent=1) + "\n",
+        f"{name}.json": as_json,
         **{f"{stem}.csv": partial(_csv, rows_of) for stem, rows_of in rows.items()},
         **{f"{stem}.png": draw for stem, draw in figures.items()},
         f"{name}.html": html,

@@ -95,12 +95,11 @@ def markdown_table(head: Sequence[str], rows: Rows) -> str:
     return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines)
 
 
-def html_table(head: Sequence[str], rows: Rows, caption: str = "") -> str:
+def html_table(head: Sequence[str], rows: Rows) -> str:
     """A table in HTML; a cell that begins with a tick or a cross is coloured."""
     top = "".join(f'<th scope="col">{escape(cell)}</th>' for cell in head)
     body = "".join(f"<tr>{''.join(map(_cell, row))}</tr>" for row in rows)
-    says = f"<caption>{escape(caption)}</caption>" if caption else ""
-    table = f"<table>{says}<thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>"
+    table = f"<table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>"
     return f'<div class="wide">{table}</div>'
 
 

@@ -101,9 +101,13 @@ class Flown:
         """RMS tracking error before the fault, once settled, deg/s."""
         return self.rms_deg_s(axis, SETTLED_S, self.fault_at_s)
 
-    def after_deg_s(self, axis: str) -> float:
-        """RMS tracking error after the fault, once settled, deg/s."""
-        return self.rms_deg_s(axis, self.fault_at_s + SETTLED_S)
+    def kept_deg_s(self, axis: str, start_s: float) -> float:
+        """RMS tracking error of an axis from start_s on, deg/s; infinite if the aircraft is lost."""
+        return np.inf if self.metrics.departure else self.rms_deg_s(axis, start_s)
+
+    def first_s(self, holds: np.ndarray) -> float:
+        """The first instant at which something (frames,) holds, s; infinite if it never does."""
+        return float(self.log["t_s"][np.argmax(holds)]) if holds.any() else np.inf
 
     def between(self, start_s: float, end_s: float = np.inf) -> np.ndarray:
         """Which frames lie in a span of time."""
@@ -111,16 +115,11 @@ class Flown:
 
     def excluded_at_s(self, estimator: str) -> float:
         """When an isolation estimator was excluded, s; infinite if it never was, or was not there at all."""
-        out = np.flatnonzero(self.log[f"fie_{estimator}_excluded"] == 1)
-        return float(self.log["t_s"][out[0]]) if out.size and self.has(estimator) else np.inf
+        return self.first_s((self.log[f"fie_{estimator}_excluded"] == 1) & self.has(estimator))
 
     def has(self, estimator: str) -> bool:
         """Whether an isolation estimator is there: one left out is excluded from the first frame on."""
         return bool(self.log[f"fie_{estimator}_excluded"][0] != 1)
-
-    def closest(self, estimator: str) -> float:
-        """Largest |residual| / threshold of an isolation estimator, on the residual's side."""
-        return float(np.max(self.shares_of(estimator)))
 
     def shares_of(self, estimator: str) -> np.ndarray:
         """|residual| / threshold of an isolation estimator, on the residual's side, (3, frames)."""
@@ -140,10 +139,6 @@ class Flown:
         )
         zero = residual == 0
         return np.abs(residual) / np.where(zero, 1.0, threshold)
-
-    def closest_before_fault(self) -> float:
-        """Largest |residual| / threshold of the detection estimator before the fault."""
-        return float(np.max(self.shares()[:, self.between(0.0, self.fault_at_s)]))
 
     def residuals_of(self, estimator: str) -> np.ndarray:
         """The residuals of an isolation estimator, (3, frames) rad/s; zero while it is not at work."""

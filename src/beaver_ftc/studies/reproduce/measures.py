@@ -64,6 +64,11 @@ def _frames(flown: Flown, span_s: float) -> float:
     return abs(round(span_s / flown.frame_s)) if np.isfinite(span_s) else np.inf
 
 
+def _ratio(error: float, other: float) -> float:
+    """Of two errors; infinite where the first is, whatever the other."""
+    return error / other if np.isfinite(error) else np.inf
+
+
 # Detection and isolation
 
 
@@ -111,50 +116,55 @@ def order(flights: Flights, *names: str) -> float:
 @_measure("largest |residual| / threshold before the fault")
 def before_fault(flights: Flights, name: str) -> float:
     """How near the detection estimator comes to a false alarm."""
-    return flights[name].closest_before_fault()
+    flown = flights[name]
+    return float(np.max(flown.shares()[:, flown.between(0.0, flown.fault_at_s)]))
 
 
 @_measure("largest |residual| / threshold")
 def own_estimator(flights: Flights, *names: str) -> float:
     """How near the isolation estimators of the true faults come to being excluded."""
-    return max(flights[name].closest(name) for name in names)
+    return max(float(np.max(flights[name].shares_of(name))) for name in names)
 
 
 @_measure("between first crossing and alarm", "frames")
 def alarm_lag(flights: Flights, name: str) -> float:
     """From the first residual beyond its threshold to the alarm."""
     flown = flights[name]
-    over = np.flatnonzero(flown.shares().max(axis=0) > 1.0)
-    first_s = flown.log["t_s"][over[0]] if over.size else None
+    first_s = flown.first_s(flown.shares().max(axis=0) > 1.0)
     return _frames(flown, _after(first_s, flown.metrics.detection.time_s))
 
 
 @_measure("between first crossing and exclusion", "frames")
 def exclusion_lag(flights: Flights, name: str) -> float:
     """From a residual beyond its threshold to the exclusion, of the slower of those that do not fit."""
-    flown, lags = flights[name], []
-    for other in set(ESTIMATORS) - {name}:
-        over = np.flatnonzero(flown.shares_of(other).max(axis=0) > 1.0)
-        first_s = flown.log["t_s"][over[0]] if over.size else None
-        lags.append(_frames(flown, _after(first_s, flown.excluded_at_s(other))))
-    return max(lags)
+    flown = flights[name]
+    first_s = {other: flown.first_s(flown.shares_of(other).max(axis=0) > 1.0) for other in _others(name)}
+    return max(_frames(flown, _after(at_s, flown.excluded_at_s(other))) for other, at_s in first_s.items())
+
+
+def _others(name: str) -> list[str]:
+    """The isolation estimators that do not fit a fault."""
+    return [other for other in ESTIMATORS if other != name]
+
+
+def _last_exclusion_s(flown: Flown, name: str) -> float:
+    return max(map(flown.excluded_at_s, _others(name)))
 
 
 @_measure("last exclusion", "s after detection")
 def last_to_go(flights: Flights, name: str) -> float:
     """From the alarm to the exclusion of the last estimator that does not fit."""
     flown = flights[name]
-    last_s = max(flown.excluded_at_s(other) for other in ESTIMATORS if other != name)
-    return _after(flown.metrics.detection.time_s, last_s)
+    return _after(flown.metrics.detection.time_s, _last_exclusion_s(flown, name))
 
 
 @_measure("between last exclusion and conclusion", "frames")
 def conclusion_lag(flights: Flights, name: str) -> float:
     """From the exclusion of the last estimator that does not fit to the right name."""
     flown = flights[name]
-    last_s = max(flown.excluded_at_s(other) for other in ESTIMATORS if other != name)
     isolation = flown.metrics.isolation
-    return _frames(flown, _after(last_s, isolation.time_s)) if isolation.correct else np.inf
+    lag_s = _after(_last_exclusion_s(flown, name), isolation.time_s)
+    return _frames(flown, lag_s) if isolation.correct else np.inf
 
 
 @_measure("estimators at work", at_least=True)
@@ -180,8 +190,7 @@ def activation(flights: Flights, name: str) -> float:
     """Between the alarm and the first residual of any isolation estimator."""
     flown = flights[name]
     begun = np.any([flown.residuals_of(other).any(axis=0) for other in ESTIMATORS], axis=0)
-    first_s = flown.log["t_s"][np.argmax(begun)] if begun.any() else None
-    return _frames(flown, _after(flown.metrics.detection.time_s, first_s))
+    return _frames(flown, _after(flown.metrics.detection.time_s, flown.first_s(begun)))
 
 
 @_measure("pairs of fault and estimator that answer so", at_least=True)
@@ -231,7 +240,7 @@ def _certain_at_s(flown: Flown, name: str) -> dict[str, float]:
     for other in set(moment) - {name}:
         beyond = since & (mismatch(z, moment[other], bound) > 1.0)
         if beyond.any():
-            found[other] = max(alarm_s, float(flown.log["t_s"][np.argmax(beyond)]))
+            found[other] = max(alarm_s, flown.first_s(beyond))
     return found
 
 
@@ -266,8 +275,7 @@ def learning(flights: Flights, *names: str) -> float:
 
 def _left_of_error(flown: Flown, axis: str) -> float:
     early = flown.rms_deg_s(axis, flown.fault_at_s, flown.fault_at_s + 5.0)
-    late = flown.rms_deg_s(axis, flown.fault_at_s + 13.0)
-    return np.inf if flown.metrics.departure else late / early
+    return _ratio(flown.kept_deg_s(axis, flown.fault_at_s + 13.0), early)
 
 
 @_measure("farthest outside")
@@ -312,8 +320,11 @@ def separation(flights: Flights, name: str) -> float:
 @_measure("RMS error", "of the reference's amplitude", none=LOST)
 def tracking(flights: Flights, name: str, axis: str) -> float:
     """RMS error of an axis after the fault, once settled; infinite if the aircraft is lost."""
-    flown = flights[name]
-    return np.inf if flown.metrics.departure else flown.after_deg_s(axis) / AMPLITUDE_DEG_S
+    return _settled_deg_s(flights[name], axis) / AMPLITUDE_DEG_S
+
+
+def _settled_deg_s(flown: Flown, axis: str) -> float:
+    return flown.kept_deg_s(axis, flown.fault_at_s + SETTLED_S)
 
 
 @_measure("largest RMS error", "of the reference's amplitude", none=LOST)
@@ -325,12 +336,7 @@ def worst_tracking(flights: Flights, *names: str) -> float:
 @_measure("largest RMS error", "of the reference's amplitude", none=LOST)
 def healthy_tracking(flights: Flights, name: str) -> float:
     """RMS error of the worst axis of a healthy flight."""
-    flown = flights[name]
-    return (
-        np.inf
-        if flown.metrics.departure
-        else max(flown.rms_deg_s(axis, SETTLED_S) / AMPLITUDE_DEG_S for axis in AXES)
-    )
+    return max(flights[name].kept_deg_s(axis, SETTLED_S) for axis in AXES) / AMPLITUDE_DEG_S
 
 
 @_measure("RMS error of q", "times that before", at_least=True)
@@ -340,35 +346,36 @@ def deterioration(flights: Flights, name: str) -> float:
     return flown.rms_deg_s("q", flown.fault_at_s) / flown.before_deg_s("q")
 
 
-def _since_fault(flown: Flown) -> float:
-    return flown.rms_deg_s("q", flown.fault_at_s)
-
-
 @_measure("largest RMS error", "of the passive law's", none=LOST)
 def beside_passive(flights: Flights, *names: str) -> float:
     """RMS error after the fault over that of a robust law without a diagnosis, of the worst of the faults."""
-    ratios = [(flights[n], flights[f"{n}-passive"].after_deg_s(AXIS[n]), AXIS[n]) for n in names]
     return max(
-        np.inf if f.metrics.departure else f.after_deg_s(axis) / passive for f, passive, axis in ratios
+        _ratio(
+            _settled_deg_s(flights[n], AXIS[n]),
+            flights[f"{n}-passive"].rms_deg_s(AXIS[n], flights[n].fault_at_s + SETTLED_S),
+        )
+        for n in names
     )
 
 
 @_measure("RMS error of q in the transient", "of that after a sudden hand-over", none=LOST)
 def transient(flights: Flights, gradual: str, sudden: str) -> float:
     """RMS pitch rate error of the first TRANSIENT_S after the fault, over that of another hand-over."""
-    over = [flights[n].rms_deg_s("q", flights[n].fault_at_s, flights[n].fault_at_s + TRANSIENT_S)
-            for n in (gradual, sudden)]  # fmt: skip
-    return over[0] / over[1]
+    first, second = (
+        flown.rms_deg_s("q", flown.fault_at_s, flown.fault_at_s + TRANSIENT_S)
+        for flown in (flights[gradual], flights[sudden])
+    )
+    return first / second
 
 
 @_measure("largest RMS error", "of the nominal law's", none=LOST)
 def beside_nominal(flights: Flights, *names: str) -> float:
     """RMS error after the fault over that of the nominal law, of the worst of several faults."""
+    ours, nominal = ([flights[name + end] for name in names] for end in ("", "-nominal"))
     return max(
-        np.inf if flights[n].metrics.departure
-        else _since_fault(flights[n]) / _since_fault(flights[f"{n}-nominal"])
-        for n in names
-    )  # fmt: skip
+        _ratio(one.kept_deg_s("q", one.fault_at_s), other.rms_deg_s("q", other.fault_at_s))
+        for one, other in zip(ours, nominal, strict=True)
+    )
 
 
 @_measure("flown on", "s after the fault", at_least=True)

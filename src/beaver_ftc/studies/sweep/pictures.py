@@ -4,20 +4,19 @@ Each function takes the flights and returns a figure, or None where the flights 
 """
 
 import re
-from collections.abc import Callable, Iterator
-from itertools import cycle
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from beaver_ftc.results.model import Document
-from beaver_ftc.results.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION
+from beaver_ftc.results.style import BLACK, BLUE, GREY
 from beaver_ftc.studies.engine.statistics import wilson
-from beaver_ftc.studies.present.figures import GRID, heat_map, new_figure
+from beaver_ftc.studies.present.figures import GRID, curve_look, heat_map, marker, new_figure
 from beaver_ftc.studies.present.page import save
 from beaver_ftc.studies.sweep.outcomes import Flights
-from beaver_ftc.studies.sweep.summary import NO_ALARM, OUTCOMES
+from beaver_ftc.studies.sweep.summary import OUTCOMES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -37,14 +36,6 @@ _UNITS = {  # the longest ending first
     "_rad_s": "rad/s", "_deg_s": "deg/s", "_deg": "deg", "_rad": "rad", "_mps": "m/s", "_hz": "Hz",
     "_m": "m", "_s": "s",
 }  # fmt: skip
-MOST_LINES = 400  # of parallel coordinates: more is a grey block
-_FAULT_LOOKS = (
-    (BLUE, "o", "-"),
-    (ORANGE, "s", "--"),
-    (GREEN, "^", "-."),
-    (PURPLE, "D", ":"),
-    (SKY, "v", "-"),
-)
 
 
 def write_figures(flights: Flights, summary: Document, folder: Path) -> list[Path]:
@@ -98,15 +89,15 @@ def detection_probability(flights: Flights, summary: Document) -> "Figure | None
     if key is None or not flights.faulted.any():
         return None
     figure, axes = _axes("Detection probability (bars: 95 % intervals)", in_words(key), "share detected")
-    for (colour, marker, dash), label, group in _faults(flights):
+    for place, (label, group) in enumerate(_faults(flights)):
         values, hits = flights[key][group], flights.detected[group]
         bins = _levels(values) if flights.vary[key].count else _bins(values)
         found = [wilson(int(hits[bin].sum()), bin.size) for bin in bins]
         shares = np.array([estimate.value for estimate in found])
         reach = np.array([[e.value - e.low, e.high - e.value] for e in found]).T
         axes.errorbar(
-            [values[bin].mean() for bin in bins], shares, np.maximum(reach, 0), label=label, color=colour,
-            marker=marker, linestyle=dash, markersize=4.5, linewidth=1.3, elinewidth=0.8, capsize=2,
+            [values[bin].mean() for bin in bins], shares, np.maximum(reach, 0), label=label,
+            marker=marker(place), markersize=4.5, elinewidth=0.8, capsize=2, **curve_look(place),
         )  # fmt: skip
     if flights.vary[key].loguniform:
         _log_of_numbers(axes)
@@ -115,11 +106,10 @@ def detection_probability(flights: Flights, summary: Document) -> "Figure | None
     return figure
 
 
-def _faults(flights: Flights) -> Iterator[tuple[tuple[str, str, str], str, np.ndarray]]:
-    """(look, label, which flights) of each fault."""
+def _faults(flights: Flights) -> list[tuple[str, np.ndarray]]:
+    """(label, which flights) of each fault."""
     labels = flights.fault_labels
-    for look, label in zip(cycle(_FAULT_LOOKS), sorted(set(labels[flights.faulted])), strict=False):
-        yield look, label, flights.faulted & (labels == label)
+    return [(label, flights.faulted & (labels == label)) for label in sorted(set(labels[flights.faulted]))]
 
 
 def _levels(values: np.ndarray) -> list[np.ndarray]:
@@ -142,11 +132,11 @@ def delay_distribution(flights: Flights, summary: Document) -> "Figure | None":
         return None
     figure, axes = _axes("", "detection delay (s)", "share of faults detected within the delay")
     axes.set_title("Detection delay", fontsize=10, loc="left")
-    for (colour, _, dash), label, group in _faults(flights):
+    for place, (label, group) in enumerate(_faults(flights)):
         delays = np.sort(flights.detection_delay_s[group & flights.detected])
         if delays.size:
             shares = np.arange(1, delays.size + 1) / group.sum()
-            axes.step(delays, shares, where="post", label=label, color=colour, linestyle=dash, linewidth=1.4)
+            axes.step(delays, shares, where="post", label=label, **curve_look(place))
     for q, says in ((0.5, "half"), (0.95, "95 %")):
         axes.axhline(q, color=GREY, linewidth=0.8, linestyle=":")
         axes.annotate(says, (1.0, q), xycoords=("axes fraction", "data"), ha="right", va="bottom", fontsize=7)
@@ -166,147 +156,40 @@ def confusion_matrix(flights: Flights, summary: Document) -> "Figure | None":
     counts, rows, columns = np.array(confusion["counts"]), confusion["faults"], confusion["diagnoses"]
     if not counts.size:
         return None
-    if len(rows) == 1:  # a matrix of one row is no picture
-        return _diagnoses(rows[0], columns, counts[0])
-    size = (2.6 + 1.15 * len(columns), 1.7 + 0.55 * len(rows))
-    figure, axes = _axes("What broke (rows) against what the diagnosis said (columns)", size=size)
-    axes.grid(visible=False)
     shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
-    labels = dict.fromkeys(np.ndindex(*counts.shape), ("0", GREY))
-    for row, column in np.argwhere(counts).tolist():
-        share = shares[row, column]
-        ink = "white" if share > 0.6 else BLACK
-        labels[row, column] = (f"{counts[row, column]}\n{share:.0%}", ink)
+
+    def text(at: Place) -> str:
+        return f"{counts[at]}\n{shares[at]:.0%}" if counts[at] else "0"
+
+    title = "What broke (rows) against what the diagnosis said (columns)"
+    return _shaded(title, shares, text, columns, rows)
+
+
+Place = tuple[int, ...]
+
+
+def _shaded(
+    title: str, shares: np.ndarray, text: Callable[[Place], str], columns: Sequence[str], rows: Sequence[str]
+) -> "Figure":
+    """A heat map of shares with a text on each cell."""
+    figure, axes = _axes(title, size=(max(7.0, 2.6 + 1.15 * len(columns)), 1.7 + 0.55 * len(rows)))
+    axes.grid(visible=False)
+    labels = {at: (text(at), "white" if shares[at] > 0.6 else BLACK) for at in np.ndindex(*shares.shape)}
     heat_map(axes, shares, labels, columns, rows, cmap="Blues", vmin=0, vmax=1.15)
-    for border in range(1, len(rows)):
-        axes.axhline(border - 0.5, color="white", linewidth=2)
-    for border in range(1, len(columns)):
-        axes.axvline(border - 0.5, color="white", linewidth=2)
     return figure
 
 
-def _diagnoses(fault: str, diagnoses: list[str], counts: np.ndarray) -> "Figure":
-    """What the diagnosis said of one fault, as bars."""
-    size = (8.0, 1.5 + 0.45 * len(diagnoses))
-    figure, axes = _axes(f"{fault}: what the diagnosis said", "share of the flights", size=size)
-    shares = counts / counts.sum()
-    axes.barh(range(len(diagnoses)), shares, 0.6, color=BLUE)
-    for row, (count, share) in enumerate(zip(counts, shares, strict=True)):
-        axes.annotate(f" {count} ({share:.0%})", (share, row), va="center", fontsize=8)
-    axes.set_yticks(range(len(diagnoses)), diagnoses)
-    axes.invert_yaxis()
-    axes.set_xlim(0, 1.18)
-    return figure
-
-
-def sensitivity_bars(flights: Flights, summary: Document) -> "Figure | None":
+def sensitivity(flights: Flights, summary: Document) -> "Figure | None":
     """How much of each outcome each varied key explains."""
-    rankings = {OUTCOMES[name]: ranking for name, ranking in summary["sensitivity"].items() if ranking}
+    rankings = {name: ranking for name, ranking in summary["sensitivity"].items() if ranking}
     if not rankings:
         return None
     keys = [entry["key"] for entry in next(iter(rankings.values()))][:12]
+    explained = [{entry["key"]: entry["explained"] for entry in ranking} for ranking in rankings.values()]
+    shares = np.array([[of[key] for of in explained] for key in keys])
     title = "Sensitivity: share of an outcome that a key explains by rank correlation"
-    figure, axes = _axes(title, size=(8.0, 1.8 + 0.5 * len(keys)))
-    height = 0.8 / len(rankings)
-    colours = (BLUE, ORANGE, GREEN, PURPLE)
-    for position, (name, ranking) in enumerate(rankings.items()):
-        explained = {entry["key"]: entry["explained"] for entry in ranking}
-        places = np.arange(len(keys)) + (position + 0.5) * height - 0.4
-        axes.barh(places, [explained[key] for key in keys], height, label=name, color=colours[position])
-    axes.set_yticks(range(len(keys)), [in_words(key) for key in keys])
-    axes.invert_yaxis()
-    axes.set_xlim(0, 1)
-    figure.legend(loc="outside lower center", ncols=4, fontsize=8, frameon=False)
-    return figure
-
-
-def parallel_coordinates(flights: Flights, summary: Document) -> "Figure | None":
-    """Each flight a line through its varied values and its delay, the bad ones on top."""
-    ranked = [entry["key"] for entry in summary["sensitivity"]["detection_delay"]]
-    keys = (ranked or list(flights.vary))[:8]
-    if not keys:
-        return None
-    chosen = _spread(flights)
-    size = (max(7.0, 1.7 * len(keys) + 3), 5.0)
-    figure, axes = _axes(f"{chosen.size} of {len(flights)} flights, a line each", size=size)
-    axes.grid(visible=False)
-    scaled = np.column_stack([*(_scaled(axes, i, flights, key)[chosen] for i, key in enumerate(keys)),
-                              _scaled_delay(axes, len(keys), flights)[chosen]])  # fmt: skip
-    for label, which, colour, alpha in _outcomes(flights):
-        lines = scaled[which[chosen]]
-        if lines.size:
-            axes.plot(lines.T, color=colour, alpha=alpha, linewidth=0.8)
-            axes.plot([], [], color=colour, label=label)
-    names = [*(in_words(key).replace(": ", ":\n").replace(" (", "\n(") for key in keys), "detection\ndelay"]
-    axes.set_xticks(range(len(keys) + 1), names, fontsize=8)
-    axes.set_yticks([])
-    axes.set_ylim(-0.06, 1.06)
-    axes.set_xlim(-0.3, len(keys) + 0.45)
-    for place in range(len(keys) + 1):
-        axes.axvline(place, color=BLACK, linewidth=0.8)
-    figure.legend(loc="outside lower center", ncols=4, fontsize=8, frameon=False)
-    return figure
-
-
-def _spread(flights: Flights) -> np.ndarray:
-    """Positions of the flights to draw: every bad one as far as there is room, and of the others evenly."""
-    bad = np.flatnonzero((flights.faulted & ~flights.detected) | flights.departed | flights["false_alarm"])
-    bad = bad[:: max(1, -(-bad.size // (MOST_LINES // 2)))]
-    return np.union1d(bad, np.arange(0, len(flights), max(1, -(-len(flights) // MOST_LINES))))
-
-
-def _outcomes(flights: Flights) -> list[tuple[str, np.ndarray, str, float]]:
-    """(label, which, colour, alpha), drawn in this order."""
-    bad = flights["false_alarm"] | flights.departed | ~flights.measured
-    wrong = flights.detected & (flights["isolation.fault"] != "") & ~flights["isolation.correct"]
-    missed = flights.faulted & ~flights.detected
-    return [
-        ("detected, or nothing to detect", ~bad & ~missed & ~wrong, BLUE, 0.25),
-        (NO_ALARM, missed & ~bad, ORANGE, 0.5),
-        ("named wrongly", wrong & ~bad, PURPLE, 0.7),
-        ("false alarm, lost or not flown", bad, VERMILION, 0.8),
-    ]
-
-
-def _scaled(axes: "Axes", place: int, flights: Flights, key: str) -> np.ndarray:
-    """A key's values from 0 to 1, its ends or its names written beside its axis."""
-    values = flights[key]
-    if not flights.is_number(key):
-        names, group = np.unique(values.astype(str), return_inverse=True)
-        for i, name in enumerate(names):
-            _say(axes, place, i / max(names.size - 1, 1), _short(name))
-        return group / max(names.size - 1, 1)
-    low, high = float(values.min()), float(values.max())
-    _say(axes, place, 0.0, f"{low:.3g}")
-    _say(axes, place, 1.0, f"{high:.3g}")
-    if flights.vary[key].loguniform:
-        values, low, high = np.log(values), np.log(low), np.log(high)
-    return (values - low) / max(high - low, 1e-300)
-
-
-def _short(name: str) -> str:
-    """A choice as there is room for it: of a section, the words in it."""
-    words = re.findall(r': "([^"]+)"', name)
-    return (" ".join(words) or name.replace("[]", "none"))[:28].replace("_", " ")
-
-
-def _scaled_delay(axes: "Axes", place: int, flights: Flights) -> np.ndarray:
-    """The delay from 0 to 0.9 on a logarithm, never at 1; without a fault there is no point."""
-    delays = flights.detection_delay_s
-    seen = delays[flights.detected & (delays > 0)]
-    low, high = (float(seen.min()), float(seen.max())) if seen.size else (0.01, 1.0)
-    if seen.size:
-        _say(axes, place, 0.0, f"{low:.2g} s")
-        _say(axes, place, 0.9, f"{high:.2g} s")
-    if (flights.faulted & ~flights.detected).any():
-        _say(axes, place, 1.0, "never")
-    with np.errstate(divide="ignore", invalid="ignore"):
-        share = 0.9 * (np.log(np.maximum(delays, low)) - np.log(low)) / max(np.log(high / low), 1e-12)
-    return np.where(flights.faulted, np.where(flights.detected, share, 1.0), np.nan)
-
-
-def _say(axes: "Axes", place: int, height: float, text: str) -> None:
-    axes.annotate(text, (place, height), xytext=(4, 0), textcoords="offset points", fontsize=7, va="center")
+    outcomes = [OUTCOMES[name] for name in rankings]
+    return _shaded(title, shares, lambda at: f"{shares[at]:.2f}", outcomes, list(map(in_words, keys)))
 
 
 def search_history(flights: Flights, summary: Document) -> "Figure | None":
@@ -327,6 +210,5 @@ FIGURES: dict[str, tuple[str, Drawer]] = {
     "detection-probability": ("Detection probability against magnitude", detection_probability),
     "delay-distribution": ("Detection delay", delay_distribution),
     "confusion-matrix": ("Faults and diagnoses", confusion_matrix),
-    "sensitivity": ("Sensitivity", sensitivity_bars),
-    "parallel-coordinates": ("Parallel coordinates", parallel_coordinates),
+    "sensitivity": ("Sensitivity", sensitivity),
 }

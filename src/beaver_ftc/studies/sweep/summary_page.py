@@ -3,22 +3,28 @@
 Everything is said from the summary document, so that the words and `summary.json` cannot disagree.
 """
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.results.metrics import NEAR_THRESHOLD_SHARE
 from beaver_ftc.results.model import Document, Expectation, Judged
-from beaver_ftc.studies.present.page import picture_data
-from beaver_ftc.studies.present.tables import number, printed
+from beaver_ftc.studies.present.page import Heading, Links, Part, Pictures, Table, as_html, versions_line
+from beaver_ftc.studies.present.tables import Rows, number, printed
 from beaver_ftc.studies.sweep.pictures import FIGURES
 from beaver_ftc.studies.sweep.summary import OUTCOMES
 
 if TYPE_CHECKING:
-    from rich.table import Table
+    from rich.table import Table as Shown
 
 
 MANY = 0.1  # of a sweep's flights
+_STEERED = "The search steered these flights towards the worst: rates say nothing about flights in general."
+_EXPLAINED = (
+    "Share of the ranks of an outcome that a varied key explains (Kruskal and Wallis' epsilon squared), "
+    "Spearman's rank correlation, and how often chance alone explains as much."
+)
 _UNITS = {"delay": " s", "false_alarm": " of the threshold", "tracking": " deg/s"}
 
 
@@ -110,12 +116,12 @@ def summary_text(summary: Document, colour: bool = False) -> str:
     return "\n".join([printed([_table(summary)], colour=colour), *worst]) + "\n"
 
 
-def _table(summary: Document) -> "Table":
-    from rich.table import Table
+def _table(summary: Document) -> "Shown":
+    from rich.table import Table as Shown
     from rich.text import Text
 
     headline = Text(title(summary), "bold green" if summary["passed"] else "bold red")
-    table = Table(title=headline, title_justify="left", show_header=False, box=None)
+    table = Shown(title=headline, title_justify="left", show_header=False, box=None)
     table.add_column(style="bold", no_wrap=True)
     table.add_column(overflow="fold")
     for what, how in facts(summary):
@@ -207,22 +213,60 @@ def _drivers(ranking: list[Document]) -> str:
 
 def render(summary: Document, folder: Path) -> str:
     """The report as HTML text, from the summary and the figures and flights in the sweep's folder."""
-    from beaver_ftc.results.report import template
+    drawn = {name: folder / "figures" / f"{name}.png" for name in FIGURES}
+    figures = {name: path for name, path in drawn.items() if path.exists()}
+    return as_html(title(summary), _parts(summary, folder, figures), figures)
 
-    figures = [(title, folder / "figures" / f"{name}.png") for name, (title, _) in FIGURES.items()]
-    return template(Path(__file__).parent / "templates" / "sweep.html.j2").render(
-        summary=summary,
-        title=title(summary),
-        facts=facts(summary),
-        tracking=tracking(summary),
-        expectations=expectations(summary),
-        sensitivity=[(OUTCOMES[name], ranking) for name, ranking in summary["sensitivity"].items()
-                     if ranking],
-        worst=[flight | {"link": _link(folder, flight["name"])} for flight in summary["worst"]],
-        figures=[(title, picture_data(path)) for title, path in figures if path.exists()],
-        value=value,
-        percent=percent,
-    )  # fmt: skip
+
+def _parts(summary: Document, folder: Path, figures: Mapping[str, Path]) -> list[Part]:
+    expected = [("✓ met" if passed else "✗ MISSED", *row) for *row, passed in expectations(summary)]
+    worst = [(str(each["run"]), "; ".join(each["why"]), each["replay"]) for each in summary["worst"]]
+    again = [(each["name"], link) for each in summary["worst"] if (link := _link(folder, each["name"]))]
+    failed = [(str(each["count"]), each["reason"], str(each["first_run"])) for each in summary["reasons"]]
+    explained = [
+        (
+            OUTCOMES[outcome],
+            *(value(each[key]) for key in ("key", "explained", "rank_correlation", "p_value")),
+        )
+        for outcome, ranking in summary["sensitivity"].items()
+        for each in ranking
+    ]
+    flown = f"{summary['flights']} flights, sampling {summary['sampling']}, seed {summary['seed']}"
+    return [
+        summary["description"],
+        _STEERED if "search" in summary else "",
+        *_section("What the flights show", ("", ""), facts(summary)),
+        *_section("Expectations", ("", "of", "expected", "found"), expected),
+        *_section("Tracking error, median RMS in deg/s", ("", *AXES), tracking(summary)),
+        *_section("By fault", _BY_FAULT, [_of_fault(each) for each in summary["by_fault"]]),
+        Heading("Figures"),
+        Pictures([(FIGURES[name][0], name) for name in figures]),
+        *_section("Flights worth a look", ("flight", "why", "flies it again"), worst),
+        Links("Flights that have been flown again: ", again) if again else "",
+        *_section("Flights that could not be flown", ("flights", "why", "first"), failed),
+        *_section("Sensitivity", ("outcome", "key", "explained", "correlation", "p"), explained),
+        _EXPLAINED if explained else "",
+        f"{flown}; {versions_line(summary['versions'])}",
+    ]
+
+
+def _section(title: str, head: Sequence[str], rows: Rows) -> list[Part]:
+    """A heading and its table; nothing without rows."""
+    return [Heading(title), Table(head, rows)] if rows else []
+
+
+_OF_KEY = ("key", "explained", "rank_correlation", "p_value")
+_BY_FAULT = (
+    "fault", "flights", "detected", "95 % interval", "delay: median", "95 %", "max", "named rightly",
+    "95 % interval", "named wrongly",
+)  # fmt: skip
+
+
+def _of_fault(fault: Document) -> tuple[str, ...]:
+    d, i = fault["detection"], fault["isolation"]
+    delays = (number(d["delay_s"][which], "s", "never") for which in ("median", "p95", "max"))
+    rates = [(percent(of["rate"]), f"{percent(of['low'])} to {percent(of['high'])}") for of in (d, i)]
+    return fault["fault"], str(fault["flights"]), *rates[0], *delays, *rates[1], str(i["wrong"]["count"])
 
 
 def _link(folder: Path, name: str) -> str | None:

@@ -48,8 +48,8 @@ from beaver_ftc.documents.files import Document
 from beaver_ftc.plugins import entries, loaded, required
 
 __all__ = [
-    "COMMANDS", "GROUP", "GROUPS", "Reporter", "ScenarioArgument", "StudyCommand", "WorkersOption", "declare",
-    "files_of_commands", "groups", "registered", "summary",
+    "COMMANDS", "FORMER", "GROUP", "GROUPS", "Reporter", "ScenarioArgument", "StudyCommand", "WorkersOption",
+    "declare", "files_of_commands", "groups", "registered", "summary",
 ]  # fmt: skip
 
 GROUP, GROUPS = "beaver_ftc.commands", "beaver_ftc.command_groups"
@@ -67,13 +67,16 @@ COMMANDS = {
     "compare": "beaver_ftc.cli.compare:command",
     "reproduce": "beaver_ftc.studies.reproduce.reproduction:Reproduce",
     "matrix": "beaver_ftc.studies.matrix.command:Matrix",
-    "power": "beaver_ftc.studies.power.shown:Power",
-    "smallest": "beaver_ftc.studies.smallest.survey:Smallest",
     "decay": "beaver_ftc.studies.decay.survey:Decay",
     "mechanisms": "beaver_ftc.studies.mechanisms.command:Mechanisms",
     "bench": "beaver_ftc.studies.bench.measure:Bench",
     "verify": "beaver_ftc.studies.verify:Verify",
-    "detectability": "beaver_ftc.studies.detectability:Detectability",
+    "detectability": "beaver_ftc.studies.detectability.command:Detectability",
+}
+
+FORMER = {  # names that still work for a release, and what to type instead, before the same arguments
+    "smallest": ("detectability", "--within", "0.5"),
+    "power": ("detectability", "--grid", "quick"),
 }
 
 
@@ -182,7 +185,6 @@ WorkersOption = Annotated[
 ]
 AirspeedOption = Annotated[float | None, typer.Option(min=1, max=1000)]
 AirspeedsOption = Annotated[list[float] | None, typer.Option(min=1, max=1000)]
-AltitudeOption = Annotated[float | None, typer.Option(min=-300, max=30000)]
 AltitudesOption = Annotated[list[float] | None, typer.Option(min=-300, max=30000)]
 TurbulenceName = StrEnum("TurbulenceName", ["none", "light", "moderate"])
 

@@ -15,8 +15,9 @@ COMMANDS = sorted(registered())
 REFUSED = (
     "compare nope", "decay nope", "derive nope", "diagnose nope.csv --model nope.json", "evidence nope",
     "identify nope.csv --vehicle nope --out model.json", "mismatch nope", "run nope",
-    "separate nope", "smallest nope --surface elevator", "sweep nope", "sweep nope --resume", "trim nope",
-    "validate nope", "power --aircraft nope", "matrix --aircraft nope", "challenge grade nope",
+    "separate nope", "detectability nope --surface elevator --within 1", "sweep nope", "sweep nope --resume",
+    "trim nope", "validate nope", "detectability --grid quick --aircraft nope", "matrix --aircraft nope",
+    "challenge grade nope",
     "compare --benchmark --laws nope", "compare --flights nope", "import gtm nope", "live --aircraft nope",
 )  # fmt: skip
 

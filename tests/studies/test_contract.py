@@ -19,8 +19,6 @@ MISTAKES = {  # of each study a line that it cannot answer, and what is said of 
     "linearise": (["nothing"], "nothing"),
     "reproduce": (["--workers", "0"], "--workers"),
     "matrix": (["--pitch-lost", "--declared"], "exclude each other"),
-    "power": (["--schemes", "nothing"], "nothing"),
-    "smallest": (["short.yaml", "--surface", "elevater"], "allowed: aileron, elevator, rudder, flap"),
     "decay": (["nothing"], "nothing"),
     "mechanisms": (["--draws", "0"], "--draws"),
     "bench": (["--rounds", "0"], "--rounds"),

@@ -88,7 +88,11 @@ class Rows(TyperGroup):
                 self.add_command(Row(last, target))
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """The command that is called, whole."""
+        """The command that is called, whole; by a former name with a notice."""
+        if ctx.parent is None and args[0] in commands.FORMER:
+            now = commands.FORMER[args[0]]
+            complain(f"{args[0]} is a former name: type beaver-ftc {' '.join(now)}")
+            args = [*now, *args[1:]]
         name, command, rest = super().resolve_command(ctx, args)
         return name, command.whole() if isinstance(command, Row) else command, rest
 

@@ -13,11 +13,12 @@ from beaver_ftc.scenario.schema import load_scenario
 from beaver_ftc.scenario.sweeps import load_sweep
 from beaver_ftc.studies.decay.shown import HEAD, cells, sentences
 from beaver_ftc.studies.decay.survey import TOGETHER, run_decay
+from beaver_ftc.studies.detectability.command import run_schemes
+from beaver_ftc.studies.detectability.probabilities import DUELS_S
+from beaver_ftc.studies.detectability.schemes import GRIDS, contenders
+from beaver_ftc.studies.detectability.shown import who_is_better
 from beaver_ftc.studies.engine.statistics import share_within, wilson
 from beaver_ftc.studies.engine.study import fly_all
-from beaver_ftc.studies.power.probabilities import DUELS_S
-from beaver_ftc.studies.power.shown import run_power, who_is_better
-from beaver_ftc.studies.power.survey import GRIDS, contenders
 from beaver_ftc.studies.present.tables import markdown_table
 from beaver_ftc.studies.sweep.one_flight import fly_one
 from beaver_ftc.studies.sweep.sampling import Assignment, Plan
@@ -127,9 +128,9 @@ def _closely(name: str, count: int) -> str:
 def robustness_power() -> str:
     """Share of losses found under tactical-grade sensors, by scheme, surface and air; and a picture of it."""
     with TemporaryDirectory() as name:
-        document = run_power(Path(name), GRIDS["quick"], contenders(None), 2)
+        document = run_schemes(Path(name), GRIDS["quick"], contenders(None), 2)
         Path("images").mkdir(exist_ok=True)
-        drawn = Path(name, "power", "figures", "schemes-tactical-grade.png")
+        drawn = Path(name, "detectability", "detectability.png")
         Path("images/power-tactical-grade.png").write_bytes(drawn.read_bytes())
     return _power_of(document)
 
@@ -139,7 +140,7 @@ def robustness_power_probe() -> str:
     scheme where shares of a few flights do not. That of multiple-models is 0 if no odds favour a fault."""
     grid = replace(GRIDS["quick"], blocks=1, magnitudes=(1.0,), excitations_deg_s=(3.0,), healthy_h=0.01)
     with TemporaryDirectory() as name:
-        document = run_power(Path(name), grid, contenders(None))
+        document = run_schemes(Path(name), grid, contenders(None))
     levels = (f"{each['turbulence']}, {each['scheme']}: {each['level']:.6g}" for each in document["levels"])
     return "\n".join((_power_of(document), *levels))
 

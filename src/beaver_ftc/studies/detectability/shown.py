@@ -1,0 +1,496 @@
+"""The answers of `detectability` as sentences, one table, figures and files.
+
+There are three kinds of documents, by what they hold: `points` (what is certain, by places), `compared` (the
+size found in a share of flights, by variants of a scenario) and `cells` (the share found in a grid of
+flights, by schemes). The lines of all three have the columns of HEAD; what no line has is no column.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import product
+from operator import itemgetter
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from beaver_ftc.results.metrics import NEAR_THRESHOLD_SHARE, as_json
+from beaver_ftc.results.model import Document
+from beaver_ftc.results.style import SERIES
+from beaver_ftc.studies.compare.scores import leader
+from beaver_ftc.studies.detectability import isolability
+from beaver_ftc.studies.detectability.certain import DETECT_WITHIN_S, ISOLATE_WITHIN_S, upwards
+from beaver_ftc.studies.detectability.probabilities import (
+    JUDGED_S,
+    SIGNIFICANT,
+    Row,
+    limit,
+    summary,
+    title_of,
+)
+from beaver_ftc.studies.detectability.schemes import BOTH, BUILT_IN, WATCHED_S, WITHIN_S
+from beaver_ftc.studies.present.figures import GRID, heat_map, label_edges, marker, panels
+from beaver_ftc.studies.present.page import Heading, Makers, Part, Pictures, Table, study_files
+from beaver_ftc.studies.present.tables import aligned, grouped, percent, seconds
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+NAME = "detectability"
+SOON = f"found within {'/'.join(f'{s:g}' for s in WITHIN_S)} s, %"
+HEAD = (
+    "loss of", "flown", "scheme", "certain from", "half of onsets from", "found in 90 % from",
+    "95 % interval", "flights", "false alarms/h", "before faults/h", SOON, "median delay",
+)  # fmt: skip
+OWN = ", default level"
+INFORMED = "informed test"
+Line = Mapping[str, str]  # cells by their column of HEAD
+
+
+class Shown(NamedTuple):
+    """A document in words. more: what a page and a text have below the table and its notes."""
+
+    title: str
+    sentences: Sequence[str]
+    lines: Sequence[Line]
+    notes: Sequence[str] = ()
+    more: Sequence[Part] = ()
+
+
+def shown(document: Document) -> Shown:
+    """A document in the words of its kind."""
+    if "points" in document:
+        return _places(document)
+    return _sizes(document) if "compared" in document else _schemes(document)
+
+
+def as_text(document: Document) -> str:
+    """The sentences, the table, and what explains it."""
+    words = shown(document)
+    parts = [*words.sentences, "", _aligned(table(words.lines)), *words.notes]
+    for part in words.more:
+        parts += ["", _aligned(part)] if isinstance(part, Table) else [part] * isinstance(part, str)
+    return "\n".join(parts)
+
+
+def _aligned(of: Table) -> str:
+    return aligned([of.head, *of.rows])
+
+
+def table(lines: Sequence[Line]) -> Table:
+    """The one table, of the columns that these lines have."""
+    head = [name for name in HEAD if any(name in line for line in lines)]
+    return Table(head, [[line.get(name, "") for name in head] for line in lines])
+
+
+def page_of(document: Document, *pictures: tuple[str, str]) -> tuple[str, Sequence[Part]]:
+    """The title; sentences, pictures, table and notes."""
+    words = shown(document)
+    drawn = [Pictures(pictures)] if pictures else []
+    return words.title, [*words.sentences, *drawn, table(words.lines), *words.notes, *words.more]
+
+
+# What is certain, by places.
+
+CERTAIN = (
+    "Certain: detected and isolated in time at so many places, whenever the loss starts or at half of the\n"
+    "possible start times, from the smallest loss at the best to that at the worst of these places."
+)
+
+
+def _places(document: Document) -> Shown:
+    rows = document["points"]
+    lines = [
+        {
+            "loss of": fault, "flown": f"{scale:g} x reference", "certain from": _span(of, "isolated"),
+            "half of onsets from": _span(of, "isolated_median"),
+        }
+        for (fault, scale), of in grouped(rows, "fault", "excitation").items()
+    ]  # fmt: skip
+    pairs = isolability.table(document["pairs"])
+    below = Table(isolability.TABLE_HEAD, pairs), isolability.TABLE_CAPTION
+    more = [Heading("Isolability"), *below] if pairs else []
+    return Shown(f"Detectability: {document['scenario']}", conclusions(rows), lines, [CERTAIN], more)
+
+
+def _span(rows: Sequence[Document], key: str) -> str:
+    certain = [row[key] for row in rows if row[key] is not None]
+    ends = f"{percent(min(certain))} to {percent(max(certain))}, " if certain else ""
+    return f"{ends}{len(certain)} of {len(rows)} places"
+
+
+def conclusions(rows: Sequence[Document]) -> list[str]:
+    """One sentence a fault, at the excitation nearest to the scenario's own references."""
+    scale = min((row["excitation"] for row in rows), key=lambda of: abs(of - 1.0))
+    chosen = [row for row in rows if row["excitation"] == scale]
+    return [_conclusion(fault, scale, of) for (fault,), of in grouped(chosen, "fault").items()]
+
+
+def _conclusion(fault: str, scale: float, rows: Sequence[Document]) -> str:
+    certain = [row["isolated"] for row in rows if row["isolated"] is not None]
+    reference = "the scenario's references" if scale == 1.0 else f"{scale:g} times the scenario's references"
+    if not certain:
+        worst = min(rows, key=lambda row: (row["detected"] is not None, row["why"]))
+        return f"{fault}: at {reference} no loss is certain to be detected and isolated ({worst['why']})."
+    places = "all" if len(certain) == len(rows) else f"{len(certain)} of"
+    return (
+        f"{fault}: at {reference} a loss of {upwards(max(certain))} or more is certain to be detected and "
+        f"isolated at {places} {len(rows)} places."
+    )
+
+
+def draw_places(document: Document) -> "Figure":
+    """A map a fault and excitation: over speed and altitude, the magnitude certain to be found."""
+    rows = document["points"]
+    names = [[f"{x:g}" for x in sorted({row[key] for row in rows})] for key in ("altitude_m", "airspeed_mps")]
+    maps = {
+        f"{fault}, {scale:g} x reference": {
+            (f"{row['altitude_m']:g}", f"{row['airspeed_mps']:g}"): (
+                row["detected"], f"{_short(row['detected'])}\n{_short(row['isolated'])}"
+            )
+            for row in of
+        }
+        for (fault, scale), of in grouped(rows, "fault", "excitation").items()
+    }  # fmt: skip
+    return _maps(
+        f"{document['scenario']}: smallest loss of effectiveness certain to be detected within "
+        f"{DETECT_WITHIN_S:g} s (upper number)\nand isolated within {ISOLATE_WITHIN_S:g} s (lower number); "
+        "hatched, -: not even a total loss",
+        maps, len({row["excitation"] for row in rows}), (3.4, 3.0), names, ("altitude (m)", "airspeed (m/s)"),
+    )  # fmt: skip
+
+
+def draw_pairs(document: Document) -> "Figure":
+    """A map an excitation. A row is the surface that loses effectiveness, a column the surface that the loss
+    could be taken for."""
+    of_pairs = isolability.worst_by_pair(document["pairs"])
+    faults = [*dict.fromkeys(fault for fault, _, _ in of_pairs)]
+    maps: dict[str, Any] = {}
+    for (fault, other, scale), of in of_pairs.items():
+        cell = of["half"][0], "\n".join(isolability.cell_line(how, of) for how in ("half", "always"))
+        maps.setdefault(f"{scale:g} x reference", {})[fault, other] = cell
+    size = 1.55 * len(faults) + 0.3, 0.65 * len(faults) + 0.8
+    return _maps(
+        f"{document['scenario']}: smallest loss distinguished from that of another surface, and the time\n"
+        "of a total one (half: at half of the instants; always: at every instant; hatched: no loss)",
+        maps, min(3, len(maps)), size, (faults, faults), ("loss of", "taken for"),
+    )  # fmt: skip
+
+
+def _maps(
+    title: str, maps: Mapping[str, Mapping[tuple[str, str], tuple[float | None, str]]], across: int,
+    size: tuple[float, float], names: Sequence[Sequence[str]], labels: tuple[str, str],
+) -> "Figure":  # fmt: skip
+    """Panels by their titles, so many across, each of so many inches. A cell (row, column) has a share, None
+    for one that no loss reaches, and its text; names, labels: of rows and columns."""
+    down = -(-len(maps) // across)
+    figure, grid = panels(down, across, across * size[0] + 1.2, down * size[1] + 0.5, title, sharey=True)
+    for axes, (name, cells) in zip(grid.flat, maps.items(), strict=False):
+        values = np.full((len(names[0]), len(names[1])), np.nan)
+        at = {(row, column): (names[0].index(row), names[1].index(column)) for row, column in cells}
+        for place, (value, _) in cells.items():
+            values[at[place]] = np.nan if value is None else value
+        texts = {at[place]: (text, "black") for place, (_, text) in cells.items()}
+        image = heat_map(
+            axes, values, texts, names[1], names[0], 7, cmap="viridis_r", vmin=0.0, vmax=1.0, alpha=0.6
+        )
+        axes.set_title(name, fontsize=9)
+    for axes in grid.flat[len(maps) :]:
+        axes.set_visible(False)
+    label_edges(grid, labels[1], [labels[0]] * down)
+    figure.colorbar(image, ax=grid, label="smallest loss, share of the effectiveness", shrink=0.6)
+    return figure
+
+
+def _short(magnitude: float | None) -> str:
+    return "-" if magnitude is None else f"{magnitude:.2f}"
+
+
+# The size found in a share of flights, by variants of a scenario.
+
+
+def _sizes(document: Document) -> Shown:
+    lines = [
+        {
+            "loss of": document["surface"], "flown": row["variant"],
+            "certain from": percent(row["certain"]["size"]),
+            "found in 90 % from": percent(row["found"]["size"]), "95 % interval": _interval(row["found"]),
+            "flights": str(row["found"]["flights"]),
+        }
+        for row in _variants(document)
+    ]  # fmt: skip
+    title = f"Detectability: {document['surface']} of {document['scenario']}"
+    return Shown(title, list(_size_sentences(document)), lines)
+
+
+def _variants(document: Document) -> list[Document]:
+    return [document, *document["compared"]]
+
+
+def _size_sentences(document: Document) -> Iterator[str]:
+    """What is certain, what is found, what limits it, and what would help."""
+    within = f"within {document['within_s']:g} s"
+    yield _certain(document, within)
+    yield _found(document, within)
+    yield from (
+        f"Nothing can be concluded in part of these flights: {why}." for why in document["inconclusive"]
+    )
+    if document["bound_used"] >= NEAR_THRESHOLD_SHARE:
+        yield (
+            f"Half of these flights use {percent(document['bound_used'])} of the bound or more before the "
+            "loss: the size found then measures the uncertainty that the scenario flies with, not the "
+            "diagnosis."
+        )
+    if document["false_alarms"]:
+        yield (
+            f"In {document['false_alarms']} of {document['total_loss']['of']} flights an alarm came before "
+            "the loss: these count as not found."
+        )
+    if document["failed"]:
+        yield f"{document['failed']} flights could not be flown to the end: these count as not found."
+    for lead, what, references in (
+        ("What limits it most", "What limits it: nothing that was left out alone", False),
+        ("Which reference would help", "Which reference would help: none of those that were tried", True),
+    ):
+        best = _best(document, references)
+        nothing = f"{what} makes a difference outside of the intervals."
+        yield nothing if best is None else f"{lead}: {_effect(best)}."
+
+
+def _certain(document: Document, within: str) -> str:
+    certain, surface = document["certain"], document["surface"]
+    if certain["size"] is None:
+        return (
+            f"Not even a total loss of {surface} is certain to be detected {within}: "
+            f"it was in {certain['at_total_loss']} of {certain['flights']} flights."
+        )
+    return (
+        f"A loss of {percent(certain['size'])} of the effectiveness of {surface} and more is certain to be "
+        f"detected {within}: in each of {certain['flights']} flights, whatever the declared uncertainty does."
+    )
+
+
+def _found(document: Document, within: str) -> str:
+    found, total, share = document["found"], document["total_loss"], percent(document["share"])
+    if found["size"] is None:
+        return (
+            f"Not even a total loss of {document['surface']} is found {within} in {share} of flights: it is "
+            f"in {percent(total['value'])} (95 % interval {percent(total['low'], '')} to "
+            f"{percent(total['high'])}; {total['count']} of {total['of']})."
+        )
+    return (
+        f"A loss of {percent(found['size'])} of the effectiveness of {document['surface']} is found {within} "
+        f"in {share} of flights (95 % interval {_interval(found)}; {found['flights']} flights)."
+    )
+
+
+def _is_better(other: Document, document: Document) -> bool:
+    """Whether a variant finds smaller losses, by intervals that do not overlap; where no loss is found often
+    enough, whether a total one is found more often."""
+    found, base = other["found"], document["found"]
+    if base["size"] is None:
+        return bool(other["total_loss"]["low"] > document["total_loss"]["high"])
+    return found["high"] is not None and base["low"] is not None and bool(found["high"] < base["low"])
+
+
+def _best(document: Document, references: bool) -> Document | None:
+    """The variant that helps most, of those that change a reference, or of the others."""
+    some = [
+        row
+        for row in document["compared"]
+        if ("reference" in row["variant"]) is references and _is_better(row, document)
+    ]
+    return min(some, key=lambda row: (row["found"]["size"] or 2.0, -row["total_loss"]["value"]), default=None)
+
+
+def _effect(row: Document) -> str:
+    found, total = row["found"], row["total_loss"]
+    if found["size"] is None:
+        return f"{row['variant']}, a total loss is found in {percent(total['value'])} of flights"
+    return f"{row['variant']}, it would be {percent(found['size'])} ({_interval(found)})"
+
+
+def _interval(found: Document) -> str:
+    if found["low"] is None:
+        return "more than a total loss"
+    if found["low"] == found["high"]:
+        return percent(found["low"])
+    low = percent(found["low"], "")
+    return f"{low} % or more" if found["high"] is None else f"{low} to {percent(found['high'])}"
+
+
+def rows_of_sizes(document: Document) -> list[Document]:
+    """The rows of the CSV file."""
+    return [
+        {"variant": row["variant"], "found": row["found"], "certain": row["certain"],
+         "total_loss_found": row["total_loss"]["value"]}
+        for row in _variants(document)
+    ]  # fmt: skip
+
+
+# The share found in a grid of flights, by schemes.
+
+
+def _schemes(document: Document) -> Shown:
+    conditions = document["grid"]["conditions"]
+    said = [f"{title_of(*where)}, {one}" for where in conditions for one in who_is_better(document, *where)]
+    said += comparison(document)
+    said += [f"could not be judged: {failure}" for failure in document["failures"]]
+    lines = [line for condition in conditions for line in _scheme_lines(document, *condition)]
+    return Shown("Detectability: schemes on the same flights", said, lines, _legend(document))
+
+
+def _scheme_lines(document: Document, sensors: str, turbulence: str) -> Iterator[Line]:
+    """A line a surface and scheme; ours of both detectors also at its default level."""
+    here = {"sensors": sensors, "turbulence": turbulence}
+    for surface in document["grid"]["surfaces"]:
+        place = {"loss of": surface, "flown": title_of(sensors, turbulence)}
+        for level in _those(document["levels"], **here):
+            found = next(_those(document["totals"], **here, scheme=level["scheme"], surface=surface), None)
+            row = place | {"scheme": level["scheme"], "false alarms/h": _rate(level["calibration"])}
+            yield row | {"before faults/h": _rate(level["before_faults"])} | _soon(found)
+            if level["scheme"] in BUILT_IN:
+                row |= {"scheme": f"{level['scheme']}{OWN}", "false alarms/h": _rate(level["own_level"])}
+                yield row | _soon(found and found["own_level"])
+        for known in _those(document["limits"], **here, surface=surface):
+            shares = "/".join(percent(share, "") for share in known["within"].values())
+            yield place | {"scheme": INFORMED, SOON: shares}
+
+
+def _soon(found: Document | None) -> Line:
+    """Per cent found within each delay, and the median delay."""
+    if not found or not found["flights"]:
+        return {SOON: "-"}
+    shares = "/".join(percent(found["within"][f"{within_s:g}"]["value"], "") for within_s in WITHIN_S)
+    return {SOON: shares, "median delay": seconds(found["median_delay_s"]), "flights": str(found["flights"])}
+
+
+def who_is_better(
+    document: Document, sensors: str, turbulence: str, within_s: float = WATCHED_S
+) -> Iterator[str]:
+    """Of a condition, a sentence a surface: who finds most faults so soon."""
+    here, soon = {"sensors": sensors, "turbulence": turbulence}, f"{within_s:g}"
+    for surface in document["grid"]["surfaces"]:
+        place, rows = here | {"surface": surface}, dict[str, Document]()
+        for total in _those(document["totals"], **place):
+            if total["flights"] and (total["scheme"] == BOTH or total["scheme"] not in BUILT_IN):
+                found, duel = total["within"][soon], {"better": 0, "worse": 0, "p": 1.0}
+                against = {"against": total["scheme"], "ours": BOTH, "within_s": within_s}
+                for one in _those(document["comparison"], **place, **against):
+                    duel = {"better": one["seeds_theirs"], "worse": one["seeds_ours"], "p": one["p"]}
+                rates = {"rate": found["value"], "rate_low": found["low"], "rate_high": found["high"]}
+                rows[total["scheme"]] = rates | {"against_ours": duel}
+        if BOTH in rows:
+            yield leader(rows, BOTH, "rate", f"{surface}, found within {soon} s", percent, more=True)
+
+
+def comparison(document: Document) -> list[str]:
+    """How often each of our schemes finds more or fewer faults than others, and is unlikely to by chance."""
+    return [
+        f"{ours}, faults found within {within_s:g} s, {len(duels)} comparisons: better in "
+        f"{_count(duels, 'better')}, worse in {_count(duels, 'worse')}, no difference at "
+        f"p < {SIGNIFICANT:g} in the rest"
+        for (ours, within_s), duels in grouped(document["comparison"], "ours", "within_s").items()
+    ]
+
+
+def _count(duels: Sequence[Document], verdict: str) -> int:
+    return sum(duel["verdict"] == verdict for duel in duels)
+
+
+def _those(lines: Sequence[Document], **where: Any) -> Iterator[Document]:
+    return (line for line in lines if where.items() <= line.items())
+
+
+def _rate(alarms: Document | None) -> str:
+    if alarms is None or alarms["per_h"] is None:
+        return "-"
+    high = "" if alarms["per_h_high"] is None else f" to {alarms['per_h_high']:.0f}"
+    return f"{alarms['per_h']:.0f} ({alarms['per_h_low']:.0f}{high})"
+
+
+def _legend(document: Document) -> list[str]:
+    grid, per_h = document["grid"], document["false_alarms_per_h"]
+    hours = min((level["calibration"]["hours"] for level in document["levels"]), default=0.0)
+    losses = ", ".join(f"{100 * magnitude:g}" for magnitude in grid["magnitudes"])
+    references = ", ".join(f"{excitation:g}" for excitation in grid["excitations_deg_s"])
+    return [
+        f"Losses of {losses} % under references of {references} deg/s. False alarms/h: every scheme at the "
+        f"level of its statistic with at most {per_h:g} per hour, on the same {hours:.2f} h of healthy "
+        "flight (95 % limits); before faults/h: the same on other flights.",
+        f"By chance alone {per_h * WITHIN_S[-1] / 36.0:.1f} % are detected within {WITHIN_S[-1]:g} s. "
+        "Default level: the one that follows from what the scheme declares.",
+        f"{INFORMED}: knows surface, magnitude and instant, and the gusts that the vanes show; made once in "
+        "that time at the same rate. Plug-ins are given every reading that the statistical scheme uses.",
+    ]
+
+
+def draw_schemes(document: Document, rows: Sequence[Row]) -> "Figure":
+    """Rows air, columns surfaces; in each, a line of dots a scheme: the share detected, a dot a magnitude."""
+    surfaces, conditions = document["grid"]["surfaces"], document["grid"]["conditions"]
+    names = [*dict.fromkeys(row["scheme"] for row in rows), INFORMED]
+    most = f"at most {document['false_alarms_per_h']:g} false alarms per hour"
+    figure, axes = panels(
+        len(conditions), len(surfaces), 2.3 * len(surfaces) + 1.7,
+        (0.3 * len(names) + 0.6) * len(conditions) + 1.2, f"Loss of effectiveness, {most}, all references",
+        dpi=120, sharex=True, sharey=True,
+    )  # fmt: skip
+    here = grouped(rows, "sensors", "turbulence", "surface")
+    for panel, (condition, surface) in zip(axes.flat, product(conditions, surfaces), strict=True):
+        _draw(panel, here.get((*condition, surface), []), names, document)
+    label_edges(
+        axes, f"detected within {JUDGED_S:g} s, %",
+        [title_of(*condition).replace(", ", ",\n") for condition in conditions], surfaces,
+    )  # fmt: skip
+    each = len(document["grid"]["excitations_deg_s"])
+    flights = [each * cell["flights"] for cell in document["cells"]]
+    figure.legend(
+        *axes[0][0].get_legend_handles_labels(), loc="outside lower center",
+        ncols=len(document["grid"]["magnitudes"]), fontsize=8, frameon=False, title_fontsize=8,
+        title=f"of {min(flights, default=0)} to {max(flights, default=0)} flights, exact 95 % interval",
+    )  # fmt: skip
+    return figure
+
+
+def _draw(panel: "Axes", rows: Sequence[Row], names: Sequence[str], document: Document) -> None:
+    """Of each scheme the share detected with its exact 95 % interval, magnitudes below one another."""
+    magnitudes, within = document["grid"]["magnitudes"], f"{JUDGED_S:g}"
+    apart = 0.6 / len(magnitudes)
+    for place, magnitude in enumerate(magnitudes):
+        here = [row for row in rows if row["magnitude"] == magnitude]
+        found = {scheme: summary(of) for (scheme,), of in grouped(here, "scheme").items()}
+        shares = {scheme: cell["within"][within] for scheme, cell in found.items() if cell["flights"]}
+        if here:
+            found_by_it = limit(here, document["false_alarms_per_h"])[within]
+            shares[INFORMED] = {"value": found_by_it, "low": found_by_it, "high": found_by_it}
+        percents = 100.0 * np.array([[of["value"], of["low"], of["high"]] for of in shares.values()])
+        values, lows, highs = percents.reshape(-1, 3).T
+        panel.errorbar(
+            values, [names.index(of) + apart * (place - 0.5 * (len(magnitudes) - 1)) for of in shares],
+            xerr=(np.maximum(values - lows, 0.0), np.maximum(highs - values, 0.0)), linestyle="none",
+            marker=marker(place), markersize=4.5, color=SERIES[place], elinewidth=1.0, clip_on=False,
+            label=f"{100 * magnitude:g} % lost",
+        )  # fmt: skip
+    panel.set_yticks(range(len(names)), names)
+    panel.set_ylim(len(names) - 0.5, -0.5)
+    panel.set_xlim(-2, 102)
+    panel.grid(axis="x", alpha=0.3)
+    panel.hlines(np.arange(len(names) - 1) + 0.5, -2, 102, color=GRID, linewidth=0.6)
+    panel.tick_params(labelsize=8)
+
+
+OF_PLACES: Makers = study_files(
+    NAME,
+    lambda document: page_of(
+        document, ("smallest loss that is certain to be detected and isolated", NAME),
+        ("smallest loss that is distinguished from each other surface", "isolability"),
+    ),
+    {NAME: itemgetter("points"), "isolability": itemgetter("pairs")},
+    {NAME: draw_places, "isolability": draw_pairs},
+)  # fmt: skip
+OF_SIZES: Makers = study_files(NAME, page_of, {NAME: rows_of_sizes}, {})
+# Of the document and of one row a flight and scheme.
+OF_SCHEMES: Makers = study_files(
+    NAME, lambda survey: page_of(survey[0], ("share of the losses that each scheme detects", NAME)),
+    {NAME: itemgetter(1)}, {NAME: lambda survey: draw_schemes(*survey)},
+) | {f"{NAME}.json": lambda survey: as_json(survey[0])}  # fmt: skip
+FILES = tuple(OF_PLACES | OF_SIZES | OF_SCHEMES)

@@ -56,7 +56,7 @@ def pytest_addoption(parser):
 # Files that take a worker longest: begun last, they would keep it while the other has nothing to do.
 LONGEST = (
     "products/live/page/test_guests.py", "aircraft/derive/test_derive.py", "cli/test_command_line.py",
-    "studies/mechanisms/test_mechanisms.py", "rivals/test_detectors.py", "compiled/test_cache.py",
+    "studies/sensitivity/test_mechanisms.py", "rivals/test_detectors.py", "compiled/test_cache.py",
     "detection/test_likelihood.py", "studies/reproduce/test_reproduce.py",
     "assurance/certificates/test_certificates.py", "loop/test_loop.py", "diagnosis/test_new_type.py",
     "tools/test_drawn.py", "aircraft/test_engines.py", "tests/test_notebooks.py", "logs/test_commands.py",

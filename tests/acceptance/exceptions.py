@@ -49,9 +49,9 @@ TABLE = (
         "beaver-ftc evidence --help",
     ),
     Exempt(
-        r"beaver-ftc mechanisms( .*)?",
+        r"beaver-ftc sensitivity --mechanisms( .*)?",
         "flies for minutes; the study's own tests fly a few draws",
-        "beaver-ftc mechanisms --help",
+        "beaver-ftc sensitivity --help",
     ),
     Exempt(
         r"beaver-ftc sweep elevator-jams\.yaml --rare no_departure",
@@ -151,7 +151,7 @@ TABLE = (
         "beaver-ftc reproduce --help",
         by_day=True,
     ),
-    Exempt(r"(beaver-ftc decay \S+)", "a minute: two flights a row", r"\1 --flights 2", by_day=True),
+    Exempt(r"(beaver-ftc sensitivity \S+)", "a minute: two flights a row", r"\1 --flights 2", by_day=True),
     Exempt(
         r"(beaver-ftc detectability) \S+ (--surface elevator --within 0\.5)",
         "half a minute: shorter flights",

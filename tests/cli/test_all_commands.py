@@ -13,7 +13,7 @@ from commands import beaver
 
 COMMANDS = sorted(registered())
 REFUSED = (
-    "compare nope", "decay nope", "derive nope", "diagnose nope.csv --model nope.json", "evidence nope",
+    "compare nope", "sensitivity nope", "derive nope", "diagnose nope.csv --model nope.json", "evidence nope",
     "identify nope.csv --vehicle nope --out model.json", "mismatch nope", "run nope",
     "separate nope", "detectability nope --surface elevator --within 1", "sweep nope", "sweep nope --resume",
     "trim nope", "validate nope", "detectability --grid quick --aircraft nope", "matrix --aircraft nope",

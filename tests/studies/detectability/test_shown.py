@@ -19,8 +19,8 @@ from beaver_ftc.studies.detectability.schemes import (
     Condition,
     Watched,
 )
-from beaver_ftc.studies.detectability.shown import OF_PLACES, OF_SCHEMES, OF_SIZES, as_text
-from beaver_ftc.studies.present.page import contents
+from beaver_ftc.studies.detectability.shown import OF_PLACES, OF_SCHEMES, OF_SIZES, page_of
+from beaver_ftc.studies.present.page import as_text, contents
 from kept import in_short, page, picture
 
 
@@ -68,7 +68,7 @@ def places():
 
 def test_what_is_certain(places, changed):
     none = [row | dict.fromkeys(MAGNITUDES) for row in places["points"][:1]]
-    texts = [as_text(one) for one in (places, places | {"points": none, "pairs": []})]
+    texts = [as_text(page_of(one)[1]) for one in (places, places | {"points": none, "pairs": []})]
     assert not changed([text.splitlines() for text in texts])
 
 
@@ -121,7 +121,7 @@ CASES = {
 
 
 def test_what_is_said_of_every_size(changed):
-    assert not changed({name: as_text(of).splitlines() for name, of in CASES.items()})
+    assert not changed({name: as_text(page_of(of)[1]).splitlines() for name, of in CASES.items()})
 
 
 GRID = replace(
@@ -171,9 +171,9 @@ def test_the_document(surveyed, changed):
 
 
 def test_what_is_said_of_schemes(surveyed, changed):
-    assert not changed(as_text(surveyed[0]).splitlines())
+    assert not changed(as_text(page_of(surveyed[0])[1]).splitlines())
     nothing = {name: [] for name in ("levels", "totals", "cells", "limits", "comparison", "failures")}
-    assert not changed(as_text(surveyed[0] | nothing).splitlines(), part="nothing")
+    assert not changed(as_text(page_of(surveyed[0] | nothing)[1]).splitlines(), part="nothing")
 
 
 def test_the_picture_of_schemes_where_not_all_was_flown(surveyed, changed):

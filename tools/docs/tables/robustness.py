@@ -11,8 +11,6 @@ import numpy as np
 
 from beaver_ftc.scenario.schema import load_scenario
 from beaver_ftc.scenario.sweeps import load_sweep
-from beaver_ftc.studies.decay.shown import HEAD, cells, sentences
-from beaver_ftc.studies.decay.survey import TOGETHER, run_decay
 from beaver_ftc.studies.detectability.command import run_schemes
 from beaver_ftc.studies.detectability.probabilities import DUELS_S
 from beaver_ftc.studies.detectability.schemes import GRIDS, contenders
@@ -20,6 +18,10 @@ from beaver_ftc.studies.detectability.shown import who_is_better
 from beaver_ftc.studies.engine.statistics import share_within, wilson
 from beaver_ftc.studies.engine.study import fly_all
 from beaver_ftc.studies.present.tables import markdown_table
+from beaver_ftc.studies.sensitivity.beyond import TOGETHER
+from beaver_ftc.studies.sensitivity.command import run_errors
+from beaver_ftc.studies.sensitivity.shown import HEAD, cells
+from beaver_ftc.studies.sensitivity.shown import error_sentences as sentences
 from beaver_ftc.studies.sweep.one_flight import fly_one
 from beaver_ftc.studies.sweep.sampling import Assignment, Plan
 from tools.docs.tables import moved
@@ -237,9 +239,9 @@ _PICTURED = "False alarms, right names and tracking over the size of each error,
 def robustness_decay() -> str:
     """How verdicts decay beyond what is declared, of two scenarios; and a picture of the first."""
     with TemporaryDirectory() as name:
-        whole, published = (run_decay(Path(name), load_scenario(one), workers=2) for one in DECAYS)
+        whole, published = (run_errors(Path(name), load_scenario(one), workers=2) for one in DECAYS)
         Path("images").mkdir(exist_ok=True)
-        Path("images/decay.png").write_bytes(Path(whole["folder"], "decay.png").read_bytes())
+        Path("images/decay.png").write_bytes(Path(whole["folder"], "sensitivity.png").read_bytes())
     pictured = f"![{_PICTURED}](images/decay.png)\n\n{DECAY_FIGURE}"
     table = moved(_decay_table(whole), "*Table 1.", "robustness-decay", DECAY_TITLE)
     return "\n\n".join([table, pictured, f"### {PUBLISHED}", _published(published)])
@@ -248,7 +250,7 @@ def robustness_decay() -> str:
 def robustness_decay_probe() -> str:
     """Two flights of each row of the first."""
     with TemporaryDirectory() as name:
-        return _decay_of(run_decay(Path(name), load_scenario(DECAYS[0]), 2))
+        return _decay_of(run_errors(Path(name), load_scenario(DECAYS[0]), 2))
 
 
 def _decay_of(document: Document) -> str:

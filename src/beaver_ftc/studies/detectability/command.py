@@ -26,9 +26,10 @@ from beaver_ftc.results.model import Document
 from beaver_ftc.scenario.schema import Scenario, load_scenario
 from beaver_ftc.studies.detectability import certain, probabilities, schemes
 from beaver_ftc.studies.detectability.schemes import GRIDS, Grid, Watched
-from beaver_ftc.studies.detectability.shown import FILES, NAME, OF_PLACES, OF_SCHEMES, as_text
+from beaver_ftc.studies.detectability.shown import FILES, NAME, OF_PLACES, OF_SCHEMES, page_of
 from beaver_ftc.studies.detectability.sizes import Asked, run_sizes
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
+from beaver_ftc.studies.present.page import as_text
 
 GridName = StrEnum("GridName", ["quick", "full"])
 SensorsName = StrEnum("SensorsName", {"ideal": "ideal", "tactical_grade": "tactical-grade"})
@@ -199,7 +200,7 @@ class Detectability(StudyCommand):
     def as_text(self, document: Document, colour: bool) -> str:
         """The answers in words, else sentences and table; and where the files are."""
         lines = document.get("answers") or [
-            as_text(document), *certain.geometry(document.get("alike", ())),
+            as_text(page_of(document)[1]), *certain.geometry(document.get("alike", ())),
             *certain.of_engines(document.get("engines", ())),
         ]  # fmt: skip
         return "\n".join([*lines, "", f"results: {document['folder']}"])

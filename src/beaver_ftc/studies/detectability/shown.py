@@ -29,7 +29,7 @@ from beaver_ftc.studies.detectability.probabilities import (
 from beaver_ftc.studies.detectability.schemes import BOTH, BUILT_IN, WATCHED_S, WITHIN_S
 from beaver_ftc.studies.present.figures import GRID, heat_map, label_edges, marker, panels
 from beaver_ftc.studies.present.page import Heading, Makers, Part, Pictures, Table, study_files
-from beaver_ftc.studies.present.tables import aligned, grouped, percent, seconds
+from beaver_ftc.studies.present.tables import grouped, percent, seconds
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -61,19 +61,6 @@ def shown(document: Document) -> Shown:
     if "points" in document:
         return _places(document)
     return _sizes(document) if "compared" in document else _schemes(document)
-
-
-def as_text(document: Document) -> str:
-    """The sentences, the table, and what explains it."""
-    words = shown(document)
-    parts = [*words.sentences, "", _aligned(table(words.lines)), *words.notes]
-    for part in words.more:
-        parts += ["", _aligned(part)] if isinstance(part, Table) else [part] * isinstance(part, str)
-    return "\n".join(parts)
-
-
-def _aligned(of: Table) -> str:
-    return aligned([of.head, *of.rows])
 
 
 def table(lines: Sequence[Line]) -> Table:

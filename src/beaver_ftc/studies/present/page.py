@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.studies.present.tables import Rows, as_csv, html_table, markdown_table
+from beaver_ftc.studies.present.tables import Rows, aligned, as_csv, html_table, markdown_table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -63,6 +63,22 @@ def _markdown(part: Part, figures: str) -> Iterator[str]:
             yield from (f"![{title}]({figures}/{stem}.png)" for title, stem in part.shown)
         case _:
             yield part
+
+
+def as_text(parts: Sequence[Part]) -> str:
+    """The parts as lines for a terminal, without pictures."""
+    lines: list[str] = []
+    for part in parts:
+        match part:
+            case Heading():
+                lines += ["", part.text]
+            case Table():
+                lines += ["", aligned([part.head, *part.rows])]
+            case Bullets():
+                lines += ["", part.lead, *(f"- {sentence}" for sentence in part.sentences)]
+            case str():
+                lines.append(part)
+    return "\n".join(lines)
 
 
 def as_html(title: str, parts: Sequence[Part], figures: Mapping[str, Path]) -> str:

@@ -24,7 +24,8 @@ from beaver_ftc.scenario.airframe import air_of
 from beaver_ftc.scenario.declared import undeclared
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.compare.margins_in_flight import margins_of
-from beaver_ftc.studies.mechanisms.systems import (
+from beaver_ftc.studies.present.tables import finite
+from beaver_ftc.studies.sensitivity.systems import (
     CONSTANT,
     MECHANISMS,
     PAPER,
@@ -32,7 +33,6 @@ from beaver_ftc.studies.mechanisms.systems import (
     Changes,
     Mechanism,
 )
-from beaver_ftc.studies.present.tables import finite
 
 SURFACES = ("aileron", "elevator", "rudder")  # draws of a cell take turns
 LOSSES = {"loss 20 %": 0.2, "loss 40 %": 0.4, "loss 80 %": 0.8}

@@ -7,24 +7,17 @@ fault, detection, right and wrong names, and how the aircraft is flown.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import partial
-from pathlib import Path
-from typing import Annotated, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import typer
 
-from beaver_ftc.commands import Reporter, ScenarioArgument, StudyCommand, WorkersOption
-from beaver_ftc.documents.errors import BadInput, BeaverFtcError
+from beaver_ftc.documents.errors import BeaverFtcError
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.metrics import measure, versions
 from beaver_ftc.results.model import Document, Metrics
-from beaver_ftc.scenario.schema import Scenario, load_scenario
-from beaver_ftc.studies.decay.errors import Error, changes_of, errors_of
-from beaver_ftc.studies.decay.shown import FILES, as_text
+from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, counted, median
-from beaver_ftc.studies.engine.study import Progress, Study, run_study
+from beaver_ftc.studies.sensitivity.errors import Error, changes_of, errors_of
 
 FACTORS = (1.0, 1.5, 2.0, 4.0)
 TOGETHER = "all together"
@@ -114,24 +107,6 @@ def row_of(found: Metrics | None, bound_used: float = 0.0) -> Document:
     }
 
 
-def run_decay(
-    out: Path, scenario: Scenario, flights: int = FLIGHTS, seed: int = 1, workers: int = 1,
-    progress: Progress | None = None,
-) -> Document:  # fmt: skip
-    """Write `out/<scenario>-decay/`; return the document. Raises BadInput where nothing is diagnosed."""
-    if scenario.fdi.scheme == "none":
-        raise BadInput(f"{scenario.name}: fdi.scheme: none diagnoses nothing, allowed: a scheme")
-    errors = errors_of(scenario)
-    cases = cases_of(errors, flights)
-    study = Study(
-        f"{scenario.name[:80]}-decay", cases, partial(fly_one, scenario, seed),
-        partial(document_of, scenario, errors, cases, seed), FILES, follows_from=[scenario, seed],
-        lost=lambda flight, why: row_of(None),
-    )  # fmt: skip
-    document: Document = run_study(study, out, workers, progress)
-    return document | {"folder": str(out / study.name)}
-
-
 def document_of(
     scenario: Scenario, errors: Sequence[Error], cases: Sequence[Flight], seed: int, rows: Sequence[Document]
 ) -> Document:
@@ -168,42 +143,3 @@ def summary(rows: Sequence[Document]) -> Document:
         **{name: counted(count, len(flown)) for name, count in counts.items()},
         **{name: median(row[name] for row in flown) for name in MEASURED},
     }
-
-
-@dataclass(frozen=True)
-class Decay(StudyCommand):
-    """Measure how verdicts degrade beyond declared bounds.
-
-    `fdi.bounds` can declare several errors. The command flies each declared error at 1, 1.5, 2 and 4 times
-    its declared size, first alone and then together with all other errors. An error that is not declared has
-    no declared size. The command flies such an error alone, at multiples of a fixed size. The sign of an
-    error is random, but its size is not. The command reports false alarms, detections, right names, wrong
-    names and tracking errors, each with its 95 % interval.
-
-    If the command is interrupted, the same command resumes it.
-
-    Examples:
-      beaver-ftc decay elevator-loss-in-turbulence
-
-    flights: Number of flights for each error and size.
-    seed: Seed of all random draws.
-    out: Folder for the results.
-    """
-
-    scenario: ScenarioArgument
-    flights: Annotated[int, typer.Option(min=1, max=10_000)] = FLIGHTS
-    seed: Annotated[int, typer.Option(min=0)] = 1
-    workers: WorkersOption = None
-    out: Path = Path("runs")
-
-    FILES = FILES
-
-    def run(self, reporter: Reporter) -> Document:
-        """Fly every row."""
-        return run_decay(
-            self.out, load_scenario(self.scenario), self.flights, self.seed, self.processes, reporter.progress
-        )
-
-    def as_text(self, document: Document, colour: bool) -> str:
-        """What changes, the table, and where the files are."""
-        return f"{as_text(document)}\n\nresults: {document['folder']}"

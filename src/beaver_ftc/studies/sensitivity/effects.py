@@ -7,10 +7,11 @@ worse, and better if the opposite holds. The net share, worse less better, is wh
 from collections.abc import Callable, Mapping, Sequence
 from math import inf, isfinite
 
+from beaver_ftc.results.metrics import versions
 from beaver_ftc.results.model import Document
-from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial, median
-from beaver_ftc.studies.mechanisms.survey import FACTORS, Flight, cases_of, with_key, without_key
-from beaver_ftc.studies.mechanisms.systems import MECHANISMS, SYSTEMS, Mechanism
+from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial, counted, median
+from beaver_ftc.studies.sensitivity.mechanisms import FACTORS, Flight, cases_of, with_key, without_key
+from beaver_ftc.studies.sensitivity.systems import MECHANISMS, SYSTEMS, Mechanism
 
 LATE_S = 0.1  # an alarm so much later is late
 WORSE = 1.1  # a tracking error so many times as large is worse
@@ -34,6 +35,7 @@ def document_of(seed: int, draws: int, rows: Sequence[Document], margins: list[D
         "systems": {system: _system_row([row[system] for row in rows]) for system in SYSTEMS},
         "mechanisms": found,
         "false_alarms": alarms,
+        "versions": dict(versions()),
     }
 
 
@@ -139,7 +141,7 @@ def _system_row(outcomes: Sequence[Document]) -> Document:
     }
     return {
         "flights": n,
-        **{name: {"count": count, **vars(binomial(count, n))} for name, count in rates.items()},
+        **{name: counted(count, n) for name, count in rates.items()},
         "tracking_deg_s": median(o["tracking_deg_s"] for o in outcomes),
     }
 

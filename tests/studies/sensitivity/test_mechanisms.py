@@ -1,4 +1,4 @@
-"""`mechanisms`: what is removed, what pairs amount to, and which false alarms have a reason."""
+"""`sensitivity --mechanisms`: what is removed, what pairs amount to, and which false alarms have a reason."""
 
 import json
 
@@ -13,9 +13,9 @@ from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import Columns
 from beaver_ftc.results.metrics import measure
 from beaver_ftc.scenario.declared import undeclared
-from beaver_ftc.studies.mechanisms import command, effects, survey
-from beaver_ftc.studies.mechanisms.effects import CRITERIA, document_of, net
-from beaver_ftc.studies.mechanisms.survey import (
+from beaver_ftc.studies.sensitivity import command, effects, mechanisms
+from beaver_ftc.studies.sensitivity.effects import CRITERIA, document_of, net
+from beaver_ftc.studies.sensitivity.mechanisms import (
     CONSTANT,
     FACTORS,
     INSTRUMENTS,
@@ -26,7 +26,7 @@ from beaver_ftc.studies.mechanisms.survey import (
     without_key,
     without_mechanism,
 )
-from beaver_ftc.studies.mechanisms.systems import DEFAULT, LAW, MECHANISMS, PAPER
+from beaver_ftc.studies.sensitivity.systems import DEFAULT, LAW, MECHANISMS, PAPER
 
 ELEVATOR = Flight("loss 80 %", "high", 0.0, "exact sensors", 1)
 EVERY = pytest.mark.parametrize("mechanism", MECHANISMS, ids=lambda each: each.key)
@@ -66,7 +66,7 @@ def test_both_flights_of_a_pair_have_the_same_healthy_loop(mechanism):
     rows = []
     for scenario, withheld in ((healthy, ""), (without_mechanism(healthy, mechanism), mechanism.withheld)):
         log = Columns(*(f"{surface}_cmd_rad" for surface in healthy.airframe.surfaces))
-        fly(scenario, log, watch=survey.watch_of(withheld))
+        fly(scenario, log, watch=mechanisms.watch_of(withheld))
         rows.append(log.read(*log))
     assert np.array_equal(*rows)
 
@@ -77,7 +77,7 @@ def test_both_flights_of_a_pair_have_the_same_healthy_loop(mechanism):
 ])  # fmt: skip
 def test_what_is_withheld_from_the_law_it_does_not_use(withheld, modes):
     log = Columns("t_s", "flap_cmd_rad")
-    flight = fly(scenario_of(ELEVATOR, 7, DEFAULT), log, watch=survey.watch_of(withheld))
+    flight = fly(scenario_of(ELEVATOR, 7, DEFAULT), log, watch=mechanisms.watch_of(withheld))
     found = measure(flight)
     assert found.isolation.correct
     assert [change.mode for change in found.supervisor] == modes
@@ -168,7 +168,7 @@ def few_cells(monkeypatch):
         "fault": ("loss 40 %",), "bandwidth": ("high",), "error": (0.0, 0.05),
         "instruments": ("exact sensors",),
     }  # fmt: skip
-    for module in (survey, effects):
+    for module in (mechanisms, effects):
         monkeypatch.setattr(module, "FACTORS", few)
 
 
@@ -205,8 +205,8 @@ def test_a_document_and_its_files(tmp_path, monkeypatch, few_cells):
     assert document["margins"][0]["gain_margin_db"] > 6.0
     alarms = next(row for row in document["false_alarms"] if row["flown"] == DEFAULT)
     assert (alarms["count"], alarms["certified"], alarms["unexplained"]) == (1, 1, 0)
-    folder = tmp_path / "mechanisms"
+    folder = tmp_path / "mechanisms-sensitivity"
     assert {path.name for path in folder.iterdir()} == {
-        f"mechanisms.{k}" for k in ("json", "csv", "png", "html")
+        f"sensitivity.{k}" for k in ("json", "csv", "png", "html")
     }
-    assert (folder / "mechanisms.csv").read_text().count("\n") == 1 + len(MECHANISMS)
+    assert (folder / "sensitivity.csv").read_text().count("\n") == 1 + len(MECHANISMS)

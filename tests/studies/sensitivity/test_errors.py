@@ -1,4 +1,4 @@
-"""`decay`: which truths are flown, what a flight counts for, and what a summary counts."""
+"""`sensitivity SCENARIO`: which truths are flown, what a flight counts for, and what a summary counts."""
 
 import numpy as np
 import pytest
@@ -7,16 +7,16 @@ import beaver_ftc as bf
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.results.model import Metrics
 from beaver_ftc.scenario.declared import undeclared
-from beaver_ftc.studies.decay import survey
-from beaver_ftc.studies.decay.errors import errors_of
-from beaver_ftc.studies.decay.survey import (
+from beaver_ftc.studies.sensitivity import beyond
+from beaver_ftc.studies.sensitivity.beyond import (
     TOGETHER,
     Flight,
     cases_of,
     row_of,
-    run_decay,
     scenario_of,
 )
+from beaver_ftc.studies.sensitivity.command import run_errors
+from beaver_ftc.studies.sensitivity.errors import errors_of
 from flying import loss
 
 LOSS = loss(at_s=1.5)
@@ -149,7 +149,7 @@ def of_rows(**changes):
 
 
 def test_a_summary_counts_flights_that_were_flown_and_what_never_came_as_longest():
-    found = survey.summary(of_rows())
+    found = beyond.summary(of_rows())
     assert (found["flights"], found["failed"]) == (5, 1)
     counts = {name: (found[name]["count"], found[name]["of"], found[name]["value"]) for name in
               ("false_alarm", "detected", "named", "misnamed", "lost")}  # fmt: skip
@@ -164,4 +164,4 @@ def test_a_summary_counts_flights_that_were_flown_and_what_never_came_as_longest
 
 def test_a_scenario_without_a_diagnosis_is_refused(tmp_path):
     with pytest.raises(BadInput, match="scheme: none diagnoses nothing"):
-        run_decay(tmp_path, bf.load(SHORT | {"fdi": {"scheme": "none"}}))
+        run_errors(tmp_path, bf.load(SHORT | {"fdi": {"scheme": "none"}}))

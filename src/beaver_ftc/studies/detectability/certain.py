@@ -14,7 +14,7 @@ frame-by-frame test of the innovation, whatever the fault's course; z is taken a
 the loop's answer to the fault within the window is neglected.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import combinations
@@ -43,6 +43,7 @@ EXCITATIONS = (0.25, 0.5, 1.0, 2.0)  # of the scenario's references
 SETTLED_S = 2.0  # the start of a reference is a step of its own
 BISECTIONS = 16  # magnitudes to 2^-16
 MAGNITUDES = ("detected", "detected_median", "isolated", "isolated_median")
+AMPLITUDES = ("amplitude_deg_s", "values_deg_s")  # parameters of a reference
 PLACE = ("airspeed_mps", "altitude_m", "excitation")
 ALIKE_DEG = 3.0  # distinguished only from this deflection on: similar effects on the rates
 TOO_SHORT = "the flight ends before a fault could be isolated"
@@ -307,11 +308,21 @@ def at(scenario: Scenario, speed_mps: float, altitude_m: float, excitation: floa
     document = scenario.model_dump(mode="json", exclude_none=True)
     del document["fdi"]["bounds"]["actuators"]
     document["initial"] |= {"airspeed_mps": speed_mps, "altitude_m": altitude_m}
-    for signal in (signal for signals in document["reference"].values() for signal in signals):
-        parameters = next(iter(signal.values()))
-        for name in parameters.keys() & {"amplitude_deg_s", "values_deg_s"}:
-            parameters[name] = (np.asarray(parameters[name]) * excitation).tolist()
+    document["reference"] = {
+        axis: scaled(signals, AMPLITUDES, excitation) for axis, signals in document["reference"].items()
+    }
     return Scenario.model_validate({**document, "faults": [], "expect": {}})
+
+
+def scaled(signals: Sequence[Document], keys: Collection[str], times: float) -> list[Document]:
+    """Reference signals with these of their parameters multiplied."""
+    return [
+        {
+            name: of | {key: (np.asarray(of[key]) * times).tolist() for key in of.keys() & {*keys}}
+            for name, of in signal.items()
+        }
+        for signal in signals
+    ]
 
 
 def _nothing(why: str) -> Document:

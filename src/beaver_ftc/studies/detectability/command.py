@@ -189,13 +189,15 @@ class Detectability(StudyCommand):
         return found | ({"engines": failures} if failures else {})
 
     def _of_schemes(self, grid: GridName, reporter: Reporter) -> Document:
-        """Over the grid; of one surface with the answers in words."""
+        """Over the grid."""
         chosen = schemes.contenders(None if self.schemes is None else listed(self.schemes))
-        place = (values[0] if values else None for values in (self.airspeed, self.altitude))
-        flown = GRIDS[grid].only(self.sensors, self.turbulence).elsewhere(self.aircraft, *place, self.surface)
+        airspeed_mps, altitude_m = (
+            values[0] if values else None for values in (self.airspeed, self.altitude)
+        )
+        flown = GRIDS[grid].only(self.sensors, self.turbulence)
+        flown = flown.elsewhere(self.aircraft, airspeed_mps, altitude_m, self.surface)
         document = run_schemes(self.out, flown, chosen, self.processes, reporter.progress)
-        said = probabilities.answers(document, self.surface) if self.surface else []
-        return document | ({"answers": said} if said else {}) | {"folder": str(self.out / NAME)}
+        return document | {"folder": str(self.out / NAME)}
 
     def as_text(self, document: Document, colour: bool) -> str:
         """The answers in words, else sentences and table; and where the files are."""

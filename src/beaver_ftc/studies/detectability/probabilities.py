@@ -12,7 +12,7 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.results.metrics import versions
 from beaver_ftc.results.model import Document
 from beaver_ftc.studies.compare.replay import Trace, alarms_at
-from beaver_ftc.studies.detectability.schemes import BOTH, BUILT_IN, WATCHED_S, WITHIN_S, Grid, Watched
+from beaver_ftc.studies.detectability.schemes import BUILT_IN, WATCHED_S, WITHIN_S, Grid, Watched
 from beaver_ftc.studies.engine.statistics import Estimate, binomial, poisson, share_within, sign_test
 from beaver_ftc.studies.present.tables import finite, grouped
 
@@ -169,23 +169,6 @@ def title_of(sensors: str, turbulence: str) -> str:
     """A condition in words."""
     air = "still air" if turbulence == "none" else f"{turbulence} turbulence"
     return f"{sensors} sensors, {air}"
-
-
-def answers(document: Document, surface: str) -> list[str]:
-    """A line for each condition, excitation and magnitude: how many losses of a surface our scheme of both
-    detectors finds how soon."""
-    lines = []
-    for cell in document["cells"]:
-        if cell["surface"] == surface and cell["scheme"] == BOTH:
-            soon = ", ".join(
-                f"within {s} s in {of['value']:.0%} ({100 * of['low']:.0f} to {of['high']:.0%})"
-                for s, of in cell["within"].items()
-            )
-            lines.append(
-                f"{title_of(cell['sensors'], cell['turbulence'])}, {cell['excitation_deg_s']:g} deg/s: a "
-                f"loss of {surface} of {cell['magnitude']:.0%} is found {soon} of {cell['flights']} flights"
-            )
-    return lines
 
 
 def _counted(level: Level) -> Document:

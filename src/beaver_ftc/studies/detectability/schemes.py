@@ -22,12 +22,12 @@ from beaver_ftc.scenario.airframe import air_of, find_aircraft
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.compare import replay
 from beaver_ftc.studies.compare.replay import Recording, Trace
+from beaver_ftc.studies.engine.draws import loss, sines, swings
 from beaver_ftc.studies.engine.workers import Case
 
 STRIKES_S = (8.0, 10.0)  # a fault strikes at random in between
 WATCHED_S = 5.0  # after it
 WITHIN_S = (0.5, 1.0, WATCHED_S)  # how soon is soon
-FREQUENCY_HZ = {"p": 0.25, "q": 0.2, "r": 0.15}
 _RATE_HZ = 100.0
 UNEXPLAINED_UP_TO_RAD_S = 15.0  # the faster of the published sinusoids, and what is declared of them
 
@@ -135,7 +135,7 @@ def scenario_of(
             "duration_s": duration_s,
             "rate_hz": _RATE_HZ,
             "seed": block.seed,
-            "reference": _reference(block),
+            "reference": sines(_draws(block, 0), block.excitation_deg_s),
             "uncertainty": _uncertainty(block) if aircraft == DEFAULT else {},
             "sensors": sensors,
             "environment": air_of(turbulence),
@@ -152,36 +152,18 @@ def strikes_at_s(block: Block) -> float:
     return round(_draws(block, 2).uniform(*STRIKES_S) * _RATE_HZ) / _RATE_HZ
 
 
-def loss(surface: str, magnitude: float, at_s: float) -> Document:
-    """The fault of a cell."""
-    kind = {"type": "loss_of_effectiveness", "actuator": surface}
-    return kind | {"magnitude": magnitude, "at_s": at_s}
-
-
 def _draws(block: Block, purpose: int) -> np.random.Generator:
     """Random numbers of a seed, the same in every condition."""
     return np.random.default_rng([block.seed, purpose])
-
-
-def _reference(block: Block) -> Document:
-    phase_deg = _draws(block, 0).uniform(-180.0, 180.0, 3)
-    return {
-        axis: [{"sine": {"amplitude_deg_s": block.excitation_deg_s, "frequency_hz": hz, "phase_deg": phase}}]
-        for (axis, hz), phase in zip(FREQUENCY_HZ.items(), phase_deg.tolist(), strict=True)
-    }
 
 
 def _uncertainty(block: Block) -> Document:
     """Inside the published bound [Zhang2005, sec. VII]: half of it at the bound, whatever the frequency."""
     draws = _draws(block, 1)
     coupling = draws.uniform(-0.25, 0.25, 3).tolist()
-    frequency = np.exp(draws.uniform(np.log(1.0), np.log(UNEXPLAINED_UP_TO_RAD_S), 3)).tolist()
     return {
         "inertia_coupling": dict(zip("pqr", coupling, strict=True)),
-        "sinusoid": {
-            axis: {"amplitude_rad_s2": 0.02, "frequency_rad_s": omega}
-            for axis, omega in zip("pqr", frequency, strict=True)
-        },
+        "sinusoid": swings(draws, [0.02] * 3, (1.0, UNEXPLAINED_UP_TO_RAD_S)),
     }
 
 

@@ -5,10 +5,10 @@ size found in a share of flights, by variants of a scenario) and `cells` (the sh
 flights, by schemes). The lines of all three have the columns of HEAD; what no line has is no column.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import product
 from operator import itemgetter
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,8 +16,8 @@ from beaver_ftc.results.metrics import NEAR_THRESHOLD_SHARE, as_json
 from beaver_ftc.results.model import Document
 from beaver_ftc.results.style import SERIES
 from beaver_ftc.studies.compare.scores import leader
-from beaver_ftc.studies.detectability import isolability
 from beaver_ftc.studies.detectability.certain import DETECT_WITHIN_S, ISOLATE_WITHIN_S, upwards
+from beaver_ftc.studies.detectability.isolability import DISTINGUISHED_LOSS
 from beaver_ftc.studies.detectability.probabilities import (
     JUDGED_S,
     SIGNIFICANT,
@@ -28,7 +28,7 @@ from beaver_ftc.studies.detectability.probabilities import (
 )
 from beaver_ftc.studies.detectability.schemes import BOTH, BUILT_IN, WATCHED_S, WITHIN_S
 from beaver_ftc.studies.present.figures import GRID, heat_map, label_edges, marker, panels
-from beaver_ftc.studies.present.page import Heading, Makers, Part, Pictures, Table, study_files
+from beaver_ftc.studies.present.page import Makers, Part, Pictures, Table, study_files
 from beaver_ftc.studies.present.tables import grouped, percent, seconds
 
 if TYPE_CHECKING:
@@ -38,26 +38,17 @@ if TYPE_CHECKING:
 NAME = "detectability"
 SOON = f"found within {'/'.join(f'{s:g}' for s in WITHIN_S)} s, %"
 HEAD = (
-    "loss of", "flown", "scheme", "certain from", "half of onsets from", "found in 90 % from",
-    "95 % interval", "flights", "false alarms/h", "before faults/h", SOON, "median delay",
+    "loss of", "taken for", "flown", "scheme", "certain from", "half of onsets from", "delay", "half: delay",
+    "doublet", "found in 90 % from", "95 % interval", "flights", "false alarms/h", "before faults/h", SOON,
+    "median delay",
 )  # fmt: skip
 OWN = ", default level"
 INFORMED = "informed test"
-Line = Mapping[str, str]  # cells by their column of HEAD
+Line = dict[str, str]  # cells by their column of HEAD
 
 
-class Shown(NamedTuple):
-    """A document in words. more: what a page and a text have below the table and its notes."""
-
-    title: str
-    sentences: Sequence[str]
-    lines: Sequence[Line]
-    notes: Sequence[str] = ()
-    more: Sequence[Part] = ()
-
-
-def shown(document: Document) -> Shown:
-    """A document in the words of its kind."""
+def page_of(document: Document) -> tuple[str, Sequence[Part]]:
+    """The title, and the parts of a page: sentences, table and notes; the text has no pictures."""
     if "points" in document:
         return _places(document)
     return _sizes(document) if "compared" in document else _schemes(document)
@@ -69,40 +60,48 @@ def table(lines: Sequence[Line]) -> Table:
     return Table(head, [[line.get(name, "") for name in head] for line in lines])
 
 
-def page_of(document: Document, *pictures: tuple[str, str]) -> tuple[str, Sequence[Part]]:
-    """The title; sentences, pictures, table and notes."""
-    words = shown(document)
-    drawn = [Pictures(pictures)] if pictures else []
-    return words.title, [*words.sentences, *drawn, table(words.lines), *words.notes, *words.more]
-
-
 # What is certain, by places.
 
 CERTAIN = (
-    "Certain: detected and isolated in time at so many places, whenever the loss starts or at half of the\n"
-    "possible start times, from the smallest loss at the best to that at the worst of these places."
+    "From the smallest loss at the best place to that at the worst, of so many places where some loss is\n"
+    "certain to be detected and isolated in time, whenever it starts and at half of the start times.\n"
+    "Taken for: the same until the other surface alone is excluded. Delay: until a total loss excludes it.\n"
+    f"Doublet: the smallest that distinguishes losses of {percent(DISTINGUISHED_LOSS)} in straight flight."
 )
 
 
-def _places(document: Document) -> Shown:
-    rows = document["points"]
+def _places(document: Document) -> tuple[str, Sequence[Part]]:
+    points = grouped(document["points"], "fault", "excitation").items()
     lines = [
-        {
-            "loss of": fault, "flown": f"{scale:g} x reference", "certain from": _span(of, "isolated"),
-            "half of onsets from": _span(of, "isolated_median"),
-        }
-        for (fault, scale), of in grouped(rows, "fault", "excitation").items()
-    ]  # fmt: skip
-    pairs = isolability.table(document["pairs"])
-    below = Table(isolability.TABLE_HEAD, pairs), isolability.TABLE_CAPTION
-    more = [Heading("Isolability"), *below] if pairs else []
-    return Shown(f"Detectability: {document['scenario']}", conclusions(rows), lines, [CERTAIN], more)
+        {"loss of": fault, "flown": _times(scale)} | _spans(of, "isolated") for (fault, scale), of in points
+    ]
+    for (fault, other, scale), of in grouped(document["pairs"], "fault", "other", "excitation").items():
+        shown = _spans(of, "magnitude") | {
+            "delay": _span(of, "longest_s", seconds), "half: delay": _span(of, "median_s", seconds),
+            "doublet": _span(of, "doublet_deg", lambda deg: f"{deg:.1f} deg"),
+        }  # fmt: skip
+        lines.append({"loss of": fault, "taken for": other, "flown": _times(scale), **shown})
+    drawn = (
+        ("smallest loss that is certain to be detected and isolated", NAME),
+        ("smallest loss that is distinguished from each other surface", "isolability"),
+    )
+    said = conclusions(document["points"])
+    return f"Detectability: {document['scenario']}", [*said, Pictures(drawn), table(lines), CERTAIN]
 
 
-def _span(rows: Sequence[Document], key: str) -> str:
-    certain = [row[key] for row in rows if row[key] is not None]
-    ends = f"{percent(min(certain))} to {percent(max(certain))}, " if certain else ""
-    return f"{ends}{len(certain)} of {len(rows)} places"
+def _times(scale: float) -> str:
+    return f"{scale:g} x reference"
+
+
+def _spans(rows: Sequence[Document], key: str) -> Line:
+    return {"certain from": _span(rows, key), "half of onsets from": _span(rows, f"{key}_median")}
+
+
+def _span(rows: Sequence[Document], key: str, form: Callable[[float], str] = percent) -> str:
+    """From the least to the largest value over the places that have one, and how many these are."""
+    known = [row[key] for row in rows if row[key] is not None]
+    ends = dict.fromkeys(map(form, (min(known), max(known)))) if known else ["-"]
+    return f"{' to '.join(ends)} ({len(known)}/{len(rows)})"
 
 
 def conclusions(rows: Sequence[Document]) -> list[str]:
@@ -130,7 +129,7 @@ def draw_places(document: Document) -> "Figure":
     rows = document["points"]
     names = [[f"{x:g}" for x in sorted({row[key] for row in rows})] for key in ("altitude_m", "airspeed_mps")]
     maps = {
-        f"{fault}, {scale:g} x reference": {
+        f"{fault}, {_times(scale)}": {
             (f"{row['altitude_m']:g}", f"{row['airspeed_mps']:g}"): (
                 row["detected"], f"{_short(row['detected'])}\n{_short(row['isolated'])}"
             )
@@ -149,16 +148,16 @@ def draw_places(document: Document) -> "Figure":
 def draw_pairs(document: Document) -> "Figure":
     """A map an excitation. A row is the surface that loses effectiveness, a column the surface that the loss
     could be taken for."""
-    of_pairs = isolability.worst_by_pair(document["pairs"])
-    faults = [*dict.fromkeys(fault for fault, _, _ in of_pairs)]
+    faults = [*dict.fromkeys(row["fault"] for row in document["pairs"])]
     maps: dict[str, Any] = {}
-    for (fault, other, scale), of in of_pairs.items():
-        cell = of["half"][0], "\n".join(isolability.cell_line(how, of) for how in ("half", "always"))
-        maps.setdefault(f"{scale:g} x reference", {})[fault, other] = cell
+    for (fault, other, scale), of in grouped(document["pairs"], "fault", "other", "excitation").items():
+        half = [row["magnitude_median"] for row in of]
+        cell = None if None in half else max(half), "\n".join(reversed(_spans(of, "magnitude").values()))
+        maps.setdefault(_times(scale), {})[fault, other] = cell
     size = 1.55 * len(faults) + 0.3, 0.65 * len(faults) + 0.8
     return _maps(
-        f"{document['scenario']}: smallest loss distinguished from that of another surface, and the time\n"
-        "of a total one (half: at half of the instants; always: at every instant; hatched: no loss)",
+        f"{document['scenario']}: smallest loss distinguished from that of another surface, and places\n"
+        "(upper numbers: at half of the instants; lower numbers: at every instant; hatched: no loss)",
         maps, min(3, len(maps)), size, (faults, faults), ("loss of", "taken for"),
     )  # fmt: skip
 
@@ -195,7 +194,7 @@ def _short(magnitude: float | None) -> str:
 # The size found in a share of flights, by variants of a scenario.
 
 
-def _sizes(document: Document) -> Shown:
+def _sizes(document: Document) -> tuple[str, Sequence[Part]]:
     lines = [
         {
             "loss of": document["surface"], "flown": row["variant"],
@@ -206,7 +205,7 @@ def _sizes(document: Document) -> Shown:
         for row in _variants(document)
     ]  # fmt: skip
     title = f"Detectability: {document['surface']} of {document['scenario']}"
-    return Shown(title, list(_size_sentences(document)), lines)
+    return title, [*_size_sentences(document), table(lines)]
 
 
 def _variants(document: Document) -> list[Document]:
@@ -317,13 +316,14 @@ def rows_of_sizes(document: Document) -> list[Document]:
 # The share found in a grid of flights, by schemes.
 
 
-def _schemes(document: Document) -> Shown:
+def _schemes(document: Document) -> tuple[str, Sequence[Part]]:
     conditions = document["grid"]["conditions"]
     said = [f"{title_of(*where)}, {one}" for where in conditions for one in who_is_better(document, *where)]
     said += comparison(document)
     said += [f"could not be judged: {failure}" for failure in document["failures"]]
     lines = [line for condition in conditions for line in _scheme_lines(document, *condition)]
-    return Shown("Detectability: schemes on the same flights", said, lines, _legend(document))
+    drawn = Pictures([("share of the losses that each scheme detects", NAME)])
+    return "Detectability: schemes on the same flights", [*said, drawn, table(lines), *_legend(document)]
 
 
 def _scheme_lines(document: Document, sensors: str, turbulence: str) -> Iterator[Line]:
@@ -466,18 +466,16 @@ def _draw(panel: "Axes", rows: Sequence[Row], names: Sequence[str], document: Do
 
 
 OF_PLACES: Makers = study_files(
-    NAME,
-    lambda document: page_of(
-        document, ("smallest loss that is certain to be detected and isolated", NAME),
-        ("smallest loss that is distinguished from each other surface", "isolability"),
-    ),
-    {NAME: itemgetter("points"), "isolability": itemgetter("pairs")},
+    NAME, page_of, {NAME: itemgetter("points"), "isolability": itemgetter("pairs")},
     {NAME: draw_places, "isolability": draw_pairs},
 )  # fmt: skip
 OF_SIZES: Makers = study_files(NAME, page_of, {NAME: rows_of_sizes}, {})
 # Of the document and of one row a flight and scheme.
-OF_SCHEMES: Makers = study_files(
-    NAME, lambda survey: page_of(survey[0], ("share of the losses that each scheme detects", NAME)),
-    {NAME: itemgetter(1)}, {NAME: lambda survey: draw_schemes(*survey)},
-) | {f"{NAME}.json": lambda survey: as_json(survey[0])}  # fmt: skip
-FILES = tuple(OF_PLACES | OF_SIZES | OF_SCHEMES)
+OF_SCHEMES: Makers = {
+    **study_files(
+        NAME, lambda survey: page_of(survey[0]), {NAME: itemgetter(1)},
+        {NAME: lambda survey: draw_schemes(*survey)},
+    ),
+    f"{NAME}.json": lambda survey: as_json(survey[0]),
+}  # fmt: skip
+FILES = tuple(OF_PLACES)

@@ -25,9 +25,10 @@ from beaver_ftc.results.writer import result_folder
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.signals import TIME_TOLERANCE_S
-from beaver_ftc.studies.detectability.certain import SETTLED_S
+from beaver_ftc.studies.detectability.certain import AMPLITUDES, SETTLED_S, scaled
 from beaver_ftc.studies.detectability.shown import NAME, OF_SIZES
 from beaver_ftc.studies.detectability.thresholds import LARGEST, STAGES, Threshold, of_all, threshold
+from beaver_ftc.studies.engine.draws import loss
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, counted
 from beaver_ftc.studies.engine.study import FlyRound, Study, in_rounds
 from beaver_ftc.studies.present.page import contents, write_files
@@ -75,11 +76,8 @@ class _Flown:
             self.tell(f"{variant}: {len(self.rows)} flights")
         return [self.rows[flight] for flight in wanted]
 
-    def found(self, variant: str, runs: Sequence[int], size: int) -> list[bool]:
-        return [row["found"] for row in self.of(variant, runs, size)]
-
-    def certain(self, variant: str, runs: Sequence[int], size: int) -> list[bool]:
-        return [row["certain"] for row in self.of(variant, runs, size)]
+    def says(self, variant: str, key: str, runs: Sequence[int], size: int) -> list[bool]:
+        return [row[key] for row in self.of(variant, runs, size)]
 
 
 def run_sizes(
@@ -123,8 +121,8 @@ def fly_one(variants: dict[str, Scenario], asked: Asked, flight: Flight) -> Docu
     seed = int(draws.integers(2**31))
     frames = round(draws.uniform(SETTLED_S, scenario.duration_s - asked.within_s) * scenario.rate_hz)
     at_s = frames / scenario.rate_hz
-    loss = {"type": "loss_of_effectiveness", "actuator": asked.surface, "magnitude": flight.size / LARGEST}
-    flown = scenario.with_({"seed": seed, "faults": [loss | {"at_s": at_s}], "expect": {}})
+    fault = loss(asked.surface, flight.size / LARGEST, at_s)
+    flown = scenario.with_({"seed": seed, "faults": [fault], "expect": {}})
     ends_s = min(at_s + asked.within_s + 2.0 / scenario.rate_hz, scenario.duration_s)
     try:
         landing = fly(flown.model_copy(update={"duration_s": ends_s}))
@@ -175,7 +173,7 @@ def _other_references(scenario: Scenario, surface: str) -> Iterator[tuple[str, D
     aircraft = scenario.airframe
     axis = "pqr"[aircraft.dominant_axis[aircraft.surfaces.index(surface)]]
     signals = scenario.model_dump(mode="json", exclude_none=True)["reference"].get(axis, [])
-    louder, faster = (_scaled(signals, keys) for keys in (_AMPLITUDES, _FREQUENCIES))
+    louder, faster = (scaled(signals, keys, 2.0) for keys in (AMPLITUDES, _FREQUENCIES))
     if louder != signals:
         yield f"with twice the amplitude of reference.{axis}", {f"reference.{axis}": louder}
     if faster != signals:
@@ -186,22 +184,7 @@ def _other_references(scenario: Scenario, surface: str) -> Iterator[tuple[str, D
         yield says, {f"reference.{axis}": [{"sine": sine}]}
 
 
-_AMPLITUDES = {"amplitude_deg_s", "values_deg_s"}
-_FREQUENCIES = {"frequency_hz", "start_frequency_hz", "end_frequency_hz"}
-
-
-def _scaled(signals: Sequence[Document], keys: set[str], times: float = 2.0) -> list[Document]:
-    """Reference signals with these of their parameters multiplied."""
-    return [
-        {
-            name: {
-                key: (np.asarray(value) * times).tolist() if key in keys else value
-                for key, value in of.items()
-            }
-            for name, of in signal.items()
-        }
-        for signal in signals
-    ]
+_FREQUENCIES = ("frequency_hz", "start_frequency_hz", "end_frequency_hz")
 
 
 def _document(scenario: Scenario, asked: Asked, variants: dict[str, Scenario], flown: _Flown) -> Document:
@@ -228,11 +211,10 @@ def _document(scenario: Scenario, asked: Asked, variants: dict[str, Scenario], f
 
 def _answer(variant: str, flown: _Flown, stages: Sequence[int]) -> Document:
     """The two sizes of one variant, as shares of the effectiveness, and what a total loss comes to."""
-    found = threshold(partial(flown.found, variant), SHARE, CONFIDENCE, stages)
-    certain = of_all(partial(flown.certain, variant), stages[0])
+    found = threshold(partial(flown.says, variant, "found"), SHARE, CONFIDENCE, stages)
+    certain = of_all(partial(flown.says, variant, "certain"), stages[0])
     total = flown.of(variant, range(found.flights), LARGEST)
-    at_all = [flown.of(variant, range(stages[0]), LARGEST)]
-    sure = sum(row["certain"] for rows in at_all for row in rows)
+    sure = sum(flown.says(variant, "certain", range(stages[0]), LARGEST))
     return {
         "variant": variant,
         "found": _shares(found),

@@ -76,56 +76,56 @@ def _within(value: float, limits: tuple[float, float]) -> float:
     return float(np.clip(value, *limits))
 
 
-def _coefficients(scenario: Scenario, declared: Declared) -> Error:
-    names = [term.name for term in scenario.airframe.moments]
-    shares = {name: declared.coefficients.of(name) for name in names}
-    known = any(shares.values())
-    shares = shares if known else dict.fromkeys(names, UNDECLARED_SHARE)
+def _signed(sizes: Mapping[str, float], usual: float, limits: tuple[float, float]) -> Change:
+    """Of each key its usual value, so many times its size more or less, within the limits."""
 
     def change(times: float, draws: np.random.Generator) -> Document:
-        signs = _signs(draws, names)
-        ratios = {name: _within(1.0 + times * signs[name] * shares[name], _RATIO) for name in names}
-        return {"uncertainty.coefficients": ratios}
+        signs = _signs(draws, [*sizes])
+        return {key: _within(usual + times * signs[key] * size, limits) for key, size in sizes.items()}
 
+    return change
+
+
+def _below(section: str, change: Change) -> Change:
+    return lambda times, draws: {section: change(times, draws)}
+
+
+def _of_ratios(what: str, section: str, shares: Mapping[str, float], limits: tuple[float, float]) -> Error:
+    """Factors of the truth that are off by shares of which some are declared, or by a unit of its own."""
+    known = any(shares.values())
+    shares = shares if known else dict.fromkeys(shares, UNDECLARED_SHARE)
     largest = f"{100.0 * max(shares.values()):g} %"
-    return Error("moment coefficients", largest if known else _unknown(largest), change, known)
+    change = _below(section, _signed(shares, 1.0, limits))
+    return Error(what, largest if known else _unknown(largest), change, known)
+
+
+def _coefficients(scenario: Scenario, declared: Declared) -> Error:
+    shares = {term.name: declared.coefficients.of(term.name) for term in scenario.airframe.moments}
+    return _of_ratios("moment coefficients", "uncertainty.coefficients", shares, _RATIO)
 
 
 def _inertia(share: float) -> Error:
-    size, names = share or UNDECLARED_SHARE, ("Ix", "Iy", "Iz")
-
-    def change(times: float, draws: np.random.Generator) -> Document:
-        signs = _signs(draws, names)
-        return {
-            f"uncertainty.inertia.{name}": _within(1.0 + times * signs[name] * size, _INERTIA)
-            for name in names
-        }
-
-    says = f"{100.0 * size:g} %"
-    return Error("moments of inertia", says if share else _unknown(says), change, share > 0.0)
+    shares = dict.fromkeys(("Ix", "Iy", "Iz"), share)
+    return _of_ratios("moments of inertia", "uncertainty.inertia", shares, _INERTIA)
 
 
 def _coupling(theta: Sequence[float]) -> Error:
-    def change(times: float, draws: np.random.Generator) -> Document:
-        signs = _signs(draws, AXES)
-        return {
-            f"uncertainty.inertia_coupling.{axis}": _within(times * signs[axis] * size, (-1.0, 1.0))
-            for axis, size in zip(AXES, theta, strict=True)
-        }
-
-    return Error("inertia coupling", f"{max(theta):g}", change)
+    change = _signed(dict(zip(AXES, theta, strict=True)), 0.0, (-1.0, 1.0))
+    return Error("inertia coupling", f"{max(theta):g}", _below("uncertainty.inertia_coupling", change))
 
 
 def _acceleration(scenario: Scenario, sizes: Sequence[float]) -> Error:
-    flown = scenario.uncertainty.sinusoid
+    """Of the frequencies that the scenario flies, where it flies any."""
+    flown = {axis: getattr(scenario.uncertainty.sinusoid, axis) for axis in AXES}
+    known = {axis: wave.frequency_rad_s for axis, wave in flown.items() if wave.amplitude_rad_s2}
 
     def change(times: float, draws: np.random.Generator) -> Document:
         drawn = dict(zip(AXES, draws.uniform(*FREQUENCIES_RAD_S, len(AXES)).tolist(), strict=True))
-        waves = {axis: getattr(flown, axis) for axis in AXES}
-        known = {axis: wave.frequency_rad_s for axis, wave in waves.items() if wave.amplitude_rad_s2}
         return {
-            f"uncertainty.sinusoid.{axis}": {"amplitude_rad_s2": times * size, "frequency_rad_s": at}
-            for (axis, at), size in zip((drawn | known).items(), sizes, strict=True)
+            "uncertainty.sinusoid": {
+                axis: {"amplitude_rad_s2": times * size, "frequency_rad_s": at}
+                for (axis, at), size in zip((drawn | known).items(), sizes, strict=True)
+            }
         }
 
     return Error("unstructured acceleration", f"{max(sizes):g} rad/s2", change)

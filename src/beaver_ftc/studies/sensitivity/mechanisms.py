@@ -24,6 +24,7 @@ from beaver_ftc.scenario.airframe import air_of
 from beaver_ftc.scenario.declared import undeclared
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.compare.margins_in_flight import margins_of
+from beaver_ftc.studies.engine.draws import loss, sines, swings
 from beaver_ftc.studies.present.tables import finite
 from beaver_ftc.studies.sensitivity.systems import (
     CONSTANT,
@@ -59,7 +60,6 @@ FACTORS: Mapping[str, tuple[Any, ...]] = {
 DRAWS = 3  # of a cell
 AIRSPEED_MPS, STRIKES_S, AFTER_S = (38.0, 52.0), (6.0, 9.0), 8.0
 RATE_HZ, AMPLITUDE_DEG_S = 100.0, 3.0
-FREQUENCY_HZ = {"p": 0.25, "q": 0.2, "r": 0.15}
 SWINGS_RAD_S = (1.0, 15.0)  # frequencies of the unstructured acceleration
 
 
@@ -96,10 +96,10 @@ def scenario_of(flight: Flight, seed: int, system: str) -> Scenario:
             "duration_s": at_s + AFTER_S,
             "rate_hz": RATE_HZ,
             "initial": {"airspeed_mps": float(draws.uniform(*AIRSPEED_MPS))},
-            "reference": _reference(draws),
+            "reference": sines(draws, AMPLITUDE_DEG_S),
             "sensors": sensors,
             "environment": air_of(air),
-            "faults": [_fault(flight) | {"at_s": at_s}],
+            "faults": [_fault(flight, at_s)],
             "fdi": {
                 "bounds": {
                     "sensors": sensors,
@@ -114,33 +114,19 @@ def scenario_of(flight: Flight, seed: int, system: str) -> Scenario:
     return scenario.with_({**SYSTEMS[system], **_bandwidth(flight, system), **errors})
 
 
-def _reference(draws: np.random.Generator) -> Document:
-    sines = zip(FREQUENCY_HZ.items(), draws.uniform(-180.0, 180.0, len(AXES)).tolist(), strict=True)
-    return {
-        axis: [{"sine": {"amplitude_deg_s": AMPLITUDE_DEG_S, "frequency_hz": hz, "phase_deg": phase_deg}}]
-        for (axis, hz), phase_deg in sines
-    }
-
-
-def _fault(flight: Flight) -> Document:
+def _fault(flight: Flight, at_s: float) -> Document:
     if flight.fault == UNANTICIPATED:
-        return {"type": "unanticipated", "Cm_alpha3": 10.0}
-    kind = {"type": "loss_of_effectiveness", "actuator": surface_of(flight)}
-    return kind | {"magnitude": LOSSES[flight.fault]}
+        return {"type": "unanticipated", "Cm_alpha3": 10.0, "at_s": at_s}
+    return loss(surface_of(flight), LOSSES[flight.fault], at_s)
 
 
 def _errors(coupling: float, swing_rad_s2: float, draws: np.random.Generator) -> Document:
     """Errors of the model somewhere within what is declared."""
     thetas = draws.uniform(-coupling, coupling, len(AXES)).tolist()
     sizes = draws.uniform(0.0, swing_rad_s2, len(AXES)).tolist()
-    slowest, fastest = np.log(SWINGS_RAD_S)
-    swings = np.exp(draws.uniform(slowest, fastest, len(AXES))).tolist()
     return {
         "uncertainty.inertia_coupling": dict(zip(AXES, thetas, strict=True)),
-        "uncertainty.sinusoid": {
-            axis: {"amplitude_rad_s2": size, "frequency_rad_s": rad_s}
-            for axis, size, rad_s in zip(AXES, sizes, swings, strict=True)
-        },
+        "uncertainty.sinusoid": swings(draws, sizes, SWINGS_RAD_S),
     }
 
 

@@ -121,13 +121,15 @@ def detection_magnitude(z: np.ndarray, bound: np.ndarray) -> np.ndarray:
         return np.min(2.0 * bound / np.abs(z), axis=1)
 
 
-def mismatch(z: np.ndarray, other: np.ndarray, bound: np.ndarray) -> np.ndarray:
-    """M_sj (n,) of m z_s = `z` and z_j = `other`, (n, 3): convex and piecewise linear in b."""
+def mismatch(
+    z: np.ndarray, other: np.ndarray, bound: np.ndarray, limits: tuple[float, float] = (0.0, 1.0)
+) -> np.ndarray:
+    """M_sj (n,) of m z_s = `z` and z_j = `other`, (n, 3): convex and piecewise linear in b, within limits."""
     a, b = z / (2.0 * bound), other / (2.0 * bound)
     best = np.full(len(a), np.inf)
     for candidate in _corners(a, b):
-        b_share = np.clip(np.nan_to_num(candidate, nan=0.0, posinf=1.0, neginf=0.0), 0.0, 1.0)
-        best = np.minimum(best, np.abs(a - b_share[:, None] * b).max(axis=1))
+        share = np.clip(np.nan_to_num(candidate, nan=0.0, posinf=0.0, neginf=0.0), *limits)
+        best = np.minimum(best, np.abs(a - share[:, None] * b).max(axis=1))
     return best
 
 
@@ -162,10 +164,8 @@ def best_in_window(values: np.ndarray, frames: int) -> np.ndarray:
 def least_distinguished_rad(column: np.ndarray, other: np.ndarray, bound: np.ndarray) -> float:
     """The least deflection off its command, rad, of a surface with this column of G (3,) that a frame's rates
     are certain to tell from every deflection of another; inf where the columns are parallel. bound (3,)."""
-    a, b = (each[None, :] / (2.0 * bound) for each in (column, other))
-    tried = np.concatenate([each for each in _corners(a, b) if np.all(np.isfinite(each))])
-    least = np.abs(a - tried[:, None] * b).max(axis=1).min()
-    return 1.0 / float(least) if least > 1e-9 * np.abs(a).max() else inf
+    least = float(mismatch(column[None], other[None], bound[None], (-inf, inf))[0])
+    return 1.0 / least if least > 1e-9 * np.abs(column / (2.0 * bound)).max() else inf
 
 
 def alike(scenario: Scenario) -> list[Document]:
@@ -192,13 +192,11 @@ def geometry(pairs: Sequence[Document]) -> list[str]:
     """A line a pair."""
     lines = []
     for pair in pairs:
-        apart = [(name, x) for name, x in pair["told_apart_from_deg"].items() if x is not None]
-        told = " or ".join(f"{name} is at least {x:.2g} deg off its command" for name, x in apart)
-        forces = ", accelerometers do" if pair["by_forces"] and not told else ""
-        says = (
-            f"the rates distinguish them if {told}" if told else f"the rates never distinguish them{forces}"
-        )
-        lines.append(f"{' and '.join(pair['surfaces'])} have similar effects on the rates: {says}")
+        apart = {name: x for name, x in pair["told_apart_from_deg"].items() if x is not None}
+        told = " or ".join(f"{name} is at least {x:.2g} deg off its command" for name, x in apart.items())
+        never = f"never distinguish them{', accelerometers do' * pair['by_forces']}"
+        says = f"distinguish them if {told}" if told else never
+        lines.append(f"{' and '.join(pair['surfaces'])} have similar effects on the rates: the rates {says}")
     return lines
 
 
@@ -225,8 +223,8 @@ def engine_failures(scenario: Scenario) -> list[Document]:
     for e, name in enumerate(aircraft.effectors):
         turns = np.abs(effects[:, e]) * gained
         shows = 1.0 / float(detection_magnitude(turns[None], bound[None])[0])
-        turned = turns.tolist()
-        found.append({"engine": name, "turns_rad_s2": turned, "shows": shows, "known": known, "held": held})
+        seen = {"turns_rad_s2": turns.tolist(), "shows": shows, "known": known, "held": held}
+        found.append({"engine": name, **seen})
     return found
 
 
@@ -254,13 +252,13 @@ def with_aircraft(scenario: Scenario, reference: str) -> Scenario:
 
 def answers(scenario: Scenario, rows: Sequence[Document]) -> list[str]:
     """A line a row: from which loss on a surface's fault is certain to be found there."""
-    aircraft = scenario.airframe
-    axis_of = dict(zip(aircraft.surfaces, aircraft.dominant_axis, strict=True))
-    return [_answer(scenario, AXES[axis_of[row["fault"]]], row) for row in rows]
+    return [_answer(scenario, row) for row in rows]
 
 
-def _answer(scenario: Scenario, axis: str, row: Document) -> str:
-    asked = _amplitude_deg_s(scenario, axis) * row["excitation"]
+def _answer(scenario: Scenario, row: Document) -> str:
+    axis = axis_of(scenario, row["fault"])
+    signals = (signal.shape for signal in getattr(scenario.reference, axis))
+    asked = row["excitation"] * sum(float(getattr(shape, "amplitude_deg_s", 0.0)) for shape in signals)
     place = f"at {row['airspeed_mps']:g} m/s and {row['altitude_m']:g} m, {asked:g} deg/s of {MOTION[axis]}"
     fault, detected, isolated = row["fault"], row["detected"], row["isolated"]
     soon = f"is certain to be detected within {DETECT_WITHIN_S:g} s"
@@ -277,10 +275,10 @@ def upwards(magnitude: float) -> str:
     return f"{ceil(100.0 * magnitude - 1e-9)} %"
 
 
-def _amplitude_deg_s(scenario: Scenario, axis: str) -> float:
-    """The amplitudes of an axis' reference together; 0 where it asks for nothing that has one."""
-    signals = (signal.shape for signal in getattr(scenario.reference, axis))
-    return sum(float(getattr(shape, "amplitude_deg_s", 0.0)) for shape in signals)
+def axis_of(scenario: Scenario, surface: str) -> str:
+    """The axis on which a surface shows most."""
+    aircraft = scenario.airframe
+    return AXES[aircraft.dominant_axis[aircraft.surfaces.index(surface)]]
 
 
 def survey_name(scenario: Scenario) -> str:

@@ -214,9 +214,21 @@ def _variants(document: Document) -> list[Document]:
 
 def _size_sentences(document: Document) -> Iterator[str]:
     """What is certain, what is found, what limits it, and what would help."""
-    within = f"within {document['within_s']:g} s"
-    yield _certain(document, within)
-    yield _found(document, within)
+    certain, found, total = (document[key] for key in ("certain", "found", "total_loss"))
+    surface, within = document["surface"], f"within {document['within_s']:g} s"
+    nothing = f"not even a total loss of {surface}"
+    loss = "a loss of {} of the effectiveness of " + surface
+    size = nothing if certain["size"] is None else f"{loss.format(percent(certain['size']))} and more"
+    yield (
+        f"Certain to be detected {within}, whatever the declared uncertainty does: {size} (a total loss: in "
+        f"{certain['at_total_loss']} of {certain['flights']} flights)."
+    )
+    size = nothing if found["size"] is None else loss.format(f"{percent(found['size'])} ({_interval(found)})")
+    yield (
+        f"Found {within} in {percent(document['share'])} of flights: {size} (a total loss: in "
+        f"{percent(total['value'])}, {percent(total['low'], '')} to {percent(total['high'])}; "
+        f"{total['count']} of {total['of']} flights). Intervals: 95 %."
+    )
     yield from (
         f"Nothing can be concluded in part of these flights: {why}." for why in document["inconclusive"]
     )
@@ -226,47 +238,19 @@ def _size_sentences(document: Document) -> Iterator[str]:
             "loss: the size found then measures the uncertainty that the scenario flies with, not the "
             "diagnosis."
         )
-    if document["false_alarms"]:
-        yield (
-            f"In {document['false_alarms']} of {document['total_loss']['of']} flights an alarm came before "
-            "the loss: these count as not found."
-        )
-    if document["failed"]:
-        yield f"{document['failed']} flights could not be flown to the end: these count as not found."
-    for lead, what, references in (
-        ("What limits it most", "What limits it: nothing that was left out alone", False),
-        ("Which reference would help", "Which reference would help: none of those that were tried", True),
+    for count, what in (
+        (document["false_alarms"], "have an alarm before the loss"),
+        (document["failed"], "cannot be flown to the end"),
+    ):
+        if count:
+            yield f"{count} flights with a total loss {what}: these count as not found."
+    for lead, tried, references in (
+        ("What limits it most", "nothing that was left out alone", False),
+        ("Which reference would help", "none of those that were tried", True),
     ):
         best = _best(document, references)
-        nothing = f"{what} makes a difference outside of the intervals."
-        yield nothing if best is None else f"{lead}: {_effect(best)}."
-
-
-def _certain(document: Document, within: str) -> str:
-    certain, surface = document["certain"], document["surface"]
-    if certain["size"] is None:
-        return (
-            f"Not even a total loss of {surface} is certain to be detected {within}: "
-            f"it was in {certain['at_total_loss']} of {certain['flights']} flights."
-        )
-    return (
-        f"A loss of {percent(certain['size'])} of the effectiveness of {surface} and more is certain to be "
-        f"detected {within}: in each of {certain['flights']} flights, whatever the declared uncertainty does."
-    )
-
-
-def _found(document: Document, within: str) -> str:
-    found, total, share = document["found"], document["total_loss"], percent(document["share"])
-    if found["size"] is None:
-        return (
-            f"Not even a total loss of {document['surface']} is found {within} in {share} of flights: it is "
-            f"in {percent(total['value'])} (95 % interval {percent(total['low'], '')} to "
-            f"{percent(total['high'])}; {total['count']} of {total['of']})."
-        )
-    return (
-        f"A loss of {percent(found['size'])} of the effectiveness of {document['surface']} is found {within} "
-        f"in {share} of flights (95 % interval {_interval(found)}; {found['flights']} flights)."
-    )
+        none = f"{tried} makes a difference outside of the intervals"
+        yield f"{lead}: {none if best is None else _effect(best)}."
 
 
 def _is_better(other: Document, document: Document) -> bool:

@@ -25,7 +25,7 @@ from beaver_ftc.results.writer import result_folder
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.signals import TIME_TOLERANCE_S
-from beaver_ftc.studies.detectability.certain import AMPLITUDES, SETTLED_S, scaled
+from beaver_ftc.studies.detectability.certain import AMPLITUDES, SETTLED_S, axis_of, scaled
 from beaver_ftc.studies.detectability.shown import NAME, OF_SIZES
 from beaver_ftc.studies.detectability.thresholds import LARGEST, STAGES, Threshold, of_all, threshold
 from beaver_ftc.studies.engine.draws import loss
@@ -170,8 +170,7 @@ def _left_out(scenario: Scenario) -> Iterator[tuple[str, Document]]:
 
 def _other_references(scenario: Scenario, surface: str) -> Iterator[tuple[str, Document]]:
     """References that move the surface more: on the axis on which it shows."""
-    aircraft = scenario.airframe
-    axis = "pqr"[aircraft.dominant_axis[aircraft.surfaces.index(surface)]]
+    axis = axis_of(scenario, surface)
     signals = scenario.model_dump(mode="json", exclude_none=True)["reference"].get(axis, [])
     louder, faster = (scaled(signals, keys, 2.0) for keys in (AMPLITUDES, _FREQUENCIES))
     if louder != signals:

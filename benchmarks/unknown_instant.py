@@ -199,7 +199,7 @@ class Seen:
 
     def level(self, drawn: np.ndarray) -> float:
         """Of PER_H false alarms, of the healthy flights drawn."""
-        return level_for([self.healthy[i] for i in drawn], PER_H).level
+        return level_for([self.healthy[i] for i in drawn], PER_H)
 
     def found(self, level: float) -> np.ndarray:
         """Which losses (n,) are found in time, and no alarm was raised before."""

@@ -10,12 +10,11 @@ from hypothesis import strategies as st
 
 from beaver_ftc.diagnosis.informed_test import detection_probability
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.studies.compare.replay import Trace, record
+from beaver_ftc.studies.compare.replay import Trace, alarms_at, record
 from beaver_ftc.studies.detectability.command import run_schemes
 from beaver_ftc.studies.detectability.probabilities import (
     JUDGED_S,
     document_of,
-    level_at,
     level_for,
     limit,
     rows_of,
@@ -114,19 +113,19 @@ class TestLevels:
     def test_no_more_alarms_than_allowed_and_no_lower_level_would_do(self, largest, per_h):
         traces = healthy(*largest)
         level = level_for(traces, per_h)
-        assert level.alarms <= max(per_h * level.hours, 0.0) + 1e-6
-        assert level.alarms == sum(value > level.level for value in largest)
-        below = [value for value in largest if value < level.level]
+        alarms, hours = alarms_at(traces, level)
+        assert alarms <= max(per_h * hours, 0.0) + 1e-6
+        assert alarms == sum(value > level for value in largest)
+        below = [value for value in largest if value < level]
         if below:
-            assert level_at(traces, max(below)).alarms > per_h * level.hours - 1e-6
+            assert alarms_at(traces, max(below))[0] > per_h * hours - 1e-6
 
     def test_the_hours_end_with_the_alarm_as_in_a_sweep(self):
         """Two flights of an hour, one alarmed at the level 2 after 900 s: 1.25 h, not 2."""
         rising = Trace(3.0, (), False, 3600.0, rises=((0.0, 1.0), (900.0, 2.5), (1800.0, 3.0)))
         quiet = Trace(1.5, (), False, 3600.0, rises=((0.0, 1.5),))
         assert [rising.fault_free_s(level) for level in (0.5, 2.0, 2.7, 4.0)] == [0.0, 900.0, 1800.0, 3600.0]
-        found = level_at([rising, quiet], 2.0)
-        assert (found.alarms, found.hours) == (1, 1.25)
+        assert alarms_at([rising, quiet], 2.0) == (1, 1.25)
 
 
 def watched(seed, **delays):
@@ -140,7 +139,7 @@ def watched(seed, **delays):
 
 class TestCounts:
     def test_a_row_has_the_delay_at_the_common_level_and_at_the_schemes_own(self):
-        levels = {(*STILL, "a"): level_at(healthy(2.0), 2.0), (*STILL, "b"): level_at(healthy(0.4), 0.4)}
+        levels = {(*STILL, "a"): 2.0, (*STILL, "b"): 0.4}
         found, missed = rows_of([watched(1, a=0.7, b=0.7)], levels)
         assert (found["delay_s"], found["own_delay_s"], found["false_alarm"]) == (0.7, 0.2, False)
         assert (missed["delay_s"], missed["false_alarm"], missed["own_false_alarm"]) == (None, True, False)
@@ -159,7 +158,7 @@ class TestCounts:
         assert summary([rows[-1]])["flights"] == 0
 
     def test_the_limit_counts_a_flight_once_however_many_schemes_watched_it(self):
-        levels = {(*STILL, scheme): level_at(healthy(2.0), 2.0) for scheme in "ab"}
+        levels = {(*STILL, scheme): 2.0 for scheme in "ab"}
         far = watched(2, a=0.1)
         far.deflections = [[100.0] * 3]
         found = limit(rows_of([watched(1, a=0.7, b=0.7), far], levels), 36.0)

@@ -1,7 +1,7 @@
 """From traces to alarm levels at an equal false-alarm rate, rows, probabilities, and one document."""
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from itertools import product
 from math import inf
 from statistics import fmean
@@ -13,38 +13,27 @@ from beaver_ftc.results.metrics import versions
 from beaver_ftc.results.model import Document
 from beaver_ftc.studies.compare.replay import Trace, alarms_at
 from beaver_ftc.studies.detectability.schemes import BUILT_IN, WATCHED_S, WITHIN_S, Grid, Watched
-from beaver_ftc.studies.engine.statistics import Estimate, binomial, poisson, share_within, sign_test
+from beaver_ftc.studies.engine.statistics import binomial, poisson, share_within, sign_test
 from beaver_ftc.studies.present.tables import finite, grouped
 
 
-@dataclass(frozen=True)
-class Level:
-    """An alarm level, and the false alarms it costs: counted, in so many hours, per hour with limits."""
-
-    level: float
-    alarms: int
-    hours: float
-
-    @property
-    def per_h(self) -> Estimate:
-        """False alarms per hour with their exact two-sided limits."""
-        return poisson(self.alarms, self.hours)
-
-
-def level_for(healthy: Sequence[Trace], per_h: float) -> Level:
+def level_for(healthy: Sequence[Trace], per_h: float) -> float:
     """The most sensitive level with no more false alarms than this; a flight raises one at most."""
-    strictest, *others = sorted({trace.before for trace in healthy}, reverse=True)
-    best = level_at(healthy, strictest)
-    for found in (level_at(healthy, level) for level in others):
-        if found.alarms > per_h * found.hours + 1e-9:
+    best, *others = sorted({trace.before for trace in healthy}, reverse=True)
+    for level in others:
+        alarms, hours = alarms_at(healthy, level)
+        if alarms > per_h * hours + 1e-9:
             break
-        best = found
+        best = level
     return best
 
 
-def level_at(healthy: Sequence[Trace], level: float) -> Level:
-    """What a level costs in false alarms, over the time until they were raised."""
-    return Level(level, *alarms_at(healthy, level))
+def _counted(traces: Sequence[Trace], level: float) -> Document:
+    """What a level costs in false alarms, over the time until they were raised, with exact limits."""
+    alarms, hours = alarms_at(traces, level)
+    rates = vars(poisson(alarms, hours)).values()
+    names = ("per_h", "per_h_low", "per_h_high")
+    return {"alarms": alarms, "hours": hours, **dict(zip(names, map(finite, rates), strict=True))}
 
 
 Row = Document
@@ -64,7 +53,7 @@ def _by_condition(watched: Iterable[Watched]) -> dict[Key, list[Trace]]:
     return traces
 
 
-def rows_of(faulted: Iterable[Watched], levels: dict[Key, Level]) -> list[Row]:
+def rows_of(faulted: Iterable[Watched], levels: dict[Key, float]) -> list[Row]:
     """One row a flight and scheme.
 
     delay_s at the common level, own_delay_s at the scheme's own; None where there is no alarm. An alarm
@@ -77,7 +66,7 @@ def rows_of(faulted: Iterable[Watched], levels: dict[Key, Level]) -> list[Row]:
         ), strict=True))
         for one in faulted
         for scheme, traces in one.traces.items()
-        for level in [levels[(*one.block.condition, scheme)].level]
+        for level in [levels[(*one.block.condition, scheme)]]
         for fault, trace, deflections in zip(one.faults, traces, one.deflections, strict=True)
         if trace.faulted
     ]  # fmt: skip
@@ -140,11 +129,11 @@ def document_of(
         "levels": [
             {
                 **dict(zip(("sensors", "turbulence", "scheme"), key, strict=True)),
-                "level": level.level,
-                "calibration": _counted(level),
+                "level": level,
+                "calibration": _counted(watched[key], level),
                 # on flights that had no part in setting it
-                "before_faults": _counted(level_at(struck[key], level.level)) if key in struck else None,
-                "own_level": _counted(level_at(watched[key], 1.0)),
+                "before_faults": _counted(struck[key], level) if key in struck else None,
+                "own_level": _counted(watched[key], 1.0),
             }
             for key, level in levels.items()
         ],
@@ -169,17 +158,6 @@ def title_of(sensors: str, turbulence: str) -> str:
     """A condition in words."""
     air = "still air" if turbulence == "none" else f"{turbulence} turbulence"
     return f"{sensors} sensors, {air}"
-
-
-def _counted(level: Level) -> Document:
-    rate = level.per_h
-    return {
-        "alarms": level.alarms,
-        "hours": level.hours,
-        "per_h": finite(rate.value),
-        "per_h_low": finite(rate.low),
-        "per_h_high": finite(rate.high),
-    }
 
 
 def _lines(

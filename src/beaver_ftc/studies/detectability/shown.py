@@ -27,7 +27,7 @@ from beaver_ftc.studies.detectability.probabilities import (
     title_of,
 )
 from beaver_ftc.studies.detectability.schemes import BOTH, BUILT_IN, WATCHED_S, WITHIN_S
-from beaver_ftc.studies.present.figures import GRID, heat_map, label_edges, marker, panels
+from beaver_ftc.studies.present.figures import GRID, draw_estimates, heat_map, label_edges, marker, panels
 from beaver_ftc.studies.present.page import Makers, Part, Pictures, Table, study_files
 from beaver_ftc.studies.present.tables import grouped, percent, seconds
 
@@ -433,12 +433,10 @@ def _draw(panel: "Axes", rows: Sequence[Row], names: Sequence[str], document: Do
         if here:
             found_by_it = limit(here, document["false_alarms_per_h"])[within]
             shares[INFORMED] = {"value": found_by_it, "low": found_by_it, "high": found_by_it}
-        percents = 100.0 * np.array([[of["value"], of["low"], of["high"]] for of in shares.values()])
-        values, lows, highs = percents.reshape(-1, 3).T
-        panel.errorbar(
-            values, [names.index(of) + apart * (place - 0.5 * (len(magnitudes) - 1)) for of in shares],
-            xerr=(np.maximum(values - lows, 0.0), np.maximum(highs - values, 0.0)), linestyle="none",
-            marker=marker(place), markersize=4.5, color=SERIES[place], elinewidth=1.0, clip_on=False,
+        lines = [names.index(of) + apart * (place - 0.5 * (len(magnitudes) - 1)) for of in shares]
+        draw_estimates(
+            panel, lines, [*shares.values()], 100.0, across=True, linestyle="none", marker=marker(place),
+            markersize=4.5, color=SERIES[place], elinewidth=1.0, clip_on=False,
             label=f"{100 * magnitude:g} % lost",
         )  # fmt: skip
     panel.set_yticks(range(len(names)), names)

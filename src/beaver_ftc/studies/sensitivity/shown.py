@@ -1,6 +1,6 @@
 """What larger errors, or the loss of a mechanism, change: as sentences, tables, figures and files."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from itertools import chain
 from operator import itemgetter
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.results.model import Document
 from beaver_ftc.results.style import BLACK
-from beaver_ftc.studies.present.figures import GRID, SERIES, label_edges, panels
+from beaver_ftc.studies.present.figures import GRID, SERIES, draw_estimates, label_edges, panels
 from beaver_ftc.studies.present.page import Heading, Part, Pictures, Table, study_files, versions_line
 from beaver_ftc.studies.present.tables import estimate, grouped, number, or_never, percent
 from beaver_ftc.studies.sensitivity.systems import DEFAULT, PAPER
@@ -106,23 +106,16 @@ def draw_errors(document: Document) -> "Figure":
         times = 1.0 if quantity.endswith("_deg_s") else 100.0
         for panel, rows in zip(line, errors, strict=True):
             known = [row for row in rows if None not in (row[quantity]["value"], row[quantity]["low"])]
-            points = [(row["factor"], *_ends(row[quantity], times)) for row in known]
-            at, value, below, above = zip(*points, strict=True) if points else [()] * 4
-            look = {"color": BLACK, "marker": "o", "markersize": 4, "linewidth": 1.2, "capsize": 2}
-            panel.errorbar(at, value, [below, above], **look)
+            draw_estimates(
+                panel, [row["factor"] for row in known], [row[quantity] for row in known], times,
+                color=BLACK, marker="o", markersize=4, linewidth=1.2, capsize=2,
+            )  # fmt: skip
             panel.set_xscale("log", base=2)
             panel.set_xticks(document["factors"], [f"{factor:g}" for factor in document["factors"]])
             panel.minorticks_off()
             panel.grid(color=GRID, linewidth=0.6)
     label_edges(grid, "times the size", list(SHOWN.values()), titles)
     return figure
-
-
-def _ends(found: Mapping[str, float | None], times: float) -> tuple[float, float, float]:
-    """A value, and how far its interval reaches below and above it."""
-    value, low, high = (float("nan") if x is None else times * x for x in
-                        (found["value"], found["low"], found["high"]))  # fmt: skip
-    return value, value - low, high - value
 
 
 # Flights without a mechanism.
@@ -286,11 +279,11 @@ def draw_mechanisms(document: Document) -> "Figure":
     rows = document["mechanisms"]
     figure, grid = panels(1, len(CRITERIA), 13.0, 0.28 * len(rows) + 1.4, sharey=True)
     for panel, (name, words) in zip(grid[0], CRITERIA.items(), strict=True):
-        for place, row in enumerate(rows):
-            value, below, above = _ends(row[name], 100.0)
-            panel.errorbar(
-                [value], [place], xerr=[[below], [above]], fmt="o", markersize=4, capsize=2, linewidth=1.2,
-                color=SERIES[(PAPER, DEFAULT).index(row["system"])],
+        for colour, system in zip(SERIES, (PAPER, DEFAULT), strict=False):
+            places = [place for place, row in enumerate(rows) if row["system"] == system]
+            draw_estimates(
+                panel, places, [rows[place][name] for place in places], 100.0, across=True, fmt="o",
+                markersize=4, capsize=2, linewidth=1.2, color=colour, label=f"{system} system",
             )  # fmt: skip
         panel.axvline(0.0, color="#444444", linewidth=0.8)
         panel.grid(axis="x", color=GRID, linewidth=0.6)
@@ -299,9 +292,8 @@ def draw_mechanisms(document: Document) -> "Figure":
     grid[0][0].set_yticks(range(len(rows)), [_label(row) for row in rows], fontsize=8)
     grid[0][0].invert_yaxis()
     label_edges(grid, "worse without it, net points")
-    for system, colour in zip((PAPER, DEFAULT), SERIES, strict=False):
-        grid[0][0].plot([], [], "o", color=colour, label=f"{system} system")
-    figure.legend(loc="outside lower center", ncols=2, fontsize=9, frameon=False)
+    known = grid[0][0].get_legend_handles_labels()
+    figure.legend(*known, loc="outside lower center", ncols=2, fontsize=9, frameon=False)
     return figure
 
 

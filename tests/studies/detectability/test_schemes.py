@@ -19,6 +19,7 @@ from beaver_ftc.studies.detectability.probabilities import (
     limit,
     rows_of,
     summary,
+    title_of,
 )
 from beaver_ftc.studies.detectability.schemes import (
     BUILT_IN,
@@ -33,7 +34,8 @@ from beaver_ftc.studies.detectability.schemes import (
     scenario_of,
     strikes_at_s,
 )
-from beaver_ftc.studies.detectability.shown import comparison
+from beaver_ftc.studies.detectability.shown import comparison, page_of
+from beaver_ftc.studies.present.page import Table
 
 STILL, LIGHT = Condition("ideal", "none"), Condition("tactical-grade", "light")
 SMALL = replace(
@@ -193,6 +195,20 @@ class TestSurvey:
             if (cell["sensors"], cell["scheme"], cell["magnitude"]) == ("ideal", ESTIMATORS, 1.0)
         ]
         assert [cell["within"]["1"]["value"] for cell in cells] == [1.0, 1.0]
+
+    def test_the_table_has_the_shares_of_every_scheme(self, survey):
+        document = survey[0]
+        parts = page_of(document)[1]
+        table = next(part for part in parts if isinstance(part, Table))
+        lines = [dict(zip(table.head, cells, strict=True)) for cells in table.rows]
+        assert len(lines) == 2 * 2 * (2 * len(BUILT_IN) + 1 + 1)
+        for total in document["totals"]:
+            air = title_of(total["sensors"], total["turbulence"])
+            wanted = {"loss of": total["surface"], "flown": air, "scheme": total["scheme"]}
+            (line,) = [line for line in lines if wanted.items() <= line.items()]
+            shares = (f"{100 * of['value']:.0f}" for of in total["within"].values())
+            assert line["found within 0.5/1/5 s, %"] == ("/".join(shares) or "-")
+        assert parts[0].startswith("ideal sensors, still air, aileron, found within 5 s: both")
 
     def test_it_is_flown_again_into_the_same_folder_to_the_same_numbers(self, survey):
         document, folder = survey

@@ -5,7 +5,7 @@ size found in a share of flights, by variants of a scenario) and `cells` (the sh
 flights, by schemes). The lines of all three have the columns of HEAD; what no line has is no column.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import product
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any
@@ -16,7 +16,7 @@ from beaver_ftc.results.metrics import NEAR_THRESHOLD_SHARE, as_json
 from beaver_ftc.results.model import Document
 from beaver_ftc.results.style import SERIES
 from beaver_ftc.studies.compare.scores import leader
-from beaver_ftc.studies.detectability.certain import DETECT_WITHIN_S, ISOLATE_WITHIN_S, upwards
+from beaver_ftc.studies.detectability.certain import upwards
 from beaver_ftc.studies.detectability.isolability import DISTINGUISHED_LOSS
 from beaver_ftc.studies.detectability.probabilities import (
     JUDGED_S,
@@ -81,12 +81,9 @@ def _places(document: Document) -> tuple[str, Sequence[Part]]:
             "doublet": _span(of, "doublet_deg", lambda deg: f"{deg:.1f} deg"),
         }  # fmt: skip
         lines.append({"loss of": fault, "taken for": other, "flown": _times(scale), **shown})
-    drawn = (
-        ("smallest loss that is certain to be detected and isolated", NAME),
-        ("smallest loss that is distinguished from each other surface", "isolability"),
-    )
+    drawn = Pictures([("smallest loss that is distinguished from each other surface", NAME)])
     said = conclusions(document["points"])
-    return f"Detectability: {document['scenario']}", [*said, Pictures(drawn), table(lines), CERTAIN]
+    return f"Detectability: {document['scenario']}", [*said, table(lines), CERTAIN, drawn]
 
 
 def _times(scale: float) -> str:
@@ -124,71 +121,28 @@ def _conclusion(fault: str, scale: float, rows: Sequence[Document]) -> str:
     )
 
 
-def draw_places(document: Document) -> "Figure":
-    """A map a fault and excitation: over speed and altitude, the magnitude certain to be found."""
-    rows = document["points"]
-    names = [[f"{x:g}" for x in sorted({row[key] for row in rows})] for key in ("altitude_m", "airspeed_mps")]
-    maps = {
-        f"{fault}, {_times(scale)}": {
-            (f"{row['altitude_m']:g}", f"{row['airspeed_mps']:g}"): (
-                row["detected"], f"{_short(row['detected'])}\n{_short(row['isolated'])}"
-            )
-            for row in of
-        }
-        for (fault, scale), of in grouped(rows, "fault", "excitation").items()
-    }  # fmt: skip
-    return _maps(
-        f"{document['scenario']}: smallest loss of effectiveness certain to be detected within "
-        f"{DETECT_WITHIN_S:g} s (upper number)\nand isolated within {ISOLATE_WITHIN_S:g} s (lower number); "
-        "hatched, -: not even a total loss",
-        maps, len({row["excitation"] for row in rows}), (3.4, 3.0), names, ("altitude (m)", "airspeed (m/s)"),
-    )  # fmt: skip
-
-
 def draw_pairs(document: Document) -> "Figure":
-    """A map an excitation. A row is the surface that loses effectiveness, a column the surface that the loss
-    could be taken for."""
+    """A panel an excitation: rows what loses effectiveness, columns what it could be taken for."""
+    pairs = grouped(document["pairs"], "excitation")
     faults = [*dict.fromkeys(row["fault"] for row in document["pairs"])]
-    maps: dict[str, Any] = {}
-    for (fault, other, scale), of in grouped(document["pairs"], "fault", "other", "excitation").items():
-        half = [row["magnitude_median"] for row in of]
-        cell = None if None in half else max(half), "\n".join(reversed(_spans(of, "magnitude").values()))
-        maps.setdefault(_times(scale), {})[fault, other] = cell
-    size = 1.55 * len(faults) + 0.3, 0.65 * len(faults) + 0.8
-    return _maps(
+    title = (
         f"{document['scenario']}: smallest loss distinguished from that of another surface, and places\n"
-        "(upper numbers: at half of the instants; lower numbers: at every instant; hatched: no loss)",
-        maps, min(3, len(maps)), size, (faults, faults), ("loss of", "taken for"),
-    )  # fmt: skip
-
-
-def _maps(
-    title: str, maps: Mapping[str, Mapping[tuple[str, str], tuple[float | None, str]]], across: int,
-    size: tuple[float, float], names: Sequence[Sequence[str]], labels: tuple[str, str],
-) -> "Figure":  # fmt: skip
-    """Panels by their titles, so many across, each of so many inches. A cell (row, column) has a share, None
-    for one that no loss reaches, and its text; names, labels: of rows and columns."""
-    down = -(-len(maps) // across)
-    figure, grid = panels(down, across, across * size[0] + 1.2, down * size[1] + 0.5, title, sharey=True)
-    for axes, (name, cells) in zip(grid.flat, maps.items(), strict=False):
-        values = np.full((len(names[0]), len(names[1])), np.nan)
-        at = {(row, column): (names[0].index(row), names[1].index(column)) for row, column in cells}
-        for place, (value, _) in cells.items():
-            values[at[place]] = np.nan if value is None else value
-        texts = {at[place]: (text, "black") for place, (_, text) in cells.items()}
-        image = heat_map(
-            axes, values, texts, names[1], names[0], 7, cmap="viridis_r", vmin=0.0, vmax=1.0, alpha=0.6
-        )
-        axes.set_title(name, fontsize=9)
-    for axes in grid.flat[len(maps) :]:
-        axes.set_visible(False)
-    label_edges(grid, labels[1], [labels[0]] * down)
-    figure.colorbar(image, ax=grid, label="smallest loss, share of the effectiveness", shrink=0.6)
+        "(upper numbers: at half of the instants; lower numbers: at every instant; hatched: no loss)"
+    )
+    size = len(pairs) * (1.55 * len(faults) + 0.3) + 1.2, 0.65 * len(faults) + 1.6
+    figure, grid = panels(1, len(pairs), *size, title, sharey=True)
+    for axes, ((scale,), rows) in zip(grid[0], pairs.items(), strict=True):
+        values, texts = np.full((len(faults), len(faults)), np.nan), {}
+        for (fault, other), of in grouped(rows, "fault", "other").items():
+            at, half = (faults.index(fault), faults.index(other)), [row["magnitude_median"] for row in of]
+            values[at] = np.nan if None in half else max(half)
+            texts[at] = "\n".join(reversed(_spans(of, "magnitude").values())), "black"
+        look: dict[str, Any] = {"cmap": "viridis_r", "vmin": 0.0, "vmax": 1.0, "alpha": 0.6}
+        image = heat_map(axes, values, texts, faults, faults, 7, **look)
+        axes.set_title(_times(scale), fontsize=9)
+    label_edges(grid, "taken for", ["loss of"])
+    figure.colorbar(image, ax=grid, label="smallest loss (half), share", shrink=0.6)
     return figure
-
-
-def _short(magnitude: float | None) -> str:
-    return "-" if magnitude is None else f"{magnitude:.2f}"
 
 
 # The size found in a share of flights, by variants of a scenario.
@@ -449,7 +403,7 @@ def _draw(panel: "Axes", rows: Sequence[Row], names: Sequence[str], document: Do
 
 OF_PLACES: Makers = study_files(
     NAME, page_of, {NAME: itemgetter("points"), "isolability": itemgetter("pairs")},
-    {NAME: draw_places, "isolability": draw_pairs},
+    {NAME: draw_pairs},
 )  # fmt: skip
 OF_SIZES: Makers = study_files(NAME, page_of, {NAME: rows_of_sizes}, {})
 # Of the document and of one row a flight and scheme.

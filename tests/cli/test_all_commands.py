@@ -8,7 +8,7 @@ from typing import get_args
 import pytest
 
 from beaver_ftc.cli.main import Row, every_command
-from beaver_ftc.commands import registered
+from beaver_ftc.commands import FORMER, registered
 from commands import beaver
 
 COMMANDS = sorted(registered())
@@ -52,6 +52,16 @@ def test_a_command_explains_itself_and_refuses_what_it_does_not_know(name, tmp_p
     assert "--no-such-option" in wrong.stderr
     assert "Traceback" not in wrong.stderr
     assert [*tmp_path.iterdir()] == []
+
+
+@pytest.mark.parametrize("name", FORMER)
+def test_a_former_name_says_what_to_type_instead(name, tmp_path):
+    now, shown = FORMER[name], beaver(name, "--help", cwd=tmp_path)
+    assert (shown.returncode, shown.stderr) == (
+        0,
+        f"{name} is a former name: type beaver-ftc {' '.join(now)}\n",
+    )
+    assert f"beaver-ftc {now[0]} [OPTIONS]" in shown.stdout.splitlines()[0]
 
 
 @pytest.mark.parametrize("line", REFUSED)

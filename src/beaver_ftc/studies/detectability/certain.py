@@ -25,7 +25,7 @@ import numpy as np
 
 from beaver_ftc.control.engines import effects_of as effects_of_engines
 from beaver_ftc.design.model import AXES, N_Y, both_responses_along, design_of
-from beaver_ftc.documents.errors import BeaverFtcError
+from beaver_ftc.documents.errors import BeaverFtcError, SimulationFailed
 from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.plant.instrumented import ENGINE_SIGNALS
 from beaver_ftc.results.log import Columns
@@ -287,18 +287,25 @@ def survey_name(scenario: Scenario) -> str:
 
 
 def look_at(scenario: Scenario, point: tuple[float, float, float]) -> dict[str, list[Document]]:
-    place, there = dict(zip(PLACE, point, strict=True)), at(scenario, *point)
+    """The rows of each of PARTS at a place: without a result, why there is none."""
+    place, there, faults = (
+        dict(zip(PLACE, point, strict=True)),
+        at(scenario, *point),
+        scenario.airframe.class_of_losses,
+    )
     try:
         seen = excitation(there)
+        if len(seen.bound) < _windows(seen)[1]:
+            raise SimulationFailed(TOO_SHORT)
         doublets = isolability.smallest_doublets(at(there, *point[:2], 0.0), SETTLED_S)
     except BeaverFtcError as error:
-        faults = scenario.airframe.class_of_losses
-        none = [{"fault": fault, **_nothing(str(error))} for fault in faults]
-        found = {"points": none, "pairs": isolability.rows_without_result(faults, str(error))}
+        none = dict.fromkeys((*MAGNITUDES, "confused_with")) | {"why": str(error)}
+        points = [{"fault": fault, **none} for fault in faults]
+        pairs = isolability.rows_without_result(faults, str(error))
     else:
+        points = [{"fault": fault, **judge(seen, fault)} for fault in seen.moment]
         pairs = [row | doublets[row["fault"], row["other"]] for row in pairs_of(seen)]
-        found = {"points": [{"fault": fault, **judge(seen, fault)} for fault in seen.moment], "pairs": pairs}
-    return {what: [place | row for row in rows] for what, rows in found.items()}
+    return {what: [place | row for row in rows] for what, rows in zip(PARTS, (points, pairs), strict=True)}
 
 
 def at(scenario: Scenario, speed_mps: float, altitude_m: float, excitation: float) -> Scenario:
@@ -323,10 +330,6 @@ def scaled(signals: Sequence[Document], keys: Collection[str], times: float) -> 
     ]
 
 
-def _nothing(why: str) -> Document:
-    return {**dict.fromkeys(MAGNITUDES), "confused_with": None, "why": why}
-
-
 def judge(seen: Excitation, fault: str) -> Document:
     """Magnitudes from which a fault is certain to be found along a flight.
 
@@ -335,8 +338,6 @@ def judge(seen: Excitation, fault: str) -> Document:
     """
     z = seen.moment[fault]
     detect, isolate = _windows(seen)
-    if len(z) < isolate:
-        return _nothing(TOO_SHORT)
     found = best_in_window(detection_magnitude(z, seen.bound), detect)
     excluded = {other: best_in_window(least, isolate) for other, least in seen.excluding[fault].items()}
     isolated = np.maximum(found[: len(z) - isolate + 1], np.max(list(excluded.values()), axis=0))
@@ -357,8 +358,6 @@ def _windows(seen: Excitation) -> tuple[int, int]:
 
 def pairs_of(seen: Excitation) -> list[Document]:
     """Of each fault and each other, what a flight shows: how small, and how soon."""
-    if len(seen.bound) < _windows(seen)[1]:
-        return isolability.rows_without_result([*seen.moment], TOO_SHORT)
     return [
         {"fault": fault, "other": other, **isolability.loss_limits(least, _windows(seen)[1], seen.dt)}
         for fault, of_others in seen.excluding.items()

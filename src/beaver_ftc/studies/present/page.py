@@ -181,11 +181,6 @@ def _write(path: Path, content: Content) -> None:
 
 
 def save(figure: "Figure", path: Path) -> Path:
-    """Write a figure as PNG or SVG; the same figure gives the same bytes."""
-    from matplotlib import rc_context
-
-    svg = path.suffix == ".svg"
-    metadata = {"Date": None, "Creator": "beaver-ftc"} if svg else {"Software": "beaver-ftc"}
-    with rc_context({"svg.hashsalt": path.stem}):
-        figure.savefig(path, metadata=metadata)
+    """Write a figure as PNG; the same figure gives the same bytes."""
+    figure.savefig(path, metadata={"Software": "beaver-ftc"})
     return path

@@ -31,7 +31,12 @@ from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.metrics import fault_free_s
 from beaver_ftc.scenario.airframe import find_aircraft
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.studies.detectability import DETECT_WITHIN_S, SETTLED_S, detection_magnitude, excitation
+from beaver_ftc.studies.detectability.certain import (
+    DETECT_WITHIN_S,
+    SETTLED_S,
+    detection_magnitude,
+    excitation,
+)
 
 TWELVE = ("737", "A4", "B747", "MD11", "c172p", "c310", "J3Cub", "L410", "OV10", "T37", "pa28", "p51d")
 HEALTHY_S, FAULTY_S = 60.0, 25.0

@@ -2,10 +2,10 @@
 
     python benchmarks/study_floor.py [--cases N]
 
-Cases of `matrix`, `power` and `sweep --rare` are flown as a worker flies them. After each flight, JSBSim
-alone flies as many frames of the same aircraft, surfaces held. The last column is the largest factor by which
-the study can become faster if it still flies these frames. Imports, start of the workers and figures of the
-command are not included: `waits.py --long` measures them together with the cases.
+Cases of `matrix`, `detectability --grid` and `sweep --rare` are flown as a worker flies them. After each
+flight, JSBSim alone flies as many frames of the same aircraft, surfaces held. The last column is the largest
+factor by which the study can become faster if it still flies these frames. Imports, start of the workers and
+figures of the command are not included: `waits.py --long` measures them together with the cases.
 """
 
 import argparse
@@ -17,8 +17,8 @@ import numpy as np
 
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.scenario.sweeps import load_sweep
+from beaver_ftc.studies.detectability import schemes as survey
 from beaver_ftc.studies.matrix import fault_matrix
-from beaver_ftc.studies.power import survey
 from beaver_ftc.studies.sweep import rare
 
 SWEEP, EXPECTATION = "elevator-effectiveness", "no_departure"
@@ -75,7 +75,7 @@ def of_rare(count: int) -> list[Callable[[], object]]:
     return [partial(fly, run) for run in range(count)]
 
 
-STUDIES = {"matrix": of_matrix, "power": of_power, "sweep --rare": of_rare}
+STUDIES = {"matrix": of_matrix, "detectability --grid": of_power, "sweep --rare": of_rare}
 
 
 def main() -> None:

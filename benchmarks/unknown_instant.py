@@ -10,9 +10,9 @@ the truth's own innovations: a vector autoregression of ORDER frames, fitted to 
 of the healthy flights, whitens them and the fault's signature. Errors of the model, gusts and gyros are in it
 as they are, not as they are declared. Instants are 0.05 s apart and at most 10 s back.
 
-Flights are those of `beaver-ftc power`. What is declared is what is there: sensors, air, and of the Beaver
-the published uncertainty; of other aircraft, which have none, the error of their own model, at the measured
-pace (`--published` declares the published one of all). That error is known
+Flights are those of `beaver-ftc detectability --grid`. What is declared is what is there: sensors, air, and
+of the Beaver the published uncertainty; of other aircraft, which have none, the error of their own model,
+at the measured pace (`--published` declares the published one of all). That error is known
 within a model's envelope alone, and outside nothing is concluded: losses within a second of which the
 aircraft is outside are left out.
 
@@ -39,8 +39,8 @@ from beaver_ftc.diagnosis.informed_test import detection_probability
 from beaver_ftc.diagnosis.rivals.gust import VaneGust
 from beaver_ftc.scenario.airframe import find_aircraft
 from beaver_ftc.studies.compare.replay import Recording, Trace, record, trace
-from beaver_ftc.studies.power.probabilities import level_for
-from beaver_ftc.studies.power.survey import (
+from beaver_ftc.studies.detectability.probabilities import level_for
+from beaver_ftc.studies.detectability.schemes import (
     BOTH,
     WATCHED_S,
     Block,
@@ -199,7 +199,7 @@ class Seen:
 
     def level(self, drawn: np.ndarray) -> float:
         """Of PER_H false alarms, of the healthy flights drawn."""
-        return level_for([self.healthy[i] for i in drawn], PER_H).level
+        return level_for([self.healthy[i] for i in drawn], PER_H)
 
     def found(self, level: float) -> np.ndarray:
         """Which losses (n,) are found in time, and no alarm was raised before."""
@@ -327,7 +327,7 @@ def main() -> None:
     parser.add_argument("--turbulence", default="light", choices=("none", "light", "moderate", "severe"))
     parser.add_argument("--flights", type=int, default=20, help="of each surface, magnitude and excitation")
     parser.add_argument("--healthy", type=int, default=72)
-    parser.add_argument("--seed", type=int, default=500_000)  # others than those of `power`
+    parser.add_argument("--seed", type=int, default=500_000)  # others than those of that command
     parser.add_argument("--published", action="store_true")
     args = parser.parse_args()
     cells: list[Cell] = []

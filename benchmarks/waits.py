@@ -6,9 +6,9 @@
 Every wait is a whole process of its own, and the processor time is that of the process and of all that it
 starts. A wait that compiles begins each time with a cache of its own: empty, or as a first flight leaves it.
 The waits of a flight in a sweep are ratios to JSBSim's frames alone (`flight_cost.py`). `--long` takes also
-what needs minutes or the network (`matrix`, `power`, rare events, `reproduce`, `make demo` from a fresh
-clone); `import gtm` needs the user's copy of the data base. The processor time of a study includes its
-workers, on Linux: they are no children of the command, and become this process's when it ends.
+what needs minutes or the network (`matrix`, `detectability --grid`, rare events, `reproduce`, `make demo`
+from a fresh clone); `import gtm` needs the user's copy of the data base. The processor time of a study
+includes its workers, on Linux: they are no children of the command, and become this process's when it ends.
 
 `--beside REVISION` measures in pairs: the code of that revision and today's, in turn, and prints the medians
 of both and of their ratio, which a busy machine changes little.
@@ -256,7 +256,7 @@ WAITS = (
     Wait("flight in a sweep / bare frames", 1.35, lambda at: in_a_sweep(at, "published"), fresh=True),
     Wait("the same, one beginning / bare", 1.20, lambda at: in_a_sweep(at, "one beginning"), fresh=True),
     Wait("matrix", None, study("matrix"), fresh=True, long=True),
-    Wait("power", None, study("power"), fresh=True, long=True),
+    Wait("detectability --grid", None, study("detectability", "--grid", "quick"), fresh=True, long=True),
     Wait("rare events", None, study("sweep", RARE, "--rare", "no_departure"), fresh=True, long=True),
     Wait("reproduce", 60.0, study("reproduce"), fresh=True, long=True),
     Wait("make demo from a fresh clone", 45.0, demo, fresh=True, long=True),

@@ -56,7 +56,7 @@ def pytest_addoption(parser):
 # Files that take a worker longest: begun last, they would keep it while the other has nothing to do.
 LONGEST = (
     "products/live/page/test_guests.py", "aircraft/derive/test_derive.py", "cli/test_command_line.py",
-    "studies/mechanisms/test_mechanisms.py", "rivals/test_detectors.py", "compiled/test_cache.py",
+    "studies/sensitivity/test_mechanisms.py", "rivals/test_detectors.py", "compiled/test_cache.py",
     "detection/test_likelihood.py", "studies/reproduce/test_reproduce.py",
     "assurance/certificates/test_certificates.py", "loop/test_loop.py", "diagnosis/test_new_type.py",
     "tools/test_drawn.py", "aircraft/test_engines.py", "tests/test_notebooks.py", "logs/test_commands.py",
@@ -65,7 +65,7 @@ LONGEST = (
     "scenario/test_new_sensor.py", "live/page/test_page.py", "studies/sweep/test_campaign.py",
     "studies/test_new_study.py", "compiled/test_strangers.py", "studies/mismatch/test_command.py",
     "logs/test_long_logs.py", "evidence/test_evidence.py", "matrix/test_pitch_lost.py",
-    "sitl/test_endpoint.py", "bench/test_memory.py", "studies/power/test_survey.py",
+    "sitl/test_endpoint.py", "bench/test_memory.py", "studies/detectability/test_schemes.py",
     "compiled/test_sized_types.py", "recorded/test_benchmark.py", "loop/test_who_sees_the_truth.py",
     "studies/sweep/test_rare.py", "results/test_painters.py", "plugins/test_pytest_plugin.py",
     "diagnosis/test_statistical_flights.py", "tools/test_docs_names.py",

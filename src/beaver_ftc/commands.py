@@ -48,8 +48,8 @@ from beaver_ftc.documents.files import Document
 from beaver_ftc.plugins import entries, loaded, required
 
 __all__ = [
-    "COMMANDS", "GROUP", "GROUPS", "Reporter", "ScenarioArgument", "StudyCommand", "WorkersOption", "declare",
-    "files_of_commands", "groups", "registered", "summary",
+    "COMMANDS", "FORMER", "GROUP", "GROUPS", "Reporter", "ScenarioArgument", "StudyCommand", "WorkersOption",
+    "declare", "files_of_commands", "groups", "registered", "summary",
 ]  # fmt: skip
 
 GROUP, GROUPS = "beaver_ftc.commands", "beaver_ftc.command_groups"
@@ -67,14 +67,50 @@ COMMANDS = {
     "compare": "beaver_ftc.cli.compare:command",
     "reproduce": "beaver_ftc.studies.reproduce.reproduction:Reproduce",
     "matrix": "beaver_ftc.studies.matrix.command:Matrix",
-    "power": "beaver_ftc.studies.power.shown:Power",
-    "smallest": "beaver_ftc.studies.smallest.survey:Smallest",
-    "decay": "beaver_ftc.studies.decay.survey:Decay",
-    "mechanisms": "beaver_ftc.studies.mechanisms.command:Mechanisms",
+    "sensitivity": "beaver_ftc.studies.sensitivity.command:Sensitivity",
     "bench": "beaver_ftc.studies.bench.measure:Bench",
     "verify": "beaver_ftc.studies.verify:Verify",
-    "detectability": "beaver_ftc.studies.detectability:Detectability",
+    "detectability": "beaver_ftc.studies.detectability.command:Detectability",
 }
+
+FORMER = {  # names that still work for a release, and what to type instead, before the same arguments
+    "smallest": ("detectability", "--within", "0.5"),
+    "power": ("detectability", "--grid", "quick"),
+    "decay": ("sensitivity",),
+    "mechanisms": ("sensitivity", "--mechanisms"),
+}
+
+TOPICS = {  # of the program's help: commands by what they are for, in a few words
+    "fly": {
+        "run": "scenarios", "sweep": "many variations of one", "live": "by hand, in the browser",
+        "new": "begin a file", "validate": "check files",
+    },
+    "look": {
+        "list": "the choices", "show": "a built-in file", "schema": "all keys", "trim": "a flight condition",
+        "linearise": "margins of the loop",
+    },
+    "ask": {
+        "detectability": "how small a fault is found", "sensitivity": "what larger errors change",
+        "mismatch": "errors of the model", "separate": "a doublet", "matrix": "every fault",
+    },
+    "compare": {
+        "compare": "runs, schemes, laws", "reproduce": "the published study", "bench": "time of a frame",
+        "challenge": "a class",
+    },
+    "aircraft": {"derive": "from JSBSim", "import": "from published data"},
+    "logs": {"identify": "a vehicle from its flights", "diagnose": "recorded flights"},
+    "links": {"sitl": "an autopilot flies"},
+    "evidence": {"evidence": "a plan of requirements", "verify": "guarantees", "check": "a certificate"},
+}  # fmt: skip
+MORE = "more"  # the topic of commands of other packages
+
+
+def topics(names: Collection[str]) -> dict[str, dict[str, str]]:
+    """Of these commands what each is for, by topic."""
+    named = {name for of in TOPICS.values() for name in of}
+    found = {topic: {n: says for n, says in of.items() if n in names} for topic, of in TOPICS.items()}
+    found[MORE] = {name: "" for name in names if name not in named}
+    return {topic: of for topic, of in found.items() if of}
 
 
 def registered() -> dict[str, str]:
@@ -182,7 +218,6 @@ WorkersOption = Annotated[
 ]
 AirspeedOption = Annotated[float | None, typer.Option(min=1, max=1000)]
 AirspeedsOption = Annotated[list[float] | None, typer.Option(min=1, max=1000)]
-AltitudeOption = Annotated[float | None, typer.Option(min=-300, max=30000)]
 AltitudesOption = Annotated[list[float] | None, typer.Option(min=-300, max=30000)]
 TurbulenceName = StrEnum("TurbulenceName", ["none", "light", "moderate"])
 

@@ -131,7 +131,8 @@ def _name(page: Path) -> str:
 def commands_of_help(text: str) -> list[str]:
     """The names of the commands that `beaver-ftc --help` lists."""
     listed = text.partition("\nCommands:\n")[2]
-    return re.findall(r"^  ([a-z][\w-]*) ", listed, re.MULTILINE)
+    rows = re.sub(r"\n {12}", " ", listed)
+    return re.findall(r"(?:^  [a-z]+ +|; )([a-z][\w-]*): ", rows, re.MULTILINE)
 
 
 def examples_of_help(text: str) -> list[str]:

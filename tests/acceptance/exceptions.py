@@ -49,9 +49,9 @@ TABLE = (
         "beaver-ftc evidence --help",
     ),
     Exempt(
-        r"beaver-ftc mechanisms( .*)?",
+        r"beaver-ftc sensitivity --mechanisms( .*)?",
         "flies for minutes; the study's own tests fly a few draws",
-        "beaver-ftc mechanisms --help",
+        "beaver-ftc sensitivity --help",
     ),
     Exempt(
         r"beaver-ftc sweep elevator-jams\.yaml --rare no_departure",
@@ -151,9 +151,9 @@ TABLE = (
         "beaver-ftc reproduce --help",
         by_day=True,
     ),
-    Exempt(r"(beaver-ftc decay \S+)", "a minute: two flights a row", r"\1 --flights 2", by_day=True),
+    Exempt(r"(beaver-ftc sensitivity \S+)", "a minute: two flights a row", r"\1 --flights 2", by_day=True),
     Exempt(
-        r"(beaver-ftc smallest) \S+ (--surface elevator --within 0\.5)",
+        r"(beaver-ftc detectability) \S+ (--surface elevator --within 0\.5)",
         "half a minute: shorter flights",
         r"\1 brief.yaml \2",
         by_day=True,
@@ -175,9 +175,9 @@ TABLE = (
         r"\1 --replay 0 --no-report",
     ),
     Exempt(
-        r"beaver-ftc power.*",
+        r"beaver-ftc detectability --grid.*",
         "minutes: one condition, one rival",
-        "beaver-ftc power --sensors tactical-grade --turbulence none --schemes rls-monitor",
+        "beaver-ftc detectability --grid quick --surface rudder --turbulence none --schemes rls-monitor",
     ),
     Exempt(r"(beaver-ftc matrix(?!.*--airspeed).*)", "one airspeed for three", r"\1 --airspeed 45"),
     Exempt(r"beaver-ftc bench.*", "two minutes of compiling", "beaver-ftc bench --rounds 3 --no-parts"),

@@ -19,12 +19,12 @@ ALONE = [command for command in SHOWN if not command.page.startswith(ELSEWHERE)]
 TRIED = list(dict.fromkeys(line for line in map(tried, ALONE) if line is not None))
 # No second time in JSON: another line of the same command is shorter, or there is no such option.
 TEXT_ONLY = re.compile(
-    "power|bench|reproduce|smallest|decay|compare --|detectability|--backend|--flightgear|--search|--out|"
+    "bench|reproduce|sensitivity|compare --|detectability|--backend|--flightgear|--search|--out|"
     "--help|schema|--map|--variant [^ ]*,[^ ]*,|matrix --[dp]|ftc new|ftc show|challenge new|&&"
 )
 # These run by day for their text alone; the tests of each command ask smaller runs for JSON.
 IN_JSON_AT_NIGHT = re.compile(
-    r"matrix|mechanisms|jet\.yaml|scenarios/|challenge grade|sweep \S+ --(junit|resume)"
+    r"matrix|sensitivity|jet\.yaml|scenarios/|challenge grade|sweep \S+ --(junit|resume)"
 )
 PLUGIN = next(line for line in TRIED if "--target plugins" in line)
 

@@ -8,15 +8,16 @@ from typing import get_args
 import pytest
 
 from beaver_ftc.cli.main import Row, every_command
-from beaver_ftc.commands import registered
+from beaver_ftc.commands import FORMER, registered
 from commands import beaver
 
 COMMANDS = sorted(registered())
 REFUSED = (
-    "compare nope", "decay nope", "derive nope", "diagnose nope.csv --model nope.json", "evidence nope",
+    "compare nope", "sensitivity nope", "derive nope", "diagnose nope.csv --model nope.json", "evidence nope",
     "identify nope.csv --vehicle nope --out model.json", "mismatch nope", "run nope",
-    "separate nope", "smallest nope --surface elevator", "sweep nope", "sweep nope --resume", "trim nope",
-    "validate nope", "power --aircraft nope", "matrix --aircraft nope", "challenge grade nope",
+    "separate nope", "detectability nope --surface elevator --within 1", "sweep nope", "sweep nope --resume",
+    "trim nope", "validate nope", "detectability --grid quick --aircraft nope", "matrix --aircraft nope",
+    "challenge grade nope",
     "compare --benchmark --laws nope", "compare --flights nope", "import gtm nope", "live --aircraft nope",
 )  # fmt: skip
 
@@ -51,6 +52,16 @@ def test_a_command_explains_itself_and_refuses_what_it_does_not_know(name, tmp_p
     assert "--no-such-option" in wrong.stderr
     assert "Traceback" not in wrong.stderr
     assert [*tmp_path.iterdir()] == []
+
+
+@pytest.mark.parametrize("name", FORMER)
+def test_a_former_name_says_what_to_type_instead(name, tmp_path):
+    now, shown = FORMER[name], beaver(name, "--help", cwd=tmp_path)
+    assert (shown.returncode, shown.stderr) == (
+        0,
+        f"{name} is a former name: type beaver-ftc {' '.join(now)}\n",
+    )
+    assert f"beaver-ftc {now[0]} [OPTIONS]" in shown.stdout.splitlines()[0]
 
 
 @pytest.mark.parametrize("line", REFUSED)

@@ -201,8 +201,8 @@ def test_run_that_is_ended_leaves_no_half_result(short, number, status, left):
 def test_version_and_help(tmp_path):
     assert beaver("--version", cwd=tmp_path).stdout.startswith("beaver-ftc ")
     said = dict(re.findall(r"^  (\w+)  +(.+)$", beaver("--help", cwd=tmp_path).stdout, re.MULTILINE))
-    assert {"run", "validate", "schema", "trim", "list"} <= set(said)
-    assert said["run"] == "Simulate scenarios and report the results."
+    assert {"fly", "look", "ask", "compare", "aircraft", "logs", "links", "evidence"} >= set(said) > {"fly"}
+    assert said["fly"].startswith("run: scenarios; sweep: ")
 
 
 @pytest.mark.parametrize("format", ["text", "json"])

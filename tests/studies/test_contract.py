@@ -19,17 +19,14 @@ MISTAKES = {  # of each study a line that it cannot answer, and what is said of 
     "linearise": (["nothing"], "nothing"),
     "reproduce": (["--workers", "0"], "--workers"),
     "matrix": (["--pitch-lost", "--declared"], "exclude each other"),
-    "power": (["--schemes", "nothing"], "nothing"),
-    "smallest": (["short.yaml", "--surface", "elevater"], "allowed: aileron, elevator, rudder, flap"),
-    "decay": (["nothing"], "nothing"),
-    "mechanisms": (["--draws", "0"], "--draws"),
+    "sensitivity": (["nothing"], "nothing"),
     "bench": (["--rounds", "0"], "--rounds"),
     "verify": (["--faults", "-1"], "--faults"),
     "detectability": (["short.yaml", "--surface", "flap"], "allowed: aileron, elevator, rudder"),
 }
 QUICK = {  # of each study that has one: a line that is answered within seconds, and its result folder, if any
     "linearise": (["short.yaml"], ""),
-    "decay": (["short.yaml", "--flights", "1", "--workers", "1", "--out", "runs"], "short-decay"),
+    "sensitivity": (["short.yaml", "--flights", "1", "--workers", "1"], "short-sensitivity"),
     "detectability": (["short.yaml", "--airspeed", "45", "--altitude", "500"], "short-detectability"),
     "verify": (["--hours", "0", "--faults", "1", "--workers", "1"], "verification"),
 }

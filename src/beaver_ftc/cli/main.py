@@ -87,8 +87,24 @@ class Rows(TyperGroup):
             if name.startswith(above) and " " not in last:
                 self.add_command(Row(last, target))
 
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Those of the program by topic, on one screen."""
+        if ctx.parent is not None:
+            super().format_commands(ctx, formatter)
+            return
+        rows = [
+            (topic, "; ".join(f"{name}: {says}".removesuffix(": ") for name, says in of.items()))
+            for topic, of in commands.topics(self.commands).items()
+        ]
+        with formatter.section("Commands"):
+            formatter.write_dl(rows)
+
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """The command that is called, whole."""
+        """The command that is called, whole; by a former name with a notice."""
+        if ctx.parent is None and args[0] in commands.FORMER:
+            now = commands.FORMER[args[0]]
+            complain(f"{args[0]} is a former name: type beaver-ftc {' '.join(now)}")
+            args = [*now, *args[1:]]
         name, command, rest = super().resolve_command(ctx, args)
         return name, command.whole() if isinstance(command, Row) else command, rest
 
@@ -116,7 +132,7 @@ def options(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
     ] = False,
 ) -> None:
-    """Fault diagnosis and fault-tolerant control of the DHC-2 Beaver, flown by JSBSim.
+    """Fault diagnosis and fault-tolerant control of the DHC-2 Beaver in JSBSim.
 
     Exit status: 0 = done and every expectation met, 1 = an expectation or a check failed, 2 = bad input or
     usage, 3 = the simulation could not be completed.

@@ -12,6 +12,7 @@ from beaver_ftc.studies.present.page import (
     Pictures,
     Table,
     as_html,
+    as_text,
     replace_between,
     write_files,
 )
@@ -27,14 +28,12 @@ def drawn():
 def test_each_content_is_written_in_its_way_and_a_file_may_be_made_of_another(tmp_path):
     files = {
         "text.txt": "é", "bytes.bin": b"\x00", "none": None,
-        "figures": {"one.png": drawn(), "one.svg": drawn()},
+        "figures": {"one.png": drawn()},
         "later.txt": lambda folder: str(len((folder / "bytes.bin").read_bytes())),
     }  # fmt: skip
     write_files(tmp_path / "out", files)
     there = sorted(path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*") if path.is_file())
-    assert there == [
-        f"out/{n}" for n in ("bytes.bin", "figures/one.png", "figures/one.svg", "later.txt", "text.txt")
-    ]
+    assert there == [f"out/{n}" for n in ("bytes.bin", "figures/one.png", "later.txt", "text.txt")]
     assert (tmp_path / "out/text.txt").read_text(encoding="utf-8") == "é"
     assert (tmp_path / "out/later.txt").read_text() == "1"
     assert b"beaver-ftc" in (tmp_path / "out/figures/one.png").read_bytes()[:2048]
@@ -42,9 +41,13 @@ def test_each_content_is_written_in_its_way_and_a_file_may_be_made_of_another(tm
 
 def test_a_figure_is_the_same_to_the_byte_each_time(tmp_path):
     for folder in ("a", "b"):
-        write_files(tmp_path / folder, {"one.png": drawn(), "one.svg": drawn()})
-    for name in ("one.png", "one.svg"):
-        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
+        write_files(tmp_path / folder, {"one.png": drawn()})
+    assert (tmp_path / "a/one.png").read_bytes() == (tmp_path / "b/one.png").read_bytes()
+
+
+def test_the_text_of_a_page_has_no_pictures():
+    parts = ["said", Pictures([("one", "one")]), Heading("numbers"), Table(("a", "b"), [("1", "22")]), "note"]
+    assert as_text(parts) == "said\n\nnumbers\n\na  b\n1  22\nnote"
 
 
 def test_what_stands_outside_the_marks_of_a_page_stays(tmp_path):

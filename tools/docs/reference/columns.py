@@ -1,6 +1,5 @@
 """The columns of the log and of every table that a command writes: from the code that writes them."""
 
-import io
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
@@ -14,11 +13,10 @@ from beaver_ftc.diagnosis.isolation import estimator_names
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant.channels import log_columns
 from beaver_ftc.results.log import unit_of
-from beaver_ftc.studies import detectability
+from beaver_ftc.studies.detectability import certain, probabilities
+from beaver_ftc.studies.detectability.schemes import WITHIN_S
 from beaver_ftc.studies.mismatch import split, study
 from beaver_ftc.studies.mismatch.sources import SOURCES
-from beaver_ftc.studies.power.shown import rows_as_parquet
-from beaver_ftc.studies.power.survey import WITHIN_S
 from beaver_ftc.studies.present.tables import markdown_table
 from beaver_ftc.studies.sweep.columns import columns_of
 from beaver_ftc.studies.sweep.one_flight import FIXED
@@ -54,16 +52,15 @@ def _sweep() -> Columns:
     return {name: _KINDS[kind] for name, kind in kinds.items()}
 
 
-def _power() -> Columns:
-    from pyarrow.parquet import read_schema
-
-    schema = read_schema(io.BytesIO(rows_as_parquet([])))
-    return {name: _KINDS[str(kind)] for name, kind in zip(schema.names, schema.types, strict=True)}
+def _schemes() -> Columns:
+    kinds = dict.fromkeys(("sensors", "turbulence", "surface", "scheme"), TEXT)
+    kinds |= {"seed": "count"} | dict.fromkeys(("false_alarm", "own_false_alarm"), FLAG)
+    return {name: kinds.get(name, NUMBER) for name in probabilities.COLUMNS}
 
 
 def _detectability() -> Columns:
     texts = ("fault", "confused_with", "other", "why")
-    names = (*detectability.COLUMNS, *detectability.PAIRS)
+    names = (*certain.COLUMNS, *certain.PAIRS)
     return {name: TEXT if name in texts else NUMBER for name in names}
 
 
@@ -85,7 +82,7 @@ def _diagnosis() -> Columns:
 TABLES: dict[str, Callable[[], Columns]] = {
     "log": _log,
     "sweep": _sweep,
-    "power": _power,
+    "detectability-grid": _schemes,
     "detectability": _detectability,
     "mismatch": _mismatch,
     "mismatch-frames": _mismatch_frames,

@@ -78,7 +78,7 @@ _NOTES = """Some commands can end with status 1:
 |`matrix`|a fault is named wrongly, or an alarm is false|
 |`matrix --pitch-lost`|an aircraft is lost with control by engine power, but not without it|
 |`reproduce`|a statement of the paper does not hold, and the reason is not known|
-|`mechanisms`|a false alarm of a worst-case detector has no reason|
+|`sensitivity --mechanisms`|a false alarm of a worst-case detector has no reason|
 |`separate`|a doublet was flown, and both candidates remain|
 
 After Ctrl-C, only `sitl` ends with status 1: it writes the results of the flight until then, with the verdict

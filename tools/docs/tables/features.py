@@ -29,7 +29,7 @@ PLANES = {
 LONGEST_S = 900
 LIVE = "`live`, changes in flight"
 YES, NO = "✓", "✗"
-STUDIES = ("sweep", "compare", "detectability", "power")
+STUDIES = ("sweep", "compare", "detectability")
 
 
 @dataclass(frozen=True)
@@ -56,8 +56,8 @@ FEATURES = (
     Feature("`sweep`", "sweep W.yaml"),
     Feature("`compare --sweep`", "compare --sweep W.yaml --schemes observer-constant --laws nominal"),
     Feature("`detectability`", "detectability S.yaml --surface elevator --airspeed {speed:.0f}"),
-    Feature("`power`", "power --aircraft {plane} --surface elevator --sensors tactical-grade "
-            "--turbulence none --schemes observer-constant"),
+    Feature("`detectability --grid`", "detectability --grid quick --aircraft {plane} --surface elevator "
+            "--sensors tactical-grade --turbulence none --schemes observer-constant"),
     Feature("`separate`", "separate S.yaml", keys=(
         ("faults", [{"actuator": "elevator", "type": "float", "at_s": 3}]), ("fdi", {"fault_class": "all"}),
     )),

@@ -1,14 +1,15 @@
-"""What docs/results/mechanisms.md shows of the study of `beaver-ftc mechanisms`."""
+"""What docs/results/mechanisms.md shows of the study of `beaver-ftc sensitivity --mechanisms`."""
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from beaver_ftc.studies.mechanisms import shown
-from beaver_ftc.studies.mechanisms.command import run_mechanisms
-from beaver_ftc.studies.mechanisms.survey import DRAWS, Flight, fly_one
-from beaver_ftc.studies.mechanisms.systems import DIAGNOSIS, LAW
+from beaver_ftc.studies.present.page import Table
 from beaver_ftc.studies.present.tables import markdown_table, number
+from beaver_ftc.studies.sensitivity import shown
+from beaver_ftc.studies.sensitivity.command import run_mechanisms
+from beaver_ftc.studies.sensitivity.mechanisms import DRAWS, Flight, fly_one
+from beaver_ftc.studies.sensitivity.systems import DIAGNOSIS, LAW
 from tools.docs.tables import aside, shared
 
 Document = dict[str, Any]
@@ -24,7 +25,6 @@ GROUPS = {  # some criterion is worse, some is better without the mechanism: tit
     (False, True): "Mechanisms that cost",
     (False, False): "Mechanisms that change no criterion beyond chance",
 }
-NET = "T0: net share by each criterion, points, with intervals"
 NO_CRITERION = ", and no criterion changes beyond chance"  # the title of the last group says it
 _PICTURED = (
     "Net share of flights that are worse without each mechanism, by four criteria, with 95 % intervals"
@@ -43,7 +43,7 @@ def mechanisms_findings() -> str:
     document, drawn = _flown()
     Path("images").mkdir(exist_ok=True)
     Path("images/mechanisms.png").write_bytes(drawn)
-    flown, *_, explained = shown.sentences(document)
+    flown, *_, explained = shown.mechanism_sentences(document)
     return f"{flown}\n\n{_grouped(document)}\n\n{explained}\n\n![{_PICTURED}](images/mechanisms.png)"
 
 
@@ -64,50 +64,37 @@ def _signs(row: Document) -> tuple[bool, bool]:
 
 def mechanisms_systems() -> str:
     """Both systems with all of their mechanisms."""
-    document = _flown()[0]
-    return markdown_table(shown.system_head(document), shown.system_rows(document))
+    return _markdown(shown.tables(_flown()[0])["systems"])
+
+
+ASIDES = {
+    "net": "T0: net share by each criterion, points, with intervals",
+    "same": "T1: flights in which a mechanism changes nothing",
+    "medians": "T2: medians of delay and tracking error, with and without each mechanism",
+    "by-instruments": "T3: net share of late alarms by instruments, points",
+    "by-error": "T4: net share of lost names by undeclared error, points",
+    "by-fault": "T5: net share of worse tracking by fault, points",
+    "by-bandwidth": "T6: net share of worse tracking by bandwidth, points",
+    "margins": "T7: stability margins of the healthy loop",
+    "alarms": "T8: false alarms, complete and without each mechanism",
+}
+LEVELS = {
+    "by-instruments": ("instruments", "late", DIAGNOSIS), "by-error": ("error", "names", DIAGNOSIS),
+    "by-fault": ("fault", "tracking", LAW), "by-bandwidth": ("bandwidth", "tracking", LAW),
+}  # fmt: skip
 
 
 def mechanisms_asides() -> str:
     """Further tables, as CSV."""
-    tables = {
-        "net": (NET, _rows(shown.NET_HEAD, shown.net_row)),
-        "same": ("T1: flights in which a mechanism changes nothing", _rows(shown.SAME_HEAD, shown.same_row)),
-        "medians": (
-            "T2: medians of delay and tracking error, with and without each mechanism",
-            _rows(shown.MEDIAN_HEAD, shown.median_row),
-        ),
-        "by-instruments": (
-            "T3: net share of late alarms by instruments, points", _by("instruments", "late", DIAGNOSIS)
-        ),
-        "by-error": (
-            "T4: net share of lost names by undeclared error, points", _by("error", "names", DIAGNOSIS)
-        ),
-        "by-fault": ("T5: net share of worse tracking by fault, points", _by("fault", "tracking", LAW)),
-        "by-bandwidth": (
-            "T6: net share of worse tracking by bandwidth, points", _by("bandwidth", "tracking", LAW)
-        ),
-        "margins": (
-            "T7: stability margins of the healthy loop",
-            markdown_table(shown.MARGIN_HEAD, shown.margin_rows(_flown()[0])),
-        ),
-        "alarms": (
-            "T8: false alarms, complete and without each mechanism",
-            markdown_table(shown.ALARM_HEAD, shown.alarm_rows(_flown()[0])),
-        ),
-    }  # fmt: skip
-    return "\n".join(aside(f"mechanisms-{name}", *each) for name, each in tables.items())
-
-
-def _rows(head: tuple[str, ...], row_of: Any) -> str:
-    return markdown_table(head, [row_of(row) for row in _flown()[0]["mechanisms"]])
-
-
-def _by(factor: str, criterion: str, serves: str) -> str:
     document = _flown()[0]
-    return markdown_table(
-        shown.level_head(document, factor), shown.level_rows(document, factor, criterion, serves)
+    tables = shown.tables(document) | {name: shown.by_level(document, *of) for name, of in LEVELS.items()}
+    return "\n".join(
+        aside(f"mechanisms-{name}", says, _markdown(tables[name])) for name, says in ASIDES.items()
     )
+
+
+def _markdown(of: Table) -> str:
+    return markdown_table(of.head, of.rows)
 
 
 def mechanisms_probe() -> str:

@@ -12,15 +12,18 @@ import numpy as np
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.scenario.schema import load_scenario
 from beaver_ftc.scenario.sweeps import load_sweep
-from beaver_ftc.studies.decay.shown import HEAD, cells, sentences
-from beaver_ftc.studies.decay.survey import TOGETHER, run_decay
+from beaver_ftc.studies.detectability.command import run_schemes
+from beaver_ftc.studies.detectability.probabilities import DUELS_S
+from beaver_ftc.studies.detectability.schemes import GRIDS, contenders
+from beaver_ftc.studies.detectability.shown import who_is_better
 from beaver_ftc.studies.engine.statistics import share_within, wilson
 from beaver_ftc.studies.engine.study import fly_all
 from beaver_ftc.studies.matrix.clairvoyant import columns_of, seen_when_told
-from beaver_ftc.studies.power.probabilities import DUELS_S
-from beaver_ftc.studies.power.shown import run_power, who_is_better
-from beaver_ftc.studies.power.survey import GRIDS, contenders
 from beaver_ftc.studies.present.tables import markdown_table
+from beaver_ftc.studies.sensitivity.beyond import TOGETHER
+from beaver_ftc.studies.sensitivity.command import run_errors
+from beaver_ftc.studies.sensitivity.shown import HEAD, cells
+from beaver_ftc.studies.sensitivity.shown import error_sentences as sentences
 from beaver_ftc.studies.sweep.one_flight import fly_one, scenario_of
 from beaver_ftc.studies.sweep.sampling import Assignment, Plan
 from tools.docs.tables import moved
@@ -161,9 +164,9 @@ def _closely(name: str, count: int) -> str:
 def robustness_power() -> str:
     """Share of losses found under tactical-grade sensors, by scheme, surface and air; and a picture of it."""
     with TemporaryDirectory() as name:
-        document = run_power(Path(name), GRIDS["quick"], contenders(None), 2)
+        document = run_schemes(Path(name), GRIDS["quick"], contenders(None), 2)
         Path("images").mkdir(exist_ok=True)
-        drawn = Path(name, "power", "figures", "schemes-tactical-grade.png")
+        drawn = Path(name, "detectability", "detectability.png")
         Path("images/power-tactical-grade.png").write_bytes(drawn.read_bytes())
     return _power_of(document)
 
@@ -173,7 +176,7 @@ def robustness_power_probe() -> str:
     scheme where shares of a few flights do not. That of multiple-models is 0 if no odds favour a fault."""
     grid = replace(GRIDS["quick"], blocks=1, magnitudes=(1.0,), excitations_deg_s=(3.0,), healthy_h=0.01)
     with TemporaryDirectory() as name:
-        document = run_power(Path(name), grid, contenders(None))
+        document = run_schemes(Path(name), grid, contenders(None))
     levels = (f"{each['turbulence']}, {each['scheme']}: {each['level']:.6g}" for each in document["levels"])
     return "\n".join((_power_of(document), *levels))
 
@@ -270,9 +273,9 @@ _PICTURED = "False alarms, right names and tracking over the size of each error,
 def robustness_decay() -> str:
     """How verdicts decay beyond what is declared, of two scenarios; and a picture of the first."""
     with TemporaryDirectory() as name:
-        whole, published = (run_decay(Path(name), load_scenario(one), workers=2) for one in DECAYS)
+        whole, published = (run_errors(Path(name), load_scenario(one), workers=2) for one in DECAYS)
         Path("images").mkdir(exist_ok=True)
-        Path("images/decay.png").write_bytes(Path(whole["folder"], "decay.png").read_bytes())
+        Path("images/decay.png").write_bytes(Path(whole["folder"], "sensitivity.png").read_bytes())
     pictured = f"![{_PICTURED}](images/decay.png)\n\n{DECAY_FIGURE}"
     table = moved(_decay_table(whole), "*Table 1.", "robustness-decay", DECAY_TITLE)
     return "\n\n".join([table, pictured, f"### {PUBLISHED}", _published(published)])
@@ -281,7 +284,7 @@ def robustness_decay() -> str:
 def robustness_decay_probe() -> str:
     """Two flights of each row of the first."""
     with TemporaryDirectory() as name:
-        return _decay_of(run_decay(Path(name), load_scenario(DECAYS[0]), 2))
+        return _decay_of(run_errors(Path(name), load_scenario(DECAYS[0]), 2))
 
 
 def _decay_of(document: Document) -> str:

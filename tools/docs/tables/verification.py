@@ -5,7 +5,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from beaver_ftc.scenario.schema import load_scenario
-from beaver_ftc.studies.detectability import run_survey
+from beaver_ftc.studies.detectability.command import run_places
 from beaver_ftc.studies.present.tables import markdown_table
 
 
@@ -25,7 +25,7 @@ SCALES = (0.5, 2.0)  # of the references of `fault-free`
 
 def _surveyed(**where: Any) -> str:
     with TemporaryDirectory() as folder:
-        found = run_survey(Path(folder), load_scenario("fault-free"), excitations=SCALES, **where)
+        found = run_places(Path(folder), load_scenario("fault-free"), excitations=SCALES, **where)
     return _map_of(found["points"])
 
 

@@ -168,7 +168,7 @@ KINDS: dict[str, tuple[str, Document]] = {
     ),
     "one beginning": ("elevator-effectiveness", {}),
 }
-ONE_BEGINNING = "one beginning"  # its flights begin alike, as those of `matrix` and `power`: one trim for all
+ONE_BEGINNING = "one beginning"  # its flights begin alike, as those of `matrix`: one trim for all
 Taken = tuple[np.ndarray, int, float]
 
 

@@ -1,6 +1,6 @@
 """How figures of a study are begun, and what they have in common."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -79,3 +79,17 @@ def heat_map(
     axes.set_xticks(range(len(columns)), columns, fontsize=fontsize)
     axes.set_yticks(range(len(rows)), rows, fontsize=fontsize)
     return axes.imshow(values, aspect="auto", **image)
+
+
+def draw_estimates(
+    axes: "Axes", places: Sequence[float], found: Sequence[Mapping[str, Any]], times: float = 1.0,
+    across: bool = False, **look: Any,
+) -> None:  # fmt: skip
+    """Values with bars for their intervals at places of the other axis. across: values to the right."""
+    ends = np.array([[of["value"], of["low"], of["high"]] for of in found], dtype=float).reshape(-1, 3).T
+    value, low, high = times * ends
+    bars = np.maximum(value - low, 0.0), np.maximum(high - value, 0.0)
+    if across:
+        axes.errorbar(value, places, xerr=bars, **look)
+    else:
+        axes.errorbar(places, value, yerr=bars, **look)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.results.metrics import as_json
-from beaver_ftc.studies.present.tables import Rows, as_csv, html_table, markdown_table
+from beaver_ftc.studies.present.tables import Rows, aligned, as_csv, html_table, markdown_table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -72,6 +72,22 @@ def _markdown(part: Part, figures: str) -> Iterator[str]:
             yield from (f"![{title}]({figures}/{stem}.png)" for title, stem in part.shown)
         case _:
             yield part
+
+
+def as_text(parts: Sequence[Part]) -> str:
+    """The parts as lines for a terminal, without pictures."""
+    lines: list[str] = []
+    for part in parts:
+        match part:
+            case Heading():
+                lines += ["", part.text]
+            case Table():
+                lines += ["", aligned([part.head, *part.rows])]
+            case Bullets():
+                lines += ["", part.lead, *(f"- {sentence}" for sentence in part.sentences)]
+            case str():
+                lines.append(part)
+    return "\n".join(lines)
 
 
 def as_html(title: str, parts: Sequence[Part], figures: Mapping[str, Path]) -> str:
@@ -178,11 +194,6 @@ def _write(path: Path, content: Content) -> None:
 
 
 def save(figure: "Figure", path: Path) -> Path:
-    """Write a figure as PNG or SVG; the same figure gives the same bytes."""
-    from matplotlib import rc_context
-
-    svg = path.suffix == ".svg"
-    metadata = {"Date": None, "Creator": "beaver-ftc"} if svg else {"Software": "beaver-ftc"}
-    with rc_context({"svg.hashsalt": path.stem}):
-        figure.savefig(path, metadata=metadata)
+    """Write a figure as PNG; the same figure gives the same bytes."""
+    figure.savefig(path, metadata={"Software": "beaver-ftc"})
     return path

@@ -14,7 +14,7 @@ from beaver_ftc.diagnosis.bounds import ROUNDING_RAD_S2
 from beaver_ftc.plant.conditions import trimmed
 from beaver_ftc.plant.linear import differences
 from beaver_ftc.scenario.faults import LossOfEffectiveness
-from beaver_ftc.studies.detectability import mismatch, moments_of
+from beaver_ftc.studies.detectability.certain import mismatch, moments_of
 from beaver_ftc.studies.reproduce.cases import ESTIMATORS, SETTLED_S, Flown
 from beaver_ftc.studies.reproduce.choices import AMPLITUDE_DEG_S
 

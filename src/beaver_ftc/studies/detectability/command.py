@@ -1,0 +1,208 @@
+"""The command `detectability`: what is certain, what a share of flights finds, and what schemes find."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import partial
+from itertools import product
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from beaver_ftc.aircraft import load
+from beaver_ftc.commands import (
+    SCENARIO,
+    AirspeedsOption,
+    AltitudesOption,
+    Reporter,
+    StudyCommand,
+    TurbulenceName,
+    WorkersOption,
+    listed,
+)
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.results.model import Document
+from beaver_ftc.scenario.schema import Scenario, load_scenario
+from beaver_ftc.studies.detectability import certain, probabilities, schemes
+from beaver_ftc.studies.detectability.schemes import GRIDS, Grid, Watched
+from beaver_ftc.studies.detectability.shown import FILES, NAME, OF_PLACES, OF_SCHEMES, page_of
+from beaver_ftc.studies.detectability.sizes import Asked, run_sizes
+from beaver_ftc.studies.engine.study import Progress, Study, run_study
+from beaver_ftc.studies.present.page import as_text
+
+GridName = StrEnum("GridName", ["quick", "full"])
+SensorsName = StrEnum("SensorsName", {"ideal": "ideal", "tactical_grade": "tactical-grade"})
+
+
+def run_places(
+    out: Path,
+    scenario: Scenario,
+    speeds_mps: Sequence[float] = (),
+    altitudes_m: Sequence[float] = (),
+    excitations: Sequence[float] = certain.EXCITATIONS,
+    progress: Progress | None = None,
+) -> Document:
+    """Write `out/<scenario>-detectability/`; return the document: a row a fault and grid point, and one a
+    fault, other surface and grid point.
+
+    Raises BadInput if another scheme than the sharpened one diagnoses.
+    """
+    fdi = scenario.fdi
+    sharp = fdi.sharpen.pole_bank and fdi.sharpen.memory and fdi.sharpen.shared_effectiveness
+    if fdi.scheme != "adaptive-estimators" or not sharp or max(fdi.pole_bank_per_s, default=0.0) < 1e6:
+        raise BadInput(
+            f"{scenario.name}: fdi: detectability is worked out for the sharpened scheme, allowed: "
+            "scheme adaptive-estimators, sharpen all, a filter of 1e6 in pole_bank_per_s"
+        )
+    aircraft, start_m = scenario.airframe, scenario.airframe.file.start.altitude_m
+    if not speeds_mps:  # those of the built-in aircraft, or about where another one starts
+        about = [round(share * aircraft.usual_airspeed_mps, 1) for share in certain.SHARES]
+        speeds_mps = certain.SPEEDS_MPS if aircraft is load() else about
+    if not altitudes_m:  # another aircraft's error is known about the one it starts at
+        altitudes_m = certain.ALTITUDES_M if start_m is None else (start_m,)
+    study = Study(
+        certain.survey_name(scenario), list(product(speeds_mps, altitudes_m, excitations)),
+        partial(certain.look_at, scenario), partial(certain.document_of, scenario.name), OF_PLACES,
+        row=dict[str, list[Document]], follows_from=scenario,
+    )  # fmt: skip
+    return run_study(study, out, progress=progress)
+
+
+def run_schemes(
+    out: Path, grid: Grid, names: Sequence[str], workers: int = 1, progress: Progress | None = None
+) -> Document:
+    """Write `out/detectability/`; return the document."""
+    names, healthy = tuple(names), grid.healthy()
+    cases = [*((block, False) for block in healthy), *((block, True) for block in grid.faulted())]
+    study = Study(
+        NAME, cases, partial(schemes.fly_block, grid=grid, schemes=names),
+        lambda seen: probabilities.document_of(grid, seen[: len(healthy)], seen[len(healthy) :]), OF_SCHEMES,
+        row=Watched, follows_from=(grid, names), lost=schemes.lost,
+    )  # fmt: skip
+    return run_study(study, out, workers, progress)[0]
+
+
+@dataclass(frozen=True)
+class Detectability(StudyCommand):
+    """Find how small a loss is detected, how often and how soon.
+
+    The command has three methods. Each prints one table, and sentences that begin with the answer. If a
+    method is interrupted, the same command resumes it.
+
+    SCENARIO: compute from the declared bounds the smallest loss that is certain to be detected within 0.5 s
+    and isolated within 1 s, at several airspeeds and altitudes, and with references scaled by factors from
+    0.25 to 2. "Half of onsets": half of the possible start times of the loss. With --surface the command
+    prints one sentence for each place. For each pair of surfaces it prints the smallest loss for which they
+    are distinguished, the delay, and the smallest doublet that distinguishes them.
+
+    SCENARIO --surface --within: fly losses with random seeds and start times. The command prints the smallest
+    loss that is certain to be detected within this time, and the smallest that is detected in 90 % of the
+    flights, with its 95 % interval. It adds flights until the interval is narrow, up to 480. Then it repeats
+    the flights with one change at a time, to find what makes these losses so large: without turbulence,
+    without sensor errors, without servos, without model uncertainty, with references of twice the amplitude,
+    and with references of twice the frequency.
+
+    --grid: fly losses of several sizes and surfaces, with several references, sensors and severities of
+    turbulence, and let all schemes diagnose the same flights. The alarm level of each scheme is chosen on
+    healthy flights, so that all schemes have the same rate of false alarms.
+
+    Examples:
+      beaver-ftc detectability elevator-partial-loss --surface elevator --airspeed 45 --altitude 1000
+      beaver-ftc detectability elevator-partial-loss --surface elevator --within 0.5
+      beaver-ftc detectability --grid quick --sensors tactical-grade --turbulence none
+
+    surface: Only losses of this surface.
+    within: Longest time from the loss to the alarm, s.
+    grid: Number of variations: `quick` takes about 1 min of processor time, `full` about 10 min.
+    airspeed: Airspeed, m/s. Default: 36, 40, 44, 48 and 52 for the Beaver, otherwise 0.9, 1 and 1.1
+    times the airspeed at the start. With --grid: one, default 45.
+    altitude: Altitude above sea level, m. Default: the altitude at the start in the aircraft file,
+    otherwise 0, 1000, 2000 and 3000. With --grid: one.
+    aircraft: Aircraft instead of the scenario's: built-in name, jsbsim:NAME, or ./FOLDER.
+    schemes: With --grid: names of schemes, separated by commas. Default: all registered schemes.
+    sensors: With --grid: fly only these sensors. Default: all sensors of the grid.
+    turbulence: With --grid: fly only this severity of turbulence. Default: all severities of the grid.
+    seed: With --within: seed of all random draws.
+    out: Folder for the results.
+    """
+
+    scenario: Annotated[str | None, SCENARIO] = None
+    surface: str | None = None
+    within: Annotated[float | None, typer.Option(min=0.01, max=60)] = None
+    grid: GridName | None = None
+    airspeed: AirspeedsOption = None
+    altitude: AltitudesOption = None
+    aircraft: str | None = None
+    schemes: str | None = None
+    sensors: SensorsName | None = None
+    turbulence: TurbulenceName | None = None
+    seed: Annotated[int, typer.Option(min=0)] = 1
+    workers: WorkersOption = None
+    out: Path = Path("runs")
+
+    FILES = FILES
+
+    def run(self, reporter: Reporter) -> Document:
+        """By the method that was asked for."""
+        self._refuse_contradictions()
+        if self.grid is not None:
+            return self._of_schemes(self.grid, reporter)
+        scenario = load_scenario(str(self.scenario))
+        if self.aircraft is not None:
+            scenario = certain.with_aircraft(scenario, self.aircraft)
+        if self.within is not None:
+            asked = Asked(str(self.surface), self.within, self.seed)
+            return run_sizes(self.out, scenario, asked, self.processes, reporter.say)
+        return self._of_places(scenario, reporter)
+
+    def _refuse_contradictions(self) -> None:
+        places = (self.airspeed or (), self.altitude or ())
+        for wrong, allowed in (
+            ((self.scenario is None) is (self.grid is None), "exactly one of SCENARIO and --grid"),
+            (self.within is not None and self.grid is not None, "--within only with SCENARIO"),
+            (self.within is not None and self.surface is None, "--within only with --surface"),
+            (self.within is not None and any(places), "--airspeed and --altitude only without --within"),
+            (self.grid is None and bool(self.schemes or self.sensors or self.turbulence),
+             "--schemes, --sensors and --turbulence only with --grid"),
+            (self.grid is not None and max(map(len, places)) > 1,
+             "with --grid at most one --airspeed and one --altitude"),
+        ):  # fmt: skip
+            if wrong:
+                raise BadInput(f"detectability: allowed: {allowed}")
+
+    def _of_places(self, scenario: Scenario, reporter: Reporter) -> Document:
+        """Over every place; of one surface with the answers in words."""
+        known = scenario.airframe.class_of_losses
+        if self.surface is not None and self.surface not in known:
+            raise BadInput(f"--surface {self.surface!r:.60}: allowed: {', '.join(known)}")
+        speeds_mps, altitudes_m = self.airspeed or (), self.altitude or ()
+        found = run_places(self.out, scenario, speeds_mps, altitudes_m, progress=reporter.progress)
+        folder = str(self.out / certain.survey_name(scenario))
+        if self.surface is not None:
+            found |= {
+                part: [row for row in found[part] if row["fault"] == self.surface] for part in certain.PARTS
+            }
+            return found | {"answers": certain.answers(scenario, found["points"]), "folder": folder}
+        failures = certain.engine_failures(scenario)
+        found |= {"alike": certain.alike(scenario), "folder": folder}
+        return found | ({"engines": failures} if failures else {})
+
+    def _of_schemes(self, grid: GridName, reporter: Reporter) -> Document:
+        """Over the grid."""
+        chosen = schemes.contenders(None if self.schemes is None else listed(self.schemes))
+        airspeed_mps, altitude_m = (
+            values[0] if values else None for values in (self.airspeed, self.altitude)
+        )
+        flown = GRIDS[grid].only(self.sensors, self.turbulence)
+        flown = flown.elsewhere(self.aircraft, airspeed_mps, altitude_m, self.surface)
+        document = run_schemes(self.out, flown, chosen, self.processes, reporter.progress)
+        return document | {"folder": str(self.out / NAME)}
+
+    def as_text(self, document: Document, colour: bool) -> str:
+        """The answers in words, else sentences and table; and where the files are."""
+        lines = document.get("answers") or [
+            as_text(page_of(document)[1]), *certain.geometry(document.get("alike", ())),
+            *certain.of_engines(document.get("engines", ())),
+        ]  # fmt: skip
+        return "\n".join([*lines, "", f"results: {document['folder']}"])

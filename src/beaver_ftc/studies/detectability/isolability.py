@@ -1,0 +1,57 @@
+"""The map of isolability: from which size on a loss of one surface excludes another surface, and how soon.
+
+A pair is a surface that loses effectiveness and another surface that could explain the innovation. For each
+pair the map has, along a flight: the smallest loss for which the other surface is excluded in time, and the
+time until a total loss excludes it; for every instant at which the loss may begin, and for half of them. It
+also has the smallest doublet that is certain to distinguish losses of the two surfaces in straight flight,
+which `separate` finds.
+"""
+
+from collections.abc import Sequence
+from itertools import permutations
+from math import inf
+
+import numpy as np
+
+from beaver_ftc.plugins import offered
+from beaver_ftc.results.model import Document
+from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.studies.engine.statistics import quantile
+
+LOSS_COLUMNS = ("magnitude", "magnitude_median", "longest_s", "median_s")
+DOUBLET_COLUMNS = ("doublet_deg", "doublet_s", "why")
+WITHOUT_DOUBLETS = dict(
+    zip(DOUBLET_COLUMNS, (None, None, "no installed package offers 'doublets'"), strict=True)
+)
+DISTINGUISHED_LOSS = 0.5  # share of effectiveness lost: of both losses that a doublet distinguishes
+
+
+def loss_limits(excluded: np.ndarray, frames: int, dt: float) -> Document:
+    """Limits of one pair along a flight, by LOSS_COLUMNS; None for a limit that no loss reaches.
+
+    excluded (n,): smallest loss, a share of 1, for which the frame alone excludes the other surface; inf
+    where no loss does. frames: number of frames within which the other surface has to be excluded. dt s: of a
+    frame. A delay includes the frame in which the loss begins.
+    """
+    least = np.sort(np.lib.stride_tricks.sliding_window_view(excluded, frames).min(axis=1))
+    n = len(excluded)
+    next_exclusion = np.where(excluded <= 1.0, np.arange(n), n)
+    next_exclusion = np.minimum.accumulate(next_exclusion[::-1])[::-1]
+    delay_s = np.where(next_exclusion < n, (next_exclusion - np.arange(n) + 1) * dt, inf)
+    delay_s = np.sort(delay_s[: len(least)])
+    found = least[-1], quantile(least, 0.5), delay_s[-1], quantile(delay_s, 0.5)
+    return {name: float(x) if x < inf else None for name, x in zip(LOSS_COLUMNS, found, strict=True)}
+
+
+def smallest_doublets(scenario: Scenario, after_s: float) -> dict[tuple[str, str], Document]:
+    """By pair of surfaces: the smallest doublet, flown after_s into a healthy flight, that distinguishes
+    losses of DISTINGUISHED_LOSS of the two; or why there is none."""
+    find = offered("doublets")
+    pairs = permutations(scenario.airframe.class_of_losses, 2)
+    return find(scenario, after_s, DISTINGUISHED_LOSS) if find else dict.fromkeys(pairs, WITHOUT_DOUBLETS)
+
+
+def rows_without_result(faults: Sequence[str], why: str) -> list[Document]:
+    """The rows, one a pair of surfaces, of a place that has no result, with the reason `why`."""
+    none = dict.fromkeys((*LOSS_COLUMNS, *DOUBLET_COLUMNS)) | {"why": why}
+    return [{"fault": fault, "other": other, **none} for fault, other in permutations(faults, 2)]

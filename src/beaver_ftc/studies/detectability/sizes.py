@@ -1,0 +1,233 @@
+"""Which flights answer how small a loss is found in time, and what limits it.
+
+A flight is the scenario without its own faults, with a loss of one surface: its seed and the instant of the
+loss are drawn, its size is asked for. The loss strikes anywhere between the start, once the references have
+settled, and the end. What is found: an alarm within the time asked for. What is certain: that the condition
+of guaranteed detection (loop/frame.py, `guaranteed_delay_s` of the metrics) holds within that time.
+
+The same flights, with one thing left out of scenario and declaration, say what limits the answer; with
+another reference, what would help.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from beaver_ftc.documents.errors import BadInput, BeaverFtcError
+from beaver_ftc.loop.loop import fly
+from beaver_ftc.results.metrics import measure, versions
+from beaver_ftc.results.model import Document
+from beaver_ftc.results.writer import result_folder
+from beaver_ftc.scenario.declared import Declared
+from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.signals import TIME_TOLERANCE_S
+from beaver_ftc.studies.detectability.certain import AMPLITUDES, SETTLED_S, axis_of, scaled
+from beaver_ftc.studies.detectability.shown import NAME, OF_SIZES
+from beaver_ftc.studies.detectability.thresholds import LARGEST, STAGES, Threshold, of_all, threshold
+from beaver_ftc.studies.engine.draws import loss
+from beaver_ftc.studies.engine.statistics import CONFIDENCE, counted
+from beaver_ftc.studies.engine.study import FlyRound, Study, in_rounds
+from beaver_ftc.studies.present.page import contents, write_files
+from beaver_ftc.studies.present.tables import finite
+
+SHARE = 0.9  # of flights
+AS_IT_IS = "as it is"
+NOTHING = {"p": 0.0, "q": 0.0, "r": 0.0}
+ADDED_DEG_S, ADDED_HZ = 3.0, 0.25  # of a sine, where an axis has no reference
+FIRST = STAGES[:1]  # flights of a comparison, and of the size that is certain
+
+
+@dataclass(frozen=True)
+class Asked:
+    """surface: that loses effectiveness. within_s: from the loss to the alarm. seed: of all that is drawn."""
+
+    surface: str
+    within_s: float
+    seed: int = 1
+
+
+class Flight(NamedTuple):
+    """One flight: of which variant of the scenario, its number, and the size of the loss, per cent."""
+
+    variant: str
+    run: int
+    size: int
+
+
+@dataclass
+class _Flown:
+    """Flights as they are flown, each once; fly: a round of them, by its number."""
+
+    fly: FlyRound
+    tell: Any
+    rounds: int = 0
+    rows: dict[Flight, Document] = field(default_factory=dict)
+
+    def of(self, variant: str, runs: Sequence[int], size: int) -> list[Document]:
+        wanted = [Flight(variant, run, size) for run in runs]
+        missing = [flight for flight in wanted if flight not in self.rows]
+        if missing:
+            self.rows.update(zip(missing, self.fly(self.rounds, missing), strict=True))
+            self.rounds += 1
+            self.tell(f"{variant}: {len(self.rows)} flights")
+        return [self.rows[flight] for flight in wanted]
+
+    def says(self, variant: str, key: str, runs: Sequence[int], size: int) -> list[bool]:
+        return [row[key] for row in self.of(variant, runs, size)]
+
+
+def run_sizes(
+    out: Path, scenario: Scenario, asked: Asked, workers: int = 1, tell: Any = lambda line: None
+) -> Document:
+    """Write `out/<scenario>-detectability-<surface>/`; return the document.
+
+    Raises BadInput where the scenario cannot answer.
+    """
+    check(scenario, asked)
+    variants = dict(variants_of(scenario, asked.surface))
+    study = Study(
+        f"{scenario.name[:70]}-{NAME}-{asked.surface}", (), partial(fly_one, variants, asked),
+        lambda rows: None, OF_SIZES, follows_from=[scenario, asked],
+        lost=lambda flight, why: _row(failed=True),
+    )  # fmt: skip
+    with in_rounds(study, out, workers) as rounds:
+        flown = _Flown(rounds, tell)
+        document = _document(scenario, asked, variants, flown)
+        with result_folder(out, study.name, study.files) as folder:
+            write_files(folder, contents(study.files, document))
+    return document | {"folder": str(out / study.name)}
+
+
+def check(scenario: Scenario, asked: Asked) -> None:
+    """Raise BadInput for what cannot be answered."""
+    surfaces = scenario.airframe.surfaces
+    if asked.surface not in surfaces:
+        raise BadInput(f"--surface {asked.surface!r:.60}: allowed: {', '.join(surfaces)}")
+    if scenario.fdi.scheme == "none":
+        raise BadInput(f"{scenario.name}: fdi.scheme: none diagnoses nothing, allowed: a scheme")
+    if scenario.duration_s < SETTLED_S + 2.0 * asked.within_s:
+        least = SETTLED_S + 2.0 * asked.within_s
+        raise BadInput(f"{scenario.name}: duration_s: too short for --within, allowed: {least:g} or more")
+
+
+def fly_one(variants: dict[str, Scenario], asked: Asked, flight: Flight) -> Document:
+    """The row of a flight."""
+    scenario = variants[flight.variant]
+    draws = np.random.default_rng([asked.seed, flight.run])
+    seed = int(draws.integers(2**31))
+    frames = round(draws.uniform(SETTLED_S, scenario.duration_s - asked.within_s) * scenario.rate_hz)
+    at_s = frames / scenario.rate_hz
+    fault = loss(asked.surface, flight.size / LARGEST, at_s)
+    flown = scenario.with_({"seed": seed, "faults": [fault], "expect": {}})
+    ends_s = min(at_s + asked.within_s + 2.0 / scenario.rate_hz, scenario.duration_s)
+    try:
+        landing = fly(flown.model_copy(update={"duration_s": ends_s}))
+        found = measure(landing)
+    except BeaverFtcError:
+        return _row(failed=True)
+    within_s = asked.within_s + TIME_TOLERANCE_S
+    delay_s, certain_s = found.detection.delay_s, found.detection.guaranteed_delay_s
+    inconclusive = found.detection.inconclusive
+    return _row(
+        found=delay_s is not None and delay_s <= within_s,
+        certain=certain_s is not None and certain_s <= within_s,
+        false_alarm=found.false_alarm,
+        inconclusive=inconclusive.reasons[0]["says"] if inconclusive else None,
+        bound_used=max(landing.closest_approach, default=0.0),
+    )
+
+
+def _row(**known: Any) -> Document:
+    nothing = {"found": False, "certain": False, "false_alarm": False, "inconclusive": None, "failed": False}
+    return nothing | {"bound_used": 0.0} | known
+
+
+def variants_of(scenario: Scenario, surface: str) -> Iterator[tuple[str, Scenario]]:
+    """The scenario, and the same with one thing left out or changed, by what that is."""
+    yield AS_IT_IS, scenario.with_({"faults": [], "expect": {}})
+    for name, change in (*_left_out(scenario), *_other_references(scenario, surface)):
+        yield name, scenario.with_({"faults": [], "expect": {}, **change})
+
+
+def _left_out(scenario: Scenario) -> Iterator[tuple[str, Document]]:
+    """What may hide a fault, left out of the flight and of what is declared."""
+    declared, environment = Declared.of(scenario), scenario.environment
+    if environment.is_turbulent or environment.gusts or declared.air.moves:
+        yield "without turbulence", {"environment": {}, "fdi.bounds.turbulence": "none"}
+    if not (scenario.sensors.is_ideal and declared.sensors.is_ideal):
+        yield "with perfect sensors", {"sensors": "ideal", "fdi.bounds.sensors": "ideal"}
+    if not (scenario.actuators.is_ideal and declared.servo_errors.is_none):
+        known = {"fdi.bounds.deflection_deg": 0.0, "fdi.bounds.actuators": {}}
+        yield "with perfect servos", {"actuators": "ideal", "uncertainty.actuators": {}, **known}
+    exact = {"coefficients": 0.0, "inertia": 0.0, "inertia_coupling": NOTHING, "constant_rad_s2": NOTHING}
+    none = {f"fdi.bounds.{key}": value for key, value in exact.items()}
+    yield "without uncertainty of the model", {"uncertainty": {}, **none}
+
+
+def _other_references(scenario: Scenario, surface: str) -> Iterator[tuple[str, Document]]:
+    """References that move the surface more: on the axis on which it shows."""
+    axis = axis_of(scenario, surface)
+    signals = scenario.model_dump(mode="json", exclude_none=True)["reference"].get(axis, [])
+    louder, faster = (scaled(signals, keys, 2.0) for keys in (AMPLITUDES, _FREQUENCIES))
+    if louder != signals:
+        yield f"with twice the amplitude of reference.{axis}", {f"reference.{axis}": louder}
+    if faster != signals:
+        yield f"with twice the frequency of reference.{axis}", {f"reference.{axis}": faster}
+    if not signals:
+        sine = {"amplitude_deg_s": ADDED_DEG_S, "frequency_hz": ADDED_HZ}
+        says = f"with a sine of {ADDED_DEG_S:g} deg/s and {ADDED_HZ:g} Hz as reference.{axis}"
+        yield says, {f"reference.{axis}": [{"sine": sine}]}
+
+
+_FREQUENCIES = ("frequency_hz", "start_frequency_hz", "end_frequency_hz")
+
+
+def _document(scenario: Scenario, asked: Asked, variants: dict[str, Scenario], flown: _Flown) -> Document:
+    whole = _answer(AS_IT_IS, flown, STAGES)
+    compared = [_answer(name, flown, FIRST) for name in variants if name != AS_IT_IS]
+    rows = [row for flight, row in flown.rows.items() if flight.variant == AS_IT_IS]
+    reasons = sorted({row["inconclusive"] for row in rows} - {None})
+    return {
+        "scenario": scenario.name,
+        "surface": asked.surface,
+        "type": "loss_of_effectiveness",
+        "within_s": asked.within_s,
+        "share": SHARE,
+        "confidence": CONFIDENCE,
+        "seed": asked.seed,
+        **whole,
+        "compared": compared,
+        "inconclusive": reasons,
+        "bound_used": float(np.median([row["bound_used"] for row in rows])),
+        "flights_flown": len(flown.rows),
+        "versions": dict(versions()),
+    }
+
+
+def _answer(variant: str, flown: _Flown, stages: Sequence[int]) -> Document:
+    """The two sizes of one variant, as shares of the effectiveness, and what a total loss comes to."""
+    found = threshold(partial(flown.says, variant, "found"), SHARE, CONFIDENCE, stages)
+    certain = of_all(partial(flown.says, variant, "certain"), stages[0])
+    total = flown.of(variant, range(found.flights), LARGEST)
+    sure = sum(flown.says(variant, "certain", range(stages[0]), LARGEST))
+    return {
+        "variant": variant,
+        "found": _shares(found),
+        "certain": {
+            "size": finite(certain / LARGEST), "flights": stages[0],
+            "at_total_loss": sure,
+        },
+        "total_loss": counted(sum(row["found"] for row in total), len(total)),
+        "false_alarms": sum(row["false_alarm"] for row in total),
+        "failed": sum(row["failed"] for row in total),
+    }  # fmt: skip
+
+
+def _shares(found: Threshold) -> Document:
+    """As shares of 1; null: not even a total loss."""
+    of = {name: finite(getattr(found, name) / LARGEST) for name in ("size", "low", "high")}
+    return of | {"flights": found.flights}

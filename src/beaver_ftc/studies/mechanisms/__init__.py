@@ -1,1 +1,0 @@
-"""Which mechanism of adaptive diagnosis and accommodation improves a verdict or a flight."""

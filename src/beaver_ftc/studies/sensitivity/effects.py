@@ -1,0 +1,164 @@
+"""What pairs of flights, with a mechanism and without it, amount to.
+
+A pair is worse without the mechanism if it then has a false alarm, a late alarm or no right name, or tracks
+worse, and better if the opposite holds. The net share, worse less better, is what the mechanism is worth.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from math import inf, isfinite
+
+from beaver_ftc.results.metrics import versions
+from beaver_ftc.results.model import Document
+from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial, counted, median
+from beaver_ftc.studies.sensitivity.mechanisms import FACTORS, Flight, cases_of, with_key, without_key
+from beaver_ftc.studies.sensitivity.systems import MECHANISMS, SYSTEMS, Mechanism
+
+LATE_S = 0.1  # an alarm so much later is late
+WORSE = 1.1  # a tracking error so many times as large is worse
+Pair = tuple[Document, Document]  # outcomes of a draw with the mechanism and without it
+
+
+def document_of(seed: int, draws: int, rows: Sequence[Document], margins: list[Document]) -> Document:
+    """A row a mechanism; rows: of every case of `cases_of`, in order."""
+    cases = cases_of(draws)
+    found = [_row_of(mechanism, cases, rows) for mechanism in MECHANISMS]
+    alarms = [_alarms_of(key, rows) for key in rows[0]]
+    return {
+        "passed": not any(row["unexplained"] for row in alarms if row["worst_case"]),
+        "seed": seed,
+        "draws": len(cases),
+        "confidence": CONFIDENCE,
+        "factors": {name: list(values) for name, values in FACTORS.items()},
+        "late_s": LATE_S,
+        "worse": WORSE,
+        "margins": margins,
+        "systems": {system: _system_row([row[system] for row in rows]) for system in SYSTEMS},
+        "mechanisms": found,
+        "false_alarms": alarms,
+        "versions": dict(versions()),
+    }
+
+
+def _row_of(mechanism: Mechanism, cases: Sequence[Flight], rows: Sequence[Document]) -> Document:
+    pairs = [(row[with_key(mechanism)], row[without_key(mechanism)]) for row in rows]
+    by = {
+        factor: {str(value): effect_of([p for p, case in zip(pairs, cases, strict=True)
+                                        if getattr(case, factor) == value]) for value in values}
+        for factor, values in FACTORS.items()
+    }  # fmt: skip
+    about = {"system": mechanism.system, "mechanism": mechanism.name, "serves": mechanism.serves}
+    return {**about, **effect_of(pairs), "by": by}
+
+
+def effect_of(pairs: Sequence[Pair]) -> Document:
+    """What the mechanism does in these pairs: shares of flights that are worse without it, less those that
+    are better; and medians of both."""
+    flown = [pair for pair in pairs if not any(outcome["failed"] for outcome in pair)]
+    return {
+        "flights": len(flown),
+        "failed": len(pairs) - len(flown),
+        "same_verdict": sum(a["verdict"] == b["verdict"] for a, b in flown),
+        "same_tracking": sum(a["tracking_deg_s"] == b["tracking_deg_s"] for a, b in flown),
+        **{name: net(flown, worse) for name, worse in CRITERIA.items()},
+        "delay_s": _both(flown, "delay_s"),
+        "tracking_deg_s": _both(flown, "tracking_deg_s"),
+        "tracking_ratio": median(_ratio(b, a) for a, b in flown),
+    }
+
+
+def _more_alarms(a: Document, b: Document) -> bool:
+    return bool(b["false_alarm"] and not a["false_alarm"])
+
+
+def _later(a: Document, b: Document) -> bool:
+    """Whether b's alarm is late beside a's; of flights with a false alarm there is no delay to compare."""
+    if a["false_alarm"] or b["false_alarm"]:
+        return False
+    return _or_never(b["delay_s"]) > _or_never(a["delay_s"]) + LATE_S
+
+
+def _name_lost(a: Document, b: Document) -> bool:
+    return bool(a["named"] and not b["named"])
+
+
+def _tracks_worse(a: Document, b: Document) -> bool:
+    return _or_never(b["tracking_deg_s"]) > WORSE * _or_never(a["tracking_deg_s"])
+
+
+CRITERIA: Mapping[str, Callable[[Document, Document], bool]] = {
+    "false_alarms": _more_alarms, "late": _later, "names": _name_lost, "tracking": _tracks_worse,
+}  # fmt: skip
+"""Whether the second flight of a pair is worse than the first."""
+
+
+def net(pairs: Sequence[Pair], worse: Callable[[Document, Document], bool]) -> Document:
+    """Share of pairs that are worse without the mechanism, less the share of those that are better.
+
+    Its interval is that of both shares, each exact at half of the error probability: together they hold with
+    the whole confidence, whatever the shares depend on [ClopperPearson1934].
+    """
+    n, each = len(pairs), (1.0 + CONFIDENCE) / 2.0
+    lost, gained = sum(worse(a, b) for a, b in pairs), sum(worse(b, a) for a, b in pairs)
+    without, with_ = binomial(lost, n, each), binomial(gained, n, each)
+    return {
+        "worse": lost,
+        "better": gained,
+        "value": (lost - gained) / n if n else 0.0,
+        "low": without.low - with_.high,
+        "high": without.high - with_.low,
+    }
+
+
+def _both(pairs: Sequence[Pair], name: str) -> Document:
+    kept = pairs if name != "delay_s" else [p for p in pairs if not any(o["false_alarm"] for o in p)]
+    return {
+        "flights": len(kept),
+        "with": median(a[name] for a, _ in kept),
+        "without": median(b[name] for _, b in kept),
+    }
+
+
+def _ratio(b: Document, a: Document) -> float:
+    """Of the tracking errors; 1 where both aircraft are lost."""
+    over, under = _or_never(b["tracking_deg_s"]), _or_never(a["tracking_deg_s"])
+    if not isfinite(under):
+        return 0.0 if isfinite(over) else 1.0
+    return over / under
+
+
+def _or_never(value: float | None) -> float:
+    return inf if value is None else value
+
+
+def _system_row(outcomes: Sequence[Document]) -> Document:
+    """What a system does with all of its mechanisms."""
+    n = len(outcomes)
+    rates = {
+        "false_alarms": sum(o["false_alarm"] for o in outcomes),
+        "detected": sum(o["delay_s"] is not None for o in outcomes),
+        "named": sum(o["named"] for o in outcomes),
+        "lost": sum(o["tracking_deg_s"] is None for o in outcomes),
+    }
+    return {
+        "flights": n,
+        **{name: counted(count, n) for name, count in rates.items()},
+        "tracking_deg_s": median(o["tracking_deg_s"] for o in outcomes),
+    }
+
+
+def _alarms_of(key: str, rows: Sequence[Document]) -> Document:
+    """False alarms of what was flown, and why they came. worst_case: whether it promises that none comes
+    within the declaration. unexplained: alarms without an undeclared error, or without the certificate that
+    this scheme has."""
+    reasons = [row[key]["reason"] for row in rows if row[key]["false_alarm"]]
+    worst_case = "statistical" not in key
+    explained = [r["undeclared"] > 0 and (r["certified"] is not False or not worst_case) for r in reasons]
+    return {
+        "flown": key,
+        "worst_case": worst_case,
+        "count": len(reasons),
+        "undeclared": sum(reason["undeclared"] > 0 for reason in reasons),
+        "certified": sum(bool(reason["certified"]) for reason in reasons),
+        "certifiable": sum(reason["certified"] is not None for reason in reasons),
+        "unexplained": len(reasons) - sum(explained),
+    }

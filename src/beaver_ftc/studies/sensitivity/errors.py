@@ -1,0 +1,189 @@
+"""The errors that a scenario declares, and flights in which they are a multiple of what is declared.
+
+Each error is flown at its limit, not within it: every coefficient, inertia and bias is off by the whole
+amount, with a sign that is drawn. An error that is not declared has a unit of its own, and is absent from
+all other flights.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from beaver_ftc.aircraft import AXES
+from beaver_ftc.results.model import Document
+from beaver_ftc.scenario.airframe import air_of
+from beaver_ftc.scenario.declared import Declared
+from beaver_ftc.scenario.diagnosis import ActuatorBound
+from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.sensors import PRESETS
+
+FREQUENCIES_RAD_S = (5.0, 15.0)  # of an unstructured acceleration where the scenario flies none
+UNDECLARED_SHARE = 0.01  # of a coefficient or a moment of inertia of which no error is declared
+UNDECLARED_SENSORS, UNDECLARED_AIR = "tactical-grade", "light"
+INTENSITY = {"none": 0.0, "light": 1.0, "moderate": 2.0, "severe": 3.0}  # wind at 20 ft: 15, 30, 45 kt
+_RATIO, _INERTIA, _WIDEST_BAND_DEG = (0.1, 10.0), (0.5, 2.0), 10.0  # what the keys of a scenario admit
+_RANDOM, _SIGNED = ("noise_std", "quantum"), ("bias", "scale_error", "drift")
+
+Change = Callable[[float, np.random.Generator], Document]
+
+
+class Error(NamedTuple):
+    """One kind of error.
+
+    says: how much of it is declared, or that it is not. change: the keys of a scenario that make it so many
+    times as large, with signs that are drawn.
+    """
+
+    name: str
+    says: str
+    change: Change
+    declared: bool = True
+
+
+def errors_of(scenario: Scenario) -> tuple[Error, ...]:
+    """Every kind of error that the bounds of a scenario may declare, and that a truth may have."""
+    bounds, declared = scenario.fdi.bounds, Declared.of(scenario)
+    published = (
+        _coupling(declared.coupling) if any(declared.coupling) else None,
+        _acceleration(scenario, declared.constant_rad_s2) if any(declared.constant_rad_s2) else None,
+    )
+    return (
+        _coefficients(scenario, declared),
+        _inertia(bounds.inertia),
+        *(error for error in published if error),
+        *(() if declared.servo_errors.is_none else (_servos(declared),)),
+        _sensors({} if bounds.sensors.is_ideal else bounds.sensors.model_dump()),
+        _air(bounds.turbulence),
+    )
+
+
+def changes_of(errors: Sequence[Error], factors: Mapping[str, float], draws: np.random.Generator) -> Document:
+    """The keys of a truth in which each error is so many times what is declared; those without a factor are
+    absent, as is everything that no error makes."""
+    truth: Document = {"uncertainty": {}, "sensors": "ideal", "environment": {}}
+    for error in errors:  # the same signs whatever the factors
+        made = error.change(factors.get(error.name, 0.0), draws)
+        truth |= made if error.name in factors else {}
+    return truth
+
+
+def _signs(draws: np.random.Generator, names: Sequence[str]) -> dict[str, float]:
+    return dict(zip(names, draws.choice((-1.0, 1.0), len(names)).tolist(), strict=True))
+
+
+def _within(value: float, limits: tuple[float, float]) -> float:
+    return float(np.clip(value, *limits))
+
+
+def _signed(sizes: Mapping[str, float], usual: float, limits: tuple[float, float]) -> Change:
+    """Of each key its usual value, so many times its size more or less, within the limits."""
+
+    def change(times: float, draws: np.random.Generator) -> Document:
+        signs = _signs(draws, [*sizes])
+        return {key: _within(usual + times * signs[key] * size, limits) for key, size in sizes.items()}
+
+    return change
+
+
+def _below(section: str, change: Change) -> Change:
+    return lambda times, draws: {section: change(times, draws)}
+
+
+def _of_ratios(what: str, section: str, shares: Mapping[str, float], limits: tuple[float, float]) -> Error:
+    """Factors of the truth that are off by shares of which some are declared, or by a unit of its own."""
+    known = any(shares.values())
+    shares = shares if known else dict.fromkeys(shares, UNDECLARED_SHARE)
+    largest = f"{100.0 * max(shares.values()):g} %"
+    change = _below(section, _signed(shares, 1.0, limits))
+    return Error(what, largest if known else _unknown(largest), change, known)
+
+
+def _coefficients(scenario: Scenario, declared: Declared) -> Error:
+    shares = {term.name: declared.coefficients.of(term.name) for term in scenario.airframe.moments}
+    return _of_ratios("moment coefficients", "uncertainty.coefficients", shares, _RATIO)
+
+
+def _inertia(share: float) -> Error:
+    shares = dict.fromkeys(("Ix", "Iy", "Iz"), share)
+    return _of_ratios("moments of inertia", "uncertainty.inertia", shares, _INERTIA)
+
+
+def _coupling(theta: Sequence[float]) -> Error:
+    change = _signed(dict(zip(AXES, theta, strict=True)), 0.0, (-1.0, 1.0))
+    return Error("inertia coupling", f"{max(theta):g}", _below("uncertainty.inertia_coupling", change))
+
+
+def _acceleration(scenario: Scenario, sizes: Sequence[float]) -> Error:
+    """Of the frequencies that the scenario flies, where it flies any."""
+    flown = {axis: getattr(scenario.uncertainty.sinusoid, axis) for axis in AXES}
+    known = {axis: wave.frequency_rad_s for axis, wave in flown.items() if wave.amplitude_rad_s2}
+
+    def change(times: float, draws: np.random.Generator) -> Document:
+        drawn = dict(zip(AXES, draws.uniform(*FREQUENCIES_RAD_S, len(AXES)).tolist(), strict=True))
+        return {
+            "uncertainty.sinusoid": {
+                axis: {"amplitude_rad_s2": times * size, "frequency_rad_s": at}
+                for (axis, at), size in zip((drawn | known).items(), sizes, strict=True)
+            }
+        }
+
+    return Error("unstructured acceleration", f"{max(sizes):g} rad/s2", change)
+
+
+def _servos(declared: Declared) -> Error:
+    """Bandwidths and rate limits, each with a sign drawn, and dead bands."""
+    bounds = {name: bound.model_dump() for name, bound in declared.servo_errors}
+
+    def change(times: float, draws: np.random.Generator) -> Document:
+        truth = {}
+        for name, bound in bounds.items():
+            signs = _signs(draws, ("bandwidth", "rate_limit"))
+            truth[name] = {key: _within(1.0 + times * signs[key] * bound[key], _RATIO) for key in signs}
+            truth[name]["dead_band_deg"] = min(times * bound["dead_band_deg"], _WIDEST_BAND_DEG)
+        return {"uncertainty.actuators": truth}
+
+    largest = {key: max(bound[key] for bound in bounds.values()) for key in ActuatorBound.model_fields}
+    says = "{bandwidth:.0%}, {rate_limit:.0%}, {dead_band_deg:g} deg".format(**largest).replace("%", " %")
+    return Error("actuators", says, change)
+
+
+def _sensors(declared: Mapping[str, Mapping[str, float]]) -> Error:
+    """Noise and resolution are so many times as large; biases and slopes too, each with a sign drawn."""
+    bounds = declared or PRESETS[UNDECLARED_SENSORS]
+
+    def change(times: float, draws: np.random.Generator) -> Document:
+        truth = {}
+        for name, keys in bounds.items():
+            signs = _signs(draws, list(keys))
+            truth[name] = {
+                key: times * abs(value) * (signs[key] if key.startswith(_SIGNED) else 1.0)
+                for key, value in keys.items()
+                if value and key.startswith((*_RANDOM, *_SIGNED))
+            }
+        return {"sensors": truth}
+
+    name = _preset(declared) if declared else _unknown(UNDECLARED_SENSORS)
+    return Error("sensor errors", name, change, bool(declared))
+
+
+def _preset(declared: Mapping[str, Mapping[str, float]]) -> str:
+    sizes = {name: {key: value for key, value in of.items() if value} for name, of in declared.items()}
+    sizes = {name: of for name, of in sizes.items() if of}
+    return next((name for name, preset in PRESETS.items() if preset == sizes), "as declared")
+
+
+def _air(declared: str) -> Error:
+    """The strongest of the severities that there are, up to so many times the one declared."""
+    base = INTENSITY[declared] or INTENSITY[UNDECLARED_AIR]
+
+    def change(times: float, draws: np.random.Generator) -> Document:
+        within = [name for name, intensity in INTENSITY.items() if intensity <= times * base]
+        return {"environment": air_of(within[-1])}
+
+    is_declared = declared != "none"
+    return Error("turbulence", declared if is_declared else _unknown(UNDECLARED_AIR), change, is_declared)
+
+
+def _unknown(unit: str) -> str:
+    return f"none; unit {unit}"

@@ -1,0 +1,267 @@
+"""Which flights show what a mechanism is worth, and what pairs of flights amount to.
+
+A draw is a flight: fault, airspeed, references, instant, and errors of the model within what is declared.
+Every system flies it, with all of its mechanisms and without each of them. Cells of the survey are all
+combinations of fault, bandwidth of the law, undeclared error and instruments; each has draws of its own.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from itertools import product
+from math import hypot
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from beaver_ftc.aircraft import AXES
+from beaver_ftc.documents.errors import BeaverFtcError
+from beaver_ftc.loop.loop import Loop, fly
+from beaver_ftc.loop.readout import withhold_from_law
+from beaver_ftc.plugins import required
+from beaver_ftc.results.log import Columns, MemoryLog
+from beaver_ftc.results.metrics import measure
+from beaver_ftc.results.model import Document, Metrics
+from beaver_ftc.scenario.airframe import air_of
+from beaver_ftc.scenario.declared import undeclared
+from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.studies.compare.margins_in_flight import margins_of
+from beaver_ftc.studies.engine.draws import loss, sines, swings
+from beaver_ftc.studies.present.tables import finite
+from beaver_ftc.studies.sensitivity.systems import (
+    CONSTANT,
+    MECHANISMS,
+    PAPER,
+    SYSTEMS,
+    Changes,
+    Mechanism,
+)
+
+SURFACES = ("aileron", "elevator", "rudder")  # draws of a cell take turns
+LOSSES = {"loss 20 %": 0.2, "loss 40 %": 0.4, "loss 80 %": 0.8}
+UNANTICIPATED = "unanticipated"
+FAULTS = (*LOSSES, UNANTICIPATED)
+# Bandwidth of the rate loops, Kp in 1/s, and what gives it to the laws: the published one takes it, the
+# default one follows from a gain margin, dB.
+BANDWIDTHS: Mapping[str, tuple[float, float]] = {
+    "low": (2.3, 20.0),
+    "medium": (6.6, 12.0),
+    "high": (14.0, 6.0),
+}
+ERRORS = (0.0, 0.005, 0.02, 0.05)  # of every moment coefficient, beyond what is declared
+SENSORS = "tactical-grade"
+# What is flown, and declared: sensors, turbulence, inertia coupling, and unstructured acceleration, rad/s2.
+INSTRUMENTS: Mapping[str, tuple[str, str, float, float]] = {
+    "exact sensors": ("ideal", "none", 0.25, 0.02),  # the published bounds
+    "real sensors": (SENSORS, "none", 0.0, 0.002),
+    "real sensors, light turbulence": (SENSORS, "light", 0.0, 0.002),
+}
+FACTORS: Mapping[str, tuple[Any, ...]] = {
+    "fault": FAULTS, "bandwidth": tuple(BANDWIDTHS), "error": ERRORS, "instruments": tuple(INSTRUMENTS),
+}  # fmt: skip
+DRAWS = 3  # of a cell
+AIRSPEED_MPS, STRIKES_S, AFTER_S = (38.0, 52.0), (6.0, 9.0), 8.0
+RATE_HZ, AMPLITUDE_DEG_S = 100.0, 3.0
+SWINGS_RAD_S = (1.0, 15.0)  # frequencies of the unstructured acceleration
+
+
+class Flight(NamedTuple):
+    """One draw of a cell."""
+
+    fault: str
+    bandwidth: str
+    error: float
+    instruments: str
+    run: int
+
+
+def cases_of(draws: int) -> list[Flight]:
+    """Every draw of every cell."""
+    return [Flight._make((*cell, run)) for cell in product(*FACTORS.values()) for run in range(draws)]
+
+
+def surface_of(flight: Flight) -> str:
+    """The surface that fails; of an unanticipated fault, `-`."""
+    return SURFACES[flight.run % len(SURFACES)] if flight.fault in LOSSES else "-"
+
+
+def scenario_of(flight: Flight, seed: int, system: str) -> Scenario:
+    """What a system flies, with all of its mechanisms. Draws depend on the cell and the run alone."""
+    places = (values.index(value) for values, value in zip(FACTORS.values(), flight, strict=False))
+    draws = np.random.default_rng([seed, *places, flight.run])
+    at_s = round(draws.uniform(*STRIKES_S) * RATE_HZ) / RATE_HZ
+    sensors, air, coupling, swing_rad_s2 = INSTRUMENTS[flight.instruments]
+    scenario = Scenario.model_validate(
+        {
+            "name": "mechanisms",
+            "seed": int(draws.integers(2**31)),
+            "duration_s": at_s + AFTER_S,
+            "rate_hz": RATE_HZ,
+            "initial": {"airspeed_mps": float(draws.uniform(*AIRSPEED_MPS))},
+            "reference": sines(draws, AMPLITUDE_DEG_S),
+            "sensors": sensors,
+            "environment": air_of(air),
+            "faults": [_fault(flight, at_s)],
+            "fdi": {
+                "bounds": {
+                    "sensors": sensors,
+                    "turbulence": air,
+                    "inertia_coupling": dict.fromkeys(AXES, coupling),
+                    "constant_rad_s2": dict.fromkeys(AXES, swing_rad_s2),
+                }
+            },
+        }
+    )
+    errors = _errors(coupling, swing_rad_s2, draws) | _undeclared(scenario, flight.error, draws)
+    return scenario.with_({**SYSTEMS[system], **_bandwidth(flight, system), **errors})
+
+
+def _fault(flight: Flight, at_s: float) -> Document:
+    if flight.fault == UNANTICIPATED:
+        return {"type": "unanticipated", "Cm_alpha3": 10.0, "at_s": at_s}
+    return loss(surface_of(flight), LOSSES[flight.fault], at_s)
+
+
+def _errors(coupling: float, swing_rad_s2: float, draws: np.random.Generator) -> Document:
+    """Errors of the model somewhere within what is declared."""
+    thetas = draws.uniform(-coupling, coupling, len(AXES)).tolist()
+    sizes = draws.uniform(0.0, swing_rad_s2, len(AXES)).tolist()
+    return {
+        "uncertainty.inertia_coupling": dict(zip(AXES, thetas, strict=True)),
+        "uncertainty.sinusoid": swings(draws, sizes, SWINGS_RAD_S),
+    }
+
+
+def _undeclared(scenario: Scenario, share: float, draws: np.random.Generator) -> Document:
+    """Every moment coefficient off by a share of it, with a sign that is drawn."""
+    names = [term.name for term in scenario.airframe.moments]
+    signs = draws.choice((-1.0, 1.0), len(names)).tolist()
+    ratios = {name: 1.0 + share * sign for name, sign in zip(names, signs, strict=True)}
+    return {"uncertainty.coefficients": ratios if share else {}}
+
+
+def _bandwidth(flight: Flight, system: str) -> Changes:
+    Kp, margin_db = BANDWIDTHS[flight.bandwidth]
+    if system == PAPER:
+        return {"control.proportional_per_s": Kp, "control.integral_per_s2": Kp**2 / 4.0}
+    return {"control.gain_margin_db": margin_db}
+
+
+def with_mechanism(scenario: Scenario, mechanism: Mechanism) -> Scenario:
+    """What flies with it."""
+    return scenario.with_(mechanism.present)
+
+
+def without_mechanism(scenario: Scenario, mechanism: Mechanism) -> Scenario:
+    """What flies without it; what is withheld from the law is no key.
+
+    In place of adaptive thresholds stands the least constant that promises the same: the largest value of the
+    adaptive threshold in the same flight as declared and without the fault.
+    """
+    changed = scenario.with_(mechanism.without)
+    if "fdi.options.adaptive_threshold" not in mechanism.without:
+        return changed
+    names = [f"{axis}_threshold_rad_s" for axis in AXES]
+    log = Columns(*names)
+    fly(scenario.with_({"faults": [], "uncertainty.coefficients": {}}), log)
+    return changed.with_({CONSTANT: max(float(log[name].max()) for name in names)})
+
+
+def fly_one(seed: int, flight: Flight) -> Document:
+    """The outcome of a draw by what was flown: each system, with and without each of its mechanisms."""
+    flown = {}
+    for system in SYSTEMS:
+        whole = scenario_of(flight, seed, system)
+        flown[system] = outcome_of(whole)
+        for mechanism in (each for each in MECHANISMS if each.system == system):
+            if with_key(mechanism) not in flown:
+                flown[with_key(mechanism)] = outcome_of(with_mechanism(whole, mechanism))
+            if without_key(mechanism) not in flown:
+                less = without_mechanism(whole, mechanism)
+                flown[without_key(mechanism)] = outcome_of(less, mechanism.withheld)
+    return flown
+
+
+def with_key(mechanism: Mechanism) -> str:
+    """The outcome of a draw in which the mechanism is there."""
+    return f"with {mechanism.key}" if mechanism.present else mechanism.system
+
+
+def without_key(mechanism: Mechanism) -> str:
+    """The outcome of a draw without it."""
+    return f"without {mechanism.key}" if mechanism.without or mechanism.withheld else mechanism.system
+
+
+def watch_of(withheld: str) -> Callable[[Loop], Callable[[], None]] | None:
+    """What `fly` calls as the flight begins, to withhold something from its law; None if nothing is."""
+
+    def begin(loop: Loop) -> Callable[[], None]:
+        withhold_from_law(loop.frames[0], withheld)
+        return lambda: None
+
+    return begin if withheld else None
+
+
+def outcome_of(scenario: Scenario, withheld: str = "") -> Document:
+    """What counts of a flight. withheld: from the law, as in `withhold_from_law`."""
+    try:
+        found = measure(fly(scenario, watch=watch_of(withheld)))
+    except BeaverFtcError as error:
+        return FAILED | {"error": str(error)}
+    detection, isolation = found.detection, found.isolation
+    return {
+        "failed": False,
+        "false_alarm": found.false_alarm,
+        "delay_s": found.fault_found_s,
+        "named": found.fault_named,
+        "tracking_deg_s": _tracking(found),
+        "verdict": [detection.time_s, isolation.fault, isolation.time_s],
+        "reason": reason_of(scenario) if found.false_alarm else None,
+    }
+
+
+FAILED: Document = {
+    "failed": True, "false_alarm": False, "delay_s": None, "named": False, "tracking_deg_s": None,
+    "verdict": None, "reason": None,
+}  # fmt: skip
+
+
+def _tracking(found: Metrics) -> float | None:
+    """RMS error of all axes after the fault, deg/s; None of an aircraft that is lost."""
+    rms = found.tracking.post_fault_rms_deg_s
+    return None if found.departure or rms is None else hypot(rms.p or 0.0, rms.q or 0.0, rms.r or 0.0)
+
+
+def reason_of(scenario: Scenario) -> Document:
+    """Of a false alarm: how many errors of the truth are undeclared; and whether a certificate proves that
+    the data are outside what is declared, of a scheme whose alarms have one."""
+    beyond = sum(1 for _ in undeclared(scenario))
+    if not scenario.fdi.is_ours:
+        return {"undeclared": beyond, "certified": None}
+    log = MemoryLog()
+    fly(scenario, log)
+    stated = required("proof", "mechanisms")(scenario, log).certificate["statements"]
+    return {"undeclared": beyond, "certified": any(_proves_alarm(statement) for statement in stated)}
+
+
+def _proves_alarm(statement: Mapping[str, Any]) -> bool:
+    """Whether a statement is that no healthy aircraft within the declaration gives these data."""
+    return statement["column"] == "detected" and "sides" in statement
+
+
+def margins_row(cell: tuple[str, str, str]) -> Document:
+    """Margins of a system's healthy loop at a bandwidth, the least over surfaces and airspeeds."""
+    system, bandwidth, instruments = cell
+    flight = Flight(FACTORS["fault"][0], bandwidth, FACTORS["error"][0], instruments, 0)
+    found = margins_of(scenario_of(flight, 0, system))
+    return {
+        "system": system,
+        "bandwidth": bandwidth,
+        "instruments": instruments,
+        "gain_margin_db": finite(min(min(each.up_db, each.down_db) for each in found)),
+        "phase_margin_deg": finite(min(each.phase_deg for each in found)),
+    }
+
+
+def margin_cells() -> Iterator[tuple[str, str, str]]:
+    """System, bandwidth and instruments of each row of margins; the air is not in a loop."""
+    seen = [name for name, (_, air, *_) in INSTRUMENTS.items() if air == "none"]
+    yield from product(SYSTEMS, BANDWIDTHS, seen)

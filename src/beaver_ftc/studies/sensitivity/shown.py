@@ -1,0 +1,308 @@
+"""What larger errors, or the loss of a mechanism, change: as sentences, tables, figures and files."""
+
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from itertools import chain
+from operator import itemgetter
+from typing import TYPE_CHECKING, Any
+
+from beaver_ftc.results.model import Document
+from beaver_ftc.results.style import BLACK
+from beaver_ftc.studies.present.figures import GRID, SERIES, draw_estimates, label_edges, panels
+from beaver_ftc.studies.present.page import Heading, Part, Pictures, Table, study_files, versions_line
+from beaver_ftc.studies.present.tables import estimate, grouped, number, or_never, percent
+from beaver_ftc.studies.sensitivity.systems import DEFAULT, PAPER
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+NAME = "sensitivity"
+
+
+def page_of(document: Document) -> tuple[str, Sequence[Part]]:
+    """The title and the parts of a page, and of the text without its pictures."""
+    return _page_of_mechanisms(document) if "mechanisms" in document else _page_of_errors(document)
+
+
+# Larger errors than declared.
+
+HEAD = (
+    "error", "declared", "times", "flights", "false alarms, %", "detected, %", "named rightly, %",
+    "named wrongly, %", "delay, s", "tracking RMS, deg/s", "bound used, %",
+)  # fmt: skip
+CAPTION = (
+    "In brackets 95 % intervals. Delay, tracking and bound used are medians: of the flights in which the "
+    "aircraft is lost the tracking error is infinite. The bound used is the part of the detection bound that "
+    "the healthy part of a flight takes."
+)
+SHOWN = {
+    "false_alarm": "false alarms, %", "named": "named rightly, %", "tracking_deg_s": "RMS rate error, deg/s",
+}  # fmt: skip
+
+
+def _page_of_errors(document: Document) -> tuple[str, Sequence[Part]]:
+    return f"Beyond what is declared: {document['scenario']}", [
+        *error_sentences(document), Table(HEAD, [cells(row) for row in document["rows"]]), CAPTION,
+        Pictures([("False alarms, right names and tracking over the factor", NAME)]),
+        versions_line(document["versions"]),
+    ]  # fmt: skip
+
+
+def error_sentences(document: Document) -> Iterator[str]:
+    """What holds as declared, and the least factor at which an error changes the verdict."""
+    errors = list(grouped(document["rows"], "error").values())
+    alarms, misnamed = _counts(errors[-1][0])
+    yield (
+        f"{document['scenario']}: with every error at the limit of what is declared, {alarms} flights have a "
+        f"false alarm and {misnamed} a wrong name."
+    )
+    yield from map(_onset, errors)
+
+
+def _counts(row: Document) -> list[str]:
+    return [f"{row[name]['count']} of {row[name]['of']}" for name in ("false_alarm", "misnamed")]
+
+
+def _onset(rows: Sequence[Document]) -> str:
+    """The least factor with a false alarm or a wrong name, of one error."""
+    declared = rows[0]["declared"]
+    size = "the unit" if declared.startswith("none; ") else "the declared size"
+    head = f"{rows[0]['error']} ({declared.replace('none; ', 'not declared; ', 1)})"
+    broken = next((row for row in rows if row["false_alarm"]["count"] or row["misnamed"]["count"]), None)
+    if broken is None:
+        most = rows[-1]["factor"]
+        return f"{head}: no false alarm and no wrong name up to {most:g} times {size}."
+    alarms, misnamed = _counts(broken)
+    return (
+        f"{head}: an error of {broken['factor']:g} times {size} gives a false alarm in {alarms} flights "
+        f"and a wrong name in {misnamed}."
+    )
+
+
+def cells(row: Document) -> tuple[str, ...]:
+    """One row for HEAD."""
+    shares = ("{} ({})".format(*estimate(row[name], partial(percent, unit=""))) for name in
+              ("false_alarm", "detected", "named", "misnamed"))  # fmt: skip
+    return (
+        row["error"], row["declared"], f"{row['factor']:g}", str(row["flights"]), *shares,
+        *(_interval(row[name]) for name in ("delay_s", "tracking_deg_s")),
+        _interval(row["bound_used"], lambda share: or_never(share and 100.0 * share)),
+    )  # fmt: skip
+
+
+def _interval(found: Document, form: Callable[[Any], str] = or_never) -> str:
+    value, limits = estimate(found, form)
+    return value if found["value"] is None or found["low"] == found["high"] else f"{value} ({limits})"
+
+
+def draw_errors(document: Document) -> "Figure":
+    """A row a quantity, a column an error, over the factor; bars are intervals."""
+    errors = [*grouped(document["rows"], "error").values()]
+    titles = [f"{rows[0]['error']}\n{rows[0]['declared']}" for rows in errors]
+    title = f"{document['scenario']}: errors larger than declared"
+    size = 0.8 + 1.9 * len(errors), 0.9 + 1.5 * len(SHOWN)
+    figure, grid = panels(len(SHOWN), len(errors), *size, title, sharex=True, sharey="row")
+    for line, quantity in zip(grid, SHOWN, strict=True):
+        times = 1.0 if quantity.endswith("_deg_s") else 100.0
+        for panel, rows in zip(line, errors, strict=True):
+            known = [row for row in rows if None not in (row[quantity]["value"], row[quantity]["low"])]
+            draw_estimates(
+                panel, [row["factor"] for row in known], [row[quantity] for row in known], times,
+                color=BLACK, marker="o", markersize=4, linewidth=1.2, capsize=2,
+            )  # fmt: skip
+            panel.set_xscale("log", base=2)
+            panel.set_xticks(document["factors"], [f"{factor:g}" for factor in document["factors"]])
+            panel.minorticks_off()
+            panel.grid(color=GRID, linewidth=0.6)
+    label_edges(grid, "times the size", list(SHOWN.values()), titles)
+    return figure
+
+
+# Flights without a mechanism.
+
+CRITERIA = {  # of effects.py, in the words of tables
+    "false_alarms": "false alarms",
+    "late": "late alarms",
+    "names": "lost names",
+    "tracking": "worse tracking",
+}
+INTERVAL = "95 % interval"
+SYSTEM_SHARES = {
+    "false_alarms": "false alarms, %", "detected": "detected, %", "named": "named rightly, %",
+    "lost": "aircraft lost, %",
+}  # fmt: skip
+CAPTIONS = {
+    "systems": "Both systems with all of their mechanisms.",
+    "net": "Net share of flights that are worse without the mechanism, percentage points.",
+    "same": "Pairs of flights with the same alarm, name and time of both, and with the same tracking error.",
+    "medians": "Medians with and without the mechanism; error ratio: without over with.",
+    "alarms": "False alarms, and how many of them are explained.",
+    "margins": "Margins of the healthy loop, the least.",
+}
+_FACTOR_WORDS = {
+    "fault": "faults", "bandwidth": "bandwidths", "error": "undeclared errors", "instruments": "instruments",
+}  # fmt: skip
+
+
+def _page_of_mechanisms(document: Document) -> tuple[str, Sequence[Part]]:
+    of_each = tables(document)
+    return "What each mechanism is worth", [
+        *mechanism_sentences(document), Pictures([(CAPTIONS["net"], NAME)]),
+        *(part for name, says in CAPTIONS.items() for part in (Heading(says), of_each[name])),
+        versions_line(document["versions"]),
+    ]  # fmt: skip
+
+
+def mechanism_sentences(document: Document) -> Iterator[str]:
+    """What was flown, what each mechanism improves or worsens, and whether false alarms have a reason."""
+    names = " x ".join(f"{len(values)} {_FACTOR_WORDS[name]}" for name, values in document["factors"].items())
+    yield f"{document['draws']} draws over {names}, each flown with and without every mechanism."
+    yield from (finding(row) for row in document["mechanisms"])
+    alarms = [row for row in document["false_alarms"] if row["worst_case"]]
+    total, without, certified, certifiable = (
+        sum(row[key] for row in alarms) for key in ("count", "unexplained", "certified", "certifiable")
+    )
+    yield (
+        f"In all of these flights, worst-case detectors raise {total} false alarms. The reason of "
+        f"{total - without} of them is an undeclared error. Of {certifiable} false alarms of the default "
+        f"scheme, {certified} have a certificate."
+    )
+
+
+def _label(row: Document) -> str:
+    """A mechanism with its system."""
+    return f"{row['mechanism']} ({row['system']})"
+
+
+def finding(row: Document) -> str:
+    """What the removal of a mechanism changes, beyond chance."""
+    flights = row["flights"]
+    if row["same_verdict"] == row["same_tracking"] == flights:
+        return f"{_label(row)}: without it all {flights} flights are the same."
+    certain = {name: row[name] for name in CRITERIA if row[name]["low"] > 0.0 or row[name]["high"] < 0.0}
+    if not certain:
+        changed = flights - row["same_verdict"]
+        differ = f"{changed} of {flights} verdicts differ" if changed else "no verdict differs"
+        return f"{_label(row)}: without it {differ}, and no criterion changes beyond chance."
+    said = (f"{CRITERIA[name]} {100 * found['value']:+.1f} points" for name, found in certain.items())
+    return f"{_label(row)}: without it, {', '.join(said)}."
+
+
+def tables(document: Document) -> dict[str, Table]:
+    """The table of each of CAPTIONS."""
+    systems = document["systems"]
+    quantities = [("flights", [(str(row["flights"]), "") for row in systems.values()])]
+    quantities += [
+        (words, [estimate(row[name], partial(percent, unit="")) for row in systems.values()])
+        for name, words in SYSTEM_SHARES.items()
+    ]
+    quantities += [("error, deg/s", [estimate(row["tracking_deg_s"]) for row in systems.values()])]
+    return {
+        "systems": Table(
+            ("quantity", *_with_interval(systems)),
+            [(words, *chain.from_iterable(values)) for words, values in quantities],
+        ),
+        "net": _of_each(
+            document["mechanisms"], _with_interval(f"{words}, points" for words in CRITERIA.values()),
+            lambda row: chain.from_iterable(_net(row[name]) for name in CRITERIA),
+        ),
+        "same": _of_each(
+            document["mechanisms"], ("flights", "same verdict", "same tracking"),
+            lambda row: map(str, (row["flights"], row["same_verdict"], row["same_tracking"])),
+        ),
+        "medians": _of_each(
+            document["mechanisms"],
+            ("delay with, s", "delay without, s", "error with, deg/s", "error without, deg/s", "error ratio",
+             INTERVAL),
+            _medians,
+        ),
+        "alarms": Table(
+            ("system", "mechanisms", "false alarms", "with an undeclared error", "certified", "unexplained"),
+            [
+                (*_system_and_mechanisms(row["flown"]), str(row["count"]), str(row["undeclared"]),
+                 str(row["certified"]) if row["certifiable"] or not row["count"] else "-",
+                 str(row["unexplained"]) if row["worst_case"] else "-")
+                for row in document["false_alarms"]
+            ],
+        ),
+        "margins": Table(
+            ("system", "bandwidth", "instruments", "gain margin, dB", "phase margin, deg"),
+            [
+                (row["system"], row["bandwidth"], row["instruments"],
+                 *(number(row[key], none="none") for key in ("gain_margin_db", "phase_margin_deg")))
+                for row in document["margins"]
+            ],
+        ),
+    }  # fmt: skip
+
+
+def by_level(document: Document, factor: str, criterion: str, serves: str) -> Table:
+    """By level of a factor, the net share by a criterion, of the mechanisms that serve diagnosis or law."""
+    levels = document["factors"][factor]
+    names = [f"error {100 * level:g} %" if factor == "error" else str(level) for level in levels]
+    return _of_each(
+        [row for row in document["mechanisms"] if row["serves"] == serves], _with_interval(names),
+        lambda row: chain.from_iterable(_net(found[criterion]) for found in row["by"][factor].values()),
+    )  # fmt: skip
+
+
+def _of_each(rows: Sequence[Document], head: Sequence[str], of: Callable[[Document], Any]) -> Table:
+    """A row a mechanism, of these cells."""
+    return Table(("mechanism", *head), [(_label(row), *of(row)) for row in rows])
+
+
+def _with_interval(names: Any) -> list[str]:
+    return [head for name in names for head in (name, INTERVAL)]
+
+
+def _net(found: Document) -> tuple[str, str]:
+    """A net share and its interval, percentage points."""
+    value, limits = estimate(found, lambda share: f"{100.0 * share:+.1f}")
+    return "0.0" if value[1:] == "0.0" else value, limits
+
+
+def _medians(row: Document) -> Iterator[str]:
+    for of in ("delay_s", "tracking_deg_s"):
+        yield from (or_never(row[of][which]["value"]) for which in ("with", "without"))
+    yield from estimate(row["tracking_ratio"])
+
+
+def _system_and_mechanisms(flown: str) -> tuple[str, str]:
+    """Both of a key such as "published" or "without default: bank of poles"."""
+    first, _, rest = flown.partition(" ")
+    system, _, mechanism = rest.partition(": ")
+    return (system, f"{first} {mechanism}") if rest else (first, "all")
+
+
+def draw_mechanisms(document: Document) -> "Figure":
+    """A panel a criterion, a dot a mechanism with its interval; to the right of 0 the mechanism helps."""
+    rows = document["mechanisms"]
+    figure, grid = panels(1, len(CRITERIA), 13.0, 0.28 * len(rows) + 1.4, sharey=True)
+    for panel, (name, words) in zip(grid[0], CRITERIA.items(), strict=True):
+        for colour, system in zip(SERIES, (PAPER, DEFAULT), strict=False):
+            places = [place for place, row in enumerate(rows) if row["system"] == system]
+            draw_estimates(
+                panel, places, [rows[place][name] for place in places], 100.0, across=True, fmt="o",
+                markersize=4, capsize=2, linewidth=1.2, color=colour, label=f"{system} system",
+            )  # fmt: skip
+        panel.axvline(0.0, color="#444444", linewidth=0.8)
+        panel.grid(axis="x", color=GRID, linewidth=0.6)
+        panel.set_title(words, fontsize=9)
+        panel.tick_params(labelsize=8)
+    grid[0][0].set_yticks(range(len(rows)), [_label(row) for row in rows], fontsize=8)
+    grid[0][0].invert_yaxis()
+    label_edges(grid, "worse without it, net points")
+    known = grid[0][0].get_legend_handles_labels()
+    figure.legend(*known, loc="outside lower center", ncols=2, fontsize=9, frameon=False)
+    return figure
+
+
+def pairs_of(document: Document) -> list[Document]:
+    """The rows of the CSV file: all pairs of each mechanism."""
+    left_out = ("delay_s", "tracking_deg_s", "by")
+    return [{key: row[key] for key in row if key not in left_out} for row in document["mechanisms"]]
+
+
+OF_ERRORS = study_files(NAME, page_of, {NAME: itemgetter("rows")}, {NAME: draw_errors})
+OF_MECHANISMS = study_files(NAME, page_of, {NAME: pairs_of}, {NAME: draw_mechanisms})
+FILES = tuple(OF_ERRORS)

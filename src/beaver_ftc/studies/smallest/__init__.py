@@ -1,1 +1,0 @@
-"""How small a loss of one surface is found in time: certain, and in 90 % of flights."""

@@ -101,7 +101,7 @@ def own_logs_of_aircraft() -> str:
 
 
 def _by_identified(of: own.Campaign) -> list[Document]:
-    return own.flown(of, "table", ["identified"])
+    return own.flown(of, ["identified"])
 
 
 def _own_rows(results: list[Document], head_of_column: dict[str, str]) -> list[list[str]]:
@@ -114,10 +114,9 @@ def own_logs_probe() -> str:
     of = own.Campaign(air="light", seed=OWN_SEEDS[0])
     with TemporaryDirectory() as folder:
         trained = [one | {"duration_s": PROBED_S} for one in islice(own.training(of), 2)]
-        logs = [own.recorded(one, "table", Path(folder)) for one in trained]
-        model = own.identified(of, logs)
+        model = own.identified([own.recorded(one, Path(folder)) for one in trained])
         quiet = next(one for one in own.scenarios(of) if one["sensors"] == "ideal")  # as those two are
-        rows, _ = own.by_model(own.recorded(quiet, "table", Path(folder)), model)
+        rows, _ = own.by_model(own.recorded(quiet, Path(folder)), model)
     return f"{rows.fault_probability[-1]:.2g} {rows.effectiveness_low[-1]} {rows.effectiveness_high[-1]}"
 
 

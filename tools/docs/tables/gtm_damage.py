@@ -19,6 +19,7 @@ from beaver_ftc.studies.present.tables import markdown_table
 from beaver_ftc_aircraft.gtm.conversion import convert
 from beaver_ftc_aircraft.gtm.parameters import cases
 from beaver_ftc_aircraft.gtm.steady import Bench
+from tools.docs.tables import table_of
 from tools.gtm.envelope import BANKS_DEG, SIDESLIPS_DEG, SPEEDS_KT, Envelope, Turn
 from tools.gtm.specification import DATABASE
 
@@ -149,18 +150,7 @@ def gtm_laws() -> str:
         asked = ["compare", "--sweep", str(SWEEP), "--schemes", "adaptive-estimators", "--workers", "1"]
         subprocess.run([sys.executable, "-c", code, *asked], cwd=_kept(), capture_output=True, check=True)
     (of,) = json.loads(made.read_text(encoding="utf-8"))["sets"].values()
-    rows = [
-        [
-            one["law"],
-            str(of["flights"]),
-            str(one["departures"]),
-            *(_degrees(one[f"{when}_median"]) for when in ("before", "after")),
-        ]
-        for one in of["lines"]
-    ]
-    head = ("law", "flights", "aircraft lost", "before damage, deg/s", "after damage, deg/s")
-    return markdown_table(head, rows)
-
-
-def _degrees(rate: float | None) -> str:
-    return "-" if rate is None else f"{rate:.3g}"
+    return table_of(of["lines"], {
+        "law": "law", "flights": lambda one: str(of["flights"]), "aircraft lost": "departures",
+        "before damage, deg/s": "before_median .3g", "after damage, deg/s": "after_median .3g",
+    })  # fmt: skip

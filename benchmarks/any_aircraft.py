@@ -1,35 +1,26 @@
 """Whether the promises hold for aircraft nobody wrote by hand: no false alarm, no fault named wrongly.
 
-    python benchmarks/any_aircraft.py [NAMES] --flights N --seed S [--first K] [--healthy-s T] [--hours H]
-
-Each aircraft is derived if it has not been. Then N healthy flights, and N losses of effectiveness of 40 % and
-more of each surface, at random speeds, frame rates, references, magnitudes, times and profiles, with the
-published bound declared and no error but the aircraft's own. There is no autopilot, so that some flights end
-early, out of the altitudes that are simulated: `--hours` flies further healthy ones, with the numbers that
-follow, until so many hours are full. `--flights 0 --first 200 --hours 2.5` flies these alone.
-A name may be a folder, `./aircraft/737`: of `derive --engines`, say, whose engines fail besides. These have
-a row of their own, where only `unanticipated` is a name that is not wrong.
-A row an aircraft: hours flown in health and their false alarms; of each fault how many were detected, named,
-named wrongly, and how often the true surface was left out of what is still possible; how many the theory of
+`python -m tools.docs table any-aircraft` prints a row an aircraft of the jsbsim package: hours flown in
+health and their false alarms; how many losses of effectiveness of 40 % and more were detected, named, named
+wrongly, and how often the true surface was left out of what is still possible; how many the theory of
 `detectability` is certain to detect within 0.5 s, weighed along the same flight in health, and how many of
-these were not (`late`).
+these were not.
+
+Speeds, frame rates, references, magnitudes, times and profiles are drawn by the seed, with the published
+bound declared and no error but the aircraft's own. There is no autopilot, so that some flights end early, out
+of the altitudes that are simulated: further healthy ones follow until the hours are full.
 """
 
-import argparse
-import time
-from collections.abc import Iterable, Iterator
-from pathlib import Path
+from collections import Counter
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 
 from beaver_ftc import load
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.metrics import fault_free_s
-from beaver_ftc.scenario.airframe import find_aircraft
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.detectability.certain import (
     DETECT_WITHIN_S,
@@ -42,20 +33,7 @@ TWELVE = ("737", "A4", "B747", "MD11", "c172p", "c310", "J3Cub", "L410", "OV10",
 HEALTHY_S, FAULTY_S = 60.0, 25.0
 MOST_REFUSED = 100  # flights that do not trim, before the hours are given up
 SHAPES = ("sine", "square", "doublet", "step")
-COLUMNS = (
-    "aircraft",
-    "healthy",
-    "false",
-    "losses",
-    "detected",
-    "named",
-    "wrong",
-    "left out",
-    "certain",
-    "late",
-    "departed",
-    "s",
-)
+COUNTED = ("false", "losses", "detected", "named", "wrong", "left out", "certain", "late")
 
 
 def signal(rng: np.random.Generator) -> dict[str, Any]:
@@ -72,23 +50,10 @@ def signal(rng: np.random.Generator) -> dict[str, Any]:
     return {"step": {"amplitude_deg_s": 0.2 * size, "start_s": start_s, "end_s": start_s + 3.0}}
 
 
-def reference_of(name: str) -> str:
-    """What a scenario calls it."""
-    return name if name.startswith("./") else f"jsbsim:{name}"
-
-
-def plain_of(name: str) -> Scenario:
-    """A flight with nothing in it."""
-    find_aircraft(reference_of(name), Path())
-    return load({"name": "plain", "aircraft": reference_of(name)})
-
-
-def scenario(
-    name: str, surface: str | None, seed: int, index: int, healthy_s: float, fault_class: str
-) -> Scenario:
+def scenario(name: str, surface: str | None, seed: int, index: int) -> Scenario:
     """Flight number `index` of an aircraft: healthy, or with a loss of `surface`."""
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(index, len(surface or ""))))
-    reference, plain = reference_of(name), plain_of(name)
+    plain = load({"name": "plain", "aircraft": f"jsbsim:{name}"})
     low, high = plain.airframe.envelope.airspeed_mps
     middle = plain.initial.airspeed_mps
     rate_hz = int(np.exp(rng.uniform(np.log(25), np.log(200))))
@@ -96,44 +61,31 @@ def scenario(
         "actuator": surface, "type": "loss_of_effectiveness", "magnitude": float(rng.uniform(0.4, 1.0)),
         "at_s": float(rng.uniform(3.0, 10.0)),
     }  # fmt: skip
-    if surface in plain.airframe.damage:
-        fault = {"type": "damage", "case": surface, "at_s": fault["at_s"]}
-    elif rng.random() < 0.3:
+    if rng.random() < 0.3:
         fault |= {"profile": "incipient", "kappa_per_s": float(np.exp(rng.uniform(-1.0, 2.0)))}
     speed_mps = middle + 0.6 * (rng.uniform(low, high) - middle)
     return load({
-        "name": f"{surface or 'healthy'}-{index}", "aircraft": reference, "rate_hz": rate_hz,
+        "name": f"{surface or 'healthy'}-{index}", "aircraft": f"jsbsim:{name}", "rate_hz": rate_hz,
         "substeps": int(rng.integers(1, 4)) if rng.random() < 0.2 else 1,
-        "duration_s": FAULTY_S if surface else healthy_s,
+        "duration_s": FAULTY_S if surface else HEALTHY_S,
         "initial": {"airspeed_mps": float(speed_mps)},
         "reference": {axis: [signal(rng) for _ in range(rng.integers(1, 3))] for axis in "pqr"},
-        "faults": [fault] if surface else [], "fdi": {"fault_class": fault_class}, "seed": index,
+        "faults": [fault] if surface else [], "fdi": {"fault_class": "published"}, "seed": index,
     })  # fmt: skip
 
 
-def flown(
-    name: str, faulty: Iterable[str | None], args: argparse.Namespace
-) -> Iterator[tuple[str | None, Any]]:
-    """What is faulty, or None in health, and what came of the flight; None where it has no trim."""
-    for surface in faulty:
-        index, flown_s, refused = args.first, 0.0, 0
-        wanted_s = 3600.0 * args.hours if surface is None else 0.0
-        while index < args.first + args.flights or (flown_s < wanted_s and refused < MOST_REFUSED):
-            flight = scenario(name, surface, args.seed, index, args.healthy_s, args.fault_class)
-            index += 1
-            try:
-                done = fly(flight)
-            except BadInput as error:  # a speed at which it does not trim
-                print(f"   {name} {flight.name}: {error}")
-                refused += 1
-                continue
-            flown_s += seconds_of(done)
-            yield surface, done
-
-
-def seconds_of(flight: Any) -> float:
-    """How long it flew."""
-    return float(flight.scenario.duration_s if flight.departure is None else flight.departure[0])
+def flown(name: str, surface: str | None, flights: int, hours: float, seed: int) -> Iterator[Any]:
+    """What came of so many flights, and in health of so many hours; none of a speed without a trim."""
+    index, flown_s, refused = 0, 0.0, 0
+    wanted_s = 3600.0 * hours if surface is None else 0.0
+    while index < flights or (flown_s < wanted_s and refused < MOST_REFUSED):
+        try:
+            done = fly(scenario(name, surface, seed, index))
+            flown_s += float(done.scenario.duration_s if done.departure is None else done.departure[0])
+            yield done
+        except BadInput:
+            refused += 1
+        index += 1
 
 
 def is_certain(faulty: Scenario) -> bool:
@@ -149,76 +101,31 @@ def is_certain(faulty: Scenario) -> bool:
     return bool((fault.magnitude * grown > needed[there]).any())
 
 
-def rows_of(name: str, args: argparse.Namespace) -> Iterator[tuple[list[str], list[str]]]:
-    """The rows of an aircraft: of its surfaces, and of engines that may fail."""
-    yield row_of(name, args)
-    aircraft = plain_of(name).airframe
-    if aircraft.effectors:
-        yield row_of(name, args, tuple(aircraft.damage))
+def row_of(name: str, flights: int, hours: float, seed: int) -> list[str]:
+    """The row of an aircraft: its name, hours in health, COUNTED."""
+    count, healthy_s = Counter[str](), 0.0
+    for surface in (None, *load({"name": "plain", "aircraft": f"jsbsim:{name}"}).airframe.surfaces):
+        for flight in flown(name, surface, flights, hours, seed):
+            if surface is None:
+                healthy_s += fault_free_s(flight)
+                count["false"] += flight.detection_time_s is not None
+            else:
+                count.update(outcome(surface, flight))
+    return [name, f"{healthy_s / 3600.0:.2f} h", *(str(count[column]) for column in COUNTED)]
 
 
-def row_of(name: str, args: argparse.Namespace, damage: tuple[str, ...] = ()) -> tuple[list[str], list[str]]:
-    """A row of the table, of health and surfaces, or of damage; and a line on each broken promise."""
-    faulty = damage or (None, *plain_of(name).airframe.surfaces)
-    start, count, said = time.perf_counter(), dict.fromkeys(COLUMNS, 0), []
-    for surface, flight in flown(name, faulty, args):
-        detected = flight.detection_time_s is not None
-        label = f"{name} {flight.scenario.name}"
-        if flight.departure is not None:
-            count["departed"] += 1
-            said.append(f"{label}: departed, {flight.departure}")
-        if surface is None:
-            count["healthy"] += fault_free_s(flight)
-            if detected:
-                count["false"] += 1
-                said.append(f"{label}: alarm at {flight.detection_time_s:.2f} s in health")
-            continue
-        fault = flight.scenario.faults[0]
-        early = detected and flight.detection_time_s < fault.at_s
-        unknown = fault.type == "damage"
-        name_of_it = "unanticipated" if unknown else surface
-        wrong = flight.isolated is not None and flight.isolated != name_of_it
-        left = {candidate.partition(":")[0] for candidate in flight.candidates}
-        left_out = detected and not unknown and flight.isolated is None and surface not in left
-        certain = not unknown and is_certain(flight.scenario)
-        in_time = detected and flight.detection_time_s <= fault.at_s + DETECT_WITHIN_S
-        count["losses"] += 1
-        count["certain"] += certain
-        count["late"] += certain and not in_time
-        count["detected"] += detected
-        count["named"] += flight.isolated == name_of_it
-        count["wrong"] += wrong
-        count["left out"] += left_out
-        count["false"] += early
-        if wrong or early or left_out:
-            said.append(f"{label}: {'early' if early else flight.isolated}, of {flight.candidates}")
-        if certain and not in_time:
-            said.append(f"{label}: certain from {fault.at_s:.2f} s, detected {flight.detection_time_s}")
-    values = [f"{count['healthy'] / 3600.0:.2f} h", *(str(count[c]) for c in COLUMNS[2:-1])]
-    return [name, *values, f"{time.perf_counter() - start:.0f}"], said
-
-
-def main() -> None:
-    """Fly them all and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("names", nargs="*", default=TWELVE, metavar="NAME")
-    parser.add_argument("--flights", type=int, default=20, help="in health, and with each surface")
-    parser.add_argument("--first", type=int, default=0, help="the number of the first flight of each")
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--healthy-s", type=float, default=HEALTHY_S)
-    parser.add_argument("--hours", type=float, default=0.0, help="fly at least so long in health")
-    parser.add_argument("--class", dest="fault_class", choices=("published", "all"), default="published")
-    args = parser.parse_args()
-    table, broken = Table(*COLUMNS), []
-    for name in args.names:
-        find_aircraft(reference_of(name), Path())
-        for row, said in rows_of(name, args):
-            table.add_row(*row)
-            broken += said
-            print("  ".join(row), *said, sep="\n   ", flush=True)
-    Console(width=120).print(table)
-    print("\n".join(broken) or "every promise held")
-
-
-if __name__ == "__main__":
-    main()
+def outcome(surface: str, flight: Any) -> dict[str, bool]:
+    """Which columns a flight with a loss counts in."""
+    detected, at_s = flight.detection_time_s is not None, flight.scenario.faults[0].at_s
+    left = {candidate.partition(":")[0] for candidate in flight.candidates}
+    certain = is_certain(flight.scenario)
+    return {
+        "false": detected and flight.detection_time_s < at_s,
+        "losses": True,
+        "detected": detected,
+        "named": flight.isolated == surface,
+        "wrong": flight.isolated not in (None, surface),
+        "left out": detected and flight.isolated is None and surface not in left,
+        "certain": certain,
+        "late": certain and not (detected and flight.detection_time_s <= at_s + DETECT_WITHIN_S),
+    }

@@ -22,13 +22,16 @@ import sys
 import tarfile
 import tempfile
 import time
+import xml.etree.ElementTree as ET
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from aircraft_cost import Variant, jsbsim_alone, write_variant
+from beaver_ftc.aircraft import load
+from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.conditions import trim
+from beaver_ftc.plant.model_file import with_systems
 from beaver_ftc.studies.bench.measure import by_kind
 
 HERE = Path(__file__).resolve()
@@ -38,16 +41,41 @@ PLAIN_FRAMES = 1000
 PAIRS = 4
 
 
+def jsbsim_alone(model: Path) -> None:
+    """Write the aircraft without surfaces and aerodynamics: a mass above the rotating Earth, in air."""
+    aircraft = load()
+    root = with_systems(aircraft.jsbsim)
+    for system in root.findall("system") + root.findall("flight_control"):
+        root.remove(system)
+    properties = [f"fcs/{s}-{end}-rad" for s in aircraft.surfaces for end in ("cmd", "pos", "effective")]
+    _declare(ET.SubElement(root, "flight_control"), properties, "0")
+    aerodynamics = root.find("aerodynamics")
+    assert aerodynamics is not None
+    for part in list(aerodynamics):
+        if part.tag != "property":
+            aerodynamics.remove(part)
+    _declare(aerodynamics, ["engine/power-kw", "aero/dpt", "aero/envelope-valid"], "0.2")
+    ET.ElementTree(root).write(model)
+
+
+def _declare(section: ET.Element, names: list[str], value: str) -> None:
+    for name in names:
+        ET.SubElement(section, "property", value=value).text = name
+
+
 def measure(rounds: int) -> dict[str, Any]:
     """The unit, us, and what `by_kind` gives, frames and the loop's own part of them in units."""
     plain: list[float] = []
     with tempfile.TemporaryDirectory() as folder:
-        unit = Variant(write_variant(Path(folder) / "plain", jsbsim_alone), trim())
+        model = Path(folder) / load().jsbsim.name
+        jsbsim_alone(model)
+        plant, state = Plant(rate_hz=100, model=model), trim()
 
         def fly_plain() -> None:
-            unit.prepare()
+            plant.start(state)
             began = time.process_time()
-            unit.fly(PLAIN_FRAMES)
+            for _ in range(PLAIN_FRAMES):
+                plant.run()
             plain.append((time.process_time() - began) / PLAIN_FRAMES)
 
         kinds = by_kind(rounds, fly_plain)

@@ -1,13 +1,11 @@
 """Which of the damage could be found at all: beside a test that is told everything of it but when it strikes.
 
-    python -m benchmarks.gtm_informed [--flights 600] [--seed 1] [--beside gtm_damage.jsonl] [--out F]
-
-The flights are those of gtm_damage.py, whose rows --beside holds (`python benchmarks/gtm_damage.py --out
-gtm_damage.jsonl`); each is flown again under the nominal law, recorded as a detector sees it. Told is which
-case; what it does to the three rates' accelerations in every frame (every third, straight lines between),
-worked out from the true flight by the specification (tools/gtm: moments, mass, centre of gravity and inertia,
-with the case less without); and noise as it is, the model's errors in it, by a vector autoregression fitted
-to flights without damage at that speed. The test is Page's (unknown_instant.py). A likelihood ratio that
+`python -m tools.docs table gtm-damage-informed` prints it. The flights are those of gtm_damage.py; each is
+flown again under the nominal law, recorded as a detector sees it. Told is which case; what it does to the
+three rates' accelerations in every frame (every third, straight lines between), worked out from the true
+flight by the specification (tools/gtm: moments, mass, centre of gravity and inertia, with the case less
+without); and noise as it is, the model's errors in it, by a vector autoregression fitted to flights without
+damage at that speed. The test is Page's (unknown_instant.py). A likelihood ratio that
 begins at one instant ever reaches h with probability exp(-h) at most [Ville], so that an instant a frame
 gives the declared rate of false alarms, or fewer, at h = ln(frames per hour / alarms per hour); its level is
 that, or more where it reached more before the damage in any flight of its case.
@@ -18,19 +16,17 @@ as it was, under our law, `certain` is the chance that the same test finds what 
 1 s: its log likelihood ratio is normal, of mean d^2 / 2 and variance d^2. No detector that keeps to the
 declared error is surer. Where the model's error is not known, nothing is left.
 
-A row a case: found within 1 s by ours, by the informed test, by both, by ours alone, by it alone; of the
-flights that ours does not find in time, how many are certain, the sum of the chances.
-Rows that --out holds are not flown again. Needs BEAVER_FTC_GTM and `aircraft: gtm`.
+A row a case: flights, found within 1 s by ours, by the informed test; of the flights that ours does not find
+in time, the sum of the chances. Rows that a file holds are not flown again. Needs BEAVER_FTC_GTM and
+`aircraft: gtm`.
 """
 
-import argparse
 import json
 from collections.abc import Callable, Iterator
 from functools import cache
 from math import cos, degrees, log, sin
 from pathlib import Path
 from statistics import NormalDist
-from typing import Any
 
 import numpy as np
 from benchmarks.gtm_damage import M_S_PER_KT, Document, scenario
@@ -43,7 +39,6 @@ from beaver_ftc.aircraft import load
 from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.scenario.schema import load_text
 from beaver_ftc.studies.compare.replay import Recording, record, trace
-from beaver_ftc.studies.present.tables import markdown_table
 
 M_PER_FT = 0.3048
 BANDS_KT = (70.0, 80.0, 90.0, 100.0, 110.0)  # the noise is fitted between two
@@ -52,10 +47,6 @@ EACH = 3  # frames between two of which the effect is worked out
 DT_S = 0.01
 PER_H = 1e-3  # false alarms, as ours declares
 LEVEL = log(3600.0 * 100.0 / PER_H)
-HEAD = [
-    "case", "flights", "ours", "told all but the instant", "both", "ours alone", "it alone",
-    "certain, not ours",
-]  # fmt: skip
 
 
 def recorded(given: Document) -> Recording:
@@ -188,20 +179,19 @@ def seen(seed: int, k: int, spec: Specification, late: bool) -> Document:
     }  # fmt: skip
 
 
-def rows(ours: dict[int, Document], of: dict[int, Document]) -> Iterator[list[Any]]:
+def rows(ours: dict[int, Document], of: dict[int, Document]) -> Iterator[list[str]]:
     """A row a case, and one of all."""
-    total = np.zeros(7)
+    total = np.zeros(4)
     for case in load("gtm").damage:
         there = [k for k in of if ours[k]["case"] == case]
         level = level_of([of[k] for k in there])
-        by_us = np.array([not is_late(ours[k]) for k in there])
-        by_it = np.array([of[k]["after"] > level for k in there])
-        either = by_us & by_it, by_us & ~by_it, by_it & ~by_us
-        row = [len(there), by_us.sum(), by_it.sum(), *(one.sum() for one in either)]
-        row.append(sum(certain(of[k], level) for k in there if is_late(ours[k])))
+        row = np.array([
+            len(there), sum(not is_late(ours[k]) for k in there), sum(of[k]["after"] > level for k in there),
+            sum(certain(of[k], level) for k in there if is_late(ours[k])),
+        ])  # fmt: skip
         total += row
-        yield [case, *_printed(row)]
-    yield ["all", *_printed(list(total))]
+        yield _printed(case, row)
+    yield _printed("all", total)
 
 
 def is_late(row: Document) -> bool:
@@ -220,8 +210,8 @@ def certain(row: Document, level: float) -> float:
     return NormalDist().cdf((0.5 * d * d - level) / d) if d > 0.0 else 0.0
 
 
-def _printed(row: list[float]) -> list[str]:
-    return [*(str(int(n)) for n in row[:6]), f"{row[6]:.1f}"]
+def _printed(case: str, row: np.ndarray) -> list[str]:
+    return [case, *(str(int(n)) for n in row[:3]), f"{row[3]:.1f}"]
 
 
 def see_all(ours: dict[int, Document], seed: int, out: Path) -> dict[int, Document]:
@@ -235,25 +225,3 @@ def see_all(ours: dict[int, Document], seed: int, out: Path) -> dict[int, Docume
             of[k] = seen(seed, k, spec, is_late(ours[k]))
             print(json.dumps(of[k]), file=file, flush=True)
     return {k: of[k] for k in ours}
-
-
-def main() -> None:
-    """Fly, print the table."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--flights", type=int, default=600)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--beside", type=Path, default=Path("gtm_damage.jsonl"))
-    parser.add_argument("--out", type=Path, default=Path("gtm_informed.jsonl"))
-    given = parser.parse_args()
-    if folder() is None or not given.beside.is_file():
-        parser.error("needs BEAVER_FTC_GTM, and --beside, which gtm_damage.py writes")
-    flown = map(json.loads, given.beside.read_text().splitlines())
-    ours = {one["k"]: one for one in flown if one["k"] < given.flights}
-    of = see_all(ours, given.seed, given.out)
-    print(markdown_table(HEAD, list(rows(ours, of))))
-
-
-if __name__ == "__main__":
-    main()

@@ -1,15 +1,14 @@
 """Our own logs, diagnosed by two models: bounds, names and alarms where the truth is known.
 
-    python -m benchmarks.own_logs [--flights 1] [--seed 1] [--as table] [--aircraft beaver] [--type TYPE]
-        [--air none] [--by identified]
+    python -m benchmarks.own_logs [--flights 1] [--seed 1] [--aircraft beaver] [--air none] [--by identified]
 
 Three laws, two airspeeds, references drawn by the seed (sines and doublets on three axes), admitted errors of
 inertia and air drawn as well, gyros ideal or with declared noise. Healthy flights, and losses of 0.3, 0.6 and
-0.9 of whatever turns the aircraft, or with `--type` another fault of it. Each flight is written as a recorder
-on board would have, read again, and diagnosed as `diagnose --aircraft` does (`by` aircraft), and by a model
-that `identify` has of twelve healthy flights of a minute: two of the laws, other airspeeds, other days. Both
-read the log by the vehicle file that `run --as` writes, as it is.
-`--air light` flies in turbulence, declared to the aircraft's own model, and to `identify` by nothing.
+0.9 of whatever turns the aircraft. Each flight is written as a recorder on board would have, read again, and
+diagnosed as `diagnose --aircraft` does (`by` aircraft), and by a model that `identify` has of twelve healthy
+flights of a minute: two of the laws, other airspeeds, other days. Both read the log by the vehicle file that
+`run --as table` writes. `--air light` flies in turbulence, declared to the aircraft's own model, and
+to `identify` by nothing.
 
 Prints a row for each model and size: flights, refused logs, alarms before the fault, found, named rightly,
 named wrongly in any row (a group of surfaces that cannot be told apart is wrong where the surface at fault is
@@ -23,7 +22,7 @@ exceeds the logarithm of the samples in an hour [Lorden1971].
 
 import argparse
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from math import log as ln
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -37,7 +36,7 @@ from beaver_ftc.design.model import N_Y, DesignFunctions, design_record
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results.exports import RECORDING_FILE_OF_KIND
 from beaver_ftc.results.writer import run
-from beaver_ftc.studies.present.tables import markdown_table
+from beaver_ftc.studies.present.tables import grouped, markdown_table
 from beaver_ftc_logs.by_aircraft import diagnose_aircraft, load_diagnosed
 from beaver_ftc_logs.diagnose import LogRows, diagnose
 from beaver_ftc_logs.identification import identify, scale_if_better
@@ -49,18 +48,16 @@ Document = dict[str, Any]
 LAWS, TRAINING_LAWS = ("nominal", "adaptive", "fault-tolerant"), ("nominal", "adaptive")
 TESTED, TRAINED = (38.0 / 45.0, 48.0 / 45.0), (40.0 / 45.0, 46.0 / 45.0)
 """Airspeeds, of the usual one."""
+BY = ("aircraft", "identified")
 LOSS = "loss_of_effectiveness"
-TYPES: dict[str, list[Document]] = {
-    LOSS: [{"magnitude": size} for size in (0.3, 0.6, 0.9)],
-    "stuck": [{"position_deg": size} for size in (-4.0, 2.0, 6.0)],
-    "bias": [{"bias_deg": size} for size in (1.0, -3.0, 6.0)],
-    "float": [{}],
-    "oscillatory": [{"amplitude_deg": size, "frequency_rad_s": 6.0} for size in (0.5, 2.0, 4.0)],
-}
+SIZES = (0.3, 0.6, 0.9)
 DURATION_S, FAULT_S = 20.0, 10.0
 HEALTHY = 5  # of each law and airspeed
 TRAINING, TRAINING_S = 12, 60.0
 NOISE = {"noise_std_deg_s": 0.05}
+_COUNTED = ("refused", "false", "found", "right", "wrong")
+_SUMMED = ("held", "said", "held_lost", "lost", "samples")
+NO_SURFACE = {"", "unknown", "unanticipated", "engine"}  # in the place of a name
 HEAD = [
     "by", "fault", "flights", "refused", "false alarms", "found", "named rightly", "named wrongly",
     "held by bounds", "held at fault", "said of", "median width", "credible", "told",
@@ -68,11 +65,10 @@ HEAD = [
 
 
 class Campaign(NamedTuple):
-    """What is flown: a reference of an aircraft, moving air, the type of the faults, and how it is drawn."""
+    """What is flown: a reference of an aircraft, moving air, and how it is drawn."""
 
     aircraft: str = "beaver"
     air: str = "none"
-    type: str = LOSS
     count: int = 1
     seed: int = 1
 
@@ -86,11 +82,11 @@ def scenarios(of: Campaign) -> Iterator[Document]:
             for i in range(HEALTHY * of.count):
                 yield _drawn(of, law, airspeed_mps, (of.seed, i), [])
             for place, surface in enumerate(plain.airframe.primary):
-                for size, fault in enumerate(TYPES[of.type]):
-                    whole = {"actuator": surface, "type": of.type, "at_s": FAULT_S, **fault}
+                for size in SIZES:
+                    loss = {"actuator": surface, "type": LOSS, "at_s": FAULT_S, "magnitude": size}
                     for i in range(of.count):
-                        drawn_by = (of.seed, place, i, (3, 6, 9)[size])
-                        yield _drawn(of, law, airspeed_mps, drawn_by, [whole])
+                        drawn_by = (of.seed, place, i, round(10 * size))
+                        yield _drawn(of, law, airspeed_mps, drawn_by, [loss])
 
 
 def training(of: Campaign) -> Iterator[Document]:
@@ -124,7 +120,7 @@ def _drawn(
         "environment": {"turbulence": "dryden", "severity": of.air} if moves else {},
         "sensors": dict.fromkeys("pqr", NOISE) if noisy else "ideal",
         "fdi": {
-            "fault_class": "published" if of.type == LOSS else "all",
+            "fault_class": "published",
             "bounds": bounds | ({"turbulence": of.air} if moves else {}),
         },
         "control": {"law": law},
@@ -153,12 +149,12 @@ class Log(NamedTuple):
     path: Path
 
 
-def recorded(document: Document, kind: str, folder: Path) -> Log:
+def recorded(document: Document, folder: Path) -> Log:
     """Fly it, and write its log."""
     scenario = bf.load(document)
-    run(scenario, folder, report=False, recording=kind)
+    run(scenario, folder, report=False, recording="table")
     place = folder / scenario.name
-    return Log(scenario, place, place / RECORDING_FILE_OF_KIND[kind])
+    return Log(scenario, place, place / RECORDING_FILE_OF_KIND["table"])
 
 
 Said = tuple[LogRows, str | None]
@@ -173,11 +169,10 @@ def by_aircraft(log: Log, of: Campaign) -> Said:
     return rows, verdict["isolated"]
 
 
-def identified(of: Campaign, logs: list[Log]) -> Model:
+def identified(logs: list[Log]) -> Model:
     """As `identify` writes it to a file, from healthy flights of other days."""
     vehicle: Vehicle = load_vehicle(str(logs[0].folder / "vehicle.yaml"))
-    faults = ["loss"] if of.type == LOSS else ["loss", "stuck"]
-    vehicle = vehicle.model_copy(update={"faults": faults})
+    vehicle = vehicle.model_copy(update={"faults": ["loss"]})
     named = [log.path.rename(log.path.with_stem(log.flown.name)) for log in logs]
     found = identify(*scale_if_better(load_flights_for_fit(named, vehicle), vehicle))
     return Model.model_validate_json(model_file_text(found))
@@ -231,75 +226,48 @@ def by_model(log: Log, model: Model) -> Said:
 
 def _tried(by: str, log: Log, way: Callable[[Log], Said]) -> Document:
     """What was right; of a log that is refused nothing is said."""
+    size = f"{LOSS} {log.flown.faults[0].magnitude:g}" if log.flown.faults else "none"
+    found = {"by": by, "size": size, "refused": False}
     try:
-        return judged(by, log, way(log)) | {"refused": False}
+        return found | judged(log, way(log))
     except BadInput:
-        nothing = dict.fromkeys((*_COUNTED, "held", "said", "held_lost", "lost", "samples"), 0)
-        what = {"by": by, "size": _size(log.flown.faults), "refused": True}
-        return nothing | what | {"width": np.empty(0), "credible": 0.0}
+        nothing = dict.fromkeys((*_COUNTED, *_SUMMED), 0)
+        return found | nothing | {"refused": True, "width": np.empty(0), "credible": 0.0}
 
 
-def judged(by: str, log: Log, said_of: Said) -> Document:
+def judged(log: Log, said_of: Said) -> Document:
     """What was right."""
-    (rows, isolated), faults = said_of, log.flown.faults
-    truth, actual, began_s = np.ones_like(rows.effectiveness_low), None, np.inf
-    for fault in faults:
+    (rows, isolated), low, high = said_of, said_of[0].effectiveness_low, said_of[0].effectiveness_high
+    truth, actual, began_s = np.ones_like(low), None, np.inf
+    for fault in log.flown.faults:
         actual, began_s = fault.actuator, fault.at_s
         surface = list(log.flown.airframe.surfaces).index(actual)
-        left = 1.0 - fault.magnitude if fault.type == LOSS else np.nan
-        truth[rows.t_s >= began_s - 1e-6, surface] = left
-    has_truth = np.isfinite(truth)
-    said = (rows.effectiveness_high - rows.effectiveness_low < 0.999) & has_truth
-    held = (rows.effectiveness_low <= truth + 1e-9) & (truth <= rows.effectiveness_high + 1e-9)
+        truth[rows.t_s >= began_s - 1e-6, surface] = 1.0 - fault.magnitude
+    said = high - low < 0.999
+    held = (low <= truth + 1e-9) & (truth <= high + 1e-9)
     lost = said & (truth < 1.0)
     alarmed = rows.t_s[rows.faulty == 1]
-    named = {str(name) for name in rows.isolated_surfaces[rows.faulty == 1]} - {
-        "unknown",
-        "unanticipated",
-        "engine",
-        "",
-    }
+    named = {str(name) for name in rows.isolated_surfaces[rows.faulty == 1]} - NO_SURFACE
     return {
-        "by": by,
-        "size": _size(faults),
-        "false": bool((alarmed < began_s - 1e-6).any()),
-        "found": bool((alarmed >= began_s - 1e-6).any()),
+        "false": bool((alarmed < began_s - 1e-6).any()), "found": bool((alarmed >= began_s - 1e-6).any()),
         "right": actual is not None and isolated == actual,
         "wrong": any(actual not in name.split("+") for name in named),
-        "held": int(held[said].sum()),
-        "said": int(said.sum()),
-        "held_lost": int(held[lost].sum()),
-        "lost": int(lost.sum()),
-        "samples": int(has_truth.sum()),
-        "width": (rows.effectiveness_high - rows.effectiveness_low)[said],
-        "credible": float(rows.credible.mean()),
-    }
-
-
-def _size(faults: Any) -> str:
-    if not faults:
-        return "none"
-    one = next((fault for fault in TYPES[faults[0].type] if _is(faults[0], fault)), {})
-    return f"{faults[0].type} {next(iter(one.values())):g}" if one else str(faults[0].type)
-
-
-def _is(fault: Any, keys: Document) -> bool:
-    return all(abs(getattr(fault, key) - value) < 1e-9 for key, value in keys.items())
+        "held": int(held[said].sum()), "said": int(said.sum()),
+        "held_lost": int(held[lost].sum()), "lost": int(lost.sum()), "samples": truth.size,
+        "width": (high - low)[said], "credible": float(rows.credible.mean()),
+    }  # fmt: skip
 
 
 def table(results: list[Document]) -> list[list[str]]:
     """A row for each model and size of the fault."""
     rows = []
-    for by, size in dict.fromkeys((one["by"], one["size"]) for one in results):
-        of = [one for one in results if (one["by"], one["size"]) == (by, size)]
-        said = sum(one["said"] for one in of)
+    for (by, size), of in grouped(results, "by", "size").items():
+        total = {key: sum(one[key] for one in of) for key in (*_COUNTED, *_SUMMED)}
         widths = np.concatenate([one["width"] for one in of])
         rows.append([
-            by, size, str(len(of)),
-            *(str(sum(one[key] for one in of)) for key in _COUNTED),
-            _share(sum(one["held"] for one in of), said),
-            _share(sum(one["held_lost"] for one in of), sum(one["lost"] for one in of)),
-            f"{said / max(sum(one['samples'] for one in of), 1):.2f}",
+            by, size, str(len(of)), *(str(total[key]) for key in _COUNTED),
+            _share(total["held"], total["said"]), _share(total["held_lost"], total["lost"]),
+            f"{total['said'] / max(total['samples'], 1):.2f}",
             f"{np.median(widths):.3f}" if len(widths) else "",
             f"{np.mean([one['credible'] for one in of]):.2f}", _told(of),
         ])  # fmt: skip
@@ -315,39 +283,38 @@ def _share(part: int, whole: int) -> str:
     return f"{part / whole:.3f}" if whole else ""
 
 
-_COUNTED = ("refused", "false", "found", "right", "wrong")
-
-
 def main() -> None:
     """Fly, write, read, diagnose, print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--flights", type=int, default=1, help="of each law, airspeed, surface and fault")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--as", dest="kind", choices=sorted(RECORDING_FILE_OF_KIND), default="table")
     parser.add_argument("--aircraft", default="beaver")
     parser.add_argument("--air", choices=("none", "light", "moderate", "severe"), default="none")
-    parser.add_argument("--type", choices=TYPES, default=LOSS)
-    parser.add_argument("--by", choices=("aircraft", "identified"), nargs="*")
+    parser.add_argument("--by", choices=BY, nargs="*", default=BY)
     asked = parser.parse_args()
-    of = Campaign(asked.aircraft, asked.air, asked.type, asked.flights, asked.seed)
-    print(markdown_table(HEAD, table(flown(of, asked.kind, asked.by or ["aircraft", "identified"]))))
+    of = Campaign(asked.aircraft, asked.air, asked.flights, asked.seed)
+    print(markdown_table(HEAD, table(flown(of, asked.by))))
 
 
-def flown(of: Campaign, kind: str, by: list[str]) -> list[Document]:
+def ways(of: Campaign, by: Sequence[str], logs: list[Log]) -> dict[str, Callable[[Log], Said]]:
+    """The diagnosis by each of these models; logs: of the training flights."""
+    found: dict[str, Callable[[Log], Said]] = {"aircraft": lambda log: by_aircraft(log, of)}
+    if "identified" in by:
+        model = identified(logs)
+        found["identified"] = lambda log: by_model(log, model)
+    return {name: found[name] for name in by}
+
+
+def flown(of: Campaign, by: Sequence[str]) -> list[Document]:
     """Fly a campaign and diagnose each log: a row for each flight and model."""
     results = []
     with tempfile.TemporaryDirectory() as folder:
-        logs = [recorded(one, kind, Path(folder)) for one in training(of)]
-        noise = noises(logs)
-        ways: dict[str, Callable[[Log], Said]] = {"aircraft": lambda log: by_aircraft(log, of)}
-        if "identified" in by:
-            model = identified(of, logs)
-            ways["identified"] = lambda log: by_model(log, model)
+        logs = [recorded(one, Path(folder)) for one in training(of)]
+        noise, tried = noises(logs), ways(of, by, logs)
         for document in scenarios(of):
-            log = recorded(document, kind, Path(folder))
-            lost = of.type == LOSS and bool(log.flown.faults)
-            certain = told(log, noise) if lost else None
-            results += [_tried(name, log, ways[name]) | {"told": certain} for name in by]
+            log = recorded(document, Path(folder))
+            certain = told(log, noise) if log.flown.faults else None
+            results += [_tried(name, log, way) | {"told": certain} for name, way in tried.items()]
     return results
 
 

@@ -1,11 +1,7 @@
-"""What `sitl` promises, measured: lockstep, latency, memory, the published case, a circuit from the ground,
-healthy hours.
+"""What `sitl` promises of many frames, measured: latency, memory, false alarms in healthy hours.
 
-    python benchmarks/sitl.py lockstep [--frames 100000]
     python benchmarks/sitl.py latency [--frames 20000]
     python benchmarks/sitl.py memory [--frames 1000000]
-    python benchmarks/sitl.py published
-    python benchmarks/sitl.py circuit
     python benchmarks/sitl.py healthy [--hours 50] [--rate 100] [--seed 0]
 
 The autopilots are those of tools/autopilots: neither ArduPilot nor PX4 is needed. Exit status 1 where a bar
@@ -16,19 +12,16 @@ import argparse
 import json
 import re
 import signal
-import socket
 import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from pymavlink.dialects.v20 import common
-
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from tools.autopilots import peers, trial
-from tools.autopilots.small import Circuit, Small
+from tools.autopilots import peers
+from tools.autopilots.small import Small
 
 import beaver_ftc as bf
 from beaver_ftc_links.sitl.ardupilot import Ardupilot
@@ -64,34 +57,11 @@ def healthy(hours: float, rate_hz: int, seed: int) -> Iterator[str]:
         raise SystemExit(1)
 
 
-def lockstep(frames: int) -> Iterator[str]:
-    """A bad line, each protocol, with JSBSim behind it."""
-    base, missed = bf.load("fault-free").with_({"expect": {}, "duration_s": 36_000}), 0
-    for protocol, rate_hz, over in (("ardupilot", None, trial.ardupilot), ("px4", 250.0, trial.px4)):
-        found = over(Vehicle(base, protocol == "ardupilot", rate_hz, log=False), frames, 1)
-        missed += found.twice + found.lost
-        happened = ", ".join(f"{count} {what}" for what, count in found.happened.items())
-        yield f"{protocol}: {found.frames} frames in {len(found.meant)} flights ({happened})"
-        yield f"{protocol}: {found.twice} flown twice, {found.lost} lost"
-    if missed:
-        raise SystemExit(1)
-
-
 def started(*arguments: str) -> tuple[subprocess.Popen, tuple[str, int]]:
     """The command as a user starts it, and where it listens."""
     code = "from beaver_ftc.cli.main import main; main()"
-    command = [
-        sys.executable,
-        "-c",
-        code,
-        "sitl",
-        *arguments,
-        "--port",
-        "0",
-        "--no-report",
-        "--format",
-        "json",
-    ]
+    options = ("--port", "0", "--no-report", "--format", "json")
+    command = [sys.executable, "-c", code, "sitl", *arguments, *options]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert process.stderr is not None
     for line in process.stderr:
@@ -119,17 +89,11 @@ def latency(frames: int) -> Iterator[str]:
         raise SystemExit(1)
 
 
-def fly_on(
-    protocol: str, address: tuple[str, int], frames: int, small: Small | None = None, rate_hz: int = 400
-) -> peers.Px4 | None:
+def fly_on(protocol: str, address: tuple[str, int], frames: int) -> None:
     """So many frames with a small autopilot."""
-    small = small or Small()
-    if protocol == "ardupilot":
-        peers.Ardupilot(small.outputs, rate_hz).fly(address, frames)
-        return None
-    autopilot = peers.Px4(small.outputs)
-    autopilot.fly(address, frames)
-    return autopilot
+    small = Small()
+    end = peers.Ardupilot(small.outputs, 400) if protocol == "ardupilot" else peers.Px4(small.outputs)
+    end.fly(address, frames)
 
 
 def memory(frames: int) -> Iterator[str]:
@@ -153,76 +117,8 @@ def resident_mb() -> float:
     return int(re.search(r"RssAnon:\s+(\d+)", text)[1]) / 1024
 
 
-def published(_: int) -> Iterator[str]:
-    """The published elevator case, by the command, under both protocols: found, named, and said."""
-    missed = False
-    for protocol in ("ardupilot", "px4"):
-        with tempfile.TemporaryDirectory() as out, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as ground:
-            ground.bind(("127.0.0.1", 0))
-            ground.settimeout(0.2)
-            where = f"127.0.0.1:{ground.getsockname()[1]}"
-            arguments = (
-                "elevator-partial-loss",
-                "--as",
-                protocol,
-                "--speed",
-                "0",
-                "--out",
-                out,
-                "--mavlink",
-                where,
-            )
-            process, address = started(*arguments)
-            fly_on(protocol, address, 100_000)
-            document = json.loads(process.communicate()[0])
-            texts = heard(ground)
-            isolation, detection = document["isolation"], document["detection"]
-            found = f"alarm {detection['delay_s']} s after the fault, {isolation['fault']} named after"
-            estimate = f"{isolation['delay_s']} s, theta {isolation['estimate']:.3f}"
-            yield f"{protocol}: {found} {estimate}, exit {process.returncode}, STATUSTEXT {texts}"
-            missed |= process.returncode != 0 or not any("elevator" in text for text in texts)
-    if missed:
-        raise SystemExit(1)
-
-
-def circuit(_: int) -> Iterator[str]:
-    """From the ground and back by the command, a fault on the way, under both protocols at 100 Hz."""
-    file, missed = Path(__file__).parents[1] / "examples" / "autopilot" / "from-the-ground.yaml", False
-    for protocol in ("ardupilot", "px4"):
-        with tempfile.TemporaryDirectory() as out:
-            process, address = started(
-                str(file), "--as", protocol, "--rate", "100", "--speed", "0", "--out", out
-            )
-            small = Circuit()
-            fly_on(protocol, address, 100_000, small, 100)
-            document = json.loads(process.communicate()[0])
-            link, found = document["link"], document["isolation"]["fault"]
-            delay = f"{found} named {document['isolation']['delay_s']} s after the fault"
-            says = f"diagnosed from {link['diagnosed_from_s']:.1f} s, {delay}"
-            lost = f"false alarm {document['false_alarm']}, departure {document['departure']}"
-            yield f"{protocol}: {small.phase} at the end; {says}, {lost}, exit {process.returncode}"
-            missed |= process.returncode != 0 or small.phase != "stop"
-    if missed:
-        raise SystemExit(1)
-
-
-def heard(ground: socket.socket) -> list[str]:
-    """The texts a ground station has been sent."""
-    mav, texts = common.MAVLink(None), []
-    mav.robust_parsing = True
-    while True:
-        try:
-            messages = mav.parse_buffer(ground.recv(65536)) or []
-        except TimeoutError:
-            return texts
-        texts += [message.text for message in messages if message.get_type() == "STATUSTEXT"]
-
-
 # What is measured, and how many frames by itself.
-MEASURED = {
-    "lockstep": (lockstep, 100_000), "latency": (latency, 20_000), "memory": (memory, 1_000_000),
-    "published": (published, 0), "circuit": (circuit, 0),
-}  # fmt: skip
+MEASURED = {"latency": (latency, 20_000), "memory": (memory, 1_000_000)}
 
 
 def main() -> None:

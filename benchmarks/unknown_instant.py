@@ -1,7 +1,6 @@
 """What of all there is to see is found: beside a test that is told everything of a loss but when it strikes.
 
-    python benchmarks/unknown_instant.py [AIRCRAFT ...] [--surface S] [--turbulence light] [--flights 20]
-        [--healthy 72] [--seed 500000] [--published]
+`python -m tools.docs table unknown-instant` prints it for aircraft of the jsbsim package.
 
 Page's test [Page1954]: the largest log likelihood ratio of "this fault, since some instant" that any instant
 has. Where observations have one distribution before and one after, no test has a shorter worst mean delay at
@@ -10,22 +9,18 @@ the truth's own innovations: a vector autoregression of ORDER frames, fitted to 
 of the healthy flights, whitens them and the fault's signature. Errors of the model, gusts and gyros are in it
 as they are, not as they are declared. Instants are 0.05 s apart and at most 10 s back.
 
-Flights are those of `beaver-ftc detectability --grid`. What is declared is what is there: sensors, air, and
-of the Beaver the published uncertainty; of other aircraft, which have none, the error of their own model,
-at the measured pace (`--published` declares the published one of all). That error is known
-within a model's envelope alone, and outside nothing is concluded: losses within a second of which the
-aircraft is outside are left out.
+Flights are those of `beaver-ftc detectability --grid`. What is declared is what is there: sensors, air, and the error of the
+aircraft's own model, at the measured pace. That error is known within a model's envelope alone, and outside
+nothing is concluded: losses within a second of which the aircraft is outside are left out.
 
-Each surface is lost by 40 and 100 % at 3 and 6 deg/s. A row a surface: the share of losses found within 1 s
-by the test told the instant too; by Page's; by our two detectors, all with levels that give at most 20 false
-alarms per hour on the healthy flights; then ours as a share of Page's. `shipped` is the same at the level
-that follows from the declaration, 0.001 an hour: Page's level is raised by the logarithm of how much rarer
-its false alarms are to be, which is what it takes of the greatest of many likelihood ratios [Lorden1971].
-Rows of all aircraft together are last. Intervals: 95 % of RESAMPLED draws of flights, a flight's losses kept
-together, and of the healthy flights, from which levels are taken anew.
+Each surface is lost by 40 and 100 % at 3 and 6 deg/s. Counted are the losses found within 1 s by Page's test
+and by our two detectors, first with levels that give at most 20 false alarms per hour on the healthy flights,
+then at the level that follows from the declaration, 0.001 an hour: Page's level is raised by the logarithm of
+how much rarer its false alarms are to be, which is what it takes of the greatest of many likelihood ratios
+[Lorden1971]. Intervals: 95 % of RESAMPLED draws of flights, a flight's losses kept together, and of the
+healthy flights, from which levels are taken anew.
 """
 
-import argparse
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import log
@@ -34,8 +29,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from beaver_ftc.aircraft import DEFAULT
-from beaver_ftc.diagnosis.informed_test import detection_probability
 from beaver_ftc.diagnosis.rivals.gust import VaneGust
 from beaver_ftc.scenario.airframe import find_aircraft
 from beaver_ftc.studies.compare.replay import Recording, Trace, record, trace
@@ -132,14 +125,6 @@ def ratios(recording: Recording, surface: str, noise: Whitener) -> dict[float, n
     }
 
 
-def deflection(recording: Recording, surface: str, noise: Whitener) -> float:
-    """How far a total loss stands out of the noise WITHIN_S after it struck (clairvoyant.py)."""
-    t = np.array([measured.t_s for measured, _ in recording.seen[1:]])
-    struck = signature(recording, surface) * (t > recording.fault_at_s + 1e-9)[:, None]
-    soon = t <= recording.fault_at_s + WITHIN_S + 1e-9
-    return float(np.sqrt(np.square(noise.respond(struck)[soon]).sum()))
-
-
 @dataclass(frozen=True)
 class Survey:
     """Which aircraft in which air, how many flights a cell and in health; flights' seeds begin at `seed`."""
@@ -149,13 +134,11 @@ class Survey:
     flights: int
     healthy: int
     seed: int
-    published: bool = False
 
     def flown(self, block: Block, duration_s: float, faults: list[dict]) -> Recording:
         """A flight as shown to plug-ins."""
         flight = scenario_of(block, duration_s, faults, {"aircraft": self.aircraft})
-        own_alone = {} if self.published or self.aircraft == DEFAULT else OWN_ALONE
-        return record(with_fdi(flight, BOTH).with_(own_alone))
+        return record(with_fdi(flight, BOTH).with_(OWN_ALONE))
 
     def block(self, excitation_deg_s: float, number: int) -> Block:
         return Block(Condition("tactical-grade", self.turbulence), excitation_deg_s, self.seed + number)
@@ -208,28 +191,26 @@ class Seen:
 
 @dataclass(frozen=True)
 class Cell:
-    """A surface of an aircraft: of each loss (n,) its flight and magnitude, how surely a test told the
-    instant finds it; what Page's, of each magnitude, and ours made of it."""
+    """A surface of an aircraft: of each loss (n,) its flight and magnitude; what Page's test, of each
+    magnitude, and ours made of it."""
 
     aircraft: str
     surface: str
     flight: np.ndarray
     magnitude: np.ndarray
-    told: np.ndarray
     page: dict[float, Seen]
     ours: Seen
-    flown: int
 
     def counts(self, drawn: np.ndarray, losses: np.ndarray) -> np.ndarray:
-        """Of the losses, which may be drawn repeatedly: how many count, found by the test told the instant,
-        Page's, ours, at the level as shipped Page's, ours."""
+        """Of the losses, which may be drawn repeatedly: how many count, found by Page's test, by ours, and
+        at the level as shipped by Page's, by ours."""
         page, shipped = np.zeros((2, len(self.flight)), dtype=bool)
         for magnitude, seen in self.page.items():
             level, of_it = seen.level(drawn), self.magnitude == magnitude
             page[of_it] = seen.found(level)[of_it]
             shipped[of_it] = seen.found(level + log(PER_H / SHIPPED_PER_H))[of_it]
         ours = self.ours.found(self.ours.level(drawn))
-        columns = np.ones(len(page)), self.told, page, ours, shipped, self.ours.found(SHIPPED)
+        columns = np.ones(len(page)), page, ours, shipped, self.ours.found(SHIPPED)
         return np.array([column[losses].sum() for column in columns])
 
 
@@ -239,28 +220,23 @@ def cell_of(survey: Survey, surface: str, healthy: list[Recording], noise: White
     for recording in healthy:
         for magnitude, statistic in ratios(recording, surface, noise).items():
             page[magnitude].append(trace(recording, statistic))
-    losses = list(survey.lost(surface))
-    known = [(at // len(MAGNITUDES), m, one) for at, (m, one) in enumerate(losses) if is_known(one)]
+    losses = enumerate(survey.lost(surface))
+    known = [(at // len(MAGNITUDES), m, one) for at, (m, one) in losses if is_known(one)]
     seen: dict[float, list[Trace]] = {magnitude: [] for magnitude in MAGNITUDES}
     for _, _, recording in known:
         for magnitude, statistic in ratios(recording, surface, noise).items():
             seen[magnitude].append(trace(recording, statistic))
-    told = [
-        detection_probability(m * deflection(one, surface, noise), WITHIN_S, PER_H) for _, m, one in known
-    ]
     return Cell(
         survey.aircraft, surface,
         np.array([flight for flight, _, _ in known], dtype=int), np.array([m for _, m, _ in known]),
-        np.array(told),
         {m: Seen.of(seen[m], page[m]) for m in MAGNITUDES},
         Seen.of(*([trace(one, one.built_in) for one in of] for of in ([one for *_, one in known], healthy))),
-        len(losses),
     )  # fmt: skip
 
 
 def counted(cells: list[Cell]) -> tuple[np.ndarray, np.ndarray]:
-    """Counts as of `Cell.counts` of cells together, (6,), and of RESAMPLED draws (RESAMPLED, 6)."""
-    rng, total, draws = np.random.default_rng(0), np.zeros(6), np.zeros((RESAMPLED, 6))
+    """Counts as of `Cell.counts` of cells together, (5,), and of RESAMPLED draws (RESAMPLED, 5)."""
+    rng, total, draws = np.random.default_rng(0), np.zeros(5), np.zeros((RESAMPLED, 5))
     for aircraft in dict.fromkeys(cell.aircraft for cell in cells):
         of_it = [cell for cell in cells if cell.aircraft == aircraft]
         healthy = len(of_it[0].ours.healthy)
@@ -274,71 +250,22 @@ def counted(cells: list[Cell]) -> tuple[np.ndarray, np.ndarray]:
     return total, draws
 
 
-HEAD = [
-    "aircraft", "surface", "losses", "told the instant", "all but it", "ours", "share",
-    "all but it, shipped", "ours, shipped", "share, shipped",
-]  # fmt: skip
-
-
-def shares_of(cells: list[Cell]) -> tuple[int, float, list[list[float]]]:
-    """Losses that count, the share that a test told the instant finds; at equal rates, then as shipped, what
-    the one told all but the instant finds, ours, ours over its, and the ends of that."""
+def shares_of(cells: list[Cell]) -> tuple[int, list[list[float]]]:
+    """Losses that count; at equal rates, then as shipped, the share that Page's test finds, ours, ours over
+    its, and the ends of that."""
     total, draws = counted(cells)
     found = []
-    for told, ours in ((2, 3), (4, 5)):
+    for page, ours in ((1, 2), (3, 4)):
         with np.errstate(divide="ignore", invalid="ignore"):
-            share, spread = total[ours] / total[told], draws[:, ours] / draws[:, told]
+            share, spread = total[ours] / total[page], draws[:, ours] / draws[:, page]
             ends = np.nanpercentile(spread, PERCENT)
-        found.append([total[told] / total[0], total[ours] / total[0], share, *ends])
-    return int(total[0]), float(total[1] / total[0]), found
+        found.append([total[page] / total[0], total[ours] / total[0], share, *ends])
+    return int(total[0]), found
 
 
-def row_of(aircraft: str, surface: str, cells: list[Cell]) -> list[str]:
-    """A row of the table."""
-    losses, instant, found = shares_of(cells)
-    row = [aircraft, surface, f"{losses} of {sum(cell.flown for cell in cells)}", f"{instant:.0%}"]
-    for told, ours, share, low, high in found:
-        row += [f"{told:.0%}", f"{ours:.0%}", f"{share:.0%} ({low:.0%} to {high:.0%})"]
-    return row
-
-
-def cells_of(survey: Survey, surfaces: list[str]) -> list[Cell]:
+def cells_of(survey: Survey) -> list[Cell]:
     """All cells of an aircraft."""
     healthy = survey.in_health()
     noise = fitted([unexplained(one) for one in healthy])
-    known = surfaces or find_aircraft(survey.aircraft, Path()).class_of_losses
+    known = find_aircraft(survey.aircraft, Path()).class_of_losses
     return [cell_of(survey, surface, healthy, noise) for surface in known]
-
-
-def rows_together(cells: list[Cell]) -> list[list[str]]:
-    """Rows of several aircraft: of each surface, and of all."""
-    surfaces = dict.fromkeys(cell.surface for cell in cells)
-    of_surfaces = [row_of("all", name, [cell for cell in cells if cell.surface == name]) for name in surfaces]
-    return [*of_surfaces, row_of("all", "all", cells)]
-
-
-def main() -> None:
-    """Print a row a surface, as they come."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("aircraft", nargs="*", default=["beaver"])
-    parser.add_argument(
-        "--surface", action="append", help="once a surface; without it all that the class has"
-    )
-    parser.add_argument("--turbulence", default="light", choices=("none", "light", "moderate", "severe"))
-    parser.add_argument("--flights", type=int, default=20, help="of each surface, magnitude and excitation")
-    parser.add_argument("--healthy", type=int, default=72)
-    parser.add_argument("--seed", type=int, default=500_000)  # others than those of that command
-    parser.add_argument("--published", action="store_true")
-    args = parser.parse_args()
-    cells: list[Cell] = []
-    print("|".join(HEAD))
-    for name in args.aircraft:
-        sizes = args.turbulence, args.flights, args.healthy, args.seed, args.published
-        of_it = cells_of(Survey(name, *sizes), args.surface)
-        print(*("|".join(row_of(one.aircraft, one.surface, [one])) for one in of_it), sep="\n", flush=True)
-        cells += of_it
-    print(*map("|".join, rows_together(cells)), sep="\n")
-
-
-if __name__ == "__main__":
-    main()

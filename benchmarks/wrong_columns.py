@@ -22,17 +22,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pandas as pd
-from benchmarks.own_logs import (
-    Campaign,
-    Log,
-    Said,
-    by_aircraft,
-    by_model,
-    identified,
-    recorded,
-    scenarios,
-    training,
-)
+from benchmarks.own_logs import BY, NO_SURFACE, Campaign, Log, Said, recorded, scenarios, training, ways
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.studies.present.tables import markdown_table
@@ -106,7 +96,7 @@ def ending(diagnosed: Callable[[Log], Said], log: Log) -> tuple[str, ...]:
     ends = ["not credible"] if rows.credible.mean() < 0.5 else []
     if alarmed.any():
         ends.append("alarmed")
-    if set(map(str, rows.isolated_surfaces[alarmed])) - {"", "unknown", "unanticipated", "engine"}:
+    if set(map(str, rows.isolated_surfaces[alarmed])) - NO_SURFACE:
         ends.append("named")
     return tuple(ends)
 
@@ -117,28 +107,25 @@ def main() -> None:
     parser.add_argument("--logs", type=int, default=10)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--aircraft", default="beaver")
-    parser.add_argument("--by", choices=("aircraft", "identified"), nargs="*")
+    parser.add_argument("--by", choices=BY, nargs="*", default=BY)
     parser.add_argument("--only", default="", help="mistakes whose words have this")
     parser.add_argument("--verbose", action="store_true", help="each alarm, too")
     asked = parser.parse_args()
-    by = asked.by or ["aircraft", "identified"]
     of = Campaign(asked.aircraft, seed=asked.seed)
     counts: Counter[tuple[str, str, str]] = Counter()
     seen: list[str] = []
     with tempfile.TemporaryDirectory() as scratch:
-        ways: dict[str, Callable[[Log], Said]] = {"aircraft": lambda log: by_aircraft(log, of)}
-        if "identified" in by:
-            model = identified(of, [recorded(one, "table", Path(scratch)) for one in training(of)])
-            ways["identified"] = lambda log: by_model(log, model)
+        trained = training(of) if "identified" in asked.by else ()
+        tried = ways(of, asked.by, [recorded(one, Path(scratch)) for one in trained])
         healthy = [one for one in scenarios(of) if not one["faults"]][: asked.logs]
-        logs = [recorded(one, "table", Path(scratch)) for one in healthy]
+        logs = [recorded(one, Path(scratch)) for one in healthy]
         folder = Path(scratch) / "mistaken"
         folder.mkdir()
         for mistake in (one for one in mistakes() if asked.only in one.said):
             for log in logs:
                 wrong = with_mistake(log, mistake, folder)
-                for way in by:
-                    ends = ending(ways[way], wrong)
+                for way, diagnosed in tried.items():
+                    ends = ending(diagnosed, wrong)
                     counts.update((way, mistake.group, end) for end in ("logs", *ends))
                     if "alarmed" in ends:
                         seen.append(f"{way}: {mistake.said}, {log.flown.name}: {', '.join(ends)}")

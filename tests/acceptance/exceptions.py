@@ -125,14 +125,9 @@ TABLE = (
         "needs scikit-learn; tests/plugins/test_learned.py trains it",
     ),
     Exempt(
-        r"python -m tools\.drawn\.forgeries",
-        "minutes: a few forgeries",
-        "python -m tools.drawn.forgeries --flights 2 --forged 40",
-    ),
-    Exempt(
         r"python -m tools\.drawn\.certificates",
         "half a minute: a few flights",
-        "python -m tools.drawn.certificates --flights 4 --altered 4",
+        "python -m tools.drawn.certificates --flights 2 --altered 4 --forged 40",
     ),
     Exempt(
         r"beaver-ftc (run|validate|check|sweep|compare|detectability|evidence|sitl|mismatch|separate"

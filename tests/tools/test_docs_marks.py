@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tools.docs import refresh
 from tools.docs.commands import Output
-from tools.docs.marks import Number, parsed
+from tools.docs.marks import parsed
 from tools.docs.refresh import Refreshed, Wanted, digest_of
-from tools.docs.values import printed
+from tools.docs.values import Place, printed
 
 from beaver_ftc.documents.errors import BadInput
 
@@ -151,7 +151,7 @@ NUMBERS = {
 
 
 def number(path, factor=1.0, form=""):
-    return Number("name", path, factor, form, 1, 0, 0)
+    return Place(path, factor, form)
 
 
 @pytest.mark.parametrize("wanted", NUMBERS, ids=str)

@@ -5,7 +5,7 @@ import ast
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tools.docs import bare, names
+from tools.docs import names, prose
 from tools.docs.marks import parsed
 
 SHOWN = frozenset({"MyCusum", "cusum"})
@@ -86,4 +86,4 @@ BARE = {
 
 @pytest.mark.parametrize("text", BARE)
 def test_a_number_that_no_command_prints_is_counted(text):
-    assert bool(list(bare.numbers(parsed(text, "docs/page.md")))) == BARE[text]
+    assert bool(list(prose.numbers(text))) == BARE[text]

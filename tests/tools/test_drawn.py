@@ -114,9 +114,6 @@ def altered(metrics, **sections):
         ({"isolation": {"fault": "rudder"}}, "wrong name"),
         ({"isolation": {"fault": "unanticipated"}}, "excluded"),
         ({"isolation": {"fault": None, "isolated": False, "candidates": ["rudder"]}}, "excluded"),
-        ({"detection": {"delay_s": 0.02}}, "verdict"),
-        ({"isolation": {"delay_s": 0.03}}, "verdict"),
-        ({"isolation": {"correct": False}}, "verdict"),
     ],
 )
 def test_a_broken_promise_is_seen(published, sections, kind):

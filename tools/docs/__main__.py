@@ -6,7 +6,6 @@ python -m tools.docs table NAME    print a table; `constants` and `properties` p
 python -m tools.docs cells PAGE    print the tables of a page as JSON, for numbers in the prose beside them
 python -m tools.docs screens       take the pictures of report and live page again, with a browser
 python -m tools.docs reference NAME    print a page of the generated reference, as the web site has it
-python -m tools.docs prose         print how often each page breaks a rule of prose.py, as prose.yaml has it
 """
 
 import argparse
@@ -28,7 +27,6 @@ def main() -> int:
         "properties": _properties,
         "reference": _reference,
         "screens": _screens,
-        "prose": _prose,
     }
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     try:
@@ -51,22 +49,17 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--only", default="", metavar="TEXT", help="of what takes long, commands with this")
     parser.add_argument("--jobs", type=int, help="processes side by side; as many as cores without it")
     parser.add_argument("--again", action="store_true", help="run also commands whose output is kept")
-    parser.add_argument("--bare", action="store_true", help="print numbers in prose that no command prints")
     parser.add_argument("--times", action="store_true", help="print which commands take longest")
     return parser.parse_args()
 
 
 def _pages(options: argparse.Namespace) -> int:
-    from tools.docs import bare, names, prose
+    from tools.docs import names, prose
     from tools.docs.marks import read
     from tools.docs.pages import chosen
     from tools.docs.refresh import Wanted, check, slowest, write
 
     pages = [read(path) for path in chosen(options.pages)]
-    if options.bare:
-        found = [f"{page.name}:{line}: {words}" for page in pages for line, words in bare.numbers(page)]
-        print("\n".join([*found, f"{len(found)} sentences with numbers that no command prints"]))
-        return 0
     if options.check:
         with ThreadPoolExecutor(1) as beside:  # the last command leaves other cores idle
             words = beside.submit(lambda: names.check(pages, every=not options.pages) + prose.check(pages))
@@ -119,16 +112,6 @@ def _screens() -> str:
     from tools.docs.screens import write_screens
 
     return "\n".join(map(str, write_screens(ROOT / "docs" / "images")))
-
-
-def _prose() -> str:
-    import yaml
-
-    from tools.docs import prose
-    from tools.docs.marks import read
-    from tools.docs.pages import every_page
-
-    return yaml.safe_dump(prose.counts([read(path) for path in every_page()])).rstrip()
 
 
 def _reference(name: str = "") -> str:

@@ -9,12 +9,12 @@ marks are text.
 """
 
 import re
-import shlex
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from tools.docs.pages import ROOT, Finding
+from tools.docs.values import Place
 
 _COMMENT = re.compile(r"<!--.*?(?:-->|$)")
 _PRINTED = re.compile(r"<!-- printed: (\S.*?) -->")
@@ -80,9 +80,7 @@ class Number:
     """A number in prose: where it stands, and how it is taken out of a document."""
 
     name: str
-    path: str
-    factor: float
-    format: str
+    place: Place
     line: int
     begin: int
     end: int
@@ -175,14 +173,9 @@ def _read_line(page: Page, number: int, start: int, line: str) -> None:
 
 def _read_number(page: Page, line: int, start: int, found: re.Match[str]) -> None:
     try:
-        name, path, *rest = shlex.split(found[1])
-        path, _, factor = path.partition("*")
-        factors = [factor] * bool(factor) + [word[1:] for word in rest if word.startswith("*")]
-        formats = [word for word in rest if not word.startswith("*")]
-        (factor,), (spec,) = factors or ["1"], formats or [""]
-        page.numbers.append(
-            Number(name, path, float(factor), spec, line, start + found.start(2), start + found.end(2))
-        )
+        name, _, words = found[1].partition(" ")
+        begin, end = start + found.start(2), start + found.end(2)
+        page.numbers.append(Number(name, Place.read(words), line, begin, end))
     except ValueError:
         page.wrong(line, f"no mark of a number: {found[0]}, allowed: <!--=NAME path.to.value *100 .2f-->")
 

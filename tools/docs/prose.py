@@ -1,25 +1,19 @@
-"""How pages are written: tables have captions, symbols are in the glossary, sentences have verbs, and a
-page ends with the next step. On pages of results, a command prints the numbers of prose.
+"""How pages are written: tables have captions, symbols are in the glossary, a page ends with the next step.
+On pages of results, a command prints the numbers of prose.
 
-A page that is older than a rule may break it as often as `prose.yaml` says, and no more often.
+Numbers that need no command: in code and equations, between marks, in headings and links, dates, versions,
+numbers of sections, equations, figures and tables, and in sentences or rows of a table that cite a source. A
+whole number up to twelve is a word in figures.
 """
 
 import re
-from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache
-from pathlib import Path
 
-import yaml
-
-from tools.docs import bare
-from tools.docs.marks import Page, parsed
+from tools.docs.marks import Page
 from tools.docs.pages import ROOT, Finding, is_generated
 
-ALLOWED = Path(__file__).with_name("prose.yaml")
-VERBS = Path(__file__).with_name("verbs.txt")
 GLOSSARY = ROOT / "docs/reference/glossary.md"
-CAPTION, SYMBOL, VERB, NEXT, NUMBER = "caption", "symbol", "verb", "next", "number"
 RESULTS = "docs/results/"
 _HOME = ("README.md", "docs/README.md")  # they are the way to all pages
 _FENCE = re.compile(r"^ *(`{3,}|~{3,}).*?^ *\1`* *$", re.MULTILINE | re.DOTALL)
@@ -34,56 +28,44 @@ _GREEK = (
 )
 _SYMBOL = re.compile(rf"\\{_GREEK}(?![A-Za-z])|(?<![\\A-Za-z])[A-Za-z]+")
 _NO_SYMBOLS = frozenset(("sin", "cos", "tan", "exp", "ln", "log", "max", "min", "deg", "rad", "Hz"))
-_RELATION = re.compile(r"\$[^$]*(?:[=<>]|\\(?:le|ge|in|approx|ne)(?![a-z]))[^$]*\$")  # a verb in signs
-_SENTENCE = re.compile(r"(?<=[.!?])\s+(?=[A-Z`*\"(])")
-_CAPTION = ("*Table ", "*Figure ")  # a caption may be a noun with what it needs
-_LEAST_WORDS = 4  # shorter is a label
-_PLAIN = re.compile(r"`[^`]*`|\$[^$]*\$|!?\[([^\]]*)\]\([^)]*\)")
+_LEFT_OUT = re.compile(
+    r"^ *(`{3,}|~{3,}).*?^ *\1`* *$"  # fenced code
+    r"|^ {4}(?![-*\d])[^\n]*$"  # indented code
+    r"|^#+ [^\n]*$"
+    r"|<!-- printed:.*?<!-- /printed -->"
+    r"|<!--=.*?<!--/-->"
+    r"|<!--.*?-->"
+    r"|\$\$.*?\$\$|\$[^$\n]+\$"
+    r"|``.*?``|`[^`]+`"
+    r"|\]\([^)]*\)|https?://\S+"
+    r"|\b\d{4}-\d\d(?:-\d\d)?\b"  # dates
+    r"|\b[vV]?\d+\.\d+\.\d+\S*"  # versions
+    r"|\b(?:section|sections|eq\.|equation|equations|fig\.|figure|figures|table|row|rows|step|part|page|Python|C"
+    r"|version)s? \(?\d+[\d.a-z]*\)?(?:(?:,| and| to|-) ?\(?\d+[\d.a-z]*\)?)*",
+    re.MULTILINE | re.DOTALL | re.IGNORECASE,
+)
+_NUMBER = re.compile(r"(?<![\w.^_-])[-−]?\d[\d.,]*(?:e[+-]?\d+)?(?![\w.-]*\w-?\d)")
+_CITES = re.compile(r"\[[A-Z][\w-]*\d[\w-]*\b[^\]]*\]|\[[A-Z]{2,}\]")
+_SENTENCE = re.compile(r"(?<=[.:;])(?<!sec\.)(?<!eq\.)(?<!fig\.)\s+|\n\s*\n|\n(?=[-|])")
+_WORDS = 12
 
 
 def check(pages: Sequence[Page]) -> list[Finding]:
-    """A finding for each rule that a page breaks more often than it may."""
-    allowed, found = _allowed(), counts(pages)
-    return [
-        Finding(page.name, line, words)
-        for page in pages
-        if page.name in found
-        for kind, line, words in faults(page.name, page.text)
-        if found[page.name][kind] > allowed.get(page.name, {}).get(kind, 0)
-    ]
-
-
-@cache
-def _allowed() -> Mapping[str, Mapping[str, int]]:
-    return yaml.safe_load(ALLOWED.read_text(encoding="utf-8")) or {}
-
-
-def counts(pages: Sequence[Page]) -> dict[str, dict[str, int]]:
-    """{page: {rule: how often it is broken}} of pages that break one."""
+    """A finding for each place where a page breaks a rule."""
     written = (page for page in pages if not is_generated(page.text))
-    found = {page.name: Counter(kind for kind, *_ in faults(page.name, page.text)) for page in written}
-    return {name: dict(broken) for name, broken in found.items() if broken}
+    return [Finding(page.name, *found) for page in written for found in faults(page)]
 
 
-def faults(name: str, text: str) -> Iterator[tuple[str, int, str]]:
-    """(rule, line, what is wrong) of a page."""
-    bare_text = _MARK.sub(_blank, _FENCE.sub(_blank, text))
-    yield from _tables(bare_text)
-    yield from _symbols(bare_text)
-    yield from _verbless(bare_text)
-    if name.startswith("docs/") and name not in _HOME and not _names_a_next_step(bare_text):
-        yield (
-            NEXT,
-            bare_text.count("\n"),
-            "the page names no next step, allowed: a last section `## Next` with a link",
-        )
-    yield from _unprinted(name, text)
-
-
-def _unprinted(name: str, text: str) -> Iterator[tuple[str, int, str]]:
-    """Sentences of a page of results with a number that no command prints."""
-    for line, words in bare.numbers(parsed(text, name)) if name.startswith(RESULTS) else ():
-        yield NUMBER, line, f'a number that no command prints: "{words[:80]}", allowed: a mark, or no number'
+def faults(page: Page) -> Iterator[tuple[int, str]]:
+    """(line, what is wrong) of a page."""
+    text = _MARK.sub(_blank, _FENCE.sub(_blank, page.text))
+    yield from _tables(text)
+    yield from _symbols(text)
+    if page.name.startswith("docs/") and page.name not in _HOME and not _names_a_next_step(text):
+        says = "the page names no next step, allowed: a last section `## Next` with a link"
+        yield text.count("\n"), says
+    for line, words in numbers(page.text) if page.name.startswith(RESULTS) else ():
+        yield line, f'a number that no command prints: "{words[:80]}", allowed: a mark, or no number'
 
 
 def _blank(found: re.Match[str]) -> str:
@@ -96,7 +78,7 @@ def _names_a_next_step(text: str) -> bool:
     return last.startswith("Next\n") and "](" in last
 
 
-def _tables(text: str) -> Iterator[tuple[str, int, str]]:
+def _tables(text: str) -> Iterator[tuple[int, str]]:
     """Tables whose paragraph above is no caption."""
     lines = text.split("\n")
     for number, line in enumerate(lines):
@@ -111,7 +93,7 @@ def _tables(text: str) -> Iterator[tuple[str, int, str]]:
         paragraph = " ".join(above[begin:])
         if not re.match(r"\*Table \d+\. .*\*$", paragraph):
             head = lines[number - 1].strip()
-            yield CAPTION, number, f"no caption above the table {head[:60]}, allowed: *Table N. Sentence.*"
+            yield number, f"no caption above the table {head[:60]}, allowed: *Table N. Sentence.*"
 
 
 @cache
@@ -146,67 +128,30 @@ def _letters(word: str) -> Iterator[str]:
         yield from word
 
 
-def _symbols(text: str) -> Iterator[tuple[str, int, str]]:
+def _symbols(text: str) -> Iterator[tuple[int, str]]:
     known = known_symbols()
     for found in _MATHS.finditer(text):
         line = text.count("\n", 0, found.start()) + 1
         for symbol in dict.fromkeys(symbols_of(found[0])):
             if symbol not in known:
-                yield SYMBOL, line, f"${symbol}$ is not in docs/reference/glossary.md"
+                yield line, f"${symbol}$ is not in docs/reference/glossary.md"
 
 
-@cache
-def verbs() -> frozenset[str]:
-    """The verbs of verbs.txt in each of their forms; a line is a verb, with its irregular forms behind it."""
-    found: set[str] = set()
-    for line in VERBS.read_text(encoding="utf-8").splitlines():
-        for verb, *irregular in [line.split()] if line.strip() else []:
-            found.update((verb, *irregular, *_forms(verb)))
-    return frozenset(found)
+def numbers(text: str) -> Iterator[tuple[int, str]]:
+    """(line, sentence) of each sentence with a number that no command prints."""
+    prose = _LEFT_OUT.sub(lambda found: re.sub(r"[^\n]", " ", found[0]), text)
+    start = 0
+    for end in [*(found.end() for found in _SENTENCE.finditer(prose)), len(prose)]:
+        sentence = prose[start:end]
+        if not _CITES.search(text[start:end]):
+            found = [number for number in _NUMBER.finditer(sentence) if _is_measured(number[0])]
+            if found:
+                line = prose.count("\n", 0, start + found[0].start()) + 1
+                yield line, " ".join(text[start:end].split())
+        start = end
 
 
-def _forms(verb: str) -> Iterator[str]:
-    """Third person, past and -ing of a verb, doubled consonants included."""
-    stem = verb.removesuffix("e")
-    yield verb + ("es" if re.search(r"(s|sh|ch|x|z|o)$", verb) else "s")
-    if re.search(r"[^aeiou]y$", verb):
-        yield from (verb[:-1] + "ies", verb[:-1] + "ied")
-    for root in (stem, verb, verb + verb[-1]):
-        yield from (root + "ed", root + "ing")
-
-
-def _verbless(text: str) -> Iterator[tuple[str, int, str]]:
-    """Sentences of paragraphs and of items of lists in which no word is a verb."""
-    for line, paragraph in _paragraphs(text.partition("\n## Next\n")[0]):  # there are labels of links
-        if paragraph.startswith(_CAPTION):
-            continue
-        for sentence in _SENTENCE.split(paragraph):
-            if not sentence.rstrip("*_ ").endswith((".", "!", "?")):
-                continue
-            plain = _PLAIN.sub(lambda found: f" {found[1] or 'X'} ", sentence)
-            words = re.findall(r"[A-Za-z']+", plain)
-            if _RELATION.search(sentence) or any(_is_verb(word) for word in words):
-                continue
-            if len(words) >= _LEAST_WORDS:
-                yield VERB, line, f'a sentence without a verb: "{sentence[:80]}"'
-
-
-def _is_verb(word: str) -> bool:
-    return word.lower() in verbs() or word.lower().endswith("n't")
-
-
-def _paragraphs(text: str) -> Iterator[tuple[int, str]]:
-    """(line, text) of each paragraph and item; no headings, tables, pictures, indented code."""
-    begin, gathered = 0, list[str]()
-    for number, line in enumerate([*text.split("\n"), ""], 1):
-        item = re.match(r"\s*(?:[-*+]|\d+\.) (?=\S)", line)
-        leaves = not line.strip() or line.startswith(("#", "|", "    ", "!", "$$", "<", "  <"))
-        if leaves or item:
-            if "".join(gathered).strip():
-                yield begin, " ".join(gathered)
-            gathered = [line[item.end() :]] if item and not leaves else []
-            begin = number
-        elif gathered:
-            gathered.append(line.strip())
-        else:
-            gathered, begin = [line.strip()], number
+def _is_measured(number: str) -> bool:
+    """Whether it is more than a count of few."""
+    text = number.rstrip(".,").replace(",", "")
+    return not (text.isdigit() and int(text) <= _WORDS)

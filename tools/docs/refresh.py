@@ -125,12 +125,12 @@ class Refreshed:
         if number.name not in self._documents:
             return
         try:
-            new = values.printed(self._documents[number.name], number)
+            new = values.printed(self._documents[number.name], number.place)
         except BadInput as error:
             self._wrong(number.line, f"{number.name} {error}")
             return
         command = self.page.documents[number.name].origin.command
-        what = f"{number.name} {number.path} of {command}"
+        what = f"{number.name} {number.place.path} of {command}"
         self._put(number.line, number.begin, number.end, new, what)
 
     def _output(self, made: Block | Document) -> Output | None:

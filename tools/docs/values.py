@@ -1,12 +1,29 @@
-"""A number out of a document, as prose has it."""
+"""A value out of a document, as prose and tables have it."""
 
+import shlex
 from collections import Counter
-from typing import Any
+from typing import Any, NamedTuple
 
 from beaver_ftc.documents.errors import BadInput
-from tools.docs.marks import Number
 
 _LONGEST = 200  # of what is listed
+
+
+class Place(NamedTuple):
+    """Where a value stands in a document, and in which form it is shown."""
+
+    path: str
+    factor: float = 1.0
+    format: str = ""
+
+    @classmethod
+    def read(cls, words: str) -> "Place":
+        """Of words such as `delay.median_s .2f`, `share *100 .0f`. Raises ValueError for others."""
+        path, *rest = shlex.split(words)
+        path, _, factor = path.partition("*")
+        factors = [factor] * bool(factor) + [word[1:] for word in rest if word.startswith("*")]
+        (factor,), (spec,) = factors or ["1"], [word for word in rest if not word.startswith("*")] or [""]
+        return cls(path, float(factor), spec)
 
 
 def at(document: Any, path: str) -> Any:
@@ -37,19 +54,19 @@ def _steps(value: Any) -> tuple[dict[str, Any], str]:
     return known, f"an index below {len(value)}, or key=value of one row"
 
 
-def printed(document: Any, number: Number) -> str:
-    """The number as it stands in prose. Raises BadInput where it cannot be taken or formatted."""
-    value = at(document, number.path)
+def printed(document: Any, place: Place) -> str:
+    """The value as it stands in prose. Raises BadInput where it cannot be taken or formatted."""
+    value = at(document, place.path)
     if isinstance(value, dict | list) or value is None:
-        raise BadInput(f"{number.path}: is {_kind(value)}, allowed: a number, a text, yes or no")
+        raise BadInput(f"{place.path}: is {_kind(value)}, allowed: a number, a text, yes or no")
     if isinstance(value, bool):
         value = "yes" if value else "no"
     try:
         if isinstance(value, str):
-            return format(value, number.format)
-        return format(value * number.factor if number.factor != 1.0 else value, number.format)
+            return format(value, place.format)
+        return format(value * place.factor if place.factor != 1.0 else value, place.format)
     except ValueError as error:
-        raise BadInput(f"{number.path}: {error}: {number.format}, allowed: a format of Python") from None
+        raise BadInput(f"{place.path}: {error}: {place.format}, allowed: a format of Python") from None
 
 
 def _kind(value: Any) -> str:

@@ -1,84 +1,102 @@
-"""Certificates of drawn flights: does the checker accept all, and refuse each that is altered?
+"""Certificates of drawn flights: does the checker accept the true ones, and refuse what is altered or false?
 
-    python -m tools.drawn.certificates [--flights N] [--seed S] [--altered A]
+    python -m tools.drawn.certificates [--flights N] [--seed S] [--altered A] [--forged F]
 
-Of N flights of our scheme that are certified, from the schema (`python -m tools.drawn`), each certificate is
-checked; then A times one number, index or frame of one of them is altered, drawn by the seed: as it is, and
-with the digest written again, so that only what is recomputed is left to refuse it. Exit status 1 where a
-true certificate is refused or an altered one accepted.
+The certificates of N flights of our scheme, drawn from the schema (`python -m tools.drawn`), and of N healthy
+ones are checked. A times a number, index or frame of one of them is altered: as it is, and with the digest
+written again, so that only what is recomputed is left to refuse it. F times a false statement is put into
+one: an alarm in a row in which there was none, an exclusion of a fault that is not excluded, or at another
+time. Its evidence is changed by one to three of ROADS, the digest is written again. What is refused for its
+sides alone is deceived as well: they come last, and who forges can write them. Log and scenario stay as they
+are. Exit status 1 where a true certificate is refused, or another one accepted.
 """
 
 import argparse
 import copy
 import json
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
+import yaml
 
 import beaver_ftc as bf
 from beaver_ftc.scenario.builtin import to_yaml
+from beaver_ftc_assurance.certificates import check_certificate as checker
 from beaver_ftc_assurance.certificates.certificate import as_text, with_digest
-from beaver_ftc_assurance.certificates.check_certificate import failures
 from tools.drawn.campaign import AIRCRAFT
 from tools.drawn.compose import OURS, PLAIN, drawn_flights
 
 Document = dict[str, Any]
+Log = dict[str, np.ndarray]
 SCALED = 1.01  # times a number that is altered
+TYPES = ("stuck", "float", "bias", "loss_of_effectiveness", "hardover up", "oscillatory", "rate_limit")
+SIDES = "the stated sides are not the recomputed ones"
+WILD = (-1e9, -1e3, -1.0, -1e-3, 0.0, 1e-13, 1e-6, 0.3, 0.5, 2.0, 50.0, 1e3, 1e300, np.inf, np.nan)
 
 
 def main() -> None:
-    """Fly, check, alter, and say how often what came out."""
+    """Fly, check, alter, forge, count."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--flights", type=int, default=100)
+    parser.add_argument("--flights", type=int, default=40)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--altered", type=int, default=100)
+    parser.add_argument("--forged", type=int, default=5000)
     args = parser.parse_args()
-    rng, sizes = np.random.default_rng(args.seed), [0]
-    count, unseen, without = Counter[str](), Counter[str](), Counter[str]()
-    for index, written, log, scenario in certified(args.seed, args.flights):
-        refused = [*failures(written, log, scenario)]
-        count["flights"] += 1
-        count["statements"] += len(written["statements"])
-        count["not certified"] += len(written["without"])
-        without.update(f"{_kind(said)}: {said['because']}" for said in written["without"])
-        count["refused"] += bool(refused)
-        sizes.append(len(as_text(written)))
-        if refused:
-            print(f"{index}: {'; '.join(refused)[:300]}", flush=True)
-        due = -(-args.altered * count["flights"] // args.flights) - count["altered"]
-        for place in drawn_places(rng, written, due):
-            count["altered"] += 1
-            other = altered(written, place)
-            count["accepted"] += not [*failures(other, log, scenario)]
-            if not [*failures(with_digest(other), log, scenario)]:
-                unseen[" ".join(str(part) for part in place if not isinstance(part, int))] += 1
-    print(*(f"{word} {n}" for word, n in count.items()), f"largest {max(sizes)} bytes", sep=", ")
-    for reason, n in without.most_common():
-        print(f"{n:6d} without: {reason}")
-    print(f"with the digest written again {unseen.total()} accepted:", dict(unseen.most_common()))
-    raise SystemExit(bool(count["refused"] or count["accepted"] or unseen))
+    np.seterr(all="ignore")  # forged numbers overflow
+    rng, count, reasons = np.random.default_rng(args.seed), Counter[str](), Counter[str]()
+    for written, log, scenario in flights(args.seed, args.flights):
+        count["true certificates"] += 1
+        if refused := [*checker.failures(written, log, scenario)]:
+            count["true ones refused"] += 1
+            print(f"refused: {refused[0][:200]}", flush=True)
+        share = count["true certificates"] / (2 * args.flights)
+        others = {
+            "altered": alterations(rng, written, int(args.altered * share) - count["altered"]),
+            "forged": forgeries(rng, written, log, scenario, int(args.forged * share) - count["forged"]),
+        }
+        for kind, made in others.items():
+            for other, how in made:
+                why = [*checker.failures(other, log, scenario)]
+                if kind == "forged":
+                    why = [one for one in why if not one.endswith(SIDES)]
+                count[kind] += 1
+                count[f"{kind} ones accepted"] += not why
+                reasons.update(one.rpartition(": ")[2][:60] for one in why[:1])
+                if not why:
+                    print(f"accepted: {how}: {as_text(other)[:400]}", flush=True)
+    print(*(f"{word} {n}" for word, n in count.items()), sep=", ")
+    for reason, n in reasons.most_common(25):
+        print(f"{n:6d} {reason}")
+    wrong = ("true ones refused", "altered ones accepted", "forged ones accepted")
+    raise SystemExit(any(count[word] for word in wrong))
 
 
-def _kind(said: Document) -> str:
-    """Of which kind an event is."""
-    return "alarm" if said["what"] is None else "exclusion" if said["column"] else "type"
+def flights(seed: int, n: int) -> Iterator[tuple[Document, Log, str]]:
+    """Certificate as it is read back, log and scenario of n drawn flights of our scheme, and of as many
+    healthy ones."""
+    drawn, found = drawn_flights(seed, AIRCRAFT, kinds=(OURS, PLAIN, PLAIN)), 0
+    while found < n:
+        with suppress(bf.BadInput):  # there is no trim
+            scenario = next(drawn).scenario()
+            yield from map(_certified, (bf.load(_healthy(seed + found)), scenario))
+            found += 1
 
 
-def certified(seed: int, flights: int) -> Iterator[tuple[int, Document, dict[str, np.ndarray], str]]:
-    """So many flights of our scheme: number, certificate as it is read back, log, scenario."""
-    found = 0
-    for drawn in drawn_flights(seed, AIRCRAFT, kinds=(OURS, PLAIN, PLAIN)):
-        try:
-            flight = bf.fly(drawn.scenario())
-        except bf.BadInput:
-            continue
-        proof = flight.proof()
-        yield drawn.index, json.loads(as_text(proof.certificate)), proof.log, to_yaml(flight.scenario)
-        found += 1
-        if found == flights:
-            return
+def _certified(scenario: bf.Scenario) -> tuple[Document, Log, str]:
+    flight = bf.fly(scenario)
+    proof = flight.proof()
+    return json.loads(as_text(proof.certificate)), proof.log, to_yaml(flight.scenario)
+
+
+def _healthy(k: int) -> Document:
+    return {
+        "name": "healthy", "duration_s": 4.0, "seed": k, "initial": {"airspeed_mps": 35 + k % 15},
+        "reference": {"q": [{"sine": {"amplitude_deg_s": 1 + k % 4, "frequency_hz": 0.3}}]},
+        "fdi": {"fault_class": ("all", "published")[k % 2]},
+    }  # fmt: skip
 
 
 def places(node: Any, place: tuple = ()) -> Iterator[tuple]:
@@ -90,24 +108,216 @@ def places(node: Any, place: tuple = ()) -> Iterator[tuple]:
         yield place
 
 
-def drawn_places(rng: np.random.Generator, certificate: Document, n: int) -> list[tuple]:
-    """So many of them, drawn, where there are statements."""
-    known = [*places(certificate)] if certificate["statements"] else []
-    return [known[i] for i in rng.integers(len(known), size=n)] if known else []
+def alterations(rng: np.random.Generator, written: Document, n: int) -> Iterator[tuple[Document, tuple]]:
+    """So many documents with a number altered, as they are and with the digest written again; and where."""
+    known = [*places(written)] if written["statements"] else []
+    for place in (known[i] for i in rng.integers(len(known), size=max(n, 0))) if known else ():
+        other = altered(written, place)
+        yield other, place
+        yield with_digest(other), (*place, "with the digest")
 
 
 def altered(certificate: Document, place: tuple) -> Document:
     """The same with one number altered: a frame or index by one, a number by a hundredth."""
     other = copy.deepcopy(certificate)
-    node = other
+    node, key = _at(other, place), place[-1]
+    value = node[key]
+    if isinstance(value, int):
+        node[key] = value + 1
+    else:
+        node[key] = value * SCALED if value else 1e-3
+    return other
+
+
+def _at(node: Any, place: tuple) -> Any:
+    """What holds a place."""
     for key in place[:-1]:
         node = node[key]
-    value = node[place[-1]]
-    if isinstance(value, int):
-        node[place[-1]] = value + 1
+    return node
+
+
+def forgeries(
+    rng: np.random.Generator, written: Document, log: Log, scenario: str, n: int
+) -> Iterator[tuple[Document, tuple]]:
+    """So many documents with a statement that is false, and the roads by which each was made to hold."""
+    for _ in range(n):
+        forged, said = false_statement(rng, written, log)
+        chosen = tuple(rng.choice([*ROADS], size=rng.integers(1, 4), replace=False))
+        for name in chosen:
+            with suppress(TypeError):  # a road after one that left a field of another type
+                ROADS[name](rng, forged, said, log)
+        _restate(forged, said, log, scenario)
+        yield with_digest(json.loads(json.dumps(forged))), chosen
+
+
+def false_statement(rng: np.random.Generator, written: Document, log: Log) -> tuple[Document, Document]:
+    """The document with one statement alone, of an event that the log does not have."""
+    rows, forged = len(log["t_s"]), copy.deepcopy(written)
+    true = [one for one in written["statements"] if "as" not in one]
+    surfaces = [name.removesuffix("_cmd_rad") for name in log if name.endswith("_cmd_rad")]
+    excluded = {(one["what"], one["frame"]) for one in written["statements"]}
+    while True:
+        k, kind = int(rng.integers(1, rows)), rng.integers(3)
+        surface = str(rng.choice(surfaces))
+        what = (None, surface, f"{surface} {rng.choice(TYPES)}")[kind]
+        column = checker.event_column(what, log)
+        columns = [column, f"fie_{surface}_excluded", "detected", "t_s"]
+        column = str(rng.choice(columns, p=[0.7, 0.1, 0.1, 0.1]))
+        if (what, k) not in excluded and not _is_event(what, k, log):
+            break
+    if true and rng.random() < 0.6:  # the evidence of another event
+        said = copy.deepcopy(true[rng.integers(len(true))])
+        if rng.random() < 0.5:
+            _move(said, k - said["frame"], rows, log)
     else:
-        node[place[-1]] = value * SCALED if value else 1e-3
-    return other
+        said = {"theta": "any", "terms": [_term(k, log, forged)], "sides": [0.0, 0.0]}
+        forged.setdefault("declared", {name: {} for name in "cbgoBm"})
+        forged.setdefault("dt_s", float(np.median(np.diff(log["t_s"]))))
+    said |= {"what": what, "column": column, "frame": k}
+    forged["statements"] = [said]
+    return forged, said
+
+
+def _is_event(what: str | None, k: int, log: Log) -> bool:
+    """Whether the log has this event in this row."""
+    column = log.get(checker.event_column(what, log))
+    return column is not None and bool(column[k:].all() and (k == 0 or not column[k - 1]))
+
+
+def _term(k: int, log: Log, forged: Document) -> Document:
+    """A frame by itself, as the log has it."""
+    d = [0.0, 0.0, 0.0]
+    d[k % 3] = (-1.0) ** (k // 3)
+    return {"weight": 1.0, "d": d, "first": k, "frame": k, **_copies(k, k, log)}
+
+
+def _copies(first: int, last: int, log: Log) -> Document:
+    of = {"x": "measured_rad_s", "F": "design_rad_s2", "eta_bar": "eta_bar_rad_s2"}
+    return {
+        name: [[float(log[f"{axis}_{column}"][k]) for axis in "pqr"] for k in range(first, last + 1)]
+        for name, column in of.items()
+    }
+
+
+def _move(said: Document, by: int, rows: int, log: Log) -> None:
+    """The evidence at another time."""
+    for one in (*said.get("terms", ()), *said.get("bounds", ())):
+        if "block" not in said and 0 < one["first"] + by <= one["frame"] + by < rows:
+            one["first"], one["frame"] = one["first"] + by, one["frame"] + by
+            if "since" in one:
+                one["since"] = max(one["since"] + by, 0)
+            if "x" in one:
+                one.update(_copies(one["first"], one["frame"], log))
+    if "likelihood" in said:
+        said["first"] = max(said["first"] + by, 1)
+
+
+def _restate(forged: Document, said: Document, log: Log, scenario: str) -> None:
+    """Write `rest` of the terms as log and scenario have it."""
+    with suppress(ArithmeticError, LookupError, TypeError, ValueError, checker.Refused):
+        declared = checker.declared_at_row(yaml.safe_load(scenario), said["frame"])
+        frames = checker.Frames(forged, log, declared, said.get("block"))
+        for term in said.get("terms", ()):
+            rows = slice(term["first"], term["frame"] + 1)
+            term["rest"] = (np.array(term["eta_bar"]) - frames.stated_bound_rad_s2[rows]).tolist()
+
+
+# --- the roads: each changes one thing that could make a statement hold ----------------------------------
+
+
+def _number(rng: np.random.Generator, forged: Document, said: Document, log: Log) -> None:
+    """A number, mostly of the statement, or all of its list become others; frames stay whole."""
+    whole = said if rng.random() < 0.8 else forged
+    known = [*places(whole)]
+    place = known[rng.integers(len(known))]
+    node = _at(whole, place)
+    for key in range(len(node)) if isinstance(node, list) and rng.random() < 0.3 else (place[-1],):
+        is_whole = isinstance(node[key], int)
+        node[key] = node[key] + int(rng.integers(-3, 4)) if is_whole else float(rng.choice(WILD))
+
+
+def _no_bounds(rng: np.random.Generator, forged: Document, said: Document, log: Log) -> None:
+    forged["declared"] = {name: {} for name in "cbgoBm"}
+    forged["omega_E"] = rng.choice([0.0, -1e3, 7.292115857915991e-05]).item()
+
+
+def _given(rng: np.random.Generator, forged: Document, said: Document, log: Log) -> None:
+    """Each term has a field that it need not have, or has it no more."""
+    name = str(rng.choice(["pole_per_s", "since", "fault", "h", "Z", "r"]))
+    for term in (*said.get("terms", ()), *said.get("bounds", ())):
+        if not isinstance(term, dict):  # `bounds` of some statements are names
+            continue
+        if name in "hZr":
+            term[name] = rng.choice(WILD, max(term["frame"] + 1 - term["first"], 0)).tolist()
+        elif name == "fault":
+            term["fault"] = float(rng.choice([-1e3, -1e-3, 0.0]))
+        else:
+            term["pole_per_s"] = float(rng.choice([-1.0, 1.0], p=[0.7, 0.3]) * rng.choice([0.1, 5, 50, 1e4]))
+            term["since"] = int(rng.integers(-5, term["frame"] + 3))
+        if rng.random() < 0.2:
+            term.pop(name, None)
+
+
+def _theta(rng: np.random.Generator, forged: Document, said: Document, log: Log) -> None:
+    said["theta"] = str(rng.choice(["any", "constant", "constant while it shows", "course", "none"]))
+    said |= {"least": float(rng.choice([-1.0, 0.0, 5.0])), "most": float(rng.choice([-5.0, 0.0, 1.0]))}
+
+
+def _block(rng: np.random.Generator, forged: Document, said: Document, log: Log) -> None:
+    length = int(rng.choice([-1, 0, 1, 2, 20]))
+    said["block"] = [length, 0, (len(log["t_s"]) // max(length, 1)) * max(length, 1)]
+
+
+def _odd(rng: np.random.Generator, forged: Document, said: Document, log: Log) -> None:
+    """A value of another type in some field of the statement."""
+    said[str(rng.choice([*said]))] = [None, "1", True, [], {}, [[]], 1e400, -1][rng.integers(8)]
+
+
+def _evidence(rng: np.random.Generator, forged: Document, said: Document, log: Log) -> None:
+    """Evidence of another kind, made up."""
+    for name in [name for name in said if name not in ("what", "column", "frame")]:
+        del said[name]
+    kind = rng.integers(6)
+    if kind == 0:
+        alarm = {"likelihood": "t_s", "axes": [1], "first": 1, "what": None, "column": "detected", "frame": 1}
+        forged["statements"].insert(0, alarm)
+    said |= (
+        {"as": "alarm"},
+        {"test": str(rng.choice(checker.TESTS)), "looks": rng.choice(WILD, (2, 3)).tolist()},
+        {"missing": [rng.choice([-1, 0, 3]).item()]},
+        {"theta": str(rng.choice(["any", "course"])), "terms": []},
+        _chance(rng, said["frame"], log),
+        _course(rng, said["frame"]),
+    )[kind] | {"sides": [[1.0], [0.0]] if kind > 3 else [1.0, 0.0]}
+
+
+def _chance(rng: np.random.Generator, k: int, log: Log) -> Document:
+    shares = [name for name in log if name.endswith("_likelihood_share")]
+    frame: Document = {"jitter": [float(rng.choice([0, -1e-6]))], "drift": [[0.0]], "signature": [1.0]}
+    tolerance = [-1e3] if rng.random() < 0.3 else []
+    frame |= {"known": [[1.0]]} if tolerance else {}
+    frame |= {"bounded": [float(rng.choice([0.0, -1e6]))]} if rng.random() < 0.5 else {}
+    return {
+        "likelihood": str(rng.choice([*shares, "t_s", "airspeed_mps"])),
+        "level": float(rng.choice([-50.0, 1e-9, 0.0, 6.0])), "sense": str(rng.choice(["either", "less"])),
+        "axes": [int(rng.integers(3))], "R": [float(rng.choice([1e-6, -1e-6, 0.0]))],
+        "P": [[1e-6, 0], [0, float(rng.choice([1e-6, -1e-6]))]], "Y": [[0.0] * (2 + len(tolerance))] * 2,
+        "tolerance": tolerance, "first": k, "frames": [frame],
+    }  # fmt: skip
+
+
+def _course(rng: np.random.Generator, k: int) -> Document:
+    wide = float(rng.choice([0.0, -1e6]))
+    bounds = [{"d": [0.0, 1.0, 0.0], "first": j, "frame": j, "h": [0.0], "r": [wide], "Z": [z]}
+              for j, z in ((max(k - 2, 1), 1.0), (k, -1.0))]  # fmt: skip
+    course = {"stops": [1e9], "pace_rad_s": 1e9, "slowest_rad_s": 1e9, "near": -1e9, "ordered": [-1e9]}
+    return {"theta": "course", "bounds": bounds, **course}
+
+
+ROADS: dict[str, Callable[..., None]] = {
+    "number": _number, "no bounds": _no_bounds, "given": _given, "theta": _theta, "block": _block,
+    "odd": _odd, "evidence": _evidence,
+}  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -19,13 +19,13 @@ from tools.drawn.declare import Words, declare, fit
 from tools.drawn.factors import (
     DRAWN,
     LEFT_OUT,
-    Together,
     factors_of,
     fault_types,
     grows,
     keys_of,
     registered_of,
     sensor_fault_types,
+    together,
 )
 from tools.drawn.ranges import DECLARED_ONLY, RANGES, size_of_sensor_fault
 from tools.drawn.walk import Circumstances, Node, Undrawable, Walk, log_uniform
@@ -90,7 +90,7 @@ def array_of(schema: Node, aircraft: Sequence[str], kind: Kind, rng: np.random.G
         replace(factor, levels=kind.only.get(factor.name, factor.levels))
         for factor in factors_of(schema, aircraft, kind.declared)
     ]
-    return CoveringArray(factors, Together(schema, kind.declared).forbidden, rng)
+    return CoveringArray(factors, together(schema, kind.declared), rng)
 
 
 @lru_cache(maxsize=8)

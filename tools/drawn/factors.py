@@ -5,14 +5,19 @@ A key that the schema has is a factor with the levels `-` (left out), each value
 """
 
 from collections.abc import Iterator, Sequence
+from fnmatch import fnmatchcase
 from functools import cache
+from pathlib import Path
+
+import yaml
 
 from beaver_ftc.plugins import DETECTORS, LAWS, OURS, registered
-from tools.drawn.array import Factor
+from tools.drawn.array import Factor, Forbidden
 from tools.drawn.ranges import DECLARED_ONLY, RANGES
 from tools.drawn.walk import Node
 
 LEFT_OUT, DRAWN = "-", "drawn"
+TOGETHER = Path(__file__).with_name("together.yaml")
 STRUCK = frozenset({"one", "two", "many"})
 WHOLE = ("expect",)  # sections of which a few keys are drawn together
 DEEPER = ("fdi.bounds",)  # sections in a section whose keys are factors as well
@@ -123,74 +128,33 @@ def grows(schema: Node, kind: str) -> bool:
     return "incipient" in fault_types(schema)[kind]["properties"]["profile"].get("enum", ())
 
 
-# What goes with the published scheme.
-_AS_PUBLISHED = {
-    "detector": ("worst-case",), "fdi.fault_class": (LEFT_OUT, "published"),
-    "fdi.pairs": (LEFT_OUT, "false"), "fdi.sensor_monitor": (LEFT_OUT, "auto", "never"),
-    "fdi.probing": (LEFT_OUT,),
-    "fdi.thresholds": (LEFT_OUT, "published"), "fdi.sharpen": (LEFT_OUT, "none"),
-}  # fmt: skip
-MOVING_AIR = ("air", "gusts", "environment.wind_mps")
-NOISY = ("tactical-grade", "consumer-grade", DRAWN)
+class Levels:
+    """Some levels of a factor: `a, b`, or `not a, b` for all others."""
+
+    def __init__(self, words: str) -> None:
+        self._others = words.startswith("not ")
+        self._named = words.removeprefix("not ").split(", ")
+
+    def __contains__(self, level: str) -> bool:
+        return (level in self._named) != self._others
 
 
-class Together:
-    """What may not stand together in one scenario."""
+def together(schema: Node, declared: bool) -> Forbidden:
+    """Which levels together.yaml rules out, and what of a jam cannot grow."""
+    rules = [
+        (name, Levels(levels), other, Levels(there))
+        for rule in yaml.safe_load(TOGETHER.read_text(encoding="utf-8"))
+        if declared or not rule.get("declared")
+        for name, levels in rule["if"].items()
+        for other, there in rule["then"].items()
+    ]
+    switched = [kind for kind in fault_types(schema) if not grows(schema, kind)]
+    rules.append(("type", Levels(", ".join(switched)), "profile", Levels("not incipient")))
 
-    def __init__(self, schema: Node, declared: bool) -> None:
-        self._switched = {kind for kind in fault_types(schema) if not grows(schema, kind)}
-        self._declared = declared
-
-    def forbidden(self, name: str, level: str, other: str, there: str) -> bool:
-        """Whether the schema, or what is promised, rules out the pair. Asked both ways."""
-        rules = (
-            self._derived,
-            self._faults,
-            self._keys,
-            *((self._promises_nothing,) if self._declared else ()),
+    def forbidden(name: str, level: str, other: str, there: str) -> bool:
+        return any(
+            name == first and level in levels and fnmatchcase(other, second) and there not in allowed
+            for first, levels, second, allowed in rules
         )
-        return any(rule(name, level, other, there) for rule in rules)
 
-    @staticmethod
-    def _derived(name: str, level: str, other: str, there: str) -> bool:
-        """Other aircraft than ours: in still air, with three surfaces, and nothing known of their thrust."""
-        if name != "aircraft" or level == "beaver":
-            return False
-        lacking = (*MOVING_AIR, "autopilot.airspeed_mps", "fdi.probing")
-        if other in lacking or other.startswith("uncertainty."):
-            return there != LEFT_OUT
-        if (
-            other == "fdi.bounds.turbulence"
-        ):  # declared: the vanes are asked, and the forces are not known well
-            return there not in (LEFT_OUT, "none")
-        return (other, there) in (("surface", "4"), ("fdi.pairs", "true"))
-
-    def _faults(self, name: str, level: str, other: str, there: str) -> bool:
-        """A jam does not grow; what is declared constant is there from its start to the end."""
-        if (name, other) == ("type", "profile"):
-            return level in self._switched and there == "incipient"
-        return (name, level, other) == ("fdi.fault_profile", "abrupt", "profile") and there != "abrupt"
-
-    @classmethod
-    def _keys(cls, name: str, level: str, other: str, there: str) -> bool:
-        """What the schema's own checks refuse."""
-        if (name, other) == ("autopilot.heading_deg", "autopilot.bank_deg"):
-            return LEFT_OUT not in (level, there)
-        if (name, level) == ("scheme", "zhang2005"):
-            return there not in _AS_PUBLISHED.get(other, (there,))
-        return (name, level) == ("fdi.pairs", "true") and cls._not_with_pairs(other, there)
-
-    @staticmethod
-    def _not_with_pairs(other: str, there: str) -> bool:
-        varying = {"sensors": NOISY, "changes": ("sensors", "declared_sensors", "several")}
-        return (other == "fdi.fault_class" and there != "all") or there in varying.get(other, ())
-
-    @staticmethod
-    def _promises_nothing(name: str, level: str, other: str, there: str) -> bool:
-        """A gust is not declared to the watch of the instruments, and `never` watches none."""
-        watched = (other, there) in (("fdi.sensor_monitor", "always"), ("fdi.fault_class", "all"))
-        if name == "gusts" and level != LEFT_OUT:
-            return watched
-        return (
-            (name, level) == ("fdi.sensor_monitor", "never") and other == "sensor fault" and there != LEFT_OUT
-        )
+    return forbidden

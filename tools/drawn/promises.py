@@ -3,12 +3,10 @@
 `broken` looks at the metrics alone, `flown_again` at the numbers of the scenario read back from its text.
 
 Whether an alarm is false, a detection late or a name right is asked of `beaver_ftc.results.metrics`, as
-everywhere. `_judged_otherwise` works the same out by a second road, with a tolerance of its own, so that an
-error there shows here.
+everywhere.
 """
 
 import json
-import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -31,7 +29,6 @@ DEFAULT_LIMIT_DEG_S = 60.0
 def broken(scenario: bf.Scenario, metrics: Document, declared: bool) -> Iterator[str]:
     """A line for each promise that the flight breaks. declared: whether every error of the truth is."""
     yield from _sane(scenario, metrics)
-    yield from _judged_otherwise(scenario, metrics)
     if declared:
         yield from _false_alarms(scenario, metrics)
         yield from _late(scenario, metrics)
@@ -55,51 +52,6 @@ def _sane(scenario: bf.Scenario, metrics: Document) -> Iterator[str]:
     times = [change["time_s"] for change in metrics["supervisor"]]
     if times != sorted(times):
         yield "supervisor: modes out of order"
-
-
-def _judged_otherwise(scenario: bf.Scenario, metrics: Document) -> Iterator[str]:
-    """Where the metrics judge alarm, delay or name otherwise than the times and places of the faults do."""
-    first_s = min((fault.at_s for fault in scenario.faults), default=math.inf)
-    alarms_s = [time_s for time_s, _ in _alarms(scenario, metrics) if time_s is not None]
-    if metrics["false_alarm"] != any(time_s < first_s - DUST_S for time_s in alarms_s):
-        yield f"verdict: false_alarm {metrics['false_alarm']}, alarms {alarms_s}, faults from {first_s:g} s"
-    # of several places the delay of a name counts from the fault that it means
-    judged = ("detection", "isolation") if len(_places(scenario)) < 2 else ("detection",)
-    for what in judged:
-        delay_s = metrics[what]["delay_s"]
-        by_time_s = _since_fault_s(scenario, first_s, metrics[what]["time_s"])
-        if not _is_near(delay_s, by_time_s):
-            yield f"verdict: {what} {delay_s} s after the fault, by its time {by_time_s} s"
-    isolation, right = metrics["isolation"], _right_names(scenario)
-    if right is not None and isolation["fault"] is not None:
-        correct = isolation["fault"] in right and isolation["time_s"] >= first_s - DUST_S
-        if isolation["correct"] != correct:
-            yield f"verdict: {isolation['fault']} correct {isolation['correct']}, broken {sorted(right)}"
-
-
-def _since_fault_s(scenario: bf.Scenario, first_s: float, time_s: float | None) -> float | None:
-    """From the first frame with a fault to an event; None of one before."""
-    if time_s is None or time_s < first_s - DUST_S:
-        return None
-    return max(time_s - math.ceil((first_s - DUST_S) * scenario.rate_hz) / scenario.rate_hz, 0.0)
-
-
-def _is_near(one: float | None, other: float | None) -> bool:
-    return one is other if one is None or other is None else abs(one - other) < DUST_S
-
-
-def _places(scenario: bf.Scenario) -> set[tuple[str | None, str | None]]:
-    """What is broken: (surface, sensor), both None of the aerodynamics."""
-    return {(_surface(fault), _sensor(fault)) for fault in scenario.faults}
-
-
-def _right_names(scenario: bf.Scenario) -> set[str] | None:
-    """The right names where one surface or one instrument is broken; None elsewhere."""
-    places = _places(scenario)
-    surface, sensor = places.pop() if len(places) == 1 else (None, None)
-    if sensor:
-        return {f"sensor {sensor}", UNANTICIPATED}
-    return {surface} if surface else None
 
 
 def _alarms(scenario: bf.Scenario, metrics: Document) -> Iterator[tuple[float | None, str]]:

@@ -1,16 +1,19 @@
 """The same manoeuvres by JSBSim and by the specification: trim, linear modes, doublets, spin, damage."""
 
+import csv
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from math import atan2, cos, degrees, radians, sin
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.optimize import fsolve, root
 
 from beaver_ftc_aircraft.gtm.database import read
 from beaver_ftc_aircraft.gtm.folder import write_model
+from beaver_ftc_aircraft.gtm.parameters import OUTPUTS, parameters
 from beaver_ftc_aircraft.gtm.steady import HEADING_DEG, Bench, Condition, Steady, pitch_angle
 from tools.gtm.specification import DATABASE, STEP_S, SURFACES, Controls, Servos, Specification, State
 
@@ -294,6 +297,56 @@ def linear_specified(spec: Specification, steady: Steady) -> np.ndarray:
     """Of the specification."""
     controls, whole = of_steady(steady), state_of(steady).array()
     return linear(lambda x: spec.rates_of_change(np.array([*x, *whole[8:]]), controls, 0)[:6], whole[:8])
+
+
+def coefficients(
+    model: Bench, alpha: float, beta: float, V: float, rates: Any, deg: dict[str, float], case: int = 0,
+    gear: float = 0.0,
+) -> np.ndarray:  # fmt: skip
+    """CX CY CZ Cl Cm Cn of the converted model, its stops out of the way."""
+    fdm, travel = model.fdm, parameters()["surfaces"]
+    for letters, name in NAMES.items():
+        fdm[f"fcs/{name}-cmd-rad"] = radians(deg[letters])
+        fdm[f"actuators/{name}/position-min-rad"], fdm[f"actuators/{name}/position-max-rad"] = -1.6, 1.6
+    fdm["gear/down"] = gear
+    model.damage(case)
+    velocity = V * np.array([cos(alpha) * cos(beta), sin(beta), sin(alpha) * cos(beta)])
+    model.place(800.0, velocity, (0.0, 0.0, 0.0), rates)
+    found = np.array([fdm[f"aero/coefficient/{name}"] for name in OUTPUTS])
+    fdm["gear/down"] = 0.0
+    for name, of in travel.items():
+        for end, stop in zip(("min", "max"), of["travel_deg"], strict=True):
+            fdm[f"actuators/{name}/position-{end}-rad"] = radians(stop)
+        fdm[f"fcs/{name}-cmd-rad"] = 0.0
+    model.damage(0)
+    return found
+
+
+def at_the_given_points(model: Bench, where: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Coefficients at the points of the source, (60, 6) each: as given, and of the converted model."""
+    with (where / "points.csv").open() as file:
+        rows = [{name: float(text) for name, text in row.items()} for row in csv.DictReader(file)]
+    given = np.array([[row[name] for name in OUTPUTS] for row in rows])
+    found = [
+        coefficients(
+            model, radians(row["alpha_deg"]), radians(row["beta_deg"]), row["V_ft_s"],
+            [row[f"{axis}_rad_s"] for axis in "pqr"],
+            {name: row[f"{name}_deg"] for name in SURFACES}, int(row["damage"]), row["GEAR"],
+        )
+        for row in rows
+    ]  # fmt: skip
+    return given, np.array(found)
+
+
+def masses(model: Bench, case: int) -> np.ndarray:
+    """Weight lbf, centre of gravity in JSBSim's structural frame ft, inertia xx yy zz xy xz yz slug ft2."""
+    model.damage(case)
+    model.place(800.0, (160.0, 0.0, 8.0), (0.0, 0.05, 0.0))
+    names = ["weight-lbs", *(f"cg-{axis}-in" for axis in "xyz")]
+    names += [f"i{name}-slugs_ft2" for name in ("xx", "yy", "zz", "xy", "xz", "yz")]
+    found = np.array([model.fdm[f"inertia/{name}"] for name in names])
+    model.damage(0)
+    return found / np.array([1.0, 12.0, 12.0, 12.0, *[1.0] * 6])
 
 
 def gravity_of(model: Bench, spec: Specification) -> float:

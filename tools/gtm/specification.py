@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import yaml
 from scipy.io import loadmat
+from scipy.linalg import expm
 
 WHERE = "BEAVER_FTC_GTM"
 DATABASE = "T2_polynomial_aerodatabase.mat"
@@ -197,13 +198,8 @@ class Specification:
             weight, shift = weight + damage["dweight_lbf"], np.array(damage["dCG_in"]) / 12.0
             i = {name: i[name] + damage[f"d{name}"] for name in ("Ixx", "Iyy", "Izz", "Ixz", "Iyz", "Ixy")}
         cg = of["weight"]["value"] * np.array(of["cg"]["value"]) / weight + shift
-        tensor = np.array(
-            [
-                [i["Ixx"], -i["Ixy"], -i["Ixz"]],
-                [-i["Ixy"], i["Iyy"], -i["Iyz"]],
-                [-i["Ixz"], -i["Iyz"], i["Izz"]],
-            ]
-        )
+        x, y, z, xy, xz, yz = (i[name] for name in ("Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz"))
+        tensor = np.array([[x, -xy, -xz], [-xy, y, -yz], [-xz, -yz, z]])
         return weight, cg, tensor
 
     def air(self, altitude: float) -> tuple[float, float]:
@@ -272,13 +268,8 @@ class Servos:
         spool = of["engines"]["spool"]
         A, B = np.array(spool["A"], float), np.array(spool["B"], float)
         self.C = np.array(spool["C"])
-        grown, powers = np.eye(2), np.eye(2)
-        forced, term = np.zeros((2, 2)), np.eye(2) * STEP_S
-        for n in range(1, 20):  # the matrix exponential, and its integral over the step
-            forced = forced + term
-            powers = powers @ A * STEP_S / n
-            grown, term = grown + powers, powers * STEP_S / (n + 1)
-        self.A, self.B = grown, forced @ B
+        of_a_step = expm(STEP_S * np.block([[A, B[:, None]], [np.zeros((1, 3))]]))
+        self.A, self.B = of_a_step[:2, :2], of_a_step[:2, 2]
         self.spools = [np.array([0.0, throttle / 0.7314]) for throttle in command.throttles]
 
     def move(self, command: Controls) -> Controls:

@@ -157,7 +157,7 @@ def _write(mode: str, file: Path) -> int:
 
 def _measured(mode: str, file: Path) -> dict:
     watch = coverage.Coverage(data_file=None, source=[str(SOURCES)], config_file=False, messages=False)
-    timed = _Timed(watch, SLOW_S[mode], _slow_before(mode, file))
+    timed = _Timed(watch, SLOW_S[mode])
     with tempfile.TemporaryDirectory() as others:
         os.environ["MUTANTS_LINES"] = f"{others}/lines"
         os.environ["PYTHONPATH"] = os.pathsep.join([str(Path(__file__).parent), str(ROOT / "src")])
@@ -173,7 +173,6 @@ def _measured(mode: str, file: Path) -> dict:
         "sources": _digests(sources),
         "seconds": timed.seconds,
         "left_out": timed.left_out,
-        "slow": sorted(timed.slow),
         "lines": lines,
     }
 
@@ -182,14 +181,6 @@ def _read(file: Path) -> coverage.CoverageData:
     data = coverage.CoverageData(basename=str(file))
     data.read()
     return data
-
-
-def _slow_before(mode: str, file: Path) -> set[str]:
-    """Tests that took too long when the package was another, and the test file the same: not tried again."""
-    kept, name = _kept(mode, file), file.relative_to(ROOT).as_posix()
-    before = json.loads(kept.read_text()) if kept.exists() else {}
-    same = before.get("sources", {}).get(name) == _digests([name])[name]
-    return set(before.get("slow", ()) if same else ())
 
 
 def _lines(data: coverage.CoverageData, timed: "_Timed") -> dict[str, dict[int, list[str]]]:
@@ -244,12 +235,11 @@ def forget() -> None:
 class _Timed:
     """Notes for each test that passes how long it took, and gives up one that is slow."""
 
-    def __init__(self, watch: coverage.Coverage, slow_s: float, known_slow: set[str]) -> None:
+    def __init__(self, watch: coverage.Coverage, slow_s: float) -> None:
         self._watch, self._slow_s = watch, slow_s
         self.seconds: dict[str, float] = {}
         self.left_out: Counter[str] = Counter()
         self.slow: set[str] = set()  # after one slow case the other cases of a test are not tried
-        self._known_slow = known_slow
         self.users: dict[str, list[str]] = {}  # the tests that share a fixture, by its name
         self._is_slow = False
 
@@ -279,7 +269,7 @@ class _Timed:
         self._count_for(self._test)
         forget()
         self._start, self._is_slow = processor_s(), False
-        if _function(item.nodeid) in self.slow | self._known_slow:
+        if _function(item.nodeid) in self.slow:
             item.add_marker(pytest.mark.skip(reason="takes too long for this"))
             self._is_slow = True
         with _limit(self._give_up, self._slow_s):

@@ -12,18 +12,21 @@ import os
 import pickle
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from functools import wraps
 from importlib import import_module
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from filelock import FileLock
 
 from beaver_ftc.documents.errors import BadInput, suggestion
+from beaver_ftc.studies.present.tables import markdown_table
 from tools.docs.commands import BIN, SHARED
+from tools.docs.values import Place, at, printed
 
 T = TypeVar("T")
+Column = str | Callable[[Any], str]
 _MAKER = re.compile(r"^def ([a-z]\w*)\(\) -> str:", re.MULTILINE)
 
 
@@ -52,6 +55,20 @@ def beaver(*arguments: str) -> list[str]:
     if SHARED in os.environ and served.exists():
         return [str(served), *arguments]
     return [sys.executable, "-c", "from beaver_ftc.cli.main import main; main()", *arguments]
+
+
+def table_of(rows: Iterable[Any], columns: Mapping[str, Column], none: str = "-") -> str:
+    """Rows of a study in Markdown. columns: of each head, where its cell stands in a row and in what form, as
+    in the mark of a number (`delay_s .2f`, `share *100 .0f`), or what makes the cell of the row. none: for
+    what is null.
+    """
+    made = {head: column if callable(column) else _taken(column, none) for head, column in columns.items()}
+    return markdown_table(tuple(made), [[of(row) for of in made.values()] for row in rows])
+
+
+def _taken(words: str, none: str) -> Callable[[Any], str]:
+    place = Place.read(words)
+    return lambda row: none if at(row, place.path) is None else printed(row, place)
 
 
 def shared(make: Callable[[], T]) -> Callable[[], T]:

@@ -1,6 +1,5 @@
 """Tables of aircraft.md: what `derive` makes of aircraft of the jsbsim package; are promises kept?"""
 
-import argparse
 import json
 import subprocess
 import tempfile
@@ -8,7 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from xml.etree import ElementTree
 
-from benchmarks.any_aircraft import HEALTHY_S, TWELVE, row_of
+from benchmarks.any_aircraft import TWELVE, row_of
 from benchmarks.unknown_instant import Cell, Survey, cells_of, shares_of
 
 from beaver_ftc.plant.instrumented import names
@@ -50,7 +49,7 @@ def derived_aircraft_probe() -> str:
 
 
 def any_aircraft() -> str:
-    """`python benchmarks/any_aircraft.py`, with fewer flights: do the promises hold for them?"""
+    """Random flights: do the promises hold for them?"""
     return _flown(TWELVE, FLIGHTS, HOURS)
 
 
@@ -60,7 +59,7 @@ def any_aircraft_probe() -> str:
 
 
 def unknown_instant() -> str:
-    """`python benchmarks/unknown_instant.py`: the diagnosis beside Page's test."""
+    """The diagnosis beside Page's test."""
     return moved(_beside(WATCHED, LOST, HEALTHY), "*Table 4.", "unknown-instant", EACH_TITLE)
 
 
@@ -74,7 +73,7 @@ def _beside(chosen: Iterable[str], flights: int, healthy: int) -> str:
     found: dict[str, list[Cell]] = {}
     for name in chosen:
         derive_if_needed(f"jsbsim:{name}")
-        found[name] = cells_of(Survey(f"jsbsim:{name}", "light", flights, healthy, FIRST), [])
+        found[name] = cells_of(Survey(f"jsbsim:{name}", "light", flights, healthy, FIRST))
     cells = [cell for of_it in found.values() for cell in of_it]
     surfaces = tuple(dict.fromkeys(cell.surface for cell in cells))
     groups = {name: [cell for cell in cells if cell.surface == name] for name in surfaces} | {"all": cells}
@@ -96,23 +95,15 @@ def _beside(chosen: Iterable[str], flights: int, healthy: int) -> str:
 
 def _shares(cells: list[Cell], rate: int) -> list[str]:
     """Losses; found by Page's test and by ours, ours over Page's with its limits, %."""
-    losses, _, found = shares_of(cells)
+    losses, found = shares_of(cells)
     return [str(losses), *(f"{100.0 * share:.0f}" for share in found[rate])]
 
 
 def _flown(chosen: Iterable[str], flights: int, hours: float) -> str:
-    args = argparse.Namespace(
-        flights=flights,
-        first=0,
-        seed=SEED,
-        healthy_s=HEALTHY_S,
-        hours=hours,
-        fault_class="published",
-    )
     rows = []
     for name in chosen:
         derive_if_needed(f"jsbsim:{name}")
-        rows.append(row_of(name, args)[0][: len(FLOWN) + 1])
+        rows.append(row_of(name, flights, hours, SEED))
     return markdown_table(("aircraft", *FLOWN), rows)
 
 

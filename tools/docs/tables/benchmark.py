@@ -22,7 +22,7 @@ from beaver_ftc.studies.compare.tune import is_adopted
 from beaver_ftc.studies.engine.statistics import wilson
 from beaver_ftc.studies.engine.study import fly_all
 from beaver_ftc.studies.present.tables import markdown_table
-from tools.docs.tables import aside
+from tools.docs.tables import aside, table_of
 
 TUNING = Path(__file__).parents[3] / "benchmarks" / "tuning.json"  # how the values in tuned.json were found
 Document = dict[str, Any]
@@ -58,17 +58,20 @@ def benchmark_probe() -> str:
     return _tables(_compared([case for case in cases if case.scenario.duration_s <= PROBED_S], workers=1))
 
 
-GAIN_COLUMNS = (
-    "method", "grade", "draw", "judged on", "flights", "cost, before", "cost, after", "gain, %",
-    "from, %", "to, %", "adopted",
-)  # fmt: skip
+GAINS = {
+    "method": "name", "grade": "grade", "draw": "draw",
+    "judged on": lambda again: f"{again['draw'] + 1} to {again['draw'] + again['judged']}",
+    "flights": "flights", "cost, before": "built_in .3f", "cost, after": "retuned .3f",
+    "gain, %": "gain *100 .1f", "from, %": "gain_low *100 .1f", "to, %": "gain_high *100 .1f",
+    "adopted": lambda again: "yes" if is_adopted(again) else "no",
+}  # fmt: skip
 
 
 def benchmark_gains() -> str:
     """By how much the cost of a method falls that is tuned again, on flights of its own: of every search that
     finds other values, as the record of the searches has it."""
     rows = json.loads(TUNING.read_text(encoding="utf-8"))["methods"]
-    found = [(row, again) for row in rows for again in row["again"] if again.get("gain")]
+    found = [{**row, **again} for row in rows for again in row["again"] if again.get("gain")]
     last = {
         f"`{row['name']}` on `{row['grade']}`": row["again"][-1]
         for row in rows
@@ -83,17 +86,8 @@ def benchmark_gains() -> str:
         f"values for {kept}, no admissible values for {', '.join(none)}, and values that were not adopted "
         f"for {len(last) - kept - len(none)}. A second tuning found the values of {', '.join(drawn)}."
     )
-    table = markdown_table(GAIN_COLUMNS, [_gain(*each) for each in found])
+    table = table_of(found, GAINS)
     return f"{aside('benchmark-gains', 'Gain of a second tuning', table)}\n\n{says}"
-
-
-def _gain(row: Document, again: Document) -> tuple[str, ...]:
-    costs = (f"{again[key]:.3f}" for key in ("built_in", "retuned"))
-    shares = (f"{100.0 * again[key]:.1f}" for key in ("gain", "gain_low", "gain_high"))
-    adopted = "yes" if is_adopted(again) else "no"
-    judged = f"{again['draw'] + 1} to {again['draw'] + again['judged']}"
-    flown = row["name"], row["grade"], str(again["draw"]), judged, str(again["flights"])
-    return *flown, *costs, *shares, adopted
 
 
 def _compared(cases: list[SetFlight], workers: int = 2) -> Document:

@@ -1,6 +1,5 @@
 """Tables and pictures of the GTM: the converted model beside its specification, `BEAVER_FTC_GTM`."""
 
-import csv
 import os
 import tempfile
 from functools import cache
@@ -11,11 +10,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from beaver_ftc.studies.present.tables import markdown_table
-from beaver_ftc_aircraft.gtm.parameters import OUTPUTS
 from beaver_ftc_aircraft.gtm.steady import Bench, Condition, Steady
 from tools.docs.tables import aside, shared
 from tools.gtm import flights
-from tools.gtm.flights import ADAMS_BASHFORTH, FINE_S, MOTION, NAMES
+from tools.gtm.flights import ADAMS_BASHFORTH, FINE_S, MOTION
 from tools.gtm.specification import SURFACES, Specification
 
 PICTURE = "images/gtm-flights.png"
@@ -150,63 +148,27 @@ def _air() -> float:
     return float(np.abs(found / _specifications()[0].air(800.0) - 1.0).max())
 
 
-def _coefficients(
-    alpha: float, beta: float, V: float, rates: np.ndarray, deg: dict[str, float], case: int
-) -> np.ndarray:
-    fdm = _bench().fdm
-    for letters, name in NAMES.items():
-        fdm[f"fcs/{name}-cmd-rad"] = radians(deg[letters])
-    _bench().damage(case)
-    velocity = V * np.array([cos(alpha) * cos(beta), sin(beta), sin(alpha) * cos(beta)])
-    _bench().place(800.0, velocity, (0.0, 0.0, 0.0), rates)
-    return np.array([fdm[f"aero/coefficient/{name}"] for name in OUTPUTS])
-
-
 def _points() -> tuple[float, float]:
     """Largest differences at the given points and at drawn ones, of the span over the given ones."""
-    with (_where() / "points.csv").open() as file:
-        rows = list(csv.DictReader(file))
-    wanted = np.array([[float(row[name]) for name in OUTPUTS] for row in rows])
-    span, found = np.ptp(wanted, axis=0), []
-    for name in NAMES.values():
-        _bench().fdm[f"actuators/{name}/position-min-rad"] = -1.6
-        _bench().fdm[f"actuators/{name}/position-max-rad"] = 1.6
-    for row in rows:
-        number = {name: float(text) for name, text in row.items()}
-        deg, rates = (
-            {name: number[f"{name}_deg"] for name in SURFACES},
-            [number[f"{axis}_rad_s"] for axis in "pqr"],
-        )
-        _bench().fdm["gear/down"] = number["GEAR"]
-        flow = radians(number["alpha_deg"]), radians(number["beta_deg"]), number["V_ft_s"]
-        found.append(_coefficients(*flow, np.array(rates), deg, int(number["damage"])))
-    _bench().fdm["gear/down"] = 0.0
-    rng, worst = np.random.default_rng(1), 0.0
+    given, found = flights.at_the_given_points(_bench(), _where())
+    span, rng, worst = np.ptp(given, axis=0), np.random.default_rng(1), 0.0
     for k in range(DRAWN):
-        deg = {name: float(rng.choice([0.0, rng.uniform(-35, 35)])) for name in SURFACES} | {
-            "STAB": rng.uniform(-12, 4)
-        }
+        deg = {name: float(rng.choice([0.0, rng.uniform(-35, 35)])) for name in SURFACES}
+        deg["STAB"] = rng.uniform(-12, 4)
         alpha, beta = radians(rng.uniform(-15, 95)), radians(rng.uniform(-60, 60))
         state = alpha, beta, rng.uniform(70, 230), rng.normal(0, [1.5, 0.7, 0.7]), deg, k % 7
-        off = _coefficients(*state) - _specifications()[0].coefficients(*state)
+        off = flights.coefficients(_bench(), *state) - _specifications()[0].coefficients(*state)
         worst = max(worst, float((np.abs(off) / span).max()))
-    for name in NAMES.values():
-        _bench().fdm[f"fcs/{name}-cmd-rad"] = 0.0
-    return float((np.abs(found - wanted) / span).max()), worst
+    return float((np.abs(found - given) / span).max()), worst
 
 
 def _masses() -> float:
     worst = 0.0
     for case in range(7):
         weight, cg, inertia = _specifications()[0].mass(case)
-        _bench().damage(case)
-        _bench().place(800.0, (160.0, 0.0, 8.0), (0.0, 0.05, 0.0))
-        fdm = _bench().fdm
-        names = [*(f"i{x}-slugs_ft2" for x in ("xx", "yy", "zz", "xz")), "weight-lbs", "cg-x-in", "cg-z-in"]
-        found = np.abs([fdm[f"inertia/{name}"] for name in names])
-        wanted = np.abs([*np.diag(inertia), inertia[0, 2], weight, 12 * cg[0], 12 * cg[2]])
+        found = np.abs(flights.masses(_bench(), case)[[0, 1, 3, 4, 5, 6, 8]])
+        wanted = np.abs([weight, cg[0], cg[2], *np.diag(inertia), inertia[0, 2]])
         worst = max(worst, float(np.abs(found / wanted - 1.0).max()))
-    _bench().damage(0)
     return worst
 
 

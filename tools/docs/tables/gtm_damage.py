@@ -19,6 +19,7 @@ from beaver_ftc.studies.present.tables import markdown_table
 from beaver_ftc_aircraft.gtm.conversion import convert
 from beaver_ftc_aircraft.gtm.parameters import cases
 from beaver_ftc_aircraft.gtm.steady import Bench
+from tools.docs.tables import table_of
 from tools.gtm.envelope import BANKS_DEG, SIDESLIPS_DEG, SPEEDS_KT, Envelope, Turn
 from tools.gtm.specification import DATABASE
 
@@ -111,25 +112,20 @@ def _draw(of: dict[str, list[Turn]]) -> None:
 
 
 def gtm_damage() -> str:
-    """The campaign of `benchmarks/gtm_damage.py`: how soon damage is detected, and what is concluded."""
-    columns = (1, 2, 3, 4, 5, 7, 8, 9, 10, 11)
-    rows = [[row[0], *(str(row[k]) for k in columns)] for row in campaign.rows(_flights())]
-    return markdown_table(("case", *(campaign.HEAD[k] for k in columns)), rows)
+    """How soon damage is detected in random turns, and what is concluded."""
+    return markdown_table(campaign.HEAD, [list(map(str, row)) for row in campaign.rows(_flights())])
 
 
 def gtm_damage_informed() -> str:
-    """The same flights beside `benchmarks/gtm_informed.py`; and in calm air with exact sensors."""
+    """The same flights by the informed test; and in calm air with exact sensors."""
     *_, calm = campaign.rows(campaign.fly_all(CALM, 1, True, _kept() / "calm.jsonl"))
     ours = {one["k"]: one for one in _flights()}
-    informed_of = informed.see_all(ours, 1, _kept() / "informed.jsonl")
-    rows = [
-        [row[0], *(str(row[k]) for k in (1, 2, 3)), str(row[-1])] for row in informed.rows(ours, informed_of)
-    ]
+    rows = list(informed.rows(ours, informed.see_all(ours, 1, _kept() / "informed.jsonl")))
     head = ("case", "flights", "ours", "Page", "avoidable misses")
     return (
         f"*Table 7. {OURS_AND_PAGE}*\n\n{markdown_table(head, rows)}\n\n"
         f"With exact sensors in calm air, {calm[3]} of {calm[1]} damages are detected within 1 s, and "
-        f"{calm[11]} flights end with a wrong name."
+        f"{calm[10]} flights end with a wrong name."
     )
 
 
@@ -154,18 +150,7 @@ def gtm_laws() -> str:
         asked = ["compare", "--sweep", str(SWEEP), "--schemes", "adaptive-estimators", "--workers", "1"]
         subprocess.run([sys.executable, "-c", code, *asked], cwd=_kept(), capture_output=True, check=True)
     (of,) = json.loads(made.read_text(encoding="utf-8"))["sets"].values()
-    rows = [
-        [
-            one["law"],
-            str(of["flights"]),
-            str(one["departures"]),
-            *(_degrees(one[f"{when}_median"]) for when in ("before", "after")),
-        ]
-        for one in of["lines"]
-    ]
-    head = ("law", "flights", "aircraft lost", "before damage, deg/s", "after damage, deg/s")
-    return markdown_table(head, rows)
-
-
-def _degrees(rate: float | None) -> str:
-    return "-" if rate is None else f"{rate:.3g}"
+    return table_of(of["lines"], {
+        "law": "law", "flights": lambda one: str(of["flights"]), "aircraft lost": "departures",
+        "before damage, deg/s": "before_median .3g", "after damage, deg/s": "after_median .3g",
+    })  # fmt: skip

@@ -8,7 +8,7 @@ from beaver_ftc.aircraft import AXES
 from beaver_ftc.scenario.schema import load
 from beaver_ftc.studies.mismatch.linear import analyse, linear_document
 from beaver_ftc.studies.present.tables import markdown_table
-from tools.docs.tables import beaver
+from tools.docs.tables import beaver, table_of
 
 DESIGNS = ("declared", "engine-neglected", "linearised", "frozen-alpha", "heavy")
 CONDITIONS = ((30.0, 0.0), (35.0, 1829.0), (45.0, 1829.0), (50.0, 3000.0), (55.0, 4000.0))
@@ -21,28 +21,18 @@ def mismatch_designs() -> str:
     command = beaver(*given, "--format", "json")
     with tempfile.TemporaryDirectory() as folder:
         run = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True)
-    flights = {}
-    for found in json.loads(run.stdout)["runs"]:
-        flights[found["scenario"].removeprefix("elevator-partial-loss").lstrip("-") or "declared"] = found
-    return markdown_table(
-        (
-            "design model",
-            *(f"{axis}, % of bound" for axis in AXES),
-            *(f"{axis}, rad/s²" for axis in AXES),
-            "largest source",
-            "false alarm",
-        ),
-        [
-            (
-                name,
-                *(f"{100 * flights[name]['bound'][axis]['worst_ratio']:.0f}" for axis in AXES),
-                *(f"{flights[name]['bound'][axis]['smallest_constant_rad_s2']:.2g}" for axis in AXES),
-                flights[name]["dominant"]["source"],
-                "yes" if flights[name]["false_alarm"] else "no",
-            )
-            for name in DESIGNS
-        ],
-    )
+    flights = {
+        run["scenario"].removeprefix("elevator-partial-loss").lstrip("-") or "declared": run
+        for run in json.loads(run.stdout)["runs"]
+    }
+    columns = {
+        "design model": "name",
+        **{f"{axis}, % of bound": f"bound.{axis}.worst_ratio *100 .0f" for axis in AXES},
+        **{f"{axis}, rad/s²": f"bound.{axis}.smallest_constant_rad_s2 .2g" for axis in AXES},
+        "largest source": "dominant.source",
+        "false alarm": "false_alarm",
+    }
+    return table_of([flights[name] | {"name": name} for name in DESIGNS], columns)
 
 
 def mismatch_modes() -> str:

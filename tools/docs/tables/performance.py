@@ -7,6 +7,7 @@ import sys
 from beaver_ftc.studies.bench.measure import bench, by_kind
 from beaver_ftc.studies.present.tables import markdown_table
 from tools.docs.pages import ROOT
+from tools.docs.tables import table_of
 
 KINDS = {
     "published": "published",
@@ -29,23 +30,24 @@ PER_FRAMES = "/ bare"  # of `waits.py`: a ratio of Table 1, not a wait
 def performance_flights() -> str:
     """Flights of a sweep, each beside as many of JSBSim's own frames."""
     kinds = by_kind(ROUNDS)
-    return markdown_table(("flight of 15 s", "frames, ratio", "flight, ratio", "flight, ms"), [
-        (name, f"{kinds[kind]['frames_ratio']:.2f}", f"{kinds[kind]['flight_ratio']:.2f}",
-         f"{sum(kinds[kind]['parts_ms'].values()):.0f}")
-        for kind, name in KINDS.items()
-    ])  # fmt: skip
+    rows = [kinds[kind] | {"name": name, "sum_ms": sum(kinds[kind]["parts_ms"].values())}
+            for kind, name in KINDS.items()]  # fmt: skip
+    return table_of(rows, {
+        "flight of 15 s": "name", "frames, ratio": "frames_ratio .2f", "flight, ratio": "flight_ratio .2f",
+        "flight, ms": "sum_ms .0f",
+    })  # fmt: skip
 
 
 def performance_frames() -> str:
     """The closed loop, and other ways to write it, beside the bare aircraft."""
     found = bench(ROUNDS, with_parts=False)
-    rows = [
-        ("closed loop, before the alarm", found["before_alarm"]["ratio"]),
-        ("closed loop, after the alarm", found["ratio"]),
-        ("whole flight with a log file", found["whole_flight"]["with_log_file_ratio"]),
-        *((name, found["alternatives"][key]["ratio"]) for key, name in ALTERNATIVES.items()),
-    ]
-    return markdown_table(("frame", "ratio"), [(name, f"{ratio:.2f}") for name, ratio in rows])
+    rows = {
+        "closed loop, before the alarm": found["before_alarm"]["ratio"],
+        "closed loop, after the alarm": found["ratio"],
+        "whole flight with a log file": found["whole_flight"]["with_log_file_ratio"],
+        **{name: found["alternatives"][key]["ratio"] for key, name in ALTERNATIVES.items()},
+    }
+    return table_of(list(map(list, rows.items())), {"frame": "0", "ratio": "1 .2f"})
 
 
 def performance_waits() -> str:

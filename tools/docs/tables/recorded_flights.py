@@ -13,7 +13,7 @@ from benchmarks import own_logs as own
 from beaver_ftc.studies.present.page import write_files
 from beaver_ftc.studies.present.tables import markdown_table
 from beaver_ftc_logs.recorded.benchmark import LABEL_TITLES, SURFACE_KINDS, result_files, run_benchmark
-from tools.docs.tables import aside, shared
+from tools.docs.tables import aside, shared, table_of
 
 Document = dict[str, Any]
 PICTURE = "images/recorded-flights.png"
@@ -39,6 +39,7 @@ OWN = {  # column of benchmarks/own_logs.py: head on the page
 }
 OWN_OF_AIRCRAFT = OWN | {"refused": "refused"}
 SHOWN = ("classes", "healthy_or_faulty", "mean_error", "held_by_bounds")
+NOT_COUNTED = {"false_alarms_per_hour": {"value": None}}  # of a published method
 DELAYS = (
     '*Table 2. Delays on the failures of ALFA. "found": failures found, of all failures of this surface. '
     '"delay": mean time from failure to alarm, for the failures found, s. "within 5 s": failures found '
@@ -101,7 +102,7 @@ def own_logs_of_aircraft() -> str:
 
 
 def _by_identified(of: own.Campaign) -> list[Document]:
-    return own.flown(of, "table", ["identified"])
+    return own.flown(of, ["identified"])
 
 
 def _own_rows(results: list[Document], head_of_column: dict[str, str]) -> list[list[str]]:
@@ -114,10 +115,9 @@ def own_logs_probe() -> str:
     of = own.Campaign(air="light", seed=OWN_SEEDS[0])
     with TemporaryDirectory() as folder:
         trained = [one | {"duration_s": PROBED_S} for one in islice(own.training(of), 2)]
-        logs = [own.recorded(one, "table", Path(folder)) for one in trained]
-        model = own.identified(of, logs)
+        model = own.identified([own.recorded(one, Path(folder)) for one in trained])
         quiet = next(one for one in own.scenarios(of) if one["sensors"] == "ideal")  # as those two are
-        rows, _ = own.by_model(own.recorded(quiet, "table", Path(folder)), model)
+        rows, _ = own.by_model(own.recorded(quiet, Path(folder)), model)
     return f"{rows.fault_probability[-1]:.2g} {rows.effectiveness_low[-1]} {rows.effectiveness_high[-1]}"
 
 
@@ -128,30 +128,30 @@ def _part(document: Document, name: str) -> Document:
 def _alfa(document: Document) -> str:
     part = _part(document, "alfa")
     rows = (*part["rows"], *part["published"])
-    found = (
-        "method", "precision", "recall", "accuracy", "false alarms per hour", "95 % interval",
-        "healthy flights alarmed",
-    )  # fmt: skip
+    found = {
+        "method": "method", "precision": "precision .2f", "recall": "recall .2f", "accuracy": "accuracy .2f",
+        "false alarms per hour": "false_alarms_per_hour.value .1f",
+        "95 % interval": lambda row: _interval(row["false_alarms_per_hour"]),
+        "healthy flights alarmed": _healthy,
+    }  # fmt: skip
     late = (
         "method",
         *(head for kind in SURFACE_KINDS for head in (f"{kind}: found", "delay, s")),
         "within 5 s",
     )
     return (
-        f"{markdown_table(found, [_found_row(row) for row in rows])}\n\n{DELAYS}\n\n"
+        f"{table_of([NOT_COUNTED | row for row in rows], found, '')}\n\n{DELAYS}\n\n"
         f"{markdown_table(late, [_delay_row(row) for row in rows])}"
     )
 
 
-def _found_row(row: Document) -> list[str]:
-    cells = [row["method"], *(f"{row[key]:.2f}" for key in ("precision", "recall", "accuracy"))]
-    if "false_alarms_per_hour" not in row:
-        return [*cells, "", "", ""]
-    alarms = row["false_alarms_per_hour"]
-    return [
-        *cells, f"{alarms['value']:.1f}", f"{alarms['low']:.1f} to {alarms['high']:.0f}",
-        f"{row['healthy_flights_with_an_alarm']} of {row['healthy_flights']}",
-    ]  # fmt: skip
+def _interval(alarms: Document) -> str:
+    return "" if alarms["value"] is None else f"{alarms['low']:.1f} to {alarms['high']:.0f}"
+
+
+def _healthy(row: Document) -> str:
+    alarmed, flights = (row.get(f"healthy_flights{end}") for end in ("_with_an_alarm", ""))
+    return "" if alarmed is None else f"{alarmed} of {flights}"
 
 
 def _delay_row(row: Document) -> list[str]:
@@ -176,10 +176,5 @@ def _delay(of: Document) -> tuple[str, str]:
 
 def _enac(document: Document) -> str:
     part = _part(document, "enac")
-    return markdown_table(("method", *(LABEL_TITLES[key] for key in SHOWN)), [
-        (row["method"], *_shares(row, SHOWN)) for row in (*part["rows"], *part["published"])
-    ])  # fmt: skip
-
-
-def _shares(row: Document, keys: tuple[str, ...]) -> list[str]:
-    return ["" if row.get(key) is None else f"{row[key]:.3f}" for key in keys]
+    rows = [dict.fromkeys(SHOWN) | row for row in (*part["rows"], *part["published"])]
+    return table_of(rows, {"method": "method", **{LABEL_TITLES[key]: f"{key} .3f" for key in SHOWN}}, "")

@@ -23,26 +23,27 @@ def beaver_mass() -> str:
     slow, fast = envelope.airspeed_mps
     settings = aircraft.file.engine.settings
     engine = [
-        (f"{setting.says}, {end}", f"{limit:g}", setting.unit)
+        (f"{setting.says}, {end}", limit, "g", setting.unit)
         for setting in settings.values()
         for end, limit in zip(("least", "largest"), setting.range, strict=True)
     ]
     rows = [
-        ("mass", f"{mass.mass_kg:.0f}", "kg"),
-        ("moment of inertia about roll, $I_x$", f"{mass.Ix_kg_m2:.0f}", "kg m²"),
-        ("moment of inertia about pitch, $I_y$", f"{mass.Iy_kg_m2:.0f}", "kg m²"),
-        ("moment of inertia about yaw, $I_z$", f"{mass.Iz_kg_m2:.0f}", "kg m²"),
-        ("product of inertia, $J_{xz}$", f"{mass.Jxz_kg_m2:.0f}", "kg m²"),
-        ("wing area", f"{geometry.wing_area_m2:.2f}", "m²"),
-        ("span", f"{geometry.span_m:.2f}", "m"),
-        ("mean chord", f"{geometry.chord_m:.3f}", "m"),
+        ("mass", mass.mass_kg, ".0f", "kg"),
+        ("moment of inertia about roll, $I_x$", mass.Ix_kg_m2, ".0f", "kg m²"),
+        ("moment of inertia about pitch, $I_y$", mass.Iy_kg_m2, ".0f", "kg m²"),
+        ("moment of inertia about yaw, $I_z$", mass.Iz_kg_m2, ".0f", "kg m²"),
+        ("product of inertia, $J_{xz}$", mass.Jxz_kg_m2, ".0f", "kg m²"),
+        ("wing area", geometry.wing_area_m2, ".2f", "m²"),
+        ("span", geometry.span_m, ".2f", "m"),
+        ("mean chord", geometry.chord_m, ".3f", "m"),
         *engine,
-        ("validated airspeed, least", f"{slow:g}", "m/s"),
-        ("validated airspeed, largest", f"{fast:g}", "m/s"),
-        ("validated angle of attack, least", f"{low:.1f}", "deg"),
-        ("validated angle of attack, largest", f"{high:.1f}", "deg"),
+        ("validated airspeed, least", slow, "g", "m/s"),
+        ("validated airspeed, largest", fast, "g", "m/s"),
+        ("validated angle of attack, least", low, ".1f", "deg"),
+        ("validated angle of attack, largest", high, ".1f", "deg"),
     ]
-    return markdown_table(("quantity", "value", "unit"), rows)
+    shown = [(says, format(value, form), unit) for says, value, form, unit in rows]
+    return markdown_table(("quantity", "value", "unit"), shown)
 
 
 def beaver_surfaces() -> str:

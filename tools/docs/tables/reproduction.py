@@ -18,7 +18,7 @@ from beaver_ftc.studies.reproduce.words import (
     measured,
     number,
 )
-from tools.docs.tables import aside, shared
+from tools.docs.tables import aside, shared, table_of
 
 Document = dict[str, Any]
 FOLDER = "images/reproduction"
@@ -129,20 +129,14 @@ def reproduction_beside() -> str:
 
 def _beside(document: Document) -> str:
     both = document["beside"]
-    head = (
-        "case", "flown by", "isolated after, s", "RMS before, deg/s", "RMS after, deg/s", "travel, deg",
-        "work, deg²/s",
-    )  # fmt: skip
-    rows = [
-        (
-            row["case"],
-            row["flown_by"],
-            *(plain_number(row[key]) for key in ("isolated_s", "before_deg_s", "after_deg_s")),
-            *(f"{row[key]:.0f}" for key in ("travel_deg", "work_deg2_per_s")),
-        )
-        for row in both["rows"]
-    ]
-    return f"{markdown_table(head, rows)}\n\n{beside.alarms_sentence(both)}"
+    table = table_of(both["rows"], {
+        "case": "case", "flown by": "flown_by",
+        "isolated after, s": lambda row: plain_number(row["isolated_s"]),
+        "RMS before, deg/s": lambda row: plain_number(row["before_deg_s"]),
+        "RMS after, deg/s": lambda row: plain_number(row["after_deg_s"]),
+        "travel, deg": "travel_deg .0f", "work, deg²/s": "work_deg2_per_s .0f",
+    })  # fmt: skip
+    return f"{table}\n\n{beside.alarms_sentence(both)}"
 
 
 def reproduction_figures() -> str:

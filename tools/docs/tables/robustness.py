@@ -26,7 +26,7 @@ from beaver_ftc.studies.sensitivity.shown import HEAD, cells
 from beaver_ftc.studies.sensitivity.shown import error_sentences as sentences
 from beaver_ftc.studies.sweep.one_flight import fly_one, scenario_of
 from beaver_ftc.studies.sweep.sampling import Assignment, Plan
-from tools.docs.tables import moved
+from tools.docs.tables import moved, table_of
 
 Document = dict[str, Any]
 Rows = list[dict[str, Any]]
@@ -261,7 +261,10 @@ DECAY_CAPTION = (
 
 DECAY_TITLE = "Verdicts beyond the declaration: shares in % of the flights, and median tracking error"
 PUBLISHED = "The published case has no margin"
-PUBLISHED_HEAD = ("error", "declared", "times", "false alarms", "named wrongly")
+PUBLISHED_COLUMNS = {
+    "error": "error", "declared": "declared", "times": "factor g", "false alarms": "false_alarm.count",
+    "named wrongly": "misnamed.count",
+}  # fmt: skip
 DECAY_FIGURE = (
     "*Figure 2. False alarms, right names (both in % of the flights) and tracking RMS (deg/s) for "
     "`elevator-loss-in-turbulence`. Horizontal: size of the error divided by its declared size, or by its "
@@ -316,19 +319,12 @@ def _published(document: Document) -> str:
         for name in dict.fromkeys(row["error"] for row in rows)
         for of in [[row for row in rows if row["error"] == name]]
     ]
-    shown = [
-        (
-            row["error"], row["declared"], f"{row['factor']:g}", str(row["false_alarm"]["count"]),
-            str(row["misnamed"]["count"]),
-        )
-        for row in (together[0], *each)
-    ]  # fmt: skip
     caption = (
         f"*Table 5. Verdicts of `{document['scenario']}`. First row: all errors as declared. Other "
         'rows: the smallest size with a wrong verdict. "times": this size, divided by the declared size or '
         f"by the unit. Last columns: numbers of flights, of {document['flights']} a row.*"
     )
-    return f"{caption}\n\n{markdown_table(PUBLISHED_HEAD, shown)}"
+    return f"{caption}\n\n{table_of((together[0], *each), PUBLISHED_COLUMNS)}"
 
 
 def _said_of(document: Document) -> str:

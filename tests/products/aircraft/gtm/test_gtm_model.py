@@ -1,55 +1,23 @@
 """The converted model against the specification: coefficients, masses, trim, modes, flights."""
 
-import csv
-from math import cos, exp, radians, sin
+from math import exp, radians
 
 import numpy as np
 import pytest
 from tools.gtm import flights
-from tools.gtm.flights import ADAMS_BASHFORTH, FINE_S, MOTION, NAMES
+from tools.gtm.flights import ADAMS_BASHFORTH, FINE_S, MOTION
 from tools.gtm.specification import SURFACES, Specification, State
 
-from beaver_ftc_aircraft.gtm.parameters import OUTPUTS, parameters
 from beaver_ftc_aircraft.gtm.steady import Condition
 
 SPAN = 1e-9  # of each coefficient's span
 AFT = np.array([-12.0, 12.0, -12.0])  # JSBSim's structural frame
 
 
-def at(bench, alpha, beta, V, rates, deg, case=0, gear=False):
-    """Coefficients of the converted model; stops out of the way."""
-    fdm = bench.fdm
-    for letters, name in NAMES.items():
-        fdm[f"fcs/{name}-cmd-rad"] = radians(deg[letters])
-        fdm[f"actuators/{name}/position-min-rad"], fdm[f"actuators/{name}/position-max-rad"] = -1.6, 1.6
-    fdm["gear/down"] = float(gear)
-    bench.damage(case)
-    velocity = V * np.array([cos(alpha) * cos(beta), sin(beta), sin(alpha) * cos(beta)])
-    bench.place(800.0, velocity, (0.0, 0.0, 0.0), rates)
-    found = np.array([fdm[f"aero/coefficient/{name}"] for name in OUTPUTS])
-    fdm["gear/down"] = 0.0
-    for name, of in parameters()["surfaces"].items():
-        for end, stop in zip(("min", "max"), of["travel_deg"], strict=True):
-            fdm[f"actuators/{name}/position-{end}-rad"] = radians(stop)
-        fdm[f"fcs/{name}-cmd-rad"] = 0.0
-    bench.damage(0)
-    return found
-
-
 def test_the_given_points(where, bench):
     """Of each 10 digits are given."""
-    with (where / "points.csv").open() as file:
-        rows = list(csv.DictReader(file))
-    given = np.array([[float(row[name]) for name in OUTPUTS] for row in rows])
-    found = [
-        at(
-            bench, radians(float(row["alpha_deg"])), radians(float(row["beta_deg"])), float(row["V_ft_s"]),
-            [float(row[f"{axis}_rad_s"]) for axis in "pqr"],
-            {name: float(row[f"{name}_deg"]) for name in SURFACES}, int(row["damage"]), row["GEAR"] != "0",
-        )
-        for row in rows
-    ]  # fmt: skip
-    assert len(rows) == 60
+    given, found = flights.at_the_given_points(bench, where)
+    assert len(given) == 60
     assert (np.abs(found - given) <= SPAN * np.ptp(given, axis=0)).all()
 
 
@@ -63,7 +31,7 @@ def test_random_points_inside_and_beyond_the_tables(bench, specified, seed):
         deg["STAB"] = rng.choice([0.0, rng.uniform(-12, 4)])
         case, gear, V = k % 7, bool(k % 2), rng.uniform(60, 250)
         rates = rng.choice([0.0, 1.0], 3) * rng.normal(0, [2.0, 1.0, 1.0])
-        found = at(bench, alpha, beta, V, rates, deg, case, gear)
+        found = flights.coefficients(bench, alpha, beta, V, rates, deg, case, float(gear))
         wanted = specified.coefficients(alpha, beta, V, rates, deg, case, gear)
         assert np.abs(found - wanted).max() <= 1e-9 * (1.0 + np.abs(wanted).max()), (case, deg)
 
@@ -71,15 +39,11 @@ def test_random_points_inside_and_beyond_the_tables(bench, specified, seed):
 @pytest.mark.parametrize("case", range(7))
 def test_mass_properties_of_each_case(bench, specified, case):
     weight, cg, inertia = specified.mass(case)
-    bench.damage(case)
-    bench.place(800.0, (160.0, 0.0, 8.0), (0.0, 0.05, 0.0))
-    fdm = bench.fdm
-    found = [fdm[f"inertia/i{name}-slugs_ft2"] for name in ("xx", "yy", "zz", "xy", "xz", "yz")]
+    found = flights.masses(bench, case)
     wanted = [*np.diag(inertia), *(-inertia[i, j] for i, j in ((0, 1), (0, 2), (1, 2)))]
-    bench.damage(0)
-    assert fdm["inertia/weight-lbs"] == pytest.approx(weight, rel=1e-6)
-    assert [fdm[f"inertia/cg-{axis}-in"] / 12.0 for axis in "xyz"] == pytest.approx(cg * AFT / 12.0, rel=1e-6)
-    np.testing.assert_allclose(np.abs(found), np.abs(wanted), atol=1e-6)
+    assert found[0] == pytest.approx(weight, rel=1e-6)
+    assert found[1:4] == pytest.approx(cg * AFT / 12.0, rel=1e-6)
+    np.testing.assert_allclose(np.abs(found[4:]), np.abs(wanted), atol=1e-6)
 
 
 def test_trim_at_the_check_point(where, bench, specified):

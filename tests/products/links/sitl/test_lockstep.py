@@ -161,7 +161,6 @@ def test_a_new_connection_is_a_new_flight(px4):
 @given(seed=st.integers(0, 10_000))
 @pytest.mark.parametrize("protocol", ["ardupilot", "px4"])
 def test_on_a_bad_line_nothing_is_flown_twice_or_lost(protocol, seed):
-    """`benchmarks/sitl.py lockstep` flies 100,000 frames of each so, with JSBSim behind."""
     found = getattr(trial, protocol)(Stub(), 600, seed, a_flight=120)
     assert (found.frames, found.twice, found.lost) == (600, 0, 0)
     assert len(found.meant) > 3

@@ -9,9 +9,9 @@ the truth's own innovations: a vector autoregression of ORDER frames, fitted to 
 of the healthy flights, whitens them and the fault's signature. Errors of the model, gusts and gyros are in it
 as they are, not as they are declared. Instants are 0.05 s apart and at most 10 s back.
 
-Flights are those of `beaver-ftc detectability --grid`. What is declared is what is there: sensors, air, and the error of the
-aircraft's own model, at the measured pace. That error is known within a model's envelope alone, and outside
-nothing is concluded: losses within a second of which the aircraft is outside are left out.
+Flights are those of `beaver-ftc detectability --grid`. What is declared is what is there: sensors, air, and
+the error of the aircraft's own model, at the measured pace. It is known within an envelope alone; outside
+nothing is concluded, and losses within a second of which the aircraft is outside are left out.
 
 Each surface is lost by 40 and 100 % at 3 and 6 deg/s. Counted are the losses found within 1 s by Page's test
 and by our two detectors, first with levels that give at most 20 false alarms per hour on the healthy flights,

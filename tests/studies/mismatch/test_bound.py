@@ -115,7 +115,7 @@ def test_the_recommended_bound_covers_the_flight_it_makes():
     case = scenario(design_model={"mass": 1.1}, faults=[loss(at_s=6)], duration_s=12)
     kept, flown = split_flight(case)
     assert flown.false_alarm
-    constant, settled = settle([case], [kept])
+    constant, settled = settle([case], [kept.smallest_constant])
     assert settled
     again, flown_with_it = split_flight(with_bound(case, constant))
     assert not again.exceeded
@@ -126,9 +126,9 @@ def test_no_bound_is_recommended_under_which_a_flight_then_raises_a_false_alarm(
     """A calm flight needs little; the published case, flown with as little, would alarm before its fault."""
     calm = scenario(duration_s=6, uncertainty={})
     kept, _ = split_flight(calm)
-    needed = recommend([kept])
+    needed = recommend([kept.smallest_constant])
     assert guarantee_with(needed, calm)["false_alarm"]
-    found = recommended_for([calm], [kept])
+    found = recommended_for([calm], [kept.smallest_constant])
     assert found["guarantee"]["recommended"]["false_alarm"] is False
     assert found["recommended"]["settled"]
     assert found["recommended"]["runs"] == 1

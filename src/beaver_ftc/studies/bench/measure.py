@@ -34,6 +34,7 @@ from beaver_ftc.studies.bench.contenders import (
 from beaver_ftc.studies.bench.parts import PARTS, frame_with
 from beaver_ftc.studies.bench.straightforward import Straightforward
 from beaver_ftc.studies.engine.workers import cores, environment
+from beaver_ftc.studies.present.tables import aligned
 from beaver_ftc.studies.sweep.one_flight import row_of, scenario_of
 from beaver_ftc.studies.sweep.sampling import Plan
 
@@ -261,63 +262,47 @@ _ALTERNATIVES = {
 
 def text_of(document: Document) -> str:
     """The document of `bench` as text."""
+    whole, sweeps = document["whole_flight"], document["sweep_flights"]
+    sections = {
+        "after the alarm: every estimator, the network and the fault-tolerant law at work": _rows(document),
+        "before the alarm": _rows(document["before_alarm"]),
+        "other ways, after the alarm": [
+            _row(_ALTERNATIVES[name], figures) for name, figures in document["alternatives"].items()
+        ],
+        f"whole flights of {whole['frames']} frames, loading and trim included": [
+            *_rows(whole),
+            _row("with a log file", whole | {"ratio": whole["with_log_file_ratio"]}, "with_log_file_us"),
+        ],
+        "flights of 15 s in a sweep, ms of processor time; x: of what JSBSim alone takes for its frames": [
+            ["", *STAGES, "frames alone", "frames, x", "flight, x", "us added a frame"],
+            *([kind, *(f"{figure:.3f}" for figure in _of_kind(of))] for kind, of in sweeps.items()),
+        ],
+    }
     return "\n".join([
         "{processor}, {cores} cores, Python {python}, JSBSim {jsbsim}".format(**document["machine"]),
         "us a frame: medians [quartiles] over {rounds} rounds of {frames_a_round} frames".format(**document),
-        "",
-        "after the alarm: every estimator, the network and the fault-tolerant law at work",
-        *_phase_lines(document),
-        "",
-        "before the alarm",
-        *_phase_lines(document["before_alarm"]),
-        "",
-        "other ways, after the alarm",
-        *(_line(_ALTERNATIVES[name], figures) for name, figures in document["alternatives"].items()),
-        "",
-        *_flights(document["whole_flight"]),
-        "",
-        *_kinds(document["sweep_flights"]),
+        *(f"\n{title}\n{aligned(rows)}" for title, rows in sections.items()),
     ])  # fmt: skip
 
 
-def _phase_lines(phase: Document) -> list[str]:
-    parts = phase["parts"].items()
+def _rows(phase: Document) -> list[list[str]]:
+    """The bare aircraft, the parts of the loop if they were timed, and the loop."""
     return [
-        _line("bare aircraft", {**phase, "ratio": 1.0}, "bare_us"),
-        *(_line(f"  + {name}", part) + f"{part['adds_us']:+10.3f}" for name, part in parts),
-        _line("closed loop", phase, "closed_loop_us"),
+        _row("bare aircraft", phase | {"ratio": 1.0}, "bare_us"),
+        *(_row(f"  + {name}", part) for name, part in phase.get("parts", {}).items()),
+        _row("closed loop", phase, "closed_loop_us"),
     ]
 
 
-def _flights(flights: Document) -> list[str]:
-    with_file = {**flights, "ratio": flights["with_log_file_ratio"]}
-    return [
-        f"whole flights of {flights['frames']} frames, loading and trim included",
-        _line("bare aircraft", {**flights, "ratio": 1.0}, "bare_us"),
-        _line("closed loop", flights, "closed_loop_us"),
-        _line("with a log file", with_file, "with_log_file_us"),
-    ]
-
-
-def _kinds(kinds: Document) -> list[str]:
-    """A line a kind of flight; the parts are the same for all."""
-    parts = list(next(iter(kinds.values()))["parts_ms"])
-    head = [*parts, "frames alone", "frames, x", "flight, x", "us added a frame"]
-    widths = [max(len(word), 8) + 2 for word in head]
-    lines = [
-        "flights of 15 s in a sweep, ms of processor time; x: of what JSBSim alone takes for its frames",
-        " " * 32 + "".join(f"{word:>{width}}" for word, width in zip(head, widths, strict=True)),
-    ]
-    for kind, of in kinds.items():
-        others = (of[key] for key in ("bare_ms", "frames_ratio", "flight_ratio", "own_part_us"))
-        figures = zip((*of["parts_ms"].values(), *others), widths, strict=True)
-        lines.append(f"{kind:32}" + "".join(f"{figure:{width}.3f}" for figure, width in figures))
-    return lines
-
-
-def _line(what: str, figures: Document, us: str = "us") -> str:
+def _row(what: str, figures: Document, us: str = "us") -> list[str]:
     low, high = figures[f"{us}_quartiles"]
-    return f"{what:42}{figures[us]:9.3f}  [{low:.3f}, {high:.3f}]{figures['ratio']:9.3f} x"
+    adds = f"{figures['adds_us']:+.3f}" if "adds_us" in figures else ""
+    return [what, f"{figures[us]:.3f}", f"[{low:.3f}, {high:.3f}]", f"{figures['ratio']:.3f} x", adds]
+
+
+def _of_kind(of: Document) -> list[float]:
+    keys = ("bare_ms", "frames_ratio", "flight_ratio", "own_part_us")
+    return [*of["parts_ms"].values(), *(of[key] for key in keys)]
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.linear_systems import zeros
 from beaver_ftc.studies.matrix.fault_matrix import AIRSPEEDS_MPS, AT_S, REFERENCE, UNCERTAINTY, trimmed_deg
 from beaver_ftc.studies.present.page import Makers
-from beaver_ftc.studies.present.tables import finite
+from beaver_ftc.studies.present.tables import aligned, finite
 
 NAME = "pitch-lost"
 DURATION_S = 100.0
@@ -35,7 +35,6 @@ COLUMNS = ("t_s", "q_rad_s", "theta_rad", "phi_rad", "airspeed_mps", "envelope_v
 STATES = ("airspeed", "alpha", "q", "theta")
 FREQUENCIES_RAD_S = np.geomspace(1e-3, 1e2, 20001)
 SLOW_RAD_S = 1.0  # the phugoid is slower than this, the short period faster
-FIRST, WIDTH = 26, 27  # of the first column, which begins with a law, and of the others
 SETTLED_S = 30.0  # from here on the swing is judged: what the fault itself throws off is over
 LAWS = ("fault-tolerant-published", "oracle-published")
 MARGIN_HEAD = (
@@ -195,20 +194,19 @@ def as_text(document: Document) -> str:
     """A table for each law, then what the linear model says, and the totals."""
     speeds = [found["airspeed_mps"] for found in document["margins"]]
     flights = {(row["law"], row["lost"], row["airspeed_mps"]): row for row in document["flights"]}
-    lines = []
-    for law in LAWS:
-        lines.append(f"{law:{FIRST}}" + "".join(f"{f'{V:g} m/s':{WIDTH}}" for V in speeds))
-        for name in LOST:
-            lines.append(
-                f"{name:{FIRST}}" + "".join(f"{_cell(flights[law, name, V]):{WIDTH}}" for V in speeds)
-            )
-        lines.append("")
+    tables = [
+        aligned([
+            [law, *(f"{V:g} m/s" for V in speeds)],
+            *([name, *(_cell(flights[law, name, V]) for V in speeds)] for name in LOST),
+        ])
+        for law in LAWS
+    ]  # fmt: skip
     totals = (
         f"{len(document['flights'])} pairs of faults flown: {document['saved']} aircraft kept that are lost "
         f"without engine power, {document['harmed']} lost that are kept without"
     )
-    tables, linear = [line.rstrip() for line in lines], [_margin(one) for one in document["margins"]]
-    return "\n".join([*tables, LEGEND, "", _row(MARGIN_HEAD), *linear, "", totals])
+    linear = aligned([MARGIN_HEAD, *map(_margin, document["margins"])])
+    return "\n\n".join([*tables, LEGEND, linear, totals])
 
 
 FILES: Makers = {f"{NAME}.json": as_json, f"{NAME}.txt": lambda document: as_text(document) + "\n"}
@@ -225,14 +223,10 @@ def _half(outcome: Document) -> str:
     return f"{outcome['q_rms_deg_s']:.2f} {outcome['theta_swing_deg']:4.1f}"
 
 
-def _margin(one: Document) -> str:
+def _margin(one: Document) -> tuple[str, ...]:
     alone, damped = one["phugoid_damping"]
     gain = "unlimited" if one["gain_margin_db"] is None else f"{one['gain_margin_db']:.1f} dB"
     phase = "unlimited" if one["phase_margin_deg"] is None else f"{one['phase_margin_deg']:.0f} deg"
     closed, opened = one["worth_deg"]
     zero, worth = f"zero at +{one['attitude_zero_rad_s']:.2f} rad/s", f"{closed:+.1f} to {opened:+.1f} deg"
-    return _row((f"{one['airspeed_mps']:g} m/s", f"{alone:.2f} > {damped:.2f}", gain, phase, zero, worth))
-
-
-def _row(cells: tuple[str, ...]) -> str:
-    return "".join(f"{cell:{width}}" for cell, width in zip(cells, (11, 18, 14, 15, 22, 0), strict=True))
+    return f"{one['airspeed_mps']:g} m/s", f"{alone:.2f} > {damped:.2f}", gain, phase, zero, worth

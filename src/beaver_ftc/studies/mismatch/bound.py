@@ -3,12 +3,14 @@
 from collections.abc import Sequence
 from math import ceil, floor, log10
 
+import numpy as np
+
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.documents.files import Document
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.metrics import Truth
 from beaver_ftc.scenario.schema import Scenario, load_scenario
-from beaver_ftc.studies.mismatch.split import Split, split_flight
+from beaver_ftc.studies.mismatch.split import split_flight
 
 PUBLISHED_CASE = "elevator-partial-loss"
 MAX_ROUNDS = 10  # of flights with a larger bound
@@ -16,15 +18,14 @@ LEAST_RAD_S2 = 1e-4  # of a bound that is widened
 PerAxis = dict[str, float]
 
 
-def recommend(flights: Sequence[Split], at_least: PerAxis | None = None) -> PerAxis:
+def recommend(needed: Sequence[np.ndarray], at_least: PerAxis | None = None) -> PerAxis:
     """The smallest constant parts of eta_bar, rad/s2 per axis, that would have covered every run.
 
-    Rounded up to two digits; none below `at_least`.
+    needed: of each run (3,). Rounded up to two digits; none below `at_least`.
     """
     found = dict(at_least or dict.fromkeys(AXES, 0.0))
-    for i, axis in enumerate(AXES):
-        needed = max(flight.smallest_constant[i] for flight in flights)
-        found[axis] = max(found[axis], rounded_up(float(needed)))
+    for axis, most in zip(AXES, np.max(needed, axis=0).tolist(), strict=True):
+        found[axis] = max(found[axis], rounded_up(most))
     return found
 
 
@@ -70,7 +71,7 @@ def with_bound(scenario: Scenario, constant_rad_s2: PerAxis) -> Scenario:
     return scenario.model_copy(update={"fdi": scenario.fdi.model_copy(update={"bounds": bounds})})
 
 
-def recommended_for(scenarios: Sequence[Scenario], kept: Sequence[Split]) -> Document:
+def recommended_for(scenarios: Sequence[Scenario], needed: Sequence[np.ndarray]) -> Document:
     """The bound that covers these flights, and the published elevator case flown with it and the design.
 
     The case is one of the flights to be covered: a bound that suits calmer air alone would raise a false
@@ -82,7 +83,7 @@ def recommended_for(scenarios: Sequence[Scenario], kept: Sequence[Split]) -> Doc
     first, runs = scenarios[0], len(scenarios)
     declared = first.fdi.bounds.constant_rad_s2.model_dump()
     case = published_case(declared, first)
-    constant, settled = settle([*scenarios, case], [*kept, split_flight(case)[0]])
+    constant, settled = settle([*scenarios, case], [*needed, split_flight(case)[0].smallest_constant])
     return {
         "recommended": {
             "constant_rad_s2": constant, "runs": runs, "coverage": runs / (runs + 1), "settled": settled,
@@ -93,19 +94,19 @@ def recommended_for(scenarios: Sequence[Scenario], kept: Sequence[Split]) -> Doc
     }  # fmt: skip
 
 
-def settle(scenarios: Sequence[Scenario], kept: Sequence[Split]) -> tuple[PerAxis, bool]:
+def settle(scenarios: Sequence[Scenario], needed: Sequence[np.ndarray]) -> tuple[PerAxis, bool]:
     """The recommended bound, flown with until no flight exceeds it or alarms falsely; whether so.
 
     A bound too small raises an alarm, after which another law flies; without that alarm the flight, and its
     mismatch, is another. So every flight is flown again with what is recommended.
     """
-    flights, constant = list(kept), recommend(kept)
+    constant = recommend(needed)
     for _ in range(MAX_ROUNDS):
-        again = [split_flight(with_bound(scenario, constant)) for scenario in scenarios]
-        short = [flight for flight, flown in again if flight.exceeded or flown.false_alarm]
+        again = (split_flight(with_bound(scenario, constant)) for scenario in scenarios)
+        short = [flight.smallest_constant for flight, flown in again if flight.exceeded or flown.false_alarm]
         if not short:
             return constant, True
-        flights += short
-        larger = recommend(flights, constant)
+        needed = [*needed, *short]
+        larger = recommend(needed, constant)
         constant = larger if larger != constant else widened(larger)
     return constant, False

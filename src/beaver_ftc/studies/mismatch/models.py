@@ -41,6 +41,9 @@ _TOGETHER = {
 }  # fmt: skip
 
 
+LOGGED = frozenset((*_ALONE, *(column for columns in _TOGETHER.values() for column in columns)))
+
+
 @dataclass(frozen=True)
 class States:
     """Frames of a flight; n of them. SI and rad.

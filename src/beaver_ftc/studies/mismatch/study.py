@@ -28,6 +28,7 @@ from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.mismatch import charts
 from beaver_ftc.studies.mismatch.bound import recommended_for
 from beaver_ftc.studies.mismatch.linear import analyse, linear_document
+from beaver_ftc.studies.mismatch.models import LOGGED
 from beaver_ftc.studies.mismatch.sources import SOURCES
 from beaver_ftc.studies.mismatch.split import (
     CAUSES,
@@ -59,8 +60,9 @@ VARIANTS: dict[str, Document] = {
 
 def run_mismatch(
     scenario: Scenario, out: Path, report: bool = True, progress: Progress | None = None
-) -> tuple[Document, Split]:
-    """Fly `scenario` and write `out/<name>/`: a run's result folder with the mismatch in it.
+) -> tuple[Document, np.ndarray]:
+    """Fly `scenario` and write `out/<name>/`: a run's result folder with the mismatch in it. Return its
+    document, and the constant part (3,) rad/s2 of a bound that would have covered the flight.
 
     Raises BadInput for a flight that cannot be trimmed, SimulationFailed for one not completed or kept.
     """
@@ -68,12 +70,13 @@ def run_mismatch(
         with ParquetLog(folder / "log.parquet") as log:
             flight = fly(scenario, log, progress)
         flown = measure(flight)
-        kept = split(scenario, StoredLog(folder / "log.parquet").read())
+        stored = StoredLog(folder / "log.parquet")
+        kept = split(scenario, stored.read([name for name in stored.columns if name in LOGGED]))
         with ParquetLog(folder / "mismatch.parquet") as frames:
             frames.open(COLUMNS)
             frames.write(kept.rows())
         analysis = analyse(scenario)
-        recommended = recommended_for([scenario], [kept])
+        recommended = recommended_for([scenario], [kept.smallest_constant])
         found = document(scenario, kept, flown) | recommended | {"linear": linear_document(analysis)}
         write_documents(folder, scenario, flown.document())
         write_files(folder, _as_files(found, csv_rows(found)))
@@ -81,7 +84,7 @@ def run_mismatch(
             show_in_reports()
             write_files(folder / "figures", charts.figures(folder, found, flown, analysis))
             write_report_files(folder, flown.document())
-    return found, kept
+    return found, kept.smallest_constant
 
 
 def refuse_other_aircraft(scenarios: Iterable[Scenario]) -> None:

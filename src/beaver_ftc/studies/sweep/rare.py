@@ -31,7 +31,7 @@ from beaver_ftc.studies.engine.workers import Case
 from beaver_ftc.studies.present.page import write_files
 from beaver_ftc.studies.present.tables import finite, number
 from beaver_ftc.studies.sweep.one_flight import scenario_of, warm_up
-from beaver_ftc.studies.sweep.sampling import Assignment, value_at
+from beaver_ftc.studies.sweep.sampling import Assignment, values_at
 from beaver_ftc.studies.sweep.store import identity_of
 
 RUNS, MEMBERS = 8, 220  # independent runs, flights of each a level: 10^-5 by a hundredth of 10^6 flights
@@ -197,15 +197,14 @@ def score_of(scenario: Scenario, expectation: str) -> float:
     return min(score, _BEFORE) if found.passed else max(score, 0.0)
 
 
-def values_at(sweep: Sweep, point: Sequence[float]) -> Document:
+def values_of(sweep: Sweep, point: Sequence[float]) -> Document:
     """The varied keys at a point of standard normals."""
-    units = [min(_NORMAL.cdf(u), 1.0 - 2.0**-53) for u in point]
-    return {key: value_at(how, u) for (key, how), u in zip(sweep.file.vary.items(), units, strict=True)}
+    return values_at(sweep.file.vary.items(), (min(_NORMAL.cdf(u), 1.0 - 2.0**-53) for u in point))
 
 
 def scenario_at(sweep: Sweep, run: int, point: Sequence[float]) -> Scenario:
     """The flight at a point of standard normals; its number gives its seed."""
-    return scenario_of(sweep, Assignment(run, values_at(sweep, point)))
+    return scenario_of(sweep, Assignment(run, values_of(sweep, point)))
 
 
 def _fly(sweep: Sweep, expectation: str, case: tuple[int, list[float]]) -> Document:
@@ -266,7 +265,7 @@ def _document(sweep: Sweep, expectation: str, chains: Chains, failed: int) -> Do
     likeliest = None
     if chains.design is not None:
         distance, run, point = chains.design
-        likeliest = {"run": run, "distance": distance, "values": values_at(sweep, point.tolist())}
+        likeliest = {"run": run, "distance": distance, "values": values_of(sweep, point.tolist())}
     return {
         "sweep": sweep.name, "expectation": expectation, "confidence": CONFIDENCE, **said,
         "plain": {key: finite(value) for key, value in found["plain"].items()},

@@ -7,7 +7,7 @@ from.
 
 import math
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from statistics import NormalDist
 from typing import Any, NamedTuple
 
@@ -57,6 +57,11 @@ def _normal(distribution: NormalDist, within: tuple[float, float] | None, u: flo
     return min(max(distribution.inv_cdf(share), low), high)
 
 
+def values_at(vary: Iterable[tuple[str, Variation]], point: Iterable[float]) -> Document:
+    """The value of each key at a point of the unit cube."""
+    return {key: value_at(how, float(u)) for (key, how), u in zip(vary, point, strict=True)}
+
+
 def counted_value(how: Variation, position: int) -> Any:
     """The value at a position of a `linspace` or a `choice`."""
     if how.choice is not None:
@@ -98,7 +103,7 @@ class Plan:
         )
 
     def _values(self, index: int, point: np.ndarray) -> Document:
-        values = {key: value_at(how, float(u)) for (key, how), u in zip(self._drawn, point, strict=True)}
+        values = values_at(self._drawn, point)
         for key, how in reversed(self._in_turn):
             index, position = divmod(index, how.count or 1)
             values[key] = counted_value(how, position)

@@ -21,7 +21,7 @@ from beaver_ftc.studies.engine.store import batches_of
 from beaver_ftc.studies.engine.workers import Batch
 from beaver_ftc.studies.present.tables import finite
 from beaver_ftc.studies.sweep.one_flight import DEPARTED
-from beaver_ftc.studies.sweep.sampling import Assignment, value_at
+from beaver_ftc.studies.sweep.sampling import Assignment, values_at
 from beaver_ftc.studies.sweep.store import Store
 
 WEIGHT, CROSSOVER = 0.7, 0.9  # [Storn1997] recommend 0.4 to 1 and, for few dependent keys, 0.9
@@ -111,18 +111,12 @@ def generations(sweep: Sweep, objective: str, store: Store) -> Iterator[Batch]:
         raise BadInput(f"{sweep.name}: vary: nothing varies, allowed in a search: at least one key")
     evolution = Evolution(sweep.file.seed, len(sweep.keys))
     for number, runs in batches_of(sweep.flights, evolution.members):
-        points = evolution.trials()[: len(runs)]
-        flights = zip(runs, points, strict=True)
-        yield Batch(number, tuple(Assignment(run, _values(sweep, point)) for run, point in flights))
+        values = [values_at(sweep.file.vary.items(), x) for x in evolution.trials()[: len(runs)]]
+        yield Batch(number, tuple(map(Assignment, runs, values)))
         table = store.landed(number, runs)
         if table is None:
             return
         evolution.select(np.array([score(objective, row) for row in table.to_pylist()]))
-
-
-def _values(sweep: Sweep, point: np.ndarray) -> Document:
-    keys = sweep.file.vary.items()
-    return {key: value_at(how, float(u)) for (key, how), u in zip(keys, point, strict=True)}
 
 
 def found(objective: str, results: Path, sweep: Sweep) -> Document:

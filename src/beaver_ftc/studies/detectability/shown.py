@@ -71,11 +71,13 @@ CERTAIN = (
 
 
 def _places(document: Document) -> tuple[str, Sequence[Part]]:
-    points = grouped(document["points"], "fault", "excitation").items()
+    of_faults = sorted(document["points"], key=itemgetter("fault"))
+    points = grouped(of_faults, "fault", "excitation").items()
     lines = [
         {"loss of": fault, "flown": _times(scale)} | _spans(of, "isolated") for (fault, scale), of in points
     ]
-    for (fault, other, scale), of in grouped(document["pairs"], "fault", "other", "excitation").items():
+    of_pairs = sorted(document["pairs"], key=itemgetter("fault", "other"))
+    for (fault, other, scale), of in grouped(of_pairs, "fault", "other", "excitation").items():
         shown = _spans(of, "magnitude") | {
             "delay": _span(of, "longest_s", seconds), "half: delay": _span(of, "median_s", seconds),
             "doublet": _span(of, "doublet_deg", lambda deg: f"{deg:.1f} deg"),

@@ -39,8 +39,8 @@ NAME = "detectability"
 SOON = f"found within {'/'.join(f'{s:g}' for s in WITHIN_S)} s, %"
 HEAD = (
     "loss of", "taken for", "flown", "scheme", "certain from", "half of onsets from", "delay", "half: delay",
-    "doublet", "found in 90 % from", "95 % interval", "flights", "false alarms/h", "before faults/h", SOON,
-    "median delay",
+    "doublet", "doublet time", "found in 90 % from", "95 % interval", "flights", "false alarms/h",
+    "before faults/h", SOON, "median delay",
 )  # fmt: skip
 OWN = ", default level"
 INFORMED = "informed test"
@@ -81,6 +81,7 @@ def _places(document: Document) -> tuple[str, Sequence[Part]]:
         shown = _spans(of, "magnitude") | {
             "delay": _span(of, "longest_s", seconds), "half: delay": _span(of, "median_s", seconds),
             "doublet": _span(of, "doublet_deg", lambda deg: f"{deg:.1f} deg"),
+            "doublet time": _span(of, "doublet_s", seconds),
         }  # fmt: skip
         lines.append({"loss of": fault, "taken for": other, "flown": _times(scale), **shown})
     drawn = Pictures([("smallest loss that is distinguished from each other surface", NAME)])

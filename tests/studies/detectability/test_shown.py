@@ -2,6 +2,9 @@
 
 import pytest
 
+from beaver_ftc.commands import Reporter
+from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.studies.detectability.command import Detectability
 from beaver_ftc.studies.detectability.shown import page_of
 from beaver_ftc.studies.present.page import Table, as_text
 
@@ -66,7 +69,7 @@ def place(fault, other, airspeed_mps, detected, isolated, why):
     magnitudes = {"detected": detected, "isolated": isolated, "isolated_median": 0.2}
     point = {"airspeed_mps": airspeed_mps, "excitation": 0.5, "fault": fault}
     pair = {"other": other, "magnitude": isolated, "magnitude_median": 0.1, "longest_s": 0.4, "median_s": 0.1}
-    return point | magnitudes | {"why": why}, point | pair | {"doublet_deg": 1.25}
+    return point | magnitudes | {"why": why}, point | pair | {"doublet_deg": 1.25, "doublet_s": 0.03}
 
 
 def test_a_line_spans_the_places_where_some_loss_is_certain():
@@ -87,4 +90,25 @@ def test_a_line_spans_the_places_where_some_loss_is_certain():
     lines = [dict(zip(table.head, cells, strict=True)) for cells in table.rows]
     assert [line["certain from"] for line in lines[:2]] == ["30 % (1/2)", "- (0/1)"]
     assert lines[2]["taken for"] == "rudder"
-    assert (lines[2]["half: delay"], lines[2]["doublet"]) == ("0.10 s (2/2)", "1.2 deg (2/2)")
+    times = [lines[2][name] for name in ("half: delay", "doublet", "doublet time")]
+    assert times == ["0.10 s (2/2)", "1.2 deg (2/2)", "0.03 s (2/2)"]
+
+
+@pytest.mark.parametrize(
+    ("keys", "says"),
+    [
+        ({}, "exactly one of SCENARIO and --grid"),
+        ({"scenario": "fault-free", "grid": "quick"}, "exactly one of SCENARIO and --grid"),
+        ({"grid": "quick", "within": 0.5, "surface": "rudder"}, "--within only with SCENARIO"),
+        ({"scenario": "fault-free", "within": 0.5}, "--within only with --surface"),
+        (
+            {"scenario": "fault-free", "within": 0.5, "surface": "rudder", "altitude": [0.0]},
+            "only without --within",
+        ),
+        ({"scenario": "fault-free", "sensors": "ideal"}, "only with --grid"),
+        ({"grid": "quick", "airspeed": [40.0, 50.0]}, "at most one --airspeed"),
+    ],
+)
+def test_methods_exclude_each_other(keys, says):
+    with pytest.raises(BadInput, match=f"detectability: allowed: .*{says}"):
+        Detectability(**keys).run(Reporter())

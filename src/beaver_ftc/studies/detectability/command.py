@@ -41,6 +41,7 @@ def run_places(
     speeds_mps: Sequence[float] = (),
     altitudes_m: Sequence[float] = (),
     excitations: Sequence[float] = certain.EXCITATIONS,
+    workers: int = 1,
     progress: Progress | None = None,
 ) -> Document:
     """Write `out/<scenario>-detectability/`; return the document: a row a fault and grid point, and one a
@@ -66,7 +67,7 @@ def run_places(
         partial(certain.look_at, scenario), partial(certain.document_of, scenario.name), OF_PLACES,
         row=dict[str, list[Document]], follows_from=scenario,
     )  # fmt: skip
-    return run_study(study, out, progress=progress)
+    return run_study(study, out, workers, progress)
 
 
 def run_schemes(
@@ -116,9 +117,9 @@ class Detectability(StudyCommand):
     within: Longest time from the loss to the alarm, s.
     grid: Number of variations: `quick` takes about 1 min of processor time, `full` about 10 min.
     airspeed: Airspeed, m/s. Default: 36, 40, 44, 48 and 52 for the Beaver, otherwise 0.9, 1 and 1.1
-    times the airspeed at the start. With --grid: one, default 45.
+    times the airspeed at the start. With --grid: at most one.
     altitude: Altitude above sea level, m. Default: the altitude at the start in the aircraft file,
-    otherwise 0, 1000, 2000 and 3000. With --grid: one.
+    otherwise 0, 1000, 2000 and 3000. With --grid: at most one.
     aircraft: Aircraft instead of the scenario's: built-in name, jsbsim:NAME, or ./FOLDER.
     schemes: With --grid: names of schemes, separated by commas. Default: all registered schemes.
     sensors: With --grid: fly only these sensors. Default: all sensors of the grid.
@@ -176,8 +177,8 @@ class Detectability(StudyCommand):
         known = scenario.airframe.class_of_losses
         if self.surface is not None and self.surface not in known:
             raise BadInput(f"--surface {self.surface!r:.60}: allowed: {', '.join(known)}")
-        speeds_mps, altitudes_m = self.airspeed or (), self.altitude or ()
-        found = run_places(self.out, scenario, speeds_mps, altitudes_m, progress=reporter.progress)
+        where = self.airspeed or (), self.altitude or ()
+        found = run_places(self.out, scenario, *where, workers=self.processes, progress=reporter.progress)
         folder = str(self.out / certain.survey_name(scenario))
         if self.surface is not None:
             found |= {

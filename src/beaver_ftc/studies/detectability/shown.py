@@ -39,8 +39,8 @@ NAME = "detectability"
 SOON = f"found within {'/'.join(f'{s:g}' for s in WITHIN_S)} s, %"
 HEAD = (
     "loss of", "taken for", "flown", "scheme", "certain from", "half of onsets from", "delay", "half: delay",
-    "doublet", "found in 90 % from", "95 % interval", "flights", "false alarms/h", "before faults/h", SOON,
-    "median delay",
+    "doublet", "doublet time", "found in 90 % from", "95 % interval", "flights", "false alarms/h",
+    "before faults/h", SOON, "median delay",
 )  # fmt: skip
 OWN = ", default level"
 INFORMED = "informed test"
@@ -71,14 +71,17 @@ CERTAIN = (
 
 
 def _places(document: Document) -> tuple[str, Sequence[Part]]:
-    points = grouped(document["points"], "fault", "excitation").items()
+    of_faults = sorted(document["points"], key=itemgetter("fault"))
+    points = grouped(of_faults, "fault", "excitation").items()
     lines = [
         {"loss of": fault, "flown": _times(scale)} | _spans(of, "isolated") for (fault, scale), of in points
     ]
-    for (fault, other, scale), of in grouped(document["pairs"], "fault", "other", "excitation").items():
+    of_pairs = sorted(document["pairs"], key=itemgetter("fault", "other"))
+    for (fault, other, scale), of in grouped(of_pairs, "fault", "other", "excitation").items():
         shown = _spans(of, "magnitude") | {
             "delay": _span(of, "longest_s", seconds), "half: delay": _span(of, "median_s", seconds),
             "doublet": _span(of, "doublet_deg", lambda deg: f"{deg:.1f} deg"),
+            "doublet time": _span(of, "doublet_s", seconds),
         }  # fmt: skip
         lines.append({"loss of": fault, "taken for": other, "flown": _times(scale), **shown})
     drawn = Pictures([("smallest loss that is distinguished from each other surface", NAME)])

@@ -22,7 +22,7 @@ FREQUENCIES_RAD_S = (5.0, 15.0)  # of an unstructured acceleration where the sce
 UNDECLARED_SHARE = 0.01  # of a coefficient or a moment of inertia of which no error is declared
 UNDECLARED_SENSORS, UNDECLARED_AIR = "tactical-grade", "light"
 INTENSITY = {"none": 0.0, "light": 1.0, "moderate": 2.0, "severe": 3.0}  # wind at 20 ft: 15, 30, 45 kt
-_RATIO, _INERTIA, _WIDEST_BAND_DEG = (0.1, 10.0), (0.5, 2.0), 10.0  # what the keys of a scenario admit
+FACTOR_LIMITS, _INERTIA, _WIDEST_BAND_DEG = (0.1, 10.0), (0.5, 2.0), 10.0  # what the keys of a scenario admit
 _RANDOM, _SIGNED = ("noise_std", "quantum"), ("bias", "scale_error", "drift")
 
 Change = Callable[[float, np.random.Generator], Document]
@@ -76,7 +76,7 @@ def _within(value: float, limits: tuple[float, float]) -> float:
     return float(np.clip(value, *limits))
 
 
-def _signed(sizes: Mapping[str, float], usual: float, limits: tuple[float, float]) -> Change:
+def signed(sizes: Mapping[str, float], usual: float, limits: tuple[float, float]) -> Change:
     """Of each key its usual value, so many times its size more or less, within the limits."""
 
     def change(times: float, draws: np.random.Generator) -> Document:
@@ -95,13 +95,13 @@ def _of_ratios(what: str, section: str, shares: Mapping[str, float], limits: tup
     known = any(shares.values())
     shares = shares if known else dict.fromkeys(shares, UNDECLARED_SHARE)
     largest = f"{100.0 * max(shares.values()):g} %"
-    change = _below(section, _signed(shares, 1.0, limits))
+    change = _below(section, signed(shares, 1.0, limits))
     return Error(what, largest if known else _unknown(largest), change, known)
 
 
 def _coefficients(scenario: Scenario, declared: Declared) -> Error:
     shares = {term.name: declared.coefficients.of(term.name) for term in scenario.airframe.moments}
-    return _of_ratios("moment coefficients", "uncertainty.coefficients", shares, _RATIO)
+    return _of_ratios("moment coefficients", "uncertainty.coefficients", shares, FACTOR_LIMITS)
 
 
 def _inertia(share: float) -> Error:
@@ -110,7 +110,7 @@ def _inertia(share: float) -> Error:
 
 
 def _coupling(theta: Sequence[float]) -> Error:
-    change = _signed(dict(zip(AXES, theta, strict=True)), 0.0, (-1.0, 1.0))
+    change = signed(dict(zip(AXES, theta, strict=True)), 0.0, (-1.0, 1.0))
     return Error("inertia coupling", f"{max(theta):g}", _below("uncertainty.inertia_coupling", change))
 
 
@@ -138,9 +138,9 @@ def _servos(declared: Declared) -> Error:
     def change(times: float, draws: np.random.Generator) -> Document:
         truth = {}
         for name, bound in bounds.items():
-            signs = _signs(draws, ("bandwidth", "rate_limit"))
-            truth[name] = {key: _within(1.0 + times * signs[key] * bound[key], _RATIO) for key in signs}
-            truth[name]["dead_band_deg"] = min(times * bound["dead_band_deg"], _WIDEST_BAND_DEG)
+            shares = {key: bound[key] for key in ("bandwidth", "rate_limit")}
+            band_deg = min(times * bound["dead_band_deg"], _WIDEST_BAND_DEG)
+            truth[name] = signed(shares, 1.0, FACTOR_LIMITS)(times, draws) | {"dead_band_deg": band_deg}
         return {"uncertainty.actuators": truth}
 
     largest = {key: max(bound[key] for bound in bounds.values()) for key in ActuatorBound.model_fields}

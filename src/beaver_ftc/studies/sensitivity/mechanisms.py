@@ -26,6 +26,7 @@ from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.compare.margins_in_flight import margins_of
 from beaver_ftc.studies.engine.draws import loss, sines, swings
 from beaver_ftc.studies.present.tables import finite
+from beaver_ftc.studies.sensitivity.errors import FACTOR_LIMITS, signed
 from beaver_ftc.studies.sensitivity.systems import (
     CONSTANT,
     MECHANISMS,
@@ -132,10 +133,9 @@ def _errors(coupling: float, swing_rad_s2: float, draws: np.random.Generator) ->
 
 def _undeclared(scenario: Scenario, share: float, draws: np.random.Generator) -> Document:
     """Every moment coefficient off by a share of it, with a sign that is drawn."""
-    names = [term.name for term in scenario.airframe.moments]
-    signs = draws.choice((-1.0, 1.0), len(names)).tolist()
-    ratios = {name: 1.0 + share * sign for name, sign in zip(names, signs, strict=True)}
-    return {"uncertainty.coefficients": ratios if share else {}}
+    shares = {term.name: share for term in scenario.airframe.moments}
+    ratios = signed(shares, 1.0, FACTOR_LIMITS)(1.0, draws) if share else {}
+    return {"uncertainty.coefficients": ratios}
 
 
 def _bandwidth(flight: Flight, system: str) -> Changes:

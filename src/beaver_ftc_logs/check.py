@@ -129,7 +129,8 @@ def _compare_angles(log: RecordedFlight, vehicle: Vehicle) -> list[str]:
         return ["no roll angle is named: whether the rates are in rad/s is not checked"]
     gyros = [columns[name] for name in vehicle.rate_columns]
     names = [angle.column if angle else "" for angle in (angles.roll, angles.pitch, angles.yaw)]
-    roll, pitch, yaw = map(columns.get, names)
+    roll = columns[angles.roll.column]
+    pitch, yaw = map(columns.get, names[1:])
     fits = [
         physics.fit_roll(gyros, roll, pitch),
         physics.fit_pitch(gyros, roll, pitch) if pitch else None,

@@ -266,8 +266,8 @@ class Vehicle(Section):
             *((("attitude", of), ANGLE, getattr(attitude, of, None)) for of in ("roll", "pitch", "yaw")),
             (("acceleration",), ACCELERATION, self.acceleration),
             (("airspeed",), SPEED, self.airspeed),
-            (("energy", "altitude"), LENGTH, energy and energy.altitude),
-            (("energy", "airspeed"), SPEED, energy and energy.airspeed),
+            (("energy", "altitude"), LENGTH, getattr(energy, "altitude", None)),
+            (("energy", "airspeed"), SPEED, getattr(energy, "airspeed", None)),
             *((("flow", of), _FLOW_KINDS.get(of), quantity) for of, quantity in sorted(self.flow.items())),
         ]
         return [(location, kind, quantity) for location, kind, quantity in found if quantity is not None]

@@ -101,7 +101,7 @@ class LogInputs:
         return replace(self, input_arrays=[rates, signals, commands, attitude])
 
     def stretches(self) -> Iterator[list[Floats]]:
-        """The arrays of each stretch, for a diagnosis that begins anew."""
+        """The arrays of each stretch, each after a reset of the diagnosis."""
         for begin, end in self.gap_free_stretches:
             self.diagnosis.reset()
             yield [np.ascontiguousarray(array[begin:end]) for array in self.input_arrays]

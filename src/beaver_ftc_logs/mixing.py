@@ -306,7 +306,7 @@ def _px4_mixing(params: _Parameters, column_names: set[str]) -> tuple[list[_Surf
         drivers[i] = [name for name in found if re.fullmatch(_PX4_OUTPUT_PATTERN, name)]
         reason = f"CA_SV_CS{i}_TYPE {kind}{''.join(f', {name} {servo}' for name in drivers[i])}"
         full = _full_name(_PX4_SURFACES[kind], i, kinds)
-        surfaces.append(_Surface(full, f"surface {i}", kind, shares[i], reason))
+        surfaces.append(_Surface(full, f"surface {i}", i, shares[i], reason))
     outputs = [[(f"actuator_servos.control[{i}]", (1.0, 0.0, "")) for i in drivers]]
     if "actuator_outputs_1.output[0]" not in column_names:  # else it is unknown which of the two is MAIN
         outputs += _px4_pulses(params, [*drivers.values()])

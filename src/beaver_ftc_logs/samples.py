@@ -223,7 +223,8 @@ def _check_attitude(log: RecordedFlight, vehicle: Vehicle) -> frozenset[str]:
 def convert_to_si(log: RecordedFlight, vehicle: Vehicle) -> RecordedFlight:
     """A log with the columns that a vehicle names in SI."""
     columns = dict(log.columns)
-    for name, quantity in {quantity.column: quantity for quantity in vehicle.measured_quantities()}.items():
+    quantities = {quantity.column: quantity for *_, quantity in reversed(vehicle.located_quantities())}
+    for name, quantity in quantities.items():
         if name in columns:
             columns[name] = replace(columns[name], values=quantity.to_si(columns[name].values))
     return replace(log, columns=columns)

@@ -46,6 +46,7 @@ VehicleName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$", max_length=100)]
 _SURFACE_NAME_PATTERN = re.compile(r"[A-Za-z0-9_-]{1,100}")
 ColumnName = Annotated[str, Field(min_length=1, max_length=200)]
 FaultKind = Literal["loss", "stuck"]
+_FLOW_KINDS = {"alpha_rad": ANGLE, "beta_rad": ANGLE}
 
 
 class QuantityColumn(Section):
@@ -241,55 +242,35 @@ class Vehicle(Section):
         }
         for key, values in tables.items():
             mistakes += _unknown_name_conflicts((key,), values, "surface", self.surfaces)
-        for location, kind, quantity in self.typed_quantities():
-            if quantity.unit is not None and SI_UNITS[quantity.unit][0] != kind:
+        first: dict[str, QuantityColumn] = {}
+        two_ways: list[Conflict] = []
+        for location, kind, quantity in self.located_quantities():
+            if kind and quantity.unit is not None and SI_UNITS[quantity.unit][0] != kind:
                 reason = f"{quantity.unit!r} is no unit of it, allowed: {', '.join(units_of_kind(kind))}"
                 mistakes.append(((*location, "unit"), reason))
-        mistakes += self._reading_conflicts()
-        refuse(mistakes)
+            if kind is not None and first.setdefault(quantity.column, quantity) != quantity:
+                reason = f"{quantity.column!r} is read in two ways, allowed: one unit, scale and offset"
+                two_ways.append((location, reason))
+        refuse([*mistakes, *two_ways[:1]])
         return self
 
-    def typed_quantities(self) -> list[tuple[Location, str, QuantityColumn]]:
-        """The quantities whose kind is known, those only looked at among them, and where they stand."""
-        kinds: list[tuple[str, str, Any]] = [
-            *((f"rates {axis}", RATE, getattr(self.rates, axis)) for axis in "pqr"),
-            *(
-                (f"attitude {axis}", ANGLE, getattr(self.attitude, axis, None))
-                for axis in ("roll", "pitch", "yaw")
-            ),
-            ("acceleration", ACCELERATION, self.acceleration),
-            ("airspeed", SPEED, self.airspeed),
-            ("energy altitude", LENGTH, getattr(self.energy, "altitude", None)),
-            ("energy airspeed", SPEED, getattr(self.energy, "airspeed", None)),
-            *((f"flow {name}", ANGLE, self.flow.get(name)) for name in ("alpha_rad", "beta_rad")),
-        ]
-        return [
-            (tuple(keys.split()), kind, quantity) for keys, kind, quantity in kinds if quantity is not None
-        ]
+    def located_quantities(self) -> list[tuple[Location, str | None, QuantityColumn]]:
+        """Every column but those of labels and outputs: where it stands in the file, and its kind.
 
-    def _reading_conflicts(self) -> list[Conflict]:
-        """One column read in two ways."""
-        first: dict[str, QuantityColumn] = {}
-        typed = [(location, quantity) for location, _, quantity in self.typed_quantities()]
-        for location, quantity in [*self.located_model_quantities(), *typed]:
-            if first.setdefault(quantity.column, quantity) != quantity:
-                reason = f"{quantity.column!r} is read in two ways, allowed: one unit, scale and offset"
-                return [(location, reason)]
-        return []
-
-    def located_model_quantities(self) -> list[tuple[Location, QuantityColumn]]:
-        """Rates, commands and signals as they stand in the file."""
-        found: list[tuple[Location, QuantityColumn]] = [
-            (("rates", axis), getattr(self.rates, axis)) for axis in "pqr"
+        The kind is empty where any unit may be right, None of a flow that only the aircraft's model knows."""
+        attitude, energy = self.attitude, self.energy
+        found: list[tuple[Location, str | None, QuantityColumn | None]] = [
+            *((("rates", axis), RATE, getattr(self.rates, axis)) for axis in "pqr"),
+            *((("commands", i), "", quantity) for i, quantity in enumerate(self.commands)),
+            *((("signals", i), "", quantity) for i, quantity in enumerate(self.signals)),
+            *((("attitude", of), ANGLE, getattr(attitude, of, None)) for of in ("roll", "pitch", "yaw")),
+            (("acceleration",), ACCELERATION, self.acceleration),
+            (("airspeed",), SPEED, self.airspeed),
+            (("energy", "altitude"), LENGTH, getattr(energy, "altitude", None)),
+            (("energy", "airspeed"), SPEED, getattr(energy, "airspeed", None)),
+            *((("flow", of), _FLOW_KINDS.get(of), quantity) for of, quantity in sorted(self.flow.items())),
         ]
-        found += [(("commands", i), quantity) for i, quantity in enumerate(self.commands)]
-        return found + [(("signals", i), quantity) for i, quantity in enumerate(self.signals)]
-
-    def measured_quantities(self) -> list[QuantityColumn]:
-        """Every column but those of labels and outputs."""
-        located = [quantity for _, quantity in self.located_model_quantities()]
-        typed = [quantity for *_, quantity in self.typed_quantities()]
-        return [*located, *self.flow.values(), *typed]
+        return [(location, kind, quantity) for location, kind, quantity in found if quantity is not None]
 
     @property
     def rate_columns(self) -> list[str]:
@@ -333,7 +314,8 @@ class Vehicle(Section):
 
     def column_names(self) -> list[str]:
         """Every column of a log that the vehicle may want, its time aside."""
-        quantities = [*self.measured_quantities(), *self.labels.values(), *self.outputs.values()]
+        located = [quantity for *_, quantity in self.located_quantities()]
+        quantities = [*located, *self.labels.values(), *self.outputs.values()]
         return list(dict.fromkeys(quantity.column for quantity in quantities))
 
 

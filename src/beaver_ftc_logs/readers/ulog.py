@@ -26,8 +26,9 @@ _MAX_MESSAGE_BYTES = 65535
 def read(path: Path, wanted: Collection[str] | None = None) -> RecordedFlight:
     """The flight in a .ulg file. Raises BadInput where it is none, or pyulog is missing.
 
-    wanted: the columns that are kept in memory, all where None. Where the log has none of them, all
-    columns are returned, without numbers. Where it lacks one, the log is read once more for the names of all.
+    wanted: the columns that are returned, all where None; their topics are in memory while the log is read.
+    Where the log has none of them, all columns are returned, without numbers. Where it lacks one, the log is
+    read once more for the names of all.
     """
     params: dict[str, tuple[float, ...]] = {}
     with package_errors_as_bad_input(path, "ULog", "pyulog", "a .ulg file of PX4"):

@@ -1,12 +1,23 @@
 """Small vehicles, models, flights and rows made by hand: small enough to be held whole."""
 
 import numpy as np
+from typer.testing import CliRunner
 
+from beaver_ftc.cli.main import app
 from beaver_ftc_logs.diagnose import LogRows
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.regression import group_surfaces
 from beaver_ftc_logs.samples import Samples, mixer_matrix
 from beaver_ftc_logs.vehicle import Vehicle
+
+
+def run(*arguments):
+    """What a command line does, with whatever ends it raised."""
+    done = CliRunner().invoke(app, [str(argument) for argument in arguments])
+    if done.exception is not None and not isinstance(done.exception, SystemExit):
+        raise done.exception
+    return done
+
 
 RATES = {"p": "p_rad_s", "q": "q_rad_s", "r": "r_rad_s"}
 WING = {

@@ -1,6 +1,7 @@
 """A log diagnosed by its aircraft's own model: the flight's own verdict, and refusals of what a log lacks."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -8,10 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pyarrow import csv as arrow
 from pyarrow import parquet
-from typer.testing import CliRunner
 
 import beaver_ftc as bf
-from beaver_ftc.cli.main import app
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.results.exports import RECORDING_FILE_OF_KIND, write_recording
 from beaver_ftc_logs import stepped
@@ -19,6 +18,7 @@ from beaver_ftc_logs.by_aircraft import diagnose_aircraft, load_diagnosed
 from beaver_ftc_logs.recording import Column, RecordedFlight
 from beaver_ftc_logs.samples import read_vehicle_columns
 from beaver_ftc_logs.vehicle import Vehicle, load_vehicle
+from products.logs.small import run
 
 BEAVER = load_diagnosed("beaver")
 
@@ -212,9 +212,8 @@ def test_a_scenario_that_does_not_fit_is_refused(tmp_path, text, says):
 )
 def test_options_that_contradict(tmp_path, options, says):
     (tmp_path / "flight.csv").write_text("t_s,p\n0,1\n")
-    done = CliRunner().invoke(app, ["diagnose", str(tmp_path / "flight.csv"), *options])
-    assert isinstance(done.exception, BadInput)
-    assert says in str(done.exception)
+    with pytest.raises(BadInput, match=re.escape(says)):
+        run("diagnose", tmp_path / "flight.csv", *options)
 
 
 def test_the_command_writes_rows_verdict_and_page(flown, tmp_path):
@@ -225,8 +224,8 @@ def test_the_command_writes_rows_verdict_and_page(flown, tmp_path):
     with (tmp_path / "vehicle.yaml").open("a") as file:
         file.write("labels: {elevator: elevator_truth}\n")
     told = ["--aircraft", "beaver", "--scenario", str(flown[0] / "scenario.yaml"), "--score"]
-    arguments = ["diagnose", str(path), *told, "--out", str(tmp_path / "d"), "--format", "json"]
-    (verdict,) = json.loads(CliRunner().invoke(app, arguments).stdout)["flights"]
+    done = run("diagnose", path, *told, "--out", tmp_path / "d", "--format", "json")
+    (verdict,) = json.loads(done.stdout)["flights"]
     assert (verdict["aircraft"], verdict["isolated"]) == ("beaver", "elevator")
     assert verdict["score"]["mean_error"] < 0.01
     rows = parquet.read_table(tmp_path / "d" / "flight" / "diagnosis.parquet")

@@ -4,12 +4,11 @@ import json
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from beaver_ftc.cli.main import app
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.vehicle import load_vehicle
 from products.logs import synthetic
+from products.logs.small import run
 from products.logs.test_signals import T_S, turning
 
 PHI, THETA, RATES = turning()
@@ -18,13 +17,6 @@ KINEMATIC = {
     "roll_cmd": 0.3 * np.sin(T_S), "pitch_cmd": 0.2 * np.cos(1.3 * T_S), "roll_rad": PHI, "pitch_rad": THETA,
     "az_m_s2": -9.8 + 0.1 * np.sin(2.0 * T_S),
 }  # fmt: skip
-
-
-def run(*arguments):
-    done = CliRunner().invoke(app, [str(argument) for argument in arguments])
-    if done.exception is not None and not isinstance(done.exception, SystemExit):
-        raise done.exception
-    return done
 
 
 def logged(path, names=None, factors=None, delimiter=",", comma=False, above=()):

@@ -5,19 +5,11 @@ import json
 import numpy as np
 import pytest
 from pyarrow import parquet
-from typer.testing import CliRunner
 
-from beaver_ftc.cli.main import app
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.model import model_file_text
 from products.logs import synthetic
-
-
-def run(*arguments):
-    done = CliRunner().invoke(app, [str(argument) for argument in arguments])
-    if done.exception is not None and not isinstance(done.exception, SystemExit):
-        raise done.exception
-    return done
+from products.logs.small import run
 
 
 @pytest.fixture(scope="module")

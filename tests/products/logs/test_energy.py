@@ -1,18 +1,15 @@
 """Energy height by closed forms, and which names an engine that may have failed leaves."""
 
-import json
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import energy
 from beaver_ftc_logs.readers import alfa
 from beaver_ftc_logs.recording import Column, RecordedFlight
 from beaver_ftc_logs.samples import resample
-from beaver_ftc_logs.vehicle import Vehicle, load_vehicle
+from beaver_ftc_logs.vehicle import Vehicle
 
 T_S = np.arange(0.0, 20.0, 0.1)
 ONE = np.zeros(len(T_S), dtype=int)
@@ -75,14 +72,6 @@ def test_samples_have_it_in_si_where_it_is_logged():
     climb = resample(recording(**logged), vehicle).energy_height_rate_mps
     np.testing.assert_allclose(climb[T_S > 5.05], -2.0, atol=1e-9)
     assert resample(recording(alt=logged["alt"]), vehicle).energy_height_rate_mps is None
-
-
-def test_a_unit_of_another_kind_is_refused(tmp_path):
-    path = tmp_path / "wing.yaml"
-    wrong = WING | {"energy": {"altitude": {"column": "alt", "unit": "kt"}, "airspeed": "tas"}}
-    path.write_text(json.dumps(wrong))
-    with pytest.raises(BadInput, match=r"energy.altitude.unit: 'kt' is no unit of it, allowed: m, cm, ft"):
-        load_vehicle(path)
 
 
 def test_the_airspeed_of_an_alfa_flight_is_ground_speed_less_the_last_wind():

@@ -9,7 +9,8 @@ from beaver_ftc_logs.known_commands import is_command_name, multicopter_reason
 from beaver_ftc_logs.readers import check_exists, read_flight, reader_name_for_path
 from beaver_ftc_logs.readers.time_text import seconds_of_text
 from products.logs import synthetic
-from products.logs.test_check import KINEMATIC, RATES, T_S, logged, run
+from products.logs.small import run
+from products.logs.test_check import KINEMATIC, RATES, T_S, logged
 
 
 @pytest.mark.parametrize("name", [

@@ -11,7 +11,8 @@ from beaver_ftc_logs.readers import read_flight
 from beaver_ftc_logs.samples import resample
 from beaver_ftc_logs.vehicle import Vehicle
 from products.logs import synthetic
-from products.logs.test_check import KINEMATIC, run
+from products.logs.small import run
+from products.logs.test_check import KINEMATIC
 
 T_S = KINEMATIC["t_s"]
 GYRO = {"t_s": T_S} | {

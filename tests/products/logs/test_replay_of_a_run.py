@@ -4,12 +4,11 @@ import json
 
 import pytest
 from pyarrow import parquet
-from typer.testing import CliRunner
 
 import beaver_ftc as bf
-from beaver_ftc.cli.main import app
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.replay import replay_run_log
+from products.logs import small
 
 DECLARED = {"rate_hz": 50, "actuators": "servo", "fdi": {"sharpen": "none"}}
 WITHDRAWN = {"design_model": {"linearised": True}, "fdi": {"bounds": {"coefficients": 0.05}}}
@@ -81,8 +80,7 @@ def test_damaged_metrics_beside_the_log_are_told(run, tmp_path, text):
 
 def test_the_command_writes_rows_and_verdict(run, tmp_path):
     folder, flight = run
-    arguments = ["diagnose", str(folder / "log.parquet"), "--out", str(tmp_path), "--format", "json"]
-    done = CliRunner().invoke(app, arguments)
+    done = small.run("diagnose", folder / "log.parquet", "--out", tmp_path, "--format", "json")
     (verdict,) = json.loads(done.stdout)["flights"]
     assert verdict["as_flown"] is True
     rows = parquet.read_table(tmp_path / folder.name / "diagnosis.parquet")
@@ -93,6 +91,5 @@ def test_the_command_writes_rows_and_verdict(run, tmp_path):
 def test_another_table_wants_a_model(tmp_path):
     path = tmp_path / "flight.csv"
     path.write_text("t_s,p\n0,1\n1,2\n")
-    done = CliRunner().invoke(app, ["diagnose", str(path), "--out", str(tmp_path)])
-    assert isinstance(done.exception, BadInput)
-    assert "--model is missing" in str(done.exception)
+    with pytest.raises(BadInput, match="--model is missing"):
+        small.run("diagnose", path, "--out", tmp_path)

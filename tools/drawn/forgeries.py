@@ -84,56 +84,20 @@ def forgeries(
     rng: np.random.Generator, written: Document, log: Log, scenario: str, n: int
 ) -> Iterator[tuple[Document, tuple[str, ...]]]:
     """So many documents with a statement that is false, and the roads by which each was made to hold."""
-    while n > 0:
-        forged, said = false_statement(rng, written, log)
+    for _ in range(n):
+        forged = Forgery(rng, written, log)
         chosen = tuple(rng.choice([*ROADS], size=rng.integers(1, 4), replace=False))
         for name in chosen:
             with suppress(TypeError):  # a road after one that left a field of another type
-                ROADS[name](rng, forged, said, log)
-        restate(forged, said, log, scenario)
-        yield with_digest(json.loads(json.dumps(forged))), chosen
-        n -= 1
-
-
-def false_statement(rng: np.random.Generator, written: Document, log: Log) -> tuple[Document, Document]:
-    """The document with one statement alone, of an event that the log does not have."""
-    rows, forged = len(log["t_s"]), copy.deepcopy(written)
-    true = [one for one in written["statements"] if "as" not in one]
-    surfaces = [name.removesuffix("_cmd_rad") for name in log if name.endswith("_cmd_rad")]
-    excluded = {(one["what"], one["frame"]) for one in written["statements"]}
-    while True:
-        k, kind = int(rng.integers(1, rows)), rng.integers(3)
-        surface = str(rng.choice(surfaces))
-        what = (None, surface, f"{surface} {rng.choice(TYPES)}")[kind]
-        column = checker.event_column(what, log)
-        columns = [column, f"fie_{surface}_excluded", "detected", "t_s"]
-        column = str(rng.choice(columns, p=[0.7, 0.1, 0.1, 0.1]))
-        if (what, k) not in excluded and not _is_event(what, k, log):
-            break
-    if true and rng.random() < 0.6:  # the evidence of another event
-        said = copy.deepcopy(true[rng.integers(len(true))])
-        if rng.random() < 0.5:
-            _move(said, k - said["frame"], rows, log)
-    else:
-        said = {"theta": "any", "terms": [_term(k, log, forged)], "sides": [0.0, 0.0]}
-        forged.setdefault("declared", {name: {} for name in "cbgoBm"})
-        forged.setdefault("dt_s", float(np.median(np.diff(log["t_s"]))))
-    said |= {"what": what, "column": column, "frame": k}
-    forged["statements"] = [said]
-    return forged, said
+                ROADS[name](forged)
+        forged.restate(scenario)
+        yield with_digest(json.loads(json.dumps(forged.document))), chosen
 
 
 def _is_event(what: str | None, k: int, log: Log) -> bool:
     """Whether the log has this event in this row."""
     column = log.get(checker.event_column(what, log))
     return column is not None and bool(column[k:].all() and (k == 0 or not column[k - 1]))
-
-
-def _term(k: int, log: Log, forged: Document) -> Document:
-    """A frame by itself, as the log has it."""
-    d = [0.0, 0.0, 0.0]
-    d[k % 3] = (-1.0) ** (k // 3)
-    return {"weight": 1.0, "d": d, "first": k, "frame": k, **_copies(k, k, log)}
 
 
 def _copies(first: int, last: int, log: Log) -> Document:
@@ -144,172 +108,208 @@ def _copies(first: int, last: int, log: Log) -> Document:
     }
 
 
-def _move(said: Document, by: int, rows: int, log: Log) -> None:
-    """The evidence at another time."""
-    for one in (*said.get("terms", ()), *said.get("bounds", ())):
-        if "block" not in said and 0 < one["first"] + by <= one["frame"] + by < rows:
-            one["first"], one["frame"] = one["first"] + by, one["frame"] + by
-            if "since" in one:
-                one["since"] = max(one["since"] + by, 0)
-            if "x" in one:
-                one.update(_copies(one["first"], one["frame"], log))
-    if "likelihood" in said:
-        said["first"] = max(said["first"] + by, 1)
+class Forgery:
+    """A document with one statement alone, `said`, of an event that the log does not have."""
 
+    def __init__(self, rng: np.random.Generator, written: Document, log: Log) -> None:
+        self.rng, self.log, self.document = rng, log, copy.deepcopy(written)
+        rows, true = len(log["t_s"]), [one for one in written["statements"] if "as" not in one]
+        surfaces = [name.removesuffix("_cmd_rad") for name in log if name.endswith("_cmd_rad")]
+        excluded = {(one["what"], one["frame"]) for one in written["statements"]}
+        while True:
+            k, kind = int(rng.integers(1, rows)), rng.integers(3)
+            surface = str(rng.choice(surfaces))
+            what = (None, surface, f"{surface} {rng.choice(TYPES)}")[kind]
+            columns = [checker.event_column(what, log), f"fie_{surface}_excluded", "detected", "t_s"]
+            column = str(rng.choice(columns, p=[0.7, 0.1, 0.1, 0.1]))
+            if (what, k) not in excluded and not _is_event(what, k, log):
+                break
+        if true and rng.random() < 0.6:  # the evidence of another event
+            self.said = copy.deepcopy(true[rng.integers(len(true))])
+            if rng.random() < 0.5:
+                self._move(k - self.said["frame"])
+        else:
+            d = [0.0, 0.0, 0.0]
+            d[k % 3] = (-1.0) ** (k // 3)
+            term = {"weight": 1.0, "d": d, "first": k, "frame": k, **_copies(k, k, log)}
+            self.said = {"theta": "any", "terms": [term], "sides": [0.0, 0.0]}
+            self.document.setdefault("declared", {name: {} for name in "cbgoBm"})
+            self.document.setdefault("dt_s", float(np.median(np.diff(log["t_s"]))))
+        self.said |= {"what": what, "column": column, "frame": k}
+        self.document["statements"] = [self.said]
 
-def restate(forged: Document, said: Document, log: Log, scenario: str) -> None:
-    """Write rest and sides as the numbers now have it: the checker's own sums, whatever they are. Where the
-    checker refuses before it has sums, no sides would hold."""
-    with suppress(Exception):
-        declared = checker.declared_at_row(yaml.safe_load(scenario), said["frame"])
-        frames = checker.Frames(forged, log, declared, said.get("block"))
-        for term in said.get("terms", ()):
-            rows = slice(term["first"], term["frame"] + 1)
-            term["rest"] = (np.array(term["eta_bar"]) - frames.stated_bound_rad_s2[rows]).tolist()
-        pairs = checker.pairs_of(said, frames, declared)
-        sides = np.array(pairs, float).T
-        said["sides"] = sides.tolist() if {"likelihood", "bounds"} & set(said) else sides[:, 0].tolist()
+    def _move(self, by: int) -> None:
+        """The evidence at another time."""
+        said = self.said
+        for one in (*said.get("terms", ()), *said.get("bounds", ())):
+            if "block" not in said and 0 < one["first"] + by <= one["frame"] + by < len(self.log["t_s"]):
+                one["first"], one["frame"] = one["first"] + by, one["frame"] + by
+                if "since" in one:
+                    one["since"] = max(one["since"] + by, 0)
+                if "x" in one:
+                    one.update(_copies(one["first"], one["frame"], self.log))
+        if "likelihood" in said:
+            said["first"] = max(said["first"] + by, 1)
+
+    def replace(self, **evidence: Any) -> None:
+        """Other evidence for the same event."""
+        for name in [name for name in self.said if name not in ("what", "column", "frame")]:
+            del self.said[name]
+        self.said |= evidence
+
+    def restate(self, scenario: str) -> None:
+        """Write rest and sides as the numbers now have it: the checker's own sums, whatever they are. Where
+        the checker refuses before it has sums, no sides would hold."""
+        said = self.said
+        with suppress(Exception):
+            declared = checker.declared_at_row(yaml.safe_load(scenario), said["frame"])
+            frames = checker.Frames(self.document, self.log, declared, said.get("block"))
+            for term in said.get("terms", ()):
+                rows = slice(term["first"], term["frame"] + 1)
+                term["rest"] = (np.array(term["eta_bar"]) - frames.stated_bound_rad_s2[rows]).tolist()
+            sides = np.array(checker.pairs_of(said, frames, declared), float).T
+            said["sides"] = sides.tolist() if {"likelihood", "bounds"} & set(said) else sides[:, 0].tolist()
 
 
 # --- the roads: each alters one thing that could make a statement hold -----------------------------------
 
 
-def _dt(rng: np.random.Generator, forged: Document, said: Document, log: Log) -> None:
-    forged["dt_s"] = float(forged.get("dt_s", 0.01) * rng.choice([-1.0, *WIDE]))
+def _dt(of: Forgery) -> None:
+    of.document["dt_s"] = float(of.document.get("dt_s", 0.01) * of.rng.choice([-1.0, *WIDE]))
 
 
-def _instants(rng: np.random.Generator, forged: Document, said: Document, log: Log) -> None:
-    forged["instants"] = rng.choice([-1e9, 0, 0.5, 2, 50]).item()
+def _instants(of: Forgery) -> None:
+    of.document["instants"] = of.rng.choice([-1e9, 0, 0.5, 2, 50]).item()
 
 
-def _noise(rng: np.random.Generator, forged: Document, said: Document, log: Log) -> None:
+def _noise(of: Forgery) -> None:
     given = {
-        axis: float(v) for axis, v in zip("pqr", rng.choice([-1e3, -1e-3, 0, 1e-6, 0.5, 1e3], 3), strict=True)
+        axis: float(v)
+        for axis, v in zip("pqr", of.rng.choice([-1e3, -1e-3, 0, 1e-6, 0.5, 1e3], 3), strict=True)
     }
-    forged.setdefault("declared", {name: {} for name in "cbgoBm"})[str(rng.choice([*"oBm"]))] = given
+    of.document.setdefault("declared", {name: {} for name in "cbgoBm"})[str(of.rng.choice([*"oBm"]))] = given
 
 
-def _no_bounds(rng: np.random.Generator, forged: Document, said: Document, log: Log) -> None:
-    forged["declared"] = {name: {} for name in "cbgoBm"}
-    forged["omega_E"] = rng.choice([0.0, -1e3, 7.292115857915991e-05]).item()
+def _no_bounds(of: Forgery) -> None:
+    of.document["declared"] = {name: {} for name in "cbgoBm"}
+    of.document["omega_E"] = of.rng.choice([0.0, -1e3, 7.292115857915991e-05]).item()
 
 
 def _of_terms(alter: Callable[..., None]) -> Callable[..., None]:
-    def road(rng: np.random.Generator, forged: Document, said: Document, log: Log) -> None:
-        for term in (*said.get("terms", ()), *said.get("bounds", ())):
+    def road(of: Forgery) -> None:
+        for term in (*of.said.get("terms", ()), *of.said.get("bounds", ())):
             if isinstance(term, dict):  # `bounds` of some statements are names
-                alter(rng, term, log)
+                alter(of.rng, term)
 
     return road
 
 
-def _direction(rng: np.random.Generator, term: Document, log: Log) -> None:
+def _direction(rng: np.random.Generator, term: Document) -> None:
     term["d"] = rng.choice([-1.0, 0.0, 1.0, 0.3, 1e300], 3).tolist()
 
 
-def _pole(rng: np.random.Generator, term: Document, log: Log) -> None:
+def _pole(rng: np.random.Generator, term: Document) -> None:
     term["pole_per_s"] = float(rng.choice([-1.0, 1.0], p=[0.7, 0.3]) * rng.choice([0.1, 5, 50, 200, 1e4]))
     term["since"] = int(max(term["frame"] - rng.integers(1, 60), 0))
 
 
-def _since(rng: np.random.Generator, term: Document, log: Log) -> None:
+def _since(rng: np.random.Generator, term: Document) -> None:
     term["since"] = int(rng.integers(-5, term["frame"] + 3))
 
 
-def _weight(rng: np.random.Generator, term: Document, log: Log) -> None:
+def _weight(rng: np.random.Generator, term: Document) -> None:
     term["weight"] = float(rng.choice([-1.0, 0.0, 1e-300, 1e300, np.inf, np.nan]))
 
 
-def _effect(rng: np.random.Generator, term: Document, log: Log) -> None:
+def _effect(rng: np.random.Generator, term: Document) -> None:
     for name in rng.choice([*"hZr"], rng.integers(1, 4), replace=False):
         n = term["frame"] + 1 - term["first"]
         term[str(name)] = rng.choice([-1e3, -1.0, 0.0, 1.0, 1e-13], n).tolist()
 
 
-def _no_effect(rng: np.random.Generator, term: Document, log: Log) -> None:
+def _no_effect(rng: np.random.Generator, term: Document) -> None:
     for name in ("h", "Z", "r", "fault"):
         term.pop(name, None)
 
 
-def _past(rng: np.random.Generator, term: Document, log: Log) -> None:
+def _past(rng: np.random.Generator, term: Document) -> None:
     term["fault"] = float(rng.choice([-1e3, -1e-3, 0.0]))
 
 
-def _copy(rng: np.random.Generator, term: Document, log: Log) -> None:
+def _copy(rng: np.random.Generator, term: Document) -> None:
     for name in rng.choice(["x", "F", "eta_bar"], rng.integers(1, 4), replace=False):
         if name in term:
             term[str(name)] = (np.array(term[str(name)]) * rng.choice([-1.0, 0.0, 2.0])).tolist()
 
 
-def _theta(rng: np.random.Generator, forged: Document, said: Document, log: Log) -> None:
-    said["theta"] = str(rng.choice(["any", "constant", "constant while it shows", "course", "none"]))
-    said |= {"least": float(rng.choice([-1.0, 0.0, 5.0])), "most": float(rng.choice([-5.0, 0.0, 1.0]))}
+def _theta(of: Forgery) -> None:
+    of.said["theta"] = str(of.rng.choice(["any", "constant", "constant while it shows", "course", "none"]))
+    of.said |= {
+        "least": float(of.rng.choice([-1.0, 0.0, 5.0])),
+        "most": float(of.rng.choice([-5.0, 0.0, 1.0])),
+    }
 
 
-def _block(rng: np.random.Generator, forged: Document, said: Document, log: Log) -> None:
-    length = int(rng.choice([-1, 0, 1, 2, 20]))
-    said["block"] = [length, 0, (len(log["t_s"]) // max(length, 1)) * max(length, 1)]
+def _block(of: Forgery) -> None:
+    length = int(of.rng.choice([-1, 0, 1, 2, 20]))
+    of.said["block"] = [length, 0, (len(of.log["t_s"]) // max(length, 1)) * max(length, 1)]
 
 
-def _replace(said: Document, **evidence: Any) -> None:
-    for name in [name for name in said if name not in ("what", "column", "frame")]:
-        del said[name]
-    said |= evidence
+def _looks(of: Forgery) -> None:
+    looks = of.rng.choice(
+        [[1.0, 0.0, -2.0], [1.0, 0.0, 0.0], [1e3, 0.0, 1.0], [np.nan, 0.0, -1.0]], 2
+    ).tolist()
+    of.replace(test=str(of.rng.choice(checker.TESTS)), looks=looks, sides=[1.0, 0.0])
 
 
-def _looks(rng: np.random.Generator, forged: Document, said: Document, log: Log) -> None:
-    looks = rng.choice([[1.0, 0.0, -2.0], [1.0, 0.0, 0.0], [1e3, 0.0, 1.0], [np.nan, 0.0, -1.0]], 2).tolist()
-    _replace(said, test=str(rng.choice(checker.TESTS)), looks=looks, sides=[1.0, 0.0])
+def _missing(of: Forgery) -> None:
+    of.replace(missing=[of.rng.choice([-1, 0, 3]).item()], sides=[1.0, 0.0])
 
 
-def _missing(rng: np.random.Generator, forged: Document, said: Document, log: Log) -> None:
-    _replace(said, missing=[rng.choice([-1, 0, 3]).item()], sides=[1.0, 0.0])
-
-
-def _as_alarm(rng: np.random.Generator, forged: Document, said: Document, log: Log) -> None:
+def _as_alarm(of: Forgery) -> None:
     alarm = {"likelihood": "t_s", "axes": [1], "first": 1, "what": None, "column": "detected", "frame": 1}
-    forged["statements"].insert(0, alarm)
-    _replace(said, **{"as": "alarm"})
+    of.document["statements"].insert(0, alarm)
+    of.replace(**{"as": "alarm"})
 
 
-def _chance(rng: np.random.Generator, forged: Document, said: Document, log: Log) -> None:
-    k, shares = said["frame"], [name for name in log if name.endswith("_likelihood_share")]
-    frame: Document = {"jitter": [float(rng.choice([0, -1e-6]))], "drift": [[0.0]], "signature": [1.0]}
-    if rng.random() < 0.5:
-        frame["bounded"] = [float(rng.choice([0.0, -1e6]))]
-    tolerance = [-1e3] if rng.random() < 0.3 else []
+def _chance(of: Forgery) -> None:
+    k, shares = of.said["frame"], [name for name in of.log if name.endswith("_likelihood_share")]
+    frame: Document = {"jitter": [float(of.rng.choice([0, -1e-6]))], "drift": [[0.0]], "signature": [1.0]}
+    if of.rng.random() < 0.5:
+        frame["bounded"] = [float(of.rng.choice([0.0, -1e6]))]
+    tolerance = [-1e3] if of.rng.random() < 0.3 else []
     if tolerance:
         frame["known"] = [[1.0]]
-    _replace(
-        said, likelihood=str(rng.choice([*shares, "t_s", "airspeed_mps"])),
-        level=float(rng.choice([-50.0, 1e-9, 0.0, 6.0])), sense=str(rng.choice(["either", "less"])),
-        axes=[int(rng.integers(3))], R=[float(rng.choice([1e-6, -1e-6, 0.0]))],
-        P=[[1e-6, 0], [0, float(rng.choice([1e-6, -1e-6]))]], Y=[[0.0] * (2 + len(tolerance))] * 2,
+    of.replace(
+        likelihood=str(of.rng.choice([*shares, "t_s", "airspeed_mps"])),
+        level=float(of.rng.choice([-50.0, 1e-9, 0.0, 6.0])), sense=str(of.rng.choice(["either", "less"])),
+        axes=[int(of.rng.integers(3))], R=[float(of.rng.choice([1e-6, -1e-6, 0.0]))],
+        P=[[1e-6, 0], [0, float(of.rng.choice([1e-6, -1e-6]))]], Y=[[0.0] * (2 + len(tolerance))] * 2,
         tolerance=tolerance, first=k, frames=[frame], sides=[[1.0, 1.0], [0.0, 0.0]],
     )  # fmt: skip
 
 
-def _course(rng: np.random.Generator, forged: Document, said: Document, log: Log) -> None:
-    k = said["frame"]
+def _course(of: Forgery) -> None:
+    k = of.said["frame"]
     frames = sorted({max(k - 2, 1), k})
     bounds = [{"d": [0.0, 1.0, 0.0], "first": j, "frame": j, "h": [0.0],
-               "r": [float(rng.choice([0.0, -1e6]))],
+               "r": [float(of.rng.choice([0.0, -1e6]))],
                "Z": [float(z)]} for j, z in zip(frames, (1.0, -1.0), strict=False)]  # fmt: skip
-    _replace(said, theta="course", bounds=bounds, stops=[1e9], pace_rad_s=1e9, slowest_rad_s=1e9, near=-1e9,
+    of.replace(theta="course", bounds=bounds, stops=[1e9], pace_rad_s=1e9, slowest_rad_s=1e9, near=-1e9,
              ordered=[-1e9], sides=[[1.0], [0.0]])  # fmt: skip
 
 
-def _empty(rng: np.random.Generator, forged: Document, said: Document, log: Log) -> None:
-    _replace(said, theta=str(rng.choice(["any", "course"])), terms=[], sides=[1.0, 0.0])
+def _empty(of: Forgery) -> None:
+    of.replace(theta=str(of.rng.choice(["any", "course"])), terms=[], sides=[1.0, 0.0])
 
 
-def _odd(rng: np.random.Generator, forged: Document, said: Document, log: Log) -> None:
+def _odd(of: Forgery) -> None:
     """A value of another type in some field of the statement."""
-    name = str(rng.choice([*said]))
-    said[name] = [None, "1", True, [], {}, [[]], 1e400, -1][rng.integers(8)]
+    name = str(of.rng.choice([*of.said]))
+    of.said[name] = [None, "1", True, [], {}, [[]], 1e400, -1][of.rng.integers(8)]
 
 
-ROADS: dict[str, Callable[..., None]] = {
+ROADS: dict[str, Callable[[Forgery], None]] = {
     "dt": _dt, "instants": _instants, "noise": _noise, "no bounds": _no_bounds,
     "direction": _of_terms(_direction), "pole": _of_terms(_pole), "since": _of_terms(_since),
     "weight": _of_terms(_weight), "effect": _of_terms(_effect), "no effect": _of_terms(_no_effect),

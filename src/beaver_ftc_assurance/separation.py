@@ -14,6 +14,7 @@ short horizon in which the rates follow dx/dt = G u: a linear programme finds th
 
 import json
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import combinations
 from math import degrees, inf, radians
@@ -126,12 +127,12 @@ def separate(scenario: Scenario, rate_deg_s: float = LARGEST_RATE_DEG_S) -> Docu
     names = scenario.airframe.surfaces
     if len(left) < 2:
         raise BadInput(f"{scenario.name}: one candidate or none is left, allowed with separate: two at least")
-    pairs, both = propose(left, situation, names), combinations(left, 2)
-    if scenario.fdi.probing is not None:
-        pairs = [
-            pair | (_flown(scenario, pair, each) if pair["separates"] else {})
-            for pair, each in zip(pairs, both, strict=True)
-        ]
+    pairs = []
+    for both in combinations(left, 2):
+        pair = {"candidates": [_words(each, names) for each in both]} | tell_apart(*both, situation, names)
+        if scenario.fdi.probing is not None and pair["separates"]:
+            pair |= _flown(scenario, pair, both)
+        pairs.append(pair)
     return {
         "scenario": scenario.name,
         "time_s": landing.frames / scenario.rate_hz,
@@ -143,34 +144,27 @@ def separate(scenario: Scenario, rate_deg_s: float = LARGEST_RATE_DEG_S) -> Docu
     }
 
 
-def propose(left: Sequence[Candidate], at: Situation, names: Sequence[str]) -> list[Document]:
-    """For each two candidates the smallest doublet that tells them apart, or why there is none."""
-    return [
-        {"candidates": [_words(each, names) for each in both], **tell_apart(*both, at, names)}
-        for both in combinations(left, 2)
-    ]
-
-
 def _flown(scenario: Scenario, pair: Document, candidates: Sequence[Candidate]) -> Document:
     """Which of two candidates are left once the doublet has been flown, and exits from the envelope in it."""
-    flight = _longer(scenario, pair)
-    try:
+    with _longer(scenario, pair) as flight:
         before = 0
         for k in _with_doublet(flight, scenario, pair):
             if k == round(scenario.duration_s * scenario.rate_hz) - 1:
                 before = flight.readout.envelope_exits
-        at_end, both = flight.readout, zip(candidates, pair["candidates"], strict=True)
-        still = {*_left(at_end.diagnosis)}
+        still, both = {*_left(flight.readout.diagnosis)}, zip(candidates, pair["candidates"], strict=True)
         left = [words for one, words in both if (one.surface, one.kind) in still]
-        return {"left": left, "envelope_exits": at_end.envelope_exits - before}
-    finally:
-        flight.release()
+        return {"left": left, "envelope_exits": flight.readout.envelope_exits - before}
 
 
-def _longer(scenario: Scenario, pair: Document) -> Stepping:
+@contextmanager
+def _longer(scenario: Scenario, pair: Document) -> Iterator[Stepping]:
     """The flight, with time for the doublet."""
     spare_s = pair["duration_s"] + 10.0 / scenario.rate_hz
-    return Stepping(scenario.model_copy(update={"duration_s": scenario.duration_s + spare_s}))
+    flight = Stepping(scenario.model_copy(update={"duration_s": scenario.duration_s + spare_s}))
+    try:
+        yield flight
+    finally:
+        flight.release()
 
 
 def _with_doublet(flight: Stepping, scenario: Scenario, pair: Document) -> Iterator[int]:
@@ -191,11 +185,8 @@ def _with_doublet(flight: Stepping, scenario: Scenario, pair: Document) -> Itera
 
 def certified(scenario: Scenario, pair: Document) -> Certified:
     """The certificate of the flight with its doublet."""
-    flight = _longer(scenario, pair)
-    try:
+    with _longer(scenario, pair) as flight:
         return proved.proved(scenario, flight.records, _with_doublet(flight, scenario, pair))
-    finally:
-        flight.release()
 
 
 def write(document: Document, scenario: Scenario, out: Path) -> Path:

@@ -260,8 +260,8 @@ def _likelihood_ratio(
         its["foreseen"] = np.sum(taken, axis=0)[:, felt]
     state = then["state"][0, states]
     Y = np.array([state, np.zeros(2 * n), *before[0]]).T
-    xx, xd, dd = (of[name][0][np.ix_(felt, felt)] for name in ("P_xx", "P_xd", "P_dd"))
-    P = np.block([[xx, xd], [xd.T, dd]])
+    xx, xd, dd = (of[name][0] for name in ("P_xx", "P_xd", "P_dd"))
+    P = np.block([[xx, xd], [xd.T, dd]])[np.ix_(states, states)]
     innovation = history.innovation_rad_s2[rows[0] : rows[-1] + 1, axes]
     return LikelihoodRatio(
         level=diagnosis.statistical_alarm_level, axes=axes, sense="less" if sense else "either",

@@ -469,21 +469,20 @@ def effect_of_fault(what, frames):
         return Effect(zero, zero, zero, 0.0, 0.0)
     surface, _, kind = what.partition(" ")
     name = f"fie_{surface}_position" if kind else f"fie_{surface}"
-    needed = [f"{name}_p_slope"] + ([f"{surface}_travel_low_rad"] if kind else [f"{name}_theta_low"])
-    require(all(column in frames.log for column in needed),
-            f"the log has no columns of {what}: it was not written with this certificate")  # fmt: skip
+    ends = f"{surface}_travel_{{}}_rad" if kind else f"{name}_theta_{{}}"
+    lacking = {f"{name}_p_slope", ends.format("low")} - set(frames.log)
+    require(not lacking, f"the log has no columns of {what}: it was not written with this certificate")
     columns = f"{name}_{{}}_offset_rad_s2", f"{name}_{{}}_slope", f"{name}_{{}}_spread_rad_s2"
     offset, slope, spread = (frames.mean(frames.columns(column)) for column in columns)
-    ends = f"{surface}_travel_{{}}_rad" if kind else f"{name}_theta_{{}}"
     low, high = (constant_value(frames.log[ends.format(end)]) for end in ("low", "high"))
     if not kind:
         return Effect(offset, slope, spread, low, high)
-    course = course_of(what, frames.log)
-    if course is not None:  # theta says where the surface was; of a swing, how far off its command
-        relation = float(course[0] == "swing"), False, False, low, high
-    else:
-        relation = relation_of(what, frames.log, low, high)
-    return effect_of_relation(relation, offset, slope, spread)
+    gain, is_share, is_constant, low, high = relation_of(what, frames.log, low, high)
+    # G (p - u) of the relation; offset and slope are those of the surface's position: -G u and G
+    h, Z = (1.0 - gain) * offset, -offset if is_share else slope
+    if low == high:
+        h, Z, low, high = h + low * Z, np.zeros_like(Z), 0.0, 0.0
+    return Effect(h, Z, spread, low, high, bool(is_constant))
 
 
 def course_of(what, log):
@@ -499,8 +498,11 @@ def course_of(what, log):
 
 
 def relation_of(what, log, low, high):
-    """How this type moves the surface, see RELATIONS; low, high: the travel, rad."""
-    kind = what.partition(" ")[2]
+    """How this type moves the surface, see RELATIONS; low, high: the travel, rad. Of a type with a course
+    theta says where the surface was; of a swing, how far off its command."""
+    kind, course = what.partition(" ")[2], course_of(what, log)
+    if course is not None:
+        return float(course[0] == "swing"), False, False, low, high
     if kind in RELATIONS:
         return RELATIONS[kind](low, high)
     columns = [f"{what.replace(' ', '_')}_{name}" for name in RELATION_COLUMNS]
@@ -514,16 +516,6 @@ def constant_value(values):
     found = np.unique(values[np.isfinite(values)])
     require(len(found) == 1, "a column that must be constant is not")
     return float(found[0])
-
-
-def effect_of_relation(relation, offset, slope, spread):
-    """G (p - u) of a relation; offset and slope are those of the surface's position: -G u and G."""
-    gain, is_share, is_constant, low, high = relation
-    Z = -offset if is_share else slope
-    h = (1.0 - gain) * offset
-    if low == high:
-        return Effect(h + low * Z, np.zeros_like(Z), spread, 0.0, 0.0, bool(is_constant))
-    return Effect(h, Z, spread, low, high, bool(is_constant))
 
 
 # --- 6. The sum over filters (docs/explanation/certificates.md, "The inequality") ---------------------

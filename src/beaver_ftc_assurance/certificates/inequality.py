@@ -144,44 +144,49 @@ class Inequality:
         return {**self.history.statement_fields, "theta": theta, **ends, "terms": said, "sides": self.sides}
 
     def _evaluate(self, term: Term) -> _Numbers:
+        """E = sum of a^(k-j) dt nu[j].d over the frames j after filter_start, k: last_frame; and its limit:
+        the same sum of eta_bar, the gyro noise of both ends, and the largest effect of the fault."""
         of, history, d, dt = self.hypothesis, self.history, term.direction, self.history.dt
         start, last, first = term.filter_start, term.last_frame, self._first_written_frame(term)
         a = 0.0 if isinf(term.pole_per_s) else exp(-term.pole_per_s * dt)
-        begin = min(max(start, term.first_kept_frame) + 1, first)
-        before = _filtered(a, dt, of.max_effects(d, slice(begin, first)), term.effect_before)
-        summed, noise = slice(start + 1, last + 1), history.gyro_error_change_rad_s @ np.abs(d)
-        weights = _filter_weights(a, last - start)
+        summed, weights = slice(start + 1, last + 1), _filter_weights(a, last - start)
         value = dt * weights @ (history.innovation_rad_s2[summed] @ d)
+        noise = history.gyro_error_change_rad_s @ np.abs(d)
         gyro = a * weights[0] * noise[start] + (1.0 - a) * weights @ noise[start:last] + noise[last]
         limit = dt * weights @ (history.eta_bar_rad_s2[summed] @ np.abs(d)) + gyro
+        begin = min(max(start, term.first_kept_frame) + 1, first)
+        before = _filtered(a, dt, of.max_effects(d, slice(begin, first)), term.effect_before)
         rows = slice(first, last + 1)
         h, Z, r = of.along(d, rows)
         at_low, at_high = h + of.theta_low * Z, h + of.theta_high * Z
-        adds = np.maximum(at_low, at_high) > MIN_EFFECT_RAD_S2
         if of.theta_is_constant:
-            limit, adds = limit + _filtered(a, dt, h + r, before), np.ones(len(h), bool)
+            done, slope = h + r, float(dt * _filter_weights(a, len(Z)) @ Z)
+            adds = np.ones(len(h), bool)
         else:
-            limit += _filtered(a, dt, of.max_effects(d, rows), before)
-        said: Document = {"weight": term.weight, "d": d.tolist()}
-        if a:
-            said |= {"pole_per_s": term.pole_per_s, "since": start}
-        said |= {"first": first, "frame": last}
-        if a and before:
-            said["fault"] = before
+            done, slope = of.max_effects(d, rows), 0.0
+            adds = np.maximum(at_low, at_high) > MIN_EFFECT_RAD_S2
+        limit += _filtered(a, dt, done, before)
+        least, most = bool((adds & (at_low > at_high)).any()), bool((adds & (at_high > at_low)).any())
+        return _Numbers(self._fields_of(term, rows, before, adds), value, limit, slope, least, most)
+
+    def _fields_of(self, term: Term, rows: slice, before: float, adds: np.ndarray) -> Document:
+        """The fields of a term whose frames `rows` are written out. before: largest effect of the fault
+        before them, rad/s; adds (frames,): whether the fault's effect is more than rounding."""
+        history, is_filtered = self.history, not isinf(term.pole_per_s)
+        said: Document = {"weight": term.weight, "d": term.direction.tolist()}
+        said |= {"pole_per_s": term.pole_per_s, "since": term.filter_start} if is_filtered else {}
+        said |= {"first": rows.start, "frame": term.last_frame}
+        said |= {"fault": before} if is_filtered and before else {}
         logged = {"x": history.rates_rad_s, "F": history.model_rad_s2, "eta_bar": history.eta_bar_rad_s2}
         said |= {name: values[rows].tolist() for name, values in logged.items()}
         rest = history.unstated_bound_rad_s2[rows]
         rest = np.where(np.abs(rest) < ROUNDING_SHARE * history.eta_bar_rad_s2[rows], 0.0, rest)
         said |= {"rest": rest.tolist()} if rest.any() else {}
+        h, Z, r = self.hypothesis.along(term.direction, rows)
         for name, values in (("h", h), ("Z", Z)):
             if (values * adds).any():
                 said[name] = [float(v) if there else None for v, there in zip(values, adds, strict=True)]
-        said |= {"r": r.tolist()} if r.any() else {}
-        slope = float(dt * _filter_weights(a, len(Z)) @ Z) if of.theta_is_constant else 0.0
-        least, most = (
-            bool((adds & (one > other)).any()) for one, other in ((at_low, at_high), (at_high, at_low))
-        )
-        return _Numbers(said, value, limit, slope, least, most)
+        return said | ({"r": r.tolist()} if r.any() else {})
 
     def _first_written_frame(self, term: Term) -> int:
         """The first frame that is written out: what the filter has forgotten would decide nothing. A constant

@@ -26,8 +26,7 @@ from beaver_ftc.scenario import Scenario
 FRAMES_BEFORE_ALARM = 40  # frames kept before the alarm: what was before them is in the filters
 STATISTICAL_FRAMES_BEFORE_ALARM = 2**N_SLOTS + 2  # with the statistical detector: its oldest onset
 KEPT_AFTER_EVENT_S = 10.0  # after the last event, where types are excluded one by one
-MAX_FRAMES_AFTER_ALARM = 1 << 16  # frames kept after the alarm
-FIRST_ROOM_AFTER_ALARM = 1 << 10  # frames for which there is room at first; doubled when it is used up
+MAX_FRAMES_AFTER_ALARM = 1 << 16  # frames kept after the alarm; memory is taken as they come
 
 
 @dataclass
@@ -107,25 +106,20 @@ class Recorder:
         give_back_memory(numbers)
         ring = 1 + (FRAMES_BEFORE_ALARM if config.statistical is None else STATISTICAL_FRAMES_BEFORE_ALARM)
         self._ring = np.empty((ring, len(self._early.words)), np.int64)
-        self._kept = np.empty((ring + FIRST_ROOM_AFTER_ALARM, len(self._always.words)), np.int64)
+        self._kept = np.empty((ring + MAX_FRAMES_AFTER_ALARM, len(self._always.words)), np.int64)
         self._frames, self._alarm = frames, copy_memory(frames)
-        self._take_arguments()
+        words, alarm = _words_of(frames), _words_of(self._alarm)
+        places = self._always.words, self._early.words
+        self._arguments = words, *places, self._kept, self._ring, alarm, self._state
+        self._keep_frame = direct(keep_frame, *self._arguments)
 
     def land(self) -> None:
         """Keep the record as it is at the end."""
         self._last = copy_memory(self._frames)
 
-    def _take_arguments(self) -> None:
-        words, alarm = _words_of(self._frames), _words_of(self._alarm)
-        places = self._always.words, self._early.words
-        self._arguments = words, *places, self._kept, self._ring, alarm, self._state
-        self._keep_frame = direct(keep_frame, *self._arguments)
-
     def keep(self) -> None:
         """Keep what stands in the record."""
-        if self._keep_frame(*self._arguments) and len(self._kept) < MAX_FRAMES_AFTER_ALARM:
-            self._kept = np.resize(self._kept, (2 * len(self._kept), self._kept.shape[1]))
-            self._take_arguments()
+        self._keep_frame(*self._arguments)
 
     def tape(self, events: Sequence[int], rows: int) -> Tape:
         """The frames around these, of so many rows; the first of them is the alarm's, if one was raised."""
@@ -157,7 +151,7 @@ def keep_frame(record, always, early, kept, ring, alarm, state):
     of the record.
 
     state (5,): number of frames; frame of the alarm, or -1; frame in which the last alarm was withdrawn;
-    places in the record of the two alarm flags. Returns whether `kept` has no room for the next row.
+    places in the record of the two alarm flags.
     """
     k, rows = state[0], len(ring)
     state[0] = k + 1
@@ -170,13 +164,12 @@ def keep_frame(record, always, early, kept, ring, alarm, state):
     after = k - state[1] if state[1] >= 0 else 0
     row = k % rows if after == 0 else rows - 1 + after
     if row >= len(kept):
-        return True
+        return
     for j in range(len(always)):
         kept[row, j] = record[always[j]]
     if after == 0:
         for j in range(len(early)):
             ring[row, j] = record[early[j]]
-    return row + 1 == len(kept)
 
 
 def _words_of(frames: np.ndarray) -> np.ndarray:

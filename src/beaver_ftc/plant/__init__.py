@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from beaver_ftc.plant.instrumented import instrument as instrument_model
     from beaver_ftc.plant.instrumented import is_told as is_known_to_jsbsim
     from beaver_ftc.plant.instrumented import source_of as source_of_jsbsim
-    from beaver_ftc.plant.instruments import AX, ENGINE_SPEED, SENSORS
+    from beaver_ftc.plant.instruments import AX, SENSORS
     from beaver_ftc.plant.model_file import (
         check_model_has_no_side_effects,
         copy_of,

@@ -125,7 +125,7 @@ def _compare_angles(log: RecordedFlight, vehicle: Vehicle) -> list[str]:
         return ["no roll angle is named: whether the rates are in rad/s is not checked"]
     gyros = [_column_in_si(columns, getattr(vehicle.rates, axis)) for axis in "pqr"]
     named = [angle if angle and angle.column in columns else None for angle in (angles.pitch, angles.yaw)]
-    in_si = [angle and _column_in_si(columns, angle) for angle in (angles.roll, *named)]
+    in_si = [None if one is None else _column_in_si(columns, one) for one in (angles.roll, *named)]
     fits = [physics.fit_angle(gyros, in_si, axis) for axis in range(3)]
     if fits[0] is None:
         return ["too little moves to compare the rates with the roll angle"]

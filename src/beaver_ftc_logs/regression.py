@@ -21,6 +21,7 @@ coefficients b (m,) or (m, 3); P is the inverse of Z' Z once each column is divi
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -184,7 +185,7 @@ class Innovations:
     def gains(self) -> Floats:
         """The gain of each response, (G,), by least squares of y on trim and responses."""
         Z = self.columns().reshape(3 * len(self.F), -1)
-        return np.linalg.lstsq(Z, (self.y @ self.W).ravel(), rcond=None)[0][3:]
+        return np.asarray(np.linalg.lstsq(Z, (self.y @ self.W).ravel(), rcond=None)[0][3:])
 
     def quick_power(self, rate_hz: float) -> Floats:
         """Power of the quick part of the responses an axis, in variances of the noise, (n,): of the
@@ -288,7 +289,7 @@ def _newey_west(X: Floats, e: Floats, P: Floats, stretch: NDArray[np.int64], lag
     return np.sqrt(np.maximum(np.diag(P @ S @ P), 0.0))
 
 
-def trailing_sums(x: Floats, n: float) -> tuple[Floats, NDArray[np.int64]]:
+def trailing_sums(x: NDArray[Any], n: float) -> tuple[Floats, NDArray[np.int64]]:
     """Sums of x (k, ...) over the last n rows, each row's own included, and how many rows these are, (k,)."""
     end = np.arange(1, len(x) + 1)
     begin = np.maximum(end - max(round(n), 1), 0)

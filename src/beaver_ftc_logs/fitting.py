@@ -761,8 +761,8 @@ def prediction_quality(model: Model, held_out: FitPart) -> Document:
     explained = 1.0 - e.var(axis=0) / np.maximum(y.var(axis=0), MIN_DIVISOR)
     return {
         "samples": len(y),
-        "explained": dict(zip("pqr", explained.tolist(), strict=True)),
-        "residual_rad_s": dict(zip("pqr", e.std(axis=0).tolist(), strict=True)),
+        "explained": regression.by_axis(explained),
+        "residual_rad_s": regression.by_axis(e.std(axis=0)),
     }
 
 

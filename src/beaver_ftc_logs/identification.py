@@ -300,7 +300,7 @@ def median_inflation(parts: Sequence[fitting.FitPart], model: Model) -> dict[str
     """By how much the residual's colour widens the standard errors of the responses: the median, an axis."""
     n = len(model.groups) * model.n_command_lags
     inflation = fitting.fit_of(parts, model).standard_error_inflation[-n:]
-    return dict(zip("pqr", np.median(inflation, axis=0).tolist(), strict=True))
+    return regression.by_axis(np.median(inflation, axis=0))
 
 
 def density_ratios(parts: Sequence[fitting.FitPart], model: Model) -> list[Document]:
@@ -312,8 +312,8 @@ def density_ratios(parts: Sequence[fitting.FitPart], model: Model) -> list[Docum
     for lo, hi in _SPECTRUM_BANDS_HZ:
         inside = (f > lo) & (f <= hi)
         if inside.any():
-            ratio = (density[inside].mean(axis=0) / white).tolist()
-            bands.append({"from_hz": lo, "to_hz": hi, **dict(zip("pqr", ratio, strict=True))})
+            ratio = density[inside].mean(axis=0) / white
+            bands.append({"from_hz": lo, "to_hz": hi, **regression.by_axis(ratio)})
     return bands
 
 
@@ -455,7 +455,7 @@ def fit_output_error(parts: Sequence[fitting.FitPart], groups: list[list[int]]) 
         "delay_s": float(found.x[1]),
         "delay_sd_s": float(errors[1]),
         "shorter_than_can_be_told": bool(found.x[0] < 2.0 * _MIN_SERVO_LAG_S),
-        "explained_of_windows_not_fitted": dict(zip("pqr", explained.tolist(), strict=True)),
+        "explained_of_windows_not_fitted": regression.by_axis(explained),
     }
 
 

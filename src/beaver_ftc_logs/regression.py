@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
-from beaver_ftc_logs.samples import Samples, mixer_matrix
+from beaver_ftc_logs.samples import Samples, mixer_matrix, whiten_samples
 from beaver_ftc_logs.vehicle import Vehicle
 
 _PARALLEL_TOLERANCE = 1e-9
@@ -225,6 +225,18 @@ def innovations(samples: Samples, model: Model, labelled: bool = False) -> Innov
         whole &= _delay_rows(known, lag, False)
     rows, c, R = np.arange(len(y)), model.whitened_intercept(ma), model.covariance_of_noise(ma)
     return Innovations(rows, whole, np.nan_to_num(y), np.nan_to_num(F), c, R, model.inflation_of(ma), ma)
+
+
+def by_noise(samples: Samples, model: Model) -> list[tuple[Samples, Model]]:
+    """A flight whitened by each noise of a model, and the model with this noise alone; both as they are where
+    the model has none."""
+    noises = [(noise.ma_coefficients, model.with_single_noise(noise)) for noise in model.noise_models]
+    return [(whiten_samples(samples, ma), one) for ma, one in noises] or [(samples, model)]
+
+
+def by_axis(values: Floats) -> dict[str, float]:
+    """The numbers of p, q and r by name."""
+    return dict(zip("pqr", values.tolist(), strict=True))
 
 
 def subtract_noise(values: Floats, ar: Floats) -> Floats:

@@ -172,13 +172,14 @@ def refuse_rate_unit(samples: Samples, ranges: FittedRanges | None) -> None:
         return
     most = _UNIT_FACTOR_ROOT**2
     for unit, per_rad in (("deg/s", 180.0 / np.pi), ("cdeg/s", 18000.0 / np.pi), ("mrad/s", 1000.0)):
-        hints = {
-            ratio / per_rad: f"{1.0 / per_rad:.4g} (`unit: {unit}`) fits",
-            ratio * per_rad: f"{per_rad:.4g} fits: the model's own were in {unit}?",
-        }
-        for hint in (hint for factor, hint in hints.items() if 1.0 / most < factor < most):
-            spread = f"rates spread {ratio:.3g} times as widely as in the flights of the model"
-            raise BadInput(f"{samples.name}: {spread}, allowed: rates in rad/s; a factor of {hint}")
+        hints = (
+            (ratio / per_rad, f"{1.0 / per_rad:.4g} (`unit: {unit}`) fits"),
+            (ratio * per_rad, f"{per_rad:.4g} fits: the model's own were in {unit}?"),
+        )
+        for factor, hint in hints:
+            if 1.0 / most < factor < most:
+                spread = f"rates spread {ratio:.3g} times as widely as in the flights of the model"
+                raise BadInput(f"{samples.name}: {spread}, allowed: rates in rad/s; a factor of {hint}")
 
 
 def refuse_command_unit(

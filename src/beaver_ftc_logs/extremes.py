@@ -132,21 +132,20 @@ def threshold_for_rate(tail: PeakTail, rate: float) -> float:
 def _excess_for_rate(tail: PeakTail, rate: float) -> float:
     """Excess over the level of the tail at which the posterior mean of the rate is this; 0 if the rate at the
     level is lower."""
+    from scipy.optimize import brentq
+
     xi, sigma, p = _pareto_posterior(tail)
     mean = float(_rate_quantiles(tail).mean())
 
-    def too_many(z: float) -> bool:
-        return mean * float(_exceedance(z, xi, sigma) @ p) > rate
+    def over(z: float) -> float:
+        return mean * float(_exceedance(z, xi, sigma) @ p) - rate
 
-    lo, hi = 0.0, 1.0
-    if not too_many(lo):
+    if over(0.0) <= 0.0:
         return 0.0
-    while too_many(hi) and hi < _MAX_EXCESS:
-        lo, hi = hi, 2.0 * hi
-    for _ in range(40):
-        mid = 0.5 * (lo + hi)
-        lo, hi = (mid, hi) if too_many(mid) else (lo, mid)
-    return hi
+    hi = 1.0
+    while over(hi) > 0.0 and hi < _MAX_EXCESS:
+        hi *= 2.0
+    return float(brentq(over, 0.0, hi)) if over(hi) <= 0.0 else hi
 
 
 def lorden_threshold(rate_hz: float, rate: float) -> float:

@@ -39,8 +39,8 @@ from beaver_ftc.compiled import kernel
 from beaver_ftc_logs.bank import HypothesisBank, build_noise, build_states
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import Floats
-from beaver_ftc_logs.regression import Innovations, innovations, trailing_sums
-from beaver_ftc_logs.samples import Samples, whiten_samples
+from beaver_ftc_logs.regression import Innovations, by_noise, innovations, trailing_sums
+from beaver_ftc_logs.samples import Samples
 
 _EVIDENCE_MEMORY_S = 600.0
 _MIN_PROBABILITY = 1e-15
@@ -69,11 +69,7 @@ def bank_posterior(samples: Samples, model: Model, bank: HypothesisBank) -> tupl
         flights = [innovations(_with_command_delay(samples, delay_s), model) for delay_s in delays]
         runs = [run_flight(flight, model, bank) for flight in flights]
         return _average_runs(list(model_weights([run[3] for run in runs], model.rate_hz)), runs)
-    models = [model.with_single_noise(noise) for noise in model.noise_models]
-    flights = [
-        innovations(whiten_samples(samples, one.noise_models[0].ma_coefficients), one) for one in models
-    ]
-    pairs = list(zip(flights, models, strict=True))
+    pairs = [(innovations(white, one), one) for white, one in by_noise(samples, model)]
     p = model_weights([_noise_likelihood(*pair) for pair in pairs], model.rate_hz)
     kept = np.where(p < _MIN_NOISE_WEIGHT, 0.0, p)
     kept /= kept.sum(axis=0)

@@ -192,7 +192,8 @@ def isolability_document(samples: Samples, model: Model) -> Document:
 def _white_responses(samples: Samples, model: Model) -> Floats:
     """Each group's share of the rates in standard deviations of the noise, (n, G, 3)."""
     flight = innovations(samples, model)
-    return flight.F[flight.is_known] @ flight.W * np.sqrt(model.settings.effective_sample_share)
+    share = model.settings.effective_sample_share
+    return np.asarray(flight.F[flight.is_known] @ flight.W * np.sqrt(share))
 
 
 def _group_entry(F: Floats, g: int, model: Model, bank: HypothesisBank, dt_s: float) -> Document:

@@ -19,8 +19,9 @@ the two halves of a single flight in turn, or each of several flights in turn.
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import wraps
 from itertools import groupby, pairwise, product
-from typing import Any, TypeVar
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -119,16 +120,24 @@ _COVERAGE_GOAL = 0.93
 """Coverage the bounds aim at: 90 % and some of what another day takes away."""
 
 
-Cached = TypeVar("Cached")
+Args = ParamSpec("Args")
+Result = TypeVar("Result")
+OfParts = Callable[Concatenate[Sequence[FitPart], Args], Result]
 
 
-def _once(parts: Sequence[FitPart], key: tuple[object, ...], compute: Callable[[], Cached]) -> Cached:
+def _once(compute: OfParts[Args, Result]) -> OfParts[Args, Result]:
     """Compute a result for these flights once: every test of a model needs the same fits to parts of them."""
-    cache = parts[0].result_cache
-    whole = (*key, *map(id, parts))
-    if whole not in cache:
-        cache[whole] = (tuple(parts), compute())  # held: an id is of one object while this lives
-    return cache[whole][1]  # type: ignore[return-value]
+
+    @wraps(compute)
+    def cached(parts: Sequence[FitPart], *args: Args.args, **kwargs: Args.kwargs) -> Result:
+        cache = parts[0].result_cache
+        values = (arg.model_dump_json() if isinstance(arg, Vehicle) else arg for arg in args)
+        key = (compute.__name__, *values, *map(id, parts))
+        if key not in cache:
+            cache[key] = (tuple(parts), compute(parts, *args, **kwargs))  # held: an id is of one object
+        return cache[key][1]  # type: ignore[return-value]
+
+    return cached
 
 
 def fit_parts(flights: Sequence[Samples]) -> list[FitPart]:
@@ -221,13 +230,9 @@ def fit_of(parts: Sequence[FitPart], model: Model) -> regression.Regression:
     return fit_order(parts, model.vehicle, model.n_rate_lags, model.n_command_lags)
 
 
+@_once
 def fit_order(parts: Sequence[FitPart], vehicle: Vehicle, h: int, L: int) -> regression.Regression:
     """Least squares of given order over all flights."""
-    key = ("order", vehicle.model_dump_json(), h, L)
-    return _once(parts, key, lambda: _fit_order_now(parts, vehicle, h, L))
-
-
-def _fit_order_now(parts: Sequence[FitPart], vehicle: Vehicle, h: int, L: int) -> regression.Regression:
     Z, y, stretch = stack_data(parts, vehicle, h, L)
     if len(y) < 10 * Z.shape[1]:
         allowed = f"at least {10 * Z.shape[1]} to fit {Z.shape[1]} coefficients an axis"
@@ -259,12 +264,8 @@ def stack_data(
     return np.vstack(Z), np.vstack(y), np.concatenate(stretches)
 
 
+@_once
 def _model_of_order(parts: Sequence[FitPart], vehicle: Vehicle, h: int, L: int) -> Model:
-    key = ("model", vehicle.model_dump_json(), h, L)
-    return _once(parts, key, lambda: _build_model(parts, vehicle, h, L))
-
-
-def _build_model(parts: Sequence[FitPart], vehicle: Vehicle, h: int, L: int) -> Model:
     fit = fit_order(parts, vehicle, h, L)
     names = list(vehicle.surfaces)
     groups = regression.group_surfaces(vehicle)
@@ -539,8 +540,7 @@ def validation_folds(
     """Return the fitted flights, the held-out one and its name: halves of one flight; each flight in turn, of
     more than `most` every so many at once."""
     if len(parts) == 1:
-        (whole,) = parts
-        first, second = _once(parts, ("halves",), lambda: _split_in_halves(whole))
+        first, second = _halves(parts)
         return [([first], second, "second half"), ([second], first, "first half")]
     n = min(len(parts), most or len(parts))
     return [
@@ -550,8 +550,10 @@ def validation_folds(
     ]
 
 
-def _split_in_halves(part: FitPart) -> tuple[FitPart, FitPart]:
-    """Split the usable samples of a flight into two halves."""
+@_once
+def _halves(parts: Sequence[FitPart]) -> tuple[FitPart, FitPart]:
+    """The usable samples of one flight in two halves."""
+    (part,) = parts
     rows = np.flatnonzero(part.is_usable)
     middle = int(rows[len(rows) // 2]) if len(rows) else 0
     first = np.arange(len(part.is_usable)) < middle
@@ -759,8 +761,8 @@ def prediction_quality(model: Model, held_out: FitPart) -> Document:
     explained = 1.0 - e.var(axis=0) / np.maximum(y.var(axis=0), MIN_DIVISOR)
     return {
         "samples": len(y),
-        "explained": dict(zip("pqr", explained.tolist(), strict=True)),
-        "residual_rad_s": dict(zip("pqr", e.std(axis=0).tolist(), strict=True)),
+        "explained": regression.by_axis(explained),
+        "residual_rad_s": regression.by_axis(e.std(axis=0)),
     }
 
 

@@ -131,14 +131,28 @@ def whiten_flights(flights: Sequence[Samples], vehicle: Vehicle) -> list[Samples
     """
     if not vehicle.moving_air:
         return list(flights)
-    # the commands get as many lags as the rates, not as many as they have at most: the results rest on it
-    order = max(fitting.RATE_LAGS), max(fitting.RATE_LAGS)
-    colours = [_choose_ma(flight, vehicle, order) for flight in flights]
+    from scipy.signal import lfilter
+
+    def stacked(flights: Sequence[Samples]) -> tuple[Floats, Floats]:
+        # the commands get as many lags as the rates, not as many as they have at most: the results rest on it
+        return fitting.stack_data(fitting.fit_parts(flights), vehicle, *[max(fitting.RATE_LAGS)] * 2)[:2]
+
+    def own_residual(flight: Samples, ma: tuple[float, ...]) -> Floats:
+        Z, y = stacked([whiten_samples(flight, ma)])
+        if len(y) < 2:
+            known = f"{len(y)} samples known to be healthy"
+            raise BadInput(f"identify: {flight.name}: {known}, allowed: at least 2")
+        return np.asarray(y - Z @ np.linalg.lstsq(Z, y, rcond=None)[0])
+
+    alone = [{ma: own_residual(flight, ma) for ma in NOISE_MA_CANDIDATES} for flight in flights]
+    colours = [_likeliest_ma(residuals)[1] for residuals in alone]
     whitened = [whiten_samples(flight, ma) for flight, ma in zip(flights, colours, strict=True)]
     for _ in range(_MAX_ROUNDS):
-        Z, y, _ = fitting.stack_data(fitting.fit_parts(whitened), vehicle, *order)
+        Z, y = stacked(whitened)
         C = np.linalg.lstsq(Z, y, rcond=None)[0]
-        found = [_best_ma(fitting.fit_parts([flight]), vehicle, order, np.asarray(C)) for flight in flights]
+        left = [y - Z @ C for Z, y in (stacked([flight]) for flight in flights)]
+        white = [{ma: lfilter([sum(ma)], ma, e, axis=0) for ma in NOISE_MA_CANDIDATES} for e in left]
+        found = [_likeliest_ma(residuals) for residuals in white]
         if (new := [ma for _, ma in found]) == colours:
             break
         mean = np.mean([log_det for log_det, _ in found])
@@ -150,33 +164,12 @@ def whiten_flights(flights: Sequence[Samples], vehicle: Vehicle) -> list[Samples
     return whitened
 
 
-def _choose_ma(flight: Samples, vehicle: Vehicle, order: tuple[int, int]) -> tuple[float, ...]:
-    """The colour of which a fit to one flight alone leaves least: the likeliest of an ARMAX model, by
-    profile likelihood over the moving averages."""
-
-    def log_det(ma: tuple[float, ...]) -> float:
-        Z, y, _ = fitting.stack_data(fitting.fit_parts([whiten_samples(flight, ma)]), vehicle, *order)
-        if len(y) < 2:
-            known = f"{len(y)} samples known to be healthy"
-            raise BadInput(f"identify: {flight.name}: {known}, allowed: at least 2")
-        e = y - Z @ np.linalg.lstsq(Z, y, rcond=None)[0]
-        return float(np.linalg.slogdet(np.cov(e.T))[1]) - 6.0 * float(np.log(sum(ma)))
-
-    return min(NOISE_MA_CANDIDATES, key=log_det)
-
-
-def _best_ma(
-    parts: list[fitting.FitPart], vehicle: Vehicle, order: tuple[int, int], C: Floats
-) -> tuple[float, tuple[float, ...]]:
-    """The colour of a flight, and the log determinant of the residual y - Z C that it leaves."""
-    from scipy.signal import lfilter
-
-    Z, y, _ = fitting.stack_data(parts, vehicle, *order)
-    e = y - Z @ C
-    white = {ma: lfilter([1.0], ma, e, axis=0) for ma in NOISE_MA_CANDIDATES}
-    log_dets = {ma: np.linalg.slogdet(np.cov(g.T))[1] for ma, g in white.items()}
-    best = min(log_dets, key=lambda ma: float(log_dets[ma]))
-    return float(log_dets[best]) + 6.0 * float(np.log(sum(best))), best
+def _likeliest_ma(residuals: dict[tuple[float, ...], Floats]) -> tuple[float, tuple[float, ...]]:
+    """The log determinant of what the likeliest moving average leaves, and this: by profile likelihood, as of
+    an ARMAX model. residuals: in a flight that is whitened by each, (n, 3)."""
+    log_dets = {ma: float(np.linalg.slogdet(np.cov(e.T))[1]) for ma, e in residuals.items()}
+    best = min(log_dets, key=lambda ma: log_dets[ma] - 6.0 * float(np.log(sum(ma))))
+    return log_dets[best], best
 
 
 def expect_another_day(folds: list[Document], model: Model) -> Document:
@@ -307,7 +300,7 @@ def median_inflation(parts: Sequence[fitting.FitPart], model: Model) -> dict[str
     """By how much the residual's colour widens the standard errors of the responses: the median, an axis."""
     n = len(model.groups) * model.n_command_lags
     inflation = fitting.fit_of(parts, model).standard_error_inflation[-n:]
-    return dict(zip("pqr", np.median(inflation, axis=0).tolist(), strict=True))
+    return regression.by_axis(np.median(inflation, axis=0))
 
 
 def density_ratios(parts: Sequence[fitting.FitPart], model: Model) -> list[Document]:
@@ -319,8 +312,8 @@ def density_ratios(parts: Sequence[fitting.FitPart], model: Model) -> list[Docum
     for lo, hi in _SPECTRUM_BANDS_HZ:
         inside = (f > lo) & (f <= hi)
         if inside.any():
-            ratio = (density[inside].mean(axis=0) / white).tolist()
-            bands.append({"from_hz": lo, "to_hz": hi, **dict(zip("pqr", ratio, strict=True))})
+            ratio = density[inside].mean(axis=0) / white
+            bands.append({"from_hz": lo, "to_hz": hi, **regression.by_axis(ratio)})
     return bands
 
 
@@ -462,7 +455,7 @@ def fit_output_error(parts: Sequence[fitting.FitPart], groups: list[list[int]]) 
         "delay_s": float(found.x[1]),
         "delay_sd_s": float(errors[1]),
         "shorter_than_can_be_told": bool(found.x[0] < 2.0 * _MIN_SERVO_LAG_S),
-        "explained_of_windows_not_fitted": dict(zip("pqr", explained.tolist(), strict=True)),
+        "explained_of_windows_not_fitted": regression.by_axis(explained),
     }
 
 
@@ -481,8 +474,8 @@ def _cut_windows(
             if known[rows].all() and np.ptp(samples.stretch_number[rows]) == 0:
                 windows.append((u[rows], samples.rates[end - n : end]))
     chosen = windows[:: max(len(windows) // _MIN_FREE_RUNS, 1)]
-    u, y = ([window[i] for window in chosen] for i in (0, 1))
-    return np.reshape(u, (-1, past + n, len(groups))), np.reshape(y, (-1, n, 3))
+    commands, rates = ([window[i] for window in chosen] for i in (0, 1))
+    return np.reshape(commands, (-1, past + n, len(groups))), np.reshape(rates, (-1, n, 3))
 
 
 def _simulate(th: Floats, u: Floats, y: Floats, dt_s: float) -> Floats:

@@ -66,12 +66,12 @@ def fit_angle(gyros: Sequence[Column], angles: Sequence[Column | None], axis: in
         circle = _full_circle(np.append(4.0 * pitch.values, roll.values))
         theta = _interpolate(pitch, t) * 2.0 * np.pi / circle
     turn = [q * np.sin(phi), r * np.cos(phi)]
+    if axis == 1:
+        return _fit_angle(t, _interpolate(angle, t), [q * np.cos(phi), -r * np.sin(phi)])
     if axis == 0:
         terms = [p] if theta is None else [p, *(np.tan(theta) * part for part in turn)]
-    elif axis == 1:
-        return _fit_angle(t, _interpolate(angle, t), [q * np.cos(phi), -r * np.sin(phi)])
     else:
-        terms = [sum(turn) / (1.0 if theta is None else np.cos(theta))]
+        terms = [(turn[0] + turn[1]) / (1.0 if theta is None else np.cos(theta))]
     return _fit_angle(t, _interpolate(angle, t), terms, _full_circle(angle.values), theta)
 
 

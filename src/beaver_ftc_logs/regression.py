@@ -21,13 +21,14 @@ coefficients b (m,) or (m, 3); P is the inverse of Z' Z once each column is divi
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
-from beaver_ftc_logs.samples import Samples, mixer_matrix
+from beaver_ftc_logs.samples import Samples, mixer_matrix, whiten_samples
 from beaver_ftc_logs.vehicle import Vehicle
 
 _PARALLEL_TOLERANCE = 1e-9
@@ -184,7 +185,7 @@ class Innovations:
     def gains(self) -> Floats:
         """The gain of each response, (G,), by least squares of y on trim and responses."""
         Z = self.columns().reshape(3 * len(self.F), -1)
-        return np.linalg.lstsq(Z, (self.y @ self.W).ravel(), rcond=None)[0][3:]
+        return np.asarray(np.linalg.lstsq(Z, (self.y @ self.W).ravel(), rcond=None)[0][3:])
 
     def quick_power(self, rate_hz: float) -> Floats:
         """Power of the quick part of the responses an axis, in variances of the noise, (n,): of the
@@ -224,6 +225,18 @@ def innovations(samples: Samples, model: Model, labelled: bool = False) -> Innov
         whole &= _delay_rows(known, lag, False)
     rows, c, R = np.arange(len(y)), model.whitened_intercept(ma), model.covariance_of_noise(ma)
     return Innovations(rows, whole, np.nan_to_num(y), np.nan_to_num(F), c, R, model.inflation_of(ma), ma)
+
+
+def by_noise(samples: Samples, model: Model) -> list[tuple[Samples, Model]]:
+    """A flight whitened by each noise of a model, and the model with this noise alone; both as they are where
+    the model has none."""
+    noises = [(noise.ma_coefficients, model.with_single_noise(noise)) for noise in model.noise_models]
+    return [(whiten_samples(samples, ma), one) for ma, one in noises] or [(samples, model)]
+
+
+def by_axis(values: Floats) -> dict[str, float]:
+    """The numbers of p, q and r by name."""
+    return dict(zip("pqr", values.tolist(), strict=True))
 
 
 def subtract_noise(values: Floats, ar: Floats) -> Floats:
@@ -288,7 +301,7 @@ def _newey_west(X: Floats, e: Floats, P: Floats, stretch: NDArray[np.int64], lag
     return np.sqrt(np.maximum(np.diag(P @ S @ P), 0.0))
 
 
-def trailing_sums(x: Floats, n: float) -> tuple[Floats, NDArray[np.int64]]:
+def trailing_sums(x: NDArray[Any], n: float) -> tuple[Floats, NDArray[np.int64]]:
     """Sums of x (k, ...) over the last n rows, each row's own included, and how many rows these are, (k,)."""
     end = np.arange(1, len(x) + 1)
     begin = np.maximum(end - max(round(n), 1), 0)

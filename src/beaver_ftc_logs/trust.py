@@ -60,10 +60,8 @@ _REVERSED_GAIN_LIMIT = -0.5
 
 def compute_fitted_ranges(parts: Sequence[FitPart], model: Model, gain_sd: Floats) -> FittedRanges:
     """Compute the ranges in which a model was fitted. gain_sd (G,): standard errors, of parts not fitted."""
-    rates = np.vstack([part.samples.rates[part.is_usable] for part in parts])
-    commands = np.vstack([part.samples.commands[part.is_usable] for part in parts])
-    airspeeds = _usable([(part.samples.airspeed, part.is_usable) for part in parts])
-    climbs = _usable([(part.samples.energy_height_rate_mps, part.is_usable) for part in parts])
+    fields = ("rates", "commands", "airspeed", "energy_height_rate_mps")
+    rates, commands, airspeeds, climbs = (_usable(parts, name) for name in fields)
     climbs = climbs[np.isfinite(climbs)]
     still: dict[str, float] = {}
     for part in parts:
@@ -81,9 +79,10 @@ def compute_fitted_ranges(parts: Sequence[FitPart], model: Model, gain_sd: Float
     )
 
 
-def _usable(flights: Sequence[tuple[Floats | None, Mask]]) -> Floats:
-    """A quantity of those flights that have it, in the samples in use."""
-    return np.concatenate([np.empty(0), *(values[used] for values, used in flights if values is not None)])
+def _usable(parts: Sequence[FitPart], name: str) -> Floats:
+    """A field of those flights that have it, in the samples in use."""
+    known = [(getattr(part.samples, name), part.is_usable) for part in parts]
+    return np.concatenate([values[used] for values, used in known if values is not None] or [np.empty(0)])
 
 
 def central_ranges(values: Floats) -> list[list[float]]:
@@ -173,13 +172,14 @@ def refuse_rate_unit(samples: Samples, ranges: FittedRanges | None) -> None:
         return
     most = _UNIT_FACTOR_ROOT**2
     for unit, per_rad in (("deg/s", 180.0 / np.pi), ("cdeg/s", 18000.0 / np.pi), ("mrad/s", 1000.0)):
-        hints = {
-            ratio / per_rad: f"{1.0 / per_rad:.4g} (`unit: {unit}`) fits",
-            ratio * per_rad: f"{per_rad:.4g} fits: the model's own were in {unit}?",
-        }
-        for hint in (hint for factor, hint in hints.items() if 1.0 / most < factor < most):
-            spread = f"rates spread {ratio:.3g} times as widely as in the flights of the model"
-            raise BadInput(f"{samples.name}: {spread}, allowed: rates in rad/s; a factor of {hint}")
+        hints = (
+            (ratio / per_rad, f"{1.0 / per_rad:.4g} (`unit: {unit}`) fits"),
+            (ratio * per_rad, f"{per_rad:.4g} fits: the model's own were in {unit}?"),
+        )
+        for factor, hint in hints:
+            if 1.0 / most < factor < most:
+                spread = f"rates spread {ratio:.3g} times as widely as in the flights of the model"
+                raise BadInput(f"{samples.name}: {spread}, allowed: rates in rad/s; a factor of {hint}")
 
 
 def refuse_command_unit(
@@ -259,11 +259,7 @@ def refuse_columns(samples: Samples, model: Model) -> None:
 def _whiten_likeliest(samples: Samples, model: Model) -> tuple[Samples, Model] | None:
     """Return the flight whitened by the noise of the model that makes it likeliest, and the model with this
     noise alone; None where a part of the flight is too short."""
-    pairs = [
-        (whiten_samples(samples, noise.ma_coefficients), model.with_single_noise(noise))
-        for noise in model.noise_models
-    ]
-    found = [(pair, _likelihoods(*pair).mean()) for pair in pairs or [(samples, model)]]
+    found = [(pair, _likelihoods(*pair).mean()) for pair in regression.by_noise(samples, model)]
     likeliest, likelihood = max(found, key=lambda one: one[1])
     return likeliest if np.isfinite(likelihood) else None
 

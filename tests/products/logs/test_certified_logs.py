@@ -58,9 +58,3 @@ def test_a_logs_alarm_and_exclusions_are_proved(name, faults, tmp_path, monkeypa
     assert set(told) - {None} == set_at_end
     assert bool(faults) == ("detected" in set_at_end)
     assert document["begins_s"] == (1.3 if faults else 0.0)
-
-
-@pytest.mark.parametrize("option", ["--certificate", "--vehicle v.yaml", "--scenario s.yaml"])
-def test_what_belongs_to_an_aircraft_is_refused_without_one(option):
-    done = CliRunner().invoke(app, ["diagnose", "x.parquet", *option.split()])
-    assert f"{option}: allowed: only with --aircraft" in str(done.exception or done.output)

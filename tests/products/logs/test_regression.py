@@ -90,20 +90,3 @@ def test_what_is_not_excited_gets_no_coefficient():
     assert np.isfinite(fit.coefficient_error_correlation).all()
     few = regression.fit_ols(x[:3], y[:3], run[:3], 5)
     assert np.isfinite(few.residual_covariance).all()
-
-
-def test_a_spectrum_holds_the_variance():
-    rng = np.random.default_rng(3)
-    white = rng.standard_normal((4096, 3)) * [1.0, 2.0, 3.0]
-    frequency, density = regression.spectral_density(white, 0.05)
-    assert len(frequency) == 129
-    assert (frequency[0], frequency[-1]) == (0.0, pytest.approx(10.0))
-    assert density.mean(axis=0) * 10.0 == pytest.approx([1.0, 4.0, 9.0], rel=0.05)
-    assert len(regression.spectral_density(white[:100], 0.05)[0]) == 51
-    shifted = regression.spectral_density(white + 7.0, 0.05)[1]
-    np.testing.assert_allclose(shifted, density, rtol=1e-6)
-
-
-def test_a_flight_is_split_where_its_shortest_part_is_long_enough():
-    assert [len(part) for part in regression.split_parts(np.arange(242))] == [61, 61, 60, 60]
-    assert regression.split_parts(np.arange(239)) is None  # the last part has 59 rows

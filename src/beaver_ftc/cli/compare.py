@@ -138,7 +138,6 @@ def _compare_runs(folders: list[Path], out: Path, format: Format) -> None:
 
 def _compare_on_flights(options: Options, most: int | None) -> None:
     """Schemes and laws on the flights of a sweep, or of the standard sets."""
-    from beaver_ftc.plugins import DETECTORS, LAWS
     from beaver_ftc.studies.compare.leaderboard import as_text, run_comparison, write_leaderboard
     from beaver_ftc.studies.compare.trial import LAW, SCHEME, entries_of, of_set, of_sweep, set_names
     from beaver_ftc.studies.compare.tune import read_tuned
@@ -153,8 +152,8 @@ def _compare_on_flights(options: Options, most: int | None) -> None:
         name = f"benchmark-{options.only}" if options.only else "benchmark"
     chosen = None if options.tuned is None else read_tuned(options.tuned)
     entries = entries_of(
-        _chosen("--schemes", DETECTORS, options.schemes, SCHEME, alone=options.laws is None),
-        _chosen("--laws", LAWS, options.laws, LAW, alone=options.schemes is None),
+        _chosen("--schemes", options.schemes, SCHEME, alone=options.laws is None),
+        _chosen("--laws", options.laws, LAW, alone=options.schemes is None),
     )
     with progress_bar(f"{len(cases)} flights, {len(entries)} times each") as progress:
         workers = options.workers or cores()
@@ -169,25 +168,32 @@ def _compare_on_flights(options: Options, most: int | None) -> None:
         write_leaderboard(document, options.leaderboard)
 
 
-def _chosen(option: str, group: str, names: str | None, ours: str, *, alone: bool) -> list[str]:
+def _group(option: str) -> str:
+    """The plug-ins that an option names."""
+    from beaver_ftc.plugins import DETECTORS, LAWS
+
+    return DETECTORS if option == "--schemes" else LAWS
+
+
+def _chosen(option: str, names: str | None, ours: str, *, alone: bool) -> list[str]:
     """The names listed, ours among them; without a list all that are registered, or none where the list of
-    the other kind is what was asked for (alone: it was not). Raises BadInput with a line a name that is not
-    registered."""
+    the other kind is what was asked for (alone: it was not)."""
     from beaver_ftc.plugins import registered
 
     if names is None:
-        return list(registered(group)) if alone else []
-    return list(dict.fromkeys([ours, *_registered(option, group, listed(names))]))
+        return list(registered(_group(option))) if alone else []
+    return list(dict.fromkeys([ours, *_named(option, names)]))
 
 
-def _registered(option: str, group: str, names: list[str]) -> list[str]:
-    """These names. Raises BadInput with a line a name that is not registered."""
+def _named(option: str, names: str | None) -> list[str]:
+    """The schemes or laws listed. Raises BadInput with a line a name that is not registered."""
     from beaver_ftc.plugins import refusal
 
-    wrong = [f"{option}: {says}" for name in names if (says := refusal(group, name))]
+    given = [] if names is None else listed(names)
+    wrong = [f"{option}: {says}" for name in given if (says := refusal(_group(option), name))]
     if wrong:
         raise BadInput("\n".join(wrong))
-    return names
+    return given
 
 
 def _tune(options: Options, most: int | None) -> None:
@@ -206,14 +212,6 @@ def _tune(options: Options, most: int | None) -> None:
         document = tune(methods, how, options.workers or cores(), progress)
     path = write_tuned(document, options.out)
     answer(options.format, document, lambda: f"{as_text(document)}\n\nwritten: {path}")
-
-
-def _named(option: str, names: str | None) -> list[str]:
-    """The schemes or laws listed."""
-    from beaver_ftc.plugins import DETECTORS, LAWS
-
-    group = DETECTORS if option == "--schemes" else LAWS
-    return _registered(option, group, [] if names is None else listed(names))
 
 
 def _grades(given: str | None) -> list[str]:

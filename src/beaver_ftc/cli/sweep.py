@@ -97,17 +97,17 @@ def command(arguments: Arguments) -> None:
     judged(arguments.file, format, arguments.junit, fly)
 
 
+_NOT_WITH_RARE = ("search", "replay", "junit", "ray_address", "backend", "keep_logs", "certificate")
+
+
 def _rare(sweep: "Sweep", arguments: Arguments) -> None:
     """Estimate the probability that an expectation is not met, with its interval."""
     from beaver_ftc.cli import told
     from beaver_ftc.studies.engine.workers import cores
     from beaver_ftc.studies.sweep.rare import as_text, run_rare
 
-    others = ("search", "replay", "junit", "ray_address")
-    given = [name for name in others if getattr(arguments, name) is not None]
-    given += ["backend"] if arguments.backend is not Backend.local else []
-    given += ["keep_logs"] if arguments.keep_logs != "none" else []
-    given += ["certificate"] if arguments.certificate else []
+    usual = Arguments(arguments.file)
+    given = [name for name in _NOT_WITH_RARE if getattr(arguments, name) != getattr(usual, name)]
     if given:
         raise BadInput(f"--rare and --{given[0].replace('_', '-')} exclude each other, allowed: one of them")
     with told() as tell:

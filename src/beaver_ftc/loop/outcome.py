@@ -120,8 +120,8 @@ def inconclusive_now(frame: np.void, aircraft: Aircraft) -> str:
 
 @dataclass(frozen=True)
 class Landing:
-    """What a flight has yielded: metrics, texts and rows of tables are views of it. Times in s since the
-    start, rates in rad/s, per axis (p, q, r).
+    """What a flight has yielded: metrics, texts and rows of tables are views of it. A field that is called
+    as a key of the metrics is that key. Times in s since the start, rates in rad/s, per axis (p, q, r).
 
     isolated: aileron, elevator, rudder, flap, unanticipated, or None while more than one fault fits
     (`candidates`; with them what damage that the aircraft declares may have taken). so_far: whether it is a

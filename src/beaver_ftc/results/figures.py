@@ -127,21 +127,10 @@ def _restyle_for_paper(figure: "Figure") -> "Figure":
     for legend in figure.legends:
         legend.remove()
     figure.set_layout_engine("constrained", h_pad=0.02, w_pad=0.02)
-    _draw_legend_outside(figure)
-    return figure
-
-
-def _draw_legend_outside(figure: "Figure") -> None:
-    """The legend of a figure that lays itself out."""
     shown = _legend_handle_of_label(figure.axes)
-    figure.legend(
-        shown.values(),
-        shown.keys(),
-        loc="outside lower center",
-        ncols=2,
-        fontsize=PAPER_FONT - 2,
-        frameon=False,
-    )
+    where: dict[str, Any] = {"loc": "outside lower center", "ncols": 2, "fontsize": PAPER_FONT - 2}
+    figure.legend(shown.values(), shown.keys(), frameon=False, **where)
+    return figure
 
 
 def _draw_for_screen(

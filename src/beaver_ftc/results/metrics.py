@@ -187,7 +187,7 @@ def metrics(flight: "Landing") -> Document:
 def measure(flight: "Landing") -> Metrics:
     """What a flight amounts to."""
     truth = Truth.of(flight.scenario)
-    found = replace(rounded(Metrics.of(_found(flight, truth))), **_declared(flight, truth))
+    found = Metrics.of(_found(flight, truth) | _declared(flight, truth), rounded)
     found = replace(found, hints=tuple(hints(flight, found)))
     expectations = tuple(evaluate(flight.scenario.expect, found))
     return replace(found, expectations=expectations, passed=all(one.passed for one in expectations))
@@ -220,7 +220,6 @@ def _found(flight: "Landing", truth: Truth) -> Document:
     landed, onset = vars(flight), truth.onset
     at_once = truth.first is not None and truth.first.at_s <= 0  # then nothing was measured before it
     return landed | {
-        "faults": (),
         "detection": landed | {
             "detected": flight.detection_time_s is not None,
             "time_s": flight.detection_time_s,

@@ -36,23 +36,24 @@ class Part:
     _last: ClassVar[tuple[str, ...]] = ()
 
     @classmethod
-    def of(cls, found: Any) -> Self:
+    def of(cls, found: Any, value: "Reader | None" = None) -> Self:
         """From a section as JSON has it, or a tuple of its values; a key that is not there is None, or an
-        empty list."""
+        empty list. value: what becomes of a single value, such as `rounded`."""
         part: Any = cls
+        if isinstance(found, cls):
+            return found
+        value = value or _list_as_tuple
         if isinstance(found, tuple):
-            return cls(*found)
-        return cls(**{name: read(found.get(name)) for name, (read, _) in _fields_of(part).items()})
+            return cls(*map(value, found))
+        return cls(**{name: read(found.get(name)) for name, (read, _) in _fields_of(part, value).items()})
 
     def document(self) -> Document:
         """The section as a mapping of keys to values."""
         part: Any = type(self)
-        values = {name: getattr(self, name) for name in _fields_of(part)}
-        known = {name for name, (_, known) in _fields_of(part).items() if known}
         return {
-            key: _as_json_value(value)
-            for key, value in values.items()
-            if not (value is None and key in known)
+            name: _as_json_value(value)
+            for name, (_, only_known) in _fields_of(part, _list_as_tuple).items()
+            if not ((value := getattr(self, name)) is None and only_known)
         }
 
     def at(self, path: str) -> Any:
@@ -69,13 +70,13 @@ Reader = Callable[[Any], Any]
 
 
 @cache
-def _fields_of(part: Any) -> dict[str, tuple[Reader, bool]]:
+def _fields_of(part: Any, value: Reader) -> dict[str, tuple[Reader, bool]]:
     """How each field of a section is read, and whether the document has it only where it is known; in the
     document's order."""
     hints, marks = get_type_hints(part), get_type_hints(part, include_extras=True)
     others = [one.name for one in fields(part) if one.name not in part._first + part._last]
     return {
-        name: (_reader_of_type(hints[name]), _KNOWN in get_args(marks[name]))
+        name: (_reader_of_type(hints[name], value), _KNOWN in get_args(marks[name]))
         for name in (*part._first, *others, *part._last)
     }
 
@@ -87,17 +88,17 @@ def without_none(hint: Any) -> Any:
     return next(one for one in get_args(hint) if one is not type(None))
 
 
-def _reader_of_type(hint: Any) -> Reader:
+def _reader_of_type(hint: Any, value: Reader) -> Reader:
     """How a value of JSON becomes a field of this type: the type is looked into once, not for each flight."""
     bare = without_none(hint)
     kind, inner = get_origin(bare), get_args(bare)
     if kind is tuple:
-        read: Reader = partial(_tuple_of, _reader_of_type(inner[0]))
+        read: Reader = partial(_tuple_of, _reader_of_type(inner[0], value))
     elif kind is dict:
-        read = partial(_dict_of, _reader_of_type(inner[1]))
+        read = partial(_dict_of, _reader_of_type(inner[1], value))
     else:
-        one = bare.of if isinstance(bare, type) and issubclass(bare, Part) else _list_as_tuple
-        return partial(_known, one)
+        is_section = isinstance(bare, type) and issubclass(bare, Part)
+        return partial(_known, partial(bare.of, value=value) if is_section else value)
     return read if bare is hint else partial(_known, read)
 
 
@@ -126,13 +127,10 @@ def _as_json_value(value: Any) -> Any:
 
 
 def rounded(value: Any) -> Any:
-    """A section, or a part of one, with each number to nine decimals, which have no rounding dust of frame
-    times; null for a number that is not finite."""
+    """A value with each number to nine decimals, which have no rounding dust of frame times; null for a
+    number that is not finite."""
     if isinstance(value, float):  # first, as most are
         return round(float(value), 9) if math.isfinite(value) else None
-    if isinstance(value, Part):
-        part: Any = type(value)
-        return part(**{name: rounded(getattr(value, name)) for name in _fields_of(part)})
     if isinstance(value, dict):
         return {key: rounded(entry) for key, entry in value.items()}
     return tuple(map(rounded, value)) if isinstance(value, tuple | list) else value
@@ -435,9 +433,9 @@ class ChangeInFlight(Part):
         return {key: value for key, value in found.items() if key not in of_it}
 
     @classmethod
-    def of(cls, document: Mapping[str, Any]) -> Self:
+    def of(cls, found: Any, value: Reader | None = None) -> Self:
         """From a section as JSON has it."""
-        return super().of({**document, "renewed": "detection_time_s" in document})
+        return super().of({**found, "renewed": "detection_time_s" in found}, value)
 
 
 @dataclass(frozen=True)

@@ -178,40 +178,15 @@ def _base64_floats(name: str, values: np.ndarray) -> str:
 
 
 def _view_entry(view: View) -> Document:
-    return {
-        "name": view.name,
-        "title": view.title,
-        "across": view.n_panel_columns,
-        "absent": view.text_without_data,
-        "folded": view.folded,
-        "panels": [_panel_entry(panel) for panel in view.panels],
-    }
+    return asdict(view) | {"panels": [_panel_entry(panel) for panel in view.panels]}
 
 
 def _panel_entry(panel: Panel) -> Document:
-    return {
-        "label": panel.label,
+    return asdict(panel) | {
         "unit": panel.unit,
-        "log": panel.log_scale,
-        "limits": panel.limits,
         "steps": panel.value_names or panel.rows,
-        "bars": panel.bars,
-        "during": panel.bars_during_column,
-        "clipped": panel.clips_spikes,
-        "shade": panel.shade_column,
-        "shadeLabel": panel.shade_label,
-        "shadeColour": SHADES.get(panel.shade_label, ""),
-        "level": panel.line_at,
-        "traces": [
-            {
-                "column": trace.column,
-                "label": trace.label,
-                "role": trace.role,
-                "factor": trace.factor,
-                "offset": trace.offset,
-            }
-            for trace in panel.traces
-        ],
+        "shade_colour": SHADES.get(panel.shade_label, ""),
+        "traces": [asdict(trace) | {"factor": trace.factor} for trace in panel.traces],
     }
 
 

@@ -38,9 +38,6 @@ LOOKS = {
     "p": Look(SKY, (7, 3), 1.4, 4),
     "q": Look(ORANGE, (), 1.4, 5),
     "r": Look(PURPLE, (2, 2), 1.6, 4),
-    "error of p": Look(SKY, (7, 3), 1.4, 4),
-    "error of q": Look(ORANGE, (), 1.4, 5),
-    "error of r": Look(PURPLE, (2, 2), 1.6, 4),
     # One colour a surface in every picture: aileron, elevator, rudder, flap, further ones.
     "surface 0": Look(SKY, (7, 2, 1.5, 2), 1.8, 3),
     "surface 1": Look(ORANGE, (), 1.8, 2),

@@ -178,10 +178,10 @@ class Panel {
       entry.append(this.readouts[i]);
       caption.append(entry);
     });
-    if (this.spec.shade) {
+    if (this.spec.shade_column) {
       const box = make("i", { className: "box" });
-      box.style.background = this.spec.shadeColour;
-      this.shadeKey = caption.appendChild(make("span", { hidden: true }, box, ` ${this.spec.shadeLabel}`));
+      box.style.background = this.spec.shade_colour;
+      this.shadeKey = caption.appendChild(make("span", { hidden: true }, box, ` ${this.spec.shade_label}`));
     }
     return caption;
   }
@@ -214,7 +214,7 @@ class Panel {
 
   /** Lowest and highest value in the window over all runs, so that runs side by side share their scale. */
   range() {
-    const { steps, limits, log, level } = this.spec;
+    const { steps, limits, log_scale: log, line_at: level } = this.spec;
     if (steps.length) return [-0.4, steps.length - 0.6];
     if (limits) return limits;
     let low = level ?? Infinity, high = level ?? -Infinity;
@@ -228,7 +228,7 @@ class Panel {
           const value = values[i] * trace.factor + trace.offset;
           if (value < low) low = value;
           if (value > high) high = value;
-          if (this.spec.clipped && !Number.isNaN(value)) all.push(value);
+          if (this.spec.clips_spikes && !Number.isNaN(value)) all.push(value);
         }
       }
     }
@@ -246,7 +246,7 @@ class Panel {
   }
 
   draw(pen, width, height) {
-    const [low, high] = this.range(), log = this.spec.log;
+    const [low, high] = this.range(), log = this.spec.log_scale;
     const left = this.left, right = width - MARGIN.right, top = MARGIN.top, bottom = height - MARGIN.bottom;
     const scale = log ? Math.log10 : Number;
     const x = (t) => left + ((t - clock.start) / (clock.end - clock.start)) * (right - left);
@@ -263,7 +263,7 @@ class Panel {
     if (this.spec.bars) this.drawBars(frame, series);
     else for (const trace of this.inOrder()) this.drawTrace(frame, series, trace);
     pen.restore();
-    if (this.spec.clipped) this.drawSpikes(frame);
+    if (this.spec.clips_spikes) this.drawSpikes(frame);
     this.drawModes(frame, series);
     this.drawMarks(frame);
     this.drawCursor(frame, series);
@@ -274,7 +274,7 @@ class Panel {
   }
 
   drawAxes({ pen, x, y, left, right, top, bottom, low, high }) {
-    const { steps, log, level } = this.spec;
+    const { steps, log_scale: log, line_at: level } = this.spec;
     const time = ticks(clock.start, clock.end, Math.max(2, (right - left) / 75));
     pen.strokeStyle = "#e3e3e3";
     pen.fillStyle = "#444";
@@ -308,7 +308,7 @@ class Panel {
     for (let i = first; i <= last; i++) {
       let value = values[i] * trace.factor + trace.offset;
       if (Number.isNaN(value)) { drawn = false; continue; }
-      if (this.spec.log && value < low) value = low;
+      if (this.spec.log_scale && value < low) value = low;
       const px = x(times[i]), py = y(value);
       if (!drawn) pen.moveTo(px, py);
       else if (stepped) { pen.lineTo(px, before); pen.lineTo(px, py); } else pen.lineTo(px, py);
@@ -322,7 +322,7 @@ class Panel {
   /** A row a label: a bar while one of its traces is 0, a thin line while all that are there are 1. */
   drawBars({ pen, x, y }, series) {
     this.spec.steps.forEach((label, place) => {
-      const of = this.spec.traces.filter((trace) => trace.label === label), at = (i, value) => series[this.spec.during][i] === 1 && of.some((trace) => series[trace.column][i] === value);
+      const of = this.spec.traces.filter((trace) => trace.label === label), at = (i, value) => series[this.spec.bars_during_column][i] === 1 && of.some((trace) => series[trace.column][i] === value);
       const bar = (inside, half, colour) => {
         pen.fillStyle = colour;
         for (const [start, end] of stretches(series.t_s, inside)) pen.fillRect(x(start), y(this.row(place) + half), Math.max(1, x(end) - x(start)), y(this.row(place) - half) - y(this.row(place) + half));
@@ -350,10 +350,10 @@ class Panel {
   }
 
   drawShade({ pen, x, top, bottom }, series) {
-    const flags = series[this.spec.shade];
+    const flags = series[this.spec.shade_column];
     if (!flags) return;
     let any = false;
-    pen.fillStyle = this.spec.shadeColour;
+    pen.fillStyle = this.spec.shade_colour;
     for (const [start, end] of stretches(series.t_s, (i) => flags[i] === 1)) {
       pen.fillRect(x(start), top, Math.max(1, x(end) - x(start)), bottom - top);
       any = true;
@@ -682,21 +682,21 @@ function polyline(pen, project, points) {
 
 function gridOf(view, run) {
   const grid = make("div", { className: "grid" });
-  grid.style.setProperty("--across", DATA.runs.length > 1 ? 1 : view.across);
+  grid.style.setProperty("--across", DATA.runs.length > 1 ? 1 : view.n_panel_columns);
   grid.append(...view.panels.map((panel) => new Panel(panel, DATA.runs, run).element));
   return grid;
 }
 
 function absentIn(view, run) {
   const columns = view.panels.flatMap((panel) => panel.traces.map((trace) => trace.column));
-  return view.absent && columns.every((name) => run.levels[0][name].every(Number.isNaN));
+  return view.text_without_data && columns.every((name) => run.levels[0][name].every(Number.isNaN));
 }
 
 function section(view) {
   const runs = make("div", { className: "runs" });
   for (const run of DATA.runs) {
     const title = DATA.runs.length > 1 ? [make("h3", { textContent: run.name })] : [];
-    const body = absentIn(view, run) ? make("p", { className: "hint", textContent: view.absent }) : gridOf(view, run);
+    const body = absentIn(view, run) ? make("p", { className: "hint", textContent: view.text_without_data }) : gridOf(view, run);
     runs.append(make("div", {}, ...title, body));
   }
   const title = make("h2", { textContent: view.title });

@@ -49,7 +49,7 @@ def _tracking(surfaces: tuple[str, str], axis: str) -> tuple[Panel, ...]:
         _pair(f"{name} deflection", (f"{name}_cmd_rad", "command", "command"), f"{name}_effective_rad")
         for name in surfaces
     )
-    errors = tuple(Trace(f"{axis}_error_rad_s", f"error of {axis}", f"error of {axis}") for axis in AXES)
+    errors = tuple(Trace(f"{axis}_error_rad_s", f"error of {axis}", axis) for axis in AXES)
     rate = _pair(AXIS_NAMES[axis], (f"{axis}_model_rad_s", "reference", "target"), f"{axis}_rad_s")
     return (*above, Panel("tracking errors", errors), rate)
 

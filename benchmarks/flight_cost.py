@@ -1,4 +1,4 @@
-"""What a flight costs beside flying: taken apart, in five kinds of flight, in units of JSBSim's plain frame.
+"""What a flight costs beside flying, taken apart, in five kinds of flight.
 
     python benchmarks/flight_cost.py [--rounds N] [--record FILE | --check FILE]
 
@@ -21,69 +21,17 @@ import subprocess
 import sys
 import tarfile
 import tempfile
-import time
-import xml.etree.ElementTree as ET
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from beaver_ftc.aircraft import load
-from beaver_ftc.plant.adapter import Plant
-from beaver_ftc.plant.conditions import trim
-from beaver_ftc.plant.model_file import with_systems
 from beaver_ftc.studies.bench.measure import by_kind
 
 HERE = Path(__file__).resolve()
 ROOT = HERE.parents[1]
 ALLOWED_RISE = 0.10
-PLAIN_FRAMES = 1000
 PAIRS = 4
-
-
-def jsbsim_alone(model: Path) -> None:
-    """Write the aircraft without surfaces and aerodynamics: a mass above the rotating Earth, in air."""
-    aircraft = load()
-    root = with_systems(aircraft.jsbsim)
-    for system in root.findall("system") + root.findall("flight_control"):
-        root.remove(system)
-    properties = [f"fcs/{s}-{end}-rad" for s in aircraft.surfaces for end in ("cmd", "pos", "effective")]
-    _declare(ET.SubElement(root, "flight_control"), properties, "0")
-    aerodynamics = root.find("aerodynamics")
-    assert aerodynamics is not None
-    for part in list(aerodynamics):
-        if part.tag != "property":
-            aerodynamics.remove(part)
-    _declare(aerodynamics, ["engine/power-kw", "aero/dpt", "aero/envelope-valid"], "0.2")
-    ET.ElementTree(root).write(model)
-
-
-def _declare(section: ET.Element, names: list[str], value: str) -> None:
-    for name in names:
-        ET.SubElement(section, "property", value=value).text = name
-
-
-def measure(rounds: int) -> dict[str, Any]:
-    """The unit, us, and what `by_kind` gives, frames and the loop's own part of them in units."""
-    plain: list[float] = []
-    with tempfile.TemporaryDirectory() as folder:
-        model = Path(folder) / load().jsbsim.name
-        jsbsim_alone(model)
-        plant, state = Plant(rate_hz=100, model=model), trim()
-
-        def fly_plain() -> None:
-            plant.start(state)
-            began = time.process_time()
-            for _ in range(PLAIN_FRAMES):
-                plant.run()
-            plain.append((time.process_time() - began) / PLAIN_FRAMES)
-
-        kinds = by_kind(rounds, fly_plain)
-    unit_us = 1e6 * float(np.median(plain[1:]))
-    for of in kinds.values():
-        for part in ("own_part", "frame"):
-            of[f"{part}_units"] = round(of.pop(f"{part}_us") / unit_us, 3)
-    return {"unit_us": unit_us, "kinds": kinds}
 
 
 def git(*words: str) -> bytes:
@@ -161,18 +109,18 @@ def main() -> int:
     if given.check is not None:
         recorded = json.loads(given.check.read_text(encoding="utf-8"))
         return check(recorded["revision"], given.rounds)
-    now = measure(given.rounds)
-    print(f"unit, JSBSim's plain frame: {now['unit_us']:.2f} us; medians of {given.rounds} rounds, ms")
-    for kind, of in now["kinds"].items():
+    kinds = by_kind(given.rounds)
+    print(f"medians of {given.rounds} rounds, ms")
+    for kind, of in kinds.items():
         parts = ", ".join(f"{name} {ms:.2f}" for name, ms in of["parts_ms"].items())
         print(f"{kind}: {parts}; bare frames {of['bare_ms']:.2f}")
         print(
             f"    frames / bare {of['frames_ratio']:.3f}, flight / bare {of['flight_ratio']:.3f}, "
-            f"a frame {of['frame_units']:.2f} units, the loop's own part {of['own_part_units']:.2f} of them"
+            f"a frame {of['frame_us']:.2f} us, the loop's own part {of['own_part_us']:.2f} of them"
         )
     if given.record:
         revision = git("rev-parse", "HEAD").decode().strip() if (ROOT / ".git").exists() else None
-        recorded = json.dumps({"revision": revision, **now}, indent=1)
+        recorded = json.dumps({"revision": revision, "kinds": kinds}, indent=1)
         given.record.write_text(recorded + "\n", encoding="utf-8")
     return 0
 

@@ -216,22 +216,21 @@ class Cell:
 
 def cell_of(survey: Survey, surface: str, healthy: list[Recording], noise: Whitener) -> Cell:
     """Fly a surface's losses and show them to both tests."""
-    page: dict[float, list[Trace]] = {magnitude: [] for magnitude in MAGNITUDES}
-    for recording in healthy:
-        for magnitude, statistic in ratios(recording, surface, noise).items():
-            page[magnitude].append(trace(recording, statistic))
     losses = enumerate(survey.lost(surface))
     known = [(at // len(MAGNITUDES), m, one) for at, (m, one) in losses if is_known(one)]
-    seen: dict[float, list[Trace]] = {magnitude: [] for magnitude in MAGNITUDES}
-    for _, _, recording in known:
-        for magnitude, statistic in ratios(recording, surface, noise).items():
-            seen[magnitude].append(trace(recording, statistic))
-    return Cell(
-        survey.aircraft, surface,
-        np.array([flight for flight, _, _ in known], dtype=int), np.array([m for _, m, _ in known]),
-        {m: Seen.of(seen[m], page[m]) for m in MAGNITUDES},
-        Seen.of(*([trace(one, one.built_in) for one in of] for of in ([one for *_, one in known], healthy))),
-    )  # fmt: skip
+    flights = np.array([flight for flight, *_ in known], dtype=int)
+    magnitudes = np.array([m for _, m, _ in known])
+    both = [one for *_, one in known], healthy
+    by_page = [[ratios(recording, surface, noise) for recording in of] for of in both]
+    page = {
+        m: Seen.of(*(
+            [trace(one, ratio[m]) for one, ratio in zip(of, found, strict=True)]
+            for of, found in zip(both, by_page, strict=True)
+        ))
+        for m in MAGNITUDES
+    }  # fmt: skip
+    ours = Seen.of(*([trace(one, one.built_in) for one in of] for of in both))
+    return Cell(survey.aircraft, surface, flights, magnitudes, page, ours)
 
 
 def counted(cells: list[Cell]) -> tuple[np.ndarray, np.ndarray]:

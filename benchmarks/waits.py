@@ -5,10 +5,10 @@
 
 Every wait is a whole process of its own, and the processor time is that of the process and of all that it
 starts. A wait that compiles begins each time with a cache of its own: empty, or as a first flight leaves it.
-The waits of a flight in a sweep are ratios to JSBSim's frames alone (`flight_cost.py`). `--long` takes also
-what needs minutes or the network (`matrix`, `detectability --grid`, rare events, `reproduce`, `make demo`
-from a fresh clone); `import gtm` needs the user's copy of the data base. The processor time of a study
-includes its workers, on Linux: they are no children of the command, and become this process's when it ends.
+What a flight costs beside JSBSim's frames alone is measured by `flight_cost.py`. `--long` takes also what
+needs minutes or the network (`matrix`, `detectability --grid`, rare events, `reproduce`, `make demo` from a
+fresh clone); `import gtm` needs the user's copy of the data base. The processor time of a study includes its
+workers, on Linux: they are no children of the command, and become this process's when it ends.
 
 `--beside REVISION` measures in pairs: the code of that revision and today's, in turn, and prints the medians
 of both and of their ratio, which a busy machine changes little.
@@ -18,7 +18,6 @@ import argparse
 import asyncio
 import ctypes
 import fnmatch
-import json
 import os
 import shutil
 import statistics
@@ -28,10 +27,10 @@ import tempfile
 import time
 import tomllib
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 ROOT = Path(__file__).resolve().parents[1]
 ADOPT_ORPHANS = 36  # prctl(2): PR_SET_CHILD_SUBREAPER
@@ -47,13 +46,12 @@ autopilot: {altitude_m: [{hold: true}], heading_deg: [{hold: true}], airspeed_mp
 """
 
 
-@dataclass(frozen=True)
-class Taken:
-    """Seconds by the wall and of the processor, and the largest process; of a ratio, the ratio alone."""
+class Taken(NamedTuple):
+    """Seconds by the wall and of the processor, and the largest process."""
 
     wall: float
-    processor: float | None = None
-    peak_mb: float | None = None
+    processor: float
+    peak_mb: float
 
 
 @dataclass(frozen=True)
@@ -124,9 +122,7 @@ def with_workers(measure: Callable[[], Taken]) -> Taken:
             left_s, peak_mb = left_s + used.ru_utime + used.ru_stime, max(peak_mb, used.ru_maxrss / 2**10)
     finally:
         ctypes.CDLL(None).prctl(ADOPT_ORPHANS, 0, 0, 0, 0)
-    assert taken.processor is not None
-    assert taken.peak_mb is not None
-    return replace(taken, processor=taken.processor + left_s, peak_mb=max(taken.peak_mb, peak_mb))
+    return Taken(taken.wall, taken.processor + left_s, max(taken.peak_mb, peak_mb))
 
 
 def after_a_first_flight(place: Place, scenario: str) -> Taken:
@@ -196,17 +192,9 @@ def demo(place: Place) -> Taken:
     return place.taken(["sh", "-c", f"git clone -q {ROOT} clone && make -C clone demo"], "empty")
 
 
-def in_a_sweep(place: Place, kind: str) -> Taken:
-    """A flight of a sweep over its bare frames: median of the rounds of `flight_cost.py`."""
-    said = place.folder / "flight-cost.json"
-    script = str(place.tree / "benchmarks/flight_cost.py")
-    place.taken([sys.executable, script, "--rounds", "12", "--record", str(said)])
-    return Taken(json.loads(said.read_text(encoding="utf-8"))["kinds"][kind]["flight_ratio"])
-
-
 @dataclass(frozen=True)
 class Wait:
-    """A row: its name, the bar (None: a ratio to an earlier revision alone), how it is measured.
+    """A row: its name, the bar (None: there is none), how it is measured.
 
     fresh: what compiles is a part of it, so that nothing is warmed up before, and it is measured once.
     long: only when asked for.
@@ -253,8 +241,6 @@ WAITS = (
     Wait("first run of a fresh install", 12.0, fresh_install, fresh=True),
     Wait("first flight of another aircraft", 2.0, another(OTHER_AIRCRAFT), fresh=True),
     Wait("first flight of another kind", 2.0, another(OTHER_KIND), fresh=True),
-    Wait("flight in a sweep / bare frames", 1.35, lambda at: in_a_sweep(at, "published"), fresh=True),
-    Wait("the same, one beginning / bare", 1.20, lambda at: in_a_sweep(at, "one beginning"), fresh=True),
     Wait("matrix", None, study("matrix"), fresh=True, long=True),
     Wait("detectability --grid", None, study("detectability", "--grid", "quick"), fresh=True, long=True),
     Wait("rare events", None, study("sweep", RARE, "--rare", "no_departure"), fresh=True, long=True),
@@ -263,15 +249,10 @@ WAITS = (
 )  # fmt: skip
 
 
-TAKEN = ("wall", "processor", "peak_mb")
-
-
 def medians(rounds: list[Taken]) -> Taken:
     """Of each number by itself; the largest of the peaks."""
-    if rounds[0].processor is None:
-        return Taken(statistics.median(taken.wall for taken in rounds))
-    wall, processor, peak = ([getattr(taken, what) for taken in rounds] for what in TAKEN)
-    return Taken(statistics.median(wall), statistics.median(processor), max(peak))
+    wall, processor, peaks = zip(*rounds, strict=True)
+    return Taken(statistics.median(wall), statistics.median(processor), max(peaks))
 
 
 def alone(wait: Wait, place: Place, rounds: int) -> str:
@@ -280,24 +261,20 @@ def alone(wait: Wait, place: Place, rounds: int) -> str:
         wait.measure(place)
     found = [wait.measure(place) for _ in range(1 if wait.fresh else rounds)]
     taken = medians([each for each in found if each]) if all(found) else None
-    bar = "-" if wait.bar is None else f"{wait.bar:.2f}"
-    return f"{wait.name:34}{''.join(_cell(taken, what) for what in TAKEN)}{bar:>14}"
-
-
-def _cell(taken: Taken | None, what: str) -> str:
-    value = getattr(taken, what) if taken else None
-    return f"{'-':>14}" if value is None else f"{value:14.{0 if what == 'peak_mb' else 2}f}"
+    cells = ["-"] * 3 if taken is None else [f"{of:.{n}f}" for of, n in zip(taken, (2, 2, 0), strict=True)]
+    cells.append("-" if wait.bar is None else f"{wait.bar:.2f}")
+    return f"{wait.name:34}" + "".join(f"{cell:>14}" for cell in cells)
 
 
 def in_pairs(wait: Wait, places: tuple[Place, Place], pairs: int) -> str:
-    """Then, now, and the median of their ratios, by the processor where it is known; they take turns."""
+    """Then, now, and the median of their ratios, by the processor; they take turns."""
     if not wait.fresh:
         for place in places:
             wait.measure(place)
     then_now = []
     for pair in range(pairs):
         seen = {which: wait.measure(places[which]) for which in ((0, 1) if pair % 2 else (1, 0))}
-        then_now.append([taken.processor or taken.wall for _, taken in sorted(seen.items()) if taken])
+        then_now.append([taken.processor for _, taken in sorted(seen.items()) if taken])
     if not all(map(len, then_now)):
         return f"{wait.name:34}{'-':>10}{'-':>10}"
     then, now = (statistics.median(column) for column in zip(*then_now, strict=True))
@@ -328,7 +305,7 @@ def main() -> int:
             then = Place(unpack(given.beside, Path(folder, "code")), Path(folder, "then"), gtm)
             then.folder.mkdir()
             said = git("rev-parse", "--short", given.beside).decode().strip()
-            print(f"{'processor s (or ratio)':34}{said:>10}{'now':>10}{'now/then':>10}", flush=True)
+            print(f"{'processor, s':34}{said:>10}{'now':>10}{'now/then':>10}", flush=True)
         else:
             print(f"{'':34}{'wall, s':>14}{'processor, s':>14}{'peak, MB':>14}{'bar, s':>14}", flush=True)
         for wait in wanted:

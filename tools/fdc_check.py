@@ -1,9 +1,6 @@
 """The truth against the FDC data: state derivatives at random states, and two doublet responses.
 
-The data are CSV files computed from the FDC equations by an independent implementation; `report(folder)` is
-the comparison, e.g.
-
-    python -c "from tools.fdc_check import report; print(report('tests/data'))"
+The data are CSV files computed from the FDC equations by an independent implementation.
 """
 
 from dataclasses import dataclass
@@ -135,22 +132,3 @@ def _difference(name: str, ours: np.ndarray, theirs: np.ndarray) -> np.ndarray:
 
 def _rms(x: np.ndarray) -> float:
     return float(np.sqrt(np.mean(x**2)))
-
-
-def report(folder: str | Path) -> str:
-    """The whole comparison as text: one line a signal, with its bar."""
-    folder = Path(folder)
-    lines = ["state derivatives at random states: RMS error / RMS value"]
-    lines += _rows(derivative_agreement(folder))
-    for surface in ("aileron", "elevator"):
-        for rate_hz in RESPONSE_BAR:
-            lines.append(f"{surface} doublet, 20 s, {rate_hz} Hz: largest error / span")
-            lines += _rows(response_agreement(folder, surface, rate_hz))
-    return "\n".join(lines)
-
-
-def _rows(agreements: list[Agreement]) -> list[str]:
-    return [
-        f"  {each.signal:16}{each.error:10.2e}" + ("" if each.bar is None else f"   bar {each.bar:g}")
-        for each in agreements
-    ]

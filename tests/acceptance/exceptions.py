@@ -187,7 +187,7 @@ TABLE = (
         r"beaver-ftc verify --hours 0.01 --faults 2\1\2",
     ),
     Exempt(
-        r"(beaver-ftc sweep (?:elevator|robust)-\S+)",
+        r"(beaver-ftc sweep (?:autopilot|elevator|robust)-\S+)",
         "hundreds of flights: one of them (test_sweeps.py flies each in short)",
         r"\1 --replay 0 --no-report",
     ),

@@ -14,7 +14,7 @@ from tools.docs.constants import constants
 from tools.docs.marks import parsed
 from tools.docs.refresh import Refreshed, Wanted
 
-from beaver_ftc.plugins import LAWS, options_of
+from beaver_ftc.control.laws import rejecting
 
 
 def one(line, **options):
@@ -85,21 +85,24 @@ def test_a_command_that_draws_otherwise_is_red(tmp_path, monkeypatch):
     assert Refreshed(parsed(text, "docs/page.md"), output, Wanted()).changes == []
 
 
-def test_a_changed_gain_turns_the_page_that_cites_it_red(monkeypatch):
-    text = (
+def test_a_changed_gain_turns_the_page_that_cites_it_red(tmp_path, monkeypatch):
+    page = parsed(
         "<!-- from code: python -m tools.docs constants -->\n"
-        "The gain is <!--=code options.laws.zhang2005.network_gain g-->40<!--/-->.\n"
+        f"It is <!--=code modules.control.laws.rejecting.RATIO g-->{rejecting.RATIO:g}<!--/-->.\n",
+        "docs/page.md",
     )
-    page = parsed(text, "docs/page.md")
+    alone = tmp_path / "src/beaver_ftc/control/laws/rejecting.py"  # all modules take seconds
+    alone.parent.mkdir(parents=True)
+    alone.symlink_to(rejecting.__file__)
+    monkeypatch.setattr("tools.docs.constants.ROOT", tmp_path)
 
     def changes():
         output = Output(json.dumps(constants()))
         return Refreshed(page, {"python -m tools.docs constants": output}, Wanted()).changes
 
-    monkeypatch.setattr("tools.docs.constants._of_modules", dict)  # seconds, and another test's
     assert changes() == []
-    monkeypatch.setitem(options_of(LAWS, "zhang2005")["network_gain"], "default", 41.0)
-    assert ['stands "40", printed "41"' in str(change) for change in changes()] == [True]
+    monkeypatch.setattr(rejecting, "RATIO", 41.0)
+    assert ['printed "41"' in str(change) for change in changes()] == [True]
 
 
 def test_what_was_printed_is_kept_until_a_file_changes_that_the_command_can_read(tmp_path, monkeypatch):

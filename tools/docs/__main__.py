@@ -2,7 +2,7 @@
 
 python -m tools.docs [PAGE ...]    write every cheap block, number and picture again
 python -m tools.docs --check       print what stands otherwise and every wrong name; status 1 if any
-python -m tools.docs table NAME    print a table; `constants` and `properties` print those
+python -m tools.docs table NAME    print a table; `constants` prints those
 python -m tools.docs cells PAGE    print the tables of a page as JSON, for numbers in the prose beside them
 python -m tools.docs screens       take the pictures of report and live page again, with a browser
 python -m tools.docs reference NAME    print a page of the generated reference, as the web site has it
@@ -24,7 +24,6 @@ def main() -> int:
         "table": _table,
         "cells": _cells,
         "constants": _constants,
-        "properties": _properties,
         "reference": _reference,
         "screens": _screens,
     }
@@ -99,12 +98,6 @@ def _constants() -> str:
     from tools.docs.constants import constants
 
     return json.dumps(constants(), indent=1)
-
-
-def _properties() -> str:
-    from tools.docs.properties import as_markdown
-
-    return as_markdown()
 
 
 def _screens() -> str:

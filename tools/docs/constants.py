@@ -20,38 +20,11 @@ _LONGEST = 64  # elements of a constant that is shown
 
 
 def constants() -> dict[str, Any]:
-    """The document: defaults of every key, what a key may be, options of plug-ins, the aircraft, constants
-    of modules by the module's path, and how many there are of what can be listed.
-    """
-    from beaver_ftc.cli.catalogue import _available
-    from beaver_ftc.commands import registered as registered_commands
-    from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled, options_of, registered
-    from beaver_ftc.scenario.schema import Scenario, load_text
+    """The document: defaults of every key of a scenario, and constants of modules by the module's path."""
+    from beaver_ftc.scenario.schema import load_text
 
-    plain = load_text("name: default\n")
-    options = {
-        kind: {
-            name: {key: row["default"] for key, row in options_of(group, name).items()}
-            for name in registered(group)
-            if is_compiled(group, name)
-        }
-        for kind, group in (("schemes", DETECTORS), ("laws", LAWS))
-    }
-    counts = {kind: len(list(entries)) for kind, entries in _available().items()}
-    return _plain({
-        "defaults": plain.model_dump(),
-        "sections": Scenario.model_json_schema()["$defs"],
-        "options": options,
-        "aircraft": {name: _aircraft(name) for name in ("beaver",)},
-        "modules": dict(_of_modules()),
-        "counts": {**counts, "commands": len(registered_commands())},
-    })  # fmt: skip
-
-
-def _aircraft(name: str) -> Any:
-    from beaver_ftc.aircraft import load
-
-    return load(name).file.model_dump()
+    defaults = load_text("name: default\n").model_dump()
+    return _plain({"defaults": defaults, "modules": dict(_of_modules())})
 
 
 def _of_modules() -> Iterator[tuple[str, dict[str, Any]]]:

@@ -14,10 +14,12 @@ import time
 from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
+from itertools import islice
 from multiprocessing import get_context
 from pathlib import Path
 
-from tools.drawn.campaign import AIRCRAFT, Outcome, fly_slice
+from tools.drawn.campaign import AIRCRAFT, Outcome, fly, keep_it
+from tools.drawn.compose import Drawn, drawn_flights
 
 WORDS = ("flights", "refused", "detected", "named", "broken")
 
@@ -34,13 +36,15 @@ def main() -> None:
     parser.add_argument("--shrink", action="store_true", help="leave out what is not needed to break it")
     args = parser.parse_args()
     began, count, kinds = time.monotonic(), Counter(dict.fromkeys(WORDS, 0)), Counter()
-    for outcome in outcomes(args):
+    drawn = list(islice(drawn_flights(args.seed, args.aircraft), args.first, args.first + args.flights))
+    for outcome, flight in zip(outcomes(drawn, args.workers), drawn, strict=True):
         count["flights"] += 1
         for word in WORDS[1:]:
             count[word] += bool(getattr(outcome, word))
         kinds.update({line.partition(":")[0] for line in outcome.broken})
         if outcome.broken:
             print(f"{outcome.index}: {'; '.join(outcome.broken)[:300]}", flush=True)
+            keep_it(args.keep, flight, outcome, args.shrink)
     took_s = time.monotonic() - began
     print(*(f"{word} {count[word]}" for word in WORDS), sep=", ")
     print(*(f"{kind}: {n}" for kind, n in kinds.most_common()), sep="\n")
@@ -48,17 +52,10 @@ def main() -> None:
     raise SystemExit(1 if count["broken"] else 0)
 
 
-def outcomes(args: argparse.Namespace) -> Iterator[Outcome]:
-    """Every outcome; each worker flies every so many-th."""
-    rest = args.first + args.flights, args.workers, args.keep, args.shrink
-    slices = [(args.seed, tuple(args.aircraft), args.first + i, *rest) for i in range(args.workers)]
-    with ProcessPoolExecutor(args.workers, get_context()) as pool:
-        for flown in pool.map(_slice, slices):
-            yield from flown
-
-
-def _slice(one: tuple) -> list[Outcome]:
-    return list(fly_slice(*one))
+def outcomes(drawn: list[Drawn], workers: int) -> Iterator[Outcome]:
+    """Every outcome, in order."""
+    with ProcessPoolExecutor(workers, get_context()) as pool:
+        yield from pool.map(fly, drawn)
 
 
 if __name__ == "__main__":

@@ -1,14 +1,12 @@
 """Drawn flights, one after the other: flown, held against their promises, kept if they break one."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
-from itertools import islice
+from dataclasses import dataclass
 from pathlib import Path
 
 import yaml
 
 import beaver_ftc as bf
-from tools.drawn.compose import Drawn, drawn_flights
+from tools.drawn.compose import Drawn
 from tools.drawn.promises import broken, flown_again
 from tools.drawn.shrink import smaller
 
@@ -22,52 +20,28 @@ class Outcome:
     """What came of a flight. refused: why it was not flown."""
 
     index: int
-    declared: bool
     broken: tuple[str, ...] = ()
     refused: str = ""
     detected: bool = False
     named: bool = False
-    row: dict[str, str] = field(default_factory=dict)
-
-
-def fly_slice(
-    seed: int,
-    aircraft: Sequence[str],
-    first: int,
-    end: int,
-    step: int = 1,
-    keep: Path | None = None,
-    shrink: bool = False,
-) -> Iterator[Outcome]:
-    """The outcomes of every step-th flight from first to end."""
-    for drawn in islice(drawn_flights(seed, aircraft), first, end, step):
-        outcome = fly(drawn)
-        if outcome.broken and keep is not None:
-            keep_it(keep, drawn, outcome, shrink)
-        yield outcome
 
 
 def fly(drawn: Drawn, again: bool | None = None) -> Outcome:
     """Fly it, and hold it against every promise. again: whether to fly it twice; every so many-th."""
     again = drawn.index % AGAIN == 0 if again is None else again
-    about = {"index": drawn.index, "declared": drawn.declared, "row": drawn.row}
     try:
         flight = bf.fly(drawn.scenario(), log=False)
     except bf.BadInput as error:
         known = any(word in str(error) for word in NO_TRIM)
-        return Outcome(**about, refused=str(error), broken=() if known else (f"refused: {error}",))
+        return Outcome(drawn.index, refused=str(error), broken=() if known else (f"refused: {error}",))
     except Exception as error:  # whatever it is, it is a find
-        return Outcome(**about, broken=(f"{type(error).__name__}: {error}",))
+        return Outcome(drawn.index, broken=(f"{type(error).__name__}: {error}",))
     found = list(broken(flight.scenario, flight.metrics, drawn.declared))
     if again:
         found += flown_again(flight)
     metrics = flight.metrics
-    return Outcome(
-        **about,
-        broken=tuple(found),
-        detected=metrics["detection"]["detected"],
-        named=metrics["isolation"]["isolated"],
-    )
+    detected, named = metrics["detection"]["detected"], metrics["isolation"]["isolated"]
+    return Outcome(drawn.index, tuple(found), detected=detected, named=named)
 
 
 def keep_it(folder: Path, drawn: Drawn, outcome: Outcome, shrink: bool) -> None:

@@ -49,6 +49,8 @@ class Envelope:
     def __init__(self, bench: Bench, case: int) -> None:
         taken = list(cases().values())[case - 1]["takes"] if case else ()
         self.bench, self.case = bench, case
+        self.known: dict[float, np.ndarray] = {}  # level flight by speed
+        self.near: dict[tuple[float, float, float], np.ndarray] = {}  # all that was found
         self.no_rudder = all(name in taken for name in surfaces("rudder"))
         self.thin = sqrt(bench.density(ALTITUDE_FT) / SEA_LEVEL_SLUG_FT3)
         bench.damage(case)
@@ -71,16 +73,6 @@ class Envelope:
                         if bank == sideslip == 0:
                             self.known[speed] = turn.x
                     yield turn
-
-    @property
-    def known(self) -> dict[float, np.ndarray]:
-        """Level flight by speed."""
-        return self.__dict__.setdefault("_level", {})
-
-    @property
-    def near(self) -> dict[tuple[float, float, float], np.ndarray]:
-        """All that was found."""
-        return self.__dict__.setdefault("_all", {})
 
     def _start(self, speed: float) -> np.ndarray:
         return np.array([radians(min(12.0, 3.5 * (90.0 / speed) ** 2)), 0.03, 0.0, 0.0, 0.4, 0.0])

@@ -98,71 +98,12 @@ def specified_trim(spec: Specification, wanted: Condition, guess: Steady) -> Ste
         )[:6]
 
     first = guess.alpha_deg if wanted.alpha_deg is None else guess.airspeed_fps
-    start = [
-        first,
-        guess.phi_deg,
-        guess.elevator_deg,
-        guess.aileron_deg,
-        guess.rudder_deg,
-        guess.throttle_percent,
-    ]
+    others = "phi_deg", "elevator_deg", "aileron_deg", "rudder_deg", "throttle_percent"
+    start = [first, *(getattr(guess, name) for name in others)]
     x, _, good, says = fsolve(off, start, full_output=True, xtol=1e-12)
     if good != 1 and np.abs(off(x)).max() > 1e-7:
         raise ValueError(says)
     return made(x)
-
-
-def by_specification(
-    spec: Specification, start: State, plan: Plan, end_s: float, case: int = 0, onset_s: float = 10.0
-) -> np.ndarray:
-    """SIGNALS at every step, (n, 10)."""
-    servos, x, rows = Servos(spec.of, plan(0.0)), start.array(), []
-    for k in range(round(end_s / STEP_S) + 1):
-        rows.append(x)
-        t = k * STEP_S
-        x = spec.step(x, servos.move(plan(t)), case if t >= onset_s - 1e-9 else 0)
-    return np.array(rows)
-
-
-def by_jsbsim(
-    model: Bench,
-    start: State,
-    plan: Plan,
-    end_s: float,
-    damage: tuple[int, float],
-    dt: float,
-    integrator: int,
-) -> np.ndarray:
-    """The same flight, its rows those of the specification's steps. A command is written for the time at
-    which the frame that reads it ends."""
-    fdm, (case, onset_s) = model.fdm, damage
-    fdm["simulation/integrator/rate/rotational"] = integrator
-    fdm.set_dt(dt)
-    begin(model, start, plan(0.0))
-    every, rows = round(STEP_S / dt), []
-    for k in range(round(end_s / dt) + 1):
-        if k % every == 0:
-            rows.append([fdm[name] for name in _IN_JSBSIM])
-        t = (k + 1) * dt
-        _command(model, plan(t))
-        model.damage(case if t >= onset_s - 1e-9 else 0)
-        fdm.run()
-    model.damage(0)
-    for side in ("left", "right"):
-        fdm[f"fcs/{side}_engine-cmd-norm"] = 0.0
-    found = np.array(rows)
-    for angle in (SIGNALS.index("phi"), SIGNALS.index("psi")):
-        found[:, angle] = np.unwrap(found[:, angle])
-    return found
-
-
-def begin(model: Bench, at: State, controls: Controls) -> None:
-    """Put the converted model there, undamaged, at time 0."""
-    model.damage(0)
-    _command(model, controls)
-    angles = at.phi, at.theta, at.psi
-    model.place(at.altitude, (at.u, at.v, at.w), angles, (at.p, at.q, at.r))
-    model.fdm.set_sim_time(0.0)
 
 
 def _command(model: Bench, controls: Controls) -> None:
@@ -185,12 +126,42 @@ class Manoeuvre:
     onset_s: float = 10.0
 
     def by_specification(self, spec: Specification) -> np.ndarray:
-        """SIGNALS at every step of 5 ms."""
-        return by_specification(spec, self.start, self.plan, self.end_s, self.case, self.onset_s)
+        """SIGNALS at every step of 5 ms, (n, 10)."""
+        servos, x, rows = Servos(spec.of, self.plan(0.0)), self.start.array(), []
+        for k in range(round(self.end_s / STEP_S) + 1):
+            rows.append(x)
+            t = k * STEP_S
+            x = spec.step(x, servos.move(self.plan(t)), self._case_at(t))
+        return np.array(rows)
 
     def by_jsbsim(self, model: Bench, dt: float = STEP_S, integrator: int = EULER) -> np.ndarray:
-        """The same at the same times."""
-        return by_jsbsim(model, self.start, self.plan, self.end_s, (self.case, self.onset_s), dt, integrator)
+        """The same at the same times. A command is that of the time at which the frame that reads it ends."""
+        fdm, start = model.fdm, self.start
+        fdm["simulation/integrator/rate/rotational"] = integrator
+        fdm.set_dt(dt)
+        model.damage(0)
+        _command(model, self.plan(0.0))
+        angles = start.phi, start.theta, start.psi
+        model.place(start.altitude, (start.u, start.v, start.w), angles, (start.p, start.q, start.r))
+        fdm.set_sim_time(0.0)
+        every, rows = round(STEP_S / dt), []
+        for k in range(round(self.end_s / dt) + 1):
+            if k % every == 0:
+                rows.append([fdm[name] for name in _IN_JSBSIM])
+            t = (k + 1) * dt
+            _command(model, self.plan(t))
+            model.damage(self._case_at(t))
+            fdm.run()
+        model.damage(0)
+        for side in ("left", "right"):
+            fdm[f"fcs/{side}_engine-cmd-norm"] = 0.0
+        found = np.array(rows)
+        for angle in (SIGNALS.index("phi"), SIGNALS.index("psi")):
+            found[:, angle] = np.unwrap(found[:, angle])
+        return found
+
+    def _case_at(self, t: float) -> int:
+        return self.case if t >= self.onset_s - 1e-9 else 0
 
 
 def doublets(steady: Steady) -> Manoeuvre:

@@ -6,27 +6,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-ARITHMETIC = {
-    ast.Add: ast.Sub,
-    ast.Sub: ast.Add,
-    ast.Mult: ast.Div,
-    ast.Div: ast.Mult,
-    ast.FloorDiv: ast.Mult,
-    ast.Mod: ast.Mult,
-    ast.Pow: ast.Mult,
-}
-COMPARISONS = {
-    ast.Lt: (ast.LtE, ast.GtE),
-    ast.LtE: (ast.Lt, ast.Gt),
-    ast.Gt: (ast.GtE, ast.LtE),
-    ast.GtE: (ast.Gt, ast.Lt),
-    ast.Eq: (ast.NotEq,),
-    ast.NotEq: (ast.Eq,),
-    ast.In: (ast.NotIn,),
-    ast.NotIn: (ast.In,),
-    ast.Is: (ast.IsNot,),
-    ast.IsNot: (ast.Is,),
-}
+# Operators of Python's syntax tree, and what could stand in their place.
+SWAPS = {
+    "Add": "Sub", "Sub": "Add", "Mult": "Div", "Div": "Mult", "FloorDiv": "Mult", "Mod": "Mult",
+    "Pow": "Mult", "Lt": "LtE GtE", "LtE": "Lt Gt", "Gt": "GtE LtE", "GtE": "Gt Lt", "Eq": "NotEq",
+    "NotEq": "Eq", "In": "NotIn", "NotIn": "In", "Is": "IsNot", "IsNot": "Is", "And": "Or", "Or": "And",
+}  # fmt: skip
 # Keywords whose value no caller can see: zip's check of its own arguments, a record's padding.
 UNSEEN = {"strict", "align"}
 # Keywords of what draws, whose value only the eye can judge.
@@ -136,18 +121,26 @@ def _of_operators(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
             yield "sign", node.operand
         case ast.UnaryOp(op=ast.Not()):
             yield "operator", node.operand
-        case ast.BinOp() if type(node.op) in ARITHMETIC:
-            yield "operator", ast.BinOp(node.left, ARITHMETIC[type(node.op)](), node.right)
         case ast.AugAssign(op=ast.Add()):
             yield "sign", ast.AugAssign(node.target, ast.Sub(), node.value)
-        case ast.BoolOp():
-            other = ast.Or() if isinstance(node.op, ast.And) else ast.And()
-            yield "operator", ast.BoolOp(other, node.values)
+        case ast.BinOp(op=op) | ast.BoolOp(op=op):
+            for new in _swapped(op):
+                yield "operator", _with_fields(node, op=new)
         case ast.Compare(ops=[op]):
-            for new in COMPARISONS.get(type(op), ()):
-                yield "comparison", ast.Compare(node.left, [new()], node.comparators)
+            for new in _swapped(op):
+                yield "comparison", _with_fields(node, ops=[new])
         case ast.Call(func=ast.Name(id=name)) if name in FUNCTIONS:
-            yield "operator", ast.Call(ast.Name(FUNCTIONS[name], ast.Load()), node.args, node.keywords)
+            yield "operator", _with_fields(node, func=ast.Name(FUNCTIONS[name], ast.Load()))
+
+
+def _swapped(operator: ast.AST) -> Iterator[ast.AST]:
+    for name in SWAPS.get(type(operator).__name__, "").split():
+        yield getattr(ast, name)()
+
+
+def _with_fields(node: ast.AST, **changed: object) -> ast.AST:
+    """The same with other fields, and no place in the source."""
+    return type(node)(**{**dict(ast.iter_fields(node)), **changed})
 
 
 def _of_numbers(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:

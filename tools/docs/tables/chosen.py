@@ -1,6 +1,6 @@
 """Tables of docs/results/choices.md: constants chosen by flights, those flights, and those of the results."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
 from math import exp
@@ -19,7 +19,7 @@ from beaver_ftc.studies.compare.criteria import LawCost, effort, flights, flown,
 from beaver_ftc.studies.compare.gain import geometric_mean, relative_gain
 from beaver_ftc.studies.compare.trial import CALIBRATION, DRAW, LAW, SCHEME, Entry
 from beaver_ftc.studies.present.tables import markdown_table
-from tools.docs.tables import aside
+from tools.docs.tables import aside, table_of
 
 Document = dict[str, Any]
 FILE = Path(__file__).parents[1] / "chosen.yaml"
@@ -28,33 +28,30 @@ ORIGINS = ("derived", "stated", "search", "limit", "judged")
 BENCHMARK = Path(__file__).parents[3] / "scenarios" / "benchmark"
 TUNED_DRAWS = (*range(61), 80)  # of the calibration sets, that tuned.json was chosen on
 COMPARED = "compared"  # every set of the benchmark but those that rivals are tuned on
-CONSTANT_HEAD = ("row", "name", "constant", "value", "determines", "chosen by", "file")
-FLIGHT_HEAD = (
-    "row", "name", "flights that chose the constant", "seeds of the choice", "flights of the results",
-    "seeds of the results",
-)  # fmt: skip
+CONSTANTS = {
+    "row": "row", "name": "name", "constant": "constant", "value": "value", "determines": "sets",
+    "chosen by": lambda choice: f"`{choice['command']}`" if choice["command"] else "by hand",
+    "file": lambda choice: f"`{choice['where']}`",
+}  # fmt: skip
+FLIGHTS = {
+    "row": "row", "name": "name", "flights that chose the constant": "flights.says",
+    "seeds of the choice": lambda choice: _said(choice["flights"]),
+    "flights of the results": lambda choice: "{page}: {says}".format(**choice["results"]),
+    "seeds of the results": lambda choice: _said(choice["results"]),
+}  # fmt: skip
 
 
 def chosen_asides() -> str:
     """How many groups of constants there are, and their tables as CSV."""
+    rows = [{"row": number, **choice} for number, choice in enumerate(choices(), 1)]
+    beside = "C2: flights that chose them, beside those of the results"
     links = [
-        aside(
-            "chosen-constants",
-            "C1: constants that flights chose, with the command of each",
-            _constants(),
-        ),
-        aside("chosen-flights", "C2: flights that chose them, beside those of the results", _flights()),
+        aside("chosen-constants", "C1: constants that flights chose, with the command of each",
+              table_of(rows, CONSTANTS)),
+        aside("chosen-flights", beside, table_of(rows, FLIGHTS)),
         aside("chosen-not", "C3: other constants of the diagnosis of logs, each with its origin", _others()),
-    ]
-    return f"{len(choices())} groups of constants were chosen by flights.\n\n" + "\n".join(links)
-
-
-def _constants() -> str:
-    """The constants, in rows with a number."""
-    return _table(
-        CONSTANT_HEAD,
-        lambda choice: (choice["constant"], choice["value"], choice["sets"], *_where(choice)),
-    )
+    ]  # fmt: skip
+    return f"{len(rows)} groups of constants were chosen by flights.\n\n" + "\n".join(links)
 
 
 def _others() -> str:
@@ -81,16 +78,6 @@ def not_chosen_constants() -> dict[str, dict[str, str]]:
     """By file: the name of each constant that no recorded choice has, and the origin of its value."""
     found: dict[str, dict[str, str]] = parse(NOT_CHOSEN_FILE.read_text(encoding="utf-8")).data
     return found
-
-
-def _flights() -> str:
-    """Of each row, the flights that chose the constant, beside those of the results that depend on it."""
-    return _table(
-        FLIGHT_HEAD,
-        lambda choice: (
-            choice["flights"]["says"], _said(choice["flights"]), *_result(choice["results"]),
-        ),
-    )  # fmt: skip
 
 
 RATIOS, RATIO_DRAWS = (3.0, 4.5, 6.5, 9.0, 13.0, 20.0), (101, 102)
@@ -169,20 +156,6 @@ def _observer_ratio(ratio: float) -> Iterator[None]:
             yield
     finally:
         rejecting.candidates.cache_clear()
-
-
-def _table(head: tuple[str, ...], cells: Callable[[Document], tuple[str, ...]]) -> str:
-    return markdown_table(
-        head, [(str(row), choice["name"], *cells(choice)) for row, choice in enumerate(choices(), 1)]
-    )
-
-
-def _where(choice: Document) -> tuple[str, str]:
-    return f"`{choice['command']}`" if choice["command"] else "by hand", f"`{choice['where']}`"
-
-
-def _result(results: Document) -> tuple[str, str]:
-    return f"{results['page']}: {results['says']}", _said(results)
 
 
 def choices() -> list[Document]:

@@ -24,7 +24,6 @@ ALTERNATIVES = {
 }
 ROUNDS = 40
 WAITS = ("command", "elapsed, s", "processor, s", "memory, MB", "largest allowed, s")
-PER_FRAMES = "/ bare"  # of `waits.py`: a ratio of Table 1, not a wait
 
 
 def performance_flights() -> str:
@@ -54,7 +53,7 @@ def performance_waits() -> str:
     """Each wait as `make waits` prints it: whole processes by the wall and the processor, and their bars."""
     _, *lines = _printed("waits.py", "--rounds", "3").splitlines()
     found = [re.fullmatch(r"(.+?)\s+([\d.-]+)\s+([\d.-]+)\s+([\d.-]+)\s+([\d.]+)", line) for line in lines]
-    rows = [row.groups() for row in found if row and PER_FRAMES not in row[1]]
+    rows = [row.groups() for row in found if row]
     return markdown_table(WAITS, rows)
 
 

@@ -173,8 +173,8 @@ ONE_BEGINNING = "one beginning"  # its flights begin alike, as those of `matrix`
 Taken = tuple[np.ndarray, int, float]
 
 
-def by_kind(rounds: int, between: Callable[[], object] = lambda: None) -> dict[str, Document]:
-    """What a flight of each kind costs, all kinds in each round; `between` is called before every round.
+def by_kind(rounds: int) -> dict[str, Document]:
+    """What a flight of each kind costs, all kinds in each round.
 
     Processor time: `parts_ms` by part, `bare_ms` for JSBSim's frames alone, `frames_ratio` and `flight_ratio`
     to those, `frame_us`, a frame of the loop, and `own_part_us`, what it adds to one of JSBSim. Ratios are
@@ -183,7 +183,6 @@ def by_kind(rounds: int, between: Callable[[], object] = lambda: None) -> dict[s
     sweeps = {kind: load_sweep(name) for kind, (name, _) in KINDS.items()}
     seen: dict[str, list[Taken]] = {kind: [] for kind in KINDS}
     for run in range(-1, rounds):
-        between()
         for kind, (_, changes) in KINDS.items():
             taken = _flown(sweeps[kind], changes, max(run, 0), kind == ONE_BEGINNING)
             if run >= 0:  # the first is the warm-up

@@ -163,7 +163,7 @@ def test_a_new_connection_is_a_new_flight(px4):
 def test_on_a_bad_line_nothing_is_flown_twice_or_lost(protocol, seed):
     found = getattr(trial, protocol)(Stub(), 600, seed, a_flight=120)
     assert (found.frames, found.twice, found.lost) == (600, 0, 0)
-    assert len(found.meant) > 3
+    assert len(found.meant) > 2  # a flight has 240 frames at most
 
 
 ALOFT = Instant(

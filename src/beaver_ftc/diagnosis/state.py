@@ -26,6 +26,12 @@ PITCH_GROUP, LATERAL_GROUP = 0, 1  # groups of surfaces
 ROLL, PITCH, YAW, SIDE_FORCE, NORMAL_FORCE = range(5)  # axes, and components of the force: forces.py
 
 
+def fill(record: np.void, **values: object) -> None:
+    """Write these fields of a record."""
+    for name, value in values.items():
+        record[name] = value
+
+
 @sized
 def plugin_verdict_dtype(n: int) -> np.dtype:
     """A plug-in's verdict. isolated: a surface, NOT_ISOLATED or UNANTICIPATED."""

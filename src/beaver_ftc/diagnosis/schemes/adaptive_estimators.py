@@ -374,7 +374,7 @@ def update_gusts(gust, vaneless, force, pred, meas, k, dt):
     if (force.in_use or gust.output.uses_accelerometers) and not meas.inertial:
         forces.drop_forces(force, gust, vaneless)
     if force.in_use or gust.output.uses_accelerometers:
-        gusts.store_accelerometer_reading(gust, meas.force)
+        gust.memory.f_read[:] = meas.force
     if force.in_use:
         update_forces(gust, vaneless, force, pred, meas, k, dt)
 
@@ -385,7 +385,7 @@ def update_forces(gust, vaneless, force, pred, meas, k, dt):
     forces.update_both_forces(force, gust, meas, pred.u, dt)
     if vaneless.output.gusty:
         forces.fill_vaneless_y(force, vaneless.memory.w_body, meas.y)
-        gusts.store_accelerometer_reading(vaneless, meas.force)
+        vaneless.memory.f_read[:] = meas.force
         gusts.set_intensity(vaneless, meas.altitude)
         gusts.step_gust(vaneless, force.y_free, meas.attitude, dt, k)
         gusts.fill_gust_effect(vaneless, pred.design, meas.x, force.y_free, pred.u)

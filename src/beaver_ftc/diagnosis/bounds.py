@@ -243,8 +243,8 @@ def moment_size(err, model, i, s, v):
 
 @kernel
 def inertia_factors(err, model, s, v):
-    """What the twelve inertia coefficients multiply, in their order; s, v: see `moment_size`. The moments of
-    one surface alone have no rates beside them."""
+    """What the twelve inertia coefficients multiply, in their order; s, v: see `moment_size`. For one surface
+    alone the rates do not count."""
     w = 1.0 if s < 0 else 0.0
     p, q, r = w * err.x[v, 0], w * err.x[v, 1], w * err.x[v, 2]
     L, N = moment_size(err, model, 0, s, v), moment_size(err, model, 2, s, v)

@@ -453,33 +453,21 @@ def finish_gust(gust, share):
 
 
 @kernel
-def full_drift(gust, V, L_rate, L_force):
-    """Intensity, (rad/s2)2/s, of the drift by the whole rotation of the air, for a view without vanes.
-
-        V sum_j (|L_rate' C_j| + |L_force' C_j|)^2 Q_j      if C turns fast: + (tau L_rate' C_dot_j)^2 Q_j / 2
-
-    L_rate, L_force (3,) 1/s: gust sensitivity of the rates and of the forces, about the body axes.
-    """
-    C, C_dot, Q, Q_V = gust.output.C, gust.memory.C_dot, gust.memory.Q, 0.0
-    tau = gust_lag(gust, 0, V) if gust.memory.turns_fast else 0.0
-    for j in range(3):
-        L_all = abs(project_gust(L_rate, C, j)) + abs(project_gust(L_force, C, j))
-        Q_V += (L_all**2 + 0.5 * (tau * project_gust(L_rate, C_dot, j)) ** 2) * Q[j]
-    return Q_V * max(V, gust.output.V)
-
-
-@kernel
-def remaining_drift(gust, V, L_rate, L_force):
-    """Intensity, (rad/s2)2/s, of the drift that remains with the gust estimate subtracted from the rates.
+def view_drift(gust, V, L_rate, L_force, subtracted):
+    """Intensity, (rad/s2)2/s, of the drift of a view by the rotation of the air:
 
         V sum_j (sqrt(share_j) |L_rate' C_j| + |L_force' C_j|)^2 Q_j
 
-    On the forces the whole rotation acts. L_rate, L_force: see `full_drift`.
+    subtracted: the gust estimate is subtracted from the rates. Otherwise share is 1, and each j adds
+    (tau L_rate' C_dot_j)^2 Q_j / 2 if C turns fast. On the forces the whole rotation acts. L_rate, L_force
+    (3,) 1/s: gust sensitivity of the rates and of the forces, about the body axes.
     """
-    C, Q_V = gust.output.C, 0.0
+    C, mem, Q_V = gust.output.C, gust.memory, 0.0
+    tau = 0.0 if subtracted or not mem.turns_fast else gust_lag(gust, 0, V)
     for j in range(3):
-        L_left = np.sqrt(unmeasured_share(gust, j)) * abs(project_gust(L_rate, C, j))
-        Q_V += (L_left + abs(project_gust(L_force, C, j))) ** 2 * gust.memory.Q[j]
+        share = unmeasured_share(gust, j) if subtracted else 1.0
+        L = np.sqrt(share) * abs(project_gust(L_rate, C, j)) + abs(project_gust(L_force, C, j))
+        Q_V += (L**2 + 0.5 * (tau * project_gust(L_rate, mem.C_dot, j)) ** 2) * mem.Q[j]
     return Q_V * max(V, gust.output.V)
 
 

@@ -510,14 +510,14 @@ def fill_errors(err: np.void, declared: Declared, model: np.void, mass: MassProp
     dC = declared.coefficients.absolute(declared.aircraft.moments, model["moments"]["value"])
     err["dC"][: dC.size] = dC
     aloft = GUST_LIMIT_SIGMA * air.rotation_limit_rad_s(b)
-    others = {"dI": inertia_bounds(declared.inertia, mass), "du": declared.deflections_rad, "wg": aloft}
+    dI, du = inertia_bounds(declared.inertia, mass), declared.deflections_rad
     known = errors.is_ideal and declared.servo_errors.is_none
     fill(
-        err, **others, du0=declared.deflection_rad, wg_aloft=aloft,
+        err, dI=dI, du=du, du0=declared.deflection_rad, wg=aloft, wg_aloft=aloft,
         wg_1m=GUST_LIMIT_SIGMA * air.low_rotation_limit_rad_s(b),
         h0=errors["altitude"].worst, h1=errors["altitude"].slope,
         e0=errors.each("worst"), e1=errors.each("slope"), steady=errors.each("steady", AXES),
-        given=not known or any(np.any(e) for e in (dC, *others.values())),
+        given=not known or any(np.any(e) for e in (dC, dI, du, np.array(aloft))),
     )  # fmt: skip
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from kernels import fill
-from true_flight import UNITS, new_monitor, tested, true_flight
+from true_flight import UNITS, compared, new_monitor, true_flight
 
 from beaver_ftc.diagnosis.monitors import redundancy
 from beaver_ftc.diagnosis.monitors.redundancy import (
@@ -42,7 +42,7 @@ def test_sound_sensors_stay_within_every_bound(seed, swiftly, h):
     config["e_slope"], config["drift"] = np.abs(slope), np.abs(drift).max()
     readings = (1.0 + slope) * true + bias + noise * rng.choice([-1.0, 1.0], true.shape)
     readings += h * np.arange(n)[:, None] * drift
-    nearest = np.max([ratio for ratio, _ in tested(monitor, readings)], axis=0)
+    nearest = np.max([ratio for ratio, _ in compared(monitor, readings)], axis=0)
     assert (nearest <= 1.0).all(), nearest
     assert (nearest > 0.2).sum() >= 4, nearest
 
@@ -52,7 +52,7 @@ def test_exact_readings_are_predicted(seed):
     """Attitude and flow to rounding; altitude and density to the second order of the sample time."""
     h = 0.01
     readings = true_flight(np.random.default_rng(seed), 50, h, theta=(-0.9, 0.9))
-    residual = np.array([residual for _, residual in tested(new_monitor(h), readings)])[1:]
+    residual = np.array([residual for _, residual in compared(new_monitor(h), readings)])[1:]
     assert abs(residual[:, :DENSITY_TEST]).max() < 1e-12
     assert abs(residual[:, CLIMB_TEST]).max() < 4.0 / 3.0 * h * h * 2.0
     assert abs(residual[:, [RPM_TEST, PRESSURE_TEST]]).max() == 0.0
@@ -72,7 +72,7 @@ def test_a_reading_that_jumps_exceeds_its_own_tests_and_a_small_error_none(senso
     for size, shown in ((0.9, set()), (20.0, SHOWN_BY[sensor])):
         readings = true_flight(np.random.default_rng(sensor), 20, h, False)
         readings[10:, sensor] += size * UNITS[sensor]
-        ratios, residuals = np.swapaxes([*tested(new_monitor(h, UNITS), readings)], 0, 1)
+        ratios, residuals = np.swapaxes([*compared(new_monitor(h, UNITS), readings)], 0, 1)
         ratio, residual = ratios.max(axis=0), residuals.max(axis=0)
         exceeded = set(np.flatnonzero(ratio > 1.0).tolist())
         assert shown <= exceeded, exceeded
@@ -113,7 +113,7 @@ def test_near_the_vertical_the_tests_of_the_attitude_begin_anew():
     readings = np.repeat(true_flight(np.random.default_rng(1), 1, 0.02), 5, axis=0)
     readings[:, :3], readings[:, THETA] = 0.0, (1.25, 1.28, 1.31, 1.28, 1.25)
     monitor = new_monitor(0.02)
-    ratios = [ratio[ANGLE_TEST + 1] for ratio, _ in tested(monitor, readings)]
+    ratios = [ratio[ANGLE_TEST + 1] for ratio, _ in compared(monitor, readings)]
     assert ratios[0] > 1.0  # 0.03 rad in a sample, and no rates
     assert ratios[1:3] == [0.0, 0.0]  # that of now, or that of before, is beyond 1.3 rad
     assert monitor["redundancy"]["r"][ANGLE_TEST + 1] == pytest.approx([-0.03] * 3)
@@ -129,5 +129,5 @@ def test_momentary_errors_of_the_attitude_stay_within_bounds_that_remember_long(
     readings[:, PHI : PHI + 3] += e[PHI : PHI + 3] * rng.choice([-1.0, 0.0, 1.0], (400, 3))
     monitor = new_monitor(0.02, e)
     monitor["redundancy"]["decay"] = 0.0, 0.99, 0.9999
-    for ratio, _ in tested(monitor, readings):
+    for ratio, _ in compared(monitor, readings):
         assert (ratio[TURN_TEST : TURN_TEST + 3] <= 1.0).all()

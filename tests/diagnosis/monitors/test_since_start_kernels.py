@@ -6,7 +6,7 @@ error that swings slowly.
 
 import numpy as np
 import pytest
-from true_flight import UNITS, new_monitor, tested, true_flight
+from true_flight import UNITS, compared, new_monitor, true_flight
 
 from beaver_ftc.diagnosis.monitors import initial_errors
 from beaver_ftc.diagnosis.monitors.redundancy import (
@@ -27,7 +27,7 @@ SHOWN = {H_ALPHA: 0.1, H_BETA: 0.12, H_PHI: 0.1, H_THETA: 0.1}
 def judged(readings, h):
     """The hypotheses after each sample but the first; whether tests have exceeded their bounds by then."""
     monitor = new_monitor(h, 0.05 * UNITS, 0.01 * UNITS)
-    for _ in tested(monitor, readings):
+    for _ in compared(monitor, readings):
         yield monitor["initial_errors"], monitor["memory"]["exceeded"]
 
 

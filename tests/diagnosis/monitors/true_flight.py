@@ -61,7 +61,7 @@ def new_monitor(h, e_zero=0.0, const=0.0, **fields):
     return fill(monitor, alarmed_at_s=-1.0, isolated_at_s=-1.0, **fields)
 
 
-def tested(monitor, readings):
+def compared(monitor, readings):
     """Ratios and residuals of the tests after each sample but the first; errors from the start are judged."""
     red, initial, exceeded = monitor["redundancy"], monitor["initial_errors"], monitor["memory"]["exceeded"]
     redundancy.start_tests(red, readings[0], readings[0, AX:])

@@ -26,11 +26,11 @@ Variances: for plug-ins, and for the filters and tests of the statistical detect
 
 Symbols of the kernels (err: of `errors_dtype`, emap: of `map_dtype`, model: the design model):
 
-    x (3,) rad/s, y, u (n,) rad   rates, readings, deflections; in err an `a` behind the letter is the
-                                  magnitude as measured, a `w` the worst that the errors allow
+    x (3,) rad/s, y, u (n,) rad   rates, readings, deflections; in err [0] is the magnitude as measured, [1]
+                                  the worst that the errors allow
     eta (3,) rad/s2               bound on the uncertainty
     C, dC; c, dc                  coefficient and its tolerance, of a moment's term; of inertia, dI (12,)
-    L, M, N; Lw, Mw, Nw  N m      moments: sum of their terms' magnitudes, as measured and at worst
+    L, M, N  N m                  moments: sum of their terms' magnitudes
     q Pa, S m2, l m               dynamic pressure, wing area, span or chord
     z (coordinates,)              place in the map: x, then y with the density in place of dynamic pressure
     b, j, k                       box, level of travel, row of time of the map
@@ -71,6 +71,7 @@ from beaver_ftc.design.model import (
     power_error_kw,
     signals,
 )
+from beaver_ftc.diagnosis.state import fill
 from beaver_ftc.plant.faults import OF_THE_SLIPSTREAM
 from beaver_ftc.scenario.declared import Declared, SensorErrors
 from beaver_ftc.scenario.sensors import ENGINE, NOISE_LIMIT_SIGMA
@@ -109,9 +110,8 @@ def errors_dtype(n: int) -> np.dtype:
         wg_aloft=float, wg_1m=float, h0=float, h1=float,
         # of dpt: see `slipstream_bound`
         engine=int, kw0=float, kw1=float,
-        # scratch: magnitudes as measured, and as large as they can be
-        xa=3, ya=N_Y, ua=n, xw=3, yw=N_Y, uw=n, xr=3, sig=N_SIGNALS, ma=MAX_MONOMIALS, mw=MAX_MONOMIALS,
-        eG=(3, n),
+        # scratch: magnitudes as measured [0], and as large as they can be [1]
+        x=(2, 3), y=(2, N_Y), u=(2, n), x_air=3, sig=N_SIGNALS, m=(2, MAX_MONOMIALS), eG=(3, n),
     )  # fmt: skip
 
 
@@ -156,15 +156,14 @@ def fill_map(emap: np.void, aircraft: Aircraft, one_free: bool, two_free: bool) 
     if declared is None:
         return
     n_levels, n_rows = len(declared.travel_share), len(declared.until_s)
-    emap["one_free"] = one_free
-    emap["two_free"] = two_free
-    emap["n_boxes"] = len(declared.boxes)
-    emap["n_levels"], emap["n_rows"] = (n_levels, n_rows)
+    share = np.array([declared.stand_ins if s in aircraft.stand_ins else 1.0 for s in aircraft.surfaces])
+    lo, hi = np.transpose([(travel.min_rad, travel.max_rad) for travel in aircraft.travel.values()])
+    fill(
+        emap, one_free=one_free, two_free=two_free, n_boxes=len(declared.boxes), n_levels=n_levels,
+        n_rows=n_rows, stop_lo=share * lo, stop_hi=share * hi,
+    )  # fmt: skip
     emap["until_s"][:n_rows] = declared.until_s
     emap["share"][:n_levels] = declared.travel_share
-    share = np.array([declared.stand_ins if s in aircraft.stand_ins else 1.0 for s in aircraft.surfaces])
-    emap["stop_lo"] = share * [travel.min_rad for travel in aircraft.travel.values()]
-    emap["stop_hi"] = share * [travel.max_rad for travel in aircraft.travel.values()]
     for b, box in enumerate(declared.boxes):
         ends = np.array(box.ends(aircraft.signals))
         emap["lo"][b, : len(ends)] = ends[:, 0]
@@ -207,51 +206,49 @@ def slipstream_bound(err, y):
 
 @kernel
 def fill_magnitudes(err, x, y, u):
-    """Fill xa, ya, ua with |signal| as measured and xw, yw, uw with the largest |signal| that the errors
-    allow; for airspeed, the smallest. xr: rates with the air's rotation.
+    """Fill x, y, u with |signal| as measured, and with the largest |signal| that the errors allow; for
+    airspeed, the smallest. x_air: these rates with the air's rotation.
     """
     for i in range(3):
-        err.xa[i] = abs(x[i])
-        err.xw[i] = abs(x[i]) + reading_bound(err, i, x[i])
-        err.xr[i] = err.xw[i] + err.wg[i]
-    for i in range(DPT):
-        err.ya[i] = abs(y[i])
-        err.yw[i] = abs(y[i]) + reading_bound(err, _Y0 + i, y[i])
-    for i in range(DPT, y.size):
-        err.ya[i] = err.yw[i] = abs(y[i])
+        err.x[0, i] = abs(x[i])
+        err.x[1, i] = abs(x[i]) + reading_bound(err, i, x[i])
+        err.x_air[i] = err.x[1, i] + err.wg[i]
+    for i in range(y.size):
+        err.y[0, i] = abs(y[i])
+        err.y[1, i] = abs(y[i]) + (reading_bound(err, _Y0 + i, y[i]) if i < DPT else 0.0)
     if err.engine:
-        err.yw[DPT] += slipstream_bound(err, y)
+        err.y[1, DPT] += slipstream_bound(err, y)
     for s in range(u.size):
-        err.ua[s] = abs(u[s])
-        err.uw[s] = abs(u[s]) + err.du[s]
+        err.u[0, s] = abs(u[s])
+        err.u[1, s] = abs(u[s]) + err.du[s]
     V = y[AIRSPEED]
-    err.yw[AIRSPEED] = max(2.0 * V - err.yw[AIRSPEED], _MIN_V_SHARE * V)
+    err.y[1, AIRSPEED] = max(2.0 * V - err.y[1, AIRSPEED], _MIN_V_SHARE * V)
 
 
 @kernel
-def moment_sizes(err, model, i, s):
-    """(M, Mw), N m: magnitudes of the terms of moment i as measured, and the largest that the errors allow.
+def moment_size(err, model, i, s, v):
+    """q S l sum (|C| + v dC) m |u|, N m: magnitudes of the terms of moment i as measured (v = 0), or the
+    largest that the errors allow (v = 1).
 
-        M = q S l sum |C| m |u|      Mw = qw S l sum (|C| + dC) mw uw
-
-    m, mw: product of a term's signals. s: the surface whose terms alone count, per rad; -1: all terms do.
+    m: product of a term's signals. s: the surface whose terms alone count, per rad; -1: all terms do.
     """
-    tab, C, Cw = model.moments, 0.0, 0.0
+    tab, C = model.moments, 0.0
     for k in range(tab.free_from[i], tab.surface_to[i]):
-        at, c = tab.surface[k], abs(tab.value[k])
+        at = tab.surface[k]
         if s < 0 or at == s:
-            u, uw = (err.ua[at], err.uw[at]) if s < 0 <= at else (1.0, 1.0)
-            C += c * err.ma[tab.monomial[k]] * u
-            Cw += (c + err.dC[k]) * err.mw[tab.monomial[k]] * uw
-    Sl = model.S * (model.c if i == 1 else model.b)
-    return Sl * err.ya[QDYN] * C, Sl * err.yw[QDYN] * Cw
+            u = err.u[v, at] if s < 0 <= at else 1.0
+            C += (abs(tab.value[k]) + v * err.dC[k]) * err.m[v, tab.monomial[k]] * u
+    return model.S * (model.c if i == 1 else model.b) * err.y[v, QDYN] * C
 
 
 @kernel
-def inertia_factors(w, x, L, M, N):
-    """What the twelve inertia coefficients multiply, in their order; w: factor of the rates x (3,)."""
-    p, q, r = w * x[0], w * x[1], w * x[2]
-    return p * q, q * r, L, N, p * p, p * r, r * r, M, p * q, q * r, L, N
+def inertia_factors(err, model, s, v):
+    """What the twelve inertia coefficients multiply, in their order; s, v: see `moment_size`. For one surface
+    alone the rates do not count."""
+    w = 1.0 if s < 0 else 0.0
+    p, q, r = w * err.x[v, 0], w * err.x[v, 1], w * err.x[v, 2]
+    L, N = moment_size(err, model, 0, s, v), moment_size(err, model, 2, s, v)
+    return p * q, q * r, L, N, p * p, p * r, r * r, moment_size(err, model, 1, s, v), p * q, q * r, L, N
 
 
 @kernel
@@ -262,11 +259,7 @@ def add_product_bounds(err, model, s, eta):
 
     s: the surface whose moments alone count, per rad; -1: all moments and the rates do.
     """
-    w = 1.0 if s < 0 else 0.0
-    L, Lw = moment_sizes(err, model, 0, s)
-    M, Mw = moment_sizes(err, model, 1, s)
-    N, Nw = moment_sizes(err, model, 2, s)
-    f, fw = inertia_factors(w, err.xa, L, M, N), inertia_factors(w, err.xw, Lw, Mw, Nw)
+    f, fw = inertia_factors(err, model, s, 0), inertia_factors(err, model, s, 1)
     c = (
         *(model.Ppq, model.Pqr, model.Pl, model.Pn),
         *(model.Qpp, model.Qpr, model.Qrr, model.Qm),
@@ -290,10 +283,10 @@ def fill_eG(err, model, s):
 def add_declared_bound(err, model, x, y, u, eta):
     """Add to eta the bound by the declared errors: of each moment and product of rates, times its inertia."""
     fill_magnitudes(err, x, y, u)
-    signals(model.moments, err.xa, err.ya, err.sig)
-    monomials(model.moments, err.sig, err.ma)
-    signals(model.moments, err.xr, err.yw, err.sig)
-    monomials(model.moments, err.sig, err.mw)
+    signals(model.moments, err.x[0], err.y[0], err.sig)
+    monomials(model.moments, err.sig, err.m[0])
+    signals(model.moments, err.x_air, err.y[1], err.sig)
+    monomials(model.moments, err.sig, err.m[1])
     add_product_bounds(err, model, -1, eta)
 
 
@@ -458,14 +451,14 @@ def fill_bound(bound, model, meas, u):
         if bound.has_eG:
             for s in range(u.size):
                 fill_eG(err, model, s)
+    else:
+        err.x[1, :] = x
     if emap.n_boxes > 0:
         look_up_map(emap, x, y, u, err.du)
         for i in range(3):
             eta[i] += emap.e_now[i]
-    rates = err.xw if err.given else x
-    add_published_bound(
-        rates, model, bound.inertia_coupling_error_share, bound.const, bound.earth_rate_rad_s, eta
-    )
+    share, const, earth = bound.inertia_coupling_error_share, bound.const, bound.earth_rate_rad_s
+    add_published_bound(err.x[1], model, share, const, earth, eta)
 
 
 GUST_LIMIT_SIGMA = 6.0  # exceeded once in 5e8 independent samples
@@ -497,38 +490,35 @@ def configure_bound(bound: np.void, declared: Declared, model: np.void) -> None:
     """Fill in the declared bound and the error of the aircraft's design model: its map, or else one constant
     for all states. model: its record.
     """
-    fdi, aircraft = declared.fdi, declared.aircraft
-    bound["inertia_coupling_error_share"], bound["earth_rate_rad_s"] = (declared.coupling, EARTH_RATE_RAD_S)
-    bound["const"] = declared.constant_rad_s2
-    all_types = fdi.fault_class == "all"
-    fill_map(bound["error_map"], aircraft, all_types, all_types and fdi.pairs)
+    aircraft, all_types = declared.aircraft, declared.fdi.fault_class == "all"
+    const = np.array(declared.constant_rad_s2)
     if aircraft.file.model_error_map is None:
-        bound["const"] += aircraft.model_error_rad_s2
+        const += aircraft.model_error_rad_s2
+    fill_map(bound["error_map"], aircraft, all_types, all_types and declared.fdi.pairs)
     err = bound["declared_errors"]
     fill_errors(err, declared, model, mass_of(declared.design_model, aircraft))
     fill_engine_errors(err, declared)
-    bound["has_eG"] = err["given"] and all_types
+    fill(
+        bound, inertia_coupling_error_share=declared.coupling, earth_rate_rad_s=EARTH_RATE_RAD_S, const=const,
+        has_eG=err["given"] and all_types,
+    )  # fmt: skip
 
 
 def fill_errors(err: np.void, declared: Declared, model: np.void, mass: MassProperties) -> None:
     """Fill the declared errors; model, mass: record and mass properties of the design model."""
+    errors, air, b = declared.sensors, declared.air, declared.aircraft.geometry.span_m
     dC = declared.coefficients.absolute(declared.aircraft.moments, model["moments"]["value"])
     err["dC"][: dC.size] = dC
-    err["dI"] = inertia_bounds(declared.inertia, mass)
-    err["du0"] = declared.deflection_rad
-    err["du"] = declared.deflections_rad
-    errors, air, b = declared.sensors, declared.air, declared.aircraft.geometry.span_m
-    err["wg_aloft"] = GUST_LIMIT_SIGMA * air.rotation_limit_rad_s(b)
-    err["wg_1m"] = GUST_LIMIT_SIGMA * air.low_rotation_limit_rad_s(b)
-    err["wg"] = err["wg_aloft"]
-    err["h0"] = errors["altitude"].worst
-    err["h1"] = errors["altitude"].slope
-    err["e0"] = errors.each("worst")
-    err["e1"] = errors.each("slope")
-    err["steady"] = errors.each("steady", AXES)
-    others = (err["dC"], err["dI"], err["du"], err["wg"])
+    aloft = GUST_LIMIT_SIGMA * air.rotation_limit_rad_s(b)
+    dI, du = inertia_bounds(declared.inertia, mass), declared.deflections_rad
     known = errors.is_ideal and declared.servo_errors.is_none
-    err["given"] = any(np.any(e) for e in others) or not known
+    fill(
+        err, dI=dI, du=du, du0=declared.deflection_rad, wg=aloft, wg_aloft=aloft,
+        wg_1m=GUST_LIMIT_SIGMA * air.low_rotation_limit_rad_s(b),
+        h0=errors["altitude"].worst, h1=errors["altitude"].slope,
+        e0=errors.each("worst"), e1=errors.each("slope"), steady=errors.each("steady", AXES),
+        given=not known or any(np.any(e) for e in (dC, dI, du, np.array(aloft))),
+    )  # fmt: skip
 
 
 def fill_engine_errors(err: np.void, declared: Declared) -> None:
@@ -544,8 +534,8 @@ def fill_engine_errors(err: np.void, declared: Declared) -> None:
     inhg = declared.aircraft.engine.settings["manifold_pressure_inhg"].range[1]
     largest = dict(zip(ENGINE, (initial.engine_rpm, inhg), strict=True))
     bounds = [errors[name].of_reading(reading) for name, reading in largest.items()]
-    err["engine"] = 1
-    err["kw0"], err["kw1"] = power_error_kw(initial.engine_rpm, inhg, *bounds)
+    kw0, kw1 = power_error_kw(initial.engine_rpm, inhg, *bounds)
+    fill(err, engine=1, kw0=kw0, kw1=kw1)
 
 
 def poles_for_delays(errors: SensorErrors, eta: float) -> tuple[float, ...]:

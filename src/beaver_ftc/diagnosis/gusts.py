@@ -61,6 +61,7 @@ from beaver_ftc.design.model import (
 )
 from beaver_ftc.diagnosis.bounds import flow_noise, gust_noise, least_height
 from beaver_ftc.diagnosis.monitors.redundancy import EARTH_M_S2
+from beaver_ftc.diagnosis.state import fill
 from beaver_ftc.plant.instruments import wrapped
 from beaver_ftc.scenario.declared import MASS_TOLERANCE, Declared, SensorErrors
 
@@ -134,20 +135,17 @@ def fill_force(gust, x, y, u, f):
 @kernel
 def fill_rotation(phi, th, T):
     """Fill T (3, 3), the rotation from level axes (forward, right, down) to body axes; angles rad."""
-    sin_phi, cos_phi, sin_theta, cos_theta = np.sin(phi), np.cos(phi), np.sin(th), np.cos(th)
-    T[0, 0], T[0, 1], T[0, 2] = cos_theta, 0.0, -sin_theta
-    T[1, 0] = sin_phi * sin_theta
-    T[1, 1] = cos_phi
-    T[1, 2] = sin_phi * cos_theta
-    T[2, 0] = cos_phi * sin_theta
-    T[2, 1] = -sin_phi
-    T[2, 2] = cos_phi * cos_theta
+    s_phi, c_phi, s_th, c_th = np.sin(phi), np.cos(phi), np.sin(th), np.cos(th)
+    T[0, :] = c_th, 0.0, -s_th
+    T[1, :] = s_phi * s_th, c_phi, s_phi * c_th
+    T[2, :] = c_phi * s_th, -s_phi, c_phi * c_th
 
 
 @kernel
-def level_component(T, v, i):
-    """Component i in level axes of a vector v (3,) in body axes: (T' v)_i."""
-    return T[0, i] * v[0] + T[1, i] * v[1] + T[2, i] * v[2]
+def project_gust(v, C, j):
+    """v' C_j: component j, in the axes whose rotation to body axes is C, of a vector v (3,) in body axes; and
+    sensitivity to the gust about axis j, from that to rotation about the body axes."""
+    return v[0] * C[0, j] + v[1] * C[1, j] + v[2] * C[2, j]
 
 
 @kernel
@@ -161,7 +159,7 @@ def fill_velocity(gust, y, attitude):
     mem.heading = attitude[2]
     v = V * np.cos(alpha) * np.cos(beta), V * np.sin(beta), V * np.sin(alpha) * np.cos(beta)
     for i in range(3):
-        mem.v[i] = level_component(mem.T, v, i)
+        mem.v[i] = project_gust(v, mem.T, i)
 
 
 @kernel
@@ -190,7 +188,7 @@ def update_axes(gust, z):
     gust.memory.C_dot[:] = C
     for i in range(3):
         c = complex(T[i, 0], T[i, 1]) * z.conjugate()
-        C[i, 0], C[i, 1], C[i, 2] = c.real, c.imag, T[i, 2]
+        C[i, :] = c.real, c.imag, T[i, 2]
 
 
 @kernel
@@ -232,21 +230,17 @@ def advance_gust(gust, y, attitude, dt):
     only decays, and the sum of changes v_g starts again. It does so one instant longer: JSBSim's gusts turn a
     step after the heading.
     """
-    mem, a = gust.memory, gust.memory.scratch
-    for i in range(3):
-        a[i] = level_component(mem.T, mem.f, i)
-    a[2] += gust.config.gravity
-    if not mem.has_prev:
-        mem.a_prev[:] = a[:3]
-        mem.has_prev = 1
-    for i in range(3):
-        mem.v[i] += dt * (1.5 * a[i] - 0.5 * mem.a_prev[i])
+    mem, v, prev, g = gust.memory, gust.memory.v, gust.memory.a_prev, gust.config.gravity
     turn = wrapped(attitude[2] - mem.heading)
     z = complex(np.cos(turn), -np.sin(turn))
-    v_h, a_h, v_z = complex(mem.v[0], mem.v[1]) * z, complex(a[0], a[1]) * z, mem.v[2]
-    mem.a_prev[0], mem.a_prev[1], mem.a_prev[2] = a_h.real, a_h.imag, a[2]
+    a = project_gust(mem.f, mem.T, 0), project_gust(mem.f, mem.T, 1), project_gust(mem.f, mem.T, 2) + g
+    for i in range(3):
+        v[i] += dt * (1.5 * a[i] - 0.5 * (prev[i] if mem.has_prev else a[i]))
+    mem.has_prev = 1
+    v_h, a_h, v_z = complex(v[0], v[1]) * z, complex(a[0], a[1]) * z, v[2]
+    prev[:] = a_h.real, a_h.imag, a[2]
     fill_velocity(gust, y, attitude)
-    dv = v_h.real - mem.v[0], v_h.imag - mem.v[1], v_z - mem.v[2]
+    dv = v_h.real - v[0], v_h.imag - v[1], v_z - v[2]
     update_gust_speed(gust, dv, y[AIRSPEED], dt)
     update_axes(gust, z)
     fill_axes_rate(gust, dt, gust.output.V)
@@ -333,9 +327,7 @@ def fill_gust_effect(gust, design, x, y, u):
         w_i = out.C[i, 1] * mem.w[1] + out.C[i, 2] * mem.w[2]
         mem.w_body[i] = w_i if out.measured or cfg.coarse_only else 0.0
     for i in range(3):
-        acc = 0.0
-        for j in range(3):
-            acc -= out.rate_damping[i, j] * mem.w_body[j]
+        acc = -project_gust(mem.w_body, out.rate_damping.T, i)
         out.acc[i], out.acc_coarse[i] = (acc, 0.0) if out.measured else (0.0, acc)
 
 
@@ -357,12 +349,6 @@ def update_gust(gust, design, x, y, u, attitude, dt):
     for i in range(3):
         gust.memory.acc_sum[i] += gust.output.acc[i]
     add_turn_variance(gust, y[AIRSPEED], dt)
-
-
-@kernel
-def store_accelerometer_reading(gust, f):
-    """Keep the reading of the accelerometers, f (3,) m/s2."""
-    gust.memory.f_read[:] = f
 
 
 @kernel
@@ -462,44 +448,27 @@ def finish_gust(gust, share):
         for i in range(3):
             for j in range(3):
                 out.var_turn[i, j] = mem.var_prev[i, j] + mem.var_now[i, j]
-                mem.var_prev[i, j], mem.var_now[i, j] = mem.var_now[i, j], 0.0
+        mem.var_prev[:] = mem.var_now
+        mem.var_now[:] = 0.0
 
 
 @kernel
-def full_drift(gust, V, L_rate, L_force):
-    """Intensity, (rad/s2)2/s, of the drift by the whole rotation of the air, for a view without vanes.
-
-        V sum_j (|L_rate' C_j| + |L_force' C_j|)^2 Q_j      if C turns fast: + (tau L_rate' C_dot_j)^2 Q_j / 2
-
-    L_rate, L_force (3,) 1/s: gust sensitivity of the rates and of the forces, about the body axes.
-    """
-    C, C_dot, Q, Q_V = gust.output.C, gust.memory.C_dot, gust.memory.Q, 0.0
-    tau = gust_lag(gust, 0, V) if gust.memory.turns_fast else 0.0
-    for j in range(3):
-        L_all = abs(project_gust(L_rate, C, j)) + abs(project_gust(L_force, C, j))
-        Q_V += (L_all**2 + 0.5 * (tau * project_gust(L_rate, C_dot, j)) ** 2) * Q[j]
-    return Q_V * max(V, gust.output.V)
-
-
-@kernel
-def remaining_drift(gust, V, L_rate, L_force):
-    """Intensity, (rad/s2)2/s, of the drift that remains with the gust estimate subtracted from the rates.
+def view_drift(gust, V, L_rate, L_force, subtracted):
+    """Intensity, (rad/s2)2/s, of the drift of a view by the rotation of the air:
 
         V sum_j (sqrt(share_j) |L_rate' C_j| + |L_force' C_j|)^2 Q_j
 
-    On the forces the whole rotation acts. L_rate, L_force: see `full_drift`.
+    subtracted: the gust estimate is subtracted from the rates. Otherwise share is 1, and each j adds
+    (tau L_rate' C_dot_j)^2 Q_j / 2 if C turns fast. On the forces the whole rotation acts. L_rate, L_force
+    (3,) 1/s: gust sensitivity of the rates and of the forces, about the body axes.
     """
-    C, Q_V = gust.output.C, 0.0
+    C, mem, Q_V = gust.output.C, gust.memory, 0.0
+    tau = 0.0 if subtracted or not mem.turns_fast else gust_lag(gust, 0, V)
     for j in range(3):
-        L_left = np.sqrt(unmeasured_share(gust, j)) * abs(project_gust(L_rate, C, j))
-        Q_V += (L_left + abs(project_gust(L_force, C, j))) ** 2 * gust.memory.Q[j]
+        share = unmeasured_share(gust, j) if subtracted else 1.0
+        L = np.sqrt(share) * abs(project_gust(L_rate, C, j)) + abs(project_gust(L_force, C, j))
+        Q_V += (L**2 + 0.5 * (tau * project_gust(L_rate, mem.C_dot, j)) ** 2) * mem.Q[j]
     return Q_V * max(V, gust.output.V)
-
-
-@kernel
-def project_gust(L_m, C, j):
-    """Sensitivity L_m' C_j to the gust about axis j, from that (3,) to rotation about the body axes."""
-    return L_m[0] * C[0, j] + L_m[1] * C[1, j] + L_m[2] * C[2, j]
 
 
 @kernel
@@ -514,28 +483,20 @@ def effect_product(gust, C, i_1, i_2, j):
 
 def configure_gust(gust: np.void, declared: Declared, mass: MassProperties) -> None:
     """Fill the record with the declared turbulence, for an aircraft of this mass."""
-    air, errors, aircraft = declared.air, declared.sensors, declared.aircraft
-    span = aircraft.geometry.span_m
-    gust["output"]["gusty"] = air.moves
-    gust["config"]["has_forces"] = bool(aircraft.measurable_forces)
-    gust["output"]["measured"] = (
-        gust["config"]["has_forces"] or gust["output"]["uses_accelerometers"]
-    )  # only where forces are known
-    gust["config"]["coarse_only"] = gust["output"]["gusty"] and not gust["output"]["measured"]
-    fill_table(gust["memory"]["table"], aircraft, aircraft.measurable_forces, FORCES)
-    gust["config"]["S_m"] = aircraft.geometry.wing_area_m2 / mass.mass_kg
-    gust["config"]["gravity"] = GRAVITY_MPS2  # standard; what is constant has no part in a change of the gust
-    gust["config"]["span"] = span
-    gust["config"]["Q_aloft"] = air.rotation_walk(span)
-    gust["config"]["Q_1m"] = air.rotation_walk_at_1_m(span)
-    gust["memory"]["Q"], gust["memory"]["share"] = (
-        gust["config"]["Q_aloft"],
-        MIN_UNMEASURED_SHARES if gust["output"]["measured"] else 1.0,
-    )
-    gust["config"]["h0"] = errors["altitude"].worst
-    gust["config"]["h1"] = errors["altitude"].slope
-    gust["config"]["L_gust"] = SCALE_M
-    gust["config"]["L_roll"] = rotation_lengths(span)[0]
+    air, aircraft, span = declared.air, declared.aircraft, declared.aircraft.geometry.span_m
+    output, memory, altitude = gust["output"], gust["memory"], declared.sensors["altitude"]
+    known = bool(aircraft.measurable_forces)
+    measured = known or output["uses_accelerometers"]  # only where forces are known
+    fill(output, gusty=air.moves, measured=measured)
+    fill_table(memory["table"], aircraft, aircraft.measurable_forces, FORCES)
+    aloft = air.rotation_walk(span)
+    fill(memory, Q=aloft, share=MIN_UNMEASURED_SHARES if measured else 1.0)
+    fill(
+        gust["config"], has_forces=known, coarse_only=air.moves and not measured, span=span, Q_aloft=aloft,
+        S_m=aircraft.geometry.wing_area_m2 / mass.mass_kg, Q_1m=air.rotation_walk_at_1_m(span),
+        gravity=GRAVITY_MPS2,  # standard; what is constant has no part in a change of the gust
+        h0=altitude.worst, h1=altitude.slope, L_gust=SCALE_M, L_roll=rotation_lengths(span)[0],
+    )  # fmt: skip
 
 
 def add_gust_noise(
@@ -576,12 +537,10 @@ def configure_gust_speed(gust: np.void, declared: Declared, level: float, V: flo
     else:
         b += GRAVITY_MPS2 * MAX_DRAG_OVER_WEIGHT * (declared.coefficients.largest + MASS_TOLERANCE)
     a = (2.0 * b**2 * rate / sigma**2) ** (1.0 / 3.0)
-    gust["config"]["var_v"] = sigma**2
-    gust["config"]["v_max"] = MAX_GUST_STDS * sigma
-    gust["config"]["a_v"] = a
-    gust["config"]["var_V"] = sigma**2 * a / (a + rate) + (b / a) ** 2 + of_V.random**2
-    gust["config"]["var_V"] += (of_V.steady + of_V.slope * V) ** 2
-    gust["config"]["speed_error_share"] = speed_error_share(level)
+    var_V = sigma**2 * a / (a + rate) + (b / a) ** 2 + of_V.random**2 + (of_V.steady + of_V.slope * V) ** 2
+    share = speed_error_share(level)
+    v_max = MAX_GUST_STDS * sigma
+    fill(gust["config"], var_v=sigma**2, v_max=v_max, a_v=a, var_V=var_V, speed_error_share=share)
 
 
 def speed_error_share(level: float) -> float:

@@ -432,7 +432,7 @@ def read_sensor_monitor(mon: np.void) -> SensorMonitor:
     o, red = mon["output"], mon["redundancy"]
     j = int(o["worst_test_index"])
     worst = SensorTest(
-        *(float(red[name][j]) for name in ("residual", "per_s", "per_sample", "gust")),
+        float(red["residual"][j]), float(red["per_s"][j]), float(red["per_sample"][j]), float(red["gust"][j]),
         red["r"][j].copy(), red["B"][j].copy(),
     )  # fmt: skip
     return SensorMonitor(

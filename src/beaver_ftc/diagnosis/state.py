@@ -4,6 +4,7 @@ The number of a scheme is the place of its kernels in SCHEME_KERNEL_PATHS, which
 """
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -24,6 +25,12 @@ _AUTHORITIES = {
 LOSS, POSITION_HYPOTHESIS = 0, 1  # kinds of hypothesis: isolation.py
 PITCH_GROUP, LATERAL_GROUP = 0, 1  # groups of surfaces
 ROLL, PITCH, YAW, SIDE_FORCE, NORMAL_FORCE = range(5)  # axes, and components of the force: forces.py
+
+
+def fill(record: np.void, **values: Any) -> None:
+    """Write these fields of a record."""
+    for name, value in values.items():
+        record[name] = value
 
 
 @sized

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from kernels import fill
-from true_flight import UNITS, new_monitor, true_flight
+from true_flight import UNITS, compared, new_monitor, true_flight
 
 from beaver_ftc.diagnosis.monitors import redundancy
 from beaver_ftc.diagnosis.monitors.redundancy import (
@@ -23,17 +23,7 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     THETA,
     TURN_TEST,
 )
-from beaver_ftc.plant.instruments import ALTITUDE, AX, ENGINE_SPEED, MANIFOLD, N_SENSORS, PHI
-
-
-def compared(monitor, readings):
-    """The ratio and the residual of each test, sample by sample after the first."""
-    red = monitor["redundancy"]
-    redundancy.start_tests(red, readings[0], readings[0, AX:])
-    for y in readings[1:]:
-        redundancy.run_tests(red, y, True)
-        redundancy.store_sample(red, y, y[AX:])
-        yield red["ratio"].copy(), red["residual"].copy()
+from beaver_ftc.plant.instruments import ALTITUDE, ENGINE_SPEED, MANIFOLD, N_SENSORS, PHI
 
 
 @pytest.mark.parametrize("h", [0.05, 0.01, 0.002])

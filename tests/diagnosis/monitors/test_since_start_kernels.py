@@ -6,9 +6,9 @@ error that swings slowly.
 
 import numpy as np
 import pytest
-from true_flight import UNITS, new_monitor, true_flight
+from true_flight import UNITS, compared, new_monitor, true_flight
 
-from beaver_ftc.diagnosis.monitors import initial_errors, redundancy
+from beaver_ftc.diagnosis.monitors import initial_errors
 from beaver_ftc.diagnosis.monitors.redundancy import (
     H_AIRSPEED,
     H_ALPHA,
@@ -16,28 +16,19 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     H_PHI,
     H_THETA,
     N_INITIAL,
-    N_TESTS,
 )
 from beaver_ftc.diagnosis.monitors.sensor_monitor import INITIAL_SENSOR
-from beaver_ftc.plant.instruments import AX, SENSORS
+from beaver_ftc.plant.instruments import SENSORS
 
 SAMPLES = 100
 SHOWN = {H_ALPHA: 0.1, H_BETA: 0.12, H_PHI: 0.1, H_THETA: 0.1}
 
 
-def samples(signal, h):
-    """Each sample's number, the hypotheses, and the tests that have been beyond their bound by then."""
-    monitor, exceeded = new_monitor(h, 0.05 * UNITS, 0.01 * UNITS), np.zeros(N_TESTS, int)
-    red, initial = monitor["redundancy"], monitor["initial_errors"]
-    redundancy.start_tests(red, signal[0], signal[0, AX:])
-    initial_errors.start_bounds(initial, signal[0])
-    for k in range(1, len(signal)):
-        redundancy.run_tests(red, signal[k], 0)
-        initial_errors.update_bounds(red, initial, signal[k])
-        exceeded |= red["ratio"] > 1.0
-        initial_errors.latch_refuted(red, initial, exceeded)
-        yield k, initial, exceeded
-        redundancy.store_sample(red, signal[k], signal[k, AX:])
+def judged(readings, h):
+    """The hypotheses after each sample but the first; whether tests have exceeded their bounds by then."""
+    monitor = new_monitor(h, 0.05 * UNITS, 0.01 * UNITS)
+    for _ in compared(monitor, readings):
+        yield monitor["initial_errors"], monitor["memory"]["exceeded"]
 
 
 @pytest.mark.parametrize("kind", ["constant", "scale", "swinging"])
@@ -53,7 +44,7 @@ def test_what_is_broken_from_the_start_is_never_refuted(seed, h, swiftly, i, kin
         signal[:, sensor] = true + {"constant": x, "scale": 1.6 * size * true, "swinging": x * swing}[kind]
         reading, moved = signal[:, sensor], set()
         off = abs(reading / true - 1.0 if i == H_AIRSPEED else 2.0 * np.sin(0.5 * (reading - true)))
-        for k, initial, _ in samples(signal, h):
+        for k, (initial, _) in enumerate(judged(signal, h), 1):
             assert off[k] <= (initial["e"][i] + initial["d"][i]) * (1.0 + 1e-9), (size, k)
             moved |= set(np.flatnonzero(initial["refuted"][i]).tolist())
         assert all(initial_errors.REACTS[i, j] for j in moved), (size, moved)
@@ -63,7 +54,7 @@ def test_what_is_broken_from_the_start_is_never_refuted(seed, h, swiftly, i, kin
 def test_a_sound_flight_shows_each_reading_to_be_sound():
     """None is beyond its bound, and none can be off by more than a little any more."""
     signal = true_flight(np.random.default_rng(5), SAMPLES, 0.01)
-    *_, (_, initial, exceeded) = samples(signal, 0.01)
+    *_, (initial, exceeded) = judged(signal, 0.01)
     assert not exceeded.any()
     for i, little in SHOWN.items():
         assert initial["e"][i] < little < initial["e_start"][i], i

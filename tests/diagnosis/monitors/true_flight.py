@@ -4,6 +4,7 @@ import numpy as np
 from kernels import fill
 from scipy.spatial.transform import Rotation
 
+from beaver_ftc.diagnosis.monitors import initial_errors, redundancy
 from beaver_ftc.diagnosis.monitors.redundancy import (
     AIRSPEED,
     ALPHA,
@@ -58,3 +59,17 @@ def new_monitor(h, e_zero=0.0, const=0.0, **fields):
     red["y_pred"][[ENGINE_SPEED, MANIFOLD]] = 1800.0, 20.0
     fill(monitor, enabled=1, substeps=1, has_engine=1, rate_gain=1.0, n_frozen=3, isolated_sensor=NO_SENSOR)
     return fill(monitor, alarmed_at_s=-1.0, isolated_at_s=-1.0, **fields)
+
+
+def compared(monitor, readings):
+    """Ratios and residuals of the tests after each sample but the first; errors from the start are judged."""
+    red, initial, exceeded = monitor["redundancy"], monitor["initial_errors"], monitor["memory"]["exceeded"]
+    redundancy.start_tests(red, readings[0], readings[0, AX:])
+    initial_errors.start_bounds(initial, readings[0])
+    for y in readings[1:]:
+        redundancy.run_tests(red, y, True)
+        initial_errors.update_bounds(red, initial, y)
+        exceeded |= red["ratio"] > 1.0
+        initial_errors.latch_refuted(red, initial, exceeded)
+        yield red["ratio"].copy(), red["residual"].copy()
+        redundancy.store_sample(red, y, y[AX:])

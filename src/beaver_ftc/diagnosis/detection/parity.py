@@ -93,7 +93,7 @@ from beaver_ftc.diagnosis.detection.likelihood import (
     BlockCapacity,
     evidence_ratio,
 )
-from beaver_ftc.diagnosis.gusts import full_drift, project_gust, remaining_drift
+from beaver_ftc.diagnosis.gusts import project_gust, view_drift
 from beaver_ftc.diagnosis.state import LOSS, NORMAL_FORCE, PITCH, ROLL, SIDE_FORCE, YAW
 
 N_TONES = 16
@@ -410,11 +410,9 @@ def fill_view_noise(view, noise, blocks, forces, gust, inertial, V):
         for j in range(3):
             view.L_force[j] += m_i * f.L[j] * forces.q_ratio
     if gust.output.gusty:
-        if subtracts_gust(view, gust):
-            own = inertial if view.vane_free else gust
-            Q_d += remaining_drift(own, V, view.L_rate, view.L_force)
-        else:
-            Q_d += full_drift(gust, V, view.L_rate, view.L_force)
+        subtracted = subtracts_gust(view, gust)
+        own = inertial if subtracted and view.vane_free else gust
+        Q_d += view_drift(own, V, view.L_rate, view.L_force, subtracted)
         for i in range(3):
             for j in range(3):
                 b.P_dd[0, 0] += m[i] * m[j] * gust.output.var_turn[i, j]

@@ -19,6 +19,7 @@ import numpy as np
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.model import DPT
+from beaver_ftc.diagnosis.state import fill
 from beaver_ftc.public import lazily
 
 if TYPE_CHECKING:
@@ -52,9 +53,10 @@ def configure_balance(config: np.void, aircraft: Aircraft) -> None:
     error_map, signals = aircraft.file.model_error_map, list(aircraft.signals)
     if error_map is None or not error_map.knows_engines or not {THRUST_SIGNAL, YAW_SIGNAL} <= set(signals):
         return
-    config["n_engines"], config["yaw_per_thrust"] = (len(aircraft.effectors), yaw_per_thrust(aircraft))
-    config["i_T"], config["i_n"] = (DPT + signals.index(name) for name in (THRUST_SIGNAL, YAW_SIGNAL))
-    config["slack"] = MAX_OFFSET_M / aircraft.geometry.span_m
+    i_T, i_n = (DPT + signals.index(name) for name in (THRUST_SIGNAL, YAW_SIGNAL))
+    slack = MAX_OFFSET_M / aircraft.geometry.span_m
+    n = len(aircraft.effectors)
+    fill(config, n_engines=n, yaw_per_thrust=yaw_per_thrust(aircraft), i_T=i_T, i_n=i_n, slack=slack)
 
 
 @kernel

@@ -39,6 +39,7 @@ from beaver_ftc.design import LEAST_HEIGHT_M, Dryden
 from beaver_ftc.design.model import DesignFunctions
 from beaver_ftc.diagnosis.bounds import GUST_LIMIT_SIGMA, air_rotation_slopes
 from beaver_ftc.diagnosis.detection.filters import advance_bound, leak
+from beaver_ftc.diagnosis.state import fill
 from beaver_ftc.plant.instruments import (
     ALTITUDE,
     AX,
@@ -76,6 +77,7 @@ DUPLICATE_TOLERANCE = np.array([equal.within for _, equal in DUPLICATES], float)
 FILTER_POLES_PER_S = (1e6, 10.0, 1.0)  # of the filters of each test; the first is the residual itself
 N_POLES = len(FILTER_POLES_PER_S)
 NO_SENSOR = -1
+ERRORS = {"e_zero": "worst", "e_slope": "slope", "const": "steady"}  # of a reading, by their declared names
 FORCE_JUMP_M_S2 = 8.0  # a sound specific force changes by less from one sample to the next
 GYRO_OPEN, GYRO_CONFIRMED, GYRO_REFUTED = 0, 1, 2  # of `gyro_verdict`
 MAX_AIRSPEED_OVER_TRIM = 1.4  # largest airspeed of a flight, as a share of that in trim
@@ -191,18 +193,19 @@ def configure_sensor_monitor(monitor: np.void, declared: Declared, design: np.vo
 
     A monitor that is not declared has found nothing, and its record holds no more than that.
     """
-    output, config, red = monitor["output"], monitor["config"], monitor["redundancy"]
-    output["isolated_sensor"], output["alarmed_at_s"], output["isolated_at_s"] = NO_SENSOR, -1.0, -1.0
+    config, red = monitor["config"], monitor["redundancy"]
+    fill(monitor["output"], isolated_sensor=NO_SENSOR, alarmed_at_s=-1.0, isolated_at_s=-1.0)
     config["enabled"] = declared.monitors_sensors
     if not declared.monitors_sensors:
         return
     initial = cast("Any", declared.initial)  # whose keys the aircraft names
-    config["substeps"], config["has_engine"] = (declared.substeps, declared.aircraft.has_engine_instruments)
+    D = air_rotation_slopes(DesignFunctions(np.array([design])), y)
+    engine = declared.aircraft.has_engine_instruments
+    size = np.where(np.eye(3) > 0.0, -D, abs(D))
+    fill(config, substeps=declared.substeps, has_engine=engine, D=D, D_size=size)
     config["y_trim"][3:7] = y[:4]
-    config["D"] = D = air_rotation_slopes(DesignFunctions(np.array([design])), y)
-    config["D_size"] = np.where(np.eye(3) > 0.0, -D, abs(D))
     monitor["memory"]["substep"] = declared.substeps - 1  # the first JSBSim frame ends a frame of the loop
-    if config["has_engine"]:
+    if engine:
         red["y_pred"][[ENGINE_SPEED, MANIFOLD]] = initial.engine_rpm, initial.manifold_pressure_inhg
     configure_tests(red, declared)
     configure_errors(config, red, declared)
@@ -210,27 +213,28 @@ def configure_sensor_monitor(monitor: np.void, declared: Declared, design: np.vo
 
 def configure_tests(red: np.void, declared: Declared) -> None:
     """Fill the constants of the equations of motion and of the gusts; a sample is a JSBSim frame."""
-    initial, air = declared.initial, declared.air
-    red["h"] = h = 1.0 / declared.rate_hz / declared.substeps
-    red["decay"] = [exp(-lam * h) for lam in FILTER_POLES_PER_S]
-    red["g"] = GRAVITY_MPS2 * (1.0 + initial.altitude_m / EARTH_RADIUS_M) ** -2
-    red["gust_max"], red["gust_change"] = bound_gusts(air, initial.airspeed_mps, h)
-    red["max_airspeed_mps"] = MAX_AIRSPEED_OVER_TRIM * initial.airspeed_mps
-    red["low_m"], red["wind_max"] = air.low_m, declared.vertical_wind_mps
+    initial, air, h = declared.initial, declared.air, 1.0 / declared.rate_hz / declared.substeps
+    gust_max, gust_change = bound_gusts(air, initial.airspeed_mps, h)
+    fill(
+        red, h=h, decay=[exp(-lam * h) for lam in FILTER_POLES_PER_S],
+        g=GRAVITY_MPS2 * (1.0 + initial.altitude_m / EARTH_RADIUS_M) ** -2,
+        gust_max=gust_max, gust_change=gust_change, low_m=air.low_m, wind_max=declared.vertical_wind_mps,
+        max_airspeed_mps=MAX_AIRSPEED_OVER_TRIM * initial.airspeed_mps,
+    )  # fmt: skip
 
 
 def configure_errors(config: np.void, red: np.void, declared: Declared) -> None:
     """Fill the declared errors of the readings, and from how many identical samples each is frozen; a sample
     is a JSBSim frame."""
     sensors, h = declared.sensors, float(red["h"])
+    fill(red, **{name: sensors.each(kind, SENSORS) for name, kind in ERRORS.items()})
+    drifts = [getattr(getattr(sensors.declared, name), "drift_rad_s", 0.0) for name in SENSORS]
+    red["drift"] = max(map(abs, drifts))
     for i, name in enumerate(SENSORS):
         e = sensors[name]
-        red["e_zero"][i], red["e_slope"][i], red["const"][i] = e.worst, e.slope, e.steady
         config["n_frozen"][i] = n_frozen(e.noise, e.resolution) * frames_apart(i, h)
-        drift = getattr(getattr(sensors.declared, name), "drift_rad_s", 0.0)
-        red["drift"] = max(red["drift"], abs(drift))
-    config["noisy"] = np.any((red["e_zero"] > red["const"])[PHI : PHI + 3])
-    config["rate_gain"] = min(1.0, h * RATE_GAIN_PER_S) if config["noisy"] else 1.0
+    noisy = np.any((red["e_zero"] > red["const"])[PHI : PHI + 3])
+    fill(config, noisy=noisy, rate_gain=min(1.0, h * RATE_GAIN_PER_S) if noisy else 1.0)
 
 
 def n_frozen(noise: float, resolution: float) -> int:

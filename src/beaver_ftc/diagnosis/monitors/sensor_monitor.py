@@ -299,10 +299,10 @@ def exclude_gyros(mon):
     """
     M, red = mon.memory, mon.redundancy
     for i in range(3):
-        j, w = i, M.w[i]
-        leak(M.gap[i], red.decay, red.residual[j] + red.h * w)
+        w = M.w[i]
+        leak(M.gap[i], red.decay, red.residual[i] + red.h * w)
         leak(M.gap_bound[i], red.decay, red.h * (M.w_bound[i] + attitude.DAMPING_TOLERANCE * abs(w)))
-        if exceeds(M.gap[i], 1.0, M.gap_bound[i], 1.0, red.B[j]):
+        if exceeds(M.gap[i], 1.0, M.gap_bound[i], 1.0, red.B[i]):
             rule_out_gyros(mon)
 
 
@@ -399,23 +399,22 @@ def judge_gyros(mon, bank, bound, dt):
     for i in range(3):
         if M.gyro_verdict[i] != GYRO_OPEN:
             continue
-        jump = (shown[0, SHOWN, i] - shown[1, SHOWN, i]) / dt  # rad/s2
-        w, past, known = abs(shown[0, SHOWN, i]), abs(shown[1, SHOWN, i]), M.w_bound[i] + abs(M.w[i])
-        peak, older = shown[1, MOST, i], shown[2, MOST, i]
+        now, past, older = shown[0, SHOWN, i], shown[1, SHOWN, i], shown[2, MOST, i]
+        peak, floor, estimate, B = shown[1, MOST, i], shown[1, LEAST, i], abs(M.w[i]), M.w_bound[i]
+        largest, jump = max(abs(now), abs(past)), (now - past) / dt  # rad/s, rad/s2
         # of w, rad/s, by the attitude's noise
         noise = SAMPLES_IN_JUMP * red.per_sample[i] / red.h
         nu_max = bound.nu_max[i] + RATE_ROUNDING
-        estimated = abs(M.w[i]) > M.w_bound[i] + RATE_ROUNDING
-        shows = abs(nu[i]) > nu_max or bank_axis(bank) >= 0 or estimated
-        brief = max(past, peak, w) < TRANSIENT_LEFT * older and older > MIN_TRANSIENT * noise
-        tol = MAX_DYNAMICS_PER_S * max(w, past) + JUMP_TOLERANCE * abs(jump)
+        shows = abs(nu[i]) > nu_max or bank_axis(bank) >= 0 or estimate > B + RATE_ROUNDING
+        brief = max(largest, peak) < TRANSIENT_LEFT * older and older > MIN_TRANSIENT * noise
+        tol = MAX_DYNAMICS_PER_S * largest + JUMP_TOLERANCE * abs(jump)
         fits = abs(nu[i] - jump) <= nu_max + tol + noise / dt
-        varies = noise < shown[1, LEAST, i] < peak / (1.0 + JUMP_TOLERANCE)
-        allowed = MIN_ESTIMATED_SHARE * w <= known + noise
-        if not (fits or varies) or (not shows and (brief or not allowed)):
-            M.gyro_verdict[i] = GYRO_REFUTED
-        elif shows and fits:
+        varies = noise < floor < peak / (1.0 + JUMP_TOLERANCE)
+        allowed = MIN_ESTIMATED_SHARE * abs(now) <= B + estimate + noise
+        if fits and shows:
             M.gyro_verdict[i] = GYRO_CONFIRMED
+        elif not (fits or varies) or (not shows and (brief or not allowed)):
+            M.gyro_verdict[i] = GYRO_REFUTED
 
 
 @kernel
@@ -481,7 +480,8 @@ def sum_flow(mon, y):
         M.B_sum[n] += red.h * red.per_s[j]
         M.e_sum[n] += ini.e_alarm[n] * ini.H[n, j]
         M.y_min[n], M.y_max[n] = min(M.y_min[n], y_n), max(M.y_max[n], y_n)
-    alpha = np.sign(M.r_sum[1]) * max(abs(M.r_sum[1]) - M.B_sum[1] - M.e_sum[1], 0.0)
+    r, B = M.r_sum[1], M.B_sum[1] + M.e_sum[1]
+    alpha = r - min(max(r, -B), B)
     leak(M.climb, red.decay, red.h * y[AIRSPEED] * alpha * np.cos(y[PHI]) * np.cos(y[THETA]))
     M.n_since += 1
 
@@ -620,32 +620,30 @@ def suspect_flow(mon, alarm):
     """Suspect a flow sensor, an accelerometer, or a gyro whose error may be hidden in the tests of the
     attitude. No flow sensor moves the attitude's tests.
     """
-    M, suspect, sensor = mon.memory, mon.output.suspect, SENSOR_OF[alarm]
-    turns = M.exceeded[:ANGLE_TEST]
-    n = turns.sum() if alarm > SPEED_TEST else 0
-    if alarm > SPEED_TEST:
-        for i in range(3):
-            explains = gyro_hidden(mon, alarm, i) if n == 0 else n == 1 and turns[i] == 1
-            suspect[i] = explains and not M.cleared[i]
-    if n == 0:
+    suspect, cleared, turns = mon.output.suspect, mon.memory.cleared, mon.memory.exceeded[:ANGLE_TEST]
+    by_gyro, flow = alarm > SPEED_TEST and turns.any(), SENSOR_OF[alarm]
+    for i in range(3 if alarm > SPEED_TEST else 0):
+        suspect[i] = (turns[i] and alone(turns, i)) if by_gyro else gyro_hidden(mon, alarm, i)
+    if not by_gyro:
         suspect_accelerometers(mon)
-        suspect[sensor] = not M.cleared[sensor]
+        suspect[flow] = 1
+    for i in range(N_IN_EQUATIONS):
+        suspect[i] &= not cleared[i]
 
 
 @kernel
 def gyro_hidden(mon, j, i):
     """Whether an error of gyro i explains the test j of the flow, and stays within the bound of the test of
-    its axis. All of the error of the gyro across the flow (full) turns it; of another a share, by kinematics;
-    q does not act on the sideslip.
+    its axis. All of the error of the gyro across the flow (q for the incidence, r for the sideslip) turns it;
+    of another a share, by kinematics; q does not act on the sideslip.
     """
     red = mon.redundancy
-    alpha, beta = red.y_past[ALPHA], red.y_past[BETA]
-    k = share = HIDDEN_FACTOR
-    if i != j - SPEED_TEST:
-        s, c = np.sin(alpha), np.cos(alpha)
-        k, share = 1.0, share * abs(s if j == BETA_TEST else np.tan(beta) * (c if i == 0 else s))
-    acts = i != 1 or j == ALPHA_TEST
-    return acts and not exceeds(red.r[j], k, red.B[j], share, red.B[i])
+    s, c = np.sin(red.y_past[ALPHA]), np.cos(red.y_past[ALPHA])
+    t = np.tan(red.y_past[BETA])
+    share = (t * c, 1.0, t * s)[i] if j == ALPHA_TEST else (s, 0.0, 1.0)[i]
+    full = i == j - SPEED_TEST
+    k = HIDDEN_FACTOR if full else 1.0
+    return (full or i != 1) and not exceeds(red.r[j], k, red.B[j], HIDDEN_FACTOR * abs(share), red.B[i])
 
 
 @kernel
@@ -654,15 +652,14 @@ def suspect_accelerometers(mon):
     r_sum, m/s and rad; plane: turned by beta; body: then by alpha. least: less the bound on |dv| of sound
     sensors.
     """
-    M, y, r, B = mon.memory, mon.redundancy.y_past, mon.memory.r_sum, mon.memory.B_sum
+    y, r, B = mon.redundancy.y_past, mon.memory.r_sum, mon.memory.B_sum
     alpha, beta, V = y[ALPHA], y[BETA], speed(y)
     plane = complex(r[0], V * r[2]) * complex(np.cos(beta), np.sin(beta))
     body = complex(plane.real, V * np.cos(beta) * r[1]) * complex(np.cos(alpha), np.sin(alpha))
     dv = abs(body.real), abs(plane.imag), abs(body.imag)
     least, frozen = MIN_AXIS_SHARE * max(dv) - B[0] - V * (B[1] + B[2]), last_frozen(mon, FORCES)
     for i in FORCES:
-        cause = frozen == i or (frozen < 0 and dv[i - AX] >= least)
-        mon.output.suspect[i] = cause and not M.cleared[i]
+        mon.output.suspect[i] = frozen == i or (frozen < 0 and dv[i - AX] >= least)
 
 
 @kernel

@@ -377,7 +377,7 @@ def update_gusts(gust, vaneless, vaned, force, pred, meas, k, dt):
     if (force.in_use or gust.output.uses_accelerometers) and not meas.inertial:
         forces.drop_forces(force, gust, vaneless, vaned)
     if force.in_use or gust.output.uses_accelerometers:
-        gusts.store_accelerometer_reading(gust, meas.force)
+        gust.memory.f_read[:] = meas.force
     if force.in_use:
         forces.update_both_forces(force, gust, meas, pred.u, dt)
         if vaneless.output.gusty:
@@ -390,7 +390,7 @@ def update_gusts(gust, vaneless, vaned, force, pred, meas, k, dt):
 @kernel
 def step_view_gust(gust, y, pred, meas, k, dt):
     """Update a gust estimate by accelerometers that the views alone use; y (5,) with its flow angles."""
-    gusts.store_accelerometer_reading(gust, meas.force)
+    gust.memory.f_read[:] = meas.force
     gusts.set_intensity(gust, meas.altitude)
     gusts.step_gust(gust, y, meas.attitude, dt, k)
     gusts.fill_gust_effect(gust, pred.design, meas.x, y, pred.u)

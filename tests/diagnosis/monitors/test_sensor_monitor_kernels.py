@@ -1,4 +1,4 @@
-"""The sensor monitor in flights by rotation matrices: faults named by hand, and faults drawn at random."""
+"""The sensor monitor in flights by rotation matrices: faults named by hand and drawn at random; its rules."""
 
 import numpy as np
 import pytest
@@ -7,16 +7,45 @@ from true_flight import UNITS, new_monitor, true_flight
 
 from beaver_ftc.diagnosis.model_prediction import prediction_dtype
 from beaver_ftc.diagnosis.monitors import sensor_monitor
-from beaver_ftc.plant.instruments import AX, MEASURED, N_SENSORS, PHI, SENSORS
+from beaver_ftc.diagnosis.monitors.redundancy import (
+    AIRSPEED,
+    ALPHA,
+    ALPHA_TEST,
+    ANGLE_TEST,
+    BETA,
+    BETA_TEST,
+    CLIMB_TEST,
+    DENSITY_TEST,
+    GYRO_OPEN,
+    GYRO_REFUTED,
+    PRESSURE_TEST,
+    PSI,
+    RPM_TEST,
+    SPEED_TEST,
+    THETA,
+    TURN_TEST,
+)
+from beaver_ftc.plant.instruments import (
+    ALTITUDE,
+    AX,
+    ENGINE_SPEED,
+    MANIFOLD,
+    MEASURED,
+    N_SENSORS,
+    PHI,
+    SENSORS,
+)
 
 H, N, FROM = 0.01, 200, 40
+FORCES = (AX, AX + 1, AX + 2)
 D = np.array([[4.0, 0.2, -0.3], [-0.2, 3.0, 0.0], [0.3, 0.1, 1.0]])
 
 
 def flown(readings, true, missing=None, air=None, **fields):
     """The monitor after a flight; the readings (N, N_SENSORS) that the diagnosis is given, and whether it may
-    use accelerometers (N,). The innovation has the errors of the gyros in it alone."""
-    fdi, given, inertial = new_fdi(), [], []
+    use accelerometers (N,); suspects, cleared sensors, verdicts of gyros and unused readings (N, ...). The
+    innovation has the errors of the gyros in it alone."""
+    fdi, given, inertial, history = new_fdi(), [], [], []
     D_size = np.where(np.eye(3) > 0.0, -D, abs(D))
     monitor = new_monitor(H, 0.02 * UNITS, 0.01 * UNITS, D=D, D_size=D_size, y_trim=true[0], **fields)
     fill(monitor["redundancy"], **air or {})
@@ -39,7 +68,11 @@ def flown(readings, true, missing=None, air=None, **fields):
         )
         given.append(measured["signal"].copy())
         inertial.append(int(measured["inertial"]))
-    return monitor, np.array(given), np.array(inertial)
+        o, M = monitor["output"], monitor["memory"]
+        history.append(
+            np.concatenate([o["suspect"], M["cleared"], M["gyro_verdict"], o["is_reading_unused"]])
+        )
+    return monitor, np.array(given), np.array(inertial), np.array(history)
 
 
 def with_fault(seed, sensor, kind, size, first=FROM, noisy=False):
@@ -77,7 +110,7 @@ NAMED = [
 def test_a_broken_sensor_is_isolated_and_its_reading_replaced(name, kind, size):
     i = SENSORS.index(name)
     readings, true = with_fault(7, i, kind, size)
-    monitor, given, inertial = flown(readings, true)
+    monitor, given, inertial, _ = flown(readings, true)
     output = monitor["output"]
     assert output["alarmed"]
     assert output["isolated_sensor"] == i, [SENSORS[s] for s in np.flatnonzero(output["suspect"])]
@@ -93,11 +126,87 @@ def test_a_broken_sensor_is_isolated_and_its_reading_replaced(name, kind, size):
 @pytest.mark.parametrize("seed", range(4))
 def test_sound_sensors_raise_no_alarm(seed):
     readings, true = with_fault(seed, 0, "none", 0)
-    monitor, given, inertial = flown(readings, true)
+    monitor, given, inertial, _ = flown(readings, true)
     assert not monitor["output"]["alarmed"]
     assert (given == readings).all() and inertial.all()  # noqa: PT018
 
 
+def with_ratios(ratios, **fields):
+    """Tests {test: ratio}, of which the residual is as large; in level flight, where each angle turns the
+    aircraft about one axis. Other bounds are 1."""
+    monitor = new_monitor(H, **fields)
+    test = monitor["redundancy"]
+    test["B"] = 1.0
+    for j, ratio in ratios.items():
+        test["ratio"][j], test["r"][j] = ratio, ratio
+    monitor["memory"]["c_max"] = np.eye(3)
+    turns, angles = test["r"][TURN_TEST:][:3], test["r"][ANGLE_TEST:][:3]
+    monitor["memory"]["beyond"] = turns - np.eye(3)[..., None] * angles[:, None]
+    return monitor
+
+
+def suspects(ratios, alarm=None, **fields):
+    """The sensors that can have brought the tests here."""
+    monitor = with_ratios(ratios, **fields)
+    monitor["output"]["alarm_test"] = max(ratios, key=ratios.get) if alarm is None else alarm
+    sensor_monitor.latch_exceeded(monitor)
+    sensor_monitor.find_suspects(monitor)
+    return set(np.flatnonzero(monitor["output"]["suspect"]).tolist())
+
+
+@pytest.mark.parametrize(
+    ("ratios", "who"),
+    [
+        ({SPEED_TEST: 2.0}, {AIRSPEED, *FORCES}),
+        ({DENSITY_TEST: 3.0, SPEED_TEST: 2.0}, {AIRSPEED}),
+        ({CLIMB_TEST: 2.0}, {ALTITUDE}),
+        ({CLIMB_TEST: 3.0, SPEED_TEST: 2.0}, set()),  # the altitude is in no other test
+        ({DENSITY_TEST: 3.0, CLIMB_TEST: 2.0}, {AIRSPEED}),  # nor is the dynamic pressure
+        ({RPM_TEST: 2.0}, {ENGINE_SPEED}),
+        ({PRESSURE_TEST: 2.0}, {MANIFOLD}),
+        ({ALPHA_TEST: 5.0}, {ALPHA, *FORCES}),
+        ({BETA_TEST: 5.0}, {BETA, *FORCES}),
+        ({ALPHA_TEST: 2.0}, {ALPHA, 1, *FORCES}),  # its gyro need not show yet: within twice both bounds
+        ({BETA_TEST: 2.0}, {BETA, 2, *FORCES}),
+        ({ALPHA_TEST: 5.0, TURN_TEST + 1: 2.0}, {1}),
+        ({BETA_TEST: 5.0, TURN_TEST + 2: 2.0}, {2}),
+        ({BETA_TEST: 5.0, TURN_TEST: 2.0}, {0}),  # no sensor of the flow moves the attitude's tests
+        ({ALPHA_TEST: 5.0, TURN_TEST: 2.0, TURN_TEST + 1: 1.5}, set()),
+        ({TURN_TEST: 2.1}, {0}),
+        ({TURN_TEST + 2: 2.1}, {2}),
+        ({TURN_TEST: 1.9}, {0, PHI}),  # the angle's own test may hide as much: both bounds together
+        ({TURN_TEST + 1: 2.0, ANGLE_TEST + 1: 1.5}, {1, THETA}),
+        ({TURN_TEST: 2.0, TURN_TEST + 1: 1.5}, set()),
+        ({ANGLE_TEST + 2: 2.0}, {0, 1, 2, PSI}),  # an angle alone may be the first to show what a gyro does
+        ({ANGLE_TEST: 2.0, ANGLE_TEST + 2: 1.5}, {0, 1, 2}),
+        ({TURN_TEST: 100.0, TURN_TEST + 1: 2.9}, {0}),  # a large error moves its neighbours a little
+        ({TURN_TEST: 100.0, TURN_TEST + 1: 3.1}, set()),
+        ({ANGLE_TEST: 100.0, ANGLE_TEST + 1: 2.9}, {0, 1, 2, PHI}),
+        ({TURN_TEST + 2: 100.0, ANGLE_TEST: 2.0}, {2, PHI}),  # angles are compared with angles
+    ],
+)
+def test_who_is_suspected_of_what_the_tests_show(ratios, who):
+    assert suspects(ratios) == who
+
+
+@pytest.mark.parametrize(
+    ("peak", "noise", "verdict"),
+    [
+        (0.0, 0.0, GYRO_REFUTED), (0.004, 0.0, GYRO_OPEN), (0.0, 0.6, GYRO_OPEN), (0.0, 0.4, GYRO_REFUTED),
+    ],
+)  # fmt: skip
+def test_an_error_of_the_attitude_that_has_shown_and_is_gone_is_no_gyros(peak, noise, verdict):
+    """Two frames ago the first gyro's error has shown as 1 rad/s; the noise of the attitude in rad/s."""
+    monitor, fdi = new_monitor(H, w_bound=1.0), new_fdi()
+    shown = monitor["memory"]["shown"]
+    shown[2, sensor_monitor.MOST, 0], shown[1, sensor_monitor.MOST, 0] = 1.0, peak
+    monitor["redundancy"]["per_sample"], fdi["bound"]["nu_max"] = noise * H / 4.0, 1.0
+    fdi["bank"]["output"]["threshold"][:3] = 1.0
+    sensor_monitor.judge_gyros(monitor, fdi["bank"], fdi["bound"], 0.02)
+    assert monitor["memory"]["gyro_verdict"][0] == verdict
+
+
+KEPT_MEMORY = "exceeded", "cleared", "gyro_verdict", "gyros_excluded", "w_bound"
 KINDS = ("jump", "jump", "scale", "noise", "ramp", "frozen", "missing")
 
 
@@ -113,12 +222,11 @@ def test_faults_drawn_at_random_end_as_kept(i, changed):
         air = {"gust_max": 3.0, "gust_change": (0.1, 0.3, 1.0), "low_m": 500.0} if gusty else {}
         fields = {"noisy": noisy, "substeps": 1 + 3 * slow, "turn_max": 0.01 * turns}
         missing = i if kind == "missing" else None
-        monitor, given, inertial = flown(readings[:90], true[:90], missing, air, **fields)
-        M, red, ini = monitor["memory"], monitor["redundancy"], monitor["initial_errors"]
-        results = {name: monitor["output"][name] for name in monitor["output"].dtype.names}
-        results |= {
-            name: M[name] for name in ("exceeded", "cleared", "gyro_verdict", "gyros_excluded", "w_bound")
-        }
+        monitor, given, inertial, history = flown(readings[:90], true[:90], missing, air, **fields)
+        output, red, ini = monitor["output"], monitor["redundancy"], monitor["initial_errors"]
+        results = {name: output[name] for name in output.dtype.names}
+        results |= {name: monitor["memory"][name] for name in KEPT_MEMORY}
         results |= {"B": red["B"], "initial": ini["e"], "refuted": ini["refuted"].sum(axis=1)}
-        kept.append(results | {"given": given.mean(axis=0), "inertial": inertial.sum()})
+        results |= {"given": given.mean(axis=0), "inertial": inertial.sum(), "history": history.sum(axis=0)}
+        kept.append(results)
     assert not changed(kept)

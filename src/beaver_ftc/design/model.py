@@ -551,6 +551,17 @@ def responses_at(design: np.void, x: np.ndarray, y: np.ndarray) -> tuple[np.ndar
     return np.concatenate(f, axis=-1).T, np.moveaxis(np.concatenate(G, axis=-1), -1, 0)
 
 
+def acceleration_at(design: np.void, x: np.ndarray, y: np.ndarray, u: np.ndarray) -> np.ndarray:
+    """f + G u (n, 3) rad/s2 at many states: see `responses_at`; u (n, surfaces) rad."""
+    f, G = responses_at(design, x, y)
+    return f + np.einsum("kas,ks->ka", G, u)
+
+
+def unanticipated_at(design: np.void, y: np.ndarray, Cm_alpha3: np.ndarray) -> np.ndarray:
+    """What `unanticipated_pitch` gives at each of y (n, 5) and Cm_alpha3 (n,): (n,) rad/s2."""
+    return Cm_alpha3 * design["Qm"] * y[:, QDYN] * design["S"] * design["c"] * y[:, ALPHA] ** 3
+
+
 def effectiveness(design: np.void, y: np.ndarray) -> np.ndarray:
     """G (3, 4) rad/s2 per rad at y (5,), without compiled code."""
     return design["G0"].copy() if design["linearised"] else _split(design, np.zeros(3), y)[1].real

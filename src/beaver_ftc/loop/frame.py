@@ -49,12 +49,11 @@ from beaver_ftc.diagnosis.model_prediction import (
     move_surfaces,
     predict_known,
 )
-from beaver_ftc.diagnosis.monitors import sensor_monitor
+from beaver_ftc.diagnosis.monitors import redundancy, sensor_monitor
 from beaver_ftc.diagnosis.schemes import detection_share, record_isolated_surfaces
 from beaver_ftc.diagnosis.state import PITCH, PLUGIN_SCHEME_NUMBER
 from beaver_ftc.diagnosis.types import verdict
 from beaver_ftc.plant import channels as ch
-from beaver_ftc.plant.instruments import MANIFOLD
 from beaver_ftc.plant.sensing import (
     NOT_FINITE,
     effective,
@@ -357,7 +356,7 @@ def monitor_sensors(frame):
     fdi, monitor, engine = frame.fdi, frame.fdi.sensor_monitor, frame.control.power.output
     before, t = monitor.output.alarmed, frame.k * frame.dt
     if engine.in_use:
-        monitor.redundancy.y_pred[MANIFOLD] = engine.command[0]
+        redundancy.expect_pressure(monitor.redundancy, engine.command[0])
     sensor_monitor.check_sensors(
         monitor, frame.prediction, frame.measured, fdi.verdict, fdi.bank, fdi.bound, frame.dt, t
     )

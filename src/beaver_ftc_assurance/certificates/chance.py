@@ -106,7 +106,7 @@ class LikelihoodRatio:
 
     Y (2 n, 2 + m): innovation, signature and m constants through the filter before the first frame.
     tolerance (m,): of the constants. P (2 n, 2 n), R (n,): variances before the first frame, and of gyros.
-    frames: the filter's inputs by name, (frames, ...).
+    series: the filter's inputs by name, (frames, ...).
     """
 
     level: float
@@ -117,24 +117,24 @@ class LikelihoodRatio:
     Y: np.ndarray
     P: np.ndarray
     first: int
-    frames: dict[str, np.ndarray]
+    series: dict[str, np.ndarray]
     innovation: np.ndarray
     dt: float
 
     @property
     def fields(self) -> Document:
         """The statement's, null where zero stands."""
-        rows = zip(*(values.tolist() for values in self.frames.values()), strict=True)
+        rows = zip(*(values.tolist() for values in self.series.values()), strict=True)
         return {
             "level": self.level, "axes": self.axes, "sense": self.sense, "tolerance": self.tolerance.tolist(),
             "R": _null_for_zero(self.R), "Y": [*map(_null_for_zero, self.Y)],
             "P": [*map(_null_for_zero, self.P)], "first": self.first,
-            "frames": [dict(zip(self.frames, row, strict=True)) for row in rows],
+            "frames": [dict(zip(self.series, row, strict=True)) for row in rows],
         }  # fmt: skip
 
     def without(self, name: str) -> "LikelihoodRatio":
         """The same without one of the filter's inputs."""
-        return replace(self, frames={key: of for key, of in self.frames.items() if key != name})
+        return replace(self, series={key: of for key, of in self.series.items() if key != name})
 
     def without_negligible(self) -> "LikelihoodRatio":
         """The same without what decides nothing: what the filter has forgotten, bounds that add nothing."""
@@ -147,10 +147,10 @@ class LikelihoodRatio:
         ]
         if len(matters) > MAX_WRITTEN_CONSTANTS:
             said, matters = said._with_constants_merged(), [0]
-        Y, frames = said.Y[:, [0, 1, *(2 + j for j in matters)]], said.frames
-        if "known" in frames:
-            frames = frames | {"known": frames["known"][:, matters]}
-        said = replace(said, tolerance=said.tolerance[matters], Y=Y, frames=frames)
+        Y, series = said.Y[:, [0, 1, *(2 + j for j in matters)]], said.series
+        if "known" in series:
+            series = series | {"known": series["known"][:, matters]}
+        said = replace(said, tolerance=said.tolerance[matters], Y=Y, series=series)
         said = replace(said, Y=said._without_negligible_numbers("Y"))
         return replace(said, P=said._without_negligible_numbers("P"), R=said._without_negligible_numbers("R"))
 
@@ -176,13 +176,13 @@ class LikelihoodRatio:
         """One constant in the place of many: all at their worst, which is linear in them."""
         worst = self.tolerance * np.sign(self.sums()[0][2:])
         Y = np.column_stack([self.Y[:, :2], [worst @ row for row in self.Y[:, 2:].copy()]])
-        known = np.array([[worst @ of_frame] for of_frame in self.frames["known"].copy()])
-        return replace(self, tolerance=np.ones(1), Y=Y, frames=self.frames | {"known": known})
+        known = np.array([[worst @ of_frame] for of_frame in self.series["known"].copy()])
+        return replace(self, tolerance=np.ones(1), Y=Y, series=self.series | {"known": known})
 
     def sums(self) -> tuple[np.ndarray, float, float]:
         """Sums over the frames of w.g for each column of Y, (2 + m,); the same of the prediction for calm
         air; and the room that a bounded uncertainty needs, as it swings or at its rate of change."""
-        its, n = self.frames, len(self.axes)
+        its, n = self.series, len(self.axes)
         count, none = len(self.innovation), np.zeros_like(self.innovation)
         inputs = [self.innovation - its.get("air", 0.0), its["signature"]]
         inputs += [*np.moveaxis(its["known"], 1, 0)] if "known" in its else []
@@ -267,7 +267,7 @@ def _likelihood_ratio(
         level=diagnosis.statistical_alarm_level, axes=axes, sense="less" if sense else "either",
         tolerance=block.regressor_coefficient_error_bound[known], R=of["R_y"][0, felt],
         Y=np.vstack([Y[:n], -Y[n:]]), P=0.5 * (P + P.T),  # else rounding sets both sides apart
-        first=rows[0], frames=its, innovation=innovation, dt=dt,
+        first=rows[0], series=its, innovation=innovation, dt=dt,
     )  # fmt: skip
 
 

@@ -2,10 +2,11 @@
 
 import numpy as np
 
+from beaver_ftc.design.model import acceleration_at
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.channels import TRUTH
 from beaver_ftc.plant.trim import trim
-from beaver_ftc.studies.mismatch.models import acceleration, air_name, states_of
+from beaver_ftc.studies.mismatch.models import air_name, states_of
 from beaver_ftc.studies.mismatch.sources import Models, instantaneous
 from flying import flown, scenario
 
@@ -47,7 +48,7 @@ def test_turbulence_is_its_own_source_and_leaves_nothing():
     assert np.abs(states.x_air - states.x).max() > 1e-3
     case = Models(CALM)
     contributions, _ = instantaneous(case, states)
-    designed = acceleration(case.design, states.x_measured, states.y_measured, states.u)
+    designed = acceleration_at(case.design, states.x_measured, states.y_measured, states.u)
     rest = states.xdot - designed - sum(contributions.values())
     assert np.abs(contributions["wind_turbulence"]).max() > 1e-3
     assert np.abs(rest).max() <= ROUNDING

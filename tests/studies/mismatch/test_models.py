@@ -4,8 +4,14 @@ import numpy as np
 import pytest
 
 from beaver_ftc.design.fdc import MASS
-from beaver_ftc.design.model import anchor, design_of, inertia_coefficients, inertial, response
-from beaver_ftc.studies.mismatch.models import acceleration
+from beaver_ftc.design.model import (
+    acceleration_at,
+    anchor,
+    design_of,
+    inertia_coefficients,
+    inertial,
+    response,
+)
 from beaver_ftc.studies.mismatch.sources import (
     earth_in_body,
     earth_rotation,
@@ -35,7 +41,7 @@ def test_belief_is_what_the_compiled_loop_evaluates(keys):
     x, y, u = random_states()
     design = design_of(case.design_model)[0]
     anchor(design, x[0], y[0], u[0])
-    found = acceleration(design, x, y, u)
+    found = acceleration_at(design, x, y, u)
     record = np.array([design]).view(np.recarray)[0]
     for k in range(len(x)):
         f, G = np.zeros(3), np.zeros((3, 4))

@@ -166,7 +166,7 @@ MONITOR_MEMORY_RECORD = record(
     jump=float,  # of the accelerometers, m/s2, which fades
     # since the alarm, of speed, incidence, sideslip: number of samples; sums of the residuals, of the part of
     # sound sensors, of the part of an initial error; range of the readings
-    n_since=int, r_sum=3, B_sum=3, e_sum=3, y_min=3, y_max=3,
+    n_since=int, r_sum=3, B_sum=3, H_sum=3, y_min=3, y_max=3,
     climb=N_POLES,  # m, filtered: error of the climb, of an incidence with the error that its residuals show
 )  # fmt: skip
 
@@ -392,6 +392,12 @@ def store_sample(red, y, force):
     red.e_older[:] = red.e_past
     red.e_past[:] = red.e
     red.a[:] = combined(1.0, force, red.g, down(y))
+
+
+@kernel
+def expect_pressure(red, pressure):
+    """Predict the manifold pressure, inHg, from the command of the law in charge of the engine."""
+    red.y_pred[MANIFOLD] = pressure
 
 
 @kernel

@@ -463,7 +463,7 @@ def flow_jumped(mon, y, i):
 @kernel
 def sum_flow(mon, y):
     """Add up, after the sample of the alarm, the residuals of the flow (r_sum), the part of sound sensors
-    (B_sum) and that of an error from the start (e_sum); and find the range of each reading.
+    (B_sum) and that of an error from the start (H_sum); and find the range of each reading.
 
     alpha: error of the incidence that the sums leave unexplained, rad; climb: its effect in a sample, m.
     """
@@ -478,9 +478,9 @@ def sum_flow(mon, y):
             continue
         M.r_sum[n] += red.residual[j]
         M.B_sum[n] += red.h * red.per_s[j]
-        M.e_sum[n] += ini.e_alarm[n] * ini.H[n, j]
+        M.H_sum[n] += ini.e_alarm[n] * ini.H[n, j]
         M.y_min[n], M.y_max[n] = min(M.y_min[n], y_n), max(M.y_max[n], y_n)
-    r, B = M.r_sum[1], M.B_sum[1] + M.e_sum[1]
+    r, B = M.r_sum[1], M.B_sum[1] + M.H_sum[1]
     alpha = r - min(max(r, -B), B)
     leak(M.climb, red.decay, red.h * y[AIRSPEED] * alpha * np.cos(y[PHI]) * np.cos(y[THETA]))
     M.n_since += 1
@@ -490,7 +490,7 @@ def sum_flow(mon, y):
 def sum_exceeds_range(M, n):
     """Whether the residuals add up to more than an error of a flow sensor whose reading has this range."""
     span = M.y_max[n] - M.y_min[n]
-    return span > 0.0 and abs(M.r_sum[n]) > MIN_SUM_RATIO * span + CLEAR_FACTOR * (M.B_sum[n] + M.e_sum[n])
+    return span > 0.0 and abs(M.r_sum[n]) > MIN_SUM_RATIO * span + CLEAR_FACTOR * (M.B_sum[n] + M.H_sum[n])
 
 
 @kernel

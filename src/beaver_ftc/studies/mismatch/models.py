@@ -1,4 +1,4 @@
-"""The log as arrays, and the acceleration that a design model expects there."""
+"""The log as arrays."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -7,7 +7,6 @@ import numpy as np
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.design.fdc import SURFACES
-from beaver_ftc.design.model import responses_at
 
 Log = Mapping[str, np.ndarray]
 
@@ -79,9 +78,3 @@ def states_of(log: Log) -> States:
         for name, columns in _TOGETHER.items()
     }
     return States(**{name: log[name] for name in _ALONE}, **together)
-
-
-def acceleration(design: np.void, x: np.ndarray, y: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """f + G u (n, 3) rad/s2 of a design model's record; x (n, 3) rad/s, y (n, 5), u (n, 4) rad."""
-    f, G = responses_at(design, x, y)
-    return f + np.einsum("kas,ks->ka", G, u)

@@ -50,9 +50,8 @@ from beaver_ftc.aircraft.aircraft import EARTH_RADIUS_M, EARTH_RATE_RAD_S
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.fdc import SURFACES, TRAVEL
 from beaver_ftc.design.model import (
-    ALPHA,
-    QDYN,
     InertiaCoefficients,
+    acceleration_at,
     anchor,
     design_of,
     design_record,
@@ -60,6 +59,7 @@ from beaver_ftc.design.model import (
     inertial,
     mass_of,
     responses_at,
+    unanticipated_at,
 )
 from beaver_ftc.plant.adapter import START_LATITUDE_DEG
 from beaver_ftc.plant.conditions import known_trim
@@ -68,7 +68,7 @@ from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.faults import UNANTICIPATED, place_of
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.signals import grown_share, is_before, is_in_force
-from beaver_ftc.studies.mismatch.models import States, acceleration
+from beaver_ftc.studies.mismatch.models import States
 
 SOURCES = (
     "sensors", "actuators", "fault", "simplification", "engine", "coefficients", "inertia",
@@ -175,7 +175,9 @@ def fault_effects(m: Models, states: States, G: np.ndarray, healthy: np.ndarray)
             effects[name] = effects.get(name, 0.0) + G[:, :, s] * by_rad[:, None]
     for fault in m.scenario.faults:
         if fault.type == UNANTICIPATED:
-            effects[name_of(fault)] = unanticipated(fault, m.design, states)
+            extra: Any = fault
+            pitch = unanticipated_at(m.design, states.y, extra.Cm_alpha3 * share(fault, states.t_s))
+            effects[name_of(fault)] = np.outer(pitch, (0.0, 1.0, 0.0))
     return effects
 
 
@@ -189,13 +191,6 @@ def share(fault: Any, t_s: np.ndarray) -> np.ndarray:
     """B(t - T0) (n,): how far a fault has grown, 0 where it is not there."""
     grown = np.array([grown_share(fault, t) for t in t_s])
     return np.where(is_in_force(fault, t_s), grown, 0.0)
-
-
-def unanticipated(fault: Any, design: np.void, states: States) -> np.ndarray:
-    """The extra pitching moment on alpha^3 as an acceleration (n, 3) rad/s2 [Zhang2005]."""
-    moment = states.y[:, QDYN] * design["S"] * design["c"] * states.y[:, ALPHA] ** 3
-    pitch = fault.Cm_alpha3 * share(fault, states.t_s) * design["Qm"] * moment
-    return np.column_stack([0.0 * pitch, pitch, 0.0 * pitch])
 
 
 def _lost(faults: list, states: States, position: np.ndarray) -> Iterator[tuple[Any, np.ndarray]]:
@@ -241,7 +236,7 @@ def wind_turbulence(m: Models, s: States) -> np.ndarray:
     Wind that does not turn reaches the moments only through alpha, beta and V, which are measured.
     """
     in_air, over_earth = (
-        acceleration(m.truth, rates, s.y, s.effective) - inertial(m.inertia, rates)
+        acceleration_at(m.truth, rates, s.y, s.effective) - inertial(m.inertia, rates)
         for rates in (s.x_air, s.x)
     )
     return in_air - over_earth
@@ -257,13 +252,13 @@ def instantaneous(m: Models, s: States) -> tuple[Contributions, dict[str, Contri
     """All sources but the integration at every frame, and the single faults and single coefficients."""
     healthy, (_, G) = healthy_positions(m.scenario, s.u), responses_at(m.design, s.x, s.y)
     faults, nothing = fault_effects(m, s, G, healthy), np.zeros_like(s.x)
-    measured = acceleration(m.design, s.x_measured, s.y_measured, s.u)
+    measured = acceleration_at(m.design, s.x_measured, s.y_measured, s.u)
     ways = (m.design, m.untied, m.whole, m.turning, m.truth)
-    on_the_way = [acceleration(model, s.x, s.y, s.effective) for model in ways]
+    on_the_way = [acceleration_at(model, s.x, s.y, s.effective) for model in ways]
     simplification, engine, coefficients, inertia = np.diff(on_the_way, axis=0)
     extra = sum((effect for name, effect in faults.items() if name.startswith("unanticipated")), nothing)
     contributions = {
-        "sensors": acceleration(m.design, s.x, s.y, s.u) - measured,
+        "sensors": acceleration_at(m.design, s.x, s.y, s.u) - measured,
         "actuators": np.einsum("kas,ks->ka", G, healthy - s.u),
         "fault": sum(faults.values(), nothing),
         "simplification": simplification,
@@ -275,5 +270,7 @@ def instantaneous(m: Models, s: States) -> tuple[Contributions, dict[str, Contri
         "wind_turbulence": wind_turbulence(m, s),
         "earth_rotation": earth(m, s),
     }
-    errors = {name: acceleration(one, s.x, s.y, s.effective) - on_the_way[2] for name, one in m.parts.items()}
+    errors = {
+        name: acceleration_at(one, s.x, s.y, s.effective) - on_the_way[2] for name, one in m.parts.items()
+    }
     return contributions, {"fault": faults, "coefficients": errors}

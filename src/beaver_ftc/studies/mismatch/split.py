@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from beaver_ftc.aircraft import AXES
+from beaver_ftc.design.model import acceleration_at
 from beaver_ftc.documents.files import Document
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import Columns
@@ -13,7 +14,7 @@ from beaver_ftc.results.metrics import measure
 from beaver_ftc.results.model import Metrics
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.studies.mismatch.models import Log, acceleration, states_of
+from beaver_ftc.studies.mismatch.models import Log, states_of
 from beaver_ftc.studies.mismatch.sources import SOURCES, Contributions, Models, instantaneous
 from beaver_ftc.studies.present.tables import finite
 
@@ -129,7 +130,7 @@ def split(scenario: Scenario, log: Log) -> Split:
     """
     m, s = Models(scenario), states_of(log)
     contributions, details = instantaneous(m, s)
-    sampled = s.xdot - acceleration(m.design, s.x_measured, s.y_measured, s.u)
+    sampled = s.xdot - acceleration_at(m.design, s.x_measured, s.y_measured, s.u)
     over_frames = np.diff(s.x, axis=0) * scenario.rate_hz - s.design_mean[1:]
     total = np.concatenate([over_frames, sampled[-1:]])
     return Split(

@@ -51,7 +51,7 @@ def test_writer_and_checker_follow_the_same_filter(pace, keep):
     half = numbers(4, 4, seed=9)
     ours = LikelihoodRatio(
         level=5.0, axes=[0, 2], sense="either", tolerance=np.array([0.3]), R=np.array([0.5, 0.7]),
-        P=half @ half.T, Y=numbers(4, 3, seed=10), first=first, frames=inputs, dt=dt,
+        P=half @ half.T, Y=numbers(4, 3, seed=10), first=first, series=inputs, dt=dt,
         innovation=nu[first:, [0, 2]],
     )  # fmt: skip
     totals, calm, ours_room = ours.sums()

@@ -42,6 +42,7 @@ def _names(folder):
 
 @pytest.mark.usefixtures("figures_in_short")
 def test_run_writes_the_contract_says_the_verdict_and_stops_for_a_users_file_beside_the_figures(short):
+    beaver("run", "short.yaml", cwd=short)  # what this machine has not compiled yet is said once
     done = beaver("run", "short.yaml", cwd=short)
     assert (done.returncode, done.stderr) == (0, "")
     assert "short: PASSED" in done.stdout

@@ -63,7 +63,7 @@ def searched(seed, restarts):
 def test_a_search_is_restarted_until_none_gains():
     """A stranger's search from the values found, with other seeds, then gains little; one without restarts
     leaves much."""
-    once, whole = ([searched(seed, restarts) for seed in (1, 101, 201)] for restarts in (0, 20))
+    once, whole = ([searched(seed, restarts) for seed in range(1, 600, 100)] for restarts in (0, 20))
     assert np.mean([found.cost for found in whole]) < 0.6 * np.mean([found.cost for found in once])
     for found in whole:
         assert found.settled

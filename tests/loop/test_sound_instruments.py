@@ -66,17 +66,17 @@ FLOWN = {
 }  # fmt: skip
 
 
-def require_no_suspicion(words):
+def suspected(words):
+    """Whether the flight has an alarm, or a test of the sensor monitor exceeds its bound."""
     fdi = {"sensor_monitor": "always", **words.get("fdi", {})}
     found = bf.fly(load({"name": "x", "duration_s": 3, **words, "fdi": fdi}))
-    assert not found.metrics["false_alarm"]
-    assert found.log["watch_share"].max() <= 1.0
-    assert found.log["detected"].max() == 0.0
+    alarmed = found.metrics["false_alarm"] or found.log["detected"].max() > 0.0
+    return alarmed or not found.log["watch_share"].max() <= 1.0
 
 
 @pytest.mark.parametrize("name", FLOWN)
 def test_sound_declared_instruments_are_never_suspected(name):
-    require_no_suspicion(FLOWN[name])
+    assert not suspected(FLOWN[name])
 
 
 @pytest.mark.parametrize("grade", GRADES)
@@ -84,7 +84,7 @@ def test_sound_declared_instruments_are_never_suspected(name):
 @pytest.mark.parametrize("turbulence", ["none", "light"])
 @pytest.mark.parametrize("seed", [0, 1])
 def test_sound_accelerometers_are_never_suspected(grade, turbulence, rate_hz, substeps, seed):
-    require_no_suspicion(accelerometers(grade, turbulence, {}, seed, rate_hz=rate_hz, substeps=substeps))
+    assert not suspected(accelerometers(grade, turbulence, {}, seed, rate_hz=rate_hz, substeps=substeps))
 
 
 @pytest.mark.parametrize("grade", GRADES)

@@ -456,7 +456,7 @@ def acceleration(f, G, u, out):
 assert (PH, RH) == (2, 4)  # rates are neighbours among the signals: see rate_damping
 
 
-BLOCK = 10_000  # states that are evaluated at once
+_BLOCK = 10_000  # states that are evaluated at once
 _STEP = 1e-30  # of a complex step: far below rounding, so the derivative is exact to rounding
 
 
@@ -546,7 +546,7 @@ def responses_at(design: np.void, x: np.ndarray, y: np.ndarray) -> tuple[np.ndar
     if design["frozen_alpha"]:
         y = y.copy()
         y[:, ALPHA] = design["y0"][ALPHA]
-    blocks = [slice(k, k + BLOCK) for k in range(0, len(x), BLOCK)]  # of a long flight: memory
+    blocks = [slice(k, k + _BLOCK) for k in range(0, len(x), _BLOCK)]  # of a long flight: memory
     f, G = zip(*(_split(design, x[rows].T, y[rows].T) for rows in blocks), strict=True)
     return np.concatenate(f, axis=-1).T, np.moveaxis(np.concatenate(G, axis=-1), -1, 0)
 

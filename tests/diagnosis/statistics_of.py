@@ -32,7 +32,7 @@ class Across:
         record, bound = fdi["statistical"], fdi["bound"]
         views, tests = views_of(record), record["test"]
         parity.turn_views(views, record["forces"], record["gust"], bound, G, Gu)
-        parts = (record[name] for name in ("noise", "block", "forces", "gust", "vaneless"))
+        parts = (record[name] for name in ("noise", "block", "forces", "gust", "gust", "vaneless"))
         parity.project_innovation(views, int(tests["regress"]), *parts, innovation, y[2])
         parity.update_views(views, tests, record["tone_test_config"], y, fdi["config"]["dt"], frame, latched)
 

@@ -101,6 +101,17 @@ def test_a_frozen_accelerometer_is_no_flap(seed):
     assert "flap" not in flight.metrics["isolation"]["names"]
 
 
+@pytest.mark.parametrize("sensor", ["ay", "az"])
+def test_no_alarm_rests_on_accelerometers_in_doubt(sensor):
+    """Before any alarm, a flight with a broken one differs by the monitor's own test alone."""
+    noise = {"type": "noise", "sensor": sensor, "magnitude": 0.3}
+    broken = scenario(noise, seed=12).with_({"fdi.fault_class": "all", "duration_s": 8.0})
+    found, sound = (bf.fly(each).log for each in (broken, broken.with_({"faults": []})))
+    assert found["detected"].max() == 0.0
+    other = [name for name in found if not np.array_equal(found[name], sound[name], equal_nan=True)]
+    assert other == ["watch_share"]
+
+
 BROKEN = [(gyro, size) for gyro in "pqr" for size in (0.5, 2.0)] + [("alpha", 2.0), ("beta", 2.0)]
 
 

@@ -463,19 +463,21 @@ def turn_views(views, forces, gust, bound, G, Gu):
 
 
 @kernel
-def project_innovation(views, with_Z, noise, blocks, forces, gust, inertial, nu, V):
+def project_innovation(views, with_Z, noise, blocks, forces, gust, vaned, inertial, nu, V):
     """Project the innovation nu (3,) rad/s2 on the direction of each view, into `nu` of its block.
 
-    Fill the noise too, and, if with_Z, the regressors of constant errors; V m/s.
+    Fill the noise too, and, if with_Z, the regressors of constant errors; V m/s. gust: that of the rates;
+    vaned: that of views which a confirmer confirms.
     """
     for view in views:
         if not view.used:
             continue
-        fill_view_noise(view, noise, blocks, forces, gust, inertial, V)
+        of_view = vaned if view.confirmer > 0 else gust
+        fill_view_noise(view, noise, blocks, forces, of_view, inertial, V)
         m, col, nu_m, nu_col = view.direction, view.col, 0.0, 0.0
         for i in range(m.size):
             if m[i] != 0.0 or col[i] != 0.0:
-                nu_i = view_innovation(view, forces, gust, inertial, nu, i)
+                nu_i = view_innovation(view, forces, of_view, inertial, nu, i)
                 nu_m += m[i] * nu_i
                 nu_col += col[i] * nu_i
         view.block.nu[0] = nu_m
@@ -647,7 +649,8 @@ def configure_parity_views(stat: np.void, aircraft: Aircraft) -> None:
     directions = list(list_directions(aircraft, bool(forces["in_use"])))
     stat["n_views"] = min(len(directions), len(stat["views"]))
     for view, d in zip(stat["views"], directions, strict=False):
-        if subtracts and d.uses_vane_gust:
+        may_alarm = d.nulled == AXIS_VIEW  # and no alarm rests on accelerometers that may break
+        if subtracts and d.uses_vane_gust and not (may_alarm and stat["vaned"]["output"]["gusty"]):
             view["confirmer"] = NORMAL_FORCE if d.plane_pair == PITCH_PLANE else SIDE_FORCE
         _configure_view(view, d, gusty)
         rates = stat["block"][PITCH_BLOCK if d.plane_pair == PITCH_PLANE else LATERAL_BLOCK]

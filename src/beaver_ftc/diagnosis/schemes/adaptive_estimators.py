@@ -339,7 +339,7 @@ def update_tests(fdi, prediction, measured, k, t):
             sensor_monitor.rule_out_gyros(fdi.sensor_monitor)
     parity.turn_views(views, force, view_gust, fdi.bound, means.G_old, means.Gu_old)
     parity.project_innovation(
-        views, cfg.regress, stat.noise, blocks, force, view_gust, vaneless, nu, y[AIRSPEED]
+        views, cfg.regress, stat.noise, blocks, force, gust, view_gust, vaneless, nu, y[AIRSPEED]
     )
     parity.update_views(views, cfg, stat.tone_test_config, y, dt, k, alarmed)
     bounded = fdi.bound.error_map.outside == 0

@@ -116,7 +116,7 @@ def filter_all(block, innovations, dt, out):
 
 
 @kernel
-def weigh_all(block, innovations, signatures, regressors, first, keep, uses_regressors, dt):
+def weigh_all(block, innovations, signatures, regressors, first, keep, dt):
     """Show a block frames `first` onwards: innovations (k, n), signatures (k, h, 2), regressors (k, j, 2)."""
     for k in range(len(innovations)):
         if keep == 1.0:
@@ -128,20 +128,20 @@ def weigh_all(block, innovations, signatures, regressors, first, keep, uses_regr
             likelihood.whiten_step(block, block.x_Z[j], regressors[k, j], dt, block.g_Z[j])
         for h in range(block.n_h):
             block.hypothesis[h].signature[:] = signatures[k, h]
-        likelihood.accumulate_evidence(block, uses_regressors, dt, keep)
+        likelihood.accumulate_evidence(block, dt, keep)
         likelihood.evaluate_hypotheses(block)
 
 
 @kernel
 def bounded_all(block, d, signatures, onset, dt):
     """Show a block an uncertainty d (k, n) up to 0.02 rad/s2, and from `onset` on signatures (k, h, n)."""
-    bounded = np.full(3, 0.02)
+    block.eta[:] = 0.02
     for k in range(len(d)):
         likelihood.advance_covariance(block, dt)
         block.nu[: block.n] = d[k]
         likelihood.whiten_step(block, block.state, block.nu, dt, block.g)
         for h in range(block.n_h):
             block.hypothesis[h].signature[: block.n] = signatures[k, h]
-        likelihood.bound_responses(block, bounded, dt)
+        likelihood.bound_responses(block, dt)
         if k >= onset:
-            likelihood.accumulate_evidence(block, False, dt, 1.0)
+            likelihood.accumulate_evidence(block, dt, 1.0)

@@ -295,7 +295,8 @@ def add_whitened_frames(blocks, inputs, drift, jitter, bounded, foreseen, keep, 
             for j in range(block.n):
                 block.P_dd[i, j] += drift[k, i, j]
         advance_block(block, dt)
-        response_of_block(block, bounded[k], dt)
+        block.eta[:] = bounded[k]
+        response_of_block(block, dt)
         for c in range(len(states)):
             whiten_frame(block, states[c], inputs[k, c], dt, g[c])
         room[2] = 0.0

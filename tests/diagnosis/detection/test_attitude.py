@@ -39,9 +39,7 @@ def compared(gyro_error, fault):
         nu = (x + e - read) / DT_S + D @ read
         att["turn"] = -DT_S * e_before
         blocks[0]["nu"][0], blocks[1]["nu"] = nu[1], nu[[0, 2]]
-        compare_attitude(
-            att.view(np.recarray)[0], blocks.view(np.recarray), np.zeros(3), False, read, DT_S, True
-        )
+        compare_attitude(att.view(np.recarray)[0], blocks.view(np.recarray), np.zeros(3), read, DT_S, True)
         found.append((float(att["score"][0]), int(att["gyro"][0])))
     return np.array(found).T
 

@@ -33,7 +33,7 @@ def _shown(block, nu, signatures, regressors=None, first=0, keep=1.0):
     known = np.zeros((frames, int(block["n_Z"]), 2))
     if regressors is not None:
         known[:, :, :n] = regressors
-    weigh_all(block, nu, wide, known, first, keep, regressors is not None, DT)
+    weigh_all(block, nu, wide, known, first, keep, DT)
     return block
 
 
@@ -127,7 +127,7 @@ def _largest_share(block, innovations, moments, shown=None):
         block["nu"][0], block["hypothesis"][0]["signature"][0] = nu, moment
         if block["calm"]["n"]:
             likelihood.whiten_calm(block, FRAME_S)
-        likelihood.update_block(block, np.zeros(3), False, FRAME_S, 1.0)
+        likelihood.update_block(block, FRAME_S, 1.0)
         most = max(most, block["hypothesis"][0]["score"])
     return most
 

@@ -10,7 +10,7 @@ from beaver_ftc.design.fdc import MASS
 from beaver_ftc.design.model import AXES
 from beaver_ftc.diagnosis.detection import likelihood, statistical
 from beaver_ftc.diagnosis.detection.likelihood import N_SLOTS
-from beaver_ftc.diagnosis.detection.parity import fill_block_signatures
+from beaver_ftc.diagnosis.detection.rows import RATES
 from beaver_ftc.loop.assembly import configure_design
 from beaver_ftc.plant.instruments import MEASURED
 from beaver_ftc.scenario.declared import Declared
@@ -44,7 +44,7 @@ class Detector:
         self.detector = self.fdi["statistical"]
         measured = np.zeros(1, MEASURED)[0]
         measured["x"], measured["y"][:5] = LEVEL_FLIGHT[:2]
-        parts = (self.detector[name] for name in ("test", "noise", "block", "gust"))
+        parts = (self.detector[name] for name in ("test", "noise", "rows", "block", "gust"))
         statistical.prepare_tests(*parts, self.fdi["bound"], design, measured, LEVEL_FLIGHT[2], self.dt)
         self.frame = 0
 
@@ -74,9 +74,11 @@ def watch_all(detector, innovations, Gu, cubic, first, renew, dt, scores):
     """The frames of a flight without one: innovations (k, 3), Gu (k, 3, 4) rad/s2, cubic (k,)."""
     for k in range(len(innovations)):
         blocks, alarm, tests = detector.block, detector.alarm, detector.test
-        fill_block_signatures(blocks, Gu[k], cubic[k])
-        bounded, still = detector.noise.eta, detector.gust
-        statistical.update_blocks(tests, bounded, blocks, still, innovations[k], dt, first + k, 0)
+        rows, still = detector.rows, detector.gust
+        rows.per_cubed = cubic[k]
+        for i in range(3):
+            rows.nu[RATES, i], rows.Gu[:4, i] = innovations[k, i], Gu[k, i]
+        statistical.update_blocks(tests, rows, blocks, still, dt, first + k, 0)
         views = detector.views[: detector.n_views]
         statistical.update_alarm(alarm, tests, blocks, views, detector.forces, still, (first + k) * dt)
         scores[k] = alarm.ratio

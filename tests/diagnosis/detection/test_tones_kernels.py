@@ -33,7 +33,7 @@ def view(rng):
         block["noise_share"],
     ) = 1, 3, 1.0, 0.5
     block["S_inv"][0, 0], block["K_x"][0, 0], block["K_d"][0, 0] = 4.0, 0.3, 0.8
-    block["tol"][:3], view["eta"] = rng.uniform(0.1, 0.2, 3), 0.05
+    block["tol"][:3], block["eta"] = rng.uniform(0.1, 0.2, 3), 0.05
     return view
 
 
@@ -44,14 +44,12 @@ def tone_test_config():
     return tone_test_config
 
 
-def listen(
-    view, tone_test_config, samples, regressors=None, heard=True, uses_regressors=False, alarm_level=6.0
-):
+def listen(view, tone_test_config, samples, regressors=None, heard=True, alarm_level=6.0):
     for k, sample in enumerate(samples):
         view["block"]["g"][0] = sample
         if regressors is not None:
             view["block"]["g_Z"][:3, 0] = regressors[k]
-        parity.update_tones(view, tone_test_config, alarm_level, heard, uses_regressors, DT)
+        parity.update_tones(view, tone_test_config, alarm_level, heard, DT)
 
 
 @pytest.mark.parametrize(("K_x", "K_d", "keep"), [(0.3, 0.8, 1.0), (0.05, 0.02, 1.0), (0.2, 0.5, 0.95)])
@@ -104,7 +102,7 @@ def test_no_periodic_uncertainty_of_that_pace_is_heard_louder(steps, x):
 
 @pytest.mark.parametrize("frequency_rad_s", [1.0, 3.9, 9.6, 13.0])
 def test_a_tone_is_heard_on_the_grid_and_between(view, tone_test_config, frequency_rad_s):
-    view["eta"] = 0.0
+    view["block"]["eta"] = 0.0
     samples = 0.5 * 0.8 * np.cos(frequency_rad_s * DT * np.arange(1000) + 1.0)  # 0.8 standard deviations
     listen(view, tone_test_config, samples, alarm_level=LEVEL)
     whole = (

@@ -112,7 +112,7 @@ def add_turn(att, i, turn):
 
 
 @kernel
-def compare_attitude(att, blocks, eta, with_Z, x, dt, detected):
+def compare_attitude(att, blocks, eta, x, dt, detected):
     """Advance the comparison by a frame of dt s that the blocks have whitened.
 
     eta (3,) rad/s2: bound of the uncertainty; x (3,) rad/s: measured rates. `score` and `gyro` are filled if
@@ -122,7 +122,7 @@ def compare_attitude(att, blocks, eta, with_Z, x, dt, detected):
     att.xi[:] = att.s[:, 1]
     for i in range(3):
         blk = blocks[PITCH_BLOCK if i == 1 else LATERAL_BLOCK]
-        advance_axis(att, i, blk, i // 2, eta[i], with_Z, dt, detected)
+        advance_axis(att, i, blk, i // 2, eta[i], dt, detected)
     att.score, att.gyro = 0.0, -1
     if detected or max(att.turn_score[0], att.turn_score[1], att.turn_score[2]) > 1.0:
         fill_score(att, blocks)
@@ -168,10 +168,10 @@ def find_gyro(att):
 
 
 @kernel
-def advance_axis(att, i, blk, row, eta, with_Z, dt, detected):
+def advance_axis(att, i, blk, row, eta, dt, detected):
     """Advance filter, responses and sums of axis i, in this row of its block; N, M and R_j if `detected`."""
     K0, K1, K2, S = advance_P(att, i, blk, row, dt)
-    D, a, n = att.D[i, i], blk.a, blk.n_Z if with_Z else 0
+    D, a, n = att.D[i, i], blk.a, blk.n_Z
     att.n[i] = n + N_FURTHER
     att.A[i] += att.turn[i]
     att.turn[i] = 0.0

@@ -88,7 +88,8 @@ from beaver_ftc.diagnosis.state import LOSS
 PITCH_BLOCK, LATERAL_BLOCK, REVERTING_BLOCK = 0, 1, 2
 N_FILTER_BLOCKS = 3
 N_SLOTS = 10
-N_INPUT_READINGS = 5  # alpha, beta, airspeed, dynamic pressure, engine power: statistical.py
+N_INPUT_READINGS = 5  # alpha, beta, airspeed, dynamic pressure, engine power: rows.py
+N_ROWS = 5  # roll, pitch, yaw, side force, normal force: rows.py
 USUAL_HYPOTHESES = 8  # of a block of the rates of most aircraft: three losses, and the alternatives to them
 MIN_ETA_RAD_S2 = 1e-3  # lower limit of the bound that sets the drift: the bound may pass zero
 STEP_FAULT, ALPHA_CUBED_MOMENT, GROWING_LOSS, LOSS_END = 2, 3, 4, 5  # further kinds of hypothesis
@@ -165,6 +166,9 @@ def block_dtype(size: BlockCapacity) -> np.dtype:
     return record(
         axes=(int, 2),  # first: a record that begins as another does is taken for one
         **_FILTER_FIELDS,
+        # what is subtracted from the rows that it sees, and its directions; bound on the uncertainty there,
+        # rad/s2, and whether it holds wherever one surface may be: rows.py
+        source=int, m=(2, N_ROWS), eta=2, any_position=int,
         # length of the drift's memory, m, 0 for none; factor on the intensity of a gust
         drift_correlation_length_m=float, Q_scale=float,
         x_known=4, nu=2,  # state of the filter after known faults
@@ -172,8 +176,8 @@ def block_dtype(size: BlockCapacity) -> np.dtype:
         has_coarse=int, g_c=2, x_c=4,  # whether vanes show a gust roughly; state of its filter
         # alarm level, standard deviations; share of it reserved for noise beyond a bounded uncertainty
         alarm_level=float, noise_share=float, eta_rate=float, eta_0=2, eta_r=2,
-        n_Z=int, tol=size.max_regressors, regressor=(size.max_regressors, 2),
-        x_Z=(size.max_regressors, 4), g_Z=(size.max_regressors, 2),
+        n_Z=int, columns=(int, size.max_regressors), tol=size.max_regressors,
+        regressor=(size.max_regressors, 2), x_Z=(size.max_regressors, 4), g_Z=(size.max_regressors, 2),
         n_h=int, hypothesis=(HYPOTHESIS_RECORD, size.max_hypotheses),
         tests=(TESTS_RECORD, n_groups),
         R=(n_groups, size.max_regressors, N_GROUP_TESTS),
@@ -354,8 +358,8 @@ def reset_slot(b, slot):
 
 
 @kernel
-def bound_responses(b, eta, dt):
-    """Fill `eta_0` = eta_bar |g_0| and `eta_r` = eta_bar RINGING |K_d^-1|, (2,); eta (3,) rad/s2: eta_bar.
+def bound_responses(b, dt):
+    """Fill `eta_0` = eta |g_0| and `eta_r` = eta RINGING |K_d^-1|, (2,).
 
     g_0 = dt (1 - a) / (K_x (1 - a) + dt K_d)      K_d^-1: cofactors c over det
     """
@@ -365,10 +369,10 @@ def bound_responses(b, eta, dt):
         b.eta_0[i] = b.eta_r[i] = 0.0
         for j in range(b.n):
             c = 1.0 if b.n == 1 else (K_d[1 - i, 1 - i] if i == j else K_d[i, j])
-            b.eta_r[i] += RINGING_FACTOR * abs(c / det) * eta[b.axes[j]]
+            b.eta_r[i] += RINGING_FACTOR * abs(c / det) * b.eta[j]
         if lost > 0.0:
             g_0 = dt * lost / (b.K_x[i, i] * lost + dt * K_d[i, i])
-            b.eta_0[i] = g_0 * eta[b.axes[i]]
+            b.eta_0[i] = g_0 * b.eta[i]
 
 
 @kernel
@@ -457,18 +461,14 @@ def accumulate_regressors(b, t, R, n, decay):
 
 
 @kernel
-def accumulate_evidence(b, with_Z, dt, decay):
-    """Add the frame just whitened to the sums of every hypothesis and onset; earlier sums decay by `decay`.
-
-    with_Z: whether the regressors count; dt s.
-    """
+def accumulate_evidence(b, dt, decay):
+    """Add the frame just whitened to the sums of every hypothesis and onset; earlier ones decay."""
     for h in range(b.n_h):
         update_signatures(b.hypothesis[h], b.tests[h // GROUP_SIZE], (h % GROUP_SIZE) * N_SLOTS)
     for i in range(n_test_groups(b.n_h)):
         t, n = b.tests[i], tests_in_group(b, i)
         accumulate_tests(b, t, n, dt, decay)
-        if with_Z:
-            accumulate_regressors(b, t, b.R[i], n, decay)
+        accumulate_regressors(b, t, b.R[i], n, decay)
 
 
 @kernel
@@ -565,23 +565,22 @@ def evaluate_hypotheses(b, decay=0.0, mapped=False):
 
 
 @kernel
-def update_block(b, eta, with_Z, dt, decay, hi_decay=0.0, mapped=False):
+def update_block(b, dt, decay, hi_decay=0.0, mapped=False):
     """Update a block with one frame of the innovation nu: whiten it and test every hypothesis; dt s.
 
-    Noise, drift, signatures and, if with_Z, regressors are those of the frame. eta: see `bound_responses`;
-    decay: `accumulate_evidence`; hi_decay and mapped: `evaluate_hypotheses`.
+    Noise, bound, drift, signatures and regressors are those of the frame. decay:
+    `accumulate_evidence`; hi_decay and mapped: `evaluate_hypotheses`.
     """
     advance_covariance(b, dt)
     if b.alarm_level > 0.0:
-        bound_responses(b, eta, dt)
+        bound_responses(b, dt)
     whiten_step(b, b.state, b.nu, dt, b.g)
     if b.calm.n > 0:
         update_calm_part(b, dt)
     if b.has_coarse:
         whiten_step(b, b.x_c, b.g_c, dt, b.g_c)
-    if with_Z:
-        whiten_regressors(b, dt)
-    accumulate_evidence(b, with_Z, dt, decay)
+    whiten_regressors(b, dt)
+    accumulate_evidence(b, dt, decay)
     evaluate_hypotheses(b, hi_decay, mapped)
 
 

@@ -52,12 +52,11 @@ N are normal. With v the larger of their variances, |N| / sqrt(v) exceeds x with
 The sums are updated once per TONE_INTERVAL_S: no frequency of the grid changes its phase much in that
 time.
 
-Letters of the kernels, in addition to those of likelihood.py: i and k are an axis or a force, j a regressor;
-in the tests of tones k is a frequency, t their record, c their configuration.
+Letters of the kernels, in addition to those of likelihood.py and rows.py: in the tests of tones k is a
+frequency, t their record, c their configuration.
 
-    m, col      direction of a view and g / |g|, (5,): roll, pitch, yaw, side force, normal force
-    b, f        block of a view; record of a force; `rates`: block of the rates that the view combines
-    nu          innovation of the rates (3,), rad/s2
+    m, col      direction of a view and g / |g|, (5,)
+    b, f        block of a view; record of a force
     L           acceleration per rad/s of rotation of the air, 1/s
     N, R        sums as above, (N_TONES,) and (n_Z, N_TONES) complex
     z, rho      exp(i w dt); exp((i w - 1 / T) dt) of an update; rho2: of 2 w
@@ -71,7 +70,7 @@ from typing import NamedTuple
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.aircraft.schema import MAX_TERMS_OF_ONE
+from beaver_ftc.aircraft.schema import MAX_SURFACES, MAX_TERMS_OF_ONE
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA
 from beaver_ftc.diagnosis.bounds import moment_axis
@@ -92,6 +91,16 @@ from beaver_ftc.diagnosis.detection.likelihood import (
     USUAL_HYPOTHESES,
     BlockCapacity,
     evidence_ratio,
+)
+from beaver_ftc.diagnosis.detection.rows import (
+    INERTIAL,
+    RAW,
+    VANED,
+    VANELESS,
+    add_turn,
+    look,
+    seen,
+    set_columns,
 )
 from beaver_ftc.diagnosis.gusts import project_gust, view_drift
 from beaver_ftc.diagnosis.state import LOSS, NORMAL_FORCE, PITCH, ROLL, SIDE_FORCE, YAW
@@ -143,28 +152,27 @@ def within_limits(c, y):
 
 
 @kernel
-def update_tones(view, c, level, inside, with_Z, dt):
+def update_tones(view, c, level, inside, dt):
     """Update the tests of tones of a view with one frame, which the view's block has whitened; dt s.
 
-    level: alarm level of the detector, standard deviations. with_Z: whether the regressors count. Unless
-    `inside`, the frame counts as zero, so the sums decay.
+    level: alarm level of the detector, standard deviations. Unless `inside`, the frame counts as zero, so the
+    sums decay.
     """
     t, b = view.tones, view.block
-    n_Z = b.n_Z if with_Z else 0
     weight = np.sqrt(b.S_inv[0, 0]) if inside else 0.0
     t.sum_g += weight * b.g[0]
-    for j in range(n_Z):
+    for j in range(b.n_Z):
         t.sum_Z[j] += weight * b.g_Z[j, 0]
     t.n_new += 1
     if t.n_new < c.stride:
         return
     resonate(t.N, c.rho, t.sum_g)
-    for j in range(n_Z):
+    for j in range(b.n_Z):
         resonate(t.R[j], c.rho, t.sum_Z[j])
         t.sum_Z[j] = 0.0
     t.D = c.a * c.a * t.D + t.n_new
-    update_tone_eta(t, c, b, weight * view.eta[0], dt)
-    bound_coefficients(t, b.tol, n_Z)
+    update_tone_eta(t, c, b, weight * b.eta[0], dt)
+    bound_coefficients(t, b.tol, b.n_Z)
     score_tones(t, c, level)
     t.sum_g, t.n_new = 0.0, 0
 
@@ -253,7 +261,6 @@ def configure_tones(c: np.void, false_alarm: float, V: float, rate: float, dt: f
     c["v_share"] = 0.5 + 0.5 * (1.0 - a**2) / np.abs(1.0 - (a * z**stride) ** 2)
 
 
-VANE_TOLERANCE = 0.1  # relative error of the effect of a vane's error: its column is that of the trim
 PEAK_MEMORY_RATIO = 5.0  # time constant of `peak` over the one with which evidence is forgotten
 MIN_FORCE_PART = 0.9  # component of a direction of length 1, above which a view counts as one of the force
 MIN_NORM_SHARE = 0.1  # least length that the errors leave of a column, as a share of its length
@@ -261,8 +268,9 @@ PITCH_PLANE = (PITCH, NORMAL_FORCE)
 ROLL_YAW_PLANE = (ROLL, YAW)
 YAW_PLANE = (YAW, SIDE_FORCE)
 
-# Values of `nulled` in a view without one: a view of an axis; one across the column of an error of a vane.
-AXIS_VIEW, VANE_VIEW = -1, -2
+# Values of `nulled` besides a surface: a view of an axis; one across the column of an error of the side vane,
+# of the other vane.
+AXIS_VIEW, VANE_VIEW = -1, MAX_SURFACES
 
 
 class StatisticalSize(NamedTuple):
@@ -282,207 +290,90 @@ USUAL_SIZE = StatisticalSize(BlockCapacity(23, USUAL_HYPOTHESES), BlockCapacity(
 def view_dtype(size: BlockCapacity) -> np.dtype:
     """A view whose block has these capacities."""
     return record(
-        # whose column the direction is orthogonal to, or AXIS_VIEW, or VANE_VIEW
-        nulled=int,
+        nulled=int,  # whose column of `rows.G` the direction is orthogonal to, or AXIS_VIEW
         alarm_axis=int,  # reported with an alarm of this view
-        direction=5, col=5,  # m and g / |g|: roll, pitch, yaw, side force, normal force
-        plane_pair=(int, 2),  # the two components that the column has
-        across_gust=int,  # whether m is orthogonal to the rolling gust as well
-        always_Z=int,  # whether regressors count in this view even if they do in no other block
-        by_inertia=int,  # whether the force is that at the flow angle from inertial motion
-        vane_free=int,  # whether an error of a vane does not appear in this view
+        places=(int, 3), col=5,  # the rows that it combines, or -1; g / |g|
+        by_force=int,  # whether it sees a force
         confirmer=int,  # force of the views that confirm this one; 0 if no vane is used
         # of this frame: whether the view is used; which share of nu along the column leaks into it
         used=int, leak=float,
-        eta=1,  # bound on the uncertainty along m, rad/s2
-        # effect of the air's rotation about the body axes, 1/s
-        L_rate=3, L_force=3,
+        L_rate=3, L_force=3,  # effect of the air's rotation about the body axes, 1/s
         peak=float,  # largest score, decaying slowly
         block=likelihood.block_dtype(size), tones=tones_dtype(size.max_regressors),
     )  # fmt: skip
 
 
 @kernel
-def view_innovation(view, forces, gust, inertial, nu, i):
-    """Component i of the innovation that a view projects, rad/s2: of the rates, nu (3,), or of a force."""
-    if i < SIDE_FORCE:
-        own = inertial if view.vane_free else gust
-        return nu[i] - (own.output.acc_mean[i] if subtracts_gust(view, gust) else 0.0)
-    f = forces.component[i - SIDE_FORCE]
-    return f.e_inertial if view.by_inertia else f.innovation
+def turn_view(view, rows, gust):
+    """Turn a view across the column g of what it nulls: of a surface, or of an error of a vane.
 
+        m = g x q / |g x q|      col = g / |g|      on the rows i, k, j of `places`
 
-@kernel
-def column_entry(view, forces, bound, G, place):
-    """Entry 0 or 1 (place) of the column in a view's plane and the bound on its error, rad/s2 per rad."""
-    i, s = view.plane_pair[place], view.nulled
-    if s == VANE_VIEW:
-        g = forces.component[view.plane_pair[1] - SIDE_FORCE].vane[place]
-        return g, VANE_TOLERANCE * abs(g)
-    if i >= SIDE_FORCE:
-        f = forces.component[i - SIDE_FORCE]
-        return f.G_prev[s], f.e_G[s]
-    return G[i, s], bound.eG[i, s] if bound.has_eG else 0.0
-
-
-@kernel
-def turn_view(view, forces, gust, bound, G):
-    """Fill `direction` m and `col` (5,) of a view across a column g of G (3, n) rad/s2 per rad.
-
-        m = (-g_j, g_i) / |g|      col = g / |g|
-
-    Returns the share of the innovation along the column that errors e of the column let leak into the view,
-    (|m_i| e_i + |m_j| e_j) / (|g| - |m_j| e_i - |m_i| e_j).
+    q: the effect of the rolling gust on i and k, 1/s, or, without a row k, along the place of k. Returns the
+    share of the innovation along g that errors e of g let leak into the view, |m|' e / (|g| - |col|' e).
     """
-    if view.across_gust:
-        return turn_vane_view(view, forces, gust)
-    i, j = view.plane_pair[0], view.plane_pair[1]
-    g_i, e_i = column_entry(view, forces, bound, G, 0)
-    g_j, e_j = column_entry(view, forces, bound, G, 1)
-    norm = np.sqrt(g_i * g_i + g_j * g_j)
-    if norm == 0.0:
-        return 0.0
-    c, s = g_i / norm, g_j / norm
-    view.direction[i], view.direction[j] = -s, c
-    view.col[i], view.col[j] = c, s
-    c, s = abs(c), abs(s)
-    return (s * e_i + c * e_j) / max(norm - (c * e_i + s * e_j), MIN_NORM_SHARE * norm)
-
-
-@kernel
-def turn_vane_view(view, forces, gust):
-    """Fill `direction` m and `col` of a view across two vectors; return the share that leaks, as `turn_view`.
-
-        m = b x q / |b x q|      col = b / |b|      in (p: roll, r: yaw, Y: side force)
-
-    b: column of an error of the side vane, rad/s2 per rad; q: effect of the rolling gust on the rates, 1/s.
-    """
-    f, C, L = forces.component[0], gust.output.C, gust.output.rate_damping
-    b_p, b_r, b_Y = f.vane_roll, f.vane[0], f.vane[1]
-    q_p, q_r = project_gust(L[ROLL], C, 0), project_gust(L[YAW], C, 0)
-    m_p, m_r, m_Y = -b_Y * q_r, b_Y * q_p, b_p * q_r - b_r * q_p
-    norm_m = np.sqrt(m_p * m_p + m_r * m_r + m_Y * m_Y)
+    m, col, c, e, e_col = view.block.m[0], view.col, view.nulled, 0.0, 0.0
+    i, k, j = view.places[0], view.places[1], view.places[2]
+    g_i, g_k, g_j, q_i, q_k = rows.G[c, i], 0.0, rows.G[c, j], 0.0, 1.0
+    if k >= 0:
+        L, C = gust.output.rate_damping, gust.output.C
+        g_k, q_i, q_k = rows.G[c, k], project_gust(L[i], C, 0), project_gust(L[k], C, 0)
+    m_i, m_k, m_j = -g_j * q_k, g_j * q_i, g_i * q_k - g_k * q_i
+    norm, norm_m = np.sqrt(g_i * g_i + g_k * g_k + g_j * g_j), np.sqrt(m_i * m_i + m_k * m_k + m_j * m_j)
     if norm_m == 0.0:
         return 0.0
-    norm_b = np.sqrt(b_p * b_p + b_r * b_r + b_Y * b_Y)
-    e = 0.0
-    for i, b_i, m_i in ((ROLL, b_p, m_p), (YAW, b_r, m_r), (SIDE_FORCE, b_Y, m_Y)):
-        view.direction[i] = m_i / norm_m
-        view.col[i] = b_i / norm_b
-        e += VANE_TOLERANCE * abs(view.direction[i] * b_i)
-    return e / ((1.0 - VANE_TOLERANCE) * norm_b)
+    for r, g_r, m_r in ((i, g_i, m_i), (k, g_k, m_k), (j, g_j, m_j)):
+        if r >= 0:
+            m[r], col[r] = m_r / norm_m, g_r / norm
+            e += abs(m[r]) * rows.e_G[c, r]
+            e_col += abs(col[r]) * rows.e_G[c, r]
+    return e / max(norm - e_col, MIN_NORM_SHARE * norm)
 
 
 @kernel
-def subtracts_gust(view, gust):
-    """True if the gust estimate is subtracted from a view: the measured force separates it from faults."""
-    return view.confirmer > 0 and gust.output.uses_accelerometers == 1
+def fill_view_drift(view, q, gust, own, forces, V):
+    """Fill the drift of a view, (rad/s2)2/s, at a speed V m/s.
 
+    It is that of a bounded uncertainty, that of the flow angle from inertial motion, and that of the rotation
+    of the air, by L_rate = m' L and L_force = sum over the forces of m L_f.
 
-@kernel
-def uses_force(view):
-    """True if a view's direction has a component along a force."""
-    return view.direction[SIDE_FORCE] != 0.0 or view.direction[SIDE_FORCE + 1] != 0.0
-
-
-@kernel
-def fill_view_noise(view, noise, blocks, forces, gust, inertial, V):
-    """Fill R_y, Q_x, Q_d and eta of a view from the declared ones, projected on m; V m/s.
-
-    R_y = m^2 R_y      sqrt(Q_x) = |m| sqrt(noise)      eta = |m| eta
-    L_rate = m' L      L_force = sum over the forces of m L_f      Q_d: of the gust, by L_rate and L_force
-
+    q: see NOISE_RECORD. gust: the estimate of the views; own: that which this view subtracts, if any.
     """
-    b, m, L = view.block, view.direction, gust.output.rate_damping
-    R_y, std, eta, Q_d = 0.0, 0.0, 0.0, 0.0
-    view.L_rate[:] = view.L_force[:] = 0.0
-    for i in range(3):
-        R_y += m[i] * m[i] * blocks[PITCH_BLOCK if i == PITCH else LATERAL_BLOCK].R_y[i // 2]
-        std += abs(m[i]) * (np.sqrt(noise.Q[i]) + view.vane_free * forces.gust_noise[i])
-        eta += abs(m[i]) * (noise.eta[i] + noise.eta_free[i])
-        for j in range(3):
-            view.L_rate[j] += m[i] * L[i, j]
+    b, m, L = view.block, view.block.m, gust.output.rate_damping
+    Q_d = q * max(b.eta[0], likelihood.MIN_ETA_RAD_S2) ** 2
     for i, f in enumerate(forces.component):
-        m_i = m[SIDE_FORCE + i]
-        std += abs(m_i) * np.sqrt(f.var[view.by_inertia])
-        eta += abs(m_i) * (f.eta_u * forces.q_ratio + f.e_lag)
-        Q_d += view.by_inertia * (m_i * forces.q_ratio) ** 2 * f.Q_e
-        for j in range(3):
-            view.L_force[j] += m_i * f.L[j] * forces.q_ratio
+        Q_d += (view.block.source == INERTIAL) * (m[0, SIDE_FORCE + i] * forces.q_ratio) ** 2 * f.Q_e
     if gust.output.gusty:
-        subtracted = subtracts_gust(view, gust)
-        own = inertial if subtracted and view.vane_free else gust
-        Q_d += view_drift(own, V, view.L_rate, view.L_force, subtracted)
-        for i in range(3):
-            for j in range(3):
-                b.P_dd[0, 0] += m[i] * m[j] * gust.output.var_turn[i, j]
-    b.R_y[0], b.Q_x[0], view.eta[0] = R_y, std * std, eta
-    b.Q_d[0, 0] = Q_d + noise.q * max(eta, likelihood.MIN_ETA_RAD_S2) ** 2
+        for j in range(3):
+            view.L_rate[j] = m[0, 0] * L[0, j] + m[0, 1] * L[1, j] + m[0, 2] * L[2, j]
+            view.L_force[j] = 0.0
+            for i, f in enumerate(forces.component):
+                view.L_force[j] += m[0, SIDE_FORCE + i] * f.L[j] * forces.q_ratio
+        Q_d += view_drift(own, V, view.L_rate, view.L_force, view.block.source != RAW and forces.in_use == 1)
+        add_turn(b, gust)
+    b.Q_d[0, 0] = Q_d
 
 
 @kernel
-def fill_view_regressors(view, blocks, forces, nu_col):
-    """Fill the regressors of a view: projections of those of the rates' block, of the force, of the leak.
+def look_at_views(views, noise, rows, forces, gust, vaned, vaneless, V):
+    """Bring direction, noise, signatures and regressors of each view to the elapsed frame; V m/s.
 
-    nu_col rad/s2: innovation along the column.
-    """
-    b, m, force = view.block, view.direction, view.plane_pair[1]
-    rates = blocks[PITCH_BLOCK if view.plane_pair[0] == PITCH else LATERAL_BLOCK]
-    n = rates.n_Z
-    for j in range(n):
-        b.regressor[j, 0] = 0.0
-        for i in range(rates.n):
-            b.regressor[j, 0] += m[rates.axes[i]] * rates.regressor[j, i]
-    if force >= SIDE_FORCE and m[force] != 0.0:
-        f = forces.component[force - SIDE_FORCE]
-        for j in range(f.n_Z):
-            b.regressor[n + j, 0] = m[force] * f.regressor[j]
-        n += f.n_Z
-        if view.by_inertia:
-            b.regressor[n, 0] = m[force] * f.e_drift
-            n += 1
-    if view.nulled != AXIS_VIEW:
-        b.regressor[n, 0] = view.leak * nu_col
-
-
-@kernel
-def turn_views(views, forces, gust, bound, G, Gu):
-    """Bring the direction and the signatures of each view to this frame.
-
-    G (3, n) rad/s2 per rad, Gu (3, n) rad/s2: control effectiveness and effect of each surface in the frame.
-    """
-    for f in forces.component:
-        f.eta_u = 0.0
-        for s, du in enumerate(bound.declared_errors.du):
-            f.eta_u += f.G_trim[s] * du
-    for view in views:
-        view.used = not uses_force(view) or (forces.in_use and forces.n_seen == MIN_UPDATES)
-        if view.used:
-            view.leak = turn_view(view, forces, gust, bound, G) if view.nulled != AXIS_VIEW else 0.0
-            fill_view_signatures(view, forces, Gu)
-
-
-@kernel
-def project_innovation(views, with_Z, noise, blocks, forces, gust, vaned, inertial, nu, V):
-    """Project the innovation nu (3,) rad/s2 on the direction of each view, into `nu` of its block.
-
-    Fill the noise too, and, if with_Z, the regressors of constant errors; V m/s. gust: that of the rates;
-    vaned: that of views which a confirmer confirms.
+    gust, vaned, vaneless: the estimates that are subtracted: rows.py.
     """
     for view in views:
+        b, m = view.block, view.block.m[0]
+        view.used = not view.by_force or (forces.in_use and forces.n_seen == MIN_UPDATES)
         if not view.used:
             continue
-        of_view = vaned if view.confirmer > 0 else gust
-        fill_view_noise(view, noise, blocks, forces, of_view, inertial, V)
-        m, col, nu_m, nu_col = view.direction, view.col, 0.0, 0.0
-        for i in range(m.size):
-            if m[i] != 0.0 or col[i] != 0.0:
-                nu_i = view_innovation(view, forces, of_view, inertial, nu, i)
-                nu_m += m[i] * nu_i
-                nu_col += col[i] * nu_i
-        view.block.nu[0] = nu_m
-        if with_Z or view.always_Z:
-            fill_view_regressors(view, blocks, forces, nu_col)
+        of_view = gust if b.source == RAW else vaned
+        view.leak = turn_view(view, rows, of_view) if view.nulled != AXIS_VIEW else 0.0
+        look(b, rows)
+        if view.nulled != AXIS_VIEW and b.n_Z > 0:
+            b.regressor[b.n_Z - 1, 0] = 0.0
+            for r in range(m.size):
+                b.regressor[b.n_Z - 1, 0] += view.leak * view.col[r] * rows.nu[b.source, r]
+        own = vaneless if b.source >= VANELESS and forces.in_use else of_view
+        fill_view_drift(view, noise.q, of_view, own, forces, V)
 
 
 @kernel
@@ -497,24 +388,18 @@ def update_views(views, cfg, c, y, dt, k, latched):
             continue
         if not latched:
             likelihood.reset_slot(view.block, slot)
-        with_Z = cfg.regress or view.always_Z
-        likelihood.update_block(view.block, view.eta, with_Z, dt, decay)
-        if not view.by_inertia:  # the error of the integrated angle oscillates with the aircraft's own modes
-            update_tones(view, c, cfg.alarm_level, inside, with_Z, dt)
+        likelihood.update_block(view.block, dt, decay)
+        if (
+            view.block.source != INERTIAL
+        ):  # the error of the integrated angle oscillates with the aircraft's own modes
+            update_tones(view, c, cfg.alarm_level, inside, dt)
         view.peak = max((1.0 - (1.0 - cfg.forget) / PEAK_MEMORY_RATIO) * view.peak, view_score(view))
 
 
 @kernel
-def changes_view(view, forces, s, column):
-    """True if a fault of surface s, with this column (3,) of G, changes the projection of a view."""
-    if view.nulled == s:
-        return False
-    m, effect = view.direction, 0.0
-    for i in range(3):
-        effect += m[i] * column[i]
-    for j in range(2):
-        effect += m[SIDE_FORCE + j] * forces.component[j].G[s]
-    return effect != 0.0
+def changes_view(view, rows, s):
+    """True if a fault of surface s changes the projection of a view."""
+    return view.nulled != s and seen(view.block.m, 0, rows.G, s) != 0.0
 
 
 @kernel
@@ -527,20 +412,20 @@ def view_score(view):
 
 
 @kernel
-def confirmed_score(view, views, cfg, forces, gust):
+def confirmed_score(view, views, cfg, forces):
     """The score of a view, limited by the views that confirm that it is not an error of a vane.
 
-    A view of the rates alone needs no confirmation: no error of a vane changes the rates alone. Peak scores
-    are compared because the view and its confirmation may reach their levels at different times. The
-    confirming view must reach the level of the isolation, sqrt(2 margin).
+    A view of the rates alone from which no gust is subtracted needs no confirmation: no error of a vane
+    changes the rates alone. Peak scores are compared because the view and its confirmation may reach their
+    levels at different times. The confirming view must reach the level of the isolation, sqrt(2 margin).
     """
-    if uses_force(view) and not forces.in_use:
+    if view.by_force and not forces.in_use:
         return 0.0
-    if view.vane_free or not (uses_force(view) or subtracts_gust(view, gust)):
+    if view.block.source != VANED or not forces.in_use:
         return view_score(view)
     peak = 0.0
     for other in views:
-        if other.vane_free and other.plane_pair[1] == view.confirmer:
+        if other.block.source >= VANELESS and other.places[2] == view.confirmer:
             peak = max(peak, other.peak)
     return min(view.peak, peak * cfg.alarm_level / np.sqrt(2.0 * cfg.margin))
 
@@ -552,20 +437,20 @@ def view_alarm_score(view, views, cfg, forces, gust):
     Views raise it only where no block of the rates tests: for an oscillation about an axis, and for a
     force, if accelerometers cannot break.
     """
-    if view.nulled == AXIS_VIEW and not view.by_inertia:
-        return view.tones.score
-    by_force = view.plane_pair[1] >= SIDE_FORCE and abs(view.direction[view.plane_pair[1]]) > MIN_FORCE_PART
-    if view.nulled >= 0 and by_force and gust.output.uses_accelerometers == 1:
-        return confirmed_score(view, views, cfg, forces, gust)
+    if view.nulled == AXIS_VIEW:
+        return view.tones.score if view.block.source != INERTIAL else 0.0
+    of_force = view.by_force and abs(view.block.m[0, view.places[2]]) > MIN_FORCE_PART
+    if of_force and view.block.source == VANED and gust.output.uses_accelerometers == 1:
+        return confirmed_score(view, views, cfg, forces)
     return 0.0
 
 
 @kernel
-def views_exclude(views, cfg, forces, gust, s, column):
-    """True if a view detects a signal that no fault of surface s, with this column (3,) of G, can cause."""
+def views_exclude(views, cfg, forces, rows, s):
+    """True if a view detects a signal that no fault of surface s can cause."""
     for view in views:
-        decides = not view.vane_free and not changes_view(view, forces, s, column)
-        if decides and confirmed_score(view, views, cfg, forces, gust) > cfg.alarm_level:
+        decides = view.block.source < VANELESS and not changes_view(view, rows, s)
+        if decides and confirmed_score(view, views, cfg, forces) > cfg.alarm_level:
             return True
     return False
 
@@ -609,7 +494,7 @@ def list_directions(aircraft: Aircraft, with_forces: bool = False) -> Iterator[P
             pair = aircraft.dominant_axis[s], plane[1]
             yield ParityDirection(s, _unit_sum(pair), pair, [other for other in tested if other != s])
         if separable:
-            yield ParityDirection(VANE_VIEW, _unit_sum(plane), plane, tested)
+            yield ParityDirection(VANE_VIEW + i, _unit_sum(plane), plane, tested)
             yield ParityDirection(AXIS_VIEW, _unit_sum(plane[1:]), plane, tested, by_inertia=True)
 
 
@@ -642,7 +527,7 @@ def _largest_block(axes: list[int]) -> int:
 
 
 def configure_parity_views(stat: np.void, aircraft: Aircraft) -> None:
-    """Fill the views of a statistical record whose blocks and forces are already set up."""
+    """Fill the views of a statistical record whose rows, blocks and forces are already set up."""
     forces = stat["forces"]
     gusty = bool(stat["gust"]["output"]["gusty"])
     subtracts = forces["in_use"] and gusty and all(aircraft.separated_by_force(name) for name in FORCE_NAMES)
@@ -650,54 +535,58 @@ def configure_parity_views(stat: np.void, aircraft: Aircraft) -> None:
     stat["n_views"] = min(len(directions), len(stat["views"]))
     for view, d in zip(stat["views"], directions, strict=False):
         may_alarm = d.nulled == AXIS_VIEW  # and no alarm rests on accelerometers that may break
-        if subtracts and d.uses_vane_gust and not (may_alarm and stat["vaned"]["output"]["gusty"]):
-            view["confirmer"] = NORMAL_FORCE if d.plane_pair == PITCH_PLANE else SIDE_FORCE
-        _configure_view(view, d, gusty)
+        vaned = subtracts and d.uses_vane_gust and not (may_alarm and stat["vaned"]["output"]["gusty"])
+        _configure_view(view, d, gusty, vaned)
         rates = stat["block"][PITCH_BLOCK if d.plane_pair == PITCH_PLANE else LATERAL_BLOCK]
-        _configure_filter(view["block"], rates)
-        _configure_regressors(view, d, rates, forces)
+        _configure_filter(view["block"], d, rates)
+        _configure_columns(view, d, rates, stat["rows"], forces)
         _configure_hypotheses(view["block"], d, gusty)
 
 
-def _configure_view(view: np.void, d: ParityDirection, gusty: bool) -> None:
-    """Fill the direction of a view, the axis that its alarm names, and which errors it does not see."""
-    is_axis = d.nulled == AXIS_VIEW
-    across_vane = d.nulled == VANE_VIEW
-    view["nulled"] = d.nulled
-    view["direction"], view["plane_pair"] = d.m_0, d.plane_pair
-    view["alarm_axis"] = d.m_0.index(1.0) if is_axis and not d.by_inertia else d.plane_pair[0]
-    view["across_gust"] = across_vane and d.plane_pair == YAW_PLANE and gusty
-    view["by_inertia"] = d.by_inertia
-    view["vane_free"] = d.by_inertia or across_vane
-    if any(d.m_0[SIDE_FORCE:]):
-        view["confirmer"] = d.plane_pair[1]
-        view["always_Z"] = 1
+def _configure_view(view: np.void, d: ParityDirection, gusty: bool, vaned: bool) -> None:
+    """Fill the rows that a view combines, the axis that its alarm names, and which errors it does not see.
+
+    vaned: whether the gust estimate by vanes is subtracted, although it sees no force.
+    """
+    is_axis, across_vane, by_force = d.nulled == AXIS_VIEW, d.nulled >= VANE_VIEW, any(d.m_0[SIDE_FORCE:])
+    i, j = d.plane_pair
+    across_gust = across_vane and d.plane_pair == YAW_PLANE and gusty
+    view["nulled"], view["by_force"] = d.nulled, by_force
+    view["places"] = (ROLL, YAW, j) if across_gust else (i, -1, j)
+    view["alarm_axis"] = d.m_0.index(1.0) if is_axis and not d.by_inertia else i
+    view["block"]["source"] = VANED if vaned or by_force else RAW
+    if d.by_inertia or across_vane:
+        view["block"]["source"] = INERTIAL if d.by_inertia else VANELESS
+    if by_force or vaned:
+        view["confirmer"] = NORMAL_FORCE if d.plane_pair == PITCH_PLANE or j == NORMAL_FORCE else SIDE_FORCE
 
 
-def _configure_filter(b: np.void, rates: np.void) -> None:
-    """Fill the filter of a view's block, of one axis, from the block of the rates that the view combines."""
-    b["n"], b["a"] = 1, 1.0
+def _configure_filter(b: np.void, d: ParityDirection, rates: np.void) -> None:
+    """Fill direction and filter of a view's block from the block of the rates that the view combines."""
+    b["n"], b["a"], b["Q_scale"], b["m"][0], b["any_position"] = 1, 1.0, 1.0, d.m_0, 1
     b["P_xx"][0, 0] = rates["R_y"].max()
     b["P_dd"][0, 0] = likelihood.DRIFT_PRIOR_RAD_S2**2
     for name in ("alarm_level", "noise_share", "eta_rate"):
         b[name] = rates[name]
 
 
-def _configure_regressors(view: np.void, d: ParityDirection, rates: np.void, forces: np.void) -> None:
-    """Fill the tolerances of a view's regressors: those of its rates, of its force, of the flow angle from
-    inertial motion, and that of the leak, which is worked out in flight.
+def _configure_columns(
+    view: np.void, d: ParityDirection, rates: np.void, rows: np.void, forces: np.void
+) -> None:
+    """Fill the regressors that a view sees: those of its rates, of its force, of the flow angle from inertial
+    motion, and the leak, which is worked out in flight.
     """
-    parts = [rates["tol"][: rates["n_Z"]]]
-    if any(d.m_0[SIDE_FORCE:]):
-        f = forces["component"][d.plane_pair[1] - SIDE_FORCE]
-        parts.append(f["tol"][: f["n_Z"]])
-        if d.by_inertia:
-            parts.append([f["drift"]])
+    b, columns = view["block"], list(rates["columns"][: rates["n_Z"]])
+    if not columns and not view["by_force"]:
+        return
+    if view["by_force"]:
+        i = d.plane_pair[1] - SIDE_FORCE
+        first = int(rows["first"][i])
+        columns += range(first, first + int(forces["component"][i]["n_Z"]) + d.by_inertia)
+    set_columns(b, rows, columns)
     if d.nulled != AXIS_VIEW:
-        parts.append([1.0])
-    tol = np.concatenate(parts)
-    view["block"]["n_Z"] = len(tol)
-    view["block"]["tol"][: len(tol)] = tol
+        b["tol"][b["n_Z"]] = 1.0
+        b["n_Z"] += 1
 
 
 def _configure_hypotheses(b: np.void, d: ParityDirection, gusty: bool) -> None:
@@ -709,39 +598,5 @@ def _configure_hypotheses(b: np.void, d: ParityDirection, gusty: bool) -> None:
     kinds = [STEP_FAULT, *(LOSS for _ in lost)]
     b["n_h"] = len(kinds)
     hyps = b["hypothesis"][: len(kinds)]
-    hyps["kind"], hyps["surface"] = kinds, [-1, *lost]
+    hyps["kind"], hyps["surface"], hyps["signature"][0, 0] = kinds, [-1, *lost], 1.0
     likelihood.set_signs(b, kinds)
-
-
-@kernel
-def fill_block_signatures(blocks, Gu, per_cubed):
-    """Fill the signatures of the blocks of the rates, rad/s2.
-
-    Gu (3, n) rad/s2: effect of each surface, mean over the frame; per_cubed rad/s2: pitch acceleration of a
-    coefficient 1 of alpha^3.
-    """
-    for b in blocks:
-        for h in b.hypothesis[: b.n_h]:
-            for i in range(b.n):
-                if h.surface >= 0:
-                    h.signature[i] = Gu[b.axes[i], h.surface]
-                elif h.kind == STEP_FAULT:
-                    h.signature[i] = 1.0 if h.axis == b.axes[i] else 0.0
-                else:
-                    h.signature[i] = per_cubed
-
-
-@kernel
-def fill_view_signatures(view, forces, Gu):
-    """Fill the projections of the signatures on the direction of a view: of a step, and of losses.
-
-    Gu (3, n) rad/s2: effect of each surface, mean over the frame.
-    """
-    b, m = view.block, view.direction
-    for h in b.hypothesis[: b.n_h]:
-        s = h.surface
-        h.signature[0] = 1.0
-        if h.kind != STEP_FAULT:
-            h.signature[0] = m[0] * Gu[0, s] + m[1] * Gu[1, s] + m[2] * Gu[2, s]
-            for i in range(2):
-                h.signature[0] += m[SIDE_FORCE + i] * forces.component[i].Gu[s]

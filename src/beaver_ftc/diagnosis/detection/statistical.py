@@ -5,11 +5,8 @@ different models of the drift. A random walk reacts fast and ignores constant er
 zero gathers evidence for longer. Pitch has only the latter if no vane measures its gust. The worst-case
 scheme needs no probability; the scenario's `fdi.authority` sets whose alarms and exclusions count.
 
-The noise model follows from what a scenario declares, and the declared rate of false alarms holds for the
-declared noise. An error e of an air-data reading changes f + G u by e times its derivative with that reading,
-to first order. The derivative depends on the flight condition and is evaluated in flight. A steady error is a
-constant times a known regressor, like an error of a coefficient; noise is model noise. dpt is worked out from
-the engine's power, airspeed and dynamic pressure, so it has their errors.
+The noise model (rows.py) follows from what a scenario declares, and the declared rate of false alarms holds
+for the declared noise.
 
 Symbols of the kernels:
 
@@ -20,9 +17,6 @@ Symbols of the kernels:
     dt s, k                       duration and number of the frame
     b, h, v                       block, hypothesis, view
     s, i, j                       surface, axis, reading or term
-    tab                           the table of the moments' terms (design.model)
-    ds, dm, dF                    change of signals, monomials and F per unit of a reading
-    L, M, N                       rolling, pitching and yawing moment, N m (per unit of a reading)
     fies, of (n,)                 isolation estimators; number of that of each surface's loss, or -1
     lo, hi                        bounds on a log-likelihood ratio
     cfg, noise, gust, bound       records of the tests, the noise model, the gust estimate, the bounds
@@ -35,30 +29,18 @@ from sys import float_info
 import numpy as np
 
 from beaver_ftc.aircraft import AXES, Aircraft, MassProperties
-from beaver_ftc.aircraft.schema import MAX_MONOMIALS, MAX_SURFACES, MAX_TERMS
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.design import rotation_lengths
 from beaver_ftc.design.model import (
     AIRSPEED,
     ALPHA,
     BETA,
-    N_SIGNALS,
-    PH,
     QDYN,
-    RH,
-    directional,
-    evaluate,
     jacobian,
-    regressors,
-    slipstream_slopes,
-    whole_sum,
 )
 from beaver_ftc.diagnosis import gusts
 from beaver_ftc.diagnosis.bounds import (
-    OFF_MAP_RAD_S2,
-    add_published_bound,
     coefficient_bounds,
-    extra_bound,
     moment_axis,
 )
 from beaver_ftc.diagnosis.detection import likelihood, parity
@@ -70,7 +52,6 @@ from beaver_ftc.diagnosis.detection.likelihood import (
     LATERAL_BLOCK,
     LOSS_END,
     N_FILTER_BLOCKS,
-    N_INPUT_READINGS,
     N_SLOTS,
     STEP_FAULT,
     block_dtype,
@@ -80,12 +61,25 @@ from beaver_ftc.diagnosis.detection.parity import (
     N_TONES,
     TONE_RECORD,
     USUAL_SIZE,
+    VANE_VIEW,
     ParityDirection,
     StatisticalSize,
     configure_parity_views,
     configure_tones,
     list_directions,
     view_dtype,
+)
+from beaver_ftc.diagnosis.detection.rows import (
+    NOISE_RECORD,
+    RATES,
+    ROWS_RECORD,
+    add_constants,
+    add_turn,
+    begin_rows,
+    configure_force_rows,
+    configure_rows,
+    look,
+    set_columns,
 )
 from beaver_ftc.diagnosis.gusts import (
     FORCE_ERROR_SHARE,
@@ -96,14 +90,10 @@ from beaver_ftc.diagnosis.gusts import (
     configure_gust_speed,
 )
 from beaver_ftc.diagnosis.state import DAMAGE_EXCLUDES, LOSS, SIDE_FORCE
-from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA
-from beaver_ftc.scenario.declared import Declared, SensorErrors
+from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.diagnosis import Statistical
 
 PITCH_AXES, LATERAL_AXES = (1,), (0, 2)
-_READING_OF = {"alpha": ALPHA, "beta": BETA, "V": AIRSPEED, "qdyn": QDYN}
-_KW_READING = N_INPUT_READINGS - 1  # of the engine, kW
-_DPT = RH + 1  # the first of the declared signals
 N_SIGNS = {
     LOSS: 1,
     GROWING_LOSS: 1,
@@ -119,7 +109,6 @@ KAPPA_PER_S = 1.5
 LEVEL_NOISE_SHARE = 0.5
 # 42 of 75 flights of a GTM not found before; 15: 23, 8: 36, 0.2 and less: 35 and fewer
 DAMAGE_FREQUENCY_RAD_S = 3.0
-MIN_GYRO_STD_RAD_S = 1e-9  # of a gyro: exact ones are still doubles, and a variance no difference of zeros
 # (kind, surface, axis, raises alarms)
 HypothesisEntry = tuple[int, int, int, int]
 
@@ -149,7 +138,7 @@ def count_tests(aircraft: Aircraft, *directions: ParityDirection) -> int:
     kinds = [kind for _, rows in hypotheses_by_block(aircraft) for kind, _, _, alarms in rows if alarms]
     n_tones = 0
     for d in directions:
-        if d.nulled >= 0 and any(d.m_0[SIDE_FORCE:]):
+        if 0 <= d.nulled < VANE_VIEW and any(d.m_0[SIDE_FORCE:]):
             kinds += [STEP_FAULT, *(LOSS for _ in d.tested_losses)]
             n_tones += N_TONES
         elif d.nulled == AXIS_VIEW and not d.by_inertia:
@@ -204,10 +193,10 @@ def configure_statistics(
     _configure_levels(cfg, declared, n_tests, rate_hz)
     configure_gust_speed(gust, declared, float(cfg["alarm_level"]), V)
     tol = coefficient_bounds(declared, model, mass, *trim[1:])
-    _configure_blocks(stat, declared, tol, rate, dt_s)
+    configure_rows(stat, errors, tol, fdi["bound"]["declared_errors"])
+    _configure_blocks(stat, declared, rate, dt_s)
     stat["noise"]["rate0"] = settings.uncertainty_rad_s * dt_s
     _configure_noise(stat, drift_frequency(settings, aircraft), declared, model, trim, dt_s)
-    configure_readings(stat, errors, fdi["bound"]["declared_errors"])
     if views:
         configure_tones(
             stat["tone_test_config"],
@@ -218,6 +207,7 @@ def configure_statistics(
         )
         if declared.uses_accelerometers:
             configure_forces(fdi, declared, trim, jacobian(model, *trim)[3], dt_s)
+            configure_force_rows(stat["rows"], stat["forces"])
             _configure_view_gusts(stat, declared)
         configure_parity_views(stat, aircraft)
     _configure_lengths(stat, V, rate_hz)
@@ -268,31 +258,32 @@ def _configure_lengths(stat: np.void, V: float, rate_hz: float) -> None:
             b["Q_scale"] = (gust_m / b["drift_correlation_length_m"]) ** 2
 
 
-def _configure_blocks(stat: np.void, declared: Declared, tol: np.ndarray, rate: float, dt_s: float) -> None:
-    """Fill axes and hypotheses of each block, its level, and the tolerances tol of its unknown constants.
+def _configure_blocks(stat: np.void, declared: Declared, rate: float, dt_s: float) -> None:
+    """Fill axes and hypotheses of each block, its level, and its unknown constants.
 
     rate: largest change of the bounded uncertainty within a frame, over its bound. A loss that is declared
     constant does not grow.
     """
-    aircraft, cfg = declared.aircraft, stat["test"]
+    aircraft, cfg, rows = declared.aircraft, stat["test"], stat["rows"]
     losses = [aircraft.surfaces.index(name) for name in aircraft.class_of_losses]
     left_out = (GROWING_LOSS, LOSS_END) if declared.fdi.fault_profile == "abrupt" else ()
-    cfg["n_scores"], cfg["regress"] = len(losses) + len(AXES), bool(np.any(tol))
-    for b, (axes, all_rows) in zip(stat["block"], hypotheses_by_block(aircraft), strict=True):
+    cfg["n_scores"] = len(losses) + len(AXES)
+    for b, (axes, all_entries) in zip(stat["block"], hypotheses_by_block(aircraft), strict=True):
         own = [k for k, term in enumerate(aircraft.moments) if moment_axis(term) in axes]
-        b["n"], b["n_Z"], b["tol"][: len(own)] = len(axes), len(own), tol[own]
-        b["a"], b["Q_scale"], b["eta_rate"] = 1.0, 1.0, rate
+        readings = range(len(aircraft.moments), int(rows["n"]))
+        set_columns(b, rows, [*own, *readings] if rows["n"] else [])
+        b["n"], b["a"], b["Q_scale"], b["eta_rate"], b["source"] = len(axes), 1.0, 1.0, rate, RATES
         b["alarm_level"] = cfg["alarm_level"]
         b["noise_share"] = 0.0 if declared.is_noise_free else LEVEL_NOISE_SHARE
         for i, axis in enumerate(axes):
-            b["axes"][i] = axis
-            R = max(declared.sensors[AXES[axis]].random, MIN_GYRO_STD_RAD_S) ** 2
-            b["R_y"][i] = b["P_xx"][i, i] = R
+            b["axes"][i], b["m"][i, axis] = axis, 1.0
+            b["R_y"][i] = b["P_xx"][i, i] = rows["R"][axis]
             b["P_dd"][i, i] = likelihood.DRIFT_PRIOR_RAD_S2**2
-        rows = [row for row in all_rows if row[0] not in left_out]
-        b["n_h"], b["hypothesis"]["decay"] = len(rows), exp(-KAPPA_PER_S * dt_s)
-        likelihood.set_signs(b, [kind for kind, *_ in rows])
-        for h, (kind, s, axis, alarms) in zip(b["hypothesis"], rows, strict=False):
+        entries = [entry for entry in all_entries if entry[0] not in left_out]
+        b["n_h"], b["hypothesis"]["decay"] = len(entries), exp(-KAPPA_PER_S * dt_s)
+        likelihood.set_signs(b, [kind for kind, *_ in entries])
+        for h, (kind, s, axis, alarms) in zip(b["hypothesis"], entries, strict=False):
+            h["signature"][: len(axes)] = [kind == STEP_FAULT and axis == each for each in axes]
             h["kind"], h["surface"], h["axis"], h["alarms"] = kind, s, axis, alarms
             h["column"] = losses.index(s) if kind == LOSS else len(losses) + axis
 
@@ -332,7 +323,7 @@ def _configure_noise(
     noise["q"] = derive_intensity(eta, omega, float(sigma[:3].max()), level, dt_s)
     _, G, F_x, F_y = jacobian(model, *trim)
     noise["Q0"] = F_x**2 @ sigma[:3] ** 2
-    Q_y = F_y[:, [ALPHA, BETA, AIRSPEED, QDYN]] ** 2 @ sigma[3:] ** 2  # later as `add_readings` says
+    Q_y = F_y[:, [ALPHA, BETA, AIRSPEED, QDYN]] ** 2 @ sigma[3:] ** 2  # later as `rows.add_constants` says
     noise["Q"] = noise["Q0"] + Q_y
     noise["G_trim"][:, : G.shape[1]] = np.abs(G)
 
@@ -375,88 +366,6 @@ def derive_length(stat: np.void, V: float, rate_hz: float, gust_m: float) -> flo
     return min(V * tau, gust_m or np.inf)
 
 
-def configure_readings(stat: np.void, errors: SensorErrors, err: np.void) -> None:
-    """Add the readings of the air data to the regressors of the blocks; err: of `errors_dtype`."""
-    tol = np.zeros(N_INPUT_READINGS)
-    sigma = stat["noise"]["sigma"]
-    for name, j in _READING_OF.items():
-        tol[j] = errors[name].steady
-        sigma[j] = errors[name].random
-    tol[_KW_READING] = err["kw0"]  # all of it: so many standard deviations are part of that
-    sigma[_KW_READING] = err["kw0"] / NOISE_LIMIT_SIGMA
-    if not (tol.any() or sigma.any()):
-        return
-    stat["noise"]["noisy"] = stat["test"]["regress"] = 1
-    for b in stat["block"]:
-        k = int(b["n_Z"])
-        b["n_Z"] = k + N_INPUT_READINGS
-        b["tol"][k : k + N_INPUT_READINGS] = tol
-
-
-@kernel
-def fill_signal_slopes(tab, err, y, j, ds):
-    """Fill ds (N_SIGNALS,), the change of the table's signals per unit of reading j.
-
-    ds_j = 1 (vanes)      ds_k = -s_k / V (normalised rates, by V)      ds_dpt by V, qdyn and kW
-    """
-    ds[:] = 0.0
-    if j < AIRSPEED:  # a vane
-        ds[j] = 1.0
-    if j == AIRSPEED:
-        for k in range(PH, RH + 1):
-            ds[k] = -tab.signal[k] / y[AIRSPEED]
-    if err.engine and j >= AIRSPEED:
-        ds[_DPT] = slipstream_slopes(y, err.kw1)[j - AIRSPEED]  # the readings from airspeed on, in this order
-
-
-@kernel
-def accelerate(model, L, M, N):
-    """(Pl L + Pn N, Qm M, Rl L + Rn N), rad/s2, by moments in N m."""
-    return model.Pl * L + model.Pn * N, model.Qm * M, model.Rl * L + model.Rn * N
-
-
-@kernel
-def add_row(b, k, w, F):
-    """Z_k <- Z_k + w F on the axes of block b; F (3,) rad/s2 per unit."""
-    for i, axis in enumerate(b.axes[: b.n]):
-        b.regressor[k, i] += w * F[axis]
-
-
-@kernel
-def fill_slopes(model, y, u, j, dm, dF):
-    """Fill dF (3,) rad/s2 per unit of reading j: inertia times the moments' change.
-
-    (L, M, N) = q S (b, c, b) (sum C dm + [j is qdyn] sum C m / q)
-    """
-    tab, q = model.moments, y[QDYN]
-    for i in range(3):
-        C = whole_sum(tab, i, dm, u)
-        if j == QDYN:
-            C += whole_sum(tab, i, tab.power, u) / q
-        dF[i] = q * model.S * (model.c if i == 1 else model.b) * C
-    dF[0], dF[1], dF[2] = accelerate(model, dF[0], dF[1], dF[2])
-
-
-@kernel
-def add_readings(w, noise, blocks, err, model, y, u):
-    """Add an instant to the readings' regressors, rad/s2 per unit, and fill the model noise as it is now.
-
-        Z_j <- Z_j + w dF_j      Q = Q0 + sum_j (dF_j sigma_j)^2, (rad/s2)2
-
-    sigma (readings,): noise of the readings. The terms of `model.moments` are evaluated at this instant.
-    """
-    tab, dF = model.moments, noise.dF
-    noise.Q[:] = noise.Q0
-    for j in range(N_INPUT_READINGS):
-        fill_signal_slopes(tab, err, y, j, noise.ds)
-        directional(tab, tab.signal, tab.power, noise.ds, noise.dm)
-        fill_slopes(model, y, u, j, noise.dm, dF)
-        for i in range(3):
-            noise.Q[i] += (dF[i] * noise.sigma[j]) ** 2
-        for b in blocks:
-            add_row(b, b.n_Z - N_INPUT_READINGS + j, w, dF)
-
-
 # Least share of the best log-likelihood ratio that a constant theta explains of a loss growing at any rate
 # (docs/explanation/statistical.md).
 MIN_LLR_SHARE = 0.25
@@ -472,26 +381,8 @@ TESTING_RECORD = record(
     alarm_level=float, margin=float,  # standard deviations; difference of log-likelihood ratios
     forget=float,  # factor by which evidence decays per frame after the alarm
     n_scores=int,
-    regress=int,  # whether unknown constants have tolerances
     w=float,  # one over the number of instants in a frame
     mapped=int,  # if the error is mapped and no surface can be lost
-)  # fmt: skip
-
-# The noise model: accelerations that are not caused by a fault.
-NOISE_RECORD = record(
-    # of the drift that represents a bounded uncertainty, over bound squared, 1/s
-    q=float,
-    # share of its bound by which the uncertainty changes in a frame if no surface moves
-    rate0=float,
-    eta=3,  # bound on the uncertainty with healthy surfaces, now, rad/s2
-    eta_free=3,  # what one surface anywhere in its travel adds to it, rad/s2
-    G_trim=(3, MAX_SURFACES),  # magnitude of the effect of each surface in trim, rad/s2 per rad
-    # variance by noise of all inputs of the model; without the air data; (rad/s2)2
-    Q=3, Q0=3,
-    # whether errors of the air data count; their noise, units of the readings
-    noisy=int, sigma=N_INPUT_READINGS,
-    # scratch
-    zC=MAX_TERMS, ds=N_SIGNALS, dm=MAX_MONOMIALS, dF=3,
 )  # fmt: skip
 
 # Output of the detector: largest score over the alarm level and its axis; the largest so far in healthy
@@ -503,7 +394,7 @@ ALARM_RECORD = record(ratio=float, axis=int, peak=float, detected_at_s=float)
 def statistical_dtype(size: StatisticalSize = USUAL_SIZE) -> np.dtype:
     """The record of the detector, for an aircraft that needs these capacities."""
     return record(
-        test=TESTING_RECORD, noise=NOISE_RECORD, alarm=ALARM_RECORD,
+        test=TESTING_RECORD, noise=NOISE_RECORD, rows=ROWS_RECORD, alarm=ALARM_RECORD,
         block=(block_dtype(size.rate_size), N_FILTER_BLOCKS), n_views=int,
         views=(view_dtype(size.view_size), size.n_views), tone_test_config=TONE_RECORD, forces=FORCES_RECORD,
         gust=GUST_RECORD, vaneless=GUST_RECORD, vaned=GUST_RECORD, attitude=attitude_dtype(size.rate_size),
@@ -511,8 +402,8 @@ def statistical_dtype(size: StatisticalSize = USUAL_SIZE) -> np.dtype:
 
 
 @kernel
-def update_blocks(cfg, eta, blocks, gust, nu, dt, k, alarmed, may_end=False):
-    """Update the blocks with frame k: g = whitened nu - acc_mean, the gust's mean effect.
+def update_blocks(cfg, rows, blocks, gust, dt, k, alarmed, may_end=False):
+    """Update the blocks with frame k: each whitens what it sees of the rows, and tests it.
 
     alarmed: the detector has raised its alarm; may_end: a loss may end.
     """
@@ -521,27 +412,18 @@ def update_blocks(cfg, eta, blocks, gust, nu, dt, k, alarmed, may_end=False):
     for j, b in enumerate(blocks):
         if not alarmed:
             likelihood.reset_slot(b, slot)
-        for i, axis in enumerate(b.axes[: b.n]):
-            b.nu[i] = nu[axis] - gust.output.acc_mean[axis]
+        look(b, rows)
         b.has_coarse = gust.config.coarse_only
         if gust.config.coarse_only:
             likelihood.set_coarse_gust(b, gust.output.acc_coarse)
         if gust.output.gusty:
-            add_axes_turn(gust, b)
+            add_turn(b, gust)
             if j < likelihood.REVERTING_BLOCK:
                 likelihood.whiten_calm(b, dt)
             else:  # without gust both blocks of roll and yaw have the same filter
                 b.calm.g[:] = blocks[LATERAL_BLOCK].calm.g
         hi_decay = cfg.forget if may_end else 0.0
-        likelihood.update_block(b, eta, cfg.regress, dt, decay, hi_decay, cfg.mapped)
-
-
-@kernel
-def add_axes_turn(gust, b):
-    """P_dd <- P_dd + Q_scale var_turn: what a fast turn of the gusts' axes may change in the drift."""
-    for i in range(b.n):
-        for j in range(b.n):
-            b.P_dd[i, j] += b.Q_scale * gust.output.var_turn[b.axes[i], b.axes[j]]
+        likelihood.update_block(b, dt, decay, hi_decay, cfg.mapped)
 
 
 @kernel
@@ -704,23 +586,19 @@ def estimate_loss(blocks, s):
 
 
 @kernel
-def prepare_tests(cfg, noise, blocks, gust, bound, model, meas, u, dt):
-    """Prepare the next frame: gust, regressors, drift and model noise at this instant.
+def prepare_tests(cfg, noise, rows, blocks, gust, bound, model, meas, u, dt):
+    """Prepare the next frame: gust, rows, and drift of the blocks at this instant.
 
     u (n,): positions of healthy surfaces.
     """
-    x, y = meas.x, meas.y
     if gust.output.gusty:
-        gusts.fill_gust_effect(gust, model, x, y, u)
-    if cfg.regress:
-        for b in blocks:
-            b.regressor[:] = 0.0
-        add_regressors(cfg.w, noise, blocks, bound.declared_errors, model, meas, u)
-    fill_noise(noise, blocks, gust, bound, model, meas, dt)
+        gusts.fill_gust_effect(gust, model, meas.x, meas.y, u)
+    begin_rows(cfg.w, noise, rows, bound, model, meas, u)
+    fill_drift(noise, blocks, gust, meas.y[AIRSPEED], dt)
     if bound.error_map.n_boxes > 0:
         update_eta_rate(noise, blocks, bound.error_map, u)
     if gust.output.gusty:
-        gusts.begin_gust_sums(gust, y[AIRSPEED], cfg.w * dt)
+        gusts.begin_gust_sums(gust, meas.y[AIRSPEED], cfg.w * dt)
 
 
 @kernel
@@ -739,70 +617,28 @@ def update_eta_rate(noise, blocks, emap, u):
 
 
 @kernel
-def add_test_instant(cfg, noise, blocks, gust, bound, model, meas, u, dt):
-    """Add an instant inside a frame, dt s after the instant before, to gust and regressors."""
+def add_test_instant(cfg, noise, rows, gust, bound, model, meas, u, dt):
+    """Add an instant inside a frame, dt s after the instant before, to gust and rows."""
     if gust.output.gusty:
         gusts.update_gust(gust, model, meas.x, meas.y, u, meas.attitude, dt)
-    if cfg.regress:
-        add_regressors(cfg.w, noise, blocks, bound.declared_errors, model, meas, u)
+    add_constants(cfg.w, noise, rows, bound.declared_errors, model, meas, u)
 
 
 @kernel
-def add_regressors(w, noise, blocks, err, model, meas, u):
-    """Add an instant, w of the frame, to the regressors of all unknown constants."""
-    y = meas.y
-    evaluate(model.moments, meas.x, y)
-    add_coefficients(w, noise.zC, blocks, model, y, u)
-    if noise.noisy:
-        add_readings(w, noise, blocks, err, model, y, u)
+def fill_drift(noise, blocks, gust, V, dt):
+    """Fill of each block the drift's intensity Q_d and decay a; of the filter without gust the noise, too.
 
-
-@kernel
-def fill_noise(noise, blocks, gust, bound, model, meas, dt):
-    """Fill eta, and of each block the drift's intensity Q_d, model noise Q_x and decay a.
-
-    eta = published bound + |G| du + mapped error
-    Q_d = Q_scale q_gust + q max(eta, MIN_ETA)^2,  (rad/s2)2/s      Q_x = Q      a = exp(-dt V / length)
+    Q_d = Q_scale q_gust + q max(eta, MIN_ETA)^2,  (rad/s2)2/s      a = exp(-dt V / length)
     """
-    eta, emap, V, gusty = noise.eta, bound.error_map, meas.y[AIRSPEED], gust.output.gusty
-    eta[:] = 0.0
-    add_published_bound(
-        meas.x, model, bound.inertia_coupling_error_share, bound.const, bound.earth_rate_rad_s, eta
-    )
-    for i in range(3):
-        for s, du in enumerate(bound.declared_errors.du):
-            eta[i] += noise.G_trim[i, s] * du
-        if emap.n_boxes > 0:
-            eta[i] += min(emap.e_now[i], OFF_MAP_RAD_S2)
-        if emap.one_free:
-            noise.eta_free[i] = extra_bound(emap, emap.n_levels - 1, i)
     for k, b in enumerate(blocks):
         reverts, length = k == likelihood.REVERTING_BLOCK, b.drift_correlation_length_m
         for i, axis in enumerate(b.axes[: b.n]):
             for j in range(b.n):
+                gusty = gust.output.gusty
                 q_gust = gusts.unmeasured_drift(gust, V, axis, b.axes[j], reverts) if gusty else 0.0
                 b.Q_d[i, j] = b.Q_scale * q_gust
-            q_eta = noise.q * max(eta[axis], likelihood.MIN_ETA_RAD_S2) ** 2
+            q_eta = noise.q * max(noise.eta[axis], likelihood.MIN_ETA_RAD_S2) ** 2
             b.Q_d[i, i] += q_eta
             b.calm.Q_d[i, i] = q_eta
-            b.Q_x[i] = b.calm.Q_x[i] = noise.Q[axis]
+            b.calm.Q_x[i] = noise.Q[axis]
         b.a = np.exp(-dt * V / length) if length > 0.0 else 1.0
-
-
-@kernel
-def add_coefficients(w, z, blocks, model, y, u):
-    """Add an instant to the coefficients' regressors (terms, 2) rad/s2: inertia times q S (b, c, b) z.
-
-    z (terms,): monomial of each term, with the deflection of its surface.
-    """
-    tab = model.moments
-    regressors(tab, tab.power, u, z)
-    for b in blocks:
-        k = 0
-        for axis in b.axes[: b.n]:
-            qSl = y[QDYN] * model.S * (model.c if axis == 1 else model.b)
-            for j in range(tab.free_from[axis], tab.surface_to[axis]):
-                M = qSl * z[j]
-                F = accelerate(model, M * (axis == 0), M * (axis == 1), M * (axis == 2))
-                add_row(b, k, w, F)
-                k += 1

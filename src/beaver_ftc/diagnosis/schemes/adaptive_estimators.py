@@ -22,7 +22,7 @@ from beaver_ftc.compiled import apart, kernel, one_of
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, unanticipated_pitch
 from beaver_ftc.diagnosis import conclusion, gusts, isolation, monitors
 from beaver_ftc.diagnosis.detection import attitude, filters, forces, parity, statistical
-from beaver_ftc.diagnosis.detection.parity import fill_block_signatures
+from beaver_ftc.diagnosis.detection.rows import finish_rows
 from beaver_ftc.diagnosis.model_prediction import fill_old_effects, innovation_known
 from beaver_ftc.diagnosis.monitors import sensor_monitor
 from beaver_ftc.diagnosis.state import UNANTICIPATED, YAW
@@ -169,10 +169,8 @@ def likelihood_excludes(fdi, fie):
 def parity_excludes(fdi, fie):
     """Whether a parity view shows motion that the surface of estimator fie cannot cause."""
     stat = fdi.statistical
-    j = fdi.layout.position[fie.surface]
     views = stat.views[: stat.n_views]
-    G = fdi.isolation.estimator[j].effect.regressor
-    return parity.views_exclude(views, stat.test, stat.forces, gust_of_views(stat), fie.surface, G)
+    return parity.views_exclude(views, stat.test, stat.forces, stat.rows, fie.surface)
 
 
 @kernel
@@ -314,8 +312,9 @@ def update_tests(fdi, prediction, measured, k, t):
     """Test the innovation of the elapsed frame, which ends frame k at t s, for every hypothesis."""
     stat = fdi.statistical
     y = measured.y
-    eta = fdi.statistical.noise.eta
+    eta = stat.noise.eta
     cfg = stat.test
+    rows = stat.rows
     blocks = stat.block
     gust = stat.gust
     force = stat.forces
@@ -328,19 +327,17 @@ def update_tests(fdi, prediction, measured, k, t):
         if own.output.gusty:
             gusts.finish_gust(own, prediction.w)
     fill_old_effects(means)
-    fill_block_signatures(blocks, means.Gu_old, unanticipated_pitch(prediction.design, y, 1.0))
+    per_cubed = unanticipated_pitch(prediction.design, y, 1.0)
+    finish_rows(rows, stat.noise, force, gust, view_gust, vaneless, fdi.bound, means, nu, per_cubed)
     alarmed = stat.alarm.detected_at_s >= 0.0
     may_end = not fdi.config.abrupt
-    statistical.update_blocks(cfg, eta, blocks, gust, nu, dt, k, alarmed, may_end)
+    statistical.update_blocks(cfg, rows, blocks, gust, dt, k, alarmed, may_end)
     if stat.attitude.enabled:
         att, detected = stat.attitude, fdi.verdict.detected
-        attitude.compare_attitude(att, blocks, eta, cfg.regress, measured.x, dt, detected)
+        attitude.compare_attitude(att, blocks, eta, measured.x, dt, detected)
         if detected and att.score > 1.0:
             sensor_monitor.rule_out_gyros(fdi.sensor_monitor)
-    parity.turn_views(views, force, view_gust, fdi.bound, means.G_old, means.Gu_old)
-    parity.project_innovation(
-        views, cfg.regress, stat.noise, blocks, force, gust, view_gust, vaneless, nu, y[AIRSPEED]
-    )
+    parity.look_at_views(views, stat.noise, rows, force, gust, view_gust, vaneless, y[AIRSPEED])
     parity.update_views(views, cfg, stat.tone_test_config, y, dt, k, alarmed)
     bounded = fdi.bound.error_map.outside == 0
     statistical.update_alarm(stat.alarm, cfg, blocks, views, force, gust, t, bounded)
@@ -354,8 +351,9 @@ def prepare_gusts(fdi, prediction, measured, k):
     stat, dt = fdi.statistical, fdi.config.dt
     update_gusts(stat.gust, stat.vaneless, stat.vaned, stat.forces, prediction, measured, k, dt)
     statistical.prepare_tests(
-        stat.test, stat.noise, stat.block, stat.gust, fdi.bound, prediction.design, measured, prediction.u, dt
-    )
+        stat.test, stat.noise, stat.rows, stat.block, stat.gust, fdi.bound, prediction.design, measured,
+        prediction.u, dt,
+    )  # fmt: skip
 
 
 @apart(long_loops=True)
@@ -364,7 +362,7 @@ def add_gust_instant(fdi, prediction, measured):
     stat = fdi.statistical
     h = prediction.w * fdi.config.dt
     statistical.add_test_instant(
-        stat.test, stat.noise, stat.block, stat.gust, fdi.bound, prediction.design, measured, prediction.u, h
+        stat.test, stat.noise, stat.rows, stat.gust, fdi.bound, prediction.design, measured, prediction.u, h
     )
 
 

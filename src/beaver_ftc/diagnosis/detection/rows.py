@@ -1,0 +1,300 @@
+"""What an instant says on five rows, and what a block or a view sees of it.
+
+The rows are roll, pitch and yaw, of the rates, and side force and normal force (forces.py); all in rad/s2. On
+each of them an instant says
+
+    nu = sum_s theta_s Gu_s + sum_j c_j Z_j + d + noise          |c_j| <= tol_j,  |d| <= eta
+
+nu is the innovation; Gu_s the effect of surface s at its command, of which a loss takes the share -theta_s;
+Z_j the effect of an unknown constant c_j: of a coefficient of the moments, of a reading of the air data, of a
+term of a force; d is a bounded uncertainty.
+
+A block of the rates and a parity view both see these rows in one or two directions m:
+
+    m nu,   m Gu,   m Z,   |m| eta,   |m| std,   m^2 R
+
+std is the deviation of the noise of nu, R the variance of the noise of the gyros, (rad/s)2.
+
+An error e of an air-data reading changes f + G u by e times its derivative with that reading, to first order.
+The derivative depends on the flight condition and is evaluated in flight. dpt is worked out from the engine's
+power, airspeed and dynamic pressure, so it has their errors. Noise of the readings is model noise:
+
+    Z_j <- Z_j + w dF_j      Q = Q0 + sum_j (dF_j sigma_j)^2, (rad/s2)2
+
+Letters of the kernels, in addition to those of statistical.py: r is a row, c a column of Z, k a term.
+"""
+
+import numpy as np
+
+from beaver_ftc.aircraft import AXES
+from beaver_ftc.aircraft.schema import MAX_MONOMIALS, MAX_SURFACES, MAX_TERMS
+from beaver_ftc.compiled import kernel, record
+from beaver_ftc.design.model import (
+    AIRSPEED,
+    ALPHA,
+    BETA,
+    N_SIGNALS,
+    PH,
+    QDYN,
+    RH,
+    directional,
+    evaluate,
+    regressors,
+    slipstream_slopes,
+    whole_sum,
+)
+from beaver_ftc.diagnosis.bounds import OFF_MAP_RAD_S2, add_published_bound, extra_bound
+from beaver_ftc.diagnosis.detection.forces import MAX_FORCE_REGRESSORS
+from beaver_ftc.diagnosis.detection.likelihood import ALPHA_CUBED_MOMENT, N_INPUT_READINGS, N_ROWS
+from beaver_ftc.diagnosis.state import PITCH, ROLL, SIDE_FORCE, YAW
+from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA
+from beaver_ftc.scenario.declared import SensorErrors
+
+# What is subtracted from the innovation of the rates: nothing; the gust of the rates' blocks; that of the
+# views, by vanes; that by accelerometers alone. With the last the forces are those at the flow angle from
+# inertial motion, and the rates do not count.
+RAW, RATES, VANED, VANELESS, INERTIAL = range(5)
+MAX_COLUMNS = MAX_TERMS + N_INPUT_READINGS + 2 * (MAX_FORCE_REGRESSORS + 1)
+VANE_TOLERANCE = 0.1  # relative error of the effect of a vane's error: its column is that of the trim
+MIN_GYRO_STD_RAD_S = 1e-9  # of a gyro: exact ones are still doubles, and a variance no difference of zeros
+_READING_OF = {"alpha": ALPHA, "beta": BETA, "V": AIRSPEED, "qdyn": QDYN}
+_KW_READING = N_INPUT_READINGS - 1  # of the engine, kW
+_DPT = RH + 1  # the first of the declared signals
+
+# The noise model: accelerations that are not caused by a fault.
+NOISE_RECORD = record(
+    # of the drift that represents a bounded uncertainty, over bound squared, 1/s
+    q=float,
+    # share of its bound by which the uncertainty changes in a frame if no surface moves
+    rate0=float,
+    eta=3,  # bound on the uncertainty with healthy surfaces, now, rad/s2
+    eta_free=3,  # what one surface anywhere in its travel adds to it, rad/s2
+    G_trim=(3, MAX_SURFACES),  # magnitude of the effect of each surface in trim, rad/s2 per rad
+    # variance by noise of all inputs of the model; without the air data; (rad/s2)2
+    Q=3, Q0=3,
+    # whether errors of the air data count; their noise, units of the readings
+    noisy=int, sigma=N_INPUT_READINGS,
+    # scratch
+    zC=MAX_TERMS, ds=N_SIGNALS, dm=MAX_MONOMIALS, dF=3,
+)  # fmt: skip
+
+ROWS_RECORD = record(
+    nu=(5, N_ROWS), std=(5, N_ROWS),  # for each of what may be subtracted
+    eta=(2, N_ROWS), R=N_ROWS,  # eta: surfaces as commanded; one of them anywhere in its travel
+    # effect of a surface, and of an error of the side and the other vane, per rad; bound on its error
+    G=(MAX_SURFACES + 2, N_ROWS), e_G=(MAX_SURFACES + 2, N_ROWS), Gu=(MAX_SURFACES, N_ROWS),
+    per_cubed=float,  # pitch acceleration of a coefficient 1 of alpha^3
+    n=int, first=(int, 2),  # columns of the rates, 0 if no constant counts; the first of each force
+    tol=MAX_COLUMNS, Z=(MAX_COLUMNS, N_ROWS),
+)  # fmt: skip
+
+
+def configure_rows(stat: np.void, errors: SensorErrors, tol: np.ndarray, err: np.void) -> None:
+    """Fill what the rates have of errors: tolerances tol of the coefficients, and of the readings; noise.
+
+    err: of `errors_dtype`.
+    """
+    rows, noise, n = stat["rows"], stat["noise"], len(tol)
+    rows["R"][:3] = [max(errors[name].random, MIN_GYRO_STD_RAD_S) ** 2 for name in AXES]
+    rows["tol"][:n] = tol
+    rows["first"] = n + N_INPUT_READINGS + np.array([0, MAX_FORCE_REGRESSORS + 1])
+    of_readings, sigma = rows["tol"][n : n + N_INPUT_READINGS], noise["sigma"]
+    for name, j in _READING_OF.items():
+        of_readings[j], sigma[j] = errors[name].steady, errors[name].random
+    of_readings[_KW_READING] = err["kw0"]  # all of it: so many standard deviations are part of that
+    sigma[_KW_READING] = err["kw0"] / NOISE_LIMIT_SIGMA
+    noise["noisy"] = of_readings.any() or sigma.any()
+    rows["n"] = n + noise["noisy"] * N_INPUT_READINGS if noise["noisy"] or tol.any() else 0
+
+
+def configure_force_rows(rows: np.void, forces: np.void) -> None:
+    """Fill the tolerances of the forces' columns, and the columns of errors of the vanes."""
+    for i, f in enumerate(forces["component"]):
+        n, first, vane = int(f["n_Z"]), int(rows["first"][i]), MAX_SURFACES + i
+        rows["tol"][first : first + n], rows["tol"][first + n] = f["tol"][:n], f["drift"]
+        axis = YAW if i == 0 else PITCH
+        rows["G"][vane, [ROLL, axis, SIDE_FORCE + i]] = f["vane_roll"], *f["vane"]
+    rows["e_G"][MAX_SURFACES:] = VANE_TOLERANCE * np.abs(rows["G"][MAX_SURFACES:])
+
+
+@kernel
+def fill_signal_slopes(tab, err, y, j, ds):
+    """Fill ds (N_SIGNALS,), the change of the table's signals per unit of reading j.
+
+    ds_j = 1 (vanes)      ds_k = -s_k / V (normalised rates, by V)      ds_dpt by V, qdyn and kW
+    """
+    ds[:] = 0.0
+    if j < AIRSPEED:  # a vane
+        ds[j] = 1.0
+    if j == AIRSPEED:
+        for k in range(PH, RH + 1):
+            ds[k] = -tab.signal[k] / y[AIRSPEED]
+    if err.engine and j >= AIRSPEED:
+        ds[_DPT] = slipstream_slopes(y, err.kw1)[j - AIRSPEED]  # the readings from airspeed on, in this order
+
+
+@kernel
+def accelerate(model, L, M, N):
+    """(Pl L + Pn N, Qm M, Rl L + Rn N), rad/s2, by moments in N m."""
+    return model.Pl * L + model.Pn * N, model.Qm * M, model.Rl * L + model.Rn * N
+
+
+@kernel
+def add_constants(w, noise, rows, err, model, meas, u):
+    """Add an instant, w of the frame, to Z of the rates, rad/s2 per unit; and fill Q as it is now."""
+    y, tab = meas.y, model.moments
+    if rows.n == 0:
+        return
+    evaluate(tab, meas.x, y)
+    regressors(tab, tab.power, u, noise.zC)
+    for i in range(3):
+        qSl = y[QDYN] * model.S * (model.c if i == 1 else model.b)
+        for k in range(tab.free_from[i], tab.surface_to[i]):
+            M = qSl * noise.zC[k]
+            add_column(rows, k, w, accelerate(model, M * (i == 0), M * (i == 1), M * (i == 2)))
+    if noise.noisy:
+        noise.Q[:] = noise.Q0
+        for j in range(N_INPUT_READINGS):
+            fill_signal_slopes(tab, err, y, j, noise.ds)
+            directional(tab, tab.signal, tab.power, noise.ds, noise.dm)
+            fill_slopes(model, y, u, j, noise.dm, noise.dF)
+            for i in range(3):
+                noise.Q[i] += (noise.dF[i] * noise.sigma[j]) ** 2
+            add_column(rows, rows.n - N_INPUT_READINGS + j, w, noise.dF)
+
+
+@kernel
+def add_column(rows, c, w, F):
+    """Z_c <- Z_c + w F on the axes; F (3,) rad/s2 per unit."""
+    for i in range(3):
+        rows.Z[c, i] += w * F[i]
+
+
+@kernel
+def fill_slopes(model, y, u, j, dm, dF):
+    """Fill dF (3,) rad/s2 per unit of reading j: inertia times the moments' change.
+
+    (L, M, N) = q S (b, c, b) (sum C dm + [j is qdyn] sum C m / q)
+    """
+    tab, q = model.moments, y[QDYN]
+    for i in range(3):
+        C = whole_sum(tab, i, dm, u)
+        if j == QDYN:
+            C += whole_sum(tab, i, tab.power, u) / q
+        dF[i] = q * model.S * (model.c if i == 1 else model.b) * C
+    dF[0], dF[1], dF[2] = accelerate(model, dF[0], dF[1], dF[2])
+
+
+@kernel
+def begin_rows(w, noise, rows, bound, model, meas, u):
+    """Begin the rows of the next frame at this instant: constants, eta, and the noise that the blocks take.
+
+    eta = published bound + |G| du + mapped error
+    """
+    eta, emap = noise.eta, bound.error_map
+    rows.Z[: rows.n] = 0.0
+    add_constants(w, noise, rows, bound.declared_errors, model, meas, u)
+    eta[:] = 0.0
+    add_published_bound(
+        meas.x, model, bound.inertia_coupling_error_share, bound.const, bound.earth_rate_rad_s, eta
+    )
+    for i in range(3):
+        for s, du in enumerate(bound.declared_errors.du):
+            eta[i] += noise.G_trim[i, s] * du
+        if emap.n_boxes > 0:
+            eta[i] += min(emap.e_now[i], OFF_MAP_RAD_S2)
+        if emap.one_free:
+            noise.eta_free[i] = extra_bound(emap, emap.n_levels - 1, i)
+        rows.eta[0, i], rows.eta[1, i] = eta[i], eta[i] + noise.eta_free[i]
+        rows.std[RATES, i] = np.sqrt(noise.Q[i])
+
+
+@kernel
+def finish_rows(rows, noise, forces, gust, of_views, vaneless, bound, means, nu, per_cubed):
+    """Fill the rows of the elapsed frame; nu (3,) rad/s2: innovation of the rates.
+
+    gust, of_views, vaneless: the estimates that are subtracted. per_cubed: see ROWS_RECORD.
+    """
+    rows.per_cubed = per_cubed
+    for i in range(3):
+        rows.nu[RAW, i], rows.nu[RATES, i] = nu[i], nu[i] - gust.output.acc_mean[i]
+        rows.nu[VANED, i] = nu[i] - (of_views.output.acc_mean[i] if forces.in_use else 0.0)
+        rows.nu[VANELESS, i] = nu[i] - vaneless.output.acc_mean[i]
+        rows.std[RAW, i] = rows.std[VANED, i] = np.sqrt(noise.Q[i])
+        rows.std[VANELESS, i] = rows.std[RAW, i] + forces.gust_noise[i]
+        for s in range(means.G.shape[1]):
+            rows.G[s, i], rows.Gu[s, i] = means.G_old[i, s], means.Gu_old[i, s]
+            rows.e_G[s, i] = bound.eG[i, s]
+    if forces.in_use:
+        for i, f in enumerate(forces.component):
+            fill_force_row(rows, forces, f, i, bound.declared_errors.du)
+
+
+@kernel
+def fill_force_row(rows, forces, f, i, du):
+    """Fill the row of force i, whose record is f; du (n,) rad: errors of the deflections."""
+    r, c, eta = SIDE_FORCE + i, rows.first[i], 0.0
+    for s in range(du.size):
+        eta += f.G_trim[s] * du[s]
+        rows.G[s, r], rows.e_G[s, r], rows.Gu[s, r] = f.G_prev[s], f.e_G[s], f.Gu[s]
+    for source in range(INERTIAL):
+        rows.nu[source, r], rows.std[source, r] = f.innovation, np.sqrt(f.var[0])
+    rows.nu[INERTIAL, r], rows.std[INERTIAL, r] = f.e_inertial, np.sqrt(f.var[1])
+    rows.eta[0, r] = rows.eta[1, r] = eta * forces.q_ratio + f.e_lag
+    for k in range(f.n_Z):
+        rows.Z[c + k, r] = f.regressor[k]
+    rows.Z[c + f.n_Z, r] = f.e_drift
+
+
+def set_columns(b: np.void, rows: np.void, columns: list[int]) -> None:
+    """Fill which columns of Z a block sees, and their tolerances."""
+    b["n_Z"], b["columns"][: len(columns)] = len(columns), columns
+    b["tol"][: len(columns)] = rows["tol"][columns]
+
+
+@kernel
+def seen(m, i, X, k):
+    """m_i X_k in direction i of m (2, 5); X (K, 5)."""
+    total = 0.0
+    for r in range(N_ROWS):
+        total += m[i, r] * X[k, r]
+    return total
+
+
+@kernel
+def seen_at_most(m, i, X, k):
+    """|m_i| X_k; X (K, 5)."""
+    total = 0.0
+    for r in range(N_ROWS):
+        total += abs(m[i, r]) * X[k, r]
+    return total
+
+
+@kernel
+def look(b, rows):
+    """Fill what block b sees of the rows of the elapsed frame: nu, noise, bound, signatures, regressors."""
+    m, source = b.m, b.source
+    for i in range(b.n):
+        b.nu[i] = seen(m, i, rows.nu, source)
+        b.Q_x[i] = seen_at_most(m, i, rows.std, source) ** 2
+        b.eta[i] = seen_at_most(m, i, rows.eta, b.any_position)
+        b.R_y[i] = 0.0
+        for r in range(N_ROWS):
+            b.R_y[i] += m[i, r] * m[i, r] * rows.R[r]
+        for h in b.hypothesis[: b.n_h]:
+            if h.surface >= 0:
+                h.signature[i] = seen(m, i, rows.Gu, h.surface)
+            elif h.kind == ALPHA_CUBED_MOMENT:
+                h.signature[i] = m[i, PITCH] * rows.per_cubed
+        for j in range(b.n_Z):
+            b.regressor[j, i] = seen(m, i, rows.Z, b.columns[j])
+
+
+@kernel
+def add_turn(b, gust):
+    """P_dd <- P_dd + Q_scale m var_turn m': what a fast turn of the gusts' axes may change in the drift."""
+    for i in range(b.n):
+        for j in range(b.n):
+            for r in range(3):
+                for q in range(3):
+                    b.P_dd[i, j] += b.Q_scale * b.m[i, r] * b.m[j, q] * gust.output.var_turn[r, q]

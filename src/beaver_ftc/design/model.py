@@ -380,37 +380,43 @@ def design_record(
 
 
 @kernel
-def accelerations_of_moments(design, x, L, M, N, f):
-    """Fill f (3,) rad/s2 from rates x (3,) rad/s and moments N m."""
+def add_coupling(design, x, f):
+    """Add to f (3,) rad/s2 what the inertia makes of the rates x (3,) rad/s."""
     p, q, r = x[0], x[1], x[2]
-    f[0] = design.Ppq * p * q + design.Pqr * q * r + design.Pn * N + design.Pl * L
-    f[1] = design.Qpp * p * p + design.Qpr * p * r + design.Qrr * r * r + design.Qm * M
-    f[2] = design.Rpq * p * q + design.Rqr * q * r + design.Rn * N + design.Rl * L
+    f[0] += design.Ppq * p * q + design.Pqr * q * r
+    f[1] += design.Qpp * p * p + design.Qpr * p * r + design.Qrr * r * r
+    f[2] += design.Rpq * p * q + design.Rqr * q * r
 
 
 @kernel
-def accelerations_per_rad(design, y, G):
-    """Turn G (3, surfaces) from slopes of Cl, Cm, Cn into rad/s2 per rad."""
-    lateral = y[QDYN] * design.S * design.b
-    longitudinal = design.Qm * y[QDYN] * design.S * design.c
-    for s in range(G.shape[1]):
-        Cl, Cn = G[0, s], G[2, s]
-        in_roll, in_yaw = design.Pn * Cn + design.Pl * Cl, design.Rn * Cn + design.Rl * Cl
-        G[0, s], G[1, s], G[2, s] = lateral * in_roll, longitudinal * G[1, s], lateral * in_yaw
+def accelerate(design, y, C):
+    """Turn C (3, columns) from coefficients Cl, Cm, Cn into the accelerations that they cause, rad/s2."""
+    qS = y[QDYN] * design.S
+    for k in range(C.shape[1]):
+        L, M, N = qS * design.b * C[0, k], qS * design.c * C[1, k], qS * design.b * C[2, k]
+        C[0, k] = design.Pl * L + design.Pn * N
+        C[1, k] = design.Qm * M
+        C[2, k] = design.Rl * L + design.Rn * N
+
+
+@kernel
+def evaluated_responses(design, x, y, f, G):
+    """Fill f and G as `both_responses` does, from the table's monomials as they are."""
+    table = design.moments
+    for i in range(3):
+        f[i] = free_sum(table, i, table.power)
+    surface_sums(table, table.power, G)
+    accelerate(design, y, f.reshape(3, 1))
+    accelerate(design, y, G)
+    add_coupling(design, x, f)
 
 
 @kernel
 def both_responses(design, x, y, f, G):
     """Fill f (3,) rad/s2, the angular acceleration at neutral surfaces, and G (3, surfaces) rad/s2 per rad,
     that of each surface, whatever the rates. x (3,) rad/s, y (4 + declared,)."""
-    table, power = design.moments, design.moments.power
-    evaluate(table, x, y)
-    lateral, longitudinal = y[QDYN] * design.S * design.b, y[QDYN] * design.S * design.c
-    Cl, Cn = free_sum(table, 0, power), free_sum(table, 2, power)
-    Cm = free_sum(table, 1, power)
-    accelerations_of_moments(design, x, lateral * Cl, longitudinal * Cm, lateral * Cn, f)
-    surface_sums(table, power, G)
-    accelerations_per_rad(design, y, G)
+    evaluate(design.moments, x, y)
+    evaluated_responses(design, x, y, f, G)
 
 
 @kernel
@@ -426,16 +432,12 @@ def rate_damping(design, x, y, u, scratch, out):
     against the air. x (3,) rad/s, y (4 + declared,), u (surfaces,) rad; scratch (MAX_MONOMIALS,)."""
     table = design.moments
     evaluate(table, x, y)
-    lateral, longitudinal = y[QDYN] * design.S * design.b, y[QDYN] * design.S * design.c
     for j in range(3):
         slopes(table, table.signal, table.power, PH + j, scratch)
         per_rate = design.c / y[AIRSPEED] if j == 1 else design.b / (2 * y[AIRSPEED])
-        L = lateral * whole_sum(table, 0, scratch, u) * per_rate
-        M = longitudinal * whole_sum(table, 1, scratch, u) * per_rate
-        N = lateral * whole_sum(table, 2, scratch, u) * per_rate
-        out[0, j] = design.Pl * L + design.Pn * N
-        out[1, j] = design.Qm * M
-        out[2, j] = design.Rl * L + design.Rn * N
+        for i in range(3):
+            out[i, j] = whole_sum(table, i, scratch, u) * per_rate
+    accelerate(design, y, out)
 
 
 @kernel
@@ -511,11 +513,11 @@ def _split(design: np.void, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, n
     signal, power = np.zeros((N_SIGNALS, *states), kind), np.zeros((MAX_MONOMIALS, *states), kind)
     plain(signals)(table, x, y, signal)
     plain(monomials)(table, signal, power)
-    arms = [y[QDYN] * record.S * length for length in (record.b, record.c, record.b)]
-    moments = [arm * plain(free_sum)(table, i, power) for i, arm in enumerate(arms)]
-    plain(accelerations_of_moments)(record, x, *moments, f)
+    f[:] = [plain(free_sum)(table, i, power) for i in range(3)]
     plain(surface_sums)(table, power, G)
-    plain(accelerations_per_rad)(record, y, G)
+    plain(accelerate)(record, y, f[:, None])
+    plain(accelerate)(record, y, G)
+    plain(add_coupling)(record, x, f)
     return f, G
 
 

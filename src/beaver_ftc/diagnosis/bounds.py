@@ -5,9 +5,11 @@ coefficient times powers of measured signals. If every factor f is known to with
 
     |prod (f + e) - prod f| <= prod (|f| + |e|) - prod |f|
 
-and the sum of these over the terms bounds |F(truth) - F(measured)| at this state. If all errors have one
-sign, each term reaches its bound. The same bound serves the isolation estimators: a lost share of a surface
-multiplies its terms by 1 + theta in [0, 1], and with them their error.
+and the sum of these over the terms bounds |F(truth) - F(measured)| at this state. The sum of prod |f| is the
+design model with |f| in place of each factor, and that of prod (|f| + |e|) the same with |f| + |e|: the bound
+is the difference of two evaluations of one model. If all errors have one sign, each term reaches its bound.
+The same bound serves the isolation estimators: a lost share of a surface multiplies its terms by 1 + theta in
+[0, 1], and with them their error.
 
 A gyro's error appears once more, because xdot is computed from the gyro's readings. Its constant part drops
 out of the difference. Of the changing part n with |n| <= nbar the filter eps[k+1] = a eps[k] + n[k+1] - n[k]
@@ -29,9 +31,6 @@ Symbols of the kernels (err: of `errors_dtype`, emap: of `map_dtype`, model: the
     x (3,) rad/s, y, u (n,) rad   rates, readings, deflections; in err [0] is the magnitude as measured, [1]
                                   the worst that the errors allow
     eta (3,) rad/s2               bound on the uncertainty
-    C, dC; c, dc                  coefficient and its tolerance, of a moment's term; of inertia, dI (12,)
-    L, M, N  N m                  moments: sum of their terms' magnitudes
-    q Pa, S m2, l m               dynamic pressure, wing area, span or chord
     z (coordinates,)              place in the map: x, then y with the density in place of dynamic pressure
     b, j, k                       box, level of travel, row of time of the map
     s, i                          surface, axis
@@ -47,7 +46,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import AXES, Aircraft, MassProperties, Term
 from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S, MOMENTS
-from beaver_ftc.aircraft.schema import MAX_AGES, MAX_BOXES, MAX_LEVELS, MAX_MONOMIALS, MAX_TERMS, RATE_SIGNALS
+from beaver_ftc.aircraft.schema import MAX_AGES, MAX_BOXES, MAX_LEVELS, RATE_SIGNALS
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.design import LEAST_HEIGHT_M
 from beaver_ftc.design.model import (
@@ -55,21 +54,23 @@ from beaver_ftc.design.model import (
     DPT,
     DPT_0,
     KW_TO_DPT,
-    N_SIGNALS,
     N_Y,
     PH,
     QDYN,
     QH,
     RH,
     DesignFunctions,
+    InertiaCoefficients,
+    acceleration,
     coefficient_slopes,
     density_ratio,
+    design_dtype,
+    evaluate,
+    evaluated_responses,
     inertia_coefficients,
     jacobian,
     mass_of,
-    monomials,
     power_error_kw,
-    signals,
 )
 from beaver_ftc.diagnosis.state import fill
 from beaver_ftc.plant.faults import OF_THE_SLIPSTREAM
@@ -98,8 +99,6 @@ def errors_dtype(n: int) -> np.dtype:
     """The declared errors beyond the published bound, of an aircraft with n surfaces."""
     return record(
         given=int,
-        dC=MAX_TERMS,  # of each moment coefficient, as the design model has them
-        dI=12,  # of each inertia coefficient, in the order of design.model
         # error of a signal: offset + slope |signal|
         e0=7, e1=7,
         steady=3,  # of the offset of a gyro, what does not change
@@ -110,8 +109,10 @@ def errors_dtype(n: int) -> np.dtype:
         wg_aloft=float, wg_1m=float, h0=float, h1=float,
         # of dpt: see `slipstream_bound`
         engine=int, kw0=float, kw1=float,
-        # scratch: magnitudes as measured [0], and as large as they can be [1]
-        x=(2, 3), y=(2, N_Y), u=(2, n), x_air=3, sig=N_SIGNALS, m=(2, MAX_MONOMIALS), eG=(3, n),
+        # the design model of magnitudes [0], and of the largest magnitudes that the errors allow [1]
+        model=(design_dtype(n), 2),
+        # the same of rates, also relative to the air, of readings and deflections; what the models give there
+        x=(2, 3), x_air=(2, 3), y=(2, N_Y), u=(2, n), f=(2, 3), G=(2, 3, n), F=(2, 3), eG=(3, n),
     )  # fmt: skip
 
 
@@ -209,85 +210,37 @@ def fill_magnitudes(err, x, y, u):
     """Fill x, y, u with |signal| as measured, and with the largest |signal| that the errors allow; for
     airspeed, the smallest. x_air: these rates with the air's rotation.
     """
-    for i in range(3):
-        err.x[0, i] = abs(x[i])
-        err.x[1, i] = abs(x[i]) + reading_bound(err, i, x[i])
-        err.x_air[i] = err.x[1, i] + err.wg[i]
-    for i in range(y.size):
-        err.y[0, i] = abs(y[i])
-        err.y[1, i] = abs(y[i]) + (reading_bound(err, _Y0 + i, y[i]) if i < DPT else 0.0)
+    for v in range(2):
+        for i in range(3):
+            err.x[v, i] = abs(x[i]) + v * reading_bound(err, i, x[i])
+            err.x_air[v, i] = err.x[v, i] + v * err.wg[i]
+        for i in range(y.size):
+            err.y[v, i] = abs(y[i]) + (v * reading_bound(err, _Y0 + i, y[i]) if i < DPT else 0.0)
+        for s in range(u.size):
+            err.u[v, s] = abs(u[s]) + v * err.du[s]
     if err.engine:
         err.y[1, DPT] += slipstream_bound(err, y)
-    for s in range(u.size):
-        err.u[0, s] = abs(u[s])
-        err.u[1, s] = abs(u[s]) + err.du[s]
     V = y[AIRSPEED]
     err.y[1, AIRSPEED] = max(2.0 * V - err.y[1, AIRSPEED], _MIN_V_SHARE * V)
 
 
 @kernel
-def moment_size(err, model, i, s, v):
-    """q S l sum (|C| + v dC) m |u|, N m: magnitudes of the terms of moment i as measured (v = 0), or the
-    largest that the errors allow (v = 1).
+def add_declared_bound(err, x, y, u, eta):
+    """Add to eta the bound by the declared errors, and fill eG, that on the effect of each surface, per rad.
 
-    m: product of a term's signals. s: the surface whose terms alone count, per rad; -1: all terms do.
+        eta <- eta + F_1 - F_0      eG = G_1 - G_0      F = f + G u
+
+    F_0, F_1: the design model of magnitudes, at the magnitudes as measured and at the largest possible ones.
     """
-    tab, C = model.moments, 0.0
-    for k in range(tab.free_from[i], tab.surface_to[i]):
-        at = tab.surface[k]
-        if s < 0 or at == s:
-            u = err.u[v, at] if s < 0 <= at else 1.0
-            C += (abs(tab.value[k]) + v * err.dC[k]) * err.m[v, tab.monomial[k]] * u
-    return model.S * (model.c if i == 1 else model.b) * err.y[v, QDYN] * C
-
-
-@kernel
-def inertia_factors(err, model, s, v):
-    """What the twelve inertia coefficients multiply, in their order; s, v: see `moment_size`. For one surface
-    alone the rates do not count."""
-    w = 1.0 if s < 0 else 0.0
-    p, q, r = w * err.x[v, 0], w * err.x[v, 1], w * err.x[v, 2]
-    L, N = moment_size(err, model, 0, s, v), moment_size(err, model, 2, s, v)
-    return p * q, q * r, L, N, p * p, p * r, r * r, moment_size(err, model, 1, s, v), p * q, q * r, L, N
-
-
-@kernel
-def add_product_bounds(err, model, s, eta):
-    """Add to eta the bound on the error of each inertia coefficient c times its factor f:
-
-        eta_i <- eta_i + sum (|c| + dI) fw - |c| f
-
-    s: the surface whose moments alone count, per rad; -1: all moments and the rates do.
-    """
-    f, fw = inertia_factors(err, model, s, 0), inertia_factors(err, model, s, 1)
-    c = (
-        *(model.Ppq, model.Pqr, model.Pl, model.Pn),
-        *(model.Qpp, model.Qpr, model.Qrr, model.Qm),
-        *(model.Rpq, model.Rqr, model.Rl, model.Rn),
-    )
-    for k in range(12):
-        eta[k // 4] += (abs(c[k]) + err.dI[k]) * fw[k] - abs(c[k]) * f[k]
-
-
-@kernel
-def fill_eG(err, model, s):
-    """Fill eG[:, s], rad/s2 per rad: bound on the error of the effect of surface s.
-
-    The declared bound is affine in |u_s|; this is its slope. `add_declared_bound` fills what it reads.
-    """
-    err.eG[:, s] = 0.0
-    add_product_bounds(err, model, s, err.eG[:, s])
-
-
-@kernel
-def add_declared_bound(err, model, x, y, u, eta):
-    """Add to eta the bound by the declared errors: of each moment and product of rates, times its inertia."""
     fill_magnitudes(err, x, y, u)
-    signals(model.moments, err.x[0], err.y[0], err.sig)
-    monomials(model.moments, err.sig, err.m[0])
-    signals(model.moments, err.x_air, err.y[1], err.sig)
-    monomials(model.moments, err.sig, err.m[1])
-    add_product_bounds(err, model, -1, eta)
+    for v in range(2):
+        evaluate(err.model[v].moments, err.x_air[v], err.y[v])
+        evaluated_responses(err.model[v], err.x[v], err.y[v], err.f[v], err.G[v])
+        acceleration(err.f[v], err.G[v], err.u[v], err.F[v])
+    for i in range(3):
+        eta[i] += err.F[1, i] - err.F[0, i]
+        for s in range(u.size):
+            err.eG[i, s] = err.G[1, i, s] - err.G[0, i, s]
 
 
 @kernel
@@ -447,10 +400,7 @@ def fill_bound(bound, model, meas, u):
     eta[:] = 0.0
     if err.given:
         set_air_rotation(err, meas.altitude)
-        add_declared_bound(err, model, x, y, u, eta)
-        if bound.has_eG:
-            for s in range(u.size):
-                fill_eG(err, model, s)
+        add_declared_bound(err, x, y, u, eta)
     else:
         err.x[1, :] = x
     if emap.n_boxes > 0:
@@ -507,13 +457,17 @@ def configure_bound(bound: np.void, declared: Declared, model: np.void) -> None:
 def fill_errors(err: np.void, declared: Declared, model: np.void, mass: MassProperties) -> None:
     """Fill the declared errors; model, mass: record and mass properties of the design model."""
     errors, air, b = declared.sensors, declared.air, declared.aircraft.geometry.span_m
-    dC = declared.coefficients.absolute(declared.aircraft.moments, model["moments"]["value"])
-    err["dC"][: dC.size] = dC
     aloft = GUST_LIMIT_SIGMA * air.rotation_limit_rad_s(b)
+    dC = declared.coefficients.absolute(declared.aircraft.moments, model["moments"]["value"])
     dI, du = inertia_bounds(declared.inertia, mass), declared.deflections_rad
+    err["model"] = model
+    err["model"]["moments"]["value"] = np.abs(model["moments"]["value"])
+    err["model"]["moments"]["value"][1, : dC.size] += dC
+    for name, e in zip(InertiaCoefficients._fields, dI, strict=True):
+        err["model"][name] = abs(model[name]) + np.array([0.0, e])
     known = errors.is_ideal and declared.servo_errors.is_none
     fill(
-        err, dI=dI, du=du, du0=declared.deflection_rad, wg=aloft, wg_aloft=aloft,
+        err, du=du, du0=declared.deflection_rad, wg=aloft, wg_aloft=aloft,
         wg_1m=GUST_LIMIT_SIGMA * air.low_rotation_limit_rad_s(b),
         h0=errors["altitude"].worst, h1=errors["altitude"].slope,
         e0=errors.each("worst"), e1=errors.each("slope"), steady=errors.each("steady", AXES),

@@ -458,7 +458,6 @@ def acceleration(f, G, u, out):
 assert (PH, RH) == (2, 4)  # rates are neighbours among the signals: see rate_damping
 
 
-_BLOCK = 10_000  # states that are evaluated at once
 _STEP = 1e-30  # of a complex step: far below rounding, so the derivative is exact to rounding
 
 
@@ -539,18 +538,11 @@ def coefficient_slopes(design: np.void, x: np.ndarray, y: np.ndarray, u: np.ndar
 
 
 def responses_at(design: np.void, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """f (n, 3) rad/s2 and G (n, 3, surfaces) rad/s2 per rad at many states, without compiled code: what
-    `response` gives at each of x (n, 3) rad/s and y (n, 4 + declared)."""
-    m = y.shape[1]
-    if design["linearised"]:
-        away = (x - design["x0"]) @ design["f_x"].T + (y - design["y0"][:m]) @ design["f_y"][:, :m].T
-        return design["f0"] + away, np.broadcast_to(design["G0"], (len(x), *design["G0"].shape))
-    if design["frozen_alpha"]:
-        y = y.copy()
-        y[:, ALPHA] = design["y0"][ALPHA]
-    blocks = [slice(k, k + _BLOCK) for k in range(0, len(x), _BLOCK)]  # of a long flight: memory
-    f, G = zip(*(_split(design, x[rows].T, y[rows].T) for rows in blocks), strict=True)
-    return np.concatenate(f, axis=-1).T, np.moveaxis(np.concatenate(G, axis=-1), -1, 0)
+    """f (n, 3) rad/s2 and G (n, 3, surfaces) rad/s2 per rad at many states: what `response` gives at each of
+    x (n, 3) rad/s and y (n, 4 + declared)."""
+    f, G = np.empty(x.shape), np.zeros((len(x), *design["G0"].shape))
+    responses(design, np.ascontiguousarray(x), np.ascontiguousarray(y), f, G)
+    return f, G
 
 
 def acceleration_at(design: np.void, x: np.ndarray, y: np.ndarray, u: np.ndarray) -> np.ndarray:
@@ -561,7 +553,8 @@ def acceleration_at(design: np.void, x: np.ndarray, y: np.ndarray, u: np.ndarray
 
 def unanticipated_at(design: np.void, y: np.ndarray, Cm_alpha3: np.ndarray) -> np.ndarray:
     """What `unanticipated_pitch` gives at each of y (n, 5) and Cm_alpha3 (n,): (n,) rad/s2."""
-    return Cm_alpha3 * design["Qm"] * y[:, QDYN] * design["S"] * design["c"] * y[:, ALPHA] ** 3
+    pitch: np.ndarray = plain(unanticipated_pitch)(_fields(design), y.T, Cm_alpha3)
+    return pitch
 
 
 def effectiveness(design: np.void, y: np.ndarray) -> np.ndarray:
@@ -592,9 +585,9 @@ def response(design, x, y, f, G):
 
 @kernel
 def responses(design, x, y, f, G):
-    """The same at each of x (n, 3), into f (n, 3); G is that of y."""
+    """The same at each of x (n, 3) and y (n, 4 + declared), into f (n, 3) and G (n, 3, surfaces)."""
     for i in range(x.shape[0]):
-        response(design, x[i], y, f[i], G)
+        response(design, x[i], y[i], f[i], G[i])
 
 
 @kernel
@@ -623,13 +616,9 @@ class DesignFunctions:
 
     def f(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Angular acceleration (3,) rad/s² at neutral surfaces. For `x` (n, 3) the result is (n, 3)."""
-        return self._response(np.atleast_2d(x), y)[0].reshape(np.shape(x))
+        rows = np.atleast_2d(x)
+        return responses_at(self._record, rows, np.tile(y, (len(rows), 1)))[0].reshape(np.shape(x))
 
     def G(self, y: np.ndarray) -> np.ndarray:
         """Effectiveness matrix (3, surfaces), rad/s² per rad: acceleration for each rad of a surface."""
-        return self._response(np.zeros((1, 3)), y)[1]
-
-    def _response(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        f, G = np.empty(x.shape), np.zeros(self._record["G0"].shape)
-        responses(self._record, np.ascontiguousarray(x), np.ascontiguousarray(y), f, G)
-        return f, G
+        return responses_at(self._record, np.zeros((1, 3)), y[None])[1][0]

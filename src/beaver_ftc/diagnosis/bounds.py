@@ -62,6 +62,7 @@ from beaver_ftc.design.model import (
     DesignFunctions,
     InertiaCoefficients,
     acceleration,
+    acceleration_at,
     coefficient_slopes,
     density_ratio,
     design_dtype,
@@ -166,9 +167,8 @@ def fill_map(emap: np.void, aircraft: Aircraft, one_free: bool, two_free: bool) 
     emap["until_s"][:n_rows] = declared.until_s
     emap["share"][:n_levels] = declared.travel_share
     for b, box in enumerate(declared.boxes):
-        ends = np.array(box.ends(aircraft.signals))
-        emap["lo"][b, : len(ends)] = ends[:, 0]
-        emap["hi"][b, : len(ends)] = ends[:, 1]
+        ends = np.transpose(box.ends(aircraft.signals))
+        emap["lo"][b, : ends.shape[1]], emap["hi"][b, : ends.shape[1]] = ends
         tables = box.error_p_rad_s2, box.error_q_rad_s2, box.error_r_rad_s2
         emap["e"][:n_rows, b, :n_levels] = np.stack(tables, axis=-1)
         emap["yaw"][b] = box.engines_apart or 0.0
@@ -520,23 +520,19 @@ def plugin_errors(declared: Declared, model: np.ndarray, y: np.ndarray, u: np.nd
     from beaver_ftc.design.context import DeclaredErrors  # for plug-ins alone
 
     aircraft, errors = declared.aircraft, declared.sensors
-    servos, off = (
-        [getattr(of, s) for s in aircraft.surfaces] for of in (declared.servos, declared.servo_errors)
-    )
-    noise, bias, resolution = (errors.each(kind) for kind in ("noise", "steady", "resolution"))
+    instruments = {
+        f"{prefix}{name}": errors.each("steady" if name == "bias" else name, *readings)
+        for prefix, readings in (("", ()), ("further_", (_FURTHER_READINGS,)))
+        for name in ("noise", "bias", "resolution", "slope")
+    }
     dC = declared.coefficients.absolute(aircraft.moments, model["moments"]["value"][0])
     gust, gust_s = declared.air.rotation(float(y[2]), aircraft.geometry.span_m)
+    noise, bias, resolution, _ = list(instruments.values())[:4]
     sigma = np.sqrt(noise**2 + bias**2 + resolution**2 / 12.0)[_Y0:]
     du = declared.deflections_rad
     return DeclaredErrors(
-        noise=noise,
-        bias=bias,
-        resolution=resolution,
-        slope=errors.each("slope"),
-        **{
-            f"further_{name}": errors.each("steady" if name == "bias" else name, _FURTHER_READINGS)
-            for name in ("noise", "bias", "resolution", "slope")
-        },
+        **instruments,
+        **servo_data(declared),
         gust_rad_s=gust,
         gust_time_s=gust_s,
         gust_effect=air_rotation_slopes(DesignFunctions(model.copy()), y),
@@ -544,19 +540,28 @@ def plugin_errors(declared: Declared, model: np.ndarray, y: np.ndarray, u: np.nd
         inertia=declared.inertia,
         deflection_rad=declared.deflection_rad,
         model_rad_s2=model_error_std(model, y, u, sigma, dC, du),
-        bandwidth_rad_s=np.array([servo.bandwidth_rad_s for servo in servos]),
-        rate_limit_rad_s=np.radians([servo.rate_limit_deg_s for servo in servos]),
-        bandwidth_error=np.array([error.bandwidth for error in off]),
-        rate_limit_error=np.array([error.rate_limit for error in off]),
-        dead_band_rad=np.radians([error.dead_band_deg for error in off]),
     )
+
+
+def servo_data(declared: Declared) -> dict[str, np.ndarray]:
+    """The declared actuators and their errors, (surfaces,) each, by the names of `DeclaredErrors`."""
+    servos, off = (
+        [getattr(of, s) for s in declared.aircraft.surfaces]
+        for of in (declared.servos, declared.servo_errors)
+    )
+    return {
+        "bandwidth_rad_s": np.array([servo.bandwidth_rad_s for servo in servos]),
+        "rate_limit_rad_s": np.radians([servo.rate_limit_deg_s for servo in servos]),
+        "bandwidth_error": np.array([error.bandwidth for error in off]),
+        "rate_limit_error": np.array([error.rate_limit for error in off]),
+        "dead_band_rad": np.radians([error.dead_band_deg for error in off]),
+    }
 
 
 def air_rotation_slopes(model: DesignFunctions, y: np.ndarray) -> np.ndarray:
     """Angular acceleration of an aircraft at rest in air that rotates, (3, 3) 1/s: -df/dx without rates."""
-    step = 1e-4
-    columns = [(model.f(step * e, y) - model.f(-step * e, y)) / (2.0 * step) for e in np.eye(3)]
-    return -np.column_stack(columns)
+    steps = 1e-4 * np.eye(3)
+    return -((model.f(steps, y) - model.f(-steps, y)) / 2e-4).T
 
 
 def model_error_std(
@@ -567,20 +572,16 @@ def model_error_std(
     sigma (4,): errors of alpha, beta, airspeed, dynamic pressure; dC (terms,): of the coefficients, absolute;
     du (surfaces,) rad: of the deflections.
     """
-    F = _acceleration_at(model, y, u)
-    dy = np.pad(np.diag(sigma), ((0, 0), (0, y.size - sigma.size)))
-    dF = [_acceleration_at(model, y + d, u) - F for d in dy]
-    dF += [_acceleration_at(model, y, u + e) - F for e in np.diag(du)]
+    off_y = np.pad(np.diag(sigma), ((1, u.size), (0, y.size - sigma.size)))
+    off_u = np.pad(np.diag(du), ((1 + sigma.size, 0), (0, 0)))
+    rest = np.zeros((len(off_y), 3))
+    F = acceleration_at(model[0], rest, y + off_y, u + off_u)
+    dF = [*(F[1:] - F[0])]
     for k in np.flatnonzero(dC):
         changed = model.copy()
         changed["moments"]["value"][0][k] += dC[k]
-        dF.append(_acceleration_at(changed, y, u) - F)
+        dF.append(acceleration_at(changed[0], rest[:1], y[None], u[None])[0] - F[0])
     return np.sqrt(np.square(dF).sum(axis=0))
-
-
-def _acceleration_at(rec: np.ndarray, y: np.ndarray, u: np.ndarray) -> np.ndarray:
-    model = DesignFunctions(rec)
-    return model.f(np.zeros(3), y) + model.G(y) @ u
 
 
 def flow_noise(errors: SensorErrors, V: float) -> np.ndarray:

@@ -336,11 +336,9 @@ def inertia_of(design: np.void) -> InertiaCoefficients:
 
 def inertial(inertia: InertiaCoefficients, x: np.ndarray) -> np.ndarray:
     """The angular acceleration (n, 3) rad/s2 of turning with no moment, from the rate products [FDC]."""
-    p, q, r = x.T
-    roll = inertia.Ppq * p * q + inertia.Pqr * q * r
-    pitch = inertia.Qpp * p * p + inertia.Qpr * p * r + inertia.Qrr * r * r
-    yaw = inertia.Rpq * p * q + inertia.Rqr * q * r
-    return np.column_stack([roll, pitch, yaw])
+    f = np.zeros((3, len(x)))
+    plain(add_coupling)(inertia, x.T, f)
+    return f.T
 
 
 @sized

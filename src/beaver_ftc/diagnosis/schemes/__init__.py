@@ -50,7 +50,7 @@ def configure_diagnosis(fdi: np.void, pred: np.void, declared: Declared, travel:
     config, aircraft, dt = declared.fdi, declared.aircraft, 1.0 / declared.rate_hz
     rows = isolation.list_estimators(config.fault_class, aircraft)
     state.configure_shared(fdi["config"], declared)
-    fdi["config"]["variant"] = adaptive_estimators.variant_row(config)
+    fdi["config"]["variant"] = adaptive_estimators.whose_exclusions(config)
     state.configure_layout(fdi["layout"], rows, aircraft)
     isolation.configure_isolation(fdi["isolation"], declared, rows, travel)
     if config.pairs:

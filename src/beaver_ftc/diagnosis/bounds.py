@@ -57,7 +57,6 @@ from beaver_ftc.design.model import (
     N_Y,
     PH,
     QDYN,
-    QH,
     RH,
     DesignFunctions,
     InertiaCoefficients,
@@ -617,19 +616,14 @@ def coefficient_bounds(
     (statistical.py); y, u in trim."""
     aircraft, errors = declared.aircraft, declared.sensors
     C = np.abs(model["moments"]["value"][: len(aircraft.moments)])
-    dI = inertia_bounds(declared.inertia, mass)
-    inertia = np.abs(inertia_coefficients(mass))
-    own = (2, 7, 11)  # what multiplies a moment there
-    relative = np.full(C.shape, max(dI[i] / inertia[i] for i in own))
-    relative += [_signal_error(errors, term) for term in aircraft.moments]
+    own = [2, 7, 11]  # what multiplies a moment there
+    by_inertia = inertia_bounds(declared.inertia, mass)[own] / np.abs(inertia_coefficients(mass))[own]
+    relative = by_inertia.max() + [_signal_error(errors, term) for term in aircraft.moments]
     tol = declared.coefficients.absolute(aircraft.moments, C) + relative * C
-    slopes = np.abs(coefficient_slopes(model, np.zeros(3), y, u))
     b, c = aircraft.geometry.span_m, aircraft.geometry.chord_m
-    for name, j, length in zip(AXES, (PH, QH, RH), (b / 2, c, b / 2), strict=True):
-        rate = errors[name].steady * length / y[AIRSPEED]
-        for k, term in enumerate(aircraft.moments):
-            if term.is_constant:
-                tol[k] += rate * slopes[moment_axis(term), j]
+    slopes = np.abs(coefficient_slopes(model, np.zeros(3), y, u))[:, PH : RH + 1]
+    by_gyros = slopes @ (errors.each("steady", AXES) * (b / 2, c, b / 2) / y[AIRSPEED])
+    tol += [by_gyros[moment_axis(term)] * term.is_constant for term in aircraft.moments]
     return tol
 
 
@@ -639,9 +633,8 @@ def _signal_error(errors: SensorErrors, term: Term) -> float:
     own = AXES[moment_axis(term)]  # a slope of it is counted once for all terms of the axis
     e = errors[own].slope + errors["qdyn"].slope
     for name, n in term.of:
-        if name in _GYRO_OF:
-            e += n * errors["V"].slope
-        err = errors.get(_GYRO_OF.get(name, name))
-        if err is not None and _GYRO_OF.get(name) != own:
-            e += n * err.slope
+        gyro = _GYRO_OF.get(name)
+        err = errors.get(gyro or name)
+        e += n * errors["V"].slope if gyro else 0.0
+        e += n * err.slope if err is not None and gyro != own else 0.0
     return e

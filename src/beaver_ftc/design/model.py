@@ -418,13 +418,6 @@ def both_responses(design, x, y, f, G):
 
 
 @kernel
-def both_responses_along(design, x, y, f, G):
-    """The same for each row of y (n, 4 + declared): f (3,) of the last one, G (n, 3, surfaces) of all."""
-    for i in range(y.shape[0]):
-        both_responses(design, x, y[i], f, G[i])
-
-
-@kernel
 def rate_damping(design, x, y, u, scratch, out):
     """Fill out (3, 3) 1/s: what the aerodynamic moments' accelerations change by per rate of the aircraft
     against the air. x (3,) rad/s, y (4 + declared,), u (surfaces,) rad; scratch (MAX_MONOMIALS,)."""
@@ -505,17 +498,23 @@ def _split(design: np.void, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, n
     """The nonlinear f (3, ...) and G (3, n, ...) by the evaluator's plain functions, which take complex
     numbers and any number of states at once: x (3, ...), y (4 + declared, ...)."""
     record, table = _fields(design), _fields(design["moments"])
-    states, kind = np.broadcast_shapes(x.shape[1:], y.shape[1:]), np.result_type(x, y)
-    f, G = np.zeros((3, *states), kind), np.zeros((*record.G0.shape, *states), kind)
-    signal, power = np.zeros((N_SIGNALS, *states), kind), np.zeros((MAX_MONOMIALS, *states), kind)
+    states = np.broadcast_shapes(x.shape[1:], y.shape[1:])
+    signal = np.zeros((N_SIGNALS, *states), np.result_type(x, y))
     plain(signals)(table, x, y, signal)
-    plain(monomials)(table, signal, power)
-    f[:] = [plain(free_sum)(table, i, power) for i in range(3)]
-    plain(surface_sums)(table, power, G)
+    f, G = _coefficients(table, signal, record.G0.shape[1])
     plain(accelerate)(record, y, f[:, None])
     plain(accelerate)(record, y, G)
     plain(add_coupling)(record, x, f)
     return f, G
+
+
+def _coefficients(table: Any, signal: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Cl, Cm, Cn at neutral surfaces, (3, ...), and their slopes per rad of n surfaces, (3, n, ...)."""
+    states, kind = signal.shape[1:], signal.dtype
+    power, per_rad = np.zeros((MAX_MONOMIALS, *states), kind), np.zeros((3, n, *states), kind)
+    plain(monomials)(table, signal, power)
+    plain(surface_sums)(table, power, per_rad)
+    return np.array([plain(free_sum)(table, i, power) for i in range(3)]), per_rad
 
 
 def _fields(record: np.void) -> SimpleNamespace:
@@ -525,13 +524,9 @@ def _fields(record: np.void) -> SimpleNamespace:
 
 def coefficient_slopes(design: np.void, x: np.ndarray, y: np.ndarray, u: np.ndarray) -> np.ndarray:
     """d(Cl, Cm, Cn) / d signals, (3, N_SIGNALS), with the surfaces at u rad, by complex steps."""
-    table = _fields(design["moments"])
-    signal, power = np.zeros(N_SIGNALS, complex), np.zeros((MAX_MONOMIALS, N_SIGNALS), complex)
+    table, signal = _fields(design["moments"]), np.zeros(N_SIGNALS, complex)
     plain(signals)(table, x, y, signal)
-    plain(monomials)(table, signal[:, None] + 1j * _STEP * np.eye(N_SIGNALS), power)
-    per_rad = np.zeros((3, u.size, N_SIGNALS), complex)
-    plain(surface_sums)(table, power, per_rad)
-    free = np.array([plain(free_sum)(table, i, power) for i in range(3)])
+    free, per_rad = _coefficients(table, signal[:, None] + 1j * _STEP * np.eye(N_SIGNALS), u.size)
     return (free + np.einsum("isk,s->ik", per_rad, u)).imag / _STEP
 
 

@@ -137,8 +137,6 @@ def _load_scheme(path: str) -> CompiledScheme:
 
 SCHEMES = tuple(map(_load_scheme, SCHEME_KERNEL_PATHS))
 
-begin_scheme = one_of([scheme.begin_scheme for scheme in SCHEMES])
-advance_estimators_to_frame = one_of([scheme.advance_estimators_to_frame for scheme in SCHEMES])
-update_verdict = one_of([scheme.update_verdict for scheme in SCHEMES])
-prepare_next_frame = one_of([scheme.prepare_next_frame for scheme in SCHEMES])
-accumulate_substep = one_of([scheme.accumulate_substep for scheme in SCHEMES])
+begin_scheme, advance_estimators_to_frame, update_verdict, prepare_next_frame, accumulate_substep = map(
+    one_of, zip(*SCHEMES, strict=True)
+)

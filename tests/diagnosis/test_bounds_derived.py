@@ -42,7 +42,7 @@ def bound(x, y, u, **bounds):
     scenario = Scenario.model_validate({"name": "x", "fdi": {"bounds": bounds}})
     frame = configure_design(scenario, TRAVEL_RAD)[0]
     out = np.zeros(3)
-    add_declared_bound(frame["fdi"]["bound"]["declared_errors"], frame["prediction"]["design"], x, y, u, out)
+    add_declared_bound(frame["fdi"]["bound"]["declared_errors"], x, y, u, out)
     return out
 
 

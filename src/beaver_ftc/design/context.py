@@ -68,15 +68,15 @@ class DeclaredErrors:
     @cached_property
     def errors(self) -> bool:
         """Whether any error is declared."""
-        shares = self.noise, self.bias, self.resolution, self.slope, self.gust_rad_s, self.coefficients
-        of_servos = self.bandwidth_error, self.rate_limit_error, self.dead_band_rad, self.deflection_rad
-        return bool(any(np.any(share) for share in (*shares, *of_servos)) or self.inertia)
+        servos = self.bandwidth_error, self.rate_limit_error, self.dead_band_rad
+        others = self.coefficients, *servos, self.deflection_rad, self.inertia
+        return self.noisy or any(np.any(error) for error in others)
 
     @property
     def noisy(self) -> bool:
         """Whether errors of instruments or turbulence are declared."""
-        shares = self.noise, self.bias, self.resolution, self.slope, self.gust_rad_s
-        return any(np.any(share) for share in shares)
+        errors = self.noise, self.bias, self.resolution, self.slope, self.gust_rad_s
+        return any(np.any(error) for error in errors)
 
     @property
     def air(self) -> bool:

@@ -14,7 +14,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import Term, load
 from beaver_ftc.aircraft.aircraft import FORCES, GRAVITY_MPS2, MOMENTS
-from beaver_ftc.design.model import engine_power_kw, inertia_coefficients, slipstream
+from beaver_ftc.design.model import engine_power_kw, slipstream
 
 _AIRCRAFT = load()  # the equations are those of any aircraft, the engine is that of the built-in one
 GEOMETRY, MASS = _AIRCRAFT.geometry, _AIRCRAFT.mass
@@ -95,14 +95,13 @@ def derivatives(
 
 def _flow_rates(state: np.ndarray, of: Mapping, betadot_ratio: float) -> np.ndarray:
     """Vdot, alphadot, betadot; the force of betadot acts across the flight path: it changes betadot alone."""
-    V, alpha, beta, p, q, r, phi, theta = state[:8]
-    weight, area = MASS.mass_kg * gravity(state[11]), of["qdyn"] * GEOMETRY.wing_area_m2
-    X = area * of["CX"] - weight * np.sin(theta)
-    Y = area * of["CY"] + weight * np.cos(theta) * np.sin(phi)
-    Z = area * of["CZ"] + weight * np.cos(theta) * np.cos(phi)
+    V, alpha, beta, p, q, r = state[:6]
+    area, down = of["qdyn"] * GEOMETRY.wing_area_m2, _to_body(*state[6:9])[:, 2]
+    force = area * np.array([of[name] for name in FORCES]) + MASS.mass_kg * gravity(state[11]) * down
+    X, Y, Z = force
     ca, sa, cb, sb = np.cos(alpha), np.sin(alpha), np.cos(beta), np.sin(beta)
     mV = MASS.mass_kg * V
-    Vdot = (X * ca * cb + Y * sb + Z * sa * cb) / MASS.mass_kg
+    Vdot = force @ _flow(alpha, beta) / MASS.mass_kg
     alphadot = (Z * ca - X * sa) / (mV * cb) + q - (p * ca + r * sa) * sb / cb
     betadot = (Y * cb - (X * ca + Z * sa) * sb) / mV + p * sa - r * ca
     side = betadot_ratio * _CY_BETADOT * area * GEOMETRY.span_m / (2 * V) / mV
@@ -110,18 +109,31 @@ def _flow_rates(state: np.ndarray, of: Mapping, betadot_ratio: float) -> np.ndar
 
 
 _CY_BETADOT = _AIRCRAFT.terms["CY_betadot"].value
+_INERTIA_KG_M2 = np.array(
+    [[MASS.Ix_kg_m2, 0.0, -MASS.Jxz_kg_m2], [0.0, MASS.Iy_kg_m2, 0.0], [-MASS.Jxz_kg_m2, 0.0, MASS.Iz_kg_m2]]
+)
 
 
 def _body_accelerations(state: np.ndarray, of: Mapping) -> np.ndarray:
-    """pdot, qdot, rdot."""
-    p, q, r = state[3:6]
-    i, area = inertia_coefficients(MASS), of["qdyn"] * GEOMETRY.wing_area_m2
-    L, N = area * GEOMETRY.span_m * of["Cl"], area * GEOMETRY.span_m * of["Cn"]
-    M = area * GEOMETRY.chord_m * of["Cm"]
-    pdot = i.Ppq * p * q + i.Pqr * q * r + i.Pl * L + i.Pn * N
-    qdot = i.Qpp * p * p + i.Qpr * p * r + i.Qrr * r * r + i.Qm * M
-    rdot = i.Rpq * p * q + i.Rqr * q * r + i.Rl * L + i.Rn * N
-    return np.array([pdot, qdot, rdot])
+    """pdot, qdot, rdot: I x' = M - x x I x."""
+    x, lengths = state[3:6], (GEOMETRY.span_m, GEOMETRY.chord_m, GEOMETRY.span_m)
+    arms = of["qdyn"] * GEOMETRY.wing_area_m2 * np.array(lengths)
+    M = arms * np.array([of[name] for name in MOMENTS])
+    return np.linalg.solve(_INERTIA_KG_M2, M - np.cross(x, _INERTIA_KG_M2 @ x))
+
+
+def _flow(alpha: complex, beta: complex) -> np.ndarray:
+    """Direction of the velocity in body axes, (3,)."""
+    return np.array([np.cos(alpha) * np.cos(beta), np.sin(beta), np.sin(alpha) * np.cos(beta)])
+
+
+def _to_body(phi: complex, theta: complex, psi: complex) -> np.ndarray:
+    """Rotation (3, 3) from north, east, down to body axes."""
+    sf, cf, st, ct, sp, cp = (f(a) for a in (phi, theta, psi) for f in (np.sin, np.cos))
+    roll = np.array([[1, 0, 0], [0, cf, sf], [0, -sf, cf]])
+    pitch = np.array([[ct, 0, -st], [0, 1, 0], [st, 0, ct]])
+    yaw = np.array([[cp, sp, 0], [-sp, cp, 0], [0, 0, 1]])
+    return roll @ pitch @ yaw
 
 
 def _euler_rates(state: np.ndarray) -> np.ndarray:
@@ -133,13 +145,8 @@ def _euler_rates(state: np.ndarray) -> np.ndarray:
 
 def _track(state: np.ndarray) -> np.ndarray:
     """Velocity over the ground: north, east, up, in still air."""
-    V, alpha, beta = state[:3]
-    phi, theta, psi = state[6:9]
-    u, v, w = V * np.cos(alpha) * np.cos(beta), V * np.sin(beta), V * np.sin(alpha) * np.cos(beta)
-    across, down = v * np.cos(phi) - w * np.sin(phi), v * np.sin(phi) + w * np.cos(phi)
-    ahead = u * np.cos(theta) + down * np.sin(theta)
-    north, east = ahead * np.cos(psi) - across * np.sin(psi), ahead * np.sin(psi) + across * np.cos(psi)
-    return np.array([north, east, u * np.sin(theta) - down * np.cos(theta)])
+    north, east, down = state[0] * _flow(*state[1:3]) @ _to_body(*state[6:9])
+    return np.array([north, east, -down])
 
 
 def linearise(

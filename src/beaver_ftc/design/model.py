@@ -336,11 +336,9 @@ def inertia_of(design: np.void) -> InertiaCoefficients:
 
 def inertial(inertia: InertiaCoefficients, x: np.ndarray) -> np.ndarray:
     """The angular acceleration (n, 3) rad/s2 of turning with no moment, from the rate products [FDC]."""
-    p, q, r = x.T
-    roll = inertia.Ppq * p * q + inertia.Pqr * q * r
-    pitch = inertia.Qpp * p * p + inertia.Qpr * p * r + inertia.Qrr * r * r
-    yaw = inertia.Rpq * p * q + inertia.Rqr * q * r
-    return np.column_stack([roll, pitch, yaw])
+    f = np.zeros((3, len(x)))
+    plain(add_coupling)(inertia, x.T, f)
+    return f.T
 
 
 @sized
@@ -380,44 +378,43 @@ def design_record(
 
 
 @kernel
-def accelerations_of_moments(design, x, L, M, N, f):
-    """Fill f (3,) rad/s2 from rates x (3,) rad/s and moments N m."""
+def add_coupling(design, x, f):
+    """Add to f (3,) rad/s2 what the inertia makes of the rates x (3,) rad/s."""
     p, q, r = x[0], x[1], x[2]
-    f[0] = design.Ppq * p * q + design.Pqr * q * r + design.Pn * N + design.Pl * L
-    f[1] = design.Qpp * p * p + design.Qpr * p * r + design.Qrr * r * r + design.Qm * M
-    f[2] = design.Rpq * p * q + design.Rqr * q * r + design.Rn * N + design.Rl * L
+    f[0] += design.Ppq * p * q + design.Pqr * q * r
+    f[1] += design.Qpp * p * p + design.Qpr * p * r + design.Qrr * r * r
+    f[2] += design.Rpq * p * q + design.Rqr * q * r
 
 
 @kernel
-def accelerations_per_rad(design, y, G):
-    """Turn G (3, surfaces) from slopes of Cl, Cm, Cn into rad/s2 per rad."""
-    lateral = y[QDYN] * design.S * design.b
-    longitudinal = design.Qm * y[QDYN] * design.S * design.c
-    for s in range(G.shape[1]):
-        Cl, Cn = G[0, s], G[2, s]
-        in_roll, in_yaw = design.Pn * Cn + design.Pl * Cl, design.Rn * Cn + design.Rl * Cl
-        G[0, s], G[1, s], G[2, s] = lateral * in_roll, longitudinal * G[1, s], lateral * in_yaw
+def accelerate(design, y, C):
+    """Turn C (3, columns) from coefficients Cl, Cm, Cn into the accelerations that they cause, rad/s2."""
+    qS = y[QDYN] * design.S
+    for k in range(C.shape[1]):
+        L, M, N = qS * design.b * C[0, k], qS * design.c * C[1, k], qS * design.b * C[2, k]
+        C[0, k] = design.Pl * L + design.Pn * N
+        C[1, k] = design.Qm * M
+        C[2, k] = design.Rl * L + design.Rn * N
+
+
+@kernel
+def evaluated_responses(design, x, y, f, G):
+    """Fill f and G as `both_responses` does, from the table's monomials as they are."""
+    table = design.moments
+    for i in range(3):
+        f[i] = free_sum(table, i, table.power)
+    surface_sums(table, table.power, G)
+    accelerate(design, y, f.reshape(3, 1))
+    accelerate(design, y, G)
+    add_coupling(design, x, f)
 
 
 @kernel
 def both_responses(design, x, y, f, G):
     """Fill f (3,) rad/s2, the angular acceleration at neutral surfaces, and G (3, surfaces) rad/s2 per rad,
     that of each surface, whatever the rates. x (3,) rad/s, y (4 + declared,)."""
-    table, power = design.moments, design.moments.power
-    evaluate(table, x, y)
-    lateral, longitudinal = y[QDYN] * design.S * design.b, y[QDYN] * design.S * design.c
-    Cl, Cn = free_sum(table, 0, power), free_sum(table, 2, power)
-    Cm = free_sum(table, 1, power)
-    accelerations_of_moments(design, x, lateral * Cl, longitudinal * Cm, lateral * Cn, f)
-    surface_sums(table, power, G)
-    accelerations_per_rad(design, y, G)
-
-
-@kernel
-def both_responses_along(design, x, y, f, G):
-    """The same for each row of y (n, 4 + declared): f (3,) of the last one, G (n, 3, surfaces) of all."""
-    for i in range(y.shape[0]):
-        both_responses(design, x, y[i], f, G[i])
+    evaluate(design.moments, x, y)
+    evaluated_responses(design, x, y, f, G)
 
 
 @kernel
@@ -426,16 +423,12 @@ def rate_damping(design, x, y, u, scratch, out):
     against the air. x (3,) rad/s, y (4 + declared,), u (surfaces,) rad; scratch (MAX_MONOMIALS,)."""
     table = design.moments
     evaluate(table, x, y)
-    lateral, longitudinal = y[QDYN] * design.S * design.b, y[QDYN] * design.S * design.c
     for j in range(3):
         slopes(table, table.signal, table.power, PH + j, scratch)
         per_rate = design.c / y[AIRSPEED] if j == 1 else design.b / (2 * y[AIRSPEED])
-        L = lateral * whole_sum(table, 0, scratch, u) * per_rate
-        M = longitudinal * whole_sum(table, 1, scratch, u) * per_rate
-        N = lateral * whole_sum(table, 2, scratch, u) * per_rate
-        out[0, j] = design.Pl * L + design.Pn * N
-        out[1, j] = design.Qm * M
-        out[2, j] = design.Rl * L + design.Rn * N
+        for i in range(3):
+            out[i, j] = whole_sum(table, i, scratch, u) * per_rate
+    accelerate(design, y, out)
 
 
 @kernel
@@ -456,7 +449,6 @@ def acceleration(f, G, u, out):
 assert (PH, RH) == (2, 4)  # rates are neighbours among the signals: see rate_damping
 
 
-_BLOCK = 10_000  # states that are evaluated at once
 _STEP = 1e-30  # of a complex step: far below rounding, so the derivative is exact to rounding
 
 
@@ -506,17 +498,23 @@ def _split(design: np.void, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, n
     """The nonlinear f (3, ...) and G (3, n, ...) by the evaluator's plain functions, which take complex
     numbers and any number of states at once: x (3, ...), y (4 + declared, ...)."""
     record, table = _fields(design), _fields(design["moments"])
-    states, kind = np.broadcast_shapes(x.shape[1:], y.shape[1:]), np.result_type(x, y)
-    f, G = np.zeros((3, *states), kind), np.zeros((*record.G0.shape, *states), kind)
-    signal, power = np.zeros((N_SIGNALS, *states), kind), np.zeros((MAX_MONOMIALS, *states), kind)
+    states = np.broadcast_shapes(x.shape[1:], y.shape[1:])
+    signal = np.zeros((N_SIGNALS, *states), np.result_type(x, y))
     plain(signals)(table, x, y, signal)
-    plain(monomials)(table, signal, power)
-    arms = [y[QDYN] * record.S * length for length in (record.b, record.c, record.b)]
-    moments = [arm * plain(free_sum)(table, i, power) for i, arm in enumerate(arms)]
-    plain(accelerations_of_moments)(record, x, *moments, f)
-    plain(surface_sums)(table, power, G)
-    plain(accelerations_per_rad)(record, y, G)
+    f, G = _coefficients(table, signal, record.G0.shape[1])
+    plain(accelerate)(record, y, f[:, None])
+    plain(accelerate)(record, y, G)
+    plain(add_coupling)(record, x, f)
     return f, G
+
+
+def _coefficients(table: Any, signal: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Cl, Cm, Cn at neutral surfaces, (3, ...), and their slopes per rad of n surfaces, (3, n, ...)."""
+    states, kind = signal.shape[1:], signal.dtype
+    power, per_rad = np.zeros((MAX_MONOMIALS, *states), kind), np.zeros((3, n, *states), kind)
+    plain(monomials)(table, signal, power)
+    plain(surface_sums)(table, power, per_rad)
+    return np.array([plain(free_sum)(table, i, power) for i in range(3)]), per_rad
 
 
 def _fields(record: np.void) -> SimpleNamespace:
@@ -526,29 +524,18 @@ def _fields(record: np.void) -> SimpleNamespace:
 
 def coefficient_slopes(design: np.void, x: np.ndarray, y: np.ndarray, u: np.ndarray) -> np.ndarray:
     """d(Cl, Cm, Cn) / d signals, (3, N_SIGNALS), with the surfaces at u rad, by complex steps."""
-    table = _fields(design["moments"])
-    signal, power = np.zeros(N_SIGNALS, complex), np.zeros((MAX_MONOMIALS, N_SIGNALS), complex)
+    table, signal = _fields(design["moments"]), np.zeros(N_SIGNALS, complex)
     plain(signals)(table, x, y, signal)
-    plain(monomials)(table, signal[:, None] + 1j * _STEP * np.eye(N_SIGNALS), power)
-    per_rad = np.zeros((3, u.size, N_SIGNALS), complex)
-    plain(surface_sums)(table, power, per_rad)
-    free = np.array([plain(free_sum)(table, i, power) for i in range(3)])
+    free, per_rad = _coefficients(table, signal[:, None] + 1j * _STEP * np.eye(N_SIGNALS), u.size)
     return (free + np.einsum("isk,s->ik", per_rad, u)).imag / _STEP
 
 
 def responses_at(design: np.void, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """f (n, 3) rad/s2 and G (n, 3, surfaces) rad/s2 per rad at many states, without compiled code: what
-    `response` gives at each of x (n, 3) rad/s and y (n, 4 + declared)."""
-    m = y.shape[1]
-    if design["linearised"]:
-        away = (x - design["x0"]) @ design["f_x"].T + (y - design["y0"][:m]) @ design["f_y"][:, :m].T
-        return design["f0"] + away, np.broadcast_to(design["G0"], (len(x), *design["G0"].shape))
-    if design["frozen_alpha"]:
-        y = y.copy()
-        y[:, ALPHA] = design["y0"][ALPHA]
-    blocks = [slice(k, k + _BLOCK) for k in range(0, len(x), _BLOCK)]  # of a long flight: memory
-    f, G = zip(*(_split(design, x[rows].T, y[rows].T) for rows in blocks), strict=True)
-    return np.concatenate(f, axis=-1).T, np.moveaxis(np.concatenate(G, axis=-1), -1, 0)
+    """f (n, 3) rad/s2 and G (n, 3, surfaces) rad/s2 per rad at many states: what `response` gives at each of
+    x (n, 3) rad/s and y (n, 4 + declared)."""
+    f, G = np.empty(x.shape), np.zeros((len(x), *design["G0"].shape))
+    responses(design, np.ascontiguousarray(x), np.ascontiguousarray(y), f, G)
+    return f, G
 
 
 def acceleration_at(design: np.void, x: np.ndarray, y: np.ndarray, u: np.ndarray) -> np.ndarray:
@@ -559,7 +546,8 @@ def acceleration_at(design: np.void, x: np.ndarray, y: np.ndarray, u: np.ndarray
 
 def unanticipated_at(design: np.void, y: np.ndarray, Cm_alpha3: np.ndarray) -> np.ndarray:
     """What `unanticipated_pitch` gives at each of y (n, 5) and Cm_alpha3 (n,): (n,) rad/s2."""
-    return Cm_alpha3 * design["Qm"] * y[:, QDYN] * design["S"] * design["c"] * y[:, ALPHA] ** 3
+    pitch: np.ndarray = plain(unanticipated_pitch)(_fields(design), y.T, Cm_alpha3)
+    return pitch
 
 
 def effectiveness(design: np.void, y: np.ndarray) -> np.ndarray:
@@ -590,9 +578,9 @@ def response(design, x, y, f, G):
 
 @kernel
 def responses(design, x, y, f, G):
-    """The same at each of x (n, 3), into f (n, 3); G is that of y."""
+    """The same at each of x (n, 3) and y (n, 4 + declared), into f (n, 3) and G (n, 3, surfaces)."""
     for i in range(x.shape[0]):
-        response(design, x[i], y, f[i], G)
+        response(design, x[i], y[i], f[i], G[i])
 
 
 @kernel
@@ -621,13 +609,9 @@ class DesignFunctions:
 
     def f(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Angular acceleration (3,) rad/s² at neutral surfaces. For `x` (n, 3) the result is (n, 3)."""
-        return self._response(np.atleast_2d(x), y)[0].reshape(np.shape(x))
+        rows = np.atleast_2d(x)
+        return responses_at(self._record, rows, np.tile(y, (len(rows), 1)))[0].reshape(np.shape(x))
 
     def G(self, y: np.ndarray) -> np.ndarray:
         """Effectiveness matrix (3, surfaces), rad/s² per rad: acceleration for each rad of a surface."""
-        return self._response(np.zeros((1, 3)), y)[1]
-
-    def _response(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        f, G = np.empty(x.shape), np.zeros(self._record["G0"].shape)
-        responses(self._record, np.ascontiguousarray(x), np.ascontiguousarray(y), f, G)
-        return f, G
+        return responses_at(self._record, np.zeros((1, 3)), y[None])[1][0]

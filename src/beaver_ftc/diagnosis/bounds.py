@@ -5,9 +5,11 @@ coefficient times powers of measured signals. If every factor f is known to with
 
     |prod (f + e) - prod f| <= prod (|f| + |e|) - prod |f|
 
-and the sum of these over the terms bounds |F(truth) - F(measured)| at this state. If all errors have one
-sign, each term reaches its bound. The same bound serves the isolation estimators: a lost share of a surface
-multiplies its terms by 1 + theta in [0, 1], and with them their error.
+and the sum of these over the terms bounds |F(truth) - F(measured)| at this state. The sum of prod |f| is the
+design model with |f| in place of each factor, and that of prod (|f| + |e|) the same with |f| + |e|: the bound
+is the difference of two evaluations of one model. If all errors have one sign, each term reaches its bound.
+The same bound serves the isolation estimators: a lost share of a surface multiplies its terms by 1 + theta in
+[0, 1], and with them their error.
 
 A gyro's error appears once more, because xdot is computed from the gyro's readings. Its constant part drops
 out of the difference. Of the changing part n with |n| <= nbar the filter eps[k+1] = a eps[k] + n[k+1] - n[k]
@@ -29,9 +31,6 @@ Symbols of the kernels (err: of `errors_dtype`, emap: of `map_dtype`, model: the
     x (3,) rad/s, y, u (n,) rad   rates, readings, deflections; in err [0] is the magnitude as measured, [1]
                                   the worst that the errors allow
     eta (3,) rad/s2               bound on the uncertainty
-    C, dC; c, dc                  coefficient and its tolerance, of a moment's term; of inertia, dI (12,)
-    L, M, N  N m                  moments: sum of their terms' magnitudes
-    q Pa, S m2, l m               dynamic pressure, wing area, span or chord
     z (coordinates,)              place in the map: x, then y with the density in place of dynamic pressure
     b, j, k                       box, level of travel, row of time of the map
     s, i                          surface, axis
@@ -47,7 +46,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import AXES, Aircraft, MassProperties, Term
 from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S, MOMENTS
-from beaver_ftc.aircraft.schema import MAX_AGES, MAX_BOXES, MAX_LEVELS, MAX_MONOMIALS, MAX_TERMS, RATE_SIGNALS
+from beaver_ftc.aircraft.schema import MAX_AGES, MAX_BOXES, MAX_LEVELS, RATE_SIGNALS
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.design import LEAST_HEIGHT_M
 from beaver_ftc.design.model import (
@@ -55,21 +54,23 @@ from beaver_ftc.design.model import (
     DPT,
     DPT_0,
     KW_TO_DPT,
-    N_SIGNALS,
     N_Y,
     PH,
     QDYN,
-    QH,
     RH,
     DesignFunctions,
+    InertiaCoefficients,
+    acceleration,
+    acceleration_at,
     coefficient_slopes,
     density_ratio,
+    design_dtype,
+    evaluate,
+    evaluated_responses,
     inertia_coefficients,
     jacobian,
     mass_of,
-    monomials,
     power_error_kw,
-    signals,
 )
 from beaver_ftc.diagnosis.state import fill
 from beaver_ftc.plant.faults import OF_THE_SLIPSTREAM
@@ -98,8 +99,6 @@ def errors_dtype(n: int) -> np.dtype:
     """The declared errors beyond the published bound, of an aircraft with n surfaces."""
     return record(
         given=int,
-        dC=MAX_TERMS,  # of each moment coefficient, as the design model has them
-        dI=12,  # of each inertia coefficient, in the order of design.model
         # error of a signal: offset + slope |signal|
         e0=7, e1=7,
         steady=3,  # of the offset of a gyro, what does not change
@@ -110,8 +109,10 @@ def errors_dtype(n: int) -> np.dtype:
         wg_aloft=float, wg_1m=float, h0=float, h1=float,
         # of dpt: see `slipstream_bound`
         engine=int, kw0=float, kw1=float,
-        # scratch: magnitudes as measured [0], and as large as they can be [1]
-        x=(2, 3), y=(2, N_Y), u=(2, n), x_air=3, sig=N_SIGNALS, m=(2, MAX_MONOMIALS), eG=(3, n),
+        # the design model of magnitudes [0], and of the largest magnitudes that the errors allow [1]
+        model=(design_dtype(n), 2),
+        # the same of rates, also relative to the air, of readings and deflections; what the models give there
+        x=(2, 3), x_air=(2, 3), y=(2, N_Y), u=(2, n), f=(2, 3), G=(2, 3, n), F=(2, 3), eG=(3, n),
     )  # fmt: skip
 
 
@@ -165,9 +166,8 @@ def fill_map(emap: np.void, aircraft: Aircraft, one_free: bool, two_free: bool) 
     emap["until_s"][:n_rows] = declared.until_s
     emap["share"][:n_levels] = declared.travel_share
     for b, box in enumerate(declared.boxes):
-        ends = np.array(box.ends(aircraft.signals))
-        emap["lo"][b, : len(ends)] = ends[:, 0]
-        emap["hi"][b, : len(ends)] = ends[:, 1]
+        ends = np.transpose(box.ends(aircraft.signals))
+        emap["lo"][b, : ends.shape[1]], emap["hi"][b, : ends.shape[1]] = ends
         tables = box.error_p_rad_s2, box.error_q_rad_s2, box.error_r_rad_s2
         emap["e"][:n_rows, b, :n_levels] = np.stack(tables, axis=-1)
         emap["yaw"][b] = box.engines_apart or 0.0
@@ -209,85 +209,37 @@ def fill_magnitudes(err, x, y, u):
     """Fill x, y, u with |signal| as measured, and with the largest |signal| that the errors allow; for
     airspeed, the smallest. x_air: these rates with the air's rotation.
     """
-    for i in range(3):
-        err.x[0, i] = abs(x[i])
-        err.x[1, i] = abs(x[i]) + reading_bound(err, i, x[i])
-        err.x_air[i] = err.x[1, i] + err.wg[i]
-    for i in range(y.size):
-        err.y[0, i] = abs(y[i])
-        err.y[1, i] = abs(y[i]) + (reading_bound(err, _Y0 + i, y[i]) if i < DPT else 0.0)
+    for v in range(2):
+        for i in range(3):
+            err.x[v, i] = abs(x[i]) + v * reading_bound(err, i, x[i])
+            err.x_air[v, i] = err.x[v, i] + v * err.wg[i]
+        for i in range(y.size):
+            err.y[v, i] = abs(y[i]) + (v * reading_bound(err, _Y0 + i, y[i]) if i < DPT else 0.0)
+        for s in range(u.size):
+            err.u[v, s] = abs(u[s]) + v * err.du[s]
     if err.engine:
         err.y[1, DPT] += slipstream_bound(err, y)
-    for s in range(u.size):
-        err.u[0, s] = abs(u[s])
-        err.u[1, s] = abs(u[s]) + err.du[s]
     V = y[AIRSPEED]
     err.y[1, AIRSPEED] = max(2.0 * V - err.y[1, AIRSPEED], _MIN_V_SHARE * V)
 
 
 @kernel
-def moment_size(err, model, i, s, v):
-    """q S l sum (|C| + v dC) m |u|, N m: magnitudes of the terms of moment i as measured (v = 0), or the
-    largest that the errors allow (v = 1).
+def add_declared_bound(err, x, y, u, eta):
+    """Add to eta the bound by the declared errors, and fill eG, that on the effect of each surface, per rad.
 
-    m: product of a term's signals. s: the surface whose terms alone count, per rad; -1: all terms do.
+        eta <- eta + F_1 - F_0      eG = G_1 - G_0      F = f + G u
+
+    F_0, F_1: the design model of magnitudes, at the magnitudes as measured and at the largest possible ones.
     """
-    tab, C = model.moments, 0.0
-    for k in range(tab.free_from[i], tab.surface_to[i]):
-        at = tab.surface[k]
-        if s < 0 or at == s:
-            u = err.u[v, at] if s < 0 <= at else 1.0
-            C += (abs(tab.value[k]) + v * err.dC[k]) * err.m[v, tab.monomial[k]] * u
-    return model.S * (model.c if i == 1 else model.b) * err.y[v, QDYN] * C
-
-
-@kernel
-def inertia_factors(err, model, s, v):
-    """What the twelve inertia coefficients multiply, in their order; s, v: see `moment_size`. For one surface
-    alone the rates do not count."""
-    w = 1.0 if s < 0 else 0.0
-    p, q, r = w * err.x[v, 0], w * err.x[v, 1], w * err.x[v, 2]
-    L, N = moment_size(err, model, 0, s, v), moment_size(err, model, 2, s, v)
-    return p * q, q * r, L, N, p * p, p * r, r * r, moment_size(err, model, 1, s, v), p * q, q * r, L, N
-
-
-@kernel
-def add_product_bounds(err, model, s, eta):
-    """Add to eta the bound on the error of each inertia coefficient c times its factor f:
-
-        eta_i <- eta_i + sum (|c| + dI) fw - |c| f
-
-    s: the surface whose moments alone count, per rad; -1: all moments and the rates do.
-    """
-    f, fw = inertia_factors(err, model, s, 0), inertia_factors(err, model, s, 1)
-    c = (
-        *(model.Ppq, model.Pqr, model.Pl, model.Pn),
-        *(model.Qpp, model.Qpr, model.Qrr, model.Qm),
-        *(model.Rpq, model.Rqr, model.Rl, model.Rn),
-    )
-    for k in range(12):
-        eta[k // 4] += (abs(c[k]) + err.dI[k]) * fw[k] - abs(c[k]) * f[k]
-
-
-@kernel
-def fill_eG(err, model, s):
-    """Fill eG[:, s], rad/s2 per rad: bound on the error of the effect of surface s.
-
-    The declared bound is affine in |u_s|; this is its slope. `add_declared_bound` fills what it reads.
-    """
-    err.eG[:, s] = 0.0
-    add_product_bounds(err, model, s, err.eG[:, s])
-
-
-@kernel
-def add_declared_bound(err, model, x, y, u, eta):
-    """Add to eta the bound by the declared errors: of each moment and product of rates, times its inertia."""
     fill_magnitudes(err, x, y, u)
-    signals(model.moments, err.x[0], err.y[0], err.sig)
-    monomials(model.moments, err.sig, err.m[0])
-    signals(model.moments, err.x_air, err.y[1], err.sig)
-    monomials(model.moments, err.sig, err.m[1])
-    add_product_bounds(err, model, -1, eta)
+    for v in range(2):
+        evaluate(err.model[v].moments, err.x_air[v], err.y[v])
+        evaluated_responses(err.model[v], err.x[v], err.y[v], err.f[v], err.G[v])
+        acceleration(err.f[v], err.G[v], err.u[v], err.F[v])
+    for i in range(3):
+        eta[i] += err.F[1, i] - err.F[0, i]
+        for s in range(u.size):
+            err.eG[i, s] = err.G[1, i, s] - err.G[0, i, s]
 
 
 @kernel
@@ -447,10 +399,7 @@ def fill_bound(bound, model, meas, u):
     eta[:] = 0.0
     if err.given:
         set_air_rotation(err, meas.altitude)
-        add_declared_bound(err, model, x, y, u, eta)
-        if bound.has_eG:
-            for s in range(u.size):
-                fill_eG(err, model, s)
+        add_declared_bound(err, x, y, u, eta)
     else:
         err.x[1, :] = x
     if emap.n_boxes > 0:
@@ -507,13 +456,17 @@ def configure_bound(bound: np.void, declared: Declared, model: np.void) -> None:
 def fill_errors(err: np.void, declared: Declared, model: np.void, mass: MassProperties) -> None:
     """Fill the declared errors; model, mass: record and mass properties of the design model."""
     errors, air, b = declared.sensors, declared.air, declared.aircraft.geometry.span_m
-    dC = declared.coefficients.absolute(declared.aircraft.moments, model["moments"]["value"])
-    err["dC"][: dC.size] = dC
     aloft = GUST_LIMIT_SIGMA * air.rotation_limit_rad_s(b)
+    dC = declared.coefficients.absolute(declared.aircraft.moments, model["moments"]["value"])
     dI, du = inertia_bounds(declared.inertia, mass), declared.deflections_rad
+    err["model"] = model
+    err["model"]["moments"]["value"] = np.abs(model["moments"]["value"])
+    err["model"]["moments"]["value"][1, : dC.size] += dC
+    for name, e in zip(InertiaCoefficients._fields, dI, strict=True):
+        err["model"][name] = abs(model[name]) + np.array([0.0, e])
     known = errors.is_ideal and declared.servo_errors.is_none
     fill(
-        err, dI=dI, du=du, du0=declared.deflection_rad, wg=aloft, wg_aloft=aloft,
+        err, du=du, du0=declared.deflection_rad, wg=aloft, wg_aloft=aloft,
         wg_1m=GUST_LIMIT_SIGMA * air.low_rotation_limit_rad_s(b),
         h0=errors["altitude"].worst, h1=errors["altitude"].slope,
         e0=errors.each("worst"), e1=errors.each("slope"), steady=errors.each("steady", AXES),
@@ -566,23 +519,19 @@ def plugin_errors(declared: Declared, model: np.ndarray, y: np.ndarray, u: np.nd
     from beaver_ftc.design.context import DeclaredErrors  # for plug-ins alone
 
     aircraft, errors = declared.aircraft, declared.sensors
-    servos, off = (
-        [getattr(of, s) for s in aircraft.surfaces] for of in (declared.servos, declared.servo_errors)
-    )
-    noise, bias, resolution = (errors.each(kind) for kind in ("noise", "steady", "resolution"))
+    instruments = {
+        f"{prefix}{name}": errors.each("steady" if name == "bias" else name, *readings)
+        for prefix, readings in (("", ()), ("further_", (_FURTHER_READINGS,)))
+        for name in ("noise", "bias", "resolution", "slope")
+    }
     dC = declared.coefficients.absolute(aircraft.moments, model["moments"]["value"][0])
     gust, gust_s = declared.air.rotation(float(y[2]), aircraft.geometry.span_m)
+    noise, bias, resolution, _ = list(instruments.values())[:4]
     sigma = np.sqrt(noise**2 + bias**2 + resolution**2 / 12.0)[_Y0:]
     du = declared.deflections_rad
     return DeclaredErrors(
-        noise=noise,
-        bias=bias,
-        resolution=resolution,
-        slope=errors.each("slope"),
-        **{
-            f"further_{name}": errors.each("steady" if name == "bias" else name, _FURTHER_READINGS)
-            for name in ("noise", "bias", "resolution", "slope")
-        },
+        **instruments,
+        **servo_data(declared),
         gust_rad_s=gust,
         gust_time_s=gust_s,
         gust_effect=air_rotation_slopes(DesignFunctions(model.copy()), y),
@@ -590,19 +539,28 @@ def plugin_errors(declared: Declared, model: np.ndarray, y: np.ndarray, u: np.nd
         inertia=declared.inertia,
         deflection_rad=declared.deflection_rad,
         model_rad_s2=model_error_std(model, y, u, sigma, dC, du),
-        bandwidth_rad_s=np.array([servo.bandwidth_rad_s for servo in servos]),
-        rate_limit_rad_s=np.radians([servo.rate_limit_deg_s for servo in servos]),
-        bandwidth_error=np.array([error.bandwidth for error in off]),
-        rate_limit_error=np.array([error.rate_limit for error in off]),
-        dead_band_rad=np.radians([error.dead_band_deg for error in off]),
     )
+
+
+def servo_data(declared: Declared) -> dict[str, np.ndarray]:
+    """The declared actuators and their errors, (surfaces,) each, by the names of `DeclaredErrors`."""
+    servos, off = (
+        [getattr(of, s) for s in declared.aircraft.surfaces]
+        for of in (declared.servos, declared.servo_errors)
+    )
+    return {
+        "bandwidth_rad_s": np.array([servo.bandwidth_rad_s for servo in servos]),
+        "rate_limit_rad_s": np.radians([servo.rate_limit_deg_s for servo in servos]),
+        "bandwidth_error": np.array([error.bandwidth for error in off]),
+        "rate_limit_error": np.array([error.rate_limit for error in off]),
+        "dead_band_rad": np.radians([error.dead_band_deg for error in off]),
+    }
 
 
 def air_rotation_slopes(model: DesignFunctions, y: np.ndarray) -> np.ndarray:
     """Angular acceleration of an aircraft at rest in air that rotates, (3, 3) 1/s: -df/dx without rates."""
-    step = 1e-4
-    columns = [(model.f(step * e, y) - model.f(-step * e, y)) / (2.0 * step) for e in np.eye(3)]
-    return -np.column_stack(columns)
+    steps = 1e-4 * np.eye(3)
+    return -((model.f(steps, y) - model.f(-steps, y)) / 2e-4).T
 
 
 def model_error_std(
@@ -613,20 +571,16 @@ def model_error_std(
     sigma (4,): errors of alpha, beta, airspeed, dynamic pressure; dC (terms,): of the coefficients, absolute;
     du (surfaces,) rad: of the deflections.
     """
-    F = _acceleration_at(model, y, u)
-    dy = np.pad(np.diag(sigma), ((0, 0), (0, y.size - sigma.size)))
-    dF = [_acceleration_at(model, y + d, u) - F for d in dy]
-    dF += [_acceleration_at(model, y, u + e) - F for e in np.diag(du)]
+    off_y = np.pad(np.diag(sigma), ((1, u.size), (0, y.size - sigma.size)))
+    off_u = np.pad(np.diag(du), ((1 + sigma.size, 0), (0, 0)))
+    rest = np.zeros((len(off_y), 3))
+    F = acceleration_at(model[0], rest, y + off_y, u + off_u)
+    dF = [*(F[1:] - F[0])]
     for k in np.flatnonzero(dC):
         changed = model.copy()
         changed["moments"]["value"][0][k] += dC[k]
-        dF.append(_acceleration_at(changed, y, u) - F)
+        dF.append(acceleration_at(changed[0], rest[:1], y[None], u[None])[0] - F[0])
     return np.sqrt(np.square(dF).sum(axis=0))
-
-
-def _acceleration_at(rec: np.ndarray, y: np.ndarray, u: np.ndarray) -> np.ndarray:
-    model = DesignFunctions(rec)
-    return model.f(np.zeros(3), y) + model.G(y) @ u
 
 
 def flow_noise(errors: SensorErrors, V: float) -> np.ndarray:
@@ -662,19 +616,14 @@ def coefficient_bounds(
     (statistical.py); y, u in trim."""
     aircraft, errors = declared.aircraft, declared.sensors
     C = np.abs(model["moments"]["value"][: len(aircraft.moments)])
-    dI = inertia_bounds(declared.inertia, mass)
-    inertia = np.abs(inertia_coefficients(mass))
-    own = (2, 7, 11)  # what multiplies a moment there
-    relative = np.full(C.shape, max(dI[i] / inertia[i] for i in own))
-    relative += [_signal_error(errors, term) for term in aircraft.moments]
+    own = [2, 7, 11]  # what multiplies a moment there
+    by_inertia = inertia_bounds(declared.inertia, mass)[own] / np.abs(inertia_coefficients(mass))[own]
+    relative = by_inertia.max() + [_signal_error(errors, term) for term in aircraft.moments]
     tol = declared.coefficients.absolute(aircraft.moments, C) + relative * C
-    slopes = np.abs(coefficient_slopes(model, np.zeros(3), y, u))
     b, c = aircraft.geometry.span_m, aircraft.geometry.chord_m
-    for name, j, length in zip(AXES, (PH, QH, RH), (b / 2, c, b / 2), strict=True):
-        rate = errors[name].steady * length / y[AIRSPEED]
-        for k, term in enumerate(aircraft.moments):
-            if term.is_constant:
-                tol[k] += rate * slopes[moment_axis(term), j]
+    slopes = np.abs(coefficient_slopes(model, np.zeros(3), y, u))[:, PH : RH + 1]
+    by_gyros = slopes @ (errors.each("steady", AXES) * (b / 2, c, b / 2) / y[AIRSPEED])
+    tol += [by_gyros[moment_axis(term)] * term.is_constant for term in aircraft.moments]
     return tol
 
 
@@ -684,9 +633,8 @@ def _signal_error(errors: SensorErrors, term: Term) -> float:
     own = AXES[moment_axis(term)]  # a slope of it is counted once for all terms of the axis
     e = errors[own].slope + errors["qdyn"].slope
     for name, n in term.of:
-        if name in _GYRO_OF:
-            e += n * errors["V"].slope
-        err = errors.get(_GYRO_OF.get(name, name))
-        if err is not None and _GYRO_OF.get(name) != own:
-            e += n * err.slope
+        gyro = _GYRO_OF.get(name)
+        err = errors.get(gyro or name)
+        e += n * errors["V"].slope if gyro else 0.0
+        e += n * err.slope if err is not None and gyro != own else 0.0
     return e

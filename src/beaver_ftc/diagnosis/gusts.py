@@ -179,6 +179,13 @@ def start_gust(gust, y, attitude):
 
 
 @kernel
+def turned(v, z):
+    """v (3,) in level axes, turned by an angle about the vertical; z = exp(i angle)."""
+    h = complex(v[0], v[1]) * z
+    return h.real, h.imag, v[2]
+
+
+@kernel
 def update_axes(gust, z):
     """Fill `C` for this instant, and keep that of the instant before in `C_dot`.
 
@@ -187,8 +194,7 @@ def update_axes(gust, z):
     T, C = gust.memory.T, gust.output.C
     gust.memory.C_dot[:] = C
     for i in range(3):
-        c = complex(T[i, 0], T[i, 1]) * z.conjugate()
-        C[i, :] = c.real, c.imag, T[i, 2]
+        C[i, :] = turned(T[i], z.conjugate())
 
 
 @kernel
@@ -204,19 +210,6 @@ def fill_axes_rate(gust, dt, V):
             C_dot[i, j] = (C[i, j] - C_dot[i, j]) / dt
             fastest = max(fastest, abs(C_dot[i, j]))
     gust.memory.turns_fast = 0.5 * (fastest * gust_lag(gust, 0, V)) ** 2 > FAST_TURN_SHARE
-
-
-@kernel
-def yaw_turn_share(gust, V, psi_dot):
-    """Share of the yawing gust's intensity that is unmeasured at a rate psi_dot, rad/s, of the heading.
-
-        share = psi_dot^2 b L / (pi V^2)
-
-    The gusts turn with the aircraft: a gust from ahead, of deviation sigma, becomes one from the side. This
-    adds a change of rate sigma to the walk of intensity 3 sigma^2 V / L. The share is the ratio of their
-    squares over the lag of the yawing gust, 3 b / pi V.
-    """
-    return psi_dot * psi_dot * gust.config.span * gust.config.L_gust / (pi * V * V)
 
 
 @kernel
@@ -237,10 +230,10 @@ def advance_gust(gust, y, attitude, dt):
     for i in range(3):
         v[i] += dt * (1.5 * a[i] - 0.5 * (prev[i] if mem.has_prev else a[i]))
     mem.has_prev = 1
-    v_h, a_h, v_z = complex(v[0], v[1]) * z, complex(a[0], a[1]) * z, v[2]
-    prev[:] = a_h.real, a_h.imag, a[2]
+    prev[:] = turned(a, z)
+    v_still = turned(v, z)
     fill_velocity(gust, y, attitude)
-    dv = v_h.real - v[0], v_h.imag - v[1], v_z - v[2]
+    dv = v_still[0] - v[0], v_still[1] - v[1], v_still[2] - v[2]
     update_gust_speed(gust, dv, y[AIRSPEED], dt)
     update_axes(gust, z)
     fill_axes_rate(gust, dt, gust.output.V)
@@ -254,11 +247,17 @@ def update_rotation(gust, dv, psi_dot, dt):
         w_q <- exp(-dt / tau_q) w_q + dv_z / V tau_q      w_r <- exp(-dt / tau_r) w_r + dv_y / V tau_r
 
     dv (3,) m/s: change of the gust in level axes; psi_dot rad/s: rate of the heading; dt s.
+
+    The gusts turn with the aircraft: a gust from ahead, of deviation sigma, becomes one from the side. This
+    adds a change of rate sigma to the walk of intensity 3 sigma^2 V / L. The ratio of their squares over the
+    lag of the yawing gust, 3 b / pi V, is the share of its intensity that is unmeasured:
+
+        share = psi_dot^2 b L / (pi V^2)
     """
-    mem, V = gust.memory, gust.output.V
+    cfg, mem, V = gust.config, gust.memory, gust.output.V
     tau_q, tau_r = gust_lag(gust, 1, V), gust_lag(gust, 2, V)
     a_q, a_r = np.exp(-dt / tau_q), np.exp(-dt / tau_r)
-    previous, mem.turn_now = mem.turn_now, yaw_turn_share(gust, V, psi_dot)
+    previous, mem.turn_now = mem.turn_now, psi_dot * psi_dot * cfg.span * cfg.L_gust / (pi * V * V)
     larger = max(previous, mem.turn_now)
     mem.turn_past = min(max(a_r * mem.turn_past, larger), 1.0)
     mem.start_share *= a_q
@@ -323,12 +322,12 @@ def fill_gust_effect(gust, design, x, y, u):
     else:
         fill_force(gust, x, y, u, mem.f)
     rate_damping(design, x, y, u, mem.scratch, out.rate_damping)
+    mem.w_body[:] = 0.0
+    for i in range(3 if out.measured or cfg.coarse_only else 0):
+        mem.w_body[i] = out.C[i, 1] * mem.w[1] + out.C[i, 2] * mem.w[2]
+    acc, other = (out.acc, out.acc_coarse) if out.measured else (out.acc_coarse, out.acc)
     for i in range(3):
-        w_i = out.C[i, 1] * mem.w[1] + out.C[i, 2] * mem.w[2]
-        mem.w_body[i] = w_i if out.measured or cfg.coarse_only else 0.0
-    for i in range(3):
-        acc = -project_gust(mem.w_body, out.rate_damping.T, i)
-        out.acc[i], out.acc_coarse[i] = (acc, 0.0) if out.measured else (0.0, acc)
+        acc[i], other[i] = -project_gust(mem.w_body, out.rate_damping.T, i), 0.0
 
 
 @kernel
@@ -357,11 +356,12 @@ def drop_accelerometers(gust):
 
     Without a model of the forces the gust is then unmeasured, and all of its variance counts as unknown.
     """
-    gust.output.uses_accelerometers = 0
-    if gust.output.measured and not gust.config.has_forces:
-        gust.output.measured, gust.memory.share[:] = 0, 1.0
+    mem, out = gust.memory, gust.output
+    out.uses_accelerometers = 0
+    if out.measured and not gust.config.has_forces:
+        out.measured, mem.share[:] = 0, 1.0
         for j in range(1, 3):
-            add_variance(gust, gust.output.C, j, 0.5 * gust_lag(gust, j, 1.0) * gust.memory.Q[j])
+            add_variance(gust, out.C, j, 0.5 * gust_lag(gust, j, 1.0) * mem.Q[j])
 
 
 @kernel
@@ -373,16 +373,6 @@ def unmeasured_share(gust, j):
     var = cfg.var_V + mem.start_left * cfg.var_v if gust.output.measured else 0.0
     by_time = mem.start_share if j == 1 else mem.turn_past
     return min(mem.share[j] + cfg.speed_error_share * var / V**2 + by_time, 1.0)
-
-
-@kernel
-def rolling_scale(gust, j):
-    """Power of the gust about axis j at low frequency, over that with the length of the rolling gust.
-
-    A gust of the rolling gust's length and with this share of the intensity has the same power at low
-    frequency. It is 1 if vanes measure the gust: the spectrum of the unmeasured rest is not known.
-    """
-    return (gust_lag(gust, j, 1.0) / gust.config.L_roll) ** 2 if gust.config.coarse_only else 1.0
 
 
 @kernel
@@ -400,12 +390,12 @@ def unmeasured_drift(gust, V, i_1, i_2, as_rolling=False):
         V sum_j (L C)_i1j (L C)_i2j share_j Q_j
 
     as_rolling: that of a gust with the correlation length of the rolling gust and equal power at low
-    frequency.
+    frequency. Vanes leave a rest of unknown spectrum; its intensity stays.
     """
-    C, Q_V = gust.output.C, 0.0
+    cfg, C, Q_V = gust.config, gust.output.C, 0.0
     for j in range(3):
         Q = unmeasured_share(gust, j) * gust.memory.Q[j]
-        scale = rolling_scale(gust, j) if as_rolling else 1.0
+        scale = (gust_lag(gust, j, 1.0) / cfg.L_roll) ** 2 if as_rolling and cfg.coarse_only else 1.0
         Q_V += effect_product(gust, C, i_1, i_2, j) * Q * scale
     return Q_V * max(V, gust.output.V)
 
@@ -443,13 +433,10 @@ def finish_gust(gust, share):
     mem, out = gust.memory, gust.output
     for i in range(3):
         out.acc_mean[i] = share * mem.acc_sum[i]
-    if mem.n_turn > 0:
-        mem.n_turn -= 1
-        for i in range(3):
-            for j in range(3):
-                out.var_turn[i, j] = mem.var_prev[i, j] + mem.var_now[i, j]
-        mem.var_prev[:] = mem.var_now
-        mem.var_now[:] = 0.0
+        for j in range(3 if mem.n_turn > 0 else 0):
+            out.var_turn[i, j] = mem.var_prev[i, j] + mem.var_now[i, j]
+            mem.var_prev[i, j], mem.var_now[i, j] = mem.var_now[i, j], 0.0
+    mem.n_turn = max(mem.n_turn - 1, 0)
 
 
 @kernel
@@ -507,14 +494,14 @@ def add_gust_noise(
     It is the noise of the vanes and of the force that predicts the velocity; for the estimate without vanes
     that of the forces as well. y, u: in trim.
     """
-    std = flow_noise(errors, y[AIRSPEED])
-    span = float(stat["gust"]["config"]["span"])
-    if stat["forces"]["in_use"] or stat["gust"]["output"]["uses_accelerometers"]:
+    std, forces, gust = flow_noise(errors, y[AIRSPEED]), stat["forces"], stat["gust"]
+    span = float(gust["config"]["span"])
+    if forces["in_use"] or gust["output"]["uses_accelerometers"]:
         std += INTEGRATION_NOISE_GAIN * errors.each("random", ("az", "ay")) * dt / y[AIRSPEED]
-    if stat["forces"]["in_use"]:
-        forces = stat["forces"]["component"][::-1]  # normal to the body, and across
-        by_forces = np.sqrt(forces["var_acc"]) / np.abs(forces["vane"][:, 1])
-        stat["forces"]["gust_noise"] = gust_noise(by_forces, design, y, u, span)
+    if forces["in_use"]:
+        each = forces["component"][::-1]  # normal to the body, and across
+        by_forces = np.sqrt(each["var_acc"]) / np.abs(each["vane"][:, 1])
+        forces["gust_noise"] = gust_noise(by_forces, design, y, u, span)
     for name in ("Q0", "Q"):
         stat["noise"][name] += gust_noise(std, design, y, u, span) ** 2
 
@@ -526,21 +513,22 @@ def configure_gust_speed(gust: np.void, declared: Declared, level: float, V: flo
     1/s, an error b / a. Of a gust of deviation sigma and return rate V / L the sum misses the variance
     sigma^2 a / (a + V / L). Their total is least near a^3 = 2 b^2 V / (L sigma^2).
     """
-    sigma, errors = declared.air.sigma_mps, declared.sensors
-    if not (gust["output"]["gusty"] and gust["output"]["measured"]):
+    sigma, errors, out = declared.air.sigma_mps, declared.sensors, gust["output"]
+    if not (out["gusty"] and out["measured"]):
         return
-    rate, of_V = V / SCALE_M, errors["V"]
+    rate, of_V, drag = V / SCALE_M, errors["V"], GRAVITY_MPS2 * MAX_DRAG_OVER_WEIGHT
     b = 2.0 * EARTH_RATE_RAD_S * V + MAX_PATH_SLOPE_RAD * EARTH_M_S2  # Coriolis; gravity with place
     b += GRAVITY_MPS2 * (errors["phi"].steady + errors["theta"].steady)
-    if gust["output"]["uses_accelerometers"]:
-        b += errors["ax"].steady + GRAVITY_MPS2 * MAX_DRAG_OVER_WEIGHT * errors["ax"].slope
+    if out["uses_accelerometers"]:
+        b += errors["ax"].steady + drag * errors["ax"].slope
     else:
-        b += GRAVITY_MPS2 * MAX_DRAG_OVER_WEIGHT * (declared.coefficients.largest + MASS_TOLERANCE)
+        b += drag * (declared.coefficients.largest + MASS_TOLERANCE)
     a = (2.0 * b**2 * rate / sigma**2) ** (1.0 / 3.0)
     var_V = sigma**2 * a / (a + rate) + (b / a) ** 2 + of_V.random**2 + (of_V.steady + of_V.slope * V) ** 2
-    share = speed_error_share(level)
-    v_max = MAX_GUST_STDS * sigma
-    fill(gust["config"], var_v=sigma**2, v_max=v_max, a_v=a, var_V=var_V, speed_error_share=share)
+    fill(
+        gust["config"], var_v=sigma**2, v_max=MAX_GUST_STDS * sigma, a_v=a, var_V=var_V,
+        speed_error_share=speed_error_share(level),
+    )  # fmt: skip
 
 
 def speed_error_share(level: float) -> float:

@@ -33,9 +33,11 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.aircraft import Aircraft, Term
+from beaver_ftc.aircraft import AXES, Aircraft, Term
+from beaver_ftc.aircraft.aircraft import MOMENTS
+from beaver_ftc.compiled import plain
 from beaver_ftc.design.context import Context
-from beaver_ftc.design.model import inertia_coefficients
+from beaver_ftc.design.model import N_SIGNALS, accelerate, design_record, nearer, signals
 from beaver_ftc.diagnosis.gusts import MIN_UNMEASURED_SHARES
 
 UNEXPLAINED_MEMORY_S = 0.1
@@ -136,11 +138,9 @@ def healthy_positions(context: Context, columns: FlightColumns, surface: str) ->
     rate = context.declared.rate_limit_rad_s[s]
     a = 1.0 - np.exp(-bandwidth * context.dt_s) if bandwidth else 1.0
     step = rate * context.dt_s if rate else np.inf
-    lo, hi = context.travel_rad[:, s]
     u, positions = columns[f"{surface}_effective_rad"][0], np.empty_like(commands)
-    for k, command in enumerate(np.clip(commands, lo, hi)):
-        u += min(max((command - u) * a, -step), step)
-        positions[k] = u
+    for k, command in enumerate(np.clip(commands, *context.travel_rad[:, s])):
+        u = positions[k] = plain(nearer)(u, command, a, step)
     return positions
 
 
@@ -148,19 +148,13 @@ def term_acceleration(
     aircraft: Aircraft, term: Term, columns: FlightColumns, deflection: np.ndarray | None
 ) -> np.ndarray:
     """Acceleration by a coefficient of one, (frames, 3) rad/s2; deflection (frames,) rad: of its surface."""
-    V, geometry = columns["airspeed_mps"], aircraft.geometry
-    inertia = inertia_coefficients(aircraft.mass)
-    values: dict[str | None, Any] = {
-        **{name: columns[name] for name in aircraft.signals},
-        "alpha": columns["alpha_rad"], "beta": columns["beta_rad"],
-        "ph": columns["p_rad_s"] * geometry.span_m / (2.0 * V),
-        "qh": columns["q_rad_s"] * geometry.chord_m / V,
-        "rh": columns["r_rad_s"] * geometry.span_m / (2.0 * V), term.surface: deflection,
-    }  # fmt: skip
-    qS = columns["qdyn_pa"] * geometry.wing_area_m2 * prod(values[factor] for factor in term.factors)
-    arms = {
-        "Cl": (inertia.Pl * geometry.span_m, 0.0, inertia.Rl * geometry.span_m),
-        "Cm": (0.0, inertia.Qm * geometry.chord_m, 0.0),
-        "Cn": (inertia.Pn * geometry.span_m, 0.0, inertia.Rn * geometry.span_m),
-    }[term.coefficient]
-    return np.multiply.outer(qS, arms)
+    x = np.array([columns[f"{axis}_rad_s"] for axis in AXES])
+    names = "alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa", *aircraft.signals
+    y, design = np.array([columns[name] for name in names]), design_record(aircraft).view(np.recarray)[0]
+    signal, C = np.empty((N_SIGNALS, y.shape[1])), np.zeros((3, 1, y.shape[1]))
+    plain(signals)(design.moments, x, y, signal)
+    values: dict[str | None, Any] = dict(zip(aircraft.signal_names, signal, strict=False))
+    values[term.surface] = deflection
+    C[MOMENTS.index(term.coefficient), 0] = prod(values[factor] for factor in term.factors)
+    plain(accelerate)(design, y, C)
+    return C[:, 0].T

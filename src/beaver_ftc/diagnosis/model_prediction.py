@@ -9,13 +9,11 @@ and then by the accelerations of the other instants, under u[k+1]. The mean over
 sum over its n instants, the first of them under the old command.
 """
 
-from math import exp, radians
-
 import numpy as np
 
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.design.model import actuators_dtype, design_dtype, design_of, move, move_ends, response
-from beaver_ftc.diagnosis.bounds import extra_bound, fill_bound, n_gyro
+from beaver_ftc.diagnosis.bounds import extra_bound, fill_bound, n_gyro, servo_data
 from beaver_ftc.scenario.declared import Declared
 
 
@@ -72,16 +70,14 @@ def configure_prediction(pred: np.void, declared: Declared, travel: np.ndarray) 
     act["real"] = not declared.servos.is_ideal
     act["uncertain"] = not declared.servo_errors.is_none
     act["low"], act["high"] = travel
-    for s, name in enumerate(declared.aircraft.surfaces):
-        servo = getattr(declared.servos, name)
-        omega, rate = servo.bandwidth_rad_s, radians(servo.rate_limit_deg_s)
-        error = getattr(declared.servo_errors, name)
-        slower_faster = np.array([1.0 - error.bandwidth, 1.0 + error.bandwidth])
-        act["approach"][s] = 1.0 - exp(-omega * h) if omega else 1.0
-        act["step"][s] = rate * h if rate else np.inf
-        act["approaches"][s] = 1.0 - np.exp(-omega * h * slower_faster) if omega else 1.0
-        act["steps"][s] = act["step"][s] * np.array([1.0 - error.rate_limit, 1.0 + error.rate_limit])
-        act["band"][s] = radians(error.dead_band_deg)
+    servos, ends = servo_data(declared), np.array([-1.0, 1.0])
+    slower_faster = 1.0 + np.outer(servos["bandwidth_error"], ends)
+    omega, rate = servos["bandwidth_rad_s"][:, None], servos["rate_limit_rad_s"]
+    act["approaches"] = np.where(omega > 0.0, 1.0 - np.exp(-omega * h * slower_faster), 1.0)
+    act["approach"] = np.where(omega > 0.0, 1.0 - np.exp(-omega * h), 1.0)[:, 0]
+    act["step"] = np.where(rate > 0.0, rate * h, np.inf)
+    act["steps"] = act["step"][:, None] * (1.0 + np.outer(servos["rate_limit_error"], ends))
+    act["band"] = servos["dead_band_rad"]
 
 
 @kernel

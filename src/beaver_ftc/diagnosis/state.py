@@ -17,7 +17,7 @@ NOT_ISOLATED, UNANTICIPATED = -1, -2
 DAMAGE_EXCLUDES = 2  # value of `weak`: declared damage may have excluded the others
 INTERVAL_THRESHOLD, PUBLISHED_THRESHOLD, CONSTANT_THRESHOLD = 0, 1, 2  # thresholds
 EITHER_DETECTOR, WORST_CASE_DETECTOR, STATISTICAL_DETECTOR = 0, 1, 2  # whose alarms count
-_AUTHORITIES = {
+AUTHORITIES = {
     "either": EITHER_DETECTOR,
     "worst-case": WORST_CASE_DETECTOR,
     "statistical": STATISTICAL_DETECTOR,
@@ -50,8 +50,8 @@ def layout_dtype(n: int) -> np.dtype:
 
 
 # Configuration that several stages read. enabled: a compiled scheme diagnoses; scheme_number: of that scheme;
-# variant: its number (schemes/adaptive_estimators.py); authority: the detector whose alarms count,
-# EITHER_DETECTOR, WORST_CASE_DETECTOR or STATISTICAL_DETECTOR; diagnoses_all_types: faults of every type;
+# authority, variant: the detector whose alarms, and whose exclusions count, EITHER_DETECTOR,
+# WORST_CASE_DETECTOR or STATISTICAL_DETECTOR; diagnoses_all_types: faults of every type;
 # abrupt: a fault is declared to stay as it is; n_substeps: JSBSim frames in a frame; dt s.
 SHARED_CONFIG_RECORD = record(
     enabled=int, scheme_number=int, variant=int, authority=int, diagnoses_all_types=int, abrupt=int,
@@ -64,7 +64,7 @@ def configure_shared(cfg: np.void, declared: Declared) -> None:
     fdi = declared.fdi
     cfg["enabled"], cfg["dt"] = fdi.diagnoses, 1.0 / declared.rate_hz
     cfg["scheme_number"] = scheme_number(fdi.scheme)
-    cfg["authority"], cfg["diagnoses_all_types"] = (_AUTHORITIES[fdi.authority], fdi.fault_class == "all")
+    cfg["authority"], cfg["diagnoses_all_types"] = (AUTHORITIES[fdi.authority], fdi.fault_class == "all")
     cfg["abrupt"], cfg["n_substeps"] = (fdi.fault_profile == "abrupt", declared.substeps)
 
 

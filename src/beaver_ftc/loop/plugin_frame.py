@@ -18,8 +18,12 @@ from beaver_ftc.design.context import Context
 from beaver_ftc.design.model import DesignFunctions
 from beaver_ftc.diagnosis import Detector, Measured, Verdict
 from beaver_ftc.diagnosis.bounds import plugin_errors
-from beaver_ftc.diagnosis.schemes.adaptive_estimators import PUBLISHED_VARIANT
-from beaver_ftc.diagnosis.state import NOT_ISOLATED, PLUGIN_SCHEME_NUMBER, UNANTICIPATED
+from beaver_ftc.diagnosis.state import (
+    NOT_ISOLATED,
+    PLUGIN_SCHEME_NUMBER,
+    UNANTICIPATED,
+    WORST_CASE_DETECTOR,
+)
 from beaver_ftc.documents.errors import NO_FAILURE, SimulationFailed
 from beaver_ftc.loop import stepping as stages
 from beaver_ftc.loop.assembly import Trim, reads_accelerometers, y_places
@@ -262,10 +266,7 @@ def plugged(
             "n_estimators"
         ] = 0
         fdi["statistical"]["test"]["enabled"] = fdi["sensor_monitor"]["config"]["enabled"] = 0
-        fdi["config"]["scheme_number"], fdi["config"]["variant"] = (
-            PLUGIN_SCHEME_NUMBER,
-            PUBLISHED_VARIANT,
-        )
+        fdi["config"]["scheme_number"], fdi["config"]["variant"] = PLUGIN_SCHEME_NUMBER, WORST_CASE_DETECTOR
         fdi["types"]["pair"]["enabled"] = 0
         n = fdi["types"]["surface"].size
         fdi["isolation"]["estimator"]["surface"][:n] = range(n)

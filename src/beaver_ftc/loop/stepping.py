@@ -24,6 +24,7 @@ from beaver_ftc.diagnosis.conclusion import weighs_statistics
 from beaver_ftc.diagnosis.model_prediction import redo_move
 from beaver_ftc.diagnosis.schemes import SCHEMES, adaptive_estimators
 from beaver_ftc.diagnosis.schemes import detection_share as largest_statistic
+from beaver_ftc.diagnosis.state import WORST_CASE_DETECTOR
 from beaver_ftc.loop import frame as whole
 from beaver_ftc.loop.frame import add_effect
 from beaver_ftc.plant.channels import advance
@@ -143,7 +144,7 @@ def fly_on(frames, references, log, order):
 
 _ROW, _AXES = types.Array(types.float64, 1, "C"), types.NestedArray(types.float64, (3,))
 _NUMBERS = {
-    "k": types.int64, "mode": types.int64, "started": types.int64,
+    "k": types.int64, "j": types.int64, "mode": types.int64, "started": types.int64,
     "by_observer": types.boolean,
     "t": types.float64, "share": types.float64, "probe": types.float64,
     "commanded": _ROW, "row": _ROW, "effectiveness": _ROW,
@@ -175,8 +176,16 @@ def _of_the_diagnosis(frame: np.void) -> Iterator[Any]:
         scheme.prepare_next_frame,
     )
     if scheme.advance_estimators_to_frame is adaptive_estimators.advance_estimators_to_frame:
-        faults = list(adaptive_estimators.ISOLATION_VARIANTS.values())[fdi["config"]["variant"]]
-        yield from (faults.begin_at_alarm, faults.record_commands, faults.isolate)
+        weigh = adaptive_estimators.weigh_loss
+        if fdi["config"]["diagnoses_all_types"]:
+            weigh = adaptive_estimators.weigh_position
+            yield from (
+                adaptive_estimators.begin_types,
+                adaptive_estimators.record_orders,
+                adaptive_estimators.decide_type,
+            )
+        if fdi["config"]["variant"] != WORST_CASE_DETECTOR:
+            yield weigh
         if fdi["statistical"]["test"]["enabled"]:
             yield from (
                 adaptive_estimators.update_tests,

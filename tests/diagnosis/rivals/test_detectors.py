@@ -136,7 +136,7 @@ def test_the_observers_residual_has_its_closed_form():
         x = np.array([0.0, 0.3 * DT * k, 0.0])
         detector.step(Measured(k * DT, x, np.zeros(5), np.zeros(3), np.zeros((3, 4)), BOUND), np.zeros(4))
     a = np.exp(-10.0 * DT)
-    assert detector.eps[1] == pytest.approx(DT * 0.3 * (1 - a**50) / (1 - a))
+    assert detector.filtered[1, 0] == pytest.approx(DT * 0.3 * (1 - a**50) / (1 - a))
 
 
 def test_the_monitor_learns_any_second_order_pair_and_sees_it_change():

@@ -19,7 +19,7 @@ An error e of an air-data reading changes f + G u by e times its derivative with
 The derivative depends on the flight condition and is evaluated in flight. dpt is worked out from the engine's
 power, airspeed and dynamic pressure, so it has their errors. Noise of the readings is model noise:
 
-    Z_j <- Z_j + w dF_j      Q = Q0 + sum_j (dF_j sigma_j)^2, (rad/s2)2
+    Z_j <- Z_j + w dF_j      Q = Q0 + sum_j (dF_j sigma_j)^2, (rad/s2)2      dF_j: per unit of the constant
 
 Letters of the kernels, in addition to those of statistical.py: r is a row, c a column of Z, k a term.
 """
@@ -37,6 +37,7 @@ from beaver_ftc.design.model import (
     PH,
     QDYN,
     RH,
+    accelerate,
     directional,
     evaluate,
     regressors,
@@ -75,7 +76,7 @@ NOISE_RECORD = record(
     # whether errors of the air data count; their noise, units of the readings
     noisy=int, sigma=N_INPUT_READINGS,
     # scratch
-    zC=MAX_TERMS, ds=N_SIGNALS, dm=MAX_MONOMIALS, dF=3,
+    zC=MAX_TERMS, ds=N_SIGNALS, dm=MAX_MONOMIALS, C=(3, MAX_COLUMNS),
 )  # fmt: skip
 
 ROWS_RECORD = record(
@@ -134,55 +135,37 @@ def fill_signal_slopes(tab, err, y, j, ds):
 
 
 @kernel
-def accelerate(model, L, M, N):
-    """(Pl L + Pn N, Qm M, Rl L + Rn N), rad/s2, by moments in N m."""
-    return model.Pl * L + model.Pn * N, model.Qm * M, model.Rl * L + model.Rn * N
-
-
-@kernel
 def add_constants(w, noise, rows, err, model, meas, u):
-    """Add an instant, w of the frame, to Z of the rates, rad/s2 per unit; and fill Q as it is now."""
-    y, tab = meas.y, model.moments
-    if rows.n == 0:
+    """Add an instant, w of the frame, to Z of the rates, rad/s2 per unit; and fill Q as it is now.
+
+    C (3, n): the coefficients of the moments per unit of each constant: the term's monomial, with the
+    deflection of its surface; for reading j, sum C dm + [j is qdyn] sum C m / q.
+    """
+    y, tab, C, n = meas.y, model.moments, noise.C, rows.n
+    if n == 0:
         return
     evaluate(tab, meas.x, y)
     regressors(tab, tab.power, u, noise.zC)
+    first = n - N_INPUT_READINGS * noise.noisy  # of the readings
     for i in range(3):
-        qSl = y[QDYN] * model.S * (model.c if i == 1 else model.b)
+        C[i, :n] = 0.0
         for k in range(tab.free_from[i], tab.surface_to[i]):
-            M = qSl * noise.zC[k]
-            add_column(rows, k, w, accelerate(model, M * (i == 0), M * (i == 1), M * (i == 2)))
-    if noise.noisy:
-        noise.Q[:] = noise.Q0
-        for j in range(N_INPUT_READINGS):
-            fill_signal_slopes(tab, err, y, j, noise.ds)
-            directional(tab, tab.signal, tab.power, noise.ds, noise.dm)
-            fill_slopes(model, y, u, j, noise.dm, noise.dF)
-            for i in range(3):
-                noise.Q[i] += (noise.dF[i] * noise.sigma[j]) ** 2
-            add_column(rows, rows.n - N_INPUT_READINGS + j, w, noise.dF)
-
-
-@kernel
-def add_column(rows, c, w, F):
-    """Z_c <- Z_c + w F on the axes; F (3,) rad/s2 per unit."""
+            C[i, k] = noise.zC[k]
+    for j in range(n - first):
+        fill_signal_slopes(tab, err, y, j, noise.ds)
+        directional(tab, tab.signal, tab.power, noise.ds, noise.dm)
+        for i in range(3):
+            C[i, first + j] = whole_sum(tab, i, noise.dm, u)
+            if j == QDYN:
+                C[i, first + j] += whole_sum(tab, i, tab.power, u) / y[QDYN]
+    accelerate(model, y, C[:, :n])
     for i in range(3):
-        rows.Z[c, i] += w * F[i]
-
-
-@kernel
-def fill_slopes(model, y, u, j, dm, dF):
-    """Fill dF (3,) rad/s2 per unit of reading j: inertia times the moments' change.
-
-    (L, M, N) = q S (b, c, b) (sum C dm + [j is qdyn] sum C m / q)
-    """
-    tab, q = model.moments, y[QDYN]
-    for i in range(3):
-        C = whole_sum(tab, i, dm, u)
-        if j == QDYN:
-            C += whole_sum(tab, i, tab.power, u) / q
-        dF[i] = q * model.S * (model.c if i == 1 else model.b) * C
-    dF[0], dF[1], dF[2] = accelerate(model, dF[0], dF[1], dF[2])
+        if noise.noisy:
+            noise.Q[i] = noise.Q0[i]
+        for c in range(n):
+            rows.Z[c, i] += w * C[i, c]
+            if c >= first:
+                noise.Q[i] += (C[i, c] * noise.sigma[c - first]) ** 2
 
 
 @kernel

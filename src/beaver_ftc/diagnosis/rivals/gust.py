@@ -7,17 +7,20 @@ v: velocity relative to the air, m/s, by airspeed and vanes; f: accelerometers, 
 axes. The level axes of a frame point where the nose did at its beginning. No vane shows the rolling gust.
 """
 
-from math import cos, exp, sin
+from math import cos, sin
 
 import numpy as np
 
 from beaver_ftc.aircraft.aircraft import GRAVITY_MPS2
+from beaver_ftc.compiled import plain
 from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis import Measured
+from beaver_ftc.diagnosis.gusts import fill_rotation
 from beaver_ftc.diagnosis.informed_test import with_measured_gust
 
 PITCHING, YAWING = 1, 2
 _TURNED_SHARE = 0.3  # of noises of airspeed and bank in the flow's angles: attitudes and incidences of 17 deg
+_GRAVITY = np.array([0.0, 0.0, GRAVITY_MPS2])
 
 
 class VaneGust:
@@ -29,7 +32,8 @@ class VaneGust:
         self._effect, self._lag_s = declared.gust_effect, declared.gust_time_s
         self._airspeed = float(context.trim_y[2])
         self._air_rotation = np.zeros(3)  # rad/s in level axes
-        self._before: tuple[np.ndarray, np.ndarray, float] | None = None  # velocity, force, heading
+        self._expected: np.ndarray | None = None  # velocity now in still air, in the level axes of _heading
+        self._heading = 0.0
         self._is_measured = declared.air and self._airspeed > 0.0
         self.context = context
         if self._is_measured:
@@ -55,30 +59,22 @@ class VaneGust:
         to_level = _level_axes(phi, theta)
         flow = np.array([cos(alpha) * cos(beta), sin(beta), sin(alpha) * cos(beta)])
         velocity, force = V * (to_level @ flow), to_level @ measured.force
-        before, self._before = self._before, (velocity, force, psi)
-        if before is None:
+        expected, turn = self._expected, psi - self._heading
+        self._expected, self._heading = velocity + self._dt * (force + _GRAVITY), psi
+        if expected is None:
             return measured
         acting = self._air_rotation @ to_level  # in body axes: that at the beginning of the frame
-        self._air_rotation = self._after(before, velocity, psi, V)
+        velocity[1] = sin(turn) * velocity[0] + cos(turn) * velocity[1]
+        lag_s = self._lag_s * self._airspeed / V
+        change = (expected - velocity)[[0, 2, 1]]  # that downwards pitches the air, that to the right yaws it
+        self._air_rotation = np.exp(-self._dt / lag_s) * self._air_rotation + change / (V * lag_s)
+        self._air_rotation[0] = 0.0
         air = (V / self._airspeed) * (self._effect @ acting)
         return measured._replace(acceleration=measured.acceleration + air)
-
-    def _after(self, before: tuple[np.ndarray, np.ndarray, float], velocity: np.ndarray, psi: float, V: float
-    ) -> np.ndarray:  # fmt: skip
-        """The rotation (3,) rad/s of the air at the end of a frame; velocity m/s in its own level axes."""
-        (_, right, down), (_, force_right, force_down), psi_before = before
-        dt, turn = self._dt, psi - psi_before
-        now_right = sin(turn) * velocity[0] + cos(turn) * velocity[1]
-        change_right = right + dt * force_right - now_right
-        change_down = down + dt * (force_down + GRAVITY_MPS2) - velocity[2]
-        after = np.zeros(3)
-        for axis, change in ((PITCHING, change_down), (YAWING, change_right)):
-            lag_s = self._lag_s[axis] * self._airspeed / V
-            after[axis] = exp(-dt / lag_s) * self._air_rotation[axis] + change / (V * lag_s)
-        return after
 
 
 def _level_axes(phi: float, theta: float) -> np.ndarray:
     """L' (3, 3): a vector in body axes, times this, is one in level axes: ahead, right, down."""
-    sf, cf, st, ct = sin(phi), cos(phi), sin(theta), cos(theta)
-    return np.array([[ct, sf * st, cf * st], [0.0, cf, -sf], [-st, sf * ct, cf * ct]])
+    L = np.empty((3, 3))
+    plain(fill_rotation)(phi, theta, L)
+    return L.T

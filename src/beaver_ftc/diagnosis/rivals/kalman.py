@@ -1,9 +1,11 @@
 """Kalman filter steps, one or many filters at a time: leading axes are filters.
 
-    predict    P- = F P F' + Q
-    update     S = H P H' + R,  K = P H' S^-1,  z+ = z + K nu,  P+ = P - K S K'
+    predict    z- = F z + (dt xdot, 0),  P- = F P F' + Q
+    update     S = H P H' + R,  K = P H' S^-1,  z+ = z- + K nu,  P+ = P- - K S K'
 
 [Simon2006, ch. 5], sigma points [Julier2004]. H picks the first states: what is measured are the body rates.
+
+    z = (p, q, r, theta, g)      theta: parameters, a random walk; g: rotation of the air, if declared
 
 Turbulence is the rotation of the air as three more states, a first-order process for each axis, as declared
 (design/context.py):
@@ -13,50 +15,80 @@ Turbulence is the rotation of the air as three more states, a first-order proces
 
 import numpy as np
 
-from beaver_ftc.design.context import Context
+from beaver_ftc.diagnosis import Measured
+from beaver_ftc.diagnosis.rivals.rival import Rival
 
 
-class TurbulenceModel:
-    """The model of turbulence: rotation of the air about n_states axes, 3, or 0 if no turbulence is declared.
+class KalmanRival(Rival):
+    """Base of the rivals by Kalman filters: each has `predict` and `weigh`.
 
-    a (n,): a, over a frame. process_noise_variance (n,), initial_variance (n,): (rad/s)^2.
-    rate_effect (3, n): dt B, change of the rates over a frame per rad/s of the air.
+    F (n, n) without the dynamics of the aircraft; q (n,): diagonal of Q but for the rates; R (3, 3); z, P:
+    state and covariance of one filter.
     """
 
-    def __init__(self, context: Context) -> None:
-        declared_uncertainty, dt = context.declared, context.dt_s
-        self.n_states = 3 if declared_uncertainty.air else 0
-        self.a = np.exp(-dt / declared_uncertainty.gust_time_s[: self.n_states])
-        self.initial_variance = declared_uncertainty.gust_rad_s[: self.n_states] ** 2
-        self.process_noise_variance = (1.0 - self.a**2) * self.initial_variance
-        self.rate_effect = dt * declared_uncertainty.gust_effect[:, : self.n_states]
+    def fill_model(self, n_theta: int = 0, theta_variance: float = 0.0, walk: float = 0.0) -> None:
+        """Fill the model, and start healthy. theta_variance: at the start; walk: variance of a frame."""
+        declared, n_air = self.context.declared, 3 if self.context.declared.air else 0
+        a = np.exp(-self.dt / declared.gust_time_s[:n_air])
+        gust_variance = declared.gust_rad_s[:n_air] ** 2
+        rate_variance = declared.rate_variance(self.options["measurement_rad_s"])
+        self.n_air, self.n = n_air, 3 + n_theta + n_air
+        self.F, air = np.eye(self.n), slice(3 + n_theta, None)
+        self.F[:3, air] = self.dt * declared.gust_effect[:, :n_air]
+        self.F[air, air] = np.diag(a)
+        self.q = np.concatenate((np.zeros(3), np.full(n_theta, walk), (1.0 - a**2) * gust_variance))
+        self.R, self.is_first = np.diag(rate_variance), True
+        self.P = np.diag(np.concatenate((rate_variance, np.full(n_theta, theta_variance), gust_variance)))
+        self.z = np.zeros(self.n)
 
+    def advance(self, measured: Measured, command: np.ndarray) -> float:
+        """Predict over the elapsed frame, update with the measured rates, weigh the innovation."""
+        if self.is_first:
+            self.is_first, self.z[..., :3] = False, measured.x
+            return 0.0
+        self.predict(measured)
+        nu = measured.x - self.z[..., :3]
+        self.z, self.P, S = update_state_and_covariance(self.z, self.P, nu, self.R)
+        return self.weigh(nu, S)
 
-def unexplained_acceleration_size(context: Context, eta_bar: np.ndarray) -> np.ndarray:
-    """Return the assumed size (3,) rad/s2 of the acceleration that nothing explains.
+    def predict(self, measured: Measured) -> None:
+        """Predict z and P over the elapsed frame."""
+        raise NotImplementedError
 
-    The declared bound, eta_bar, as long as it is the published one; with more declared that bound is the sum
-    of all worst cases, instruments and air included, which have states or a variance of their own here.
-    """
-    declared_uncertainty = context.declared
-    return (
-        np.hypot(context.constant_rad_s2, declared_uncertainty.model_rad_s2)
-        if declared_uncertainty.errors
-        else eta_bar
-    )
+    def weigh(self, nu: np.ndarray, S: np.ndarray) -> float:
+        """The decision statistic, 1 at the alarm, by the innovation nu and its covariance S."""
+        raise NotImplementedError
+
+    def move(self, z: np.ndarray, F: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
+        """F z + (dt acceleration, 0), of each state z (..., n); acceleration (..., 3) rad/s2."""
+        z = z @ F.T
+        z[..., :3] += self.dt * acceleration
+        return z
+
+    def add_noise(self, P: np.ndarray, measured: Measured, noise: float | np.ndarray) -> np.ndarray:
+        """P + Q. The acceleration that nothing explains has the size of the declared bound times noise (...).
+
+        That bound is eta_bar as long as it is the published one. With more declared it is the sum of all
+        worst cases, instruments and air included, which have states or a variance of their own here.
+        """
+        declared, size = self.context.declared, measured.eta_bar
+        if declared.errors:
+            size = np.hypot(self.context.constant_rad_s2, declared.model_rad_s2)
+        Q = np.tile(self.q, (*np.shape(noise), 1)).reshape(*np.shape(noise), self.n)
+        Q[..., :3] = (self.dt * np.multiply.outer(noise, size)) ** 2
+        P[..., range(self.n), range(self.n)] += Q
+        return P
 
 
 def update_state_and_covariance(
-    state: np.ndarray, P: np.ndarray, nu: np.ndarray, R: np.ndarray
+    z: np.ndarray, P: np.ndarray, nu: np.ndarray, R: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Condition (state, P) on the innovation nu (..., m) of the first m states; returns state, P and
-    S (..., m, m)."""
-    n_measured = nu.shape[-1]
-    S = P[..., :n_measured, :n_measured] + R
-    K = np.linalg.solve(S, P[..., :n_measured, :]).swapaxes(-1, -2)
-    state = state + (K @ nu[..., None])[..., 0]
-    P = P - K @ P[..., :n_measured, :]
-    return state, 0.5 * (P + P.swapaxes(-1, -2)), S
+    """Condition (z, P) on the innovation nu (..., m) of the first m states; returns z, P, S (..., m, m)."""
+    m = nu.shape[-1]
+    S = P[..., :m, :m] + R
+    K = np.linalg.solve(S, P[..., :m, :]).swapaxes(-1, -2)
+    P = P - K @ P[..., :m, :]
+    return z + (K @ nu[..., None])[..., 0], 0.5 * (P + P.swapaxes(-1, -2)), S
 
 
 def normalised_innovation_square(nu: np.ndarray, S: np.ndarray) -> np.ndarray:
@@ -66,24 +98,19 @@ def normalised_innovation_square(nu: np.ndarray, S: np.ndarray) -> np.ndarray:
 
 def log_likelihood(nu: np.ndarray, S: np.ndarray) -> np.ndarray:
     """Logarithm of the Gaussian density of the innovation."""
-    n_measured = nu.shape[-1]
-    return -0.5 * (
-        normalised_innovation_square(nu, S) + np.linalg.slogdet(S)[1] + n_measured * np.log(2.0 * np.pi)
-    )
+    constant = nu.shape[-1] * np.log(2.0 * np.pi)
+    return -0.5 * (normalised_innovation_square(nu, S) + np.linalg.slogdet(S)[1] + constant)
 
 
-def sigma_points(state: np.ndarray, P: np.ndarray, covariance_factor: float) -> tuple[np.ndarray, np.ndarray]:
-    """2 n + 1 points (2 n + 1, n) and their weights (2 n + 1,) with the mean `state` and the covariance P.
+def sigma_points(z: np.ndarray, P: np.ndarray, spread: float) -> tuple[np.ndarray, np.ndarray]:
+    """2 n + 1 points (2 n + 1, n) and their weights (2 n + 1,) with the mean z and the covariance P.
 
-    covariance_factor is n + kappa [Julier2004, eq. 12]; 3 matches the fourth moment of a Gaussian in one
-    dimension.
+    spread is n + kappa [Julier2004, eq. 12]; 3 matches the fourth moment of a Gaussian in one dimension.
     """
-    n_states = len(state)
-    point_offsets = _matrix_root(covariance_factor * P).T
-    state_points = np.concatenate((state[None], state + point_offsets, state - point_offsets))
-    point_weights = np.full(2 * n_states + 1, 0.5 / covariance_factor)
-    point_weights[0] = 1.0 - n_states / covariance_factor
-    return state_points, point_weights
+    offsets = _matrix_root(spread * P).T
+    weights = np.full(2 * z.size + 1, 0.5 / spread)
+    weights[0] = 1.0 - z.size / spread
+    return np.concatenate((z[None], z + offsets, z - offsets)), weights
 
 
 def _matrix_root(P: np.ndarray) -> np.ndarray:
@@ -92,6 +119,6 @@ def _matrix_root(P: np.ndarray) -> np.ndarray:
     try:
         return np.linalg.cholesky(P)
     except np.linalg.LinAlgError:
-        eigenvalues, eigenvectors = np.linalg.eigh(P)
-        matrix_root: np.ndarray = eigenvectors * np.sqrt(np.maximum(eigenvalues, 0.0))
-        return matrix_root
+        values, vectors = np.linalg.eigh(P)
+        root: np.ndarray = vectors * np.sqrt(np.maximum(values, 0.0))
+        return root

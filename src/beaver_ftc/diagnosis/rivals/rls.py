@@ -16,61 +16,52 @@ from typing import ClassVar
 
 import numpy as np
 
-from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis import Measured, Verdict
-from beaver_ftc.diagnosis.rivals import rival_options
+from beaver_ftc.diagnosis.rivals.rival import Rival
 
 
 class RecursiveLeastSquaresFit:
     """y = w' phi, learnt sample by sample.
 
-    forget: lam in (0, 1]. prior_variance: of the parameters at the start; it also bounds P, which
-    would otherwise grow without excitation.
+    lam in (0, 1]: forgetting. prior: variance of the parameters at the start; it also bounds P, which would
+    otherwise grow without excitation.
     """
 
-    def __init__(self, n_parameters: int, forgetting_factor: float, prior_variance: float) -> None:
-        self.weights, self.P = np.zeros(n_parameters), np.eye(n_parameters) * prior_variance
-        self._forgetting_factor, self._prior_variance = forgetting_factor, prior_variance
+    def __init__(self, n: int, lam: float, prior: float) -> None:
+        self.weights, self.P = np.zeros(n), np.eye(n) * prior
+        self._lam, self._prior = lam, prior
 
     def step(self, phi: np.ndarray, y: float) -> float:
         """Learn from one sample; returns the error of the prediction made before it."""
         Pphi = self.P @ phi
-        gain = Pphi / (self._forgetting_factor + phi @ Pphi)
-        prediction_error = y - float(self.weights @ phi)
-        self.weights = self.weights + gain * prediction_error
-        P = (self.P - np.outer(gain, Pphi)) / self._forgetting_factor
-        largest_variance = float(P.diagonal().max())
-        self.P = (
-            P if largest_variance <= self._prior_variance else P * (self._prior_variance / largest_variance)
-        )
-        return prediction_error
+        K = Pphi / (self._lam + phi @ Pphi)
+        error = y - float(self.weights @ phi)
+        self.weights = self.weights + K * error
+        P = (self.P - np.outer(K, Pphi)) / self._lam
+        self.P = P * min(1.0, self._prior / float(P.diagonal().max()))
+        return error
 
 
 class InputOutputPredictionTest:
     """Test of the prediction of one output by one input: y[k] from y[k-1], y[k-2], u[k-1], u[k-2] and a
-    constant."""
+    constant. lam: forgetting of the model; fade: of mean and variance of its error; least: deviation."""
 
-    def __init__(self, forgetting_factor: float, averaging_decay: float, min_error_std: float) -> None:
-        self._model = RecursiveLeastSquaresFit(5, forgetting_factor, 1e4)
-        self._averaging_decay, self._min_error_std = averaging_decay, min_error_std
-        self._regressor = np.zeros(5)
-        self._regressor[4] = 1.0
-        self.error_mean, self.error_variance = 0.0, 0.0
+    def __init__(self, lam: float, fade: float, least: float) -> None:
+        self._model, self._fade, self._least = RecursiveLeastSquaresFit(5, lam, 1e4), fade, least
+        self._phi = np.array([0.0, 0.0, 0.0, 0.0, 1.0])
+        self.mean, self.variance = 0.0, 0.0
 
     def step(self, u: float, y: float) -> float:
         """Return |z| of the newest output, then learn from it."""
-        prediction_error = self._model.step(self._regressor, y)
-        score = abs(prediction_error - self.error_mean) / sqrt(self.error_variance + self._min_error_std**2)
-        self.error_mean += (1.0 - self._averaging_decay) * (prediction_error - self.error_mean)
-        self.error_variance = (
-            self._averaging_decay * self.error_variance
-            + (1.0 - self._averaging_decay) * (prediction_error - self.error_mean) ** 2
-        )
-        self._regressor = np.array([y, self._regressor[0], u, self._regressor[2], 1.0])
+        error = self._model.step(self._phi, y)
+        score = abs(error - self.mean) / sqrt(self.variance + self._least**2)
+        self.mean += (1.0 - self._fade) * (error - self.mean)
+        self.variance = self._fade * self.variance + (1.0 - self._fade) * (error - self.mean) ** 2
+        self._phi = np.array([y, self._phi[0], u, self._phi[2], 1.0])
         return score
 
 
-class RlsMonitor:
+class RlsMonitor(Rival):
     """Recursive least squares between each surface and its rate, without an aircraft model [Keipour2019]."""
 
     name: ClassVar[str] = "rls-monitor"
@@ -82,32 +73,21 @@ class RlsMonitor:
         "warm_up_s": 4.0,  # before it, the models have seen too little
     }
 
-    def reset(self, context: Context) -> None:
-        """Know nothing."""
-        self.options = rival_options(self.name, self.defaults, context)
-        forgetting_factor = exp(-context.dt_s / self.options["forgetting_s"])
-        averaging_decay = exp(-context.dt_s / self.options["score_s"])
-        min_error_std = np.hypot(self.options["floor_rad_s"], context.declared.gyro_rad_s)
-        self.prediction_tests = [
-            InputOutputPredictionTest(forgetting_factor, averaging_decay, float(min_error_std[i]))
-            for i in range(3)
-        ]
-        self.leading_surface_indices, self.leaders = context.leading, context.leaders
-        self.verdict = Verdict()
+    def start(self) -> None:
+        """Start without a model."""
+        lam, fade = (exp(-self.dt / self.options[name]) for name in ("forgetting_s", "score_s"))
+        least = np.hypot(self.options["floor_rad_s"], self.context.declared.gyro_rad_s)
+        self.tests = [InputOutputPredictionTest(lam, fade, float(std)) for std in least]
 
-    def step(self, measured: Measured, command: np.ndarray) -> Verdict:
-        """Score every pair; the first beyond the limit is the fault."""
-        scores = [
-            prediction_test.step(float(command[surface_index]), float(measured_rate))
-            for prediction_test, surface_index, measured_rate in zip(
-                self.prediction_tests, self.leading_surface_indices, measured.x, strict=True
-            )
-        ]
+    def advance(self, measured: Measured, command: np.ndarray) -> float | np.ndarray:
+        """Score every pair."""
+        pairs = zip(self.tests, command[self.leading], measured.x, strict=True)
+        scores = [test.step(float(u), float(y)) for test, u, y in pairs]
         if measured.t_s < self.options["warm_up_s"]:
-            return Verdict(statistic=0.0)
-        worst_axis = int(np.argmax(scores))
-        statistic = scores[worst_axis] / self.options["alarm"]
-        if statistic > 1.0 and not self.verdict.detected:
-            surface_name = self.leaders[worst_axis]
-            self.verdict = Verdict(True, "pqr"[worst_axis], surface_name, candidates=(surface_name,))
-        return self.verdict._replace(statistic=statistic)
+            return 0.0
+        return np.array(scores) / self.options["alarm"]
+
+    def isolate(self, measured: Measured) -> Verdict:
+        """The first pair beyond the limit is the fault."""
+        surface = self.context.leaders[self.alarm_axis]
+        return Verdict(True, "pqr"[self.alarm_axis], surface, candidates=(surface,))

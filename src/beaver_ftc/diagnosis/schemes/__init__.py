@@ -50,7 +50,7 @@ def configure_diagnosis(fdi: np.void, pred: np.void, declared: Declared, travel:
     config, aircraft, dt = declared.fdi, declared.aircraft, 1.0 / declared.rate_hz
     rows = isolation.list_estimators(config.fault_class, aircraft)
     state.configure_shared(fdi["config"], declared)
-    fdi["config"]["variant"] = adaptive_estimators.variant_row(config)
+    fdi["config"]["variant"] = adaptive_estimators.whose_exclusions(config)
     state.configure_layout(fdi["layout"], rows, aircraft)
     isolation.configure_isolation(fdi["isolation"], declared, rows, travel)
     if config.pairs:
@@ -137,8 +137,6 @@ def _load_scheme(path: str) -> CompiledScheme:
 
 SCHEMES = tuple(map(_load_scheme, SCHEME_KERNEL_PATHS))
 
-begin_scheme = one_of([scheme.begin_scheme for scheme in SCHEMES])
-advance_estimators_to_frame = one_of([scheme.advance_estimators_to_frame for scheme in SCHEMES])
-update_verdict = one_of([scheme.update_verdict for scheme in SCHEMES])
-prepare_next_frame = one_of([scheme.prepare_next_frame for scheme in SCHEMES])
-accumulate_substep = one_of([scheme.accumulate_substep for scheme in SCHEMES])
+begin_scheme, advance_estimators_to_frame, update_verdict, prepare_next_frame, accumulate_substep = map(
+    one_of, zip(*SCHEMES, strict=True)
+)

@@ -5,27 +5,31 @@ The acceleration by known faults is part of the prediction, so the estimator of 
 A Python plug-in has a scheme of its own (PYTHON_PLUGIN): its verdict replaces ours, and our estimators run
 on, because the laws use them. The scheme `none` (NO_DIAGNOSIS) only begins the detection filters.
 
-The isolation depends on the fault class and on the detectors in authority; a row of
-ISOLATION_VARIANTS for each:
+The isolation depends on the fault class, and on the detectors whose exclusions count (`variant`):
 
     class        of the bank of estimators excludes  and decides
-    published    worst case, statistics, or either   the estimator that is left: a loss of one surface
+    published    worst case, likelihoods, or either  the estimator that is left: a loss of one surface
     all          worst case, or parity views as well  the type of a fault on each surface, alone or in pairs
-
-`variant_row` chooses the row when a flight is assembled.
 """
 
 from collections.abc import Callable
 from typing import NamedTuple
 
-from beaver_ftc.compiled import apart, kernel, one_of
+from beaver_ftc.compiled import apart, kernel
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, unanticipated_pitch
 from beaver_ftc.diagnosis import conclusion, gusts, isolation, monitors
 from beaver_ftc.diagnosis.detection import attitude, filters, forces, parity, statistical
 from beaver_ftc.diagnosis.detection.rows import finish_rows
 from beaver_ftc.diagnosis.model_prediction import fill_old_effects, innovation_known
 from beaver_ftc.diagnosis.monitors import sensor_monitor
-from beaver_ftc.diagnosis.state import UNANTICIPATED, YAW
+from beaver_ftc.diagnosis.state import (
+    AUTHORITIES,
+    EITHER_DETECTOR,
+    STATISTICAL_DETECTOR,
+    UNANTICIPATED,
+    WORST_CASE_DETECTOR,
+    YAW,
+)
 from beaver_ftc.diagnosis.types import pairs, registry, verdict
 from beaver_ftc.scenario.diagnosis import FdiConfig
 
@@ -110,20 +114,6 @@ NO_DIAGNOSIS = CompiledScheme(
 )  # fmt: skip
 
 
-class IsolationVariant(NamedTuple):
-    """Lazy kernels of a row.
-
-    begin_at_alarm(fdi): start with no knowledge of any fault.
-    record_commands(fdi, prediction): record what each surface was commanded in the elapsed frame.
-    isolate(fdi, measured, t, started): exclude faults at t s, and decide; started: the
-    isolation started a frame or more ago.
-    """
-
-    begin_at_alarm: Callable[..., None]
-    record_commands: Callable[..., None]
-    isolate: Callable[..., None]
-
-
 @kernel
 def continue_isolation(fdi, meas, t, before):
     """From the alarm on, exclude faults and decide; before: the alarm came a frame or more ago.
@@ -131,17 +121,18 @@ def continue_isolation(fdi, meas, t, before):
     Where sensors are monitored, the isolation starts one frame after the alarm, because the attitude reveals
     a gyro fault one frame late (later where it is noisy). With a broken sensor or engine nothing is isolated.
     """
-    variant, monitor = fdi.config.variant, fdi.sensor_monitor
+    monitor = fdi.sensor_monitor
     if not before:
         isolation.start_estimators(fdi.isolation, fdi.bound.n_gyro, meas.x)
-        begin_variant(variant, fdi)
+        if fdi.config.diagnoses_all_types:
+            begin_types(fdi)
     sound = not sensor_monitor.may_be_initial(monitor, fdi.verdict.detected_at_s)
     if (
         sound
         and sensor_monitor.allows_isolation(monitor, before)
         and not fdi.engine_monitor.output.engine_failed
     ):
-        isolate_variant(variant, fdi, meas, t, before)
+        isolate(fdi, meas, t, before)
 
 
 @kernel
@@ -152,25 +143,23 @@ def worst_case_allows(fdi, fie, x, started):
     )
 
 
-@kernel
-def likelihood_excludes(fdi, fie):
-    """Whether the statistical detector excludes the loss of estimator fie, once it has raised its alarm."""
+@apart(long_loops=True)
+def weigh_loss(fdi, j):
+    """Fill `unlikely` of estimator j: whether the statistical detector excludes its loss, after its alarm."""
     stat, cfg = fdi.statistical, fdi.config
-    if stat.alarm.detected_at_s < 0.0:
-        return False
-    hidden = fdi.sensor_monitor.config.enabled and stat.gust.output.gusty
-    isolation.update_likelihood(
-        fie, stat.test, stat.block, fdi.isolation, fdi.layout.loss, cfg.abrupt, hidden
-    )
-    return fie.unlikely == 1
+    if stat.alarm.detected_at_s >= 0.0:
+        hidden, fie = fdi.sensor_monitor.config.enabled and stat.gust.output.gusty, fdi.isolation.estimator[j]
+        isolation.update_likelihood(
+            fie, stat.test, stat.block, fdi.isolation, fdi.layout.loss, cfg.abrupt, hidden
+        )
 
 
-@kernel
-def parity_excludes(fdi, fie):
-    """Whether a parity view shows motion that the surface of estimator fie cannot cause."""
-    stat = fdi.statistical
+@apart(long_loops=True)
+def weigh_position(fdi, j):
+    """Fill `unlikely` of estimator j: whether a parity view shows motion that its surface cannot cause."""
+    stat, fie = fdi.statistical, fdi.isolation.estimator[j]
     views = stat.views[: stat.n_views]
-    return parity.views_exclude(views, stat.test, stat.forces, stat.rows, fie.surface)
+    fie.unlikely = parity.views_exclude(views, stat.test, stat.forces, stat.rows, fie.surface)
 
 
 @kernel
@@ -188,11 +177,22 @@ def exclude_or_wait(fdi, fie, possible, t):
 
 
 @kernel
-def exclude_worst_case(fdi, x, t, started):
-    """Exclude the faults that are not possible in the worst case."""
-    for fie in fdi.isolation.estimator[: fdi.isolation.config.n_estimators]:
-        possible = worst_case_allows(fdi, fie, x, started)
+def isolate(fdi, meas, t, started):
+    """Exclude faults at t s, and decide; started: the isolation started a frame or more ago."""
+    cfg, iso = fdi.config, fdi.isolation
+    for j, fie in enumerate(iso.estimator[: iso.config.n_estimators]):
+        possible = worst_case_allows(fdi, fie, meas.x, started) or cfg.variant == STATISTICAL_DETECTOR
+        if possible and cfg.variant != WORST_CASE_DETECTOR:
+            if cfg.diagnoses_all_types:
+                weigh_position(fdi, j)
+            else:
+                weigh_loss(fdi, j)
+            possible = not fie.unlikely
         exclude_or_wait(fdi, fie, possible, t)
+    if cfg.diagnoses_all_types:
+        decide_type(fdi, t, started)
+    else:
+        decide_loss(fdi, t)
 
 
 @kernel
@@ -204,47 +204,6 @@ def decide_loss(fdi, t):
 
 
 @apart
-def loss_by_worst_case(fdi, measured, t, started):
-    """Isolate by the worst case alone (IsolationVariant)."""
-    exclude_worst_case(fdi, measured.x, t, started)
-    decide_loss(fdi, t)
-
-
-@apart(long_loops=True)
-def loss_by_either(fdi, measured, t, started):
-    """Isolate by the worst case and the statistical detector (IsolationVariant)."""
-    for fie in fdi.isolation.estimator[: fdi.isolation.config.n_estimators]:
-        possible = worst_case_allows(fdi, fie, measured.x, started) and not likelihood_excludes(fdi, fie)
-        exclude_or_wait(fdi, fie, possible, t)
-    decide_loss(fdi, t)
-
-
-@apart(long_loops=True)
-def loss_by_statistics(fdi, measured, t, started):
-    """Isolate by the statistical detector alone (IsolationVariant); the residuals are logged all the same."""
-    for fie in fdi.isolation.estimator[: fdi.isolation.config.n_estimators]:
-        worst_case_allows(fdi, fie, measured.x, started)
-        exclude_or_wait(fdi, fie, not likelihood_excludes(fdi, fie), t)
-    decide_loss(fdi, t)
-
-
-@apart
-def type_by_worst_case(fdi, measured, t, started):
-    """Isolate a fault of any type by the worst case alone (IsolationVariant)."""
-    exclude_worst_case(fdi, measured.x, t, started)
-    decide_type(fdi, t, started)
-
-
-@apart(long_loops=True)
-def type_by_either(fdi, measured, t, started):
-    """Isolate a fault of any type by the worst case and the parity views (IsolationVariant)."""
-    for fie in fdi.isolation.estimator[: fdi.isolation.config.n_estimators]:
-        possible = worst_case_allows(fdi, fie, measured.x, started) and not parity_excludes(fdi, fie)
-        exclude_or_wait(fdi, fie, possible, t)
-    decide_type(fdi, t, started)
-
-
-@kernel
 def decide_type(fdi, t, started):
     """Decide which fault of every type, alone or two at a time, is there."""
     types, found, layout, bank = fdi.types, fdi.verdict, fdi.layout, fdi.bank
@@ -264,47 +223,24 @@ def decide_type(fdi, t, started):
 
 
 @apart
-def skip_begin(fdi):
-    """The estimators are all that a loss needs (IsolationVariant)."""
-
-
-@apart
 def begin_types(fdi):
-    """Start the feasible sets of all types (IsolationVariant)."""
+    """Start the feasible sets of all types at the alarm, with no knowledge of any fault."""
     registry.restart_types(fdi.types)
 
 
 @apart
-def skip_commands(fdi, prediction):
-    """The estimators have observed all that a loss needs (IsolationVariant)."""
-
-
-@apart
 def record_orders(fdi, prediction):
-    """Record the orders to each surface (IsolationVariant)."""
+    """Record what each surface was commanded in the elapsed frame."""
     registry.record_commands(fdi.types, prediction.commanded, prediction.means)
 
 
-ISOLATION_VARIANTS = {
-    ("published", "worst-case"): IsolationVariant(skip_begin, skip_commands, loss_by_worst_case),
-    ("published", "either"): IsolationVariant(skip_begin, skip_commands, loss_by_either),
-    ("published", "statistical"): IsolationVariant(skip_begin, skip_commands, loss_by_statistics),
-    ("all", "worst-case"): IsolationVariant(begin_types, record_orders, type_by_worst_case),
-    ("all", "either"): IsolationVariant(begin_types, record_orders, type_by_either),
-}
-PUBLISHED_VARIANT = 0  # the place of the published class without statistics
-
-begin_variant = one_of([variant.begin_at_alarm for variant in ISOLATION_VARIANTS.values()])
-record_variant = one_of([variant.record_commands for variant in ISOLATION_VARIANTS.values()])
-isolate_variant = one_of([variant.isolate for variant in ISOLATION_VARIANTS.values()])
-
-
-def variant_row(config: FdiConfig) -> int:
-    """The place of a diagnosis' row. The worst case excludes types of fault for any authority."""
-    authority = config.authority if config.weighs_chance else "worst-case"
-    if config.fault_class == "all" and authority == "statistical":
-        authority = "either"
-    return list(ISOLATION_VARIANTS).index((config.fault_class, authority))
+def whose_exclusions(config: FdiConfig) -> int:
+    """The detector whose exclusions count: EITHER_DETECTOR, WORST_CASE_DETECTOR or STATISTICAL_DETECTOR. The
+    worst case excludes types of fault for any authority."""
+    if not config.weighs_chance:
+        return WORST_CASE_DETECTOR
+    authority = AUTHORITIES[config.authority]
+    return EITHER_DETECTOR if (config.fault_class, authority) == ("all", STATISTICAL_DETECTOR) else authority
 
 
 @apart(long_loops=True)
@@ -416,7 +352,8 @@ def advance_estimators_to_frame(fdi, prediction, measured, k, t):
     if fdi.statistical.test.enabled:
         update_tests(fdi, prediction, measured, k, t)
     update_estimators(fdi, prediction)
-    record_variant(fdi.config.variant, fdi, prediction)
+    if fdi.config.diagnoses_all_types:
+        record_orders(fdi, prediction)
     leaks = found.isolated_estimator >= 0 or found.target >= 0
     filters.advance_fdae(fdi.fdae, bound, prediction.x_before, prediction.F_known, found.detected, leaks, dt)
 

@@ -56,11 +56,10 @@ def configure_network(net: np.void, gain: float, W_max: float, travel: np.ndarra
     cfg = net["config"]
     cfg["gain"], cfg["w_max"] = gain, W_max
     for i in range(3):
+        angles = ALPHA_CENTRES_RAD if i == PITCH else BETA_CENTRES_RAD
         deflections = travel[0, i] + TRAVEL_SHARE_CENTRES * (travel[1, i] - travel[0, i])
-        for j, centres in enumerate(
-            (ALPHA_CENTRES_RAD if i == PITCH else BETA_CENTRES_RAD, RATE_CENTRES_RAD_S, deflections)
-        ):
-            cfg["c0"][i, j], cfg["dc"][i, j] = centres[0], centres[1] - centres[0]
+        first, second = np.transpose([each[:2] for each in (angles, RATE_CENTRES_RAD_S, deflections)])
+        cfg["c0"][i], cfg["dc"][i] = first, second - first
 
 
 def reconfigure_published(fdi: np.void, declared: Declared, travel: np.ndarray) -> None:
@@ -105,16 +104,14 @@ def evaluate_state_network(net, main, x, y, u):
     main (3,): the surface that leads each axis.
     """
     for i in range(3):
-        fill_input_basis(net, i, 0, N_CENTRES[0], y[ALPHA] if i == PITCH else y[BETA])
-        fill_input_basis(net, i, 1, N_CENTRES[1], x[i])
-        fill_input_basis(net, i, 2, N_CENTRES[2], u[main[i]])
-        n, fhat = 0, 0.0
+        for j, v in enumerate((y[ALPHA] if i == PITCH else y[BETA], x[i], u[main[i]])):
+            fill_input_basis(net, i, j, N_CENTRES[j], v)
+        n, fhat, part = 0, 0.0, net.memory.part
         for a in range(N_CENTRES[0]):
             for b in range(N_CENTRES[1]):
                 for c in range(N_CENTRES[2]):
-                    phi = net.memory.part[0, a] * net.memory.part[1, b] * net.memory.part[2, c]
-                    net.memory.basis[i, n] = phi
-                    fhat += net.memory.weights[i, n] * phi
+                    net.memory.basis[i, n] = part[0, a] * part[1, b] * part[2, c]
+                    fhat += net.memory.weights[i, n] * net.memory.basis[i, n]
                     n += 1
         net.output[i] = fhat
 

@@ -24,7 +24,7 @@ from pathlib import Path
 import numpy as np
 
 from beaver_ftc.control.engines import effects_of as effects_of_engines
-from beaver_ftc.design.model import AXES, N_Y, both_responses_along, design_of
+from beaver_ftc.design.model import AXES, design_of, responses_at
 from beaver_ftc.documents.errors import BeaverFtcError, SimulationFailed
 from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.plant.instrumented import ENGINE_SIGNALS
@@ -96,13 +96,12 @@ def moments_of(
     """Along a flight of n frames, by the design model: the moment of each surface that leads an axis, (n, 3)
     rad/s2 by its name; the bound (n, 3) rad/s2; and G (n, 3, surfaces) rad/s2 per rad."""
     aircraft = scenario.airframe
-    y = np.zeros((len(log["t_s"]), N_Y))
-    seen = _side_by_side(log, "alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa", *aircraft.signals)
-    y[:, : seen.shape[1]] = seen
+    y = _side_by_side(log, "alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa", *aircraft.signals)
     u = _side_by_side(log, *(f"{surface}_cmd_rad" for surface in aircraft.surfaces))
     bound = _side_by_side(log, *(f"{axis}_eta_bar_rad_s2" for axis in AXES))
-    design, G = design_of(scenario.design_model, aircraft)[0], np.zeros((len(y), 3, aircraft.n))
-    both_responses_along(design, np.zeros(3), y, np.zeros(3), G)
+    design = design_of(scenario.design_model, aircraft)[0]
+    design["linearised"] = design["frozen_alpha"] = False
+    G = responses_at(design, np.zeros((len(y), 3)), y)[1]
     moment = G * u[:, None, :]
     of = {name: moment[:, :, aircraft.surfaces.index(name)] for name in aircraft.class_of_losses}
     return of, bound, G

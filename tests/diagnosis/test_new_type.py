@@ -51,7 +51,7 @@ def estimate(fdi, s, kind):
 TYPES = (
     FaultType(
         name="reversed", has_constant_parameter=True, consistent_interval=consistent_interval,
-        possible_deflection_range=deflection, estimate_parameter=estimate,
+        deflection_range=deflection, estimate_parameter=estimate,
     ),
 )  # fmt: skip
 '''

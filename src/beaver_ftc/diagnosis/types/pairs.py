@@ -32,7 +32,7 @@ from beaver_ftc.diagnosis.types import (
     set_anomalous,
     verdict,
 )
-from beaver_ftc.diagnosis.types.registry import ALL, CONSTANT, MODE, N_CONSTANT, possible_deflection_range
+from beaver_ftc.diagnosis.types.registry import ALL, CONSTANT, MODE, N_CONSTANT, deflection_range
 from beaver_ftc.diagnosis.types.verdict import NO_SURFACE, can_be_faulty, constant_remains, type_remains
 
 
@@ -78,7 +78,7 @@ def constant_range(c, srf, k):
     lo, hi = np.inf, -np.inf
     for h in range(N_CONSTANT):
         if type_remains(srf, h):
-            h_lo, h_hi = possible_deflection_range(c, srf, h, k)
+            h_lo, h_hi = deflection_range(c, srf, h, k)
             lo = min(lo, h_lo)
             hi = max(hi, h_hi)
     reach_lo, reach_hi = srf.actuator.reach_lo, srf.actuator.reach_hi

@@ -47,7 +47,6 @@ from beaver_ftc.diagnosis.types.registry import (
     VARYING_QUIET,
     VARYING_SHOWN,
     WAIT_HALF_CYCLES,
-    error_of_type,
     has_shown,
     motion_rules_out,
 )
@@ -161,7 +160,7 @@ def can_be_another(srf, apparent, dependent):
         if apparent >= 0 and type_remains(srf, h) and (dependent or not FOLLOWS_COMMAND[h]):
             for j in range(N_CONSTANT):
                 alike = SAME_NAME[j] == SAME_NAME[apparent] and CAN_LOOK_LIKE[h, j] and type_remains(srf, j)
-                if alike and not motion_rules_out(srf, STOP_SIDE[j], h):
+                if alike and not motion_rules_out(srf, h, STOP_SIDE[j]):
                     return True
     return False
 
@@ -350,7 +349,7 @@ def deflection_error(srf, possible):
     if possible:
         for h in ERROR_TYPES:
             if type_remains(srf, h):
-                e = error_of_type(srf, h)
+                e = registry.deflection_error(srf, h)
                 if np.isfinite(e):
                     return e
                 break

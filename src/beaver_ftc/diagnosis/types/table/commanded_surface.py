@@ -45,7 +45,7 @@ def error_of_frame(srf):
 
 
 @kernel
-def share_range(srf):
+def share_range(srf, h):
     """Return the range of 1 + theta: 0 to 1."""
     return 0.0, 1.0
 
@@ -95,7 +95,7 @@ LOSS_RELATION = DeflectionRelation(
 LOSS = FaultType(
     name="loss_of_effectiveness", has_constant_parameter=True, sort_rank=1,
     parameter_range=share_range, consistent_interval=loss_interval,
-    possible_deflection_range=loss_range,
+    deflection_range=loss_range,
     accommodation_mode=SCALE_COMMAND, end_type="float",
     deflection_relation=LOSS_RELATION, estimate_parameter=theta_of_loss,
     estimate_parameter_interval=theta_of_set,
@@ -227,7 +227,7 @@ def update_growing(c, srf, h, k):
 
 
 @kernel
-def has_run(srf, stop):
+def has_run(srf, h, stop):
     """Whether the surface has moved towards that stop as fast as only a runaway does."""
     if stop == 0:
         return False
@@ -241,7 +241,7 @@ def last_offset(fdi: np.void, s: int, h: int) -> float | None:
 
 BIAS = FaultType(
     name="bias", has_constant_parameter=True, sort_rank=6,
-    consistent_interval=bias_of_frame, possible_deflection_range=bias_range,
+    consistent_interval=bias_of_frame, deflection_range=bias_range,
     accommodation_mode=SUBTRACT_OFFSET, deflection_error=bias_middle,
     deflection_error_precedence=2,
     deflection_relation=DeflectionRelation(
@@ -322,7 +322,7 @@ def restart_sign(c, srf, h, k):
 
 
 @kernel
-def swing_has_shown(srf):
+def swing_has_shown(srf, h):
     """Whether it has swung for two half-cycles and more."""
     return srf.oscillatory.n_half >= MIN_HALF_CYCLES
 

@@ -49,14 +49,13 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.diagnosis import isolation
+from beaver_ftc.diagnosis.sets import EMPTY_SET, UNLIMITED_SET, intersect
 
 Kernel = Callable[..., Any]
 
 # Accommodation modes, what the law does about a surface at fault: scale its command, give the surface up,
 # subtract its offset, or wait for it at the rate that it has.
 SCALE_COMMAND, GIVE_UP, SUBTRACT_OFFSET, WAIT_FOR_SURFACE = range(4)
-
-UNLIMITED_SET, EMPTY_SET = (-np.inf, np.inf), (np.inf, -np.inf)  # an unlimited set, and an empty one
 
 # `evidence_at_rest`: what a surface says of a type that was given up, stays where it was and shows nothing
 # wrong.
@@ -233,12 +232,10 @@ def intersect_set(srf, h, other):
     holds the two bounds that contradict each other. EMPTY_SET has no such bounds: a type that it excludes
     keeps its set.
     """
-    lo, hi = other
-    if lo == np.inf:
+    if other == EMPTY_SET:
         srf.sets.excluded[h] = 1
         return
-    srf.sets.low[h] = max(srf.sets.low[h], lo)
-    srf.sets.high[h] = min(srf.sets.high[h], hi)
+    put_set(srf, h, intersect((srf.sets.low[h], srf.sets.high[h]), other))
     if srf.sets.low[h] > srf.sets.high[h]:
         srf.sets.excluded[h] = 1
 
@@ -278,12 +275,8 @@ def observe_surface(c, srf, fie, m, nu, nu_max, eff):
     last, cmd = srf.last, srf.commands
     last.u = -eff.base[m] / eff.regressor[m]
     last.kappa = 0.25 * (cmd.G_max - cmd.G_min) / abs(eff.regressor[m])
-    last.lo, last.hi = fie.theta_min, fie.theta_max
-    for i in range(3):
-        if c.frames_per_block > 1 and i != m and eff.regressor[i] != 0.0:
-            continue  # over a block the axes weigh what varies differently
-        lo, hi = isolation.consistent_on(nu, nu_max, fie, eff, i)
-        last.lo, last.hi = (max(last.lo, lo), min(last.hi, hi))
+    axis = m if c.frames_per_block > 1 else -1  # over a block the axes weigh what varies differently
+    last.lo, last.hi = isolation.consistent_on_axes(nu, nu_max, fie, eff, axis)
     mark_stops(srf, 2.0 * (nu_max[m] + eff.e[m]) / abs(eff.regressor[m]))
 
 

@@ -30,15 +30,14 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.diagnosis import isolation
+from beaver_ftc.diagnosis.sets import EMPTY_SET, UNLIMITED_SET
 from beaver_ftc.diagnosis.state import PITCH_GROUP
 from beaver_ftc.diagnosis.types import (
-    EMPTY_SET,
     GIVE_UP,
     OBSERVATION_RECORD,
     REST_EXCLUDES_TYPE,
     REST_HIDES_TYPE,
     REST_POSITION_IS_PARAMETER,
-    UNLIMITED_SET,
     FaultType,
     Kernel,
     copy_observation,

@@ -28,7 +28,8 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.model import farthest
-from beaver_ftc.diagnosis.types import EMPTY_SET, UNLIMITED_SET, put_set
+from beaver_ftc.diagnosis.sets import EMPTY_SET, UNLIMITED_SET
+from beaver_ftc.diagnosis.types import put_set
 
 EARLIER, LATER = 0, 1
 # A surface nearer than this to a healthy one counts as healthy: its effect is below the rounding bound.

@@ -19,14 +19,12 @@ from math import pi, sqrt
 import numpy as np
 
 from beaver_ftc.compiled import kernel, record
-from beaver_ftc.diagnosis import isolation
+from beaver_ftc.diagnosis.sets import EMPTY_SET, NO_THETA, UNLIMITED_SET, explain
 from beaver_ftc.diagnosis.types import (
-    EMPTY_SET,
     REST_EXCLUDES_TYPE,
     REST_HIDES_TYPE,
     SCALE_COMMAND,
     SUBTRACT_OFFSET,
-    UNLIMITED_SET,
     WAIT_FOR_SURFACE,
     DeflectionRelation,
     FaultType,
@@ -54,7 +52,7 @@ def share_range(srf, h):
 def loss_interval(c, srf, h, k):
     """The 1 + theta in [0, 1] with p = (1 + theta) u in the judged frame; lo > hi if none."""
     lo, hi = srf.judged.lo, srf.judged.hi
-    return isolation.consistent_theta(0.5 * (lo + hi), 0.5 * (hi - lo), srf.judged.u, 0.0, 1.0)
+    return explain(0.5 * (lo + hi), 0.5 * (hi - lo), srf.judged.u, 0.0, 1.0)
 
 
 @kernel
@@ -122,7 +120,7 @@ def bias_of_frame(c, srf, h, k):
     """
     seen, cmd, act = srf.judged, srf.commands, srf.actuator
     if seen.hi < act.stop_lo or seen.lo > act.stop_hi:
-        return isolation.NO_THETA
+        return NO_THETA
     lo, hi = error_of_frame(srf)
     if seen.lo - max(seen.u - cmd.u_min[1], 0.0) <= act.stop_lo:
         lo = -np.inf

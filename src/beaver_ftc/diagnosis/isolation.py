@@ -75,6 +75,7 @@ from beaver_ftc.diagnosis.state import (
     POSITION_HYPOTHESIS,
     PUBLISHED_THRESHOLD,
     UNANTICIPATED,
+    fill,
 )
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.diagnosis import MAX_POLES
@@ -270,12 +271,14 @@ def configure_isolation(
 ) -> None:
     """Fill in the estimators and how the decision among them is sharpened; travel (2, n) rad."""
     config, aircraft, dt = declared.fdi, declared.aircraft, 1.0 / declared.rate_hz
-    sharpen, cfg = config.sharpen, iso["config"]
-    cfg["mu_kind"] = _THRESHOLD_KINDS[config.thresholds]
-    cfg["forget"] = exp(-dt / config.forgetting_time_s)
-    cfg["a"] = exp(-config.isolation_pole_per_s * dt)
-    cfg["reach"], cfg["shared"] = sharpen.memory, sharpen.shared_effectiveness
-    cfg["narrows"], cfg["n_estimators"] = sharpen.set_membership, len(rows)
+    losable = {name for damage in aircraft.damage.values() for name in damage.takes}
+    fill(
+        iso["config"], n_estimators=len(rows), mu_kind=_THRESHOLD_KINDS[config.thresholds],
+        forget=exp(-dt / config.forgetting_time_s), a=exp(-config.isolation_pole_per_s * dt),
+        reach=config.sharpen.memory, shared=config.sharpen.shared_effectiveness,
+        narrows=config.sharpen.set_membership, hold_s=DAMAGE_HOLD_OFF_S if aircraft.damage else 0.0,
+        losable=[name in losable for name in aircraft.surfaces],
+    )  # fmt: skip
     ends = np.array([np.minimum(travel[0], 0.0), np.maximum(travel[1], 0.0)])  # a share of it can be left
     for fie, (_, kind, s) in zip(iso["estimator"], rows, strict=False):
         fie["hypothesis_kind"], fie["surface"] = kind, s
@@ -285,9 +288,6 @@ def configure_isolation(
     # Damage is outside the class: with declared damage, the last fault left after statistical exclusion is
     # not isolated yet.
     iso["estimator"]["weak"] = DAMAGE_EXCLUDES if config.weighs_chance and aircraft.damage else 0
-    cfg["hold_s"] = DAMAGE_HOLD_OFF_S if aircraft.damage else 0.0
-    losable = {name for damage in aircraft.damage.values() for name in damage.takes}
-    cfg["losable"] = [name in losable for name in aircraft.surfaces]
 
 
 @kernel

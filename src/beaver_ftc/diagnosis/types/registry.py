@@ -31,7 +31,7 @@ import numpy as np
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.diagnosis import isolation
 from beaver_ftc.diagnosis.sets import EMPTY_SET, UNLIMITED_SET
-from beaver_ftc.diagnosis.state import PITCH_GROUP
+from beaver_ftc.diagnosis.state import PITCH_GROUP, fill
 from beaver_ftc.diagnosis.types import (
     GIVE_UP,
     OBSERVATION_RECORD,
@@ -40,6 +40,7 @@ from beaver_ftc.diagnosis.types import (
     REST_POSITION_IS_PARAMETER,
     FaultType,
     Kernel,
+    clip_travel,
     copy_observation,
     intersect_set,
     observe_surface,
@@ -243,32 +244,30 @@ def configure_types(
     types: np.void, layout: np.void, servos: np.void, declared: Declared, travel: np.ndarray
 ) -> None:
     """Fill the configuration of the types and the actuator of each surface; travel (2, n): the stops, rad."""
-    fdi, c, dt = declared.fdi, types["config"], 1.0 / declared.rate_hz
-    c["frames_per_block"] = n_block = (
-        ceil(BLOCK_DURATION_S / dt) if declared.sensors.declared.gyros_vary else 1
-    )
-    c["single_instant"] = declared.substeps == 1 and n_block == 1
-    c["block_duration_s"] = n_block * dt
+    fdi, dt = declared.fdi, 1.0 / declared.rate_hz
+    n_block = ceil(BLOCK_DURATION_S / dt) if declared.sensors.declared.gyros_vary else 1
     half = pi / fdi.slowest_oscillation_rad_s / (n_block * dt)
-    c["half_frames"] = ceil(min(half, 1e9))  # longer than any flight
-    c["n_substeps"], c["returns_lagged"], c["dt"] = (declared.substeps, servos["real"], dt)
-    c["abrupt"] = fdi.fault_profile == "abrupt"
-    types["pair"]["first_pitch"], types["pair"]["enabled"] = -1, fdi.pairs
+    fill(
+        types["config"], frames_per_block=n_block, single_instant=declared.substeps == 1 and n_block == 1,
+        block_duration_s=n_block * dt, half_frames=ceil(min(half, 1e9)),  # longer than any flight
+        n_substeps=declared.substeps, returns_lagged=servos["real"], dt=dt,
+        abrupt=fdi.fault_profile == "abrupt",
+    )  # fmt: skip
+    fill(types["pair"], first_pitch=-1, enabled=fdi.pairs)
     names, h = declared.aircraft.surfaces, dt / declared.substeps
     for s, (name, srf, lo, hi) in enumerate(zip(names, types["surface"], *travel, strict=True)):
-        rate_deg_s = getattr(declared.servos, name).rate_limit_deg_s
-        act = srf["actuator"]
-        act["stop_lo"], act["stop_hi"] = lo, hi
-        act["reach_lo"], act["reach_hi"] = (min(lo, 0.0), max(hi, 0.0))
-        for field in ("approaches", "steps", "band"):
-            act[field] = servos[field][s]
-        act["uncertain"] = servos["uncertain"]
+        approaches, steps, band = (servos[field][s] for field in ("approaches", "steps", "band"))
+        rate_rad_s = radians(getattr(declared.servos, name).rate_limit_deg_s) or DEFAULT_SERVO_RAD_S
         slowest = 1.0 - getattr(declared.servo_errors, name).rate_limit
-        act["runaway"] = 0.5 * slowest * (radians(rate_deg_s) or DEFAULT_SERVO_RAD_S)
-        act["slow_step"] = min(radians(fdi.slowest_rate_deg_s) * h, act["steps"][0])
-        act["near"] = act["slow_step"] / act["approaches"][0] + act["band"]
-        srf["status"]["may_be_sole"] = not fdi.pairs or layout["group"][s] == PITCH_GROUP
-        srf["accommodation"]["mode"] = srf["status"]["fault_type"] = -1
+        slow_step = min(radians(fdi.slowest_rate_deg_s) * h, steps[0])
+        fill(
+            srf["actuator"], stop_lo=lo, stop_hi=hi, reach_lo=min(lo, 0.0), reach_hi=max(hi, 0.0),
+            approaches=approaches, steps=steps, band=band, uncertain=servos["uncertain"],
+            runaway=0.5 * slowest * rate_rad_s, slow_step=slow_step, near=slow_step / approaches[0] + band,
+        )  # fmt: skip
+        may_be_sole = not fdi.pairs or layout["group"][s] == PITCH_GROUP
+        fill(srf["status"], may_be_sole=may_be_sole, fault_type=-1)
+        srf["accommodation"]["mode"] = -1
 
 
 @kernel
@@ -303,11 +302,10 @@ def record_commands(types, u, ext):
             for b in range(N_KEPT - 1, 0, -1):
                 cmd.history[b, :n] = cmd.history[b - 1, :n]
                 cmd.cmd_min[b], cmd.cmd_max[b] = (cmd.cmd_min[b - 1], cmd.cmd_max[b - 1])
-            cmd.cmd_min[0], cmd.cmd_max[0] = np.inf, -np.inf
-            cmd.u_min[1], cmd.u_max[1] = (cmd.u_min[0], cmd.u_max[0])
-            cmd.u_min[0], cmd.u_max[0] = np.inf, -np.inf
-            cmd.G_min, cmd.G_max = np.inf, -np.inf
-        p = min(max(u[s], srf.actuator.stop_lo), srf.actuator.stop_hi)
+            cmd.u_min[1], cmd.u_max[1] = cmd.u_min[0], cmd.u_max[0]
+            cmd.cmd_min[0] = cmd.u_min[0] = cmd.G_min = np.inf
+            cmd.cmd_max[0] = cmd.u_max[0] = cmd.G_max = -np.inf
+        p = clip_travel(srf, u[s])
         cmd.history[0, types.block.n_so_far] = p
         cmd.cmd_min[0], cmd.cmd_max[0] = (min(cmd.cmd_min[0], p), max(cmd.cmd_max[0], p))
         cmd.u_min[0] = min(cmd.u_min[0], ext.u_min[s])

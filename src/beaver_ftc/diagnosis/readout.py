@@ -405,11 +405,10 @@ def _read_hypothesis(hyp: np.void) -> StatisticalHypothesis:
 def _read_sensor_monitor(mon: np.void) -> SensorMonitor:
     o, red = mon["output"], mon["redundancy"]
     j = int(o["worst_test_index"])
-    tests = ("residual", "per_s", "per_sample", "gust")
-    worst = SensorTest(*(float(red[name][j]) for name in tests), red["r"][j].copy(), red["B"][j].copy())
+    worst = (red[name][j].copy() for name in ("residual", "per_s", "per_sample", "gust", "r", "B"))
     return SensorMonitor(
         bool(mon["config"]["enabled"]), bool(o["alarmed"]), j,
-        float(o["top_ratio"]), worst, int(o["isolated_sensor"]),
+        float(o["top_ratio"]), SensorTest(*worst), int(o["isolated_sensor"]),
         o["is_reading_unused"].astype(bool), float(red["h"]),
         *(red[name].copy() for name in ("gust_change", "y_pred", "e")),
     )  # fmt: skip

@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 from kernels import estimator, new_fdi, on
 
 from beaver_ftc.diagnosis import isolation
+from beaver_ftc.diagnosis.sets import explain
 
 AXES = st.tuples(*[st.floats(-1.0, 1.0)] * 3)
 WITHIN = st.tuples(*[st.floats(-0.999, 0.999)] * 3)  # shares of a bound, but for rounding
@@ -43,7 +44,7 @@ def test_the_true_theta_stays_in_every_set_and_sets_shrink(theta, frames, spread
 @given(measured=st.floats(-1.0, 1.0), bound=st.floats(0.0, 0.5),
        Z=st.floats(0.2, 2.0), sign=st.sampled_from([-1.0, 1.0]))  # fmt: skip
 def test_of_one_axis_the_set_is_what_solves_the_inequality(measured, bound, Z, sign):
-    low, high = isolation.consistent_theta(measured, bound, sign * Z, -5.0, 5.0)
+    low, high = explain(measured, bound, sign * Z, -5.0, 5.0)
     theta = np.linspace(-6.0, 6.0, 4001)
     agrees = (np.abs(measured - theta * sign * Z) <= bound) & (np.abs(theta) <= 5.0)
     inside = (low <= theta) & (theta <= high)

@@ -27,7 +27,8 @@ REVERSED = '''
 """A surface rigged the wrong way round: p = -u."""
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis.types import EMPTY_SET, UNLIMITED_SET, FaultType
+from beaver_ftc.diagnosis.sets import EMPTY_SET, UNLIMITED_SET
+from beaver_ftc.diagnosis.types import FaultType
 
 
 @kernel
@@ -51,7 +52,7 @@ def estimate(fdi, s, kind):
 TYPES = (
     FaultType(
         name="reversed", has_constant_parameter=True, consistent_interval=consistent_interval,
-        possible_deflection_range=deflection, estimate_parameter=estimate,
+        deflection_range=deflection, estimate_parameter=estimate,
     ),
 )  # fmt: skip
 '''
@@ -91,14 +92,8 @@ WORN = '''
 """A surface that moves further than it is told, by a factor that never becomes smaller: p = g u, g >= 1."""
 
 from beaver_ftc.compiled import kernel, record
-from beaver_ftc.diagnosis.isolation import consistent_theta
-from beaver_ftc.diagnosis.types import (
-    EMPTY_SET,
-    SUBTRACT_OFFSET,
-    UNLIMITED_SET,
-    DeflectionRelation,
-    FaultType,
-)
+from beaver_ftc.diagnosis.sets import EMPTY_SET, UNLIMITED_SET, explain
+from beaver_ftc.diagnosis.types import SUBTRACT_OFFSET, DeflectionRelation, FaultType
 
 MOST = 2.0
 
@@ -115,7 +110,7 @@ def consistent_interval(config, surface, type_index, k):
     seen, worn = surface.judged, surface.overdrive
     low, high = seen.lo, seen.hi
     middle, slack = 0.5 * (low + high), 0.5 * (high - low)
-    low, high = consistent_theta(middle, slack, seen.u, worn.least, MOST)
+    low, high = explain(middle, slack, seen.u, worn.least, MOST)
     if low > high:
         return EMPTY_SET
     worn.least = max(worn.least, low)

@@ -13,7 +13,7 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.diagnosis.detection import filters, statistical
-from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, WORST_CASE_DETECTOR
+from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, WORST_CASE_DETECTOR, fill
 from beaver_ftc.diagnosis.types import (
     GIVE_UP,
     SCALE_COMMAND,
@@ -53,10 +53,10 @@ def conclusion_dtype(n: int) -> np.dtype:
 
 def reset_conclusion(found: np.void) -> None:
     """Fill the record of a diagnosis that has concluded nothing."""
-    found["detected_at_s"] = found["isolated_at_s"] = -1.0
-    found["isolated_estimator"], found["from_s"] = NOT_ISOLATED, -1.0
-    found["isolated_type"], found["type_from_s"] = -1, -1.0
-    found["fault_type"] = found["target"] = found["accommodation_mode"] = found["typed_at_s"] = -1
+    fill(
+        found, detected_at_s=-1.0, isolated_estimator=NOT_ISOLATED, isolated_at_s=-1.0, fault_type=-1,
+        typed_at_s=-1.0, target=-1, accommodation_mode=-1, from_s=-1.0, isolated_type=-1, type_from_s=-1.0,
+    )  # fmt: skip
 
 
 @kernel

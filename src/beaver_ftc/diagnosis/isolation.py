@@ -64,6 +64,7 @@ from beaver_ftc.diagnosis.detection.filters import (
     published_interval,
     residual_interval,
 )
+from beaver_ftc.diagnosis.sets import explain, intersect
 from beaver_ftc.diagnosis.state import (
     CONSTANT_THRESHOLD,
     DAMAGE_EXCLUDES,
@@ -74,11 +75,11 @@ from beaver_ftc.diagnosis.state import (
     POSITION_HYPOTHESIS,
     PUBLISHED_THRESHOLD,
     UNANTICIPATED,
+    fill,
 )
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.diagnosis import MAX_POLES
 
-NO_THETA = (1.0, -1.0)
 N_ROUNDS = 4  # each round reduces the remaining travel to the share of it that the tolerance is
 
 
@@ -92,16 +93,6 @@ def eta_explains(nu, nu_max):
 
 
 @kernel
-def consistent_theta(nu, e, Z, lo, hi):
-    """The theta of [lo, hi] with |nu - theta Z| <= e, as (low, high); low > high if none."""
-    if Z == 0.0:
-        return (lo, hi) if abs(nu) <= e else NO_THETA
-    a = (nu - e) / Z
-    b = (nu + e) / Z
-    return max(lo, min(a, b)), min(hi, max(a, b))
-
-
-@kernel
 def consistent_on(nu, nu_max, fie, phi, i):
     """The theta of the known set with |nu - base - theta Z| <= nu_max + e on axis i; the whole set if i is
     skipped.
@@ -109,7 +100,7 @@ def consistent_on(nu, nu_max, fie, phi, i):
     if fie.skip[i]:
         return fie.theta_min, fie.theta_max
     e = nu_max[i] + phi.e[i]
-    return consistent_theta(nu[i] - phi.base[i], e, phi.regressor[i], fie.theta_min, fie.theta_max)
+    return explain(nu[i] - phi.base[i], e, phi.regressor[i], fie.theta_min, fie.theta_max)
 
 
 @kernel
@@ -142,9 +133,7 @@ def widen_error(fie, bound, nu, n_substeps):
     level = level_near(emap, fie, between, n_substeps)
     for _ in range(N_ROUNDS):
         more = own_error(bound, s, i, u + first, level)
-        lo, hi = consistent_theta(
-            nu[i] - phi.base[i], e + more, phi.regressor[i], fie.theta_min, fie.theta_max
-        )
+        lo, hi = explain(nu[i] - phi.base[i], e + more, phi.regressor[i], fie.theta_min, fie.theta_max)
         if lo > hi:
             break
         u, between = min(u, max(abs(lo), abs(hi))), (lo, hi)
@@ -165,39 +154,38 @@ def level_near(emap, fie, between, n_substeps):
 
 
 @kernel
-def theta_explains(fie, nu, nu_max):
-    """True if one theta, or no fault at all, is consistent with the elapsed frame on every axis."""
-    if eta_explains(nu, nu_max):
-        return True
-    lo, hi = fie.theta_min, fie.theta_max
+def consistent_on_axes(nu, nu_max, fie, phi, axis):
+    """The theta that agree on every axis; if `axis` >= 0, on that axis, and on those where Z = 0."""
+    between = fie.theta_min, fie.theta_max
     for i in range(3):
-        lo_i, hi_i = consistent_on(nu, nu_max, fie, fie.effect, i)
-        lo, hi = max(lo, lo_i), min(hi, hi_i)
-    return lo <= hi
+        if axis < 0 or i == axis or phi.regressor[i] == 0.0:
+            between = intersect(between, consistent_on(nu, nu_max, fie, phi, i))
+    return between
 
 
 @kernel
-def intersect_sets(fie, i, between, shared):
-    """Intersect the set of theta on axis i, or on every axis if `shared`, with `between`."""
-    lo, hi = between
-    for j in range(3):
-        if shared or j == i:
-            fie.set_lo[j] = max(fie.set_lo[j], lo)
-            fie.set_hi[j] = min(fie.set_hi[j], hi)
+def theta_explains(fie, nu, nu_max):
+    """True if one theta, or no fault at all, is consistent with the elapsed frame on every axis."""
+    lo, hi = consistent_on_axes(nu, nu_max, fie, fie.effect, -1)
+    return lo <= hi or eta_explains(nu, nu_max)
 
 
 @kernel
 def narrow_sets(fie, nu, nu_max, shared):
-    """Intersect the set of a constant theta with those of frame and filtered residual; false if it is empty.
+    """Intersect the sets of a constant theta, on each axis or one if `shared`, with those of frame and
+    filtered residual; false if one is empty.
 
     |eps + Omega thetahat - Omega theta| <= e       for any course of the estimate
     """
-    some = True
     for i in range(3):
-        intersect_sets(fie, i, consistent_on(nu, nu_max, fie, fie.effect, i), shared)
         eps = fie.residual[i] + fie.Om[i] * fie.theta[i]
-        between = consistent_theta(eps, fie.e[i], fie.Om[i], fie.theta_min, fie.theta_max)
-        intersect_sets(fie, i, between, shared)
+        between = explain(eps, fie.e[i], fie.Om[i], fie.theta_min, fie.theta_max)
+        between = intersect(between, consistent_on(nu, nu_max, fie, fie.effect, i))
+        for j in range(3):
+            if shared or j == i:
+                known = fie.set_lo[j], fie.set_hi[j]
+                fie.set_lo[j], fie.set_hi[j] = intersect(known, between)
+    some = True
     for i in range(3):
         some = some and fie.set_lo[i] <= fie.set_hi[i]
     return some
@@ -283,12 +271,14 @@ def configure_isolation(
 ) -> None:
     """Fill in the estimators and how the decision among them is sharpened; travel (2, n) rad."""
     config, aircraft, dt = declared.fdi, declared.aircraft, 1.0 / declared.rate_hz
-    sharpen, cfg = config.sharpen, iso["config"]
-    cfg["mu_kind"] = _THRESHOLD_KINDS[config.thresholds]
-    cfg["forget"] = exp(-dt / config.forgetting_time_s)
-    cfg["a"] = exp(-config.isolation_pole_per_s * dt)
-    cfg["reach"], cfg["shared"] = sharpen.memory, sharpen.shared_effectiveness
-    cfg["narrows"], cfg["n_estimators"] = sharpen.set_membership, len(rows)
+    losable = {name for damage in aircraft.damage.values() for name in damage.takes}
+    fill(
+        iso["config"], n_estimators=len(rows), mu_kind=_THRESHOLD_KINDS[config.thresholds],
+        forget=exp(-dt / config.forgetting_time_s), a=exp(-config.isolation_pole_per_s * dt),
+        reach=config.sharpen.memory, shared=config.sharpen.shared_effectiveness,
+        narrows=config.sharpen.set_membership, hold_s=DAMAGE_HOLD_OFF_S if aircraft.damage else 0.0,
+        losable=[name in losable for name in aircraft.surfaces],
+    )  # fmt: skip
     ends = np.array([np.minimum(travel[0], 0.0), np.maximum(travel[1], 0.0)])  # a share of it can be left
     for fie, (_, kind, s) in zip(iso["estimator"], rows, strict=False):
         fie["hypothesis_kind"], fie["surface"] = kind, s
@@ -298,9 +288,6 @@ def configure_isolation(
     # Damage is outside the class: with declared damage, the last fault left after statistical exclusion is
     # not isolated yet.
     iso["estimator"]["weak"] = DAMAGE_EXCLUDES if config.weighs_chance and aircraft.damage else 0
-    cfg["hold_s"] = DAMAGE_HOLD_OFF_S if aircraft.damage else 0.0
-    losable = {name for damage in aircraft.damage.values() for name in damage.takes}
-    cfg["losable"] = [name in losable for name in aircraft.surfaces]
 
 
 @kernel

@@ -5,12 +5,14 @@ change when the flight goes on. `fdi` is a record of `schemes.fdi_dtype`.
 """
 
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeVar, get_type_hints
 
 import numpy as np
 
 from beaver_ftc.diagnosis.detection.likelihood import N_SLOTS
 from beaver_ftc.diagnosis.state import scheme_number
+
+Read = TypeVar("Read")
 
 
 class IsolationEstimator(NamedTuple):
@@ -98,20 +100,11 @@ class DeclaredBounds(NamedTuple):
 
 
 class GustReadout(NamedTuple):
-    """Gusts as the vanes see them. is_turbulence_declared; subtracts_measured_gust: its effect
-    is subtracted from the innovation; gust_acceleration_rad_s2 (3,): what the gust does now."""
+    """Gusts as the vanes see them. is_turbulence_declared; subtracts_measured_gust: its effect is subtracted
+    from the innovation."""
 
     is_turbulence_declared: bool
     subtracts_measured_gust: bool
-    gust_acceleration_rad_s2: np.ndarray
-
-
-class ModelErrorMapReadout(NamedTuple):
-    """The design model's error where the aircraft is now, from the map that the aircraft declares: whether
-    the map covers the place, and its bound (3,) rad/s2."""
-
-    is_inside_map: bool
-    error_bound_rad_s2: np.ndarray
 
 
 class StatisticalHypothesis(NamedTuple):
@@ -249,13 +242,8 @@ class DiagnosisReadout:
     @cached_property
     def types_config(self) -> FaultTypesConfig:
         """How fault types are examined."""
-        c = self._fdi["types"]["config"]
-        return FaultTypesConfig(
-            bool(c["single_instant"]), int(c["n_substeps"]),
-            bool(c["returns_lagged"]),
-            int(c["half_frames"]),
-            int(c["frames_per_block"]), float(c["block_duration_s"]), float(c["dt"]),
-        )  # fmt: skip
+        names = "single_instant n_substeps returns_lagged half_frames frames_per_block block_duration_s dt"
+        return _read(FaultTypesConfig, self._fdi["types"]["config"], names)
 
     @cached_property
     def n_frames_in_block_so_far(self) -> int:
@@ -270,34 +258,15 @@ class DiagnosisReadout:
     @cached_property
     def declared_bounds(self) -> DeclaredBounds:
         """The declared uncertainty."""
-        bound = self._fdi["bound"]
-        errors = bound["declared_errors"]
-        declared = bool(errors["given"])
-        at_rest, constant, per_rate = (
-            errors[name][:3].copy() if declared else np.zeros(3) for name in ("e0", "steady", "e1")
-        )
-        return DeclaredBounds(
-            eta_bar_rad_s2=bound["eta_bar"].copy(),
-            changing_gyro_error_bound_rad_s=bound["n_gyro"].copy(),
-            inertia_coupling_error_share=bound["inertia_coupling_error_share"].copy(),
-            constant_error_rad_s2=bound["const"].copy(),
-            earth_rate_rad_s=float(bound["earth_rate_rad_s"]),
-            gyro_error_bound_at_rest_rad_s=at_rest,
-            constant_gyro_error_bound_rad_s=constant,
-            gyro_error_bound_per_rate=per_rate,
-        )  # fmt: skip
+        errors = self._fdi["bound"]["declared_errors"]
+        of_gyros = (errors[name][:3] * bool(errors["given"]) for name in ("e0", "steady", "e1"))
+        names = "eta_bar n_gyro inertia_coupling_error_share const earth_rate_rad_s"
+        return _read(DeclaredBounds, self._fdi["bound"], names, *of_gyros)
 
     @cached_property
     def gust(self) -> GustReadout:
         """Gusts as the vanes see them."""
-        gust = self._fdi["statistical"]["gust"]["output"]
-        return GustReadout(bool(gust["gusty"]), bool(gust["measured"]), gust["acc"].copy())
-
-    @cached_property
-    def mapped_error(self) -> ModelErrorMapReadout:
-        """The design model's error here, where the aircraft maps it."""
-        emap = self._fdi["bound"]["error_map"]
-        return ModelErrorMapReadout(not emap["outside"], emap["e_now"].copy())
+        return _read(GustReadout, self._fdi["statistical"]["gust"]["output"], "gusty measured")
 
     @cached_property
     def acceleration_variance_from_input_noise(self) -> np.ndarray:
@@ -317,7 +286,7 @@ class DiagnosisReadout:
     @cached_property
     def sensor_monitor(self) -> SensorMonitor:
         """The sensor monitor."""
-        return read_sensor_monitor(self._fdi["sensor_monitor"])
+        return _read_sensor_monitor(self._fdi["sensor_monitor"])
 
 
 def estimator_records(fdi: np.void) -> np.ndarray:
@@ -393,17 +362,24 @@ def alarm_flags(fdi: np.void) -> tuple[np.int64, np.int64]:
     return fdi["verdict"]["detected"], fdi["sensor_monitor"]["output"]["alarmed"]
 
 
-def _read_estimator(fie: np.void) -> IsolationEstimator:
-    axes = tuple(np.flatnonzero(fie["skip"] == 0).tolist())
-    span = float(fie["theta_min"]), float(fie["theta_max"])
-    return IsolationEstimator(
-        int(fie["hypothesis_kind"]), *span, bool(fie["excluded"]), axes, fie["parity_direction"].copy()
+def _read(kind: type[Read], record: np.void, names: str, *others: Any) -> Read:
+    """An object of a class, its first fields copied from the fields of a record with these names."""
+    hints = get_type_hints(kind).values()
+    copies = {np.ndarray: np.array}
+    return kind(
+        *(copies.get(hint, hint)(record[name]) for hint, name in zip(hints, names.split(), strict=False)),
+        *others,
     )
 
 
+def _read_estimator(fie: np.void) -> IsolationEstimator:
+    axes = tuple(np.flatnonzero(fie["skip"] == 0).tolist())
+    names = "hypothesis_kind theta_min theta_max excluded"
+    return _read(IsolationEstimator, fie, names, axes, fie["parity_direction"].copy())
+
+
 def _read_surface(srf: np.void) -> SurfaceFaultTypes:
-    names = ("stop_lo", "stop_hi", "runaway", "slow_step", "near")
-    actuator = Actuator(*(float(srf["actuator"][name]) for name in names))
+    actuator = _read(Actuator, srf["actuator"], "stop_lo stop_hi runaway slow_step near")
     return SurfaceFaultTypes(actuator, srf["sets"]["excluded"].astype(bool))
 
 
@@ -423,21 +399,16 @@ def _read_block(blk: np.void) -> StatisticalBlock:
 
 
 def _read_hypothesis(hyp: np.void) -> StatisticalHypothesis:
-    place = (int(hyp["kind"]), int(hyp["surface"]), int(hyp["axis"]))
-    return StatisticalHypothesis(*place, bool(hyp["alarms"]), float(hyp["score"]))
+    return _read(StatisticalHypothesis, hyp, "kind surface axis alarms score")
 
 
-def read_sensor_monitor(mon: np.void) -> SensorMonitor:
-    """The sensor monitor, of its record (dtype SENSOR_MONITOR_RECORD)."""
+def _read_sensor_monitor(mon: np.void) -> SensorMonitor:
     o, red = mon["output"], mon["redundancy"]
     j = int(o["worst_test_index"])
-    worst = SensorTest(
-        float(red["residual"][j]), float(red["per_s"][j]), float(red["per_sample"][j]), float(red["gust"][j]),
-        red["r"][j].copy(), red["B"][j].copy(),
-    )  # fmt: skip
+    worst = (red[name][j].copy() for name in ("residual", "per_s", "per_sample", "gust", "r", "B"))
     return SensorMonitor(
         bool(mon["config"]["enabled"]), bool(o["alarmed"]), j,
-        float(o["top_ratio"]), worst, int(o["isolated_sensor"]),
+        float(o["top_ratio"]), SensorTest(*worst), int(o["isolated_sensor"]),
         o["is_reading_unused"].astype(bool), float(red["h"]),
         *(red[name].copy() for name in ("gust_change", "y_pred", "e")),
     )  # fmt: skip

@@ -62,24 +62,25 @@ SHARED_CONFIG_RECORD = record(
 def configure_shared(cfg: np.void, declared: Declared) -> None:
     """Fill the shared configuration (SHARED_CONFIG_RECORD)."""
     fdi = declared.fdi
-    cfg["enabled"], cfg["dt"] = fdi.diagnoses, 1.0 / declared.rate_hz
-    cfg["scheme_number"] = scheme_number(fdi.scheme)
-    cfg["authority"], cfg["diagnoses_all_types"] = (AUTHORITIES[fdi.authority], fdi.fault_class == "all")
-    cfg["abrupt"], cfg["n_substeps"] = (fdi.fault_profile == "abrupt", declared.substeps)
+    fill(
+        cfg, enabled=fdi.diagnoses, dt=1.0 / declared.rate_hz, scheme_number=scheme_number(fdi.scheme),
+        authority=AUTHORITIES[fdi.authority], diagnoses_all_types=fdi.fault_class == "all",
+        abrupt=fdi.fault_profile == "abrupt", n_substeps=declared.substeps,
+    )  # fmt: skip
 
 
 def configure_layout(layout: np.void, rows: Sequence[tuple[str, int, int]], aircraft: Aircraft) -> None:
     """Fill in axes, groups and estimators of the surfaces; rows: of isolation.py."""
     index = {name: k for k, name in enumerate(aircraft.surfaces)}
-    layout["main"] = main_surface_index_by_axis(aircraft)
-    layout["dominant_axis"] = aircraft.dominant_axis
-    layout["group"] = [PITCH_GROUP if axis == PITCH else LATERAL_GROUP for axis in aircraft.dominant_axis]
-    layout["partner"] = layout["loss"] = layout["position"] = -1
+    groups = [PITCH_GROUP if axis == PITCH else LATERAL_GROUP for axis in aircraft.dominant_axis]
+    fill(
+        layout, main=main_surface_index_by_axis(aircraft), dominant_axis=aircraft.dominant_axis,
+        group=groups, partner=-1, loss=-1, position=-1,
+    )  # fmt: skip
     for names in aircraft.groups.values():
         if len(names) == 2:
             a, b = (index[name] for name in names)
-            layout["partner"][a] = b
-            layout["partner"][b] = a
+            layout["partner"][[a, b]] = b, a
     for j, (_, kind, s) in enumerate(rows):
         layout["loss" if kind == LOSS else "position"][s] = j
 

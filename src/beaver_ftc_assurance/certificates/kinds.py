@@ -47,7 +47,7 @@ def reason_not_certified(tape: Tape, kind: int) -> str | None:
     config = tape.alarm.diagnosis.types_config
     if TYPES[kind].has_shown is not None and not config.single_instant:
         return OSCILLATION_AT_STOP
-    if config.returns_lagged and TYPES[kind].on_possible_release is not None:
+    if config.returns_lagged and TYPES[kind].holds_surface:
         return RETURNING_SURFACE
     return None if TYPES[kind].frames_test or TYPES[kind].deflection_relation is not None else UNKNOWN_TYPE
 

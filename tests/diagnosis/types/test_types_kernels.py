@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 from kernels import new_fdi, on, put_on
 
 from beaver_ftc.diagnosis import types
-from beaver_ftc.diagnosis.types import registry
+from beaver_ftc.diagnosis.types import registry, release
 from beaver_ftc.diagnosis.types.registry import N_TYPES, TYPES
-from beaver_ftc.diagnosis.types.table import commanded_surface, held_surface
+from beaver_ftc.diagnosis.types.table import commanded_surface
 from fault_kinds import (
     BIAS,
     CONSTANT_LOSS,
@@ -196,8 +196,8 @@ def test_an_oscillation_is_counted_by_half_cycles():
     swing = surface["oscillatory"]
     assert swing["n_half"] == 3
     assert (swing["first_end"], swing["last_end"]) == (5, 15)
-    assert commanded_surface.swing_has_shown(surface)
-    assert not commanded_surface.swing_has_shown(swung([1] * 5 + [-1] * 5 + [1])[1])
+    assert registry.has_shown(surface, OSCILLATORY)
+    assert not registry.has_shown(swung([1] * 5 + [-1] * 5 + [1])[1], OSCILLATORY)
     assert commanded_surface.swing_frequency(fdi, 0, OSCILLATORY) == pytest.approx(2 * np.pi / (10 * DT))
     # the first half-cycle is cut off and does not count: ten frames, each 0.1 rad off; its first frame is
     # summed before the half-cycle before it is seen to have ended
@@ -206,21 +206,19 @@ def test_an_oscillation_is_counted_by_half_cycles():
 
 @pytest.mark.parametrize(("length", "ways"), [(1, (0.0, 0.02, 0.1)), (5, (0.0, 0.0, 0.08))])
 def test_a_runaway_has_gone_at_least_its_way(length, ways):
-    fdi, surface = new_surface(
-        k_first=3,
-        first_lo=0.1,
-        first_hi=0.2,
-        runaway=1.0,
-    )
+    fdi, surface = new_surface(k_first=3, first_lo=0.1, first_hi=0.2, runaway=1.0)
     fdi["types"]["config"]["frames_per_block"] = length
+
+    def between(kind, frame):
+        return on(registry.deflection_range, fdi, surface, kind, frame)
+
     for frame, way in zip((3, 4, 8), ways, strict=True):
-        assert on(held_surface.runaway_distance, fdi, surface, frame) == pytest.approx(way)
-        assert on(held_surface.runaway_interval, fdi, surface, frame, 1)[0] == pytest.approx(0.1 + way)
-        assert on(held_surface.runaway_interval, fdi, surface, frame, -1)[1] == pytest.approx(0.2 - way)
-    assert on(held_surface.runaway_interval, fdi, surface, 99, 1) == (HIGH, HIGH)
-    assert on(held_surface.runaway_interval, fdi, surface, 99, -1) == (LOW, LOW)
+        assert between(UP, frame) == pytest.approx((0.1 + way, HIGH))
+        assert between(DOWN, frame) == pytest.approx((LOW, 0.2 - way))
+    assert between(UP, 99) == (HIGH, HIGH)
+    assert between(DOWN, 99) == (LOW, LOW)
     surface["evidence"]["k_first"] = -1
-    assert on(held_surface.runaway_interval, fdi, surface, 9, 1) == (LOW, HIGH)
+    assert between(UP, 9) == between(DOWN, 9) == (LOW, HIGH)
 
 
 @pytest.mark.parametrize(
@@ -232,54 +230,29 @@ def test_a_runaway_has_gone_at_least_its_way(length, ways):
 )  # fmt: skip
 def test_what_holds_a_surface_is_excluded_where_it_is_not(kind, inside, outside):
     for (low, high), excluded in ((inside, 0), (outside, 1)):
-        fdi, surface = new_surface(
-            low=low,
-            high=high,
-            k_first=3,
-            first_lo=0.1,
-            first_hi=0.2,
-        )
-        surface["actuator"]["runaway"] = 1.0
+        fdi, surface = new_surface(low=low, high=high, k_first=3, first_lo=0.1, first_hi=0.2, runaway=1.0)
         surface["sets"]["low"][STUCK], surface["sets"]["high"][STUCK] = 0.05, 0.3
-        judged(TYPES[kind].consistent_interval, fdi, surface, kind, 5)
+        on(registry.judge_types, fdi, surface, 5)
         assert surface["sets"]["excluded"][kind] == excluded
     if kind == STUCK:
         assert TYPES[kind].estimate_parameter(fdi, 0, kind) == pytest.approx(0.175)
-
-
-def released(low=0.2, high=0.3, order=0.0, judged=(-1.0, 1.0), instants=1, **fields):
-    fdi, surface = new_surface(low=judged[0], high=judged[1], **fields)
-    fdi["types"]["config"]["returns_lagged"], fdi["types"]["config"]["n_substeps"] = (
-        1,
-        instants,
-    )
-    surface["commands"]["history"][1] = order
-    for which in (held_surface.EARLIER_SLOT, held_surface.LATER_SLOT):
-        held_surface.clear_releases(surface, which, STUCK)
-    surface["release"]["back_lo"][held_surface.LATER_SLOT, STUCK] = low
-    surface["release"]["back_hi"][held_surface.LATER_SLOT, STUCK] = high
-    return fdi, surface
 
 
 @given(st.lists(st.floats(0.5, 2.0), min_size=1, max_size=9), st.floats(-0.4, 0.5), st.floats(-0.4, 0.5))
 def test_what_a_frame_shows_of_a_return_is_weighted_by_the_effectiveness_then(G, held, order):
     """The innovation's own mean, sum G a / sum G, lies within the room; a return agrees with it."""
     G = np.array(G)
-    fdi, surface = released(low=held, high=held, order=order, instants=G.size)
+    fdi, surface = new_surface(low=-1.0, high=1.0)
+    fdi["types"]["config"]["returns_lagged"], fdi["types"]["config"]["n_substeps"] = 1, G.size
+    surface["commands"]["history"][1] = order
+    release.set_return(surface["release"], release.LATER, STUCK, held, held)
     path = [held]
     for _ in range(G.size - 1):
         path.append(path[-1] + np.clip(0.5 * (order - path[-1]), -0.1, 0.1))
     shown = np.sum(G * path) / np.sum(G)
     surface["judged"]["kappa"] = 0.25 * (G.max() - G.min()) / G.mean()
-    mean, _, room = on(held_surface.simulate_return, fdi, surface, held, 1.0)
+    mean, _, room = on(release.simulate_return, fdi, surface, held, 1.0)
     assert abs(shown - mean) <= room + 1e-15
-    (
-        surface["judged"]["u"],
-        surface["judged"]["lo"],
-        surface["judged"]["hi"],
-    ) = (
-        9.0,
-        shown - 1e-12,
-        shown + 1e-12,
-    )
-    assert on(held_surface.keep_returns, fdi, surface, STUCK)
+    judged = surface["judged"]
+    judged["u"], judged["lo"], judged["hi"] = 9.0, shown - 1e-12, shown + 1e-12
+    assert on(release.keep_returns, fdi, surface, STUCK)

@@ -49,14 +49,13 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.diagnosis import isolation
+from beaver_ftc.diagnosis.sets import EMPTY_SET, UNLIMITED_SET, intersect
 
 Kernel = Callable[..., Any]
 
 # Accommodation modes, what the law does about a surface at fault: scale its command, give the surface up,
 # subtract its offset, or wait for it at the rate that it has.
 SCALE_COMMAND, GIVE_UP, SUBTRACT_OFFSET, WAIT_FOR_SURFACE = range(4)
-
-UNLIMITED_SET, EMPTY_SET = (-np.inf, np.inf), (np.inf, -np.inf)  # an unlimited set, and an empty one
 
 # `evidence_at_rest`: what a surface says of a type that was given up, stays where it was and shows nothing
 # wrong.
@@ -103,9 +102,11 @@ class FaultType:
                             the parameters (low, high) that explain the judged frame, in which something was
                             wrong; UNLIMITED_SET if every one does, EMPTY_SET (low > high) excludes the
                             type
-    parameter_range(srf)    the parameters (low, high) that there are; unlimited if left out
-    set_after_frame(srf, h)
-                            the set (low, high) to go on with after a frame; the one there is if left out
+    parameter_range(srf, h)
+                            the parameters (low, high) that there are; unlimited if left out
+    deflection_range(c, srf, h, k)
+                            least and greatest deflection under it by frame k, rad; of a constant type
+    holds_surface           it holds the surface there, and may release it (release.py): that explains a frame
     memory_dtype, memory_record_name
                             a record of its own, found at `srf.<memory_record_name>`
     reset_memory(srf, h)    its memory is reset: nothing is known yet
@@ -113,17 +114,10 @@ class FaultType:
                             called for every frame, before it is judged
     on_skipped_frame(c, srf, h, k)
                             called for a frame that is not judged
-    on_possible_release(c, srf, h, k)
-                            a repair may have released the surface as the frame began
-    propagate_release(c, srf, h)
-                            advance such a release by a frame (held_surface.py)
-    possible_deflection_range(c, srf, h, k)
-                            least and greatest deflection under it by the elapsed frame, rad; of a constant
-                            type
 
     The evidence that a verdict needs:
 
-    has_shown(srf)          kernel: whether the type has shown itself. A type with this part explains a flight
+    has_shown(srf, h)       kernel: whether the type has shown itself. A type with this part explains a flight
                             only once it has shown itself
     show_half_cycles        half-cycles of the slowest oscillation within which such a type shows itself
     evidence_at_rest        what a surface that was given up, and stays where it was, says of the type:
@@ -135,7 +129,7 @@ class FaultType:
     follows_command         whether the deflection error depends on the command. While a type that does not
                             is left on one surface, no other surface is isolated in its place
     can_look_like           names of types that this one can look like: they are not named while it is left
-    motion_rules_out(srf, stop)
+    motion_rules_out(srf, h, stop)
                             kernel: whether the surface has moved as this type cannot, towards the stop
                             of that direction (0: of a type without one)
     stop_direction          the stop that it runs to: 1 upper, -1 lower, 0 neither
@@ -171,19 +165,17 @@ class FaultType:
 
     name: str
     has_constant_parameter: bool
-    consistent_interval: Kernel
+    consistent_interval: Kernel | None = None
     description: str = ""
     sort_rank: int = 100
     parameter_range: Kernel | None = None
-    set_after_frame: Kernel | None = None
     memory_dtype: np.dtype | None = None
     memory_record_name: str = ""
     reset_memory: Kernel | None = None
     before_judging_frame: Kernel | None = None
     on_skipped_frame: Kernel | None = None
-    on_possible_release: Kernel | None = None
-    propagate_release: Kernel | None = None
-    possible_deflection_range: Kernel = reachable_range
+    deflection_range: Kernel = reachable_range
+    holds_surface: bool = False
     has_shown: Kernel | None = None
     show_half_cycles: int = 0
     evidence_at_rest: int = REST_IS_UNINFORMATIVE
@@ -240,12 +232,10 @@ def intersect_set(srf, h, other):
     holds the two bounds that contradict each other. EMPTY_SET has no such bounds: a type that it excludes
     keeps its set.
     """
-    lo, hi = other
-    if lo == np.inf:
+    if other == EMPTY_SET:
         srf.sets.excluded[h] = 1
         return
-    srf.sets.low[h] = max(srf.sets.low[h], lo)
-    srf.sets.high[h] = min(srf.sets.high[h], hi)
+    put_set(srf, h, intersect((srf.sets.low[h], srf.sets.high[h]), other))
     if srf.sets.low[h] > srf.sets.high[h]:
         srf.sets.excluded[h] = 1
 
@@ -285,12 +275,8 @@ def observe_surface(c, srf, fie, m, nu, nu_max, eff):
     last, cmd = srf.last, srf.commands
     last.u = -eff.base[m] / eff.regressor[m]
     last.kappa = 0.25 * (cmd.G_max - cmd.G_min) / abs(eff.regressor[m])
-    last.lo, last.hi = fie.theta_min, fie.theta_max
-    for i in range(3):
-        if c.frames_per_block > 1 and i != m and eff.regressor[i] != 0.0:
-            continue  # over a block the axes weigh what varies differently
-        lo, hi = isolation.consistent_on(nu, nu_max, fie, eff, i)
-        last.lo, last.hi = (max(last.lo, lo), min(last.hi, hi))
+    axis = m if c.frames_per_block > 1 else -1  # over a block the axes weigh what varies differently
+    last.lo, last.hi = isolation.consistent_on_axes(nu, nu_max, fie, eff, axis)
     mark_stops(srf, 2.0 * (nu_max[m] + eff.e[m]) / abs(eff.regressor[m]))
 
 

@@ -19,8 +19,7 @@ types/__init__.py.
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis import state
-from beaver_ftc.diagnosis.state import LATERAL_GROUP, PITCH, PITCH_GROUP, ROLL, YAW
+from beaver_ftc.diagnosis.state import LATERAL_GROUP, PITCH, PITCH_GROUP, ROLL, UNANTICIPATED, YAW
 from beaver_ftc.diagnosis.types import (
     GIVE_UP,
     SCALE_COMMAND,
@@ -32,7 +31,7 @@ from beaver_ftc.diagnosis.types import (
     set_anomalous,
     verdict,
 )
-from beaver_ftc.diagnosis.types.registry import ALL, CONSTANT, MODE, N_CONSTANT, possible_deflection_range
+from beaver_ftc.diagnosis.types.registry import ALL, CONSTANT, MODE, N_CONSTANT, deflection_range
 from beaver_ftc.diagnosis.types.verdict import NO_SURFACE, can_be_faulty, constant_remains, type_remains
 
 
@@ -78,7 +77,7 @@ def constant_range(c, srf, k):
     lo, hi = np.inf, -np.inf
     for h in range(N_CONSTANT):
         if type_remains(srf, h):
-            h_lo, h_hi = possible_deflection_range(c, srf, h, k)
+            h_lo, h_hi = deflection_range(c, srf, h, k)
             lo = min(lo, h_lo)
             hi = max(hi, h_hi)
     reach_lo, reach_hi = srf.actuator.reach_lo, srf.actuator.reach_hi
@@ -132,18 +131,6 @@ def observe_pairs(types, layout, est, bank, nu_max):
 
 
 @kernel
-def update_status(srf, is_isolated, kind, t):
-    """Name a surface and the type of its fault (-1 if open), or take the name back; t s."""
-    kind = kind if is_isolated else -1
-    status = srf.status
-    if is_isolated and not status.is_isolated:
-        status.isolated_at_s = t
-    if kind != status.fault_type:
-        status.typed_at_s = t
-    status.is_isolated, status.fault_type = is_isolated, kind
-
-
-@kernel
 def isolate_lateral(types, layout, t):
     """Set the isolation of the surfaces of roll and yaw. Whether the fault of this plane is outside the
     class.
@@ -157,8 +144,8 @@ def isolate_lateral(types, layout, t):
     outside = both and refuted
     open_yet = both and not (verdict.explains_flight(roll) and verdict.explains_flight(yaw))
     isolates = pair.group_alarm[LATERAL_GROUP] == 1 and not (outside or open_yet)
-    update_status(roll, isolates and not yaw_alone, verdict.type_on_surface(c, roll), t)
-    update_status(yaw, isolates and not roll_alone, verdict.type_on_surface(c, yaw), t)
+    verdict.update_status(roll, isolates and not yaw_alone, verdict.type_on_surface(c, roll), t)
+    verdict.update_status(yaw, isolates and not roll_alone, verdict.type_on_surface(c, yaw), t)
     return outside
 
 
@@ -223,9 +210,9 @@ def isolate_pitch(types, layout, t):
         srf2 = types.surface[s2]
         anomalous = srf2.evidence.n_anomalous > 0
         possible = can_be_faulty(srf2) and verdict.left(srf2, ALL)
-        update_status(srf1, possible or not anomalous, srf1.status.fault_type, t)
+        verdict.update_status(srf1, possible or not anomalous, srf1.status.fault_type, t)
         shows = anomalous and possible and verdict.explains_flight(srf2)
-        update_status(srf2, shows, verdict.type_on_surface(types.config, srf2), t)
+        verdict.update_status(srf2, shows, verdict.type_on_surface(types.config, srf2), t)
         return
     sole = sole_pitch(types, layout)
     for s, srf in enumerate(types.surface):
@@ -233,7 +220,7 @@ def isolate_pitch(types, layout, t):
             kind = verdict.type_on_surface(types.config, srf) if s == sole else -1
             # a jam may as well be a trailing surface or one at its stop, if the other is off by a constant
             open_yet = kind >= 0 and MODE[kind] == GIVE_UP
-            update_status(srf, s == sole, verdict.TYPE_UNDECIDED if open_yet else kind, t)
+            verdict.update_status(srf, s == sole, verdict.TYPE_UNDECIDED if open_yet else kind, t)
 
 
 @kernel
@@ -260,22 +247,12 @@ def decide_pairs(types, past, layout, t):
         earliest = types.surface[max(first, 0)].status
         if status.is_isolated and (first < 0 or status.isolated_at_s < earliest.isolated_at_s):
             first = s
-    estimator, isolated_at_s, kind, typed_at_s = first_finding(types, past, layout, first, outside, t)
-    lead, mode = accommodate_pairs(types, layout)
-    return (estimator, isolated_at_s, kind, typed_at_s, lead, mode)
-
-
-@kernel
-def first_finding(types, past, layout, s, outside, t):
-    """The finding on surface s, the first named, as that of a single fault: estimator, its instant, type, its
-    instant. NO_SURFACE: none is named, and the fault of roll and yaw may be outside the class."""
-    if s >= 0:
-        status = types.surface[s].status
-        estimator = verdict.estimator_of_fault(layout, s, status.fault_type)
-        return (estimator, status.isolated_at_s, status.fault_type, status.typed_at_s)
-    estimator = state.UNANTICIPATED if outside else state.NOT_ISOLATED
-    isolated_at_s = t if estimator != past.isolated_estimator else past.isolated_at_s
-    return estimator, isolated_at_s, -1, past.typed_at_s
+    if first == NO_SURFACE and outside:
+        first = UNANTICIPATED
+    return (
+        *verdict.finding_on_surface(types, past, layout, first, t),
+        *accommodate_pairs(types, layout),
+    )
 
 
 @kernel

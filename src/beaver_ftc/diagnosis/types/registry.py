@@ -30,9 +30,9 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.diagnosis import isolation
-from beaver_ftc.diagnosis.state import PITCH_GROUP
+from beaver_ftc.diagnosis.sets import EMPTY_SET, UNLIMITED_SET
+from beaver_ftc.diagnosis.state import PITCH_GROUP, fill
 from beaver_ftc.diagnosis.types import (
-    EMPTY_SET,
     GIVE_UP,
     OBSERVATION_RECORD,
     REST_EXCLUDES_TYPE,
@@ -40,10 +40,12 @@ from beaver_ftc.diagnosis.types import (
     REST_POSITION_IS_PARAMETER,
     FaultType,
     Kernel,
+    clip_travel,
     copy_observation,
     intersect_set,
     observe_surface,
     put_set,
+    release,
     set_anomalous,
     table,
 )
@@ -82,8 +84,9 @@ def _parts_of(name: str) -> dict[int, Kernel]:
 
 
 # The columns that verdict.py reads; `FaultType` says what they are.
-MODE, STOP_SIDE, REST = (
-    _type_column(name) for name in ("accommodation_mode", "stop_direction", "evidence_at_rest")
+MODE, STOP_SIDE, REST, HOLDS = (
+    _type_column(name)
+    for name in ("accommodation_mode", "stop_direction", "evidence_at_rest", "holds_surface")
 )
 SHOW_HALF_CYCLES = _type_column("show_half_cycles")
 WAIT_HALF_CYCLES = _type_column("wait_half_cycles")
@@ -116,47 +119,29 @@ def type_index_of(name: str, *, has_constant_parameter: bool = True, stop_direct
     return [(row.name, row.has_constant_parameter, row.stop_direction) for row in TYPES].index(sought)
 
 
-def _write_kernel(name: str, arguments: str, given: str, line: str, last: str, **names: Any) -> Kernel:
-    """A kernel of these arguments with a line for each type that has the part `name`, {call} in it.
+def _by_type(name: str, arguments: str, default: Any) -> Kernel:
+    """A kernel of these arguments, h among them, that returns what this part of type h returns; `default` for
+    a type without it.
 
-    Compiled code calls only what it can name, so the calls are written out: part_3(srf, 3) is that of type 3,
-    for a part that is given srf and h.
+    Compiled code calls only what it can name, so the calls are written out.
     """
     parts = _parts_of(name)
-    calls = {h: ", ".join(str(h) if each == "h" else each for each in given.split(", ")) for h in parts}
-    lines = [line.format(h=h, call=f"part_{h}({call})") for h, call in calls.items()]
-    names |= {"__name__": __name__, **{f"part_{h}": part for h, part in parts.items()}}
-    source = "\n    ".join([f"def {name}_of_types({arguments}):", *lines, last])
+    calls = [f"if h == {h}: return part_{h}({arguments})" for h in parts]
+    source = "\n    ".join([f"def {name}_of_type({arguments}):", *calls, "return default"])
+    names = {"__name__": __name__, "default": default, **{f"part_{h}": part for h, part in parts.items()}}
     exec(compile(source, __file__, "exec"), names)
-    return kernel(names[f"{name}_of_types"])
+    return kernel(names[f"{name}_of_type"])
 
 
-def _call_each(name: str, given: str, result: Kernel | None = None) -> Kernel:
-    """A kernel that calls this part of every type, and result(srf, h, interval) with what that returns."""
-    arguments = ", ".join(each for each in given.split(", ") if each != "h")
-    line = "result(srf, {h}, {call})" if result else "{call}"
-    return _write_kernel(name, arguments, given, line, "return", result=result)
-
-
-def _call_one(name: str, given: str, default: Any) -> Kernel:
-    """A kernel that returns what this part of type h returns; `default` for a type without it."""
-    arguments = given if "h" in given.split(", ") else f"{given}, h"
-    line = "if h == {h}: return {call}"
-    return _write_kernel(name, arguments, given, line, "return default", default=default)
-
-
-reset_memory_each = _call_each("reset_memory", "srf, h")
-parameter_range_each = _call_each("parameter_range", "srf", put_set)
-before_judging_frame_each = _call_each("before_judging_frame", "c, srf, h")
-on_skipped_frame_each = _call_each("on_skipped_frame", "c, srf, h, k")
-consistent_each = _call_each("consistent_interval", "c, srf, h, k", intersect_set)
-on_possible_release_each = _call_each("on_possible_release", "c, srf, h, k")
-set_after_each = _call_each("set_after_frame", "srf, h", put_set)
-propagate_release_each = _call_each("propagate_release", "c, srf, h")
-has_shown = _call_one("has_shown", "srf", True)
-motion_rules_out = _call_one("motion_rules_out", "srf, stop", False)
-possible_deflection_range = _call_one("possible_deflection_range", "c, srf, h, k", EMPTY_SET)
-error_of_type = _call_one("deflection_error", "srf, h", np.nan)
+reset_memory = _by_type("reset_memory", "srf, h", None)
+parameter_range = _by_type("parameter_range", "srf, h", UNLIMITED_SET)
+before_judging_frame = _by_type("before_judging_frame", "c, srf, h", None)
+on_skipped_frame = _by_type("on_skipped_frame", "c, srf, h, k", None)
+consistent_interval = _by_type("consistent_interval", "c, srf, h, k", UNLIMITED_SET)
+has_shown = _by_type("has_shown", "srf, h", True)
+motion_rules_out = _by_type("motion_rules_out", "srf, h, stop", False)
+deflection_range = _by_type("deflection_range", "c, srf, h, k", EMPTY_SET)
+deflection_error = _by_type("deflection_error", "srf, h", np.nan)
 
 MAX_BLOCK = 256  # frames of a block
 N_KEPT = 3  # frames, or blocks, of which the orders are kept: the elapsed one and two before it
@@ -199,10 +184,11 @@ STATUS_RECORD = record(
 # The mode of accommodation, -1 for none; frames since the fault last showed: verdict.py.
 ACCOMMODATION_RECORD = record(mode=int, n_silent=int)
 
-# Where a surface can be that a type has held and released, rad: table/held_surface.py.
+# Where a surface can be that a type has held and released, rad: release.py. held: where it is held by then;
+# set: the set of the type before the release.
 RELEASE_RECORD = record(
-    back_lo=(2, N_TYPES), back_hi=(2, N_TYPES), released=(int, N_TYPES),
-    held_lo=N_TYPES, held_hi=N_TYPES,  # where it is held by then
+    back_lo=(2, N_TYPES), back_hi=(2, N_TYPES), released=(int, N_TYPES), held_lo=N_TYPES, held_hi=N_TYPES,
+    set_lo=(2, N_TYPES), set_hi=(2, N_TYPES),
 )  # fmt: skip
 
 # What was known of the first of two faults when it was named: pairs.py.
@@ -258,32 +244,30 @@ def configure_types(
     types: np.void, layout: np.void, servos: np.void, declared: Declared, travel: np.ndarray
 ) -> None:
     """Fill the configuration of the types and the actuator of each surface; travel (2, n): the stops, rad."""
-    fdi, c, dt = declared.fdi, types["config"], 1.0 / declared.rate_hz
-    c["frames_per_block"] = n_block = (
-        ceil(BLOCK_DURATION_S / dt) if declared.sensors.declared.gyros_vary else 1
-    )
-    c["single_instant"] = declared.substeps == 1 and n_block == 1
-    c["block_duration_s"] = n_block * dt
+    fdi, dt = declared.fdi, 1.0 / declared.rate_hz
+    n_block = ceil(BLOCK_DURATION_S / dt) if declared.sensors.declared.gyros_vary else 1
     half = pi / fdi.slowest_oscillation_rad_s / (n_block * dt)
-    c["half_frames"] = ceil(min(half, 1e9))  # longer than any flight
-    c["n_substeps"], c["returns_lagged"], c["dt"] = (declared.substeps, servos["real"], dt)
-    c["abrupt"] = fdi.fault_profile == "abrupt"
-    types["pair"]["first_pitch"], types["pair"]["enabled"] = -1, fdi.pairs
+    fill(
+        types["config"], frames_per_block=n_block, single_instant=declared.substeps == 1 and n_block == 1,
+        block_duration_s=n_block * dt, half_frames=ceil(min(half, 1e9)),  # longer than any flight
+        n_substeps=declared.substeps, returns_lagged=servos["real"], dt=dt,
+        abrupt=fdi.fault_profile == "abrupt",
+    )  # fmt: skip
+    fill(types["pair"], first_pitch=-1, enabled=fdi.pairs)
     names, h = declared.aircraft.surfaces, dt / declared.substeps
     for s, (name, srf, lo, hi) in enumerate(zip(names, types["surface"], *travel, strict=True)):
-        rate_deg_s = getattr(declared.servos, name).rate_limit_deg_s
-        act = srf["actuator"]
-        act["stop_lo"], act["stop_hi"] = lo, hi
-        act["reach_lo"], act["reach_hi"] = (min(lo, 0.0), max(hi, 0.0))
-        for field in ("approaches", "steps", "band"):
-            act[field] = servos[field][s]
-        act["uncertain"] = servos["uncertain"]
+        approaches, steps, band = (servos[field][s] for field in ("approaches", "steps", "band"))
+        rate_rad_s = radians(getattr(declared.servos, name).rate_limit_deg_s) or DEFAULT_SERVO_RAD_S
         slowest = 1.0 - getattr(declared.servo_errors, name).rate_limit
-        act["runaway"] = 0.5 * slowest * (radians(rate_deg_s) or DEFAULT_SERVO_RAD_S)
-        act["slow_step"] = min(radians(fdi.slowest_rate_deg_s) * h, act["steps"][0])
-        act["near"] = act["slow_step"] / act["approaches"][0] + act["band"]
-        srf["status"]["may_be_sole"] = not fdi.pairs or layout["group"][s] == PITCH_GROUP
-        srf["accommodation"]["mode"] = srf["status"]["fault_type"] = -1
+        slow_step = min(radians(fdi.slowest_rate_deg_s) * h, steps[0])
+        fill(
+            srf["actuator"], stop_lo=lo, stop_hi=hi, reach_lo=min(lo, 0.0), reach_hi=max(hi, 0.0),
+            approaches=approaches, steps=steps, band=band, uncertain=servos["uncertain"],
+            runaway=0.5 * slowest * rate_rad_s, slow_step=slow_step, near=slow_step / approaches[0] + band,
+        )  # fmt: skip
+        may_be_sole = not fdi.pairs or layout["group"][s] == PITCH_GROUP
+        fill(srf["status"], may_be_sole=may_be_sole, fault_type=-1)
+        srf["accommodation"]["mode"] = -1
 
 
 @kernel
@@ -296,14 +280,14 @@ def restart_types(types):
 @kernel
 def restart_surface(srf):
     """Nothing is known of this surface yet."""
-    srf.sets.low[:] = -np.inf
-    srf.sets.high[:] = np.inf
     srf.sets.excluded[:] = 0
-    parameter_range_each(srf)
     srf.last.lo, srf.last.hi = srf.actuator.reach_lo, srf.actuator.reach_hi
     srf.evidence.k_first = -1
     srf.evidence.n_anomalous = srf.evidence.n_rest = srf.evidence.n_unhidden = 0
-    reset_memory_each(srf)
+    for h in range(N_TYPES):
+        put_set(srf, h, parameter_range(srf, h))
+        reset_memory(srf, h)
+        release.allow_before(srf, h)
 
 
 @kernel
@@ -318,11 +302,10 @@ def record_commands(types, u, ext):
             for b in range(N_KEPT - 1, 0, -1):
                 cmd.history[b, :n] = cmd.history[b - 1, :n]
                 cmd.cmd_min[b], cmd.cmd_max[b] = (cmd.cmd_min[b - 1], cmd.cmd_max[b - 1])
-            cmd.cmd_min[0], cmd.cmd_max[0] = np.inf, -np.inf
-            cmd.u_min[1], cmd.u_max[1] = (cmd.u_min[0], cmd.u_max[0])
-            cmd.u_min[0], cmd.u_max[0] = np.inf, -np.inf
-            cmd.G_min, cmd.G_max = np.inf, -np.inf
-        p = min(max(u[s], srf.actuator.stop_lo), srf.actuator.stop_hi)
+            cmd.u_min[1], cmd.u_max[1] = cmd.u_min[0], cmd.u_max[0]
+            cmd.cmd_min[0] = cmd.u_min[0] = cmd.G_min = np.inf
+            cmd.cmd_max[0] = cmd.u_max[0] = cmd.G_max = -np.inf
+        p = clip_travel(srf, u[s])
         cmd.history[0, types.block.n_so_far] = p
         cmd.cmd_min[0], cmd.cmd_max[0] = (min(cmd.cmd_min[0], p), max(cmd.cmd_max[0], p))
         cmd.u_min[0] = min(cmd.u_min[0], ext.u_min[s])
@@ -359,27 +342,35 @@ def judge_types(c, srf, k):
         return
     if ev.k_first < 0:
         (ev.k_first, ev.first_lo, ev.first_hi) = (k, now.lo, now.hi)
-    consistent_each(c, srf, k)
+    for h in range(N_TYPES):
+        if HOLDS[h]:
+            intersect_set(srf, h, release.held_set(c, srf, h, *deflection_range(c, srf, h, k)))
+        else:
+            intersect_set(srf, h, consistent_interval(c, srf, h, k))
 
 
 @kernel
 def judge_frame(types):
     """Judge the frame before the elapsed one."""
     c, k = types.config, types.frame_index - 1
+    returns = c.returns_lagged and types.frame_index > 0
     for s, srf in enumerate(types.surface):
-        before_judging_frame_each(c, srf)
-        if c.returns_lagged and types.frame_index > 0:
-            on_possible_release_each(c, srf, k)
+        for h in range(N_TYPES):
+            before_judging_frame(c, srf, h)
+            if returns and HOLDS[h]:
+                lo, hi = deflection_range(c, srf, h, k if c.single_instant else k - 1)
+                release.begin_release(c, srf, h, lo, hi, STOP_SIDE[h])
         if c.abrupt and srf.accommodation.mode == GIVE_UP and not srf.judged.anomalous:
             count_rest(types, s)
         elif srf.judged.anomalous and (c.single_instant or (srf.earlier.anomalous and srf.last.anomalous)):
             count_anomaly(srf)
             judge_types(c, srf, k)
         else:
-            on_skipped_frame_each(c, srf, k)
-        if c.returns_lagged and types.frame_index > 0:
-            set_after_each(srf)
-            propagate_release_each(c, srf)
+            for h in range(N_TYPES):
+                on_skipped_frame(c, srf, h, k)
+        for h in range(N_TYPES):
+            if returns and HOLDS[h]:
+                release.advance_returns(c, srf, h)
         if srf.judged.hides[0] or srf.judged.hides[1]:
             srf.evidence.n_unhidden = 0
     types.frame_index += 1

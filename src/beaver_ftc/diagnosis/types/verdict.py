@@ -47,7 +47,6 @@ from beaver_ftc.diagnosis.types.registry import (
     VARYING_QUIET,
     VARYING_SHOWN,
     WAIT_HALF_CYCLES,
-    error_of_type,
     has_shown,
     motion_rules_out,
 )
@@ -161,7 +160,7 @@ def can_be_another(srf, apparent, dependent):
         if apparent >= 0 and type_remains(srf, h) and (dependent or not FOLLOWS_COMMAND[h]):
             for j in range(N_CONSTANT):
                 alike = SAME_NAME[j] == SAME_NAME[apparent] and CAN_LOOK_LIKE[h, j] and type_remains(srf, j)
-                if alike and not motion_rules_out(srf, STOP_SIDE[j], h):
+                if alike and not motion_rules_out(srf, h, STOP_SIDE[j]):
                     return True
     return False
 
@@ -245,14 +244,32 @@ def decide_single(types, past, layout, est, t):
     past: that of the frame before, which gives the instants of what has not changed; t s.
     """
     s = find_surface(types, layout)
-    estimator_past = past.isolated_estimator
-    s_past = est[estimator_past].surface if estimator_past >= 0 else estimator_past
-    kind = type_on_surface(types.config, types.surface[s]) if s >= 0 else -1
-    isolated_at_s = t if s != s_past else past.isolated_at_s
-    typed_at_s = t if kind != past.fault_type else past.typed_at_s
-    estimator = estimator_of_fault(layout, s, kind) if s >= 0 else s
-    lead, mode = decide_mode(types, estimator, layout, est)
-    return (estimator, isolated_at_s, kind, typed_at_s, lead, mode)
+    for i, srf in enumerate(types.surface):
+        update_status(srf, i == s, type_on_surface(types.config, srf) if i == s else TYPE_UNDECIDED, t)
+    found = finding_on_surface(types, past, layout, s, t)
+    return (*found, *decide_mode(types, found[0], layout, est))
+
+
+@kernel
+def update_status(srf, is_isolated, kind, t):
+    """Name a surface and the type of its fault (-1 if open), or take the name back; t s."""
+    kind = kind if is_isolated else -1
+    status = srf.status
+    if is_isolated and not status.is_isolated:
+        status.isolated_at_s = t
+    if kind != status.fault_type:
+        status.typed_at_s = t
+    status.is_isolated, status.fault_type = is_isolated, kind
+
+
+@kernel
+def finding_on_surface(types, past, layout, s, t):
+    """The finding on surface s, NOT_ISOLATED or UNANTICIPATED: estimator, since when, type, since when."""
+    if s >= 0:
+        status = types.surface[s].status
+        estimator = estimator_of_fault(layout, s, status.fault_type)
+        return (estimator, status.isolated_at_s, status.fault_type, status.typed_at_s)
+    return (s, t if s != past.isolated_estimator else past.isolated_at_s, TYPE_UNDECIDED, past.typed_at_s)
 
 
 @kernel
@@ -350,7 +367,7 @@ def deflection_error(srf, possible):
     if possible:
         for h in ERROR_TYPES:
             if type_remains(srf, h):
-                e = error_of_type(srf, h)
+                e = registry.deflection_error(srf, h)
                 if np.isfinite(e):
                     return e
                 break

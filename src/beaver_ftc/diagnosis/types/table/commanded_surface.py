@@ -19,14 +19,12 @@ from math import pi, sqrt
 import numpy as np
 
 from beaver_ftc.compiled import kernel, record
-from beaver_ftc.diagnosis import isolation
+from beaver_ftc.diagnosis.sets import EMPTY_SET, NO_THETA, UNLIMITED_SET, explain
 from beaver_ftc.diagnosis.types import (
-    EMPTY_SET,
     REST_EXCLUDES_TYPE,
     REST_HIDES_TYPE,
     SCALE_COMMAND,
     SUBTRACT_OFFSET,
-    UNLIMITED_SET,
     WAIT_FOR_SURFACE,
     DeflectionRelation,
     FaultType,
@@ -45,7 +43,7 @@ def error_of_frame(srf):
 
 
 @kernel
-def share_range(srf):
+def share_range(srf, h):
     """Return the range of 1 + theta: 0 to 1."""
     return 0.0, 1.0
 
@@ -54,7 +52,7 @@ def share_range(srf):
 def loss_interval(c, srf, h, k):
     """The 1 + theta in [0, 1] with p = (1 + theta) u in the judged frame; lo > hi if none."""
     lo, hi = srf.judged.lo, srf.judged.hi
-    return isolation.consistent_theta(0.5 * (lo + hi), 0.5 * (hi - lo), srf.judged.u, 0.0, 1.0)
+    return explain(0.5 * (lo + hi), 0.5 * (hi - lo), srf.judged.u, 0.0, 1.0)
 
 
 @kernel
@@ -95,7 +93,7 @@ LOSS_RELATION = DeflectionRelation(
 LOSS = FaultType(
     name="loss_of_effectiveness", has_constant_parameter=True, sort_rank=1,
     parameter_range=share_range, consistent_interval=loss_interval,
-    possible_deflection_range=loss_range,
+    deflection_range=loss_range,
     accommodation_mode=SCALE_COMMAND, end_type="float",
     deflection_relation=LOSS_RELATION, estimate_parameter=theta_of_loss,
     estimate_parameter_interval=theta_of_set,
@@ -122,7 +120,7 @@ def bias_of_frame(c, srf, h, k):
     """
     seen, cmd, act = srf.judged, srf.commands, srf.actuator
     if seen.hi < act.stop_lo or seen.lo > act.stop_hi:
-        return isolation.NO_THETA
+        return NO_THETA
     lo, hi = error_of_frame(srf)
     if seen.lo - max(seen.u - cmd.u_min[1], 0.0) <= act.stop_lo:
         lo = -np.inf
@@ -227,7 +225,7 @@ def update_growing(c, srf, h, k):
 
 
 @kernel
-def has_run(srf, stop):
+def has_run(srf, h, stop):
     """Whether the surface has moved towards that stop as fast as only a runaway does."""
     if stop == 0:
         return False
@@ -241,7 +239,7 @@ def last_offset(fdi: np.void, s: int, h: int) -> float | None:
 
 BIAS = FaultType(
     name="bias", has_constant_parameter=True, sort_rank=6,
-    consistent_interval=bias_of_frame, possible_deflection_range=bias_range,
+    consistent_interval=bias_of_frame, deflection_range=bias_range,
     accommodation_mode=SUBTRACT_OFFSET, deflection_error=bias_middle,
     deflection_error_precedence=2,
     deflection_relation=DeflectionRelation(
@@ -322,7 +320,7 @@ def restart_sign(c, srf, h, k):
 
 
 @kernel
-def swing_has_shown(srf):
+def swing_has_shown(srf, h):
     """Whether it has swung for two half-cycles and more."""
     return srf.oscillatory.n_half >= MIN_HALF_CYCLES
 

@@ -9,7 +9,7 @@ import json
 import math
 import shutil
 from collections import Counter, deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -38,7 +38,7 @@ Lost = Callable[[Any, str], Any]
 GO_ON = "; what has been flown is kept, the same command goes on with it"
 POLL_S = 0.2
 MOST_LOSSES = 3
-OF_A_PART = 32  # cases of a round that are kept together
+OF_A_PART = 32  # cases that a study in rounds keeps together
 TASKS_A_SLOT = 4  # towards the end tasks get smaller, so that no worker is left with a long last one
 LOST = "the process that flies it ends, each time it is tried"
 
@@ -123,27 +123,76 @@ def _tasks(batch: Batch, size: int) -> list[Batch]:
     return [Batch(batch.number, batch.cases[i : i + size]) for i in range(0, len(batch.cases), size)]
 
 
+@dataclass
+class Flying:
+    """Flies batches that have not landed, by workers that begin with the first of these.
+
+    landed: the rows of a batch by its number and runs, None if they are not there. land: keeps them. make:
+    workers, for at most so many cases. lost: as in `Campaign`. at_work: closes the workers.
+    """
+
+    landed: Callable[[Number, Sequence[int]], Any]
+    land: Callable[[Number, list[Row]], Any]
+    make: Callable[[int], Workers]
+    lost: Lost
+    at_work: contextlib.ExitStack
+    workers: Workers | None = None
+
+    def fly(
+        self,
+        batches: Iterable[tuple[Number, Sequence[int]]],
+        cases_of: Callable[[Sequence[int]], Sequence[Any]],
+        there: Callable[[Number, Any], None],
+        stopped: Callable[[], bool] = lambda: False,
+    ) -> None:
+        """cases_of: these runs. there: takes the number and the rows of each batch, once they are there."""
+        missing: dict[Number, Sequence[int]] = {}
+        for number, runs in batches:
+            rows = self.landed(number, runs)
+            if rows is None:
+                missing[number] = runs
+            else:
+                there(number, rows)
+
+        def land(batch: Batch, rows: list[Row]) -> None:
+            self.land(batch.number, rows)
+            there(batch.number, rows)
+
+        if missing:
+            left = sum(map(len, missing.values()))
+            if self.workers is None:
+                self.workers = self.at_work.enter_context(contextlib.closing(self.make(left)))
+            coming = (Batch(number, tuple(cases_of(runs))) for number, runs in missing.items())
+            Campaign(Batches(coming, left, land), self.workers, self.lost).fly(stopped)
+
+
+FlyRound = Callable[[int, Sequence[Any]], list[Any]]
+"""Flies one round of cases after the other, by its number, and gives their rows in order."""
+
+
 @dataclass(frozen=True)
 class Study:
     """What is a study's own: its cases, how each is flown, what their rows amount to, and its files.
 
     name: of the result folder. fly: from a case to its row, a value of the type `row`; it can be pickled, as
     the cases can. document: of all rows. files: their names, with what makes the content of each from the
-    document. follows_from: what the rows follow from beside the cases. lost: the row of a case that kills
-    its process each time; without it that is a SimulationFailed. warm_up: of the workers. part: how many
-    cases are kept together.
+    document; None is no file. follows_from: what the rows follow from beside the cases. lost: the row of a
+    case that kills its process each time; without it that is a SimulationFailed. warm_up: of the workers.
+    part: how many cases are kept together. rounds: in place of `cases`, where the next case follows from the
+    rows before: flies round after round, and gives what the document is of.
     """
 
     name: str
     cases: Sequence[Any]
     fly: Fly
-    document: Callable[[list[Any]], Any]
+    document: Callable[[Any], Any]
     files: Makers
     row: Any = dict
     follows_from: Any = None
     lost: Lost | None = None
     warm_up: Nothing | None = None
     part: int = 1
+    rounds: Callable[[FlyRound], Any] | None = None
 
 
 def run_study(study: Study, out: Path, workers: int = 1, progress: Progress | None = None) -> Any:
@@ -155,55 +204,31 @@ def run_study(study: Study, out: Path, workers: int = 1, progress: Progress | No
 
 
 @contextlib.contextmanager
-def flown(study: Study, out: Path, workers: int = 1, progress: Progress | None = None) -> Iterator[list[Any]]:
-    """Yield the rows of all cases, in their order whatever the number of workers; on success they go."""
-    with in_rounds(study, out, workers, study.part, progress) as fly:
-        yield fly(0, study.cases)
-
-
-FlyRound = Callable[[int, Sequence[Any]], list[Any]]
-
-
-@contextlib.contextmanager
-def in_rounds(
-    study: Study, out: Path, workers: int = 1, part: int | None = None, progress: Progress | None = None
-) -> Iterator[FlyRound]:
-    """Yield what flies one round of cases after the other, by its number, and gives their rows in order: what
-    to fly next may follow from the rows before. Kept as they land, a part of cases at a time; on success they
-    go. What has landed is read from there: the same rows, whenever they were flown."""
+def flown(study: Study, out: Path, workers: int = 1, progress: Progress | None = None) -> Iterator[Any]:
+    """Yield the rows of all cases, in their order whatever the number of workers; or what `rounds` gives.
+    They are kept as they land, a part of cases at a time, and read from there: the same rows, whenever they
+    were flown. On success they go."""
     with _keeping(study, out) as parts, contextlib.ExitStack() as at_work:
-        flying: list[Workers] = []
+        work = Work(partial(_fly_case, study.fly), study.warm_up)
+        flying = Flying(
+            parts.landed, parts.land, partial(_workers, work, workers), study.lost or _fail, at_work
+        )
 
         def fly(number: int, cases: Sequence[Any]) -> list[Any]:
-            pieces = {
-                f"{number:06}-{n:06}": runs for n, runs in store.batches_of(len(cases), part or OF_A_PART)
+            pieces: dict[Number, range] = {
+                f"{number:06}-{n:06}": runs for n, runs in store.batches_of(len(cases), study.part)
             }
-            found: dict[Number, list[Any]] = {}
+            found = set[Number]()
 
-            def take(piece: Any) -> None:
-                rows = parts.landed(piece, pieces[piece])
-                if rows is not None:
-                    found[piece] = rows
-                    if progress:
-                        progress(len(found) / len(pieces))
+            def there(piece: Number, rows: Any) -> None:
+                found.add(piece)
+                if progress:
+                    progress(len(found) / len(pieces))
 
-            def land(batch: Batch, rows: list[Row]) -> None:
-                parts.land(batch.number, rows)
-                take(batch.number)
+            flying.fly(pieces.items(), lambda runs: [Case(n, cases[n]) for n in runs], there)
+            return [row for piece, runs in pieces.items() for row in parts.landed(piece, runs)]
 
-            for piece in pieces:
-                take(piece)
-            missing = [piece for piece in pieces if piece not in found]
-            if missing:
-                left = sum(len(pieces[piece]) for piece in missing)
-                if not flying:
-                    made = _workers(Work(partial(_fly_case, study.fly), study.warm_up), workers, left)
-                    flying.append(at_work.enter_context(contextlib.closing(made)))
-                coming = (Batch(piece, tuple(Case(n, cases[n]) for n in pieces[piece])) for piece in missing)
-                Campaign(Batches(coming, left, land), flying[0], study.lost or _fail).fly()
-            return [row for piece in pieces for row in found[piece]]
-
-        yield fly
+        yield study.rounds(fly) if study.rounds else fly(0, study.cases)
 
 
 @contextlib.contextmanager
@@ -230,19 +255,18 @@ def _keeping(study: Study, out: Path) -> Iterator[store.Parts]:
 
 def fly_all(fly: Fly, cases: Sequence[Any], workers: int, progress: Progress | None = None) -> list[Any]:
     """fly(case) of every case, in order, kept nowhere."""
-    rows: dict[Number, Any] = {}
+    found: dict[Number, Any] = {}
 
-    def land(batch: Batch, flown: list[Row]) -> None:
-        rows[batch.number] = flown[0]
+    def there(number: Number, rows: Any) -> None:
+        found[number] = rows[0]
         if progress:
-            progress(len(rows) / len(cases))
+            progress(len(found) / len(cases))
 
-    batches = Batches((Batch(n, (Case(n, case),)) for n, case in enumerate(cases)), len(cases), land)
-    if cases:
-        made = _workers(Work(partial(_fly_case, fly)), workers, len(cases))
-        with contextlib.closing(made) as flying:
-            Campaign(batches, flying, _fail).fly()
-    return [rows[n] for n in range(len(cases))]
+    with contextlib.ExitStack() as at_work:
+        make = partial(_workers, Work(partial(_fly_case, fly)), workers)
+        flying = Flying(lambda *batch: None, lambda *batch: None, make, _fail, at_work)
+        flying.fly(store.batches_of(len(cases), 1), lambda runs: [Case(n, cases[n]) for n in runs], there)
+    return [found[n] for n in range(len(cases))]
 
 
 def _workers(work: Work, workers: int, cases: int) -> Workers:

@@ -43,58 +43,78 @@ TASKS_A_SLOT = 4  # towards the end tasks get smaller, so that no worker is left
 LOST = "the process that flies it ends, each time it is tried"
 
 
-@dataclass
-class Batches:
-    """Batches known beforehand. left: number of cases in those still to come. landed: takes each batch with
-    all its rows, in the order of its cases.
-    """
-
-    coming: Iterator[Batch]
-    left: int
-    landed: Callable[[Batch, list[Row]], Any]
-
-
-class Campaign:
-    """Workers at work on batches: tasks are handed out, rows gathered, whole batches landed.
+class Flying:
+    """Flies batches of which nothing has landed: workers fly tasks, rows are gathered, whole batches land.
 
     A lost worker's task is flown again. One that is lost twice is taken apart into single cases, so that the
     case that kills its process is found: lost alone three times, it is given the row of a case that was lost.
-    lost: the row of a case that kills its process.
+
+    landed: the rows of a batch by its number and runs, None if they are not there. land: keeps them. make:
+    workers, when the first batch is missing, for so many cases. lost: the row of a case that kills its
+    process.
     """
 
-    def __init__(self, batches: Batches, workers: Workers, lost: Lost) -> None:
-        self._batches, self._workers, self._lost = batches, workers, lost
-        self._waiting: deque[Batch] = deque()
-        self._flying = 0
-        self._flown: dict[Number, tuple[Batch, dict[int, Row]]] = {}
-        self._losses: Counter[tuple[int, ...]] = Counter()
+    def __init__(
+        self, landed: Callable[..., Any], land: Callable[..., Any], make: Callable[[int], Workers], lost: Lost
+    ) -> None:
+        self._landed, self._land, self._make, self._lost = landed, land, make, lost
+        self._workers: Workers | None = None
 
-    def fly(self, stopped: Callable[[], bool] = lambda: False) -> None:
-        """Fly until there is nothing left; once `stopped`, only what is in the air."""
+    def close(self) -> None:
+        """Terminate the workers."""
+        if self._workers:
+            self._workers.close()
+
+    def fly(
+        self,
+        batches: Iterable[tuple[Number, Sequence[int]]],
+        cases_of: Callable[[Sequence[int]], Sequence[Any]],
+        there: Callable[[Number, Any], None],
+        stopped: Callable[[], bool] = lambda: False,
+    ) -> None:
+        """Fly what is missing; once `stopped`, only what is in the air. cases_of: these runs. there: takes
+        the number and the rows of each batch, once they are there."""
+        missing: dict[Number, Sequence[int]] = {}
+        for number, runs in batches:
+            rows = self._landed(number, runs)
+            if rows is None:
+                missing[number] = runs
+            else:
+                there(number, rows)
+        if not missing:
+            return
+        self._coming = (Batch(number, tuple(cases_of(runs))) for number, runs in missing.items())
+        self._left = sum(map(len, missing.values()))  # cases in the batches still to come
+        self._waiting, self._flying = deque[Batch](), 0
+        self._flown: dict[Number, tuple[Batch, dict[int, Row]]] = {}
+        self._losses = Counter[tuple[int, ...]]()
+        workers = self._workers = self._workers or self._make(self._left)
         while True:
-            self._hand_out(stopped())
+            self._hand_out(workers, stopped())
             if not self._flying:
                 return
-            whole = [batch for outcome in self._workers.outcomes(POLL_S) for batch in self._gather(*outcome)]
-            self._hand_out(stopped())  # first put the workers to work, then see to the disk
-            for batch, rows in whole:
-                self._batches.landed(batch, [rows[case.run] for case in batch.cases])
+            whole = [batch for outcome in workers.outcomes(POLL_S) for batch in self._gather(*outcome)]
+            self._hand_out(workers, stopped())  # first put the workers to work, then see to the disk
+            for batch, by_run in whole:
+                rows = [by_run[case.run] for case in batch.cases]
+                self._land(batch.number, rows)
+                there(batch.number, rows)
 
-    def _hand_out(self, stopped: bool) -> None:
-        while self._flying < self._workers.slots and not stopped:
+    def _hand_out(self, workers: Workers, stopped: bool) -> None:
+        while self._flying < workers.slots and not stopped:
             if not self._waiting:
-                self._open_batch()
+                self._open_batch(workers.slots)
             if not self._waiting:
                 return
-            self._workers.submit(self._waiting.popleft())
+            workers.submit(self._waiting.popleft())
             self._flying += 1
 
-    def _open_batch(self) -> None:
-        batch = next(self._batches.coming, None)
+    def _open_batch(self, slots: int) -> None:
+        batch = next(self._coming, None)
         if batch is not None:
             self._flown[batch.number] = (batch, {})
-            size = max(1, math.ceil(self._batches.left / (self._workers.slots * TASKS_A_SLOT)))
-            self._batches.left -= len(batch.cases)
+            size = max(1, math.ceil(self._left / (slots * TASKS_A_SLOT)))
+            self._left -= len(batch.cases)
             self._waiting.extend(_tasks(batch, size))
 
     def _gather(self, task: Batch, rows: list[Row] | None) -> list[tuple[Batch, dict[int, Row]]]:
@@ -105,8 +125,7 @@ class Campaign:
         so_far.update((case.run, row) for case, row in flown)
         if len(so_far) < len(batch.cases):
             return []
-        del self._flown[task.number]
-        return [(batch, so_far)]
+        return [self._flown.pop(task.number)]
 
     def _fly_again(self, task: Batch) -> list[tuple[Any, Row]]:
         """See to a lost task; the (case, row) it yields all the same."""
@@ -121,49 +140,6 @@ class Campaign:
 
 def _tasks(batch: Batch, size: int) -> list[Batch]:
     return [Batch(batch.number, batch.cases[i : i + size]) for i in range(0, len(batch.cases), size)]
-
-
-@dataclass
-class Flying:
-    """Flies batches that have not landed, by workers that begin with the first of these.
-
-    landed: the rows of a batch by its number and runs, None if they are not there. land: keeps them. make:
-    workers, for at most so many cases. lost: as in `Campaign`. at_work: closes the workers.
-    """
-
-    landed: Callable[[Number, Sequence[int]], Any]
-    land: Callable[[Number, list[Row]], Any]
-    make: Callable[[int], Workers]
-    lost: Lost
-    at_work: contextlib.ExitStack
-    workers: Workers | None = None
-
-    def fly(
-        self,
-        batches: Iterable[tuple[Number, Sequence[int]]],
-        cases_of: Callable[[Sequence[int]], Sequence[Any]],
-        there: Callable[[Number, Any], None],
-        stopped: Callable[[], bool] = lambda: False,
-    ) -> None:
-        """cases_of: these runs. there: takes the number and the rows of each batch, once they are there."""
-        missing: dict[Number, Sequence[int]] = {}
-        for number, runs in batches:
-            rows = self.landed(number, runs)
-            if rows is None:
-                missing[number] = runs
-            else:
-                there(number, rows)
-
-        def land(batch: Batch, rows: list[Row]) -> None:
-            self.land(batch.number, rows)
-            there(batch.number, rows)
-
-        if missing:
-            left = sum(map(len, missing.values()))
-            if self.workers is None:
-                self.workers = self.at_work.enter_context(contextlib.closing(self.make(left)))
-            coming = (Batch(number, tuple(cases_of(runs))) for number, runs in missing.items())
-            Campaign(Batches(coming, left, land), self.workers, self.lost).fly(stopped)
 
 
 FlyRound = Callable[[int, Sequence[Any]], list[Any]]
@@ -208,11 +184,12 @@ def flown(study: Study, out: Path, workers: int = 1, progress: Progress | None =
     """Yield the rows of all cases, in their order whatever the number of workers; or what `rounds` gives.
     They are kept as they land, a part of cases at a time, and read from there: the same rows, whenever they
     were flown. On success they go."""
-    with _keeping(study, out) as parts, contextlib.ExitStack() as at_work:
-        work = Work(partial(_fly_case, study.fly), study.warm_up)
-        flying = Flying(
-            parts.landed, parts.land, partial(_workers, work, workers), study.lost or _fail, at_work
-        )
+    work = Work(partial(_fly_case, study.fly), study.warm_up)
+    make, lost = partial(_workers, work, workers), study.lost or _fail
+    with (
+        _keeping(study, out) as parts,
+        contextlib.closing(Flying(parts.landed, parts.land, make, lost)) as flying,
+    ):
 
         def fly(number: int, cases: Sequence[Any]) -> list[Any]:
             pieces: dict[Number, range] = {
@@ -262,9 +239,11 @@ def fly_all(fly: Fly, cases: Sequence[Any], workers: int, progress: Progress | N
         if progress:
             progress(len(found) / len(cases))
 
-    with contextlib.ExitStack() as at_work:
-        make = partial(_workers, Work(partial(_fly_case, fly)), workers)
-        flying = Flying(lambda *batch: None, lambda *batch: None, make, _fail, at_work)
+    def nothing(number: Number, of: Any) -> None:
+        """None is there, and none is kept."""
+
+    make = partial(_workers, Work(partial(_fly_case, fly)), workers)
+    with contextlib.closing(Flying(nothing, nothing, make, _fail)) as flying:
         flying.fly(store.batches_of(len(cases), 1), lambda runs: [Case(n, cases[n]) for n in runs], there)
     return [found[n] for n in range(len(cases))]
 

@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import ExitStack
+from contextlib import closing
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -101,9 +101,8 @@ def _fly_missing(
     sweep: Sweep, options: Options, store: Store, landed: Landed, stopped: Callable[[], bool]
 ) -> None:
     """Fly what is not there; of a search each generation once the one before has landed."""
-    with ExitStack() as at_work:
-        make, lost = partial(_workers, sweep, options), partial(one_flight.lost, sweep)
-        flying = Flying(store.landed, store.parts.land, make, lost, at_work)
+    make, lost = partial(_workers, sweep, options), partial(one_flight.lost, sweep)
+    with closing(Flying(store.landed, store.parts.land, make, lost)) as flying:
 
         def fly(batches: Iterable[tuple[Number, Sequence[int]]], cases_of: Callable[..., Any]) -> None:
             flying.fly(batches, cases_of, lambda number, rows: landed(counts_of(rows)), stopped)

@@ -5,11 +5,11 @@ worse, and better if the opposite holds. The net share, worse less better, is wh
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from math import inf, isfinite
+from math import isfinite
 
 from beaver_ftc.results.metrics import versions
 from beaver_ftc.results.model import Document
-from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial, counted, median
+from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial, counted, median, or_never
 from beaver_ftc.studies.sensitivity.mechanisms import FACTORS, Flight, cases_of, with_key, without_key
 from beaver_ftc.studies.sensitivity.systems import MECHANISMS, SYSTEMS, Mechanism
 
@@ -74,7 +74,7 @@ def _later(a: Document, b: Document) -> bool:
     """Whether b's alarm is late beside a's; of flights with a false alarm there is no delay to compare."""
     if a["false_alarm"] or b["false_alarm"]:
         return False
-    return _or_never(b["delay_s"]) > _or_never(a["delay_s"]) + LATE_S
+    return or_never(b["delay_s"]) > or_never(a["delay_s"]) + LATE_S
 
 
 def _name_lost(a: Document, b: Document) -> bool:
@@ -82,7 +82,7 @@ def _name_lost(a: Document, b: Document) -> bool:
 
 
 def _tracks_worse(a: Document, b: Document) -> bool:
-    return _or_never(b["tracking_deg_s"]) > WORSE * _or_never(a["tracking_deg_s"])
+    return or_never(b["tracking_deg_s"]) > WORSE * or_never(a["tracking_deg_s"])
 
 
 CRITERIA: Mapping[str, Callable[[Document, Document], bool]] = {
@@ -120,14 +120,10 @@ def _both(pairs: Sequence[Pair], name: str) -> Document:
 
 def _ratio(b: Document, a: Document) -> float:
     """Of the tracking errors; 1 where both aircraft are lost."""
-    over, under = _or_never(b["tracking_deg_s"]), _or_never(a["tracking_deg_s"])
+    over, under = or_never(b["tracking_deg_s"]), or_never(a["tracking_deg_s"])
     if not isfinite(under):
         return 0.0 if isfinite(over) else 1.0
     return over / under
-
-
-def _or_never(value: float | None) -> float:
-    return inf if value is None else value
 
 
 def _system_row(outcomes: Sequence[Document]) -> Document:

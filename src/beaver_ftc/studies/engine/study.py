@@ -12,6 +12,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -142,8 +143,8 @@ def _tasks(batch: Batch, size: int) -> list[Batch]:
     return [Batch(batch.number, batch.cases[i : i + size]) for i in range(0, len(batch.cases), size)]
 
 
-FlyRound = Callable[[int, Sequence[Any]], list[Any]]
-"""Flies one round of cases after the other, by its number, and gives their rows in order."""
+FlyRound = Callable[[Sequence[Any]], list[Any]]
+"""Flies one round of cases after the other, and gives their rows in order."""
 
 
 @dataclass(frozen=True)
@@ -154,8 +155,9 @@ class Study:
     the cases can. document: of all rows. files: their names, with what makes the content of each from the
     document; None is no file. follows_from: what the rows follow from beside the cases. lost: the row of a
     case that kills its process each time; without it that is a SimulationFailed. warm_up: of the workers.
-    part: how many cases are kept together. rounds: in place of `cases`, where the next case follows from the
-    rows before: flies round after round, and gives what the document is of.
+    part: how many cases are kept together; by default one, and OF_A_PART of a round. rounds: in place of
+    `cases`, where the next case follows from the rows before: flies round after round, and gives what the
+    document is of.
     """
 
     name: str
@@ -167,7 +169,7 @@ class Study:
     follows_from: Any = None
     lost: Lost | None = None
     warm_up: Nothing | None = None
-    part: int = 1
+    part: int | None = None
     rounds: Callable[[FlyRound], Any] | None = None
 
 
@@ -190,10 +192,12 @@ def flown(study: Study, out: Path, workers: int = 1, progress: Progress | None =
         _keeping(study, out) as parts,
         contextlib.closing(Flying(parts.landed, parts.land, make, lost)) as flying,
     ):
+        rounds, part = count(), study.part or (OF_A_PART if study.rounds else 1)
 
-        def fly(number: int, cases: Sequence[Any]) -> list[Any]:
+        def fly(cases: Sequence[Any]) -> list[Any]:
+            number = next(rounds)
             pieces: dict[Number, range] = {
-                f"{number:06}-{n:06}": runs for n, runs in store.batches_of(len(cases), study.part)
+                f"{number:06}-{n:06}": runs for n, runs in store.batches_of(len(cases), part)
             }
             found = set[Number]()
 
@@ -205,7 +209,7 @@ def flown(study: Study, out: Path, workers: int = 1, progress: Progress | None =
             flying.fly(pieces.items(), lambda runs: [Case(n, cases[n]) for n in runs], there)
             return [row for piece, runs in pieces.items() for row in parts.landed(piece, runs)]
 
-        yield study.rounds(fly) if study.rounds else fly(0, study.cases)
+        yield study.rounds(fly) if study.rounds else fly(study.cases)
 
 
 @contextlib.contextmanager

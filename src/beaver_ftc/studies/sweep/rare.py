@@ -25,7 +25,7 @@ from beaver_ftc.scenario.builtin import to_yaml
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sweeps import Sweep
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial
-from beaver_ftc.studies.engine.study import OF_A_PART, FlyRound, Study, run_study
+from beaver_ftc.studies.engine.study import FlyRound, Study, run_study
 from beaver_ftc.studies.engine.workers import Case
 from beaver_ftc.studies.present.tables import finite, number
 from beaver_ftc.studies.sweep.one_flight import scenario_of, warm_up
@@ -41,8 +41,8 @@ _BEFORE = -1e-12  # the score of what has just not happened
 _NORMAL = NormalDist()
 
 Scores = np.ndarray
-FlyPoints = Callable[[int, np.ndarray], Scores]
-"""From a round's number and points (flights, keys), standard normals, to scores (flights,); events from 0."""
+FlyPoints = Callable[[np.ndarray], Scores]
+"""From a round's points (flights, keys), standard normals, to scores (flights,); events from 0."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,6 @@ class Chains:
         self.design: tuple[float, int, np.ndarray] | None = (
             None  # the likeliest event: distance, flight, point
         )
-        self._round = 0
 
     def go(self, fly: FlyPoints) -> None:
         """Fly until every run has reached the event, or cannot."""
@@ -122,8 +121,7 @@ class Chains:
 
     def _flown(self, fly: FlyPoints, points: np.ndarray) -> Scores:
         flat = points.reshape(-1, points.shape[-1])
-        scores = fly(self._round, flat)
-        self._round += 1
+        scores = fly(flat)
         for i in np.flatnonzero(scores >= 0.0).tolist():
             distance = float(np.linalg.norm(flat[i]))
             if self.design is None or distance < self.design[0]:
@@ -229,11 +227,11 @@ def run_rare(
     def rounds(flies: FlyRound) -> Document:
         failed = 0
 
-        def fly(number: int, points: np.ndarray) -> Scores:
+        def fly(points: np.ndarray) -> Scores:
             nonlocal failed
-            rows = flies(number, [(chains.flights + i, point.tolist()) for i, point in enumerate(points)])
+            rows = flies([(chains.flights + i, point.tolist()) for i, point in enumerate(points)])
             failed += sum(row["failed"] for row in rows)
-            if number == 0 and failed == len(rows):
+            if not chains.flights and failed == len(rows):
                 raise SimulationFailed(f"{sweep.name}: no flight could be flown")
             tell(f"{name}: {chains.flights + len(rows)} flights, level {chains.levels}")
             return np.array([row["score"] for row in rows])
@@ -255,7 +253,7 @@ def run_rare(
     study = Study(
         name, (), partial(_fly, sweep, expectation), dict, {"rare.json": as_json, "flight.yaml": likeliest},
         follows_from=[identity_of(sweep, expectation), RUNS, MEMBERS], lost=lost,
-        warm_up=partial(warm_up, sweep), part=OF_A_PART, rounds=rounds,
+        warm_up=partial(warm_up, sweep), rounds=rounds,
     )  # fmt: skip
     document: Document = run_study(study, out, workers)
     return document | {"folder": str(out / name)}

@@ -66,10 +66,6 @@ def effect_of(pairs: Sequence[Pair]) -> Document:
     }
 
 
-def _more_alarms(a: Document, b: Document) -> bool:
-    return bool(b["false_alarm"] and not a["false_alarm"])
-
-
 def _later(a: Document, b: Document) -> bool:
     """Whether b's alarm is late beside a's; of flights with a false alarm there is no delay to compare."""
     if a["false_alarm"] or b["false_alarm"]:
@@ -77,17 +73,12 @@ def _later(a: Document, b: Document) -> bool:
     return or_never(b["delay_s"]) > or_never(a["delay_s"]) + LATE_S
 
 
-def _name_lost(a: Document, b: Document) -> bool:
-    return bool(a["named"] and not b["named"])
-
-
-def _tracks_worse(a: Document, b: Document) -> bool:
-    return or_never(b["tracking_deg_s"]) > WORSE * or_never(a["tracking_deg_s"])
-
-
 CRITERIA: Mapping[str, Callable[[Document, Document], bool]] = {
-    "false_alarms": _more_alarms, "late": _later, "names": _name_lost, "tracking": _tracks_worse,
-}  # fmt: skip
+    "false_alarms": lambda a, b: b["false_alarm"] > a["false_alarm"],
+    "late": _later,
+    "names": lambda a, b: a["named"] > b["named"],
+    "tracking": lambda a, b: or_never(b["tracking_deg_s"]) > WORSE * or_never(a["tracking_deg_s"]),
+}
 """Whether the second flight of a pair is worse than the first."""
 
 
@@ -121,9 +112,7 @@ def _both(pairs: Sequence[Pair], name: str) -> Document:
 def _ratio(b: Document, a: Document) -> float:
     """Of the tracking errors; 1 where both aircraft are lost."""
     over, under = or_never(b["tracking_deg_s"]), or_never(a["tracking_deg_s"])
-    if not isfinite(under):
-        return 0.0 if isfinite(over) else 1.0
-    return over / under
+    return over / under if isfinite(under) else float(not isfinite(over))
 
 
 def _system_row(outcomes: Sequence[Document]) -> Document:

@@ -43,7 +43,7 @@ def repeated(problem: str, repeats: int) -> tuple[int, int, int]:
     held = near = flights = 0
     for seed in range(repeats):
         chains = Chains(keys, seed)
-        chains.go(lambda _, points: score(points))
+        chains.go(score)
         found = chains.estimate()
         held += found.low <= probability <= found.high
         near += 0.5 < found.probability / probability < 2

@@ -83,14 +83,13 @@ def interpolated(law: Schedule, qdyn: float, lost: float) -> np.ndarray:
 def allocation(G: np.ndarray, main: np.ndarray, stand_in: int, lost: float) -> np.ndarray:
     """Commands per demanded acceleration, (n, 3), as control/allocation.py gives them within the travels."""
     a, e, r = main[ROLL], main[PITCH], main[YAW]
-    commands = np.zeros((G.shape[1], 3))
-    determinant = G[ROLL, a] * G[YAW, r] - G[ROLL, r] * G[YAW, a]
-    if determinant != 0.0:
-        commands[a, [ROLL, YAW]] = G[YAW, r] / determinant, -G[ROLL, r] / determinant
-        commands[r, [ROLL, YAW]] = -G[YAW, a] / determinant, G[ROLL, a] / determinant
+    commands, (a, e, r) = np.zeros((G.shape[1], 3)), main[[ROLL, PITCH, YAW]]
     flap = lost if stand_in >= 0 else 0.0
     shares = [(PITCH, stand_in, flap), (PITCH, e, 1.0 - flap)]
-    if determinant == 0.0:
+    lateral = G[np.ix_([ROLL, YAW], [a, r])]
+    if np.linalg.det(lateral):
+        commands[np.ix_([a, r], [ROLL, YAW])] = np.linalg.inv(lateral)
+    else:
         shares += [(ROLL, a, 1.0), (YAW, r, 1.0)]
     for axis, s, share in shares:
         if share and G[axis, s]:
@@ -101,36 +100,34 @@ def allocation(G: np.ndarray, main: np.ndarray, stand_in: int, lost: float) -> n
 def law_response(loop: OpenLoop, law: LawGains, z: Any) -> np.ndarray:
     """Where the surfaces go for what is measured, (..., n, m), at each z (...)."""
     n, m, dt = len(loop.effectiveness), len(loop.C), loop.dt_s
-    z = np.asarray(z, complex)
-    back = (1.0 / z)[..., None, None]
+    z = np.asarray(z, complex)[..., None, None]
+    back = 1.0 / z
     mean = law.share * back + 1.0 - law.share  # of what acts over the elapsed frame
-    one, keep = np.eye(3), np.diag(1.0 - law.L_rate)
-    L_disturbance, Kp = np.diag(law.L_disturbance), np.diag(law.Kp)
-    demand = np.diag(law.lead) @ law.demand
+    actuator = loop.approach / (z - 1.0 + loop.approach)
+    one, keep, all_n = np.eye(3), np.diag(1.0 - law.L_rate), np.eye(n)
+    L_disturbance, Kp, lead = np.diag(law.L_disturbance), np.diag(law.Kp), np.diag(law.lead)
+    demand, rates, none = lead @ law.demand, np.eye(3, m), np.zeros((n, m))
     ahead = one + law.share * dt * Kp
+    wide, tall = np.zeros((3, n)), np.zeros((n, 3))
     # unknowns: rate, disturbance, position, command; driven by what is measured
-    rate, disturbance, position, command = (
-        slice(0, 3), slice(3, 6), slice(6, 6 + n), slice(6 + n, 6 + 2 * n),
-    )  # fmt: skip
-    M = np.zeros((*z.shape, 6 + 2 * n, 6 + 2 * n), complex)
-    M[..., rate, rate] = one - keep * back
-    M[..., rate, disturbance] = -keep * dt * back
-    M[..., rate, position] = -keep @ loop.G * dt * mean
-    M[..., disturbance, rate] = L_disturbance * back
-    M[..., disturbance, disturbance] = one - one * back + L_disturbance * dt * back
-    M[..., disturbance, position] = L_disturbance @ loop.G * dt * mean
-    M[..., position, position] = np.eye(n)
-    M[..., position, command] = -np.eye(n) * (loop.approach / (z[..., None] - 1.0 + loop.approach))[..., None]
-    M[..., command, rate] = demand @ Kp
-    M[..., command, disturbance] = demand @ ahead
-    M[..., command, position] = demand @ Kp @ loop.G * law.share * dt + np.diag(law.lead) - np.eye(n)
-    M[..., command, command] = np.eye(n)
-    rates = np.eye(3, m)
-    driven = np.zeros((*z.shape, 6 + 2 * n, m), complex)
-    driven[..., rate, :] = np.diag(law.L_rate) @ rates + keep @ loop.f * dt * mean
-    driven[..., disturbance, :] = L_disturbance @ (rates - loop.f * dt * mean)
-    driven[..., command, :] = -demand @ ahead @ loop.f
-    return np.linalg.solve(M, driven)[..., position, :]
+    M = [
+        [one - keep * back, -keep * dt * back, -keep @ loop.G * dt * mean, wide],
+        [L_disturbance * back, one - one * back + L_disturbance * dt * back,
+         L_disturbance @ loop.G * dt * mean, wide],
+        [tall, tall, all_n, -all_n * actuator],
+        [demand @ Kp, demand @ ahead, demand @ Kp @ loop.G * law.share * dt + lead - all_n, all_n],
+    ]  # fmt: skip
+    driven = [
+        [np.diag(law.L_rate) @ rates + keep @ loop.f * dt * mean],
+        [L_disturbance @ (rates - loop.f * dt * mean)], [none], [-demand @ ahead @ loop.f],
+    ]  # fmt: skip
+
+    def joined(rows: list[list[np.ndarray]]) -> np.ndarray:
+        return np.block(
+            [[np.broadcast_to(of, (*z.shape[:-2], *of.shape[-2:])) for of in row] for row in rows]
+        )
+
+    return np.linalg.solve(joined(M), joined(driven))[..., 6 : 6 + n, :]
 
 
 def loops(loop: OpenLoop, law: LawGains, omega: np.ndarray) -> np.ndarray:

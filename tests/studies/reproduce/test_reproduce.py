@@ -155,9 +155,9 @@ def test_command_writes_tables_figures_and_page(tmp_path, monkeypatch):
         published_figures, "draw", lambda view, *of: drawn(view, *of) if view.name == "fig-3" else b"picture"
     )
     as_flown = [claim.number(flights_of()) for claim in MEASURED]
-    row = [*as_flown, *as_flown, 4.0]
+    row = {"numbers": as_flown, "without": as_flown, "same": 4}
     monkeypatch.setattr(
-        reproduction, "row_of", lambda studied: row if studied[0] == reproduction.NUMBERS else [0.0]
+        reproduction, "row_of", lambda studied: row if studied[0] == "numbers" else {"false alarm": 0.0}
     )
     monkeypatch.setattr("beaver_ftc.studies.reproduce.reproduction.fly_case", lambda case: flown(case.name))
     done = CliRunner().invoke(

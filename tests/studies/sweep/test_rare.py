@@ -34,7 +34,7 @@ def biased(tmp_path):
 
 def test_the_likeliest_event_is_near_the_design_point():
     chains = Chains(2, 1)
-    chains.go(lambda _, points: points.sum(1) / math.sqrt(2) - 4.0)
+    chains.go(lambda points: points.sum(1) / math.sqrt(2) - 4.0)
     distance, _, point = chains.design
     assert 4.0 <= distance < 4.3
     assert point == pytest.approx([4 / math.sqrt(2)] * 2, abs=0.8)
@@ -42,7 +42,7 @@ def test_the_likeliest_event_is_near_the_design_point():
 
 def test_a_frequent_event_needs_no_levels():
     chains = Chains(1, 3)
-    chains.go(lambda _, points: points[:, 0])
+    chains.go(lambda points: points[:, 0])
     found = chains.estimate()
     assert (found.levels, found.flights) == (0, rare.RUNS * rare.MEMBERS)
     assert found.low < 0.5 < found.high
@@ -60,7 +60,7 @@ def test_a_frequent_event_needs_no_levels():
 )
 def test_where_it_cannot_get_there_it_says_so(score, why):
     chains = Chains(2, 1)
-    chains.go(lambda _, points: score(points))
+    chains.go(score)
     found = chains.estimate()
     assert (math.isnan(found.probability), found.low, found.why) == (True, 0.0, why)
     assert chains.design is None

@@ -9,7 +9,7 @@ import numpy as np
 
 from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S
 from beaver_ftc.control.laws import discretise
-from beaver_ftc.design.fdc import GEOMETRY, MASS, SURFACES, TERMS
+from beaver_ftc.design.fdc import GEOMETRY, MASS, MOMENTS, SURFACES, TERMS
 from beaver_ftc.design.model import inertia_coefficients
 from beaver_ftc.diagnosis.detection.filters import (
     ALPHA_CENTRES_RAD,
@@ -23,6 +23,7 @@ from beaver_ftc.scenario.signals import sample
 from beaver_ftc.studies.bench.contenders import take_over
 
 AXES = "pqr"
+SIGNALS = ("alpha", "beta", "ph", "qh", "rh", "dpt")  # of the terms of moments
 LEAST_EFFECTIVENESS = 0.1
 
 
@@ -37,27 +38,22 @@ class PublishedModel:
         inertia = inertia_coefficients(MASS)
         self.coupling = np.array([inertia.Pqr, inertia.Qpr, inertia.Rpq])
         self.lengths = np.array([GEOMETRY.span_m, GEOMETRY.chord_m, GEOMETRY.span_m])
-        self.k = {name: term.value for name, term in TERMS.items()}
+        terms = [term for term in TERMS.values() if term.coefficient in MOMENTS]
+        self.values = np.array([term.value for term in terms])
+        self.powers = np.array([[dict(term.of).get(signal, 0) for signal in SIGNALS] for term in terms])
+        columns = (None, *SURFACES)
+        self.into = np.zeros((len(MOMENTS), len(columns), len(terms)))  # coefficient, factor, term
+        for i, term in enumerate(terms):
+            self.into[MOMENTS.index(term.coefficient), columns.index(term.surface), i] = 1.0
 
     def f_and_G(self, x: np.ndarray, truth: dict[str, float]) -> tuple[np.ndarray, np.ndarray]:
         """f (3,) rad/s2 and G (3, 4) rad/s2 per rad at the rates x (3,) rad/s."""
-        k, a, be, dpt = self.k, truth["alpha_rad"], truth["beta_rad"], truth["dpt"]
-        ph, qh, rh = x * self.lengths / truth["airspeed_mps"] * np.array([0.5, 1.0, 0.5])
-        coefficients = np.array([
-            k["Cl_0"] + k["Cl_beta"] * be + k["Cl_p"] * ph + k["Cl_r"] * rh + k["Cl_a2dpt"] * a**2 * dpt,
-            k["Cm_0"] + k["Cm_alpha"] * a + k["Cm_alpha2"] * a**2 + k["Cm_q"] * qh
-            + k["Cm_beta2"] * be**2 + k["Cm_r"] * rh + k["Cm_dpt"] * dpt,
-            k["Cn_0"] + k["Cn_beta"] * be + k["Cn_p"] * ph + k["Cn_r"] * rh + k["Cn_q"] * qh
-            + k["Cn_beta3"] * be**3 + k["Cn_dpt3"] * dpt**3,
-        ])  # fmt: skip
-        slopes = np.array([
-            [k["Cl_da"] + k["Cl_daa"] * a, 0, k["Cl_dr"], 0],
-            [0, k["Cm_de"], 0, k["Cm_df"]],
-            [k["Cn_da"], 0, k["Cn_dr"], 0],
-        ])  # fmt: skip
+        rates = x * self.lengths / truth["airspeed_mps"] * np.array([0.5, 1.0, 0.5])
+        signals = np.array([truth["alpha_rad"], truth["beta_rad"], *rates, truth["dpt"]])
+        coefficients = self.into @ (self.values * (signals**self.powers).prod(axis=1))
         scale = truth["qdyn_pa"] * GEOMETRY.wing_area_m2 * self.lengths
-        gyroscopic = np.cross(x, self.inertia @ x)
-        return self.inverse @ (scale * coefficients - gyroscopic), self.inverse @ (scale[:, None] * slopes)
+        moments, slopes = scale * coefficients[:, 0], scale[:, None] * coefficients[:, 1:]
+        return self.inverse @ (moments - np.cross(x, self.inertia @ x)), self.inverse @ slopes
 
 
 class Estimators:
@@ -147,11 +143,10 @@ class Estimators:
 
 def _basis(alpha: float, beta: float) -> np.ndarray:
     """Normalised radial basis functions along alpha and along beta, each as wide as its spacing."""
-    along_alpha = np.exp(
-        -0.5 * ((alpha - ALPHA_CENTRES_RAD) / (ALPHA_CENTRES_RAD[1] - ALPHA_CENTRES_RAD[0])) ** 2
-    )
-    along_beta = np.exp(-0.5 * ((beta - BETA_CENTRES_RAD) / (BETA_CENTRES_RAD[1] - BETA_CENTRES_RAD[0])) ** 2)
-    both = np.concatenate([along_alpha, along_beta])
+    both = np.concatenate([
+        np.exp(-0.5 * ((value - centres) / (centres[1] - centres[0])) ** 2)
+        for value, centres in ((alpha, ALPHA_CENTRES_RAD), (beta, BETA_CENTRES_RAD))
+    ])  # fmt: skip
     return both / np.linalg.norm(both)
 
 
@@ -235,13 +230,11 @@ class Straightforward:
         """A row of the log."""
         e = self.estimators
         row = truth | {f"{s}_cmd_rad": u for s, u in zip(SURFACES, self.u, strict=True)}
-        for i, axis in enumerate(AXES):
-            row[f"{axis}_measured_rad_s"], row[f"{axis}_reference_rad_s"] = x[i], reference[i]
-            row[f"{axis}_model_rad_s"] = self.law.model[0, i]
-            row[f"{axis}_residual_rad_s"], row[f"{axis}_threshold_rad_s"] = e.residual[i], e.threshold[i]
-            for s in range(3):
-                row[f"fie_{SURFACES[s]}_{axis}_residual_rad_s"] = e.fie_residual[s, i]
-                row[f"fie_{SURFACES[s]}_{axis}_lower_rad_s"] = e.lower[s, i]
-                row[f"fie_{SURFACES[s]}_{axis}_upper_rad_s"] = e.upper[s, i]
-        row["detected"] = e.detected
-        return row
+        of_axes = {
+            "measured": x, "reference": reference, "model": self.law.model[0], "residual": e.residual,
+            "threshold": e.threshold,
+        }  # fmt: skip
+        row |= {f"{AXES[i]}_{name}_rad_s": of[i] for name, of in of_axes.items() for i in range(3)}
+        for name, of in (("residual", e.fie_residual), ("lower", e.lower), ("upper", e.upper)):
+            row |= {f"fie_{SURFACES[s]}_{AXES[i]}_{name}_rad_s": of[s, i] for s, i in np.ndindex(3, 3)}
+        return row | {"detected": e.detected}

@@ -12,7 +12,7 @@ from beaver_ftc.documents.validation import one_line
 from beaver_ftc.results.model import Document, Metrics, read_metrics
 from beaver_ftc.results.style import BLACK
 from beaver_ftc.studies.present.figures import panels
-from beaver_ftc.studies.present.page import save
+from beaver_ftc.studies.present.page import write_files
 from beaver_ftc.studies.present.tables import aligned, number
 
 if TYPE_CHECKING:
@@ -164,8 +164,8 @@ def write_runs(out: Path, folders: Sequence[Path]) -> list[Run]:
     runs = read_runs(folders)
     show_in_reports()
     with result_folder(out, "runs") as folder:
-        save(figure_of(runs), folder / "runs.png")
-        (folder / "runs.json").write_text(as_json([run.document for run in runs]), encoding="utf-8")
+        documents = [run.document for run in runs]
+        write_files(folder, {"runs.png": figure_of(runs), "runs.json": as_json(documents)})
         write_report(folder / "runs.html", folders, labels(runs))
     return runs
 

@@ -14,10 +14,10 @@ from beaver_ftc.studies.compare.trial import LAW, ORACLE, SCHEME, Entry, Result,
 from beaver_ftc.studies.engine.statistics import (
     CONFIDENCE,
     Estimate,
+    duel,
     median,
     poisson_bound,
     share_within,
-    sign_test,
     wilson,
     wilson_bound,
 )
@@ -83,8 +83,7 @@ def _duel(entry: Entry, mine: Sequence[Result], ours: Sequence[Result]) -> Docum
 
     both = zip(mine, ours, strict=bool(ours))
     pairs = [(badness(a), badness(b)) for a, b in both if a.faulted and b.faulted]
-    better, worse = sum(a < b for a, b in pairs), sum(a > b for a, b in pairs)
-    return {"better": better, "worse": worse, "p": sign_test(better, worse)}
+    return dict(zip(("worse", "better", "p"), duel(pairs), strict=True))
 
 
 def _spread(name: str, values: Sequence[float], which: Sequence[str] = ("median", "90")) -> Document:

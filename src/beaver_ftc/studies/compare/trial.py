@@ -24,6 +24,7 @@ from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.diagnosis import Statistical
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.compare.replay import Trace, record, replay, trace
+from beaver_ftc.studies.engine.statistics import or_never
 
 CALIBRATION = "calibration-"  # and the grade: the sets that methods are tuned on
 DRAW = 1000  # between the seeds of two draws of a set: the seeds of all sets are smaller
@@ -234,10 +235,10 @@ def result_of(flight: Landing, entry: Entry, us: float) -> Result:
         false_alarm=found.false_alarm,
         fault_free_s=found.fault_free_s,
         faulted=fault is not None and strikes_within(fault.at_s, end_s),
-        delay_s=_or_never(found.detection.delay_s),
+        delay_s=or_never(found.detection.delay_s),
         isolated=isolation.fault,
         correct=found.fault_named,
-        isolation_delay_s=_or_never(isolation.delay_s) if found.fault_named else inf,
+        isolation_delay_s=or_never(isolation.delay_s) if found.fault_named else inf,
         rms_deg_s=inf if departed else whole,
         before_deg_s=inf if departed and fault is None else before,
         after_deg_s=inf if departed else after,
@@ -246,10 +247,6 @@ def result_of(flight: Landing, entry: Entry, us: float) -> Result:
         departed=departed,
         us=us,
     )
-
-
-def _or_never(value: float | None) -> float:
-    return inf if value is None else value
 
 
 def _size(rms: Rates | None) -> float:

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict
 from itertools import product
-from math import inf
 from statistics import fmean
 from typing import Any
 
@@ -13,7 +12,7 @@ from beaver_ftc.results.metrics import versions
 from beaver_ftc.results.model import Document
 from beaver_ftc.studies.compare.replay import Trace, alarms_at
 from beaver_ftc.studies.detectability.schemes import BUILT_IN, WATCHED_S, WITHIN_S, Grid, Watched
-from beaver_ftc.studies.engine.statistics import binomial, poisson, share_within, sign_test
+from beaver_ftc.studies.engine.statistics import binomial, duel, or_never, poisson, share_within
 from beaver_ftc.studies.present.tables import finite, grouped
 
 
@@ -84,7 +83,7 @@ def summary(rows: Sequence[Row], own: bool = False) -> Document:
     """
     prefix = "own_" if own else ""
     flights = [row[f"{prefix}delay_s"] for row in rows if not row[f"{prefix}false_alarm"]]
-    delays = [inf if delay_s is None else delay_s for delay_s in flights]
+    delays = [*map(or_never, flights)]
     found = {s: sum(delay <= s + 1e-9 for delay in delays) for s in WITHIN_S} if delays else {}
     return {
         "flights": len(delays),
@@ -194,7 +193,6 @@ def _found_by_seed(rows: Sequence[Row], within_s: float) -> dict[int, int]:
 
 def _duel(ours: dict[int, int], theirs: dict[int, int]) -> Document:
     pairs = [(found, theirs[seed]) for seed, found in ours.items() if seed in theirs]
-    wins, losses = sum(a > b for a, b in pairs), sum(a < b for a, b in pairs)
-    p = sign_test(wins, losses)
+    wins, losses, p = duel(pairs)
     verdict = "even" if p >= SIGNIFICANT else "better" if wins > losses else "worse"
     return {"seeds_ours": wins, "seeds_theirs": losses, "p": p, "verdict": verdict}

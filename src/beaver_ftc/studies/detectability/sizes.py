@@ -21,7 +21,6 @@ from beaver_ftc.documents.errors import BadInput, BeaverFtcError
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.metrics import measure, versions
 from beaver_ftc.results.model import Document
-from beaver_ftc.results.writer import result_folder
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.signals import TIME_TOLERANCE_S
@@ -30,8 +29,7 @@ from beaver_ftc.studies.detectability.shown import NAME, OF_SIZES
 from beaver_ftc.studies.detectability.thresholds import LARGEST, STAGES, Threshold, of_all, threshold
 from beaver_ftc.studies.engine.draws import loss
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, counted
-from beaver_ftc.studies.engine.study import FlyRound, Study, in_rounds
-from beaver_ftc.studies.present.page import contents, write_files
+from beaver_ftc.studies.engine.study import FlyRound, Study, run_study
 from beaver_ftc.studies.present.tables import finite
 
 SHARE = 0.9  # of flights
@@ -60,19 +58,17 @@ class Flight(NamedTuple):
 
 @dataclass
 class _Flown:
-    """Flights as they are flown, each once; fly: a round of them, by its number."""
+    """Flights as they are flown, each once; fly: a round of them."""
 
     fly: FlyRound
     tell: Any
-    rounds: int = 0
     rows: dict[Flight, Document] = field(default_factory=dict)
 
     def of(self, variant: str, runs: Sequence[int], size: int) -> list[Document]:
         wanted = [Flight(variant, run, size) for run in runs]
         missing = [flight for flight in wanted if flight not in self.rows]
         if missing:
-            self.rows.update(zip(missing, self.fly(self.rounds, missing), strict=True))
-            self.rounds += 1
+            self.rows.update(zip(missing, self.fly(missing), strict=True))
             self.tell(f"{variant}: {len(self.rows)} flights")
         return [self.rows[flight] for flight in wanted]
 
@@ -91,14 +87,10 @@ def run_sizes(
     variants = dict(variants_of(scenario, asked.surface))
     study = Study(
         f"{scenario.name[:70]}-{NAME}-{asked.surface}", (), partial(fly_one, variants, asked),
-        lambda rows: None, OF_SIZES, follows_from=[scenario, asked],
-        lost=lambda flight, why: _row(failed=True),
+        dict, OF_SIZES, follows_from=[scenario, asked], lost=lambda flight, why: _row(failed=True),
+        rounds=lambda fly: _document(scenario, asked, variants, _Flown(fly, tell)),
     )  # fmt: skip
-    with in_rounds(study, out, workers) as rounds:
-        flown = _Flown(rounds, tell)
-        document = _document(scenario, asked, variants, flown)
-        with result_folder(out, study.name, study.files) as folder:
-            write_files(folder, contents(study.files, document))
+    document: Document = run_study(study, out, workers)
     return document | {"folder": str(out / study.name)}
 
 

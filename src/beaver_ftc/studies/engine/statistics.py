@@ -59,11 +59,19 @@ def binomial_upper(events: int, trials: int) -> float:
     return binomial(events, trials, 2.0 * CONFIDENCE - 1.0).high
 
 
-def sign_test(wins: int, losses: int) -> float:
-    """Probability of a result at least as uneven between equals, two-sided and exact [Conover1999]."""
+def duel(pairs: Iterable[tuple[float, float]]) -> tuple[int, int, float]:
+    """In how many pairs the first number is the larger, in how many the smaller, and the probability of a
+    result at least as uneven between equals, two-sided and exact [Conover1999]."""
     from scipy.stats import binomtest
 
-    return float(binomtest(wins, wins + losses).pvalue) if wins + losses else 1.0
+    larger = [a > b for a, b in pairs if a != b]
+    more, n = sum(larger), len(larger)
+    return more, n - more, float(binomtest(more, n).pvalue) if n else 1.0
+
+
+def or_never(value: float | None) -> float:
+    """A time or an error; None is infinite."""
+    return math.inf if value is None else value
 
 
 def poisson(events: int, exposure: float) -> Estimate:
@@ -94,7 +102,7 @@ def quantile(ordered: np.ndarray, q: float) -> float:
 
 def median(values: Iterable[float | None]) -> dict[str, float | None]:
     """A median for a document with its two-sided interval; None is infinite, as it is of none."""
-    ordered = np.sort([math.inf if value is None else value for value in values])
+    ordered = np.sort([*map(or_never, values)])
     ends = [quantile_bound(ordered, 0.5, (1.0 + CONFIDENCE) / 2, upper) for upper in (False, True)]
     found = quantile(ordered, 0.5), *ends
     return {key: finite(value) for key, value in zip(("value", "low", "high"), found, strict=True)}
@@ -102,7 +110,7 @@ def median(values: Iterable[float | None]) -> dict[str, float | None]:
 
 def share_within(values: Iterable[float | None], share: float) -> float:
     """The smallest value that at least this share do not exceed; None is infinite, as it is of none."""
-    ordered = np.sort([math.inf if value is None else value for value in values])
+    ordered = np.sort([*map(or_never, values)])
     return quantile(ordered, share) if ordered.size else math.inf
 
 

@@ -9,9 +9,10 @@ import json
 import math
 import shutil
 from collections import Counter, deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -38,63 +39,83 @@ Lost = Callable[[Any, str], Any]
 GO_ON = "; what has been flown is kept, the same command goes on with it"
 POLL_S = 0.2
 MOST_LOSSES = 3
-OF_A_PART = 32  # cases of a round that are kept together
+OF_A_PART = 32  # cases that a study in rounds keeps together
 TASKS_A_SLOT = 4  # towards the end tasks get smaller, so that no worker is left with a long last one
 LOST = "the process that flies it ends, each time it is tried"
 
 
-@dataclass
-class Batches:
-    """Batches known beforehand. left: number of cases in those still to come. landed: takes each batch with
-    all its rows, in the order of its cases.
-    """
-
-    coming: Iterator[Batch]
-    left: int
-    landed: Callable[[Batch, list[Row]], Any]
-
-
-class Campaign:
-    """Workers at work on batches: tasks are handed out, rows gathered, whole batches landed.
+class Flying:
+    """Flies batches of which nothing has landed: workers fly tasks, rows are gathered, whole batches land.
 
     A lost worker's task is flown again. One that is lost twice is taken apart into single cases, so that the
     case that kills its process is found: lost alone three times, it is given the row of a case that was lost.
-    lost: the row of a case that kills its process.
+
+    landed: the rows of a batch by its number and runs, None if they are not there. land: keeps them. make:
+    workers, when the first batch is missing, for so many cases. lost: the row of a case that kills its
+    process.
     """
 
-    def __init__(self, batches: Batches, workers: Workers, lost: Lost) -> None:
-        self._batches, self._workers, self._lost = batches, workers, lost
-        self._waiting: deque[Batch] = deque()
-        self._flying = 0
-        self._flown: dict[Number, tuple[Batch, dict[int, Row]]] = {}
-        self._losses: Counter[tuple[int, ...]] = Counter()
+    def __init__(
+        self, landed: Callable[..., Any], land: Callable[..., Any], make: Callable[[int], Workers], lost: Lost
+    ) -> None:
+        self._landed, self._land, self._make, self._lost = landed, land, make, lost
+        self._workers: Workers | None = None
 
-    def fly(self, stopped: Callable[[], bool] = lambda: False) -> None:
-        """Fly until there is nothing left; once `stopped`, only what is in the air."""
+    def close(self) -> None:
+        """Terminate the workers."""
+        if self._workers:
+            self._workers.close()
+
+    def fly(
+        self,
+        batches: Iterable[tuple[Number, Sequence[int]]],
+        cases_of: Callable[[Sequence[int]], Sequence[Any]],
+        there: Callable[[Number, Any], None],
+        stopped: Callable[[], bool] = lambda: False,
+    ) -> None:
+        """Fly what is missing; once `stopped`, only what is in the air. cases_of: these runs. there: takes
+        the number and the rows of each batch, once they are there."""
+        missing: dict[Number, Sequence[int]] = {}
+        for number, runs in batches:
+            rows = self._landed(number, runs)
+            if rows is None:
+                missing[number] = runs
+            else:
+                there(number, rows)
+        if not missing:
+            return
+        self._coming = (Batch(number, tuple(cases_of(runs))) for number, runs in missing.items())
+        self._left = sum(map(len, missing.values()))  # cases in the batches still to come
+        self._waiting, self._flying = deque[Batch](), 0
+        self._flown: dict[Number, tuple[Batch, dict[int, Row]]] = {}
+        self._losses = Counter[tuple[int, ...]]()
+        workers = self._workers = self._workers or self._make(self._left)
         while True:
-            self._hand_out(stopped())
+            self._hand_out(workers, stopped())
             if not self._flying:
                 return
-            whole = [batch for outcome in self._workers.outcomes(POLL_S) for batch in self._gather(*outcome)]
-            self._hand_out(stopped())  # first put the workers to work, then see to the disk
-            for batch, rows in whole:
-                self._batches.landed(batch, [rows[case.run] for case in batch.cases])
+            whole = [batch for outcome in workers.outcomes(POLL_S) for batch in self._gather(*outcome)]
+            self._hand_out(workers, stopped())  # first put the workers to work, then see to the disk
+            for batch, by_run in whole:
+                rows = [by_run[case.run] for case in batch.cases]
+                self._land(batch.number, rows)
+                there(batch.number, rows)
 
-    def _hand_out(self, stopped: bool) -> None:
-        while self._flying < self._workers.slots and not stopped:
+    def _hand_out(self, workers: Workers, stopped: bool) -> None:
+        while self._flying < workers.slots and not stopped:
             if not self._waiting:
-                self._open_batch()
+                self._open_batch(workers.slots)
             if not self._waiting:
                 return
-            self._workers.submit(self._waiting.popleft())
+            workers.submit(self._waiting.popleft())
             self._flying += 1
 
-    def _open_batch(self) -> None:
-        batch = next(self._batches.coming, None)
+    def _open_batch(self, slots: int) -> None:
+        batch = next(self._coming, None)
         if batch is not None:
             self._flown[batch.number] = (batch, {})
-            size = max(1, math.ceil(self._batches.left / (self._workers.slots * TASKS_A_SLOT)))
-            self._batches.left -= len(batch.cases)
+            size = max(1, math.ceil(self._left / (slots * TASKS_A_SLOT)))
+            self._left -= len(batch.cases)
             self._waiting.extend(_tasks(batch, size))
 
     def _gather(self, task: Batch, rows: list[Row] | None) -> list[tuple[Batch, dict[int, Row]]]:
@@ -105,8 +126,7 @@ class Campaign:
         so_far.update((case.run, row) for case, row in flown)
         if len(so_far) < len(batch.cases):
             return []
-        del self._flown[task.number]
-        return [(batch, so_far)]
+        return [self._flown.pop(task.number)]
 
     def _fly_again(self, task: Batch) -> list[tuple[Any, Row]]:
         """See to a lost task; the (case, row) it yields all the same."""
@@ -123,27 +143,34 @@ def _tasks(batch: Batch, size: int) -> list[Batch]:
     return [Batch(batch.number, batch.cases[i : i + size]) for i in range(0, len(batch.cases), size)]
 
 
+FlyRound = Callable[[Sequence[Any]], list[Any]]
+"""Flies one round of cases after the other, and gives their rows in order."""
+
+
 @dataclass(frozen=True)
 class Study:
     """What is a study's own: its cases, how each is flown, what their rows amount to, and its files.
 
     name: of the result folder. fly: from a case to its row, a value of the type `row`; it can be pickled, as
     the cases can. document: of all rows. files: their names, with what makes the content of each from the
-    document. follows_from: what the rows follow from beside the cases. lost: the row of a case that kills
-    its process each time; without it that is a SimulationFailed. warm_up: of the workers. part: how many
-    cases are kept together.
+    document; None is no file. follows_from: what the rows follow from beside the cases. lost: the row of a
+    case that kills its process each time; without it that is a SimulationFailed. warm_up: of the workers.
+    part: how many cases are kept together; by default one, and OF_A_PART of a round. rounds: in place of
+    `cases`, where the next case follows from the rows before: flies round after round, and gives what the
+    document is of.
     """
 
     name: str
     cases: Sequence[Any]
     fly: Fly
-    document: Callable[[list[Any]], Any]
+    document: Callable[[Any], Any]
     files: Makers
     row: Any = dict
     follows_from: Any = None
     lost: Lost | None = None
     warm_up: Nothing | None = None
-    part: int = 1
+    part: int | None = None
+    rounds: Callable[[FlyRound], Any] | None = None
 
 
 def run_study(study: Study, out: Path, workers: int = 1, progress: Progress | None = None) -> Any:
@@ -155,55 +182,34 @@ def run_study(study: Study, out: Path, workers: int = 1, progress: Progress | No
 
 
 @contextlib.contextmanager
-def flown(study: Study, out: Path, workers: int = 1, progress: Progress | None = None) -> Iterator[list[Any]]:
-    """Yield the rows of all cases, in their order whatever the number of workers; on success they go."""
-    with in_rounds(study, out, workers, study.part, progress) as fly:
-        yield fly(0, study.cases)
+def flown(study: Study, out: Path, workers: int = 1, progress: Progress | None = None) -> Iterator[Any]:
+    """Yield the rows of all cases, in their order whatever the number of workers; or what `rounds` gives.
+    They are kept as they land, a part of cases at a time, and read from there: the same rows, whenever they
+    were flown. On success they go."""
+    work = Work(partial(_fly_case, study.fly), study.warm_up)
+    make, lost = partial(_workers, work, workers), study.lost or _fail
+    with (
+        _keeping(study, out) as parts,
+        contextlib.closing(Flying(parts.landed, parts.land, make, lost)) as flying,
+    ):
+        rounds, part = count(), study.part or (OF_A_PART if study.rounds else 1)
 
-
-FlyRound = Callable[[int, Sequence[Any]], list[Any]]
-
-
-@contextlib.contextmanager
-def in_rounds(
-    study: Study, out: Path, workers: int = 1, part: int | None = None, progress: Progress | None = None
-) -> Iterator[FlyRound]:
-    """Yield what flies one round of cases after the other, by its number, and gives their rows in order: what
-    to fly next may follow from the rows before. Kept as they land, a part of cases at a time; on success they
-    go. What has landed is read from there: the same rows, whenever they were flown."""
-    with _keeping(study, out) as parts, contextlib.ExitStack() as at_work:
-        flying: list[Workers] = []
-
-        def fly(number: int, cases: Sequence[Any]) -> list[Any]:
-            pieces = {
-                f"{number:06}-{n:06}": runs for n, runs in store.batches_of(len(cases), part or OF_A_PART)
+        def fly(cases: Sequence[Any]) -> list[Any]:
+            number = next(rounds)
+            pieces: dict[Number, range] = {
+                f"{number:06}-{n:06}": runs for n, runs in store.batches_of(len(cases), part)
             }
-            found: dict[Number, list[Any]] = {}
+            found = set[Number]()
 
-            def take(piece: Any) -> None:
-                rows = parts.landed(piece, pieces[piece])
-                if rows is not None:
-                    found[piece] = rows
-                    if progress:
-                        progress(len(found) / len(pieces))
+            def there(piece: Number, rows: Any) -> None:
+                found.add(piece)
+                if progress:
+                    progress(len(found) / len(pieces))
 
-            def land(batch: Batch, rows: list[Row]) -> None:
-                parts.land(batch.number, rows)
-                take(batch.number)
+            flying.fly(pieces.items(), lambda runs: [Case(n, cases[n]) for n in runs], there)
+            return [row for piece, runs in pieces.items() for row in parts.landed(piece, runs)]
 
-            for piece in pieces:
-                take(piece)
-            missing = [piece for piece in pieces if piece not in found]
-            if missing:
-                left = sum(len(pieces[piece]) for piece in missing)
-                if not flying:
-                    made = _workers(Work(partial(_fly_case, study.fly), study.warm_up), workers, left)
-                    flying.append(at_work.enter_context(contextlib.closing(made)))
-                coming = (Batch(piece, tuple(Case(n, cases[n]) for n in pieces[piece])) for piece in missing)
-                Campaign(Batches(coming, left, land), flying[0], study.lost or _fail).fly()
-            return [row for piece in pieces for row in found[piece]]
-
-        yield fly
+        yield study.rounds(fly) if study.rounds else fly(study.cases)
 
 
 @contextlib.contextmanager
@@ -230,19 +236,20 @@ def _keeping(study: Study, out: Path) -> Iterator[store.Parts]:
 
 def fly_all(fly: Fly, cases: Sequence[Any], workers: int, progress: Progress | None = None) -> list[Any]:
     """fly(case) of every case, in order, kept nowhere."""
-    rows: dict[Number, Any] = {}
+    found: dict[Number, Any] = {}
 
-    def land(batch: Batch, flown: list[Row]) -> None:
-        rows[batch.number] = flown[0]
+    def there(number: Number, rows: Any) -> None:
+        found[number] = rows[0]
         if progress:
-            progress(len(rows) / len(cases))
+            progress(len(found) / len(cases))
 
-    batches = Batches((Batch(n, (Case(n, case),)) for n, case in enumerate(cases)), len(cases), land)
-    if cases:
-        made = _workers(Work(partial(_fly_case, fly)), workers, len(cases))
-        with contextlib.closing(made) as flying:
-            Campaign(batches, flying, _fail).fly()
-    return [rows[n] for n in range(len(cases))]
+    def nothing(number: Number, of: Any) -> None:
+        """None is there, and none is kept."""
+
+    make = partial(_workers, Work(partial(_fly_case, fly)), workers)
+    with contextlib.closing(Flying(nothing, nothing, make, _fail)) as flying:
+        flying.fly(store.batches_of(len(cases), 1), lambda runs: [Case(n, cases[n]) for n in runs], there)
+    return [found[n] for n in range(len(cases))]
 
 
 def _workers(work: Work, workers: int, cases: int) -> Workers:

@@ -63,7 +63,6 @@ from beaver_ftc.design.model import (
 )
 from beaver_ftc.plant.adapter import START_LATITUDE_DEG
 from beaver_ftc.plant.conditions import known_trim
-from beaver_ftc.scenario.airframe import ActuatorDynamics
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.faults import UNANTICIPATED, place_of
 from beaver_ftc.scenario.schema import Scenario
@@ -82,39 +81,36 @@ Contributions = dict[str, np.ndarray]
 def healthy_positions(scenario: Scenario, commands: np.ndarray) -> np.ndarray:
     """Positions (n, 4) rad of a scenario's healthy actuators at rows with these commands (n, 4) rad."""
     dt = 1.0 / (scenario.rate_hz * scenario.substeps)
-    each = [getattr(scenario.actuators, surface) for surface in SURFACES]
-    off = [getattr(scenario.uncertainty.actuators, surface) for surface in SURFACES]
-    bandwidths = [a.bandwidth_rad_s * b.bandwidth for a, b in zip(each, off, strict=True)]
-    rates = [radians(a.rate_limit_deg_s * b.rate_limit) for a, b in zip(each, off, strict=True)]
-    share = np.array([1.0 - exp(-bandwidth * dt) if bandwidth else 1.0 for bandwidth in bandwidths])
-    reach = np.array([rate * dt if rate else inf for rate in rates])  # rad; in a JSBSim frame
-    band = np.array([radians(one.dead_band_deg) for one in off])
-    low, high = np.array([_stops(*both) for both in zip(SURFACES, each, strict=True)]).T
+    share, reach, band, low, high = np.array([_servo(scenario, surface, dt) for surface in SURFACES]).T
     positions = np.empty_like(commands)
     _follow(commands, share, reach, band, low, high, scenario.substeps, positions)
     return positions
 
 
-def _stops(surface: str, dynamics: ActuatorDynamics) -> tuple[float, float]:
-    if dynamics.travel_deg is not None:
-        return radians(dynamics.travel_deg[0]), radians(dynamics.travel_deg[1])
-    return TRAVEL[surface].min_rad, TRAVEL[surface].max_rad
+def _servo(scenario: Scenario, surface: str, dt: float) -> tuple[float, ...]:
+    """Of an actuator in a JSBSim frame: share of the way, reach, dead band and stops, rad."""
+    servo, off = getattr(scenario.actuators, surface), getattr(scenario.uncertainty.actuators, surface)
+    bandwidth, rate = servo.bandwidth_rad_s * off.bandwidth, servo.rate_limit_deg_s * off.rate_limit
+    stops = TRAVEL[surface].min_rad, TRAVEL[surface].max_rad
+    if servo.travel_deg is not None:
+        stops = radians(servo.travel_deg[0]), radians(servo.travel_deg[1])
+    share, reach = 1.0 - exp(-bandwidth * dt) if bandwidth else 1.0, radians(rate) * dt if rate else inf
+    return share, reach, radians(off.dead_band_deg), *stops
 
 
 @kernel
 def _follow(commands, share, reach, band, low, high, runs, positions):
     """Fill positions (n, 4) rad, `runs` JSBSim frames a row."""
     at = np.minimum(np.maximum(commands[0], low), high)
+    ideal = (share == 1.0) & (reach == np.inf) & (band == 0.0)
     for k in range(commands.shape[0]):
-        for s in range(4):
-            demand = min(max(commands[k, s], low[s]), high[s])
-            ideal = share[s] == 1.0 and reach[s] == np.inf and band[s] == 0.0
-            for _ in range(runs):
-                e = demand - at[s]
-                e -= min(max(e, -band[s]), band[s])
-                way = min(max(share[s] * e, -reach[s]), reach[s])
-                at[s] = demand if ideal else min(max(at[s] + way, low[s]), high[s])
-            positions[k, s] = at[s]
+        demand = np.minimum(np.maximum(commands[k], low), high)
+        for _ in range(runs):
+            e = demand - at
+            e -= np.minimum(np.maximum(e, -band), band)
+            way = np.minimum(np.maximum(share * e, -reach), reach)
+            at = np.where(ideal, demand, np.minimum(np.maximum(at + way, low), high))
+        positions[k] = at
 
 
 def earth_in_body(attitude: np.ndarray, latitude: np.ndarray) -> np.ndarray:

@@ -17,21 +17,15 @@ MARKS = "os^DXPv<>*h"  # eleven beside eight colours: no two of 88 curves have b
 GRID = "#dddddd"
 
 
-def new_figure(width: float, height: float, title: str = "", dpi: int = DPI) -> "Figure":
-    """An empty figure, inches, without matplotlib's global state."""
+def panels(
+    down: int, across: int, width: float, height: float, title: str = "", dpi: int = DPI, **subplots: Any
+) -> tuple["Figure", Any]:
+    """A figure, inches, without matplotlib's global state, with its panels (down, across)."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(width, height), dpi=dpi, layout="constrained")
     if title:
         figure.suptitle(title, fontsize=11)
-    return figure
-
-
-def panels(
-    down: int, across: int, width: float, height: float, title: str = "", dpi: int = DPI, **subplots: Any
-) -> tuple["Figure", Any]:
-    """A figure, inches, with its panels (down, across)."""
-    figure = new_figure(width, height, title, dpi)
     return figure, figure.subplots(down, across, squeeze=False, **subplots)
 
 

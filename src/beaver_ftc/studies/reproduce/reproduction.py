@@ -41,7 +41,7 @@ from beaver_ftc.studies.reproduce.claims import (
 from beaver_ftc.studies.reproduce.published_figures import figures_of
 from beaver_ftc.studies.reproduce.words import NAME, as_html, as_markdown, as_text
 
-NUMBERS, FALSE_ALARM = "numbers", "false alarm"
+NUMBERS, ABLATED, SAME, FALSE_ALARM = "numbers", "without", "same", "false alarm"
 AS_PUBLISHED = Changed("as published", {}, "")
 ELSEWHERE = (*BEYOND, *VARIANTS, *GAINS)  # wherever the paper did not fly
 SETTINGS = (AS_PUBLISHED, *ELSEWHERE)
@@ -64,32 +64,28 @@ class Flights:
     designs: list[tuple[Flown, Flown]]
 
 
-def row_of(studied: tuple[str, Changed]) -> list[float]:
+def row_of(studied: tuple[str, Changed]) -> Document:
     """Of a setting the number of every measured claim, in their order, the same without the mechanism, and
     in how many flights adaptation changes no alarm and no name; or whether a healthy flight alarms. A number
     that no verdict needs is not flown."""
     asked, setting = studied
     if asked == FALSE_ALARM:
-        return [beside.false_alarm_of(setting)]
+        return {FALSE_ALARM: beside.false_alarm_of(setting)}
     flown: dict[str, Flown] = {}
     flights, published = LazyFlights(setting.changes, flown), setting.name == AS_PUBLISHED.name
 
     def without(claim: Claim) -> float:
         return claim.number(LazyFlights({**setting.changes, **WITHOUT[claim.ablation].changes}, flown))
 
-    return [
-        *(claim.number(flights) if published or not claim.because else nan for claim in MEASURED),
-        *(
+    rigid = LazyFlights({**setting.changes, **NO_ADAPTATION}, flown)
+    return {
+        NUMBERS: [claim.number(flights) if published or not claim.because else nan for claim in MEASURED],
+        ABLATED: [
             without(claim) if published or (claim.testable and not claim.because) else nan
             for claim in MEASURED
-        ),
-        float(same_without_adaptation(flights, LazyFlights({**setting.changes, **NO_ADAPTATION}, flown))),
-    ]
-
-
-def same_without_adaptation(flights: Mapping[str, Flown], without: Mapping[str, Flown]) -> int:
-    """In how many of the faulty flights the alarm, the name and its time stay as they are."""
-    return sum(_found_in(flights[name]) == _found_in(without[name]) for name in FAULTY)
+        ],
+        SAME: sum(_found_in(flights[name]) == _found_in(rigid[name]) for name in FAULTY),
+    }
 
 
 def _found_in(flown: Flown) -> tuple[float | None, str | None, float | None]:
@@ -103,18 +99,15 @@ def fly_published() -> Flights:
     return Flights(published, beside.fly_beside(), truth_and_design.fly_designs())
 
 
-def document_of(flights: Flights, rows: Sequence[list[float]]) -> Document:
+def document_of(flights: Flights, rows: Sequence[Document]) -> Document:
     """Judge the flights; rows: of every setting of STUDIED."""
-    settings = rows[: len(SETTINGS)]
-    count = len(MEASURED)
-    numbers = {setting.name: row[:count] for setting, row in zip(SETTINGS, settings, strict=True)}
-    ablated = {setting.name: row[count : 2 * count] for setting, row in zip(SETTINGS, settings, strict=True)}
+    settings = {
+        setting.name: row for (asked, setting), row in zip(STUDIED, rows, strict=True) if asked == NUMBERS
+    }
+    numbers, ablated = ({name: row[key] for name, row in settings.items()} for key in (NUMBERS, ABLATED))
     ours = numbers[AS_PUBLISHED.name]
     judged = {
-        claim: _judged(
-            claim,
-            {name: (numbers[name][i], ablated[name][i]) for name in numbers},
-        )
+        claim: _judged(claim, {name: (numbers[name][i], ablated[name][i]) for name in numbers})
         for i, claim in enumerate(MEASURED)
     }
     claims = [{"where": c.where, "statement": c.statement} | judged.get(c, _unjudged(c)) for c in CLAIMS]
@@ -123,10 +116,15 @@ def document_of(flights: Flights, rows: Sequence[list[float]]) -> Document:
         "passed": all(claim["verdict"] != NOT_BORNE_OUT or claim["because"] for claim in claims),
         "counts": {verdict: counts[verdict] for verdict in VERDICTS},
         **_counted_apart(claims),
-        "adaptation": {"flights": len(FAULTY) * len(SETTINGS), "same": int(sum(row[-1] for row in settings))},
+        "adaptation": {
+            "flights": len(FAULTY) * len(SETTINGS),
+            "same": sum(row[SAME] for row in settings.values()),
+        },
         "claims": claims,
         "ablations": _ablations(claims),
-        "beside": beside.document_of(flights.beside, [row[0] for row in rows[len(SETTINGS) :]]),
+        "beside": beside.document_of(
+            flights.beside, [row[FALSE_ALARM] for row in rows if FALSE_ALARM in row]
+        ),
         "truth_and_design": truth_and_design.document_of(flights.designs),
         "choices": [asdict(choice) for choice in (*CHOICES, *OPTIONS)],
         "gains": _gains(ours, numbers),
@@ -139,7 +137,7 @@ def document_of(flights: Flights, rows: Sequence[list[float]]) -> Document:
                     numbers[setting.name], ablated[setting.name], ablated[AS_PUBLISHED.name]
                 ),
             }
-            for setting in (*BEYOND, *VARIANTS, *GAINS)
+            for setting in ELSEWHERE
         ],
         "cases": [
             {
@@ -283,7 +281,7 @@ FILES: Makers = {
 
 def reproduce(out: Path, workers: int, progress: Progress | None = None) -> Document:
     """Write `out/reproduction/` (tables as JSON, Markdown and HTML, and the figures); return the document."""
-    study = Study(NAME, STUDIED, row_of, _found, FILES, row=list[float])
+    study = Study(NAME, STUDIED, row_of, _found, FILES)
     document: Document = run_study(study, out, workers, progress)[0]
     return document
 

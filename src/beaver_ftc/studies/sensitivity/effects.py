@@ -5,11 +5,11 @@ worse, and better if the opposite holds. The net share, worse less better, is wh
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from math import inf, isfinite
+from math import isfinite
 
 from beaver_ftc.results.metrics import versions
 from beaver_ftc.results.model import Document
-from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial, counted, median
+from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial, counted, median, or_never
 from beaver_ftc.studies.sensitivity.mechanisms import FACTORS, Flight, cases_of, with_key, without_key
 from beaver_ftc.studies.sensitivity.systems import MECHANISMS, SYSTEMS, Mechanism
 
@@ -66,28 +66,19 @@ def effect_of(pairs: Sequence[Pair]) -> Document:
     }
 
 
-def _more_alarms(a: Document, b: Document) -> bool:
-    return bool(b["false_alarm"] and not a["false_alarm"])
-
-
 def _later(a: Document, b: Document) -> bool:
     """Whether b's alarm is late beside a's; of flights with a false alarm there is no delay to compare."""
     if a["false_alarm"] or b["false_alarm"]:
         return False
-    return _or_never(b["delay_s"]) > _or_never(a["delay_s"]) + LATE_S
-
-
-def _name_lost(a: Document, b: Document) -> bool:
-    return bool(a["named"] and not b["named"])
-
-
-def _tracks_worse(a: Document, b: Document) -> bool:
-    return _or_never(b["tracking_deg_s"]) > WORSE * _or_never(a["tracking_deg_s"])
+    return or_never(b["delay_s"]) > or_never(a["delay_s"]) + LATE_S
 
 
 CRITERIA: Mapping[str, Callable[[Document, Document], bool]] = {
-    "false_alarms": _more_alarms, "late": _later, "names": _name_lost, "tracking": _tracks_worse,
-}  # fmt: skip
+    "false_alarms": lambda a, b: b["false_alarm"] > a["false_alarm"],
+    "late": _later,
+    "names": lambda a, b: a["named"] > b["named"],
+    "tracking": lambda a, b: or_never(b["tracking_deg_s"]) > WORSE * or_never(a["tracking_deg_s"]),
+}
 """Whether the second flight of a pair is worse than the first."""
 
 
@@ -120,14 +111,8 @@ def _both(pairs: Sequence[Pair], name: str) -> Document:
 
 def _ratio(b: Document, a: Document) -> float:
     """Of the tracking errors; 1 where both aircraft are lost."""
-    over, under = _or_never(b["tracking_deg_s"]), _or_never(a["tracking_deg_s"])
-    if not isfinite(under):
-        return 0.0 if isfinite(over) else 1.0
-    return over / under
-
-
-def _or_never(value: float | None) -> float:
-    return inf if value is None else value
+    over, under = or_never(b["tracking_deg_s"]), or_never(a["tracking_deg_s"])
+    return over / under if isfinite(under) else float(not isfinite(over))
 
 
 def _system_row(outcomes: Sequence[Document]) -> Document:

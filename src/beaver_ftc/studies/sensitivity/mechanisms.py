@@ -23,6 +23,7 @@ from beaver_ftc.results.model import Document, Metrics
 from beaver_ftc.scenario.airframe import air_of
 from beaver_ftc.scenario.declared import undeclared
 from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.studies.compare.criteria import least_margins
 from beaver_ftc.studies.compare.margins_in_flight import margins_of
 from beaver_ftc.studies.engine.draws import loss, sines, swings
 from beaver_ftc.studies.present.tables import finite
@@ -251,13 +252,13 @@ def margins_row(cell: tuple[str, str, str]) -> Document:
     """Margins of a system's healthy loop at a bandwidth, the least over surfaces and airspeeds."""
     system, bandwidth, instruments = cell
     flight = Flight(FACTORS["fault"][0], bandwidth, FACTORS["error"][0], instruments, 0)
-    found = margins_of(scenario_of(flight, 0, system))
+    gain_db, phase_deg = least_margins(margins_of(scenario_of(flight, 0, system)))
     return {
         "system": system,
         "bandwidth": bandwidth,
         "instruments": instruments,
-        "gain_margin_db": finite(min(min(each.up_db, each.down_db) for each in found)),
-        "phase_margin_deg": finite(min(each.phase_deg for each in found)),
+        "gain_margin_db": finite(gain_db),
+        "phase_margin_deg": finite(phase_deg),
     }
 
 

@@ -1,12 +1,12 @@
 """A sweep from beginning to end: fly what is missing, then say what it all shows."""
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, closing
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError, SimulationFailed
 from beaver_ftc.documents.files import read_json
@@ -15,10 +15,10 @@ from beaver_ftc.results.model import Document
 from beaver_ftc.results.writer import clear_disk_errors
 from beaver_ftc.scenario.sweeps import Sweep
 from beaver_ftc.studies.engine.store import batches_of, write_whole
-from beaver_ftc.studies.engine.study import Batches, Campaign
-from beaver_ftc.studies.engine.workers import Batch, LocalWorkers, Number, Row, Work, Workers, cores
+from beaver_ftc.studies.engine.study import Flying
+from beaver_ftc.studies.engine.workers import LocalWorkers, Number, Work, Workers, cores
 from beaver_ftc.studies.sweep import one_flight
-from beaver_ftc.studies.sweep.one_flight import Keep, counts_of_rows, counts_of_table
+from beaver_ftc.studies.sweep.one_flight import Keep, counts_of
 from beaver_ftc.studies.sweep.sampling import Assignment, Plan
 from beaver_ftc.studies.sweep.search import found, generations, members
 from beaver_ftc.studies.sweep.store import Store, batch_size, identity_of
@@ -100,39 +100,21 @@ def run_sweep(
 def _fly_missing(
     sweep: Sweep, options: Options, store: Store, landed: Landed, stopped: Callable[[], bool]
 ) -> None:
-    workers: Workers | None = None
-    with ExitStack() as at_work:
-        for batches in _missing(sweep, options, store, landed):
-            workers = workers or at_work.enter_context(closing(_workers(sweep, options)))
-            Campaign(batches, workers, partial(one_flight.lost, sweep)).fly(stopped)
+    """Fly what is not there; of a search each generation once the one before has landed."""
+    make, lost = partial(_workers, sweep, options), partial(one_flight.lost, sweep)
+    with closing(Flying(store.landed, store.parts.land, make, lost)) as flying:
+
+        def fly(batches: Iterable[tuple[Number, Sequence[int]]], cases_of: Callable[..., Any]) -> None:
+            flying.fly(batches, cases_of, lambda number, rows: landed(counts_of(rows)), stopped)
+
+        if not options.search:
+            fly(batches_of(sweep.flights, batch_size(sweep)), Plan(sweep).assignments)
+            return
+        for number, cases in generations(sweep, options.search, store):
+            fly([(number, [case.run for case in cases])], lambda runs, cases=cases: cases)
 
 
-def _missing(sweep: Sweep, options: Options, store: Store, landed: Landed) -> Iterator[Batches]:
-    """What is still to be flown: of a search the next generation, once the one before has landed."""
-
-    def there(number: Number, runs: Sequence[int]) -> bool:
-        table = store.landed(number, runs)
-        if table is not None:
-            landed(counts_of_table(table))
-        return table is not None
-
-    def land(batch: Batch, rows: list[Row]) -> None:
-        store.parts.land(batch.number, rows)
-        landed(counts_of_rows(rows))
-
-    if options.search:
-        for batch in generations(sweep, options.search, store):
-            if not there(batch.number, [case.run for case in batch.cases]):
-                yield Batches(iter([batch]), len(batch.cases), land)
-        return
-    plan, batches = Plan(sweep), batches_of(sweep.flights, batch_size(sweep))
-    missing = {number: runs for number, runs in batches if not there(number, runs)}
-    if missing:
-        coming = (Batch(number, tuple(plan.assignments(runs))) for number, runs in missing.items())
-        yield Batches(coming, sum(map(len, missing.values())), land)
-
-
-def _workers(sweep: Sweep, options: Options) -> Workers:
+def _workers(sweep: Sweep, options: Options, flights: int) -> Workers:
     work = Work(partial(one_flight.fly_one, sweep, keep=options.keep), partial(one_flight.warm_up, sweep))
     if options.backend == "ray":
         from beaver_ftc.studies.engine.ray_workers import RayWorkers

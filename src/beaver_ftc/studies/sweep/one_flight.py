@@ -98,20 +98,15 @@ def table_of(sweep: "Sweep", schema: "pa.Schema", rows: Sequence[Row]) -> "pa.Ta
     return pa.Table.from_pylist(cells, schema=schema)
 
 
-def counts_of_rows(rows: Sequence[Row]) -> Counter[str]:
+def counts_of(rows: "Sequence[Row] | pa.Table") -> Counter[str]:
     """How many flights: `done`, `failed` (no metrics), `faulted`, and `detected` of these."""
-    counts: Counter[str] = Counter(done=len(rows))
-    for row in rows:
-        counts["failed"] += row["status"] not in RESULTS
-        faulted = row["fault.type"] is not None
-        counts["faulted"] += faulted
-        counts["detected"] += faulted and bool(row["detection.detected"])
-    return counts
-
-
-def counts_of_table(table: "pa.Table") -> Counter[str]:
-    """The same of a table."""
-    return counts_of_rows(table.select(["status", "fault.type", "detection.detected"]).to_pylist())
+    if not isinstance(rows, Sequence):
+        rows = rows.select(["status", "fault.type", "detection.detected"]).to_pylist()
+    faulted = [row for row in rows if row["fault.type"] is not None]
+    return Counter(
+        done=len(rows), failed=sum(row["status"] not in RESULTS for row in rows), faulted=len(faulted),
+        detected=sum(bool(row["detection.detected"]) for row in faulted),
+    )  # fmt: skip
 
 
 KEEP_POLICIES = ("none", "failed", "missed", "worst", "all")

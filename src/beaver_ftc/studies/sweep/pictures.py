@@ -13,7 +13,15 @@ import numpy as np
 from beaver_ftc.results.model import Document
 from beaver_ftc.results.style import BLACK, BLUE, GREY
 from beaver_ftc.studies.engine.statistics import wilson
-from beaver_ftc.studies.present.figures import GRID, curve_look, heat_map, marker, new_figure
+from beaver_ftc.studies.present.figures import (
+    GRID,
+    curve_look,
+    draw_estimates,
+    heat_map,
+    label_edges,
+    marker,
+    panels,
+)
 from beaver_ftc.studies.present.page import save
 from beaver_ftc.studies.sweep.outcomes import Flights
 from beaver_ftc.studies.sweep.summary import OUTCOMES
@@ -50,11 +58,10 @@ def write_figures(flights: Flights, summary: Document, folder: Path) -> list[Pat
 def _axes(
     title: str, x: str = "", y: str = "", size: tuple[float, float] = (8.0, 4.6)
 ) -> tuple["Figure", "Axes"]:
-    figure = new_figure(*size)
-    axes = figure.subplots()
+    figure, grid = panels(1, 1, *size)
+    axes = grid[0, 0]
     axes.set_title(title, fontsize=10)
-    axes.set_xlabel(x, fontsize=9)
-    axes.set_ylabel(y, fontsize=9)
+    label_edges(grid, x, [y])
     axes.tick_params(labelsize=8)
     axes.grid(color=GRID, linewidth=0.6)
     axes.set_axisbelow(True)
@@ -92,12 +99,10 @@ def detection_probability(flights: Flights, summary: Document) -> "Figure | None
     for place, (label, group) in enumerate(_faults(flights)):
         values, hits = flights[key][group], flights.detected[group]
         bins = _levels(values) if flights.vary[key].count else _bins(values)
-        found = [wilson(int(hits[bin].sum()), bin.size) for bin in bins]
-        shares = np.array([estimate.value for estimate in found])
-        reach = np.array([[e.value - e.low, e.high - e.value] for e in found]).T
-        axes.errorbar(
-            [values[bin].mean() for bin in bins], shares, np.maximum(reach, 0), label=label,
-            marker=marker(place), markersize=4.5, elinewidth=0.8, capsize=2, **curve_look(place),
+        found = [vars(wilson(int(hits[bin].sum()), bin.size)) for bin in bins]
+        draw_estimates(
+            axes, [values[bin].mean() for bin in bins], found, label=label, marker=marker(place),
+            markersize=4.5, elinewidth=0.8, capsize=2, **curve_look(place),
         )  # fmt: skip
     if flights.vary[key].loguniform:
         _log_of_numbers(axes)

@@ -21,14 +21,12 @@ from beaver_ftc.documents.errors import BadInput, BeaverFtcError, SimulationFail
 from beaver_ftc.documents.files import Document
 from beaver_ftc.results.log import Columns
 from beaver_ftc.results.metrics import as_json, measure, versions
-from beaver_ftc.results.writer import result_folder
 from beaver_ftc.scenario.builtin import to_yaml
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sweeps import Sweep
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial
-from beaver_ftc.studies.engine.study import FlyRound, Study, in_rounds
+from beaver_ftc.studies.engine.study import FlyRound, Study, run_study
 from beaver_ftc.studies.engine.workers import Case
-from beaver_ftc.studies.present.page import write_files
 from beaver_ftc.studies.present.tables import finite, number
 from beaver_ftc.studies.sweep.one_flight import scenario_of, warm_up
 from beaver_ftc.studies.sweep.sampling import Assignment, values_at
@@ -43,8 +41,8 @@ _BEFORE = -1e-12  # the score of what has just not happened
 _NORMAL = NormalDist()
 
 Scores = np.ndarray
-FlyPoints = Callable[[int, np.ndarray], Scores]
-"""From a round's number and points (flights, keys), standard normals, to scores (flights,); events from 0."""
+FlyPoints = Callable[[np.ndarray], Scores]
+"""From a round's points (flights, keys), standard normals, to scores (flights,); events from 0."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +71,6 @@ class Chains:
         self.design: tuple[float, int, np.ndarray] | None = (
             None  # the likeliest event: distance, flight, point
         )
-        self._round = 0
 
     def go(self, fly: FlyPoints) -> None:
         """Fly until every run has reached the event, or cannot."""
@@ -124,8 +121,7 @@ class Chains:
 
     def _flown(self, fly: FlyPoints, points: np.ndarray) -> Scores:
         flat = points.reshape(-1, points.shape[-1])
-        scores = fly(self._round, flat)
-        self._round += 1
+        scores = fly(flat)
         for i in np.flatnonzero(scores >= 0.0).tolist():
             distance = float(np.linalg.norm(flat[i]))
             if self.design is None or distance < self.design[0]:
@@ -226,36 +222,40 @@ def run_rare(
     """
     check(sweep, expectation)
     name = f"{sweep.name}-rare-{expectation.replace('.', '-')}"
-    chains, failed = Chains(len(sweep.keys), sweep.file.seed), 0
+    chains = Chains(len(sweep.keys), sweep.file.seed)
 
-    def fly(number: int, points: np.ndarray, flies: FlyRound) -> Scores:
-        nonlocal failed
-        rows = flies(number, [(chains.flights + i, point.tolist()) for i, point in enumerate(points)])
-        failed += sum(row["failed"] for row in rows)
-        scores = np.array([row["score"] for row in rows])
-        if number == 0 and failed == len(rows):
-            raise SimulationFailed(f"{sweep.name}: no flight could be flown")
-        tell(f"{name}: {chains.flights + len(rows)} flights, level {chains.levels}")
-        return scores
+    def rounds(flies: FlyRound) -> Document:
+        failed = 0
+
+        def fly(points: np.ndarray) -> Scores:
+            nonlocal failed
+            rows = flies([(chains.flights + i, point.tolist()) for i, point in enumerate(points)])
+            failed += sum(row["failed"] for row in rows)
+            if not chains.flights and failed == len(rows):
+                raise SimulationFailed(f"{sweep.name}: no flight could be flown")
+            tell(f"{name}: {chains.flights + len(rows)} flights, level {chains.levels}")
+            return np.array([row["score"] for row in rows])
+
+        chains.go(fly)
+        return _document(sweep, expectation, chains, failed)
+
+    def likeliest(document: Document) -> str | None:
+        """The scenario of the likeliest event that was flown."""
+        if chains.design is None:
+            return None
+        _, run, point = chains.design
+        return to_yaml(scenario_at(sweep, run, point.tolist()))
 
     def lost(case: Case, why: str) -> Document:
         say_once(f"{name}: of a flight {why}; such flights count as no event")
         return {"score": -math.inf, "failed": True}
 
     study = Study(
-        name, (), partial(_fly, sweep, expectation), lambda rows: None, {},
+        name, (), partial(_fly, sweep, expectation), dict, {"rare.json": as_json, "flight.yaml": likeliest},
         follows_from=[identity_of(sweep, expectation), RUNS, MEMBERS], lost=lost,
-        warm_up=partial(warm_up, sweep),
+        warm_up=partial(warm_up, sweep), rounds=rounds,
     )  # fmt: skip
-    with in_rounds(study, out, workers) as flies:
-        chains.go(lambda number, points: fly(number, points, flies))
-        document = _document(sweep, expectation, chains, failed)
-        files = {"rare.json": as_json(document)}
-        if chains.design is not None:
-            _, run, point = chains.design
-            files["flight.yaml"] = to_yaml(scenario_at(sweep, run, point.tolist()))
-        with result_folder(out, name) as folder:
-            write_files(folder, files)
+    document: Document = run_study(study, out, workers)
     return document | {"folder": str(out / name)}
 
 

@@ -44,15 +44,6 @@ def test_the_first_right_answer_wins(yours, its, winner):
     assert game.phase == OVER
 
 
-def test_nothing_of_the_fault_is_shown_before_the_end():
-    game = Game().next_round("random", 0.0, [FAULT], np.random.default_rng(1))
-    while not game.is_due(game.due_s):
-        pass
-    game.broke(FAULT, game.due_s)
-    assert set(game.shown()) == {"phase", "mode", "answered", "score"}
-    assert game.shown()["phase"] == "waiting"
-
-
 def test_the_hidden_fault_comes_within_its_times_and_is_not_always_the_same():
     rounds = [
         Game().next_round(

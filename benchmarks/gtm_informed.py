@@ -29,7 +29,7 @@ from pathlib import Path
 from statistics import NormalDist
 
 import numpy as np
-from benchmarks.gtm_damage import M_S_PER_KT, Document, scenario
+from benchmarks.gtm_damage import M_S_PER_KT, Document, rows_in, scenario
 from benchmarks.unknown_instant import WITHIN_S, Whitener, fitted, largest_ratios, unexplained
 from tools.gtm.flights import CASES, NAMES
 from tools.gtm.specification import Controls, Specification, folder
@@ -196,10 +196,5 @@ def see_all(ours: dict[int, Document], seed: int, out: Path) -> dict[int, Docume
     """What the informed test makes of our flights: the rows in the file, and the others, added to it."""
     where = folder()
     assert where is not None
-    done = [json.loads(line) for line in out.read_text().splitlines()] if out.is_file() else []
-    of, spec = {one["k"]: one for one in done}, Specification(where)
-    with out.open("a", encoding="utf-8") as file:
-        for k in sorted(ours.keys() - of.keys()):
-            of[k] = seen(seed, k, spec, is_late(ours[k]))
-            print(json.dumps(of[k]), file=file, flush=True)
-    return {k: of[k] for k in ours}
+    spec = Specification(where)
+    return rows_in(out, ours, lambda k: seen(seed, k, spec, is_late(ours[k])))

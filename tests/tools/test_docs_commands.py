@@ -34,9 +34,9 @@ def test_what_cannot_be_used_says_why():
     assert {line: output.fault for line, output in found.items()} == FAULTS
 
 
-def picture(shade, size=40):
+def picture(shade):
     content = io.BytesIO()
-    Image.fromarray(np.full((size, size, 3), shade, np.uint8)).save(content, "PNG")
+    Image.fromarray(np.full((40, 40, 3), shade, np.uint8)).save(content, "PNG")
     return content.getvalue()
 
 

@@ -10,7 +10,7 @@ before, that is none of the lost ones. Rows already in the file are not flown ag
 """
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -94,11 +94,16 @@ def rows(of: list[Document]) -> Iterator[list[Any]]:
 
 
 def fly_all(flights: int, seed: int, calm: bool, out: Path) -> list[Document]:
-    """The rows of so many flights: those in the file, and the others, added to it."""
-    done = [json.loads(line) for line in out.read_text().splitlines()] if out.is_file() else []
+    """The rows of so many flights."""
+    return list(rows_in(out, range(flights), lambda k: flown(seed, k, calm)).values())
+
+
+def rows_in(out: Path, wanted: Iterable[int], made: Callable[[int], Document]) -> dict[int, Document]:
+    """Row after row by its number `k`: those in the file, and the others, made and added to it."""
+    done = map(json.loads, out.read_text().splitlines()) if out.is_file() else ()
+    of = {each["k"]: each for each in done}
     with out.open("a", encoding="utf-8") as file:
-        for k in sorted(set(range(flights)) - {each["k"] for each in done}):
-            done.append(flown(seed, k, calm))
-            file.write(json.dumps(done[-1]) + "\n")
-            file.flush()
-    return sorted((each for each in done if each["k"] < flights), key=lambda each: each["k"])
+        for k in sorted(set(wanted) - of.keys()):
+            of[k] = made(k)
+            print(json.dumps(of[k]), file=file, flush=True)
+    return {k: of[k] for k in sorted(wanted)}

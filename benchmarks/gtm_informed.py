@@ -29,8 +29,8 @@ from pathlib import Path
 from statistics import NormalDist
 
 import numpy as np
-from benchmarks.gtm_damage import M_S_PER_KT, Document, scenario
-from benchmarks.unknown_instant import ORDER, WITHIN_S, Whitener, fitted, unexplained
+from benchmarks.gtm_damage import M_S_PER_KT, Document, rows_in, scenario
+from benchmarks.unknown_instant import WITHIN_S, Whitener, fitted, largest_ratios, unexplained
 from tools.gtm.flights import CASES, NAMES
 from tools.gtm.specification import Controls, Specification, folder
 
@@ -105,28 +105,6 @@ _STATE = (
 )  # fmt: skip
 
 
-def largest_ratio(recording: Recording, does: np.ndarray, white: Whitener) -> np.ndarray:
-    """The largest log likelihood ratio of these accelerations since some frame, at every frame (n,).
-
-    From ORDER frames after it began on a fault is whitened as if it had always been there.
-    """
-    z, begins = white.respond(unexplained(recording)), np.arange(len(does))
-    always = white.respond(does)
-    gone = np.cumsum(np.einsum("ki,ki->k", z, always) - 0.5 * np.square(always).sum(axis=1))
-    before, of = white.before.reshape(ORDER, 3, 3), np.vstack((does, np.zeros((ORDER, 3))))
-    seen_z, since, best = np.vstack((z, np.zeros((ORDER, 3)))), np.zeros(len(does)), np.zeros(len(does))
-    for late in range(ORDER):
-        rest = of[begins + late] - sum(
-            (of[begins + late - j] @ before[j - 1] for j in range(1, late + 1)), np.zeros((len(does), 3))
-        )
-        response = rest @ white.root
-        since = since + (response * (seen_z[begins + late] - 0.5 * response)).sum(axis=1)
-        best[late:] = np.maximum(best[late:], since[: len(does) - late])
-    settled = np.maximum.accumulate(since[:-ORDER] - gone[ORDER - 1 : -1])
-    best[ORDER:] = np.maximum(best[ORDER:], gone[ORDER:] + settled)
-    return np.concatenate(([0.0], np.maximum(best, 0.0)))
-
-
 def deflected(late_s: np.ndarray, does: np.ndarray, white: Whitener) -> float:
     """How far they stand out of the noise WITHIN_S after the damage; late_s (n,): frames after it."""
     response = white.respond(does * (late_s > 1e-9)[:, None])
@@ -171,7 +149,7 @@ def seen(seed: int, k: int, spec: Specification, late: bool) -> Document:
     case = CASES.index(damage["case"]) + 1
     recording, white = recorded(given), noise(seed, band_of(given))
     does = effect(spec, given, case)[: len(recording.seen) - 1]
-    of_it = trace(recording, largest_ratio(recording, does, white))
+    of_it = trace(recording, largest_ratios(recording, does, white)[1.0])
     return {
         "k": k, "before": of_it.before,
         "after": max((value for late, value in of_it.records if late <= WITHIN_S + 1e-9), default=0.0),
@@ -218,10 +196,5 @@ def see_all(ours: dict[int, Document], seed: int, out: Path) -> dict[int, Docume
     """What the informed test makes of our flights: the rows in the file, and the others, added to it."""
     where = folder()
     assert where is not None
-    done = [json.loads(line) for line in out.read_text().splitlines()] if out.is_file() else []
-    of, spec = {one["k"]: one for one in done}, Specification(where)
-    with out.open("a", encoding="utf-8") as file:
-        for k in sorted(ours.keys() - of.keys()):
-            of[k] = seen(seed, k, spec, is_late(ours[k]))
-            print(json.dumps(of[k]), file=file, flush=True)
-    return {k: of[k] for k in ours}
+    spec = Specification(where)
+    return rows_in(out, ours, lambda k: seen(seed, k, spec, is_late(ours[k])))

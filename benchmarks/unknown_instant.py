@@ -107,21 +107,28 @@ def signature(recording: Recording, surface: str) -> np.ndarray:
 
 def ratios(recording: Recording, surface: str, noise: Whitener) -> dict[float, np.ndarray]:
     """Of each magnitude the largest log likelihood ratio, at every frame (n,)."""
-    g = noise.respond(unexplained(recording))
     moment = signature(recording, surface)
-    n = len(moment)
-    k, since = np.arange(n), np.arange(0, n, EVERY)
-    response = noise.responses(moment)
+    return largest_ratios(recording, moment, noise, MAGNITUDES, EVERY, FURTHEST)
+
+
+def largest_ratios(
+    recording: Recording, does: np.ndarray, noise: Whitener, sizes: tuple[float, ...] = (1.0,),
+    every: int = 1, furthest: int = FURTHEST,
+) -> dict[float, np.ndarray]:  # fmt: skip
+    """The same of accelerations (n, 3) rad/s2 times each size, since instants so many frames apart."""
+    g, n = noise.respond(unexplained(recording)), len(does)
+    k, since = np.arange(n), np.arange(0, n, every)
+    response = noise.responses(does)
     age = k[:, None] - since
     began = np.clip(age, 0, ORDER), k[:, None]
-    late = (age >= 0) & (age < FURTHEST)
+    late = (age >= 0) & (age < furthest)
     N, D = (
         np.cumsum(np.where(age >= 0, seen.sum(axis=2)[began], 0.0), axis=0)
         for seen in (response * g, np.square(response))
     )
     return {
-        m: np.concatenate(([0.0], np.where(late, m * N - 0.5 * m * m * D, 0.0).max(axis=1)))
-        for m in MAGNITUDES
+        m: np.concatenate(([0.0], np.where(late, m * N - 0.5 * m * m * D, 0.0).max(axis=1, initial=0.0)))
+        for m in sizes
     }
 
 

@@ -67,13 +67,3 @@ def bits(value):
     """Of every number in an array, also of records: not of the gaps between them, which a copy leaves."""
     names = value.dtype.names
     return value.tobytes() if names is None else b"".join(bits(value[name]) for name in names)
-
-
-def not_zero(record: np.void, path: str = "") -> Iterator[tuple[str, np.ndarray]]:
-    """Path and value of each number of a record that is not zero."""
-    for name in record.dtype.names:
-        value = record[name]
-        if isinstance(value, np.void):
-            yield from not_zero(value, f"{path}{name}.")
-        elif value.dtype.names is None and np.any(value):
-            yield path + name, np.asarray(value)

@@ -116,13 +116,6 @@ def test_what_cannot_be_made():
             plugins.made(LAWS, name)
 
 
-def test_a_broken_one_says_so_where_it_is_listed():
-    entry = Registered(LAWS, "gone", "nowhere:Gone", "a-package")
-    assert entry.description() == "broken: plug-in gone: not registered" + plugins.suggestion(
-        "gone", registered(LAWS)
-    )
-
-
 @pytest.mark.parametrize(
     ("group", "name", "says"),
     [
@@ -152,36 +145,6 @@ def test_what_is_compiled_in():
         },
     }  # fmt: skip
     assert not plugins.is_compiled(DETECTORS, "oracle")
-
-
-class Point:
-    """An entry point of an installed package."""
-
-    def __init__(self, name, value, dist):
-        self.name, self.value, self.dist = name, value, dist
-
-
-class Dist:
-    name = "a-package"
-
-
-def test_what_packages_register_comes_after_ours_and_never_in_their_place(monkeypatch, tmp_path):
-    monkeypatch.syspath_prepend(tmp_path)
-    points = [
-        Point("zeta", "own_plugins:MyLaw", Dist),
-        Point("alpha", "own_plugins:Odd", None),
-        Point("lqr", "x:Y", Dist),
-    ]
-    monkeypatch.setattr("importlib.metadata.entry_points", lambda group: points if group == LAWS else [])
-    known = registered(LAWS)
-    assert list(known)[-2:] == ["alpha", "zeta"]
-    assert (known["zeta"].package, known["alpha"].package, known["lqr"].package) == (
-        "a-package",
-        "",
-        "beaver-ftc",
-    )
-    assert known["zeta"].description() == "Commands nothing."
-    assert not plugins.is_compiled(LAWS, "zeta")
 
 
 # As plugins.yaml has them: with options and limits of tuning, without, and with a class.
@@ -246,15 +209,3 @@ def test_between_which_limits_a_parameter_is_tuned(rows, monkeypatch):
     with pytest.raises(BadInput) as refused:
         plugins.tunable(LAWS, entry.name)
     assert str(refused.value) == "plug-in my-law: tunable is a list, allowed: option: (low, high)"
-
-
-@pytest.mark.parametrize(
-    "limits",
-    [(0.0, 1.0), (2.0, 2.0), (3.0, 2.0), (1.0, float("inf")), (0.1, 1.0, "odds"), (0.1, 0.9, "linear"),
-     (0.1,), (0.1, 0.5, "log", 1), "ab", None, (0.1, None)],
-)  # fmt: skip
-def test_limits_of_tuning_that_are_none(limits):
-    with pytest.raises(BadInput) as refused:
-        plugins._range("mine", "gain", limits)
-    says = 'allowed: (low, high) with 0 < low < high, or (low, high, "odds") below 1'
-    assert str(refused.value) == f"mine: tunable gain: {limits!r:.60}; {says}"

@@ -1,10 +1,10 @@
 """What must stay equal to the bit through a rebuild: fingerprints of logs, metrics, studies and words.
 
-    python -m tools.oracles write FILE [--what flights,drawn,studies,words] [--every N] [--workers W]
+    python -m tools.oracles write FILE [--what flights,studies,words] [--every N] [--workers W]
     python -m tools.oracles compare FILE FILE
 
-`flights`: every built-in scenario x law x scheme, at three frame rates. `drawn`: a covering array of all that
-a scenario may say. `studies`: each study's documents on a small grid. `words`: help, schema, lists, verdicts.
+`flights`: every built-in scenario x law x scheme, at three frame rates. `studies`: each study's documents on
+a small grid. `words`: help, schema, lists, verdicts.
 --every N: each N-th of the flights alone. Fingerprints differ between machines: write both files on one.
 """
 
@@ -33,7 +33,6 @@ SCHEMES = ("adaptive-estimators", "none", "rls-monitor", "augmented-ekf", "augme
            "observer-constant")  # fmt: skip
 RATES_HZ = (50.0, 100.0, 200.0)
 AT_MOST_S = 65.0  # of a mission
-DRAWN_SEED, N_DRAWN = 424_242, 110
 VARYING = re.compile(
     r'"?\b(wall_s|elapsed_s|seconds|took_s|wall_time_s|created|date|version|cpu_s|commit|real_time_factor'
     r'|times_real_time|flight code|code|us)"?\s*[:=]\s*[^,}\n]*'
@@ -111,16 +110,6 @@ def _flight(case: tuple[str, str, str, float]) -> tuple[str, dict[str, str]]:
     return "flights/" + " ".join(map(str, case)), flown(changed(*case))
 
 
-def _drawn(index: int) -> tuple[str, dict[str, str]]:
-    from itertools import islice
-
-    from tools.drawn.campaign import AIRCRAFT
-    from tools.drawn.compose import drawn_flights
-
-    drawn = next(islice(drawn_flights(DRAWN_SEED, AIRCRAFT), index, None))
-    return f"drawn/{index}", flown(drawn.words)
-
-
 def _study(name: str, arguments: tuple[str, ...]) -> tuple[str, dict[str, str]]:
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
@@ -163,8 +152,6 @@ def jobs(what: set[str], every: int) -> Iterator[Any]:
         helps = [(name, "--help") for name in commands()]
         verdicts = [("run", name, "--no-report") for name in bf.scenarios()]
         yield from (partial(_study, "words/" + " ".join(a), a) for a in (*WORDS, *helps, *verdicts))
-    if "drawn" in what:
-        yield from (partial(_drawn, index) for index in range(N_DRAWN))
     if "flights" in what:
         cases = list(product(bf.scenarios(), LAWS, SCHEMES, RATES_HZ))
         yield from (partial(_flight, case) for case in cases[::every])
@@ -203,7 +190,7 @@ def main() -> None:
     )
     parser.add_argument("do", choices=("write", "compare"))
     parser.add_argument("files", type=Path, nargs="+")
-    parser.add_argument("--what", default="flights,drawn,studies,words")
+    parser.add_argument("--what", default="flights,studies,words")
     parser.add_argument("--every", type=int, default=1)
     parser.add_argument("--workers", type=int, default=2)
     args = parser.parse_args()

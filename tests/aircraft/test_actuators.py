@@ -1,6 +1,6 @@
 """Actuators and their failures, surface by surface, against closed forms."""
 
-from math import exp, sin
+from math import exp
 
 import numpy as np
 import pytest
@@ -112,43 +112,6 @@ def test_lag_within_the_rate_limit(surface):
     assert steps[-1] / steps[-2] == pytest.approx(exp(-20 * DT), rel=1e-6)
 
 
-def test_effectiveness_scales_what_the_aerodynamics_see(surface):
-    surface.command(0.08)
-    surface.fail(effectiveness=0.6)
-    assert surface.run() == [0.08]
-    assert surface.effective == 0.6 * 0.08
-
-
-def test_a_jam_holds_whatever_is_commanded(surface):
-    surface.fail(stuck=1, stuck__at__rad=0.03)
-    for command in (0.2, -0.09, 0.0):
-        surface.command(command, norm=0.1)
-        assert surface.run() == [0.03]
-    surface.fail(bias__rad=0.02, oscillation__amplitude__rad=0.02, oscillation__frequency__rad_sec=9.0)
-    assert (surface.run(20) == 0.03).all()
-
-
-def test_a_floating_surface_gives_no_moment(surface):
-    surface.command(0.08)
-    surface.fail(float=1, bias__rad=0.02)
-    assert surface.run() == [0.0]
-    assert surface.effective == 0.0
-
-
-@pytest.mark.parametrize("direction", [-1, 1])
-@pytest.mark.parametrize(("rate_limit", "rate"), [(0.0, RUNAWAY_RATE), (0.4, 0.4)])
-def test_a_runaway_goes_to_its_stop_at_the_rate_limit_whatever_is_commanded(
-    surface, travel, direction, rate_limit, rate
-):
-    stop = travel.max_rad if direction > 0 else travel.min_rad
-    surface.actuator(bandwidth=20.0 if rate_limit else 0.0, rate_limit=rate_limit)
-    surface.fail(hardover=direction)
-    for frame in range(1, 280):
-        surface.command(0.09 * (-1) ** frame, norm=0.2 * (-1) ** (frame // 3))
-        wanted = direction * min(rate * DT * frame, abs(stop))
-        assert surface.run() == pytest.approx([wanted], abs=1e-13)
-
-
 @pytest.mark.parametrize("failure", [{"stuck": 1, "stuck__at__rad": -0.09}, {"hardover": 1}, {"float": 1}])
 @pytest.mark.parametrize(("bandwidth", "rate_limit"), [(20.0, 0.0), (0.0, 0.3), (15.0, 0.5)])
 def test_a_repaired_surface_returns_by_its_own_dynamics(surface, failure, bandwidth, rate_limit):
@@ -162,23 +125,6 @@ def test_a_repaired_surface_returns_by_its_own_dynamics(surface, failure, bandwi
         step = (0.02 - x) * (1 - exp(-bandwidth * DT) if bandwidth else 1)
         x += np.clip(step, -rate_limit * DT, rate_limit * DT) if rate_limit else step
         assert position == pytest.approx(x, abs=1e-13)
-
-
-def test_bias_is_added_after_the_actuator(surface, travel):
-    surface.command(0.03)
-    surface.fail(bias__rad=-0.05)
-    assert surface.run() == pytest.approx([-0.02], abs=1e-16)
-    surface.fail(bias__rad=3.0)
-    assert surface.run() == [travel.max_rad]
-
-
-def test_oscillation_is_added_after_the_actuator(surface):
-    surface.command(0.01)
-    surface.fail(oscillation__amplitude__rad=0.02, oscillation__frequency__rad_sec=7.0)
-    for _ in range(50):
-        position = surface.run()[0]
-        t = surface.plant.read("simulation/sim-time-sec")
-        assert position == pytest.approx(0.01 + 0.02 * sin(7.0 * t), abs=1e-15)
 
 
 def test_rate_scale_slows_the_actuator(surface):

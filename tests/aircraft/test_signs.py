@@ -6,9 +6,6 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from beaver_ftc.design.fdc import MASS, TERMS
-from beaver_ftc.design.model import inertia_coefficients
-
 
 class Accelerations(NamedTuple):
     """Body accelerations: linear in ft/s2, angular in rad/s2."""
@@ -87,37 +84,3 @@ def test_rates_are_damped(beaver, trim_point, axis):
     for rate in (0.2, -0.2):
         result = restarted(beaver, trim_point, **{f"{axis}_rad_s": rate})
         assert getattr(result, axis) * rate < 0
-
-
-@pytest.mark.parametrize(
-    ("surface", "only", "driven", "coupled", "ratio"),
-    [
-        ("aileron", "Cn_da", "p", "r", MASS.Jxz_kg_m2 / MASS.Iz_kg_m2),
-        ("rudder", "Cl_dr", "r", "p", MASS.Jxz_kg_m2 / MASS.Ix_kg_m2),
-    ],
-)
-def test_a_pure_moment_couples_through_Jxz(beaver, surface, only, driven, coupled, ratio):
-    """A pure rolling moment also yaws, Iz rdot = Jxz pdot; a pure yawing one rolls, Ix pdot = Jxz rdot."""
-    change(beaver, **{f"uncertainty/{only}-scale": 0.0})
-    changed = deflect(beaver, surface, 0.1)
-    assert abs(getattr(changed, driven)) > 0.1
-    assert getattr(changed, coupled) / getattr(changed, driven) == pytest.approx(ratio, rel=1e-6)
-
-
-def test_without_moments_the_rates_couple_as_a_rigid_body(beaver, trim_point):
-    """Euler's equations with Jxz at random rates: inertial rates and accelerations, no aerodynamic moment."""
-    for name, term in TERMS.items():
-        if term.coefficient in ("Cl", "Cm", "Cn"):
-            beaver.write(f"uncertainty/{name}-scale", 0.0)
-    j = inertia_coefficients(MASS)
-    rng = np.random.default_rng(3)
-    for rates in rng.uniform(-1, 1, (20, 3)):
-        restarted(beaver, trim_point, **dict(zip(("p_rad_s", "q_rad_s", "r_rad_s"), rates, strict=True)))
-        p, q, r = (beaver.read(f"velocities/{axis}i-rad_sec") for axis in "pqr")
-        wanted = [
-            j.Ppq * p * q + j.Pqr * q * r,
-            j.Qpp * p**2 + j.Qpr * p * r + j.Qrr * r**2,
-            j.Rpq * p * q + j.Rqr * q * r,
-        ]
-        found = [beaver.read(f"accelerations/{axis}idot-rad_sec2") for axis in "pqr"]
-        assert found == pytest.approx(wanted, abs=1e-10)

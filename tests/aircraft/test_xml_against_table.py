@@ -6,14 +6,11 @@ from tools.actuators import files
 from beaver_ftc.aircraft import load
 from beaver_ftc.design.fdc import (
     COEFFICIENTS,
-    GEOMETRY,
-    MASS,
     SURFACES,
     TERMS,
     TRAVEL,
     coefficient_terms,
 )
-from beaver_ftc.design.model import inertia_coefficients
 from beaver_ftc.plant.model_file import with_systems
 
 PROPERTY_OF = {
@@ -29,10 +26,7 @@ PROPERTY_OF = {
     "flap": "fcs/flap-effective-rad",
     "dpt": "aero/dpt",
 }
-# 1 slug is 32.17404855... lbm; the international pound and foot are exact.
-KG_PER_SLUG = 0.45359237 * 9.80665 / 0.3048
 OPERATIONS = ("product", "sum", "max", "ifthen")
-SLUG_FT2_PER_KG_M2 = 1 / (KG_PER_SLUG * 0.3048**2)
 
 
 @pytest.fixture(scope="module")
@@ -87,40 +81,6 @@ def test_coefficient_is_the_sum_of_its_terms(functions, coefficient):
 def test_there_is_no_scalable_term_the_table_lacks(xml):
     scales = {name for name in declared(xml) if name.endswith("-scale") and name.startswith("uncertainty/")}
     assert scales == {f"uncertainty/{name}-scale" for name in TERMS}
-
-
-def test_each_axis_stands_once(xml):
-    assert [axis.get("name") for axis in xml.iter("axis")] == ["X", "Y", "Z", "ROLL", "PITCH", "YAW"]
-
-
-def test_geometry_and_mass(xml):
-    metrics, mass = xml.find("metrics"), xml.find("mass_balance")
-    unit = {"wingarea": ("FT2", 0.3048**2), "wingspan": ("FT", 0.3048), "chord": ("FT", 0.3048)}
-    wanted = {"wingarea": GEOMETRY.wing_area_m2, "wingspan": GEOMETRY.span_m, "chord": GEOMETRY.chord_m}
-    for name, (feet, in_si) in unit.items():
-        assert metrics.find(name).get("unit") == feet
-        assert float(metrics.find(name).text) * in_si == pytest.approx(wanted[name], rel=1e-15)
-    assert float(mass.find("emptywt").text) == MASS.mass_kg
-
-
-@pytest.mark.parametrize("axes", ["xx", "yy", "zz", "xz"])
-def test_inertia(xml, axes):
-    table = {"xx": MASS.Ix_kg_m2, "yy": MASS.Iy_kg_m2, "zz": MASS.Iz_kg_m2, "xz": MASS.Jxz_kg_m2}
-    element = xml.find("mass_balance").find(f"i{axes}")
-    assert element.get("unit") == "SLUG*FT2"
-    assert float(element.text) / SLUG_FT2_PER_KG_M2 == pytest.approx(table[axes], rel=1e-15)
-
-
-def test_reference_lengths_in_the_rates_are_the_table_s(functions):
-    assert numbers(functions["aero/q-hat"]) == [GEOMETRY.chord_m]
-    for name in ("aero/p-hat", "aero/r-hat", "aero/betadot-hat"):
-        assert numbers(functions[name]) == [GEOMETRY.span_m / 2]
-
-
-@pytest.mark.parametrize(("axis", "name"), [("p", "Pqr"), ("q", "Qpr"), ("r", "Rpq")])
-def test_inertia_coupling_error_has_the_table_s_coefficient(functions, axis, name):
-    written = numbers(functions[f"uncertainty/{axis}dot-rad_sec2"].find("ifthen/sum"))
-    assert written == pytest.approx([getattr(inertia_coefficients(MASS), name)], abs=1e-12)
 
 
 def test_envelope_is_the_table_s(functions):

@@ -17,10 +17,10 @@ MASS_KG, DENSITY = 2288.231, 1.0238  # the latter at 1828.8 m
 STRAIGHT = {"altitude_m": [{"hold": True}], "airspeed_mps": [{"hold": True}], "heading_deg": [{"hold": True}]}
 
 
-def jammed(position_deg, duration_s=100.0, **keys):
+def jammed(position_deg):
     fault = {"actuator": "elevator", "type": "stuck", "position_deg": position_deg, "at_s": 20.0}
-    given = {"name": "jam", "duration_s": duration_s, "autopilot": STRAIGHT, "faults": [fault],
-             "actuators": "servo", "fdi": {"fault_class": "all"}, **keys}  # fmt: skip
+    given = {"name": "jam", "duration_s": 100.0, "autopilot": STRAIGHT, "faults": [fault],
+             "actuators": "servo", "fdi": {"fault_class": "all"}}  # fmt: skip
     memory = Memory()
     return fly(Scenario.model_validate(given), memory), memory
 

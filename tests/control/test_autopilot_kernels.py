@@ -60,9 +60,9 @@ def full_power(pilot, control, y):
     return loops.highest_power(pilot, control["power"], left[RUDDER], at_stop[RUDDER], y)
 
 
-def new_y(alpha=0.1, beta=0.03, airspeed=46.0, dpt=0.4):
+def new_y(dpt=0.4):
     y = np.zeros(8)
-    y[[ALPHA, BETA, AIRSPEED, QDYN, DPT]] = alpha, beta, airspeed, 0.55 * airspeed**2, dpt
+    y[[ALPHA, BETA, AIRSPEED, QDYN, DPT]] = 0.1, 0.03, 46.0, 0.55 * 46.0**2, dpt
     return y
 
 
@@ -102,33 +102,21 @@ def test_without_an_airspeed_the_engine_stays_and_descents_are_free():
     assert high == pytest.approx(min(0.01 + 0.02 * (V - 35.0), 0.15))
 
 
-def throttled(path=0.03, y=None, power=(), rudder=1.0, **fields):
-    pilot, control = (
-        new_autopilot(SPEED, **{"recent_airspeed_mps": 43.0, "missing_acceleration": 0.05, **fields}),
-        new_control(),
-    )
-    pilot["airspeed_to_fly"], pilot["airspeed_to_fly_rate"], pilot["dpt_cubed_held_by_sideslip"] = (
-        45.0,
-        0.04,
-        0.2,
-    )
-    control["surfaces"]["output"]["effectiveness"][RUDDER] = rudder
-    control["power"]["output"]["command"][0] = 21.0
-    for name, value in dict(power).items():
-        law_records.fields(control["power"])[name] = value
-    pilot["full_power"] = full_power(pilot, control, new_y(dpt=0.2) if y is None else y)
-    power, engine = law_records.fields(control["power"]), control["power"]
-    power["step"] = 0.5
-    loops.set_power(pilot, engine, new_y(dpt=0.2) if y is None else y, path, PUSH)
-    follow_autopilot(engine, pilot["power_setting"], pilot["power_airspeed"])
-    return pilot, power
-
-
 @pytest.mark.parametrize("rudder", [1.0, 0.5, 0.02])
 def test_power_leaves_the_rudder_enough(rudder):
     """The propeller yaws with dpt^3; the rudder holds what is left of it, sideslip what that lacks."""
-    y = new_y(dpt=0.85)
-    _, power = throttled(path=0.5, y=y, rudder=rudder)
+    y, control = new_y(dpt=0.85), new_control()
+    pilot = new_autopilot(
+        SPEED, recent_airspeed_mps=43.0, missing_acceleration=0.05, airspeed_to_fly=45.0,
+        airspeed_to_fly_rate=0.04, dpt_cubed_held_by_sideslip=0.2,
+    )  # fmt: skip
+    control["surfaces"]["output"]["effectiveness"][RUDDER] = rudder
+    control["power"]["output"]["command"][0] = 21.0
+    pilot["full_power"] = full_power(pilot, control, y)
+    power, engine = law_records.fields(control["power"]), control["power"]
+    power["step"] = 0.5
+    loops.set_power(pilot, engine, y, 0.5, PUSH)
+    follow_autopilot(engine, pilot["power_setting"], pilot["power_airspeed"])
     dpt = y[DPT] + (power["base"] - 21.0) * 40.0 / (2.0 * y[QDYN] * y[AIRSPEED])
     yawing = (dpt / 0.9) ** 3
     held = rudder + (1.0 - rudder) * 0.2 / 0.9**3

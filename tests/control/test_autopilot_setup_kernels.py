@@ -22,21 +22,17 @@ LEGS = {
 DESIGN = {"mass": 1.1, "coefficients": {"Cm_alpha": 1.2}}
 
 
-def set_up(stand_in=3, autopilot=LEGS, **keys):
+@pytest.fixture(scope="module")
+def filled():
     """(autopilot, control) as filled for a scenario."""
-    given = {"name": "profile", "duration_s": 60, "autopilot": autopilot, "design_model": DESIGN, **keys}
+    given = {"name": "profile", "duration_s": 60, "autopilot": LEGS, "design_model": DESIGN}
     pilot, control = np.zeros(1, AUTOPILOT)[0], np.zeros(1, control_dtype(4))[0]
-    control["layout"]["main"], control["layout"]["stand_in"] = (0, 1, 2), stand_in
+    control["layout"]["main"], control["layout"]["stand_in"] = (0, 1, 2), 3
     control["layout"]["low"], control["layout"]["high"] = (-0.5, -0.4, -0.3, -0.1), (0.5, 0.4, 0.3, 1.0)
     control["power"]["config"]["trim"], control["power"]["config"]["low"] = 20.0, 12.0
     control["power"]["config"]["high"], control["power"]["config"]["step"] = 28.0, 0.5
     profile.set_up_autopilot(pilot, control, Declared.of(Scenario.model_validate(given)))
     return pilot, control
-
-
-@pytest.fixture(scope="module")
-def filled():
-    return set_up()
 
 
 def level(qdyn_pa, flap_rad):

@@ -17,7 +17,6 @@ from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.diagnosis.types import GIVE_UP, SCALE_COMMAND, SUBTRACT_OFFSET, WAIT_FOR_SURFACE
 from beaver_ftc.loop import frame as whole
 from beaver_ftc.loop.assembly import frame_dtype
-from beaver_ftc.loop.frame import true_faults_dtype
 from law_records import put
 
 ELEVATOR, RUDDER, FLAP = 1, 2, 3
@@ -33,20 +32,12 @@ def new_control(**fields):
     return put(control, **({"effectiveness": 1.0, "least_effectiveness": 0.1} | fields))
 
 
-def new_frame(faults=None, **fields):
-    """A frame whose law has these fields; of the diagnosis and the truth, nothing but whole surfaces."""
+def new_frame(stand_in):
+    """A frame of a law with this stand-in; of the diagnosis and the truth, nothing but whole surfaces."""
     frame = record(frame_dtype(4))
-    frame["control"], frame["faults"] = new_control(**fields), new_faults(**(faults or {}))
+    frame["control"], frame["faults"]["effectiveness"] = new_control(stand_in=stand_in), 1.0
     frame["fdi"]["types"]["surface"]["accommodation"]["mode"] = -1
     return frame
-
-
-def new_faults(**fields):
-    faults = record(true_faults_dtype(4))
-    faults["effectiveness"] = 1.0
-    for name, value in fields.items():
-        faults[name] = value
-    return faults
 
 
 @pytest.mark.parametrize(
@@ -66,7 +57,7 @@ def new_faults(**fields):
 def test_the_mode_that_the_diagnosis_asks_for(
     diagnoses_all_types, isolated, lead, accommodation_mode, stand_in, mode
 ):
-    frame = new_frame(stand_in=stand_in)
+    frame = new_frame(stand_in)
     fdi = frame["fdi"]
     fdi["config"]["diagnoses_all_types"], fdi["isolation"]["estimator"]["surface"][4:8] = (
         diagnoses_all_types,
@@ -96,17 +87,17 @@ def asked_for(frame):
     return accommodation.mode_from(config, layout, frame["fdi"]["verdict"], frame["assessment"])
 
 
-def lost_rudder(theta, believed=1.0, frames=400, noise=0.0):
+def lost_rudder(theta, believed):
     """What is learnt of a rudder with this loss: its moment, and what the observer misses of it."""
-    control, rng = new_control(), np.random.default_rng(2)
+    control = new_control()
     law, observer = control["rejecting"], record(OBSERVER_ERROR)
     config, memory = law["config"], law["memory"]
     memory["L_rate"], memory["L_disturbance"], config["fading"] = 0.3, 2.0, rejecting.derive_fading(DT)
-    for k in range(frames):
+    for k in range(400):
         given = np.zeros((3, 4))
         given[2, RUDDER] = 0.5 * np.sin(0.2 * k)
         unexplained = (theta - (believed - 1.0)) * given[2, RUDDER]
-        missed = observer_response(observer, 2, unexplained, 0.3, 2.0, DT) + noise * rng.normal()
+        missed = observer_response(observer, 2, unexplained, 0.3, 2.0, DT)
         rejecting.accumulate(config, memory, 2, believed, given[2, RUDDER], missed)
     return memory["sums"]
 

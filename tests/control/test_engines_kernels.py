@@ -19,9 +19,9 @@ SECTION = {"airspeed_mps": [20.0, 30.0, 60.0], "setting": [0.0, 0.25, 1.0], "lag
            "force_n": [[-100.0, 500.0, 2000.0], [-200.0, 400.0, 1500.0], [-500.0] * 2 + [600.0]]}  # fmt: skip
 
 
-def engine_of(section=SECTION, airspeed_mps=30.0):
+def engine_of(airspeed_mps=30.0):
     engine = np.zeros(1, ENGINE).view(np.recarray)[0]
-    set_up_engine(engine, ThrustSection.model_validate(section), MASS_KG)
+    set_up_engine(engine, ThrustSection.model_validate(SECTION), MASS_KG)
     look_up(engine, airspeed_mps)
     return engine
 

@@ -15,11 +15,11 @@ DT = 0.01
 G_TYPICAL = np.array([[-9.0, 0.0, 0.6, 0.0], [0.0, -10.0, 0.0, 2.1], [-0.2, 0.0, -2.0, 0.0]])
 
 
-def control_record(Kp=2.0, Ki=1.0):
+def control_record():
     control = new_control(
         main=(0, 1, 2), stand_in=3, dt=DT, effectiveness=1.0, least_effectiveness=0.1, hand_over_step=DT
     )
-    control["published"]["config"]["Kp"], control["published"]["config"]["Ki"] = Kp, Ki
+    control["published"]["config"]["Kp"], control["published"]["config"]["Ki"] = 2.0, 1.0
     layout = control["layout"]
     layout["low"], layout["high"] = [-0.52, -0.49, -0.44, -0.1], [0.52, 0.49, 0.44, 1.03]
     return control

@@ -78,13 +78,13 @@ def published(demand, left, share, probe=0.0):
     return allocated["command"].copy()
 
 
-def generally(demand, left, share, probe=0.0, at=None, step=np.inf):
+def generally(demand, left, share, at=None, step=np.inf):
     control, prediction = beaver_law(left)
     control["axes"]["demand"], prediction["actuators"]["step"] = demand, step
     prediction["u"] = TRIM if at is None else at
     effectiveness = control["surfaces"]["output"]["effectiveness"]
     parts = control["axes"], control["allocation"], control["layout"], effectiveness
-    allocation.allocate_generally(*parts, prediction, share, probe)
+    allocation.allocate_generally(*parts, prediction, share, 0.0)
     return control["allocation"]["output"]
 
 

@@ -159,10 +159,3 @@ def test_the_unanticipated_moment_grows_with_the_cube_of_alpha():
     y = np.array([0.2, 0.1, 45.0, 1000.0, 0.5])
     expected = 10.0 * 0.2**3 * 1000.0 * 23.23 * 1.5875 / 6928.93
     assert model.unanticipated_pitch(design_record()[0], y, 10.0) == pytest.approx(expected, rel=1e-12)
-
-
-def test_acceleration_is_f_plus_G_u():
-    rng = np.random.default_rng(1)
-    f, G, u, found = rng.normal(size=3), rng.normal(size=(3, 4)), rng.normal(size=4), np.zeros(3)
-    model.acceleration(f, G, u, found)
-    assert found == pytest.approx(f + G @ u, rel=1e-12)

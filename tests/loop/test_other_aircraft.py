@@ -8,9 +8,8 @@ import pytest
 
 import beaver_ftc as bf
 from beaver_ftc.aircraft import load
-from beaver_ftc.design.model import DesignFunctions, design_record
 from beaver_ftc.loop.loop import fly
-from beaver_ftc.plant.adapter import FlightState, Plant
+from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.trim import trim
 from beaver_ftc.plugins import DETECTORS, LAWS, registered
 from beaver_ftc.scenario.schema import load_scenario, load_text
@@ -45,29 +44,6 @@ def test_it_has_its_own_surfaces_groups_and_leaders(trainer):
     assert trainer.dominant_axis == (0, 1, 2)
     assert trainer.primary == trainer.surfaces
     assert trainer.signal_names == ("alpha", "beta", "ph", "qh", "rh")
-
-
-def test_the_design_model_gives_what_jsbsim_does(trainer):
-    """At random states: f + G u is the truth's angular acceleration but for the turning Earth."""
-    model = DesignFunctions(design_record(trainer))
-    plant, rng = Plant(100, aircraft=trainer), np.random.default_rng(1)
-    worst = 0.0
-    for _ in range(30):
-        names = ("alpha_rad", "beta_rad", "p_rad_s", "q_rad_s", "r_rad_s")
-        values = rng.uniform((-0.05, -0.2, -0.4, -0.4, -0.4), (0.2, 0.2, 0.4, 0.4, 0.4))
-        u = rng.uniform(-0.3, 0.3, 3)
-        plant.start(FlightState(
-            rng.uniform(35, 65), rng.uniform(0, 4000), aircraft=trainer,
-            **dict(zip(names, values, strict=True)),
-            **{f"{s}_rad": d for s, d in zip(trainer.surfaces, u, strict=True)},
-        ))  # fmt: skip
-        x = np.array([plant.read(f"velocities/{axis}-rad_sec") for axis in "pqr"])
-        qdyn = plant.read("aero/qbar-psf") * 47.88025898033584
-        V = plant.read("velocities/vt-fps") * 0.3048
-        y = np.array([plant.read("aero/alpha-rad"), plant.read("aero/beta-rad"), V, qdyn])
-        truth = [plant.read(f"accelerations/{axis}dot-rad_sec2") for axis in "pqr"]
-        worst = max(worst, np.abs(model.f(x, y) + model.G(y) @ u - truth).max())
-    assert worst < 3e-4
 
 
 def test_it_is_trimmed_by_its_own_surfaces_and_engine(trainer):

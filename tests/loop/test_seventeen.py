@@ -1,6 +1,5 @@
 """An aircraft of 17 surfaces flies, is diagnosed and is shown, as one of four."""
 
-import numpy as np
 import pytest
 import yaml
 from tests import seventeen
@@ -31,19 +30,6 @@ def scenario(folder, **given):
     }
     file.write_text(yaml.safe_dump(document), encoding="utf-8")
     return bf.load(file)
-
-
-def test_all_parts_moved_as_the_whole_are_the_whole(folder):
-    """At any state: the same accelerations as the Beaver's, to rounding."""
-    rng, whole = np.random.default_rng(1), load()
-    aircraft = load(f"./{seventeen.NAME}", folder)
-    parts = seventeen.parts()
-    for name in ("CX", "CY", "CZ", "Cl", "Cm", "Cn"):
-        of = {signal: rng.uniform(-0.2, 0.2) for signal in (*whole.signal_names, "betadoth")}
-        of |= {surface: rng.uniform(-0.3, 0.3) for surface in whole.surfaces}
-        ways = {part.name: of[s] * np.sign(part.share) for s, of_it in parts.items() for part in of_it}
-        alike = of | ways
-        assert aircraft.coefficient(name, alike) == pytest.approx(whole.coefficient(name, of), abs=1e-9)
 
 
 def test_a_healthy_flight_raises_no_alarm_and_ends_in_no_departure(folder):

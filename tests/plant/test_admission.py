@@ -6,12 +6,10 @@ from pathlib import Path
 import pytest
 
 from beaver_ftc.aircraft.aircraft import read
-from beaver_ftc.aircraft.schema import AircraftFile
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.validation import ScenarioError
 from beaver_ftc.plant import admission
 from beaver_ftc.scenario import airframe
-from trainer import trainer_file
 
 TRAINER = Path(__file__).parents[1] / "data" / "aircraft" / "trainer"
 
@@ -43,38 +41,6 @@ def test_a_property_that_the_model_lacks_is_said_at_its_line(trainer, old, new, 
     line = 1 + next(i for i, text in enumerate(file.read_text().splitlines()) if "no-such" in text)
     with pytest.raises(ScenarioError, match=f"aircraft.yaml:{line}: .*'fcs/no-such-rad' is no property of"):
         airframe.find_aircraft("./trainer", trainer.parent)
-
-
-def test_every_property_that_the_file_names_is_looked_for():
-    """By its key, also what only a fault or a flight from the ground would write."""
-    surfaces = {
-        name: {key: f"of/{name}-{key}" for key in ("command", "position", "effective")}
-        | {"travel_rad": [-1, 1]}
-        for name in ("aileron", "elevator", "rudder")
-    }
-    push = {"property": "of/lever", "default": 1, "range": [0, 3]}
-    thrust = {"airspeed_mps": [40, 60], "setting": [1, 2], "force_n": [[0, 1], [0, 1]]}
-    data = trainer_file(
-        surfaces=surfaces, trim={"throttle": "of/lever"}, signals={"mach": {"property": "of/mach"}},
-        ground={"present": "of/ground", "height_m": 1, "pitch_deg": 2},
-        engine={"settings": {"push": push}, "limits": {"heat": {"property": "of/heat", "range": [0, 9]}},
-                "thrust": thrust},
-        effectors={"left": {"throttle": "of/left", "share": 0.5, "right_m": 1}},
-        damage={"off": {"property": "of/off"}, "dented": {"property": "of/dented"}},
-    )  # fmt: skip
-    found = dict(admission._properties(AircraftFile.model_validate(data)))
-    assert found == {
-        **{
-            ("surfaces", name, key): f"of/{name}-{key}"
-            for name in surfaces
-            for key in ("command", "position", "effective")
-        },
-        ("signals", "mach", "property"): "of/mach", ("trim", "throttle"): "of/lever",
-        ("engine", "settings", "push", "property"): "of/lever",
-        ("engine", "limits", "heat", "property"): "of/heat", ("effectors", "left", "throttle"): "of/left",
-        ("damage", "off", "property"): "of/off", ("damage", "dented", "property"): "of/dented",
-        ("ground", "present"): "of/ground",
-    }  # fmt: skip
 
 
 def test_a_model_that_would_write_is_refused_each_time_whatever_the_cache_has(trainer):

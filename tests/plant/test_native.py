@@ -6,7 +6,6 @@ import pytest
 from beaver_ftc.documents import files
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.plant import addresses, channels
-from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.channels import NodeBank
 from beaver_ftc.scenario.schema import load
 
@@ -89,11 +88,3 @@ def test_jsbsim_run_by_compiled_code_is_the_same_flight(air, substeps):
     assert called.fly_frame is not None
     logs = [np.concatenate([rows.copy() for rows in loop.chunks()]) for loop in (compiled, called)]
     np.testing.assert_array_equal(*logs)
-
-
-@needs_native
-def test_an_executive_that_is_not_where_it_is_expected_is_run_through_python(monkeypatch):
-    plant = Plant(rate_hz=100)
-    monkeypatch.setattr(addresses, "is_proved", lambda layout: True)
-    monkeypatch.setattr(addresses, "LAYOUT", addresses.LAYOUT._replace(executive_base=32))  # a dictionary
-    assert addresses.executive_address(plant.fdm) == 0

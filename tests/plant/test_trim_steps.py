@@ -7,11 +7,8 @@ import numpy as np
 import pytest
 
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
-from beaver_ftc.plant import trim as steps
-from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.conditions import trimmed
 from beaver_ftc.plant.linear import differences, own
-from beaver_ftc.plant.trim import trim
 from beaver_ftc.scenario.schema import load as load_scenario
 
 
@@ -19,20 +16,6 @@ def said(call, *arguments, error=BadInput):
     with pytest.raises(error) as caught:
         call(*arguments)
     return str(caught.value)
-
-
-def test_a_quick_look_is_the_full_start_s_accelerations():
-    truth = Plant(rate_hz=100)
-    point = trim(45.0, 1000.0, plant=truth)
-    names = ("alpha_rad", "beta_rad", "theta_rad", "aileron_rad", "elevator_rad", "rudder_rad")
-    look = steps._looking(truth, point)
-    off = np.array([0.01, 0.02, -0.03, 0.04, -0.05, 0.06])
-    x = np.array([getattr(point, name) for name in names]) + off
-    for _ in range(3):  # the side force of betadot lags a look
-        quick = look(x)
-    truth.start(replace(point, **dict(zip(names, x.tolist(), strict=True))))
-    assert quick == pytest.approx([truth.read(n) * factor for n, factor in steps.ACCELERATIONS], abs=1e-5)
-    assert len(steps.ACCELERATIONS) == 6
 
 
 def test_slopes_by_jsbsim_itself_are_those_by_differences():

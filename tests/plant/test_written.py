@@ -7,7 +7,7 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant.adapter import FlightState, Plant, body_axes
-from beaver_ftc.plant.trim import configure, take_off
+from beaver_ftc.plant.trim import configure
 from beaver_ftc.scenario.schema import load
 from trainer import trainer
 
@@ -16,22 +16,6 @@ BANKED = {
     "theta_rad": -0.1, "psi_rad": 1.1, "aileron_rad": 0.06, "elevator_rad": -0.08, "rudder_rad": 0.07,
     "flap_rad": 0.2, "engine_rpm": 1900.0, "manifold_pressure_inhg": 22.0,
 }  # fmt: skip
-
-
-class Noted(Plant):
-    """An aircraft that notes what is written: some properties of JSBSim read 0 whatever they are."""
-
-    def __init__(self, *of, **more):
-        self.written = {}
-        super().__init__(*of, **more)
-
-    def write(self, name, value):
-        self.written[name] = value
-        super().write(name, value)
-
-    def write_all(self, names, values):
-        self.written |= zip(names, values, strict=True)
-        super().write_all(names, values)
 
 
 def written(plant):
@@ -75,16 +59,3 @@ def test_an_error_of_the_truth_that_an_aircraft_cannot_have_is_refused(uncertain
                 configure(plant, scenario)
         else:
             configure(plant, scenario)
-
-
-@pytest.mark.parametrize(
-    ("severity", "exceedence", "wind_fps"), [("light", 3, 25.3), ("moderate", 4, 50.6), ("severe", 6, 76.0)]
-)
-def test_turbulence_as_the_specification_has_it(severity, exceedence, wind_fps, trim_point):
-    plant = Noted(rate_hz=50)
-    air = {"turbulence": "dryden", "severity": severity}
-    take_off(plant, load({"environment": air, "seed": 2**31 - 2}), trim_point)
-    folder = "atmosphere/turbulence/milspec"
-    found = [plant.written[f"{folder}/severity"], plant.written[f"{folder}/windspeed_at_20ft_AGL-fps"]]
-    assert found == [exceedence, wind_fps]
-    assert (plant.written["atmosphere/randomseed"], plant.written["atmosphere/turb-type"]) == (1, 4)

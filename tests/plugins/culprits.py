@@ -97,13 +97,6 @@ class RaisingLaw(Hold):
         raise IndexError("no such layer")
 
 
-class NoStep:
-    """Half a detector."""
-
-    def reset(self, context):
-        pass
-
-
 class Odd:
     """Neither a detector nor a law."""
 

@@ -239,8 +239,6 @@ class Frames(NamedTuple):
     G: np.ndarray
     Gu: np.ndarray
     r: np.ndarray
-    G_range: np.ndarray
-    u_range: np.ndarray
 
 
 def mean_of_frames(n: int, of_instants: np.ndarray) -> np.ndarray:
@@ -260,12 +258,5 @@ def frames_of(declaration: Declaration, f: np.ndarray, G: np.ndarray, u: np.ndar
         r = np.abs(by_frame[:, 0] - by_frame[:, 1:].mean(axis=1)) / n
     return Frames(
         mean_of_frames(n, f + Gu.sum(axis=-1)), mean_of_frames(n, G), mean_of_frames(n, Gu),
-        np.concatenate([np.zeros((1, *Gu.shape[1:])), r]), _range(n, G), _range(n, u),
+        np.concatenate([np.zeros((1, *Gu.shape[1:])), r]),
     )  # fmt: skip
-
-
-def _range(n: int, of_instants: np.ndarray) -> np.ndarray:
-    """(2, frames, ...): least and largest within a frame."""
-    by_frame = of_instants[:-1].reshape(-1, n, *of_instants.shape[1:])
-    ends = np.array([by_frame.min(axis=1), by_frame.max(axis=1)])
-    return np.concatenate([np.full((2, 1, *of_instants.shape[1:]), np.nan), ends], axis=1)

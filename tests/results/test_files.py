@@ -2,17 +2,15 @@
 
 import shutil
 
-import numpy as np
 import pytest
 from synthetic import landed
 
 import beaver_ftc as bf
 from beaver_ftc.documents.errors import SimulationFailed
-from beaver_ftc.results import log, writer
+from beaver_ftc.results import writer
 from beaver_ftc.results.flight import Flight as Opened
 from beaver_ftc.results.metrics import metrics
 from beaver_ftc.results.writer import refuse_foreign, result_folder
-from beaver_ftc.scenario.schema import Scenario
 
 
 @pytest.mark.parametrize(
@@ -81,24 +79,3 @@ def test_an_own_aircraft_is_kept_with_its_flight(own, tmp_path):
     assert files == {"scenario.yaml", "metrics.json"} | {f.replace("my-uav", "aircraft", 1) for f in model}
     assert bf.load(tmp_path / "scenario.yaml").aircraft == "./aircraft"
     assert Opened(own, bf.open_run(tmp_path).metrics).passed is True
-
-
-def test_a_run_writes_what_is_asked_for(tmp_path, monkeypatch):
-    flown, drawn = Scenario(name="short", duration_s=0.2), []
-    monkeypatch.setattr(writer, "write_report_files", lambda *given, **_: drawn.append(given))
-    usual = {"scenario.yaml", "metrics.json", "log.parquet"}
-    asked = [
-        ({"report": False}, set()), ({"report": False, "exports": ("csv",)}, {"log.csv"}),
-        ({"report": False, "exports": ("acmi",)}, {"flight.acmi"}),
-        ({"recording": "table"}, {"flight.csv", "vehicle.yaml"}),
-    ]  # fmt: skip
-    for given, more in asked:
-        document = writer.run(flown, tmp_path, **given)
-        assert {path.name for path in (tmp_path / "short").iterdir()} == usual | more
-    assert document["frames"] == 20
-    assert [document for _, document in drawn] == [document]
-    written = np.genfromtxt(tmp_path / "short" / "flight.csv", delimiter=",", names=True)
-    flap = log.StoredLog(tmp_path / "short" / "log.parquet").read(["flap_cmd_rad"])["flap_cmd_rad"]
-    stops = flown.airframe.travel["flap"]
-    assert stops.max_rad > abs(stops.min_rad)
-    assert written["flap_command"] == pytest.approx(flap / stops.max_rad)

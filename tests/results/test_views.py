@@ -5,7 +5,6 @@ import pytest
 from synthetic import LOSS, landed, scenario
 
 from beaver_ftc.results.figures import draw
-from beaver_ftc.results.log import Log
 from beaver_ftc.results.metrics import measure
 from beaver_ftc.results.simulation import Simulation
 from beaver_ftc.results.style import closeup_window, marks
@@ -14,7 +13,6 @@ from beaver_ftc.results.views import (
     Trace,
     View,
     estimators,
-    series_of,
     surfaces,
     views,
 )
@@ -42,32 +40,6 @@ def test_which_views_a_log_allows():
     assert estimators(EVERY) == ("aileron", "elevator", "rudder")
     assert surfaces(EVERY) == ("aileron", "elevator", "rudder", "flap")
     assert views(["t_s"]) == ()
-
-
-def test_the_mean_airspeed_that_is_judged_is_drawn_within_what_is_expected_of_it():
-    """The largest deviation of the mean in the picture is the number of the verdict, in chunks as in one."""
-    rng, n, dt = np.random.default_rng(3), 900, 0.02
-    flown = 45.0 + np.cumsum(rng.normal(0.0, 0.3, n))
-    command = np.where(np.arange(n) < 40, np.nan, 44.0)
-    mean, means = 0.0, []
-    for one, asked in zip(flown, command, strict=True):
-        mean += 0.0 if np.isnan(asked) else dt / 10.0 * (one - asked - mean)
-        means.append(asked + mean)
-    whole = {"t_s": dt * np.arange(n), "airspeed_mps": flown, "airspeed_command_mps": command}
-
-    class Chunks(dict, Log):
-        def row_count(self):
-            return n
-
-        def read_chunks(self, names):
-            for start in (0, 250, 600):
-                rows = slice(start, {0: 250, 250: 600, 600: n}[start])
-                yield {name: self[name][rows] for name in {*names, "t_s"}}
-
-    drawn = series_of(Chunks(whole), ["airspeed_mean_mps"])
-    np.testing.assert_allclose(drawn["airspeed_mean_mps"], means, rtol=1e-12)
-    (panel,) = [p for p in views(EVERY, within_mps=3.5)[1].panels if p.label == "airspeed"]
-    assert [t.offset for t in panel.traces if t.role == "bound"] == [3.5, -3.5]
 
 
 T_S = np.arange(0.0, 20.0, 0.5)

@@ -1,36 +1,11 @@
 """What `fdi.bounds` declares is asked of one object: who takes part, and that nobody reads the section."""
 
-import ast
-
 import numpy as np
 import pytest
 
-from beaver_ftc.scenario.diagnosis import Bounds, failing, of_several
+from beaver_ftc.scenario.diagnosis import failing, of_several
 from beaver_ftc.scenario.schema import load
 from flying import declared_in
-from test_architecture import PRODUCTS, modules, tree
-
-# They make other bounds of those given, and ask nothing of them.
-WRITE = {"beaver_ftc:studies.mismatch.bound", "beaver_ftc:scenario.interventions"}
-DECLARED = "beaver_ftc:scenario.declared"
-
-
-def test_nobody_but_declared_reads_the_bounds():
-    """`fdi.bounds.turbulence` and its like, anywhere in the core or a product."""
-    readers = {
-        f"{package}:{name}: {node.attr}"
-        for package in ("beaver_ftc", *PRODUCTS)
-        for name, file in modules(package).items()
-        if f"{package}:{name}" not in WRITE | {DECLARED} and ".bounds." in file.read_text(encoding="utf-8")
-        for node in ast.walk(tree(name, package))
-        if isinstance(node, ast.Attribute) and node.attr in Bounds.model_fields
-        if isinstance(node.value, ast.Attribute) and node.value.attr == "bounds"
-    }
-    own = {
-        "beaver_ftc:scenario.diagnosis: sensors",
-        "beaver_ftc:scenario.pairs: sensors",
-    }  # where it is refused
-    assert readers <= own
 
 
 def test_errors_of_an_instrument_in_si_and_how_far_a_reading_can_be_off():

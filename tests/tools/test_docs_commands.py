@@ -2,13 +2,10 @@
 
 import io
 import json
-import os
-import time
 
 import numpy as np
-import pytest
 from PIL import Image
-from tools.docs import commands, kept, pages, pictures
+from tools.docs import kept, pages, pictures
 from tools.docs.commands import Output, outputs
 from tools.docs.constants import constants
 from tools.docs.marks import parsed
@@ -37,41 +34,9 @@ def test_what_cannot_be_used_says_why():
     assert {line: output.fault for line, output in found.items()} == FAULTS
 
 
-def test_a_command_that_takes_too_long_is_to_be_dear(monkeypatch):
-    monkeypatch.setattr(commands, "LONGEST_S", 0.1)
-    monkeypatch.setattr(commands, "PATIENCE", 3.0)
-    busy = "python -c 'import time\nwhile time.process_time() < 0.2: pass\nprint(1)'"
-    for line in ("sleep 20; echo 1", busy):
-        assert "make it dear" in one(line).fault
-    assert outputs([], {busy})[busy].text == "1"
-
-
-def test_what_is_interrupted_leaves_nothing_running(tmp_path, monkeypatch):
-    def interrupted(*_, **__):
-        while not (tmp_path / "pid").exists():
-            time.sleep(0.01)
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(commands, "zip", interrupted, raising=False)
-    with pytest.raises(KeyboardInterrupt):
-        outputs([f"echo $$ > {tmp_path}/part; mv {tmp_path}/part {tmp_path}/pid; sleep 60"])
-    assert _has_ended(int((tmp_path / "pid").read_text()))
-
-
-def _has_ended(pid):
-    """Whether a process is gone; it may take a moment until its parent has been told."""
-    for _ in range(1000):
-        try:
-            os.kill(pid, 0)
-        except ProcessLookupError:
-            return True
-        time.sleep(0.01)
-    return False
-
-
-def picture(shade, size=40):
+def picture(shade):
     content = io.BytesIO()
-    Image.fromarray(np.full((size, size, 3), shade, np.uint8)).save(content, "PNG")
+    Image.fromarray(np.full((40, 40, 3), shade, np.uint8)).save(content, "PNG")
     return content.getvalue()
 
 

@@ -34,8 +34,8 @@ PRINTED = {
 }
 
 
-def refreshed(text, printed=None, wanted=None, name="docs/page.md"):
-    return Refreshed(parsed(text, name), printed or PRINTED, wanted or Wanted(probes=True))
+def refreshed(text, printed=None, wanted=None):
+    return Refreshed(parsed(text, "docs/page.md"), printed or PRINTED, wanted or Wanted(probes=True))
 
 
 def words(findings):

@@ -1,10 +1,6 @@
 """Names in prose: those of the code, its files and commands pass; one letter more, and it is a line."""
 
-import ast
-
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from tools.docs import names, prose
 from tools.docs.marks import parsed
 
@@ -37,11 +33,6 @@ def test_a_name_of_the_project_passes_and_another_is_found(span):
     assert names.wrong(span, SHOWN) == WRONG.get(span)
 
 
-@given(st.text(st.sampled_from("ab_.<>*{}/:()[]\"' -=,0"), max_size=30))
-def test_no_span_breaks_the_checker(span):
-    assert names.wrong(span) is None or span.strip()
-
-
 def test_names_of_others_pass_and_each_has_to_be_used(monkeypatch):
     listed = {"SyncVectorEnv": "of Gymnasium", "never_said": "of nobody"}
     monkeypatch.setattr(names, "foreign", lambda: listed)
@@ -50,19 +41,6 @@ def test_names_of_others_pass_and_each_has_to_be_used(monkeypatch):
     assert str(first).startswith("docs/page.md:2: `AsyncVectorEnvs` in `AsyncVectorEnvs` is no name here")
     assert "never_said: no page has it" in second.words
     assert len(names.check([parsed(text, "docs/page.md")], every=False)) == 1
-
-
-def test_only_prose_is_looked_at():
-    text = "```python\nno_such(`gone_name`)\n```\n<!-- `gone_name` -->\n\n    run `gone_name`\n\n`yes`\n"
-    assert list(names.spans(text)) == [(8, "yes")]
-    assert {"no_such", "run"} <= names.shown(text)
-
-
-def test_what_code_describes_is_no_name():
-    code = 'def step(delay_s):\n    """Says gone_function."""\n    return f"{delay_s}_residual", "a_key"\n'
-    said = [*names.said(ast.parse(code))]
-    assert {"step", "delay_s", "_residual", "a_key"} <= {*said}
-    assert not any("gone" in text for text in said)
 
 
 BARE = {

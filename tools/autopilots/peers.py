@@ -80,8 +80,8 @@ class Ardupilot:
                 now = self.hear(answer)
         return now
 
-    def _asked(self, line: socket.socket, datagram: bytes, times: int = 60) -> bytes | None:
-        for _ in range(times):
+    def _asked(self, line: socket.socket, datagram: bytes) -> bytes | None:
+        for _ in range(60):
             line.send(datagram)
             try:
                 return line.recv(MOST_BYTES)

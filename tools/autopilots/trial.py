@@ -38,7 +38,6 @@ class Spy:
     def __init__(self, body: Any, number_of: Any) -> None:
         self._body, self._number_of = body, number_of
         self.flown: list[list[int]] = []
-        self.unasked = 0  # frames flown while an autopilot started
 
     @property
     def over(self) -> bool:
@@ -55,8 +54,6 @@ class Spy:
     def fly(self, outputs: Any, frame_hz: float, in_charge: bool = True) -> None:
         if len(outputs):
             self.flown[-1].append(self._number_of(outputs))
-        else:
-            self.unasked += 1
         self._body.fly(outputs, frame_hz, in_charge)
 
     def instant(self) -> Any:

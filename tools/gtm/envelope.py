@@ -21,6 +21,7 @@ from beaver_ftc_aircraft.gtm.steady import (
     pitch_angle,
 )
 from beaver_ftc_aircraft.gtm.systems import THROTTLE
+from tools.gtm.specification import axes_of
 
 SPEEDS_KT = tuple(range(60, 131, 10))
 BANKS_DEG = (-45, -30, -15, 0, 15, 30, 45)
@@ -114,6 +115,6 @@ class Envelope:
         V = speed * FT_S_PER_KNOT / self.thin
         theta = pitch_angle(alpha, beta, phi, 0.0)
         rates = turning * np.array([-sin(theta), cos(theta) * sin(phi), cos(theta) * cos(phi)])
-        flow = V * np.array([cos(alpha) * cos(beta), sin(beta), sin(alpha) * cos(beta)])
+        flow = V * axes_of(alpha, beta)
         self.bench.place(ALTITUDE_FT, flow, (phi, theta, radians(HEADING_DEG)), rates)
         return self.bench.accelerations()

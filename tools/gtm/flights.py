@@ -15,7 +15,16 @@ from beaver_ftc_aircraft.gtm.database import read
 from beaver_ftc_aircraft.gtm.folder import write_model
 from beaver_ftc_aircraft.gtm.parameters import OUTPUTS, parameters
 from beaver_ftc_aircraft.gtm.steady import HEADING_DEG, Bench, Condition, Steady, pitch_angle
-from tools.gtm.specification import DATABASE, STEP_S, SURFACES, Controls, Servos, Specification, State
+from tools.gtm.specification import (
+    DATABASE,
+    STEP_S,
+    SURFACES,
+    Controls,
+    Servos,
+    Specification,
+    State,
+    axes_of,
+)
 
 # The specification's letters, and the names here.
 NAMES = dict(
@@ -281,7 +290,7 @@ def coefficients(
         fdm[f"actuators/{name}/position-min-rad"], fdm[f"actuators/{name}/position-max-rad"] = -1.6, 1.6
     fdm["gear/down"] = gear
     model.damage(case)
-    velocity = V * np.array([cos(alpha) * cos(beta), sin(beta), sin(alpha) * cos(beta)])
+    velocity = V * axes_of(alpha, beta)
     model.place(800.0, velocity, (0.0, 0.0, 0.0), rates)
     found = np.array([fdm[f"aero/coefficient/{name}"] for name in OUTPUTS])
     fdm["gear/down"] = 0.0

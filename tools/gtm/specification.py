@@ -37,6 +37,11 @@ def folder() -> Path | None:
     return found if there else None
 
 
+def axes_of(alpha: float, beta: float) -> np.ndarray:
+    """The way of the flow at these angles, rad, in body axes."""
+    return np.array([cos(alpha) * cos(beta), sin(beta), sin(alpha) * cos(beta)])
+
+
 def multilinear(data: np.ndarray, axes: list[list[float]], at: list[float], hold: bool = False) -> np.ndarray:
     """Between breakpoints; beyond them along the last cell, or held."""
     for grid, place in zip(axes, at, strict=True):
@@ -170,7 +175,7 @@ class Specification:
                 c += six * scale[k]
             c[1] += inc[:, 1] @ hats
             return c
-        along = np.array([cos(alpha) * cos(beta), sin(beta), sin(alpha) * cos(beta)])
+        along = axes_of(alpha, beta)
         omega = 0.0
         if along[0] != 0.0 and p != 0.0:
             left = r - p / along[0] * along[2]
@@ -240,7 +245,7 @@ class Specification:
         rpm = np.polyval(of["rpm_percent"]["polynomial"], throttle)
         thrust = max(0.0, np.polyval(of["thrust"]["polynomial"], rpm) * pressure / 2116.22 - 0.010 * load)
         _, a2, a3 = map(radians, of[side]["angles"])
-        along = np.array([cos(a2) * cos(a3), sin(a3), -sin(a2) * cos(a3)])
+        along = axes_of(-a2, a3)
         shaft = of["rotor"]
         inertia = pi * shaft["shaft_dia"] ** 4 / 32.0 * shaft["shaft_len"] * shaft["density"]
         spin = inertia * 2.0 * pi / 60.0 * rpm / 100.0 * 123000.0

@@ -28,17 +28,13 @@ def missed_by_observer(accelerations):
     return np.array(missed)
 
 
-def flown(seed=1, tied=0.0):
-    """Moments of healthy surfaces (frames, 3, N), signals (frames, 5), what is missed (frames, 3).
-
-    tied: how much of the last surface's command answers the sideslip, as a rudder does.
-    """
+def flown(seed=1):
+    """Moments of healthy surfaces (frames, 3, N), signals (frames, 5), what is missed (frames, 3)."""
     rng = np.random.default_rng(seed)
     t = DT * np.arange(FRAMES)
     G = rng.normal(0.0, 8.0, (3, N))
     u = 0.2 * np.sin(np.outer(t, rng.uniform(2.0, 15.0, N)) + rng.uniform(0, 6, N))
     signals = 0.1 * np.sin(np.outer(t, rng.uniform(2.0, 15.0, 5)) + rng.uniform(0, 6, 5))
-    u[:, -1] = (1.0 - tied) * u[:, -1] + tied * signals[:, 1]
     given = G[None] * u[:, None]
     a = given @ THETA
     for (axis, signal), per in TURNED.items():
@@ -46,18 +42,15 @@ def flown(seed=1, tied=0.0):
     return given, signals, missed_by_observer(a)
 
 
-def listened(given, signals, missed, believed=None, airframe=True, forgets=True):
-    """The record after all frames; believed (N,): the effectiveness that the observer assumed with."""
+def listened(given, signals, missed, forgets=True):
+    """The record after all frames."""
     record = np.zeros(1, estimator_dtype(N)).view(np.recarray)[0]
     rejecting.begin_estimator(record, np.zeros(3), np.zeros(3), DT)
     record.unsure[:] *= forgets
-    if not airframe:
-        record.P[N:, N:] = record.unsure[N:] = 0.0
-    effectiveness = np.ones(N) if believed is None else believed
     y = np.zeros(8)
     for moments, signal, off in zip(given, signals, missed, strict=True):
         y[ALPHA], y[BETA] = signal[:2]
-        rejecting.estimate(record, off, PULL, INTO, DT, signal[2:], y, effectiveness, moments)
+        rejecting.estimate(record, off, PULL, INTO, DT, signal[2:], y, np.ones(N), moments)
     return record
 
 

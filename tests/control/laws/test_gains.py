@@ -28,17 +28,15 @@ def grid(loop):
     return omega, np.exp(1j * omega * loop.dt_s)
 
 
-def simulated(loop, s, scale, frames, noise=None, seed=0):
+def simulated(loop, s, scale, frames):
     """Surface (times G) of the loop in time, its gain off by `scale`; from the law's equations as written."""
     dt, share = loop.dt_s, loop.share
     pull, learn = corrections(RATIO * s, dt)
-    rng = np.random.default_rng(seed)
     x, rate, disturbance, position, before, command = 1e-3, 0.0, 0.0, 0.0, 0.0, 0.0
     positions = []
     for _ in range(frames):
-        measured = x + (noise * rng.standard_normal() if noise else 0.0)
         rate += dt * (share * before + (1 - share) * position + disturbance)
-        missed = measured - rate
+        missed = x - rate
         rate += pull * missed
         disturbance += learn * missed
         ahead = rate + share * dt * (position + disturbance)

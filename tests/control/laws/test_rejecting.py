@@ -15,8 +15,8 @@ REAL = {
 }  # fmt: skip
 
 
-def error_deg_s(log, from_s=2.0, to_s=np.inf):
-    return np.sqrt(sum(log.rms_deg_s(axis, from_s, to_s) ** 2 for axis in "pqr"))
+def error_deg_s(log, from_s=2.0):
+    return np.sqrt(sum(log.rms_deg_s(axis, from_s, np.inf) ** 2 for axis in "pqr"))
 
 
 class TestInRealAir:

@@ -19,9 +19,9 @@ from beaver_ftc.studies.compare.trial import (
     of_set,
 )
 from beaver_ftc.studies.compare.tune import is_adopted
-from beaver_ftc.studies.engine.statistics import wilson
+from beaver_ftc.studies.engine.statistics import CONFIDENCE, poisson_bound, wilson
 from beaver_ftc.studies.engine.study import fly_all
-from beaver_ftc.studies.present.tables import markdown_table
+from beaver_ftc.studies.present.tables import estimate, markdown_table
 from tools.docs.tables import aside, table_of
 
 TUNING = Path(__file__).parents[3] / "benchmarks" / "tuning.json"  # how the values in tuned.json were found
@@ -39,6 +39,7 @@ PROBED = ("published", "realism", "air-light")  # one of each grade that is tune
 PROBED_S = 30.0  # the longest flight of the probe: flights of a minute without a fault are left out
 NO_SCHEME = "none"
 SHARES = (1.0, 0.92, 0.75, 0.5, 0.42)  # of which a table has intervals
+BOLD = "in brackets: faulted flights; bold: a rival's number is better than that of"
 _RATIO = "Tracking error divided by the oracle's in the same flight, median; below 1: better than the oracle"
 _RATIO_90 = "Tracking error divided by the oracle's, not exceeded in 90 % of the flights"
 _SHARES = "Wilson 95 % intervals of the shares in Tables 2 and 3, %"
@@ -104,105 +105,91 @@ def everybody() -> list[Entry]:
     return [*entries_of(schemes, laws), Entry(NO_SCHEME, LAW)]
 
 
+def _form(form: str, none: str, factor: float = 1.0) -> Callable[[Any], str]:
+    return lambda value: none if value is None else format(factor * value, form)
+
+
+_percent, _seconds, _ratio = _form(".0f", "-", 100.0), _form(".2f", "never"), _form(".2f", "lost")
+
+
 def _tables(document: Document) -> str:
     """The tables of the page."""
-    sets = {name: document["sets"][name] for name in SHOWN if name in document["sets"]}
-    faulted = {name: part for name, part in sets.items() if part["lines"][0]["faults"]}
-    schemes, laws = _schemes(faulted), _laws(faulted)
+    sets = {name: document["sets"][name]["lines"] for name in SHOWN if name in document["sets"]}
+    faulted = {name: lines for name, lines in sets.items() if lines[0]["faults"]}
+    every = {name: _by("scheme", lines, law=LAW) for name, lines in sets.items()}
+    schemes = {name: every[name] for name in faulted}
+    laws = {
+        name: _by("law", lines, scheme=SCHEME) | {ALONE: _by("law", lines, scheme=NO_SCHEME)[LAW]}
+        for name, lines in faulted.items()
+    }
     return "\n\n".join([
         _block(2, "Faults detected, %", schemes, "detection_rate", _percent, more=True),
         _block(3, "Faults named correctly at the end, %", schemes, "isolation_rate", _percent, more=True),
         _block(4, "Median delay of the alarm, s", schemes, "delay_median_s", _seconds, more=False),
-        _alarms(5, _schemes(sets)),
+        _alarms(5, every),
         _block(6, _RATIO, laws, "ratio_median", _ratio, more=False),
         _block(7, _RATIO_90, laws, "ratio_90", _ratio, more=False),
         "\n".join([
             aside("benchmark-shares", _SHARES, _rates(faulted)),
             aside("benchmark-delays", _UPPER.format("delay of Table 4, s"),
-                  _limit_of(schemes, "delay_median_high_s", _seconds)),
+                  _cells(schemes, "delay_median_high_s", _seconds)),
             aside("benchmark-ratios-low", _LOWER.format("ratio of Table 6"),
-                  _limit_of(laws, "ratio_median_low", _ratio)),
+                  _cells(laws, "ratio_median_low", _ratio)),
             aside("benchmark-ratios-high", _UPPER.format("ratio of Table 6"),
-                  _limit_of(laws, "ratio_median_high", _ratio)),
+                  _cells(laws, "ratio_median_high", _ratio)),
         ]),
     ])  # fmt: skip
 
 
-def _schemes(sets: dict[str, Document]) -> Rows:
-    return {
-        name: {
-            row["scheme"]: row for row in part["lines"] if row["law"] == LAW and row["scheme"] not in HIDDEN
-        }
-        for name, part in sets.items()
-    }
-
-
-def _laws(sets: dict[str, Document]) -> Rows:
-    """By law; our law without a scheme has a row of its own."""
-    rows: Rows = {}
-    for name, part in sets.items():
-        shown = [row for row in part["lines"] if row["law"] not in HIDDEN]
-        rows[name] = {row["law"]: row for row in shown if row["scheme"] == SCHEME}
-        rows[name] |= dict.fromkeys([ALONE], _alone(shown))
-    return rows
-
-
-def _alone(lines: list[Document]) -> Document:
-    return next(row for row in lines if (row["scheme"], row["law"]) == (NO_SCHEME, LAW))
+def _by(part: str, lines: list[Document], **other: str) -> dict[str, Document]:
+    """The lines with this other part, by scheme or by law."""
+    return {row[part]: row for row in lines if row[part] not in HIDDEN and other.items() <= row.items()}
 
 
 def _block(number: int, title: str, rows: Rows, key: str, cell: Callable[[Any], str], more: bool) -> str:
-    """A caption and a table of one number a cell. more: whether more is better."""
-    ours = _ours(rows)
-
-    def shown(name: str, of: dict[str, Document]) -> str:
-        theirs, is_rival = of[name].get(key), name not in (ours, STATISTICAL, ALONE)
-        is_better = is_rival and _less(of[ours].get(key), theirs, more)
-        return f"**{cell(theirs)}**" if is_better else cell(theirs)
-
-    marked = f"; bold: a rival's number is better than that of `{ours}`"
-    caption = _caption(number, f"{title}; in brackets: faulted flights{marked}")
-    return "\n\n".join([caption, _cells(rows, shown), _who_is_better(rows, ours, key, cell, more)])
-
-
-def _ours(rows: Rows) -> str:
-    return SCHEME if SCHEME in next(iter(rows.values())) else LAW
-
-
-def _cells(rows: Rows, shown: Callable[[str, dict[str, Document]], str]) -> str:
-    """A row for each scheme or law, a column for each set."""
-    counts = {name: next(iter(of.values()))["faults"] for name, of in rows.items()}
-    head = ("", *(f"{name} ({count})" for name, count in counts.items()))
-    body = [(_label(name), *(shown(name, of) for of in rows.values())) for name in next(iter(rows.values()))]
-    return markdown_table(head, body)
-
-
-def _limit_of(rows: Rows, key: str, cell: Callable[[Any], str]) -> str:
-    """A table of limits, which are compared with nothing."""
-    return _cells(rows, lambda name, of: cell(of[name].get(key)))
-
-
-def _who_is_better(rows: Rows, ours: str, key: str, cell: Callable[[Any], str], more: bool) -> str:
-    """The first sentence below a table: the best rival of each set in which one is better than ours."""
+    """A caption, a table of one number a cell, and the best rival of each set in which one is better than
+    ours. more: whether more is better.
+    """
+    ours = SCHEME if SCHEME in next(iter(rows.values())) else LAW
+    better = {
+        name: {
+            rival: row[key] for rival, row in of.items()
+            if rival not in (ours, STATISTICAL, ALONE) and _less(of[ours].get(key), row.get(key), more)
+        }
+        for name, of in rows.items()
+    }  # fmt: skip
 
     def said(row: Document) -> str:
         limits = [cell(limit) for limit in _limits(row, key)]
         return f"{cell(row.get(key))} ({' to '.join(limits)})" if limits else cell(row.get(key))
 
-    found = []
-    for name, of in rows.items():
-        better = [
-            rival for rival in of
-            if rival not in (ours, STATISTICAL, ALONE) and _less(of[ours].get(key), of[rival].get(key), more)
-        ]  # fmt: skip
-        if better:
-            numbers = {rival: of[rival][key] for rival in better}
-            best = (max if more else min)(numbers, key=lambda rival: numbers[rival])
-            found.append(f"`{best}` in `{name}`, {said(of[best])} against {said(of[ours])}")
-    if not found:
-        return f"In no set is a rival better than `{ours}`."
+    best = {
+        name: (max if more else min)(of, key=lambda rival: of[rival]) for name, of in better.items() if of
+    }
+    found = [
+        f"`{rival}` in `{name}`, {said(rows[name][rival])} against {said(rows[name][ours])}"
+        for name, rival in best.items()
+    ]
     rest = "" if len(found) == len(rows) else f" In the other sets no rival is better than `{ours}`."
-    return f"Better than `{ours}` are: {'; '.join(found)}.{rest}"
+    return "\n\n".join([
+        _caption(number, f"{title}; {BOLD} `{ours}`"),
+        _cells(rows, key, cell, better),
+        f"Better than `{ours}` are: {'; '.join(found)}.{rest}" if found
+        else f"In no set is a rival better than `{ours}`.",
+    ])  # fmt: skip
+
+
+def _cells(rows: Rows, key: str, cell: Callable[[Any], str], bold: Document | None = None) -> str:
+    """A row for each scheme or law, a column for each set. bold: of each set, who is."""
+    head = [f"{name} ({next(iter(of.values()))['faults']})" for name, of in rows.items()]
+    body = [
+        [f"{name} (passive)" if name in PASSIVE_LAWS else name] + [
+            f"**{cell(of[name].get(key))}**" if bold and name in bold[where] else cell(of[name].get(key))
+            for where, of in rows.items()
+        ]
+        for name in next(iter(rows.values()))
+    ]  # fmt: skip
+    return markdown_table(("", *head), body)
 
 
 def _limits(row: Document, key: str) -> tuple[Any, ...]:
@@ -219,22 +206,6 @@ def _caption(number: int, title: str) -> str:
     return f"*Table {number}. {title}.*"
 
 
-def _label(name: str) -> str:
-    return f"{name} (passive)" if name in PASSIVE_LAWS else name
-
-
-def _percent(share: float | None) -> str:
-    return "-" if share is None else f"{100 * share:.0f}"
-
-
-def _seconds(delay_s: float | None) -> str:
-    return "never" if delay_s is None else f"{delay_s:.2f}"
-
-
-def _ratio(ratio: float | None) -> str:
-    return "lost" if ratio is None else f"{ratio:.2f}"
-
-
 def _less(ours: float | None, theirs: float | None, more: bool) -> bool:
     """Whether theirs is better; a delay without end, or an aircraft lost, is None and the worst."""
     if theirs is None or ours is None:
@@ -242,41 +213,31 @@ def _less(ours: float | None, theirs: float | None, more: bool) -> bool:
     return theirs > ours if more else theirs < ours
 
 
-def _rates(sets: dict[str, Document]) -> str:
+def _rates(sets: dict[str, list[Document]]) -> str:
     """What the numbers of flights say of a rate."""
-    counts = sorted({part["lines"][0]["faults"] for part in sets.values()})
-    rows = [(str(n), *(_interval(n, share) for share in SHARES)) for n in counts]
-    return markdown_table(("faulted flights", *(f"measured {100 * share:.0f} %" for share in SHARES)), rows)
-
-
-def _interval(n: int, share: float) -> str:
-    found = wilson(round(share * n), n)
-    return f"{100 * found.low:.0f} to {100 * found.high:.0f}"
+    counts = sorted({lines[0]["faults"] for lines in sets.values()})
+    rows = [
+        [str(n), *(estimate(vars(wilson(round(share * n), n)), _percent)[1] for share in SHARES)]
+        for n in counts
+    ]
+    return markdown_table(("faulted flights", *(f"measured {_percent(share)} %" for share in SHARES)), rows)
 
 
 def _alarms(number: int, rows: Rows) -> str:
     """Per hour flown without a fault, with exact sensors and with declared errors."""
+    groups = [[of for name, of in rows.items() if (name in EXACT) == exact] for exact in (True, False)]
+    exact_h, air_h = (sum(of[SCHEME]["healthy_h"] for of in group) for group in groups)
     head = ("", "exact sensors", "upper limit, 95 %", "in air", "upper limit, 95 %")
-    names = list(next(iter(rows.values())))
-    body = [(name, *_of_one(rows, name, False), *_of_one(rows, name, True)) for name in names]
-    hours = [_hours(rows, in_air) for in_air in (False, True)]
-    flown = f"{hours[0]:.2f} h with exact sensors, {hours[1]:.2f} h in air"
-    return "\n\n".join(
-        [
-            _caption(number, f"False alarms per flight hour without a fault; flown: {flown}"),
-            markdown_table(head, body),
-        ]
-    )
+    body = [
+        [name, *(cell for group in groups for cell in _per_hour([of[name] for of in group]))]
+        for name in next(iter(rows.values()))
+    ]
+    flown = f"{exact_h:.2f} h with exact sensors, {air_h:.2f} h in air"
+    title = _caption(number, f"False alarms per flight hour without a fault; flown: {flown}")
+    return f"{title}\n\n{markdown_table(head, body)}"
 
 
-def _hours(rows: Rows, in_air: bool) -> float:
-    return sum(of[SCHEME]["healthy_h"] for name, of in rows.items() if (name not in EXACT) == in_air)
-
-
-def _of_one(rows: Rows, name: str, in_air: bool) -> tuple[str, str]:
-    from beaver_ftc.studies.engine.statistics import CONFIDENCE, poisson_bound
-
-    lines = [of[name] for of_set, of in rows.items() if (of_set not in EXACT) == in_air]
+def _per_hour(lines: list[Document]) -> tuple[str, str]:
     alarms, hours = (sum(line[key] for line in lines) for key in ("false_alarms", "healthy_h"))
     if not hours:
         return "-", "-"

@@ -3,7 +3,7 @@
 import os
 import tempfile
 from functools import cache
-from math import cos, radians, sin
+from math import radians
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -14,7 +14,7 @@ from beaver_ftc_aircraft.gtm.steady import Bench, Condition, Steady
 from tools.docs.tables import aside, shared
 from tools.gtm import flights
 from tools.gtm.flights import ADAMS_BASHFORTH, FINE_S, MOTION
-from tools.gtm.specification import SURFACES, Specification
+from tools.gtm.specification import SURFACES, Specification, axes_of
 
 PICTURE = "images/gtm-flights.png"
 SPEEDS_KT = (46, 55, 65, 75, 85, 95, 105, 115, 130)
@@ -217,7 +217,7 @@ def gtm_spiral() -> str:
     """A steady steep spiral of NASA's simulation: JSBSim, which starts there at 1500 ft, and as published."""
     V, *angles = (value for _, value in SPIRAL.values())
     alpha, beta, p, q, r, phi, theta = map(radians, angles)
-    along = V / 0.3048 * np.array([cos(alpha) * cos(beta), sin(beta), sin(alpha) * cos(beta)])
+    along = V / 0.3048 * axes_of(alpha, beta)
     start = flights.State(*map(float, along), p, q, r, phi, theta, 0.0, 1500.0)
     held = flights.of_commands(-30.0, 0.0, 0.0, 0.0)
     rows = flights.Manoeuvre("spiral", start, lambda t: held, 12.0).by_jsbsim(_bench())[_SETTLED]

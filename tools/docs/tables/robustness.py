@@ -36,22 +36,30 @@ SOON_S = 0.5
 
 def robustness_losses() -> str:
     """Elevator losses under each kind of error."""
-    return _losses(500)
+    return _losses_of({condition: _flown(f"robust-elevator-{condition}", 500) for condition in CONDITIONS})
 
 
 def robustness_losses_probe() -> str:
-    """A few of these flights, to more digits."""
-    return "\n".join(_closely(f"robust-elevator-{condition}", 3) for condition in CONDITIONS)
-
-
-def _losses(count: int) -> str:
-    return _losses_of({condition: _flown(f"robust-elevator-{condition}", count) for condition in CONDITIONS})
+    """A few of these flights, to more digits: the delay, and how near the residual came to its threshold."""
+    return "\n".join(
+        f"robust-elevator-{condition}: " + ", ".join(
+            f"{row['detection.delay_s']} {row['worst_residual_ratio']:.6g}"
+            for row in _flown(f"robust-elevator-{condition}", 3, workers=1)
+        )
+        for condition in CONDITIONS
+    )  # fmt: skip
 
 
 def _flown(name: str, count: int, workers: int = 2) -> Rows:
     """The first flights of a built-in sweep, a row each."""
     sweep = load_sweep(name)
     return fly_all(partial(fly_one, sweep), list(Plan(sweep).assignments(range(count))), workers)
+
+
+def _shown(drawn: Path, name: str) -> None:
+    """Keep a picture of a study beside the page."""
+    Path("images").mkdir(exist_ok=True)
+    Path("images", name).write_bytes(drawn.read_bytes())
 
 
 LOSSES_HEAD = (
@@ -85,6 +93,7 @@ DOUBT_HEAD = (
     "wrongly named",
     "median time to the name, s",
 )
+DOUBTED_SWEEP = "robust-elevator-all"
 DOUBTED = ("elevator", "rudder", "aileron")
 OF_DOUBT = {
     "sound": {"sensor_monitor": "never"},
@@ -112,35 +121,31 @@ def robustness_doubt_bound() -> str:
 
 
 def _told(surface: str) -> tuple[str, ...]:
-    sweep, seen = load_sweep("robust-elevator-all"), []
-    for one in Plan(sweep).assignments(range(TOLD_FLIGHTS)):
-        values = _with_fault(one, surface) | {"fdi.sensor_monitor": "always"}
-        scenario = scenario_of(sweep, one._replace(values=values))
+    seen = []
+    for one in _doubted(surface, {"sensor_monitor": "always"}, TOLD_FLIGHTS):
+        scenario = scenario_of(load_sweep(DOUBTED_SWEEP), one)
         kept = columns_of(scenario.airframe)
         fly(scenario, kept)
         seen.append(seen_when_told(scenario, kept, surface))
-    least, chance = (
-        min(each["told_deflection"] for each in seen),
-        np.mean([each["told_chance"] for each in seen]),
-    )
+    least = min(each["told_deflection"] for each in seen)
+    chance = np.mean([each["told_chance"] for each in seen])
     return surface, str(TOLD_FLIGHTS), f"{least:.0f}", f"{100 * chance:.0f}"
 
 
 def _of_doubt(part: str, sensors: str, count: int) -> tuple[str, ...]:
-    sweep = load_sweep("robust-elevator-all")
-    drawn = [
-        one._replace(
-            values=_with_fault(one, part) | {f"fdi.{key}": is_ for key, is_ in OF_DOUBT[sensors].items()}
-        )
-        for one in Plan(sweep).assignments(range(count))
-    ]
-    rows = fly_all(partial(fly_one, sweep), drawn, 2)
+    rows = fly_all(partial(fly_one, load_sweep(DOUBTED_SWEEP)), _doubted(part, OF_DOUBT[sensors], count), 2)
     right = [row for row in rows if row["isolation.correct"]]
     named = [row for row in rows if row["isolation.isolated"]]
     median_s = f"{np.median([row['isolation.delay_s'] for row in right]):.2f}" if right else "-"
     found = sum(row["detection.delay_s"] is not None for row in rows)
     counts = (found, len(right), len(named) - len(right))
     return (part, sensors, *(f"{count_of} of {count}" for count_of in counts), median_s)
+
+
+def _doubted(part: str, fdi: dict[str, str], count: int) -> list[Assignment]:
+    keys = {f"fdi.{key}": value for key, value in fdi.items()}
+    drawn = Plan(load_sweep(DOUBTED_SWEEP)).assignments(range(count))
+    return [one._replace(values=_with_fault(one, part) | keys) for one in drawn]
 
 
 def _with_fault(one: Assignment, part: str) -> Document:
@@ -153,21 +158,11 @@ def _with_fault(one: Assignment, part: str) -> Document:
     return kept | {"faults": [fault], "duration_s": 20.0}
 
 
-def _closely(name: str, count: int) -> str:
-    """Of a few flights of a sweep the delay, and how near the residual came to its threshold."""
-    rows = _flown(name, count, workers=1)
-    return f"{name}: " + ", ".join(
-        f"{row['detection.delay_s']} {row['worst_residual_ratio']:.6g}" for row in rows
-    )
-
-
 def robustness_power() -> str:
     """Share of losses found under tactical-grade sensors, by scheme, surface and air; and a picture of it."""
     with TemporaryDirectory() as name:
         document = run_schemes(Path(name), GRIDS["quick"], contenders(None), 2)
-        Path("images").mkdir(exist_ok=True)
-        drawn = Path(name, "detectability", "detectability.png")
-        Path("images/power-tactical-grade.png").write_bytes(drawn.read_bytes())
+        _shown(Path(name, "detectability", "detectability.png"), "power-tactical-grade.png")
     return _power_of(document)
 
 
@@ -189,15 +184,12 @@ SOON = {"1": "*Table 2. Share of the faults that are found within 1 s, %; rows a
 
 def _power_of(document: Document) -> str:
     """At the same rate of false alarms for all; `both` at its default level as well."""
-    return "\n\n".join(
-        (
-            *(
-                f"{title}\n\n{_power_within(document, soon)}\n\n{_best(document, soon)}"
-                for soon, title in SOON.items()
-            ),
-            *(_duels(document["comparison"], within_s) for within_s in DUELS_S),
-        )
-    )
+    parts = [
+        part
+        for soon, title in SOON.items()
+        for part in (title, _power_within(document, soon), _best(document, soon))
+    ]
+    return "\n\n".join([*parts, *(_duels(document["comparison"], within_s) for within_s in DUELS_S)])
 
 
 def _best(document: Document, soon: str) -> str:
@@ -277,8 +269,7 @@ def robustness_decay() -> str:
     """How verdicts decay beyond what is declared, of two scenarios; and a picture of the first."""
     with TemporaryDirectory() as name:
         whole, published = (run_errors(Path(name), load_scenario(one), workers=2) for one in DECAYS)
-        Path("images").mkdir(exist_ok=True)
-        Path("images/decay.png").write_bytes(Path(whole["folder"], "sensitivity.png").read_bytes())
+        _shown(Path(whole["folder"], "sensitivity.png"), "decay.png")
     pictured = f"![{_PICTURED}](images/decay.png)\n\n{DECAY_FIGURE}"
     table = moved(_decay_table(whole), "*Table 1.", "robustness-decay", DECAY_TITLE)
     return "\n\n".join([table, pictured, f"### {PUBLISHED}", _published(published)])
@@ -287,22 +278,19 @@ def robustness_decay() -> str:
 def robustness_decay_probe() -> str:
     """Two flights of each row of the first."""
     with TemporaryDirectory() as name:
-        return _decay_of(run_errors(Path(name), load_scenario(DECAYS[0]), 2))
-
-
-def _decay_of(document: Document) -> str:
-    """The sentences and the table."""
-    return f"{_said_of(document)}\n\n{_decay_table(document)}"
+        document = run_errors(Path(name), load_scenario(DECAYS[0]), 2)
+    says = "\n".join(f"- {sentence}" for sentence in sentences(document))
+    flown = f"`{document['scenario']}`, {document['flights']} flights a row"
+    return f"{flown}:\n\n{says}\n\n{_decay_table(document)}"
 
 
 def _decay_table(document: Document) -> str:
     """A table without intervals, which the figure has."""
-    wanted = [DECAY_HEAD.index(head) if head in DECAY_HEAD else -1 for head in HEAD]
     rows = [
         tuple(
             cell if head in DECAY_WORDS else cell.partition(" (")[0]
-            for head, cell, place in zip(HEAD, cells(row), wanted, strict=True)
-            if place >= 0
+            for head, cell in zip(HEAD, cells(row), strict=True)
+            if head in DECAY_HEAD
         )
         for row in document["rows"]
         if row["factor"] > 1.0 or row["error"] == TOGETHER or _is_undeclared(document, row)
@@ -325,11 +313,6 @@ def _published(document: Document) -> str:
         f"by the unit. Last columns: numbers of flights, of {document['flights']} a row.*"
     )
     return f"{caption}\n\n{table_of((together[0], *each), PUBLISHED_COLUMNS)}"
-
-
-def _said_of(document: Document) -> str:
-    says = "\n".join(f"- {sentence}" for sentence in sentences(document))
-    return f"`{document['scenario']}`, {document['flights']} flights a row:\n\n{says}"
 
 
 def _is_undeclared(document: Document, row: Document) -> bool:

@@ -1,30 +1,9 @@
 """Which aircraft is meant, where it goes, and where it is sampled."""
 
-from pathlib import Path
-
 import pytest
 
-from beaver_ftc.aircraft import aircraft as loading
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc_aircraft.derive import derivation, outline
-from beaver_ftc_aircraft.derive.derivation import Source
-
-
-def test_only_what_was_derived_is_written_over(tmp_path):
-    source = Source("mine", Path("mine.xml"))
-    assert derivation._target(source, tmp_path) == tmp_path / "mine"
-    target = tmp_path / "mine"
-    target.mkdir()
-    for text in (None, "name: mine\n"):
-        if text:
-            (target / loading.FILE).write_text(text)
-        with pytest.raises(BadInput, match="is there already and was not derived"):
-            derivation._target(source, tmp_path)
-    (target / loading.FILE).write_text(loading.first_line() + "name: mine\n")
-    assert derivation._target(source, tmp_path) == target
-    assert derivation._target(Source("a", Path(), target=tmp_path / "b"), None) == tmp_path / "b"
-    with pytest.raises(BadInput, match=r"^mine: give --out DIR"):
-        derivation._target(source, None)
+from beaver_ftc_aircraft.derive import outline
 
 
 def test_where_to_sample_is_read_from_a_file(tmp_path):

@@ -35,11 +35,11 @@ MODELS = {
 }
 
 
-def pair_of(folder, text, named=None, views=True):
+def pair_of(folder, text, views=True):
     """(model, copy, what is known of the surfaces)."""
     path = foreign.write(folder, text)
     own, absent = derivation._own(Source("navion", path), folder / "own")
-    found = find_surfaces(path, own, named or {})
+    found = find_surfaces(path, own, {})
     if not views:
         by_name = {
             s: {name: usual_view(name, found.travel[s]) for name in of} for s, of in found.seen.items()
@@ -49,9 +49,9 @@ def pair_of(folder, text, named=None, views=True):
     return own, copy, found
 
 
-def turned(fdm, given, speed_fps=185.0):
+def turned(fdm, given):
     """Angular accelerations once all is where it is put."""
-    fdm["ic/h-sl-ft"], fdm["ic/vt-fps"], fdm["ic/alpha-deg"] = 4900.0, speed_fps, 2.0
+    fdm["ic/h-sl-ft"], fdm["ic/vt-fps"], fdm["ic/alpha-deg"] = 4900.0, 185.0, 2.0
     for name, value in given.items():
         fdm[name] = value
     for k in range(60):

@@ -109,11 +109,9 @@ def flown(name):
     return proved(name)[:2]
 
 
-def refusals(name, certificate, log=None):
+def refusals(name, certificate):
     """Why the checker refuses a certificate of this flight."""
-    _, own, scenario = proved(name)
-    given = certificate, own if log is None else log, scenario
-    return [*failures(*given)]
+    return [*failures(certificate, *proved(name)[1:])]
 
 
 def set_at_end(log):

@@ -38,7 +38,7 @@ def scenario(**keys):
 
 
 @contextmanager
-def served(protocol, flown=None, **options):
+def served(protocol, **options):
     """`serve` in a thread: where it listens, what it says; after the block, what came of it."""
     said, came, there = [], [], threading.Event()
 
@@ -48,7 +48,7 @@ def served(protocol, flown=None, **options):
             there.set()
 
     def run():
-        came.append(serve(flown or scenario(), Options(Protocol(protocol), port=0, **options), say))
+        came.append(serve(scenario(), Options(Protocol(protocol), port=0, **options), say))
 
     thread = threading.Thread(target=run)
     thread.start()

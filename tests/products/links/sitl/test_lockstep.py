@@ -60,20 +60,6 @@ def test_each_packet_is_answered_with_its_frame(ardupilot):
     assert ardupilot.body.begun == 1
 
 
-def test_a_packet_sent_again_is_answered_again_and_not_flown(ardupilot):
-    once = [ardupilot.take(k) for k in (0, 1, 1, 1, 2)]
-    assert once == [0.0025, 0.005, 0.005, 0.005, 0.0075]
-    assert (ardupilot.body.frames, ardupilot.counts["repeated"]) == (3, 2)
-
-
-def test_a_packet_that_was_overtaken_is_late(ardupilot):
-    for k in range(10):
-        ardupilot.take(k)
-    assert ardupilot.take(6) is None
-    assert ardupilot.take(10) == pytest.approx(11 / 400)
-    assert (ardupilot.counts["late"], ardupilot.counts["resets"]) == (1, 0)
-
-
 @pytest.mark.parametrize("flown", [5, 500])
 def test_a_count_begun_anew_begins_the_flight_anew(ardupilot, flown):
     """Long after at once; soon after with the second packet, since a late one would look the same."""
@@ -114,19 +100,6 @@ def px4():
     end = Px4(body, link, mavlink, lambda params: (0, "done"))
     autopilot = peers.Px4(lambda told: (0.1, 0.2, 0.3, 0.4), silent=0, armed_after=0)
     return SimpleNamespace(body=body, counts=link.counts, end=end, autopilot=autopilot, link=link)
-
-
-def test_an_answer_of_the_last_stamp_is_flown_once(px4):
-    answer = px4.autopilot.hear(px4.end.connect(0.0))
-    for k in range(5):
-        sent = px4.end.take(answer, 0.004 * k)
-        assert px4.end.take(answer, 0.004 * k) == b""
-        answer = px4.autopilot.hear(sent)
-    assert px4.body.frames == 5
-    assert px4.counts["repeated"] == 5
-    assert px4.autopilot.stamps == [1_000_000 + 4000 * k for k in range(6)]
-    outputs, rate_hz, in_charge = px4.body.given[-1]
-    assert (outputs[:4], rate_hz, in_charge) == (pytest.approx((0.1, 0.2, 0.3, 0.4)), 250.0, True)
 
 
 def kinds_of(packed):

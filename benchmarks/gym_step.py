@@ -18,6 +18,7 @@ import warnings
 import gymnasium
 import numpy as np
 
+import beaver_ftc  # noqa: F401  (registers its environment)
 from beaver_ftc_links.environments import ID
 
 OURS = ID

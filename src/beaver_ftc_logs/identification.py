@@ -63,25 +63,25 @@ def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
         "colour": median_inflation(parts, model),
         "spectrum": density_ratios(parts, model),
     }
-    settings = model.settings.model_copy(update={"credible_mass": mass})
-    return model.model_copy(update={"settings": settings, "identification_results": results})
+    settings = model.settings.model_copy(update={"bounds": mass})
+    return model.model_copy(update={"settings": settings, "identified": results})
 
 
 def add_unseen_noise(model: Model, flights: Sequence[Samples]) -> Model:
     """In moving air the model with noise that no fitted flight had: gusts held within a sample or not, and
     noisier gyros, whose colour follows from the model. A law answers noise; which noise a flight has, and how
     much of it, the flight itself shows (`filtering.recent_scale`)."""
-    if not model.noise_models:
+    if not model.colours:
         return model
-    known = [tuple(noise.ma_coefficients) for noise in model.noise_models]
-    quietest = min((np.array(noise.residual_covariance) for noise in model.noise_models), key=np.linalg.det)
-    powers = [noise.usual_quick_power for noise in model.noise_models if noise.usual_quick_power is not None]
+    known = [tuple(noise.average) for noise in model.colours]
+    quietest = min((np.array(noise.noise) for noise in model.colours), key=np.linalg.det)
+    powers = [noise.quick for noise in model.colours if noise.quick is not None]
     same: dict[str, Any] = {
-        "wider": max(noise.covariance_inflation for noise in model.noise_models),
+        "wider": max(noise.wider for noise in model.colours),
         "misreads": np.max([model.hidden_gain_error_sd(one) for one in known], axis=0).tolist(),
         "quick": min(powers, default=None),
     }
-    models = list(model.noise_models)
+    models = list(model.colours)
     for ma in UNFITTED_MA:
         if ma not in known:
             parts = fitting.fit_parts([whiten_samples(flight, ma) for flight in flights])
@@ -90,7 +90,7 @@ def add_unseen_noise(model: Model, flights: Sequence[Samples]) -> Model:
     for gyro_sd in UNFITTED_GYROS_RAD_S:
         ar, R = gyro_noise.yule_walker_predictor(model, quietest, gyro_sd, fitting.AR_ORDER)
         models.append(NoiseModel(average=[1.0], before=ar.tolist(), noise=R.tolist(), **same))
-    return model.model_copy(update={"noise_models": models})
+    return model.model_copy(update={"colours": models})
 
 
 def assume_law_and_air(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Vehicle, list[str]]:
@@ -177,8 +177,8 @@ def expect_another_day(folds: list[Document], model: Model) -> Document:
         key: {"mean": float(np.mean(each)), "worst": float((max if key == "mean_error" else min)(each))}
         for key, each in values.items()
     }
-    tail = model.fitted_ranges.alarm_peak_tail if model.fitted_ranges is not None else None
-    threshold = model.settings.alarm_threshold
+    tail = model.fitted.tail if model.fitted is not None else None
+    threshold = model.settings.threshold
     if tail is None or threshold is None:
         return expected
     target = model.settings.false_alarms_per_hour or 0.0
@@ -186,7 +186,7 @@ def expect_another_day(folds: list[Document], model: Model) -> Document:
         "false_alarms_per_hour": {"asked": target, **asdict(extremes.false_alarm_rate(tail, threshold))},
         "minutes_left_out": tail.healthy_minutes,
         "minutes_missing": extremes.missing_healthy_minutes(tail, target),
-        **model.identification_results,
+        **model.identified,
     }
 
 
@@ -269,7 +269,7 @@ def _check_units(flights: Sequence[Samples], vehicle: Vehicle) -> None:
 def collinear_names(parts: Sequence[fitting.FitPart], model: Model) -> list[Document]:
     """Regressors whose coefficient's variance the others inflate more than tenfold, worst first; None where
     the others make it up."""
-    Z, _, _ = fitting.stack_data(parts, model.vehicle, model.n_rate_lags, model.n_command_lags)
+    Z, _, _ = fitting.stack_data(parts, model.vehicle, model.history, model.lags)
     factors = variance_inflation(Z[:, 1:])
     pairs = sorted(zip(regressor_names(model), factors.tolist(), strict=True), key=lambda pair: -pair[1])
     return [
@@ -281,20 +281,20 @@ def collinear_names(parts: Sequence[fitting.FitPart], model: Model) -> list[Docu
 
 def regressor_names(model: Model) -> list[str]:
     """Names of the columns of the fit after the constant, in their order."""
-    h = model.n_rate_lags
+    h = model.history
     signals = model.vehicle.regressor_columns
     commands = [(f"command of {'+'.join(group)}",) for group in model.groups]
     lagged = [
         ("pqr", h),
         (signals, model.vehicle.n_signal_lags(h)),
-        *((one, model.n_command_lags) for one in commands),
+        *((one, model.lags) for one in commands),
     ]
     return [f"{name}[-{k}]" for names, most in lagged for k in range(1, most + 1) for name in names]
 
 
 def median_inflation(parts: Sequence[fitting.FitPart], model: Model) -> dict[str, float]:
     """By how much the residual's colour widens the standard errors of the responses: the median, an axis."""
-    n = len(model.groups) * model.n_command_lags
+    n = len(model.groups) * model.lags
     inflation = fitting.fit_of(parts, model).standard_error_inflation[-n:]
     return regression.by_axis(np.median(inflation, axis=0))
 
@@ -315,16 +315,16 @@ def density_ratios(parts: Sequence[fitting.FitPart], model: Model) -> list[Docum
 
 def identification_text(model: Model) -> str:
     """Return the identification as lines of text."""
-    results: Document = dict(model.identification_results)
+    results: Document = dict(model.identified)
     n_samples = sum(flight["samples"] for flight in results["flights"])
     lines = [
         f"{model.vehicle.name}: {n_samples} samples at {model.rate_hz:.3g} Hz, flights: "
         f"{len(results['flights'])}; "
-        f"past samples of the rates: {model.n_rate_lags}, of the commands: {model.n_command_lags}",
+        f"past samples of the rates: {model.history}, of the commands: {model.lags}",
         *(f"  {line}" for line in results.get("assumed", [])),
         *(f"  together, not distinguishable: {', '.join(group)}" for group in model.groups if len(group) > 1),
         *_pressure_lines(model),
-        *dict.fromkeys(map(_noise_text, model.noise_models)),
+        *dict.fromkeys(map(_noise_text, model.colours)),
         *(f"  {line}" for line in trust.unknown_sentences(model)),
         *(f"  {flight['name']}: {note}" for flight in results["flights"] for note in flight["notes"]),
         *map(_fold_text, results["tests"]),
@@ -342,9 +342,9 @@ def identification_text(model: Model) -> str:
 
 
 def _noise_text(noise: NoiseModel) -> str:
-    colour = ", ".join(f"{c:.3g}" for c in noise.ma_coefficients)
+    colour = ", ".join(f"{c:.3g}" for c in noise.average)
     return (
-        f"  noise of the colour {colour}: {noise.covariance_inflation:.2g} times as wide, in squares, as "
+        f"  noise of the colour {colour}: {noise.wider:.2g} times as wide, in squares, as "
         "gains of 10 s left out differ, and other laws may"
     )
 

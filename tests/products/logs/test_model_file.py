@@ -48,7 +48,7 @@ def written(tmp_path, *changes):
 
 
 def test_the_model_itself_is_one(tmp_path):
-    assert load_model(written(tmp_path)).n_command_lags == LAGS
+    assert load_model(written(tmp_path)).lags == LAGS
 
 
 def test_a_file_of_release_1_0_has_keys_that_have_no_effect(tmp_path):

@@ -184,7 +184,7 @@ def expect_another_day(folds: list[Document], model: Model) -> Document:
     target = model.settings.false_alarms_per_hour or 0.0
     return expected | {
         "false_alarms_per_hour": {"asked": target, **asdict(extremes.false_alarm_rate(tail, threshold))},
-        "minutes_left_out": tail.healthy_minutes,
+        "minutes_left_out": tail.minutes,
         "minutes_missing": extremes.missing_healthy_minutes(tail, target),
         **model.identified,
     }

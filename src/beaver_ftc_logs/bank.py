@@ -92,12 +92,12 @@ def build_bank(model: Model) -> HypothesisBank:
                 rows.append((_effect_row(n, {g: level}), GROUP_LOSS, per_kind * share, offset))
     rows += _pair_hypotheses(n, groups)
     if stuck:
-        anywhere = np.diag(np.array(model.residual_covariance)) * settings.jam_rate_offset_sd**2
+        anywhere = np.diag(np.array(model.noise)) * settings.jam_sd**2
         rows.append((np.ones(n), UNKNOWN_OFFSET, _OFFSET_SHARE, anywhere))
     rows.append((np.zeros(n), NO_RESPONSE, _SILENT_SHARE, np.zeros(3)))
     effectiveness, kind, change, offset = (np.array(values) for values in zip(*rows, strict=True))
     change[1:] *= (1.0 - settings.repair_share) / change[1:].sum()
-    rate = settings.effectiveness_changes_per_hour / (3600.0 * model.rate_hz)
+    rate = settings.changes_per_hour / (3600.0 * model.rate_hz)
     own = np.ones_like(effectiveness) if model.vehicle.other_laws else effectiveness
     return HypothesisBank(effectiveness, kind, change, offset, _prior_probabilities(kind, change), rate, own)
 
@@ -112,13 +112,13 @@ def _effect_row(n: int, levels: dict[int, float]) -> Floats:
 def _levels_and_shares(model: Model, g: int) -> tuple[Floats, Floats]:
     """Levels of effectiveness below 1, and the share of each among the group's faults."""
     settings = model.settings
-    labelled = settings.likely_levels.get("+".join(model.groups[g]), [])
-    grid = np.arange(0.0, 1.0 - 0.5 * settings.effectiveness_level_step, settings.effectiveness_level_step)
+    labelled = settings.levels.get("+".join(model.groups[g]), [])
+    grid = np.arange(0.0, 1.0 - 0.5 * settings.level_step, settings.level_step)
     levels = np.unique(np.round(np.concatenate([grid, np.array(labelled, dtype=float)]), 6))
     is_labelled = np.isin(levels, np.round(labelled, 6))
     if not is_labelled.any() or is_labelled.all():
         return levels, np.full(len(levels), 1.0 / len(levels))
-    share = settings.likely_share
+    share = settings.level_share
     return levels, np.where(is_labelled, share / is_labelled.sum(), (1.0 - share) / (~is_labelled).sum())
 
 
@@ -128,7 +128,7 @@ def _offset_variances(model: Model, g: int) -> list[Floats]:
     _, _, B, R = model.as_arrays()
     total = np.abs(B[g]).sum(axis=0) / np.sqrt(np.diag(R))
     ratio = np.clip(total / max(total.max(), MIN_DIVISOR), 0.3, 1.0)
-    variances = {"loss": np.zeros(3), "stuck": np.diag(R) * (model.settings.jam_rate_offset_sd * ratio) ** 2}
+    variances = {"loss": np.zeros(3), "stuck": np.diag(R) * (model.settings.jam_sd * ratio) ** 2}
     return [variances[kind] for kind in model.vehicle.faults]
 
 
@@ -172,20 +172,20 @@ def build_states(model: Model, ma: Sequence[float] = ()) -> StateModel:
     n = len(model.groups)
     _, _, B, R = model.as_arrays()
     r = np.diag(R)
-    shift = B.sum(axis=1) * settings.trim_command_shift_sd
+    shift = B.sum(axis=1) * settings.trim_shift
     P = np.zeros((4 + n, 4 + n))
     P[:3, :3] = np.diag(r * settings.trim_sd**2) + shift.T @ shift
     P[3, 3] = settings.gain_sd**2
-    drift = settings.own_gain_spread**2 + _extra_variance(model)
+    drift = settings.own_gain_sd**2 + _extra_variance(model)
     hidden = model.hidden_gain_error_sd(ma) ** 2
     P[range(4, 4 + n), range(4, 4 + n)] = drift + hidden
     # What the fit misreads stays the same in a flight: the larger spread adds nothing to the drift.
-    own_s = settings.own_gain_return_s * (1.0 + hidden / np.maximum(drift, MIN_DIVISOR))
-    return_s = np.array([np.inf] * 3 + [settings.gain_return_time_s, *own_s])
+    own_s = settings.own_gain_time_s * (1.0 + hidden / np.maximum(drift, MIN_DIVISOR))
+    return_s = np.array([np.inf] * 3 + [settings.gain_time_s, *own_s])
     a = np.exp(-1.0 / (model.rate_hz * return_s))
     walk = (1.0 - a**2) * np.diag(P)
-    walk[:3] = r * np.array(settings.trim_step_sd) ** 2
-    bound = np.array([settings.max_trim_sd] * 3 + [settings.max_gain_sd] * (1 + n))
+    walk[:3] = r * np.array(settings.trim_walk) ** 2
+    bound = np.array([settings.trim_bound] * 3 + [settings.gain_bound] * (1 + n))
     x = np.array([0.0, 0.0, 0.0, 1.0] + [0.0] * n)
     return StateModel(x, P, np.sqrt(np.diag(P)) * bound, a, walk)
 
@@ -193,9 +193,9 @@ def build_states(model: Model, ma: Sequence[float] = ()) -> StateModel:
 def _extra_variance(model: Model) -> Floats:
     """Variance of each group's gain by which it is known worse than to a step between levels, (G,)."""
     variance = np.zeros(len(model.groups))
-    if model.fitted_ranges is not None and model.fitted_ranges.group_gain_sd:
-        variance += np.array(model.fitted_ranges.group_gain_sd) ** 2
-    return np.maximum(variance - model.settings.effectiveness_level_step**2, 0.0)
+    if model.fitted is not None and model.fitted.gain_sd:
+        variance += np.array(model.fitted.gain_sd) ** 2
+    return np.maximum(variance - model.settings.level_step**2, 0.0)
 
 
 class ResidualNoise(NamedTuple):
@@ -225,9 +225,9 @@ def build_noise(model: Model, ma: Sequence[float] = ()) -> ResidualNoise:
     return ResidualNoise(
         intercept_rad_s=model.whitened_intercept(ma),
         covariance=model.as_arrays()[3],
-        effective_sample_share=settings.effective_sample_share,
-        t_degrees_of_freedom=settings.t_degrees_of_freedom,
-        scale_memory_samples=settings.noise_scale_memory_s * model.rate_hz,
+        effective_sample_share=settings.power,
+        t_degrees_of_freedom=settings.tail,
+        scale_memory_samples=settings.noise_memory_s * model.rate_hz,
         min_variance_scale=_MIN_NOISE_SCALE,
         max_variance_scale=_MAX_NOISE_SCALE,
         max_squared_residual=_MAX_SQUARE if len(model.residual_ar_coefficients(ma)) else np.inf,

@@ -80,8 +80,8 @@ def identify(
         "model": str(out),
         "page": str(page),
         "mixing": mixing,
-        "identified": model.identification_results,
-        "settings": model.settings.model_dump(by_alias=True),
+        "identified": model.identified,
+        "settings": model.settings.model_dump(),
     }
     long = [f"  {samples.name}: {samples.notes[0]}" for samples in logs if samples.n_log_parts > 1]
     answer(

@@ -93,9 +93,9 @@ def _rows_of_estimate(samples: Samples, model: Model, e: Floats, sd: Floats) -> 
     low, high = (np.clip(e + sign * _SD_OF_90_PERCENT * sd, 0.0, 1.0) for sign in (-1.0, 1.0))
     nearest = np.clip(e, 0.0, 1.0)
     lost = e + _MIN_LOSS_SD * sd < 1.0
-    if model.settings.likely_levels:
+    if model.settings.levels:
         for g, group in enumerate(model.groups):
-            labelled = model.settings.likely_levels.get("+".join(group))
+            labelled = model.settings.levels.get("+".join(group))
             levels = np.array([*labelled, 1.0]) if labelled else np.unique(bank.effectiveness[:, g])
             nearest[:, g] = levels[np.abs(nearest[:, g, None] - levels).argmin(axis=1)]
         lost = nearest < 1.0

@@ -23,7 +23,7 @@ from beaver_ftc_logs.bank import GROUP_LOSS, UNKNOWN_OFFSET, HypothesisBank, bui
 from beaver_ftc_logs.filtering import bank_posterior, fault_evidence, page_cusum
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats, Ints, Mask
-from beaver_ftc_logs.regression import expand_groups, innovations
+from beaver_ftc_logs.regression import expand_groups
 from beaver_ftc_logs.samples import Samples
 
 _LOG_RATE_TOLERANCE = 0.25
@@ -32,7 +32,6 @@ _NAME_SHARE = 0.5
 _EXCLUSION_RISK = 0.001
 """Chance of a name without the surface at fault: a likelihood ratio of two groups passes 1000 against the
 true one with that chance at most (Markov's inequality), where the model is right."""
-_DIRECTION_WINDOW_S = 1.0
 _COMMAND_ROUNDING = 1e-6
 """Share of travel that a command moves by rounding alone."""
 _NO_RESPONSE_LIMIT = 0.5
@@ -137,8 +136,6 @@ def _diagnose_checked_log(samples: Samples, model: Model) -> LogRows:
     P, _, _ = bank_posterior(known, model, bank)
     silent = P[:, bank.no_response_hypothesis_index] > _NO_RESPONSE_LIMIT
     rows = rows_of_posterior(samples, model, bank, P)
-    if model.vehicle.other_laws and model.settings.alarm_threshold is not None and not model.noise_models:
-        rows = _withdraw_contradicted(known, model, rows, model.settings.alarm_threshold)
     return finish_rows(samples, model, rows, silent)
 
 
@@ -177,14 +174,14 @@ def _add_unknown_surfaces(samples: Samples, model: Model, rows: LogRows) -> LogR
         in_name = np.array([surface in named or bool(addable[k, i]) for i, surface in enumerate(surfaces)])
         names[k] = "+".join(compress(surfaces, in_name))
         of_one_group = any(named <= set(group) for group in model.groups)
-        if in_name.sum() > len(named) or (model.settings.one_faulty_group and not of_one_group):
+        if in_name.sum() > len(named) or (model.settings.one_group and not of_one_group):
             high[k, in_name] = 1.0
     return replace(rows, isolated_surfaces=names, effectiveness_high=high)
 
 
 def _withdraw_by_engine(samples: Samples, model: Model, rows: LogRows) -> LogRows:
     """Rows in which no surface is named where an engine may have failed."""
-    unpowered_mps = model.fitted_ranges.unpowered_climb_mps if model.fitted_ranges else None
+    unpowered_mps = model.fitted.energy_climb if model.fitted else None
     rate_mps = samples.energy_height_rate_mps
     if unpowered_mps is None or rate_mps is None:
         return rows
@@ -192,35 +189,6 @@ def _withdraw_by_engine(samples: Samples, model: Model, rows: LogRows) -> LogRow
         rows.t_s, rows.faulty, rows.isolated_surfaces, rate_mps, unpowered_mps, rows.evidence_start_time_s
     )
     return replace(rows.without_estimate(named != rows.isolated_surfaces), isolated_surfaces=named)
-
-
-def _withdraw_contradicted(samples: Samples, model: Model, rows: LogRows, least: float) -> LogRows:
-    """Rows with the name `unknown` where the residual of the last second lies along another group.
-
-    A faulty surface, be it stuck, biased or oscillating, changes the rates along the direction in which it
-    turns the aircraft when healthy. A name is withdrawn where the direction of another group explains the
-    residual better by the log likelihood `least`, whatever the course of time along it. Not used in moving
-    air, since gusts have directions too.
-
-        gain_g = power / 2 sum over the last second of (r' m_g / |m_g|)^2
-
-    r (n, 3): residual in standard deviations. m (3, G): whitened direction of each group.
-    """
-    flight = innovations(samples, model)
-    r = flight.e @ flight.W
-    m = (np.array(model.command_response).sum(axis=1) @ flight.W).T
-    norms = np.linalg.norm(m, axis=0)
-    p = (r @ (m / np.maximum(norms, MIN_DIVISOR))) ** 2
-    total = np.cumsum(p, axis=0)
-    begin = np.maximum(np.arange(len(total)) - round(_DIRECTION_WINDOW_S * model.rate_hz), 0)
-    gain = 0.5 * model.settings.effective_sample_share * (total - total[begin])
-    best = gain.max(axis=1)
-    wrong = np.zeros(len(r), dtype=bool)
-    for g, group in enumerate(model.groups):
-        names_group = [not set(group).isdisjoint(name.split("+")) for name in rows.isolated_surfaces]
-        wrong |= np.array(names_group, dtype=bool) & (best - gain[:, g] > least)
-    names = np.where(wrong, UNKNOWN_SURFACE, rows.isolated_surfaces)
-    return replace(rows.without_estimate(wrong), isolated_surfaces=names)
 
 
 def check_log_fits_model(samples: Samples, model: Model) -> None:
@@ -231,7 +199,7 @@ def check_log_fits_model(samples: Samples, model: Model) -> None:
             f"{samples.name}: has samples at {rate_hz:.3g} Hz, allowed: within {_LOG_RATE_TOLERANCE:.0%} of "
             f"the {model.rate_hz:.3g} Hz the model was identified at"
         )
-    trust.refuse_rate_unit(samples, model.fitted_ranges)
+    trust.refuse_rate_unit(samples, model.fitted)
     trust.refuse_columns(samples, model)
 
 
@@ -241,12 +209,12 @@ def rows_of_posterior(samples: Samples, model: Model, bank: HypothesisBank, P: F
     p_fault = P[:, bank.is_fault_hypothesis].sum(axis=1)
     P_live = P[:, : bank.no_response_hypothesis_index] / np.maximum(1.0 - p_silent, MIN_DIVISOR)[:, None]
     calm = P[:, 0] + p_silent > 0.5
-    mu = model.settings.alarm_threshold
+    mu = model.settings.threshold
     steps = fault_evidence(P, bank)
     evidence = page_cusum(steps, mu or np.inf)
-    alarmed = nameable = _held_long_enough(p_fault >= model.settings.alarm_probability, model)
+    alarmed = nameable = _held_long_enough(p_fault >= model.settings.alarm, model)
     if mu is not None:
-        mu_name = model.settings.name_evidence_ratio * mu
+        mu_name = model.settings.name_evidence * mu
         alarmed = (evidence >= mu) & ~calm
         nameable = (page_cusum(steps, mu_name) >= mu_name) & ~calm
     faulty = _latched(alarmed, calm).astype(np.int64)
@@ -278,7 +246,7 @@ def _group_bounds(bank: HypothesisBank, P_live: Floats, g: int, model: Model) ->
     if model.vehicle.other_laws:  # how rare faults are says nothing of a flight with one: all levels alike
         p = p / _group_levels(bank, bank.prior_probability[None, : bank.no_response_hypothesis_index], g)[1]
         p /= p.sum(axis=1, keepdims=True)
-    low, high = _credible_bounds(levels, p, model.settings.credible_mass)
+    low, high = _credible_bounds(levels, p, model.settings.bounds)
     if len(model.groups[g]) > 1:
         low, high = np.where(low < low.max(initial=0.0), 0.0, low), np.ones_like(high)
     # the median, with half of the probability on either side: the least mean absolute error
@@ -287,7 +255,7 @@ def _group_bounds(bank: HypothesisBank, P_live: Floats, g: int, model: Model) ->
 
 def _held_long_enough(holds: Mask, model: Model) -> Mask:
     """Return the rows at which a condition holds and has held for long enough, (n,)."""
-    n = round(model.settings.confirmation_s * model.rate_hz)
+    n = round(model.settings.hold_s * model.rate_hz)
     held = np.arange(len(holds)) - np.maximum.accumulate(np.where(holds, -1, np.arange(len(holds))))
     return np.asarray(holds & (held > n))
 
@@ -334,7 +302,7 @@ def _surfaces_at_fault(
     faults = [bank.is_fault_of_group(g) for g in range(len(model.groups))]
     share = np.column_stack([P[:, of_group].sum(axis=1) / p_fault for of_group in faults])
     likely = (share > _NAME_SHARE) & nameable[:, None]
-    if model.settings.one_faulty_group:
+    if model.settings.one_group:
         is_loss = bank.hypothesis_kind == GROUP_LOSS
         p_loss = np.column_stack([P[:, of_group & is_loss].sum(axis=1) for of_group in faults])
         likely = (p_loss > _EXCLUSION_RISK * p_loss.max(axis=1, keepdims=True)) & nameable[:, None]
@@ -343,14 +311,14 @@ def _surfaces_at_fault(
     names = join_names(likely, ["+".join(group) for group in model.groups])
     named = np.full(len(P), "", dtype=object)
     offset = P[:, bank.hypothesis_kind == UNKNOWN_OFFSET].sum(axis=1) > p_fault
-    n_hold = round(model.settings.rename_hold_s * model.rate_hz)
+    n_hold = round(model.settings.rename_s * model.rate_hz)
     n_same = 0
     for k in np.flatnonzero(faulty):
         new, old = names[k] or UNKNOWN_SURFACE, named[k - 1] if k else ""
         n_same = n_same + 1 if k and new == (names[k - 1] or UNKNOWN_SURFACE) else 0
         # what was once excluded stays so: Ville's inequality bounds the chance of a wrong exclusion
         named_again = new == UNKNOWN_SURFACE or set(old.split("+")) <= set(new.split("+"))
-        waits = n_same < n_hold or (model.settings.one_faulty_group and named_again)
+        waits = n_same < n_hold or (model.settings.one_group and named_again)
         # an offset of no known cause, or a name that has not stood, while the alarm does: nothing new
         keeps = old and (offset[k] or (old != UNKNOWN_SURFACE and waits))
         named[k] = old if keeps else new

@@ -49,14 +49,10 @@ PeaksAndHours = tuple[Floats, float]
 class PeakTail(Section):
     """The highest peaks of the alarm statistic on held-out flights."""
 
-    tail_start_level: Number = Field(description="the level, in natural logarithms of odds", alias="level")
-    excess_over_level: list[Number] = Field(
-        min_length=1, description="by how much each peak is over it", alias="excess"
-    )
-    healthy_minutes: Number = Field(gt=0, description="of healthy flight they were seen in", alias="minutes")
-    overdispersion: Number = Field(
-        1.0, ge=1, description="how much more the flights differ than by chance", alias="dispersion"
-    )
+    level: Number = Field(description="the level, in natural logarithms of odds")
+    excess: list[Number] = Field(min_length=1, description="by how much each peak is over it")
+    minutes: Number = Field(gt=0, description="of healthy flight they were seen in")
+    dispersion: Number = Field(1.0, ge=1, description="how much more the flights differ than by chance")
 
 
 @dataclass(frozen=True)
@@ -105,7 +101,7 @@ def _overdispersion(flights: Sequence[PeaksAndHours]) -> float:
 def false_alarm_rate(tail: PeakTail, threshold: float) -> FalseAlarmRate:
     """False alarms an hour at a threshold not below the tail's level."""
     xi, sigma, p = _pareto_posterior(tail)
-    rates = np.outer(_exceedance(threshold - tail.tail_start_level, xi, sigma), _rate_quantiles(tail)).ravel()
+    rates = np.outer(_exceedance(threshold - tail.level, xi, sigma), _rate_quantiles(tail)).ravel()
     order = np.argsort(rates)
     weights = np.repeat(p, len(_RATE_QUANTILES)) / len(_RATE_QUANTILES)
     index = np.searchsorted(np.cumsum(weights[order]), np.array(_INTERVAL) - _PROBABILITY_ROUNDING)
@@ -122,11 +118,11 @@ def threshold_for_rate(tail: PeakTail, rate: float) -> float:
     """
     from scipy.stats import poisson
 
-    expected = rate * tail.healthy_minutes / 60.0
+    expected = rate * tail.minutes / 60.0
     n = int(poisson.ppf(1.0 - _MORE_ALARMS_CHANCE, expected))
-    z = sorted(tail.excess_over_level, reverse=True)
+    z = sorted(tail.excess, reverse=True)
     observed = z[n] if n < len(z) else 0.0
-    return tail.tail_start_level + max(observed, _excess_for_rate(tail, rate))
+    return tail.level + max(observed, _excess_for_rate(tail, rate))
 
 
 def _excess_for_rate(tail: PeakTail, rate: float) -> float:
@@ -157,25 +153,25 @@ def lorden_threshold(rate_hz: float, rate: float) -> float:
 
 def missing_healthy_minutes(tail: PeakTail, rate: float) -> float:
     """Minutes of healthy flight that are missing to show the requested rate without a fitted tail."""
-    return max(60.0 * RULED_OUT_COUNT / rate - tail.healthy_minutes, 0.0)
+    return max(60.0 * RULED_OUT_COUNT / rate - tail.minutes, 0.0)
 
 
 def _rate_quantiles(tail: PeakTail) -> Floats:
     """Quantiles of the posterior of the number of peaks over the level in an hour, at even probabilities."""
     from scipy.stats import gamma
 
-    shape = len(tail.excess_over_level) / tail.overdispersion + 0.5
-    return np.asarray(gamma.ppf(_RATE_QUANTILES, shape) * tail.overdispersion / (tail.healthy_minutes / 60.0))
+    shape = len(tail.excess) / tail.dispersion + 0.5
+    return np.asarray(gamma.ppf(_RATE_QUANTILES, shape) * tail.dispersion / (tail.minutes / 60.0))
 
 
 def _pareto_posterior(tail: PeakTail) -> tuple[Floats, Floats, Floats]:
     """xi, sigma and p of each point of the grid."""
     from scipy.stats import genpareto
 
-    z = np.array(tail.excess_over_level)
+    z = np.array(tail.excess)
     scales = max(float(z.mean()), MIN_DIVISOR) * _SCALE_RATIOS
     xi, sigma = (grid.ravel() for grid in np.meshgrid(_SHAPE_GRID, scales, indexing="ij"))
-    ll = genpareto.logpdf(z[:, None], xi, scale=sigma).sum(axis=0) / tail.overdispersion
+    ll = genpareto.logpdf(z[:, None], xi, scale=sigma).sum(axis=0) / tail.dispersion
     ll -= 0.5 * (xi / _SHAPE_SD) ** 2
     p = np.exp(ll - ll.max())
     return xi, sigma, p / p.sum()

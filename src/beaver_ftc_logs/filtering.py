@@ -64,8 +64,8 @@ def bank_posterior(samples: Samples, model: Model, bank: HypothesisBank) -> tupl
     to the last sample at which its weight is not negligible: within a second most become far less likely than
     another, and stay so.
     """
-    if not model.noise_models or samples.noise_ma_coefficients:
-        delays = model.settings.command_delays_s
+    if not model.colours or samples.noise_ma_coefficients:
+        delays = model.settings.delays_s
         flights = [innovations(_with_command_delay(samples, delay_s), model) for delay_s in delays]
         runs = [run_flight(flight, model, bank) for flight in flights]
         return _average_runs(list(model_weights([run[3] for run in runs], model.rate_hz)), runs)
@@ -95,9 +95,9 @@ def _noise_likelihood(flight: Innovations, model: Model) -> Floats:
     healthy; by the covariance of the fit, without its inflation."""
     q = flight.quick_scale(model)
     d2 = ((flight.e @ flight.W) ** 2).sum(axis=1) / q
-    nu = model.settings.t_degrees_of_freedom
+    nu = model.settings.tail
     ll = -0.5 * ((nu + 3.0) * np.log1p(d2 / nu) + 3.0 * np.log(q)) - flight.log_size
-    return np.where(flight.is_known, model.settings.effective_sample_share * ll, 0.0)
+    return np.where(flight.is_known, model.settings.power * ll, 0.0)
 
 
 def fault_evidence(p: Floats, bank: HypothesisBank) -> Floats:

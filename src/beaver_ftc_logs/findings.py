@@ -47,7 +47,7 @@ def verdict_document(samples: Samples, model: Model, rows: LogRows) -> Document:
         "events": fault_events(rows, list(model.vehicle.surfaces)),
         "can_separate": [*trust.unknown_sentences(model), *isolability_sentences(isolable)],
         "isolability": isolable,
-        "settings": model.settings.model_dump(by_alias=True),
+        "settings": model.settings.model_dump(),
         "notes": list(samples.notes),
     }
 
@@ -192,7 +192,7 @@ def isolability_document(samples: Samples, model: Model) -> Document:
 def _white_responses(samples: Samples, model: Model) -> Floats:
     """Each group's share of the rates in standard deviations of the noise, (n, G, 3)."""
     flight = innovations(samples, model)
-    share = model.settings.effective_sample_share
+    share = model.settings.power
     return np.asarray(flight.F[flight.is_known] @ flight.W * np.sqrt(share))
 
 
@@ -227,8 +227,8 @@ def _alarm_odds(model: Model, bank: HypothesisBank, g: int, dt_s: float) -> floa
     shares = bank.transition_share[bank.is_fault_of_group(g)]
     if not len(shares):
         return float("inf")
-    p = settings.effectiveness_changes_per_hour * dt_s / 3600.0 * float(np.median(shares))
-    return float(np.log(settings.alarm_probability / (1.0 - settings.alarm_probability)) - np.log(p))
+    p = settings.changes_per_hour * dt_s / 3600.0 * float(np.median(shares))
+    return float(np.log(settings.alarm / (1.0 - settings.alarm)) - np.log(p))
 
 
 def _smallest_losses(J: float, odds: float) -> dict[str, float | None]:

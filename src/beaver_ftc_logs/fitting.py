@@ -168,22 +168,19 @@ def fit_model(parts: Sequence[FitPart], vehicle: Vehicle, settings: FilterSettin
     bic = bic_by_order(parts, vehicle)
     model = _model_of_order(parts, vehicle, *min(bic, key=lambda order: bic[order]))
     model = model.model_copy(update={"settings": settings or estimate_filter_settings(parts, model)})
-    return _with_inflated_noise(parts, model) if model.noise_models else model
+    return _with_inflated_noise(parts, model) if model.colours else model
 
 
 def refit(parts: Sequence[FitPart], model: Model) -> Model:
     """A model of the same order and settings, fitted to other flights."""
-    refitted = _model_of_order(parts, model.vehicle, model.n_rate_lags, model.n_command_lags)
+    refitted = _model_of_order(parts, model.vehicle, model.history, model.lags)
     return _with_inflation(refitted.model_copy(update={"settings": model.settings}), model.inflation_of)
 
 
 def _with_inflation(model: Model, inflation_of: Callable[[Sequence[float]], float]) -> Model:
     """The model with so many times as wide a noise of each moving average."""
-    models = [
-        noise.model_copy(update={"covariance_inflation": inflation_of(noise.ma_coefficients)})
-        for noise in model.noise_models
-    ]
-    return model.model_copy(update={"noise_models": models})
+    models = [noise.model_copy(update={"wider": inflation_of(noise.average)}) for noise in model.colours]
+    return model.model_copy(update={"colours": models})
 
 
 def held_out_folds(parts: Sequence[FitPart], model: Model) -> Iterator[tuple[Model, FitPart]]:
@@ -193,7 +190,7 @@ def held_out_folds(parts: Sequence[FitPart], model: Model) -> Iterator[tuple[Mod
     for fitted, held_out, _ in validation_folds(parts, _MAX_SPLITS):
         gain_sd = group_gain_sd(fit_of(fitted, model), model).tolist()
         ranges = FittedRanges(commands=[], rates=[], gain_sd=gain_sd, tied=tied)
-        yield refit(fitted, model).model_copy(update={"fitted_ranges": ranges}), held_out
+        yield refit(fitted, model).model_copy(update={"fitted": ranges}), held_out
 
 
 def bic_by_order(parts: Sequence[FitPart], vehicle: Vehicle) -> dict[tuple[int, int], float]:
@@ -227,7 +224,7 @@ def _order_columns(vehicle: Vehicle, h: int, L: int) -> NDArray[np.int64]:
 
 def fit_of(parts: Sequence[FitPart], model: Model) -> regression.Regression:
     """Least squares of a model's order over all flights."""
-    return fit_order(parts, model.vehicle, model.n_rate_lags, model.n_command_lags)
+    return fit_order(parts, model.vehicle, model.history, model.lags)
 
 
 @_once
@@ -285,10 +282,10 @@ def _model_of_order(parts: Sequence[FitPart], vehicle: Vehicle, h: int, L: int) 
     )
     colours = sorted({part.samples.noise_ma_coefficients for part in parts} - {()})
     noises = [_fit_noise_model(_parts_in(parts, ma), model, list(ma)) for ma in colours]
-    model = model.model_copy(update={"noise_models": noises})
+    model = model.model_copy(update={"colours": noises})
     if vehicle.other_laws:
-        noises = [_with_errors(_parts_in(parts, noise.ma_coefficients), model, noise) for noise in noises]
-    return model.model_copy(update={"noise_models": noises})
+        noises = [_with_errors(_parts_in(parts, noise.average), model, noise) for noise in noises]
+    return model.model_copy(update={"colours": noises})
 
 
 def _with_errors(own: Sequence[FitPart], model: Model, noise: NoiseModel) -> NoiseModel:
@@ -298,8 +295,8 @@ def _with_errors(own: Sequence[FitPart], model: Model, noise: NoiseModel) -> Noi
     powers = np.concatenate([part.innovations(model).quick_power(model.rate_hz) for part in own])
     return noise.model_copy(
         update={
-            "misread_shares": hidden_errors(own, model, noise),
-            "usual_quick_power": float(np.quantile(powers, _USUAL_SHARE)),
+            "misreads": hidden_errors(own, model, noise),
+            "quick": float(np.quantile(powers, _USUAL_SHARE)),
         }
     )
 
@@ -346,7 +343,7 @@ def hidden_errors(own: Sequence[FitPart], model: Model, noise: NoiseModel) -> li
     """
     e = one_step_residuals(own, model)
     powers = [_centred(part.innovations(model).F) ** 2 for part in own]
-    r = np.diag(np.array(noise.residual_covariance))
+    r = np.diag(np.array(noise.noise))
     p = np.vstack(powers).mean(axis=0) / r
     q = np.maximum(e.var(axis=0) / r - 1.0, 0.0)
     most = np.minimum(np.sqrt(p @ q) / np.maximum(p.sum(axis=1), MIN_DIVISOR), _GAIN_SD_CAP)
@@ -373,7 +370,7 @@ def estimate_filter_settings(parts: Sequence[FitPart], model: Model) -> FilterSe
     """Estimate the settings of later faults from the flights: levels seen, and how often they changed."""
     moving, other_laws = model.vehicle.moving_air, model.vehicle.other_laws
     extra: dict[str, Any] = _OTHER_LAWS | (_MOVING_AIR if moving else {}) if other_laws else {}
-    if other_laws and model.noise_models:
+    if other_laws and model.colours:
         extra |= {"quick_error": quick_error_share(parts, model)}
     extra |= {"delays_s": [d / model.rate_hz for d in ((0.0,) if moving else _DELAYS_SAMPLES)]}
     surfaces = list(model.vehicle.surfaces)
@@ -384,7 +381,7 @@ def estimate_filter_settings(parts: Sequence[FitPart], model: Model) -> FilterSe
         changed_to = [level for each in labelled.values() for one in each for level in one[1:]]
         n, hours = len(changed_to), sum(part.is_usable.sum() * part.samples.dt_s for part in parts) / 3600.0
         # A flight may be tested less hard than these: the rate is the geometric mean of theirs and the usual.
-        rate = np.sqrt((n + 1) / hours * FilterSettings().effectiveness_changes_per_hour)
+        rate = np.sqrt((n + 1) / hours * FilterSettings().changes_per_hour)
         repair_share = (changed_to.count(1.0) + _N_PRIOR_CHANGES / 2) / (n + _N_PRIOR_CHANGES)
         seen = {"levels": levels, "changes_per_hour": float(rate), "repair_share": repair_share}
         return FilterSettings(**(_OTHER_DAYS | extra | seen), power=_POWER_LABELLED)
@@ -519,7 +516,7 @@ def _estimate_trim_walk(parts: Sequence[FitPart], model: Model) -> list[float]:
                 means = g[begin:end][: (end - begin) // n * n].reshape(-1, n, 3).mean(axis=1)
                 sums[i] += (np.diff(means, axis=0) ** 2).sum(axis=0)
                 counts[i] += max(len(means) - 1, 0)
-    usual = np.array(FilterSettings().trim_step_sd)
+    usual = np.array(FilterSettings().trim_walk)
     if not counts.all():
         return usual.tolist()
     v1, v2 = sums / counts[:, None]
@@ -579,15 +576,15 @@ def add_ranges_and_threshold(parts: Sequence[FitPart], model: Model) -> Model:
     gain_sd = np.minimum(np.sqrt(variance), _GAIN_SD_CAP)
     tail = extremes.fit_peak_tail(peaks)
     ranges = trust.compute_fitted_ranges(parts, model, gain_sd).model_copy(
-        update={"alarm_peak_tail": tail, "misread_gain": misread}
+        update={"tail": tail, "misread": misread}
     )
     rate, threshold = _alarm_rate_and_threshold(model, tail, peaks)
-    alarm = {"false_alarms_per_hour": rate, "alarm_threshold": threshold}
+    alarm = {"false_alarms_per_hour": rate, "threshold": threshold}
     return model.model_copy(
         update={
-            "fitted_ranges": ranges,
+            "fitted": ranges,
             "settings": model.settings.model_copy(update=alarm),
-            "identification_results": dict(_cross_validate(peaks, rate, model)),
+            "identified": dict(_cross_validate(peaks, rate, model)),
         }
     )
 
@@ -598,7 +595,7 @@ def _alarm_rate_and_threshold(
     """The rate of false alarms, 1/h, that the vehicle file asks for or that is usual, and the evidence at
     which health reaches it. Raises BadInput if the flights are too short to tell the rate asked for."""
     requested = model.vehicle.false_alarms_per_hour
-    target = _DEFAULT_FALSE_ALARMS if requested is None and not model.settings.likely_levels else requested
+    target = _DEFAULT_FALSE_ALARMS if requested is None and not model.settings.levels else requested
     if tail is None and requested is not None:
         minutes = 60.0 * sum(hours for _, hours in peaks)
         reason = f"{minutes:.1f} min of health left out have too few peaks of the evidence to tell"
@@ -614,13 +611,13 @@ def _max_gain_bias(parts: Sequence[FitPart], model: Model) -> Floats:
     law feeds it back to the surfaces, and least squares takes it for their answer, at most so much of it as
     the standard deviation of one is of the other's; a law that feeds back otherwise shows the difference.
     """
-    if not model.noise_models:
+    if not model.colours:
         return np.zeros(len(model.groups))
     share = 0.0
-    for noise in model.noise_models:
-        e = one_step_residuals(_parts_in(parts, noise.ma_coefficients), model)
-        chance = 3.0 * AR_ORDER / len(e) if noise.ar_coefficients else 0.0
-        log_det = np.linalg.slogdet(np.array(noise.residual_covariance))[1]
+    for noise in model.colours:
+        e = one_step_residuals(_parts_in(parts, noise.average), model)
+        chance = 3.0 * AR_ORDER / len(e) if noise.before else 0.0
+        log_det = np.linalg.slogdet(np.array(noise.noise))[1]
         log_ratio = log_det - np.linalg.slogdet(np.cov(e.T))[1]
         share = max(share, 1.0 - float(np.exp(log_ratio / 3.0)) - chance)
     untied = trust.effect_powers(parts, model)[1]
@@ -697,7 +694,7 @@ def group_gain_sd(fit: regression.Regression, model: Model) -> Floats:
     Responses z with errors of covariance C tell their factor with the variance 1 / (z' C^-1 z), both in the
     standard errors s (L, 3) of the coefficients; b (3,) is the sum over lags, in sd of the noise.
     """
-    n, L = len(model.groups), model.n_command_lags
+    n, L = len(model.groups), model.lags
     first = len(fit.coefficients) - n * L
     sd = np.sqrt(np.maximum(np.diag(fit.residual_covariance), MIN_DIVISOR))
     gain_sd = np.zeros(n)
@@ -727,7 +724,7 @@ def fold_qualities(parts: Sequence[FitPart], model: Model) -> list[Document]:
 def score_folds(parts: Sequence[FitPart], model: Model) -> tuple[list[Document], float]:
     """One entry a fold, and the posterior mass with which the bounds hold the labels as they should."""
     entries = fold_qualities(parts, model)
-    usual = model.settings.credible_mass
+    usual = model.settings.bounds
     coverage: list[list[float]] = []
     for entry, (fitted, held_out, _) in zip(entries, validation_folds(parts), strict=True):
         labels = np.where(held_out.is_usable[:, None], held_out.samples.labels, np.nan)
@@ -744,8 +741,8 @@ def _scores_by_mass(model: Model, held_out: FitPart, labels: Floats) -> dict[flo
     bank = build_bank(model)
     p, _, _ = bank_posterior(held_out.samples, model, bank)
     scores = {}
-    for mass in {*_CREDIBLE_MASSES, model.settings.credible_mass}:
-        settings = model.settings.model_copy(update={"credible_mass": mass})
+    for mass in {*_CREDIBLE_MASSES, model.settings.bounds}:
+        settings = model.settings.model_copy(update={"bounds": mass})
         candidate = model.model_copy(update={"settings": settings})
         rows = rows_of_posterior(held_out.samples, candidate, bank, p)
         scores[mass] = score_against_labels(rows, labels)
@@ -768,7 +765,7 @@ def prediction_quality(model: Model, held_out: FitPart) -> Document:
 
 def one_step_residual(model: Model, part: FitPart) -> tuple[NDArray[np.int64], Floats]:
     """Places (n,) of the samples in use, and their one-step residuals (n, 3), whatever is known of noise."""
-    flight = part.innovations(model.model_copy(update={"noise_models": []}))
+    flight = part.innovations(model.model_copy(update={"colours": []}))
     return flight.rows, flight.e
 
 

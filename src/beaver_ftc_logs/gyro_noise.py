@@ -38,9 +38,9 @@ def yule_walker_predictor(model: Model, Q: Floats, s: float, L: int) -> tuple[Fl
 
 def _autocovariance(model: Model, Q: Floats, s: float, L: int) -> NDArray[np.float64]:
     """R[t] = E w[k] w[k-t]' for lags t = 0 ... L, (L + 1, 3, 3): s2 sum_j M[t+j] M[j]', and Q at t = 0."""
-    A = np.array(model.past_coefficients)[: 3 * model.n_rate_lags].reshape(model.n_rate_lags, 3, 3)
+    A = np.array(model.past)[: 3 * model.history].reshape(model.history, 3, 3)
     M = np.concatenate([np.eye(3)[None], -A.transpose(0, 2, 1)])
-    R = np.zeros((max(L, model.n_rate_lags) + 1, 3, 3))
+    R = np.zeros((max(L, model.history) + 1, 3, 3))
     for t in range(len(M)):
         R[t] = s**2 * np.einsum("jab,jcb->ac", M[t:], M[: len(M) - t])
     R[0] += Q

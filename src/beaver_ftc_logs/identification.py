@@ -17,7 +17,7 @@ from beaver_ftc.results import Document
 from beaver_ftc_logs import extremes, fitting, gyro_noise, regression, trust
 from beaver_ftc_logs.model import FittedRanges, Model, NoiseModel
 from beaver_ftc_logs.recording import Floats
-from beaver_ftc_logs.regression import group_indices, spectral_density, variance_inflation
+from beaver_ftc_logs.regression import spectral_density, variance_inflation
 from beaver_ftc_logs.samples import (
     NOISE_MA_CANDIDATES,
     UNFITTED_GYROS_RAD_S,
@@ -33,11 +33,8 @@ _SCORES = ("classes", "healthy_or_faulty", "mean_error", "held_by_bounds")
 _DECISIVE_BIC = 10.0
 """By how much a criterion must be less: odds of 150 to 1 [Kass1995, section 3.2]."""
 _SPECTRUM_BANDS_HZ = ((0.0, 0.1), (0.1, 0.5), (0.5, 1.0), (1.0, 2.0), (2.0, 5.0), (5.0, 10.0))
-FREE_RUN_WINDOW_S = 2.0
-_MIN_FREE_RUNS = 400
 _AIRSPEED_POWERS = (0.0, 1.0, 3.0)
 _MAX_ROUNDS = 8
-_MAX_DELAY_S, _MIN_SERVO_LAG_S, _MAX_SERVO_LAG_S = 0.6, 0.005, 1.0
 
 
 def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
@@ -65,27 +62,26 @@ def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
         "collinear": collinear_names(parts, model),
         "colour": median_inflation(parts, model),
         "spectrum": density_ratios(parts, model),
-        "output_error": fit_output_error(parts, group_indices(model)),
     }
-    settings = model.settings.model_copy(update={"credible_mass": mass})
-    return model.model_copy(update={"settings": settings, "identification_results": results})
+    settings = model.settings.model_copy(update={"bounds": mass})
+    return model.model_copy(update={"settings": settings, "identified": results})
 
 
 def add_unseen_noise(model: Model, flights: Sequence[Samples]) -> Model:
     """In moving air the model with noise that no fitted flight had: gusts held within a sample or not, and
     noisier gyros, whose colour follows from the model. A law answers noise; which noise a flight has, and how
     much of it, the flight itself shows (`filtering.recent_scale`)."""
-    if not model.noise_models:
+    if not model.colours:
         return model
-    known = [tuple(noise.ma_coefficients) for noise in model.noise_models]
-    quietest = min((np.array(noise.residual_covariance) for noise in model.noise_models), key=np.linalg.det)
-    powers = [noise.usual_quick_power for noise in model.noise_models if noise.usual_quick_power is not None]
+    known = [tuple(noise.average) for noise in model.colours]
+    quietest = min((np.array(noise.noise) for noise in model.colours), key=np.linalg.det)
+    powers = [noise.quick for noise in model.colours if noise.quick is not None]
     same: dict[str, Any] = {
-        "wider": max(noise.covariance_inflation for noise in model.noise_models),
+        "wider": max(noise.wider for noise in model.colours),
         "misreads": np.max([model.hidden_gain_error_sd(one) for one in known], axis=0).tolist(),
         "quick": min(powers, default=None),
     }
-    models = list(model.noise_models)
+    models = list(model.colours)
     for ma in UNFITTED_MA:
         if ma not in known:
             parts = fitting.fit_parts([whiten_samples(flight, ma) for flight in flights])
@@ -94,7 +90,7 @@ def add_unseen_noise(model: Model, flights: Sequence[Samples]) -> Model:
     for gyro_sd in UNFITTED_GYROS_RAD_S:
         ar, R = gyro_noise.yule_walker_predictor(model, quietest, gyro_sd, fitting.AR_ORDER)
         models.append(NoiseModel(average=[1.0], before=ar.tolist(), noise=R.tolist(), **same))
-    return model.model_copy(update={"noise_models": models})
+    return model.model_copy(update={"colours": models})
 
 
 def assume_law_and_air(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Vehicle, list[str]]:
@@ -181,16 +177,16 @@ def expect_another_day(folds: list[Document], model: Model) -> Document:
         key: {"mean": float(np.mean(each)), "worst": float((max if key == "mean_error" else min)(each))}
         for key, each in values.items()
     }
-    tail = model.fitted_ranges.alarm_peak_tail if model.fitted_ranges is not None else None
-    threshold = model.settings.alarm_threshold
+    tail = model.fitted.tail if model.fitted is not None else None
+    threshold = model.settings.threshold
     if tail is None or threshold is None:
         return expected
     target = model.settings.false_alarms_per_hour or 0.0
     return expected | {
         "false_alarms_per_hour": {"asked": target, **asdict(extremes.false_alarm_rate(tail, threshold))},
-        "minutes_left_out": tail.healthy_minutes,
+        "minutes_left_out": tail.minutes,
         "minutes_missing": extremes.missing_healthy_minutes(tail, target),
-        **model.identification_results,
+        **model.identified,
     }
 
 
@@ -273,7 +269,7 @@ def _check_units(flights: Sequence[Samples], vehicle: Vehicle) -> None:
 def collinear_names(parts: Sequence[fitting.FitPart], model: Model) -> list[Document]:
     """Regressors whose coefficient's variance the others inflate more than tenfold, worst first; None where
     the others make it up."""
-    Z, _, _ = fitting.stack_data(parts, model.vehicle, model.n_rate_lags, model.n_command_lags)
+    Z, _, _ = fitting.stack_data(parts, model.vehicle, model.history, model.lags)
     factors = variance_inflation(Z[:, 1:])
     pairs = sorted(zip(regressor_names(model), factors.tolist(), strict=True), key=lambda pair: -pair[1])
     return [
@@ -285,20 +281,20 @@ def collinear_names(parts: Sequence[fitting.FitPart], model: Model) -> list[Docu
 
 def regressor_names(model: Model) -> list[str]:
     """Names of the columns of the fit after the constant, in their order."""
-    h = model.n_rate_lags
+    h = model.history
     signals = model.vehicle.regressor_columns
     commands = [(f"command of {'+'.join(group)}",) for group in model.groups]
     lagged = [
         ("pqr", h),
         (signals, model.vehicle.n_signal_lags(h)),
-        *((one, model.n_command_lags) for one in commands),
+        *((one, model.lags) for one in commands),
     ]
     return [f"{name}[-{k}]" for names, most in lagged for k in range(1, most + 1) for name in names]
 
 
 def median_inflation(parts: Sequence[fitting.FitPart], model: Model) -> dict[str, float]:
     """By how much the residual's colour widens the standard errors of the responses: the median, an axis."""
-    n = len(model.groups) * model.n_command_lags
+    n = len(model.groups) * model.lags
     inflation = fitting.fit_of(parts, model).standard_error_inflation[-n:]
     return regression.by_axis(np.median(inflation, axis=0))
 
@@ -319,28 +315,22 @@ def density_ratios(parts: Sequence[fitting.FitPart], model: Model) -> list[Docum
 
 def identification_text(model: Model) -> str:
     """Return the identification as lines of text."""
-    results: Document = dict(model.identification_results)
+    results: Document = dict(model.identified)
     n_samples = sum(flight["samples"] for flight in results["flights"])
     lines = [
         f"{model.vehicle.name}: {n_samples} samples at {model.rate_hz:.3g} Hz, flights: "
         f"{len(results['flights'])}; "
-        f"past samples of the rates: {model.n_rate_lags}, of the commands: {model.n_command_lags}",
+        f"past samples of the rates: {model.history}, of the commands: {model.lags}",
         *(f"  {line}" for line in results.get("assumed", [])),
         *(f"  together, not distinguishable: {', '.join(group)}" for group in model.groups if len(group) > 1),
         *_pressure_lines(model),
-        *dict.fromkeys(map(_noise_text, model.noise_models)),
+        *dict.fromkeys(map(_noise_text, model.colours)),
         *(f"  {line}" for line in trust.unknown_sentences(model)),
         *(f"  {flight['name']}: {note}" for flight in results["flights"] for note in flight["notes"]),
         *map(_fold_text, results["tests"]),
         *_day_lines(results["another_day"], len(results["flights"])),
         f"  the residual's colour widens standard errors by {_axis_text(results['colour'])}",
     ]
-    output = results["output_error"]
-    if "delay_s" in output:
-        delay = f"delay {output['delay_s']:.3f} s (sd {output['delay_sd_s']:.3f})"
-        explained = _axis_text(output["explained_of_windows_not_fitted"])
-        lag = f"servo lag {_servo_text(output)}"
-        lines.append(f"  output error: {lag}, {delay}, explains of 2 s free runs not fitted {explained}")
     if results["collinear"]:
         most, n = results["collinear"][0], len(results["collinear"])
         are = "regressors are" if n > 1 else "regressor is"
@@ -352,9 +342,9 @@ def identification_text(model: Model) -> str:
 
 
 def _noise_text(noise: NoiseModel) -> str:
-    colour = ", ".join(f"{c:.3g}" for c in noise.ma_coefficients)
+    colour = ", ".join(f"{c:.3g}" for c in noise.average)
     return (
-        f"  noise of the colour {colour}: {noise.covariance_inflation:.2g} times as wide, in squares, as "
+        f"  noise of the colour {colour}: {noise.wider:.2g} times as wide, in squares, as "
         "gains of 10 s left out differ, and other laws may"
     )
 
@@ -411,97 +401,5 @@ def _fold_text(fold: Document) -> str:
     )
 
 
-def _servo_text(fit: Document) -> str:
-    if fit["shorter_than_can_be_told"]:
-        return "shorter than this rate can tell"
-    return f"{fit['servo_lag_s']:.3f} s (sd {fit['servo_lag_sd_s']:.3f})"
-
-
 def _axis_text(values: dict[str, float]) -> str:
     return ", ".join(f"{axis} {value:.3f}" for axis, value in values.items())
-
-
-def fit_output_error(parts: Sequence[fitting.FitPart], groups: list[list[int]]) -> dict[str, Any]:
-    """Fit on every other window, test on the rest. Returns servo lag and delay in s, their standard errors,
-    and the share of the rates' variance explained over free-running windows not fitted, an axis.
-
-    th: parameters, as in `_simulate`; P: inverse of their information.
-    """
-    from scipy.optimize import least_squares
-
-    dt_s = float(np.median([part.samples.dt_s for part in parts]))
-    u, y = _cut_windows(parts, groups, round(FREE_RUN_WINDOW_S / dt_s), round(_MAX_DELAY_S / dt_s) + 1)
-    if len(y) < 20 or not np.ptp(y, axis=(0, 1)).all():
-        return {"windows": len(y), "says": "too few gap-free windows in which every rate moves"}
-    fitted, held_out = slice(0, None, 2), slice(1, None, 2)
-    sd = y.std(axis=(0, 1))
-    # lag, delay, A, B and c
-    guess = np.array([0.1, dt_s, *(0.7 * np.eye(3)).ravel(), *np.full(3 * len(groups), 0.01), *np.zeros(3)])
-    free = np.full(len(guess) - 2, np.inf)
-    lower, upper = [_MIN_SERVO_LAG_S, 0.0, *-free], [_MAX_SERVO_LAG_S, _MAX_DELAY_S, *free]
-
-    def error(th: Floats, rows: slice) -> Floats:
-        return ((_simulate(th, u[rows], y[rows], dt_s) - y[rows]) / sd).ravel()
-
-    found = least_squares(error, guess, bounds=(lower, upper), args=(fitted,), loss="soft_l1", max_nfev=40)
-    P = np.linalg.pinv(found.jac.T @ found.jac)
-    errors = np.sqrt(np.maximum(np.diag(P), 0.0) * float(found.fun @ found.fun) / len(found.fun))
-    e = error(found.x, held_out).reshape(-1, 3) * sd
-    explained = 1.0 - e.var(axis=0) / y[held_out].reshape(-1, 3).var(axis=0)
-    return {
-        "windows": len(y),
-        "servo_lag_s": float(found.x[0]),
-        "servo_lag_sd_s": float(errors[0]),
-        "delay_s": float(found.x[1]),
-        "delay_sd_s": float(errors[1]),
-        "shorter_than_can_be_told": bool(found.x[0] < 2.0 * _MIN_SERVO_LAG_S),
-        "explained_of_windows_not_fitted": regression.by_axis(explained),
-    }
-
-
-def _cut_windows(
-    parts: Sequence[fitting.FitPart], groups: list[list[int]], n: int, past: int
-) -> tuple[Floats, Floats]:
-    """Commands u (W, past + n, G) with their past, scaled by labels, and rates y (W, n, 3), of W windows."""
-    windows = []
-    for part in parts:
-        samples = part.samples
-        effect = np.where(np.isfinite(samples.labels), samples.labels, 1.0)
-        u = np.column_stack([(samples.commands * effect)[:, group].sum(axis=1) for group in groups])
-        known = part.is_usable & np.isfinite(u).all(axis=1) & np.isfinite(samples.rates).all(axis=1)
-        for end in range(past + n, len(u), n):
-            rows = slice(end - past - n, end)
-            if known[rows].all() and np.ptp(samples.stretch_number[rows]) == 0:
-                windows.append((u[rows], samples.rates[end - n : end]))
-    chosen = windows[:: max(len(windows) // _MIN_FREE_RUNS, 1)]
-    commands, rates = ([window[i] for window in chosen] for i in (0, 1))
-    return np.reshape(commands, (-1, past + n, len(groups))), np.reshape(rates, (-1, n, 3))
-
-
-def _simulate(th: Floats, u: Floats, y: Floats, dt_s: float) -> Floats:
-    """Free runs X (W, m, 3) of all windows at once, rad/s, from the first of the rates y (W, m, 3):
-
-        x[k+1] = A x[k] + B' s[k] + c,    s[k+1] = a s[k] + (1 - a) v[k],    a = exp(-dt / lag)
-
-    s (W, n): positions of the servos; v (W, n): commands u (W, past + m, n) a delay before. th: lag and
-    delay, both s, A (3, 3), B (n, 3), c (3,).
-    """
-    n = u.shape[2]
-    lag_s, delay_s = th[:2]
-    A = th[2:11].reshape(3, 3)
-    B = th[11 : 11 + 3 * n].reshape(n, 3)
-    c = th[11 + 3 * n :]
-    m = y.shape[1]
-    past = u.shape[1] - m
-    whole, f = divmod(delay_s / dt_s, 1.0)
-    a = np.exp(-dt_s / lag_s)
-    x = y[:, 0].copy()
-    s = u[:, 0].copy()
-    X = np.empty_like(y)
-    for k in range(u.shape[1]):
-        if k >= past:
-            X[:, k - past] = x
-            x = x @ A.T + s @ B + c
-        v = (1.0 - f) * u[:, max(k - int(whole), 0)] + f * u[:, max(k - int(whole) - 1, 0)]
-        s = a * s + (1.0 - a) * v
-    return X

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from beaver_ftc.documents import Conflict, Location, Number, Section, Whole, read_file, refuse
 from beaver_ftc_logs.extremes import PeakTail
@@ -33,155 +33,97 @@ Positive = Annotated[Number, Field(gt=0, le=_MAX_COEF)]
 NonNegative = Annotated[Number, Field(ge=0, le=_MAX_COEF)]
 AtLeastOne = Annotated[Number, Field(ge=1, le=_MAX_COEF)]
 
-_FILE_KEYS = {
-    "effectiveness_changes_per_hour": "changes_per_hour",
-    "likely_levels": "levels",
-    "likely_share": "level_share",
-    "trim_command_shift_sd": "trim_shift",
-    "trim_step_sd": "trim_walk",
-    "gain_return_time_s": "gain_time_s",
-    "own_gain_spread": "own_gain_sd",
-    "own_gain_return_s": "own_gain_time_s",
-    "quick_error_share": "quick_error",
-    "max_trim_sd": "trim_bound",
-    "max_gain_sd": "gain_bound",
-    "command_delays_s": "delays_s",
-    "jam_rate_offset_sd": "jam_sd",
-    "effective_sample_share": "power",
-    "t_degrees_of_freedom": "tail",
-    "noise_scale_memory_s": "noise_memory_s",
-    "alarm_probability": "alarm",
-    "confirmation_s": "hold_s",
-    "alarm_threshold": "threshold",
-    "name_evidence_ratio": "name_evidence",
-    "rename_hold_s": "rename_s",
-    "one_faulty_group": "one_group",
-    "effectiveness_level_step": "level_step",
-    "credible_mass": "bounds",
-    "command_ranges": "commands",
-    "rate_ranges_rad_s": "rates",
-    "airspeed_range_mps": "airspeed",
-    "rate_sd_rad_s": "spread",
-    "tied_shares": "tied",
-    "group_gain_sd": "gain_sd",
-    "longest_still_s": "still_s",
-    "misread_gain": "misread",
-    "unpowered_climb_mps": "energy_climb",
-    "alarm_peak_tail": "tail",
-    "ma_coefficients": "average",
-    "residual_covariance": "noise",
-    "ar_coefficients": "before",
-    "covariance_inflation": "wider",
-    "misread_shares": "misreads",
-    "usual_quick_power": "quick",
-    "n_rate_lags": "history",
-    "n_command_lags": "lags",
-    "past_coefficients": "past",
-    "command_response": "response",
-    "response_error": "response_sd",
-    "noise_models": "colours",
-    "fitted_ranges": "fitted",
-    "identification_results": "identified",
-}
-"""The keys of the file by attribute, where they differ: those of release 1.0.0."""
 
-
-class FileSection(Section):
-    """A section of the model file."""
-
-    model_config = ConfigDict(alias_generator=lambda name: _FILE_KEYS.get(name, name))
-
-
-class FilterSettings(FileSection):
+class FilterSettings(Section):
     """Prior settings of the filter.
 
-    effectiveness_changes_per_hour: how often a surface changes its effectiveness
+    changes_per_hour: how often a surface changes its effectiveness
     repair_share: share of the changes that restore health
-    likely_levels: likelier levels of effectiveness, by group
-    likely_share: share of faults at the likelier levels
+    levels: likelier levels of effectiveness, by group
+    level_share: share of faults at the likelier levels
     trim_sd: free spread of the trim between flights, in residual sd
-    trim_command_shift_sd: spread of the trim as a shift of each group's command
-    trim_step_sd: drift of the trim a sample, in residual sd
+    trim_shift: spread of the trim as a shift of each group's command
+    trim_walk: drift of the trim a sample, in residual sd
     gain_sd: spread of the control gain
-    gain_return_time_s: in which the control gain returns to the model's, s
-    own_gain_spread: spread of each group's gain about the common
-    own_gain_return_s: in which that returns to the common gain, s
-    quick_error_share: error of responses quicker than the fitted flights have, as a share of them
-    max_trim_sd: farthest the trim is adapted, in its spread
-    max_gain_sd: farthest the gain is adapted, in its spread
-    command_delays_s: delays tried beside the model's, each under a sample
-    jam_rate_offset_sd: offset of the rates a sample by a stuck surface, in sd
-    effective_sample_share: share of a white residual's information in this one
-    t_degrees_of_freedom: degrees of freedom of the residual's t distribution
-    noise_scale_memory_s: memory of the running scale of the residual, s
-    alarm_probability: probability of a fault that raises the alarm
-    confirmation_s: for how long the probability must stand, s
+    gain_time_s: in which the control gain returns to the model's, s
+    own_gain_sd: spread of each group's gain about the common
+    own_gain_time_s: in which that returns to the common gain, s
+    quick_error: error of responses quicker than the fitted flights have, as a share of them
+    trim_bound: farthest the trim is adapted, in its spread
+    gain_bound: farthest the gain is adapted, in its spread
+    delays_s: delays tried beside the model's, each under a sample
+    jam_sd: offset of the rates a sample by a stuck surface, in sd
+    power: share of a white residual's information in this one
+    tail: degrees of freedom of the residual's t distribution
+    noise_memory_s: memory of the running scale of the residual, s
+    alarm: probability of a fault that raises the alarm
+    hold_s: for how long the probability must stand, s
     false_alarms_per_hour: the rate that was asked for
-    alarm_threshold: evidence for a fault that raises the alarm, instead of both: for that rate
-    name_evidence_ratio: evidence for a name, over that for an alarm
-    rename_hold_s: for how long another name stands before it counts, s
-    one_faulty_group: whether one group alone is at fault: a name has every group that is not excluded
-    effectiveness_level_step: step of the grid of effectiveness
-    credible_mass: posterior mass inside the bounds
+    threshold: evidence for a fault that raises the alarm, instead of both: for that rate
+    name_evidence: evidence for a name, over that for an alarm
+    rename_s: for how long another name stands before it counts, s
+    one_group: whether one group alone is at fault: a name has every group that is not excluded
+    level_step: step of the grid of effectiveness
+    bounds: posterior mass inside the bounds
     """
 
-    effectiveness_changes_per_hour: Positive = 12.0
+    changes_per_hour: Positive = 12.0
     repair_share: Number = Field(0.1, ge=0, lt=1)
-    likely_levels: dict[str, Annotated[list[ShareBelowOne], Field(max_length=100)]] = Field({})
-    likely_share: Share = 0.9
+    levels: dict[str, Annotated[list[ShareBelowOne], Field(max_length=100)]] = Field({})
+    level_share: Share = 0.9
     trim_sd: Positive = 0.5
-    trim_command_shift_sd: NonNegative = 0.0
-    trim_step_sd: list[NonNegative] = Field([3e-4] * 3, min_length=3, max_length=3)
+    trim_shift: NonNegative = 0.0
+    trim_walk: list[NonNegative] = Field([3e-4] * 3, min_length=3, max_length=3)
     gain_sd: Number = Field(0.15, gt=0, lt=0.5)
-    gain_return_time_s: Positive = 5e4
-    own_gain_spread: Number = Field(0.0, ge=0, lt=0.5)
-    own_gain_return_s: Positive = 2000.0
-    quick_error_share: Share = 1.0
-    max_trim_sd: Positive = 4.0
-    max_gain_sd: Positive = 3.0
-    command_delays_s: CoefRow = Field([0.0], min_length=1, max_length=9)
-    jam_rate_offset_sd: Positive = 2.0
-    effective_sample_share: Number = Field(1.0, gt=0, le=1)
-    t_degrees_of_freedom: Number = Field(8.0, gt=2, le=_MAX_COEF)
-    noise_scale_memory_s: Positive = 60.0
-    alarm_probability: OpenShare = 0.5
-    confirmation_s: NonNegative = 0.0
+    gain_time_s: Positive = 5e4
+    own_gain_sd: Number = Field(0.0, ge=0, lt=0.5)
+    own_gain_time_s: Positive = 2000.0
+    quick_error: Share = 1.0
+    trim_bound: Positive = 4.0
+    gain_bound: Positive = 3.0
+    delays_s: CoefRow = Field([0.0], min_length=1, max_length=9)
+    jam_sd: Positive = 2.0
+    power: Number = Field(1.0, gt=0, le=1)
+    tail: Number = Field(8.0, gt=2, le=_MAX_COEF)
+    noise_memory_s: Positive = 60.0
+    alarm: OpenShare = 0.5
+    hold_s: NonNegative = 0.0
     false_alarms_per_hour: Number | None = Field(None, gt=0, le=_MAX_COEF)
-    alarm_threshold: Number | None = Field(None, gt=0, le=_MAX_COEF)
-    name_evidence_ratio: AtLeastOne = 1.0
-    rename_hold_s: NonNegative = 0.0
-    one_faulty_group: bool = False
-    effectiveness_level_step: Number = Field(0.1, ge=0.01, le=0.5)
-    credible_mass: OpenShare = 0.9
+    threshold: Number | None = Field(None, gt=0, le=_MAX_COEF)
+    name_evidence: AtLeastOne = 1.0
+    rename_s: NonNegative = 0.0
+    one_group: bool = False
+    level_step: Number = Field(0.1, ge=0.01, le=0.5)
+    bounds: OpenShare = 0.9
 
 
-class FittedRanges(FileSection):
+class FittedRanges(Section):
     """Ranges in which a model was fitted, and its errors on data that were not fitted: where it is
     credible.
 
-    command_ranges: least and largest command of each surface, share of travel
-    rate_ranges_rad_s: least and largest p, q and r, rad/s
-    airspeed_range_mps: least and largest airspeed, m/s
-    rate_sd_rad_s: standard deviation of p, q and r, rad/s
-    tied_shares: share of each group's effect that past, signals and other groups make up
-    group_gain_sd: standard error of each group's gain
-    longest_still_s: longest time each column stood still, s
-    misread_gain: how much likelier at most a sample of a part not fitted was with its columns read
+    commands: least and largest command of each surface, share of travel
+    rates: least and largest p, q and r, rad/s
+    airspeed: least and largest airspeed, m/s
+    spread: standard deviation of p, q and r, rad/s
+    tied: share of each group's effect that past, signals and other groups make up
+    gain_sd: standard error of each group's gain
+    still_s: longest time each column stood still, s
+    misread: how much likelier at most a sample of a part not fitted was with its columns read
     wrongly, in natural logarithms
-    unpowered_climb_mps: rate of the energy height as without power, m/s
-    alarm_peak_tail: highest alarm statistic on parts not fitted
+    energy_climb: rate of the energy height as without power, m/s
+    tail: highest alarm statistic on parts not fitted
     """
 
-    command_ranges: CoefRows
-    rate_ranges_rad_s: CoefRows
-    airspeed_range_mps: CoefRow | None = None
-    rate_sd_rad_s: CoefRow = Field([])
-    tied_shares: CoefRow = Field([])
-    group_gain_sd: CoefRow = Field([])
-    longest_still_s: dict[str, Number] = Field({})
-    misread_gain: NonNegative = 0.0
-    unpowered_climb_mps: Number | None = None
-    alarm_peak_tail: PeakTail | None = None
+    commands: CoefRows
+    rates: CoefRows
+    airspeed: CoefRow | None = None
+    spread: CoefRow = Field([])
+    tied: CoefRow = Field([])
+    gain_sd: CoefRow = Field([])
+    still_s: dict[str, Number] = Field({})
+    misread: NonNegative = 0.0
+    energy_climb: Number | None = None
+    tail: PeakTail | None = None
 
     @model_validator(mode="before")
     @classmethod
@@ -192,37 +134,37 @@ class FittedRanges(FileSection):
         return {key: value for key, value in data.items() if key not in _DEAD_KEYS}
 
 
-class NoiseModel(FileSection):
+class NoiseModel(Section):
     """The noise of some flights: another gyro, air or law colours what is not explained.
 
-    ma_coefficients: 1, c1, ...: its moving average, newest first
-    residual_covariance: covariance of the residual whitened by that, (3, 3), (rad/s)2
-    ar_coefficients: AR coefficients: the previous residuals predict the next, latest first, (3 L, 3)
-    covariance_inflation: how many times as far, in squares, gains left out and other laws' differ
-    misread_shares: share of its effect by which the fit may misread each group in this noise
-    usual_quick_power: power of the quick part of the responses, in variances of the noise, that the
+    average: 1, c1, ...: its moving average, newest first
+    noise: covariance of the residual whitened by that, (3, 3), (rad/s)2
+    before: AR coefficients: the previous residuals predict the next, latest first, (3 L, 3)
+    wider: how many times as far, in squares, gains left out and other laws' differ
+    misreads: share of its effect by which the fit may misread each group in this noise
+    quick: power of the quick part of the responses, in variances of the noise, that the
     fitted flights exceed in a tenth of their samples
     """
 
-    ma_coefficients: CoefRow = Field(min_length=1, max_length=1000)
-    residual_covariance: CoefRows
-    ar_coefficients: CoefRows = Field([])
-    covariance_inflation: AtLeastOne = 1.0
-    misread_shares: list[ShareBelowOne] = Field([])
-    usual_quick_power: Number | None = Field(default=None, ge=0, le=_MAX_COEF)
+    average: CoefRow = Field(min_length=1, max_length=1000)
+    noise: CoefRows
+    before: CoefRows = Field([])
+    wider: AtLeastOne = 1.0
+    misreads: list[ShareBelowOne] = Field([])
+    quick: Number | None = Field(default=None, ge=0, le=_MAX_COEF)
 
 
-class Model(FileSection):
+class Model(Section):
     """How one vehicle's rates answer their own past and the commands, and how well that is known.
 
     groups: surfaces that move together when healthy
-    past_coefficients: (3 history + regressor_columns x signal lags, 3)
-    command_response: (groups, lags, 3), a share of command to rad/s a sample
-    response_error: standard errors of `response`, colour included
-    residual_covariance: covariance of the residual, (3, 3), (rad/s)2
-    noise_models: noises that flights were seen to have, for `moving_air`
-    fitted_ranges: what it was fitted on; None: nothing is known
-    identification_results: what it was found from, and how well
+    past: (3 history + regressor_columns x signal lags, 3)
+    response: (groups, lags, 3), a share of command to rad/s a sample
+    response_sd: standard errors of `response`, colour included
+    noise: covariance of the residual, (3, 3), (rad/s)2
+    colours: noises that flights were seen to have, for `moving_air`
+    fitted: what it was fitted on; None: nothing is known
+    identified: what it was found from, and how well
     """
 
     vehicle: Vehicle
@@ -230,22 +172,22 @@ class Model(FileSection):
     groups: list[Annotated[list[str], Field(min_length=1)]] = Field(
         min_length=1, max_length=_MAX_SURFACE_GROUPS
     )
-    n_rate_lags: Whole = Field(ge=1, le=50)
-    n_command_lags: Whole = Field(ge=1, le=50)
+    history: Whole = Field(ge=1, le=50)
+    lags: Whole = Field(ge=1, le=50)
     intercept: CoefRow = Field(min_length=3, max_length=3)
-    past_coefficients: CoefRows
-    command_response: list[CoefRows]
-    response_error: list[CoefRows]
-    residual_covariance: CoefRows
-    noise_models: list[NoiseModel] = Field([])
+    past: CoefRows
+    response: list[CoefRows]
+    response_sd: list[CoefRows]
+    noise: CoefRows
+    colours: list[NoiseModel] = Field([])
     settings: FilterSettings = FilterSettings()
-    fitted_ranges: FittedRanges | None = None
-    identification_results: dict[str, object] = Field({})
+    fitted: FittedRanges | None = None
+    identified: dict[str, object] = Field({})
 
     @model_validator(mode="after")
     def _check_arrays(self) -> "Model":
-        n_signals = len(self.vehicle.regressor_columns) * self.vehicle.n_signal_lags(self.n_rate_lags)
-        n, n_past = len(self.past_coefficients), 3 * self.n_rate_lags + n_signals
+        n_signals = len(self.vehicle.regressor_columns) * self.vehicle.n_signal_lags(self.history)
+        n, n_past = len(self.past), 3 * self.history + n_signals
         reason = f"has {n} rows, allowed: {n_past}, as `identify` writes them: identify it again"
         conflicts: list[Conflict] = [(("past",), reason)] * (n != n_past)
         refuse([*conflicts, *self._group_mistakes(), *self._shape_mistakes()])
@@ -262,40 +204,38 @@ class Model(FileSection):
                     yield ("groups", i, k), f"{name!r:.60} {reason}, allowed: each surface once"
                 seen.add(name)
         names = ["+".join(group) for group in self.groups]
-        for name in self.settings.likely_levels:
+        for name in self.settings.levels:
             if name not in names:
                 reason = f"{name!r:.60} is no group, allowed: {', '.join(names)}"
                 yield ("settings", "levels", name), reason
-        for k, delay_s in enumerate(self.settings.command_delays_s):
+        for k, delay_s in enumerate(self.settings.delays_s):
             if abs(delay_s) * self.rate_hz > 1.0 + 1e-9:
                 yield ("settings", "delays_s", k), f"{delay_s:g} is too long, allowed: up to a sample, s"
 
     def _shape_mistakes(self) -> Iterator[Conflict]:
         """Arrays whose shape contradicts groups, lags and rates; empty ones that may be are not checked."""
-        G, L = len(self.groups), self.n_command_lags
+        G, L = len(self.groups), self.lags
         arrays: list[tuple[Location, Any, tuple[int, ...]]] = [
-            (("response",), self.command_response, (G, L, 3)),
-            (("response_sd",), self.response_error, (G, L, 3)),
-            (("noise",), self.residual_covariance, (3, 3)),
+            (("response",), self.response, (G, L, 3)),
+            (("response_sd",), self.response_sd, (G, L, 3)),
+            (("noise",), self.noise, (3, 3)),
         ]
-        optional: list[tuple[Location, Any, tuple[int, ...]]] = [
-            (("past",), self.past_coefficients, (len(self.past_coefficients), 3))
-        ]
-        for i, noise in enumerate(self.noise_models):
-            at, n_ar = ("colours", i), -(-len(noise.ar_coefficients) // 3) * 3
-            arrays.append(((*at, "noise"), noise.residual_covariance, (3, 3)))
-            optional.append(((*at, "before"), noise.ar_coefficients, (n_ar, 3)))
-            optional.append(((*at, "misreads"), noise.misread_shares, (G,)))
-            if noise.ma_coefficients[0] != 1.0:
+        optional: list[tuple[Location, Any, tuple[int, ...]]] = [(("past",), self.past, (len(self.past), 3))]
+        for i, noise in enumerate(self.colours):
+            at, n_ar = ("colours", i), -(-len(noise.before) // 3) * 3
+            arrays.append(((*at, "noise"), noise.noise, (3, 3)))
+            optional.append(((*at, "before"), noise.before, (n_ar, 3)))
+            optional.append(((*at, "misreads"), noise.misreads, (G,)))
+            if noise.average[0] != 1.0:
                 yield (*at, "average"), "does not begin with 1, allowed: 1, c1, ..."
-        if (ranges := self.fitted_ranges) is not None:
+        if (ranges := self.fitted) is not None:
             optional += [
-                (("fitted", "commands"), ranges.command_ranges, (len(ranges.command_ranges), 2)),
-                (("fitted", "rates"), ranges.rate_ranges_rad_s, (3, 2)),
-                (("fitted", "airspeed"), ranges.airspeed_range_mps, (2,)),
-                (("fitted", "spread"), ranges.rate_sd_rad_s, (3,)),
-                (("fitted", "tied"), ranges.tied_shares, (G,)),
-                (("fitted", "gain_sd"), ranges.group_gain_sd, (G,)),
+                (("fitted", "commands"), ranges.commands, (len(ranges.commands), 2)),
+                (("fitted", "rates"), ranges.rates, (3, 2)),
+                (("fitted", "airspeed"), ranges.airspeed, (2,)),
+                (("fitted", "spread"), ranges.spread, (3,)),
+                (("fitted", "tied"), ranges.tied, (G,)),
+                (("fitted", "gain_sd"), ranges.gain_sd, (G,)),
             ]
         for key_path, lists, shape in [*arrays, *(one for one in optional if one[1])]:
             if _shape(lists) != shape:
@@ -303,9 +243,9 @@ class Model(FileSection):
 
     def _covariance_mistakes(self) -> Iterator[Conflict]:
         """Covariances that are none, or that no arithmetic in 64 bits can invert; negative deviations."""
-        covariances: list[tuple[Location, CoefRows]] = [(("noise",), self.residual_covariance)]
-        for i, noise in enumerate(self.noise_models):
-            covariances.append((("colours", i, "noise"), noise.residual_covariance))
+        covariances: list[tuple[Location, CoefRows]] = [(("noise",), self.noise)]
+        for i, noise in enumerate(self.colours):
+            covariances.append((("colours", i, "noise"), noise.noise))
         for key_path, rows in covariances:
             R = np.array(rows)
             if abs(R - R.T).max() > 1e-6 * abs(R).max():
@@ -315,15 +255,15 @@ class Model(FileSection):
             if smallest <= 0.0 or largest > _MAX_CONDITION_NUMBER * smallest:
                 allowed = f"a covariance, conditioned to {_MAX_CONDITION_NUMBER:g}"
                 yield key_path, f"is singular or nearly so, allowed: {allowed}"
-        if np.min(self.response_error) < 0.0:
+        if np.min(self.response_sd) < 0.0:
             yield ("response_sd",), "has a negative number, allowed: at least 0"
-        ranges = self.fitted_ranges
-        if ranges is not None and min((*ranges.group_gain_sd, *ranges.rate_sd_rad_s), default=0.0) < 0.0:
+        ranges = self.fitted
+        if ranges is not None and min((*ranges.gain_sd, *ranges.spread), default=0.0) < 0.0:
             yield ("fitted",), "gain_sd or spread has a negative number, allowed: at least 0"
 
     def with_single_noise(self, noise: NoiseModel) -> "Model":
         """The model with one of its noise models only."""
-        return self.model_copy(update={"noise_models": [noise]})
+        return self.model_copy(update={"colours": [noise]})
 
     def with_noise_of(self, average: Sequence[float]) -> "Model":
         """The model with the noise fitted for flights of this moving average, times its inflation.
@@ -331,35 +271,35 @@ class Model(FileSection):
         average: 1, c1, ..., the moving-average model of the residual's noise, newest first.
         """
         R = self.inflation_of(average) * self.covariance_of_noise(average)
-        return self.model_copy(update={"residual_covariance": R.tolist()})
+        return self.model_copy(update={"noise": R.tolist()})
 
     def _noise_of(self, average: Sequence[float]) -> NoiseModel:
         """The noise fitted for flights of this moving average; that of all flights where none was fitted."""
-        fitted = [noise for noise in self.noise_models if noise.ma_coefficients == list(average)]
-        return fitted[0] if fitted else NoiseModel(average=[1.0], noise=self.residual_covariance)
+        fitted = [noise for noise in self.colours if noise.average == list(average)]
+        return fitted[0] if fitted else NoiseModel(average=[1.0], noise=self.noise)
 
     def covariance_of_noise(self, average: Sequence[float]) -> Floats:
         """Covariance (3, 3) of the noise of flights of this moving average, (rad/s)2."""
-        return np.array(self._noise_of(average).residual_covariance)
+        return np.array(self._noise_of(average).noise)
 
     def inflation_of(self, average: Sequence[float]) -> float:
         """Factor on the covariance of the fitted noise, by which it covers parts that were not fitted."""
-        return float(self._noise_of(average).covariance_inflation)
+        return float(self._noise_of(average).wider)
 
     def hidden_gain_error_sd(self, average: Sequence[float]) -> Floats:
         """By how much of its effect the fit may misread each group in the noise of this moving average, (G,);
         0 where that is not known."""
-        return np.array(self._noise_of(average).misread_shares or [0.0] * len(self.groups))
+        return np.array(self._noise_of(average).misreads or [0.0] * len(self.groups))
 
     def usual_quick_power(self, average: Sequence[float]) -> float:
         """Power of the quick part of the responses that flights of this noise seldom exceed, in variances of
         the noise; infinite where that is not known."""
-        power = self._noise_of(average).usual_quick_power
+        power = self._noise_of(average).quick
         return float("inf") if power is None else power
 
     def residual_ar_coefficients(self, average: Sequence[float]) -> Floats:
         """Autoregressive coefficients of the residual, (L, 3, 3), latest lag first; L is 0 if not fitted."""
-        return np.reshape(np.array(self._noise_of(average).ar_coefficients), (-1, 3, 3))
+        return np.reshape(np.array(self._noise_of(average).before), (-1, 3, 3))
 
     def whitened_intercept(self, average: Sequence[float]) -> Floats:
         """The intercept less its prediction by `residual_ar_coefficients`, (3,)."""
@@ -370,9 +310,9 @@ class Model(FileSection):
         """intercept (3,), past (m, 3), response (G, L, 3) and noise (3, 3) as arrays."""
         return (
             np.array(self.intercept),
-            np.array(self.past_coefficients),
-            np.array(self.command_response),
-            np.array(self.residual_covariance),
+            np.array(self.past),
+            np.array(self.response),
+            np.array(self.noise),
         )
 
 
@@ -391,4 +331,4 @@ def load_model(path: Path) -> Model:
 
 def model_file_text(model: Model) -> str:
     """The model as the text of its file."""
-    return model.model_dump_json(indent=1, by_alias=True) + "\n"
+    return model.model_dump_json(indent=1) + "\n"

@@ -55,9 +55,9 @@ def words_of_model(model: Model) -> Words:
     """Of an identified model."""
     return Words(
         "90 % bounds",
-        f"The probability of a fault stayed below the alarm level of {model.settings.alarm_probability}.",
+        f"The probability of a fault stayed below the alarm level of {model.settings.alarm}.",
         f"The model was identified at {model.rate_hz:.3g} Hz; it predicts a sample from past ones, "
-        f"{model.n_rate_lags} of the rates and {model.n_command_lags} of the commands.",
+        f"{model.history} of the rates and {model.lags} of the commands.",
     )
 
 
@@ -187,12 +187,12 @@ def refuse_foreign_file(path: Path) -> None:
 def render_identification(flights: Sequence[Samples], model: Model) -> str:
     """The page as HTML text."""
     usable = fitting.fit_parts(flights)
-    fit = fitting.fit_order(usable, model.vehicle, model.n_rate_lags, model.n_command_lags)
+    fit = fitting.fit_order(usable, model.vehicle, model.history, model.lags)
     names = ["constant", *regressor_names(model)]
     return load_template("model.html.j2").render(
         mark=PAGE_MARK,
         model=model,
-        found=model.identification_results,
+        found=model.identified,
         used=sum(int(flight.is_usable.sum()) for flight in usable),
         coefficients=list(zip(names, fit.coefficients.tolist(), fit.standard_errors.tolist(), strict=True)),
         fits=_encode_png(_prediction_figure(usable, model)),

@@ -202,7 +202,7 @@ class Innovations:
         is no noise: it has the same sign in many samples.
         """
         excess = np.maximum(self.quick_power(model.rate_hz) - model.usual_quick_power(self.ma), 0.0)
-        return np.asarray(1.0 + model.settings.quick_error_share**2 * excess)
+        return np.asarray(1.0 + model.settings.quick_error**2 * excess)
 
 
 def innovations(samples: Samples, model: Model, labelled: bool = False) -> Innovations:
@@ -212,7 +212,7 @@ def innovations(samples: Samples, model: Model, labelled: bool = False) -> Innov
 
     Summed in the same order whatever the length of the flight, so that a row does not depend on later ones.
     """
-    h, L = model.n_rate_lags, model.n_command_lags
+    h, L = model.history, model.lags
     f = model.vehicle.n_signal_lags(h)
     X, U, known = build_regressors(samples, group_indices(model), h, L, labelled, f)
     _, A, B, _ = model.as_arrays()
@@ -230,7 +230,7 @@ def innovations(samples: Samples, model: Model, labelled: bool = False) -> Innov
 def by_noise(samples: Samples, model: Model) -> list[tuple[Samples, Model]]:
     """A flight whitened by each noise of a model, and the model with this noise alone; both as they are where
     the model has none."""
-    noises = [(noise.ma_coefficients, model.with_single_noise(noise)) for noise in model.noise_models]
+    noises = [(noise.average, model.with_single_noise(noise)) for noise in model.colours]
     return [(whiten_samples(samples, ma), one) for ma, one in noises] or [(samples, model)]
 
 

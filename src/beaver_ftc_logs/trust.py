@@ -106,9 +106,9 @@ def tied_shares(parts: Sequence[FitPart], model: Model) -> Floats:
 def effect_powers(parts: Sequence[FitPart], model: Model) -> tuple[Floats, Floats]:
     """Power of each group's effect y = U_g B_g W on the rates, in variances of the noise a sample, (G,), and
     of what past X, signals and the commands U of the other groups do not make up of it, e = y - Z b, (G,)."""
-    h, f = model.n_rate_lags, model.vehicle.n_signal_lags(model.n_rate_lags)
+    h, f = model.history, model.vehicle.n_signal_lags(model.history)
     groups = regression.group_indices(model)
-    stacked = [part.regressors(groups, h, model.n_command_lags, f) for part in parts]
+    stacked = [part.regressors(groups, h, model.lags, f) for part in parts]
     X, U = (np.concatenate([one[i][one[2]] for one in stacked]) for i in (0, 1))
     _, _, B, R = model.as_arrays()
     W = np.linalg.inv(np.linalg.cholesky(R)).T
@@ -126,17 +126,17 @@ def effect_powers(parts: Sequence[FitPart], model: Model) -> tuple[Floats, Float
 
 def known_effects(model: Model) -> list[bool]:
     """Whether anything is said of each group."""
-    if model.fitted_ranges is None or not model.fitted_ranges.tied_shares:
+    if model.fitted is None or not model.fitted.tied:
         return [True] * len(model.groups)
-    return [share < _MAX_TIED_SHARE for share in model.fitted_ranges.tied_shares]
+    return [share < _MAX_TIED_SHARE for share in model.fitted.tied]
 
 
 def known_gains(model: Model) -> list[bool]:
     """Whether the effect of each group is known under any law: the model may not err by all of it."""
     known = known_effects(model)
-    if model.fitted_ranges is None or not model.fitted_ranges.group_gain_sd or not model.vehicle.other_laws:
+    if model.fitted is None or not model.fitted.gain_sd or not model.vehicle.other_laws:
         return known
-    pairs = zip(known, model.fitted_ranges.group_gain_sd, strict=True)
+    pairs = zip(known, model.fitted.gain_sd, strict=True)
     return [effect and regression.BOUND_MARGIN * sd < 1.0 for effect, sd in pairs]
 
 
@@ -148,10 +148,10 @@ def unknown_surfaces(model: Model) -> set[str]:
 
 def unknown_sentences(model: Model) -> list[str]:
     """Why nothing is said of some groups."""
-    if model.fitted_ranges is None:
+    if model.fitted is None:
         return []
     start = "of what {} does, {:.1%} follows from the rates, signals and other surfaces of the flights fitted"
-    rows = zip(model.groups, model.fitted_ranges.tied_shares, known_effects(model), strict=False)
+    rows = zip(model.groups, model.fitted.tied, known_effects(model), strict=False)
     return [
         f"{start.format('+'.join(group), share)}: its effect cannot be told, nothing is said of it"
         for group, share, known in rows
@@ -162,11 +162,11 @@ def unknown_sentences(model: Model) -> list[str]:
 def refuse_rate_unit(samples: Samples, ranges: FittedRanges | None) -> None:
     """Raise BadInput where all rates spread so much more or less than in the flights of the model that they
     are in another unit."""
-    if ranges is None or not ranges.rate_sd_rad_s:
+    if ranges is None or not ranges.spread:
         return
     if not np.isfinite(samples.rates).any(axis=0).all():  # an axis without a number has no spread
         return
-    ratios = np.nanstd(samples.rates, axis=0) / np.maximum(ranges.rate_sd_rad_s, MIN_DIVISOR)
+    ratios = np.nanstd(samples.rates, axis=0) / np.maximum(ranges.spread, MIN_DIVISOR)
     ratio = float(np.exp(np.mean(np.log(np.maximum(ratios, MIN_DIVISOR)))))
     if not ratios.max() < _MAX_AXIS_RATIO * ratios.min():
         return
@@ -190,10 +190,10 @@ def refuse_command_unit(
 
     Shapes: commands (n, S), rates (n, 3).
     """
-    rate_ratios = _relative_motion(rates, ranges.rate_ranges_rad_s)
+    rate_ratios = _relative_motion(rates, ranges.rates)
     alike = rate_ratios.min() > 1.0 / _MAX_ALIKE_FACTOR and rate_ratios.max() < _MAX_ALIKE_FACTOR
     allowed = _MIN_UNIT_FACTOR * (1.0 if alike else max(rate_ratios.max(), 1.0))
-    ratios = _relative_motion(commands, ranges.command_ranges)
+    ratios = _relative_motion(commands, ranges.commands)
     for surface, ratio in zip(surfaces, ratios.tolist(), strict=True):
         if allowed < ratio < 1e4 or (alike and 1e-4 < ratio < 1.0 / _MIN_UNIT_FACTOR):
             raise BadInput(
@@ -221,7 +221,7 @@ def answers(samples: Samples, model: Model, most: int | None = None) -> Answers 
     step = max(len(rows) // most, 1) if most else 1
     if (parts := regression.split_parts(rows[::step])) is None:
         return None
-    share = model.settings.effective_sample_share / flight.inflation
+    share = model.settings.power / flight.inflation
     bounds = [flight.at(part).gain_bounds(share) for part in parts]
     lower, upper, scales = (np.array(each) for each in zip(*bounds, strict=True))
     likelihood = -flight.log_size - 1.5 * np.log(scales)
@@ -279,10 +279,10 @@ def _mistake_texts(samples: Samples, model: Model, found: Answers) -> dict[str, 
     """Return the mistakes in the rates' answers to a flight's columns, by kind and column, the surest
     first."""
     mistakes = {}
-    known, surfaces, ranges = known_gains(model), list(model.vehicle.surfaces), model.fitted_ranges
+    known, surfaces, ranges = known_gains(model), list(model.vehicle.surfaces), model.fitted
     motions = np.zeros(len(surfaces))
-    if ranges is not None and ranges.command_ranges:
-        motions = _relative_motion(samples.commands, ranges.command_ranges)
+    if ranges is not None and ranges.commands:
+        motions = _relative_motion(samples.commands, ranges.commands)
     highest, lowest = found.upper.max(axis=0), found.lower.min(axis=0)
     for group, sure, hi, lo in zip(model.groups, known, highest, lowest, strict=True):
         name = "+".join(group)
@@ -311,7 +311,7 @@ def _likelier_mistake(samples: Samples, model: Model) -> str | None:
     if not gains:
         return None
     text, gain = max(gains.items(), key=lambda one: one[1])
-    allowed = 2.0 * model.fitted_ranges.misread_gain if model.fitted_ranges is not None else 0.0
+    allowed = 2.0 * model.fitted.misread if model.fitted is not None else 0.0
     if gain * n <= np.log(len(gains) / _FALSE_MISTAKE_CHANCE) + allowed * n:
         return None
     log10 = gain * n / np.log(10.0)
@@ -363,8 +363,8 @@ def untrusted_rows(samples: Samples, model: Model) -> dict[str, Mask]:
             samples.is_rate_clipped, np.floor(_CLIPPING_MEMORY_S / samples.dt_s) + 1.0
         )
         reasons[f"a rate was clipped in the last {_CLIPPING_MEMORY_S:g} s"] = recent > 0
-    if model.fitted_ranges is not None:
-        reasons |= _rows_out_of_range(samples, model, model.fitted_ranges)
+    if model.fitted is not None:
+        reasons |= _rows_out_of_range(samples, model, model.fitted)
     return {reason: rows for reason, rows in reasons.items() if rows.any()}
 
 
@@ -373,11 +373,11 @@ def _rows_out_of_range(samples: Samples, model: Model, ranges: FittedRanges) -> 
     flight so far, by reason."""
     commands = [f"command of {surface}" for surface in model.vehicle.surfaces]
     channels = [
-        *zip(commands, samples.commands.T, ranges.command_ranges, strict=False),
-        *zip(_rate_columns(model), samples.rates.T, ranges.rate_ranges_rad_s, strict=False),
+        *zip(commands, samples.commands.T, ranges.commands, strict=False),
+        *zip(_rate_columns(model), samples.rates.T, ranges.rates, strict=False),
     ]
-    if ranges.airspeed_range_mps is not None and samples.airspeed is not None:
-        channels.append(("airspeed", samples.airspeed, ranges.airspeed_range_mps))
+    if ranges.airspeed is not None and samples.airspeed is not None:
+        channels.append(("airspeed", samples.airspeed, ranges.airspeed))
     reasons = {}
     for name, values, (lo, hi) in channels:
         margin = _RANGE_MARGIN_SHARE * (hi - lo) + MIN_DIVISOR
@@ -396,7 +396,7 @@ def _rate_columns(model: Model) -> list[str]:
 def _still_rows(samples: Samples, model: Model) -> dict[str, Mask]:
     """Rows in which a column has stood still for too long, by reason: a measured rate may hardly, another
     thrice as long as in the model's flights; a rate of which these are known, from MIN_STILL_S / 3 on."""
-    fitted = model.fitted_ranges.longest_still_s if model.fitted_ranges else {}
+    fitted = model.fitted.still_s if model.fitted else {}
     rates = _rate_columns(model)
     reasons = {}
     for name, unchanged_s in samples.unchanged_s.items():

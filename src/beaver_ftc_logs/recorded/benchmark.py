@@ -152,7 +152,7 @@ def whole_settings(usable: list[FitPart], data: DataSet) -> FilterSettings:
     model = fit_model(usable, data.vehicle)
     if len(usable) > 1:
         return model.settings
-    return model.settings.model_copy(update={"credible_mass": score_folds(usable, model)[1]})
+    return model.settings.model_copy(update={"bounds": score_folds(usable, model)[1]})
 
 
 def _score_against_log(held_out: FitPart, rows: LogRows, model: Model) -> Document:

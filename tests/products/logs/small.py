@@ -74,12 +74,12 @@ def flight(model, n=300, lost=(), seed=1, gap=None, name="small", **changes):
         labels[begin:end, surface] = left
     members = [[list(its.surfaces).index(one) for one in group] for group in model.groups]
     moved = np.column_stack([(labels * surfaces)[:, group].sum(axis=1) for group in members])
-    white = rng.standard_normal((n, 3)) @ np.linalg.cholesky(np.array(model.residual_covariance)).T
-    response, past = np.array(model.command_response), np.array(model.past_coefficients)
+    white = rng.standard_normal((n, 3)) @ np.linalg.cholesky(np.array(model.noise)).T
+    response, past = np.array(model.response), np.array(model.past)
     rates = np.zeros((n, 3))
-    for k in range(max(model.n_rate_lags, model.n_command_lags), n):
-        before = [*(rates[k - j] for j in range(1, model.n_rate_lags + 1)), signals[k - 1]]
-        driven = sum(moved[k - j] @ response[:, j - 1] for j in range(1, model.n_command_lags + 1))
+    for k in range(max(model.history, model.lags), n):
+        before = [*(rates[k - j] for j in range(1, model.history + 1)), signals[k - 1]]
+        driven = sum(moved[k - j] @ response[:, j - 1] for j in range(1, model.lags + 1))
         rates[k] = np.array(model.intercept) + np.concatenate(before) @ past + driven + white[k]
     t_s, run = np.arange(n) * step, np.zeros(n, dtype=np.int64)
     if gap is not None:

@@ -46,10 +46,10 @@ def test_flights_that_differ_count_for_less():
     alike = parts_of(TAILS["exponential"][0], rng, 1.0)
     apart = [(3.0 * alike[0][0], alike[0][1]), *((0.3 * one, hours) for one, hours in alike[1:])]
     calm, wild = extremes.fit_peak_tail(alike), extremes.fit_peak_tail(apart)
-    assert calm.overdispersion < 2.0 < wild.overdispersion
+    assert calm.dispersion < 2.0 < wild.dispersion
     rates = [
-        extremes.false_alarm_rate(wild.model_copy(update={"overdispersion": d}), 20.0)
-        for d in (1.0, wild.overdispersion)
+        extremes.false_alarm_rate(wild.model_copy(update={"dispersion": d}), 20.0)
+        for d in (1.0, wild.dispersion)
     ]
     assert rates[1].high / max(rates[1].low, 1e-12) > 3.0 * rates[0].high / max(rates[0].low, 1e-12)
 

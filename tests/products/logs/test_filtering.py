@@ -20,7 +20,7 @@ def healthy(sampled):
 
 def delays_of(samples, model):
     """Which delay explains a flight best, by running each alone."""
-    bank, delays_s = build_bank(model), model.settings.command_delays_s
+    bank, delays_s = build_bank(model), model.settings.delays_s
     flights = [innovations(_with_command_delay(samples, d), model) for d in delays_s]
     return model_weights([run_flight(flight, model, bank)[3] for flight in flights], model.rate_hz)
 
@@ -51,7 +51,7 @@ def test_a_shift_of_a_command_is_within_the_spread_of_the_trim(wing_model):
     settings = wing_model.settings
     _, _, response, noise = wing_model.as_arrays()
     rng = np.random.default_rng(4)
-    shifts = settings.trim_command_shift_sd * rng.standard_normal((200_000, len(response)))
+    shifts = settings.trim_shift * rng.standard_normal((200_000, len(response)))
     free = settings.trim_sd * np.sqrt(np.diag(noise)) * rng.standard_normal((200_000, 3))
     drawn = np.cov((shifts @ response.sum(axis=1) + free).T)
     np.testing.assert_allclose(

@@ -54,7 +54,5 @@ def test_what_motion_alone_tells_is_what_is_left_of_the_regression(flown):
 
 def _white_responses(samples, model):
     flight = innovations(samples, model)
-    root = np.linalg.inv(np.linalg.cholesky(np.array(model.residual_covariance))) * np.sqrt(
-        model.settings.effective_sample_share
-    )
+    root = np.linalg.inv(np.linalg.cholesky(np.array(model.noise))) * np.sqrt(model.settings.power)
     return flight.F[flight.is_known] @ root.T

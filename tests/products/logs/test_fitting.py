@@ -79,7 +79,7 @@ def fitted(usable_flights):
 
 
 def test_tests_on_what_was_not_fitted(changed, fitted, usable_flights):
-    quick = fitted.settings.model_copy(update={"command_delays_s": [0.0]})
+    quick = fitted.settings.model_copy(update={"delays_s": [0.0]})
     entries, bounds = fitting.score_folds(usable_flights, fitted.model_copy(update={"settings": quick}))
     assert not changed({"entries": entries, "bounds": bounds})
     assert [entry["left_out"] for entry in entries] == ["second half", "first half"]
@@ -109,4 +109,4 @@ def test_days_that_differ_let_a_sample_tell_less():
         for size in (0.0, 0.15, 0.3)
     )
     assert more > 1.5 * some > 5.0 * none
-    assert fitting.estimate_filter_settings(days([0.7, 1.3] * 3), MODEL).effective_sample_share < 0.2
+    assert fitting.estimate_filter_settings(days([0.7, 1.3] * 3), MODEL).power < 0.2

@@ -17,8 +17,8 @@ METHODS = {"sliding": "sliding-least-squares", "forgetting": "forgetting-least-s
 def batch(samples, model, k, forget):
     """Least squares of trim and lost effectiveness up to sample k, every one of them at once."""
     flight = innovations(samples, model)
-    sd = np.sqrt(np.diag(model.residual_covariance))
-    whiten = np.linalg.inv(np.linalg.cholesky(np.array(model.residual_covariance)))
+    sd = np.sqrt(np.diag(model.noise))
+    whiten = np.linalg.inv(np.linalg.cholesky(np.array(model.noise)))
     information, score = np.diag([1.0 / 0.3**2] * 3 + [4.0, 4.0]), np.zeros(5)
     for i in range(k + 1):
         age_s = (k - i) * samples.dt_s

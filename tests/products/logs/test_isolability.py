@@ -40,8 +40,8 @@ def test_surfaces_that_move_together_are_said_to_and_named_together(sampled, win
 def test_groups_that_act_alike_or_opposed_are_not_separable(sampled, wing_model, sign, named):
     """The left elevon's response made that of the right one, or its opposite, under the same commands."""
     samples = sampled(40.0, seed=47)
-    right = np.array(wing_model.command_response[0])
-    model = wing_model.model_copy(update={"command_response": [right.tolist(), (sign * right).tolist()]})
+    right = np.array(wing_model.response[0])
+    model = wing_model.model_copy(update={"response": [right.tolist(), (sign * right).tolist()]})
     moved = replace(samples, commands=samples.commands[:, [0, 0]])
     found = isolability_document(moved, model)
     (pair,) = found["alike"]
@@ -58,9 +58,9 @@ def test_the_smallest_loss_by_its_closed_form(sampled, wing_model):
     """d^2 / 2 times the information gathered equals the odds, sample by sample from the model file; the same
     samples taken for half as long each carry twice as much a second."""
     samples = sampled(40.0, seed=46)
-    inverse = np.linalg.inv(np.array(wing_model.residual_covariance))
-    response, lags = np.array(wing_model.command_response), wing_model.n_command_lags
-    first = max(lags, wing_model.n_rate_lags)
+    inverse = np.linalg.inv(np.array(wing_model.noise))
+    response, lags = np.array(wing_model.response), wing_model.lags
+    first = max(lags, wing_model.history)
     information = []
     for k in range(first, len(samples.t_s)):
         moved = sum(samples.commands[k - j, 0] * response[0][j - 1] for j in range(1, lags + 1))
@@ -68,14 +68,14 @@ def test_the_smallest_loss_by_its_closed_form(sampled, wing_model):
     settings = wing_model.settings
     for rate_hz in (10.0, 20.0):
         found = isolability_document(replace(samples, dt_s=1.0 / rate_hz), wing_model)["groups"][0]
-        per_s = settings.effective_sample_share * np.mean(information) * rate_hz
+        per_s = settings.power * np.mean(information) * rate_hz
         assert found["information_per_s"] == pytest.approx(per_s, rel=1e-9)
         odds = 0.5 * found["smallest_loss"]["60"] ** 2 * per_s * 60.0
         share = np.median(
             build_bank(wing_model).transition_share[build_bank(wing_model).is_fault_of_group(0)]
         )
-        change = settings.effectiveness_changes_per_hour / 3600.0 / rate_hz * share
+        change = settings.changes_per_hour / 3600.0 / rate_hz * share
         assert odds == pytest.approx(
-            np.log(settings.alarm_probability / (1.0 - settings.alarm_probability) / change),
+            np.log(settings.alarm / (1.0 - settings.alarm) / change),
             rel=1e-9,
         )

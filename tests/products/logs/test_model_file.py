@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc_logs.model import load_model
+from beaver_ftc_logs.model import load_model, model_file_text
 
 G, LAGS, HISTORY = 2, 3, 2
 
@@ -30,6 +30,7 @@ MODEL = {
     "fitted": {
         "commands": [[-0.5, 0.4], [-0.3, 0.6]], "rates": [[-1, 2], [-2, 3], [-3, 4]], "spread": [0.1, 0.2, 0.3],  # noqa: E501
         "tied": [0.1, 0.2], "gain_sd": [0.3, 0.4],
+        "tail": {"level": 3.0, "excess": [1.5, 0.5], "minutes": 30.0, "dispersion": 1.2},
     },
 }  # fmt: skip
 
@@ -48,7 +49,11 @@ def written(tmp_path, *changes):
 
 
 def test_the_model_itself_is_one(tmp_path):
-    assert load_model(written(tmp_path)).n_command_lags == LAGS
+    its = load_model(written(tmp_path))
+    assert its.lags == LAGS
+    again = json.loads(model_file_text(its))
+    assert MODEL.keys() <= again.keys()
+    assert MODEL["fitted"].items() <= again["fitted"].items()
 
 
 def test_a_file_of_release_1_0_has_keys_that_have_no_effect(tmp_path):

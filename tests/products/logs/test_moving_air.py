@@ -57,9 +57,9 @@ def test_a_fit_finds_the_colours_that_a_law_answers(flights, moving):
     given, white = flights
     colours = [one.noise_ma_coefficients for one in white]
     assert colours == colours[:2] * 2
-    assert len(set(colours)) == len(moving.noise_models) == 2
-    assert all(one.covariance_inflation >= 1.0 for one in moving.noise_models)
-    off, off_without = (abs(one.command_response[0][0][0] - 0.5) for one in (moving, fitted(given)))
+    assert len(set(colours)) == len(moving.colours) == 2
+    assert all(one.wider >= 1.0 for one in moving.colours)
+    off, off_without = (abs(one.response[0][0][0] - 0.5) for one in (moving, fitted(given)))
     assert off < 0.5 * off_without
 
 
@@ -69,10 +69,10 @@ def test_a_model_of_two_colours_takes_the_likelier(flights, moving, colour):
     depends on a later sample by which noise is likely."""
     new = flown(AVERAGE if colour else (1.0,), 0.5, 1500, 9 + colour)
     its = flights[1][colour].noise_ma_coefficients
-    own = [one for one in moving.noise_models if tuple(one.ma_coefficients) == its]
+    own = [one for one in moving.colours if tuple(one.average) == its]
     bank = build_bank(moving)
     both = bank_posterior(new, moving, bank)
-    alone = bank_posterior(new, moving.model_copy(update={"noise_models": own}), bank)
+    alone = bank_posterior(new, moving.model_copy(update={"colours": own}), bank)
     np.testing.assert_allclose(both[0][300:], alone[0][300:], atol=1e-6)
     short = bank_posterior(samples.select_rows(new, slice(600)), moving, bank)
     for part, cut in zip(both, short, strict=True):
@@ -84,12 +84,10 @@ def test_columns_are_compared_in_white(moving, colour):
     """A command of the other sign is told; one that a law moves by the noise itself is not taken for it."""
     flight = flown(colour, 1.1, 4000, 21)
     trust.refuse_columns(flight, moving)
-    found = [
-        trust.answers(whiten_samples(flight, one.ma_coefficients), moving) for one in moving.noise_models
-    ]
+    found = [trust.answers(whiten_samples(flight, one.average), moving) for one in moving.colours]
     likeliest = max(found, key=lambda one: one.likelihood.mean())
     assert all(1.0 < gain < 1.6 for gain in likeliest.upper.max(axis=0))
-    plain = trust.answers(flight, moving.model_copy(update={"noise_models": []}))
+    plain = trust.answers(flight, moving.model_copy(update={"colours": []}))
     assert colour == (1.0,) or min(plain.upper.max(axis=0)) > 1.9  # what coloured noise does to the fit
     with pytest.raises(BadInput, match="answer the command of right the other way round"):
         trust.refuse_columns(replace(flight, commands=flight.commands * [-1.0, 1.0]), moving)

@@ -38,11 +38,11 @@ def test_a_sign_that_turns_about_in_flight_is_no_column(flown, wing_model):
 @pytest.fixture(scope="module")
 def n_signal_lags():
     """A model whose rates feel a signal, with what it was fitted on, and a flight by it."""
-    past = [*small.model(small.TAIL).past_coefficients[:-1], [0.3, 0.2, -0.1]]
+    past = [*small.model(small.TAIL).past[:-1], [0.3, 0.2, -0.1]]
     model = small.model(small.TAIL, past=past)
     flight = small.flight(model, n=1200, seed=7)
     known = FittedRanges(commands=central_ranges(flight.commands), rates=central_ranges(flight.rates))
-    return model.model_copy(update={"fitted_ranges": known}), flight
+    return model.model_copy(update={"fitted": known}), flight
 
 
 def test_a_signal_of_the_other_sign_is_refused(n_signal_lags):
@@ -57,10 +57,10 @@ def test_a_rate_of_the_other_sign_is_refused_by_what_it_does_to_the_others(n_sig
     model, _ = n_signal_lags
     lost = small.flight(model, n=1200, seed=8, lost=((1, 0, 1200, 0.0),))
     assert refuse_columns(lost, model) is None
-    past = np.array(model.past_coefficients)
+    past = np.array(model.past)
     past[:3] += np.array([[0.0, 0.2, 0.0], [0.0, 0.0, 0.0], [0.4, 0.0, 0.0]])
-    coupled = model.model_copy(update={"past_coefficients": past.tolist()})
-    idle = coupled.model_copy(update={"command_response": np.zeros_like(model.command_response).tolist()})
+    coupled = model.model_copy(update={"past": past.tolist()})
+    idle = coupled.model_copy(update={"response": np.zeros_like(model.response).tolist()})
     flight = small.flight(idle, n=6000, seed=9)
     assert refuse_columns(flight, coupled) is None
     with pytest.raises(BadInput, match=r"times as likely with `scale: -1` on r_rad_s"):

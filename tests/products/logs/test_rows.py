@@ -39,8 +39,8 @@ RIGHT, LEFT, BOTH = (0.5, 1.0), (1.0, 0.25), (0.5, 0.25)
 
 def test_names_under_other_laws(monkeypatch):
     """Unknown until the evidence is four times the threshold; another name waits a second; one group."""
-    settings = WING.settings.model_copy(update={"alarm_threshold": 2.0})
-    other = {"name_evidence_ratio": 4.0, "rename_hold_s": 1.0, "one_faulty_group": True}
+    settings = WING.settings.model_copy(update={"threshold": 2.0})
+    other = {"name_evidence": 4.0, "rename_s": 1.0, "one_group": True}
     asks = settings.model_copy(update=other)
     model = WING.model_copy(update={"settings": asks})
     reach = round(WING.rate_hz)

@@ -16,12 +16,12 @@ def flown(sampled):
 def by_hand(samples, model, k):
     """Residual of sample k and the groups' answers, summed term by term from the model file."""
     predicted = np.array(model.intercept)
-    past = [samples.rates[k - lag] for lag in range(1, model.n_rate_lags + 1)]
-    predicted = predicted + np.concatenate(past) @ np.array(model.past_coefficients)
+    past = [samples.rates[k - lag] for lag in range(1, model.history + 1)]
+    predicted = predicted + np.concatenate(past) @ np.array(model.past)
     answers = [
         sum(
-            samples.commands[k - lag, g] * np.array(model.command_response[g][lag - 1])
-            for lag in range(1, model.n_command_lags + 1)
+            samples.commands[k - lag, g] * np.array(model.response[g][lag - 1])
+            for lag in range(1, model.lags + 1)
         )
         for g in range(len(model.groups))
     ]

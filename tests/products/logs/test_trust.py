@@ -58,8 +58,8 @@ def test_where_it_was_not_fitted_it_says_nothing(model, change, says):
 
 def test_a_residual_that_is_larger_than_any_fitted_does_not_make_a_row_incredible(model):
     """Noise of 2.5 times the standard deviation: the rows are credible, and a large loss is still named."""
-    noise = (6.25 * np.array(small.model().residual_covariance)).tolist()
-    noisy = model.model_copy(update={"residual_covariance": noise})
+    noise = (6.25 * np.array(small.model().noise)).tolist()
+    noisy = model.model_copy(update={"noise": noise})
     flown = small.flight(noisy, n=1500, lost=((1, 600, 1500, 0.0),), seed=21)
     rows = diagnose(flown, model)
     assert rows.credible.mean() > 0.9
@@ -71,9 +71,7 @@ def test_a_residual_that_is_larger_than_any_fitted_does_not_make_a_row_incredibl
 def test_a_rate_that_never_stood_still_may_for_half_a_second(model, usual, most):
     """A filter that follows a dead gyro for longer finds a fault of it."""
     known = model.model_copy(
-        update={
-            "fitted_ranges": model.fitted_ranges.model_copy(update={"longest_still_s": {"q_rad_s": usual}})
-        }
+        update={"fitted": model.fitted.model_copy(update={"still_s": {"q_rad_s": usual}})}
     )
     still = np.zeros(600)
     still[300:320] = 0.1 * np.arange(20)
@@ -89,7 +87,7 @@ def test_a_rate_that_never_stood_still_may_for_half_a_second(model, usual, most)
 def test_rates_in_another_unit_than_the_models_own(model, factor, says):
     flown = small.flight(model, n=300, seed=4, rates=HEALTHY.rates[:300] * factor)
     if says is None:
-        trust.refuse_rate_unit(flown, model.fitted_ranges)
+        trust.refuse_rate_unit(flown, model.fitted)
         return
     with pytest.raises(BadInput, match=says):
         diagnose(flown, model)

@@ -17,7 +17,7 @@ from beaver_ftc.results import Document
 from beaver_ftc_logs import extremes, fitting, gyro_noise, regression, trust
 from beaver_ftc_logs.model import FittedRanges, Model, NoiseModel
 from beaver_ftc_logs.recording import Floats
-from beaver_ftc_logs.regression import spectral_density, variance_inflation
+from beaver_ftc_logs.regression import group_indices, spectral_density, variance_inflation
 from beaver_ftc_logs.samples import (
     NOISE_MA_CANDIDATES,
     UNFITTED_GYROS_RAD_S,
@@ -33,8 +33,11 @@ _SCORES = ("classes", "healthy_or_faulty", "mean_error", "held_by_bounds")
 _DECISIVE_BIC = 10.0
 """By how much a criterion must be less: odds of 150 to 1 [Kass1995, section 3.2]."""
 _SPECTRUM_BANDS_HZ = ((0.0, 0.1), (0.1, 0.5), (0.5, 1.0), (1.0, 2.0), (2.0, 5.0), (5.0, 10.0))
+FREE_RUN_WINDOW_S = 2.0
+_MIN_FREE_RUNS = 400
 _AIRSPEED_POWERS = (0.0, 1.0, 3.0)
 _MAX_ROUNDS = 8
+_MAX_DELAY_S, _MIN_SERVO_LAG_S, _MAX_SERVO_LAG_S = 0.6, 0.005, 1.0
 
 
 def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
@@ -62,6 +65,7 @@ def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
         "collinear": collinear_names(parts, model),
         "colour": median_inflation(parts, model),
         "spectrum": density_ratios(parts, model),
+        "output_error": fit_output_error(parts, group_indices(model)),
     }
     settings = model.settings.model_copy(update={"bounds": mass})
     return model.model_copy(update={"settings": settings, "identified": results})
@@ -331,6 +335,12 @@ def identification_text(model: Model) -> str:
         *_day_lines(results["another_day"], len(results["flights"])),
         f"  the residual's colour widens standard errors by {_axis_text(results['colour'])}",
     ]
+    output = results["output_error"]
+    if "delay_s" in output:
+        delay = f"delay {output['delay_s']:.3f} s (sd {output['delay_sd_s']:.3f})"
+        explained = _axis_text(output["explained_of_windows_not_fitted"])
+        lag = f"servo lag {_servo_text(output)}"
+        lines.append(f"  output error: {lag}, {delay}, explains of 2 s free runs not fitted {explained}")
     if results["collinear"]:
         most, n = results["collinear"][0], len(results["collinear"])
         are = "regressors are" if n > 1 else "regressor is"
@@ -401,5 +411,97 @@ def _fold_text(fold: Document) -> str:
     )
 
 
+def _servo_text(fit: Document) -> str:
+    if fit["shorter_than_can_be_told"]:
+        return "shorter than this rate can tell"
+    return f"{fit['servo_lag_s']:.3f} s (sd {fit['servo_lag_sd_s']:.3f})"
+
+
 def _axis_text(values: dict[str, float]) -> str:
     return ", ".join(f"{axis} {value:.3f}" for axis, value in values.items())
+
+
+def fit_output_error(parts: Sequence[fitting.FitPart], groups: list[list[int]]) -> dict[str, Any]:
+    """Fit on every other window, test on the rest. Returns servo lag and delay in s, their standard errors,
+    and the share of the rates' variance explained over free-running windows not fitted, an axis.
+
+    th: parameters, as in `_simulate`; P: inverse of their information.
+    """
+    from scipy.optimize import least_squares
+
+    dt_s = float(np.median([part.samples.dt_s for part in parts]))
+    u, y = _cut_windows(parts, groups, round(FREE_RUN_WINDOW_S / dt_s), round(_MAX_DELAY_S / dt_s) + 1)
+    if len(y) < 20 or not np.ptp(y, axis=(0, 1)).all():
+        return {"windows": len(y), "says": "too few gap-free windows in which every rate moves"}
+    fitted, held_out = slice(0, None, 2), slice(1, None, 2)
+    sd = y.std(axis=(0, 1))
+    # lag, delay, A, B and c
+    guess = np.array([0.1, dt_s, *(0.7 * np.eye(3)).ravel(), *np.full(3 * len(groups), 0.01), *np.zeros(3)])
+    free = np.full(len(guess) - 2, np.inf)
+    lower, upper = [_MIN_SERVO_LAG_S, 0.0, *-free], [_MAX_SERVO_LAG_S, _MAX_DELAY_S, *free]
+
+    def error(th: Floats, rows: slice) -> Floats:
+        return ((_simulate(th, u[rows], y[rows], dt_s) - y[rows]) / sd).ravel()
+
+    found = least_squares(error, guess, bounds=(lower, upper), args=(fitted,), loss="soft_l1", max_nfev=40)
+    P = np.linalg.pinv(found.jac.T @ found.jac)
+    errors = np.sqrt(np.maximum(np.diag(P), 0.0) * float(found.fun @ found.fun) / len(found.fun))
+    e = error(found.x, held_out).reshape(-1, 3) * sd
+    explained = 1.0 - e.var(axis=0) / y[held_out].reshape(-1, 3).var(axis=0)
+    return {
+        "windows": len(y),
+        "servo_lag_s": float(found.x[0]),
+        "servo_lag_sd_s": float(errors[0]),
+        "delay_s": float(found.x[1]),
+        "delay_sd_s": float(errors[1]),
+        "shorter_than_can_be_told": bool(found.x[0] < 2.0 * _MIN_SERVO_LAG_S),
+        "explained_of_windows_not_fitted": regression.by_axis(explained),
+    }
+
+
+def _cut_windows(
+    parts: Sequence[fitting.FitPart], groups: list[list[int]], n: int, past: int
+) -> tuple[Floats, Floats]:
+    """Commands u (W, past + n, G) with their past, scaled by labels, and rates y (W, n, 3), of W windows."""
+    windows = []
+    for part in parts:
+        samples = part.samples
+        effect = np.where(np.isfinite(samples.labels), samples.labels, 1.0)
+        u = np.column_stack([(samples.commands * effect)[:, group].sum(axis=1) for group in groups])
+        known = part.is_usable & np.isfinite(u).all(axis=1) & np.isfinite(samples.rates).all(axis=1)
+        for end in range(past + n, len(u), n):
+            rows = slice(end - past - n, end)
+            if known[rows].all() and np.ptp(samples.stretch_number[rows]) == 0:
+                windows.append((u[rows], samples.rates[end - n : end]))
+    chosen = windows[:: max(len(windows) // _MIN_FREE_RUNS, 1)]
+    commands, rates = ([window[i] for window in chosen] for i in (0, 1))
+    return np.reshape(commands, (-1, past + n, len(groups))), np.reshape(rates, (-1, n, 3))
+
+
+def _simulate(th: Floats, u: Floats, y: Floats, dt_s: float) -> Floats:
+    """Free runs X (W, m, 3) of all windows at once, rad/s, from the first of the rates y (W, m, 3):
+
+        x[k+1] = A x[k] + B' s[k] + c,    s[k+1] = a s[k] + (1 - a) v[k],    a = exp(-dt / lag)
+
+    s (W, n): positions of the servos; v (W, n): commands u (W, past + m, n) a delay before. th: lag and
+    delay, both s, A (3, 3), B (n, 3), c (3,).
+    """
+    n = u.shape[2]
+    lag_s, delay_s = th[:2]
+    A = th[2:11].reshape(3, 3)
+    B = th[11 : 11 + 3 * n].reshape(n, 3)
+    c = th[11 + 3 * n :]
+    m = y.shape[1]
+    past = u.shape[1] - m
+    whole, f = divmod(delay_s / dt_s, 1.0)
+    a = np.exp(-dt_s / lag_s)
+    x = y[:, 0].copy()
+    s = u[:, 0].copy()
+    X = np.empty_like(y)
+    for k in range(u.shape[1]):
+        if k >= past:
+            X[:, k - past] = x
+            x = x @ A.T + s @ B + c
+        v = (1.0 - f) * u[:, max(k - int(whole), 0)] + f * u[:, max(k - int(whole) - 1, 0)]
+        s = a * s + (1.0 - a) * v
+    return X

@@ -156,10 +156,9 @@ def weigh_loss(fdi, j):
 
 @apart(long_loops=True)
 def weigh_position(fdi, j):
-    """Fill `unlikely` of estimator j: whether a parity view shows motion that its surface cannot cause."""
-    stat, fie = fdi.statistical, fdi.isolation.estimator[j]
-    views = stat.views[: stat.n_views]
-    fie.unlikely = parity.views_exclude(views, stat.test, stat.forces, stat.rows, fie.surface)
+    """Fill `unlikely` of estimator j by the parity views."""
+    stat, views = fdi.statistical, fdi.statistical.views[: fdi.statistical.n_views]
+    isolation.update_views(fdi.isolation.estimator[j], views, stat.test, stat.forces, stat.rows)
 
 
 @kernel

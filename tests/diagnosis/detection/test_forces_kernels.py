@@ -13,8 +13,8 @@ from beaver_ftc.diagnosis.detection.forces import (
     NORMAL_INDEX,
     SIDE_INDEX,
     configure_forces,
-    update_both_forces,
 )
+from beaver_ftc.diagnosis.detection.rows import update_forces
 from beaver_ftc.plant.instruments import MEASURED
 from beaver_ftc.scenario.diagnosis import Bounds
 from flying import declared_in
@@ -23,7 +23,13 @@ AIRCRAFT = load()
 X, U = np.array([0.05, -0.03, 0.04]), np.array([0.06, -0.08, 0.05, 0.1])
 Y = np.array([0.11, 0.07, 46.0, 1150.0, 2.1])
 ALONG_Y = np.arange(15.0).reshape(3, 5)
-DT, GRAVITY = 0.01, 9.80665
+DT, GRAVITY, FIRST = 0.01, 9.80665, (0, 70)
+
+
+def feel(fdi, seen):
+    """Show the forces an instant."""
+    statistical, du = fdi["statistical"], np.zeros(4)
+    update_forces(statistical["rows"], statistical["forces"], statistical["gust"], du, seen, U, DT)
 
 
 def measured(x=X, y=Y, force=(0.5, 0.3, -9.5), attitude=(0.2, 0.15)):
@@ -46,6 +52,7 @@ def felt(bounds=None, **declared_errors):
     )
     air["config"]["L_gust"], statistical["forces"]["in_use"] = 533.4, 1
     air["output"]["uses_accelerometers"] = 1
+    statistical["rows"]["first"] = FIRST
     configure_forces(fdi, declared_in(bounds or Bounds(), AIRCRAFT), (X, Y, U), ALONG_Y, DT)
     return fdi
 
@@ -67,20 +74,21 @@ def test_the_model_is_the_sum_of_its_terms_and_the_rest_is_the_innovation(f, nam
     fdi, rate = felt(), 0.04
     record, seen = fdi["statistical"]["forces"], measured()
     record["angle_rate"][SIDE_INDEX], record["n_seen"] = rate, 1
-    update_both_forces(record, fdi["statistical"]["gust"], seen, U, DT)
+    feel(fdi, seen)
     whole = per_coefficient() * coefficient(name, rate=rate)
     force = record["component"][f]
     expected = seen["force"][1 + f] / AIRCRAFT.geometry.chord_m - whole
     assert force["innovation"] == pytest.approx(expected, rel=1e-12)
     n = int(force["n_Z"])
-    assert force["regressor"][n - 1] == pytest.approx(whole)
+    columns = fdi["statistical"]["rows"]["Z"][FIRST[f] : FIRST[f] + n, 3 + f]
+    assert columns[-1] == pytest.approx(whole)
     values = [t.value for t in AIRCRAFT.measurable_forces if t.coefficient == name]
     values += [
         t.value
         for t in AIRCRAFT.forces
         if t.coefficient == "CY" and f == SIDE_INDEX and "betadoth" in dict(t.of)
     ]
-    terms = force["regressor"][: n - 1]
+    terms = columns[:-1]
     if f == SIDE_INDEX:
         terms = np.append(terms[:-1], terms[-1] / values[-1])
         assert terms[-1] == pytest.approx(per_coefficient() * rate * AIRCRAFT.geometry.span_m / (2 * Y[2]))
@@ -90,14 +98,13 @@ def test_the_model_is_the_sum_of_its_terms_and_the_rest_is_the_innovation(f, nam
 @pytest.mark.parametrize(("f", "name"), [(SIDE_INDEX, "CY"), (NORMAL_INDEX, "CZ")])
 def test_a_surface_s_column_is_the_slope_along_it_and_its_errors_are_shares_of_the_terms(f, name):
     fdi = felt(Bounds(coefficients=0.05))
-    record = fdi["statistical"]["forces"]
-    update_both_forces(record, fdi["statistical"]["gust"], measured(), U, DT)
-    force = record["component"][f]
+    feel(fdi, measured())
+    rows = fdi["statistical"]["rows"]
     for s in range(4):
         ahead = U + 1e-4 * np.eye(4)[s]
         slope = per_coefficient() * (coefficient(name, u=ahead) - coefficient(name)) / 1e-4
-        assert force["G"][s] == pytest.approx(slope, abs=1e-9)
-        assert force["Gu"][s] == pytest.approx(slope * U[s], abs=1e-9)
+        assert rows["G"][s, 3 + f] == pytest.approx(slope, abs=1e-9)
+        assert rows["Gu"][s, 3 + f] == pytest.approx(slope * U[s], abs=1e-9)
         own = [
             t
             for t in AIRCRAFT.measurable_forces
@@ -106,7 +113,7 @@ def test_a_surface_s_column_is_the_slope_along_it_and_its_errors_are_shares_of_t
         size = sum(
             abs(t.value) * Y[0] ** dict(t.of).get("alpha", 0) * Y[1] ** dict(t.of).get("beta", 0) for t in own
         )
-        assert force["e_G"][s] == pytest.approx(0.05 * per_coefficient() * size)
+        assert rows["e_G"][s, 3 + f] == pytest.approx(0.05 * per_coefficient() * size)
 
 
 def test_the_flow_s_rates_are_those_of_a_body_that_moves_on():
@@ -133,11 +140,9 @@ def test_noise_of_the_readings_is_jitter_of_the_forces():
     std = np.radians([0.03, 0.02]), 0.1, 4.0, np.radians(0.05)
     for _ in range(1500):
         y = Y + np.array([*(std[0] * rng.normal(size=2)), std[1] * rng.normal(), std[2] * rng.normal(), 0.0])
-        update_both_forces(
-            record, fdi["statistical"]["gust"], measured(X + std[3] * rng.normal(size=3), y), U, DT
-        )
+        feel(fdi, measured(X + std[3] * rng.normal(size=3), y))
         drawn.append(record["component"]["innovation"].copy())
-    update_both_forces(record, fdi["statistical"]["gust"], measured(), U, DT)
+    feel(fdi, measured())
     assert np.sqrt(record["component"]["var"][:, 0]) == pytest.approx(np.std(drawn, axis=0), rel=0.06)
     without = record["component"]["var"][:, 0] - record["component"]["var"][:, 1]
     slopes = record["component"]["vane"][:, 1] * np.radians([0.02, 0.03])
@@ -164,14 +169,14 @@ def test_in_turbulence_gusts_turn_the_flow():
 def test_without_vanes_the_flow_is_what_the_forces_say():
     """A vane that is off by little: forces give back where the flow is."""
     fdi = felt()
-    record, air = fdi["statistical"]["forces"], fdi["statistical"]["gust"]
-    update_both_forces(record, air, measured(), U, DT)
+    record = fdi["statistical"]["forces"]
+    feel(fdi, measured())
     sound = [
         measured().force[1 + f] - record["component"][f]["innovation"] * AIRCRAFT.geometry.chord_m
         for f in (SIDE_INDEX, NORMAL_INDEX)
     ]
     off = Y + np.array([0.004, -0.003, 0.0, 0.0, 0.0])
-    update_both_forces(record, air, measured(y=off, force=(0.5, *sound)), U, DT)
+    feel(fdi, measured(y=off, force=(0.5, *sound)))
     forces.fill_vaneless_y(record, np.zeros(3), np.append(off, np.zeros(record["y_free"].size - 5)))
     assert record["y_free"][:5] == pytest.approx(Y, abs=6e-4), "an eighth of what they are off"
     still, turning = record["y_free"][:2].copy(), np.array([0.02, -0.03, 0.01])

@@ -19,8 +19,7 @@ like e, is in rad/s2.
 
     e, f_hat       innovation; force of the model
     per_C          qdyn S / m c: e of a coefficient of one
-    Z, tol         regressor of a term; tolerance of its coefficient
-    G, Gu, e_G     e per rad of a surface; e at its command; bound on the error of G
+    G              e per rad of a surface
     L              e per rad/s of rotation of the air, 1/s
     angle, vane    flow angle from inertial motion, rad; of a vane's error, per rad: (acceleration, e)
 """
@@ -31,9 +30,10 @@ from beaver_ftc.aircraft import AXES, Aircraft, Term
 from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S, FORCES
 from beaver_ftc.aircraft.schema import MAX_SURFACES, MAX_TERMS_OF_ONE, SIDESLIP_RATE
 from beaver_ftc.compiled import kernel, record
-from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, DPT, N_Y, QDYN, evaluate, slipstream_slopes
+from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, DPT, N_Y, QDYN, slipstream_slopes
 from beaver_ftc.diagnosis.gusts import drop_accelerometers
 from beaver_ftc.diagnosis.monitors.redundancy import EARTH_M_S2
+from beaver_ftc.diagnosis.state import PITCH, ROLL, SIDE_FORCE, YAW
 from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA
 from beaver_ftc.scenario.declared import MASS_TOLERANCE, Declared, SensorErrors
 from beaver_ftc.scenario.sensors import ACCELEROMETERS
@@ -49,6 +49,7 @@ MAX_FORCE_LAG_S = 0.002
 DRIFT_CHANGE_PER_S = 0.3  # share of a drift that may change within a second
 # Tolerance of the term in the rate of sideslip, by whether the air moves: gusts have a part in it.
 SIDESLIP_RATE_TOLERANCES = {False: 0.05, True: 0.2}
+VANE_TOLERANCE = 0.1  # relative error of the effect of a vane's error: its column is that of the trim
 # The rate of sideslip, the bias of the accelerometer and the force as a whole come last.
 MAX_FORCE_REGRESSORS = MAX_TERMS_OF_ONE + 3
 
@@ -59,15 +60,14 @@ FORCE_RECORD = record(
     # e at the flow angle from inertial motion; that angle, rad; bound on its drift, rad/s; e per rad/s of
     # drift; intensity of the drift of e by errors and gusts, (rad/s2)2/s
     e_inertial=float, angle=float, drift=float, e_drift=float, Q_e=float,
-    # of each surface: e per rad, now and with the readings before; e at the command; error of e per rad
-    G=MAX_SURFACES, G_prev=MAX_SURFACES, Gu=MAX_SURFACES, e_G=MAX_SURFACES,
+    G=MAX_SURFACES,  # e per rad of each surface, now
     # of an error of the vane, per rad: angular acceleration and e, angular acceleration in roll
     vane=2, vane_roll=float,
     var_trim=2, var=2,  # variance of e in trim and now, with the vane and without it, (rad/s2)2
-    L=3, eta_u=float, f_hat=float, e_lag=float,  # bounds on e by errors of deflections and by a time lag
+    L=3, f_hat=float,
     G_trim=MAX_SURFACES,  # magnitude of e by each surface in trim, per rad
     var_acc=float,  # variance of e by noise of the accelerometer; independent of the pressure
-    n_Z=int, tol=MAX_FORCE_REGRESSORS, regressor=MAX_FORCE_REGRESSORS,
+    n_Z=int,  # its columns in rows.py, without that of the drift
 )  # fmt: skip
 FORCES_RECORD = record(
     in_use=int, c_inv=float, gravity=float, span=float,  # whether forces are used; 1/m; m/s2; m
@@ -78,26 +78,6 @@ FORCES_RECORD = record(
     gust_noise=3,  # noise of the gust estimate from forces, rad/s2
     y_free=N_Y, component=(FORCE_RECORD, 2),
 )  # fmt: skip
-
-
-@kernel
-def update_both_forces(forces, gust, meas, u, dt):
-    """Update the innovations of the forces at this instant, dt s after the last; u (n,) rad: surfaces.
-
-    At the first instant the rate of sideslip of the run before is not known; that of this instant is used.
-    """
-    if forces.n_seen == 0:
-        fill_angle_rates(forces, meas)
-    evaluate(gust.memory.table, meas.x, meas.y)
-    forces.q_ratio = meas.y[QDYN] / forces.q_trim
-    for i in range(2):
-        f_prev = forces.component[i].f_hat
-        update_force(forces, gust, i, meas, u)
-        f = forces.component[i]
-        f.e_lag = MAX_FORCE_LAG_S * abs(f.f_hat - f_prev) / dt if forces.n_seen else 0.0
-        update_inertial(forces, f, i, meas.y, dt)
-    fill_angle_rates(forces, meas)
-    forces.n_seen = min(forces.n_seen + 1, MIN_UPDATES)
 
 
 @kernel
@@ -136,49 +116,6 @@ def update_inertial(forces, f, i, y, dt):
     f.angle = f.angle + dt * forces.angle_rate[i] if forces.n_seen else angle
     f.e_drift += dt * slope
     f.e_inertial = f.innovation - slope * (angle - f.angle)
-
-
-@kernel
-def update_force(forces, gust, i, meas, u):
-    """Update force i: its innovation e, the effects of surfaces, and the regressors of its errors.
-
-        f_hat = sum C_k Z_k,  Z_k = per_C monomial_k u_s,  per_C = qdyn S / m c      e = a_i / c - f_hat
-
-    The last regressors are the term in the rate of sideslip, f_bdot, and f_hat itself.
-    """
-    table, f = gust.memory.table, forces.component[i]
-    first = table.free_from[SIDE_ROW + i]
-    end = table.surface_to[SIDE_ROW + i]
-    per_C = meas.y[QDYN] * gust.config.S_m * forces.c_inv
-    f_hat = 0.0
-    f.G_prev[:] = f.G
-    f.G[:] = 0.0
-    f.e_G[:] = 0.0
-    for k in range(first, end):
-        s = table.surface[k]
-        Z = per_C * table.power[table.monomial[k]]
-        if s >= 0:
-            f.G[s] += table.value[k] * Z
-            f.e_G[s] += f.tol[k - first] * abs(Z)
-            Z *= u[s]
-        f.regressor[k - first] = Z
-        f_hat += table.value[k] * Z
-    if i == SIDE_INDEX:
-        f_bdot = (
-            per_C * forces.CY_bdot * forces.angle_rate[SIDE_INDEX] * forces.span / (2.0 * meas.y[AIRSPEED])
-        )
-        f.regressor[end - first] = f_bdot
-        f_hat += f_bdot
-    f.regressor[f.n_Z - 1] = f_hat
-    f.f_hat = f_hat
-    if forces.n_seen == 0:
-        f.G_prev[:] = f.G
-    for s in range(u.size):
-        f.Gu[s] = f.G_prev[s] * u[s]
-    f.innovation = meas.force[1 + i] * forces.c_inv - f_hat
-    std = f_hat * forces.q_noise / meas.y[QDYN]
-    for k in range(2):
-        f.var[k] = f.var_trim[k] * forces.q_ratio**2 + std * std + f.var_acc
 
 
 @kernel
@@ -249,11 +186,11 @@ def _configure_force(
     f["var_trim"] = _force_variances(fdi, errors, y, f_all, vane)
     std = errors[ACCELEROMETERS[1 + i]].random
     f["var_acc"] = (forces["c_inv"] * std) ** 2
-    _configure_terms(f, declared, terms, y, f_y[vane] / per_C, i, forces["c_inv"])
+    f["drift"] = _drift_bound(errors, cfg["gravity"], y[AIRSPEED], i)
+    _configure_columns(fdi["statistical"]["rows"], f, declared, terms, y, f_y[vane] / per_C, i)
     for term in terms:
         if term.surface:
             f["G_trim"][aircraft.surfaces.index(term.surface)] += per_C * abs(term.value)
-    f["drift"] = _drift_bound(errors, cfg["gravity"], y[AIRSPEED], i)
     Q_angle = (DRIFT_CHANGE_PER_S * f["drift"]) ** 2 + dt * (std / y[AIRSPEED]) ** 2
     f["Q_e"] = f_y[vane] ** 2 * (Q_angle + declared.air.angle_walk(y[AIRSPEED]))
 
@@ -300,29 +237,30 @@ def _drift_bound(errors: SensorErrors, gravity: float, V: float, i: int) -> floa
     return float(EARTH_RATE_RAD_S + gyros + a_all / V)
 
 
-def _configure_terms(
-    f: np.void, declared: Declared, terms: list[Term], y: np.ndarray, C_vane: float, i: int, c_inv: float
+def _configure_columns(
+    rows: np.void, f: np.void, declared: Declared, terms: list[Term], y: np.ndarray, C_vane: float, i: int
 ) -> None:
-    """Fill the tolerances of each term: that of the coefficients, and what constant errors of vane and
-    pressure do; of the accelerometer's bias, m/s2; of the whole."""
+    """Fill the tolerances of the force's columns: of each term, by that of the coefficients and by constant
+    errors of vane and pressure; of the rate of sideslip; of the accelerometer's bias, m/s2; of the whole; of
+    the drift. Fill the columns of an error of the vane."""
     tol_C, errors = declared.coefficients.largest, declared.sensors
     vane = errors["alpha" if i == NORMAL_INDEX else "beta"]
     acc = errors[ACCELEROMETERS[1 + i]]
     tol_q = errors["qdyn"].steady / y[QDYN] + errors["qdyn"].slope
-    for k, term in enumerate(terms):
-        f["tol"][k] = (tol_C + tol_q + vane.slope) * abs(term.value)
-        if term.is_constant:
-            f["tol"][k] += vane.steady * abs(C_vane)
-    n = len(terms)
+    tol = [
+        (tol_C + tol_q + vane.slope) * abs(t.value) + t.is_constant * vane.steady * abs(C_vane) for t in terms
+    ]
+    first = int(rows["first"][i])
     if i == SIDE_INDEX:
-        f["tol"][n] = tol_C + SIDESLIP_RATE_TOLERANCES[declared.air.moves]
-        n = n + 1
+        tol.append(tol_C + SIDESLIP_RATE_TOLERANCES[declared.air.moves])
     if acc.steady:
-        f["tol"][n] = acc.steady
-        f["regressor"][n] = c_inv
-        n = n + 1
-    f["tol"][n] = MASS_TOLERANCE + acc.slope
-    f["n_Z"] = n + 1
+        rows["Z"][first + len(tol), SIDE_FORCE + i] = 1.0 / declared.aircraft.geometry.chord_m
+        tol.append(acc.steady)
+    tol += [MASS_TOLERANCE + acc.slope, f["drift"]]
+    f["n_Z"], rows["tol"][first : first + len(tol)] = len(tol) - 1, tol
+    of_vane = rows["G"][MAX_SURFACES + i]
+    of_vane[[ROLL, YAW if i == SIDE_INDEX else PITCH, SIDE_FORCE + i]] = f["vane_roll"], *f["vane"]
+    rows["e_G"][MAX_SURFACES + i] = VANE_TOLERANCE * np.abs(of_vane)
 
 
 def _force_coefficient(aircraft: Aircraft, name: str, state: TrimState) -> float:

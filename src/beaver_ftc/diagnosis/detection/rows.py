@@ -45,9 +45,17 @@ from beaver_ftc.design.model import (
     whole_sum,
 )
 from beaver_ftc.diagnosis.bounds import OFF_MAP_RAD_S2, add_published_bound, extra_bound
-from beaver_ftc.diagnosis.detection.forces import MAX_FORCE_REGRESSORS
+from beaver_ftc.diagnosis.detection.forces import (
+    MAX_FORCE_LAG_S,
+    MAX_FORCE_REGRESSORS,
+    MIN_UPDATES,
+    SIDE_INDEX,
+    SIDE_ROW,
+    fill_angle_rates,
+    update_inertial,
+)
 from beaver_ftc.diagnosis.detection.likelihood import ALPHA_CUBED_MOMENT, N_INPUT_READINGS, N_ROWS
-from beaver_ftc.diagnosis.state import PITCH, ROLL, SIDE_FORCE, YAW
+from beaver_ftc.diagnosis.state import PITCH, SIDE_FORCE
 from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA
 from beaver_ftc.scenario.declared import SensorErrors
 
@@ -56,7 +64,6 @@ from beaver_ftc.scenario.declared import SensorErrors
 # inertial motion, and the rates do not count.
 RAW, RATES, VANED, VANELESS, INERTIAL = range(5)
 MAX_COLUMNS = MAX_TERMS + N_INPUT_READINGS + 2 * (MAX_FORCE_REGRESSORS + 1)
-VANE_TOLERANCE = 0.1  # relative error of the effect of a vane's error: its column is that of the trim
 MIN_GYRO_STD_RAD_S = 1e-9  # of a gyro: exact ones are still doubles, and a variance no difference of zeros
 _READING_OF = {"alpha": ALPHA, "beta": BETA, "V": AIRSPEED, "qdyn": QDYN}
 _KW_READING = N_INPUT_READINGS - 1  # of the engine, kW
@@ -106,16 +113,6 @@ def configure_rows(stat: np.void, errors: SensorErrors, tol: np.ndarray, err: np
     sigma[_KW_READING] = err["kw0"] / NOISE_LIMIT_SIGMA
     noise["noisy"] = of_readings.any() or sigma.any()
     rows["n"] = n + noise["noisy"] * N_INPUT_READINGS if noise["noisy"] or tol.any() else 0
-
-
-def configure_force_rows(rows: np.void, forces: np.void) -> None:
-    """Fill the tolerances of the forces' columns, and the columns of errors of the vanes."""
-    for i, f in enumerate(forces["component"]):
-        n, first, vane = int(f["n_Z"]), int(rows["first"][i]), MAX_SURFACES + i
-        rows["tol"][first : first + n], rows["tol"][first + n] = f["tol"][:n], f["drift"]
-        axis = YAW if i == 0 else PITCH
-        rows["G"][vane, [ROLL, axis, SIDE_FORCE + i]] = f["vane_roll"], *f["vane"]
-    rows["e_G"][MAX_SURFACES:] = VANE_TOLERANCE * np.abs(rows["G"][MAX_SURFACES:])
 
 
 @kernel
@@ -208,25 +205,74 @@ def finish_rows(rows, noise, forces, gust, of_views, vaneless, bound, means, nu,
         for s in range(means.G.shape[1]):
             rows.G[s, i], rows.Gu[s, i] = means.G_old[i, s], means.Gu_old[i, s]
             rows.e_G[s, i] = bound.eG[i, s]
-    if forces.in_use:
-        for i, f in enumerate(forces.component):
-            fill_force_row(rows, forces, f, i, bound.declared_errors.du)
 
 
 @kernel
-def fill_force_row(rows, forces, f, i, du):
-    """Fill the row of force i, whose record is f; du (n,) rad: errors of the deflections."""
-    r, c, eta = SIDE_FORCE + i, rows.first[i], 0.0
-    for s in range(du.size):
-        eta += f.G_trim[s] * du[s]
-        rows.G[s, r], rows.e_G[s, r], rows.Gu[s, r] = f.G_prev[s], f.e_G[s], f.Gu[s]
-    for source in range(INERTIAL):
-        rows.nu[source, r], rows.std[source, r] = f.innovation, np.sqrt(f.var[0])
-    rows.nu[INERTIAL, r], rows.std[INERTIAL, r] = f.e_inertial, np.sqrt(f.var[1])
-    rows.eta[0, r] = rows.eta[1, r] = eta * forces.q_ratio + f.e_lag
-    for k in range(f.n_Z):
-        rows.Z[c + k, r] = f.regressor[k]
-    rows.Z[c + f.n_Z, r] = f.e_drift
+def update_forces(rows, forces, gust, du, meas, u, dt):
+    """Update the rows of the forces at this instant, dt s after the last; u (n,) rad: surfaces; du: their
+    errors.
+
+    At the first instant the rate of sideslip of the run before is not known; that of this instant is used.
+    """
+    if forces.n_seen == 0:
+        fill_angle_rates(forces, meas)
+    evaluate(gust.memory.table, meas.x, meas.y)
+    forces.q_ratio = meas.y[QDYN] / forces.q_trim
+    for i, f in enumerate(forces.component):
+        r, f_prev, eta = SIDE_FORCE + i, f.f_hat, 0.0
+        update_force(rows, forces, f, gust, i, meas, u)
+        update_inertial(forces, f, i, meas.y, dt)
+        for source in range(INERTIAL):
+            rows.nu[source, r], rows.std[source, r] = f.innovation, np.sqrt(f.var[0])
+        rows.nu[INERTIAL, r], rows.std[INERTIAL, r] = f.e_inertial, np.sqrt(f.var[1])
+        rows.Z[rows.first[i] + f.n_Z, r] = f.e_drift
+        for s in range(u.size):
+            eta += f.G_trim[s] * du[s]
+        e_lag = MAX_FORCE_LAG_S * abs(f.f_hat - f_prev) / dt if forces.n_seen else 0.0
+        rows.eta[0, r] = rows.eta[1, r] = eta * forces.q_ratio + e_lag
+    fill_angle_rates(forces, meas)
+    forces.n_seen = min(forces.n_seen + 1, MIN_UPDATES)
+
+
+@kernel
+def update_force(rows, forces, f, gust, i, meas, u):
+    """Update force i, whose record is f: its innovation e, the effects of surfaces, and its columns.
+
+        f_hat = sum C_k Z_k,  Z_k = per_C monomial_k u_s,  per_C = qdyn S / m c      e = a_i / c - f_hat
+
+    The last columns are the term in the rate of sideslip, f_bdot, and f_hat itself.
+    """
+    table, r, c = gust.memory.table, SIDE_FORCE + i, rows.first[i]
+    first = table.free_from[SIDE_ROW + i]
+    end = table.surface_to[SIDE_ROW + i]
+    per_C = meas.y[QDYN] * gust.config.S_m * forces.c_inv
+    f_hat = 0.0
+    for s in range(u.size):
+        rows.G[s, r], rows.e_G[s, r], f.G[s] = f.G[s], 0.0, 0.0
+    for k in range(first, end):
+        s = table.surface[k]
+        Z = per_C * table.power[table.monomial[k]]
+        if s >= 0:
+            f.G[s] += table.value[k] * Z
+            rows.e_G[s, r] += rows.tol[c + k - first] * abs(Z)
+            Z *= u[s]
+        rows.Z[c + k - first, r] = Z
+        f_hat += table.value[k] * Z
+    if i == SIDE_INDEX:
+        f_bdot = (
+            per_C * forces.CY_bdot * forces.angle_rate[SIDE_INDEX] * forces.span / (2.0 * meas.y[AIRSPEED])
+        )
+        rows.Z[c + end - first, r] = f_bdot
+        f_hat += f_bdot
+    rows.Z[c + f.n_Z - 1, r] = f.f_hat = f_hat
+    for s in range(u.size):
+        if forces.n_seen == 0:
+            rows.G[s, r] = f.G[s]
+        rows.Gu[s, r] = rows.G[s, r] * u[s]
+    f.innovation = meas.force[1 + i] * forces.c_inv - f_hat
+    std = f_hat * forces.q_noise / meas.y[QDYN]
+    for k in range(2):
+        f.var[k] = f.var_trim[k] * forces.q_ratio**2 + std * std + f.var_acc
 
 
 def set_columns(b: np.void, rows: np.void, columns: list[int]) -> None:

@@ -76,7 +76,6 @@ from beaver_ftc.diagnosis.detection.rows import (
     add_constants,
     add_turn,
     begin_rows,
-    configure_force_rows,
     configure_rows,
     look,
     set_columns,
@@ -207,7 +206,6 @@ def configure_statistics(
         )
         if declared.uses_accelerometers:
             configure_forces(fdi, declared, trim, jacobian(model, *trim)[3], dt_s)
-            configure_force_rows(stat["rows"], stat["forces"])
             _configure_view_gusts(stat, declared)
         configure_parity_views(stat, aircraft)
     _configure_lengths(stat, V, rate_hz)

@@ -19,7 +19,7 @@ from beaver_ftc.compiled import apart, kernel
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, unanticipated_pitch
 from beaver_ftc.diagnosis import conclusion, gusts, isolation, monitors
 from beaver_ftc.diagnosis.detection import attitude, filters, forces, parity, statistical
-from beaver_ftc.diagnosis.detection.rows import finish_rows
+from beaver_ftc.diagnosis.detection.rows import finish_rows, update_forces
 from beaver_ftc.diagnosis.model_prediction import fill_old_effects, innovation_known
 from beaver_ftc.diagnosis.monitors import sensor_monitor
 from beaver_ftc.diagnosis.state import (
@@ -284,7 +284,7 @@ def update_tests(fdi, prediction, measured, k, t):
 def prepare_gusts(fdi, prediction, measured, k):
     """Prepare the tests of the frame after frame k: the gust that the vanes measure, noise, coefficients."""
     stat, dt = fdi.statistical, fdi.config.dt
-    update_gusts(stat.gust, stat.vaneless, stat.vaned, stat.forces, prediction, measured, k, dt)
+    update_gusts(stat, fdi.bound.declared_errors.du, prediction, measured, k, dt)
     statistical.prepare_tests(
         stat.test, stat.noise, stat.rows, stat.block, stat.gust, fdi.bound, prediction.design, measured,
         prediction.u, dt,
@@ -302,8 +302,10 @@ def add_gust_instant(fdi, prediction, measured):
 
 
 @kernel
-def update_gusts(gust, vaneless, vaned, force, pred, meas, k, dt):
-    """Update the gust estimate from vanes and accelerometers, and the innovations of the forces."""
+def update_gusts(stat, du, pred, meas, k, dt):
+    """Update the gust estimate from vanes and accelerometers, and the rows of the forces; du (n,) rad: errors
+    of the deflections."""
+    gust, vaneless, vaned, force = stat.gust, stat.vaneless, stat.vaned, stat.forces
     if gust.output.gusty:
         gusts.set_intensity(gust, meas.altitude)
         gusts.step_gust(gust, meas.y, meas.attitude, pred.w * dt, k)
@@ -312,7 +314,7 @@ def update_gusts(gust, vaneless, vaned, force, pred, meas, k, dt):
     if force.in_use or gust.output.uses_accelerometers:
         gust.memory.f_read[:] = meas.force
     if force.in_use:
-        forces.update_both_forces(force, gust, meas, pred.u, dt)
+        update_forces(stat.rows, force, gust, du, meas, pred.u, dt)
         if vaneless.output.gusty:
             forces.fill_vaneless_y(force, vaneless.memory.w_body, meas.y)
             step_view_gust(vaneless, force.y_free, pred, meas, k, dt)

@@ -284,16 +284,6 @@ def whiten_step(b, x, v, dt, g):
 
 
 @kernel
-def whiten_regressors(b, dt):
-    """Advance the filter of each regressor Z as `whiten_step` does: x_Z, g_Z.
-
-    In a block of one axis all values of a second axis are zero.
-    """
-    for j in range(b.n_Z):
-        whiten_step(b, b.x_Z[j], b.regressor[j], dt, b.g_Z[j])
-
-
-@kernel
 def whiten_calm(b, dt):
     """Whiten nu by the filter without gust; dt s."""
     advance_covariance(b.calm, dt)
@@ -482,12 +472,6 @@ def uncertain_share(t, k, r0, r1):
 
 
 @kernel
-def is_one_sided(kind):
-    """True if only one sign of N supports a hypothesis: a loss cannot be a gain."""
-    return kind in (LOSS, GROWING_LOSS, LOSS_END)
-
-
-@kernel
 def max_llr(signed, N, D):
     """Largest log-likelihood ratio of a fault against none: N^2 / 2 D.
 
@@ -579,7 +563,8 @@ def update_block(b, dt, decay, hi_decay=0.0, mapped=False):
         update_calm_part(b, dt)
     if b.has_coarse:
         whiten_step(b, b.x_c, b.g_c, dt, b.g_c)
-    whiten_regressors(b, dt)
+    for j in range(b.n_Z):
+        whiten_step(b, b.x_Z[j], b.regressor[j], dt, b.g_Z[j])
     accumulate_evidence(b, dt, decay)
     evaluate_hypotheses(b, hi_decay, mapped)
 
@@ -587,14 +572,7 @@ def update_block(b, dt, decay, hi_decay=0.0, mapped=False):
 @kernel
 def estimate_theta(kind, N, D):
     """The most likely theta: N / D; for a loss with a prior that is uniform on its set [-1, 0]."""
-    if not is_one_sided(kind):
+    if kind not in (LOSS, GROWING_LOSS, LOSS_END):
         return N / D
     th = (N - 0.5 * LOSS_PRIOR) / (D + LOSS_PRIOR)
     return min(max(th, -1.0), 0.0)
-
-
-@kernel
-def set_coarse_gust(b, acc):
-    """Store acc (3,) rad/s2, the effect of the coarse gust, in g_c, where `update_block` whitens it."""
-    for i, axis in enumerate(b.axes[: b.n]):
-        b.g_c[i] = acc[axis]

@@ -413,7 +413,8 @@ def update_blocks(cfg, rows, blocks, gust, dt, k, alarmed, may_end=False):
         look(b, rows)
         b.has_coarse = gust.config.coarse_only
         if gust.config.coarse_only:
-            likelihood.set_coarse_gust(b, gust.output.acc_coarse)
+            for i, axis in enumerate(b.axes[: b.n]):
+                b.g_c[i] = gust.output.acc_coarse[axis]
         if gust.output.gusty:
             add_turn(b, gust)
             if j < likelihood.REVERTING_BLOCK:

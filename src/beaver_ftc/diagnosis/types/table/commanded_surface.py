@@ -299,9 +299,7 @@ def update_swing(c, srf, h, k):
         M.since = k + 1
         return UNLIMITED_SET
     if sign != M.sign:
-        if (
-            M.sign != 0
-        ):  # a half-cycle ends here; the first one is cut off at its beginning and does not count
+        if M.sign != 0:  # a half-cycle ends here; the first is cut off at its beginning and does not count
             if M.n_half == 0:
                 M.first_end = k
             else:

@@ -87,6 +87,7 @@ class Slow:
     def compile_unless_taken(self, kinds):
         os.write(1, f"{os.getpid()}\\n".encode())
         time.sleep(60)
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background ignores it
 cache.can_fork = lambda: True
 cache.os.dup2 = lambda *_: None
 cache.compile_missing([cache.Wanted(Slow(), ()), cache.Wanted(Slow(), ())])

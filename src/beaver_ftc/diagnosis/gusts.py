@@ -323,8 +323,9 @@ def fill_gust_effect(gust, design, x, y, u):
         fill_force(gust, x, y, u, mem.f)
     rate_damping(design, x, y, u, mem.scratch, out.rate_damping)
     mem.w_body[:] = 0.0
-    for i in range(3 if out.measured or cfg.coarse_only else 0):
-        mem.w_body[i] = out.C[i, 1] * mem.w[1] + out.C[i, 2] * mem.w[2]
+    if out.measured or cfg.coarse_only:
+        for i in range(3):
+            mem.w_body[i] = out.C[i, 1] * mem.w[1] + out.C[i, 2] * mem.w[2]
     acc, other = (out.acc, out.acc_coarse) if out.measured else (out.acc_coarse, out.acc)
     for i in range(3):
         acc[i], other[i] = -project_gust(mem.w_body, out.rate_damping.T, i), 0.0
@@ -433,10 +434,13 @@ def finish_gust(gust, share):
     mem, out = gust.memory, gust.output
     for i in range(3):
         out.acc_mean[i] = share * mem.acc_sum[i]
-        for j in range(3 if mem.n_turn > 0 else 0):
-            out.var_turn[i, j] = mem.var_prev[i, j] + mem.var_now[i, j]
-            mem.var_prev[i, j], mem.var_now[i, j] = mem.var_now[i, j], 0.0
-    mem.n_turn = max(mem.n_turn - 1, 0)
+    if mem.n_turn > 0:
+        mem.n_turn -= 1
+        for i in range(3):
+            for j in range(3):
+                out.var_turn[i, j] = mem.var_prev[i, j] + mem.var_now[i, j]
+        mem.var_prev[:] = mem.var_now
+        mem.var_now[:] = 0.0
 
 
 @kernel

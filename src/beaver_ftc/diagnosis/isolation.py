@@ -463,9 +463,10 @@ def advance_estimators(iso, bound, x, F, dt):
 
 
 @kernel
-def update_views(fie, views, cfg, forces, rows):
-    """Fill `unlikely` of estimator fie: whether a parity view shows motion that its surface cannot cause."""
-    fie.unlikely = parity.views_exclude(views, cfg, forces, rows, fie.surface)
+def update_views(fie, views, cfg, forces, G):
+    """Fill `unlikely` of estimator fie: whether a parity view shows motion that its surface, with this column
+    (3,) of G, cannot cause."""
+    fie.unlikely = parity.views_exclude(views, cfg, forces, fie.surface, G)
 
 
 @kernel

@@ -101,6 +101,15 @@ def test_a_fault_of_any_course_shows_nothing_where_its_surface_moves_nothing(fdi
     for k in range(20):
         observe(fdi, course[k] * G[:, surface], G, k)
     for v, view in enumerate(statistical["views"][:5]):
-        felt = parity.changes_view(view, statistical["rows"], surface)
+        felt = parity.changes_view(view, statistical["forces"], surface, G[:, surface])
         assert felt == (v not in blind)
         assert (np.abs(view["block"]["tests"]["correlation"]).max() > 1e-6) == felt
+
+
+def test_before_a_column_is_known_a_fault_shows_where_its_surface_moves_something(fdi):
+    """In the first frame a view is not turned yet; what it sees then refutes no surface that moves it."""
+    statistical, G = fdi["statistical"], np.array([-9.0, 0.0, 1.2])
+    views = statistical["views"]
+    felt = [parity.changes_view(views[v], statistical["forces"], AILERON, G) for v in (ROLL_AXIS, PITCH_AXIS)]
+    assert not statistical["rows"]["G"][AILERON].any()
+    assert felt == [True, False]

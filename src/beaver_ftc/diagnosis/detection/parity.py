@@ -99,7 +99,6 @@ from beaver_ftc.diagnosis.detection.rows import (
     VANELESS,
     add_turn,
     look,
-    seen,
     set_columns,
 )
 from beaver_ftc.diagnosis.gusts import project_gust, view_drift
@@ -397,9 +396,17 @@ def update_views(views, cfg, c, y, dt, k, latched):
 
 
 @kernel
-def changes_view(view, rows, s):
-    """True if a fault of surface s changes the projection of a view."""
-    return view.nulled != s and seen(view.block.m, 0, rows.G, s) != 0.0
+def changes_view(view, forces, s, G):
+    """True if a fault of surface s changes the projection of a view; G (3,): its effect on the rates now.
+
+    The column that the view was turned across is that of the frame before, and zero in the first.
+    """
+    m, effect = view.block.m, 0.0
+    for i in range(3):
+        effect += m[0, i] * G[i]
+    for i, f in enumerate(forces.component):
+        effect += m[0, SIDE_FORCE + i] * f.G[s]
+    return view.nulled != s and effect != 0.0
 
 
 @kernel
@@ -446,10 +453,10 @@ def view_alarm_score(view, views, cfg, forces, gust):
 
 
 @kernel
-def views_exclude(views, cfg, forces, rows, s):
-    """True if a view detects a signal that no fault of surface s can cause."""
+def views_exclude(views, cfg, forces, s, G):
+    """True if a view detects a signal that no fault of surface s, with this column (3,) of G, can cause."""
     for view in views:
-        decides = view.block.source < VANELESS and not changes_view(view, rows, s)
+        decides = view.block.source < VANELESS and not changes_view(view, forces, s, G)
         if decides and confirmed_score(view, views, cfg, forces) > cfg.alarm_level:
             return True
     return False

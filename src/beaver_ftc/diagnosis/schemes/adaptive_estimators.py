@@ -157,8 +157,9 @@ def weigh_loss(fdi, j):
 @apart(long_loops=True)
 def weigh_position(fdi, j):
     """Fill `unlikely` of estimator j by the parity views."""
-    stat, views = fdi.statistical, fdi.statistical.views[: fdi.statistical.n_views]
-    isolation.update_views(fdi.isolation.estimator[j], views, stat.test, stat.forces, stat.rows)
+    stat, fies = fdi.statistical, fdi.isolation.estimator
+    G = fies[fdi.layout.position[fies[j].surface]].effect.regressor
+    isolation.update_views(fies[j], stat.views[: stat.n_views], stat.test, stat.forces, G)
 
 
 @kernel

@@ -12,13 +12,12 @@ import numpy as np
 import pytest
 
 from beaver_ftc import compiled
-from beaver_ftc.compiled import target
 
 
 @pytest.mark.parametrize("version", ["0.67.2", "0.680.0", "1.0.0"])
 def test_of_another_version_nothing_is_borrowed(monkeypatch, version):
     monkeypatch.setattr(numba, "__version__", version)
-    assert not target.borrows.__wrapped__()
+    assert compiled._own_target.__wrapped__() is None
 
 
 KERNELS = """
@@ -50,27 +49,41 @@ if __name__ == "__main__":
 """
 
 
-@pytest.mark.parametrize("compiler", ["", "numba"])
-def test_kernels_come_to_the_same_either_way_and_are_kept(tmp_path, compiler):
+def run(command, compiler=""):
+    environment = {**os.environ, compiled.VARIABLE: compiler}
+    done = subprocess.run(
+        [sys.executable, *command], env=environment, capture_output=True, text=True, check=True
+    )
+    return done.stdout.split(), done.stderr
+
+
+def test_kernels_come_to_the_same_either_way_and_are_kept(tmp_path):
     """Records of two shapes: the process that loads both must not take the code of one for the other's."""
-    (tmp_path / "few_kernels.py").write_text(KERNELS)
-    environment = {**os.environ, target.VARIABLE: compiler}
-
-    def run(size):
-        command = [sys.executable, tmp_path / "few_kernels.py", str(size)]
-        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
-        return done.stdout.split(), done.stderr
-
-    first, said = run(1)
-    assert first == ["-1.0", "inf", "-inf", "Kernel", "0"]
-    borrows = compiler == "" and compiled.borrows()
-    assert ("code is compiled in a minute" in said) != borrows
-    assert run(4)[0][:4] == first[:4]
-    again, said = run(1)
-    assert again[:4] == first[:4]
+    kernels = tmp_path / "few_kernels.py"
+    kernels.write_text(KERNELS)
+    assert run([kernels, "1"])[0] == ["-1.0", "inf", "-inf", "Kernel", "0"]
+    assert run([kernels, "4"])[0][:3] == ["-1.0", "inf", "-inf"]
+    again, said = run([kernels, "1"])
+    assert again[:3] == ["-1.0", "inf", "-inf"]
     assert said == ""
-    kept = {path.name.partition("-")[0] for path in (tmp_path / "cache").glob("*-*")}
-    assert kept == ({"step", "halve"} if borrows else {"step"})
+    assert {path.name.partition("-")[0] for path in (tmp_path / "cache").glob("*-*")} == {"step", "halve"}
+    by_numba, said = run([kernels, "1"], "numba")
+    assert by_numba[:4] == ["-1.0", "inf", "-inf", "CPUDispatcher"]
+    assert "compiles by its own means" in said
+
+
+FLIGHT = """
+from beaver_ftc import fly, load
+log = fly(load({"name": "short", "duration_s": 0.5, "faults": [
+    {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 0.5, "at_s": 0.2}]})).log
+print(*(f"{name}={log[name].to_numpy().tobytes().hex()}" for name in log))
+"""
+
+
+def test_a_flight_without_what_is_borrowed_is_the_same():
+    flights = [run(["-c", FLIGHT], compiler)[0] for compiler in ("", "numba")]
+    assert len(flights[0]) > 100
+    assert flights[0] == flights[1]
 
 
 def test_code_for_size_is_shorter_gives_the_same_and_is_kept_apart(tmp_path):

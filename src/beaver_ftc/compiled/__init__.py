@@ -8,7 +8,8 @@ Compiled code is kept in the user's cache, each kernel under what its code follo
 again what it changes. It also works where the package is read-only. Nobody else may write there: what is
 kept is run.
 
-target.py says how much is borrowed of which version of Numba. Flights are the same with any.
+target.py compiles by parts of Numba that are known from inside. With a version that is not in `KNOWN`, or
+with BEAVER_FTC_COMPILER=numba, Numba compiles by its own means, in each process anew; flights are the same.
 
 One of several kernels by its number: how compiled code calls a row of a table.
 
@@ -18,6 +19,7 @@ compiles the rows that it uses.
 """
 
 import functools
+import os
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 from pathlib import Path
@@ -38,7 +40,9 @@ from beaver_ftc.documents.files import cache_of_version, digest_of_files
 
 __all__ = ["apart", "direct", "kernel", "plain", "record", "row_of", "sized"]
 
-ALONE = "numba {} has other parts than are known: each start compiles for minutes, allowed: numba 0.68.*"
+KNOWN = ("0.68",)  # versions of Numba whose inside is as we have found it
+VARIABLE = "BEAVER_FTC_COMPILER"  # `numba`: as with a version that is not known
+ALONE = "numba {} compiles by its own means: each start takes minutes, known from inside: numba {}"
 
 _FOLDER = Path(__file__).parent
 
@@ -105,19 +109,19 @@ def compile_into(folder: Path | None, function, for_size=False):
 
 @lru_cache(maxsize=1)
 def _own_target() -> ModuleType | None:
-    """Our own target of the compiler; None if this version of Numba has no room for it."""
-    try:
-        from beaver_ftc.compiled import target
-    except (ImportError, AttributeError, TypeError):
-        say_once(ALONE.format(numba.__version__))
+    """Our own target of the compiler; None if this version of Numba is not known from inside."""
+    known = numba.__version__.startswith(tuple(f"{version}." for version in KNOWN))
+    if not known or os.environ.get(VARIABLE) == "numba":
+        say_once(ALONE.format(numba.__version__, ", ".join(f"{version}.*" for version in KNOWN)))
         return None
+    from beaver_ftc.compiled import target
+
     return target
 
 
 def borrows() -> bool:
     """Whether kernels are compiled by parts that Numba does not promise: see target.py."""
-    target = _own_target()
-    return target is not None and target.borrows()
+    return _own_target() is not None
 
 
 def direct(function: Any, *arguments: np.ndarray) -> Any:

@@ -5,40 +5,32 @@ its functions, and the contexts in which they are typed and translated. Ours inh
 CPU target. Nothing of Numba is replaced: a function that somebody else compiles never comes here.
 
 Machine code. Numba optimises a function again at each level of calls. Here a kernel that another one calls
-is only translated; the outermost one is optimised once, with all that it calls (`Library`). This is
-borrowed from inside the versions of Numba in `KNOWN`. Another version is tried in a process of its own,
-because what is borrowed from inside it may end a process instead of raising; it is used if it passes the
-trial.
+is only translated; the outermost one is optimised once, with all that it calls (`Library`).
 
-Of a version in `KNOWN` more is borrowed: records have types that are the same for all sizes, and kernels that
-only some flights call are called by their address, each compiled by itself when a flight first calls it. The
-caller holds the address, zero at first; then Python finds or compiles the code. So a flight compiles what it
-uses, and kernels that call the same one share its code. With any other version each aircraft has code of its
-own, all of it, which takes longer.
+Kernels that only some flights call are called by their address, each compiled by itself when a flight first
+calls it. The caller holds the address, zero at first; then Python finds or compiles the code. So a flight
+compiles what it uses, and kernels that call the same one share its code.
 
-To compiled code a record with room is its memory and the places in it (records.py): a row of numbers, found
-by the record's own NumPy type each time that Python calls compiled code. So a copy of a record, one from a
-file or another process brings its places along, and what has none is refused. They never change: LLVM is told
-so, and need not look again after a write. Kernels of ours alone see such a type. To anybody else's `@njit`
-the same record is what it is to Numba.
+Records have types that are the same for all sizes. To compiled code a record with room is its memory and the
+places in it (records.py): a row of numbers, found by the record's own NumPy type each time that Python calls
+compiled code. So a copy of a record, one from a file or another process brings its places along, and what
+has none is refused. They never change: LLVM is told so, and need not look again after a write. Kernels of
+ours alone see such a type. To anybody else's `@njit` the same record is what it is to Numba.
 
-All that is borrowed from inside Numba is in this file: a version without those parts cannot import it, and
-kernels are then compiled by Numba's own means.
+All that is borrowed from inside Numba is in this file, which is used with the versions in
+`beaver_ftc.compiled.KNOWN` alone. With another, kernels are compiled by Numba's own means.
 """
 
 import functools
 import hashlib
 import operator
-import os
 import pickle
-import sys
 import zlib
 from collections.abc import Callable, Iterator
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-import llvmlite
 import numba
 import numpy as np
 from llvmlite import ir
@@ -80,9 +72,6 @@ from numba.np.arrayobj import make_array, populate_array
 from beaver_ftc.compiled import cache
 from beaver_ftc.compiled.cache import CodeCache, announced, locked
 from beaver_ftc.compiled.records import Part, Shape, places, shape_of
-from beaver_ftc.documents.errors import say_once
-from beaver_ftc.documents.files import digest_of_files
-from beaver_ftc.documents.files import passes as passes_in_a_child
 
 # mypy: disable-error-code="call-arg,override"
 
@@ -484,74 +473,6 @@ class Codegen(JITCPUCodegen):
     _library_class = Library
 
 
-CODE = (
-    "from beaver_ftc.compiled import compile_into; from beaver_ftc.compiled.target import is_right; "
-    "raise SystemExit(0 if is_right(compile_into) else 3)"
-)
-
-
-def passes() -> bool:
-    """Whether kernels compiled so are right, as found now or by an earlier process."""
-    files = sorted(Path(__file__).parent.glob("*.py"))
-    versions = numba.__version__, llvmlite.__version__, sys.implementation.cache_tag, digest_of_files(*files)
-    return passes_in_a_child("numba", str(versions), CODE, {VARIABLE: "trial"})
-
-
-def is_right(compile_into: Callable[[None, Callable[..., Any]], Callable[..., Any]]) -> bool:
-    """Whether kernels that call one another can be compiled, and return the same as their plain form.
-
-    compile_into: as in `beaver_ftc.compiled`, which imports this module.
-    """
-    try:
-        return _returns_the_same(compile_into)
-    except Exception:  # whatever a part does that is not as we have found it
-        return False
-
-
-def _returns_the_same(compile_into) -> bool:
-    import numpy as np
-
-    def scale(x, by):
-        x[:] = x / by
-
-    def weigh(record, x):
-        scaled(x, record.level)
-        return np.sqrt(x[0] * x[1]) + record.state.sum()
-
-    def total(records, x):
-        found = 0.0
-        for record in records:
-            for i in range(2):
-                found += weighed(record, x[i]) + max(x[i, 0], found)
-        return found
-
-    def refuse(x):
-        scaled(x[:2], x[1])
-        if x[0] > 0.0:
-            raise ValueError("greater than zero")
-        return x[0]
-
-    compiled = [compile_into(None, function) for function in (scale, weigh, total, refuse)]
-    scaled, weighed, totalled, refused = compiled
-    records = np.ones(2, [("level", "f8"), ("state", "f8", (2, 3))])
-    records["level"] = 2.0, 0.0
-    x = np.arange(1.0, 5.0).reshape(2, 2)
-    again = x.copy()
-    first = totalled(records, x), weighed(records[0], x[0]), refused(np.array([-1.0, 2.0]))
-    scaled, weighed = scale, weigh
-    with np.errstate(all="ignore"):
-        second = total(records.view(np.recarray), again), weigh(records.view(np.recarray)[0], again[0]), -0.5
-    try:
-        refused(np.array([1.0, 1.0]))
-    except ValueError as error:
-        return str(error) == "greater than zero" and np.array_equal(
-            [*first, *x[0]], [*second, *again[0]], True
-        )
-    return False
-
-
-__all__ = ["stub"]
-
 _ADDRESS = ir.IntType(64)
 
 _known: dict[tuple[str, ...], Any] = {}
@@ -641,27 +562,10 @@ def _address_held(context: Any, builder: Any, ask: Callable[[], int]) -> Any:
 
 
 NAME = "beaver_ftc"  # of the target
-KNOWN = ("0.68",)  # versions of Numba whose inside is as we have found it
-VARIABLE = "BEAVER_FTC_COMPILER"  # `numba`: as with a version that is not known; `trial`: without a trial
-SLOWER = "numba {} is not known from inside: code is compiled in a minute, not in 20 s; known: numba {}"
-SLOWEST = "numba {} has other parts than are known: code is compiled in minutes, not in 20 s; known: numba {}"
 
 
 class Target(CPU):
     """Numba's token of the target: what is meant for any target or for CPUs is meant for it too."""
-
-
-@functools.cache
-def borrows() -> bool:
-    """Whether this version of Numba is known from inside."""
-    known = numba.__version__.startswith(tuple(f"{version}." for version in KNOWN))
-    return known and not os.environ.get(VARIABLE)
-
-
-@functools.cache
-def optimises_once() -> bool:
-    """Whether `Library` makes the machine code: where this version is known, or has passed a trial."""
-    return borrows() or os.environ.get(VARIABLE) == "trial" or passes()
 
 
 class _Context(CPUContext):
@@ -669,8 +573,7 @@ class _Context(CPUContext):
 
     def init(self) -> None:
         super().init()
-        if optimises_once():
-            self._internal_codegen = Codegen(NAME)
+        self._internal_codegen = Codegen(NAME)
 
     def load_additional_registries(self) -> None:
         """Numba's own implementations, imported once: Numba calls this for whatever it does not find."""
@@ -693,8 +596,7 @@ class _Context(CPUContext):
     def get_executable(self, library: Any, fndesc: Any, env: Any) -> Any:
         """What Python calls; of an inner function what stands for it."""
         library._ensure_finalized()
-        is_inner = len(compiling) > 1 and optimises_once()
-        return Inner() if is_inner else super().get_executable(library, fndesc, env)
+        return Inner() if len(compiling) > 1 else super().get_executable(library, fndesc, env)
 
 
 @functools.cache
@@ -804,7 +706,7 @@ class Kernel(Dispatcher):
 
     def typeof_pyval(self, val: Any) -> Any:
         """The type of an argument; in place of Numba's for records that have a size."""
-        return (borrows() and type_of(val)) or super().typeof_pyval(val)
+        return type_of(val) or super().typeof_pyval(val)
 
     def stored(self, args: Any) -> Any:
         """The code an earlier process has kept, or None; found without making ready to compile."""
@@ -859,7 +761,6 @@ class Kernel(Dispatcher):
 
     def _compile_and_keep(self, args: tuple[Any, ...]) -> Any:
         with announced(self.size):
-            _say_slower()
             self.targetctx.refresh()
             result = self._translated(args, {"no_cfunc_wrapper": True})
             if self._cached:
@@ -889,12 +790,6 @@ class Kernel(Dispatcher):
         return result.entry_point
 
 
-def _say_slower() -> None:
-    if os.environ.get(VARIABLE) != "trial" and not borrows():
-        says = SLOWER if optimises_once() else SLOWEST
-        say_once(says.format(numba.__version__, ", ".join(f"{version}.*" for version in KNOWN)))
-
-
 def _jit(**options: Any) -> Callable[..., Dispatcher]:
     """The decorator of what Numba itself has compiled for our target."""
     return functools.partial(Dispatcher, targetoptions=options)
@@ -920,8 +815,7 @@ def _shorten_messages() -> None:
 
 def array_type(dtype: Any, dimensions: int) -> Any:
     """The type of a C-ordered array; of records that have a size, theirs."""
-    sized = borrows() and kind_of(dtype, dimensions)
-    return sized or types.Array(numba.from_dtype(dtype), dimensions, "C")
+    return kind_of(dtype, dimensions) or types.Array(numba.from_dtype(dtype), dimensions, "C")
 
 
 @intrinsic

@@ -40,7 +40,7 @@ FLOWN = ("healthy", "false alarms", "losses", "detected", "named", "wrong", "lef
 def derived_aircraft() -> str:
     """All of them, and in words those that cannot be derived."""
     text = _derived(names()).replace("*Table 6.", "*Table 4.", 1)  # the probe keeps its digest
-    return moved(text, "|aircraft|", "derived-aircraft", DERIVED_TITLE)
+    return moved(text, "| aircraft |", "derived-aircraft", DERIVED_TITLE)
 
 
 def derived_aircraft_probe() -> str:

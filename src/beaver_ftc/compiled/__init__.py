@@ -241,31 +241,25 @@ def _with_attributes(argument):
     return argument
 
 
-Kernel = Callable[..., None]
+Kernel = Callable[..., Any]
 
 
 def one_of(kernels: Sequence[Kernel]) -> Kernel:
-    """A kernel (place, *arguments) that calls the kernel at that place with these arguments.
+    """A kernel (place, *arguments) that returns what the kernel at that place returns for these arguments.
 
-    place: 0 for the first kernel; a place beyond the last calls the last. The kernels return nothing.
+    place: 0 for the first kernel; a place beyond the last calls the last.
     """
-    first, others = kernels[0], kernels[1:]
-
-    if not others:
-
-        @kernel
-        def last(place: int, *arguments: Any) -> None:
-            first(*arguments)
-
-        return last
-
-    rest = one_of(others)
+    if numba.config.DISABLE_JIT:
+        return lambda place, *arguments: kernels[min(place, len(kernels) - 1)](*arguments)
+    first = kernels[0]
+    if len(kernels) == 1:
+        return kernel(lambda place, *arguments: first(*arguments))
+    rest = one_of(kernels[1:])
 
     @kernel
-    def either(place: int, *arguments: Any) -> None:
+    def either(place: int, *arguments: Any) -> Any:
         if place == 0:
-            first(*arguments)
-        else:
-            rest(place - 1, *arguments)
+            return first(*arguments)
+        return rest(place - 1, *arguments)
 
     return either

@@ -11,6 +11,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from beaver_ftc_live.page import messages
 from beaver_ftc_live.page.gate import MAX_PAGES
+from commands import beaver
 
 
 @pytest.fixture(scope="module")
@@ -114,7 +115,6 @@ def test_it_ends_cleanly_with_a_page_open(tmp_path):
 
 def test_a_flight_that_cannot_be_trimmed_ends_it_in_a_line(tmp_path):
     (tmp_path / "slow.yaml").write_text("name: slow\ninitial: {airspeed_mps: 20}\n")
-    cockpit = started(tmp_path, str(tmp_path / "slow.yaml"))
-    _, says = cockpit.process.communicate(timeout=600)
-    assert cockpit.process.returncode == 2
-    assert says.splitlines()[-1].startswith("slow: no steady straight flight at 20 m/s")
+    done = beaver("live", "slow.yaml", cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.splitlines()[-1].startswith("slow: no steady straight flight at 20 m/s")

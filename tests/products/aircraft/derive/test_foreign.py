@@ -155,6 +155,7 @@ def wing(tmp_path_factory):
         patched.setattr(derivation, "SAMPLES", 300)
         patched.setattr(derivation, "CHECKED", 400)
         patched.setattr(sample, "STARTS_OF_WORST", 8)
+        patched.setattr(sample, "FRAMES", 200)
         return derivation.derive(str(path), folder / "out"), folder / "out"
 
 

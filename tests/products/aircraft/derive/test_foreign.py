@@ -156,6 +156,7 @@ def wing(tmp_path_factory):
         patched.setattr(derivation, "CHECKED", 400)
         patched.setattr(sample, "STARTS_OF_WORST", 8)
         patched.setattr(sample, "FRAMES", 200)
+        patched.setattr(sample, "STARTS", 16)
         return derivation.derive(str(path), folder / "out"), folder / "out"
 
 

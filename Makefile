@@ -20,7 +20,7 @@ FAST := tests/aircraft tests/design tests/plant tests/results tests/scenario $(w
 # tests wait.
 PLAIN := tests/design $(wildcard tests/*/test_*_kernels.py tests/*/*/test_*_kernels.py) \
   $(addprefix tests/diagnosis/,test_model_prediction_coarse_frames.py test_isolation_membership.py test_short_flights.py types/test_types_verdict.py) \
-  $(addprefix tests/control/test_,decisions.py law_frame.py laws.py supervisor.py compiled_rivals.py) \
+  $(addprefix tests/control/test_,decisions.py laws.py supervisor.py compiled_rivals.py) \
   tests/control/laws/test_gains.py tests/diagnosis/rivals/test_filters.py \
   $(addprefix tests/scenario/test_,dump.py given.py loader.py aircraft_folder.py) \
   tests/test_architecture.py tests/test_stages.py tests/test_readouts.py $(addprefix tests/tools/test_,reference.py docs_names.py)

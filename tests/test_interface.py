@@ -16,18 +16,6 @@ from flying import loss, scenario
 ROOT = Path(__file__).parents[1]
 
 
-def documented():
-    """The Python texts of the first section of docs/reference/python.md, whose elisions stand for nothing,
-    with a tenth of the flights: tests/acceptance/ flies all.
-    """
-    text = (ROOT / "docs/reference/python.md").read_text(encoding="utf-8")
-    section = text.partition("## At a glance")[2].partition("\n## ")[0]
-    code = "".join(re.findall(r"```python\n(.*?)```", section, re.DOTALL))
-    return (
-        code.replace("fdi={...}", "fdi={}").replace("(...)", "()").replace("runs=200, workers=2", "runs=20")
-    )
-
-
 def test_the_exclusion_by_hand_is_that_of_the_diagnosis(capsys):
     """The last Python text of the section on the diagnosis alone, as it stands."""
     text = (ROOT / "docs/reference/python.md").read_text(encoding="utf-8")

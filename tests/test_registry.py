@@ -132,21 +132,6 @@ def test_what_is_said_of_a_name(group, name, says):
     assert found is None if says is None else found.startswith(says)
 
 
-def test_what_is_compiled_in():
-    names = {
-        group: {name for name in registered(group) if plugins.is_compiled(group, name)}
-        for group in (DETECTORS, LAWS)
-    }
-    assert names == {
-        DETECTORS: {"adaptive-estimators", "zhang2005", "none"},
-        LAWS: {
-            "nominal", "adaptive", "fault-tolerant", "fault-tolerant-published", "oracle", "oracle-published",
-            "zhang2005",
-        },
-    }  # fmt: skip
-    assert not plugins.is_compiled(DETECTORS, "oracle")
-
-
 # As plugins.yaml has them: with options and limits of tuning, without, and with a class.
 ROWS = {
     "mine": {
@@ -187,12 +172,6 @@ def rows(monkeypatch):
 def test_options_of_what_the_compiled_frame_does_are_within_their_limits(rows, name, given, wrong):
     found = plugins.wrong_options(LAWS, name, given)
     assert found == [(("options", key), says) for key, says in wrong]
-
-
-def test_what_is_not_given_has_its_default(rows):
-    assert plugins.settings(LAWS, "mine", {}) == {"gain": 2.0, "order": 1}
-    assert plugins.settings(LAWS, "mine", {"order": 3}) == {"gain": 2.0, "order": 3}
-    assert plugins.settings(LAWS, "bare", {}) == {}
 
 
 def test_between_which_limits_a_parameter_is_tuned(rows, monkeypatch):

@@ -81,11 +81,3 @@ def test_built_in_scenarios_in_text_and_in_json(names, beaver, tmp_path):
         for name in ("metrics.json", "log.parquet", "scenario.yaml"):
             first = tmp_path / "runs" / run["scenario"] / name
             assert (folder / name).read_bytes() == first.read_bytes()
-
-
-def test_every_built_in_scenario_is_valid_and_its_own_resolved_form_is_too(beaver, tmp_path):
-    assert beaver("validate", *SCENARIOS).returncode == 0
-    beaver("run", "fault-free", "--no-report")
-    resolved = beaver("validate", "runs/fault-free/scenario.yaml", "--format", "json")
-    (file,) = json.loads(resolved.stdout)["files"]
-    assert (resolved.returncode, file["valid"], file["errors"]) == (0, True, [])

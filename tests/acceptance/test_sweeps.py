@@ -81,9 +81,3 @@ def test_built_in_sweep(name, beaver, tmp_path):
     assert again.returncode == text.returncode
     assert json.loads(again.stdout)["passed"] is summary["passed"]
     assert pyarrow.parquet.read_table(tmp_path / "again" / name / "results.parquet").equals(table)
-
-
-def test_every_built_in_sweep_is_valid(beaver):
-    done = beaver("validate", *SWEEPS, "--format", "json")
-    document = json.loads(done.stdout)
-    assert (done.returncode, document["valid"], len(document["files"])) == (0, True, len(SWEEPS))

@@ -37,16 +37,3 @@ def _is_expected(line, done):
     if done.returncode == 2:
         return bool(BY_HAND.match(line))
     return done.returncode == 1 and re.search("MISSED|FAILED", done.stdout)
-
-
-def test_tutorials_are_numbered_and_lead_to_each_other():
-    titles = {}
-    for page in TUTORIALS:
-        number = re.match(r"# Tutorial (\d+): ", page.read_text(encoding="utf-8"))
-        assert number, page.name
-        titles[int(number[1])] = page
-    assert sorted(titles) == list(range(1, 11))
-    for number in range(1, 10):
-        last = titles[number].read_text(encoding="utf-8").rpartition("## Next")[2]
-        link = rf"\[[Tt]utorial {number + 1}\]\({titles[number + 1].name}\)"
-        assert re.search(link, last), titles[number].name

@@ -23,13 +23,6 @@ expect: {detected_within_s: 1.0, no_departure: true}
 """
 
 
-def _beaver(*arguments, cwd, **options):
-    """In a process of its own."""
-    return subprocess.run(
-        [BEAVER, *arguments], cwd=cwd, capture_output=True, text=True, timeout=120, check=False, **options
-    )
-
-
 @pytest.fixture
 def short(tmp_path):
     (tmp_path / "short.yaml").write_text(SHORT)
@@ -123,45 +116,42 @@ def test_folder_that_cannot_be_written_is_status_3(short):
     assert done.stderr.count("\n") == 1
 
 
-def _limit_file_size():
-    import resource
+@pytest.fixture
+def small_files():
+    """As on a disk that fills up."""
+    resource = pytest.importorskip("resource")
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, before[1]))
+    yield
+    resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
-    resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
 
-
-def test_disk_that_fills_up_is_status_3_and_leaves_nothing(short):
-    done = _beaver("run", "short.yaml", "--no-report", cwd=short, preexec_fn=_limit_file_size)
+def test_disk_that_fills_up_is_status_3_and_leaves_nothing(short, small_files):
+    done = beaver("run", "short.yaml", "--no-report", cwd=short)
     assert done.returncode == 3
     assert done.stderr.startswith("cannot write runs/short: ")
     assert done.stderr.count("\n") == 1
     assert _names(short) == ["short.yaml"]
 
 
-def test_full_standard_output_is_status_3(short):
+def printed_into(stdout):
+    """(status, what it says) of a command whose output goes there."""
+    done = subprocess.run([BEAVER, "list"], stdout=stdout, stderr=subprocess.PIPE, check=False)
+    return done.returncode, done.stderr
+
+
+def test_full_standard_output_is_status_3():
     with open("/dev/full", "w") as full:
-        done = subprocess.run(
-            [BEAVER, "run", "short.yaml", "--no-report"],
-            cwd=short,
-            stdout=full,
-            stderr=subprocess.PIPE,
-            check=False,
-        )
-    assert done.returncode == 3
-    assert b"Traceback" not in done.stderr
+        status, says = printed_into(full)
+    assert status == 3
+    assert b"Traceback" not in says
 
 
-def test_reader_that_goes_away_is_no_error(short):
+def test_reader_that_goes_away_is_no_error():
     read, write = os.pipe()
     os.close(read)
-    done = subprocess.run(
-        [BEAVER, "run", "short.yaml", "--no-report"],
-        cwd=short,
-        stdout=write,
-        stderr=subprocess.PIPE,
-        check=False,
-    )
+    assert printed_into(write) == (0, b"")
     os.close(write)
-    assert (done.returncode, done.stderr) == (0, b"")
 
 
 LONG = SHORT.replace("short", "long").replace("duration_s: 6", "duration_s: 20000")

@@ -6,12 +6,10 @@ import pytest
 import law_records
 from beaver_ftc.control import autopilot as loops
 from beaver_ftc.control.autopilot import AUTOPILOT, SPEED
-from beaver_ftc.control.engines import follow_autopilot
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, DPT, QDYN
 from law_records import put
 
 DT, G, V, ALPHA_NOW = 0.05, 9.8, 44.0, 0.08
-AILERON, RUDDER = 0, 2
 GAINS = {
     "altitude": 0.7, "altitude_i": 0.04, "attitude": 3.0, "speed": 0.3, "speed_i": 0.015, "bank": 1.1,
     "bank_i": 0.2, "heading": 0.25, "heading_i": 0.04, "sideslip": 0.5, "alpha_s": 2.0, "airspeed_s": 3.0,
@@ -50,14 +48,6 @@ def new_control(**fields):
     control = law_records.new_control(main=(0, 1, 2), effectiveness=1.0, least_effectiveness=0.1)
     control["power"]["config"]["dpt_factor"], control["power"]["config"]["highest_dpt"] = 40.0, 0.9
     return put(control, **fields)
-
-
-def full_power(pilot, control, y):
-    left, at_stop = (
-        control["surfaces"]["output"]["effectiveness"],
-        control["allocation"]["output"]["saturated"],
-    )
-    return loops.highest_power(pilot, control["power"], left[RUDDER], at_stop[RUDDER], y)
 
 
 def new_y(dpt=0.4):
@@ -102,45 +92,6 @@ def test_without_an_airspeed_the_engine_stays_and_descents_are_free():
     assert high == pytest.approx(min(0.01 + 0.02 * (V - 35.0), 0.15))
 
 
-@pytest.mark.parametrize("rudder", [1.0, 0.5, 0.02])
-def test_power_leaves_the_rudder_enough(rudder):
-    """The propeller yaws with dpt^3; the rudder holds what is left of it, sideslip what that lacks."""
-    y, control = new_y(dpt=0.85), new_control()
-    pilot = new_autopilot(
-        SPEED, recent_airspeed_mps=43.0, missing_acceleration=0.05, airspeed_to_fly=45.0,
-        airspeed_to_fly_rate=0.04, dpt_cubed_held_by_sideslip=0.2,
-    )  # fmt: skip
-    control["surfaces"]["output"]["effectiveness"][RUDDER] = rudder
-    control["power"]["output"]["command"][0] = 21.0
-    pilot["full_power"] = full_power(pilot, control, y)
-    power, engine = law_records.fields(control["power"]), control["power"]
-    power["step"] = 0.5
-    loops.set_power(pilot, engine, y, 0.5, PUSH)
-    follow_autopilot(engine, pilot["power_setting"], pilot["power_airspeed"])
-    dpt = y[DPT] + (power["base"] - 21.0) * 40.0 / (2.0 * y[QDYN] * y[AIRSPEED])
-    yawing = (dpt / 0.9) ** 3
-    held = rudder + (1.0 - rudder) * 0.2 / 0.9**3
-    assert yawing == pytest.approx(held, rel=1e-9) or power["base"] in (12.0, 28.0)
-
-
 @pytest.mark.parametrize("angle", [-9.0, -3.2, -3.1, 0.0, 2.0, 3.2, 9.0])
 def test_a_direction_is_given_within_half_a_turn(angle):
     assert loops.wrap_to_half_turn(angle) == pytest.approx(np.arctan2(np.sin(angle), np.cos(angle)))
-
-
-def follow(pilot, control, y):
-    saturated = control["allocation"]["output"]["saturated"]
-    loops.smooth_signals_and_losses(pilot, control["layout"], control["surfaces"], saturated, False, y)
-
-
-@pytest.mark.parametrize(("surface", "share"), [(AILERON, "roll_loss_share"), (RUDDER, "yaw_loss_share")])
-@pytest.mark.parametrize("left", [0.0, 0.0999, 0.1, 1.0])
-def test_signals_are_smoothed_and_a_lost_surface_is_noticed(surface, share, left):
-    pilot, control = new_autopilot(roll_loss_share=0.5, yaw_loss_share=0.5), new_control()
-    control["surfaces"]["output"]["effectiveness"][surface] = left
-    follow(pilot, control, new_y())
-    assert pilot["alpha"] == pytest.approx(ALPHA_NOW + DT / 2.0 * (0.1 - ALPHA_NOW))
-    assert pilot["airspeed"] == pytest.approx(V + DT / 3.0 * (46.0 - V))
-    for name in ("roll_loss_share", "yaw_loss_share"):
-        goal = 1.0 if name == share and left < 0.1 else 0.0
-        assert pilot[name] == pytest.approx(0.5 + DT / 1.5 * (goal - 0.5))

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
-from beaver_ftc.control import accommodation, allocation, laws
+from beaver_ftc.control import allocation, laws
 from beaver_ftc.control.laws import published
 from beaver_ftc.design.model import AILERON, ELEVATOR, FLAP, RUDDER
 from law_records import new_control
@@ -117,17 +117,3 @@ class TestAllocation:
         u = allocated(control, G)
         assert u[ELEVATOR] == pytest.approx(-0.04 / 0.6)
         assert u[FLAP] == pytest.approx(0.2 / 2.1)
-
-
-def test_effectiveness_moves_no_faster_than_allowed():
-    control = control_record()
-    surfaces, effectiveness = control["surfaces"], control["surfaces"]["output"]["effectiveness"]
-    surfaces["config"]["effectiveness_step"], target = 0.04, np.array([1.0, 0.5, 1.0, 0.98])
-    seen = []
-    for _ in range(20):
-        for s in range(4):
-            accommodation.approach(surfaces, s, effectiveness[s], target[s], False)
-        seen.append(effectiveness.copy())
-    assert seen[0] == pytest.approx([1, 0.96, 1, 0.98])
-    assert seen[-1] == pytest.approx(target)
-    assert surfaces["output"]["target"] == pytest.approx(target)

@@ -36,29 +36,6 @@ class Vandal(Silent):
         return Verdict()
 
 
-class RaisesAtReset(Silent):
-    """Cannot start."""
-
-    def reset(self, context):
-        raise LookupError("no weights")
-
-
-class Raises(Silent):
-    """Fails in flight."""
-
-    def step(self, measured, command):
-        if measured.t_s > 0.5:
-            raise ZeroDivisionError("division by\nzero")
-        return Verdict()
-
-
-class NotAVerdict(Silent):
-    """Returns something else."""
-
-    def step(self, measured, command):
-        return True
-
-
 class Hold:
     """A law that leaves the surfaces in trim."""
 

@@ -14,7 +14,6 @@ from beaver_ftc.loop.loop import fly
 from beaver_ftc.plugins import DETECTORS, LAWS, VARIABLE, _hyphenated, plugin_class, register, registered
 from beaver_ftc.results.metrics import metrics
 from beaver_ftc.scenario.schema import load_text
-from commands import beaver
 from flying import Memory, scenario
 
 FAULT = {"actuator": "elevator", "type": "loss_of_effectiveness", "magnitude": 0.4, "at_s": 3}
@@ -105,33 +104,6 @@ def test_a_plug_in_cannot_write_into_the_flight():
     assert np.array_equal(clean.rows, vandalised.rows, equal_nan=True)
 
 
-def test_commands_are_limited_to_the_travel():
-    class Full(culprits.Hold):
-        def step(self, measured, reference, verdict):
-            return np.array([0.0, -9.0, 0.0, 0.0])
-
-    flight, log = _flown(scenario(duration_s=1), law=Full())
-    assert log["elevator_cmd_rad"].min() == pytest.approx(-0.49)
-    assert flight.saturation_s["elevator"] > 0
-
-
-@pytest.mark.parametrize(
-    ("name", "says"),
-    [
-        ("RaisesAtReset", "reset raised LookupError: no weights"),
-        ("Raises", "at 0.51 s: step raised ZeroDivisionError: division by zero"),
-        ("NotAVerdict", "step returned bool, allowed: a Verdict"),
-    ],
-)
-def test_a_bad_detector_is_named(name, says):
-    with pytest.raises(SimulationFailed) as failed:
-        fly(scenario(**SHORT, fdi={"scheme": register(f"culprits:{name}").name}))
-    message = str(failed.value)
-    assert message.startswith(f"plug-in {_hyphenated(name)} at ")
-    assert says in message
-    assert "\n" not in message
-
-
 @pytest.mark.parametrize(
     ("name", "says"),
     [
@@ -169,22 +141,6 @@ def test_everything_registered_keeps_the_protocol(group):
         if entry.target:
             assert getdoc(plugin_class(group, name)).startswith(entry.description())
             assert isinstance(plugin_class(group, name)(), Detector if group == DETECTORS else Law)
-
-
-@pytest.mark.parametrize(
-    ("key", "value", "says"),
-    [
-        ("fdi", "scheme: augmented-efk", "unknown scheme 'augmented-efk', did you mean augmented-ekf?"),
-        ("control", "law: lqg", "unknown law 'lqg', did you mean lqr?"),
-        ("fdi", "scheme: ../mine.py", "unknown scheme '../mine.py', allowed: adaptive-estimators"),
-        ("fdi", "scheme: 'nowhere.at_all:Mine'", "'nowhere.at_all:Mine' is a class; a scenario"),
-    ],
-)
-def test_an_unknown_name_is_bad_input_at_its_line(tmp_path, key, value, says):
-    (tmp_path / "s.yaml").write_text(f"name: s\n{key}: {{{value}}}\n")
-    done = beaver("validate", "s.yaml", cwd=tmp_path)
-    assert done.returncode == 2
-    assert done.stderr.startswith(f"s.yaml:2: {key}.{value.partition(':')[0]}: {says}")
 
 
 def test_options_reach_the_plug_in_and_unknown_ones_are_refused():

@@ -18,6 +18,7 @@ def differences(document: dict[str, Any]) -> list[str]:
     declaration = declared(document)
     reference = diagnose(declaration, read(document, flight.log, declaration))
     log = flight.log.iloc[: len(reference.columns["p_design_rad_s2"])]
+    log.attrs = {}  # which pandas would copy for each column
     found = [line for name in reference.columns if (line := _column(name, log, reference, document))]
     return [*found, *_verdict(flight.metrics, reference, document)]
 

@@ -193,9 +193,14 @@ class Servos:
     def moved(self, u: np.ndarray, target: np.ndarray) -> np.ndarray:
         """Where surfaces at u (surfaces,) rad are a JSBSim step later."""
         if self.ideal:
-            return target
-        way = (np.clip(target, *self.travel) - u) * self.share
-        return np.clip(u + np.clip(way, -self.step, self.step), *self.travel)
+            return np.broadcast_to(target, self.share.shape)
+        way = (within(self.travel, target) - u) * self.share
+        return within(self.travel, u + within((-self.step, self.step), way))
+
+
+def within(ends: tuple[np.ndarray, np.ndarray], value: np.ndarray) -> np.ndarray:
+    """A value, or the end that is nearest to it."""
+    return np.minimum(np.maximum(value, ends[0]), ends[1])
 
 
 def servo_positions(
@@ -206,27 +211,25 @@ def servo_positions(
 
     The ends of where a surface may be go by the farthest of all steps that errors of bandwidth and rate limit
     allow, to a target within the dead band of the command."""
-    errors, surfaces = declaration["bounds.actuators"], declaration.aircraft.surfaces
-    each = [{**errors, **errors.get(s, {})} for s in surfaces]
+    errors, aircraft = declaration["bounds.actuators"], declaration.aircraft
+    each = [{**errors, **errors.get(s, {})} for s in aircraft.surfaces]
     w, r, d = (np.array([of.get(key, 0.0) for of in each]) for key in ACTUATOR_ERRORS)
-    known, band, travel = (
-        Servos(declaration, 1.0 + 0.0 * w, 1.0 + 0.0 * r),
-        np.radians(d),
-        declaration.aircraft.travel,
-    )
-    possible = [Servos(declaration, 1.0 + i * w, 1.0 + j * r) for i, j in product((-1.0, 1.0), repeat=2)]
-    u, low, high = command.copy(), command.copy(), command.copy()
-    u[0], low[0], high[0] = start, np.clip(start - band, *travel), np.clip(start + band, *travel)
+    known, band, travel = Servos(declaration, 1.0 + 0.0 * w, 1.0 + 0.0 * r), np.radians(d), aircraft.travel
+    u = command.copy()
+    u[0] = start
     for j in range(1, len(command)):
         u[j] = known.moved(u[j - 1], command[j])
-        low[j] = np.min(
-            [of.moved(low[j - 1], np.clip(command[j] - band, *travel)) for of in possible], axis=0
-        )
-        high[j] = np.max(
-            [of.moved(high[j - 1], np.clip(command[j] + band, *travel)) for of in possible], axis=0
-        )
-    spread = np.maximum(high - u, u - low) if (w + r + d).any() else np.zeros_like(u)
-    return u, np.radians(declaration["bounds.deflection_deg"]) + spread
+    du = np.radians(declaration["bounds.deflection_deg"]) + np.zeros_like(u)
+    if not (w + r + d).any():
+        return u, du
+    signs = np.array([*product((-1.0, 1.0), repeat=2)])
+    possible = Servos(declaration, 1.0 + signs[:, :1] * w, 1.0 + signs[:, 1:] * r)
+    low, high = within(travel, command - band), within(travel, command + band)
+    low[0], high[0] = within(travel, start - band), within(travel, start + band)
+    for j in range(1, len(command)):
+        low[j] = possible.moved(low[j - 1], low[j]).min(axis=0)
+        high[j] = possible.moved(high[j - 1], high[j]).max(axis=0)
+    return u, du + np.maximum(high - u, u - low)
 
 
 class Frames(NamedTuple):

@@ -38,7 +38,10 @@ SECTIONS: dict[str, dict[str, Document]] = {
     "design": {
         "nominal": {}, "no engine": {"engine_terms": False}, "linearised": {"linearised": True},
         "frozen alpha": {"frozen_alpha": True}, "both": {"linearised": True, "frozen_alpha": True},
-        "heavy": {"mass": 1.03, "inertia": {"Ix": 0.98, "Jxz": 1.05}},
+        "heavy": {
+            "mass": 1.03, "inertia": {"Ix": 0.98, "Jxz": 1.05},
+            "coefficients": {"Cm_alpha": 1.1, "Cl_beta": 0.9},
+        },
     },
     "sharpen": {
         "default": {}, "none": {"sharpen": "none"}, "no bank": {"sharpen": {"pole_bank": False}},

@@ -3,7 +3,6 @@ import json
 import re
 import shutil
 
-import matplotlib.image
 import numpy as np
 import pytest
 from browser import PROGRAM, Browser
@@ -111,12 +110,14 @@ def test_replay_moves_at_the_pace_of_the_flight_and_stops(page):
 
 
 def test_replay_turns_the_aircraft(page):
+    from PIL import Image
+
     _middle(page, ".space canvas")
     looks = []
     for time in (0, 3):
         page.evaluate(f"beaverReport.setTime({time})")
         page.settle()
-        looks.append(matplotlib.image.imread(io.BytesIO(page.screenshot())))
+        looks.append(np.asarray(Image.open(io.BytesIO(page.screenshot())), float) / 255.0)
     assert np.abs(looks[0] - looks[1]).max() > 0.2
 
 

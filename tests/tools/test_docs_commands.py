@@ -5,18 +5,13 @@ import json
 
 import numpy as np
 from PIL import Image
-from tools.docs import kept, pages, pictures
+from tools.docs import pages, pictures
 from tools.docs.commands import Output, outputs
 from tools.docs.constants import constants
 from tools.docs.marks import parsed
 from tools.docs.refresh import Refreshed, Wanted
 
 from beaver_ftc.control.laws import rejecting
-
-
-def one(line, **options):
-    return outputs([line], **options)[line]
-
 
 FAULTS = {
     "exit 2": "ends with status 2: nothing on standard error",
@@ -68,33 +63,3 @@ def test_a_changed_gain_turns_the_page_that_cites_it_red(tmp_path, monkeypatch):
     assert changes() == []
     monkeypatch.setattr(rejecting, "RATIO", 41.0)
     assert ['printed "41"' in str(change) for change in changes()] == [True]
-
-
-def test_what_was_printed_is_kept_until_a_file_changes_that_the_command_can_read(tmp_path, monkeypatch):
-    monkeypatch.setattr(kept, "cache_base", lambda: tmp_path / "cache")
-    (tmp_path / "src").mkdir()
-    code, page = tmp_path / "src" / "one.py", tmp_path / "README.md"
-    code.write_text("1")
-    page.write_text("old")
-    table, other, cells, printed = (
-        f"{kept.MAKES_TABLE}x",
-        "beaver-ftc list",
-        "python -m tools.docs cells a",
-        Output("said", "", 1.5, {"a.png": b"p"}),
-    )
-    for line in (table, other, cells):
-        kept.Kept(root=tmp_path).put(line, printed)
-    kept.Kept(root=tmp_path).put("wrong", Output("", "ends with status 3"))
-    assert [kept.Kept(root=tmp_path).get(line) for line in (table, other, "wrong")] == [
-        printed,
-        printed,
-        None,
-    ]
-    page.write_text("new")
-    assert [kept.Kept(root=tmp_path).get(line) for line in (table, other)] == [printed, printed]
-    assert kept.Kept(root=tmp_path).get(cells) is None
-    page.write_text("new\n```yaml\nname: a\n```\n")
-    assert [kept.Kept(root=tmp_path).get(line) for line in (table, other)] == [printed, None]
-    assert kept.Kept(["DATA"], tmp_path).get(table) is None
-    code.write_text("2")
-    assert kept.Kept(root=tmp_path).get(table) is None

@@ -9,9 +9,6 @@ from tools.docs import refresh
 from tools.docs.commands import Output
 from tools.docs.marks import parsed
 from tools.docs.refresh import Refreshed, Wanted, digest_of
-from tools.docs.values import Place, printed
-
-from beaver_ftc.documents.errors import BadInput
 
 PAGE = """# A page
 
@@ -132,36 +129,3 @@ def test_what_is_dear_is_written_with_revision_date_and_digest_when_it_is_flown(
     assert refreshed(stale, NEAR, Wanted(dear=True, only="near")).text == stale
     failed = refreshed(stale, {**NEAR, "fly far": Output("", "prints nothing")}, Wanted(dear=True))
     assert (failed.text, len(failed.findings)) == (stale, 1)
-
-
-DOCUMENT = {
-    "a": [{"name": "x", "b.c": 0.123}, {"name": "y", "b.c": 7}],
-    "yes": True,
-    "no": None,
-}
-NUMBERS = {
-    ("a.0.b.c", 1.0, ".2f"): "0.12",
-    ("a.name=y.b.c", 1.0, ""): "7",
-    ("a.-1.b.c", 1.0, ".1f"): "7.0",
-    ("a.0.b.c", 100.0, ".3g"): "12.3",
-    ("a.0.b.c", 1.0, ".1%"): "12.3%",
-    ("yes", 1.0, ""): "yes",
-    ("a.1.name", 1.0, ""): "y",
-}
-
-
-def number(path, factor=1.0, form=""):
-    return Place(path, factor, form)
-
-
-@pytest.mark.parametrize("wanted", NUMBERS, ids=str)
-def test_a_number_is_taken_by_its_path_and_formatted(wanted):
-    assert printed(DOCUMENT, number(*wanted)) == NUMBERS[wanted]
-
-
-@pytest.mark.parametrize("path", ["b", "a.2", "a.z", "a.0.b", "a", "no", "yes.a", "a.name=z", "a.-3"])
-def test_a_path_that_leads_nowhere_is_a_line(path):
-    with pytest.raises(BadInput, match="allowed"):
-        printed(DOCUMENT, number(path))
-    with pytest.raises(BadInput, match="allowed"):
-        printed(DOCUMENT, number("a.0.b.c", form=".2q"))

@@ -4,15 +4,13 @@ from itertools import combinations, islice
 
 import numpy as np
 import pytest
-from pydantic import Field
 from tools.drawn.array import CoveringArray, Factor
 from tools.drawn.campaign import fly
 from tools.drawn.compose import EVERYTHING, array_of, drawn_flights
 from tools.drawn.promises import broken
 
 import beaver_ftc as bf
-from beaver_ftc.documents.document import Flag, Number, Section, number
-from beaver_ftc.scenario.schema import Scenario, Uncertainty, json_schema
+from beaver_ftc.scenario.schema import json_schema
 
 AIRCRAFT = ("beaver", "jsbsim:c172p")
 SEED = 2026
@@ -39,35 +37,6 @@ def test_every_pair_of_levels_stands_together_in_some_row():
 
 def rows_of(seed):
     return array_of(json_schema(), AIRCRAFT, EVERYTHING, np.random.default_rng([seed, 0])).rows()
-
-
-class Icing(Section):
-    """A section that does not exist yet."""
-
-    thickness_mm: Number = number(..., unit="mm", says="ice", ge=0, le=20)
-    boots: Flag = Field(default=True)
-
-
-class WiderUncertainty(Uncertainty):
-    roughness: Number = number(1.0, unit="share of 1", says="of the skin", ge=0.5, le=4)
-
-
-class Wider(Scenario):
-    icing: Icing = Field(default_factory=lambda: Icing(thickness_mm=0.0))
-    uncertainty: WiderUncertainty = Field(default_factory=WiderUncertainty)
-
-
-def test_a_new_key_takes_part_by_itself():
-    drawn = [one.words for one in islice(drawn_flights(1, ("beaver",), Wider.model_json_schema()), 40)]
-    assert {words["icing"]["boots"] for words in drawn if "boots" in words.get("icing", {})} == {True, False}
-    thick = [words["icing"]["thickness_mm"] for words in drawn if "thickness_mm" in words.get("icing", {})]
-    assert thick
-    assert 0 <= min(thick) < max(thick) <= 20
-    rough = [
-        words["uncertainty"]["roughness"] for words in drawn if "roughness" in words.get("uncertainty", {})
-    ]
-    assert rough
-    assert 0.5 <= min(rough) < max(rough) <= 2.0  # within a factor of two of its default
 
 
 def test_every_key_of_the_schema_is_drawn_sometime():

@@ -31,7 +31,10 @@ def jet(tmp_path_factory):
     folder = tmp_path_factory.mktemp("engines")
     with pytest.MonkeyPatch.context() as quick:
         quick.setattr(sampling, "STARTS_OF_WORST", 8)
-        quick.setattr(derivation, "CHECKED", 800)
+        quick.setattr(sampling, "FRAMES", 200)
+        quick.setattr(sampling, "STARTS", 16)
+        quick.setattr(derivation, "SAMPLES", 1000)
+        quick.setattr(derivation, "CHECKED", 400)
         derive("jsbsim:737", folder / "aircraft", engines=True)
     return folder
 

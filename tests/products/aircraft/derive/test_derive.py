@@ -74,7 +74,10 @@ def quickly():
     """Where it does not matter how large the errors are."""
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(sampling, "STARTS_OF_WORST", 8)
-        patched.setattr(derivation, "CHECKED", 800)
+        patched.setattr(sampling, "FRAMES", 200)
+        patched.setattr(sampling, "STARTS", 16)
+        patched.setattr(derivation, "SAMPLES", 1500)
+        patched.setattr(derivation, "CHECKED", 500)
         yield
 
 

@@ -10,13 +10,16 @@ import pytest
 import yaml
 
 from beaver_ftc.plant.adapter import Plant
+from beaver_ftc.plant.trim import trim
+from beaver_ftc.scenario.airframe import find_aircraft
 from beaver_ftc_aircraft.derive import derivation, derived, sample
+from beaver_ftc_aircraft.derive.outline import usual_start
 
 TRAINER = Path(__file__).parents[3] / "data" / "aircraft" / "trainer"
 ENVELOPE = "airspeed_mps: [42, 58]\nalpha_deg: [-2, 9]\naltitude_m: 1200\nsideslip_deg: 6\n"
 
 
-def derive(reference, folder, envelope=None):
+def derive(reference, folder, envelope):
     """(what was found, the steps told), from few states."""
     told = []
     with pytest.MonkeyPatch.context() as patched:
@@ -27,8 +30,10 @@ def derive(reference, folder, envelope=None):
 
 
 @pytest.fixture(scope="module")
-def stranger(tmp_path_factory):
-    return derive("jsbsim:c172p", tmp_path_factory.mktemp("derived"))
+def stranger():
+    """An aircraft derived from JSBSim's, as it is kept, and its trim."""
+    aircraft = find_aircraft("jsbsim:c172p")
+    return aircraft, trim(plant=Plant(100, aircraft=aircraft), **usual_start(aircraft))
 
 
 @pytest.fixture(scope="module")
@@ -51,9 +56,9 @@ def parts_of(found_and_told):
 
 def test_fuel_is_what_the_model_starts_with_however_long_its_engines_have_run(stranger):
     """As its file says: 100 lbs in each of two tanks."""
-    found, _ = stranger
-    plant = Plant(100, aircraft=found.aircraft)
-    plant.start(found.trim)
+    aircraft, level = stranger
+    plant = Plant(100, aircraft=aircraft)
+    plant.start(level)
     for _ in range(50):
         plant.run()
     assert list(plant.tanks_lbs.values()) == [100.0, 100.0]
@@ -62,11 +67,11 @@ def test_fuel_is_what_the_model_starts_with_however_long_its_engines_have_run(st
 
 def test_thrust_at_full_power_is_within_the_map(stranger):
     """Its engine stops at high altitudes: it must run again at the next start."""
-    found, _ = stranger
-    plant = Plant(100, aircraft=found.aircraft)
-    plant.start(replace(found.trim, settings={"throttle": 1.0}))
-    least, largest = found.error_map.boxes[-1].signals["thrust"]
-    assert least < plant.read(found.aircraft.signals["thrust"].property) < largest
+    aircraft, level = stranger
+    plant = Plant(100, aircraft=aircraft)
+    plant.start(replace(level, settings={"throttle": 1.0}))
+    least, largest = aircraft.file.model_error_map.boxes[-1].signals["thrust"]
+    assert least < plant.read(aircraft.signals["thrust"].property) < largest
 
 
 def test_what_is_derived_of_an_aircraft_with_a_file_over_an_envelope_of_its_own(filed, changed):

@@ -7,8 +7,10 @@ import pytest
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.plant.adapter import bare
+from beaver_ftc.plant.instrumented import instrument
+from beaver_ftc.plant.model_file import copy_of
 from beaver_ftc.scenario.schema import load_text
-from beaver_ftc_aircraft.derive import derivation
+from beaver_ftc_aircraft.derive import derivation, sample
 from beaver_ftc_aircraft.derive.derivation import source_of
 
 from . import foreign
@@ -64,23 +66,35 @@ PLACES = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("case", PLACES)
-@pytest.mark.parametrize("apart", [False, True])
-def test_the_authors_engine_is_the_one_that_runs(case, apart, tmp_path, prepared):
-    """Where JSBSim looks, in its order; apart: the propulsion is in a file of its own."""
-    engine, motors, watts = PLACES[case]
+def of_another_author(folder, case, apart=False):
+    """The folder of a Navion with that engine; apart: the propulsion is in a file of its own."""
+    engine, motors, _ = PLACES[case]
     for place, power in motors.items():
-        file = tmp_path / place
+        file = folder / place
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(MOTOR.format(power))
     text = foreign.powered(engine)
     if apart:
         section = re.search(r"<propulsion>.*</propulsion>", text, re.S).group(0)
         text = text.replace(section, '<propulsion file="Propulsion"/>')
-        (tmp_path / "aircraft" / "navion").mkdir(parents=True, exist_ok=True)
-        (tmp_path / "aircraft" / "navion" / "Propulsion.xml").write_text(section)
-    path = foreign.write(tmp_path / "aircraft", text)
-    assert prepared(path.parent)["power_hp"] == pytest.approx(watts / 745.7, rel=1e-3)
+        (folder / "aircraft" / "navion").mkdir(parents=True, exist_ok=True)
+        (folder / "aircraft" / "navion" / "Propulsion.xml").write_text(section)
+    return foreign.write(folder / "aircraft", text).parent
+
+
+@pytest.mark.parametrize("case", PLACES)
+@pytest.mark.parametrize("apart", [False, True])
+def test_the_authors_engine_is_the_one_that_runs(case, apart, tmp_path):
+    """Where JSBSim looks, in its order."""
+    model = source_of(str(of_another_author(tmp_path, case, apart))).model
+    gathered = copy_of(model, tmp_path / "read" / "navion", layout=True)
+    power_hp = of_full_power(instrument(gathered, tmp_path / "copy", {}))
+    assert power_hp == pytest.approx(PLACES[case][2] / 745.7, rel=1e-3)
+
+
+def test_the_aircraft_that_is_derived_has_it(tmp_path, prepared):
+    found = prepared(of_another_author(tmp_path, "its own before the shared", apart=True))
+    assert found["power_hp"] == pytest.approx(14000 / 745.7, rel=1e-3)
 
 
 def test_a_file_of_the_layout_does_not_leave_it(tmp_path):
@@ -140,6 +154,9 @@ def wing(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(derivation, "SAMPLES", 300)
         patched.setattr(derivation, "CHECKED", 400)
+        patched.setattr(sample, "STARTS_OF_WORST", 8)
+        patched.setattr(sample, "FRAMES", 200)
+        patched.setattr(sample, "STARTS", 16)
         return derivation.derive(str(path), folder / "out"), folder / "out"
 
 

@@ -11,7 +11,6 @@ from beaver_ftc.plant.adapter import bare
 from beaver_ftc.plant.instrumented import usual_view
 from beaver_ftc.plant.model_file import copy_of
 from beaver_ftc_aircraft.derive import derivation
-from beaver_ftc_aircraft.derive.derivation import Source
 from beaver_ftc_aircraft.derive.surfaces import differences, find_surfaces
 
 from . import foreign
@@ -35,17 +34,22 @@ MODELS = {
 }
 
 
+def written(folder, text):
+    """The file of a model, and what nothing fails in."""
+    path = foreign.write(folder, text)
+    return path, instrumented.instrument(path, folder / "own" / "navion", {})
+
+
 def pair_of(folder, text, views=True):
     """(model, copy, what is known of the surfaces)."""
-    path = foreign.write(folder, text)
-    own, absent = derivation._own(Source("navion", path), folder / "own")
+    path, own = written(folder, text)
     found = find_surfaces(path, own, {})
     if not views:
         by_name = {
             s: {name: usual_view(name, found.travel[s]) for name in of} for s, of in found.seen.items()
         }
         found = replace(found, views=by_name)
-    copy = instrumented.instrument(path, folder / "copy" / "navion", found.travel, absent, views=found.views)
+    copy = instrumented.instrument(path, folder / "copy" / "navion", found.travel, views=found.views)
     return own, copy, found
 
 
@@ -100,8 +104,7 @@ def test_the_comparison_finds_a_copy_that_takes_names_at_their_word(case, tmp_pa
 
 def test_a_rudder_of_another_name_is_not_left_out_in_silence(tmp_path):
     text = foreign.NAVION.replace("fcs/rudder-pos-rad", "fcs/posRud_rad")
-    path = foreign.write(tmp_path, text)
-    own, _ = derivation._own(Source("navion", path), tmp_path / "own")
+    path, own = written(tmp_path, text)
     with pytest.raises(BadInput, match=r"only aileron, elevator; .*surfaces: \{rudder: fcs/posRud_rad\}"):
         find_surfaces(path, own, {})
 
@@ -112,8 +115,7 @@ def test_one_property_by_two_commands_is_no_surface(tmp_path):
     text = foreign.controlled(foreign.NAVION, mix)
     for name in (LEFT, "fcs/elevator-pos-rad"):
         text = foreign.seen_as(text, name, "<property> fcs/elevon </property>")
-    path = foreign.write(tmp_path, text)
-    own, _ = derivation._own(Source("navion", path), tmp_path / "own")
+    path, own = written(tmp_path, text)
     with pytest.raises(
         BadInput, match="aileron and elevator commands both move fcs/elevon, allowed: one surface"
     ):

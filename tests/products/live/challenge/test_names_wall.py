@@ -1,10 +1,6 @@
 """The wall of names by itself: what Python is about to do, handed to the hook as Python would."""
 
-import ctypes
 import os
-import struct
-import sys
-from types import SimpleNamespace
 
 import pytest
 
@@ -81,55 +77,3 @@ def test_what_computing_takes_is_let_through():
         for arguments in every:
             hook(event, arguments)
     assert told == []
-
-
-def answered(code, machine, number):
-    """What a filter of the kernel answers to a call: an interpreter of its four instructions."""
-    at = value = 0
-    while True:
-        instruction, yes, no, operand = code[at]
-        at += 1
-        if instruction == 0x20:  # load a word of what is asked: the number at 0, the machine at 4
-            value = {0: number, 4: machine}[operand]
-        elif instruction in (0x15, 0x35):
-            at += yes if (value == operand if instruction == 0x15 else value >= operand) else no
-        else:
-            assert instruction == 0x06
-            return operand
-
-
-ALLOWED, FORBIDDEN, KILLED = 0x7FFF0000, 0x00050001, 0x80000000
-# From the kernel's tables: read, write, openat, newfstatat, mmap, exit_group, rseq, faccessat2; and socket,
-# connect, kill, execve, clone, unlinkat, ptrace, prctl, setpriority, prlimit64.
-MACHINES = {
-    "x86_64": (0xC000003E, (0, 1, 257, 262, 9, 231, 334, 439), (41, 42, 62, 59, 56, 263, 101, 157, 141, 302)),
-    "aarch64": (
-        0xC00000B7,
-        (63, 64, 56, 79, 222, 94, 293, 439),
-        (198, 203, 129, 221, 220, 35, 117, 167, 140, 261),
-    ),
-}
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="seccomp is Linux's")
-@pytest.mark.parametrize("machine", MACHINES)
-def test_the_kernel_lets_through_the_calls_of_computing_alone(monkeypatch, machine):
-    codes, asked = [], []
-
-    def prctl(option, what, given, *rest):
-        asked.append((option, what, *rest))
-        if option == 22:
-            length, where = struct.unpack("HxxxxxxP", given)
-            text = ctypes.string_at(where, 8 * length)
-            codes.append([struct.unpack_from("HBBI", text, 8 * row) for row in range(length)])
-        return 0
-
-    monkeypatch.setattr(confine, "_linux", lambda: SimpleNamespace(prctl=prctl))
-    monkeypatch.setattr(confine.platform, "machine", lambda: machine)
-    assert confine._restrict_calls()
-    assert asked == [(38, 1, 0, 0), (22, 2, 0, 0)]
-    (code,), (own, allowed, forbidden) = codes, MACHINES[machine]
-    assert {answered(code, own, number) for number in allowed} == {ALLOWED}
-    assert {answered(code, own, number) for number in forbidden} == {FORBIDDEN}
-    assert answered(code, own, 0x40000000 + allowed[0]) == FORBIDDEN  # the same by another way of calling
-    assert {answered(code, other, number) for other in (0, own + 1) for number in allowed} == {KILLED}

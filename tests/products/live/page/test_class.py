@@ -46,12 +46,9 @@ def test_a_guest_who_is_invited_breaks_and_has_no_other_say(site, do, invited):
 @pytest.mark.parametrize(
     ("name", "taken"),
     [
-        ("Ada", "Ada"), ("  Ada   Lovelace ", "Ada Lovelace"), ("\u738b\u5c0f\u660e", "\u738b\u5c0f\u660e"),
-        ("</script><b onload=x>", "</script><b onload=x>"), ("A\nB", "A B"), ("x" * 24, "x" * 24),
-        ("x" * 25, None), ("", None), ("   ", None), ("a\u202eb", None), ("a\u200bb", None), ("a\0b", None),
-        ("a\x1b[2Jb", None), ("\ue000", None), (7, None), (None, None), (["a"], None),
-        ("\u0e17\u0e35\u0e48", "\u0e17\u0e35\u0e48"), ("a\u0336\u0301\u035a", None), ("\u0301", None),
-        ("a \u0301b", None), ("\u3164", None), ("a\u2800b", None),
+        ("  Ada   Lovelace ", "Ada Lovelace"), ("A\nB", "A B"), ("</script><b onload=x>",) * 2,
+        ("x" * 25, None), ("   ", None), ("a\u202eb", None), ("\ue000", None), (7, None),
+        ("\u0e17\u0e35\u0e48",) * 2, ("a\u0336\u0301\u035a", None), ("\u3164", None),
     ],
 )  # fmt: skip
 def test_names(site, name, taken):

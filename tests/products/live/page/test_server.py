@@ -6,11 +6,12 @@ import signal
 import subprocess
 
 import pytest
-from live_cockpit import Seat, ended, started, status, until
+from live_cockpit import Seat, ended, status, until
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from beaver_ftc_live.page import messages
 from beaver_ftc_live.page.gate import MAX_PAGES
+from commands import beaver
 
 
 @pytest.fixture(scope="module")
@@ -101,20 +102,18 @@ def test_there_is_room_for_twenty_pages_and_again_when_one_leaves(seat):
         assert until(pages.enter_context(seat.open()), "hello")
 
 
-def test_it_ends_cleanly_with_a_page_open(tmp_path):
-    cockpit = started(tmp_path)
-    with Seat(cockpit.address).open() as link:
+def test_a_flight_that_cannot_be_trimmed_ends_it_in_a_line(tmp_path):
+    (tmp_path / "slow.yaml").write_text("name: slow\ninitial: {airspeed_mps: 20}\n")
+    done = beaver("live", "slow.yaml", cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.splitlines()[-1].startswith("slow: no steady straight flight at 20 m/s")
+
+
+def test_it_ends_cleanly_with_a_page_open(cockpit, seat):
+    with seat.open() as link:
         until(link, "f")
         assert ended(cockpit, signal.SIGTERM) == (0, "")
     children = subprocess.run(
         ["ps", "-o", "pid=", "--ppid", str(cockpit.process.pid)], capture_output=True, text=True, check=False
     )
     assert children.stdout.split() == []
-
-
-def test_a_flight_that_cannot_be_trimmed_ends_it_in_a_line(tmp_path):
-    (tmp_path / "slow.yaml").write_text("name: slow\ninitial: {airspeed_mps: 20}\n")
-    cockpit = started(tmp_path, str(tmp_path / "slow.yaml"))
-    _, says = cockpit.process.communicate(timeout=600)
-    assert cockpit.process.returncode == 2
-    assert says.splitlines()[-1].startswith("slow: no steady straight flight at 20 m/s")

@@ -1,66 +1,8 @@
-"""What a type of fault does to the failure properties, twice over, and what its row says of it."""
+"""Instruments of a grade, from data sheets."""
 
 import pytest
 
-from beaver_ftc.scenario.airframe import checked_against
-from beaver_ftc.scenario.faults import (
-    TYPES,
-    Past,
-)
-from beaver_ftc.scenario.interventions import fault_of
 from beaver_ftc.scenario.sensors import Sensors
-from scenario.damageable import damageable
-
-GIVEN = {
-    "loss_of_effectiveness": {"magnitude": 0.4},
-    "stuck": {"position_deg": 45.0},
-    "hardover": {"direction": -1},
-    "float": {},
-    "bias": {"bias_deg": -18.0},
-    "rate_limit": {"scale": 0.2},
-    "oscillatory": {"amplitude_deg": 36.0, "frequency_rad_s": 5.0},
-    "unanticipated": {"Cm_alpha3": 8.0},
-    "damage": {"case": "tail-off"},
-}
-BEFORE = {
-    "effectiveness": 0.8, "stuck": 0.0, "stuck-at-rad": 0.1, "hardover": 0.0, "float": 0.0, "bias-rad": 0.1,
-    "rate-scale": 0.5, "oscillation-amplitude-rad": 0.0, "oscillation-frequency-rad_sec": 0.0,
-    "Cm-alpha3": 3.0,
-}  # fmt: skip
-PI = 3.14159265358979
-QUARTER = {
-    "loss_of_effectiveness": {"effectiveness": 0.8 * 0.9},
-    "bias": {"bias-rad": 0.1 - 0.25 * PI / 10},
-    "rate_limit": {"rate-scale": 0.5 * 0.8},
-    "oscillatory": {"oscillation-amplitude-rad": PI / 20, "oscillation-frequency-rad_sec": 5.0},
-    "unanticipated": {"Cm-alpha3": 3.0 + 2.0},
-}
-AFTER = {
-    "loss_of_effectiveness": {"effectiveness": 0.8 * 0.9 * 0.6},
-    "stuck": {"stuck": 1.0, "stuck-at-rad": PI / 4},
-    "hardover": {"hardover": -1.0},
-    "float": {"float": 1.0},
-    "bias": {"bias-rad": 0.1 - 1.25 * PI / 10},
-    "rate_limit": {"rate-scale": 0.5 * 0.8 * 0.2},
-    "oscillatory": {"oscillation-amplitude-rad": PI / 5, "oscillation-frequency-rad_sec": 5.0},
-    "unanticipated": {"Cm-alpha3": 3.0 + 2.0 + 8.0},
-    "damage": {"tail-off": 1.0},
-}
-
-
-def fault(kind, **keys):
-    actuator = {} if kind in ("unanticipated", "damage") else {"actuator": "flap"}
-    with checked_against(damageable()):
-        return fault_of({"type": kind, **actuator, **keys}, 1.0)
-
-
-@pytest.mark.parametrize("kind", TYPES)
-def test_a_quarter_of_a_fault_and_then_the_whole_of_it(kind):
-    found = dict(BEFORE)
-    for share, after in ((0.25, QUARTER.get(kind, AFTER[kind])), (1.0, AFTER[kind])):
-        fault(kind, **GIVEN[kind]).strike(found, share, Past(at_rad=0.7))
-        assert found == pytest.approx(BEFORE | after)
-
 
 G = 9.80665
 GRADES = {  # from data sheets: a random walk over an hour is a sample's noise at 100 Hz; else as assumed

@@ -11,16 +11,15 @@ in time, since the airspeed varies about that of the fitted flights. If the stan
 is larger than a step between levels, the excess is added to the variance of its own gain.
 
 Letters as in `filtering`: g a group of n, B (n, L, 3) its response and R (3, 3) the covariance of the noise,
-rad/s and (rad/s)2 a sample; ma the moving average by which a flight is whitened, empty if it is not.
+rad/s and (rad/s)2 a sample.
 """
 
-from collections.abc import Sequence
 from itertools import combinations, product
 from typing import NamedTuple
 
 import numpy as np
 
-from beaver_ftc_logs.model import Model
+from beaver_ftc_logs.model import Model, NoiseModel
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
 from beaver_ftc_logs.trust import known_effects
 
@@ -165,19 +164,19 @@ class StateModel(NamedTuple):
     random_walk_variance: Floats
 
 
-def build_states(model: Model, ma: Sequence[float] = ()) -> StateModel:
+def build_states(model: Model, noise: NoiseModel) -> StateModel:
     """The prior and the limits of trim and gains, from a model's settings: mean x (N,), covariance P (N, N),
     retention a (N,) = exp(-1 / (rate return_s)) a sample, and walk (N,) = (1 - a^2) diag(P)."""
     settings = model.settings
     n = len(model.groups)
-    _, _, B, R = model.as_arrays()
-    r = np.diag(R)
+    _, _, B, _ = model.as_arrays()
+    r = noise.wider * np.diag(np.array(noise.noise))
     shift = B.sum(axis=1) * settings.trim_shift
     P = np.zeros((4 + n, 4 + n))
     P[:3, :3] = np.diag(r * settings.trim_sd**2) + shift.T @ shift
     P[3, 3] = settings.gain_sd**2
     drift = settings.own_gain_sd**2 + _extra_variance(model)
-    hidden = model.hidden_gain_error_sd(ma) ** 2
+    hidden = np.array(noise.misreads or [0.0] * n) ** 2
     P[range(4, 4 + n), range(4, 4 + n)] = drift + hidden
     # What the fit misreads stays the same in a flight: the larger spread adds nothing to the drift.
     own_s = settings.own_gain_time_s * (1.0 + hidden / np.maximum(drift, MIN_DIVISOR))
@@ -219,17 +218,17 @@ class ResidualNoise(NamedTuple):
     covariance_inflation: float
 
 
-def build_noise(model: Model, ma: Sequence[float] = ()) -> ResidualNoise:
+def build_noise(model: Model, noise: NoiseModel, intercept_rad_s: Floats) -> ResidualNoise:
     """The noise of a flight, from a model's settings."""
     settings = model.settings
     return ResidualNoise(
-        intercept_rad_s=model.whitened_intercept(ma),
-        covariance=model.as_arrays()[3],
+        intercept_rad_s=intercept_rad_s,
+        covariance=noise.wider * np.array(noise.noise),
         effective_sample_share=settings.power,
         t_degrees_of_freedom=settings.tail,
         scale_memory_samples=settings.noise_memory_s * model.rate_hz,
         min_variance_scale=_MIN_NOISE_SCALE,
         max_variance_scale=_MAX_NOISE_SCALE,
-        max_squared_residual=_MAX_SQUARE if len(model.residual_ar_coefficients(ma)) else np.inf,
-        covariance_inflation=model.inflation_of(ma),
+        max_squared_residual=_MAX_SQUARE if noise.before else np.inf,
+        covariance_inflation=noise.wider,
     )

@@ -151,14 +151,13 @@ def model_weights(ll: Sequence[Floats], rate_hz: float) -> Floats:
 
 def run_flight(flight: Innovations, model: Model, bank: HypothesisBank) -> BankRun:
     """The result of `run_bank` for one flight."""
-    noisy = model.with_noise_of(flight.ma)
     q = flight.quick_scale(model)
     r_min = np.zeros(len(q))
     if model.vehicle.other_laws:
-        white = flight.e @ flight.W / np.sqrt(flight.inflation * q[:, None])
+        white = flight.e @ flight.W / np.sqrt(flight.noise.wider * q[:, None])
         r_min = recent_scale(white, flight.is_known, model.rate_hz)
     y, F = (np.ascontiguousarray(values) for values in (flight.y, flight.F))
-    states, noise = build_states(noisy, flight.ma), build_noise(noisy, flight.ma)
+    states, noise = build_states(model, flight.noise), build_noise(model, flight.noise, flight.c)
     run: BankRun = run_bank(y, F, flight.is_known, bank, states, noise, r_min, q)
     return run
 

@@ -174,7 +174,7 @@ def fit_model(parts: Sequence[FitPart], vehicle: Vehicle, settings: FilterSettin
 def refit(parts: Sequence[FitPart], model: Model) -> Model:
     """A model of the same order and settings, fitted to other flights."""
     refitted = _model_of_order(parts, model.vehicle, model.history, model.lags)
-    return _with_inflation(refitted.model_copy(update={"settings": model.settings}), model.inflation_of)
+    return _with_inflation(refitted.model_copy(update={"settings": model.settings}), lambda ma: model.noise_of(ma).wider)
 
 
 def _with_inflation(model: Model, inflation_of: Callable[[Sequence[float]], float]) -> Model:
@@ -323,7 +323,7 @@ def _squared_quick_error(fold: Model, held_out: FitPart) -> float | None:
     """
     flight = held_out.innovations(fold)
     power = flight.quick_power(fold.rate_hz)
-    unusual = power > fold.usual_quick_power(flight.ma)
+    unusual = power > flight.noise.usual_quick_power
     if unusual.sum() < _MIN_QUICK_SAMPLES:
         return None
     squares = ((flight.e - np.median(flight.e, axis=0)) @ flight.W) ** 2
@@ -413,6 +413,14 @@ def gain_overdispersion(parts: Sequence[FitPart], model: Model) -> float:
     return sum(error for error, _ in errors) / sum(n for _, n in errors)
 
 
+def _gains(F: Floats, e: Floats) -> tuple[Floats, Floats, Floats]:
+    """Information F' F of errors g of gains, what the residual says of them, F' e, and g by least squares, of
+    e (n, 3) = F g + noise, F (n, 3, m)."""
+    X = F.reshape(e.size, F.shape[2])
+    FF, Fe = X.T @ X, X.T @ e.ravel()
+    return FF, Fe, np.linalg.lstsq(FF, Fe, rcond=_RANK_TOLERANCE)[0]
+
+
 def _gain_errors(
     fold: Model, held_out: FitPart, window_s: float | None = None, loudness: float = 1.0
 ) -> list[tuple[float, int]]:
@@ -426,7 +434,7 @@ def _gain_errors(
     F, e = _standardized(fold, held_out)
     if not len(e):  # a part without a residual shows no gain
         return []
-    P = build_states(fold, held_out.samples.noise_ma_coefficients).initial_covariance[3:, 3:]
+    P = build_states(fold, fold.noise_of(held_out.samples.noise_ma_coefficients)).initial_covariance[3:, 3:]
     S = np.asarray(P[0, 0] + np.diag(np.diag(P)[1:][known]))
     F, n = F[:, :, known], 1
     if window_s is None:
@@ -436,10 +444,7 @@ def _gain_errors(
         n = max(round(len(e) * held_out.samples.dt_s / window_s), 1)
     errors = []
     for rows in np.array_split(np.arange(len(e)), n):
-        Fw, ew = (_centred(values[rows]) / np.sqrt(loudness) for values in (F, e))
-        Fw = Fw.reshape(ew.size, -1)
-        FF, Fe = Fw.T @ Fw, Fw.T @ ew.ravel()
-        g = np.linalg.lstsq(FF, Fe, rcond=_RANK_TOLERANCE)[0]
+        FF, Fe, g = _gains(*(_centred(values[rows]) / np.sqrt(loudness) for values in (F, e)))
         A = np.eye(len(g)) + S @ FF  # singular by rounding where nothing tells a gain
         error = max(float(Fe @ np.linalg.lstsq(A, g, rcond=_RANK_TOLERANCE)[0]), 0.0)
         errors.append((error, int(np.linalg.matrix_rank(FF, tol=_RANK_TOLERANCE * np.trace(FF)))))
@@ -489,7 +494,7 @@ def _standardized(model: Model, held_out: FitPart) -> tuple[Floats, Floats]:
     """Return the effect F (n, 3, G, 3) of each axis of each group's answer on the residuals of a part, and
     those e (n, 3), both in sd of the noise, without means; where responses are quick, q times that."""
     flight = held_out.innovations(model)
-    sd = np.sqrt(flight.inflation * flight.quick_scale(model))[:, None]
+    sd = np.sqrt(flight.noise.wider * flight.quick_scale(model))[:, None]
     F = np.einsum("nga,ab->nbga", flight.F, flight.W)
     return _centred(F) / sd[:, :, None, None], _centred(flight.e @ flight.W) / sd
 
@@ -572,7 +577,8 @@ def add_ranges_and_threshold(parts: Sequence[FitPart], model: Model) -> Model:
     variance = group_gain_sd(fit_of(parts, model), model) ** 2
     if model.vehicle.other_laws:
         # how far another flight's gains may be before any is left out counts as one flight
-        variance += np.nanmean([_max_gain_bias(parts, model) ** 2, *deviations], axis=0)
+        hidden = [noise.misreads for noise in model.colours] or [[0.0] * len(model.groups)]
+        variance += np.nanmean([np.max(hidden, axis=0) ** 2, *deviations], axis=0)
     gain_sd = np.minimum(np.sqrt(variance), _GAIN_SD_CAP)
     tail = extremes.fit_peak_tail(peaks)
     ranges = trust.compute_fitted_ranges(parts, model, gain_sd).model_copy(
@@ -604,37 +610,16 @@ def _alarm_rate_and_threshold(
     return target, _choose_threshold(tail, target, model) if target else None
 
 
-def _max_gain_bias(parts: Sequence[FitPart], model: Model) -> Floats:
-    """By how much a group's gain may be misread under one law, (G,).
-
-    Of the residual's variance the share that its own past predicts is no noise, but what the model lacks. A
-    law feeds it back to the surfaces, and least squares takes it for their answer, at most so much of it as
-    the standard deviation of one is of the other's; a law that feeds back otherwise shows the difference.
-    """
-    if not model.colours:
-        return np.zeros(len(model.groups))
-    share = 0.0
-    for noise in model.colours:
-        e = one_step_residuals(_parts_in(parts, noise.average), model)
-        chance = 3.0 * AR_ORDER / len(e) if noise.before else 0.0
-        log_det = np.linalg.slogdet(np.array(noise.noise))[1]
-        log_ratio = log_det - np.linalg.slogdet(np.cov(e.T))[1]
-        share = max(share, 1.0 - float(np.exp(log_ratio / 3.0)) - chance)
-    untied = trust.effect_powers(parts, model)[1]
-    return np.minimum(np.sqrt(3.0 * share / np.maximum(untied, MIN_DIVISOR)), _GAIN_SD_CAP)
-
-
 def _squared_deviations(model: Model, held_out: FitPart) -> Floats:
     """Squares of how far the groups' gains are from 1 in a flight left out, beyond the noise's share, (G,);
     nan of a group whose effect it does not show."""
     F, e = _standardized(model, held_out)
-    F = F.sum(axis=3).reshape(e.size, len(model.groups))
-    squares = np.full(F.shape[1], np.nan)
-    known = np.array(trust.known_effects(model)) & F.any(axis=0)
-    FF = F[:, known].T @ F[:, known]
-    P = np.linalg.pinv(FF, rcond=_RANK_TOLERANCE, hermitian=True)
-    g = P @ (F[:, known].T @ e.ravel())
+    F = F.sum(axis=3)
+    squares = np.full(len(model.groups), np.nan)
+    known = np.array(trust.known_effects(model)) & F.any(axis=(0, 1))
     if known.any():  # a part without a residual shows the effect of no group
+        FF, _, g = _gains(F[:, :, known], e)
+        P = np.linalg.pinv(FF, rcond=_RANK_TOLERANCE, hermitian=True)
         squares[known] = np.maximum(g**2 - np.diag(P) * max(float((e**2).mean()), 1.0), 0.0)
     return squares
 

@@ -82,7 +82,7 @@ def add_unseen_noise(model: Model, flights: Sequence[Samples]) -> Model:
     powers = [noise.quick for noise in model.colours if noise.quick is not None]
     same: dict[str, Any] = {
         "wider": max(noise.wider for noise in model.colours),
-        "misreads": np.max([model.hidden_gain_error_sd(one) for one in known], axis=0).tolist(),
+        "misreads": np.max([noise.misreads for noise in model.colours], axis=0).tolist(),
         "quick": min(powers, default=None),
     }
     models = list(model.colours)

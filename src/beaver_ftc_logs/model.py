@@ -153,6 +153,16 @@ class NoiseModel(Section):
     misreads: list[ShareBelowOne] = Field([])
     quick: Number | None = Field(default=None, ge=0, le=_MAX_COEF)
 
+    @property
+    def usual_quick_power(self) -> float:
+        """`quick`; infinite where that is not known."""
+        return float("inf") if self.quick is None else self.quick
+
+    @property
+    def ar(self) -> Floats:
+        """Autoregressive coefficients of the residual, (L, 3, 3), latest lag first; L is 0 if not fitted."""
+        return np.reshape(np.array(self.before), (-1, 3, 3))
+
 
 class Model(Section):
     """How one vehicle's rates answer their own past and the commands, and how well that is known.
@@ -261,50 +271,13 @@ class Model(Section):
         if ranges is not None and min((*ranges.gain_sd, *ranges.spread), default=0.0) < 0.0:
             yield ("fitted",), "gain_sd or spread has a negative number, allowed: at least 0"
 
-    def with_single_noise(self, noise: NoiseModel) -> "Model":
-        """The model with one of its noise models only."""
-        return self.model_copy(update={"colours": [noise]})
-
-    def with_noise_of(self, average: Sequence[float]) -> "Model":
-        """The model with the noise fitted for flights of this moving average, times its inflation.
+    def noise_of(self, average: Sequence[float]) -> NoiseModel:
+        """The noise fitted for flights of this moving average; that of all flights where none was fitted.
 
         average: 1, c1, ..., the moving-average model of the residual's noise, newest first.
         """
-        R = self.inflation_of(average) * self.covariance_of_noise(average)
-        return self.model_copy(update={"noise": R.tolist()})
-
-    def _noise_of(self, average: Sequence[float]) -> NoiseModel:
-        """The noise fitted for flights of this moving average; that of all flights where none was fitted."""
         fitted = [noise for noise in self.colours if noise.average == list(average)]
-        return fitted[0] if fitted else NoiseModel(average=[1.0], noise=self.noise)
-
-    def covariance_of_noise(self, average: Sequence[float]) -> Floats:
-        """Covariance (3, 3) of the noise of flights of this moving average, (rad/s)2."""
-        return np.array(self._noise_of(average).noise)
-
-    def inflation_of(self, average: Sequence[float]) -> float:
-        """Factor on the covariance of the fitted noise, by which it covers parts that were not fitted."""
-        return float(self._noise_of(average).wider)
-
-    def hidden_gain_error_sd(self, average: Sequence[float]) -> Floats:
-        """By how much of its effect the fit may misread each group in the noise of this moving average, (G,);
-        0 where that is not known."""
-        return np.array(self._noise_of(average).misreads or [0.0] * len(self.groups))
-
-    def usual_quick_power(self, average: Sequence[float]) -> float:
-        """Power of the quick part of the responses that flights of this noise seldom exceed, in variances of
-        the noise; infinite where that is not known."""
-        power = self._noise_of(average).quick
-        return float("inf") if power is None else power
-
-    def residual_ar_coefficients(self, average: Sequence[float]) -> Floats:
-        """Autoregressive coefficients of the residual, (L, 3, 3), latest lag first; L is 0 if not fitted."""
-        return np.reshape(np.array(self._noise_of(average).before), (-1, 3, 3))
-
-    def whitened_intercept(self, average: Sequence[float]) -> Floats:
-        """The intercept less its prediction by `residual_ar_coefficients`, (3,)."""
-        intercept = np.array(self.intercept)
-        return np.asarray(intercept - intercept @ self.residual_ar_coefficients(average).sum(axis=0))
+        return fitted[0] if fitted else NoiseModel(average=list(average) or [1.0], noise=self.noise)
 
     def as_arrays(self) -> tuple[Floats, Floats, Floats, Floats]:
         """intercept (3,), past (m, 3), response (G, L, 3) and noise (3, 3) as arrays."""

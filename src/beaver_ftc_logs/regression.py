@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from beaver_ftc_logs.model import Model
+from beaver_ftc_logs.model import Model, NoiseModel
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
 from beaver_ftc_logs.samples import Samples, mixer_matrix, whiten_samples
 from beaver_ftc_logs.vehicle import Vehicle
@@ -128,9 +128,8 @@ class Innovations:
     """What the past does not explain of a flight's rates, a row a sample: y = c + sum_g F_g + e in health.
 
     rows (n,): place of each row in the flight. is_known (n,): whether all of the past is there; else a row
-    of e is 0. y (n, 3), F (n, G, 3), c (3,) rad/s, R (3, 3) (rad/s)2: as in the head of this file, less what
-    earlier residuals predict of them. inflation: how many times as wide as R the filter takes the noise to
-    be. ma: moving average by which the flight is whitened, empty if it is not.
+    of e is 0. y (n, 3), F (n, G, 3), c (3,) rad/s: as in the head of this file, less what earlier residuals
+    predict of them. noise: of the flight.
     """
 
     rows: NDArray[np.int64]
@@ -138,14 +137,17 @@ class Innovations:
     y: Floats
     F: Floats
     c: Floats
-    R: Floats
-    inflation: float = 1.0
-    ma: tuple[float, ...] = ()
+    noise: NoiseModel
 
     @cached_property
     def e(self) -> Floats:
         """Residual of a healthy vehicle, (n, 3)."""
         return np.where(self.is_known[:, None], self.y - self.c - self.F.sum(axis=1), 0.0)
+
+    @cached_property
+    def R(self) -> Floats:
+        """Covariance of the noise, (3, 3) (rad/s)2."""
+        return np.array(self.noise.noise)
 
     @cached_property
     def W(self) -> Floats:
@@ -155,7 +157,7 @@ class Innovations:
     @property
     def log_size(self) -> float:
         """Logarithm of the size of the noise of a sample before it was whitened, log det(R)^1/2."""
-        return 0.5 * float(np.linalg.slogdet(self.R)[1]) - 3.0 * float(np.log(sum(self.ma or (1.0,))))
+        return 0.5 * float(np.linalg.slogdet(self.R)[1]) - 3.0 * float(np.log(sum(self.noise.average)))
 
     def at(self, rows: NDArray[np.int64] | slice) -> "Innovations":
         """Some of the rows."""
@@ -201,7 +203,7 @@ class Innovations:
         Slow commands of healthy flight hardly show how a surface responds to a step. The error after a step
         is no noise: it has the same sign in many samples.
         """
-        excess = np.maximum(self.quick_power(model.rate_hz) - model.usual_quick_power(self.ma), 0.0)
+        excess = np.maximum(self.quick_power(model.rate_hz) - self.noise.usual_quick_power, 0.0)
         return np.asarray(1.0 + model.settings.quick_error**2 * excess)
 
 
@@ -215,23 +217,25 @@ def innovations(samples: Samples, model: Model, labelled: bool = False) -> Innov
     h, L = model.history, model.lags
     f = model.vehicle.n_signal_lags(h)
     X, U, known = build_regressors(samples, group_indices(model), h, L, labelled, f)
-    _, A, B, _ = model.as_arrays()
-    ma = samples.noise_ma_coefficients
-    ar = model.residual_ar_coefficients(ma)
+    c, A, B, _ = model.as_arrays()
+    noise = model.noise_of(samples.noise_ma_coefficients)
+    ar = noise.ar
     y = subtract_noise(samples.rates - np.einsum("nm,mr->nr", X, A), ar)
     F = subtract_noise(np.einsum("ngl,glr->ngr", U, B), ar)
     whole = known.copy()
     for lag in range(1, len(ar) + 1):
         whole &= _delay_rows(known, lag, False)
-    rows, c, R = np.arange(len(y)), model.whitened_intercept(ma), model.covariance_of_noise(ma)
-    return Innovations(rows, whole, np.nan_to_num(y), np.nan_to_num(F), c, R, model.inflation_of(ma), ma)
+    y, F, c = np.nan_to_num(y), np.nan_to_num(F), np.asarray(c - c @ ar.sum(axis=0))
+    return Innovations(np.arange(len(y)), whole, y, F, c, noise)
 
 
 def by_noise(samples: Samples, model: Model) -> list[tuple[Samples, Model]]:
     """A flight whitened by each noise of a model, and the model with this noise alone; both as they are where
     the model has none."""
-    noises = [(noise.average, model.with_single_noise(noise)) for noise in model.colours]
-    return [(whiten_samples(samples, ma), one) for ma, one in noises] or [(samples, model)]
+    return [
+        (whiten_samples(samples, noise.average), model.model_copy(update={"colours": [noise]}))
+        for noise in model.colours
+    ] or [(samples, model)]
 
 
 def by_axis(values: Floats) -> dict[str, float]:

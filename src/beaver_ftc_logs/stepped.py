@@ -18,6 +18,7 @@ import numpy as np
 from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.loop import FLOW, Diagnosis
 from beaver_ftc_logs.diagnose import UNKNOWN_SURFACE, LogRows
+from beaver_ftc_logs.model import NoiseModel
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
 from beaver_ftc_logs.regression import Innovations, split_parts
 
@@ -85,8 +86,9 @@ def _command_gains(nu: Floats, Z: Floats) -> tuple[Floats, Floats]:
     if (parts := split_parts(rows)) is None:
         return np.ones(Z.shape[2]), np.ones(Z.shape[2])
     sd = np.maximum(nu[rows].std(axis=0), MIN_DIVISOR)
+    noise = NoiseModel.model_construct(average=[1.0], noise=np.diag(sd**2).tolist())
     k, known = np.arange(len(nu)), np.ones(len(nu), dtype=bool)
-    frames = Innovations(k, known, nu, Z.transpose(0, 2, 1), np.zeros(3), np.diag(sd**2))
+    frames = Innovations(k, known, nu, Z.transpose(0, 2, 1), np.zeros(3), noise)
     upper = [frames.at(part).gain_bounds(_EFFECTIVE_SAMPLE_SHARE)[1] for part in parts]
     return 1.0 + frames.at(rows).gains(), 1.0 + np.max(upper, axis=0)
 

@@ -96,32 +96,26 @@ def central_ranges(values: Floats) -> list[list[float]]:
 def tied_shares(parts: Sequence[FitPart], model: Model) -> Floats:
     """Share of each group's effect on the rates that past, signals and the other groups make up, (G,): where
     it is near 1 the law ties the group to what it answers to, and its effect cannot be told; 1 where the
-    group never moved. An effect far above the noise may be made up to a larger share: what is left counts."""
-    power, rest = effect_powers(parts, model)
-    moved = power > _MIN_EFFECT_POWER
-    share = 1.0 - rest / np.minimum(np.where(moved, power, 1.0), _EFFECT_POWER_CAP)
-    return np.where(moved, np.maximum(share, 0.0), 1.0)
+    group never moved. An effect far above the noise may be made up to a larger share: what is left counts.
 
-
-def effect_powers(parts: Sequence[FitPart], model: Model) -> tuple[Floats, Floats]:
-    """Power of each group's effect y = U_g B_g W on the rates, in variances of the noise a sample, (G,), and
-    of what past X, signals and the commands U of the other groups do not make up of it, e = y - Z b, (G,)."""
+    The effect y = U_g B_g W is in standard deviations of the noise, e = y - Z b what past X, signals and the
+    commands U of the other groups do not make up of it."""
     h, f = model.history, model.vehicle.n_signal_lags(model.history)
     groups = regression.group_indices(model)
     stacked = [part.regressors(groups, h, model.lags, f) for part in parts]
     X, U = (np.concatenate([one[i][one[2]] for one in stacked]) for i in (0, 1))
     _, _, B, R = model.as_arrays()
     W = np.linalg.inv(np.linalg.cholesky(R)).T
-    power, rest = np.zeros((2, len(groups)))
+    shares = np.ones(len(groups))
     for g in range(len(groups)):
         Z = np.column_stack([np.ones(len(X)), X, np.delete(U, g, axis=1).reshape(len(U), -1)])
         y = U[:, g] @ B[g] @ W
         y = y - y.mean(axis=0)
-        power[g] = float((y**2).sum()) / len(y)
-        if power[g] > _MIN_EFFECT_POWER:
+        power = float((y**2).sum()) / len(y)
+        if power > _MIN_EFFECT_POWER:
             e = y - Z @ np.linalg.lstsq(Z, y, rcond=None)[0]
-            rest[g] = float((e**2).sum()) / len(y)
-    return power, rest
+            shares[g] = max(1.0 - float((e**2).sum()) / len(y) / min(power, _EFFECT_POWER_CAP), 0.0)
+    return shares
 
 
 def known_effects(model: Model) -> list[bool]:
@@ -221,7 +215,7 @@ def answers(samples: Samples, model: Model, most: int | None = None) -> Answers 
     step = max(len(rows) // most, 1) if most else 1
     if (parts := regression.split_parts(rows[::step])) is None:
         return None
-    share = model.settings.power / flight.inflation
+    share = model.settings.power / flight.noise.wider
     bounds = [flight.at(part).gain_bounds(share) for part in parts]
     lower, upper, scales = (np.array(each) for each in zip(*bounds, strict=True))
     likelihood = -flight.log_size - 1.5 * np.log(scales)

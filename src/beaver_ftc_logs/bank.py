@@ -111,7 +111,7 @@ def _effect_row(n: int, levels: dict[int, float]) -> Floats:
 def _levels_and_shares(model: Model, g: int) -> tuple[Floats, Floats]:
     """Levels of effectiveness below 1, and the share of each among the group's faults."""
     settings = model.settings
-    labelled = settings.levels.get("+".join(model.groups[g]), [])
+    labelled = settings.levels.get(model.group_names[g], [])
     grid = np.arange(0.0, 1.0 - 0.5 * settings.level_step, settings.level_step)
     levels = np.unique(np.round(np.concatenate([grid, np.array(labelled, dtype=float)]), 6))
     is_labelled = np.isin(levels, np.round(labelled, 6))

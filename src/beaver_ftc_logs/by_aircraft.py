@@ -21,7 +21,7 @@ from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import findings, trust
 from beaver_ftc_logs.diagnose import LogRows, reversed_command_error
-from beaver_ftc_logs.recording import Floats, Mask, RecordedFlight
+from beaver_ftc_logs.recording import Floats, Mask, RecordedFlight, true_runs
 from beaver_ftc_logs.samples import Samples, convert_to_si, resample, sample_column
 from beaver_ftc_logs.stepped import Replayed, error_sections, replay_samples, rows_of_replay
 from beaver_ftc_logs.vehicle import QuantityColumn, Vehicle
@@ -233,11 +233,7 @@ def _flow_columns(
             reason = f"flow: no {name}, allowed: a column for each of {', '.join(names)}"
             raise BadInput(f"vehicle {vehicle.name}: {reason}")
     flow = [vehicle.flow[name] for name in names]
-    for quantity in (vehicle.airspeed, *flow):
-        if quantity.column not in log.columns:
-            nearest = log.nearest_columns_text(quantity.column)
-            reason = f"no column {quantity.column}, allowed: a log that has it; it has {nearest}"
-            raise BadInput(f"{log.name}: {reason}")
+    log.check_has(quantity.column for quantity in (vehicle.airspeed, *flow))
     return vehicle.airspeed, flow
 
 
@@ -284,9 +280,7 @@ def _gap_free_stretches(samples: Samples, missing: Mask, rate_hz: float) -> list
     """First row and end of each stretch that is evenly spaced and has no missing number."""
     uneven = np.abs(np.diff(samples.t_s) * rate_hz - 1.0) > _STEP_JITTER
     joins = ~(missing[1:] | missing[:-1] | uneven)
-    first, last = np.flatnonzero(np.diff(joins.astype(int), prepend=0, append=0)).reshape(-1, 2).T
-    enough = last + 1 - first >= _MIN_SAMPLES
-    return [*zip(first[enough].tolist(), (last[enough] + 1).tolist(), strict=True)]
+    return [(begin, end + 1) for begin, end in true_runs(joins) if end + 1 - begin >= _MIN_SAMPLES]
 
 
 def _doubtful_rows(inputs: LogInputs, replay: Replayed, rows: LogRows) -> dict[str, Mask]:

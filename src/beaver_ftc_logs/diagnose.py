@@ -22,7 +22,7 @@ from beaver_ftc_logs import energy, trust
 from beaver_ftc_logs.bank import GROUP_LOSS, UNKNOWN_OFFSET, HypothesisBank, build_bank
 from beaver_ftc_logs.filtering import bank_posterior, fault_evidence, page_cusum
 from beaver_ftc_logs.model import Model
-from beaver_ftc_logs.recording import MIN_DIVISOR, Floats, Ints, Mask
+from beaver_ftc_logs.recording import MIN_DIVISOR, Floats, Ints, Mask, last_row_at, last_true_row
 from beaver_ftc_logs.regression import expand_groups, innovations
 from beaver_ftc_logs.samples import Samples
 
@@ -250,7 +250,7 @@ def rows_of_posterior(samples: Samples, model: Model, bank: HypothesisBank, P: F
         alarmed = (evidence >= mu) & ~calm
         nameable = (page_cusum(steps, mu_name) >= mu_name) & ~calm
     faulty = _latched(alarmed, calm).astype(np.int64)
-    start = np.maximum.accumulate(np.where(evidence <= 0.0, np.arange(len(evidence)), 0))
+    start = np.maximum(last_true_row(evidence <= 0.0), 0)
     per_group = [_group_bounds(bank, P_live, g, model) for g in range(len(model.groups))]
     e, low, high = (np.column_stack(column) for column in zip(*per_group, strict=True))
     silent = p_silent > _NO_RESPONSE_LIMIT
@@ -288,16 +288,12 @@ def _group_bounds(bank: HypothesisBank, P_live: Floats, g: int, model: Model) ->
 def _held_long_enough(holds: Mask, model: Model) -> Mask:
     """Return the rows at which a condition holds and has held for long enough, (n,)."""
     n = round(model.settings.hold_s * model.rate_hz)
-    held = np.arange(len(holds)) - np.maximum.accumulate(np.where(holds, -1, np.arange(len(holds))))
-    return np.asarray(holds & (held > n))
+    return np.asarray(holds & (np.arange(len(holds)) - last_true_row(~holds) > n))
 
 
 def _latched(alarmed: Mask, calm: Mask) -> Mask:
     """An alarm once raised stands until health is the likelier again."""
-    k = np.arange(len(alarmed))
-    last_alarm = np.maximum.accumulate(np.where(alarmed, k, -1))
-    last_calm = np.maximum.accumulate(np.where(calm & ~alarmed, k, -1))
-    return np.asarray((last_alarm >= 0) & (last_alarm > last_calm))
+    return np.asarray(last_true_row(alarmed) > last_true_row(calm & ~alarmed))
 
 
 def _group_levels(bank: HypothesisBank, P_live: Floats, g: int) -> tuple[Floats, Floats]:
@@ -340,7 +336,7 @@ def _surfaces_at_fault(
         likely = (p_loss > _EXCLUSION_RISK * p_loss.max(axis=1, keepdims=True)) & nameable[:, None]
         can_lose = p_loss.max(axis=0) > 0.0
         likely &= ~(likely[:, can_lose].all(axis=1) & (can_lose.sum() > 1))[:, None]
-    names = join_names(likely, ["+".join(group) for group in model.groups])
+    names = join_names(likely, model.group_names)
     named = np.full(len(P), "", dtype=object)
     offset = P[:, bank.hypothesis_kind == UNKNOWN_OFFSET].sum(axis=1) > p_fault
     n_hold = round(model.settings.rename_s * model.rate_hz)
@@ -366,7 +362,7 @@ def _at_log_stamps(samples: Samples, rows: LogRows) -> LogRows:
     """The rows at the log's own stamps: each stamp has the last row up to it."""
     if len(samples.log_stamps_s) == len(rows.t_s) and np.array_equal(samples.log_stamps_s, rows.t_s):
         return rows
-    last = np.maximum(np.searchsorted(rows.t_s, samples.log_stamps_s, side="right") - 1, 0)
+    last = last_row_at(rows.t_s, samples.log_stamps_s)
     names = [name for name in LogRows.__dataclass_fields__ if name not in ("t_s", "doubtful_rows")]
     reasons = {reason: mask[last] for reason, mask in rows.doubtful_rows.items()}
     fields = {name: getattr(rows, name)[last] for name in names}

@@ -18,9 +18,8 @@ the two halves of a single flight in turn, or each of several flights in turn.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 from functools import wraps
-from itertools import groupby, pairwise, product
+from itertools import groupby, product
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
@@ -38,7 +37,7 @@ from beaver_ftc_logs.filtering import (
     recent_scale,
 )
 from beaver_ftc_logs.model import FilterSettings, FittedRanges, Model, NoiseModel
-from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
+from beaver_ftc_logs.recording import MIN_DIVISOR, Floats, runs_between
 from beaver_ftc_logs.regression import FitPart
 from beaver_ftc_logs.samples import Samples, constant_stretches
 from beaver_ftc_logs.scoring import score_against_labels
@@ -108,9 +107,6 @@ _USUAL_SHARE = 0.9
 _MIN_QUICK_SAMPLES = 10
 """Samples with quick responses that a flight must have, for the mean of their errors."""
 _RANK_TOLERANCE = 1e-9
-_N_MISTAKE_TESTS = 4
-"""Number of held-out flights that are also read with each mistake in their columns. The largest gain in
-likelihood of n flights is exceeded by that of the next, similar flight with probability 1 / (n + 1)."""
 _MAX_SPLITS, _GAIN_SD_CAP = 12, 0.33
 """A gain that is known no better than to a third is not known to be there."""
 _N_PRIOR_CHANGES = 20
@@ -174,13 +170,10 @@ def fit_model(parts: Sequence[FitPart], vehicle: Vehicle, settings: FilterSettin
 def refit(parts: Sequence[FitPart], model: Model) -> Model:
     """A model of the same order and settings, fitted to other flights."""
     refitted = _model_of_order(parts, model.vehicle, model.history, model.lags)
-    return _with_inflation(refitted.model_copy(update={"settings": model.settings}), lambda ma: model.noise_of(ma).wider)
-
-
-def _with_inflation(model: Model, inflation_of: Callable[[Sequence[float]], float]) -> Model:
-    """The model with so many times as wide a noise of each moving average."""
-    models = [noise.model_copy(update={"wider": inflation_of(noise.average)}) for noise in model.colours]
-    return model.model_copy(update={"colours": models})
+    colours = [
+        noise.model_copy(update={"wider": model.noise_of(noise.average).wider}) for noise in refitted.colours
+    ]
+    return refitted.model_copy(update={"settings": model.settings, "colours": colours})
 
 
 def held_out_folds(parts: Sequence[FitPart], model: Model) -> Iterator[tuple[Model, FitPart]]:
@@ -354,7 +347,9 @@ def _fit_noise_model(own: Sequence[FitPart], model: Model, ma: list[float]) -> N
     """The noise of flights of one moving average, with an AR predictor of the residual, by least squares
     where samples follow one another; without a predictor where too few do."""
     flights = [part.innovations(model) for part in own]
-    runs = [flight.e[begin:end] for flight in flights for begin, end in _row_runs(flight.rows)]
+    runs = [
+        flight.e[begin:end] for flight in flights for begin, end in runs_between(np.diff(flight.rows) > 1)
+    ]
     targets = [run[AR_ORDER:] for run in runs]
     if sum(map(len, targets)) < 10 * 3 * AR_ORDER:
         return NoiseModel(average=ma, noise=np.cov(np.vstack(runs).T).tolist())
@@ -464,7 +459,11 @@ def _with_inflated_noise(parts: Sequence[FitPart], model: Model) -> Model:
     for ma in inflation if model.vehicle.other_laws else ():
         # a gyro's noise takes from the next sample what it added to one
         inflation[ma] *= _GYRO_FACTOR if len(ma) > 1 and ma[1] < 0.0 else _GUST_FACTOR
-    return _with_inflation(model, lambda ma: inflation.get(tuple(ma), 1.0))
+    colours = [
+        noise.model_copy(update={"wider": inflation.get(tuple(noise.average), 1.0)})
+        for noise in model.colours
+    ]
+    return model.model_copy(update={"colours": colours})
 
 
 def _window_inflations(fold: Model, held_out: FitPart, others: Sequence[FitPart]) -> list[float]:
@@ -516,7 +515,7 @@ def _estimate_trim_walk(parts: Sequence[FitPart], model: Model) -> list[float]:
     for fold, held_out in held_out_folds(parts, model):
         flight = held_out.innovations(fold)
         g = flight.e / np.sqrt(np.maximum(np.diag(flight.R), MIN_DIVISOR))
-        for begin, end in _row_runs(flight.rows):
+        for begin, end in runs_between(np.diff(flight.rows) > 1):
             for i, n in enumerate(spans.astype(int).tolist()):
                 means = g[begin:end][: (end - begin) // n * n].reshape(-1, n, 3).mean(axis=1)
                 sums[i] += (np.diff(means, axis=0) ** 2).sum(axis=0)
@@ -528,12 +527,6 @@ def _estimate_trim_walk(parts: Sequence[FitPart], model: Model) -> list[float]:
     n1, n2 = spans
     w = 1.5 * (n2 * v2 - n1 * v1) / (n2**2 - n1**2)
     return np.maximum(np.sqrt(np.maximum(w, 0.0)), usual).tolist()
-
-
-def _row_runs(rows: NDArray[np.int64]) -> list[tuple[int, int]]:
-    """Begin and end of what of increasing places follows one another."""
-    edges = [0, *(np.flatnonzero(np.diff(rows) > 1) + 1).tolist(), len(rows)]
-    return list(pairwise(edges))
 
 
 def validation_folds(
@@ -565,12 +558,9 @@ def _halves(parts: Sequence[FitPart]) -> tuple[FitPart, FitPart]:
 def add_ranges_and_threshold(parts: Sequence[FitPart], model: Model) -> Model:
     """The model with what it was fitted on, and how it did on parts that were left out in turn: at which
     evidence of a fault they would alarm as often as declared."""
-    misread = 0.0
     peaks = list[extremes.PeaksAndHours]()
     deviations = list[Floats]()
     for fold, held_out in held_out_folds(parts, model):
-        if len(peaks) < _N_MISTAKE_TESTS:
-            misread = max(misread, _misread_gain(fold, held_out))
         peaks.append(_healthy_peaks(fold, held_out))
         if len(parts) > 1 and model.vehicle.other_laws:
             deviations.append(_squared_deviations(fold, held_out))
@@ -581,9 +571,7 @@ def add_ranges_and_threshold(parts: Sequence[FitPart], model: Model) -> Model:
         variance += np.nanmean([np.max(hidden, axis=0) ** 2, *deviations], axis=0)
     gain_sd = np.minimum(np.sqrt(variance), _GAIN_SD_CAP)
     tail = extremes.fit_peak_tail(peaks)
-    ranges = trust.compute_fitted_ranges(parts, model, gain_sd).model_copy(
-        update={"tail": tail, "misread": misread}
-    )
+    ranges = trust.compute_fitted_ranges(parts, model, gain_sd).model_copy(update={"tail": tail})
     rate, threshold = _alarm_rate_and_threshold(model, tail, peaks)
     alarm = {"false_alarms_per_hour": rate, "threshold": threshold}
     return model.model_copy(
@@ -634,13 +622,6 @@ def _choose_threshold(tail: extremes.PeakTail | None, target: float, model: Mode
     return max(extremes.threshold_for_rate(tail, target), least) if tail is not None else least
 
 
-def _misread_gain(model: Model, held_out: FitPart) -> float:
-    """How much likelier a sample of a part left out, in health, is with its columns read wrongly, at most."""
-    rates = np.where(held_out.is_usable[:, None], held_out.samples.rates, np.nan)
-    gains, _ = trust.mistake_gains(replace(held_out.samples, rates=rates), model)
-    return max(0.0, *gains.values()) if gains else 0.0
-
-
 def _cross_validate(
     flights: Sequence[extremes.PeaksAndHours], target: float | None, model: Model
 ) -> Document:
@@ -666,7 +647,7 @@ def _healthy_peaks(model: Model, held_out: FitPart) -> extremes.PeaksAndHours:
     z = fault_evidence(p, bank)
     answers = p[:, bank.no_response_hypothesis_index] < 0.5
     rows = np.flatnonzero(held_out.is_usable & ~(held_out.samples.labels < 1.0).any(axis=1) & answers)
-    runs = [page_cusum(z[rows[begin:end]], np.inf) for begin, end in _row_runs(rows)]
+    runs = [page_cusum(z[rows[begin:end]], np.inf) for begin, end in runs_between(np.diff(rows) > 1)]
     peaks = np.concatenate([extremes.peaks_between_zeros(cusum) for cusum in runs])
     return peaks, len(rows) * held_out.samples.dt_s / 3600.0
 
@@ -698,12 +679,16 @@ def group_gain_sd(fit: regression.Regression, model: Model) -> Floats:
     return np.minimum(gain_sd, _GAIN_SD_CAP)
 
 
+def refitted_folds(parts: Sequence[FitPart], model: Model) -> list[tuple[Model, FitPart, str]]:
+    """For each part that is left out, the model fitted to the others, this part and its name."""
+    folds = validation_folds(parts)
+    return [(refit(fitted, model), held_out, name) for fitted, held_out, name in folds]
+
+
 def fold_qualities(parts: Sequence[FitPart], model: Model) -> list[Document]:
     """Compute the explained variance of parts left out, one entry a fold."""
-    return [
-        {"left_out": name, **prediction_quality(refit(fitted, model), held_out)}
-        for fitted, held_out, name in validation_folds(parts)
-    ]
+    folds = refitted_folds(parts, model)
+    return [{"left_out": name, **prediction_quality(fold, held_out)} for fold, held_out, name in folds]
 
 
 def score_folds(parts: Sequence[FitPart], model: Model) -> tuple[list[Document], float]:
@@ -711,10 +696,10 @@ def score_folds(parts: Sequence[FitPart], model: Model) -> tuple[list[Document],
     entries = fold_qualities(parts, model)
     usual = model.settings.bounds
     coverage: list[list[float]] = []
-    for entry, (fitted, held_out, _) in zip(entries, validation_folds(parts), strict=True):
+    for entry, (fold, held_out, _) in zip(entries, refitted_folds(parts, model), strict=True):
         labels = np.where(held_out.is_usable[:, None], held_out.samples.labels, np.nan)
         if np.isfinite(labels).all(axis=1).any():
-            scores = _scores_by_mass(refit(fitted, model), held_out, labels)
+            scores = _scores_by_mass(fold, held_out, labels)
             entry["score"] = scores[usual]
             coverage.append([scores[mass]["held_by_bounds"] for mass in _CREDIBLE_MASSES])
     if not coverage:

@@ -466,16 +466,16 @@ def _cut_windows(
     windows = []
     for part in parts:
         samples = part.samples
-        effect = np.where(np.isfinite(samples.labels), samples.labels, 1.0)
-        u = np.column_stack([(samples.commands * effect)[:, group].sum(axis=1) for group in groups])
-        known = part.is_usable & np.isfinite(u).all(axis=1) & np.isfinite(samples.rates).all(axis=1)
-        for end in range(past + n, len(u), n):
-            rows = slice(end - past - n, end)
-            if known[rows].all() and np.ptp(samples.stretch_number[rows]) == 0:
-                windows.append((u[rows], samples.rates[end - n : end]))
-    chosen = windows[:: max(len(windows) // _MIN_FREE_RUNS, 1)]
-    commands, rates = ([window[i] for window in chosen] for i in (0, 1))
-    return np.reshape(commands, (-1, past + n, len(groups))), np.reshape(rates, (-1, n, 3))
+        v = regression.group_commands(samples, groups, labelled=True)
+        rows = np.column_stack([samples.rates, samples.stretch_number, v])[:-1]
+        rows[~part.is_usable[:-1]] = np.nan
+        if len(rows) >= past + n:
+            views = np.lib.stride_tricks.sliding_window_view(rows, past + n, axis=0)[::n].transpose(0, 2, 1)
+            is_whole = np.isfinite(views).all(axis=(1, 2)) & (np.ptp(views[:, :, 3], axis=1) == 0)
+            windows.append(views[is_whole])
+    chosen = np.concatenate(windows or [np.empty((0, past + n, 4 + len(groups)))])
+    chosen = chosen[:: max(len(chosen) // _MIN_FREE_RUNS, 1)]
+    return chosen[:, :, 4:], chosen[:, past:, :3]
 
 
 def _simulate(th: Floats, u: Floats, y: Floats, dt_s: float) -> Floats:

@@ -21,7 +21,7 @@ _MAX_COEF = 1e6  # of any coefficient: those of logs are below 100
 _MAX_SURFACE_GROUPS = 24  # the filter tries all pairs
 _MAX_CONDITION_NUMBER = 1e12  # of a covariance
 # keys of `fitted` in files of release 1.0.0
-_DEAD_KEYS = ("correlation", "scale", "minutes", "column_sd")
+_DEAD_KEYS = ("correlation", "scale", "minutes", "column_sd", "misread")
 
 Coefficient = Annotated[Number, Field(ge=-_MAX_COEF, le=_MAX_COEF)]
 CoefRow = list[Coefficient]
@@ -108,8 +108,6 @@ class FittedRanges(Section):
     tied: share of each group's effect that past, signals and other groups make up
     gain_sd: standard error of each group's gain
     still_s: longest time each column stood still, s
-    misread: how much likelier at most a sample of a part not fitted was with its columns read
-    wrongly, in natural logarithms
     energy_climb: rate of the energy height as without power, m/s
     tail: highest alarm statistic on parts not fitted
     """
@@ -121,7 +119,6 @@ class FittedRanges(Section):
     tied: CoefRow = Field([])
     gain_sd: CoefRow = Field([])
     still_s: dict[str, Number] = Field({})
-    misread: NonNegative = 0.0
     energy_climb: Number | None = None
     tail: PeakTail | None = None
 
@@ -213,10 +210,9 @@ class Model(Section):
                     reason = "is in two groups" if name in seen else "is no surface of the vehicle"
                     yield ("groups", i, k), f"{name!r:.60} {reason}, allowed: each surface once"
                 seen.add(name)
-        names = ["+".join(group) for group in self.groups]
         for name in self.settings.levels:
-            if name not in names:
-                reason = f"{name!r:.60} is no group, allowed: {', '.join(names)}"
+            if name not in self.group_names:
+                reason = f"{name!r:.60} is no group, allowed: {', '.join(self.group_names)}"
                 yield ("settings", "levels", name), reason
         for k, delay_s in enumerate(self.settings.delays_s):
             if abs(delay_s) * self.rate_hz > 1.0 + 1e-9:
@@ -270,6 +266,11 @@ class Model(Section):
         ranges = self.fitted
         if ranges is not None and min((*ranges.gain_sd, *ranges.spread), default=0.0) < 0.0:
             yield ("fitted",), "gain_sd or spread has a negative number, allowed: at least 0"
+
+    @property
+    def group_names(self) -> list[str]:
+        """The surfaces of each group, joined by +."""
+        return ["+".join(group) for group in self.groups]
 
     def noise_of(self, average: Sequence[float]) -> NoiseModel:
         """The noise fitted for flights of this moving average; that of all flights where none was fitted.

@@ -9,6 +9,7 @@ from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass, field
 from difflib import SequenceMatcher
 from io import StringIO
+from itertools import pairwise
 from math import isnan
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,27 @@ _S_PER_US = 1e-6
 _N_LISTED_NEAREST_NAMES = 10
 MIN_DIVISOR = float(np.sqrt(np.finfo(float).tiny))
 """Least value of a divisor that may be zero."""
+
+
+def last_true_row(mask: Mask) -> Ints:
+    """The last row up to each at which a mask (n,) is true, (n,); -1 before the first."""
+    return np.asarray(np.maximum.accumulate(np.where(mask, np.arange(len(mask)), -1)))
+
+
+def last_row_at(stamps: Floats, t_s: Floats) -> Ints:
+    """The row of the last stamp up to each time; the first before it."""
+    return np.asarray(np.maximum(np.searchsorted(stamps, t_s, side="right") - 1, 0))
+
+
+def runs_between(is_edge: Mask) -> list[tuple[int, int]]:
+    """Begin and end of each run of n rows; is_edge (n - 1,): whether one ends behind the row."""
+    return list(pairwise([0, *(np.flatnonzero(is_edge) + 1).tolist(), len(is_edge) + 1]))
+
+
+def true_runs(mask: Mask) -> list[tuple[int, int]]:
+    """Begin and end of each run of rows at which a mask (n,) is true."""
+    edges = np.flatnonzero(np.diff(mask.astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
+    return [(begin, end) for begin, end in edges.tolist()]
 
 
 @dataclass(frozen=True)
@@ -63,9 +85,13 @@ class RecordedFlight:
     parameters: Parameters = field(default_factory=dict)
     unread_column_names: tuple[str, ...] = ()
 
-    def nearest_columns_text(self, wanted_name: str) -> str:
-        """The names of the log's columns that are nearest to one that it has not, read or not."""
-        return nearest_names_text(wanted_name, {*self.columns, *self.unread_column_names})
+    def check_has(self, names: Iterable[str]) -> None:
+        """Raise BadInput, with the names nearest to it, where the log lacks a column."""
+        for name in names:
+            if name not in self.columns:
+                nearest = nearest_names_text(name, {*self.columns, *self.unread_column_names})
+                allowed = f"allowed: a log that has it; it has {nearest}"
+                raise BadInput(f"{self.name}: no column {name}, {allowed}")
 
 
 def add_parameter(values_by_name: dict[str, tuple[float, ...]], name: str, value: float) -> None:

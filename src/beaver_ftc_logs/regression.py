@@ -20,14 +20,13 @@ coefficients b (m,) or (m, 3); P is the inverse of Z' Z once each column is divi
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from beaver_ftc_logs.model import Model, NoiseModel
-from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
+from beaver_ftc_logs.recording import MIN_DIVISOR, Floats, runs_between
 from beaver_ftc_logs.samples import Samples, mixer_matrix, whiten_samples
 from beaver_ftc_logs.vehicle import Vehicle
 
@@ -88,12 +87,9 @@ def build_regressors(
     """The regressors of each sample: the past x (n, 3 h + X f), the commands U (n, G, L) of the groups, and
     whether all of it is known and no gap lies within, (n,).
 
-    labelled: multiply each surface's command by its labelled effectiveness (1 where there is no label).
+    labelled: as of `group_commands`.
     """
-    u = samples.commands
-    if labelled:
-        u = u * np.where(np.isfinite(samples.labels), samples.labels, 1.0)
-    v = np.column_stack([u[:, group].sum(axis=1) for group in groups])
+    v = group_commands(samples, groups, labelled)
     rates = [_delay_rows(samples.rates, k, np.nan) for k in range(1, h + 1)]
     X = np.column_stack([*rates, *(_delay_rows(samples.signals, k, np.nan) for k in range(1, f + 1))])
     U = np.stack([_delay_rows(v, k, np.nan) for k in range(1, L + 1)], axis=1)
@@ -101,6 +97,15 @@ def build_regressors(
     ok &= np.isfinite(samples.rates).all(axis=1)
     ok &= samples.stretch_number == _delay_rows(samples.stretch_number, max(h, L), -1)
     return X, U.transpose(0, 2, 1), ok
+
+
+def group_commands(samples: Samples, groups: list[list[int]], labelled: bool) -> Floats:
+    """The command of each group, (n, G); labelled: each surface's times its labelled effectiveness, 1 where
+    there is no label."""
+    u = samples.commands
+    if labelled:
+        u = u * np.where(np.isfinite(samples.labels), samples.labels, 1.0)
+    return np.column_stack([u[:, group].sum(axis=1) for group in groups])
 
 
 def _delay_rows(values: np.ndarray, lag: int, fill: float) -> np.ndarray:
@@ -296,9 +301,10 @@ def _newey_west(X: Floats, e: Floats, P: Floats, stretch: NDArray[np.int64], lag
     """Standard errors (m,) that hold for autocorrelated residuals e (n,), the root of diag(P S P): S sums the
     products of the scores X e with Bartlett's weights over `lag` lags."""
     scores, w = X * e[:, None], lag + 1
-    edges = [0, *(np.flatnonzero(np.diff(stretch)) + 1).tolist(), len(stretch)]
     S = np.zeros((X.shape[1], X.shape[1]))
-    for begin, end in pairwise(edges):  # Bartlett's weights are those of products of running sums
+    for begin, end in runs_between(
+        np.diff(stretch) != 0
+    ):  # Bartlett's weights are those of products of running sums
         sums = np.cumsum(np.pad(scores[begin:end], ((w, w - 1), (0, 0))), axis=0)
         windows = sums[w:] - sums[:-w]
         S += windows.T @ windows / w
@@ -332,13 +338,11 @@ def variance_inflation(Z: Floats) -> Floats:
     norms = np.sqrt((X**2).sum(axis=0))
     factors = np.full(Z.shape[1], np.inf)
     varying = norms > 1e-12
-    C = (X[:, varying] / norms[varying]).T @ (X[:, varying] / norms[varying])
-    lam, V = np.linalg.eigh(C)
-    nonzero = lam > _RANK_TOLERANCE * lam.max(initial=0.0)
-    V2 = V**2
-    finite = (V2[:, nonzero] / lam[nonzero]).sum(axis=1)
-    factors[varying] = np.where(V2[:, ~nonzero].sum(axis=1) > _RANK_TOLERANCE, np.inf, finite)
-    return factors
+    X = X[:, varying] / norms[varying]
+    lam, V = np.linalg.eigh(X.T @ X)
+    lam = np.where(lam > _RANK_TOLERANCE * lam.max(initial=0.0), lam, _RANK_TOLERANCE**2)
+    factors[varying] = (V**2 / lam).sum(axis=1)
+    return np.where(factors < 1.0 / _RANK_TOLERANCE, factors, np.inf)
 
 
 def spectral_density(e: Floats, dt_s: float, longest: int = 256) -> tuple[Floats, Floats]:

@@ -6,7 +6,7 @@ fitted to show for how long.
 
 import numpy as np
 
-from beaver_ftc_logs.recording import Column, Floats, Ints, Mask
+from beaver_ftc_logs.recording import Column, Floats, Ints, Mask, last_true_row
 
 MIN_STILL_S, MIN_STILL_ROWS = 1.5, 12
 """A measured rate that repeats for longer than both is frozen."""
@@ -16,9 +16,8 @@ _SPIKE_RATIO, _MAX_SPIKE_SHARE = 40.0, 0.01
 
 def time_since_change_s(column: Column) -> Floats:
     """How long a column's value has been the same at each row, (n,) s; 0 for fewer than MIN_STILL_ROWS."""
-    row = np.arange(len(column.values))
-    since = np.maximum.accumulate(np.where(_changed_rows(column.values), row, 0))
-    return np.where(row - since >= MIN_STILL_ROWS, column.t_s - column.t_s[since], 0.0)
+    since = last_true_row(_changed_rows(column.values))
+    return np.where(np.arange(len(since)) - since >= MIN_STILL_ROWS, column.t_s - column.t_s[since], 0.0)
 
 
 def _changed_rows(values: Floats) -> Mask:
@@ -37,12 +36,11 @@ def find_clipped_rows(values: Floats) -> Mask:
     for v in (values, -values):
         known = np.where(np.isfinite(v), v, -np.inf)
         at_top = (v == np.maximum.accumulate(known)) & (v > 0.0)
-        row = np.arange(len(v))
-        since = np.maximum.accumulate(np.where(_changed_rows(v) | ~at_top, row, 0))
+        since = last_true_row(_changed_rows(v) | ~at_top)
         # a larger value begins the count again
         ordinal = np.cumsum(_changed_rows(np.maximum.accumulate(known)).astype(np.int64))
         count = np.cumsum(at_top) - _count_at_previous(at_top, ordinal)
-        clipped |= at_top & (row - since >= _CLIPPED_IN_TURN - 1) & (count >= _CLIPPED_IN_ALL)
+        clipped |= at_top & (np.arange(len(v)) - since >= _CLIPPED_IN_TURN - 1) & (count >= _CLIPPED_IN_ALL)
     return clipped
 
 

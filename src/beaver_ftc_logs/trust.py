@@ -145,10 +145,10 @@ def unknown_sentences(model: Model) -> list[str]:
     if model.fitted is None:
         return []
     start = "of what {} does, {:.1%} follows from the rates, signals and other surfaces of the flights fitted"
-    rows = zip(model.groups, model.fitted.tied, known_effects(model), strict=False)
+    rows = zip(model.group_names, model.fitted.tied, known_effects(model), strict=False)
     return [
-        f"{start.format('+'.join(group), share)}: its effect cannot be told, nothing is said of it"
-        for group, share, known in rows
+        f"{start.format(name, share)}: its effect cannot be told, nothing is said of it"
+        for name, share, known in rows
         if not known
     ]
 
@@ -298,15 +298,13 @@ def _likelier_mistake(samples: Samples, model: Model) -> str | None:
 
     By chance a wrong reading is K times as likely as the true one in at most one part of K (Markov's
     inequality for a likelihood ratio); all readings together have the chance `_FALSE_MISTAKE_CHANCE`. That
-    holds for a correct model. The flight must be likelier by as much more as flights were that the model was
-    not fitted on, whose columns are right, and by as much again for another law (`misread_gain`).
+    holds for a correct model.
     """
     gains, n = mistake_gains(samples, model)
     if not gains:
         return None
     text, gain = max(gains.items(), key=lambda one: one[1])
-    allowed = 2.0 * model.fitted.misread if model.fitted is not None else 0.0
-    if gain * n <= np.log(len(gains) / _FALSE_MISTAKE_CHANCE) + allowed * n:
+    if gain * n <= np.log(len(gains) / _FALSE_MISTAKE_CHANCE):
         return None
     log10 = gain * n / np.log(10.0)
     return f"each part of the flight is at least 10^{log10:.0f} times as likely with {text}"

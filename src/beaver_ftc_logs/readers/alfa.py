@@ -24,6 +24,7 @@ from beaver_ftc_logs.recording import (
     Ints,
     LoggedFailure,
     RecordedFlight,
+    last_row_at,
     rows_with_increasing_time,
 )
 
@@ -108,7 +109,7 @@ def _add_airspeed_from_wind(columns: dict[str, Column]) -> None:
 
     def held_values(name: str) -> Floats:
         column = columns[name]
-        return column.values[np.maximum(np.searchsorted(column.t_s, stamps, side="right") - 1, 0)]
+        return column.values[last_row_at(column.t_s, stamps)]
 
     north, east = (held_values(names[i]) - held_values(names[i + 1]) for i in (0, 2))
     columns["airspeed_by_wind_m_s"] = Column(stamps, np.hypot(north, east))

@@ -55,7 +55,9 @@ def test_a_shift_of_a_command_is_within_the_spread_of_the_trim(wing_model):
     free = settings.trim_sd * np.sqrt(np.diag(noise)) * rng.standard_normal((200_000, 3))
     drawn = np.cov((shifts @ response.sum(axis=1) + free).T)
     np.testing.assert_allclose(
-        build_states(wing_model, wing_model.noise_of(())).initial_covariance[:3, :3], drawn, atol=2e-2 * drawn.max()
+        build_states(wing_model, wing_model.noise_of(())).initial_covariance[:3, :3],
+        drawn,
+        atol=2e-2 * drawn.max(),
     )
 
 

@@ -23,7 +23,7 @@ from beaver_ftc_logs.bank import GROUP_LOSS, UNKNOWN_OFFSET, HypothesisBank, bui
 from beaver_ftc_logs.filtering import bank_posterior, fault_evidence, page_cusum
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats, Ints, Mask, last_row_at, last_true_row
-from beaver_ftc_logs.regression import expand_groups, innovations
+from beaver_ftc_logs.regression import expand_groups, innovations, trailing_sums
 from beaver_ftc_logs.samples import Samples
 
 _LOG_RATE_TOLERANCE = 0.25
@@ -211,9 +211,7 @@ def _withdraw_contradicted(samples: Samples, model: Model, rows: LogRows, least:
     m = (np.array(model.response).sum(axis=1) @ flight.W).T
     norms = np.linalg.norm(m, axis=0)
     p = (r @ (m / np.maximum(norms, MIN_DIVISOR))) ** 2
-    total = np.cumsum(p, axis=0)
-    begin = np.maximum(np.arange(len(total)) - round(_DIRECTION_WINDOW_S * model.rate_hz), 0)
-    gain = 0.5 * model.settings.power * (total - total[begin])
+    gain = 0.5 * model.settings.power * trailing_sums(p, _DIRECTION_WINDOW_S * model.rate_hz)[0]
     best = gain.max(axis=1)
     wrong = np.zeros(len(r), dtype=bool)
     for g, group in enumerate(model.groups):

@@ -34,22 +34,14 @@ def find_clipped_rows(values: Floats) -> Mask:
     """
     clipped = np.zeros(len(values), dtype=bool)
     for v in (values, -values):
-        known = np.where(np.isfinite(v), v, -np.inf)
-        at_top = (v == np.maximum.accumulate(known)) & (v > 0.0)
+        top = np.maximum.accumulate(np.where(np.isfinite(v), v, -np.inf))
+        at_top = (v == top) & (v > 0.0)
         since = last_true_row(_changed_rows(v) | ~at_top)
-        # a larger value begins the count again
-        ordinal = np.cumsum(_changed_rows(np.maximum.accumulate(known)).astype(np.int64))
-        count = np.cumsum(at_top) - _count_at_previous(at_top, ordinal)
-        clipped |= at_top & (np.arange(len(v)) - since >= _CLIPPED_IN_TURN - 1) & (count >= _CLIPPED_IN_ALL)
+        total = np.cumsum(at_top)
+        before = (total - at_top)[last_true_row(_changed_rows(top))]  # a larger value begins the count again
+        lasts = np.arange(len(v)) - since >= _CLIPPED_IN_TURN - 1
+        clipped |= at_top & lasts & (total - before >= _CLIPPED_IN_ALL)
     return clipped
-
-
-def _count_at_previous(at_top: Mask, ordinal: Ints) -> Ints:
-    """Count, for each row, the rows at smaller largest values: those before the present largest value was
-    reached. ordinal (n,): number of the present largest value, counted from 1."""
-    total = np.cumsum(at_top)
-    firsts = np.flatnonzero(np.diff(ordinal, prepend=0))
-    return (total - at_top)[firsts][ordinal - 1] if len(firsts) else np.zeros(len(ordinal), dtype=np.int64)
 
 
 def find_spike_rows(values: Floats) -> Ints:

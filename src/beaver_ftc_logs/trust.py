@@ -33,6 +33,7 @@ from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
 from beaver_ftc_logs.regression import FitPart
 from beaver_ftc_logs.samples import NOISE_MA_CANDIDATES, Samples, whiten_samples
 from beaver_ftc_logs.signals import MIN_STILL_S
+from beaver_ftc_logs.units import RATE, SI_UNITS, nearest_unit
 
 Mask = NDArray[np.bool_]
 
@@ -164,16 +165,16 @@ def refuse_rate_unit(samples: Samples, ranges: FittedRanges | None) -> None:
     ratio = float(np.exp(np.mean(np.log(np.maximum(ratios, MIN_DIVISOR)))))
     if not ratios.max() < _MAX_AXIS_RATIO * ratios.min():
         return
-    most = _UNIT_FACTOR_ROOT**2
-    for unit, per_rad in (("deg/s", 180.0 / np.pi), ("cdeg/s", 18000.0 / np.pi), ("mrad/s", 1000.0)):
-        hints = (
-            (ratio / per_rad, f"{1.0 / per_rad:.4g} (`unit: {unit}`) fits"),
-            (ratio * per_rad, f"{per_rad:.4g} fits: the model's own were in {unit}?"),
-        )
-        for factor, hint in hints:
-            if 1.0 / most < factor < most:
-                spread = f"rates spread {ratio:.3g} times as widely as in the flights of the model"
-                raise BadInput(f"{samples.name}: {spread}, allowed: rates in rad/s; a factor of {hint}")
+    hints = (
+        (1.0 / ratio, "a factor of {0:.4g} (`unit: {2}`) fits"),
+        (ratio, "a factor of {1:.4g} fits: the model's own were in {2}?"),
+    )
+    for size, hint in hints:
+        unit = nearest_unit(RATE, size, _UNIT_FACTOR_ROOT**2)
+        if unit not in (None, "rad/s"):
+            text = hint.format(SI_UNITS[unit][1], 1.0 / SI_UNITS[unit][1], unit)
+            spread = f"rates spread {ratio:.3g} times as widely as in the flights of the model"
+            raise BadInput(f"{samples.name}: {spread}, allowed: rates in rad/s; {text}")
 
 
 def refuse_command_unit(

@@ -39,6 +39,9 @@ _NO_RESPONSE_LIMIT = 0.5
 """Probability that nothing answers the commands above which nothing is said of any surface."""
 
 
+Names = NDArray[np.object_]
+
+
 @dataclass(frozen=True)
 class LogRows:
     """The diagnosis of a flight, one row for each sample.
@@ -52,7 +55,7 @@ class LogRows:
 
     t_s: Floats
     faulty: Ints
-    isolated_surfaces: NDArray[np.object_]
+    isolated_surfaces: Names
     effectiveness: Floats
     effectiveness_low: Floats
     effectiveness_high: Floats
@@ -316,9 +319,7 @@ def _credible_bounds(levels: Floats, p: Floats, mass: float) -> tuple[Floats, Fl
     return edges[np.searchsorted(levels, low)], edges[np.searchsorted(levels, high) + 1]
 
 
-def _surfaces_at_fault(
-    model: Model, bank: HypothesisBank, P: Floats, faulty: Ints, nameable: Mask
-) -> NDArray[np.object_]:
+def _surfaces_at_fault(model: Model, bank: HypothesisBank, P: Floats, faulty: Ints, nameable: Mask) -> Names:
     """The surfaces of the groups that most of the fault's probability is on; `unknown` where it is split.
 
     Where one group is at fault (`one_group`), each that may be instead is named with it; `unknown` where none
@@ -351,7 +352,7 @@ def _surfaces_at_fault(
     return named
 
 
-def join_names(flags: Mask, names: Sequence[str]) -> NDArray[np.object_]:
+def join_names(flags: Mask, names: Sequence[str]) -> Names:
     """The names that are flagged in flags (n, K), joined by +, (n,) text."""
     return np.array(["+".join(compress(names, row)) for row in flags], dtype=object)
 

@@ -23,7 +23,6 @@ from itertools import groupby, product
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
@@ -37,8 +36,8 @@ from beaver_ftc_logs.filtering import (
     recent_scale,
 )
 from beaver_ftc_logs.model import FilterSettings, FittedRanges, Model, NoiseModel
-from beaver_ftc_logs.recording import MIN_DIVISOR, Floats, runs_between
-from beaver_ftc_logs.regression import FitPart
+from beaver_ftc_logs.recording import MIN_DIVISOR, Floats, Ints, Mask, runs_between
+from beaver_ftc_logs.regression import FitPart, Parts
 from beaver_ftc_logs.samples import Samples, constant_stretches
 from beaver_ftc_logs.scoring import score_against_labels
 from beaver_ftc_logs.vehicle import Vehicle
@@ -107,6 +106,8 @@ _USUAL_SHARE = 0.9
 _MIN_QUICK_SAMPLES = 10
 """Samples with quick responses that a flight must have, for the mean of their errors."""
 _RANK_TOLERANCE = 1e-9
+_MIN_EFFECT_POWER, _EFFECT_POWER_CAP = 1e-6, 12.5
+"""Of an effect of so many variances of the noise a sample, a fiftieth is half a standard deviation."""
 _MAX_SPLITS, _GAIN_SD_CAP = 12, 0.33
 """A gain that is known no better than to a third is not known to be there."""
 _N_PRIOR_CHANGES = 20
@@ -118,14 +119,14 @@ _COVERAGE_GOAL = 0.93
 
 Args = ParamSpec("Args")
 Result = TypeVar("Result")
-OfParts = Callable[Concatenate[Sequence[FitPart], Args], Result]
+OfParts = Callable[Concatenate[Parts, Args], Result]
 
 
 def _once(compute: OfParts[Args, Result]) -> OfParts[Args, Result]:
     """Compute a result for these flights once: every test of a model needs the same fits to parts of them."""
 
     @wraps(compute)
-    def cached(parts: Sequence[FitPart], *args: Args.args, **kwargs: Args.kwargs) -> Result:
+    def cached(parts: Parts, *args: Args.args, **kwargs: Args.kwargs) -> Result:
         cache = parts[0].result_cache
         values = (arg.model_dump_json() if isinstance(arg, Vehicle) else arg for arg in args)
         key = (compute.__name__, *values, *map(id, parts))
@@ -141,7 +142,7 @@ def fit_parts(flights: Sequence[Samples]) -> list[FitPart]:
     return [FitPart(samples, usable_mask(samples)) for samples in flights]
 
 
-def usable_mask(samples: Samples) -> NDArray[np.bool_]:
+def usable_mask(samples: Samples) -> Mask:
     """Which samples are known to be healthy, or faulty by a known amount, (n,)."""
     usable = np.ones(len(samples.t_s), dtype=bool)
     if samples.logged_failures:
@@ -159,7 +160,7 @@ def usable_mask(samples: Samples) -> NDArray[np.bool_]:
     return usable
 
 
-def fit_model(parts: Sequence[FitPart], vehicle: Vehicle, settings: FilterSettings | None = None) -> Model:
+def fit_model(parts: Parts, vehicle: Vehicle, settings: FilterSettings | None = None) -> Model:
     """The model that fits these flights. Raises BadInput where there is too little to fit."""
     bic = bic_by_order(parts, vehicle)
     model = _model_of_order(parts, vehicle, *min(bic, key=lambda order: bic[order]))
@@ -167,7 +168,7 @@ def fit_model(parts: Sequence[FitPart], vehicle: Vehicle, settings: FilterSettin
     return _with_inflated_noise(parts, model) if model.colours else model
 
 
-def refit(parts: Sequence[FitPart], model: Model) -> Model:
+def refit(parts: Parts, model: Model) -> Model:
     """A model of the same order and settings, fitted to other flights."""
     refitted = _model_of_order(parts, model.vehicle, model.history, model.lags)
     colours = [
@@ -176,17 +177,17 @@ def refit(parts: Sequence[FitPart], model: Model) -> Model:
     return refitted.model_copy(update={"settings": model.settings, "colours": colours})
 
 
-def held_out_folds(parts: Sequence[FitPart], model: Model) -> Iterator[tuple[Model, FitPart]]:
+def held_out_folds(parts: Parts, model: Model) -> Iterator[tuple[Model, FitPart]]:
     """For each part that is left out, a model fitted to others, with the standard errors of its gains, and
     this part."""
-    tied = trust.tied_shares(parts, model).tolist()
+    tied = tied_shares(parts, model).tolist()
     for fitted, held_out, _ in validation_folds(parts, _MAX_SPLITS):
         gain_sd = group_gain_sd(fit_of(fitted, model), model).tolist()
         ranges = FittedRanges(commands=[], rates=[], gain_sd=gain_sd, tied=tied)
         yield refit(fitted, model).model_copy(update={"fitted": ranges}), held_out
 
 
-def bic_by_order(parts: Sequence[FitPart], vehicle: Vehicle) -> dict[tuple[int, int], float]:
+def bic_by_order(parts: Parts, vehicle: Vehicle) -> dict[tuple[int, int], float]:
     """The Bayesian information criterion of each number of past samples of rates and commands.
 
     Every order's regressors are among those of the largest: one matrix of products serves all. With the
@@ -206,7 +207,7 @@ def bic_by_order(parts: Sequence[FitPart], vehicle: Vehicle) -> dict[tuple[int, 
     return bic
 
 
-def _order_columns(vehicle: Vehicle, h: int, L: int) -> NDArray[np.int64]:
+def _order_columns(vehicle: Vehicle, h: int, L: int) -> Ints:
     """Columns of the largest design that an order has."""
     n, most = len(vehicle.regressor_columns), max(RATE_LAGS)
     rates = np.arange(1 + 3 * most) < 1 + 3 * h
@@ -215,13 +216,13 @@ def _order_columns(vehicle: Vehicle, h: int, L: int) -> NDArray[np.int64]:
     return np.flatnonzero(np.concatenate([rates, signals, commands]))
 
 
-def fit_of(parts: Sequence[FitPart], model: Model) -> regression.Regression:
+def fit_of(parts: Parts, model: Model) -> regression.Regression:
     """Least squares of a model's order over all flights."""
     return fit_order(parts, model.vehicle, model.history, model.lags)
 
 
 @_once
-def fit_order(parts: Sequence[FitPart], vehicle: Vehicle, h: int, L: int) -> regression.Regression:
+def fit_order(parts: Parts, vehicle: Vehicle, h: int, L: int) -> regression.Regression:
     """Least squares of given order over all flights."""
     Z, y, stretch = stack_data(parts, vehicle, h, L)
     if len(y) < 10 * Z.shape[1]:
@@ -234,9 +235,7 @@ def fit_order(parts: Sequence[FitPart], vehicle: Vehicle, h: int, L: int) -> reg
     return regression.fit_ols(Z, y, stretch, round(_NEWEY_WEST_S / dt_s))
 
 
-def stack_data(
-    parts: Sequence[FitPart], vehicle: Vehicle, h: int, L: int
-) -> tuple[Floats, Floats, NDArray[np.int64]]:
+def stack_data(parts: Parts, vehicle: Vehicle, h: int, L: int) -> tuple[Floats, Floats, Ints]:
     """Regressors, rates and run number over all flights: the same samples for any order.
 
     Columns of the regressors: one, the past, the commands of each group by lag.
@@ -245,7 +244,8 @@ def stack_data(
     most = max(RATE_LAGS + COMMAND_LAGS)
     Z, y, stretches = [], [], []
     for i, part in enumerate(parts):
-        X, U, used = part.regressors(groups, h, L, vehicle.n_signal_lags(h))
+        X, U, known = regression.build_regressors(part.samples, groups, h, L, True, vehicle.n_signal_lags(h))
+        used = part.is_usable & known
         used[:most] = False
         n, weight = len(X), part.samples.fit_weight
         Z.append(weight * np.column_stack([np.ones(n), X, U.reshape(n, -1)])[used])
@@ -255,7 +255,7 @@ def stack_data(
 
 
 @_once
-def _model_of_order(parts: Sequence[FitPart], vehicle: Vehicle, h: int, L: int) -> Model:
+def _model_of_order(parts: Parts, vehicle: Vehicle, h: int, L: int) -> Model:
     fit = fit_order(parts, vehicle, h, L)
     names = list(vehicle.surfaces)
     groups = regression.group_surfaces(vehicle)
@@ -281,7 +281,7 @@ def _model_of_order(parts: Sequence[FitPart], vehicle: Vehicle, h: int, L: int) 
     return model.model_copy(update={"colours": noises})
 
 
-def _with_errors(own: Sequence[FitPart], model: Model, noise: NoiseModel) -> NoiseModel:
+def _with_errors(own: Parts, model: Model, noise: NoiseModel) -> NoiseModel:
     """The noise of some flights with how far a model may misread the groups' effects in it, and with their
     usual quickness: the power of the quick part of the responses that the flights exceed in a tenth of their
     samples, in variances of this noise."""
@@ -294,12 +294,12 @@ def _with_errors(own: Sequence[FitPart], model: Model, noise: NoiseModel) -> Noi
     )
 
 
-def _parts_in(parts: Sequence[FitPart], ma: Sequence[float]) -> list[FitPart]:
+def _parts_in(parts: Parts, ma: Sequence[float]) -> list[FitPart]:
     """The parts that are whitened by this moving average."""
     return [part for part in parts if part.samples.noise_ma_coefficients == tuple(ma)]
 
 
-def quick_error_share(parts: Sequence[FitPart], model: Model) -> float:
+def quick_error_share(parts: Parts, model: Model) -> float:
     """Estimate the error of unusually quick responses, as a share of them, at most 1: the largest of the
     flights left out; 1 if none of them has such responses."""
     squares = [_squared_quick_error(fold, held_out) for fold, held_out in held_out_folds(parts, model)]
@@ -325,7 +325,7 @@ def _squared_quick_error(fold: Model, held_out: FitPart) -> float | None:
     return float(((ratio - 1.0) / power[unusual]).mean())
 
 
-def hidden_errors(own: Sequence[FitPart], model: Model, noise: NoiseModel) -> list[float]:
+def hidden_errors(own: Parts, model: Model, noise: NoiseModel) -> list[float]:
     """How far a fit may misread the effect of each group in the flights of one noise, as a share, (G,): the
     standard deviation of an error that is anywhere below the largest.
 
@@ -343,7 +343,7 @@ def hidden_errors(own: Sequence[FitPart], model: Model, noise: NoiseModel) -> li
     return (most / np.sqrt(3.0)).tolist()
 
 
-def _fit_noise_model(own: Sequence[FitPart], model: Model, ma: list[float]) -> NoiseModel:
+def _fit_noise_model(own: Parts, model: Model, ma: list[float]) -> NoiseModel:
     """The noise of flights of one moving average, with an AR predictor of the residual, by least squares
     where samples follow one another; without a predictor where too few do."""
     flights = [part.innovations(model) for part in own]
@@ -361,7 +361,7 @@ def _fit_noise_model(own: Sequence[FitPart], model: Model, ma: list[float]) -> N
     return NoiseModel(average=ma, before=ar.tolist(), noise=np.cov((y - Z @ ar).T).tolist())
 
 
-def estimate_filter_settings(parts: Sequence[FitPart], model: Model) -> FilterSettings:
+def estimate_filter_settings(parts: Parts, model: Model) -> FilterSettings:
     """Estimate the settings of later faults from the flights: levels seen, and how often they changed."""
     moving, other_laws = model.vehicle.moving_air, model.vehicle.other_laws
     extra: dict[str, Any] = _OTHER_LAWS | (_MOVING_AIR if moving else {}) if other_laws else {}
@@ -386,13 +386,13 @@ def estimate_filter_settings(parts: Sequence[FitPart], model: Model) -> FilterSe
     return FilterSettings(**extra, power=min(most, 1.0 / gain_overdispersion(parts, drifting)))
 
 
-def _label_levels(parts: Sequence[FitPart], i: int) -> list[list[float]]:
+def _label_levels(parts: Parts, i: int) -> list[list[float]]:
     """The levels of one surface's label in their order, edges left out, of each flight."""
     labels = [part.samples.labels[:, i][part.is_usable] for part in parts]
     return [[round(level, 6) for level, _ in groupby(one[np.isfinite(one)].tolist())] for one in labels]
 
 
-def gain_overdispersion(parts: Sequence[FitPart], model: Model) -> float:
+def gain_overdispersion(parts: Parts, model: Model) -> float:
     """Estimate how many times as far, in squares, the gains of parts left out are from 1 as the filter
     believes.
 
@@ -413,7 +413,7 @@ def _gains(F: Floats, e: Floats) -> tuple[Floats, Floats, Floats]:
     e (n, 3) = F g + noise, F (n, 3, m)."""
     X = F.reshape(e.size, F.shape[2])
     FF, Fe = X.T @ X, X.T @ e.ravel()
-    return FF, Fe, np.linalg.lstsq(FF, Fe, rcond=_RANK_TOLERANCE)[0]
+    return FF, Fe, np.asarray(np.linalg.lstsq(FF, Fe, rcond=_RANK_TOLERANCE)[0])
 
 
 def _gain_errors(
@@ -446,7 +446,7 @@ def _gain_errors(
     return errors
 
 
-def _with_inflated_noise(parts: Sequence[FitPart], model: Model) -> Model:
+def _with_inflated_noise(parts: Parts, model: Model) -> Model:
     """The model with the noise of each colour so many times wider as the gains of ten seconds left out, each
     axis of an answer with its own, are farther from 1, in squares, than it and the filter let them be: quiet
     gyros show what the model itself lacks."""
@@ -466,7 +466,7 @@ def _with_inflated_noise(parts: Sequence[FitPart], model: Model) -> Model:
     return model.model_copy(update={"colours": colours})
 
 
-def _window_inflations(fold: Model, held_out: FitPart, others: Sequence[FitPart]) -> list[float]:
+def _window_inflations(fold: Model, held_out: FitPart, others: Parts) -> list[float]:
     """How many times as far, in squares, the gains of each ten seconds of a part left out are from 1 as the
     filter lets them be. Under other laws the filter widens the noise of a flight that is louder than the
     others (`recent_scale`): what it widens by itself is not counted again."""
@@ -474,7 +474,7 @@ def _window_inflations(fold: Model, held_out: FitPart, others: Sequence[FitPart]
     return [min(error / max(n, 1), _MAX_INFLATION) for error, n in errors]
 
 
-def _loudness(fold: Model, held_out: FitPart, others: Sequence[FitPart]) -> float:
+def _loudness(fold: Model, held_out: FitPart, others: Parts) -> float:
     """How many times as wide the filter finds the noise of a flight left out as that of the loudest other
     flight of the same noise; 1 if it is within the range of these, or under the same law."""
     if not fold.vehicle.other_laws:
@@ -503,7 +503,7 @@ def _centred(values: Floats) -> Floats:
     return values - values.mean(axis=0) if len(values) else values
 
 
-def _estimate_trim_walk(parts: Sequence[FitPart], model: Model) -> list[float]:
+def _estimate_trim_walk(parts: Parts, model: Model) -> list[float]:
     """Drift of the trim a sample, in residual sd, that parts left out show; the usual at least.
 
     Means of n samples of a random walk, with steps of variance w, and of noise whose mean has the variance
@@ -529,9 +529,7 @@ def _estimate_trim_walk(parts: Sequence[FitPart], model: Model) -> list[float]:
     return np.maximum(np.sqrt(np.maximum(w, 0.0)), usual).tolist()
 
 
-def validation_folds(
-    parts: Sequence[FitPart], most: int | None = None
-) -> list[tuple[list[FitPart], FitPart, str]]:
+def validation_folds(parts: Parts, most: int | None = None) -> list[tuple[list[FitPart], FitPart, str]]:
     """Return the fitted flights, the held-out one and its name: halves of one flight; each flight in turn, of
     more than `most` every so many at once."""
     if len(parts) == 1:
@@ -546,7 +544,7 @@ def validation_folds(
 
 
 @_once
-def _halves(parts: Sequence[FitPart]) -> tuple[FitPart, FitPart]:
+def _halves(parts: Parts) -> tuple[FitPart, FitPart]:
     """The usable samples of one flight in two halves."""
     (part,) = parts
     rows = np.flatnonzero(part.is_usable)
@@ -555,7 +553,7 @@ def _halves(parts: Sequence[FitPart]) -> tuple[FitPart, FitPart]:
     return FitPart(part.samples, part.is_usable & first), FitPart(part.samples, part.is_usable & ~first)
 
 
-def add_ranges_and_threshold(parts: Sequence[FitPart], model: Model) -> Model:
+def add_ranges_and_threshold(parts: Parts, model: Model) -> Model:
     """The model with what it was fitted on, and how it did on parts that were left out in turn: at which
     evidence of a fault they would alarm as often as declared."""
     peaks = list[extremes.PeaksAndHours]()
@@ -571,7 +569,9 @@ def add_ranges_and_threshold(parts: Sequence[FitPart], model: Model) -> Model:
         variance += np.nanmean([np.max(hidden, axis=0) ** 2, *deviations], axis=0)
     gain_sd = np.minimum(np.sqrt(variance), _GAIN_SD_CAP)
     tail = extremes.fit_peak_tail(peaks)
-    ranges = trust.compute_fitted_ranges(parts, model, gain_sd).model_copy(update={"tail": tail})
+    ranges = trust.compute_fitted_ranges(parts, tied_shares(parts, model), gain_sd).model_copy(
+        update={"tail": tail}
+    )
     rate, threshold = _alarm_rate_and_threshold(model, tail, peaks)
     alarm = {"false_alarms_per_hour": rate, "threshold": threshold}
     return model.model_copy(
@@ -652,6 +652,28 @@ def _healthy_peaks(model: Model, held_out: FitPart) -> extremes.PeaksAndHours:
     return peaks, len(rows) * held_out.samples.dt_s / 3600.0
 
 
+def tied_shares(parts: Parts, model: Model) -> Floats:
+    """Share of each group's effect on the rates that past, signals and the other groups make up, (G,): where
+    it is near 1 the law ties the group to what it answers to, and its effect cannot be told; 1 where the
+    group never moved. An effect far above the noise may be made up to a larger share: what is left counts.
+
+    The effect y = U_g B_g W is in standard deviations of the noise, e = y - Z b what the other columns of the
+    fit do not make up of it."""
+    Z, _, _ = stack_data(parts, model.vehicle, model.history, model.lags)
+    _, _, B, R = model.as_arrays()
+    W = np.linalg.inv(np.linalg.cholesky(R)).T
+    shares = np.ones(len(B))
+    for g, columns in enumerate(np.arange(Z.shape[1])[-B.shape[1] * len(B) :].reshape(len(B), -1)):
+        y = Z[:, columns] @ B[g] @ W
+        y = y - y.mean(axis=0)
+        power = float((y**2).sum()) / len(y)
+        if power > _MIN_EFFECT_POWER:
+            others = np.delete(Z, columns, axis=1)
+            e = y - others @ np.linalg.lstsq(others, y, rcond=None)[0]
+            shares[g] = max(1.0 - float((e**2).sum()) / len(y) / min(power, _EFFECT_POWER_CAP), 0.0)
+    return shares
+
+
 def group_gain_sd(fit: regression.Regression, model: Model) -> Floats:
     """Standard error of each group's gain, (G,), colour included: of its response summed over lags, along
     itself, weighed by the noise; for `other_laws` of the factor of the whole response. Where a surface's slow
@@ -679,19 +701,19 @@ def group_gain_sd(fit: regression.Regression, model: Model) -> Floats:
     return np.minimum(gain_sd, _GAIN_SD_CAP)
 
 
-def refitted_folds(parts: Sequence[FitPart], model: Model) -> list[tuple[Model, FitPart, str]]:
+def refitted_folds(parts: Parts, model: Model) -> list[tuple[Model, FitPart, str]]:
     """For each part that is left out, the model fitted to the others, this part and its name."""
     folds = validation_folds(parts)
     return [(refit(fitted, model), held_out, name) for fitted, held_out, name in folds]
 
 
-def fold_qualities(parts: Sequence[FitPart], model: Model) -> list[Document]:
+def fold_qualities(parts: Parts, model: Model) -> list[Document]:
     """Compute the explained variance of parts left out, one entry a fold."""
     folds = refitted_folds(parts, model)
     return [{"left_out": name, **prediction_quality(fold, held_out)} for fold, held_out, name in folds]
 
 
-def score_folds(parts: Sequence[FitPart], model: Model) -> tuple[list[Document], float]:
+def score_folds(parts: Parts, model: Model) -> tuple[list[Document], float]:
     """One entry a fold, and the posterior mass with which the bounds hold the labels as they should."""
     entries = fold_qualities(parts, model)
     usual = model.settings.bounds
@@ -733,12 +755,12 @@ def prediction_quality(model: Model, held_out: FitPart) -> Document:
     }
 
 
-def one_step_residual(model: Model, part: FitPart) -> tuple[NDArray[np.int64], Floats]:
+def one_step_residual(model: Model, part: FitPart) -> tuple[Ints, Floats]:
     """Places (n,) of the samples in use, and their one-step residuals (n, 3), whatever is known of noise."""
     flight = part.innovations(model.model_copy(update={"colours": []}))
     return flight.rows, flight.e
 
 
-def one_step_residuals(parts: Sequence[FitPart], model: Model) -> Floats:
+def one_step_residuals(parts: Parts, model: Model) -> Floats:
     """The same of several flights, one after the other, (n, 3)."""
     return np.vstack([one_step_residual(model, part)[1] for part in parts])

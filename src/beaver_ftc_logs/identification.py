@@ -17,7 +17,7 @@ from beaver_ftc.results import Document
 from beaver_ftc_logs import extremes, fitting, gyro_noise, regression, trust
 from beaver_ftc_logs.model import FittedRanges, Model, NoiseModel
 from beaver_ftc_logs.recording import Floats
-from beaver_ftc_logs.regression import group_indices, spectral_density, variance_inflation
+from beaver_ftc_logs.regression import Parts, group_indices, spectral_density, variance_inflation
 from beaver_ftc_logs.samples import (
     NOISE_MA_CANDIDATES,
     UNFITTED_GYROS_RAD_S,
@@ -240,7 +240,7 @@ def _min_bic(flights: Sequence[Samples], vehicle: Vehicle) -> float:
     return min(fitting.bic_by_order(fitting.fit_parts(flights), vehicle).values())
 
 
-def check_explained(folds: list[Document], parts: Sequence[fitting.FitPart], model: Model) -> None:
+def check_explained(folds: list[Document], parts: Parts, model: Model) -> None:
     """Raise BadInput where a model explains less of an axis than its mean does, on parts not fitted."""
     known = [fold for fold in folds if fold["samples"]]
     counts = [fold["samples"] for fold in known]
@@ -270,7 +270,7 @@ def _check_units(flights: Sequence[Samples], vehicle: Vehicle) -> None:
         trust.refuse_command_unit(flight.name, flight.commands, flight.rates, first, list(vehicle.surfaces))
 
 
-def collinear_names(parts: Sequence[fitting.FitPart], model: Model) -> list[Document]:
+def collinear_names(parts: Parts, model: Model) -> list[Document]:
     """Regressors whose coefficient's variance the others inflate more than tenfold, worst first; None where
     the others make it up."""
     Z, _, _ = fitting.stack_data(parts, model.vehicle, model.history, model.lags)
@@ -296,14 +296,14 @@ def regressor_names(model: Model) -> list[str]:
     return [f"{name}[-{k}]" for names, most in lagged for k in range(1, most + 1) for name in names]
 
 
-def median_inflation(parts: Sequence[fitting.FitPart], model: Model) -> dict[str, float]:
+def median_inflation(parts: Parts, model: Model) -> dict[str, float]:
     """By how much the residual's colour widens the standard errors of the responses: the median, an axis."""
     n = len(model.groups) * model.lags
     inflation = fitting.fit_of(parts, model).standard_error_inflation[-n:]
     return regression.by_axis(np.median(inflation, axis=0))
 
 
-def density_ratios(parts: Sequence[fitting.FitPart], model: Model) -> list[Document]:
+def density_ratios(parts: Parts, model: Model) -> list[Document]:
     """Mean density of the residual by band, over that of white noise of the same variance, an axis."""
     e = fitting.one_step_residuals(parts, model)
     f, density = spectral_density(e, 1.0 / model.rate_hz)
@@ -421,7 +421,7 @@ def _axis_text(values: dict[str, float]) -> str:
     return ", ".join(f"{axis} {value:.3f}" for axis, value in values.items())
 
 
-def fit_output_error(parts: Sequence[fitting.FitPart], groups: list[list[int]]) -> dict[str, Any]:
+def fit_output_error(parts: Parts, groups: list[list[int]]) -> dict[str, Any]:
     """Fit on every other window, test on the rest. Returns servo lag and delay in s, their standard errors,
     and the share of the rates' variance explained over free-running windows not fitted, an axis.
 
@@ -459,9 +459,7 @@ def fit_output_error(parts: Sequence[fitting.FitPart], groups: list[list[int]]) 
     }
 
 
-def _cut_windows(
-    parts: Sequence[fitting.FitPart], groups: list[list[int]], n: int, past: int
-) -> tuple[Floats, Floats]:
+def _cut_windows(parts: Parts, groups: list[list[int]], n: int, past: int) -> tuple[Floats, Floats]:
     """Commands u (W, past + n, G) with their past, scaled by labels, and rates y (W, n, 3), of W windows."""
     windows = []
     for part in parts:

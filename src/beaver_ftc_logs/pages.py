@@ -19,7 +19,7 @@ from beaver_ftc_logs.findings import MAX_BRIEF_EVENT_S, duration_text, events_to
 from beaver_ftc_logs.identification import regressor_names
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import Floats, true_runs
-from beaver_ftc_logs.regression import Regression, spectral_density
+from beaver_ftc_logs.regression import Parts, Regression, spectral_density
 from beaver_ftc_logs.samples import Samples
 
 if TYPE_CHECKING:
@@ -212,7 +212,7 @@ def _encode_png(figure: Any) -> str:
     return b64encode(buffer.getvalue()).decode()
 
 
-def _prediction_figure(usable: Sequence[fitting.FitPart], model: Model) -> Any:
+def _prediction_figure(usable: Parts, model: Model) -> Any:
     """Measured and predicted rates over the liveliest part of each flight (or half) that was left out."""
     folds = [fold for fold in fitting.refitted_folds(usable, model) if fold[1].is_usable.any()]
     folds = folds[:_MAX_SHOWN_FLIGHTS]
@@ -247,7 +247,7 @@ def _liveliest_window(model: Model, held_out: fitting.FitPart, n: int) -> tuple[
     return samples.t_s[window], rates[window], r[window]
 
 
-def _spectrum_figure(usable: Sequence[fitting.FitPart], model: Model) -> Any:
+def _spectrum_figure(usable: Parts, model: Model) -> Any:
     """Density of the residual, and what white noise of the same variance would have."""
     residual = fitting.one_step_residuals(usable, model)
     f_hz, power = spectral_density(residual, 1.0 / model.rate_hz)

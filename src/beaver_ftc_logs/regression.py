@@ -18,6 +18,7 @@ cannot be distinguished by any fit, so they form one group with one response. Le
 coefficients b (m,) or (m, 3); P is the inverse of Z' Z once each column is divided by its scale s (m,).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -26,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from beaver_ftc_logs.model import Model, NoiseModel
-from beaver_ftc_logs.recording import MIN_DIVISOR, Floats, runs_between
+from beaver_ftc_logs.recording import MIN_DIVISOR, Floats, Ints, Mask, runs_between
 from beaver_ftc_logs.samples import Samples, mixer_matrix, whiten_samples
 from beaver_ftc_logs.vehicle import Vehicle
 
@@ -47,23 +48,18 @@ class FitPart:
     results that were computed from this flight and others."""
 
     samples: Samples
-    is_usable: NDArray[np.bool_]
+    is_usable: Mask
     result_cache: dict[tuple[object, ...], tuple[object, object]] = field(
         default_factory=dict, repr=False, compare=False
     )
-
-    def regressors(
-        self, groups: list[list[int]], h: int, L: int, f: int
-    ) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-        """As `build_regressors`, commands as effective as labels say, and which samples are known and in
-        use."""
-        X, U, is_known = build_regressors(self.samples, groups, h, L, True, f)
-        return X, U, self.is_usable & is_known
 
     def innovations(self, model: Model) -> "Innovations":
         """The samples in use by a model, commands as effective as labels say."""
         flight = innovations(self.samples, model, labelled=True)
         return flight.at(np.flatnonzero(self.is_usable & flight.is_known))
+
+
+Parts = Sequence[FitPart]
 
 
 def group_surfaces(vehicle: Vehicle) -> list[list[int]]:
@@ -83,7 +79,7 @@ def group_surfaces(vehicle: Vehicle) -> list[list[int]]:
 
 def build_regressors(
     samples: Samples, groups: list[list[int]], h: int, L: int, labelled: bool, f: int = 1
-) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+) -> tuple[Floats, Floats, Mask]:
     """The regressors of each sample: the past x (n, 3 h + X f), the commands U (n, G, L) of the groups, and
     whether all of it is known and no gap lies within, (n,).
 
@@ -137,8 +133,8 @@ class Innovations:
     predict of them. noise: of the flight.
     """
 
-    rows: NDArray[np.int64]
-    is_known: NDArray[np.bool_]
+    rows: Ints
+    is_known: Mask
     y: Floats
     F: Floats
     c: Floats
@@ -164,7 +160,7 @@ class Innovations:
         """Logarithm of the size of the noise of a sample before it was whitened, log det(R)^1/2."""
         return 0.5 * float(np.linalg.slogdet(self.R)[1]) - 3.0 * float(np.log(sum(self.noise.average)))
 
-    def at(self, rows: NDArray[np.int64] | slice) -> "Innovations":
+    def at(self, rows: Ints | slice) -> "Innovations":
         """Some of the rows."""
         chosen = {name: getattr(self, name)[rows] for name in ("rows", "is_known", "y", "F")}
         return replace(self, **chosen)
@@ -273,7 +269,7 @@ class Regression:
     coefficient_error_correlation: Floats
 
 
-def fit_ols(Z: Floats, y: Floats, stretch: NDArray[np.int64], lag: int) -> Regression:
+def fit_ols(Z: Floats, y: Floats, stretch: Ints, lag: int) -> Regression:
     """Ordinary least squares of the rates y (n, 3) on Z (n, m), with Newey-West standard errors:
 
         X = Z / s,   P = (X' X)^+,   b = P X' y,   e = y - X b,   R = e' e / (n - m)
@@ -297,7 +293,7 @@ def fit_ols(Z: Floats, y: Floats, stretch: NDArray[np.int64], lag: int) -> Regre
     return Regression(b / s[:, None], R, coloured / s[:, None], inflation, P / np.outer(d, d))
 
 
-def _newey_west(X: Floats, e: Floats, P: Floats, stretch: NDArray[np.int64], lag: int) -> Floats:
+def _newey_west(X: Floats, e: Floats, P: Floats, stretch: Ints, lag: int) -> Floats:
     """Standard errors (m,) that hold for autocorrelated residuals e (n,), the root of diag(P S P): S sums the
     products of the scores X e with Bartlett's weights over `lag` lags."""
     scores, w = X * e[:, None], lag + 1
@@ -311,7 +307,7 @@ def _newey_west(X: Floats, e: Floats, P: Floats, stretch: NDArray[np.int64], lag
     return np.sqrt(np.maximum(np.diag(P @ S @ P), 0.0))
 
 
-def trailing_sums(x: NDArray[Any], n: float) -> tuple[Floats, NDArray[np.int64]]:
+def trailing_sums(x: NDArray[Any], n: float) -> tuple[Floats, Ints]:
     """Sums of x (k, ...) over the last n rows, each row's own included, and how many rows these are, (k,)."""
     end = np.arange(1, len(x) + 1)
     begin = np.maximum(end - max(round(n), 1), 0)
@@ -325,7 +321,7 @@ def noise_scale(e2: Floats) -> float:
     return float(np.median(e2.reshape(-1, 3).sum(axis=1)) / _MEDIAN_CHI2)
 
 
-def split_parts(rows: NDArray[np.int64]) -> list[NDArray[np.int64]] | None:
+def split_parts(rows: Ints) -> list[Ints] | None:
     """The rows of a flight in its parts; None where one is too short."""
     parts = np.array_split(rows, _N_PARTS)
     return parts if min(map(len, parts)) >= _MIN_PART_ROWS else None

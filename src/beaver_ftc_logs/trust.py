@@ -22,20 +22,17 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import energy, regression
 from beaver_ftc_logs.column_mistakes import corrected_logs, log_without_signal
 from beaver_ftc_logs.model import FittedRanges, Model
-from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
-from beaver_ftc_logs.regression import FitPart
+from beaver_ftc_logs.recording import MIN_DIVISOR, Floats, Ints, Mask
+from beaver_ftc_logs.regression import Parts
 from beaver_ftc_logs.samples import NOISE_MA_CANDIDATES, Samples, whiten_samples
 from beaver_ftc_logs.signals import MIN_STILL_S
 from beaver_ftc_logs.units import RATE, SI_UNITS, nearest_unit
-
-Mask = NDArray[np.bool_]
 
 _RANGE_MARGIN_SHARE = 0.5
 """Share of its span by which a range is passed before a row is outside."""
@@ -45,9 +42,7 @@ _MAX_STILL_FACTOR = 3.0
 _FALSE_MISTAKE_CHANCE, _MAX_COMPARED_SAMPLES = 0.001, 8000
 """Probability with which chance alone may look like a mistake in the columns; samples that are compared."""
 _CLIPPING_MEMORY_S = 30.0
-_MIN_EFFECT_POWER = 1e-6
-_MAX_TIED_SHARE, _EFFECT_POWER_CAP = 0.98, 12.5
-"""Of an effect of so many variances of the noise a sample, a fiftieth is half a standard deviation."""
+_MAX_TIED_SHARE = 0.98
 _MAX_AXIS_RATIO, _UNIT_FACTOR_ROOT = 10.0, 1.6
 _MAX_ALIKE_FACTOR, _MIN_UNIT_FACTOR = 3.0, 12.0
 _COMMAND_UNIT_HINT = ": one unit (57.3 is deg for rad, 100 percent: `unit`, `scale`)"
@@ -59,8 +54,9 @@ _REVERSED_GAIN_LIMIT = -0.5
 """Half-way from the gain of a wrong sign, -1, to that of a lost surface, 0."""
 
 
-def compute_fitted_ranges(parts: Sequence[FitPart], model: Model, gain_sd: Floats) -> FittedRanges:
-    """Compute the ranges in which a model was fitted. gain_sd (G,): standard errors, of parts not fitted."""
+def compute_fitted_ranges(parts: Parts, tied: Floats, gain_sd: Floats) -> FittedRanges:
+    """Compute the ranges in which a model was fitted. tied (G,): as of `fitting.tied_shares`; gain_sd (G,):
+    standard errors, of parts not fitted."""
     fields = ("rates", "commands", "airspeed", "energy_height_rate_mps")
     rates, commands, airspeeds, climbs = (_usable(parts, name) for name in fields)
     climbs = climbs[np.isfinite(climbs)]
@@ -73,14 +69,14 @@ def compute_fitted_ranges(parts: Sequence[FitPart], model: Model, gain_sd: Float
         rates=central_ranges(rates),
         airspeed=central_ranges(airspeeds[:, None])[0] if airspeeds.size else None,
         spread=np.nanstd(rates, axis=0).tolist(),
-        tied=tied_shares(parts, model).tolist(),
+        tied=tied.tolist(),
         gain_sd=gain_sd.tolist(),
         still_s=still,
         energy_climb=float(np.quantile(climbs, energy.UNPOWERED_SHARE)) if climbs.size else None,
     )
 
 
-def _usable(parts: Sequence[FitPart], name: str) -> Floats:
+def _usable(parts: Parts, name: str) -> Floats:
     """A field of those flights that have it, in the samples in use."""
     known = [(getattr(part.samples, name), part.is_usable) for part in parts]
     return np.concatenate([values[used] for values, used in known if values is not None] or [np.empty(0)])
@@ -92,31 +88,6 @@ def central_ranges(values: Floats) -> list[list[float]]:
         return []
     known = np.where(np.isfinite(values).any(axis=0), values, 0.0)
     return np.nanquantile(known, _RANGE_QUANTILES, axis=0).T.tolist()
-
-
-def tied_shares(parts: Sequence[FitPart], model: Model) -> Floats:
-    """Share of each group's effect on the rates that past, signals and the other groups make up, (G,): where
-    it is near 1 the law ties the group to what it answers to, and its effect cannot be told; 1 where the
-    group never moved. An effect far above the noise may be made up to a larger share: what is left counts.
-
-    The effect y = U_g B_g W is in standard deviations of the noise, e = y - Z b what past X, signals and the
-    commands U of the other groups do not make up of it."""
-    h, f = model.history, model.vehicle.n_signal_lags(model.history)
-    groups = regression.group_indices(model)
-    stacked = [part.regressors(groups, h, model.lags, f) for part in parts]
-    X, U = (np.concatenate([one[i][one[2]] for one in stacked]) for i in (0, 1))
-    _, _, B, R = model.as_arrays()
-    W = np.linalg.inv(np.linalg.cholesky(R)).T
-    shares = np.ones(len(groups))
-    for g in range(len(groups)):
-        Z = np.column_stack([np.ones(len(X)), X, np.delete(U, g, axis=1).reshape(len(U), -1)])
-        y = U[:, g] @ B[g] @ W
-        y = y - y.mean(axis=0)
-        power = float((y**2).sum()) / len(y)
-        if power > _MIN_EFFECT_POWER:
-            e = y - Z @ np.linalg.lstsq(Z, y, rcond=None)[0]
-            shares[g] = max(1.0 - float((e**2).sum()) / len(y) / min(power, _EFFECT_POWER_CAP), 0.0)
-    return shares
 
 
 def known_effects(model: Model) -> list[bool]:
@@ -410,7 +381,7 @@ def without_dead_rows(samples: Samples, model: Model) -> Samples:
     return replace(samples, rates=np.where(dead[:, None], np.nan, samples.rates))
 
 
-def credibility_entry(reasons: Mapping[str, Mask], credible: NDArray[np.int64]) -> Document:
+def credibility_entry(reasons: Mapping[str, Mask], credible: Ints) -> Document:
     """Return the entry of verdict.json with the share of credible rows, and the reasons for the others with
     their shares."""
     shares = {reason: float(rows.mean()) for reason, rows in reasons.items()}

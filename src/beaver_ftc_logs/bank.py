@@ -124,7 +124,7 @@ def _levels_and_shares(model: Model, g: int) -> tuple[Floats, Floats]:
 def _offset_variances(model: Model, g: int) -> list[Floats]:
     """Variances of the rates' offset that may come with a loss, (3,) each: none, or that of the group stuck
     anywhere within its travel, along the axes it moves most."""
-    _, _, B, R = model.as_arrays()
+    B, R = np.array(model.response), np.array(model.noise)
     total = np.abs(B[g]).sum(axis=0) / np.sqrt(np.diag(R))
     ratio = np.clip(total / max(total.max(), MIN_DIVISOR), 0.3, 1.0)
     variances = {"loss": np.zeros(3), "stuck": np.diag(R) * (model.settings.jam_sd * ratio) ** 2}
@@ -169,9 +169,8 @@ def build_states(model: Model, noise: NoiseModel) -> StateModel:
     retention a (N,) = exp(-1 / (rate return_s)) a sample, and walk (N,) = (1 - a^2) diag(P)."""
     settings = model.settings
     n = len(model.groups)
-    _, _, B, _ = model.as_arrays()
     r = noise.wider * np.diag(np.array(noise.noise))
-    shift = B.sum(axis=1) * settings.trim_shift
+    shift = np.array(model.response).sum(axis=1) * settings.trim_shift
     P = np.zeros((4 + n, 4 + n))
     P[:3, :3] = np.diag(r * settings.trim_sd**2) + shift.T @ shift
     P[3, 3] = settings.gain_sd**2

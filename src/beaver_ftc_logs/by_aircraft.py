@@ -21,7 +21,7 @@ from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import findings, trust
 from beaver_ftc_logs.diagnose import LogRows, reversed_command_error
-from beaver_ftc_logs.recording import Floats, Mask, RecordedFlight, true_runs
+from beaver_ftc_logs.recording import Floats, Mask, RecordedFlight, Runs, true_runs
 from beaver_ftc_logs.samples import Samples, convert_to_si, resample, sample_column
 from beaver_ftc_logs.stepped import Replayed, error_sections, replay_samples, rows_of_replay
 from beaver_ftc_logs.vehicle import QuantityColumn, Vehicle
@@ -92,7 +92,7 @@ class LogInputs:
     input_arrays: list[Floats]
     held_age_s: dict[str, float]
     has_missing_value: Mask
-    gap_free_stretches: list[tuple[int, int]]
+    gap_free_stretches: Runs
     full_deflection_rad: Floats
 
     def with_commands(self, commands: Floats) -> "LogInputs":
@@ -276,7 +276,7 @@ def _median_without_nan(values: Floats) -> float:
     return float(np.median(numbers)) if numbers.size else float("nan")
 
 
-def _gap_free_stretches(samples: Samples, missing: Mask, rate_hz: float) -> list[tuple[int, int]]:
+def _gap_free_stretches(samples: Samples, missing: Mask, rate_hz: float) -> Runs:
     """First row and end of each stretch that is evenly spaced and has no missing number."""
     uneven = np.abs(np.diff(samples.t_s) * rate_hz - 1.0) > _STEP_JITTER
     joins = ~(missing[1:] | missing[:-1] | uneven)
@@ -284,7 +284,7 @@ def _gap_free_stretches(samples: Samples, missing: Mask, rate_hz: float) -> list
 
 
 def _doubtful_rows(inputs: LogInputs, replay: Replayed, rows: LogRows) -> dict[str, Mask]:
-    """For each reason that has rows, the rows (n,) for which there is no verdict."""
+    """For each reason the rows (n,) for which there is no verdict."""
     aircraft, missing = inputs.aircraft, inputs.has_missing_value
     (low_mps, high_mps), (low, high) = aircraft.envelope.airspeed_mps, aircraft.alpha_rad
     alpha, airspeed = inputs.input_arrays[1][:, 0], inputs.input_arrays[1][:, 2]
@@ -310,8 +310,7 @@ def _doubtful_rows(inputs: LogInputs, replay: Replayed, rows: LogRows) -> dict[s
         alarms = begin + np.flatnonzero(rows.faulty[begin:end])
         if alarms.size and has_reason[alarms[0]]:
             after[alarms[0] : end] = True
-    reasons["the alarm was raised where nothing can be said"] = after & ~has_reason
-    return {reason: mask for reason, mask in reasons.items() if mask.any()}
+    return reasons | {"the alarm was raised where nothing can be said": after & ~has_reason}
 
 
 def _verdict_document(

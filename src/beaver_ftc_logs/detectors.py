@@ -171,7 +171,7 @@ def loop_detector_inputs(samples: Samples, model: Model) -> list[tuple[Measured,
 
 def _model_error_sd_rad_s2(model: Model) -> Floats:
     """The residual's standard deviation as an error of the model, (3,) rad/s2."""
-    return np.asarray(np.sqrt(np.diag(model.as_arrays()[3])) / (1.0 / model.rate_hz))
+    return np.asarray(np.sqrt(np.diag(np.array(model.noise))) / (1.0 / model.rate_hz))
 
 
 def loop_detector_context(model: Model) -> Context:
@@ -179,7 +179,7 @@ def loop_detector_context(model: Model) -> Context:
     dt_s = 1.0 / model.rate_hz
     noise = np.zeros(7)
     noise[:3] = _DECLARED_GYRO_RAD_S
-    design: Any = LinearRateModel(model.as_arrays()[1], dt_s)
+    design: Any = LinearRateModel(np.array(model.past), dt_s)
     return Context(
         dt_s=dt_s, substeps=1, model=design, trim_x=np.zeros(3), trim_y=np.zeros(N_Y),
         trim_rad=np.zeros(_N_LOOP),

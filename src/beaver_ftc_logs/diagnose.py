@@ -104,7 +104,8 @@ class LogRows:
 
     def without_verdict(self, reasons: Mapping[str, Mask]) -> "LogRows":
         """The rows without alarm, name and bounds, and not credible, where one of the reasons, (n,) each, is
-        true."""
+        true; reasons without a row are left out."""
+        reasons = {reason: mask for reason, mask in reasons.items() if mask.any()}
         removed = np.any([np.zeros(len(self.t_s), dtype=bool), *reasons.values()], axis=0)
         rows = self.without_estimate(removed)._where(
             removed, faulty=0, isolated_surfaces="", fault_probability=0.0
@@ -149,7 +150,7 @@ def finish_rows(samples: Samples, model: Model, rows: LogRows, silent: Mask | No
     """Rows at the log's own stamps, without a verdict where the model is not credible, and without bounds
     for a group whose effect is unknown. silent (n,): where nothing answers the commands."""
     reasons = trust.untrusted_rows(samples, model)
-    if silent is not None and silent.any():
+    if silent is not None:
         reasons["nothing answers the commands: on the ground, or these are not what it follows"] = silent
     if not any(trust.known_effects(model)):
         always = np.ones(len(rows.t_s), dtype=bool)

@@ -177,14 +177,14 @@ def refit(parts: Parts, model: Model) -> Model:
     return refitted.model_copy(update={"settings": model.settings, "colours": colours})
 
 
-def held_out_folds(parts: Parts, model: Model) -> Iterator[tuple[Model, FitPart]]:
-    """For each part that is left out, a model fitted to others, with the standard errors of its gains, and
-    this part."""
+def held_out_folds(parts: Parts, model: Model) -> Iterator[tuple[Model, FitPart, Parts]]:
+    """For each part that is left out, a model fitted to others, with the standard errors of its gains, this
+    part, and the others."""
     tied = tied_shares(parts, model).tolist()
     for fitted, held_out, _ in validation_folds(parts, _MAX_SPLITS):
         gain_sd = group_gain_sd(fit_of(fitted, model), model).tolist()
         ranges = FittedRanges(commands=[], rates=[], gain_sd=gain_sd, tied=tied)
-        yield refit(fitted, model).model_copy(update={"fitted": ranges}), held_out
+        yield refit(fitted, model).model_copy(update={"fitted": ranges}), held_out, fitted
 
 
 def bic_by_order(parts: Parts, vehicle: Vehicle) -> dict[tuple[int, int], float]:
@@ -302,7 +302,7 @@ def _parts_in(parts: Parts, ma: Sequence[float]) -> list[FitPart]:
 def quick_error_share(parts: Parts, model: Model) -> float:
     """Estimate the error of unusually quick responses, as a share of them, at most 1: the largest of the
     flights left out; 1 if none of them has such responses."""
-    squares = [_squared_quick_error(fold, held_out) for fold, held_out in held_out_folds(parts, model)]
+    squares = [_squared_quick_error(fold, held_out) for fold, held_out, _ in held_out_folds(parts, model)]
     known = [square for square in squares if square is not None]
     return float(np.sqrt(np.clip(max(known, default=1.0), 0.0, 1.0)))
 
@@ -403,7 +403,7 @@ def gain_overdispersion(parts: Parts, model: Model) -> float:
     that is as believed.
     """
     errors = [(float(len(model.groups)), len(model.groups))]
-    for fold, held_out in held_out_folds(parts, model):
+    for fold, held_out, _ in held_out_folds(parts, model):
         errors += _gain_errors(fold, held_out)
     return sum(error for error, _ in errors) / sum(n for _, n in errors)
 
@@ -451,10 +451,11 @@ def _with_inflated_noise(parts: Parts, model: Model) -> Model:
     axis of an answer with its own, are farther from 1, in squares, than it and the filter let them be: quiet
     gyros show what the model itself lacks."""
     windows: dict[tuple[float, ...], list[float]] = {}
-    rest = validation_folds(parts, _MAX_SPLITS)
-    for (fold, held_out), (fitted, _, _) in zip(held_out_folds(parts, model), rest, strict=True):
+    for fold, held_out, fitted in held_out_folds(parts, model):
+        loudness = _loudness(fold, held_out, fitted if len(parts) > 1 else parts)
+        errors = _gain_errors(fold, held_out, _GAIN_WINDOW_S, loudness)
         found = windows.setdefault(held_out.samples.noise_ma_coefficients, [])
-        found.extend(_window_inflations(fold, held_out, fitted if len(parts) > 1 else parts))
+        found.extend(min(error / max(n, 1), _MAX_INFLATION) for error, n in errors)
     inflation = {ma: max(float(np.mean(values)), 1.0) for ma, values in windows.items() if values}
     for ma in inflation if model.vehicle.other_laws else ():
         # a gyro's noise takes from the next sample what it added to one
@@ -466,17 +467,10 @@ def _with_inflated_noise(parts: Parts, model: Model) -> Model:
     return model.model_copy(update={"colours": colours})
 
 
-def _window_inflations(fold: Model, held_out: FitPart, others: Parts) -> list[float]:
-    """How many times as far, in squares, the gains of each ten seconds of a part left out are from 1 as the
-    filter lets them be. Under other laws the filter widens the noise of a flight that is louder than the
-    others (`recent_scale`): what it widens by itself is not counted again."""
-    errors = _gain_errors(fold, held_out, _GAIN_WINDOW_S, _loudness(fold, held_out, others))
-    return [min(error / max(n, 1), _MAX_INFLATION) for error, n in errors]
-
-
 def _loudness(fold: Model, held_out: FitPart, others: Parts) -> float:
     """How many times as wide the filter finds the noise of a flight left out as that of the loudest other
-    flight of the same noise; 1 if it is within the range of these, or under the same law."""
+    flight of the same noise; 1 if it is within the range of these, or under the same law. What the filter
+    widens by itself (`recent_scale`) is not counted again."""
     if not fold.vehicle.other_laws:
         return 1.0
 
@@ -512,7 +506,7 @@ def _estimate_trim_walk(parts: Parts, model: Model) -> list[float]:
     sums = np.zeros((2, 3))
     counts = np.zeros(2)
     spans = np.round(np.array(_TRIM_SPANS_S) * model.rate_hz)
-    for fold, held_out in held_out_folds(parts, model):
+    for fold, held_out, _ in held_out_folds(parts, model):
         flight = held_out.innovations(fold)
         g = flight.e / np.sqrt(np.maximum(np.diag(flight.R), MIN_DIVISOR))
         for begin, end in runs_between(np.diff(flight.rows) > 1):
@@ -558,15 +552,15 @@ def add_ranges_and_threshold(parts: Parts, model: Model) -> Model:
     evidence of a fault they would alarm as often as declared."""
     peaks = list[extremes.PeaksAndHours]()
     deviations = list[Floats]()
-    for fold, held_out in held_out_folds(parts, model):
+    for fold, held_out, _ in held_out_folds(parts, model):
         peaks.append(_healthy_peaks(fold, held_out))
         if len(parts) > 1 and model.vehicle.other_laws:
             deviations.append(_squared_deviations(fold, held_out))
     variance = group_gain_sd(fit_of(parts, model), model) ** 2
     if model.vehicle.other_laws:
-        # how far another flight's gains may be before any is left out counts as one flight
+        # how far another flight's gains are at most before any is left out counts as one flight
         hidden = [noise.misreads for noise in model.colours] or [[0.0] * len(model.groups)]
-        variance += np.nanmean([np.max(hidden, axis=0) ** 2, *deviations], axis=0)
+        variance += np.nanmean([3.0 * np.max(hidden, axis=0) ** 2, *deviations], axis=0)
     gain_sd = np.minimum(np.sqrt(variance), _GAIN_SD_CAP)
     tail = extremes.fit_peak_tail(peaks)
     ranges = trust.compute_fitted_ranges(parts, tied_shares(parts, model), gain_sd).model_copy(
@@ -660,16 +654,14 @@ def tied_shares(parts: Parts, model: Model) -> Floats:
     The effect y = U_g B_g W is in standard deviations of the noise, e = y - Z b what the other columns of the
     fit do not make up of it."""
     Z, _, _ = stack_data(parts, model.vehicle, model.history, model.lags)
-    _, _, B, R = model.as_arrays()
-    W = np.linalg.inv(np.linalg.cholesky(R)).T
+    B, W = np.array(model.response), np.linalg.inv(np.linalg.cholesky(np.array(model.noise))).T
     shares = np.ones(len(B))
     for g, columns in enumerate(np.arange(Z.shape[1])[-B.shape[1] * len(B) :].reshape(len(B), -1)):
         y = Z[:, columns] @ B[g] @ W
         y = y - y.mean(axis=0)
         power = float((y**2).sum()) / len(y)
         if power > _MIN_EFFECT_POWER:
-            others = np.delete(Z, columns, axis=1)
-            e = y - others @ np.linalg.lstsq(others, y, rcond=None)[0]
+            e = regression.left_by(np.delete(Z, columns, axis=1), y)
             shares[g] = max(1.0 - float((e**2).sum()) / len(y) / min(power, _EFFECT_POWER_CAP), 0.0)
     return shares
 

@@ -142,7 +142,7 @@ def whiten_flights(flights: Sequence[Samples], vehicle: Vehicle) -> list[Samples
         if len(y) < 2:
             known = f"{len(y)} samples known to be healthy"
             raise BadInput(f"identify: {flight.name}: {known}, allowed: at least 2")
-        return np.asarray(y - Z @ np.linalg.lstsq(Z, y, rcond=None)[0])
+        return regression.left_by(Z, y)
 
     alone = [{ma: own_residual(flight, ma) for ma in NOISE_MA_CANDIDATES} for flight in flights]
     colours = [_likeliest_ma(residuals)[1] for residuals in alone]

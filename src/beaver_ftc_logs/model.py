@@ -280,15 +280,6 @@ class Model(Section):
         fitted = [noise for noise in self.colours if noise.average == list(average)]
         return fitted[0] if fitted else NoiseModel(average=list(average) or [1.0], noise=self.noise)
 
-    def as_arrays(self) -> tuple[Floats, Floats, Floats, Floats]:
-        """intercept (3,), past (m, 3), response (G, L, 3) and noise (3, 3) as arrays."""
-        return (
-            np.array(self.intercept),
-            np.array(self.past),
-            np.array(self.response),
-            np.array(self.noise),
-        )
-
 
 def _shape(lists: Any) -> tuple[int, ...] | None:
     """Lengths of nested lists; None where those of one depth differ."""

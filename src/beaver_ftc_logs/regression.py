@@ -218,7 +218,7 @@ def innovations(samples: Samples, model: Model, labelled: bool = False) -> Innov
     h, L = model.history, model.lags
     f = model.vehicle.n_signal_lags(h)
     X, U, known = build_regressors(samples, group_indices(model), h, L, labelled, f)
-    c, A, B, _ = model.as_arrays()
+    c, A, B = (np.array(values) for values in (model.intercept, model.past, model.response))
     noise = model.noise_of(samples.noise_ma_coefficients)
     ar = noise.ar
     y = subtract_noise(samples.rates - np.einsum("nm,mr->nr", X, A), ar)
@@ -305,6 +305,11 @@ def _newey_west(X: Floats, e: Floats, P: Floats, stretch: Ints, lag: int) -> Flo
         windows = sums[w:] - sums[:-w]
         S += windows.T @ windows / w
     return np.sqrt(np.maximum(np.diag(P @ S @ P), 0.0))
+
+
+def left_by(Z: Floats, y: Floats) -> Floats:
+    """What least squares on Z (n, m) leaves of y (n,) or (n, k)."""
+    return np.asarray(y - Z @ np.linalg.lstsq(Z, y, rcond=None)[0])
 
 
 def trailing_sums(x: NDArray[Any], n: float) -> tuple[Floats, Ints]:

@@ -17,7 +17,16 @@ import numpy as np
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs import energy, physics, signals
 from beaver_ftc_logs.readers import read_parts, split_long_recording
-from beaver_ftc_logs.recording import Column, Floats, Ints, LoggedFailure, Mask, RecordedFlight, runs_between
+from beaver_ftc_logs.recording import (
+    Column,
+    Floats,
+    Ints,
+    LoggedFailure,
+    Mask,
+    RecordedFlight,
+    Runs,
+    runs_between,
+)
 from beaver_ftc_logs.units import TIME_UNITS
 from beaver_ftc_logs.vehicle import QuantityColumn, Vehicle
 
@@ -364,7 +373,7 @@ def _means_and_age(column: Column, t: Floats, h: float) -> tuple[Floats, float]:
     return np.where(count > 0, mean, held), 0.5 * h
 
 
-def constant_stretches(values: Floats) -> list[tuple[int, int]]:
+def constant_stretches(values: Floats) -> Runs:
     """Begin and end of each stretch of equal rows; nan is equal to nan."""
     known = np.nan_to_num(values, nan=-1.0)
     return runs_between(np.any(np.diff(known, axis=0) != 0.0, axis=1))

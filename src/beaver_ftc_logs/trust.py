@@ -329,7 +329,7 @@ def untrusted_rows(samples: Samples, model: Model) -> dict[str, Mask]:
         reasons[f"a rate was clipped in the last {_CLIPPING_MEMORY_S:g} s"] = recent > 0
     if model.fitted is not None:
         reasons |= _rows_out_of_range(samples, model, model.fitted)
-    return {reason: rows for reason, rows in reasons.items() if rows.any()}
+    return reasons
 
 
 def _rows_out_of_range(samples: Samples, model: Model, ranges: FittedRanges) -> dict[str, Mask]:
@@ -338,7 +338,7 @@ def _rows_out_of_range(samples: Samples, model: Model, ranges: FittedRanges) -> 
     commands = [f"command of {surface}" for surface in model.vehicle.surfaces]
     channels = [
         *zip(commands, samples.commands.T, ranges.commands, strict=False),
-        *zip(_rate_columns(model), samples.rates.T, ranges.rates, strict=False),
+        *zip(model.vehicle.rate_columns, samples.rates.T, ranges.rates, strict=False),
     ]
     if ranges.airspeed is not None and samples.airspeed is not None:
         channels.append(("airspeed", samples.airspeed, ranges.airspeed))
@@ -353,15 +353,11 @@ def _rows_out_of_range(samples: Samples, model: Model, ranges: FittedRanges) -> 
     return reasons
 
 
-def _rate_columns(model: Model) -> list[str]:
-    return [getattr(model.vehicle.rates, axis).column for axis in "pqr"]
-
-
 def _still_rows(samples: Samples, model: Model) -> dict[str, Mask]:
     """Rows in which a column has stood still for too long, by reason: a measured rate may hardly, another
     thrice as long as in the model's flights; a rate of which these are known, from MIN_STILL_S / 3 on."""
     fitted = model.fitted.still_s if model.fitted else {}
-    rates = _rate_columns(model)
+    rates = model.vehicle.rate_columns
     reasons = {}
     for name, unchanged_s in samples.unchanged_s.items():
         still_s = fitted.get(name, 0.0 if name in rates else np.inf)

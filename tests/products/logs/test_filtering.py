@@ -49,7 +49,7 @@ def test_a_delayed_flight_takes_nothing_from_later(healthy, wing_model):
 def test_a_shift_of_a_command_is_within_the_spread_of_the_trim(wing_model):
     """The covariance of the trim is that of many drawn shifts, through the model's own responses."""
     settings = wing_model.settings
-    _, _, response, noise = wing_model.as_arrays()
+    response, noise = np.array(wing_model.response), np.array(wing_model.noise)
     rng = np.random.default_rng(4)
     shifts = settings.trim_shift * rng.standard_normal((200_000, len(response)))
     free = settings.trim_sd * np.sqrt(np.diag(noise)) * rng.standard_normal((200_000, 3))

@@ -138,7 +138,7 @@ def reversed_command_error(flight: str, surface: str, allowed: str) -> BadInput:
 def _diagnose_checked_log(samples: Samples, model: Model) -> LogRows:
     bank = build_bank(model)
     known = trust.without_dead_rows(samples, model)
-    P, _, _ = bank_posterior(known, model, bank)
+    P = bank_posterior(known, model, bank)
     silent = P[:, bank.no_response_hypothesis_index] > _NO_RESPONSE_LIMIT
     rows = rows_of_posterior(samples, model, bank, P)
     if model.vehicle.other_laws and model.settings.threshold is not None and not model.colours:
@@ -237,8 +237,11 @@ def check_log_fits_model(samples: Samples, model: Model) -> None:
     trust.refuse_columns(samples, model)
 
 
-def rows_of_posterior(samples: Samples, model: Model, bank: HypothesisBank, P: Floats) -> LogRows:
-    """Return the rows that follow from the probabilities of the hypotheses (n, H)."""
+def rows_of_posterior(
+    samples: Samples, model: Model, bank: HypothesisBank, P: Floats, mass: float | None = None
+) -> LogRows:
+    """Return the rows that follow from the probabilities of the hypotheses (n, H). mass: posterior mass
+    inside the bounds, that of the model's settings where None."""
     p_silent = P[:, bank.no_response_hypothesis_index]
     p_fault = P[:, bank.is_fault_hypothesis].sum(axis=1)
     P_live = P[:, : bank.no_response_hypothesis_index] / np.maximum(1.0 - p_silent, MIN_DIVISOR)[:, None]
@@ -253,7 +256,9 @@ def rows_of_posterior(samples: Samples, model: Model, bank: HypothesisBank, P: F
         nameable = (page_cusum(steps, mu_name) >= mu_name) & ~calm
     faulty = _latched(alarmed, calm).astype(np.int64)
     start = np.maximum(last_true_row(evidence <= 0.0), 0)
-    per_group = [_group_bounds(bank, P_live, g, model) for g in range(len(model.groups))]
+    per_group = [
+        _group_bounds(bank, P_live, g, model, mass or model.settings.bounds) for g in range(len(model.groups))
+    ]
     e, low, high = (np.column_stack(column) for column in zip(*per_group, strict=True))
     silent = p_silent > _NO_RESPONSE_LIMIT
     e[silent], low[silent], high[silent] = 1.0, 0.0, 1.0
@@ -271,8 +276,10 @@ def rows_of_posterior(samples: Samples, model: Model, bank: HypothesisBank, P: F
     )
 
 
-def _group_bounds(bank: HypothesisBank, P_live: Floats, g: int, model: Model) -> tuple[Floats, ...]:
-    """A group's effectiveness and its bounds, (n,) each.
+def _group_bounds(
+    bank: HypothesisBank, P_live: Floats, g: int, model: Model, mass: float
+) -> tuple[Floats, ...]:
+    """A group's effectiveness and its bounds, which hold this posterior mass, (n,) each.
 
     Of several surfaces that move together any may have lost all, or nothing.
     """
@@ -280,7 +287,7 @@ def _group_bounds(bank: HypothesisBank, P_live: Floats, g: int, model: Model) ->
     if model.vehicle.other_laws:  # how rare faults are says nothing of a flight with one: all levels alike
         p = p / _group_levels(bank, bank.prior_probability[None, : bank.no_response_hypothesis_index], g)[1]
         p /= p.sum(axis=1, keepdims=True)
-    low, high = _credible_bounds(levels, p, model.settings.bounds)
+    low, high = _credible_bounds(levels, p, mass)
     if len(model.groups[g]) > 1:
         low, high = np.where(low < low.max(initial=0.0), 0.0, low), np.ones_like(high)
     # the median, with half of the probability on either side: the least mean absolute error

@@ -274,24 +274,11 @@ def _model_of_order(parts: Parts, vehicle: Vehicle, h: int, L: int) -> Model:
         noise=fit.residual_covariance.tolist(),
     )
     colours = sorted({part.samples.noise_ma_coefficients for part in parts} - {()})
-    noises = [_fit_noise_model(_parts_in(parts, ma), model, list(ma)) for ma in colours]
-    model = model.model_copy(update={"colours": noises})
-    if vehicle.other_laws:
-        noises = [_with_errors(_parts_in(parts, noise.average), model, noise) for noise in noises]
+    noises = []
+    for own in (_parts_in(parts, ma) for ma in colours):
+        noise = _fit_noise_model(own, model)
+        noises.append(_with_errors(own, model, noise) if vehicle.other_laws else noise)
     return model.model_copy(update={"colours": noises})
-
-
-def _with_errors(own: Parts, model: Model, noise: NoiseModel) -> NoiseModel:
-    """The noise of some flights with how far a model may misread the groups' effects in it, and with their
-    usual quickness: the power of the quick part of the responses that the flights exceed in a tenth of their
-    samples, in variances of this noise."""
-    powers = np.concatenate([part.innovations(model).quick_power(model.rate_hz) for part in own])
-    return noise.model_copy(
-        update={
-            "misreads": hidden_errors(own, model, noise),
-            "quick": float(np.quantile(powers, _USUAL_SHARE)),
-        }
-    )
 
 
 def _parts_in(parts: Parts, ma: Sequence[float]) -> list[FitPart]:
@@ -325,28 +312,31 @@ def _squared_quick_error(fold: Model, held_out: FitPart) -> float | None:
     return float(((ratio - 1.0) / power[unusual]).mean())
 
 
-def hidden_errors(own: Parts, model: Model, noise: NoiseModel) -> list[float]:
-    """How far a fit may misread the effect of each group in the flights of one noise, as a share, (G,): the
-    standard deviation of an error that is anywhere below the largest.
+def _with_errors(own: Parts, model: Model, noise: NoiseModel) -> NoiseModel:
+    """The noise of some flights with how far a fit may misread the effect of each group in it, as a share,
+    (G,): the standard deviation of an error that is anywhere below the largest; and with the power of the
+    quick part of the responses that the flights exceed in a tenth of their samples, in variances of the
+    noise.
 
     What the past predicts of a residual is no noise, but what the model lacks. A law that feeds it to the
     surfaces makes it look like their effect. On an axis with the power q of what is lacking and p of the
     effect, both in variances of the noise, the effect is then misread by sqrt(q / p) of itself at most; over
     axes, that least squares weighs by p, by sqrt(sum q p) / sum p. A law that feeds back otherwise shows it.
     """
-    e = one_step_residuals(own, model)
-    powers = [_centred(part.innovations(model).F) ** 2 for part in own]
+    flights = [part.innovations(model.model_copy(update={"colours": [noise]})) for part in own]
     r = np.diag(np.array(noise.noise))
-    p = np.vstack(powers).mean(axis=0) / r
-    q = np.maximum(e.var(axis=0) / r - 1.0, 0.0)
+    p = np.vstack([_centred(flight.F) ** 2 for flight in flights]).mean(axis=0) / r
+    q = np.maximum(one_step_residuals(own, model).var(axis=0) / r - 1.0, 0.0)
     most = np.minimum(np.sqrt(p @ q) / np.maximum(p.sum(axis=1), MIN_DIVISOR), _GAIN_SD_CAP)
-    return (most / np.sqrt(3.0)).tolist()
+    powers = np.concatenate([flight.quick_power(model.rate_hz) for flight in flights])
+    usual = float(np.quantile(powers, _USUAL_SHARE))
+    return noise.model_copy(update={"misreads": (most / np.sqrt(3.0)).tolist(), "quick": usual})
 
 
-def _fit_noise_model(own: Parts, model: Model, ma: list[float]) -> NoiseModel:
+def _fit_noise_model(own: Parts, model: Model) -> NoiseModel:
     """The noise of flights of one moving average, with an AR predictor of the residual, by least squares
     where samples follow one another; without a predictor where too few do."""
-    flights = [part.innovations(model) for part in own]
+    ma, flights = list(own[0].samples.noise_ma_coefficients), [part.innovations(model) for part in own]
     runs = [
         flight.e[begin:end] for flight in flights for begin, end in runs_between(np.diff(flight.rows) > 1)
     ]
@@ -637,7 +627,7 @@ def _cross_validate(
 def _healthy_peaks(model: Model, held_out: FitPart) -> extremes.PeaksAndHours:
     """Return for a part left out the peaks of the alarm statistic in health, and its healthy hours."""
     bank = build_bank(model)
-    p, _, _ = bank_posterior(held_out.samples, model, bank)
+    p = bank_posterior(held_out.samples, model, bank)
     z = fault_evidence(p, bank)
     answers = p[:, bank.no_response_hypothesis_index] < 0.5
     rows = np.flatnonzero(held_out.is_usable & ~(held_out.samples.labels < 1.0).any(axis=1) & answers)
@@ -713,24 +703,17 @@ def score_folds(parts: Parts, model: Model) -> tuple[list[Document], float]:
     for entry, (fold, held_out, _) in zip(entries, refitted_folds(parts, model), strict=True):
         labels = np.where(held_out.is_usable[:, None], held_out.samples.labels, np.nan)
         if np.isfinite(labels).all(axis=1).any():
-            scores = _scores_by_mass(fold, held_out, labels)
+            bank = build_bank(fold)
+            p = bank_posterior(held_out.samples, fold, bank)
+            scores = {
+                mass: score_against_labels(rows_of_posterior(held_out.samples, fold, bank, p, mass), labels)
+                for mass in (*_CREDIBLE_MASSES, usual)
+            }
             entry["score"] = scores[usual]
             coverage.append([scores[mass]["held_by_bounds"] for mass in _CREDIBLE_MASSES])
     if not coverage:
         return entries, usual
     return entries, _CREDIBLE_MASSES[int(np.argmin(np.abs(np.mean(coverage, axis=0) - _COVERAGE_GOAL)))]
-
-
-def _scores_by_mass(model: Model, held_out: FitPart, labels: Floats) -> dict[float, Document]:
-    bank = build_bank(model)
-    p, _, _ = bank_posterior(held_out.samples, model, bank)
-    scores = {}
-    for mass in {*_CREDIBLE_MASSES, model.settings.bounds}:
-        settings = model.settings.model_copy(update={"bounds": mass})
-        candidate = model.model_copy(update={"settings": settings})
-        rows = rows_of_posterior(held_out.samples, candidate, bank, p)
-        scores[mass] = score_against_labels(rows, labels)
-    return scores
 
 
 def prediction_quality(model: Model, held_out: FitPart) -> Document:

@@ -22,7 +22,7 @@ def delays_of(samples, model):
     """Which delay explains a flight best, by running each alone."""
     bank, delays_s = build_bank(model), model.settings.delays_s
     flights = [innovations(_with_command_delay(samples, d), model) for d in delays_s]
-    return model_weights([run_flight(flight, model, bank)[3] for flight in flights], model.rate_hz)
+    return model_weights([run_flight(flight, model, bank)[1] for flight in flights], model.rate_hz)
 
 
 @pytest.mark.parametrize(("command_delay_s", "which"), [(-0.04, 0), (0.0, 1), (0.04, 2)])
@@ -40,8 +40,8 @@ def test_a_delayed_flight_takes_nothing_from_later(healthy, wing_model):
     commands = healthy.commands.copy()
     commands[k + 1 :] += 0.3
     bank = build_bank(wing_model)
-    one = bank_posterior(healthy, wing_model, bank)[0]
-    other = bank_posterior(replace(healthy, commands=commands), wing_model, bank)[0]
+    one = bank_posterior(healthy, wing_model, bank)
+    other = bank_posterior(replace(healthy, commands=commands), wing_model, bank)
     assert np.array_equal(one[: k + 1], other[: k + 1])
     assert not np.array_equal(one[k + 2], other[k + 2])
 

@@ -39,7 +39,8 @@ HypothesisRow = tuple[Floats, int, float, Floats]
 
 
 class HypothesisBank(NamedTuple):
-    """H hypotheses of G groups; the first is healthy, the last that nothing answers the commands.
+    """H hypotheses of G groups; the first is healthy, the last that nothing answers the commands: on the
+    ground, or everything lost.
 
     effectiveness (H, G). hypothesis_kind (H,). transition_share (H,): share of all changes of hypothesis that
     lead to this one. rate_offset_variance (H, 3): variance of the offset of the rates that comes with it,
@@ -56,11 +57,6 @@ class HypothesisBank(NamedTuple):
     prior_probability: Floats
     change_probability_per_sample: float
     own_gain_share: Floats
-
-    @property
-    def no_response_hypothesis_index(self) -> int:
-        """Index of the hypothesis that nothing answers the commands: on the ground, or everything lost."""
-        return len(self.hypothesis_kind) - 1
 
     @property
     def is_fault_hypothesis(self) -> np.ndarray:

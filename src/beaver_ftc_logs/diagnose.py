@@ -139,7 +139,7 @@ def _diagnose_checked_log(samples: Samples, model: Model) -> LogRows:
     bank = build_bank(model)
     known = trust.without_dead_rows(samples, model)
     P = bank_posterior(known, model, bank)
-    silent = P[:, bank.no_response_hypothesis_index] > _NO_RESPONSE_LIMIT
+    silent = P[:, -1] > _NO_RESPONSE_LIMIT
     rows = rows_of_posterior(samples, model, bank, P)
     if model.vehicle.other_laws and model.settings.threshold is not None and not model.colours:
         rows = _withdraw_contradicted(known, model, rows, model.settings.threshold)
@@ -242,9 +242,9 @@ def rows_of_posterior(
 ) -> LogRows:
     """Return the rows that follow from the probabilities of the hypotheses (n, H). mass: posterior mass
     inside the bounds, that of the model's settings where None."""
-    p_silent = P[:, bank.no_response_hypothesis_index]
+    p_silent = P[:, -1]
     p_fault = P[:, bank.is_fault_hypothesis].sum(axis=1)
-    P_live = P[:, : bank.no_response_hypothesis_index] / np.maximum(1.0 - p_silent, MIN_DIVISOR)[:, None]
+    P_live = P[:, :-1] / np.maximum(1.0 - p_silent, MIN_DIVISOR)[:, None]
     calm = P[:, 0] + p_silent > 0.5
     mu = model.settings.threshold
     steps = fault_evidence(P, bank)
@@ -285,7 +285,7 @@ def _group_bounds(
     """
     levels, p = _group_levels(bank, P_live, g)
     if model.vehicle.other_laws:  # how rare faults are says nothing of a flight with one: all levels alike
-        p = p / _group_levels(bank, bank.prior_probability[None, : bank.no_response_hypothesis_index], g)[1]
+        p = p / _group_levels(bank, bank.prior_probability[None, :-1], g)[1]
         p /= p.sum(axis=1, keepdims=True)
     low, high = _credible_bounds(levels, p, mass)
     if len(model.groups[g]) > 1:
@@ -307,9 +307,7 @@ def _latched(alarmed: Mask, calm: Mask) -> Mask:
 
 def _group_levels(bank: HypothesisBank, P_live: Floats, g: int) -> tuple[Floats, Floats]:
     """A group's levels, the last of them 1, and the probability of each, (L,) and (n, L)."""
-    levels, level_of = np.unique(
-        bank.effectiveness[: bank.no_response_hypothesis_index, g], return_inverse=True
-    )
+    levels, level_of = np.unique(bank.effectiveness[:-1, g], return_inverse=True)
     p = np.zeros((len(P_live), len(levels)))
     for h, j in enumerate(level_of):
         p[:, j] += P_live[:, h]

@@ -629,7 +629,7 @@ def _healthy_peaks(model: Model, held_out: FitPart) -> extremes.PeaksAndHours:
     bank = build_bank(model)
     p = bank_posterior(held_out.samples, model, bank)
     z = fault_evidence(p, bank)
-    answers = p[:, bank.no_response_hypothesis_index] < 0.5
+    answers = p[:, -1] < 0.5
     rows = np.flatnonzero(held_out.is_usable & ~(held_out.samples.labels < 1.0).any(axis=1) & answers)
     runs = [page_cusum(z[rows[begin:end]], np.inf) for begin, end in runs_between(np.diff(rows) > 1)]
     peaks = np.concatenate([extremes.peaks_between_zeros(cusum) for cusum in runs])

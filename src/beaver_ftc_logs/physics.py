@@ -61,7 +61,7 @@ def fit_angle(gyros: Sequence[Column], angles: Sequence[Column | None], axis: in
     p, q, r = (_interpolate(gyro, t) for gyro in gyros)
     # The circle is known whatever the unit.
     phi = _interpolate(roll, t) * 2.0 * np.pi / _full_circle(roll.values)
-    theta = None
+    theta = np.zeros(len(t))
     if pitch is not None:
         circle = _full_circle(np.append(4.0 * pitch.values, roll.values))
         theta = _interpolate(pitch, t) * 2.0 * np.pi / circle
@@ -69,9 +69,9 @@ def fit_angle(gyros: Sequence[Column], angles: Sequence[Column | None], axis: in
     if axis == 1:
         return _fit_angle(t, _interpolate(angle, t), [q * np.cos(phi), -r * np.sin(phi)])
     if axis == 0:
-        terms = [p] if theta is None else [p, *(np.tan(theta) * part for part in turn)]
+        terms = [p, *(np.tan(theta) * part for part in turn)]
     else:
-        terms = [(turn[0] + turn[1]) / (1.0 if theta is None else np.cos(theta))]
+        terms = [(turn[0] + turn[1]) / np.cos(theta)]
     return _fit_angle(t, _interpolate(angle, t), terms, _full_circle(angle.values), theta)
 
 

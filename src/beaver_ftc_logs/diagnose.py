@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from beaver_ftc.documents import BadInput
+from beaver_ftc.results import Document
 from beaver_ftc_logs import energy, trust
 from beaver_ftc_logs.bank import GROUP_LOSS, UNKNOWN_OFFSET, HypothesisBank, build_bank
 from beaver_ftc_logs.filtering import bank_posterior, fault_evidence, page_cusum
@@ -70,10 +71,10 @@ class LogRows:
         if len(self.credible) != len(self.t_s):
             object.__setattr__(self, "credible", np.ones(len(self.t_s), dtype=np.int64))
 
-    def table(self, surfaces: Iterable[str], with_probability: bool = False) -> dict[str, Any]:
+    def table(self, surfaces: Iterable[str], with_probability: bool = False) -> Document:
         """The columns of diagnosis.parquet. Where nothing is said of a surface's effectiveness, its
         bounds are 0 and 1."""
-        columns: dict[str, Any] = {"t_s": self.t_s, "faulty": self.faulty}
+        columns: Document = {"t_s": self.t_s, "faulty": self.faulty}
         columns["named"] = self.isolated_surfaces.tolist()
         for i, surface in enumerate(surfaces):
             columns[f"{surface}_effectiveness"] = self.effectiveness[:, i]

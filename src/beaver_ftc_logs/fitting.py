@@ -20,7 +20,7 @@ the two halves of a single flight in turn, or each of several flights in turn.
 from collections.abc import Callable, Iterator, Sequence
 from functools import wraps
 from itertools import groupby, product
-from typing import Any, Concatenate, ParamSpec, TypeVar
+from typing import Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 
@@ -59,7 +59,7 @@ _TRIM_SPANS_S = (2.0, 8.0)
 """Spans whose means tell the drift of the trim from the residual's colour."""
 _POWER_LABELLED = 0.8
 """A coloured residual tells less than a white one: by how much, blocked tests decided."""
-_OTHER_DAYS: dict[str, Any] = {
+_OTHER_DAYS: Document = {
     "trim_sd": 0.1,
     "trim_shift": 0.03,
     "trim_walk": [2.5e-3, 6e-4, 2e-3],
@@ -69,7 +69,7 @@ _OTHER_DAYS: dict[str, Any] = {
 }
 """How far another day may be: chosen on days drawn from one flight, judged on others (`--other-days`). The
 drift of the trim is what the means of the residual over 30 s show in that flight."""
-_OTHER_LAWS: dict[str, Any] = {
+_OTHER_LAWS: Document = {
     "own_gain_sd": 0.05,
     "own_gain_time_s": 20.0,
     "name_evidence": 2.0,
@@ -84,7 +84,7 @@ not modelled ties the command to it), and what a name asks for then. Chosen on s
 bounds: the posterior mass of 90 % bounds where no labels choose it. For a second or two after a loss most of
 the mass still claims health: 0.9 of it held the truth at the fault in 0.70 to 0.94 of the samples, fewest of
 large losses; 0.97 in 0.83 to 0.99, on seeds 401 to 403, which chose it."""
-_MOVING_AIR: dict[str, Any] = {"own_gain_sd": 0.08, "own_gain_time_s": 100.0}
+_MOVING_AIR: Document = {"own_gain_sd": 0.08, "own_gain_time_s": 100.0}
 _GAIN_WINDOW_S, AR_ORDER = 10.0, 20
 """Whitened by the flight's own noise model and an AR predictor of so many samples; gains differ by flight
 rather than within it: chosen on seeds 11 and 12, in light turbulence; what a name asks for on a pa28's
@@ -354,7 +354,7 @@ def _fit_noise_model(own: Parts, model: Model) -> NoiseModel:
 def estimate_filter_settings(parts: Parts, model: Model) -> FilterSettings:
     """Estimate the settings of later faults from the flights: levels seen, and how often they changed."""
     moving, other_laws = model.vehicle.moving_air, model.vehicle.other_laws
-    extra: dict[str, Any] = _OTHER_LAWS | (_MOVING_AIR if moving else {}) if other_laws else {}
+    extra: Document = _OTHER_LAWS | (_MOVING_AIR if moving else {}) if other_laws else {}
     if other_laws and model.colours:
         extra |= {"quick_error": quick_error_share(parts, model)}
     extra |= {"delays_s": [d / model.rate_hz for d in ((0.0,) if moving else _DELAYS_SAMPLES)]}

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from itertools import product
 from math import isfinite
-from typing import Any
 
 import numpy as np
 
@@ -17,7 +16,7 @@ from beaver_ftc.results import Document
 from beaver_ftc_logs import extremes, fitting, gyro_noise, regression, trust
 from beaver_ftc_logs.model import FittedRanges, Model, NoiseModel
 from beaver_ftc_logs.recording import Floats
-from beaver_ftc_logs.regression import Parts, group_indices, spectral_density, variance_inflation
+from beaver_ftc_logs.regression import Groups, Parts, group_indices, spectral_density, variance_inflation
 from beaver_ftc_logs.samples import (
     NOISE_MA_CANDIDATES,
     UNFITTED_GYROS_RAD_S,
@@ -80,7 +79,7 @@ def add_unseen_noise(model: Model, flights: Sequence[Samples]) -> Model:
     known = [tuple(noise.average) for noise in model.colours]
     quietest = min((np.array(noise.noise) for noise in model.colours), key=np.linalg.det)
     powers = [noise.quick for noise in model.colours if noise.quick is not None]
-    same: dict[str, Any] = {
+    same: Document = {
         "wider": max(noise.wider for noise in model.colours),
         "misreads": np.max([noise.misreads for noise in model.colours], axis=0).tolist(),
         "quick": min(powers, default=None),
@@ -421,7 +420,7 @@ def _axis_text(values: dict[str, float]) -> str:
     return ", ".join(f"{axis} {value:.3f}" for axis, value in values.items())
 
 
-def fit_output_error(parts: Parts, groups: list[list[int]]) -> dict[str, Any]:
+def fit_output_error(parts: Parts, groups: Groups) -> Document:
     """Fit on every other window, test on the rest. Returns servo lag and delay in s, their standard errors,
     and the share of the rates' variance explained over free-running windows not fitted, an axis.
 
@@ -459,7 +458,7 @@ def fit_output_error(parts: Parts, groups: list[list[int]]) -> dict[str, Any]:
     }
 
 
-def _cut_windows(parts: Parts, groups: list[list[int]], n: int, past: int) -> tuple[Floats, Floats]:
+def _cut_windows(parts: Parts, groups: Groups, n: int, past: int) -> tuple[Floats, Floats]:
     """Commands u (W, past + n, G) with their past, scaled by labels, and rates y (W, n, 3), of W windows."""
     windows = []
     for part in parts:

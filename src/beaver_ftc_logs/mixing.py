@@ -19,6 +19,7 @@ import numpy as np
 
 from beaver_ftc.documents import BadInput
 from beaver_ftc.documents import validate_model as validate
+from beaver_ftc.results import Document
 from beaver_ftc_logs.readers import SELECTIVE_READERS, check_exists, read_flight, reader_name_for_path
 from beaver_ftc_logs.recording import Floats, Parameters
 from beaver_ftc_logs.vehicle import Vehicle, read_vehicle_document
@@ -73,7 +74,7 @@ class Mixing:
     entry_by_column: `commands` by column; surfaces: as the key; lines: what was found, and what stays out.
     """
 
-    entry_by_column: dict[str, Any] = field(default_factory=dict)
+    entry_by_column: Document = field(default_factory=dict)
     surfaces: dict[str, Weights] = field(default_factory=dict)
     lines: list[str] = field(default_factory=list)
 
@@ -449,7 +450,7 @@ def load_vehicle_for_logs(
     missing = [key for key in ("commands", "surfaces") if key not in document.data]
     lines: list[str] = []
     if missing and logs:
-        first: dict[str, Any] = {}
+        first: Document = {}
         for log in logs:
             keys, lines_of_log = _missing_keys_of_log(log, reader, document.data, missing)
             if first and keys != first:
@@ -463,7 +464,7 @@ def load_vehicle_for_logs(
 
 def _missing_keys_of_log(
     log: Path, reader: str | None, data: Mapping[str, Any], missing: Sequence[str]
-) -> tuple[dict[str, Any], list[str]]:
+) -> tuple[Document, list[str]]:
     """The keys that a vehicle file leaves out, by a log's parameters; none in a format without parameters."""
     check_exists(log)
     used_reader = reader or data.get("reader") or reader_name_for_path(log)

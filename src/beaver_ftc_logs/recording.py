@@ -22,8 +22,10 @@ from beaver_ftc.documents import BadInput
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Mask = NDArray[np.bool_]
-Parameters = Mapping[str, tuple[float, ...]]
+Parameters = dict[str, tuple[float, ...]]
 """Parameters of an autopilot by name: its value in the log; if it changes, the first and the last one."""
+TimeSource = tuple[str, str]
+"""The column of the time and its unit."""
 _S_PER_US = 1e-6
 _N_LISTED_NEAREST_NAMES = 10
 MIN_DIVISOR = float(np.sqrt(np.finfo(float).tiny))
@@ -98,7 +100,7 @@ class RecordedFlight:
                 raise BadInput(f"{self.name}: no column {name}, {allowed}")
 
 
-def add_parameter(values_by_name: dict[str, tuple[float, ...]], name: str, value: float) -> None:
+def add_parameter(values_by_name: Parameters, name: str, value: float) -> None:
     """Note a value that a log gives to a parameter."""
     values = values_by_name.get(name, ())
     is_as_before = bool(values) and (values[-1] == value or (isnan(values[-1]) and isnan(value)))

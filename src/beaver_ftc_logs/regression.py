@@ -62,10 +62,14 @@ class FitPart:
 Parts = Sequence[FitPart]
 
 
-def group_surfaces(vehicle: Vehicle) -> list[list[int]]:
+Groups = list[list[int]]
+"""Surfaces that move together, by their places."""
+
+
+def group_surfaces(vehicle: Vehicle) -> Groups:
     """Surfaces by what excites them: those in one group get proportional commands."""
     M = mixer_matrix(vehicle)
-    groups: list[list[int]] = []
+    groups: Groups = []
     for i, m in enumerate(M):
         for group in groups:
             first = M[group[0]]
@@ -78,7 +82,7 @@ def group_surfaces(vehicle: Vehicle) -> list[list[int]]:
 
 
 def build_regressors(
-    samples: Samples, groups: list[list[int]], h: int, L: int, labelled: bool, f: int = 1
+    samples: Samples, groups: Groups, h: int, L: int, labelled: bool, f: int = 1
 ) -> tuple[Floats, Floats, Mask]:
     """The regressors of each sample: the past x (n, 3 h + X f), the commands U (n, G, L) of the groups, and
     whether all of it is known and no gap lies within, (n,).
@@ -95,7 +99,7 @@ def build_regressors(
     return X, U.transpose(0, 2, 1), ok
 
 
-def group_commands(samples: Samples, groups: list[list[int]], labelled: bool) -> Floats:
+def group_commands(samples: Samples, groups: Groups, labelled: bool) -> Floats:
     """The command of each group, (n, G); labelled: each surface's times its labelled effectiveness, 1 where
     there is no label."""
     u = samples.commands
@@ -110,7 +114,7 @@ def _delay_rows(values: np.ndarray, lag: int, fill: float) -> np.ndarray:
     return np.concatenate([np.full((lag, *values.shape[1:]), fill), values[: len(values) - lag]])
 
 
-def group_indices(model: Model) -> list[list[int]]:
+def group_indices(model: Model) -> Groups:
     """The model's groups as positions of their surfaces."""
     names = list(model.vehicle.surfaces)
     return [[names.index(name) for name in group] for group in model.groups]

@@ -17,6 +17,7 @@ import numpy as np
 
 from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.loop import FLOW, Diagnosis
+from beaver_ftc.results import Document
 from beaver_ftc_logs.diagnose import UNKNOWN_SURFACE, LogRows
 from beaver_ftc_logs.model import NoiseModel
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
@@ -45,7 +46,7 @@ class Replayed:
     command_gain_bounds: Floats
 
 
-def error_sections(scenario: Any) -> dict[str, Any]:
+def error_sections(scenario: Any) -> Document:
     """Return the errors that a scenario declares, as `Diagnosis` takes it."""
     values = scenario.model_dump(mode="json", exclude_unset=True)
     return {key: values[key] for key in _ERROR_KEYS if key in values}

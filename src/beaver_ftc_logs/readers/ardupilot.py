@@ -14,6 +14,7 @@ import numpy as np
 
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs.recording import (
+    Parameters,
     RecordedFlight,
     Topic,
     add_parameter,
@@ -32,7 +33,7 @@ def read(path: Path, wanted: Collection[str] | None = None) -> RecordedFlight:
     wanted: the columns that are kept in memory, all where None. Where the log has none of them, all
     columns are returned, without numbers: their names are known then.
     """
-    params: dict[str, tuple[float, ...]] = {}
+    params: Parameters = {}
     with package_errors_as_bad_input(path, "dataflash log", "pymavlink", "ArduPilot's .bin or .log"):
         import_module("pymavlink")  # here, since `dataflash` may have been imported before
         from beaver_ftc_logs.readers import dataflash

@@ -11,7 +11,7 @@ import numpy as np
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs.readers import LAST_PART_FACTOR, PART_OVERLAP_SHARE, check_is_log_itself
 from beaver_ftc_logs.readers.text import TableCells, TextTable, join_blocks
-from beaver_ftc_logs.recording import Column, Floats, RecordedFlight, nearest_names_text
+from beaver_ftc_logs.recording import Column, Floats, RecordedFlight, TimeSource, nearest_names_text
 from beaver_ftc_logs.units import TIME_UNITS
 
 TIME_COLUMN = "t_s"
@@ -25,7 +25,7 @@ NumberTable = dict[str, Floats]
 
 def read_parts(
     path: Path,
-    time: tuple[str, str] | None = None,
+    time: TimeSource | None = None,
     columns: Collection[str] | None = None,
     part_rows: int | None = None,
 ) -> Iterator[RecordedFlight]:

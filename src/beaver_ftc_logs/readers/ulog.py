@@ -10,6 +10,7 @@ from typing import Any
 
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs.recording import (
+    Parameters,
     RecordedFlight,
     Topic,
     add_parameter,
@@ -30,7 +31,7 @@ def read(path: Path, wanted: Collection[str] | None = None) -> RecordedFlight:
     Where the log has none of them, all columns are returned, without numbers. Where it lacks one, the log is
     read once more for the names of all.
     """
-    params: dict[str, tuple[float, ...]] = {}
+    params: Parameters = {}
     with package_errors_as_bad_input(path, "ULog", "pyulog", "a .ulg file of PX4"):
         topics = all_topics = _read_topics(path, wanted, params)
         if wanted is not None and not {*wanted} <= {*names_of_topics(topics)}:
@@ -42,9 +43,7 @@ def read(path: Path, wanted: Collection[str] | None = None) -> RecordedFlight:
     return RecordedFlight(path.stem, columns, notes=notes, parameters=params, unread_column_names=unread)
 
 
-def _read_topics(
-    path: Path, wanted: Collection[str] | None, params: dict[str, tuple[float, ...]]
-) -> dict[str, Topic]:
+def _read_topics(path: Path, wanted: Collection[str] | None, params: Parameters) -> dict[str, Topic]:
     """The topics of the wanted columns, of any instance; all where the log has none of these.
 
     params: receives those of the log. Raises ValueError for a message too large.

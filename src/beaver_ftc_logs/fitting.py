@@ -17,10 +17,8 @@ the two halves of a single flight in turn, or each of several flights in turn.
     known           which groups have an effect that is known (G,)
 """
 
-from collections.abc import Callable, Iterator, Sequence
-from functools import wraps
+from collections.abc import Iterator, Sequence
 from itertools import groupby, product
-from typing import Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 
@@ -117,26 +115,6 @@ _COVERAGE_GOAL = 0.93
 """Coverage the bounds aim at: 90 % and some of what another day takes away."""
 
 
-Args = ParamSpec("Args")
-Result = TypeVar("Result")
-OfParts = Callable[Concatenate[Parts, Args], Result]
-
-
-def _once(compute: OfParts[Args, Result]) -> OfParts[Args, Result]:
-    """Compute a result for these flights once: every test of a model needs the same fits to parts of them."""
-
-    @wraps(compute)
-    def cached(parts: Parts, *args: Args.args, **kwargs: Args.kwargs) -> Result:
-        cache = parts[0].result_cache
-        values = (arg.model_dump_json() if isinstance(arg, Vehicle) else arg for arg in args)
-        key = (compute.__name__, *values, *map(id, parts))
-        if key not in cache:
-            cache[key] = (tuple(parts), compute(parts, *args, **kwargs))  # held: an id is of one object
-        return cache[key][1]  # type: ignore[return-value]
-
-    return cached
-
-
 def fit_parts(flights: Sequence[Samples]) -> list[FitPart]:
     """Return each flight with the samples that are known well enough for the fit."""
     return [FitPart(samples, usable_mask(samples)) for samples in flights]
@@ -163,14 +141,14 @@ def usable_mask(samples: Samples) -> Mask:
 def fit_model(parts: Parts, vehicle: Vehicle, settings: FilterSettings | None = None) -> Model:
     """The model that fits these flights. Raises BadInput where there is too little to fit."""
     bic = bic_by_order(parts, vehicle)
-    model = _model_of_order(parts, vehicle, *min(bic, key=lambda order: bic[order]))
+    model = _fitted(parts, vehicle, *min(bic, key=lambda order: bic[order]))[1]
     model = model.model_copy(update={"settings": settings or estimate_filter_settings(parts, model)})
     return _with_inflated_noise(parts, model) if model.colours else model
 
 
 def refit(parts: Parts, model: Model) -> Model:
     """A model of the same order and settings, fitted to other flights."""
-    refitted = _model_of_order(parts, model.vehicle, model.history, model.lags)
+    refitted = _fitted(parts, model.vehicle, model.history, model.lags)[1]
     colours = [
         noise.model_copy(update={"wider": model.noise_of(noise.average).wider}) for noise in refitted.colours
     ]
@@ -218,10 +196,20 @@ def _order_columns(vehicle: Vehicle, h: int, L: int) -> Ints:
 
 def fit_of(parts: Parts, model: Model) -> regression.Regression:
     """Least squares of a model's order over all flights."""
-    return fit_order(parts, model.vehicle, model.history, model.lags)
+    return _fitted(parts, model.vehicle, model.history, model.lags)[0]
 
 
-@_once
+def _fitted(parts: Parts, vehicle: Vehicle, h: int, L: int) -> tuple[regression.Regression, Model]:
+    """Least squares of given order over all flights, and its model: made once, since every test of a model
+    needs the same fits to parts of them."""
+    fits, key = parts[0].fits, (vehicle.model_dump_json(), h, L, *map(id, parts))
+    if key not in fits:
+        fit = fit_order(parts, vehicle, h, L)
+        # with the parts, which are held: an id is of one object
+        fits[key] = fit, _model_of_fit(fit, parts, vehicle, h, L), tuple(parts)
+    return fits[key][:2]
+
+
 def fit_order(parts: Parts, vehicle: Vehicle, h: int, L: int) -> regression.Regression:
     """Least squares of given order over all flights."""
     Z, y, stretch = stack_data(parts, vehicle, h, L)
@@ -254,9 +242,7 @@ def stack_data(parts: Parts, vehicle: Vehicle, h: int, L: int) -> tuple[Floats, 
     return np.vstack(Z), np.vstack(y), np.concatenate(stretches)
 
 
-@_once
-def _model_of_order(parts: Parts, vehicle: Vehicle, h: int, L: int) -> Model:
-    fit = fit_order(parts, vehicle, h, L)
+def _model_of_fit(fit: regression.Regression, parts: Parts, vehicle: Vehicle, h: int, L: int) -> Model:
     names = list(vehicle.surfaces)
     groups = regression.group_surfaces(vehicle)
     first = len(fit.coefficients) - len(groups) * L
@@ -517,7 +503,7 @@ def validation_folds(parts: Parts, most: int | None = None) -> list[tuple[list[F
     """Return the fitted flights, the held-out one and its name: halves of one flight; each flight in turn, of
     more than `most` every so many at once."""
     if len(parts) == 1:
-        first, second = _halves(parts)
+        first, second = parts[0].halves
         return [([first], second, "second half"), ([second], first, "first half")]
     n = min(len(parts), most or len(parts))
     return [
@@ -525,16 +511,6 @@ def validation_folds(parts: Parts, most: int | None = None) -> list[tuple[list[F
         for k in range(n)
         for one in parts[k::n]
     ]
-
-
-@_once
-def _halves(parts: Parts) -> tuple[FitPart, FitPart]:
-    """The usable samples of one flight in two halves."""
-    (part,) = parts
-    rows = np.flatnonzero(part.is_usable)
-    middle = int(rows[len(rows) // 2]) if len(rows) else 0
-    first = np.arange(len(part.is_usable)) < middle
-    return FitPart(part.samples, part.is_usable & first), FitPart(part.samples, part.is_usable & ~first)
 
 
 def add_ranges_and_threshold(parts: Parts, model: Model) -> Model:

@@ -44,14 +44,22 @@ _QUICK_SPAN_S = 0.5
 
 @dataclass(frozen=True)
 class FitPart:
-    """A flight (or half of one) and which of its samples the fit may use, is_usable (n,). result_cache:
-    results that were computed from this flight and others."""
+    """A flight (or half of one) and which of its samples the fit may use, is_usable (n,). fits: to this
+    flight and others."""
 
     samples: Samples
     is_usable: Mask
-    result_cache: dict[tuple[object, ...], tuple[object, object]] = field(
-        default_factory=dict, repr=False, compare=False
-    )
+    fits: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
+
+    @cached_property
+    def halves(self) -> tuple["FitPart", "FitPart"]:
+        """The usable samples in two halves."""
+        rows = np.flatnonzero(self.is_usable)
+        middle = int(rows[len(rows) // 2]) if len(rows) else 0
+        is_first = np.arange(len(self.is_usable)) < middle
+        return FitPart(self.samples, self.is_usable & is_first), FitPart(
+            self.samples, self.is_usable & ~is_first
+        )
 
     def innovations(self, model: Model) -> "Innovations":
         """The samples in use by a model, commands as effective as labels say."""

@@ -110,7 +110,8 @@ def _plain_rows(samples: Samples, names: np.ndarray, e: Floats, **given: Floats)
     probability those that are not given: the bounds are the estimate, the probability is 0 or 1."""
     faulty = np.array([bool(name) for name in names], dtype=np.int64)
     given = {"low": e, "high": e, "probability": faulty.astype(float), **given}
-    return LogRows(samples.t_s, faulty, names, e, given["low"], given["high"], given["probability"])
+    t_s = samples.t_s
+    return LogRows(t_s, faulty, names, e, given["low"], given["high"], given["probability"], t_s)
 
 
 def diagnose_by_freeze_rule(log: RecordedFlight, samples: Samples, model: Model) -> LogRows | None:

@@ -11,6 +11,7 @@ calm (n,): whether health, or no response at all, is the likelier.
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import compress
 from typing import Any
 
@@ -49,9 +50,8 @@ class LogRows:
 
     t_s (n,). faulty (n,): 0 or 1. isolated_surfaces (n,): names joined by +, empty without an alarm.
     effectiveness of each surface, its bounds effectiveness_low and effectiveness_high (n, S).
-    fault_probability (n,) of any surface. credible (n,): 0 or 1, by default 1. evidence_start_time_s (n,):
-    time at which the evidence for a fault began to increase, by default t_s. doubtful_rows: for each reason
-    the rows (n,) that are not credible.
+    fault_probability (n,) of any surface. evidence_start_time_s (n,): time at which the evidence for a fault
+    began to increase. doubtful_rows: for each reason the rows (n,) that are not credible.
     """
 
     t_s: Floats
@@ -61,15 +61,14 @@ class LogRows:
     effectiveness_low: Floats
     effectiveness_high: Floats
     fault_probability: Floats
-    credible: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int64))
-    evidence_start_time_s: Floats = field(default_factory=lambda: np.empty(0))
+    evidence_start_time_s: Floats
     doubtful_rows: Mapping[str, Mask] = field(default_factory=dict)
 
-    def __post_init__(self) -> None:
-        if len(self.evidence_start_time_s) != len(self.t_s):
-            object.__setattr__(self, "evidence_start_time_s", self.t_s)
-        if len(self.credible) != len(self.t_s):
-            object.__setattr__(self, "credible", np.ones(len(self.t_s), dtype=np.int64))
+    @cached_property
+    def credible(self) -> Ints:
+        """0 where a row is doubtful, else 1, (n,)."""
+        is_doubtful = np.any([np.zeros(len(self.t_s)), *self.doubtful_rows.values()], axis=0)
+        return np.where(is_doubtful, 0, 1)
 
     def table(self, surfaces: Iterable[str], with_probability: bool = False) -> Document:
         """The columns of diagnosis.parquet. Where nothing is said of a surface's effectiveness, its
@@ -107,11 +106,10 @@ class LogRows:
         """The rows without alarm, name and bounds, and not credible, where one of the reasons, (n,) each, is
         true; reasons without a row are left out."""
         reasons = {reason: mask for reason, mask in reasons.items() if mask.any()}
-        removed = np.any([np.zeros(len(self.t_s), dtype=bool), *reasons.values()], axis=0)
-        rows = self.without_estimate(removed)._where(
-            removed, faulty=0, isolated_surfaces="", fault_probability=0.0
-        )
-        return replace(rows, credible=np.where(removed, 0, 1), doubtful_rows=reasons)
+        rows = replace(self, doubtful_rows=reasons)
+        removed = rows.credible == 0
+        rows = rows.without_estimate(removed)
+        return rows._where(removed, faulty=0, isolated_surfaces="", fault_probability=0.0)
 
 
 def diagnose(samples: Samples, model: Model) -> LogRows:

@@ -138,6 +138,7 @@ def rows_of_replay(t_s: Floats, replay: Replayed, surfaces: Sequence[str], fdi: 
         effectiveness_low=low,
         effectiveness_high=high,
         fault_probability=faulty.astype(float),
+        evidence_start_time_s=t_s,
     )
 
 

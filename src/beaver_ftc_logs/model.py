@@ -21,7 +21,7 @@ _MAX_COEF = 1e6  # of any coefficient: those of logs are below 100
 _MAX_SURFACE_GROUPS = 24  # the filter tries all pairs
 _MAX_CONDITION_NUMBER = 1e12  # of a covariance
 # keys of `fitted` in files of release 1.0.0
-_DEAD_KEYS = ("correlation", "scale", "minutes", "column_sd", "misread")
+_DEAD_KEYS = ("correlation", "scale", "minutes", "column_sd", "misread", "spread")
 
 Coefficient = Annotated[Number, Field(ge=-_MAX_COEF, le=_MAX_COEF)]
 CoefRow = list[Coefficient]
@@ -104,7 +104,6 @@ class FittedRanges(Section):
     commands: least and largest command of each surface, share of travel
     rates: least and largest p, q and r, rad/s
     airspeed: least and largest airspeed, m/s
-    spread: standard deviation of p, q and r, rad/s
     tied: share of each group's effect that past, signals and other groups make up
     gain_sd: standard error of each group's gain
     still_s: longest time each column stood still, s
@@ -115,7 +114,6 @@ class FittedRanges(Section):
     commands: CoefRows
     rates: CoefRows
     airspeed: CoefRow | None = None
-    spread: CoefRow = Field([])
     tied: CoefRow = Field([])
     gain_sd: CoefRow = Field([])
     still_s: dict[str, Number] = Field({})
@@ -239,7 +237,6 @@ class Model(Section):
                 (("fitted", "commands"), ranges.commands, (len(ranges.commands), 2)),
                 (("fitted", "rates"), ranges.rates, (3, 2)),
                 (("fitted", "airspeed"), ranges.airspeed, (2,)),
-                (("fitted", "spread"), ranges.spread, (3,)),
                 (("fitted", "tied"), ranges.tied, (G,)),
                 (("fitted", "gain_sd"), ranges.gain_sd, (G,)),
             ]
@@ -264,8 +261,8 @@ class Model(Section):
         if np.min(self.response_sd) < 0.0:
             yield ("response_sd",), "has a negative number, allowed: at least 0"
         ranges = self.fitted
-        if ranges is not None and min((*ranges.gain_sd, *ranges.spread), default=0.0) < 0.0:
-            yield ("fitted",), "gain_sd or spread has a negative number, allowed: at least 0"
+        if ranges is not None and min(ranges.gain_sd, default=0.0) < 0.0:
+            yield ("fitted",), "gain_sd has a negative number, allowed: at least 0"
 
     @property
     def group_names(self) -> list[str]:

@@ -68,7 +68,6 @@ def compute_fitted_ranges(parts: Parts, tied: Floats, gain_sd: Floats) -> Fitted
         commands=central_ranges(commands),
         rates=central_ranges(rates),
         airspeed=central_ranges(airspeeds[:, None])[0] if airspeeds.size else None,
-        spread=np.nanstd(rates, axis=0).tolist(),
         tied=tied.tolist(),
         gain_sd=gain_sd.tolist(),
         still_s=still,
@@ -128,14 +127,12 @@ def unknown_sentences(model: Model) -> list[str]:
 def refuse_rate_unit(samples: Samples, ranges: FittedRanges | None) -> None:
     """Raise BadInput where all rates spread so much more or less than in the flights of the model that they
     are in another unit."""
-    if ranges is None or not ranges.spread:
+    if ranges is None or not ranges.rates:
         return
-    if not np.isfinite(samples.rates).any(axis=0).all():  # an axis without a number has no spread
+    ratios = _relative_motion(samples.rates, ranges.rates)
+    if not ratios.max() < _MAX_AXIS_RATIO * ratios.min():  # an axis without a number does not move
         return
-    ratios = np.nanstd(samples.rates, axis=0) / np.maximum(ranges.spread, MIN_DIVISOR)
-    ratio = float(np.exp(np.mean(np.log(np.maximum(ratios, MIN_DIVISOR)))))
-    if not ratios.max() < _MAX_AXIS_RATIO * ratios.min():
-        return
+    ratio = float(np.exp(np.mean(np.log(ratios))))
     hints = (
         (1.0 / ratio, "a factor of {0:.4g} (`unit: {2}`) fits"),
         (ratio, "a factor of {1:.4g} fits: the model's own were in {2}?"),
@@ -144,8 +141,8 @@ def refuse_rate_unit(samples: Samples, ranges: FittedRanges | None) -> None:
         unit = nearest_unit(RATE, size, _UNIT_FACTOR_ROOT**2)
         if unit not in (None, "rad/s"):
             text = hint.format(SI_UNITS[unit][1], 1.0 / SI_UNITS[unit][1], unit)
-            spread = f"rates spread {ratio:.3g} times as widely as in the flights of the model"
-            raise BadInput(f"{samples.name}: {spread}, allowed: rates in rad/s; {text}")
+            motion = f"rates spread {ratio:.3g} times as widely as in the flights of the model"
+            raise BadInput(f"{samples.name}: {motion}, allowed: rates in rad/s; {text}")
 
 
 def refuse_command_unit(

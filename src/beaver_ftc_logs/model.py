@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
-from beaver_ftc.documents import Conflict, Location, Number, Section, Whole, read_file, refuse
+from beaver_ftc.documents import Conflict, Location, Number, Section, Whole, deny, read_file, refuse
 from beaver_ftc_logs.extremes import PeakTail
 from beaver_ftc_logs.recording import Floats
 from beaver_ftc_logs.vehicle import Vehicle
@@ -32,6 +32,30 @@ Share = Annotated[Number, Field(ge=0, le=1)]
 Positive = Annotated[Number, Field(gt=0, le=_MAX_COEF)]
 NonNegative = Annotated[Number, Field(ge=0, le=_MAX_COEF)]
 AtLeastOne = Annotated[Number, Field(ge=1, le=_MAX_COEF)]
+
+
+def _shape(lists: Any) -> tuple[int, ...] | None:
+    """Lengths of nested lists; None where those of one depth differ."""
+    try:
+        return np.shape(lists)
+    except ValueError:
+        return None
+
+
+def _check_covariance(rows: CoefRows) -> CoefRows:
+    """The rows of a covariance (3, 3). Refuses one that is none, or that 64 bits cannot invert."""
+    if _shape(rows) != (3, 3):
+        deny("has another shape, allowed: 3 x 3 numbers")
+    R = np.array(rows)
+    if abs(R - R.T).max() > 1e-6 * abs(R).max():
+        deny("is not symmetric, allowed: a covariance")
+    smallest, *_, largest = np.linalg.eigvalsh(R)
+    if smallest <= 0.0 or largest > _MAX_CONDITION_NUMBER * smallest:
+        deny(f"is singular or nearly so, allowed: a covariance, conditioned to {_MAX_CONDITION_NUMBER:g}")
+    return rows
+
+
+Covariance = Annotated[CoefRows, AfterValidator(_check_covariance)]
 
 
 class FilterSettings(Section):
@@ -115,7 +139,7 @@ class FittedRanges(Section):
     rates: CoefRows
     airspeed: CoefRow | None = None
     tied: CoefRow = Field([])
-    gain_sd: CoefRow = Field([])
+    gain_sd: list[NonNegative] = Field([])
     still_s: dict[str, Number] = Field({})
     energy_climb: Number | None = None
     tail: PeakTail | None = None
@@ -142,7 +166,7 @@ class NoiseModel(Section):
     """
 
     average: CoefRow = Field(min_length=1, max_length=1000)
-    noise: CoefRows
+    noise: Covariance
     before: CoefRows = Field([])
     wider: AtLeastOne = 1.0
     misreads: list[ShareBelowOne] = Field([])
@@ -181,9 +205,9 @@ class Model(Section):
     lags: Whole = Field(ge=1, le=50)
     intercept: CoefRow = Field(min_length=3, max_length=3)
     past: CoefRows
-    response: list[CoefRows]
-    response_sd: list[CoefRows]
-    noise: CoefRows
+    response: list[CoefRows] = Field(min_length=1)
+    response_sd: list[list[list[NonNegative]]] = Field(min_length=1)
+    noise: Covariance
     colours: list[NoiseModel] = Field([])
     settings: FilterSettings = FilterSettings()
     fitted: FittedRanges | None = None
@@ -196,7 +220,6 @@ class Model(Section):
         reason = f"has {n} rows, allowed: {n_past}, as `identify` writes them: identify it again"
         conflicts: list[Conflict] = [(("past",), reason)] * (n != n_past)
         refuse([*conflicts, *self._group_mistakes(), *self._shape_mistakes()])
-        refuse(self._covariance_mistakes())
         return self
 
     def _group_mistakes(self) -> Iterator[Conflict]:
@@ -222,47 +245,25 @@ class Model(Section):
         arrays: list[tuple[Location, Any, tuple[int, ...]]] = [
             (("response",), self.response, (G, L, 3)),
             (("response_sd",), self.response_sd, (G, L, 3)),
-            (("noise",), self.noise, (3, 3)),
+            (("past",), self.past, (len(self.past), 3)),
         ]
-        optional: list[tuple[Location, Any, tuple[int, ...]]] = [(("past",), self.past, (len(self.past), 3))]
         for i, noise in enumerate(self.colours):
             at, n_ar = ("colours", i), -(-len(noise.before) // 3) * 3
-            arrays.append(((*at, "noise"), noise.noise, (3, 3)))
-            optional.append(((*at, "before"), noise.before, (n_ar, 3)))
-            optional.append(((*at, "misreads"), noise.misreads, (G,)))
+            arrays.append(((*at, "before"), noise.before, (n_ar, 3)))
+            arrays.append(((*at, "misreads"), noise.misreads, (G,)))
             if noise.average[0] != 1.0:
                 yield (*at, "average"), "does not begin with 1, allowed: 1, c1, ..."
         if (ranges := self.fitted) is not None:
-            optional += [
+            arrays += [
                 (("fitted", "commands"), ranges.commands, (len(ranges.commands), 2)),
                 (("fitted", "rates"), ranges.rates, (3, 2)),
                 (("fitted", "airspeed"), ranges.airspeed, (2,)),
                 (("fitted", "tied"), ranges.tied, (G,)),
                 (("fitted", "gain_sd"), ranges.gain_sd, (G,)),
             ]
-        for key_path, lists, shape in [*arrays, *(one for one in optional if one[1])]:
-            if _shape(lists) != shape:
+        for key_path, lists, shape in arrays:
+            if lists and _shape(lists) != shape:
                 yield key_path, f"has another shape, allowed: {' x '.join(map(str, shape))} numbers"
-
-    def _covariance_mistakes(self) -> Iterator[Conflict]:
-        """Covariances that are none, or that no arithmetic in 64 bits can invert; negative deviations."""
-        covariances: list[tuple[Location, CoefRows]] = [(("noise",), self.noise)]
-        for i, noise in enumerate(self.colours):
-            covariances.append((("colours", i, "noise"), noise.noise))
-        for key_path, rows in covariances:
-            R = np.array(rows)
-            if abs(R - R.T).max() > 1e-6 * abs(R).max():
-                yield key_path, "is not symmetric, allowed: a covariance"
-                continue
-            smallest, *_, largest = np.linalg.eigvalsh(R)
-            if smallest <= 0.0 or largest > _MAX_CONDITION_NUMBER * smallest:
-                allowed = f"a covariance, conditioned to {_MAX_CONDITION_NUMBER:g}"
-                yield key_path, f"is singular or nearly so, allowed: {allowed}"
-        if np.min(self.response_sd) < 0.0:
-            yield ("response_sd",), "has a negative number, allowed: at least 0"
-        ranges = self.fitted
-        if ranges is not None and min(ranges.gain_sd, default=0.0) < 0.0:
-            yield ("fitted",), "gain_sd has a negative number, allowed: at least 0"
 
     @property
     def group_names(self) -> list[str]:
@@ -276,14 +277,6 @@ class Model(Section):
         """
         fitted = [noise for noise in self.colours if noise.average == list(average)]
         return fitted[0] if fitted else NoiseModel(average=list(average) or [1.0], noise=self.noise)
-
-
-def _shape(lists: Any) -> tuple[int, ...] | None:
-    """Lengths of nested lists; None where those of one depth differ."""
-    try:
-        return np.shape(lists)
-    except ValueError:
-        return None
 
 
 def load_model(path: Path) -> Model:

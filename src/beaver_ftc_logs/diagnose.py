@@ -248,7 +248,7 @@ def rows_of_posterior(
     mu = model.settings.threshold
     steps = fault_evidence(P, bank)
     evidence = page_cusum(steps, mu or np.inf)
-    alarmed = nameable = _held_long_enough(p_fault >= model.settings.alarm, model)
+    alarmed = nameable = p_fault >= model.settings.alarm
     if mu is not None:
         mu_name = model.settings.name_evidence * mu
         alarmed = (evidence >= mu) & ~calm
@@ -291,12 +291,6 @@ def _group_bounds(
         low, high = np.where(low < low.max(initial=0.0), 0.0, low), np.ones_like(high)
     # the median, with half of the probability on either side: the least mean absolute error
     return levels[(np.cumsum(p, axis=1) >= 0.5 - 1e-12).argmax(axis=1)], low, high
-
-
-def _held_long_enough(holds: Mask, model: Model) -> Mask:
-    """Return the rows at which a condition holds and has held for long enough, (n,)."""
-    n = round(model.settings.hold_s * model.rate_hz)
-    return np.asarray(holds & (np.arange(len(holds)) - last_true_row(~holds) > n))
 
 
 def _latched(alarmed: Mask, calm: Mask) -> Mask:

@@ -20,8 +20,8 @@ _MAX_FILE_BYTES = 20_000_000
 _MAX_COEF = 1e6  # of any coefficient: those of logs are below 100
 _MAX_SURFACE_GROUPS = 24  # the filter tries all pairs
 _MAX_CONDITION_NUMBER = 1e12  # of a covariance
-# keys of `fitted` in files of release 1.0.0
-_DEAD_KEYS = ("correlation", "scale", "minutes", "column_sd", "misread", "spread")
+# keys of `fitted` and `settings` in files of release 1.0.0
+_DEAD_KEYS = ("correlation", "scale", "minutes", "column_sd", "misread", "spread", "hold_s")
 
 Coefficient = Annotated[Number, Field(ge=-_MAX_COEF, le=_MAX_COEF)]
 CoefRow = list[Coefficient]
@@ -58,7 +58,19 @@ def _check_covariance(rows: CoefRows) -> CoefRows:
 Covariance = Annotated[CoefRows, AfterValidator(_check_covariance)]
 
 
-class FilterSettings(Section):
+class _LastingSection(Section):
+    """A section of a model file."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _drop_dead_keys(cls, data: object) -> object:
+        """Model files of release 1.0.0 have keys that nothing reads any more."""
+        if not isinstance(data, dict):
+            return data
+        return {key: value for key, value in data.items() if key not in _DEAD_KEYS}
+
+
+class FilterSettings(_LastingSection):
     """Prior settings of the filter.
 
     changes_per_hour: how often a surface changes its effectiveness
@@ -81,7 +93,6 @@ class FilterSettings(Section):
     tail: degrees of freedom of the residual's t distribution
     noise_memory_s: memory of the running scale of the residual, s
     alarm: probability of a fault that raises the alarm
-    hold_s: for how long the probability must stand, s
     false_alarms_per_hour: the rate that was asked for
     threshold: evidence for a fault that raises the alarm, instead of both: for that rate
     name_evidence: evidence for a name, over that for an alarm
@@ -111,7 +122,6 @@ class FilterSettings(Section):
     tail: Number = Field(8.0, gt=2, le=_MAX_COEF)
     noise_memory_s: Positive = 60.0
     alarm: OpenShare = 0.5
-    hold_s: NonNegative = 0.0
     false_alarms_per_hour: Number | None = Field(None, gt=0, le=_MAX_COEF)
     threshold: Number | None = Field(None, gt=0, le=_MAX_COEF)
     name_evidence: AtLeastOne = 1.0
@@ -121,7 +131,7 @@ class FilterSettings(Section):
     bounds: OpenShare = 0.9
 
 
-class FittedRanges(Section):
+class FittedRanges(_LastingSection):
     """Ranges in which a model was fitted, and its errors on data that were not fitted: where it is
     credible.
 
@@ -143,14 +153,6 @@ class FittedRanges(Section):
     still_s: dict[str, Number] = Field({})
     energy_climb: Number | None = None
     tail: PeakTail | None = None
-
-    @model_validator(mode="before")
-    @classmethod
-    def _drop_dead_keys(cls, data: object) -> object:
-        """Model files of release 1.0.0 have keys that nothing reads any more."""
-        if not isinstance(data, dict):
-            return data
-        return {key: value for key, value in data.items() if key not in _DEAD_KEYS}
 
 
 class NoiseModel(Section):

@@ -58,8 +58,9 @@ def test_the_model_itself_is_one(tmp_path):
 
 def test_a_file_of_release_1_0_has_keys_that_have_no_effect(tmp_path):
     former = [
-        (f"fitted.{key}", value) for key, value in (("correlation", [[1.0]]), ("scale", 2), ("column_sd", {}))
-    ]
+        ("fitted.correlation", [[1.0]]), ("fitted.scale", 2), ("fitted.column_sd", {}),
+        ("fitted.misread", 0.1), ("fitted.spread", [0.1, 0.2, 0.3]), ("settings", {"hold_s": 1.0}),
+    ]  # fmt: skip
     assert load_model(written(tmp_path, *former)) == load_model(written(tmp_path))
 
 

@@ -21,7 +21,7 @@ from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import findings, trust
 from beaver_ftc_logs.diagnose import LogRows, reversed_command_error
-from beaver_ftc_logs.recording import Floats, Mask, RecordedFlight, Runs, true_runs
+from beaver_ftc_logs.recording import Floats, Mask, Reasons, RecordedFlight, Runs, true_runs
 from beaver_ftc_logs.samples import Samples, convert_to_si, resample, sample_column
 from beaver_ftc_logs.stepped import Replayed, error_sections, replay_samples, rows_of_replay
 from beaver_ftc_logs.vehicle import QuantityColumn, Vehicle
@@ -283,7 +283,7 @@ def _gap_free_stretches(samples: Samples, missing: Mask, rate_hz: float) -> Runs
     return [(begin, end + 1) for begin, end in true_runs(joins) if end + 1 - begin >= _MIN_SAMPLES]
 
 
-def _doubtful_rows(inputs: LogInputs, replay: Replayed, rows: LogRows) -> dict[str, Mask]:
+def _doubtful_rows(inputs: LogInputs, replay: Replayed, rows: LogRows) -> Reasons:
     """For each reason the rows (n,) for which there is no verdict."""
     aircraft, missing = inputs.aircraft, inputs.has_missing_value
     (low_mps, high_mps), (low, high) = aircraft.envelope.airspeed_mps, aircraft.alpha_rad
@@ -337,7 +337,7 @@ def _verdict_document(
         "type": last.type,
         "estimate": last.estimate,
         "candidates": list(last.candidates),
-        "credible": trust.credibility_entry(rows.doubtful_rows, rows.credible),
+        "credible": rows.credibility(),
         "events": findings.fault_events(rows, surfaces),
         "can_separate": _excluded_losses(rows, surfaces),
         "isolability": {"together": []},

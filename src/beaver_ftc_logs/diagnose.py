@@ -9,7 +9,7 @@ residual. alarmed (n,): whether the evidence raises an alarm; nameable (n,): whe
 calm (n,): whether health, or no response at all, is the likelier.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import compress
@@ -24,7 +24,7 @@ from beaver_ftc_logs import energy, trust
 from beaver_ftc_logs.bank import GROUP_LOSS, UNKNOWN_OFFSET, HypothesisBank, build_bank
 from beaver_ftc_logs.filtering import bank_posterior, fault_evidence, page_cusum
 from beaver_ftc_logs.model import Model
-from beaver_ftc_logs.recording import MIN_DIVISOR, Floats, Ints, Mask, last_row_at, last_true_row
+from beaver_ftc_logs.recording import MIN_DIVISOR, Floats, Ints, Mask, Reasons, last_row_at, last_true_row
 from beaver_ftc_logs.regression import expand_groups, innovations, trailing_sums
 from beaver_ftc_logs.samples import Samples
 
@@ -62,7 +62,7 @@ class LogRows:
     effectiveness_high: Floats
     fault_probability: Floats
     evidence_start_time_s: Floats
-    doubtful_rows: Mapping[str, Mask] = field(default_factory=dict)
+    doubtful_rows: Reasons = field(default_factory=dict)
 
     @cached_property
     def credible(self) -> Ints:
@@ -92,6 +92,14 @@ class LogRows:
         other columns, is credible here too."""
         return not self.has_credible_alarm() and bool((self.credible >= other.credible).all())
 
+    def credibility(self) -> Document:
+        """The entry of verdict.json with the share of credible rows, and the reasons for the others with
+        their shares."""
+        shares = {reason: float(rows.mean()) for reason, rows in self.doubtful_rows.items()}
+        ordered = sorted(shares, key=lambda reason: -shares[reason])
+        entries = [{"says": reason, "share": shares[reason]} for reason in ordered]
+        return {"share": float(self.credible.mean()) if len(self.t_s) else 0.0, "reasons": entries}
+
     def _where(self, mask: Mask, **values: Any) -> "LogRows":
         """The rows with other values where a mask is true."""
         changed = {name: np.where(mask, value, getattr(self, name)) for name, value in values.items()}
@@ -102,7 +110,7 @@ class LogRows:
         mask = removed if removed.ndim == 2 else removed[:, None]
         return self._where(mask, effectiveness=1.0, effectiveness_low=0.0, effectiveness_high=1.0)
 
-    def without_verdict(self, reasons: Mapping[str, Mask]) -> "LogRows":
+    def without_verdict(self, reasons: Reasons) -> "LogRows":
         """The rows without alarm, name and bounds, and not credible, where one of the reasons, (n,) each, is
         true; reasons without a row are left out."""
         reasons = {reason: mask for reason, mask in reasons.items() if mask.any()}

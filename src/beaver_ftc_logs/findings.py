@@ -43,7 +43,7 @@ def verdict_document(samples: Samples, model: Model, rows: LogRows) -> Document:
         "vehicle": model.vehicle.name,
         **span_entry(samples),
         "faulty": bool(rows.faulty.any()),
-        "credible": trust.credibility_entry(rows.doubtful_rows, rows.credible),
+        "credible": rows.credibility(),
         "events": fault_events(rows, list(model.vehicle.surfaces)),
         "can_separate": [*trust.unknown_sentences(model), *isolability_sentences(isolable)],
         "isolability": isolable,

@@ -135,6 +135,10 @@ class _Axes:
         return self.problem or next(iter(missing), "" if weights else "its mix is not known")
 
 
+_Found = tuple[list[_Surface], list[_Outputs], _Axes]
+"""Surfaces, the ways in which their outputs may be logged, and the commands before the mixer."""
+
+
 def mixing_of_log(reader: str, params: Parameters, column_names: Collection[str]) -> Mixing:
     """The mixing that the parameters of a log say, with commands out of these columns. Without surfaces where
     they say none, or their commands are not in the log."""
@@ -214,7 +218,7 @@ def _full_name(name: str, number: int, kinds: Mapping[int, int]) -> str:
     return name if [*kinds.values()].count(kinds[number]) == 1 else f"{name}_{number}"
 
 
-def _ardupilot_mixing(params: _Parameters) -> tuple[list[_Surface], list[_Outputs], _Axes]:
+def _ardupilot_mixing(params: _Parameters) -> _Found:
     """The surfaces by SERVOn_FUNCTION."""
     matches = (re.fullmatch(r"SERVO(\d{1,2})_FUNCTION", name) for name in params.values_by_name)
     names = {int(match[1]): match[0] for match in matches if match}
@@ -286,7 +290,7 @@ def _assumed_reading(problem: _BadParameter) -> Reading:
     return scale, offset, f"; range and sign stay out ({problem}), assumed: {low:g} to {high:g} us"
 
 
-def _px4_mixing(params: _Parameters, column_names: set[str]) -> tuple[list[_Surface], list[_Outputs], _Axes]:
+def _px4_mixing(params: _Parameters, column_names: set[str]) -> _Found:
     """The surfaces by CA_SV_CSn_TYPE, their shares by the torques."""
     try:
         n = params.whole_number("CA_SV_CS_COUNT", 1, _PX4_MAX_SURFACES)

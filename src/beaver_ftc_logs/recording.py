@@ -22,6 +22,10 @@ from beaver_ftc.documents import BadInput
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Mask = NDArray[np.bool_]
+Reasons = dict[str, Mask]
+"""For each reason of a doubt its rows, (n,)."""
+Wanted = Collection[str] | None
+"""Columns that are read, all where None."""
 Parameters = dict[str, tuple[float, ...]]
 """Parameters of an autopilot by name: its value in the log; if it changes, the first and the last one."""
 TimeSource = tuple[str, str]
@@ -67,6 +71,10 @@ class Column:
     note: str = ""
 
 
+Columns = dict[str, Column]
+"""Columns by name."""
+
+
 @dataclass(frozen=True)
 class LoggedFailure:
     """A failure that the log itself states: for scoring only, `diagnose` never reads it."""
@@ -85,7 +93,7 @@ class RecordedFlight:
     """
 
     name: str
-    columns: Mapping[str, Column]
+    columns: Columns
     logged_failures: tuple[LoggedFailure, ...] = ()
     notes: tuple[str, ...] = field(default=())
     parameters: Parameters = field(default_factory=dict)
@@ -162,9 +170,9 @@ def names_of_topics(topics: Mapping[str, Topic]) -> tuple[str, ...]:
 
 def columns_of_topics(
     topics: Mapping[str, Topic],
-    wanted: Collection[str] | None,
+    wanted: Wanted,
     all_topics: Mapping[str, Topic] | None = None,
-) -> tuple[dict[str, Column], tuple[str, ...], float | None]:
+) -> tuple[Columns, tuple[str, ...], float | None]:
     """The wanted columns `topic.field`, all where None, the names of the others, and the first stamp of the
     topics, from which time counts, s.
 
@@ -177,7 +185,7 @@ def columns_of_topics(
     kept = {name: rows_with_increasing_time(name, topic.stamps_us) for name, topic in topics.items()}
     first_us = [topics[name].stamps_us[rows[0]] for name, (rows, _) in kept.items() if len(rows)]
     origin_us = min(first_us, default=0.0)
-    columns: dict[str, Column] = {}
+    columns: Columns = {}
     for name, topic in topics.items():
         rows, note = kept[name]
         t_s = (topic.stamps_us[rows] - origin_us) * _S_PER_US

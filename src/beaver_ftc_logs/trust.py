@@ -17,18 +17,17 @@ A row uses nothing later than its time.
     reasons         rows that are not credible, by reason
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from beaver_ftc.documents import BadInput
-from beaver_ftc.results import Document
 from beaver_ftc_logs import energy, regression
 from beaver_ftc_logs.column_mistakes import corrected_logs, log_without_signal
 from beaver_ftc_logs.model import FittedRanges, Model
-from beaver_ftc_logs.recording import MIN_DIVISOR, Floats, Ints, Mask
+from beaver_ftc_logs.recording import MIN_DIVISOR, Floats, Reasons
 from beaver_ftc_logs.regression import Parts
 from beaver_ftc_logs.samples import NOISE_MA_CANDIDATES, Samples, whiten_samples
 from beaver_ftc_logs.signals import MIN_STILL_S
@@ -316,9 +315,9 @@ def _relative_motion(values: Floats, fitted: Sequence[Sequence[float]]) -> Float
     return np.asarray(spans[0] / np.maximum(spans[1], MIN_DIVISOR))
 
 
-def untrusted_rows(samples: Samples, model: Model) -> dict[str, Mask]:
+def untrusted_rows(samples: Samples, model: Model) -> Reasons:
     """Rows that are not credible, by reason."""
-    reasons: dict[str, Mask] = _still_rows(samples, model)
+    reasons: Reasons = _still_rows(samples, model)
     if samples.is_rate_clipped is not None:
         recent, _ = regression.trailing_sums(
             samples.is_rate_clipped, np.floor(_CLIPPING_MEMORY_S / samples.dt_s) + 1.0
@@ -329,7 +328,7 @@ def untrusted_rows(samples: Samples, model: Model) -> dict[str, Mask]:
     return reasons
 
 
-def _rows_out_of_range(samples: Samples, model: Model, ranges: FittedRanges) -> dict[str, Mask]:
+def _rows_out_of_range(samples: Samples, model: Model, ranges: FittedRanges) -> Reasons:
     """Rows in which a command, a rate or the airspeed was outside for most of the last seconds, or of the
     flight so far, by reason."""
     commands = [f"command of {surface}" for surface in model.vehicle.surfaces]
@@ -350,7 +349,7 @@ def _rows_out_of_range(samples: Samples, model: Model, ranges: FittedRanges) -> 
     return reasons
 
 
-def _still_rows(samples: Samples, model: Model) -> dict[str, Mask]:
+def _still_rows(samples: Samples, model: Model) -> Reasons:
     """Rows in which a column has stood still for too long, by reason: a measured rate may hardly, another
     thrice as long as in the model's flights; a rate of which these are known, from MIN_STILL_S / 3 on."""
     fitted = model.fitted.still_s if model.fitted else {}
@@ -372,12 +371,3 @@ def without_dead_rows(samples: Samples, model: Model) -> Samples:
     if not dead.any():
         return samples
     return replace(samples, rates=np.where(dead[:, None], np.nan, samples.rates))
-
-
-def credibility_entry(reasons: Mapping[str, Mask], credible: Ints) -> Document:
-    """Return the entry of verdict.json with the share of credible rows, and the reasons for the others with
-    their shares."""
-    shares = {reason: float(rows.mean()) for reason, rows in reasons.items()}
-    ordered = sorted(shares, key=lambda reason: -shares[reason])
-    entries = [{"says": reason, "share": shares[reason]} for reason in ordered]
-    return {"share": float(credible.mean()) if len(credible) else 0.0, "reasons": entries}

@@ -1,7 +1,7 @@
 """Readers of recorded flights, by name. A new format is one file here and one row of `READERS`."""
 
 import re
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from beaver_ftc.documents import BadInput
-from beaver_ftc_logs.recording import Column, Floats, RecordedFlight, TimeSource
+from beaver_ftc_logs.recording import Column, Floats, RecordedFlight, TimeSource, Wanted
 
 ROWS_PER_PART = 100_000
 """Rows of a part of a long table."""
@@ -61,7 +61,7 @@ def read_flight(
     path: Path,
     reader: str | None = None,
     time: TimeSource | None = None,
-    columns: Collection[str] | None = None,
+    columns: Wanted = None,
 ) -> RecordedFlight:
     """The recorded flight in a file or folder.
 
@@ -76,7 +76,7 @@ def read_parts(
     path: Path,
     reader: str | None = None,
     time: TimeSource | None = None,
-    columns: Collection[str] | None = None,
+    columns: Wanted = None,
     in_parts: bool = True,
 ) -> Iterator[RecordedFlight]:
     """The same, a long table in parts."""

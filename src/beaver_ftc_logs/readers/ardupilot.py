@@ -5,7 +5,7 @@ the second on: `IMU1.GyrX`. Time counts from the first message with a stamp. Rea
 extra `flights`.
 """
 
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,7 @@ from beaver_ftc_logs.recording import (
     Parameters,
     RecordedFlight,
     Topic,
+    Wanted,
     add_parameter,
     columns_of_topics,
     package_errors_as_bad_input,
@@ -27,7 +28,7 @@ _INSTANCE_FIELDS = ("I", "C", "Instance")
 _IGNORED_MESSAGES = {"FMT", "FMTU", "UNIT", "MULT", "PARM", "MSG"}
 
 
-def read(path: Path, wanted: Collection[str] | None = None) -> RecordedFlight:
+def read(path: Path, wanted: Wanted = None) -> RecordedFlight:
     """The flight in a dataflash log. Raises BadInput where it is none, or pymavlink is missing.
 
     wanted: the columns that are kept in memory, all where None. Where the log has none of them, all

@@ -4,7 +4,6 @@ Time counts from the first message of the log. Reading needs pyulog: the extra `
 """
 
 import re
-from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,7 @@ from beaver_ftc_logs.recording import (
     Parameters,
     RecordedFlight,
     Topic,
+    Wanted,
     add_parameter,
     columns_of_topics,
     names_of_topics,
@@ -24,7 +24,7 @@ _MAX_MESSAGE_BYTES = 65535
 """Bytes of a message: its length is written in 16 bits."""
 
 
-def read(path: Path, wanted: Collection[str] | None = None) -> RecordedFlight:
+def read(path: Path, wanted: Wanted = None) -> RecordedFlight:
     """The flight in a .ulg file. Raises BadInput where it is none, or pyulog is missing.
 
     wanted: the columns that are returned, all where None; their topics are in memory while the log is read.
@@ -43,7 +43,7 @@ def read(path: Path, wanted: Collection[str] | None = None) -> RecordedFlight:
     return RecordedFlight(path.stem, columns, notes=notes, parameters=params, unread_column_names=unread)
 
 
-def _read_topics(path: Path, wanted: Collection[str] | None, params: Parameters) -> dict[str, Topic]:
+def _read_topics(path: Path, wanted: Wanted, params: Parameters) -> dict[str, Topic]:
     """The topics of the wanted columns, of any instance; all where the log has none of these.
 
     params: receives those of the log. Raises ValueError for a message too large.

@@ -8,6 +8,7 @@ outside the aircraft's envelope, after a gap, and where a number is missing.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import combinations
 from math import pi
 from pathlib import Path
@@ -81,9 +82,7 @@ class LogInputs:
     """A log as inputs of the diagnosis of an aircraft.
 
     input_arrays: one array (n, ...) each, as `stepped.input_columns`. held_age_s: mean age of the values of
-    each column that is held. has_missing_value (n,): rows in which an input is not a number.
-    gap_free_stretches: first row and end of each stretch through which the diagnosis is stepped without a
-    reset. full_deflection_rad (S,): what a command of 1 is in the log."""
+    each column that is held. full_deflection_rad (S,): what a command of 1 is in the log."""
 
     samples: Samples
     aircraft: Aircraft
@@ -91,9 +90,20 @@ class LogInputs:
     rate_hz: float
     input_arrays: list[Floats]
     held_age_s: dict[str, float]
-    has_missing_value: Mask
-    gap_free_stretches: Runs
     full_deflection_rad: Floats
+
+    @cached_property
+    def has_missing_value(self) -> Mask:
+        """Rows in which an input is not a number, (n,)."""
+        return ~np.isfinite(np.hstack(self.input_arrays)).all(axis=1)
+
+    @cached_property
+    def gap_free_stretches(self) -> Runs:
+        """First row and end of each stretch through which the diagnosis is stepped without a reset: evenly
+        spaced, and without a missing number."""
+        uneven = np.abs(np.diff(self.samples.t_s) * self.rate_hz - 1.0) > _STEP_JITTER
+        joins = ~(self.has_missing_value[1:] | self.has_missing_value[:-1] | uneven)
+        return [(begin, end + 1) for begin, end in true_runs(joins) if end + 1 - begin >= _MIN_SAMPLES]
 
     def with_commands(self, commands: Floats) -> "LogInputs":
         """The inputs with other commands, rad."""
@@ -168,14 +178,13 @@ def read_inputs(log: RecordedFlight, vehicle: Vehicle, given: DiagnosedAircraft)
             attitude[:, axis] = sampled_at(quantity)
     arrays = [samples.rates, signals, samples.commands * full_rad, attitude]
     _check_plausible(samples.name, signals, arrays[2], aircraft)
-    missing = np.asarray(~np.isfinite(np.hstack(arrays)).all(axis=1))
-    stretches = _gap_free_stretches(samples, missing, rate_hz)
-    if not stretches:
+    inputs = LogInputs(samples, aircraft, diagnosis, rate_hz, arrays, ages, full_rad)
+    if not inputs.gap_free_stretches:
         raise BadInput(
             f"{samples.name}: has no {_MIN_SAMPLES} samples in turn, evenly spaced and without a missing "
             f"number, allowed: all signals logged at one rate of {_MIN_HZ:g} to {_MAX_HZ:g} Hz"
         )
-    return LogInputs(samples, aircraft, diagnosis, rate_hz, arrays, ages, missing, stretches, full_rad)
+    return inputs
 
 
 def diagnose_aircraft(
@@ -274,13 +283,6 @@ def _median_without_nan(values: Floats) -> float:
     """Median of the values that are numbers; nan if none is."""
     numbers = values[~np.isnan(values)]
     return float(np.median(numbers)) if numbers.size else float("nan")
-
-
-def _gap_free_stretches(samples: Samples, missing: Mask, rate_hz: float) -> Runs:
-    """First row and end of each stretch that is evenly spaced and has no missing number."""
-    uneven = np.abs(np.diff(samples.t_s) * rate_hz - 1.0) > _STEP_JITTER
-    joins = ~(missing[1:] | missing[:-1] | uneven)
-    return [(begin, end + 1) for begin, end in true_runs(joins) if end + 1 - begin >= _MIN_SAMPLES]
 
 
 def _doubtful_rows(inputs: LogInputs, replay: Replayed, rows: LogRows) -> Reasons:

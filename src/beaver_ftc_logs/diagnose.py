@@ -366,7 +366,7 @@ def join_names(flags: Mask, names: Sequence[str]) -> Names:
 
 def _at_log_stamps(samples: Samples, rows: LogRows) -> LogRows:
     """The rows at the log's own stamps: each stamp has the last row up to it."""
-    if len(samples.log_stamps_s) == len(rows.t_s) and np.array_equal(samples.log_stamps_s, rows.t_s):
+    if np.array_equal(samples.log_stamps_s, rows.t_s):
         return rows
     last = last_row_at(rows.t_s, samples.log_stamps_s)
     names = [name for name in LogRows.__dataclass_fields__ if name not in ("t_s", "doubtful_rows")]

@@ -172,7 +172,7 @@ def bic_by_order(parts: Parts, vehicle: Vehicle) -> dict[tuple[int, int], float]
     coefficients C of m regressors on n samples, it is n log det((y' y - (Z' y)' C) / n) + 3 m log n.
     """
     Z, y, _ = stack_data(parts, vehicle, max(RATE_LAGS), max(COMMAND_LAGS))
-    rms = np.maximum(np.sqrt((Z**2).mean(axis=0)), MIN_DIVISOR)
+    rms = regression.rms_of_columns(Z)
     ZZ = (Z / rms).T @ (Z / rms)
     Zy = (Z / rms).T @ y
     yy = y.T @ y
@@ -219,7 +219,7 @@ def fit_order(parts: Parts, vehicle: Vehicle, h: int, L: int) -> regression.Regr
     still = [axis for axis, sd in zip("pqr", y.std(axis=0), strict=True) if sd < _MIN_RATE_SD]
     if still:
         raise BadInput(f"identify: rate {still[0]} does not move, allowed: flights in which every rate does")
-    dt_s = float(np.median([part.samples.dt_s for part in parts]))
+    dt_s = regression.usual_step_s(parts)
     return regression.fit_ols(Z, y, stretch, round(_NEWEY_WEST_S / dt_s))
 
 
@@ -249,7 +249,7 @@ def _model_of_fit(fit: regression.Regression, parts: Parts, vehicle: Vehicle, h:
     shape = (len(groups), L, 3)
     model = Model(
         vehicle=vehicle,
-        rate_hz=1.0 / float(np.median([part.samples.dt_s for part in parts])),
+        rate_hz=1.0 / regression.usual_step_s(parts),
         groups=[[names[i] for i in group] for group in groups],
         history=h,
         lags=L,

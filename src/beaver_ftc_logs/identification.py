@@ -428,7 +428,7 @@ def fit_output_error(parts: Parts, groups: Groups) -> Document:
     """
     from scipy.optimize import least_squares
 
-    dt_s = float(np.median([part.samples.dt_s for part in parts]))
+    dt_s = regression.usual_step_s(parts)
     u, y = _cut_windows(parts, groups, round(FREE_RUN_WINDOW_S / dt_s), round(_MAX_DELAY_S / dt_s) + 1)
     if len(y) < 20 or not np.ptp(y, axis=(0, 1)).all():
         return {"windows": len(y), "says": "too few gap-free windows in which every rate moves"}

@@ -120,7 +120,7 @@ def _fit_angle(
 
 
 def _interpolate(column: Column, t: Floats) -> Floats:
-    if len(column.t_s) == len(t) and np.array_equal(column.t_s, t):
+    if np.array_equal(column.t_s, t):
         return column.values
     known = np.isfinite(column.values)
     if not known.any():

@@ -70,6 +70,11 @@ class FitPart:
 Parts = Sequence[FitPart]
 
 
+def usual_step_s(parts: Parts) -> float:
+    """The usual step of the samples of all flights, s."""
+    return float(np.median([part.samples.dt_s for part in parts]))
+
+
 Groups = list[list[int]]
 """Surfaces that move together, by their places."""
 
@@ -182,13 +187,16 @@ class Innovations:
         trim = np.broadcast_to(np.eye(3), (len(self.F), 3, 3))
         return np.asarray((np.concatenate([trim, self.F], axis=1) @ self.W).transpose(0, 2, 1))
 
+    def regression(self) -> tuple[Floats, Floats]:
+        """Regressors Z (3 n, 3 + G) of trim and responses, and the rates v (3 n,), whitened."""
+        return self.columns().reshape(3 * len(self.F), -1), (self.y @ self.W).ravel()
+
     def gain_bounds(self, share: float) -> tuple[Floats, Floats, float]:
         """By least squares of y on trim and responses: the gain that each response surely is not below, and
         not above, (G,) each, 1 as in the model; far apart where columns make one another up. And the scale
         of the noise, in variances of it. share: effective_sample_share."""
-        Z = self.columns().reshape(3 * len(self.F), -1)
-        v = (self.y @ self.W).ravel()
-        s = np.maximum(np.sqrt((Z**2).mean(axis=0)), MIN_DIVISOR)
+        Z, v = self.regression()
+        s = rms_of_columns(Z)
         X = Z / s
         P = np.linalg.inv(X.T @ X + _EIGENVALUE_FLOOR * len(X) * np.eye(X.shape[1]))
         b = P @ (X.T @ v)
@@ -199,8 +207,7 @@ class Innovations:
 
     def gains(self) -> Floats:
         """The gain of each response, (G,), by least squares of y on trim and responses."""
-        Z = self.columns().reshape(3 * len(self.F), -1)
-        return np.asarray(np.linalg.lstsq(Z, (self.y @ self.W).ravel(), rcond=None)[0][3:])
+        return np.asarray(np.linalg.lstsq(*self.regression(), rcond=None)[0][3:])
 
     def quick_power(self, rate_hz: float) -> Floats:
         """Power of the quick part of the responses an axis, in variances of the noise, (n,): of the
@@ -317,6 +324,11 @@ def _newey_west(X: Floats, e: Floats, P: Floats, stretch: Ints, lag: int) -> Flo
         windows = sums[w:] - sums[:-w]
         S += windows.T @ windows / w
     return np.sqrt(np.maximum(np.diag(P @ S @ P), 0.0))
+
+
+def rms_of_columns(Z: Floats) -> Floats:
+    """Root mean square of each column of Z (n, m), above 0."""
+    return np.maximum(np.sqrt((Z**2).mean(axis=0)), MIN_DIVISOR)
 
 
 def left_by(Z: Floats, y: Floats) -> Floats:

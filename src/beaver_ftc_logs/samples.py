@@ -328,7 +328,7 @@ def _median_step_s(stamps: Floats) -> float:
 
 def sample_column(column: Column, t_s: Floats, step_s: float) -> tuple[Floats, float | None]:
     """A column's values at given times, and how old they are on average, s; None: it has these very times."""
-    if len(column.t_s) == len(t_s) and np.array_equal(column.t_s, t_s):
+    if np.array_equal(column.t_s, t_s):
         return column.values, None
     if _median_step_s(column.t_s) < 0.6 * step_s:
         return _means_and_age(column, t_s, step_s)

@@ -11,16 +11,15 @@ in time, since the airspeed varies about that of the fitted flights. If the stan
 is larger than a step between levels, the excess is added to the variance of its own gain.
 
 Letters as in `filtering`: g a group of n, B (n, L, 3) its response and R (3, 3) the covariance of the noise,
-rad/s and (rad/s)2 a sample; ma the moving average by which a flight is whitened, empty if it is not.
+rad/s and (rad/s)2 a sample.
 """
 
-from collections.abc import Sequence
 from itertools import combinations, product
 from typing import NamedTuple
 
 import numpy as np
 
-from beaver_ftc_logs.model import Model
+from beaver_ftc_logs.model import Model, NoiseModel
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
 from beaver_ftc_logs.trust import known_effects
 
@@ -40,7 +39,8 @@ HypothesisRow = tuple[Floats, int, float, Floats]
 
 
 class HypothesisBank(NamedTuple):
-    """H hypotheses of G groups; the first is healthy, the last that nothing answers the commands.
+    """H hypotheses of G groups; the first is healthy, the last that nothing answers the commands: on the
+    ground, or everything lost.
 
     effectiveness (H, G). hypothesis_kind (H,). transition_share (H,): share of all changes of hypothesis that
     lead to this one. rate_offset_variance (H, 3): variance of the offset of the rates that comes with it,
@@ -57,11 +57,6 @@ class HypothesisBank(NamedTuple):
     prior_probability: Floats
     change_probability_per_sample: float
     own_gain_share: Floats
-
-    @property
-    def no_response_hypothesis_index(self) -> int:
-        """Index of the hypothesis that nothing answers the commands: on the ground, or everything lost."""
-        return len(self.hypothesis_kind) - 1
 
     @property
     def is_fault_hypothesis(self) -> np.ndarray:
@@ -112,7 +107,7 @@ def _effect_row(n: int, levels: dict[int, float]) -> Floats:
 def _levels_and_shares(model: Model, g: int) -> tuple[Floats, Floats]:
     """Levels of effectiveness below 1, and the share of each among the group's faults."""
     settings = model.settings
-    labelled = settings.levels.get("+".join(model.groups[g]), [])
+    labelled = settings.levels.get(model.group_names[g], [])
     grid = np.arange(0.0, 1.0 - 0.5 * settings.level_step, settings.level_step)
     levels = np.unique(np.round(np.concatenate([grid, np.array(labelled, dtype=float)]), 6))
     is_labelled = np.isin(levels, np.round(labelled, 6))
@@ -125,7 +120,7 @@ def _levels_and_shares(model: Model, g: int) -> tuple[Floats, Floats]:
 def _offset_variances(model: Model, g: int) -> list[Floats]:
     """Variances of the rates' offset that may come with a loss, (3,) each: none, or that of the group stuck
     anywhere within its travel, along the axes it moves most."""
-    _, _, B, R = model.as_arrays()
+    B, R = np.array(model.response), np.array(model.noise)
     total = np.abs(B[g]).sum(axis=0) / np.sqrt(np.diag(R))
     ratio = np.clip(total / max(total.max(), MIN_DIVISOR), 0.3, 1.0)
     variances = {"loss": np.zeros(3), "stuck": np.diag(R) * (model.settings.jam_sd * ratio) ** 2}
@@ -165,19 +160,18 @@ class StateModel(NamedTuple):
     random_walk_variance: Floats
 
 
-def build_states(model: Model, ma: Sequence[float] = ()) -> StateModel:
+def build_states(model: Model, noise: NoiseModel) -> StateModel:
     """The prior and the limits of trim and gains, from a model's settings: mean x (N,), covariance P (N, N),
     retention a (N,) = exp(-1 / (rate return_s)) a sample, and walk (N,) = (1 - a^2) diag(P)."""
     settings = model.settings
     n = len(model.groups)
-    _, _, B, R = model.as_arrays()
-    r = np.diag(R)
-    shift = B.sum(axis=1) * settings.trim_shift
+    r = noise.wider * np.diag(np.array(noise.noise))
+    shift = np.array(model.response).sum(axis=1) * settings.trim_shift
     P = np.zeros((4 + n, 4 + n))
     P[:3, :3] = np.diag(r * settings.trim_sd**2) + shift.T @ shift
     P[3, 3] = settings.gain_sd**2
     drift = settings.own_gain_sd**2 + _extra_variance(model)
-    hidden = model.hidden_gain_error_sd(ma) ** 2
+    hidden = np.array(noise.misreads or [0.0] * n) ** 2
     P[range(4, 4 + n), range(4, 4 + n)] = drift + hidden
     # What the fit misreads stays the same in a flight: the larger spread adds nothing to the drift.
     own_s = settings.own_gain_time_s * (1.0 + hidden / np.maximum(drift, MIN_DIVISOR))
@@ -219,17 +213,17 @@ class ResidualNoise(NamedTuple):
     covariance_inflation: float
 
 
-def build_noise(model: Model, ma: Sequence[float] = ()) -> ResidualNoise:
+def build_noise(model: Model, noise: NoiseModel, intercept_rad_s: Floats) -> ResidualNoise:
     """The noise of a flight, from a model's settings."""
     settings = model.settings
     return ResidualNoise(
-        intercept_rad_s=model.whitened_intercept(ma),
-        covariance=model.as_arrays()[3],
+        intercept_rad_s=intercept_rad_s,
+        covariance=noise.wider * np.array(noise.noise),
         effective_sample_share=settings.power,
         t_degrees_of_freedom=settings.tail,
         scale_memory_samples=settings.noise_memory_s * model.rate_hz,
         min_variance_scale=_MIN_NOISE_SCALE,
         max_variance_scale=_MAX_NOISE_SCALE,
-        max_squared_residual=_MAX_SQUARE if len(model.residual_ar_coefficients(ma)) else np.inf,
-        covariance_inflation=model.inflation_of(ma),
+        max_squared_residual=_MAX_SQUARE if noise.before else np.inf,
+        covariance_inflation=noise.wider,
     )

@@ -8,6 +8,7 @@ outside the aircraft's envelope, after a gap, and where a number is missing.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import combinations
 from math import pi
 from pathlib import Path
@@ -21,7 +22,7 @@ from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import findings, trust
 from beaver_ftc_logs.diagnose import LogRows, reversed_command_error
-from beaver_ftc_logs.recording import Floats, Mask, RecordedFlight
+from beaver_ftc_logs.recording import Floats, Mask, Reasons, RecordedFlight, Runs, true_runs
 from beaver_ftc_logs.samples import Samples, convert_to_si, resample, sample_column
 from beaver_ftc_logs.stepped import Replayed, error_sections, replay_samples, rows_of_replay
 from beaver_ftc_logs.vehicle import QuantityColumn, Vehicle
@@ -81,9 +82,7 @@ class LogInputs:
     """A log as inputs of the diagnosis of an aircraft.
 
     input_arrays: one array (n, ...) each, as `stepped.input_columns`. held_age_s: mean age of the values of
-    each column that is held. has_missing_value (n,): rows in which an input is not a number.
-    gap_free_stretches: first row and end of each stretch through which the diagnosis is stepped without a
-    reset. full_deflection_rad (S,): what a command of 1 is in the log."""
+    each column that is held. full_deflection_rad (S,): what a command of 1 is in the log."""
 
     samples: Samples
     aircraft: Aircraft
@@ -91,9 +90,20 @@ class LogInputs:
     rate_hz: float
     input_arrays: list[Floats]
     held_age_s: dict[str, float]
-    has_missing_value: Mask
-    gap_free_stretches: list[tuple[int, int]]
     full_deflection_rad: Floats
+
+    @cached_property
+    def has_missing_value(self) -> Mask:
+        """Rows in which an input is not a number, (n,)."""
+        return ~np.isfinite(np.hstack(self.input_arrays)).all(axis=1)
+
+    @cached_property
+    def gap_free_stretches(self) -> Runs:
+        """First row and end of each stretch through which the diagnosis is stepped without a reset: evenly
+        spaced, and without a missing number."""
+        uneven = np.abs(np.diff(self.samples.t_s) * self.rate_hz - 1.0) > _STEP_JITTER
+        joins = ~(self.has_missing_value[1:] | self.has_missing_value[:-1] | uneven)
+        return [(begin, end + 1) for begin, end in true_runs(joins) if end + 1 - begin >= _MIN_SAMPLES]
 
     def with_commands(self, commands: Floats) -> "LogInputs":
         """The inputs with other commands, rad."""
@@ -168,14 +178,13 @@ def read_inputs(log: RecordedFlight, vehicle: Vehicle, given: DiagnosedAircraft)
             attitude[:, axis] = sampled_at(quantity)
     arrays = [samples.rates, signals, samples.commands * full_rad, attitude]
     _check_plausible(samples.name, signals, arrays[2], aircraft)
-    missing = np.asarray(~np.isfinite(np.hstack(arrays)).all(axis=1))
-    stretches = _gap_free_stretches(samples, missing, rate_hz)
-    if not stretches:
+    inputs = LogInputs(samples, aircraft, diagnosis, rate_hz, arrays, ages, full_rad)
+    if not inputs.gap_free_stretches:
         raise BadInput(
             f"{samples.name}: has no {_MIN_SAMPLES} samples in turn, evenly spaced and without a missing "
             f"number, allowed: all signals logged at one rate of {_MIN_HZ:g} to {_MAX_HZ:g} Hz"
         )
-    return LogInputs(samples, aircraft, diagnosis, rate_hz, arrays, ages, missing, stretches, full_rad)
+    return inputs
 
 
 def diagnose_aircraft(
@@ -233,11 +242,7 @@ def _flow_columns(
             reason = f"flow: no {name}, allowed: a column for each of {', '.join(names)}"
             raise BadInput(f"vehicle {vehicle.name}: {reason}")
     flow = [vehicle.flow[name] for name in names]
-    for quantity in (vehicle.airspeed, *flow):
-        if quantity.column not in log.columns:
-            nearest = log.nearest_columns_text(quantity.column)
-            reason = f"no column {quantity.column}, allowed: a log that has it; it has {nearest}"
-            raise BadInput(f"{log.name}: {reason}")
+    log.check_has(quantity.column for quantity in (vehicle.airspeed, *flow))
     return vehicle.airspeed, flow
 
 
@@ -280,17 +285,8 @@ def _median_without_nan(values: Floats) -> float:
     return float(np.median(numbers)) if numbers.size else float("nan")
 
 
-def _gap_free_stretches(samples: Samples, missing: Mask, rate_hz: float) -> list[tuple[int, int]]:
-    """First row and end of each stretch that is evenly spaced and has no missing number."""
-    uneven = np.abs(np.diff(samples.t_s) * rate_hz - 1.0) > _STEP_JITTER
-    joins = ~(missing[1:] | missing[:-1] | uneven)
-    first, last = np.flatnonzero(np.diff(joins.astype(int), prepend=0, append=0)).reshape(-1, 2).T
-    enough = last + 1 - first >= _MIN_SAMPLES
-    return [*zip(first[enough].tolist(), (last[enough] + 1).tolist(), strict=True)]
-
-
-def _doubtful_rows(inputs: LogInputs, replay: Replayed, rows: LogRows) -> dict[str, Mask]:
-    """For each reason that has rows, the rows (n,) for which there is no verdict."""
+def _doubtful_rows(inputs: LogInputs, replay: Replayed, rows: LogRows) -> Reasons:
+    """For each reason the rows (n,) for which there is no verdict."""
     aircraft, missing = inputs.aircraft, inputs.has_missing_value
     (low_mps, high_mps), (low, high) = aircraft.envelope.airspeed_mps, aircraft.alpha_rad
     alpha, airspeed = inputs.input_arrays[1][:, 0], inputs.input_arrays[1][:, 2]
@@ -316,8 +312,7 @@ def _doubtful_rows(inputs: LogInputs, replay: Replayed, rows: LogRows) -> dict[s
         alarms = begin + np.flatnonzero(rows.faulty[begin:end])
         if alarms.size and has_reason[alarms[0]]:
             after[alarms[0] : end] = True
-    reasons["the alarm was raised where nothing can be said"] = after & ~has_reason
-    return {reason: mask for reason, mask in reasons.items() if mask.any()}
+    return reasons | {"the alarm was raised where nothing can be said": after & ~has_reason}
 
 
 def _verdict_document(
@@ -344,7 +339,7 @@ def _verdict_document(
         "type": last.type,
         "estimate": last.estimate,
         "candidates": list(last.candidates),
-        "credible": trust.credibility_entry(rows.doubtful_rows, rows.credible),
+        "credible": rows.credibility(),
         "events": findings.fault_events(rows, surfaces),
         "can_separate": _excluded_losses(rows, surfaces),
         "isolability": {"together": []},

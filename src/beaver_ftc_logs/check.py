@@ -37,7 +37,7 @@ from beaver_ftc_logs.readers.table import (
     first_cells_of_column,
     text_of_column_phrase,
 )
-from beaver_ftc_logs.recording import Column, Floats, RecordedFlight, nearest_names_text
+from beaver_ftc_logs.recording import Column, Floats, RecordedFlight, TimeSource, nearest_names_text
 from beaver_ftc_logs.samples import convert_to_si, read_vehicle_parts, resample
 from beaver_ftc_logs.units import ACCELERATION, RATE, SI_UNITS, TIME_UNITS, nearest_unit
 from beaver_ftc_logs.vehicle import Vehicle, unused_keys_as_comments
@@ -197,7 +197,7 @@ def _guess_vehicle(path: Path, reader: str | None, lines: list[str]) -> Document
 
 
 def _read_likely(
-    path: Path, reader: str, time: tuple[str, str] | None
+    path: Path, reader: str, time: TimeSource | None
 ) -> tuple[RecordedFlight, list[str], Mixing]:
     """The columns of a log, of a long table its first part, that may be something; the names of all; the
     mixing by its parameters."""
@@ -235,7 +235,7 @@ def _shortest_match(pattern: str, names: Sequence[str]) -> str | None:
     return min(matches, key=lambda name: (len(name), name), default=None)
 
 
-def _find_time(path: Path, remarks: list[str]) -> tuple[str, str]:
+def _find_time(path: Path, remarks: list[str]) -> TimeSource:
     """The time column of a table and its unit. Raises BadInput where no column increases like time."""
     names = column_names(path)
     likely = [name for name in names if re.fullmatch(_NAME_PATTERNS["time"], _snake_case(name))]

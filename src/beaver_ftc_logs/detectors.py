@@ -38,7 +38,7 @@ from beaver_ftc_logs.diagnose import (
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import Floats, RecordedFlight
 from beaver_ftc_logs.regression import expand_groups, group_indices, innovations, trailing_sums
-from beaver_ftc_logs.samples import Samples
+from beaver_ftc_logs.samples import Samples, unchanged_s
 from beaver_ftc_logs.trust import without_dead_rows
 
 LEAST_SQUARES_MEMORY_S = 20.0
@@ -94,14 +94,14 @@ def _rows_of_estimate(samples: Samples, model: Model, e: Floats, sd: Floats) -> 
     nearest = np.clip(e, 0.0, 1.0)
     lost = e + _MIN_LOSS_SD * sd < 1.0
     if model.settings.levels:
-        for g, group in enumerate(model.groups):
-            labelled = model.settings.levels.get("+".join(group))
+        for g, name in enumerate(model.group_names):
+            labelled = model.settings.levels.get(name)
             levels = np.array([*labelled, 1.0]) if labelled else np.unique(bank.effectiveness[:, g])
             nearest[:, g] = levels[np.abs(nearest[:, g, None] - levels).argmin(axis=1)]
         lost = nearest < 1.0
     low = expand_groups(np.minimum(low, nearest), model)
     high = expand_groups(np.maximum(high, nearest), model)
-    names = join_names(lost, ["+".join(group) for group in model.groups])
+    names = join_names(lost, model.group_names)
     return _plain_rows(samples, names, expand_groups(nearest, model), low=low, high=high)
 
 
@@ -110,7 +110,8 @@ def _plain_rows(samples: Samples, names: np.ndarray, e: Floats, **given: Floats)
     probability those that are not given: the bounds are the estimate, the probability is 0 or 1."""
     faulty = np.array([bool(name) for name in names], dtype=np.int64)
     given = {"low": e, "high": e, "probability": faulty.astype(float), **given}
-    return LogRows(samples.t_s, faulty, names, e, given["low"], given["high"], given["probability"])
+    t_s = samples.t_s
+    return LogRows(t_s, faulty, names, e, given["low"], given["high"], given["probability"], t_s)
 
 
 def diagnose_by_freeze_rule(log: RecordedFlight, samples: Samples, model: Model) -> LogRows | None:
@@ -122,11 +123,7 @@ def diagnose_by_freeze_rule(log: RecordedFlight, samples: Samples, model: Model)
         return None
     frozen = np.zeros((len(samples.t_s), len(surfaces)), dtype=bool)
     for name, column in outputs.items():
-        last = np.searchsorted(column.t_s, samples.t_s, side="right") - 1
-        changed = np.concatenate([[True], np.diff(column.values) != 0.0])
-        since_s = column.t_s[np.maximum.accumulate(np.where(changed, np.arange(len(changed)), 0))]
-        still_s = np.where(last >= 0, samples.t_s - since_s[np.maximum(last, 0)], 0.0)
-        frozen[:, surfaces.index(name)] = still_s > MIN_FROZEN_OUTPUT_S
+        frozen[:, surfaces.index(name)] = unchanged_s(column, samples.t_s) > MIN_FROZEN_OUTPUT_S
     return _plain_rows(samples, join_names(frozen, surfaces), 1.0 - frozen)
 
 
@@ -175,7 +172,7 @@ def loop_detector_inputs(samples: Samples, model: Model) -> list[tuple[Measured,
 
 def _model_error_sd_rad_s2(model: Model) -> Floats:
     """The residual's standard deviation as an error of the model, (3,) rad/s2."""
-    return np.asarray(np.sqrt(np.diag(model.as_arrays()[3])) / (1.0 / model.rate_hz))
+    return np.asarray(np.sqrt(np.diag(np.array(model.noise))) / (1.0 / model.rate_hz))
 
 
 def loop_detector_context(model: Model) -> Context:
@@ -183,7 +180,7 @@ def loop_detector_context(model: Model) -> Context:
     dt_s = 1.0 / model.rate_hz
     noise = np.zeros(7)
     noise[:3] = _DECLARED_GYRO_RAD_S
-    design: Any = LinearRateModel(model.as_arrays()[1], dt_s)
+    design: Any = LinearRateModel(np.array(model.past), dt_s)
     return Context(
         dt_s=dt_s, substeps=1, model=design, trim_x=np.zeros(3), trim_y=np.zeros(N_Y),
         trim_rad=np.zeros(_N_LOOP),
@@ -216,7 +213,7 @@ def rows_of_verdicts(verdicts: list[Verdict], samples: Samples, model: Model) ->
             names[k], low[k] = UNKNOWN_SURFACE, 0.0
             continue
         g = LOOP_SURFACES.index(str(verdicts[k].isolated))
-        names[k], low[k, members[g]] = "+".join(model.groups[g]), 0.0
+        names[k], low[k, members[g]] = model.group_names[g], 0.0
         e[k, members[g]] = _remaining_effectiveness(verdicts[k], g)
     p = np.where(np.isnan(statistic), faulty, np.clip(statistic, 0.0, 1.0))
     return _plain_rows(samples, names, e, low=low, high=np.ones_like(low), probability=p)

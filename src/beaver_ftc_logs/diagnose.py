@@ -9,8 +9,9 @@ residual. alarmed (n,): whether the evidence raises an alarm; nameable (n,): whe
 calm (n,): whether health, or no response at all, is the likelier.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import compress
 from typing import Any
 
@@ -18,12 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from beaver_ftc.documents import BadInput
+from beaver_ftc.results import Document
 from beaver_ftc_logs import energy, trust
 from beaver_ftc_logs.bank import GROUP_LOSS, UNKNOWN_OFFSET, HypothesisBank, build_bank
 from beaver_ftc_logs.filtering import bank_posterior, fault_evidence, page_cusum
 from beaver_ftc_logs.model import Model
-from beaver_ftc_logs.recording import MIN_DIVISOR, Floats, Ints, Mask
-from beaver_ftc_logs.regression import expand_groups, innovations
+from beaver_ftc_logs.recording import MIN_DIVISOR, Floats, Ints, Mask, Reasons, last_row_at, last_true_row
+from beaver_ftc_logs.regression import expand_groups, innovations, trailing_sums
 from beaver_ftc_logs.samples import Samples
 
 _LOG_RATE_TOLERANCE = 0.25
@@ -39,38 +41,39 @@ _NO_RESPONSE_LIMIT = 0.5
 """Probability that nothing answers the commands above which nothing is said of any surface."""
 
 
+Names = NDArray[np.object_]
+
+
 @dataclass(frozen=True)
 class LogRows:
     """The diagnosis of a flight, one row for each sample.
 
     t_s (n,). faulty (n,): 0 or 1. isolated_surfaces (n,): names joined by +, empty without an alarm.
     effectiveness of each surface, its bounds effectiveness_low and effectiveness_high (n, S).
-    fault_probability (n,) of any surface. credible (n,): 0 or 1, by default 1. evidence_start_time_s (n,):
-    time at which the evidence for a fault began to increase, by default t_s. doubtful_rows: for each reason
-    the rows (n,) that are not credible.
+    fault_probability (n,) of any surface. evidence_start_time_s (n,): time at which the evidence for a fault
+    began to increase. doubtful_rows: for each reason the rows (n,) that are not credible.
     """
 
     t_s: Floats
     faulty: Ints
-    isolated_surfaces: NDArray[np.object_]
+    isolated_surfaces: Names
     effectiveness: Floats
     effectiveness_low: Floats
     effectiveness_high: Floats
     fault_probability: Floats
-    credible: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int64))
-    evidence_start_time_s: Floats = field(default_factory=lambda: np.empty(0))
-    doubtful_rows: Mapping[str, Mask] = field(default_factory=dict)
+    evidence_start_time_s: Floats
+    doubtful_rows: Reasons = field(default_factory=dict)
 
-    def __post_init__(self) -> None:
-        if len(self.evidence_start_time_s) != len(self.t_s):
-            object.__setattr__(self, "evidence_start_time_s", self.t_s)
-        if len(self.credible) != len(self.t_s):
-            object.__setattr__(self, "credible", np.ones(len(self.t_s), dtype=np.int64))
+    @cached_property
+    def credible(self) -> Ints:
+        """0 where a row is doubtful, else 1, (n,)."""
+        is_doubtful = np.any([np.zeros(len(self.t_s)), *self.doubtful_rows.values()], axis=0)
+        return np.where(is_doubtful, 0, 1)
 
-    def table(self, surfaces: Iterable[str], with_probability: bool = False) -> dict[str, Any]:
+    def table(self, surfaces: Iterable[str], with_probability: bool = False) -> Document:
         """The columns of diagnosis.parquet. Where nothing is said of a surface's effectiveness, its
         bounds are 0 and 1."""
-        columns: dict[str, Any] = {"t_s": self.t_s, "faulty": self.faulty}
+        columns: Document = {"t_s": self.t_s, "faulty": self.faulty}
         columns["named"] = self.isolated_surfaces.tolist()
         for i, surface in enumerate(surfaces):
             columns[f"{surface}_effectiveness"] = self.effectiveness[:, i]
@@ -89,6 +92,14 @@ class LogRows:
         other columns, is credible here too."""
         return not self.has_credible_alarm() and bool((self.credible >= other.credible).all())
 
+    def credibility(self) -> Document:
+        """The entry of verdict.json with the share of credible rows, and the reasons for the others with
+        their shares."""
+        shares = {reason: float(rows.mean()) for reason, rows in self.doubtful_rows.items()}
+        ordered = sorted(shares, key=lambda reason: -shares[reason])
+        entries = [{"says": reason, "share": shares[reason]} for reason in ordered]
+        return {"share": float(self.credible.mean()) if len(self.t_s) else 0.0, "reasons": entries}
+
     def _where(self, mask: Mask, **values: Any) -> "LogRows":
         """The rows with other values where a mask is true."""
         changed = {name: np.where(mask, value, getattr(self, name)) for name, value in values.items()}
@@ -99,14 +110,14 @@ class LogRows:
         mask = removed if removed.ndim == 2 else removed[:, None]
         return self._where(mask, effectiveness=1.0, effectiveness_low=0.0, effectiveness_high=1.0)
 
-    def without_verdict(self, reasons: Mapping[str, Mask]) -> "LogRows":
+    def without_verdict(self, reasons: Reasons) -> "LogRows":
         """The rows without alarm, name and bounds, and not credible, where one of the reasons, (n,) each, is
-        true."""
-        removed = np.any([np.zeros(len(self.t_s), dtype=bool), *reasons.values()], axis=0)
-        rows = self.without_estimate(removed)._where(
-            removed, faulty=0, isolated_surfaces="", fault_probability=0.0
-        )
-        return replace(rows, credible=np.where(removed, 0, 1), doubtful_rows=reasons)
+        true; reasons without a row are left out."""
+        reasons = {reason: mask for reason, mask in reasons.items() if mask.any()}
+        rows = replace(self, doubtful_rows=reasons)
+        removed = rows.credible == 0
+        rows = rows.without_estimate(removed)
+        return rows._where(removed, faulty=0, isolated_surfaces="", fault_probability=0.0)
 
 
 def diagnose(samples: Samples, model: Model) -> LogRows:
@@ -134,8 +145,8 @@ def reversed_command_error(flight: str, surface: str, allowed: str) -> BadInput:
 def _diagnose_checked_log(samples: Samples, model: Model) -> LogRows:
     bank = build_bank(model)
     known = trust.without_dead_rows(samples, model)
-    P, _, _ = bank_posterior(known, model, bank)
-    silent = P[:, bank.no_response_hypothesis_index] > _NO_RESPONSE_LIMIT
+    P = bank_posterior(known, model, bank)
+    silent = P[:, -1] > _NO_RESPONSE_LIMIT
     rows = rows_of_posterior(samples, model, bank, P)
     if model.vehicle.other_laws and model.settings.threshold is not None and not model.colours:
         rows = _withdraw_contradicted(known, model, rows, model.settings.threshold)
@@ -146,7 +157,7 @@ def finish_rows(samples: Samples, model: Model, rows: LogRows, silent: Mask | No
     """Rows at the log's own stamps, without a verdict where the model is not credible, and without bounds
     for a group whose effect is unknown. silent (n,): where nothing answers the commands."""
     reasons = trust.untrusted_rows(samples, model)
-    if silent is not None and silent.any():
+    if silent is not None:
         reasons["nothing answers the commands: on the ground, or these are not what it follows"] = silent
     if not any(trust.known_effects(model)):
         always = np.ones(len(rows.t_s), dtype=bool)
@@ -211,9 +222,7 @@ def _withdraw_contradicted(samples: Samples, model: Model, rows: LogRows, least:
     m = (np.array(model.response).sum(axis=1) @ flight.W).T
     norms = np.linalg.norm(m, axis=0)
     p = (r @ (m / np.maximum(norms, MIN_DIVISOR))) ** 2
-    total = np.cumsum(p, axis=0)
-    begin = np.maximum(np.arange(len(total)) - round(_DIRECTION_WINDOW_S * model.rate_hz), 0)
-    gain = 0.5 * model.settings.power * (total - total[begin])
+    gain = 0.5 * model.settings.power * trailing_sums(p, _DIRECTION_WINDOW_S * model.rate_hz)[0]
     best = gain.max(axis=1)
     wrong = np.zeros(len(r), dtype=bool)
     for g, group in enumerate(model.groups):
@@ -235,23 +244,28 @@ def check_log_fits_model(samples: Samples, model: Model) -> None:
     trust.refuse_columns(samples, model)
 
 
-def rows_of_posterior(samples: Samples, model: Model, bank: HypothesisBank, P: Floats) -> LogRows:
-    """Return the rows that follow from the probabilities of the hypotheses (n, H)."""
-    p_silent = P[:, bank.no_response_hypothesis_index]
+def rows_of_posterior(
+    samples: Samples, model: Model, bank: HypothesisBank, P: Floats, mass: float | None = None
+) -> LogRows:
+    """Return the rows that follow from the probabilities of the hypotheses (n, H). mass: posterior mass
+    inside the bounds, that of the model's settings where None."""
+    p_silent = P[:, -1]
     p_fault = P[:, bank.is_fault_hypothesis].sum(axis=1)
-    P_live = P[:, : bank.no_response_hypothesis_index] / np.maximum(1.0 - p_silent, MIN_DIVISOR)[:, None]
+    P_live = P[:, :-1] / np.maximum(1.0 - p_silent, MIN_DIVISOR)[:, None]
     calm = P[:, 0] + p_silent > 0.5
     mu = model.settings.threshold
     steps = fault_evidence(P, bank)
     evidence = page_cusum(steps, mu or np.inf)
-    alarmed = nameable = _held_long_enough(p_fault >= model.settings.alarm, model)
+    alarmed = nameable = p_fault >= model.settings.alarm
     if mu is not None:
         mu_name = model.settings.name_evidence * mu
         alarmed = (evidence >= mu) & ~calm
         nameable = (page_cusum(steps, mu_name) >= mu_name) & ~calm
     faulty = _latched(alarmed, calm).astype(np.int64)
-    start = np.maximum.accumulate(np.where(evidence <= 0.0, np.arange(len(evidence)), 0))
-    per_group = [_group_bounds(bank, P_live, g, model) for g in range(len(model.groups))]
+    start = np.maximum(last_true_row(evidence <= 0.0), 0)
+    per_group = [
+        _group_bounds(bank, P_live, g, model, mass or model.settings.bounds) for g in range(len(model.groups))
+    ]
     e, low, high = (np.column_stack(column) for column in zip(*per_group, strict=True))
     silent = p_silent > _NO_RESPONSE_LIMIT
     e[silent], low[silent], high[silent] = 1.0, 0.0, 1.0
@@ -269,42 +283,32 @@ def rows_of_posterior(samples: Samples, model: Model, bank: HypothesisBank, P: F
     )
 
 
-def _group_bounds(bank: HypothesisBank, P_live: Floats, g: int, model: Model) -> tuple[Floats, ...]:
-    """A group's effectiveness and its bounds, (n,) each.
+def _group_bounds(
+    bank: HypothesisBank, P_live: Floats, g: int, model: Model, mass: float
+) -> tuple[Floats, ...]:
+    """A group's effectiveness and its bounds, which hold this posterior mass, (n,) each.
 
     Of several surfaces that move together any may have lost all, or nothing.
     """
     levels, p = _group_levels(bank, P_live, g)
     if model.vehicle.other_laws:  # how rare faults are says nothing of a flight with one: all levels alike
-        p = p / _group_levels(bank, bank.prior_probability[None, : bank.no_response_hypothesis_index], g)[1]
+        p = p / _group_levels(bank, bank.prior_probability[None, :-1], g)[1]
         p /= p.sum(axis=1, keepdims=True)
-    low, high = _credible_bounds(levels, p, model.settings.bounds)
+    low, high = _credible_bounds(levels, p, mass)
     if len(model.groups[g]) > 1:
         low, high = np.where(low < low.max(initial=0.0), 0.0, low), np.ones_like(high)
     # the median, with half of the probability on either side: the least mean absolute error
     return levels[(np.cumsum(p, axis=1) >= 0.5 - 1e-12).argmax(axis=1)], low, high
 
 
-def _held_long_enough(holds: Mask, model: Model) -> Mask:
-    """Return the rows at which a condition holds and has held for long enough, (n,)."""
-    n = round(model.settings.hold_s * model.rate_hz)
-    held = np.arange(len(holds)) - np.maximum.accumulate(np.where(holds, -1, np.arange(len(holds))))
-    return np.asarray(holds & (held > n))
-
-
 def _latched(alarmed: Mask, calm: Mask) -> Mask:
     """An alarm once raised stands until health is the likelier again."""
-    k = np.arange(len(alarmed))
-    last_alarm = np.maximum.accumulate(np.where(alarmed, k, -1))
-    last_calm = np.maximum.accumulate(np.where(calm & ~alarmed, k, -1))
-    return np.asarray((last_alarm >= 0) & (last_alarm > last_calm))
+    return np.asarray(last_true_row(alarmed) > last_true_row(calm & ~alarmed))
 
 
 def _group_levels(bank: HypothesisBank, P_live: Floats, g: int) -> tuple[Floats, Floats]:
     """A group's levels, the last of them 1, and the probability of each, (L,) and (n, L)."""
-    levels, level_of = np.unique(
-        bank.effectiveness[: bank.no_response_hypothesis_index, g], return_inverse=True
-    )
+    levels, level_of = np.unique(bank.effectiveness[:-1, g], return_inverse=True)
     p = np.zeros((len(P_live), len(levels)))
     for h, j in enumerate(level_of):
         p[:, j] += P_live[:, h]
@@ -322,9 +326,7 @@ def _credible_bounds(levels: Floats, p: Floats, mass: float) -> tuple[Floats, Fl
     return edges[np.searchsorted(levels, low)], edges[np.searchsorted(levels, high) + 1]
 
 
-def _surfaces_at_fault(
-    model: Model, bank: HypothesisBank, P: Floats, faulty: Ints, nameable: Mask
-) -> NDArray[np.object_]:
+def _surfaces_at_fault(model: Model, bank: HypothesisBank, P: Floats, faulty: Ints, nameable: Mask) -> Names:
     """The surfaces of the groups that most of the fault's probability is on; `unknown` where it is split.
 
     Where one group is at fault (`one_group`), each that may be instead is named with it; `unknown` where none
@@ -340,7 +342,7 @@ def _surfaces_at_fault(
         likely = (p_loss > _EXCLUSION_RISK * p_loss.max(axis=1, keepdims=True)) & nameable[:, None]
         can_lose = p_loss.max(axis=0) > 0.0
         likely &= ~(likely[:, can_lose].all(axis=1) & (can_lose.sum() > 1))[:, None]
-    names = join_names(likely, ["+".join(group) for group in model.groups])
+    names = join_names(likely, model.group_names)
     named = np.full(len(P), "", dtype=object)
     offset = P[:, bank.hypothesis_kind == UNKNOWN_OFFSET].sum(axis=1) > p_fault
     n_hold = round(model.settings.rename_s * model.rate_hz)
@@ -357,16 +359,16 @@ def _surfaces_at_fault(
     return named
 
 
-def join_names(flags: Mask, names: Sequence[str]) -> NDArray[np.object_]:
+def join_names(flags: Mask, names: Sequence[str]) -> Names:
     """The names that are flagged in flags (n, K), joined by +, (n,) text."""
     return np.array(["+".join(compress(names, row)) for row in flags], dtype=object)
 
 
 def _at_log_stamps(samples: Samples, rows: LogRows) -> LogRows:
     """The rows at the log's own stamps: each stamp has the last row up to it."""
-    if len(samples.log_stamps_s) == len(rows.t_s) and np.array_equal(samples.log_stamps_s, rows.t_s):
+    if np.array_equal(samples.log_stamps_s, rows.t_s):
         return rows
-    last = np.maximum(np.searchsorted(rows.t_s, samples.log_stamps_s, side="right") - 1, 0)
+    last = last_row_at(rows.t_s, samples.log_stamps_s)
     names = [name for name in LogRows.__dataclass_fields__ if name not in ("t_s", "doubtful_rows")]
     reasons = {reason: mask[last] for reason, mask in rows.doubtful_rows.items()}
     fields = {name: getattr(rows, name)[last] for name in names}

@@ -9,7 +9,7 @@ fast as in the parts of healthy flight with the engine idling, no surface is nam
 import numpy as np
 
 from beaver_ftc.aircraft import GRAVITY_MPS2
-from beaver_ftc_logs.recording import Floats
+from beaver_ftc_logs.recording import Floats, last_true_row, true_runs
 
 ENGINE, UNKNOWN_SURFACE = "engine", "unknown"
 UNPOWERED_SHARE = 0.15
@@ -40,14 +40,11 @@ def withdraw_surfaces(
     time.
     """
     named = names.copy()
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], faulty, [0]])))
-    for begin, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+    for begin, end in true_runs(faulty == 1):
         first = int(np.searchsorted(t, start[begin]))
         falling = climb[first:end] <= unpowered
         rising = climb[first:end] > 0.0
-        k = np.arange(end - first)
-        last_fall, last_rise = (np.maximum.accumulate(np.where(held, k, -1)) for held in (falling, rising))
-        failed = (last_fall > last_rise)[begin - first :]
+        failed = (last_true_row(falling) > last_true_row(rising))[begin - first :]
         share = np.cumsum(falling[begin - first :]) / np.arange(1, end - begin + 1)
         sure = failed & (share > 0.5) & (t[begin:end] - t[begin] >= _NAMING_DELAY_S)
         engine = np.where(np.logical_or.accumulate(sure) & failed, ENGINE, UNKNOWN_SURFACE)

@@ -25,7 +25,7 @@ import numpy as np
 from pydantic import Field
 
 from beaver_ftc.documents import Number, Section
-from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
+from beaver_ftc_logs.recording import MIN_DIVISOR, Floats, true_runs
 
 _SHAPE_SD, _SHAPE_GRID = 0.2, np.linspace(-0.5, 0.5, 41)
 _SCALE_RATIOS = np.geomspace(0.2, 5.0, 61)
@@ -66,8 +66,7 @@ class FalseAlarmRate:
 
 def peaks_between_zeros(s: Floats) -> Floats:
     """The highest value of each stretch of a statistic s (n,) above zero, (k,)."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], s > 0.0, [0]]).astype(np.int8)))
-    return np.array([s[begin:end].max() for begin, end in zip(edges[::2], edges[1::2], strict=True)])
+    return np.array([s[begin:end].max() for begin, end in true_runs(s > 0.0)])
 
 
 def fit_peak_tail(flights: Sequence[PeaksAndHours]) -> PeakTail | None:

@@ -52,14 +52,14 @@ _MEAN_SQUARE = 0.93
 _MIN_NOISE_WEIGHT = 1e-3
 """Probability of a noise model below which it is left out."""
 
-BankRun = tuple[Floats, Floats, Floats, Floats]
+BankRun = tuple[Floats, Floats]
 """As `run_bank` returns it."""
 
 
-def bank_posterior(samples: Samples, model: Model, bank: HypothesisBank) -> tuple[Floats, Floats, Floats]:
-    """Probability of each hypothesis (n, H), trim and gains (n, 4 + G) and noise scale (n,), by sample.
+def bank_posterior(samples: Samples, model: Model, bank: HypothesisBank) -> Floats:
+    """Probability of each hypothesis by sample, (n, H).
 
-    All are averages over the command delays of the model's settings and, if the flight is not yet whitened,
+    It is the average over the command delays of the model's settings or, if the flight is not yet whitened,
     over its noise models. The weights are their probabilities given the last minutes. A noise model is run up
     to the last sample at which its weight is not negligible: within a second most become far less likely than
     another, and stay so.
@@ -68,26 +68,18 @@ def bank_posterior(samples: Samples, model: Model, bank: HypothesisBank) -> tupl
         delays = model.settings.delays_s
         flights = [innovations(_with_command_delay(samples, delay_s), model) for delay_s in delays]
         runs = [run_flight(flight, model, bank) for flight in flights]
-        return _average_runs(list(model_weights([run[3] for run in runs], model.rate_hz)), runs)
+        weights = model_weights([ll for _, ll in runs], model.rate_hz)
+        return np.asarray((weights[:, :, None] * np.array([p for p, _ in runs])).sum(axis=0))
     pairs = [(innovations(white, one), one) for white, one in by_noise(samples, model)]
-    p = model_weights([_noise_likelihood(*pair) for pair in pairs], model.rate_hz)
-    kept = np.where(p < _MIN_NOISE_WEIGHT, 0.0, p)
+    weights = model_weights([_noise_likelihood(*pair) for pair in pairs], model.rate_hz)
+    kept = np.where(weights < _MIN_NOISE_WEIGHT, 0.0, weights)
     kept /= kept.sum(axis=0)
-    counts = [int(np.flatnonzero(w).max(initial=-1)) + 1 for w in kept]
-    used = [(flight.at(slice(n)), one) for (flight, one), n in zip(pairs, counts, strict=True) if n]
-    runs = [run_flight(*pair, bank) for pair in used]
-    return _average_runs([w for w, n in zip(kept, counts, strict=True) if n], runs)
-
-
-def _average_runs(weights: Sequence[Floats], runs: Sequence[BankRun]) -> tuple[Floats, Floats, Floats]:
-    """Weighted average of runs; weights (n,) each. A run may be shorter than n where its weight stays 0."""
-    averages: list[Floats] = []
-    for outputs in list(zip(*runs, strict=True))[:3]:
-        mean = np.zeros((len(weights[0]), *outputs[0].shape[1:]))
-        for w, output in zip(weights, outputs, strict=True):
-            mean[: len(output)] += (w[: len(output)] * output.T).T
-        averages.append(mean)
-    return averages[0], averages[1], averages[2]
+    mean = np.zeros((len(samples.t_s), len(bank.transition_share)))
+    for w, (flight, one) in zip(kept, pairs, strict=True):
+        if n := int(np.flatnonzero(w).max(initial=-1)) + 1:
+            p, _ = run_flight(flight.at(slice(n)), one, bank)
+            mean[:n] += w[:n, None] * p
+    return mean
 
 
 def _noise_likelihood(flight: Innovations, model: Model) -> Floats:
@@ -151,14 +143,13 @@ def model_weights(ll: Sequence[Floats], rate_hz: float) -> Floats:
 
 def run_flight(flight: Innovations, model: Model, bank: HypothesisBank) -> BankRun:
     """The result of `run_bank` for one flight."""
-    noisy = model.with_noise_of(flight.ma)
     q = flight.quick_scale(model)
     r_min = np.zeros(len(q))
     if model.vehicle.other_laws:
-        white = flight.e @ flight.W / np.sqrt(flight.inflation * q[:, None])
+        white = flight.e @ flight.W / np.sqrt(flight.noise.wider * q[:, None])
         r_min = recent_scale(white, flight.is_known, model.rate_hz)
     y, F = (np.ascontiguousarray(values) for values in (flight.y, flight.F))
-    states, noise = build_states(noisy, flight.ma), build_noise(noisy, flight.ma)
+    states, noise = build_states(model, flight.noise), build_noise(model, flight.noise, flight.c)
     run: BankRun = run_bank(y, F, flight.is_known, bank, states, noise, r_min, q)
     return run
 
@@ -182,8 +173,8 @@ def recent_scale(g: Floats, ok: np.ndarray, rate_hz: float) -> Floats:
 
 @kernel
 def run_bank(y, F, ok, bank, states, noise, r_min, q):
-    """Posterior probabilities (n, H), mean states (n, N), noise scale r (n,) and ll (n,): the log likelihood
-    of a sample given all before it, times effective_sample_share.
+    """Posterior probabilities (n, H) and ll (n,): the log likelihood of a sample given all before it, times
+    effective_sample_share.
 
     ok (n,): the sample may be used. bank: HypothesisBank, states: StateModel, noise: ResidualNoise, as in
     `bank`; r_min (n,): lower bound of the scale of the noise; q (n,).
@@ -198,8 +189,6 @@ def run_bank(y, F, ok, bank, states, noise, r_min, q):
     lo = states.initial_mean - states.max_deviation
     hi = states.initial_mean + states.max_deviation
     post = np.zeros((n, H))
-    means = np.zeros((n, N))
-    scales = np.zeros(n)
     ll = np.zeros(n)
     r = 1.0
     for k in range(n):
@@ -215,9 +204,7 @@ def run_bank(y, F, ok, bank, states, noise, r_min, q):
         else:
             p = prior
         post[k] = p
-        scales[k] = r
-        means[k] = p @ x
-    return post, means, scales, ll
+    return post, ll
 
 
 @kernel

@@ -19,8 +19,8 @@ from beaver_ftc_logs.bank import HypothesisBank, build_bank
 from beaver_ftc_logs.diagnose import UNKNOWN_SURFACE, LogRows
 from beaver_ftc_logs.energy import ENGINE
 from beaver_ftc_logs.model import Model
-from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
-from beaver_ftc_logs.regression import innovations
+from beaver_ftc_logs.recording import MIN_DIVISOR, Floats, Runs
+from beaver_ftc_logs.regression import innovations, left_by
 from beaver_ftc_logs.samples import Samples, constant_stretches
 
 MAX_BRIEF_EVENT_S = 3.0
@@ -43,7 +43,7 @@ def verdict_document(samples: Samples, model: Model, rows: LogRows) -> Document:
         "vehicle": model.vehicle.name,
         **span_entry(samples),
         "faulty": bool(rows.faulty.any()),
-        "credible": trust.credibility_entry(rows.doubtful_rows, rows.credible),
+        "credible": rows.credibility(),
         "events": fault_events(rows, list(model.vehicle.surfaces)),
         "can_separate": [*trust.unknown_sentences(model), *isolability_sentences(isolable)],
         "isolability": isolable,
@@ -74,10 +74,10 @@ def fault_events(rows: LogRows, surfaces: list[str]) -> list[Document]:
     return [_fault_event_entry(rows, begin, end, surfaces) for begin, end in runs if rows.faulty[begin]]
 
 
-def _join_runs(rows: LogRows, runs: list[tuple[int, int]]) -> list[tuple[int, int]]:
+def _join_runs(rows: LogRows, runs: Runs) -> Runs:
     """Runs with the brief ones taken into the alarm before them, a brief one without a name into the one
     after it, and alike neighbours made one."""
-    joined: list[tuple[int, int]] = []
+    joined: Runs = []
     for begin, end in runs:
         before = joined[-1] if joined else (begin, begin)
         first, names, e = before[0], rows.isolated_surfaces, rows.effectiveness
@@ -217,7 +217,7 @@ def _own_information(F: Floats, g: int) -> float:
     n, G, m = F.shape
     f = F.transpose(1, 0, 2).reshape(G, -1)
     N = np.column_stack([np.tile(np.eye(m), (n, 1)), *np.delete(f, g, axis=0)])
-    r = f[g] - N @ np.linalg.lstsq(N, f[g], rcond=None)[0]
+    r = left_by(N, f[g])
     return float(r @ r) / n
 
 

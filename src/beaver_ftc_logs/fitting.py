@@ -17,14 +17,10 @@ the two halves of a single flight in turn, or each of several flights in turn.
     known           which groups have an effect that is known (G,)
 """
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
-from functools import wraps
-from itertools import groupby, pairwise, product
-from typing import Any, Concatenate, ParamSpec, TypeVar
+from collections.abc import Iterator, Sequence
+from itertools import groupby, product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
@@ -38,8 +34,8 @@ from beaver_ftc_logs.filtering import (
     recent_scale,
 )
 from beaver_ftc_logs.model import FilterSettings, FittedRanges, Model, NoiseModel
-from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
-from beaver_ftc_logs.regression import FitPart
+from beaver_ftc_logs.recording import MIN_DIVISOR, Floats, Ints, Mask, runs_between
+from beaver_ftc_logs.regression import FitPart, Parts
 from beaver_ftc_logs.samples import Samples, constant_stretches
 from beaver_ftc_logs.scoring import score_against_labels
 from beaver_ftc_logs.vehicle import Vehicle
@@ -61,7 +57,7 @@ _TRIM_SPANS_S = (2.0, 8.0)
 """Spans whose means tell the drift of the trim from the residual's colour."""
 _POWER_LABELLED = 0.8
 """A coloured residual tells less than a white one: by how much, blocked tests decided."""
-_OTHER_DAYS: dict[str, Any] = {
+_OTHER_DAYS: Document = {
     "trim_sd": 0.1,
     "trim_shift": 0.03,
     "trim_walk": [2.5e-3, 6e-4, 2e-3],
@@ -71,7 +67,7 @@ _OTHER_DAYS: dict[str, Any] = {
 }
 """How far another day may be: chosen on days drawn from one flight, judged on others (`--other-days`). The
 drift of the trim is what the means of the residual over 30 s show in that flight."""
-_OTHER_LAWS: dict[str, Any] = {
+_OTHER_LAWS: Document = {
     "own_gain_sd": 0.05,
     "own_gain_time_s": 20.0,
     "name_evidence": 2.0,
@@ -86,7 +82,7 @@ not modelled ties the command to it), and what a name asks for then. Chosen on s
 bounds: the posterior mass of 90 % bounds where no labels choose it. For a second or two after a loss most of
 the mass still claims health: 0.9 of it held the truth at the fault in 0.70 to 0.94 of the samples, fewest of
 large losses; 0.97 in 0.83 to 0.99, on seeds 401 to 403, which chose it."""
-_MOVING_AIR: dict[str, Any] = {"own_gain_sd": 0.08, "own_gain_time_s": 100.0}
+_MOVING_AIR: Document = {"own_gain_sd": 0.08, "own_gain_time_s": 100.0}
 _GAIN_WINDOW_S, AR_ORDER = 10.0, 20
 """Whitened by the flight's own noise model and an AR predictor of so many samples; gains differ by flight
 rather than within it: chosen on seeds 11 and 12, in light turbulence; what a name asks for on a pa28's
@@ -108,9 +104,8 @@ _USUAL_SHARE = 0.9
 _MIN_QUICK_SAMPLES = 10
 """Samples with quick responses that a flight must have, for the mean of their errors."""
 _RANK_TOLERANCE = 1e-9
-_N_MISTAKE_TESTS = 4
-"""Number of held-out flights that are also read with each mistake in their columns. The largest gain in
-likelihood of n flights is exceeded by that of the next, similar flight with probability 1 / (n + 1)."""
+_MIN_EFFECT_POWER, _EFFECT_POWER_CAP = 1e-6, 12.5
+"""Of an effect of so many variances of the noise a sample, a fiftieth is half a standard deviation."""
 _MAX_SPLITS, _GAIN_SD_CAP = 12, 0.33
 """A gain that is known no better than to a third is not known to be there."""
 _N_PRIOR_CHANGES = 20
@@ -120,32 +115,12 @@ _COVERAGE_GOAL = 0.93
 """Coverage the bounds aim at: 90 % and some of what another day takes away."""
 
 
-Args = ParamSpec("Args")
-Result = TypeVar("Result")
-OfParts = Callable[Concatenate[Sequence[FitPart], Args], Result]
-
-
-def _once(compute: OfParts[Args, Result]) -> OfParts[Args, Result]:
-    """Compute a result for these flights once: every test of a model needs the same fits to parts of them."""
-
-    @wraps(compute)
-    def cached(parts: Sequence[FitPart], *args: Args.args, **kwargs: Args.kwargs) -> Result:
-        cache = parts[0].result_cache
-        values = (arg.model_dump_json() if isinstance(arg, Vehicle) else arg for arg in args)
-        key = (compute.__name__, *values, *map(id, parts))
-        if key not in cache:
-            cache[key] = (tuple(parts), compute(parts, *args, **kwargs))  # held: an id is of one object
-        return cache[key][1]  # type: ignore[return-value]
-
-    return cached
-
-
 def fit_parts(flights: Sequence[Samples]) -> list[FitPart]:
     """Return each flight with the samples that are known well enough for the fit."""
     return [FitPart(samples, usable_mask(samples)) for samples in flights]
 
 
-def usable_mask(samples: Samples) -> NDArray[np.bool_]:
+def usable_mask(samples: Samples) -> Mask:
     """Which samples are known to be healthy, or faulty by a known amount, (n,)."""
     usable = np.ones(len(samples.t_s), dtype=bool)
     if samples.logged_failures:
@@ -163,44 +138,41 @@ def usable_mask(samples: Samples) -> NDArray[np.bool_]:
     return usable
 
 
-def fit_model(parts: Sequence[FitPart], vehicle: Vehicle, settings: FilterSettings | None = None) -> Model:
+def fit_model(parts: Parts, vehicle: Vehicle, settings: FilterSettings | None = None) -> Model:
     """The model that fits these flights. Raises BadInput where there is too little to fit."""
     bic = bic_by_order(parts, vehicle)
-    model = _model_of_order(parts, vehicle, *min(bic, key=lambda order: bic[order]))
+    model = _fitted(parts, vehicle, *min(bic, key=lambda order: bic[order]))[1]
     model = model.model_copy(update={"settings": settings or estimate_filter_settings(parts, model)})
     return _with_inflated_noise(parts, model) if model.colours else model
 
 
-def refit(parts: Sequence[FitPart], model: Model) -> Model:
+def refit(parts: Parts, model: Model) -> Model:
     """A model of the same order and settings, fitted to other flights."""
-    refitted = _model_of_order(parts, model.vehicle, model.history, model.lags)
-    return _with_inflation(refitted.model_copy(update={"settings": model.settings}), model.inflation_of)
+    refitted = _fitted(parts, model.vehicle, model.history, model.lags)[1]
+    colours = [
+        noise.model_copy(update={"wider": model.noise_of(noise.average).wider}) for noise in refitted.colours
+    ]
+    return refitted.model_copy(update={"settings": model.settings, "colours": colours})
 
 
-def _with_inflation(model: Model, inflation_of: Callable[[Sequence[float]], float]) -> Model:
-    """The model with so many times as wide a noise of each moving average."""
-    models = [noise.model_copy(update={"wider": inflation_of(noise.average)}) for noise in model.colours]
-    return model.model_copy(update={"colours": models})
-
-
-def held_out_folds(parts: Sequence[FitPart], model: Model) -> Iterator[tuple[Model, FitPart]]:
-    """For each part that is left out, a model fitted to others, with the standard errors of its gains, and
-    this part."""
-    tied = trust.tied_shares(parts, model).tolist()
+def held_out_folds(parts: Parts, model: Model) -> Iterator[tuple[Model, FitPart, Parts]]:
+    """For each part that is left out, a model fitted to others, with the standard errors of its gains, this
+    part, and the others."""
+    tied = tied_shares(parts, model).tolist()
     for fitted, held_out, _ in validation_folds(parts, _MAX_SPLITS):
         gain_sd = group_gain_sd(fit_of(fitted, model), model).tolist()
         ranges = FittedRanges(commands=[], rates=[], gain_sd=gain_sd, tied=tied)
-        yield refit(fitted, model).model_copy(update={"fitted": ranges}), held_out
+        yield refit(fitted, model).model_copy(update={"fitted": ranges}), held_out, fitted
 
 
-def bic_by_order(parts: Sequence[FitPart], vehicle: Vehicle) -> dict[tuple[int, int], float]:
+def bic_by_order(parts: Parts, vehicle: Vehicle) -> dict[tuple[int, int], float]:
     """The Bayesian information criterion of each number of past samples of rates and commands.
 
     Every order's regressors are among those of the largest: one matrix of products serves all. With the
     coefficients C of m regressors on n samples, it is n log det((y' y - (Z' y)' C) / n) + 3 m log n.
     """
     Z, y, _ = stack_data(parts, vehicle, max(RATE_LAGS), max(COMMAND_LAGS))
-    rms = np.maximum(np.sqrt((Z**2).mean(axis=0)), MIN_DIVISOR)
+    rms = regression.rms_of_columns(Z)
     ZZ = (Z / rms).T @ (Z / rms)
     Zy = (Z / rms).T @ y
     yy = y.T @ y
@@ -213,7 +185,7 @@ def bic_by_order(parts: Sequence[FitPart], vehicle: Vehicle) -> dict[tuple[int, 
     return bic
 
 
-def _order_columns(vehicle: Vehicle, h: int, L: int) -> NDArray[np.int64]:
+def _order_columns(vehicle: Vehicle, h: int, L: int) -> Ints:
     """Columns of the largest design that an order has."""
     n, most = len(vehicle.regressor_columns), max(RATE_LAGS)
     rates = np.arange(1 + 3 * most) < 1 + 3 * h
@@ -222,13 +194,23 @@ def _order_columns(vehicle: Vehicle, h: int, L: int) -> NDArray[np.int64]:
     return np.flatnonzero(np.concatenate([rates, signals, commands]))
 
 
-def fit_of(parts: Sequence[FitPart], model: Model) -> regression.Regression:
+def fit_of(parts: Parts, model: Model) -> regression.Regression:
     """Least squares of a model's order over all flights."""
-    return fit_order(parts, model.vehicle, model.history, model.lags)
+    return _fitted(parts, model.vehicle, model.history, model.lags)[0]
 
 
-@_once
-def fit_order(parts: Sequence[FitPart], vehicle: Vehicle, h: int, L: int) -> regression.Regression:
+def _fitted(parts: Parts, vehicle: Vehicle, h: int, L: int) -> tuple[regression.Regression, Model]:
+    """Least squares of given order over all flights, and its model: made once, since every test of a model
+    needs the same fits to parts of them."""
+    fits, key = parts[0].fits, (vehicle.model_dump_json(), h, L, *map(id, parts))
+    if key not in fits:
+        fit = fit_order(parts, vehicle, h, L)
+        # with the parts, which are held: an id is of one object
+        fits[key] = fit, _model_of_fit(fit, parts, vehicle, h, L), tuple(parts)
+    return fits[key][:2]
+
+
+def fit_order(parts: Parts, vehicle: Vehicle, h: int, L: int) -> regression.Regression:
     """Least squares of given order over all flights."""
     Z, y, stretch = stack_data(parts, vehicle, h, L)
     if len(y) < 10 * Z.shape[1]:
@@ -237,13 +219,11 @@ def fit_order(parts: Sequence[FitPart], vehicle: Vehicle, h: int, L: int) -> reg
     still = [axis for axis, sd in zip("pqr", y.std(axis=0), strict=True) if sd < _MIN_RATE_SD]
     if still:
         raise BadInput(f"identify: rate {still[0]} does not move, allowed: flights in which every rate does")
-    dt_s = float(np.median([part.samples.dt_s for part in parts]))
+    dt_s = regression.usual_step_s(parts)
     return regression.fit_ols(Z, y, stretch, round(_NEWEY_WEST_S / dt_s))
 
 
-def stack_data(
-    parts: Sequence[FitPart], vehicle: Vehicle, h: int, L: int
-) -> tuple[Floats, Floats, NDArray[np.int64]]:
+def stack_data(parts: Parts, vehicle: Vehicle, h: int, L: int) -> tuple[Floats, Floats, Ints]:
     """Regressors, rates and run number over all flights: the same samples for any order.
 
     Columns of the regressors: one, the past, the commands of each group by lag.
@@ -252,7 +232,8 @@ def stack_data(
     most = max(RATE_LAGS + COMMAND_LAGS)
     Z, y, stretches = [], [], []
     for i, part in enumerate(parts):
-        X, U, used = part.regressors(groups, h, L, vehicle.n_signal_lags(h))
+        X, U, known = regression.build_regressors(part.samples, groups, h, L, True, vehicle.n_signal_lags(h))
+        used = part.is_usable & known
         used[:most] = False
         n, weight = len(X), part.samples.fit_weight
         Z.append(weight * np.column_stack([np.ones(n), X, U.reshape(n, -1)])[used])
@@ -261,16 +242,14 @@ def stack_data(
     return np.vstack(Z), np.vstack(y), np.concatenate(stretches)
 
 
-@_once
-def _model_of_order(parts: Sequence[FitPart], vehicle: Vehicle, h: int, L: int) -> Model:
-    fit = fit_order(parts, vehicle, h, L)
+def _model_of_fit(fit: regression.Regression, parts: Parts, vehicle: Vehicle, h: int, L: int) -> Model:
     names = list(vehicle.surfaces)
     groups = regression.group_surfaces(vehicle)
     first = len(fit.coefficients) - len(groups) * L
     shape = (len(groups), L, 3)
     model = Model(
         vehicle=vehicle,
-        rate_hz=1.0 / float(np.median([part.samples.dt_s for part in parts])),
+        rate_hz=1.0 / regression.usual_step_s(parts),
         groups=[[names[i] for i in group] for group in groups],
         history=h,
         lags=L,
@@ -281,35 +260,22 @@ def _model_of_order(parts: Sequence[FitPart], vehicle: Vehicle, h: int, L: int) 
         noise=fit.residual_covariance.tolist(),
     )
     colours = sorted({part.samples.noise_ma_coefficients for part in parts} - {()})
-    noises = [_fit_noise_model(_parts_in(parts, ma), model, list(ma)) for ma in colours]
-    model = model.model_copy(update={"colours": noises})
-    if vehicle.other_laws:
-        noises = [_with_errors(_parts_in(parts, noise.average), model, noise) for noise in noises]
+    noises = []
+    for own in (_parts_in(parts, ma) for ma in colours):
+        noise = _fit_noise_model(own, model)
+        noises.append(_with_errors(own, model, noise) if vehicle.other_laws else noise)
     return model.model_copy(update={"colours": noises})
 
 
-def _with_errors(own: Sequence[FitPart], model: Model, noise: NoiseModel) -> NoiseModel:
-    """The noise of some flights with how far a model may misread the groups' effects in it, and with their
-    usual quickness: the power of the quick part of the responses that the flights exceed in a tenth of their
-    samples, in variances of this noise."""
-    powers = np.concatenate([part.innovations(model).quick_power(model.rate_hz) for part in own])
-    return noise.model_copy(
-        update={
-            "misreads": hidden_errors(own, model, noise),
-            "quick": float(np.quantile(powers, _USUAL_SHARE)),
-        }
-    )
-
-
-def _parts_in(parts: Sequence[FitPart], ma: Sequence[float]) -> list[FitPart]:
+def _parts_in(parts: Parts, ma: Sequence[float]) -> list[FitPart]:
     """The parts that are whitened by this moving average."""
     return [part for part in parts if part.samples.noise_ma_coefficients == tuple(ma)]
 
 
-def quick_error_share(parts: Sequence[FitPart], model: Model) -> float:
+def quick_error_share(parts: Parts, model: Model) -> float:
     """Estimate the error of unusually quick responses, as a share of them, at most 1: the largest of the
     flights left out; 1 if none of them has such responses."""
-    squares = [_squared_quick_error(fold, held_out) for fold, held_out in held_out_folds(parts, model)]
+    squares = [_squared_quick_error(fold, held_out) for fold, held_out, _ in held_out_folds(parts, model)]
     known = [square for square in squares if square is not None]
     return float(np.sqrt(np.clip(max(known, default=1.0), 0.0, 1.0)))
 
@@ -323,7 +289,7 @@ def _squared_quick_error(fold: Model, held_out: FitPart) -> float | None:
     """
     flight = held_out.innovations(fold)
     power = flight.quick_power(fold.rate_hz)
-    unusual = power > fold.usual_quick_power(flight.ma)
+    unusual = power > flight.noise.usual_quick_power
     if unusual.sum() < _MIN_QUICK_SAMPLES:
         return None
     squares = ((flight.e - np.median(flight.e, axis=0)) @ flight.W) ** 2
@@ -332,29 +298,34 @@ def _squared_quick_error(fold: Model, held_out: FitPart) -> float | None:
     return float(((ratio - 1.0) / power[unusual]).mean())
 
 
-def hidden_errors(own: Sequence[FitPart], model: Model, noise: NoiseModel) -> list[float]:
-    """How far a fit may misread the effect of each group in the flights of one noise, as a share, (G,): the
-    standard deviation of an error that is anywhere below the largest.
+def _with_errors(own: Parts, model: Model, noise: NoiseModel) -> NoiseModel:
+    """The noise of some flights with how far a fit may misread the effect of each group in it, as a share,
+    (G,): the standard deviation of an error that is anywhere below the largest; and with the power of the
+    quick part of the responses that the flights exceed in a tenth of their samples, in variances of the
+    noise.
 
     What the past predicts of a residual is no noise, but what the model lacks. A law that feeds it to the
     surfaces makes it look like their effect. On an axis with the power q of what is lacking and p of the
     effect, both in variances of the noise, the effect is then misread by sqrt(q / p) of itself at most; over
     axes, that least squares weighs by p, by sqrt(sum q p) / sum p. A law that feeds back otherwise shows it.
     """
-    e = one_step_residuals(own, model)
-    powers = [_centred(part.innovations(model).F) ** 2 for part in own]
+    flights = [part.innovations(model.model_copy(update={"colours": [noise]})) for part in own]
     r = np.diag(np.array(noise.noise))
-    p = np.vstack(powers).mean(axis=0) / r
-    q = np.maximum(e.var(axis=0) / r - 1.0, 0.0)
+    p = np.vstack([_centred(flight.F) ** 2 for flight in flights]).mean(axis=0) / r
+    q = np.maximum(one_step_residuals(own, model).var(axis=0) / r - 1.0, 0.0)
     most = np.minimum(np.sqrt(p @ q) / np.maximum(p.sum(axis=1), MIN_DIVISOR), _GAIN_SD_CAP)
-    return (most / np.sqrt(3.0)).tolist()
+    powers = np.concatenate([flight.quick_power(model.rate_hz) for flight in flights])
+    usual = float(np.quantile(powers, _USUAL_SHARE))
+    return noise.model_copy(update={"misreads": (most / np.sqrt(3.0)).tolist(), "quick": usual})
 
 
-def _fit_noise_model(own: Sequence[FitPart], model: Model, ma: list[float]) -> NoiseModel:
+def _fit_noise_model(own: Parts, model: Model) -> NoiseModel:
     """The noise of flights of one moving average, with an AR predictor of the residual, by least squares
     where samples follow one another; without a predictor where too few do."""
-    flights = [part.innovations(model) for part in own]
-    runs = [flight.e[begin:end] for flight in flights for begin, end in _row_runs(flight.rows)]
+    ma, flights = list(own[0].samples.noise_ma_coefficients), [part.innovations(model) for part in own]
+    runs = [
+        flight.e[begin:end] for flight in flights for begin, end in runs_between(np.diff(flight.rows) > 1)
+    ]
     targets = [run[AR_ORDER:] for run in runs]
     if sum(map(len, targets)) < 10 * 3 * AR_ORDER:
         return NoiseModel(average=ma, noise=np.cov(np.vstack(runs).T).tolist())
@@ -366,10 +337,10 @@ def _fit_noise_model(own: Sequence[FitPart], model: Model, ma: list[float]) -> N
     return NoiseModel(average=ma, before=ar.tolist(), noise=np.cov((y - Z @ ar).T).tolist())
 
 
-def estimate_filter_settings(parts: Sequence[FitPart], model: Model) -> FilterSettings:
+def estimate_filter_settings(parts: Parts, model: Model) -> FilterSettings:
     """Estimate the settings of later faults from the flights: levels seen, and how often they changed."""
     moving, other_laws = model.vehicle.moving_air, model.vehicle.other_laws
-    extra: dict[str, Any] = _OTHER_LAWS | (_MOVING_AIR if moving else {}) if other_laws else {}
+    extra: Document = _OTHER_LAWS | (_MOVING_AIR if moving else {}) if other_laws else {}
     if other_laws and model.colours:
         extra |= {"quick_error": quick_error_share(parts, model)}
     extra |= {"delays_s": [d / model.rate_hz for d in ((0.0,) if moving else _DELAYS_SAMPLES)]}
@@ -391,13 +362,13 @@ def estimate_filter_settings(parts: Sequence[FitPart], model: Model) -> FilterSe
     return FilterSettings(**extra, power=min(most, 1.0 / gain_overdispersion(parts, drifting)))
 
 
-def _label_levels(parts: Sequence[FitPart], i: int) -> list[list[float]]:
+def _label_levels(parts: Parts, i: int) -> list[list[float]]:
     """The levels of one surface's label in their order, edges left out, of each flight."""
     labels = [part.samples.labels[:, i][part.is_usable] for part in parts]
     return [[round(level, 6) for level, _ in groupby(one[np.isfinite(one)].tolist())] for one in labels]
 
 
-def gain_overdispersion(parts: Sequence[FitPart], model: Model) -> float:
+def gain_overdispersion(parts: Parts, model: Model) -> float:
     """Estimate how many times as far, in squares, the gains of parts left out are from 1 as the filter
     believes.
 
@@ -408,9 +379,17 @@ def gain_overdispersion(parts: Sequence[FitPart], model: Model) -> float:
     that is as believed.
     """
     errors = [(float(len(model.groups)), len(model.groups))]
-    for fold, held_out in held_out_folds(parts, model):
+    for fold, held_out, _ in held_out_folds(parts, model):
         errors += _gain_errors(fold, held_out)
     return sum(error for error, _ in errors) / sum(n for _, n in errors)
+
+
+def _gains(F: Floats, e: Floats) -> tuple[Floats, Floats, Floats]:
+    """Information F' F of errors g of gains, what the residual says of them, F' e, and g by least squares, of
+    e (n, 3) = F g + noise, F (n, 3, m)."""
+    X = F.reshape(e.size, F.shape[2])
+    FF, Fe = X.T @ X, X.T @ e.ravel()
+    return FF, Fe, np.asarray(np.linalg.lstsq(FF, Fe, rcond=_RANK_TOLERANCE)[0])
 
 
 def _gain_errors(
@@ -426,7 +405,7 @@ def _gain_errors(
     F, e = _standardized(fold, held_out)
     if not len(e):  # a part without a residual shows no gain
         return []
-    P = build_states(fold, held_out.samples.noise_ma_coefficients).initial_covariance[3:, 3:]
+    P = build_states(fold, fold.noise_of(held_out.samples.noise_ma_coefficients)).initial_covariance[3:, 3:]
     S = np.asarray(P[0, 0] + np.diag(np.diag(P)[1:][known]))
     F, n = F[:, :, known], 1
     if window_s is None:
@@ -436,43 +415,38 @@ def _gain_errors(
         n = max(round(len(e) * held_out.samples.dt_s / window_s), 1)
     errors = []
     for rows in np.array_split(np.arange(len(e)), n):
-        Fw, ew = (_centred(values[rows]) / np.sqrt(loudness) for values in (F, e))
-        Fw = Fw.reshape(ew.size, -1)
-        FF, Fe = Fw.T @ Fw, Fw.T @ ew.ravel()
-        g = np.linalg.lstsq(FF, Fe, rcond=_RANK_TOLERANCE)[0]
+        FF, Fe, g = _gains(*(_centred(values[rows]) / np.sqrt(loudness) for values in (F, e)))
         A = np.eye(len(g)) + S @ FF  # singular by rounding where nothing tells a gain
         error = max(float(Fe @ np.linalg.lstsq(A, g, rcond=_RANK_TOLERANCE)[0]), 0.0)
         errors.append((error, int(np.linalg.matrix_rank(FF, tol=_RANK_TOLERANCE * np.trace(FF)))))
     return errors
 
 
-def _with_inflated_noise(parts: Sequence[FitPart], model: Model) -> Model:
+def _with_inflated_noise(parts: Parts, model: Model) -> Model:
     """The model with the noise of each colour so many times wider as the gains of ten seconds left out, each
     axis of an answer with its own, are farther from 1, in squares, than it and the filter let them be: quiet
     gyros show what the model itself lacks."""
     windows: dict[tuple[float, ...], list[float]] = {}
-    rest = validation_folds(parts, _MAX_SPLITS)
-    for (fold, held_out), (fitted, _, _) in zip(held_out_folds(parts, model), rest, strict=True):
+    for fold, held_out, fitted in held_out_folds(parts, model):
+        loudness = _loudness(fold, held_out, fitted if len(parts) > 1 else parts)
+        errors = _gain_errors(fold, held_out, _GAIN_WINDOW_S, loudness)
         found = windows.setdefault(held_out.samples.noise_ma_coefficients, [])
-        found.extend(_window_inflations(fold, held_out, fitted if len(parts) > 1 else parts))
+        found.extend(min(error / max(n, 1), _MAX_INFLATION) for error, n in errors)
     inflation = {ma: max(float(np.mean(values)), 1.0) for ma, values in windows.items() if values}
     for ma in inflation if model.vehicle.other_laws else ():
         # a gyro's noise takes from the next sample what it added to one
         inflation[ma] *= _GYRO_FACTOR if len(ma) > 1 and ma[1] < 0.0 else _GUST_FACTOR
-    return _with_inflation(model, lambda ma: inflation.get(tuple(ma), 1.0))
+    colours = [
+        noise.model_copy(update={"wider": inflation.get(tuple(noise.average), 1.0)})
+        for noise in model.colours
+    ]
+    return model.model_copy(update={"colours": colours})
 
 
-def _window_inflations(fold: Model, held_out: FitPart, others: Sequence[FitPart]) -> list[float]:
-    """How many times as far, in squares, the gains of each ten seconds of a part left out are from 1 as the
-    filter lets them be. Under other laws the filter widens the noise of a flight that is louder than the
-    others (`recent_scale`): what it widens by itself is not counted again."""
-    errors = _gain_errors(fold, held_out, _GAIN_WINDOW_S, _loudness(fold, held_out, others))
-    return [min(error / max(n, 1), _MAX_INFLATION) for error, n in errors]
-
-
-def _loudness(fold: Model, held_out: FitPart, others: Sequence[FitPart]) -> float:
+def _loudness(fold: Model, held_out: FitPart, others: Parts) -> float:
     """How many times as wide the filter finds the noise of a flight left out as that of the loudest other
-    flight of the same noise; 1 if it is within the range of these, or under the same law."""
+    flight of the same noise; 1 if it is within the range of these, or under the same law. What the filter
+    widens by itself (`recent_scale`) is not counted again."""
     if not fold.vehicle.other_laws:
         return 1.0
 
@@ -489,7 +463,7 @@ def _standardized(model: Model, held_out: FitPart) -> tuple[Floats, Floats]:
     """Return the effect F (n, 3, G, 3) of each axis of each group's answer on the residuals of a part, and
     those e (n, 3), both in sd of the noise, without means; where responses are quick, q times that."""
     flight = held_out.innovations(model)
-    sd = np.sqrt(flight.inflation * flight.quick_scale(model))[:, None]
+    sd = np.sqrt(flight.noise.wider * flight.quick_scale(model))[:, None]
     F = np.einsum("nga,ab->nbga", flight.F, flight.W)
     return _centred(F) / sd[:, :, None, None], _centred(flight.e @ flight.W) / sd
 
@@ -499,7 +473,7 @@ def _centred(values: Floats) -> Floats:
     return values - values.mean(axis=0) if len(values) else values
 
 
-def _estimate_trim_walk(parts: Sequence[FitPart], model: Model) -> list[float]:
+def _estimate_trim_walk(parts: Parts, model: Model) -> list[float]:
     """Drift of the trim a sample, in residual sd, that parts left out show; the usual at least.
 
     Means of n samples of a random walk, with steps of variance w, and of noise whose mean has the variance
@@ -508,10 +482,10 @@ def _estimate_trim_walk(parts: Sequence[FitPart], model: Model) -> list[float]:
     sums = np.zeros((2, 3))
     counts = np.zeros(2)
     spans = np.round(np.array(_TRIM_SPANS_S) * model.rate_hz)
-    for fold, held_out in held_out_folds(parts, model):
+    for fold, held_out, _ in held_out_folds(parts, model):
         flight = held_out.innovations(fold)
         g = flight.e / np.sqrt(np.maximum(np.diag(flight.R), MIN_DIVISOR))
-        for begin, end in _row_runs(flight.rows):
+        for begin, end in runs_between(np.diff(flight.rows) > 1):
             for i, n in enumerate(spans.astype(int).tolist()):
                 means = g[begin:end][: (end - begin) // n * n].reshape(-1, n, 3).mean(axis=1)
                 sums[i] += (np.diff(means, axis=0) ** 2).sum(axis=0)
@@ -525,19 +499,11 @@ def _estimate_trim_walk(parts: Sequence[FitPart], model: Model) -> list[float]:
     return np.maximum(np.sqrt(np.maximum(w, 0.0)), usual).tolist()
 
 
-def _row_runs(rows: NDArray[np.int64]) -> list[tuple[int, int]]:
-    """Begin and end of what of increasing places follows one another."""
-    edges = [0, *(np.flatnonzero(np.diff(rows) > 1) + 1).tolist(), len(rows)]
-    return list(pairwise(edges))
-
-
-def validation_folds(
-    parts: Sequence[FitPart], most: int | None = None
-) -> list[tuple[list[FitPart], FitPart, str]]:
+def validation_folds(parts: Parts, most: int | None = None) -> list[tuple[list[FitPart], FitPart, str]]:
     """Return the fitted flights, the held-out one and its name: halves of one flight; each flight in turn, of
     more than `most` every so many at once."""
     if len(parts) == 1:
-        first, second = _halves(parts)
+        first, second = parts[0].halves
         return [([first], second, "second half"), ([second], first, "first half")]
     n = min(len(parts), most or len(parts))
     return [
@@ -547,36 +513,24 @@ def validation_folds(
     ]
 
 
-@_once
-def _halves(parts: Sequence[FitPart]) -> tuple[FitPart, FitPart]:
-    """The usable samples of one flight in two halves."""
-    (part,) = parts
-    rows = np.flatnonzero(part.is_usable)
-    middle = int(rows[len(rows) // 2]) if len(rows) else 0
-    first = np.arange(len(part.is_usable)) < middle
-    return FitPart(part.samples, part.is_usable & first), FitPart(part.samples, part.is_usable & ~first)
-
-
-def add_ranges_and_threshold(parts: Sequence[FitPart], model: Model) -> Model:
+def add_ranges_and_threshold(parts: Parts, model: Model) -> Model:
     """The model with what it was fitted on, and how it did on parts that were left out in turn: at which
     evidence of a fault they would alarm as often as declared."""
-    misread = 0.0
     peaks = list[extremes.PeaksAndHours]()
     deviations = list[Floats]()
-    for fold, held_out in held_out_folds(parts, model):
-        if len(peaks) < _N_MISTAKE_TESTS:
-            misread = max(misread, _misread_gain(fold, held_out))
+    for fold, held_out, _ in held_out_folds(parts, model):
         peaks.append(_healthy_peaks(fold, held_out))
         if len(parts) > 1 and model.vehicle.other_laws:
             deviations.append(_squared_deviations(fold, held_out))
     variance = group_gain_sd(fit_of(parts, model), model) ** 2
     if model.vehicle.other_laws:
-        # how far another flight's gains may be before any is left out counts as one flight
-        variance += np.nanmean([_max_gain_bias(parts, model) ** 2, *deviations], axis=0)
+        # how far another flight's gains are at most before any is left out counts as one flight
+        hidden = [noise.misreads for noise in model.colours] or [[0.0] * len(model.groups)]
+        variance += np.nanmean([3.0 * np.max(hidden, axis=0) ** 2, *deviations], axis=0)
     gain_sd = np.minimum(np.sqrt(variance), _GAIN_SD_CAP)
     tail = extremes.fit_peak_tail(peaks)
-    ranges = trust.compute_fitted_ranges(parts, model, gain_sd).model_copy(
-        update={"tail": tail, "misread": misread}
+    ranges = trust.compute_fitted_ranges(parts, tied_shares(parts, model), gain_sd).model_copy(
+        update={"tail": tail}
     )
     rate, threshold = _alarm_rate_and_threshold(model, tail, peaks)
     alarm = {"false_alarms_per_hour": rate, "threshold": threshold}
@@ -604,37 +558,16 @@ def _alarm_rate_and_threshold(
     return target, _choose_threshold(tail, target, model) if target else None
 
 
-def _max_gain_bias(parts: Sequence[FitPart], model: Model) -> Floats:
-    """By how much a group's gain may be misread under one law, (G,).
-
-    Of the residual's variance the share that its own past predicts is no noise, but what the model lacks. A
-    law feeds it back to the surfaces, and least squares takes it for their answer, at most so much of it as
-    the standard deviation of one is of the other's; a law that feeds back otherwise shows the difference.
-    """
-    if not model.colours:
-        return np.zeros(len(model.groups))
-    share = 0.0
-    for noise in model.colours:
-        e = one_step_residuals(_parts_in(parts, noise.average), model)
-        chance = 3.0 * AR_ORDER / len(e) if noise.before else 0.0
-        log_det = np.linalg.slogdet(np.array(noise.noise))[1]
-        log_ratio = log_det - np.linalg.slogdet(np.cov(e.T))[1]
-        share = max(share, 1.0 - float(np.exp(log_ratio / 3.0)) - chance)
-    untied = trust.effect_powers(parts, model)[1]
-    return np.minimum(np.sqrt(3.0 * share / np.maximum(untied, MIN_DIVISOR)), _GAIN_SD_CAP)
-
-
 def _squared_deviations(model: Model, held_out: FitPart) -> Floats:
     """Squares of how far the groups' gains are from 1 in a flight left out, beyond the noise's share, (G,);
     nan of a group whose effect it does not show."""
     F, e = _standardized(model, held_out)
-    F = F.sum(axis=3).reshape(e.size, len(model.groups))
-    squares = np.full(F.shape[1], np.nan)
-    known = np.array(trust.known_effects(model)) & F.any(axis=0)
-    FF = F[:, known].T @ F[:, known]
-    P = np.linalg.pinv(FF, rcond=_RANK_TOLERANCE, hermitian=True)
-    g = P @ (F[:, known].T @ e.ravel())
+    F = F.sum(axis=3)
+    squares = np.full(len(model.groups), np.nan)
+    known = np.array(trust.known_effects(model)) & F.any(axis=(0, 1))
     if known.any():  # a part without a residual shows the effect of no group
+        FF, _, g = _gains(F[:, :, known], e)
+        P = np.linalg.pinv(FF, rcond=_RANK_TOLERANCE, hermitian=True)
         squares[known] = np.maximum(g**2 - np.diag(P) * max(float((e**2).mean()), 1.0), 0.0)
     return squares
 
@@ -647,13 +580,6 @@ def _choose_threshold(tail: extremes.PeakTail | None, target: float, model: Mode
         factor = _LORDEN_FACTOR
     least = factor * extremes.lorden_threshold(model.rate_hz, target)
     return max(extremes.threshold_for_rate(tail, target), least) if tail is not None else least
-
-
-def _misread_gain(model: Model, held_out: FitPart) -> float:
-    """How much likelier a sample of a part left out, in health, is with its columns read wrongly, at most."""
-    rates = np.where(held_out.is_usable[:, None], held_out.samples.rates, np.nan)
-    gains, _ = trust.mistake_gains(replace(held_out.samples, rates=rates), model)
-    return max(0.0, *gains.values()) if gains else 0.0
 
 
 def _cross_validate(
@@ -677,13 +603,33 @@ def _cross_validate(
 def _healthy_peaks(model: Model, held_out: FitPart) -> extremes.PeaksAndHours:
     """Return for a part left out the peaks of the alarm statistic in health, and its healthy hours."""
     bank = build_bank(model)
-    p, _, _ = bank_posterior(held_out.samples, model, bank)
+    p = bank_posterior(held_out.samples, model, bank)
     z = fault_evidence(p, bank)
-    answers = p[:, bank.no_response_hypothesis_index] < 0.5
+    answers = p[:, -1] < 0.5
     rows = np.flatnonzero(held_out.is_usable & ~(held_out.samples.labels < 1.0).any(axis=1) & answers)
-    runs = [page_cusum(z[rows[begin:end]], np.inf) for begin, end in _row_runs(rows)]
+    runs = [page_cusum(z[rows[begin:end]], np.inf) for begin, end in runs_between(np.diff(rows) > 1)]
     peaks = np.concatenate([extremes.peaks_between_zeros(cusum) for cusum in runs])
     return peaks, len(rows) * held_out.samples.dt_s / 3600.0
+
+
+def tied_shares(parts: Parts, model: Model) -> Floats:
+    """Share of each group's effect on the rates that past, signals and the other groups make up, (G,): where
+    it is near 1 the law ties the group to what it answers to, and its effect cannot be told; 1 where the
+    group never moved. An effect far above the noise may be made up to a larger share: what is left counts.
+
+    The effect y = U_g B_g W is in standard deviations of the noise, e = y - Z b what the other columns of the
+    fit do not make up of it."""
+    Z, _, _ = stack_data(parts, model.vehicle, model.history, model.lags)
+    B, W = np.array(model.response), np.linalg.inv(np.linalg.cholesky(np.array(model.noise))).T
+    shares = np.ones(len(B))
+    for g, columns in enumerate(np.arange(Z.shape[1])[-B.shape[1] * len(B) :].reshape(len(B), -1)):
+        y = Z[:, columns] @ B[g] @ W
+        y = y - y.mean(axis=0)
+        power = float((y**2).sum()) / len(y)
+        if power > _MIN_EFFECT_POWER:
+            e = regression.left_by(np.delete(Z, columns, axis=1), y)
+            shares[g] = max(1.0 - float((e**2).sum()) / len(y) / min(power, _EFFECT_POWER_CAP), 0.0)
+    return shares
 
 
 def group_gain_sd(fit: regression.Regression, model: Model) -> Floats:
@@ -713,40 +659,37 @@ def group_gain_sd(fit: regression.Regression, model: Model) -> Floats:
     return np.minimum(gain_sd, _GAIN_SD_CAP)
 
 
-def fold_qualities(parts: Sequence[FitPart], model: Model) -> list[Document]:
+def refitted_folds(parts: Parts, model: Model) -> list[tuple[Model, FitPart, str]]:
+    """For each part that is left out, the model fitted to the others, this part and its name."""
+    folds = validation_folds(parts)
+    return [(refit(fitted, model), held_out, name) for fitted, held_out, name in folds]
+
+
+def fold_qualities(parts: Parts, model: Model) -> list[Document]:
     """Compute the explained variance of parts left out, one entry a fold."""
-    return [
-        {"left_out": name, **prediction_quality(refit(fitted, model), held_out)}
-        for fitted, held_out, name in validation_folds(parts)
-    ]
+    folds = refitted_folds(parts, model)
+    return [{"left_out": name, **prediction_quality(fold, held_out)} for fold, held_out, name in folds]
 
 
-def score_folds(parts: Sequence[FitPart], model: Model) -> tuple[list[Document], float]:
+def score_folds(parts: Parts, model: Model) -> tuple[list[Document], float]:
     """One entry a fold, and the posterior mass with which the bounds hold the labels as they should."""
     entries = fold_qualities(parts, model)
     usual = model.settings.bounds
     coverage: list[list[float]] = []
-    for entry, (fitted, held_out, _) in zip(entries, validation_folds(parts), strict=True):
+    for entry, (fold, held_out, _) in zip(entries, refitted_folds(parts, model), strict=True):
         labels = np.where(held_out.is_usable[:, None], held_out.samples.labels, np.nan)
         if np.isfinite(labels).all(axis=1).any():
-            scores = _scores_by_mass(refit(fitted, model), held_out, labels)
+            bank = build_bank(fold)
+            p = bank_posterior(held_out.samples, fold, bank)
+            scores = {
+                mass: score_against_labels(rows_of_posterior(held_out.samples, fold, bank, p, mass), labels)
+                for mass in (*_CREDIBLE_MASSES, usual)
+            }
             entry["score"] = scores[usual]
             coverage.append([scores[mass]["held_by_bounds"] for mass in _CREDIBLE_MASSES])
     if not coverage:
         return entries, usual
     return entries, _CREDIBLE_MASSES[int(np.argmin(np.abs(np.mean(coverage, axis=0) - _COVERAGE_GOAL)))]
-
-
-def _scores_by_mass(model: Model, held_out: FitPart, labels: Floats) -> dict[float, Document]:
-    bank = build_bank(model)
-    p, _, _ = bank_posterior(held_out.samples, model, bank)
-    scores = {}
-    for mass in {*_CREDIBLE_MASSES, model.settings.bounds}:
-        settings = model.settings.model_copy(update={"bounds": mass})
-        candidate = model.model_copy(update={"settings": settings})
-        rows = rows_of_posterior(held_out.samples, candidate, bank, p)
-        scores[mass] = score_against_labels(rows, labels)
-    return scores
 
 
 def prediction_quality(model: Model, held_out: FitPart) -> Document:
@@ -763,12 +706,12 @@ def prediction_quality(model: Model, held_out: FitPart) -> Document:
     }
 
 
-def one_step_residual(model: Model, part: FitPart) -> tuple[NDArray[np.int64], Floats]:
+def one_step_residual(model: Model, part: FitPart) -> tuple[Ints, Floats]:
     """Places (n,) of the samples in use, and their one-step residuals (n, 3), whatever is known of noise."""
     flight = part.innovations(model.model_copy(update={"colours": []}))
     return flight.rows, flight.e
 
 
-def one_step_residuals(parts: Sequence[FitPart], model: Model) -> Floats:
+def one_step_residuals(parts: Parts, model: Model) -> Floats:
     """The same of several flights, one after the other, (n, 3)."""
     return np.vstack([one_step_residual(model, part)[1] for part in parts])

@@ -13,7 +13,6 @@ Q (3, 3) (rad/s)2, s rad/s: standard deviation of a gyro, A (h, 3, 3), M = (1, -
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import Floats
@@ -36,7 +35,7 @@ def yule_walker_predictor(model: Model, Q: Floats, s: float, L: int) -> tuple[Fl
     return np.asarray(B), np.asarray(R[0] - S.T @ B)
 
 
-def _autocovariance(model: Model, Q: Floats, s: float, L: int) -> NDArray[np.float64]:
+def _autocovariance(model: Model, Q: Floats, s: float, L: int) -> Floats:
     """R[t] = E w[k] w[k-t]' for lags t = 0 ... L, (L + 1, 3, 3): s2 sum_j M[t+j] M[j]', and Q at t = 0."""
     A = np.array(model.past)[: 3 * model.history].reshape(model.history, 3, 3)
     M = np.concatenate([np.eye(3)[None], -A.transpose(0, 2, 1)])

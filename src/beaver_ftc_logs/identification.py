@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from itertools import product
 from math import isfinite
-from typing import Any
 
 import numpy as np
 
@@ -17,7 +16,7 @@ from beaver_ftc.results import Document
 from beaver_ftc_logs import extremes, fitting, gyro_noise, regression, trust
 from beaver_ftc_logs.model import FittedRanges, Model, NoiseModel
 from beaver_ftc_logs.recording import Floats
-from beaver_ftc_logs.regression import group_indices, spectral_density, variance_inflation
+from beaver_ftc_logs.regression import Groups, Parts, group_indices, spectral_density, variance_inflation
 from beaver_ftc_logs.samples import (
     NOISE_MA_CANDIDATES,
     UNFITTED_GYROS_RAD_S,
@@ -80,9 +79,9 @@ def add_unseen_noise(model: Model, flights: Sequence[Samples]) -> Model:
     known = [tuple(noise.average) for noise in model.colours]
     quietest = min((np.array(noise.noise) for noise in model.colours), key=np.linalg.det)
     powers = [noise.quick for noise in model.colours if noise.quick is not None]
-    same: dict[str, Any] = {
+    same: Document = {
         "wider": max(noise.wider for noise in model.colours),
-        "misreads": np.max([model.hidden_gain_error_sd(one) for one in known], axis=0).tolist(),
+        "misreads": np.max([noise.misreads for noise in model.colours], axis=0).tolist(),
         "quick": min(powers, default=None),
     }
     models = list(model.colours)
@@ -142,7 +141,7 @@ def whiten_flights(flights: Sequence[Samples], vehicle: Vehicle) -> list[Samples
         if len(y) < 2:
             known = f"{len(y)} samples known to be healthy"
             raise BadInput(f"identify: {flight.name}: {known}, allowed: at least 2")
-        return np.asarray(y - Z @ np.linalg.lstsq(Z, y, rcond=None)[0])
+        return regression.left_by(Z, y)
 
     alone = [{ma: own_residual(flight, ma) for ma in NOISE_MA_CANDIDATES} for flight in flights]
     colours = [_likeliest_ma(residuals)[1] for residuals in alone]
@@ -240,7 +239,7 @@ def _min_bic(flights: Sequence[Samples], vehicle: Vehicle) -> float:
     return min(fitting.bic_by_order(fitting.fit_parts(flights), vehicle).values())
 
 
-def check_explained(folds: list[Document], parts: Sequence[fitting.FitPart], model: Model) -> None:
+def check_explained(folds: list[Document], parts: Parts, model: Model) -> None:
     """Raise BadInput where a model explains less of an axis than its mean does, on parts not fitted."""
     known = [fold for fold in folds if fold["samples"]]
     counts = [fold["samples"] for fold in known]
@@ -270,7 +269,7 @@ def _check_units(flights: Sequence[Samples], vehicle: Vehicle) -> None:
         trust.refuse_command_unit(flight.name, flight.commands, flight.rates, first, list(vehicle.surfaces))
 
 
-def collinear_names(parts: Sequence[fitting.FitPart], model: Model) -> list[Document]:
+def collinear_names(parts: Parts, model: Model) -> list[Document]:
     """Regressors whose coefficient's variance the others inflate more than tenfold, worst first; None where
     the others make it up."""
     Z, _, _ = fitting.stack_data(parts, model.vehicle, model.history, model.lags)
@@ -296,14 +295,14 @@ def regressor_names(model: Model) -> list[str]:
     return [f"{name}[-{k}]" for names, most in lagged for k in range(1, most + 1) for name in names]
 
 
-def median_inflation(parts: Sequence[fitting.FitPart], model: Model) -> dict[str, float]:
+def median_inflation(parts: Parts, model: Model) -> dict[str, float]:
     """By how much the residual's colour widens the standard errors of the responses: the median, an axis."""
     n = len(model.groups) * model.lags
     inflation = fitting.fit_of(parts, model).standard_error_inflation[-n:]
     return regression.by_axis(np.median(inflation, axis=0))
 
 
-def density_ratios(parts: Sequence[fitting.FitPart], model: Model) -> list[Document]:
+def density_ratios(parts: Parts, model: Model) -> list[Document]:
     """Mean density of the residual by band, over that of white noise of the same variance, an axis."""
     e = fitting.one_step_residuals(parts, model)
     f, density = spectral_density(e, 1.0 / model.rate_hz)
@@ -421,7 +420,7 @@ def _axis_text(values: dict[str, float]) -> str:
     return ", ".join(f"{axis} {value:.3f}" for axis, value in values.items())
 
 
-def fit_output_error(parts: Sequence[fitting.FitPart], groups: list[list[int]]) -> dict[str, Any]:
+def fit_output_error(parts: Parts, groups: Groups) -> Document:
     """Fit on every other window, test on the rest. Returns servo lag and delay in s, their standard errors,
     and the share of the rates' variance explained over free-running windows not fitted, an axis.
 
@@ -429,7 +428,7 @@ def fit_output_error(parts: Sequence[fitting.FitPart], groups: list[list[int]]) 
     """
     from scipy.optimize import least_squares
 
-    dt_s = float(np.median([part.samples.dt_s for part in parts]))
+    dt_s = regression.usual_step_s(parts)
     u, y = _cut_windows(parts, groups, round(FREE_RUN_WINDOW_S / dt_s), round(_MAX_DELAY_S / dt_s) + 1)
     if len(y) < 20 or not np.ptp(y, axis=(0, 1)).all():
         return {"windows": len(y), "says": "too few gap-free windows in which every rate moves"}
@@ -459,23 +458,21 @@ def fit_output_error(parts: Sequence[fitting.FitPart], groups: list[list[int]]) 
     }
 
 
-def _cut_windows(
-    parts: Sequence[fitting.FitPart], groups: list[list[int]], n: int, past: int
-) -> tuple[Floats, Floats]:
+def _cut_windows(parts: Parts, groups: Groups, n: int, past: int) -> tuple[Floats, Floats]:
     """Commands u (W, past + n, G) with their past, scaled by labels, and rates y (W, n, 3), of W windows."""
     windows = []
     for part in parts:
         samples = part.samples
-        effect = np.where(np.isfinite(samples.labels), samples.labels, 1.0)
-        u = np.column_stack([(samples.commands * effect)[:, group].sum(axis=1) for group in groups])
-        known = part.is_usable & np.isfinite(u).all(axis=1) & np.isfinite(samples.rates).all(axis=1)
-        for end in range(past + n, len(u), n):
-            rows = slice(end - past - n, end)
-            if known[rows].all() and np.ptp(samples.stretch_number[rows]) == 0:
-                windows.append((u[rows], samples.rates[end - n : end]))
-    chosen = windows[:: max(len(windows) // _MIN_FREE_RUNS, 1)]
-    commands, rates = ([window[i] for window in chosen] for i in (0, 1))
-    return np.reshape(commands, (-1, past + n, len(groups))), np.reshape(rates, (-1, n, 3))
+        v = regression.group_commands(samples, groups, labelled=True)
+        rows = np.column_stack([samples.rates, samples.stretch_number, v])[:-1]
+        rows[~part.is_usable[:-1]] = np.nan
+        if len(rows) >= past + n:
+            views = np.lib.stride_tricks.sliding_window_view(rows, past + n, axis=0)[::n].transpose(0, 2, 1)
+            is_whole = np.isfinite(views).all(axis=(1, 2)) & (np.ptp(views[:, :, 3], axis=1) == 0)
+            windows.append(views[is_whole])
+    chosen = np.concatenate(windows or [np.empty((0, past + n, 4 + len(groups)))])
+    chosen = chosen[:: max(len(chosen) // _MIN_FREE_RUNS, 1)]
+    return chosen[:, :, 4:], chosen[:, past:, :3]
 
 
 def _simulate(th: Floats, u: Floats, y: Floats, dt_s: float) -> Floats:

@@ -5,10 +5,10 @@ such names too. What is not in these tables is no command until a vehicle file n
 """
 
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
-from beaver_ftc_logs.recording import Column, Parameters
+from beaver_ftc_logs.recording import Columns, Parameters
 
 
 @dataclass(frozen=True)
@@ -132,7 +132,7 @@ def multicopter_reason(params: Parameters, names: Collection[str]) -> str | None
 VTOL_MODE, _ON_ITS_WING = "vehicle_status.vehicle_type", 2.0
 
 
-def hovers_throughout(params: Parameters, columns: Mapping[str, Column]) -> bool:
+def hovers_throughout(params: Parameters, columns: Columns) -> bool:
     """Whether the log is of a VTOL that never flies on its wing [PX4, vehicle_status.msg: vehicle_type 2]."""
     is_vtol = params.get("MAV_TYPE", (0.0,))[-1] in _PX4_VTOL_TYPES
     return is_vtol and VTOL_MODE in columns and not (columns[VTOL_MODE].values == _ON_ITS_WING).any()

@@ -19,6 +19,7 @@ import numpy as np
 
 from beaver_ftc.documents import BadInput
 from beaver_ftc.documents import validate_model as validate
+from beaver_ftc.results import Document
 from beaver_ftc_logs.readers import SELECTIVE_READERS, check_exists, read_flight, reader_name_for_path
 from beaver_ftc_logs.recording import Floats, Parameters
 from beaver_ftc_logs.vehicle import Vehicle, read_vehicle_document
@@ -73,7 +74,7 @@ class Mixing:
     entry_by_column: `commands` by column; surfaces: as the key; lines: what was found, and what stays out.
     """
 
-    entry_by_column: dict[str, Any] = field(default_factory=dict)
+    entry_by_column: Document = field(default_factory=dict)
     surfaces: dict[str, Weights] = field(default_factory=dict)
     lines: list[str] = field(default_factory=list)
 
@@ -132,6 +133,10 @@ class _Axes:
         weights = self.weights(surface)
         missing = [f"{column} is not either" for column in weights if column not in names]
         return self.problem or next(iter(missing), "" if weights else "its mix is not known")
+
+
+_Found = tuple[list[_Surface], list[_Outputs], _Axes]
+"""Surfaces, the ways in which their outputs may be logged, and the commands before the mixer."""
 
 
 def mixing_of_log(reader: str, params: Parameters, column_names: Collection[str]) -> Mixing:
@@ -213,7 +218,7 @@ def _full_name(name: str, number: int, kinds: Mapping[int, int]) -> str:
     return name if [*kinds.values()].count(kinds[number]) == 1 else f"{name}_{number}"
 
 
-def _ardupilot_mixing(params: _Parameters) -> tuple[list[_Surface], list[_Outputs], _Axes]:
+def _ardupilot_mixing(params: _Parameters) -> _Found:
     """The surfaces by SERVOn_FUNCTION."""
     matches = (re.fullmatch(r"SERVO(\d{1,2})_FUNCTION", name) for name in params.values_by_name)
     names = {int(match[1]): match[0] for match in matches if match}
@@ -285,7 +290,7 @@ def _assumed_reading(problem: _BadParameter) -> Reading:
     return scale, offset, f"; range and sign stay out ({problem}), assumed: {low:g} to {high:g} us"
 
 
-def _px4_mixing(params: _Parameters, column_names: set[str]) -> tuple[list[_Surface], list[_Outputs], _Axes]:
+def _px4_mixing(params: _Parameters, column_names: set[str]) -> _Found:
     """The surfaces by CA_SV_CSn_TYPE, their shares by the torques."""
     try:
         n = params.whole_number("CA_SV_CS_COUNT", 1, _PX4_MAX_SURFACES)
@@ -449,7 +454,7 @@ def load_vehicle_for_logs(
     missing = [key for key in ("commands", "surfaces") if key not in document.data]
     lines: list[str] = []
     if missing and logs:
-        first: dict[str, Any] = {}
+        first: Document = {}
         for log in logs:
             keys, lines_of_log = _missing_keys_of_log(log, reader, document.data, missing)
             if first and keys != first:
@@ -463,7 +468,7 @@ def load_vehicle_for_logs(
 
 def _missing_keys_of_log(
     log: Path, reader: str | None, data: Mapping[str, Any], missing: Sequence[str]
-) -> tuple[dict[str, Any], list[str]]:
+) -> tuple[Document, list[str]]:
     """The keys that a vehicle file leaves out, by a log's parameters; none in a format without parameters."""
     check_exists(log)
     used_reader = reader or data.get("reader") or reader_name_for_path(log)

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
-from beaver_ftc.documents import Conflict, Location, Number, Section, Whole, read_file, refuse
+from beaver_ftc.documents import Conflict, Location, Number, Section, Whole, deny, read_file, refuse
 from beaver_ftc_logs.extremes import PeakTail
 from beaver_ftc_logs.recording import Floats
 from beaver_ftc_logs.vehicle import Vehicle
@@ -20,8 +20,8 @@ _MAX_FILE_BYTES = 20_000_000
 _MAX_COEF = 1e6  # of any coefficient: those of logs are below 100
 _MAX_SURFACE_GROUPS = 24  # the filter tries all pairs
 _MAX_CONDITION_NUMBER = 1e12  # of a covariance
-# keys of `fitted` in files of release 1.0.0
-_DEAD_KEYS = ("correlation", "scale", "minutes", "column_sd")
+# keys of `fitted` and `settings` in files of release 1.0.0
+_DEAD_KEYS = ("correlation", "scale", "minutes", "column_sd", "misread", "spread", "hold_s")
 
 Coefficient = Annotated[Number, Field(ge=-_MAX_COEF, le=_MAX_COEF)]
 CoefRow = list[Coefficient]
@@ -34,7 +34,43 @@ NonNegative = Annotated[Number, Field(ge=0, le=_MAX_COEF)]
 AtLeastOne = Annotated[Number, Field(ge=1, le=_MAX_COEF)]
 
 
-class FilterSettings(Section):
+def _shape(lists: Any) -> tuple[int, ...] | None:
+    """Lengths of nested lists; None where those of one depth differ."""
+    try:
+        return np.shape(lists)
+    except ValueError:
+        return None
+
+
+def _check_covariance(rows: CoefRows) -> CoefRows:
+    """The rows of a covariance (3, 3). Refuses one that is none, or that 64 bits cannot invert."""
+    if _shape(rows) != (3, 3):
+        deny("has another shape, allowed: 3 x 3 numbers")
+    R = np.array(rows)
+    if abs(R - R.T).max() > 1e-6 * abs(R).max():
+        deny("is not symmetric, allowed: a covariance")
+    smallest, *_, largest = np.linalg.eigvalsh(R)
+    if smallest <= 0.0 or largest > _MAX_CONDITION_NUMBER * smallest:
+        deny(f"is singular or nearly so, allowed: a covariance, conditioned to {_MAX_CONDITION_NUMBER:g}")
+    return rows
+
+
+Covariance = Annotated[CoefRows, AfterValidator(_check_covariance)]
+
+
+class _LastingSection(Section):
+    """A section of a model file."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _drop_dead_keys(cls, data: object) -> object:
+        """Model files of release 1.0.0 have keys that nothing reads any more."""
+        if not isinstance(data, dict):
+            return data
+        return {key: value for key, value in data.items() if key not in _DEAD_KEYS}
+
+
+class FilterSettings(_LastingSection):
     """Prior settings of the filter.
 
     changes_per_hour: how often a surface changes its effectiveness
@@ -57,7 +93,6 @@ class FilterSettings(Section):
     tail: degrees of freedom of the residual's t distribution
     noise_memory_s: memory of the running scale of the residual, s
     alarm: probability of a fault that raises the alarm
-    hold_s: for how long the probability must stand, s
     false_alarms_per_hour: the rate that was asked for
     threshold: evidence for a fault that raises the alarm, instead of both: for that rate
     name_evidence: evidence for a name, over that for an alarm
@@ -87,7 +122,6 @@ class FilterSettings(Section):
     tail: Number = Field(8.0, gt=2, le=_MAX_COEF)
     noise_memory_s: Positive = 60.0
     alarm: OpenShare = 0.5
-    hold_s: NonNegative = 0.0
     false_alarms_per_hour: Number | None = Field(None, gt=0, le=_MAX_COEF)
     threshold: Number | None = Field(None, gt=0, le=_MAX_COEF)
     name_evidence: AtLeastOne = 1.0
@@ -97,19 +131,16 @@ class FilterSettings(Section):
     bounds: OpenShare = 0.9
 
 
-class FittedRanges(Section):
+class FittedRanges(_LastingSection):
     """Ranges in which a model was fitted, and its errors on data that were not fitted: where it is
     credible.
 
     commands: least and largest command of each surface, share of travel
     rates: least and largest p, q and r, rad/s
     airspeed: least and largest airspeed, m/s
-    spread: standard deviation of p, q and r, rad/s
     tied: share of each group's effect that past, signals and other groups make up
     gain_sd: standard error of each group's gain
     still_s: longest time each column stood still, s
-    misread: how much likelier at most a sample of a part not fitted was with its columns read
-    wrongly, in natural logarithms
     energy_climb: rate of the energy height as without power, m/s
     tail: highest alarm statistic on parts not fitted
     """
@@ -117,21 +148,11 @@ class FittedRanges(Section):
     commands: CoefRows
     rates: CoefRows
     airspeed: CoefRow | None = None
-    spread: CoefRow = Field([])
     tied: CoefRow = Field([])
-    gain_sd: CoefRow = Field([])
+    gain_sd: list[NonNegative] = Field([])
     still_s: dict[str, Number] = Field({})
-    misread: NonNegative = 0.0
     energy_climb: Number | None = None
     tail: PeakTail | None = None
-
-    @model_validator(mode="before")
-    @classmethod
-    def _drop_dead_keys(cls, data: object) -> object:
-        """Model files of release 1.0.0 have keys that nothing reads any more."""
-        if not isinstance(data, dict):
-            return data
-        return {key: value for key, value in data.items() if key not in _DEAD_KEYS}
 
 
 class NoiseModel(Section):
@@ -147,11 +168,21 @@ class NoiseModel(Section):
     """
 
     average: CoefRow = Field(min_length=1, max_length=1000)
-    noise: CoefRows
+    noise: Covariance
     before: CoefRows = Field([])
     wider: AtLeastOne = 1.0
     misreads: list[ShareBelowOne] = Field([])
     quick: Number | None = Field(default=None, ge=0, le=_MAX_COEF)
+
+    @property
+    def usual_quick_power(self) -> float:
+        """`quick`; infinite where that is not known."""
+        return float("inf") if self.quick is None else self.quick
+
+    @property
+    def ar(self) -> Floats:
+        """Autoregressive coefficients of the residual, (L, 3, 3), latest lag first; L is 0 if not fitted."""
+        return np.reshape(np.array(self.before), (-1, 3, 3))
 
 
 class Model(Section):
@@ -176,9 +207,9 @@ class Model(Section):
     lags: Whole = Field(ge=1, le=50)
     intercept: CoefRow = Field(min_length=3, max_length=3)
     past: CoefRows
-    response: list[CoefRows]
-    response_sd: list[CoefRows]
-    noise: CoefRows
+    response: list[CoefRows] = Field(min_length=1)
+    response_sd: list[list[list[NonNegative]]] = Field(min_length=1)
+    noise: Covariance
     colours: list[NoiseModel] = Field([])
     settings: FilterSettings = FilterSettings()
     fitted: FittedRanges | None = None
@@ -191,7 +222,6 @@ class Model(Section):
         reason = f"has {n} rows, allowed: {n_past}, as `identify` writes them: identify it again"
         conflicts: list[Conflict] = [(("past",), reason)] * (n != n_past)
         refuse([*conflicts, *self._group_mistakes(), *self._shape_mistakes()])
-        refuse(self._covariance_mistakes())
         return self
 
     def _group_mistakes(self) -> Iterator[Conflict]:
@@ -203,10 +233,9 @@ class Model(Section):
                     reason = "is in two groups" if name in seen else "is no surface of the vehicle"
                     yield ("groups", i, k), f"{name!r:.60} {reason}, allowed: each surface once"
                 seen.add(name)
-        names = ["+".join(group) for group in self.groups]
         for name in self.settings.levels:
-            if name not in names:
-                reason = f"{name!r:.60} is no group, allowed: {', '.join(names)}"
+            if name not in self.group_names:
+                reason = f"{name!r:.60} is no group, allowed: {', '.join(self.group_names)}"
                 yield ("settings", "levels", name), reason
         for k, delay_s in enumerate(self.settings.delays_s):
             if abs(delay_s) * self.rate_hz > 1.0 + 1e-9:
@@ -218,110 +247,38 @@ class Model(Section):
         arrays: list[tuple[Location, Any, tuple[int, ...]]] = [
             (("response",), self.response, (G, L, 3)),
             (("response_sd",), self.response_sd, (G, L, 3)),
-            (("noise",), self.noise, (3, 3)),
+            (("past",), self.past, (len(self.past), 3)),
         ]
-        optional: list[tuple[Location, Any, tuple[int, ...]]] = [(("past",), self.past, (len(self.past), 3))]
         for i, noise in enumerate(self.colours):
             at, n_ar = ("colours", i), -(-len(noise.before) // 3) * 3
-            arrays.append(((*at, "noise"), noise.noise, (3, 3)))
-            optional.append(((*at, "before"), noise.before, (n_ar, 3)))
-            optional.append(((*at, "misreads"), noise.misreads, (G,)))
+            arrays.append(((*at, "before"), noise.before, (n_ar, 3)))
+            arrays.append(((*at, "misreads"), noise.misreads, (G,)))
             if noise.average[0] != 1.0:
                 yield (*at, "average"), "does not begin with 1, allowed: 1, c1, ..."
         if (ranges := self.fitted) is not None:
-            optional += [
+            arrays += [
                 (("fitted", "commands"), ranges.commands, (len(ranges.commands), 2)),
                 (("fitted", "rates"), ranges.rates, (3, 2)),
                 (("fitted", "airspeed"), ranges.airspeed, (2,)),
-                (("fitted", "spread"), ranges.spread, (3,)),
                 (("fitted", "tied"), ranges.tied, (G,)),
                 (("fitted", "gain_sd"), ranges.gain_sd, (G,)),
             ]
-        for key_path, lists, shape in [*arrays, *(one for one in optional if one[1])]:
-            if _shape(lists) != shape:
+        for key_path, lists, shape in arrays:
+            if lists and _shape(lists) != shape:
                 yield key_path, f"has another shape, allowed: {' x '.join(map(str, shape))} numbers"
 
-    def _covariance_mistakes(self) -> Iterator[Conflict]:
-        """Covariances that are none, or that no arithmetic in 64 bits can invert; negative deviations."""
-        covariances: list[tuple[Location, CoefRows]] = [(("noise",), self.noise)]
-        for i, noise in enumerate(self.colours):
-            covariances.append((("colours", i, "noise"), noise.noise))
-        for key_path, rows in covariances:
-            R = np.array(rows)
-            if abs(R - R.T).max() > 1e-6 * abs(R).max():
-                yield key_path, "is not symmetric, allowed: a covariance"
-                continue
-            smallest, *_, largest = np.linalg.eigvalsh(R)
-            if smallest <= 0.0 or largest > _MAX_CONDITION_NUMBER * smallest:
-                allowed = f"a covariance, conditioned to {_MAX_CONDITION_NUMBER:g}"
-                yield key_path, f"is singular or nearly so, allowed: {allowed}"
-        if np.min(self.response_sd) < 0.0:
-            yield ("response_sd",), "has a negative number, allowed: at least 0"
-        ranges = self.fitted
-        if ranges is not None and min((*ranges.gain_sd, *ranges.spread), default=0.0) < 0.0:
-            yield ("fitted",), "gain_sd or spread has a negative number, allowed: at least 0"
+    @property
+    def group_names(self) -> list[str]:
+        """The surfaces of each group, joined by +."""
+        return ["+".join(group) for group in self.groups]
 
-    def with_single_noise(self, noise: NoiseModel) -> "Model":
-        """The model with one of its noise models only."""
-        return self.model_copy(update={"colours": [noise]})
-
-    def with_noise_of(self, average: Sequence[float]) -> "Model":
-        """The model with the noise fitted for flights of this moving average, times its inflation.
+    def noise_of(self, average: Sequence[float]) -> NoiseModel:
+        """The noise fitted for flights of this moving average; that of all flights where none was fitted.
 
         average: 1, c1, ..., the moving-average model of the residual's noise, newest first.
         """
-        R = self.inflation_of(average) * self.covariance_of_noise(average)
-        return self.model_copy(update={"noise": R.tolist()})
-
-    def _noise_of(self, average: Sequence[float]) -> NoiseModel:
-        """The noise fitted for flights of this moving average; that of all flights where none was fitted."""
         fitted = [noise for noise in self.colours if noise.average == list(average)]
-        return fitted[0] if fitted else NoiseModel(average=[1.0], noise=self.noise)
-
-    def covariance_of_noise(self, average: Sequence[float]) -> Floats:
-        """Covariance (3, 3) of the noise of flights of this moving average, (rad/s)2."""
-        return np.array(self._noise_of(average).noise)
-
-    def inflation_of(self, average: Sequence[float]) -> float:
-        """Factor on the covariance of the fitted noise, by which it covers parts that were not fitted."""
-        return float(self._noise_of(average).wider)
-
-    def hidden_gain_error_sd(self, average: Sequence[float]) -> Floats:
-        """By how much of its effect the fit may misread each group in the noise of this moving average, (G,);
-        0 where that is not known."""
-        return np.array(self._noise_of(average).misreads or [0.0] * len(self.groups))
-
-    def usual_quick_power(self, average: Sequence[float]) -> float:
-        """Power of the quick part of the responses that flights of this noise seldom exceed, in variances of
-        the noise; infinite where that is not known."""
-        power = self._noise_of(average).quick
-        return float("inf") if power is None else power
-
-    def residual_ar_coefficients(self, average: Sequence[float]) -> Floats:
-        """Autoregressive coefficients of the residual, (L, 3, 3), latest lag first; L is 0 if not fitted."""
-        return np.reshape(np.array(self._noise_of(average).before), (-1, 3, 3))
-
-    def whitened_intercept(self, average: Sequence[float]) -> Floats:
-        """The intercept less its prediction by `residual_ar_coefficients`, (3,)."""
-        intercept = np.array(self.intercept)
-        return np.asarray(intercept - intercept @ self.residual_ar_coefficients(average).sum(axis=0))
-
-    def as_arrays(self) -> tuple[Floats, Floats, Floats, Floats]:
-        """intercept (3,), past (m, 3), response (G, L, 3) and noise (3, 3) as arrays."""
-        return (
-            np.array(self.intercept),
-            np.array(self.past),
-            np.array(self.response),
-            np.array(self.noise),
-        )
-
-
-def _shape(lists: Any) -> tuple[int, ...] | None:
-    """Lengths of nested lists; None where those of one depth differ."""
-    try:
-        return np.shape(lists)
-    except ValueError:
-        return None
+        return fitted[0] if fitted else NoiseModel(average=list(average) or [1.0], noise=self.noise)
 
 
 def load_model(path: Path) -> Model:

@@ -18,8 +18,8 @@ from beaver_ftc_logs.diagnose import LogRows
 from beaver_ftc_logs.findings import MAX_BRIEF_EVENT_S, duration_text, events_to_show
 from beaver_ftc_logs.identification import regressor_names
 from beaver_ftc_logs.model import Model
-from beaver_ftc_logs.recording import Floats
-from beaver_ftc_logs.regression import Regression, spectral_density
+from beaver_ftc_logs.recording import Floats, true_runs
+from beaver_ftc_logs.regression import Parts, Regression, spectral_density
 from beaver_ftc_logs.samples import Samples
 
 if TYPE_CHECKING:
@@ -149,10 +149,9 @@ def _draw_effectiveness(axis: Any, rows: LogRows, s: int, label: str) -> None:
 
 def _shade_alarms(axis: Any, rows: LogRows) -> None:
     """Shade the time in which the alarm stands."""
-    edges = np.flatnonzero(np.diff(rows.faulty, prepend=0, append=0))
-    times_s = rows.t_s[np.minimum(edges, len(rows.t_s) - 1)]
-    for begin_s, end_s in zip(times_s[::2], times_s[1::2], strict=True):
-        axis.axvspan(begin_s, end_s, color="#f4d6cc", alpha=0.45, linewidth=0)
+    for begin, end in true_runs(rows.faulty == 1):
+        end_s = rows.t_s[min(end, len(rows.t_s) - 1)]
+        axis.axvspan(rows.t_s[begin], end_s, color="#f4d6cc", alpha=0.45, linewidth=0)
 
 
 def write_results(
@@ -213,11 +212,10 @@ def _encode_png(figure: Any) -> str:
     return b64encode(buffer.getvalue()).decode()
 
 
-def _prediction_figure(usable: Sequence[fitting.FitPart], model: Model) -> Any:
+def _prediction_figure(usable: Parts, model: Model) -> Any:
     """Measured and predicted rates over the liveliest part of each flight (or half) that was left out."""
-    all_folds = fitting.validation_folds(usable)
-    folds = [(fitting.refit(fitted, model), held_out, name) for fitted, held_out, name in all_folds]
-    folds = [fold for fold in folds if fold[1].is_usable.any()][:_MAX_SHOWN_FLIGHTS]
+    folds = [fold for fold in fitting.refitted_folds(usable, model) if fold[1].is_usable.any()]
+    folds = folds[:_MAX_SHOWN_FLIGHTS]
     n = max(len(folds), 1)
     figure = _new_figure(11, 4.6 * n)
     parts = figure.subfigures(n, squeeze=False)[:, 0]
@@ -249,9 +247,9 @@ def _liveliest_window(model: Model, held_out: fitting.FitPart, n: int) -> tuple[
     return samples.t_s[window], rates[window], r[window]
 
 
-def _spectrum_figure(usable: Sequence[fitting.FitPart], model: Model) -> Any:
+def _spectrum_figure(usable: Parts, model: Model) -> Any:
     """Density of the residual, and what white noise of the same variance would have."""
-    residual = np.vstack([fitting.one_step_residual(model, flight)[1] for flight in usable])
+    residual = fitting.one_step_residuals(usable, model)
     f_hz, power = spectral_density(residual, 1.0 / model.rate_hz)
     figure = _new_figure(7.5, 3.2)
     axis = figure.subplots()

@@ -9,12 +9,12 @@ t (n,) s are the stamps of the rates; p, q, r (n,) and the angles have the unit 
 are in rad. gyros: the columns of p, q and r.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from beaver_ftc_logs.recording import Column, Floats
+from beaver_ftc_logs.recording import Column, Columns, Floats
 from beaver_ftc_logs.units import ACCELERATION, ANGLE, RATE, SI_UNITS, UNIT_FACTORS, nearest_unit
 
 _ANGLE_WINDOW_S, _MIN_WINDOWS = 1.0, 8
@@ -61,7 +61,7 @@ def fit_angle(gyros: Sequence[Column], angles: Sequence[Column | None], axis: in
     p, q, r = (_interpolate(gyro, t) for gyro in gyros)
     # The circle is known whatever the unit.
     phi = _interpolate(roll, t) * 2.0 * np.pi / _full_circle(roll.values)
-    theta = None
+    theta = np.zeros(len(t))
     if pitch is not None:
         circle = _full_circle(np.append(4.0 * pitch.values, roll.values))
         theta = _interpolate(pitch, t) * 2.0 * np.pi / circle
@@ -69,9 +69,9 @@ def fit_angle(gyros: Sequence[Column], angles: Sequence[Column | None], axis: in
     if axis == 1:
         return _fit_angle(t, _interpolate(angle, t), [q * np.cos(phi), -r * np.sin(phi)])
     if axis == 0:
-        terms = [p] if theta is None else [p, *(np.tan(theta) * part for part in turn)]
+        terms = [p, *(np.tan(theta) * part for part in turn)]
     else:
-        terms = [(turn[0] + turn[1]) / (1.0 if theta is None else np.cos(theta))]
+        terms = [(turn[0] + turn[1]) / np.cos(theta)]
     return _fit_angle(t, _interpolate(angle, t), terms, _full_circle(angle.values), theta)
 
 
@@ -120,7 +120,7 @@ def _fit_angle(
 
 
 def _interpolate(column: Column, t: Floats) -> Floats:
-    if len(column.t_s) == len(t) and np.array_equal(column.t_s, t):
+    if np.array_equal(column.t_s, t):
         return column.values
     known = np.isfinite(column.values)
     if not known.any():
@@ -138,9 +138,7 @@ NamedColumn = tuple[str, Column]
 _RATE_TITLES = ("roll rate", "pitch rate", "yaw rate")
 
 
-def attitude_mistake(
-    named: Mapping[str, Column], angles: Sequence[NamedColumn | None], others: Mapping[str, Column]
-) -> str | None:
+def attitude_mistake(named: Columns, angles: Sequence[NamedColumn | None], others: Columns) -> str | None:
     """Describe a mistake in the rates (p, q, r by column) or the angles: roll, pitch and yaw, None where one
     is not known. The first that is wrong; None where nothing is. others: what may have taken the place of a
     rate."""
@@ -173,14 +171,14 @@ def attitude_mistake(
 
 
 def _fit_with(
-    named: Mapping[str, Column], angles: Sequence[NamedColumn | None], axis: int, rate: Column
+    named: Columns, angles: Sequence[NamedColumn | None], axis: int, rate: Column
 ) -> AngleFit | None:
     """How the angle of a place follows the rates with this one in its place."""
     gyros = [rate if i == axis else gyro for i, gyro in enumerate(named.values())]
     return fit_angle(gyros, [angle and angle[1] for angle in angles], axis)
 
 
-def confirmed_rates(named: Mapping[str, Column], angles: Sequence[NamedColumn | None]) -> frozenset[str]:
+def confirmed_rates(named: Columns, angles: Sequence[NamedColumn | None]) -> frozenset[str]:
     """The columns of p, q and r whose integral is the change of roll, pitch and yaw, in sign and unit too."""
     places = enumerate(named.items())
     return frozenset(n for axis, (n, rate) in places if _is_exact(_fit_with(named, angles, axis, rate)))

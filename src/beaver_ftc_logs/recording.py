@@ -9,6 +9,7 @@ from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass, field
 from difflib import SequenceMatcher
 from io import StringIO
+from itertools import pairwise
 from math import isnan
 from pathlib import Path
 from typing import Any
@@ -21,12 +22,43 @@ from beaver_ftc.documents import BadInput
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Mask = NDArray[np.bool_]
-Parameters = Mapping[str, tuple[float, ...]]
+Reasons = dict[str, Mask]
+"""For each reason of a doubt its rows, (n,)."""
+Wanted = Collection[str] | None
+"""Columns that are read, all where None."""
+Parameters = dict[str, tuple[float, ...]]
 """Parameters of an autopilot by name: its value in the log; if it changes, the first and the last one."""
+TimeSource = tuple[str, str]
+"""The column of the time and its unit."""
 _S_PER_US = 1e-6
 _N_LISTED_NEAREST_NAMES = 10
 MIN_DIVISOR = float(np.sqrt(np.finfo(float).tiny))
 """Least value of a divisor that may be zero."""
+
+
+Runs = list[tuple[int, int]]
+"""Begin and end of runs of rows."""
+
+
+def last_true_row(mask: Mask) -> Ints:
+    """The last row up to each at which a mask (n,) is true, (n,); -1 before the first."""
+    return np.asarray(np.maximum.accumulate(np.where(mask, np.arange(len(mask)), -1)))
+
+
+def last_row_at(stamps: Floats, t_s: Floats) -> Ints:
+    """The row of the last stamp up to each time; the first before it."""
+    return np.asarray(np.maximum(np.searchsorted(stamps, t_s, side="right") - 1, 0))
+
+
+def runs_between(is_edge: Mask) -> Runs:
+    """Begin and end of each run of n rows; is_edge (n - 1,): whether one ends behind the row."""
+    return list(pairwise([0, *(np.flatnonzero(is_edge) + 1).tolist(), len(is_edge) + 1]))
+
+
+def true_runs(mask: Mask) -> Runs:
+    """Begin and end of each run of rows at which a mask (n,) is true."""
+    edges = np.flatnonzero(np.diff(mask.astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
+    return [(begin, end) for begin, end in edges.tolist()]
 
 
 @dataclass(frozen=True)
@@ -37,6 +69,10 @@ class Column:
     t_s: Floats
     values: Floats
     note: str = ""
+
+
+Columns = dict[str, Column]
+"""Columns by name."""
 
 
 @dataclass(frozen=True)
@@ -57,18 +93,22 @@ class RecordedFlight:
     """
 
     name: str
-    columns: Mapping[str, Column]
+    columns: Columns
     logged_failures: tuple[LoggedFailure, ...] = ()
     notes: tuple[str, ...] = field(default=())
     parameters: Parameters = field(default_factory=dict)
     unread_column_names: tuple[str, ...] = ()
 
-    def nearest_columns_text(self, wanted_name: str) -> str:
-        """The names of the log's columns that are nearest to one that it has not, read or not."""
-        return nearest_names_text(wanted_name, {*self.columns, *self.unread_column_names})
+    def check_has(self, names: Iterable[str]) -> None:
+        """Raise BadInput, with the names nearest to it, where the log lacks a column."""
+        for name in names:
+            if name not in self.columns:
+                nearest = nearest_names_text(name, {*self.columns, *self.unread_column_names})
+                allowed = f"allowed: a log that has it; it has {nearest}"
+                raise BadInput(f"{self.name}: no column {name}, {allowed}")
 
 
-def add_parameter(values_by_name: dict[str, tuple[float, ...]], name: str, value: float) -> None:
+def add_parameter(values_by_name: Parameters, name: str, value: float) -> None:
     """Note a value that a log gives to a parameter."""
     values = values_by_name.get(name, ())
     is_as_before = bool(values) and (values[-1] == value or (isnan(values[-1]) and isnan(value)))
@@ -130,9 +170,9 @@ def names_of_topics(topics: Mapping[str, Topic]) -> tuple[str, ...]:
 
 def columns_of_topics(
     topics: Mapping[str, Topic],
-    wanted: Collection[str] | None,
+    wanted: Wanted,
     all_topics: Mapping[str, Topic] | None = None,
-) -> tuple[dict[str, Column], tuple[str, ...], float | None]:
+) -> tuple[Columns, tuple[str, ...], float | None]:
     """The wanted columns `topic.field`, all where None, the names of the others, and the first stamp of the
     topics, from which time counts, s.
 
@@ -145,7 +185,7 @@ def columns_of_topics(
     kept = {name: rows_with_increasing_time(name, topic.stamps_us) for name, topic in topics.items()}
     first_us = [topics[name].stamps_us[rows[0]] for name, (rows, _) in kept.items() if len(rows)]
     origin_us = min(first_us, default=0.0)
-    columns: dict[str, Column] = {}
+    columns: Columns = {}
     for name, topic in topics.items():
         rows, note = kept[name]
         t_s = (topic.stamps_us[rows] - origin_us) * _S_PER_US

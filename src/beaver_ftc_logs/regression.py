@@ -18,16 +18,16 @@ cannot be distinguished by any fit, so they form one group with one response. Le
 coefficients b (m,) or (m, 3); P is the inverse of Z' Z once each column is divided by its scale s (m,).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from beaver_ftc_logs.model import Model
-from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
+from beaver_ftc_logs.model import Model, NoiseModel
+from beaver_ftc_logs.recording import MIN_DIVISOR, Floats, Ints, Mask, runs_between
 from beaver_ftc_logs.samples import Samples, mixer_matrix, whiten_samples
 from beaver_ftc_logs.vehicle import Vehicle
 
@@ -44,22 +44,22 @@ _QUICK_SPAN_S = 0.5
 
 @dataclass(frozen=True)
 class FitPart:
-    """A flight (or half of one) and which of its samples the fit may use, is_usable (n,). result_cache:
-    results that were computed from this flight and others."""
+    """A flight (or half of one) and which of its samples the fit may use, is_usable (n,). fits: to this
+    flight and others."""
 
     samples: Samples
-    is_usable: NDArray[np.bool_]
-    result_cache: dict[tuple[object, ...], tuple[object, object]] = field(
-        default_factory=dict, repr=False, compare=False
-    )
+    is_usable: Mask
+    fits: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
 
-    def regressors(
-        self, groups: list[list[int]], h: int, L: int, f: int
-    ) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-        """As `build_regressors`, commands as effective as labels say, and which samples are known and in
-        use."""
-        X, U, is_known = build_regressors(self.samples, groups, h, L, True, f)
-        return X, U, self.is_usable & is_known
+    @cached_property
+    def halves(self) -> tuple["FitPart", "FitPart"]:
+        """The usable samples in two halves."""
+        rows = np.flatnonzero(self.is_usable)
+        middle = int(rows[len(rows) // 2]) if len(rows) else 0
+        is_first = np.arange(len(self.is_usable)) < middle
+        return FitPart(self.samples, self.is_usable & is_first), FitPart(
+            self.samples, self.is_usable & ~is_first
+        )
 
     def innovations(self, model: Model) -> "Innovations":
         """The samples in use by a model, commands as effective as labels say."""
@@ -67,10 +67,22 @@ class FitPart:
         return flight.at(np.flatnonzero(self.is_usable & flight.is_known))
 
 
-def group_surfaces(vehicle: Vehicle) -> list[list[int]]:
+Parts = Sequence[FitPart]
+
+
+def usual_step_s(parts: Parts) -> float:
+    """The usual step of the samples of all flights, s."""
+    return float(np.median([part.samples.dt_s for part in parts]))
+
+
+Groups = list[list[int]]
+"""Surfaces that move together, by their places."""
+
+
+def group_surfaces(vehicle: Vehicle) -> Groups:
     """Surfaces by what excites them: those in one group get proportional commands."""
     M = mixer_matrix(vehicle)
-    groups: list[list[int]] = []
+    groups: Groups = []
     for i, m in enumerate(M):
         for group in groups:
             first = M[group[0]]
@@ -83,17 +95,14 @@ def group_surfaces(vehicle: Vehicle) -> list[list[int]]:
 
 
 def build_regressors(
-    samples: Samples, groups: list[list[int]], h: int, L: int, labelled: bool, f: int = 1
-) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+    samples: Samples, groups: Groups, h: int, L: int, labelled: bool, f: int = 1
+) -> tuple[Floats, Floats, Mask]:
     """The regressors of each sample: the past x (n, 3 h + X f), the commands U (n, G, L) of the groups, and
     whether all of it is known and no gap lies within, (n,).
 
-    labelled: multiply each surface's command by its labelled effectiveness (1 where there is no label).
+    labelled: as of `group_commands`.
     """
-    u = samples.commands
-    if labelled:
-        u = u * np.where(np.isfinite(samples.labels), samples.labels, 1.0)
-    v = np.column_stack([u[:, group].sum(axis=1) for group in groups])
+    v = group_commands(samples, groups, labelled)
     rates = [_delay_rows(samples.rates, k, np.nan) for k in range(1, h + 1)]
     X = np.column_stack([*rates, *(_delay_rows(samples.signals, k, np.nan) for k in range(1, f + 1))])
     U = np.stack([_delay_rows(v, k, np.nan) for k in range(1, L + 1)], axis=1)
@@ -103,13 +112,22 @@ def build_regressors(
     return X, U.transpose(0, 2, 1), ok
 
 
+def group_commands(samples: Samples, groups: Groups, labelled: bool) -> Floats:
+    """The command of each group, (n, G); labelled: each surface's times its labelled effectiveness, 1 where
+    there is no label."""
+    u = samples.commands
+    if labelled:
+        u = u * np.where(np.isfinite(samples.labels), samples.labels, 1.0)
+    return np.column_stack([u[:, group].sum(axis=1) for group in groups])
+
+
 def _delay_rows(values: np.ndarray, lag: int, fill: float) -> np.ndarray:
     """The rows `lag` samples later, `fill` where there is no past."""
     lag = min(lag, len(values))
     return np.concatenate([np.full((lag, *values.shape[1:]), fill), values[: len(values) - lag]])
 
 
-def group_indices(model: Model) -> list[list[int]]:
+def group_indices(model: Model) -> Groups:
     """The model's groups as positions of their surfaces."""
     names = list(model.vehicle.surfaces)
     return [[names.index(name) for name in group] for group in model.groups]
@@ -128,24 +146,26 @@ class Innovations:
     """What the past does not explain of a flight's rates, a row a sample: y = c + sum_g F_g + e in health.
 
     rows (n,): place of each row in the flight. is_known (n,): whether all of the past is there; else a row
-    of e is 0. y (n, 3), F (n, G, 3), c (3,) rad/s, R (3, 3) (rad/s)2: as in the head of this file, less what
-    earlier residuals predict of them. inflation: how many times as wide as R the filter takes the noise to
-    be. ma: moving average by which the flight is whitened, empty if it is not.
+    of e is 0. y (n, 3), F (n, G, 3), c (3,) rad/s: as in the head of this file, less what earlier residuals
+    predict of them. noise: of the flight.
     """
 
-    rows: NDArray[np.int64]
-    is_known: NDArray[np.bool_]
+    rows: Ints
+    is_known: Mask
     y: Floats
     F: Floats
     c: Floats
-    R: Floats
-    inflation: float = 1.0
-    ma: tuple[float, ...] = ()
+    noise: NoiseModel
 
     @cached_property
     def e(self) -> Floats:
         """Residual of a healthy vehicle, (n, 3)."""
         return np.where(self.is_known[:, None], self.y - self.c - self.F.sum(axis=1), 0.0)
+
+    @cached_property
+    def R(self) -> Floats:
+        """Covariance of the noise, (3, 3) (rad/s)2."""
+        return np.array(self.noise.noise)
 
     @cached_property
     def W(self) -> Floats:
@@ -155,9 +175,9 @@ class Innovations:
     @property
     def log_size(self) -> float:
         """Logarithm of the size of the noise of a sample before it was whitened, log det(R)^1/2."""
-        return 0.5 * float(np.linalg.slogdet(self.R)[1]) - 3.0 * float(np.log(sum(self.ma or (1.0,))))
+        return 0.5 * float(np.linalg.slogdet(self.R)[1]) - 3.0 * float(np.log(sum(self.noise.average)))
 
-    def at(self, rows: NDArray[np.int64] | slice) -> "Innovations":
+    def at(self, rows: Ints | slice) -> "Innovations":
         """Some of the rows."""
         chosen = {name: getattr(self, name)[rows] for name in ("rows", "is_known", "y", "F")}
         return replace(self, **chosen)
@@ -167,13 +187,16 @@ class Innovations:
         trim = np.broadcast_to(np.eye(3), (len(self.F), 3, 3))
         return np.asarray((np.concatenate([trim, self.F], axis=1) @ self.W).transpose(0, 2, 1))
 
+    def regression(self) -> tuple[Floats, Floats]:
+        """Regressors Z (3 n, 3 + G) of trim and responses, and the rates v (3 n,), whitened."""
+        return self.columns().reshape(3 * len(self.F), -1), (self.y @ self.W).ravel()
+
     def gain_bounds(self, share: float) -> tuple[Floats, Floats, float]:
         """By least squares of y on trim and responses: the gain that each response surely is not below, and
         not above, (G,) each, 1 as in the model; far apart where columns make one another up. And the scale
         of the noise, in variances of it. share: effective_sample_share."""
-        Z = self.columns().reshape(3 * len(self.F), -1)
-        v = (self.y @ self.W).ravel()
-        s = np.maximum(np.sqrt((Z**2).mean(axis=0)), MIN_DIVISOR)
+        Z, v = self.regression()
+        s = rms_of_columns(Z)
         X = Z / s
         P = np.linalg.inv(X.T @ X + _EIGENVALUE_FLOOR * len(X) * np.eye(X.shape[1]))
         b = P @ (X.T @ v)
@@ -184,8 +207,7 @@ class Innovations:
 
     def gains(self) -> Floats:
         """The gain of each response, (G,), by least squares of y on trim and responses."""
-        Z = self.columns().reshape(3 * len(self.F), -1)
-        return np.asarray(np.linalg.lstsq(Z, (self.y @ self.W).ravel(), rcond=None)[0][3:])
+        return np.asarray(np.linalg.lstsq(*self.regression(), rcond=None)[0][3:])
 
     def quick_power(self, rate_hz: float) -> Floats:
         """Power of the quick part of the responses an axis, in variances of the noise, (n,): of the
@@ -201,7 +223,7 @@ class Innovations:
         Slow commands of healthy flight hardly show how a surface responds to a step. The error after a step
         is no noise: it has the same sign in many samples.
         """
-        excess = np.maximum(self.quick_power(model.rate_hz) - model.usual_quick_power(self.ma), 0.0)
+        excess = np.maximum(self.quick_power(model.rate_hz) - self.noise.usual_quick_power, 0.0)
         return np.asarray(1.0 + model.settings.quick_error**2 * excess)
 
 
@@ -215,23 +237,25 @@ def innovations(samples: Samples, model: Model, labelled: bool = False) -> Innov
     h, L = model.history, model.lags
     f = model.vehicle.n_signal_lags(h)
     X, U, known = build_regressors(samples, group_indices(model), h, L, labelled, f)
-    _, A, B, _ = model.as_arrays()
-    ma = samples.noise_ma_coefficients
-    ar = model.residual_ar_coefficients(ma)
+    c, A, B = (np.array(values) for values in (model.intercept, model.past, model.response))
+    noise = model.noise_of(samples.noise_ma_coefficients)
+    ar = noise.ar
     y = subtract_noise(samples.rates - np.einsum("nm,mr->nr", X, A), ar)
     F = subtract_noise(np.einsum("ngl,glr->ngr", U, B), ar)
     whole = known.copy()
     for lag in range(1, len(ar) + 1):
         whole &= _delay_rows(known, lag, False)
-    rows, c, R = np.arange(len(y)), model.whitened_intercept(ma), model.covariance_of_noise(ma)
-    return Innovations(rows, whole, np.nan_to_num(y), np.nan_to_num(F), c, R, model.inflation_of(ma), ma)
+    y, F, c = np.nan_to_num(y), np.nan_to_num(F), np.asarray(c - c @ ar.sum(axis=0))
+    return Innovations(np.arange(len(y)), whole, y, F, c, noise)
 
 
 def by_noise(samples: Samples, model: Model) -> list[tuple[Samples, Model]]:
     """A flight whitened by each noise of a model, and the model with this noise alone; both as they are where
     the model has none."""
-    noises = [(noise.average, model.with_single_noise(noise)) for noise in model.colours]
-    return [(whiten_samples(samples, ma), one) for ma, one in noises] or [(samples, model)]
+    return [
+        (whiten_samples(samples, noise.average), model.model_copy(update={"colours": [noise]}))
+        for noise in model.colours
+    ] or [(samples, model)]
 
 
 def by_axis(values: Floats) -> dict[str, float]:
@@ -264,7 +288,7 @@ class Regression:
     coefficient_error_correlation: Floats
 
 
-def fit_ols(Z: Floats, y: Floats, stretch: NDArray[np.int64], lag: int) -> Regression:
+def fit_ols(Z: Floats, y: Floats, stretch: Ints, lag: int) -> Regression:
     """Ordinary least squares of the rates y (n, 3) on Z (n, m), with Newey-West standard errors:
 
         X = Z / s,   P = (X' X)^+,   b = P X' y,   e = y - X b,   R = e' e / (n - m)
@@ -288,20 +312,31 @@ def fit_ols(Z: Floats, y: Floats, stretch: NDArray[np.int64], lag: int) -> Regre
     return Regression(b / s[:, None], R, coloured / s[:, None], inflation, P / np.outer(d, d))
 
 
-def _newey_west(X: Floats, e: Floats, P: Floats, stretch: NDArray[np.int64], lag: int) -> Floats:
+def _newey_west(X: Floats, e: Floats, P: Floats, stretch: Ints, lag: int) -> Floats:
     """Standard errors (m,) that hold for autocorrelated residuals e (n,), the root of diag(P S P): S sums the
     products of the scores X e with Bartlett's weights over `lag` lags."""
     scores, w = X * e[:, None], lag + 1
-    edges = [0, *(np.flatnonzero(np.diff(stretch)) + 1).tolist(), len(stretch)]
     S = np.zeros((X.shape[1], X.shape[1]))
-    for begin, end in pairwise(edges):  # Bartlett's weights are those of products of running sums
+    for begin, end in runs_between(
+        np.diff(stretch) != 0
+    ):  # Bartlett's weights are those of products of running sums
         sums = np.cumsum(np.pad(scores[begin:end], ((w, w - 1), (0, 0))), axis=0)
         windows = sums[w:] - sums[:-w]
         S += windows.T @ windows / w
     return np.sqrt(np.maximum(np.diag(P @ S @ P), 0.0))
 
 
-def trailing_sums(x: NDArray[Any], n: float) -> tuple[Floats, NDArray[np.int64]]:
+def rms_of_columns(Z: Floats) -> Floats:
+    """Root mean square of each column of Z (n, m), above 0."""
+    return np.maximum(np.sqrt((Z**2).mean(axis=0)), MIN_DIVISOR)
+
+
+def left_by(Z: Floats, y: Floats) -> Floats:
+    """What least squares on Z (n, m) leaves of y (n,) or (n, k)."""
+    return np.asarray(y - Z @ np.linalg.lstsq(Z, y, rcond=None)[0])
+
+
+def trailing_sums(x: NDArray[Any], n: float) -> tuple[Floats, Ints]:
     """Sums of x (k, ...) over the last n rows, each row's own included, and how many rows these are, (k,)."""
     end = np.arange(1, len(x) + 1)
     begin = np.maximum(end - max(round(n), 1), 0)
@@ -315,7 +350,7 @@ def noise_scale(e2: Floats) -> float:
     return float(np.median(e2.reshape(-1, 3).sum(axis=1)) / _MEDIAN_CHI2)
 
 
-def split_parts(rows: NDArray[np.int64]) -> list[NDArray[np.int64]] | None:
+def split_parts(rows: Ints) -> list[Ints] | None:
     """The rows of a flight in its parts; None where one is too short."""
     parts = np.array_split(rows, _N_PARTS)
     return parts if min(map(len, parts)) >= _MIN_PART_ROWS else None
@@ -328,13 +363,11 @@ def variance_inflation(Z: Floats) -> Floats:
     norms = np.sqrt((X**2).sum(axis=0))
     factors = np.full(Z.shape[1], np.inf)
     varying = norms > 1e-12
-    C = (X[:, varying] / norms[varying]).T @ (X[:, varying] / norms[varying])
-    lam, V = np.linalg.eigh(C)
-    nonzero = lam > _RANK_TOLERANCE * lam.max(initial=0.0)
-    V2 = V**2
-    finite = (V2[:, nonzero] / lam[nonzero]).sum(axis=1)
-    factors[varying] = np.where(V2[:, ~nonzero].sum(axis=1) > _RANK_TOLERANCE, np.inf, finite)
-    return factors
+    X = X[:, varying] / norms[varying]
+    lam, V = np.linalg.eigh(X.T @ X)
+    lam = np.where(lam > _RANK_TOLERANCE * lam.max(initial=0.0), lam, _RANK_TOLERANCE**2)
+    factors[varying] = (V**2 / lam).sum(axis=1)
+    return np.where(factors < 1.0 / _RANK_TOLERANCE, factors, np.inf)
 
 
 def spectral_density(e: Floats, dt_s: float, longest: int = 256) -> tuple[Floats, Floats]:

@@ -23,7 +23,7 @@ def is_log_of_run(path: Path) -> bool:
     return path.name == "log.parquet" and path.with_name("scenario.yaml").is_file()
 
 
-def replay_run_log(path: Path) -> tuple[dict[str, Any], Document]:
+def replay_run_log(path: Path) -> tuple[Document, Document]:
     """Step the diagnosis through a log: columns of diagnosis.parquet by name, and the document of
     verdict.json. Raises BadInput where the flight's diagnosis was none of ours."""
     from beaver_ftc.loop import Diagnosis

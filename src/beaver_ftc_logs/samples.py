@@ -9,7 +9,6 @@ that a log has as many as its rows ask for, whatever its clock does.
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,16 @@ import numpy as np
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs import energy, physics, signals
 from beaver_ftc_logs.readers import read_parts, split_long_recording
-from beaver_ftc_logs.recording import Column, Floats, Ints, LoggedFailure, Mask, RecordedFlight
+from beaver_ftc_logs.recording import (
+    Column,
+    Floats,
+    Ints,
+    LoggedFailure,
+    Mask,
+    RecordedFlight,
+    Runs,
+    runs_between,
+)
 from beaver_ftc_logs.units import TIME_UNITS
 from beaver_ftc_logs.vehicle import QuantityColumn, Vehicle
 
@@ -133,7 +141,7 @@ def resample(log: RecordedFlight, vehicle: Vehicle) -> Samples:
         log_stamps_s=stamps,
         notes=(*log.notes, *dict.fromkeys(_defects(log, used, rate_names))),
         airspeed=sampled(vehicle.airspeed),
-        unchanged_s={name: _unchanged_s(log.columns[name], t_s) for name in used},
+        unchanged_s={name: unchanged_s(log.columns[name], t_s) for name in used},
         is_rate_clipped=np.asarray(np.nan_to_num(was_clipped).any(axis=0)),
         energy_height_rate_mps=climb_mps,
         confirmed_rates=confirmed,
@@ -162,9 +170,8 @@ def whiten_samples(samples: Samples, C: Sequence[float], fit_weight: float = 1.0
     arrays = (samples.rates, samples.commands, samples.signals)
     x = np.hstack(arrays)
     known = np.isfinite(x).all(axis=1)
-    edges = np.flatnonzero((np.diff(known) != 0) | (np.diff(samples.stretch_number) != 0)) + 1
     x[~known] = np.nan
-    for a, b in pairwise([0, *edges.tolist(), len(x)]):
+    for a, b in runs_between((np.diff(known) != 0) | (np.diff(samples.stretch_number) != 0)):
         x0 = x[a]
         x[a:b] = x0 + lfilter([sum(C)], C, x[a:b] - x0, axis=0)
     names, ends = ("rates", "commands", "signals"), np.cumsum([array.shape[1] for array in arrays])[:2]
@@ -181,7 +188,7 @@ def _defects(log: RecordedFlight, used: list[str], rate_names: list[str]) -> Ite
             yield f"{name}: spreads {sd:.3g} rad/s, as hardly an aircraft does: {hint}"
 
 
-def _unchanged_s(column: Column, t_s: Floats) -> Floats:
+def unchanged_s(column: Column, t_s: Floats) -> Floats:
     """For how long a column has been the same at each sample, s, its age included: rows without a number
     stand still."""
     column = _finite_rows(column)
@@ -254,10 +261,7 @@ def _mixed_commands(flight: str, logged_commands: Floats, vehicle: Vehicle) -> F
 def _refuse_columns(log: RecordedFlight, used: list[str], rate_names: list[str]) -> None:
     """Raise BadInput where a column is missing, or holds nothing; rates that no vehicle turns at are in
     another unit."""
-    for name in used:
-        if name not in log.columns:
-            nearest = log.nearest_columns_text(name)
-            raise BadInput(f"{log.name}: no column {name}, allowed: a log that has it; it has {nearest}")
+    log.check_has(used)
     largest = {}
     for name in used:
         values = log.columns[name].values
@@ -324,7 +328,7 @@ def _median_step_s(stamps: Floats) -> float:
 
 def sample_column(column: Column, t_s: Floats, step_s: float) -> tuple[Floats, float | None]:
     """A column's values at given times, and how old they are on average, s; None: it has these very times."""
-    if len(column.t_s) == len(t_s) and np.array_equal(column.t_s, t_s):
+    if np.array_equal(column.t_s, t_s):
         return column.values, None
     if _median_step_s(column.t_s) < 0.6 * step_s:
         return _means_and_age(column, t_s, step_s)
@@ -369,11 +373,10 @@ def _means_and_age(column: Column, t: Floats, h: float) -> tuple[Floats, float]:
     return np.where(count > 0, mean, held), 0.5 * h
 
 
-def constant_stretches(values: Floats) -> list[tuple[int, int]]:
+def constant_stretches(values: Floats) -> Runs:
     """Begin and end of each stretch of equal rows; nan is equal to nan."""
     known = np.nan_to_num(values, nan=-1.0)
-    edges = np.flatnonzero(np.any(np.diff(known, axis=0) != 0.0, axis=1)) + 1
-    return list(pairwise([0, *edges.tolist(), len(values)]))
+    return runs_between(np.any(np.diff(known, axis=0) != 0.0, axis=1))
 
 
 def read_vehicle_columns(path: Path, vehicle: Vehicle, reader: str | None = None) -> RecordedFlight:

@@ -9,7 +9,7 @@ import numpy as np
 
 from beaver_ftc.results import Document, Onset
 from beaver_ftc_logs.diagnose import UNKNOWN_SURFACE, LogRows
-from beaver_ftc_logs.recording import Floats, LoggedFailure
+from beaver_ftc_logs.recording import Floats, LoggedFailure, last_row_at
 from beaver_ftc_logs.samples import Samples
 
 _SAME_FAILURE_S = 2.0
@@ -24,7 +24,7 @@ def score_diagnosis(samples: Samples, rows: LogRows, groups: list[list[str]]) ->
     labelled = np.isfinite(samples.labels).any(axis=0)
     if not labelled.any():
         return score_against_failures(rows, samples.logged_failures, groups)
-    last = np.maximum(np.searchsorted(samples.t_s, rows.t_s, side="right") - 1, 0)
+    last = last_row_at(samples.t_s, rows.t_s)
     names = ("effectiveness", "effectiveness_low", "effectiveness_high")
     rows = replace(rows, **{name: getattr(rows, name).compress(labelled, axis=1) for name in names})
     return score_against_labels(rows, samples.labels[last].compress(labelled, axis=1))

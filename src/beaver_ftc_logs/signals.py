@@ -6,7 +6,7 @@ fitted to show for how long.
 
 import numpy as np
 
-from beaver_ftc_logs.recording import Column, Floats, Ints, Mask
+from beaver_ftc_logs.recording import Column, Floats, Ints, Mask, last_true_row
 
 MIN_STILL_S, MIN_STILL_ROWS = 1.5, 12
 """A measured rate that repeats for longer than both is frozen."""
@@ -16,9 +16,8 @@ _SPIKE_RATIO, _MAX_SPIKE_SHARE = 40.0, 0.01
 
 def time_since_change_s(column: Column) -> Floats:
     """How long a column's value has been the same at each row, (n,) s; 0 for fewer than MIN_STILL_ROWS."""
-    row = np.arange(len(column.values))
-    since = np.maximum.accumulate(np.where(_changed_rows(column.values), row, 0))
-    return np.where(row - since >= MIN_STILL_ROWS, column.t_s - column.t_s[since], 0.0)
+    since = last_true_row(_changed_rows(column.values))
+    return np.where(np.arange(len(since)) - since >= MIN_STILL_ROWS, column.t_s - column.t_s[since], 0.0)
 
 
 def _changed_rows(values: Floats) -> Mask:
@@ -35,23 +34,14 @@ def find_clipped_rows(values: Floats) -> Mask:
     """
     clipped = np.zeros(len(values), dtype=bool)
     for v in (values, -values):
-        known = np.where(np.isfinite(v), v, -np.inf)
-        at_top = (v == np.maximum.accumulate(known)) & (v > 0.0)
-        row = np.arange(len(v))
-        since = np.maximum.accumulate(np.where(_changed_rows(v) | ~at_top, row, 0))
-        # a larger value begins the count again
-        ordinal = np.cumsum(_changed_rows(np.maximum.accumulate(known)).astype(np.int64))
-        count = np.cumsum(at_top) - _count_at_previous(at_top, ordinal)
-        clipped |= at_top & (row - since >= _CLIPPED_IN_TURN - 1) & (count >= _CLIPPED_IN_ALL)
+        top = np.maximum.accumulate(np.where(np.isfinite(v), v, -np.inf))
+        at_top = (v == top) & (v > 0.0)
+        since = last_true_row(_changed_rows(v) | ~at_top)
+        total = np.cumsum(at_top)
+        before = (total - at_top)[last_true_row(_changed_rows(top))]  # a larger value begins the count again
+        lasts = np.arange(len(v)) - since >= _CLIPPED_IN_TURN - 1
+        clipped |= at_top & lasts & (total - before >= _CLIPPED_IN_ALL)
     return clipped
-
-
-def _count_at_previous(at_top: Mask, ordinal: Ints) -> Ints:
-    """Count, for each row, the rows at smaller largest values: those before the present largest value was
-    reached. ordinal (n,): number of the present largest value, counted from 1."""
-    total = np.cumsum(at_top)
-    firsts = np.flatnonzero(np.diff(ordinal, prepend=0))
-    return (total - at_top)[firsts][ordinal - 1] if len(firsts) else np.zeros(len(ordinal), dtype=np.int64)
 
 
 def find_spike_rows(values: Floats) -> Ints:

@@ -17,7 +17,9 @@ import numpy as np
 
 from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.loop import FLOW, Diagnosis
+from beaver_ftc.results import Document
 from beaver_ftc_logs.diagnose import UNKNOWN_SURFACE, LogRows
+from beaver_ftc_logs.model import NoiseModel
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
 from beaver_ftc_logs.regression import Innovations, split_parts
 
@@ -44,7 +46,7 @@ class Replayed:
     command_gain_bounds: Floats
 
 
-def error_sections(scenario: Any) -> dict[str, Any]:
+def error_sections(scenario: Any) -> Document:
     """Return the errors that a scenario declares, as `Diagnosis` takes it."""
     values = scenario.model_dump(mode="json", exclude_unset=True)
     return {key: values[key] for key in _ERROR_KEYS if key in values}
@@ -85,8 +87,9 @@ def _command_gains(nu: Floats, Z: Floats) -> tuple[Floats, Floats]:
     if (parts := split_parts(rows)) is None:
         return np.ones(Z.shape[2]), np.ones(Z.shape[2])
     sd = np.maximum(nu[rows].std(axis=0), MIN_DIVISOR)
+    noise = NoiseModel.model_construct(average=[1.0], noise=np.diag(sd**2).tolist())
     k, known = np.arange(len(nu)), np.ones(len(nu), dtype=bool)
-    frames = Innovations(k, known, nu, Z.transpose(0, 2, 1), np.zeros(3), np.diag(sd**2))
+    frames = Innovations(k, known, nu, Z.transpose(0, 2, 1), np.zeros(3), noise)
     upper = [frames.at(part).gain_bounds(_EFFECTIVE_SAMPLE_SHARE)[1] for part in parts]
     return 1.0 + frames.at(rows).gains(), 1.0 + np.max(upper, axis=0)
 
@@ -135,6 +138,7 @@ def rows_of_replay(t_s: Floats, replay: Replayed, surfaces: Sequence[str], fdi: 
         effectiveness_low=low,
         effectiveness_high=high,
         fault_probability=faulty.astype(float),
+        evidence_start_time_s=t_s,
     )
 
 

@@ -17,24 +17,21 @@ A row uses nothing later than its time.
     reasons         rows that are not credible, by reason
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from beaver_ftc.documents import BadInput
-from beaver_ftc.results import Document
 from beaver_ftc_logs import energy, regression
 from beaver_ftc_logs.column_mistakes import corrected_logs, log_without_signal
 from beaver_ftc_logs.model import FittedRanges, Model
-from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
-from beaver_ftc_logs.regression import FitPart
+from beaver_ftc_logs.recording import MIN_DIVISOR, Floats, Reasons
+from beaver_ftc_logs.regression import Parts
 from beaver_ftc_logs.samples import NOISE_MA_CANDIDATES, Samples, whiten_samples
 from beaver_ftc_logs.signals import MIN_STILL_S
-
-Mask = NDArray[np.bool_]
+from beaver_ftc_logs.units import RATE, SI_UNITS, nearest_unit
 
 _RANGE_MARGIN_SHARE = 0.5
 """Share of its span by which a range is passed before a row is outside."""
@@ -44,9 +41,7 @@ _MAX_STILL_FACTOR = 3.0
 _FALSE_MISTAKE_CHANCE, _MAX_COMPARED_SAMPLES = 0.001, 8000
 """Probability with which chance alone may look like a mistake in the columns; samples that are compared."""
 _CLIPPING_MEMORY_S = 30.0
-_MIN_EFFECT_POWER = 1e-6
-_MAX_TIED_SHARE, _EFFECT_POWER_CAP = 0.98, 12.5
-"""Of an effect of so many variances of the noise a sample, a fiftieth is half a standard deviation."""
+_MAX_TIED_SHARE = 0.98
 _MAX_AXIS_RATIO, _UNIT_FACTOR_ROOT = 10.0, 1.6
 _MAX_ALIKE_FACTOR, _MIN_UNIT_FACTOR = 3.0, 12.0
 _COMMAND_UNIT_HINT = ": one unit (57.3 is deg for rad, 100 percent: `unit`, `scale`)"
@@ -58,8 +53,9 @@ _REVERSED_GAIN_LIMIT = -0.5
 """Half-way from the gain of a wrong sign, -1, to that of a lost surface, 0."""
 
 
-def compute_fitted_ranges(parts: Sequence[FitPart], model: Model, gain_sd: Floats) -> FittedRanges:
-    """Compute the ranges in which a model was fitted. gain_sd (G,): standard errors, of parts not fitted."""
+def compute_fitted_ranges(parts: Parts, tied: Floats, gain_sd: Floats) -> FittedRanges:
+    """Compute the ranges in which a model was fitted. tied (G,): as of `fitting.tied_shares`; gain_sd (G,):
+    standard errors, of parts not fitted."""
     fields = ("rates", "commands", "airspeed", "energy_height_rate_mps")
     rates, commands, airspeeds, climbs = (_usable(parts, name) for name in fields)
     climbs = climbs[np.isfinite(climbs)]
@@ -71,15 +67,14 @@ def compute_fitted_ranges(parts: Sequence[FitPart], model: Model, gain_sd: Float
         commands=central_ranges(commands),
         rates=central_ranges(rates),
         airspeed=central_ranges(airspeeds[:, None])[0] if airspeeds.size else None,
-        spread=np.nanstd(rates, axis=0).tolist(),
-        tied=tied_shares(parts, model).tolist(),
+        tied=tied.tolist(),
         gain_sd=gain_sd.tolist(),
         still_s=still,
         energy_climb=float(np.quantile(climbs, energy.UNPOWERED_SHARE)) if climbs.size else None,
     )
 
 
-def _usable(parts: Sequence[FitPart], name: str) -> Floats:
+def _usable(parts: Parts, name: str) -> Floats:
     """A field of those flights that have it, in the samples in use."""
     known = [(getattr(part.samples, name), part.is_usable) for part in parts]
     return np.concatenate([values[used] for values, used in known if values is not None] or [np.empty(0)])
@@ -91,37 +86,6 @@ def central_ranges(values: Floats) -> list[list[float]]:
         return []
     known = np.where(np.isfinite(values).any(axis=0), values, 0.0)
     return np.nanquantile(known, _RANGE_QUANTILES, axis=0).T.tolist()
-
-
-def tied_shares(parts: Sequence[FitPart], model: Model) -> Floats:
-    """Share of each group's effect on the rates that past, signals and the other groups make up, (G,): where
-    it is near 1 the law ties the group to what it answers to, and its effect cannot be told; 1 where the
-    group never moved. An effect far above the noise may be made up to a larger share: what is left counts."""
-    power, rest = effect_powers(parts, model)
-    moved = power > _MIN_EFFECT_POWER
-    share = 1.0 - rest / np.minimum(np.where(moved, power, 1.0), _EFFECT_POWER_CAP)
-    return np.where(moved, np.maximum(share, 0.0), 1.0)
-
-
-def effect_powers(parts: Sequence[FitPart], model: Model) -> tuple[Floats, Floats]:
-    """Power of each group's effect y = U_g B_g W on the rates, in variances of the noise a sample, (G,), and
-    of what past X, signals and the commands U of the other groups do not make up of it, e = y - Z b, (G,)."""
-    h, f = model.history, model.vehicle.n_signal_lags(model.history)
-    groups = regression.group_indices(model)
-    stacked = [part.regressors(groups, h, model.lags, f) for part in parts]
-    X, U = (np.concatenate([one[i][one[2]] for one in stacked]) for i in (0, 1))
-    _, _, B, R = model.as_arrays()
-    W = np.linalg.inv(np.linalg.cholesky(R)).T
-    power, rest = np.zeros((2, len(groups)))
-    for g in range(len(groups)):
-        Z = np.column_stack([np.ones(len(X)), X, np.delete(U, g, axis=1).reshape(len(U), -1)])
-        y = U[:, g] @ B[g] @ W
-        y = y - y.mean(axis=0)
-        power[g] = float((y**2).sum()) / len(y)
-        if power[g] > _MIN_EFFECT_POWER:
-            e = y - Z @ np.linalg.lstsq(Z, y, rcond=None)[0]
-            rest[g] = float((e**2).sum()) / len(y)
-    return power, rest
 
 
 def known_effects(model: Model) -> list[bool]:
@@ -151,10 +115,10 @@ def unknown_sentences(model: Model) -> list[str]:
     if model.fitted is None:
         return []
     start = "of what {} does, {:.1%} follows from the rates, signals and other surfaces of the flights fitted"
-    rows = zip(model.groups, model.fitted.tied, known_effects(model), strict=False)
+    rows = zip(model.group_names, model.fitted.tied, known_effects(model), strict=False)
     return [
-        f"{start.format('+'.join(group), share)}: its effect cannot be told, nothing is said of it"
-        for group, share, known in rows
+        f"{start.format(name, share)}: its effect cannot be told, nothing is said of it"
+        for name, share, known in rows
         if not known
     ]
 
@@ -162,24 +126,22 @@ def unknown_sentences(model: Model) -> list[str]:
 def refuse_rate_unit(samples: Samples, ranges: FittedRanges | None) -> None:
     """Raise BadInput where all rates spread so much more or less than in the flights of the model that they
     are in another unit."""
-    if ranges is None or not ranges.spread:
+    if ranges is None or not ranges.rates:
         return
-    if not np.isfinite(samples.rates).any(axis=0).all():  # an axis without a number has no spread
+    ratios = _relative_motion(samples.rates, ranges.rates)
+    if not ratios.max() < _MAX_AXIS_RATIO * ratios.min():  # an axis without a number does not move
         return
-    ratios = np.nanstd(samples.rates, axis=0) / np.maximum(ranges.spread, MIN_DIVISOR)
-    ratio = float(np.exp(np.mean(np.log(np.maximum(ratios, MIN_DIVISOR)))))
-    if not ratios.max() < _MAX_AXIS_RATIO * ratios.min():
-        return
-    most = _UNIT_FACTOR_ROOT**2
-    for unit, per_rad in (("deg/s", 180.0 / np.pi), ("cdeg/s", 18000.0 / np.pi), ("mrad/s", 1000.0)):
-        hints = (
-            (ratio / per_rad, f"{1.0 / per_rad:.4g} (`unit: {unit}`) fits"),
-            (ratio * per_rad, f"{per_rad:.4g} fits: the model's own were in {unit}?"),
-        )
-        for factor, hint in hints:
-            if 1.0 / most < factor < most:
-                spread = f"rates spread {ratio:.3g} times as widely as in the flights of the model"
-                raise BadInput(f"{samples.name}: {spread}, allowed: rates in rad/s; a factor of {hint}")
+    ratio = float(np.exp(np.mean(np.log(ratios))))
+    hints = (
+        (1.0 / ratio, "a factor of {0:.4g} (`unit: {2}`) fits"),
+        (ratio, "a factor of {1:.4g} fits: the model's own were in {2}?"),
+    )
+    for size, hint in hints:
+        unit = nearest_unit(RATE, size, _UNIT_FACTOR_ROOT**2)
+        if unit not in (None, "rad/s"):
+            text = hint.format(SI_UNITS[unit][1], 1.0 / SI_UNITS[unit][1], unit)
+            motion = f"rates spread {ratio:.3g} times as widely as in the flights of the model"
+            raise BadInput(f"{samples.name}: {motion}, allowed: rates in rad/s; {text}")
 
 
 def refuse_command_unit(
@@ -221,7 +183,7 @@ def answers(samples: Samples, model: Model, most: int | None = None) -> Answers 
     step = max(len(rows) // most, 1) if most else 1
     if (parts := regression.split_parts(rows[::step])) is None:
         return None
-    share = model.settings.power / flight.inflation
+    share = model.settings.power / flight.noise.wider
     bounds = [flight.at(part).gain_bounds(share) for part in parts]
     lower, upper, scales = (np.array(each) for each in zip(*bounds, strict=True))
     likelihood = -flight.log_size - 1.5 * np.log(scales)
@@ -304,15 +266,13 @@ def _likelier_mistake(samples: Samples, model: Model) -> str | None:
 
     By chance a wrong reading is K times as likely as the true one in at most one part of K (Markov's
     inequality for a likelihood ratio); all readings together have the chance `_FALSE_MISTAKE_CHANCE`. That
-    holds for a correct model. The flight must be likelier by as much more as flights were that the model was
-    not fitted on, whose columns are right, and by as much again for another law (`misread_gain`).
+    holds for a correct model.
     """
     gains, n = mistake_gains(samples, model)
     if not gains:
         return None
     text, gain = max(gains.items(), key=lambda one: one[1])
-    allowed = 2.0 * model.fitted.misread if model.fitted is not None else 0.0
-    if gain * n <= np.log(len(gains) / _FALSE_MISTAKE_CHANCE) + allowed * n:
+    if gain * n <= np.log(len(gains) / _FALSE_MISTAKE_CHANCE):
         return None
     log10 = gain * n / np.log(10.0)
     return f"each part of the flight is at least 10^{log10:.0f} times as likely with {text}"
@@ -355,9 +315,9 @@ def _relative_motion(values: Floats, fitted: Sequence[Sequence[float]]) -> Float
     return np.asarray(spans[0] / np.maximum(spans[1], MIN_DIVISOR))
 
 
-def untrusted_rows(samples: Samples, model: Model) -> dict[str, Mask]:
+def untrusted_rows(samples: Samples, model: Model) -> Reasons:
     """Rows that are not credible, by reason."""
-    reasons: dict[str, Mask] = _still_rows(samples, model)
+    reasons: Reasons = _still_rows(samples, model)
     if samples.is_rate_clipped is not None:
         recent, _ = regression.trailing_sums(
             samples.is_rate_clipped, np.floor(_CLIPPING_MEMORY_S / samples.dt_s) + 1.0
@@ -365,16 +325,16 @@ def untrusted_rows(samples: Samples, model: Model) -> dict[str, Mask]:
         reasons[f"a rate was clipped in the last {_CLIPPING_MEMORY_S:g} s"] = recent > 0
     if model.fitted is not None:
         reasons |= _rows_out_of_range(samples, model, model.fitted)
-    return {reason: rows for reason, rows in reasons.items() if rows.any()}
+    return reasons
 
 
-def _rows_out_of_range(samples: Samples, model: Model, ranges: FittedRanges) -> dict[str, Mask]:
+def _rows_out_of_range(samples: Samples, model: Model, ranges: FittedRanges) -> Reasons:
     """Rows in which a command, a rate or the airspeed was outside for most of the last seconds, or of the
     flight so far, by reason."""
     commands = [f"command of {surface}" for surface in model.vehicle.surfaces]
     channels = [
         *zip(commands, samples.commands.T, ranges.commands, strict=False),
-        *zip(_rate_columns(model), samples.rates.T, ranges.rates, strict=False),
+        *zip(model.vehicle.rate_columns, samples.rates.T, ranges.rates, strict=False),
     ]
     if ranges.airspeed is not None and samples.airspeed is not None:
         channels.append(("airspeed", samples.airspeed, ranges.airspeed))
@@ -389,15 +349,11 @@ def _rows_out_of_range(samples: Samples, model: Model, ranges: FittedRanges) -> 
     return reasons
 
 
-def _rate_columns(model: Model) -> list[str]:
-    return [getattr(model.vehicle.rates, axis).column for axis in "pqr"]
-
-
-def _still_rows(samples: Samples, model: Model) -> dict[str, Mask]:
+def _still_rows(samples: Samples, model: Model) -> Reasons:
     """Rows in which a column has stood still for too long, by reason: a measured rate may hardly, another
     thrice as long as in the model's flights; a rate of which these are known, from MIN_STILL_S / 3 on."""
     fitted = model.fitted.still_s if model.fitted else {}
-    rates = _rate_columns(model)
+    rates = model.vehicle.rate_columns
     reasons = {}
     for name, unchanged_s in samples.unchanged_s.items():
         still_s = fitted.get(name, 0.0 if name in rates else np.inf)
@@ -415,12 +371,3 @@ def without_dead_rows(samples: Samples, model: Model) -> Samples:
     if not dead.any():
         return samples
     return replace(samples, rates=np.where(dead[:, None], np.nan, samples.rates))
-
-
-def credibility_entry(reasons: Mapping[str, Mask], credible: NDArray[np.int64]) -> Document:
-    """Return the entry of verdict.json with the share of credible rows, and the reasons for the others with
-    their shares."""
-    shares = {reason: float(rows.mean()) for reason, rows in reasons.items()}
-    ordered = sorted(shares, key=lambda reason: -shares[reason])
-    entries = [{"says": reason, "share": shares[reason]} for reason in ordered]
-    return {"share": float(credible.mean()) if len(credible) else 0.0, "reasons": entries}

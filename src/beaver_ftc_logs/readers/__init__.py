@@ -1,7 +1,7 @@
 """Readers of recorded flights, by name. A new format is one file here and one row of `READERS`."""
 
 import re
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from beaver_ftc.documents import BadInput
-from beaver_ftc_logs.recording import Column, Floats, RecordedFlight
+from beaver_ftc_logs.recording import Column, Floats, RecordedFlight, TimeSource, Wanted
 
 ROWS_PER_PART = 100_000
 """Rows of a part of a long table."""
@@ -26,7 +26,7 @@ class Reader:
     wanted are read, the names alone where there are none of these."""
 
     suffixes: tuple[str, ...]
-    time: tuple[str, str] | None = None
+    time: TimeSource | None = None
     of_autopilot: bool = False
 
 
@@ -60,8 +60,8 @@ _LARGE_FILE_STORES = {
 def read_flight(
     path: Path,
     reader: str | None = None,
-    time: tuple[str, str] | None = None,
-    columns: Collection[str] | None = None,
+    time: TimeSource | None = None,
+    columns: Wanted = None,
 ) -> RecordedFlight:
     """The recorded flight in a file or folder.
 
@@ -75,8 +75,8 @@ def read_flight(
 def read_parts(
     path: Path,
     reader: str | None = None,
-    time: tuple[str, str] | None = None,
-    columns: Collection[str] | None = None,
+    time: TimeSource | None = None,
+    columns: Wanted = None,
     in_parts: bool = True,
 ) -> Iterator[RecordedFlight]:
     """The same, a long table in parts."""

@@ -20,10 +20,12 @@ from beaver_ftc.documents import BadInput
 from beaver_ftc_logs.readers.table import read_numbers
 from beaver_ftc_logs.recording import (
     Column,
+    Columns,
     Floats,
     Ints,
     LoggedFailure,
     RecordedFlight,
+    last_row_at,
     rows_with_increasing_time,
 )
 
@@ -91,7 +93,7 @@ def _read_columns(
             yield (name, Column(t_s, _CONVERSION_OF_UNIT[unit](tables[topic][field])[rows], note))
 
 
-def _add_attitude_errors(columns: dict[str, Column]) -> None:
+def _add_attitude_errors(columns: Columns) -> None:
     """Commanded less measured attitude, rad: the demand on the surfaces, upstream of what froze."""
     for axis in ("roll", "pitch"):
         command, measured = columns.get(f"{axis}_command_rad"), columns.get(f"{axis}_rad")
@@ -99,7 +101,7 @@ def _add_attitude_errors(columns: dict[str, Column]) -> None:
             columns[f"{axis}_error_rad"] = Column(command.t_s, command.values - measured.values, command.note)
 
 
-def _add_airspeed_from_wind(columns: dict[str, Column]) -> None:
+def _add_airspeed_from_wind(columns: Columns) -> None:
     """Ground speed less the wind last estimated, m/s: most flights have no airspeed of their own."""
     names = [f"{vector}_{direction}_m_s" for direction in ("north", "east") for vector in ("ground", "wind")]
     if any(name not in columns or not len(columns[name].t_s) for name in names):
@@ -108,7 +110,7 @@ def _add_airspeed_from_wind(columns: dict[str, Column]) -> None:
 
     def held_values(name: str) -> Floats:
         column = columns[name]
-        return column.values[np.maximum(np.searchsorted(column.t_s, stamps, side="right") - 1, 0)]
+        return column.values[last_row_at(column.t_s, stamps)]
 
     north, east = (held_values(names[i]) - held_values(names[i + 1]) for i in (0, 2))
     columns["airspeed_by_wind_m_s"] = Column(stamps, np.hypot(north, east))

@@ -5,7 +5,7 @@ the second on: `IMU1.GyrX`. Time counts from the first message with a stamp. Rea
 extra `flights`.
 """
 
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -14,8 +14,10 @@ import numpy as np
 
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs.recording import (
+    Parameters,
     RecordedFlight,
     Topic,
+    Wanted,
     add_parameter,
     columns_of_topics,
     package_errors_as_bad_input,
@@ -26,13 +28,13 @@ _INSTANCE_FIELDS = ("I", "C", "Instance")
 _IGNORED_MESSAGES = {"FMT", "FMTU", "UNIT", "MULT", "PARM", "MSG"}
 
 
-def read(path: Path, wanted: Collection[str] | None = None) -> RecordedFlight:
+def read(path: Path, wanted: Wanted = None) -> RecordedFlight:
     """The flight in a dataflash log. Raises BadInput where it is none, or pymavlink is missing.
 
     wanted: the columns that are kept in memory, all where None. Where the log has none of them, all
     columns are returned, without numbers: their names are known then.
     """
-    params: dict[str, tuple[float, ...]] = {}
+    params: Parameters = {}
     with package_errors_as_bad_input(path, "dataflash log", "pymavlink", "ArduPilot's .bin or .log"):
         import_module("pymavlink")  # here, since `dataflash` may have been imported before
         from beaver_ftc_logs.readers import dataflash

@@ -1,7 +1,7 @@
 """A CSV or Parquet table with a time column `t_s`, or another: one row a sample, one column a quantity."""
 
 from collections import Counter
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ import numpy as np
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs.readers import LAST_PART_FACTOR, PART_OVERLAP_SHARE, check_is_log_itself
 from beaver_ftc_logs.readers.text import TableCells, TextTable, join_blocks
-from beaver_ftc_logs.recording import Column, Floats, RecordedFlight, nearest_names_text
+from beaver_ftc_logs.recording import Column, Floats, RecordedFlight, TimeSource, Wanted, nearest_names_text
 from beaver_ftc_logs.units import TIME_UNITS
 
 TIME_COLUMN = "t_s"
@@ -25,8 +25,8 @@ NumberTable = dict[str, Floats]
 
 def read_parts(
     path: Path,
-    time: tuple[str, str] | None = None,
-    columns: Collection[str] | None = None,
+    time: TimeSource | None = None,
+    columns: Wanted = None,
     part_rows: int | None = None,
 ) -> Iterator[RecordedFlight]:
     """The flight in a table, one of more than 1.2 times so many rows in parts of so many, numbered, each of
@@ -121,9 +121,7 @@ class _Table:
             self._of = _ParquetTable(path) if path.suffix.lower() == ".parquet" else TextTable.find(path)
         self.names, self.remarks = self._of.names, self._of.remarks
 
-    def parts(
-        self, columns: Collection[str] | None, part_rows: int | None = None
-    ) -> Iterator[tuple[TableCells, bool]]:
+    def parts(self, columns: Wanted, part_rows: int | None = None) -> Iterator[tuple[TableCells, bool]]:
         """Some columns, all where None, in parts of so many rows, the whole where None, and whether there is
         more. Raises BadInput for a wanted name that several columns have."""
         doubled = self._of.doubled_names

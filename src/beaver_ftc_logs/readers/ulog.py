@@ -4,14 +4,15 @@ Time counts from the first message of the log. Reading needs pyulog: the extra `
 """
 
 import re
-from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs.recording import (
+    Parameters,
     RecordedFlight,
     Topic,
+    Wanted,
     add_parameter,
     columns_of_topics,
     names_of_topics,
@@ -23,14 +24,14 @@ _MAX_MESSAGE_BYTES = 65535
 """Bytes of a message: its length is written in 16 bits."""
 
 
-def read(path: Path, wanted: Collection[str] | None = None) -> RecordedFlight:
+def read(path: Path, wanted: Wanted = None) -> RecordedFlight:
     """The flight in a .ulg file. Raises BadInput where it is none, or pyulog is missing.
 
     wanted: the columns that are returned, all where None; their topics are in memory while the log is read.
     Where the log has none of them, all columns are returned, without numbers. Where it lacks one, the log is
     read once more for the names of all.
     """
-    params: dict[str, tuple[float, ...]] = {}
+    params: Parameters = {}
     with package_errors_as_bad_input(path, "ULog", "pyulog", "a .ulg file of PX4"):
         topics = all_topics = _read_topics(path, wanted, params)
         if wanted is not None and not {*wanted} <= {*names_of_topics(topics)}:
@@ -42,9 +43,7 @@ def read(path: Path, wanted: Collection[str] | None = None) -> RecordedFlight:
     return RecordedFlight(path.stem, columns, notes=notes, parameters=params, unread_column_names=unread)
 
 
-def _read_topics(
-    path: Path, wanted: Collection[str] | None, params: dict[str, tuple[float, ...]]
-) -> dict[str, Topic]:
+def _read_topics(path: Path, wanted: Wanted, params: Parameters) -> dict[str, Topic]:
     """The topics of the wanted columns, of any instance; all where the log has none of these.
 
     params: receives those of the log. Raises ValueError for a message too large.

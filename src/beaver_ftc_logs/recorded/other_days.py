@@ -179,7 +179,7 @@ def _score_days(
     kind: str, days: Sequence[DayChanges], folds: Sequence[tuple[Model, FitPart]], whole: Model
 ) -> Iterator[Document]:
     """Yield the scores of each day. whole: the model of all flights."""
-    _, A, _, Q = whole.as_arrays()
+    A, Q = np.array(whole.past), np.array(whole.noise)
     for day in days:
         scores: dict[str, list[Document]] = {OUR_DETECTOR: [], _RIVAL_DETECTOR: []}
         for model, held_out in folds:

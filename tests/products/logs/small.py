@@ -101,4 +101,4 @@ def rows(parts, surfaces=2, step_s=0.5):
     faulty = np.array([int(bool(name)) for name in named], dtype=np.int64)
     t_s = 10.0 + step_s * np.arange(len(named))
     probability = np.where(faulty, 0.9, 0.1) + 0.001 * np.arange(len(named))
-    return LogRows(t_s, faulty, named, estimate, 0.8 * estimate, 0.5 + 0.5 * estimate, probability)
+    return LogRows(t_s, faulty, named, estimate, 0.8 * estimate, 0.5 + 0.5 * estimate, probability, t_s)

@@ -22,7 +22,7 @@ def delays_of(samples, model):
     """Which delay explains a flight best, by running each alone."""
     bank, delays_s = build_bank(model), model.settings.delays_s
     flights = [innovations(_with_command_delay(samples, d), model) for d in delays_s]
-    return model_weights([run_flight(flight, model, bank)[3] for flight in flights], model.rate_hz)
+    return model_weights([run_flight(flight, model, bank)[1] for flight in flights], model.rate_hz)
 
 
 @pytest.mark.parametrize(("command_delay_s", "which"), [(-0.04, 0), (0.0, 1), (0.04, 2)])
@@ -40,8 +40,8 @@ def test_a_delayed_flight_takes_nothing_from_later(healthy, wing_model):
     commands = healthy.commands.copy()
     commands[k + 1 :] += 0.3
     bank = build_bank(wing_model)
-    one = bank_posterior(healthy, wing_model, bank)[0]
-    other = bank_posterior(replace(healthy, commands=commands), wing_model, bank)[0]
+    one = bank_posterior(healthy, wing_model, bank)
+    other = bank_posterior(replace(healthy, commands=commands), wing_model, bank)
     assert np.array_equal(one[: k + 1], other[: k + 1])
     assert not np.array_equal(one[k + 2], other[k + 2])
 
@@ -49,13 +49,15 @@ def test_a_delayed_flight_takes_nothing_from_later(healthy, wing_model):
 def test_a_shift_of_a_command_is_within_the_spread_of_the_trim(wing_model):
     """The covariance of the trim is that of many drawn shifts, through the model's own responses."""
     settings = wing_model.settings
-    _, _, response, noise = wing_model.as_arrays()
+    response, noise = np.array(wing_model.response), np.array(wing_model.noise)
     rng = np.random.default_rng(4)
     shifts = settings.trim_shift * rng.standard_normal((200_000, len(response)))
     free = settings.trim_sd * np.sqrt(np.diag(noise)) * rng.standard_normal((200_000, 3))
     drawn = np.cov((shifts @ response.sum(axis=1) + free).T)
     np.testing.assert_allclose(
-        build_states(wing_model).initial_covariance[:3, :3], drawn, atol=2e-2 * drawn.max()
+        build_states(wing_model, wing_model.noise_of(())).initial_covariance[:3, :3],
+        drawn,
+        atol=2e-2 * drawn.max(),
     )
 
 

@@ -28,7 +28,7 @@ MODEL = {
     "noise": [[2.0, 0.1, 0.2], [0.1, 3.0, 0.3], [0.2, 0.3, 4.0]],
     "colours": [{"average": [1.0, 0.5], "noise": [[2.5, 0.1, 0.2], [0.1, 3.5, 0.3], [0.2, 0.3, 4.5]]}],
     "fitted": {
-        "commands": [[-0.5, 0.4], [-0.3, 0.6]], "rates": [[-1, 2], [-2, 3], [-3, 4]], "spread": [0.1, 0.2, 0.3],  # noqa: E501
+        "commands": [[-0.5, 0.4], [-0.3, 0.6]], "rates": [[-1, 2], [-2, 3], [-3, 4]],
         "tied": [0.1, 0.2], "gain_sd": [0.3, 0.4],
         "tail": {"level": 3.0, "excess": [1.5, 0.5], "minutes": 30.0, "dispersion": 1.2},
     },
@@ -58,8 +58,9 @@ def test_the_model_itself_is_one(tmp_path):
 
 def test_a_file_of_release_1_0_has_keys_that_have_no_effect(tmp_path):
     former = [
-        (f"fitted.{key}", value) for key, value in (("correlation", [[1.0]]), ("scale", 2), ("column_sd", {}))
-    ]
+        ("fitted.correlation", [[1.0]]), ("fitted.scale", 2), ("fitted.column_sd", {}),
+        ("fitted.misread", 0.1), ("fitted.spread", [0.1, 0.2, 0.3]), ("settings", {"hold_s": 1.0}),
+    ]  # fmt: skip
     assert load_model(written(tmp_path, *former)) == load_model(written(tmp_path))
 
 
@@ -69,7 +70,7 @@ WRONG = [
     ("groups", [["left"], ["tail"]], "groups[1][0]"), ("groups", [["left"]], "response"),
     ("response", MODEL["response"][:1], "response"),
     ("response.1.2", [0.1, 0.2], "response"), ("response_sd.0", [[0.1, 0.2, 0.3]], "response_sd"),
-    ("response_sd.1.2.0", -0.1, "response_sd"), ("past.3", [0.1, 0.2], "past"),
+    ("response_sd.1.2.0", -0.1, "response_sd[1][2][0]"), ("past.3", [0.1, 0.2], "past"),
     ("past.3.1", 1e300, "past[3][1]"), ("noise", [[1, 0], [0, 1]], "noise"),
     ("noise", SINGULAR, "noise"), ("noise.0.1", 0.11, "noise"), ("noise.1.1", -3.0, "noise"),
     ("noise.2.2", 1e-13, "noise"), ("colours.0.noise", SINGULAR, "colours[0].noise"),
@@ -77,7 +78,7 @@ WRONG = [
     ("colours.0.before", [[1.0, 0, 0]], "colours[0].before"),
     ("fitted.rates", [[-1, 2]], "fitted.rates"), ("fitted.airspeed", [1.0], "fitted.airspeed"),
     ("fitted.tied", [0.1], "fitted.tied"),
-    ("fitted.gain_sd", [0.1, -0.4], "fitted"), ("fitted.commands", [[1.0]], "fitted.commands"),
+    ("fitted.gain_sd", [0.1, -0.4], "fitted.gain_sd[1]"), ("fitted.commands", [[1.0]], "fitted.commands"),
     ("settings", {"level_step": 1e-9}, "settings.level_step"),
     ("settings", {"levels": {"tail": [0.5]}}, "settings.levels.tail"),
     ("settings", {"levels": {"left": [1.5]}}, "settings.levels.left[0]"),

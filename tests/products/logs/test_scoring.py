@@ -16,7 +16,8 @@ def rows(estimate, low, high, faulty=None):
     faulty = np.zeros(len(estimate), dtype=int) if faulty is None else np.array(faulty)
     n = len(estimate)
     named = np.full(n, "", dtype=object)
-    return LogRows(np.arange(n) * 1.0, faulty, named, estimate, np.array(low), np.array(high), np.zeros(n))
+    t_s = np.arange(n) * 1.0
+    return LogRows(t_s, faulty, named, estimate, np.array(low), np.array(high), np.zeros(n), t_s)
 
 
 def test_figures_by_labels():

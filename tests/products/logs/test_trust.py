@@ -98,7 +98,7 @@ def test_what_the_law_ties_together_is_not_claimed(model):
     flown = small.flight(model, n=2000, seed=3)
     follows = np.vstack([np.zeros(3), flown.rates[:-1]]) @ [0.4, -0.3, 0.2]
     commands = np.column_stack([follows, flown.commands[:, 1]])
-    share = trust.tied_shares(
+    share = fitting.tied_shares(
         fitting.fit_parts([small.flight(model, n=2000, commands=commands, rates=flown.rates)]),
         small.model(history=4, lags=3),
     )
@@ -107,7 +107,7 @@ def test_what_the_law_ties_together_is_not_claimed(model):
     loose = 1000.0 * (follows + 0.05 * follows.std() * np.random.default_rng(4).standard_normal(2000))
     commands[:, 0] = loose  # all but 1 of 400, of an effect that is a million times the noise
     far = small.flight(model, n=2000, commands=commands, rates=flown.rates)
-    assert trust.tied_shares(fitting.fit_parts([far]), small.model(history=4, lags=3))[0] == 0.0
+    assert fitting.tied_shares(fitting.fit_parts([far]), small.model(history=4, lags=3))[0] == 0.0
 
 
 def test_a_model_that_explains_less_than_the_mean_is_refused():

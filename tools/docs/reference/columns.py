@@ -75,7 +75,7 @@ def _mismatch_frames() -> Columns:
 def _diagnosis() -> Columns:
     kinds = {"faulty": FLAG, "named": TEXT}
     no_rows, no_surfaces = np.empty(0), np.empty((0, 1))
-    rows = LogRows(no_rows, no_rows, no_rows, no_surfaces, no_surfaces, no_surfaces, no_rows)
+    rows = LogRows(no_rows, no_rows, no_rows, no_surfaces, no_surfaces, no_surfaces, no_rows, no_rows)
     return {name: kinds.get(name, NUMBER) for name in rows.table(["SURFACE"], with_probability=True)}
 
 

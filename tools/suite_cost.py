@@ -1,8 +1,8 @@
 """`python -m tools.suite_cost`: seconds of processor that the test suite takes, by test, fixture and kernel.
 
 It runs what `make test` runs with this module as a plug-in (tests/conftest.py), and prints tables. Seconds
-are those of the process and of the commands it has started and waited for: what else the machine does meanwhile
-does not count.
+are those of the process and of the commands it has started and waited for: what else the machine does
+meanwhile does not count.
 """
 
 import json

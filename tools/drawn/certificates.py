@@ -18,6 +18,8 @@ import json
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from functools import reduce
+from operator import getitem
 from pathlib import Path
 from typing import Any
 
@@ -122,20 +124,13 @@ def alterations(rng: np.random.Generator, written: Document, n: int) -> Iterator
 def altered(certificate: Document, place: tuple) -> Document:
     """The same with one number altered: a frame or index by one, a number by a hundredth."""
     other = copy.deepcopy(certificate)
-    node, key = _at(other, place), place[-1]
+    node, key = reduce(getitem, place[:-1], other), place[-1]
     value = node[key]
     if isinstance(value, int):
         node[key] = value + 1
     else:
         node[key] = value * SCALED if value else 1e-3
     return other
-
-
-def _at(node: Any, place: tuple) -> Any:
-    """What holds a place."""
-    for key in place[:-1]:
-        node = node[key]
-    return node
 
 
 def forgeries(
@@ -172,8 +167,8 @@ def false_statement(rng: np.random.Generator, written: Document, log: Log) -> tu
     forged.setdefault("declared", {name: {} for name in "cbgoBm"})
     forged.setdefault("dt_s", float(np.median(np.diff(log["t_s"]))))
     said |= {"what": what, "frame": k}
-    if not said.keys().isdisjoint(("terms", "bounds", "likelihood")):
-        said.setdefault("sides", [1.0, 0.0] if "terms" in said else [[1.0], [0.0]])
+    if "as" not in said:
+        said.setdefault("sides", [[1.0, 0.0]] * 2 if {"bounds", "likelihood"} & said.keys() else [1.0, 0.0])
     said["column"] = str(rng.choice(columns, p=[0.7, 0.1, 0.1, 0.1]))
     forged["statements"] = [said]
     return forged, said
@@ -220,7 +215,7 @@ def _number(rng: np.random.Generator, forged: Document, said: Document) -> None:
     whole = said if rng.random() < 0.8 else forged
     known = [*places(whole)]
     place = known[rng.integers(len(known))]
-    node = _at(whole, place)
+    node = reduce(getitem, place[:-1], whole)
     for key in range(len(node)) if isinstance(node, list) and rng.random() < 0.3 else (place[-1],):
         is_whole = isinstance(node[key], int)
         node[key] = node[key] + int(rng.integers(-3, 4)) if is_whole else float(rng.choice(FORGED["numbers"]))

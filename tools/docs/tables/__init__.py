@@ -40,7 +40,7 @@ def makers() -> dict[str, str]:
     return found
 
 
-def table(name: str) -> str:
+def table(name: str = "") -> str:
     """What the maker of this name returns. Raises BadInput where there is none."""
     known, name = makers(), name.replace("_", "-")
     if name not in known:

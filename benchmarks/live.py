@@ -1,6 +1,6 @@
 """What a class costs the flight on the live page and whoever flies, by turns without and with the guests.
 
-    python -m benchmarks.live --guests 30 [--seconds 10]
+    python -m benchmarks.live --guests 30
 
 No browser is needed: all pages are websockets of this process.
 """
@@ -24,7 +24,7 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.typing import Origin
 
 COMMAND = [sys.executable, "-c", "from beaver_ftc.cli.main import main; main()", "live"]
-TURNS = 4  # without the guests and with them
+TURNS, TURN_S = 4, 10.0  # without the guests and with them; of a turn
 BOTH = ("alone", "with them")
 
 
@@ -61,7 +61,7 @@ class Watcher:
                 self.jitter_ms.append(json.loads(told)["jitter_ms"])
 
 
-async def measure_class(guests: int, seconds: float) -> None:
+async def measure_class(guests: int) -> None:
     """Clock, frames and processor, by turns without and with the guests; medians, and their ratio."""
     with tempfile.TemporaryDirectory() as out:
         command = [*COMMAND, "--guests", str(guests), "--out", out]
@@ -74,10 +74,7 @@ async def measure_class(guests: int, seconds: float) -> None:
                     await asyncio.sleep(0.1)
                 await asyncio.sleep(2.0)
                 turns = [
-                    (
-                        await turn(flyer, [], process.pid, seconds),
-                        await turn(flyer, watchers, process.pid, seconds),
-                    )
+                    (await turn(flyer, [], process.pid), await turn(flyer, watchers, process.pid))
                     for _ in range(TURNS)
                 ]
         finally:
@@ -96,9 +93,7 @@ async def measure_class(guests: int, seconds: float) -> None:
     print(f"{'load of the machine':36} {os.getloadavg()[0]:10.1f}  on {os.cpu_count()} cores")
 
 
-async def turn(
-    flyer: Watcher, watchers: list[Watcher], pid: int, seconds: float
-) -> dict[tuple[str, str], float]:
+async def turn(flyer: Watcher, watchers: list[Watcher], pid: int) -> dict[tuple[str, str], float]:
     """So many seconds with these looking on."""
     async with contextlib.AsyncExitStack() as there:
         for watcher in watchers:
@@ -107,7 +102,7 @@ async def turn(
         for watcher in (flyer, *watchers):
             watcher.forget()
         start_s, worked_s = time.monotonic(), processor_s(pid)
-        await asyncio.sleep(seconds)
+        await asyncio.sleep(TURN_S)
         took_s, worked_s = time.monotonic() - start_s, processor_s(pid) - worked_s
         found = {
             ("frames to the pilot", "1/s"): flyer.frames / took_s,
@@ -137,10 +132,9 @@ def processor_s(pid: int) -> float:
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seconds", type=float, default=10.0)
     parser.add_argument("--guests", type=int, default=30)
     given = parser.parse_args()
-    asyncio.run(measure_class(given.guests, given.seconds))
+    asyncio.run(measure_class(given.guests))
 
 
 if __name__ == "__main__":

@@ -4,7 +4,6 @@ Which test executes which line is what `python -m tools.mutants` has found out (
 as they were then, so line numbers are those before the change. Test files that you have changed run as well.
 """
 
-import argparse
 import os
 import re
 import subprocess
@@ -14,6 +13,7 @@ from collections.abc import Iterable, Iterator
 from tools.mutants.reach import Reach, kept_so_far
 from tools.mutants.scope import COMPILED, PLAIN, ROOT, tests
 
+BUDGET_S = 50.0  # of processor, as measured before
 _HUNK = re.compile(r"^@@ -(\d+)(?:,(\d+))? ")
 
 
@@ -46,11 +46,7 @@ def chosen(reach: Reach, files: Iterable[tuple[str, list[int]]], budget_s: float
 
 def main() -> int:
     """Run them, plain kernels and compiled ones apart; exit status 1 if one fails."""
-    parser = argparse.ArgumentParser(prog="python -m tools.check", description=__doc__)
-    parser.add_argument("--since", default="HEAD", help="the revision to compare with")
-    parser.add_argument("--seconds", type=float, default=50.0, help="of processor, as measured before")
-    options = parser.parse_args()
-    command = ["git", "diff", "-U0", "--no-renames", options.since, "--", "src", "tests"]
+    command = ["git", "diff", "-U0", "--no-renames", "HEAD", "--", "src", "tests"]
     diff = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
     files = list(changed(diff))
     if not (ROOT / ".mutants").exists():
@@ -60,7 +56,7 @@ def main() -> int:
     failed = False
     for mode in (PLAIN, COMPILED):
         sources = [(name, lines) for name, lines in files if name.startswith("src/")]
-        taken = chosen(kept_so_far(mode), sources, options.seconds / 2)
+        taken = chosen(kept_so_far(mode), sources, BUDGET_S / 2)
         of_mode = {file.relative_to(ROOT).as_posix() for file in tests(mode)}
         taken += [name for name, _ in files if name in of_mode and (ROOT / name).exists()]
         print(f"{mode}: {len(taken)} tests and files", flush=True)

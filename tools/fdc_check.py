@@ -4,18 +4,20 @@ The data are CSV files computed from the FDC equations by an independent impleme
 """
 
 from dataclasses import dataclass
-from math import hypot, pi
+from math import pi
 from pathlib import Path
 
 import numpy as np
 
 from beaver_ftc.plant.adapter import FT_PER_M, FlightState, Plant
+from beaver_ftc.plant.linear import derivative
 
 M_PER_FT = 1.0 / FT_PER_M
 SAMPLE_S = 0.05
-DERIVATIVE_BAR = {
+DERIVATIVE_BAR: dict[str, float | None] = {  # in the order of `plant.linear.derivative`
     "Vdot_mps2": 2e-4,
     "alphadot_rad_s": 5e-4,
+    "betadot_rad_s": None,
     "pdot_rad_s2": 2e-4,
     "qdot_rad_s2": 2e-4,
     "rdot_rad_s2": 2e-4,
@@ -70,30 +72,14 @@ def flight_state(row: np.void) -> FlightState:
     )
 
 
-def derivatives(plant: Plant) -> dict[str, float]:
-    """Time derivatives of the truth's state, named as in the FDC data; from JSBSim's own accelerations."""
-    u, v, w = (plant.read(f"velocities/{axis}-fps") * M_PER_FT for axis in "uvw")
-    udot, vdot, wdot = (plant.read(f"accelerations/{axis}dot-ft_sec2") * M_PER_FT for axis in "uvw")
-    V, uw = hypot(u, v, w), hypot(u, w)
-    Vdot = (u * udot + v * vdot + w * wdot) / V
-    rates = {f"{axis}dot_rad_s2": plant.read(f"accelerations/{axis}dot-rad_sec2") for axis in "pqr"}
-    return {
-        "Vdot_mps2": Vdot,
-        "alphadot_rad_s": (u * wdot - w * udot) / uw**2,
-        "betadot_rad_s": (vdot * V - v * Vdot) / (V * uw),
-    } | rates
-
-
 def derivative_agreement(folder: Path) -> list[Agreement]:
     """RMS error over RMS value of each state derivative, over the random states."""
     table = read_table(folder / "fdc_state_derivatives.csv")
-    plant, found = Plant(rate_hz=100), []
-    for row in table:
-        plant.start(flight_state(row))
-        found.append(derivatives(plant))
+    plant = Plant(rate_hz=100)
+    found = np.array([derivative(plant, flight_state(row)) for row in table]).T
     return [
-        Agreement(name, _rms(np.array([each[name] for each in found]) - table[name]) / _rms(table[name]), bar)
-        for name, bar in (DERIVATIVE_BAR | {"betadot_rad_s": None}).items()
+        Agreement(name, _rms(of - table[name]) / _rms(table[name]), bar)
+        for (name, bar), of in zip(DERIVATIVE_BAR.items(), found, strict=False)
     ]
 
 

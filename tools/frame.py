@@ -1,6 +1,6 @@
 """Print what runs in one frame of a flight: kernels in the order of their calls, and what each of them wrote.
 
-python -m tools.frame SCENARIO [--at SECONDS | --after-alarm FRAMES] [--depth CALLS] [--all]
+python -m tools.frame SCENARIO [--at SECONDS | --after-alarm FRAMES]
 
 Kernels fly as plain Python, some 10 ms a frame. A field that is written with the value it had is not seen.
 """
@@ -105,21 +105,15 @@ def writers(calls: list[Call]) -> list[Call]:
     return found[::-1]
 
 
-def lines(calls: list[Call], depth: int) -> Iterator[str]:
+def lines(calls: list[Call]) -> Iterator[str]:
     """The calls as a list, repeated ones once."""
-    shown = (call for call in calls if call.depth <= depth)
-    for (at, name), same in groupby(shown, lambda call: (call.depth, call.name)):
+    for (at, name), same in groupby(calls, lambda call: (call.depth, call.name)):
         several = list(same)
         wrote = Counter(path for call in several for path in call.wrote)
         fields, more = ", ".join([*wrote][:MOST_FIELDS]), len(wrote) - MOST_FIELDS
         times = f" x {len(several)}" if len(several) > 1 else ""
-        yield (
-            "  " * at
-            + name
-            + times
-            + (f"  -> {fields}" if wrote else "")
-            + (f" and {more} more" if more > 0 else "")
-        )
+        said = (f"  -> {fields}" if wrote else "") + (f" and {more} more" if more > 0 else "")
+        yield f"{'  ' * at}{name}{times}{said}"
 
 
 def main() -> None:
@@ -130,8 +124,6 @@ def main() -> None:
     parser.add_argument("scenario")
     parser.add_argument("--at", type=float, default=None, metavar="SECONDS", help="time of the frame")
     parser.add_argument("--after-alarm", type=int, default=1, metavar="FRAMES", help="frames after the alarm")
-    parser.add_argument("--depth", type=int, default=99, metavar="CALLS", help="how deep calls are shown")
-    parser.add_argument("--all", action="store_true", help="also the calls that wrote nothing")
     given = parser.parse_args()
     if os.environ.get(PLAIN, "0") in ("", "0"):
         os.execve(
@@ -139,7 +131,7 @@ def main() -> None:
         )
     at_s, calls = trace(given.scenario, given.at, given.after_alarm)
     print(f"{given.scenario}: {len(calls)} calls in the frame at {at_s:g} s")
-    print(*lines(calls if given.all else writers(calls), given.depth), sep="\n")
+    print(*lines(writers(calls)), sep="\n")
 
 
 if __name__ == "__main__":

@@ -1,11 +1,10 @@
 """`python -m tools.suite_cost`: seconds of processor that the test suite takes, by test, fixture and kernel.
 
-It runs what `make test` runs with this module as a plug-in (tests/conftest.py), and prints tables; `--read`
-prints those of an earlier run again. Seconds are those of the process and of the commands it has started and
-waited for: what else the machine does meanwhile does not count.
+It runs what `make test` runs with this module as a plug-in (tests/conftest.py), and prints tables. Seconds
+are those of the process and of the commands it has started and waited for: what else the machine does
+meanwhile does not count.
 """
 
-import argparse
 import json
 import os
 import subprocess
@@ -20,6 +19,7 @@ from typing import Any
 import pytest
 
 FOLDER = "BEAVER_FTC_SUITE_COST"  # where each process of a run appends its rows
+LONGEST = 30  # rows of a table
 KINDS = ("test", "fixture", "compilation", "rest")
 
 
@@ -85,40 +85,35 @@ def pytest_configure(config: Any) -> None:
         config.pluginmanager.register(Cost(Path(os.environ[FOLDER])), "suite-cost")
 
 
-def tables(rows: list[tuple[str, str, float]], longest: int) -> Iterator[str]:
+def tables(rows: list[tuple[str, str, float]]) -> Iterator[str]:
     """Sums by kind, and of each kind the dearest; of tests and fixtures also by file."""
-    yield from _table("seconds of processor by kind", ((kind, seconds) for kind, _, seconds in rows), longest)
+    yield from _table("seconds of processor by kind", ((kind, seconds) for kind, _, seconds in rows))
     for kind in KINDS:
-        yield from _table(kind, ((name, seconds) for of, name, seconds in rows if of == kind), longest)
+        yield from _table(kind, ((name, seconds) for of, name, seconds in rows if of == kind))
     files = ((name.partition("::")[0], seconds) for of, name, seconds in rows if of in KINDS[:2])
-    yield from _table("file", files, longest)
+    yield from _table("file", files)
 
 
-def _table(title: str, parts: Iterable[tuple[str, float]], longest: int) -> Iterator[str]:
+def _table(title: str, parts: Iterable[tuple[str, float]]) -> Iterator[str]:
     seconds: dict[str, float] = {}
     times = Counter[str]()
     for name, part_s in parts:
         seconds[name] = seconds.get(name, 0.0) + part_s
         times[name] += 1
     yield f"\n{title}: {sum(seconds.values()):.0f} s in {times.total()}"
-    for name in sorted(seconds, key=seconds.__getitem__, reverse=True)[:longest]:
+    for name in sorted(seconds, key=seconds.__getitem__, reverse=True)[:LONGEST]:
         yield f"{seconds[name]:8.1f} s {times[name]:6d} x  {name}"
 
 
 def main() -> int:
-    """Run the suite as `make test` does, or read what a run has written."""
-    parser = argparse.ArgumentParser(prog="python -m tools.suite_cost", description=__doc__)
-    parser.add_argument("--read", type=Path, help="the folder of an earlier run")
-    parser.add_argument("--longest", type=int, default=30, help="rows a table")
-    parser.add_argument("command", nargs="*", default=["make", "test"], help="what runs pytest")
-    options = parser.parse_args()
-    folder, status = options.read or Path(tempfile.mkdtemp(prefix="suite-cost-")), 0
-    if not options.read:
-        environment = os.environ | {FOLDER: str(folder)}
-        status = subprocess.run(options.command, env=environment, check=False).returncode
-        print(f"rows: {folder}")
-    lines = (line for file in sorted(folder.glob("*.jsonl")) for line in file.read_text().splitlines())
-    print(*tables(list(map(json.loads, lines)), options.longest), sep="\n")
+    """Run the suite as `make test` does, or what stands behind `--`."""
+    command = [word for word in sys.argv[1:] if word != "--"] or ["make", "test"]
+    with tempfile.TemporaryDirectory() as folder:
+        status = subprocess.run(command, env=os.environ | {FOLDER: folder}, check=False).returncode
+        lines = [
+            line for file in sorted(Path(folder).glob("*.jsonl")) for line in file.read_text().splitlines()
+        ]
+    print(*tables(list(map(json.loads, lines))), sep="\n")
     return status
 
 

@@ -7,6 +7,7 @@ frame bears its number in its outputs; `Spy` keeps what is flown.
 
 import struct
 from collections import Counter, deque
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -68,7 +69,7 @@ class Found:
     meant: list[list[int]] = field(default_factory=list)
     flown: list[list[int]] = field(default_factory=list)
     happened: Counter = field(default_factory=Counter)
-    counts: dict[str, int] = field(default_factory=dict)
+    counts: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def frames(self) -> int:
@@ -117,20 +118,25 @@ def number_in_pulses(outputs: Any) -> int:
     return int(outputs[14]) + 65536 * int(outputs[15])
 
 
+def _flights(line: Line, found: Found, frames: int, a_flight: int) -> Iterator[tuple[int, list[int]]]:
+    """The size of each flight, about `a_flight` frames, until so many are asked for; and where its frames are
+    noted."""
+    while (left := frames - found.frames) > 0:
+        size = min(int(line.rng.integers(a_flight // 2, 2 * a_flight)), left)
+        found.meant.append([])
+        yield size, found.meant[-1]
+
+
 def ardupilot(body: Any, frames: int, seed: int, rate_hz: int = 400, a_flight: int = 2500) -> Found:
     """So many frames of ArduPilot's protocol over a bad line, restarted after about `a_flight` of them."""
-    line, spy, link, found = Line(seed), Spy(body, number_in_pulses), Link(), Found()
-    end, port, done = Ardupilot(spy, link), 1, 0
-    while done < frames:
-        size = min(int(line.rng.integers(a_flight // 2, 2 * a_flight)), frames - done)
-        if found.meant:
+    line, spy, link = Line(seed), Spy(body, number_in_pulses), Link()
+    found = Found(flown=spy.flown, happened=line.happened, counts=link.counts)
+    end, port = Ardupilot(spy, link), 1
+    for size, meant in _flights(line, found, frames, a_flight):
+        if len(found.meant) > 1:
             line.now_s += 0.0 if line.rng.random() < 0.5 else 3.0
             port += bool(line.rng.random() < 0.5)  # a process started again mostly has another
-        meant: list[int] = []
-        found.meant.append(meant)
         _fly_ardupilot(line, end, port, size, rate_hz, meant)
-        done += size
-    found.flown, found.happened, found.counts = spy.flown, line.happened, dict(link.counts)
     return found
 
 
@@ -176,17 +182,12 @@ def number_in_controls(outputs: Any) -> int:
 
 def px4(body: Any, frames: int, seed: int, a_flight: int = 2500) -> Found:
     """So many frames of PX4's protocol over a bad line; each flight is a connection."""
-    line, spy, link, found = Line(seed), Spy(body, number_in_controls), Link(), Found()
+    line, spy, link = Line(seed), Spy(body, number_in_controls), Link()
     spy.flown.append([])
-    mavlink = Mavlink()
-    end, done = Px4(spy, link, mavlink, lambda params: (3, "")), 0
-    while done < frames:
-        size = min(int(line.rng.integers(a_flight // 2, 2 * a_flight)), frames - done)
-        meant: list[int] = []
-        found.meant.append(meant)
+    found = Found(flown=spy.flown, happened=line.happened, counts=link.counts)
+    end = Px4(spy, link, Mavlink(), lambda params: (3, ""))
+    for size, meant in _flights(line, found, frames, a_flight):
         _fly_px4(line, end, size, meant)
-        done += size
-    found.flown, found.happened, found.counts = spy.flown, line.happened, dict(link.counts)
     return found
 
 

@@ -13,24 +13,28 @@ import json
 import signal
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from importlib import import_module
 
 from beaver_ftc.documents.errors import BeaverFtcError
+
+PRINTERS = {  # the first argument: what prints
+    "table": "tables:table",
+    "cells": "cells:of_page",
+    "constants": "constants:constants",
+    "reference": "reference:page",
+    "screens": "screens:screens",
+}
 
 
 def main() -> int:
     """Exit status 0 if nothing is wrong."""
     first = sys.argv[1] if len(sys.argv) > 1 else ""
-    printers = {
-        "table": _table,
-        "cells": _cells,
-        "constants": _constants,
-        "reference": _reference,
-        "screens": _screens,
-    }
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     try:
-        if first in printers:
-            print(printers[first](*sys.argv[2:]))
+        if first in PRINTERS:
+            module, _, name = PRINTERS[first].partition(":")
+            said = getattr(import_module(f"tools.docs.{module}"), name)(*sys.argv[2:])
+            print(said if isinstance(said, str) else json.dumps(said, indent=1))
             return 0
         return _pages(_options())
     except BeaverFtcError as error:
@@ -78,39 +82,6 @@ def _pages(options: argparse.Namespace) -> int:
         if options.times:
             print("\n".join(slowest(printed, 20)))
     return int(bool(wrong))
-
-
-def _table(name: str = "") -> str:
-    from tools.docs.tables import table
-
-    return table(name)
-
-
-def _cells(name: str = "") -> str:
-    from tools.docs.cells import cells
-    from tools.docs.pages import chosen
-
-    page = chosen([name])[0]
-    return json.dumps(cells(page.read_text(encoding="utf-8"), page.parent), indent=1)
-
-
-def _constants() -> str:
-    from tools.docs.constants import constants
-
-    return json.dumps(constants(), indent=1)
-
-
-def _screens() -> str:
-    from tools.docs.pages import ROOT
-    from tools.docs.screens import write_screens
-
-    return "\n".join(map(str, write_screens(ROOT / "docs" / "images")))
-
-
-def _reference(name: str = "") -> str:
-    from tools.docs.reference import page
-
-    return page(name)
 
 
 if __name__ == "__main__":

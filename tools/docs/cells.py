@@ -5,6 +5,8 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+from tools.docs.pages import chosen
+
 _CAPTION = re.compile(r"\*Table (\d+)\. ")
 _RULE = re.compile(r"\|(?: ?:?-+:? ?\|)+")
 _COLUMNS = re.compile(r"(?<!\\)\|")
@@ -13,6 +15,12 @@ _COLUMNS = re.compile(r"(?<!\\)\|")
 _FILE = re.compile(r"\]\(([\w./-]+\.csv)\)")
 
 Rows = list[dict[str, str | int | float]]
+
+
+def of_page(name: str = "") -> dict[str, Rows]:
+    """Of a page by its name."""
+    page = chosen([name])[0]
+    return cells(page.read_text(encoding="utf-8"), page.parent)
 
 
 def cells(text: str, folder: Path = Path()) -> dict[str, Rows]:

@@ -23,7 +23,10 @@ _END = "<!-- /printed -->"
 _NUMBER = re.compile(r"<!--=(.*?)-->(.*?)<!--/-->")
 _FENCE = re.compile(r" *(`{3,}|~{3,})")
 _BEGINS = re.compile(r"\s*(?:[-*+>]|\d+\.)?\s*<!--=")
-_AT = re.compile(r"at (\S+) (\d{4}-\d\d-\d\d) (\S+)")
+_OPTION = re.compile(
+    r"(?P<dear>dear)|probe: (?P<probe>.+)|needs (?P<needs>[A-Z_]+)|(?P<machine>machine)"
+    r"|at (?P<at>\S+ \d{4}-\d\d-\d\d \S+)"
+)
 _OPTIONS = "allowed: dear, probe: COMMAND, needs NAME, machine, at REVISION DATE DIGEST"
 _ALLOWED = "allowed: printed: COMMAND, /printed, from NAME: COMMAND, =NAME path format, /"
 
@@ -182,26 +185,20 @@ def _read_number(page: Page, line: int, start: int, found: re.Match[str]) -> Non
 
 def _origin(text: str, page: Page, line: int) -> Origin:
     """A command with its options; what is wrong with them is noted."""
-    parts = text.split(" | ")
-    first = next(
-        (i for i, part in enumerate(parts) if part == "dear" or part.startswith("needs ")), len(parts)
-    )
-    origin = Origin(" | ".join(parts[:first]), dear=first < len(parts))
-    for part in parts[first:]:
-        at = _AT.fullmatch(part)
-        if part.startswith("probe: "):
-            origin = replace(origin, probe=part.removeprefix("probe: "))
-        elif re.fullmatch(r"needs [A-Z_]+", part):
-            origin = replace(origin, needs=part.removeprefix("needs "))
-        elif part == "machine":
-            origin = replace(origin, machine=True)
-        elif at:
-            origin = replace(origin, at=(at[1], at[2], at[3]))
-        elif part != "dear":
-            page.wrong(line, f"no option of what is dear: {part}, {_OPTIONS}")
-    if origin.dear and not (origin.probe or origin.needs or origin.machine):
-        page.wrong(line, f"dear without a probe: {origin.command}, allowed: | dear | probe: COMMAND")
-    return origin
+    command, dear, words = text.partition(" | dear")
+    found: dict[str, str] = {}
+    for word in words.split(" | ")[1:]:
+        option = _OPTION.fullmatch(word)
+        if option is None:
+            page.wrong(line, f"no option of what is dear: {word}, {_OPTIONS}")
+        else:
+            found |= {str(option.lastgroup): option[str(option.lastgroup)]}
+    at = found.pop("at", "").split()
+    machine = "machine" in found
+    if dear and not found:
+        page.wrong(line, f"dear without a probe: {command}, allowed: | dear | probe: COMMAND")
+    found.pop("machine", None)
+    return Origin(command, bool(dear), machine=machine, at=(at[0], at[1], at[2]) if at else None, **found)
 
 
 def _match_numbers(page: Page) -> None:

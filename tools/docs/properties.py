@@ -12,6 +12,7 @@ from beaver_ftc.design.fdc import SURFACES
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.files import data_root
 from beaver_ftc.plant.model_file import with_systems
+from beaver_ftc.studies.present.tables import markdown_table
 
 _XML = "aircraft/beaver/beaver.xml"
 _OPERATIONS = ("product", "sum", "max", "ifthen")
@@ -69,12 +70,12 @@ def as_markdown() -> str:
         _HEAD,
         "## Properties that can be set",
         "With the defaults, a surface follows its command.",
-        _table(("property", "default", "meaning"), _input_rows(inputs)),
+        markdown_table(("property", "default", "meaning"), _input_rows(inputs)),
         "## Properties that JSBSim computes",
-        _table(("property", "meaning"), _output_rows(others)),
+        markdown_table(("property", "meaning"), _output_rows(others)),
         "## Aerodynamic terms",
         _TERMS,
-        _table(("term", "value", "times"), [_term_row(element) for element in terms]),
+        markdown_table(("term", "value", "times"), [_term_row(element) for element in terms]),
         _NEXT,
     ]) + "\n"  # fmt: skip
 
@@ -168,8 +169,3 @@ def _factors(element: Element) -> list[str]:
 def _description(element: Element) -> str:
     said = element.find("description")
     return "" if said is None else _text(said)
-
-
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = [head, ["---"] * len(head), *rows]
-    return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines)

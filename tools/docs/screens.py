@@ -14,6 +14,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from beaver_ftc.documents.errors import BadInput
+from tools.docs.pages import ROOT
 from tools.docs.pictures import lighten
 
 SCENARIO = "elevator-partial-loss"
@@ -33,6 +34,11 @@ _NUMBERS = """(parts) => parts.forEach((part, i) => {
   document.body.append(badge);
 })"""
 BREAK_AT_S, LOOK_AT_S = 12.0, 20.0
+
+
+def screens() -> str:
+    """Take the pictures of the pages again: the files."""
+    return "\n".join(map(str, write_screens(ROOT / "docs" / "images")))
 
 
 def write_screens(images: Path) -> Iterator[Path]:

@@ -6,9 +6,10 @@ The certificates of N flights of our scheme, drawn from the schema (`python -m t
 ones are checked. A times a number, index or frame of one of them is altered: as it is, and with the digest
 written again, so that only what is recomputed is left to refuse it. F times a false statement is put into
 one: an alarm in a row in which there was none, an exclusion of a fault that is not excluded, or at another
-time. Its evidence is changed by one to three of ROADS, the digest is written again. What is refused for its
-sides alone is deceived as well: they come last, and who forges can write them. Log and scenario stay as they
-are. Exit status 1 where a true certificate is refused, or another one accepted.
+time. Its evidence, of another event or made up (forged.yaml), is changed by one to three EDITS, the digest is
+written again. What is refused for its sides alone is deceived as well: they come last, and who forges can
+write them. Log and scenario stay as they are. Exit status 1 where a true certificate is refused, or another
+one accepted.
 """
 
 import argparse
@@ -17,6 +18,9 @@ import json
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from functools import reduce
+from operator import getitem
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,7 +29,7 @@ import yaml
 import beaver_ftc as bf
 from beaver_ftc.scenario.builtin import to_yaml
 from beaver_ftc_assurance.certificates import check_certificate as checker
-from beaver_ftc_assurance.certificates.certificate import as_text, with_digest
+from beaver_ftc_assurance.certificates.certificate import MEASURED_MODEL_BOUND, as_text, with_digest
 from tools.drawn.campaign import AIRCRAFT
 from tools.drawn.compose import OURS, PLAIN, drawn_flights
 
@@ -34,7 +38,7 @@ Log = dict[str, np.ndarray]
 SCALED = 1.01  # times a number that is altered
 TYPES = ("stuck", "float", "bias", "loss_of_effectiveness", "hardover up", "oscillatory", "rate_limit")
 SIDES = "the stated sides are not the recomputed ones"
-WILD = (-1e9, -1e3, -1.0, -1e-3, 0.0, 1e-13, 1e-6, 0.3, 0.5, 2.0, 50.0, 1e3, 1e300, np.inf, np.nan)
+FORGED = yaml.safe_load(Path(__file__).with_name("forged.yaml").read_text(encoding="utf-8"))
 
 
 def main() -> None:
@@ -120,7 +124,7 @@ def alterations(rng: np.random.Generator, written: Document, n: int) -> Iterator
 def altered(certificate: Document, place: tuple) -> Document:
     """The same with one number altered: a frame or index by one, a number by a hundredth."""
     other = copy.deepcopy(certificate)
-    node, key = _at(other, place), place[-1]
+    node, key = reduce(getitem, place[:-1], other), place[-1]
     value = node[key]
     if isinstance(value, int):
         node[key] = value + 1
@@ -129,51 +133,43 @@ def altered(certificate: Document, place: tuple) -> Document:
     return other
 
 
-def _at(node: Any, place: tuple) -> Any:
-    """What holds a place."""
-    for key in place[:-1]:
-        node = node[key]
-    return node
-
-
 def forgeries(
     rng: np.random.Generator, written: Document, log: Log, scenario: str, n: int
 ) -> Iterator[tuple[Document, tuple]]:
-    """So many documents with a statement that is false, and the roads by which each was made to hold."""
+    """So many documents with a statement that is false, and the edits by which each was made to hold."""
     for _ in range(n):
         forged, said = false_statement(rng, written, log)
-        chosen = tuple(rng.choice([*ROADS], size=rng.integers(1, 4), replace=False))
-        for name in chosen:
-            with suppress(TypeError):  # a road after one that left a field of another type
-                ROADS[name](rng, forged, said, log)
+        edits = tuple(rng.choice([*EDITS], size=rng.integers(1, 4), p=SHARES))
+        for name in edits:
+            with suppress(KeyError, TypeError):  # an edit after one that left a field of another type
+                EDITS[name](rng, forged, said)
         _restate(forged, said, log, scenario)
-        yield with_digest(json.loads(json.dumps(forged))), chosen
+        yield with_digest(json.loads(json.dumps(forged))), edits
 
 
 def false_statement(rng: np.random.Generator, written: Document, log: Log) -> tuple[Document, Document]:
-    """The document with one statement alone, of an event that the log does not have."""
+    """The document with one statement alone, of an event that the log does not have: its evidence is that of
+    another event, or made up."""
     rows, forged = len(log["t_s"]), copy.deepcopy(written)
     true = [one for one in written["statements"] if "as" not in one]
     surfaces = [name.removesuffix("_cmd_rad") for name in log if name.endswith("_cmd_rad")]
     excluded = {(one["what"], one["frame"]) for one in written["statements"]}
     while True:
-        k, kind = int(rng.integers(1, rows)), rng.integers(3)
-        surface = str(rng.choice(surfaces))
-        what = (None, surface, f"{surface} {rng.choice(TYPES)}")[kind]
-        column = checker.event_column(what, log)
-        columns = [column, f"fie_{surface}_excluded", "detected", "t_s"]
-        column = str(rng.choice(columns, p=[0.7, 0.1, 0.1, 0.1]))
+        k, surface = int(rng.integers(1, rows)), str(rng.choice(surfaces))
+        what = (None, surface, f"{surface} {rng.choice(TYPES)}")[rng.integers(3)]
         if (what, k) not in excluded and not _is_event(what, k, log):
             break
-    if true and rng.random() < 0.6:  # the evidence of another event
-        said = copy.deepcopy(true[rng.integers(len(true))])
-        if rng.random() < 0.5:
-            _move(said, k - said["frame"], rows, log)
-    else:
-        said = {"theta": "any", "terms": [_term(k, log, forged)], "sides": [0.0, 0.0]}
-        forged.setdefault("declared", {name: {} for name in "cbgoBm"})
-        forged.setdefault("dt_s", float(np.median(np.diff(log["t_s"]))))
-    said |= {"what": what, "column": column, "frame": k}
+    columns = [checker.event_column(what, log), f"fie_{surface}_excluded", "detected", "t_s"]
+    known = true if true and rng.random() < 0.6 else FORGED["evidence"]
+    said = {"frame": 0, **copy.deepcopy(known[rng.integers(len(known))])}
+    if known is not true or rng.random() < 0.5:
+        _move(said, k - said["frame"], rows, log)
+    forged.setdefault("declared", {name: {} for name in "cbgoBm"})
+    forged.setdefault("dt_s", float(np.median(np.diff(log["t_s"]))))
+    said |= {"what": what, "frame": k}
+    if "as" not in said:
+        said.setdefault("sides", [[1.0, 0.0]] * 2 if {"bounds", "likelihood"} & said.keys() else [1.0, 0.0])
+    said["column"] = str(rng.choice(columns, p=[0.7, 0.1, 0.1, 0.1]))
     forged["statements"] = [said]
     return forged, said
 
@@ -184,30 +180,19 @@ def _is_event(what: str | None, k: int, log: Log) -> bool:
     return column is not None and bool(column[k:].all() and (k == 0 or not column[k - 1]))
 
 
-def _term(k: int, log: Log, forged: Document) -> Document:
-    """A frame by itself, as the log has it."""
-    d = [0.0, 0.0, 0.0]
-    d[k % 3] = (-1.0) ** (k // 3)
-    return {"weight": 1.0, "d": d, "first": k, "frame": k, **_copies(k, k, log)}
-
-
-def _copies(first: int, last: int, log: Log) -> Document:
-    of = {"x": "measured_rad_s", "F": "design_rad_s2", "eta_bar": "eta_bar_rad_s2"}
-    return {
-        name: [[float(log[f"{axis}_{column}"][k]) for axis in "pqr"] for k in range(first, last + 1)]
-        for name, column in of.items()
-    }
-
-
 def _move(said: Document, by: int, rows: int, log: Log) -> None:
-    """The evidence at another time."""
+    """The evidence at another time, with what the log has of its frames then."""
     for one in (*said.get("terms", ()), *said.get("bounds", ())):
         if "block" not in said and 0 < one["first"] + by <= one["frame"] + by < rows:
             one["first"], one["frame"] = one["first"] + by, one["frame"] + by
             if "since" in one:
                 one["since"] = max(one["since"] + by, 0)
-            if "x" in one:
-                one.update(_copies(one["first"], one["frame"], log))
+            if "weight" in one:
+                frames = range(one["first"], one["frame"] + 1)
+                one |= {
+                    name: [[float(log[f"{axis}_{of}"][k]) for axis in "pqr"] for k in frames]
+                    for name, of in zip(("x", "F", "eta_bar"), MEASURED_MODEL_BOUND, strict=True)
+                }
     if "likelihood" in said:
         said["first"] = max(said["first"] + by, 1)
 
@@ -222,102 +207,41 @@ def _restate(forged: Document, said: Document, log: Log, scenario: str) -> None:
             term["rest"] = (np.array(term["eta_bar"]) - frames.stated_bound_rad_s2[rows]).tolist()
 
 
-# --- the roads: each changes one thing that could make a statement hold ----------------------------------
+# --- the edits: each changes one thing that could make a statement hold ----------------------------------
 
 
-def _number(rng: np.random.Generator, forged: Document, said: Document, log: Log) -> None:
+def _number(rng: np.random.Generator, forged: Document, said: Document) -> None:
     """A number, mostly of the statement, or all of its list become others; frames stay whole."""
     whole = said if rng.random() < 0.8 else forged
     known = [*places(whole)]
     place = known[rng.integers(len(known))]
-    node = _at(whole, place)
+    node = reduce(getitem, place[:-1], whole)
     for key in range(len(node)) if isinstance(node, list) and rng.random() < 0.3 else (place[-1],):
         is_whole = isinstance(node[key], int)
-        node[key] = node[key] + int(rng.integers(-3, 4)) if is_whole else float(rng.choice(WILD))
+        node[key] = node[key] + int(rng.integers(-3, 4)) if is_whole else float(rng.choice(FORGED["numbers"]))
 
 
-def _no_bounds(rng: np.random.Generator, forged: Document, said: Document, log: Log) -> None:
-    forged["declared"] = {name: {} for name in "cbgoBm"}
-    forged["omega_E"] = rng.choice([0.0, -1e3, 7.292115857915991e-05]).item()
+def _field(rng: np.random.Generator, forged: Document, said: Document) -> None:
+    """A field of the document, of the statement or of all of its parts is given a value, or is gone."""
+    kind = str(rng.choice(["document", "statement", "part"], p=[0.2, 0.2, 0.6]))
+    parts = [one for name in ("terms", "bounds") for one in said.get(name) or () if isinstance(one, dict)]
+    known = [(name, of) for name, of in FORGED["fields"][kind].items() if kind != "statement" or name in said]
+    name, values = known[rng.integers(len(known))] if known else ("block", FORGED["blocks"])
+    for one in {"document": [forged], "statement": [said], "part": parts}[kind]:
+        value = values[rng.integers(len(values))]
+        frames = one["frame"] + 1 - one["first"] if name in ("h", "Z", "r") else 0
+        one[name] = [value] * frames if frames else copy.deepcopy(value)
+        if rng.random() < 0.1:
+            del one[name]
 
 
-def _given(rng: np.random.Generator, forged: Document, said: Document, log: Log) -> None:
-    """Each term has a field that it need not have, or has it no more."""
-    name = str(rng.choice(["pole_per_s", "since", "fault", "h", "Z", "r"]))
-    for term in (*said.get("terms", ()), *said.get("bounds", ())):
-        if not isinstance(term, dict):  # `bounds` of some statements are names
-            continue
-        if name in "hZr":
-            term[name] = rng.choice(WILD, max(term["frame"] + 1 - term["first"], 0)).tolist()
-        elif name == "fault":
-            term["fault"] = float(rng.choice([-1e3, -1e-3, 0.0]))
-        else:
-            term["pole_per_s"] = float(rng.choice([-1.0, 1.0], p=[0.7, 0.3]) * rng.choice([0.1, 5, 50, 1e4]))
-            term["since"] = int(rng.integers(-5, term["frame"] + 3))
-        if rng.random() < 0.2:
-            term.pop(name, None)
-
-
-def _theta(rng: np.random.Generator, forged: Document, said: Document, log: Log) -> None:
-    said["theta"] = str(rng.choice(["any", "constant", "constant while it shows", "course", "none"]))
-    said |= {"least": float(rng.choice([-1.0, 0.0, 5.0])), "most": float(rng.choice([-5.0, 0.0, 1.0]))}
-
-
-def _block(rng: np.random.Generator, forged: Document, said: Document, log: Log) -> None:
-    length = int(rng.choice([-1, 0, 1, 2, 20]))
-    said["block"] = [length, 0, (len(log["t_s"]) // max(length, 1)) * max(length, 1)]
-
-
-def _odd(rng: np.random.Generator, forged: Document, said: Document, log: Log) -> None:
+def _odd(rng: np.random.Generator, forged: Document, said: Document) -> None:
     """A value of another type in some field of the statement."""
-    said[str(rng.choice([*said]))] = [None, "1", True, [], {}, [[]], 1e400, -1][rng.integers(8)]
+    said[str(rng.choice([*said]))] = FORGED["odd"][rng.integers(len(FORGED["odd"]))]
 
 
-def _evidence(rng: np.random.Generator, forged: Document, said: Document, log: Log) -> None:
-    """Evidence of another kind, made up."""
-    for name in [name for name in said if name not in ("what", "column", "frame")]:
-        del said[name]
-    kind = rng.integers(6)
-    if kind == 0:
-        alarm = {"likelihood": "t_s", "axes": [1], "first": 1, "what": None, "column": "detected", "frame": 1}
-        forged["statements"].insert(0, alarm)
-    said |= (
-        {"as": "alarm"},
-        {"test": str(rng.choice(checker.TESTS)), "looks": rng.choice(WILD, (2, 3)).tolist()},
-        {"missing": [rng.choice([-1, 0, 3]).item()]},
-        {"theta": str(rng.choice(["any", "course"])), "terms": []},
-        _chance(rng, said["frame"], log),
-        _course(rng, said["frame"]),
-    )[kind] | {"sides": [[1.0], [0.0]] if kind > 3 else [1.0, 0.0]}
-
-
-def _chance(rng: np.random.Generator, k: int, log: Log) -> Document:
-    shares = [name for name in log if name.endswith("_likelihood_share")]
-    frame: Document = {"jitter": [float(rng.choice([0, -1e-6]))], "drift": [[0.0]], "signature": [1.0]}
-    tolerance = [-1e3] if rng.random() < 0.3 else []
-    frame |= {"known": [[1.0]]} if tolerance else {}
-    frame |= {"bounded": [float(rng.choice([0.0, -1e6]))]} if rng.random() < 0.5 else {}
-    return {
-        "likelihood": str(rng.choice([*shares, "t_s", "airspeed_mps"])),
-        "level": float(rng.choice([-50.0, 1e-9, 0.0, 6.0])), "sense": str(rng.choice(["either", "less"])),
-        "axes": [int(rng.integers(3))], "R": [float(rng.choice([1e-6, -1e-6, 0.0]))],
-        "P": [[1e-6, 0], [0, float(rng.choice([1e-6, -1e-6]))]], "Y": [[0.0] * (2 + len(tolerance))] * 2,
-        "tolerance": tolerance, "first": k, "frames": [frame],
-    }  # fmt: skip
-
-
-def _course(rng: np.random.Generator, k: int) -> Document:
-    wide = float(rng.choice([0.0, -1e6]))
-    bounds = [{"d": [0.0, 1.0, 0.0], "first": j, "frame": j, "h": [0.0], "r": [wide], "Z": [z]}
-              for j, z in ((max(k - 2, 1), 1.0), (k, -1.0))]  # fmt: skip
-    course = {"stops": [1e9], "pace_rad_s": 1e9, "slowest_rad_s": 1e9, "near": -1e9, "ordered": [-1e9]}
-    return {"theta": "course", "bounds": bounds, **course}
-
-
-ROADS: dict[str, Callable[..., None]] = {
-    "number": _number, "no bounds": _no_bounds, "given": _given, "theta": _theta, "block": _block,
-    "odd": _odd, "evidence": _evidence,
-}  # fmt: skip
+EDITS: dict[str, Callable[..., None]] = {"number": _number, "field": _field, "odd": _odd}
+SHARES = 0.7, 0.27, 0.03
 
 
 if __name__ == "__main__":

@@ -133,45 +133,42 @@ def _instrument(
 
 
 def _surfaces(scenario: bf.Scenario, metrics: Document, faults: list[Any]) -> Iterator[str]:
-    """Faults of the class: of one surface, or with `pairs` of two."""
-    struck = {_surface(fault) for fault in faults}
-    if _norm_bound(scenario) and any(
-        fault.profile != "abrupt" or fault.end_s is not None for fault in faults
-    ):
+    """Faults of the class: of one surface, or with `pairs` of two, held against what is named and left."""
+    fdi, isolation = scenario.fdi, metrics["isolation"]
+    changing = any(fault.profile != "abrupt" or fault.end_s is not None for fault in faults)
+    if changing and fdi.thresholds == "published":  # that test supposes a constant parameter
         return
-    if len(struck) == 1:
-        yield from _one_surface(scenario, metrics, faults)
-    elif len(faults) == 2 and scenario.fdi.pairs:
-        yield from _pair(metrics, faults)
-
-
-def _norm_bound(scenario: bf.Scenario) -> bool:
-    """The published isolation test supposes a constant parameter."""
-    return scenario.fdi.thresholds == "published"
-
-
-def _one_surface(scenario: bf.Scenario, metrics: Document, faults: list[Any]) -> Iterator[str]:
-    isolation, surface = metrics["isolation"], _surface(faults[0])
-    named, left = isolation["fault"], isolation["candidates"]
-    if scenario.fdi.fault_profile == "abrupt" and len(faults) > 1:
+    true = {_surface(one): _kinds([of for of in faults if _surface(of) == _surface(one)]) for one in faults}
+    alone = len(true) == 1
+    if alone and fdi.fault_profile == "abrupt" and len(faults) > 1:
         return
-    kinds = _kinds(faults)
-    if named is not None and not DeclaredFault.of_scenario(faults[0]).is_named_by(named):
-        yield f"{'excluded' if named == UNANTICIPATED else 'wrong name'}: {named}, broken is {surface}"
-    elif named is None and scenario.fdi.pairs:
-        yield from _left_of_pair(isolation, {surface: kinds})
-    elif named is None:
-        mine = [one for one in left if one.split(":")[0] == surface]
-        if not mine:
-            yield f"excluded: {surface}, left {left}"
-        elif _type_left_out(scenario, faults, mine):
-            yield f"excluded: {surface}:{faults[0].type}, left {mine}"
-    elif len(kinds) == 1:
-        kind = isolation["type"]
-        if kind == "hardover" and _runs_away(scenario, faults[0]):
-            return
-        if kind not in (None, faults[0].type) or (kind is None and faults[0].type not in left):
-            yield f"wrong type: {kind or left}, broken is {faults[0].type} of {surface}"
+    if not alone and not (len(faults) == 2 and fdi.pairs):
+        return
+    one_name = alone and (isolation["fault"] or not fdi.pairs)
+    found = [isolation] if one_name else isolation["faults"]
+    named = {one["fault"]: one for one in found if one["fault"]}
+    for name in named.keys() - true.keys():
+        yield f"{'excluded' if name == UNANTICIPATED else 'wrong name'}: {name}, broken are {sorted(true)}"
+    for surface in named.keys() & true.keys():
+        kind, left, kinds = named[surface]["type"], named[surface]["candidates"], true[surface]
+        fast = kind == "hardover" and any(_runs_away(scenario, fault) for fault in faults)
+        wrong = kind not in kinds if kind is not None else (left or one_name) and not kinds & set(left)
+        if wrong and not fast and len(kinds) == 1:
+            yield f"wrong type: {kind or left}, broken is {kinds} of {surface}"
+    if one_name and not named:
+        yield from _left_out(scenario, isolation["candidates"], *next(iter(true.items())))
+    for plane in () if one_name else PLANES:
+        hit = true.keys() & set(plane)
+        if hit and not named.keys() & set(plane) and isolation["fault"] == UNANTICIPATED:
+            yield f"excluded: {sorted(hit)}"
+
+
+def _left_out(scenario: bf.Scenario, left: list[str], surface: str, kinds: set[Any]) -> Iterator[str]:
+    """The true surface, or its one type, is not among the candidates."""
+    mine = [one for one in left if one.split(":")[0] == surface]
+    open_type = surface in mine or scenario.fdi.fault_class != "all" or len(kinds) > 1
+    if not mine or not (open_type or f"{surface}:{next(iter(kinds))}" in mine):
+        yield f"excluded: {surface} {kinds}, left {left}"
 
 
 def _kinds(faults: list[Any]) -> set[Any]:
@@ -186,33 +183,6 @@ def _runs_away(scenario: bf.Scenario, fault: Any) -> bool:
         return False
     limit_deg_s = getattr(scenario.known_actuators, fault.actuator).rate_limit_deg_s or DEFAULT_LIMIT_DEG_S
     return abs(fault.bias_deg) * fault.kappa_per_s > 0.9 * limit_deg_s
-
-
-def _type_left_out(scenario: bf.Scenario, faults: list[Any], mine: list[str]) -> bool:
-    """Whether candidates of the true surface lack its true type."""
-    surface, kinds = _surface(faults[0]), {fault.type for fault in faults}
-    open_type = surface in mine or scenario.fdi.fault_class != "all" or len(kinds) > 1
-    return not open_type and f"{surface}:{faults[0].type}" not in mine
-
-
-def _pair(metrics: Document, faults: list[Any]) -> Iterator[str]:
-    """As tests/studies/matrix/test_random_pairs.py: none is named wrongly, no true one is excluded."""
-    yield from _left_of_pair(metrics["isolation"], {_surface(fault): {fault.type} for fault in faults})
-
-
-def _left_of_pair(isolation: Document, true: dict[Any, set[str]]) -> Iterator[str]:
-    named = {found["fault"]: found for found in isolation["faults"] if found["fault"]}
-    yield from (f"wrong name: {one}, broken are {sorted(true)}" for one in named if one not in true)
-    for surface in named.keys() & true.keys():
-        kind, left = named[surface]["type"], named[surface]["candidates"]
-        if len(true[surface]) > 1:
-            continue
-        if (kind is not None and kind not in true[surface]) or (left and not true[surface] & set(left)):
-            yield f"wrong type: {kind or left}, broken is {true[surface]} of {surface}"
-    for plane in PLANES:
-        hit = [surface for surface in plane if surface in true]
-        if hit and not named.keys() & set(plane) and isolation["fault"] == UNANTICIPATED:
-            yield f"excluded: {hit}"
 
 
 def flown_again(flight: bf.Flight) -> Iterator[str]:

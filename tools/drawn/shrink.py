@@ -3,6 +3,8 @@
 from collections.abc import Callable, Iterator, Sequence
 from copy import deepcopy
 from dataclasses import replace
+from functools import reduce
+from operator import getitem
 from typing import Any
 
 from tools.drawn.compose import Drawn
@@ -45,21 +47,12 @@ def places(node: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
 
 
 def without(words: Words, place: tuple[Any, ...]) -> Words | None:
-    """A copy with one thing left out; nothing of the bounds."""
+    """A copy with one thing left out; nothing of the bounds, and not what is left out already."""
     if place[:2] == ("fdi", "bounds") or "declared_sensors" in place:
         return None
     less = deepcopy(words)
-    node: Any = less
-    for key in place[:-1]:
-        node = (
-            node[key]
-            if (isinstance(node, dict) and key in node) or (isinstance(node, list) and key < len(node))
-            else None
-        )
-        if node is None:
-            return None
-    if (isinstance(node, dict) and place[-1] in node) or (isinstance(node, list) and place[-1] < len(node)):
-        del node[place[-1]]
-    else:
+    try:
+        del reduce(getitem, place[:-1], less)[place[-1]]
+    except LookupError:
         return None
     return less

@@ -7,7 +7,7 @@ from the neighbour found before. A point is in the envelope where all accelerati
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from math import cos, radians, sin, sqrt
+from math import cos, degrees, radians, sin, sqrt
 
 import numpy as np
 
@@ -18,9 +18,9 @@ from beaver_ftc_aircraft.gtm.steady import (
     HEADING_DEG,
     SEA_LEVEL_SLUG_FT3,
     Bench,
+    Steady,
     pitch_angle,
 )
-from beaver_ftc_aircraft.gtm.systems import THROTTLE
 from tools.gtm.specification import axes_of
 
 SPEEDS_KT = tuple(range(60, 131, 10))
@@ -104,17 +104,11 @@ class Envelope:
     def _off(self, speed: float, bank: float, sideslip: float, x: np.ndarray) -> np.ndarray:
         alpha, elevator, aileron, side, throttle, turning = map(float, x)
         beta, rudder = (side, 0.0) if self.no_rudder else (radians(sideslip), side)
-        fdm, phi = self.bench.fdm, radians(bank)
-        for name in surfaces("elevator"):
-            fdm[f"fcs/{name}-cmd-rad"] = elevator
-        for name, of in surfaces("aileron").items():
-            fdm[f"fcs/{name}-cmd-rad"] = -aileron if of["side"] == "left" else aileron
-        for name in surfaces("rudder"):
-            fdm[f"fcs/{name}-cmd-rad"] = rudder
-        fdm[THROTTLE] = throttle
-        V = speed * FT_S_PER_KNOT / self.thin
+        phi, V = radians(bank), speed * FT_S_PER_KNOT / self.thin
         theta = pitch_angle(alpha, beta, phi, 0.0)
+        angles = map(degrees, (alpha, beta, phi, theta, elevator, aileron, rudder))
+        for name, number in Steady(V, speed, *angles, 100.0 * throttle, 0.0).commands().items():
+            self.bench.fdm[name] = number
         rates = turning * np.array([-sin(theta), cos(theta) * sin(phi), cos(theta) * cos(phi)])
-        flow = V * axes_of(alpha, beta)
-        self.bench.place(ALTITUDE_FT, flow, (phi, theta, radians(HEADING_DEG)), rates)
+        self.bench.place(ALTITUDE_FT, V * axes_of(alpha, beta), (phi, theta, radians(HEADING_DEG)), rates)
         return self.bench.accelerations()

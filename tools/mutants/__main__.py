@@ -20,16 +20,17 @@ from tools.mutants.reach import Reach, few_examples, reach
 from tools.mutants.scope import GLUE, MODES, SOURCES, drawn, left_out, stale
 from tools.mutants.trial import HANGS, KILLED, outcome
 
+LEAST = 85.0  # per cent
 LIBRARIES = (hypothesis, numba, pandas, pydantic, scipy)  # loaded once here, not once in each child
 
 
 def main() -> int:
-    """Exit status 0 if at least `--least` per cent of the mutants die."""
+    """Exit status 0 if at least LEAST per cent of the mutants die."""
     options = _options()
     for name in stale():
         _say(f"equivalent.yaml: no such mutant: {name}")
     every, numbers = drawn(options.seed, options.modules)
-    taken = every[options.start : options.count]
+    taken = every[: options.count]
     made = " and ".join(f"{number} of the {kind}" for kind, number in numbers.items())
     _say(f"mutants that can be made: {made}; none of")
     for line in left_out():
@@ -40,15 +41,13 @@ def main() -> int:
         _say(f"{kind}: {', '.join(f'{number} {end.lower()}' for end, number in of.items()) or 'none drawn'}")
     dead = sum(number for (_, end), number in ends.items() if end in (KILLED, HANGS))
     _say(f"{dead} of {len(taken)} mutants killed (seed {options.seed})")
-    return int(100 * dead < options.least * len(taken))
+    return int(100 * dead < LEAST * len(taken))
 
 
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m tools.mutants", description=__doc__)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--count", type=int, default=100, help="how many of the seed's mutants")
-    parser.add_argument("--start", type=int, default=0, help="leave out the first so many, to go on")
-    parser.add_argument("--least", type=float, default=85.0, help="per cent that must die")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes side by side")
     parser.add_argument("modules", nargs="*", default=["**/*.py"], help="patterns below src")
     return parser.parse_args()
@@ -75,7 +74,7 @@ def _trials(
     tests = [{mode: found[mode].reaching(mutant) for mode in MODES[kind]} for kind, mutant in taken]
     with ProcessPoolExecutor(options.jobs, mp_context=get_context("fork")) as pool:
         done = pool.map(outcome, [mutant for _, mutant in taken], tests)
-        for number, ((kind, mutant), end) in enumerate(zip(taken, done, strict=True), options.start + 1):
+        for number, ((kind, mutant), end) in enumerate(zip(taken, done, strict=True), 1):
             ends[kind, end] += 1
             _say(f"{number:4d} {kind} {end:7} {_line(mutant)}")
     return ends

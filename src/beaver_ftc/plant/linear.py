@@ -120,11 +120,11 @@ def engine_slope(plant: Plant, point: FlightState) -> np.ndarray:
 
 def _slope(plant: Plant, point: FlightState, field: str, step: float) -> np.ndarray:
     here = getattr(point, field)
-    ahead, behind = (_derivative(plant, replace(point, **{field: here + way})) for way in (step, -step))
+    ahead, behind = (derivative(plant, replace(point, **{field: here + way})) for way in (step, -step))
     return (ahead - behind) / (2.0 * step)
 
 
-def _derivative(plant: Plant, state: FlightState) -> np.ndarray:
+def derivative(plant: Plant, state: FlightState) -> np.ndarray:
     """Time derivative of the ten states, (10,), from JSBSim's accelerations."""
     plant.start(state)
     u, v, w = (plant.read(f"velocities/{axis}-fps") * M_PER_FT for axis in "uvw")

@@ -15,7 +15,7 @@ PAGES: dict[str, Callable[[], str]] = {
 }
 
 
-def page(name: str) -> str:
+def page(name: str = "") -> str:
     """The Markdown of a page. Raises BadInput for a name that none has."""
     if name not in PAGES:
         raise BadInput(f"reference: there is no page {name[:60]!r}{suggestion(name, PAGES)}")

@@ -11,11 +11,13 @@ import io
 import os
 import pickle
 import re
+import subprocess
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from functools import wraps
 from importlib import import_module
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
 
 from filelock import FileLock
@@ -40,7 +42,7 @@ def makers() -> dict[str, str]:
     return found
 
 
-def table(name: str) -> str:
+def table(name: str = "") -> str:
     """What the maker of this name returns. Raises BadInput where there is none."""
     known, name = makers(), name.replace("_", "-")
     if name not in known:
@@ -55,6 +57,21 @@ def beaver(*arguments: str) -> list[str]:
     if SHARED in os.environ and served.exists():
         return [str(served), *arguments]
     return [sys.executable, "-c", "from beaver_ftc.cli.main import main; main()", *arguments]
+
+
+def printed_by(*arguments: str) -> str:
+    """What `beaver-ftc` prints for these arguments, in a folder of its own."""
+    with TemporaryDirectory() as folder:
+        command = beaver(*arguments)
+        return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True).stdout
+
+
+def picture(name: str, says: str, content: bytes) -> str:
+    """Save a picture beside the pages, and return the line that shows it."""
+    path = Path("images", name)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(content)
+    return f"![{says}]({path.as_posix()})"
 
 
 def table_of(rows: Iterable[Any], columns: Mapping[str, Column], none: str = "-") -> str:

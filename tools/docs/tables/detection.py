@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 from functools import cache
+from io import BytesIO
 from itertools import pairwise
-from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -16,6 +16,7 @@ import beaver_ftc as bf
 from beaver_ftc.design.model import design_of, response
 from beaver_ftc.results.style import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILION
 from beaver_ftc.scenario.diagnosis import DEADBEAT_PER_S
+from tools.docs.tables import picture
 
 SCENARIO, SURFACE = "elevator-partial-loss", "elevator"
 LOSS, AT_S = 0.08, 12.8  # small, so that alarm and certainty come at different frames
@@ -157,8 +158,7 @@ def feasible_set() -> str:
 
 
 def _saved(figure: Figure, name: str, says: str) -> str:
-    path = Path("images", f"{name}.svg")
-    path.parent.mkdir(exist_ok=True)
-    figure.savefig(path, metadata={"Date": None, "Creator": None})
+    drawn = BytesIO()
+    figure.savefig(drawn, format="svg", metadata={"Date": None, "Creator": None})
     plt.close(figure)
-    return f"![{says}]({path.as_posix()})"
+    return picture(f"{name}.svg", says, drawn.getvalue())

@@ -3,7 +3,6 @@
 import hashlib
 import re
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -12,6 +11,7 @@ import beaver_ftc as bf
 from beaver_ftc.results.flight import Flight
 from beaver_ftc.results.style import BLACK, GREY, LOOKS, VERMILION
 from beaver_ftc.studies.present.tables import markdown_table
+from tools.docs.tables import picture
 
 _WIDTH, _HEIGHT = 260, 150  # of a thumbnail, px
 _LEFT, _RIGHT = 30, 254  # x of the panels: from, to
@@ -53,11 +53,8 @@ def _sections() -> Iterator[str]:
 
 def _row(name: str) -> tuple[str, str, str]:
     flight = bf.fly(name)
-    path = Path("images/gallery", f"{name}.svg")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(_thumbnail(flight), encoding="utf-8")
     description = re.split(r"(?<=[.!?]) (?=[A-Z])", " ".join(bf.load(name).description.split()))[0]
-    shown = f"![{name}]({path.as_posix()})"
+    shown = picture(f"gallery/{name}.svg", name, _thumbnail(flight).encode())
     return shown, f"`{name}`<br>{description}", _outcome(flight)
 
 

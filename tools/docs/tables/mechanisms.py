@@ -10,7 +10,7 @@ from beaver_ftc.studies.sensitivity import shown
 from beaver_ftc.studies.sensitivity.command import run_mechanisms
 from beaver_ftc.studies.sensitivity.mechanisms import DRAWS, Flight, fly_one
 from beaver_ftc.studies.sensitivity.systems import DIAGNOSIS, LAW
-from tools.docs.tables import aside, shared
+from tools.docs.tables import aside, picture, shared
 
 Document = dict[str, Any]
 SEED = 1
@@ -41,10 +41,8 @@ def _flown() -> tuple[Document, bytes]:
 def mechanisms_findings() -> str:
     """What each mechanism is worth, in sentences; and the figure."""
     document, drawn = _flown()
-    Path("images").mkdir(exist_ok=True)
-    Path("images/mechanisms.png").write_bytes(drawn)
     flown, *_, explained = shown.mechanism_sentences(document)
-    return f"{flown}\n\n{_grouped(document)}\n\n{explained}\n\n![{_PICTURED}](images/mechanisms.png)"
+    return f"{flown}\n\n{_grouped(document)}\n\n{explained}\n\n{picture('mechanisms.png', _PICTURED, drawn)}"
 
 
 def _grouped(document: Document) -> str:

@@ -26,7 +26,7 @@ from beaver_ftc.studies.sensitivity.shown import HEAD, cells
 from beaver_ftc.studies.sensitivity.shown import error_sentences as sentences
 from beaver_ftc.studies.sweep.one_flight import fly_one, scenario_of
 from beaver_ftc.studies.sweep.sampling import Assignment, Plan
-from tools.docs.tables import moved, table_of
+from tools.docs.tables import moved, picture, table_of
 
 Document = dict[str, Any]
 Rows = list[dict[str, Any]]
@@ -54,12 +54,6 @@ def _flown(name: str, count: int, workers: int = 2) -> Rows:
     """The first flights of a built-in sweep, a row each."""
     sweep = load_sweep(name)
     return fly_all(partial(fly_one, sweep), list(Plan(sweep).assignments(range(count))), workers)
-
-
-def _shown(drawn: Path, name: str) -> None:
-    """Keep a picture of a study beside the page."""
-    Path("images").mkdir(exist_ok=True)
-    Path("images", name).write_bytes(drawn.read_bytes())
 
 
 LOSSES_HEAD = (
@@ -162,7 +156,7 @@ def robustness_power() -> str:
     """Share of losses found under tactical-grade sensors, by scheme, surface and air; and a picture of it."""
     with TemporaryDirectory() as name:
         document = run_schemes(Path(name), GRIDS["quick"], contenders(None), 2)
-        _shown(Path(name, "detectability", "detectability.png"), "power-tactical-grade.png")
+        picture("power-tactical-grade.png", "", Path(name, "detectability", "detectability.png").read_bytes())
     return _power_of(document)
 
 
@@ -269,8 +263,8 @@ def robustness_decay() -> str:
     """How verdicts decay beyond what is declared, of two scenarios; and a picture of the first."""
     with TemporaryDirectory() as name:
         whole, published = (run_errors(Path(name), load_scenario(one), workers=2) for one in DECAYS)
-        _shown(Path(whole["folder"], "sensitivity.png"), "decay.png")
-    pictured = f"![{_PICTURED}](images/decay.png)\n\n{DECAY_FIGURE}"
+        shown = picture("decay.png", _PICTURED, Path(whole["folder"], "sensitivity.png").read_bytes())
+    pictured = f"{shown}\n\n{DECAY_FIGURE}"
     table = moved(_decay_table(whole), "*Table 1.", "robustness-decay", DECAY_TITLE)
     return "\n\n".join([table, pictured, f"### {PUBLISHED}", _published(published)])
 

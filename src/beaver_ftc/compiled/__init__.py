@@ -241,25 +241,31 @@ def _with_attributes(argument):
     return argument
 
 
-Kernel = Callable[..., Any]
+Kernel = Callable[..., None]
 
 
 def one_of(kernels: Sequence[Kernel]) -> Kernel:
-    """A kernel (place, *arguments) that returns what the kernel at that place returns for these arguments.
+    """A kernel (place, *arguments) that calls the kernel at that place with these arguments.
 
-    place: 0 for the first kernel; a place beyond the last calls the last.
+    place: 0 for the first kernel; a place beyond the last calls the last. The kernels return nothing.
     """
-    if numba.config.DISABLE_JIT:
-        return lambda place, *arguments: kernels[min(place, len(kernels) - 1)](*arguments)
-    first = kernels[0]
-    if len(kernels) == 1:
-        return kernel(lambda place, *arguments: first(*arguments))
-    rest = one_of(kernels[1:])
+    first, others = kernels[0], kernels[1:]
+
+    if not others:
+
+        @kernel
+        def last(place: int, *arguments: Any) -> None:
+            first(*arguments)
+
+        return last
+
+    rest = one_of(others)
 
     @kernel
-    def either(place: int, *arguments: Any) -> Any:
+    def either(place: int, *arguments: Any) -> None:
         if place == 0:
-            return first(*arguments)
-        return rest(place - 1, *arguments)
+            first(*arguments)
+        else:
+            rest(place - 1, *arguments)
 
     return either

@@ -45,7 +45,7 @@ def excluded_types(tape: Tape) -> Iterator[tuple[int, int, int]]:
 def reason_not_certified(tape: Tape, kind: int) -> str | None:
     """Why an exclusion of this type cannot be certified, None if it can."""
     config = tape.alarm.diagnosis.types_config
-    if TYPES[kind].must_show and not config.single_instant:
+    if TYPES[kind].has_shown is not None and not config.single_instant:
         return OSCILLATION_AT_STOP
     if config.returns_lagged and TYPES[kind].holds_surface:
         return RETURNING_SURFACE

@@ -62,42 +62,10 @@ SCALE_COMMAND, GIVE_UP, SUBTRACT_OFFSET, WAIT_FOR_SURFACE = range(4)
 REST_IS_UNINFORMATIVE, REST_EXCLUDES_TYPE, REST_HIDES_TYPE, REST_POSITION_IS_PARAMETER = range(4)
 
 
-# What a type does that leaves a part out.
-
-
 @kernel
 def reachable_range(c, srf, h, k):
     """Anywhere within reach."""
     return srf.actuator.reach_lo, srf.actuator.reach_hi
-
-
-@kernel
-def nothing(*arguments):
-    """Nothing is done."""
-
-
-@kernel
-def any_parameter(*arguments):
-    """Every parameter will do."""
-    return UNLIMITED_SET
-
-
-@kernel
-def shows_at_once(*arguments):
-    """It need not show itself."""
-    return True
-
-
-@kernel
-def no_motion(*arguments):
-    """No motion rules it out."""
-    return False
-
-
-@kernel
-def unknown_error(*arguments):
-    """It does not say how far the surface is off."""
-    return np.nan
 
 
 class DeflectionRelation(NamedTuple):
@@ -197,40 +165,35 @@ class FaultType:
 
     name: str
     has_constant_parameter: bool
-    consistent_interval: Kernel = any_parameter
+    consistent_interval: Kernel | None = None
     description: str = ""
     sort_rank: int = 100
-    parameter_range: Kernel = any_parameter
+    parameter_range: Kernel | None = None
     memory_dtype: np.dtype | None = None
     memory_record_name: str = ""
-    reset_memory: Kernel = nothing
-    before_judging_frame: Kernel = nothing
-    on_skipped_frame: Kernel = nothing
+    reset_memory: Kernel | None = None
+    before_judging_frame: Kernel | None = None
+    on_skipped_frame: Kernel | None = None
     deflection_range: Kernel = reachable_range
     holds_surface: bool = False
-    has_shown: Kernel = shows_at_once
+    has_shown: Kernel | None = None
     show_half_cycles: int = 0
     evidence_at_rest: int = REST_IS_UNINFORMATIVE
     wait_half_cycles: int = 1
     follows_command: bool = True
     can_look_like: tuple[str, ...] = ()
-    motion_rules_out: Kernel = no_motion
+    motion_rules_out: Kernel | None = None
     stop_direction: int = 0
     accommodation_mode: int = SUBTRACT_OFFSET
     other_accommodation_modes: tuple[int, ...] = ()
     end_type: str = ""
-    deflection_error: Kernel = unknown_error
+    deflection_error: Kernel | None = None
     deflection_error_precedence: int = 100
     deflection_relation: DeflectionRelation | None = None
     frames_test: str = ""
     estimate_parameter: Callable[[np.void, int, int], float | None] = _no_estimate
     estimate_parameter_interval: Callable[[np.void, int, int], tuple[float, float] | None] = _no_estimate
     estimate_frequency_rad_s: Callable[[np.void, int, int], float | None] = _no_estimate
-
-    @property
-    def must_show(self) -> bool:
-        """Whether it explains a flight only once it has shown itself."""
-        return self.has_shown is not shows_at_once
 
 
 @kernel

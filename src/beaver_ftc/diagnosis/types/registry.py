@@ -24,11 +24,13 @@ import pkgutil
 from functools import lru_cache
 from importlib import import_module
 from math import ceil, pi, radians
+from typing import Any
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel, one_of, record, sized
+from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.diagnosis import isolation
+from beaver_ftc.diagnosis.sets import EMPTY_SET, UNLIMITED_SET
 from beaver_ftc.diagnosis.state import PITCH_GROUP, fill
 from beaver_ftc.diagnosis.types import (
     GIVE_UP,
@@ -37,6 +39,7 @@ from beaver_ftc.diagnosis.types import (
     REST_HIDES_TYPE,
     REST_POSITION_IS_PARAMETER,
     FaultType,
+    Kernel,
     clip_travel,
     copy_observation,
     intersect_set,
@@ -45,7 +48,6 @@ from beaver_ftc.diagnosis.types import (
     release,
     set_anomalous,
     table,
-    unknown_error,
 )
 from beaver_ftc.scenario.declared import Declared
 
@@ -75,6 +77,12 @@ def _type_column(name: str) -> np.ndarray:
     return np.array([int(getattr(row, name)) for row in TYPES])
 
 
+def _parts_of(name: str) -> dict[int, Kernel]:
+    """This part of each type that has it."""
+    parts = {h: getattr(row, name) for h, row in enumerate(TYPES)}
+    return {h: part for h, part in parts.items() if part is not None}
+
+
 # The columns that verdict.py reads; `FaultType` says what they are.
 MODE, STOP_SIDE, REST, HOLDS = (
     _type_column(name)
@@ -83,7 +91,7 @@ MODE, STOP_SIDE, REST, HOLDS = (
 SHOW_HALF_CYCLES = _type_column("show_half_cycles")
 WAIT_HALF_CYCLES = _type_column("wait_half_cycles")
 FOLLOWS_COMMAND = _type_column("follows_command")
-MUST_SHOW = np.array([row.must_show for row in TYPES])
+MUST_SHOW = np.array([row.has_shown is not None for row in TYPES])
 CAN_LOOK_LIKE = np.array([[other.name in row.can_look_like for other in TYPES] for row in TYPES])
 SERVES = np.array(
     [[mode in (row.accommodation_mode, *row.other_accommodation_modes) for row in TYPES] for mode in range(4)]
@@ -100,11 +108,7 @@ HIDDEN_AT_REST = REST == REST_HIDES_TYPE
 NAMED = np.array([*(np.array(SAME_NAME) == h for h in range(N_TYPES)), ALL])
 # Types that give the deflection error of a surface, in the order in which they are used.
 ERROR_TYPES = np.array(
-    sorted(
-        (h for h in range(N_TYPES) if TYPES[h].deflection_error is not unknown_error),
-        key=lambda h: TYPES[h].deflection_error_precedence,
-    ),
-    dtype=int,
+    sorted(_parts_of("deflection_error"), key=lambda h: TYPES[h].deflection_error_precedence), dtype=int
 )
 END_TYPE = np.array([TYPE_NAMES.index(row.end_type) if row.end_type else -1 for row in TYPES])
 
@@ -115,16 +119,29 @@ def type_index_of(name: str, *, has_constant_parameter: bool = True, stop_direct
     return [(row.name, row.has_constant_parameter, row.stop_direction) for row in TYPES].index(sought)
 
 
-# The part of type h, as kernels (h, *arguments of the part).
-reset_memory = one_of([row.reset_memory for row in TYPES])
-parameter_range = one_of([row.parameter_range for row in TYPES])
-before_judging_frame = one_of([row.before_judging_frame for row in TYPES])
-on_skipped_frame = one_of([row.on_skipped_frame for row in TYPES])
-consistent_interval = one_of([row.consistent_interval for row in TYPES])
-has_shown = one_of([row.has_shown for row in TYPES])
-motion_rules_out = one_of([row.motion_rules_out for row in TYPES])
-deflection_range = one_of([row.deflection_range for row in TYPES])
-deflection_error = one_of([row.deflection_error for row in TYPES])
+def _by_type(name: str, arguments: str, default: Any) -> Kernel:
+    """A kernel of these arguments, h among them, that returns what this part of type h returns; `default` for
+    a type without it.
+
+    Compiled code calls only what it can name, so the calls are written out.
+    """
+    parts = _parts_of(name)
+    calls = [f"if h == {h}: return part_{h}({arguments})" for h in parts]
+    source = "\n    ".join([f"def {name}_of_type({arguments}):", *calls, "return default"])
+    names = {"__name__": __name__, "default": default, **{f"part_{h}": part for h, part in parts.items()}}
+    exec(compile(source, __file__, "exec"), names)
+    return kernel(names[f"{name}_of_type"])
+
+
+reset_memory = _by_type("reset_memory", "srf, h", None)
+parameter_range = _by_type("parameter_range", "srf, h", UNLIMITED_SET)
+before_judging_frame = _by_type("before_judging_frame", "c, srf, h", None)
+on_skipped_frame = _by_type("on_skipped_frame", "c, srf, h, k", None)
+consistent_interval = _by_type("consistent_interval", "c, srf, h, k", UNLIMITED_SET)
+has_shown = _by_type("has_shown", "srf, h", True)
+motion_rules_out = _by_type("motion_rules_out", "srf, h, stop", False)
+deflection_range = _by_type("deflection_range", "c, srf, h, k", EMPTY_SET)
+deflection_error = _by_type("deflection_error", "srf, h", np.nan)
 
 MAX_BLOCK = 256  # frames of a block
 N_KEPT = 3  # frames, or blocks, of which the orders are kept: the elapsed one and two before it
@@ -268,8 +285,8 @@ def restart_surface(srf):
     srf.evidence.k_first = -1
     srf.evidence.n_anomalous = srf.evidence.n_rest = srf.evidence.n_unhidden = 0
     for h in range(N_TYPES):
-        put_set(srf, h, parameter_range(h, srf, h))
-        reset_memory(h, srf, h)
+        put_set(srf, h, parameter_range(srf, h))
+        reset_memory(srf, h)
         release.allow_before(srf, h)
 
 
@@ -327,9 +344,9 @@ def judge_types(c, srf, k):
         (ev.k_first, ev.first_lo, ev.first_hi) = (k, now.lo, now.hi)
     for h in range(N_TYPES):
         if HOLDS[h]:
-            intersect_set(srf, h, release.held_set(c, srf, h, *deflection_range(h, c, srf, h, k)))
+            intersect_set(srf, h, release.held_set(c, srf, h, *deflection_range(c, srf, h, k)))
         else:
-            intersect_set(srf, h, consistent_interval(h, c, srf, h, k))
+            intersect_set(srf, h, consistent_interval(c, srf, h, k))
 
 
 @kernel
@@ -339,9 +356,9 @@ def judge_frame(types):
     returns = c.returns_lagged and types.frame_index > 0
     for s, srf in enumerate(types.surface):
         for h in range(N_TYPES):
-            before_judging_frame(h, c, srf, h)
+            before_judging_frame(c, srf, h)
             if returns and HOLDS[h]:
-                lo, hi = deflection_range(h, c, srf, h, k if c.single_instant else k - 1)
+                lo, hi = deflection_range(c, srf, h, k if c.single_instant else k - 1)
                 release.begin_release(c, srf, h, lo, hi, STOP_SIDE[h])
         if c.abrupt and srf.accommodation.mode == GIVE_UP and not srf.judged.anomalous:
             count_rest(types, s)
@@ -350,7 +367,7 @@ def judge_frame(types):
             judge_types(c, srf, k)
         else:
             for h in range(N_TYPES):
-                on_skipped_frame(h, c, srf, h, k)
+                on_skipped_frame(c, srf, h, k)
         for h in range(N_TYPES):
             if returns and HOLDS[h]:
                 release.advance_returns(c, srf, h)

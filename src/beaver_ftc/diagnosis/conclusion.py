@@ -74,14 +74,13 @@ def set_isolated(found, j, t):
 
 
 @kernel
-def record_decision(found, given):
+def record_decision(found, finding, lead):
     """Replace isolated fault, type and accommodation by those that the fault types found.
 
-    found: (isolated, isolated_at_s, type, type_at_s, target, accommodation_mode).
+    finding: (isolated, isolated_at_s, type, type_at_s); lead: (target, accommodation_mode).
     """
-    found.isolated_estimator, found.isolated_at_s = (given[0], given[1])
-    found.fault_type, found.typed_at_s = (given[2], given[3])
-    found.target, found.accommodation_mode = (given[4], given[5])
+    found.isolated_estimator, found.isolated_at_s, found.fault_type, found.typed_at_s = finding
+    found.target, found.accommodation_mode = lead
 
 
 @kernel

@@ -217,9 +217,10 @@ def decide_type(fdi, t, started):
     if sensor_monitor.doubts_gyros(fdi.sensor_monitor):
         return
     if in_pairs:
-        conclusion.record_decision(found, pairs.decide_pairs(types, found, layout, t))
+        finding = pairs.decide_pairs(types, found, layout, t)
     else:
-        conclusion.record_decision(found, verdict.decide_single(types, found, layout, fies, t))
+        finding = verdict.decide_single(types, found, layout, t)
+    conclusion.record_decision(found, finding, verdict.accommodate(types, layout))
 
 
 @apart

@@ -22,8 +22,6 @@ from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.state import LATERAL_GROUP, PITCH, PITCH_GROUP, ROLL, UNANTICIPATED, YAW
 from beaver_ftc.diagnosis.types import (
     GIVE_UP,
-    SCALE_COMMAND,
-    SUBTRACT_OFFSET,
     forget_anomalies,
     last_error,
     observe_error,
@@ -236,8 +234,8 @@ def sole_pitch(types, layout):
 
 @kernel
 def decide_pairs(types, past, layout, t):
-    """Name surfaces and types plane by plane; t s. Returns the finding for `conclusion.record_decision`: its
-    isolated estimator is of the one named first, the law acts on all.
+    """Name surfaces and types plane by plane; t s. Returns the finding on the one named first, for
+    `conclusion.record_decision`.
     """
     outside = isolate_lateral(types, layout, t)
     isolate_pitch(types, layout, t)
@@ -249,49 +247,4 @@ def decide_pairs(types, past, layout, t):
             first = s
     if first == NO_SURFACE and outside:
         first = UNANTICIPATED
-    return (
-        *verdict.finding_on_surface(types, past, layout, first, t),
-        *accommodate_pairs(types, layout),
-    )
-
-
-@kernel
-def pitch_isolated(types, layout):
-    """Whether a surface of pitch is named."""
-    for s, srf in enumerate(types.surface):
-        if layout.group[s] == PITCH_GROUP and srf.status.is_isolated:
-            return True
-    return False
-
-
-@kernel
-def acts_on(types, layout, s):
-    """Whether the law is to act on surface s: it is isolated, or it is the most likely one in pitch."""
-    if types.surface[s].status.is_isolated:
-        return True
-    if (
-        layout.group[s] != PITCH_GROUP
-        or pitch_isolated(types, layout)
-        or not types.pair.group_alarm[PITCH_GROUP]
-    ):
-        return False
-    sole = verdict.sole_surface(types.surface, True)
-    return s == (sole if sole >= 0 else layout.main[PITCH])
-
-
-@kernel
-def accommodate_pairs(types, layout):
-    """Settle what the law does about each surface. Returns the lead, which the supervisor follows, and what
-    is done about it: a replaced elevator leads before all others."""
-    lead, mode = NO_SURFACE, -1
-    for s, srf in enumerate(types.surface):
-        srf.accommodation.mode = -1
-        if acts_on(types, layout, s):
-            possible = srf.status.is_isolated == 1 or can_be_faulty(srf)
-            own = verdict.choose_mode(srf) if possible else SUBTRACT_OFFSET
-            if verdict.fault_shows(types.config, srf, own, possible):
-                srf.accommodation.mode = own
-                leads = s == layout.main[PITCH] and own in (SCALE_COMMAND, GIVE_UP)
-                if lead == NO_SURFACE or leads:
-                    lead, mode = s, own
-    return lead, mode
+    return verdict.finding_on_surface(types, past, layout, first, t)

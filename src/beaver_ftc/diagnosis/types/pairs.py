@@ -63,10 +63,10 @@ def locate_one(srf, own, other, nu, nu_max):
 def locate_lateral(types, layout, est, nu, nu_max):
     """Find where ailerons and rudder were in the elapsed frame, two deflections in two equations."""
     a, r = layout.main[ROLL], layout.main[YAW]
-    ail, rud = est[layout.position[a]].effect, est[layout.position[r]].effect
-    reached = locate_one(types.surface[a], ail, rud, nu, nu_max)
-    if not (locate_one(types.surface[r], rud, ail, nu, nu_max) and reached):
-        types.pair.lateral_outside = 1
+    for s, other in ((a, r), (r, a)):
+        own, effect = est[layout.position[s]].effect, est[layout.position[other]].effect
+        if not locate_one(types.surface[s], own, effect, nu, nu_max):
+            types.pair.lateral_outside = 1
 
 
 @kernel
@@ -133,18 +133,17 @@ def isolate_lateral(types, layout, t):
     """Set the isolation of the surfaces of roll and yaw. Whether the fault of this plane is outside the
     class.
     """
-    c, pair = types.config, types.pair
     roll, yaw = types.surface[layout.main[ROLL]], types.surface[layout.main[YAW]]
-    roll_alone = can_be_faulty(roll)
-    yaw_alone = can_be_faulty(yaw)
-    both = not roll_alone and not yaw_alone
-    refuted = pair.lateral_outside == 1 or not verdict.left(roll, ALL) or not verdict.left(yaw, ALL)
-    outside = both and refuted
-    open_yet = both and not (verdict.explains_flight(roll) and verdict.explains_flight(yaw))
-    isolates = pair.group_alarm[LATERAL_GROUP] == 1 and not (outside or open_yet)
-    verdict.update_status(roll, isolates and not yaw_alone, verdict.type_on_surface(c, roll), t)
-    verdict.update_status(yaw, isolates and not roll_alone, verdict.type_on_surface(c, yaw), t)
-    return outside
+    both = not can_be_faulty(roll) and not can_be_faulty(yaw)
+    refuted, explained = types.pair.lateral_outside == 1, True
+    for srf in (roll, yaw):
+        refuted = refuted or not verdict.left(srf, ALL)
+        explained = explained and verdict.explains_flight(srf)
+    isolates = types.pair.group_alarm[LATERAL_GROUP] == 1 and not (both and (refuted or not explained))
+    for srf, other in ((roll, yaw), (yaw, roll)):
+        at_fault = isolates and not can_be_faulty(other)
+        verdict.update_status(srf, at_fault, verdict.type_on_surface(types.config, srf), t)
+    return both and refuted
 
 
 @kernel

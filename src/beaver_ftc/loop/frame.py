@@ -463,7 +463,7 @@ def isolated_theta(fdi, s):
     """Estimated theta of the isolated loss of surface s: see conclusion.py."""
     return assessed.isolated_theta(
         fdi.config, fdi.verdict, fdi.layout, fdi.isolation.estimator, fdi.statistical, s
-    )
+    )[0]
 
 
 @kernel
@@ -592,8 +592,8 @@ def record_row(frame, commanded, row):
         record_profile(frame.autopilot, row, column)
     detector = fdi.statistical
     if logged.tests and detector.test.enabled:
-        views = detector.views[: detector.n_views]
-        statistical.write_scores(detector.test, detector.block, views, detector.forces, detector.gust, row)
+        n = detector.test.n_scores
+        row[row.size - n :] = detector.alarm.share[:n]
 
 
 @kernel

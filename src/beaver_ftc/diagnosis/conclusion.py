@@ -74,14 +74,13 @@ def set_isolated(found, j, t):
 
 
 @kernel
-def record_decision(found, given):
+def record_decision(found, finding, lead):
     """Replace isolated fault, type and accommodation by those that the fault types found.
 
-    found: (isolated, isolated_at_s, type, type_at_s, target, accommodation_mode).
+    finding: (isolated, isolated_at_s, type, type_at_s); lead: (target, accommodation_mode).
     """
-    found.isolated_estimator, found.isolated_at_s = (given[0], given[1])
-    found.fault_type, found.typed_at_s = (given[2], given[3])
-    found.target, found.accommodation_mode = (given[4], given[5])
+    found.isolated_estimator, found.isolated_at_s, found.fault_type, found.typed_at_s = finding
+    found.target, found.accommodation_mode = lead
 
 
 @kernel
@@ -191,11 +190,8 @@ def assess_surfaces(out, cfg, found, types, layout, fies, stat):
         elif out.accommodation_mode[s] >= 0:
             assess_surface(out, types, layout, fies, s)
         elif s == at_fault and not all_types:
-            out.effectiveness[s] = 1.0 + isolated_theta(cfg, found, layout, fies, stat, s)
-            out.at_once[s] = (
-                weighs_statistics(stat.test, cfg.authority)
-                and statistical.estimate_loss(stat.block, s)[1] > MIN_INFORMATION
-            )
+            theta, information = isolated_theta(cfg, found, layout, fies, stat, s)
+            out.effectiveness[s], out.at_once[s] = 1.0 + theta, information > MIN_INFORMATION
 
 
 @kernel
@@ -230,10 +226,11 @@ def assess_surface(out, types, layout, fies, s):
 
 @kernel
 def isolated_theta(cfg, found, layout, fies, stat, s):
-    """Estimated theta of the isolated loss of surface s: under noise, the most likely one."""
+    """Estimated theta of the isolated loss of surface s, under noise the most likely one; one over its
+    variance, 0 in the worst case."""
     if weighs_statistics(stat.test, cfg.authority):
-        return statistical.estimate_loss(stat.block, s)[0]
-    return fies[found.isolated_estimator].theta[layout.dominant_axis[s]]
+        return statistical.estimate_loss(stat.block, s)
+    return fies[found.isolated_estimator].theta[layout.dominant_axis[s]], 0.0
 
 
 @kernel

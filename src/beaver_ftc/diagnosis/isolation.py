@@ -41,7 +41,7 @@ Symbols of the kernels:
     e_Gu (3, n) rad/s2            error of that mean if a fault changes within the frame
     phi                           effect of a fault, base + theta Z within +- e (EFFECT_RECORD)
     lo, hi; between               interval of theta, or of a position, rad
-    Om, Om_pos, Om_neg            Omega, and the same of the positive and the negative part of Z
+    Om, Om_pos                    Omega, and the same of the positive part of Z
     e, e_lag rad/s                bound on the filtered uncertainty, and its part with a memory
     th, P                         estimate of theta and its variance
     s, i, j                       surface, axis, estimator
@@ -214,8 +214,8 @@ ESTIMATOR_RECORD = record(
     theta_min=float, theta_max=float,  # the known set of theta
     excluded=int, excluded_at_s=float, pending=int, skip=(int, 3), xhat=3, residual=3, mu_lo=3, mu_hi=3,
     confirmed=int, weak=int, unlikely=int,  # by likelihood ratios
-    # Omega, and the same of the positive and the negative part of Z
-    Om=3, Om_pos=3, Om_neg=3, e=3, e_lag=3, theta=3, P=3, effect=EFFECT_RECORD,
+    # Omega, and the same of the positive part of Z
+    Om=3, Om_pos=3, e=3, e_lag=3, theta=3, P=3, effect=EFFECT_RECORD,
     mean_effect=EFFECT_RECORD,
     # that the surface can have had: rad; share of its travel
     u_far=float, share_far=float,
@@ -336,7 +336,7 @@ def update_residual(fie, kind, x):
         fie.residual[i] = x[i] - fie.xhat[i]
         lo, hi, Om, th, e = fie.theta_min, fie.theta_max, fie.Om[i], fie.theta[i], fie.e[i]
         if kind == INTERVAL_THRESHOLD:
-            mu = residual_interval(lo, hi, fie.Om_pos[i], fie.Om_neg[i], Om, th, e)
+            mu = residual_interval(lo, hi, fie.Om_pos[i], Om - fie.Om_pos[i], Om, th, e)
         elif kind == CONSTANT_THRESHOLD:
             mu = -e, e
         else:
@@ -429,7 +429,7 @@ def advance_estimator(iso, fie, bound, x, F, dt):
     """Advance one estimator by a frame: estimate, predicted rates, and filtered Z and bounds.
 
         xhat <- x + dt (F + base + Z th) + a (xhat - x) + Om[k+1] (step of th)
-        Om <- a Om + dt Z      Om_pos <- a Om_pos + dt max(Z, 0)      Om_neg <- a Om_neg + dt min(Z, 0)
+        Om <- a Om + dt Z      Om_pos <- a Om_pos + dt max(Z, 0)
         th <- P{th + dt gain Om eps} by gradient [Zhang2005, sec. IV], or by least squares
 
     x: at the start of the frame, as the residual eps; fie.effect must be that of this frame.
@@ -449,7 +449,6 @@ def advance_estimator(iso, fie, bound, x, F, dt):
             step = least_squares_step(fie, i, fie.residual[i], cfg.forget)
         fie.Om[i] = a * fie.Om[i] + dt * Z
         fie.Om_pos[i] = a * fie.Om_pos[i] + dt * max(Z, 0.0)
-        fie.Om_neg[i] = a * fie.Om_neg[i] + dt * min(Z, 0.0)
         fie.xhat[i] += fie.Om[i] * step
         fie.e_lag[i] = advance_bound(fie.e_lag[i], bound.eta_bar[i] + phi.e[i], a, dt, bound.n_old[i])
         fie.e[i] = fie.e_lag[i] + bound.n_gyro[i]

@@ -1,6 +1,6 @@
 """Records that several stages of the diagnosis share, and the numbers that stand for names.
 
-The number of a scheme is the place of its kernels in SCHEME_KERNEL_PATHS, which plugins.yaml lists.
+The number of a scheme decides which kernels fly: schemes/__init__.py.
 """
 
 from collections.abc import Sequence
@@ -10,7 +10,6 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft, main_surface_index_by_axis
 from beaver_ftc.compiled import record, sized
-from beaver_ftc.plugins import DETECTORS, compiled_rows
 from beaver_ftc.scenario.declared import Declared
 
 NOT_ISOLATED, UNANTICIPATED = -1, -2
@@ -22,6 +21,9 @@ AUTHORITIES = {
     "worst-case": WORST_CASE_DETECTOR,
     "statistical": STATISTICAL_DETECTOR,
 }
+# Schemes: ours, the published one, none; and that of a plug-in, whose verdict replaces ours.
+ADAPTIVE_SCHEME, PUBLISHED_SCHEME, NO_SCHEME, PLUGIN_SCHEME = range(4)
+_SCHEMES = {"adaptive-estimators": ADAPTIVE_SCHEME, "zhang2005": PUBLISHED_SCHEME, "none": NO_SCHEME}
 LOSS, POSITION_HYPOTHESIS = 0, 1  # kinds of hypothesis: isolation.py
 PITCH_GROUP, LATERAL_GROUP = 0, 1  # groups of surfaces
 ROLL, PITCH, YAW, SIDE_FORCE, NORMAL_FORCE = range(5)  # axes, and components of the force: forces.py
@@ -85,14 +87,6 @@ def configure_layout(layout: np.void, rows: Sequence[tuple[str, int, int]], airc
         layout["loss" if kind == LOSS else "position"][s] = j
 
 
-_COMPILED = compiled_rows(DETECTORS)
-_PLUGIN_PATH = f"{__package__}.schemes.adaptive_estimators:PYTHON_PLUGIN"  # of every Python plug-in
-SCHEME_KERNEL_PATHS = (*dict.fromkeys(row["kernels"] for row in _COMPILED.values()), _PLUGIN_PATH)
-PLUGIN_SCHEME_NUMBER = SCHEME_KERNEL_PATHS.index(_PLUGIN_PATH)
-
-
 def scheme_number(name: str) -> int:
-    """Index of the path of a scheme's kernels in SCHEME_KERNEL_PATHS."""
-    return (
-        SCHEME_KERNEL_PATHS.index(_COMPILED[name]["kernels"]) if name in _COMPILED else PLUGIN_SCHEME_NUMBER
-    )
+    """The number of a scheme by its name in plugins.yaml; of every Python plug-in PLUGIN_SCHEME."""
+    return _SCHEMES.get(name, PLUGIN_SCHEME)

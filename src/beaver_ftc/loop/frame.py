@@ -51,7 +51,7 @@ from beaver_ftc.diagnosis.model_prediction import (
 )
 from beaver_ftc.diagnosis.monitors import redundancy, sensor_monitor
 from beaver_ftc.diagnosis.schemes import detection_share, record_isolated_surfaces
-from beaver_ftc.diagnosis.state import PITCH, PLUGIN_SCHEME_NUMBER
+from beaver_ftc.diagnosis.state import PITCH, PLUGIN_SCHEME
 from beaver_ftc.diagnosis.types import verdict
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.sensing import (
@@ -420,20 +420,19 @@ def diagnose(frame):
     The faults that the law already takes into account are expected: they are no innovation.
     """
     fdi, prediction, measured, k = frame.fdi, frame.prediction, frame.measured, frame.k - frame.since
-    scheme = fdi.config.scheme_number
     diagnoses_all_types = fdi.config.diagnoses_all_types
     applied = frame.control.surfaces.output
     monitors.disable_if_apart(fdi.engine_monitor, frame.control.power.output.command[1:])
     if k == 0:
-        schemes.begin_scheme(scheme, fdi, prediction, measured)
+        schemes.begin_scheme(fdi, prediction, measured)
     else:
         predict_known(
             prediction, fdi.verdict.detected, applied.effectiveness, applied.offset, diagnoses_all_types
         )
-        schemes.advance_estimators_to_frame(scheme, fdi, prediction, measured, k, frame.t)
-    schemes.update_verdict(scheme, fdi, prediction, measured, frame.t)
+        schemes.advance_estimators_to_frame(fdi, prediction, measured, k, frame.t)
+    schemes.update_verdict(fdi, prediction, measured, frame.t)
     record_isolated_surfaces(fdi, frame.t)
-    schemes.prepare_next_frame(scheme, fdi, prediction, measured, k)
+    schemes.prepare_next_frame(fdi, prediction, measured, k)
     begin_sums(prediction, fdi.bound, fdi.layout, diagnoses_all_types, measured)
     follow_guarantee(frame.accounts.guarantee, fdi.bank, fdi.config.dt, prediction.w, k, frame.t)
     assess_faults(frame)
@@ -455,7 +454,7 @@ def assess_faults(frame):
 def accumulate_instant(frame):
     """Take in an instant inside a frame: what is believed of it, and the gust that the vanes see by then."""
     fdi = frame.fdi
-    schemes.accumulate_substep(fdi.config.scheme_number, fdi, frame.prediction, frame.measured)
+    schemes.accumulate_substep(fdi, frame.prediction, frame.measured)
     add_instant(frame.prediction, fdi.bound, fdi.layout, fdi.config.diagnoses_all_types, frame.measured)
 
 
@@ -464,7 +463,7 @@ def isolated_theta(fdi, s):
     """Estimated theta of the isolated loss of surface s: see conclusion.py."""
     return assessed.isolated_theta(
         fdi.config, fdi.verdict, fdi.layout, fdi.isolation.estimator, fdi.statistical, s
-    )
+    )[0]
 
 
 @kernel
@@ -531,7 +530,7 @@ def fly_profile(frame, commanded):
 def note_beyond_threshold(accounts, fdi, t):
     """Note that a detector is beyond its threshold at t s. A plug-in says so itself."""
     monitor, detector, authority = fdi.sensor_monitor, fdi.statistical, fdi.config.authority
-    if fdi.config.scheme_number == PLUGIN_SCHEME_NUMBER:
+    if fdi.config.scheme_number == PLUGIN_SCHEME:
         is_beyond = fdi.plugin_verdict.detected == 1
     else:
         uses_statistics = weighs_statistics(detector.test, authority)
@@ -593,8 +592,8 @@ def record_row(frame, commanded, row):
         record_profile(frame.autopilot, row, column)
     detector = fdi.statistical
     if logged.tests and detector.test.enabled:
-        views = detector.views[: detector.n_views]
-        statistical.write_scores(detector.test, detector.block, views, detector.forces, detector.gust, row)
+        n = detector.test.n_scores
+        row[row.size - n :] = detector.alarm.share[:n]
 
 
 @kernel

@@ -3,7 +3,7 @@
     begin -> diagnose -> decide -> command | take_command -> finish
 
 are the stages of frame.py; left of the bar: built in, right of it: a plug-in's answer. A plug-in's verdict is
-taken by `diagnose` (adaptive_estimators.PYTHON_PLUGIN).
+taken by `diagnose` (adaptive_estimators.plugin_update).
 """
 
 from collections.abc import Callable, Mapping
@@ -20,7 +20,7 @@ from beaver_ftc.diagnosis import Detector, Measured, Verdict
 from beaver_ftc.diagnosis.bounds import plugin_errors
 from beaver_ftc.diagnosis.state import (
     NOT_ISOLATED,
-    PLUGIN_SCHEME_NUMBER,
+    PLUGIN_SCHEME,
     UNANTICIPATED,
     WORST_CASE_DETECTOR,
 )
@@ -266,7 +266,7 @@ def plugged(
             "n_estimators"
         ] = 0
         fdi["statistical"]["test"]["enabled"] = fdi["sensor_monitor"]["config"]["enabled"] = 0
-        fdi["config"]["scheme_number"], fdi["config"]["variant"] = PLUGIN_SCHEME_NUMBER, WORST_CASE_DETECTOR
+        fdi["config"]["scheme_number"], fdi["config"]["variant"] = PLUGIN_SCHEME, WORST_CASE_DETECTOR
         fdi["types"]["pair"]["enabled"] = 0
         n = fdi["types"]["surface"].size
         fdi["isolation"]["estimator"]["surface"][:n] = range(n)

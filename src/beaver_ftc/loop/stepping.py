@@ -22,9 +22,8 @@ from beaver_ftc.control import CompiledLaw, accommodation, allocation, laws
 from beaver_ftc.control.state import in_charge
 from beaver_ftc.diagnosis.conclusion import weighs_statistics
 from beaver_ftc.diagnosis.model_prediction import redo_move
-from beaver_ftc.diagnosis.schemes import SCHEMES, adaptive_estimators
 from beaver_ftc.diagnosis.schemes import detection_share as largest_statistic
-from beaver_ftc.diagnosis.state import WORST_CASE_DETECTOR
+from beaver_ftc.diagnosis.schemes import kernels_of_scheme
 from beaver_ftc.loop import frame as whole
 from beaver_ftc.loop.frame import add_effect
 from beaver_ftc.plant.channels import advance
@@ -168,29 +167,7 @@ def kernels_flown(frames: np.ndarray, arrays: tuple[np.ndarray, ...]) -> Iterato
 
 def _of_the_diagnosis(frame: np.void) -> Iterator[Any]:
     fdi = frame["fdi"]
-    scheme = SCHEMES[fdi["config"]["scheme_number"]]
-    yield from (
-        scheme.begin_scheme,
-        scheme.advance_estimators_to_frame,
-        scheme.update_verdict,
-        scheme.prepare_next_frame,
-    )
-    if scheme.advance_estimators_to_frame is adaptive_estimators.advance_estimators_to_frame:
-        weigh = adaptive_estimators.weigh_loss
-        if fdi["config"]["diagnoses_all_types"]:
-            weigh = adaptive_estimators.weigh_position
-            yield from (
-                adaptive_estimators.begin_types,
-                adaptive_estimators.record_orders,
-                adaptive_estimators.decide_type,
-            )
-        if fdi["config"]["variant"] != WORST_CASE_DETECTOR:
-            yield weigh
-        if fdi["statistical"]["test"]["enabled"]:
-            yield from (
-                adaptive_estimators.update_tests,
-                adaptive_estimators.prepare_gusts,
-            )
+    yield from kernels_of_scheme(fdi)
     if fdi["sensor_monitor"]["config"]["enabled"]:
         yield whole.monitor_sensors
 

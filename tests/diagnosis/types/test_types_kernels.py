@@ -105,10 +105,8 @@ def test_a_growing_bias_keeps_its_sign_and_never_shrinks(offsets, excluded):
 def test_a_growing_bias_is_as_fast_as_a_runaway_only_where_that_is_certain(places, ran):
     fdi, surface = new_surface(runaway=0.05 / DT)
     for place in places:
-        on(commanded_surface.widen_offset, fdi, surface, GROWING_BIAS)
-        if place == "well":
-            on(commanded_surface.forget_growing, fdi, surface, GROWING_BIAS)
-        elif place is not None:
+        on(commanded_surface.widen_offset, fdi, surface, GROWING_BIAS, 5, place == "well")
+        if place not in (None, "well"):
             surface["judged"]["lo"], surface["judged"]["hi"] = (
                 place - 0.01,
                 min(place + 0.01, HIGH),
@@ -180,7 +178,7 @@ def swung(signs, half_frames=20):
             0.1 * sign - 0.02,
             0.1 * sign + 0.02,
         )
-        on(commanded_surface.add_square, fdi, surface, OSCILLATORY)
+        on(commanded_surface.add_square, fdi, surface, OSCILLATORY, frame, False)
         judged(
             commanded_surface.update_swing,
             fdi,
@@ -210,7 +208,7 @@ def test_a_runaway_has_gone_at_least_its_way(length, ways):
     fdi["types"]["config"]["frames_per_block"] = length
 
     def between(kind, frame):
-        return on(registry.deflection_range, fdi, surface, kind, frame)
+        return registry.deflection_range(fdi["types"]["config"], surface, kind, frame)
 
     for frame, way in zip((3, 4, 8), ways, strict=True):
         assert between(UP, frame) == pytest.approx((0.1 + way, HIGH))

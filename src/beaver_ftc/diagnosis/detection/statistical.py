@@ -29,6 +29,7 @@ from sys import float_info
 import numpy as np
 
 from beaver_ftc.aircraft import AXES, Aircraft, MassProperties
+from beaver_ftc.aircraft.schema import MAX_SURFACES
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.design import rotation_lengths
 from beaver_ftc.design.model import (
@@ -384,8 +385,8 @@ TESTING_RECORD = record(
 )  # fmt: skip
 
 # Output of the detector: largest score over the alarm level and its axis; the largest so far in healthy
-# flight; time of the first alarm, s, or -1.
-ALARM_RECORD = record(ratio=float, axis=int, peak=float, detected_at_s=float)
+# flight; time of the first alarm, s, or -1. share: n_scores of the log, of losses, then of steps.
+ALARM_RECORD = record(ratio=float, axis=int, peak=float, detected_at_s=float, share=MAX_SURFACES + len(AXES))
 
 
 @sized
@@ -447,19 +448,21 @@ def fill_unmodelled(blocks, gust, out):
 
 @kernel
 def update_alarm(alarm, cfg, blocks, views, forces, gust, t, bounded=True):
-    """Fill the largest score over the alarm level, its axis, and at the first alarm its time t s.
+    """Fill the scores over the alarm level, the largest, its axis, and at the first alarm its time t s.
 
-    The score is 0 unless `bounded`: outside its map, the model's error has no bound.
+    Scores of forces and of oscillations are in the column of the step on their axis. The largest is 0 unless
+    `bounded`: outside its map, the model's error has no bound.
     """
-    alarm.ratio = 0.0
-    if not bounded:
-        return
+    alarm.ratio, alarm.share[:] = 0.0, 0.0
     for b in blocks:
         for h in b.hypothesis[: b.n_h]:
             if h.alarms:
-                keep_score(alarm, cfg.alarm_level, h.score, h.axis)
+                keep_score(alarm, h.score / cfg.alarm_level, h.axis, h.column)
     for v in views:
-        keep_score(alarm, cfg.alarm_level, parity.view_alarm_score(v, views, cfg, forces, gust), v.alarm_axis)
+        share = parity.view_alarm_score(v, views, cfg, forces, gust) / cfg.alarm_level
+        keep_score(alarm, share, v.alarm_axis, cfg.n_scores - 3 + v.alarm_axis)
+    if not bounded:
+        alarm.ratio = 0.0
     if alarm.ratio > 1.0 and alarm.detected_at_s < 0.0:
         alarm.detected_at_s = t
 
@@ -471,29 +474,11 @@ def keep_score_peak(alarm):
 
 
 @kernel
-def keep_score(alarm, level, score, axis):
-    """Keep a score, standard deviations, if its ratio to the alarm level is the largest."""
-    ratio = score / level
-    if ratio > alarm.ratio:
-        alarm.ratio, alarm.axis = ratio, axis
-
-
-@kernel
-def write_scores(cfg, blocks, views, forces, gust, row):
-    """Write the last columns of a log row: scores over the alarm level, first of losses, then of steps.
-
-    Scores of forces and of oscillations are in the column of the step on their axis.
-    """
-    first = row.size - cfg.n_scores
-    row[first:] = 0.0
-    for b in blocks:
-        for h in b.hypothesis[: b.n_h]:
-            if h.alarms:
-                col = first + h.column
-                row[col] = max(row[col], h.score / cfg.alarm_level)
-    for v in views:
-        col = row.size - 3 + v.alarm_axis
-        row[col] = max(row[col], parity.view_alarm_score(v, views, cfg, forces, gust) / cfg.alarm_level)
+def keep_score(alarm, share, axis, column):
+    """Keep a score over the alarm level in its column, and with its axis if it is the largest of all."""
+    alarm.share[column] = max(alarm.share[column], share)
+    if share > alarm.ratio:
+        alarm.ratio, alarm.axis = share, axis
 
 
 @kernel
@@ -514,13 +499,14 @@ def best_alternative(b, fies, of, s, revived=False):
 
 
 @kernel
-def loss_bound(b, s, ended):
-    """max_h hi_h over the losses of surface s in block b, or, if `ended`, over their ends; 0 without any."""
-    hi = 0.0
+def loss_bounds(b, s, ended):
+    """max_h (lo_h, hi_h) over the losses of surface s in block b, or, if `ended`, over their ends; 0 without
+    any."""
+    lo, hi = 0.0, 0.0
     for h in b.hypothesis[: b.n_h]:
         if h.surface == s and (h.kind == LOSS_END) == ended:
-            hi = max(hi, h.llr_hi)
-    return hi
+            lo, hi = max(lo, h.llr_lo), max(hi, h.llr_hi)
+    return lo, hi
 
 
 @kernel
@@ -533,11 +519,7 @@ def confirms_loss(cfg, blocks, fies, of, s):
     """
     revived = of[s] >= 0 and fies[of[s]].weak == DAMAGE_EXCLUDES
     for b in blocks:
-        lo = 0.0
-        for h in b.hypothesis[: b.n_h]:
-            if h.surface == s and h.kind in (LOSS, GROWING_LOSS):
-                lo = max(lo, h.llr_lo)
-        if lo - best_alternative(b, fies, of, s, revived) > cfg.margin:
+        if loss_bounds(b, s, False)[0] - best_alternative(b, fies, of, s, revived) > cfg.margin:
             return True
     return False
 
@@ -561,10 +543,10 @@ def excludes_loss(cfg, blocks, fies, of, s, pitch_ends, abrupt):
     for b in blocks[LATERAL_BLOCK:]:
         best = best_alternative(pitch, fies, of, s)
         best = max(best, best_alternative(b, fies, of, s))
-        hi = max(loss_bound(pitch, s, False), loss_bound(b, s, False))
-        hi_end = loss_bound(b, s, True)
+        hi = max(loss_bounds(pitch, s, False)[1], loss_bounds(b, s, False)[1])
+        hi_end = loss_bounds(b, s, True)[1]
         if pitch_ends:
-            hi_end = max(hi_end, loss_bound(pitch, s, True))
+            hi_end = max(hi_end, loss_bounds(pitch, s, True)[1])
         low = hi < share * best and hi_end < end_share * best
         if low and best - max(hi, hi_end) > cfg.margin:
             return True

@@ -1,17 +1,18 @@
 """The diagnosis as a whole: its record, its configuration, and the kernels of the scheme in charge.
 
 `begin_scheme`, `advance_estimators_to_frame`, `update_verdict`, `prepare_next_frame` and
-`accumulate_substep` call the kernel of a scheme by its number (adaptive_estimators.CompiledScheme;
-state.SCHEME_KERNEL_PATHS). The frame (loop/frame.py) calls them.
+`accumulate_substep` say which kernels fly for which scheme, in the order in which the frame (loop/frame.py)
+calls them. prediction, measured: the records of the prediction and the sensors.
 
 fdi: of `fdi_dtype`; t s.
 """
 
-from importlib import import_module
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel, one_of, record, sized
+from beaver_ftc.compiled import apart, kernel, record, sized
 from beaver_ftc.diagnosis import bounds, isolation, monitors, state
 from beaver_ftc.diagnosis import conclusion as conclusions
 from beaver_ftc.diagnosis.bounds import bound_dtype
@@ -21,8 +22,14 @@ from beaver_ftc.diagnosis.detection.parity import USUAL_SIZE, StatisticalSize
 from beaver_ftc.diagnosis.monitors import sensor_monitor
 from beaver_ftc.diagnosis.monitors.redundancy import SENSOR_MONITOR_RECORD
 from beaver_ftc.diagnosis.schemes import adaptive_estimators, published
-from beaver_ftc.diagnosis.schemes.adaptive_estimators import CompiledScheme
-from beaver_ftc.diagnosis.state import PLUGIN_SCHEME_NUMBER, SCHEME_KERNEL_PATHS, STATISTICAL_DETECTOR
+from beaver_ftc.diagnosis.state import (
+    ADAPTIVE_SCHEME,
+    NO_SCHEME,
+    PLUGIN_SCHEME,
+    PUBLISHED_SCHEME,
+    STATISTICAL_DETECTOR,
+    WORST_CASE_DETECTOR,
+)
 from beaver_ftc.diagnosis.types import registry
 from beaver_ftc.diagnosis.types.registry import SAME_NAME
 from beaver_ftc.diagnosis.types.verdict import DEDUCED_FAULTY, TYPE_UNDECIDED, name_remains
@@ -103,7 +110,7 @@ def record_isolated_surfaces(fdi, t):
         refuted = s == fdi.types.pair.first_pitch and surf.status.basis == DEDUCED_FAULTY
         named = found.isolated_type[s] if isolated else TYPE_UNDECIDED
         reason = conclusions.reason_of_withdrawal(
-            fdi.config.scheme_number == PLUGIN_SCHEME_NUMBER,
+            fdi.config.scheme_number == PLUGIN_SCHEME,
             void,
             j >= 0 and fies[j].excluded,
             not all_types or (name_remains(surf, named) and not refuted),
@@ -128,15 +135,63 @@ def detection_share(bank, alarm, authority, likely):
     return max(score, share) if share > 1.0 or not likely else score
 
 
-def _load_scheme(path: str) -> CompiledScheme:
-    """The scheme at `module` or `module:NAME`; without a name SCHEME."""
-    module, _, name = path.partition(":")
-    scheme: CompiledScheme = getattr(import_module(module), name or "SCHEME")
-    return scheme
+@apart
+def begin_scheme(fdi, prediction, measured):
+    """Begin the detection filters at the first frame, all of the gyros' errors to come; fix the parity
+    direction of each fault."""
+    filters.start(fdi.bank, fdi.fdae, measured.x, fdi.bound.n_gyro)
+    filters.set_directions(fdi.isolation, prediction.G)
 
 
-SCHEMES = tuple(map(_load_scheme, SCHEME_KERNEL_PATHS))
+@kernel
+def advance_estimators_to_frame(fdi, prediction, measured, k, t):
+    """Bring the estimators from the frame before to frame k at t s."""
+    scheme = fdi.config.scheme_number
+    if scheme == PUBLISHED_SCHEME:
+        published.advance_estimators_to_frame(fdi, prediction, measured)
+    elif scheme != NO_SCHEME:
+        adaptive_estimators.advance_estimators_to_frame(fdi, prediction, measured, k, t)
 
-begin_scheme, advance_estimators_to_frame, update_verdict, prepare_next_frame, accumulate_substep = map(
-    one_of, zip(*SCHEMES, strict=True)
-)
+
+@kernel
+def update_verdict(fdi, prediction, measured, t):
+    """From residuals to the alarm, and from then on to a verdict, at t s."""
+    scheme = fdi.config.scheme_number
+    if scheme == ADAPTIVE_SCHEME:
+        adaptive_estimators.update_verdict(fdi, prediction, measured, t)
+    elif scheme == PUBLISHED_SCHEME:
+        published.update_verdict(fdi, prediction, measured, t)
+    elif scheme == PLUGIN_SCHEME:
+        adaptive_estimators.plugin_update(fdi, measured, t)
+
+
+@kernel
+def prepare_next_frame(fdi, prediction, measured, k):
+    """Prepare the statistical detector for the frame after frame k."""
+    if fdi.statistical.test.enabled and fdi.config.scheme_number != NO_SCHEME:
+        adaptive_estimators.prepare_gusts(fdi, prediction, measured, k)
+
+
+@kernel
+def accumulate_substep(fdi, prediction, measured):
+    """Add one JSBSim frame inside the next frame."""
+    if fdi.statistical.test.enabled and fdi.config.scheme_number != NO_SCHEME:
+        adaptive_estimators.add_gust_instant(fdi, prediction, measured)
+
+
+def kernels_of_scheme(fdi: np.void) -> Iterator[Any]:
+    """The kernels that a flight compiles apart, of its scheme."""
+    cfg = fdi["config"]
+    scheme, ours = cfg["scheme_number"], adaptive_estimators
+    yield begin_scheme
+    if scheme == PUBLISHED_SCHEME:
+        yield from (published.advance_estimators_to_frame, published.update_verdict)
+    elif scheme != NO_SCHEME:
+        yield ours.advance_estimators_to_frame
+        yield ours.plugin_update if scheme == PLUGIN_SCHEME else ours.update_verdict
+        if cfg["diagnoses_all_types"]:
+            yield from (ours.begin_types, ours.record_orders, ours.decide_type)
+        if cfg["variant"] != WORST_CASE_DETECTOR:
+            yield ours.weigh_position if cfg["diagnoses_all_types"] else ours.weigh_loss
+        if fdi["statistical"]["test"]["enabled"]:
+            yield from (ours.update_tests, ours.prepare_gusts)

@@ -1,9 +1,7 @@
-"""Compiled schemes: their contract with the frame, our scheme, and those of a plug-in and of no diagnosis.
+"""Our scheme: it detects by the bank of filters and the statistical detector, and isolates by fault class.
 
-Our scheme (SCHEME) detects by the bank of filters and the statistical detector, and isolates by fault class.
 The acceleration by known faults is part of the prediction, so the estimator of the unknown explains the rest.
-A Python plug-in has a scheme of its own (PYTHON_PLUGIN): its verdict replaces ours, and our estimators run
-on, because the laws use them. The scheme `none` (NO_DIAGNOSIS) only begins the detection filters.
+The verdict of a Python plug-in replaces ours; our estimators run on, because the laws use them.
 
 The isolation depends on the fault class, and on the detectors whose exclusions count (`variant`):
 
@@ -11,9 +9,6 @@ The isolation depends on the fault class, and on the detectors whose exclusions 
     published    worst case, likelihoods, or either  the estimator that is left: a loss of one surface
     all          worst case, or parity views as well  the type of a fault on each surface, alone or in pairs
 """
-
-from collections.abc import Callable
-from typing import NamedTuple
 
 from beaver_ftc.compiled import apart, kernel
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, unanticipated_pitch
@@ -32,53 +27,6 @@ from beaver_ftc.diagnosis.state import (
 )
 from beaver_ftc.diagnosis.types import pairs, registry, verdict
 from beaver_ftc.scenario.diagnosis import FdiConfig
-
-
-class CompiledScheme(NamedTuple):
-    """Lazy kernels (compiled.py), called with `fdi` (`fdi_dtype`), and `prediction` and `measured`, the
-    records of the prediction and the sensors: the names of arguments are those of the frame's parts
-    (loop/stepping.py). A row of plugins.yaml names the scheme: `module`, whose SCHEME it is, or
-    `module:NAME`.
-
-    begin_scheme(fdi, prediction, measured): start the estimators at the first frame.
-    advance_estimators_to_frame(fdi, prediction, measured, k, t): bring the estimators from the frame before
-    to frame k at t s.
-    update_verdict(fdi, prediction, measured, t): from residuals to the alarm, and from then on to a verdict.
-    prepare_next_frame(fdi, prediction, measured, k): prepare the estimators for the next frame.
-    accumulate_substep(fdi, prediction, measured): add one JSBSim frame inside the next frame.
-    """
-
-    begin_scheme: Callable[..., None]
-    advance_estimators_to_frame: Callable[..., None]
-    update_verdict: Callable[..., None]
-    prepare_next_frame: Callable[..., None]
-    accumulate_substep: Callable[..., None]
-
-
-@apart
-def skip_advance(fdi, prediction, measured, k, t):
-    """The `advance_estimators_to_frame` of a scheme without estimators."""
-
-
-@apart
-def skip_verdict(fdi, prediction, measured, t):
-    """The `update_verdict` of a scheme without a verdict."""
-
-
-@apart
-def skip_prepare(fdi, prediction, measured, k):
-    """The `prepare_next_frame` of a scheme whose estimators need nothing but the means over the frame."""
-
-
-@apart
-def skip_substep(fdi, prediction, measured):
-    """The `accumulate_substep` of such a scheme."""
-
-
-@kernel
-def start_filters(fdi, x):
-    """Begin the detection filters at the first measurement x (3,), all of the gyros' errors to come."""
-    filters.start(fdi.bank, fdi.fdae, x, fdi.bound.n_gyro)
 
 
 @kernel
@@ -101,17 +49,6 @@ def update_estimators(fdi, pred):
     isolation.update_effects(iso, fdi.bank, bound, cfg, detected, means.G, means.Gu, means.e_Gu)
     if detected and not sensor_monitor.has_alarm(fdi.sensor_monitor):
         isolation.advance_estimators(iso, bound, pred.x_before, means.F, cfg.dt)
-
-
-@apart
-def begin_filters(fdi, prediction, measured):
-    """Begin the detection filters, which the log records (CompiledScheme)."""
-    start_filters(fdi, measured.x)
-
-
-NO_DIAGNOSIS = CompiledScheme(
-    begin_filters, skip_advance, skip_verdict, skip_prepare, skip_substep
-)  # fmt: skip
 
 
 @kernel
@@ -217,9 +154,10 @@ def decide_type(fdi, t, started):
     if sensor_monitor.doubts_gyros(fdi.sensor_monitor):
         return
     if in_pairs:
-        conclusion.record_decision(found, pairs.decide_pairs(types, found, layout, t))
+        finding = pairs.decide_pairs(types, found, layout, t)
     else:
-        conclusion.record_decision(found, verdict.decide_single(types, found, layout, fies, t))
+        finding = verdict.decide_single(types, found, layout, t)
+    conclusion.record_decision(found, finding, verdict.accommodate(types, layout))
 
 
 @apart
@@ -340,15 +278,8 @@ def gust_of_views(stat):
 
 
 @apart
-def begin_scheme(fdi, prediction, measured):
-    """Begin the filters, and fix the parity direction of each fault (CompiledScheme)."""
-    start_filters(fdi, measured.x)
-    filters.set_directions(fdi.isolation, prediction.G)
-
-
-@apart
 def advance_estimators_to_frame(fdi, prediction, measured, k, t):
-    """Bring bank, likelihoods, isolation and FDAE to this frame (CompiledScheme)."""
+    """Bring bank, likelihoods, isolation and FDAE to this frame."""
     found, bound, dt = fdi.verdict, fdi.bound, fdi.config.dt
     update_filters(fdi, prediction, measured)
     if fdi.statistical.test.enabled:
@@ -362,7 +293,7 @@ def advance_estimators_to_frame(fdi, prediction, measured, k, t):
 
 @apart
 def update_verdict(fdi, prediction, measured, t):
-    """From residuals to the alarm and a verdict, unless a sensor is at fault (CompiledScheme)."""
+    """From residuals to the alarm and a verdict, unless a sensor is at fault."""
     if sensor_monitor.has_alarm(fdi.sensor_monitor):
         return
     before, found = fdi.verdict.detected, fdi.verdict
@@ -388,35 +319,11 @@ def find_alarm_axis(fdi, y, t):
 
 
 @apart
-def prepare_next_frame(fdi, prediction, measured, k):
-    """Prepare the statistical detector, where it is declared (CompiledScheme)."""
-    if fdi.statistical.test.enabled:
-        prepare_gusts(fdi, prediction, measured, k)
-
-
-@apart
-def accumulate_substep(fdi, prediction, measured):
-    """The same for an instant inside the frame (CompiledScheme)."""
-    if fdi.statistical.test.enabled:
-        add_gust_instant(fdi, prediction, measured)
-
-
-SCHEME = CompiledScheme(
-    begin_scheme, advance_estimators_to_frame, update_verdict, prepare_next_frame, accumulate_substep
-)
-
-
-@apart
-def plugin_update(fdi, prediction, measured, t):
-    """Take the plug-in's verdict, fdi.plugin_verdict (CompiledScheme)."""
+def plugin_update(fdi, measured, t):
+    """Take the plug-in's verdict, fdi.plugin_verdict."""
     filters.fdae_residual(fdi.fdae, measured.x)
     conclusion.record_plugin_verdict(fdi.verdict, fdi.plugin_verdict, t)
     if fdi.verdict.isolated_estimator >= 0:
         fdi.isolation.estimator[fdi.verdict.isolated_estimator].theta[:] = fdi.plugin_verdict.theta
     if fdi.verdict.detected:
         filters.evaluate_network(fdi.fdae.network, measured.y[ALPHA], measured.y[BETA])
-
-
-PYTHON_PLUGIN = CompiledScheme(
-    begin_filters, advance_estimators_to_frame, plugin_update, prepare_next_frame, accumulate_substep
-)

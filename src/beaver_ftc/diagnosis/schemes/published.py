@@ -25,7 +25,6 @@ from beaver_ftc.diagnosis.detection import filters
 from beaver_ftc.diagnosis.detection.filters import fill_gaussians, train
 from beaver_ftc.diagnosis.monitors import sensor_monitor
 from beaver_ftc.diagnosis.schemes import adaptive_estimators
-from beaver_ftc.diagnosis.schemes.adaptive_estimators import CompiledScheme, begin_scheme
 from beaver_ftc.diagnosis.state import CONSTANT_THRESHOLD, PITCH
 from beaver_ftc.plugins import DETECTORS, settings
 from beaver_ftc.scenario.declared import Declared
@@ -144,8 +143,8 @@ def fdae_axis(fdae):
 
 
 @apart
-def advance_estimators_to_frame(fdi, prediction, measured, k, t):
-    """Bring isolation, FDAE and its network to this frame (adaptive_estimators.CompiledScheme)."""
+def advance_estimators_to_frame(fdi, prediction, measured):
+    """Bring isolation, FDAE and its network to this frame."""
     pub, dt, mu = fdi.published, fdi.config.dt, fdi.published.config.mu0
     adaptive_estimators.update_filters(fdi, prediction, measured)
     adaptive_estimators.update_estimators(fdi, prediction)
@@ -159,7 +158,7 @@ def advance_estimators_to_frame(fdi, prediction, measured, k, t):
 
 @apart
 def update_verdict(fdi, prediction, measured, t):
-    """Raise the alarm by the FDAE, evaluate its network, and isolate (adaptive_estimators.CompiledScheme)."""
+    """Raise the alarm by the FDAE, evaluate its network, and isolate."""
     if sensor_monitor.has_alarm(fdi.sensor_monitor):
         return
     before, found, net = fdi.verdict.detected, fdi.verdict, fdi.published.network
@@ -171,12 +170,3 @@ def update_verdict(fdi, prediction, measured, t):
         conclusion.latch_alarm(found, axis, t)
     if found.detected:
         adaptive_estimators.continue_isolation(fdi, measured, t, before)
-
-
-SCHEME = CompiledScheme(
-    begin_scheme,
-    advance_estimators_to_frame,
-    update_verdict,
-    adaptive_estimators.skip_prepare,
-    adaptive_estimators.skip_substep,
-)

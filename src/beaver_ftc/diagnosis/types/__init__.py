@@ -110,10 +110,8 @@ class FaultType:
     memory_dtype, memory_record_name
                             a record of its own, found at `srf.<memory_record_name>`
     reset_memory(srf, h)    its memory is reset: nothing is known yet
-    before_judging_frame(c, srf, h)
-                            called for every frame, before it is judged
-    on_skipped_frame(c, srf, h, k)
-                            called for a frame that is not judged
+    see_frame(c, srf, h, k, skipped)
+                            called for every frame, before it is judged; skipped: it is not judged
 
     The evidence that a verdict needs:
 
@@ -172,8 +170,7 @@ class FaultType:
     memory_dtype: np.dtype | None = None
     memory_record_name: str = ""
     reset_memory: Kernel | None = None
-    before_judging_frame: Kernel | None = None
-    on_skipped_frame: Kernel | None = None
+    see_frame: Kernel | None = None
     deflection_range: Kernel = reachable_range
     holds_surface: bool = False
     has_shown: Kernel | None = None

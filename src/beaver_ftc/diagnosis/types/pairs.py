@@ -22,8 +22,6 @@ from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.state import LATERAL_GROUP, PITCH, PITCH_GROUP, ROLL, UNANTICIPATED, YAW
 from beaver_ftc.diagnosis.types import (
     GIVE_UP,
-    SCALE_COMMAND,
-    SUBTRACT_OFFSET,
     forget_anomalies,
     last_error,
     observe_error,
@@ -65,10 +63,10 @@ def locate_one(srf, own, other, nu, nu_max):
 def locate_lateral(types, layout, est, nu, nu_max):
     """Find where ailerons and rudder were in the elapsed frame, two deflections in two equations."""
     a, r = layout.main[ROLL], layout.main[YAW]
-    ail, rud = est[layout.position[a]].effect, est[layout.position[r]].effect
-    reached = locate_one(types.surface[a], ail, rud, nu, nu_max)
-    if not (locate_one(types.surface[r], rud, ail, nu, nu_max) and reached):
-        types.pair.lateral_outside = 1
+    for s, other in ((a, r), (r, a)):
+        own, effect = est[layout.position[s]].effect, est[layout.position[other]].effect
+        if not locate_one(types.surface[s], own, effect, nu, nu_max):
+            types.pair.lateral_outside = 1
 
 
 @kernel
@@ -135,18 +133,17 @@ def isolate_lateral(types, layout, t):
     """Set the isolation of the surfaces of roll and yaw. Whether the fault of this plane is outside the
     class.
     """
-    c, pair = types.config, types.pair
     roll, yaw = types.surface[layout.main[ROLL]], types.surface[layout.main[YAW]]
-    roll_alone = can_be_faulty(roll)
-    yaw_alone = can_be_faulty(yaw)
-    both = not roll_alone and not yaw_alone
-    refuted = pair.lateral_outside == 1 or not verdict.left(roll, ALL) or not verdict.left(yaw, ALL)
-    outside = both and refuted
-    open_yet = both and not (verdict.explains_flight(roll) and verdict.explains_flight(yaw))
-    isolates = pair.group_alarm[LATERAL_GROUP] == 1 and not (outside or open_yet)
-    verdict.update_status(roll, isolates and not yaw_alone, verdict.type_on_surface(c, roll), t)
-    verdict.update_status(yaw, isolates and not roll_alone, verdict.type_on_surface(c, yaw), t)
-    return outside
+    both = not can_be_faulty(roll) and not can_be_faulty(yaw)
+    refuted, explained = types.pair.lateral_outside == 1, True
+    for srf in (roll, yaw):
+        refuted = refuted or not verdict.left(srf, ALL)
+        explained = explained and verdict.explains_flight(srf)
+    isolates = types.pair.group_alarm[LATERAL_GROUP] == 1 and not (both and (refuted or not explained))
+    for srf, other in ((roll, yaw), (yaw, roll)):
+        at_fault = isolates and not can_be_faulty(other)
+        verdict.update_status(srf, at_fault, verdict.type_on_surface(types.config, srf), t)
+    return both and refuted
 
 
 @kernel
@@ -236,8 +233,8 @@ def sole_pitch(types, layout):
 
 @kernel
 def decide_pairs(types, past, layout, t):
-    """Name surfaces and types plane by plane; t s. Returns the finding for `conclusion.record_decision`: its
-    isolated estimator is of the one named first, the law acts on all.
+    """Name surfaces and types plane by plane; t s. Returns the finding on the one named first, for
+    `conclusion.record_decision`.
     """
     outside = isolate_lateral(types, layout, t)
     isolate_pitch(types, layout, t)
@@ -249,49 +246,4 @@ def decide_pairs(types, past, layout, t):
             first = s
     if first == NO_SURFACE and outside:
         first = UNANTICIPATED
-    return (
-        *verdict.finding_on_surface(types, past, layout, first, t),
-        *accommodate_pairs(types, layout),
-    )
-
-
-@kernel
-def pitch_isolated(types, layout):
-    """Whether a surface of pitch is named."""
-    for s, srf in enumerate(types.surface):
-        if layout.group[s] == PITCH_GROUP and srf.status.is_isolated:
-            return True
-    return False
-
-
-@kernel
-def acts_on(types, layout, s):
-    """Whether the law is to act on surface s: it is isolated, or it is the most likely one in pitch."""
-    if types.surface[s].status.is_isolated:
-        return True
-    if (
-        layout.group[s] != PITCH_GROUP
-        or pitch_isolated(types, layout)
-        or not types.pair.group_alarm[PITCH_GROUP]
-    ):
-        return False
-    sole = verdict.sole_surface(types.surface, True)
-    return s == (sole if sole >= 0 else layout.main[PITCH])
-
-
-@kernel
-def accommodate_pairs(types, layout):
-    """Settle what the law does about each surface. Returns the lead, which the supervisor follows, and what
-    is done about it: a replaced elevator leads before all others."""
-    lead, mode = NO_SURFACE, -1
-    for s, srf in enumerate(types.surface):
-        srf.accommodation.mode = -1
-        if acts_on(types, layout, s):
-            possible = srf.status.is_isolated == 1 or can_be_faulty(srf)
-            own = verdict.choose_mode(srf) if possible else SUBTRACT_OFFSET
-            if verdict.fault_shows(types.config, srf, own, possible):
-                srf.accommodation.mode = own
-                leads = s == layout.main[PITCH] and own in (SCALE_COMMAND, GIVE_UP)
-                if lead == NO_SURFACE or leads:
-                    lead, mode = s, own
-    return lead, mode
+    return verdict.finding_on_surface(types, past, layout, first, t)

@@ -119,29 +119,41 @@ def type_index_of(name: str, *, has_constant_parameter: bool = True, stop_direct
     return [(row.name, row.has_constant_parameter, row.stop_direction) for row in TYPES].index(sought)
 
 
-def _by_type(name: str, arguments: str, default: Any) -> Kernel:
-    """A kernel of these arguments, h among them, that returns what this part of type h returns; `default` for
-    a type without it.
+def _by_type(name: str, place: int, default: Any) -> Kernel:
+    """A kernel that returns what this part of type h returns, given the same arguments; `default` for a type
+    without it. place: of h among the arguments.
 
-    Compiled code calls only what it can name, so the calls are written out.
+    Compiled code calls only what it can name: each part has a kernel that calls it for its type, and for any
+    other type the kernel of the part before.
     """
-    parts = _parts_of(name)
-    calls = [f"if h == {h}: return part_{h}({arguments})" for h in parts]
-    source = "\n    ".join([f"def {name}_of_type({arguments}):", *calls, "return default"])
-    names = {"__name__": __name__, "default": default, **{f"part_{h}": part for h, part in parts.items()}}
-    exec(compile(source, __file__, "exec"), names)
-    return kernel(names[f"{name}_of_type"])
+
+    @kernel
+    def of_type(*arguments):
+        return default
+
+    for h, part in _parts_of(name).items():
+        of_type = _of_type_or(h, place, part, of_type)
+    return of_type
 
 
-reset_memory = _by_type("reset_memory", "srf, h", None)
-parameter_range = _by_type("parameter_range", "srf, h", UNLIMITED_SET)
-before_judging_frame = _by_type("before_judging_frame", "c, srf, h", None)
-on_skipped_frame = _by_type("on_skipped_frame", "c, srf, h, k", None)
-consistent_interval = _by_type("consistent_interval", "c, srf, h, k", UNLIMITED_SET)
-has_shown = _by_type("has_shown", "srf, h", True)
-motion_rules_out = _by_type("motion_rules_out", "srf, h, stop", False)
-deflection_range = _by_type("deflection_range", "c, srf, h, k", EMPTY_SET)
-deflection_error = _by_type("deflection_error", "srf, h", np.nan)
+def _of_type_or(number: int, place: int, part: Kernel, others: Kernel) -> Kernel:
+    """A kernel that calls `part` for the type of this number, else `others`; place: of a type's number."""
+
+    @kernel
+    def of_type(*arguments):
+        return part(*arguments) if arguments[place] == number else others(*arguments)
+
+    return of_type
+
+
+reset_memory = _by_type("reset_memory", 1, None)
+parameter_range = _by_type("parameter_range", 1, UNLIMITED_SET)
+see_frame = _by_type("see_frame", 2, None)
+consistent_interval = _by_type("consistent_interval", 2, UNLIMITED_SET)
+has_shown = _by_type("has_shown", 1, True)
+motion_rules_out = _by_type("motion_rules_out", 1, False)
+deflection_range = _by_type("deflection_range", 2, EMPTY_SET)
+deflection_error = _by_type("deflection_error", 1, np.nan)
 
 MAX_BLOCK = 256  # frames of a block
 N_KEPT = 3  # frames, or blocks, of which the orders are kept: the elapsed one and two before it
@@ -355,19 +367,18 @@ def judge_frame(types):
     c, k = types.config, types.frame_index - 1
     returns = c.returns_lagged and types.frame_index > 0
     for s, srf in enumerate(types.surface):
+        rests = c.abrupt and srf.accommodation.mode == GIVE_UP and not srf.judged.anomalous
+        judges = srf.judged.anomalous and (c.single_instant or (srf.earlier.anomalous and srf.last.anomalous))
         for h in range(N_TYPES):
-            before_judging_frame(c, srf, h)
+            see_frame(c, srf, h, k, not (rests or judges))
             if returns and HOLDS[h]:
                 lo, hi = deflection_range(c, srf, h, k if c.single_instant else k - 1)
                 release.begin_release(c, srf, h, lo, hi, STOP_SIDE[h])
-        if c.abrupt and srf.accommodation.mode == GIVE_UP and not srf.judged.anomalous:
+        if rests:
             count_rest(types, s)
-        elif srf.judged.anomalous and (c.single_instant or (srf.earlier.anomalous and srf.last.anomalous)):
+        if judges:
             count_anomaly(srf)
             judge_types(c, srf, k)
-        else:
-            for h in range(N_TYPES):
-                on_skipped_frame(c, srf, h, k)
         for h in range(N_TYPES):
             if returns and HOLDS[h]:
                 release.advance_returns(c, srf, h)

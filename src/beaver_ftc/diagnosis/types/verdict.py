@@ -237,7 +237,7 @@ def type_on_surface(c, srf):
 
 
 @kernel
-def decide_single(types, past, layout, est, t):
+def decide_single(types, past, layout, t):
     """The finding on the surface and, when it is certain, on the type, for
     `conclusion.record_decision`.
 
@@ -246,8 +246,7 @@ def decide_single(types, past, layout, est, t):
     s = find_surface(types, layout)
     for i, srf in enumerate(types.surface):
         update_status(srf, i == s, type_on_surface(types.config, srf) if i == s else TYPE_UNDECIDED, t)
-    found = finding_on_surface(types, past, layout, s, t)
-    return (*found, *decide_mode(types, found[0], layout, est))
+    return finding_on_surface(types, past, layout, s, t)
 
 
 @kernel
@@ -310,19 +309,25 @@ def serves_constants(srf, mode):
 
 
 @kernel
-def presumed_surface(types, estimator, layout, est):
-    """The surface the law acts upon: the one at fault, or the likeliest; NO_SURFACE yet.
+def presumed_surface(types, layout):
+    """The surface that the law acts upon while none is isolated, in pairs none of pitch: the likeliest, or
+    NO_SURFACE.
 
     It acts before all doubt is gone, since it can take it back. Of elevator and flap it does not matter which
     is thought to be off, as long as both follow their commands: the moment is the same.
     """
-    if estimator >= 0:
-        return est[estimator].surface
-    s = sole_surface(types.surface, True)
-    if s >= 0:
-        return s
+    pair = types.pair
+    if pair.enabled and not pair.group_alarm[PITCH_GROUP]:
+        return NO_SURFACE
     for s, srf in enumerate(types.surface):
-        if layout.dominant_axis[s] == PITCH and can_be_faulty(srf):
+        if srf.status.is_isolated and (layout.group[s] == PITCH_GROUP or not pair.enabled):
+            return NO_SURFACE
+    sole = sole_surface(types.surface, True)
+    if sole >= 0:
+        return sole
+    for s, srf in enumerate(types.surface):
+        first = s == layout.main[PITCH] if pair.enabled else can_be_faulty(srf)
+        if layout.group[s] == PITCH_GROUP and first:
             return s
     return NO_SURFACE
 
@@ -335,18 +340,21 @@ def clear_modes(surfs):
 
 
 @kernel
-def decide_mode(types, estimator, layout, est):
-    """The surface on which the law acts, or NO_SURFACE, and how; estimator: if any."""
-    s = presumed_surface(types, estimator, layout, est)
+def accommodate(types, layout):
+    """Settle what the law does about each surface. Returns the lead, which the supervisor follows, and what
+    is done about it: a replaced elevator leads before all others."""
+    lead, mode, presumed = NO_SURFACE, -1, presumed_surface(types, layout)
     clear_modes(types.surface)
-    if s < 0:
-        return NO_SURFACE, -1
-    srf = types.surface[s]
-    mode = choose_mode(srf)
-    if fault_shows(types.config, srf, mode, True):
-        srf.accommodation.mode = mode
-        return s, mode
-    return NO_SURFACE, mode
+    for s, srf in enumerate(types.surface):
+        if srf.status.is_isolated or s == presumed:
+            possible = srf.status.is_isolated == 1 or can_be_faulty(srf)
+            own = choose_mode(srf) if possible else SUBTRACT_OFFSET
+            if fault_shows(types.config, srf, own, possible):
+                srf.accommodation.mode = own
+                leads = s == layout.main[PITCH] and own in (SCALE_COMMAND, GIVE_UP)
+                if lead == NO_SURFACE or leads:
+                    lead, mode = s, own
+    return lead, mode
 
 
 @kernel

@@ -163,12 +163,6 @@ def reset_growing(srf, h):
     M = srf.growing_bias
     M.up = M.down = 0.0
     M.has_run[:] = 0
-    forget_offset(M)
-
-
-@kernel
-def forget_offset(M):
-    """Its offset is not known."""
     M.b_lo, M.b_hi = -np.inf, np.inf
 
 
@@ -179,17 +173,12 @@ def max_growth(c, srf):
 
 
 @kernel
-def widen_offset(c, srf, h):
-    """Widen the interval of the offset by what one that is slower than a runaway moves in a frame."""
-    db = max_growth(c, srf)
+def widen_offset(c, srf, h, k, skipped):
+    """Widen the interval of the offset by what one that is slower than a runaway moves in a frame. In a
+    skipped frame the fault may have gone, and begin again with any offset."""
+    db = np.inf if skipped else max_growth(c, srf)
     srf.growing_bias.b_lo -= db
     srf.growing_bias.b_hi += db
-
-
-@kernel
-def forget_growing(c, srf, h, k):
-    """The fault may have gone, and begin again with any offset."""
-    forget_offset(srf.growing_bias)
 
 
 @kernel
@@ -250,9 +239,7 @@ BIAS = FaultType(
 )  # fmt: skip
 GROWING_BIAS = FaultType(
     name="bias", description="bias that grows", has_constant_parameter=False, sort_rank=4,
-    reset_memory=reset_growing, before_judging_frame=widen_offset,
-    consistent_interval=update_growing,
-    on_skipped_frame=forget_growing,
+    reset_memory=reset_growing, see_frame=widen_offset, consistent_interval=update_growing,
     memory_record_name="growing_bias",
     memory_dtype=record(
         up=float, down=float,  # how far it has certainly grown, rad
@@ -279,10 +266,12 @@ def reset_swing(srf, h):
 
 
 @kernel
-def add_square(c, srf, h):
-    """Sum (p - u)^2."""
+def add_square(c, srf, h, k, skipped):
+    """Sum (p - u)^2. In a skipped frame it may have swung to the other side, unseen."""
     lo, hi = error_of_frame(srf)
     srf.oscillatory.square += (0.5 * (lo + hi)) ** 2
+    if skipped:
+        srf.oscillatory.since = k + 1
 
 
 @kernel
@@ -312,12 +301,6 @@ def update_swing(c, srf, h, k):
 
 
 @kernel
-def restart_sign(c, srf, h, k):
-    """In a frame that is not judged it may have swung to the other side, unseen."""
-    srf.oscillatory.since = k + 1
-
-
-@kernel
 def swing_has_shown(srf, h):
     """Whether it has swung for two half-cycles and more."""
     return srf.oscillatory.n_half >= MIN_HALF_CYCLES
@@ -339,9 +322,8 @@ def swing_frequency(fdi: np.void, s: int, h: int) -> float | None:
 
 OSCILLATORY = FaultType(
     name="oscillatory", has_constant_parameter=False, sort_rank=2,
-    reset_memory=reset_swing, before_judging_frame=add_square,
-    consistent_interval=update_swing,
-    on_skipped_frame=restart_sign, memory_record_name="oscillatory",
+    reset_memory=reset_swing, see_frame=add_square, consistent_interval=update_swing,
+    memory_record_name="oscillatory",
     memory_dtype=record(
         sign=int, since=int,
         n_half=int, first_end=int, last_end=int,

@@ -9,7 +9,7 @@ again what it changes. It also works where the package is read-only. Nobody else
 kept is run.
 
 target.py compiles by parts of Numba that are known from inside. With a version that is not in `KNOWN`, or
-with BEAVER_FTC_COMPILER=numba, Numba compiles by its own means, in each process anew; flights are the same.
+with BEAVER_FTC_COMPILER=numba, Numba compiles by its own means, again in each process; flights are the same.
 
 One of several kernels by its number: how compiled code calls a row of a table.
 

@@ -95,7 +95,7 @@ class LogInputs:
     @cached_property
     def has_missing_value(self) -> Mask:
         """Rows in which an input is not a number, (n,)."""
-        return ~np.isfinite(np.hstack(self.input_arrays)).all(axis=1)
+        return np.asarray(~np.isfinite(np.hstack(self.input_arrays)).all(axis=1))
 
     @cached_property
     def gap_free_stretches(self) -> Runs:

@@ -159,11 +159,10 @@ def finish_rows(samples: Samples, model: Model, rows: LogRows, silent: Mask | No
     reasons = trust.untrusted_rows(samples, model)
     if silent is not None:
         reasons["nothing answers the commands: on the ground, or these are not what it follows"] = silent
-    if not any(trust.known_effects(model)):
-        always = np.ones(len(rows.t_s), dtype=bool)
-        reasons["of no surface is the effect known from the flights fitted"] = always
+    nothing_known = np.full(len(rows.t_s), not trust.known_effects(model).any())
+    reasons["of no surface is the effect known from the flights fitted"] = nothing_known
     rows = _add_unknown_surfaces(samples, model, _withdraw_by_engine(samples, model, rows))
-    gain_known = np.array(trust.known_gains(model), dtype=float)[None]
+    gain_known = trust.known_gains(model)[None]
     unknown = np.broadcast_to(expand_groups(gain_known, model) == 0.0, rows.effectiveness_low.shape)
     return _at_log_stamps(samples, rows.without_estimate(unknown).without_verdict(reasons))
 

@@ -401,7 +401,7 @@ def _gain_errors(
 
         g = (F' F)^-1 F' e,    square = g' ((F' F)^-1 + S)^-1 g = (F' e)' (1 + S F' F)^-1 g
     """
-    known = np.array(trust.known_effects(fold))
+    known = trust.known_effects(fold)
     F, e = _standardized(fold, held_out)
     if not len(e):  # a part without a residual shows no gain
         return []
@@ -564,7 +564,7 @@ def _squared_deviations(model: Model, held_out: FitPart) -> Floats:
     F, e = _standardized(model, held_out)
     F = F.sum(axis=3)
     squares = np.full(len(model.groups), np.nan)
-    known = np.array(trust.known_effects(model)) & F.any(axis=(0, 1))
+    known = trust.known_effects(model) & F.any(axis=(0, 1))
     if known.any():  # a part without a residual shows the effect of no group
         FF, _, g = _gains(F[:, :, known], e)
         P = np.linalg.pinv(FF, rcond=_RANK_TOLERANCE, hermitian=True)

@@ -133,7 +133,7 @@ def group_indices(model: Model) -> Groups:
     return [[names.index(name) for name in group] for group in model.groups]
 
 
-def expand_groups(values: Floats, model: Model) -> Floats:
+def expand_groups(values: Floats | Mask, model: Model) -> Floats:
     """Each surface's column (n, S) of those of the groups (n, G): its group's, 1 where it is in none."""
     index = np.full(len(model.vehicle.surfaces), -1)
     for g, group in enumerate(group_indices(model)):

@@ -27,7 +27,7 @@ from beaver_ftc.documents import BadInput
 from beaver_ftc_logs import energy, regression
 from beaver_ftc_logs.column_mistakes import corrected_logs, log_without_signal
 from beaver_ftc_logs.model import FittedRanges, Model
-from beaver_ftc_logs.recording import MIN_DIVISOR, Floats, Reasons
+from beaver_ftc_logs.recording import MIN_DIVISOR, Floats, Mask, Reasons
 from beaver_ftc_logs.regression import Parts
 from beaver_ftc_logs.samples import NOISE_MA_CANDIDATES, Samples, whiten_samples
 from beaver_ftc_logs.signals import MIN_STILL_S
@@ -88,20 +88,18 @@ def central_ranges(values: Floats) -> list[list[float]]:
     return np.nanquantile(known, _RANGE_QUANTILES, axis=0).T.tolist()
 
 
-def known_effects(model: Model) -> list[bool]:
-    """Whether anything is said of each group."""
-    if model.fitted is None or not model.fitted.tied:
-        return [True] * len(model.groups)
-    return [share < _MAX_TIED_SHARE for share in model.fitted.tied]
+def known_effects(model: Model) -> Mask:
+    """Whether anything is said of each group, (G,)."""
+    tied = model.fitted.tied if model.fitted else []
+    return np.array(tied or [0.0] * len(model.groups)) < _MAX_TIED_SHARE
 
 
-def known_gains(model: Model) -> list[bool]:
-    """Whether the effect of each group is known under any law: the model may not err by all of it."""
+def known_gains(model: Model) -> Mask:
+    """Whether the effect of each group is known under any law, (G,): the model may not err by all of it."""
     known = known_effects(model)
     if model.fitted is None or not model.fitted.gain_sd or not model.vehicle.other_laws:
         return known
-    pairs = zip(known, model.fitted.gain_sd, strict=True)
-    return [effect and regression.BOUND_MARGIN * sd < 1.0 for effect, sd in pairs]
+    return known & (regression.BOUND_MARGIN * np.array(model.fitted.gain_sd) < 1.0)
 
 
 def unknown_surfaces(model: Model) -> set[str]:

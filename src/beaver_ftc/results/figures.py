@@ -47,15 +47,6 @@ class Picture:
     subtitle: str
 
 
-def write_figures(log_path: Path, metrics: Metrics, folder: Path) -> list[Path]:
-    """Draw every view of the log as `<view>.png`, some also as `<view>-closeup.png`; return the files."""
-    folder.mkdir(exist_ok=True)
-    pictures = pictures_of(log_path, metrics, folder)
-    for picture in pictures:
-        save(picture)
-    return [picture.path for picture in pictures]
-
-
 def pictures_of(
     log_path: Path, metrics: Metrics, folder: Path, formats: Sequence[str] = ("png",)
 ) -> list[Picture]:

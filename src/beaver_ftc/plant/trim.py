@@ -44,6 +44,7 @@ _GOAL = 1e-11  # m/s2 and rad/s2: rounding leaves a tenth of it
 _MAX_STEPS = 15  # of Broyden's method
 _RATES_AND_FLOW = ("ic/u-fps", "ic/v-fps", "ic/w-fps")
 TOLERANCE = 1e-9  # m/s2 and rad/s2, in each of the six accelerations
+ROUNDED = 1e-8  # the same where no step brings less: rounding of an airship, whose lift and weight are large
 
 _ALPHA_LIMIT_RAD = 0.6  # beyond it an aircraft has departed, so it cannot be trimmed there
 _MAX_ITERATIONS = 40
@@ -200,6 +201,8 @@ def _solve(truth: Plant, state: FlightState) -> tuple[FlightState, np.ndarray]:
             break
         x = x + _shortened(_newton_step(_jacobian(look, x, here), here))
         here = look(x)
+    if np.abs(here).max() <= ROUNDED:
+        return state_at(x), here
     raise _not_flown(state_at(x), _left_over(here), truth.aircraft)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
-from math import degrees, radians
+from math import degrees, isnan, radians
 from pathlib import Path
 from time import perf_counter
 
@@ -280,7 +280,12 @@ def _compared(
     tell("compare")
     found, noted = differences(pair.own, pair.copy, pair.surfaces, airspeed_mps), set[tuple[str, ...]]()
     for off in found:
-        if not off.share <= DIFFERENT:
+        if isnan(off.share):
+            raise BadInput(
+                f"{source.says}: its {off.axis} is no finite number in some runs of JSBSim, allowed: a model "
+                "that JSBSim can run"
+            )
+        if off.share > DIFFERENT:
             if not off.because or set(off.because) - pair.along:
                 raise BadInput(
                     f"{source.says}: its copy would fly otherwise, off by {off}, allowed: aerodynamics that "

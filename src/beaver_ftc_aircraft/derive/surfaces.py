@@ -50,7 +50,7 @@ _ANYWHERE_RAD = 3.0
 _OF_LARGEST = 0.1  # a cause beside the largest
 _NOTHING = 1e-4
 _LEAST_FT_S2, _LEAST_SHARE = 0.03, 1e-3  # what counts as a span of accelerations: forces, moments
-_AXES = "forward", "to the right", "downward", "roll", "pitch", "yaw"
+_AXES = "acceleration forward", "acceleration to the right", "acceleration downward", "roll", "pitch", "yaw"
 _ACCELERATIONS = (
     *(f"accelerations/{axis}dot-ft_sec2" for axis in "uvw"),
     *(f"accelerations/{axis}dot-rad_sec2" for axis in "pqr"),

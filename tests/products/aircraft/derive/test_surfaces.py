@@ -11,7 +11,7 @@ from beaver_ftc.plant.adapter import bare
 from beaver_ftc.plant.instrumented import usual_view
 from beaver_ftc.plant.model_file import copy_of
 from beaver_ftc_aircraft.derive import derivation
-from beaver_ftc_aircraft.derive.surfaces import differences, find_surfaces
+from beaver_ftc_aircraft.derive.surfaces import Difference, differences, find_surfaces
 
 from . import foreign
 from .foreign import LEFT, RIGHT
@@ -85,7 +85,7 @@ WRONG = {
     "the sum of equal signs": ("aileron", "roll", 0.4, RIGHT),
     "shares of equal signs": ("aileron", "roll", 0.2, RIGHT),
     "differential, not by halves": ("aileron", "roll", 0.05, RIGHT),
-    "normalised by two stops": ("elevator", "downward", 0.05, "fcs/elevator-pos-rad"),
+    "normalised by two stops": ("elevator", "acceleration downward", 0.05, "fcs/elevator-pos-rad"),
 }
 
 
@@ -132,3 +132,17 @@ def test_copies_of_the_package_s_aircraft_fly_as_they_do(name, off, tmp_path):
     most = max(differences(own, copy, found, (60.0, 120.0)), key=lambda of: of.share)
     assert most.share == pytest.approx(off, abs=0.1 * off + 1e-4)
     assert most.because == (("fcs/flaperon-mix-rad",) if name == "f16" else ())
+
+
+def test_an_airship_is_trimmed_as_far_as_rounding_lets_it(tmp_path):
+    with pytest.raises(BadInput, match=r"Submarine_Scout: its copy would fly otherwise.* in acceleration"):
+        derivation.derive("jsbsim:Submarine_Scout", tmp_path)
+
+
+def test_a_model_whose_accelerations_are_no_numbers_is_told_so(tmp_path, monkeypatch):
+    """As with a turboprop whose thrust is not finite in some runs of JSBSim."""
+    broken = Difference("aileron", np.nan, "acceleration forward", -0.35, ())
+    monkeypatch.setattr(derivation, "differences", lambda *given: [broken])
+    path, _ = written(tmp_path / "author", MODELS["equal stops"])
+    with pytest.raises(BadInput, match="its acceleration forward is no finite number"):
+        derivation.derive(str(path), tmp_path / "out")

@@ -46,8 +46,7 @@ def flown(readings, true, missing=None, air=None, **fields):
     use accelerometers (N,); suspects, cleared sensors, verdicts of gyros and unused readings (N, ...). The
     innovation has the errors of the gyros in it alone."""
     fdi, given, inertial, history = new_fdi(), [], [], []
-    D_size = np.where(np.eye(3) > 0.0, -D, abs(D))
-    monitor = new_monitor(H, 0.02 * UNITS, 0.01 * UNITS, D=D, D_size=D_size, y_trim=true[0], **fields)
+    monitor = new_monitor(H, 0.02 * UNITS, 0.01 * UNITS, D=D, y_trim=true[0], **fields)
     fill(monitor, **air or {})
     n = monitor["config"]["substeps"]
     monitor["substep"] = n - 1

@@ -109,8 +109,7 @@ MONITOR_CONFIG_RECORD = record(
     rate_gain=float,  # share of its error that a replaced rate corrects in one sample
     noisy=int,  # the attitude: then a surface is isolated only once no gyro can be the cause
     n_frozen=(int, N_SENSORS),  # number of identical samples from which a reading counts as frozen
-    # 1/s: body rates decay with rate' = -D rate; |D|, with -D_ii on its diagonal
-    D=(3, 3), D_size=(3, 3),
+    D=(3, 3),  # 1/s: body rates decay with rate' = -D rate
 )  # fmt: skip
 
 MONITOR_OUTPUT_RECORD = record(
@@ -188,8 +187,7 @@ def configure_sensor_monitor(monitor: np.void, declared: Declared, design: np.vo
     initial = cast("Any", declared.initial)  # whose keys the aircraft names
     D = air_rotation_slopes(DesignFunctions(np.array([design])), y)
     engine = declared.aircraft.has_engine_instruments
-    size = np.where(np.eye(3) > 0.0, -D, abs(D))
-    fill(config, substeps=declared.substeps, has_engine=engine, D=D, D_size=size)
+    fill(config, substeps=declared.substeps, has_engine=engine, D=D)
     config["y_trim"][3:7] = y[:4]
     monitor["substep"] = declared.substeps - 1  # the first JSBSim frame ends a frame of the loop
     if engine:

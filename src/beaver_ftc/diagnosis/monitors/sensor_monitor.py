@@ -97,7 +97,6 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     SPEED_TEST,
     THETA,
     compare_duplicates,
-    dot,
     exceeds,
     run_tests,
     speed,
@@ -196,15 +195,18 @@ def check_sensors(mon, pred, measured, found, bank, bound, dt, t):
 def advance_gyro_estimate(mon, nu, eta, dt):
     """Advance w, the gyro's error (3,) rad/s if the dynamics are right, and its bound B by a frame of dt s:
 
-    w <- w + dt (nu - D w),    B <- B + dt (eta + |D| B), with -D_ii on the diagonal of |D|
+    w <- A w + dt nu,    B <- |A| B + dt eta,    A = I - dt D
 
     nu, eta (3,): innovation and its bound, rad/s2.
     """
-    c, w, B = mon.config, mon.w, mon.w_bound
+    w, B = mon.w, mon.w_bound
     w0, B0 = (w[0], w[1], w[2]), (B[0], B[1], B[2])
     for i in range(3):
-        w[i] += dt * (nu[i] - dot(c.D[i], w0))
-        B[i] = max(B[i] + dt * (eta[i] + dot(c.D_size[i], B0)), 0.0)
+        w[i], B[i] = dt * nu[i], dt * eta[i]
+        for j in range(3):
+            A = (i == j) - dt * mon.config.D[i, j]
+            w[i] += A * w0[j]
+            B[i] += abs(A) * B0[j]
 
 
 @kernel

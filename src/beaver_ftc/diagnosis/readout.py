@@ -403,12 +403,12 @@ def _read_hypothesis(hyp: np.void) -> StatisticalHypothesis:
 
 
 def _read_sensor_monitor(mon: np.void) -> SensorMonitor:
-    o, red = mon["output"], mon["redundancy"]
+    o = mon["output"]
     j = int(o["worst_test_index"])
-    worst = (red[name][j].copy() for name in ("residual", "per_s", "per_sample", "gust", "r", "B"))
+    worst = (mon[name][j].copy() for name in ("residual", "per_s", "per_sample", "gust", "r", "B"))
     return SensorMonitor(
         bool(mon["config"]["enabled"]), bool(o["alarmed"]), j,
         float(o["top_ratio"]), SensorTest(*worst), int(o["isolated_sensor"]),
-        o["is_reading_unused"].astype(bool), float(red["h"]),
-        *(red[name].copy() for name in ("gust_change", "y_pred", "e")),
+        o["is_reading_unused"].astype(bool), float(mon["h"]),
+        *(mon[name].copy() for name in ("gust_change", "y_pred", "e")),
     )  # fmt: skip

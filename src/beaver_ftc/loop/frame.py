@@ -318,7 +318,7 @@ def record_used(effectiveness, used, row, column):
 def record_sensor_monitor(monitor, missing, row, column, columns):
     """How near a test between the instruments came to its bound in this frame, and which; of three `columns`
     the first instrument that gives no reading, missing (N_SENSORS,). Returns the next column."""
-    if monitor.config.enabled and monitor.memory.stage:
+    if monitor.config.enabled and monitor.stage:
         row[column], row[column + 1] = (
             monitor.output.top_ratio,
             monitor.output.worst_test_index,
@@ -356,7 +356,7 @@ def monitor_sensors(frame):
     fdi, monitor, engine = frame.fdi, frame.fdi.sensor_monitor, frame.control.power.output
     before, t = monitor.output.alarmed, frame.k * frame.dt
     if engine.in_use:
-        redundancy.expect_pressure(monitor.redundancy, engine.command[0])
+        redundancy.expect_pressure(monitor, engine.command[0])
     sensor_monitor.check_sensors(
         monitor, frame.prediction, frame.measured, fdi.verdict, fdi.bank, fdi.bound, frame.dt, t
     )

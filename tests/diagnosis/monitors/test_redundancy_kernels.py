@@ -38,8 +38,7 @@ def test_sound_sensors_stay_within_every_bound(seed, swiftly, h):
     drift[np.abs(np.arange(N_SENSORS) - PHI - 1) > 1] = 0.0
     noise = rng.choice([0.0, 0.2, 1.0], N_SENSORS) * UNITS
     monitor = new_monitor(h, np.abs(bias) + noise, np.abs(bias))
-    config = monitor["redundancy"]
-    config["e_slope"], config["drift"] = np.abs(slope), np.abs(drift).max()
+    monitor["e_slope"], monitor["drift"] = np.abs(slope), np.abs(drift).max()
     readings = (1.0 + slope) * true + bias + noise * rng.choice([-1.0, 1.0], true.shape)
     readings += h * np.arange(n)[:, None] * drift
     nearest = np.max([ratio for ratio, _ in compared(monitor, readings)], axis=0)
@@ -84,7 +83,7 @@ def test_a_reading_that_jumps_exceeds_its_own_tests_and_a_small_error_none(senso
 
 def test_a_declared_error_is_of_the_reading_and_what_is_steady_does_not_change():
     """|reading - truth| <= offset + slope |truth|, and |truth| <= (|reading| + offset) / (1 - slope)."""
-    red, signal = new_monitor(0.02, 0.3, 0.25)["redundancy"], np.full(N_SENSORS, -3.0)
+    red, signal = new_monitor(0.02, 0.3, 0.25), np.full(N_SENSORS, -3.0)
     signal[PHI + 2] += 2.0 * np.pi  # a heading is off by its slope of the angle from north
     red["e_slope"] = 0.1
     redundancy.bound_readings(red, signal)
@@ -96,7 +95,7 @@ def test_a_declared_error_is_of_the_reading_and_what_is_steady_does_not_change()
 def test_filters_sum_what_was_with_what_each_pole_keeps():
     rng, n, h = np.random.default_rng(2), 30, 0.02
     keep, gust = np.array([0.0, 0.8, 0.97]), np.array([0.1, 0.2, 0.3])
-    red = fill(new_monitor(h)["redundancy"], decay=keep, gust_change=gust, gust=0.5)
+    red = fill(new_monitor(h), decay=keep, gust_change=gust, gust=0.5)
     residual, rate, noise = rng.normal(size=n), rng.uniform(1, 2, n), rng.uniform(1, 2, n)
     for values in zip(residual, rate, noise, strict=True):
         red["residual"][1], red["per_s"][1], red["per_sample"][1] = values
@@ -116,7 +115,7 @@ def test_near_the_vertical_the_tests_of_the_attitude_begin_anew():
     ratios = [ratio[ANGLE_TEST + 1] for ratio, _ in compared(monitor, readings)]
     assert ratios[0] > 1.0  # 0.03 rad in a sample, and no rates
     assert ratios[1:3] == [0.0, 0.0]  # that of now, or that of before, is beyond 1.3 rad
-    assert monitor["redundancy"]["r"][ANGLE_TEST + 1] == pytest.approx([-0.03] * 3)
+    assert monitor["r"][ANGLE_TEST + 1] == pytest.approx([-0.03] * 3)
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -128,6 +127,6 @@ def test_momentary_errors_of_the_attitude_stay_within_bounds_that_remember_long(
     readings[:, :3] = readings[:, PHI] = 0.0
     readings[:, PHI : PHI + 3] += e[PHI : PHI + 3] * rng.choice([-1.0, 0.0, 1.0], (400, 3))
     monitor = new_monitor(0.02, e)
-    monitor["redundancy"]["decay"] = 0.0, 0.99, 0.9999
+    monitor["decay"] = 0.0, 0.99, 0.9999
     for ratio, _ in compared(monitor, readings):
         assert (ratio[TURN_TEST : TURN_TEST + 3] <= 1.0).all()

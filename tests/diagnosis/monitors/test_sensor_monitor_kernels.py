@@ -46,11 +46,10 @@ def flown(readings, true, missing=None, air=None, **fields):
     use accelerometers (N,); suspects, cleared sensors, verdicts of gyros and unused readings (N, ...). The
     innovation has the errors of the gyros in it alone."""
     fdi, given, inertial, history = new_fdi(), [], [], []
-    D_size = np.where(np.eye(3) > 0.0, -D, abs(D))
-    monitor = new_monitor(H, 0.02 * UNITS, 0.01 * UNITS, D=D, D_size=D_size, y_trim=true[0], **fields)
-    fill(monitor["redundancy"], **air or {})
+    monitor = new_monitor(H, 0.02 * UNITS, 0.01 * UNITS, D=D, y_trim=true[0], **fields)
+    fill(monitor, **air or {})
     n = monitor["config"]["substeps"]
-    monitor["memory"]["substep"] = n - 1
+    monitor["substep"] = n - 1
     fdi["bound"]["nu_max"] = fdi["bound"]["eta_bar"] = 0.2
     fdi["bank"]["output"]["threshold"] = 9.0
     measured, pred = (np.zeros(1, dtype).view(np.recarray)[0] for dtype in (MEASURED, prediction_dtype(4)))
@@ -68,9 +67,11 @@ def flown(readings, true, missing=None, air=None, **fields):
         )
         given.append(measured["signal"].copy())
         inertial.append(int(measured["inertial"]))
-        o, M = monitor["output"], monitor["memory"]
+        o = monitor["output"]
         history.append(
-            np.concatenate([o["suspect"], M["cleared"], M["gyro_verdict"], o["is_reading_unused"]])
+            np.concatenate(
+                [o["suspect"], monitor["cleared"], monitor["gyro_verdict"], o["is_reading_unused"]]
+            )
         )
     return monitor, np.array(given), np.array(inertial), np.array(history)
 
@@ -135,13 +136,12 @@ def with_ratios(ratios, **fields):
     """Tests {test: ratio}, of which the residual is as large; in level flight, where each angle turns the
     aircraft about one axis. Other bounds are 1."""
     monitor = new_monitor(H, **fields)
-    test = monitor["redundancy"]
-    test["B"] = 1.0
+    monitor["B"] = 1.0
     for j, ratio in ratios.items():
-        test["ratio"][j], test["r"][j] = ratio, ratio
-    monitor["memory"]["c_max"] = np.eye(3)
-    turns, angles = test["r"][TURN_TEST:][:3], test["r"][ANGLE_TEST:][:3]
-    monitor["memory"]["beyond"] = turns - np.eye(3)[..., None] * angles[:, None]
+        monitor["ratio"][j], monitor["r"][j] = ratio, ratio
+    monitor["c_max"] = np.eye(3)
+    turns, angles = monitor["r"][TURN_TEST:][:3], monitor["r"][ANGLE_TEST:][:3]
+    monitor["beyond"] = turns - np.eye(3)[..., None] * angles[:, None]
     return monitor
 
 
@@ -198,12 +198,12 @@ def test_who_is_suspected_of_what_the_tests_show(ratios, who):
 def test_an_error_of_the_attitude_that_has_shown_and_is_gone_is_no_gyros(peak, noise, verdict):
     """Two frames ago the first gyro's error has shown as 1 rad/s; the noise of the attitude in rad/s."""
     monitor, fdi = new_monitor(H, w_bound=1.0), new_fdi()
-    shown = monitor["memory"]["shown"]
+    shown = monitor["shown"]
     shown[2, sensor_monitor.MOST, 0], shown[1, sensor_monitor.MOST, 0] = 1.0, peak
-    monitor["redundancy"]["per_sample"], fdi["bound"]["nu_max"] = noise * H / 4.0, 1.0
+    monitor["per_sample"], fdi["bound"]["nu_max"] = noise * H / 4.0, 1.0
     fdi["bank"]["output"]["threshold"][:3] = 1.0
     sensor_monitor.judge_gyros(monitor, fdi["bank"], fdi["bound"], 0.02)
-    assert monitor["memory"]["gyro_verdict"][0] == verdict
+    assert monitor["gyro_verdict"][0] == verdict
 
 
 KEPT_MEMORY = "exceeded", "cleared", "gyro_verdict", "gyros_excluded", "w_bound"
@@ -223,10 +223,10 @@ def test_faults_drawn_at_random_end_as_kept(i, changed):
         fields = {"noisy": noisy, "substeps": 1 + 3 * slow, "turn_max": 0.01 * turns}
         missing = i if kind == "missing" else None
         monitor, given, inertial, history = flown(readings[:90], true[:90], missing, air, **fields)
-        output, red, ini = monitor["output"], monitor["redundancy"], monitor["initial_errors"]
+        output = monitor["output"]
         results = {name: output[name] for name in output.dtype.names}
-        results |= {name: monitor["memory"][name] for name in KEPT_MEMORY}
-        results |= {"B": red["B"], "initial": ini["e"], "refuted": ini["refuted"].sum(axis=1)}
+        results |= {name: monitor[name] for name in KEPT_MEMORY}
+        results |= {"B": monitor["B"], "initial": monitor["E"], "refuted": monitor["refuted"].sum(axis=1)}
         results |= {"given": given.mean(axis=0), "inertial": inertial.sum(), "history": history.sum(axis=0)}
         kept.append(results)
     assert not changed(kept)

@@ -53,23 +53,21 @@ def true_flight(rng, n, h, swiftly=True, theta=(-0.2, 0.3)):
 def new_monitor(h, e_zero=0.0, const=0.0, **fields):
     """A monitor of one sample a frame that is declared these errors."""
     monitor = np.zeros(1, SENSOR_MONITOR_RECORD).view(np.recarray)[0]
-    red = monitor["redundancy"]
-    fill(red, h=h, decay=np.exp(-h * np.array(FILTER_POLES_PER_S)), g=GRAVITY)
-    fill(red, e_zero=e_zero, const=const, max_airspeed_mps=80.0, wind_max=1.0)
-    red["y_pred"][[ENGINE_SPEED, MANIFOLD]] = 1800.0, 20.0
+    fill(monitor, h=h, decay=np.exp(-h * np.array(FILTER_POLES_PER_S)), g=GRAVITY)
+    fill(monitor, e_zero=e_zero, const=const, max_airspeed_mps=80.0, wind_max=1.0)
+    monitor["y_pred"][[ENGINE_SPEED, MANIFOLD]] = 1800.0, 20.0
     fill(monitor, enabled=1, substeps=1, has_engine=1, rate_gain=1.0, n_frozen=3, isolated_sensor=NO_SENSOR)
     return fill(monitor, alarmed_at_s=-1.0, isolated_at_s=-1.0, **fields)
 
 
 def compared(monitor, readings):
     """Ratios and residuals of the tests after each sample but the first; errors from the start are judged."""
-    red, initial, exceeded = monitor["redundancy"], monitor["initial_errors"], monitor["memory"]["exceeded"]
-    redundancy.start_tests(red, readings[0], readings[0, AX:])
-    initial_errors.start_bounds(initial, readings[0])
+    redundancy.start_tests(monitor, readings[0], readings[0, AX:])
+    initial_errors.start_bounds(monitor, readings[0])
     for y in readings[1:]:
-        redundancy.run_tests(red, y, True)
-        initial_errors.update_bounds(red, initial, y)
-        exceeded |= red["ratio"] > 1.0
-        initial_errors.latch_refuted(red, initial, exceeded)
-        yield red["ratio"].copy(), red["residual"].copy()
-        redundancy.store_sample(red, y, y[AX:])
+        redundancy.run_tests(monitor, y, True)
+        initial_errors.update_bounds(monitor, y)
+        monitor["exceeded"] |= monitor["ratio"] > 1.0
+        initial_errors.latch_refuted(monitor, monitor["exceeded"])
+        yield monitor["ratio"].copy(), monitor["residual"].copy()
+        redundancy.store_sample(monitor, y, y[AX:])

@@ -55,7 +55,7 @@ in body axes; p, q, r rad/s):
 Gyros need no such hypothesis: all of a gyro's error is in the test of its own axis in every sample. Neither
 does the dynamic pressure: only the density shows it.
 
-red: record of the tests (redundancy.py, which says y and y_past); ini: record of the hypotheses.
+mon: record of the monitor (redundancy.py, which says y and y_past), with H, H_m, C, C_m and d; e is its E.
 """
 
 import numpy as np
@@ -125,7 +125,7 @@ def angle_of_chord(x):
 
 
 @kernel
-def start_bounds(ini, y):
+def start_bounds(mon, y):
     """e_start: bound each error at the first sample: an aircraft can fly at the truth.
 
     T: temperature of the standard troposphere, over that at sea level. V_air: airspeed by dynamic pressure
@@ -135,33 +135,33 @@ def start_bounds(ini, y):
     V_air = np.sqrt(2.0 * max(y[QDYN], MIN_QDYN_PA) / (1.225 * T**4.2559))
     most, least = np.sqrt(1.0 + DENSITY_SHARE), np.sqrt(1.0 - DENSITY_SHARE)
     off = max(speed(y) / V_air * most - 1.0, 1.0 - speed(y) / V_air * least)
-    ini.e_start[H_AIRSPEED] = min(off, MAX_SPEED_RATIO - 1.0)
-    ini.e_start[H_ALPHA] = 2.0 * np.sin(0.5 * min(abs(y[ALPHA]) + MAX_FLOW_ANGLE_RAD, np.pi))
-    ini.e_start[H_BETA] = 2.0 * np.sin(0.5 * min(abs(y[BETA]) + MAX_FLOW_ANGLE_RAD, np.pi))
-    ini.e_start[H_PHI:] = MAX_CHORD
-    ini.e[:] = ini.e_start
+    mon.E_start[H_AIRSPEED] = min(off, MAX_SPEED_RATIO - 1.0)
+    mon.E_start[H_ALPHA] = 2.0 * np.sin(0.5 * min(abs(y[ALPHA]) + MAX_FLOW_ANGLE_RAD, np.pi))
+    mon.E_start[H_BETA] = 2.0 * np.sin(0.5 * min(abs(y[BETA]) + MAX_FLOW_ANGLE_RAD, np.pi))
+    mon.E_start[H_PHI:] = MAX_CHORD
+    mon.E[:] = mon.E_start
 
 
 @kernel
-def allowed_effect(red, j, m):
+def allowed_effect(mon, j, m):
     """r + B: bound on the effect of any error on a test through a filter, in the unit of the residual."""
-    return abs(red.r[j, m]) + red.B[j, m]
+    return abs(mon.r[j, m]) + mon.B[j, m]
 
 
 @kernel
-def widen_bounds(red, ini):
+def widen_bounds(mon):
     """Update d, and widen e by the part of it that the slowest filter forgets in a sample."""
-    m, e = SLOW_POLE, ini.e
+    m, e = SLOW_POLE, mon.E
     for h, j in enumerate(CHANGE_TEST):
-        d = allowed_effect(red, j, m) + e[h] * ini.H_m[h, j, m]
+        d = allowed_effect(mon, j, m) + e[h] * mon.H_m[h, j, m]
         if h == H_AIRSPEED:  # from m/s to a share of the truth, which is at least V / (1 + e)
-            d *= (1.0 + e[h]) / speed(red.y_past)
-        ini.d[h] = min(d, ini.e_start[h])
-        e[h] = min(e[h] + (1.0 - red.decay[m]) * ini.d[h], ini.e_start[h])
+            d *= (1.0 + e[h]) / speed(mon.y_past)
+        mon.d[h] = min(d, mon.E_start[h])
+        e[h] = min(e[h] + (1.0 - mon.decay[m]) * mon.d[h], mon.E_start[h])
 
 
 @kernel
-def fill_attitude_effects(ini, h, y):
+def fill_attitude_effects(mon, h, y):
     """Fill H for the tests of the attitude.
 
     Body axes. phi off by e: (q, r) is turned by e about the first axis, which changes it by
@@ -173,19 +173,19 @@ def fill_attitude_effects(ini, h, y):
     theta' = q cos(phi) - r sin(phi) there is no theta.
     """
     # 1 / cos(theta) by its reading, and the largest one if theta is off
-    sec, sec_max = secant(y[THETA]), secant(abs(y[THETA]) + angle_of_chord(ini.e[H_THETA]))
+    sec, sec_max = secant(y[THETA]), secant(abs(y[THETA]) + angle_of_chord(mon.E[H_THETA]))
     second = (h * (abs(y[P]) + abs(y[Q]) + abs(y[R]))) ** 2  # rad2: the axes turn during the step
     # Rotation in a step, rad: about the body's second and third axes; about the vertical, psi' h
     qr = h * np.hypot(y[Q], y[R])
     heading = h * abs(y[Q] * np.sin(y[PHI]) + y[R] * np.cos(y[PHI])) * sec_max
     by_phi, by_theta = sec * (qr + sec * second), sec * sec_max * second
-    ini.H[H_PHI, :SPEED_TEST] = second, second + qr, second + qr, by_phi, by_phi, by_phi
-    ini.H[H_THETA, :ANGLE_TEST] = second + heading
-    ini.H[H_THETA, ANGLE_TEST:SPEED_TEST] = sec * heading + by_theta, by_theta, sec * heading + by_theta
+    mon.H[H_PHI, :SPEED_TEST] = second, second + qr, second + qr, by_phi, by_phi, by_phi
+    mon.H[H_THETA, :ANGLE_TEST] = second + heading
+    mon.H[H_THETA, ANGLE_TEST:SPEED_TEST] = sec * heading + by_theta, by_theta, sec * heading + by_theta
 
 
 @kernel
-def fill_effects(red, ini, y_now):
+def fill_effects(mon, y_now):
     """Fill H (N_INITIAL, RPM_TEST) and C, taken at the sample before, y, from which y_now is predicted.
 
     h2: h and the second order in h. A, n: bound on |a| in the step, and over V; G: gravity; P: |(p, r)|; each
@@ -208,7 +208,7 @@ def fill_effects(red, ini, y_now):
                  take at most all of it, beta' the part sin(phi) along the second axis, and sin(beta) of the
                  rest. The vertical is turned, against v
     """
-    h, g, e, H, y, a = red.h, red.g, ini.e, ini.H, red.y_past, red.a
+    h, g, e, H, y, a = mon.h, mon.g, mon.E, mon.H, mon.y_past, mon.a
     V, ct, s_phi, sb, cb = speed(y), np.cos(y[THETA]), np.sin(y[PHI]), np.sin(y[BETA]), np.cos(y[BETA])
     d0, d1, d2 = down(y)
     beta_max = abs(y[BETA]) + angle_of_chord(e[H_BETA])
@@ -217,14 +217,14 @@ def fill_effects(red, ini, y_now):
     # rad/s, acceleration m/s2, the vertical
     z = complex(np.cos(y[ALPHA]), np.sin(y[ALPHA]))
     rate, acc, vertical = z * complex(y[P], -y[R]), z * complex(a[0], -a[2]), z * complex(d0, -d2)
-    a_max = max(red.a_size[0], vector_length(a))
+    a_max = max(mon.a_size[0], vector_length(a))
     h2 = h * (1.0 + h * (a_max / V + abs(y[P]) + abs(y[Q]) + abs(y[R])))
     A, n, G, P_h = h2 * a_max, h2 * a_max / V, h2 * g, h2 * abs(rate)
     vert, across = h * V * cb * abs(vertical), ct * np.hypot(sb, z.imag * cb)
-    climb = abs(red.y_pred[ALTITUDE] - y[ALTITUDE])
+    climb = abs(mon.y_pred[ALTITUDE] - y[ALTITUDE])
     slower = 1.0 - min(e[H_AIRSPEED], 1.0 - 1.0 / MAX_SPEED_RATIO)
     density = 2.0 * np.log(speed(y_now) / V)
-    fill_attitude_effects(ini, h, y)
+    fill_attitude_effects(mon, h, y)
     # By hypothesis: V, alpha, beta, phi, theta
     by_beta, by_phi, by_theta = sec * sec_max * (h2 * abs(rate.real) + n), sec * G * ct / V, sec * G / V
     H[:, SPEED_TEST] = 0.0, A, A, G * across, G
@@ -243,7 +243,7 @@ def fill_effects(red, ini, y_now):
     # phi: (q, r), and gravity g cos(theta) (sin(phi), cos(phi)) across the first axis, are turned by it.
     # alpha off by e: beta' changes by x (roll cos(e / 2) + yaw sin(e / 2)). beta off by e: alpha' changes by
     # x cos(e / 2) roll over both cosines. The part of the force in both, of either sign, comes last
-    ini.C[:] = (
+    mon.C[:] = (
         h * complex(y[Q], y[R]),
         h * g * complex(d2, d1),
         complex(h * (y[Q] * s_phi + y[R] * np.cos(y[PHI]))),
@@ -260,7 +260,7 @@ def fill_effects(red, ini, y_now):
 
 
 @kernel
-def tighten_bounds(red, ini):
+def tighten_bounds(mon):
     """Lower the bound on each error to what the tests allow, filter by filter: of each row of EVIDENCE
 
         e <- min(e, s / (EFFECT_LEFT |C_m|)),    s^2 = sum over its tests of (r + B + 2 d H_m)^2
@@ -271,66 +271,66 @@ def tighten_bounds(red, ini):
     The tests of the flow have bounds for a right airspeed: a true one that is 1 + e times smaller makes them
     larger by that. The density shows changes of its error in addition: those are in the airspeed's own test.
     """
-    e, V = ini.e, speed(red.y_past)
-    for m in range(red.decay.size):
+    e, V = mon.E, speed(mon.y_past)
+    for m in range(mon.decay.size):
         ratio = 1.0 + e[H_AIRSPEED]
         for n, (h, first, last) in enumerate(EVIDENCE):
-            C, s2 = ini.C_m[n, m], 0.0
+            C, s2 = mon.C_m[n, m], 0.0
             for j in range(first, last + 1):
-                effect = allowed_effect(red, j, m) + 2.0 * ini.d[h] * ini.H_m[h, j, m]
+                effect = allowed_effect(mon, j, m) + 2.0 * mon.d[h] * mon.H_m[h, j, m]
                 s2 += (effect * V if j > first == SPEED_TEST else effect) ** 2
             s, c = np.sqrt(s2), abs(C)
             if first == DENSITY_TEST:
-                s += 2.0 * ratio * allowed_effect(red, SPEED_TEST, m) / V
+                s += 2.0 * ratio * allowed_effect(mon, SPEED_TEST, m) / V
             elif h == H_AIRSPEED:
                 s *= ratio
             elif h <= H_BETA and first < CLIMB_TEST:
                 half = 0.5 * angle_of_chord(e[h])
-                force = ini.C_m[len(EVIDENCE) + h - H_ALPHA, m].real
+                force = mon.C_m[len(EVIDENCE) + h - H_ALPHA, m].real
                 c = np.cos(half) * abs(C.real) - np.sin(half) * abs(C.imag) - force
             if c > 0.0:
                 e[h] = min(e[h], s / (EFFECT_LEFT * c))
 
 
 @kernel
-def update_bounds(red, ini, y):
+def update_bounds(mon, y):
     """Update all bounds by the sample y, which has just been tested."""
-    if too_steep(red, y):
-        ini.C_m[:] = 0.0
+    if too_steep(mon, y):
+        mon.C_m[:] = 0.0
         return
-    widen_bounds(red, ini)
-    fill_effects(red, ini, y)
-    for n, C in enumerate(ini.C):
-        leak(ini.C_m[n], red.decay, C)
+    widen_bounds(mon)
+    fill_effects(mon, y)
+    for n, C in enumerate(mon.C):
+        leak(mon.C_m[n], mon.decay, C)
     for h in range(N_INITIAL):
         for j in range(RPM_TEST):
-            leak(ini.H_m[h, j], red.decay, ini.H[h, j])
-    tighten_bounds(red, ini)
+            leak(mon.H_m[h, j], mon.decay, mon.H[h, j])
+    tighten_bounds(mon)
 
 
 @kernel
-def refutes_initial(red, ini, h, j):
+def refutes_initial(mon, h, j):
     """Whether a test's residual is larger than sound sensors and the error of hypothesis h explain: for a
     pole m, r > factor B + x H_m, x = e + d. No hypothesis has an effect on the engine's tests and later
     ones.
     """
     if j >= RPM_TEST:
-        return red.ratio[j] > 1.0
-    x = ini.e[h] + ini.d[h]
+        return mon.ratio[j] > 1.0
+    x = mon.E[h] + mon.d[h]
     factor = 1.0 + x if h == H_AIRSPEED and j >= SPEED_TEST else 1.0
-    return exceeds(red.r[j], factor, red.B[j], x, ini.H_m[h, j])
+    return exceeds(mon.r[j], factor, mon.B[j], x, mon.H_m[h, j])
 
 
 @kernel
-def latch_refuted(red, ini, exceeded):
+def latch_refuted(mon, exceeded):
     """Record by which of `exceeded` (N_TESTS,) each hypothesis is refuted."""
     for h in range(N_INITIAL):
         for j in range(N_TESTS):
-            ini.refuted[h, j] |= exceeded[j] and refutes_initial(red, ini, h, j)
+            mon.refuted[h, j] |= exceeded[j] and refutes_initial(mon, h, j)
 
 
 @kernel
-def explains_exceeded(ini, h, alarm):
+def explains_exceeded(mon, h, alarm):
     """Whether an error that the sensor of a hypothesis has had from the start, and that may change, explains
     all tests exceeded since the alarm.
 
@@ -338,6 +338,6 @@ def explains_exceeded(ini, h, alarm):
     the error is constant then, and any refuting test counts. Otherwise those that react at once do not count.
     """
     for j in range(N_TESTS):
-        if ini.refuted[h, j] and (REACTS[h, alarm] or not REACTS[h, j]):
+        if mon.refuted[h, j] and (REACTS[h, alarm] or not REACTS[h, j]):
             return False
     return True

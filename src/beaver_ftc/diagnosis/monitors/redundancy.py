@@ -23,7 +23,7 @@ its gusts within a filter's memory.
                                      axes
     h                                time between two samples, s: a JSBSim frame
     i, j, m, d                       sensor or axis, test, pole of a filter, duplicate sensor
-    red                              record of the tests
+    mon                              record of the monitor
 
 This file also has the records of the sensor monitor, their configuration, and its finding in words.
 """
@@ -104,8 +104,26 @@ EVIDENCE = (
 )  # fmt: skip
 N_EFFECTS = len(EVIDENCE) + 2  # and the parts of the force
 
+MONITOR_CONFIG_RECORD = record(
+    enabled=int, substeps=int, has_engine=int, y_trim=N_SENSORS,
+    rate_gain=float,  # share of its error that a replaced rate corrects in one sample
+    noisy=int,  # the attitude: then a surface is isolated only once no gyro can be the cause
+    n_frozen=(int, N_SENSORS),  # number of identical samples from which a reading counts as frozen
+    D=(3, 3),  # 1/s: body rates decay with rate' = -D rate
+)  # fmt: skip
+
+MONITOR_OUTPUT_RECORD = record(
+    alarmed=int, alarmed_at_s=float,
+    keeps_surface=int,  # a surface was found long before, with sound sensors: it stays found
+    had_surface=int,  # a surface had been isolated just before the alarm
+    alarm_test=int,  # test that has raised the alarm
+    worst_test_index=int, top_ratio=float,  # test with the largest ratio of this frame, and that ratio
+    suspect=(int, N_SENSORS), isolated_sensor=int, isolated_at_s=float, is_reading_unused=(int, N_SENSORS),
+)  # fmt: skip
+
 # Symbols: above.
-REDUNDANCY_RECORD = record(
+SENSOR_MONITOR_RECORD = record(
+    config=MONITOR_CONFIG_RECORD, output=MONITOR_OUTPUT_RECORD,
     h=float, decay=N_POLES, g=float,  # decay: of each filter per sample; g m/s2
     # Declared turbulence, m/s: bound on a gust's speed; bound on its changes through each filter, which
     # holds up to max_airspeed_mps, and above low_m: below it a gust changes faster
@@ -128,26 +146,11 @@ REDUNDANCY_RECORD = record(
     # that the filter sums. ratio: largest |r| / B over the poles.
     residual=N_TESTS, per_s=N_TESTS, per_sample=N_TESTS, past=N_TESTS, gust=N_TESTS,
     r=(N_TESTS, N_POLES), B=(N_TESTS, N_POLES), e_sum=(N_TESTS, N_POLES), ratio=N_TESTS,
-)  # fmt: skip
-
-INITIAL_ERRORS_RECORD = record(
-    # Symbols: initial_errors.py
-    e_start=N_INITIAL, e=N_INITIAL, e_alarm=N_INITIAL, d=N_INITIAL,
+    # Errors from the start: symbols of initial_errors.py
+    E_start=N_INITIAL, E=N_INITIAL, E_alarm=N_INITIAL, d=N_INITIAL,
     H=(N_INITIAL, RPM_TEST), H_m=(N_INITIAL, RPM_TEST, N_POLES),
     C=(complex, N_EFFECTS), C_m=(complex, N_EFFECTS, N_POLES),
     refuted=(int, N_INITIAL, N_TESTS),  # since the alarm
-)  # fmt: skip
-
-MONITOR_CONFIG_RECORD = record(
-    enabled=int, substeps=int, has_engine=int, y_trim=N_SENSORS,
-    rate_gain=float,  # share of its error that a replaced rate corrects in one sample
-    noisy=int,  # the attitude: then a surface is isolated only once no gyro can be the cause
-    n_frozen=(int, N_SENSORS),  # number of identical samples from which a reading counts as frozen
-    # 1/s: body rates decay with rate' = -D rate; |D|, with -D_ii on its diagonal
-    D=(3, 3), D_size=(3, 3),
-)  # fmt: skip
-
-MONITOR_MEMORY_RECORD = record(
     stage=int, t_start=float, substep=int, exceeded=(int, N_TESTS),
     # since the alarm, rad: by angle, body axis and pole, filtered residual of turning beyond the part of the
     # angle's own residual; by angle and pole, filtered size of the angle's residual; by angle and body axis,
@@ -170,30 +173,13 @@ MONITOR_MEMORY_RECORD = record(
     climb=N_POLES,  # m, filtered: error of the climb, of an incidence with the error that its residuals show
 )  # fmt: skip
 
-MONITOR_OUTPUT_RECORD = record(
-    alarmed=int, alarmed_at_s=float,
-    keeps_surface=int,  # a surface was found long before, with sound sensors: it stays found
-    had_surface=int,  # a surface had been isolated just before the alarm
-    alarm_test=int,  # test that has raised the alarm
-    worst_test_index=int, top_ratio=float,  # test with the largest ratio of this frame, and that ratio
-    suspect=(int, N_SENSORS), isolated_sensor=int, isolated_at_s=float, is_reading_unused=(int, N_SENSORS),
-)  # fmt: skip
-
-SENSOR_MONITOR_RECORD = record(
-    config=MONITOR_CONFIG_RECORD,
-    memory=MONITOR_MEMORY_RECORD,
-    output=MONITOR_OUTPUT_RECORD,
-    redundancy=REDUNDANCY_RECORD,
-    initial_errors=INITIAL_ERRORS_RECORD,
-)
-
 
 def configure_sensor_monitor(monitor: np.void, declared: Declared, design: np.void, y: np.ndarray) -> None:
     """Fill the monitor's record at the trim: y, the measured signals there; design: model of the designer.
 
     A monitor that is not declared has found nothing, and its record holds no more than that.
     """
-    config, red = monitor["config"], monitor["redundancy"]
+    config = monitor["config"]
     fill(monitor["output"], isolated_sensor=NO_SENSOR, alarmed_at_s=-1.0, isolated_at_s=-1.0)
     config["enabled"] = declared.monitors_sensors
     if not declared.monitors_sensors:
@@ -201,39 +187,38 @@ def configure_sensor_monitor(monitor: np.void, declared: Declared, design: np.vo
     initial = cast("Any", declared.initial)  # whose keys the aircraft names
     D = air_rotation_slopes(DesignFunctions(np.array([design])), y)
     engine = declared.aircraft.has_engine_instruments
-    size = np.where(np.eye(3) > 0.0, -D, abs(D))
-    fill(config, substeps=declared.substeps, has_engine=engine, D=D, D_size=size)
+    fill(config, substeps=declared.substeps, has_engine=engine, D=D)
     config["y_trim"][3:7] = y[:4]
-    monitor["memory"]["substep"] = declared.substeps - 1  # the first JSBSim frame ends a frame of the loop
+    monitor["substep"] = declared.substeps - 1  # the first JSBSim frame ends a frame of the loop
     if engine:
-        red["y_pred"][[ENGINE_SPEED, MANIFOLD]] = initial.engine_rpm, initial.manifold_pressure_inhg
-    configure_tests(red, declared)
-    configure_errors(config, red, declared)
+        monitor["y_pred"][[ENGINE_SPEED, MANIFOLD]] = initial.engine_rpm, initial.manifold_pressure_inhg
+    configure_tests(monitor, declared)
+    configure_errors(monitor, declared)
 
 
-def configure_tests(red: np.void, declared: Declared) -> None:
+def configure_tests(monitor: np.void, declared: Declared) -> None:
     """Fill the constants of the equations of motion and of the gusts; a sample is a JSBSim frame."""
     initial, air, h = declared.initial, declared.air, 1.0 / declared.rate_hz / declared.substeps
     gust_max, gust_change = bound_gusts(air, initial.airspeed_mps, h)
     fill(
-        red, h=h, decay=[exp(-lam * h) for lam in FILTER_POLES_PER_S],
+        monitor, h=h, decay=[exp(-lam * h) for lam in FILTER_POLES_PER_S],
         g=GRAVITY_MPS2 * (1.0 + initial.altitude_m / EARTH_RADIUS_M) ** -2,
         gust_max=gust_max, gust_change=gust_change, low_m=air.low_m, wind_max=declared.vertical_wind_mps,
         max_airspeed_mps=MAX_AIRSPEED_OVER_TRIM * initial.airspeed_mps,
     )  # fmt: skip
 
 
-def configure_errors(config: np.void, red: np.void, declared: Declared) -> None:
+def configure_errors(monitor: np.void, declared: Declared) -> None:
     """Fill the declared errors of the readings, and from how many identical samples each is frozen; a sample
     is a JSBSim frame."""
-    sensors, h = declared.sensors, float(red["h"])
-    fill(red, **{name: sensors.each(kind, SENSORS) for name, kind in ERRORS.items()})
+    config, sensors, h = monitor["config"], declared.sensors, float(monitor["h"])
+    fill(monitor, **{name: sensors.each(kind, SENSORS) for name, kind in ERRORS.items()})
     drifts = [getattr(getattr(sensors.declared, name), "drift_rad_s", 0.0) for name in SENSORS]
-    red["drift"] = max(map(abs, drifts))
+    monitor["drift"] = max(map(abs, drifts))
     for i, name in enumerate(SENSORS):
         e = sensors[name]
         config["n_frozen"][i] = n_frozen(e.noise, e.resolution) * frames_apart(i, h)
-    noisy = np.any((red["e_zero"] > red["const"])[PHI : PHI + 3])
+    noisy = np.any((monitor["e_zero"] > monitor["const"])[PHI : PHI + 3])
     fill(config, noisy=noisy, rate_gain=min(1.0, h * RATE_GAIN_PER_S) if noisy else 1.0)
 
 
@@ -375,33 +360,33 @@ def exceeds(r, k, B, x, H):
 
 
 @kernel
-def bound_readings(red, y):
+def bound_readings(mon, y):
     """Bounds by declaration: e = (e_zero + e_slope |y|) / (1 - e_slope), and n = e - const."""
     for i in range(N_SENSORS):
         size = abs(wrapped(y[i]) if i == PSI else y[i])
-        e = (red.e_zero[i] + red.e_slope[i] * size) / (1.0 - red.e_slope[i])
-        red.n[i] = e - red.const[i] + READING_ROUNDING * abs(y[i])
-        red.e[i] = e + red.e_drift if PHI <= i <= PSI else e
+        e = (mon.e_zero[i] + mon.e_slope[i] * size) / (1.0 - mon.e_slope[i])
+        mon.n[i] = e - mon.const[i] + READING_ROUNDING * abs(y[i])
+        mon.e[i] = e + mon.e_drift if PHI <= i <= PSI else e
 
 
 @kernel
-def store_sample(red, y, force):
+def store_sample(mon, y, force):
     """Take y and the specific force (3,) m/s2 as the sample before, for the next one."""
-    red.y_older[:] = red.y_past
-    red.y_past[:] = y
-    red.e_older[:] = red.e_past
-    red.e_past[:] = red.e
-    red.a[:] = combined(1.0, force, red.g, down(y))
+    mon.y_older[:] = mon.y_past
+    mon.y_past[:] = y
+    mon.e_older[:] = mon.e_past
+    mon.e_past[:] = mon.e
+    mon.a[:] = combined(1.0, force, mon.g, down(y))
 
 
 @kernel
-def expect_pressure(red, pressure):
+def expect_pressure(mon, pressure):
     """Predict the manifold pressure, inHg, from the command of the law in charge of the engine."""
-    red.y_pred[MANIFOLD] = pressure
+    mon.y_pred[MANIFOLD] = pressure
 
 
 @kernel
-def predict_readings(red):
+def predict_readings(mon):
     """Fill y_pred: attitude, flow and altitude now, from the sample before. Returns the attitude.
 
     q <- q (1, h w / 2) / |...|: the turn of an Euler step; v <- v + h (3/2 a - 1/2 a_past), turned by -h w,
@@ -409,7 +394,7 @@ def predict_readings(red):
 
         phi = arg(z1^2 - z2*^2),    2 z1 z2 = sin(theta) + i cos(theta) sin(psi)
     """
-    h, y, past = red.h, red.y_pred, red.y_past
+    h, y, past = mon.h, mon.y_pred, mon.y_past
     s1, s2 = complex(1.0, 0.5 * h * past[P]), 0.5 * h * complex(past[Q], past[R])
     size = np.hypot(abs(s1), abs(s2))
     step = s1 / size, s2 / size
@@ -421,10 +406,10 @@ def predict_readings(red):
     V, along = past[AIRSPEED], past[AIRSPEED] * np.cos(past[BETA])
     v = along * np.cos(past[ALPHA]), V * np.sin(past[BETA]), along * np.sin(past[ALPHA])
     y[ALTITUDE] = past[ALTITUDE] - h * dot(v, down(past))
-    a = combined(AB_NOW, red.a, -AB_PAST, red.a_past)
-    red.a_size_past = vector_length(red.a_past)
-    red.a_size[:] = vector_length(a), red.a_size[0], red.a_size[1]
-    red.a_past[:] = turned(step, red.a)
+    a = combined(AB_NOW, mon.a, -AB_PAST, mon.a_past)
+    mon.a_size_past = vector_length(mon.a_past)
+    mon.a_size[:] = vector_length(a), mon.a_size[0], mon.a_size[1]
+    mon.a_past[:] = turned(step, mon.a)
     v = turned(step, combined(1.0, v, h, a))
     y[AIRSPEED] = vector_length(v)
     y[ALPHA] = np.arctan2(v[2], v[0])
@@ -439,29 +424,29 @@ def half_density(y):
 
 
 @kernel
-def fill_residuals(red, y, q):
+def fill_residuals(mon, y, q):
     """Fill the residual of each test: y - y_pred; of turning 2 (q* q_now); of the density
     log(rho / rho_past), rho = qdyn / V^2. q: the attitude as predicted.
     """
     z1, z2 = times(inverse(q), attitude(y))
     side = 2.0 if z1.real >= 0.0 else -2.0
-    red.residual[:ANGLE_TEST] = side * z1.imag, side * z2.real, side * z2.imag
+    mon.residual[:ANGLE_TEST] = side * z1.imag, side * z2.real, side * z2.imag
     for j in range(ANGLE_TEST, RPM_TEST):
-        r = y[SENSOR_OF[j]] - red.y_pred[SENSOR_OF[j]]
-        red.residual[j] = wrapped(r) if j < SPEED_TEST else r
-    red.residual[DENSITY_TEST] = np.log(half_density(y) / half_density(red.y_past))
+        r = y[SENSOR_OF[j]] - mon.y_pred[SENSOR_OF[j]]
+        mon.residual[j] = wrapped(r) if j < SPEED_TEST else r
+    mon.residual[DENSITY_TEST] = np.log(half_density(y) / half_density(mon.y_past))
 
 
 @kernel
-def highest(red, y, i):
+def highest(mon, y, i):
     """Bound |y_i| in this sample and the one before: |y| + e."""
-    return max(abs(y[i]) + red.e[i], abs(red.y_past[i]) + red.e_past[i])
+    return max(abs(y[i]) + mon.e[i], abs(mon.y_past[i]) + mon.e_past[i])
 
 
 @kernel
-def lowest(red, y, i):
+def lowest(mon, y, i):
     """Lower bound on y_i in this sample and the one before: y - e."""
-    return min(y[i] - red.e[i], red.y_past[i] - red.e_past[i])
+    return min(y[i] - mon.e[i], mon.y_past[i] - mon.e_past[i])
 
 
 @kernel
@@ -471,25 +456,25 @@ def secant(angle):
 
 
 @kernel
-def too_steep(red, y):
+def too_steep(mon, y):
     """Whether the tests of turning and of the angles restart, in this sample and the one before."""
-    return highest(red, y, THETA) > MAX_PITCH_RAD
+    return highest(mon, y, THETA) > MAX_PITCH_RAD
 
 
 @kernel
-def bound_acceleration(red, w_max, e_w):
+def bound_acceleration(mon, w_max, e_w):
     """e_a: bound on the error of the acceleration of the elapsed step, m/s2.
 
     A sensor adds to 3/2 y - 1/2 y_before the error 3/2 e_past + 1/2 e_older - const at most: accelerometers,
     and the attitude, which gives gravity its direction. Turning the previous acceleration into the present
     axes adds more.
     """
-    e_a, force2 = EARTH_M_S2 + red.e_first + red.h * AB_PAST * e_w * red.a_size_past, 0.0
+    e_a, force2 = EARTH_M_S2 + mon.e_first + mon.h * AB_PAST * e_w * mon.a_size_past, 0.0
     for i in (PHI, THETA, AX, AX + 1, AX + 2):
-        e = AB_NOW * red.e_past[i] + AB_PAST * red.e_older[i] - red.const[i]
-        e_turn = red.h * w_max * red.const[i]
+        e = AB_NOW * mon.e_past[i] + AB_PAST * mon.e_older[i] - mon.const[i]
+        e_turn = mon.h * w_max * mon.const[i]
         if i < AX:
-            e_a += red.g * (e + e_turn)
+            e_a += mon.g * (e + e_turn)
         else:
             e_a += e_turn
             force2 += e**2
@@ -497,15 +482,15 @@ def bound_acceleration(red, w_max, e_w):
 
 
 @kernel
-def bound_attitude(red, y, w_max, e_w):
+def bound_attitude(mon, y, w_max, e_w):
     """Fill the bounds of `bound_residuals` for the tests of the attitude.
 
     A constant error of the attitude turns with the aircraft: in the rates J(phi, theta) (phi', theta', psi')
     it changes J. A momentary error (brief) turns an axis when it begins, and back when it ends with another
     J. sec: largest 1 / cos(theta).
     """
-    h, e, n, past, const = red.h, red.e_past, red.n, red.y_past, red.const
-    sec, turn = secant(highest(red, y, THETA)), h * w_max
+    h, e, n, past, const = mon.h, mon.e_past, mon.n, mon.y_past, mon.const
+    sec, turn = secant(highest(mon, y, THETA)), h * w_max
     tilt = abs(y[PHI] - past[PHI]) + abs(y[THETA] - past[THETA])
     brief = e[THETA] - const[THETA] + e[PSI] - const[PSI] + n[THETA] + n[PSI]
     axes = w_max * (e[PHI] + (1.0 + sec) * e[THETA] + e[PSI]) + tilt * brief / h + turn * e_w
@@ -513,53 +498,53 @@ def bound_attitude(red, y, w_max, e_w):
     s_theta, s_phi = abs(np.sin(y[THETA])) + n[THETA], abs(np.sin(y[PHI])) + n[PHI]
     coupled = s_theta * n[PSI], s_phi * n[PSI], s_phi * n[THETA]
     for i in range(3):
-        red.per_s[i] = EARTH_TURN_RAD_S + 2.0 * red.drift + e[i] + axes
-        red.per_sample[i] = n[PHI + i] + coupled[i]
-        red.per_s[ANGLE_TEST + i] = sec * angles + red.drift
+        mon.per_s[i] = EARTH_TURN_RAD_S + 2.0 * mon.drift + e[i] + axes
+        mon.per_sample[i] = n[PHI + i] + coupled[i]
+        mon.per_s[ANGLE_TEST + i] = sec * angles + mon.drift
 
 
 @kernel
-def bound_flow(red, y, w_max, e_w):
+def bound_flow(mon, y, w_max, e_w):
     """Fill the bounds of `bound_residuals` for the tests of flow and climb: the largest derivative of their
     kinematics with respect to each reading, times the bound e of the reading.
 
     sec: largest 1 / cos(beta); second: 1 and the second order in h; gust: how much faster a gust changes.
     """
-    h, e, a_size = red.h, red.e_past, red.a_size
-    V = max(lowest(red, y, AIRSPEED), MIN_AIRSPEED_MPS)
-    sec = secant(highest(red, y, BETA))
+    h, e, a_size = mon.h, mon.e_past, mon.a_size
+    V = max(lowest(mon, y, AIRSPEED), MIN_AIRSPEED_MPS)
+    sec = secant(highest(mon, y, BETA))
     vane, e_V = e[ALPHA] + e[BETA], e[AIRSPEED]
-    e_a = bound_acceleration(red, w_max, e_w)
+    e_a = bound_acceleration(mon, w_max, e_w)
     a, second = a_size[0] + e_a, 1.0 + h * (2.0 * a_size[0] / V + w_max)
-    low = max(lowest(red, y, ALTITUDE), LEAST_HEIGHT_M)
-    gust = np.sqrt(max(y[AIRSPEED] / red.max_airspeed_mps, 1.0) * max(red.low_m / low, 1.0))
+    low = max(lowest(mon, y, ALTITUDE), LEAST_HEIGHT_M)
+    gust = np.sqrt(max(y[AIRSPEED] / mon.max_airspeed_mps, 1.0) * max(mon.low_m / low, 1.0))
     flow = second * (sec**2 * ((e_a + a * (vane + e_V / V)) / V + w_max * vane) + sec * e_w)
-    red.per_s[SPEED_TEST:DENSITY_TEST] = e_a + second * a * vane + h * (a / V) ** 2 * e_V, flow, flow
-    red.gust[SPEED_TEST:DENSITY_TEST] = gust, gust * sec / V, gust * sec / V
-    path = (red.y_past[AIRSPEED] + e_V) * (e[PHI] + e[THETA] + vane)
+    mon.per_s[SPEED_TEST:DENSITY_TEST] = e_a + second * a * vane + h * (a / V) ** 2 * e_V, flow, flow
+    mon.gust[SPEED_TEST:DENSITY_TEST] = gust, gust * sec / V, gust * sec / V
+    path = (mon.y_past[AIRSPEED] + e_V) * (e[PHI] + e[THETA] + vane)
     bend = POSITION_FACTOR * h * max(a, a_size[1], a_size[2])
-    red.per_s[CLIMB_TEST] = red.wind_max + red.gust_max + path + e_V + bend
+    mon.per_s[CLIMB_TEST] = mon.wind_max + mon.gust_max + path + e_V + bend
 
 
 @kernel
-def bound_density(red, y):
+def bound_density(mon, y):
     """Fill the bounds of `bound_residuals` for the logarithm of the density: climb over the scale height, and
     log(y) of the dynamic pressure and, twice, of the airspeed: of a constant error e
 
         e |1 / y - 1 / y_past| / (1 - e / y_min)
     """
-    j, past = DENSITY_TEST, red.y_past
-    climb = past[AIRSPEED] + red.e_past[AIRSPEED] + red.wind_max + red.gust_max
-    red.per_s[j], red.per_sample[j] = climb / DENSITY_SCALE_HEIGHT_M, 0.0
+    j, past = DENSITY_TEST, mon.y_past
+    climb = past[AIRSPEED] + mon.e_past[AIRSPEED] + mon.wind_max + mon.gust_max
+    mon.per_s[j], mon.per_sample[j] = climb / DENSITY_SCALE_HEIGHT_M, 0.0
     for i, k, least in ((QDYN, 1.0, MIN_QDYN_PA), (AIRSPEED, 2.0, MIN_AIRSPEED_MPS)):
-        e, y1, y0 = red.const[i], max(y[i], least), max(past[i], least)
+        e, y1, y0 = mon.const[i], max(y[i], least), max(past[i], least)
         e_log = e * abs(1.0 / y1 - 1.0 / y0) / max(1.0 - e / min(y1, y0), MIN_SHARE_LEFT)
-        red.per_s[j] += k * e_log / red.h
-        red.per_sample[j] += k * red.n[i] / max(y[i] - red.e[i], least)
+        mon.per_s[j] += k * e_log / mon.h
+        mon.per_sample[j] += k * mon.n[i] / max(y[i] - mon.e[i], least)
 
 
 @kernel
-def bound_residuals(red, y):
+def bound_residuals(mon, y):
     """Fill per_s and per_sample of each test: the largest effect of sound sensors with the declared errors.
 
     The errors of the sample before act through the prediction, those of this sample through the reading that
@@ -567,90 +552,90 @@ def bound_residuals(red, y):
     """
     e_w = w_max = 0.0
     for i in range(3):
-        e_w += red.e_past[i]
-        w_max += abs(red.y_past[i]) + red.e_past[i]
+        e_w += mon.e_past[i]
+        w_max += abs(mon.y_past[i]) + mon.e_past[i]
     for j in range(ANGLE_TEST, RPM_TEST):
-        red.per_sample[j] = red.n[SENSOR_OF[j]]
-    bound_attitude(red, y, w_max, e_w)
-    bound_flow(red, y, w_max, e_w)
-    bound_density(red, y)
+        mon.per_sample[j] = mon.n[SENSOR_OF[j]]
+    bound_attitude(mon, y, w_max, e_w)
+    bound_flow(mon, y, w_max, e_w)
+    bound_density(mon, y)
 
 
 @kernel
-def filter_test(red, j):
+def filter_test(mon, j):
     """Pass the residual of test j through its filters, a = exp(-pole h); find its largest ratio to the bound:
 
     r <- a r + residual,    B = e_sum + per_sample + gust gust_change,    ratio = max |r| / B
 
     e_sum, the part that the filter sums, as that of a detection filter.
     """
-    r, e, B, n = red.r[j], red.e_sum[j], red.B[j], red.per_sample[j]
-    red.ratio[j] = 0.0
-    leak(r, red.decay, red.residual[j])
-    for m, a in enumerate(red.decay):
-        e[m] = advance_bound(e[m], red.per_s[j], a, red.h, red.past[j])
-        B[m] = e[m] + n + red.gust[j] * red.gust_change[m]
-        red.ratio[j] = max(red.ratio[j], abs(r[m]) / B[m])
-    red.past[j] = n
+    r, e, B, n = mon.r[j], mon.e_sum[j], mon.B[j], mon.per_sample[j]
+    mon.ratio[j] = 0.0
+    leak(r, mon.decay, mon.residual[j])
+    for m, a in enumerate(mon.decay):
+        e[m] = advance_bound(e[m], mon.per_s[j], a, mon.h, mon.past[j])
+        B[m] = e[m] + n + mon.gust[j] * mon.gust_change[m]
+        mon.ratio[j] = max(mon.ratio[j], abs(r[m]) / B[m])
+    mon.past[j] = n
 
 
 @kernel
-def restart_tests(red, n):
+def restart_tests(mon, n):
     """Restart the first n tests with this sample: their filters are empty, and the whole bound per sample is
     still due."""
-    red.ratio[:n] = red.residual[:n] = red.r[:n] = 0.0
+    mon.ratio[:n] = mon.residual[:n] = mon.r[:n] = 0.0
     for j in range(n):
-        red.e_sum[j] = red.past[j] = red.per_sample[j]
+        mon.e_sum[j] = mon.past[j] = mon.per_sample[j]
 
 
 @kernel
-def compare(red, j, residual, bound):
+def compare(mon, j, residual, bound):
     """Judge the residual of test j alone, without a filter, by the bound on it."""
-    red.residual[j], red.B[j, 0] = residual, bound + COMPARISON_ROUNDING
-    red.ratio[j] = abs(residual) / red.B[j, 0]
+    mon.residual[j], mon.B[j, 0] = residual, bound + COMPARISON_ROUNDING
+    mon.ratio[j] = abs(residual) / mon.B[j, 0]
 
 
 @kernel
-def compare_duplicates(red, y, fresh):
+def compare_duplicates(mon, y, fresh):
     """Compare each duplicate sensor i with the reading j that it should equal, in the samples in which it is
     fresh; fresh (sampled sensors,). One of the two is broken if they differ by more than tolerance + e_i +
     e_j.
     """
     for d in range(DUPLICATE.size):
         i, j = DUPLICATE[d], COUNTERPART[d]
-        red.ratio[N_EQUATIONS + d] = 0.0
+        mon.ratio[N_EQUATIONS + d] = 0.0
         if fresh[i - N_IN_EQUATIONS]:
             r = wrapped(y[i] - y[j]) if PHI <= j <= PSI else y[i] - y[j]
-            compare(red, N_EQUATIONS + d, r, DUPLICATE_TOLERANCE[d] + red.e[i] + red.e[j])
+            compare(mon, N_EQUATIONS + d, r, DUPLICATE_TOLERANCE[d] + mon.e[i] + mon.e[j])
 
 
 @kernel
-def start_tests(red, y, force):
+def start_tests(mon, y, force):
     """Start with the first sample, before which no reading is known; force (3,) m/s2."""
-    bound_readings(red, y)
-    store_sample(red, y, force)
-    red.y_older[:] = y
-    red.e_older[:] = red.e_past
-    red.a_past[:] = red.a
-    red.a_size[:2] = vector_length(red.a) + FORCE_JUMP_M_S2
-    red.e_first = AB_PAST * FORCE_JUMP_M_S2
-    bound_residuals(red, y)
-    restart_tests(red, RPM_TEST)
+    bound_readings(mon, y)
+    store_sample(mon, y, force)
+    mon.y_older[:] = y
+    mon.e_older[:] = mon.e_past
+    mon.a_past[:] = mon.a
+    mon.a_size[:2] = vector_length(mon.a) + FORCE_JUMP_M_S2
+    mon.e_first = AB_PAST * FORCE_JUMP_M_S2
+    bound_residuals(mon, y)
+    restart_tests(mon, RPM_TEST)
 
 
 @kernel
-def run_tests(red, y, has_engine):
+def run_tests(mon, y, has_engine):
     """Compare this sample y with the one before."""
-    red.e_drift += red.h * red.drift
-    bound_readings(red, y)
-    fill_residuals(red, y, predict_readings(red))
-    bound_residuals(red, y)
-    red.e_first = 0.0
-    first = SPEED_TEST if too_steep(red, y) else 0
-    restart_tests(red, first)
+    mon.e_drift += mon.h * mon.drift
+    bound_readings(mon, y)
+    fill_residuals(mon, y, predict_readings(mon))
+    bound_residuals(mon, y)
+    mon.e_first = 0.0
+    first = SPEED_TEST if too_steep(mon, y) else 0
+    restart_tests(mon, first)
     for j in range(first, RPM_TEST):
-        filter_test(red, j)
+        filter_test(mon, j)
     if has_engine:
         for j in (RPM_TEST, PRESSURE_TEST):
             i = SENSOR_OF[j]
-            compare(red, j, y[i] - red.y_pred[i], red.e[i])
+            compare(mon, j, y[i] - mon.y_pred[i], mon.e[i])

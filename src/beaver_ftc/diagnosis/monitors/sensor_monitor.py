@@ -48,8 +48,8 @@ error e t; an error of a flow sensor is a step, which its own reading contains. 
 The direction of the spurious velocity dv, which the residuals add up to, says which accelerometer is broken.
 
 Symbols: redundancy.py and initial_errors.py; i sensor or axis, j test, m pole, d duplicate, h hypothesis of
-initial_errors.py. mon: record of the monitor; M its memory, o its output, red the tests, ini the hypotheses,
-found the conclusion about surfaces, bank the detection filters, pred the prediction of the model.
+initial_errors.py. mon: record of the monitor; o its output; found the conclusion
+about surfaces, bank the detection filters, pred the prediction of the model.
 """
 
 import numpy as np
@@ -97,7 +97,6 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     SPEED_TEST,
     THETA,
     compare_duplicates,
-    dot,
     exceeds,
     run_tests,
     speed,
@@ -165,54 +164,57 @@ def check_sensors(mon, pred, measured, found, bank, bound, dt, t):
 
     bank: with the innovation of the elapsed frame, of dt s; bound: with the bound on that innovation.
     """
-    M, red, y = mon.memory, mon.redundancy, measured.signal
-    if not M.stage:  # the first sample: there is none to compare it with
-        M.stage, M.t_start, red.e_drift = 1, t, red.drift * t
-        start_tests(red, y, measured.force)
-        start_bounds(mon.initial_errors, y)
+    y = measured.signal
+    if not mon.stage:  # the first sample: there is none to compare it with
+        mon.stage, mon.t_start, mon.e_drift = 1, t, mon.drift * t
+        start_tests(mon, y, measured.force)
+        start_bounds(mon, y)
     else:
-        if M.substep == 0:
+        if mon.substep == 0:
             advance_gyro_estimate(mon, bank.output.innovation, bound.eta_bar, dt)
-        run_tests(red, y, mon.config.has_engine)
+        run_tests(mon, y, mon.config.has_engine)
         if N_TESTS > N_EQUATIONS:
-            compare_duplicates(red, y, measured.fresh)
+            compare_duplicates(mon, y, measured.fresh)
             latch_agreed(mon, measured.fresh)
-        update_bounds(red, mon.initial_errors, y)
+        update_bounds(mon, y)
         count_same(mon, y)
-        follow_gyro_errors(M, red)
-        if too_steep(red, y):
-            restart_comparison(M)
+        follow_gyro_errors(mon)
+        if too_steep(mon, y):
+            restart_comparison(mon)
         else:
-            advance_stage(M)
+            advance_stage(mon)
             if mon.config.noisy:
                 exclude_gyros(mon)
         isolate_sensor(mon, measured, found, bank, bound, dt, t)
         replace_readings(mon, pred, measured)
-        store_sample(red, y, measured.force)
-    M.substep = (M.substep + 1) % mon.config.substeps
+        store_sample(mon, y, measured.force)
+    mon.substep = (mon.substep + 1) % mon.config.substeps
 
 
 @kernel
 def advance_gyro_estimate(mon, nu, eta, dt):
     """Advance w, the gyro's error (3,) rad/s if the dynamics are right, and its bound B by a frame of dt s:
 
-    w <- w + dt (nu - D w),    B <- B + dt (eta + |D| B), with -D_ii on the diagonal of |D|
+    w <- A w + dt nu,    B <- |A| B + dt eta,    A = I - dt D
 
     nu, eta (3,): innovation and its bound, rad/s2.
     """
-    c, w, B = mon.config, mon.memory.w, mon.memory.w_bound
+    w, B = mon.w, mon.w_bound
     w0, B0 = (w[0], w[1], w[2]), (B[0], B[1], B[2])
     for i in range(3):
-        w[i] += dt * (nu[i] - dot(c.D[i], w0))
-        B[i] = max(B[i] + dt * (eta[i] + dot(c.D_size[i], B0)), 0.0)
+        w[i], B[i] = dt * nu[i], dt * eta[i]
+        for j in range(3):
+            A = (i == j) - dt * mon.config.D[i, j]
+            w[i] += A * w0[j]
+            B[i] += abs(A) * B0[j]
 
 
 @kernel
 def latch_agreed(mon, fresh):
     """Record which sensors have agreed, before any alarm, with the reading that they should equal."""
     for d, i in enumerate(DUPLICATE):
-        agrees = mon.redundancy.ratio[N_EQUATIONS + d] <= 1.0 and not mon.output.alarmed
-        mon.memory.agreed[d] |= fresh[i - N_IN_EQUATIONS] and agrees
+        agrees = mon.ratio[N_EQUATIONS + d] <= 1.0 and not mon.output.alarmed
+        mon.agreed[d] |= fresh[i - N_IN_EQUATIONS] and agrees
 
 
 @kernel
@@ -220,18 +222,18 @@ def count_same(mon, y):
     """Count the samples for which each reading has been the very same, and find the largest jump of an
     accelerometer from one sample to the next, m/s2, which fades within JUMP_MEMORY_S.
     """
-    M, past = mon.memory, mon.redundancy.y_past
-    M.jump *= 1.0 - mon.redundancy.h / JUMP_MEMORY_S
+    past = mon.y_past
+    mon.jump *= 1.0 - mon.h / JUMP_MEMORY_S
     for i in range(N_SENSORS):
-        M.n_same[i] = M.n_same[i] + 1 if y[i] == past[i] else 0
+        mon.n_same[i] = mon.n_same[i] + 1 if y[i] == past[i] else 0
     for i in FORCES:
-        M.jump = max(M.jump, abs(y[i] - past[i]))
+        mon.jump = max(mon.jump, abs(y[i] - past[i]))
 
 
 @kernel
 def is_frozen(mon, i):
     """Whether a sensor is frozen: no sound one gives the same reading for so many samples."""
-    return mon.memory.n_same[i] >= mon.config.n_frozen[i]
+    return mon.n_same[i] >= mon.config.n_frozen[i]
 
 
 @kernel
@@ -246,49 +248,49 @@ def last_frozen(mon, sensors):
 @kernel
 def stands_still(mon, i):
     """Whether a sensor is frozen at a reading that is not zero: a sound one may read zero."""
-    return mon.redundancy.y_past[i] != 0.0 and is_frozen(mon, i)
+    return mon.y_past[i] != 0.0 and is_frozen(mon, i)
 
 
 @kernel
-def follow_gyro_errors(M, red):
+def follow_gyro_errors(mon):
     """Keep what the attitude shows of each gyro's error, if it is right itself: SHOWN as a frame begins, MOST
     and LEAST of its size in the other samples of the frame. shown[1], shown[2]: of the two frames before."""
-    shown = M.shown
-    if M.substep == 0:
+    shown = mon.shown
+    if mon.substep == 0:
         shown[2] = shown[1]
         shown[1] = shown[0]
         shown[0, MOST:] = 0.0
     for i in range(3):
-        w = -red.residual[i] / red.h
-        if M.substep == 0:
+        w = -mon.residual[i] / mon.h
+        if mon.substep == 0:
             shown[0, SHOWN, i] = w
         else:
             shown[0, MOST, i] = max(shown[0, MOST, i], abs(w))
-            shown[0, LEAST, i] = abs(w) if M.substep == 1 else min(shown[0, LEAST, i], abs(w))
+            shown[0, LEAST, i] = abs(w) if mon.substep == 1 else min(shown[0, LEAST, i], abs(w))
 
 
 @kernel
-def restart_comparison(M):
+def restart_comparison(mon):
     """Compare w with the attitude only from the next sample on: a test that restarts has no residual, and
     shows neither an error nor its absence.
     """
-    M.stage = 1
-    M.gap[:] = M.gap_bound[:] = 0.0
-    M.beyond[:] = 0.0
-    M.swing[:] = 0.0
-    M.c_max[:] = 0.0
+    mon.stage = 1
+    mon.gap[:] = mon.gap_bound[:] = 0.0
+    mon.beyond[:] = 0.0
+    mon.swing[:] = 0.0
+    mon.c_max[:] = 0.0
 
 
 @kernel
-def advance_stage(M):
+def advance_stage(mon):
     """Widen the bound on w by a gyro's error of the first sample, which has caused no innovation. The first
     frame shows no change of an error.
     """
-    if M.stage < FULL_STAGE and M.substep == 0:
-        M.stage += 1
+    if mon.stage < FULL_STAGE and mon.substep == 0:
+        mon.stage += 1
         for i in range(3):
-            if M.stage < FULL_STAGE:
-                M.w_bound[i] += abs(M.shown[0, SHOWN, i])
+            if mon.stage < FULL_STAGE:
+                mon.w_bound[i] += abs(mon.shown[0, SHOWN, i])
 
 
 @kernel
@@ -297,22 +299,21 @@ def exclude_gyros(mon):
 
     gap <- a gap + residual + h w. Where the attitude is noisy, a surface is isolated only after that.
     """
-    M, red = mon.memory, mon.redundancy
     for i in range(3):
-        w = M.w[i]
-        leak(M.gap[i], red.decay, red.residual[i] + red.h * w)
-        leak(M.gap_bound[i], red.decay, red.h * (M.w_bound[i] + attitude.DAMPING_TOLERANCE * abs(w)))
-        if exceeds(M.gap[i], 1.0, M.gap_bound[i], 1.0, red.B[i]):
+        w = mon.w[i]
+        leak(mon.gap[i], mon.decay, mon.residual[i] + mon.h * w)
+        leak(mon.gap_bound[i], mon.decay, mon.h * (mon.w_bound[i] + attitude.DAMPING_TOLERANCE * abs(w)))
+        if exceeds(mon.gap[i], 1.0, mon.gap_bound[i], 1.0, mon.B[i]):
             rule_out_gyros(mon)
 
 
 @kernel
 def isolate_sensor(mon, measured, found, bank, bound, dt, t):
     """Raise the alarm, and isolate the sensor once it is the only suspect."""
-    o, M, red = mon.output, mon.memory, mon.redundancy
-    if M.substep == 0:  # the test with the largest ratio, of the samples of this frame
+    o = mon.output
+    if mon.substep == 0:  # the test with the largest ratio, of the samples of this frame
         o.worst_test_index, o.top_ratio = 0, 0.0
-    for j, ratio in enumerate(red.ratio):
+    for j, ratio in enumerate(mon.ratio):
         if ratio > o.top_ratio:
             o.worst_test_index, o.top_ratio = j, ratio
     for i in range(N_SENSORS):
@@ -324,10 +325,10 @@ def isolate_sensor(mon, measured, found, bank, bound, dt, t):
     if o.top_ratio > 1.0 and not o.alarmed:
         raise_alarm(mon, found, t)
         o.alarm_test = o.worst_test_index
-        mon.initial_errors.e_alarm[:] = mon.initial_errors.e
+        mon.E_alarm[:] = mon.E
     if o.alarmed:
-        filter_beyond(M, red, measured.signal)
-        if M.substep == 0 and M.stage == FULL_STAGE:
+        filter_beyond(mon, measured.signal)
+        if mon.substep == 0 and mon.stage == FULL_STAGE:
             judge_gyros(mon, bank, bound, dt)
         latch_exceeded(mon)
         if SPEED_TEST <= o.alarm_test <= BETA_TEST:
@@ -362,19 +363,19 @@ def mark_isolated(mon, i, t):
 
 
 @kernel
-def filter_beyond(M, red, y):
+def filter_beyond(mon, y):
     """Filter what the tests of turning show beyond an error of one angle i, for each of phi, theta and psi.
 
     An error that changes by x within a sample moves the residual of its angle by x and that of body axis j by
     c_j x (turn_share). If this angle alone is wrong, r_j - c_j r_i contains noise alone.
     """
     for i in range(3):
-        r = red.residual[ANGLE_TEST + i]
-        leak(M.swing[i], red.decay, abs(r))
+        r = mon.residual[ANGLE_TEST + i]
+        leak(mon.swing[i], mon.decay, abs(r))
         for j in range(3):
             c = turn_share(y, j, i)
-            M.c_max[i, j] = max(M.c_max[i, j], abs(c))
-            leak(M.beyond[i, j], red.decay, red.residual[j] - c * r)
+            mon.c_max[i, j] = max(mon.c_max[i, j], abs(c))
+            leak(mon.beyond[i, j], mon.decay, mon.residual[j] - c * r)
 
 
 @kernel
@@ -395,15 +396,15 @@ def judge_gyros(mon, bank, bound, dt):
     and varies between them, as noise does (varies), the innovation cannot be compared with its jump: the
     innovation contains the errors as the frames begin, and the attitude shows those of the samples before.
     """
-    M, red, nu, shown = mon.memory, mon.redundancy, bank.output.innovation, mon.memory.shown
+    nu, shown = bank.output.innovation, mon.shown
     for i in range(3):
-        if M.gyro_verdict[i] != GYRO_OPEN:
+        if mon.gyro_verdict[i] != GYRO_OPEN:
             continue
         now, past, older = shown[0, SHOWN, i], shown[1, SHOWN, i], shown[2, MOST, i]
-        peak, floor, estimate, B = shown[1, MOST, i], shown[1, LEAST, i], abs(M.w[i]), M.w_bound[i]
+        peak, floor, estimate, B = shown[1, MOST, i], shown[1, LEAST, i], abs(mon.w[i]), mon.w_bound[i]
         largest, jump = max(abs(now), abs(past)), (now - past) / dt  # rad/s, rad/s2
         # of w, rad/s, by the attitude's noise
-        noise = SAMPLES_IN_JUMP * red.per_sample[i] / red.h
+        noise = SAMPLES_IN_JUMP * mon.per_sample[i] / mon.h
         nu_max = bound.nu_max[i] + RATE_ROUNDING
         shows = abs(nu[i]) > nu_max or bank_axis(bank) >= 0 or estimate > B + RATE_ROUNDING
         brief = max(largest, peak) < TRANSIENT_LEFT * older and older > MIN_TRANSIENT * noise
@@ -412,9 +413,9 @@ def judge_gyros(mon, bank, bound, dt):
         varies = noise < floor < peak / (1.0 + JUMP_TOLERANCE)
         allowed = MIN_ESTIMATED_SHARE * abs(now) <= B + estimate + noise
         if fits and shows:
-            M.gyro_verdict[i] = GYRO_CONFIRMED
+            mon.gyro_verdict[i] = GYRO_CONFIRMED
         elif not (fits or varies) or (not shows and (brief or not allowed)):
-            M.gyro_verdict[i] = GYRO_REFUTED
+            mon.gyro_verdict[i] = GYRO_REFUTED
 
 
 @kernel
@@ -422,26 +423,26 @@ def latch_exceeded(mon):
     """Record the tests that have exceeded their bounds since the alarm; of turning, and of the angles, those
     that exceed them by more than an error on another axis explains.
     """
-    red, exceeded = mon.redundancy, mon.memory.exceeded
+    exceeded = mon.exceeded
     for j in range(N_TESTS):
         least = 0.0
         for i in range(j - j % 3, j - j % 3 + 3):
-            least = max(least, COUPLING_SHARE * abs(red.r[i, 0])) if j < SPEED_TEST else -1.0
-        exceeded[j] |= red.ratio[j] > 1.0 and abs(red.r[j, 0]) > least
-    latch_refuted(red, mon.initial_errors, exceeded)
+            least = max(least, COUPLING_SHARE * abs(mon.r[i, 0])) if j < SPEED_TEST else -1.0
+        exceeded[j] |= mon.ratio[j] > 1.0 and abs(mon.r[j, 0]) > least
+    latch_refuted(mon, exceeded)
 
 
 @kernel
 def clear_sensors(mon, y):
     """Clear the flow sensor, or the accelerometers, by this sample, that of the alarm or a later one."""
-    M, alarm = mon.memory, mon.output.alarm_test
+    alarm = mon.output.alarm_test
     flow = SENSOR_OF[alarm]
-    by_density = alarm == SPEED_TEST and M.exceeded[DENSITY_TEST]
+    by_density = alarm == SPEED_TEST and mon.exceeded[DENSITY_TEST]
     if is_frozen(mon, flow) or flow_jumped(mon, y, flow) or by_density:
-        M.cleared[AX:] = 1
+        mon.cleared[AX:] = 1
     sum_flow(mon, y)
-    if sum_exceeds_range(M, alarm - SPEED_TEST) or contradicted(mon, y) or last_frozen(mon, FORCES) >= 0:
-        M.cleared[flow] = 1
+    if sum_exceeds_range(mon, alarm - SPEED_TEST) or contradicted(mon, y) or last_frozen(mon, FORCES) >= 0:
+        mon.cleared[flow] = 1
     clear_gyros(mon, y)
 
 
@@ -452,12 +453,12 @@ def flow_jumped(mon, y, i):
 
     per_a: residual for an acceleration error of 1 m/s2 in one sample. ddy: second difference of the reading.
     """
-    j, red, M = mon.output.alarm_test, mon.redundancy, mon.memory
-    per_a = red.h / (1.0 if j == SPEED_TEST else speed(red.y_past))
-    ddy, r = abs(y[i] - 2.0 * red.y_past[i] + red.y_older[i]), abs(red.residual[j])
-    soon = M.n_since * red.h < JUMP_WINDOW_S - TIME_ROUNDING_S
-    leaps = r > red.B[j, 0] + FORCE_JUMP_M_S2 * per_a
-    return soon and leaps and ddy >= MIN_JUMP_SHARE * r > AB_NOW * M.jump * per_a
+    j = mon.output.alarm_test
+    per_a = mon.h / (1.0 if j == SPEED_TEST else speed(mon.y_past))
+    ddy, r = abs(y[i] - 2.0 * mon.y_past[i] + mon.y_older[i]), abs(mon.residual[j])
+    soon = mon.n_since * mon.h < JUMP_WINDOW_S - TIME_ROUNDING_S
+    leaps = r > mon.B[j, 0] + FORCE_JUMP_M_S2 * per_a
+    return soon and leaps and ddy >= MIN_JUMP_SHARE * r > AB_NOW * mon.jump * per_a
 
 
 @kernel
@@ -467,48 +468,48 @@ def sum_flow(mon, y):
 
     alpha: error of the incidence that the sums leave unexplained, rad; climb: its effect in a sample, m.
     """
-    red, M, ini = mon.redundancy, mon.memory, mon.initial_errors
     for n in range(3):
         j = SPEED_TEST + n
         y_n = y[SENSOR_OF[j]]
-        if M.n_since == 0:
-            M.y_min[n] = M.y_max[n] = y_n
+        if mon.n_since == 0:
+            mon.y_min[n] = mon.y_max[n] = y_n
             # noise of the first and of the last sample
-            M.B_sum[n] = 2.0 * red.per_sample[j] + red.gust[j] * red.gust_max
+            mon.B_sum[n] = 2.0 * mon.per_sample[j] + mon.gust[j] * mon.gust_max
             continue
-        M.r_sum[n] += red.residual[j]
-        M.B_sum[n] += red.h * red.per_s[j]
-        M.H_sum[n] += ini.e_alarm[n] * ini.H[n, j]
-        M.y_min[n], M.y_max[n] = min(M.y_min[n], y_n), max(M.y_max[n], y_n)
-    r, B = M.r_sum[1], M.B_sum[1] + M.H_sum[1]
+        mon.r_sum[n] += mon.residual[j]
+        mon.B_sum[n] += mon.h * mon.per_s[j]
+        mon.H_sum[n] += mon.E_alarm[n] * mon.H[n, j]
+        mon.y_min[n], mon.y_max[n] = min(mon.y_min[n], y_n), max(mon.y_max[n], y_n)
+    r, B = mon.r_sum[1], mon.B_sum[1] + mon.H_sum[1]
     alpha = r - min(max(r, -B), B)
-    leak(M.climb, red.decay, red.h * y[AIRSPEED] * alpha * np.cos(y[PHI]) * np.cos(y[THETA]))
-    M.n_since += 1
+    leak(mon.climb, mon.decay, mon.h * y[AIRSPEED] * alpha * np.cos(y[PHI]) * np.cos(y[THETA]))
+    mon.n_since += 1
 
 
 @kernel
-def sum_exceeds_range(M, n):
+def sum_exceeds_range(mon, n):
     """Whether the residuals add up to more than an error of a flow sensor whose reading has this range."""
-    span = M.y_max[n] - M.y_min[n]
-    return span > 0.0 and abs(M.r_sum[n]) > MIN_SUM_RATIO * span + CLEAR_FACTOR * (M.B_sum[n] + M.H_sum[n])
+    span = mon.y_max[n] - mon.y_min[n]
+    least = MIN_SUM_RATIO * span + CLEAR_FACTOR * (mon.B_sum[n] + mon.H_sum[n])
+    return span > 0.0 and abs(mon.r_sum[n]) > least
 
 
 @kernel
 def contradicted(mon, y):
     """Whether an airspeed of this error would exceed the test of the density, or an incidence that of the
     climb, while that test is within its bound."""
-    red, ini, alarm = mon.redundancy, mon.initial_errors, mon.output.alarm_test
+    alarm = mon.output.alarm_test
     other = DENSITY_TEST if alarm == SPEED_TEST else CLIMB_TEST
-    if alarm == BETA_TEST or mon.memory.exceeded[other]:
+    if alarm == BETA_TEST or mon.exceeded[other]:
         return False
     h = alarm - SPEED_TEST
-    e, H, B = ini.e_alarm[h], ini.H_m[h, other], red.B[other]
+    e, H, B = mon.E_alarm[h], mon.H_m[h, other], mon.B[other]
     if alarm == ALPHA_TEST:
-        return exceeds(mon.memory.climb, CLEAR_FACTOR, B, CLEAR_FACTOR * e, H)
+        return exceeds(mon.climb, CLEAR_FACTOR, B, CLEAR_FACTOR * e, H)
     # log(density) changes by twice the relative change of the airspeed
     k = CLEAR_FACTOR * speed(y) / (2.0 * (1.0 - min(e, 1.0)))
     for m in range(B.size):
-        if abs(red.r[SPEED_TEST, m]) - red.B[SPEED_TEST, m] > k * (B[m] + e * H[m]):
+        if abs(mon.r[SPEED_TEST, m]) - mon.B[SPEED_TEST, m] > k * (B[m] + e * H[m]):
             return True
     return False
 
@@ -520,12 +521,12 @@ def clear_gyros(mon, y):
 
     turn_max, rad: by noise and constant errors with the declared probability (attitude.py), 0 if unknown.
     """
-    M, red, alarm = mon.memory, mon.redundancy, mon.output.alarm_test
-    least = abs(red.residual[alarm]) - red.B[alarm, 0]
-    if alarm == SPEED_TEST or too_steep(red, y) or not 0.0 < M.turn_max < least:
+    alarm = mon.output.alarm_test
+    least = abs(mon.residual[alarm]) - mon.B[alarm, 0]
+    if alarm == SPEED_TEST or too_steep(mon, y) or not 0.0 < mon.turn_max < least:
         return
     for i in range(3):
-        M.cleared[i] |= abs(red.residual[i]) < M.turn_max
+        mon.cleared[i] |= abs(mon.residual[i]) < mon.turn_max
 
 
 @kernel
@@ -547,7 +548,7 @@ def find_suspects(mon):
         if suspect[i] and stands_still(mon, i):
             return
     for h, i in enumerate(INITIAL_SENSOR):
-        suspect[i] |= explains_exceeded(mon.initial_errors, h, alarm)
+        suspect[i] |= explains_exceeded(mon, h, alarm)
 
 
 @kernel
@@ -559,13 +560,13 @@ def suspect_duplicate(mon, d):
 
     No test shows an error that a reading has had from the first sample on, nor a frozen reading.
     """
-    red, M, suspect = mon.redundancy, mon.memory, mon.output.suspect
+    suspect = mon.output.suspect
     i, own, j = COUNTERPART[d], COUNTERPART_TEST[d], N_EQUATIONS + d
     # of the reading, if it is the broken one
-    least = abs(red.residual[j]) - red.B[j, 0]
-    hidden = least <= HIDDEN_FACTOR * max(red.B[own, 0], red.e[i])
-    suspect[DUPLICATE[d]] = not M.exceeded[own]
-    suspect[i] = M.exceeded[own] == 1 or hidden or is_frozen(mon, i) or not M.agreed[d]
+    least = abs(mon.residual[j]) - mon.B[j, 0]
+    hidden = least <= HIDDEN_FACTOR * max(mon.B[own, 0], mon.e[i])
+    suspect[DUPLICATE[d]] = not mon.exceeded[own]
+    suspect[i] = mon.exceeded[own] == 1 or hidden or is_frozen(mon, i) or not mon.agreed[d]
 
 
 @kernel
@@ -579,19 +580,19 @@ def suspect_attitude(mon):
     """Suspect gyros and attitude: one axis alone, or one angle alone, but for what an error of phi or theta
     from the start explains. A gyro's error may appear in an angle first. A frozen angle excludes the gyros;
     it is suspected until it is known not to be frozen."""
-    M, suspect, ratio = mon.memory, mon.output.suspect, mon.redundancy.ratio[:ANGLE_TEST]
-    turns, angles = M.exceeded[:ANGLE_TEST], M.exceeded[ANGLE_TEST:SPEED_TEST]
-    refuted = mon.initial_errors.refuted[H_PHI:, ANGLE_TEST:SPEED_TEST]
+    suspect, ratio = mon.output.suspect, mon.ratio[:ANGLE_TEST]
+    turns, angles = mon.exceeded[:ANGLE_TEST], mon.exceeded[ANGLE_TEST:SPEED_TEST]
+    refuted = mon.refuted[H_PHI:, ANGLE_TEST:SPEED_TEST]
     frozen, worst = last_frozen(mon, ANGLES) >= 0, np.argmax(ratio)
     for i in range(3):
-        suspect[i] = alone(turns, i) and M.gyro_verdict[i] != GYRO_REFUTED and not frozen
+        suspect[i] = alone(turns, i) and mon.gyro_verdict[i] != GYRO_REFUTED and not frozen
         explains, k = explains_turns(mon, i), PHI + i
         unshared = alone(angles, i) if i == 2 else alone(refuted[i], i)
         only = unshared and (explains or angles[i] == 1)
         axis = worst if ratio[worst] > ratio[i] else i
         # too early to say
-        early = 0 < M.n_same[k] < mon.config.n_frozen[k] < N_FROZEN_NEVER
-        suspect[k] = (only and M.gyro_verdict[axis] != GYRO_CONFIRMED) or (explains and early)
+        early = 0 < mon.n_same[k] < mon.config.n_frozen[k] < N_FROZEN_NEVER
+        suspect[k] = (only and mon.gyro_verdict[axis] != GYRO_CONFIRMED) or (explains and early)
 
 
 @kernel
@@ -599,18 +600,17 @@ def explains_turns(mon, i):
     """Whether an error x of angle i (phi, theta, psi) explains the tests of the axes: one as large as the
     residual of the angle's own test allows now, or as its residuals since the alarm have shown.
     """
-    M, red, ini = mon.memory, mon.redundancy, mon.initial_errors
     own, h = ANGLE_TEST + i, min(H_PHI + i, N_INITIAL - 1)
-    initial = ini.e_alarm[h] if i < 2 else 0.0
-    tilt = red.e[PHI] + red.e[THETA]
+    initial = mon.E_alarm[h] if i < 2 else 0.0
+    tilt = mon.e[PHI] + mon.e[THETA]
     for j in range(3):
-        r, c = red.r[j], abs(turn_share(red.y_past, j, i)) + tilt
+        r, c = mon.r[j], abs(turn_share(mon.y_past, j, i)) + tilt
         for m in range(r.size):
-            B = red.B[own, m]
-            sound = red.B[j, m] + initial * ini.H_m[h, j, m]
-            now = abs(r[m]) > c * (abs(red.r[own, m]) + B) + sound
-            since = abs(M.beyond[i, j, m]) > sound + M.c_max[i, j] * B + tilt * M.swing[i, m]
-            if M.exceeded[j] and now and since:
+            B = mon.B[own, m]
+            sound = mon.B[j, m] + initial * mon.H_m[h, j, m]
+            now = abs(r[m]) > c * (abs(mon.r[own, m]) + B) + sound
+            since = abs(mon.beyond[i, j, m]) > sound + mon.c_max[i, j] * B + tilt * mon.swing[i, m]
+            if mon.exceeded[j] and now and since:
                 return False
     return True
 
@@ -620,7 +620,7 @@ def suspect_flow(mon, alarm):
     """Suspect a flow sensor, an accelerometer, or a gyro whose error may be hidden in the tests of the
     attitude. No flow sensor moves the attitude's tests.
     """
-    suspect, cleared, turns = mon.output.suspect, mon.memory.cleared, mon.memory.exceeded[:ANGLE_TEST]
+    suspect, cleared, turns = mon.output.suspect, mon.cleared, mon.exceeded[:ANGLE_TEST]
     by_gyro, flow = alarm > SPEED_TEST and turns.any(), SENSOR_OF[alarm]
     for i in range(3 if alarm > SPEED_TEST else 0):
         suspect[i] = (turns[i] and alone(turns, i)) if by_gyro else gyro_hidden(mon, alarm, i)
@@ -637,13 +637,12 @@ def gyro_hidden(mon, j, i):
     its axis. All of the error of the gyro across the flow (q for the incidence, r for the sideslip) turns it;
     of another a share, by kinematics; q does not act on the sideslip.
     """
-    red = mon.redundancy
-    s, c = np.sin(red.y_past[ALPHA]), np.cos(red.y_past[ALPHA])
-    t = np.tan(red.y_past[BETA])
+    s, c = np.sin(mon.y_past[ALPHA]), np.cos(mon.y_past[ALPHA])
+    t = np.tan(mon.y_past[BETA])
     share = (t * c, 1.0, t * s)[i] if j == ALPHA_TEST else (s, 0.0, 1.0)[i]
     full = i == j - SPEED_TEST
     k = HIDDEN_FACTOR if full else 1.0
-    return (full or i != 1) and not exceeds(red.r[j], k, red.B[j], HIDDEN_FACTOR * abs(share), red.B[i])
+    return (full or i != 1) and not exceeds(mon.r[j], k, mon.B[j], HIDDEN_FACTOR * abs(share), mon.B[i])
 
 
 @kernel
@@ -652,7 +651,7 @@ def suspect_accelerometers(mon):
     r_sum, m/s and rad; plane: turned by beta; body: then by alpha. least: less the bound on |dv| of sound
     sensors.
     """
-    y, r, B = mon.redundancy.y_past, mon.memory.r_sum, mon.memory.B_sum
+    y, r, B = mon.y_past, mon.r_sum, mon.B_sum
     alpha, beta, V = y[ALPHA], y[BETA], speed(y)
     plane = complex(r[0], V * r[2]) * complex(np.cos(beta), np.sin(beta))
     body = complex(plane.real, V * np.cos(beta) * r[1]) * complex(np.cos(alpha), np.sin(alpha))
@@ -666,27 +665,27 @@ def suspect_accelerometers(mon):
 def suspect_lone(mon, alarm):
     """Suspect the sensor that takes part in no other test, of kinematics if none is exceeded; and the
     airspeed, unless the error that the density shows would exceed the bound of the airspeed's own test."""
-    M, red, ini, suspect = mon.memory, mon.redundancy, mon.initial_errors, mon.output.suspect
-    suspect[SENSOR_OF[alarm]] = alarm >= RPM_TEST or alone(M.exceeded[:RPM_TEST], alarm)
+    suspect = mon.output.suspect
+    suspect[SENSOR_OF[alarm]] = alarm >= RPM_TEST or alone(mon.exceeded[:RPM_TEST], alarm)
     if alarm == DENSITY_TEST:
-        e, H = ini.e_alarm[H_AIRSPEED], ini.H_m[H_AIRSPEED, alarm]
+        e, H = mon.E_alarm[H_AIRSPEED], mon.H_m[H_AIRSPEED, alarm]
         # a relative change of the airspeed changes log(density) by twice as much
-        k = 2.0 * HIDDEN_FACTOR * (1.0 + e) / speed(red.y_past)
-        hidden = not exceeds(red.r[alarm], k, red.B[SPEED_TEST], e, H)
+        k = 2.0 * HIDDEN_FACTOR * (1.0 + e) / speed(mon.y_past)
+        hidden = not exceeds(mon.r[alarm], k, mon.B[SPEED_TEST], e, H)
         # its test need not show an error if it is frozen
-        suspect[AIRSPEED] = M.exceeded[SPEED_TEST] == 1 or hidden or M.n_same[AIRSPEED] > 0
+        suspect[AIRSPEED] = mon.exceeded[SPEED_TEST] == 1 or hidden or mon.n_same[AIRSPEED] > 0
 
 
 @kernel
 def add_turn(mon, att, y):
     """Add to the comparison of attitude and rates what the attitude has turned beyond the gyros in this
     sample; near the vertical it shows no turn."""
-    if too_steep(mon.redundancy, y):
+    if too_steep(mon, y):
         attitude.restart(att)
         return
     for i in range(3):
-        attitude.add_turn(att, i, mon.redundancy.residual[i])
-    mon.memory.turn_max = att.turn_max
+        attitude.add_turn(att, i, mon.residual[i])
+    mon.turn_max = att.turn_max
 
 
 @kernel
@@ -702,7 +701,7 @@ def name_gyro(mon, found, i, t):
 @kernel
 def rule_out_gyros(mon):
     """No gyro can be broken: a surface may be isolated."""
-    mon.memory.gyros_excluded = 1
+    mon.gyros_excluded = 1
 
 
 @kernel
@@ -723,14 +722,14 @@ def allows_isolation(mon, is_earlier):
 @kernel
 def doubts_gyros(mon):
     """Whether a gyro may be the cause of the alarm of the surfaces."""
-    return mon.config.enabled == 1 and mon.config.noisy == 1 and mon.memory.gyros_excluded == 0
+    return mon.config.enabled == 1 and mon.config.noisy == 1 and mon.gyros_excluded == 0
 
 
 @kernel
 def may_be_initial(mon, detected_at_s):
     """Whether the alarm of the surfaces is so early that an error which a flow sensor has had from the start
     may have caused it: the design model uses its reading from the first frame on."""
-    return mon.config.enabled and detected_at_s < mon.memory.t_start + INITIAL_WINDOW_S
+    return mon.config.enabled and detected_at_s < mon.t_start + INITIAL_WINDOW_S
 
 
 @kernel
@@ -761,16 +760,15 @@ def replace_readings(mon, pred, measured):
 @kernel
 def estimate_reading(mon, pred, y, i):
     """The estimate of a sensor's reading from the other sensors, in its unit."""
-    red = mon.redundancy
     if i < 3:
         return estimate_rate(mon, pred, i)
-    rho = 2.0 * red.y_past[QDYN] / red.y_past[AIRSPEED] ** 2
+    rho = 2.0 * mon.y_past[QDYN] / mon.y_past[AIRSPEED] ** 2
     if i == AIRSPEED:
         return np.sqrt(max(2.0 * y[QDYN] / rho, MIN_AIRSPEED_MPS**2))
     if i == QDYN:
         return 0.5 * rho * y[AIRSPEED] ** 2
-    back = red.h / VANE_RETURN_S if i in (ALPHA, BETA) else 0.0
-    return red.y_pred[i] + back * (mon.config.y_trim[i] - red.y_pred[i])
+    back = mon.h / VANE_RETURN_S if i in (ALPHA, BETA) else 0.0
+    return mon.y_pred[i] + back * (mon.config.y_trim[i] - mon.y_pred[i])
 
 
 @kernel
@@ -780,14 +778,14 @@ def estimate_rate(mon, pred, i):
 
     The rate itself is used for the next sample: its own error shows there.
     """
-    red, M, gain = mon.redundancy, mon.memory, mon.config.rate_gain
-    acc, u = pred.f[i], pred.u_old if M.substep == 0 else pred.u
+    gain = mon.config.rate_gain
+    acc, u = pred.f[i], pred.u_old if mon.substep == 0 else pred.u
     for s in range(u.size):
         acc += pred.G[i, s] * u[s]
     if mon.output.keeps_surface:
         acc += pred.F_known[i] - pred.means.F[i]
-    rate = gain * red.residual[i] / red.h
-    if not M.replaced[i] and gain < 1.0:
-        rate = FILTER_POLES_PER_S[RATE_POLE] * red.r[i, RATE_POLE]
-    M.replaced[i] = 1
-    return red.y_past[i] + rate + red.h * acc
+    rate = gain * mon.residual[i] / mon.h
+    if not mon.replaced[i] and gain < 1.0:
+        rate = FILTER_POLES_PER_S[RATE_POLE] * mon.r[i, RATE_POLE]
+    mon.replaced[i] = 1
+    return mon.y_past[i] + rate + mon.h * acc

@@ -85,7 +85,7 @@ def prepare_takeover(fdi: np.void, earlier: np.void, in_flight: bool) -> None:
         fdi["bank"]["output"]["peak"] = earlier["bank"]["output"]["peak"]
     for name in ("gust", "vaneless", "vaned"):
         fdi["statistical"][name]["config"]["starts_in_flight"] = in_flight
-    fdi["sensor_monitor"]["memory"]["substep"] = 0
+    fdi["sensor_monitor"]["substep"] = 0
 
 
 def _refuse_pairs(declared: Declared) -> None:

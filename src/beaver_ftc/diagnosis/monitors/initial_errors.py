@@ -136,8 +136,8 @@ def start_bounds(mon, y):
     most, least = np.sqrt(1.0 + DENSITY_SHARE), np.sqrt(1.0 - DENSITY_SHARE)
     off = max(speed(y) / V_air * most - 1.0, 1.0 - speed(y) / V_air * least)
     mon.E_start[H_AIRSPEED] = min(off, MAX_SPEED_RATIO - 1.0)
-    mon.E_start[H_ALPHA] = 2.0 * np.sin(0.5 * min(abs(y[ALPHA]) + MAX_FLOW_ANGLE_RAD, np.pi))
-    mon.E_start[H_BETA] = 2.0 * np.sin(0.5 * min(abs(y[BETA]) + MAX_FLOW_ANGLE_RAD, np.pi))
+    for h, i in ((H_ALPHA, ALPHA), (H_BETA, BETA)):
+        mon.E_start[h] = 2.0 * np.sin(0.5 * min(abs(y[i]) + MAX_FLOW_ANGLE_RAD, np.pi))
     mon.E_start[H_PHI:] = MAX_CHORD
     mon.E[:] = mon.E_start
 

@@ -148,9 +148,12 @@ def moved_by(model: Path, surface: str, names: Sequence[str]) -> list[str]:
 
 
 def _check_names(source: Path, named: Mapping[str, Sequence[str]]) -> None:
-    known = seen_by_aerodynamics(source)
+    known, surface_of = seen_by_aerodynamics(source), dict[str, str]()
     for surface, names in named.items():
         for name in names:
+            if surface_of.setdefault(name, surface) != surface:
+                says = f"surfaces.{surface}: {name!r} is that of {surface_of[name]}"
+                raise BadInput(f"{says}, allowed: one surface, one command")
             if name not in known:
                 of_control = ", ".join(sorted(of for of in known if of.startswith("fcs/"))) or "none of fcs/"
                 raise BadInput(

@@ -146,3 +146,10 @@ def test_a_model_whose_accelerations_are_no_numbers_is_told_so(tmp_path, monkeyp
     path, _ = written(tmp_path / "author", MODELS["equal stops"])
     with pytest.raises(BadInput, match="its acceleration forward is no finite number"):
         derivation.derive(str(path), tmp_path / "out")
+
+
+def test_a_property_is_that_of_one_surface(tmp_path):
+    path, own = written(tmp_path, MODELS["equal stops"])
+    named = dict.fromkeys(("elevator", "aileron"), ("fcs/elevator-pos-rad",))
+    with pytest.raises(BadInput, match=r"surfaces\.aileron: 'fcs/elevator-pos-rad' is that of elevator"):
+        find_surfaces(path, own, named)

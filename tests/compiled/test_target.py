@@ -72,6 +72,21 @@ def test_kernels_come_to_the_same_either_way_and_are_kept(tmp_path):
     assert "compiles by its own means" in said
 
 
+WITHOUT_A_PART = """
+import numba.core.imputils as inside
+del inside.lower_getattr_generic
+import beaver_ftc.loop.loop
+from beaver_ftc import compiled
+print(compiled.borrows())
+"""
+
+
+def test_a_known_version_without_a_part_that_is_borrowed_compiles_by_its_own_means():
+    borrows, said = run(["-c", WITHOUT_A_PART])
+    assert borrows == ["False"]
+    assert "compiles by its own means" in said
+
+
 FLIGHT = """
 from beaver_ftc import fly, load
 log = fly(load({"name": "short", "duration_s": 0.5, "faults": [

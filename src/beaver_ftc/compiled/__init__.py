@@ -18,6 +18,7 @@ caller's code does not depend on how many rows there are. Give it lazy kernels (
 compiles the rows that it uses.
 """
 
+import contextlib
 import functools
 import os
 from collections.abc import Callable, Sequence
@@ -109,14 +110,16 @@ def compile_into(folder: Path | None, function, for_size=False):
 
 @lru_cache(maxsize=1)
 def _own_target() -> ModuleType | None:
-    """Our own target of the compiler; None if this version of Numba is not known from inside."""
+    """Our own target of the compiler; None if this version of Numba is not known from inside, or lacks a part
+    all the same."""
     known = numba.__version__.startswith(tuple(f"{version}." for version in KNOWN))
-    if not known or os.environ.get(VARIABLE) == "numba":
-        say_once(ALONE.format(numba.__version__, ", ".join(f"{version}.*" for version in KNOWN)))
-        return None
-    from beaver_ftc.compiled import target
+    if known and os.environ.get(VARIABLE) != "numba":
+        with contextlib.suppress(ImportError, AttributeError, TypeError):
+            from beaver_ftc.compiled import target
 
-    return target
+            return target
+    say_once(ALONE.format(numba.__version__, ", ".join(f"{version}.*" for version in KNOWN)))
+    return None
 
 
 def borrows() -> bool:

@@ -11,17 +11,15 @@ kept is run.
 target.py compiles by parts of Numba that are known from inside. With a version that is not in `KNOWN`, or
 with BEAVER_FTC_COMPILER=numba, Numba compiles by its own means, again in each process; flights are the same.
 
-One of several kernels by its number: how compiled code calls a row of a table.
-
-Compiled code calls only kernels that it can name. `one_of` names each row's kernel in turn, so the
-caller's code does not depend on how many rows there are. Give it lazy kernels (compiled.py): a flight then
+Compiled code calls only kernels that it can name. `one_of` names each kernel of a table in turn, so the
+caller's code does not depend on how many rows there are. Give it lazy kernels (`apart`): a flight then
 compiles the rows that it uses.
 """
 
 import contextlib
 import functools
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from functools import lru_cache
 from pathlib import Path
 from types import ModuleType
@@ -244,31 +242,25 @@ def _with_attributes(argument):
     return argument
 
 
-Kernel = Callable[..., None]
+Kernel = Callable[..., Any]
 
 
-def one_of(kernels: Sequence[Kernel]) -> Kernel:
-    """A kernel (place, *arguments) that calls the kernel at that place with these arguments.
-
-    place: 0 for the first kernel; a place beyond the last calls the last. The kernels return nothing.
-    """
-    first, others = kernels[0], kernels[1:]
-
-    if not others:
-
-        @kernel
-        def last(place: int, *arguments: Any) -> None:
-            first(*arguments)
-
-        return last
-
-    rest = one_of(others)
+def one_of(kernels: Mapping[int, Kernel], otherwise: Kernel) -> Kernel:
+    """A kernel (number, *arguments) that returns what the kernel of this number, or `otherwise`, returns for
+    these arguments."""
 
     @kernel
-    def either(place: int, *arguments: Any) -> None:
-        if place == 0:
-            first(*arguments)
-        else:
-            rest(place - 1, *arguments)
+    def call(number: int, *arguments: Any) -> Any:
+        return otherwise(*arguments)
 
-    return either
+    for own, each in kernels.items():
+        call = _one_or(own, each, call)
+    return call
+
+
+def _one_or(own: int, each: Kernel, others: Kernel) -> Kernel:
+    @kernel
+    def call(number: int, *arguments: Any) -> Any:
+        return each(*arguments) if number == own else others(number, *arguments)
+
+    return call

@@ -19,8 +19,12 @@ from beaver_ftc.scenario.declared import Declared
 
 FILES: dict[str, CompiledLaw] = {file_of(module): import_module(module).LAW for module in MODULES}
 
-accommodate = one_of([law.accommodate or accommodation.accommodate for law in FILES.values()])
-command = one_of([law.command for law in FILES.values()])
+accommodate = one_of(
+    {law: of.accommodate for law, of in enumerate(FILES.values()) if of.accommodate},
+    accommodation.accommodate,
+)
+_COMMANDS = [of.command for of in FILES.values()]
+command = one_of(dict(enumerate(_COMMANDS[1:], 1)), _COMMANDS[0])
 
 
 # law: place of its file in FILES; what the law is given: see plugins.yaml.

@@ -194,8 +194,8 @@ def test_an_oscillation_is_counted_by_half_cycles():
     swing = surface["oscillatory"]
     assert swing["n_half"] == 3
     assert (swing["first_end"], swing["last_end"]) == (5, 15)
-    assert registry.has_shown(surface, OSCILLATORY)
-    assert not registry.has_shown(swung([1] * 5 + [-1] * 5 + [1])[1], OSCILLATORY)
+    assert registry.has_shown(OSCILLATORY, surface, OSCILLATORY)
+    assert not registry.has_shown(OSCILLATORY, swung([1] * 5 + [-1] * 5 + [1])[1], OSCILLATORY)
     assert commanded_surface.swing_frequency(fdi, 0, OSCILLATORY) == pytest.approx(2 * np.pi / (10 * DT))
     # the first half-cycle is cut off and does not count: ten frames, each 0.1 rad off; its first frame is
     # summed before the half-cycle before it is seen to have ended
@@ -208,7 +208,7 @@ def test_a_runaway_has_gone_at_least_its_way(length, ways):
     fdi["types"]["config"]["frames_per_block"] = length
 
     def between(kind, frame):
-        return registry.deflection_range(fdi["types"]["config"], surface, kind, frame)
+        return registry.deflection_range(kind, fdi["types"]["config"], surface, kind, frame)
 
     for frame, way in zip((3, 4, 8), ways, strict=True):
         assert between(UP, frame) == pytest.approx((0.1 + way, HIGH))

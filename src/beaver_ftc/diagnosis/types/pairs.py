@@ -75,7 +75,7 @@ def constant_range(c, srf, k):
     lo, hi = np.inf, -np.inf
     for h in range(N_CONSTANT):
         if type_remains(srf, h):
-            h_lo, h_hi = deflection_range(c, srf, h, k)
+            h_lo, h_hi = deflection_range(h, c, srf, h, k)
             lo = min(lo, h_lo)
             hi = max(hi, h_hi)
     reach_lo, reach_hi = srf.actuator.reach_lo, srf.actuator.reach_hi

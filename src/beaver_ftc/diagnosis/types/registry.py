@@ -28,7 +28,7 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel, record, sized
+from beaver_ftc.compiled import kernel, one_of, record, sized
 from beaver_ftc.diagnosis import isolation
 from beaver_ftc.diagnosis.sets import EMPTY_SET, UNLIMITED_SET
 from beaver_ftc.diagnosis.state import PITCH_GROUP, fill
@@ -119,41 +119,25 @@ def type_index_of(name: str, *, has_constant_parameter: bool = True, stop_direct
     return [(row.name, row.has_constant_parameter, row.stop_direction) for row in TYPES].index(sought)
 
 
-def _by_type(name: str, place: int, default: Any) -> Kernel:
-    """A kernel that returns what this part of type h returns, given the same arguments; `default` for a type
-    without it. place: of h among the arguments.
-
-    Compiled code calls only what it can name: each part has a kernel that calls it for its type, and for any
-    other type the kernel of the part before.
-    """
+def _by_type(name: str, default: Any) -> Kernel:
+    """A kernel (h, *arguments) that returns what this part of type h returns for these arguments; `default`
+    for a type without it."""
 
     @kernel
-    def of_type(*arguments):
+    def otherwise(*arguments):
         return default
 
-    for h, part in _parts_of(name).items():
-        of_type = _of_type_or(h, place, part, of_type)
-    return of_type
+    return one_of(_parts_of(name), otherwise)
 
 
-def _of_type_or(number: int, place: int, part: Kernel, others: Kernel) -> Kernel:
-    """A kernel that calls `part` for the type of this number, else `others`; place: of a type's number."""
-
-    @kernel
-    def of_type(*arguments):
-        return part(*arguments) if arguments[place] == number else others(*arguments)
-
-    return of_type
-
-
-reset_memory = _by_type("reset_memory", 1, None)
-parameter_range = _by_type("parameter_range", 1, UNLIMITED_SET)
-see_frame = _by_type("see_frame", 2, None)
-consistent_interval = _by_type("consistent_interval", 2, UNLIMITED_SET)
-has_shown = _by_type("has_shown", 1, True)
-motion_rules_out = _by_type("motion_rules_out", 1, False)
-deflection_range = _by_type("deflection_range", 2, EMPTY_SET)
-deflection_error = _by_type("deflection_error", 1, np.nan)
+reset_memory = _by_type("reset_memory", None)
+parameter_range = _by_type("parameter_range", UNLIMITED_SET)
+see_frame = _by_type("see_frame", None)
+consistent_interval = _by_type("consistent_interval", UNLIMITED_SET)
+has_shown = _by_type("has_shown", True)
+motion_rules_out = _by_type("motion_rules_out", False)
+deflection_range = _by_type("deflection_range", EMPTY_SET)
+deflection_error = _by_type("deflection_error", np.nan)
 
 MAX_BLOCK = 256  # frames of a block
 N_KEPT = 3  # frames, or blocks, of which the orders are kept: the elapsed one and two before it
@@ -297,8 +281,8 @@ def restart_surface(srf):
     srf.evidence.k_first = -1
     srf.evidence.n_anomalous = srf.evidence.n_rest = srf.evidence.n_unhidden = 0
     for h in range(N_TYPES):
-        put_set(srf, h, parameter_range(srf, h))
-        reset_memory(srf, h)
+        put_set(srf, h, parameter_range(h, srf, h))
+        reset_memory(h, srf, h)
         release.allow_before(srf, h)
 
 
@@ -356,9 +340,9 @@ def judge_types(c, srf, k):
         (ev.k_first, ev.first_lo, ev.first_hi) = (k, now.lo, now.hi)
     for h in range(N_TYPES):
         if HOLDS[h]:
-            intersect_set(srf, h, release.held_set(c, srf, h, *deflection_range(c, srf, h, k)))
+            intersect_set(srf, h, release.held_set(c, srf, h, *deflection_range(h, c, srf, h, k)))
         else:
-            intersect_set(srf, h, consistent_interval(c, srf, h, k))
+            intersect_set(srf, h, consistent_interval(h, c, srf, h, k))
 
 
 @kernel
@@ -370,9 +354,9 @@ def judge_frame(types):
         rests = c.abrupt and srf.accommodation.mode == GIVE_UP and not srf.judged.anomalous
         judges = srf.judged.anomalous and (c.single_instant or (srf.earlier.anomalous and srf.last.anomalous))
         for h in range(N_TYPES):
-            see_frame(c, srf, h, k, not (rests or judges))
+            see_frame(h, c, srf, h, k, not (rests or judges))
             if returns and HOLDS[h]:
-                lo, hi = deflection_range(c, srf, h, k if c.single_instant else k - 1)
+                lo, hi = deflection_range(h, c, srf, h, k if c.single_instant else k - 1)
                 release.begin_release(c, srf, h, lo, hi, STOP_SIDE[h])
         if rests:
             count_rest(types, s)

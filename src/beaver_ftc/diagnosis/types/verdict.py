@@ -106,7 +106,7 @@ def name_remains(srf, named):
 def explains_flight(srf):
     """Whether some type explains the flight: it is left, and if it must show itself it has."""
     for h in range(N_TYPES):
-        if type_remains(srf, h) and has_shown(srf, h):
+        if type_remains(srf, h) and has_shown(h, srf, h):
             return True
     return False
 
@@ -137,7 +137,7 @@ def sole(srf, mask):
 def sole_shown(srf, mask):
     """The one type of a mask that is left, if it has shown itself; else TYPE_UNDECIDED."""
     kind = sole(srf, mask)
-    return kind if kind >= 0 and has_shown(srf, kind) else TYPE_UNDECIDED
+    return kind if kind >= 0 and has_shown(kind, srf, kind) else TYPE_UNDECIDED
 
 
 @kernel
@@ -160,7 +160,7 @@ def can_be_another(srf, apparent, dependent):
         if apparent >= 0 and type_remains(srf, h) and (dependent or not FOLLOWS_COMMAND[h]):
             for j in range(N_CONSTANT):
                 alike = SAME_NAME[j] == SAME_NAME[apparent] and CAN_LOOK_LIKE[h, j] and type_remains(srf, j)
-                if alike and not motion_rules_out(srf, h, STOP_SIDE[j]):
+                if alike and not motion_rules_out(h, srf, h, STOP_SIDE[j]):
                     return True
     return False
 
@@ -375,7 +375,7 @@ def deflection_error(srf, possible):
     if possible:
         for h in ERROR_TYPES:
             if type_remains(srf, h):
-                e = registry.deflection_error(srf, h)
+                e = registry.deflection_error(h, srf, h)
                 if np.isfinite(e):
                     return e
                 break

@@ -84,7 +84,10 @@ TABLE = (
     Exempt(r"\. \.venv/bin/activate", "in a checkout, after make demo has made the environment"),
     Exempt(r"fgfs .*", "needs FlightGear"),
     Exempt(r"(ray start|srun|sleep|head=).*|.* --ray-address .*", "needs a cluster of several machines"),
-    Exempt(r"python (-m )?benchmarks[/.].*", "a measurement of minutes to hours, from a checkout"),
+    Exempt(
+        r"python -m tools\.docs table .*|python (-m )?benchmarks[/.].*",
+        "a measurement of minutes to hours, from a checkout",
+    ),
     Exempt(
         r"python tools/check_certificate\.py FOLDER",
         "stands for the folder of any run with a certificate",

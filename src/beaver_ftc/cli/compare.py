@@ -30,6 +30,7 @@ class Options:
     restarts: Annotated[int, typer.Option(min=0)] = 8
     seed: int = 1
     draw: Annotated[int, typer.Option(min=0)] = 0
+    draws: Annotated[int, typer.Option(min=1)] = 1
     tuned: Annotated[Path | None, typer.Option(metavar="FILE")] = None
     schemes: str | None = None
     laws: str | None = None
@@ -72,6 +73,7 @@ def command(options: Options) -> None:
     restarts: With --tune: largest number of further searches.
     seed: With --tune: seed of the search.
     draw: With --tune: number of the set of calibration flights.
+    draws: With --tune: how many such sets, from that number on, are flown together.
     tuned: With --sweep or --benchmark: read the parameters from this file.
     schemes: Names of schemes, separated by commas. Default: all registered schemes and laws.
     laws: Names of laws, separated by commas. Default: all registered schemes and laws.
@@ -106,6 +108,7 @@ def _refuse_contradictions(options: Options, folder: Path | None) -> None:
         (options.only is not None, options.benchmark, "--set: allowed: only with --benchmark"),
         (options.grade is not None, options.tune, "--grade: allowed: only with --tune"),
         (options.draw != 0, options.tune, "--draw: allowed: only with --tune"),
+        (options.draws != 1, options.tune, "--draws: allowed: only with --tune"),
         (
             options.tuned is not None,
             options.sweep is not None or options.benchmark,
@@ -206,7 +209,7 @@ def _tune(options: Options, most: int | None) -> None:
     schemes = [*registered(DETECTORS), STATISTICAL] if everything else _named("--schemes", options.schemes)
     laws = list(registered(LAWS)) if everything else _named("--laws", options.laws)
     methods = methods_of(schemes, laws, _grades(options.grade))
-    how = Search(options.trials, options.seed, options.restarts, most, options.draw)
+    how = Search(options.trials, options.seed, options.restarts, most, options.draw, options.draws)
     budget = options.trials * (1 + options.restarts)
     with progress_bar(f"{len(methods)} methods and grades, up to {budget} trials each") as progress:
         document = tune(methods, how, options.workers or cores(), progress)

@@ -39,3 +39,11 @@ def test_every_draw_has_flights_that_no_other_draw_and_no_table_has():
     seeds += [{case.scenario.seed for case in of_set(name)} for name in set_names()]
     assert len(set().union(*seeds)) == sum(map(len, seeds))
     assert of_set(CALIBRATION + "exact", 1) == of_set(CALIBRATION + "exact", 1, 0)
+
+
+def test_several_draws_together_are_the_flights_of_each():
+    seeds = [
+        sorted(case.scenario.seed for case in flights("exact", None, *draws))
+        for draws in ((3,), (4,), (3, 2))
+    ]
+    assert sorted(seeds[0] + seeds[1]) == seeds[2]

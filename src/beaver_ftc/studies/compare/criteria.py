@@ -63,11 +63,13 @@ Values = Mapping[str, float]
 
 
 @cache
-def flights(grade: str, most: int | None, draw: int = 0) -> tuple[SetFlight, ...]:
-    """The flights that a grade's methods are tuned on; kinds of flights take turns. draw: see `of_sweep`."""
+def flights(grade: str, most: int | None, draw: int = 0, draws: int = 1) -> tuple[SetFlight, ...]:
+    """The flights that a grade's methods are tuned on; kinds of flights take turns. draw: see `of_sweep`.
+    draws: so many from this one on, together."""
     of_kind: dict[str, list[SetFlight]] = {}
-    for case in of_set(CALIBRATION + grade, most, draw):
-        of_kind.setdefault(case.scenario.name.rpartition("-")[0], []).append(case)
+    for each in range(draw, draw + draws):
+        for case in of_set(CALIBRATION + grade, most, each):
+            of_kind.setdefault(case.scenario.name.rpartition("-")[0], []).append(case)
     placed = [
         ((i + 0.5) / len(cases), k, case)
         for k, cases in enumerate(of_kind.values())
@@ -141,10 +143,10 @@ def delay_cost(delay_s: float) -> float:
 class LawCost:
     """J of a law, with what makes a candidate inadmissible."""
 
-    def __init__(self, name: str, grade: str, most: int | None, draw: int) -> None:
+    def __init__(self, name: str, grade: str, most: int | None, draw: int, draws: int = 1) -> None:
         self._entry = Entry(SCHEME, name)
-        self._cases = [case for case in flights(grade, most, draw) if case.scenario.faults]
-        self._oracle, self._effort_allowed = yardsticks(grade, most, draw)
+        self._cases = [case for case in flights(grade, most, draw, draws) if case.scenario.faults]
+        self._oracle, self._effort_allowed = yardsticks(grade, most, draw, draws)
         self._lowest = inf
 
     def __call__(self, values: Values) -> float:
@@ -201,9 +203,9 @@ def _ratio(result: Result, oracle_deg_s: float) -> float:
 
 
 @cache
-def yardsticks(grade: str, most: int | None, draw: int) -> tuple[tuple[float, ...], float]:
+def yardsticks(grade: str, most: int | None, draw: int, draws: int) -> tuple[tuple[float, ...], float]:
     """Of each faulted flight the oracle's error, deg/s; and the default law's RMS surface rate, deg/s."""
-    cases = [case for case in flights(grade, most, draw) if case.scenario.faults]
+    cases = [case for case in flights(grade, most, draw, draws) if case.scenario.faults]
     oracle = tuple(flown(case, Entry(SCHEME, ORACLE), LAWS, {}).rms_deg_s for case in cases)
     return oracle, effort([flown(case, Entry(SCHEME, LAW), LAWS, {}) for case in cases])
 

@@ -1,8 +1,8 @@
 """`beaver-ftc compare --tune --draw N`: how much does a user gain who tunes a method again?
 
-A method is tuned by the procedure of tune.py on draw N of the calibration sets, with seeds of its own, from
-the values that it ships with. Both settings then fly the next `JUDGED` draws. The gain is the share by which
-the values found cost less there:
+A method is tuned by the procedure of tune.py on draw N of the calibration sets, or on several from N on, with
+seeds of their own, from the values that it ships with. Both settings then fly the next `JUDGED` draws. The
+gain is the share by which the values found cost less there:
 
     gain = 1 - J(found) / J(built in)
 
@@ -24,9 +24,9 @@ RESAMPLES = 4000
 Size = Callable[..., np.ndarray]  # of the parts (..., n) of a cost along an axis: the cost
 
 
-def gain_of(group: str, name: str, grade: str, settings: Sequence[Values], draw: int) -> Document:
-    """Both costs, and the gain of the second setting over the first, on the draws after this one."""
-    draws = range(draw + 1, draw + 1 + JUDGED)
+def gain_of(group: str, name: str, grade: str, settings: Sequence[Values], first: int) -> Document:
+    """Both costs, and the gain of the second setting over the first, on `JUDGED` draws from the first on."""
+    draws = range(first, first + JUDGED)
     costs: Sequence[DetectorCost | LawCost]
     size: Size
     if group == DETECTORS:

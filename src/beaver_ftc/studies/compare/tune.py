@@ -98,13 +98,14 @@ def methods_of(schemes: Sequence[str], laws: Sequence[str], grades: Sequence[str
 class Search:
     """How to search. trials: of each search. restarts: searches after the first, at most. most: flights of
     each calibration sweep; None is all of them. draw: of the calibration sets; 0 chooses the values that
-    ship, another number measures the gain over them."""
+    ship, another number measures the gain over them. draws: so many from this one on, together."""
 
     trials: int
     seed: int
     restarts: int
     most: int | None = None
     draw: int = 0
+    draws: int = 1
 
 
 def tune(methods: Sequence[Method], how: Search, workers: int, progress: Progress | None) -> Document:
@@ -127,19 +128,15 @@ def tune_method(method: Method, how: Search) -> Document:
     """A row: the values chosen, their cost, that of the values at the start, trials, ranges, flights of a
     trial, margins; on a draw that does not choose what ships, the gain of the values found, small or large.
     """
-    cost = (
-        DetectorCost(method.name, flights(method.grade, how.most, how.draw))
-        if method.group == DETECTORS
-        else LawCost(method.name, method.grade, how.most, how.draw)
-    )
+    on = method.grade, how.most, how.draw, how.draws
+    cost = DetectorCost(method.name, flights(*on)) if method.group == DETECTORS else LawCost(method.name, *on)
     start = method.start()
     found = search(cost, method.ranges(), start, how.trials, how.seed, how.restarts)
     gains = found.cost < (1.0 - LEAST_GAIN) * found.start_cost
     values = found.values if gains else start
-    count = len(flights(method.grade, how.most, how.draw))
-    row = {**_row(method, found), "values": values, "flights": count, **_margins(cost, values)}
+    row = {**_row(method, found), "values": values, "flights": len(flights(*on)), **_margins(cost, values)}
     if how.draw and min(found.cost, found.start_cost) < INADMISSIBLE:
-        row |= gain_of(method.group, method.name, method.grade, (start, found.values), how.draw)
+        row |= gain_of(method.group, method.name, method.grade, (start, found.values), how.draw + how.draws)
     return row
 
 

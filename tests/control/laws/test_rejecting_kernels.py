@@ -104,6 +104,14 @@ def led(lead, command, u):
     return out["command"]
 
 
+@given(st.floats(0.25, 1.0), st.floats(-0.05, 0.05))
+def test_an_actuator_that_is_led_is_in_a_frame_where_it_is_wanted(share, wanted):
+    """It goes this share of the way to its command; a slower one than 1 / MOST_LEAD does not arrive."""
+    u = np.array([0.05, -0.05, 0.0, 0.02])
+    command = led(rejecting.lead_of(share), np.full(4, wanted), u)
+    assert u + share * (command - u) == pytest.approx(np.full(4, wanted), abs=1e-12)
+
+
 def test_a_command_leads_a_lagging_actuator_within_the_travel():
     command = led([3.0, 1.0, 4.0, 0.0], [0.1, -0.1, 0.4, 0.5], [0.05, -0.2, 0.3, 0.4])
     assert command == pytest.approx([0.05 + 3 * 0.05, -0.1, 0.44, 0.5])

@@ -23,9 +23,19 @@ class Still:
         return np.zeros((3, 4))
 
 
-def context(declared=None, **options):
-    return Context(DT, 1, Still(), np.zeros(3), np.zeros(5), np.zeros(4), np.array([[-1.0] * 4, [1.0] * 4]),
-                   BOUND, np.zeros(3), options=options, declared=declared or Declared())  # fmt: skip
+class Damped(Still):
+    """The same with rate damping and couplings: xdot = D x + G u."""
+
+    D = np.array([[-8.0, 0.0, 2.0], [0.0, -4.0, 0.0], [-0.3, 0.5, -1.0]])
+
+    def f(self, x, y):
+        return x @ self.D.T
+
+
+def context(declared=None, model=None, **options):
+    limits = np.array([[-1.0] * 4, [1.0] * 4])
+    return Context(DT, 1, model or Still(), np.zeros(3), np.zeros(5), np.zeros(4), limits, BOUND, np.zeros(3),
+                   options=options, declared=declared or Declared())  # fmt: skip
 
 
 GUSTY = Declared(
@@ -101,6 +111,19 @@ def test_something_no_surface_explains_is_not_blamed_on_one(name):
     _, verdicts, alarm_s = watch(name, flight(extra=2.0))
     assert alarm_s is not None
     assert verdicts[-1].isolated == "unanticipated"
+
+
+@pytest.mark.parametrize("name", ["augmented-ekf", "augmented-ukf"])
+def test_the_motion_of_an_aircraft_that_is_as_its_model_is_predicted_without_error(name):
+    detector, model, x = plugin_class(DETECTORS, name)(), Damped(), np.zeros(3)
+    detector.reset(context(model=model, **detector.defaults))
+    acceleration = np.zeros(3)
+    for k in range(300):
+        detector.step(Measured(k * DT, x, np.zeros(5), acceleration, np.ones((3, 4)), BOUND), np.zeros(4))
+        acceleration = model.f(x, None) + 3.0 * np.sin(np.array([9.0, 7.0, 5.0]) * k * DT)
+        x = x + DT * acceleration
+    assert detector.z[:6] == pytest.approx([*(x - DT * acceleration), 0.0, 0.0, 0.0], abs=1e-9)
+    assert detector.mean_square == pytest.approx(3.0 * detector.fade**299, rel=1e-6)
 
 
 @pytest.mark.parametrize("name", ["augmented-ekf", "augmented-ukf"])

@@ -81,13 +81,14 @@ class AugmentedEkf(EffectivenessFilter):
     # alarm: chi-square value of the largest theta^2 / variance
     defaults: ClassVar[Mapping[str, float]] = DEFAULT_OPTIONS | {"alarm": 20.0}
 
-    def predict(self, measured: Measured) -> None:
-        """z- = g(z), P- = F P F' + Q with the Jacobian F at the estimate."""
-        F = self.transition(measured)
-        self.z = self.move(self.z, F, measured.acceleration)
+    def predict(self, measured: Measured, before: Measured) -> None:
+        """z- = F z + dt (xdot - J x), P- = F P F' + Q; J = df/dx at x, measured in the frame before."""
+        F, x = self.transition(measured), before.x
         steps = _STEP_RAD_S * np.eye(3)
-        f = self.context.model.f(np.concatenate((measured.x + steps, measured.x - steps)), measured.y)
-        F[:3, :3] += self.dt * (f[:3] - f[3:]).T / (2.0 * _STEP_RAD_S)
+        f = self.context.model.f(np.concatenate((x + steps, x - steps)), before.y)
+        J = (f[:3] - f[3:]).T / (2.0 * _STEP_RAD_S)
+        F[:3, :3] += self.dt * J
+        self.z = self.move(self.z, F, measured.acceleration - J @ x)
         self.P = self.add_noise(F @ self.P @ F.T, measured, self.options["noise"])
 
     def update_statistic(self, square: float) -> float:
@@ -105,11 +106,11 @@ class AugmentedUkf(EffectivenessFilter):
         "spread": float(N_STATES_WITHOUT_GUSTS),
     }
 
-    def predict(self, measured: Measured) -> None:
+    def predict(self, measured: Measured, before: Measured) -> None:
         """Move the sigma points through the dynamics; their mean and covariance are z- and P-. f differs
-        between points by its change from the measured state."""
+        between points by its change from the measured state, both of the frame before."""
         points, weights = sigma_points(self.z, self.P, self.options["spread"] + self.n_air)
-        f = self.context.model.f(np.concatenate((points[:, :3], measured.x[None])), measured.y)
+        f = self.context.model.f(np.concatenate((points[:, :3], before.x[None])), before.y)
         points = self.move(points, self.transition(measured), measured.acceleration + f[:-1] - f[-1])
         self.z = weights @ points
         off = points - self.z

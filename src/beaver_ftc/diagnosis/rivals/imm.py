@@ -72,7 +72,7 @@ class InteractingMultipleModels(KalmanRival):
         self.noise = np.full(N_MODES, self.options["noise"])
         self.noise[-1] = self.options["unknown_noise"]
 
-    def predict(self, measured: Measured) -> None:
+    def predict(self, measured: Measured, before: Measured) -> None:
         """Mix the hypotheses, and predict each over the elapsed frame."""
         z, P, self.mu = mix_states(self.z, self.P, self.mu, self.chain)
         acceleration = np.tile(measured.acceleration, (N_MODES, 1))

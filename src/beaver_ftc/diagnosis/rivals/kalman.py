@@ -23,8 +23,10 @@ class KalmanRival(Rival):
     """Base of the rivals by Kalman filters: each has `predict` and `weigh`.
 
     F (n, n) without the dynamics of the aircraft; q (n,): diagonal of Q but for the rates; R (3, 3); z, P:
-    state and covariance of one filter.
+    state and covariance of one filter. before: the measurements of the frame before; None in the first.
     """
+
+    before: Measured | None
 
     def fill_model(self, n_theta: int = 0, theta_variance: float = 0.0, walk: float = 0.0) -> None:
         """Fill the model, and start healthy. theta_variance: at the start; walk: variance of a frame."""
@@ -37,22 +39,25 @@ class KalmanRival(Rival):
         self.F[:3, air] = self.dt * declared.gust_effect[:, :n_air]
         self.F[air, air] = np.diag(a)
         self.q = np.concatenate((np.zeros(3), np.full(n_theta, walk), (1.0 - a**2) * gust_variance))
-        self.R, self.is_first = np.diag(rate_variance), True
+        self.R, self.before = np.diag(rate_variance), None
         self.P = np.diag(np.concatenate((rate_variance, np.full(n_theta, theta_variance), gust_variance)))
         self.z = np.zeros(self.n)
 
     def advance(self, measured: Measured, command: np.ndarray) -> float:
         """Predict over the elapsed frame, update with the measured rates, weigh the innovation."""
-        if self.is_first:
-            self.is_first, self.z[..., :3] = False, measured.x
-            return 0.0
-        self.predict(measured)
-        nu = measured.x - self.z[..., :3]
-        self.z, self.P, S = update_state_and_covariance(self.z, self.P, nu, self.R)
-        return self.weigh(nu, S)
+        statistic = 0.0
+        if self.before is None:
+            self.z[..., :3] = measured.x
+        else:
+            self.predict(measured, self.before)
+            nu = measured.x - self.z[..., :3]
+            self.z, self.P, S = update_state_and_covariance(self.z, self.P, nu, self.R)
+            statistic = self.weigh(nu, S)
+        self.before = measured
+        return statistic
 
-    def predict(self, measured: Measured) -> None:
-        """Predict z and P over the elapsed frame."""
+    def predict(self, measured: Measured, before: Measured) -> None:
+        """Predict z and P over the elapsed frame, which began at the measurements of `before`."""
         raise NotImplementedError
 
     def weigh(self, nu: np.ndarray, S: np.ndarray) -> float:

@@ -48,11 +48,20 @@ def test_readings_have_the_errors_of_their_instruments():
     assert (steps[0][3:6] > steps[1]).all()
 
 
-def test_without_accelerometers_there_is_no_reading_of_theirs():
-    sim = Simulation(scenario(duration_s=1))
+FAILS = [{"sensor": "q", "type": "bias", "magnitude": 1, "at_s": 0.9}]
+
+
+@pytest.mark.parametrize("faults", [[], FAILS])
+def test_accelerometers_are_read_whatever_fails_later(faults):
+    sim = Simulation(scenario(duration_s=1, faults=faults))
     sim.step()
-    assert np.isnan(sim.measured.force).all()
-    assert np.isfinite(sim.measured.attitude).all()
+    assert np.linalg.norm(sim.measured.force) == pytest.approx(9.8, abs=0.5)
+
+
+def test_a_law_that_takes_over_in_flight_reads_accelerometers():
+    sim = Simulation(scenario(duration_s=1, changes=[{"at_s": 0.5, "law": "lqr"}]))
+    sim.step(frames=60)
+    assert np.linalg.norm(sim.measured.force) == pytest.approx(9.8, abs=0.5)
 
 
 def test_nothing_in_the_context_tells_of_the_noise():

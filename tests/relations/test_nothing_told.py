@@ -17,6 +17,8 @@ from beaver_ftc.loop.loop import Loop
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import load
 from beaver_ftc.scenario.truth import Truth
+from beaver_ftc.studies.sensitivity.beyond import Flight, scenario_of
+from beaver_ftc.studies.sensitivity.errors import errors_of
 from flying import SINES
 from samples import AT_NIGHT
 from test_architecture import modules, tree
@@ -227,3 +229,50 @@ def test_the_designers_trim_is_that_of_a_truth_as_declared():
     assert (flown.y == as_declared.y).all()
     assert (flown.u == as_declared.command).all()
     assert np.abs(flown.command - flown.u).max() > 1e-3
+
+
+TOLD = {"control.law": "oracle", "faults": [{**SURFACE_FAULTS[0], "at_s": 0.3}], "changes": []}
+
+
+def test_the_diagnosis_of_a_flight_by_the_oracle_expects_what_it_has_found_itself():
+    sim = bf.Simulation(declared("published").with_(TOLD))
+    while not sim.verdict.detected:
+        sim.step()
+    sim.step()
+    prediction, found = sim.records[0]["prediction"], sim.records[0]["assessment"]
+    lost = prediction["means"]["Gu"] @ (1.0 - found["effectiveness"])
+    assert prediction["F_known"] == pytest.approx(prediction["means"]["F"] - lost, abs=1e-9)
+    assert (found["effectiveness"] == 1.0).all()  # so early nothing is named, and the oracle knows it
+
+
+@pytest.mark.parametrize("law", ["fault-tolerant", "zhang2005", "adaptive"])
+def test_a_law_after_the_oracle_is_not_told_what_the_oracle_knew(law):
+    change = {"changes": [{"at_s": 0.6, "law": law}], "fdi.scheme": "none"}
+    sim = bf.Simulation(declared("published").with_(TOLD | change))
+    sim.step(frames=round(0.6 * 50) + 1)
+    surfaces = sim.records[0]["control"]["surfaces"]["output"]
+    assert (surfaces["effectiveness"] == 1.0).all()
+    assert not surfaces["offset"].any()
+    assert not sim.records[0]["faults"]["effectiveness"].any()
+
+
+def test_a_law_after_a_change_of_the_sensors_knows_those_before_it():
+    """In its gains and in all else."""
+    other = [{"at_s": 0.2, "sensors": "consumer-grade"}, {"at_s": 0.4, "law": "adaptive"}]
+    other.append({"at_s": 0.6, "law": "fault-tolerant"})
+    laws = []
+    for changes in (other, other[1:]):
+        sim = bf.Simulation(declared("published").with_({"changes": changes}))
+        sim.step(frames=round(0.6 * 50) + 1)
+        laws.append(sim.records[0]["control"]["rejecting"]["config"].tobytes())
+    assert laws[0] == laws[1]
+
+
+def test_beyond_the_declaration_the_law_does_not_know_by_how_much():
+    scenario = load("elevator-loss-in-turbulence")
+    laws = set()
+    for factor in (0.0, 1.0, 4.0):
+        flight = Flight("sensor errors", factor, 0)
+        found = configured(scenario_of(scenario, errors_of(scenario), 1, flight))
+        laws.add(b"".join(value for name, value in found.items() if name.startswith("control.rejecting")))
+    assert len(laws) == 1

@@ -30,12 +30,13 @@ command = one_of(dict(enumerate(_COMMANDS[1:], 1)), _COMMANDS[0])
 # law: place of its file in FILES; what the law is given: see plugins.yaml.
 CONFIG = record(law=int, uses_verdict=int, reallocates=int, informed=int)
 
-# What a law takes over from the one before: how the reference stands, what is known of the surfaces, where
-# they and the engine are. All else restarts.
+# What a law takes over from the one before: how the reference stands, where the surfaces and the engine are,
+# and what is known of the surfaces, unless the one before knew it from the truth. All else restarts.
 KEPT = (
-    ("reference", "output"), ("surfaces", "output"), ("allocation", "output"), ("probe", "memory"),
-    ("power", "memory"), ("power", "output"),
+    ("reference", "output"), ("allocation", "output"), ("probe", "memory"), ("power", "memory"),
+    ("power", "output"),
 )  # fmt: skip
+KNOWN = ("surfaces", "output")
 
 
 @sized
@@ -74,10 +75,13 @@ def take_over(new: np.void, before: np.void, learnt: np.ndarray) -> None:
 
     learnt (3,) rad/s2: what the diagnosis' network explains.
     """
-    for stage, part in KEPT:
+    told = before["config"]["informed"] and not new["config"]["informed"]
+    for stage, part in KEPT if told else (*KEPT, KNOWN):
         new[stage][part] = before[stage][part]
     law, next_law = in_charge(before), in_charge(new)
     unexplained = law.unexplained(before) if law.unexplained else before["surfaces"]["output"]["unknown"]
+    if told:
+        unexplained = np.zeros(3)
     if next_law.begin is not None:
         next_law.begin(new, before, unexplained, learnt)
 

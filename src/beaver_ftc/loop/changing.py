@@ -87,10 +87,7 @@ class Changing:
             take_diagnosis(frame, new, stage.frame)
         if change.sensors is not None:
             take_configuration(frame["instruments"], new["instruments"])
-        statistical = frame["fdi"]["statistical"]
-        forces = statistical["forces"]["in_use"] or statistical["gust"]["output"]["uses_accelerometers"]
-        if frame["fdi"]["sensor_monitor"]["config"]["enabled"] or frame["instruments"]["engine"] or forces:
-            loop.read_more()
+        loop.read_more()
         frame["control"]["power"]["config"]["enabled"] = new["control"]["power"]["config"]["enabled"]
         before = loop.plugin_frame
         if stage.plugins is not None and before is not None and stage.plugins.detector is before.detector:
@@ -133,6 +130,8 @@ def take_law(frame: np.void, new: np.void) -> None:
     learnt = fdi["fdae"]["network"]["output"].copy() if fdi["verdict"]["detected"] else np.zeros(3)
     take_over(new, frame["control"], learnt)
     frame["control"] = new
+    for name in ("effectiveness", "immovable", "effective", "Cm_alpha3"):
+        frame["faults"][name] = 0  # of the truth: an informed law is told again
 
 
 def take_diagnosis(frame: np.void, new: np.void, k: int) -> None:

@@ -417,18 +417,20 @@ def begin(frame):
 def diagnose(frame):
     """The diagnosis, from prediction to verdict, by the kernels of the scheme in charge.
 
-    The faults that the law already takes into account are expected: they are no innovation.
+    The faults that the law already takes into account are expected: they are no innovation. Of a law that is
+    informed of the truth, those count that the diagnosis itself has found.
     """
     fdi, prediction, measured, k = frame.fdi, frame.prediction, frame.measured, frame.k - frame.since
     diagnoses_all_types = fdi.config.diagnoses_all_types
-    applied = frame.control.surfaces.output
+    applied, found, detected = frame.control.surfaces.output, frame.assessment, fdi.verdict.detected
     monitors.disable_if_apart(fdi.engine_monitor, frame.control.power.output.command[1:])
     if k == 0:
         schemes.begin_scheme(fdi, prediction, measured)
     else:
-        predict_known(
-            prediction, fdi.verdict.detected, applied.effectiveness, applied.offset, diagnoses_all_types
-        )
+        if frame.control.config.informed:
+            predict_known(prediction, detected, found.effectiveness, found.offset, diagnoses_all_types)
+        else:
+            predict_known(prediction, detected, applied.effectiveness, applied.offset, diagnoses_all_types)
         schemes.advance_estimators_to_frame(fdi, prediction, measured, k, frame.t)
     schemes.update_verdict(fdi, prediction, measured, frame.t)
     record_isolated_surfaces(fdi, frame.t)

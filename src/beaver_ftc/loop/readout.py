@@ -150,16 +150,11 @@ class Instruments:
     """The readings of a flight that goes on: they change with it."""
 
     def __init__(self, frame: np.void) -> None:
-        self._measured, self._signal = frame["measured"], frame["measured"]["signal"]
+        self._signal = frame["measured"]["signal"]
 
     def readings(self) -> list[float]:
         """Of each of `plant.instruments.SENSORS`, SI."""
         return self._signal.tolist()
-
-    @property
-    def has_accelerometers(self) -> bool:
-        """Whether the accelerometers are among what is read."""
-        return bool(self._measured["inertial"])
 
 
 def alarm_flags(frame: np.void) -> tuple[np.int64, np.int64]:

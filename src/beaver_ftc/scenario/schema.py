@@ -591,5 +591,7 @@ def _as_changed(now: Scenario, change: Change, given: Scenario) -> Scenario:
         bounds = fdi.bounds.model_copy(update={"sensors": change.declared_sensors})
         fdi = fdi.model_copy(update={"bounds": bounds})
     if change.sensors is not None:
-        changes["sensors"] = change.sensors
+        changes["sensors"] = change.sensors  # of which nobody is told: a law knows those it has known
+        known = now.design_model.model_copy(update={"sensors": now.known_sensors})
+        changes["design_model"] = known
     return now.model_copy(update={**changes, "fdi": fdi})

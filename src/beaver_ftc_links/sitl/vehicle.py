@@ -53,10 +53,6 @@ _NODES = (  # what no instrument of ours measures, of the truth; factors to SI
     ("attitude/psi-rad", 1.0),
     ("position/lat-gc-rad", 1.0),
     ("position/long-gc-rad", 1.0),
-    ("forces/fbx-total-lbs", M_PER_FT),
-    ("forces/fby-total-lbs", M_PER_FT),
-    ("forces/fbz-total-lbs", M_PER_FT),
-    ("inertia/mass-slugs", 1.0),
 )
 _AT = {name: i for i, name in enumerate(SENSORS)}
 
@@ -164,15 +160,15 @@ class Flown(Simulation):
         self._diagnoses = False
 
     def _start_or_stop_diagnosis(self) -> None:
-        """End the diagnosis near the ground, begin it again in flight unless it has found something."""
-        now = FrameReadout(self._frame)
-        height_m = now.height_m - self._standing_m
+        """End the diagnosis near the ground, begin it again in flight unless it has found something. The
+        wheels know where the ground is; the airspeed is that of the instrument."""
+        height_m = FrameReadout(self._frame).height_m - self._standing_m
         if self._diagnoses:
             if height_m < self._lowest_m:
                 self._stop_diagnosis()
         elif (
             height_m > self._lowest_m + UP_M - DOWN_M
-            and now.airspeed_mps > self._slowest_mps
+            and self._instruments.readings()[_AT["V"]] > self._slowest_mps
             and not self.alarmed
         ):
             self._begin_diagnosis()
@@ -239,12 +235,9 @@ class Flown(Simulation):
         true = [read() * factor for read, factor in self._nodes]
         north = (true[9] - self._origin.latitude_rad) * self._origin.radius_m
         east = (true[10] - self._origin.longitude_rad) * self._origin.parallel_radius_m
-        force = tuple(signal[AX : AX + 3])
-        if not self._instruments.has_accelerometers:
-            force = true[11] / true[14], true[12] / true[14], true[13] / true[14]
         t_s = self._next_instant_s
         return Instant(
-            t_s, tuple(signal[:3]), force, tuple(signal[_AT["phi"] : _AT["psi"] + 1]),
+            t_s, tuple(signal[:3]), tuple(signal[AX : AX + 3]), tuple(signal[_AT["phi"] : _AT["psi"] + 1]),
             signal[_AT["V"]], signal[_AT["beta"]], signal[_AT["qdyn"]], signal[_AT["altitude"]],
             (north, east, self.ground_m - true[5]), tuple(true[:3]),
             true[3], true[4], true[5], tuple(true[6:9]),

@@ -62,11 +62,13 @@ def factors_of(errors: Sequence[Error], flight: Flight) -> dict[str, float]:
 
 
 def scenario_of(scenario: Scenario, errors: Sequence[Error], seed: int, flight: Flight) -> Scenario:
-    """What flies: draws depend on the number of the flight alone, so that rows differ by the error."""
+    """What flies: draws depend on the number of the flight alone, so that rows differ by the error. The law
+    knows the sensors of the scenario, whatever theirs are in the flight."""
     draws = np.random.default_rng([seed, flight.run])
     changes: Document = {"seed": int(draws.integers(2**31)), "expect": {}}
     later = float(draws.uniform())
     changes |= changes_of(errors, factors_of(errors, flight), draws)
+    changes["design_model.sensors"] = scenario.known_sensors.model_dump()
     times = [fault.at_s for fault in scenario.faults]
     room = min(LATER_S, scenario.duration_s - LEFT_S - max(times, default=0.0))
     later_s = round(later * max(room, 0.0) * scenario.rate_hz) / scenario.rate_hz

@@ -11,6 +11,7 @@ GOOD = (
     "src/beaver_ftc/loop/frame.py", "log.parquet", "beaver-ftc run elevator-partial-loss --no-report",
     "sweep FILE --workers 2", "--host ADDRESS", "make docs-check", "bf.fly(scenario, detector=MyCusum())",
     "fdi: {scheme: cusum}", "runs/live-SCENARIO-DATE-TIME/", "x_0 + 3 (y - 2)", "test_docs_names.py",
+    "isolation.narrow_sets",
 )  # fmt: skip
 WRONG = {
     "fdi.bounds.sensorss": "sensorss",
@@ -25,6 +26,7 @@ WRONG = {
     "bf.flyy(scenario)": "flyy",
     "sensors: ideall": "ideall",
     "the frame calls frame_stepp of it": "frame_stepp",
+    "isolation.predict": "isolation.predict",
 }
 
 

@@ -30,6 +30,7 @@ _FILLED = re.compile(
 _FILE = re.compile(r"[\w./-]+\.(?:py|md|ya?ml|xml|json|csv|parquet|html|js|png|svg|toml|ipynb)")
 _TEST = re.compile(r"(?<=def )test_\w+|BEAVER_FTC_\w+")
 _READ = (".yaml", ".yml", ".js", ".html", ".j2", ".toml", ".xml", ".json", ".c", "Makefile")
+_OF_A_MODULE = re.compile(r"([a-z_]+)\.([a-z_]\w*)")
 _SHORT = 2  # letters of a symbol, not of a name
 
 
@@ -38,6 +39,17 @@ def files() -> frozenset[str]:
     """Files of the repository, as git lists them."""
     listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True)
     return frozenset(listed.stdout.split("\n"))
+
+
+@cache
+def by_module() -> dict[str, frozenset[str]]:
+    """The names in modules of the packages, by the name of the file; of several so called, those of all."""
+    found: dict[str, frozenset[str]] = {}
+    for name in files():
+        if name.startswith("src/") and name.endswith(".py"):
+            names = frozenset(said(ast.parse((ROOT / name).read_text(encoding="utf-8"))))
+            found[Path(name).stem] = found.get(Path(name).stem, frozenset()) | names
+    return found
 
 
 @cache
@@ -82,6 +94,14 @@ def wrong(span: str, own: frozenset[str] = frozenset()) -> str | None:
     for word in text.split():
         if _FILE.fullmatch(word) and not is_file(word, own):
             return word
+    placed = _OF_A_MODULE.fullmatch(text)
+    if (
+        placed
+        and not _FILE.fullmatch(text)
+        and placed[2] not in by_module().get(placed[1], {placed[2]})
+        and text not in known()
+    ):
+        return text
     words = _WORD.findall(_FILLED.sub(" ", text))
     if " " in text and not re.search(r"^(beaver-ftc|python3?|make) |\w: ", text):  # prose
         words = [word for word in words if "_" in word or word.startswith("--")]

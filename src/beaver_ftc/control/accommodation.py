@@ -67,16 +67,15 @@ def mode_from(config, layout, verdict, assessment):
 
 
 @kernel
-def true_mode(elevator, faults):
-    """The mode for a law that knows the true fault the moment it occurs; elevator: the surface that leads
-    pitch."""
+def true_mode(config, layout, faults):
+    """The mode for a law that knows the true fault the moment it occurs; config: as in `mode_of`."""
+    elevator = layout.main[PITCH]
     if not faults.present:
         return MODE_NOMINAL
     if faults.Cm_alpha3 != 0.0:
         return MODE_UNANTICIPATED
-    if faults.effectiveness[elevator] < 1.0 or faults.immovable[elevator]:
-        return MODE_REALLOCATED
-    return MODE_ADAPTIVE
+    failed = faults.effectiveness[elevator] < 1.0 or faults.immovable[elevator]
+    return MODE_REALLOCATED if failed and config.reallocates and layout.stand_in >= 0 else MODE_ADAPTIVE
 
 
 @kernel

@@ -160,8 +160,8 @@ def assessment_dtype(n: int) -> np.dtype:
     detected: a fault; no_target: true without a fault as well; isolated_surface: -1 for none. lags: a surface
     follows its command late. accommodation_mode: of each surface, -1 where open, or where faults of every
     type are not diagnosed; effectiveness; at_once: whether the law applies it at once, not gradually; offset,
-    lag rad. unknown_acceleration (3,) rad/s2: explained by no known fault. pitch_undecided: elevator or flap
-    is at fault, and it has long been open which. held: the surfaces are assessed as before a sensor broke.
+    lag rad. unknown_acceleration (3,) rad/s2: explained by no known fault. pitch_undecided: the elevator may
+    be at fault, and it has long been open. held: the surfaces are assessed as before a sensor broke.
     """
     return record(
         detected=int, no_target=int, diagnoses_all_types=int, isolated_surface=int, lags=int,
@@ -252,6 +252,7 @@ def assess_unknown(out, cfg, found, types, layout, stat, fdae, bound):
             statistical.fill_unmodelled(stat.block, stat.gust, unknown)
         else:
             filters.fdae_unmodelled(fdae, bound.n_gyro, unknown)
-    waited = types.surface[layout.main[PITCH]].evidence.n_anomalous >= types.config.half_frames
+    elevator = types.surface[layout.main[PITCH]]
+    waited = elevator.evidence.n_anomalous >= types.config.half_frames and verdict.can_be_faulty(elevator)
     not_isolated = found.detected and found.isolated_estimator == NOT_ISOLATED
     out.pitch_undecided = cfg.diagnoses_all_types and not_isolated and waited

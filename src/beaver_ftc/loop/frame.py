@@ -474,7 +474,7 @@ def decide(frame):
     control, layout, informed = frame.control, frame.control.layout, frame.control.config.informed
     share_faults(frame.truth, frame.faults, informed)
     if informed:
-        wanted = accommodation.true_mode(layout.main[PITCH], frame.faults)
+        wanted = accommodation.true_mode(control.config, layout, frame.faults)
     else:
         wanted = accommodation.mode_from(control.config, layout, frame.fdi.verdict, frame.assessment)
     accommodation.supervise(frame.supervisor, wanted, frame.t)

@@ -109,7 +109,7 @@ def smooth(filtered, i, value, keep):
 
 @kernel
 def cross(G, i, j, k):
-    """Cofactor sum of three columns of the leading rows: component k of column i x column j."""
+    """Component k of column i x column j of G (3, n)."""
     a, b = (k + 1) % 3, (k + 2) % 3
     return G[a, i] * G[b, j] - G[b, i] * G[a, j]
 

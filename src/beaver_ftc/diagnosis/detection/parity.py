@@ -196,12 +196,13 @@ def tone_gain(K_x, K_d, a, z, dt):
 
 @kernel
 def update_tone_eta(t, c, b, eta, dt):
-    """Update `eta`: the most that a bounded uncertainty, |d| <= eta sqrt(S), adds to |N|.
+    """Update `eta`: what a bounded uncertainty, |d| <= eta sqrt(S), adds to |N|, nearly the most.
 
         b_0 <- a b_0 + |W| v      b_2 <- rho2 b_2 + |W| v      eta_k = c (b_0 + |b_2|),  v = eta n_new
 
     |cos x| = 2 / pi (1 + 2/3 cos 2x - 2/15 cos 4x + ...). A bound that varies at twice the tone's frequency
-    adds most. Its higher harmonics add less: together no more than a third of that again.
+    adds most; the last third of |b_2| is for the harmonics above. One that varies at four times the frequency
+    or more can add a tenth more than that.
     """
     for k in range(t.eta.size):
         v = eta * t.n_new * tone_gain(b.K_x[0, 0], b.K_d[0, 0], b.a, c.z[k], dt)

@@ -5,12 +5,23 @@ the flight, delays s since the first frame with the fault, rates deg/s; None is 
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass, field, fields
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 from types import UnionType
-from typing import Annotated, Any, ClassVar, Self, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import (
+    Annotated,
+    Any,
+    ClassVar,
+    Self,
+    TypeVar,
+    Union,
+    dataclass_transform,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 
 from beaver_ftc.documents import files
 from beaver_ftc.scenario.faults import DAMAGE, LOSS_OF_EFFECTIVENESS, UNANTICIPATED, of_a_sensor
@@ -25,7 +36,7 @@ _KNOWN = "a key that the document has only where its value is known"
 Known = Annotated[Value | None, _KNOWN]
 
 
-@dataclass(frozen=True)
+@dataclass_transform(frozen_default=True, field_specifiers=(field,))
 class Part:
     """A section of the document, its keys in the order of its fields.
 
@@ -35,24 +46,27 @@ class Part:
     _first: ClassVar[tuple[str, ...]] = ()
     _last: ClassVar[tuple[str, ...]] = ()
 
+    def __init_subclass__(cls) -> None:
+        """Each section is a frozen dataclass."""
+        dataclass(frozen=True)(cls)
+
     @classmethod
-    def of(cls, found: Any, value: "Reader | None" = None) -> Self:
+    def of(cls, found: Any) -> Self:
         """From a section as JSON has it, or a tuple of its values; a key that is not there is None, or an
-        empty list. value: what becomes of a single value, such as `rounded`."""
+        empty list."""
         part: Any = cls
         if isinstance(found, cls):
             return found
-        value = value or _list_as_tuple
         if isinstance(found, tuple):
-            return cls(*map(value, found))
-        return cls(**{name: read(found.get(name)) for name, (read, _) in _fields_of(part, value).items()})
+            return cls(*found)
+        return cls(**{name: _read(hint, found.get(name)) for name, (hint, _) in _fields_of(part).items()})
 
     def document(self) -> Document:
         """The section as a mapping of keys to values."""
         part: Any = type(self)
         return {
             name: _as_json_value(value)
-            for name, (_, only_known) in _fields_of(part, _list_as_tuple).items()
+            for name, (_, only_known) in _fields_of(part).items()
             if not ((value := getattr(self, name)) is None and only_known)
         }
 
@@ -66,19 +80,14 @@ class Part:
         return here
 
 
-Reader = Callable[[Any], Any]
-
-
 @cache
-def _fields_of(part: Any, value: Reader) -> dict[str, tuple[Reader, bool]]:
-    """How each field of a section is read, and whether the document has it only where it is known; in the
+def _fields_of(part: Any) -> dict[str, tuple[Any, bool]]:
+    """The type of each field of a section, and whether the document has it only where it is known; in the
     document's order."""
     hints, marks = get_type_hints(part), get_type_hints(part, include_extras=True)
     others = [one.name for one in fields(part) if one.name not in part._first + part._last]
-    return {
-        name: (_reader_of_type(hints[name], value), _KNOWN in get_args(marks[name]))
-        for name in (*part._first, *others, *part._last)
-    }
+    named = (*part._first, *others, *part._last)
+    return {name: (hints[name], _KNOWN in get_args(marks[name])) for name in named}
 
 
 def without_none(hint: Any) -> Any:
@@ -88,33 +97,24 @@ def without_none(hint: Any) -> Any:
     return next(one for one in get_args(hint) if one is not type(None))
 
 
-def _reader_of_type(hint: Any, value: Reader) -> Reader:
-    """How a value of JSON becomes a field of this type: the type is looked into once, not for each flight."""
+@cache
+def _kind_of(hint: Any) -> tuple[Any, Any, bool]:
+    """Of a field's type, looked into once: what it is, of what, and whether it may be None."""
     bare = without_none(hint)
-    kind, inner = get_origin(bare), get_args(bare)
+    return get_origin(bare) or bare, get_args(bare), bare is not hint
+
+
+def _read(hint: Any, value: Any) -> Any:
+    """A value of JSON as a field of this type."""
+    kind, of, may_be_none = _kind_of(hint)
+    if value is None and (may_be_none or kind not in (tuple, dict)):
+        return None
     if kind is tuple:
-        read: Reader = partial(_tuple_of, _reader_of_type(inner[0], value))
-    elif kind is dict:
-        read = partial(_dict_of, _reader_of_type(inner[1], value))
-    else:
-        is_section = isinstance(bare, type) and issubclass(bare, Part)
-        return partial(_known, partial(bare.of, value=value) if is_section else value)
-    return read if bare is hint else partial(_known, read)
-
-
-def _known(read: Reader, value: Any) -> Any:
-    return None if value is None else read(value)
-
-
-def _tuple_of(read: Reader, values: Any) -> Any:
-    return tuple(map(read, values or ()))
-
-
-def _dict_of(read: Reader, values: Any) -> Any:
-    return {key: read(value) for key, value in (values or {}).items()}
-
-
-def _list_as_tuple(value: Any) -> Any:
+        return tuple(_read(of[0], each) for each in value or ())
+    if kind is dict:
+        return {key: _read(of[1], each) for key, each in (value or {}).items()}
+    if isinstance(kind, type) and issubclass(kind, Part):
+        return kind.of(value)
     return tuple(value) if isinstance(value, list) else value
 
 
@@ -136,7 +136,6 @@ def rounded(value: Any) -> Any:
     return tuple(map(rounded, value)) if isinstance(value, tuple | list) else value
 
 
-@dataclass(frozen=True)
 class FlightCondition(Part):
     """The flight condition, and who diagnosed and controlled."""
 
@@ -149,7 +148,6 @@ class FlightCondition(Part):
     law: str
 
 
-@dataclass(frozen=True)
 class Fault(Part):
     """The first fault of the scenario.
 
@@ -168,7 +166,6 @@ class Fault(Part):
 _NO_SIZE = {"actuator", "sensor", "type", "at_s", "end_s", "profile"}
 
 
-@dataclass(frozen=True)
 class DeclaredFault(Fault):
     """A fault as it is declared, and as a name is held against it. size: what else its type has."""
 
@@ -206,7 +203,6 @@ class DeclaredFault(Fault):
         return None if kind is None else kind == self.type
 
 
-@dataclass(frozen=True)
 class Statistical(Part):
     """The alarm of the statistical detector.
 
@@ -220,7 +216,6 @@ class Statistical(Part):
     closest_approach: float
 
 
-@dataclass(frozen=True)
 class Inconclusive(Part):
     """The frames in which the built-in diagnosis can conclude nothing.
 
@@ -234,7 +229,6 @@ class Inconclusive(Part):
     reasons: tuple[Document, ...]
 
 
-@dataclass(frozen=True)
 class Detection(Part):
     """The alarm of a flight. Fields without a value are None.
 
@@ -256,7 +250,6 @@ class Detection(Part):
     inconclusive: Inconclusive | None
 
 
-@dataclass(frozen=True)
 class Named(Part):
     """A fault that the diagnosis named. Fields without a value are None.
 
@@ -297,7 +290,6 @@ class Named(Part):
     estimate_at_s: Known[float] = None
 
 
-@dataclass(frozen=True)
 class NameInWindow(Named):
     """A fault that the diagnosis named in a window. `Named` explains the other fields.
 
@@ -309,7 +301,6 @@ class NameInWindow(Named):
     true_size: float | None = None
 
 
-@dataclass(frozen=True)
 class Window(Part):
     """A part of the flight in which the same faults are in force.
 
@@ -330,7 +321,6 @@ class Window(Part):
     isolation: tuple[NameInWindow, ...]
 
 
-@dataclass(frozen=True)
 class Withdrawn(Part):
     """A fault that the diagnosis named, and later withdrew during the flight.
 
@@ -348,7 +338,6 @@ class Withdrawn(Part):
     because: Known[str] = None
 
 
-@dataclass(frozen=True)
 class Isolation(Named):
     """The fault that the diagnosis named. `Named` explains the fields that are not listed here.
 
@@ -374,7 +363,6 @@ class Isolation(Named):
     _last = ("estimate_at_s", "types_withdrawn")
 
 
-@dataclass(frozen=True)
 class Rates(Part):
     """One number for each axis, deg/s."""
 
@@ -383,7 +371,6 @@ class Rates(Part):
     r: float | None
 
 
-@dataclass(frozen=True)
 class Tracking(Part):
     """The tracking errors and the movement of the surfaces.
 
@@ -400,7 +387,6 @@ class Tracking(Part):
     surface_energy_deg2_s: dict[str, float]
 
 
-@dataclass(frozen=True)
 class ModeChange(Part):
     """A change of the supervisor's mode.
 
@@ -412,7 +398,6 @@ class ModeChange(Part):
     mode: str
 
 
-@dataclass(frozen=True)
 class ChangeInFlight(Part):
     """What was changed in flight; of a diagnosis that ended with it its alarm and the name it gave."""
 
@@ -433,12 +418,11 @@ class ChangeInFlight(Part):
         return {key: value for key, value in found.items() if key not in of_it}
 
     @classmethod
-    def of(cls, found: Any, value: Reader | None = None) -> Self:
+    def of(cls, found: Any) -> Self:
         """From a section as JSON has it."""
-        return super().of({**found, "renewed": "detection_time_s" in found}, value)
+        return super().of({**found, "renewed": "detection_time_s" in found})
 
 
-@dataclass(frozen=True)
 class EnvelopeExit(Part):
     """A spell outside the validated envelope."""
 
@@ -446,7 +430,6 @@ class EnvelopeExit(Part):
     end_s: float
 
 
-@dataclass(frozen=True)
 class EnvelopeExitTotals(Part):
     """All spells outside together; exits_left_out: how many are not listed."""
 
@@ -455,7 +438,6 @@ class EnvelopeExitTotals(Part):
     exits_left_out: int
 
 
-@dataclass(frozen=True)
 class Departure(Part):
     """The loss of the aircraft.
 
@@ -467,7 +449,6 @@ class Departure(Part):
     signal: str
 
 
-@dataclass(frozen=True)
 class AxisAuthority(Part):
     """Of one axis after the fault: share of the demanded acceleration given, and for how long holding the
     rates was beyond the surfaces. What they give at the end, rad/s2, believed and healthy; the engines'."""
@@ -483,7 +464,6 @@ class AxisAuthority(Part):
     engines_greatest_rad_s2: Known[float] = None
 
 
-@dataclass(frozen=True)
 class Authority(Part):
     """By axis."""
 
@@ -492,7 +472,6 @@ class Authority(Part):
     r: AxisAuthority
 
 
-@dataclass(frozen=True)
 class EnginePowerUse(Part):
     """Since when and for how long pitch was left to the engine, and the manifold pressures, inHg."""
 
@@ -502,7 +481,6 @@ class EnginePowerUse(Part):
     highest_inhg: float
 
 
-@dataclass(frozen=True)
 class Deviations(Part):
     """From the commanded profile, by channel; None where it is not flown."""
 
@@ -512,7 +490,6 @@ class Deviations(Part):
     bank_deg: float | None
 
 
-@dataclass(frozen=True)
 class ProfileDeviations(Deviations):
     """The largest. Those of the airspeed are of a mean over 10 s, the last excepted. limited: from the
     commanded airspeed as far as it can be held."""
@@ -521,14 +498,12 @@ class ProfileDeviations(Deviations):
     airspeed_at_one_instant_mps: float | None
 
 
-@dataclass(frozen=True)
 class ArrivalDeviations(Deviations):
     """The mean at the end, with its sign; and whether the flight ends in the envelope."""
 
     in_envelope: bool
 
 
-@dataclass(frozen=True)
 class ProtectionLimit(Part):
     """A limit that envelope protection has put on the command."""
 
@@ -540,7 +515,6 @@ class ProtectionLimit(Part):
     in_force: bool
 
 
-@dataclass(frozen=True)
 class Expectation(Part):
     """One expectation of the scenario, and its result.
 
@@ -576,7 +550,6 @@ class Judged:
     took_s: float = 0.0
 
 
-@dataclass(frozen=True)
 class CertificateCounts(Part):
     """Of a certificate: statements that it proves, and alarms or exclusions without a proof."""
 
@@ -584,7 +557,6 @@ class CertificateCounts(Part):
     without: int
 
 
-@dataclass(frozen=True)
 class LatencyMs(Part):
     """From a packet to its answer, ms."""
 
@@ -593,7 +565,6 @@ class LatencyMs(Part):
     largest: float
 
 
-@dataclass(frozen=True)
 class PacketIntervalMs(Part):
     """Between two packets, ms."""
 
@@ -602,7 +573,6 @@ class PacketIntervalMs(Part):
     largest: float
 
 
-@dataclass(frozen=True)
 class Link(Part):
     """How an autopilot was served: rates, counts of packets (beaver_ftc_links/sitl/link.py), times.
     diagnosed_from_s: when the diagnosis began; speed: multiple of real time, and how far behind it the flight
@@ -629,7 +599,6 @@ class Link(Part):
     said: tuple[Document, ...]
 
 
-@dataclass(frozen=True)
 class Metrics(Part):
     """The document metrics.json. assumes: what the diagnosis assumes of the truth (`sensors-sound`).
     outside_class: faults of surfaces and sensors that the declared class does not have. Under an autopilot:

@@ -30,6 +30,8 @@ from beaver_ftc_assurance.certificates.history import (
     log_rows_of,
 )
 from beaver_ftc_assurance.certificates.inequality import (
+    ANY,
+    CONSTANT,
     Hypothesis,
     Inequality,
     Term,
@@ -266,9 +268,7 @@ class _Flight:
             return None
         filtered = (filters(pole, tape.since, k, every) for pole in self._detection_poles)
         health = no_fault(tape.first, tape.end - tape.first)
-        return first_violated(
-            chain(filters(inf, k - 1, k, every), *filtered), health, self.history, tape.first
-        )
+        return first_violated(chain(filters(inf, k - 1, k, every), *filtered), health, self.history)
 
     @property
     def _detection_poles(self) -> list[float]:
@@ -287,16 +287,16 @@ class _Flight:
         )  # fmt: skip
         since_alarm = [*filters(config.isolation_pole_per_s, alarm, k, of.axes)] if k > alarm else []
         memory = self._filter_tests(e, estimator.parity_direction, of.axes, k)
-        found = first_violated(chain(single_frame_tests(k, of), memory, since_alarm), of, history, tape.first)
+        found = first_violated(chain(single_frame_tests(k, of), memory, since_alarm), of, history)
         if found is not None:
             return found
-        lasting = replace(of, theta_is_constant=True)
+        lasting = replace(of, theta=CONSTANT)
         candidates: list[list[Term]] = []
         if estimator.hypothesis_kind == LOSS and config.fault_profile == "abrupt":
             candidates = [constant_theta_tests(lasting, history, np.arange(alarm, k + 1))]
         elif config.thresholds == "published":
             candidates = since_alarm
-        return first_violated(candidates, lasting, history, tape.first)
+        return first_violated(candidates, lasting, history)
 
     def _filter_tests(
         self, e: int, across: np.ndarray, axes: tuple[int, ...], k: int
@@ -332,9 +332,8 @@ class _Flight:
             said = courses.evidence(self.scenario, tape, history, s, kind, alarm)
             return said or {"because": kinds.EXCLUDED_BY_MANY_FRAMES}
         of = kinds.hypothesis_of_type(tape, s, kind)
-        if history.length == 1 or of.theta_is_constant:
-            candidates = kinds.candidate_inequalities(of, history, alarm, k)
-            found = first_violated(candidates, of, history, tape.first)
+        if history.length == 1 or of.theta != ANY:
+            found = first_violated(kinds.candidate_inequalities(of, history, alarm, k), of, history)
         else:
             found = self._sum_of_block(kinds.hypothesis_of_type(self.tape, s, kind), history, k)
         return _said(found, kinds.EXCLUDED_BY_MANY_FRAMES)
@@ -342,12 +341,11 @@ class _Flight:
     def _sum_of_block(self, of: Hypothesis, blocks: History, k: int) -> Inequality | None:
         """Block k, or the one before, by frames, in which theta may differ. A block is left out if it begins
         before the effects of a fault are kept."""
-        L, first = blocks.length, self.tape.first
-        ends = [blocks.begin + block * L - 1 for block in (k, k + 1)]
-        candidates = [
-            [*filters(ADDING_POLE_PER_S, end - L, end, of.axes)] for end in ends if end - L >= first
-        ]
-        return first_violated(chain(*candidates), of, self.history, first)
+        L = blocks.length
+        starts = [blocks.begin + block * L - 1 for block in (k - 1, k)]
+        kept = (start for start in starts if start >= of.first_frame)
+        candidates = (filters(ADDING_POLE_PER_S, start, start + L, of.axes) for start in kept)
+        return first_violated(chain.from_iterable(candidates), of, self.history)
 
     def declared_fields(self, said: list[Document]) -> Document:
         """What all these statements go by."""

@@ -5,6 +5,7 @@ All words follow from the metrics, so that they cannot disagree with `metrics.js
 
 import io
 import math
+from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -14,14 +15,13 @@ from beaver_ftc.results.model import (
     CertificateCounts,
     ChangeInFlight,
     DeclaredFault,
-    Departure,
-    EnginePowerUse,
     Fault,
     FlightCondition,
     Inconclusive,
     Link,
     Metrics,
     Named,
+    Part,
     ProfileDeviations,
     ProtectionLimit,
     Statistical,
@@ -76,13 +76,13 @@ def verdict_lines(metrics: Metrics) -> list[tuple[str, str]]:
         ("probing", _if_there(_probing_text, isolation.probing_s)),
         ("supervisor", _supervisor_text(metrics)),
         *(("changed", _change_text(change)) for change in metrics.changes),
-        ("engine power", _if_there(_engine_power_text, metrics.engine_power)),
+        ("engine power", _filled(_ENGINE_POWER_FORM, metrics.engine_power)),
         ("profile", _if_there(_profile_text, metrics.profile)),
         *(("limited", _protection_limit_text(limit)) for limit in metrics.limits),
         ("authority", _if_there(_insufficient_authority_text, metrics.authority)),
         ("remaining", _if_there(_remaining_authority_text, metrics.authority)),
         ("envelope", _envelope_text(metrics)),
-        ("departure", _if_there(_departure_text, metrics.departure)),
+        ("departure", _filled("LOST at {time_s}: {signal}", metrics.departure)),
         ("link", _if_there(_link_text, metrics.link)),
         ("saturation", ", ".join(f"{s} {_seconds_text(t)}" for s, t in metrics.saturation_s.items() if t)),
         *(("note", hint) for hint in metrics.hints),
@@ -93,6 +93,34 @@ def verdict_lines(metrics: Metrics) -> list[tuple[str, str]]:
 def _if_there(text_of: Callable[[Any], str], section: Any) -> str:
     """What is said of a section; nothing where the flight has none."""
     return text_of(section) if section else ""
+
+
+def _filled(form: str, section: Part | None, **more: str) -> str:
+    """A sentence of a section's fields, its times as text; nothing where the flight has none."""
+    if section is None:
+        return ""
+    known = {name: _seconds_text(of) if name.endswith("_s") else of for name, of in vars(section).items()}
+    return form.format(**known, **more)
+
+
+_CONDITION_FORM = (
+    "{airspeed_mps:g} m/s at {altitude_m:g} m, {flown_s}; diagnosis {scheme}{of_every_type}; law {law}"
+)
+_STATISTICAL_FORM = (
+    "{alarm}; threshold {alarm_level:.2f} σ, peak in healthy flight {closest_approach:.2f} of it"
+)
+_ENGINE_POWER_FORM = (
+    "took over pitch at {from_s}, for {in_charge_s} in all, {lowest_inhg:.1f} to {highest_inhg:.1f} inHg"
+)
+_LINK_FORM = (
+    "{protocol}, {frames} frames at {packets_hz:g} Hz{odd}; latency {latency_ms.median:.2f} ms (99th "
+    "percentile {latency_ms.p99:.2f}), interval {interval_ms.mean:.2f} ms, jitter "
+    "{interval_ms.jitter_rms:.2f} ms RMS"
+)
+_LIMIT_FORM_OF_QUANTITY = {
+    "airspeed_mps": "airspeed to {side} {value:.1f} m/s from {time_s}{until}: {because}",
+    "bank_deg": "bank to {side} {value:.0f} deg from {time_s}{until}: {because}",
+}
 
 
 def _window_text(window: Window, metrics: Metrics) -> str:
@@ -146,10 +174,8 @@ def _surfaces_text(names: Sequence[str]) -> str:
     """One surface, a few by their names, or many counted by the part of the aircraft where they are."""
     if len(names) <= MAX_LISTED_CANDIDATES:
         return " or ".join(_without_underscores(name) for name in names)
-    parts: dict[str, int] = {}
-    for name in names:
-        part = next((part for word, part in _AIRCRAFT_PART_OF_SURFACE_WORD.items() if word in name), "others")
-        parts[part] = parts.get(part, 0) + 1
+    part_of = _AIRCRAFT_PART_OF_SURFACE_WORD.items()
+    parts = Counter(next((part for word, part in part_of if word in name), "others") for name in names)
     counted = ", ".join(f"{n} {'' if part == 'others' else 'on the '}{part}" for part, n in parts.items())
     return f"one of {len(names)} surfaces ({counted})"
 
@@ -230,9 +256,8 @@ def _change_text(change: ChangeInFlight) -> str:
 
 
 def _condition_text(flown: FlightCondition) -> str:
-    condition = f"{flown.airspeed_mps:g} m/s at {flown.altitude_m:g} m, {_seconds_text(flown.flown_s)}"
-    kind = ", every fault type" if flown.fault_class == "all" else ""
-    return f"{condition}; diagnosis {flown.scheme}{kind}; law {flown.law}"
+    of_every_type = ", every fault type" if flown.fault_class == "all" else ""
+    return _filled(_CONDITION_FORM, flown, of_every_type=of_every_type)
 
 
 _ASSUMPTION_TEXT = {"sensors-sound": "sensors are sound (A11)"}
@@ -271,16 +296,14 @@ def _masked_text(fault: DeclaredFault, faults: Sequence[DeclaredFault]) -> str:
     return f", without effect {' and '.join(spells)}" if spells else ""
 
 
+_FORM_OF_SENSOR_FAULT = {"bias": "{:+g} {}", "noise": "{:g} {}", "scale": "{:+.0%}"}
+
+
 def _fault_size_texts(fault: DeclaredFault) -> list[str]:
     """The size of an injected fault in words, that of an instrument's in the unit of the instrument."""
     if fault.sensor:
-        unit, words = (
-            QUANTITIES[fault.sensor].unit,
-            {"bias": "{:+g} {}", "noise": "{:g} {}", "scale": "{:+.0%}"},
-        )
-        return [
-            words[fault.type].format(size, unit) for key, size in fault.size.items() if key == "magnitude"
-        ]
+        unit, size = QUANTITIES[fault.sensor].unit, fault.size.get("magnitude")
+        return [] if size is None else [_FORM_OF_SENSOR_FAULT[fault.type].format(size, unit)]
     words_of = TYPES[fault.type].in_words if fault.type in TYPES else {}
     return [words_of[key](value) for key, value in fault.size.items() if key in words_of]
 
@@ -303,14 +326,10 @@ def _profile_text(profile: ProfileDeviations) -> str:
     return f"largest deviation: {', '.join(off)}" if off else ""
 
 
-_LIMIT_FORMAT_OF_QUANTITY = {"airspeed_mps": "airspeed to {} {:.1f} m/s", "bank_deg": "bank to {} {:.0f} deg"}
-
-
 def _protection_limit_text(limit: ProtectionLimit) -> str:
     """What envelope protection has limited, since when and why."""
-    what = _LIMIT_FORMAT_OF_QUANTITY[limit.limits].format(limit.side, limit.value)
     until = "" if limit.in_force else ", no longer at the end"
-    return f"{what} from {_seconds_text(limit.time_s)}{until}: {limit.because}"
+    return _filled(_LIMIT_FORM_OF_QUANTITY[limit.limits], limit, until=until)
 
 
 def _true_size_text(isolation: Named, metrics: Metrics) -> str:
@@ -352,9 +371,8 @@ def _inconclusive_text(found: Inconclusive) -> str:
 
 def _statistical_text(said: Statistical) -> str:
     """When the statistical detector alone would have raised the alarm."""
-    when = "no alarm" if said.time_s is None else f"alarm at {_seconds_text(said.time_s)}"
-    peak = f"peak in healthy flight {said.closest_approach:.2f} of it"
-    return f"{when}; threshold {said.alarm_level:.2f} σ, {peak}"
+    alarm = "no alarm" if said.time_s is None else f"alarm at {_seconds_text(said.time_s)}"
+    return _filled(_STATISTICAL_FORM, said, alarm=alarm)
 
 
 def _isolation_text(metrics: Metrics) -> str:
@@ -418,16 +436,9 @@ def _estimate_text(isolation: Named) -> str:
 
 def _supervisor_text(metrics: Metrics) -> str:
     changes = [f"{change.mode} {_seconds_text(change.time_s)}" for change in metrics.supervisor]
-    left_out = metrics.mode_changes_left_out
-    if left_out:
-        changes.insert(-1, f"({left_out} more)")
+    if metrics.mode_changes_left_out:
+        changes.insert(-1, f"({metrics.mode_changes_left_out} more)")
     return " → ".join(changes)
-
-
-def _engine_power_text(power: EnginePowerUse) -> str:
-    span = f"{power.lowest_inhg:.1f} to {power.highest_inhg:.1f} inHg"
-    total = _seconds_text(power.in_charge_s)
-    return f"took over pitch at {_seconds_text(power.from_s)}, for {total} in all, {span}"
 
 
 MAX_SHOWN_AUTHORITY_SHARE = 0.995  # of an axis: nothing to be said
@@ -466,10 +477,6 @@ def _envelope_text(metrics: Metrics) -> str:
     return f"left {count}, {total} in all, first at {_seconds_text(metrics.envelope_exits[0].start_s)}"
 
 
-def _departure_text(departure: Departure) -> str:
-    return f"LOST at {_seconds_text(departure.time_s)}: {departure.signal}"
-
-
 # The counts of a link that are printed where they are not 0.
 _LINK_COUNT_WORDS = {
     "repeated": "repeated", "late": "late", "missed": "missing", "malformed": "malformed",
@@ -479,15 +486,10 @@ _LINK_COUNT_WORDS = {
 
 def _link_text(link: Link) -> str:
     """Latency and losses of the link to an autopilot."""
-    latency, interval = link.latency_ms, link.interval_ms
     odd = "".join(
         f", {getattr(link, name)} {words}" for name, words in _LINK_COUNT_WORDS.items() if getattr(link, name)
     )
-    times = (
-        f"latency {latency.median:.2f} ms (99th percentile {latency.p99:.2f}), interval "
-        f"{interval.mean:.2f} ms, jitter {interval.jitter_rms:.2f} ms RMS"
-    )
-    return f"{link.protocol}, {link.frames} frames at {link.packets_hz:g} Hz{odd}; {times}"
+    return _filled(_LINK_FORM, link, odd=odd)
 
 
 def _seconds_text(seconds: float | None) -> str:

@@ -8,6 +8,7 @@ and the commands to the surfaces as shares of travel. `vehicle.yaml` beside it n
 ULog: https://docs.px4.io/main/en/dev_log/ulog_file_format; dataflash: FMT messages, then packed ones.
 """
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import ceil, cos, degrees, radians
 from pathlib import Path
@@ -31,8 +32,7 @@ _ACMI_COLUMNS = (
     "airspeed_mps", "alpha_rad", "beta_rad",
 )  # fmt: skip
 
-ValuesByColumn = dict[str, NDArray[np.float64]]
-ColumnsByTopic = dict[str, ValuesByColumn]
+ColumnsByTopic = dict[str, log.Values]
 """Fields of each message; every message has the stamps `t_s`."""
 
 RECORDING_FILE_OF_KIND = {"table": "flight.csv", "ulog": "flight.ulg", "ardupilot": "flight.bin"}
@@ -95,14 +95,12 @@ def _escape_acmi_text(text: str) -> str:
 def _acmi_frames(log_path: Path, metrics: Metrics, aircraft: Aircraft) -> Iterator[str]:
     """A frame of the recording at ACMI_RATE_HZ at most, each event in the first frame not before it."""
     events = sorted(marks(metrics), key=lambda mark: mark.time_s)
-    source = log.StoredLog(log_path)
-    start_m = float(next(source.read_chunks(["altitude_m"]))["altitude_m"][0])
-    columns: tuple[str, ...] = _ACMI_COLUMNS
     full_rad = aircraft.travel[FLAP].max_rad if FLAP in aircraft.surfaces else None
-    if full_rad is not None:
-        columns += (f"{FLAP}_pos_rad",)
-    for row in _rows_at_acmi_rate(source, columns):
-        place = _acmi_position(row, EARTH_RADIUS_M + start_m)
+    flap = () if full_rad is None else (f"{FLAP}_pos_rad",)
+    radius_m = 0.0
+    for row in _rows_at_acmi_rate(log.StoredLog(log_path), (*_ACMI_COLUMNS, *flap)):
+        radius_m = radius_m or EARTH_RADIUS_M + row["altitude_m"]  # of the first
+        place = _acmi_position(row, radius_m)
         yield f"#{row['t_s']:.3f}\n{_ACMI_OBJECT_ID},T={place},{_acmi_properties(row, full_rad)}\n"
         while events and events[0].time_s <= row["t_s"] + 1e-9:
             yield f"0,Event=Bookmark|{_ACMI_OBJECT_ID}|{_escape_acmi_text(events.pop(0).label)}\n"
@@ -207,25 +205,20 @@ def _write_ulog(path: Path, t_us: NDArray[np.int64], topics: ColumnsByTopic) -> 
     """Definitions and subscriptions, then every message in the order of time."""
     head = [b"ULog\x01\x12\x35\x01" + np.uint64(t_us[0]).tobytes()]
     for topic, fields in topics.items():
-        head.append(
-            _ulog_message(
-                "F", f"{topic}:uint64_t timestamp;{_ulog_field_declarations(list(fields))}".encode()
-            )
-        )
-    for number, topic in enumerate(topics):
-        head.append(_ulog_message("A", b"\x00" + np.uint16(number).tobytes() + topic.encode()))
+        layout = f"{topic}:uint64_t timestamp;{_ulog_field_declarations(list(fields))}"
+        head.append(_ulog_message("F", layout.encode()))
     packed = []
-    for number, fields in enumerate(topics.values()):
-        length, header = 10 + 8 * len(fields), b"D" + np.uint16(number).tobytes()
-        packed.append(_packed_messages(np.uint16(length).tobytes() + header, t_us, fields))
+    for number, (topic, fields) in enumerate(topics.items()):
+        of_topic = np.uint16(number).tobytes()
+        head.append(_ulog_message("A", b"\x00" + of_topic + topic.encode()))
+        length = np.uint16(10 + 8 * len(fields)).tobytes()
+        packed.append(_packed_messages(length + b"D" + of_topic, t_us, fields))
     path.write_bytes(b"".join(head) + _interleave_messages(packed))
 
 
 def _ulog_field_declarations(fields: Sequence[str]) -> str:
     """Fields of one format; `xyz[0]`, `xyz[1]`, ... are one array."""
-    arrays: dict[str, int] = {}
-    for field in fields:
-        arrays[field.partition("[")[0]] = arrays.get(field.partition("[")[0], 0) + 1
+    arrays = Counter(field.partition("[")[0] for field in fields)
     return "".join(
         f"double[{count}] {name};" if f"{name}[0]" in fields else f"double {name};"
         for name, count in arrays.items()
@@ -242,10 +235,8 @@ def _write_dataflash(path: Path, t_us: NDArray[np.int64], topics: ColumnsByTopic
     packed = []
     for number, (name, fields) in enumerate(topics.items(), start=140):
         rows = _packed_messages(bytes([0xA3, 0x95, number]), t_us, fields)
-        labels = ",".join(["TimeUS", *fields])
-        head.append(
-            _dataflash_fmt_message(number, rows.dtype.itemsize, name, "Q" + "d" * len(fields), labels)
-        )
+        layout, labels = "Q" + "d" * len(fields), ",".join(["TimeUS", *fields])
+        head.append(_dataflash_fmt_message(number, rows.dtype.itemsize, name, layout, labels))
         packed.append(rows)
     path.write_bytes(b"".join(head) + _interleave_messages(packed))
 
@@ -256,7 +247,7 @@ def _dataflash_fmt_message(number: int, length: int, name: str, layout: str, lab
     return bytes([0xA3, 0x95, 128, number, length]) + b"".join(padded)
 
 
-def _packed_messages(head: bytes, t_us: NDArray[np.int64], fields: ValuesByColumn) -> np.ndarray:
+def _packed_messages(head: bytes, t_us: NDArray[np.int64], fields: log.Values) -> np.ndarray:
     """The messages of one topic: each its head, the stamp, and the fields as doubles."""
     layout = [("head", "u1", (len(head),)), ("t", "<u8"), ("v", "<f8", (len(fields),))]
     rows = np.zeros(len(t_us), dtype=layout)

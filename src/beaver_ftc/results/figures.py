@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from beaver_ftc.results.log import StoredLog
+from beaver_ftc.results.log import StoredLog, Values
 from beaver_ftc.results.model import Metrics
 from beaver_ftc.results.style import GREY, LOOKS, SHADES, Mark, closeup_window, marks
 from beaver_ftc.results.views import (
@@ -17,7 +17,6 @@ from beaver_ftc.results.views import (
     WHOLE_FLIGHT_S,
     Panel,
     Trace,
-    ValuesOfColumns,
     View,
     series_of,
     views_of_flight,
@@ -43,7 +42,7 @@ class Picture:
 
     path: Path
     view: View
-    series: ValuesOfColumns
+    series: Values
     event_marks: Sequence[Mark]
     subtitle: str
 
@@ -90,7 +89,7 @@ _METADATA_OF_FORMAT: dict[str, Any] = {
 
 
 def draw(
-    view: View, series: ValuesOfColumns, event_marks: Sequence[Mark], subtitle: str, style: str = "screen"
+    view: View, series: Values, event_marks: Sequence[Mark], subtitle: str, style: str = "screen"
 ) -> "Figure":
     """One view as a matplotlib figure, over the time that `series` covers; style: of STYLES."""
     figure, grid = _empty_figure_and_axes(view, figure_class())
@@ -168,7 +167,7 @@ def _empty_figure_and_axes(view: View, new_figure: Any) -> tuple["Figure", Any]:
     return figure, grid
 
 
-def _draw_panel(axes: "Axes", panel: Panel, series: ValuesOfColumns, event_marks: Sequence[Mark]) -> None:
+def _draw_panel(axes: "Axes", panel: Panel, series: Values, event_marks: Sequence[Mark]) -> None:
     if panel.bars:
         _draw_bars(axes, panel, series)
     else:
@@ -207,7 +206,7 @@ def _set_log_scale(axes: "Axes") -> None:
     axes.minorticks_off()
 
 
-def _draw_trace(axes: "Axes", trace: Trace, series: ValuesOfColumns, stepped: bool) -> None:
+def _draw_trace(axes: "Axes", trace: Trace, series: Values, stepped: bool) -> None:
     look = LOOKS[trace.role]
     axes.plot(
         series["t_s"],
@@ -221,7 +220,7 @@ def _draw_trace(axes: "Axes", trace: Trace, series: ValuesOfColumns, stepped: bo
     )
 
 
-def _draw_bars(axes: "Axes", panel: Panel, series: ValuesOfColumns) -> None:
+def _draw_bars(axes: "Axes", panel: Panel, series: Values) -> None:
     """A row a label: a bar while one of its traces is 0, a thin line while all that are there are 1."""
     for place, row in enumerate(panel.steps):
         of = [trace for trace in panel.traces if trace.label == row]
@@ -235,7 +234,7 @@ def _draw_bars(axes: "Axes", panel: Panel, series: ValuesOfColumns) -> None:
             axes.fill_between(*rows, where=where, step="post", color=colour, linewidth=0)
 
 
-def _limit_axis_to_quantiles(axes: "Axes", panel: Panel, series: ValuesOfColumns) -> None:
+def _limit_axis_to_quantiles(axes: "Axes", panel: Panel, series: Values) -> None:
     """Set the axis by all but the spikes; an arrow and its value mark the largest of those."""
     values = np.concatenate([trace.factor * series[trace.column] for trace in panel.traces])
     values = values[np.isfinite(values)]
@@ -248,7 +247,7 @@ def _limit_axis_to_quantiles(axes: "Axes", panel: Panel, series: ValuesOfColumns
     for value, edge, arrow, align in (
         (values.max(), high, "\u25b2", "top"), (values.min(), low, "\u25bc", "bottom")
     ):  # fmt: skip
-        if (value > high) if align == "top" else (value < low):
+        if not low <= value <= high:
             axes.text(
                 0.995, edge, f"{arrow} {value:.1f}", transform=axes.get_yaxis_transform(), ha="right",
                 va=align, fontsize=7, color="#555555",
@@ -260,7 +259,7 @@ def _linestyle(dash: tuple[float, ...]) -> Any:
     return (0, tuple(length / 1.5 for length in dash)) if dash else "-"
 
 
-def _draw_shade(axes: "Axes", panel: Panel, series: ValuesOfColumns) -> None:
+def _draw_shade(axes: "Axes", panel: Panel, series: Values) -> None:
     if not panel.shade_column or not (series[panel.shade_column] == 1).any():
         return
     axes.fill_between(
@@ -284,7 +283,7 @@ def _draw_event_marks(axes: "Axes", event_marks: Sequence[Mark], t_s: np.ndarray
         )  # fmt: skip
 
 
-def _write_absent_text(view: View, series: ValuesOfColumns, grid: Iterable["Axes"]) -> None:
+def _write_absent_text(view: View, series: Values, grid: Iterable["Axes"]) -> None:
     """Say so where a view has nothing to show, rather than leaving empty axes to be wondered at."""
     if view.text_without_data and all(np.isnan(series[column]).all() for column in view.columns):
         for axes in grid:

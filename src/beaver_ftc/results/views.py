@@ -30,7 +30,6 @@ ATTAINABLE_AIRSPEED_COLUMN = "airspeed_limited_mps"  # the commanded airspeed, a
 BEAVER_POWER_COLUMN = "manifold_pressure_inhg"
 MAX_CURVE_POINTS = 4000  # of a curve
 WHOLE_FLIGHT_S = (-math.inf, math.inf)
-ValuesOfColumns = dict[str, np.ndarray]
 RATIO_ENDING = "_ratio"  # ends the name of a derived column: |residual| / threshold
 UNLIKE_ENDING = "_unlike_rad"  # and of a position where it is not what the aerodynamics see, else no number
 MIN_UNLIKE_RAD = math.radians(0.05)
@@ -446,7 +445,7 @@ def series_of(
     columns: Sequence[str],
     window_s: tuple[float, float] = WHOLE_FLIGHT_S,
     max_points: int = MAX_CURVE_POINTS,
-) -> ValuesOfColumns:
+) -> log.Values:
     """`t_s` and the named columns within a window of time, each of shape (points,), about max_points at most.
 
     A longer log is cut into stretches of equal length; each gives two points at its first two instants, the
@@ -467,7 +466,7 @@ def series_of(
     return {name: np.concatenate([part[name] for part in parts] or [np.empty(0)]) for name in wanted}
 
 
-def _unwrap_heading(chunks: Iterable[ValuesOfColumns]) -> Iterator[ValuesOfColumns]:
+def _unwrap_heading(chunks: Iterable[log.Values]) -> Iterator[log.Values]:
     """Heading without its jumps of a whole turn."""
     last = np.empty(0)
     for chunk in chunks:
@@ -477,7 +476,7 @@ def _unwrap_heading(chunks: Iterable[ValuesOfColumns]) -> Iterator[ValuesOfColum
         yield chunk
 
 
-def _add_mean_airspeed(chunks: Iterable[ValuesOfColumns], frame_s: float) -> Iterator[ValuesOfColumns]:
+def _add_mean_airspeed(chunks: Iterable[log.Values], frame_s: float) -> Iterator[log.Values]:
     """The mean as the autopilot judges it: deviations from the command through a lag of MEAN_S."""
     share = frame_s / MEAN_S if math.isfinite(frame_s) else 1.0
     last = 0.0
@@ -488,7 +487,7 @@ def _add_mean_airspeed(chunks: Iterable[ValuesOfColumns], frame_s: float) -> Ite
         yield chunk | {MEAN_AIRSPEED_COLUMN: chunk[COMMANDED_AIRSPEED_COLUMN] + means}
 
 
-def _derived_column(chunk: ValuesOfColumns, name: str) -> np.ndarray:
+def _derived_column(chunk: log.Values, name: str) -> np.ndarray:
     """A position where it is unlike what the aerodynamics see; or |residual| / threshold, the threshold on
     the residual's side. NaN elsewhere, and where there is no threshold."""
     values, *others = (chunk[source] for source in _source_columns_of(name))
@@ -499,7 +498,7 @@ def _derived_column(chunk: ValuesOfColumns, name: str) -> np.ndarray:
     return np.where(np.isfinite(ratio), ratio, np.nan)
 
 
-def _extremes_by_stretch(chunk: ValuesOfColumns, stretch: int) -> ValuesOfColumns:
+def _extremes_by_stretch(chunk: log.Values, stretch: int) -> log.Values:
     starts = np.arange(0, chunk["t_s"].size, stretch)
     middles = np.minimum(starts + stretch // 2, chunk["t_s"].size - 1)
     out = {name: _lowest_and_highest(values, starts) for name, values in chunk.items() if name != "t_s"}

@@ -460,7 +460,7 @@ def _hint_late_reallocation(flight_metrics: Metrics) -> str:
 
 def _hint_drift(flight: "Landing") -> str:
     """Attitude, height and speed are left alone unless a scenario has an autopilot."""
-    if flight.end is None:
+    if flight.end is None or flight.scenario.autopilot:
         return ""
     initial = flight.scenario.initial
     ends = (
@@ -472,6 +472,4 @@ def _hint_drift(flight: "Landing") -> str:
         for what, a, b, most, unit in ends
         if abs(b - a) > most
     ]
-    if not far or getattr(flight.scenario, "autopilot", None):
-        return ""
-    return f"{' and '.join(far)} (only the body rates are controlled in this scenario)"
+    return f"{' and '.join(far)} (only the body rates are controlled in this scenario)" if far else ""

@@ -84,10 +84,9 @@ def certificate(
     tape = recorder.tape(known, n) if recorder else tape_of_flight_again(scenario, known, n)
     flight = _Flight(scenario, rows, tape, history_of(scenario, rows, tape))
     for said in flight.statements(events):
-        if "sides" in said or "as" in said:
-            document["statements"].append(said)
-        else:  # no number stands there, since nothing could prove it
-            document["without"].append({name: said[name] for name in ("what", "column", "because")})
+        if "because" in said:  # no number stands there, since nothing could prove it
+            del said["frame"]
+        document["without" if "because" in said else "statements"].append(said)
     if document["statements"]:
         document |= flight.declared_fields(document["statements"])
     columns = flight.evidence_columns(document["statements"])

@@ -4,8 +4,8 @@
 
 E[k] rad/s: the innovation through a filter of pole lam up to frame k; for an infinite pole the innovation of
 frame k alone, times dt. d (3,): a direction; c > 0: a weight. With one term the fault's parameter theta may
-take any value in its range in every frame, or the fault be absent; with `theta_is_constant` theta is one
-number for all terms. docs/explanation/certificates.md, "The inequality", derives it.
+take any value in its range in every frame, or the fault be absent; where theta is constant it is one number
+for all terms. docs/explanation/certificates.md, "The inequality", derives it.
 """
 
 from collections.abc import Iterable, Iterator

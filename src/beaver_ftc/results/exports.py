@@ -24,9 +24,23 @@ from beaver_ftc.results.model import Metrics
 from beaver_ftc.results.style import marks
 
 ACMI_RATE_HZ = 25.0  # smooth to look at; a viewer interpolates
-FLAP = "flap"  # a surface of this name is shown as a share of its travel
-_ACMI_OBJECT_ID = "b1"
-_ACMI_REFERENCE_TIME = "2005-06-27T12:00:00Z"  # any will do; the same for every run, so that runs overlay
+FLAP, _FLAP_COLUMN = "flap", "flap_pos_rad"  # a surface of this name is shown as a share of its travel
+# Any time will do as reference; it is the same for every run, so that runs overlay.
+_ACMI_HEAD = """\
+FileType=text/acmi/tacview
+FileVersion=2.2
+0,ReferenceTime=2005-06-27T12:00:00Z
+0,DataSource=JSBSim
+0,DataRecorder=beaver-ftc
+0,Title={scenario}
+b1,Type=Air+FixedWing,Name={aircraft},Color=Blue
+"""
+# Longitude, latitude (deg), altitude (m), roll, pitch, yaw (deg); air data (m/s, deg).
+_ACMI_FRAME = (
+    "#{t_s:.3f}\n"
+    "b1,T={longitude:.8f}|{latitude:.8f}|{altitude_m:.3f}|{phi_deg:.3f}|{theta_deg:.3f}|{psi_deg:.3f},"
+    "TAS={airspeed_mps:.3f},AOA={alpha_deg:.3f},AOS={beta_deg:.3f}{flaps}\n"
+)
 _ACMI_COLUMNS = (
     "t_s", "north_m", "east_m", "altitude_m", "phi_rad", "theta_rad", "psi_rad",
     "airspeed_mps", "alpha_rad", "beta_rad",
@@ -52,6 +66,20 @@ _NAMES_OF_KIND = {
         "attitude": "ATT.{title}", "flow": "FL{i}.V",
     },
 }  # fmt: skip
+_VEHICLE_FILE = """\
+# Written with the log beside it: which column is what. Commands are shares of travel.
+name: {kind}-of-a-simulated-flight
+reader: {kind}
+rates: {rates}
+commands: [{commands}]
+attitude: {attitude}
+airspeed: {airspeed!r}
+surfaces:
+{surfaces}
+full_deflection_rad: {stops}
+signals: [{signals}]
+flow: {flow}
+"""
 _COLUMN_OF_ANGLE = {"roll": "phi_rad", "pitch": "theta_rad", "yaw": "psi_rad"}
 _DYNAMIC_PRESSURE_COLUMN = "qdyn_pa"
 _FLOW_COLUMNS = ("alpha_rad", "beta_rad", _DYNAMIC_PRESSURE_COLUMN)
@@ -78,13 +106,9 @@ def write_acmi(log_path: Path, metrics: Metrics, path: Path, aircraft: Aircraft 
     """The flight as a Tacview recording (ACMI 2.2): path, attitude, air data, flap, bookmarks for events."""
     aircraft = aircraft or load()
     title = aircraft.file.description.partition(",")[0] or aircraft.name
+    names = {"scenario": _escape_acmi_text(metrics.scenario), "aircraft": _escape_acmi_text(title)}
     with path.open("w", encoding="utf-8", newline="\n") as file:
-        file.write("FileType=text/acmi/tacview\nFileVersion=2.2\n")
-        file.write(
-            f"0,ReferenceTime={_ACMI_REFERENCE_TIME}\n0,DataSource=JSBSim\n0,DataRecorder=beaver-ftc\n"
-        )
-        file.write(f"0,Title={_escape_acmi_text(metrics.scenario)}\n")
-        file.write(f"{_ACMI_OBJECT_ID},Type=Air+FixedWing,Name={_escape_acmi_text(title)},Color=Blue\n")
+        file.write(_ACMI_HEAD.format(**names))
         file.writelines(_acmi_frames(log_path, metrics, aircraft))
 
 
@@ -96,14 +120,18 @@ def _acmi_frames(log_path: Path, metrics: Metrics, aircraft: Aircraft) -> Iterat
     """A frame of the recording at ACMI_RATE_HZ at most, each event in the first frame not before it."""
     events = sorted(marks(metrics), key=lambda mark: mark.time_s)
     full_rad = aircraft.travel[FLAP].max_rad if FLAP in aircraft.surfaces else None
-    flap = () if full_rad is None else (f"{FLAP}_pos_rad",)
-    radius_m = 0.0
-    for row in _rows_at_acmi_rate(log.StoredLog(log_path), (*_ACMI_COLUMNS, *flap)):
+    columns = _ACMI_COLUMNS if full_rad is None else (*_ACMI_COLUMNS, _FLAP_COLUMN)
+    radius_m, flaps = 0.0, ""
+    for row in _rows_at_acmi_rate(log.StoredLog(log_path), columns):
         radius_m = radius_m or EARTH_RADIUS_M + row["altitude_m"]  # of the first
-        place = _acmi_position(row, radius_m)
-        yield f"#{row['t_s']:.3f}\n{_ACMI_OBJECT_ID},T={place},{_acmi_properties(row, full_rad)}\n"
+        latitude = START_LATITUDE_DEG + degrees(row["north_m"] / radius_m)
+        longitude = degrees(row["east_m"] / (radius_m * cos(radians(START_LATITUDE_DEG))))
+        angles = {name.replace("_rad", "_deg"): degrees(row[name]) for name in row if name.endswith("_rad")}
+        if full_rad is not None:
+            flaps = f",Flaps={row[_FLAP_COLUMN] / full_rad:.4f}"
+        yield _ACMI_FRAME.format(**row, **angles, latitude=latitude, longitude=longitude, flaps=flaps)
         while events and events[0].time_s <= row["t_s"] + 1e-9:
-            yield f"0,Event=Bookmark|{_ACMI_OBJECT_ID}|{_escape_acmi_text(events.pop(0).label)}\n"
+            yield f"0,Event=Bookmark|b1|{_escape_acmi_text(events.pop(0).label)}\n"
 
 
 def _rows_at_acmi_rate(source: log.Log, columns: tuple[str, ...]) -> Iterator[dict[str, float]]:
@@ -113,20 +141,6 @@ def _rows_at_acmi_rate(source: log.Log, columns: tuple[str, ...]) -> Iterator[di
         for i in range(-seen % every, rows, every):
             yield {name: float(values[i]) for name, values in chunk.items()}
         seen += rows
-
-
-def _acmi_position(row: dict[str, float], radius_m: float) -> str:
-    """From the log's local plane back to longitude, latitude (deg), altitude (m), roll, pitch, yaw (deg)."""
-    latitude = START_LATITUDE_DEG + degrees(row["north_m"] / radius_m)
-    longitude = degrees(row["east_m"] / (radius_m * cos(radians(START_LATITUDE_DEG))))
-    attitude = "|".join(f"{degrees(row[name]):.3f}" for name in ("phi_rad", "theta_rad", "psi_rad"))
-    return f"{longitude:.8f}|{latitude:.8f}|{row['altitude_m']:.3f}|{attitude}"
-
-
-def _acmi_properties(row: dict[str, float], full_flap_rad: float | None) -> str:
-    alpha, beta = degrees(row["alpha_rad"]), degrees(row["beta_rad"])
-    air = f"TAS={row['airspeed_mps']:.3f},AOA={alpha:.3f},AOS={beta:.3f}"
-    return air if full_flap_rad is None else f"{air},Flaps={row[f'{FLAP}_pos_rad'] / full_flap_rad:.4f}"
 
 
 def write_recording(
@@ -171,22 +185,17 @@ def _vehicle_file_text(named: dict[str, dict[str, str]], travel_rad: dict[str, f
     """The vehicle file: which column is what."""
     angle = "{{column: {}, unit: deg}}" if kind == "ardupilot" else "{!r}"
     commands, flow = named["commands"], named["flow"]
-    felt = ", ".join(column for name, column in flow.items() if name != _DYNAMIC_PRESSURE_COLUMN)
-    lines = [
-        "# Written with the log beside it: which column is what. Commands are shares of travel.",
-        f"name: {kind}-of-a-simulated-flight",
-        f"reader: {kind}",
-        f"rates: {_flow_mapping(named['rates'], '{!r}')}",
-        f"commands: [{', '.join(map(repr, commands.values()))}]",
-        f"attitude: {_flow_mapping(named['attitude'], angle)}",
-        f"airspeed: {named['airspeed']['airspeed']!r}",
-        "surfaces:",
-        *(f"  {surface}: {{{command!r}: 1.0}}" for surface, command in commands.items()),
-        f"full_deflection_rad: {_flow_mapping(travel_rad, '{!r}')}",
-        f"signals: [{felt}]",
-        f"flow: {_flow_mapping(flow, '{}')}",
-    ]
-    return "\n".join(lines) + "\n"
+    return _VEHICLE_FILE.format(
+        kind=kind,
+        rates=_flow_mapping(named["rates"], "{!r}"),
+        commands=", ".join(map(repr, commands.values())),
+        attitude=_flow_mapping(named["attitude"], angle),
+        airspeed=named["airspeed"]["airspeed"],
+        surfaces="\n".join(f"  {surface}: {{{command!r}: 1.0}}" for surface, command in commands.items()),
+        stops=_flow_mapping(travel_rad, "{!r}"),
+        signals=", ".join(column for name, column in flow.items() if name != _DYNAMIC_PRESSURE_COLUMN),
+        flow=_flow_mapping(flow, "{}"),
+    )
 
 
 def _flow_mapping(entries: Mapping[str, object], form: str) -> str:

@@ -127,7 +127,7 @@ def _window_text(window: Window, metrics: Metrics) -> str:
     """What was found in one window, and when of it."""
     alarm = f"alarm after {_seconds_text(window.delay_s)}" if window.detected else "no alarm"
     found = [_found_text(one, metrics, "not isolated") for one in window.isolation]
-    return f"{_seconds_text(window.from_s)} to {_seconds_text(window.to_s)}: {'; '.join([alarm, *found])}"
+    return _filled("{from_s} to {to_s}: {found}", window, found="; ".join([alarm, *found]))
 
 
 def _found_text(found: Named, metrics: Metrics, otherwise: str) -> str:
@@ -244,15 +244,14 @@ def _certificate_text(written: CertificateCounts, folder: str) -> str:
 
 def _change_text(change: ChangeInFlight) -> str:
     """What was changed in flight, and what a diagnosis that ended with it had found."""
-    named = (("law", change.law), ("scheme", change.scheme))
-    to = [f"{key} {name}" for key, name in named if name]
+    to = [f"{key} {name}" for key in ("law", "scheme") if (name := getattr(change, key))]
     if change.sensors:
         to.append("sensors")
-    said = f"{', '.join(to) or 'declared sensors'} at {_seconds_text(change.time_s)}"
-    if change.detection_time_s is None:
-        return said
-    alarm = f"{'FALSE ALARM' if change.false_alarm else 'alarm'} at {_seconds_text(change.detection_time_s)}"
-    return f"{said}; the diagnosis before: {alarm}, {change.isolated or 'not isolated'}"
+    form, alarm = "{what} at {time_s}", "FALSE ALARM" if change.false_alarm else "alarm"
+    if change.detection_time_s is not None:
+        form += "; the diagnosis before: {alarm} at {detection_time_s}, {named}"
+    what, named = ", ".join(to) or "declared sensors", change.isolated or "not isolated"
+    return _filled(form, change, what=what, alarm=alarm, named=named)
 
 
 def _condition_text(flown: FlightCondition) -> str:
@@ -358,11 +357,12 @@ def _detection_text(metrics: Metrics) -> str:
     if not detection.detected:
         return "no alarm"
     source = f"on {detection.axis}" if detection.axis else "by the sensor monitor"
+    form = "after {delay_s} {source}"
     if metrics.false_alarm and detection.delay_s is None:
-        return f"FALSE ALARM at {_seconds_text(detection.time_s)} {source}"
-    guaranteed = detection.guaranteed_delay_s
-    within = "" if guaranteed is None else f" (certain within {_seconds_text(guaranteed)})"
-    return f"after {_seconds_text(detection.delay_s)} {source}{within}"
+        form = "FALSE ALARM at {time_s} {source}"
+    elif detection.guaranteed_delay_s is not None:
+        form += " (certain within {guaranteed_delay_s})"
+    return _filled(form, detection, source=source)
 
 
 def _inconclusive_text(found: Inconclusive) -> str:
@@ -473,8 +473,9 @@ def _remaining_authority_text(authority: Authority) -> str:
 def _envelope_text(metrics: Metrics) -> str:
     if not metrics.envelope_exits:
         return ""
-    count, total = _count_and_noun(metrics.envelope.exits, "time"), _seconds_text(metrics.envelope.outside_s)
-    return f"left {count}, {total} in all, first at {_seconds_text(metrics.envelope_exits[0].start_s)}"
+    times, first = _count_and_noun(metrics.envelope.exits, "time"), metrics.envelope_exits[0].start_s
+    form = "left {times}, {outside_s} in all, first at {first}"
+    return _filled(form, metrics.envelope, times=times, first=_seconds_text(first))
 
 
 # The counts of a link that are printed where they are not 0.

@@ -11,6 +11,7 @@ import errno
 import os
 import shutil
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from itertools import takewhile
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
@@ -248,12 +249,10 @@ def _foreign_files_in(folder: Path, files: Iterable[str]) -> list[str]:
         from beaver_ftc.commands import files_of_commands
 
         unknown -= {*files_of_commands()}
-    foreign = [*unknown]
-    pictures = (folder / "figures").rglob("*")
-    foreign += [str(path.relative_to(folder)) for path in pictures if not _is_our_picture(path)]
+    foreign = [path for path in (folder / "figures").rglob("*") if not _is_our_picture(path)]
     copied = (path for path in (folder / AIRCRAFT).rglob("*") if not path.is_dir())
-    foreign += [str(path.relative_to(folder)) for path in copied if path.suffix not in MODEL_FILES]
-    return sorted(foreign)
+    foreign += [path for path in copied if path.suffix not in MODEL_FILES]
+    return sorted([*unknown, *(str(path.relative_to(folder)) for path in foreign)])
 
 
 def _is_our_picture(path: Path) -> bool:
@@ -286,11 +285,7 @@ def _partial_folder_prefix(name: str) -> str:
 
 def _make_parents(folder: Path) -> list[Path]:
     """Create `folder` with its parents; return those that were missing, deepest first."""
-    missing = []
-    for candidate in (folder, *folder.parents):
-        if candidate.exists():
-            break
-        missing.append(candidate)
+    missing = list(takewhile(lambda one: not one.exists(), (folder, *folder.parents)))
     folder.mkdir(parents=True, exist_ok=True)
     return missing
 

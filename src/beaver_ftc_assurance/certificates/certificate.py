@@ -33,7 +33,6 @@ from beaver_ftc_assurance.certificates.inequality import (
     ANY,
     CONSTANT,
     Hypothesis,
-    Inequality,
     Term,
     axis_directions,
     constant_theta_tests,
@@ -207,11 +206,6 @@ def history_of(scenario: Scenario, rows: Columns, tape: Tape) -> History:
     return History(1.0 / scenario.rate_hz, scenario.substeps, x, F, eta_bar, declared_errors_of(tape.alarm))
 
 
-def _said(found: Inequality | None, because: str) -> Document:
-    """The evidence, or why there is none."""
-    return {"because": because} if found is None else found.fields
-
-
 @dataclass(frozen=True)
 class _Flight:
     """A flight whose log has events: the log's columns, and what was kept of it."""
@@ -238,9 +232,7 @@ class _Flight:
             k = events[column]
             said: Document = {"because": TOO_LATE}
             if k < tape.end:
-                said = _said(self._exclusion(e, alarm, k), chance.EXCLUSION_NOT_STATED)
-                if "because" in said and chance.alarm_excludes(tape, e, of_alarm):
-                    said = {"as": "alarm"}
+                said = self._exclusion(e, alarm, k) or chance.exclusion_by_alarm(tape, e, of_alarm)
             yield {"what": name, "column": column, "frame": k} | said
         if self.scenario.fdi.fault_class == "all":
             yield from self._types(max(alarm, 1))  # the first row has no innovation
@@ -250,7 +242,7 @@ class _Flight:
         monitor = self.tape.alarm.diagnosis.sensor_monitor
         found = self._filter_alarm(k) if is_ours else None
         if found is not None:
-            return found.fields
+            return found
         if monitor.has_raised_alarm:
             return instruments_say.alarm_evidence(monitor, self.rows, k)
         if not is_ours:
@@ -260,7 +252,7 @@ class _Flight:
         )
         return by_chance or {"because": chance.ALARM_NOT_STATED}
 
-    def _filter_alarm(self, k: int) -> Inequality | None:
+    def _filter_alarm(self, k: int) -> Document | None:
         """A filter that left its bound at frame k."""
         tape, every = self.tape, (0, 1, 2)
         if k <= tape.since:
@@ -274,7 +266,7 @@ class _Flight:
         """Poles of the detection filters, 1/s (docs/explanation/detection.md, "A bank of poles")."""
         return list(filter_poles(self.scenario.fdi, Declared.of(self.scenario)))
 
-    def _exclusion(self, e: int, alarm: int, k: int) -> Inequality | None:
+    def _exclusion(self, e: int, alarm: int, k: int) -> Document | None:
         """The test that the fault of estimator e failed at frame k."""
         tape, config, history = self.tape, self.scenario.fdi, self.history
         estimator = tape.alarm.diagnosis.estimators[e]
@@ -319,25 +311,22 @@ class _Flight:
             surface = self.scenario.airframe.surfaces[s]
             row = self.tape.first + row_set_to_end(self.tape.types[:, s, kind])
             because = kinds.reason_not_certified(tape, kind) if any_block else kinds.EXCLUDED_BY_MANY_FRAMES
-            said = {"because": because} if because else self._type(tape, history, s, kind, alarm, k)
+            found = None if because else self._type(tape, history, s, kind, alarm, k)
             yield {
                 "what": kinds.exclusion_name(surface, kind),
                 "column": kinds.exclusion_column(surface, kind), "frame": row,
-            } | said  # fmt: skip
+            } | (found or {"because": because or kinds.EXCLUDED_BY_MANY_FRAMES})  # fmt: skip
 
-    def _type(self, tape: Tape, history: History, s: int, kind: int, alarm: int, k: int) -> Document:
+    def _type(self, tape: Tape, history: History, s: int, kind: int, alarm: int, k: int) -> Document | None:
         """Evidence against a type on surface s at frame k; tape and history: perhaps by blocks."""
         if TYPES[kind].frames_test:
-            said = courses.evidence(self.scenario, tape, history, s, kind, alarm)
-            return said or {"because": kinds.EXCLUDED_BY_MANY_FRAMES}
+            return courses.evidence(self.scenario, tape, history, s, kind, alarm)
         of = kinds.hypothesis_of_type(tape, s, kind)
         if history.length == 1 or of.theta != ANY:
-            found = first_violated(kinds.candidate_inequalities(of, history, alarm, k), of, history)
-        else:
-            found = self._sum_of_block(kinds.hypothesis_of_type(self.tape, s, kind), history, k)
-        return _said(found, kinds.EXCLUDED_BY_MANY_FRAMES)
+            return first_violated(kinds.candidate_inequalities(of, history, alarm, k), of, history)
+        return self._sum_of_block(kinds.hypothesis_of_type(self.tape, s, kind), history, k)
 
-    def _sum_of_block(self, of: Hypothesis, blocks: History, k: int) -> Inequality | None:
+    def _sum_of_block(self, of: Hypothesis, blocks: History, k: int) -> Document | None:
         """Block k, or the one before, by frames, in which theta may differ. A block is left out if it begins
         before the effects of a fault are kept."""
         L = blocks.length

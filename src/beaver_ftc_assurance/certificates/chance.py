@@ -67,13 +67,15 @@ def alarm_evidence(
     return {"likelihood": column, **ratio.fields, "sides": [[value, logged], [limit, value / limit]]}
 
 
-def alarm_excludes(tape: Tape, e: int, alarm: Document) -> bool:
-    """Whether chance raised the alarm where the fault of estimator e moves nothing: then it is excluded."""
-    if "likelihood" not in alarm:
-        return False
-    here = slice(alarm["first"] - 1 - tape.first, alarm["frame"] + 1 - tape.first)
-    moved = [values[here, e][:, alarm["axes"]].any() for values in (tape.slope, tape.offset, tape.spread)]
-    return not any(moved)
+def exclusion_by_alarm(tape: Tape, e: int, alarm: Document) -> Document:
+    """The evidence that chance raised the alarm where the fault of estimator e moves nothing; why there is
+    none where it does."""
+    if "likelihood" in alarm:
+        here = slice(alarm["first"] - 1 - tape.first, alarm["frame"] + 1 - tape.first)
+        moved = (values[here, e][:, alarm["axes"]] for values in (tape.slope, tape.offset, tape.spread))
+        if not any(values.any() for values in moved):
+            return {"as": "alarm"}
+    return {"because": EXCLUSION_NOT_STATED}
 
 
 def likelihood_shares(diagnosis: DiagnosisReadout, surfaces: Sequence[str]) -> dict[str, float]:

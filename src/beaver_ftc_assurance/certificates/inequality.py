@@ -10,7 +10,6 @@ for all terms. docs/explanation/certificates.md, "The inequality", derives it.
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import combinations, compress
 from math import exp, inf, isinf
 from typing import NamedTuple
@@ -82,13 +81,12 @@ class Term:
 
 
 class _Numbers(NamedTuple):
-    """Of a term: its fields; value, and limit without a constant theta, rad/s; the factor of a constant theta
-    in that limit; decides: whether the least, and the greatest, theta decides in any frame."""
+    """Of a term: its fields; sums (3,): weighted value, and limit without a constant theta, rad/s, and the
+    factor of a constant theta in that limit; decides: whether the least, and the greatest, theta decides in
+    any frame."""
 
     fields: Document
-    value: float
-    limit: float
-    slope: float
+    sums: np.ndarray
     decides: tuple[bool, bool]
 
 
@@ -100,46 +98,23 @@ class Inequality:
     hypothesis: Hypothesis
     history: History
 
-    @cached_property
-    def _numbers(self) -> list[_Numbers]:
-        return [self._evaluate(term) for term in self.terms]
-
-    def _sum(self, name: str) -> float:
-        return sum(
-            term.weight * getattr(one, name) for term, one in zip(self.terms, self._numbers, strict=True)
-        )
-
-    @property
-    def by_theta(self) -> float:
-        """What a constant theta adds to the limit."""
-        slope, of = self._sum("slope"), self.hypothesis
-        return max(of.theta_low * slope, of.theta_high * slope) if abs(slope) > MIN_SLOPE else 0.0
-
-    @property
-    def sides(self) -> list[float]:
-        """Both sides of the inequality."""
-        return [self._sum("value"), self._sum("limit") + self.by_theta]
-
-    @property
-    def is_violated(self) -> bool:
-        """Whether the data exceed the limit of the hypothesis by more than rounding."""
-        value, limit = self.sides
-        return value - limit > MIN_RELATIVE_MARGIN * max(abs(limit), abs(value))
-
-    @property
-    def fields(self) -> Document:
-        """Of a statement: every number that the inequality takes, and none that decides nothing."""
-        of, said = self.hypothesis, [one.fields for one in self._numbers]
-        decides = [any(ends) for ends in zip(*(one.decides for one in self._numbers), strict=True)]
+    def statement(self) -> Document | None:
+        """The fields of a statement: every number that the inequality takes, and none that decides nothing.
+        None unless the data exceed the limit of the hypothesis by more than rounding."""
+        of, numbers = self.hypothesis, [self._evaluate(term) for term in self.terms]
+        value, limit, slope = np.sum([one.sums for one in numbers], axis=0).tolist()
+        by_theta = max(of.theta_low * slope, of.theta_high * slope) if abs(slope) > MIN_SLOPE else 0.0
+        limit += by_theta
+        if not value - limit > MIN_RELATIVE_MARGIN * max(abs(limit), abs(value)):
+            return None
+        said, decides = [one.fields for one in numbers], np.any([one.decides for one in numbers], axis=0)
         if of.theta != ANY:
-            slope, by_theta = self._sum("slope"), self.by_theta
-            decides = [bool(by_theta) and slope < 0.0, bool(by_theta) and slope > 0.0]
+            decides = np.array([by_theta and slope < 0.0, by_theta and slope > 0.0])
             if abs(slope) > MIN_SLOPE and not by_theta:  # the end of the range that counts is zero: no effect
-                said = [{name: value for name, value in one.items() if name != "Z"} for one in said]
-        range_of_theta = {"least": of.theta_low, "most": of.theta_high}.items()
-        ends = dict(compress(range_of_theta, decides))
+                said = [{name: entry for name, entry in one.items() if name != "Z"} for one in said]
+        ends = dict(compress({"least": of.theta_low, "most": of.theta_high}.items(), decides))
         about = {**self.history.statement_fields, "theta": of.theta, **ends}
-        return {**about, "terms": said, "sides": self.sides}
+        return {**about, "terms": said, "sides": [value, limit]}
 
     def _evaluate(self, term: Term) -> _Numbers:
         """E = sum of a^(k-j) dt nu[j].d over the frames j after filter_start, k: last_frame; and its limit:
@@ -165,7 +140,8 @@ class Inequality:
             adds = np.ones(len(h), bool)
         limit += _filtered(a, dt, done, before)
         decides = bool((adds & (at_low > at_high)).any()), bool((adds & (at_high > at_low)).any())
-        return _Numbers(self._fields_of(term, rows, before, adds), value, limit, slope, decides)
+        sums = term.weight * np.array([value, limit, slope])
+        return _Numbers(self._fields_of(term, rows, before, adds), sums, decides)
 
     def _fields_of(self, term: Term, rows: slice, before: float, adds: np.ndarray) -> Document:
         """The fields of a term whose frames `rows` are written out. before: largest effect of the fault
@@ -212,10 +188,10 @@ def _filtered(decay: float, dt: float, effects: np.ndarray, before: float) -> fl
     return float(decay * weights[0] * before + dt * weights @ effects)
 
 
-def first_violated(candidates: Iterable[list[Term]], of: Hypothesis, history: History) -> Inequality | None:
-    """The first inequality that the data violate."""
-    found = (Inequality(terms, of, history) for terms in candidates if terms)
-    return next((each for each in found if each.is_violated), None)
+def first_violated(candidates: Iterable[list[Term]], of: Hypothesis, history: History) -> Document | None:
+    """The fields of the first inequality that the data violate."""
+    said = (Inequality(terms, of, history).statement() for terms in candidates if terms)
+    return next(filter(None, said), None)
 
 
 def axis_directions(axes: tuple[int, ...]) -> Iterator[np.ndarray]:

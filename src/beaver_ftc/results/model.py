@@ -10,18 +10,7 @@ from dataclasses import KW_ONLY, dataclass, field, fields
 from functools import cache
 from pathlib import Path
 from types import UnionType
-from typing import (
-    Annotated,
-    Any,
-    ClassVar,
-    Self,
-    TypeVar,
-    Union,
-    dataclass_transform,
-    get_args,
-    get_origin,
-    get_type_hints,
-)
+from typing import Annotated, Any, ClassVar, Self, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from beaver_ftc.documents import files
 from beaver_ftc.scenario.faults import DAMAGE, LOSS_OF_EFFECTIVENESS, UNANTICIPATED, of_a_sensor
@@ -36,7 +25,7 @@ _KNOWN = "a key that the document has only where its value is known"
 Known = Annotated[Value | None, _KNOWN]
 
 
-@dataclass_transform(frozen_default=True, field_specifiers=(field,))
+@dataclass(frozen=True)
 class Part:
     """A section of the document, its keys in the order of its fields.
 
@@ -45,10 +34,6 @@ class Part:
 
     _first: ClassVar[tuple[str, ...]] = ()
     _last: ClassVar[tuple[str, ...]] = ()
-
-    def __init_subclass__(cls) -> None:
-        """Each section is a frozen dataclass."""
-        dataclass(frozen=True)(cls)
 
     @classmethod
     def of(cls, found: Any) -> Self:
@@ -136,6 +121,7 @@ def rounded(value: Any) -> Any:
     return tuple(map(rounded, value)) if isinstance(value, tuple | list) else value
 
 
+@dataclass(frozen=True)
 class FlightCondition(Part):
     """The flight condition, and who diagnosed and controlled."""
 
@@ -148,6 +134,7 @@ class FlightCondition(Part):
     law: str
 
 
+@dataclass(frozen=True)
 class Fault(Part):
     """The first fault of the scenario.
 
@@ -166,6 +153,7 @@ class Fault(Part):
 _NO_SIZE = {"actuator", "sensor", "type", "at_s", "end_s", "profile"}
 
 
+@dataclass(frozen=True)
 class DeclaredFault(Fault):
     """A fault as it is declared, and as a name is held against it. size: what else its type has."""
 
@@ -203,6 +191,7 @@ class DeclaredFault(Fault):
         return None if kind is None else kind == self.type
 
 
+@dataclass(frozen=True)
 class Statistical(Part):
     """The alarm of the statistical detector.
 
@@ -216,6 +205,7 @@ class Statistical(Part):
     closest_approach: float
 
 
+@dataclass(frozen=True)
 class Inconclusive(Part):
     """The frames in which the built-in diagnosis can conclude nothing.
 
@@ -229,6 +219,7 @@ class Inconclusive(Part):
     reasons: tuple[Document, ...]
 
 
+@dataclass(frozen=True)
 class Detection(Part):
     """The alarm of a flight. Fields without a value are None.
 
@@ -250,6 +241,7 @@ class Detection(Part):
     inconclusive: Inconclusive | None
 
 
+@dataclass(frozen=True)
 class Named(Part):
     """A fault that the diagnosis named. Fields without a value are None.
 
@@ -290,6 +282,7 @@ class Named(Part):
     estimate_at_s: Known[float] = None
 
 
+@dataclass(frozen=True)
 class NameInWindow(Named):
     """A fault that the diagnosis named in a window. `Named` explains the other fields.
 
@@ -301,6 +294,7 @@ class NameInWindow(Named):
     true_size: float | None = None
 
 
+@dataclass(frozen=True)
 class Window(Part):
     """A part of the flight in which the same faults are in force.
 
@@ -321,6 +315,7 @@ class Window(Part):
     isolation: tuple[NameInWindow, ...]
 
 
+@dataclass(frozen=True)
 class Withdrawn(Part):
     """A fault that the diagnosis named, and later withdrew during the flight.
 
@@ -338,6 +333,7 @@ class Withdrawn(Part):
     because: Known[str] = None
 
 
+@dataclass(frozen=True)
 class Isolation(Named):
     """The fault that the diagnosis named. `Named` explains the fields that are not listed here.
 
@@ -363,6 +359,7 @@ class Isolation(Named):
     _last = ("estimate_at_s", "types_withdrawn")
 
 
+@dataclass(frozen=True)
 class Rates(Part):
     """One number for each axis, deg/s."""
 
@@ -371,6 +368,7 @@ class Rates(Part):
     r: float | None
 
 
+@dataclass(frozen=True)
 class Tracking(Part):
     """The tracking errors and the movement of the surfaces.
 
@@ -387,6 +385,7 @@ class Tracking(Part):
     surface_energy_deg2_s: dict[str, float]
 
 
+@dataclass(frozen=True)
 class ModeChange(Part):
     """A change of the supervisor's mode.
 
@@ -398,6 +397,7 @@ class ModeChange(Part):
     mode: str
 
 
+@dataclass(frozen=True)
 class ChangeInFlight(Part):
     """What was changed in flight; of a diagnosis that ended with it its alarm and the name it gave."""
 
@@ -423,6 +423,7 @@ class ChangeInFlight(Part):
         return super().of({**found, "renewed": "detection_time_s" in found})
 
 
+@dataclass(frozen=True)
 class EnvelopeExit(Part):
     """A spell outside the validated envelope."""
 
@@ -430,6 +431,7 @@ class EnvelopeExit(Part):
     end_s: float
 
 
+@dataclass(frozen=True)
 class EnvelopeExitTotals(Part):
     """All spells outside together; exits_left_out: how many are not listed."""
 
@@ -438,6 +440,7 @@ class EnvelopeExitTotals(Part):
     exits_left_out: int
 
 
+@dataclass(frozen=True)
 class Departure(Part):
     """The loss of the aircraft.
 
@@ -449,6 +452,7 @@ class Departure(Part):
     signal: str
 
 
+@dataclass(frozen=True)
 class AxisAuthority(Part):
     """Of one axis after the fault: share of the demanded acceleration given, and for how long holding the
     rates was beyond the surfaces. What they give at the end, rad/s2, believed and healthy; the engines'."""
@@ -464,6 +468,7 @@ class AxisAuthority(Part):
     engines_greatest_rad_s2: Known[float] = None
 
 
+@dataclass(frozen=True)
 class Authority(Part):
     """By axis."""
 
@@ -472,6 +477,7 @@ class Authority(Part):
     r: AxisAuthority
 
 
+@dataclass(frozen=True)
 class EnginePowerUse(Part):
     """Since when and for how long pitch was left to the engine, and the manifold pressures, inHg."""
 
@@ -481,6 +487,7 @@ class EnginePowerUse(Part):
     highest_inhg: float
 
 
+@dataclass(frozen=True)
 class Deviations(Part):
     """From the commanded profile, by channel; None where it is not flown."""
 
@@ -490,6 +497,7 @@ class Deviations(Part):
     bank_deg: float | None
 
 
+@dataclass(frozen=True)
 class ProfileDeviations(Deviations):
     """The largest. Those of the airspeed are of a mean over 10 s, the last excepted. limited: from the
     commanded airspeed as far as it can be held."""
@@ -498,12 +506,14 @@ class ProfileDeviations(Deviations):
     airspeed_at_one_instant_mps: float | None
 
 
+@dataclass(frozen=True)
 class ArrivalDeviations(Deviations):
     """The mean at the end, with its sign; and whether the flight ends in the envelope."""
 
     in_envelope: bool
 
 
+@dataclass(frozen=True)
 class ProtectionLimit(Part):
     """A limit that envelope protection has put on the command."""
 
@@ -515,6 +525,7 @@ class ProtectionLimit(Part):
     in_force: bool
 
 
+@dataclass(frozen=True)
 class Expectation(Part):
     """One expectation of the scenario, and its result.
 
@@ -550,6 +561,7 @@ class Judged:
     took_s: float = 0.0
 
 
+@dataclass(frozen=True)
 class CertificateCounts(Part):
     """Of a certificate: statements that it proves, and alarms or exclusions without a proof."""
 
@@ -557,6 +569,7 @@ class CertificateCounts(Part):
     without: int
 
 
+@dataclass(frozen=True)
 class LatencyMs(Part):
     """From a packet to its answer, ms."""
 
@@ -565,6 +578,7 @@ class LatencyMs(Part):
     largest: float
 
 
+@dataclass(frozen=True)
 class PacketIntervalMs(Part):
     """Between two packets, ms."""
 
@@ -573,6 +587,7 @@ class PacketIntervalMs(Part):
     largest: float
 
 
+@dataclass(frozen=True)
 class Link(Part):
     """How an autopilot was served: rates, counts of packets (beaver_ftc_links/sitl/link.py), times.
     diagnosed_from_s: when the diagnosis began; speed: multiple of real time, and how far behind it the flight
@@ -599,6 +614,7 @@ class Link(Part):
     said: tuple[Document, ...]
 
 
+@dataclass(frozen=True)
 class Metrics(Part):
     """The document metrics.json. assumes: what the diagnosis assumes of the truth (`sensors-sound`).
     outside_class: faults of surfaces and sensors that the declared class does not have. Under an autopilot:

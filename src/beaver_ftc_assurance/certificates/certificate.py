@@ -94,12 +94,10 @@ def certificate(
 
 def logged_columns(log: Log) -> Columns:
     """The columns of a log that certificates take, (rows,)."""
-    columns = [
+    return log.read([
         name for name in log.columns
         if name in _LOGGED_COLUMNS or _EVENT_COLUMN.fullmatch(name) or name.endswith(_SHARE_SUFFIX)
-    ]  # fmt: skip
-    chunks = list(log.read_chunks(columns))
-    return {name: np.concatenate([chunk[name] for chunk in chunks]) for name in columns}
+    ])  # fmt: skip
 
 
 def event_rows(rows: Columns) -> dict[str, int]:
@@ -184,20 +182,15 @@ class Certified:
 
 @dataclass(frozen=True)
 class PartialColumn:
-    """A column of which a part is known: `values` from row `first` on, and what stands before and after."""
+    """A column of which a part is known: `values` from row `first` on. Before them stands their first, after
+    them their last."""
 
     first: int
     values: np.ndarray
-    before: float = np.nan
-    after: float = np.nan
 
     def rows(self, first: int, n: int) -> np.ndarray:
         """The rows from `first` on, (n,)."""
-        places = np.arange(first, first + n) - self.first
-        found = np.where(places < 0, self.before, self.after)
-        inside = (places >= 0) & (places < len(self.values))
-        found[inside] = self.values[places[inside]]
-        return found
+        return self.values[np.clip(np.arange(first, first + n) - self.first, 0, len(self.values) - 1)]
 
 
 def history_of(scenario: Scenario, rows: Columns, tape: Tape) -> History:
@@ -363,8 +356,9 @@ class _Flight:
             if name not in wanted:
                 continue
             for quantity, unit in (("offset", "_rad_s2"), ("slope", ""), ("spread", "_rad_s2")):
-                for axis, values in zip(AXES, getattr(tape, quantity)[:, e].T, strict=True):
-                    found[f"fie_{name}_{axis}_{quantity}{unit}"] = PartialColumn(tape.first, values)
+                known = np.pad(getattr(tape, quantity)[:, e], ((1, 1), (0, 0)), constant_values=np.nan)
+                for axis, values in zip(AXES, known.T, strict=True):
+                    found[f"fie_{name}_{axis}_{quantity}{unit}"] = PartialColumn(tape.first - 1, values)
             estimator = tape.alarm.diagnosis.estimators[e]
             found |= _constants({
                 f"fie_{name}_theta_low": estimator.theta_min, f"fie_{name}_theta_high": estimator.theta_max,
@@ -374,8 +368,8 @@ class _Flight:
             found |= _constants({f"{surface}_travel_low_rad": low, f"{surface}_travel_high_rad": high})
         for s, kind, _ in kinds.excluded_types(tape):
             if surfaces[s] in of_types:
-                flags = (tape.types[:, s, kind] > 0).astype(float)
-                column = PartialColumn(tape.first, flags, 0.0, flags[-1])
+                flags = np.append(0.0, tape.types[:, s, kind] > 0)
+                column = PartialColumn(tape.first - 1, flags)
                 found[kinds.exclusion_column(surfaces[s], kind)] = column
                 found |= _constants(kinds.type_definition_columns(tape, surfaces[s], s, kind))
         return found
@@ -392,4 +386,4 @@ def _is_unexplained(history: History, one: Document, span: Document) -> bool:
 
 def _constants(values: dict[str, float]) -> EvidenceColumns:
     """Columns with the same value in every row."""
-    return {name: PartialColumn(0, np.empty(0), value, value) for name, value in values.items()}
+    return {name: PartialColumn(0, np.array([value])) for name, value in values.items()}

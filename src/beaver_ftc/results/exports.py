@@ -8,6 +8,7 @@ and the commands to the surfaces as shares of travel. `vehicle.yaml` beside it n
 ULog: https://docs.px4.io/main/en/dev_log/ulog_file_format; dataflash: FMT messages, then packed ones.
 """
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import ceil, cos, degrees, radians
 from pathlib import Path
@@ -23,16 +24,29 @@ from beaver_ftc.results.model import Metrics
 from beaver_ftc.results.style import marks
 
 ACMI_RATE_HZ = 25.0  # smooth to look at; a viewer interpolates
-FLAP = "flap"  # a surface of this name is shown as a share of its travel
-_ACMI_OBJECT_ID = "b1"
-_ACMI_REFERENCE_TIME = "2005-06-27T12:00:00Z"  # any will do; the same for every run, so that runs overlay
+FLAP, _FLAP_COLUMN = "flap", "flap_pos_rad"  # a surface of this name is shown as a share of its travel
+# Any time will do as reference; it is the same for every run, so that runs overlay.
+_ACMI_HEAD = """\
+FileType=text/acmi/tacview
+FileVersion=2.2
+0,ReferenceTime=2005-06-27T12:00:00Z
+0,DataSource=JSBSim
+0,DataRecorder=beaver-ftc
+0,Title={scenario}
+b1,Type=Air+FixedWing,Name={aircraft},Color=Blue
+"""
+# Longitude, latitude (deg), altitude (m), roll, pitch, yaw (deg); air data (m/s, deg).
+_ACMI_FRAME = (
+    "#{t_s:.3f}\n"
+    "b1,T={longitude:.8f}|{latitude:.8f}|{altitude_m:.3f}|{phi_deg:.3f}|{theta_deg:.3f}|{psi_deg:.3f},"
+    "TAS={airspeed_mps:.3f},AOA={alpha_deg:.3f},AOS={beta_deg:.3f}{flaps}\n"
+)
 _ACMI_COLUMNS = (
     "t_s", "north_m", "east_m", "altitude_m", "phi_rad", "theta_rad", "psi_rad",
     "airspeed_mps", "alpha_rad", "beta_rad",
 )  # fmt: skip
 
-ValuesByColumn = dict[str, NDArray[np.float64]]
-ColumnsByTopic = dict[str, ValuesByColumn]
+ColumnsByTopic = dict[str, log.Values]
 """Fields of each message; every message has the stamps `t_s`."""
 
 RECORDING_FILE_OF_KIND = {"table": "flight.csv", "ulog": "flight.ulg", "ardupilot": "flight.bin"}
@@ -52,6 +66,20 @@ _NAMES_OF_KIND = {
         "attitude": "ATT.{title}", "flow": "FL{i}.V",
     },
 }  # fmt: skip
+_VEHICLE_FILE = """\
+# Written with the log beside it: which column is what. Commands are shares of travel.
+name: {kind}-of-a-simulated-flight
+reader: {kind}
+rates: {rates}
+commands: [{commands}]
+attitude: {attitude}
+airspeed: {airspeed!r}
+surfaces:
+{surfaces}
+full_deflection_rad: {stops}
+signals: [{signals}]
+flow: {flow}
+"""
 _COLUMN_OF_ANGLE = {"roll": "phi_rad", "pitch": "theta_rad", "yaw": "psi_rad"}
 _DYNAMIC_PRESSURE_COLUMN = "qdyn_pa"
 _FLOW_COLUMNS = ("alpha_rad", "beta_rad", _DYNAMIC_PRESSURE_COLUMN)
@@ -78,13 +106,9 @@ def write_acmi(log_path: Path, metrics: Metrics, path: Path, aircraft: Aircraft 
     """The flight as a Tacview recording (ACMI 2.2): path, attitude, air data, flap, bookmarks for events."""
     aircraft = aircraft or load()
     title = aircraft.file.description.partition(",")[0] or aircraft.name
+    names = {"scenario": _escape_acmi_text(metrics.scenario), "aircraft": _escape_acmi_text(title)}
     with path.open("w", encoding="utf-8", newline="\n") as file:
-        file.write("FileType=text/acmi/tacview\nFileVersion=2.2\n")
-        file.write(
-            f"0,ReferenceTime={_ACMI_REFERENCE_TIME}\n0,DataSource=JSBSim\n0,DataRecorder=beaver-ftc\n"
-        )
-        file.write(f"0,Title={_escape_acmi_text(metrics.scenario)}\n")
-        file.write(f"{_ACMI_OBJECT_ID},Type=Air+FixedWing,Name={_escape_acmi_text(title)},Color=Blue\n")
+        file.write(_ACMI_HEAD.format(**names))
         file.writelines(_acmi_frames(log_path, metrics, aircraft))
 
 
@@ -95,17 +119,19 @@ def _escape_acmi_text(text: str) -> str:
 def _acmi_frames(log_path: Path, metrics: Metrics, aircraft: Aircraft) -> Iterator[str]:
     """A frame of the recording at ACMI_RATE_HZ at most, each event in the first frame not before it."""
     events = sorted(marks(metrics), key=lambda mark: mark.time_s)
-    source = log.StoredLog(log_path)
-    start_m = float(next(source.read_chunks(["altitude_m"]))["altitude_m"][0])
-    columns: tuple[str, ...] = _ACMI_COLUMNS
     full_rad = aircraft.travel[FLAP].max_rad if FLAP in aircraft.surfaces else None
-    if full_rad is not None:
-        columns += (f"{FLAP}_pos_rad",)
-    for row in _rows_at_acmi_rate(source, columns):
-        place = _acmi_position(row, EARTH_RADIUS_M + start_m)
-        yield f"#{row['t_s']:.3f}\n{_ACMI_OBJECT_ID},T={place},{_acmi_properties(row, full_rad)}\n"
+    columns = _ACMI_COLUMNS if full_rad is None else (*_ACMI_COLUMNS, _FLAP_COLUMN)
+    radius_m, flaps = 0.0, ""
+    for row in _rows_at_acmi_rate(log.StoredLog(log_path), columns):
+        radius_m = radius_m or EARTH_RADIUS_M + row["altitude_m"]  # of the first
+        latitude = START_LATITUDE_DEG + degrees(row["north_m"] / radius_m)
+        longitude = degrees(row["east_m"] / (radius_m * cos(radians(START_LATITUDE_DEG))))
+        angles = {name.replace("_rad", "_deg"): degrees(row[name]) for name in row if name.endswith("_rad")}
+        if full_rad is not None:
+            flaps = f",Flaps={row[_FLAP_COLUMN] / full_rad:.4f}"
+        yield _ACMI_FRAME.format(**row, **angles, latitude=latitude, longitude=longitude, flaps=flaps)
         while events and events[0].time_s <= row["t_s"] + 1e-9:
-            yield f"0,Event=Bookmark|{_ACMI_OBJECT_ID}|{_escape_acmi_text(events.pop(0).label)}\n"
+            yield f"0,Event=Bookmark|b1|{_escape_acmi_text(events.pop(0).label)}\n"
 
 
 def _rows_at_acmi_rate(source: log.Log, columns: tuple[str, ...]) -> Iterator[dict[str, float]]:
@@ -115,20 +141,6 @@ def _rows_at_acmi_rate(source: log.Log, columns: tuple[str, ...]) -> Iterator[di
         for i in range(-seen % every, rows, every):
             yield {name: float(values[i]) for name, values in chunk.items()}
         seen += rows
-
-
-def _acmi_position(row: dict[str, float], radius_m: float) -> str:
-    """From the log's local plane back to longitude, latitude (deg), altitude (m), roll, pitch, yaw (deg)."""
-    latitude = START_LATITUDE_DEG + degrees(row["north_m"] / radius_m)
-    longitude = degrees(row["east_m"] / (radius_m * cos(radians(START_LATITUDE_DEG))))
-    attitude = "|".join(f"{degrees(row[name]):.3f}" for name in ("phi_rad", "theta_rad", "psi_rad"))
-    return f"{longitude:.8f}|{latitude:.8f}|{row['altitude_m']:.3f}|{attitude}"
-
-
-def _acmi_properties(row: dict[str, float], full_flap_rad: float | None) -> str:
-    alpha, beta = degrees(row["alpha_rad"]), degrees(row["beta_rad"])
-    air = f"TAS={row['airspeed_mps']:.3f},AOA={alpha:.3f},AOS={beta:.3f}"
-    return air if full_flap_rad is None else f"{air},Flaps={row[f'{FLAP}_pos_rad'] / full_flap_rad:.4f}"
 
 
 def write_recording(
@@ -173,22 +185,17 @@ def _vehicle_file_text(named: dict[str, dict[str, str]], travel_rad: dict[str, f
     """The vehicle file: which column is what."""
     angle = "{{column: {}, unit: deg}}" if kind == "ardupilot" else "{!r}"
     commands, flow = named["commands"], named["flow"]
-    felt = ", ".join(column for name, column in flow.items() if name != _DYNAMIC_PRESSURE_COLUMN)
-    lines = [
-        "# Written with the log beside it: which column is what. Commands are shares of travel.",
-        f"name: {kind}-of-a-simulated-flight",
-        f"reader: {kind}",
-        f"rates: {_flow_mapping(named['rates'], '{!r}')}",
-        f"commands: [{', '.join(map(repr, commands.values()))}]",
-        f"attitude: {_flow_mapping(named['attitude'], angle)}",
-        f"airspeed: {named['airspeed']['airspeed']!r}",
-        "surfaces:",
-        *(f"  {surface}: {{{command!r}: 1.0}}" for surface, command in commands.items()),
-        f"full_deflection_rad: {_flow_mapping(travel_rad, '{!r}')}",
-        f"signals: [{felt}]",
-        f"flow: {_flow_mapping(flow, '{}')}",
-    ]
-    return "\n".join(lines) + "\n"
+    return _VEHICLE_FILE.format(
+        kind=kind,
+        rates=_flow_mapping(named["rates"], "{!r}"),
+        commands=", ".join(map(repr, commands.values())),
+        attitude=_flow_mapping(named["attitude"], angle),
+        airspeed=named["airspeed"]["airspeed"],
+        surfaces="\n".join(f"  {surface}: {{{command!r}: 1.0}}" for surface, command in commands.items()),
+        stops=_flow_mapping(travel_rad, "{!r}"),
+        signals=", ".join(column for name, column in flow.items() if name != _DYNAMIC_PRESSURE_COLUMN),
+        flow=_flow_mapping(flow, "{}"),
+    )
 
 
 def _flow_mapping(entries: Mapping[str, object], form: str) -> str:
@@ -207,25 +214,20 @@ def _write_ulog(path: Path, t_us: NDArray[np.int64], topics: ColumnsByTopic) -> 
     """Definitions and subscriptions, then every message in the order of time."""
     head = [b"ULog\x01\x12\x35\x01" + np.uint64(t_us[0]).tobytes()]
     for topic, fields in topics.items():
-        head.append(
-            _ulog_message(
-                "F", f"{topic}:uint64_t timestamp;{_ulog_field_declarations(list(fields))}".encode()
-            )
-        )
-    for number, topic in enumerate(topics):
-        head.append(_ulog_message("A", b"\x00" + np.uint16(number).tobytes() + topic.encode()))
+        layout = f"{topic}:uint64_t timestamp;{_ulog_field_declarations(list(fields))}"
+        head.append(_ulog_message("F", layout.encode()))
     packed = []
-    for number, fields in enumerate(topics.values()):
-        length, header = 10 + 8 * len(fields), b"D" + np.uint16(number).tobytes()
-        packed.append(_packed_messages(np.uint16(length).tobytes() + header, t_us, fields))
+    for number, (topic, fields) in enumerate(topics.items()):
+        of_topic = np.uint16(number).tobytes()
+        head.append(_ulog_message("A", b"\x00" + of_topic + topic.encode()))
+        length = np.uint16(10 + 8 * len(fields)).tobytes()
+        packed.append(_packed_messages(length + b"D" + of_topic, t_us, fields))
     path.write_bytes(b"".join(head) + _interleave_messages(packed))
 
 
 def _ulog_field_declarations(fields: Sequence[str]) -> str:
     """Fields of one format; `xyz[0]`, `xyz[1]`, ... are one array."""
-    arrays: dict[str, int] = {}
-    for field in fields:
-        arrays[field.partition("[")[0]] = arrays.get(field.partition("[")[0], 0) + 1
+    arrays = Counter(field.partition("[")[0] for field in fields)
     return "".join(
         f"double[{count}] {name};" if f"{name}[0]" in fields else f"double {name};"
         for name, count in arrays.items()
@@ -242,10 +244,8 @@ def _write_dataflash(path: Path, t_us: NDArray[np.int64], topics: ColumnsByTopic
     packed = []
     for number, (name, fields) in enumerate(topics.items(), start=140):
         rows = _packed_messages(bytes([0xA3, 0x95, number]), t_us, fields)
-        labels = ",".join(["TimeUS", *fields])
-        head.append(
-            _dataflash_fmt_message(number, rows.dtype.itemsize, name, "Q" + "d" * len(fields), labels)
-        )
+        layout, labels = "Q" + "d" * len(fields), ",".join(["TimeUS", *fields])
+        head.append(_dataflash_fmt_message(number, rows.dtype.itemsize, name, layout, labels))
         packed.append(rows)
     path.write_bytes(b"".join(head) + _interleave_messages(packed))
 
@@ -256,7 +256,7 @@ def _dataflash_fmt_message(number: int, length: int, name: str, layout: str, lab
     return bytes([0xA3, 0x95, 128, number, length]) + b"".join(padded)
 
 
-def _packed_messages(head: bytes, t_us: NDArray[np.int64], fields: ValuesByColumn) -> np.ndarray:
+def _packed_messages(head: bytes, t_us: NDArray[np.int64], fields: log.Values) -> np.ndarray:
     """The messages of one topic: each its head, the stamp, and the fields as doubles."""
     layout = [("head", "u1", (len(head),)), ("t", "<u8"), ("v", "<f8", (len(fields),))]
     rows = np.zeros(len(t_us), dtype=layout)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from beaver_ftc.results.log import StoredLog
+from beaver_ftc.results.log import StoredLog, Values
 from beaver_ftc.results.model import Metrics
 from beaver_ftc.results.style import GREY, LOOKS, SHADES, Mark, closeup_window, marks
 from beaver_ftc.results.views import (
@@ -17,7 +17,6 @@ from beaver_ftc.results.views import (
     WHOLE_FLIGHT_S,
     Panel,
     Trace,
-    ValuesOfColumns,
     View,
     series_of,
     views_of_flight,
@@ -30,7 +29,8 @@ if TYPE_CHECKING:
 DPI = 110
 LEFT, STEPS_LEFT, RIGHT, TOP, BOTTOM, GAP = 0.75, 1.2, 0.2, 0.9, 0.85, 0.42  # inches
 LEGEND_LINE_INCHES = 0.17  # inches, of one more line of the legend
-PNG_COMPRESSION_LEVEL = 1  # of a PNG: a tenth larger than with zlib's 6, in two thirds of the time
+# A tenth larger than with zlib's level 6, in two thirds of the time.
+_PNG_OPTIONS: dict[str, Any] = {"pil_kwargs": {"compress_level": 1}}
 MIN_SHOWN_RATIO = 0.1  # of a logarithmic axis: what is smaller is noise
 STYLES = ("screen", "paper")
 PAPER_WIDTH, PAPER_DPI, PAPER_FONT = 8.4 / 2.54, 300, 8  # inches: a column of a journal
@@ -42,7 +42,7 @@ class Picture:
 
     path: Path
     view: View
-    series: ValuesOfColumns
+    series: Values
     event_marks: Sequence[Mark]
     subtitle: str
 
@@ -58,12 +58,11 @@ def pictures_of(
     shown = views_of_flight(source.columns, metrics)
     event_marks = marks(metrics)
     window = closeup_window(event_marks)
-    closeups = [view for view in shown if view.closeup] if window else []
+    asked = [(shown, WHOLE_FLIGHT_S, "")]
+    if window:
+        asked.append((tuple(view for view in shown if view.closeup), window, "-closeup"))
     found = []
-    for drawn, span, ending in (
-        (shown, WHOLE_FLIGHT_S, ""),
-        (closeups, window or WHOLE_FLIGHT_S, "-closeup"),
-    ):
+    for drawn, span, ending in asked:
         series = series_of(source, [name for view in drawn for name in view.columns], span)
         for view in drawn:
             own = {name: series[name] for name in ("t_s", *view.columns)}
@@ -76,11 +75,8 @@ def pictures_of(
 def save(picture: Picture) -> None:
     """Draw a picture into its file; vector graphics in the style of a paper."""
     kind = picture.path.suffix.removeprefix(".")
-    raster = kind == "png"
-    style = "screen" if raster else "paper"
-    shown = picture.view, picture.series, picture.event_marks, picture.subtitle
-    figure = draw(*shown, style=style)
-    how: dict[str, Any] = {"pil_kwargs": {"compress_level": PNG_COMPRESSION_LEVEL}} if raster else {}
+    style, how = ("screen", _PNG_OPTIONS) if kind == "png" else ("paper", {})
+    figure = draw(picture.view, picture.series, picture.event_marks, picture.subtitle, style)
     figure.savefig(picture.path, metadata=_METADATA_OF_FORMAT[kind], **how)
 
 
@@ -93,10 +89,19 @@ _METADATA_OF_FORMAT: dict[str, Any] = {
 
 
 def draw(
-    view: View, series: ValuesOfColumns, event_marks: Sequence[Mark], subtitle: str, style: str = "screen"
+    view: View, series: Values, event_marks: Sequence[Mark], subtitle: str, style: str = "screen"
 ) -> "Figure":
     """One view as a matplotlib figure, over the time that `series` covers; style: of STYLES."""
-    figure = _draw_for_screen(view, series, event_marks, subtitle)
+    figure, grid = _empty_figure_and_axes(view, figure_class())
+    every = list(grid.flat)
+    for axes, panel in zip(every, view.panels, strict=False):
+        _draw_panel(axes, panel, series, event_marks)
+    _write_absent_text(view, series, every)
+    for axes in grid[-1]:
+        axes.set_xlabel("time (s)", fontsize=9)
+    top = 1 - 0.12 / figure.get_figheight()
+    figure.suptitle(f"{view.title}\n{subtitle}", fontsize=11, y=top, va="top")
+    _draw_legend(figure, every)
     return _restyle_for_paper(figure) if style == "paper" else figure
 
 
@@ -124,21 +129,6 @@ def _restyle_for_paper(figure: "Figure") -> "Figure":
     return figure
 
 
-def _draw_for_screen(
-    view: View, series: ValuesOfColumns, event_marks: Sequence[Mark], subtitle: str
-) -> "Figure":
-    figure, grid = _empty_figure_and_axes(view, figure_class())
-    for axes, panel in zip(grid.flat, view.panels, strict=False):
-        _draw_panel(axes, panel, series, event_marks)
-    _write_absent_text(view, series, list(grid.flat))
-    for axes in grid[-1]:
-        axes.set_xlabel("time (s)", fontsize=9)
-    top = 1 - 0.12 / figure.get_figheight()
-    figure.suptitle(f"{view.title}\n{subtitle}", fontsize=11, y=top, va="top")
-    _draw_legend(figure, list(grid.flat))
-    return figure
-
-
 @cache
 def figure_class() -> "type[Figure]":
     """matplotlib's Figure, made to show itself in a notebook without pyplot and its global state."""
@@ -157,14 +147,16 @@ def figure_class() -> "type[Figure]":
 
 def _empty_figure_and_axes(view: View, new_figure: Any) -> tuple["Figure", Any]:
     """An empty figure with its grid of axes, laid out in inches: a solver would double the time."""
-    down = -(-len(view.panels) // view.n_panel_columns)
+    first_of_rows = view.panels[:: view.n_panel_columns]
+    down, is_single = len(first_of_rows), view.n_panel_columns == 1
     heights = [
-        _panel_height_inches(panel, view.n_panel_columns) for panel in view.panels[:: view.n_panel_columns]
+        0.25 + 0.25 * len(panel.steps) if panel.steps else 1.75 if is_single else 1.5
+        for panel in first_of_rows
     ]
-    width = 10.0 if view.n_panel_columns == 1 else 12.0
+    width = 10.0 if is_single else 12.0
     height = TOP + BOTTOM + sum(heights) + GAP * (down - 1)
     figure = new_figure(figsize=(width, height), dpi=DPI)
-    left = STEPS_LEFT if view.panels[0].value_names or view.panels[0].bars else LEFT
+    left = STEPS_LEFT if view.panels[0].steps else LEFT
     grid = figure.subplots(
         down, view.n_panel_columns, sharex=True, squeeze=False, height_ratios=heights,
         gridspec_kw={
@@ -175,31 +167,24 @@ def _empty_figure_and_axes(view: View, new_figure: Any) -> tuple["Figure", Any]:
     return figure, grid
 
 
-def _panel_height_inches(panel: Panel, n_panel_columns: int) -> float:
-    """Height of a panel's axes in inches."""
-    if panel.value_names or panel.bars:
-        return 0.25 + 0.25 * len(panel.value_names or panel.rows)
-    return 1.75 if n_panel_columns == 1 else 1.5
-
-
-def _draw_panel(axes: "Axes", panel: Panel, series: ValuesOfColumns, event_marks: Sequence[Mark]) -> None:
-    for trace in () if panel.bars else panel.traces:
-        _draw_trace(axes, trace, series, bool(panel.value_names))
-    _draw_bars(axes, panel, series)
+def _draw_panel(axes: "Axes", panel: Panel, series: Values, event_marks: Sequence[Mark]) -> None:
+    if panel.bars:
+        _draw_bars(axes, panel, series)
+    else:
+        for trace in panel.traces:
+            _draw_trace(axes, trace, series, bool(panel.value_names))
     _draw_shade(axes, panel, series)
     _draw_event_marks(axes, event_marks, series["t_s"])
-    title = (
-        panel.label if panel.value_names or panel.bars or not panel.unit else f"{panel.label} ({panel.unit})"
-    )
+    title = panel.label if panel.steps or not panel.unit else f"{panel.label} ({panel.unit})"
     axes.set_title(title, fontsize=9, y=1.0)  # at this height: looking for one takes a third of the time
     axes.tick_params(labelsize=8)
     axes.grid(visible=True, color="#dddddd", linewidth=0.6)
     axes.ticklabel_format(axis="x", useOffset=False)
     if series["t_s"].size > 1:
         axes.set_xlim(series["t_s"][0], series["t_s"][-1])
-    if panel.value_names:
-        axes.set_yticks(range(len(panel.value_names)), panel.value_names)
-        axes.set_ylim(-0.4, len(panel.value_names) - 0.6)
+    if n := len(panel.steps):
+        axes.set_yticks(range(n), panel.steps)
+        axes.set_ylim(*((n - 0.4, -0.6) if panel.bars else (-0.4, n - 0.6)))
     elif panel.limits:
         axes.set_ylim(*panel.limits)
     elif panel.clips_spikes:
@@ -221,7 +206,7 @@ def _set_log_scale(axes: "Axes") -> None:
     axes.minorticks_off()
 
 
-def _draw_trace(axes: "Axes", trace: Trace, series: ValuesOfColumns, stepped: bool) -> None:
+def _draw_trace(axes: "Axes", trace: Trace, series: Values, stepped: bool) -> None:
     look = LOOKS[trace.role]
     axes.plot(
         series["t_s"],
@@ -235,10 +220,9 @@ def _draw_trace(axes: "Axes", trace: Trace, series: ValuesOfColumns, stepped: bo
     )
 
 
-def _draw_bars(axes: "Axes", panel: Panel, series: ValuesOfColumns) -> None:
+def _draw_bars(axes: "Axes", panel: Panel, series: Values) -> None:
     """A row a label: a bar while one of its traces is 0, a thin line while all that are there are 1."""
-    t_s, rows = series["t_s"], panel.rows
-    for place, row in enumerate(rows):
+    for place, row in enumerate(panel.steps):
         of = [trace for trace in panel.traces if trace.label == row]
         values = np.array([series[trace.column] for trace in of])
         asked, candidate = series[panel.bars_during_column] == 1, (values == 0).any(axis=0)
@@ -246,15 +230,11 @@ def _draw_bars(axes: "Axes", panel: Panel, series: ValuesOfColumns) -> None:
         for where, half, colour in (
             (asked & candidate, 0.36, LOOKS[of[0].role].colour), (excluded, 0.04, GREY)
         ):  # fmt: skip
-            axes.fill_between(
-                t_s, place - half, place + half, where=where, step="post", color=colour, linewidth=0
-            )
-    if rows:
-        axes.set_yticks(range(len(rows)), rows)
-        axes.set_ylim(len(rows) - 0.4, -0.6)
+            rows = series["t_s"], place - half, place + half
+            axes.fill_between(*rows, where=where, step="post", color=colour, linewidth=0)
 
 
-def _limit_axis_to_quantiles(axes: "Axes", panel: Panel, series: ValuesOfColumns) -> None:
+def _limit_axis_to_quantiles(axes: "Axes", panel: Panel, series: Values) -> None:
     """Set the axis by all but the spikes; an arrow and its value mark the largest of those."""
     values = np.concatenate([trace.factor * series[trace.column] for trace in panel.traces])
     values = values[np.isfinite(values)]
@@ -267,7 +247,7 @@ def _limit_axis_to_quantiles(axes: "Axes", panel: Panel, series: ValuesOfColumns
     for value, edge, arrow, align in (
         (values.max(), high, "\u25b2", "top"), (values.min(), low, "\u25bc", "bottom")
     ):  # fmt: skip
-        if (value > high) if align == "top" else (value < low):
+        if not low <= value <= high:
             axes.text(
                 0.995, edge, f"{arrow} {value:.1f}", transform=axes.get_yaxis_transform(), ha="right",
                 va=align, fontsize=7, color="#555555",
@@ -279,7 +259,7 @@ def _linestyle(dash: tuple[float, ...]) -> Any:
     return (0, tuple(length / 1.5 for length in dash)) if dash else "-"
 
 
-def _draw_shade(axes: "Axes", panel: Panel, series: ValuesOfColumns) -> None:
+def _draw_shade(axes: "Axes", panel: Panel, series: Values) -> None:
     if not panel.shade_column or not (series[panel.shade_column] == 1).any():
         return
     axes.fill_between(
@@ -303,19 +283,12 @@ def _draw_event_marks(axes: "Axes", event_marks: Sequence[Mark], t_s: np.ndarray
         )  # fmt: skip
 
 
-def _write_absent_text(view: View, series: ValuesOfColumns, grid: Iterable["Axes"]) -> None:
+def _write_absent_text(view: View, series: Values, grid: Iterable["Axes"]) -> None:
     """Say so where a view has nothing to show, rather than leaving empty axes to be wondered at."""
     if view.text_without_data and all(np.isnan(series[column]).all() for column in view.columns):
         for axes in grid:
-            axes.text(
-                0.5,
-                0.5,
-                view.text_without_data,
-                transform=axes.transAxes,
-                ha="center",
-                va="center",
-                fontsize=9,
-            )
+            where: Any = {"transform": axes.transAxes, "ha": "center", "va": "center"}
+            axes.text(0.5, 0.5, view.text_without_data, fontsize=9, **where)
 
 
 def _max_legend_columns(labels: Sequence[str], width: float) -> int:
@@ -337,9 +310,8 @@ def _legend_handle_of_label(grid: Sequence["Axes"]) -> dict[str, Any]:
     return {label: handle for label, handle in entries.items() if label not in titles}
 
 
-def _draw_legend(figure: "Figure", grid: Iterable["Axes"]) -> None:
+def _draw_legend(figure: "Figure", grid: Sequence["Axes"]) -> None:
     """One legend for the figure: each label once, but for the single curves that panel titles name."""
-    grid = list(grid)
     shown = _legend_handle_of_label(grid)
     columns, tall = _max_legend_columns(list(shown), figure.get_figwidth()), figure.get_figheight()
     more = LEGEND_LINE_INCHES * (-(-len(shown) // columns) - 1) / tall

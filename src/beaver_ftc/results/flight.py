@@ -8,13 +8,11 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
-import numpy as np
-
 from beaver_ftc.documents.errors import BadInput, SimulationFailed, suggestion
 from beaver_ftc.plugins import required
 from beaver_ftc.results import model, verdict
 from beaver_ftc.results.expectations import expectations_in_words
-from beaver_ftc.results.log import Log, MemoryLog, StoredLog
+from beaver_ftc.results.log import Log, MemoryLog, StoredLog, Values
 from beaver_ftc.results.metrics import metrics
 from beaver_ftc.results.model import Document
 from beaver_ftc.scenario.schema import Scenario, ScenarioLike, load
@@ -38,7 +36,7 @@ class Proof(NamedTuple):
     """
 
     certificate: Document
-    log: dict[str, np.ndarray]
+    log: Values
     scenario: str
 
 

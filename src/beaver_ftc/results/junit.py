@@ -4,13 +4,14 @@ All cases of a suite are answered by the same flights: each has an equal part of
 the cases add up to the suite and the suites to what the command took.
 """
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from xml.etree import ElementTree
 
 from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.documents.validation import one_line
-from beaver_ftc.results.model import Expectation, Judged
+from beaver_ftc.results.model import Judged
 
 _MAX_LINE_CHARACTERS = 10_000  # characters of one line
 
@@ -30,38 +31,31 @@ def write_junit(runs: Sequence[Judged], path: Path) -> None:
 
 
 def _add_suite(root: ElementTree.Element, run: Judged) -> None:
-    name = run.name
-    cases = [_expectation_case(name, expectation) for expectation in run.expectations] or [
-        _completion_case(run)
-    ]
-    failures = sum(case.find("failure") is not None for case in cases)
-    errors = sum(case.find("error") is not None for case in cases)
-    counts = {"name": name, "tests": str(len(cases)), "failures": str(failures), "errors": str(errors)}
-    for case in cases:
-        case.set("time", _seconds_text(run.took_s / len(cases)))
-    ElementTree.SubElement(root, "testsuite", counts, time=_seconds_text(run.took_s)).extend(cases)
+    asked = list(_cases(run))
+    kinds = Counter(kind for _, kind, _, why in asked if why is not None)
+    counts = {"tests": len(asked), "failures": kinds["failure"], "errors": kinds["error"]}
+    about = {"name": run.name} | {name: str(count) for name, count in counts.items()}
+    suite = ElementTree.SubElement(root, "testsuite", about, time=_seconds_text(run.took_s))
+    each_s = _seconds_text(run.took_s / len(asked))
+    for name, kind, what, why in asked:
+        case = ElementTree.SubElement(suite, "testcase", classname=run.name, name=name, time=each_s)
+        if why is not None:
+            ElementTree.SubElement(case, kind, message=_xml_safe_text(why), type=what)
+
+
+def _cases(run: Judged) -> Iterator[tuple[str, str, str, str | None]]:
+    """(name, element, type, why) of each expectation; of a scenario that expects nothing, or could not be
+    flown, whether it completes. why: None where all is well."""
+    for one in run.expectations:
+        reason = f": {one.reason}" if one.reason else ""
+        missed = None if one.passed else f"{one.expected_and_actual_text}{reason}"
+        yield one.name, "failure", "ExpectationMissed", missed
+    if not run.expectations:
+        yield "completes", "error", "NotFlown", run.error
 
 
 def _seconds_text(took_s: float) -> str:
     return f"{took_s:.6f}"
-
-
-def _expectation_case(name: str, expectation: Expectation) -> ElementTree.Element:
-    case = ElementTree.Element("testcase", classname=name, name=expectation.name)
-    if not expectation.passed:
-        says = expectation.expected_and_actual_text + (
-            f": {expectation.reason}" if expectation.reason else ""
-        )
-        ElementTree.SubElement(case, "failure", message=_xml_safe_text(says), type="ExpectationMissed")
-    return case
-
-
-def _completion_case(run: Judged) -> ElementTree.Element:
-    """The case of a scenario that expects nothing, or could not be flown."""
-    case = ElementTree.Element("testcase", classname=run.name, name="completes")
-    if run.error is not None:
-        ElementTree.SubElement(case, "error", message=_xml_safe_text(run.error), type="NotFlown")
-    return case
 
 
 def _xml_safe_text(said: str) -> str:

@@ -20,6 +20,9 @@ from beaver_ftc.results.model import Metrics
 if TYPE_CHECKING:
     from pandas import DataFrame
 
+Values = dict[str, np.ndarray]
+"""Values (rows,) by the name of their column."""
+
 ROWS_PER_GROUP = 16384  # 12 MB of 90 columns: large enough to compress well, small enough to hold
 _ROWS_PER_BLOCK = 256  # rows turned into columns at a time: they fit the processor's cache, four times faster
 _MAX_ROWS_PER_GROUP = 1_000_000
@@ -102,7 +105,7 @@ class Log:
 
     columns: tuple[str, ...] = ()
 
-    def read_chunks(self, columns: Sequence[str] | None = None) -> Iterator[dict[str, np.ndarray]]:
+    def read_chunks(self, columns: Sequence[str] | None = None) -> Iterator[Values]:
         """Yield the log in chunks of rows, each as name -> values, shape (rows,)."""
         raise NotImplementedError
 
@@ -114,7 +117,7 @@ class Log:
         """Write the rows into a file with the format of the log.parquet of `run`."""
         raise NotImplementedError
 
-    def read(self, columns: Sequence[str] | None = None) -> dict[str, np.ndarray]:
+    def read(self, columns: Sequence[str] | None = None) -> Values:
         """The whole log, or the named columns of it, as name -> values, shape (frames,)."""
         chunks = list(self.read_chunks(columns))
         names = self.columns if columns is None else columns
@@ -174,7 +177,7 @@ class MemoryLog(Log):
         """Number of frames."""
         return sum(len(chunk) for chunk in self._chunks)
 
-    def read_chunks(self, columns: Sequence[str] | None = None) -> Iterator[dict[str, np.ndarray]]:
+    def read_chunks(self, columns: Sequence[str] | None = None) -> Iterator[Values]:
         """Yield the log in chunks of rows. A chunk is a mapping from the name of a column to its values (n,).
 
         - `columns`: names of the wanted columns; None for all.
@@ -216,7 +219,7 @@ class Columns(dict[str, np.ndarray]):
         """Some columns side by side, (frames, names)."""
         return np.column_stack([self[name] for name in names])
 
-    def since(self, from_s: float) -> dict[str, np.ndarray]:
+    def since(self, from_s: float) -> Values:
         """Every column from an instant on."""
         late = self["t_s"] >= from_s
         return {name: column[late] for name, column in self.items()}
@@ -264,7 +267,7 @@ class StoredLog(Log):
         """Number of frames."""
         return self._frames
 
-    def read_chunks(self, columns: Sequence[str] | None = None) -> Iterator[dict[str, np.ndarray]]:
+    def read_chunks(self, columns: Sequence[str] | None = None) -> Iterator[Values]:
         """Yield the log a row group at a time, each as name -> values, shape (rows,)."""
         with open_parquet_log(self._path) as file:
             wanted = list(self.columns if columns is None else columns)
@@ -324,18 +327,13 @@ def log_dataframe(log: "Log", found: Metrics) -> "DataFrame":
         table = DataFrame(np.asfortranarray(log.rows), columns=list(log.columns), copy=False)
     else:
         table = DataFrame(log.read())
-    table.attrs = {
-        "scenario": found.scenario, "seed": found.seed, "verdict": _verdict_attributes(found),
-        "units": units(log.columns),
-    }  # fmt: skip
-    return table
-
-
-def _verdict_attributes(found: Metrics) -> dict[str, Any]:
     detection, isolation = found.detection, found.isolation
-    return {
+    verdict = {
         "passed": found.passed, "false_alarm": found.false_alarm,
         "detected": detection.detected, "detection_delay_s": detection.delay_s,
         "isolated": isolation.fault, "type": isolation.type, "isolation_delay_s": isolation.delay_s,
         "departed": found.departure is not None,
     }  # fmt: skip
+    about = {"scenario": found.scenario, "seed": found.seed}
+    table.attrs = {**about, "verdict": verdict, "units": units(log.columns)}
+    return table

@@ -156,13 +156,9 @@ class Truth:
 
     def faults_named_rightly_by(self, name: str | None, time_s: float | None) -> tuple[DeclaredFault, ...]:
         """The declared faults of which a name given then is right, as they strike."""
-        candidates = [*self.faults]
-        if self.outside_class_from_second_fault is not None and time_s is not None:
-            candidates += (
-                []
-                if self.onset_of(self.outside_class_from_second_fault).is_false(time_s)
-                else [self.outside_class_from_second_fault]
-            )
+        candidates, beyond = self.faults, self.outside_class_from_second_fault
+        if beyond is not None and time_s is not None and not self.onset_of(beyond).is_false(time_s):
+            candidates += (beyond,)
         return tuple(fault for fault in candidates if fault.is_named_by(name, self.removed_surfaces))
 
     def is_premature(
@@ -187,7 +183,7 @@ def metrics(flight: "Landing") -> Document:
 def measure(flight: "Landing") -> Metrics:
     """What a flight amounts to."""
     truth = Truth.of(flight.scenario)
-    found = Metrics.of(_found(flight, truth) | _declared(flight, truth), rounded)
+    found = Metrics.of(rounded(_found(flight, truth)) | _declared(flight, truth))
     found = replace(found, hints=tuple(hints(flight, found)))
     expectations = tuple(evaluate(flight.scenario.expect, found))
     return replace(found, expectations=expectations, passed=all(one.passed for one in expectations))
@@ -265,24 +261,20 @@ def faults_of(scenario: "Scenario") -> list[Document]:
 
 
 def _isolation(flight: "Landing", truth: Truth) -> Document:
-    meant = truth.against(flight.isolated, flight.isolation_time_s)
-    against = meant or truth.first
-    correct = None if flight.isolated is None else meant is not None
-    type_correct = truth.is_type_right(against, flight.isolation_type, flight.type_time_s)
-    return _named(vars(flight), against, (correct, type_correct), truth) | {
+    return _named(vars(flight), truth, truth.first) | {
         "isolated": flight.isolated is not None,
         "names": _names_given_in_flight(flight, truth),
-        "faults": [_one_of_several(found, truth) for found in flight.faults],
+        "faults": [_named(found, truth) for found in flight.faults],
         "types_withdrawn": flight.withdrawn_types or None,
     }
 
 
 def _windows(flight: "Landing", truth: Truth) -> list[Document] | None:
     """What was found in each window; null of a flight that has no more than one, to its end."""
-    known = flight.windows
-    if len(known) < 2 and not (known and known[0]["to_s"] < flight.frames / truth.rate_hz):
-        return None
-    return [_window(rounded(window), truth) for window in known]
+    known, end_s = flight.windows, flight.frames / truth.rate_hz
+    if len(known) > 1 or any(window["to_s"] < end_s for window in known):
+        return [_window(rounded(window), truth) for window in known]
+    return None
 
 
 def _window(window: Document, truth: Truth) -> Document:
@@ -309,7 +301,7 @@ def _name_in_window(found: Document, truth: Truth, last_frame_s: float) -> Docum
     on_place = [fault for fault in truth.faults if fault.actuator == found["isolated"]]
     has_size = on_place and found.get("estimate") is not None
     true_size = size_at(found["isolation_type"], on_place, at_s) if has_size else None
-    return _one_of_several(found | {"estimate_at_s": at_s}, truth) | {"true_size": true_size}
+    return _named(found | {"estimate_at_s": at_s}, truth) | {"true_size": true_size}
 
 
 def _names_given_in_flight(flight: "Landing", truth: Truth) -> tuple[str, ...]:
@@ -326,32 +318,24 @@ def _names_given_in_flight(flight: "Landing", truth: Truth) -> tuple[str, ...]:
     return tuple(dict.fromkeys(name for _, _, name in sorted(said)))
 
 
-def _one_of_several(found: Document, truth: Truth) -> Document:
-    """One of several faults at once; `fault` is null where a plane's is open between its candidates."""
-    name, kind = found["isolated"], found["isolation_type"]
-    meant = truth.against(name, found["isolation_time_s"])
-    correct = None if name is None else meant is not None
-    type_correct = None if kind is None else truth.is_type_right(meant, kind, found.get("type_time_s"))
-    of_ours = {"so_far": None if name is None else True, **found}  # no other diagnosis names several
-    return _named(of_ours, meant, (correct, type_correct), truth)
-
-
-def _named(
-    found: Document, fault: DeclaredFault | None, right: tuple[bool | None, bool | None], truth: Truth
-) -> Document:
-    """A fault that is named; fault: since when it is there. right: whether it, and its type, are, unless they
-    were named before."""
-    estimate, kind, onset = found.get("estimate"), found["isolation_type"], truth.onset_of(fault)
-    name, time_s = found["isolated"], found["isolation_time_s"]
-    premature = truth.is_premature(name, time_s, fault)
-    return found | {
+def _named(found: Document, truth: Truth, otherwise: DeclaredFault | None = None) -> Document:
+    """A fault that is named; `fault` is null where it is open between candidates. otherwise: the fault that
+    a name is held against that is right of none."""
+    name, kind, time_s = found["isolated"], found["isolation_type"], found["isolation_time_s"]
+    estimate, type_time_s = found.get("estimate"), found.get("type_time_s")
+    right = truth.against(name, time_s)
+    fault = right or otherwise
+    onset, premature = truth.onset_of(fault), truth.is_premature(name, time_s, fault)
+    type_is_right = truth.is_type_right(fault, kind, type_time_s)
+    # several are named by our diagnosis alone, which excludes all others
+    return {"so_far": None if name is None else True, **found} | {
         "fault": name,
         "type": kind,
         "time_s": time_s,
         "delay_s": onset.delay_s(time_s),
-        "correct": right[0] and not premature,
-        "type_correct": right[1] and not premature,
-        "type_delay_s": onset.delay_s(found.get("type_time_s")),
+        "correct": None if name is None else right is not None and not premature,
+        "type_correct": type_is_right and not premature,
+        "type_delay_s": onset.delay_s(type_time_s),
         "estimate": estimate if estimate is None else float(estimate),
         "estimate_deg": None if estimate is None or is_share(kind) else math.degrees(estimate),
         "premature": premature,
@@ -405,28 +389,23 @@ def hints(flight: "Landing", flight_metrics: Metrics) -> list[str]:
     """Notes without which a reader would misread the verdict: one sentence each."""
     scenario = flight.scenario
     of_diagnosis = (
-        (_hint_alarm_in_one_frame, _hint_several_faults, _hint_fault_too_small)
-        if scenario.fdi.diagnoses
-        else ()
+        _hint_alarm_in_one_frame(scenario, flight_metrics),
+        "" if scenario.fdi.pairs else of_several(scenario),
+        _hint_fault_too_small(scenario, flight_metrics),
     )
-    said = [
-        *(says(scenario, flight_metrics) for says in of_diagnosis),
+    said = (
+        *(of_diagnosis if scenario.fdi.diagnoses else ()),
         _hint_residual_near_threshold(flight),
         _hint_late_reallocation(flight_metrics),
-    ]
-    said.append(_hint_drift(flight))
+        _hint_drift(flight),
+    )
     return [sentence for sentence in said if sentence]
-
-
-def _hint_several_faults(scenario: "Scenario", flight_metrics: Metrics) -> str:
-    return "" if scenario.fdi.pairs else of_several(scenario)
 
 
 def _hint_fault_too_small(scenario: "Scenario", flight_metrics: Metrics) -> str:
     detection = flight_metrics.detection
-    if not scenario.faults or detection.detected or detection.guaranteed_delay_s is not None:
-        return ""
-    if detection.inconclusive:  # which has a line of its own
+    found = detection.detected or detection.guaranteed_delay_s is not None
+    if not scenario.faults or found or detection.inconclusive:  # the last has a line of its own
         return ""
     return (
         "no alarm, and no alarm was guaranteed: the effect of the fault stayed within the uncertainty that "
@@ -437,18 +416,16 @@ def _hint_fault_too_small(scenario: "Scenario", flight_metrics: Metrics) -> str:
 def _hint_alarm_in_one_frame(scenario: "Scenario", flight_metrics: Metrics) -> str:
     """The shortest delay that there is: it says nothing of a flight in which something is uncertain."""
     delay_s, frame_s = flight_metrics.detection.delay_s, 1.0 / scenario.rate_hz
-    if delay_s is None or delay_s > frame_s + TIME_TOLERANCE_S or not _has_no_errors(scenario):
+    if delay_s is None or delay_s > frame_s + TIME_TOLERANCE_S:
+        return ""
+    if not (scenario.sensors.is_ideal and scenario.actuators.is_ideal and scenario.environment.is_still):
+        return ""
+    if not declares_all(scenario):
         return ""
     return (
         f"the alarm came within one frame ({frame_s:.2g} s): sensors exact, servos ideal, the air "
         "is still, and all errors are declared"
     )
-
-
-def _has_no_errors(scenario: "Scenario") -> bool:
-    """Whether sensors and servos are ideal, the air is still and nothing is undeclared."""
-    parts = scenario.sensors.is_ideal, scenario.actuators.is_ideal, scenario.environment.is_still
-    return all(parts) and declares_all(scenario)
 
 
 def _hint_residual_near_threshold(flight: "Landing") -> str:
@@ -470,9 +447,9 @@ def _hint_late_reallocation(flight_metrics: Metrics) -> str:
     took over is not known here."""
     isolation = flight_metrics.isolation
     taken_s = [change.time_s for change in flight_metrics.supervisor if change.mode == TAKEN_OVER]
-    if not taken_s or isolation.time_s is None or taken_s[0] - isolation.time_s < LONG_S:
+    if not taken_s or isolation.faults or isolation.time_s is None:
         return ""
-    if isolation.faults:
+    if taken_s[0] - isolation.time_s < LONG_S:
         return ""
     return (
         f"{isolation.fault} was named at {isolation.time_s:.2f} s; its demand was reallocated at "
@@ -483,7 +460,7 @@ def _hint_late_reallocation(flight_metrics: Metrics) -> str:
 
 def _hint_drift(flight: "Landing") -> str:
     """Attitude, height and speed are left alone unless a scenario has an autopilot."""
-    if flight.end is None:
+    if flight.end is None or flight.scenario.autopilot:
         return ""
     initial = flight.scenario.initial
     ends = (
@@ -495,6 +472,4 @@ def _hint_drift(flight: "Landing") -> str:
         for what, a, b, most, unit in ends
         if abs(b - a) > most
     ]
-    if not far or getattr(flight.scenario, "autopilot", None):
-        return ""
-    return f"{' and '.join(far)} (only the body rates are controlled in this scenario)"
+    return f"{' and '.join(far)} (only the body rates are controlled in this scenario)" if far else ""

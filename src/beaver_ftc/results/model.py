@@ -5,9 +5,9 @@ the flight, delays s since the first frame with the fault, rates deg/s; None is 
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass, field, fields
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 from types import UnionType
 from typing import Annotated, Any, ClassVar, Self, TypeVar, Union, get_args, get_origin, get_type_hints
@@ -36,23 +36,22 @@ class Part:
     _last: ClassVar[tuple[str, ...]] = ()
 
     @classmethod
-    def of(cls, found: Any, value: "Reader | None" = None) -> Self:
+    def of(cls, found: Any) -> Self:
         """From a section as JSON has it, or a tuple of its values; a key that is not there is None, or an
-        empty list. value: what becomes of a single value, such as `rounded`."""
+        empty list."""
         part: Any = cls
         if isinstance(found, cls):
             return found
-        value = value or _list_as_tuple
         if isinstance(found, tuple):
-            return cls(*map(value, found))
-        return cls(**{name: read(found.get(name)) for name, (read, _) in _fields_of(part, value).items()})
+            return cls(*found)
+        return cls(**{name: _read(hint, found.get(name)) for name, (hint, _) in _fields_of(part).items()})
 
     def document(self) -> Document:
         """The section as a mapping of keys to values."""
         part: Any = type(self)
         return {
             name: _as_json_value(value)
-            for name, (_, only_known) in _fields_of(part, _list_as_tuple).items()
+            for name, (_, only_known) in _fields_of(part).items()
             if not ((value := getattr(self, name)) is None and only_known)
         }
 
@@ -66,19 +65,14 @@ class Part:
         return here
 
 
-Reader = Callable[[Any], Any]
-
-
 @cache
-def _fields_of(part: Any, value: Reader) -> dict[str, tuple[Reader, bool]]:
-    """How each field of a section is read, and whether the document has it only where it is known; in the
+def _fields_of(part: Any) -> dict[str, tuple[Any, bool]]:
+    """The type of each field of a section, and whether the document has it only where it is known; in the
     document's order."""
     hints, marks = get_type_hints(part), get_type_hints(part, include_extras=True)
     others = [one.name for one in fields(part) if one.name not in part._first + part._last]
-    return {
-        name: (_reader_of_type(hints[name], value), _KNOWN in get_args(marks[name]))
-        for name in (*part._first, *others, *part._last)
-    }
+    named = (*part._first, *others, *part._last)
+    return {name: (hints[name], _KNOWN in get_args(marks[name])) for name in named}
 
 
 def without_none(hint: Any) -> Any:
@@ -88,33 +82,24 @@ def without_none(hint: Any) -> Any:
     return next(one for one in get_args(hint) if one is not type(None))
 
 
-def _reader_of_type(hint: Any, value: Reader) -> Reader:
-    """How a value of JSON becomes a field of this type: the type is looked into once, not for each flight."""
+@cache
+def _kind_of(hint: Any) -> tuple[Any, Any, bool]:
+    """Of a field's type, looked into once: what it is, of what, and whether it may be None."""
     bare = without_none(hint)
-    kind, inner = get_origin(bare), get_args(bare)
+    return get_origin(bare) or bare, get_args(bare), bare is not hint
+
+
+def _read(hint: Any, value: Any) -> Any:
+    """A value of JSON as a field of this type."""
+    kind, of, may_be_none = _kind_of(hint)
+    if value is None and (may_be_none or kind not in (tuple, dict)):
+        return None
     if kind is tuple:
-        read: Reader = partial(_tuple_of, _reader_of_type(inner[0], value))
-    elif kind is dict:
-        read = partial(_dict_of, _reader_of_type(inner[1], value))
-    else:
-        is_section = isinstance(bare, type) and issubclass(bare, Part)
-        return partial(_known, partial(bare.of, value=value) if is_section else value)
-    return read if bare is hint else partial(_known, read)
-
-
-def _known(read: Reader, value: Any) -> Any:
-    return None if value is None else read(value)
-
-
-def _tuple_of(read: Reader, values: Any) -> Any:
-    return tuple(map(read, values or ()))
-
-
-def _dict_of(read: Reader, values: Any) -> Any:
-    return {key: read(value) for key, value in (values or {}).items()}
-
-
-def _list_as_tuple(value: Any) -> Any:
+        return tuple(_read(of[0], each) for each in value or ())
+    if kind is dict:
+        return {key: _read(of[1], each) for key, each in (value or {}).items()}
+    if isinstance(kind, type) and issubclass(kind, Part):
+        return kind.of(value)
     return tuple(value) if isinstance(value, list) else value
 
 
@@ -433,9 +418,9 @@ class ChangeInFlight(Part):
         return {key: value for key, value in found.items() if key not in of_it}
 
     @classmethod
-    def of(cls, found: Any, value: Reader | None = None) -> Self:
+    def of(cls, found: Any) -> Self:
         """From a section as JSON has it."""
-        return super().of({**found, "renewed": "detection_time_s" in found}, value)
+        return super().of({**found, "renewed": "detection_time_s" in found})
 
 
 @dataclass(frozen=True)

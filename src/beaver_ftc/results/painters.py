@@ -56,11 +56,15 @@ def _can_fork() -> bool:
 @contextmanager
 def drawing(pictures: "Sequence[Picture]", painters: Painters) -> Iterator[None]:
     """Have the pictures drawn during the block: they are there at its end. Raises what went wrong."""
-    given = (
-        list(zip(painters, shares_of_equal_work(pictures, len(painters)), strict=True)) if painters else []
-    )
-    asked = [(painter, own) for painter, own in given if _send_pictures(painter, own)]
-    left = [picture for each in given if each not in asked for picture in each[1]] if given else [*pictures]
+    shares = shares_of_equal_work(pictures, len(painters) or 1)
+    asked: list[tuple[Connection, list[Picture]]] = []
+    left = [] if painters else shares[0]
+    for painter, own in zip(painters, shares, strict=False):
+        try:
+            painter.send(own)
+            asked.append((painter, own))
+        except OSError:  # it was killed
+            left += own
     failures = []
     try:
         yield
@@ -82,15 +86,6 @@ def save_all(pictures: "Sequence[Picture]") -> None:
 
         for picture in pictures:
             save(picture)
-
-
-def _send_pictures(painter: Connection, pictures: "Sequence[Picture]") -> bool:
-    """Whether this painter has been asked: one that was killed cannot be."""
-    try:
-        painter.send(pictures)
-    except OSError:
-        return False
-    return True
 
 
 def _paint(connections: Sequence[Connection], other_ends: Sequence[Connection]) -> None:

@@ -17,7 +17,7 @@ import numpy as np
 
 from beaver_ftc.results import log, verdict
 from beaver_ftc.results.expectations import expectations_in_words
-from beaver_ftc.results.model import DeclaredFault, Document, Metrics
+from beaver_ftc.results.model import Document, Metrics
 from beaver_ftc.results.style import LOOKS, MODE_COLOURS, SHADES, closeup_window, marks
 from beaver_ftc.results.views import (
     MAX_CURVE_POINTS,
@@ -55,13 +55,13 @@ def render(folders: Sequence[Path], names: Sequence[str] = ()) -> str:
     from markupsafe import Markup
 
     documents = [json.loads((folder / "metrics.json").read_text(encoding="utf-8")) for folder in folders]
-    texts = [(folder / "scenario.yaml").read_text(encoding="utf-8") for folder in folders]
+    shown = {mark.name: mark for document in documents for mark in marks(Metrics.of(document))}.values()
     return template(_TEMPLATE_FOLDER / "report.html.j2").render(
-        runs=[_verdict_entry(document, text) for document, text in zip(documents, texts, strict=True)],
+        runs=list(map(_verdict_entry, documents, folders)),
         names=names,
         modes=MODE_COLOURS,
-        marks=(shown := list({m.name: m for each in documents for m in marks(Metrics.of(each))}.values())),
-        first_mark_s=shown[0].time_s if shown else 0.0,
+        marks=shown,
+        first_mark_s=next((mark.time_s for mark in shown), 0.0),
         **script_style_and_data(folders, documents, names),
         # what studies have found in a folder, if they have been there
         sections=[Markup("".join(section(folder) for section in _REGISTERED_SECTIONS)) for folder in folders],
@@ -74,10 +74,10 @@ def register_section(section: ReportSection) -> None:
         _REGISTERED_SECTIONS.append(section)
 
 
-def _verdict_entry(metrics: Document, scenario: str) -> Document:
+def _verdict_entry(metrics: Document, folder: Path) -> Document:
     import yaml
 
-    found = Metrics.of(metrics)
+    found, scenario = Metrics.of(metrics), (folder / "scenario.yaml").read_text(encoding="utf-8")
     return {
         "metrics": metrics,
         "title": verdict.title(found),
@@ -118,25 +118,24 @@ def _page_data(
 ) -> Document:
     """What the page draws from."""
     logs = [log.StoredLog(folder / "log.parquet") for folder in folders]
-    shown = _common_views(logs, documents) if shown is None else shown
+    found = [Metrics.of(document) for document in documents]
+    shown = _common_views(logs, found) if shown is None else shown
     columns = tuple(
         dict.fromkeys([*_FLIGHT_PATH_COLUMNS, "mode", *(name for view in shown for name in view.columns)])
     )
     # fewer points of each curve the more runs there are: the page stays within a few megabytes
     points = MAX_CURVE_POINTS if len(logs) <= 2 else max(600, 2 * MAX_CURVE_POINTS // len(logs))
-    found = [Metrics.of(document) for document in documents]
     named = zip(logs, found, names or [each.scenario for each in found], strict=True)
     return {
         "runs": [_run_entry(source, metrics, columns, name, points) for source, metrics, name in named],
-        "views": [_view_entry(view) for view in shown],
+        "views": [asdict(view) | {"panels": list(map(_panel_entry, view.panels))} for view in shown],
         "looks": {role: asdict(look) for role, look in LOOKS.items()},
         "modes": list(MODE_COLOURS.items()),
     }
 
 
-def _common_views(logs: Sequence[log.Log], documents: Sequence[Document]) -> tuple[View, ...]:
+def _common_views(logs: Sequence[log.Log], flown: Sequence[Metrics]) -> tuple[View, ...]:
     """Every view that all runs have; with what is expected of the airspeed, if that is the same in all."""
-    flown = [Metrics.of(document) for document in documents]
     within_mps = {expected_airspeed_mps(metrics) for metrics in flown}
     common = within_mps.pop() if len(within_mps) == 1 else None
     first, *rest = (
@@ -157,7 +156,11 @@ def _run_entry(source: log.Log, metrics: Metrics, columns: Sequence[str], name: 
     return {
         "name": name,
         "jet": not {"spoiler", "stabiliser"}.isdisjoint(surfaces_by_kind(surfaces(source.columns))),
-        "damage": [_damage_entry(fault) for fault in metrics.faults if fault.type == "damage"],
+        "damage": [
+            {"part": fault.size["case"].removesuffix("-off"), "at_s": fault.at_s, "end_s": fault.end_s}
+            for fault in metrics.faults
+            if fault.type == "damage"
+        ],
         "marks": [asdict(mark) for mark in event_marks],
         "window": window or ((float(t_s[0]), float(t_s[-1])) if t_s.size else (0.0, 0.0)),
         "levels": [
@@ -166,25 +169,15 @@ def _run_entry(source: log.Log, metrics: Metrics, columns: Sequence[str], name: 
     }
 
 
-def _damage_entry(fault: DeclaredFault) -> Document:
-    """Which part is missing, and from when to when."""
-    part = fault.size["case"].removesuffix("-off")
-    return {"part": part, "at_s": fault.at_s, "end_s": fault.end_s}
-
-
 def _base64_floats(name: str, values: np.ndarray) -> str:
     """Values as base64 of little-endian floats: double for time, single for what is only looked at."""
     return base64.b64encode(values.astype("<f8" if name == "t_s" else "<f4").tobytes()).decode("ascii")
 
 
-def _view_entry(view: View) -> Document:
-    return asdict(view) | {"panels": [_panel_entry(panel) for panel in view.panels]}
-
-
 def _panel_entry(panel: Panel) -> Document:
     return asdict(panel) | {
         "unit": panel.unit,
-        "steps": panel.value_names or panel.rows,
+        "steps": panel.steps,
         "shade_colour": SHADES.get(panel.shade_label, ""),
         "traces": [asdict(trace) | {"factor": trace.factor} for trace in panel.traces],
     }

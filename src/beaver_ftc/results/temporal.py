@@ -38,13 +38,16 @@ class FormulaError(ValueError):
     """The text is no formula; the message says why and what is allowed."""
 
 
+Interval = tuple[float, float] | None
+"""From and to, s; None for all that is to come."""
+
+
 class Formula(NamedTuple):
-    """An operator with its parts; interval in s, None for all that is to come; column_or_number: name or
-    value of an operator `column` or `number`."""
+    """An operator with its parts; column_or_number: name or value of an operator `column` or `number`."""
 
     operator: str
     parts: tuple["Formula", ...] = ()
-    interval: tuple[float, float] | None = None
+    interval: Interval = None
     column_or_number: str | float = ""
 
     @property
@@ -151,7 +154,7 @@ class _Parser:
         self._take_token(")")
         return found
 
-    def _parse_interval(self) -> tuple[float, float] | None:
+    def _parse_interval(self) -> Interval:
         if self._next_token != "[":
             return None
         self._take_token("[")
@@ -173,7 +176,7 @@ class _Parser:
         return float(token)
 
 
-def _formula(operator: str, *parts: Formula, interval: tuple[float, float] | None = None) -> Formula:
+def _formula(operator: str, *parts: Formula, interval: Interval = None) -> Formula:
     """An operator of these parts, which are what it is of: numbers, or what is true or false."""
     of_numbers = operator in ("-", "abs") or _BINDING_POWER.get(operator, 0) >= _BINDING_POWER["<="]
     if any((part.operator in _NUMERIC_OPERATORS) != of_numbers for part in parts):

@@ -5,20 +5,26 @@ All words follow from the metrics, so that they cannot disagree with `metrics.js
 
 import io
 import math
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections import Counter
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.results.expectations import expectations_in_words, value_text
 from beaver_ftc.results.model import (
-    AxisAuthority,
+    Authority,
     CertificateCounts,
     ChangeInFlight,
     DeclaredFault,
-    Detection,
     Fault,
+    FlightCondition,
+    Inconclusive,
+    Link,
     Metrics,
     Named,
+    Part,
+    ProfileDeviations,
     ProtectionLimit,
+    Statistical,
     Window,
     Withdrawn,
 )
@@ -49,50 +55,79 @@ def outcome_class(metrics: Metrics) -> str:
 
 def verdict_lines(metrics: Metrics) -> list[tuple[str, str]]:
     """(name, text) of each line of the verdict, in the order of events."""
-    declared = metrics.faults or (metrics.fault,)
+    declared, isolation = metrics.faults or (metrics.fault,), metrics.isolation
     said = (
-        ("flight", _condition_text(metrics)),
+        ("flight", _if_there(_condition_text, metrics.flight)),
         *(("" if i else "fault", _fault_text(fault, metrics.faults)) for i, fault in enumerate(declared)),
-        ("assumed", _assumptions_text(metrics)),
+        ("assumed", ", ".join(_ASSUMPTION_TEXT.get(name, name) for name in metrics.assumes)),
         ("outside", _outside_class_text(metrics)),
         ("detection", _detection_text(metrics)),
-        ("inconclusive", _inconclusive_text(metrics)),
-        ("statistical", _statistical_text(metrics)),
+        ("inconclusive", _if_there(_inconclusive_text, metrics.detection.inconclusive)),
+        ("statistical", _if_there(_statistical_text, metrics.detection.statistical)),
         ("isolation", _isolation_text(metrics)),
-        *(("", said) for said in _further_fault_texts(metrics)),
+        *(
+            ("", _found_text(fault, metrics, _candidates_text(fault.candidates)))
+            for fault in (isolation.faults[1:] if isolation.isolated else ())
+        ),
         *(
             ("" if i else "windows", _window_text(window, metrics))
             for i, window in enumerate(metrics.windows or ())
         ),
-        ("probing", _probing_text(metrics)),
+        ("probing", _if_there(_probing_text, isolation.probing_s)),
         ("supervisor", _supervisor_text(metrics)),
         *(("changed", _change_text(change)) for change in metrics.changes),
-        ("engine power", _engine_power_text(metrics)),
-        ("profile", _profile_text(metrics)),
+        ("engine power", _filled(_ENGINE_POWER_FORM, metrics.engine_power)),
+        ("profile", _if_there(_profile_text, metrics.profile)),
         *(("limited", _protection_limit_text(limit)) for limit in metrics.limits),
-        ("authority", _insufficient_authority_text(metrics)),
-        ("remaining", _remaining_authority_text(metrics)),
+        ("authority", _if_there(_insufficient_authority_text, metrics.authority)),
+        ("remaining", _if_there(_remaining_authority_text, metrics.authority)),
         ("envelope", _envelope_text(metrics)),
-        ("departure", _departure_text(metrics)),
-        ("link", _link_text(metrics)),
-        ("saturation", _saturation_text(metrics)),
+        ("departure", _filled("LOST at {time_s}: {signal}", metrics.departure)),
+        ("link", _if_there(_link_text, metrics.link)),
+        ("saturation", ", ".join(f"{s} {_seconds_text(t)}" for s, t in metrics.saturation_s.items() if t)),
         *(("note", hint) for hint in metrics.hints),
     )
     return [(what, how) for what, how in said if how]
 
 
-def _further_fault_texts(metrics: Metrics) -> list[str]:
-    """The further faults of several at once: named, or the remaining candidates."""
-    isolation = metrics.isolation
-    rest = isolation.faults[1:] if isolation.isolated else []
-    return [_found_text(fault, metrics, _candidates_text(fault.candidates)) for fault in rest]
+def _if_there(text_of: Callable[[Any], str], section: Any) -> str:
+    """What is said of a section; nothing where the flight has none."""
+    return text_of(section) if section else ""
+
+
+def _filled(form: str, section: Part | None, **more: str) -> str:
+    """A sentence of a section's fields, its times as text; nothing where the flight has none."""
+    if section is None:
+        return ""
+    known = {name: _seconds_text(of) if name.endswith("_s") else of for name, of in vars(section).items()}
+    return form.format(**known, **more)
+
+
+_CONDITION_FORM = (
+    "{airspeed_mps:g} m/s at {altitude_m:g} m, {flown_s}; diagnosis {scheme}{of_every_type}; law {law}"
+)
+_STATISTICAL_FORM = (
+    "{alarm}; threshold {alarm_level:.2f} σ, peak in healthy flight {closest_approach:.2f} of it"
+)
+_ENGINE_POWER_FORM = (
+    "took over pitch at {from_s}, for {in_charge_s} in all, {lowest_inhg:.1f} to {highest_inhg:.1f} inHg"
+)
+_LINK_FORM = (
+    "{protocol}, {frames} frames at {packets_hz:g} Hz{odd}; latency {latency_ms.median:.2f} ms (99th "
+    "percentile {latency_ms.p99:.2f}), interval {interval_ms.mean:.2f} ms, jitter "
+    "{interval_ms.jitter_rms:.2f} ms RMS"
+)
+_LIMIT_FORM_OF_QUANTITY = {
+    "airspeed_mps": "airspeed to {side} {value:.1f} m/s from {time_s}{until}: {because}",
+    "bank_deg": "bank to {side} {value:.0f} deg from {time_s}{until}: {because}",
+}
 
 
 def _window_text(window: Window, metrics: Metrics) -> str:
     """What was found in one window, and when of it."""
     alarm = f"alarm after {_seconds_text(window.delay_s)}" if window.detected else "no alarm"
     found = [_found_text(one, metrics, "not isolated") for one in window.isolation]
-    return f"{_seconds_text(window.from_s)} to {_seconds_text(window.to_s)}: {'; '.join([alarm, *found])}"
+    return _filled("{from_s} to {to_s}: {found}", window, found="; ".join([alarm, *found]))
 
 
 def _found_text(found: Named, metrics: Metrics, otherwise: str) -> str:
@@ -139,10 +174,8 @@ def _surfaces_text(names: Sequence[str]) -> str:
     """One surface, a few by their names, or many counted by the part of the aircraft where they are."""
     if len(names) <= MAX_LISTED_CANDIDATES:
         return " or ".join(_without_underscores(name) for name in names)
-    parts: dict[str, int] = {}
-    for name in names:
-        part = next((part for word, part in _AIRCRAFT_PART_OF_SURFACE_WORD.items() if word in name), "others")
-        parts[part] = parts.get(part, 0) + 1
+    part_of = _AIRCRAFT_PART_OF_SURFACE_WORD.items()
+    parts = Counter(next((part for word, part in part_of if word in name), "others") for name in names)
     counted = ", ".join(f"{n} {'' if part == 'others' else 'on the '}{part}" for part, n in parts.items())
     return f"one of {len(names)} surfaces ({counted})"
 
@@ -211,39 +244,29 @@ def _certificate_text(written: CertificateCounts, folder: str) -> str:
 
 def _change_text(change: ChangeInFlight) -> str:
     """What was changed in flight, and what a diagnosis that ended with it had found."""
-    to = [f"{key} {name}" for key, name in (("law", change.law), ("scheme", change.scheme)) if name]
-    said = f"{', '.join([*to, *(['sensors'] if change.sensors else [])]) or 'declared sensors'}"
-    if change.detection_time_s is None:
-        return f"{said} at {_seconds_text(change.time_s)}"
-    found = change.isolated or "not isolated"
-    alarm = "FALSE ALARM" if change.false_alarm else "alarm"
-    before = f"{alarm} at {_seconds_text(change.detection_time_s)}, {found}"
-    return f"{said} at {_seconds_text(change.time_s)}; the diagnosis before: {before}"
+    to = [f"{key} {name}" for key in ("law", "scheme") if (name := getattr(change, key))]
+    if change.sensors:
+        to.append("sensors")
+    form, alarm = "{what} at {time_s}", "FALSE ALARM" if change.false_alarm else "alarm"
+    if change.detection_time_s is not None:
+        form += "; the diagnosis before: {alarm} at {detection_time_s}, {named}"
+    what, named = ", ".join(to) or "declared sensors", change.isolated or "not isolated"
+    return _filled(form, change, what=what, alarm=alarm, named=named)
 
 
-def _condition_text(metrics: Metrics) -> str:
-    flown = metrics.flight
-    if not flown:
-        return ""
-    condition = f"{flown.airspeed_mps:g} m/s at {flown.altitude_m:g} m, {_seconds_text(flown.flown_s)}"
-    kind = ", every fault type" if flown.fault_class == "all" else ""
-    return f"{condition}; diagnosis {flown.scheme}{kind}; law {flown.law}"
+def _condition_text(flown: FlightCondition) -> str:
+    of_every_type = ", every fault type" if flown.fault_class == "all" else ""
+    return _filled(_CONDITION_FORM, flown, of_every_type=of_every_type)
 
 
 _ASSUMPTION_TEXT = {"sensors-sound": "sensors are sound (A11)"}
 
 
-def _assumptions_text(metrics: Metrics) -> str:
-    """What the diagnosis assumes of the truth; older documents do not say."""
-    return ", ".join(_ASSUMPTION_TEXT.get(name, name) for name in metrics.assumes or ())
-
-
 def _outside_class_text(metrics: Metrics) -> str:
     """The faults that the diagnosis cannot name, as its class does not have them."""
-    outside = " and ".join(metrics.outside_class or ())
-    if not outside:
+    if not metrics.outside_class:
         return ""
-    cure = wider(metrics.flight.fault_class)
+    outside, cure = " and ".join(metrics.outside_class), wider(metrics.flight.fault_class)
     return f"{outside}: outside the declared class, so that it cannot be named; {cure}"
 
 
@@ -272,16 +295,14 @@ def _masked_text(fault: DeclaredFault, faults: Sequence[DeclaredFault]) -> str:
     return f", without effect {' and '.join(spells)}" if spells else ""
 
 
+_FORM_OF_SENSOR_FAULT = {"bias": "{:+g} {}", "noise": "{:g} {}", "scale": "{:+.0%}"}
+
+
 def _fault_size_texts(fault: DeclaredFault) -> list[str]:
     """The size of an injected fault in words, that of an instrument's in the unit of the instrument."""
     if fault.sensor:
-        unit, words = (
-            QUANTITIES[fault.sensor].unit,
-            {"bias": "{:+g} {}", "noise": "{:g} {}", "scale": "{:+.0%}"},
-        )
-        return [
-            words[fault.type].format(size, unit) for key, size in fault.size.items() if key == "magnitude"
-        ]
+        unit, size = QUANTITIES[fault.sensor].unit, fault.size.get("magnitude")
+        return [] if size is None else [_FORM_OF_SENSOR_FAULT[fault.type].format(size, unit)]
     words_of = TYPES[fault.type].in_words if fault.type in TYPES else {}
     return [words_of[key](value) for key, value in fault.size.items() if key in words_of]
 
@@ -293,24 +314,21 @@ _DEVIATION_FORMAT_OF_CHANNEL = {
 }  # fmt: skip
 
 
-def _profile_text(metrics: Metrics) -> str:
-    """Largest deviations from the commanded profile; nothing where none was flown."""
+def _profile_text(profile: ProfileDeviations) -> str:
+    """Largest deviations from the commanded profile."""
+    instant = value_text(profile.airspeed_at_one_instant_mps)
     off = [
-        form.format(value_text(by), value_text(metrics.at("profile.airspeed_at_one_instant_mps")))
+        form.format(value_text(by), instant)
         for name, form in _DEVIATION_FORMAT_OF_CHANNEL.items()
-        if (by := metrics.at(f"profile.{name}")) is not None
+        if (by := getattr(profile, name)) is not None
     ]
     return f"largest deviation: {', '.join(off)}" if off else ""
 
 
-_LIMIT_FORMAT_OF_QUANTITY = {"airspeed_mps": "airspeed to {} {:.1f} m/s", "bank_deg": "bank to {} {:.0f} deg"}
-
-
 def _protection_limit_text(limit: ProtectionLimit) -> str:
     """What envelope protection has limited, since when and why."""
-    what = _LIMIT_FORMAT_OF_QUANTITY[limit.limits].format(limit.side, limit.value)
     until = "" if limit.in_force else ", no longer at the end"
-    return f"{what} from {_seconds_text(limit.time_s)}{until}: {limit.because}"
+    return _filled(_LIMIT_FORM_OF_QUANTITY[limit.limits], limit, until=until)
 
 
 def _true_size_text(isolation: Named, metrics: Metrics) -> str:
@@ -334,43 +352,35 @@ def _true_size_text(isolation: Named, metrics: Metrics) -> str:
 
 
 def _detection_text(metrics: Metrics) -> str:
+    """When an alarm was raised, and by which test: the residual of an axis, or the sensor monitor."""
     detection = metrics.detection
     if not detection.detected:
         return "no alarm"
+    source = f"on {detection.axis}" if detection.axis else "by the sensor monitor"
+    form = "after {delay_s} {source}"
     if metrics.false_alarm and detection.delay_s is None:
-        return f"FALSE ALARM at {_seconds_text(detection.time_s)} {_alarm_source_text(detection)}"
-    guaranteed = detection.guaranteed_delay_s
-    within = "" if guaranteed is None else f" (certain within {_seconds_text(guaranteed)})"
-    return f"after {_seconds_text(detection.delay_s)} {_alarm_source_text(detection)}{within}"
+        form = "FALSE ALARM at {time_s} {source}"
+    elif detection.guaranteed_delay_s is not None:
+        form += " (certain within {guaranteed_delay_s})"
+    return _filled(form, detection, source=source)
 
 
-def _inconclusive_text(metrics: Metrics) -> str:
-    """Where the diagnosis could conclude nothing; nothing if it could all the time."""
-    found = metrics.detection.inconclusive
-    return in_words(found.document()) if found else ""
+def _inconclusive_text(found: Inconclusive) -> str:
+    return in_words(found.document())
 
 
-def _alarm_source_text(detection: Detection) -> str:
-    """Which test raised the alarm: the residual of an axis, or the sensor monitor."""
-    return f"on {detection.axis}" if detection.axis else "by the sensor monitor"
-
-
-def _statistical_text(metrics: Metrics) -> str:
-    """When the statistical detector alone would have raised the alarm; nothing if there was none."""
-    said = metrics.detection.statistical
-    if said is None:
-        return ""
-    when = "no alarm" if said.time_s is None else f"alarm at {_seconds_text(said.time_s)}"
-    peak = f"peak in healthy flight {said.closest_approach:.2f} of it"
-    return f"{when}; threshold {said.alarm_level:.2f} σ, {peak}"
+def _statistical_text(said: Statistical) -> str:
+    """When the statistical detector alone would have raised the alarm."""
+    alarm = "no alarm" if said.time_s is None else f"alarm at {_seconds_text(said.time_s)}"
+    return _filled(_STATISTICAL_FORM, said, alarm=alarm)
 
 
 def _isolation_text(metrics: Metrics) -> str:
-    isolation = metrics.isolation
-    left = isolation.candidates if metrics.detection.detected else ()
-    found = _named_fault_text(isolation, metrics) if isolation.isolated else "none"
-    if left and not isolation.isolated:
-        found = _candidates_text(left)
+    isolation, found = metrics.isolation, "none"
+    if isolation.isolated:
+        found = _named_fault_text(isolation, metrics)
+    elif metrics.detection.detected and isolation.candidates:
+        found = _candidates_text(isolation.candidates)
     gone = _withdrawn_texts("named before", isolation.withdrawn)
     return "; ".join([found, *gone, *_withdrawn_texts("type named before", isolation.types_withdrawn or ())])
 
@@ -402,11 +412,9 @@ def _named_fault_text(isolation: Named, metrics: Metrics) -> str:
     return f"{isolation.fault}{left}{when}; {right}{_type_text(isolation)}{size}"
 
 
-def _probing_text(metrics: Metrics) -> str:
-    began_s, ended_s = metrics.isolation.probing_s or (None, None)
-    if began_s is None:
-        return ""
-    return f"flap and elevator moved from {_seconds_text(began_s)} to {_seconds_text(ended_s)}"
+def _probing_text(span_s: tuple[float, float]) -> str:
+    began, ended = map(_seconds_text, span_s)
+    return f"flap and elevator moved from {began} to {ended}"
 
 
 def _type_text(isolation: Named) -> str:
@@ -428,71 +436,46 @@ def _estimate_text(isolation: Named) -> str:
 
 def _supervisor_text(metrics: Metrics) -> str:
     changes = [f"{change.mode} {_seconds_text(change.time_s)}" for change in metrics.supervisor]
-    left_out = metrics.mode_changes_left_out
-    if left_out:
-        changes.insert(-1, f"({left_out} more)")
+    if metrics.mode_changes_left_out:
+        changes.insert(-1, f"({metrics.mode_changes_left_out} more)")
     return " → ".join(changes)
 
 
-def _engine_power_text(metrics: Metrics) -> str:
-    power = metrics.engine_power
-    if not power:
-        return ""
-    span = f"{power.lowest_inhg:.1f} to {power.highest_inhg:.1f} inHg"
-    total = _seconds_text(power.in_charge_s)
-    return f"took over pitch at {_seconds_text(power.from_s)}, for {total} in all, {span}"
-
-
 MAX_SHOWN_AUTHORITY_SHARE = 0.995  # of an axis: nothing to be said
-
-
-def _insufficient_authority_text(metrics: Metrics) -> str:
-    """For how long no law could have held a rate, if long enough to matter."""
-    beyond_s = {
-        axis: given.beyond_s
-        for axis, given in _authority_of_axes(metrics)
-        if given.beyond_s >= MIN_SHOWN_BEYOND_S
-    }
-    if not beyond_s:
-        return ""
-    said = ", ".join(f"{axis} for {_seconds_text(time)}" for axis, time in beyond_s.items())
-    return f"no deflection could hold the rate: {said}"
-
-
-def _authority_of_axes(metrics: Metrics) -> list[tuple[str, AxisAuthority]]:
-    of = metrics.authority
-    return [("p", of.p), ("q", of.q), ("r", of.r)] if of else []
-
-
 _AXIS_TITLES = {"p": "roll", "q": "pitch", "r": "yaw"}
 
 
-def _remaining_authority_text(metrics: Metrics) -> str:
+def _insufficient_authority_text(authority: Authority) -> str:
+    """For how long no law could have held a rate, if long enough to matter."""
+    beyond = ", ".join(
+        f"{axis} for {_seconds_text(given.beyond_s)}"
+        for axis, given in vars(authority).items()
+        if given.beyond_s >= MIN_SHOWN_BEYOND_S
+    )
+    return f"no deflection could hold the rate: {beyond}" if beyond else ""
+
+
+def _remaining_authority_text(authority: Authority) -> str:
     """Remaining control authority of each axis that has lost some, as a share of the healthy aircraft's."""
     said = []
-    for axis, of in _authority_of_axes(metrics):
-        ends = of.least_rad_s2, of.greatest_rad_s2, of.healthy_least_rad_s2, of.healthy_greatest_rad_s2
-        if None not in ends:
-            least, greatest, healthy_least, healthy_greatest = map(float, ends)  # type: ignore[arg-type]
-            share, most = (greatest - least) / (healthy_greatest - healthy_least), of.engines_greatest_rad_s2
-            if share < MAX_SHOWN_AUTHORITY_SHARE or most:
-                engines = f", engines {of.engines_least_rad_s2:.2g} to {most:.2g}" if most else ""
-                span = f"{least:.2g} to {greatest:.2g} rad/s2{engines}"
-                said.append(f"{_AXIS_TITLES[axis]} authority {100 * share:.0f} % ({span})")
+    for axis, of in vars(authority).items():
+        if of.least_rad_s2 is None:
+            continue
+        left, most = of.greatest_rad_s2 - of.least_rad_s2, of.engines_greatest_rad_s2
+        share = left / (of.healthy_greatest_rad_s2 - of.healthy_least_rad_s2)
+        if share < MAX_SHOWN_AUTHORITY_SHARE or most:
+            engines = f", engines {of.engines_least_rad_s2:.2g} to {most:.2g}" if most else ""
+            span = f"{of.least_rad_s2:.2g} to {of.greatest_rad_s2:.2g} rad/s2{engines}"
+            said.append(f"{_AXIS_TITLES[axis]} authority {100 * share:.0f} % ({span})")
     return "; ".join(said)
 
 
 def _envelope_text(metrics: Metrics) -> str:
-    exits = metrics.envelope_exits
-    if not exits:
+    if not metrics.envelope_exits:
         return ""
-    count, total = _count_and_noun(metrics.envelope.exits, "time"), _seconds_text(metrics.envelope.outside_s)
-    return f"left {count}, {total} in all, first at {_seconds_text(exits[0].start_s)}"
-
-
-def _departure_text(metrics: Metrics) -> str:
-    departure = metrics.departure
-    return f"LOST at {_seconds_text(departure.time_s)}: {departure.signal}" if departure else ""
+    times, first = _count_and_noun(metrics.envelope.exits, "time"), metrics.envelope_exits[0].start_s
+    form = "left {times}, {outside_s} in all, first at {first}"
+    return _filled(form, metrics.envelope, times=times, first=_seconds_text(first))
 
 
 # The counts of a link that are printed where they are not 0.
@@ -502,26 +485,12 @@ _LINK_COUNT_WORDS = {
 }  # fmt: skip
 
 
-def _link_text(metrics: Metrics) -> str:
-    """Latency and losses of the link to an autopilot; nothing where a law of ours flew."""
-    link = metrics.link
-    if not link:
-        return ""
-    latency, interval = link.latency_ms, link.interval_ms
+def _link_text(link: Link) -> str:
+    """Latency and losses of the link to an autopilot."""
     odd = "".join(
         f", {getattr(link, name)} {words}" for name, words in _LINK_COUNT_WORDS.items() if getattr(link, name)
     )
-    times = (
-        f"latency {latency.median:.2f} ms (99th percentile {latency.p99:.2f}), interval "
-        f"{interval.mean:.2f} ms, jitter {interval.jitter_rms:.2f} ms RMS"
-    )
-    return f"{link.protocol}, {link.frames} frames at {link.packets_hz:g} Hz{odd}; {times}"
-
-
-def _saturation_text(metrics: Metrics) -> str:
-    return ", ".join(
-        f"{surface} {_seconds_text(time)}" for surface, time in metrics.saturation_s.items() if time
-    )
+    return _filled(_LINK_FORM, link, odd=odd)
 
 
 def _seconds_text(seconds: float | None) -> str:

@@ -30,7 +30,6 @@ ATTAINABLE_AIRSPEED_COLUMN = "airspeed_limited_mps"  # the commanded airspeed, a
 BEAVER_POWER_COLUMN = "manifold_pressure_inhg"
 MAX_CURVE_POINTS = 4000  # of a curve
 WHOLE_FLIGHT_S = (-math.inf, math.inf)
-ValuesOfColumns = dict[str, np.ndarray]
 RATIO_ENDING = "_ratio"  # ends the name of a derived column: |residual| / threshold
 UNLIKE_ENDING = "_unlike_rad"  # and of a position where it is not what the aerodynamics see, else no number
 MIN_UNLIKE_RAD = math.radians(0.05)
@@ -80,9 +79,9 @@ class Panel:
     bars_during_column: str = ""  # as long as this column is 1
 
     @property
-    def rows(self) -> tuple[str, ...]:
-        """The rows of a panel of bars."""
-        return tuple(dict.fromkeys(trace.label for trace in self.traces)) if self.bars else ()
+    def steps(self) -> tuple[str, ...]:
+        """The names along the axis: of a discrete quantity's values, or of the rows of a panel of bars."""
+        return tuple(dict.fromkeys(trace.label for trace in self.traces)) if self.bars else self.value_names
 
     @property
     def unit(self) -> str:
@@ -146,12 +145,12 @@ def views(columns: Sequence[str], power: bool = False, within_mps: float | None 
     """Every view that a log with these columns allows; power: the law has used the engine; within_mps: of the
     commanded airspeed, as the scenario expects its mean."""
     known, moved, engine = set(columns), surfaces(columns), power_column(columns)
+    isolating = estimators(columns)
     named = (
-        _tracking_view(), _profile_view(ATTAINABLE_AIRSPEED_COLUMN in known, engine, within_mps),
-        _surfaces_view(moved), _detection_view(), _sensor_monitor_view(), _likelihood_view(columns),
-        _candidates_view(moved, estimators(columns)), _isolation_view(estimators(columns)),
-        _ratio_view(estimators(columns)),
-        _effectiveness_view(moved), _supervisor_view(), *((_engine_view(),) if power else ()), _states_view(),
+        _TRACKING, _profile_view(ATTAINABLE_AIRSPEED_COLUMN in known, engine, within_mps),
+        _surfaces_view(moved), _DETECTION, _SENSOR_MONITOR, _likelihood_view(columns),
+        _candidates_view(moved, isolating), _isolation_view(isolating), _ratio_view(isolating),
+        _effectiveness_view(moved), _SUPERVISOR, *((_ENGINE,) if power else ()), _STATES,
     )  # fmt: skip
     return tuple(view for view in named if view.panels and known.issuperset(source_columns(view.columns)))
 
@@ -191,8 +190,10 @@ def _ratio_panel(label: str, *traces: tuple[str, str, str]) -> Panel:
     return _panel(label, *traces, log_scale=True, line_at=1.0)
 
 
-def _tracking_view() -> View:
-    panels = tuple(
+_TRACKING = View(
+    "tracking",
+    "Tracking: body rates against their reference",
+    tuple(
         _panel(
             AXIS_NAMES[axis],
             (f"{axis}_reference_rad_s", "reference", "command"),
@@ -200,8 +201,8 @@ def _tracking_view() -> View:
             (f"{axis}_rad_s", "aircraft", "actual"),
         )
         for axis in AXES
-    )
-    return View("tracking", "Tracking: body rates against their reference", panels)
+    ),
+)
 
 
 def _profile_view(limited: bool, power: str, within_mps: float | None) -> View:
@@ -295,18 +296,24 @@ def isolation_panel(name: str, axis: str, label: str, threshold: str = "± thres
     return _panel(label, *bounds, residual, shade_column=shade, shade_label="excluded")
 
 
-def _detection_view() -> View:
-    ratios = [(f"{axis}_alarm{RATIO_ENDING}", axis, axis) for axis in AXES]
-    alarm = _ratio_panel("alarm test: |residual| / threshold", *ratios)
-    panels = (detection_panel(axis, f"{AXIS_NAMES[axis]}: detection residual") for axis in AXES)
-    title = "Detection: the test that raises the alarm (above 1), and the detection estimator"
-    return View("detection", title, (alarm, *panels), closeup=True)
-
-
-def _sensor_monitor_view() -> View:
-    label = "largest residual between sensors / bound"
-    title = "Sensor monitor: largest residual between sensors over its bound; above 1 one of them is faulty"
-    return View("watch", title, (_ratio_panel(label, ("watch_share", "largest", "actual")),), closeup=True)
+_DETECTION = View(
+    "detection",
+    "Detection: the test that raises the alarm (above 1), and the detection estimator",
+    (
+        _ratio_panel(
+            "alarm test: |residual| / threshold",
+            *((f"{axis}_alarm{RATIO_ENDING}", axis, axis) for axis in AXES),
+        ),
+        *(detection_panel(axis, f"{AXIS_NAMES[axis]}: detection residual") for axis in AXES),
+    ),
+    closeup=True,
+)
+_SENSOR_MONITOR = View(
+    "watch",
+    "Sensor monitor: largest residual between sensors over its bound; above 1 one of them is faulty",
+    (_ratio_panel("largest residual between sensors / bound", ("watch_share", "largest", "actual")),),
+    closeup=True,
+)
 
 
 def _likelihood_view(columns: Sequence[str]) -> View:
@@ -396,31 +403,15 @@ def _effectiveness_view(names: Sequence[str]) -> View:
     return View("effectiveness", title, panels, n_panel_columns=1 if len(panels) <= 2 else 2)
 
 
-def _supervisor_view() -> View:
-    panels = (
+_SUPERVISOR = View(
+    "supervisor",
+    "Supervisor: mode, alarm, envelope",
+    (
         _panel("mode", ("mode", "mode", "actual"), value_names=MODES),
         _panel("alarm", ("detected", "alarm", "actual"), value_names=("quiet", "alarm")),
         _panel("envelope", ("envelope_valid", "envelope", "actual"), value_names=("outside", "inside")),
-    )
-    return View("supervisor", "Supervisor: mode, alarm, envelope", panels)
-
-
-def _engine_view() -> View:
-    panels = _panels_of_columns(
-        ("manifold_pressure_inhg", "manifold pressure"), ("dpt", "slipstream dpt"),
-        ("airspeed_mps", "airspeed"), ("theta_rad", "pitch θ"),
-    )  # fmt: skip
-    return View("engine", "Engine power on pitch, when elevator and flap are lost", panels)
-
-
-def _states_view() -> View:
-    panels = _panels_of_columns(
-        ("airspeed_mps", "airspeed"), ("alpha_rad", "angle of attack"), ("beta_rad", "sideslip"),
-        ("p_rad_s", "roll rate p"), ("q_rad_s", "pitch rate q"), ("r_rad_s", "yaw rate r"),
-        ("phi_rad", "bank φ"), ("theta_rad", "pitch θ"), ("psi_rad", "heading ψ"),
-        ("north_m", "north"), ("east_m", "east"), ("altitude_m", "altitude"),
-    )  # fmt: skip
-    return View("states", "The twelve states", panels, n_panel_columns=3)
+    ),
+)
 
 
 def _panels_of_columns(*named: tuple[str, str]) -> tuple[Panel, ...]:
@@ -428,12 +419,33 @@ def _panels_of_columns(*named: tuple[str, str]) -> tuple[Panel, ...]:
     return tuple(_panel(label, (column, label, "actual")) for column, label in named)
 
 
+_ENGINE = View(
+    "engine",
+    "Engine power on pitch, when elevator and flap are lost",
+    _panels_of_columns(
+        ("manifold_pressure_inhg", "manifold pressure"), ("dpt", "slipstream dpt"),
+        ("airspeed_mps", "airspeed"), ("theta_rad", "pitch θ"),
+    ),
+)  # fmt: skip
+_STATES = View(
+    "states",
+    "The twelve states",
+    _panels_of_columns(
+        ("airspeed_mps", "airspeed"), ("alpha_rad", "angle of attack"), ("beta_rad", "sideslip"),
+        ("p_rad_s", "roll rate p"), ("q_rad_s", "pitch rate q"), ("r_rad_s", "yaw rate r"),
+        ("phi_rad", "bank φ"), ("theta_rad", "pitch θ"), ("psi_rad", "heading ψ"),
+        ("north_m", "north"), ("east_m", "east"), ("altitude_m", "altitude"),
+    ),
+    n_panel_columns=3,
+)  # fmt: skip
+
+
 def series_of(
     source: log.Log,
     columns: Sequence[str],
     window_s: tuple[float, float] = WHOLE_FLIGHT_S,
     max_points: int = MAX_CURVE_POINTS,
-) -> ValuesOfColumns:
+) -> log.Values:
     """`t_s` and the named columns within a window of time, each of shape (points,), about max_points at most.
 
     A longer log is cut into stretches of equal length; each gives two points at its first two instants, the
@@ -444,16 +456,17 @@ def series_of(
     stretch = 1 if rows <= max_points else math.ceil(2 * rows / max_points)
     whole = _unwrap_heading(source.read_chunks(source_columns(wanted)))
     whole = _add_mean_airspeed(whole, source.frame_s) if MEAN_AIRSPEED_COLUMN in wanted else whole
-    chunks = (_with_derived_columns(_rows_in_window(chunk, window_s), wanted) for chunk in whole)
-    parts = [
-        chunk if stretch == 1 else _extremes_by_stretch(chunk, stretch)
-        for chunk in chunks
-        if chunk["t_s"].size
-    ]
+    parts = []
+    for chunk in whole:
+        first, last = np.searchsorted(chunk["t_s"], window_s, side="left")
+        if first < last:
+            here = {name: values[first:last] for name, values in chunk.items()}
+            shown = {name: here[name] if name in here else _derived_column(here, name) for name in wanted}
+            parts.append(shown if stretch == 1 else _extremes_by_stretch(shown, stretch))
     return {name: np.concatenate([part[name] for part in parts] or [np.empty(0)]) for name in wanted}
 
 
-def _unwrap_heading(chunks: Iterable[ValuesOfColumns]) -> Iterator[ValuesOfColumns]:
+def _unwrap_heading(chunks: Iterable[log.Values]) -> Iterator[log.Values]:
     """Heading without its jumps of a whole turn."""
     last = np.empty(0)
     for chunk in chunks:
@@ -463,7 +476,7 @@ def _unwrap_heading(chunks: Iterable[ValuesOfColumns]) -> Iterator[ValuesOfColum
         yield chunk
 
 
-def _add_mean_airspeed(chunks: Iterable[ValuesOfColumns], frame_s: float) -> Iterator[ValuesOfColumns]:
+def _add_mean_airspeed(chunks: Iterable[log.Values], frame_s: float) -> Iterator[log.Values]:
     """The mean as the autopilot judges it: deviations from the command through a lag of MEAN_S."""
     share = frame_s / MEAN_S if math.isfinite(frame_s) else 1.0
     last = 0.0
@@ -474,32 +487,18 @@ def _add_mean_airspeed(chunks: Iterable[ValuesOfColumns], frame_s: float) -> Ite
         yield chunk | {MEAN_AIRSPEED_COLUMN: chunk[COMMANDED_AIRSPEED_COLUMN] + means}
 
 
-def _with_derived_columns(chunk: ValuesOfColumns, wanted: Sequence[str]) -> ValuesOfColumns:
-    return {name: chunk[name] if name in chunk else _derived_column(chunk, name) for name in wanted}
-
-
-def _derived_column(chunk: ValuesOfColumns, name: str) -> np.ndarray:
-    if not name.endswith(UNLIKE_ENDING):
-        return _residual_over_threshold(chunk, source_columns([name]))
-    position, effective = (chunk[source] for source in source_columns([name]))
-    return np.where(np.abs(position - effective) > MIN_UNLIKE_RAD, position, np.nan)
-
-
-def _residual_over_threshold(chunk: ValuesOfColumns, names: Sequence[str]) -> np.ndarray:
-    """|residual| / threshold, the threshold on the residual's side; NaN where there is no threshold."""
-    residual, *bounds = (chunk[name] for name in names)
-    bound = bounds[0] if len(bounds) == 1 else np.where(residual < 0, bounds[0], bounds[1])
+def _derived_column(chunk: log.Values, name: str) -> np.ndarray:
+    """A position where it is unlike what the aerodynamics see; or |residual| / threshold, the threshold on
+    the residual's side. NaN elsewhere, and where there is no threshold."""
+    values, *others = (chunk[source] for source in _source_columns_of(name))
+    if name.endswith(UNLIKE_ENDING):
+        return np.where(np.abs(values - others[0]) > MIN_UNLIKE_RAD, values, np.nan)
     with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = np.abs(residual / bound)
+        ratio = np.abs(values / np.where(values < 0, others[0], others[-1]))
     return np.where(np.isfinite(ratio), ratio, np.nan)
 
 
-def _rows_in_window(chunk: ValuesOfColumns, window_s: tuple[float, float]) -> ValuesOfColumns:
-    first, last = np.searchsorted(chunk["t_s"], window_s, side="left")
-    return {name: values[first:last] for name, values in chunk.items()}
-
-
-def _extremes_by_stretch(chunk: ValuesOfColumns, stretch: int) -> ValuesOfColumns:
+def _extremes_by_stretch(chunk: log.Values, stretch: int) -> log.Values:
     starts = np.arange(0, chunk["t_s"].size, stretch)
     middles = np.minimum(starts + stretch // 2, chunk["t_s"].size - 1)
     out = {name: _lowest_and_highest(values, starts) for name, values in chunk.items() if name != "t_s"}

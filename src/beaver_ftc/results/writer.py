@@ -11,6 +11,7 @@ import errno
 import os
 import shutil
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from itertools import takewhile
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
@@ -72,6 +73,7 @@ def run(
     or kept, NotAllWritten where the log is kept but another file could not be written.
     """
     from beaver_ftc.loop.loop import fly
+    from beaver_ftc.results.exports import write_acmi, write_csv, write_recording
 
     certificate = required("certificate", "certified")(scenario) if certified else None
     watch = certificate.watch if certificate else None
@@ -92,26 +94,19 @@ def run(
             with _note_failure_and_go_on(folder, "report.html", failed):
                 write_report_files(folder, document, painters=painters, formats=figures)
         if "csv" in exports:
-            from beaver_ftc.results.exports import write_csv
-
             with _note_failure_and_go_on(folder, "log.csv", failed):
                 write_csv(log_path, folder / "log.csv")
         if "acmi" in exports and document:
-            from beaver_ftc.results.exports import write_acmi
-
             with _note_failure_and_go_on(folder, "flight.acmi", failed):
                 write_acmi(log_path, Metrics.of(document), folder / "flight.acmi", aircraft)
         if recording is not None:
-            from beaver_ftc.results.exports import write_recording
-
             stops_rad = {s: max(abs(to.min_rad), abs(to.max_rad)) for s, to in aircraft.travel.items()}
             with _note_failure_and_go_on(folder, f"the recording ({recording})", failed):
                 write_recording(log_path, stops_rad, recording, folder, tuple(aircraft.signals))
     if failed:
         why = "; ".join(" ".join(str(error).split()) for error in failed)
-        raise NotAllWritten(f"{out / scenario.name}: the flight and its log are kept, but {why}") from failed[
-            0
-        ]
+        kept = f"{out / scenario.name}: the flight and its log are kept"
+        raise NotAllWritten(f"{kept}, but {why}") from failed[0]
     return document
 
 
@@ -254,12 +249,10 @@ def _foreign_files_in(folder: Path, files: Iterable[str]) -> list[str]:
         from beaver_ftc.commands import files_of_commands
 
         unknown -= {*files_of_commands()}
-    foreign = [*unknown]
-    pictures = (folder / "figures").rglob("*")
-    foreign += [str(path.relative_to(folder)) for path in pictures if not _is_our_picture(path)]
+    foreign = [path for path in (folder / "figures").rglob("*") if not _is_our_picture(path)]
     copied = (path for path in (folder / AIRCRAFT).rglob("*") if not path.is_dir())
-    foreign += [str(path.relative_to(folder)) for path in copied if path.suffix not in MODEL_FILES]
-    return sorted(foreign)
+    foreign += [path for path in copied if path.suffix not in MODEL_FILES]
+    return sorted([*unknown, *(str(path.relative_to(folder)) for path in foreign)])
 
 
 def _is_our_picture(path: Path) -> bool:
@@ -292,11 +285,7 @@ def _partial_folder_prefix(name: str) -> str:
 
 def _make_parents(folder: Path) -> list[Path]:
     """Create `folder` with its parents; return those that were missing, deepest first."""
-    missing = []
-    for candidate in (folder, *folder.parents):
-        if candidate.exists():
-            break
-        missing.append(candidate)
+    missing = list(takewhile(lambda one: not one.exists(), (folder, *folder.parents)))
     folder.mkdir(parents=True, exist_ok=True)
     return missing
 

@@ -30,8 +30,9 @@ from beaver_ftc_assurance.certificates.history import (
     log_rows_of,
 )
 from beaver_ftc_assurance.certificates.inequality import (
+    ANY,
+    CONSTANT,
     Hypothesis,
-    Inequality,
     Term,
     axis_directions,
     constant_theta_tests,
@@ -82,10 +83,9 @@ def certificate(
     tape = recorder.tape(known, n) if recorder else tape_of_flight_again(scenario, known, n)
     flight = _Flight(scenario, rows, tape, history_of(scenario, rows, tape))
     for said in flight.statements(events):
-        if "sides" in said or "as" in said:
-            document["statements"].append(said)
-        else:  # no number stands there, since nothing could prove it
-            document["without"].append({name: said[name] for name in ("what", "column", "because")})
+        if "because" in said:  # no number stands there, since nothing could prove it
+            del said["frame"]
+        document["without" if "because" in said else "statements"].append(said)
     if document["statements"]:
         document |= flight.declared_fields(document["statements"])
     columns = flight.evidence_columns(document["statements"])
@@ -94,12 +94,10 @@ def certificate(
 
 def logged_columns(log: Log) -> Columns:
     """The columns of a log that certificates take, (rows,)."""
-    columns = [
+    return log.read([
         name for name in log.columns
         if name in _LOGGED_COLUMNS or _EVENT_COLUMN.fullmatch(name) or name.endswith(_SHARE_SUFFIX)
-    ]  # fmt: skip
-    chunks = list(log.read_chunks(columns))
-    return {name: np.concatenate([chunk[name] for chunk in chunks]) for name in columns}
+    ])  # fmt: skip
 
 
 def event_rows(rows: Columns) -> dict[str, int]:
@@ -184,31 +182,21 @@ class Certified:
 
 @dataclass(frozen=True)
 class PartialColumn:
-    """A column of which a part is known: `values` from row `first` on, and what stands before and after."""
+    """A column of which a part is known: `values` from row `first` on. Before them stands their first, after
+    them their last."""
 
     first: int
     values: np.ndarray
-    before: float = np.nan
-    after: float = np.nan
 
     def rows(self, first: int, n: int) -> np.ndarray:
         """The rows from `first` on, (n,)."""
-        places = np.arange(first, first + n) - self.first
-        found = np.where(places < 0, self.before, self.after)
-        inside = (places >= 0) & (places < len(self.values))
-        found[inside] = self.values[places[inside]]
-        return found
+        return self.values[np.clip(np.arange(first, first + n) - self.first, 0, len(self.values) - 1)]
 
 
 def history_of(scenario: Scenario, rows: Columns, tape: Tape) -> History:
     """What the log says of rates, model and bound, and what was declared."""
     x, F, eta_bar = (np.column_stack([rows[f"{axis}_{of}"] for axis in AXES]) for of in MEASURED_MODEL_BOUND)
     return History(1.0 / scenario.rate_hz, scenario.substeps, x, F, eta_bar, declared_errors_of(tape.alarm))
-
-
-def _said(found: Inequality | None, because: str) -> Document:
-    """The evidence, or why there is none."""
-    return {"because": because} if found is None else found.fields
 
 
 @dataclass(frozen=True)
@@ -237,9 +225,7 @@ class _Flight:
             k = events[column]
             said: Document = {"because": TOO_LATE}
             if k < tape.end:
-                said = _said(self._exclusion(e, alarm, k), chance.EXCLUSION_NOT_STATED)
-                if "because" in said and chance.alarm_excludes(tape, e, of_alarm):
-                    said = {"as": "alarm"}
+                said = self._exclusion(e, alarm, k) or chance.exclusion_by_alarm(tape, e, of_alarm)
             yield {"what": name, "column": column, "frame": k} | said
         if self.scenario.fdi.fault_class == "all":
             yield from self._types(max(alarm, 1))  # the first row has no innovation
@@ -249,7 +235,7 @@ class _Flight:
         monitor = self.tape.alarm.diagnosis.sensor_monitor
         found = self._filter_alarm(k) if is_ours else None
         if found is not None:
-            return found.fields
+            return found
         if monitor.has_raised_alarm:
             return instruments_say.alarm_evidence(monitor, self.rows, k)
         if not is_ours:
@@ -259,23 +245,21 @@ class _Flight:
         )
         return by_chance or {"because": chance.ALARM_NOT_STATED}
 
-    def _filter_alarm(self, k: int) -> Inequality | None:
+    def _filter_alarm(self, k: int) -> Document | None:
         """A filter that left its bound at frame k."""
         tape, every = self.tape, (0, 1, 2)
         if k <= tape.since:
             return None
         filtered = (filters(pole, tape.since, k, every) for pole in self._detection_poles)
         health = no_fault(tape.first, tape.end - tape.first)
-        return first_violated(
-            chain(filters(inf, k - 1, k, every), *filtered), health, self.history, tape.first
-        )
+        return first_violated(chain(filters(inf, k - 1, k, every), *filtered), health, self.history)
 
     @property
     def _detection_poles(self) -> list[float]:
         """Poles of the detection filters, 1/s (docs/explanation/detection.md, "A bank of poles")."""
         return list(filter_poles(self.scenario.fdi, Declared.of(self.scenario)))
 
-    def _exclusion(self, e: int, alarm: int, k: int) -> Inequality | None:
+    def _exclusion(self, e: int, alarm: int, k: int) -> Document | None:
         """The test that the fault of estimator e failed at frame k."""
         tape, config, history = self.tape, self.scenario.fdi, self.history
         estimator = tape.alarm.diagnosis.estimators[e]
@@ -287,16 +271,16 @@ class _Flight:
         )  # fmt: skip
         since_alarm = [*filters(config.isolation_pole_per_s, alarm, k, of.axes)] if k > alarm else []
         memory = self._filter_tests(e, estimator.parity_direction, of.axes, k)
-        found = first_violated(chain(single_frame_tests(k, of), memory, since_alarm), of, history, tape.first)
+        found = first_violated(chain(single_frame_tests(k, of), memory, since_alarm), of, history)
         if found is not None:
             return found
-        lasting = replace(of, theta_is_constant=True)
+        lasting = replace(of, theta=CONSTANT)
         candidates: list[list[Term]] = []
         if estimator.hypothesis_kind == LOSS and config.fault_profile == "abrupt":
             candidates = [constant_theta_tests(lasting, history, np.arange(alarm, k + 1))]
         elif config.thresholds == "published":
             candidates = since_alarm
-        return first_violated(candidates, lasting, history, tape.first)
+        return first_violated(candidates, lasting, history)
 
     def _filter_tests(
         self, e: int, across: np.ndarray, axes: tuple[int, ...], k: int
@@ -320,34 +304,29 @@ class _Flight:
             surface = self.scenario.airframe.surfaces[s]
             row = self.tape.first + row_set_to_end(self.tape.types[:, s, kind])
             because = kinds.reason_not_certified(tape, kind) if any_block else kinds.EXCLUDED_BY_MANY_FRAMES
-            said = {"because": because} if because else self._type(tape, history, s, kind, alarm, k)
+            found = None if because else self._type(tape, history, s, kind, alarm, k)
             yield {
                 "what": kinds.exclusion_name(surface, kind),
                 "column": kinds.exclusion_column(surface, kind), "frame": row,
-            } | said  # fmt: skip
+            } | (found or {"because": because or kinds.EXCLUDED_BY_MANY_FRAMES})  # fmt: skip
 
-    def _type(self, tape: Tape, history: History, s: int, kind: int, alarm: int, k: int) -> Document:
+    def _type(self, tape: Tape, history: History, s: int, kind: int, alarm: int, k: int) -> Document | None:
         """Evidence against a type on surface s at frame k; tape and history: perhaps by blocks."""
         if TYPES[kind].frames_test:
-            said = courses.evidence(self.scenario, tape, history, s, kind, alarm)
-            return said or {"because": kinds.EXCLUDED_BY_MANY_FRAMES}
+            return courses.evidence(self.scenario, tape, history, s, kind, alarm)
         of = kinds.hypothesis_of_type(tape, s, kind)
-        if history.length == 1 or of.theta_is_constant:
-            candidates = kinds.candidate_inequalities(of, history, alarm, k)
-            found = first_violated(candidates, of, history, tape.first)
-        else:
-            found = self._sum_of_block(kinds.hypothesis_of_type(self.tape, s, kind), history, k)
-        return _said(found, kinds.EXCLUDED_BY_MANY_FRAMES)
+        if history.length == 1 or of.theta != ANY:
+            return first_violated(kinds.candidate_inequalities(of, history, alarm, k), of, history)
+        return self._sum_of_block(kinds.hypothesis_of_type(self.tape, s, kind), history, k)
 
-    def _sum_of_block(self, of: Hypothesis, blocks: History, k: int) -> Inequality | None:
+    def _sum_of_block(self, of: Hypothesis, blocks: History, k: int) -> Document | None:
         """Block k, or the one before, by frames, in which theta may differ. A block is left out if it begins
         before the effects of a fault are kept."""
-        L, first = blocks.length, self.tape.first
-        ends = [blocks.begin + block * L - 1 for block in (k, k + 1)]
-        candidates = [
-            [*filters(ADDING_POLE_PER_S, end - L, end, of.axes)] for end in ends if end - L >= first
-        ]
-        return first_violated(chain(*candidates), of, self.history, first)
+        L = blocks.length
+        starts = [blocks.begin + block * L - 1 for block in (k - 1, k)]
+        kept = (start for start in starts if start >= of.first_frame)
+        candidates = (filters(ADDING_POLE_PER_S, start, start + L, of.axes) for start in kept)
+        return first_violated(chain.from_iterable(candidates), of, self.history)
 
     def declared_fields(self, said: list[Document]) -> Document:
         """What all these statements go by."""
@@ -377,8 +356,9 @@ class _Flight:
             if name not in wanted:
                 continue
             for quantity, unit in (("offset", "_rad_s2"), ("slope", ""), ("spread", "_rad_s2")):
-                for axis, values in zip(AXES, getattr(tape, quantity)[:, e].T, strict=True):
-                    found[f"fie_{name}_{axis}_{quantity}{unit}"] = PartialColumn(tape.first, values)
+                known = np.pad(getattr(tape, quantity)[:, e], ((1, 1), (0, 0)), constant_values=np.nan)
+                for axis, values in zip(AXES, known.T, strict=True):
+                    found[f"fie_{name}_{axis}_{quantity}{unit}"] = PartialColumn(tape.first - 1, values)
             estimator = tape.alarm.diagnosis.estimators[e]
             found |= _constants({
                 f"fie_{name}_theta_low": estimator.theta_min, f"fie_{name}_theta_high": estimator.theta_max,
@@ -388,8 +368,8 @@ class _Flight:
             found |= _constants({f"{surface}_travel_low_rad": low, f"{surface}_travel_high_rad": high})
         for s, kind, _ in kinds.excluded_types(tape):
             if surfaces[s] in of_types:
-                flags = (tape.types[:, s, kind] > 0).astype(float)
-                column = PartialColumn(tape.first, flags, 0.0, flags[-1])
+                flags = np.append(0.0, tape.types[:, s, kind] > 0)
+                column = PartialColumn(tape.first - 1, flags)
                 found[kinds.exclusion_column(surfaces[s], kind)] = column
                 found |= _constants(kinds.type_definition_columns(tape, surfaces[s], s, kind))
         return found
@@ -406,4 +386,4 @@ def _is_unexplained(history: History, one: Document, span: Document) -> bool:
 
 def _constants(values: dict[str, float]) -> EvidenceColumns:
     """Columns with the same value in every row."""
-    return {name: PartialColumn(0, np.empty(0), value, value) for name, value in values.items()}
+    return {name: PartialColumn(0, np.array([value])) for name, value in values.items()}

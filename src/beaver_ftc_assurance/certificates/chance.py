@@ -67,13 +67,15 @@ def alarm_evidence(
     return {"likelihood": column, **ratio.fields, "sides": [[value, logged], [limit, value / limit]]}
 
 
-def alarm_excludes(tape: Tape, e: int, alarm: Document) -> bool:
-    """Whether chance raised the alarm where the fault of estimator e moves nothing: then it is excluded."""
-    if "likelihood" not in alarm:
-        return False
-    here = slice(alarm["first"] - 1 - tape.first, alarm["frame"] + 1 - tape.first)
-    moved = [values[here, e][:, alarm["axes"]].any() for values in (tape.slope, tape.offset, tape.spread)]
-    return not any(moved)
+def exclusion_by_alarm(tape: Tape, e: int, alarm: Document) -> Document:
+    """The evidence that chance raised the alarm where the fault of estimator e moves nothing; why there is
+    none where it does."""
+    if "likelihood" in alarm:
+        here = slice(alarm["first"] - 1 - tape.first, alarm["frame"] + 1 - tape.first)
+        moved = (values[here, e][:, alarm["axes"]] for values in (tape.slope, tape.offset, tape.spread))
+        if not any(values.any() for values in moved):
+            return {"as": "alarm"}
+    return {"because": EXCLUSION_NOT_STATED}
 
 
 def likelihood_shares(diagnosis: DiagnosisReadout, surfaces: Sequence[str]) -> dict[str, float]:
@@ -132,15 +134,12 @@ class LikelihoodRatio:
             "frames": [dict(zip(self.series, row, strict=True)) for row in rows],
         }  # fmt: skip
 
-    def without(self, name: str) -> "LikelihoodRatio":
-        """The same without one of the filter's inputs."""
-        return replace(self, series={key: of for key, of in self.series.items() if key != name})
-
     def without_negligible(self) -> "LikelihoodRatio":
         """The same without what decides nothing: what the filter has forgotten, bounds that add nothing."""
         said = self
         for name in ("bounded", "pace", "foreseen"):
-            said = said.without(name) if said._is_as(said.without(name)) else said
+            without = replace(said, series={key: of for key, of in said.series.items() if key != name})
+            said = without if said._is_as(without) else said
         alone = np.diag(self.tolerance)
         matters = [
             j for j, one in enumerate(alone) if not self._is_as(replace(self, tolerance=self.tolerance - one))
@@ -189,15 +188,11 @@ class LikelihoodRatio:
         states = np.zeros((len(inputs), 4))
         states[:, :n], states[:, 2 : 2 + n] = self.Y[:n].T, -self.Y[n:].T
         sums, room = np.zeros(len(inputs)), np.zeros(5)
-        drift = np.pad(its["drift"], ((0, 0), (0, 2 - n), (0, 2 - n)))
-        of_axes = np.stack(inputs, axis=1), its["jitter"] / (self.dt * self.dt)
+        of_axes = np.stack(inputs, axis=1), its["drift"], its["jitter"] / (self.dt * self.dt)
         bounds = its.get("bounded", none), its.get("foreseen", none)
-        columns, jitter, bounded, foreseen = map(_on_two_axes, (*of_axes, *bounds))
-        keep, pace = its.get("keep", np.ones(count)), its.get("pace", np.full(count, NO_PACE))
-        block = new_filter_block(self.P, self.R)
-        add_whitened_frames(
-            block, columns, drift, jitter, bounded, foreseen, keep, pace, states, sums, room, self.dt
-        )
+        shares = its.get("keep", np.ones(count)), its.get("pace", np.full(count, NO_PACE))
+        given = map(np.ascontiguousarray, (*of_axes, *bounds, *shares))
+        add_whitened_frames(new_filter_block(self.P, self.R), *given, states, sums, room, self.dt)
         swings, changes, last, stays, calm = room.tolist()
         return sums, calm, min(stays + swings + last, stays + changes)
 
@@ -213,11 +208,6 @@ class LikelihoodRatio:
 
 def _null_for_zero(values: np.ndarray) -> list[float | None]:
     return [value or None for value in values.tolist()]
-
-
-def _on_two_axes(values: np.ndarray) -> np.ndarray:
-    """Values (..., n) with a second axis of zeros where there is one."""
-    return np.pad(values, [(0, 0)] * (values.ndim - 1) + [(0, 2 - values.shape[-1])])
 
 
 def _likelihood_ratio(
@@ -283,19 +273,18 @@ def add_whitened_frames(blocks, inputs, drift, jitter, bounded, foreseen, keep, 
     (columns,): g, the whitened innovation of each column, w = S^-1 g of the second, the signature. See
     `likelihood.accumulate_tests`.
 
-    inputs (frames, columns, 2); drift (frames, 2, 2); jitter, bounded, foreseen (frames, 2): of two axes, the
-    second zero where there is one. states (columns, 4): advanced in place. room (5,): what a bounded
-    uncertainty can add as it swings, at its pace, in the last frame, as it stays; and the sum of w.foreseen.
+    inputs (frames, columns, n); drift (frames, n, n); jitter, bounded, foreseen (frames, n): of n axes.
+    states (columns, 4): advanced in place. room (5,): what a bounded uncertainty can add as it swings, at its
+    pace, in the last frame, as it stays; and the sum of w.foreseen.
     """
     block, g, w = blocks[0], np.zeros((len(states), 2)), np.zeros(2)
     for k in range(len(inputs)):
         block.a = keep[k]
         for i in range(block.n):
-            block.Q_x[i] = jitter[k, i]
+            block.Q_x[i], block.eta[i] = jitter[k, i], bounded[k, i]
             for j in range(block.n):
                 block.P_dd[i, j] += drift[k, i, j]
         advance_block(block, dt)
-        block.eta[:] = bounded[k]
         response_of_block(block, dt)
         for c in range(len(states)):
             whiten_frame(block, states[c], inputs[k, c], dt, g[c])

@@ -1,13 +1,13 @@
 """Exclusions of fault types by their course: bounds of single frames on the surface's position, compared.
 
 Each frame that health does not explain bounds the surface's position from below, or above; a fault type
-forbids some pairs of such bounds. A rule takes the bounds (`SurfaceBounds`), and returns what it finds: pairs
-(greater, less), where the type requires greater <= less. docs/explanation/certificates.md, "Types that pairs
-exclude", has the pairs of each rule, in order.
+forbids some pairs of such bounds. A rule takes the bounds (`SurfaceBounds`), and returns what it can state:
+pairs (greater, less), where the type requires greater <= less. docs/explanation/certificates.md, "Types that
+pairs exclude", has the pairs of each rule, in order.
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from math import pi
 
@@ -37,7 +37,8 @@ class SurfaceBounds:
     axis_commands (n, 3): the same as each axis has it; they differ if the effectiveness changes in a frame.
     command_range (n, 2): how far below and above `command` the commands of the frame's instants reach, >= 0.
     is_unexplained (n,): health does not explain the frame. max_order (n,): largest command in effect in the
-    frame. stops (2,): low and high end of travel.
+    frame. stops (2,): low and high end of travel. held: the hypothesis by which a frame bounds the position.
+    slowest_rad_s: of an oscillation.
     """
 
     first_frame: int
@@ -50,6 +51,10 @@ class SurfaceBounds:
     is_unexplained: np.ndarray
     max_order: np.ndarray
     stops: np.ndarray
+    held: Hypothesis
+    actuator: Actuator
+    config: FaultTypesConfig
+    slowest_rad_s: float
 
     def runs_beyond(self, reference: np.ndarray) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
         """By axis: the axis; how far each frame shows the surface beyond `reference` (n,), rad; the first
@@ -59,26 +64,34 @@ class SurfaceBounds:
             beyond = self.is_unexplained & (lower > reference + MIN_POSITION_DIFFERENCE_RAD)
             yield axis, lower - reference, np.maximum.accumulate(np.where(beyond, 0, places + 1))
 
+    def statement(
+        self, lower: range, upper: int | None, pairs: list[Pair], fields: Document, axis: int | None = None
+    ) -> Document:
+        """What is stated of lower bounds, by number from first_frame on, that are compared with the upper
+        bound of a frame, None if there is none. axis: of the lower bounds, None for that of the largest;
+        fields: further ones of the statement."""
+        held = self.held
+        if upper is None:  # an oscillation: theta is the distance from the command
+            held = replace(held, offset=np.zeros_like(held.offset))
+        axis = int(self.lower[lower[0]].argmax()) if axis is None else axis
+        said = [self._bound_fields(held, lower, axis, 1)]
+        if upper is not None:
+            of_upper = int(self.upper[upper].argmin())
+            said.append(self._bound_fields(held, range(upper, upper + 1), of_upper, -1))
+        sides = [[float(value) for value in column] for column in zip(*pairs, strict=True)]
+        return {"theta": "course", **fields, "bounds": said, "sides": sides}
 
-@dataclass(frozen=True)
-class Exclusion:
-    """What a rule has found: frames whose lower bounds are compared, by number from first_frame on, and by
-    which axis, None for the one with the largest; the frame whose upper bound is compared, None if there is
-    none; the pairs; and further fields of the statement."""
-
-    lower_frames: range
-    upper_frame: int | None
-    pairs: list[Pair]
-    fields: Document = field(default_factory=dict)
-    axis: int | None = None
+    def _bound_fields(self, held: Hypothesis, frames: range, axis: int, side: int) -> Document:
+        """Fields of frames that bound the surface by an axis: from below (side 1), or above (-1)."""
+        first, last = self.first_frame + frames[0], self.first_frame + frames[-1]
+        d = np.zeros(3)
+        d[axis] = side * self.sign * np.sign(held.slope[first - held.first_frame, axis])
+        h, Z, r = held.along(d, slice(first, last + 1))
+        effect = {"h": h.tolist(), "Z": (self.sign * Z).tolist(), "r": r.tolist()}
+        return {"d": d.tolist(), "first": first, "frame": last} | effect
 
 
-Rule = Callable[[SurfaceBounds, Actuator, FaultTypesConfig, float], Exclusion | None]
-
-
-def _exclude_offset(
-    bounds: SurfaceBounds, actuator: Actuator, config: FaultTypesConfig, _: float, grows: bool = False
-) -> Exclusion | None:
+def _exclude_offset(bounds: SurfaceBounds, grows: bool = False) -> Document | None:
     """A constant offset: its lower bound by one frame exceeds its upper bound by another. One that only
     grows, and keeps its sign: a positive one is smaller in a later frame. A stop may hide an offset; it is
     nearer by the range of the command."""
@@ -100,18 +113,17 @@ def _exclude_offset(
         if grows:
             pairs = [(greater, 0.0), *pairs, (bounds.first_frame + j, bounds.first_frame + i)]
         if greater > less and not (grows and greater <= 0.0):
-            return Exclusion(range(i, i + 1), j, pairs, {"stops": [float(low_stop[i]), float(high_stop[j])]})
+            stops = [float(low_stop[i]), float(high_stop[j])]
+            return bounds.statement(range(i, i + 1), j, pairs, {"stops": stops})
         return None
     return None
 
 
-def _exclude_runaway(
-    bounds: SurfaceBounds, actuator: Actuator, config: FaultTypesConfig, _: float
-) -> Exclusion | None:
+def _exclude_runaway(bounds: SurfaceBounds) -> Document | None:
     """A runaway at its least rate or faster: a later frame shows less travel. In a frame of several instants
     the lower bound may hold from its last instant on only: a frame less counts."""
-    rate, high_stop = actuator.min_runaway_rate_rad_s, bounds.stops[1]
-    step, late_frames = rate * config.block_duration_s, int(not config.single_instant)
+    rate, high_stop = bounds.actuator.min_runaway_rate_rad_s, bounds.stops[1]
+    step, late_frames = rate * bounds.config.block_duration_s, int(not bounds.config.single_instant)
     least, most = bounds.lower.max(axis=1), bounds.upper.min(axis=1)
     # lower bound of each frame, traced back to frame 0 at the least rate
     traced_back = np.where(bounds.is_unexplained, least - step * np.arange(len(least)), -np.inf)
@@ -123,30 +135,28 @@ def _exclude_runaway(
         reached = least[i] + step * (j - i - late_frames)
         if bounds.is_unexplained[i] and reached > most[j] + MIN_POSITION_DIFFERENCE_RAD:
             frames = bounds.first_frame + j, bounds.first_frame + i
+            pairs = [(high_stop, most[j]), frames, (reached, most[j])]
             fields = {"stops": [float(high_stop)], "pace_rad_s": rate}
-            return Exclusion(range(i, i + 1), j, [(high_stop, most[j]), frames, (reached, most[j])], fields)
+            return bounds.statement(range(i, i + 1), j, pairs, fields)
     return None
 
 
-def _exclude_oscillation(
-    bounds: SurfaceBounds, actuator: Actuator, config: FaultTypesConfig, slowest_rad_s: float
-) -> Exclusion | None:
+def _exclude_oscillation(bounds: SurfaceBounds) -> Document | None:
     """An oscillation about the command: the surface is on one side of it for longer than half of the slowest
     period."""
     for axis, beyond, starts in bounds.runs_beyond(bounds.command):
-        for k in np.flatnonzero(np.arange(len(starts)) - starts > config.half_blocks)[:1].tolist():
+        for k in np.flatnonzero(np.arange(len(starts)) - starts > bounds.config.half_blocks)[:1].tolist():
             run = range(int(starts[k]), k + 1)
-            half_period_frames = pi / slowest_rad_s / config.dt_s
+            half_period_frames = pi / bounds.slowest_rad_s / bounds.config.dt_s
             pairs = [(k - run[0], half_period_frames), *_positive_pairs(beyond, run)]
-            return Exclusion(run, None, pairs, {"slowest_rad_s": slowest_rad_s}, axis)
+            return bounds.statement(run, None, pairs, {"slowest_rad_s": bounds.slowest_rad_s}, axis)
     return None
 
 
-def _exclude_rate_limit(
-    bounds: SurfaceBounds, actuator: Actuator, config: FaultTypesConfig, _: float
-) -> Exclusion | None:
+def _exclude_rate_limit(bounds: SurfaceBounds) -> Document | None:
     """A surface that approaches its order by its least step in every instant, until its lag makes the steps
     smaller: in a run of frames beyond all orders, a later one shows a position farther away."""
+    actuator, config = bounds.actuator, bounds.config
     min_approach = config.n_substeps * config.frames_per_block * actuator.slow_step_rad  # of a frame, rad
     orders, most = bounds.max_order, bounds.upper.min(axis=1)
     # upper bound of each frame, traced back to frame 0 at the least approach
@@ -160,7 +170,7 @@ def _exclude_rate_limit(
                 fields = {"ordered": orders[i : k + 1].tolist(), "near": near}
                 fields |= {"step": min_approach} if k - i > 1 else {}
                 pairs = [*_positive_pairs(beyond, run), (reached, upper), (reached, near), (1.0, 0.0)]
-                return Exclusion(run, i, pairs, fields, axis)
+                return bounds.statement(run, i, pairs, fields, axis)
     return None
 
 
@@ -171,7 +181,7 @@ def _positive_pairs(distance: np.ndarray, run: range) -> list[Pair]:
 
 
 # By the course that a type's row names.
-RULES: dict[str, Rule] = {
+RULES: dict[str, Callable[[SurfaceBounds], Document | None]] = {
     "runaway": _exclude_runaway, "offset": _exclude_offset,
     "growing offset": partial(_exclude_offset, grows=True), "swing": _exclude_oscillation,
     "approach": _exclude_rate_limit,
@@ -182,23 +192,28 @@ def evidence(
     scenario: Scenario, tape: Tape, history: History, surface: int, fault_type: int, alarm_frame: int
 ) -> Document | None:
     """What excludes a fault type on a surface by its course; None where single frames do not."""
-    held, diagnosis = hypothesis_held_anywhere(tape, surface), tape.last.diagnosis
-    actuator, row = diagnosis.surface_fault_types[surface].actuator, TYPES[fault_type]
+    held, row = hypothesis_held_anywhere(tape, surface), TYPES[fault_type]
     for sign in (row.stop_direction,) if row.stop_direction else (1, -1):
-        bounds = _surface_bounds(tape, history, held, surface, alarm_frame, sign)
-        slowest_rad_s = scenario.fdi.slowest_oscillation_rad_s
-        found = RULES[row.frames_test](bounds, actuator, diagnosis.types_config, slowest_rad_s)
+        bounds = _surface_bounds(scenario, tape, history, held, surface, alarm_frame, sign)
+        found = RULES[row.frames_test](bounds)
         if found is not None:
-            return history.statement_fields | _fields(found, bounds, held)
+            return history.statement_fields | found
     return None
 
 
 def _surface_bounds(
-    tape: Tape, history: History, held: Hypothesis, surface: int, alarm_frame: int, sign: int
+    scenario: Scenario,
+    tape: Tape,
+    history: History,
+    held: Hypothesis,
+    surface: int,
+    alarm_frame: int,
+    sign: int,
 ) -> SurfaceBounds:
     """The bounds of the frames from the alarm on that the diagnosis has tested types with. held: by which a
     frame bounds the position."""
     frames, several = np.arange(alarm_frame, tape.end - 1), not history.has_single_instants
+    diagnosis = tape.last.diagnosis
     here = slice(alarm_frame - tape.first, tape.end - 1 - tape.first)
     lower, upper, _ = theta_bounds_by_frame(held, history, frames)
     if sign < 0:
@@ -213,28 +228,7 @@ def _surface_bounds(
         alarm_frame, sign, lower, upper, command, axis_commands, command_range,
         is_unexplained=history.is_unexplained(frames),
         max_order=np.maximum(orders[:, 2], orders[:, 1 if several else 2]),
-        stops=np.sort(sign * np.array(travel_rad(tape, surface))),
+        stops=np.sort(sign * np.array(travel_rad(tape, surface))), held=held,
+        actuator=diagnosis.surface_fault_types[surface].actuator, config=diagnosis.types_config,
+        slowest_rad_s=scenario.fdi.slowest_oscillation_rad_s,
     )  # fmt: skip
-
-
-def _fields(found: Exclusion, bounds: SurfaceBounds, held: Hypothesis) -> Document:
-    """The fields of a statement of what a rule has found."""
-    i, j = found.lower_frames[0], found.upper_frame
-    axis = int(bounds.lower[i].argmax()) if found.axis is None else found.axis
-    if j is None:  # an oscillation: theta is the distance from the command
-        held = replace(held, offset=np.zeros_like(held.offset))
-    said = [_bound_fields(bounds, held, found.lower_frames, axis, 1)]
-    if j is not None:
-        said.append(_bound_fields(bounds, held, range(j, j + 1), int(bounds.upper[j].argmin()), -1))
-    sides = [[float(value) for value in column] for column in zip(*found.pairs, strict=True)]
-    return {"theta": "course", **found.fields, "bounds": said, "sides": sides}
-
-
-def _bound_fields(bounds: SurfaceBounds, held: Hypothesis, frames: range, axis: int, side: int) -> Document:
-    """Fields of frames that bound the surface by an axis: from below (side 1), or above (-1)."""
-    first, last = bounds.first_frame + frames[0], bounds.first_frame + frames[-1]
-    d = np.zeros(3)
-    d[axis] = side * bounds.sign * np.sign(held.slope[first - held.first_frame, axis])
-    h, Z, r = held.along(d, slice(first, last + 1))
-    effect = {"h": h.tolist(), "Z": (bounds.sign * Z).tolist(), "r": r.tolist()}
-    return {"d": d.tolist(), "first": first, "frame": last} | effect

@@ -4,14 +4,13 @@
 
 E[k] rad/s: the innovation through a filter of pole lam up to frame k; for an infinite pole the innovation of
 frame k alone, times dt. d (3,): a direction; c > 0: a weight. With one term the fault's parameter theta may
-take any value in its range in every frame, or the fault be absent; with `theta_is_constant` theta is one
-number for all terms. docs/explanation/certificates.md, "The inequality", derives it.
+take any value in its range in every frame, or the fault be absent; where theta is constant it is one number
+for all terms. docs/explanation/certificates.md, "The inequality", derives it.
 """
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
-from functools import cached_property
-from itertools import combinations
+from dataclasses import dataclass
+from itertools import combinations, compress
 from math import exp, inf, isinf
 from typing import NamedTuple
 
@@ -24,16 +23,18 @@ N_WRITTEN_FRAMES = 16  # of a filter; what was before them is stated as the filt
 MIN_RELATIVE_MARGIN = 1e-9  # by which the left side is larger, over the larger side: summation may do less
 MIN_EFFECT_RAD_S2 = 1e-12  # a smaller effect of a fault is rounding
 MIN_SLOPE = 1e-12  # of a sum in theta: a smaller one comes from rounding, where theta drops out of two terms
+ANY, CONSTANT, CONSTANT_WHILE_SHOWN = "any", "constant", "constant while it shows"  # theta of a statement
 MEMORY_TIME_CONSTANTS = 16.0  # of a filter: of an older innovation less than e^-16 is left
 
 
 @dataclass(frozen=True)
 class Hypothesis:
     """A fault's effect on the innovation: offset + theta slope, within +-spread, rad/s2; theta in
-    [theta_low, theta_high]. Arrays (frames, 3), from frame first_frame on.
+    [theta_low, theta_high]. Arrays (frames, 3), from frame first_frame on, before which none is kept.
 
-    theta_is_constant: theta is one number; only_where_shown: one in frames that health does not explain,
-    while elsewhere the fault may be absent. axes: those of the innovation that the hypothesis is tested on.
+    theta: `any` in each frame, one that is `constant`, or `constant while it shows`: one in frames that
+    health does not explain, while elsewhere the fault may be absent. axes: those of the innovation that the
+    hypothesis is tested on.
     """
 
     first_frame: int
@@ -42,8 +43,7 @@ class Hypothesis:
     spread: np.ndarray
     theta_low: float
     theta_high: float
-    theta_is_constant: bool = False
-    only_where_shown: bool = False
+    theta: str = ANY
     axes: tuple[int, ...] = (0, 1, 2)
 
     def along(self, direction: np.ndarray, frames: slice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -69,8 +69,7 @@ def no_fault(first_frame: int, n_frames: int) -> Hypothesis:
 class Term:
     """One filter along a direction (3,), from frame filter_start, where its residual is zero, to last_frame.
 
-    effect_before: rad/s, largest effect of the fault on the filter up to frame first_kept_frame, before which
-    the fault's effects are not kept.
+    effect_before: rad/s, largest effect of the fault on the filter before its effects are kept.
     """
 
     direction: np.ndarray
@@ -78,20 +77,17 @@ class Term:
     filter_start: int
     last_frame: int
     weight: float = 1.0
-    first_kept_frame: int = 0
     effect_before: float = 0.0
 
 
 class _Numbers(NamedTuple):
-    """Of a term: its fields; value, and limit without a constant theta, rad/s; the factor of a constant theta
-    in that limit; whether the least, and the greatest, theta decides in any frame."""
+    """Of a term: its fields; sums (3,): weighted value, and limit without a constant theta, rad/s, and the
+    factor of a constant theta in that limit; decides: whether the least, and the greatest, theta decides in
+    any frame."""
 
     fields: Document
-    value: float
-    limit: float
-    slope: float
-    least: bool
-    most: bool
+    sums: np.ndarray
+    decides: tuple[bool, bool]
 
 
 @dataclass(frozen=True)
@@ -102,46 +98,23 @@ class Inequality:
     hypothesis: Hypothesis
     history: History
 
-    @cached_property
-    def _numbers(self) -> list[_Numbers]:
-        return [self._evaluate(term) for term in self.terms]
-
-    def _sum(self, name: str) -> float:
-        return sum(
-            term.weight * getattr(one, name) for term, one in zip(self.terms, self._numbers, strict=True)
-        )
-
-    @property
-    def by_theta(self) -> float:
-        """What a constant theta adds to the limit."""
-        slope, of = self._sum("slope"), self.hypothesis
-        return max(of.theta_low * slope, of.theta_high * slope) if abs(slope) > MIN_SLOPE else 0.0
-
-    @property
-    def sides(self) -> list[float]:
-        """Both sides of the inequality."""
-        return [self._sum("value"), self._sum("limit") + self.by_theta]
-
-    @property
-    def is_violated(self) -> bool:
-        """Whether the data exceed the limit of the hypothesis by more than rounding."""
-        value, limit = self.sides
-        return value - limit > MIN_RELATIVE_MARGIN * max(abs(limit), abs(value))
-
-    @property
-    def fields(self) -> Document:
-        """Of a statement: every number that the inequality takes, and none that decides nothing."""
-        of, slope, by_theta = self.hypothesis, self._sum("slope"), self.by_theta
-        said, theta = [one.fields for one in self._numbers], "any"
-        least, most = (any(getattr(one, end) for one in self._numbers) for end in ("least", "most"))
-        if of.theta_is_constant:
-            theta = "constant while it shows" if of.only_where_shown else "constant"
-            least, most = bool(by_theta) and slope < 0.0, bool(by_theta) and slope > 0.0
+    def statement(self) -> Document | None:
+        """The fields of a statement: every number that the inequality takes, and none that decides nothing.
+        None unless the data exceed the limit of the hypothesis by more than rounding."""
+        of, numbers = self.hypothesis, [self._evaluate(term) for term in self.terms]
+        value, limit, slope = np.sum([one.sums for one in numbers], axis=0).tolist()
+        by_theta = max(of.theta_low * slope, of.theta_high * slope) if abs(slope) > MIN_SLOPE else 0.0
+        limit += by_theta
+        if not value - limit > MIN_RELATIVE_MARGIN * max(abs(limit), abs(value)):
+            return None
+        said, decides = [one.fields for one in numbers], np.any([one.decides for one in numbers], axis=0)
+        if of.theta != ANY:
+            decides = np.array([by_theta and slope < 0.0, by_theta and slope > 0.0])
             if abs(slope) > MIN_SLOPE and not by_theta:  # the end of the range that counts is zero: no effect
-                said = [{name: value for name, value in one.items() if name != "Z"} for one in said]
-        ends = {"least": of.theta_low} if least else {}
-        ends |= {"most": of.theta_high} if most else {}
-        return {**self.history.statement_fields, "theta": theta, **ends, "terms": said, "sides": self.sides}
+                said = [{name: entry for name, entry in one.items() if name != "Z"} for one in said]
+        ends = dict(compress({"least": of.theta_low, "most": of.theta_high}.items(), decides))
+        about = {**self.history.statement_fields, "theta": of.theta, **ends}
+        return {**about, "terms": said, "sides": [value, limit]}
 
     def _evaluate(self, term: Term) -> _Numbers:
         """E = sum of a^(k-j) dt nu[j].d over the frames j after filter_start, k: last_frame; and its limit:
@@ -154,20 +127,21 @@ class Inequality:
         noise = history.gyro_error_change_rad_s @ np.abs(d)
         gyro = a * weights[0] * noise[start] + (1.0 - a) * weights @ noise[start:last] + noise[last]
         limit = dt * weights @ (history.eta_bar_rad_s2[summed] @ np.abs(d)) + gyro
-        begin = min(max(start, term.first_kept_frame) + 1, first)
+        begin = min(max(start, of.first_frame) + 1, first)
         before = _filtered(a, dt, of.max_effects(d, slice(begin, first)), term.effect_before)
         rows = slice(first, last + 1)
         h, Z, r = of.along(d, rows)
         at_low, at_high = h + of.theta_low * Z, h + of.theta_high * Z
-        if of.theta_is_constant:
-            done, slope = h + r, float(dt * _filter_weights(a, len(Z)) @ Z)
-            adds = np.ones(len(h), bool)
-        else:
+        if of.theta == ANY:
             done, slope = of.max_effects(d, rows), 0.0
             adds = np.maximum(at_low, at_high) > MIN_EFFECT_RAD_S2
+        else:
+            done, slope = h + r, float(dt * _filter_weights(a, len(Z)) @ Z)
+            adds = np.ones(len(h), bool)
         limit += _filtered(a, dt, done, before)
-        least, most = bool((adds & (at_low > at_high)).any()), bool((adds & (at_high > at_low)).any())
-        return _Numbers(self._fields_of(term, rows, before, adds), value, limit, slope, least, most)
+        decides = bool((adds & (at_low > at_high)).any()), bool((adds & (at_high > at_low)).any())
+        sums = term.weight * np.array([value, limit, slope])
+        return _Numbers(self._fields_of(term, rows, before, adds), sums, decides)
 
     def _fields_of(self, term: Term, rows: slice, before: float, adds: np.ndarray) -> Document:
         """The fields of a term whose frames `rows` are written out. before: largest effect of the fault
@@ -194,10 +168,11 @@ class Inequality:
         last = term.last_frame
         if isinf(term.pole_per_s):
             return last
-        longest = last - term.filter_start if self.hypothesis.theta_is_constant else N_WRITTEN_FRAMES
+        of, start = self.hypothesis, term.filter_start
+        longest = N_WRITTEN_FRAMES if of.theta == ANY else last - start
         remembered = int(MEMORY_TIME_CONSTANTS / (term.pole_per_s * self.history.dt))
         first = last + 1 - max(min(longest, remembered), 1)
-        return max(first, term.filter_start + 1, term.first_kept_frame + 1)
+        return max(first, start + 1, of.first_frame + 1)
 
 
 def _filter_weights(decay: float, n: int) -> np.ndarray:
@@ -213,24 +188,15 @@ def _filtered(decay: float, dt: float, effects: np.ndarray, before: float) -> fl
     return float(decay * weights[0] * before + dt * weights @ effects)
 
 
-def first_violated(
-    candidates: Iterable[list[Term]], of: Hypothesis, history: History, first_kept_frame: int
-) -> Inequality | None:
-    """The first inequality that the data violate."""
-    for terms in filter(None, candidates):
-        found = Inequality([replace(term, first_kept_frame=first_kept_frame) for term in terms], of, history)
-        if found.is_violated:
-            return found
-    return None
+def first_violated(candidates: Iterable[list[Term]], of: Hypothesis, history: History) -> Document | None:
+    """The fields of the first inequality that the data violate."""
+    said = (Inequality(terms, of, history).statement() for terms in candidates if terms)
+    return next(filter(None, said), None)
 
 
 def axis_directions(axes: tuple[int, ...]) -> Iterator[np.ndarray]:
     """Both directions (3,) along each of the axes."""
-    for i in axes:
-        for sign in (1.0, -1.0):
-            direction = np.zeros(3)
-            direction[i] = sign
-            yield direction
+    return (way for d in np.eye(3)[[*axes]] for way in (d, 0.0 - d))
 
 
 def filters(pole_per_s: float, start: int, last: int, axes: tuple[int, ...]) -> Iterator[list[Term]]:

@@ -16,6 +16,8 @@ from beaver_ftc.diagnosis import DeflectionRelation
 from beaver_ftc_assurance.certificates.check_certificate import COURSES, RELATION_COLUMNS, RELATIONS
 from beaver_ftc_assurance.certificates.history import History
 from beaver_ftc_assurance.certificates.inequality import (
+    ANY,
+    CONSTANT_WHILE_SHOWN,
     Hypothesis,
     Term,
     constant_theta_tests,
@@ -111,9 +113,8 @@ def _effect_of_relation(
     offset, slope = (relation.command_gain - 1.0) * Gu, Gu if relation.theta_is_share else G
     if low == high:  # theta is known
         offset, slope, low, high = offset + low * slope, 0.0 * slope, 0.0, 0.0
-    return Hypothesis(
-        tape.first, offset, slope, spread, low, high, theta_is_constant, theta_is_constant, axes
-    )
+    theta = CONSTANT_WHILE_SHOWN if theta_is_constant else ANY
+    return Hypothesis(tape.first, offset, slope, spread, low, high, theta, axes)
 
 
 def candidate_inequalities(
@@ -121,7 +122,7 @@ def candidate_inequalities(
 ) -> Iterator[list[Term]]:
     """Inequalities that may exclude a hypothesis by frames up to last_frame. None takes a frame before the
     hypothesis's first, of which no effect is known."""
-    if not hypothesis.theta_is_constant:
+    if hypothesis.theta == ANY:
         for frame in range(max(last_frame - 1, hypothesis.first_frame), last_frame + 1):
             yield from single_frame_tests(frame, hypothesis)
         return

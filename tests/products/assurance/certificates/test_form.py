@@ -10,6 +10,7 @@ import pytest
 
 from beaver_ftc_assurance.certificates import check_certificate, courses
 from beaver_ftc_assurance.certificates.chance import LikelihoodRatio
+from beaver_ftc_assurance.certificates.inequality import no_fault
 from telling import numbers
 
 
@@ -75,9 +76,10 @@ def test_an_oscillation_is_excluded_once_one_side_lasts_longer_than_half_of_its_
     bounds = courses.SurfaceBounds(
         first_frame=0, sign=1, lower=np.column_stack([lower, np.zeros(10)]), upper=lower,
         command=np.full(10, 0.1), axis_commands=lower, command_range=lower,
-        is_unexplained=np.ones(10, bool), max_order=lower, stops=lower,
+        is_unexplained=np.ones(10, bool), max_order=lower, stops=lower, held=no_fault(0, 10), actuator=None,
+        config=SimpleNamespace(half_blocks=3, dt_s=0.1), slowest_rad_s=pi / 0.3,
     )  # fmt: skip
-    found = courses.RULES["swing"](bounds, None, SimpleNamespace(half_blocks=3, dt_s=0.1), pi / 0.3)
-    assert list(found.lower_frames) == [3, 4, 5, 6, 7]
+    found = courses.RULES["swing"](bounds)
+    assert [(one["first"], one["frame"]) for one in found["bounds"]] == [(3, 7)]
     beyond = [0.05, 0.06, 0.07, 0.08, 0.09]
-    assert np.array(found.pairs) == pytest.approx(np.array([(4, 3.0), (0.05, 0.0), (sum(beyond), 0.0)]))
+    assert np.array(found["sides"]) == pytest.approx(np.array([(4, 0.05, sum(beyond)), (3.0, 0.0, 0.0)]))

@@ -70,7 +70,7 @@ def flown(readings, true, missing=None, air=None, **fields):
         o = monitor["output"]
         history.append(
             np.concatenate(
-                [o["suspect"], monitor["cleared"], monitor["gyro_verdict"], o["is_reading_unused"]]
+                [o["suspect"], monitor["cleared"], monitor["gyro"]["verdict"], o["is_reading_unused"]]
             )
         )
     return monitor, np.array(given), np.array(inertial), np.array(history)
@@ -198,15 +198,15 @@ def test_who_is_suspected_of_what_the_tests_show(ratios, who):
 def test_an_error_of_the_attitude_that_has_shown_and_is_gone_is_no_gyros(peak, noise, verdict):
     """Two frames ago the first gyro's error has shown as 1 rad/s; the noise of the attitude in rad/s."""
     monitor, fdi = new_monitor(H, w_bound=1.0), new_fdi()
-    shown = monitor["shown"]
-    shown[2, sensor_monitor.MOST, 0], shown[1, sensor_monitor.MOST, 0] = 1.0, peak
+    gyro = monitor["gyro"]
+    gyro["most_older"][0], gyro["most_past"][0] = 1.0, peak
     monitor["per_sample"], fdi["bound"]["nu_max"] = noise * H / 4.0, 1.0
     fdi["bank"]["output"]["threshold"][:3] = 1.0
     sensor_monitor.judge_gyros(monitor, fdi["bank"], fdi["bound"], 0.02)
-    assert monitor["gyro_verdict"][0] == verdict
+    assert gyro["verdict"][0] == verdict
 
 
-KEPT_MEMORY = "exceeded", "cleared", "gyro_verdict", "gyros_excluded", "w_bound"
+KEPT_MEMORY = "exceeded", "cleared", "gyros_excluded", "w_bound"
 KINDS = ("jump", "jump", "scale", "noise", "ramp", "frozen", "missing")
 
 
@@ -226,6 +226,7 @@ def test_faults_drawn_at_random_end_as_kept(i, changed):
         output = monitor["output"]
         results = {name: output[name] for name in output.dtype.names}
         results |= {name: monitor[name] for name in KEPT_MEMORY}
+        results |= {"gyro_verdict": monitor["gyro"]["verdict"]}
         results |= {"B": monitor["B"], "initial": monitor["E"], "refuted": monitor["refuted"].sum(axis=1)}
         results |= {"given": given.mean(axis=0), "inertial": inertial.sum(), "history": history.sum(axis=0)}
         kept.append(results)

@@ -65,7 +65,7 @@ def compared(monitor, readings):
     redundancy.start_tests(monitor, readings[0], readings[0, AX:])
     initial_errors.start_bounds(monitor, readings[0])
     for y in readings[1:]:
-        redundancy.run_tests(monitor, y, True)
+        redundancy.run_tests(monitor, y, np.ones(1, int))
         initial_errors.update_bounds(monitor, y)
         monitor["exceeded"] |= monitor["ratio"] > 1.0
         initial_errors.latch_refuted(monitor, monitor["exceeded"])

@@ -81,6 +81,7 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     N_TESTS,
     QDYN,
     RPM_TEST,
+    SENSOR_OF,
     SPEED_TEST,
     THETA,
     TURN_TEST,
@@ -89,11 +90,14 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     R,
     down,
     exceeds,
+    length,
     secant,
     speed,
     too_steep,
-    vector_length,
+    unit,
+    vector,
 )
+from beaver_ftc.diagnosis.sets import explain
 from beaver_ftc.plant.instruments import ALTITUDE, PHI
 
 MAX_FLOW_ANGLE_RAD = 0.7  # an aircraft whose attitude and flow are tested flies at less, to either side
@@ -129,15 +133,16 @@ def start_bounds(mon, y):
     """e_start: bound each error at the first sample: an aircraft can fly at the truth.
 
     T: temperature of the standard troposphere, over that at sea level. V_air: airspeed by dynamic pressure
-    and standard density, m/s; most, least: reading over truth in the thickest and in the thinnest air.
+    and standard density, m/s; off: reading over truth, less 1, in the thickest or in the thinnest air.
     """
     T = max(1.0 - 2.25577e-5 * y[ALTITUDE], MIN_TEMPERATURE_RATIO)
     V_air = np.sqrt(2.0 * max(y[QDYN], MIN_QDYN_PA) / (1.225 * T**4.2559))
-    most, least = np.sqrt(1.0 + DENSITY_SHARE), np.sqrt(1.0 - DENSITY_SHARE)
-    off = max(speed(y) / V_air * most - 1.0, 1.0 - speed(y) / V_air * least)
+    ratio = speed(y) / V_air
+    off = max(ratio * np.sqrt(1.0 + DENSITY_SHARE) - 1.0, 1.0 - ratio * np.sqrt(1.0 - DENSITY_SHARE))
     mon.E_start[H_AIRSPEED] = min(off, MAX_SPEED_RATIO - 1.0)
-    for h, i in ((H_ALPHA, ALPHA), (H_BETA, BETA)):
-        mon.E_start[h] = 2.0 * np.sin(0.5 * min(abs(y[i]) + MAX_FLOW_ANGLE_RAD, np.pi))
+    for h in (H_ALPHA, H_BETA):
+        angle = abs(y[SENSOR_OF[CHANGE_TEST[h]]]) + MAX_FLOW_ANGLE_RAD
+        mon.E_start[h] = 2.0 * np.sin(0.5 * min(angle, np.pi))
     mon.E_start[H_PHI:] = MAX_CHORD
     mon.E[:] = mon.E_start
 
@@ -161,8 +166,9 @@ def widen_bounds(mon):
 
 
 @kernel
-def fill_attitude_effects(mon, h, y):
-    """Fill H for the tests of the attitude.
+def fill_attitude_effects(mon, y, turn, second):
+    """Fill H for the tests of the attitude; turn: q + i r about the level axes, as phi turns them, rad/s;
+    second, rad2: the axes turn during the step.
 
     Body axes. phi off by e: (q, r) is turned by e about the first axis, which changes it by
     2 sin(e / 2) |(q, r)|. theta off: the vertical, about which the aircraft turns at psi', likewise.
@@ -174,10 +180,8 @@ def fill_attitude_effects(mon, h, y):
     """
     # 1 / cos(theta) by its reading, and the largest one if theta is off
     sec, sec_max = secant(y[THETA]), secant(abs(y[THETA]) + angle_of_chord(mon.E[H_THETA]))
-    second = (h * (abs(y[P]) + abs(y[Q]) + abs(y[R]))) ** 2  # rad2: the axes turn during the step
     # Rotation in a step, rad: about the body's second and third axes; about the vertical, psi' h
-    qr = h * np.hypot(y[Q], y[R])
-    heading = h * abs(y[Q] * np.sin(y[PHI]) + y[R] * np.cos(y[PHI])) * sec_max
+    qr, heading = mon.h * abs(turn), mon.h * abs(turn.imag) * sec_max
     by_phi, by_theta = sec * (qr + sec * second), sec * sec_max * second
     mon.H[H_PHI, :SPEED_TEST] = second, second + qr, second + qr, by_phi, by_phi, by_phi
     mon.H[H_THETA, :ANGLE_TEST] = second + heading
@@ -185,12 +189,19 @@ def fill_attitude_effects(mon, h, y):
 
 
 @kernel
+def in_plane(z, v):
+    """The part of a vector in the plane of symmetry, turned by the incidence: along the flow, and
+    (imaginary) against the axis across it."""
+    return z * complex(v[0].imag, -v[1].imag)
+
+
+@kernel
 def fill_effects(mon, y_now):
     """Fill H (N_INITIAL, RPM_TEST) and C, taken at the sample before, y, from which y_now is predicted.
 
     h2: h and the second order in h. A, n: bound on |a| in the step, and over V; G: gravity; P: |(p, r)|; each
-    times h2. ct, sb, cb: sines and cosines of theta, beta; d0, d1, d2: the vertical; sec, sec_max: 1 /
-    cos(beta) by its reading, and the largest if beta is off. x: the error of the hypothesis.
+    times h2. ct, sb, cb: sines and cosines of theta, beta; d: the vertical; sec: 1 / cos(beta) by its
+    reading; secs: times the largest if beta is off. x: the error of the hypothesis.
 
     alpha off    V' = a . v / V, the direction of v is turned by alpha and changes by x at most; in alpha'
                  (a_z, a_x) / (V cos(beta)) and tan(beta) (p, r) are turned by alpha, in beta' (p, r) and
@@ -209,29 +220,27 @@ def fill_effects(mon, y_now):
                  rest. The vertical is turned, against v
     """
     h, g, e, H, y, a = mon.h, mon.g, mon.E, mon.H, mon.y_past, mon.a
-    V, ct, s_phi, sb, cb = speed(y), np.cos(y[THETA]), np.sin(y[PHI]), np.sin(y[BETA]), np.cos(y[BETA])
-    d0, d1, d2 = down(y)
+    V, ct, side, z, d = speed(y), np.cos(y[THETA]), unit(y[BETA]), unit(y[ALPHA]), down(y)
+    cb, sb, s_phi = side.real, abs(side.imag), abs(np.sin(y[PHI]))
     beta_max = abs(y[BETA]) + angle_of_chord(e[H_BETA])
-    sec, sec_max = secant(y[BETA]), secant(beta_max)
-    # Along the flow's projection on the plane of symmetry, and (imaginary) against the axis across it: rates
-    # rad/s, acceleration m/s2, the vertical
-    z = complex(np.cos(y[ALPHA]), np.sin(y[ALPHA]))
-    rate, acc, vertical = z * complex(y[P], -y[R]), z * complex(a[0], -a[2]), z * complex(d0, -d2)
-    a_max = max(mon.a_size[0], vector_length(a))
-    h2 = h * (1.0 + h * (a_max / V + abs(y[P]) + abs(y[Q]) + abs(y[R])))
+    sec, secs = secant(y[BETA]), secant(y[BETA]) * secant(beta_max)
+    rate, acc, vertical = in_plane(z, vector(y)), in_plane(z, a), in_plane(z, d)
+    turn = complex(y[Q], y[R]) * unit(y[PHI])
+    w, a_max = abs(y[P]) + abs(y[Q]) + abs(y[R]), max(mon.a_size[0], length(a))
+    h2 = h * (1.0 + h * (a_max / V + w))
     A, n, G, P_h = h2 * a_max, h2 * a_max / V, h2 * g, h2 * abs(rate)
     vert, across = h * V * cb * abs(vertical), ct * np.hypot(sb, z.imag * cb)
-    climb = abs(mon.y_pred[ALTITUDE] - y[ALTITUDE])
     slower = 1.0 - min(e[H_AIRSPEED], 1.0 - 1.0 / MAX_SPEED_RATIO)
+    climb = abs(mon.y_pred[ALTITUDE] - y[ALTITUDE]) / slower
     density = 2.0 * np.log(speed(y_now) / V)
-    fill_attitude_effects(mon, h, y)
+    fill_attitude_effects(mon, y, turn, (h * w) ** 2)
     # By hypothesis: V, alpha, beta, phi, theta
-    by_beta, by_phi, by_theta = sec * sec_max * (h2 * abs(rate.real) + n), sec * G * ct / V, sec * G / V
+    by_beta, by_phi, by_theta = secs * (h2 * abs(rate.real) + n), sec * G * ct / V, sec * G / V
     H[:, SPEED_TEST] = 0.0, A, A, G * across, G
-    H[:, ALPHA_TEST] = sec * n, sec * (n + P_h * abs(sb)), by_beta, by_phi, by_theta
-    H[:, BETA_TEST] = sec * n, P_h + n * abs(sb), n, by_phi, G * (abs(s_phi) + abs(sb)) / V
+    H[:, ALPHA_TEST] = sec * n, sec * (n + P_h * sb), by_beta, by_phi, by_theta
+    H[:, BETA_TEST] = sec * n, P_h + n * sb, n, by_phi, G * (s_phi + sb) / V
     H[H_AIRSPEED, DENSITY_TEST] = abs(density)
-    H[:, CLIMB_TEST] = climb / slower, vert, h * V * np.hypot(vertical.real, d1), h * V * across, h * V
+    H[:, CLIMB_TEST] = climb, vert, h * V * np.hypot(vertical.real, d[1].real), h * V * across, h * V
     # theta: along the first axis, g (sin(reading) - sin(truth)) = x g cos(mean of both). The mean is at most
     # half the error away from the reading, and at most (reading + a right angle) / 2
     pitch = abs(y[THETA])
@@ -239,23 +248,23 @@ def fill_effects(mon, y_now):
     # alpha: altitude' = V cos(beta) vert sin(gamma - alpha) + ..., where
     # tan(gamma) = tan(theta) / cos(phi). The sines of reading and truth differ by x cos(mean of gamma -
     # alpha)
-    path = abs(np.arctan2(vertical.real, -vertical.imag)) + 0.5 * angle_of_chord(e[H_ALPHA])
+    path = abs(np.angle(complex(-vertical.imag, vertical.real))) + 0.5 * angle_of_chord(e[H_ALPHA])
     # phi: (q, r), and gravity g cos(theta) (sin(phi), cos(phi)) across the first axis, are turned by it.
     # alpha off by e: beta' changes by x (roll cos(e / 2) + yaw sin(e / 2)). beta off by e: alpha' changes by
     # x cos(e / 2) roll over both cosines. The part of the force in both, of either sign, comes last
     mon.C[:] = (
-        h * complex(y[Q], y[R]),
-        h * g * complex(d2, d1),
-        complex(h * (y[Q] * s_phi + y[R] * np.cos(y[PHI]))),
-        complex(h * g * np.cos(mean)),
+        h * vector(y)[1],
+        h * g * d[1],
+        h * complex(turn.imag),
+        h * g * complex(np.cos(mean)),
         h * rate,
-        complex(h * rate.real),
-        complex(vert * np.cos(min(path, 0.5 * np.pi))),
-        complex(-h * acc.imag * sec / V),
-        complex(h * (a[1] * cb - acc.real * sb) / V),
+        h * complex(rate.real),
+        vert * complex(np.cos(min(path, 0.5 * np.pi))),
+        -h * complex(acc.imag) * sec / V,
+        h * complex(a[1].real * cb - acc.real * side.imag) / V,
         complex(density),
-        complex(h * abs(sb) * a_max / V),
-        complex(h * np.sin(min(beta_max, 0.5 * np.pi)) * sec * sec_max * abs(acc.imag) / V),
+        h * complex(sb) * a_max / V,
+        h * complex(np.sin(min(beta_max, 0.5 * np.pi)) * abs(acc.imag)) * secs / V,
     )
 
 
@@ -288,8 +297,7 @@ def tighten_bounds(mon):
                 half = 0.5 * angle_of_chord(e[h])
                 force = mon.C_m[len(EVIDENCE) + h - H_ALPHA, m].real
                 c = np.cos(half) * abs(C.real) - np.sin(half) * abs(C.imag) - force
-            if c > 0.0:
-                e[h] = min(e[h], s / (EFFECT_LEFT * c))
+            e[h] = explain(0.0, s, EFFECT_LEFT * max(c, 0.0), -e[h], e[h])[1]
 
 
 @kernel

@@ -18,9 +18,9 @@ its gusts within a filter's memory.
     n                  (N_SENSORS,)  bound on the part of an error that changes from sample to sample
     w, w_max                         body rates (3,), bound on |p| + |q| + |r|; rad/s
     e_w                              sum of the bounds on the errors of the three gyros, rad/s
-    v, a, a_past       (3,)          velocity m/s, acceleration m/s2 with gravity, that of the sample before
+    v, a, a_past       (2,)          vectors: velocity m/s, acceleration m/s2 with gravity, that of before
     q, p               (z1, z2)      quaternion z1 + z2 j of complex numbers; an attitude turns body to level
-                                     axes
+                                     axes; a vector of components x, y, z is (x i, y + z i)
     h                                time between two samples, s: a JSBSim frame
     i, j, m, d                       sensor or axis, test, pole of a filter, duplicate sensor
     mon                              record of the monitor
@@ -79,7 +79,7 @@ N_POLES = len(FILTER_POLES_PER_S)
 NO_SENSOR = -1
 ERRORS = {"e_zero": "worst", "e_slope": "slope", "const": "steady"}  # of a reading, by their declared names
 FORCE_JUMP_M_S2 = 8.0  # a sound specific force changes by less from one sample to the next
-GYRO_OPEN, GYRO_CONFIRMED, GYRO_REFUTED = 0, 1, 2  # of `gyro_verdict`
+GYRO_OPEN, GYRO_CONFIRMED, GYRO_REFUTED = 0, 1, 2  # verdicts of a gyro
 MAX_AIRSPEED_OVER_TRIM = 1.4  # largest airspeed of a flight, as a share of that in trim
 # at which the attitude corrects a replaced rate, if its noise is declared
 RATE_GAIN_PER_S = 3.0
@@ -121,6 +121,19 @@ MONITOR_OUTPUT_RECORD = record(
     suspect=(int, N_SENSORS), isolated_sensor=int, isolated_at_s=float, is_reading_unused=(int, N_SENSORS),
 )  # fmt: skip
 
+# Of an axis. shown, shown_past, rad/s: error of the gyro if the attitude is right, as this frame begins and
+# as the one before began; most, least: of its size in the other samples of this frame, of the one before
+# (most_past, least_past), of the one before that. gap, B_gap (poles,) rad: filtered difference of the turn
+# that the attitude and w show, and its bound; beyond it no gyro can be broken. replaced: its reading.
+GYRO_RECORD = record(
+    shown=float, shown_past=float, most=float, most_past=float, most_older=float,
+    least=float, least_past=float, gap=N_POLES, B_gap=N_POLES, verdict=int, replaced=int,
+)  # fmt: skip
+
+# Of speed, incidence or sideslip, since the alarm: sums of the residuals, of the part of sound sensors, of
+# the part of an initial error; range of the reading.
+FLOW_RECORD = record(r_sum=float, B_sum=float, H_sum=float, y_min=float, y_max=float)
+
 # Symbols: above.
 SENSOR_MONITOR_RECORD = record(
     config=MONITOR_CONFIG_RECORD, output=MONITOR_OUTPUT_RECORD,
@@ -135,7 +148,7 @@ SENSOR_MONITOR_RECORD = record(
     # Bounds on the error of each reading; e_drift: part of them by drift, rad
     e=N_SENSORS, n=N_SENSORS, e_drift=float, e_past=N_SENSORS, e_older=N_SENSORS,
     # of the sample before; predict_readings turns a_past into the present axes
-    y_past=N_SENSORS, y_older=N_SENSORS, a=3, a_past=3,
+    y_past=N_SENSORS, y_older=N_SENSORS, a=(complex, 2), a_past=(complex, 2),
     # m/s2: |a| in the elapsed step and in the two before it; of a_past
     a_size=3, a_size_past=float,
     e_first=float,  # m/s2, in the first step only: no sample precedes it
@@ -156,20 +169,12 @@ SENSOR_MONITOR_RECORD = record(
     # angle's own residual; by angle and pole, filtered size of the angle's residual; by angle and body axis,
     # largest size of turn_share
     beyond=(3, 3, N_POLES), swing=(3, N_POLES), c_max=(3, 3),
-    # by frame (this one, the one before, that before it), kind (SHOWN, MOST, LEAST of sensor_monitor.py) and
-    # axis, rad/s: error of the gyro if the attitude is right
-    shown=(3, 3, 3),
     # by axis, rad/s: error of the gyro if the dynamics are right (w of sensor_monitor.py), and its bound
-    w=3, w_bound=3,
+    w=3, w_bound=3, gyro=(GYRO_RECORD, 3), flow=(FLOW_RECORD, 3),
     agreed=(int, max(len(DUPLICATES), 1)),  # a sensor with the reading that it should equal
-    # by axis and pole, rad: filtered difference of the turn that the attitude and w show, and its bound;
-    # beyond it no gyro can be broken
-    gyros_excluded=int, gap=(3, N_POLES), gap_bound=(3, N_POLES), gyro_verdict=(int, 3), replaced=(int, 3),
-    n_same=(int, N_SENSORS), cleared=(int, N_SENSORS), turn_max=float,
+    gyros_excluded=int, n_same=(int, N_SENSORS), cleared=(int, N_SENSORS), turn_max=float,
     jump=float,  # of the accelerometers, m/s2, which fades
-    # since the alarm, of speed, incidence, sideslip: number of samples; sums of the residuals, of the part of
-    # sound sensors, of the part of an initial error; range of the readings
-    n_since=int, r_sum=3, B_sum=3, H_sum=3, y_min=3, y_max=3,
+    n_since=int,  # samples since the alarm
     climb=N_POLES,  # m, filtered: error of the climb, of an incidence with the error that its residuals show
 )  # fmt: skip
 
@@ -184,28 +189,22 @@ def configure_sensor_monitor(monitor: np.void, declared: Declared, design: np.vo
     config["enabled"] = declared.monitors_sensors
     if not declared.monitors_sensors:
         return
-    initial = cast("Any", declared.initial)  # whose keys the aircraft names
+    initial, air = cast("Any", declared.initial), declared.air  # whose keys the aircraft names
     D = air_rotation_slopes(DesignFunctions(np.array([design])), y)
-    engine = declared.aircraft.has_engine_instruments
+    engine, h = declared.aircraft.has_engine_instruments, 1.0 / declared.rate_hz / declared.substeps
+    gust_max, gust_change = bound_gusts(air, initial.airspeed_mps, h)
     fill(config, substeps=declared.substeps, has_engine=engine, D=D)
     config["y_trim"][3:7] = y[:4]
-    monitor["substep"] = declared.substeps - 1  # the first JSBSim frame ends a frame of the loop
-    if engine:
-        monitor["y_pred"][[ENGINE_SPEED, MANIFOLD]] = initial.engine_rpm, initial.manifold_pressure_inhg
-    configure_tests(monitor, declared)
-    configure_errors(monitor, declared)
-
-
-def configure_tests(monitor: np.void, declared: Declared) -> None:
-    """Fill the constants of the equations of motion and of the gusts; a sample is a JSBSim frame."""
-    initial, air, h = declared.initial, declared.air, 1.0 / declared.rate_hz / declared.substeps
-    gust_max, gust_change = bound_gusts(air, initial.airspeed_mps, h)
     fill(
         monitor, h=h, decay=[exp(-lam * h) for lam in FILTER_POLES_PER_S],
         g=GRAVITY_MPS2 * (1.0 + initial.altitude_m / EARTH_RADIUS_M) ** -2,
         gust_max=gust_max, gust_change=gust_change, low_m=air.low_m, wind_max=declared.vertical_wind_mps,
         max_airspeed_mps=MAX_AIRSPEED_OVER_TRIM * initial.airspeed_mps,
+        substep=declared.substeps - 1,  # the first JSBSim frame ends a frame of the loop
     )  # fmt: skip
+    if engine:
+        monitor["y_pred"][[ENGINE_SPEED, MANIFOLD]] = initial.engine_rpm, initial.manifold_pressure_inhg
+    configure_errors(monitor, declared)
 
 
 def configure_errors(monitor: np.void, declared: Declared) -> None:
@@ -243,23 +242,21 @@ def bound_gusts(air: Dryden, V: float, h: float) -> tuple[float, np.ndarray]:
 
 def sensor_monitor_finding(monitor: np.void, t_s: float) -> dict[str, Any] | None:
     """The verdict's parts as of t_s, where a sensor is found broken; None where none is."""
-    output = monitor["output"]
-    if not output["alarmed"]:
+    o = monitor["output"]
+    if not o["alarmed"]:
         return None
     finding: dict[str, Any] = {
         "isolated": None, "isolation_type": None, "estimate": None, "candidates": (),
-        "detection_time_s": float(output["alarmed_at_s"]), "isolation_time_s": None,
+        "detection_time_s": float(o["alarmed_at_s"]), "isolation_time_s": None,
     }  # fmt: skip
-    if output["isolated_sensor"] >= 0:
-        finding["isolated"] = sensor_words(SENSORS[int(output["isolated_sensor"])])
-        finding["isolation_time_s"] = float(output["isolated_at_s"])
-    elif t_s > finding["detection_time_s"] + UNANTICIPATED_DELAY_S:
-        finding["isolated"] = finding["isolation_type"] = "unanticipated"
-        finding["isolation_time_s"] = finding["detection_time_s"] + UNANTICIPATED_DELAY_S
-    else:
-        pairs = zip(SENSORS, output["suspect"], strict=True)
-        finding["candidates"] = tuple(sensor_words(name) for name, suspected in pairs if suspected)
-    return finding
+    latest = finding["detection_time_s"] + UNANTICIPATED_DELAY_S
+    if o["isolated_sensor"] >= 0:
+        name, at_s = sensor_words(SENSORS[int(o["isolated_sensor"])]), float(o["isolated_at_s"])
+        return finding | {"isolated": name, "isolation_time_s": at_s}
+    if t_s > latest:
+        name = "unanticipated"
+        return finding | {"isolated": name, "isolation_type": name, "isolation_time_s": latest}
+    return finding | {"candidates": tuple(sensor_words(SENSORS[i]) for i in np.flatnonzero(o["suspect"]))}
 
 
 # The rates are against the rotating Earth; the level turns as the aircraft flies over the round Earth.
@@ -283,6 +280,12 @@ POSITION_FACTOR = 4.0 / 3.0
 
 
 @kernel
+def unit(angle):
+    """exp(i angle)."""
+    return complex(np.cos(angle), np.sin(angle))
+
+
+@kernel
 def times(p, q):
     """p q of two quaternions: (p1 q1 - p2 q2*, p1 q2 + p2 q1*)."""
     return p[0] * q[0] - p[1] * q[1].conjugate(), p[0] * q[1] + p[1] * q[0].conjugate()
@@ -295,50 +298,54 @@ def inverse(q):
 
 
 @kernel
-def attitude(y):
-    """q of the Euler angles: psi about the third axis, theta about the second, phi about the first."""
-    phi, theta, psi = 0.5 * y[PHI], 0.5 * y[THETA], 0.5 * y[PSI]
-    heading = complex(np.cos(psi)), complex(0.0, np.sin(psi))
-    pitch = complex(np.cos(theta)), complex(np.sin(theta))
-    return times(times(heading, pitch), (complex(np.cos(phi), np.sin(phi)), 0j))
+def turned(q, v):
+    """q* v q: a constant vector v in axes that have turned by q."""
+    return times(times(inverse(q), v), q)
 
 
 @kernel
-def turned(q, v):
-    """q* v q: the components of a constant vector v (3,) in axes that have turned by q."""
-    z1, z2 = times(times(inverse(q), (complex(0.0, v[0]), complex(v[1], v[2]))), q)
-    return z1.imag, z2.real, z2.imag
+def combined(a, v, b, w):
+    """a v + b w of two quaternions or vectors."""
+    return a * v[0] + b * w[0], a * v[1] + b * w[1]
+
+
+@kernel
+def length(q):
+    """|q| of a quaternion or vector."""
+    return np.hypot(abs(q[0]), abs(q[1]))
+
+
+@kernel
+def vector(x):
+    """The vector of the components x, of which the first three count."""
+    return complex(0.0, x[0]), complex(x[1], x[2])
+
+
+@kernel
+def components(q):
+    """The components (3,) of a vector, or of a quaternion's part that is one."""
+    return q[0].imag, q[1].real, q[1].imag
+
+
+@kernel
+def attitude(y):
+    """q of the Euler angles: psi about the third axis, theta about the second, phi about the first."""
+    heading, pitch = unit(0.5 * y[PSI]), unit(0.5 * y[THETA])
+    level = (complex(heading.real), 1j * heading.imag), (complex(pitch.real), complex(pitch.imag))
+    return times(times(level[0], level[1]), (unit(0.5 * y[PHI]), 0j))
 
 
 @kernel
 def down(y):
     """The vertical unit vector, downwards, in body axes."""
-    c = np.cos(y[THETA])
-    return -np.sin(y[THETA]), np.sin(y[PHI]) * c, np.cos(y[PHI]) * c
+    return complex(0.0, -np.sin(y[THETA])), np.cos(y[THETA]) * complex(np.sin(y[PHI]), np.cos(y[PHI]))
 
 
 @kernel
 def turn_share(y, i, j):
     """c: rotation about body axis i for a change of phi, theta or psi (j 0, 1, 2), rad/rad, at attitude y."""
-    return ((1.0, 0.0, 0.0), (0.0, np.cos(y[PHI]), -np.sin(y[PHI])), down(y))[j][i]
-
-
-@kernel
-def dot(v, w):
-    """v . w of vectors (3,)."""
-    return v[0] * w[0] + v[1] * w[1] + v[2] * w[2]
-
-
-@kernel
-def combined(a, v, b, w):
-    """a v + b w of vectors (3,)."""
-    return a * v[0] + b * w[0], a * v[1] + b * w[1], a * v[2] + b * w[2]
-
-
-@kernel
-def vector_length(v):
-    """|v| of a vector (3,)."""
-    return np.sqrt(dot(v, v))
+    across = 0.0, np.cos(y[PHI]), -np.sin(y[PHI])
+    return ((1.0, 0.0, 0.0), across, components(down(y)))[j][i]
 
 
 @kernel
@@ -376,7 +383,7 @@ def store_sample(mon, y, force):
     mon.y_past[:] = y
     mon.e_older[:] = mon.e_past
     mon.e_past[:] = mon.e
-    mon.a[:] = combined(1.0, force, mon.g, down(y))
+    mon.a[:] = combined(1.0, vector(force), mon.g, down(y))
 
 
 @kernel
@@ -395,26 +402,29 @@ def predict_readings(mon):
         phi = arg(z1^2 - z2*^2),    2 z1 z2 = sin(theta) + i cos(theta) sin(psi)
     """
     h, y, past = mon.h, mon.y_pred, mon.y_past
-    s1, s2 = complex(1.0, 0.5 * h * past[P]), 0.5 * h * complex(past[Q], past[R])
-    size = np.hypot(abs(s1), abs(s2))
+    w = vector(past)
+    s1, s2 = 1.0 + 0.5 * h * w[0], 0.5 * h * w[1]
+    size = length((s1, s2))
     step = s1 / size, s2 / size
-    z1, z2 = times(attitude(past), step)
-    roll, nose = z1**2 - z2.conjugate() ** 2, 2.0 * z1 * z2
-    y[PHI] = np.arctan2(roll.imag, roll.real)
+    q = times(attitude(past), step)
+    roll, nose = q[0] ** 2 - q[1].conjugate() ** 2, 2.0 * q[0] * q[1]
+    y[PHI] = np.angle(roll)
     y[THETA] = np.arcsin(min(max(nose.real, -1.0), 1.0))
-    y[PSI] = np.arctan2(nose.imag, abs(z1) ** 2 - abs(z2) ** 2)
-    V, along = past[AIRSPEED], past[AIRSPEED] * np.cos(past[BETA])
-    v = along * np.cos(past[ALPHA]), V * np.sin(past[BETA]), along * np.sin(past[ALPHA])
-    y[ALTITUDE] = past[ALTITUDE] - h * dot(v, down(past))
+    y[PSI] = np.arctan2(nose.imag, abs(q[0]) ** 2 - abs(q[1]) ** 2)
+    flow = past[AIRSPEED] * unit(past[BETA])
+    plane = flow.real * unit(past[ALPHA])
+    v = complex(0.0, plane.real), complex(flow.imag, plane.imag)
+    climb = times(v, down(past))[0].real  # minus the product of two vectors is their scalar product
+    y[ALTITUDE] = past[ALTITUDE] + h * climb
     a = combined(AB_NOW, mon.a, -AB_PAST, mon.a_past)
-    mon.a_size_past = vector_length(mon.a_past)
-    mon.a_size[:] = vector_length(a), mon.a_size[0], mon.a_size[1]
+    mon.a_size_past = length(mon.a_past)
+    mon.a_size[:] = length(a), mon.a_size[0], mon.a_size[1]
     mon.a_past[:] = turned(step, mon.a)
     v = turned(step, combined(1.0, v, h, a))
-    y[AIRSPEED] = vector_length(v)
-    y[ALPHA] = np.arctan2(v[2], v[0])
-    y[BETA] = np.arcsin(v[1] / max(y[AIRSPEED], MIN_SPEED_MPS))
-    return z1, z2
+    y[AIRSPEED] = length(v)
+    y[ALPHA] = np.arctan2(v[1].imag, v[0].imag)
+    y[BETA] = np.arcsin(v[1].real / max(y[AIRSPEED], MIN_SPEED_MPS))
+    return q
 
 
 @kernel
@@ -428,9 +438,9 @@ def fill_residuals(mon, y, q):
     """Fill the residual of each test: y - y_pred; of turning 2 (q* q_now); of the density
     log(rho / rho_past), rho = qdyn / V^2. q: the attitude as predicted.
     """
-    z1, z2 = times(inverse(q), attitude(y))
-    side = 2.0 if z1.real >= 0.0 else -2.0
-    mon.residual[:ANGLE_TEST] = side * z1.imag, side * z2.real, side * z2.imag
+    turn = times(inverse(q), attitude(y))
+    side = 2.0 if turn[0].real >= 0.0 else -2.0
+    mon.residual[:ANGLE_TEST] = components(combined(side, turn, 0.0, turn))
     for j in range(ANGLE_TEST, RPM_TEST):
         r = y[SENSOR_OF[j]] - mon.y_pred[SENSOR_OF[j]]
         mon.residual[j] = wrapped(r) if j < SPEED_TEST else r
@@ -599,14 +609,15 @@ def compare(mon, j, residual, bound):
 def compare_duplicates(mon, y, fresh):
     """Compare each duplicate sensor i with the reading j that it should equal, in the samples in which it is
     fresh; fresh (sampled sensors,). One of the two is broken if they differ by more than tolerance + e_i +
-    e_j.
+    e_j. Those that have agreed before any alarm are recorded.
     """
     for d in range(DUPLICATE.size):
-        i, j = DUPLICATE[d], COUNTERPART[d]
-        mon.ratio[N_EQUATIONS + d] = 0.0
+        i, j, test = DUPLICATE[d], COUNTERPART[d], N_EQUATIONS + d
+        mon.ratio[test] = 0.0
         if fresh[i - N_IN_EQUATIONS]:
             r = wrapped(y[i] - y[j]) if PHI <= j <= PSI else y[i] - y[j]
-            compare(mon, N_EQUATIONS + d, r, DUPLICATE_TOLERANCE[d] + mon.e[i] + mon.e[j])
+            compare(mon, test, r, DUPLICATE_TOLERANCE[d] + mon.e[i] + mon.e[j])
+            mon.agreed[d] |= mon.ratio[test] <= 1.0 and not mon.output.alarmed
 
 
 @kernel
@@ -617,15 +628,15 @@ def start_tests(mon, y, force):
     mon.y_older[:] = y
     mon.e_older[:] = mon.e_past
     mon.a_past[:] = mon.a
-    mon.a_size[:2] = vector_length(mon.a) + FORCE_JUMP_M_S2
+    mon.a_size[:2] = length(mon.a) + FORCE_JUMP_M_S2
     mon.e_first = AB_PAST * FORCE_JUMP_M_S2
     bound_residuals(mon, y)
     restart_tests(mon, RPM_TEST)
 
 
 @kernel
-def run_tests(mon, y, has_engine):
-    """Compare this sample y with the one before."""
+def run_tests(mon, y, fresh):
+    """Compare this sample y with the one before; fresh (sampled sensors,): those that are read now."""
     mon.e_drift += mon.h * mon.drift
     bound_readings(mon, y)
     fill_residuals(mon, y, predict_readings(mon))
@@ -635,7 +646,9 @@ def run_tests(mon, y, has_engine):
     restart_tests(mon, first)
     for j in range(first, RPM_TEST):
         filter_test(mon, j)
-    if has_engine:
+    if mon.config.has_engine:
         for j in (RPM_TEST, PRESSURE_TEST):
             i = SENSOR_OF[j]
             compare(mon, j, y[i] - mon.y_pred[i], mon.e[i])
+    if N_TESTS > N_EQUATIONS:
+        compare_duplicates(mon, y, fresh)

@@ -96,7 +96,6 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     SENSOR_OF,
     SPEED_TEST,
     THETA,
-    compare_duplicates,
     exceeds,
     run_tests,
     speed,
@@ -104,6 +103,7 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     store_sample,
     too_steep,
     turn_share,
+    unit,
 )
 from beaver_ftc.plant.instruments import (
     AX,
@@ -115,7 +115,6 @@ from beaver_ftc.plant.instruments import (
     set_inertial,
     share_out,
 )
-from beaver_ftc.scenario.sensors import N_IN_EQUATIONS
 
 # Accelerometers or flow sensor
 JUMP_WINDOW_S = 1.0  # after the alarm: later, a jump by chance is too likely
@@ -136,7 +135,6 @@ FULL_STAGE = 3
 MIN_LEAD_S = 0.5  # before the alarm: a surface detected earlier was detected with sound sensors
 INITIAL_WINDOW_S = 1.0  # from the start: an alarm of the surfaces may be caused by an initial error
 VANE_RETURN_S = 20.0  # of the return to trim of a replaced vane: kinematics alone drift
-SHOWN, MOST, LEAST = range(3)  # of a gyro's error: follow_gyro_errors
 # index in FILTER_POLES_PER_S: of the filter that gives the first value of a replaced rate
 RATE_POLE = 1
 
@@ -172,10 +170,7 @@ def check_sensors(mon, pred, measured, found, bank, bound, dt, t):
     else:
         if mon.substep == 0:
             advance_gyro_estimate(mon, bank.output.innovation, bound.eta_bar, dt)
-        run_tests(mon, y, mon.config.has_engine)
-        if N_TESTS > N_EQUATIONS:
-            compare_duplicates(mon, y, measured.fresh)
-            latch_agreed(mon, measured.fresh)
+        run_tests(mon, y, measured.fresh)
         update_bounds(mon, y)
         count_same(mon, y)
         follow_gyro_errors(mon)
@@ -210,24 +205,15 @@ def advance_gyro_estimate(mon, nu, eta, dt):
 
 
 @kernel
-def latch_agreed(mon, fresh):
-    """Record which sensors have agreed, before any alarm, with the reading that they should equal."""
-    for d, i in enumerate(DUPLICATE):
-        agrees = mon.ratio[N_EQUATIONS + d] <= 1.0 and not mon.output.alarmed
-        mon.agreed[d] |= fresh[i - N_IN_EQUATIONS] and agrees
-
-
-@kernel
 def count_same(mon, y):
     """Count the samples for which each reading has been the very same, and find the largest jump of an
     accelerometer from one sample to the next, m/s2, which fades within JUMP_MEMORY_S.
     """
-    past = mon.y_past
     mon.jump *= 1.0 - mon.h / JUMP_MEMORY_S
     for i in range(N_SENSORS):
-        mon.n_same[i] = mon.n_same[i] + 1 if y[i] == past[i] else 0
+        mon.n_same[i] = (mon.n_same[i] + 1) * (y[i] == mon.y_past[i])
     for i in FORCES:
-        mon.jump = max(mon.jump, abs(y[i] - past[i]))
+        mon.jump = max(mon.jump, abs(y[i] - mon.y_past[i]))
 
 
 @kernel
@@ -253,20 +239,15 @@ def stands_still(mon, i):
 
 @kernel
 def follow_gyro_errors(mon):
-    """Keep what the attitude shows of each gyro's error, if it is right itself: SHOWN as a frame begins, MOST
-    and LEAST of its size in the other samples of the frame. shown[1], shown[2]: of the two frames before."""
-    shown = mon.shown
-    if mon.substep == 0:
-        shown[2] = shown[1]
-        shown[1] = shown[0]
-        shown[0, MOST:] = 0.0
+    """Keep what the attitude shows of each gyro's error, if it is right itself."""
     for i in range(3):
-        w = -mon.residual[i] / mon.h
+        g, w = mon.gyro[i], -mon.residual[i] / mon.h
         if mon.substep == 0:
-            shown[0, SHOWN, i] = w
+            g.shown_past, g.shown = g.shown, w
+            g.most_older, g.most_past, g.most = g.most_past, g.most, 0.0
+            g.least_past, g.least = g.least, np.inf
         else:
-            shown[0, MOST, i] = max(shown[0, MOST, i], abs(w))
-            shown[0, LEAST, i] = abs(w) if mon.substep == 1 else min(shown[0, LEAST, i], abs(w))
+            g.most, g.least = max(g.most, abs(w)), min(g.least, abs(w))
 
 
 @kernel
@@ -275,10 +256,11 @@ def restart_comparison(mon):
     shows neither an error nor its absence.
     """
     mon.stage = 1
-    mon.gap[:] = mon.gap_bound[:] = 0.0
     mon.beyond[:] = 0.0
     mon.swing[:] = 0.0
     mon.c_max[:] = 0.0
+    for i in range(3):
+        mon.gyro[i].gap[:] = mon.gyro[i].B_gap[:] = 0.0
 
 
 @kernel
@@ -287,10 +269,9 @@ def advance_stage(mon):
     frame shows no change of an error.
     """
     if mon.stage < FULL_STAGE and mon.substep == 0:
-        mon.stage += 1
         for i in range(3):
-            if mon.stage < FULL_STAGE:
-                mon.w_bound[i] += abs(mon.shown[0, SHOWN, i])
+            mon.w_bound[i] += abs(mon.gyro[i].shown) * (mon.stage == 1)
+        mon.stage += 1
 
 
 @kernel
@@ -300,26 +281,22 @@ def exclude_gyros(mon):
     gap <- a gap + residual + h w. Where the attitude is noisy, a surface is isolated only after that.
     """
     for i in range(3):
-        w = mon.w[i]
-        leak(mon.gap[i], mon.decay, mon.residual[i] + mon.h * w)
-        leak(mon.gap_bound[i], mon.decay, mon.h * (mon.w_bound[i] + attitude.DAMPING_TOLERANCE * abs(w)))
-        if exceeds(mon.gap[i], 1.0, mon.gap_bound[i], 1.0, mon.B[i]):
+        g, w = mon.gyro[i], mon.w[i]
+        leak(g.gap, mon.decay, mon.residual[i] + mon.h * w)
+        leak(g.B_gap, mon.decay, mon.h * (mon.w_bound[i] + attitude.DAMPING_TOLERANCE * abs(w)))
+        if exceeds(g.gap, 1.0, g.B_gap, 1.0, mon.B[i]):
             rule_out_gyros(mon)
 
 
 @kernel
 def isolate_sensor(mon, measured, found, bank, bound, dt, t):
     """Raise the alarm, and isolate the sensor once it is the only suspect."""
-    o = mon.output
-    if mon.substep == 0:  # the test with the largest ratio, of the samples of this frame
-        o.worst_test_index, o.top_ratio = 0, 0.0
-    for j, ratio in enumerate(mon.ratio):
-        if ratio > o.top_ratio:
-            o.worst_test_index, o.top_ratio = j, ratio
+    o, worst = mon.output, np.argmax(mon.ratio)
+    if mon.substep == 0 or mon.ratio[worst] > o.top_ratio:  # of the samples of this frame
+        o.worst_test_index, o.top_ratio = worst, mon.ratio[worst]
     for i in range(N_SENSORS):
         if measured.missing[i] and o.isolated_sensor == NO_SENSOR:
-            raise_alarm(mon, found, t)
-            mark_isolated(mon, i, t)
+            mark_isolated(mon, found, i, t)
     if o.isolated_sensor != NO_SENSOR:
         return
     if o.top_ratio > 1.0 and not o.alarmed:
@@ -335,7 +312,7 @@ def isolate_sensor(mon, measured, found, bank, bound, dt, t):
             clear_sensors(mon, measured.signal)
         find_suspects(mon)
         if o.suspect.sum() == 1:
-            mark_isolated(mon, np.argmax(o.suspect), t)
+            mark_isolated(mon, found, np.argmax(o.suspect), t)
 
 
 @kernel
@@ -356,8 +333,9 @@ def raise_alarm(mon, found, t):
 
 
 @kernel
-def mark_isolated(mon, i, t):
-    """Isolate a sensor at t s."""
+def mark_isolated(mon, found, i, t):
+    """Isolate a sensor at t s; its alarm is raised by then."""
+    raise_alarm(mon, found, t)
     mon.output.isolated_sensor, mon.output.isolated_at_s = i, t
     mon.output.is_reading_unused[i] = 1
 
@@ -396,26 +374,26 @@ def judge_gyros(mon, bank, bound, dt):
     and varies between them, as noise does (varies), the innovation cannot be compared with its jump: the
     innovation contains the errors as the frames begin, and the attitude shows those of the samples before.
     """
-    nu, shown = bank.output.innovation, mon.shown
+    nu = bank.output.innovation
     for i in range(3):
-        if mon.gyro_verdict[i] != GYRO_OPEN:
+        g, estimate, B = mon.gyro[i], abs(mon.w[i]), mon.w_bound[i]
+        if g.verdict != GYRO_OPEN:
             continue
-        now, past, older = shown[0, SHOWN, i], shown[1, SHOWN, i], shown[2, MOST, i]
-        peak, floor, estimate, B = shown[1, MOST, i], shown[1, LEAST, i], abs(mon.w[i]), mon.w_bound[i]
-        largest, jump = max(abs(now), abs(past)), (now - past) / dt  # rad/s, rad/s2
+        largest, jump = max(abs(g.shown), abs(g.shown_past)), (g.shown - g.shown_past) / dt  # rad/s, rad/s2
         # of w, rad/s, by the attitude's noise
         noise = SAMPLES_IN_JUMP * mon.per_sample[i] / mon.h
         nu_max = bound.nu_max[i] + RATE_ROUNDING
         shows = abs(nu[i]) > nu_max or bank_axis(bank) >= 0 or estimate > B + RATE_ROUNDING
-        brief = max(largest, peak) < TRANSIENT_LEFT * older and older > MIN_TRANSIENT * noise
         tol = MAX_DYNAMICS_PER_S * largest + JUMP_TOLERANCE * abs(jump)
         fits = abs(nu[i] - jump) <= nu_max + tol + noise / dt
-        varies = noise < floor < peak / (1.0 + JUMP_TOLERANCE)
-        allowed = MIN_ESTIMATED_SHARE * abs(now) <= B + estimate + noise
+        varies = noise < g.least_past < g.most_past / (1.0 + JUMP_TOLERANCE)
+        gone = max(largest, g.most_past) < TRANSIENT_LEFT * g.most_older
+        brief = gone and g.most_older > MIN_TRANSIENT * noise
+        allowed = MIN_ESTIMATED_SHARE * abs(g.shown) <= B + estimate + noise
         if fits and shows:
-            mon.gyro_verdict[i] = GYRO_CONFIRMED
+            g.verdict = GYRO_CONFIRMED
         elif not (fits or varies) or (not shows and (brief or not allowed)):
-            mon.gyro_verdict[i] = GYRO_REFUTED
+            g.verdict = GYRO_REFUTED
 
 
 @kernel
@@ -441,7 +419,8 @@ def clear_sensors(mon, y):
     if is_frozen(mon, flow) or flow_jumped(mon, y, flow) or by_density:
         mon.cleared[AX:] = 1
     sum_flow(mon, y)
-    if sum_exceeds_range(mon, alarm - SPEED_TEST) or contradicted(mon, y) or last_frozen(mon, FORCES) >= 0:
+    ranges = sum_exceeds_range(mon.flow[alarm - SPEED_TEST])
+    if ranges or contradicted(mon, y) or last_frozen(mon, FORCES) >= 0:
         mon.cleared[flow] = 1
     clear_gyros(mon, y)
 
@@ -463,35 +442,34 @@ def flow_jumped(mon, y, i):
 
 @kernel
 def sum_flow(mon, y):
-    """Add up, after the sample of the alarm, the residuals of the flow (r_sum), the part of sound sensors
-    (B_sum) and that of an error from the start (H_sum); and find the range of each reading.
+    """Add up, after the sample of the alarm, the residuals of the flow, the part of sound sensors and that of
+    an error from the start; and find the range of each reading.
 
     alpha: error of the incidence that the sums leave unexplained, rad; climb: its effect in a sample, m.
     """
     for n in range(3):
-        j = SPEED_TEST + n
-        y_n = y[SENSOR_OF[j]]
+        f, j = mon.flow[n], SPEED_TEST + n
+        now = y[SENSOR_OF[j]]
         if mon.n_since == 0:
-            mon.y_min[n] = mon.y_max[n] = y_n
+            f.y_min = f.y_max = now
             # noise of the first and of the last sample
-            mon.B_sum[n] = 2.0 * mon.per_sample[j] + mon.gust[j] * mon.gust_max
-            continue
-        mon.r_sum[n] += mon.residual[j]
-        mon.B_sum[n] += mon.h * mon.per_s[j]
-        mon.H_sum[n] += mon.E_alarm[n] * mon.H[n, j]
-        mon.y_min[n], mon.y_max[n] = min(mon.y_min[n], y_n), max(mon.y_max[n], y_n)
-    r, B = mon.r_sum[1], mon.B_sum[1] + mon.H_sum[1]
-    alpha = r - min(max(r, -B), B)
+            f.B_sum = 2.0 * mon.per_sample[j] + mon.gust[j] * mon.gust_max
+        else:
+            f.r_sum += mon.residual[j]
+            f.B_sum += mon.h * mon.per_s[j]
+            f.H_sum += mon.E_alarm[n] * mon.H[n, j]
+            f.y_min, f.y_max = min(f.y_min, now), max(f.y_max, now)
+    f = mon.flow[1]
+    alpha = f.r_sum - min(max(f.r_sum, -f.B_sum - f.H_sum), f.B_sum + f.H_sum)
     leak(mon.climb, mon.decay, mon.h * y[AIRSPEED] * alpha * np.cos(y[PHI]) * np.cos(y[THETA]))
     mon.n_since += 1
 
 
 @kernel
-def sum_exceeds_range(mon, n):
+def sum_exceeds_range(f):
     """Whether the residuals add up to more than an error of a flow sensor whose reading has this range."""
-    span = mon.y_max[n] - mon.y_min[n]
-    least = MIN_SUM_RATIO * span + CLEAR_FACTOR * (mon.B_sum[n] + mon.H_sum[n])
-    return span > 0.0 and abs(mon.r_sum[n]) > least
+    span = f.y_max - f.y_min
+    return span > 0.0 and abs(f.r_sum) > MIN_SUM_RATIO * span + CLEAR_FACTOR * (f.B_sum + f.H_sum)
 
 
 @kernel
@@ -503,13 +481,12 @@ def contradicted(mon, y):
     if alarm == BETA_TEST or mon.exceeded[other]:
         return False
     h = alarm - SPEED_TEST
-    e, H, B = mon.E_alarm[h], mon.H_m[h, other], mon.B[other]
-    if alarm == ALPHA_TEST:
-        return exceeds(mon.climb, CLEAR_FACTOR, B, CLEAR_FACTOR * e, H)
+    e, r, B = mon.E_alarm[h], mon.r[alarm], mon.B[alarm]
     # log(density) changes by twice the relative change of the airspeed
-    k = CLEAR_FACTOR * speed(y) / (2.0 * (1.0 - min(e, 1.0)))
-    for m in range(B.size):
-        if abs(mon.r[SPEED_TEST, m]) - mon.B[SPEED_TEST, m] > k * (B[m] + e * H[m]):
+    share = 2.0 * (1.0 - min(e, 1.0)) / speed(y)
+    for m, climb in enumerate(mon.climb):
+        effect = abs(climb) if alarm == ALPHA_TEST else share * (abs(r[m]) - B[m])
+        if effect > CLEAR_FACTOR * (mon.B[other, m] + e * mon.H_m[h, other, m]):
             return True
     return False
 
@@ -585,14 +562,14 @@ def suspect_attitude(mon):
     refuted = mon.refuted[H_PHI:, ANGLE_TEST:SPEED_TEST]
     frozen, worst = last_frozen(mon, ANGLES) >= 0, np.argmax(ratio)
     for i in range(3):
-        suspect[i] = alone(turns, i) and mon.gyro_verdict[i] != GYRO_REFUTED and not frozen
+        suspect[i] = alone(turns, i) and mon.gyro[i].verdict != GYRO_REFUTED and not frozen
         explains, k = explains_turns(mon, i), PHI + i
         unshared = alone(angles, i) if i == 2 else alone(refuted[i], i)
         only = unshared and (explains or angles[i] == 1)
         axis = worst if ratio[worst] > ratio[i] else i
         # too early to say
         early = 0 < mon.n_same[k] < mon.config.n_frozen[k] < N_FROZEN_NEVER
-        suspect[k] = (only and mon.gyro_verdict[axis] != GYRO_CONFIRMED) or (explains and early)
+        suspect[k] = (only and mon.gyro[axis].verdict != GYRO_CONFIRMED) or (explains and early)
 
 
 @kernel
@@ -623,11 +600,11 @@ def suspect_flow(mon, alarm):
     suspect, cleared, turns = mon.output.suspect, mon.cleared, mon.exceeded[:ANGLE_TEST]
     by_gyro, flow = alarm > SPEED_TEST and turns.any(), SENSOR_OF[alarm]
     for i in range(3 if alarm > SPEED_TEST else 0):
-        suspect[i] = (turns[i] and alone(turns, i)) if by_gyro else gyro_hidden(mon, alarm, i)
+        suspect[i] = alone(turns, i) if by_gyro else gyro_hidden(mon, alarm, i)
     if not by_gyro:
         suspect_accelerometers(mon)
         suspect[flow] = 1
-    for i in range(N_IN_EQUATIONS):
+    for i in range(N_SENSORS):
         suspect[i] &= not cleared[i]
 
 
@@ -637,9 +614,8 @@ def gyro_hidden(mon, j, i):
     its axis. All of the error of the gyro across the flow (q for the incidence, r for the sideslip) turns it;
     of another a share, by kinematics; q does not act on the sideslip.
     """
-    s, c = np.sin(mon.y_past[ALPHA]), np.cos(mon.y_past[ALPHA])
-    t = np.tan(mon.y_past[BETA])
-    share = (t * c, 1.0, t * s)[i] if j == ALPHA_TEST else (s, 0.0, 1.0)[i]
+    z, t = unit(mon.y_past[ALPHA]), np.tan(mon.y_past[BETA])
+    share = (t * z.real, 1.0, t * z.imag)[i] if j == ALPHA_TEST else (z.imag, 0.0, 1.0)[i]
     full = i == j - SPEED_TEST
     k = HIDDEN_FACTOR if full else 1.0
     return (full or i != 1) and not exceeds(mon.r[j], k, mon.B[j], HIDDEN_FACTOR * abs(share), mon.B[i])
@@ -647,16 +623,16 @@ def gyro_hidden(mon, j, i):
 
 @kernel
 def suspect_accelerometers(mon):
-    """Suspect the accelerometers along whose axis most of the spurious velocity dv is. In flow axes dv is
-    r_sum, m/s and rad; plane: turned by beta; body: then by alpha. least: less the bound on |dv| of sound
-    sensors.
+    """Suspect the accelerometers along whose axis most of the spurious velocity dv is. The sums of the flow
+    are dv in its axes, m/s and rad; plane: turned by beta; body: then by alpha. least: less the bound on |dv|
+    of sound sensors.
     """
-    y, r, B = mon.y_past, mon.r_sum, mon.B_sum
-    alpha, beta, V = y[ALPHA], y[BETA], speed(y)
-    plane = complex(r[0], V * r[2]) * complex(np.cos(beta), np.sin(beta))
-    body = complex(plane.real, V * np.cos(beta) * r[1]) * complex(np.cos(alpha), np.sin(alpha))
+    y, dV, da, db = mon.y_past, mon.flow[0], mon.flow[1], mon.flow[2]
+    V, frozen = speed(y), last_frozen(mon, FORCES)
+    plane = complex(dV.r_sum, V * db.r_sum) * unit(y[BETA])
+    body = complex(plane.real, V * np.cos(y[BETA]) * da.r_sum) * unit(y[ALPHA])
     dv = abs(body.real), abs(plane.imag), abs(body.imag)
-    least, frozen = MIN_AXIS_SHARE * max(dv) - B[0] - V * (B[1] + B[2]), last_frozen(mon, FORCES)
+    least = MIN_AXIS_SHARE * max(dv) - dV.B_sum - V * (da.B_sum + db.B_sum)
     for i in FORCES:
         mon.output.suspect[i] = frozen == i or (frozen < 0 and dv[i - AX] >= least)
 
@@ -692,10 +668,9 @@ def add_turn(mon, att, y):
 def name_gyro(mon, found, i, t):
     """Isolate gyro i at t s. What was concluded of surfaces is void, unless one was isolated before."""
     o = mon.output
-    raise_alarm(mon, found, t)
+    mark_isolated(mon, found, i, t)
     if o.keeps_surface and found.isolated_estimator < 0:
         o.keeps_surface, o.alarmed_at_s = 0, found.detected_at_s
-    mark_isolated(mon, i, t)
 
 
 @kernel
@@ -785,7 +760,7 @@ def estimate_rate(mon, pred, i):
     if mon.output.keeps_surface:
         acc += pred.F_known[i] - pred.means.F[i]
     rate = gain * mon.residual[i] / mon.h
-    if not mon.replaced[i] and gain < 1.0:
+    if not mon.gyro[i].replaced and gain < 1.0:
         rate = FILTER_POLES_PER_S[RATE_POLE] * mon.r[i, RATE_POLE]
-    mon.replaced[i] = 1
+    mon.gyro[i].replaced = 1
     return mon.y_past[i] + rate + mon.h * acc

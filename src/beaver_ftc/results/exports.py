@@ -1,9 +1,9 @@
 """The log for other tools: as CSV, as a flight recording for Tacview, and as a recorder on board would have
 written it, which is a table, a PX4 ULog or a dataflash log.
 
-Of the last, only what an autopilot knows: measured rates, attitude, flow, what else the aircraft measures,
-and the commands to the surfaces as shares of travel. `vehicle.yaml` beside it names the columns for
-`identify` and `diagnose`.
+Of the last, only what an autopilot records: rates with the errors of the gyros, attitude, flow and what else
+the aircraft measures as perfect instruments have them, since the log has no other readings, and the commands
+to the surfaces as shares of travel. `vehicle.yaml` beside it names the columns for `identify` and `diagnose`.
 
 ULog: https://docs.px4.io/main/en/dev_log/ulog_file_format; dataflash: FMT messages, then packed ones.
 """

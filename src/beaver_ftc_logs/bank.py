@@ -61,11 +61,11 @@ class HypothesisBank(NamedTuple):
     @property
     def is_fault_hypothesis(self) -> np.ndarray:
         """Which hypotheses say that some surface has lost effectiveness, (H,)."""
-        return np.asarray((self.hypothesis_kind == GROUP_LOSS) | (self.hypothesis_kind == PAIR_LOSS))
+        return (self.hypothesis_kind == GROUP_LOSS) | (self.hypothesis_kind == PAIR_LOSS)
 
     def is_fault_of_group(self, g: int) -> np.ndarray:
         """Which hypotheses say that a group has lost effectiveness, (H,)."""
-        return np.asarray((self.effectiveness[:, g] < 1.0) & (self.hypothesis_kind != NO_RESPONSE))
+        return (self.effectiveness[:, g] < 1.0) & (self.hypothesis_kind != NO_RESPONSE)
 
 
 def build_bank(model: Model) -> HypothesisBank:
@@ -141,7 +141,7 @@ def _prior_probabilities(kind: np.ndarray, share: Floats) -> Floats:
     p = share * (1.0 - _PRIOR_HEALTHY - _PRIOR_NO_RESPONSE) / share[fault].sum()
     p[0] = _PRIOR_HEALTHY
     p[-1] = _PRIOR_NO_RESPONSE
-    return np.asarray(p)
+    return p
 
 
 class StateModel(NamedTuple):
@@ -186,10 +186,8 @@ def build_states(model: Model, noise: NoiseModel) -> StateModel:
 
 def _extra_variance(model: Model) -> Floats:
     """Variance of each group's gain by which it is known worse than to a step between levels, (G,)."""
-    variance = np.zeros(len(model.groups))
-    if model.fitted is not None and model.fitted.gain_sd:
-        variance += np.array(model.fitted.gain_sd) ** 2
-    return np.maximum(variance - model.settings.level_step**2, 0.0)
+    sd = np.array(model.fitted.gain_sd or [0.0] * len(model.groups))
+    return np.maximum(sd**2 - model.settings.level_step**2, 0.0)
 
 
 class ResidualNoise(NamedTuple):

@@ -81,7 +81,7 @@ def _memory_sums(x: Floats, dt_s: float, fades: bool) -> Floats:
     if fades:
         from scipy.signal import lfilter
 
-        return np.asarray(lfilter([1.0], [1.0, -np.exp(-dt_s / LEAST_SQUARES_MEMORY_S)], x, axis=0))
+        return lfilter([1.0], [1.0, -np.exp(-dt_s / LEAST_SQUARES_MEMORY_S)], x, axis=0)
     return trailing_sums(x, LEAST_SQUARES_MEMORY_S / dt_s)[0]
 
 
@@ -135,7 +135,7 @@ class LinearRateModel:
 
     def f(self, x: Floats, y: Floats) -> Floats:
         """Angular acceleration rad/s2 by the rates alone."""
-        return np.asarray(x @ self._transposed_jacobian)
+        return x @ self._transposed_jacobian
 
     def G(self, y: Floats) -> Floats:
         """Zeros: the effects of the surfaces, with their lags, are in `contribution`."""
@@ -172,7 +172,7 @@ def loop_detector_inputs(samples: Samples, model: Model) -> list[tuple[Measured,
 
 def _model_error_sd_rad_s2(model: Model) -> Floats:
     """The residual's standard deviation as an error of the model, (3,) rad/s2."""
-    return np.asarray(np.sqrt(np.diag(np.array(model.noise))) / (1.0 / model.rate_hz))
+    return np.sqrt(np.diag(np.array(model.noise))) / (1.0 / model.rate_hz)
 
 
 def loop_detector_context(model: Model) -> Context:

@@ -69,7 +69,7 @@ def bank_posterior(samples: Samples, model: Model, bank: HypothesisBank) -> Floa
         flights = [innovations(_with_command_delay(samples, delay_s), model) for delay_s in delays]
         runs = [run_flight(flight, model, bank) for flight in flights]
         weights = model_weights([ll for _, ll in runs], model.rate_hz)
-        return np.asarray((weights[:, :, None] * np.array([p for p, _ in runs])).sum(axis=0))
+        return (weights[:, :, None] * np.array([p for p, _ in runs])).sum(axis=0)
     pairs = [(innovations(white, one), one) for white, one in by_noise(samples, model)]
     weights = model_weights([_noise_likelihood(*pair) for pair in pairs], model.rate_hz)
     kept = np.where(weights < _MIN_NOISE_WEIGHT, 0.0, weights)
@@ -101,7 +101,7 @@ def fault_evidence(p: Floats, bank: HypothesisBank) -> Floats:
     fault = np.clip(p[:, is_fault].sum(axis=1), _MIN_PROBABILITY, 1.0 - _MIN_PROBABILITY)
     entry = change * share[is_fault].sum() / share.sum()
     prior = np.append(bank.prior_probability[is_fault].sum(), (1.0 - change) * fault[:-1] + entry)
-    return np.asarray(np.log(fault / (1.0 - fault)) - np.log(prior / (1.0 - prior)))
+    return np.log(fault / (1.0 - fault)) - np.log(prior / (1.0 - prior))
 
 
 @kernel
@@ -138,7 +138,7 @@ def model_weights(ll: Sequence[Floats], rate_hz: float) -> Floats:
     a = np.exp(-1.0 / (_EVIDENCE_MEMORY_S * rate_hz))
     sums = lfilter([1.0], [1.0, -a], np.array(ll), axis=1)
     p = np.exp(sums - sums.max(axis=0))
-    return np.asarray(p / p.sum(axis=0))
+    return p / p.sum(axis=0)
 
 
 def run_flight(flight: Innovations, model: Model, bank: HypothesisBank) -> BankRun:

@@ -32,7 +32,7 @@ def yule_walker_predictor(model: Model, Q: Floats, s: float, L: int) -> tuple[Fl
     P = blocks.transpose(0, 2, 1, 3).reshape(3 * L, 3 * L)
     S = np.concatenate([_at_lag(R, -int(i) - 1) for i in lags])
     B = np.linalg.solve(P, S)
-    return np.asarray(B), np.asarray(R[0] - S.T @ B)
+    return B, R[0] - S.T @ B
 
 
 def _autocovariance(model: Model, Q: Floats, s: float, L: int) -> Floats:
@@ -48,4 +48,4 @@ def _autocovariance(model: Model, Q: Floats, s: float, L: int) -> Floats:
 
 def _at_lag(R: Floats, t: int) -> Floats:
     """E w[k] w[k-lag]' at any lag."""
-    return np.asarray(R[t] if t >= 0 else R[-t].T)
+    return R[t] if t >= 0 else R[-t].T

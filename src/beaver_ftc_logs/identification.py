@@ -115,7 +115,7 @@ def assume_law_and_air(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Ve
         else:
             lines.append(f"{key}: {str(getattr(vehicle, key)).lower()}, as the vehicle file says")
     if vehicle.reference_airspeed_mps is None:
-        airspeed = any(flight.airspeed is not None for flight in flights)
+        airspeed = any(np.isfinite(flight.airspeed).any() for flight in flights)
         why = "explains no more" if airspeed else "is not logged"
         lines.append(f"reference_airspeed_mps: none, the airspeed {why}")
     return vehicle, lines
@@ -180,7 +180,7 @@ def expect_another_day(folds: list[Document], model: Model) -> Document:
         key: {"mean": float(np.mean(each)), "worst": float((max if key == "mean_error" else min)(each))}
         for key, each in values.items()
     }
-    tail = model.fitted.tail if model.fitted is not None else None
+    tail = model.fitted.tail
     threshold = model.settings.threshold
     if tail is None or threshold is None:
         return expected
@@ -198,7 +198,7 @@ def scale_if_better(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Seque
     known and this explains more; else both as they are. Where other laws may fly, each group of surfaces with
     the power of the airspeed that explains most; another than that of the pressure must explain decisively
     more."""
-    V = np.concatenate([np.empty(0), *(flight.airspeed for flight in flights if flight.airspeed is not None)])
+    V = np.concatenate([flight.airspeed for flight in flights])
     V = V[np.isfinite(V)]
     V0 = float(np.median(V)) if V.size else 0.0
     if vehicle.reference_airspeed_mps is not None or V0 <= 0.0:

@@ -145,8 +145,8 @@ class FittedRanges(_LastingSection):
     tail: highest alarm statistic on parts not fitted
     """
 
-    commands: CoefRows
-    rates: CoefRows
+    commands: CoefRows = Field([])
+    rates: CoefRows = Field([])
     airspeed: CoefRow | None = None
     tied: CoefRow = Field([])
     gain_sd: list[NonNegative] = Field([])
@@ -194,7 +194,7 @@ class Model(Section):
     response_sd: standard errors of `response`, colour included
     noise: covariance of the residual, (3, 3), (rad/s)2
     colours: noises that flights were seen to have, for `moving_air`
-    fitted: what it was fitted on; None: nothing is known
+    fitted: what it was fitted on; left out: nothing is known
     identified: what it was found from, and how well
     """
 
@@ -212,7 +212,7 @@ class Model(Section):
     noise: Covariance
     colours: list[NoiseModel] = Field([])
     settings: FilterSettings = FilterSettings()
-    fitted: FittedRanges | None = None
+    fitted: FittedRanges = FittedRanges()
     identified: dict[str, object] = Field({})
 
     @model_validator(mode="after")
@@ -255,14 +255,9 @@ class Model(Section):
             arrays.append(((*at, "misreads"), noise.misreads, (G,)))
             if noise.average[0] != 1.0:
                 yield (*at, "average"), "does not begin with 1, allowed: 1, c1, ..."
-        if (ranges := self.fitted) is not None:
-            arrays += [
-                (("fitted", "commands"), ranges.commands, (len(ranges.commands), 2)),
-                (("fitted", "rates"), ranges.rates, (3, 2)),
-                (("fitted", "airspeed"), ranges.airspeed, (2,)),
-                (("fitted", "tied"), ranges.tied, (G,)),
-                (("fitted", "gain_sd"), ranges.gain_sd, (G,)),
-            ]
+        shapes = {"commands": (len(self.fitted.commands), 2), "rates": (3, 2), "airspeed": (2,)}
+        for key, shape in (shapes | {"tied": (G,), "gain_sd": (G,)}).items():
+            arrays.append((("fitted", key), getattr(self.fitted, key), shape))
         for key_path, lists, shape in arrays:
             if lists and _shape(lists) != shape:
                 yield key_path, f"has another shape, allowed: {' x '.join(map(str, shape))} numbers"

@@ -42,12 +42,12 @@ Runs = list[tuple[int, int]]
 
 def last_true_row(mask: Mask) -> Ints:
     """The last row up to each at which a mask (n,) is true, (n,); -1 before the first."""
-    return np.asarray(np.maximum.accumulate(np.where(mask, np.arange(len(mask)), -1)))
+    return np.maximum.accumulate(np.where(mask, np.arange(len(mask)), -1))
 
 
 def last_row_at(stamps: Floats, t_s: Floats) -> Ints:
     """The row of the last stamp up to each time; the first before it."""
-    return np.asarray(np.maximum(np.searchsorted(stamps, t_s, side="right") - 1, 0))
+    return np.maximum(np.searchsorted(stamps, t_s, side="right") - 1, 0)
 
 
 def runs_between(is_edge: Mask) -> Runs:

@@ -113,7 +113,7 @@ def _sliding_maximum(x: Floats, n: int) -> Floats:
 
     padded = np.concatenate([np.full((n - 1, x.shape[1]), -np.inf), x])
     top = maximum_filter1d(padded, n, axis=0, origin=(n - 1) // 2)
-    return np.asarray(top[n - 1 :])
+    return top[n - 1 :]
 
 
 def rows_of_replay(t_s: Floats, replay: Replayed, surfaces: Sequence[str], fdi: Any) -> LogRows:

@@ -111,10 +111,10 @@ def _levels_and_shares(model: Model, g: int) -> tuple[Floats, Floats]:
     grid = np.arange(0.0, 1.0 - 0.5 * settings.level_step, settings.level_step)
     levels = np.unique(np.round(np.concatenate([grid, np.array(labelled, dtype=float)]), 6))
     is_labelled = np.isin(levels, np.round(labelled, 6))
-    if not is_labelled.any() or is_labelled.all():
+    n, share = int(is_labelled.sum()), settings.level_share
+    if n in (0, len(levels)):
         return levels, np.full(len(levels), 1.0 / len(levels))
-    share = settings.level_share
-    return levels, np.where(is_labelled, share / is_labelled.sum(), (1.0 - share) / (~is_labelled).sum())
+    return levels, np.where(is_labelled, share / n, (1.0 - share) / (len(levels) - n))
 
 
 def _offset_variances(model: Model, g: int) -> list[Floats]:
@@ -123,8 +123,8 @@ def _offset_variances(model: Model, g: int) -> list[Floats]:
     B, R = np.array(model.response), np.array(model.noise)
     total = np.abs(B[g]).sum(axis=0) / np.sqrt(np.diag(R))
     ratio = np.clip(total / max(total.max(), MIN_DIVISOR), 0.3, 1.0)
-    variances = {"loss": np.zeros(3), "stuck": np.diag(R) * (model.settings.jam_sd * ratio) ** 2}
-    return [variances[kind] for kind in model.vehicle.faults]
+    stuck = np.diag(R) * (model.settings.jam_sd * ratio) ** 2
+    return [stuck if kind == "stuck" else np.zeros(3) for kind in model.vehicle.faults]
 
 
 def _pair_hypotheses(n: int, groups: list[int]) -> list[HypothesisRow]:

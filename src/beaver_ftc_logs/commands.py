@@ -57,8 +57,6 @@ def identify(
     if vehicle is None or out is None:
         option = "--vehicle" if vehicle is None else "--out"
         raise BadInput(f"identify: {option} is missing, allowed: --vehicle FILE --out MODEL, or --check")
-    from beaver_ftc.results import clear_disk_errors
-    from beaver_ftc.studies.engine import write_whole
     from beaver_ftc_logs.identification import identification_text, identify, scale_if_better
     from beaver_ftc_logs.mixing import load_vehicle_for_logs
     from beaver_ftc_logs.model import model_file_text
@@ -74,10 +72,8 @@ def identify(
     logs, loaded = scale_if_better(load_flights_for_fit(flights, loaded, reader), loaded)
     model = identify(logs, loaded)
     page_html = render_identification(logs, model)
-    for path, file_text in ((out, model_file_text(model)), (page, page_html)):
-        with clear_disk_errors(path):
-            path.parent.mkdir(parents=True, exist_ok=True)
-            write_whole(path, file_text.encode("utf-8"))
+    _write_file(out, model_file_text(model))
+    _write_file(page, page_html)
     document = {
         "model": str(out),
         "page": str(page),
@@ -107,7 +103,7 @@ def _check_logs(
     guess = next((finding["vehicle"] for finding in findings if finding["vehicle"]), None)
     texts = [*mixing, *(as_text(finding) for finding in findings)]
     if guess is not None and out is not None:
-        _write_vehicle_file(out, vehicle_file_text(guess))
+        _write_file(out, vehicle_file_text(guess))
         texts.append(f"vehicle file: {out}")
     elif guess is not None:
         texts.append(vehicle_file_text(guess))
@@ -116,12 +112,13 @@ def _check_logs(
         raise typer.Exit(2)
 
 
-def _write_vehicle_file(path: Path, text: str) -> None:
+def _write_file(path: Path, text: str) -> None:
     from beaver_ftc.results import clear_disk_errors
+    from beaver_ftc.studies.engine import write_whole
 
     with clear_disk_errors(path):
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
+        write_whole(path, text.encode("utf-8"))
 
 
 @dataclass(frozen=True)

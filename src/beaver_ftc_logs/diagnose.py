@@ -336,7 +336,7 @@ def _at_log_stamps(samples: Samples, rows: LogRows) -> LogRows:
     if np.array_equal(samples.log_stamps_s, rows.t_s):
         return rows
     last = last_row_at(rows.t_s, samples.log_stamps_s)
-    names = [name for name in LogRows.__dataclass_fields__ if name not in ("t_s", "doubtful_rows")]
-    reasons = {reason: mask[last] for reason, mask in rows.doubtful_rows.items()}
+    names = set(LogRows.__dataclass_fields__) - {"doubtful_rows"}
     fields = {name: getattr(rows, name)[last] for name in names}
-    return LogRows(t_s=samples.log_stamps_s, doubtful_rows=reasons, **fields)
+    reasons = {reason: mask[last] for reason, mask in rows.doubtful_rows.items()}
+    return LogRows(**(fields | {"t_s": samples.log_stamps_s, "doubtful_rows": reasons}))

@@ -203,7 +203,6 @@ def scale_if_better(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Seque
     V0 = float(np.median(V)) if V.size else 0.0
     if vehicle.reference_airspeed_mps is not None or V0 <= 0.0:
         return flights, vehicle
-    unset = {key: None for key in ("other_laws", "moving_air") if getattr(vehicle, key) is None}
     assumed, _ = assume_law_and_air(flights, vehicle)
     best = assumed.model_copy(update={"reference_airspeed_mps": V0})
     if _min_bic(flights, assumed) - _min_bic(_scaled(flights, best), best) < _DECISIVE_BIC:
@@ -218,7 +217,8 @@ def scale_if_better(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Seque
             candidate = best.model_copy(update={"airspeed_powers": powers})
             if (bic := _min_bic(_scaled(flights, candidate, white), candidate)) < least:
                 least, best = bic, candidate
-    return _scaled(flights, best), best.model_copy(update=unset)
+    found = {key: getattr(best, key) for key in ("reference_airspeed_mps", "airspeed_powers")}
+    return _scaled(flights, best), vehicle.model_copy(update=found)
 
 
 def _scaled(

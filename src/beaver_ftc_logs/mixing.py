@@ -382,32 +382,30 @@ def _add_surfaces_by_output(
             mixing.lines.append(surface.stays_out(f"{column} is not in the log"))
     used = [(surface, *output) for surface, output in pairs if output[0] in names]
     surfaces, columns = [surface for surface, *_ in used], [column for _, column, _ in used]
-    rows, own = _rows_of_commands(surfaces), _weights_of_own_columns(surfaces, columns)
+    rows, own = _rows_of_commands(surfaces), _weights_of_own_columns(surfaces)
     basis: list[int] = []
     for k, (surface, column, (scale, offset, text)) in enumerate(used):
         factors = np.linalg.lstsq(rows[basis].T, rows[k], rcond=None)[0] if basis else np.zeros(0)
         if basis and np.allclose(factors @ rows[basis], rows[k], atol=1e-6):
-            weights: Weights = {}
-            for factor, i in zip(factors.tolist(), basis, strict=True):
-                for name, weight in own[i].items():
-                    weights[name] = weights.get(name, 0.0) + factor * weight
-            weights = _tidy(weights)
+            shares = factors @ own[basis]
         else:
             basis.append(k)
-            weights = own[k]
+            shares = own[k]
+        weights = _tidy(dict(zip(columns, shares.tolist(), strict=True)))
         mixing.surfaces[surface.name] = weights
         mixing.entry_by_column[column] = _command_entry(column, scale, offset)
         shared = "" if column in weights else f"; it moves with {' and '.join(weights)}"
         mixing.lines.append(f"{surface}: {surface.reason}{text}{shared}")
 
 
-def _weights_of_own_columns(surfaces: Sequence[_Surface], columns: list[str]) -> list[Weights]:
-    """The command of each surface by itself. Flaps are added to one flaperon and taken from the other: half
-    the sum of both is the command without flaps."""
+def _weights_of_own_columns(surfaces: Sequence[_Surface]) -> Floats:
+    """The command of each surface by itself, a row of shares of the columns. Flaps are added to one flaperon
+    and taken from the other: half the sum of both is the command without flaps."""
+    own = np.eye(len(surfaces))
     flaps = [k for k, surface in enumerate(surfaces) if surface.name in _FLAPERONS]
-    halves = {columns[k]: 0.5 for k in flaps}
-    both = len(flaps) == len(_FLAPERONS)
-    return [halves if both and k in flaps else {column: 1.0} for k, column in enumerate(columns)]
+    if len(flaps) == len(_FLAPERONS):
+        own[np.ix_(flaps, flaps)] = 0.5
+    return own
 
 
 def _rows_of_commands(surfaces: Sequence[_Surface]) -> Floats:

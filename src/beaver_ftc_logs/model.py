@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from beaver_ftc.documents import Conflict, Location, Number, Section, Whole, deny, read_file, refuse
 from beaver_ftc_logs.extremes import PeakTail
@@ -194,7 +194,7 @@ class Model(Section):
     response_sd: standard errors of `response`, colour included
     noise: covariance of the residual, (3, 3), (rad/s)2
     colours: noises that flights were seen to have, for `moving_air`
-    fitted: what it was fitted on; left out: nothing is known
+    fitted: what it was fitted on; null or left out: nothing is known
     identified: what it was found from, and how well
     """
 
@@ -212,7 +212,7 @@ class Model(Section):
     noise: Covariance
     colours: list[NoiseModel] = Field([])
     settings: FilterSettings = FilterSettings()
-    fitted: FittedRanges = FittedRanges()
+    fitted: Annotated[FittedRanges, BeforeValidator(lambda given: given or {})] = FittedRanges()
     identified: dict[str, object] = Field({})
 
     @model_validator(mode="after")

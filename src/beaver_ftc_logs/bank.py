@@ -29,7 +29,6 @@ _OFFSET_SHARE = 0.05
 _SILENT_SHARE = 0.02
 _PAIR_LEVELS = (0.25, 0.5, 0.75)
 _PRIOR_HEALTHY, _PRIOR_NO_RESPONSE = 0.7, 0.2
-_MIN_NOISE_SCALE, _MAX_NOISE_SCALE = 0.3, 6.0
 _MAX_SQUARE = 30.0
 """For a whitened flight: the predictor needs a fraction of a second to adapt to a fault."""
 
@@ -195,9 +194,9 @@ class ResidualNoise(NamedTuple):
 
     intercept_rad_s (3,): intercept of the model. covariance (3, 3) of a sample, (rad/s)2.
     effective_sample_share: information of a residual over that of a white one. t_degrees_of_freedom of its t
-    distribution. scale_memory_samples, min_variance_scale, max_variance_scale: memory and limits of the
-    running scale of the covariance. max_squared_residual: squared standardised residual above which a sample
-    carries no information. covariance_inflation: covariance over that of the residuals in the fit.
+    distribution. scale_memory_samples: memory of the running scale of the covariance. max_squared_residual:
+    squared standardised residual above which a sample carries no information. covariance_inflation:
+    covariance over that of the residuals in the fit.
     """
 
     intercept_rad_s: Floats
@@ -205,8 +204,6 @@ class ResidualNoise(NamedTuple):
     effective_sample_share: float
     t_degrees_of_freedom: float
     scale_memory_samples: float
-    min_variance_scale: float
-    max_variance_scale: float
     max_squared_residual: float
     covariance_inflation: float
 
@@ -220,8 +217,6 @@ def build_noise(model: Model, noise: NoiseModel, intercept_rad_s: Floats) -> Res
         effective_sample_share=settings.power,
         t_degrees_of_freedom=settings.tail,
         scale_memory_samples=settings.noise_memory_s * model.rate_hz,
-        min_variance_scale=_MIN_NOISE_SCALE,
-        max_variance_scale=_MAX_NOISE_SCALE,
         max_squared_residual=_MAX_SQUARE if noise.before else np.inf,
         covariance_inflation=noise.wider,
     )

@@ -38,7 +38,7 @@ from beaver_ftc_logs.readers.table import (
     text_of_column_phrase,
 )
 from beaver_ftc_logs.recording import Column, Floats, RecordedFlight, TimeSource, nearest_names_text
-from beaver_ftc_logs.samples import convert_to_si, read_vehicle_parts, resample
+from beaver_ftc_logs.samples import convert_to_si, named_angles, read_vehicle_parts, resample
 from beaver_ftc_logs.units import ACCELERATION, RATE, SI_UNITS, TIME_UNITS, nearest_unit
 from beaver_ftc_logs.vehicle import Vehicle, unused_keys_as_comments
 
@@ -124,20 +124,20 @@ def _check_recording(log: RecordedFlight, vehicle: Vehicle) -> tuple[bool, list[
 
 def _compare_angles(log: RecordedFlight, vehicle: Vehicle) -> list[str]:
     """That rates and angles agree, or that nothing could be compared."""
-    columns, angles = convert_to_si(log, vehicle).columns, vehicle.attitude
-    if angles is None or angles.roll.column not in columns:
+    columns = convert_to_si(log, vehicle).columns
+    angles = named_angles(columns, vehicle)
+    if angles[0] is None:
         return ["no roll angle is named: whether the rates are in rad/s is not checked"]
     gyros = [columns[name] for name in vehicle.rate_columns]
-    names = [angle.column if angle else "" for angle in (angles.roll, angles.pitch, angles.yaw)]
-    in_si = [columns.get(name) for name in names]
+    in_si = [angle and angle[1] for angle in angles]
     fits = [physics.fit_angle(gyros, in_si, axis) for axis in range(3)]
     if fits[0] is None:
         return ["too little moves to compare the rates with the roll angle"]
     return [
-        f"the change of {angle} is {fit.slope:.3f} times the integral of {rate} (correlation "
+        f"the change of {angle[0]} is {fit.slope:.3f} times the integral of {rate} (correlation "
         f"{fit.correlation:.2f}): {'they agree' if _agrees(fit) else 'they tell nothing of one another'}"
-        for fit, angle, rate in zip(fits, names, vehicle.rate_columns, strict=True)
-        if fit
+        for fit, angle, rate in zip(fits, angles, vehicle.rate_columns, strict=True)
+        if fit and angle
     ]
 
 

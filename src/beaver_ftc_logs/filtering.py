@@ -44,6 +44,7 @@ from beaver_ftc_logs.samples import Samples
 
 _EVIDENCE_MEMORY_S = 600.0
 _MIN_PROBABILITY = 1e-15
+_MIN_NOISE_SCALE, _MAX_NOISE_SCALE = 0.3, 6.0
 _SQUARE_CLIP = 3.0
 _SUM_SPANS_S, _VARIANCE_WINDOW_S = (0.0, 0.1), 2.0
 """Spans over which a residual is summed, and the window in which its variance is taken."""
@@ -200,7 +201,7 @@ def run_bank(y, F, ok, bank, states, noise, r_min, q):
             p, d2, ll[k] = _correct(prior, x, P, y[k], F[k], bank, noise, q[k] * max(r, r_min[k]))
             x[:] = np.minimum(np.maximum(x, lo), hi)  # bounded, so that no hypothesis adapts to a fault
             r *= np.exp((1.0 - p[last]) * (d2 / 3.0 - _MEAN_SQUARE) / noise.scale_memory_samples)
-            r = min(max(r, noise.min_variance_scale), noise.max_variance_scale)
+            r = min(max(r, _MIN_NOISE_SCALE), _MAX_NOISE_SCALE)
         else:
             p = prior
         post[k] = p

@@ -16,9 +16,11 @@ import numpy as np
 
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs import energy, physics, signals
+from beaver_ftc_logs.physics import NamedColumn
 from beaver_ftc_logs.readers import read_parts, split_long_recording
 from beaver_ftc_logs.recording import (
     Column,
+    Columns,
     Floats,
     Ints,
     LoggedFailure,
@@ -198,14 +200,11 @@ def _is_held_value_stale(column: Column, t_s: Floats, step_s: float) -> Mask:
 def _check_attitude(log: RecordedFlight, vehicle: Vehicle) -> frozenset[str]:
     """The columns of rates that the angles confirm. Raises BadInput where rates, angles and gravity
     contradict one another: what is in another unit."""
-    columns, attitude, mistake = log.columns, vehicle.attitude, None
+    columns, mistake = log.columns, None
     confirmed = frozenset[str]()
     rates = {name: columns[name] for name in vehicle.rate_columns}
-    if attitude and not signals.find_clipped_rows(next(iter(rates.values())).values).any():
-        angles = [
-            (quantity.column, columns[quantity.column]) if quantity and quantity.column in columns else None
-            for quantity in (attitude.roll, attitude.pitch, attitude.yaw)
-        ]
+    if not signals.find_clipped_rows(next(iter(rates.values())).values).any():
+        angles = named_angles(columns, vehicle)
         flow = [quantity.column for quantity in vehicle.flow.values()]
         possible = dict.fromkeys([*vehicle.signal_columns, *flow, *vehicle.command_columns])
         candidates = {name: columns[name] for name in possible if name in columns}
@@ -217,6 +216,12 @@ def _check_attitude(log: RecordedFlight, vehicle: Vehicle) -> frozenset[str]:
     if mistake:
         raise BadInput(f"{log.name}: {mistake}, allowed: what the vehicle file says, or its `unit` mended")
     return confirmed
+
+
+def named_angles(columns: Columns, vehicle: Vehicle) -> list[NamedColumn | None]:
+    """The columns of roll, pitch and yaw; None of an angle that is not named or not logged."""
+    angles = [getattr(vehicle.attitude, angle, None) for angle in ("roll", "pitch", "yaw")]
+    return [(of.column, columns[of.column]) if of and of.column in columns else None for of in angles]
 
 
 def convert_to_si(log: RecordedFlight, vehicle: Vehicle) -> RecordedFlight:

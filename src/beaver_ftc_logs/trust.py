@@ -332,7 +332,7 @@ def _rows_out_of_range(samples: Samples, model: Model, ranges: FittedRanges) -> 
     reasons = {}
     for name, values, (lo, hi) in channels:
         margin = _RANGE_MARGIN_SHARE * (hi - lo) + MIN_DIVISOR
-        margins = (_AIRSPEED_MARGIN * lo, _AIRSPEED_MARGIN * hi) if name == "airspeed" else (margin, margin)
+        margins = _AIRSPEED_MARGIN * np.array([lo, hi]) if name == "airspeed" else (margin, margin)
         outside = (values < lo - margins[0]) | (values > hi + margins[1])
         reason = f"{name} is outside {lo:.3g} to {hi:.3g}, where the model was fitted"
         sums, n = regression.trailing_sums(outside, _RANGE_WINDOW_S / samples.dt_s)

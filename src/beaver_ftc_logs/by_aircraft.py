@@ -22,7 +22,15 @@ from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import findings, trust
 from beaver_ftc_logs.diagnose import LogRows, reversed_command_error
-from beaver_ftc_logs.recording import Floats, Mask, Reasons, RecordedFlight, Runs, true_runs
+from beaver_ftc_logs.recording import (
+    Floats,
+    Mask,
+    Reasons,
+    RecordedFlight,
+    Runs,
+    largest_magnitude,
+    true_runs,
+)
 from beaver_ftc_logs.samples import Samples, convert_to_si, named_angles, resample, sample_column
 from beaver_ftc_logs.stepped import Replayed, error_sections, replay_samples, rows_of_replay
 from beaver_ftc_logs.vehicle import Vehicle
@@ -269,7 +277,7 @@ def _check_plausible(flight: str, signals: Floats, commands: Floats, aircraft: A
     for surface, command in zip(aircraft.surfaces, commands.T, strict=True):
         travel = aircraft.travel[surface]
         stop_rad = max(abs(travel.min_rad), abs(travel.max_rad))
-        max_rad = np.nanmax(np.abs(command), initial=0.0)
+        max_rad = largest_magnitude(command)
         if max_rad > _STOP_RATIO * stop_rad:
             reason = f"the command of {surface} reaches {max_rad:.3g} rad"
             allowed = f"its stop, {stop_rad:.3g} rad"

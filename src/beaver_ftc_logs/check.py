@@ -37,8 +37,21 @@ from beaver_ftc_logs.readers.table import (
     first_cells_of_column,
     text_of_column_phrase,
 )
-from beaver_ftc_logs.recording import Column, Floats, RecordedFlight, TimeSource, nearest_names_text
-from beaver_ftc_logs.samples import convert_to_si, named_angles, read_vehicle_parts, resample
+from beaver_ftc_logs.recording import (
+    Column,
+    Floats,
+    RecordedFlight,
+    TimeSource,
+    largest_magnitude,
+    nearest_names_text,
+)
+from beaver_ftc_logs.samples import (
+    convert_to_si,
+    median_step_s,
+    named_angles,
+    read_vehicle_parts,
+    resample,
+)
 from beaver_ftc_logs.units import ACCELERATION, RATE, SI_UNITS, TIME_UNITS, nearest_unit
 from beaver_ftc_logs.vehicle import Vehicle, unused_keys_as_comments
 
@@ -77,7 +90,7 @@ _PWM_RANGE_US = (700.0, 2300.0)
 _LARGEST_RAD_S = 12.0
 _MIN_CORRELATION = 0.7
 _MAX_COMMANDS, _MAX_READ_COLUMNS = 8, 60
-_LOG_RATES_HZ = (4.0, 2000.0)
+_LOG_STEPS_S = (1.0 / 2000.0, 1.0 / 4.0)
 
 
 class _NoVehicle(Exception):
@@ -245,9 +258,8 @@ def _find_time(path: Path, remarks: list[str]) -> TimeSource:
         stamps = cells.numbers[name][np.isfinite(cells.numbers[name])]
         if phrase := text_of_column_phrase(cells, name):
             phrases.append(f"{name} holds {phrase.removeprefix(', but ')}")
-        step = float(np.median(np.diff(stamps[:50]))) if len(stamps) > 1 else 0.0
-        rates = {unit: 1.0 / (step * seconds) for unit, seconds in TIME_UNITS.items()} if step > 0.0 else {}
-        units = [unit for unit, rate in rates.items() if _LOG_RATES_HZ[0] <= rate <= _LOG_RATES_HZ[1]]
+        step, (shortest_s, longest_s) = median_step_s(stamps), _LOG_STEPS_S
+        units = [unit for unit, seconds in TIME_UNITS.items() if shortest_s <= step * seconds <= longest_s]
         if units:
             unit = next((unit for unit in units if _snake_case(name).endswith(unit)), units[0])
             if (name, unit) != (TIME_COLUMN, "s"):
@@ -264,7 +276,7 @@ def _guess_angle_unit(name: str, roll: Column, reader: str) -> str:
     stated = next((unit for unit in ("deg", "rad") if unit in name.lower()), None)
     if reader == "ardupilot":
         return "deg"
-    return stated or ("deg" if _largest_magnitude(roll.values) > 2.0 * np.pi else "rad")
+    return stated or ("deg" if largest_magnitude(roll.values) > 2.0 * np.pi else "rad")
 
 
 def _guess_rate_unit(
@@ -279,12 +291,8 @@ def _guess_rate_unit(
         fit = physics.fit_angle(rates, (in_rad, None, None), 0)
         if fit is not None and _agrees(fit):
             found = nearest_unit(RATE, abs(fit.slope), 1.5) or found or "rad/s"
-    largest = max(_largest_magnitude(rate.values) for rate in rates)
+    largest = max(largest_magnitude(rate.values) for rate in rates)
     return found or ("deg/s" if largest > _LARGEST_RAD_S else "rad/s")
-
-
-def _largest_magnitude(values: Floats) -> float:
-    return float(np.nanmax(np.abs(values), initial=0.0))
 
 
 def _column_entry(name: str | None, unit: str, si_unit: str) -> Any:
@@ -293,7 +301,7 @@ def _column_entry(name: str | None, unit: str, si_unit: str) -> Any:
 
 def _pulse_entry(name: str, values: Floats) -> Any:
     """A command as a share of travel: pulses of 1100 to 1900 us, per cent, or as it is."""
-    median, largest = float(np.nanmedian(values)), _largest_magnitude(values)
+    median, largest = float(np.nanmedian(values)), largest_magnitude(values)
     if _PWM_RANGE_US[0] < median < _PWM_RANGE_US[1]:
         return {"column": name, "scale": 0.0025, "offset": -3.75}
     return {"column": name, "unit": "%"} if 10.0 < largest <= 105.0 else name

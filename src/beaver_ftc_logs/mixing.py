@@ -21,7 +21,7 @@ from beaver_ftc.documents import BadInput
 from beaver_ftc.documents import validate_model as validate
 from beaver_ftc.results import Document
 from beaver_ftc_logs.readers import SELECTIVE_READERS, check_exists, read_flight, reader_name_for_path
-from beaver_ftc_logs.recording import Floats, Parameters
+from beaver_ftc_logs.recording import Floats, Parameters, last_value
 from beaver_ftc_logs.vehicle import Vehicle, read_vehicle_document
 
 Weights = dict[str, float]
@@ -172,14 +172,13 @@ class _Parameters:
     def number(self, name: str, low: float, high: float, unit: str = "") -> float:
         """The last value of a parameter. Raises _BadParameter for one that is missing or out of range."""
         allowed = f"allowed: {low:g} to {high:g}{unit}"
-        values = self.values_by_name.get(name, ())
-        if not values:
+        value = last_value(self.values_by_name, name)
+        if value is None:
             raise _BadParameter(f"{name} is not in the log, {allowed}")
-        value = values[-1]
         if not (math.isfinite(value) and low <= value <= high):
             raise _BadParameter(f"{name} is {value:g}, {allowed}")
         line = f"{name} changes in the log: its last value, {value:g}, is used"
-        if len(values) > 1 and line not in self.lines_on_changes:
+        if len(self.values_by_name[name]) > 1 and line not in self.lines_on_changes:
             self.lines_on_changes.append(line)
         return value
 
@@ -316,7 +315,7 @@ def _px4_mixing(params: _Parameters, column_names: set[str]) -> _Found:
     if "actuator_outputs_1.output[0]" not in column_names:  # else it is unknown which of the two is MAIN
         outputs += _px4_pulses(params, [*drivers.values()])
     # of several torque setpoints, as a vehicle that can hover has, it is unknown which one is of these
-    is_fixed_wing = params.values_by_name.get("CA_AIRFRAME", (0.0,))[-1] == _PX4_FIXED_WING
+    is_fixed_wing = last_value(params.values_by_name, "CA_AIRFRAME") == _PX4_FIXED_WING
     reason = "" if is_fixed_wing else "CA_AIRFRAME is not 1 (fixed wing)"
     return surfaces, outputs, _Axes(_PX4_AXIS_COLUMNS, 1.0, reason)
 

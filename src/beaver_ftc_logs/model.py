@@ -221,11 +221,12 @@ class Model(Section):
         n, n_past = len(self.past), 3 * self.history + n_signals
         reason = f"has {n} rows, allowed: {n_past}, as `identify` writes them: identify it again"
         conflicts: list[Conflict] = [(("past",), reason)] * (n != n_past)
-        refuse([*conflicts, *self._group_mistakes(), *self._shape_mistakes()])
+        refuse([*conflicts, *self._name_mistakes(), *self._shape_mistakes()])
         return self
 
-    def _group_mistakes(self) -> Iterator[Conflict]:
-        """Names that are no surface of the vehicle's, or are in two groups; levels of no group."""
+    def _name_mistakes(self) -> Iterator[Conflict]:
+        """Names that are no surface of the vehicle's, or are in two groups; levels of no group; delays that
+        are too long."""
         seen: set[str] = set()
         for i, group in enumerate(self.groups):
             for k, name in enumerate(group):

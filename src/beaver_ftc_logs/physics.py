@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from beaver_ftc_logs.recording import Column, Columns, Floats
+from beaver_ftc_logs.recording import Column, Columns, Floats, largest_magnitude
 from beaver_ftc_logs.units import ACCELERATION, ANGLE, RATE, SI_UNITS, UNIT_FACTORS, nearest_unit
 
 _ANGLE_WINDOW_S, _MIN_WINDOWS = 1.0, 8
@@ -105,8 +105,8 @@ def _fit_angle(
     return AngleFit(
         slope=np.sign(xy) * np.sqrt(yy / xx),
         correlation=xy / np.sqrt(xx * yy),
-        max_angle_magnitude=float(np.nanmax(np.abs(angle))),
-        max_rate_magnitude=float(np.nanmax(np.abs(terms[0]))),
+        max_angle_magnitude=largest_magnitude(angle),
+        max_rate_magnitude=largest_magnitude(terms[0]),
     )
 
 
@@ -121,7 +121,7 @@ def _interpolate(column: Column, t: Floats) -> Floats:
 
 def _full_circle(angle: Floats) -> float:
     """A full circle in the unit that the angles seem to have: the least of rad, deg and cdeg that fits."""
-    largest = float(np.nanmax(np.abs(angle), initial=0.0))
+    largest = largest_magnitude(angle)
     return next((circle for circle in (2.0 * np.pi, 360.0) if largest <= 1.02 * circle), 36000.0)
 
 
@@ -210,7 +210,7 @@ def _factor_remark(fit: AngleFit, rate: str, angle: str) -> str | None:
 def _pitch_remark(name: str, pitch: Column) -> str | None:
     """Describe a mistake in a pitch angle by its size, and which unit fits; None where nothing is: it says
     what no comparison can, where rates and angles are scaled alike."""
-    largest = float(np.nanmax(np.abs(pitch.values), initial=0.0))
+    largest = largest_magnitude(pitch.values)
     if largest <= _MAX_PITCH_RAD:
         return None
     unit = next((u for u in ("deg", "cdeg") if largest * SI_UNITS[u][1] <= _MAX_PITCH_RAD), None)

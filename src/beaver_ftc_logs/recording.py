@@ -61,6 +61,11 @@ def true_runs(mask: Mask) -> Runs:
     return [(begin, end) for begin, end in edges.tolist()]
 
 
+def largest_magnitude(values: Floats) -> float:
+    """The largest of the numbers without sign, 0 of none."""
+    return float(np.nanmax(np.abs(values), initial=0.0))
+
+
 @dataclass(frozen=True)
 class Column:
     """One logged quantity. t_s (n,) s, increasing; values (n,) in the unit its name carries; note: a line on
@@ -114,6 +119,12 @@ def add_parameter(values_by_name: Parameters, name: str, value: float) -> None:
     is_as_before = bool(values) and (values[-1] == value or (isnan(values[-1]) and isnan(value)))
     if not is_as_before:
         values_by_name[name] = (*values[:1], float(value))
+
+
+def last_value(parameters: Parameters, name: str) -> float | None:
+    """The last value of a parameter, None where the log does not give it."""
+    values = parameters.get(name)
+    return values[-1] if values else None
 
 
 def nearest_names_text(wanted_name: str, names: Iterable[str]) -> str:

@@ -27,6 +27,7 @@ from beaver_ftc_logs.recording import (
     Mask,
     RecordedFlight,
     Runs,
+    largest_magnitude,
     runs_between,
 )
 from beaver_ftc_logs.units import TIME_UNITS
@@ -193,7 +194,7 @@ def unchanged_s(column: Column, t_s: Floats) -> Floats:
 def _is_held_value_stale(column: Column, t_s: Floats, step_s: float) -> Mask:
     """Whether at each sample a gap has opened since the last number of a column."""
     column = _finite_rows(column)
-    usual_step_s = max(_median_step_s(column.t_s), step_s) if len(column.t_s) > 1 else step_s
+    usual_step_s = max(median_step_s(column.t_s), step_s) if len(column.t_s) > 1 else step_s
     return _held_age_s(column, t_s) > _MIN_GAP_STEPS * usual_step_s
 
 
@@ -264,7 +265,7 @@ def _refuse_columns(log: RecordedFlight, used: list[str], rate_names: list[str])
         values = log.columns[name].values
         if not np.isfinite(values).any():
             raise BadInput(f"{log.name}: column {name} holds no number, allowed: a logged quantity")
-        largest[name] = float(np.nanmax(np.abs(values)))
+        largest[name] = largest_magnitude(values)
         if largest[name] > _MAX_NUMBER:
             mistake = f"column {name} holds {largest[name]:g}, allowed: up to {_MAX_NUMBER:g}"
             raise BadInput(f"{log.name}: {mistake}")
@@ -282,7 +283,7 @@ def _time_base(flight: str, stamps: Floats, max_hz: float) -> tuple[Floats, Ints
     """Times of the samples and the number of the gap-free stretch of each, (n,), and the usual step, s."""
     if (n := len(stamps)) < _MIN_ROWS:
         raise BadInput(f"{flight}: has {n} samples of the rates, allowed: at least {_MIN_ROWS}")
-    step_s = _median_step_s(stamps)
+    step_s = median_step_s(stamps)
     rate_hz = 1.0 / step_s
     logged = f"{flight}: rates are logged at {rate_hz:.2g} Hz"
     if rate_hz < MIN_HZ:
@@ -318,7 +319,7 @@ def _even_time_base(stamps: Floats, step_s: float) -> tuple[Floats, Ints, float]
     return stamps[begin][stretch] + index * step_s, stretch, step_s
 
 
-def _median_step_s(stamps: Floats) -> float:
+def median_step_s(stamps: Floats) -> float:
     """The usual step of the first stamps, s: a log cut short later has the same."""
     return float(np.median(np.diff(stamps[:_MIN_ROWS]))) if len(stamps) > 1 else float("inf")
 
@@ -327,7 +328,7 @@ def sample_column(column: Column, t_s: Floats, step_s: float) -> tuple[Floats, f
     """A column's values at given times, and how old they are on average, s; None: it has these very times."""
     if np.array_equal(column.t_s, t_s):
         return column.values, None
-    if _median_step_s(column.t_s) < 0.6 * step_s:
+    if median_step_s(column.t_s) < 0.6 * step_s:
         return _means_and_age(column, t_s, step_s)
     return _latest_and_age(column, t_s)
 
@@ -389,7 +390,7 @@ def read_vehicle_parts(path: Path, vehicle: Vehicle, reader: str | None = None) 
         if column is None:  # said where the columns are used
             yield log
             continue
-        ratio = 1.0 / (_median_step_s(column.t_s) * vehicle.max_sample_rate_hz)
+        ratio = 1.0 / (median_step_s(column.t_s) * vehicle.max_sample_rate_hz)
         yield from split_long_recording(log, column.t_s, max(ratio, 1.0))
 
 

@@ -496,9 +496,10 @@ def _estimate_trim_walk(parts: Parts, model: Model) -> list[float]:
                 means = g[: len(g) // n * n].reshape(-1, n, 3).mean(axis=1)
                 found.append(np.diff(means, axis=0) ** 2 / np.maximum(np.diag(flight.R), MIN_DIVISOR))
     usual = np.array(FilterSettings().trim_walk)
-    if not all(map(sum, (map(len, found) for found in squares))):
+    short, long = map(np.vstack, squares)
+    if not len(short) or not len(long):
         return usual.tolist()
-    v1, v2 = (np.vstack(found).mean(axis=0) for found in squares)
+    v1, v2 = short.mean(axis=0), long.mean(axis=0)
     n1, n2 = spans
     w = 1.5 * (n2 * v2 - n1 * v1) / (n2**2 - n1**2)
     return np.maximum(np.sqrt(np.maximum(w, 0.0)), usual).tolist()

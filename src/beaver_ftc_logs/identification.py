@@ -466,11 +466,10 @@ def _cut_windows(parts: Parts, groups: Groups, n: int, past: int) -> tuple[Float
         v = regression.group_commands(samples, groups, labelled=True)
         rows = np.column_stack([samples.rates, samples.stretch_number, v])[:-1]
         rows[~part.is_usable[:-1]] = np.nan
-        if len(rows) >= past + n:
-            views = np.lib.stride_tricks.sliding_window_view(rows, past + n, axis=0)[::n].transpose(0, 2, 1)
-            is_whole = np.isfinite(views).all(axis=(1, 2)) & (np.ptp(views[:, :, 3], axis=1) == 0)
-            windows.append(views[is_whole])
-    chosen = np.concatenate(windows or [np.empty((0, past + n, 4 + len(groups)))])
+        begin = np.arange(0, len(rows) - past - n + 1, n)
+        cut = rows[begin[:, None] + np.arange(past + n)]
+        windows.append(cut[np.isfinite(cut).all(axis=(1, 2)) & (np.ptp(cut[:, :, 3], axis=1) == 0)])
+    chosen = np.concatenate(windows)
     chosen = chosen[:: max(len(chosen) // _MIN_FREE_RUNS, 1)]
     return chosen[:, :, 4:], chosen[:, past:, :3]
 

@@ -175,7 +175,7 @@ def held_out_folds(parts: Parts, model: Model, most: int | None = _MAX_SPLITS) -
     tied = tied_shares(parts, model).tolist()
     for fitted, held_out, name in validation_folds(parts, most):
         gain_sd = group_gain_sd(fit_of(fitted, model), model).tolist()
-        ranges = FittedRanges(gain_sd=gain_sd, tied=tied)
+        ranges = FittedRanges(commands=[], rates=[], gain_sd=gain_sd, tied=tied)
         yield Fold(refit(fitted, model).model_copy(update={"fitted": ranges}), held_out, name, fitted)
 
 

@@ -145,14 +145,22 @@ class FittedRanges(_LastingSection):
     tail: highest alarm statistic on parts not fitted
     """
 
-    commands: CoefRows = Field([])
-    rates: CoefRows = Field([])
+    commands: CoefRows
+    rates: CoefRows
     airspeed: CoefRow | None = None
     tied: CoefRow = Field([])
     gain_sd: list[NonNegative] = Field([])
     still_s: dict[str, Number] = Field({})
     energy_climb: Number | None = None
     tail: PeakTail | None = None
+
+
+NOTHING_FITTED = FittedRanges(commands=[], rates=[])
+"""Of a model that knows nothing of its flights."""
+
+
+def _or_nothing(given: Any) -> Any:
+    return NOTHING_FITTED if given is None else given
 
 
 class NoiseModel(Section):
@@ -212,7 +220,7 @@ class Model(Section):
     noise: Covariance
     colours: list[NoiseModel] = Field([])
     settings: FilterSettings = FilterSettings()
-    fitted: Annotated[FittedRanges, BeforeValidator(lambda given: given or {})] = FittedRanges()
+    fitted: Annotated[FittedRanges, BeforeValidator(_or_nothing)] = NOTHING_FITTED
     identified: dict[str, object] = Field({})
 
     @model_validator(mode="after")

@@ -29,7 +29,6 @@ _OFFSET_SHARE = 0.05
 _SILENT_SHARE = 0.02
 _PAIR_LEVELS = (0.25, 0.5, 0.75)
 _PRIOR_HEALTHY, _PRIOR_NO_RESPONSE = 0.7, 0.2
-_MIN_NOISE_SCALE, _MAX_NOISE_SCALE = 0.3, 6.0
 _MAX_SQUARE = 30.0
 """For a whitened flight: the predictor needs a fraction of a second to adapt to a fault."""
 
@@ -61,11 +60,11 @@ class HypothesisBank(NamedTuple):
     @property
     def is_fault_hypothesis(self) -> np.ndarray:
         """Which hypotheses say that some surface has lost effectiveness, (H,)."""
-        return np.asarray((self.hypothesis_kind == GROUP_LOSS) | (self.hypothesis_kind == PAIR_LOSS))
+        return (self.hypothesis_kind == GROUP_LOSS) | (self.hypothesis_kind == PAIR_LOSS)
 
     def is_fault_of_group(self, g: int) -> np.ndarray:
         """Which hypotheses say that a group has lost effectiveness, (H,)."""
-        return np.asarray((self.effectiveness[:, g] < 1.0) & (self.hypothesis_kind != NO_RESPONSE))
+        return (self.effectiveness[:, g] < 1.0) & (self.hypothesis_kind != NO_RESPONSE)
 
 
 def build_bank(model: Model) -> HypothesisBank:
@@ -111,10 +110,10 @@ def _levels_and_shares(model: Model, g: int) -> tuple[Floats, Floats]:
     grid = np.arange(0.0, 1.0 - 0.5 * settings.level_step, settings.level_step)
     levels = np.unique(np.round(np.concatenate([grid, np.array(labelled, dtype=float)]), 6))
     is_labelled = np.isin(levels, np.round(labelled, 6))
-    if not is_labelled.any() or is_labelled.all():
+    n, share = int(is_labelled.sum()), settings.level_share
+    if n in (0, len(levels)):
         return levels, np.full(len(levels), 1.0 / len(levels))
-    share = settings.level_share
-    return levels, np.where(is_labelled, share / is_labelled.sum(), (1.0 - share) / (~is_labelled).sum())
+    return levels, np.where(is_labelled, share / n, (1.0 - share) / (len(levels) - n))
 
 
 def _offset_variances(model: Model, g: int) -> list[Floats]:
@@ -123,8 +122,8 @@ def _offset_variances(model: Model, g: int) -> list[Floats]:
     B, R = np.array(model.response), np.array(model.noise)
     total = np.abs(B[g]).sum(axis=0) / np.sqrt(np.diag(R))
     ratio = np.clip(total / max(total.max(), MIN_DIVISOR), 0.3, 1.0)
-    variances = {"loss": np.zeros(3), "stuck": np.diag(R) * (model.settings.jam_sd * ratio) ** 2}
-    return [variances[kind] for kind in model.vehicle.faults]
+    stuck = np.diag(R) * (model.settings.jam_sd * ratio) ** 2
+    return [stuck if kind == "stuck" else np.zeros(3) for kind in model.vehicle.faults]
 
 
 def _pair_hypotheses(n: int, groups: list[int]) -> list[HypothesisRow]:
@@ -141,7 +140,7 @@ def _prior_probabilities(kind: np.ndarray, share: Floats) -> Floats:
     p = share * (1.0 - _PRIOR_HEALTHY - _PRIOR_NO_RESPONSE) / share[fault].sum()
     p[0] = _PRIOR_HEALTHY
     p[-1] = _PRIOR_NO_RESPONSE
-    return np.asarray(p)
+    return p
 
 
 class StateModel(NamedTuple):
@@ -186,10 +185,8 @@ def build_states(model: Model, noise: NoiseModel) -> StateModel:
 
 def _extra_variance(model: Model) -> Floats:
     """Variance of each group's gain by which it is known worse than to a step between levels, (G,)."""
-    variance = np.zeros(len(model.groups))
-    if model.fitted is not None and model.fitted.gain_sd:
-        variance += np.array(model.fitted.gain_sd) ** 2
-    return np.maximum(variance - model.settings.level_step**2, 0.0)
+    sd = np.array(model.fitted.gain_sd or [0.0] * len(model.groups))
+    return np.maximum(sd**2 - model.settings.level_step**2, 0.0)
 
 
 class ResidualNoise(NamedTuple):
@@ -197,9 +194,9 @@ class ResidualNoise(NamedTuple):
 
     intercept_rad_s (3,): intercept of the model. covariance (3, 3) of a sample, (rad/s)2.
     effective_sample_share: information of a residual over that of a white one. t_degrees_of_freedom of its t
-    distribution. scale_memory_samples, min_variance_scale, max_variance_scale: memory and limits of the
-    running scale of the covariance. max_squared_residual: squared standardised residual above which a sample
-    carries no information. covariance_inflation: covariance over that of the residuals in the fit.
+    distribution. scale_memory_samples: memory of the running scale of the covariance. max_squared_residual:
+    squared standardised residual above which a sample carries no information. covariance_inflation:
+    covariance over that of the residuals in the fit.
     """
 
     intercept_rad_s: Floats
@@ -207,8 +204,6 @@ class ResidualNoise(NamedTuple):
     effective_sample_share: float
     t_degrees_of_freedom: float
     scale_memory_samples: float
-    min_variance_scale: float
-    max_variance_scale: float
     max_squared_residual: float
     covariance_inflation: float
 
@@ -222,8 +217,6 @@ def build_noise(model: Model, noise: NoiseModel, intercept_rad_s: Floats) -> Res
         effective_sample_share=settings.power,
         t_degrees_of_freedom=settings.tail,
         scale_memory_samples=settings.noise_memory_s * model.rate_hz,
-        min_variance_scale=_MIN_NOISE_SCALE,
-        max_variance_scale=_MAX_NOISE_SCALE,
         max_squared_residual=_MAX_SQUARE if noise.before else np.inf,
         covariance_inflation=noise.wider,
     )

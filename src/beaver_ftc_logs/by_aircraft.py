@@ -22,10 +22,18 @@ from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import findings, trust
 from beaver_ftc_logs.diagnose import LogRows, reversed_command_error
-from beaver_ftc_logs.recording import Floats, Mask, Reasons, RecordedFlight, Runs, true_runs
-from beaver_ftc_logs.samples import Samples, convert_to_si, resample, sample_column
+from beaver_ftc_logs.recording import (
+    Floats,
+    Mask,
+    Reasons,
+    RecordedFlight,
+    Runs,
+    largest_magnitude,
+    true_runs,
+)
+from beaver_ftc_logs.samples import Samples, convert_to_si, named_angles, resample, sample_column
 from beaver_ftc_logs.stepped import Replayed, error_sections, replay_samples, rows_of_replay
-from beaver_ftc_logs.vehicle import QuantityColumn, Vehicle
+from beaver_ftc_logs.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from beaver_ftc.loop import Diagnosis
@@ -158,24 +166,23 @@ def read_inputs(log: RecordedFlight, vehicle: Vehicle, given: DiagnosedAircraft)
     diagnosis = Diagnosis(aircraft, rate_hz, **given.declared_errors)
     columns, ages = convert_to_si(log, vehicle).columns, dict(samples.held_age_s)
 
-    def sampled_at(quantity: QuantityColumn) -> Floats:
-        values, age_s = sample_column(columns[quantity.column], samples.t_s, samples.dt_s)
+    def sampled_at(name: str) -> Floats:
+        values, age_s = sample_column(columns[name], samples.t_s, samples.dt_s)
         if age_s is not None:
-            ages[quantity.column] = age_s
+            ages[name] = age_s
         return values
 
-    signals = np.column_stack([sampled_at(quantity) for quantity in (*flow[:2], airspeed, *flow[2:])])
+    signals = np.column_stack([sampled_at(name) for name in (*flow[:2], airspeed, *flow[2:])])
     places = [list(vehicle.surfaces).index(name) for name in aircraft.surfaces]
     full_rad = np.array([vehicle.full_deflection_rad.get(name, 1.0) for name in aircraft.surfaces])
     samples = replace(samples, commands=samples.commands[:, places], labels=samples.labels[:, places])
     attitude = np.zeros_like(samples.rates)
     if diagnosis.declared.air.moves:
-        for axis, angle in enumerate(_ATTITUDE_ANGLE_NAMES):
-            quantity = getattr(vehicle.attitude, angle) if vehicle.attitude else None
-            if quantity is None or quantity.column not in columns:
+        for axis, angle in enumerate(named_angles(columns, vehicle)):
+            if angle is None:
                 reason = "is missing, allowed: its column, where fdi.bounds declares turbulence"
-                raise BadInput(f"{samples.name}: attitude.{angle}: {reason}")
-            attitude[:, axis] = sampled_at(quantity)
+                raise BadInput(f"{samples.name}: attitude.{_ATTITUDE_ANGLE_NAMES[axis]}: {reason}")
+            attitude[:, axis] = sampled_at(angle[0])
     arrays = [samples.rates, signals, samples.commands * full_rad, attitude]
     _check_plausible(samples.name, signals, arrays[2], aircraft)
     inputs = LogInputs(samples, aircraft, diagnosis, rate_hz, arrays, ages, full_rad)
@@ -225,9 +232,7 @@ def _corrected_inputs(inputs: LogInputs, replay: Replayed) -> Iterator[tuple[Log
             yield corrected, BadInput(f"{flight}: {reason}, allowed: commands as of {aircraft.name}")
 
 
-def _flow_columns(
-    log: RecordedFlight, vehicle: Vehicle, aircraft: Aircraft
-) -> tuple[QuantityColumn, list[QuantityColumn]]:
+def _flow_columns(log: RecordedFlight, vehicle: Vehicle, aircraft: Aircraft) -> tuple[str, list[str]]:
     """The columns of the airspeed and of the flow. Raises BadInput if the vehicle file or the log lacks an
     input of the aircraft's design model."""
     missing = [name for name in aircraft.surfaces if name not in vehicle.surfaces]
@@ -241,9 +246,9 @@ def _flow_columns(
         if name not in vehicle.flow:
             reason = f"flow: no {name}, allowed: a column for each of {', '.join(names)}"
             raise BadInput(f"vehicle {vehicle.name}: {reason}")
-    flow = [vehicle.flow[name] for name in names]
-    log.check_has(quantity.column for quantity in (vehicle.airspeed, *flow))
-    return vehicle.airspeed, flow
+    flow = [vehicle.flow[name].column for name in names]
+    log.check_has([vehicle.airspeed.column, *flow])
+    return vehicle.airspeed.column, flow
 
 
 def _log_rate_hz(samples: Samples) -> float:
@@ -272,7 +277,7 @@ def _check_plausible(flight: str, signals: Floats, commands: Floats, aircraft: A
     for surface, command in zip(aircraft.surfaces, commands.T, strict=True):
         travel = aircraft.travel[surface]
         stop_rad = max(abs(travel.min_rad), abs(travel.max_rad))
-        max_rad = np.nanmax(np.abs(command), initial=0.0)
+        max_rad = largest_magnitude(command)
         if max_rad > _STOP_RATIO * stop_rad:
             reason = f"the command of {surface} reaches {max_rad:.3g} rad"
             allowed = f"its stop, {stop_rad:.3g} rad"

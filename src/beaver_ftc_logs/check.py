@@ -37,8 +37,21 @@ from beaver_ftc_logs.readers.table import (
     first_cells_of_column,
     text_of_column_phrase,
 )
-from beaver_ftc_logs.recording import Column, Floats, RecordedFlight, TimeSource, nearest_names_text
-from beaver_ftc_logs.samples import convert_to_si, read_vehicle_parts, resample
+from beaver_ftc_logs.recording import (
+    Column,
+    Floats,
+    RecordedFlight,
+    TimeSource,
+    largest_magnitude,
+    nearest_names_text,
+)
+from beaver_ftc_logs.samples import (
+    convert_to_si,
+    median_step_s,
+    named_angles,
+    read_vehicle_parts,
+    resample,
+)
 from beaver_ftc_logs.units import ACCELERATION, RATE, SI_UNITS, TIME_UNITS, nearest_unit
 from beaver_ftc_logs.vehicle import Vehicle, unused_keys_as_comments
 
@@ -77,7 +90,7 @@ _PWM_RANGE_US = (700.0, 2300.0)
 _LARGEST_RAD_S = 12.0
 _MIN_CORRELATION = 0.7
 _MAX_COMMANDS, _MAX_READ_COLUMNS = 8, 60
-_LOG_RATES_HZ = (4.0, 2000.0)
+_LOG_STEPS_S = (1.0 / 2000.0, 1.0 / 4.0)
 
 
 class _NoVehicle(Exception):
@@ -124,20 +137,20 @@ def _check_recording(log: RecordedFlight, vehicle: Vehicle) -> tuple[bool, list[
 
 def _compare_angles(log: RecordedFlight, vehicle: Vehicle) -> list[str]:
     """That rates and angles agree, or that nothing could be compared."""
-    columns, angles = convert_to_si(log, vehicle).columns, vehicle.attitude
-    if angles is None or angles.roll.column not in columns:
+    columns = convert_to_si(log, vehicle).columns
+    angles = named_angles(columns, vehicle)
+    if angles[0] is None:
         return ["no roll angle is named: whether the rates are in rad/s is not checked"]
     gyros = [columns[name] for name in vehicle.rate_columns]
-    names = [angle.column if angle else "" for angle in (angles.roll, angles.pitch, angles.yaw)]
-    in_si = [columns.get(name) for name in names]
+    in_si = [angle and angle[1] for angle in angles]
     fits = [physics.fit_angle(gyros, in_si, axis) for axis in range(3)]
     if fits[0] is None:
         return ["too little moves to compare the rates with the roll angle"]
     return [
-        f"the change of {angle} is {fit.slope:.3f} times the integral of {rate} (correlation "
+        f"the change of {angle[0]} is {fit.slope:.3f} times the integral of {rate} (correlation "
         f"{fit.correlation:.2f}): {'they agree' if _agrees(fit) else 'they tell nothing of one another'}"
-        for fit, angle, rate in zip(fits, names, vehicle.rate_columns, strict=True)
-        if fit
+        for fit, angle, rate in zip(fits, angles, vehicle.rate_columns, strict=True)
+        if fit and angle
     ]
 
 
@@ -245,9 +258,8 @@ def _find_time(path: Path, remarks: list[str]) -> TimeSource:
         stamps = cells.numbers[name][np.isfinite(cells.numbers[name])]
         if phrase := text_of_column_phrase(cells, name):
             phrases.append(f"{name} holds {phrase.removeprefix(', but ')}")
-        step = float(np.median(np.diff(stamps[:50]))) if len(stamps) > 1 else 0.0
-        rates = {unit: 1.0 / (step * seconds) for unit, seconds in TIME_UNITS.items()} if step > 0.0 else {}
-        units = [unit for unit, rate in rates.items() if _LOG_RATES_HZ[0] <= rate <= _LOG_RATES_HZ[1]]
+        step, (shortest_s, longest_s) = median_step_s(stamps), _LOG_STEPS_S
+        units = [unit for unit, seconds in TIME_UNITS.items() if shortest_s <= step * seconds <= longest_s]
         if units:
             unit = next((unit for unit in units if _snake_case(name).endswith(unit)), units[0])
             if (name, unit) != (TIME_COLUMN, "s"):
@@ -264,7 +276,7 @@ def _guess_angle_unit(name: str, roll: Column, reader: str) -> str:
     stated = next((unit for unit in ("deg", "rad") if unit in name.lower()), None)
     if reader == "ardupilot":
         return "deg"
-    return stated or ("deg" if _largest_magnitude(roll.values) > 2.0 * np.pi else "rad")
+    return stated or ("deg" if largest_magnitude(roll.values) > 2.0 * np.pi else "rad")
 
 
 def _guess_rate_unit(
@@ -279,12 +291,8 @@ def _guess_rate_unit(
         fit = physics.fit_angle(rates, (in_rad, None, None), 0)
         if fit is not None and _agrees(fit):
             found = nearest_unit(RATE, abs(fit.slope), 1.5) or found or "rad/s"
-    largest = max(_largest_magnitude(rate.values) for rate in rates)
+    largest = max(largest_magnitude(rate.values) for rate in rates)
     return found or ("deg/s" if largest > _LARGEST_RAD_S else "rad/s")
-
-
-def _largest_magnitude(values: Floats) -> float:
-    return float(np.nanmax(np.abs(values), initial=0.0))
 
 
 def _column_entry(name: str | None, unit: str, si_unit: str) -> Any:
@@ -293,7 +301,7 @@ def _column_entry(name: str | None, unit: str, si_unit: str) -> Any:
 
 def _pulse_entry(name: str, values: Floats) -> Any:
     """A command as a share of travel: pulses of 1100 to 1900 us, per cent, or as it is."""
-    median, largest = float(np.nanmedian(values)), _largest_magnitude(values)
+    median, largest = float(np.nanmedian(values)), largest_magnitude(values)
     if _PWM_RANGE_US[0] < median < _PWM_RANGE_US[1]:
         return {"column": name, "scale": 0.0025, "offset": -3.75}
     return {"column": name, "unit": "%"} if 10.0 < largest <= 105.0 else name

@@ -1,6 +1,7 @@
 """`beaver-ftc identify` and `diagnose`: from recorded flights to a model, and to what broke in a flight."""
 
 import os
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -13,7 +14,8 @@ from beaver_ftc.commands import declare
 from beaver_ftc.documents import BadInput
 
 if TYPE_CHECKING:
-    from beaver_ftc_logs.model import Model
+    from beaver_ftc_logs.diagnose import LogRows
+    from beaver_ftc_logs.pages import Words
     from beaver_ftc_logs.samples import Samples
 
 FlightsArgument = Annotated[list[Path], typer.Argument(metavar="FLIGHT", help="Paths of recorded flights.")]
@@ -55,8 +57,6 @@ def identify(
     if vehicle is None or out is None:
         option = "--vehicle" if vehicle is None else "--out"
         raise BadInput(f"identify: {option} is missing, allowed: --vehicle FILE --out MODEL, or --check")
-    from beaver_ftc.results import clear_disk_errors
-    from beaver_ftc.studies.engine import write_whole
     from beaver_ftc_logs.identification import identification_text, identify, scale_if_better
     from beaver_ftc_logs.mixing import load_vehicle_for_logs
     from beaver_ftc_logs.model import model_file_text
@@ -72,10 +72,8 @@ def identify(
     logs, loaded = scale_if_better(load_flights_for_fit(flights, loaded, reader), loaded)
     model = identify(logs, loaded)
     page_html = render_identification(logs, model)
-    for path, file_text in ((out, model_file_text(model)), (page, page_html)):
-        with clear_disk_errors(path):
-            path.parent.mkdir(parents=True, exist_ok=True)
-            write_whole(path, file_text.encode("utf-8"))
+    _write_file(out, model_file_text(model))
+    _write_file(page, page_html)
     document = {
         "model": str(out),
         "page": str(page),
@@ -105,7 +103,7 @@ def _check_logs(
     guess = next((finding["vehicle"] for finding in findings if finding["vehicle"]), None)
     texts = [*mixing, *(as_text(finding) for finding in findings)]
     if guess is not None and out is not None:
-        _write_vehicle_file(out, vehicle_file_text(guess))
+        _write_file(out, vehicle_file_text(guess))
         texts.append(f"vehicle file: {out}")
     elif guess is not None:
         texts.append(vehicle_file_text(guess))
@@ -114,12 +112,13 @@ def _check_logs(
         raise typer.Exit(2)
 
 
-def _write_vehicle_file(path: Path, text: str) -> None:
+def _write_file(path: Path, text: str) -> None:
     from beaver_ftc.results import clear_disk_errors
+    from beaver_ftc.studies.engine import write_whole
 
     with clear_disk_errors(path):
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
+        write_whole(path, text.encode("utf-8"))
 
 
 @dataclass(frozen=True)
@@ -167,18 +166,43 @@ def diagnose(options: DiagnoseOptions) -> None:
     if options.model is None:
         _replay_run_logs(options.flights, options.out, options.format)
         return
-    from beaver_ftc_logs.detectors import check_detector_name
-    from beaver_ftc_logs.findings import as_text
+    from beaver_ftc_logs.detectors import check_detector_name, diagnose_with_detector
+    from beaver_ftc_logs.findings import as_text, verdict_document
     from beaver_ftc_logs.model import load_model
+    from beaver_ftc_logs.pages import words_of_model
     from beaver_ftc_logs.samples import stream_flights
 
     check_detector_name(options.detector)
     model = load_model(options.model)
-    verdicts = [
-        _diagnose_and_write(flight, model, options.out, options.score, options.detector)
-        for flight in stream_flights(options.flights, model.vehicle, options.reader)
-    ]
+    verdicts = []
+    for samples in stream_flights(options.flights, model.vehicle, options.reader):
+        rows = diagnose_with_detector(options.detector, samples, model)
+        verdict = verdict_document(samples, model, rows) | {"detector": options.detector}
+        verdicts.append(
+            _write_diagnosis(options, samples, rows, verdict, model.groups, words_of_model(model))
+        )
     answer(options.format, {"flights": verdicts}, lambda: "\n".join(map(as_text, verdicts)))
+
+
+def _write_diagnosis(
+    options: DiagnoseOptions,
+    samples: "Samples",
+    rows: "LogRows",
+    verdict: Document,
+    groups: list[list[str]],
+    words: "Words",
+    extra: Callable[[Path], None] | None = None,
+) -> Document:
+    """The verdict with its score and the folder into which table, page and `extra` are written."""
+    from beaver_ftc_logs.pages import render_diagnosis, write_results
+    from beaver_ftc_logs.scoring import score_diagnosis
+
+    if options.score:
+        verdict["score"] = score_diagnosis(samples, rows, groups)
+    page = render_diagnosis(samples, rows, verdict, words)
+    table = rows.table(words.surfaces, with_probability=options.model is not None)
+    folder = write_results(options.out, samples.name, table, verdict, page, extra)
+    return verdict | {"folder": str(folder)}
 
 
 def _check_options_agree(options: DiagnoseOptions) -> None:
@@ -210,44 +234,38 @@ def _check_options_agree(options: DiagnoseOptions) -> None:
 
 
 def _diagnose_with_aircraft(options: DiagnoseOptions) -> None:
-    from beaver_ftc_logs import pages
     from beaver_ftc_logs.by_aircraft import diagnose_inputs, load_diagnosed, read_inputs
     from beaver_ftc_logs.findings import as_text
     from beaver_ftc_logs.mixing import load_vehicle_for_logs
+    from beaver_ftc_logs.pages import words_of_aircraft
     from beaver_ftc_logs.readers import check_exists
     from beaver_ftc_logs.samples import read_vehicle_parts
-    from beaver_ftc_logs.scoring import score_diagnosis
     from beaver_ftc_logs.stepped import BOUND_WINDOW_S
 
     if options.certificate:
         from beaver_ftc_logs import certified
 
     given = load_diagnosed(str(options.aircraft), options.scenario)
+    words = words_of_aircraft(given.aircraft, BOUND_WINDOW_S)
+    groups = [[name] for name in given.aircraft.surfaces]
     verdicts: list[Document] = []
     texts: list[str] = []
     for path in options.flights:
         check_exists(path)
-        before = len(verdicts)
         beside = Path(os.path.abspath(path)).parent / "vehicle.yaml"
         if options.vehicle is None and not beside.is_file():
             raise BadInput(f"{path}: no vehicle.yaml beside it, allowed: --vehicle FILE")
-        vehicle_path = options.vehicle or str(beside)
-        loaded, mixing = load_vehicle_for_logs(vehicle_path, [path], options.reader)
+        loaded, mixing = load_vehicle_for_logs(options.vehicle or str(beside), [path], options.reader)
+        texts += mixing
         for log in read_vehicle_parts(path, loaded, options.reader):
             inputs = read_inputs(log, loaded, given)
             rows, verdict = diagnose_inputs(inputs, given)
-            samples, surfaces = inputs.samples, given.aircraft.surfaces
-            if options.score:
-                verdict["score"] = score_diagnosis(samples, rows, [[name] for name in surfaces])
             writer = None
             if options.certificate:
                 writer = partial(certified.write_certificate_and_log, inputs, rows)
-            words = pages.words_of_aircraft(given.aircraft.name, BOUND_WINDOW_S)
-            page = pages.render_diagnosis(samples, surfaces, rows, verdict, words)
-            table = rows.table(surfaces)
-            folder = pages.write_results(options.out, samples.name, table, verdict, page, writer)
-            verdicts.append(verdict | {"folder": str(folder)})
-        texts += [*mixing, *map(as_text, verdicts[before:])]
+            verdict = _write_diagnosis(options, inputs.samples, rows, verdict, groups, words, writer)
+            verdicts.append(verdict)
+            texts.append(as_text(verdict))
     answer(options.format, {"flights": verdicts}, lambda: "\n".join(texts))
 
 
@@ -265,25 +283,6 @@ def _replay_run_logs(flights: list[Path], out: Path, format: Format) -> None:
         for columns, verdict in replays
     ]
     answer(format, {"flights": verdicts}, lambda: "\n".join(map(as_text, verdicts)))
-
-
-def _diagnose_and_write(
-    samples: "Samples", model: "Model", out: Path, with_score: bool, detector: str
-) -> Document:
-    from beaver_ftc_logs.detectors import diagnose_with_detector
-    from beaver_ftc_logs.findings import verdict_document
-    from beaver_ftc_logs.pages import render_diagnosis, words_of_model, write_results
-    from beaver_ftc_logs.scoring import score_diagnosis
-
-    rows = diagnose_with_detector(detector, samples, model)
-    verdict = verdict_document(samples, model, rows) | {"detector": detector}
-    if with_score:
-        verdict["score"] = score_diagnosis(samples, rows, model.groups)
-    surfaces = list(model.vehicle.surfaces)
-    page = render_diagnosis(samples, surfaces, rows, verdict, words_of_model(model))
-    table = rows.table(surfaces, with_probability=True)
-    folder = write_results(out, samples.name, table, verdict, page)
-    return verdict | {"folder": str(folder)}
 
 
 def compare_recorded(folder: Path, out: Path, format: Format, markdown_page: Path | None) -> None:

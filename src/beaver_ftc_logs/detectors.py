@@ -56,24 +56,19 @@ def _least_squares(samples: Samples, model: Model, fades: bool) -> LogRows:
 
         theta = (M0 + sum X' X)^-1 sum X' y,   e_g - 1 = theta[3 + g]
 
-    X (n, 3, 3 + G), y (n, 3): of `_whitened_regression`. M0: information before. P: covariance of theta.
+    X (n, 3, 3 + G): regressors of trim, in standard deviations, and of lost effectiveness, whitened; y (n,
+    3): the whitened residual of a healthy vehicle. M0: information before. P: covariance of theta.
     """
-    X, y = _whitened_regression(samples, model)
+    flight = innovations(samples, model)
+    sd = [*np.sqrt(np.diag(flight.R)), *np.ones(len(model.groups))]
+    X = np.where(flight.is_known[:, None, None], flight.columns() * sd, 0.0)
     M = _memory_sums(np.einsum("nai,naj->nij", X, X), samples.dt_s, fades)
-    b = _memory_sums(np.einsum("nai,na->ni", X, y), samples.dt_s, fades)
+    b = _memory_sums(np.einsum("nai,na->ni", X, flight.e @ flight.W), samples.dt_s, fades)
     M0 = np.diag([*np.full(3, 1.0 / model.settings.trim_sd**2), *np.full(X.shape[2] - 3, 4.0)])
     P = np.linalg.inv(M + M0)
     theta = np.einsum("nij,nj->ni", P, b)
-    sd = np.sqrt(np.maximum(np.diagonal(P, axis1=1, axis2=2)[:, 3:], 0.0))
-    return _rows_of_estimate(samples, model, 1.0 + theta[:, 3:], sd)
-
-
-def _whitened_regression(samples: Samples, model: Model) -> tuple[Floats, Floats]:
-    """Regressors (n, 3, 3 + G) of trim, in standard deviations, and of lost effectiveness, and what a healthy
-    vehicle leaves, (n, 3), both whitened."""
-    flight = innovations(samples, model)
-    sd = [*np.sqrt(np.diag(flight.R)), *np.ones(len(model.groups))]
-    return np.where(flight.is_known[:, None, None], flight.columns() * sd, 0.0), flight.e @ flight.W
+    errors = np.sqrt(np.maximum(np.diagonal(P, axis1=1, axis2=2)[:, 3:], 0.0))
+    return _rows_of_estimate(samples, model, 1.0 + theta[:, 3:], errors)
 
 
 def _memory_sums(x: Floats, dt_s: float, fades: bool) -> Floats:
@@ -81,7 +76,7 @@ def _memory_sums(x: Floats, dt_s: float, fades: bool) -> Floats:
     if fades:
         from scipy.signal import lfilter
 
-        return np.asarray(lfilter([1.0], [1.0, -np.exp(-dt_s / LEAST_SQUARES_MEMORY_S)], x, axis=0))
+        return lfilter([1.0], [1.0, -np.exp(-dt_s / LEAST_SQUARES_MEMORY_S)], x, axis=0)
     return trailing_sums(x, LEAST_SQUARES_MEMORY_S / dt_s)[0]
 
 
@@ -135,7 +130,7 @@ class LinearRateModel:
 
     def f(self, x: Floats, y: Floats) -> Floats:
         """Angular acceleration rad/s2 by the rates alone."""
-        return np.asarray(x @ self._transposed_jacobian)
+        return x @ self._transposed_jacobian
 
     def G(self, y: Floats) -> Floats:
         """Zeros: the effects of the surfaces, with their lags, are in `contribution`."""
@@ -172,7 +167,7 @@ def loop_detector_inputs(samples: Samples, model: Model) -> list[tuple[Measured,
 
 def _model_error_sd_rad_s2(model: Model) -> Floats:
     """The residual's standard deviation as an error of the model, (3,) rad/s2."""
-    return np.asarray(np.sqrt(np.diag(np.array(model.noise))) / (1.0 / model.rate_hz))
+    return np.sqrt(np.diag(np.array(model.noise))) / (1.0 / model.rate_hz)
 
 
 def loop_detector_context(model: Model) -> Context:

@@ -3,10 +3,9 @@
 Everything a row says comes from samples up to its own time.
 
 P (n, H) is the probability of each hypothesis of the bank, p (n, L) that of each level of one group, e (n, G)
-the effectiveness of each group with bounds low and high. y (n, 3) rad/s are the rates that the past does not
-explain, F (n, G, 3) rad/s the responses to the commands, c (3,) the intercept, R (3, 3) the covariance of the
-residual. alarmed (n,): whether the evidence raises an alarm; nameable (n,): whether it is enough for a name;
-calm (n,): whether health, or no response at all, is the likelier.
+the effectiveness of each group with bounds low and high. alarmed (n,): whether the evidence raises an alarm;
+nameable (n,): whether it is enough for a name; calm (n,): whether health, or no response at all, is the
+likelier.
 """
 
 from collections.abc import Iterable, Sequence
@@ -25,7 +24,7 @@ from beaver_ftc_logs.bank import GROUP_LOSS, UNKNOWN_OFFSET, HypothesisBank, bui
 from beaver_ftc_logs.filtering import bank_posterior, fault_evidence, page_cusum
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats, Ints, Mask, Reasons, last_row_at, last_true_row
-from beaver_ftc_logs.regression import expand_groups, innovations, trailing_sums
+from beaver_ftc_logs.regression import expand_groups
 from beaver_ftc_logs.samples import Samples
 
 _LOG_RATE_TOLERANCE = 0.25
@@ -34,7 +33,6 @@ _NAME_SHARE = 0.5
 _EXCLUSION_RISK = 0.001
 """Chance of a name without the surface at fault: a likelihood ratio of two groups passes 1000 against the
 true one with that chance at most (Markov's inequality), where the model is right."""
-_DIRECTION_WINDOW_S = 1.0
 _COMMAND_ROUNDING = 1e-6
 """Share of travel that a command moves by rounding alone."""
 _NO_RESPONSE_LIMIT = 0.5
@@ -144,12 +142,9 @@ def reversed_command_error(flight: str, surface: str, allowed: str) -> BadInput:
 
 def _diagnose_checked_log(samples: Samples, model: Model) -> LogRows:
     bank = build_bank(model)
-    known = trust.without_dead_rows(samples, model)
-    P = bank_posterior(known, model, bank)
+    P = bank_posterior(trust.without_dead_rows(samples, model), model, bank)
     silent = P[:, -1] > _NO_RESPONSE_LIMIT
     rows = rows_of_posterior(samples, model, bank, P)
-    if model.vehicle.other_laws and model.settings.threshold is not None and not model.colours:
-        rows = _withdraw_contradicted(known, model, rows, model.settings.threshold)
     return finish_rows(samples, model, rows, silent)
 
 
@@ -194,41 +189,14 @@ def _add_unknown_surfaces(samples: Samples, model: Model, rows: LogRows) -> LogR
 
 def _withdraw_by_engine(samples: Samples, model: Model, rows: LogRows) -> LogRows:
     """Rows in which no surface is named where an engine may have failed."""
-    unpowered_mps = model.fitted.energy_climb if model.fitted else None
+    unpowered_mps = model.fitted.energy_climb
     rate_mps = samples.energy_height_rate_mps
-    if unpowered_mps is None or rate_mps is None:
+    if unpowered_mps is None or not np.isfinite(rate_mps).any():
         return rows
     named = energy.withdraw_surfaces(
         rows.t_s, rows.faulty, rows.isolated_surfaces, rate_mps, unpowered_mps, rows.evidence_start_time_s
     )
     return replace(rows.without_estimate(named != rows.isolated_surfaces), isolated_surfaces=named)
-
-
-def _withdraw_contradicted(samples: Samples, model: Model, rows: LogRows, least: float) -> LogRows:
-    """Rows with the name `unknown` where the residual of the last second lies along another group.
-
-    A faulty surface, be it stuck, biased or oscillating, changes the rates along the direction in which it
-    turns the aircraft when healthy. A name is withdrawn where the direction of another group explains the
-    residual better by the log likelihood `least`, whatever the course of time along it. Not used in moving
-    air, since gusts have directions too.
-
-        gain_g = power / 2 sum over the last second of (r' m_g / |m_g|)^2
-
-    r (n, 3): residual in standard deviations. m (3, G): whitened direction of each group.
-    """
-    flight = innovations(samples, model)
-    r = flight.e @ flight.W
-    m = (np.array(model.response).sum(axis=1) @ flight.W).T
-    norms = np.linalg.norm(m, axis=0)
-    p = (r @ (m / np.maximum(norms, MIN_DIVISOR))) ** 2
-    gain = 0.5 * model.settings.power * trailing_sums(p, _DIRECTION_WINDOW_S * model.rate_hz)[0]
-    best = gain.max(axis=1)
-    wrong = np.zeros(len(r), dtype=bool)
-    for g, group in enumerate(model.groups):
-        names_group = [not set(group).isdisjoint(name.split("+")) for name in rows.isolated_surfaces]
-        wrong |= np.array(names_group, dtype=bool) & (best - gain[:, g] > least)
-    names = np.where(wrong, UNKNOWN_SURFACE, rows.isolated_surfaces)
-    return replace(rows.without_estimate(wrong), isolated_surfaces=names)
 
 
 def check_log_fits_model(samples: Samples, model: Model) -> None:
@@ -302,7 +270,7 @@ def _group_bounds(
 
 def _latched(alarmed: Mask, calm: Mask) -> Mask:
     """An alarm once raised stands until health is the likelier again."""
-    return np.asarray(last_true_row(alarmed) > last_true_row(calm & ~alarmed))
+    return last_true_row(alarmed) > last_true_row(calm & ~alarmed)
 
 
 def _group_levels(bank: HypothesisBank, P_live: Floats, g: int) -> tuple[Floats, Floats]:
@@ -368,7 +336,7 @@ def _at_log_stamps(samples: Samples, rows: LogRows) -> LogRows:
     if np.array_equal(samples.log_stamps_s, rows.t_s):
         return rows
     last = last_row_at(rows.t_s, samples.log_stamps_s)
-    names = [name for name in LogRows.__dataclass_fields__ if name not in ("t_s", "doubtful_rows")]
-    reasons = {reason: mask[last] for reason, mask in rows.doubtful_rows.items()}
+    names = set(LogRows.__dataclass_fields__) - {"doubtful_rows"}
     fields = {name: getattr(rows, name)[last] for name in names}
-    return LogRows(t_s=samples.log_stamps_s, doubtful_rows=reasons, **fields)
+    reasons = {reason: mask[last] for reason, mask in rows.doubtful_rows.items()}
+    return LogRows(**(fields | {"t_s": samples.log_stamps_s, "doubtful_rows": reasons}))

@@ -25,7 +25,7 @@ def energy_climb_mps(t: Floats, h: Floats, V: Floats, stretch: np.ndarray) -> Fl
     whole = (i >= 0) & (stretch[np.maximum(i, 0)] == stretch)
     i = np.maximum(i, 0)
     dt = np.where(whole, t - t[i], 1.0)
-    return np.asarray(np.where(whole, (E - E[i]) / dt, np.nan))
+    return np.where(whole, (E - E[i]) / dt, np.nan)
 
 
 def withdraw_surfaces(

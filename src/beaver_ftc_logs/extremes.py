@@ -160,7 +160,7 @@ def _rate_quantiles(tail: PeakTail) -> Floats:
     from scipy.stats import gamma
 
     shape = len(tail.excess) / tail.dispersion + 0.5
-    return np.asarray(gamma.ppf(_RATE_QUANTILES, shape) * tail.dispersion / (tail.minutes / 60.0))
+    return gamma.ppf(_RATE_QUANTILES, shape) * tail.dispersion / (tail.minutes / 60.0)
 
 
 def _pareto_posterior(tail: PeakTail) -> tuple[Floats, Floats, Floats]:
@@ -180,4 +180,4 @@ def _exceedance(z: float, xi: Floats, sigma: Floats) -> Floats:
     """Probability that a peak over the level exceeds it by more than z, (g,)."""
     from scipy.stats import genpareto
 
-    return np.asarray(genpareto.sf(z, xi, scale=sigma))
+    return genpareto.sf(z, xi, scale=sigma)

@@ -44,6 +44,7 @@ from beaver_ftc_logs.samples import Samples
 
 _EVIDENCE_MEMORY_S = 600.0
 _MIN_PROBABILITY = 1e-15
+_MIN_NOISE_SCALE, _MAX_NOISE_SCALE = 0.3, 6.0
 _SQUARE_CLIP = 3.0
 _SUM_SPANS_S, _VARIANCE_WINDOW_S = (0.0, 0.1), 2.0
 """Spans over which a residual is summed, and the window in which its variance is taken."""
@@ -69,7 +70,7 @@ def bank_posterior(samples: Samples, model: Model, bank: HypothesisBank) -> Floa
         flights = [innovations(_with_command_delay(samples, delay_s), model) for delay_s in delays]
         runs = [run_flight(flight, model, bank) for flight in flights]
         weights = model_weights([ll for _, ll in runs], model.rate_hz)
-        return np.asarray((weights[:, :, None] * np.array([p for p, _ in runs])).sum(axis=0))
+        return (weights[:, :, None] * np.array([p for p, _ in runs])).sum(axis=0)
     pairs = [(innovations(white, one), one) for white, one in by_noise(samples, model)]
     weights = model_weights([_noise_likelihood(*pair) for pair in pairs], model.rate_hz)
     kept = np.where(weights < _MIN_NOISE_WEIGHT, 0.0, weights)
@@ -101,7 +102,7 @@ def fault_evidence(p: Floats, bank: HypothesisBank) -> Floats:
     fault = np.clip(p[:, is_fault].sum(axis=1), _MIN_PROBABILITY, 1.0 - _MIN_PROBABILITY)
     entry = change * share[is_fault].sum() / share.sum()
     prior = np.append(bank.prior_probability[is_fault].sum(), (1.0 - change) * fault[:-1] + entry)
-    return np.asarray(np.log(fault / (1.0 - fault)) - np.log(prior / (1.0 - prior)))
+    return np.log(fault / (1.0 - fault)) - np.log(prior / (1.0 - prior))
 
 
 @kernel
@@ -138,7 +139,7 @@ def model_weights(ll: Sequence[Floats], rate_hz: float) -> Floats:
     a = np.exp(-1.0 / (_EVIDENCE_MEMORY_S * rate_hz))
     sums = lfilter([1.0], [1.0, -a], np.array(ll), axis=1)
     p = np.exp(sums - sums.max(axis=0))
-    return np.asarray(p / p.sum(axis=0))
+    return p / p.sum(axis=0)
 
 
 def run_flight(flight: Innovations, model: Model, bank: HypothesisBank) -> BankRun:
@@ -200,7 +201,7 @@ def run_bank(y, F, ok, bank, states, noise, r_min, q):
             p, d2, ll[k] = _correct(prior, x, P, y[k], F[k], bank, noise, q[k] * max(r, r_min[k]))
             x[:] = np.minimum(np.maximum(x, lo), hi)  # bounded, so that no hypothesis adapts to a fault
             r *= np.exp((1.0 - p[last]) * (d2 / 3.0 - _MEAN_SQUARE) / noise.scale_memory_samples)
-            r = min(max(r, noise.min_variance_scale), noise.max_variance_scale)
+            r = min(max(r, _MIN_NOISE_SCALE), _MAX_NOISE_SCALE)
         else:
             p = prior
         post[k] = p

@@ -193,7 +193,7 @@ def _white_responses(samples: Samples, model: Model) -> Floats:
     """Each group's share of the rates in standard deviations of the noise, (n, G, 3)."""
     flight = innovations(samples, model)
     share = model.settings.power
-    return np.asarray(flight.F[flight.is_known] @ flight.W * np.sqrt(share))
+    return flight.F[flight.is_known] @ flight.W * np.sqrt(share)
 
 
 def _group_entry(F: Floats, g: int, model: Model, bank: HypothesisBank, dt_s: float) -> Document:

@@ -19,6 +19,7 @@ the two halves of a single flight in turn, or each of several flights in turn.
 
 from collections.abc import Iterator, Sequence
 from itertools import groupby, product
+from typing import NamedTuple
 
 import numpy as np
 
@@ -155,14 +156,27 @@ def refit(parts: Parts, model: Model) -> Model:
     return refitted.model_copy(update={"settings": model.settings, "colours": colours})
 
 
-def held_out_folds(parts: Parts, model: Model) -> Iterator[tuple[Model, FitPart, Parts]]:
-    """For each part that is left out, a model fitted to others, with the standard errors of its gains, this
-    part, and the others."""
+class Fold(NamedTuple):
+    """A part that is left out, its name, the model that is fitted to the others, with the standard errors of
+    its gains, and these."""
+
+    model: Model
+    held_out: FitPart
+    name: str
+    fitted: Parts
+
+    def innovations(self) -> regression.Innovations:
+        """The samples in use of the part left out, by the model of the others."""
+        return self.held_out.innovations(self.model)
+
+
+def held_out_folds(parts: Parts, model: Model, most: int | None = _MAX_SPLITS) -> Iterator[Fold]:
+    """The folds, of more than `most` flights every so many at once."""
     tied = tied_shares(parts, model).tolist()
-    for fitted, held_out, _ in validation_folds(parts, _MAX_SPLITS):
+    for fitted, held_out, name in validation_folds(parts, most):
         gain_sd = group_gain_sd(fit_of(fitted, model), model).tolist()
         ranges = FittedRanges(commands=[], rates=[], gain_sd=gain_sd, tied=tied)
-        yield refit(fitted, model).model_copy(update={"fitted": ranges}), held_out, fitted
+        yield Fold(refit(fitted, model).model_copy(update={"fitted": ranges}), held_out, name, fitted)
 
 
 def bic_by_order(parts: Parts, vehicle: Vehicle) -> dict[tuple[int, int], float]:
@@ -275,20 +289,20 @@ def _parts_in(parts: Parts, ma: Sequence[float]) -> list[FitPart]:
 def quick_error_share(parts: Parts, model: Model) -> float:
     """Estimate the error of unusually quick responses, as a share of them, at most 1: the largest of the
     flights left out; 1 if none of them has such responses."""
-    squares = [_squared_quick_error(fold, held_out) for fold, held_out, _ in held_out_folds(parts, model)]
+    squares = map(_squared_quick_error, held_out_folds(parts, model))
     known = [square for square in squares if square is not None]
     return float(np.sqrt(np.clip(max(known, default=1.0), 0.0, 1.0)))
 
 
-def _squared_quick_error(fold: Model, held_out: FitPart) -> float | None:
+def _squared_quick_error(fold: Fold) -> float | None:
     """The square of the error of unusually quick responses in a flight left out, as a share of them; None if
     it has too few.
 
     In variances of the noise of the fit, the residual of a sample has the variance r (1 + share^2 power),
     with the variance r of the noise of this flight and the power of the quick responses.
     """
-    flight = held_out.innovations(fold)
-    power = flight.quick_power(fold.rate_hz)
+    flight = fold.innovations()
+    power = flight.quick_power(fold.model.rate_hz)
     unusual = power > flight.noise.usual_quick_power
     if unusual.sum() < _MIN_QUICK_SAMPLES:
         return None
@@ -322,17 +336,13 @@ def _with_errors(own: Parts, model: Model, noise: NoiseModel) -> NoiseModel:
 def _fit_noise_model(own: Parts, model: Model) -> NoiseModel:
     """The noise of flights of one moving average, with an AR predictor of the residual, by least squares
     where samples follow one another; without a predictor where too few do."""
-    ma, flights = list(own[0].samples.noise_ma_coefficients), [part.innovations(model) for part in own]
-    runs = [
-        flight.e[begin:end] for flight in flights for begin, end in runs_between(np.diff(flight.rows) > 1)
-    ]
-    targets = [run[AR_ORDER:] for run in runs]
-    if sum(map(len, targets)) < 10 * 3 * AR_ORDER:
+    ma, L = list(own[0].samples.noise_ma_coefficients), AR_ORDER
+    runs = [run for part in own for run in part.innovations(model).residual_runs()]
+    long = [run for run in runs if len(run) > L]
+    if sum(len(run) - L for run in long) < 10 * 3 * L:
         return NoiseModel(average=ma, noise=np.cov(np.vstack(runs).T).tolist())
-    lags = range(1, AR_ORDER + 1)
-    long = [run for run in runs if len(run) > AR_ORDER]
-    Z = np.vstack([np.hstack([run[AR_ORDER - lag : len(run) - lag] for lag in lags]) for run in long])
-    y = np.vstack(targets)
+    Z = np.vstack([np.hstack([run[L - lag : -lag] for lag in range(1, L + 1)]) for run in long])
+    y = np.vstack([run[L:] for run in long])
     ar = np.linalg.lstsq(Z, y, rcond=None)[0]
     return NoiseModel(average=ma, before=ar.tolist(), noise=np.cov((y - Z @ ar).T).tolist())
 
@@ -340,10 +350,11 @@ def _fit_noise_model(own: Parts, model: Model) -> NoiseModel:
 def estimate_filter_settings(parts: Parts, model: Model) -> FilterSettings:
     """Estimate the settings of later faults from the flights: levels seen, and how often they changed."""
     moving, other_laws = model.vehicle.moving_air, model.vehicle.other_laws
-    extra: Document = _OTHER_LAWS | (_MOVING_AIR if moving else {}) if other_laws else {}
-    if other_laws and model.colours:
-        extra |= {"quick_error": quick_error_share(parts, model)}
-    extra |= {"delays_s": [d / model.rate_hz for d in ((0.0,) if moving else _DELAYS_SAMPLES)]}
+    extra: Document = {"delays_s": [d / model.rate_hz for d in ((0.0,) if moving else _DELAYS_SAMPLES)]}
+    if other_laws:
+        extra |= _OTHER_LAWS | (_MOVING_AIR if moving else {})
+        if model.colours:
+            extra["quick_error"] = quick_error_share(parts, model)
     surfaces = list(model.vehicle.surfaces)
     alone = [group[0] for group in model.groups if len(group) == 1]
     labelled = {name: _label_levels(parts, surfaces.index(name)) for name in alone}
@@ -379,8 +390,8 @@ def gain_overdispersion(parts: Parts, model: Model) -> float:
     that is as believed.
     """
     errors = [(float(len(model.groups)), len(model.groups))]
-    for fold, held_out, _ in held_out_folds(parts, model):
-        errors += _gain_errors(fold, held_out)
+    for fold in held_out_folds(parts, model):
+        errors += _gain_errors(fold)
     return sum(error for error, _ in errors) / sum(n for _, n in errors)
 
 
@@ -392,27 +403,26 @@ def _gains(F: Floats, e: Floats) -> tuple[Floats, Floats, Floats]:
     return FF, Fe, np.asarray(np.linalg.lstsq(FF, Fe, rcond=_RANK_TOLERANCE)[0])
 
 
-def _gain_errors(
-    fold: Model, held_out: FitPart, window_s: float | None = None, loudness: float = 1.0
-) -> list[tuple[float, int]]:
+def _gain_errors(fold: Fold, window_s: float | None = None, loudness: float = 1.0) -> list[tuple[float, int]]:
     """Squares of the errors g of the groups' gains that a part left out tells, in their covariance and what
     the filter leaves free, S, and how many gains there are; of each window, with a gain for each axis of an
     answer, where there are windows. loudness: variance of the noise, where the filter itself widens it.
 
         g = (F' F)^-1 F' e,    square = g' ((F' F)^-1 + S)^-1 g = (F' e)' (1 + S F' F)^-1 g
     """
-    known = trust.known_effects(fold)
-    F, e = _standardized(fold, held_out)
+    known = trust.known_effects(fold.model)
+    flight = fold.innovations()
+    F, e = _standardized(fold.model, flight)
     if not len(e):  # a part without a residual shows no gain
         return []
-    P = build_states(fold, fold.noise_of(held_out.samples.noise_ma_coefficients)).initial_covariance[3:, 3:]
-    S = np.asarray(P[0, 0] + np.diag(np.diag(P)[1:][known]))
+    P = build_states(fold.model, flight.noise).initial_covariance[3:, 3:]
+    S = P[0, 0] + np.diag(np.diag(P)[1:][known])
     F, n = F[:, :, known], 1
     if window_s is None:
         F = F.sum(axis=3)
     else:
         F, S = F.reshape(*e.shape, -1), np.kron(S, np.ones((3, 3)))
-        n = max(round(len(e) * held_out.samples.dt_s / window_s), 1)
+        n = max(round(len(e) * fold.held_out.samples.dt_s / window_s), 1)
     errors = []
     for rows in np.array_split(np.arange(len(e)), n):
         FF, Fe, g = _gains(*(_centred(values[rows]) / np.sqrt(loudness) for values in (F, e)))
@@ -427,10 +437,10 @@ def _with_inflated_noise(parts: Parts, model: Model) -> Model:
     axis of an answer with its own, are farther from 1, in squares, than it and the filter let them be: quiet
     gyros show what the model itself lacks."""
     windows: dict[tuple[float, ...], list[float]] = {}
-    for fold, held_out, fitted in held_out_folds(parts, model):
-        loudness = _loudness(fold, held_out, fitted if len(parts) > 1 else parts)
-        errors = _gain_errors(fold, held_out, _GAIN_WINDOW_S, loudness)
-        found = windows.setdefault(held_out.samples.noise_ma_coefficients, [])
+    for fold in held_out_folds(parts, model):
+        loudness = _loudness(fold, fold.fitted if len(parts) > 1 else parts)
+        errors = _gain_errors(fold, _GAIN_WINDOW_S, loudness)
+        found = windows.setdefault(fold.held_out.samples.noise_ma_coefficients, [])
         found.extend(min(error / max(n, 1), _MAX_INFLATION) for error, n in errors)
     inflation = {ma: max(float(np.mean(values)), 1.0) for ma, values in windows.items() if values}
     for ma in inflation if model.vehicle.other_laws else ():
@@ -443,26 +453,25 @@ def _with_inflated_noise(parts: Parts, model: Model) -> Model:
     return model.model_copy(update={"colours": colours})
 
 
-def _loudness(fold: Model, held_out: FitPart, others: Parts) -> float:
+def _loudness(fold: Fold, others: Parts) -> float:
     """How many times as wide the filter finds the noise of a flight left out as that of the loudest other
     flight of the same noise; 1 if it is within the range of these, or under the same law. What the filter
     widens by itself (`recent_scale`) is not counted again."""
-    if not fold.vehicle.other_laws:
+    model, ma = fold.model, fold.held_out.samples.noise_ma_coefficients
+    if not model.vehicle.other_laws:
         return 1.0
 
-    def scale(flight: FitPart) -> float:
-        _, e = _standardized(fold, flight)
-        scales = recent_scale(e, np.ones(len(e), dtype=bool), fold.rate_hz)
+    def scale(part: FitPart) -> float:
+        _, e = _standardized(model, part.innovations(model))
+        scales = recent_scale(e, np.ones(len(e), dtype=bool), model.rate_hz)
         return float(scales.mean()) if len(scales) else 1.0
 
-    scales = [scale(flight) for flight in _parts_in(others, held_out.samples.noise_ma_coefficients)]
-    return max(scale(held_out) / max([1.0, *scales]), 1.0)
+    return max(scale(fold.held_out) / max([1.0, *map(scale, _parts_in(others, ma))]), 1.0)
 
 
-def _standardized(model: Model, held_out: FitPart) -> tuple[Floats, Floats]:
-    """Return the effect F (n, 3, G, 3) of each axis of each group's answer on the residuals of a part, and
+def _standardized(model: Model, flight: regression.Innovations) -> tuple[Floats, Floats]:
+    """Return the effect F (n, 3, G, 3) of each axis of each group's answer on the residuals of a flight, and
     those e (n, 3), both in sd of the noise, without means; where responses are quick, q times that."""
-    flight = held_out.innovations(model)
     sd = np.sqrt(flight.noise.wider * flight.quick_scale(model))[:, None]
     F = np.einsum("nga,ab->nbga", flight.F, flight.W)
     return _centred(F) / sd[:, :, None, None], _centred(flight.e @ flight.W) / sd
@@ -479,21 +488,18 @@ def _estimate_trim_walk(parts: Parts, model: Model) -> list[float]:
     Means of n samples of a random walk, with steps of variance w, and of noise whose mean has the variance
     c / n differ from the next with the variance v = 2 c / n + 2 n w / 3: two n tell w from c.
     """
-    sums = np.zeros((2, 3))
-    counts = np.zeros(2)
-    spans = np.round(np.array(_TRIM_SPANS_S) * model.rate_hz)
-    for fold, held_out, _ in held_out_folds(parts, model):
-        flight = held_out.innovations(fold)
-        g = flight.e / np.sqrt(np.maximum(np.diag(flight.R), MIN_DIVISOR))
-        for begin, end in runs_between(np.diff(flight.rows) > 1):
-            for i, n in enumerate(spans.astype(int).tolist()):
-                means = g[begin:end][: (end - begin) // n * n].reshape(-1, n, 3).mean(axis=1)
-                sums[i] += (np.diff(means, axis=0) ** 2).sum(axis=0)
-                counts[i] += max(len(means) - 1, 0)
+    spans = [round(span_s * model.rate_hz) for span_s in _TRIM_SPANS_S]
+    squares: list[list[Floats]] = [[], []]
+    for flight in (fold.innovations() for fold in held_out_folds(parts, model)):
+        for g in flight.residual_runs():
+            for n, found in zip(spans, squares, strict=True):
+                means = g[: len(g) // n * n].reshape(-1, n, 3).mean(axis=1)
+                found.append(np.diff(means, axis=0) ** 2 / np.maximum(np.diag(flight.R), MIN_DIVISOR))
     usual = np.array(FilterSettings().trim_walk)
-    if not counts.all():
+    short, long = map(np.vstack, squares)
+    if not len(short) or not len(long):
         return usual.tolist()
-    v1, v2 = sums / counts[:, None]
+    v1, v2 = short.mean(axis=0), long.mean(axis=0)
     n1, n2 = spans
     w = 1.5 * (n2 * v2 - n1 * v1) / (n2**2 - n1**2)
     return np.maximum(np.sqrt(np.maximum(w, 0.0)), usual).tolist()
@@ -518,10 +524,10 @@ def add_ranges_and_threshold(parts: Parts, model: Model) -> Model:
     evidence of a fault they would alarm as often as declared."""
     peaks = list[extremes.PeaksAndHours]()
     deviations = list[Floats]()
-    for fold, held_out, _ in held_out_folds(parts, model):
-        peaks.append(_healthy_peaks(fold, held_out))
+    for fold in held_out_folds(parts, model):
+        peaks.append(_healthy_peaks(fold))
         if len(parts) > 1 and model.vehicle.other_laws:
-            deviations.append(_squared_deviations(fold, held_out))
+            deviations.append(_squared_deviations(fold))
     variance = group_gain_sd(fit_of(parts, model), model) ** 2
     if model.vehicle.other_laws:
         # how far another flight's gains are at most before any is left out counts as one flight
@@ -558,13 +564,13 @@ def _alarm_rate_and_threshold(
     return target, _choose_threshold(tail, target, model) if target else None
 
 
-def _squared_deviations(model: Model, held_out: FitPart) -> Floats:
+def _squared_deviations(fold: Fold) -> Floats:
     """Squares of how far the groups' gains are from 1 in a flight left out, beyond the noise's share, (G,);
     nan of a group whose effect it does not show."""
-    F, e = _standardized(model, held_out)
+    F, e = _standardized(fold.model, fold.innovations())
     F = F.sum(axis=3)
-    squares = np.full(len(model.groups), np.nan)
-    known = trust.known_effects(model) & F.any(axis=(0, 1))
+    squares = np.full(F.shape[2], np.nan)
+    known = trust.known_effects(fold.model) & F.any(axis=(0, 1))
     if known.any():  # a part without a residual shows the effect of no group
         FF, _, g = _gains(F[:, :, known], e)
         P = np.linalg.pinv(FF, rcond=_RANK_TOLERANCE, hermitian=True)
@@ -600,16 +606,16 @@ def _cross_validate(
     }
 
 
-def _healthy_peaks(model: Model, held_out: FitPart) -> extremes.PeaksAndHours:
+def _healthy_peaks(fold: Fold) -> extremes.PeaksAndHours:
     """Return for a part left out the peaks of the alarm statistic in health, and its healthy hours."""
-    bank = build_bank(model)
-    p = bank_posterior(held_out.samples, model, bank)
+    bank, samples = build_bank(fold.model), fold.held_out.samples
+    p = bank_posterior(samples, fold.model, bank)
     z = fault_evidence(p, bank)
     answers = p[:, -1] < 0.5
-    rows = np.flatnonzero(held_out.is_usable & ~(held_out.samples.labels < 1.0).any(axis=1) & answers)
+    rows = np.flatnonzero(fold.held_out.is_usable & ~(samples.labels < 1.0).any(axis=1) & answers)
     runs = [page_cusum(z[rows[begin:end]], np.inf) for begin, end in runs_between(np.diff(rows) > 1)]
     peaks = np.concatenate([extremes.peaks_between_zeros(cusum) for cusum in runs])
-    return peaks, len(rows) * held_out.samples.dt_s / 3600.0
+    return peaks, len(rows) * samples.dt_s / 3600.0
 
 
 def tied_shares(parts: Parts, model: Model) -> Floats:
@@ -659,16 +665,10 @@ def group_gain_sd(fit: regression.Regression, model: Model) -> Floats:
     return np.minimum(gain_sd, _GAIN_SD_CAP)
 
 
-def refitted_folds(parts: Parts, model: Model) -> list[tuple[Model, FitPart, str]]:
-    """For each part that is left out, the model fitted to the others, this part and its name."""
-    folds = validation_folds(parts)
-    return [(refit(fitted, model), held_out, name) for fitted, held_out, name in folds]
-
-
 def fold_qualities(parts: Parts, model: Model) -> list[Document]:
     """Compute the explained variance of parts left out, one entry a fold."""
-    folds = refitted_folds(parts, model)
-    return [{"left_out": name, **prediction_quality(fold, held_out)} for fold, held_out, name in folds]
+    folds = held_out_folds(parts, model, None)
+    return [{"left_out": fold.name, **prediction_quality(fold)} for fold in folds]
 
 
 def score_folds(parts: Parts, model: Model) -> tuple[list[Document], float]:
@@ -676,13 +676,14 @@ def score_folds(parts: Parts, model: Model) -> tuple[list[Document], float]:
     entries = fold_qualities(parts, model)
     usual = model.settings.bounds
     coverage: list[list[float]] = []
-    for entry, (fold, held_out, _) in zip(entries, refitted_folds(parts, model), strict=True):
-        labels = np.where(held_out.is_usable[:, None], held_out.samples.labels, np.nan)
+    for entry, fold in zip(entries, held_out_folds(parts, model, None), strict=True):
+        samples = fold.held_out.samples
+        labels = np.where(fold.held_out.is_usable[:, None], samples.labels, np.nan)
         if np.isfinite(labels).all(axis=1).any():
-            bank = build_bank(fold)
-            p = bank_posterior(held_out.samples, fold, bank)
+            bank = build_bank(fold.model)
+            p = bank_posterior(samples, fold.model, bank)
             scores = {
-                mass: score_against_labels(rows_of_posterior(held_out.samples, fold, bank, p, mass), labels)
+                mass: score_against_labels(rows_of_posterior(samples, fold.model, bank, p, mass), labels)
                 for mass in (*_CREDIBLE_MASSES, usual)
             }
             entry["score"] = scores[usual]
@@ -692,10 +693,10 @@ def score_folds(parts: Parts, model: Model) -> tuple[list[Document], float]:
     return entries, _CREDIBLE_MASSES[int(np.argmin(np.abs(np.mean(coverage, axis=0) - _COVERAGE_GOAL)))]
 
 
-def prediction_quality(model: Model, held_out: FitPart) -> Document:
+def prediction_quality(fold: Fold) -> Document:
     """Share of the rates' variance that one-step prediction explains, and the residual, an axis."""
-    rows, e = one_step_residual(model, held_out)
-    y = held_out.samples.rates[rows]
+    rows, e = one_step_residual(fold.model, fold.held_out)
+    y = fold.held_out.samples.rates[rows]
     if not len(y):
         return {"samples": 0}
     explained = 1.0 - e.var(axis=0) / np.maximum(y.var(axis=0), MIN_DIVISOR)

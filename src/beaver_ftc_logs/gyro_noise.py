@@ -27,12 +27,12 @@ def yule_walker_predictor(model: Model, Q: Floats, s: float, L: int) -> tuple[Fl
     P (3 L, 3 L): covariance of the earlier residuals. S (3 L, 3): covariance of these with the residual.
     """
     R = _autocovariance(model, Q, s, L)
+    both = np.concatenate([R[:0:-1].transpose(0, 2, 1), R])  # at lags -L to L
     lags = np.arange(L)
-    blocks = np.array([[_at_lag(R, int(j - i)) for j in lags] for i in lags])
-    P = blocks.transpose(0, 2, 1, 3).reshape(3 * L, 3 * L)
-    S = np.concatenate([_at_lag(R, -int(i) - 1) for i in lags])
+    P = both[L + lags - lags[:, None]].transpose(0, 2, 1, 3).reshape(3 * L, 3 * L)
+    S = both[L - 1 - lags].reshape(3 * L, 3)
     B = np.linalg.solve(P, S)
-    return np.asarray(B), np.asarray(R[0] - S.T @ B)
+    return B, R[0] - S.T @ B
 
 
 def _autocovariance(model: Model, Q: Floats, s: float, L: int) -> Floats:
@@ -44,8 +44,3 @@ def _autocovariance(model: Model, Q: Floats, s: float, L: int) -> Floats:
         R[t] = s**2 * np.einsum("jab,jcb->ac", M[t:], M[: len(M) - t])
     R[0] += Q
     return R[: L + 1]
-
-
-def _at_lag(R: Floats, t: int) -> Floats:
-    """E w[k] w[k-lag]' at any lag."""
-    return np.asarray(R[t] if t >= 0 else R[-t].T)

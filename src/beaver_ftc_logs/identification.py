@@ -115,7 +115,7 @@ def assume_law_and_air(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Ve
         else:
             lines.append(f"{key}: {str(getattr(vehicle, key)).lower()}, as the vehicle file says")
     if vehicle.reference_airspeed_mps is None:
-        airspeed = any(flight.airspeed is not None for flight in flights)
+        airspeed = any(np.isfinite(flight.airspeed).any() for flight in flights)
         why = "explains no more" if airspeed else "is not logged"
         lines.append(f"reference_airspeed_mps: none, the airspeed {why}")
     return vehicle, lines
@@ -180,7 +180,7 @@ def expect_another_day(folds: list[Document], model: Model) -> Document:
         key: {"mean": float(np.mean(each)), "worst": float((max if key == "mean_error" else min)(each))}
         for key, each in values.items()
     }
-    tail = model.fitted.tail if model.fitted is not None else None
+    tail = model.fitted.tail
     threshold = model.settings.threshold
     if tail is None or threshold is None:
         return expected
@@ -198,12 +198,11 @@ def scale_if_better(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Seque
     known and this explains more; else both as they are. Where other laws may fly, each group of surfaces with
     the power of the airspeed that explains most; another than that of the pressure must explain decisively
     more."""
-    V = np.concatenate([np.empty(0), *(flight.airspeed for flight in flights if flight.airspeed is not None)])
+    V = np.concatenate([flight.airspeed for flight in flights])
     V = V[np.isfinite(V)]
     V0 = float(np.median(V)) if V.size else 0.0
     if vehicle.reference_airspeed_mps is not None or V0 <= 0.0:
         return flights, vehicle
-    unset = {key: None for key in ("other_laws", "moving_air") if getattr(vehicle, key) is None}
     assumed, _ = assume_law_and_air(flights, vehicle)
     best = assumed.model_copy(update={"reference_airspeed_mps": V0})
     if _min_bic(flights, assumed) - _min_bic(_scaled(flights, best), best) < _DECISIVE_BIC:
@@ -218,7 +217,8 @@ def scale_if_better(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Seque
             candidate = best.model_copy(update={"airspeed_powers": powers})
             if (bic := _min_bic(_scaled(flights, candidate, white), candidate)) < least:
                 least, best = bic, candidate
-    return _scaled(flights, best), best.model_copy(update=unset)
+    found = {key: getattr(best, key) for key in ("reference_airspeed_mps", "airspeed_powers")}
+    return _scaled(flights, best), vehicle.model_copy(update=found)
 
 
 def _scaled(
@@ -466,11 +466,10 @@ def _cut_windows(parts: Parts, groups: Groups, n: int, past: int) -> tuple[Float
         v = regression.group_commands(samples, groups, labelled=True)
         rows = np.column_stack([samples.rates, samples.stretch_number, v])[:-1]
         rows[~part.is_usable[:-1]] = np.nan
-        if len(rows) >= past + n:
-            views = np.lib.stride_tricks.sliding_window_view(rows, past + n, axis=0)[::n].transpose(0, 2, 1)
-            is_whole = np.isfinite(views).all(axis=(1, 2)) & (np.ptp(views[:, :, 3], axis=1) == 0)
-            windows.append(views[is_whole])
-    chosen = np.concatenate(windows or [np.empty((0, past + n, 4 + len(groups)))])
+        begin = np.arange(0, len(rows) - past - n + 1, n)
+        cut = rows[begin[:, None] + np.arange(past + n)]
+        windows.append(cut[np.isfinite(cut).all(axis=(1, 2)) & (np.ptp(cut[:, :, 3], axis=1) == 0)])
+    chosen = np.concatenate(windows)
     chosen = chosen[:: max(len(chosen) // _MIN_FREE_RUNS, 1)]
     return chosen[:, :, 4:], chosen[:, past:, :3]
 

@@ -8,7 +8,7 @@ import re
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
-from beaver_ftc_logs.recording import Columns, Parameters
+from beaver_ftc_logs.recording import Columns, Parameters, last_value
 
 
 @dataclass(frozen=True)
@@ -105,16 +105,12 @@ _MIN_ROTORS = 3
 def multicopter_reason(params: Parameters, names: Collection[str]) -> str | None:
     """What in a log says that rotors alone move the vehicle; None where nothing does."""
 
-    def last(name: str) -> float | None:
-        values = params.get(name)
-        return values[-1] if values else None
-
-    mav_type = last("MAV_TYPE")
+    mav_type = last_value(params, "MAV_TYPE")
     if mav_type in _PX4_ROTARY_WINGS:
         return f"MAV_TYPE {mav_type:g}, {_PX4_ROTARY_WINGS[int(mav_type)]}"
-    if last("CA_AIRFRAME") == 0:
+    if last_value(params, "CA_AIRFRAME") == 0:
         return "CA_AIRFRAME 0, multirotor"
-    start = last("SYS_AUTOSTART")
+    start = last_value(params, "SYS_AUTOSTART")
     for low, high, title in _PX4_COPTERS:
         if mav_type is None and start is not None and low <= start <= high:
             return f"SYS_AUTOSTART {start:g}, {title}"
@@ -134,7 +130,7 @@ VTOL_MODE, _ON_ITS_WING = "vehicle_status.vehicle_type", 2.0
 
 def hovers_throughout(params: Parameters, columns: Columns) -> bool:
     """Whether the log is of a VTOL that never flies on its wing [PX4, vehicle_status.msg: vehicle_type 2]."""
-    is_vtol = params.get("MAV_TYPE", (0.0,))[-1] in _PX4_VTOL_TYPES
+    is_vtol = last_value(params, "MAV_TYPE") in _PX4_VTOL_TYPES
     return is_vtol and VTOL_MODE in columns and not (columns[VTOL_MODE].values == _ON_ITS_WING).any()
 
 
@@ -142,7 +138,7 @@ def command_names(names: Sequence[str], params: Parameters) -> list[str]:
     """The columns that carry commands of surfaces, those of one message: what several messages say of the
     same surfaces is said once. Of a VTOL only the group of its wing."""
     commands = [name for name in names if is_command_name(name)]
-    if params.get("MAV_TYPE", (0.0,))[-1] in _PX4_VTOL_TYPES:
+    if last_value(params, "MAV_TYPE") in _PX4_VTOL_TYPES:
         hovering = r"(actuator_controls_0|vehicle_torque_setpoint)\."
         commands = [name for name in commands if not re.match(hovering, name)]
     message = next((name.partition(".")[0] for name in commands if "." in name), None)

@@ -21,7 +21,7 @@ from beaver_ftc.documents import BadInput
 from beaver_ftc.documents import validate_model as validate
 from beaver_ftc.results import Document
 from beaver_ftc_logs.readers import SELECTIVE_READERS, check_exists, read_flight, reader_name_for_path
-from beaver_ftc_logs.recording import Floats, Parameters
+from beaver_ftc_logs.recording import Floats, Parameters, last_value
 from beaver_ftc_logs.vehicle import Vehicle, read_vehicle_document
 
 Weights = dict[str, float]
@@ -172,14 +172,13 @@ class _Parameters:
     def number(self, name: str, low: float, high: float, unit: str = "") -> float:
         """The last value of a parameter. Raises _BadParameter for one that is missing or out of range."""
         allowed = f"allowed: {low:g} to {high:g}{unit}"
-        values = self.values_by_name.get(name, ())
-        if not values:
+        value = last_value(self.values_by_name, name)
+        if value is None:
             raise _BadParameter(f"{name} is not in the log, {allowed}")
-        value = values[-1]
         if not (math.isfinite(value) and low <= value <= high):
             raise _BadParameter(f"{name} is {value:g}, {allowed}")
         line = f"{name} changes in the log: its last value, {value:g}, is used"
-        if len(values) > 1 and line not in self.lines_on_changes:
+        if len(self.values_by_name[name]) > 1 and line not in self.lines_on_changes:
             self.lines_on_changes.append(line)
         return value
 
@@ -316,7 +315,7 @@ def _px4_mixing(params: _Parameters, column_names: set[str]) -> _Found:
     if "actuator_outputs_1.output[0]" not in column_names:  # else it is unknown which of the two is MAIN
         outputs += _px4_pulses(params, [*drivers.values()])
     # of several torque setpoints, as a vehicle that can hover has, it is unknown which one is of these
-    is_fixed_wing = params.values_by_name.get("CA_AIRFRAME", (0.0,))[-1] == _PX4_FIXED_WING
+    is_fixed_wing = last_value(params.values_by_name, "CA_AIRFRAME") == _PX4_FIXED_WING
     reason = "" if is_fixed_wing else "CA_AIRFRAME is not 1 (fixed wing)"
     return surfaces, outputs, _Axes(_PX4_AXIS_COLUMNS, 1.0, reason)
 
@@ -382,32 +381,30 @@ def _add_surfaces_by_output(
             mixing.lines.append(surface.stays_out(f"{column} is not in the log"))
     used = [(surface, *output) for surface, output in pairs if output[0] in names]
     surfaces, columns = [surface for surface, *_ in used], [column for _, column, _ in used]
-    rows, own = _rows_of_commands(surfaces), _weights_of_own_columns(surfaces, columns)
+    rows, own = _rows_of_commands(surfaces), _weights_of_own_columns(surfaces)
     basis: list[int] = []
     for k, (surface, column, (scale, offset, text)) in enumerate(used):
         factors = np.linalg.lstsq(rows[basis].T, rows[k], rcond=None)[0] if basis else np.zeros(0)
         if basis and np.allclose(factors @ rows[basis], rows[k], atol=1e-6):
-            weights: Weights = {}
-            for factor, i in zip(factors.tolist(), basis, strict=True):
-                for name, weight in own[i].items():
-                    weights[name] = weights.get(name, 0.0) + factor * weight
-            weights = _tidy(weights)
+            shares = factors @ own[basis]
         else:
             basis.append(k)
-            weights = own[k]
+            shares = own[k]
+        weights = _tidy(dict(zip(columns, shares.tolist(), strict=True)))
         mixing.surfaces[surface.name] = weights
         mixing.entry_by_column[column] = _command_entry(column, scale, offset)
         shared = "" if column in weights else f"; it moves with {' and '.join(weights)}"
         mixing.lines.append(f"{surface}: {surface.reason}{text}{shared}")
 
 
-def _weights_of_own_columns(surfaces: Sequence[_Surface], columns: list[str]) -> list[Weights]:
-    """The command of each surface by itself. Flaps are added to one flaperon and taken from the other: half
-    the sum of both is the command without flaps."""
+def _weights_of_own_columns(surfaces: Sequence[_Surface]) -> Floats:
+    """The command of each surface by itself, a row of shares of the columns. Flaps are added to one flaperon
+    and taken from the other: half the sum of both is the command without flaps."""
+    own = np.eye(len(surfaces))
     flaps = [k for k, surface in enumerate(surfaces) if surface.name in _FLAPERONS]
-    halves = {columns[k]: 0.5 for k in flaps}
-    both = len(flaps) == len(_FLAPERONS)
-    return [halves if both and k in flaps else {column: 1.0} for k, column in enumerate(columns)]
+    if len(flaps) == len(_FLAPERONS):
+        own[np.ix_(flaps, flaps)] = 0.5
+    return own
 
 
 def _rows_of_commands(surfaces: Sequence[_Surface]) -> Floats:

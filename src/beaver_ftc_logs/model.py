@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from beaver_ftc.documents import Conflict, Location, Number, Section, Whole, deny, read_file, refuse
 from beaver_ftc_logs.extremes import PeakTail
@@ -155,6 +155,14 @@ class FittedRanges(_LastingSection):
     tail: PeakTail | None = None
 
 
+NOTHING_FITTED = FittedRanges(commands=[], rates=[])
+"""Of a model that knows nothing of its flights."""
+
+
+def _or_nothing(given: Any) -> Any:
+    return NOTHING_FITTED if given is None else given
+
+
 class NoiseModel(Section):
     """The noise of some flights: another gyro, air or law colours what is not explained.
 
@@ -194,7 +202,7 @@ class Model(Section):
     response_sd: standard errors of `response`, colour included
     noise: covariance of the residual, (3, 3), (rad/s)2
     colours: noises that flights were seen to have, for `moving_air`
-    fitted: what it was fitted on; None: nothing is known
+    fitted: what it was fitted on; null or left out: nothing is known
     identified: what it was found from, and how well
     """
 
@@ -212,7 +220,7 @@ class Model(Section):
     noise: Covariance
     colours: list[NoiseModel] = Field([])
     settings: FilterSettings = FilterSettings()
-    fitted: FittedRanges | None = None
+    fitted: Annotated[FittedRanges, BeforeValidator(_or_nothing)] = NOTHING_FITTED
     identified: dict[str, object] = Field({})
 
     @model_validator(mode="after")
@@ -221,11 +229,12 @@ class Model(Section):
         n, n_past = len(self.past), 3 * self.history + n_signals
         reason = f"has {n} rows, allowed: {n_past}, as `identify` writes them: identify it again"
         conflicts: list[Conflict] = [(("past",), reason)] * (n != n_past)
-        refuse([*conflicts, *self._group_mistakes(), *self._shape_mistakes()])
+        refuse([*conflicts, *self._name_mistakes(), *self._shape_mistakes()])
         return self
 
-    def _group_mistakes(self) -> Iterator[Conflict]:
-        """Names that are no surface of the vehicle's, or are in two groups; levels of no group."""
+    def _name_mistakes(self) -> Iterator[Conflict]:
+        """Names that are no surface of the vehicle's, or are in two groups; levels of no group; delays that
+        are too long."""
         seen: set[str] = set()
         for i, group in enumerate(self.groups):
             for k, name in enumerate(group):
@@ -255,14 +264,9 @@ class Model(Section):
             arrays.append(((*at, "misreads"), noise.misreads, (G,)))
             if noise.average[0] != 1.0:
                 yield (*at, "average"), "does not begin with 1, allowed: 1, c1, ..."
-        if (ranges := self.fitted) is not None:
-            arrays += [
-                (("fitted", "commands"), ranges.commands, (len(ranges.commands), 2)),
-                (("fitted", "rates"), ranges.rates, (3, 2)),
-                (("fitted", "airspeed"), ranges.airspeed, (2,)),
-                (("fitted", "tied"), ranges.tied, (G,)),
-                (("fitted", "gain_sd"), ranges.gain_sd, (G,)),
-            ]
+        shapes = {"commands": (len(self.fitted.commands), 2), "rates": (3, 2), "airspeed": (2,)}
+        for key, shape in (shapes | {"tied": (G,), "gain_sd": (G,)}).items():
+            arrays.append((("fitted", key), getattr(self.fitted, key), shape))
         for key_path, lists, shape in arrays:
             if lists and _shape(lists) != shape:
                 yield key_path, f"has another shape, allowed: {' x '.join(map(str, shape))} numbers"

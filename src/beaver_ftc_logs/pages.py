@@ -5,11 +5,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from io import BytesIO
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results import SERIES_COLOURS as SERIES
 from beaver_ftc.results import Document, as_json, result_folder
@@ -43,9 +45,10 @@ def load_template(name: str) -> "Template":
 
 @dataclass(frozen=True)
 class Words:
-    """What a flight's page says of its diagnosis: what its bounds are called, what is said without an event,
-    and of the model."""
+    """What a flight's page says of its diagnosis: of which surfaces, what its bounds are called, what is said
+    without an event, and of the model."""
 
+    surfaces: Sequence[str]
     bounds: str
     quiet: str
     predicts: str
@@ -54,6 +57,7 @@ class Words:
 def words_of_model(model: Model) -> Words:
     """Of an identified model."""
     return Words(
+        list(model.vehicle.surfaces),
         "90 % bounds",
         f"The probability of a fault stayed below the alarm level of {model.settings.alarm}.",
         f"The model was identified at {model.rate_hz:.3g} Hz; it predicts a sample from past ones, "
@@ -61,19 +65,18 @@ def words_of_model(model: Model) -> Words:
     )
 
 
-def words_of_aircraft(name: str, window_s: float) -> Words:
+def words_of_aircraft(aircraft: Aircraft, window_s: float) -> Words:
     """Of an aircraft's own model. window_s: for how long a fault has to stand for its bounds to hold."""
     return Words(
+        aircraft.surfaces,
         "bounds",
         "No residual left the bound of the errors declared.",
-        f"The model is that of {name}; the bounds hold while one surface alone is at fault, has stood for "
-        f"{window_s:g} s, and the errors declared hold.",
+        f"The model is that of {aircraft.name}; the bounds hold while one surface alone is at fault, has "
+        f"stood for {window_s:g} s, and the errors declared hold.",
     )
 
 
-def render_diagnosis(
-    samples: Samples, surfaces: Sequence[str], rows: LogRows, verdict: Document, words: Words
-) -> str:
+def render_diagnosis(samples: Samples, rows: LogRows, verdict: Document, words: Words) -> str:
     """The report of a flight as HTML text."""
     return load_template("flight.html.j2").render(
         verdict=verdict,
@@ -81,7 +84,7 @@ def render_diagnosis(
         events=events_to_show(verdict["events"]),
         brief_s=MAX_BRIEF_EVENT_S,
         words=words,
-        picture=_encode_png(flight_figure(samples, surfaces, rows, words.bounds)),
+        picture=_encode_png(flight_figure(samples, rows, words)),
         notes=[*_log_notes(samples), words.predicts],
     )
 
@@ -97,11 +100,9 @@ def _log_notes(samples: Samples) -> list[str]:
     return [*notes, *samples.notes]
 
 
-def flight_figure(
-    samples: Samples, surfaces: Sequence[str], rows: LogRows, label: str = "90 % bounds"
-) -> Any:
-    """The flight on one page: commands, rates, effectiveness with bounds, probability of a fault. label: what
-    the bounds are called."""
+def flight_figure(samples: Samples, rows: LogRows, words: Words) -> Any:
+    """The flight on one page: commands, rates, effectiveness with bounds, probability of a fault."""
+    surfaces = words.surfaces
     figure = _new_figure(11, 3.4 + 1.25 * len(surfaces))
     heights = [1.2, 1.2, *[1.0] * (len(surfaces) + 1)]
     axes = figure.subplots(len(heights), sharex=True, height_ratios=heights)
@@ -112,7 +113,7 @@ def flight_figure(
     _draw_lines(axes[2], rows.t_s, rows.fault_probability[:, None], ["a fault"], "probability")
     axes[2].set_ylim(-0.05, 1.05)
     for i, surface in enumerate(surfaces):
-        _draw_effectiveness(axes[3 + i], rows, i, label)
+        _draw_effectiveness(axes[3 + i], rows, i, words.bounds)
         _label_axis(axes[3 + i], f"{surface}\neffectiveness")
     for axis in axes:
         _shade_alarms(axis, rows)
@@ -214,31 +215,31 @@ def _encode_png(figure: Any) -> str:
 
 def _prediction_figure(usable: Parts, model: Model) -> Any:
     """Measured and predicted rates over the liveliest part of each flight (or half) that was left out."""
-    folds = [fold for fold in fitting.refitted_folds(usable, model) if fold[1].is_usable.any()]
-    folds = folds[:_MAX_SHOWN_FLIGHTS]
+    used = (fold for fold in fitting.held_out_folds(usable, model, None) if fold.held_out.is_usable.any())
+    folds = list(islice(used, _MAX_SHOWN_FLIGHTS))
     n = max(len(folds), 1)
     figure = _new_figure(11, 4.6 * n)
     parts = figure.subfigures(n, squeeze=False)[:, 0]
-    for part, (refitted, held_out, name) in zip(parts, folds, strict=False):
+    for part, fold in zip(parts, folds, strict=False):
         axes = part.subplots(3, 1, sharex=True)
-        t_s, rates, residual = _liveliest_window(refitted, held_out, round(_FIGURE_SPAN_S * model.rate_hz))
+        t_s, rates, residual = _liveliest_window(fold, round(_FIGURE_SPAN_S * model.rate_hz))
         for i, axis in enumerate(axes):
             residuals, rate = np.rad2deg(residual[:, i]), np.rad2deg(rates[:, i])
             axis.plot(t_s, rate, color="#888888", linewidth=2.2, label="measured")
             axis.plot(t_s, rate - residuals, color=SERIES[0], linewidth=0.9, label="predicted")
             axis.plot(t_s, residuals, color=SERIES[1], linewidth=0.7, label="residual")
             _label_axis(axis, f"{'pqr'[i]}, deg/s")
-        axes[0].set_title(f"{name}, not fitted: one sample ahead", fontsize=9, loc="left")
+        axes[0].set_title(f"{fold.name}, not fitted: one sample ahead", fontsize=9, loc="left")
         axes[0].legend(loc="upper right", fontsize=7, ncols=3, framealpha=0.8)
         axes[-1].set_xlabel("time, s", fontsize=8)
     return figure
 
 
-def _liveliest_window(model: Model, held_out: fitting.FitPart, n: int) -> tuple[Floats, Floats, Floats]:
+def _liveliest_window(fold: fitting.Fold, n: int) -> tuple[Floats, Floats, Floats]:
     """Times, rates and residual of the window in which the rates known moved most; nan where nothing is
     known, for lines to end."""
-    rows, residual = fitting.one_step_residual(model, held_out)
-    samples = held_out.samples
+    rows, residual = fitting.one_step_residual(fold.model, fold.held_out)
+    samples = fold.held_out.samples
     rates, r = np.full((2, *samples.rates.shape), np.nan)
     rates[rows], r[rows] = samples.rates[rows], residual
     total = np.concatenate([[0.0], np.cumsum(np.nansum(rates**2, axis=1))])

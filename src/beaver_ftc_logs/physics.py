@@ -14,14 +14,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from beaver_ftc_logs.recording import Column, Columns, Floats
+from beaver_ftc_logs.recording import Column, Columns, Floats, largest_magnitude
 from beaver_ftc_logs.units import ACCELERATION, ANGLE, RATE, SI_UNITS, UNIT_FACTORS, nearest_unit
 
 _ANGLE_WINDOW_S, _MIN_WINDOWS = 1.0, 8
-_MIN_MANY_WINDOWS, _AGREEING, _UNIT_RATIO = 20, 0.7, 1.3
-_CLOSE, _EXACT = 0.95, 0.99
-_SLOPE_FACTOR, _SLOPE_FACTOR_FEW = 1.5, 1.8
-_EXCHANGED, _EXCHANGED_FEW = 0.4, 0.2
+_EXCHANGED, _AGREEING, _CLOSE, _EXACT = 0.2, 0.7, 0.95, 0.99
+_SLOPE_FACTOR, _UNIT_RATIO = 1.8, 1.3
 _MIN_RMS_RAD_S = 1e-3
 """Level and north turn with the earth, by 7.3e-5 rad/s, and with the way over it, by 4.7e-5 rad/s at 300 m/s.
 A change of an angle that is not far above them says nothing of a rate."""
@@ -33,19 +31,13 @@ _MAX_PITCH_RAD, _STEEP_PITCH_RAD = 1.02 * 0.5 * np.pi, 1.0
 
 @dataclass(frozen=True)
 class AngleFit:
-    """slope: change of an angle over the integral of its rate; correlation of the two; n_windows: how many
-    were seen; max_angle_magnitude, max_rate_magnitude: as the log says."""
+    """slope: change of an angle over the integral of its rate; correlation of the two; max_angle_magnitude,
+    max_rate_magnitude: as the log says."""
 
     slope: float
     correlation: float
-    n_windows: int
     max_angle_magnitude: float
     max_rate_magnitude: float
-
-    @property
-    def has_many_windows(self) -> bool:
-        """Whether so many windows were seen that less is needed to tell."""
-        return self.n_windows >= _MIN_MANY_WINDOWS
 
 
 def fit_angle(gyros: Sequence[Column], angles: Sequence[Column | None], axis: int) -> AngleFit | None:
@@ -113,9 +105,8 @@ def _fit_angle(
     return AngleFit(
         slope=np.sign(xy) * np.sqrt(yy / xx),
         correlation=xy / np.sqrt(xx * yy),
-        n_windows=len(x),
-        max_angle_magnitude=float(np.nanmax(np.abs(angle))),
-        max_rate_magnitude=float(np.nanmax(np.abs(terms[0]))),
+        max_angle_magnitude=largest_magnitude(angle),
+        max_rate_magnitude=largest_magnitude(terms[0]),
     )
 
 
@@ -130,7 +121,7 @@ def _interpolate(column: Column, t: Floats) -> Floats:
 
 def _full_circle(angle: Floats) -> float:
     """A full circle in the unit that the angles seem to have: the least of rad, deg and cdeg that fits."""
-    largest = float(np.nanmax(np.abs(angle), initial=0.0))
+    largest = largest_magnitude(angle)
     return next((circle for circle in (2.0 * np.pi, 360.0) if largest <= 1.02 * circle), 36000.0)
 
 
@@ -191,7 +182,7 @@ def _is_exact(fit: AngleFit | None) -> bool:
 def _replacing_correlation(fit: AngleFit, is_rate: bool) -> float:
     """How well another column has to agree with an angle to be its rate, where the one named agrees so."""
     corr = abs(fit.correlation)
-    if is_rate and corr < (_EXCHANGED if fit.has_many_windows else _EXCHANGED_FEW):
+    if is_rate and corr < _EXCHANGED:
         return _AGREEING
     return _CLOSE if corr < _AGREEING else _EXACT if corr < _CLOSE else np.inf
 
@@ -203,8 +194,7 @@ def _factor_remark(fit: AngleFit, rate: str, angle: str) -> str | None:
     Either may be; an angle that goes round more than once is, and a rate that no vehicle turns at.
     """
     slope = abs(fit.slope)
-    limit = _SLOPE_FACTOR if fit.has_many_windows else _SLOPE_FACTOR_FEW
-    near = 1.0 / limit < slope < limit
+    near = 1.0 / _SLOPE_FACTOR < slope < _SLOPE_FACTOR
     if abs(fit.correlation) < _AGREEING or (near and fit.slope > 0.0):
         return None
     ratio = f"the change of {angle} is {fit.slope:.4g} times the integral of {rate}"
@@ -220,7 +210,7 @@ def _factor_remark(fit: AngleFit, rate: str, angle: str) -> str | None:
 def _pitch_remark(name: str, pitch: Column) -> str | None:
     """Describe a mistake in a pitch angle by its size, and which unit fits; None where nothing is: it says
     what no comparison can, where rates and angles are scaled alike."""
-    largest = float(np.nanmax(np.abs(pitch.values), initial=0.0))
+    largest = largest_magnitude(pitch.values)
     if largest <= _MAX_PITCH_RAD:
         return None
     unit = next((u for u in ("deg", "cdeg") if largest * SI_UNITS[u][1] <= _MAX_PITCH_RAD), None)

@@ -42,12 +42,12 @@ Runs = list[tuple[int, int]]
 
 def last_true_row(mask: Mask) -> Ints:
     """The last row up to each at which a mask (n,) is true, (n,); -1 before the first."""
-    return np.asarray(np.maximum.accumulate(np.where(mask, np.arange(len(mask)), -1)))
+    return np.maximum.accumulate(np.where(mask, np.arange(len(mask)), -1))
 
 
 def last_row_at(stamps: Floats, t_s: Floats) -> Ints:
     """The row of the last stamp up to each time; the first before it."""
-    return np.asarray(np.maximum(np.searchsorted(stamps, t_s, side="right") - 1, 0))
+    return np.maximum(np.searchsorted(stamps, t_s, side="right") - 1, 0)
 
 
 def runs_between(is_edge: Mask) -> Runs:
@@ -59,6 +59,11 @@ def true_runs(mask: Mask) -> Runs:
     """Begin and end of each run of rows at which a mask (n,) is true."""
     edges = np.flatnonzero(np.diff(mask.astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
     return [(begin, end) for begin, end in edges.tolist()]
+
+
+def largest_magnitude(values: Floats) -> float:
+    """The largest of the numbers without sign, 0 of none."""
+    return float(np.nanmax(np.abs(values), initial=0.0))
 
 
 @dataclass(frozen=True)
@@ -114,6 +119,12 @@ def add_parameter(values_by_name: Parameters, name: str, value: float) -> None:
     is_as_before = bool(values) and (values[-1] == value or (isnan(values[-1]) and isnan(value)))
     if not is_as_before:
         values_by_name[name] = (*values[:1], float(value))
+
+
+def last_value(parameters: Parameters, name: str) -> float | None:
+    """The last value of a parameter, None where the log does not give it."""
+    values = parameters.get(name)
+    return values[-1] if values else None
 
 
 def nearest_names_text(wanted_name: str, names: Iterable[str]) -> str:

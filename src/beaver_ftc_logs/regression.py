@@ -138,7 +138,7 @@ def expand_groups(values: Floats | Mask, model: Model) -> Floats:
     index = np.full(len(model.vehicle.surfaces), -1)
     for g, group in enumerate(group_indices(model)):
         index[group] = g
-    return np.asarray(np.take(np.column_stack([values, np.ones(len(values))]), index, axis=1))
+    return np.take(np.column_stack([values, np.ones(len(values))]), index, axis=1)
 
 
 @dataclass(frozen=True)
@@ -170,12 +170,16 @@ class Innovations:
     @cached_property
     def W(self) -> Floats:
         """Whitening matrix, (3, 3): W W' = R^-1."""
-        return np.asarray(np.linalg.inv(np.linalg.cholesky(self.R)).T)
+        return np.linalg.inv(np.linalg.cholesky(self.R)).T
 
     @property
     def log_size(self) -> float:
         """Logarithm of the size of the noise of a sample before it was whitened, log det(R)^1/2."""
         return 0.5 * float(np.linalg.slogdet(self.R)[1]) - 3.0 * float(np.log(sum(self.noise.average)))
+
+    def residual_runs(self) -> list[Floats]:
+        """The residuals of each run of rows that follow one another, (n, 3) each."""
+        return [self.e[begin:end] for begin, end in runs_between(np.diff(self.rows) > 1)]
 
     def at(self, rows: Ints | slice) -> "Innovations":
         """Some of the rows."""
@@ -185,7 +189,7 @@ class Innovations:
     def columns(self) -> Floats:
         """Effects of trim and responses in standard deviations of the noise, (n, 3, 3 + G)."""
         trim = np.broadcast_to(np.eye(3), (len(self.F), 3, 3))
-        return np.asarray((np.concatenate([trim, self.F], axis=1) @ self.W).transpose(0, 2, 1))
+        return (np.concatenate([trim, self.F], axis=1) @ self.W).transpose(0, 2, 1)
 
     def regression(self) -> tuple[Floats, Floats]:
         """Regressors Z (3 n, 3 + G) of trim and responses, and the rates v (3 n,), whitened."""
@@ -214,7 +218,7 @@ class Innovations:
         difference from their mean over the last half second."""
         sums, n = trailing_sums(self.F, _QUICK_SPAN_S * rate_hz)
         quick = (self.F - sums / n[:, None, None]) @ self.W
-        return np.asarray((quick**2).sum(axis=(1, 2)) / 3.0)
+        return (quick**2).sum(axis=(1, 2)) / 3.0
 
     def quick_scale(self, model: Model) -> Floats:
         """Variance q of the residual over that of the noise, (n,): above 1 where the responses are quicker
@@ -224,7 +228,7 @@ class Innovations:
         is no noise: it has the same sign in many samples.
         """
         excess = np.maximum(self.quick_power(model.rate_hz) - self.noise.usual_quick_power, 0.0)
-        return np.asarray(1.0 + model.settings.quick_error**2 * excess)
+        return 1.0 + model.settings.quick_error**2 * excess
 
 
 def innovations(samples: Samples, model: Model, labelled: bool = False) -> Innovations:
@@ -245,7 +249,7 @@ def innovations(samples: Samples, model: Model, labelled: bool = False) -> Innov
     whole = known.copy()
     for lag in range(1, len(ar) + 1):
         whole &= _delay_rows(known, lag, False)
-    y, F, c = np.nan_to_num(y), np.nan_to_num(F), np.asarray(c - c @ ar.sum(axis=0))
+    y, F, c = np.nan_to_num(y), np.nan_to_num(F), c - c @ ar.sum(axis=0)
     return Innovations(np.arange(len(y)), whole, y, F, c, noise)
 
 
@@ -333,7 +337,7 @@ def rms_of_columns(Z: Floats) -> Floats:
 
 def left_by(Z: Floats, y: Floats) -> Floats:
     """What least squares on Z (n, m) leaves of y (n,) or (n, k)."""
-    return np.asarray(y - Z @ np.linalg.lstsq(Z, y, rcond=None)[0])
+    return y - Z @ np.linalg.lstsq(Z, y, rcond=None)[0]
 
 
 def trailing_sums(x: NDArray[Any], n: float) -> tuple[Floats, Ints]:

@@ -16,15 +16,18 @@ import numpy as np
 
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs import energy, physics, signals
+from beaver_ftc_logs.physics import NamedColumn
 from beaver_ftc_logs.readers import read_parts, split_long_recording
 from beaver_ftc_logs.recording import (
     Column,
+    Columns,
     Floats,
     Ints,
     LoggedFailure,
     Mask,
     RecordedFlight,
     Runs,
+    largest_magnitude,
     runs_between,
 )
 from beaver_ftc_logs.units import TIME_UNITS
@@ -61,7 +64,7 @@ class Samples:
     that is held. log_stamps_s (m,): the log's own time stamps, s. notes: remarks on the reading. airspeed
     (n,) m/s, nan where unknown. unchanged_s: for how long each column of rates, commands and signals has been
     constant, (n,) s. is_rate_clipped (n,). energy_height_rate_mps (n,): rate of the energy height over the
-    last seconds, None if it is not logged. noise_ma_coefficients: the moving average of the noise by which
+    last seconds, nan where unknown. noise_ma_coefficients: the moving average of the noise by which
     rates, commands and signals are whitened, empty if they are not. fit_weight of each sample in a fit.
     n_log_parts: number of parts in which the log was read; if several, the samples are chosen stretches.
     confirmed_rates: the columns of rates that the logged angles confirm.
@@ -78,21 +81,15 @@ class Samples:
     held_age_s: dict[str, float]
     logged_failures: tuple[LoggedFailure, ...]
     log_stamps_s: Floats
+    airspeed: Floats
+    is_rate_clipped: Mask
+    energy_height_rate_mps: Floats
     notes: tuple[str, ...] = ()
-    airspeed: Floats | None = None
     unchanged_s: Mapping[str, Floats] = field(default_factory=dict)
-    is_rate_clipped: Mask | None = None
-    energy_height_rate_mps: Floats | None = None
     noise_ma_coefficients: tuple[float, ...] = ()
     fit_weight: float = 1.0
     n_log_parts: int = 1
     confirmed_rates: frozenset[str] = frozenset()
-
-
-_PER_SAMPLE_FIELDS = (
-    "t_s", "rates", "commands", "signals", "labels", "stretch_number", "airspeed", "is_rate_clipped",
-    "energy_height_rate_mps",
-)  # fmt: skip
 
 
 def resample(log: RecordedFlight, vehicle: Vehicle) -> Samples:
@@ -112,13 +109,12 @@ def resample(log: RecordedFlight, vehicle: Vehicle) -> Samples:
     def stacked_columns(names: list[str]) -> Floats:
         return np.column_stack([held[name][0] for name in names]) if names else np.empty((len(t_s), 0))
 
-    def sampled(quantity: QuantityColumn | None, min_rows: int = 0) -> Floats | None:
+    def sampled(quantity: QuantityColumn | None) -> Floats:
         column = log.columns.get(quantity.column) if quantity else None
-        return sample_column(column, t_s, step_s)[0] if column and len(column.t_s) >= min_rows else None
+        return sample_column(column, t_s, step_s)[0] if column else np.full(len(t_s), np.nan)
 
-    heights = [vehicle.energy.altitude, vehicle.energy.airspeed] if vehicle.energy else []
-    logged = [one for quantity in heights if (one := sampled(quantity, 2)) is not None]
-    climb_mps = energy.energy_climb_mps(t_s, logged[0], logged[1], stretch) if len(logged) == 2 else None
+    heights = (vehicle.energy.altitude, vehicle.energy.airspeed) if vehicle.energy else (None, None)
+    altitude_m, airspeed_mps = map(sampled, heights)
     rates = [log.columns[name] for name in rate_names]
     clipped = [signals.find_clipped_rows(rate.values).astype(float) for rate in rates]
     was_clipped = [_latest_values(t_s, rate.t_s, rows) for rate, rows in zip(rates, clipped, strict=True)]
@@ -142,8 +138,8 @@ def resample(log: RecordedFlight, vehicle: Vehicle) -> Samples:
         notes=(*log.notes, *dict.fromkeys(_defects(log, used, rate_names))),
         airspeed=sampled(vehicle.airspeed),
         unchanged_s={name: unchanged_s(log.columns[name], t_s) for name in used},
-        is_rate_clipped=np.asarray(np.nan_to_num(was_clipped).any(axis=0)),
-        energy_height_rate_mps=climb_mps,
+        is_rate_clipped=np.logical_or.reduce(np.nan_to_num(was_clipped)),
+        energy_height_rate_mps=energy.energy_climb_mps(t_s, altitude_m, airspeed_mps, stretch),
         confirmed_rates=confirmed,
     )
     V0 = vehicle.reference_airspeed_mps
@@ -154,8 +150,7 @@ def scale_by_airspeed(samples: Samples, V0: float, powers: Sequence[float] = (2.
     """The flight with what the airspeed V does of its own: commands times (V / V0)^n, n the power of each
     surface, (S,) or one, and, as further signals, rates and signals times V / V0 - 1, since damping and
     stability grow with it; V = V0 m/s where the airspeed is unknown."""
-    V = np.full(len(samples.t_s), np.nan) if samples.airspeed is None else samples.airspeed
-    ratio = np.clip(np.nan_to_num(V / V0, nan=1.0) ** 2, *_QDYN_RATIOS)[:, None]
+    ratio = np.clip(np.nan_to_num(samples.airspeed / V0, nan=1.0) ** 2, *_QDYN_RATIOS)[:, None]
     products = np.column_stack([samples.rates, samples.signals]) * (np.sqrt(ratio) - 1.0)
     joined = np.column_stack([samples.signals, products])
     return replace(samples, commands=samples.commands * ratio ** (0.5 * np.array(powers)), signals=joined)
@@ -199,21 +194,18 @@ def unchanged_s(column: Column, t_s: Floats) -> Floats:
 def _is_held_value_stale(column: Column, t_s: Floats, step_s: float) -> Mask:
     """Whether at each sample a gap has opened since the last number of a column."""
     column = _finite_rows(column)
-    usual_step_s = max(_median_step_s(column.t_s), step_s) if len(column.t_s) > 1 else step_s
-    return np.asarray(_held_age_s(column, t_s) > _MIN_GAP_STEPS * usual_step_s)
+    usual_step_s = max(median_step_s(column.t_s), step_s) if len(column.t_s) > 1 else step_s
+    return _held_age_s(column, t_s) > _MIN_GAP_STEPS * usual_step_s
 
 
 def _check_attitude(log: RecordedFlight, vehicle: Vehicle) -> frozenset[str]:
     """The columns of rates that the angles confirm. Raises BadInput where rates, angles and gravity
     contradict one another: what is in another unit."""
-    columns, attitude, mistake = log.columns, vehicle.attitude, None
+    columns, mistake = log.columns, None
     confirmed = frozenset[str]()
     rates = {name: columns[name] for name in vehicle.rate_columns}
-    if attitude and not signals.find_clipped_rows(next(iter(rates.values())).values).any():
-        angles = [
-            (quantity.column, columns[quantity.column]) if quantity and quantity.column in columns else None
-            for quantity in (attitude.roll, attitude.pitch, attitude.yaw)
-        ]
+    if not signals.find_clipped_rows(next(iter(rates.values())).values).any():
+        angles = named_angles(columns, vehicle)
         flow = [quantity.column for quantity in vehicle.flow.values()]
         possible = dict.fromkeys([*vehicle.signal_columns, *flow, *vehicle.command_columns])
         candidates = {name: columns[name] for name in possible if name in columns}
@@ -225,6 +217,12 @@ def _check_attitude(log: RecordedFlight, vehicle: Vehicle) -> frozenset[str]:
     if mistake:
         raise BadInput(f"{log.name}: {mistake}, allowed: what the vehicle file says, or its `unit` mended")
     return confirmed
+
+
+def named_angles(columns: Columns, vehicle: Vehicle) -> list[NamedColumn | None]:
+    """The columns of roll, pitch and yaw; None of an angle that is not named or not logged."""
+    angles = [getattr(vehicle.attitude, angle, None) for angle in ("roll", "pitch", "yaw")]
+    return [(of.column, columns[of.column]) if of and of.column in columns else None for of in angles]
 
 
 def convert_to_si(log: RecordedFlight, vehicle: Vehicle) -> RecordedFlight:
@@ -267,7 +265,7 @@ def _refuse_columns(log: RecordedFlight, used: list[str], rate_names: list[str])
         values = log.columns[name].values
         if not np.isfinite(values).any():
             raise BadInput(f"{log.name}: column {name} holds no number, allowed: a logged quantity")
-        largest[name] = float(np.nanmax(np.abs(values)))
+        largest[name] = largest_magnitude(values)
         if largest[name] > _MAX_NUMBER:
             mistake = f"column {name} holds {largest[name]:g}, allowed: up to {_MAX_NUMBER:g}"
             raise BadInput(f"{log.name}: {mistake}")
@@ -285,7 +283,7 @@ def _time_base(flight: str, stamps: Floats, max_hz: float) -> tuple[Floats, Ints
     """Times of the samples and the number of the gap-free stretch of each, (n,), and the usual step, s."""
     if (n := len(stamps)) < _MIN_ROWS:
         raise BadInput(f"{flight}: has {n} samples of the rates, allowed: at least {_MIN_ROWS}")
-    step_s = _median_step_s(stamps)
+    step_s = median_step_s(stamps)
     rate_hz = 1.0 / step_s
     logged = f"{flight}: rates are logged at {rate_hz:.2g} Hz"
     if rate_hz < MIN_HZ:
@@ -321,7 +319,7 @@ def _even_time_base(stamps: Floats, step_s: float) -> tuple[Floats, Ints, float]
     return stamps[begin][stretch] + index * step_s, stretch, step_s
 
 
-def _median_step_s(stamps: Floats) -> float:
+def median_step_s(stamps: Floats) -> float:
     """The usual step of the first stamps, s: a log cut short later has the same."""
     return float(np.median(np.diff(stamps[:_MIN_ROWS]))) if len(stamps) > 1 else float("inf")
 
@@ -330,7 +328,7 @@ def sample_column(column: Column, t_s: Floats, step_s: float) -> tuple[Floats, f
     """A column's values at given times, and how old they are on average, s; None: it has these very times."""
     if np.array_equal(column.t_s, t_s):
         return column.values, None
-    if _median_step_s(column.t_s) < 0.6 * step_s:
+    if median_step_s(column.t_s) < 0.6 * step_s:
         return _means_and_age(column, t_s, step_s)
     return _latest_and_age(column, t_s)
 
@@ -392,7 +390,7 @@ def read_vehicle_parts(path: Path, vehicle: Vehicle, reader: str | None = None) 
         if column is None:  # said where the columns are used
             yield log
             continue
-        ratio = 1.0 / (_median_step_s(column.t_s) * vehicle.max_sample_rate_hz)
+        ratio = 1.0 / (median_step_s(column.t_s) * vehicle.max_sample_rate_hz)
         yield from split_long_recording(log, column.t_s, max(ratio, 1.0))
 
 
@@ -441,10 +439,11 @@ def select_rows(samples: Samples, rows: slice) -> Samples:
 def _rebuilt(parts: list[Samples], join: Callable[[list[Any]], Any]) -> Samples:
     """Samples whose arrays are made of those of others."""
     first = parts[0]
-    names = [name for name in _PER_SAMPLE_FIELDS if getattr(first, name) is not None]
+    names = [name for name, value in vars(first).items() if isinstance(value, np.ndarray)]
     fields = {name: join([getattr(part, name) for part in parts]) for name in names}
+    fields["log_stamps_s"] = fields["t_s"]
     unchanged = {name: join([part.unchanged_s[name] for part in parts]) for name in first.unchanged_s}
-    return replace(first, log_stamps_s=fields["t_s"], unchanged_s=unchanged, **fields)
+    return replace(first, unchanged_s=unchanged, **fields)
 
 
 def _concatenate_samples(name: str, stretches: list[Samples], n_parts: int) -> Samples:

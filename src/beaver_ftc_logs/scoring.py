@@ -60,7 +60,7 @@ def score_against_labels(rows: LogRows, labels: Floats) -> Document:
 def nearest_setting(e: Floats, levels: Floats) -> np.ndarray:
     """Index of the setting nearest to each row of the effectiveness e (n, S), (n,)."""
     distance = ((e[:, None, :] - levels[None, :, :]) ** 2).sum(axis=2)
-    return np.asarray(distance.argmin(axis=1))
+    return distance.argmin(axis=1)
 
 
 def score_against_failures(

@@ -113,7 +113,7 @@ def _sliding_maximum(x: Floats, n: int) -> Floats:
 
     padded = np.concatenate([np.full((n - 1, x.shape[1]), -np.inf), x])
     top = maximum_filter1d(padded, n, axis=0, origin=(n - 1) // 2)
-    return np.asarray(top[n - 1 :])
+    return top[n - 1 :]
 
 
 def rows_of_replay(t_s: Floats, replay: Replayed, surfaces: Sequence[str], fdi: Any) -> LogRows:
@@ -149,13 +149,16 @@ def _fill_bounds(
     `Replayed`."""
     if not verdict.detected:
         low[:] = alone[0]
-    elif verdict.isolated in surfaces:
-        low[:], s = 1.0, surfaces.index(str(verdict.isolated))
-        low[s], high[s] = (alone[0][s], alone[1][s]) if verdict.type == LOSS_FAULT_TYPE else (0.0, 1.0)
-    elif verdict.isolated is None and verdict.candidates and set(verdict.candidates) <= set(surfaces):
-        low[:] = 1.0
-        for name in verdict.candidates:
-            low[surfaces.index(name)] = alone[0][surfaces.index(name)]
+        return
+    suspects = verdict.candidates if verdict.isolated is None else (verdict.isolated,)
+    if not suspects or not set(suspects) <= set(surfaces):
+        return
+    places = [surfaces.index(name) for name in suspects]
+    low[:] = 1.0
+    low[places] = alone[0][places]
+    if verdict.isolated is not None:
+        is_loss = verdict.type == LOSS_FAULT_TYPE
+        low[places], high[places] = (alone[0][places], alone[1][places]) if is_loss else (0.0, 1.0)
 
 
 def _isolated_name(verdict: Verdict, surfaces: Sequence[str]) -> str:

@@ -59,6 +59,7 @@ def compute_fitted_ranges(parts: Parts, tied: Floats, gain_sd: Floats) -> Fitted
     fields = ("rates", "commands", "airspeed", "energy_height_rate_mps")
     rates, commands, airspeeds, climbs = (_usable(parts, name) for name in fields)
     climbs = climbs[np.isfinite(climbs)]
+    is_airspeed_known = np.isfinite(airspeeds).any()
     still: dict[str, float] = {}
     for part in parts:
         for name, still_s in part.samples.unchanged_s.items():
@@ -66,7 +67,7 @@ def compute_fitted_ranges(parts: Parts, tied: Floats, gain_sd: Floats) -> Fitted
     return FittedRanges(
         commands=central_ranges(commands),
         rates=central_ranges(rates),
-        airspeed=central_ranges(airspeeds[:, None])[0] if airspeeds.size else None,
+        airspeed=central_ranges(airspeeds[:, None])[0] if is_airspeed_known else None,
         tied=tied.tolist(),
         gain_sd=gain_sd.tolist(),
         still_s=still,
@@ -75,9 +76,8 @@ def compute_fitted_ranges(parts: Parts, tied: Floats, gain_sd: Floats) -> Fitted
 
 
 def _usable(parts: Parts, name: str) -> Floats:
-    """A field of those flights that have it, in the samples in use."""
-    known = [(getattr(part.samples, name), part.is_usable) for part in parts]
-    return np.concatenate([values[used] for values, used in known if values is not None] or [np.empty(0)])
+    """A field of all flights, in the samples in use."""
+    return np.concatenate([getattr(part.samples, name)[part.is_usable] for part in parts])
 
 
 def central_ranges(values: Floats) -> list[list[float]]:
@@ -90,14 +90,13 @@ def central_ranges(values: Floats) -> list[list[float]]:
 
 def known_effects(model: Model) -> Mask:
     """Whether anything is said of each group, (G,)."""
-    tied = model.fitted.tied if model.fitted else []
-    return np.array(tied or [0.0] * len(model.groups)) < _MAX_TIED_SHARE
+    return np.array(model.fitted.tied or [0.0] * len(model.groups)) < _MAX_TIED_SHARE
 
 
 def known_gains(model: Model) -> Mask:
     """Whether the effect of each group is known under any law, (G,): the model may not err by all of it."""
     known = known_effects(model)
-    if model.fitted is None or not model.fitted.gain_sd or not model.vehicle.other_laws:
+    if not model.fitted.gain_sd or not model.vehicle.other_laws:
         return known
     return known & (regression.BOUND_MARGIN * np.array(model.fitted.gain_sd) < 1.0)
 
@@ -110,8 +109,6 @@ def unknown_surfaces(model: Model) -> set[str]:
 
 def unknown_sentences(model: Model) -> list[str]:
     """Why nothing is said of some groups."""
-    if model.fitted is None:
-        return []
     start = "of what {} does, {:.1%} follows from the rates, signals and other surfaces of the flights fitted"
     rows = zip(model.group_names, model.fitted.tied, known_effects(model), strict=False)
     return [
@@ -121,10 +118,10 @@ def unknown_sentences(model: Model) -> list[str]:
     ]
 
 
-def refuse_rate_unit(samples: Samples, ranges: FittedRanges | None) -> None:
+def refuse_rate_unit(samples: Samples, ranges: FittedRanges) -> None:
     """Raise BadInput where all rates spread so much more or less than in the flights of the model that they
     are in another unit."""
-    if ranges is None or not ranges.rates:
+    if not ranges.rates:
         return
     ratios = _relative_motion(samples.rates, ranges.rates)
     if not ratios.max() < _MAX_AXIS_RATIO * ratios.min():  # an axis without a number does not move
@@ -239,10 +236,10 @@ def _mistake_texts(samples: Samples, model: Model, found: Answers) -> dict[str, 
     """Return the mistakes in the rates' answers to a flight's columns, by kind and column, the surest
     first."""
     mistakes = {}
-    known, surfaces, ranges = known_gains(model), list(model.vehicle.surfaces), model.fitted
+    known, surfaces = known_gains(model), list(model.vehicle.surfaces)
     motions = np.zeros(len(surfaces))
-    if ranges is not None and ranges.commands:
-        motions = _relative_motion(samples.commands, ranges.commands)
+    if model.fitted.commands:
+        motions = _relative_motion(samples.commands, model.fitted.commands)
     highest, lowest = found.upper.max(axis=0), found.lower.min(axis=0)
     for group, sure, hi, lo in zip(model.groups, known, highest, lowest, strict=True):
         name = "+".join(group)
@@ -310,20 +307,16 @@ def _likelihoods(samples: Samples, model: Model) -> Floats:
 def _relative_motion(values: Floats, fitted: Sequence[Sequence[float]]) -> Floats:
     """Return how many times as far as in the model's flights each column of values (n, S) moves, (S,)."""
     spans = [np.ptp(np.array(ranges).reshape(-1, 2), axis=1) for ranges in (central_ranges(values), fitted)]
-    return np.asarray(spans[0] / np.maximum(spans[1], MIN_DIVISOR))
+    return spans[0] / np.maximum(spans[1], MIN_DIVISOR)
 
 
 def untrusted_rows(samples: Samples, model: Model) -> Reasons:
     """Rows that are not credible, by reason."""
     reasons: Reasons = _still_rows(samples, model)
-    if samples.is_rate_clipped is not None:
-        recent, _ = regression.trailing_sums(
-            samples.is_rate_clipped, np.floor(_CLIPPING_MEMORY_S / samples.dt_s) + 1.0
-        )
-        reasons[f"a rate was clipped in the last {_CLIPPING_MEMORY_S:g} s"] = recent > 0
-    if model.fitted is not None:
-        reasons |= _rows_out_of_range(samples, model, model.fitted)
-    return reasons
+    n = np.floor(_CLIPPING_MEMORY_S / samples.dt_s) + 1.0
+    recent, _ = regression.trailing_sums(samples.is_rate_clipped, n)
+    reasons[f"a rate was clipped in the last {_CLIPPING_MEMORY_S:g} s"] = recent > 0
+    return reasons | _rows_out_of_range(samples, model, model.fitted)
 
 
 def _rows_out_of_range(samples: Samples, model: Model, ranges: FittedRanges) -> Reasons:
@@ -334,23 +327,23 @@ def _rows_out_of_range(samples: Samples, model: Model, ranges: FittedRanges) -> 
         *zip(commands, samples.commands.T, ranges.commands, strict=False),
         *zip(model.vehicle.rate_columns, samples.rates.T, ranges.rates, strict=False),
     ]
-    if ranges.airspeed is not None and samples.airspeed is not None:
+    if ranges.airspeed is not None:
         channels.append(("airspeed", samples.airspeed, ranges.airspeed))
     reasons = {}
     for name, values, (lo, hi) in channels:
         margin = _RANGE_MARGIN_SHARE * (hi - lo) + MIN_DIVISOR
-        margins = (_AIRSPEED_MARGIN * lo, _AIRSPEED_MARGIN * hi) if name == "airspeed" else (margin, margin)
+        margins = _AIRSPEED_MARGIN * np.array([lo, hi]) if name == "airspeed" else (margin, margin)
         outside = (values < lo - margins[0]) | (values > hi + margins[1])
         reason = f"{name} is outside {lo:.3g} to {hi:.3g}, where the model was fitted"
         sums, n = regression.trailing_sums(outside, _RANGE_WINDOW_S / samples.dt_s)
-        reasons[reason] = np.asarray(sums > _MIN_OUTSIDE_SHARE * n)
+        reasons[reason] = sums > _MIN_OUTSIDE_SHARE * n
     return reasons
 
 
 def _still_rows(samples: Samples, model: Model) -> Reasons:
     """Rows in which a column has stood still for too long, by reason: a measured rate may hardly, another
     thrice as long as in the model's flights; a rate of which these are known, from MIN_STILL_S / 3 on."""
-    fitted = model.fitted.still_s if model.fitted else {}
+    fitted = model.fitted.still_s
     rates = model.vehicle.rate_columns
     reasons = {}
     for name, unchanged_s in samples.unchanged_s.items():
@@ -363,9 +356,7 @@ def _still_rows(samples: Samples, model: Model) -> Reasons:
 
 def without_dead_rows(samples: Samples, model: Model) -> Samples:
     """The flight with nothing known where a signal does not live: the filter is not to learn from it."""
-    dead = np.any([*_still_rows(samples, model).values(), np.zeros(len(samples.t_s), dtype=bool)], axis=0)
-    if samples.is_rate_clipped is not None:
-        dead |= samples.is_rate_clipped
+    dead = np.any([*_still_rows(samples, model).values(), samples.is_rate_clipped], axis=0)
     if not dead.any():
         return samples
     return replace(samples, rates=np.where(dead[:, None], np.nan, samples.rates))

@@ -5,7 +5,7 @@ It names columns, not code. Unknown keys and every other mistake are refused wit
 """
 
 import re
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -46,7 +46,12 @@ VehicleName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$", max_length=100)]
 _SURFACE_NAME_PATTERN = re.compile(r"[A-Za-z0-9_-]{1,100}")
 ColumnName = Annotated[str, Field(min_length=1, max_length=200)]
 FaultKind = Literal["loss", "stuck"]
-_FLOW_KINDS = {"alpha_rad": ANGLE, "beta_rad": ANGLE}
+_KINDS: dict[Location, str] = {
+    ("rates",): RATE, ("commands",): "", ("signals",): "", ("attitude",): ANGLE,
+    ("acceleration",): ACCELERATION, ("airspeed",): SPEED, ("energy", "altitude"): LENGTH,
+    ("energy", "airspeed"): SPEED, ("flow", "alpha_rad"): ANGLE, ("flow", "beta_rad"): ANGLE,
+}  # fmt: skip
+"""What the columns below a key measure."""
 
 
 class QuantityColumn(Section):
@@ -258,19 +263,8 @@ class Vehicle(Section):
         """Every column but those of labels and outputs: where it stands in the file, and its kind.
 
         The kind is empty where any unit may be right, None of a flow that only the aircraft's model knows."""
-        attitude, energy = self.attitude, self.energy
-        found: list[tuple[Location, str | None, QuantityColumn | None]] = [
-            *((("rates", axis), RATE, getattr(self.rates, axis)) for axis in "pqr"),
-            *((("commands", i), "", quantity) for i, quantity in enumerate(self.commands)),
-            *((("signals", i), "", quantity) for i, quantity in enumerate(self.signals)),
-            *((("attitude", of), ANGLE, getattr(attitude, of, None)) for of in ("roll", "pitch", "yaw")),
-            (("acceleration",), ACCELERATION, self.acceleration),
-            (("airspeed",), SPEED, self.airspeed),
-            (("energy", "altitude"), LENGTH, getattr(energy, "altitude", None)),
-            (("energy", "airspeed"), SPEED, getattr(energy, "airspeed", None)),
-            *((("flow", of), _FLOW_KINDS.get(of), quantity) for of, quantity in sorted(self.flow.items())),
-        ]
-        return [(location, kind, quantity) for location, kind, quantity in found if quantity is not None]
+        found = _columns_below((), {key: value for key, value in self if key not in ("labels", "outputs")})
+        return [(at, _KINDS.get(at, _KINDS.get(at[:1])), quantity) for at, quantity in found]
 
     @property
     def rate_columns(self) -> list[str]:
@@ -314,9 +308,19 @@ class Vehicle(Section):
 
     def column_names(self) -> list[str]:
         """Every column of a log that the vehicle may want, its time aside."""
-        located = [quantity for *_, quantity in self.located_quantities()]
-        quantities = [*located, *self.labels.values(), *self.outputs.values()]
-        return list(dict.fromkeys(quantity.column for quantity in quantities))
+        return list(dict.fromkeys(quantity.column for _, quantity in _columns_below((), self)))
+
+
+def _columns_below(location: Location, value: Any) -> Iterator[tuple[Location, QuantityColumn]]:
+    """Every column that a value holds, and where it stands."""
+    if isinstance(value, QuantityColumn):
+        yield location, value
+    elif isinstance(value, list):
+        for i, one in enumerate(value):
+            yield from _columns_below((*location, i), one)
+    elif isinstance(value, Section | dict):
+        for key, one in dict(value).items():
+            yield from _columns_below((*location, key), one)
 
 
 def _unknown_name_conflicts(

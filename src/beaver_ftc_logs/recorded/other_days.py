@@ -125,7 +125,7 @@ def _running_mean(values: Floats, n: int) -> Floats:
     """Centred running mean, (n, S)."""
     from scipy.ndimage import uniform_filter1d
 
-    return np.asarray(uniform_filter1d(values, n, axis=0, mode="nearest"))
+    return uniform_filter1d(values, n, axis=0, mode="nearest")
 
 
 def _coloured_noise(rng: np.random.Generator, shape: tuple[int, ...], n: float) -> Floats:
@@ -135,7 +135,7 @@ def _coloured_noise(rng: np.random.Generator, shape: tuple[int, ...], n: float) 
 
     a = np.exp(-1.0 / n)
     w = rng.standard_normal(shape) * np.sqrt(1.0 - a**2)
-    return np.asarray(lfilter([1.0], [1.0, -a], w, axis=0))
+    return lfilter([1.0], [1.0, -a], w, axis=0)
 
 
 def _response_to_noise(rng: np.random.Generator, A: Floats, Q: Floats, n: int) -> Floats:

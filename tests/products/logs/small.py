@@ -89,7 +89,8 @@ def flight(model, n=300, lost=(), seed=1, gap=None, name="small", **changes):
     given = {
         "name": name, "t_s": t_s, "rates": rates, "commands": surfaces, "signals": signals, "labels": labels,
         "stretch_number": run, "dt_s": step, "held_age_s": {}, "logged_failures": (),
-        "log_stamps_s": t_s,
+        "log_stamps_s": t_s, "airspeed": np.full(n, np.nan), "is_rate_clipped": np.zeros(n, dtype=bool),
+        "energy_height_rate_mps": np.full(n, np.nan),
     }  # fmt: skip
     return Samples(**(given | changes))
 

@@ -22,7 +22,7 @@ def flown():
 def test_a_flight_in_a_picture(flown):
     """Where the alarm is, and the effectiveness that the bounds leave of each surface, at most one."""
     samples, rows = flown
-    *shown, right, left = pages.flight_figure(samples, list(MODEL.vehicle.surfaces), rows).axes
+    *shown, right, left = pages.flight_figure(samples, rows, pages.words_of_model(MODEL)).axes
     said = [axes.get_ylabel().replace("\n", " ") for axes in (*shown, right, left)]
     assert said == ["rates, deg/s", "healthy surfaces' share of travel", "probability",
                     "right effectiveness", "left effectiveness"]  # fmt: skip
@@ -33,7 +33,7 @@ def test_a_flight_in_a_picture(flown):
 
 def rendered(samples, rows, verdict):
     words = pages.words_of_model(MODEL)
-    return pages.render_diagnosis(samples, list(MODEL.vehicle.surfaces), rows, verdict, words)
+    return pages.render_diagnosis(samples, rows, verdict, words)
 
 
 @pytest.mark.parametrize(

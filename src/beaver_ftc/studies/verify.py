@@ -169,7 +169,8 @@ def _faulty(draw: Draw, schemes: Schemes) -> Row:
 def judge(flight: Landing) -> Row:
     """What became of the promises in a flight with one fault; delays in s from the first frame with it."""
     truth, guaranteed_s = Truth.of(flight.scenario), flight.guaranteed_delay_s
-    alarm_s, delay_s = flight.detection_time_s, truth.onset.delay_s(flight.detection_time_s)
+    alarm_s = flight.detection_time_s
+    delay_s = truth.onset.delay_s(alarm_s)
     left = (*flight.candidates, flight.isolated)
     meant = truth.faults_named_rightly_by(flight.isolated, flight.isolation_time_s)
     return {
@@ -290,15 +291,14 @@ def _healthy_lines(healthy: Document) -> list[str]:
     if not healthy["flights"]:
         return []
     closest = ", ".join(f"{name} {share:.6f}" for name, share in healthy["closest_approach"].items())
-    outside = f"{healthy['hours_outside_envelope']:.2f} h outside the validated envelope"
-    rate = f"at most {healthy['false_alarms_per_hour_upper_95']:.2g} per hour, 95 % confidence"
-    return [
-        f"{healthy['hours']:.2f} flight hours without a fault: {healthy['flights']} flights, {outside}, "
-        f"{healthy['departures']} departures",
-        f"  G1 false alarms                 {healthy['false_alarms']} ({rate})",
-        f"  closest approach to threshold   {closest}",
-        "",
-    ]
+    says = (
+        "{hours:.2f} flight hours without a fault: {flights} flights, {hours_outside_envelope:.2f} h outside "
+        "the validated envelope, {departures} departures",
+        "  G1 false alarms                 {false_alarms} (at most {false_alarms_per_hour_upper_95:.2g} per "
+        "hour, 95 % confidence)",
+    )
+    lines = [line.format(**healthy) for line in says]
+    return [*lines, f"  closest approach to threshold   {closest}", ""]
 
 
 def _fault_lines(document: Document) -> list[str]:

@@ -14,16 +14,13 @@ from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.engine.workers import Case
 from beaver_ftc.studies.present import page
 from beaver_ftc.studies.present.figures import curve_look, marker, panels
-from beaver_ftc.studies.present.tables import aligned, percent
+from beaver_ftc.studies.present.tables import Columns, aligned, percent, tabulated
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 Cell = Callable[[Document], str]
-Columns = Sequence[tuple[str, Cell]]
-
-
 _PERCENT = partial(percent, unit="")
 
 
@@ -50,18 +47,18 @@ def _free(row: Document) -> str:
 
 
 DIAGNOSIS: Columns = (
-    ("scheme", _cell(str, "scheme")),
+    ("scheme", "scheme"),
     ("false alarms/h (95 %)", _alarms),
     ("detected %", _cell(_PERCENT, "detection_rate")),
     ("delay s 50/90 %", _of_faults(_cell("{:.2f}".format, "delay_median_s", "delay_90_s", none="never"))),
     ("isolated %", _cell(_PERCENT, "isolation_rate")),
     ("with no false alarm: detected % / delay s", _of_faults(_free)),
     ("tracking/oracle 50/90 %", _cell("{:.2f}".format, "ratio_median", "ratio_90", none="lost")),
-    ("lost", _cell(str, "departures")),
+    ("lost", "departures"),
     ("us/frame", _cell("{:.0f}".format, "us")),
 )
 CONTROL: Columns = (
-    ("law", _cell(str, "law")),
+    ("law", "law"),
     *DIAGNOSIS[6:],
     ("error before, deg/s 50/90 %", _cell("{:.3g}".format, "before_median", "before_90")),
     ("after", _cell("{:.3g}".format, "after_median", "after_90")),
@@ -75,10 +72,7 @@ def sections(part: Document) -> list[tuple[list[str], list[list[str]]]]:
     lines = [row | {"free": part["without_false_alarm"].get(row["scheme"])} for row in part["lines"]]
     schemes = [row for row in lines if row["law"] == LAW]
     laws = [row for row in lines if row["scheme"] == SCHEME]
-    return [
-        ([name for name, _ in columns], [[cell(row) for _, cell in columns] for row in rows])
-        for columns, rows in ((DIAGNOSIS, schemes), (CONTROL, laws))
-    ]
+    return [tabulated(DIAGNOSIS, schemes), tabulated(CONTROL, laws)]
 
 
 def first_sentences(part: Document) -> list[list[str]]:

@@ -335,7 +335,7 @@ def as_text(document: Document) -> str:
     for fault, _ in FAULTS:
         lines.append(f"{fault:{width}}" + "".join(f"  {_cell_text(cells[fault, s]):26}" for s in surfaces))
     lost = [cell for cell in document["cells"] if cell["lost"]]
-    remarks = [f"* {cell['surface']} {cell['fault']}: {cell['remark']}" for cell in lost]
+    remarks = ["* {surface} {fault}: {remark}".format(**cell) for cell in lost]
     totals = (
         f"{len(document['flights'])} faults flown: {document['wrong']} named wrongly, "
         f"{document['false_alarms']} false alarms, "

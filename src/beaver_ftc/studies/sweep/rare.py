@@ -281,7 +281,7 @@ def as_text(document: Document) -> str:
     lines = [
         f"{document['sweep']}: {document['expectation']} not met",
         f"  probability  {said}, {_between(document)}, {document['flights']} flights",
-        f"  plain        {plain['events']} of {plain['of']} flights, {_between(plain)}",
+        "  plain        {events} of {of} flights, ".format(**plain) + _between(plain),
     ]
     if document["failed"]:
         lines.append(f"  not flown    {document['failed']} flights, counted as no event")
@@ -296,4 +296,4 @@ def as_text(document: Document) -> str:
 
 
 def _between(found: Document) -> str:
-    return f"95 % {found['low']:.2g} to {found['high']:.2g}"
+    return "95 % {low:.2g} to {high:.2g}".format(**found)

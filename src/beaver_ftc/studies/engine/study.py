@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any
 
 from beaver_ftc.documents.errors import SimulationFailed, say_once
-from beaver_ftc.documents.files import read_json
 from beaver_ftc.results.writer import clear_disk_errors, result_folder
 from beaver_ftc.studies.engine import store
 from beaver_ftc.studies.engine.workers import (
@@ -262,11 +261,9 @@ def _begin(kept: Path, study: Study) -> store.Parts:
     asked = {"cases": repr(list(study.cases)), "asked": repr(study.follows_from)}
     identity = store.identity("study", asked)
     manifest, parts = kept / "study.json", store.Parts(kept / "parts", store.RowsAsJson(study.row), GO_ON)
-    there = None
-    with contextlib.suppress(OSError, ValueError):
-        there = read_json(manifest)
+    there = store.known(manifest)
     with clear_disk_errors(kept):
-        if not isinstance(there, dict) and parts:  # nothing says whose they are
+        if there is None and parts:  # nothing says whose they are
             store.set_aside(parts.folder, f"{manifest.name} {store.UNREADABLE}")
         if there != identity:
             parts.remove()

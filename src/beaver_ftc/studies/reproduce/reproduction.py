@@ -110,7 +110,17 @@ def document_of(flights: Flights, rows: Sequence[Document]) -> Document:
         claim: _judged(claim, {name: (numbers[name][i], ablated[name][i]) for name in numbers})
         for i, claim in enumerate(MEASURED)
     }
-    claims = [{"where": c.where, "statement": c.statement} | judged.get(c, _unjudged(c)) for c in CLAIMS]
+    unjudged = {
+        "verdict": CANNOT_BE_JUDGED,
+        "reason": "",
+        "because": "",
+        "number": None,
+        "construction": False,
+    }
+    claims = [
+        {"where": c.where, "statement": c.statement} | judged.get(c, unjudged | {"reason": c.reason})
+        for c in CLAIMS
+    ]
     counts = Counter(claim["verdict"] for claim in claims)
     return {
         "passed": all(claim["verdict"] != NOT_BORNE_OUT or claim["because"] for claim in claims),
@@ -148,16 +158,6 @@ def document_of(flights: Flights, rows: Sequence[Document]) -> Document:
             for case in PUBLISHED
         ],
         "versions": dict(versions()),
-    }
-
-
-def _unjudged(claim: Claim) -> Document:
-    return {
-        "verdict": CANNOT_BE_JUDGED,
-        "reason": claim.reason,
-        "because": "",
-        "number": None,
-        "construction": False,
     }
 
 

@@ -25,7 +25,7 @@ from beaver_ftc.plant.linear import LinearModel, differences
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.linear_systems import CLASSICAL, Mode, modes
 from beaver_ftc.studies.margins import N_AIRSPEEDS, over_envelope
-from beaver_ftc.studies.present.tables import aligned, finite, grouped, number
+from beaver_ftc.studies.present.tables import aligned, all_finite, grouped, number
 
 WORSE = 4  # than level 3
 _STATES = ("alpha_rad", "beta_rad", "p_rad_s", "q_rad_s", "r_rad_s", "phi_rad", "theta_rad", "psi_rad")
@@ -141,7 +141,7 @@ def over_airspeeds(scenario: Scenario) -> list[Quality]:
 
 def as_rows(found: list[Quality]) -> list[Document]:
     """For `--format json`; what never happens is null."""
-    return [{key: finite(value) for key, value in asdict(each).items()} for each in found]
+    return [all_finite(asdict(each)) for each in found]
 
 
 def as_text(rows: list[Document]) -> str:

@@ -67,17 +67,17 @@ CONTROL: Columns = (
 )
 
 
-def sections(part: Document) -> list[tuple[list[str], list[list[str]]]]:
-    """(header, rows) of the schemes with our law, and of the laws with our scheme."""
+def sections(part: Document) -> list[tuple[list[str], list[list[str]], list[str]]]:
+    """(header, rows, sentences) of the schemes with our law, and of the laws with our scheme. A sentence says
+    who is better; there is none where no flight has a fault."""
     lines = [row | {"free": part["without_false_alarm"].get(row["scheme"])} for row in part["lines"]]
     schemes = [row for row in lines if row["law"] == LAW]
     laws = [row for row in lines if row["scheme"] == SCHEME]
-    return [tabulated(DIAGNOSIS, schemes), tabulated(CONTROL, laws)]
-
-
-def first_sentences(part: Document) -> list[list[str]]:
-    """Below each table of `sections`: who is better; nothing where no flight has a fault."""
-    return [[part["who_is_better"][which]] if part["who_is_better"] else [] for which in ("schemes", "laws")]
+    best = part["who_is_better"]
+    return [
+        (*tabulated(columns, rows), [best[which]] if best else [])
+        for which, columns, rows in (("schemes", DIAGNOSIS, schemes), ("laws", CONTROL, laws))
+    ]
 
 
 def as_text(document: Document) -> str:
@@ -85,7 +85,7 @@ def as_text(document: Document) -> str:
     blocks = []
     for name, part in document["sets"].items():
         blocks.append(f"{name}: {part['flights']} flights")
-        for (header, rows), first in zip(sections(part), first_sentences(part), strict=True):
+        for header, rows, first in sections(part):
             blocks.append("\n".join([aligned([header, *rows]), *first, ""]))
         blocks += part["better_than_ours"] + [f"could not fly: {error}" for error in part["errors"]]
         blocks.append("")
@@ -118,7 +118,7 @@ def write_leaderboard(document: Document, path: Path) -> None:
 def _sets(document: Document) -> Iterator[page.Part]:
     for name, part in document["sets"].items():
         yield page.Heading(f"{name}: {part['flights']} flights")
-        for (header, rows), first in zip(sections(part), first_sentences(part), strict=True):
+        for header, rows, first in sections(part):
             yield page.Table(header, rows)
             yield from first
         losses = [f"{sentence}." for sentence in part["better_than_ours"]]

@@ -20,7 +20,7 @@ from beaver_ftc.studies.engine.statistics import (
     wilson,
     wilson_bound,
 )
-from beaver_ftc.studies.present.tables import finite, percent
+from beaver_ftc.studies.present.tables import all_finite, percent
 
 
 def line_of(
@@ -163,23 +163,19 @@ def document_of(trials: Sequence[Trial], entries: Sequence[Entry]) -> Document:
 def _set(trials: Sequence[Trial], entries: Sequence[Entry]) -> Document:
     schemes = list(dict.fromkeys(scheme for trial in trials for scheme in trial.traces))
     traces = {s: [t.traces[s] for t in trials if s in t.traces] for s in schemes}
-    lines = [_finite(line) for line in lines_of(trials, entries)]
+    lines = [all_finite(line) for line in lines_of(trials, entries)]
     points = {s: trade_off(of) for s, of in traces.items()}
-    free = {s: _finite(matched(of)) for s, of in points.items()}
+    free = {s: all_finite(matched(of)) for s, of in points.items()}
     failed = {result.error for trial in trials for result in trial.results if result.error}
     return {
         "flights": len(trials),
         "lines": lines,
-        "trade_off": {s: [_finite(point) for point in of] for s, of in points.items()},
+        "trade_off": {s: [all_finite(point) for point in of] for s, of in points.items()},
         "without_false_alarm": free,
         "who_is_better": who_is_better(lines),
         "better_than_ours": better_than_ours(lines, free if any(line["faults"] for line in lines) else {}),
         "errors": sorted({error for trial in trials for error in trial.failures} | failed),
     }
-
-
-def _finite(document: Document) -> Document:
-    return {key: finite(value) for key, value in document.items()}
 
 
 YARDSTICKS = ("none", ORACLE, "oracle-published", "fault-tolerant-published")  # and parts of ours

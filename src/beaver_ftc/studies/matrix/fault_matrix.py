@@ -164,20 +164,18 @@ def fly_case(case: FaultCase) -> Document:
     return {**case._asdict(), **_diagnosis(flight, case), **_tracking(flight, oracle, case), **seen}
 
 
+DIAGNOSED = {  # by key of a row where it is in the metrics
+    "detected": "detection.detected", "delay_s": "detection.delay_s", "false_alarm": "false_alarm",
+    "isolated": "isolation.fault", "isolation_delay_s": "isolation.delay_s", "type": "isolation.type",
+    "candidates": "isolation.candidates", "estimate": "isolation.estimate",
+}  # fmt: skip
+
+
 def _diagnosis(flight: Landing, case: FaultCase) -> Document:
     found = measure(flight)
-    detection, isolation, true_type = found.detection, found.isolation, flight.scenario.faults[0].type
-    return {
-        "detected": detection.detected,
-        "delay_s": detection.delay_s,
-        "false_alarm": found.false_alarm,
-        "isolated": isolation.fault,
-        "isolation_delay_s": isolation.delay_s,
-        "type": isolation.type,
-        "candidates": list(isolation.candidates),
-        "estimate": isolation.estimate,
-        "verdict": verdict(found, case.surface, true_type),
-    }
+    row = {key: found.at(path) for key, path in DIAGNOSED.items()}
+    row["candidates"] = list(row["candidates"])
+    return row | {"verdict": verdict(found, case.surface, flight.scenario.faults[0].type)}
 
 
 def verdict(found: Metrics, surface: str, true_type: str) -> str:

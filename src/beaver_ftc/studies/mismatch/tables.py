@@ -168,8 +168,7 @@ def mismatch_section(folder: Path) -> str:
     if not path.exists():
         return ""
     found = read_json(path)
-    drawn = {name: folder / "figures" / f"{name}.png" for name in PICTURES}
-    there = {name: picture for name, picture in drawn.items() if picture.exists()}
+    there = page.drawn_in(folder, PICTURES)
     shown = [part for caption, head, rows in tables(found) for part in (caption, page.Table(head, rows))]
     heading = page.Heading(f"Truth against design: {found['scenario']}")
     pictures = page.Pictures([(PICTURES[name], name) for name in there])

@@ -140,6 +140,12 @@ def _picture(title: str, path: Path) -> str:
     return f'<img alt="{escape(title)}" src="data:image/png;base64,{data}">'
 
 
+def drawn_in(folder: Path, stems: Iterable[str]) -> dict[str, Path]:
+    """The pictures of a result folder that are there, by their stems."""
+    files = {stem: folder / "figures" / f"{stem}.png" for stem in stems}
+    return {stem: file for stem, file in files.items() if file.exists()}
+
+
 def study_files(
     name: str, page: Callable[[Any], tuple[str, Sequence[Part]]], rows: Mapping[str, Callable[[Any], Any]],
     figures: "Makers",

@@ -21,6 +21,11 @@ def finite(value: Any) -> Any:
     return None if isinstance(value, float) and not isfinite(value) else value
 
 
+def all_finite(row: Mapping[str, Any]) -> Document:
+    """The same of each value."""
+    return {key: finite(value) for key, value in row.items()}
+
+
 def number(value: Any, unit: str = "", none: str = "-", digits: int = 3) -> str:
     """A number with the digits worth reading, without an exponent, and its unit; None is `none`."""
     if value is None or isinstance(value, str):

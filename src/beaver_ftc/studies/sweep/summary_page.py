@@ -10,7 +10,16 @@ from typing import TYPE_CHECKING, Any
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.results.metrics import NEAR_THRESHOLD_SHARE
 from beaver_ftc.results.model import Document, Expectation, Judged
-from beaver_ftc.studies.present.page import Heading, Links, Part, Pictures, Table, as_html, versions_line
+from beaver_ftc.studies.present.page import (
+    Heading,
+    Links,
+    Part,
+    Pictures,
+    Table,
+    as_html,
+    drawn_in,
+    versions_line,
+)
 from beaver_ftc.studies.present.tables import Rows, number, printed, tabulated
 from beaver_ftc.studies.sweep.pictures import FIGURES
 from beaver_ftc.studies.sweep.summary import OUTCOMES
@@ -214,8 +223,7 @@ def _drivers(ranking: list[Document]) -> str:
 
 def render(summary: Document, folder: Path) -> str:
     """The report as HTML text, from the summary and the figures and flights in the sweep's folder."""
-    drawn = {name: folder / "figures" / f"{name}.png" for name in FIGURES}
-    figures = {name: path for name, path in drawn.items() if path.exists()}
+    figures = drawn_in(folder, FIGURES)
     return as_html(title(summary), _parts(summary, folder, figures), figures)
 
 

@@ -10,10 +10,13 @@ the addition for large ratios of bank to sideslip (3.3.1.1, above 20 rad2/s2) is
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from math import inf, log
+from pathlib import Path
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from beaver_ftc.aircraft.aircraft import GRAVITY_MPS2
+from beaver_ftc.documents.document import parse
 from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.documents.files import Document
 from beaver_ftc.plant.adapter import FlightState
@@ -22,7 +25,7 @@ from beaver_ftc.plant.linear import LinearModel, differences
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.linear_systems import CLASSICAL, Mode, modes
 from beaver_ftc.studies.margins import N_AIRSPEEDS, over_envelope
-from beaver_ftc.studies.present.tables import aligned, finite, grouped, number
+from beaver_ftc.studies.present.tables import aligned, all_finite, grouped, number
 
 WORSE = 4  # than level 3
 _STATES = ("alpha_rad", "beta_rad", "p_rad_s", "q_rad_s", "r_rad_s", "phi_rad", "theta_rad", "psi_rad")
@@ -34,10 +37,10 @@ class Limit:
 
     mode: str
     quantity: str
-    unit: str
     clause: str
-    table: str  # or figure
     levels: tuple[tuple[float, float], ...]
+    unit: str = ""
+    table: str = ""  # or figure
 
     def level(self, value: float) -> int:
         """The best level whose limits the value keeps."""
@@ -50,34 +53,8 @@ class Limit:
         return min(value - least, most - value)
 
 
-LIMITS = (
-    Limit("short period", "damping", "", "3.2.2.1.2", "table IV", ((0.30, 2.0), (0.20, 2.0), (0.15, inf))),
-    Limit(
-        "short period",
-        "CAP",
-        "1/(g s2)",
-        "3.2.2.1.1",
-        "figure 2",
-        ((0.085, 3.6), (0.038, 10.0), (0.038, inf)),
-    ),
-    Limit("Dutch roll", "damping", "", "3.3.1.1", "table VI", ((0.08, inf), (0.02, inf), (0.0, inf))),
-    Limit(
-        "Dutch roll",
-        "damping x frequency",
-        "rad/s",
-        "3.3.1.1",
-        "table VI",
-        ((0.15, inf), (0.05, inf), (-inf, inf)),
-    ),
-    Limit("Dutch roll", "frequency", "rad/s", "3.3.1.1", "table VI", ((0.4, inf), (0.4, inf), (0.4, inf))),
-    Limit("roll", "time constant", "s", "3.3.1.2", "table VII", ((0.0, 1.4), (0.0, 3.0), (0.0, 10.0))),
-    Limit("spiral", "time to double", "s", "3.3.1.3", "table VIII", ((20.0, inf), (8.0, inf), (4.0, inf))),
-    Limit("phugoid", "damping", "", "3.2.1.2", "", ((0.04, inf), (0.0, inf), (-inf, inf))),
-    Limit("phugoid", "time to double", "s", "3.2.1.2", "", ((55.0, inf), (55.0, inf), (55.0, inf))),
-    Limit(
-        "roll-spiral", "damping x frequency", "rad/s", "3.3.1.4", "", ((0.5, inf), (0.3, inf), (0.15, inf))
-    ),
-)
+_FILE = Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8")
+LIMITS = TypeAdapter(tuple[Limit, ...]).validate_python(parse(_FILE).data)
 
 
 @dataclass(frozen=True)
@@ -164,7 +141,7 @@ def over_airspeeds(scenario: Scenario) -> list[Quality]:
 
 def as_rows(found: list[Quality]) -> list[Document]:
     """For `--format json`; what never happens is null."""
-    return [{key: finite(value) for key, value in asdict(each).items()} for each in found]
+    return [all_finite(asdict(each)) for each in found]
 
 
 def as_text(rows: list[Document]) -> str:

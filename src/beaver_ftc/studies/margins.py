@@ -32,7 +32,7 @@ from beaver_ftc.plant.conditions import trimmed
 from beaver_ftc.plant.linear import LinearModel, differences
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.linear_systems import held_over_frame
-from beaver_ftc.studies.present.tables import aligned, finite, grouped
+from beaver_ftc.studies.present.tables import aligned, all_finite, grouped
 
 N_FREQUENCIES = 600
 LOWEST_RAD_S = 0.3  # below, the autopilot flies: a body rate says little of a phugoid
@@ -268,10 +268,7 @@ def sensors(scenario: Scenario, m: int, dt: float) -> np.ndarray:
 
 def as_document(found: list[Margin], required: tuple[float, float]) -> Document:
     """For `--format json`; a margin without end is null."""
-    rows = [
-        {key: finite(value) for key, value in asdict(margin).items()} | {"keeps": margin.keeps(*required)}
-        for margin in found
-    ]
+    rows = [all_finite(asdict(margin)) | {"keeps": margin.keeps(*required)} for margin in found]
     return {"gain_margin_db": required[0], "phase_margin_deg": required[1], "margins": rows}
 
 

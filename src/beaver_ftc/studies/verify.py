@@ -28,7 +28,7 @@ from beaver_ftc.scenario.signals import grown_share
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial_upper, poisson_bound, share_within
 from beaver_ftc.studies.engine.study import Study, run_study
 from beaver_ftc.studies.present.page import Makers
-from beaver_ftc.studies.present.tables import finite, number
+from beaver_ftc.studies.present.tables import finite, or_never
 
 HEALTHY_S = 100.0  # attitude is open loop: a longer flight wanders out of the validated envelope
 AFTER_FAULT_S = 15.0  # more than a period of the slowest reference
@@ -169,7 +169,8 @@ def _faulty(draw: Draw, schemes: Schemes) -> Row:
 def judge(flight: Landing) -> Row:
     """What became of the promises in a flight with one fault; delays in s from the first frame with it."""
     truth, guaranteed_s = Truth.of(flight.scenario), flight.guaranteed_delay_s
-    alarm_s, delay_s = flight.detection_time_s, truth.onset.delay_s(flight.detection_time_s)
+    alarm_s = flight.detection_time_s
+    delay_s = truth.onset.delay_s(alarm_s)
     left = (*flight.candidates, flight.isolated)
     meant = truth.faults_named_rightly_by(flight.isolated, flight.isolation_time_s)
     return {
@@ -290,15 +291,14 @@ def _healthy_lines(healthy: Document) -> list[str]:
     if not healthy["flights"]:
         return []
     closest = ", ".join(f"{name} {share:.6f}" for name, share in healthy["closest_approach"].items())
-    outside = f"{healthy['hours_outside_envelope']:.2f} h outside the validated envelope"
-    rate = f"at most {healthy['false_alarms_per_hour_upper_95']:.2g} per hour, 95 % confidence"
-    return [
-        f"{healthy['hours']:.2f} flight hours without a fault: {healthy['flights']} flights, {outside}, "
-        f"{healthy['departures']} departures",
-        f"  G1 false alarms                 {healthy['false_alarms']} ({rate})",
-        f"  closest approach to threshold   {closest}",
-        "",
-    ]
+    says = (
+        "{hours:.2f} flight hours without a fault: {flights} flights, {hours_outside_envelope:.2f} h outside "
+        "the validated envelope, {departures} departures",
+        "  G1 false alarms                 {false_alarms} (at most {false_alarms_per_hour_upper_95:.2g} per "
+        "hour, 95 % confidence)",
+    )
+    lines = [line.format(**healthy) for line in says]
+    return [*lines, f"  closest approach to threshold   {closest}", ""]
 
 
 def _fault_lines(document: Document) -> list[str]:
@@ -310,10 +310,9 @@ def _fault_lines(document: Document) -> list[str]:
         cells = [f"{s[promise]} (p < {s[promise + '_probability_upper_95']:.1e})" for s in schemes.values()]
         lines.append(_line(f"{GUARANTEES[promise]} {promise.replace('_', ' ')}", cells))
     for key in ("detected", "detection_certain", "isolated"):
-        lines.append(_line(key.replace("_", " "), [str(s[key]) for s in schemes.values()]))
+        lines.append(_line(key.replace("_", " "), (str(s[key]) for s in schemes.values())))
     for (label, key), which in product(_SPREADS.items(), ("median", "p90")):
-        cells = [number(s[key][which], none="never") for s in schemes.values()]
-        lines.append(_line(f"{label}, {which}", cells))
+        lines.append(_line(f"{label}, {which}", (or_never(s[key][which]) for s in schemes.values())))
     if document["delay_shorter_by"] is not None:
         lines += [f"  median detection delay shorter by {document['delay_shorter_by']:.0%}", ""]
     return lines

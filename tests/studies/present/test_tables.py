@@ -26,3 +26,18 @@ def test_units_follow_and_what_is_missing_has_a_word_of_its_own():
     assert tables.seconds(1.234) == "1.23 s"
     assert tables.seconds(None) == "never"
     assert [tables.finite(x) for x in (1.5, float("inf"), "inf", 3)] == [1.5, None, "inf", 3]
+
+
+def test_a_table_is_its_columns_each_with_the_cell_of_a_row():
+    columns = (
+        ("who", "name"), ("after", "found.delay_s", "s"), ("share", "share", "{:.0%}".format),
+        ("both", lambda row: f"{row['name']}: {row['share']:g}"),
+    )  # fmt: skip
+    rows = [
+        {"name": "a", "found": {"delay_s": 0.5}, "share": 0.25},
+        {"name": "", "found": {"delay_s": None}, "share": 1.0},
+    ]
+    assert tables.tabulated(columns, rows) == (
+        ["who", "after", "share", "both"],
+        [["a", "0.5 s", "25%", "a: 0.25"], ["-", "-", "100%", ": 1"]],
+    )

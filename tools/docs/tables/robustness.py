@@ -19,10 +19,10 @@ from beaver_ftc.studies.detectability.shown import who_is_better
 from beaver_ftc.studies.engine.statistics import share_within, wilson
 from beaver_ftc.studies.engine.study import fly_all
 from beaver_ftc.studies.matrix.clairvoyant import columns_of, seen_when_told
-from beaver_ftc.studies.present.tables import markdown_table
+from beaver_ftc.studies.present.tables import markdown_table, tabulated
 from beaver_ftc.studies.sensitivity.beyond import TOGETHER
 from beaver_ftc.studies.sensitivity.command import run_errors
-from beaver_ftc.studies.sensitivity.shown import HEAD, cells
+from beaver_ftc.studies.sensitivity.shown import COLUMNS
 from beaver_ftc.studies.sensitivity.shown import error_sentences as sentences
 from beaver_ftc.studies.sweep.one_flight import fly_one, scenario_of
 from beaver_ftc.studies.sweep.sampling import Assignment, Plan
@@ -280,14 +280,19 @@ def robustness_decay_probe() -> str:
 
 def _decay_table(document: Document) -> str:
     """A table without intervals, which the figure has."""
+    shown = [
+        row
+        for row in document["rows"]
+        if row["factor"] > 1.0 or row["error"] == TOGETHER or _is_undeclared(document, row)
+    ]
+    heads, lines = tabulated(COLUMNS, shown)
     rows = [
         tuple(
             cell if head in DECAY_WORDS else cell.partition(" (")[0]
-            for head, cell in zip(HEAD, cells(row), strict=True)
+            for head, cell in zip(heads, line, strict=True)
             if head in DECAY_HEAD
         )
-        for row in document["rows"]
-        if row["factor"] > 1.0 or row["error"] == TOGETHER or _is_undeclared(document, row)
+        for line in lines
     ]
     return f"{DECAY_CAPTION}\n\n{markdown_table(DECAY_HEAD, rows)}"
 

@@ -14,16 +14,13 @@ from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.engine.workers import Case
 from beaver_ftc.studies.present import page
 from beaver_ftc.studies.present.figures import curve_look, marker, panels
-from beaver_ftc.studies.present.tables import aligned, percent
+from beaver_ftc.studies.present.tables import Columns, aligned, percent, tabulated
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 Cell = Callable[[Document], str]
-Columns = Sequence[tuple[str, Cell]]
-
-
 _PERCENT = partial(percent, unit="")
 
 
@@ -50,18 +47,18 @@ def _free(row: Document) -> str:
 
 
 DIAGNOSIS: Columns = (
-    ("scheme", _cell(str, "scheme")),
+    ("scheme", "scheme"),
     ("false alarms/h (95 %)", _alarms),
     ("detected %", _cell(_PERCENT, "detection_rate")),
     ("delay s 50/90 %", _of_faults(_cell("{:.2f}".format, "delay_median_s", "delay_90_s", none="never"))),
     ("isolated %", _cell(_PERCENT, "isolation_rate")),
     ("with no false alarm: detected % / delay s", _of_faults(_free)),
     ("tracking/oracle 50/90 %", _cell("{:.2f}".format, "ratio_median", "ratio_90", none="lost")),
-    ("lost", _cell(str, "departures")),
+    ("lost", "departures"),
     ("us/frame", _cell("{:.0f}".format, "us")),
 )
 CONTROL: Columns = (
-    ("law", _cell(str, "law")),
+    ("law", "law"),
     *DIAGNOSIS[6:],
     ("error before, deg/s 50/90 %", _cell("{:.3g}".format, "before_median", "before_90")),
     ("after", _cell("{:.3g}".format, "after_median", "after_90")),
@@ -70,20 +67,17 @@ CONTROL: Columns = (
 )
 
 
-def sections(part: Document) -> list[tuple[list[str], list[list[str]]]]:
-    """(header, rows) of the schemes with our law, and of the laws with our scheme."""
+def sections(part: Document) -> list[tuple[list[str], list[list[str]], list[str]]]:
+    """(header, rows, sentences) of the schemes with our law, and of the laws with our scheme. A sentence says
+    who is better; there is none where no flight has a fault."""
     lines = [row | {"free": part["without_false_alarm"].get(row["scheme"])} for row in part["lines"]]
     schemes = [row for row in lines if row["law"] == LAW]
     laws = [row for row in lines if row["scheme"] == SCHEME]
+    best = part["who_is_better"]
     return [
-        ([name for name, _ in columns], [[cell(row) for _, cell in columns] for row in rows])
-        for columns, rows in ((DIAGNOSIS, schemes), (CONTROL, laws))
+        (*tabulated(columns, rows), [best[which]] if best else [])
+        for which, columns, rows in (("schemes", DIAGNOSIS, schemes), ("laws", CONTROL, laws))
     ]
-
-
-def first_sentences(part: Document) -> list[list[str]]:
-    """Below each table of `sections`: who is better; nothing where no flight has a fault."""
-    return [[part["who_is_better"][which]] if part["who_is_better"] else [] for which in ("schemes", "laws")]
 
 
 def as_text(document: Document) -> str:
@@ -91,7 +85,7 @@ def as_text(document: Document) -> str:
     blocks = []
     for name, part in document["sets"].items():
         blocks.append(f"{name}: {part['flights']} flights")
-        for (header, rows), first in zip(sections(part), first_sentences(part), strict=True):
+        for header, rows, first in sections(part):
             blocks.append("\n".join([aligned([header, *rows]), *first, ""]))
         blocks += part["better_than_ours"] + [f"could not fly: {error}" for error in part["errors"]]
         blocks.append("")
@@ -124,7 +118,7 @@ def write_leaderboard(document: Document, path: Path) -> None:
 def _sets(document: Document) -> Iterator[page.Part]:
     for name, part in document["sets"].items():
         yield page.Heading(f"{name}: {part['flights']} flights")
-        for (header, rows), first in zip(sections(part), first_sentences(part), strict=True):
+        for header, rows, first in sections(part):
             yield page.Table(header, rows)
             yield from first
         losses = [f"{sentence}." for sentence in part["better_than_ours"]]

@@ -34,12 +34,12 @@ def margins_of(scenario: Scenario) -> list[Margin]:
     axis."""
     flights = closed_form.over_envelope(scenario, N_AIRSPEEDS)
     if scenario.control.law in flown_by("rejecting"):
-        return [margin for flight in flights for margin in takewhile(_is_healthy, closed_form.at(flight))]
+        return [
+            margin
+            for flight in flights
+            for margin in takewhile(lambda each: each.fault == "none", closed_form.at(flight))
+        ]
     return [margin for flight in flights for margin in _measured(flight)]
-
-
-def _is_healthy(margin: Margin) -> bool:
-    return margin.fault == "none"
 
 
 def _measured(scenario: Scenario) -> Iterator[Margin]:

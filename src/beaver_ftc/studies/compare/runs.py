@@ -72,29 +72,29 @@ def _read(folder: Path) -> Run:
     return run
 
 
+DIAGNOSED = {  # what it is called, and where it is in the metrics
+    "detection delay, s": "detection.delay_s", "guaranteed delay, s": "detection.guaranteed_delay_s",
+    "isolated": "isolation.fault", "isolation delay, s": "isolation.delay_s",
+    "estimate": "isolation.estimate",
+}  # fmt: skip
+
+
 def rows_of(run: Run) -> dict[str, str]:
     """What is compared of a run, name -> text: what was flown, then what came of it."""
-    found, flown = run.found, run.flown
-    detection, isolation, departure = found.detection, found.isolation, found.departure
-    rms_deg_s = {"pre": found.tracking.pre_fault_rms_deg_s, "post": found.tracking.post_fault_rms_deg_s}
-    initial = flown["initial"]
+    found, flown, departure = run.found, run.flown, run.found.departure
     outside_s = sum(stay.end_s - stay.start_s for stay in found.envelope_exits)
     return {
         "scenario": found.scenario,
         "law": flown["control"]["law"],
         "scheme": flown["fdi"]["scheme"],
-        "flight condition": f"{initial['airspeed_mps']:g} m/s, {initial['altitude_m']:g} m",
+        "flight condition": "{airspeed_mps:g} m/s, {altitude_m:g} m".format(**flown["initial"]),
         "seed": str(found.seed),
         "faults": "; ".join(map(fault_words, flown.get("faults", []))) or NOTHING,
-        "detection delay, s": number(detection.delay_s),
-        "guaranteed delay, s": number(detection.guaranteed_delay_s),
-        "isolated": isolation.fault or NOTHING,
-        "isolation delay, s": number(isolation.delay_s),
-        "estimate": number(isolation.estimate),
+        **{says: number(found.at(path)) for says, path in DIAGNOSED.items()},
         "false alarm": "yes" if found.false_alarm else "no",
         **{
-            f"{when} RMS {axis}, deg/s": number(getattr(rms, axis) if rms else None)
-            for when, rms in rms_deg_s.items()
+            f"{when} RMS {axis}, deg/s": number(found.at(f"tracking.{when}_fault_rms_deg_s.{axis}"))
+            for when in ("pre", "post")
             for axis in AXES
         },
         "outside the envelope, s": number(outside_s),

@@ -13,7 +13,6 @@ from beaver_ftc.studies.compare.replay import Trace, alarms_at
 from beaver_ftc.studies.compare.trial import LAW, ORACLE, SCHEME, Entry, Result, Trial
 from beaver_ftc.studies.engine.statistics import (
     CONFIDENCE,
-    Estimate,
     duel,
     median,
     poisson_bound,
@@ -21,7 +20,7 @@ from beaver_ftc.studies.engine.statistics import (
     wilson,
     wilson_bound,
 )
-from beaver_ftc.studies.present.tables import finite, percent
+from beaver_ftc.studies.present.tables import all_finite, percent
 
 
 def line_of(
@@ -37,6 +36,7 @@ def line_of(
     faulted = [result for result in mine if result.faulted]
     alarms, hours = sum(r.false_alarm for r in mine), sum(r.fault_free_s for r in mine) / 3600.0
     detected, n = sum(r.delay_s < inf for r in faulted), len(faulted)
+    delays_s, rate = [r.delay_s for r in faulted], wilson(detected, n)
     ratios = [m.rms_deg_s / o.rms_deg_s for m, o in flown if o.error is None and 0 < o.rms_deg_s < inf]
     return {
         "scheme": entry.scheme,
@@ -50,11 +50,11 @@ def line_of(
         "faults": n,
         "detection_rate": detected / n if n else None,
         "detection_rate_lower": wilson_bound(detected, n, CONFIDENCE, upper=False) if n else None,
-        **(_between("detection_rate", wilson(detected, n)) if n else {}),
-        "delay_median_s": share_within([r.delay_s for r in faulted], 0.5),
-        "delay_90_s": share_within([r.delay_s for r in faulted], 0.9),
+        **({"detection_rate_low": rate.low, "detection_rate_high": rate.high} if n else {}),
+        "delay_median_s": share_within(delays_s, 0.5),
+        "delay_90_s": share_within(delays_s, 0.9),
         "isolation_rate": sum(r.correct for r in faulted) / n if n else None,
-        **_interval("delay_median", [r.delay_s for r in faulted], "_s"),
+        **_interval("delay_median", delays_s, "_s"),
         "isolation_delay_median_s": share_within([r.isolation_delay_s for r in faulted], 0.5),
         **_spread("ratio", ratios),
         **_interval("ratio_median", ratios),
@@ -68,10 +68,6 @@ def line_of(
         **_spread("energy", [r.energy_deg2_s2 for r in mine], ("median",)),
         "against_ours": _duel(entry, results, ours),
     }
-
-
-def _between(name: str, found: Estimate) -> Document:
-    return {f"{name}_low": found.low, f"{name}_high": found.high}
 
 
 def _duel(entry: Entry, mine: Sequence[Result], ours: Sequence[Result]) -> Document:
@@ -167,23 +163,19 @@ def document_of(trials: Sequence[Trial], entries: Sequence[Entry]) -> Document:
 def _set(trials: Sequence[Trial], entries: Sequence[Entry]) -> Document:
     schemes = list(dict.fromkeys(scheme for trial in trials for scheme in trial.traces))
     traces = {s: [t.traces[s] for t in trials if s in t.traces] for s in schemes}
-    lines = [_finite(line) for line in lines_of(trials, entries)]
+    lines = [all_finite(line) for line in lines_of(trials, entries)]
     points = {s: trade_off(of) for s, of in traces.items()}
-    free = {s: _finite(matched(of)) for s, of in points.items()}
+    free = {s: all_finite(matched(of)) for s, of in points.items()}
     failed = {result.error for trial in trials for result in trial.results if result.error}
     return {
         "flights": len(trials),
         "lines": lines,
-        "trade_off": {s: [_finite(point) for point in of] for s, of in points.items()},
+        "trade_off": {s: [all_finite(point) for point in of] for s, of in points.items()},
         "without_false_alarm": free,
         "who_is_better": who_is_better(lines),
         "better_than_ours": better_than_ours(lines, free if any(line["faults"] for line in lines) else {}),
         "errors": sorted({error for trial in trials for error in trial.failures} | failed),
     }
-
-
-def _finite(document: Document) -> Document:
-    return {key: finite(value) for key, value in document.items()}
 
 
 YARDSTICKS = ("none", ORACLE, "oracle-published", "fault-tolerant-published")  # and parts of ours

@@ -34,7 +34,7 @@ from beaver_ftc.scenario.airframe import find_aircraft
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.detectability import isolability
-from beaver_ftc.studies.engine.statistics import quantile
+from beaver_ftc.studies.detectability.isolability import best_in_window, largest_and_median
 
 DETECT_WITHIN_S, ISOLATE_WITHIN_S = 0.5, 1.0
 SPEEDS_MPS, ALTITUDES_M = (36.0, 40.0, 44.0, 48.0, 52.0), (0.0, 1000.0, 2000.0, 3000.0)
@@ -155,11 +155,6 @@ def exclusion_magnitude(z: np.ndarray, other: np.ndarray, bound: np.ndarray) -> 
     return np.where(possible, high, np.inf)
 
 
-def best_in_window(values: np.ndarray, frames: int) -> np.ndarray:
-    """The smallest of each run of so many values, (n - frames + 1,)."""
-    return np.lib.stride_tricks.sliding_window_view(values, frames).min(axis=1)
-
-
 def least_distinguished_rad(column: np.ndarray, other: np.ndarray, bound: np.ndarray) -> float:
     """The least deflection off its command, rad, of a surface with this column of G (3,) that a frame's rates
     are certain to tell from every deflection of another; inf where the columns are parallel. bound (3,)."""
@@ -243,10 +238,15 @@ def with_aircraft(scenario: Scenario, reference: str) -> Scenario:
     """The scenario with another aircraft, which starts where its flights do; a folder is looked for in the
     working directory. What is wrong with the other aircraft's truth is not with this one's."""
     find_aircraft(reference, Path())
+    given = {"aircraft": reference, "initial": {}, "uncertainty": {}, "actuators": "ideal"}
+    return Scenario.model_validate(_without_faults(scenario) | given)
+
+
+def _without_faults(scenario: Scenario) -> Document:
+    """The keys of a scenario without its faults, what is expected of them, and bounds on its own servos."""
     document = scenario.model_dump(mode="json", exclude_none=True)
     del document["fdi"]["bounds"]["actuators"]
-    given = {"aircraft": reference, "initial": {}, "uncertainty": {}, "actuators": "ideal"}
-    return Scenario.model_validate({**document, **given, "faults": [], "expect": {}})
+    return {**document, "faults": [], "expect": {}}
 
 
 def answers(scenario: Scenario, rows: Sequence[Document]) -> list[str]:
@@ -287,11 +287,8 @@ def survey_name(scenario: Scenario) -> str:
 
 def look_at(scenario: Scenario, point: tuple[float, float, float]) -> dict[str, list[Document]]:
     """The rows of each of PARTS at a place: without a result, why there is none."""
-    place, there, faults = (
-        dict(zip(PLACE, point, strict=True)),
-        at(scenario, *point),
-        scenario.airframe.class_of_losses,
-    )
+    place, there = dict(zip(PLACE, point, strict=True)), at(scenario, *point)
+    faults = scenario.airframe.class_of_losses
     try:
         seen = excitation(there)
         if len(seen.bound) < _windows(seen)[1]:
@@ -309,13 +306,12 @@ def look_at(scenario: Scenario, point: tuple[float, float, float]) -> dict[str, 
 
 def at(scenario: Scenario, speed_mps: float, altitude_m: float, excitation: float) -> Scenario:
     """The scenario flown elsewhere, its references scaled."""
-    document = scenario.model_dump(mode="json", exclude_none=True)
-    del document["fdi"]["bounds"]["actuators"]
+    document = _without_faults(scenario)
     document["initial"] |= {"airspeed_mps": speed_mps, "altitude_m": altitude_m}
     document["reference"] = {
         axis: scaled(signals, AMPLITUDES, excitation) for axis, signals in document["reference"].items()
     }
-    return Scenario.model_validate({**document, "faults": [], "expect": {}})
+    return Scenario.model_validate(document)
 
 
 def scaled(signals: Sequence[Document], keys: Collection[str], times: float) -> list[Document]:
@@ -341,9 +337,9 @@ def judge(seen: Excitation, fault: str) -> Document:
     excluded = {other: best_in_window(least, isolate) for other, least in seen.excluding[fault].items()}
     isolated = np.maximum(found[: len(z) - isolate + 1], np.max(list(excluded.values()), axis=0))
     rival = max(excluded, key=lambda other: (excluded[other].max(), np.median(excluded[other])))
-    least = [of(each) for each in (found, isolated) for of in (np.max, lambda m: quantile(np.sort(m), 0.5))]
+    least = (*largest_and_median(found, 1.0), *largest_and_median(isolated, 1.0))
     return {
-        **{name: float(m) if m <= 1.0 else None for name, m in zip(MAGNITUDES, least, strict=True)},
+        **dict(zip(MAGNITUDES, least, strict=True)),
         "confused_with": rival,
         "why": _why(seen, fault, rival, found.max(), excluded[rival], isolate),
     }
@@ -351,8 +347,7 @@ def judge(seen: Excitation, fault: str) -> Document:
 
 def _windows(seen: Excitation) -> tuple[int, int]:
     """The frames in which a fault is to be detected, and isolated."""
-    detect, isolate = (max(round(s / seen.dt), 1) for s in (DETECT_WITHIN_S, ISOLATE_WITHIN_S))
-    return detect, isolate
+    return max(round(DETECT_WITHIN_S / seen.dt), 1), max(round(ISOLATE_WITHIN_S / seen.dt), 1)
 
 
 def pairs_of(seen: Excitation) -> list[Document]:

@@ -17,6 +17,7 @@ from beaver_ftc.plugins import offered
 from beaver_ftc.results.model import Document
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.engine.statistics import quantile
+from beaver_ftc.studies.present.tables import finite
 
 LOSS_COLUMNS = ("magnitude", "magnitude_median", "longest_s", "median_s")
 DOUBLET_COLUMNS = ("doublet_deg", "doublet_s", "why")
@@ -33,14 +34,24 @@ def loss_limits(excluded: np.ndarray, frames: int, dt: float) -> Document:
     where no loss does. frames: number of frames within which the other surface has to be excluded. dt s: of a
     frame. A delay includes the frame in which the loss begins.
     """
-    least = np.sort(np.lib.stride_tricks.sliding_window_view(excluded, frames).min(axis=1))
-    n = len(excluded)
+    least, n = best_in_window(excluded, frames), len(excluded)
     next_exclusion = np.where(excluded <= 1.0, np.arange(n), n)
     next_exclusion = np.minimum.accumulate(next_exclusion[::-1])[::-1]
     delay_s = np.where(next_exclusion < n, (next_exclusion - np.arange(n) + 1) * dt, inf)
-    delay_s = np.sort(delay_s[: len(least)])
-    found = least[-1], quantile(least, 0.5), delay_s[-1], quantile(delay_s, 0.5)
-    return {name: float(x) if x < inf else None for name, x in zip(LOSS_COLUMNS, found, strict=True)}
+    found = (*largest_and_median(least), *largest_and_median(delay_s[: len(least)]))
+    return dict(zip(LOSS_COLUMNS, found, strict=True))
+
+
+def best_in_window(values: np.ndarray, frames: int) -> np.ndarray:
+    """The smallest of each run of so many values, (n - frames + 1,)."""
+    return np.lib.stride_tricks.sliding_window_view(values, frames).min(axis=1)
+
+
+def largest_and_median(values: np.ndarray, most: float = inf) -> list[float | None]:
+    """Of values (n,), None for one that is beyond `most` or infinite."""
+    ordered = np.sort(values)
+    both = float(ordered[-1]), quantile(ordered, 0.5)
+    return [finite(value) if value <= most else None for value in both]
 
 
 def smallest_doublets(scenario: Scenario, after_s: float) -> dict[tuple[str, str], Document]:

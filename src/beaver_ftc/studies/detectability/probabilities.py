@@ -186,7 +186,7 @@ def _comparison(rows: Sequence[Row]) -> list[Document]:
 
 def _found_by_seed(rows: Sequence[Row], within_s: float) -> dict[int, int]:
     return {
-        seed: sum(row["delay_s"] is not None and row["delay_s"] <= within_s + 1e-9 for row in of)
+        seed: sum(or_never(row["delay_s"]) <= within_s + 1e-9 for row in of)
         for (seed,), of in grouped(rows, "seed").items()
     }
 

@@ -248,10 +248,10 @@ def _interval(found: Document) -> str:
 def rows_of_sizes(document: Document) -> list[Document]:
     """The rows of the CSV file."""
     return [
-        {"variant": row["variant"], "found": row["found"], "certain": row["certain"],
-         "total_loss_found": row["total_loss"]["value"]}
+        {key: row[key] for key in ("variant", "found", "certain")}
+        | {"total_loss_found": row["total_loss"]["value"]}
         for row in _variants(document)
-    ]  # fmt: skip
+    ]
 
 
 # The share found in a grid of flights, by schemes.

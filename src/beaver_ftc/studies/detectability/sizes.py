@@ -28,7 +28,7 @@ from beaver_ftc.studies.detectability.certain import AMPLITUDES, SETTLED_S, axis
 from beaver_ftc.studies.detectability.shown import NAME, OF_SIZES
 from beaver_ftc.studies.detectability.thresholds import LARGEST, STAGES, Threshold, of_all, threshold
 from beaver_ftc.studies.engine.draws import loss
-from beaver_ftc.studies.engine.statistics import CONFIDENCE, counted
+from beaver_ftc.studies.engine.statistics import CONFIDENCE, counted, or_never
 from beaver_ftc.studies.engine.study import FlyRound, Study, run_study
 from beaver_ftc.studies.present.tables import finite
 
@@ -121,14 +121,12 @@ def fly_one(variants: dict[str, Scenario], asked: Asked, flight: Flight) -> Docu
         found = measure(landing)
     except BeaverFtcError:
         return _row(failed=True)
-    within_s = asked.within_s + TIME_TOLERANCE_S
-    delay_s, certain_s = found.detection.delay_s, found.detection.guaranteed_delay_s
-    inconclusive = found.detection.inconclusive
+    within_s, detection = asked.within_s + TIME_TOLERANCE_S, found.detection
     return _row(
-        found=delay_s is not None and delay_s <= within_s,
-        certain=certain_s is not None and certain_s <= within_s,
+        found=or_never(detection.delay_s) <= within_s,
+        certain=or_never(detection.guaranteed_delay_s) <= within_s,
         false_alarm=found.false_alarm,
-        inconclusive=inconclusive.reasons[0]["says"] if inconclusive else None,
+        inconclusive=detection.inconclusive.reasons[0]["says"] if detection.inconclusive else None,
         bound_used=max(landing.closest_approach, default=0.0),
     )
 

@@ -44,6 +44,15 @@ def replace_whole(path: Path, fill: Callable[[IO[bytes]], object]) -> None:
     sync(path.parent)
 
 
+def known(manifest: Path) -> Document | None:
+    """The identity that a file has; None where there is no such file, or it cannot be read."""
+    try:
+        there = read_json(manifest)
+    except (OSError, ValueError):
+        return None
+    return there if isinstance(there, dict) else None
+
+
 def remove_leftovers(folder: Path) -> None:
     """Remove incomplete files that a killed process has left."""
     for partial in folder.rglob(".*.partial"):

@@ -9,7 +9,7 @@ import json
 import math
 import shutil
 from collections import Counter, deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import count
@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any
 
 from beaver_ftc.documents.errors import SimulationFailed, say_once
-from beaver_ftc.documents.files import read_json
 from beaver_ftc.results.writer import clear_disk_errors, result_folder
 from beaver_ftc.studies.engine import store
 from beaver_ftc.studies.engine.workers import (
@@ -196,20 +195,26 @@ def flown(study: Study, out: Path, workers: int = 1, progress: Progress | None =
 
         def fly(cases: Sequence[Any]) -> list[Any]:
             number = next(rounds)
-            pieces: dict[Number, range] = {
-                f"{number:06}-{n:06}": runs for n, runs in store.batches_of(len(cases), part)
-            }
-            found = set[Number]()
-
-            def there(piece: Number, rows: Any) -> None:
-                found.add(piece)
-                if progress:
-                    progress(len(found) / len(pieces))
-
-            flying.fly(pieces.items(), lambda runs: [Case(n, cases[n]) for n in runs], there)
+            pieces = {f"{number:06}-{n:06}": runs for n, runs in store.batches_of(len(cases), part)}
+            _fly_pieces(flying, pieces, cases, progress)
             return [row for piece, runs in pieces.items() for row in parts.landed(piece, runs)]
 
         yield study.rounds(fly) if study.rounds else fly(study.cases)
+
+
+def _fly_pieces(
+    flying: Flying, pieces: Mapping[Any, range], cases: Sequence[Any], progress: Progress | None
+) -> dict[Number, Any]:
+    """Fly cases by the piece; the rows of each."""
+    found: dict[Number, Any] = {}
+
+    def there(piece: Number, rows: Any) -> None:
+        found[piece] = rows
+        if progress:
+            progress(len(found) / len(pieces))
+
+    flying.fly(pieces.items(), lambda runs: [Case(n, cases[n]) for n in runs], there)
+    return found
 
 
 @contextlib.contextmanager
@@ -236,20 +241,14 @@ def _keeping(study: Study, out: Path) -> Iterator[store.Parts]:
 
 def fly_all(fly: Fly, cases: Sequence[Any], workers: int, progress: Progress | None = None) -> list[Any]:
     """fly(case) of every case, in order, kept nowhere."""
-    found: dict[Number, Any] = {}
-
-    def there(number: Number, rows: Any) -> None:
-        found[number] = rows[0]
-        if progress:
-            progress(len(found) / len(cases))
 
     def nothing(number: Number, of: Any) -> None:
         """None is there, and none is kept."""
 
-    make = partial(_workers, Work(partial(_fly_case, fly)), workers)
+    make, pieces = partial(_workers, Work(partial(_fly_case, fly)), workers), store.batches_of(len(cases), 1)
     with contextlib.closing(Flying(nothing, nothing, make, _fail)) as flying:
-        flying.fly(store.batches_of(len(cases), 1), lambda runs: [Case(n, cases[n]) for n in runs], there)
-    return [found[n] for n in range(len(cases))]
+        found = _fly_pieces(flying, dict(pieces), cases, progress)
+    return [found[n][0] for n in range(len(cases))]
 
 
 def _workers(work: Work, workers: int, cases: int) -> Workers:
@@ -262,11 +261,9 @@ def _begin(kept: Path, study: Study) -> store.Parts:
     asked = {"cases": repr(list(study.cases)), "asked": repr(study.follows_from)}
     identity = store.identity("study", asked)
     manifest, parts = kept / "study.json", store.Parts(kept / "parts", store.RowsAsJson(study.row), GO_ON)
-    there = None
-    with contextlib.suppress(OSError, ValueError):
-        there = read_json(manifest)
+    there = store.known(manifest)
     with clear_disk_errors(kept):
-        if not isinstance(there, dict) and parts:  # nothing says whose they are
+        if there is None and parts:  # nothing says whose they are
             store.set_aside(parts.folder, f"{manifest.name} {store.UNREADABLE}")
         if there != identity:
             parts.remove()

@@ -164,20 +164,18 @@ def fly_case(case: FaultCase) -> Document:
     return {**case._asdict(), **_diagnosis(flight, case), **_tracking(flight, oracle, case), **seen}
 
 
+DIAGNOSED = {  # by key of a row where it is in the metrics
+    "detected": "detection.detected", "delay_s": "detection.delay_s", "false_alarm": "false_alarm",
+    "isolated": "isolation.fault", "isolation_delay_s": "isolation.delay_s", "type": "isolation.type",
+    "candidates": "isolation.candidates", "estimate": "isolation.estimate",
+}  # fmt: skip
+
+
 def _diagnosis(flight: Landing, case: FaultCase) -> Document:
     found = measure(flight)
-    detection, isolation, true_type = found.detection, found.isolation, flight.scenario.faults[0].type
-    return {
-        "detected": detection.detected,
-        "delay_s": detection.delay_s,
-        "false_alarm": found.false_alarm,
-        "isolated": isolation.fault,
-        "isolation_delay_s": isolation.delay_s,
-        "type": isolation.type,
-        "candidates": list(isolation.candidates),
-        "estimate": isolation.estimate,
-        "verdict": verdict(found, case.surface, true_type),
-    }
+    row = {key: found.at(path) for key, path in DIAGNOSED.items()}
+    row["candidates"] = list(row["candidates"])
+    return row | {"verdict": verdict(found, case.surface, flight.scenario.faults[0].type)}
 
 
 def verdict(found: Metrics, surface: str, true_type: str) -> str:
@@ -335,7 +333,7 @@ def as_text(document: Document) -> str:
     for fault, _ in FAULTS:
         lines.append(f"{fault:{width}}" + "".join(f"  {_cell_text(cells[fault, s]):26}" for s in surfaces))
     lost = [cell for cell in document["cells"] if cell["lost"]]
-    remarks = [f"* {cell['surface']} {cell['fault']}: {cell['remark']}" for cell in lost]
+    remarks = ["* {surface} {fault}: {remark}".format(**cell) for cell in lost]
     totals = (
         f"{len(document['flights'])} faults flown: {document['wrong']} named wrongly, "
         f"{document['false_alarms']} false alarms, "

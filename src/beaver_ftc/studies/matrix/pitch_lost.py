@@ -27,7 +27,7 @@ from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.linear_systems import zeros
 from beaver_ftc.studies.matrix.fault_matrix import AIRSPEEDS_MPS, AT_S, REFERENCE, UNCERTAINTY, trimmed_deg
 from beaver_ftc.studies.present.page import Makers
-from beaver_ftc.studies.present.tables import aligned, finite
+from beaver_ftc.studies.present.tables import aligned, finite, tabulated
 
 NAME = "pitch-lost"
 DURATION_S = 100.0
@@ -37,10 +37,6 @@ FREQUENCIES_RAD_S = np.geomspace(1e-3, 1e2, 20001)
 SLOW_RAD_S = 1.0  # the phugoid is slower than this, the short period faster
 SETTLED_S = 30.0  # from here on the swing is judged: what the fault itself throws off is over
 LAWS = ("fault-tolerant-published", "oracle-published")
-MARGIN_HEAD = (
-    "airspeed", "phugoid damping", "gain margin", "phase margin", "power to attitude",
-    "its range as elevator",
-)  # fmt: skip
 
 # Elevator's jam off its trim in deg (None: it floats), flap's position in deg.
 LOST: dict[str, tuple[float | None, float]] = {
@@ -205,7 +201,8 @@ def as_text(document: Document) -> str:
         f"{len(document['flights'])} pairs of faults flown: {document['saved']} aircraft kept that are lost "
         f"without engine power, {document['harmed']} lost that are kept without"
     )
-    linear = aligned([MARGIN_HEAD, *map(_margin, document["margins"])])
+    head, rows = tabulated(MARGINS, document["margins"])
+    linear = aligned([head, *rows])
     return "\n\n".join([*tables, LEGEND, linear, totals])
 
 
@@ -220,13 +217,18 @@ def _cell(row: Document) -> str:
 def _half(outcome: Document) -> str:
     if outcome["departure"]:
         return f"lost {outcome['departure']['time_s']:.1f} s"
-    return f"{outcome['q_rms_deg_s']:.2f} {outcome['theta_swing_deg']:4.1f}"
+    return "{q_rms_deg_s:.2f} {theta_swing_deg:4.1f}".format(**outcome)
 
 
-def _margin(one: Document) -> tuple[str, ...]:
-    alone, damped = one["phugoid_damping"]
-    gain = "unlimited" if one["gain_margin_db"] is None else f"{one['gain_margin_db']:.1f} dB"
-    phase = "unlimited" if one["phase_margin_deg"] is None else f"{one['phase_margin_deg']:.0f} deg"
-    closed, opened = one["worth_deg"]
-    zero, worth = f"zero at +{one['attitude_zero_rad_s']:.2f} rad/s", f"{closed:+.1f} to {opened:+.1f} deg"
-    return f"{one['airspeed_mps']:g} m/s", f"{alone:.2f} > {damped:.2f}", gain, phase, zero, worth
+def _or_unlimited(says: str, margin: float | None) -> str:
+    return "unlimited" if margin is None else says.format(margin)
+
+
+MARGINS = (
+    ("airspeed", "airspeed_mps", "{:g} m/s".format),
+    ("phugoid damping", "phugoid_damping", "{0[0]:.2f} > {0[1]:.2f}".format),
+    ("gain margin", "gain_margin_db", partial(_or_unlimited, "{:.1f} dB")),
+    ("phase margin", "phase_margin_deg", partial(_or_unlimited, "{:.0f} deg")),
+    ("power to attitude", "attitude_zero_rad_s", "zero at +{:.2f} rad/s".format),
+    ("its range as elevator", "worth_deg", "{0[0]:+.1f} to {0[1]:+.1f} deg".format),
+)

@@ -1,5 +1,6 @@
 """The mismatch as tables and sentences, for the terminal and as a section of `report.html`."""
 
+from functools import partial
 from pathlib import Path
 
 from beaver_ftc.aircraft import AXES
@@ -7,7 +8,7 @@ from beaver_ftc.documents.files import read_json
 from beaver_ftc.results.model import Document
 from beaver_ftc.results.report import register_section
 from beaver_ftc.studies.present import page
-from beaver_ftc.studies.present.tables import number, plain, printed, seconds
+from beaver_ftc.studies.present.tables import number, plain, printed, seconds, tabulated
 
 WIDTH = 150
 
@@ -16,7 +17,7 @@ PICTURES = {
     "mismatch-bound": "How much of the bound each source uses",
     "mismatch-linear": "Poles and frequency responses: truth, FDC equations, design model",
 }
-Table = tuple[str, list[str], list[list[str]]]
+Table = tuple[str, list[str], list[list[str]]]  # caption, head, rows
 
 
 def label(source: str) -> str:
@@ -79,9 +80,52 @@ def _case(case: Document) -> str:
     )
 
 
+def _reason(stays: list[Document]) -> str:
+    return label(max(stays, key=lambda stay: stay["peak_ratio"] or 0.0)["source"]) if stays else "-"
+
+
+def _needed(axis: str, entry: Document) -> str:
+    return f"{percent(entry[f'{axis}_worst_ratio'])} / {entry[f'{axis}_smallest_constant_rad_s2']:.3g}"
+
+
+def _certain_within(entry: Document) -> str:
+    return "void" if entry["guarantee_void"] else seconds(entry["guaranteed_delay_s"])
+
+
+_4_DIGITS = "{:.4g}".format
+# An axis against its bound, how far it was used and exceeded, and the smallest that would have done.
+BOUNDS = (
+    ("axis", "axis"), ("constant", "constant_rad_s2", _4_DIGITS),
+    ("smallest", "smallest_constant_rad_s2", _4_DIGITS), ("worst", "worst_ratio", percent),
+    ("at", "worst_at_s", seconds), ("exceeded", "exceeded_s", seconds), ("times", "exceeded_times"),
+    ("because of", "exceedances", _reason),
+)  # fmt: skip
+# Frequency and damping of a mode, and how far the others are from the truth.
+MODES = (
+    ("mode", "mode", label), ("truth rad/s", "truth.frequency_rad_s", _4_DIGITS),
+    ("damping", "truth.damping", "{:.3g}".format), ("FDC off by", "deviation.fdc", percent),
+    ("design off by", "deviation.design", percent), ("JSBSim's own off by", "jsbsim_own_deviation", percent),
+)  # fmt: skip
+# A run: worst share of the bound, smallest constant, reason, alarm and guarantee.
+RUNS = (
+    ("run", "scenario"), *((axis, partial(_needed, axis)) for axis in AXES),
+    ("dominant", "dominant", lambda source: label(source or "-")),
+    ("false alarm", "false_alarm", lambda is_false: "yes" if is_false else "no"),
+    ("certain within", _certain_within),
+)  # fmt: skip
+
+
 def tables(found: Document) -> list[Table]:
-    """(caption, head, rows) of the sources, the bound and the modes, for the terminal and the page."""
-    return [_sources(found), _bounds(found), _modes(found)]
+    """The sources, the bound and the modes, for the terminal and the page."""
+    linear = found["linear"]
+    bounds = [{"axis": axis} | of for axis, of in found["bound"].items()]
+    modes = [{"mode": name} | of for name, of in linear["modes"].items()]
+    place = "modes at trim, {airspeed_mps:g} m/s and {altitude_m:g} m".format(**linear)
+    return [
+        _sources(found),
+        ("the bound, without the fault (constants in rad/s2)", *tabulated(BOUNDS, bounds)),
+        (place, *tabulated(MODES, modes)),
+    ]
 
 
 def _sources(found: Document) -> Table:
@@ -106,60 +150,10 @@ def _row(name: str, per_axis: list[Document]) -> list[str]:
     return row
 
 
-def _bounds(found: Document) -> Table:
-    """The bound of each axis, how far it was used and exceeded, and the smallest that would have done."""
-    head = ["axis", "constant", "smallest", "worst", "at", "exceeded", "times", "because of"]
-    rows = [
-        [
-            axis, f"{of['constant_rad_s2']:.4g}", f"{of['smallest_constant_rad_s2']:.4g}",
-            percent(of["worst_ratio"]), seconds(of["worst_at_s"]), seconds(of["exceeded_s"]),
-            str(of["exceeded_times"]), _reason(of["exceedances"]),
-        ]
-        for axis, of in found["bound"].items()
-    ]  # fmt: skip
-    return "the bound, without the fault (constants in rad/s2)", head, rows
-
-
-def _reason(stays: list[Document]) -> str:
-    return label(max(stays, key=lambda stay: stay["peak_ratio"] or 0.0)["source"]) if stays else "-"
-
-
-def _modes(found: Document) -> Table:
-    """Frequency and damping of each mode, and how far the others are from the truth."""
-    linear = found["linear"]
-    head = ["mode", "truth rad/s", "damping", "FDC off by", "design off by", "JSBSim's own off by"]
-    rows = [
-        [
-            label(name), f"{of['truth']['frequency_rad_s']:.4g}", f"{of['truth']['damping']:.3g}",
-            percent(of["deviation"]["fdc"]), percent(of["deviation"]["design"]),
-            percent(of["jsbsim_own_deviation"]),
-        ]
-        for name, of in linear["modes"].items()
-    ]  # fmt: skip
-    return f"modes at trim, {linear['airspeed_mps']:g} m/s and {linear['altitude_m']:g} m", head, rows
-
-
-def _comparison(entries: list[Document]) -> Table:
-    """Runs side by side: worst share of the bound, smallest constant, reason, alarm and guarantee."""
-    rows = [
-        [
-            entry["scenario"], *(_needed(entry, axis) for axis in AXES),
-            label(entry["dominant"] or "-"), "yes" if entry["false_alarm"] else "no",
-            "void" if entry["guarantee_void"] else seconds(entry["guaranteed_delay_s"]),
-        ]
-        for entry in entries
-    ]  # fmt: skip
-    head = ["run", *AXES, "dominant", "false alarm", "certain within"]
-    return "worst share of the bound / smallest constant bound in rad/s2", head, rows
-
-
-def _needed(entry: Document, axis: str) -> str:
-    return f"{percent(entry[f'{axis}_worst_ratio'])} / {entry[f'{axis}_smallest_constant_rad_s2']:.3g}"
-
-
 def comparison_text(entries: list[Document], recommended: Document, folder: str, colour: bool = False) -> str:
     """Several flights side by side, and the bound that covers them all."""
-    table = printed([plain(*_comparison(entries))], WIDTH, colour)
+    caption = "worst share of the bound / smallest constant bound in rad/s2"
+    table = printed([plain(caption, *tabulated(RUNS, entries))], WIDTH, colour)
     return "\n".join([table, "", *_advice(recommended), f"results      {folder}", ""])
 
 
@@ -174,8 +168,7 @@ def mismatch_section(folder: Path) -> str:
     if not path.exists():
         return ""
     found = read_json(path)
-    drawn = {name: folder / "figures" / f"{name}.png" for name in PICTURES}
-    there = {name: picture for name, picture in drawn.items() if picture.exists()}
+    there = page.drawn_in(folder, PICTURES)
     shown = [part for caption, head, rows in tables(found) for part in (caption, page.Table(head, rows))]
     heading = page.Heading(f"Truth against design: {found['scenario']}")
     pictures = page.Pictures([(PICTURES[name], name) for name in there])

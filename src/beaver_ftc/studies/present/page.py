@@ -1,7 +1,7 @@
 """A page from its parts, as Markdown and as one HTML file that needs nothing else; a study's files."""
 
 from base64 import b64encode
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from html import escape
 from pathlib import Path
@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.results.metrics import as_json
-from beaver_ftc.studies.present.tables import Rows, aligned, as_csv, html_table, markdown_table
+from beaver_ftc.studies.present.tables import (
+    Columns,
+    Rows,
+    aligned,
+    as_csv,
+    html_table,
+    markdown_table,
+    tabulated,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -50,6 +58,11 @@ class Pictures(NamedTuple):
 
 
 Part = str | Heading | Table | Bullets | Links | Pictures
+
+
+def table(columns: Columns, rows: Iterable[Any]) -> Table:
+    """A table of these columns."""
+    return Table(*tabulated(columns, rows))
 
 
 def as_markdown(parts: Sequence[Part], figures: str = "") -> str:
@@ -125,6 +138,12 @@ def _html(part: Part, figures: Mapping[str, Path]) -> str:
 def _picture(title: str, path: Path) -> str:
     data = b64encode(path.read_bytes()).decode("ascii")
     return f'<img alt="{escape(title)}" src="data:image/png;base64,{data}">'
+
+
+def drawn_in(folder: Path, stems: Iterable[str]) -> dict[str, Path]:
+    """The pictures of a result folder that are there, by their stems."""
+    files = {stem: folder / "figures" / f"{stem}.png" for stem in stems}
+    return {stem: file for stem, file in files.items() if file.exists()}
 
 
 def study_files(

@@ -5,7 +5,7 @@ import io
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from html import escape
 from math import isfinite
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from beaver_ftc.documents.files import Document
 
@@ -19,6 +19,11 @@ LEAST = 1e-3  # what is smaller is said to be so: nobody reads 2.29e-07 deg/s
 def finite(value: Any) -> Any:
     """Return a value for a JSON document: None for an infinite or missing number."""
     return None if isinstance(value, float) and not isfinite(value) else value
+
+
+def all_finite(row: Mapping[str, Any]) -> Document:
+    """The same of each value."""
+    return {key: finite(value) for key, value in row.items()}
 
 
 def number(value: Any, unit: str = "", none: str = "-", digits: int = 3) -> str:
@@ -63,6 +68,36 @@ def grouped(rows: Iterable[Document], *names: str) -> dict[tuple[Any, ...], list
     for row in rows:
         groups.setdefault(tuple(row[name] for name in names), []).append(row)
     return groups
+
+
+class Column(NamedTuple):
+    """A column of a table: its head, and its cell of a row.
+
+    of: what makes the cell of a row, or the key of its value, with dots where that is in a part. form: of the
+    value, or its unit.
+    """
+
+    head: str
+    of: str | Callable[[Any], str]
+    form: str | Callable[[Any], str] = ""
+
+    def cell(self, row: Any) -> str:
+        """The cell of a row."""
+        if not isinstance(self.of, str):
+            return self.of(row)
+        value = row
+        for key in self.of.split("."):
+            value = value[key]
+        return number(value, self.form) if isinstance(self.form, str) else self.form(value)
+
+
+Columns = Sequence[tuple[Any, ...]]  # the fields of each Column
+
+
+def tabulated(columns: Columns, rows: Iterable[Any]) -> tuple[list[str], list[list[str]]]:
+    """Head and rows of a table."""
+    made = [Column(*each) for each in columns]
+    return [each.head for each in made], [[each.cell(row) for each in made] for row in rows]
 
 
 def aligned(rows: Rows) -> str:

@@ -6,18 +6,13 @@ What is flown, declared and asked for is the same; only who diagnoses and who co
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from beaver_ftc.results.model import Document, Rates
+from beaver_ftc.results.model import Document
 from beaver_ftc.studies.present.tables import number
-from beaver_ftc.studies.reproduce.cases import CASES, EDGES, OURS, Changed, Flown, fly_case
-from beaver_ftc.studies.reproduce.measures import AXIS
+from beaver_ftc.studies.reproduce.cases import AXIS, CASES, EDGES, OURS, Changed, Flown, fly_case
 
 HEALTHY = Changed("fault-free", {}, "")
 SHOWN = (HEALTHY, *(CASES[name] for name in ("elevator", "aileron", "rudder", "unanticipated")))
 WHOSE: Mapping[str, Mapping[str, object]] = {"paper": {}, "ours": OURS}
-HEAD = (
-    "Case", "Flown by", "Detected after", "Isolated as", "after", "RMS before", "RMS after", "Surface travel",
-    "Surface work",
-)  # fmt: skip
 BETTER = "Where the paper's is better, by more than 1 %:"
 MATTERS = 0.01  # a smaller share of a number is no difference
 
@@ -61,7 +56,7 @@ def document_of(flights: Mapping[tuple[str, str], Flown], alarms: Sequence[float
     """A row a case and scheme, and the false alarms of each; alarms: of each of healthy_settings."""
     rows = [_row(case, whose, flown) for (case, whose), flown in flights.items()]
     each = len(EDGES)
-    counts = [int(sum(alarms[i * each : (i + 1) * each])) for i in range(len(WHOSE))]
+    counts = [int(sum(alarms[i : i + each])) for i in range(0, len(alarms), each)]
     return {
         "rows": rows,
         "healthy_flights": each,
@@ -72,28 +67,22 @@ def document_of(flights: Mapping[tuple[str, str], Flown], alarms: Sequence[float
 
 def _row(case: str, whose: str, flown: Flown) -> Document:
     found, axis = flown.metrics, AXIS.get(case, "q")
-    tracked, isolation = found.tracking, found.isolation
-    rms_deg_s = tracked.pre_fault_rms_deg_s, tracked.post_fault_rms_deg_s
-    before, after = (_of_axis(rms, axis) for rms in rms_deg_s)
+    tracked = found.tracking
     return {
         "case": case,
         "flown_by": whose,
         "scheme": found.flight.scheme,
         "law": found.flight.law,
         "detected_s": found.detection.delay_s,
-        "named": isolation.fault,
-        "isolated_s": isolation.delay_s,
+        "named": found.isolation.fault,
+        "isolated_s": found.isolation.delay_s,
         "axis": axis,
-        "before_deg_s": before,
-        "after_deg_s": after,
+        "before_deg_s": found.at(f"tracking.pre_fault_rms_deg_s.{axis}"),
+        "after_deg_s": found.at(f"tracking.post_fault_rms_deg_s.{axis}"),
         "travel_deg": sum(tracked.surface_travel_deg.values()),
         "work_deg2_per_s": sum(tracked.surface_energy_deg2_s.values()),
         "departed": found.departure is not None,
     }
-
-
-def _of_axis(rms: Rates | None, axis: str) -> float | None:
-    return None if rms is None else getattr(rms, axis)
 
 
 def _better(rows: Sequence[Document]) -> list[Document]:
@@ -117,17 +106,16 @@ def _less(one: float | None, other: float | None) -> bool:
     return one is not None and (other is None or one < (1.0 - MATTERS) * other)
 
 
-def rows_of(document: Document) -> list[tuple[str, ...]]:
-    """A row a flight, for HEAD."""
-    return [
-        (
-            row["case"], row["flown_by"], number(row["detected_s"], "s"), row["named"] or "-",
-            number(row["isolated_s"], "s"), number(row["before_deg_s"], "deg/s"),
-            "aircraft lost" if row["departed"] else number(row["after_deg_s"], "deg/s"),
-            number(row["travel_deg"], "deg"), number(row["work_deg2_per_s"], "deg²/s"),
-        )
-        for row in document["rows"]
-    ]  # fmt: skip
+def _after(row: Document) -> str:
+    return "aircraft lost" if row["departed"] else number(row["after_deg_s"], "deg/s")
+
+
+COLUMNS = (  # a row a flight
+    ("Case", "case"), ("Flown by", "flown_by"), ("Detected after", "detected_s", "s"),
+    ("Isolated as", "named"), ("after", "isolated_s", "s"), ("RMS before", "before_deg_s", "deg/s"),
+    ("RMS after", _after), ("Surface travel", "travel_deg", "deg"),
+    ("Surface work", "work_deg2_per_s", "deg²/s"),
+)  # fmt: skip
 
 
 def sentences(document: Document) -> list[str]:

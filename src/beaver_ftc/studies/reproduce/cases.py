@@ -19,10 +19,13 @@ from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import Columns
 from beaver_ftc.results.metrics import measure
 from beaver_ftc.results.model import Metrics
+from beaver_ftc.scenario.faults import place_of
 from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.studies.engine.statistics import or_never
 from beaver_ftc.studies.reproduce.choices import FAULT_AT_S, GIVEN, gains, scenario
 
 ESTIMATORS = ("aileron", "elevator", "rudder")
+AXIS = {"aileron": "p", "elevator": "q", "rudder": "r", "unanticipated": "q"}  # where a fault shows
 PUBLISHED_LOSS, AFTER_S = 0.4, 18.0  # of the effectiveness; flown on after the fault, s
 SETTLED_S = 2.0  # from rest, or from a fault, to steady tracking: four error time constants
 
@@ -84,6 +87,31 @@ class Flown:
         return self.metrics.fault.at_s if self.metrics.fault else FAULT_AT_S
 
     @property
+    def struck(self) -> str:
+        """The surface that the fault is of; of an unanticipated one its type."""
+        return place_of(self.scenario.faults[0])
+
+    @property
+    def axis(self) -> str:
+        """The axis on which the fault shows."""
+        return AXIS[self.struck]
+
+    @property
+    def alarm_s(self) -> float:
+        """When the alarm is raised, s; infinite if it never is."""
+        return or_never(self.metrics.detection.time_s)
+
+    @property
+    def rightly_named_s(self) -> float:
+        """When the fault gets its name, s; infinite if anything else is named in the end."""
+        isolation = self.metrics.isolation
+        return or_never(isolation.time_s if isolation.correct else None)
+
+    def mode_at_s(self, mode: str) -> float:
+        """When the supervisor first enters a mode, s; infinite if it never does."""
+        return next((change.time_s for change in self.metrics.supervisor if change.mode == mode), np.inf)
+
+    @property
     def frame_s(self) -> float:
         """Length of a frame, s."""
         return float(self.log["t_s"][1] - self.log["t_s"][0])
@@ -108,6 +136,10 @@ class Flown:
     def first_s(self, holds: np.ndarray) -> float:
         """The first instant at which something (frames,) holds, s; infinite if it never does."""
         return float(self.log["t_s"][np.argmax(holds)]) if holds.any() else np.inf
+
+    def first_beyond_s(self, shares: np.ndarray) -> float:
+        """The first instant at which any of these shares (3, frames) exceeds 1, s."""
+        return self.first_s(shares.max(axis=0) > 1.0)
 
     def between(self, start_s: float, end_s: float = np.inf) -> np.ndarray:
         """Which frames lie in a span of time."""

@@ -6,13 +6,15 @@ if the ablation fails in that setting. Statements that the code makes true by it
 nothing to measure, are counted apart.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from math import nan
 from pathlib import Path
 from typing import NamedTuple
 
+from beaver_ftc.aircraft import AXES
 from beaver_ftc.documents.document import parse
-from beaver_ftc.studies.reproduce.cases import Changed
-from beaver_ftc.studies.reproduce.measures import MEASURES, Flights, Measure
+from beaver_ftc.studies.reproduce import measures
+from beaver_ftc.studies.reproduce.cases import Changed, Flown
 
 BORNE_OUT, NOT_BORNE_OUT = "borne out", "not borne out"
 STRONGER, CANNOT_BE_JUDGED = "stronger than the paper", "cannot be judged"
@@ -24,9 +26,27 @@ TAKES: dict[str, str] = {name: row["takes"] for name, row in _FILE["ablations"].
 ABLATIONS = tuple(Changed(name, row["changes"], "") for name, row in _FILE["ablations"].items())
 
 
+class Measure(NamedTuple):
+    """What a number is of, how it is measured, its unit, whether it is to be at least its limit, and what to
+    say of an infinite one. beside: how the names of the flights end that these are compared with, if any."""
+
+    of: Callable[..., float]
+    quantity: str
+    unit: str = ""
+    at_least: bool = False
+    none: str = "never"
+    beside: str = ""
+
+
+MEASURES = {name: Measure(getattr(measures, name), **row) for name, row in _FILE["measures"].items()}
+
+
+NO_MEASURE = Measure(lambda: nan, "")
+
+
 class Claim(NamedTuple):
-    """A published statement: what is measured in which flights, its limit with where that comes from, and the
-    ablation, of ABLATIONS, in which it must fail.
+    """A published statement: what is measured in which flights, and of which axis, its limit with where that
+    comes from, and the ablation, of ABLATIONS, in which it must fail.
 
     reason: why nothing is measured, for those without a measure. because: why it does not hold; such a claim
     is flown in the published setting alone. construction: whether the code makes it true by its construction.
@@ -34,7 +54,7 @@ class Claim(NamedTuple):
 
     where: str
     statement: str
-    measure: Measure | None = None
+    measure: Measure = NO_MEASURE
     names: tuple[str, ...] = ()
     limit: float = 0.0
     source: str = ""
@@ -46,16 +66,16 @@ class Claim(NamedTuple):
     @property
     def testable(self) -> bool:
         """Whether flights can contradict it."""
-        return self.measure is not None and not self.construction
+        return not self.reason and not self.construction
 
-    def number(self, flights: Flights) -> float:
+    def number(self, flights: Mapping[str, Flown]) -> float:
         """What is measured in the flights."""
-        assert self.measure is not None
-        return float(self.measure.of(flights, *self.names))
+        beside = [name + self.measure.beside for name in self.names if self.measure.beside]
+        of = (name if name in AXES else flights[name] for name in (*self.names, *beside))
+        return float(self.measure.of(*of))
 
     def holds(self, number: float) -> bool:
         """Whether the number keeps the limit."""
-        assert self.measure is not None
         return bool(number >= self.limit if self.measure.at_least else number <= self.limit)
 
     def is_borne_out(self, number: float, without: float) -> bool:
@@ -86,4 +106,4 @@ def _claim(row: dict) -> Claim:
 
 
 CLAIMS = tuple(map(_claim, _FILE["claims"]))
-MEASURED = tuple(claim for claim in CLAIMS if claim.measure)
+MEASURED = tuple(claim for claim in CLAIMS if not claim.reason)

@@ -110,7 +110,17 @@ def document_of(flights: Flights, rows: Sequence[Document]) -> Document:
         claim: _judged(claim, {name: (numbers[name][i], ablated[name][i]) for name in numbers})
         for i, claim in enumerate(MEASURED)
     }
-    claims = [{"where": c.where, "statement": c.statement} | judged.get(c, _unjudged(c)) for c in CLAIMS]
+    unjudged = {
+        "verdict": CANNOT_BE_JUDGED,
+        "reason": "",
+        "because": "",
+        "number": None,
+        "construction": False,
+    }
+    claims = [
+        {"where": c.where, "statement": c.statement} | judged.get(c, unjudged | {"reason": c.reason})
+        for c in CLAIMS
+    ]
     counts = Counter(claim["verdict"] for claim in claims)
     return {
         "passed": all(claim["verdict"] != NOT_BORNE_OUT or claim["because"] for claim in claims),
@@ -151,32 +161,21 @@ def document_of(flights: Flights, rows: Sequence[Document]) -> Document:
     }
 
 
-def _unjudged(claim: Claim) -> Document:
-    return {
-        "verdict": CANNOT_BE_JUDGED,
-        "reason": claim.reason,
-        "because": "",
-        "number": None,
-        "construction": False,
-    }
-
-
 def _judged(claim: Claim, by_setting: Mapping[str, tuple[float, float]]) -> Document:
     """A measured claim. by_setting: its number, and that without its mechanism, by name of setting."""
-    assert claim.measure is not None
     number, without = by_setting[AS_PUBLISHED.name]
     elsewhere = [] if claim.because else [by_setting[setting.name] for setting in ELSEWHERE]
-    verdict = claim.verdict(number, without, elsewhere)
+    measure, verdict = claim.measure, claim.verdict(number, without, elsewhere)
     flown = [there for there, _ in elsewhere] or [number]
     return {
-        "measure": claim.measure.of.__name__,
-        "quantity": claim.measure.quantity,
-        "unit": claim.measure.unit,
+        "measure": measure.of.__name__,
+        "quantity": measure.quantity,
+        "unit": measure.unit,
         "flights": list(claim.names),
         "limit": claim.limit,
         "limit_from": claim.source,
-        "at_least": claim.measure.at_least,
-        "none": claim.measure.none,
+        "at_least": measure.at_least,
+        "none": measure.none,
         "number": finite(number),
         "ablation": claim.ablation,
         "without": TAKES[claim.ablation],
@@ -245,13 +244,12 @@ def _also_without(numbers: list[float], ablated: list[float], published: list[fl
     return [
         _found_of(c, ablated[i]) | {"without": TAKES[c.ablation]}
         for i, c in enumerate(MEASURED)
-        if c.measure and c.testable and not c.because
+        if c.testable and not c.because
         if c.holds(numbers[i]) and c.holds(ablated[i]) and not c.holds(published[i])
     ]
 
 
 def _found_of(claim: Claim, number: float) -> Document:
-    assert claim.measure is not None
     return {
         "where": claim.where,
         "statement": claim.statement,
@@ -266,7 +264,7 @@ def _missed(ours: list[float], numbers: list[float]) -> list[Document]:
     return [
         _found_of(c, number)
         for c, as_flown, number in zip(MEASURED, ours, numbers, strict=True)
-        if c.measure and c.holds(as_flown) and not c.holds(number)
+        if c.holds(as_flown) and not c.holds(number)
     ]
 
 

@@ -1,6 +1,7 @@
 """What flies, and what the design model has of it: eq. (2) of [Zhang2005] as printed omits the engine."""
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 from beaver_ftc.aircraft import AXES, load
@@ -17,11 +18,6 @@ DESIGNS: tuple[tuple[str, str, Mapping[str, Any]], ...] = (  # name, bound, chan
     ("eq. (2) as printed", "as published", _PRINTED),
     ("eq. (2) as printed", "wide enough: 0.05, 0.3, 0.06 rad/s2", _WIDE),
 )
-TERMS_HEAD = ("Moment", "Truth, and our design", "Eq. (2) as printed", "Omitted there")
-FLOWN_HEAD = (
-    "Design model", "Constant bound", "First alarm without a fault", "|residual| / threshold: p", "q", "r",
-    "40 % loss of the elevator: detected after", "named",
-)  # fmt: skip
 
 
 def terms() -> list[Document]:
@@ -40,13 +36,8 @@ def terms() -> list[Document]:
 
 def fly_designs() -> list[tuple[Flown, Flown]]:
     """Every design of DESIGNS: a healthy flight, and one with the published elevator fault."""
-    return [
-        (
-            fly_case(Changed("fault-free", changes, "")),
-            fly_case(CASES["elevator"], changes),
-        )
-        for _, _, changes in DESIGNS
-    ]
+    healthy = Changed("fault-free", {}, "")
+    return [(fly_case(healthy, changes), fly_case(CASES["elevator"], changes)) for _, _, changes in DESIGNS]
 
 
 def document_of(flights: list[tuple[Flown, Flown]]) -> Document:
@@ -72,25 +63,21 @@ def _row(name: str, bound: str, healthy: Flown, faulty: Flown) -> Document:
     }
 
 
-def term_rows(document: Document) -> list[tuple[str, ...]]:
-    """A row a moment, for TERMS_HEAD."""
-    return [
-        (
-            row["moment"], ", ".join(row["truth"]),
-            ", ".join(name for name in row["truth"] if name not in row["omitted"]), ", ".join(row["omitted"]),
-        )
-        for row in document["terms"]
-    ]  # fmt: skip
+def _printed(row: Document) -> str:
+    return ", ".join(name for name in row["truth"] if name not in row["omitted"])
 
 
-def flown_rows(document: Document) -> list[tuple[str, ...]]:
-    """A row a design, for FLOWN_HEAD."""
-    return [
-        (
-            row["design"], row["bound"], seconds(row["alarm_s"], none="none"),
-            *(number(row["share"][axis]) for axis in AXES),
-            "after a false alarm" if row["false_alarm"] else number(row["detected_s"], "s", none="never"),
-            row["named"] or "-",
-        )
-        for row in document["designs"]
-    ]  # fmt: skip
+def _detected(row: Document) -> str:
+    return "after a false alarm" if row["false_alarm"] else number(row["detected_s"], "s", none="never")
+
+
+TERMS = (  # a row a moment
+    ("Moment", "moment"), ("Truth, and our design", "truth", ", ".join), ("Eq. (2) as printed", _printed),
+    ("Omitted there", "omitted", ", ".join),
+)  # fmt: skip
+FLOWN = (  # a row a design
+    ("Design model", "design"), ("Constant bound", "bound"),
+    ("First alarm without a fault", "alarm_s", partial(seconds, none="none")),
+    ("|residual| / threshold: p", "share.p"), ("q", "share.q"), ("r", "share.r"),
+    ("40 % loss of the elevator: detected after", _detected), ("named", "named"),
+)  # fmt: skip

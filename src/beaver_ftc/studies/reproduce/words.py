@@ -1,13 +1,14 @@
 """The document of the reproduction in words: a text for the terminal, a page as Markdown and as HTML."""
 
 from collections import Counter
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.documents.document import parse
 from beaver_ftc.results.model import Document
 from beaver_ftc.studies.present import page, tables
-from beaver_ftc.studies.present.tables import printed
+from beaver_ftc.studies.present.tables import printed, tabulated
 from beaver_ftc.studies.reproduce import beside, truth_and_design
 from beaver_ftc.studies.reproduce.claims import BORNE_OUT, CANNOT_BE_JUDGED, NOT_BORNE_OUT, STRONGER
 from beaver_ftc.studies.reproduce.published_figures import FIGURES, SENSITIVITY
@@ -17,17 +18,6 @@ if TYPE_CHECKING:
 
 NAME, WIDTH = "reproduction", 132
 VERDICT_HEAD = ("Published", "Statement", "Our number", "Limit", "Without", "Verdict", "Remark")
-ABLATION_HEAD = ("Taken out", "By", "Statements that speak of it", "Fail without it")
-SENSITIVITY_HEAD = ("Published", "Statement", "From", "To", "Held")
-CHOICES_HEAD = ("Key", "Value", "Reason")
-GAINS_HEAD = (
-    "Option",
-    "Default",
-    "What it is",
-    "Chosen by",
-    "Halved: no longer hold",
-    "Doubled: no longer hold",
-)
 _SAYS = parse(Path(__file__).with_name("page.yaml").read_text(encoding="utf-8")).data
 ELSEWHERE_TOO = "borne out, elsewhere too"
 SHOWN_AS = {STRONGER: ELSEWHERE_TOO}  # the verdict in words: of where it was flown, not of its strength
@@ -43,9 +33,14 @@ def number(value: float | None, unit: str = "", none: str = "never") -> str:
     return tables.number(value, unit, none=none)
 
 
+def _found(claim: Document, key: str = "number") -> str:
+    """A number of a claim."""
+    return number(claim[key], claim["unit"], claim["none"])
+
+
 def ours(claim: Document) -> str:
     """Quantity and number."""
-    return f"{claim['quantity']} {number(claim['number'], claim['unit'], claim['none'])}"
+    return f"{claim['quantity']} {_found(claim)}"
 
 
 def limit(claim: Document) -> str:
@@ -57,7 +52,7 @@ def limit(claim: Document) -> str:
 
 def without(claim: Document) -> str:
     """What is taken out, and the number then."""
-    return f"{claim['without']}: {number(claim['number_without'], claim['unit'], claim['none'])}"
+    return f"{claim['without']}: {_found(claim, 'number_without')}"
 
 
 def verdict_rows(document: Document) -> list[tuple[str, ...]]:
@@ -88,31 +83,8 @@ def remark(claim: Document) -> str:
 
 def _remark(claim: Document) -> str:
     if claim["verdict"] == BORNE_OUT and not claim["construction"]:
-        return f"in {claim['borne_out_in']} of {claim['elsewhere']} settings that the paper did not fly"
+        return "in {borne_out_in} of {elsewhere} settings that the paper did not fly".format(**claim)
     return "holds without it as well" if claim["verdict"] == CANNOT_BE_JUDGED else claim["because"]
-
-
-def ablation_rows(document: Document) -> list[tuple[str, ...]]:
-    """One row an ablation, for ABLATION_HEAD."""
-    return [
-        (row["takes"], "; ".join(f"{key}: {_value(value)}" for key, value in row["changes"].items()),
-         str(row["statements"]), str(row["fail"]))
-        for row in document["ablations"]
-    ]  # fmt: skip
-
-
-def sensitivity_rows(document: Document) -> list[tuple[str, ...]]:
-    """One row a measured statement: its number's range over the changes, for SENSITIVITY_HEAD."""
-    return [
-        (
-            claim["where"],
-            claim["statement"],
-            number(claim["lowest"], claim["unit"], claim["none"]),
-            number(claim["highest"], claim["unit"], claim["none"]),
-            f"{claim['held_in']} of {claim['elsewhere']}",
-        )
-        for claim in measured(document)
-    ]
 
 
 def measured(document: Document) -> list[Document]:
@@ -134,22 +106,12 @@ def exceptions(document: Document) -> list[str]:
 
 def _said(missed: Document) -> str:
     """A statement that does not hold, and its number."""
-    statement, found = missed["statement"], number(missed["number"], missed["unit"], missed["none"])
-    return f"{missed['where']}, {statement[:1].lower()}{statement[1:-1]}: {found}"
+    statement = missed["statement"]
+    return f"{missed['where']}, {statement[:1].lower()}{statement[1:-1]}: {_found(missed)}"
 
 
-def gain_rows(document: Document) -> list[tuple[str, ...]]:
-    """One row an option, for GAINS_HEAD."""
-    return [
-        (row["key"], _value(row["default"]), row["says"], row["origin"],
-         *("; ".join(map(_said, row[how])) or "none" for how in ("halved", "doubled")))
-        for row in document["gains"]
-    ]  # fmt: skip
-
-
-def choice_rows(document: Document) -> list[tuple[str, ...]]:
-    """One row a choice, for CHOICES_HEAD."""
-    return [(choice["key"], _value(choice["value"]), choice["reason"]) for choice in document["choices"]]
+def _all_said(missed: list[Document]) -> str:
+    return "; ".join(map(_said, missed)) or "none"
 
 
 def _value(value: Any) -> str:
@@ -158,6 +120,25 @@ def _value(value: Any) -> str:
     if isinstance(value, list):
         return "; ".join(_value(part) for part in value) or "none"
     return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _changes(changes: Document) -> str:
+    return "; ".join(f"{key}: {_value(value)}" for key, value in changes.items())
+
+
+ABLATIONS = (
+    ("Taken out", "takes"), ("By", "changes", _changes), ("Statements that speak of it", "statements"),
+    ("Fail without it", "fail"),
+)  # fmt: skip
+RANGES = (  # a row a measured statement: its number's range over the changes
+    ("Published", "where"), ("Statement", "statement"), ("From", partial(_found, key="lowest")),
+    ("To", partial(_found, key="highest")), ("Held", "{held_in} of {elsewhere}".format_map),
+)  # fmt: skip
+CHOICES = (("Key", "key"), ("Value", "value", _value), ("Reason", "reason"))
+GAINS = (
+    ("Option", "key"), ("Default", "default", _value), ("What it is", "says"), ("Chosen by", "origin"),
+    ("Halved: no longer hold", "halved", _all_said), ("Doubled: no longer hold", "doubled", _all_said),
+)  # fmt: skip
 
 
 def headline(document: Document) -> str:
@@ -179,12 +160,11 @@ def headline(document: Document) -> str:
 
 def adaptation_sentence(document: Document) -> str:
     """What the adaptation of the isolation estimators changes."""
-    found = document["adaptation"]
     return (
         "Each isolation estimator adapts its estimate of the fault in flight. Without this adaptation "
-        f"(gain 0), the alarm, the named surface and the times stay the same in {found['same']} of "
-        f"{found['flights']} flights with a fault."
-    )
+        "(gain 0), the alarm, the named surface and the times stay the same in {same} of {flights} flights "
+        "with a fault."
+    ).format(**document["adaptation"])
 
 
 def summary(document: Document) -> str:
@@ -198,11 +178,9 @@ def summary(document: Document) -> str:
 def as_text(document: Document, folder: str, colour: bool = False) -> str:
     """The tables, what the sensitivity study says, and where the rest lies."""
     both, unjudged = document["beside"], Counter(c["reason"] for c in document["claims"] if c["reason"])
-    side_by_side = tables.plain("Side by side", beside.HEAD, beside.rows_of(both))
-    designs = tables.plain(
-        "Truth and design", truth_and_design.FLOWN_HEAD,
-        truth_and_design.flown_rows(document["truth_and_design"]),
-    )  # fmt: skip
+    side_by_side = tables.plain("Side by side", *tabulated(beside.COLUMNS, both["rows"]))
+    flown = tabulated(truth_and_design.FLOWN, document["truth_and_design"]["designs"])
+    designs = tables.plain("Truth and design", *flown)
     lines = [
         printed([_table(document)], WIDTH, colour), "", "Nothing to measure:",
         *(f"  {count:2} {reason}" for reason, count in unjudged.items()), "",
@@ -249,22 +227,21 @@ def _page(document: Document) -> list[page.Part]:
     return [
         _SAYS["introduction"], summary(document),
         page.Table(VERDICT_HEAD, verdict_rows(document), _GOOD),
-        _SAYS["ablations"], page.Table(ABLATION_HEAD, ablation_rows(document)),
+        _SAYS["ablations"], page.table(ABLATIONS, document["ablations"]),
         page.Heading("Beside ours"), _SAYS["beside"],
-        page.Table(beside.HEAD, beside.rows_of(both)), beside.alarms_sentence(both),
+        page.table(beside.COLUMNS, both["rows"]), beside.alarms_sentence(both),
         page.Bullets(beside.BETTER, beside.sentences(both) or ["nowhere"]),
         page.Heading("Truth and design"), _SAYS["truth"],
-        page.Table(truth_and_design.TERMS_HEAD, truth_and_design.term_rows(designs)), _SAYS["designs"],
-        page.Table(truth_and_design.FLOWN_HEAD, truth_and_design.flown_rows(designs)),
+        page.table(truth_and_design.TERMS, designs["terms"]), _SAYS["designs"],
+        page.table(truth_and_design.FLOWN, designs["designs"]),
         page.Heading("Figures"), _SAYS["figures"],
         page.Pictures([(view.title, view.name) for view, _, _ in FIGURES]),
         page.Heading("What the conclusions hang on"), _SAYS["sensitivity"],
         page.Pictures([(_SAYS["margins"], SENSITIVITY)]),
-        page.Table(SENSITIVITY_HEAD, sensitivity_rows(document)),
+        page.table(RANGES, measured(document)),
         *([page.Bullets("Where one does not:", missed)] if missed else []),
         f"The settings: {changes}.",
         page.Heading("What the paper leaves open"), _SAYS["gains"],
-        page.Table(GAINS_HEAD, gain_rows(document)),
-        _SAYS["choices"], page.Table(CHOICES_HEAD, choice_rows(document)),
+        page.table(GAINS, document["gains"]), _SAYS["choices"], page.table(CHOICES, document["choices"]),
         page.Bullets(_SAYS["deviations"], DEVIATIONS),
     ]  # fmt: skip

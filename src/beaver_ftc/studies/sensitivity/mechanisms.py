@@ -240,12 +240,9 @@ def reason_of(scenario: Scenario) -> Document:
     log = MemoryLog()
     fly(scenario, log)
     stated = required("proof", "mechanisms")(scenario, log).certificate["statements"]
-    return {"undeclared": beyond, "certified": any(_proves_alarm(statement) for statement in stated)}
-
-
-def _proves_alarm(statement: Mapping[str, Any]) -> bool:
-    """Whether a statement is that no healthy aircraft within the declaration gives these data."""
-    return statement["column"] == "detected" and "sides" in statement
+    # that no healthy aircraft within the declaration gives these data
+    certified = any(statement["column"] == "detected" and "sides" in statement for statement in stated)
+    return {"undeclared": beyond, "certified": certified}
 
 
 def margins_row(cell: tuple[str, str, str]) -> Document:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from beaver_ftc.results.model import Document
 from beaver_ftc.results.style import BLACK
 from beaver_ftc.studies.present.figures import GRID, SERIES, draw_estimates, label_edges, panels
-from beaver_ftc.studies.present.page import Heading, Part, Pictures, Table, study_files, versions_line
+from beaver_ftc.studies.present.page import Heading, Part, Pictures, Table, study_files, table, versions_line
 from beaver_ftc.studies.present.tables import estimate, grouped, number, or_never, percent
 from beaver_ftc.studies.sensitivity.systems import DEFAULT, PAPER
 
@@ -26,10 +26,6 @@ def page_of(document: Document) -> tuple[str, Sequence[Part]]:
 
 # Larger errors than declared.
 
-HEAD = (
-    "error", "declared", "times", "flights", "false alarms, %", "detected, %", "named rightly, %",
-    "named wrongly, %", "delay, s", "tracking RMS, deg/s", "bound used, %",
-)  # fmt: skip
 CAPTION = (
     "In brackets 95 % intervals. Delay, tracking and bound used are medians: of the flights in which the "
     "aircraft is lost the tracking error is infinite. The bound used is the part of the detection bound that "
@@ -42,7 +38,7 @@ SHOWN = {
 
 def _page_of_errors(document: Document) -> tuple[str, Sequence[Part]]:
     return f"Beyond what is declared: {document['scenario']}", [
-        *error_sentences(document), Table(HEAD, [cells(row) for row in document["rows"]]), CAPTION,
+        *error_sentences(document), table(COLUMNS, document["rows"]), CAPTION,
         Pictures([("False alarms, right names and tracking over the factor", NAME)]),
         versions_line(document["versions"]),
     ]  # fmt: skip
@@ -60,7 +56,7 @@ def error_sentences(document: Document) -> Iterator[str]:
 
 
 def _counts(row: Document) -> list[str]:
-    return [f"{row[name]['count']} of {row[name]['of']}" for name in ("false_alarm", "misnamed")]
+    return ["{count} of {of}".format(**row[name]) for name in ("false_alarm", "misnamed")]
 
 
 def _onset(rows: Sequence[Document]) -> str:
@@ -79,20 +75,29 @@ def _onset(rows: Sequence[Document]) -> str:
     )
 
 
-def cells(row: Document) -> tuple[str, ...]:
-    """One row for HEAD."""
-    shares = ("{} ({})".format(*estimate(row[name], partial(percent, unit=""))) for name in
-              ("false_alarm", "detected", "named", "misnamed"))  # fmt: skip
-    return (
-        row["error"], row["declared"], f"{row['factor']:g}", str(row["flights"]), *shares,
-        *(_interval(row[name]) for name in ("delay_s", "tracking_deg_s")),
-        _interval(row["bound_used"], lambda share: or_never(share and 100.0 * share)),
-    )  # fmt: skip
+_PERCENT = partial(percent, unit="")
+
+
+def _share(found: Document) -> str:
+    return "{} ({})".format(*estimate(found, _PERCENT))
 
 
 def _interval(found: Document, form: Callable[[Any], str] = or_never) -> str:
     value, limits = estimate(found, form)
     return value if found["value"] is None or found["low"] == found["high"] else f"{value} ({limits})"
+
+
+def _used(found: Document) -> str:
+    return _interval(found, lambda share: or_never(share and 100.0 * share))
+
+
+COLUMNS = (
+    ("error", "error"), ("declared", "declared"), ("times", "factor"), ("flights", "flights"),
+    ("false alarms, %", "false_alarm", _share), ("detected, %", "detected", _share),
+    ("named rightly, %", "named", _share), ("named wrongly, %", "misnamed", _share),
+    ("delay, s", "delay_s", _interval), ("tracking RMS, deg/s", "tracking_deg_s", _interval),
+    ("bound used, %", "bound_used", _used),
+)  # fmt: skip
 
 
 def draw_errors(document: Document) -> "Figure":
@@ -171,7 +176,7 @@ def mechanism_sentences(document: Document) -> Iterator[str]:
 
 def _label(row: Document) -> str:
     """A mechanism with its system."""
-    return f"{row['mechanism']} ({row['system']})"
+    return "{mechanism} ({system})".format(**row)
 
 
 def finding(row: Document) -> str:
@@ -193,7 +198,7 @@ def tables(document: Document) -> dict[str, Table]:
     systems = document["systems"]
     quantities = [("flights", [(str(row["flights"]), "") for row in systems.values()])]
     quantities += [
-        (words, [estimate(row[name], partial(percent, unit="")) for row in systems.values()])
+        (words, [estimate(row[name], _PERCENT) for row in systems.values()])
         for name, words in SYSTEM_SHARES.items()
     ]
     quantities += [("error, deg/s", [estimate(row["tracking_deg_s"]) for row in systems.values()])]
@@ -216,23 +221,8 @@ def tables(document: Document) -> dict[str, Table]:
              INTERVAL),
             _medians,
         ),
-        "alarms": Table(
-            ("system", "mechanisms", "false alarms", "with an undeclared error", "certified", "unexplained"),
-            [
-                (*_system_and_mechanisms(row["flown"]), str(row["count"]), str(row["undeclared"]),
-                 str(row["certified"]) if row["certifiable"] or not row["count"] else "-",
-                 str(row["unexplained"]) if row["worst_case"] else "-")
-                for row in document["false_alarms"]
-            ],
-        ),
-        "margins": Table(
-            ("system", "bandwidth", "instruments", "gain margin, dB", "phase margin, deg"),
-            [
-                (row["system"], row["bandwidth"], row["instruments"],
-                 *(number(row[key], none="none") for key in ("gain_margin_db", "phase_margin_deg")))
-                for row in document["margins"]
-            ],
-        ),
+        "alarms": table(ALARMS, document["false_alarms"]),
+        "margins": table(MARGINS, document["margins"]),
     }  # fmt: skip
 
 
@@ -267,11 +257,33 @@ def _medians(row: Document) -> Iterator[str]:
     yield from estimate(row["tracking_ratio"])
 
 
-def _system_and_mechanisms(flown: str) -> tuple[str, str]:
-    """Both of a key such as "published" or "without default: bank of poles"."""
+def _system(flown: str) -> str:
+    """Of a key such as "published" or "without default: bank of poles"."""
+    return flown.partition(": ")[0].rpartition(" ")[2]
+
+
+def _mechanisms(flown: str) -> str:
     first, _, rest = flown.partition(" ")
-    system, _, mechanism = rest.partition(": ")
-    return (system, f"{first} {mechanism}") if rest else (first, "all")
+    return f"{first} {rest.partition(': ')[2]}" if rest else "all"
+
+
+def _certified(row: Document) -> str:
+    return str(row["certified"]) if row["certifiable"] or not row["count"] else "-"
+
+
+def _unexplained(row: Document) -> str:
+    return str(row["unexplained"]) if row["worst_case"] else "-"
+
+
+ALARMS = (
+    ("system", "flown", _system), ("mechanisms", "flown", _mechanisms), ("false alarms", "count"),
+    ("with an undeclared error", "undeclared"), ("certified", _certified), ("unexplained", _unexplained),
+)  # fmt: skip
+MARGINS = (
+    ("system", "system"), ("bandwidth", "bandwidth"), ("instruments", "instruments"),
+    ("gain margin, dB", "gain_margin_db", partial(number, none="none")),
+    ("phase margin, deg", "phase_margin_deg", partial(number, none="none")),
+)  # fmt: skip
 
 
 def draw_mechanisms(document: Document) -> "Figure":

@@ -27,7 +27,7 @@ from beaver_ftc.scenario.sweeps import Sweep
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial
 from beaver_ftc.studies.engine.study import FlyRound, Study, run_study
 from beaver_ftc.studies.engine.workers import Case
-from beaver_ftc.studies.present.tables import finite, number
+from beaver_ftc.studies.present.tables import all_finite, number
 from beaver_ftc.studies.sweep.one_flight import scenario_of, warm_up
 from beaver_ftc.studies.sweep.sampling import Assignment, values_at
 from beaver_ftc.studies.sweep.store import identity_of
@@ -261,14 +261,14 @@ def run_rare(
 
 def _document(sweep: Sweep, expectation: str, chains: Chains, failed: int) -> Document:
     found = asdict(chains.estimate())
-    said = {key: finite(value) for key, value in found.items() if key != "plain"}
+    plain = all_finite(found.pop("plain"))
     likeliest = None
     if chains.design is not None:
         distance, run, point = chains.design
         likeliest = {"run": run, "distance": distance, "values": values_of(sweep, point.tolist())}
     return {
-        "sweep": sweep.name, "expectation": expectation, "confidence": CONFIDENCE, **said,
-        "plain": {key: finite(value) for key, value in found["plain"].items()},
+        "sweep": sweep.name, "expectation": expectation, "confidence": CONFIDENCE,
+        **all_finite(found), "plain": plain,
         "failed": failed, "likeliest": likeliest,
         "sweep_sha256": hashlib.sha256(repr(sweep.file).encode()).hexdigest(), "versions": dict(versions()),
     }  # fmt: skip
@@ -281,7 +281,7 @@ def as_text(document: Document) -> str:
     lines = [
         f"{document['sweep']}: {document['expectation']} not met",
         f"  probability  {said}, {_between(document)}, {document['flights']} flights",
-        f"  plain        {plain['events']} of {plain['of']} flights, {_between(plain)}",
+        "  plain        {events} of {of} flights, ".format(**plain) + _between(plain),
     ]
     if document["failed"]:
         lines.append(f"  not flown    {document['failed']} flights, counted as no event")
@@ -296,4 +296,4 @@ def as_text(document: Document) -> str:
 
 
 def _between(found: Document) -> str:
-    return f"95 % {found['low']:.2g} to {found['high']:.2g}"
+    return "95 % {low:.2g} to {high:.2g}".format(**found)

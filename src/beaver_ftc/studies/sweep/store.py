@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, Self
 
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
-from beaver_ftc.documents.files import read_json
 from beaver_ftc.results.writer import clear_disk_errors, refuse_foreign, sync
 from beaver_ftc.scenario.sweeps import Sweep
 from beaver_ftc.studies.engine import store as files
@@ -67,6 +66,7 @@ class Store:
         codec = RowsAsParquet(sweep)
         self.folder, self.schema = folder, codec.schema
         self.parts, self.results = Parts(folder / "parts", codec), folder / "results.parquet"
+        self._manifest = folder / "sweep.json"
         self._open = contextlib.ExitStack()
         self._compacted: pa.Table | None = None
 
@@ -99,8 +99,7 @@ class Store:
             if there is None or not resume:
                 self._clear()
             self.parts.folder.mkdir(exist_ok=True)
-            manifest = json.dumps(identity, indent=2).encode() + b"\n"
-            files.write_whole(self.folder / "sweep.json", manifest)
+            files.write_whole(self._manifest, json.dumps(identity, indent=2).encode() + b"\n")
             sync(self.folder.parent)
             files.remove_leftovers(self.folder)
 
@@ -143,18 +142,10 @@ class Store:
         with clear_disk_errors(self.folder):
             files.write_whole(self.folder / name, text.encode("utf-8"))
 
-    @property
-    def _manifest(self) -> Path:
-        return self.folder / "sweep.json"
-
     def _identity(self) -> Document | None:
         """Whose flights these are; None where no file says so, or it is damaged."""
-        try:
-            there = read_json(self._manifest)
-        except (OSError, ValueError):
-            return None
-        whole = isinstance(there, dict) and all(isinstance(there.get(key), dict) for key in _IDENTITY)
-        return there if whole else None
+        there = files.known(self._manifest) or {}
+        return there if all(isinstance(there.get(key), dict) for key in _IDENTITY) else None
 
     def _set_all_aside(self, resume: bool) -> None:
         """Rename all that is there, since nothing says whose it is; BadInput unless the sweep is resumed."""

@@ -65,17 +65,17 @@ def number(value: float) -> float | None:
 
 def rate(hits: np.ndarray, of: np.ndarray) -> Document:
     """How many of a group are hits, with Wilson's interval."""
-    count, trials = int((hits & of).sum()), int(of.sum())
+    count, trials = _counts(hits, of)
     return {"count": count, "of": trials, **_estimate("rate", wilson(count, trials))}
 
 
+def _counts(hits: np.ndarray, of: np.ndarray) -> tuple[int, int]:
+    return int((hits & of).sum()), int(of.sum())
+
+
 def _estimate(name: str, found: Estimate) -> Document:
-    return {
-        name: number(found.value),
-        "low": number(found.low),
-        "high": number(found.high),
-        "confidence": CONFIDENCE,
-    }
+    value, low, high = map(number, vars(found).values())
+    return {name: value, "low": low, "high": high, "confidence": CONFIDENCE}
 
 
 def quantiles(values: np.ndarray) -> Document:
@@ -241,8 +241,7 @@ def estimate_of(flights: Flights, name: str, level: Level) -> tuple[int, float, 
         found = quantile(ordered, level.quantile)
         return ordered.size, found, partial(statistics.quantile_bound, ordered, level.quantile)
     if name in _RATES:
-        hits, of = _RATES[name](flights)
-        count, trials = int((hits & of).sum()), int(of.sum())
+        count, trials = _counts(*_RATES[name](flights))
         return trials, wilson(count, trials).value, partial(statistics.wilson_bound, count, trials)
     count, hours = flights.false_alarms
     told = int(flights.measured.sum()) if hours > 0 else 0

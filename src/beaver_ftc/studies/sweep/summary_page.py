@@ -10,8 +10,17 @@ from typing import TYPE_CHECKING, Any
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.results.metrics import NEAR_THRESHOLD_SHARE
 from beaver_ftc.results.model import Document, Expectation, Judged
-from beaver_ftc.studies.present.page import Heading, Links, Part, Pictures, Table, as_html, versions_line
-from beaver_ftc.studies.present.tables import Rows, number, printed
+from beaver_ftc.studies.present.page import (
+    Heading,
+    Links,
+    Part,
+    Pictures,
+    Table,
+    as_html,
+    drawn_in,
+    versions_line,
+)
+from beaver_ftc.studies.present.tables import Rows, number, printed, tabulated
 from beaver_ftc.studies.sweep.pictures import FIGURES
 from beaver_ftc.studies.sweep.summary import OUTCOMES
 
@@ -100,6 +109,10 @@ def value(of: Any) -> str:
     return number(of, none="none")
 
 
+def _seconds(of: float | None) -> str:
+    return number(of, "s", "never")
+
+
 def percent(share: float | None) -> str:
     """A share in percent, with the digits that matter near 0 and 1."""
     if share is None:
@@ -154,17 +167,14 @@ def _search(summary: Document) -> str:
 def _rate(rate: Document, what: str) -> str:
     if not rate["of"]:
         return ""
-    return (
-        f"{percent(rate['rate'])} ({percent(rate['low'])} to {percent(rate['high'])}): "
-        f"{rate['count']} of {rate['of']} {what}"
-    )
+    return f"{percent(rate['rate'])} ({_interval(rate)}): {rate['count']} of {rate['of']} {what}"
 
 
 def _quantiles(delays: Document) -> str:
     if not delays["of"]:
         return ""
     quantiles = {"median": "median", "p95": "95 %", "p99": "99 %", "max": "max"}
-    return ", ".join(f"{says} {number(delays[name], 's', 'never')}" for name, says in quantiles.items())
+    return ", ".join(f"{says} {_seconds(delays[name])}" for name, says in quantiles.items())
 
 
 def _false_alarms(found: Document) -> str:
@@ -193,15 +203,15 @@ def _inconclusive(found: Document) -> str:
     if not found["count"]:
         return ""
     return (
-        f"in {found['count']} of {found['of']} flights the diagnosis could conclude nothing for part or all "
-        "of the time (detection.inconclusive.share); the verdict of a kept flight states the reason"
-    )
+        "in {count} of {of} flights the diagnosis could conclude nothing for part or all of the time "
+        "(detection.inconclusive.share); the verdict of a kept flight states the reason"
+    ).format(**found)
 
 
 def _guarantee(found: Document) -> str:
     if not found["promised"]:
         return ""
-    return f"{found['broken']} of {found['promised']} faults detected later than guaranteed"
+    return "{broken} of {promised} faults detected later than guaranteed".format(**found)
 
 
 def _drivers(ranking: list[Document]) -> str:
@@ -213,38 +223,32 @@ def _drivers(ranking: list[Document]) -> str:
 
 def render(summary: Document, folder: Path) -> str:
     """The report as HTML text, from the summary and the figures and flights in the sweep's folder."""
-    drawn = {name: folder / "figures" / f"{name}.png" for name in FIGURES}
-    figures = {name: path for name, path in drawn.items() if path.exists()}
+    figures = drawn_in(folder, FIGURES)
     return as_html(title(summary), _parts(summary, folder, figures), figures)
 
 
 def _parts(summary: Document, folder: Path, figures: Mapping[str, Path]) -> list[Part]:
     expected = [("✓ met" if passed else "✗ MISSED", *row) for *row, passed in expectations(summary)]
-    worst = [(str(each["run"]), "; ".join(each["why"]), each["replay"]) for each in summary["worst"]]
     again = [(each["name"], link) for each in summary["worst"] if (link := _link(folder, each["name"]))]
-    failed = [(str(each["count"]), each["reason"], str(each["first_run"])) for each in summary["reasons"]]
     explained = [
-        (
-            OUTCOMES[outcome],
-            *(value(each[key]) for key in ("key", "explained", "rank_correlation", "p_value")),
-        )
+        each | {"outcome": OUTCOMES[outcome]}
         for outcome, ranking in summary["sensitivity"].items()
         for each in ranking
     ]
-    flown = f"{summary['flights']} flights, sampling {summary['sampling']}, seed {summary['seed']}"
+    flown = "{flights} flights, sampling {sampling}, seed {seed}".format(**summary)
     return [
         summary["description"],
         _STEERED if "search" in summary else "",
         *_section("What the flights show", ("", ""), facts(summary)),
         *_section("Expectations", ("", "of", "expected", "found"), expected),
         *_section("Tracking error, median RMS in deg/s", ("", *AXES), tracking(summary)),
-        *_section("By fault", _BY_FAULT, [_of_fault(each) for each in summary["by_fault"]]),
+        *_section("By fault", *tabulated(BY_FAULT, summary["by_fault"])),
         Heading("Figures"),
         Pictures([(FIGURES[name][0], name) for name in figures]),
-        *_section("Flights worth a look", ("flight", "why", "flies it again"), worst),
+        *_section("Flights worth a look", *tabulated(WORST, summary["worst"])),
         Links("Flights that have been flown again: ", again) if again else "",
-        *_section("Flights that could not be flown", ("flights", "why", "first"), failed),
-        *_section("Sensitivity", ("outcome", "key", "explained", "correlation", "p"), explained),
+        *_section("Flights that could not be flown", *tabulated(FAILED, summary["reasons"])),
+        *_section("Sensitivity", *tabulated(EXPLAINED, explained)),
         _EXPLAINED if explained else "",
         f"{flown}; {versions_line(summary['versions'])}",
     ]
@@ -255,18 +259,23 @@ def _section(title: str, head: Sequence[str], rows: Rows) -> list[Part]:
     return [Heading(title), Table(head, rows)] if rows else []
 
 
-_OF_KEY = ("key", "explained", "rank_correlation", "p_value")
-_BY_FAULT = (
-    "fault", "flights", "detected", "95 % interval", "delay: median", "95 %", "max", "named rightly",
-    "95 % interval", "named wrongly",
+def _interval(rate: Document) -> str:
+    return f"{percent(rate['low'])} to {percent(rate['high'])}"
+
+
+BY_FAULT = (
+    ("fault", "fault"), ("flights", "flights"), ("detected", "detection.rate", percent),
+    ("95 % interval", "detection", _interval), ("delay: median", "detection.delay_s.median", _seconds),
+    ("95 %", "detection.delay_s.p95", _seconds), ("max", "detection.delay_s.max", _seconds),
+    ("named rightly", "isolation.rate", percent), ("95 % interval", "isolation", _interval),
+    ("named wrongly", "isolation.wrong.count"),
 )  # fmt: skip
-
-
-def _of_fault(fault: Document) -> tuple[str, ...]:
-    d, i = fault["detection"], fault["isolation"]
-    delays = (number(d["delay_s"][which], "s", "never") for which in ("median", "p95", "max"))
-    rates = [(percent(of["rate"]), f"{percent(of['low'])} to {percent(of['high'])}") for of in (d, i)]
-    return fault["fault"], str(fault["flights"]), *rates[0], *delays, *rates[1], str(i["wrong"]["count"])
+WORST = (("flight", "run"), ("why", "why", "; ".join), ("flies it again", "replay"))
+EXPLAINED = (
+    ("outcome", "outcome"), ("key", "key"), ("explained", "explained", value),
+    ("correlation", "rank_correlation", value), ("p", "p_value", value),
+)  # fmt: skip
+FAILED = (("flights", "count"), ("why", "reason"), ("first", "first_run"))
 
 
 def _link(folder: Path, name: str) -> str | None:

@@ -194,10 +194,8 @@ class LikelihoodRatio:
         bounds = its.get("bounded", none), its.get("foreseen", none)
         columns, jitter, bounded, foreseen = map(_on_two_axes, (*of_axes, *bounds))
         keep, pace = its.get("keep", np.ones(count)), its.get("pace", np.full(count, NO_PACE))
-        block = new_filter_block(self.P, self.R)
-        add_whitened_frames(
-            block, columns, drift, jitter, bounded, foreseen, keep, pace, states, sums, room, self.dt
-        )
+        of_frames = map(np.ascontiguousarray, (columns, drift, jitter, bounded, foreseen, keep, pace))
+        add_whitened_frames(new_filter_block(self.P, self.R), *of_frames, states, sums, room, self.dt)
         swings, changes, last, stays, calm = room.tolist()
         return sums, calm, min(stays + swings + last, stays + changes)
 

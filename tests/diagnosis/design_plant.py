@@ -9,10 +9,11 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.model import N_Y
-from beaver_ftc.diagnosis.bounds import ROUNDING_RAD_S2, fill_bound
+from beaver_ftc.diagnosis.bounds import ROUNDING_RAD_S2
 from beaver_ftc.diagnosis.detection.filters import keep_bank_peak
-from beaver_ftc.diagnosis.model_prediction import evaluate_design, evaluate_frame
+from beaver_ftc.diagnosis.model_prediction import evaluate_design
 from beaver_ftc.loop.assembly import configure_design
+from beaver_ftc.loop.frame import evaluate_elapsed
 from beaver_ftc.loop.stepping import diagnose
 from beaver_ftc.scenario.schema import Scenario
 
@@ -21,18 +22,11 @@ SURFACES = ("aileron", "elevator", "rudder")
 
 
 @kernel
-def evaluate_prediction(frames):
-    """What the design model makes of this instant."""
+def evaluate(frames):
+    """What the design model makes of this instant, and of the frame that ends with it."""
     frame = frames[0]
     evaluate_design(frame.prediction, frame.measured)
-    fill_bound(frame.fdi.bound, frame.prediction.design, frame.measured, frame.prediction.u)
-
-
-@kernel
-def evaluate(frames):
-    """What the design model makes of the frame that ends at this instant."""
-    frame = frames[0]
-    evaluate_frame(frame.prediction, frame.fdi.bound, frame.measured, frame.k, frame.dt)
+    evaluate_elapsed(frame)
 
 
 @kernel
@@ -43,7 +37,6 @@ def note(frames):
 
 def conclude(frames):
     """The flying diagnosis of this instant: compiled once, for all who call it from Python."""
-    evaluate(frames)
     diagnose(frames)
     note(frames)
 
@@ -130,7 +123,7 @@ class DesignPlant:
         measured, prediction = frame["measured"], frame["prediction"]
         measured["x"], measured["y"], prediction["u"] = self.x, self.condition(), self.u
         prediction["commanded"] = self.commanded
-        evaluate_prediction(self.frames)
+        evaluate(self.frames)
         f, G = prediction["f"].copy(), prediction["G"].copy()
         phi = self.effect(G)
         frame["accounts"]["guarantee"]["phi"] = phi

@@ -115,21 +115,15 @@ def filter_all(block, innovations, dt, out):
         likelihood.whiten_step(block, block.state, block.nu, dt, out[k])
 
 
-@kernel
-def weigh_all(block, innovations, signatures, regressors, first, keep, dt):
-    """Show a block frames `first` onwards: innovations (k, n), signatures (k, h, 2), regressors (k, j, 2)."""
+def weigh_all(block, innovations, signatures, regressors, dt):
+    """Show a block innovations (k, n), signatures (k, h, n) and regressors (k, j, n), as a flight does."""
+    n, n_h, n_Z = int(block["n"]), int(block["n_h"]), int(block["n_Z"])
     for k in range(len(innovations)):
-        if keep == 1.0:
-            likelihood.reset_slot(block, likelihood.restarting_slot(first + k))
-        likelihood.advance_covariance(block, dt)
-        block.nu[: block.n] = innovations[k]
-        likelihood.whiten_step(block, block.state, block.nu, dt, block.g)
-        for j in range(block.n_Z):
-            likelihood.whiten_step(block, block.x_Z[j], regressors[k, j], dt, block.g_Z[j])
-        for h in range(block.n_h):
-            block.hypothesis[h].signature[:] = signatures[k, h]
-        likelihood.accumulate_evidence(block, dt, keep)
-        likelihood.evaluate_hypotheses(block)
+        likelihood.reset_slot(block, likelihood.restarting_slot(k))
+        block["nu"][:n] = innovations[k]
+        block["regressor"][:n_Z, :n] = regressors[k]
+        block["hypothesis"]["signature"][:n_h, :n] = signatures[k]
+        likelihood.update_block(block, dt, 1.0)
 
 
 @kernel

@@ -277,6 +277,8 @@ def found(in_a_copy):
     texts = {"flights": SCENARIO, "known": KNOWN}
     if "beaver_ftc_live" in PACKAGES:
         texts["page"] = PAGE
+    if "beaver_ftc_assurance" in PACKAGES:
+        texts["certified"] = CERTIFIED
     return dict(zip(texts, map(json.loads, in_a_copy(*texts.values())), strict=True))
 
 
@@ -341,9 +343,9 @@ def test_the_live_page_knows_it(found):
 
 
 @pytest.fixture(scope="module")
-def certified(in_a_copy):
+def certified(found):
     """Certificate, log and text of the scenario of a flight in which the new type is excluded."""
-    certificate, log, scenario = json.loads(*in_a_copy(CERTIFIED))
+    certificate, log, scenario = found["certified"]
     return certificate, {name: np.array(column) for name, column in log.items()}, scenario
 
 

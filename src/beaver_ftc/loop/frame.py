@@ -377,9 +377,9 @@ def reset_surface_diagnosis(fdi):
     filters.reset_network(fdi.fdae.network)
 
 
-@kernel
+@apart
 def sense(frame):
-    """Measure, and see what the design model makes of this instant. Returns the flight's status."""
+    """Measure, and see what the design model makes of this instant. frame.departed: the flight's status."""
     truth, prediction, measured = frame.truth, frame.prediction, frame.measured
     measure(truth, frame.instruments, measured)
     if frame.fdi.sensor_monitor.config.enabled:
@@ -388,7 +388,7 @@ def sense(frame):
     if status != NOT_FINITE:
         evaluate_design(prediction, measured)
         effect_of_faults(frame.accounts.guarantee, truth, prediction, measured.y)
-    return status
+    frame.departed = status
 
 
 @kernel
@@ -403,14 +403,19 @@ def advance_clock(frame):
     frame.k += 1
 
 
+@apart
+def evaluate_elapsed(frame):
+    """See what the design model makes of the elapsed frame."""
+    evaluate_frame(frame.prediction, frame.fdi.bound, frame.measured, frame.k, frame.dt)
+
+
 @kernel
 def begin(frame):
-    """Measure, and see what the design model makes of the elapsed frame. Returns the flight's status."""
+    """Measure, and evaluate the elapsed frame. frame.departed: see `sense`."""
     start_clock(frame)
-    status = sense(frame)
-    if status != NOT_FINITE:
-        evaluate_frame(frame.prediction, frame.fdi.bound, frame.measured, frame.k, frame.dt)
-    return status
+    sense(frame)
+    if frame.departed != NOT_FINITE:
+        evaluate_elapsed(frame)
 
 
 @kernel
@@ -452,7 +457,7 @@ def assess_faults(frame):
     assess_unknown(assessment, config, found, types, layout, detector, fdi.fdae, fdi.bound)
 
 
-@kernel
+@apart
 def accumulate_instant(frame):
     """Take in an instant inside a frame: what is believed of it, and the gust that the vanes see by then."""
     fdi = frame.fdi
@@ -598,7 +603,7 @@ def record_row(frame, commanded, row):
         row[row.size - n :] = detector.alarm.share[:n]
 
 
-@kernel
+@apart
 def finish(frame, commanded, row):
     """Account, record and hand the command over; the reference model moves on. commanded (3,) rad/s."""
     control, prediction = frame.control, frame.prediction

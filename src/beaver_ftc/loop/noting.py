@@ -11,7 +11,7 @@ from beaver_ftc.diagnosis import Measured
 from beaver_ftc.loop import frame as whole
 from beaver_ftc.loop.assembly import y_places
 from beaver_ftc.loop.loop import Loop
-from beaver_ftc.loop.stepping import detection_share
+from beaver_ftc.loop.stepping import detection_share, diagnose_one
 from beaver_ftc.plant.sensing import NOT_FINITE
 
 
@@ -23,9 +23,9 @@ def fly_and_note(frames, references, log, notes):
     """
     frame = frames[0]
     row = row_of(notes, frame.k)
-    status = whole.begin(frame)
-    if status == NOT_FINITE:
-        return status
+    whole.begin(frame)
+    if frame.departed == NOT_FINITE:
+        return frame.departed
     row[0] = frame.t
     at = put(row, 1, frame.measured.x)
     for i in range(4 + frame.truth.declared):
@@ -38,7 +38,7 @@ def fly_and_note(frames, references, log, notes):
     at = put(row, at, frame.measured.force)
     row[at] = frame.measured.altitude
     at = put(row, at + 1, frame.prediction.u)
-    whole.diagnose(frame)
+    diagnose_one(frame)
     whole.decide(frame)
     whole.command(frame)
     whole.finish(frame, row_of(references, frame.row), row_of(log, frame.row))
@@ -46,7 +46,7 @@ def fly_and_note(frames, references, log, notes):
     at = put(row, at, error_map.e_now)
     row[at] = not error_map.outside
     row[at + 1] = detection_share(frames)
-    return status
+    return frame.departed
 
 
 @kernel

@@ -32,14 +32,22 @@ from beaver_ftc.plant.sensing import FLYING, NOT_FINITE, hand_over
 
 @kernel
 def begin(frames):
-    """See frame.py, as of all stages down to `finish`."""
-    return whole.begin(frames[0])
+    """See frame.py, as of all stages down to `finish`. Returns the flight's status."""
+    frame = frames[0]
+    whole.begin(frame)
+    return frame.departed
 
 
 @kernel
 def diagnose(frames):
     """The diagnosis alone."""
-    whole.diagnose(frames[0])
+    diagnose_one(frames[0])
+
+
+@apart
+def diagnose_one(frame):
+    """See frame.py. By itself, as `fly_one`."""
+    whole.diagnose(frame)
 
 
 @kernel
@@ -92,7 +100,8 @@ def sense_inside(frames):
     A departure, or what is not finite, is left for `fly_frame` to find.
     """
     frame = frames[0]
-    if whole.sense(frame) != NOT_FINITE:
+    whole.sense(frame)
+    if frame.departed != NOT_FINITE:
         whole.accumulate_instant(frame)
         add_effect(frame.accounts.guarantee)
 
@@ -103,9 +112,9 @@ def fly_one(frame, commanded, row):
 
     commanded (3,) rad/s, row (columns,) of the log: rows, which nobody counts the users of.
     """
-    frame.departed = whole.begin(frame)
+    whole.begin(frame)
     if frame.departed != NOT_FINITE:
-        whole.diagnose(frame)
+        diagnose_one(frame)
         whole.decide(frame)
         whole.command(frame)
         whole.finish(frame, commanded, row)
@@ -158,9 +167,9 @@ def kernels_flown(frames: np.ndarray, arrays: tuple[np.ndarray, ...]) -> Iterato
     from beaver_ftc.compiled.target import array_type  # there is none in every version of Numba
 
     frame = frames[0]
-    yield Wanted.of(fly_one, _kinds(fly_one, frame))
     yield Wanted.of(fly_on, tuple(array_type(each.dtype, each.ndim) for each in (frames, *arrays)))
-    wanted = (*_of_the_diagnosis(frame), *_of_the_law(frame))
+    stages = (fly_one, whole.sense, whole.evaluate_elapsed, diagnose_one, whole.finish)
+    wanted = (*stages, *_of_the_diagnosis(frame), *_of_the_law(frame))
     for each in sorted(wanted, key=lambda wanted: -wanted.called.size):
         yield Wanted.of(each, _kinds(each, frame))
 

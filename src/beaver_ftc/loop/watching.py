@@ -7,12 +7,8 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.conclusion import isolated_surface
-from beaver_ftc.diagnosis.model_prediction import (
-    evaluate_design,
-    evaluate_frame,
-    move_surfaces,
-)
-from beaver_ftc.loop.frame import accommodate, advance_clock, isolated_theta, start_clock
+from beaver_ftc.diagnosis.model_prediction import evaluate_design, move_surfaces
+from beaver_ftc.loop.frame import accommodate, advance_clock, evaluate_elapsed, isolated_theta, start_clock
 from beaver_ftc.plant.instruments import take_sample
 
 MEMORY = 8 + 5 * 8  # of the verdict's words: `news`
@@ -34,7 +30,7 @@ def take(frames, x, y, command, attitude):
         move_surfaces(prediction, command)
     take_sample(measured, x, y, attitude)
     evaluate_design(prediction, measured)
-    evaluate_frame(prediction, frame.fdi.bound, measured, frame.k, frame.dt)
+    evaluate_elapsed(frame)
     return True
 
 

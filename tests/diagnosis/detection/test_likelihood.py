@@ -25,18 +25,6 @@ def _block(case, *kinds, tolerance=()):
     return with_hypotheses(block_of(drift, noise, jitter=0.05, keep=kept), *kinds, tolerance=tolerance)
 
 
-def _shown(block, nu, signatures, regressors=None, first=0, keep=1.0):
-    """Show a block innovations (k, n), with signatures (k, h, n) and regressors (k, j, n)."""
-    frames, n = nu.shape
-    wide = np.zeros((frames, signatures.shape[1], 2))
-    wide[:, :, :n] = signatures
-    known = np.zeros((frames, int(block["n_Z"]), 2))
-    if regressors is not None:
-        known[:, :, :n] = regressors
-    weigh_all(block, nu, wide, known, first, keep, DT)
-    return block
-
-
 def _onsets(frames):
     """By slot, the frame at which it last began anew: slot j at odd multiples of 2^j."""
     starts = {}
@@ -55,7 +43,7 @@ def test_evidence_and_information_of_every_onset_are_those_of_least_squares(case
     inverse = np.linalg.inv(covariance(block, frames, DT))
     signatures, regressors = rng.normal(size=(frames, 2, n)), rng.normal(size=(frames, 3, n))
     nu = drawn(block, frames, DT, rng, start=1.0)
-    _shown(block, nu, signatures, regressors)
+    weigh_all(block, nu, signatures, regressors, DT)
     for slot, onset in _onsets(frames).items():
         for h in range(2):
             s = np.where(np.arange(frames)[:, None] >= onset, signatures[:, h], 0.0).ravel()

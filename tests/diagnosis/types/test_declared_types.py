@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from design_plant import DesignPlant, conclude, evaluate_prediction
+from design_plant import DesignPlant, conclude, evaluate
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from test_fault_types import TYPES, shares, starts, surfaces
@@ -39,7 +39,7 @@ class RealPlant(DesignPlant):
         prediction, y = frame["prediction"], self.condition()
         frame["measured"]["x"], frame["measured"]["y"] = seen, y
         prediction["u"], prediction["commanded"] = self.u, self.commanded
-        evaluate_prediction(self.frames)
+        evaluate(self.frames)
         f, G, true_f, true_G = prediction["f"].copy(), prediction["G"].copy(), np.zeros(3), np.zeros((3, 4))
         both_responses(self.truth, self.x, y, true_f, true_G)
         conclude(self.frames)

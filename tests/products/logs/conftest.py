@@ -1,10 +1,12 @@
 """What the tests of recorded flights share: a synthetic vehicle, and the real flights if there are any."""
 
 import os
+import pickle
 import warnings
 from pathlib import Path
 
 import pytest
+from filelock import FileLock
 
 from beaver_ftc_logs.identification import identify
 from beaver_ftc_logs.samples import load_flights_for_fit
@@ -57,5 +59,11 @@ def sampled(wing, wing_folder):
 
 
 @pytest.fixture(scope="session")
-def wing_model(sampled, wing):
-    return identify([sampled(400.0, parts=((150, 220, 1.0, 0.5), (300, 340, 0.4, 1.0)), seed=5)], wing)
+def wing_model(sampled, wing, tmp_path_factory, testrun_uid):
+    """Identified by the worker that asks first."""
+    kept = tmp_path_factory.getbasetemp().parent / f"wing-{testrun_uid}.pickle"
+    with FileLock(kept.with_suffix(".lock")):
+        if not kept.exists():
+            flight = sampled(400.0, parts=((150, 220, 1.0, 0.5), (300, 340, 0.4, 1.0)), seed=5)
+            kept.write_bytes(pickle.dumps(identify([flight], wing)))
+    return pickle.loads(kept.read_bytes())

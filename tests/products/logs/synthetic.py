@@ -42,22 +42,20 @@ def fly(duration_s=240.0, parts=(), seed=1, trim=(0.1, -0.2), gain=1.0):
         effectiveness[(t_s >= begin) & (t_s < end)] = values
     commands = np.array(trim) + _wander(rng, n, 0.06)
     surfaces = np.column_stack([commands.sum(axis=1) / 2, (commands[:, 0] - commands[:, 1]) / 2])
+    moved = [surfaces[2 - j : n - 1 - j] * effectiveness[3:] for j in range(3)]
+    driven = gain * sum(moved[j][:, :1] * RIGHT[j] + moved[j][:, 1:] * LEFT[j] for j in range(3))
+    noise = NOISE * rng.standard_normal((n - 3, 3))
     rates = np.zeros((n, 3))
     for k in range(3, n):
-        driven = gain * sum(
-            effectiveness[k, 0] * surfaces[k - j - 1, 0] * RIGHT[j]
-            + effectiveness[k, 1] * surfaces[k - j - 1, 1] * LEFT[j]
-            for j in range(3)
-        )
-        rates[k] = TRIM + rates[k - 1] @ PAST + driven + NOISE * rng.standard_normal(3)
+        rates[k] = TRIM + rates[k - 1] @ PAST + driven[k - 3] + noise[k - 3]
     return dict(zip(COLUMNS, np.column_stack([t_s, rates, commands, effectiveness]).T, strict=True))
 
 
 def _wander(rng, n, sd):
     """Commands that wander with a time constant of half a second, (n, 2)."""
-    values = np.zeros((n, 2))
+    values, steps = np.zeros((n, 2)), 0.6 * sd * rng.standard_normal((n - 1, 2))
     for k in range(1, n):
-        values[k] = 0.8 * values[k - 1] + 0.6 * sd * rng.standard_normal(2)
+        values[k] = 0.8 * values[k - 1] + steps[k - 1]
     return values
 
 

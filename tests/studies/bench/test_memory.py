@@ -16,7 +16,7 @@ from beaver_ftc.scenario.schema import Scenario
 def peak_mb():  # of this program alone: getrusage would count the process that started it as well
     return int(re.search(r"VmHWM:\\s+(\\d+) kB", Path("/proc/self/status").read_text())[1]) / 1024
 peaks = []
-for duration_s in (40, 160):
+for duration_s in (20, 80):
     with tempfile.TemporaryDirectory() as folder, ParquetLog(Path(folder) / "log.parquet") as log:
         flight = fly(Scenario(name="long", duration_s=duration_s, rate_hz=1000), log)
     peaks.append([flight.frames, peak_mb()])

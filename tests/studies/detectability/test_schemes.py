@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from beaver_ftc.diagnosis.informed_test import detection_probability
@@ -36,6 +36,7 @@ from beaver_ftc.studies.detectability.schemes import (
 )
 from beaver_ftc.studies.detectability.shown import comparison, page_of
 from beaver_ftc.studies.present.page import Table
+from samples import samples
 
 STILL, LIGHT = Condition("ideal", "none"), Condition("tactical-grade", "light")
 SMALL = replace(
@@ -79,6 +80,7 @@ class TestFlights:
             assert not seeds & {block.seed for block in grid.healthy()}
             assert {block.excitation_deg_s for block in grid.healthy()} == set(grid.excitations_deg_s)
 
+    @settings(max_examples=samples(40))
     @given(st.integers(0, 2_000_000), st.sampled_from([1.0, 3.0, 6.0]))
     def test_the_truth_stays_within_what_is_declared(self, seed, excitation):
         scenario = scenario_of(Block(LIGHT, excitation, seed), 12.0)

@@ -307,7 +307,7 @@ def _published(document: Document) -> str:
         for of in [[row for row in rows if row["error"] == name]]
     ]
     caption = (
-        f"*Table 5. Verdicts of `{document['scenario']}`. First row: all errors as declared. Other "
+        f"*Table 6. Verdicts of `{document['scenario']}`. First row: all errors as declared. Other "
         'rows: the smallest size with a wrong verdict. "times": this size, divided by the declared size or '
         f"by the unit. Last columns: numbers of flights, of {document['flights']} a row.*"
     )

@@ -174,7 +174,8 @@ class Innovations:
 
     @property
     def log_size(self) -> float:
-        """Logarithm of the size of the noise of a sample before it was whitened, log det(R)^1/2."""
+        """Logarithm of the size of a sample's noise before it was whitened, log det(R)^1/2 - 3 log sum a; a:
+        weights of its moving average."""
         return 0.5 * float(np.linalg.slogdet(self.R)[1]) - 3.0 * float(np.log(sum(self.noise.average)))
 
     def residual_runs(self) -> list[Floats]:

@@ -88,7 +88,7 @@ def _markdown(part: Part, figures: str) -> Iterator[str]:
 
 
 def as_text(parts: Sequence[Part]) -> str:
-    """The parts as lines for a terminal, without pictures."""
+    """The parts as lines for a terminal, without pictures or links."""
     lines: list[str] = []
     for part in parts:
         match part:

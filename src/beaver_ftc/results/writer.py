@@ -73,7 +73,6 @@ def run(
     or kept, NotAllWritten where the log is kept but another file could not be written.
     """
     from beaver_ftc.loop.loop import fly
-    from beaver_ftc.results.exports import write_acmi, write_csv, write_recording
 
     certificate = required("certificate", "certified")(scenario) if certified else None
     watch = certificate.watch if certificate else None
@@ -94,12 +93,18 @@ def run(
             with _note_failure_and_go_on(folder, "report.html", failed):
                 write_report_files(folder, document, painters=painters, formats=figures)
         if "csv" in exports:
+            from beaver_ftc.results.exports import write_csv
+
             with _note_failure_and_go_on(folder, "log.csv", failed):
                 write_csv(log_path, folder / "log.csv")
         if "acmi" in exports and document:
+            from beaver_ftc.results.exports import write_acmi
+
             with _note_failure_and_go_on(folder, "flight.acmi", failed):
                 write_acmi(log_path, Metrics.of(document), folder / "flight.acmi", aircraft)
         if recording is not None:
+            from beaver_ftc.results.exports import write_recording
+
             stops_rad = {s: max(abs(to.min_rad), abs(to.max_rad)) for s, to in aircraft.travel.items()}
             with _note_failure_and_go_on(folder, f"the recording ({recording})", failed):
                 write_recording(log_path, stops_rad, recording, folder, tuple(aircraft.signals))

@@ -251,9 +251,7 @@ def _scheme(rows: Sequence[Row]) -> Document:
     n = len(rows)
     counts = {promise: sum(row[broken] for row in rows) for promise, broken in _BROKEN.items()}
     certain = [row for row in rows if row["guaranteed_s"] is not None]
-    ratios = [  # None of a fault that is never detected
-        row["delay_s"] and row["delay_s"] / row["guaranteed_s"] for row in certain if row["guaranteed_s"]
-    ]
+    ratios = [row["delay_s"] / row["guaranteed_s"] for row in certain if row["delay_s"]]
     errors = [row["estimate_error"] for row in rows if row["estimate_error"] is not None]
     return {
         **counts,

@@ -29,8 +29,7 @@ _OFFSET_SHARE = 0.05
 _SILENT_SHARE = 0.02
 _PAIR_LEVELS = (0.25, 0.5, 0.75)
 _PRIOR_HEALTHY, _PRIOR_NO_RESPONSE = 0.7, 0.2
-_MAX_SQUARE = 30.0
-"""For a whitened flight: the predictor needs a fraction of a second to adapt to a fault."""
+_MAX_SQUARE = 30.0  # of a whitened flight: the predictor needs a fraction of a second to adapt to a fault
 
 
 HypothesisRow = tuple[Floats, int, float, Floats]

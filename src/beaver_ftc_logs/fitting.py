@@ -238,8 +238,8 @@ def fit_order(parts: Parts, vehicle: Vehicle, h: int, L: int) -> regression.Regr
 
 
 def stack_data(parts: Parts, vehicle: Vehicle, h: int, L: int) -> tuple[Floats, Floats, Ints]:
-    """Regressors, rates and run number over all flights; the same first samples are left
-    out for any order.
+    """Regressors, rates and run number over all flights; the same first samples are left out
+    for any order.
 
     Columns of the regressors: one, the past, the commands of each group by lag.
     """

@@ -78,10 +78,9 @@ def take_over(new: np.void, before: np.void, learnt: np.ndarray) -> None:
     told = before["config"]["informed"] and not new["config"]["informed"]
     for stage, part in KEPT if told else (*KEPT, KNOWN):
         new[stage][part] = before[stage][part]
-    law, next_law = in_charge(before), in_charge(new)
-    unexplained = law.unexplained(before) if law.unexplained else before["surfaces"]["output"]["unknown"]
-    if told:
-        unexplained = np.zeros(3)
+    law, next_law, unexplained = in_charge(before), in_charge(new), np.zeros(3)
+    if not told:
+        unexplained = law.unexplained(before) if law.unexplained else before["surfaces"]["output"]["unknown"]
     if next_law.begin is not None:
         next_law.begin(new, before, unexplained, learnt)
 

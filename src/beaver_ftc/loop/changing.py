@@ -130,8 +130,7 @@ def take_law(frame: np.void, new: np.void) -> None:
     learnt = fdi["fdae"]["network"]["output"].copy() if fdi["verdict"]["detected"] else np.zeros(3)
     take_over(new, frame["control"], learnt)
     frame["control"] = new
-    for name in ("effectiveness", "immovable", "effective", "Cm_alpha3"):
-        frame["faults"][name] = 0  # of the truth: an informed law is told again
+    frame["faults"] = np.zeros_like(frame["faults"])  # of the truth: an informed law is told again
 
 
 def take_diagnosis(frame: np.void, new: np.void, k: int) -> None:

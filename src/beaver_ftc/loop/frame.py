@@ -55,6 +55,7 @@ from beaver_ftc.diagnosis.state import PITCH, PLUGIN_SCHEME
 from beaver_ftc.diagnosis.types import verdict
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.sensing import (
+    FLYING,
     NOT_FINITE,
     effective,
     effectiveness,
@@ -427,15 +428,14 @@ def diagnose(frame):
     """
     fdi, prediction, measured, k = frame.fdi, frame.prediction, frame.measured, frame.k - frame.since
     diagnoses_all_types = fdi.config.diagnoses_all_types
-    applied, found, detected = frame.control.surfaces.output, frame.assessment, fdi.verdict.detected
+    applied, found, informed = frame.control.surfaces.output, frame.assessment, frame.control.config.informed
     monitors.disable_if_apart(fdi.engine_monitor, frame.control.power.output.command[1:])
     if k == 0:
         schemes.begin_scheme(fdi, prediction, measured)
     else:
-        if frame.control.config.informed:
-            predict_known(prediction, detected, found.effectiveness, found.offset, diagnoses_all_types)
-        else:
-            predict_known(prediction, detected, applied.effectiveness, applied.offset, diagnoses_all_types)
+        left = found.effectiveness if informed else applied.effectiveness
+        offset = found.offset if informed else applied.offset
+        predict_known(prediction, fdi.verdict.detected, left, offset, diagnoses_all_types)
         schemes.advance_estimators_to_frame(fdi, prediction, measured, k, frame.t)
     schemes.update_verdict(fdi, prediction, measured, frame.t)
     record_isolated_surfaces(fdi, frame.t)
@@ -463,6 +463,19 @@ def accumulate_instant(frame):
     fdi = frame.fdi
     schemes.accumulate_substep(fdi, frame.prediction, frame.measured)
     add_instant(frame.prediction, fdi.bound, fdi.layout, fdi.config.diagnoses_all_types, frame.measured)
+
+
+@kernel
+def sense_inside(frame):
+    """See an instant inside a frame of the loop, for the means over that frame; nothing is commanded.
+
+    A departure, or what is not finite, is left for the end of the frame to find.
+    """
+    sense(frame)
+    if frame.departed != NOT_FINITE:
+        accumulate_instant(frame)
+        add_effect(frame.accounts.guarantee)
+    frame.departed = FLYING
 
 
 @kernel

@@ -25,7 +25,6 @@ from beaver_ftc.diagnosis.model_prediction import redo_move
 from beaver_ftc.diagnosis.schemes import detection_share as largest_statistic
 from beaver_ftc.diagnosis.schemes import kernels_of_scheme
 from beaver_ftc.loop import frame as whole
-from beaver_ftc.loop.frame import add_effect
 from beaver_ftc.plant.channels import advance
 from beaver_ftc.plant.sensing import FLYING, NOT_FINITE, hand_over
 
@@ -95,15 +94,8 @@ def hold(frames):
 
 @kernel
 def sense_inside(frames):
-    """See an instant inside a frame of the loop, for the means over that frame; nothing is commanded.
-
-    A departure, or what is not finite, is left for `fly_frame` to find.
-    """
-    frame = frames[0]
-    whole.sense(frame)
-    if frame.departed != NOT_FINITE:
-        whole.accumulate_instant(frame)
-        add_effect(frame.accounts.guarantee)
+    """See frame.py."""
+    whole.sense_inside(frames[0])
 
 
 @apart

@@ -211,7 +211,7 @@ def count_same(mon, y):
     """
     mon.jump *= 1.0 - mon.h / JUMP_MEMORY_S
     for i in range(N_SENSORS):
-        mon.n_same[i] = (mon.n_same[i] + 1) * (y[i] == mon.y_past[i])
+        mon.n_same[i] = mon.n_same[i] + 1 if y[i] == mon.y_past[i] else 0
     for i in FORCES:
         mon.jump = max(mon.jump, abs(y[i] - mon.y_past[i]))
 
@@ -269,9 +269,10 @@ def advance_stage(mon):
     frame shows no change of an error.
     """
     if mon.stage < FULL_STAGE and mon.substep == 0:
-        for i in range(3):
-            mon.w_bound[i] += abs(mon.gyro[i].shown) * (mon.stage == 1)
         mon.stage += 1
+        if mon.stage < FULL_STAGE:
+            for i in range(3):
+                mon.w_bound[i] += abs(mon.gyro[i].shown)
 
 
 @kernel

@@ -24,7 +24,7 @@ from beaver_ftc_logs.bank import GROUP_LOSS, UNKNOWN_OFFSET, HypothesisBank, bui
 from beaver_ftc_logs.filtering import bank_posterior, fault_evidence, page_cusum
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats, Ints, Mask, Reasons, last_row_at, last_true_row
-from beaver_ftc_logs.regression import expand_groups
+from beaver_ftc_logs.regression import expand_groups, innovations, trailing_sums
 from beaver_ftc_logs.samples import Samples
 
 _LOG_RATE_TOLERANCE = 0.25
@@ -33,6 +33,7 @@ _NAME_SHARE = 0.5
 _EXCLUSION_RISK = 0.001
 """Chance of a name without the surface at fault: a likelihood ratio of two groups passes 1000 against the
 true one with that chance at most (Markov's inequality), where the model is right."""
+_DIRECTION_WINDOW_S = 1.0
 _COMMAND_ROUNDING = 1e-6
 """Share of travel that a command moves by rounding alone."""
 _NO_RESPONSE_LIMIT = 0.5
@@ -142,9 +143,12 @@ def reversed_command_error(flight: str, surface: str, allowed: str) -> BadInput:
 
 def _diagnose_checked_log(samples: Samples, model: Model) -> LogRows:
     bank = build_bank(model)
-    P = bank_posterior(trust.without_dead_rows(samples, model), model, bank)
+    known = trust.without_dead_rows(samples, model)
+    P = bank_posterior(known, model, bank)
     silent = P[:, -1] > _NO_RESPONSE_LIMIT
     rows = rows_of_posterior(samples, model, bank, P)
+    if model.vehicle.other_laws and model.settings.threshold is not None and not model.colours:
+        rows = _withdraw_contradicted(known, model, rows, model.settings.threshold)
     return finish_rows(samples, model, rows, silent)
 
 
@@ -197,6 +201,33 @@ def _withdraw_by_engine(samples: Samples, model: Model, rows: LogRows) -> LogRow
         rows.t_s, rows.faulty, rows.isolated_surfaces, rate_mps, unpowered_mps, rows.evidence_start_time_s
     )
     return replace(rows.without_estimate(named != rows.isolated_surfaces), isolated_surfaces=named)
+
+
+def _withdraw_contradicted(samples: Samples, model: Model, rows: LogRows, least: float) -> LogRows:
+    """Rows with the name `unknown` where the residual of the last second lies along another group.
+
+    A faulty surface, be it stuck, biased or oscillating, changes the rates along the direction in which it
+    turns the aircraft when healthy. A name is withdrawn where the direction of another group explains the
+    residual better by the log likelihood `least`, whatever the course of time along it. Not used in moving
+    air, since gusts have directions too.
+
+        gain_g = power / 2 sum over the last second of (r' m_g / |m_g|)^2
+
+    r (n, 3): residual in standard deviations. m (3, G): whitened direction of each group.
+    """
+    flight = innovations(samples, model)
+    r = flight.e @ flight.W
+    m = (np.array(model.response).sum(axis=1) @ flight.W).T
+    norms = np.linalg.norm(m, axis=0)
+    p = (r @ (m / np.maximum(norms, MIN_DIVISOR))) ** 2
+    gain = 0.5 * model.settings.power * trailing_sums(p, _DIRECTION_WINDOW_S * model.rate_hz)[0]
+    best = gain.max(axis=1)
+    wrong = np.zeros(len(r), dtype=bool)
+    for g, group in enumerate(model.groups):
+        names_group = [not set(group).isdisjoint(name.split("+")) for name in rows.isolated_surfaces]
+        wrong |= np.array(names_group, dtype=bool) & (best - gain[:, g] > least)
+    names = np.where(wrong, UNKNOWN_SURFACE, rows.isolated_surfaces)
+    return replace(rows.without_estimate(wrong), isolated_surfaces=names)
 
 
 def check_log_fits_model(samples: Samples, model: Model) -> None:

@@ -51,7 +51,7 @@ def command(control, assessment, faults, prediction, measured, mode, t):
     laws.command_surfaces(
         control, out.demand, out.hold, out.disturbance, assessment, faults, prediction, False
     )
-    laws.complete(control, assessment, faults, measured, t)
+    laws.complete(control, assessment, measured, t)
 
 
 @kernel

@@ -55,7 +55,8 @@ FLOWN = {
     "others within the declaration": {
         "reference": SWINGING, "substeps": 4, "duration_s": 6, "sensors": GRADE,
         "fdi": {"bounds": {"sensors": GRADE}},
-        "changes": [{"at_s": 2.0, "sensors": "ideal"}, {"at_s": 4.0, "sensors": GRADE}],
+        "changes": [{"at_s": 2.0, "sensors": "ideal", "declared_sensors": GRADE},
+                    {"at_s": 4.0, "sensors": GRADE, "declared_sensors": GRADE}],
     },
     "another grade": {
         "reference": SWINGING, "rate_hz": 71, "duration_s": 6,

@@ -254,6 +254,20 @@ def test_a_law_after_the_oracle_is_not_told_what_the_oracle_knew(law):
     assert (surfaces["effectiveness"] == 1.0).all()
     assert not surfaces["offset"].any()
     assert not sim.records[0]["faults"]["effectiveness"].any()
+    given = sim.records[0]["control"]["allocation"]["output"]
+    assert given["hand_over"] == given["lost_share"] == given["transfer_share"] == 0.0
+
+
+def test_a_diagnosis_goes_on_when_the_sensors_change_of_which_it_is_not_told():
+    """The same errors as before, under another name."""
+    grade = {"sensors": "tactical-grade", "fdi.bounds.sensors": "tactical-grade"}
+    lost = {"faults": [{**SURFACE_FAULTS[0], "at_s": 0.3}], "duration_s": 2.0, "changes": []}
+    scenario = declared("published").with_(grade | lost)
+    log = bf.fly(scenario).log
+    swapped = bf.fly(scenario.with_({"changes": [{"at_s": 1.2, "sensors": "tactical-grade"}]})).log
+    assert log["detected"].iloc[round(1.2 * 50) - 1] == 1.0
+    for column in log.columns:
+        assert np.array_equal(log[column], swapped[column], equal_nan=True), column
 
 
 def test_a_law_after_a_change_of_the_sensors_knows_those_before_it():

@@ -30,13 +30,10 @@ command = one_of(dict(enumerate(_COMMANDS[1:], 1)), _COMMANDS[0])
 # law: place of its file in FILES; what the law is given: see plugins.yaml.
 CONFIG = record(law=int, uses_verdict=int, reallocates=int, informed=int)
 
-# What a law takes over from the one before: how the reference stands, where the surfaces and the engine are,
+# What a law takes over from the one before: how the reference stands, where the surfaces and the engine are;
 # and what is known of the surfaces, unless the one before knew it from the truth. All else restarts.
-KEPT = (
-    ("reference", "output"), ("allocation", "output"), ("probe", "memory"), ("power", "memory"),
-    ("power", "output"),
-)  # fmt: skip
-KNOWN = ("surfaces", "output")
+KEPT = ("reference", "output"), ("allocation", "output"), ("probe", "memory"), ("power", "output")
+KNOWN = ("surfaces", "output"), ("power", "memory")
 
 
 @sized
@@ -76,8 +73,11 @@ def take_over(new: np.void, before: np.void, learnt: np.ndarray) -> None:
     learnt (3,) rad/s2: what the diagnosis' network explains.
     """
     told = before["config"]["informed"] and not new["config"]["informed"]
-    for stage, part in KEPT if told else (*KEPT, KNOWN):
+    for stage, part in KEPT if told else (*KEPT, *KNOWN):
         new[stage][part] = before[stage][part]
+    if told:
+        for name in ("hand_over", "lost_share", "transfer_share"):
+            new["allocation"]["output"][name] = 0.0
     law, next_law, unexplained = in_charge(before), in_charge(new), np.zeros(3)
     if not told:
         unexplained = law.unexplained(before) if law.unexplained else before["surfaces"]["output"]["unknown"]

@@ -2,8 +2,8 @@
 
 For each change the record of the flight is assembled once more, as the scenario says it from then on and from
 the same trim. At its frame the part that changes is taken from it: the law's, with what the surfaces and the
-reference stand at; the diagnosis', which restarts; or the instruments'. Truth, prediction, supervisor,
-accounts and log go on, and so do plug-ins that are not changed.
+reference stand at; the diagnosis', which restarts; or the instruments', which nobody is told. Truth,
+prediction, supervisor, accounts and log go on, and so do plug-ins that are not changed.
 """
 
 from typing import Any, NamedTuple
@@ -17,7 +17,6 @@ from beaver_ftc.loop.assembly import assemble
 from beaver_ftc.loop.plugin_frame import PluginFrame, named_detector, named_law, plugged
 from beaver_ftc.plant.faults import NEVER
 from beaver_ftc.plant.instruments import take_configuration
-from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Change, Scenario, stages
 from beaver_ftc.scenario.signals import frame_of
 
@@ -58,7 +57,7 @@ class Changing:
         layout = loop.frames["control"]["layout"][0]
         frames = assemble(then, loop.trimmed, np.array([layout["low"], layout["high"]]))
         _check_delays(frames, loop.frames)
-        renews = renews_diagnosis(change, then)
+        renews = change.scheme is not None or change.declared_sensors is not None
         detector, law = (before.detector, before.law) if before else (None, None)
         if renews:
             detector = named_detector(then)
@@ -113,15 +112,6 @@ def _check_delays(then: np.ndarray, now: np.ndarray) -> None:
             f"changes.sensors: delays of {needed} samples in all, allowed: {room} in this flight, "
             "or any that the scenario says before it begins"
         )
-
-
-def renews_diagnosis(change: Change, then: Scenario) -> bool:
-    """Whether the diagnosis restarts, in a flight that goes on as `then`: as another scheme, told other
-    errors, or with other sensors of declared errors, since a constant error is then another, and our
-    thresholds hold for one that stays."""
-    told = change.scheme is not None or change.declared_sensors is not None
-    declared = change.sensors is not None and not Declared.of(then).sensors.is_ideal
-    return told or (declared and then.fdi.is_ours)
 
 
 def take_law(frame: np.void, new: np.void) -> None:

@@ -111,16 +111,13 @@ def true_faults_dtype(n: int) -> np.dtype:
 
 
 @kernel
-def share_faults(truth, faults, informed):
-    """Fill `faults` (`true_faults_dtype`): for an informed law all, for others whether to account for
-    authority."""
-    faults.present = truth.faulted
-    if informed:
-        faults.Cm_alpha3 = truth.Cm_alpha3
-        for s in range(faults.effectiveness.size):
-            faults.effectiveness[s] = effectiveness(truth, s)
-            faults.effective[s] = effective(truth, s)
-            faults.immovable[s] = truth.immovable[s]
+def share_faults(truth, faults):
+    """Fill `faults` (`true_faults_dtype`), which an informed law alone is given."""
+    faults.present, faults.Cm_alpha3 = truth.faulted, truth.Cm_alpha3
+    for s in range(faults.effectiveness.size):
+        faults.effectiveness[s] = effectiveness(truth, s)
+        faults.effective[s] = effective(truth, s)
+        faults.immovable[s] = truth.immovable[s]
 
 
 @kernel
@@ -490,8 +487,8 @@ def isolated_theta(fdi, s):
 def decide(frame):
     """The mode for this frame."""
     control, layout, informed = frame.control, frame.control.layout, frame.control.config.informed
-    share_faults(frame.truth, frame.faults, informed)
     if informed:
+        share_faults(frame.truth, frame.faults)
         wanted = accommodation.true_mode(control.config, layout, frame.faults)
     else:
         wanted = accommodation.mode_from(control.config, layout, frame.fdi.verdict, frame.assessment)

@@ -270,11 +270,9 @@ def plugged(
         fdi["types"]["pair"]["enabled"] = 0
         n = fdi["types"]["surface"].size
         fdi["isolation"]["estimator"]["surface"][:n] = range(n)
-    control = frames["control"][0]
-    if law is not None or not control["config"]["informed"]:
-        control["power"]["config"]["enabled"] = 0
     if law is not None:
-        config = control["config"]
+        control = frames["control"][0]
+        config, control["power"]["config"]["enabled"] = control["config"], 0
         config["uses_verdict"], config["reallocates"] = getattr(law, "fault_tolerant", False), 0
         config["informed"] = 0
     return PluginFrame(frames, scenario, trim, detector, law, begun)

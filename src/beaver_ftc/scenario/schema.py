@@ -294,9 +294,7 @@ class Change(Section):
         None, "new scheme, as in `fdi.scheme`. The diagnosis restarts", examples=["zhang2005"]
     )
     sensors: Sensors | None = entry(
-        None,
-        "new sensor errors. If sensor errors are declared, the diagnosis restarts",
-        examples=["tactical-grade"],
+        None, "new sensor errors. Diagnosis and law do not receive them", examples=["tactical-grade"]
     )
     declared_sensors: BoundedSensors | None = entry(
         None, "new declared sensor errors. The diagnosis restarts"

@@ -117,17 +117,12 @@ def prepare(control, assessment, prediction, mode, t):
     allocation.form_effectiveness_matrix(control.axes, prediction.G, surfaces, config.uses_verdict)
     remains = allocation.remaining(control.layout, surfaces.output.effectiveness, PITCH)
     least, reallocated = surfaces.config.least_effectiveness, mode == MODE_REALLOCATED
-    at_once = is_governed(control) or (remains < least and assessment.diagnoses_all_types)
+    governed = control.reference.memory.active or surfaces.output.authority_lost  # from this frame on
+    at_once = governed or (remains < least and assessment.diagnoses_all_types)
     allocation.hand_over_pitch(control.allocation, reallocated, at_once, remains, least)
     if control.probe.config.frames > 0:
         wanted = assessment.pitch_undecided and config.uses_verdict and not config.informed
         allocation.advance_probe(control.probe, wanted, t)
-
-
-@kernel
-def is_governed(control):
-    """Whether the reference is governed from this frame on: authority has been lost."""
-    return control.reference.memory.active or control.surfaces.output.authority_lost
 
 
 @apart
@@ -158,14 +153,11 @@ def command_surfaces(control, demand, hold, disturbance, assessment, faults, pre
 
 
 @apart
-def complete(control, assessment, faults, measured, t):
+def complete(control, assessment, measured, t):
     """Note whether the demand is met; what is missing in pitch and yaw is left to the engines, at t s."""
     detected, out, surfaces = assessment.detected, control.allocation.output, control.surfaces
     axes, layout, lever, engine = control.axes, control.layout, control.power, control.engines
-    used = detected and (lever.config.enabled or engine.config.n > 0)
-    if faults.present or is_governed(control) or used:
-        lag, by_engines = surfaces.output.lag, engine.output.authority
-        allocation.note_shortfall(axes, out.command, layout, lag, by_engines)
+    allocation.note_shortfall(axes, out.command, layout, surfaces.output.lag, engine.output.authority)
     if lever.config.enabled:
         watched = detected or control.config.informed
         lost = watched and engines.pitch_is_lost(layout, surfaces, out.saturated, axes.shortfall)

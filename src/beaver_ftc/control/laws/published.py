@@ -41,7 +41,7 @@ def command(control, assessment, faults, prediction, measured, mode, t):
         control, out.demand, out.hold, out.disturbance, assessment, faults, prediction, False
     )
     integrate(law, control.axes, reference, control.allocation.output.command, measured.x)
-    laws.complete(control, assessment, faults, measured, t)
+    laws.complete(control, assessment, measured, t)
 
 
 @kernel

@@ -486,7 +486,7 @@ def command(control, assessment, faults, prediction, measured, mode, t):
     laws.command_surfaces(
         control, found.demand, found.hold, found.disturbance, assessment, faults, prediction, True
     )
-    laws.complete(control, assessment, faults, measured, t)
+    laws.complete(control, assessment, measured, t)
     allocation.lead_compensate(out, control.layout, law.config.lead, prediction.u)
 
 

@@ -107,7 +107,7 @@ def command(control, assessment, faults, prediction, measured, mode, t):
     )
     u = control.allocation.output.command
     published.integrate(law.feedback, control.axes, reference, u, measured.x)
-    laws.complete(control, assessment, faults, measured, t)
+    laws.complete(control, assessment, measured, t)
 
 
 def unexplained(control: np.void) -> np.ndarray:

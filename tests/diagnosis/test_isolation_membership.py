@@ -17,7 +17,7 @@ def explained(theta, base, Z, spread, error):
     fdi = new_fdi()
     fie = estimator(fdi, low=-1.0, high=0.0)
     fdi["bound"]["nu_max"] = 0.1
-    fie["effect"]["base"], fie["effect"]["regressor"], fie["effect"]["e"] = base, Z, spread
+    fie["effect"]["h"], fie["effect"]["Z"], fie["effect"]["r"] = base, Z, spread
     fdi["bank"]["output"]["innovation"] = base + theta * np.array(Z) + (0.1 + spread) * np.array(error)
     return fdi, fie
 
@@ -29,7 +29,7 @@ def test_the_true_theta_stays_in_every_set_and_sets_shrink(theta, frames, spread
     for base, Z, error in frames:
         fdi, fie = explained(theta, base, Z, spread, error)
         fdi["isolation"]["config"]["shared"] = shared
-        fie["set_lo"], fie["set_hi"], fie["theta"], fie["e"] = lo, hi, -0.5, 0.05
+        fie["set_lo"], fie["set_hi"], fie["theta"], fie["B"] = lo, hi, -0.5, 0.05
         fie["Om"] = Z
         fie["residual"] = fie["Om"] * (theta + 0.5) + 0.05 * np.array(error)
         kept = on(isolation.theta_explains, fdi, fie), on(isolation.narrow_sets, fdi, fie)

@@ -44,7 +44,7 @@ def test_a_loss_that_changed_inside_the_frame_stays_within_the_extremes(n, momen
         (moment0 + (n - 1) * moment) / n,
     )
     over(frames)
-    fie["effect"]["regressor"][0], fie["effect"]["e"][0] = (
+    fie["effect"]["Z"][0], fie["effect"]["r"][0] = (
         prediction["means"]["Gu"][0, 0],
         prediction["means"]["e_Gu"][0, 0],
     )

@@ -2,17 +2,17 @@
 
 The estimators start at detection:
 
-    xhats' = -Lambdas (xhats - x) + f + G u + base + Zs ths + Oms ths'
+    xhats' = -Lambdas (xhats - x) + f + G u + h + Zs ths + Oms ths'
     Oms' = -Lambdas Oms + Zs,  Oms(Td) = 0
 
 [Zhang2005, sec. IV]. In discrete time, with Omega[k+1] = a Omega[k] + dt Z[k] and the estimate's step
 multiplied by Omega[k+1], the residual of the true estimator is exactly Omega (theta - thetahat) plus the
 filtered uncertainty, for any course of the estimate.
 
-Every hypothesis is linear in one unknown parameter per axis, phi_i = base_i + theta_i Z_i:
+Every hypothesis is linear in one unknown parameter per axis, phi_i = h_i + theta_i Z_i:
 
-    loss of effectiveness   base 0          Z_i = G_is u_s      theta in [-1, 0]       [Zhang2005, eq. (4)]
-    position                base -G_is u_s  Z_i = G_is          theta in the travel
+    loss of effectiveness   h_i = 0         Z_i = G_is u_s      theta in [-1, 0]       [Zhang2005, eq. (4)]
+    position                h_i = -G_is u_s Z_i = G_is          theta in the travel
 
 LOSS on aileron, elevator and rudder is the published class. POSITION_HYPOTHESIS states only that the surface
 does not follow its command. Its parameter, the deflection in rad, may change in any way, so it covers every
@@ -20,9 +20,9 @@ fault of the surface. Both together are `fdi.fault_class: all`; types/ decides w
 
 Set membership: the parameters theta of a fault that are consistent with the innovation nu on axis i,
 
-    |nu_i - base_i - theta Z_i| <= eta_bar_i
+    |nu_i - h_i - theta Z_i| <= eta_bar_i
 
-nu, base, Z and eta_bar are in rad/s2 (Z per unit of theta). One surface has one parameter, so one theta must
+nu, h, Z and eta_bar are in rad/s2 (Z per unit of theta). One surface has one parameter, so one theta must
 be consistent on all axes. For a parameter that may change in any way, no test frame by frame is sharper. For
 a constant parameter (`fdi.fault_profile: abrupt`) the sets of all frames since the alarm are intersected.
 
@@ -39,10 +39,10 @@ Symbols of the kernels:
     x (3,) rad/s, F (3,) rad/s2   measured rates; mean of f + G u over the elapsed frame
     G (3, n), Gu (3, n)           mean of G, rad/s2 per rad, and effect of each healthy surface, rad/s2
     e_Gu (3, n) rad/s2            error of that mean if a fault changes within the frame
-    phi                           effect of a fault, base + theta Z within +- e (EFFECT_RECORD)
+    phi                           effect of a fault, h + theta Z within +- r (EFFECT_RECORD)
     lo, hi; between               interval of theta, or of a position, rad
-    Om, Om_pos                    Omega, and the same of the positive part of Z
-    e, e_lag rad/s                bound on the filtered uncertainty, and its part with a memory
+    Om, R_pos                     Omega, and the same of the positive part of Z
+    B, B_lag rad/s                bound on the filtered uncertainty, and its part with a memory
     th, P                         estimate of theta and its variance
     s, i, j                       surface, axis, estimator
     iso, fie, bank, bound, emap   records: isolation, estimator, bank, bounds, map of the model's error
@@ -94,13 +94,13 @@ def eta_explains(nu, nu_max):
 
 @kernel
 def consistent_on(nu, nu_max, fie, phi, i):
-    """The theta of the known set with |nu - base - theta Z| <= nu_max + e on axis i; the whole set if i is
+    """The theta of the known set with |nu - h - theta Z| <= nu_max + r on axis i; the whole set if i is
     skipped.
     """
     if fie.skip[i]:
         return fie.theta_min, fie.theta_max
-    e = nu_max[i] + phi.e[i]
-    return explain(nu[i] - phi.base[i], e, phi.regressor[i], fie.theta_min, fie.theta_max)
+    e = nu_max[i] + phi.r[i]
+    return explain(nu[i] - phi.h[i], e, phi.Z[i], fie.theta_min, fie.theta_max)
 
 
 @kernel
@@ -115,7 +115,7 @@ def own_error(bound, s, i, u, level):
 def widen_error(fie, bound, nu, n_substeps):
     """Widen the tolerance of a position by the errors of the surface's own terms at that position:
 
-        e <- e + max(eG (u + first) - eGu, 0) + extra
+        r <- r + max(eG (u + first) - eGu, 0) + extra
 
     eta_bar contains these errors at the commanded position. They grow with u, the distance from neutral. How
     far the surface can have been follows from the frame itself, on the axis of the largest Z, in a few rounds
@@ -125,15 +125,15 @@ def widen_error(fie, bound, nu, n_substeps):
     """
     s, phi, emap, i = fie.surface, fie.effect, bound.error_map, 0
     for j in range(1, 3):
-        if abs(phi.regressor[j]) > abs(phi.regressor[i]):
+        if abs(phi.Z[j]) > abs(phi.Z[i]):
             i = j
     first = 2.0 * fie.u_far / n_substeps if n_substeps > 1 else 0.0
-    u, e = max(abs(fie.theta_min), abs(fie.theta_max)), bound.nu_max[i] + phi.e[i]
+    u, e = max(abs(fie.theta_min), abs(fie.theta_max)), bound.nu_max[i] + phi.r[i]
     between = (fie.theta_min, fie.theta_max)
     level = level_near(emap, fie, between, n_substeps)
     for _ in range(N_ROUNDS):
         more = own_error(bound, s, i, u + first, level)
-        lo, hi = explain(nu[i] - phi.base[i], e + more, phi.regressor[i], fie.theta_min, fie.theta_max)
+        lo, hi = explain(nu[i] - phi.h[i], e + more, phi.Z[i], fie.theta_min, fie.theta_max)
         if lo > hi:
             break
         u, between = min(u, max(abs(lo), abs(hi))), (lo, hi)
@@ -142,7 +142,7 @@ def widen_error(fie, bound, nu, n_substeps):
     if emap.one_free:
         fie.share_far = share_used(emap, s, between, fie.share_far, n_substeps)
     for j in range(3):
-        phi.e[j] += own_error(bound, s, j, u + first, level)
+        phi.r[j] += own_error(bound, s, j, u + first, level)
 
 
 @kernel
@@ -158,7 +158,7 @@ def consistent_on_axes(nu, nu_max, fie, phi, axis):
     """The theta that agree on every axis; if `axis` >= 0, on that axis, and on those where Z = 0."""
     between = fie.theta_min, fie.theta_max
     for i in range(3):
-        if axis < 0 or i == axis or phi.regressor[i] == 0.0:
+        if axis < 0 or i == axis or phi.Z[i] == 0.0:
             between = intersect(between, consistent_on(nu, nu_max, fie, phi, i))
     return between
 
@@ -175,11 +175,11 @@ def narrow_sets(fie, nu, nu_max, shared):
     """Intersect the sets of a constant theta, on each axis or one if `shared`, with those of frame and
     filtered residual; false if one is empty.
 
-    |eps + Omega thetahat - Omega theta| <= e       for any course of the estimate
+    |eps + Omega thetahat - Omega theta| <= B       for any course of the estimate
     """
     for i in range(3):
         eps = fie.residual[i] + fie.Om[i] * fie.theta[i]
-        between = explain(eps, fie.e[i], fie.Om[i], fie.theta_min, fie.theta_max)
+        between = explain(eps, fie.B[i], fie.Om[i], fie.theta_min, fie.theta_max)
         between = intersect(between, consistent_on(nu, nu_max, fie, fie.effect, i))
         for j in range(3):
             if shared or j == i:
@@ -194,20 +194,20 @@ def narrow_sets(fie, nu, nu_max, shared):
 @kernel
 def clear_mean_effect(mean):
     """Begin the mean of a fault's effect over a block of frames (EFFECT_RECORD)."""
-    mean.base[:], mean.regressor[:], mean.e[:] = (0.0, 0.0, 0.0)
+    mean.h[:], mean.Z[:], mean.r[:] = (0.0, 0.0, 0.0)
 
 
 @kernel
 def add_to_mean(mean, phi, w):
     """mean <- mean + w phi, w the share of a frame in the block."""
     for i in range(3):
-        mean.base[i] += w * phi.base[i]
-        mean.regressor[i] += w * phi.regressor[i]
-        mean.e[i] += w * phi.e[i]
+        mean.h[i] += w * phi.h[i]
+        mean.Z[i] += w * phi.Z[i]
+        mean.r[i] += w * phi.r[i]
 
 
-# Acceleration by a fault, rad/s2: base + theta regressor, within +/- e.
-EFFECT_RECORD = record(base=3, regressor=3, e=3)
+# Acceleration by a fault, rad/s2: h + theta Z, within +/- r.
+EFFECT_RECORD = record(h=3, Z=3, r=3)
 
 ESTIMATOR_RECORD = record(
     hypothesis_kind=int, surface=int,
@@ -215,7 +215,7 @@ ESTIMATOR_RECORD = record(
     excluded=int, excluded_at_s=float, pending=int, skip=(int, 3), xhat=3, residual=3, mu_lo=3, mu_hi=3,
     confirmed=int, weak=int, unlikely=int,  # by likelihood ratios
     # Omega, and the same of the positive part of Z
-    Om=3, Om_pos=3, e=3, e_lag=3, theta=3, P=3, effect=EFFECT_RECORD,
+    Om=3, R_pos=3, B=3, B_lag=3, theta=3, P=3, effect=EFFECT_RECORD,
     mean_effect=EFFECT_RECORD,
     # that the surface can have had: rad; share of its travel
     u_far=float, share_far=float,
@@ -294,13 +294,13 @@ def configure_isolation(
 def update_effect(iso, fie, bank, bound, config, G, Gu, e_Gu):
     """Fill the effect of an estimator's fault in the elapsed frame, and update its reach in the bank.
 
-    loss  base = 0, Z = Gu_s        position  base = -Gu_s, Z = G_s        e = e_Gu_s
+    loss  h = 0, Z = Gu_s        position  h = -Gu_s, Z = G_s        r = e_Gu_s
     """
     phi, s, stuck = fie.effect, fie.surface, fie.hypothesis_kind == POSITION_HYPOTHESIS
     for i in range(3):
-        phi.base[i] = -Gu[i, s] if stuck else 0.0
-        phi.regressor[i] = G[i, s] if stuck else Gu[i, s]
-        phi.e[i] = e_Gu[i, s]
+        phi.h[i] = -Gu[i, s] if stuck else 0.0
+        phi.Z[i] = G[i, s] if stuck else Gu[i, s]
+        phi.r[i] = e_Gu[i, s]
     if stuck and (bound.has_eG or bound.error_map.one_free):
         widen_error(fie, bound, bank.output.innovation, config.n_substeps)
     if iso.config.reach:
@@ -322,7 +322,7 @@ def start_estimators(iso, n, x):
     The set of a constant theta is the known one on every axis, or without limits if iso.config.free.
     """
     for fie in iso.estimator[: iso.config.n_estimators]:
-        fie.xhat[:], fie.e_lag[:] = x, n
+        fie.xhat[:], fie.B_lag[:] = x, n
         fie.P[:] = (fie.theta_max - fie.theta_min) ** 2 / 12.0  # of a uniform distribution
         fie.set_lo[:] = -np.inf if iso.config.free else fie.theta_min
         fie.set_hi[:] = np.inf if iso.config.free else fie.theta_max
@@ -334,13 +334,13 @@ def update_residual(fie, kind, x):
     within = True
     for i in range(3):
         fie.residual[i] = x[i] - fie.xhat[i]
-        lo, hi, Om, th, e = fie.theta_min, fie.theta_max, fie.Om[i], fie.theta[i], fie.e[i]
+        lo, hi, Om, th, B = fie.theta_min, fie.theta_max, fie.Om[i], fie.theta[i], fie.B[i]
         if kind == INTERVAL_THRESHOLD:
-            mu = residual_interval(lo, hi, fie.Om_pos[i], Om - fie.Om_pos[i], Om, th, e)
+            mu = residual_interval(lo, hi, fie.R_pos[i], Om - fie.R_pos[i], Om, th, B)
         elif kind == CONSTANT_THRESHOLD:
-            mu = -e, e
+            mu = -B, B
         else:
-            mu = published_interval(lo, hi, Om, th, e)
+            mu = published_interval(lo, hi, Om, th, B)
         fie.mu_lo[i], fie.mu_hi[i] = mu
         within = within and (fie.mu_lo[i] <= fie.residual[i] <= fie.mu_hi[i] or fie.skip[i])
     return within
@@ -395,12 +395,12 @@ def decide_isolation(iso, t):
 def least_squares_step(fie, i, eps, forget):
     """One least-squares step of theta_i on a residual eps, rad/s, projected onto its set; returns the step.
 
-        K = P Om / S,  S = R + Om P Om,  R = e^2      th <- th + K eps      P <- min(P R / S / forget, prior)
+        K = P Om / S,  S = R + Om P Om,  R = B^2      th <- th + K eps      P <- min(P R / S / forget, prior)
 
     R is the square of the bound on the filtered uncertainty, so the estimate changes no faster than its
     information allows.
     """
-    th, R, POm = fie.theta[i], fie.e[i] ** 2, fie.P[i] * fie.Om[i]
+    th, R, POm = fie.theta[i], fie.B[i] ** 2, fie.P[i] * fie.Om[i]
     S = R + fie.Om[i] * POm
     if S <= 0.0:
         return 0.0
@@ -417,7 +417,7 @@ def joint_least_squares(fie, forget):
     for i in range(3):
         if i > 0:
             fie.theta[i], fie.P[i] = fie.theta[i - 1], fie.P[i - 1]
-        if fie.effect.regressor[i] != 0.0:
+        if fie.effect.Z[i] != 0.0:
             total += least_squares_step(fie, i, fie.residual[i] - fie.Om[i] * total, forget)
             forget = 1.0  # once a frame
     fie.theta[:], fie.P[:] = fie.theta[2], fie.P[2]
@@ -428,19 +428,19 @@ def joint_least_squares(fie, forget):
 def advance_estimator(iso, fie, bound, x, F, dt):
     """Advance one estimator by a frame: estimate, predicted rates, and filtered Z and bounds.
 
-        xhat <- x + dt (F + base + Z th) + a (xhat - x) + Om[k+1] (step of th)
-        Om <- a Om + dt Z      Om_pos <- a Om_pos + dt max(Z, 0)
+        xhat <- x + dt (F + h + Z th) + a (xhat - x) + Om[k+1] (step of th)
+        Om <- a Om + dt Z      R_pos <- a R_pos + dt max(Z, 0)
         th <- P{th + dt gain Om eps} by gradient [Zhang2005, sec. IV], or by least squares
 
     x: at the start of the frame, as the residual eps; fie.effect must be that of this frame.
     """
     cfg, phi, th = iso.config, fie.effect, fie.theta
     for i in range(3):
-        effect = F[i] + phi.base[i] + phi.regressor[i] * th[i]
+        effect = F[i] + phi.h[i] + phi.Z[i] * th[i]
         fie.xhat[i] = x[i] + dt * effect + cfg.a[i] * (fie.xhat[i] - x[i])
     step = joint_least_squares(fie, cfg.forget) if cfg.shared else 0.0
     for i in range(3):
-        a, Z = cfg.a[i], phi.regressor[i]
+        a, Z = cfg.a[i], phi.Z[i]
         if cfg.gradient:
             old = th[i]
             th[i] = min(max(old + dt * cfg.gain * fie.Om[i] * fie.residual[i], fie.set_lo[i]), fie.set_hi[i])
@@ -448,10 +448,10 @@ def advance_estimator(iso, fie, bound, x, F, dt):
         elif not cfg.shared:
             step = least_squares_step(fie, i, fie.residual[i], cfg.forget)
         fie.Om[i] = a * fie.Om[i] + dt * Z
-        fie.Om_pos[i] = a * fie.Om_pos[i] + dt * max(Z, 0.0)
+        fie.R_pos[i] = a * fie.R_pos[i] + dt * max(Z, 0.0)
         fie.xhat[i] += fie.Om[i] * step
-        fie.e_lag[i] = advance_bound(fie.e_lag[i], bound.eta_bar[i] + phi.e[i], a, dt, bound.n_old[i])
-        fie.e[i] = fie.e_lag[i] + bound.n_gyro[i]
+        fie.B_lag[i] = advance_bound(fie.B_lag[i], bound.eta_bar[i] + phi.r[i], a, dt, bound.n_old[i])
+        fie.B[i] = fie.B_lag[i] + bound.n_gyro[i]
 
 
 @kernel

@@ -318,9 +318,9 @@ def frame_arrays(fdi: np.void, n_estimators: int, diagnoses_all_types: bool) -> 
     est, srf = fdi["isolation"]["estimator"][:n_estimators], fdi["types"]["surface"]
     arrays = {
         "eta_bar": fdi["bound"]["eta_bar"], "noise": fdi["bound"]["n_gyro"],
-        "offset": est["effect"]["base"],
-        "slope": est["effect"]["regressor"],
-        "spread": est["effect"]["e"], "excluded": est["excluded"],
+        "offset": est["effect"]["h"],
+        "slope": est["effect"]["Z"],
+        "spread": est["effect"]["r"], "excluded": est["excluded"],
         "types": srf["sets"]["excluded"],
     }  # fmt: skip
     if diagnoses_all_types:

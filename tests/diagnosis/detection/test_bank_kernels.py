@@ -11,9 +11,9 @@ def reach_of(offset, Z, spread, low=-1.0, high=0.5, across=(0.6, 0.0, -0.8)):
     fdi = new_fdi()
     fie = estimator(fdi, low=low, high=high)
     (
-        fie["effect"]["base"],
-        fie["effect"]["regressor"],
-        fie["effect"]["e"],
+        fie["effect"]["h"],
+        fie["effect"]["Z"],
+        fie["effect"]["r"],
     ) = (
         offset,
         Z,
@@ -31,9 +31,9 @@ def test_what_a_fault_can_have_done_is_the_filtered_extreme_of_what_it_does(seed
     for _ in range(3):
         on(filters.advance_reach, fdi, fie)
     effect, across = fie["effect"], np.vstack([np.eye(3), fie["parity_direction"]])
-    at_ends = [effect["base"] + theta * effect["regressor"] for theta in (-1.0, 0.5)]
+    at_ends = [effect["h"] + theta * effect["Z"] for theta in (-1.0, 0.5)]
     does = np.array([*at_ends, np.zeros(3)]) @ across.T
-    spread = np.abs(across) @ effect["e"]
+    spread = np.abs(across) @ effect["r"]
     for m, decay in enumerate(np.exp(-POLES * DT)):
         kept = DT * weights(decay, 3).sum()
         assert fie["reach_lo"][m] == pytest.approx(kept * (does.min(axis=0) - spread))

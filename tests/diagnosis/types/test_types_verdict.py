@@ -197,7 +197,7 @@ def test_two_equations_say_where_ailerons_and_rudder_were(seed):
     off, command = rng.uniform(-0.05, 0.05, 2), np.array([0.02, -0.03])
     for k, s in enumerate((AILERON, RUDDER)):
         effect = fdi["isolation"]["estimator"][4 + s]["effect"]
-        effect["regressor"][[ROLL, YAW]], effect["e"][[ROLL, YAW]] = Z[:, k], spread[:, k]
+        effect["Z"][[ROLL, YAW]], effect["r"][[ROLL, YAW]] = Z[:, k], spread[:, k]
         fdi["types"]["surface"][s]["last"]["u"] = command[k]
     fdi["bank"]["output"]["innovation"][[ROLL, YAW]], fdi["bound"]["nu_max"][[ROLL, YAW]] = (
         Z @ off,

@@ -80,26 +80,26 @@ def advance_gyro(m, n, a):
 
 
 @kernel
-def residual_interval(lo, hi, Zp, Zm, Z, th, e):
+def residual_interval(lo, hi, R_pos, R_neg, Om, th, B):
     """The interval (low, high), rad/s, that holds the residual of the true estimator.
 
-        lo Zp + hi Zm - Z th - e  <=  eps  <=  hi Zp + lo Zm - Z th + e
+        lo R_pos + hi R_neg - Om th - B  <=  eps  <=  hi R_pos + lo R_neg - Om th + B
 
     The parameter may move anywhere within [lo, hi] at every instant, so an incipient or intermittent fault is
-    covered. Zp, Zm, Z rad/s: filtered positive part, negative part and whole of the regressor; th: estimate;
-    e rad/s: bound on the filtered uncertainty.
+    covered. R_pos, R_neg, Om rad/s: filtered positive part, negative part and whole of Z; th: estimate;
+    B rad/s: bound on the filtered uncertainty.
     """
-    eps_lo = lo * Zp + hi * Zm - Z * th - e
-    eps_hi = hi * Zp + lo * Zm - Z * th + e
+    eps_lo = lo * R_pos + hi * R_neg - Om * th - B
+    eps_hi = hi * R_pos + lo * R_neg - Om * th + B
     return eps_lo, eps_hi
 
 
 @kernel
-def published_interval(lo, hi, Z, th, e):
-    """(-mu, mu), mu = k |Z| + e rad/s, k = max(th - lo, hi - th) bounds |theta - th| [Zhang2005, via
+def published_interval(lo, hi, Om, th, B):
+    """(-mu, mu), mu = k |Om| + B rad/s, k = max(th - lo, hi - th) bounds |theta - th| [Zhang2005, via
     Zhang2002].
     """
-    mu = max(th - lo, hi - th) * abs(Z) + e
+    mu = max(th - lo, hi - th) * abs(Om) + B
     return -mu, mu
 
 
@@ -219,13 +219,13 @@ def along(v, m, i, size):
 def fault_range(fie, i):
     """Least and greatest acceleration on axis i, or along m if i = 3, rad/s2:
 
-    base + theta Z +- e,  theta in its set, or no fault at all
+    h + theta Z +- r,  theta in its set, or no fault at all
     """
     phi, m = fie.effect, fie.parity_direction
-    base, Z = along(phi.base, m, i, False), along(phi.regressor, m, i, False)
-    e = along(phi.e, m, i, True)
-    at_lo, at_hi = base + fie.theta_min * Z, base + fie.theta_max * Z
-    return min(0.0, at_lo, at_hi) - e, max(0.0, at_lo, at_hi) + e
+    h, Z = along(phi.h, m, i, False), along(phi.Z, m, i, False)
+    r = along(phi.r, m, i, True)
+    at_lo, at_hi = h + fie.theta_min * Z, h + fie.theta_max * Z
+    return min(0.0, at_lo, at_hi) - r, max(0.0, at_lo, at_hi) + r
 
 
 @kernel

@@ -99,6 +99,7 @@ from beaver_ftc.diagnosis.detection.rows import (
     VANELESS,
     add_turn,
     look,
+    look_across,
     set_columns,
 )
 from beaver_ftc.diagnosis.gusts import project_gust, view_drift
@@ -361,7 +362,7 @@ def look_at_views(views, noise, rows, forces, gust, vaned, vaneless, V):
     gust, vaned, vaneless: the estimates that are subtracted: rows.py.
     """
     for view in views:
-        b, m = view.block, view.block.m[0]
+        b = view.block
         view.used = not view.by_force or (forces.in_use and forces.n_seen == MIN_UPDATES)
         if not view.used:
             continue
@@ -369,9 +370,7 @@ def look_at_views(views, noise, rows, forces, gust, vaned, vaneless, V):
         view.leak = turn_view(view, rows, of_view) if view.nulled != AXIS_VIEW else 0.0
         look(b, rows)
         if view.nulled != AXIS_VIEW and b.n_Z > 0:
-            b.regressor[b.n_Z - 1, 0] = 0.0
-            for r in range(m.size):
-                b.regressor[b.n_Z - 1, 0] += view.leak * view.col[r] * rows.nu[b.source, r]
+            look_across(b, rows, view.leak, view.col)
         own = vaneless if b.source >= VANELESS and forces.in_use else of_view
         fill_view_drift(view, noise.q, of_view, own, forces, V)
 

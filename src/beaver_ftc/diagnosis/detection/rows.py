@@ -320,6 +320,14 @@ def look(b, rows):
 
 
 @kernel
+def look_across(b, rows, leak, col):
+    """The last regressor of a view, leak col' nu: what an error of the column col (5,) lets through."""
+    b.regressor[b.n_Z - 1, 0] = 0.0
+    for r in range(N_ROWS):
+        b.regressor[b.n_Z - 1, 0] += leak * col[r] * rows.nu[b.source, r]
+
+
+@kernel
 def add_turn(b, gust):
     """P_dd <- P_dd + Q_scale m var_turn m': what a fast turn of the gusts' axes may change in the drift."""
     for i in range(b.n):

@@ -95,7 +95,7 @@ def weigh_loss(fdi, j):
 def weigh_position(fdi, j):
     """Fill `unlikely` of estimator j by the parity views."""
     stat, fies = fdi.statistical, fdi.isolation.estimator
-    G = fies[fdi.layout.position[fies[j].surface]].effect.regressor
+    G = fies[fdi.layout.position[fies[j].surface]].effect.Z
     isolation.update_views(fies[j], stat.views[: stat.n_views], stat.test, stat.forces, G)
 
 

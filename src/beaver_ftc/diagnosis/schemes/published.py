@@ -153,7 +153,7 @@ def advance_estimators_to_frame(fdi, prediction, measured):
     if mu > 0.0:
         fdi.fdae.output.threshold[:], fdi.bank.output.threshold[0] = mu, mu
         for fie in fdi.isolation.estimator[: fdi.isolation.config.n_estimators]:
-            fie.e[:] = mu
+            fie.B[:] = mu
 
 
 @apart

@@ -270,11 +270,11 @@ def observe_surface(c, srf, fie, m, nu, nu_max, eff):
     m: the axis on which it has most effect.
     """
     last, cmd = srf.last, srf.commands
-    last.u = -eff.base[m] / eff.regressor[m]
-    last.kappa = 0.25 * (cmd.G_max - cmd.G_min) / abs(eff.regressor[m])
+    last.u = -eff.h[m] / eff.Z[m]
+    last.kappa = 0.25 * (cmd.G_max - cmd.G_min) / abs(eff.Z[m])
     axis = m if c.frames_per_block > 1 else -1  # over a block the axes weigh what varies differently
     last.lo, last.hi = isolation.consistent_on_axes(nu, nu_max, fie, eff, axis)
-    mark_stops(srf, 2.0 * (nu_max[m] + eff.e[m]) / abs(eff.regressor[m]))
+    mark_stops(srf, 2.0 * (nu_max[m] + eff.r[m]) / abs(eff.Z[m]))
 
 
 @kernel

@@ -52,10 +52,10 @@ def locate_one(srf, own, other, nu, nu_max):
     L, N: roll and yaw acceleration, rad/s2; L1, N1 per rad of this surface (own), L, N of the other. False:
     nowhere within its reach.
     """
-    L, N = other.regressor[ROLL], other.regressor[YAW]
-    det = own.regressor[ROLL] * N - own.regressor[YAW] * L
-    e_L = nu_max[ROLL] + own.e[ROLL] + other.e[ROLL]
-    e_N = nu_max[YAW] + own.e[YAW] + other.e[YAW]
+    L, N = other.Z[ROLL], other.Z[YAW]
+    det = own.Z[ROLL] * N - own.Z[YAW] * L
+    e_L = nu_max[ROLL] + own.r[ROLL] + other.r[ROLL]
+    e_N = nu_max[YAW] + own.r[YAW] + other.r[YAW]
     return observe_error(srf, (nu[ROLL] * N - nu[YAW] * L) / det, (e_L * abs(N) + e_N * abs(L)) / abs(det))
 
 
@@ -110,9 +110,9 @@ def locate_second(types, layout, est, nu, nu_max):
     lo, hi = constant_range(types.config, srf1, types.frame_index)
     srf1.last.lo, srf1.last.hi = lo, hi
     set_anomalous(srf1, 0)
-    M1, M2 = eff1.regressor[PITCH], eff2.regressor[PITCH]
+    M1, M2 = eff1.Z[PITCH], eff2.Z[PITCH]
     acc1 = M1 * last_error(srf1)
-    tol = 0.5 * abs(M1) * (hi - lo) + nu_max[PITCH] + eff1.e[PITCH] + eff2.e[PITCH]
+    tol = 0.5 * abs(M1) * (hi - lo) + nu_max[PITCH] + eff1.r[PITCH] + eff2.r[PITCH]
     if not observe_error(types.surface[s2], (nu[PITCH] - acc1) / M2, tol / abs(M2)):
         types.surface[s2].status.basis = verdict.DEDUCED_HEALTHY
 

@@ -565,7 +565,7 @@ def _configure_view(view: np.void, d: ParityDirection, gusty: bool, vaned: bool)
     if d.by_inertia or across_vane:
         view["block"]["source"] = INERTIAL if d.by_inertia else VANELESS
     if by_force or vaned:
-        view["confirmer"] = NORMAL_FORCE if d.plane_pair == PITCH_PLANE or j == NORMAL_FORCE else SIDE_FORCE
+        view["confirmer"] = NORMAL_FORCE if j == NORMAL_FORCE else SIDE_FORCE
 
 
 def _configure_filter(b: np.void, d: ParityDirection, rates: np.void) -> None:

@@ -160,7 +160,8 @@ ACTUATOR_CONFIG_RECORD = record(
     slow_step=float, near=float,
 )  # fmt: skip
 
-# The set of each type's parameter: types/__init__.py.
+# The set of each type's parameter: types/__init__.py; and what was known of the first of two faults when it
+# was named: pairs.py.
 FEASIBLE_SETS_RECORD = record(low=N_TYPES, high=N_TYPES, excluded=(int, N_TYPES))
 
 # Counts of frames in which something was wrong: all; those in which a surface that was given up stayed at its
@@ -186,9 +187,6 @@ RELEASE_RECORD = record(
     back_lo=(2, N_TYPES), back_hi=(2, N_TYPES), released=(int, N_TYPES), held_lo=N_TYPES, held_hi=N_TYPES,
     set_lo=(2, N_TYPES), set_hi=(2, N_TYPES),
 )  # fmt: skip
-
-# What was known of the first of two faults when it was named: pairs.py.
-FIRST_SETS_RECORD = record(low=N_TYPES, high=N_TYPES, excluded=(int, N_TYPES))
 
 # What the types go by: whether a frame shows one instant, instants in it, whether a surface returns by its
 # actuator, frames of half of the slowest oscillation, whether a fault is declared to stay as it is and errors
@@ -220,7 +218,7 @@ def surface_types_dtype() -> np.dtype:
         release=RELEASE_RECORD,
         **memories,
         not_at_position=int, status=STATUS_RECORD, accommodation=ACCOMMODATION_RECORD,
-        first_sets=FIRST_SETS_RECORD,
+        first_sets=FEASIBLE_SETS_RECORD,
     )  # fmt: skip
 
 

@@ -329,7 +329,8 @@ def _next(context: Any, builder: Any, sig: Any, args: Any, result: Any) -> None:
         builder.store(builder.add(i, _WORD(1), flags=["nsw"]), iterator.next)
 
 
-_kept: dict[np.dtype, tuple[str, np.ndarray]] = {}  # for as long as the process: compiled code points there
+# digest, places and their address of each shape, for as long as the process: compiled code points there
+_kept: dict[np.dtype, tuple[str, np.ndarray, int]] = {}
 
 
 def _places_of(digest: str, argument: Any) -> int:
@@ -337,11 +338,11 @@ def _places_of(digest: str, argument: Any) -> int:
     dtype = argument.dtype
     if dtype not in _kept:
         shape = shape_of(dtype)
-        _kept[dtype] = shape.digest if shape else "", np.fromiter(places(dtype) if shape else (), np.int64)
-    of, found = _kept[dtype]
+        found = np.fromiter(places(dtype) if shape else (), np.int64)
+        _kept[dtype] = shape.digest if shape else "", found, found.ctypes.data
+    of, _, address = _kept[dtype]
     if of != digest:
         raise TypeError("a record of another shape than this code was compiled for")
-    address: int = found.ctypes.data
     return address
 
 

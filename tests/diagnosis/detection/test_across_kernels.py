@@ -5,7 +5,7 @@ import pytest
 from kernels import DT, holder, new_fdi
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.diagnosis.detection import parity
+from beaver_ftc.diagnosis.detection import parity, tones
 from beaver_ftc.diagnosis.detection.parity import configure_parity_views
 
 AILERON, ELEVATOR, RUDDER = range(3)
@@ -39,7 +39,7 @@ def fdi(rng):
     rows["Z"][:4, :3], rows["tol"][:4] = rng.normal(size=(4, 3)), rng.uniform(0.1, 0.2, 4)
     rows["std"], rows["eta"][:, :3] = 0.002, (0.02, 0.03, 0.05)
     configure_parity_views(statistical, load())
-    parity.configure_tones(statistical["tone_test_config"], 1e-8, V, 15.0, DT)
+    tones.configure_tones(statistical["tone_test_config"], 1e-8, V, 15.0, DT)
     air = statistical["gust"]
     (
         air["output"]["gusty"],

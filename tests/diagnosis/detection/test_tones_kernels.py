@@ -8,10 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from kernels import DT, new_fdi
 
-from beaver_ftc.diagnosis.detection import likelihood, parity
-from beaver_ftc.diagnosis.detection.parity import (
-    TONE_MEMORY_S,
-)
+from beaver_ftc.diagnosis.detection import likelihood, tones
+from beaver_ftc.diagnosis.detection.tones import TONE_MEMORY_S
 
 CHANCE, PACE, V = 1e-11, 15.0, 45.0
 LEVEL = sqrt(-2.0 * np.log(CHANCE))
@@ -40,7 +38,7 @@ def view(rng):
 @pytest.fixture
 def tone_test_config():
     tone_test_config = new_fdi()["statistical"]["tone_test_config"]
-    parity.configure_tones(tone_test_config, CHANCE, V, PACE, DT)
+    tones.configure_tones(tone_test_config, CHANCE, V, PACE, DT)
     return tone_test_config
 
 
@@ -49,7 +47,7 @@ def listen(view, tone_test_config, samples, regressors=None, heard=True, alarm_l
         view["block"]["g"][0] = sample
         if regressors is not None:
             view["block"]["g_Z"][:3, 0] = regressors[k]
-        parity.update_tones(view, tone_test_config, alarm_level, heard, DT)
+        tones.update_tones(view["tones"], view["block"], tone_test_config, alarm_level, heard, DT)
 
 
 @pytest.mark.parametrize(("K_x", "K_d", "keep"), [(0.3, 0.8, 1.0), (0.05, 0.02, 1.0), (0.2, 0.5, 0.95)])
@@ -69,7 +67,7 @@ def test_the_filter_lets_pass_of_a_tone_what_it_does_when_run(view, K_x, K_d, ke
     )
     amplitude = np.hypot(*shares)
     angle = frequency_rad_s * DT
-    found = parity.tone_gain(K_x, K_d, keep, np.exp(1j * angle), DT)
+    found = tones.tone_gain(K_x, K_d, keep, np.exp(1j * angle), DT)
     assert found == pytest.approx(amplitude, rel=1e-9)
 
 
@@ -96,7 +94,7 @@ def test_no_periodic_uncertainty_of_that_pace_is_heard_louder(steps, x):
     )  # slopes within 1 / x, whatever the mean was
     wave -= 0.5 * (wave.max() + wave.min())
     wave /= max(1.0, np.abs(wave).max())
-    most = parity.max_tone_mean(np.array([x]), 1.0)[0]
+    most = tones.max_tone_mean(np.array([x]), 1.0)[0]
     assert abs(np.mean(np.exp(1j * phase) * wave)) <= most * (1.0 + 1e-3)
 
 

@@ -61,11 +61,16 @@ def benchmark_probe() -> str:
 
 GAINS = {
     "method": "name", "grade": "grade", "draw": "draw",
-    "judged on": lambda again: f"{again['draw'] + 1} to {again['draw'] + again['judged']}",
+    "judged on": lambda again: "{} to {}".format(*_judged_on(**again)),
     "flights": "flights", "cost, before": "built_in .3f", "cost, after": "retuned .3f",
     "gain, %": "gain *100 .1f", "from, %": "gain_low *100 .1f", "to, %": "gain_high *100 .1f",
     "adopted": lambda again: "yes" if is_adopted(again) else "no",
 }  # fmt: skip
+
+
+def _judged_on(draw: int, judged: int, draws: int = 1, **_: Any) -> tuple[int, int]:
+    """The first and the last draw on which a second tuning is judged."""
+    return draw + draws, draw + draws + judged - 1
 
 
 def benchmark_gains() -> str:

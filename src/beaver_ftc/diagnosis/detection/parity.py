@@ -7,7 +7,7 @@ the innovation nu, rad/s2, on a parity direction m that is orthogonal to that co
 
 does not depend on a fault of s. If a test finds a signal in this projection, s is not the (only) cause. Each
 direction is a view: it has a whitening filter of its own and tests for a step, for a loss of another surface
-(likelihood.py) and for an oscillation. The directions are
+(likelihood.py) and for an oscillation (tones.py). The directions are
 
 * each axis, for the surfaces that do not move it;
 * in a plane that several surfaces move, the direction across the column g of each: m = (-g_2, g_1) / |g|. The
@@ -33,38 +33,15 @@ the rates use no gust estimate that rests on accelerometers. An alarm of the rat
 part is broken, and after it the views count as usual. Forces that are known or suspected to be wrong are not
 used.
 
-*Oscillation tests.* They use the spectrum of a view's whitened innovation g at the frequencies of a grid.
-
-An oscillating surface adds a tone of unknown amplitude and phase to a view. The whitening filter
-is linear, so the whitened innovation contains the same tone. For each frequency w, rad/s, the test computes
-
-    N = sum exp((i w - 1 / T) t) g / sqrt(S)          summed over past frames; t s is the age of a frame
-
-with S the variance of g, (rad/s)2, and T = TONE_MEMORY_S. Without a fault the real and the imaginary part of
-N are normal. With v the larger of their variances, |N| / sqrt(v) exceeds x with a probability of exp(-x^2 /
-2) at most. Two errors can add to |N| without a fault (symbols as in likelihood.py):
-
-* Errors of coefficients add at most sum_j tol_j |R_j|, where R_j is the same sum over regressor j.
-* A bounded uncertainty |d| <= eta_bar adds at most |W(w)| sum eta_bar exp(-t / T) |cos|, where W is the gain
-  of the whitening filter at w. The limited rate of change of d reduces this a little
-  (`max_tone_mean`).
-
-The sums are updated once per TONE_INTERVAL_S: no frequency of the grid changes its phase much in that
-time.
-
-Letters of the kernels, in addition to those of likelihood.py and rows.py: in the tests of tones k is a
-frequency, t their record, c their configuration.
+Letters of the kernels, in addition to those of likelihood.py and rows.py:
 
     m, col      direction of a view and g / |g|, (5,)
     b, f        block of a view; record of a force
     L           acceleration per rad/s of rotation of the air, 1/s
-    N, R        sums as above, (N_TONES,) and (n_Z, N_TONES) complex
-    z, rho      exp(i w dt); exp((i w - 1 / T) dt) of an update; rho2: of 2 w
     cfg         configuration of the statistical tests
 """
 
 from collections.abc import Iterator
-from math import exp, pi, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -72,7 +49,6 @@ import numpy as np
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.schema import MAX_SURFACES, MAX_TERMS_OF_ONE
 from beaver_ftc.compiled import kernel, record, sized
-from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA
 from beaver_ftc.diagnosis.bounds import moment_axis
 from beaver_ftc.diagnosis.detection import likelihood
 from beaver_ftc.diagnosis.detection.forces import (
@@ -90,7 +66,6 @@ from beaver_ftc.diagnosis.detection.likelihood import (
     STEP_FAULT,
     USUAL_HYPOTHESES,
     BlockCapacity,
-    evidence_ratio,
 )
 from beaver_ftc.diagnosis.detection.rows import (
     INERTIAL,
@@ -102,165 +77,9 @@ from beaver_ftc.diagnosis.detection.rows import (
     look_across,
     set_columns,
 )
+from beaver_ftc.diagnosis.detection.tones import tones_dtype, update_tones, within_limits
 from beaver_ftc.diagnosis.gusts import project_gust, view_drift
 from beaver_ftc.diagnosis.state import LOSS, NORMAL_FORCE, PITCH, ROLL, SIDE_FORCE, YAW
-
-N_TONES = 16
-# A memory of T s resolves frequencies 1 / T apart. A tone halfway between two frequencies of the grid appears
-# with 0.7 of its amplitude.
-TONE_MEMORY_S = 2.5
-TONES_RAD_S = np.linspace(1.0, 13.0, N_TONES)
-TONE_INTERVAL_S = 0.04
-# Share of the alarm level reserved for noise in addition to a bounded uncertainty. It is reserved without
-# noise too, because `tone_gain` assumes constant gains, and the gains vary with a varying bound.
-TONE_NOISE_SHARE = 0.5
-# The tests run at airspeeds within this ratio of the trim airspeed, and at vane angles within this limit.
-MAX_V_FACTOR, MAX_VANE_RAD = 2.0, 0.5
-
-# Configuration that all views share.
-TONE_RECORD = record(
-    V_min=float, V_max=float,  # airspeeds, m/s, between which the tests run
-    stride=int, alarm_level=float,  # frames per update; alarm level, standard deviations
-    a=float, z=(complex, N_TONES), rho=(complex, N_TONES), rho2=(complex, N_TONES),  # a: decay in an update
-    # largest mean of cos(w t) d(t) for |d| <= 1; share of the larger of the variances of N's two parts
-    c=N_TONES, v_share=N_TONES,
-)  # fmt: skip
-
-
-@sized
-def tones_dtype(n_Z: int) -> np.dtype:
-    """The oscillation tests of one view, for a number of regressors."""
-    return record(
-        n_new=int, sum_g=float, sum_Z=n_Z,  # frames since the last update; sums of g and g_Z over sqrt(S)
-        N=(complex, N_TONES), R=(complex, n_Z, N_TONES),
-        # shares of |N| by errors of coefficients and by a bounded uncertainty; for the latter, sums over the
-        # filtered bound, and over its component at twice the frequency
-        e_R=N_TONES, eta=N_TONES, b_0=N_TONES, b_2=(complex, N_TONES),
-        D=float,  # variance of N without a fault
-        score=float,  # largest over the frequencies; on the scale of scores in likelihood.py
-    )  # fmt: skip
-
-
-@kernel
-def within_limits(c, y):
-    """True if airspeed and vane angles y (5,) are near those of normal flight.
-
-    Outside, the tolerances of the tests, which are worked out for trim, do not hold.
-    """
-    is_near = c.V_min < y[AIRSPEED] < c.V_max
-    return is_near and abs(y[ALPHA]) < MAX_VANE_RAD and abs(y[BETA]) < MAX_VANE_RAD
-
-
-@kernel
-def update_tones(view, c, level, inside, dt):
-    """Update the tests of tones of a view with one frame, which the view's block has whitened; dt s.
-
-    level: alarm level of the detector, standard deviations. Unless `inside`, the frame counts as zero, so the
-    sums decay.
-    """
-    t, b = view.tones, view.block
-    weight = np.sqrt(b.S_inv[0, 0]) if inside else 0.0
-    t.sum_g += weight * b.g[0]
-    for j in range(b.n_Z):
-        t.sum_Z[j] += weight * b.g_Z[j, 0]
-    t.n_new += 1
-    if t.n_new < c.stride:
-        return
-    resonate(t.N, c.rho, t.sum_g)
-    for j in range(b.n_Z):
-        resonate(t.R[j], c.rho, t.sum_Z[j])
-        t.sum_Z[j] = 0.0
-    t.D = c.a * c.a * t.D + t.n_new
-    update_tone_eta(t, c, b, weight * b.eta[0], dt)
-    bound_coefficients(t, b.tol, b.n_Z)
-    score_tones(t, c, level)
-    t.sum_g, t.n_new = 0.0, 0
-
-
-@kernel
-def resonate(N, rho, v):
-    """N <- rho N + v at each frequency; N, rho (N_TONES,) complex."""
-    for k in range(N.size):
-        N[k] = rho[k] * N[k] + v
-
-
-@kernel
-def tone_gain(K_x, K_d, a, z, dt):
-    """|W(w)|: amplitude of g, rad/s, by a tone of amplitude 1 rad/s2 at constant gains; dt s a frame.
-
-    g = e + dt (nu - d),  e <- g - K_x g,  d <- a d + K_d g:
-    |W| = dt / |1 - (1 - K_x) / z + dt K_d / (z - a)|,  z = exp(i w dt)
-
-    """
-    return dt / abs(1.0 - (1.0 - K_x) * z.conjugate() + dt * K_d / (z - a))
-
-
-@kernel
-def update_tone_eta(t, c, b, eta, dt):
-    """Update `eta`: what a bounded uncertainty, |d| <= eta sqrt(S), adds to |N|, nearly the most.
-
-        b_0 <- a b_0 + |W| v      b_2 <- rho2 b_2 + |W| v      eta_k = c (b_0 + |b_2|),  v = eta n_new
-
-    |cos x| = 2 / pi (1 + 2/3 cos 2x - 2/15 cos 4x + ...). A bound that varies at twice the tone's frequency
-    adds most; the last third of |b_2| is for the harmonics above. One that varies at four times the frequency
-    or more can add a tenth more than that.
-    """
-    for k in range(t.eta.size):
-        v = eta * t.n_new * tone_gain(b.K_x[0, 0], b.K_d[0, 0], b.a, c.z[k], dt)
-        t.b_0[k] = c.a * t.b_0[k] + v
-        t.b_2[k] = c.rho2[k] * t.b_2[k] + v
-        t.eta[k] = c.c[k] * (t.b_0[k] + abs(t.b_2[k]))
-
-
-@kernel
-def bound_coefficients(t, tol, n_Z):
-    """Fill e_R = sum_j tol_j |R_j|: the most that the errors of the first n_Z coefficients add to |N|.
-
-    |R_j| is at most its larger part plus (sqrt 2 - 1) times its smaller part.
-    """
-    t.e_R[:] = 0.0
-    for j in range(n_Z):
-        for k in range(t.e_R.size):
-            x, y = abs(t.R[j, k].real), abs(t.R[j, k].imag)
-            t.e_R[k] += tol[j] * (max(x, y) + 0.41421356237309515 * min(x, y))
-
-
-@kernel
-def score_tones(t, c, level):
-    """Fill `score`, the largest over the frequencies: |N| - e_R over noise and eta, scaled to the level."""
-    score = 0.0
-    for k in range(t.e_R.size):
-        N = abs(t.N[k]) - t.e_R[k]
-        ratio = evidence_ratio(c.alarm_level, TONE_NOISE_SHARE, N, t.eta[k], c.v_share[k] * t.D)
-        score = max(score, ratio)
-    t.score = score * level / c.alarm_level
-
-
-def max_tone_mean(w: np.ndarray, rate: float) -> np.ndarray:
-    """Largest mean of cos(w t) d(t) over all d with |d| <= 1 and |d'| <= rate; frequencies w (n,) rad/s.
-
-    The largest is reached by a square wave with edges of the slope `rate`, or, at frequencies where these
-    edges do not reach 1, by a triangular wave.
-    """
-    ratio = w / rate
-    return 2.0 / pi * np.where(ratio < pi / 2.0, np.sin(ratio), 1.0) / ratio
-
-
-def configure_tones(c: np.void, false_alarm: float, V: float, rate: float, dt: float) -> None:
-    """Fill the configuration that all views share.
-
-    false_alarm: probability of a false alarm granted to one test in one frame. V: airspeed in trim, m/s.
-    rate: largest rate of change of a bounded uncertainty, bounds per second. dt s a frame.
-    """
-    stride = max(round(TONE_INTERVAL_S / dt), 1)
-    z, a = np.exp(1j * TONES_RAD_S * dt), exp(-stride * dt / TONE_MEMORY_S)
-    c["V_min"], c["V_max"] = V / MAX_V_FACTOR, V * MAX_V_FACTOR
-    c["stride"], c["a"], c["alarm_level"] = stride, a, sqrt(-2.0 * np.log(false_alarm))
-    c["z"], c["rho"], c["rho2"] = z, a * z**stride, a * z ** (2 * stride)
-    c["c"] = max_tone_mean(TONES_RAD_S, rate)
-    # The variances of the two parts differ by |sum exp(2 (i w - 1 / T) t)| / sum exp(-2 t / T).
-    c["v_share"] = 0.5 + 0.5 * (1.0 - a**2) / np.abs(1.0 - (a * z**stride) ** 2)
-
 
 PEAK_MEMORY_RATIO = 5.0  # time constant of `peak` over the one with which evidence is forgotten
 MIN_FORCE_PART = 0.9  # component of a direction of length 1, above which a view counts as one of the force
@@ -391,7 +210,7 @@ def update_views(views, cfg, c, y, dt, k, latched):
         if (
             view.block.source != INERTIAL
         ):  # the error of the integrated angle oscillates with the aircraft's own modes
-            update_tones(view, c, cfg.alarm_level, inside, dt)
+            update_tones(view.tones, view.block, c, cfg.alarm_level, inside, dt)
         view.peak = max((1.0 - (1.0 - cfg.forget) / PEAK_MEMORY_RATIO) * view.peak, view_score(view))
 
 

@@ -59,14 +59,11 @@ from beaver_ftc.diagnosis.detection.likelihood import (
 )
 from beaver_ftc.diagnosis.detection.parity import (
     AXIS_VIEW,
-    N_TONES,
-    TONE_RECORD,
     USUAL_SIZE,
     VANE_VIEW,
     ParityDirection,
     StatisticalSize,
     configure_parity_views,
-    configure_tones,
     list_directions,
     view_dtype,
 )
@@ -81,6 +78,7 @@ from beaver_ftc.diagnosis.detection.rows import (
     look,
     set_columns,
 )
+from beaver_ftc.diagnosis.detection.tones import N_TONES, TONE_RECORD, configure_tones
 from beaver_ftc.diagnosis.gusts import (
     FORCE_ERROR_SHARE,
     GUST_RECORD,

@@ -59,7 +59,8 @@ from beaver_ftc.design.model import (
     rate_damping,
     whole_sum,
 )
-from beaver_ftc.diagnosis.bounds import flow_noise, gust_noise, least_height
+from beaver_ftc.diagnosis.bounds import least_height
+from beaver_ftc.diagnosis.deviations import flow_noise, gust_noise
 from beaver_ftc.diagnosis.monitors.redundancy import EARTH_M_S2
 from beaver_ftc.diagnosis.state import fill
 from beaver_ftc.plant.instruments import wrapped

@@ -17,7 +17,7 @@ from beaver_ftc.control import Law, Reference, has_kernels, row_of
 from beaver_ftc.design.context import Context
 from beaver_ftc.design.model import DesignFunctions
 from beaver_ftc.diagnosis import Detector, Measured, Verdict
-from beaver_ftc.diagnosis.bounds import plugin_errors
+from beaver_ftc.diagnosis.deviations import plugin_errors
 from beaver_ftc.diagnosis.state import (
     NOT_ISOLATED,
     PLUGIN_SCHEME,

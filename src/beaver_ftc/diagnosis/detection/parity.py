@@ -49,7 +49,6 @@ import numpy as np
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.schema import MAX_SURFACES, MAX_TERMS_OF_ONE
 from beaver_ftc.compiled import kernel, record, sized
-from beaver_ftc.diagnosis.bounds import moment_axis
 from beaver_ftc.diagnosis.detection import likelihood
 from beaver_ftc.diagnosis.detection.forces import (
     FORCE_NAMES,
@@ -78,6 +77,7 @@ from beaver_ftc.diagnosis.detection.rows import (
     set_columns,
 )
 from beaver_ftc.diagnosis.detection.tones import tones_dtype, update_tones, within_limits
+from beaver_ftc.diagnosis.deviations import moment_axis
 from beaver_ftc.diagnosis.gusts import project_gust, view_drift
 from beaver_ftc.diagnosis.state import LOSS, NORMAL_FORCE, PITCH, ROLL, SIDE_FORCE, YAW
 

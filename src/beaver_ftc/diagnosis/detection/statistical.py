@@ -40,10 +40,6 @@ from beaver_ftc.design.model import (
     jacobian,
 )
 from beaver_ftc.diagnosis import gusts
-from beaver_ftc.diagnosis.bounds import (
-    coefficient_bounds,
-    moment_axis,
-)
 from beaver_ftc.diagnosis.detection import likelihood, parity
 from beaver_ftc.diagnosis.detection.attitude import attitude_dtype, configure_attitude
 from beaver_ftc.diagnosis.detection.forces import FORCES_RECORD, TrimState, configure_forces
@@ -79,6 +75,7 @@ from beaver_ftc.diagnosis.detection.rows import (
     set_columns,
 )
 from beaver_ftc.diagnosis.detection.tones import N_TONES, TONE_RECORD, configure_tones
+from beaver_ftc.diagnosis.deviations import coefficient_bounds, moment_axis
 from beaver_ftc.diagnosis.gusts import (
     FORCE_ERROR_SHARE,
     GUST_RECORD,

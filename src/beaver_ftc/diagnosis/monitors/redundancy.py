@@ -37,8 +37,9 @@ from beaver_ftc.aircraft.aircraft import EARTH_RADIUS_M, GRAVITY_MPS2
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design import LEAST_HEIGHT_M, Dryden
 from beaver_ftc.design.model import DesignFunctions
-from beaver_ftc.diagnosis.bounds import GUST_LIMIT_SIGMA, air_rotation_slopes
+from beaver_ftc.diagnosis.bounds import GUST_LIMIT_SIGMA
 from beaver_ftc.diagnosis.detection.filters import advance_bound, leak
+from beaver_ftc.diagnosis.deviations import air_rotation_slopes
 from beaver_ftc.diagnosis.state import fill
 from beaver_ftc.plant.instruments import (
     ALTITUDE,

@@ -61,7 +61,7 @@ def command(options: Options) -> None:
     rate: Frame rate of the autopilot, Hz. Default: the rate in the first packet of ardupilot, 250 for px4.
     speed: Multiple of real time. 0 is as fast as the autopilot answers. Default: 0 for ardupilot, 1 for
     px4.
-    hold: Time at the start in which the scenario's own law flies, s.
+    hold: Time at the start in which the law `nominal` flies, s.
     ground: Elevation of the ground above sea level for the autopilot, m. Default: 0.
     mavlink: Address of a ground station, which receives the results and can inject failures.
     page: Port of a live page that shows the flight and can inject faults. 0 selects any free port. Default:

@@ -113,5 +113,5 @@ class Detector(Protocol):
         """Return the verdict up to this frame. The loop calls this method once for each frame.
 
         - `measured`: the measurements of the frame.
-        - `command` (surfaces,) rad: the command that the surfaces follow at this instant.
+        - `command` (surfaces,) rad: deflections of healthy surfaces now, by the actuators as known.
         """

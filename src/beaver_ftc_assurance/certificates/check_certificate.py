@@ -291,9 +291,7 @@ def declared_at_row(scenario, row_number):
         begins = int(np.ceil((change["at_s"] - 1e-9) * rate))
         if begins <= row_number:
             sensors = change.get("declared_sensors") or sensors
-            restarted = any(
-                change.get(name) is not None for name in ("scheme", "sensors", "declared_sensors")
-            )
+            restarted = any(change.get(name) is not None for name in ("scheme", "declared_sensors"))
             start_row = begins if restarted else start_row
     gyro_errors = {}
     for axis in AXES:

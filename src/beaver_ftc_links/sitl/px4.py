@@ -7,7 +7,7 @@ stamp of the HIL_SENSOR sent last is flown, one with an earlier stamp has been a
 counted, neither flown nor answered, or two of each would be under way for ever.
 
 An autopilot that starts needs time to pass before it answers. Until its first answer time runs by the clock,
-and until it is armed for the first time the scenario's own law flies, level.
+and until it is armed for the first time the law `nominal` flies, level.
 """
 
 from math import atan2, cos, degrees, hypot, radians, sin, sqrt

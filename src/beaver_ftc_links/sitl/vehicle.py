@@ -253,7 +253,7 @@ class Vehicle:
     """The flight, begun at the rate the packets have, and restarted when they are.
 
     pulses: as `Outputs` has it. rate_hz: of the packets, whatever they say themselves. hold_s: so long the
-    scenario's own law flies first, level. ground_m: the autopilot's, above sea level; by itself 0, and of a
+    law `nominal` flies first, level. ground_m: the autopilot's, above sea level; by itself 0, and of a
     flight from the ground its altitude. log: keep one.
     """
 

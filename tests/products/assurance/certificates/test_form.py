@@ -21,7 +21,7 @@ def test_what_a_scenario_declares_from_a_row_on():
     scenario = {
         "rate_hz": 50, "substeps": 4, "changes": [
             {"at_s": 1.0, "law": "nominal"}, {"at_s": 2.001, "declared_sensors": later},
-            {"at_s": 3.0, "scheme": "x"},
+            {"at_s": 2.5, "sensors": later}, {"at_s": 3.0, "scheme": "x"},
         ],
         "fdi": {"bounds": {"sensors": dict.fromkeys("pqr", gyro), "constant_rad_s2": {"p": 0.3},
                            "inertia_coupling": {"q": 0.4}}},
@@ -33,6 +33,7 @@ def test_what_a_scenario_declares_from_a_row_on():
     changed = check_certificate.declared_at_row(scenario, 101)
     assert changed.start_row == 101
     assert changed.gyro_errors["q"][:2] == pytest.approx((radians(0.4 + 0.5 + 0.02), radians(0.5)))
+    assert check_certificate.declared_at_row(scenario, 149).start_row == 101  # it is not told of new sensors
     assert check_certificate.declared_at_row(scenario, 150).start_row == 150
 
 

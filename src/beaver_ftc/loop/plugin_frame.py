@@ -26,7 +26,7 @@ from beaver_ftc.diagnosis.state import (
 )
 from beaver_ftc.documents.errors import NO_FAILURE, SimulationFailed
 from beaver_ftc.loop import stepping as stages
-from beaver_ftc.loop.assembly import Trim, reads_accelerometers, y_places
+from beaver_ftc.loop.assembly import Trim, reads_accelerometers
 from beaver_ftc.loop.outcome import verdict_of
 from beaver_ftc.plant.sensing import NOT_FINITE
 from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled, made
@@ -189,7 +189,7 @@ def measured_of(frame: np.void) -> Measured:
     return Measured(
         float(frame["t"]),
         frame["measured"]["x"].copy(),
-        frame["measured"]["y"][: len(y_places(frame))].copy(),
+        frame["measured"]["y"][: 4 + int(frame["truth"]["declared"])].copy(),
         frame["prediction"]["means"]["F"].copy(),
         frame["prediction"]["means"]["Gu"].copy(),
         frame["fdi"]["bound"]["eta_bar"].copy(),

@@ -19,6 +19,7 @@ from beaver_ftc.diagnosis.rivals.kalman import KalmanRival, normalised_innovatio
 from beaver_ftc.diagnosis.rivals.rival import UNANTICIPATED
 
 _STEP_RAD_S = 1e-6  # for df/dx: f is quadratic in x, so a central difference is exact to rounding
+_STEPS = _STEP_RAD_S * np.vstack((np.eye(3), -np.eye(3)))
 THETA, N_STATES_WITHOUT_GUSTS = slice(3, 6), 6
 _MAX_SQUARE = 1e6
 DEFAULT_OPTIONS = {
@@ -84,8 +85,7 @@ class AugmentedEkf(EffectivenessFilter):
     def predict(self, measured: Measured, before: Measured) -> None:
         """z- = F z + dt (xdot - J x), P- = F P F' + Q; J = df/dx at x, measured in the frame before."""
         F, x = self.transition(measured), before.x
-        steps = _STEP_RAD_S * np.eye(3)
-        f = self.context.model.f(np.concatenate((x + steps, x - steps)), before.y)
+        f = self.context.model.f(x + _STEPS, before.y)
         J = (f[:3] - f[3:]).T / (2.0 * _STEP_RAD_S)
         F[:3, :3] += self.dt * J
         self.z = self.move(self.z, F, measured.acceleration - J @ x)

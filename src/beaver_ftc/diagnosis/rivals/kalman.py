@@ -40,6 +40,7 @@ class KalmanRival(Rival):
         self.F[air, air] = np.diag(a)
         self.q = np.concatenate((np.zeros(3), np.full(n_theta, walk), (1.0 - a**2) * gust_variance))
         self.R, self.before = np.diag(rate_variance), None
+        self.own_bound = np.hypot(self.context.constant_rad_s2, declared.model_rad_s2)
         self.P = np.diag(np.concatenate((rate_variance, np.full(n_theta, theta_variance), gust_variance)))
         self.z = np.zeros(self.n)
 
@@ -76,12 +77,10 @@ class KalmanRival(Rival):
         That bound is eta_bar as long as it is the published one. With more declared it is the sum of all
         worst cases, instruments and air included, which have states or a variance of their own here.
         """
-        declared, size = self.context.declared, measured.eta_bar
-        if declared.errors:
-            size = np.hypot(self.context.constant_rad_s2, declared.model_rad_s2)
-        Q = np.tile(self.q, (*np.shape(noise), 1)).reshape(*np.shape(noise), self.n)
-        Q[..., :3] = (self.dt * np.multiply.outer(noise, size)) ** 2
-        P[..., range(self.n), range(self.n)] += Q
+        size = self.own_bound if self.context.declared.errors else measured.eta_bar
+        diagonal = np.einsum("...ii->...i", P)  # a view
+        diagonal += self.q
+        diagonal[..., :3] += (self.dt * np.multiply.outer(noise, size)) ** 2
         return P
 
 

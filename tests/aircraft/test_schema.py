@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.plant.instrumented import engines_of, instrument, names, source_of, surfaces_of
+from beaver_ftc.plant.instrumented import instrument, names, source_of, surfaces_of
 from beaver_ftc.plant.model_file import copy_of
 
 etree = pytest.importorskip("lxml.etree", reason="wants lxml, of the extra `dev`")
@@ -78,10 +78,8 @@ def test_what_derive_writes_is_valid_wherever_its_source_was(tmp_path):
         model = instrument(source, tmp_path / name, TRAVEL, absent=["fcs/nobody-gives-it"])
         found = [mistakes(path) for path in model.parent.rglob("*.xml") if path.name not in wrong]
         assert [lines for lines in found if lines] == [], name
-        valid.append(engines_of(source))
+        valid.append(name)
     assert len(valid) > 30
-    assert 0 in valid
-    assert max(valid) >= 4
 
 
 def surfaces_of_or_none(source):

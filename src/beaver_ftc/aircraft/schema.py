@@ -441,7 +441,7 @@ class ErrorMapSection(Section):
     """The measured error of the angular accelerations. A box is a range of states, and each box contains the
     boxes before it.
 
-    Outside of all boxes the error is unknown, and no alarm is raised.
+    Outside of all boxes the error is unknown, and no alarm of a surface is raised.
     boxes: the boxes, the innermost one first
     """
 

@@ -99,7 +99,7 @@ class CompiledLaw(NamedTuple):
     records: function of the number of surfaces n that returns the type of the law's own record,
     `control.NAME` for a file NAME.py. The law's kernels alone write that record.
 
-    Lazy kernels (compiled.py), called once a frame with `control` (control/state.py), `assessment` (what the
+    Lazy kernels (compiled/), called once a frame with `control` (control/state.py), `assessment` (what the
     diagnosis says of each surface) and the records `prediction` and `measured`:
 
         accommodate(control, assessment, faults, prediction, measured)   effectiveness of each surface

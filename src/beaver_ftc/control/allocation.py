@@ -45,10 +45,8 @@ ROUNDING = 1e-12  # of a multiplier
 @sized
 def problem_dtype(n: int) -> np.dtype:
     """A problem of n surfaces and its solution u. at: which limits hold, kept for the next frame; y: the
-    multipliers; steps: systems solved."""
-    return record(
-        u_preferred=n, weight=n, low=n, high=n, u=n, at=(int, n), y=3, S=(3, 3), steps=int, slack=float
-    )
+    multipliers."""
+    return record(u_preferred=n, weight=n, low=n, high=n, u=n, at=(int, n), y=3, S=(3, 3), slack=float)
 
 
 @kernel
@@ -56,9 +54,7 @@ def solve(problem, B, demand):
     """Fill u (n,) rad, from B (3, n) rad/s2 per rad and a demand (3,) rad/s2."""
     begin(problem, B)
     n, u, target = problem.u.size, problem.u, problem.u_preferred
-    problem.steps = 0
     for _ in range(4 * n + 4):
-        problem.steps += 1
         multipliers(problem, B, demand)
         blocking, share = farthest(problem, B)
         for s in range(n):

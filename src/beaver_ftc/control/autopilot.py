@@ -3,7 +3,8 @@
 The autopilot computes where each channel of the commanded profile should be now, from the legs of the
 scenario, and body-rate references and an engine setting for that.
 
-    climb    gamma_c = (h' + k (hc - h)) / V + what was found missing,   theta_c = gamma_c + alpha (smoothed)
+    climb    gamma_c = (h' + k (hc - h)) / V + what was found missing
+             theta_c = gamma_c + alpha cos(bank) (smoothed)
              theta' = k (theta_c - theta)
     speed    a = V' + k (Vc - V) + what was found missing + g (gamma_c - gamma in trim), by engine power
     gliding  gamma_c = gamma in trim - (V' + k (Vc - V) + what was found missing) / g: airspeed by pitch

@@ -47,7 +47,8 @@ class Measured(NamedTuple):
     - `y` (4 + signals,): angle of attack rad, sideslip rad, airspeed m/s, dynamic pressure Pa, and the
       signals that the aircraft declares. The Beaver declares one, `dpt`.
 
-    The other fields are means over the frame that ends at `t_s`. In the first frame they are zero.
+    The other fields are means over the frame that ends at `t_s`. In the first frame, `acceleration` and
+    `contribution` are zero.
 
     - `acceleration` (3,) rad/s²: angular acceleration f + G u of the design model. With x_before, the `x` of
       the previous frame, the innovation is (x - x_before) / dt - acceleration.
@@ -77,7 +78,7 @@ class Verdict(NamedTuple):
     """The result of a detector up to the present frame. The loop keeps the first alarm.
 
     - `detected`: True if the detector raises the alarm.
-    - `axis`: axis of the alarm: `p`, `q` or `r`.
+    - `axis`: axis of the alarm: `p`, `q` or `r`; None counts as `p`.
     - `isolated`: name of the faulty surface, or `unanticipated`; None if no fault is isolated.
     - `type`: fault type of the isolated fault.
     - `estimate`: estimated size of the fault. The size of a loss of effectiveness is theta, from -1 to 0. The

@@ -181,10 +181,10 @@ def slipstream_bound(err, y):
     """Bound the error of dpt = a + b P / (qdyn V) [FDC], computed from the engine's instruments and the air
     data.
 
-        grown b kW / (q V) + (grown - 1) |dpt - a|,   grown = 1 / ((1 - eq) (1 - eV)),   kW = kw0 + kw1 rho
+        grown b kW / (q V) + (grown - 1) |dpt - a|,   grown = 1 / ((1 - eq) (1 - eV)),   kW = kw0 + kw1 rho d
 
     eq, eV, rho: relative errors of dynamic pressure, airspeed and density. kw0: error of the power by the
-    instruments, kW; kw1: by the density, for all of it.
+    instruments, kW; kw1: by the density, for all of it; d: density over that at sea level.
     """
     eq = reading_bound(err, Y0 + QDYN, y[QDYN]) / y[QDYN]
     eV = reading_bound(err, Y0 + AIRSPEED, y[AIRSPEED]) / y[AIRSPEED]
@@ -349,7 +349,7 @@ def add_published_bound(x, model, share, const, earth, eta):
 
     [Zhang2005, sec. VII] for the first two. JSBSim integrates rates against inertial space and reports them
     against the Earth: the difference turns with the body, at no more than earth |x| on any axis. k >= 1: the
-    largest factor by which the inertia coupling multiplies a product of two rates.
+    largest sum, over an axis, of the factors by which the inertia coupling multiplies products of rates.
     """
     p, q, r = x[0], x[1], x[2]
     w = abs(p) + abs(q) + abs(r)

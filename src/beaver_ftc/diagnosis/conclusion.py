@@ -2,8 +2,8 @@
 
 The conclusion holds the alarm, surface and type of the fault, and the surface on which the law acts. The
 stages of the diagnosis return their findings: a detector the axis of its alarm, the isolation the estimator
-that is left, the fault types a surface with its type, a monitor whether the cause is no surface. The frame
-(loop/frame.py) hands each of them to a kernel of this file, and no other file writes the conclusion.
+that is left, the fault types a surface with its type, a monitor whether the cause is no surface. The schemes
+(schemes/) hand each of them to a kernel of this file, and no other file writes the conclusion.
 
 The assessment holds effectiveness, offset and lag of each surface, by whichever stage estimates them. It is
 the output of the diagnosis. No other file writes it.
@@ -61,7 +61,7 @@ def reset_conclusion(found: np.void) -> None:
 
 @kernel
 def latch_alarm(found, axis, t):
-    """Latch an alarm at t s on an axis, -1 if it has no axis: only the first alarm is recorded."""
+    """Latch an alarm at t s on an axis: only the first alarm is recorded."""
     if not found.detected:
         found.detected, found.detected_at_s, found.axis = 1, t, axis
 

@@ -81,10 +81,8 @@ ENVELOPE = record(
     outside=int, n_exits=int, outside_frames=int, exit_at_s=MAX_EVENTS, return_at_s=MAX_EVENTS,
 )  # fmt: skip
 # Frames in which the diagnosis concludes nothing, of so many watched. undiagnosed: there is none. late: the
-# flight is
-# older than any that was measured. beyond: outside the map of the model's error in this quantity, which was
-# then
-# between least and greatest. between: inside the range of each quantity, but in no box of the map.
+# flight is older than any that was measured. beyond: outside the map of the model's error in this quantity,
+# which was then between least and greatest. between: inside the range of each quantity, but in no box.
 INCONCLUSIVE = record(
     watched=int, frames=int, from_s=float, undiagnosed=int, late=int, between=int,
     beyond=(int, N_MAP_COORDINATES), least=N_MAP_COORDINATES, greatest=N_MAP_COORDINATES,
@@ -176,7 +174,7 @@ def track(tracking, truth, model_rate):
 
 @kernel
 def account_surfaces(accounts, truth, saturated, k, dt):
-    """How long each surface was saturated, how far it has actuator_travel and how fast."""
+    """How long each surface was saturated, how far it has travelled and how fast."""
     for s in range(saturated.size):
         now = position(truth, s)
         accounts.saturated_frames[s] += saturated[s]
@@ -314,17 +312,16 @@ def record_used(effectiveness, used, row, column):
 
 @kernel
 def record_sensor_monitor(monitor, missing, row, column, columns):
-    """How near a test between the instruments came to its bound in this frame, and which; of three `columns`
-    the first instrument that gives no reading, missing (N_SENSORS,). Returns the next column."""
+    """How near a test between the instruments came to its bound in this frame, and which; and the first
+    instrument that gives no reading, missing (N_SENSORS,). Returns the next column."""
     if monitor.config.enabled and monitor.stage:
         row[column], row[column + 1] = (
             monitor.output.top_ratio,
             monitor.output.worst_test_index,
         )
-    if columns > 2:
-        for i in range(missing.size - 1, -1, -1):
-            if missing[i]:
-                row[column + 2] = i
+    for i in range(missing.size - 1, -1, -1):
+        if missing[i]:
+            row[column + 2] = i
     return column + columns
 
 

@@ -1,7 +1,7 @@
 """A flight of which every frame's measurements are noted as a plug-in detector would be shown them.
 
 Compiled, since a detector in Python that notes the same costs seven times the frame. The columns of the notes
-are those of `columns_of`.
+are those of `Notes`.
 """
 
 import numpy as np

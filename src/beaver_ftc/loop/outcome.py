@@ -123,7 +123,7 @@ class Landing:
     """What a flight has yielded: metrics, texts and rows of tables are views of it. A field that is called
     as a key of the metrics is that key. Times in s since the start, rates in rad/s, per axis (p, q, r).
 
-    isolated: aileron, elevator, rudder, flap, unanticipated, or None while more than one fault fits
+    isolated: a surface, a sensor, unanticipated, or None while more than one fault fits
     (`candidates`; with them what damage that the aircraft declares may have taken). so_far: whether it is a
     surface that our schemes name, which they do by exclusion: it is the only one left, until data exclude it
     as well; None of a plug-in's and of nothing. withdrawn: spells in which a surface was named before,
@@ -143,7 +143,7 @@ class Landing:
     the flight, and outside_at_end says that it is open. outside_s: time outside the validated envelope, all
     exits together. end: airspeed, m/s, and altitude, m, at the end. profile: largest deviation from
     the commanded one by channel of the autopilot, m, m/s, rad; None where it was not flown. arrival: the
-    deviation's mean over the last 10 s, with its sign. limits: of each limit that protection has put on
+    deviation through a lag of 10 s, with its sign. limits: of each limit that protection has put on
     the command since when, on what (airspeed_mps, bank_deg), "at most" or "at least", its value at last,
     why, and whether it is in force at the end. changes: what was changed in flight: time_s; law and
     scheme, None for what was not; sensors, True or False; and of a diagnosis that was replaced

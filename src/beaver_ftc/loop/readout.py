@@ -100,7 +100,7 @@ class FrameReadout:
 
     @cached_property
     def design(self) -> np.void:
-        """The design model's record, not a copy, for the functions of `design.variants`."""
+        """The design model's record, not a copy, for the functions of `design.model`."""
         return self._frame["prediction"]["design"]
 
     @cached_property
@@ -165,14 +165,14 @@ def alarm_flags(frame: np.void) -> tuple[np.int64, np.int64]:
 def recorded_always(frame: np.void, n: int, diagnoses_all_types: bool) -> dict[str, np.ndarray]:
     """The arrays of which a certificate wants every frame, not copies: measured rates x and the model's
     acceleration, rad/s and rad/s2; the rest, and n and diagnoses_all_types: as
-    `diagnosis.readout.recorded_always`."""
+    `diagnosis.readout.frame_arrays`."""
     means = frame["prediction"]["means"]
     own = {"x": frame["measured"]["x"], "model": means["F"]}
     return own | of_diagnosis.frame_arrays(frame["fdi"], n, diagnoses_all_types)
 
 
 def recorded_until_alarm(frame: np.void, n: int, statistical: bool) -> dict[str, np.ndarray]:
-    """Those of which it wants the frames up to the alarm: see `diagnosis.readout.recorded_until_alarm`."""
+    """Those of which it wants the frames up to the alarm: see `diagnosis.readout.alarm_arrays`."""
     return of_diagnosis.alarm_arrays(frame["fdi"], n, statistical)
 
 

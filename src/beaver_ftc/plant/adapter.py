@@ -267,7 +267,7 @@ def _is_ours(model: Path) -> bool:
 
 
 class Plant:
-    """One aircraft in one JSBSim executive. Loading takes 2 to 4 ms: `reuse.borrowed` has loaded ones.
+    """One aircraft in one JSBSim executive. Loading takes 2 to 4 ms: `conditions.borrowed` has loaded ones.
 
     rate_hz:  frame rate of diagnosis and control.
     substeps: JSBSim frames per such frame; `run` advances one JSBSim frame of dt_s = 1/(rate_hz substeps).

@@ -83,11 +83,6 @@ def actuator_system(surface: str, low_rad: float, high_rad: float, prefix: str =
     return f'<?xml version="1.0"?>\n<!-- From aircraft/actuator.xml: change that. -->\n{text}'
 
 
-def engines_of(source: Path) -> int:
-    """How many engines an aircraft has."""
-    return _engines(_parsed(source), source)
-
-
 def _parsed(path: Path) -> Element:
     """The root of an XML file. Raises BadInput, naming it, if it is none."""
     try:

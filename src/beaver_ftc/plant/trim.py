@@ -230,7 +230,7 @@ def _approach(look: Look, x: Vector) -> Vector:
 
 
 def _newton_step(J: Vector, here: Vector) -> Vector:
-    """The step that takes `here` (6,) to zero in the least-squares sense; zero where that is not finite."""
+    """The step that takes `here` (6,) to zero in the least-squares sense; NaN where that is not finite."""
     if not isfinite(J.sum() + here.sum()):
         return np.full(J.shape[1], np.nan)
     try:

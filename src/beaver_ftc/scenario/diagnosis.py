@@ -404,7 +404,7 @@ class EnginePower(Section, strict=True):
     """Control of pitch by engine power, if elevator and flap are both lost. It requires the law
     `fault-tolerant` with `fault_class: all`, or the law `oracle`.
 
-    enabled: false: the engine keeps its trim setting
+    enabled: false: the law does not move the engines
     speed_gain_inhg_per_mps: less manifold pressure for each m/s above the mean airspeed, inHg per m/s
     attitude_gain_inhg_per_deg: more manifold pressure for each deg that the nose is too high, inHg per deg
     washout_s: time constant of the mean airspeed, about one period of the phugoid, s

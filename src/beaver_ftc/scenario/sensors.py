@@ -390,7 +390,7 @@ class SensorScale(SensorFault):
 
 
 class SensorFreeze(SensorFault):
-    """The reading stays at its last value."""
+    """The reading stays at its first value of the fault."""
 
     type: Literal["freeze"]
 

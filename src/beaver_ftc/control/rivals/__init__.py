@@ -1,1 +1,1 @@
-"""Rival laws, each after its source, behind the contract of control.py."""
+"""Rival laws, each after its source, behind the contract of control/__init__.py."""

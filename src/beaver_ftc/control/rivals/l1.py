@@ -1,7 +1,8 @@
 """L1 adaptive control with piecewise-constant adaptation [Hovakimyan2010, sec. 3.3].
 
-    xhat' = f + G u + sigma - a (xhat - x),      sigma = -e^{-a dt} / Phi (xhat - x),   Phi = (1 - e^{-a
-    dt}) / a G u = nu - f - C sigma,      C a first-order low-pass filter
+    xhat' = f + G u + sigma - a (xhat - x)
+    sigma = -e^{-a dt} / Phi (xhat - x),      Phi = (1 - e^{-a dt}) / a
+    G u = nu - f - C sigma,      C a first-order low-pass filter
 
 The adaptation is as fast as the frame allows; what reaches the surfaces is limited by C alone.
 """

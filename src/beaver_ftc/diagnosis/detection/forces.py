@@ -150,7 +150,7 @@ def terms_of_force(aircraft: Aircraft, i: int) -> list[Term]:
 def configure_forces(
     fdi: np.void, declared: Declared, trim: TrimState, slopes: np.ndarray, dt: float
 ) -> None:
-    """Fill the record of forces that are `known` from what is declared.
+    """Fill the record of the forces from what is declared.
 
     slopes (3, y.size): of the angular accelerations with y, in trim. dt s a frame.
     """

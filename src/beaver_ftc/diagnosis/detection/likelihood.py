@@ -49,8 +49,8 @@ A gust may be visible to the vanes only roughly, if no force separates it from t
 (gusts.py). It correlates with the surfaces of a law that uses the vanes. Its response is whitened likewise,
 and the evidence that it contributes is subtracted.
 
-Onsets: slot j restarts every 2^(j+1) frames, so that onsets of about every age exist at any time. After an
-alarm no slot restarts, and old evidence decays slowly.
+Onsets: slot j restarts every 2^(j+1) frames (the last one every 2^j), so that onsets of about every age exist
+at any time. After an alarm no slot restarts, and old evidence decays slowly.
 
 Letters of the kernels. A block b has n axes, 1 or 2; i is an axis, j a regressor, k an onset test; a digit
 at the end is an axis.

@@ -49,7 +49,7 @@ def yaw_per_thrust(aircraft: Aircraft) -> float:
 
 
 def configure_balance(config: np.void, aircraft: Aircraft) -> None:
-    """Fill the record (dtype CONFIG); it stays empty where the symmetry of the engines is not measured."""
+    """Fill the record (BALANCE_CONFIG); it stays empty where the symmetry of the engines is not measured."""
     error_map, signals = aircraft.file.model_error_map, list(aircraft.signals)
     if error_map is None or not error_map.knows_engines or not {THRUST_SIGNAL, YAW_SIGNAL} <= set(signals):
         return

@@ -116,7 +116,6 @@ MONITOR_CONFIG_RECORD = record(
 MONITOR_OUTPUT_RECORD = record(
     alarmed=int, alarmed_at_s=float,
     keeps_surface=int,  # a surface was found long before, with sound sensors: it stays found
-    had_surface=int,  # a surface had been isolated just before the alarm
     alarm_test=int,  # test that has raised the alarm
     worst_test_index=int, top_ratio=float,  # test with the largest ratio of this frame, and that ratio
     suspect=(int, N_SENSORS), isolated_sensor=int, isolated_at_s=float, is_reading_unused=(int, N_SENSORS),

@@ -330,7 +330,6 @@ def raise_alarm(mon, found, t):
     if found.detected:
         # the same fault, which the rates have shown first
         o.alarmed_at_s = found.detected_at_s
-    o.had_surface = found.isolated_estimator >= 0
 
 
 @kernel

@@ -1,7 +1,7 @@
 """Interacting multiple models: one Kalman filter a hypothesis, and the probability of each.
 
-Hypotheses: healthy; each surface with little and with much of its effectiveness lost; and one that explains
-anything badly, by noise alone, for faults outside the class. Mixing, filtering, combination as in
+Hypotheses: healthy; each surface with a quarter, half and nine tenths of its effectiveness lost; and one that
+explains anything badly, by noise alone, for faults outside the class. Mixing, filtering, combination as in
 [Blom1988]; actuator faults as modes as in [Zhang1998]. Declared turbulence is a state of each (kalman.py).
 """
 

@@ -13,7 +13,7 @@ test can exclude a type sooner without excluding a true one at some time.
     hardover        p reaches its stop at no less than half its rate limit, and stays
     bias            p = u + b              b constant; cut off by the stops
     oscillatory     p - u swings about 0   no half-cycle longer than pi / slowest oscillation
-    rate limit      p moves to u only      at any rate
+    rate limit      p moves to u only      at the slowest declared rate or faster
     growing bias    p = u + b              b of one sign and never smaller (incipient)
 
 A frame that eta alone explains gives no information: so a fault may be intermittent. The promise: the type,

@@ -278,11 +278,12 @@ class FdiConfig(Section, strict=True):
     probing: active diagnosis, for `fault_class: all`. `{}`: on; left out: off
     statistical: statistical detector besides the worst-case detector. `{}`: on; left out: off
     authority: detector that can raise the alarm and exclude, with `statistical`
-    thresholds: isolation tests: the residual must stay in an interval, or its magnitude below one bound
+    thresholds: isolation tests: the residual must stay in an interval, or its magnitude below one bound.
+    `zhang2005` sets `published`
     detection_pole_per_s: pole of the first detection filter, 1/s
     isolation_pole_per_s: pole of the isolation estimators, 1/s
     forgetting_time_s: time constant of the estimates, longer than one period of the reference, s
-    sharpen: steps beyond the published scheme
+    sharpen: steps beyond the published scheme. `thresholds: published` sets `none`
     pole_bank_per_s: poles of the detection filters after the first, 1/s
     fault_profile: assumption about the size of a fault. `any`: it can change. `abrupt`: it is constant
     """
@@ -401,8 +402,8 @@ Law = Annotated[str, named(partial(refusal, LAWS))]
 
 
 class EnginePower(Section, strict=True):
-    """Control of pitch by engine power, if elevator and flap are both lost. It requires the law
-    `fault-tolerant` with `fault_class: all`, or the law `oracle`.
+    """Control of pitch by engine power, if elevator and flap are both lost. It requires a law
+    that reallocates, with `fault_class: all`, or an oracle law.
 
     enabled: false: the law does not move the engines
     speed_gain_inhg_per_mps: less manifold pressure for each m/s above the mean airspeed, inHg per m/s
@@ -458,8 +459,8 @@ class ControlConfig(Section, strict=True):
     effectiveness_rate_per_s: fastest change of the effectiveness that the law uses, 1/s
     least_effectiveness: smallest effectiveness with which the law still uses a surface
     hand_over_s: duration of the reallocation from a failed surface to its stand-in, s
-    power: control of pitch by engine power, if elevator and flap are both lost: law `fault-tolerant` with
-    `fault_class: all`, or `oracle`
+    power: control of pitch by engine power, if elevator and flap are both lost: a law that reallocates,
+    with `fault_class: all`, or an oracle law
     """
 
     law: Law = entry("fault-tolerant", examples=["nominal"])

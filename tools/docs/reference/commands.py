@@ -71,7 +71,7 @@ _NOTES = """Some commands can end with status 1:
 |command|status 1 means|
 |---|---|
 |`run`, `sitl`|a flight misses an expectation of its scenario|
-|`sweep`|the sweep misses one of its expectations|
+|`sweep`|the sweep misses one of its expectations; with `--replay`, the flight misses one of its scenario|
 |`evidence`|a requirement is not met or not shown|
 |`verify`|a guarantee is violated|
 |`check`|a statement of the certificate does not hold|

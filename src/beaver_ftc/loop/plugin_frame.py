@@ -272,7 +272,8 @@ def plugged(
         fdi["isolation"]["estimator"]["surface"][:n] = range(n)
     if law is not None:
         control = frames["control"][0]
-        config, control["power"]["config"]["enabled"] = control["config"], 0
+        control["power"]["config"]["enabled"] = 0
+        config = control["config"]
         config["uses_verdict"], config["reallocates"] = getattr(law, "fault_tolerant", False), 0
         config["informed"] = 0
     return PluginFrame(frames, scenario, trim, detector, law, begun)

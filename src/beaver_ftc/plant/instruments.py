@@ -1,6 +1,8 @@
 """What the instruments make of the truth: lag, delay, slope, offset, noise, resolution, lost samples.
 
-    reading = quantised((1 + scale_error) lagged(t - delay) + bias + drift t + noise),    or the last one
+    reading = quantised((1 + scale_error) lagged(t - delay) + bias + drift t + noise)
+
+or the reading before, if this one is lost.
 
 Noise is white and normal, cut off at NOISE_LIMIT_SIGMA standard deviations: a bound on it can then be
 declared and holds. A flight draws its random numbers from a counter of its own [Steele2014], so it repeats

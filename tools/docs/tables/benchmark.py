@@ -59,18 +59,19 @@ def benchmark_probe() -> str:
     return _tables(_compared([case for case in cases if case.scenario.duration_s <= PROBED_S], workers=1))
 
 
+def _judged_on(again: Document) -> str:
+    """The draws on which a second tuning is judged: those after the ones that it flew."""
+    first = again["draw"] + again.get("draws", 1)
+    return f"{first} to {first + again['judged'] - 1}"
+
+
 GAINS = {
     "method": "name", "grade": "grade", "draw": "draw",
-    "judged on": lambda again: "{} to {}".format(*_judged_on(**again)),
+    "judged on": _judged_on,
     "flights": "flights", "cost, before": "built_in .3f", "cost, after": "retuned .3f",
     "gain, %": "gain *100 .1f", "from, %": "gain_low *100 .1f", "to, %": "gain_high *100 .1f",
     "adopted": lambda again: "yes" if is_adopted(again) else "no",
 }  # fmt: skip
-
-
-def _judged_on(draw: int, judged: int, draws: int = 1, **_: Any) -> tuple[int, int]:
-    """The first and the last draw on which a second tuning is judged."""
-    return draw + draws, draw + draws + judged - 1
 
 
 def benchmark_gains() -> str:

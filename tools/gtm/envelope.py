@@ -53,7 +53,7 @@ class Envelope:
         self.known: dict[float, np.ndarray] = {}  # level flight by speed
         self.near: dict[tuple[float, float, float], np.ndarray] = {}  # all that was found
         self.no_rudder = all(name in taken for name in surfaces("rudder"))
-        self.thin = sqrt(bench.density(ALTITUDE_FT) / SEA_LEVEL_SLUG_FT3)
+        self.thin = sqrt(bench.density / SEA_LEVEL_SLUG_FT3)
         bench.damage(case)
 
     def turns(
@@ -105,7 +105,7 @@ class Envelope:
         alpha, elevator, aileron, side, throttle, turning = map(float, x)
         beta, rudder = (side, 0.0) if self.no_rudder else (radians(sideslip), side)
         phi, V = radians(bank), speed * FT_S_PER_KNOT / self.thin
-        theta = pitch_angle(alpha, beta, phi, 0.0)
+        theta = pitch_angle(alpha, beta, phi)
         angles = map(degrees, (alpha, beta, phi, theta, elevator, aileron, rudder))
         for name, number in Steady(V, speed, *angles, 100.0 * throttle, 0.0).commands().items():
             self.bench.fdm[name] = number

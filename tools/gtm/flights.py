@@ -14,7 +14,7 @@ from scipy.optimize import fsolve, root
 from beaver_ftc_aircraft.gtm.database import read
 from beaver_ftc_aircraft.gtm.folder import write_model
 from beaver_ftc_aircraft.gtm.parameters import OUTPUTS, parameters
-from beaver_ftc_aircraft.gtm.steady import HEADING_DEG, Bench, Condition, Steady, pitch_angle
+from beaver_ftc_aircraft.gtm.steady import ALTITUDE_FT, HEADING_DEG, Bench, Condition, Steady, pitch_angle
 from tools.gtm.specification import (
     DATABASE,
     STEP_S,
@@ -88,23 +88,20 @@ def state_of(steady: Steady, altitude_ft: float = 800.0) -> State:
 
 def specified_trim(spec: Specification, wanted: Condition, guess: Steady) -> Steady:
     """Steady flight by the specification's own equations; wings free, no sideslip."""
-    assert (wanted.case in (1, 2), wanted.gamma_deg) == (False, 0.0), "rudders, level"
 
     def made(x: np.ndarray) -> Steady:
         first, phi, elevator, aileron, rudder, throttle = map(float, x)
         alpha = first if wanted.alpha_deg is None else wanted.alpha_deg
-        dense = (spec.air(wanted.altitude_ft)[1] / 0.0023769) ** 0.5
+        dense = (spec.air(ALTITUDE_FT)[1] / 0.0023769) ** 0.5
         V = first if wanted.alpha_deg is not None else float(wanted.eas_kt or 0.0) / 0.592487 / dense
-        theta = degrees(pitch_angle(radians(alpha), 0.0, radians(phi), 0.0))
+        theta = degrees(pitch_angle(radians(alpha), 0.0, radians(phi)))
         return Steady(
             V, V * 0.592487 * dense, alpha, 0.0, phi, theta, elevator, aileron, rudder, throttle, 0.0
         )
 
     def off(x: np.ndarray) -> np.ndarray:
         steady = made(x)
-        return spec.rates_of_change(
-            state_of(steady, wanted.altitude_ft).array(), of_steady(steady), wanted.case
-        )[:6]
+        return spec.rates_of_change(state_of(steady, ALTITUDE_FT).array(), of_steady(steady), 0)[:6]
 
     first = guess.alpha_deg if wanted.alpha_deg is None else guess.airspeed_fps
     others = "phi_deg", "elevator_deg", "aileron_deg", "rudder_deg", "throttle_percent"

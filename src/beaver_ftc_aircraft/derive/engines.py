@@ -14,11 +14,11 @@ from beaver_ftc.plant import FlightState, Plant
 
 RATE_HZ = 100
 SHORTER, _SHORT_S = 100, 0.2  # frames so many times shorter, for so long: a propeller shows it at once
-_RUN_S, _BETWEEN_S = 6.0, 0.1
+RUN_S, BETWEEN_S = 6.0, 0.1
 _LEAST_THRUST = 0.01  # of the weight
 _LEAST_LEVER = 0.01
 _FULL_LBS = 1e6  # JSBSim fills a tank to its capacity
-_LB_PER_SLUG = 32.17405
+LB_PER_SLUG = 32.17405
 
 
 @dataclass(frozen=True)
@@ -44,33 +44,58 @@ class Run:
         return self.thrust_lbs / self.weight_lbs
 
 
-def run(plant: Plant, lever: float, for_s: float = _RUN_S, filled: bool = False) -> Run:
+def steady_state(plant: Plant, power: float, alpha_rad: float = 0.0) -> FlightState:
+    """Level flight at this angle of attack in the middle of the envelope, at this setting of the power."""
+    return FlightState(
+        0.5 * sum(plant.aircraft.envelope.airspeed_mps), plant.aircraft.file.start.altitude_m or 0.0,
+        aircraft=plant.aircraft, alpha_rad=alpha_rad, theta_rad=alpha_rad, throttle=power,
+    )  # fmt: skip
+
+
+def hold(plant: Plant, state: FlightState, for_s: float, power: float | None = None) -> None:
+    """Let the engines run so long, at a setting of the power if one is given, the aircraft put back into a
+    state every tenth of a second."""
+    for _ in range(round(for_s / BETWEEN_S)):
+        plant.hold(state)
+        if power is not None:
+            plant.write(plant.aircraft.trim.throttle, power)
+        run_between(plant)
+
+
+def run_between(plant: Plant) -> None:
+    """Let a tenth of a second pass."""
+    for _ in range(round(BETWEEN_S / plant.dt_s)):
+        plant.run()
+
+
+def thrust_lbs(plant: Plant) -> float:
+    """Thrust of all engines."""
+    return sum(plant.read(f"propulsion/engine[{i}]/thrust-lbs") for i in range(plant.n_engines))
+
+
+def weight_lbs(plant: Plant) -> float:
+    """Weight of the aircraft."""
+    return plant.read("inertia/mass-slugs") * LB_PER_SLUG
+
+
+def run(plant: Plant, lever: float, for_s: float = RUN_S, filled: bool = False) -> Run:
     """What the engines of an aircraft do after a while in steady flight, held where it is, at a lever."""
-    low, high = plant.aircraft.envelope.airspeed_mps
-    state = FlightState(
-        0.5 * (low + high),
-        plant.aircraft.file.start.altitude_m or 0.0,
-        aircraft=plant.aircraft,
-        throttle=lever,
-    )
+    state = steady_state(plant, lever)
     try:
         for name in plant.tanks_lbs if filled else ():
             plant.write(name, _FULL_LBS)
         plant.start(state)
-        for _ in range(round(for_s / _BETWEEN_S)):
-            plant.hold(state)
-            for _ in range(round(_BETWEEN_S / plant.dt_s)):
-                plant.run()
+        hold(plant, state, for_s)
     except BeaverFtcError:
         return Run(0.0, (), (), (), 1.0, could=False)
     each = range(plant.n_engines)
     rpm = takewhile(plant.has, (f"propulsion/engine[{i}]/engine-rpm" for i in each))
     return Run(
-        sum(plant.read(f"propulsion/engine[{i}]/thrust-lbs") for i in each),
+        thrust_lbs(plant),
         tuple(plant.read(f"fcs/throttle-pos-norm[{i}]") for i in each),
         tuple(map(plant.read, rpm)),
         tuple(plant.read(f"moments/{axis}-prop-lbsft") for axis in "lmn"),
-        plant.read("inertia/mass-slugs") * _LB_PER_SLUG,
+        weight_lbs(plant),
     )
 
 

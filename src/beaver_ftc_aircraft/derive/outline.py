@@ -31,7 +31,14 @@ from beaver_ftc.documents import (
 from beaver_ftc.plant import FlightState, Plant, TrimPoint, bare, copy_of, others_of
 from beaver_ftc.plant import trim_plant as trim
 from beaver_ftc.scenario import initial_of
-from beaver_ftc_aircraft.derive.engines import RATE_HZ, why_no_power
+from beaver_ftc_aircraft.derive.engines import (
+    RATE_HZ,
+    hold,
+    steady_state,
+    thrust_lbs,
+    weight_lbs,
+    why_no_power,
+)
 from beaver_ftc_aircraft.derive.engines import run as run_engines
 from beaver_ftc_aircraft.derive.surfaces import Surfaces, Travel, moved_by, off_line, settled
 
@@ -55,7 +62,6 @@ _GUESS_RAD = 0.05
 _SAME_THRUST = 0.05
 _LEAST_THRUST = 0.01  # of the weight
 _HELD_S = 3.0
-LB_PER_SLUG = 32.17405
 # What a rudder at its stop leads to: a file's own terms hold wherever the air is attached.
 WIDE_SIDESLIP_RAD = 0.45
 
@@ -220,18 +226,11 @@ def _why(data: Data, folder: Path) -> str:
 
 def _steady_thrust(plant: Plant) -> float | None:
     """Thrust as a share of the weight if it and the rolling moment stay when time passes, else None."""
-    low, high = plant.aircraft.envelope.airspeed_mps
-    state = FlightState(
-        0.5 * (low + high), plant.aircraft.file.start.altitude_m or 0.0, aircraft=plant.aircraft,
-        alpha_rad=_GUESS_RAD, theta_rad=_GUESS_RAD, throttle=_POWER,
-    )  # fmt: skip
+    state = steady_state(plant, _POWER, _GUESS_RAD)
     try:
         plant.start(state)
         before = _push(plant)
-        for _ in range(round(10 * _HELD_S)):
-            plant.hold(state)
-            for _ in range(10):
-                plant.run()
+        hold(plant, state, _HELD_S)
         after = _push(plant)
     except BeaverFtcError:
         return None
@@ -241,9 +240,8 @@ def _steady_thrust(plant: Plant) -> float | None:
 
 def _push(plant: Plant) -> np.ndarray:
     """Thrust as a share of the weight, and the engines' rolling moment as a share of weight times span."""
-    thrust_lbs = sum(plant.read(f"propulsion/engine[{i}]/thrust-lbs") for i in range(plant.n_engines))
     roll_lbs = plant.read("moments/l-prop-lbsft") / plant.read("metrics/bw-ft")
-    return np.array([thrust_lbs, roll_lbs]) / (plant.read("inertia/mass-slugs") * LB_PER_SLUG)
+    return np.array([thrust_lbs(plant), roll_lbs]) / weight_lbs(plant)
 
 
 def level_flight(outlines: list[Data], folder: Path, notes: list[str]) -> Level:

@@ -100,8 +100,7 @@ class Samples:
 
     def at(self, wanted: np.ndarray) -> "Samples":
         """Those that are wanted, (n,)."""
-        arrays = {name: values[wanted] for name, values in vars(self).items() if name != "signals"}
-        return Samples(signals={name: values[wanted] for name, values in self.signals.items()}, **arrays)
+        return _each(lambda arrays: arrays[0][wanted], [self])
 
     def __len__(self) -> int:
         return len(self.x)
@@ -403,9 +402,14 @@ def sample_all(
 
 def joined(parts: Sequence[Samples]) -> Samples:
     """Samples one after the other."""
+    return _each(np.concatenate, parts)
+
+
+def _each(of: Callable[[list[np.ndarray]], np.ndarray], parts: Sequence[Samples]) -> Samples:
+    """Samples each array of which is made of the same one of these parts."""
     names = [name for name in vars(parts[0]) if name != "signals"]
-    arrays = {name: np.concatenate([getattr(of, name) for of in parts]) for name in names}
-    signals = {name: np.concatenate([of.signals[name] for of in parts]) for name in parts[0].signals}
+    arrays = {name: of([getattr(part, name) for part in parts]) for name in names}
+    signals = {name: of([part.signals[name] for part in parts]) for name in parts[0].signals}
     return Samples(signals=signals, **arrays)
 
 

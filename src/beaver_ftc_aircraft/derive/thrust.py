@@ -4,7 +4,6 @@ The aircraft is put back where it was time and again, so that it flies nowhere w
 so for the lag: JSBSim lets turbines jump to their speed whenever it initialises.
 """
 
-from collections.abc import Iterator
 from dataclasses import replace
 from math import isfinite
 from typing import Any
@@ -14,6 +13,7 @@ import numpy as np
 from beaver_ftc.aircraft import M_PER_FT, N_PER_LBF
 from beaver_ftc.plant import LEVER_DIFFERENCE as DIFFERENCE
 from beaver_ftc.plant import FlightState, Plant
+from beaver_ftc_aircraft.derive.engines import BETWEEN_S, hold, run_between
 
 OF_ENGINES = "forces/fbx-prop-lbs"
 # The force along the body's x axis, weight excepted: while the state is held, only the engines' part changes.
@@ -21,7 +21,6 @@ FORCE = "forces/fbx-total-lbs"
 SPEEDS, SETTINGS = 5, 6
 SETTLED_S, LONGEST_S = 6.0, 8.0  # after a step of the power; and of the step that shows the lag
 _FROM, _TO = 0.4, 0.7  # of the range: that step
-_BETWEEN_S = 0.1
 _STEP = 0.2  # of one engine's lever
 _MOMENTS = ("moments/m-prop-lbsft", "moments/n-prop-lbsft")
 LEAST_ARM_M = 0.2  # beside the centre of gravity
@@ -42,7 +41,10 @@ def thrust_of(plant: Plant, trim: FlightState) -> dict[str, Any] | None:
     for speed in airspeed_mps.tolist():
         state = replace(trim, airspeed_mps=speed)
         plant.start(state)
-        row = [list(_settling(plant, state, power, SETTLED_S))[-1] for power in setting.tolist()]
+        row = []
+        for power in setting.tolist():
+            hold(plant, state, SETTLED_S, power)
+            row.append(plant.read(FORCE) * N_PER_LBF)
         rows.append(np.maximum.accumulate(row) - row[0])
     lag_s = _lag_s(plant, trim, low, high)
     plant.start(trim)
@@ -61,8 +63,7 @@ def effectors_of(plant: Plant, trim: FlightState) -> dict[str, dict[str, Any]]:
         for difference in (0.0, -_STEP):
             plant.start(trim)
             plant.write(DIFFERENCE.format(i=i), difference)
-            for _ in _settling(plant, trim, plant.read(plant.aircraft.trim.throttle), SETTLED_S):
-                pass
+            hold(plant, trim, SETTLED_S, plant.read(plant.aircraft.trim.throttle))
             seen.append(np.array([plant.read(name) for name in (OF_ENGINES, *_MOMENTS)]))
         plant.write(DIFFERENCE.format(i=i), 0.0)
         changes.append(seen[0] - seen[1])
@@ -83,28 +84,15 @@ def _lag_s(plant: Plant, trim: FlightState, low: float, high: float) -> float:
     if not plant.has(OF_ENGINES):
         return 0.0
     plant.start(trim)
-    for _ in _settling(plant, trim, low + _FROM * (high - low), SETTLED_S):
-        pass
+    hold(plant, trim, SETTLED_S, low + _FROM * (high - low))
     before = plant.read(OF_ENGINES)
     plant.write(plant.aircraft.trim.throttle, low + _TO * (high - low))
-    force = np.array([_later(plant, OF_ENGINES) for _ in range(round(LONGEST_S / _BETWEEN_S))])
+    force = np.empty(round(LONGEST_S / BETWEEN_S))
+    for k in range(force.size):
+        run_between(plant)
+        force[k] = plant.read(OF_ENGINES)
     there = np.abs(force - before) >= _AFTER_TIME_CONSTANT * abs(force[-1] - before)
-    return float(np.argmax(there) * _BETWEEN_S)
-
-
-def _settling(plant: Plant, state: FlightState, power: float, for_s: float) -> Iterator[float]:
-    """The force at a setting, N, each tenth of a second, the aircraft held in a state."""
-    for _ in range(round(for_s / _BETWEEN_S)):
-        plant.hold(state)
-        plant.write(plant.aircraft.trim.throttle, power)
-        yield _later(plant, FORCE) * N_PER_LBF
-
-
-def _later(plant: Plant, name: str) -> float:
-    """A property a tenth of a second on."""
-    for _ in range(round(_BETWEEN_S / plant.dt_s)):
-        plant.run()
-    return plant.read(name)
+    return float(np.argmax(there) * BETWEEN_S)
 
 
 def _rounded(values: np.ndarray) -> list[float]:

@@ -12,8 +12,9 @@ import numpy as np
 
 from beaver_ftc_aircraft.gtm.database import Database, Table
 from beaver_ftc_aircraft.gtm.elements import (
+    FAR_ALPHA_DEG,
+    FAR_BETA_DEG,
     FAR_HAT,
-    along_angles,
     declared,
     do,
     extended,
@@ -119,9 +120,16 @@ def _flow(terms: _Terms, static: Table) -> None:
     terms.helper("aero/envelope-valid", "1 inside the static tables", do("and", *inside))
 
 
+def _along_angles(of: Table, i: int) -> tuple[np.ndarray, ...]:
+    """Output i of a table of alpha and beta, to where these angles end, with both grids."""
+    data, alphas = extended(of.data[..., i], of.axes["alpha"], FAR_ALPHA_DEG, 0)
+    data, betas = extended(data, of.axes["beta"], FAR_BETA_DEG, 1)
+    return data, alphas, betas
+
+
 def _over_angles(of: Table, i: int, beta: str = BETA) -> str:
     """Output i of a table of alpha and beta."""
-    data, alphas, betas = along_angles(of.data[..., i], of.axes["alpha"], of.axes["beta"])
+    data, alphas, betas = _along_angles(of, i)
     return table(data, [(ALPHA, alphas), (beta, betas)])
 
 
@@ -134,9 +142,18 @@ def _static(terms: _Terms, base: Database) -> None:
         added = table(damaged.data[..., i], keys)
         terms.add(output, "damage", "What damage adds", unless_zero(DAMAGE_CASE, added))
     for i, output in enumerate(LONGITUDINAL):
-        data, alphas = extended(gear.data[:, 1, i], gear.axes["alpha"], 180.0, 0)
+        data, alphas = extended(gear.data[:, 1, i], gear.axes["alpha"], FAR_ALPHA_DEG, 0)
         down = unless_zero(GEAR, table(data, [(ALPHA, alphas)]))
         terms.add(output, "gear", "Landing gear that is not up", down)
+
+
+def _between(tables: dict[str, str], surface: str, grid: list[float], is_first: bool) -> str:
+    """Straight lines over a surface's deflection between tables by name, an empty one at neutral. Where a
+    table is read first, it stands itself."""
+    body = piecewise(effective(surface), grid, [read(name) if of else "" for name, of in tables.items()])
+    for name, of in tables.items() if is_first else ():
+        body = body.replace(read(name), of, 1)
+    return body
 
 
 def _elevator(terms: _Terms, of: Table) -> None:
@@ -147,22 +164,18 @@ def _elevator(terms: _Terms, of: Table) -> None:
     grid = [radians(point) for point in elev]
     segments = surfaces("elevator")
     for i, output in enumerate(LONGITUDINAL):
-        data, alphas, betas = along_angles(of.data[..., i], of.axes["alpha"], of.axes["beta"])
+        data, alphas, betas = _along_angles(of, i)
         alone = data[..., neutral]
         stabiliser = table(alone, [(ALPHA, alphas), (BETA, betas), (effective("stabiliser"), stab)])
         terms.add(output, "stabiliser", "Stabiliser", unless_zero(effective("stabiliser"), stabiliser))
         stands = [(ALPHA, alphas), (BETA, betas), ("fcs/stabiliser-stands-rad", stab)]
-        names, tables = [], {}
+        tables = {}
         for j, point in enumerate(elev):
             name = f"aero/elevator/{output}-at-{'up' if point < 0 else 'down'}-{abs(point):.0f}-deg"
-            names.append("" if j == neutral else name)
-            tables[name] = table(data[..., j] - alone, stands, name)
-        values = [read(name) if name else "" for name in names]
+            tables[name] = "" if j == neutral else table(data[..., j] - alone, stands, name)
         before: list[str] = []
         for surface in segments:
-            body = piecewise(effective(surface), grid, values)
-            for name in names if not before else ():  # where it is read first, a table stands itself
-                body = body.replace(read(name), tables[name], 1) if name else body
+            body = _between(tables, surface, grid, not before)
             for other in before:
                 same = do("eq", read(effective(surface)), read(effective(other)))
                 body = do("ifthen", same, read(f"aero/elevator/{output}-of-{other}"), body)
@@ -191,7 +204,7 @@ def _ailerons(terms: _Terms, of: Table) -> None:
     for surface, about in surfaces("aileron").items():
         left = about["side"] == "left"
         for i, output in enumerate(OUTPUTS):
-            data, alphas, betas = along_angles(of.data[..., i], of.axes["alpha"], of.axes["beta"])
+            data, alphas, betas = _along_angles(of, i)
             data, deflections = extended(data, of.axes["ail"], far, 2)
             keys = [(ALPHA, alphas), (MIRRORED if left else BETA, betas)]
             found = table(
@@ -216,7 +229,7 @@ def _rudder(terms: _Terms, of: Table) -> None:
             body = do("product", read(f"aero/{surface}/sign"), read(of_it))
             terms.helper(f"aero/{surface}/{name}", "What its table is read at", body)
     for i, output in enumerate(OUTPUTS):
-        data, alphas, betas = along_angles(of.data[..., i], of.axes["alpha"], of.axes["beta"])
+        data, alphas, betas = _along_angles(of, i)
         data, deflections = extended(data, of.axes["rud"], 90.0, 2)
         data, deflections = data[..., :-1], deflections[:-1]  # never beyond neutral
         for surface in (upper, lower):
@@ -242,18 +255,15 @@ def _spoilers(terms: _Terms, of: Table) -> None:
     for side, beta in (("left", MIRRORED), ("right", BETA)):
         these = {name: about for name, about in surfaces("spoiler").items() if about["side"] == side}
         for i, output in enumerate(OUTPUTS):
-            data, alphas, betas = along_angles(of.data[..., i], of.axes["alpha"], of.axes["beta"])
+            data, alphas, betas = _along_angles(of, i)
             data = data * (MIRROR[i] if side == "left" else 1.0)
-            names = [f"aero/spoiler/{side}-{output}-at-{point:.0f}-deg" for point in of.axes["spo"]]
-            tables = {
-                read(name): table(data[..., j], [(ALPHA, alphas), (beta, betas)], name)
-                for j, name in enumerate(names)
-            }
+            tables = {}
+            for j, point in enumerate(of.axes["spo"]):
+                name = f"aero/spoiler/{side}-{output}-at-{point:.0f}-deg"
+                tables[name] = table(data[..., j], [(ALPHA, alphas), (beta, betas)], name) if j else ""
             parts: list[str] = []
             for surface, about in these.items():
-                body = piecewise(effective(surface), grid, ["", *(read(name) for name in names[1:])])
-                for name in names[1:] if not parts else ():
-                    body = body.replace(read(name), tables[read(name)], 1)
+                body = _between(tables, surface, grid, not parts)
                 body = do("product", value(about["share"][i]), body)
                 parts.append(unless_zero(effective(surface), body))
             says = f"{side.capitalize()} spoilers, inboard and outboard"
@@ -285,8 +295,8 @@ def _rates(terms: _Terms, base: Database) -> None:
     _split(terms)
     rotary, scale, added = base["dC6_w"], base["dC6_damage.ddscale"], base["dC6_damage.ddinc"]
     for i, output in enumerate(OUTPUTS):
-        data, alphas = extended(rotary.data[..., i], rotary.axes["alpha"], 180.0, 0)
-        data, betas = extended(data, rotary.axes["beta"], 90.0, 2)
+        data, alphas = extended(rotary.data[..., i], rotary.axes["alpha"], FAR_ALPHA_DEG, 0)
+        data, betas = extended(data, rotary.axes["beta"], FAR_BETA_DEG, 2)
         keys = [(ALPHA, alphas), (BETA, betas), ("aero/rates/rotation-hat", rotary.axes["what"])]
         found = unless_zero("aero/rates/rotation-rad_sec", table(np.swapaxes(data, 1, 2), keys))
         terms.add(output, "rotation", "Steady rotation about the velocity vector", found)
@@ -296,7 +306,7 @@ def _rates(terms: _Terms, base: Database) -> None:
         at_alpha = _held(terms, rate, "alpha-deg", ALPHA, grids[0])
         at_hat = _held(terms, rate, "hat", f"aero/{rate}-hat", grids[1])
         for i, output in enumerate(outputs):
-            data, alphas = extended(of.data[..., i], grids[0], 180.0, 0)
+            data, alphas = extended(of.data[..., i], grids[0], FAR_ALPHA_DEG, 0)
             data, hats = extended(data, grids[1], FAR_HAT, 1)
             found = table(data, [(at_alpha, alphas), (at_hat, hats)])
             scaled = table(
@@ -307,7 +317,9 @@ def _rates(terms: _Terms, base: Database) -> None:
             terms.add(output, rate, f"Oscillatory part of {rate}", body)
     parts: list[str] = []
     for k, (rate, *_) in enumerate(_RATES):
-        data, alphas = extended(added.data[:, :, k, OUTPUTS.index("CY")], added.axes["alpha"], 180.0, 0)
+        data, alphas = extended(
+            added.data[:, :, k, OUTPUTS.index("CY")], added.axes["alpha"], FAR_ALPHA_DEG, 0
+        )
         parts.append(
             do("product", table(data, [(ALPHA, alphas), (DAMAGE_CASE, _CASES)]), read(f"aero/{rate}-hat"))
         )

@@ -9,7 +9,7 @@ from xml.sax.saxutils import escape
 
 import numpy as np
 
-FAR_DEG = {"alpha": 180.0, "beta": 90.0}  # where an angle ends
+FAR_ALPHA_DEG, FAR_BETA_DEG = 180.0, 90.0  # where these angles end
 FAR_HAT = 10.0  # a dimensionless rate no flight has
 _DIGITS = ".13g"
 
@@ -22,6 +22,11 @@ def value(number: float) -> str:
 def read(name: str) -> str:
     """The value of a property."""
     return f"<property>{name}</property>"
+
+
+def triple(of: Iterable[float]) -> str:
+    """Three numbers, along x, y and z."""
+    return "".join(f"<{axis}>{float(number)!r}</{axis}>" for axis, number in zip("xyz", of, strict=True))
 
 
 def do(operation: str, *arguments: str) -> str:
@@ -63,13 +68,6 @@ def extended(data: np.ndarray, grid: np.ndarray, far: float, axis: int) -> tuple
 
     longer = np.concatenate([[on(-far, 1, 0)], values, [on(far, -2, -1)]])
     return np.moveaxis(longer, 0, axis), np.concatenate([[-far], grid, [far]])
-
-
-def along_angles(data: np.ndarray, alpha: np.ndarray, beta: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Data over alpha and beta (first axes) up to where these angles end, with both grids."""
-    data, alpha = extended(data, alpha, FAR_DEG["alpha"], 0)
-    data, beta = extended(data, beta, FAR_DEG["beta"], 1)
-    return data, alpha, beta
 
 
 def table(data: np.ndarray, keys: Sequence[tuple[str, np.ndarray]], name: str = "") -> str:

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import escape
 
-import numpy as np
 import yaml
 
 from beaver_ftc.aircraft import AIRCRAFT_FILE as FILE
@@ -14,6 +13,7 @@ from beaver_ftc.aircraft import KG_PER_LB, M_PER_FT, MAX_SURFACES
 from beaver_ftc_aircraft.derive.sample import Envelope, Moves
 from beaver_ftc_aircraft.gtm.aerodynamics import aerodynamics
 from beaver_ftc_aircraft.gtm.database import WHERE, Database
+from beaver_ftc_aircraft.gtm.elements import triple
 from beaver_ftc_aircraft.gtm.masses import LBS_PER_SLUG, mass_balance, mass_of, structural_in
 from beaver_ftc_aircraft.gtm.parameters import cases, parameters
 from beaver_ftc_aircraft.gtm.steady import ALTITUDE_FT, HEADING_DEG, LATITUDE_DEG, LONGITUDE_DEG, Steady
@@ -30,12 +30,9 @@ def write_model(base: Database, folder: Path) -> Path:
     for name, text in files.items():
         (folder / "Systems" / f"{name}.xml").write_text(text, encoding="utf-8")
     of = parameters()["geometry"]
-    reference = structural_in(np.array(of["reference_ft"]))
-    points = "".join(
-        f'<location name="{name}" unit="IN"><x>{float(reference[0])!r}</x><y>{float(reference[1])!r}</y>'
-        f"<z>{float(reference[2])!r}</z></location>"
-        for name in ("AERORP", "EYEPOINT", "VRP")
-    )
+    reference = triple(structural_in(of["reference_ft"]))
+    names = "AERORP", "EYEPOINT", "VRP"
+    points = "".join(f'<location name="{name}" unit="IN">{reference}</location>' for name in names)
     text = (
         '<?xml version="1.0"?>\n<fdm_config name="GTM T2" version="2.0" release="PRODUCTION">\n'
         "<fileheader><author>beaver-ftc</author>"

@@ -12,7 +12,7 @@ from itertools import product
 import numpy as np
 
 from beaver_ftc.aircraft import M_PER_FT
-from beaver_ftc_aircraft.gtm.elements import table
+from beaver_ftc_aircraft.gtm.elements import table, triple
 from beaver_ftc_aircraft.gtm.parameters import DAMAGE_CASE, cases, parameters
 
 LBS_PER_SLUG = 32.174049  # JSBSim's own
@@ -69,7 +69,7 @@ def mass_of(case: int = 0, gear_down: bool = False) -> Mass:
     return Mass(left, weight * cg / left + shift, inertia)
 
 
-def structural_in(point_ft: np.ndarray) -> np.ndarray:
+def structural_in(point_ft: np.ndarray | list[float]) -> np.ndarray:
     """A place in JSBSim's structural frame, x aft, y right, z up, inches."""
     return np.asarray(point_ft) * [-12.0, 12.0, -12.0]
 
@@ -119,7 +119,7 @@ def mass_balance() -> str:
     }  # fmt: skip
     parts = [f'<{name} unit="SLUG*FT2">{float(number)!r}</{name}>' for name, number in entries.items()]
     parts.append(f'<emptywt unit="LBS">{whole.weight_lbf!r}</emptywt>')
-    parts.append(f'<location name="CG" unit="IN">{_xyz(in_)}</location>')
+    parts.append(f'<location name="CG" unit="IN">{triple(in_)}</location>')
     names = ("mass", "fore", "aft", "right", "left", "up", "down")
     metre = [np.zeros(3), *(sign * np.eye(3)[axis] for axis, sign in product(range(3), (1, -1)))]
     for name, way in zip(names, metre, strict=True):
@@ -131,10 +131,6 @@ def mass_balance() -> str:
 
 
 def _point(name: str, place_ft: np.ndarray) -> str:
-    at = _xyz(structural_in(place_ft))
+    at = triple(structural_in(place_ft))
     weight = '<weight unit="LBS">0</weight>'
     return f'<pointmass name="{name}">{weight}<location unit="IN">{at}</location></pointmass>'
-
-
-def _xyz(of: np.ndarray) -> str:
-    return "".join(f"<{axis}>{float(number)!r}</{axis}>" for axis, number in zip("xyz", of, strict=True))

@@ -5,6 +5,7 @@ Newton's method on JSBSim's own six accelerations, with time standing still.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import atan, cos, degrees, radians, sin, sqrt
 from pathlib import Path
 from typing import Any
@@ -24,20 +25,20 @@ _ACCELERATIONS = (
     *(f"accelerations/{axis}dot-rad_sec2" for axis in "pqr"),
 )
 _STEPS, _SMALL = 40, 1e-9
+# Of angle of attack, bank, elevator, right aileron and rudder, rad, and the throttle; if the first is given,
+# of the airspeed in its place, ft/s.
 _DIFFERENCES = np.array([1e-5, 1e-5, 1e-4, 1e-4, 1e-4, 1e-3])
 _GUESS = np.array([radians(3.0), 0.0, radians(2.4), 0.0, 0.0, 0.4])
 _LARGEST_STEP = np.array([0.05, 0.1, 0.2, 0.2, 0.2, 0.3])
+_OF_AIRSPEED = 0.01, 20.0  # difference and largest step, ft/s
 
 
 @dataclass(frozen=True)
 class Condition:
-    """What is wanted: equivalent airspeed in knots or angle of attack; path angle; the case of damage."""
+    """What is wanted: equivalent airspeed in knots, or angle of attack."""
 
     eas_kt: float | None = None
     alpha_deg: float | None = None
-    gamma_deg: float = 0.0
-    altitude_ft: float = ALTITUDE_FT
-    case: int = 0
 
 
 @dataclass(frozen=True)
@@ -107,20 +108,19 @@ class Bench:
         """Of u, v, w in ft/s2, of p, q, r in rad/s2."""
         return np.array([self.fdm[name] for name in _ACCELERATIONS])
 
-    def steady(self, wanted: Condition, guess: Steady | None = None) -> Steady:
-        """Steady flight as wanted. Raises BadInput where there is none."""
-        self.damage(wanted.case)
-        x = _GUESS.copy() if guess is None else self._unknowns(wanted, guess)
-        if guess is None and wanted.alpha_deg is not None:
+    def steady(self, wanted: Condition) -> Steady:
+        """Level flight as wanted, without sideslip. Raises BadInput where there is none."""
+        self.damage(0)
+        x, scale, most = _GUESS.copy(), _DIFFERENCES.copy(), _LARGEST_STEP.copy()
+        if wanted.alpha_deg is not None:
             x[0] = _usual_speed(wanted.alpha_deg)
+            scale[0], most[0] = _OF_AIRSPEED
         for _ in range(_STEPS):
             off = self._off(wanted, x)
             if np.abs(off).max() < _SMALL:
                 break
-            scale = _DIFFERENCES * (np.array([1e3, 1, 1, 1, 1, 1]) if wanted.alpha_deg is not None else 1.0)
             columns = [(self._off(wanted, x + step) - off) / sum(step) for step in np.diag(scale)]
             step = np.linalg.lstsq(np.array(columns).T, -off, rcond=None)[0]
-            most = _LARGEST_STEP * (np.array([400.0, 1, 1, 1, 1, 1]) if wanted.alpha_deg is not None else 1.0)
             x = x + step * min(1.0, float((most / np.maximum(np.abs(step), 1e-12)).min()))
         left = float(np.abs(self._off(wanted, x)).max())
         if not left < 1e-6:
@@ -131,48 +131,27 @@ class Bench:
         found = self._found(wanted, x, 0.0)
         for name, number in found.commands().items():
             self.fdm[name] = number
-        heading = radians(HEADING_DEG)
-        self.place(
-            wanted.altitude_ft,
-            found.velocity_fps,
-            (radians(found.phi_deg), radians(found.theta_deg), heading),
-        )
+        angles_deg = found.phi_deg, found.theta_deg, HEADING_DEG
+        self.place(ALTITUDE_FT, found.velocity_fps, map(radians, angles_deg))
         return self.accelerations()
 
-    def _unknowns(self, wanted: Condition, of: Steady) -> np.ndarray:
-        first = radians(of.alpha_deg) if wanted.alpha_deg is None else of.airspeed_fps
-        side = of.beta_deg if _no_rudder(wanted.case) else of.rudder_deg
-        angles = (of.phi_deg, of.elevator_deg, of.aileron_deg, side)
-        return np.array([first, *map(radians, angles), of.throttle_percent / 100.0])
-
     def _found(self, wanted: Condition, x: np.ndarray, left: float) -> Steady:
-        first, phi, elevator, aileron, side, throttle = map(float, x)
-        beta, rudder = (side, 0.0) if _no_rudder(wanted.case) else (0.0, side)
-        thin = sqrt(self.density(wanted.altitude_ft) / SEA_LEVEL_SLUG_FT3)
+        first, phi, elevator, aileron, rudder, throttle = map(float, x)
+        thin = sqrt(self.density / SEA_LEVEL_SLUG_FT3)
         if wanted.alpha_deg is None:
             alpha, V = first, float(wanted.eas_kt or 0.0) * FT_S_PER_KNOT / thin
         else:
             alpha, V = radians(wanted.alpha_deg), first
-        theta = pitch_angle(alpha, beta, phi, radians(wanted.gamma_deg))
+        theta = pitch_angle(alpha, 0.0, phi)
         eas = V / FT_S_PER_KNOT * thin
-        angles = [degrees(x) for x in (alpha, beta, phi, theta, elevator, aileron, rudder)]
+        angles = [degrees(x) for x in (alpha, 0.0, phi, theta, elevator, aileron, rudder)]
         return Steady(V, eas, *angles, 100.0 * throttle, left)  # type: ignore[call-arg]
 
-    def density(self, altitude_ft: float) -> float:
-        """Of the air, slug/ft3."""
-        if altitude_ft not in self._density:
-            self.place(altitude_ft, (100.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-            self._density[altitude_ft] = self.fdm["atmosphere/rho-slugs_ft3"]
-        return self._density[altitude_ft]
-
-    @property
-    def _density(self) -> dict[float, float]:
-        return self.__dict__.setdefault("_known", {})
-
-
-def _no_rudder(case: int) -> bool:
-    taken = list(cases().values())[case - 1]["takes"] if case else ()
-    return all(name in taken for name in surfaces("rudder"))
+    @cached_property
+    def density(self) -> float:
+        """Of the air at ALTITUDE_FT, slug/ft3."""
+        self.place(ALTITUDE_FT, (100.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+        return float(self.fdm["atmosphere/rho-slugs_ft3"])
 
 
 def _usual_speed(alpha_deg: float) -> float:
@@ -181,9 +160,8 @@ def _usual_speed(alpha_deg: float) -> float:
     return sqrt(lift / min(1.1, 0.12 + 0.09 * alpha_deg))
 
 
-def pitch_angle(alpha: float, beta: float, phi: float, gamma: float) -> float:
-    """The pitch attitude that gives a path angle [Stevens and Lewis, 2.2-4], rad."""
+def pitch_angle(alpha: float, beta: float, phi: float) -> float:
+    """The pitch attitude of level flight [Stevens and Lewis, 2.2-4], rad."""
     a = cos(alpha) * cos(beta)
     b = sin(phi) * sin(beta) + cos(phi) * sin(alpha) * cos(beta)
-    g = sin(gamma)
-    return atan((a * b + g * sqrt(a * a - g * g + b * b)) / (a * a - g * g))
+    return atan(b / a)

@@ -7,11 +7,9 @@ delay set.
 from math import cos, pi, radians, sin, sqrt
 from typing import Any
 
-import numpy as np
-
 from beaver_ftc.plant import ACTUATOR_DELAY as DELAY
 from beaver_ftc.plant import actuator_system
-from beaver_ftc_aircraft.gtm.elements import component, declared, do, function, piecewise, read, value
+from beaver_ftc_aircraft.gtm.elements import component, declared, do, function, piecewise, read, triple, value
 from beaver_ftc_aircraft.gtm.masses import structural_in, weights_by_case
 from beaver_ftc_aircraft.gtm.parameters import DAMAGE_CASE, GEAR, can_be_taken, cases, parameters
 
@@ -250,10 +248,10 @@ def external_reactions() -> str:
     forces = []
     for engine in ENGINES:
         body = f"<function>{read(f'engine/{engine}/thrust-lbs')}</function>"
-        location = _triple(tuple(structural_in(np.array(_of(engine)["position_ft"]))))
+        location = triple(structural_in(_of(engine)["position_ft"]))
         forces.append(
             f'<force name="{engine}" frame="BODY">{body}<location unit="IN">{location}</location>'
-            f"<direction>{_triple(direction(engine))}</direction></force>"
+            f"<direction>{triple(direction(engine))}</direction></force>"
         )
     rate = {axis: read(f"velocities/{name}-rad_sec") for axis, name in zip("xyz", "pqr", strict=True)}
     for axis, one, other in ("xyz", "yzx", "zxy"):
@@ -262,7 +260,7 @@ def external_reactions() -> str:
             do("product", rate[one], read(f"engine/rotors/h-{other}")),
             do("product", rate[other], read(f"engine/rotors/h-{one}")),
         )
-        unit = _triple(tuple(float(axis == each) for each in "xyz"))
+        unit = triple(axis == each for each in "xyz")
         forces.append(
             f'<moment name="rotors-{axis}" frame="BODY"><function>{body}</function>'
             f"<direction>{unit}</direction></moment>"
@@ -279,10 +277,6 @@ def direction(engine: str) -> tuple[float, float, float]:
     """The way an engine pushes, body axes."""
     pitched, yawed = (radians(_of(engine)[f"{way}_deg"]) for way in ("pitched", "yawed"))
     return cos(pitched) * cos(yawed), sin(yawed), -sin(pitched) * cos(yawed)
-
-
-def _triple(of: tuple[float, ...]) -> str:
-    return "".join(f"<{axis}>{float(number)!r}</{axis}>" for axis, number in zip("xyz", of, strict=True))
 
 
 def _polynomial(of: list[float], x: str) -> str:

@@ -18,7 +18,7 @@ from beaver_ftc.diagnosis import Actuator, FaultTypesConfig
 from beaver_ftc.scenario import Scenario
 from beaver_ftc_assurance.certificates.history import Document, History
 from beaver_ftc_assurance.certificates.inequality import Hypothesis, theta_bounds_by_frame
-from beaver_ftc_assurance.certificates.kinds import hypothesis_held_anywhere, travel_rad
+from beaver_ftc_assurance.certificates.kinds import STUCK, hypothesis_of_type, travel_rad
 from beaver_ftc_assurance.certificates.tape import Tape
 
 MIN_POSITION_DIFFERENCE_RAD = 1e-9  # two positions that differ by less are not compared
@@ -192,7 +192,7 @@ def evidence(
     scenario: Scenario, tape: Tape, history: History, surface: int, fault_type: int, alarm_frame: int
 ) -> Document | None:
     """What excludes a fault type on a surface by its course; None where single frames do not."""
-    held, row = hypothesis_held_anywhere(tape, surface), TYPES[fault_type]
+    held, row = hypothesis_of_type(tape, surface, STUCK), TYPES[fault_type]
     for sign in (row.stop_direction,) if row.stop_direction else (1, -1):
         bounds = _surface_bounds(scenario, tape, history, held, surface, alarm_frame, sign)
         found = RULES[row.frames_test](bounds)

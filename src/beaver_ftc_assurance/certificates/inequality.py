@@ -12,7 +12,6 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import combinations, compress
 from math import exp, inf, isinf
-from typing import NamedTuple
 
 import numpy as np
 
@@ -80,16 +79,6 @@ class Term:
     effect_before: float = 0.0
 
 
-class _Numbers(NamedTuple):
-    """Of a term: its fields; sums (3,): weighted value, and limit without a constant theta, rad/s, and the
-    factor of a constant theta in that limit; decides: whether the least, and the greatest, theta decides in
-    any frame."""
-
-    fields: Document
-    sums: np.ndarray
-    decides: tuple[bool, bool]
-
-
 @dataclass(frozen=True)
 class Inequality:
     """A sum over filters, and the hypothesis that allows no more than its limit."""
@@ -101,23 +90,28 @@ class Inequality:
     def statement(self) -> Document | None:
         """The fields of a statement: every number that the inequality takes, and none that decides nothing.
         None unless the data exceed the limit of the hypothesis by more than rounding."""
-        of, numbers = self.hypothesis, [self._evaluate(term) for term in self.terms]
-        value, limit, slope = np.sum([one.sums for one in numbers], axis=0).tolist()
+        of, found = self.hypothesis, [self._evaluate(term) for term in self.terms]
+        said, sums, deciding = zip(*found, strict=True)
+        value, limit, slope = np.sum(sums, axis=0).tolist()
         by_theta = max(of.theta_low * slope, of.theta_high * slope) if abs(slope) > MIN_SLOPE else 0.0
         limit += by_theta
         if not value - limit > MIN_RELATIVE_MARGIN * max(abs(limit), abs(value)):
             return None
-        said, decides = [one.fields for one in numbers], np.any([one.decides for one in numbers], axis=0)
+        decides = np.any(deciding, axis=0)
         if of.theta != ANY:
             decides = np.array([by_theta and slope < 0.0, by_theta and slope > 0.0])
             if abs(slope) > MIN_SLOPE and not by_theta:  # the end of the range that counts is zero: no effect
                 said = [{name: entry for name, entry in one.items() if name != "Z"} for one in said]
         ends = dict(compress({"least": of.theta_low, "most": of.theta_high}.items(), decides))
         about = {**self.history.statement_fields, "theta": of.theta, **ends}
-        return {**about, "terms": said, "sides": [value, limit]}
+        return {**about, "terms": list(said), "sides": [value, limit]}
 
-    def _evaluate(self, term: Term) -> _Numbers:
-        """E = sum of a^(k-j) dt nu[j].d over the frames j after filter_start, k: last_frame; and its limit:
+    def _evaluate(self, term: Term) -> tuple[Document, np.ndarray, tuple[bool, bool]]:
+        """Fields of a term; sums (3,): weighted value, and limit without a constant theta, rad/s, and the
+        factor of a constant theta in that limit; whether the least, and the greatest, theta decides in any
+        frame.
+
+        E = sum of a^(k-j) dt nu[j].d over the frames j after filter_start, k: last_frame; and its limit:
         the same sum of eta_bar, the gyro noise of both ends, and the largest effect of the fault."""
         of, history, d, dt = self.hypothesis, self.history, term.direction, self.history.dt
         start, last, first = term.filter_start, term.last_frame, self._first_written_frame(term)
@@ -141,7 +135,7 @@ class Inequality:
         limit += _filtered(a, dt, done, before)
         decides = bool((adds & (at_low > at_high)).any()), bool((adds & (at_high > at_low)).any())
         sums = term.weight * np.array([value, limit, slope])
-        return _Numbers(self._fields_of(term, rows, before, adds), sums, decides)
+        return self._fields_of(term, rows, before, adds), sums, decides
 
     def _fields_of(self, term: Term, rows: slice, before: float, adds: np.ndarray) -> Document:
         """The fields of a term whose frames `rows` are written out. before: largest effect of the fault

@@ -11,11 +11,8 @@ from beaver_ftc.diagnosis.monitors import COMPARISON_ROUNDING, N_EQUATIONS, RPM_
 from beaver_ftc.plant import SENSORS
 from beaver_ftc.results import Document
 from beaver_ftc.scenario import sensor_words
+from beaver_ftc_assurance.certificates.check_certificate import TESTS
 
-TESTS = (
-    "turning p", "turning q", "turning r", "phi", "theta", "psi", "V", "alpha", "beta", "density", "altitude",
-    "engine_rpm", "manifold_pressure",
-)  # fmt: skip
 BECAUSE_BETWEEN_ROWS = "instruments raised it between two rows of the log"
 BECAUSE_NO_EQUATION = "a sensor raised it that no equation of the diagnosis uses"
 ROUNDING_SHARE = 1e-13  # of a limit: a smaller number is rounding

@@ -12,7 +12,7 @@ import numpy as np
 
 from beaver_ftc.diagnosis import DESCRIPTIONS_IN_TYPE_ORDER as WORDS
 from beaver_ftc.diagnosis import TYPE_ROWS as TYPES
-from beaver_ftc.diagnosis import DeflectionRelation
+from beaver_ftc.diagnosis import type_index_of
 from beaver_ftc_assurance.certificates.check_certificate import COURSES, RELATION_COLUMNS, RELATIONS
 from beaver_ftc_assurance.certificates.history import History
 from beaver_ftc_assurance.certificates.inequality import (
@@ -29,9 +29,7 @@ EXCLUDED_BY_MANY_FRAMES = "frames of quiet excluded it, or what several say toge
 OSCILLATION_AT_STOP = "of several instants a frame, a swing that a stop cuts off may keep its sign"
 UNKNOWN_TYPE = "no certificate is known for this type"
 RETURNING_SURFACE = "its actuator may be bringing the surface back"
-HELD_ANYWHERE = DeflectionRelation(
-    command_gain=0.0, theta_is_share=False, theta_span=lambda low, high: (low, high)
-)
+STUCK = type_index_of("stuck")
 
 
 def excluded_types(tape: Tape) -> Iterator[tuple[int, int, int]]:
@@ -88,32 +86,21 @@ def type_definition_columns(tape: Tape, surface: str, s: int, kind: int) -> dict
 
 
 def hypothesis_of_type(tape: Tape, surface: int, fault_type: int) -> Hypothesis:
-    """The effect on the innovation of a fault of this type on a surface."""
-    relation = TYPES[fault_type].deflection_relation
-    assert relation is not None
-    return _effect_of_relation(tape, surface, relation, TYPES[fault_type].has_constant_parameter)
-
-
-def hypothesis_held_anywhere(tape: Tape, surface: int) -> Hypothesis:
-    """The effect on the innovation of a surface held at theta, rad: by it a frame bounds the position."""
-    return _effect_of_relation(tape, surface, HELD_ANYWHERE, True)
-
-
-def _effect_of_relation(
-    tape: Tape, surface: int, relation: DeflectionRelation, theta_is_constant: bool
-) -> Hypothesis:
-    """G (p - u) of a relation; p: position of the surface, u: command in effect, rad."""
-    diagnosis = tape.alarm.diagnosis
+    """The effect on the innovation of a fault of this type on a surface, G (p - u); p: position of the
+    surface, by the relation of the type; u: command in effect, rad. That of `STUCK` bounds the position."""
+    row, diagnosis = TYPES[fault_type], tape.alarm.diagnosis
+    assert row.deflection_relation is not None
+    gain, theta_is_share, theta_span = row.deflection_relation
     e = diagnosis.layout.position_estimator_index_by_surface[surface]
     Gu, G, spread = -tape.offset[:, e], tape.slope[:, e], tape.spread[:, e]
     axes = diagnosis.estimators[e].active_axes
     if diagnosis.types_config.frames_per_block > 1:  # blocks: the axis on which no effect changes its sign
         axes = (diagnosis.layout.dominant_axis_by_surface[surface],)
-    low, high = relation.theta_span(*travel_rad(tape, surface))
-    offset, slope = (relation.command_gain - 1.0) * Gu, Gu if relation.theta_is_share else G
+    low, high = theta_span(*travel_rad(tape, surface))
+    offset, slope = (gain - 1.0) * Gu, Gu if theta_is_share else G
     if low == high:  # theta is known
         offset, slope, low, high = offset + low * slope, 0.0 * slope, 0.0, 0.0
-    theta = CONSTANT_WHILE_SHOWN if theta_is_constant else ANY
+    theta = CONSTANT_WHILE_SHOWN if row.has_constant_parameter else ANY
     return Hypothesis(tape.first, offset, slope, spread, low, high, theta, axes)
 
 

@@ -14,13 +14,12 @@ from beaver_ftc.cli import (
     NoReportOption,
     ResultsOption,
     ScenarioArgument,
+    address,
+    answer,
     complain,
-    emit,
-    emit_json,
     load_all,
     write_junit,
 )
-from beaver_ftc.documents import BadInput
 from beaver_ftc_links.sitl import Protocol
 
 
@@ -76,24 +75,12 @@ def command(options: Options) -> None:
         complain(f"{scenario.name}: warning: {warning}")
     served = Served(
         options.protocol, options.host, options.port, options.rate, options.speed, options.hold,
-        options.ground, address(options.mavlink), options.page,
+        options.ground, options.mavlink and address("--mavlink", options.mavlink), options.page,
     )  # fmt: skip
     flight = serve(scenario, served, lambda line: complain(f"{scenario.name}: {line}"))
     folder = flight.save(options.out, report=not options.no_report)
     found = Metrics.of(flight.metrics)
-    if options.format is Format.json:
-        emit_json(flight.metrics | {"folder": str(folder)})
-    else:
-        emit(verdict_text(found, str(folder), colour=sys.stdout.isatty()))
+    document = flight.metrics | {"folder": str(folder)}
+    answer(options.format, document, lambda: verdict_text(found, str(folder), sys.stdout.isatty()))
     write_junit([found.judged], options.junit)
     raise typer.Exit(0 if found.passed else 1)
-
-
-def address(given: str | None) -> tuple[str, int] | None:
-    """Host and port of HOST:PORT."""
-    if given is None:
-        return None
-    host, _, port = given.rpartition(":")
-    if not host or not port.isdecimal() or not 0 < int(port) < 65536:
-        raise BadInput(f"--mavlink: {given!r} is no address, allowed: HOST:PORT with a port of 1 to 65535")
-    return host, int(port)

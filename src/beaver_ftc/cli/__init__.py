@@ -341,6 +341,14 @@ def _annotated(parameter: Parameter, help: str | None) -> Parameter:
     return parameter.replace(annotation=Annotated[kind, option])
 
 
+def address(option: str, given: str) -> tuple[str, int]:
+    """Host and port of HOST:PORT, as an option has it."""
+    host, _, port = given.rpartition(":")
+    if not host or not port.isdecimal() or not 0 < int(port) < 65536:
+        raise BadInput(f"{option}: {given!r} is no address, allowed: HOST:PORT with a port of 1 to 65535")
+    return host, int(port)
+
+
 def load_all(names: list[str]) -> list["Scenario"]:
     """The scenarios of these files or built-in names. Raises BadInput with every mistake in all of them."""
     from beaver_ftc.scenario.schema import load_scenario

@@ -20,6 +20,7 @@ from beaver_ftc.cli import (
     NoReportOption,
     ResultsOption,
     ScenariosArgument,
+    address,
     complain,
     emit,
     emit_json,
@@ -118,14 +119,12 @@ def _shown(given: str | None) -> "Prepare | None":
 
     if given is None:
         return None
-    host, _, port = given.rpartition(":")
-    if not host or not port.isdecimal() or not 0 < int(port) < 65536:
-        raise BadInput(f"--flightgear: {given!r} is no address, allowed: HOST:PORT with a port of 1 to 65535")
+    host, port = address("--flightgear", given)
     try:
-        socket.getaddrinfo(host, int(port), socket.AF_INET, socket.SOCK_DGRAM)
+        socket.getaddrinfo(host, port, socket.AF_INET, socket.SOCK_DGRAM)
     except (OSError, UnicodeError):
         raise BadInput(f"--flightgear: there is no host {host!r}") from None
-    return partial(required("flightgear", "--flightgear"), host=host, port=int(port))
+    return partial(required("flightgear", "--flightgear"), host=host, port=port)
 
 
 def _run_all(scenarios: list["Scenario"], options: Options, drawn: "Drawn") -> int:

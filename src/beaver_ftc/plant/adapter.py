@@ -374,7 +374,7 @@ class Plant:
 
         As a lasting gust: JSBSim forgets a wind while initialising, and with it the right past derivatives.
         """
-        ground = body_axes(state) @ np.asarray(wind_mps)
+        ground = body_axes(state.phi_rad, state.theta_rad, state.psi_rad) @ np.asarray(wind_mps)
         for axis, speed in zip("uvw", ground, strict=True):
             name = f"ic/{axis}-fps"
             self.write(name, self.read(name) + speed * FT_PER_M)
@@ -486,10 +486,10 @@ class Plant:
         self.write_all(_PLACED, (*where, *attitude, *velocity, *rates))
 
 
-def body_axes(state: FlightState) -> np.ndarray:
+def body_axes(phi_rad: float, theta_rad: float, psi_rad: float) -> np.ndarray:
     """Rotation (3, 3) from north-east-down to body axes, by yaw, pitch, roll."""
     (sphi, cphi), (sth, cth), (spsi, cpsi) = (
-        (sin(angle), cos(angle)) for angle in (state.phi_rad, state.theta_rad, state.psi_rad)
+        (sin(angle), cos(angle)) for angle in (phi_rad, theta_rad, psi_rad)
     )
     roll = np.array([[1, 0, 0], [0, cphi, sphi], [0, -sphi, cphi]])
     pitch = np.array([[cth, 0, -sth], [0, 1, 0], [sth, 0, cth]])

@@ -12,11 +12,11 @@ been answered, so that is a count restarted, of an autopilot started again. So i
 
 import struct
 from collections.abc import Hashable
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from beaver_ftc.documents import BadInput
 from beaver_ftc_links.sitl.link import Link
-from beaver_ftc_links.sitl.vehicle import Instant
+from beaver_ftc_links.sitl.vehicle import Instant, Vehicle
 
 _HEAD = struct.Struct("<HHI")
 FORMS = {18458: struct.Struct("<16H"), 29569: struct.Struct("<32H")}  # by magic: the pulses
@@ -29,23 +29,6 @@ class Packet(NamedTuple):
     rate_hz: int
     number: int
     pulses_us: tuple[int, ...]
-
-
-class Body(Protocol):
-    """What the protocol flies: `vehicle.Vehicle`."""
-
-    @property
-    def over(self) -> bool:
-        """Whether the flight has ended."""
-
-    def begin(self, packets_hz: float, channels: int) -> None:
-        """A flight from trim. Raises BadInput for a rate it cannot be flown at, or too few outputs."""
-
-    def fly(self, outputs: tuple[int, ...], frame_hz: float) -> None:
-        """A frame of the autopilot."""
-
-    def instant(self) -> Instant:
-        """What is known of the frame just flown."""
 
 
 def decoded(datagram: bytes) -> Packet | None:
@@ -84,8 +67,8 @@ class Ardupilot:
     complaint: why no flight can be begun, in a line; empty where one can.
     """
 
-    def __init__(self, body: Body, link: Link) -> None:
-        self._body, self._link = body, link
+    def __init__(self, vehicle: Vehicle, link: Link) -> None:
+        self._vehicle, self._link = vehicle, link
         self._peer: Hashable = None
         self._last = -1  # count of the frame flown last; -1: none
         self._again = -1  # a count that came late
@@ -130,7 +113,7 @@ class Ardupilot:
 
     def _begin(self, packet: Packet, peer: Hashable) -> bool:
         try:
-            self._body.begin(packet.rate_hz, len(packet.pulses_us))
+            self._vehicle.begin(packet.rate_hz, len(packet.pulses_us))
         except BadInput as error:
             self.complaint = str(error)
             return False
@@ -141,9 +124,9 @@ class Ardupilot:
     def _fly(self, packet: Packet, now_s: float) -> bytes | None:
         self._last, self._again = packet.number, -1
         self._link.hear(now_s)
-        if self._body.over:
+        if self._vehicle.over:
             return None
-        self._body.fly(packet.pulses_us, packet.rate_hz)
+        self._vehicle.fly(packet.pulses_us, packet.rate_hz)
         self._link.counts["frames"] += 1
-        self._answer = encoded(self._body.instant())
+        self._answer = encoded(self._vehicle.instant())
         return self._answer

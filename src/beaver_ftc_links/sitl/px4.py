@@ -11,15 +11,16 @@ and until it is armed for the first time the law `nominal` flies, level.
 """
 
 from math import atan2, cos, degrees, hypot, radians, sin, sqrt
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from beaver_ftc.aircraft import GRAVITY_MPS2
 from beaver_ftc.design import standard_air
+from beaver_ftc.plant import body_axes
 from beaver_ftc_links.sitl.link import Link
 from beaver_ftc_links.sitl.mavlink import Inject, Mavlink
-from beaver_ftc_links.sitl.vehicle import Instant
+from beaver_ftc_links.sitl.vehicle import Instant, Vehicle
 
 ARMED = 128  # bit of HIL_ACTUATOR_CONTROLS.mode: MAV_MODE_FLAG_SAFETY_ARMED
 BOOT_US = 1_000_000  # stamp of the first instant: 0 means none
@@ -33,30 +34,11 @@ NO_YAW = 0
 Message = Any
 
 
-class Body(Protocol):
-    """What the protocol flies: `vehicle.Vehicle`."""
-
-    packets_hz: float
-
-    @property
-    def over(self) -> bool:
-        """Whether the flight has ended."""
-
-    def begin(self, packets_hz: float) -> None:
-        """A flight from trim."""
-
-    def fly(self, outputs: list[float], frame_hz: float, in_charge: bool) -> None:
-        """A frame of the autopilot. in_charge: it flies."""
-
-    def instant(self) -> Instant:
-        """What is known of the frame just flown."""
-
-
 class Px4:
     """One endpoint. armed: the autopilot has been armed in this flight."""
 
-    def __init__(self, body: Body, link: Link, mavlink: Mavlink, inject: Inject) -> None:
-        self._body, self._link, self._mav, self._inject = body, link, mavlink, inject
+    def __init__(self, vehicle: Vehicle, link: Link, mavlink: Mavlink, inject: Inject) -> None:
+        self._vehicle, self._link, self._mav, self._inject = vehicle, link, mavlink, inject
         self._connections = 0
         self.done: list[str] = []  # what commands have had done, in words
         self._wait()
@@ -73,7 +55,7 @@ class Px4:
         self._wait()
         if self._connections > 1:
             self._link.counts["resets"] += 1
-            self._body.begin(self._body.packets_hz)
+            self._vehicle.begin(self._vehicle.packets_hz)
         return self._say(now_s)
 
     def take(self, data: bytes, now_s: float) -> bytes:
@@ -97,9 +79,9 @@ class Px4:
                 return b""
             self._said_s = now_s
             return self._last
-        if now_s - self._said_s < step_s or self._body.over:
+        if now_s - self._said_s < step_s or self._vehicle.over:
             return b""
-        self._body.fly([], self._body.packets_hz, in_charge=False)
+        self._vehicle.fly([], self._vehicle.packets_hz, in_charge=False)
         return self._say(now_s)
 
     def _controls(self, message: Message, now_s: float) -> bytes:
@@ -110,9 +92,9 @@ class Px4:
         self._answering = True
         self._link.hear(now_s)
         self.armed |= bool(message.mode & ARMED)
-        if self._body.over:
+        if self._vehicle.over:
             return b""
-        self._body.fly(list(message.controls), self._body.packets_hz, in_charge=self.armed)
+        self._vehicle.fly(list(message.controls), self._vehicle.packets_hz, in_charge=self.armed)
         counts["frames"] += 1
         return self._say(now_s)
 
@@ -121,11 +103,11 @@ class Px4:
         return self._stamp_us(self._frame - 2)
 
     def _stamp_us(self, frame: int) -> int:
-        return BOOT_US + round(1e6 * frame / self._body.packets_hz)
+        return BOOT_US + round(1e6 * frame / self._vehicle.packets_hz)
 
     def _say(self, now_s: float) -> bytes:
         """The instant, for the next answer to bear its stamp."""
-        now, frame, hz = self._body.instant(), self._frame, self._body.packets_hz
+        now, frame, hz = self._vehicle.instant(), self._frame, self._vehicle.packets_hz
         self._sent_us, self._said_s = self._stamp_us(frame), now_s
         self._frame += 1
         m = self._mav.messages
@@ -196,17 +178,5 @@ def magnetic_gauss(attitude: tuple[float, ...]) -> tuple[float, float, float]:
     declination, inclination = radians(DECLINATION_DEG), radians(INCLINATION_DEG)
     level = cos(inclination)
     earth = np.array([level * cos(declination), level * sin(declination), sin(inclination)])
-    x, y, z = (rotation(*attitude) @ earth * FIELD_GAUSS).tolist()
+    x, y, z = (body_axes(*attitude) @ earth * FIELD_GAUSS).tolist()
     return x, y, z
-
-
-def rotation(phi: float, theta: float, psi: float) -> np.ndarray:
-    """From north, east, down to body axes, (3, 3)."""
-    (cr, sr), (cp, sp), (cy, sy) = ((cos(a), sin(a)) for a in (phi, theta, psi))
-    return np.array(
-        [
-            [cp * cy, cp * sy, -sp],
-            [sr * sp * cy - cr * sy, sr * sp * sy + cr * cy, sr * cp],
-            [cr * sp * cy + sr * sy, cr * sp * sy - sr * cy, cr * cp],
-        ]
-    )

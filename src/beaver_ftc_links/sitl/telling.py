@@ -3,6 +3,7 @@
 from typing import Any, NamedTuple
 
 from beaver_ftc_links.sitl.vehicle import Flown
+from beaver_ftc_live.page.messages import verdict_in_words
 
 EMERGENCY, CRITICAL, WARNING, INFO = 0, 2, 4, 6  # MAV_SEVERITY
 MOST_KEPT = 200
@@ -52,7 +53,7 @@ class Teller:
             where = f"on {verdict.axis}" if verdict.axis else "between the instruments"
             found.append((WARNING, f"alarm {where}"))
         if verdict.isolated and before[1:3] != now[1:3]:
-            found.append((CRITICAL, _named(verdict)))
+            found.append((CRITICAL, verdict_in_words(verdict)))
             self._named_s = sim.t_s if verdict.type == _LOSS else -1.0
         elif verdict.detected and not verdict.isolated and open_between and before[3] != now[3]:
             found.append((WARNING, " or ".join(open_between)))
@@ -63,11 +64,3 @@ class Teller:
             self._lost = True
             found.append((EMERGENCY, "the aircraft is lost"))
         return found
-
-
-def _named(verdict: Any) -> str:
-    """Surface and type."""
-    kind = verdict.type
-    if kind is None or kind == verdict.isolated:
-        return str(verdict.isolated)
-    return f"{verdict.isolated}, {kind.replace('_', ' ')}"

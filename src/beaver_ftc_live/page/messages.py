@@ -199,6 +199,14 @@ def in_words(fault: Mapping[str, Any]) -> str:
     return f"{where}: {str(fault['type']).replace('_', ' ')}" + (f" ({sizes})" if sizes else "")
 
 
+def verdict_in_words(verdict: Any) -> str:
+    """The surface that a verdict names, and the fault type."""
+    kind = verdict.type
+    if kind is None or kind == verdict.isolated:
+        return str(verdict.isolated)
+    return f"{verdict.isolated}, {kind.replace('_', ' ')}"
+
+
 def encode(message: Message) -> bytes:
     """One message to a page."""
     return json.dumps(message, separators=(",", ":"), allow_nan=False).encode()

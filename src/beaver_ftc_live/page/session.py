@@ -18,7 +18,7 @@ from beaver_ftc.scenario import channels_of, checked_against, sensors_there
 from beaver_ftc.scenario.faults import HOLDING, TYPES, place_of
 from beaver_ftc_live.page import messages
 from beaver_ftc_live.page.game import NOTHING, Fault, Game, hidden_faults
-from beaver_ftc_live.page.messages import WHEN, Message, in_words, short
+from beaver_ftc_live.page.messages import WHEN, Message, in_words, short, verdict_in_words
 
 LONGEST_S = 3600.0  # of one live flight: its log is 0.4 GB then
 HELD = ("altitude_m", "airspeed_mps", "heading_deg")  # by the autopilot that the page asks for
@@ -142,9 +142,7 @@ class Session:
             self._tell("alarm", beyond if verdict.axis else against, secret=True)
         if verdict.isolated and before[1:3] != said[1:3]:
             self.game.named(verdict.isolated, t_s)
-            kind = verdict.type if verdict.type != verdict.isolated else None
-            what = f", {kind.replace('_', ' ')}" if kind else ""
-            self._tell("named", f"{verdict.isolated}{what}", secret=True)
+            self._tell("named", verdict_in_words(verdict), secret=True)
         elif verdict.detected and verdict.candidates != before[3] and not verdict.isolated:
             self._tell("candidates", _remaining(verdict.candidates, before[3]), secret=True)
         if sim.mode != self._mode:

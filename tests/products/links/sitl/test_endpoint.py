@@ -18,8 +18,8 @@ from tools.autopilots import peers
 from tools.autopilots.small import Small
 
 import beaver_ftc as bf
+from beaver_ftc.cli import address
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc_links.commands import address
 from beaver_ftc_links.sitl import Protocol
 from beaver_ftc_links.sitl.serve import Options, serve
 
@@ -136,8 +136,7 @@ def test_addresses_that_cannot_be_had():
             BadInput, match=rf"--host, --port: 127.0.0.1:{port} cannot be had \(.*\), allowed: "
         ):
             serve(scenario(), Options(Protocol.ardupilot, port=port), print)
-    assert address(None) is None
-    assert address("10.0.0.1:14550") == ("10.0.0.1", 14550)
+    assert address("--mavlink", "10.0.0.1:14550") == ("10.0.0.1", 14550)
     for given in ("nowhere", ":1", "host:0", "host:x", "host:70000"):
         with pytest.raises(BadInput, match="is no address, allowed: HOST:PORT"):
-            address(given)
+            address("--mavlink", given)

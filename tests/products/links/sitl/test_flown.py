@@ -10,9 +10,10 @@ from tools.autopilots.small import Small
 import beaver_ftc as bf
 from beaver_ftc.design import standard_air
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.plant.adapter import body_axes
 from beaver_ftc_links.sitl.ardupilot import Ardupilot
 from beaver_ftc_links.sitl.link import Link
-from beaver_ftc_links.sitl.px4 import quaternion, rotation
+from beaver_ftc_links.sitl.px4 import quaternion
 from beaver_ftc_links.sitl.vehicle import Vehicle, at_rate
 
 NO_PULSE = 0
@@ -134,10 +135,10 @@ def test_what_the_autopilot_is_told_is_one_motion():
     phi, theta = attitude[2:-2, 0], attitude[2:-2, 1]
     p, q, r = rates[2:-2].T
     assert np.allclose(turned, p + np.tan(theta) * (q * np.sin(phi) + r * np.cos(phi)), atol=2e-3)
-    down = np.array([rotation(*angles).T @ f for angles, f in zip(attitude, force, strict=True)])
+    down = np.array([body_axes(*angles).T @ f for angles, f in zip(attitude, force, strict=True)])
     felt = np.gradient(velocity, t, axis=0)[2:-2] - [0.0, 0.0, 9.806]
     assert np.allclose(felt, down[2:-2], atol=0.06)  # the Earth turns, and is round
-    body = np.array([rotation(*angles) @ v for angles, v in zip(attitude, velocity, strict=True)])
+    body = np.array([body_axes(*angles) @ v for angles, v in zip(attitude, velocity, strict=True)])
     assert airspeed == pytest.approx(np.linalg.norm(velocity, axis=1), rel=1e-6)  # the air is still
     assert beta == pytest.approx(np.arcsin(body[:, 1] / airspeed), abs=1e-6)
     assert np.ptp(beta) > 1e-3
@@ -176,7 +177,7 @@ def test_quaternions_and_the_standard_air():
     angles, v = (0.3, -0.4, 2.0), np.array([1.0, -2.0, 3.0])
     w, *xyz = quaternion(*angles)
     across = np.cross(xyz, v)
-    assert np.allclose(rotation(*angles).T @ v, v + 2.0 * (w * across + np.cross(xyz, across)))
+    assert np.allclose(body_axes(*angles).T @ v, v + 2.0 * (w * across + np.cross(xyz, across)))
     pressures = [standard_air(altitude_m) for altitude_m in (0, 1000, 5000, 11000, 15000)]
     table = [(1013.25, 15.0), (898.75, 8.5), (540.20, -17.5), (226.32, -56.5), (120.45, -56.5)]
     assert pressures == [pytest.approx(row, rel=2e-4) for row in table]

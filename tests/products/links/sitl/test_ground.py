@@ -8,12 +8,12 @@ from tools.autopilots.small import Circuit
 import beaver_ftc as bf
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import fly
-from beaver_ftc.plant.adapter import FlightState, Plant
+from beaver_ftc.plant.adapter import FlightState, Plant, body_axes
 from beaver_ftc.plant.ground import lay
 from beaver_ftc_links.sitl.ardupilot import Ardupilot
 from beaver_ftc_links.sitl.link import Link
 from beaver_ftc_links.sitl.mavlink import Mavlink
-from beaver_ftc_links.sitl.px4 import Px4, rotation
+from beaver_ftc_links.sitl.px4 import Px4
 from beaver_ftc_links.sitl.telling import Teller
 from beaver_ftc_links.sitl.vehicle import Flown, Vehicle
 
@@ -42,7 +42,7 @@ def test_it_stands_where_the_ground_is_and_does_not_move(altitude_m):
     last = vehicle.instant()
     assert np.abs(np.subtract(last.position, first.position)).max() < 2e-3
     assert last.height_m == pytest.approx(altitude_m + 1.65, abs=0.02)
-    down = rotation(*last.attitude).T @ last.force
+    down = body_axes(*last.attitude).T @ last.force
     assert down == pytest.approx([0.0, 0.0, -G_MPS2], abs=0.02)  # the Earth turns
     assert np.linalg.norm(forces_n(vehicle.flight)) == pytest.approx(WEIGHT_N, rel=2e-3)
     assert np.degrees(last.attitude[1]) == pytest.approx(11.5, abs=0.2)

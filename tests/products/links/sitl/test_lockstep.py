@@ -10,10 +10,11 @@ from tools.autopilots import peers, trial
 from tools.autopilots.reader import read
 
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.plant.adapter import body_axes
 from beaver_ftc_links.sitl.ardupilot import Ardupilot
 from beaver_ftc_links.sitl.link import Link
 from beaver_ftc_links.sitl.mavlink import Mavlink
-from beaver_ftc_links.sitl.px4 import Px4, gps, quaternion, rotation, sensor, state
+from beaver_ftc_links.sitl.px4 import Px4, gps, quaternion, sensor, state
 from beaver_ftc_links.sitl.vehicle import Instant
 from samples import samples
 from telling import apart
@@ -173,7 +174,7 @@ def test_a_state_is_read_again_as_it_was_at_altitude():
     assert found.pop("mavpackettype") == "HIL_SENSOR"
     dip, east = np.radians(60.5), np.radians(1.2)  # of a field of 0.467 gauss
     north_east_down = np.cos(dip) * np.cos(east), np.cos(dip) * np.sin(east), np.sin(dip)
-    field = 0.467 * rotation(*ALOFT.true_attitude) @ north_east_down
+    field = 0.467 * body_axes(*ALOFT.true_attitude) @ north_east_down
     expected = {
         "time_usec": 4_000_000, "xacc": 1.3, "yacc": -2.9, "zacc": -9.1, "xgyro": 0.11, "ygyro": -0.23,
         "zgyro": 0.37, **dict(zip(("xmag", "ymag", "zmag"), field, strict=True)),

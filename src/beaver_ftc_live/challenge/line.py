@@ -183,10 +183,10 @@ class SubmittedCode:
             return self._accounts.computed_s() - computed_s > limit_s
         return over_s > self._accounts.waited_s() - waited_s
 
-    def asked(self, kind: bytes, t_s: float, numbers: list[np.ndarray]) -> np.ndarray:
+    def asked(self, kind: bytes, measured: Measured, *besides: Any) -> np.ndarray:
         """Show it a frame; its answer's numbers, finite or not."""
-        self._t_s, self._frame = t_s, self._frame + 1
-        self._send(np.concatenate(numbers).tobytes())
+        self._t_s, self._frame = measured.t_s, self._frame + 1
+        self._send(pickle.dumps((measured, *besides)))
         return np.frombuffer(self._answer(kind, self._length(kind), FRAME_S))
 
     def _length(self, kind: bytes) -> int:
@@ -296,12 +296,6 @@ class SubmittedCode:
         self._folder.cleanup()
 
 
-def _shown(measured: Measured) -> list[np.ndarray]:
-    return [np.array([measured.t_s]), measured.x, measured.y, measured.acceleration,
-            measured.contribution.ravel(), measured.eta_bar, measured.attitude, measured.force,
-            np.array([measured.altitude_m])]  # fmt: skip
-
-
 def _finite(numbers: np.ndarray, what: str) -> np.ndarray:
     if not np.isfinite(numbers).all():
         raise Mistake(f"{what} is not finite: {', '.join(f'{n:g}' for n in numbers)}")
@@ -313,7 +307,7 @@ class SubmittedDetector(SubmittedCode):
 
     def step(self, measured: Measured, command: np.ndarray) -> Verdict:
         """Its verdict on the present frame."""
-        said = self.asked(pilot.VERDICT, measured.t_s, [*_shown(measured), command])
+        said = self.asked(pilot.VERDICT, measured, command)
         named = (3, len(self.surfaces) + 1)  # the last place of an axis, and of a name
         if not all(number in range(last + 1) for number, last in zip(said[1:3], named, strict=True)):
             raise Barred("writes on the line to the grader")
@@ -329,6 +323,5 @@ class SubmittedLaw(SubmittedCode):
 
     def step(self, measured: Measured, reference: Reference, verdict: Verdict) -> np.ndarray:
         """Its command at the present frame."""
-        said = pilot.verdict_numbers(verdict, self.surfaces)
-        numbers = [*_shown(measured), reference.commanded, reference.rate, reference.acceleration, said]
-        return _finite(self.asked(pilot.COMMAND, measured.t_s, numbers), "its command")
+        known = verdict._replace(type=None, candidates=())
+        return _finite(self.asked(pilot.COMMAND, measured, reference, known), "its command")

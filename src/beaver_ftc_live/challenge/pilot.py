@@ -1,7 +1,8 @@
 """The submission's end of the line: `python pilot.py`, a process for one flight.
 
 It is told a class's source and what a plug-in may know before a flight, puts up the walls, loads the class,
-and answers each frame. What it sends is a kind, the frame's number and plain numbers (`line.py` reads them).
+and answers each frame, of which it is given what a plug-in's `step` is. What it sends is a kind, the frame's
+number and plain numbers (`line.py` reads them).
 """
 
 import os
@@ -20,8 +21,7 @@ if __name__ == "__main__":
 
 import numpy as np
 
-from beaver_ftc.control import Reference
-from beaver_ftc.diagnosis import Measured, Verdict
+from beaver_ftc.diagnosis import Verdict
 from beaver_ftc_live.challenge.confine import confine
 
 HEAD = struct.Struct("<cII")  # kind, frame, length of what follows
@@ -120,30 +120,6 @@ def _so_many(values: Any, n: int, what: str) -> np.ndarray:
     return array
 
 
-def _split(numbers: np.ndarray, *sizes: int) -> list[np.ndarray]:
-    return [part.copy() for part in np.split(numbers, np.cumsum(sizes))]
-
-
-def frame_of(numbers: np.ndarray, y: int, surfaces: tuple[str, ...]) -> tuple[Measured, list[np.ndarray]]:
-    """What is measured, and what a frame says besides."""
-    n = len(surfaces)
-    sizes = 1, 3, y, 3, 3 * n, 3, 3, 3, 1
-    t, x, of_y, acceleration, contribution, eta_bar, attitude, force, altitude, *rest = _split(
-        numbers, *sizes
-    )
-    measured = Measured(
-        float(t[0]), x, of_y, acceleration, contribution.reshape(3, n), eta_bar, attitude, force,
-        float(altitude[0]),
-    )  # fmt: skip
-    return measured, rest
-
-
-def law_given(numbers: np.ndarray, surfaces: tuple[str, ...]) -> tuple[Reference, Verdict]:
-    """Reference and verdict, as `line.py` packs them."""
-    commanded, rate, acceleration, said = _split(numbers, 3, 3, 3)
-    return Reference(commanded, rate, acceleration), verdict_of(said, surfaces)
-
-
 def verdict_of(said: np.ndarray, surfaces: tuple[str, ...]) -> Verdict:
     """A verdict from its numbers."""
     detected, axis, isolated, has_estimate, estimate, statistic, has_shares = said[:7].tolist()
@@ -168,18 +144,15 @@ def fly(line: Line, told: dict[str, Any]) -> None:
     plug_in: Any = found()
     plug_in.reset(context)
     line.send(BEGUN)
-    surfaces, y = context.surfaces, context.trim_y.size
+    surfaces = context.surfaces
     while True:
-        numbers = np.frombuffer(line.take())
+        given = pickle.loads(line.take())
         line.frame += 1
-        measured, (rest,) = frame_of(numbers, y, surfaces)
+        answer = plug_in.step(*given)
         if kind == "detector":
-            line.send(VERDICT, verdict_numbers(plug_in.step(measured, rest), surfaces).tobytes())
+            line.send(VERDICT, verdict_numbers(answer, surfaces).tobytes())
         else:
-            command = _so_many(
-                plug_in.step(measured, *law_given(rest, surfaces)), len(surfaces), "the command"
-            )
-            line.send(COMMAND, command.tobytes())
+            line.send(COMMAND, _so_many(answer, len(surfaces), "the command").tobytes())
 
 
 def _own_streams() -> Line:
@@ -193,7 +166,7 @@ def _own_streams() -> Line:
 def main() -> None:
     """Whatever goes wrong is said in a line; then the process ends."""
     line = _own_streams()
-    told = pickle.loads(line.take())  # the grader's own
+    told = pickle.loads(line.take())  # the grader's own, as is all that comes
     if told["context"] is not None:
         object.__setattr__(told["context"], "model", AskedModel(line, len(told["context"].surfaces)))
     tell: Callable[[str], None] = lambda what: line.send(REFUSED, what.encode()[:500])  # noqa: E731

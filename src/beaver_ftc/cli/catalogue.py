@@ -161,6 +161,6 @@ def schema(sweep: bool = False, plan: bool = False) -> None:
 
         emit_json(sweep_json_schema())
         return
-    from beaver_ftc.scenario.schema import Scenario
+    from beaver_ftc.scenario.schema import json_schema
 
-    emit_json({"$schema": "https://json-schema.org/draft/2020-12/schema", **Scenario.model_json_schema()})
+    emit_json(json_schema())

@@ -15,7 +15,6 @@ scenario: a `schema.Scenario`, not named as such because the schema imports this
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from enum import Enum, StrEnum
 from math import degrees, inf, pi, radians
 from typing import Any, NamedTuple, Self
 
@@ -257,75 +256,22 @@ class Declared:
 
 _FORCES = ("CY", "CZ")  # those that accelerometers are compared with
 _ROUNDING = 1e-9
+_BY_ACCELEROMETERS = ", by which accelerometers are judged"
+_SHARP_GUST = (
+    "JSBSim's does not rotate, but with fdi.bounds.turbulence the vanes take a sharp one for one that does: "
+    "fdi.statistical may raise an alarm"
+)
+_SEEMS_BROKEN = "the sensor monitor may take a sound altimeter for broken"
 
 
-class Reader(StrEnum):
-    """The part of the diagnosis that relies on what is not true."""
+class Undeclared(NamedTuple):
+    """An error of the truth beyond what is declared: a key of the scenario, and what is to be said of it."""
 
-    THRESHOLDS = "worst-case thresholds"
-    STATISTICS = "statistical detector"
-    ACCELEROMETERS = "accelerometers"
-    SENSOR_MONITOR = "sensor monitor"
-
-
-class Kind(Enum):
-    """What is undeclared, and the sentence that says so of its fields."""
-
-    LARGER = "{key}: {value:g}{unit} is beyond {bound}, {allowed:g}"
-    FORCE = "{key}: {value:g} is beyond {bound}, {allowed:g}, by which accelerometers are judged"
-    MASS = (
-        "{key}: {value:g} is off the designer's by more than {allowed:g}, by which accelerometers are judged"
-    )
-    FASTER = "{key}: {value:g}{unit} is faster than {bound}, {allowed:g}"
-    SEVERITY = "{key}: {names[0]} is more than {bound}, {names[1]}"
-    GUST = "{key}: what a gust does is covered by {bound} only"
-    SHARP_GUST = (
-        "{key}: JSBSim's does not rotate, but with {bound} the vanes take a "
-        "sharp one for one that does: fdi.statistical may raise an alarm"
-    )
-    CG = "{key}: a displaced centre of gravity is covered by {bound} only"
-    WIND = (
-        "{key}: vertical wind of {value:g}{unit} is more than {bound}, {allowed:g}: "
-        "the sensor monitor may take a sound altimeter for broken"
-    )
-    SENSOR = "{key}.{names[0]}: its errors are not within {bound}, so alarms without a fault may come; {cure}"
-    SENSORS = (
-        "{key}: the errors of {listed} are not within {bound}, so alarms without a fault may come; {cure}"
-    )
-
-
-@dataclass(frozen=True)
-class Undeclared:
-    """An error of the truth beyond what is declared.
-
-    key: of the scenario. bound: the key that covers it, or would. read_by: who relies on it. value: what the
-    scenario says, in `unit`; nominal: what would be no error; allowed: the largest declared distance between
-    them. names: severities, or instruments. cure: how to declare it.
-    """
-
-    kind: Kind
     key: str
-    bound: str
-    read_by: Reader = Reader.THRESHOLDS
-    value: float = 0.0
-    nominal: float = 0.0
-    allowed: float = 0.0
-    unit: str = ""
-    names: tuple[str, ...] = ()
-    cure: str = ""
-
-    @property
-    def excess(self) -> float:
-        """How far the error is beyond what is declared."""
-        return abs(self.value - self.nominal) - self.allowed
-
-    @property
-    def is_beyond(self) -> bool:
-        """Whether it is, by more than rounding."""
-        return self.excess > _ROUNDING
+    says: str
 
     def __str__(self) -> str:
-        return self.kind.value.format(**vars(self), listed=", ".join(self.names))
+        return f"{self.key}: {self.says}"
 
 
 def undeclared(scenario: Any) -> Iterator[Undeclared]:
@@ -338,12 +284,13 @@ def undeclared(scenario: Any) -> Iterator[Undeclared]:
     yield from _air(scenario, declared)
     yield from _sensors(scenario, declared)
     yield from _severity(scenario, declared)
-    yield from filter(_is_beyond, _moments(scenario, declared))
-    yield from filter(_is_beyond, _servos(scenario, declared))
+    yield from _moments(scenario, declared)
+    yield from _servos(scenario, declared)
     if any(scenario.uncertainty.cg_m):
-        yield Undeclared(Kind.CG, "uncertainty.cg_m", "fdi.bounds.constant_rad_s2")
+        says = "a displaced centre of gravity is covered by fdi.bounds.constant_rad_s2 only"
+        yield Undeclared("uncertainty.cg_m", says)
     if declared.uses_accelerometers:
-        yield from filter(_is_beyond, _forces(scenario, declared))
+        yield from _forces(scenario, declared)
 
 
 _UNDECLARED_DEPENDS_ON = (
@@ -359,22 +306,31 @@ def declares_all(scenario: Any) -> bool:
     return _declares_all.get(sections, lambda: next(undeclared(scenario), None) is None, scenario.substeps)
 
 
-def _is_beyond(fact: Undeclared) -> bool:
-    return fact.is_beyond
+def _beyond(key: str, off: float, allowed: float, says: str) -> Iterator[Undeclared]:
+    """An error that is off by more than is declared, and more than rounding."""
+    if off - allowed > _ROUNDING:
+        yield Undeclared(key, says)
+
+
+def _larger(key: str, bound: str, value: float, allowed: float, unit: str = "") -> Iterator[Undeclared]:
+    """A value that is larger than a bound allows."""
+    return _beyond(key, abs(value), allowed, f"{value:g}{unit} is beyond {bound}, {allowed:g}")
+
+
+def _ratio(key: str, bound: str, ratio: float, allowed: float, more: str = "") -> Iterator[Undeclared]:
+    """A ratio to the designer's that is further from 1 than a bound allows."""
+    return _beyond(key, abs(ratio - 1.0), allowed, f"{ratio:g} is beyond {bound}, {allowed:g}{more}")
 
 
 def _moments(scenario: Any, declared: Declared) -> Iterator[Undeclared]:
     """Moment coefficients and inertia, as ratios to the designer's."""
-    truth, bound = scenario.uncertainty, "fdi.bounds.coefficients"
+    truth = scenario.uncertainty
     for name, ratio in truth.coefficients.items():
         if name[:2] in MOMENTS:
             key, allowed = f"uncertainty.coefficients.{name}", declared.coefficients.of(name)
-            yield Undeclared(Kind.LARGER, key, bound, value=ratio, nominal=1.0, allowed=allowed)
+            yield from _ratio(key, "fdi.bounds.coefficients", ratio, allowed)
     for axis, ratio in truth.inertia:
-        key = f"uncertainty.inertia.{axis}"
-        yield Undeclared(
-            Kind.LARGER, key, "fdi.bounds.inertia", value=ratio, nominal=1.0, allowed=declared.inertia
-        )
+        yield from _ratio(f"uncertainty.inertia.{axis}", "fdi.bounds.inertia", ratio, declared.inertia)
 
 
 def _servos(scenario: Any, declared: Declared) -> Iterator[Undeclared]:
@@ -386,38 +342,40 @@ def _servos(scenario: Any, declared: Declared) -> Iterator[Undeclared]:
         for word, unit in (("bandwidth", "_rad_s"), ("rate_limit", "_deg_s")):
             true, expected = getattr(nominal, word + unit), getattr(known, word + unit)
             ratio = getattr(off, word) * true / expected if expected else 1.0 if not true else inf
-            allowed = getattr(bound, word)
-            yield Undeclared(
-                Kind.LARGER, f"{key}.{word}", f"{cover}.{word}", value=ratio, nominal=1.0, allowed=allowed
-            )
-        yield Undeclared(
-            Kind.LARGER, f"{key}.dead_band_deg", f"{cover}.dead_band_deg", value=off.dead_band_deg,
-            allowed=bound.dead_band_deg + degrees(declared.deflection_rad), unit=" deg",
-        )  # fmt: skip
+            yield from _ratio(f"{key}.{word}", f"{cover}.{word}", ratio, getattr(bound, word))
+        word, allowed = "dead_band_deg", bound.dead_band_deg + degrees(declared.deflection_rad)
+        yield from _larger(f"{key}.{word}", f"{cover}.{word}", off.dead_band_deg, allowed, " deg")
 
 
 def _forces(scenario: Any, declared: Declared) -> Iterator[Undeclared]:
     """Errors of the forces that accelerometers are compared with."""
-    truth, allowed, reader = scenario.uncertainty, declared.coefficients.largest, Reader.ACCELEROMETERS
+    truth, allowed, by = scenario.uncertainty, declared.coefficients.largest, _BY_ACCELEROMETERS
     for name, ratio in truth.coefficients.items():
         if name[:2] in _FORCES:
             key = f"uncertainty.coefficients.{name}"
-            yield Undeclared(Kind.FORCE, key, "fdi.bounds.coefficients", reader, ratio, 1.0, allowed)
+            yield from _ratio(key, "fdi.bounds.coefficients", ratio, allowed, by)
     heavier = truth.mass / scenario.design_model.mass
-    yield Undeclared(Kind.MASS, "uncertainty.mass", "design_model.mass", reader, heavier, 1.0, MASS_TOLERANCE)
+    says = f"{heavier:g} is off the designer's by more than {MASS_TOLERANCE:g}{by}"
+    yield from _beyond("uncertainty.mass", abs(heavier - 1.0), MASS_TOLERANCE, says)
 
 
 def _sensors(scenario: Any, declared: Declared) -> Iterator[Undeclared]:
     """One fact for all instruments, and what would declare them."""
-    beyond = tuple(declared.sensors.exceeded_by(scenario.sensors))
+    beyond = declared.sensors.exceeded_by(scenario.sensors)
     if beyond:
         enough = (name for name in PRESETS if _covers(name, scenario.sensors))
         preset = next(enough, None)
         cure = (
             f"`fdi.bounds.sensors: {preset}` declares them" if preset else "the same keys there declare them"
         )
-        kind = Kind.SENSOR if len(beyond) == 1 else Kind.SENSORS
-        yield Undeclared(kind, "sensors", "fdi.bounds.sensors", names=beyond, cure=cure)
+        alone = len(beyond) == 1
+        key, whose = (
+            (f"sensors.{beyond[0]}", "its errors")
+            if alone
+            else ("sensors", f"the errors of {', '.join(beyond)}")
+        )
+        says = f"{whose} are not within fdi.bounds.sensors, so alarms without a fault may come; {cure}"
+        yield Undeclared(key, says)
 
 
 def _covers(preset: str, truth: Sensors) -> bool:
@@ -426,13 +384,11 @@ def _covers(preset: str, truth: Sensors) -> bool:
 
 
 def _severity(scenario: Any, declared: Declared) -> Iterator[Undeclared]:
-    """Turbulence stronger than the declared one, by the standard deviation of its gusts."""
-    flown, bound = Dryden(scenario.environment.severity or "none"), "fdi.bounds.turbulence"
-    if flown.rank > declared.air.rank:
-        yield Undeclared(
-            Kind.SEVERITY, "environment.severity", bound, value=flown.sigma_mps,
-            allowed=declared.air.sigma_mps, unit=" m/s", names=(flown.severity, declared.air.severity),
-        )  # fmt: skip
+    """Turbulence stronger than the declared one."""
+    flown, known = Dryden(scenario.environment.severity or "none"), declared.air
+    if flown.rank > known.rank:
+        says = f"{flown.severity} is more than fdi.bounds.turbulence, {known.severity}"
+        yield Undeclared("environment.severity", says)
 
 
 def _unstructured(scenario: Any, declared: Declared) -> Iterator[Undeclared]:
@@ -441,37 +397,28 @@ def _unstructured(scenario: Any, declared: Declared) -> Iterator[Undeclared]:
     for axis, coupling, constant in zip(AXES, declared.coupling, declared.constant_rad_s2, strict=True):
         theta, sinusoid = getattr(truth.inertia_coupling, axis), getattr(truth.sinusoid, axis)
         key, swing = f"uncertainty.sinusoid.{axis}", sinusoid.amplitude_rad_s2
-        facts = [
-            Undeclared(
-                Kind.LARGER, f"uncertainty.inertia_coupling.{axis}", f"fdi.bounds.inertia_coupling.{axis}",
-                value=theta, allowed=coupling,
-            ),
-            Undeclared(
-                Kind.LARGER, key, f"fdi.bounds.constant_rad_s2.{axis}", value=swing, allowed=constant,
-                unit=" rad/s2",
-            ),
-        ]  # fmt: skip
+        word = f"inertia_coupling.{axis}"
+        yield from _larger(f"uncertainty.{word}", f"fdi.bounds.{word}", theta, coupling)
+        yield from _larger(key, f"fdi.bounds.constant_rad_s2.{axis}", swing, constant, " rad/s2")
         if swing > 0 and statistical:
             rad_s, slowest = sinusoid.frequency_rad_s, statistical.uncertainty_rad_s
-            bound, reader = "fdi.statistical.uncertainty_rad_s", Reader.STATISTICS
-            facts.append(Undeclared(Kind.FASTER, key, bound, reader, rad_s, 0.0, slowest, " rad/s"))
-        yield from filter(_is_beyond, facts)
+            says = f"{rad_s:g} rad/s is faster than fdi.statistical.uncertainty_rad_s, {slowest:g}"
+            yield from _beyond(key, rad_s, slowest, says)
 
 
 def _air(scenario: Any, declared: Declared) -> Iterator[Undeclared]:
     """Gusts, which rotate nothing, and vertical wind by which a sound altimeter seems broken."""
     environment, key = scenario.environment, "environment.gust"
     if any(any(gust.velocity_mps) for gust in environment.gusts):
-        yield Undeclared(Kind.GUST, key, "fdi.bounds.constant_rad_s2")
+        yield Undeclared(key, "what a gust does is covered by fdi.bounds.constant_rad_s2 only")
         if declared.follows_gusts_by_forces:
-            yield Undeclared(Kind.SHARP_GUST, key, "fdi.bounds.turbulence", Reader.STATISTICS)
+            yield Undeclared(key, _SHARP_GUST)
     if declared.monitors_sensors:
         steady = environment.wind_mps[2]
-        largest = max((steady, *(steady + gust.velocity_mps[2] for gust in environment.gusts)), key=abs)
-        bound, allowed = "fdi.bounds.vertical_wind_mps", declared.vertical_wind_mps
-        reader, speed = Reader.SENSOR_MONITOR, abs(largest)
-        wind = Undeclared(Kind.WIND, "environment", bound, reader, speed, 0.0, allowed, " m/s")
-        yield from filter(_is_beyond, (wind,))
+        largest = max(abs(steady + of) for of in (0.0, *(gust.velocity_mps[2] for gust in environment.gusts)))
+        allowed = declared.vertical_wind_mps
+        says = f"vertical wind of {largest:g} m/s is more than fdi.bounds.vertical_wind_mps, {allowed:g}"
+        yield from _beyond("environment", largest, allowed, f"{says}: {_SEEMS_BROKEN}")
 
 
 Span = tuple[float, float]

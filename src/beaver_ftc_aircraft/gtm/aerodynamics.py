@@ -127,17 +127,13 @@ def _along_angles(of: Table, i: int) -> tuple[np.ndarray, ...]:
     return data, alphas, betas
 
 
-def _over_angles(of: Table, i: int, beta: str = BETA) -> str:
-    """Output i of a table of alpha and beta."""
-    data, alphas, betas = _along_angles(of, i)
-    return table(data, [(ALPHA, alphas), (beta, betas)])
-
-
 def _static(terms: _Terms, base: Database) -> None:
     """The whole aircraft; what damage adds (held at its ends); the gear."""
     damaged, gear = base["dC6_damage.bas"], base["dC3_lgr"]
     for i, output in enumerate(OUTPUTS):
-        terms.add(output, "airframe", "Static, controls neutral", _over_angles(base["C6_bas"], i))
+        data, alphas, betas = _along_angles(base["C6_bas"], i)
+        neutral = table(data, [(ALPHA, alphas), (BETA, betas)])
+        terms.add(output, "airframe", "Static, controls neutral", neutral)
         keys = [(ALPHA, damaged.axes["alpha"]), (BETA, damaged.axes["beta"]), (DAMAGE_CASE, _CASES)]
         added = table(damaged.data[..., i], keys)
         terms.add(output, "damage", "What damage adds", unless_zero(DAMAGE_CASE, added))

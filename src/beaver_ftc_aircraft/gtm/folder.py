@@ -82,6 +82,7 @@ _LEADS = {
     "right_aileron": {"left_aileron": -1.0},
     "upper_rudder": {"lower_rudder": 1.0},
 }
+END_S = 15.0  # of a script
 _STEERS = ("elevator", "aileron", "rudder")
 
 
@@ -183,9 +184,9 @@ def write_scripts(folder: Path, steady: Steady) -> None:
                 if command.endswith(f"{kind}-cmd-rad")
             }
             events.append(_event(f"{kind} doublet, {name}", time_s, values))
-    _script(folder, "doublets", commands, events, 15.0)
+    _script(folder, "doublets", commands, events)
     for case in cases():
-        _script(folder, case, commands, [_event(case, 10.0, {damage_property(case): 1.0})], 15.0)
+        _script(folder, case, commands, [_event(case, 10.0, {damage_property(case): 1.0})])
 
 
 def _sign(command: str) -> float:
@@ -202,14 +203,14 @@ def _event(name: str, at_s: float, values: dict[str, float]) -> str:
     return f'    <event name="{name}">{condition}{sets}<notify>{said}</notify></event>'
 
 
-def _script(folder: Path, name: str, commands: dict[str, float], events: list[str], end_s: float) -> None:
-    events = [*events, _event("the end", end_s - 0.01, {})]
+def _script(folder: Path, name: str, commands: dict[str, float], events: list[str]) -> None:
+    events = [*events, _event("the end", END_S - 0.01, {})]
     lines = [
         '<?xml version="1.0"?>',
         "<!-- For JSBSim's own runner; the root is the folder above aircraft/gtm. -->",
         f'<runscript name="GTM {name}">',
         f'  <use aircraft="{NAME}" initialize="reset00"/>',
-        f'  <run start="0" end="{end_s:g}" dt="0.005">',
+        f'  <run start="0" end="{END_S:g}" dt="0.005">',
         *(f'    <property value="{number:.9g}">{command}</property>' for command, number in commands.items()),
         *events,
         "  </run>",

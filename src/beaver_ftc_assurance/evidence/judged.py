@@ -2,13 +2,12 @@
 by which flight; what has been covered; and what it all follows from.
 """
 
+import io
 import shlex
-import tempfile
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from itertools import pairwise
 from math import inf
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -128,17 +127,15 @@ def _of_sweep(plan: EvidencePlan, bar: OfSweep, name: str, rows: Sequence[Row]) 
     assert isinstance(sweep, Sweep)
     schema = schema_of(sweep)
     table = table_of(sweep, schema, [row["row"] for row in rows if row["source"] == name])
-    with tempfile.TemporaryDirectory(prefix="beaver-ftc-") as folder:
-        path = Path(folder) / "results.parquet"
-        with path.open("wb") as file:
-            write_tables(file, [table], schema)
-        flights = Flights(path, sweep)
-        found = evaluate(_levels(bar), flights)
-        plain = evaluate(_levels(bar, "confidence"), flights)
-        return [
-            (source.flight(_worst(flights, one["name"])), _of_bound(one, other))
-            for one, other in zip(found, plain, strict=True)
-        ]
+    file = io.BytesIO()
+    write_tables(file, [table], schema)
+    flights = Flights(file, sweep)
+    found = evaluate(_levels(bar), flights)
+    plain = evaluate(_levels(bar, "confidence"), flights)
+    return [
+        (source.flight(_worst(flights, one["name"])), _of_bound(one, other))
+        for one, other in zip(found, plain, strict=True)
+    ]
 
 
 def _worst(flights: Flights, name: str) -> int:

@@ -16,6 +16,7 @@ from beaver_ftc_links.sitl.telling import Text
 Message = Any  # pymavlink makes its classes itself
 Inject = Callable[[tuple[float, float, float]], tuple[int, str]]
 TEXT = 50  # characters of one STATUSTEXT
+SYSTEM = 1
 COMPONENT = 191  # MAV_COMP_ID_ONBOARD_COMPUTER
 HEARTBEAT_S = 1.0
 MOST_BYTES = 4096
@@ -32,15 +33,14 @@ def dialect() -> Any:
 class Mavlink:
     """One end of a line: packs and unpacks. malformed: bytes or messages that were none, so far."""
 
-    def __init__(self, system: int = 1) -> None:
-        self.messages, self._system = dialect(), system
-        self.malformed = 0
+    def __init__(self) -> None:
+        self.messages, self.malformed = dialect(), 0
         self._texts = 0
         self.begin()
 
     def begin(self) -> None:
         """A new line: what has come of a message on an old one is let go."""
-        self._mav = self.messages.MAVLink(None, srcSystem=self._system, srcComponent=COMPONENT)
+        self._mav = self.messages.MAVLink(None, srcSystem=SYSTEM, srcComponent=COMPONENT)
         self._mav.robust_parsing = True
 
     def pack(self, message: Message) -> bytes:

@@ -83,7 +83,6 @@ class Session:
         self.columns = sim.columns
         self.surfaces = tuple(c.removesuffix("_cmd_rad") for c in self.columns if c.endswith("_cmd_rad"))
         self._hidden = [i for i, name in enumerate(self.columns) if name.endswith(HIDDEN)]
-        self.events: deque[Message] = deque(maxlen=EVENTS_KEPT)
         self.fresh_events: list[Message] = []
         self.told: deque[Message] = deque(maxlen=EVENTS_KEPT)
         self.flying = {"law": flown.control.law, "scheme": flown.fdi.scheme}
@@ -154,7 +153,6 @@ class Session:
     def _tell(self, kind: str, says: str, secret: bool = False) -> None:
         event = {"t": round(self.sim.t_s, 2), "kind": kind, "says": says, "secret": secret}
         event |= {"by": self._by} if self._by else {}
-        self.events.append(event)
         self.fresh_events.append(event)
 
     def take_events(self) -> list[Message]:

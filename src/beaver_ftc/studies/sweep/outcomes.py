@@ -4,6 +4,7 @@ import shlex
 from collections.abc import Callable, Iterator
 from functools import cache, cached_property
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 
@@ -17,20 +18,20 @@ NO_FAULT = "no fault"
 
 
 class Flights:
-    """Columns of a `results.parquet` as arrays (flights,), each read when it is asked for.
+    """Columns of a `results.parquet`, or of one in memory, as arrays (flights,), each read when asked for.
 
     Numbers have NaN for null, flags False, texts ''.
     """
 
-    def __init__(self, path: Path, sweep: Sweep) -> None:
-        self._path, self.vary = path, sweep.file.vary
+    def __init__(self, file: Path | IO[bytes], sweep: Sweep) -> None:
+        self._file, self.vary = file, sweep.file.vary
         self._columns: dict[str, np.ndarray] = {}
 
     def __getitem__(self, name: str) -> np.ndarray:
         from pyarrow.parquet import read_table
 
         if name not in self._columns:
-            self._columns[name] = _array(read_table(self._path, columns=[name]).column(0))
+            self._columns[name] = _array(read_table(self._file, columns=[name]).column(0))
         return self._columns[name]
 
     def __len__(self) -> int:

@@ -31,7 +31,7 @@ def session(tmp_path):
 
 
 def told(session, kind):
-    return [event for event in session.events if event["kind"] == kind]
+    return [event for event in (*session.told, *session.fresh_events) if event["kind"] == kind]
 
 
 def test_a_loss_is_detected_named_and_told(session):
@@ -41,7 +41,11 @@ def test_a_loss_is_detected_named_and_told(session):
     frame = session.frame()
     assert (frame["axis"], frame["isolated"], frame["mode"]) == ("q", "elevator", "reallocated")
     assert frame["estimate"] == pytest.approx(-0.4, abs=0.05)
-    kinds = [event["kind"] for event in session.events if event["kind"] not in ("candidates", "supervisor")]
+    kinds = [
+        event["kind"]
+        for event in (*session.told, *session.fresh_events)
+        if event["kind"] not in ("candidates", "supervisor")
+    ]
     assert kinds[:4] == ["flight", "broken", "alarm", "named"]
     truth = dict(zip(session.surfaces, frame["effectiveness"], strict=True))
     assert truth == {"aileron": 1.0, "elevator": 0.6, "rudder": 1.0, "flap": 1.0}

@@ -11,13 +11,13 @@ The flight path: altitude, airspeed, heading or bank in time, a list of legs eac
 
 import csv as csv_files
 from collections.abc import Iterator, Sequence
-from functools import lru_cache, partial
+from functools import lru_cache
 from itertools import pairwise
 from math import ceil, exp, inf, isfinite, pi
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Self
 
-from pydantic import BeforeValidator, ConfigDict, ValidationInfo, create_model, model_validator
+from pydantic import ConfigDict, Field, ValidationInfo, model_validator
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.aircraft import THRUST_TERM
@@ -424,28 +424,41 @@ class _Leg(Section):
             deny("contradicts value, allowed: one of the two", "hold")
         if not self.hold and self.value is None:
             deny("required key is missing, allowed: value, or hold: true", "value")
+        low, high = self._ends(checked_aircraft())
+        if self.value is not None and not low <= self.value <= high:
+            says = type(self).model_fields["value"].description
+            allowed = f"allowed: a number from {low:g} to {high:g} ({says})"
+            deny(f"{self.value:g} is out of range, {allowed}", "value")
         return self
+
+    def _ends(self, aircraft: Aircraft) -> tuple[float, float]:
+        """Between what values this aircraft can be asked for it, where that depends on it."""
+        return -inf, inf
+
+
+# Ranges as they are shown, for the usual aircraft; those of the scenario's own aircraft count (`_ends`).
+_Altitude = Annotated[Number, Field(json_schema_extra={"maximum": 6000, "minimum": -300})]
+_Airspeed = Annotated[Number, Field(json_schema_extra={"maximum": 70, "minimum": 20})]
 
 
 class AltitudeLeg(_Leg):
     """A commanded altitude. The command changes to the new value at a constant rate of climb or descent."""
 
-    value: Number | None = number(
-        None,
-        "m",
-        "altitude above sea level",
-        ge=-300,
-        le=6000,
-        examples=[1900],
-    )
+    value: _Altitude | None = number(None, "m", "altitude above sea level", examples=[1900])
     climb_mps: Number = number(2.5, "m/s", "rate of climb or descent", gt=0, le=10)
+
+    def _ends(self, aircraft: Aircraft) -> tuple[float, float]:
+        return -300.0, highest_of(aircraft)
 
 
 class AirspeedLeg(_Leg):
     """A commanded airspeed. The command changes to the new value at a constant acceleration."""
 
-    value: Number | None = number(None, "m/s", "true airspeed", ge=20, le=70, examples=[45])
+    value: _Airspeed | None = number(None, "m/s", "true airspeed", examples=[45])
     change_mps2: Number = number(0.2, "m/s2", "acceleration of the command", gt=0, le=5)
+
+    def _ends(self, aircraft: Aircraft) -> tuple[float, float]:
+        return airspeeds_of(aircraft)
 
 
 class HeadingLeg(_Leg):
@@ -458,25 +471,6 @@ class BankLeg(_Leg):
     """A commanded bank angle, positive with the right wing down."""
 
     value: Number | None = number(None, "deg", "bank angle", ge=-45, le=45, examples=[20])
-
-
-@lru_cache
-def _wide(kind: type[_Leg]) -> type[_Leg]:
-    """A leg of any value."""
-    keys: dict[str, Any] = {"value": (Number | None, number(None, "as said"))}
-    return create_model(kind.__name__, __base__=kind, __doc__=kind.__doc__, **keys)
-
-
-def _checked(kind: type[_Leg], given: Any) -> Any:
-    """A leg whose value the aircraft in question can be asked for."""
-    if isinstance(given, kind):
-        return given
-    leg, aircraft = _wide(kind).model_validate(given), checked_aircraft()
-    low, high = (-300.0, highest_of(aircraft)) if kind is AltitudeLeg else airspeeds_of(aircraft)
-    if leg.value is not None and not low <= leg.value <= high:
-        says = str(kind.model_fields["value"].description)
-        deny(f"{leg.value:g} is out of range, allowed: a number from {low:g} to {high:g} ({says})", "value")
-    return kind.model_construct(leg.model_fields_set, **dict(leg))
 
 
 def channels_of(aircraft: Aircraft) -> tuple[str, ...]:
@@ -494,10 +488,8 @@ class Autopilot(Section):
     """Each quantity has a list of legs. From its time `at_s`, a leg sets a new `value`, or with `hold:
     true` keeps the present value. A quantity that is left out is not controlled."""
 
-    altitude_m: tuple[Annotated[AltitudeLeg, BeforeValidator(partial(_checked, AltitudeLeg))], ...] = _legs(
-        "altitude"
-    )
-    airspeed_mps: tuple[Annotated[AirspeedLeg, BeforeValidator(partial(_checked, AirspeedLeg))], ...] = _legs(
+    altitude_m: tuple[AltitudeLeg, ...] = _legs("altitude")
+    airspeed_mps: tuple[AirspeedLeg, ...] = _legs(
         "true airspeed. Engine power holds it; without an engine, pitch"
     )
     heading_deg: tuple[HeadingLeg, ...] = _legs("true heading")

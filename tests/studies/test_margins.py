@@ -5,7 +5,7 @@ import pytest
 
 from beaver_ftc.control.laws import rejecting
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.studies.margins import LawGains, OpenLoop, at, frequencies, loops, study
+from beaver_ftc.studies.margins import OpenLoop, at, frequencies, loops, study
 from flying import flown, scenario
 
 OURS = {"control": {"law": "fault-tolerant"}, "uncertainty": {}}
@@ -23,12 +23,12 @@ def test_three_integrators_are_the_design_loop(loop):
     opened = OpenLoop(
         np.zeros((3, 3)), G, np.eye(3), np.zeros((3, 3)), G, even, loop.approach * even,
         loop.delay_s * even, loop.keep * even, loop.dt_s,
+        s * even, pull * even, learn * even, np.linalg.inv(G), loop.lead * even, loop.share,
     )  # fmt: skip
-    law = LawGains(s * even, pull * even, learn * even, np.linalg.inv(G), loop.lead * even, loop.share)
     omega = frequencies(loop.dt_s)
     expected = rejecting.open_loop(loop, s, np.exp(1j * omega * loop.dt_s))
     for axis in range(3):
-        np.testing.assert_allclose(loops(opened, law, omega)[:, axis], expected, rtol=1e-9)
+        np.testing.assert_allclose(loops(opened, omega)[:, axis], expected, rtol=1e-9)
 
 
 @pytest.mark.parametrize("given", [OURS, REAL], ids=["ideal", "real"])

@@ -45,7 +45,7 @@ def repeated(problem: str, repeats: int) -> tuple[int, int, int]:
         chains = Chains(keys, seed)
         chains.go(score)
         found = chains.estimate()
-        held += found.low <= probability <= found.high
-        near += 0.5 < found.probability / probability < 2
-        flights += found.flights
+        held += found["low"] <= probability <= found["high"]
+        near += 0.5 < found["probability"] / probability < 2
+        flights += found["flights"]
     return held, near, flights

@@ -215,10 +215,6 @@ class Columns(dict[str, np.ndarray]):
         whole = np.concatenate(self._chunks, axis=1) if len(self._chunks) > 1 else self._chunks[0]
         self.update(zip(self._names, whole, strict=True))
 
-    def read(self, *names: str) -> np.ndarray:
-        """Some columns side by side, (frames, names)."""
-        return np.column_stack([self[name] for name in names])
-
     def since(self, from_s: float) -> Values:
         """Every column from an instant on."""
         late = self["t_s"] >= from_s

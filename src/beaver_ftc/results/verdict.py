@@ -6,7 +6,8 @@ All words follow from the metrics, so that they cannot disagree with `metrics.js
 import io
 import math
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.results.expectations import expectations_in_words, value_text
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 MIN_SHOWN_BEYOND_S = 0.1
+Lines = Iterable[tuple[str, str]]
 
 
 def title(metrics: Metrics) -> str:
@@ -204,37 +206,51 @@ def tracking_rms_in_words(metrics: Metrics) -> list[tuple[str, str, str, str]]:
 
 def verdict_text(metrics: Metrics, folder: str, colour: bool = False) -> str:
     """The verdict of one flight as a table for the terminal."""
-    from rich.console import Console
+    style = {"good": "bold green", "lost": "bold yellow", "bad": "bold red"}[outcome_class(metrics)]
+    lines = verdict_lines(metrics)
+    for i, (when, p, q, r) in enumerate(tracking_rms_in_words(metrics)):
+        lines.append(("" if i else "tracking RMS", f"p {p}  q {q}  r {r} deg/s {when} the fault"))
+    held = [(one.passed, one.sentence) for one in expectations_in_words(metrics)]
+    certificate = _if_there(partial(_certificate_text, folder), metrics.certificate)
+    last = [("certificate", certificate)] if certificate else []
+    table = verdict_table((title(metrics), style), lines, held, [*last, ("results", folder)])
+    return f"{printed([table], colour=colour)}\n"
 
-    console = Console(file=io.StringIO(), force_terminal=colour, highlight=False, emoji=False, markup=False)
-    with console.capture() as captured:
-        console.print(_verdict_table(metrics, folder))
-    return "\n".join(line.rstrip() for line in captured.get().splitlines()) + "\n"
 
-
-def _verdict_table(metrics: Metrics, folder: str) -> "Table":
+def verdict_table(
+    headline: tuple[str, str], lines: Lines, held: Iterable[tuple[bool, str]], last: Lines
+) -> "Table":
+    """A headline in its style, lines of (name, text), whether each expectation is met, and the last lines."""
     from rich.table import Table
     from rich.text import Text
 
-    style = {"good": "bold green", "lost": "bold yellow", "bad": "bold red"}[outcome_class(metrics)]
-    headline = Text(title(metrics), style)
-    table = Table(title=headline, title_justify="left", show_header=False, box=None)
+    table = Table(title=Text(*headline), title_justify="left", show_header=False, box=None)
     table.add_column(style="bold", no_wrap=True)
     table.add_column(overflow="fold")
-    for what, how in verdict_lines(metrics):
+    for what, how in lines:
         table.add_row(what, how)
-    for i, (when, p, q, r) in enumerate(tracking_rms_in_words(metrics)):
-        table.add_row("" if i else "tracking RMS", f"p {p}  q {q}  r {r} deg/s {when} the fault")
-    for held in expectations_in_words(metrics):
-        mark = Text("met   " if held.passed else "MISSED", "green" if held.passed else "bold red")
-        table.add_row("expected", Text.assemble(mark, f" {held.sentence}"))
-    if metrics.certificate is not None:
-        table.add_row("certificate", _certificate_text(metrics.certificate, folder))
-    table.add_row("results", folder)
+    for passed, said in held:
+        mark = Text("met   " if passed else "MISSED", "green" if passed else "bold red")
+        table.add_row("expected", Text.assemble(mark, f" {said}"))
+    for what, how in last:
+        table.add_row(what, how)
     return table
 
 
-def _certificate_text(written: CertificateCounts, folder: str) -> str:
+def printed(tables: Iterable["Table"], width: int | None = None, colour: bool = False) -> str:
+    """Tables of rich as text."""
+    from rich.console import Console
+
+    console = Console(
+        file=io.StringIO(), force_terminal=colour, highlight=False, emoji=False, markup=False, width=width
+    )
+    with console.capture() as captured:
+        for table in tables:
+            console.print(table)
+    return "\n".join(line.rstrip() for line in captured.get().splitlines())
+
+
+def _certificate_text(folder: str, written: CertificateCounts) -> str:
     """How many alarms and exclusions are certified, and the command that checks them."""
     if not written.statements and not written.without:
         return "nothing to certify: no alarm"

@@ -219,7 +219,8 @@ def result_folder(out: Path, name: str, files: Iterable[str] = ()) -> Iterator[P
             with _locked(unnamed):  # before it bears the name by which another run would look for stale ones
                 unnamed.rename(partial)
                 yield partial
-                _sync(partial)
+                for path in (*partial.rglob("*"), partial):  # on the disk before its name says that it is
+                    sync(path)
                 _move_into_place(partial, final, files)
         except BaseException:
             shutil.rmtree(partial, ignore_errors=True)
@@ -318,12 +319,6 @@ def _remove_stale(out: Path, name: str) -> None:
         with contextlib.suppress(OSError), _locked(leftover) as stale:
             if stale:
                 shutil.rmtree(leftover, ignore_errors=True)
-
-
-def _sync(folder: Path) -> None:
-    """Bring the folder's files to the disk before its name says that they are there."""
-    for path in (*folder.rglob("*"), folder):
-        sync(path)
 
 
 def sync(path: Path) -> None:

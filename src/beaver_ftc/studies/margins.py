@@ -39,24 +39,13 @@ LOWEST_RAD_S = 0.3  # below, the autopilot flies: a body rate says little of a p
 
 
 @dataclass(frozen=True)
-class LawGains:
-    """Of one flight condition. Kp 1/s, L_rate 1, L_disturbance 1/s (3,); demand (n, 3): command of each
-    surface for a demanded acceleration, rad per rad/s2; lead (n,); share: of a frame until a command acts."""
-
-    Kp: np.ndarray
-    L_rate: np.ndarray
-    L_disturbance: np.ndarray
-    demand: np.ndarray
-    lead: np.ndarray
-    share: float
-
-
-@dataclass(frozen=True)
 class OpenLoop:
-    """What the law is closed around at one condition; n surfaces, m measured signals, the rates first.
+    """The law, and what it is closed around, at one condition; n surfaces, m measured signals, rates first.
 
     A, B: aircraft; C (m, states). f (3, m): the law's model of the rates' accelerations; G (3, n) with the
     effectiveness (n,) in it. approach (n,): of the actuators in a frame. delay_s, keep (m,): of the sensors.
+    Kp 1/s, L_rate 1, L_disturbance 1/s (3,); demand (n, 3): command of each surface for a demanded
+    acceleration, rad per rad/s2; lead (n,); share: of a frame until a command acts.
     """
 
     A: np.ndarray
@@ -69,6 +58,12 @@ class OpenLoop:
     delay_s: np.ndarray
     keep: np.ndarray
     dt_s: float
+    Kp: np.ndarray
+    L_rate: np.ndarray
+    L_disturbance: np.ndarray
+    demand: np.ndarray
+    lead: np.ndarray
+    share: float
 
 
 def interpolated(law: Schedule, qdyn: float, lost: float) -> np.ndarray:
@@ -97,17 +92,17 @@ def allocation(G: np.ndarray, main: np.ndarray, stand_in: int, lost: float) -> n
     return commands
 
 
-def law_response(loop: OpenLoop, law: LawGains, z: Any) -> np.ndarray:
+def law_response(loop: OpenLoop, z: Any) -> np.ndarray:
     """Where the surfaces go for what is measured, (..., n, m), at each z (...)."""
     n, m, dt = len(loop.effectiveness), len(loop.C), loop.dt_s
     z = np.asarray(z, complex)[..., None, None]
     back = 1.0 / z
-    mean = law.share * back + 1.0 - law.share  # of what acts over the elapsed frame
+    mean = loop.share * back + 1.0 - loop.share  # of what acts over the elapsed frame
     actuator = loop.approach / (z - 1.0 + loop.approach)
-    one, keep, all_n = np.eye(3), np.diag(1.0 - law.L_rate), np.eye(n)
-    L_disturbance, Kp, lead = np.diag(law.L_disturbance), np.diag(law.Kp), np.diag(law.lead)
-    demand, rates, none = lead @ law.demand, np.eye(3, m), np.zeros((n, m))
-    ahead = one + law.share * dt * Kp
+    one, keep, all_n = np.eye(3), np.diag(1.0 - loop.L_rate), np.eye(n)
+    L_disturbance, Kp, lead = np.diag(loop.L_disturbance), np.diag(loop.Kp), np.diag(loop.lead)
+    demand, rates, none = lead @ loop.demand, np.eye(3, m), np.zeros((n, m))
+    ahead = one + loop.share * dt * Kp
     wide, tall = np.zeros((3, n)), np.zeros((n, 3))
     # unknowns: rate, disturbance, position, command; driven by what is measured
     M = [
@@ -115,10 +110,10 @@ def law_response(loop: OpenLoop, law: LawGains, z: Any) -> np.ndarray:
         [L_disturbance * back, one - one * back + L_disturbance * dt * back,
          L_disturbance @ loop.G * dt * mean, wide],
         [tall, tall, all_n, -all_n * actuator],
-        [demand @ Kp, demand @ ahead, demand @ Kp @ loop.G * law.share * dt + lead - all_n, all_n],
+        [demand @ Kp, demand @ ahead, demand @ Kp @ loop.G * loop.share * dt + lead - all_n, all_n],
     ]  # fmt: skip
     driven = [
-        [np.diag(law.L_rate) @ rates + keep @ loop.f * dt * mean],
+        [np.diag(loop.L_rate) @ rates + keep @ loop.f * dt * mean],
         [L_disturbance @ (rates - loop.f * dt * mean)], [none], [-demand @ ahead @ loop.f],
     ]  # fmt: skip
 
@@ -130,15 +125,15 @@ def law_response(loop: OpenLoop, law: LawGains, z: Any) -> np.ndarray:
     return np.linalg.solve(joined(M), joined(driven))[..., 6 : 6 + n, :]
 
 
-def loops(loop: OpenLoop, law: LawGains, omega: np.ndarray) -> np.ndarray:
+def loops(loop: OpenLoop, omega: np.ndarray) -> np.ndarray:
     """L_s (omega, n) of every surface, the others' loops closed."""
     Ad, Bd = held_over_frame(loop.A, loop.B * loop.effectiveness, loop.dt_s)
     z = np.exp(1j * omega * loop.dt_s)[:, None]
     sensors = z ** (-loop.delay_s / loop.dt_s) * (1.0 - loop.keep) / (1.0 - loop.keep / z)
     z = z[..., None]
     whole = np.linalg.solve(z * np.eye(len(Ad)) - Ad, np.broadcast_to(Bd, (len(omega), *Bd.shape)))
-    aircraft = loop.C @ whole * (law.share + (1.0 - law.share) * z)
-    around = law_response(loop, law, z[:, 0, 0]) @ (sensors[..., None] * aircraft)
+    aircraft = loop.C @ whole * (loop.share + (1.0 - loop.share) * z)
+    around = law_response(loop, z[:, 0, 0]) @ (sensors[..., None] * aircraft)
     return np.stack([-_others_closed(around, s) for s in range(len(loop.effectiveness))], axis=1)
 
 
@@ -183,12 +178,12 @@ def study(scenario: Scenario) -> list[Margin]:
     Raises BadInput for another law: its loop is not this one.
     """
     refuse_other_laws(scenario)
-    return [margin for flight in over_envelope(scenario, N_AIRSPEEDS) for margin in at(flight)]
+    return [margin for flight in over_envelope(scenario) for margin in at(flight)]
 
 
-def over_envelope(scenario: Scenario, count: int) -> Iterator[Scenario]:
-    """The scenario at so many airspeeds of the envelope, evenly spaced from its slowest to its fastest."""
-    airspeeds_mps = np.linspace(*scenario.airframe.envelope.airspeed_mps, count)
+def over_envelope(scenario: Scenario) -> Iterator[Scenario]:
+    """The scenario at airspeeds of the envelope, evenly spaced from its slowest to its fastest."""
+    airspeeds_mps = np.linspace(*scenario.airframe.envelope.airspeed_mps, N_AIRSPEEDS)
     return (scenario.with_({"initial.airspeed_mps": float(V)}) for V in airspeeds_mps)
 
 
@@ -208,8 +203,7 @@ def at(scenario: Scenario) -> Iterator[Margin]:
     y = frame.true_signals
     omega = frequencies(1.0 / scenario.rate_hz)
     for fault, effectiveness in cases(frame.control.main, scenario.airframe.surfaces):
-        loop, law = open_loop(scenario, frame, linear, y, effectiveness)
-        L = loops(loop, law, omega)
+        L = loops(open_loop(scenario, frame, linear, y, effectiveness), omega)
         for s, surface in enumerate(scenario.airframe.surfaces):
             if np.abs(L[:, s]).max() > LEAST_LOOP:
                 yield Margin(scenario.initial.airspeed_mps, fault, surface, *map(float, margins(L[:, s])))
@@ -226,21 +220,19 @@ def cases(main: np.ndarray, surfaces: tuple[str, ...]) -> Iterator[tuple[str, np
 
 def open_loop(
     scenario: Scenario, frame: FrameReadout, linear: LinearModel, y: np.ndarray, effectiveness: np.ndarray
-) -> tuple[OpenLoop, LawGains]:
+) -> OpenLoop:
     """The loop with this effectiveness (n,), the law knowing it; y: the measured signals in trim."""
     law, dt = frame.control, 1.0 / scenario.rate_hz
     _, G, f_x, f_y = jacobian(frame.design, np.zeros(3), y, law.trim_rad)
     lost = 1.0 - effectiveness[law.main[PITCH]] if law.stand_in >= 0 else 0.0
     whole = 1.0 - (1.0 - frame.actuators.approach) ** scenario.substeps
     C = outputs(linear.states, y)
-    delay_s, keep = sensors(scenario, len(C), dt)
-    loop = OpenLoop(
-        linear.A, linear.B, C, np.hstack((f_x, f_y[:, : len(C) - 3])), G * effectiveness, effectiveness,
-        whole, delay_s, keep, dt,
-    )  # fmt: skip
     demand = allocation(G * effectiveness, law.main, law.stand_in, lost)
-    Kp, L_rate, L_disturbance = interpolated(law.schedule, y[QDYN], lost)
-    return loop, LawGains(Kp, L_rate, L_disturbance, demand, law.lead, law.share)
+    return OpenLoop(
+        linear.A, linear.B, C, np.hstack((f_x, f_y[:, : len(C) - 3])), G * effectiveness, effectiveness,
+        whole, *sensors(scenario, len(C), dt), dt, *interpolated(law.schedule, y[QDYN], lost), demand,
+        law.lead, law.share,
+    )  # fmt: skip
 
 
 def outputs(states: tuple[str, ...], y: np.ndarray) -> np.ndarray:

@@ -29,7 +29,6 @@ LEAVES_S = 5.0  # a pool's thread, once its workers have ended: milliseconds
 # Starts of a worker, each later, should the process that it is forked from be killed meanwhile: one that is
 # killed closes its pipe before the system says that it has ended, so what comes at once finds it still there.
 STARTS_AFTER_S = (0.0, 0.1, 1.0)
-MOST_STILLBORN = 8  # in a row, should workers be killed before they have begun
 
 Row = Any
 Number = int | str  # of a batch: what its file is called
@@ -108,8 +107,6 @@ class ThisProcess:
 class _Worker:
     """A process of its own: one that dies takes nobody else's task with it."""
 
-    stillborn = 0  # before it in its place, in a row: those that ended before they had begun
-
     def __init__(self, work: Work) -> None:
         self.pid: Future[int] = Future()
         for pause_s in STARTS_AFTER_S:
@@ -130,11 +127,6 @@ class _Worker:
         except (KeyboardInterrupt, SystemExit):
             _begin_no_more()
             raise
-
-    @property
-    def has_begun(self) -> bool:
-        """Whether it has been ready to fly."""
-        return self.pid.done() and self.pid.exception() is None
 
     def fly(self, task: Batch) -> "Future[list[Row]]":
         return self._pool.submit(_fly, task.cases)
@@ -161,7 +153,9 @@ class LocalWorkers:
         self._busy: dict[Future[list[Row]], tuple[_Worker, Batch]] = {}
         self._idle = [_Worker(work)]
         try:
-            wait([self._idle[0].pid])  # the first compiles, should that be needed; the others find it done
+            # the first compiles, should that be needed; the others find it done
+            if self._idle[0].pid.exception():
+                raise SimulationFailed("a worker process cannot start: it ended before its first flight")
             self._idle += [_Worker(work) for _ in range(workers - 1)]
         except (KeyboardInterrupt, SystemExit):
             _begin_no_more()
@@ -179,39 +173,24 @@ class LocalWorkers:
 
     def outcomes(self, timeout_s: float) -> list[Outcome]:
         done, _ = wait(self._busy, timeout_s, FIRST_COMPLETED)
-        return [outcome for flown in done if (outcome := self._outcome(flown))]
+        return [self._outcome(flown) for flown in done]
 
     def close(self) -> None:
         for worker in (*self._idle, *(worker for worker, _ in self._busy.values())):
             worker.end()
 
-    def _outcome(self, flown: "Future[list[Row]]") -> Outcome | None:
-        """What became of a task; None if it is another's now, since its worker never came to fly it."""
+    def _outcome(self, flown: "Future[list[Row]]") -> Outcome:
         worker, task = self._busy.pop(flown)
-        rows, begun = None, True
+        rows = None
         try:
             rows = flown.result()
         except BrokenProcessPool:
-            begun = worker.has_begun
-            worker = self._in_place_of(worker)
+            worker = _Worker(self._work)
         except Exception as error:  # not a flight's: those are in their rows
             raise SimulationFailed(f"a worker cannot go on: {error}") from error
         finally:
             self._idle.append(worker)
-        if not begun:
-            self.submit(task)
-        return Outcome(task, rows) if begun else None
-
-    def _in_place_of(self, ended: _Worker) -> _Worker:
-        """Another. One may be killed before it begins; if so are those that take its place, that is said."""
-        stillborn = 0 if ended.has_begun else ended.stillborn + 1
-        if stillborn == MOST_STILLBORN:
-            raise SimulationFailed(
-                f"a worker process cannot start: {stillborn} in a row ended before their first flight"
-            ) from None
-        worker = _Worker(self._work)
-        worker.stillborn = stillborn
-        return worker
+        return Outcome(task, rows)
 
 
 _OF_THIS_PROCESS: list[Work] = []  # a worker's only one

@@ -66,9 +66,7 @@ def published_case(constant_rad_s2: PerAxis, like: Scenario) -> Scenario:
 
 def with_bound(scenario: Scenario, constant_rad_s2: PerAxis) -> Scenario:
     """The scenario with another constant part of the bound."""
-    per_axis = scenario.fdi.bounds.constant_rad_s2.model_copy(update=constant_rad_s2)
-    bounds = scenario.fdi.bounds.model_copy(update={"constant_rad_s2": per_axis})
-    return scenario.model_copy(update={"fdi": scenario.fdi.model_copy(update={"bounds": bounds})})
+    return scenario.with_({"fdi.bounds.constant_rad_s2": constant_rad_s2})
 
 
 def recommended_for(scenarios: Sequence[Scenario], needed: Sequence[np.ndarray]) -> Document:

@@ -7,8 +7,9 @@ from beaver_ftc.aircraft import AXES
 from beaver_ftc.documents.files import read_json
 from beaver_ftc.results.model import Document
 from beaver_ftc.results.report import register_section
+from beaver_ftc.results.verdict import printed
 from beaver_ftc.studies.present import page
-from beaver_ftc.studies.present.tables import number, plain, printed, seconds, tabulated
+from beaver_ftc.studies.present.tables import number, plain, seconds, tabulated
 
 WIDTH = 150
 

@@ -45,7 +45,7 @@ class Bullets(NamedTuple):
 
 
 class Links(NamedTuple):
-    """Links in a line: (text, address)."""
+    """Links in a line of an HTML page: (text, address)."""
 
     lead: str
     links: Sequence[tuple[str, str]]
@@ -79,8 +79,6 @@ def _markdown(part: Part, figures: str) -> Iterator[str]:
         case Bullets():
             yield part.lead
             yield "\n".join(f"- {sentence}" for sentence in part.sentences)
-        case Links():
-            yield part.lead + ", ".join(f"[{text}]({to})" for text, to in part.links)
         case Pictures():
             yield from (f"![{title}]({figures}/{stem}.png)" for title, stem in part.shown)
         case _:

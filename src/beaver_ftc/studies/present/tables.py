@@ -153,16 +153,3 @@ def plain(title: str, head: Sequence[str], rows: Rows) -> "Table":
     for row in rows:
         table.add_row(*row)
     return table
-
-
-def printed(tables: Sequence["Table"], width: int | None = None, colour: bool = False) -> str:
-    """Tables of rich as text."""
-    from rich.console import Console
-
-    console = Console(
-        file=io.StringIO(), force_terminal=colour, highlight=False, emoji=False, markup=False, width=width
-    )
-    with console.capture() as captured:
-        for table in tables:
-            console.print(table)
-    return "\n".join(line.rstrip() for line in captured.get().splitlines())

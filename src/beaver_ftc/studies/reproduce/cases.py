@@ -125,10 +125,6 @@ class Flown:
         error = self.error_deg_s(axis)[self.between(start_s, end_s)]
         return float(np.sqrt(np.mean(error**2))) if error.size else np.inf
 
-    def before_deg_s(self, axis: str) -> float:
-        """RMS tracking error before the fault, once settled, deg/s."""
-        return self.rms_deg_s(axis, SETTLED_S, self.fault_at_s)
-
     def kept_deg_s(self, axis: str, start_s: float) -> float:
         """RMS tracking error of an axis from start_s on, deg/s; infinite if the aircraft is lost."""
         return np.inf if self.metrics.departure else self.rms_deg_s(axis, start_s)

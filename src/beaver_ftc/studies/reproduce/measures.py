@@ -257,7 +257,7 @@ def healthy_tracking(flown: Flown) -> float:
 
 def deterioration(flown: Flown) -> float:
     """RMS pitch rate error after the fault over that before, over all the flight there is."""
-    return flown.rms_deg_s("q", flown.fault_at_s) / flown.before_deg_s("q")
+    return flown.rms_deg_s("q", flown.fault_at_s) / flown.rms_deg_s("q", SETTLED_S, flown.fault_at_s)
 
 
 def _beside(flights: tuple[Flown, ...], after_s: float) -> float:

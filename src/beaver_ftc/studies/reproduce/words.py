@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.documents.document import parse
 from beaver_ftc.results.model import Document
+from beaver_ftc.results.verdict import printed
 from beaver_ftc.studies.present import page, tables
-from beaver_ftc.studies.present.tables import printed, tabulated
+from beaver_ftc.studies.present.tables import tabulated
 from beaver_ftc.studies.reproduce import beside, truth_and_design
 from beaver_ftc.studies.reproduce.claims import BORNE_OUT, CANNOT_BE_JUDGED, NOT_BORNE_OUT, STRONGER
 from beaver_ftc.studies.reproduce.published_figures import FIGURES, SENSITIVITY

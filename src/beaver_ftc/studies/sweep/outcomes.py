@@ -161,7 +161,7 @@ def ranks_of(values: np.ndarray) -> np.ndarray:
 def _entry(key: str, values: np.ndarray, ranks: np.ndarray) -> Document:
     groups = _groups(values)
     share = _explained(groups, ranks)
-    generator = np.random.Generator(np.random.PCG64(0))
+    generator = np.random.default_rng(0)
     by_chance = sum(_explained(groups, generator.permutation(ranks)) >= share for _ in range(PERMUTATIONS))
     return {
         "key": key,

@@ -10,7 +10,6 @@ they differ by the interval, that of a lognormal mean [Cox, in Land1972].
 import hashlib
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from statistics import NormalDist
@@ -45,25 +44,11 @@ FlyPoints = Callable[[np.ndarray], Scores]
 """From a round's points (flights, keys), standard normals, to scores (flights,); events from 0."""
 
 
-@dataclass(frozen=True)
-class Estimate:
-    """A probability with its two-sided interval. why: what it lacks, if anything."""
-
-    probability: float
-    low: float
-    high: float
-    flights: int
-    levels: int
-    plain: Document
-    why: str
-
-
 class Chains:
     """Independent runs of subset simulation abreast: points (runs, members, keys), scores (runs, members)."""
 
     def __init__(self, keys: int, seed: int, runs: int = RUNS, members: int = MEMBERS) -> None:
-        words = np.random.SeedSequence(seed, spawn_key=(0, 0, _OF_RARE))
-        self._generator = np.random.Generator(np.random.PCG64(words))
+        self._generator = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(0, 0, _OF_RARE)))
         self.points = self._generator.standard_normal((runs, members, keys))
         self.scores = np.full((runs, members), -math.inf)
         self.share, self.reached = np.ones(runs), np.zeros(runs, bool)
@@ -129,14 +114,20 @@ class Chains:
         self.flights += len(flat)
         return scores.reshape(points.shape[:-1])
 
-    def estimate(self) -> Estimate:
-        """What the runs amount to."""
+    def estimate(self) -> Document:
+        """What the runs amount to: a probability with its two-sided interval; why: what it lacks, if
+        anything."""
         events, of = self.plain
-        plain = {"events": events, "of": of, **asdict(binomial(events, of))}
-        if not self.reached.all():
-            says = "the score stops rising before the event" if self.stuck else "too rare for so many levels"
-            return Estimate(math.nan, 0.0, float(self.share.max()), self.flights, self.levels, plain, says)
-        return Estimate(*lognormal_mean(self.share), self.flights, self.levels, plain, "")
+        (probability, low, high), why = (math.nan, 0.0, float(self.share.max())), ""
+        if self.reached.all():
+            probability, low, high = lognormal_mean(self.share)
+        else:
+            why = "the score stops rising before the event" if self.stuck else "too rare for so many levels"
+        return {
+            "probability": probability, "low": low, "high": high,
+            "flights": self.flights, "levels": self.levels,
+            "plain": {"events": events, "of": of, **vars(binomial(events, of))}, "why": why,
+        }  # fmt: skip
 
 
 def lognormal_mean(values: np.ndarray) -> tuple[float, float, float]:
@@ -260,7 +251,7 @@ def run_rare(
 
 
 def _document(sweep: Sweep, expectation: str, chains: Chains, failed: int) -> Document:
-    found = asdict(chains.estimate())
+    found = chains.estimate()
     plain = all_finite(found.pop("plain"))
     likeliest = None
     if chains.design is not None:

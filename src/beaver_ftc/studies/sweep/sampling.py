@@ -115,7 +115,7 @@ def _is_in_turn(file: SweepFile, how: Variation) -> bool:
 
 
 def _generator(seed: int, index: int, purpose: int) -> np.random.Generator:
-    return np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed, spawn_key=(index, purpose))))
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(index, purpose)))
 
 
 def _latin_hypercube(file: SweepFile, dimensions: int) -> np.ndarray:

@@ -7,7 +7,8 @@ is interrupted goes on exactly as it would have, and any number of workers finds
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -39,11 +40,6 @@ def delay_score(row: Mapping[str, Any]) -> float:
     return row["flown_s"] - at_s
 
 
-def false_alarm_score(row: Mapping[str, Any]) -> float:
-    """How close a residual came to its threshold without a fault; 1 is a false alarm."""
-    return row["worst_residual_ratio"]
-
-
 def tracking_score(row: Mapping[str, Any]) -> float:
     """Largest RMS tracking error after the fault, deg/s; losing the aircraft is worse, the earlier."""
     if row["status"] == DEPARTED:
@@ -52,7 +48,11 @@ def tracking_score(row: Mapping[str, Any]) -> float:
     return -math.inf if None in after else max(after)
 
 
-OBJECTIVES = {"delay": delay_score, "false_alarm": false_alarm_score, "tracking": tracking_score}
+OBJECTIVES: dict[str, Callable[[Mapping[str, Any]], float]] = {
+    "delay": delay_score,
+    "false_alarm": itemgetter("worst_residual_ratio"),  # 1 is a false alarm
+    "tracking": tracking_score,
+}
 
 
 def score(objective: str, row: Mapping[str, Any]) -> float:
@@ -77,8 +77,8 @@ class Evolution:
 
     def trials(self) -> np.ndarray:
         """The points to fly in this generation, (members, keys)."""
-        sequence = np.random.SeedSequence(self._seed, spawn_key=(self.generation, 0, _OF_SEARCH))
-        generator = np.random.Generator(np.random.PCG64(sequence))
+        spawn_key = self.generation, 0, _OF_SEARCH
+        generator = np.random.default_rng(np.random.SeedSequence(self._seed, spawn_key=spawn_key))
         if self.generation == 0:
             slices = [generator.permutation(self.members) for _ in range(self._keys)]
             return (np.column_stack(slices) + generator.random((self.members, self._keys))) / self.members

@@ -5,11 +5,12 @@ Everything is said from the summary document, so that the words and `summary.jso
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.results.metrics import NEAR_THRESHOLD_SHARE
 from beaver_ftc.results.model import Document, Expectation, Judged
+from beaver_ftc.results.verdict import printed, verdict_table
 from beaver_ftc.studies.present.page import (
     Heading,
     Links,
@@ -20,13 +21,9 @@ from beaver_ftc.studies.present.page import (
     drawn_in,
     versions_line,
 )
-from beaver_ftc.studies.present.tables import Rows, number, printed, tabulated
+from beaver_ftc.studies.present.tables import Rows, number, tabulated
 from beaver_ftc.studies.sweep.pictures import FIGURES
 from beaver_ftc.studies.sweep.summary import OUTCOMES
-
-if TYPE_CHECKING:
-    from rich.table import Table as Shown
-
 
 MANY = 0.1  # of a sweep's flights
 _STEERED = "The search steered these flights towards the worst: rates say nothing about flights in general."
@@ -126,28 +123,14 @@ def summary_text(summary: Document, colour: bool = False) -> str:
     """The summary as a table for the terminal."""
     # commands each on a line of its own to be copied
     worst = [f" {'; '.join(flight['why'])}:\n   {flight['replay']}" for flight in summary["worst"][:3]]
-    return "\n".join([printed([_table(summary)], colour=colour), *worst]) + "\n"
-
-
-def _table(summary: Document) -> "Shown":
-    from rich.table import Table as Shown
-    from rich.text import Text
-
-    headline = Text(title(summary), "bold green" if summary["passed"] else "bold red")
-    table = Shown(title=headline, title_justify="left", show_header=False, box=None)
-    table.add_column(style="bold", no_wrap=True)
-    table.add_column(overflow="fold")
-    for what, how in facts(summary):
-        table.add_row(what, how)
+    headline, lines = (title(summary), "bold green" if summary["passed"] else "bold red"), facts(summary)
     for what, p, q, r in tracking(summary):
         unit = "" if what == "ratio" else " deg/s"
         label = "tracking RMS, median" if what.startswith("before") else ""
-        table.add_row(label, f"p {p}  q {q}  r {r}{unit} {what}")
-    for name, bound, actual, passed in expectations(summary):
-        mark = Text("met   " if passed else "MISSED", "green" if passed else "bold red")
-        table.add_row("expected", Text.assemble(mark, f" {name} {bound}: {actual}"))
-    table.add_row("results", summary["folder"])
-    return table
+        lines.append((label, f"p {p}  q {q}  r {r}{unit} {what}"))
+    held = [(passed, f"{name} {bound}: {actual}") for name, bound, actual, passed in expectations(summary)]
+    table = verdict_table(headline, lines, held, [("results", summary["folder"])])
+    return "\n".join([printed([table], colour=colour), *worst]) + "\n"
 
 
 def _flights(summary: Document) -> str:

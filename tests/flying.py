@@ -6,6 +6,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.loop.loop import fly
+from beaver_ftc.results.log import MemoryLog
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.diagnosis import FdiConfig
 from beaver_ftc.scenario.schema import Scenario
@@ -31,17 +32,8 @@ def declared_in(bounds, aircraft=None):
     return replace(declared, fdi=FdiConfig(bounds=bounds), aircraft=aircraft or load())
 
 
-class Memory:
-    """A log sink that keeps everything; `memory["q_rad_s"]` is a column."""
-
-    def open(self, columns):
-        self.columns, self.chunks = list(columns), []
-
-    def write(self, rows):
-        self.chunks.append(rows.copy())
-
-    def close(self):
-        self.rows = np.concatenate(self.chunks)
+class Memory(MemoryLog):
+    """A log in memory; `memory["q_rad_s"]` is a column."""
 
     def __getitem__(self, column):
         return self.rows[:, self.columns.index(column)]

@@ -8,7 +8,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
-from beaver_ftc.documents.errors import BadInput, SimulationFailed, suggestion
+from beaver_ftc.documents.errors import BadInput, suggestion
 from beaver_ftc.plugins import required
 from beaver_ftc.results import model, verdict
 from beaver_ftc.results.expectations import expectations_in_words
@@ -291,6 +291,3 @@ def check_plug_in(what: str, plug_in: object) -> None:
     if isinstance(plug_in, type) or lacking:
         says = "a class" if isinstance(plug_in, type) else f"{plug_in!r:.60} without {' and '.join(lacking)}"
         raise BadInput(f"{what}: this is {says}, allowed: an object with reset and step")
-
-
-__all__ = ["Flight", "SimulationFailed", "fly", "open_run"]

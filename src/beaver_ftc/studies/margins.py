@@ -77,7 +77,6 @@ def interpolated(law: Schedule, qdyn: float, lost: float) -> np.ndarray:
 
 def allocation(G: np.ndarray, main: np.ndarray, stand_in: int, lost: float) -> np.ndarray:
     """Commands per demanded acceleration, (n, 3), as control/allocation.py gives them within the travels."""
-    a, e, r = main[ROLL], main[PITCH], main[YAW]
     commands, (a, e, r) = np.zeros((G.shape[1], 3)), main[[ROLL, PITCH, YAW]]
     flap = lost if stand_in >= 0 else 0.0
     shares = [(PITCH, stand_in, flap), (PITCH, e, 1.0 - flap)]

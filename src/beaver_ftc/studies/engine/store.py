@@ -222,14 +222,11 @@ def hashed_files() -> list[Path]:
         path
         for package in (PACKAGE, *folders(SERVICES))
         for path in package.rglob("*")
-        if path.suffix in (".py", ".json", ".yaml") and _makes_rows(path.relative_to(package))
+        if path.suffix in (".py", ".json", ".yaml")
+        and path.relative_to(package).with_suffix("").parts[0] not in NO_ROWS
     ]
     aircraft = [path for path in (data_root() / "aircraft").rglob("*") if path.is_file()]
     return sorted({*sources, *aircraft})
-
-
-def _makes_rows(path: Path) -> bool:
-    return path.with_suffix("").parts[0] not in NO_ROWS
 
 
 @cache

@@ -40,13 +40,11 @@ SOURCE_LOOKS: dict[str, tuple[str, tuple[float, ...]]] = {
     "inertia_coupling": (GREEN, (2, 2)), "sinusoids": (BLUE, ()), "wind_turbulence": (SKY, ()),
     "earth_rotation": (ORANGE, (1, 1)), "integration": (ORANGE, (6, 2)),
 }  # fmt: skip
-MODEL_LOOKS: dict[str, dict[str, Any]] = {
-    "truth": {"color": BLACK, "linewidth": 2.6, "alpha": 0.45, "marker": "o", "label": "truth (JSBSim)"},
-    "fdc": {"color": BLUE, "linewidth": 1.3, "dashes": (5, 2), "marker": "+", "label": "FDC equations"},
-    "design": {
-        "color": VERMILION, "linewidth": 1.3, "dashes": (1.5, 1.5), "marker": "x", "label": "design model",
-    },
-}  # fmt: skip
+MODEL_LOOKS: dict[str, tuple[str, dict[str, Any]]] = {  # marker of a pole, and curve
+    "truth": ("o", {"color": BLACK, "linewidth": 2.6, "alpha": 0.45, "label": "truth (JSBSim)"}),
+    "fdc": ("+", {"color": BLUE, "linewidth": 1.3, "dashes": (5, 2), "label": "FDC equations"}),
+    "design": ("x", {"color": VERMILION, "linewidth": 1.3, "dashes": (1.5, 1.5), "label": "design model"}),
+}
 
 
 def figures(folder: Path, found: Document, flown: Metrics, analysis: LinearAnalysis) -> Files:
@@ -107,15 +105,13 @@ def _dress(axes: "Axes") -> None:
 
 def bound_figure(found: Document) -> "Figure":
     """How much of the bound each source has used at most, per axis, on a logarithmic scale."""
-
-    def shares(*names: str) -> list[list[float | None]]:
-        """Per axis, of each source; None over no bound."""
-        return [[found["axes"][axis][name]["bound_share"] for name in names] for axis in AXES]
-
-    every = (*SOURCES, UNEXPLAINED)
-    names = [name for name in every if max(_length(share) for (share,) in shares(name)) > LEAST_SHARE]
-    values = np.array([[_length(share) for share in row] for row in shares(*names)])
-    notes = [[percent(s) if _length(s) > LEAST_SHARE else "" for s in row] for row in shares(*names)]
+    every = {
+        name: [found["axes"][axis][name]["bound_share"] for axis in AXES] for name in (*SOURCES, UNEXPLAINED)
+    }
+    names = [name for name, of in every.items() if max(map(_length, of)) > LEAST_SHARE]
+    shares = [[every[name][i] for name in names] for i in range(len(AXES))]
+    values = np.array([[_length(share) for share in row] for row in shares])
+    notes = [[percent(s) if _length(s) > LEAST_SHARE else "" for s in row] for row in shares]
     title = f"Largest share of the bound eta_bar\n{found['scenario']}", "share of eta_bar (1: all of it)"
     size = 11.0, 1.6 + 0.34 * max(len(names), 2)
     ends = LEAST_SHARE, 30.0 * max(values.max(initial=0.0), 1.0)
@@ -189,26 +185,22 @@ def linear_figure(analysis: LinearAnalysis, name: str) -> "Figure":
 
 
 def _draw_poles(axes: "Axes", analysis: LinearAnalysis) -> None:
-    for model, look in MODEL_LOOKS.items():
+    for model, (mark, look) in MODEL_LOOKS.items():
         poles = np.linalg.eigvals(analysis.models[model].A)
-        seen = {key: look[key] for key in ("color", "marker", "label")}
-        axes.scatter(poles.real, poles.imag, s=70, alpha=look.get("alpha", 1.0), **seen)
+        seen = {"color": look["color"], "label": look["label"], "alpha": look.get("alpha", 1.0)}
+        axes.scatter(poles.real, poles.imag, s=70, marker=mark, **seen)
     axes.axvline(0.0, color=GREY, linewidth=0.8)
     _dress(axes)
 
 
 def _draw_bode(magnitude: "Axes", phase: "Axes", analysis: LinearAnalysis, surface: str, rate: str) -> None:
     frequency = np.geomspace(0.01, 50.0, 300)
-    for model, look in MODEL_LOOKS.items():
+    for model, (_, look) in MODEL_LOOKS.items():
         found = response(*analysis.channel(model, surface, rate), frequency)
-        magnitude.semilogx(frequency, 20.0 * np.log10(np.abs(found)), **_line(look))
-        phase.semilogx(frequency, np.degrees(np.unwrap(np.angle(found))), **_line(look))
+        magnitude.semilogx(frequency, 20.0 * np.log10(np.abs(found)), **look)
+        phase.semilogx(frequency, np.degrees(np.unwrap(np.angle(found))), **look)
     for axes in (magnitude, phase):
         _dress(axes)
-
-
-def _line(look: dict[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in look.items() if key != "marker"}
 
 
 def map_figure(entries: Sequence[Document], name: str) -> "Figure":

@@ -5,14 +5,12 @@ A path's type follows from the metrics model; `*` is each surface.
 
 from collections.abc import Callable
 from functools import cache
-from typing import TYPE_CHECKING, Any, get_args, get_origin, get_type_hints
+from typing import Any, get_args, get_origin, get_type_hints
 
 from beaver_ftc.results.model import Metrics, Window, without_none
 
-if TYPE_CHECKING:
-    from beaver_ftc.loop.outcome import Landing
-
-Getter = Callable[[Metrics, "Landing"], Any]
+WORST_RATIO = "worst_residual_ratio"
+Getter = Callable[[Metrics], Any]
 
 NAMES = (
     "frames", "flown_s", "fault_free_s", "fault.actuator", "fault.type", "fault.at_s", "detection.detected",
@@ -25,7 +23,7 @@ NAMES = (
     "isolation.probing_s.from", "isolation.probing_s.to", "isolation.so_far", "isolation.premature",
     "isolation.withdrawn", "isolation.candidates", "isolation.faults", "windows.detected",
     "windows.correct", "false_alarm",
-    "worst_residual_ratio", "tracking.pre_fault_rms_deg_s.p", "tracking.pre_fault_rms_deg_s.q",
+    WORST_RATIO, "tracking.pre_fault_rms_deg_s.p", "tracking.pre_fault_rms_deg_s.q",
     "tracking.pre_fault_rms_deg_s.r", "tracking.post_fault_rms_deg_s.p", "tracking.post_fault_rms_deg_s.q",
     "tracking.post_fault_rms_deg_s.r", "tracking.surface_travel_deg.*", "tracking.surface_energy_deg2_s.*",
     "supervisor.mode", "supervisor.adaptive_at_s", "supervisor.reallocated_at_s",
@@ -41,7 +39,7 @@ NAMES = (
 _KINDS = {float: "float", int: "int", bool: "flag", str: "text"}
 
 
-def _faults(found: Metrics, flight: "Landing") -> str:
+def _faults(found: Metrics) -> str:
     """surface:type of each fault that was named, of several at once."""
     named = (one for one in found.isolation.faults if one.fault)
     return " ".join(f"{one.fault}:{one.type or 'open'}" for one in named)
@@ -49,18 +47,18 @@ def _faults(found: Metrics, flight: "Landing") -> str:
 
 def _of_each_window(holds: Callable[[Window], bool]) -> Getter:
     """`yes` or `no` of each window, in the order of time; empty without windows."""
-    return lambda found, flight: " ".join("yes" if holds(one) else "no" for one in found.windows or ())
+    return lambda found: " ".join("yes" if holds(one) else "no" for one in found.windows or ())
 
 
 def _first_entry(mode: str) -> Getter:
-    def get(found: Metrics, flight: "Landing") -> Any:
+    def get(found: Metrics) -> Any:
         return next((change.time_s for change in found.supervisor if change.mode == mode), None)
 
     return get
 
 
 def _end_of_pair(name: str, end: int) -> Getter:
-    def get(found: Metrics, flight: "Landing") -> Any:
+    def get(found: Metrics) -> Any:
         pair = getattr(found.isolation, name)
         return pair[end] if pair else None
 
@@ -69,16 +67,16 @@ def _end_of_pair(name: str, end: int) -> Getter:
 
 # Columns that are not at the path of their name in the metrics: type, and where they come from.
 _ELSEWHERE: dict[str, tuple[str, Getter]] = {
-    "flown_s": ("float", lambda found, flight: flight.frames / flight.scenario.rate_hz),
-    "worst_residual_ratio": ("float", lambda found, flight: flight.worst_residual_ratio),
+    "flown_s": ("float", lambda found: found.frames / found.flight.rate_hz),
+    WORST_RATIO: ("float", lambda found: None),  # which `row_of` has of the landing
     "isolation.estimate_interval.low": ("float", _end_of_pair("estimate_interval", 0)),
     "isolation.estimate_interval.high": ("float", _end_of_pair("estimate_interval", 1)),
     "isolation.probing_s.from": ("float", _end_of_pair("probing_s", 0)),
     "isolation.probing_s.to": ("float", _end_of_pair("probing_s", 1)),
-    "isolation.candidates": ("text", lambda found, flight: " ".join(found.isolation.candidates)),
+    "isolation.candidates": ("text", lambda found: " ".join(found.isolation.candidates)),
     "isolation.faults": ("text", _faults),
     "isolation.withdrawn": (
-        "text", lambda found, flight: " ".join(gone.fault for gone in found.isolation.withdrawn),
+        "text", lambda found: " ".join(gone.fault for gone in found.isolation.withdrawn),
     ),
     "windows.detected": ("text", _of_each_window(lambda window: window.detected)),
     "windows.correct": (
@@ -87,14 +85,14 @@ _ELSEWHERE: dict[str, tuple[str, Getter]] = {
             lambda window: all(one.correct and one.type_correct is not False for one in window.isolation)
         ),
     ),
-    "supervisor.mode": ("text", lambda found, flight: found.supervisor[-1].mode),
+    "supervisor.mode": ("text", lambda found: found.supervisor[-1].mode),
     "supervisor.adaptive_at_s": ("float", _first_entry("adaptive")),
     "supervisor.reallocated_at_s": ("float", _first_entry("reallocated")),
     "supervisor.unanticipated_at_s": ("float", _first_entry("unanticipated")),
-    "envelope_exits.count": ("int", lambda found, flight: found.envelope.exits),
-    "envelope_exits.total_s": ("float", lambda found, flight: found.envelope.outside_s),
+    "envelope_exits.count": ("int", lambda found: found.envelope.exits),
+    "envelope_exits.total_s": ("float", lambda found: found.envelope.outside_s),
     "expectations.missed": (
-        "text", lambda found, flight: " ".join(one.name for one in found.expectations if not one.passed),
+        "text", lambda found: " ".join(one.name for one in found.expectations if not one.passed),
     ),
 }  # fmt: skip
 
@@ -125,4 +123,4 @@ def getter_of(name: str) -> Getter:
     """What a column says of a flight; None where a section on the way to it is."""
     if name in _ELSEWHERE:
         return _ELSEWHERE[name][1]
-    return lambda found, flight: found.at(name)
+    return lambda found: found.at(name)

@@ -22,7 +22,7 @@ from beaver_ftc.documents.validation import key_path, problems_of
 from beaver_ftc.results.model import Metrics
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sweeps import Sweep, Variation
-from beaver_ftc.studies.sweep.columns import columns_of, getter_of
+from beaver_ftc.studies.sweep.columns import WORST_RATIO, columns_of, getter_of
 from beaver_ftc.studies.sweep.sampling import Assignment, flight_seed
 
 if TYPE_CHECKING:
@@ -62,7 +62,8 @@ def row_of(assignment: Assignment, found: Metrics, flight: "Landing") -> Row:
     status = DEPARTED if departure else FLOWN
     reason = f"{departure.signal} at {departure.time_s:g} s" if departure else None
     columns = columns_of(flight.scenario.airframe.surfaces)
-    metrics = {name: getter_of(name)(found, flight) for name in columns}
+    metrics = {name: getter_of(name)(found) for name in columns}
+    metrics[WORST_RATIO] = flight.worst_residual_ratio
     return _row(assignment, found.seed, status, reason, metrics)
 
 

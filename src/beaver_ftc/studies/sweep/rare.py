@@ -232,10 +232,8 @@ def run_rare(
 
     def likeliest(document: Document) -> str | None:
         """The scenario of the likeliest event that was flown."""
-        if chains.design is None:
-            return None
-        _, run, point = chains.design
-        return to_yaml(scenario_at(sweep, run, point.tolist()))
+        found = document["likeliest"]
+        return found and to_yaml(scenario_of(sweep, Assignment(found["run"], found["values"])))
 
     def lost(case: Case, why: str) -> Document:
         say_once(f"{name}: of a flight {why}; such flights count as no event")

@@ -113,9 +113,8 @@ class Store:
             return table
         if self._compacted is None and self.results.exists():
             try:
-                if self.results.is_dir():  # which Arrow would read as a table of many files
-                    raise OSError(f"{self.results} is a folder")
-                self._compacted = read_table(self.results, schema=self.schema)
+                with self.results.open("rb") as file:  # a folder Arrow would read as a table of many files
+                    self._compacted = read_table(file, schema=self.schema)
             except (ArrowException, OSError, ValueError):
                 files.set_aside(self.results, files.UNREADABLE)
         return self._compacted and self._compacted.slice(runs[0], len(runs))

@@ -18,7 +18,7 @@ from beaver_ftc.studies.compare.trial import (
     fly_case,
     of_set,
 )
-from beaver_ftc.studies.compare.tune import is_adopted
+from beaver_ftc.studies.compare.tune import LEAST_GAIN
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, poisson_bound, wilson
 from beaver_ftc.studies.engine.study import fly_all
 from beaver_ftc.studies.present.tables import estimate, markdown_table
@@ -70,7 +70,7 @@ GAINS = {
     "judged on": _judged_on,
     "flights": "flights", "cost, before": "built_in .3f", "cost, after": "retuned .3f",
     "gain, %": "gain *100 .1f", "from, %": "gain_low *100 .1f", "to, %": "gain_high *100 .1f",
-    "adopted": lambda again: "yes" if is_adopted(again) else "no",
+    "adopted": lambda again: "yes" if again.get("gain", 0.0) > LEAST_GAIN else "no",
 }  # fmt: skip
 
 

@@ -131,13 +131,10 @@ class DetectorCost:
         """What one flight adds to J."""
         cost = result.false_alarm / len(self._cases)
         if result.faulted:
-            cost += (delay_cost(result.delay_s) + (not result.correct)) / 2.0 / self._faulted
+            d = result.delay_s
+            late = d / (d + DELAY_S) if isfinite(d) else 1.0
+            cost += (late + (not result.correct)) / 2.0 / self._faulted
         return cost
-
-
-def delay_cost(delay_s: float) -> float:
-    """d / (d + 1 s)."""
-    return delay_s / (delay_s + DELAY_S) if isfinite(delay_s) else 1.0
 
 
 class LawCost:

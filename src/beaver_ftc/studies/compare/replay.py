@@ -5,11 +5,10 @@ and played back to each. What is kept of a detector's statistic is exact and sho
 the fault, and each value after it that was larger than all before.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from math import inf, isnan
-from time import process_time
 
 import numpy as np
 
@@ -44,15 +43,14 @@ class Trace:
     """A detector's statistic over one flight; alarm where it exceeds 1.
 
     before: largest value before the fault (or in all of a healthy flight). records: (delay s, value), each
-    larger than all before it since the fault. healthy_s: time without a fault. us: time a frame took,
-    microseconds. rises: (time s, value), each larger than all before it, while there is no fault.
+    larger than all before it since the fault. healthy_s: time without a fault. rises: (time s, value), each
+    larger than all before it, while there is no fault.
     """
 
     before: float
     records: tuple[tuple[float, float], ...]
     faulted: bool
     healthy_s: float
-    us: float = 0.0
     rises: tuple[tuple[float, float], ...] = ()
 
     def fault_free_s(self, level: float) -> float:
@@ -113,16 +111,13 @@ def record(scenario: Scenario) -> Recording:
         loop.release()
 
 
-def replay(recording: Recording, scheme: str, options: dict[str, float] | None = None) -> Trace:
+def replay(recording: Recording, scheme: str, options: Mapping[str, float] | None = None) -> Trace:
     """The trace of a scheme, built in or plugged in, over a recorded flight."""
     if scheme == "adaptive-estimators":
         return trace(recording, recording.built_in)
     detector: Detector = made(DETECTORS, scheme)
     detector.reset(replace(recording.context, options=options or {}))
-    began = process_time()
-    verdicts = [detector.step(measured, command) for measured, command in recording.seen]
-    us = 1e6 * (process_time() - began) / max(len(verdicts), 1)
-    return trace(recording, np.array([_statistic(verdict) for verdict in verdicts]), us)
+    return trace(recording, np.array(_statistics(detector, recording.seen)))
 
 
 def replay_together(recordings: Sequence[Recording], scheme: str) -> list[Trace]:
@@ -133,13 +128,20 @@ def replay_together(recordings: Sequence[Recording], scheme: str) -> list[Trace]
     common, context = _frames_in_common(recordings), replace(recordings[0].context, options={})
     detector: Detector = made(DETECTORS, scheme)
     detector.reset(context)
-    before = [_statistic(detector.step(*shown)) for shown in recordings[0].seen[:common]]
+    before = _statistics(detector, recordings[0].seen[:common])
     traces = []
     for recording in recordings:
         apart = deepcopy(detector, {id(context): context, id(context.model): context.model})
-        after = [_statistic(apart.step(*shown)) for shown in recording.seen[common:]]
+        after = _statistics(apart, recording.seen[common:])
         traces.append(trace(recording, np.array(before + after)))
     return traces
+
+
+def _statistics(detector: Detector, seen: Sequence[tuple[Measured, np.ndarray]]) -> list[float]:
+    """Of each frame; a detector without a statistic has only its alarm: well above the level, or well
+    below."""
+    verdicts = [detector.step(*shown) for shown in seen]
+    return [1e6 * each.detected if isnan(each.statistic) else each.statistic for each in verdicts]
 
 
 def _frames_in_common(recordings: Sequence[Recording]) -> int:
@@ -152,24 +154,17 @@ def _frames_in_common(recordings: Sequence[Recording]) -> int:
     return count if all(np.array_equal(last[0], other) for other in last[1:]) else 0
 
 
-def _statistic(verdict: Verdict) -> float:
-    """A detector without a statistic has only its alarm: well above the level, or well below."""
-    if isnan(verdict.statistic):
-        return 1e6 if verdict.detected else 0.0
-    return verdict.statistic
-
-
-def trace(recording: Recording, statistic: np.ndarray, us: float = 0.0) -> Trace:
+def trace(recording: Recording, statistic: np.ndarray) -> Trace:
     """Boil a statistic (frames,) down to what decides about alarms at any level."""
     t = np.array([measured.t_s for measured, _ in recording.seen])
     healthy = recording.onset.is_false(t)
     early = statistic[healthy]
-    rises = _records(t[healthy], early)
     since = np.array([recording.onset.delay_s(one) for one in t[~healthy]])
-    records = _records(since, statistic[~healthy])
-    faulted = not healthy.all()
-    healthy_s = float(healthy.sum()) * recording.context.dt_s
-    return Trace(float(early.max(initial=0.0)), records, faulted, healthy_s, us, rises)
+    return Trace(
+        before=float(early.max(initial=0.0)), records=_records(since, statistic[~healthy]),
+        faulted=not healthy.all(), healthy_s=float(healthy.sum()) * recording.context.dt_s,
+        rises=_records(t[healthy], early),
+    )  # fmt: skip
 
 
 def _records(t: np.ndarray, values: np.ndarray) -> tuple[tuple[float, float], ...]:

@@ -93,12 +93,6 @@ def _interval(name: str, values: Sequence[float], unit: str = "") -> Document:
     return {f"{name}_{side}{unit}": found[side] for side in ("low", "high")} if values else {}
 
 
-def lines_of(trials: Sequence[Trial], entries: Sequence[Entry]) -> list[Document]:
-    """One line an entry, in their order."""
-    yardstick, ours = (_results(trials, Entry(SCHEME, law)) for law in (ORACLE, LAW))
-    return [line_of(entry, _results(trials, entry), yardstick, ours) for entry in entries]
-
-
 def _results(trials: Iterable[Trial], entry: Entry) -> list[Result]:
     return [result for trial in trials for result in trial.results if result.entry == entry]
 
@@ -163,7 +157,8 @@ def document_of(trials: Sequence[Trial], entries: Sequence[Entry]) -> Document:
 def _set(trials: Sequence[Trial], entries: Sequence[Entry]) -> Document:
     schemes = list(dict.fromkeys(scheme for trial in trials for scheme in trial.traces))
     traces = {s: [t.traces[s] for t in trials if s in t.traces] for s in schemes}
-    lines = [all_finite(line) for line in lines_of(trials, entries)]
+    oracle, ours = (_results(trials, Entry(SCHEME, law)) for law in (ORACLE, LAW))
+    lines = [all_finite(line_of(entry, _results(trials, entry), oracle, ours)) for entry in entries]
     points = {s: trade_off(of) for s, of in traces.items()}
     free = {s: all_finite(matched(of)) for s, of in points.items()}
     failed = {result.error for trial in trials for result in trial.results if result.error}
@@ -189,7 +184,9 @@ def who_is_better(lines: Sequence[Document]) -> Document:
     laws = {row["law"]: row for row in lines if row["scheme"] == SCHEME and row["law"] not in YARDSTICKS}
     return {
         "schemes": leader(schemes, SCHEME, "detection_rate", "Faults detected", percent, more=True),
-        "laws": leader(laws, LAW, "ratio_median", "Tracking error over the oracle's, median", _ratio, False),
+        "laws": leader(
+            laws, LAW, "ratio_median", "Tracking error over the oracle's, median", "{:.2f}".format, False
+        ),
     }
 
 
@@ -228,10 +225,6 @@ def leader(
         f"{what}: {said(first)} is better than {said(second)}; wins: {wins} against {losses}, "
         f"p = {duel['p']:.2g}{sure}."
     )
-
-
-def _ratio(ratio: float) -> str:
-    return f"{ratio:.2f}"
 
 
 def better_than_ours(lines: Sequence[Document], free: Document) -> list[str]:

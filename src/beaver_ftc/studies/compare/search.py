@@ -64,9 +64,8 @@ def value_at(of: Range, place: float) -> float:
     """The value at a place (0 to 1) of a range."""
     forward, back = _SCALES[of.scale]
     low, high = forward(of.low), forward(of.high)
-    return float(f"{back(low + place * (high - low)):.6g}") if of.scale == "log" else back(
-        low + place * (high - low)
-    )  # fmt: skip
+    value = back(low + place * (high - low))
+    return float(f"{value:.6g}") if of.scale == "log" else value
 
 
 _SCALES: Mapping[str, tuple[Callable[[float], float], Callable[[float], float]]] = {

@@ -140,7 +140,8 @@ def with_entry(scenario: Scenario, entry: Entry, chosen: TunedValuesByGrade | No
     scheme or law that it names counts for that one alone, and before what was chosen.
     """
     scheme = SCHEME if entry.scheme == STATISTICAL else entry.scheme
-    fdi = scenario.fdi.with_scheme(scheme, options_for(scenario, scheme))
+    kept = scenario.fdi.options if scheme == scenario.fdi.scheme else {}
+    fdi = scenario.fdi.with_scheme(scheme, dict(kept))
     if entry.scheme == STATISTICAL and fdi.statistical is None:
         fdi = fdi.model_copy(update={"statistical": Statistical()})
     kept = scenario.control.options if entry.law == scenario.control.law else {}
@@ -154,9 +155,10 @@ def with_entry(scenario: Scenario, entry: Entry, chosen: TunedValuesByGrade | No
 
 def _says(scenario: Scenario, key: str, group: str) -> bool:
     """Whether the scenario itself sets a parameter."""
-    section, options = (scenario.fdi, "fdi") if group == DETECTORS else (scenario.control, "control")
-    if "." in key:
-        return key.split(".")[1] in section.model_fields_set and key.startswith(f"{options}.")
+    name = "fdi" if group == DETECTORS else "control"
+    section, (of, _, option) = getattr(scenario, name), key.partition(".")
+    if option:
+        return of == name and option.split(".")[0] in section.model_fields_set
     return key in section.options
 
 
@@ -170,11 +172,6 @@ def with_values(scenario: Scenario, group: str, values: Mapping[str, float]) -> 
 def grade_of(scenario: Scenario) -> str:
     """Which grade of flights a scenario belongs to."""
     return flight_grade(not Declared.of(scenario).is_noise_free, scenario.known_actuators.is_ideal)
-
-
-def options_for(scenario: Scenario, scheme: str) -> dict[str, float]:
-    """The options that a scenario gives to a scheme."""
-    return dict(scenario.fdi.options) if scheme == scenario.fdi.scheme else {}
 
 
 def fly_case(

@@ -11,11 +11,11 @@ Two files are written: `tuned.json` has the values to fly with, and `tuning.json
 """
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
+from operator import attrgetter
 from pathlib import Path
-from typing import Any
 
 from beaver_ftc.diagnosis.rivals import (
     FLIGHT_GRADES,
@@ -40,13 +40,11 @@ from beaver_ftc.studies.compare.gain import gain_of
 from beaver_ftc.studies.compare.search import Found, Values, search, value_at
 from beaver_ftc.studies.compare.trial import STATISTICAL
 from beaver_ftc.studies.engine.study import Progress, fly_all
-from beaver_ftc.studies.present.tables import aligned
+from beaver_ftc.studies.present.tables import Columns, aligned, tabulated
 
 PROCEDURE = "beaver-ftc compare --tune; docs/results/benchmark.md"
 LEAST_GAIN = 0.05
 NAME, RECORD = "tuned.json", "tuning.json"
-HEAD = ("grade", "method", "cost at the start", "cost found", "margins dB, deg")
-GAIN_HEAD = ("cost, built in", "cost, retuned", "gain, %", "from, %", "to, %")
 OF_STATISTICAL = {
     "fdi.statistical.false_alarms_per_h": Range(1e-9, 3600.0),
     "fdi.statistical.misnaming": Range(1e-9, 0.49),
@@ -71,20 +69,12 @@ class Method:
         return {key: shipped.get(key, self._default(key, of)) for key, of in self.ranges().items()}
 
     def _default(self, key: str, of: Range) -> float:
-        if "." in key:
-            return _in_scenario(key)
+        if "." in key:  # the statistical detector is there if asked for
+            return float(attrgetter(key)(Scenario(name="defaults", fdi={"statistical": {}})))
         if is_compiled(self.group, self.name):
             return float(options_of(self.group, self.name)[key]["default"])
         defaults = getattr(plugin_class(self.group, self.name), "defaults", {})
         return float(defaults.get(key, value_at(of, 0.5)))
-
-
-def _in_scenario(key: str) -> float:
-    """The default of a scenario's key; the statistical detector is there if asked for."""
-    found: Any = Scenario(name="defaults", fdi={"statistical": {}})
-    for part in key.split("."):
-        found = getattr(found, part)
-    return float(found)
 
 
 def methods_of(schemes: Sequence[str], laws: Sequence[str], grades: Sequence[str]) -> list[Method]:
@@ -140,11 +130,6 @@ def tune_method(method: Method, how: Search) -> Document:
     return row
 
 
-def is_adopted(again: Document) -> bool:
-    """Whether the values of a second tuning replace those that ship: its gain decides, not the interval."""
-    return bool(again.get("gain", 0.0) > LEAST_GAIN)
-
-
 def _row(method: Method, found: Found) -> Document:
     return {
         "grade": method.grade,
@@ -189,12 +174,12 @@ def read_tuned(path: Path) -> Document:
 
 def as_text(document: Document) -> str:
     """A line a method and grade; then where ranges were widened, and which searches the budget ended."""
-    rows = [[*HEAD, *(GAIN_HEAD if document["draw"] else ()), "values"]]
-    rows += [list(_cells(row, document["draw"])) for row in document["methods"]]
+    columns = (*COLUMNS, *(GAINS if document["draw"] else ()), VALUES)
+    table, rows = tabulated(columns, document["methods"])
     said = [sentence for row in document["methods"] for sentence in _remarks(row)]
     head = f"up to {document['trials']} trials a search, seed {document['seed']}, "
     head += f"up to {document['restarts']} restarts for each method and grade"
-    return "\n".join([head, "", aligned(rows), *said])
+    return "\n".join([head, "", aligned([table, *rows]), *said])
 
 
 def _remarks(row: Document) -> Iterator[str]:
@@ -207,23 +192,29 @@ def _remarks(row: Document) -> Iterator[str]:
         yield f"{who}: the budget ended the search; more --restarts may find a lower cost"
 
 
-def _cells(row: Document, draw: int) -> Iterator[str]:
-    yield row["grade"]
-    yield row["name"]
-    yield _cost(row["start_cost"])
-    yield _cost(row["cost"])
-    yield f"{row['gain_margin_db']:.1f}, {row['phase_margin_deg']:.0f}" if "gain_margin_db" in row else "-"
-    yield from gain_cells(row) if draw else ()
-    yield ", ".join(f"{key} {value:.4g}" for key, value in row["values"].items())
-
-
-def gain_cells(row: Document) -> tuple[str, ...]:
-    """Of a method that was tuned again: both costs on other flights, and the gain with its interval, %."""
-    if "gain" not in row:
-        return ("-",) * len(GAIN_HEAD)
-    costs = (_cost(row[key]) for key in ("built_in", "retuned"))
-    return *costs, *(f"{100.0 * row[key]:.1f}" for key in ("gain", "gain_low", "gain_high"))
-
-
 def _cost(cost: float) -> str:
     return "cannot fly" if cost >= FAILED else "inadmissible" if cost >= INADMISSIBLE else f"{cost:.3f}"
+
+
+def _if_any(form: Callable[[float], str], key: str) -> Callable[[Document], str]:
+    """The cell of a number that not every row has."""
+    return lambda row: form(row[key]) if key in row else "-"
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.1f}"
+
+
+COLUMNS: Columns = (
+    ("grade", "grade"), ("method", "name"), ("cost at the start", "start_cost", _cost),
+    ("cost found", "cost", _cost),
+    ("margins dB, deg", lambda row: "{gain_margin_db:.1f}, {phase_margin_deg:.0f}".format(**row)
+     if "gain_margin_db" in row else "-"),
+)  # fmt: skip
+# Of a method that was tuned again: both costs on other flights, and the gain with its interval.
+GAINS: Columns = (
+    ("cost, built in", _if_any(_cost, "built_in")), ("cost, retuned", _if_any(_cost, "retuned")),
+    ("gain, %", _if_any(_percent, "gain")), ("from, %", _if_any(_percent, "gain_low")),
+    ("to, %", _if_any(_percent, "gain_high")),
+)  # fmt: skip
+VALUES = ("values", lambda row: ", ".join(f"{key} {value:.4g}" for key, value in row["values"].items()))

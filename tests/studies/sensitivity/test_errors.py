@@ -145,7 +145,7 @@ def of_rows(**changes):
     rows[0] |= {"lost": True, "tracking_deg_s": None}
     rows[1] |= {"detected": False, "named": False, "delay_s": None}
     rows[2] |= {"misnamed": True, "named": False}
-    return [row | changes for row in rows] + [row_of(None)]
+    return [row | changes for row in rows] + [beyond.FAILED]
 
 
 def test_a_summary_counts_flights_that_were_flown_and_what_never_came_as_longest():

@@ -22,7 +22,6 @@ from beaver_ftc.studies.sensitivity.mechanisms import (
     Flight,
     scenario_of,
     with_key,
-    with_mechanism,
     without_key,
     without_mechanism,
 )
@@ -48,8 +47,8 @@ def flat(value, path=""):
 def test_only_the_keys_of_a_mechanism_differ(mechanism):
     whole = scenario_of(ELEVATOR, 7, mechanism.system)
     there, gone = (
-        flat(change(whole, mechanism).model_dump(mode="json"))
-        for change in (with_mechanism, without_mechanism)
+        flat(changed.model_dump(mode="json"))
+        for changed in (whole.with_(mechanism.present), without_mechanism(whole, mechanism))
     )
     differ = {key for key in {*there, *gone} if there.get(key) != gone.get(key)}
     own = {*mechanism.without, *mechanism.present} | ({CONSTANT} if "thresholds" in mechanism.name else set())

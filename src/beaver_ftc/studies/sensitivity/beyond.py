@@ -23,6 +23,7 @@ FACTORS = (1.0, 1.5, 2.0, 4.0)
 TOGETHER = "all together"
 COUNTED = ("false_alarm", "detected", "named", "misnamed", "lost")
 MEASURED = ("delay_s", "tracking_deg_s", "bound_used")
+FAILED = {"failed": True}  # the row of a flight that cannot be flown to its end
 FLIGHTS = 40  # of a row: an event that none of them has is rarer than 9 % (95 %)
 LATER_S, LEFT_S = 4.0, 5.0  # the faults come so much later at most, and so long before the end
 
@@ -37,20 +38,15 @@ class Flight(NamedTuple):
 
 def cases_of(errors: Sequence[Error], flights: int) -> list[Flight]:
     """Every flight; where each error is as declared, all rows share the same ones."""
+    declared = {error.name: error.declared for error in errors} | {TOGETHER: True}
     rows = [(TOGETHER, FACTORS[0])]
     rows += [
         (name, factor)
-        for name in (*(error.name for error in errors), TOGETHER)
+        for name, is_declared in declared.items()
         for factor in FACTORS
-        if not is_shared(errors, name, factor)
+        if not (is_declared and factor == FACTORS[0])
     ]
     return [Flight(*row, run) for row in rows for run in range(flights)]
-
-
-def is_shared(errors: Sequence[Error], name: str, factor: float) -> bool:
-    """Whether this row is that in which every error is as declared."""
-    undeclared = {error.name for error in errors if not error.declared}
-    return factor == FACTORS[0] and name not in undeclared
 
 
 def factors_of(errors: Sequence[Error], flight: Flight) -> dict[str, float]:
@@ -85,15 +81,12 @@ def fly_one(scenario: Scenario, seed: int, flight: Flight) -> Document:
     try:
         landing = fly(flown)
     except BeaverFtcError:
-        return row_of(None)
+        return FAILED
     return row_of(measure(landing), max(landing.closest_approach, default=0.0))
 
 
-def row_of(found: Metrics | None, bound_used: float = 0.0) -> Document:
-    """What is counted of a flight; None: it could not be flown to its end."""
-    if found is None:
-        nothing = dict.fromkeys(COUNTED, False) | {"failed": True}
-        return nothing | dict.fromkeys(MEASURED) | {"bound_used": 0.0}
+def row_of(found: Metrics, bound_used: float) -> Document:
+    """What is counted of a flight."""
     isolation, tracked = found.isolation, found.tracking
     rms = tracked.post_fault_rms_deg_s if found.fault else tracked.pre_fault_rms_deg_s
     return {

@@ -41,7 +41,7 @@ def run_errors(
     study = Study(
         f"{scenario.name[:80]}-{NAME}", cases, partial(beyond.fly_one, scenario, seed),
         partial(beyond.document_of, scenario, errors, cases, seed), OF_ERRORS, follows_from=[scenario, seed],
-        lost=lambda flight, why: beyond.row_of(None),
+        lost=lambda flight, why: beyond.FAILED,
     )  # fmt: skip
     return _flown(study, out, workers, progress)
 

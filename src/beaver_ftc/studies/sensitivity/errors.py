@@ -44,14 +44,14 @@ class Error(NamedTuple):
 def errors_of(scenario: Scenario) -> tuple[Error, ...]:
     """Every kind of error that the bounds of a scenario may declare, and that a truth may have."""
     bounds, declared = scenario.fdi.bounds, Declared.of(scenario)
-    published = (
-        _coupling(declared.coupling) if any(declared.coupling) else None,
-        _acceleration(scenario, declared.constant_rad_s2) if any(declared.constant_rad_s2) else None,
-    )
+    shares = {term.name: declared.coefficients.of(term.name) for term in scenario.airframe.moments}
+    inertia = dict.fromkeys(("Ix", "Iy", "Iz"), bounds.inertia)
+    constant = declared.constant_rad_s2
     return (
-        _coefficients(scenario, declared),
-        _inertia(bounds.inertia),
-        *(error for error in published if error),
+        _of_ratios("moment coefficients", "uncertainty.coefficients", shares, FACTOR_LIMITS),
+        _of_ratios("moments of inertia", "uncertainty.inertia", inertia, _INERTIA),
+        *((_coupling(declared.coupling),) if any(declared.coupling) else ()),
+        *((_acceleration(scenario, constant),) if any(constant) else ()),
         *(() if declared.servo_errors.is_none else (_servos(declared),)),
         _sensors({} if bounds.sensors.is_ideal else bounds.sensors.model_dump()),
         _air(bounds.turbulence),
@@ -72,22 +72,13 @@ def _signs(draws: np.random.Generator, names: Sequence[str]) -> dict[str, float]
     return dict(zip(names, draws.choice((-1.0, 1.0), len(names)).tolist(), strict=True))
 
 
-def _within(value: float, limits: tuple[float, float]) -> float:
-    return float(np.clip(value, *limits))
-
-
-def signed(sizes: Mapping[str, float], usual: float, limits: tuple[float, float]) -> Change:
+def signed(
+    sizes: Mapping[str, float], usual: float, limits: tuple[float, float], times: float,
+    draws: np.random.Generator,
+) -> dict[str, float]:  # fmt: skip
     """Of each key its usual value, so many times its size more or less, within the limits."""
-
-    def change(times: float, draws: np.random.Generator) -> Document:
-        signs = _signs(draws, [*sizes])
-        return {key: _within(usual + times * signs[key] * size, limits) for key, size in sizes.items()}
-
-    return change
-
-
-def _below(section: str, change: Change) -> Change:
-    return lambda times, draws: {section: change(times, draws)}
+    signs = _signs(draws, [*sizes])
+    return {key: float(np.clip(usual + times * signs[key] * size, *limits)) for key, size in sizes.items()}
 
 
 def _of_ratios(what: str, section: str, shares: Mapping[str, float], limits: tuple[float, float]) -> Error:
@@ -95,23 +86,18 @@ def _of_ratios(what: str, section: str, shares: Mapping[str, float], limits: tup
     known = any(shares.values())
     shares = shares if known else dict.fromkeys(shares, UNDECLARED_SHARE)
     largest = f"{100.0 * max(shares.values()):g} %"
-    change = _below(section, signed(shares, 1.0, limits))
-    return Error(what, largest if known else _unknown(largest), change, known)
-
-
-def _coefficients(scenario: Scenario, declared: Declared) -> Error:
-    shares = {term.name: declared.coefficients.of(term.name) for term in scenario.airframe.moments}
-    return _of_ratios("moment coefficients", "uncertainty.coefficients", shares, FACTOR_LIMITS)
-
-
-def _inertia(share: float) -> Error:
-    shares = dict.fromkeys(("Ix", "Iy", "Iz"), share)
-    return _of_ratios("moments of inertia", "uncertainty.inertia", shares, _INERTIA)
+    says = largest if known else _unknown(largest)
+    return Error(what, says, lambda *drawn: {section: signed(shares, 1.0, limits, *drawn)}, known)
 
 
 def _coupling(theta: Sequence[float]) -> Error:
-    change = signed(dict(zip(AXES, theta, strict=True)), 0.0, (-1.0, 1.0))
-    return Error("inertia coupling", f"{max(theta):g}", _below("uncertainty.inertia_coupling", change))
+    sizes = dict(zip(AXES, theta, strict=True))
+    section = "uncertainty.inertia_coupling"
+    return Error(
+        "inertia coupling",
+        f"{max(theta):g}",
+        lambda *drawn: {section: signed(sizes, 0.0, (-1.0, 1.0), *drawn)},
+    )
 
 
 def _acceleration(scenario: Scenario, sizes: Sequence[float]) -> Error:
@@ -140,7 +126,7 @@ def _servos(declared: Declared) -> Error:
         for name, bound in bounds.items():
             shares = {key: bound[key] for key in ("bandwidth", "rate_limit")}
             band_deg = min(times * bound["dead_band_deg"], _WIDEST_BAND_DEG)
-            truth[name] = signed(shares, 1.0, FACTOR_LIMITS)(times, draws) | {"dead_band_deg": band_deg}
+            truth[name] = signed(shares, 1.0, FACTOR_LIMITS, times, draws) | {"dead_band_deg": band_deg}
         return {"uncertainty.actuators": truth}
 
     largest = {key: max(bound[key] for bound in bounds.values()) for key in ActuatorBound.model_fields}

@@ -5,7 +5,7 @@ Every system flies it, with all of its mechanisms and without each of them. Cell
 combinations of fault, bandwidth of the law, undeclared error and instruments; each has draws of its own.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from itertools import product
 from math import hypot
 from typing import Any, NamedTuple
@@ -135,7 +135,7 @@ def _errors(coupling: float, swing_rad_s2: float, draws: np.random.Generator) ->
 def _undeclared(scenario: Scenario, share: float, draws: np.random.Generator) -> Document:
     """Every moment coefficient off by a share of it, with a sign that is drawn."""
     shares = {term.name: share for term in scenario.airframe.moments}
-    ratios = signed(shares, 1.0, FACTOR_LIMITS)(1.0, draws) if share else {}
+    ratios = signed(shares, 1.0, FACTOR_LIMITS, 1.0, draws) if share else {}
     return {"uncertainty.coefficients": ratios}
 
 
@@ -144,11 +144,6 @@ def _bandwidth(flight: Flight, system: str) -> Changes:
     if system == PAPER:
         return {"control.proportional_per_s": Kp, "control.integral_per_s2": Kp**2 / 4.0}
     return {"control.gain_margin_db": margin_db}
-
-
-def with_mechanism(scenario: Scenario, mechanism: Mechanism) -> Scenario:
-    """What flies with it."""
-    return scenario.with_(mechanism.present)
 
 
 def without_mechanism(scenario: Scenario, mechanism: Mechanism) -> Scenario:
@@ -174,7 +169,7 @@ def fly_one(seed: int, flight: Flight) -> Document:
         flown[system] = outcome_of(whole)
         for mechanism in (each for each in MECHANISMS if each.system == system):
             if with_key(mechanism) not in flown:
-                flown[with_key(mechanism)] = outcome_of(with_mechanism(whole, mechanism))
+                flown[with_key(mechanism)] = outcome_of(whole.with_(mechanism.present))
             if without_key(mechanism) not in flown:
                 less = without_mechanism(whole, mechanism)
                 flown[without_key(mechanism)] = outcome_of(less, mechanism.withheld)
@@ -259,7 +254,7 @@ def margins_row(cell: tuple[str, str, str]) -> Document:
     }
 
 
-def margin_cells() -> Iterator[tuple[str, str, str]]:
+def margin_cells() -> Iterable[tuple[str, str, str]]:
     """System, bandwidth and instruments of each row of margins; the air is not in a loop."""
     seen = [name for name, (_, air, *_) in INSTRUMENTS.items() if air == "none"]
-    yield from product(SYSTEMS, BANDWIDTHS, seen)
+    return product(SYSTEMS, BANDWIDTHS, seen)

@@ -17,7 +17,7 @@ from beaver_ftc.studies.detectability.certain import (
     SETTLED_S,
     Excitation,
     alike,
-    answers,
+    answer,
     at,
     best_in_window,
     detection_magnitude,
@@ -136,8 +136,7 @@ ROW = {"airspeed_mps": 50.0, "altitude_m": 1800.0, "excitation": 2.0, "fault": "
 
 def test_an_answer_is_a_line_and_rounds_up():
     """3 deg/s of roll in the scenario, twice as much here; 0.301 is no longer 30 %."""
-    (found,) = answers(scenario(), [ROW | {"detected": 0.301, "isolated": 0.4}])
-    assert found == (
+    assert answer(scenario(), ROW | {"detected": 0.301, "isolated": 0.4}) == (
         "at 50 m/s and 1800 m, 6 deg/s of roll: a loss of aileron of 31 % and more is certain to be detected "
         "within 0.5 s, isolated within 1 s from 40 % on"
     )
@@ -148,7 +147,7 @@ def test_what_a_line_promises_holds_in_flight(flight):
     here = at(flight, 50.0, 1800.0, 1.0)
     row = {"airspeed_mps": 50.0, "altitude_m": 1800.0, "excitation": 1.0, "fault": "aileron"}
     row |= judge(excitation(here), "aileron")
-    size = int(answers(here, [row])[0].partition("aileron of ")[2].partition(" %")[0]) / 100.0
+    size = int(answer(here, row).partition("aileron of ")[2].partition(" %")[0]) / 100.0
     for struck_s in (4.0, 5.0, 6.0, 7.0, 8.0):
         faults = scenario(faults=[loss("aileron", size, struck_s)]).faults
         flown = fly(here.model_copy(update={"faults": faults}))

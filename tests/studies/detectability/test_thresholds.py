@@ -40,8 +40,7 @@ def test_the_interval_covers_the_known_quantile():
 
 def test_an_order_statistic_is_that_of_the_sorted_sizes():
     sizes = drawn(7, 120)
-    known = Sizes(finder(sizes))
-    known.grow(120)
+    known = Sizes(finder(sizes), 120)
     for rank in (1, 60, 108, 120):
         assert known.ordered(rank) == np.ceil(np.sort(sizes)[rank - 1])
 

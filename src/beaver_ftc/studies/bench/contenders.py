@@ -29,11 +29,6 @@ class Contender(Protocol):
         """Fly that many frames; timed."""
 
 
-def quartiles(values: np.ndarray) -> list[float]:
-    """Lower quartile, median and upper quartile of values (rounds,)."""
-    return [float(np.quantile(values, share)) for share in (0.25, 0.5, 0.75)]
-
-
 def interleave(contenders: Sequence[Contender], rounds: int, frames: int) -> np.ndarray:
     """Time all contenders in turn, A B C then C B A; microseconds a frame, (rounds, contenders).
 

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import dataclass
 from importlib.metadata import version
+from operator import itemgetter
 from pathlib import Path
 from typing import Annotated
 
@@ -28,7 +29,6 @@ from beaver_ftc.studies.bench.contenders import (
     InnovationDetector,
     ProportionalInversion,
     interleave,
-    quartiles,
     take_over,
 )
 from beaver_ftc.studies.bench.parts import PARTS, frame_with
@@ -108,7 +108,7 @@ def _against(bare: np.ndarray, loop: np.ndarray) -> Document:
 
 def _figures(name: str, values: np.ndarray) -> Document:
     """The median over the rounds, and the quartiles as `<name>_quartiles`."""
-    low, median, high = (round(value, 4) for value in quartiles(values))
+    low, median, high = np.quantile(values, (0.25, 0.5, 0.75)).round(4).tolist()
     return {name: median, f"{name}_quartiles": [low, high]}
 
 
@@ -143,6 +143,7 @@ def _whole_flights(scenario: Scenario, rounds: int) -> Document:
     return {"frames": frames, **_against(bare, loop), **figures}
 
 
+OF_WHOLE = ("bare_ms", "frames_ratio", "flight_ratio", "own_part_us")
 STAGES = ("scenario", "aircraft, trim, record", "frames", "metrics and row")
 # kind -> a built-in sweep, and what its flights have besides
 KINDS: dict[str, tuple[str, Document]] = {
@@ -274,7 +275,10 @@ def text_of(document: Document) -> str:
         ],
         "flights of 15 s in a sweep, ms of processor time; x: of what JSBSim alone takes for its frames": [
             ["", *STAGES, "frames alone", "frames, x", "flight, x", "us added a frame"],
-            *([kind, *(f"{figure:.3f}" for figure in _of_kind(of))] for kind, of in sweeps.items()),
+            *(
+                [kind, *(f"{x:.3f}" for x in (*of["parts_ms"].values(), *itemgetter(*OF_WHOLE)(of)))]
+                for kind, of in sweeps.items()
+            ),
         ],
     }
     return "\n".join([
@@ -297,11 +301,6 @@ def _row(what: str, figures: Document, us: str = "us") -> list[str]:
     low, high = figures[f"{us}_quartiles"]
     adds = f"{figures['adds_us']:+.3f}" if "adds_us" in figures else ""
     return [what, f"{figures[us]:.3f}", f"[{low:.3f}, {high:.3f}]", f"{figures['ratio']:.3f} x", adds]
-
-
-def _of_kind(of: Document) -> list[float]:
-    keys = ("bare_ms", "frames_ratio", "flight_ratio", "own_part_us")
-    return [*of["parts_ms"].values(), *(of[key] for key in keys)]
 
 
 @dataclass(frozen=True)

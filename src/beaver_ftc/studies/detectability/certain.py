@@ -17,12 +17,13 @@ the loop's answer to the fault within the window is neglected.
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import combinations
+from itertools import combinations, combinations_with_replacement, product
 from math import ceil, degrees, inf
 from pathlib import Path
 
 import numpy as np
 
+from beaver_ftc.aircraft import Aircraft, load
 from beaver_ftc.control.engines import effects_of as effects_of_engines
 from beaver_ftc.design.model import AXES, design_of, responses_at
 from beaver_ftc.documents.errors import BeaverFtcError, SimulationFailed
@@ -35,6 +36,7 @@ from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.detectability import isolability
 from beaver_ftc.studies.detectability.isolability import best_in_window, largest_and_median
+from beaver_ftc.studies.present.tables import all_finite
 
 DETECT_WITHIN_S, ISOLATE_WITHIN_S = 0.5, 1.0
 SPEEDS_MPS, ALTITUDES_M = (36.0, 40.0, 44.0, 48.0, 52.0), (0.0, 1000.0, 2000.0, 3000.0)
@@ -126,22 +128,13 @@ def mismatch(
     """M_sj (n,) of m z_s = `z` and z_j = `other`, (n, 3): convex and piecewise linear in b, within limits."""
     a, b = z / (2.0 * bound), other / (2.0 * bound)
     best = np.full(len(a), np.inf)
-    for candidate in _corners(a, b):
-        share = np.clip(np.nan_to_num(candidate, nan=0.0, posinf=0.0, neginf=0.0), *limits)
+    # least where two of +-(a_i - b_i t) are equal, one axis with itself at its zero, or at an end
+    for (i, j), sign in product(combinations_with_replacement(range(3), 2), (1.0, -1.0)):
+        with np.errstate(all="ignore"):
+            corner = (a[:, i] - sign * a[:, j]) / (b[:, i] - sign * b[:, j])
+        share = np.clip(np.nan_to_num(corner, nan=0.0, posinf=0.0, neginf=0.0), *limits)
         best = np.minimum(best, np.abs(a - share[:, None] * b).max(axis=1))
     return best
-
-
-def _corners(a: np.ndarray, b: np.ndarray):
-    """Where max_i |a_i - b_i t| may be least: the ends, the zeros, where two axes are equal; (n,) each."""
-    yield np.zeros(len(a))
-    yield np.ones(len(a))
-    with np.errstate(all="ignore"):
-        for i in range(3):
-            yield a[:, i] / b[:, i]
-        for i, j in combinations(range(3), 2):
-            yield (a[:, i] - a[:, j]) / (b[:, i] - b[:, j])
-            yield (a[:, i] + a[:, j]) / (b[:, i] + b[:, j])
 
 
 def exclusion_magnitude(z: np.ndarray, other: np.ndarray, bound: np.ndarray) -> np.ndarray:
@@ -165,21 +158,24 @@ def least_distinguished_rad(column: np.ndarray, other: np.ndarray, bound: np.nda
 def alike(scenario: Scenario) -> list[Document]:
     """Pairs of surfaces with similar effects on the rates: the deflection, deg, from which each is certain to
     be distinguished from the other, None where none is; and whether accelerometers distinguish them."""
-    short = scenario.model_copy(update={"duration_s": SETTLED_S + 1.0})
-    seen, aircraft = excitation(short), scenario.airframe
+    seen, aircraft = excitation(_short(scenario)), scenario.airframe
     by_force = [{*aircraft.separated_by_force(force)} for force in ("CY", "CZ")]
     found = []
     for s, other in combinations(range(aircraft.n), 2):
-        pairs = ((s, other), (other, s))
-        apart = [
-            degrees(least_distinguished_rad(seen.G[:, i], seen.G[:, j], seen.bound[0])) for i, j in pairs
-        ]
-        if max(apart) > ALIKE_DEG:
-            names = aircraft.surfaces[s], aircraft.surfaces[other]
-            from_deg = dict(zip(names, (x if x < inf else None for x in apart), strict=True))
+        from_deg = {
+            aircraft.surfaces[i]: degrees(least_distinguished_rad(seen.G[:, i], seen.G[:, j], seen.bound[0]))
+            for i, j in ((s, other), (other, s))
+        }
+        if max(from_deg.values()) > ALIKE_DEG:
             forces = any({s, other} <= weighed for weighed in by_force)
-            found.append({"surfaces": names, "told_apart_from_deg": from_deg, "by_forces": forces})
+            told = {"told_apart_from_deg": all_finite(from_deg), "by_forces": forces}
+            found.append({"surfaces": tuple(from_deg), **told})
     return found
+
+
+def _short(scenario: Scenario) -> Scenario:
+    """Its beginning, long enough to weigh the surfaces in trim."""
+    return scenario.model_copy(update={"duration_s": SETTLED_S + 1.0, "faults": ()})
 
 
 def geometry(pairs: Sequence[Document]) -> list[str]:
@@ -200,7 +196,7 @@ def engine_failures(scenario: Scenario) -> list[Document]:
     whether that is held against the thrust of all."""
     aircraft = scenario.airframe
     thrust, power = aircraft.engine.thrust, aircraft.file.power_setting
-    short = scenario.model_copy(update={"duration_s": SETTLED_S + 1.0, "faults": ()})
+    short = _short(scenario)
     effects = effects_of_engines(Declared.of(short))
     if thrust is None or power is None or not effects.size:
         return []
@@ -211,15 +207,18 @@ def engine_failures(scenario: Scenario) -> list[Document]:
     ]
     gained = np.interp(setting, thrust.setting, force_n) / aircraft.mass.mass_kg
     loop.release()
-    known, found = any(name in ENGINE_SIGNALS for name in aircraft.signals), []
-    mapped = aircraft.file.model_error_map
-    held = known and mapped is not None and mapped.knows_engines
-    for e, name in enumerate(aircraft.effectors):
-        turns = np.abs(effects[:, e]) * gained
-        shows = 1.0 / float(detection_magnitude(turns[None], bound[None])[0])
-        seen = {"turns_rad_s2": turns.tolist(), "shows": shows, "known": known, "held": held}
-        found.append({"engine": name, **seen})
-    return found
+    known, mapped = any(name in ENGINE_SIGNALS for name in aircraft.signals), aircraft.file.model_error_map
+    turns = np.abs(effects.T) * gained
+    return [
+        {
+            "engine": name,
+            "turns_rad_s2": of.tolist(),
+            "shows": 1.0 / float(detection_magnitude(of[None], bound[None])[0]),
+            "known": known,
+            "held": known and mapped is not None and mapped.knows_engines,
+        }
+        for name, of in zip(aircraft.effectors, turns, strict=True)
+    ]
 
 
 def of_engines(failures: Sequence[Document]) -> list[str]:
@@ -249,12 +248,8 @@ def _without_faults(scenario: Scenario) -> Document:
     return {**document, "faults": [], "expect": {}}
 
 
-def answers(scenario: Scenario, rows: Sequence[Document]) -> list[str]:
-    """A line a row: from which loss on a surface's fault is certain to be found there."""
-    return [_answer(scenario, row) for row in rows]
-
-
-def _answer(scenario: Scenario, row: Document) -> str:
+def answer(scenario: Scenario, row: Document) -> str:
+    """From which loss on a surface's fault is certain to be found at a place, in words."""
     axis = axis_of(scenario, row["fault"])
     signals = (signal.shape for signal in getattr(scenario.reference, axis))
     asked = row["excitation"] * sum(float(getattr(shape, "amplitude_deg_s", 0.0)) for shape in signals)
@@ -280,6 +275,13 @@ def axis_of(scenario: Scenario, surface: str) -> str:
     return AXES[aircraft.dominant_axis[aircraft.surfaces.index(surface)]]
 
 
+def usual_airspeeds(aircraft: Aircraft, of_the_beaver: tuple[float, ...]) -> tuple[float, ...]:
+    """These of the built-in aircraft, m/s, or about where another one starts."""
+    if aircraft is load():
+        return of_the_beaver
+    return tuple(round(share * aircraft.usual_airspeed_mps, 1) for share in SHARES)
+
+
 def survey_name(scenario: Scenario) -> str:
     """The name of the survey's result folder, at most 100 characters."""
     return f"{scenario.name[:86]}-detectability"
@@ -301,7 +303,7 @@ def look_at(scenario: Scenario, point: tuple[float, float, float]) -> dict[str, 
     else:
         points = [{"fault": fault, **judge(seen, fault)} for fault in seen.moment]
         pairs = [row | doublets[row["fault"], row["other"]] for row in pairs_of(seen)]
-    return {what: [place | row for row in rows] for what, rows in zip(PARTS, (points, pairs), strict=True)}
+    return {"points": [place | row for row in points], "pairs": [place | row for row in pairs]}
 
 
 def at(scenario: Scenario, speed_mps: float, altitude_m: float, excitation: float) -> Scenario:
@@ -347,7 +349,8 @@ def judge(seen: Excitation, fault: str) -> Document:
 
 def _windows(seen: Excitation) -> tuple[int, int]:
     """The frames in which a fault is to be detected, and isolated."""
-    return max(round(DETECT_WITHIN_S / seen.dt), 1), max(round(ISOLATE_WITHIN_S / seen.dt), 1)
+    detect, isolate = (max(round(s / seen.dt), 1) for s in (DETECT_WITHIN_S, ISOLATE_WITHIN_S))
+    return detect, isolate
 
 
 def pairs_of(seen: Excitation) -> list[Document]:

@@ -10,7 +10,6 @@ from typing import Annotated
 
 import typer
 
-from beaver_ftc.aircraft import load
 from beaver_ftc.commands import (
     SCENARIO,
     AirspeedsOption,
@@ -57,9 +56,8 @@ def run_places(
             "scheme adaptive-estimators, sharpen all, a filter of 1e6 in pole_bank_per_s"
         )
     aircraft, start_m = scenario.airframe, scenario.airframe.file.start.altitude_m
-    if not speeds_mps:  # those of the built-in aircraft, or about where another one starts
-        about = [round(share * aircraft.usual_airspeed_mps, 1) for share in certain.SHARES]
-        speeds_mps = certain.SPEEDS_MPS if aircraft is load() else about
+    if not speeds_mps:
+        speeds_mps = certain.usual_airspeeds(aircraft, certain.SPEEDS_MPS)
     if not altitudes_m:  # another aircraft's error is known about the one it starts at
         altitudes_m = certain.ALTITUDES_M if start_m is None else (start_m,)
     study = Study(
@@ -184,7 +182,10 @@ class Detectability(StudyCommand):
             found |= {
                 part: [row for row in found[part] if row["fault"] == self.surface] for part in certain.PARTS
             }
-            return found | {"answers": certain.answers(scenario, found["points"]), "folder": folder}
+            return found | {
+                "answers": [certain.answer(scenario, row) for row in found["points"]],
+                "folder": folder,
+            }
         failures = certain.engine_failures(scenario)
         found |= {"alike": certain.alike(scenario), "folder": folder}
         return found | ({"engines": failures} if failures else {})

@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict
 from itertools import product
 from statistics import fmean
-from typing import Any
 
 from beaver_ftc.diagnosis.informed_test import detection_probability
 from beaver_ftc.documents.errors import BadInput
@@ -61,7 +60,8 @@ def rows_of(faulted: Iterable[Watched], levels: dict[Key, float]) -> list[Row]:
     return [
         dict(zip(COLUMNS, (
             *one.block.condition, one.block.excitation_deg_s, one.block.seed, *fault, scheme,
-            *_alarm(trace, level), *_alarm(trace, 1.0), *deflections,
+            *(says for at in (level, 1.0) for says in (trace.false_alarm(at), finite(trace.delay_s(at)))),
+            *deflections,
         ), strict=True))
         for one in faulted
         for scheme, traces in one.traces.items()
@@ -69,11 +69,6 @@ def rows_of(faulted: Iterable[Watched], levels: dict[Key, float]) -> list[Row]:
         for fault, trace, deflections in zip(one.faults, traces, one.deflections, strict=True)
         if trace.faulted
     ]  # fmt: skip
-
-
-def _alarm(trace: Trace, level: float) -> tuple[bool, float | None]:
-    """Whether it came before the fault, and its delay."""
-    return trace.false_alarm(level), finite(trace.delay_s(level))
 
 
 def summary(rows: Sequence[Row], own: bool = False) -> Document:
@@ -122,7 +117,11 @@ def document_of(
     levels = {key: level_for(traces, grid.per_h) for key, traces in watched.items()}
     rows = rows_of(faulted, levels)
     document = {
-        "grid": {"bouts" if key == "blocks" else key: value for key, value in _said(grid)},
+        "grid": {  # nothing of a place where it is the usual one
+            "bouts" if key == "blocks" else key: value
+            for key, value in asdict(grid).items()
+            if key != "where" or value
+        },
         "watched_s": WATCHED_S,
         "false_alarms_per_h": grid.per_h,
         "levels": [
@@ -146,11 +145,6 @@ def document_of(
         "versions": dict(versions()),
     }
     return document, rows
-
-
-def _said(grid: Grid) -> Iterable[tuple[str, Any]]:
-    """What a grid says: nothing of a place where it is the usual one."""
-    return ((key, value) for key, value in asdict(grid).items() if key != "where" or value)
 
 
 def title_of(sensors: str, turbulence: str) -> str:

@@ -3,11 +3,12 @@
 A block is flown once for each fault; every scheme watches the same flights.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
-from typing import NamedTuple
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 import numpy as np
 from pydantic import TypeAdapter
@@ -90,8 +91,8 @@ class Grid:
             raise BadInput(f"--surface {surface!r:.60}: allowed: {', '.join(known)}")
         given = {"airspeed_mps": airspeed_mps, "altitude_m": altitude_m}
         initial = {name: value for name, value in given.items() if value is not None}
-        where: Document = {"initial": initial} if initial else {}
-        where |= {"aircraft": aircraft} if aircraft else {}
+        said = {"initial": initial, "aircraft": aircraft}
+        where = {key: value for key, value in said.items() if value}
         surfaces = self.surfaces if aircraft is None else known
         return replace(self, where=where, surfaces=(surface,) if surface else surfaces)
 
@@ -121,13 +122,13 @@ GRIDS = TypeAdapter(dict[str, Grid]).validate_json((Path(__file__).parent / "gri
 def scenario_of(
     block: Block,
     duration_s: float,
-    faults: list[Document] | None = None,
-    where: Document | None = None,
+    faults: Sequence[Document] = (),
+    where: Mapping[str, Any] = MappingProxyType({}),
 ) -> Scenario:
     """A flight of a block: everything in it but the fault and where it is flown follows from the block.
     Another aircraft than the Beaver has the error of its own model, and none is added."""
     sensors, turbulence = block.condition
-    aircraft = (where or {}).get("aircraft", DEFAULT)
+    aircraft = where.get("aircraft", DEFAULT)
     find_aircraft(aircraft, Path())  # a folder in the working directory, in each process
     return Scenario.model_validate(
         {
@@ -139,10 +140,10 @@ def scenario_of(
             "uncertainty": _uncertainty(block) if aircraft == DEFAULT else {},
             "sensors": sensors,
             "environment": air_of(turbulence),
-            "faults": faults or [],
+            "faults": faults,
             "fdi": {"bounds": {"sensors": sensors, "turbulence": turbulence}},
             "control": {"law": "nominal"},
-            **(where or {}),
+            **where,
         }
     )
 

@@ -26,7 +26,7 @@ from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.signals import TIME_TOLERANCE_S
 from beaver_ftc.studies.detectability.certain import AMPLITUDES, SETTLED_S, axis_of, scaled
 from beaver_ftc.studies.detectability.shown import NAME, OF_SIZES
-from beaver_ftc.studies.detectability.thresholds import LARGEST, STAGES, Threshold, of_all, threshold
+from beaver_ftc.studies.detectability.thresholds import LARGEST, STAGES, of_all, threshold
 from beaver_ftc.studies.engine.draws import loss
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, counted, or_never
 from beaver_ftc.studies.engine.study import FlyRound, Study, run_study
@@ -132,14 +132,13 @@ def fly_one(variants: dict[str, Scenario], asked: Asked, flight: Flight) -> Docu
 
 
 def _row(**known: Any) -> Document:
-    nothing = {"found": False, "certain": False, "false_alarm": False, "inconclusive": None, "failed": False}
-    return nothing | {"bound_used": 0.0} | known
+    flags = dict.fromkeys(("found", "certain", "false_alarm", "failed"), False)
+    return {**flags, "inconclusive": None, "bound_used": 0.0, **known}
 
 
 def variants_of(scenario: Scenario, surface: str) -> Iterator[tuple[str, Scenario]]:
     """The scenario, and the same with one thing left out or changed, by what that is."""
-    yield AS_IT_IS, scenario.with_({"faults": [], "expect": {}})
-    for name, change in (*_left_out(scenario), *_other_references(scenario, surface)):
+    for name, change in ((AS_IT_IS, {}), *_left_out(scenario), *_other_references(scenario, surface)):
         yield name, scenario.with_({"faults": [], "expect": {}, **change})
 
 
@@ -162,11 +161,9 @@ def _other_references(scenario: Scenario, surface: str) -> Iterator[tuple[str, D
     """References that move the surface more: on the axis on which it shows."""
     axis = axis_of(scenario, surface)
     signals = scenario.model_dump(mode="json", exclude_none=True)["reference"].get(axis, [])
-    louder, faster = (scaled(signals, keys, 2.0) for keys in (AMPLITUDES, _FREQUENCIES))
-    if louder != signals:
-        yield f"with twice the amplitude of reference.{axis}", {f"reference.{axis}": louder}
-    if faster != signals:
-        yield f"with twice the frequency of reference.{axis}", {f"reference.{axis}": faster}
+    for what, keys in (("amplitude", AMPLITUDES), ("frequency", _FREQUENCIES)):
+        if (twice := scaled(signals, keys, 2.0)) != signals:
+            yield f"with twice the {what} of reference.{axis}", {f"reference.{axis}": twice}
     if not signals:
         sine = {"amplitude_deg_s": ADDED_DEG_S, "frequency_hz": ADDED_HZ}
         says = f"with a sine of {ADDED_DEG_S:g} deg/s and {ADDED_HZ:g} Hz as reference.{axis}"
@@ -199,25 +196,19 @@ def _document(scenario: Scenario, asked: Asked, variants: dict[str, Scenario], f
 
 
 def _answer(variant: str, flown: _Flown, stages: Sequence[int]) -> Document:
-    """The two sizes of one variant, as shares of the effectiveness, and what a total loss comes to."""
-    found = threshold(partial(flown.says, variant, "found"), SHARE, CONFIDENCE, stages)
+    """The two sizes of one variant, as shares of the effectiveness (null: not even a total loss), and what a
+    total loss comes to."""
+    found = threshold(partial(flown.says, variant, "found"), SHARE, stages)
     certain = of_all(partial(flown.says, variant, "certain"), stages[0])
     total = flown.of(variant, range(found.flights), LARGEST)
     sure = sum(flown.says(variant, "certain", range(stages[0]), LARGEST))
     return {
         "variant": variant,
-        "found": _shares(found),
-        "certain": {
-            "size": finite(certain / LARGEST), "flights": stages[0],
-            "at_total_loss": sure,
+        "found": {
+            key: size if key == "flights" else finite(size / LARGEST) for key, size in vars(found).items()
         },
+        "certain": {"size": finite(certain / LARGEST), "flights": stages[0], "at_total_loss": sure},
         "total_loss": counted(sum(row["found"] for row in total), len(total)),
         "false_alarms": sum(row["false_alarm"] for row in total),
         "failed": sum(row["failed"] for row in total),
-    }  # fmt: skip
-
-
-def _shares(found: Threshold) -> Document:
-    """As shares of 1; null: not even a total loss."""
-    of = {name: finite(getattr(found, name) / LARGEST) for name in ("size", "low", "high")}
-    return of | {"flights": found.flights}
+    }

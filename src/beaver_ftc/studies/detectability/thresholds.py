@@ -52,26 +52,21 @@ class Threshold:
 
 
 class Sizes:
-    """What is known of the smallest size at which each flight finds its fault: above `missed`, at most
-    `found`."""
+    """What is known of the smallest size at which each flight finds its fault: above `_missed`, at most
+    `_found`. flights: how many of them count."""
 
-    def __init__(self, is_found: IsFound) -> None:
-        self._is_found = is_found
-        self.missed, self.found = np.zeros(0, int), np.zeros(0, int)
-
-    def grow(self, flights: int) -> None:
-        """Take in flights, up to so many in all."""
-        more = max(flights - len(self.missed), 0)
-        self.missed = np.append(self.missed, np.zeros(more, int))
-        self.found = np.append(self.found, np.full(more, NEVER))
+    def __init__(self, is_found: IsFound, most: int) -> None:
+        self._is_found, self.flights = is_found, most
+        self._missed, self._found = np.zeros(most, int), np.full(most, NEVER)
 
     def count(self, size: int) -> int:
         """How many flights find this size; those of which it is not known are flown."""
-        unknown = np.flatnonzero((self.missed < size) & (size < self.found))
+        missed, found = self._missed[: self.flights], self._found[: self.flights]
+        unknown = np.flatnonzero((missed < size) & (size < found))
         if len(unknown):
-            found = np.array(self._is_found(unknown.tolist(), size), bool)
-            self.found[unknown[found]], self.missed[unknown[~found]] = size, size
-        return int((self.found <= size).sum())
+            is_found = np.array(self._is_found(unknown.tolist(), size), bool)
+            found[unknown[is_found]], missed[unknown[~is_found]] = size, size
+        return int((found <= size).sum())
 
     def ordered(self, rank: int) -> float:
         """The rank-th smallest size, of 1 to the number of flights."""
@@ -84,13 +79,11 @@ class Sizes:
         return float(high)
 
 
-def threshold(
-    is_found: IsFound, share: float, confidence: float = CONFIDENCE, stages: Sequence[int] = STAGES
-) -> Threshold:
+def threshold(is_found: IsFound, share: float, stages: Sequence[int] = STAGES) -> Threshold:
     """The size found in a share of flights, with its two-sided interval."""
-    sizes, one_sided = Sizes(is_found), 1.0 - 0.5 * (1.0 - confidence) / len(stages)
+    sizes, one_sided = Sizes(is_found, stages[-1]), 1.0 - 0.5 * (1.0 - CONFIDENCE) / len(stages)
     for flights in stages:
-        sizes.grow(flights)
+        sizes.flights = flights
         ranks = np.arange(1, flights + 1, dtype=float)
         bounds = [quantile_bound(ranks, share, one_sided, upper) for upper in (False, True)]
         low, high = (sizes.ordered(int(rank)) if np.isfinite(rank) else rank for rank in bounds)
@@ -103,6 +96,4 @@ def threshold(
 
 def of_all(is_found: IsFound, flights: int) -> float:
     """The size from which on every one of so many flights finds its fault, per cent; infinite if none is."""
-    sizes = Sizes(is_found)
-    sizes.grow(flights)
-    return sizes.ordered(flights)
+    return Sizes(is_found, flights).ordered(flights)

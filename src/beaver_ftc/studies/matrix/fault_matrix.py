@@ -24,6 +24,7 @@ from beaver_ftc.scenario.airframe import air_of, find_aircraft, initial_of
 from beaver_ftc.scenario.faults import TYPES
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.schema import load as load_scenario
+from beaver_ftc.studies.detectability.certain import usual_airspeeds
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.matrix.clairvoyant import columns_of, seen_when_told
 from beaver_ftc.studies.present.figures import heat_map, label_edges, panels
@@ -50,7 +51,6 @@ LOOKS = {  # symbol and colour; lightness orders them in grey
     "surface": ("\u25d1", "#c3e1f4"), "named": ("\u2714", "#d3f0e5"),
 }  # fmt: skip
 VERDICTS = tuple(LOOKS)  # the worst first
-SPEEDS = (0.9, 1.0, 1.1)  # of another aircraft, as shares of the speed it starts with
 REFERENCE, UNCERTAINTY = SETTING["reference"], SETTING["uncertainty"]
 
 # Name in the table, and the fault; off_deg: a jam this far off the trimmed command.
@@ -72,10 +72,7 @@ class FaultCase(NamedTuple):
 
 def airspeeds_of(reference: str) -> tuple[float, ...]:
     """Airspeeds to fly an aircraft at, m/s."""
-    if reference == DEFAULT:
-        return AIRSPEEDS_MPS
-    start_mps = aircraft_of(reference).usual_airspeed_mps
-    return tuple(round(share * start_mps, 1) for share in SPEEDS)
+    return usual_airspeeds(aircraft_of(reference), AIRSPEEDS_MPS)
 
 
 def aircraft_of(reference: str) -> Aircraft:

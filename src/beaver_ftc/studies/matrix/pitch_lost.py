@@ -116,7 +116,7 @@ def document_of(rows: list[Document], airspeeds_mps: Sequence[float]) -> Documen
     """All flights, the linear margins, and whether power lost an aircraft that was kept without it."""
     harmed = [row for row in rows if row["with"]["departure"] and not row["without"]["departure"]]
     return {
-        "margins": [margins(V, EnginePower()) for V in airspeeds_mps or AIRSPEEDS_MPS],
+        "margins": [margins(V, EnginePower()) for V in airspeeds_mps],
         "flights": rows,
         "saved": sum(bool(row["without"]["departure"] and not row["with"]["departure"]) for row in rows),
         "harmed": len(harmed),

@@ -1,13 +1,12 @@
 """How long a person waits: each wait by the wall and by the processor, beside its bar.
 
-    python benchmarks/waits.py [--rounds 5] [--only PATTERN] [--long] [--gtm DATABASE.mat]
-    python benchmarks/waits.py --beside REVISION [--only PATTERN]
+    python benchmarks/waits.py [--rounds 5] [--long] [--beside REVISION]
 
 Every wait is a whole process of its own, and the processor time is that of the process and of all that it
 starts. A wait that compiles begins each time with a cache of its own: empty, or as a first flight leaves it.
 What a flight costs beside JSBSim's frames alone is measured by `flight_cost.py`. `--long` takes also what
 needs minutes or the network (`matrix`, `detectability --grid`, rare events, `reproduce`, `make demo` from a
-fresh clone); `import gtm` needs the user's copy of the data base. The processor time of a study includes its
+fresh clone); `import gtm` needs the folder `BEAVER_FTC_GTM`. The processor time of a study includes its
 workers, on Linux: they are no children of the command, and become this process's when it ends.
 
 `--beside REVISION` measures in pairs: the code of that revision and today's, in turn, and prints the medians
@@ -17,7 +16,6 @@ of both and of their ratio, which a busy machine changes little.
 import argparse
 import asyncio
 import ctypes
-import fnmatch
 import os
 import shutil
 import statistics
@@ -26,7 +24,7 @@ import sys
 import tempfile
 import time
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -37,6 +35,7 @@ ADOPT_ORPHANS = 36  # prctl(2): PR_SET_CHILD_SUBREAPER
 FAULT = "elevator-partial-loss"  # 30 s at 100 Hz
 OTHER_AIRCRAFT, OTHER_KIND = "mission-split-elevator-lost", "elevator-loss-in-turbulence"
 RARE = "elevator-effectiveness"
+DATABASE = "T2_polynomial_aerodatabase.mat"
 HALF_HOUR = """\
 name: half-hour
 duration_s: 1800
@@ -56,11 +55,10 @@ class Taken(NamedTuple):
 
 @dataclass(frozen=True)
 class Place:
-    """Where a wait is measured: the code, a folder for results, kept kernels, the user's GTM data base."""
+    """Where a wait is measured: the code, and a folder for results and kept kernels."""
 
     tree: Path
     folder: Path
-    gtm: Path | None = None
 
     @cached_property
     def body(self) -> str:
@@ -148,7 +146,8 @@ def derive(place: Place) -> Taken:
 
 def import_gtm(place: Place) -> Taken | None:
     """NASA's Generic Transport Model, into a folder."""
-    return place.said("import", "gtm", str(place.gtm), "--out", "imported") if place.gtm else None
+    there = os.environ.get("BEAVER_FTC_GTM")
+    return place.said("import", "gtm", str(Path(there, DATABASE)), "--out", "imported") if there else None
 
 
 def diagnose(place: Place) -> Taken:
@@ -249,52 +248,50 @@ WAITS = (
 )  # fmt: skip
 
 
-def medians(rounds: list[Taken]) -> Taken:
-    """Of each number by itself; the largest of the peaks."""
-    wall, processor, peaks = zip(*rounds, strict=True)
-    return Taken(statistics.median(wall), statistics.median(processor), max(peaks))
+def measured(wait: Wait, places: Sequence[Place], rounds: int) -> list[list[Taken]]:
+    """What a wait takes in each place, round after round; nothing where it cannot be measured.
+
+    The first process warms up what is kept on purpose; places take turns to go first.
+    """
+    if not wait.fresh:
+        for place in places:
+            wait.measure(place)
+    found = []
+    for k in range(rounds):
+        taken = {place: wait.measure(place) for place in (places if k % 2 else places[::-1])}
+        found.append([of for place in places if (of := taken[place])])
+    return found if all(found) else []
 
 
 def alone(wait: Wait, place: Place, rounds: int) -> str:
-    """Wall, processor, memory and bar of a wait; the first process warms up what is kept on purpose."""
-    if not wait.fresh:
-        wait.measure(place)
-    found = [wait.measure(place) for _ in range(1 if wait.fresh else rounds)]
-    taken = medians([each for each in found if each]) if all(found) else None
-    cells = ["-"] * 3 if taken is None else [f"{of:.{n}f}" for of, n in zip(taken, (2, 2, 0), strict=True)]
+    """Wall, processor, memory and bar of a wait: medians, and the largest of the peaks."""
+    found = [taken for (taken,) in measured(wait, [place], 1 if wait.fresh else rounds)]
+    cells = ["-"] * 3
+    if found:
+        wall, processor, peaks = zip(*found, strict=True)
+        cells = [f"{statistics.median(of):.2f}" for of in (wall, processor)] + [f"{max(peaks):.0f}"]
     cells.append("-" if wait.bar is None else f"{wait.bar:.2f}")
     return f"{wait.name:34}" + "".join(f"{cell:>14}" for cell in cells)
 
 
-def in_pairs(wait: Wait, places: tuple[Place, Place], pairs: int) -> str:
-    """Then, now, and the median of their ratios, by the processor; they take turns."""
-    if not wait.fresh:
-        for place in places:
-            wait.measure(place)
-    then_now = []
-    for pair in range(pairs):
-        seen = {which: wait.measure(places[which]) for which in ((0, 1) if pair % 2 else (1, 0))}
-        then_now.append([taken.processor for _, taken in sorted(seen.items()) if taken])
-    if not all(map(len, then_now)):
-        return f"{wait.name:34}{'-':>10}{'-':>10}"
-    then, now = (statistics.median(column) for column in zip(*then_now, strict=True))
-    ratio = statistics.median(b / a for a, b in then_now)
-    return f"{wait.name:34}{then:10.2f}{now:10.2f}{ratio:10.2f}"
+def in_pairs(wait: Wait, places: Sequence[Place], rounds: int) -> str:
+    """Then, now, and the median of their ratios, by the processor."""
+    found = measured(wait, places, 2 if wait.fresh else rounds)
+    pairs = [(then.processor, now.processor) for then, now in found]
+    columns = [*zip(*pairs, strict=True), [now / then for then, now in pairs]] if pairs else []
+    cells = [f"{statistics.median(of):.2f}" for of in columns] or ["-", "-"]
+    return f"{wait.name:34}" + "".join(f"{cell:>10}" for cell in cells)
 
 
 def main() -> int:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--rounds", type=int, default=5)
-    parser.add_argument("--only", default="*", help="names of waits, with * and ?")
     parser.add_argument("--long", action="store_true", help="also what needs minutes or the network")
-    parser.add_argument("--gtm", type=Path, help="your copy of T2_polynomial_aerodatabase.mat")
     parser.add_argument("--beside", metavar="REVISION", help="in pairs with the code of a revision")
     given = parser.parse_args()
-    wanted = [w for w in WAITS if fnmatch.fnmatch(w.name, given.only) and (given.long or not w.long)]
-    gtm = given.gtm.resolve() if given.gtm else None
     with tempfile.TemporaryDirectory() as folder:
-        now = Place(ROOT, Path(folder, "now"), gtm)
+        now = Place(ROOT, Path(folder, "now"))
         now.folder.mkdir()
         if given.beside:
             from flight_cost import (
@@ -302,15 +299,20 @@ def main() -> int:
                 unpack,
             )  # not above: a process begins as large as the one it is forked from
 
-            then = Place(unpack(given.beside, Path(folder, "code")), Path(folder, "then"), gtm)
+            then = Place(unpack(given.beside, Path(folder, "code")), Path(folder, "then"))
             then.folder.mkdir()
             said = git("rev-parse", "--short", given.beside).decode().strip()
             print(f"{'processor, s':34}{said:>10}{'now':>10}{'now/then':>10}", flush=True)
         else:
             print(f"{'':34}{'wall, s':>14}{'processor, s':>14}{'peak, MB':>14}{'bar, s':>14}", flush=True)
-        for wait in wanted:
-            both = given.beside and in_pairs(wait, (then, now), 2 if wait.fresh else given.rounds)
-            print(both or alone(wait, now, given.rounds), flush=True)
+        for wait in WAITS:
+            if given.long or not wait.long:
+                row = (
+                    in_pairs(wait, (then, now), given.rounds)
+                    if given.beside
+                    else alone(wait, now, given.rounds)
+                )
+                print(row, flush=True)
     return 0
 
 

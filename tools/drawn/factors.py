@@ -14,7 +14,7 @@ import yaml
 from beaver_ftc.plugins import DETECTORS, LAWS, OURS, registered
 from tools.drawn.array import Factor, Forbidden
 from tools.drawn.ranges import DECLARED_ONLY, RANGES
-from tools.drawn.walk import Node
+from tools.drawn.walk import NEVER, Node
 
 LEFT_OUT, DRAWN = "-", "drawn"
 TOGETHER = Path(__file__).with_name("together.yaml")
@@ -35,7 +35,7 @@ def factors_of(schema: Node, aircraft: Sequence[str], declared: bool) -> list[Fa
     of_keys = [
         Factor(path, (LEFT_OUT, *levels))
         for path, node in keys_of(schema)
-        if path not in SPOKEN_FOR and not ranges.never_given(path) and (levels := levels_of(schema, node))
+        if path not in SPOKEN_FOR and ranges.of(path) != NEVER and (levels := levels_of(schema, node))
     ]
     return [*_own(schema, aircraft), *of_keys]
 

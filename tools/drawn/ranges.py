@@ -11,7 +11,7 @@ from typing import Any
 import yaml
 
 from beaver_ftc.scenario.sensors import PRESETS
-from tools.drawn.walk import Circumstances, Ranges, log_uniform
+from tools.drawn.walk import NEVER, Circumstances, Ranges, log_uniform
 
 FILE = Path(__file__).with_name("ranges.yaml")
 AT_THE_BOUND = 0.3  # share of errors that are as large as they may be
@@ -156,11 +156,11 @@ def wind(now: Circumstances, path: str) -> list[float]:
 
 
 def _read() -> dict[str, Any]:
-    """{pattern: function of circumstances and path, or None for a key that is never given}."""
+    """{pattern: function of circumstances and path, or NEVER for a key that is left out}."""
     found: dict[str, Any] = {}
     for pattern, drawn in yaml.safe_load(FILE.read_text(encoding="utf-8")).items():
-        found[pattern] = None
-        for name, numbers in drawn.items() if drawn != "never" else ():
+        found[pattern] = drawn
+        for name, numbers in drawn.items() if drawn != NEVER else ():
             found[pattern] = partial(_numbered, globals()[name], numbers)
     return found
 
@@ -172,5 +172,5 @@ def _numbered(draw: Any, numbers: list[float], now: Circumstances, path: str) ->
 _PATTERNS = _read()
 RANGES = Ranges(_PATTERNS)
 DECLARED_ONLY = Ranges(
-    {**dict.fromkeys(UNDECLARABLE), **{k: v for k, v in _PATTERNS.items() if k not in UNDECLARABLE}}
+    {**dict.fromkeys(UNDECLARABLE, NEVER), **{k: v for k, v in _PATTERNS.items() if k not in UNDECLARABLE}}
 )

@@ -19,8 +19,6 @@ ANALYTIC: dict[str, tuple[Callable[[np.ndarray], np.ndarray], int, float]] = {
     "in steps": (lambda u: np.floor(8 * (u[:, 0] - norm.isf(1e-3))) / 8, 2, 1e-3),
 }
 EXPECTATION, LIMIT_DEG_S = "post_fault_rms_deg_s.q", 5.1
-FAR = 3.2  # standard deviations of the bias beyond which every flight drawn is flown
-NEAR = -0.05  # the score of a flight that comes near the event
 SWEEP: dict[str, Any] = {
     "name": "biased",
     "base": {

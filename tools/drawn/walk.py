@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ Random = np.random.Generator
 GIVEN_SHARE = 0.3  # of the keys of a section that may be left out
 FACTOR = 2.0  # a number with a positive default is drawn within this factor of it
 MOST_ITEMS = 2
+NEVER = "never"
 LARGEST = 100.0  # of a number without limits
 
 
@@ -25,28 +27,17 @@ class Circumstances:
 
 
 class Ranges:
-    """pattern of a key's path -> function of circumstances and path, or None for a key that is never given.
+    """pattern of a key's path -> function of circumstances and path, or NEVER for a key that is left out.
     The first pattern that fits counts. A path has no indices: `faults.at_s`."""
 
     def __init__(self, given: Mapping[str, Any]) -> None:
-        self._given: Mapping[str, Any] = given
-        self._known: dict[str, tuple[bool, Any]] = {}
+        self._given = given
 
+    @cache  # noqa: B019 (there are two, as long as the process)
     def of(self, path: str) -> Any:
         """What is said of a path; None where nothing is."""
-        return self._looked_up(path)[1]
-
-    def never_given(self, path: str) -> bool:
-        """Whether it is said that the key is left out."""
-        fits, ranged = self._looked_up(path)
-        return fits and ranged is None
-
-    def _looked_up(self, path: str) -> tuple[bool, Any]:
-        if path not in self._known:
-            fitting = (ranged for pattern, ranged in self._given.items() if fnmatchcase(path, pattern))
-            first = next(fitting, self)
-            self._known[path] = (False, None) if first is self else (True, first)
-        return self._known[path]
+        fitting = (ranged for pattern, ranged in self._given.items() if fnmatchcase(path, pattern))
+        return next(fitting, None)
 
 
 class Undrawable(Exception):
@@ -63,7 +54,7 @@ class Walk:
     def value(self, node: Node, path: str) -> Any:
         """A value for the key at this path. Raises Undrawable."""
         ranged = self._ranges.of(path)
-        if ranged is not None:
+        if callable(ranged):
             return ranged(self.now, path)
         node = self.resolved(node)
         for kind, draw in (
@@ -124,7 +115,7 @@ class Walk:
         properties, required = node.get("properties", {}), set(node.get("required", ()))
         if not properties:
             raise Undrawable(path)
-        names = [name for name in properties if not self._ranges.never_given(f"{path}.{name}")]
+        names = [name for name in properties if self._ranges.of(f"{path}.{name}") != NEVER]
         if node.get("maxProperties") == 1:
             wanted = {names[self.now.rng.integers(len(names))]}
         else:

@@ -1,6 +1,5 @@
 """Figures of docs/explanation/detection.md and isolation.md, from one built-in flight."""
 
-from dataclasses import dataclass
 from functools import cache
 from io import BytesIO
 from itertools import pairwise
@@ -21,58 +20,22 @@ from tools.docs.tables import picture
 SCENARIO, SURFACE = "elevator-partial-loss", "elevator"
 LOSS, AT_S = 0.08, 12.8  # small, so that alarm and certainty come at different frames
 BEFORE_S, AFTER_S, SHOWN_S = 0.1, 0.3, 1.0  # shown of residuals before and after the fault; of the sets
-PITCH = 1
+PITCH, DT_S = 1, 0.01
 _LOOK = {"font.size": 9, "svg.hashsalt": "beaver-ftc", "svg.fonttype": "none", "font.family": "sans-serif"}
 
 
-@dataclass(frozen=True)
-class Filtered:
-    """One filter, rad/s: the residual E, its threshold T, and the filtered effect of the fault alone."""
-
-    says: str
-    residual: np.ndarray
-    threshold: np.ndarray
-    effect: np.ndarray
-
-
-@dataclass(frozen=True)
-class Frames:
-    """Frames of the flight, one entry a frame: time since the fault, s; innovation nu, its bound and the
-    regressor Z of pitch, rad/s2; dt s."""
-
-    t: np.ndarray
-    innovation: np.ndarray
-    bound: np.ndarray
-    regressor: np.ndarray
-    dt: float
-
-    def filtered(self, pole_per_s: float) -> Filtered:
-        """What a filter of this pole makes of them."""
-        effect = np.where(self.t > 1e-6, -LOSS * np.nan_to_num(self.regressor), 0.0)
-        a = np.exp(-pole_per_s * self.dt)
-        made = (lfilter([self.dt], [1.0, -a], of) for of in (self.innovation, self.bound, effect))
-        says = (
-            "one frame alone" if pole_per_s == DEADBEAT_PER_S else f"filter with the pole {pole_per_s:g} 1/s"
-        )
-        return Filtered(says, *made)
-
-    def sets(self) -> tuple[np.ndarray, np.ndarray]:
-        """Least and largest loss that is consistent with each frame, share of 1."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            ends = -(self.innovation + np.array([[-1.0], [1.0]]) * self.bound) / self.regressor
-        return np.clip(ends.min(axis=0), 0.0, 1.0), np.clip(ends.max(axis=0), 0.0, 1.0)
-
-
 @cache
-def _frames() -> Frames:
+def _frames() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Of each frame of the flight: time since the fault, s; innovation nu, its bound and the regressor Z of
+    pitch, rad/s2."""
     changes = {"faults[0].magnitude": LOSS, "faults[0].at_s": AT_S, "expect": {}}
     scenario = bf.load(SCENARIO).with_(changes)
-    log, dt = bf.fly(scenario).log, 1.0 / scenario.rate_hz
+    log = bf.fly(scenario).log
     rates = log[[f"{axis}_measured_rad_s" for axis in "pqr"]].to_numpy()
-    innovation = np.append(0.0, np.diff(rates[:, PITCH])) / dt - log["q_design_rad_s2"].to_numpy()
-    innovation[0], bound = 0.0, log["q_eta_bar_rad_s2"].to_numpy().copy()
-    bound[0] = 0.0
-    return Frames(log["t_s"].to_numpy() - AT_S, innovation, bound, _regressor(scenario, log, rates), dt)
+    innovation = np.append(0.0, np.diff(rates[:, PITCH])) / DT_S - log["q_design_rad_s2"].to_numpy()
+    bound = log["q_eta_bar_rad_s2"].to_numpy().copy()
+    innovation[0] = bound[0] = 0.0
+    return log["t_s"].to_numpy() - AT_S, innovation, bound, _regressor(scenario, log, rates)
 
 
 def _regressor(scenario: bf.Scenario, log: pd.DataFrame, rates: np.ndarray) -> np.ndarray:
@@ -90,20 +53,23 @@ def _regressor(scenario: bf.Scenario, log: pd.DataFrame, rates: np.ndarray) -> n
 
 def residual_and_threshold() -> str:
     """Residual of pitch rate, its threshold and the effect of the fault, of both filters of the bank."""
-    frames = _frames()
-    shown = (frames.t > -BEFORE_S) & (frames.t < AFTER_S)
     with plt.rc_context(_LOOK):
         figure, axes = plt.subplots(2, 1, figsize=(7.2, 5.2), sharex=True)
         for axis, pole in zip(axes, (10.0, DEADBEAT_PER_S), strict=True):
-            _draw_filter(axis, frames.filtered(pole), frames.t, shown)
+            _draw_filter(axis, pole)
         axes[1].set_xlabel("time since the fault, s")
         figure.subplots_adjust(left=0.1, right=0.84, top=0.95, bottom=0.1, hspace=0.25)
         return _saved(figure, "residual-and-threshold", "Residual and threshold about the fault")
 
 
-def _draw_filter(axis: Axes, made: Filtered, t: np.ndarray, shown: np.ndarray) -> None:
-    """Magnitudes, with lines labelled at their ends, and the instants of alarm and of certainty."""
-    E, T, effect = (1e3 * np.abs(of) for of in (made.residual, made.threshold, made.effect))
+def _draw_filter(axis: Axes, pole_per_s: float) -> None:
+    """Magnitudes of residual E, threshold T and filtered effect of the fault alone, 1e-3 rad/s, with lines
+    labelled at their ends, and the instants of alarm and of certainty."""
+    t, innovation, bound, Z = _frames()
+    shown = (t > -BEFORE_S) & (t < AFTER_S)
+    inputs = (innovation, bound, np.where(t > 1e-6, -LOSS * np.nan_to_num(Z), 0.0))
+    a = np.exp(-pole_per_s * DT_S)
+    E, T, effect = (1e3 * np.abs(lfilter([DT_S], [1.0, -a], of)) for of in inputs)
     lines = (
         (E, "|E| residual", BLACK, ()),
         (T, "T threshold", VERMILION, (5, 3)),
@@ -121,7 +87,10 @@ def _draw_filter(axis: Axes, made: Filtered, t: np.ndarray, shown: np.ndarray) -
         axis.text(at + 0.003, height, f"{says}: {at:.2f} s", color=BLUE, transform=axis.get_xaxis_transform())
     axis.axvline(0.0, color=GREY, lw=0.9)
     axis.text(-0.003, 0.92, "fault", color=GREY, ha="right", transform=axis.get_xaxis_transform())
-    axis.set_title(made.says, loc="left", fontsize=9)
+    deadbeat = pole_per_s == DEADBEAT_PER_S
+    axis.set_title(
+        "one frame alone" if deadbeat else f"filter with the pole {pole_per_s:g} 1/s", loc="left", fontsize=9
+    )
     axis.set_ylabel("pitch, 10⁻³ rad/s")
     axis.set_ylim(0.0, 1.05 * E[shown].max())
     axis.set_xlim(-BEFORE_S, AFTER_S)
@@ -137,9 +106,12 @@ def _apart(heights: np.ndarray, least: float) -> np.ndarray:
 
 def feasible_set() -> str:
     """The losses of the elevator that are consistent with each frame, and with all frames since the fault."""
-    frames = _frames()
-    struck = (frames.t > 1e-6) & (frames.t < SHOWN_S)
-    t, (low, high) = frames.t[struck], [ends[struck] for ends in frames.sets()]
+    t, *of_frames = _frames()
+    struck = (t > 1e-6) & (t < SHOWN_S)
+    t, innovation, bound, Z = (of[struck] for of in (t, *of_frames))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ends = np.clip(-(innovation + np.array([[-1.0], [1.0]]) * bound) / Z, 0.0, 1.0)
+    low, high = ends.min(axis=0), ends.max(axis=0)
     least, largest = np.maximum.accumulate(low), np.minimum.accumulate(high)
     with plt.rc_context(_LOOK):
         figure, axis = plt.subplots(figsize=(7.2, 3.2))

@@ -23,6 +23,7 @@ from beaver_ftc.scenario.schema import load_text
 M_S_PER_KT = 0.514444
 ALTITUDE_M = 1000.0  # below 2000 ft the turbulence declared is another
 DURATION_S = 14.0
+SEED = 1
 REAL = ("sensors", "actuators", "environment", "fdi")
 HEAD = (
     "case", "flights", "false alarms", "within 1 s", "later", "not found", "unanticipated", "lost named",
@@ -31,7 +32,7 @@ HEAD = (
 Document = dict[str, Any]
 
 
-def scenario(seed: int, k: int, calm: bool = False) -> Document:
+def scenario(k: int, calm: bool = False, seed: int = SEED) -> Document:
     """The k-th flight."""
     cases, rng = list(load("gtm").damage), np.random.default_rng([seed, k])
 
@@ -60,9 +61,9 @@ def scenario(seed: int, k: int, calm: bool = False) -> Document:
     return {key: of for key, of in given.items() if not (calm and key in REAL)}
 
 
-def flown(seed: int, k: int, calm: bool = False) -> Document:
+def flown(k: int, calm: bool) -> Document:
     """A row of the k-th flight."""
-    given = scenario(seed, k, calm)
+    given = scenario(k, calm)
     metrics = bf.fly(load_text(json.dumps(given)), log=False).metrics
     found, isolation, case = metrics["detection"], metrics["isolation"], given["faults"][0]["case"]
     lost = list(load("gtm").damage[case].takes)
@@ -93,9 +94,9 @@ def rows(of: list[Document]) -> Iterator[list[Any]]:
         ]  # fmt: skip
 
 
-def fly_all(flights: int, seed: int, calm: bool, out: Path) -> list[Document]:
+def fly_all(flights: int, calm: bool, out: Path) -> list[Document]:
     """The rows of so many flights."""
-    return list(rows_in(out, range(flights), lambda k: flown(seed, k, calm)).values())
+    return list(rows_in(out, range(flights), lambda k: flown(k, calm)).values())
 
 
 def rows_in(out: Path, wanted: Iterable[int], made: Callable[[int], Document]) -> dict[int, Document]:

@@ -29,7 +29,7 @@ from pathlib import Path
 from statistics import NormalDist
 
 import numpy as np
-from benchmarks.gtm_damage import M_S_PER_KT, Document, rows_in, scenario
+from benchmarks.gtm_damage import M_S_PER_KT, SEED, Document, rows_in, scenario
 from benchmarks.unknown_instant import WITHIN_S, Whitener, fitted, largest_ratios, unexplained
 from tools.gtm.flights import CASES, NAMES
 from tools.gtm.specification import Controls, Specification, folder
@@ -54,17 +54,11 @@ def recorded(given: Document) -> Recording:
     return record(load_text(json.dumps(given)))
 
 
-def healthy(seed: int, k: int) -> Document:
-    """The k-th flight's like without damage, of a seed of its own."""
-    given = scenario(seed + 1000, k)
-    return {key: of for key, of in given.items() if key != "faults"}
-
-
 @cache
-def noise(seed: int, band: int) -> Whitener:
+def noise(band: int) -> Whitener:
     """Of flights without damage between two speeds."""
     low, high = (knots * M_S_PER_KT for knots in BANDS_KT[band : band + 2])
-    flights = (healthy(seed, k) for k in range(100 * HEALTHY))
+    flights = (scenario(k, seed=SEED + 1000) | {"faults": []} for k in range(100 * HEALTHY))
     there = [one for one in flights if low <= one["initial"]["airspeed_mps"] < high][:HEALTHY]
     return fitted([unexplained(recorded(one)) for one in there])
 
@@ -125,35 +119,35 @@ def bounds_in(given: Document) -> np.ndarray:
     return np.minimum(there[:-1], there[1:])
 
 
-def beyond(seed: int, k: int, spec: Specification, case: int) -> float:
+def beyond(k: int, spec: Specification, case: int) -> float:
     """How far what the k-th flight's damage does beyond the bound stands out of the noise."""
-    given = shortened(seed, k)
+    given = shortened(k)
     does, bound = effect(spec, given, case), bounds_in(given)
     n = min(len(does), len(bound))
     left = np.sign(does[:n]) * np.maximum(np.abs(does[:n]) - bound[:n], 0.0)
     late_s = (np.arange(n) + 1) * DT_S - given["faults"][0]["at_s"]
-    return deflected(late_s, left, noise(seed, band_of(given)))
+    return deflected(late_s, left, noise(band_of(given)))
 
 
-def shortened(seed: int, k: int) -> Document:
+def shortened(k: int) -> Document:
     """The k-th flight, until the second after its damage is over."""
-    given = scenario(seed, k)
+    given = scenario(k)
     return given | {"duration_s": round(given["faults"][0]["at_s"] + WITHIN_S + 0.05, 2)}
 
 
-def seen(seed: int, k: int, spec: Specification, late: bool) -> Document:
+def seen(k: int, spec: Specification, late: bool) -> Document:
     """Of the k-th flight: the informed test's largest value before the damage, and within WITHIN_S of it; if
     ours was late, how far out of the noise what is beyond the bound stands."""
-    given = shortened(seed, k) | {"control": {"law": "nominal"}}
+    given = shortened(k) | {"control": {"law": "nominal"}}
     damage = given["faults"][0]
     case = CASES.index(damage["case"]) + 1
-    recording, white = recorded(given), noise(seed, band_of(given))
+    recording, white = recorded(given), noise(band_of(given))
     does = effect(spec, given, case)[: len(recording.seen) - 1]
     of_it = trace(recording, largest_ratios(recording, does, white)[1.0])
     return {
         "k": k, "before": of_it.before,
         "after": max((value for late, value in of_it.records if late <= WITHIN_S + 1e-9), default=0.0),
-        "beyond": beyond(seed, k, spec, case) if late else None,
+        "beyond": beyond(k, spec, case) if late else None,
     }  # fmt: skip
 
 
@@ -192,9 +186,9 @@ def _printed(case: str, row: np.ndarray) -> list[str]:
     return [case, *(str(int(n)) for n in row[:3]), f"{row[3]:.1f}"]
 
 
-def see_all(ours: dict[int, Document], seed: int, out: Path) -> dict[int, Document]:
+def see_all(ours: dict[int, Document], out: Path) -> dict[int, Document]:
     """What the informed test makes of our flights: the rows in the file, and the others, added to it."""
     where = folder()
     assert where is not None
     spec = Specification(where)
-    return rows_in(out, ours, lambda k: seen(seed, k, spec, is_late(ours[k])))
+    return rows_in(out, ours, lambda k: seen(k, spec, is_late(ours[k])))

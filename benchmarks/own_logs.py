@@ -1,6 +1,6 @@
 """Our own logs, diagnosed by two models: bounds, names and alarms where the truth is known.
 
-    python -m benchmarks.own_logs [--flights 1] [--seed 1] [--aircraft beaver] [--air none] [--by identified]
+    python -m benchmarks.own_logs [--seed 1] [--aircraft beaver] [--air none] [--by identified]
 
 Three laws, two airspeeds, references drawn by the seed (sines and doublets on three axes), admitted errors of
 inertia and air drawn as well, gyros ideal or with declared noise. Healthy flights, and losses of 0.3, 0.6 and
@@ -69,7 +69,6 @@ class Campaign(NamedTuple):
 
     aircraft: str = "beaver"
     air: str = "none"
-    count: int = 1
     seed: int = 1
 
 
@@ -79,14 +78,12 @@ def scenarios(of: Campaign) -> Iterator[Document]:
     for law in LAWS:
         for share in TESTED:
             airspeed_mps = plain.initial.airspeed_mps * share
-            for i in range(HEALTHY * of.count):
+            for i in range(HEALTHY):
                 yield _drawn(of, law, airspeed_mps, (of.seed, i), [])
             for place, surface in enumerate(plain.airframe.primary):
                 for size in SIZES:
                     loss = {"actuator": surface, "type": LOSS, "at_s": FAULT_S, "magnitude": size}
-                    for i in range(of.count):
-                        drawn_by = (of.seed, place, i, round(10 * size))
-                        yield _drawn(of, law, airspeed_mps, drawn_by, [loss])
+                    yield _drawn(of, law, airspeed_mps, (of.seed, place, 0, round(10 * size)), [loss])
 
 
 def training(of: Campaign) -> Iterator[Document]:
@@ -286,13 +283,12 @@ def _share(part: int, whole: int) -> str:
 def main() -> None:
     """Fly, write, read, diagnose, print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--flights", type=int, default=1, help="of each law, airspeed, surface and fault")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--aircraft", default="beaver")
     parser.add_argument("--air", choices=("none", "light", "moderate", "severe"), default="none")
     parser.add_argument("--by", choices=BY, nargs="*", default=BY)
     asked = parser.parse_args()
-    of = Campaign(asked.aircraft, asked.air, asked.flights, asked.seed)
+    of = Campaign(asked.aircraft, asked.air, asked.seed)
     print(markdown_table(HEAD, table(flown(of, asked.by))))
 
 

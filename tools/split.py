@@ -17,14 +17,13 @@ half-span, and E, a quarter.
 import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import acos, cos, pi, sin
 from pathlib import Path
 
 import yaml
 
-from beaver_ftc.aircraft import Aircraft, load
-from beaver_ftc.aircraft import Term as WholeTerm
+from beaver_ftc.aircraft import Aircraft, Term, load
 from beaver_ftc.plant.instrumented import actuator_system
 
 SPAN_M, CABIN_M, JOINT, HINGE = 14.63, 1.22, 0.55, 0.25
@@ -58,19 +57,6 @@ class Part:
 Parts = Mapping[str, Sequence[Part]]
 
 
-@dataclass(frozen=True)
-class Term:
-    """A term of a part: coefficient, name, value, powers of signals, where from, what it is."""
-
-    coefficient: str
-    name: str
-    value: float
-    of: tuple[tuple[str, int], ...]
-    surface: str
-    source: str
-    says: str
-
-
 HALVES = {
     "aileron": (Part("aileron_left", -0.5, -AILERON_M), Part("aileron_right", 0.5, AILERON_M)),
     "flap": (Part("flap_left", 0.5, -FLAP_M), Part("flap_right", 0.5, FLAP_M)),
@@ -89,28 +75,31 @@ def section_moment() -> float:
 
 def terms_of(whole: Aircraft, surface: str, part: Part) -> Iterator[Term]:
     """Its share of the terms, and what its side does besides."""
-    for term in (term for term in whole.terms.values() if term.surface == surface):
-        value, ending = part.share * term.value, term.name.removeprefix(term.coefficient)
-        found = [(term.name, value, f"{term.source}, shared", f"{term.description}: this part")]
-        if part.arm_m is not None:
-            found += [
-                (f"{c}{ending}", v, "strip theory", says) for c, v, says in of_a_side(term, value, part)
-            ]
-        for name, of_part, source, says in found:
-            yield Term(name[:2], f"{name}_{part.short}", of_part, term.of, part.name, source, says)
+    for term in whole.terms.values():
+        if term.surface == surface:
+            ending = f"{term.name.removeprefix(term.coefficient)}_{part.short}"
+            own = replace(
+                term, name=f"{term.coefficient}{ending}", value=part.share * term.value, surface=part.name,
+                source=f"{term.source}, shared", description=f"{term.description}: this part",
+            )  # fmt: skip
+            yield own
+            for coefficient, value, says in of_a_side(own, part.arm_m / SPAN_M) if part.arm_m else ():
+                yield replace(
+                    own, name=f"{coefficient}{ending}", coefficient=coefficient, value=value,
+                    source="strip theory", description=says,
+                )  # fmt: skip
 
 
-def of_a_side(whole: WholeTerm, value: float, part: Part) -> Iterator[tuple[str, float, str]]:
-    """What the other side takes back: coefficient, value, and what it is."""
-    arm = (part.arm_m or 0.0) / SPAN_M
-    if whole.coefficient == "Cl":  # an aileron: its lift follows from its roll
-        lift = -value / arm
+def of_a_side(own: Term, arm: float) -> Iterator[tuple[str, float, str]]:
+    """What the other side takes back: coefficient, value, and what it is; arm: of its lift, in spans."""
+    if own.coefficient == "Cl":  # an aileron: its lift follows from its roll
+        lift = -own.value / arm
         yield "CZ", -lift, "normal force of one side"
         yield "Cm", section_moment() * lift, "pitching moment of its section"
-    if whole.coefficient == "CZ":
-        yield "Cl", value * arm, "rolling moment of its normal force"
-    if whole.coefficient == "CX":
-        yield "Cn", -value * arm, "yawing moment of its longitudinal force"
+    if own.coefficient == "CZ":
+        yield "Cl", own.value * arm, "rolling moment of its normal force"
+    if own.coefficient == "CX":
+        yield "Cn", -own.value * arm, "yawing moment of its longitudinal force"
 
 
 def terms(whole: Aircraft, parts: Parts) -> list[Term]:
@@ -144,10 +133,10 @@ def model(whole: Aircraft, parts: Parts, name: str) -> str:
 
 
 def _product(term: Term) -> str:
-    signals = "".join(f" <property> {SIGNALS[s]} </property>" for s, power in term.of for _ in range(power))
+    signals = "".join(f" <property> {SIGNALS[signal]} </property>" for signal in term.factors[1:])
     return (
         f'        <product name="aero/coefficient/{term.name}">\n'
-        f"          <!-- {term.says} -->\n"
+        f"          <!-- {term.description} -->\n"
         f"          <value> {term.value:.10g} </value>"
         f" <property> fcs/{term.surface}-effective-rad </property>"
         f"{signals} <property> uncertainty/{term.name}-scale </property>\n"
@@ -187,7 +176,7 @@ _ENDS = {"command": "cmd-rad", "position": "pos-rad", "effective": "effective-ra
 def _filed(term: Term) -> dict:
     value = float(f"{term.value:.10g}")
     keys = {"name": term.name, "value": value, "of": dict(term.of), "surface": term.surface}
-    return keys | {"source": term.source, "description": term.says}
+    return keys | {"source": term.source, "description": term.description}
 
 
 def files(
@@ -199,10 +188,9 @@ def files(
 ) -> dict[str, str]:
     """The files of the folder, by their names."""
     filed = data(whole, parts, groups, name, says)
-    first = FIRST_LINES
     filed = json.loads(json.dumps(filed))  # what is there twice is written twice
     text = yaml.safe_dump(filed, sort_keys=False, default_flow_style=None, width=200)
-    made = {f"{name}.xml": model(whole, parts, name), "aircraft.yaml": first + text}
+    made = {f"{name}.xml": model(whole, parts, name), "aircraft.yaml": FIRST_LINES + text}
     for surface, of in filed["surfaces"].items():
         made[f"Systems/{surface}.xml"] = actuator_system(surface, *of["travel_rad"])
     return made

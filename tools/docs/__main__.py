@@ -50,7 +50,6 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--check", action="store_true", help="write nothing, print what differs")
     parser.add_argument("--dear", action="store_true", help="fly what takes long as well")
     parser.add_argument("--only", default="", metavar="TEXT", help="of what takes long, commands with this")
-    parser.add_argument("--jobs", type=int, help="processes side by side; as many as cores without it")
     parser.add_argument("--again", action="store_true", help="run also commands whose output is kept")
     parser.add_argument("--times", action="store_true", help="print which commands take longest")
     return parser.parse_args()
@@ -66,11 +65,11 @@ def _pages(options: argparse.Namespace) -> int:
     if options.check:
         with ThreadPoolExecutor(1) as beside:  # the last command leaves other cores idle
             words = beside.submit(lambda: names.check(pages, every=not options.pages) + prose.check(pages))
-            findings, printed = check(pages, options.jobs, options.again)
+            findings, printed = check(pages, options.again)
             findings += words.result()
     else:
         wanted = Wanted(dear=options.dear, only=options.only, again=options.again)
-        written, findings = write(pages, wanted, options.jobs)
+        written, findings = write(pages, wanted)
         print("".join(f"{name}: written\n" for name in written), end="")
     wrong = [finding for finding in findings if not finding.said]
     for finding in findings:

@@ -102,7 +102,6 @@ def _end(group: int) -> None:
 def outputs(
     cheap: Iterable[str],
     dear: Collection[str] = (),
-    jobs: int | None = None,
     needed: Collection[str] = (),
 ) -> dict[str, Output]:
     """{command: what it printed} of each command, once; only those that are dear may take their time.
@@ -111,7 +110,7 @@ def outputs(
     """
     lines = sorted(dict.fromkeys((*dear, *cheap)), key=_rank)
     limits = [None if line in dear else LONGEST_S for line in lines]
-    with tempfile.TemporaryDirectory() as shared, ThreadPoolExecutor(jobs or os.cpu_count()) as threads:
+    with tempfile.TemporaryDirectory() as shared, ThreadPoolExecutor(os.cpu_count()) as threads:
         checkout = Checkout(Path(shared), needed)
         served = _served(checkout, Path(shared) / BIN) if POSSIBLE and _use_package(lines) else None
         try:

@@ -61,14 +61,14 @@ def missing(origin: Origin) -> str:
     return origin.needs if origin.needs and not os.environ.get(origin.needs) else ""
 
 
-def outputs_of(pages: Sequence[Page], wanted: Wanted, jobs: int | None = None) -> dict[str, Output]:
+def outputs_of(pages: Sequence[Page], wanted: Wanted) -> dict[str, Output]:
     """{command: what it printed} of what the pages' marks want; cheap ones run if nothing of them is kept."""
     origins = [origin for page in pages for origin in page.origins]
     cheap, dear = wanted.commands(origins)
     needed = {origin.needs for origin in origins}
     kept = Kept(needed)
     known = {} if wanted.again else {line: found for line in set(cheap) if (found := kept.get(line))}
-    printed = outputs([line for line in cheap if line not in known], set(dear), jobs, needed)
+    printed = outputs([line for line in cheap if line not in known], set(dear), needed)
     for line in set(cheap) & printed.keys():
         kept.put(line, printed[line])
     return known | printed
@@ -255,9 +255,9 @@ def changed_since(name: str) -> bool:
     return _git("diff", "--quiet", name.rstrip("+"), "--", *DECIDES).returncode != 0
 
 
-def write(pages: Sequence[Page], wanted: Wanted, jobs: int | None = None) -> tuple[list[str], list[Finding]]:
+def write(pages: Sequence[Page], wanted: Wanted) -> tuple[list[str], list[Finding]]:
     """Write pages and pictures again: (files that were written, what could not be)."""
-    printed = outputs_of(pages, wanted, jobs)
+    printed = outputs_of(pages, wanted)
     written: list[str] = []
     findings: list[Finding] = []
     for page in pages:
@@ -272,12 +272,10 @@ def write(pages: Sequence[Page], wanted: Wanted, jobs: int | None = None) -> tup
     return written, findings
 
 
-def check(
-    pages: Sequence[Page], jobs: int | None = None, again: bool = False
-) -> tuple[list[Finding], dict[str, Output]]:
+def check(pages: Sequence[Page], again: bool = False) -> tuple[list[Finding], dict[str, Output]]:
     """What is wrong on the pages, and what is only said; and what every command printed."""
     wanted = Wanted(probes=True, again=again)
-    printed = outputs_of(pages, wanted, jobs)
+    printed = outputs_of(pages, wanted)
     made = [Refreshed(page, printed, wanted) for page in pages]
     return [finding for page in made for finding in (*page.findings, *page.changes)], printed
 

@@ -94,7 +94,7 @@ def chosen_ratio_probe() -> str:
 
 
 def _of_ratios(most: int | None) -> str:
-    costs = {grade: _costs(grade, most, RATIO_DRAWS) for grade in FLIGHT_GRADES}
+    costs = {grade: [LawCost(LAW, grade, most, draw) for draw in RATIO_DRAWS] for grade in FLIGHT_GRADES}
     rows = [
         (f"{ratio:g}", *(f"{exp(fmean(_parts(of, ratio))):.2f}" for of in costs.values())) for ratio in RATIOS
     ]
@@ -119,7 +119,8 @@ def chosen_ratio_gain_probe() -> str:
 
 
 def _of_better(grade: str, most: int | None) -> tuple[str, ...]:
-    costs, ratios = _costs(grade, most, BETTER_DRAWS), (rejecting.RATIO, BETTER_RATIO)
+    ratios = rejecting.RATIO, BETTER_RATIO
+    costs = [LawCost(LAW, grade, most, draw) for draw in BETTER_DRAWS]
     built_in, better = (np.array(_parts(costs, ratio)) for ratio in ratios)
     gain = relative_gain(built_in, better, geometric_mean)
     shares = (f"{100.0 * share:.1f}" for share in (gain.value, gain.low, gain.high))
@@ -128,10 +129,6 @@ def _of_better(grade: str, most: int | None) -> tuple[str, ...]:
         gain_db, phase_deg = least_margins(costs[0].margins({}))
     kept = f"{after / before:.2f}", f"{gain_db:.1f}", f"{phase_deg:.0f}"
     return f"`{grade}`", *shares, str(len(better)), *kept
-
-
-def _costs(grade: str, most: int | None, draws: Sequence[int]) -> list[LawCost]:
-    return [LawCost(LAW, grade, most, draw) for draw in draws]
 
 
 def _parts(costs: list[LawCost], ratio: float) -> list[float]:

@@ -118,9 +118,9 @@ def gtm_damage() -> str:
 
 def gtm_damage_informed() -> str:
     """The same flights by the informed test; and in calm air with exact sensors."""
-    *_, calm = campaign.rows(campaign.fly_all(CALM, 1, True, _kept() / "calm.jsonl"))
+    *_, calm = campaign.rows(campaign.fly_all(CALM, True, _kept() / "calm.jsonl"))
     ours = {one["k"]: one for one in _flights()}
-    rows = list(informed.rows(ours, informed.see_all(ours, 1, _kept() / "informed.jsonl")))
+    rows = list(informed.rows(ours, informed.see_all(ours, _kept() / "informed.jsonl")))
     head = ("case", "flights", "ours", "Page", "avoidable misses")
     return (
         f"*Table 7. {OURS_AND_PAGE}*\n\n{markdown_table(head, rows)}\n\n"
@@ -134,7 +134,7 @@ def _flights() -> list[campaign.Document]:
 
     `BEAVER_FTC_GTM_ROWS`: a folder with rows flown before by that benchmark, which are not flown again.
     """
-    return campaign.fly_all(FLIGHTS, 1, False, _kept() / "full.jsonl")
+    return campaign.fly_all(FLIGHTS, False, _kept() / "full.jsonl")
 
 
 @cache

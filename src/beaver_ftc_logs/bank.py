@@ -168,7 +168,8 @@ def build_states(model: Model, noise: NoiseModel) -> StateModel:
     P = np.zeros((4 + n, 4 + n))
     P[:3, :3] = np.diag(r * settings.trim_sd**2) + shift.T @ shift
     P[3, 3] = settings.gain_sd**2
-    drift = settings.own_gain_sd**2 + _extra_variance(model)
+    known_sd = np.array(model.fitted.gain_sd or [0.0] * n)
+    drift = settings.own_gain_sd**2 + np.maximum(known_sd**2 - settings.level_step**2, 0.0)
     hidden = np.array(noise.misreads or [0.0] * n) ** 2
     P[range(4, 4 + n), range(4, 4 + n)] = drift + hidden
     # What the fit misreads stays the same in a flight: the larger spread adds nothing to the drift.
@@ -180,12 +181,6 @@ def build_states(model: Model, noise: NoiseModel) -> StateModel:
     bound = np.array([settings.trim_bound] * 3 + [settings.gain_bound] * (1 + n))
     x = np.array([0.0, 0.0, 0.0, 1.0] + [0.0] * n)
     return StateModel(x, P, np.sqrt(np.diag(P)) * bound, a, walk)
-
-
-def _extra_variance(model: Model) -> Floats:
-    """Variance of each group's gain by which it is known worse than to a step between levels, (G,)."""
-    sd = np.array(model.fitted.gain_sd or [0.0] * len(model.groups))
-    return np.maximum(sd**2 - model.settings.level_step**2, 0.0)
 
 
 class ResidualNoise(NamedTuple):

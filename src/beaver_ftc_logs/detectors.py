@@ -242,11 +242,8 @@ def check_detector_name(name: str) -> None:
 def diagnose_with_detector(name: str, samples: Samples, model: Model) -> LogRows:
     """The rows of one detector. Raises BadInput for an unknown name, or a log at another rate."""
     check_detector_name(name)
-    check_log_fits_model(samples, model)
     if name == OUR_DETECTOR:
         return diagnose(samples, model)
-    known = without_dead_rows(samples, model)
-    if name in _FLIGHT_DETECTORS:
-        return finish_rows(samples, model, _FLIGHT_DETECTORS[name](known, model))
-    detector: Detector = made(DETECTORS, name)
-    return finish_rows(samples, model, run_loop_detector(detector, known, model))
+    check_log_fits_model(samples, model)
+    rows_by = _FLIGHT_DETECTORS.get(name) or partial(run_loop_detector, made(DETECTORS, name))
+    return finish_rows(samples, model, rows_by(without_dead_rows(samples, model), model))

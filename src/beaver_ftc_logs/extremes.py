@@ -19,7 +19,6 @@ than chance, they count for fewer.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from pydantic import Field
@@ -55,15 +54,6 @@ class PeakTail(Section):
     dispersion: Number = Field(1.0, ge=1, description="how much more the flights differ than by chance")
 
 
-@dataclass(frozen=True)
-class FalseAlarmRate:
-    """False alarms an hour: posterior mean (value), and bounds of the central 90 % of the posterior."""
-
-    value: float
-    low: float
-    high: float
-
-
 def peaks_between_zeros(s: Floats) -> Floats:
     """The highest value of each stretch of a statistic s (n,) above zero, (k,)."""
     return np.array([s[begin:end].max() for begin, end in true_runs(s > 0.0)])
@@ -97,15 +87,16 @@ def _overdispersion(flights: Sequence[PeaksAndHours]) -> float:
     return max(float(squares.sum()) / (len(flights) - 1), 1.0)
 
 
-def false_alarm_rate(tail: PeakTail, threshold: float) -> FalseAlarmRate:
-    """False alarms an hour at a threshold not below the tail's level."""
+def false_alarm_rate(tail: PeakTail, threshold: float) -> dict[str, float]:
+    """False alarms an hour at a threshold not below the tail's level: posterior mean (value), and bounds low
+    and high of the central 90 % of the posterior."""
     xi, sigma, p = _pareto_posterior(tail)
     rates = np.outer(_exceedance(threshold - tail.level, xi, sigma), _rate_quantiles(tail)).ravel()
     order = np.argsort(rates)
     weights = np.repeat(p, len(_RATE_QUANTILES)) / len(_RATE_QUANTILES)
     index = np.searchsorted(np.cumsum(weights[order]), np.array(_INTERVAL) - _PROBABILITY_ROUNDING)
     low, high = rates[order][np.minimum(index, len(rates) - 1)]
-    return FalseAlarmRate(float(rates @ weights), float(low), float(high))
+    return {"value": float(rates @ weights), "low": float(low), "high": float(high)}
 
 
 def threshold_for_rate(tail: PeakTail, rate: float) -> float:
@@ -148,11 +139,6 @@ def lorden_threshold(rate_hz: float, rate: float) -> float:
     tail: Page's sum of a log likelihood ratio passes h on average at most once in exp(h) samples
     [Lorden1971]. rate_hz: samples a second."""
     return float(np.log(max(3600.0 * rate_hz / rate, 1.0)))
-
-
-def missing_healthy_minutes(tail: PeakTail, rate: float) -> float:
-    """Minutes of healthy flight that are missing to show the requested rate without a fitted tail."""
-    return max(60.0 * RULED_OUT_COUNT / rate - tail.minutes, 0.0)
 
 
 def _rate_quantiles(tail: PeakTail) -> Floats:

@@ -173,7 +173,8 @@ def _event_text(event: Document) -> str:
 def isolability_document(samples: Samples, model: Model) -> Document:
     """Which faults this flight can separate and which not, and the smallest loss that would show by when."""
     bank = build_bank(model)
-    F = _white_responses(samples, model)
+    flight = innovations(samples, model)
+    F = flight.F[flight.is_known] @ flight.W * np.sqrt(model.settings.power)
     return {
         "together": [
             {"surfaces": group, "says": _ONE_GROUP_NOTE.format(", ".join(group))}
@@ -187,13 +188,6 @@ def isolability_document(samples: Samples, model: Model) -> Document:
         "alike": _alike_pairs(F, model),
         "columns_held_s": {name: round(age_s, 4) for name, age_s in samples.held_age_s.items()},
     }
-
-
-def _white_responses(samples: Samples, model: Model) -> Floats:
-    """Each group's share of the rates in standard deviations of the noise, (n, G, 3)."""
-    flight = innovations(samples, model)
-    share = model.settings.power
-    return flight.F[flight.is_known] @ flight.W * np.sqrt(share)
 
 
 def _group_entry(F: Floats, g: int, model: Model, bank: HypothesisBank, dt_s: float) -> Document:

@@ -5,7 +5,6 @@ covariance, ma and ar the colour of the noise. V0 is the airspeed at which the c
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict
 from itertools import product
 from math import isfinite
 
@@ -186,9 +185,9 @@ def expect_another_day(folds: list[Document], model: Model) -> Document:
         return expected
     target = model.settings.false_alarms_per_hour or 0.0
     return expected | {
-        "false_alarms_per_hour": {"asked": target, **asdict(extremes.false_alarm_rate(tail, threshold))},
+        "false_alarms_per_hour": {"asked": target, **extremes.false_alarm_rate(tail, threshold)},
         "minutes_left_out": tail.minutes,
-        "minutes_missing": extremes.missing_healthy_minutes(tail, target),
+        "minutes_missing": max(60.0 * extremes.RULED_OUT_COUNT / target - tail.minutes, 0.0),
         **model.identified,
     }
 
@@ -297,15 +296,14 @@ def regressor_names(model: Model) -> list[str]:
 
 def median_inflation(parts: Parts, model: Model) -> dict[str, float]:
     """By how much the residual's colour widens the standard errors of the responses: the median, an axis."""
-    n = len(model.groups) * model.lags
-    inflation = fitting.fit_of(parts, model).standard_error_inflation[-n:]
+    inflation = fitting.fit_of(parts, model).standard_error_inflation[-len(model.groups) * model.lags :]
     return regression.by_axis(np.median(inflation, axis=0))
 
 
 def density_ratios(parts: Parts, model: Model) -> list[Document]:
     """Mean density of the residual by band, over that of white noise of the same variance, an axis."""
     e = fitting.one_step_residuals(parts, model)
-    f, density = spectral_density(e, 1.0 / model.rate_hz)
+    f, density = spectral_density(e, model.rate_hz)
     white = e.var(axis=0) / (0.5 * model.rate_hz)
     bands = []
     for lo, hi in _SPECTRUM_BANDS_HZ:
@@ -338,7 +336,9 @@ def identification_text(model: Model) -> str:
     if "delay_s" in output:
         delay = f"delay {output['delay_s']:.3f} s (sd {output['delay_sd_s']:.3f})"
         explained = _axis_text(output["explained_of_windows_not_fitted"])
-        lag = f"servo lag {_servo_text(output)}"
+        lag = f"servo lag {output['servo_lag_s']:.3f} s (sd {output['servo_lag_sd_s']:.3f})"
+        if output["shorter_than_can_be_told"]:
+            lag = "servo lag shorter than this rate can tell"
         lines.append(f"  output error: {lag}, {delay}, explains of 2 s free runs not fitted {explained}")
     if results["collinear"]:
         most, n = results["collinear"][0], len(results["collinear"])
@@ -408,12 +408,6 @@ def _fold_text(fold: Document) -> str:
         f"{line}; {len(scores['settings'])} classes {scores['classes']:.3f}, healthy or faulty "
         f"{scores['healthy_or_faulty']:.3f}, side {scores['side']:.3f}, mean error {scores['mean_error']:.3f}"
     )
-
-
-def _servo_text(fit: Document) -> str:
-    if fit["shorter_than_can_be_told"]:
-        return "shorter than this rate can tell"
-    return f"{fit['servo_lag_s']:.3f} s (sd {fit['servo_lag_sd_s']:.3f})"
 
 
 def _axis_text(values: dict[str, float]) -> str:

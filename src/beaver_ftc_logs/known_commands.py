@@ -6,21 +6,8 @@ such names too. What is not in these tables is no command until a vehicle file n
 
 import re
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
 
 from beaver_ftc_logs.recording import Columns, Parameters, last_value
-
-
-@dataclass(frozen=True)
-class KnownCommands:
-    """A message or family of columns that carries commands of surfaces. name_pattern: of a whole name in
-    lower case; source: where the meaning of the columns is stated."""
-
-    ecosystem: str
-    name_pattern: str
-    example: str
-    source: str
-
 
 _SURFACE_WORD = (
     r"ailerons?|ail|ailrn|elevators?|elev|elv|rudders?|rud|rudd|elevons?|flaperons?|ruddervators?|v_?tail"
@@ -30,38 +17,24 @@ _PLAIN_WORD = r"cmd|cmds|command|commands|commanded"
 _COMMAND_WORD = rf"{_PLAIN_WORD}|setpoint|sp|demand|servo|pwm"
 _UNIT_WORD = r"norm|rad|deg|pct|percent|us|%|1"
 
-KNOWN_COMMANDS = (
-    KnownCommands(
-        "PX4", r"actuator_controls_[01]\.control\[[0-2]\]", "actuator_controls_0.control[0]",
-        "PX4 message actuator_controls: control 0 to 2 of groups 0 and 1 are roll, pitch, yaw",
-    ),
-    KnownCommands(
-        "PX4", r"vehicle_torque_setpoint(_\d)?\.xyz\[[0-2]\]", "vehicle_torque_setpoint.xyz[0]",
-        "PX4 message vehicle_torque_setpoint: torque about the body axes",
-    ),
-    KnownCommands(
-        "PX4", r"actuator_servos\.control\[[0-7]\]", "actuator_servos.control[0]",
-        "PX4 message actuator_servos: output of the control allocation to each servo",
-    ),
-    KnownCommands(
-        "ArduPilot", r"aetr\.(ail|elev|rudd)", "AETR.Ail",
-        "ArduPilot log message AETR: normalised control outputs before the mixers",
-    ),
-    KnownCommands(
-        "JSBSim", rf"(.*/)?fcs/((left|right)-)?({_SURFACE_WORD})-cmd(-norm|-rad|-deg)?",
-        "fcs/elevator-cmd-norm",
-        "JSBSim reference manual: properties of the flight control system",
-    ),
-    KnownCommands(
-        "X-Plane", r"_*(elev|ailrn|ruddr),_*yoke1?", "elev,yoke1",
-        "X-Plane manual, data set 8: joystick aileron, elevator, rudder",
-    ),
-    KnownCommands(
-        "blackbox", r"servo\[\d\](_us)?", "servo[0]",
-        "Betaflight and INAV blackbox fields: output to each servo",
-    ),
-)  # fmt: skip
-"""Messages of others. Columns of plain tables are judged by their words (`_is_plain_command_name`)."""
+KNOWN_COMMANDS = {
+    # PX4 message actuator_controls: control 0 to 2 of groups 0 and 1 are roll, pitch, yaw
+    r"actuator_controls_[01]\.control\[[0-2]\]": "actuator_controls_0.control[0] (PX4)",
+    # PX4 message vehicle_torque_setpoint: torque about the body axes
+    r"vehicle_torque_setpoint(_\d)?\.xyz\[[0-2]\]": "vehicle_torque_setpoint.xyz[0] (PX4)",
+    # PX4 message actuator_servos: output of the control allocation to each servo
+    r"actuator_servos\.control\[[0-7]\]": "actuator_servos.control[0] (PX4)",
+    # ArduPilot log message AETR: normalised control outputs before the mixers
+    r"aetr\.(ail|elev|rudd)": "AETR.Ail (ArduPilot)",
+    # JSBSim reference manual: properties of the flight control system
+    rf"(.*/)?fcs/((left|right)-)?({_SURFACE_WORD})-cmd(-norm|-rad|-deg)?": "fcs/elevator-cmd-norm (JSBSim)",
+    # X-Plane manual, data set 8: joystick aileron, elevator, rudder
+    r"_*(elev|ailrn|ruddr),_*yoke1?": "elev,yoke1 (X-Plane)",
+    # Betaflight and INAV blackbox fields: output to each servo
+    r"servo\[\d\](_us)?": "servo[0] (blackbox)",
+}
+"""Patterns of whole names, in lower case, of columns that carry commands of surfaces, each with an example.
+Columns of plain tables are judged by their words (`_is_plain_command_name`)."""
 
 _NOT_PLAIN_WORDS = r"[^a-z0-9%]+"
 
@@ -69,9 +42,7 @@ _NOT_PLAIN_WORDS = r"[^a-z0-9%]+"
 def is_command_name(column_name: str) -> bool:
     """Whether a column is known to carry the command of a surface."""
     name = re.sub(r"\s*[(]\s*us\s*[)]\s*$", "_us", column_name.strip().lower())
-    if any(re.fullmatch(known.name_pattern, name) for known in KNOWN_COMMANDS):
-        return True
-    return _is_plain_command_name(name)
+    return any(re.fullmatch(pattern, name) for pattern in KNOWN_COMMANDS) or _is_plain_command_name(name)
 
 
 def _is_plain_command_name(name: str) -> bool:
@@ -96,7 +67,7 @@ _PX4_ROTARY_WINGS = {2: "quadrotor", 3: "coaxial helicopter", 4: "helicopter", 1
                           14: "octorotor", 15: "tricopter", 29: "dodecarotor"}  # fmt: skip
 """MAV_TYPE of vehicles that rotors alone move [MAVLink, common.xml: MAV_TYPE]."""
 _PX4_VTOL_TYPES = range(19, 26)
-_PX4_COPTERS = ((4000, 10999, "multicopter"), (11000, 12999, "multicopter"))
+_PX4_COPTERS = range(4000, 13000)
 _COPTER_PARAMETERS = ("MOT_SPIN_ARM", "MOT_SPIN_ARMED", "MOT_SPIN_MIN", "MOT_THST_EXPO")
 _PLANE_PARAMETER = "Q_ENABLE"
 _MIN_ROTORS = 3
@@ -104,16 +75,14 @@ _MIN_ROTORS = 3
 
 def multicopter_reason(params: Parameters, names: Collection[str]) -> str | None:
     """What in a log says that rotors alone move the vehicle; None where nothing does."""
-
     mav_type = last_value(params, "MAV_TYPE")
     if mav_type in _PX4_ROTARY_WINGS:
         return f"MAV_TYPE {mav_type:g}, {_PX4_ROTARY_WINGS[int(mav_type)]}"
     if last_value(params, "CA_AIRFRAME") == 0:
         return "CA_AIRFRAME 0, multirotor"
     start = last_value(params, "SYS_AUTOSTART")
-    for low, high, title in _PX4_COPTERS:
-        if mav_type is None and start is not None and low <= start <= high:
-            return f"SYS_AUTOSTART {start:g}, {title}"
+    if mav_type is None and start in _PX4_COPTERS:
+        return f"SYS_AUTOSTART {start:g}, multicopter"
     copter = next((name for name in _COPTER_PARAMETERS if name in params), None)
     if copter is not None and _PLANE_PARAMETER not in params:
         return f"the parameter {copter} of ArduCopter"
@@ -152,7 +121,7 @@ _OUTPUT_PATTERN = r"RCO[2-4U]\.C|actuator_outputs(_\d)?\.output\[|SERVO_OUTPUT_R
 
 def missing_commands_text(names: Collection[str]) -> str:
     """Which known command messages are missing, and how a vehicle file names others."""
-    examples = ", ".join(dict.fromkeys(f"{known.example} ({known.ecosystem})" for known in KNOWN_COMMANDS))
+    examples = ", ".join(KNOWN_COMMANDS.values())
     outputs = [name for name in names if re.match(_OUTPUT_PATTERN, name)]
     found = ""
     if outputs:

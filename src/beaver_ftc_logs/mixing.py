@@ -236,13 +236,11 @@ def _ardupilot_mixing(params: _Parameters) -> _Found:
         full, reason = _full_name(name, channel, kinds), f"SERVO{channel}_FUNCTION {kind}"
         mixer = mixer_reason if is_mixed else ""
         surfaces.append(_Surface(full, f"channel {channel}", kind, axis_shares, reason, mixer))
-    outputs = [
-        (
-            f"{next((text for last, text in _ARDUPILOT_MESSAGES.items() if n <= last), 'RCO?')}.C{n}",
-            _ardupilot_channel_reading(params, f"SERVO{n}"),
-        )
-        for n in kinds
-    ]
+    outputs = []
+    for n in kinds:
+        message = next((text for last, text in _ARDUPILOT_MESSAGES.items() if n <= last), "RCO?")
+        names, place = {part: f"SERVO{n}_{part}" for part in _PULSE_RANGE_US}, f"SERVO{n}_MIN, _TRIM, _MAX"
+        outputs.append((f"{message}.C{n}", _pulse_reading(params, place, names, f"SERVO{n}_REVERSED")))
     return surfaces, [outputs], _Axes(_ARDUPILOT_AXIS_COLUMNS, 1.0 / _ARDUPILOT_FULL_COMMAND)
 
 
@@ -262,31 +260,31 @@ def _ardupilot_mixers(params: _Parameters, kinds: Collection[int]) -> tuple[Floa
     return factors, f", MIXING_GAIN {gain:g}, MIXING_OFFSET {offset:g}"
 
 
-def _ardupilot_channel_reading(params: _Parameters, prefix: str) -> Reading:
-    """Scale and offset from a pulse, us, to the command, and a text: full travel is half of the range."""
+def _pulse_reading(
+    params: _Parameters, place: str, names: Mapping[str, str], reverse: str, bit: int | None = None
+) -> Reading:
+    """Scale and offset from a pulse, us, to the command, and a text: full travel is half of the range.
+
+    names: of the parameters MIN, MAX and, where there is one, TRIM, else the middle is neutral; place: of
+    them in a text. reverse: parameter of the direction, of several outputs if it has a bit of each [PX4,
+    mixer_module.cpp].
+    """
     try:
-        low, high, trim = (
-            params.number(f"{prefix}_{part}", *limits, " us") for part, limits in _PULSE_RANGE_US.items()
-        )
+        us = {part: params.number(name, *_PULSE_RANGE_US[part], " us") for part, name in names.items()}
+        low, high = us["MIN"], us["MAX"]
+        trim = us.get("TRIM", 0.5 * (low + high))
         if not low < high or not low <= trim <= high:
-            given = f"{low:g}, {trim:g}, {high:g} us"
-            raise _BadParameter(f"{prefix}_MIN, _TRIM, _MAX are {given}, allowed: ascending")
-        reverse = params.whole_number(f"{prefix}_REVERSED", 0, 1) == 1
+            raise _BadParameter(f"{place} are {low:g}, {trim:g}, {high:g} us, allowed: ascending")
+        mask = params.whole_number(reverse, 0, 1 if bit is None else 2**16 - 1)
     except _BadParameter as problem:
-        return _assumed_reading(problem)
-    return _reading(low, high, trim, reverse)
-
-
-def _reading(low: float, high: float, trim: float, reverse: bool) -> Reading:
-    scale = (-2.0 if reverse else 2.0) / (high - low)
-    reversed_text = ", reversed" if reverse else ""
-    return scale, -trim * scale, f", {low:g} to {high:g} us, neutral at {trim:g} us{reversed_text}"
-
-
-def _assumed_reading(problem: _BadParameter) -> Reading:
-    low, high = _ASSUMED_MIN_US, _ASSUMED_MAX_US
-    scale, offset, _ = _reading(low, high, 0.5 * (low + high), False)
-    return scale, offset, f"; range and sign stay out ({problem}), assumed: {low:g} to {high:g} us"
+        low, high = _ASSUMED_MIN_US, _ASSUMED_MAX_US
+        scale = 2.0 / (high - low)
+        text = f"; range and sign stay out ({problem}), assumed: {low:g} to {high:g} us"
+        return scale, -0.5 * (low + high) * scale, text
+    is_reversed = mask >> (bit or 0) & 1
+    scale = (-2.0 if is_reversed else 2.0) / (high - low)
+    text = f", {low:g} to {high:g} us, neutral at {trim:g} us{', reversed' if is_reversed else ''}"
+    return scale, -trim * scale, text
 
 
 def _px4_mixing(params: _Parameters, column_names: set[str]) -> _Found:
@@ -344,27 +342,15 @@ def _px4_pulses(params: _Parameters, drivers: Sequence[list[str]]) -> list[_Outp
     outputs = [(match[1], int(match[2])) for match in matches if match]
     if len(outputs) < len(drivers) or len({driver for driver, _ in outputs}) != 1:
         return []
-    return [
-        [
-            (f"actuator_outputs.output[{n - 1}]", _px4_output_reading(params, driver, n))
-            for driver, n in outputs
-        ]
-    ]
-
-
-def _px4_output_reading(params: _Parameters, driver: str, number: int) -> Reading:
-    """Scale and offset from a pulse, us, to the command, and a text [PX4, mixer_module.cpp]."""
-    try:
-        low, high = (
-            params.number(f"{driver}_{part}{number}", *_PULSE_RANGE_US[part], " us")
-            for part in ("MIN", "MAX")
+    readings = []
+    for driver, n in outputs:
+        names, place = (
+            {part: f"{driver}_{part}{n}" for part in ("MIN", "MAX")},
+            f"{driver}_MIN{n}, middle, _MAX",
         )
-        if not low < high:
-            raise _BadParameter(f"{driver}_MIN{number} is {low:g} us, allowed: less than {high:g} us")
-        mask = params.whole_number(f"{driver}_REV", 0, 2**16 - 1)
-    except _BadParameter as problem:
-        return _assumed_reading(problem)
-    return _reading(low, high, 0.5 * (low + high), bool(mask >> (number - 1) & 1))
+        reading = _pulse_reading(params, place, names, f"{driver}_REV", n - 1)
+        readings.append((f"actuator_outputs.output[{n - 1}]", reading))
+    return [readings]
 
 
 def _add_surfaces_by_output(

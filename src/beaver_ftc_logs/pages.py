@@ -251,7 +251,7 @@ def _liveliest_window(fold: fitting.Fold, n: int) -> tuple[Floats, Floats, Float
 def _spectrum_figure(usable: Parts, model: Model) -> Any:
     """Density of the residual, and what white noise of the same variance would have."""
     residual = fitting.one_step_residuals(usable, model)
-    f_hz, power = spectral_density(residual, 1.0 / model.rate_hz)
+    f_hz, power = spectral_density(residual, model.rate_hz)
     figure = _new_figure(7.5, 3.2)
     axis = figure.subplots()
     for i, name in enumerate("pqr"):

@@ -375,10 +375,10 @@ def variance_inflation(Z: Floats) -> Floats:
     return np.where(factors < 1.0 / _RANK_TOLERANCE, factors, np.inf)
 
 
-def spectral_density(e: Floats, dt_s: float, longest: int = 256) -> tuple[Floats, Floats]:
+def spectral_density(e: Floats, rate_hz: float) -> tuple[Floats, Floats]:
     """Frequencies, Hz, and one-sided spectral density of a residual e (n, 3) at each, by averaged
-    periodograms of at most `longest` samples."""
+    periodograms of at most 256 samples."""
     from scipy import signal
 
-    f, density = signal.welch(e, fs=1.0 / dt_s, nperseg=min(longest, len(e)), axis=0, detrend="constant")
+    f, density = signal.welch(e, fs=rate_hz, nperseg=min(256, len(e)), axis=0)
     return f, density

@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from beaver_ftc_logs.recording import Floats
 from beaver_ftc_logs.vehicle import unused_keys_as_comments
 
 EffectivenessAtTime = Callable[[float], float]
@@ -66,46 +65,21 @@ def _simulate_rows(
     dt_s = 1.0 / SAMPLE_RATE_HZ
     rates = np.zeros(3)
     turbulence_rad_s2 = np.zeros(3)
-    roll_and_pitch_rad = np.zeros(2)
-    demanded_roll_and_pitch_rad = np.zeros(2)
+    attitude_rad = np.zeros(2)  # roll and pitch
     for k in range(round(duration_s * SAMPLE_RATE_HZ)):
         t_s = k * dt_s
         if k % round(_DEMANDED_ATTITUDE_HOLD_S * SAMPLE_RATE_HZ) == 0:
-            demanded_roll_and_pitch_rad = rng.uniform(-1.0, 1.0, 2) * [
-                _ROLL_AMPLITUDE_RAD,
-                _PITCH_AMPLITUDE_RAD,
-            ]
-        roll_and_pitch_command = _control_law(roll_and_pitch_rad, rates, demanded_roll_and_pitch_rad)
+            demanded_rad = rng.uniform(-1.0, 1.0, 2) * [_ROLL_AMPLITUDE_RAD, _PITCH_AMPLITUDE_RAD]
+        commands = np.clip(1.2 * (demanded_rad - attitude_rad) - 0.15 * rates[:2], -1.0, 1.0)
         measured_rates_deg_s = np.rad2deg(rates + _GYRO_NOISE_RAD_S * rng.standard_normal(3))
-        yield [1000.0 * t_s, *measured_rates_deg_s, *roll_and_pitch_command, *roll_and_pitch_rad]
-        effective_right_and_left_positions = (
-            np.array([roll_and_pitch_command.sum(), roll_and_pitch_command[0] - roll_and_pitch_command[1]])
-            / 2.0
-            * [1.0, left_effectiveness(t_s)]
-        )
-        turbulence_rad_s2 += dt_s * (-2.0 * turbulence_rad_s2) + np.sqrt(
-            dt_s
-        ) * _TURBULENCE_DRIVING_NOISE * rng.standard_normal(3)
-        rates = rates + dt_s * (
-            _RATE_STATE_MATRIX_PER_S @ rates
-            + effective_right_and_left_positions @ _ACCELERATION_BY_FULL_ELEVON_RAD_S2
-            + turbulence_rad_s2
-        )
-        roll_and_pitch_rad = roll_and_pitch_rad + dt_s * _roll_and_pitch_angle_rates(
-            rates, roll_and_pitch_rad
-        )
-
-
-def _control_law(roll_and_pitch_rad: Floats, rates: Floats, demanded_roll_and_pitch_rad: Floats) -> Floats:
-    """Roll and pitch command."""
-    return np.clip(1.2 * (demanded_roll_and_pitch_rad - roll_and_pitch_rad) - 0.15 * rates[:2], -1.0, 1.0)
-
-
-def _roll_and_pitch_angle_rates(rates: Floats, roll_and_pitch_rad: Floats) -> Floats:
-    """Rates of the roll and the pitch angle."""
-    p, q, r = rates
-    phi, theta = roll_and_pitch_rad
-    return np.array([
-        p + np.tan(theta) * (q * np.sin(phi) + r * np.cos(phi)),
-        q * np.cos(phi) - r * np.sin(phi),
-    ])  # fmt: skip
+        yield [1000.0 * t_s, *measured_rates_deg_s, *commands, *attitude_rad]
+        right_and_left = np.array([commands.sum(), commands[0] - commands[1]]) / 2.0
+        effective = right_and_left * [1.0, left_effectiveness(t_s)]
+        gust_rad_s2 = np.sqrt(dt_s) * _TURBULENCE_DRIVING_NOISE * rng.standard_normal(3)
+        turbulence_rad_s2 += dt_s * (-2.0 * turbulence_rad_s2) + gust_rad_s2
+        by_elevons_rad_s2 = effective @ _ACCELERATION_BY_FULL_ELEVON_RAD_S2
+        rates = rates + dt_s * (_RATE_STATE_MATRIX_PER_S @ rates + by_elevons_rad_s2 + turbulence_rad_s2)
+        p, q, r = rates
+        phi, theta = attitude_rad
+        roll_rate = p + np.tan(theta) * (q * np.sin(phi) + r * np.cos(phi))
+        attitude_rad = attitude_rad + dt_s * np.array([roll_rate, q * np.cos(phi) - r * np.sin(phi)])

@@ -287,7 +287,9 @@ def _time_base(flight: str, stamps: Floats, max_hz: float) -> tuple[Floats, Ints
     rate_hz = 1.0 / step_s
     logged = f"{flight}: rates are logged at {rate_hz:.2g} Hz"
     if rate_hz < MIN_HZ:
-        reason = f"to tell a surface's effect from the vehicle's own motion{_other_time_unit_hint(rate_hz)}"
+        units = {unit: rate_hz / seconds for unit, seconds in TIME_UNITS.items() if unit != "s"}
+        hints = [f" (time in {unit} would be {hz:.3g} Hz)" for unit, hz in units.items() if 10 <= hz <= 1000]
+        reason = f"to tell a surface's effect from the vehicle's own motion{''.join(hints[:1])}"
         raise BadInput(f"{logged}, allowed: at least {MIN_HZ:g} Hz {reason}")
     if rate_hz > _MAX_HZ:
         raise BadInput(f"{logged}, allowed: up to {_MAX_HZ:g} Hz, time in seconds")
@@ -299,14 +301,6 @@ def _time_base(flight: str, stamps: Floats, max_hz: float) -> tuple[Floats, Ints
         allowed = f"at least {_MIN_ROWS}; is time in another unit?"
         raise BadInput(f"{flight}: {reason}, allowed: {allowed}")
     return even
-
-
-def _other_time_unit_hint(rate_hz: float) -> str:
-    """The units of time in which a log too slow would be one of 10 to 1000 Hz."""
-    for unit, seconds in TIME_UNITS.items():
-        if unit != "s" and 10.0 <= rate_hz / seconds <= 1000.0:
-            return f" (time in {unit} would be {rate_hz / seconds:.3g} Hz)"
-    return ""
 
 
 def _even_time_base(stamps: Floats, step_s: float) -> tuple[Floats, Ints, float]:

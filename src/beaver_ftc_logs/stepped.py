@@ -111,9 +111,7 @@ def _sliding_maximum(x: Floats, n: int) -> Floats:
     """For each column the maximum over each sample and the `n - 1` samples before it."""
     from scipy.ndimage import maximum_filter1d
 
-    padded = np.concatenate([np.full((n - 1, x.shape[1]), -np.inf), x])
-    top = maximum_filter1d(padded, n, axis=0, origin=(n - 1) // 2)
-    return top[n - 1 :]
+    return maximum_filter1d(x, n, axis=0, mode="constant", cval=-np.inf, origin=(n - 1) // 2)
 
 
 def rows_of_replay(t_s: Floats, replay: Replayed, surfaces: Sequence[str], fdi: Any) -> LogRows:
@@ -129,11 +127,11 @@ def rows_of_replay(t_s: Floats, replay: Replayed, surfaces: Sequence[str], fdi: 
         if is_loss and verdict.estimate is not None and verdict.isolated in surfaces:
             s = surfaces.index(verdict.isolated)
             e[k, s] = min(max(1.0 + float(verdict.estimate), low[k, s]), high[k, s])
-    names = [_isolated_name(verdict, surfaces) for verdict in replay.verdicts]
+    isolated = [one.isolated if one.isolated in surfaces else UNKNOWN_SURFACE for one in replay.verdicts]
     return LogRows(
         t_s=t_s,
         faulty=faulty.astype(np.int64),
-        isolated_surfaces=np.array(names, dtype=object),
+        isolated_surfaces=np.where(faulty, np.array(isolated, dtype=object), ""),
         effectiveness=e,
         effectiveness_low=low,
         effectiveness_high=high,
@@ -159,9 +157,3 @@ def _fill_bounds(
     if verdict.isolated is not None:
         is_loss = verdict.type == LOSS_FAULT_TYPE
         low[places], high[places] = (alone[0][places], alone[1][places]) if is_loss else (0.0, 1.0)
-
-
-def _isolated_name(verdict: Verdict, surfaces: Sequence[str]) -> str:
-    if not verdict.detected:
-        return ""
-    return str(verdict.isolated) if verdict.isolated in surfaces else UNKNOWN_SURFACE

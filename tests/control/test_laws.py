@@ -36,8 +36,7 @@ def allocated(control, G):
 def pulled(control, x, f):
     """The surfaces, rad, by the published law for measured rates x; its integrators go a frame on."""
     law, axes, model = control["published"], control["axes"], control["reference"]
-    published.demand(law, model["output"], x, f, np.zeros(3))
-    allocation.form_demand(axes, *law["output"], np.zeros(4), G_TYPICAL, False)
+    published.demand(law, axes, model["output"], x, f, np.zeros(3))
     u = allocated(control, G_TYPICAL)
     published.integrate(law, axes, model, control["allocation"]["output"]["command"], x)
     return u

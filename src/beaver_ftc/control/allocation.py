@@ -53,16 +53,18 @@ def problem_dtype(n: int) -> np.dtype:
 def solve(problem, B, demand):
     """Fill u (n,) rad, from B (3, n) rad/s2 per rad and a demand (3,) rad/s2."""
     begin(problem, B)
-    n, u, target = problem.u.size, problem.u, problem.u_preferred
+    n, u = problem.u.size, problem.u
     for _ in range(4 * n + 4):
         multipliers(problem, B, demand)
         blocking, share = farthest(problem, B)
         for s in range(n):
             if problem.at[s] == FREE:
-                wanted = target[s] + problem.weight[s] * along(B, s, problem.y)
-                u[s] = u[s] + share * (wanted - u[s]) if blocking >= 0 else wanted
-        if blocking >= 0:
-            hold(problem, B, blocking)
+                there = wanted(problem, B, s)
+                u[s] = u[s] + share * (there - u[s]) if blocking >= 0 else there
+        if blocking >= 0:  # it is put on the limit it has met
+            below = wanted(problem, B, blocking) < problem.low[blocking]
+            problem.at[blocking] = LOW if below else HIGH
+            u[blocking] = problem.low[blocking] if below else problem.high[blocking]
         elif not release(problem, B):
             return
 
@@ -83,37 +85,39 @@ def begin(problem, B):
 
 
 @kernel
-def along(B, s, y):
-    """B' y of surface s."""
-    return B[0, s] * y[0] + B[1, s] * y[1] + B[2, s] * y[2]
+def wanted(problem, B, s):
+    """Where surface s goes without limits, p + v B' y."""
+    y = problem.y
+    along = B[0, s] * y[0] + B[1, s] * y[1] + B[2, s] * y[2]
+    return problem.u_preferred[s] + problem.weight[s] * along
 
 
 @kernel
 def multipliers(problem, B, demand):
-    """Fill y (3,): what is left of the demand, over slack."""
-    S, y = problem.S, problem.y
-    a, b, c = problem.slack, problem.slack, problem.slack  # of the diagonal
-    ba, ca, cb = 0.0, 0.0, 0.0
-    y0, y1, y2 = demand[0], demand[1], demand[2]
+    """Fill y (3,): what is left of the demand, over slack; S y = d - B u0 by Cholesky, S = L L', L in S."""
+    S, y, slack = problem.S, problem.y, problem.slack
+    S[:], y[:] = 0.0, demand
+    for i in range(3):
+        S[i, i] = slack
     for s in range(problem.u.size):
-        p, q, r = B[0, s], B[1, s], B[2, s]
-        at = problem.u[s]
-        if problem.at[s] == FREE:
-            at, v = problem.u_preferred[s], problem.weight[s]
-            a, b, c = a + v * p * p, b + v * q * q, c + v * r * r
-            ba, ca, cb = ba + v * q * p, ca + v * r * p, cb + v * r * q
-        y0, y1, y2 = y0 - p * at, y1 - q * at, y2 - r * at
-    S[0, 0] = sqrt(a)  # Cholesky
-    S[1, 0], S[2, 0] = ba / S[0, 0], ca / S[0, 0]
-    S[1, 1] = sqrt(max(b - S[1, 0] * S[1, 0], problem.slack))
-    S[2, 1] = (cb - S[2, 0] * S[1, 0]) / S[1, 1]
-    S[2, 2] = sqrt(max(c - S[2, 0] * S[2, 0] - S[2, 1] * S[2, 1], problem.slack))
-    y0 = y0 / S[0, 0]
-    y1 = (y1 - S[1, 0] * y0) / S[1, 1]
-    y2 = (y2 - S[2, 0] * y0 - S[2, 1] * y1) / S[2, 2]
-    y[2] = y2 / S[2, 2]
-    y[1] = (y1 - S[2, 1] * y[2]) / S[1, 1]
-    y[0] = (y0 - S[1, 0] * y[1] - S[2, 0] * y[2]) / S[0, 0]
+        free = problem.at[s] == FREE
+        at = problem.u_preferred[s] if free else problem.u[s]
+        for i in range(3):
+            y[i] -= B[i, s] * at
+            for j in range(i + 1):
+                S[i, j] += problem.weight[s] * B[i, s] * B[j, s] if free else 0.0
+    for i in range(3):
+        for j in range(i + 1):
+            for k in range(j):
+                S[i, j] -= S[i, k] * S[j, k]
+            S[i, j] = sqrt(max(S[i, j], slack)) if i == j else S[i, j] / S[j, j]
+            if j < i:
+                y[i] -= S[i, j] * y[j]
+        y[i] /= S[i, i]
+    for i in (2, 1, 0):
+        for k in range(i + 1, 3):
+            y[i] -= S[k, i] * y[k]
+        y[i] /= S[i, i]
 
 
 @kernel
@@ -121,23 +125,13 @@ def farthest(problem, B):
     """The free surface that meets a limit first on its way, or -1, and which share of the way that is."""
     blocking, share = -1, 1.0
     for s in range(problem.u.size):
-        if problem.at[s] != FREE:
-            continue
-        wanted, now = problem.u_preferred[s] + problem.weight[s] * along(B, s, problem.y), problem.u[s]
-        limit = problem.low[s] if wanted < problem.low[s] else problem.high[s]
-        if wanted < problem.low[s] or wanted > problem.high[s]:
-            part = (limit - now) / (wanted - now) if wanted != now else 0.0
+        there, now = wanted(problem, B, s), problem.u[s]
+        if problem.at[s] == FREE and (there < problem.low[s] or there > problem.high[s]):
+            limit = problem.low[s] if there < problem.low[s] else problem.high[s]
+            part = (limit - now) / (there - now) if there != now else 0.0
             if blocking < 0 or part < share:
                 blocking, share = s, part
     return blocking, share
-
-
-@kernel
-def hold(problem, B, s):
-    """Put surface s on the limit it has met."""
-    wanted = problem.u_preferred[s] + problem.weight[s] * along(B, s, problem.y)
-    problem.at[s] = LOW if wanted < problem.low[s] else HIGH
-    problem.u[s] = problem.low[s] if wanted < problem.low[s] else problem.high[s]
 
 
 @kernel
@@ -145,11 +139,8 @@ def release(problem, B):
     """Free the surface whose limit holds it back most; whether there is one."""
     worst, most = -1, ROUNDING
     for s in range(problem.u.size):
-        if problem.at[s] == FREE:
-            continue
-        # in rad: how far inside of its limit it would be
-        wanted = problem.u_preferred[s] + problem.weight[s] * along(B, s, problem.y)
-        inside = problem.at[s] * (problem.u[s] - wanted)
+        # in rad: how far inside of its limit it would be; nothing of one that is free
+        inside = problem.at[s] * (problem.u[s] - wanted(problem, B, s))
         if inside > most:
             worst, most = s, inside
     if worst >= 0:
@@ -179,9 +170,10 @@ def layout_dtype(n: int) -> np.dtype:
 
 @sized
 def axes_dtype(n: int) -> np.dtype:
-    """Output of the allocation, by axis. G (3, n) rad/s2 per rad: with the effectiveness of each surface in
-    it. rad/s2: demand, hold and disturbance as the law has them, the offsets of surfaces subtracted;
-    shortfall: what of the demand was not given; beyond: whether not even the rates can be held."""
+    """What the surfaces are to do, by axis. G (3, n) rad/s2 per rad: with the effectiveness of each surface
+    in it. rad/s2, by the law: demand, and hold, what of it only holds the rates, both less the offsets of
+    surfaces; disturbance, that its observer finds, if it has one; shortfall: what of the demand was not
+    given; beyond: whether not even the rates can be held."""
     return record(G=(3, n), demand=3, hold=3, disturbance=3, shortfall=3, beyond=(int, 3))
 
 
@@ -200,7 +192,8 @@ def configure(control: np.void, config: ControlConfig, travel: np.ndarray, aircr
     """Fill `layout` and `allocation` of a law's record; travel (2, n) rad."""
     layout = control["layout"]
     layout["low"], layout["high"] = travel
-    layout["main"], layout["stand_in"] = main_surface_index_by_axis(aircraft), _stand_in(aircraft)
+    layout["main"] = main_surface_index_by_axis(aircraft)
+    layout["stand_in"] = aircraft.surfaces.index(aircraft.stand_ins[0]) if aircraft.stand_ins else -1
     layout["is_backup"] = [surface in aircraft.stand_ins for surface in aircraft.surfaces]
     layout["authority"], layout["general"] = _authority(aircraft, layout), _is_general(aircraft)
     step = control["reference"]["config"]["dt"] / config.hand_over_s
@@ -214,11 +207,6 @@ def configure_probe(probe: np.void, probing: Probing | None, dt: float) -> None:
         probe["config"]["step"] = 2.0 * pi * probing.frequency_hz * dt
         probe["config"]["frames"] = round(probing.duration_s / dt)
         probe["memory"]["from_s"] = probe["memory"]["to_s"] = -1.0
-
-
-def _stand_in(aircraft: Aircraft) -> int:
-    """The surface that takes over from the one that leads pitch, or -1."""
-    return aircraft.surfaces.index(aircraft.stand_ins[0]) if aircraft.stand_ins else -1
 
 
 def _is_general(aircraft: Aircraft) -> bool:
@@ -268,16 +256,20 @@ def divide(moment, effectiveness):
 
 
 @kernel
-def form_demand(axes, demand, hold, disturbance, offset, G, subtracts_offsets):
-    """Fill axes.demand, hold and disturbance, each (3,) rad/s2, with what a law demands, what of it only
-    holds the rates, and the disturbance that its observer finds. If subtracts_offsets, the moments of the
-    surfaces' offsets are subtracted: G (3, n) rad/s2 per rad times the offsets (n,) rad."""
+def set_demand(axes, i, demand, hold, disturbance):
+    """What a law demands about axis i, what of it only holds the rates, and the disturbance that its observer
+    finds, rad/s2."""
+    axes.demand[i], axes.hold[i], axes.disturbance[i] = demand, hold, disturbance
+
+
+@kernel
+def subtract_offsets(axes, offset, G):
+    """Take the moments of the surfaces' offsets (n,) rad off what the law demands; G (3, n) rad/s2 per
+    rad."""
     for i in range(3):
-        axes.demand[i], axes.hold[i], axes.disturbance[i] = demand[i], hold[i], disturbance[i]
-        if subtracts_offsets:
-            for s in range(G.shape[1]):
-                axes.demand[i] -= G[i, s] * offset[s]
-                axes.hold[i] -= G[i, s] * offset[s]
+        for s in range(G.shape[1]):
+            axes.demand[i] -= G[i, s] * offset[s]
+            axes.hold[i] -= G[i, s] * offset[s]
 
 
 @kernel

@@ -41,10 +41,11 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.aircraft import GRAVITY_MPS2, THRUST_TERM
-from beaver_ftc.compiled import kernel, record
+from beaver_ftc.compiled import kernel, record, row_of
 from beaver_ftc.control.allocation import attainable, remaining
 from beaver_ftc.control.engines import (
     ENGINE,
+    between,
     ceiling,
     gained,
     look_up,
@@ -198,26 +199,16 @@ def find_airspeeds_that_can_be_held(hold, layout, surfaces, y):
 def dynamic_pressure_limit(hold, flap, elevator, highest):
     """The highest (or lowest) dynamic pressure, Pa, of level flight with flap and elevator (rad): where the
     elevator it takes is the one there is. Infinite (or zero) where the table does not bound it."""
-    before = interpolate_elevator_needed(hold, 0, flap)
+    before = between(flap, N_FLAP, hold.flap, row_of(hold.elevator, 0))
     if before > elevator:
         return hold.qdyn[0] if highest else 0.0
     for j in range(1, N_QDYN):
-        after = interpolate_elevator_needed(hold, j, flap)
+        after = between(flap, N_FLAP, hold.flap, row_of(hold.elevator, j))
         if after > elevator:
             part = (elevator - before) / (after - before)
             return hold.qdyn[j - 1] + part * (hold.qdyn[j] - hold.qdyn[j - 1])
         before = after
     return np.inf if highest else hold.qdyn[N_QDYN - 1]
-
-
-@kernel
-def interpolate_elevator_needed(hold, j, flap):
-    """Elevator for level flight at dynamic pressure j of the table and flap rad, between its columns."""
-    k = 0
-    while k < N_FLAP - 2 and flap > hold.flap[k + 1]:
-        k += 1
-    part = (flap - hold.flap[k]) / (hold.flap[k + 1] - hold.flap[k])
-    return hold.elevator[j, k] + part * (hold.elevator[j, k + 1] - hold.elevator[j, k])
 
 
 @kernel

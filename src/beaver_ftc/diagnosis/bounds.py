@@ -39,7 +39,7 @@ Symbols of the kernels (err: of `errors_dtype`, emap: of `map_dtype`, model: the
 from dataclasses import replace
 from functools import lru_cache
 from itertools import product
-from math import exp, log
+from math import exp, log, pi
 from typing import Any
 
 import numpy as np
@@ -497,6 +497,9 @@ def _pole_for_delay(T: float, n2: float, eta: float) -> float:
         lam = max(log(phi * T / n2) / T, 0.1 / T)
         phi = (n2 * lam + eta) / (1.0 - exp(-lam * T))
     return lam
+
+
+DEFAULT_RATE_RAD_S = pi / 3.0  # of an actuator with no declared rate limit: the aircraft's default
 
 
 def servo_data(declared: Declared) -> dict[str, np.ndarray]:

@@ -142,13 +142,12 @@ def fly_on(frames, references, log, order):
     return FLYING
 
 
-_ROW, _AXES = types.Array(types.float64, 1, "C"), types.NestedArray(types.float64, (3,))
+_ROW = types.Array(types.float64, 1, "C")
 _NUMBERS = {
     "k": types.int64, "j": types.int64, "mode": types.int64, "started": types.int64,
     "by_observer": types.boolean,
     "t": types.float64, "share": types.float64, "probe": types.float64,
     "commanded": _ROW, "row": _ROW, "effectiveness": _ROW,
-    "demand": _AXES, "hold": _AXES, "disturbance": _AXES,
 }  # fmt: skip
 
 

@@ -76,9 +76,8 @@ def test_the_demand_is_that_of_its_equation(seed):
     f, G, u = rng.normal(0, 1, 3), rng.normal(0, 5, (3, 4)), rng.normal(0, 0.1, 4)
     prediction["f"], prediction["G"], prediction["u"] = f, G, u
     measured["x"], measured["y"][3] = rng.normal(0, 0.1, 3), 900.0
-    axes, model, surfaces = law["output"], fields(control["reference"]), control["surfaces"]["output"]
-    main = control["layout"]["main"]
-    rejecting.demand(law, control["reference"], surfaces, main, 0.0, prediction, measured)  # begins with x
+    axes, model, surfaces = control["axes"], fields(control["reference"]), control["surfaces"]["output"]
+    rejecting.demand(control, prediction, measured)  # begins with x
     share, d, x = law["config"]["share"], law["observer"]["disturbance"], measured["x"]
     assert axes["disturbance"].tolist() == d.tolist()
     ahead = x + share * DT * (f + d + G @ (surfaces["effectiveness"] * u + surfaces["offset"]))

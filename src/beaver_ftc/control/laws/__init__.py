@@ -126,18 +126,16 @@ def prepare(control, assessment, prediction, mode, t):
 
 
 @apart
-def command_surfaces(control, demand, hold, disturbance, assessment, faults, prediction, by_observer):
-    """From the law's demand to the command of each surface; demand, hold, disturbance (3,) rad/s2: see
-    `allocation.form_demand`.
+def command_surfaces(control, assessment, faults, prediction, by_observer):
+    """From the law's demand, in control.axes, to the command of each surface.
 
     by_observer: whether the law's observer finds what a surface does not do; the stand-in then carries what
     the main surface has lost, and the flap takes what an elevator at its stop leaves.
     """
     axes, layout, surfaces, out = control.axes, control.layout, control.surfaces, control.allocation.output
     uses_verdict, effectiveness = control.config.uses_verdict, surfaces.output.effectiveness
-    allocation.form_demand(
-        axes, demand, hold, disturbance, surfaces.output.offset, prediction.G, uses_verdict
-    )
+    if uses_verdict:
+        allocation.subtract_offsets(axes, surfaces.output.offset, prediction.G)
     share = out.transfer_share if by_observer else allocation.smooth(out.hand_over)
     probe = control.probe.memory.deflection
     if layout.general:

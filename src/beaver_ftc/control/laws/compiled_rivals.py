@@ -7,7 +7,7 @@ import numpy as np
 
 from beaver_ftc.compiled import apart, kernel, record, sized
 from beaver_ftc.control import CompiledLaw
-from beaver_ftc.control.allocation import form_demand, take_command
+from beaver_ftc.control.allocation import set_demand, take_command
 
 # Filled by `compile_into` of the rival's class. incremental: whether it is incremental inversion, else the
 # regulator. The regulator: gains on error and integral, the linear model, its inverse, the trim. Incremental
@@ -24,25 +24,24 @@ MEMORY = record(
 
 @sized
 def rival_dtype(n: int) -> np.dtype:
-    """The rivals' records for n surfaces; command (n,) rad before it is limited; demand (3,) rad/s2, of
-    incremental inversion; zero (3,): no rates are held, no disturbance is found."""
-    return record(config=CONFIG, memory=MEMORY, output=record(command=n, demand=3, zero=3))
+    """The rivals' records; they do not depend on the number of surfaces n."""
+    return record(config=CONFIG, memory=MEMORY)
 
 
 @apart
 def command(control, assessment, faults, prediction, measured, mode, t):
     """From what is measured to the command of each surface (control.CompiledLaw)."""
     law, reference, layout, x = control.compiled_rivals, control.reference, control.layout, measured.x
-    memory, out, allocated = law.memory, law.output, control.allocation.output
-    out.command[:] = layout.trim
+    memory, allocated = law.memory, control.allocation.output
+    u = allocated.command
+    u[:] = layout.trim
     if law.config.incremental:
-        increment(law, reference, layout.main, prediction, x)
-        form_demand(control.axes, out.demand, out.zero, out.zero, out.zero, prediction.G, False)
+        increment(law, reference, layout.main, prediction, x, control.axes, u)
     else:
-        regulate(law, reference, layout.main, x)
-    take_command(allocated, layout, out.command)
+        regulate(law, reference, layout.main, x, u)
+    take_command(allocated, layout, u)
     memory.saturated = 0
-    for s in range(out.command.size):
+    for s in range(u.size):
         memory.saturated += allocated.saturated[s]
 
 
@@ -56,8 +55,8 @@ def missed(memory, reference, i, x):
 
 
 @kernel
-def regulate(law, reference, main, x):
-    """Add to the output's command, in trim, what the linear model asks for to follow the reference, and K
+def regulate(law, reference, main, x, u):
+    """Add to the command u (n,) rad, in trim, what the linear model asks for to follow the reference, and K
     times what is missing."""
     config, memory, target = law.config, law.memory, reference.output
     for i in range(3):
@@ -67,13 +66,13 @@ def regulate(law, reference, main, x):
             needed -= config.A[i, j] * (target.model_rate[j] - config.trim_x[j])
         for s in range(3):
             back = config.K[s, i] * error + config.K[s, 3 + i] * memory.integral[i]
-            law.output.command[main[s]] += config.B_inverse[s, i] * needed + back
+            u[main[s]] += config.B_inverse[s, i] * needed + back
 
 
 @kernel
-def increment(law, reference, main, prediction, x):
-    """G^-1 (nu - xdot0 + G u0), into the output's command; nu - xdot0 into its demand (3,) rad/s2."""
-    config, memory, demand = law.config, law.memory, law.output.demand
+def increment(law, reference, main, prediction, x, axes, u):
+    """G^-1 (nu - xdot0 + G u0), into the command u (n,) rad; the demand of the axes: nu - xdot0."""
+    config, memory = law.config, law.memory
     for i in range(3):
         error = missed(memory, reference, i, x)
         xdot0, given = memory.rate_filter[1, i], memory.surface_filter[1, i]
@@ -82,10 +81,10 @@ def increment(law, reference, main, prediction, x):
             xdot0 = smooth(memory.rate_filter, i, change, config.keep)
             given = smooth(memory.surface_filter, i, given_by(prediction.means.Gu, main, i), config.keep)
         nu = reference.output.model_acceleration[i] + config.Kp * error + config.Ki * memory.integral[i]
-        demand[i] = nu - xdot0 + given
-    solve(prediction.G, main, demand, law.output.command)
+        set_demand(axes, i, nu - xdot0 + given, 0.0, 0.0)
+    solve(prediction.G, main, axes.demand, u)
     for i in range(3):
-        demand[i] -= memory.surface_filter[1, i]
+        set_demand(axes, i, axes.demand[i] - memory.surface_filter[1, i], 0.0, 0.0)
     memory.begun, memory.x_before[:] = 1, x
 
 

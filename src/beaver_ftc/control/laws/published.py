@@ -10,12 +10,12 @@ import numpy as np
 
 from beaver_ftc.compiled import apart, kernel, record, sized
 from beaver_ftc.control import CompiledLaw, laws
+from beaver_ftc.control.allocation import set_demand
 from beaver_ftc.scenario.declared import Declared
 
 CONFIG = record(Kp=float, Ki=float)  # gains 1/s, 1/s2
 MEMORY = record(integral=3)  # of the error, rad
-OUTPUT = record(demand=3, hold=3, disturbance=3)  # rad/s2: see allocation.form_demand; it finds none
-FEEDBACK = record(config=CONFIG, memory=MEMORY, output=OUTPUT)
+FEEDBACK = record(config=CONFIG, memory=MEMORY)
 
 
 @sized
@@ -33,27 +33,31 @@ def configure(law: np.void, control: np.void, prediction: np.void, declared: Dec
 @apart
 def command(control, assessment, faults, prediction, measured, mode, t):
     """From what is measured to the command of each surface (control.CompiledLaw)."""
-    law, reference, unknown = control.published, control.reference, control.surfaces.output.unknown
-    out = law.output
+    unknown = control.surfaces.output.unknown
+    command_by(control.published, unknown, control, assessment, faults, prediction, measured, mode, t)
+
+
+@kernel
+def command_by(law, fhat, control, assessment, faults, prediction, measured, mode, t):
+    """The same by a record of type FEEDBACK; fhat (3,) rad/s2: what is unknown beside the model."""
+    axes, reference = control.axes, control.reference
     laws.prepare(control, assessment, prediction, mode, t)
-    demand(law, reference.output, measured.x, prediction.f, unknown)
-    laws.command_surfaces(
-        control, out.demand, out.hold, out.disturbance, assessment, faults, prediction, False
-    )
-    integrate(law, control.axes, reference, control.allocation.output.command, measured.x)
+    demand(law, axes, reference.output, measured.x, prediction.f, fhat)
+    laws.command_surfaces(control, assessment, faults, prediction, False)
+    integrate(law, axes, reference, control.allocation.output.command, measured.x)
     laws.complete(control, assessment, measured, t)
 
 
 @kernel
-def demand(law, reference, x, f, fhat):
-    """Fill the law's demand and hold (3,) rad/s2. x (3,) rad/s; f, fhat (3,) rad/s2: the model's acceleration
-    and what is unknown beside it; reference: the Output of laws/__init__.py."""
-    config, output = law.config, law.output
+def demand(law, axes, reference, x, f, fhat):
+    """Fill demand and hold of the axes, (3,) rad/s2. x (3,) rad/s; f, fhat (3,) rad/s2: the model's
+    acceleration and what is unknown beside it; reference: the Output of laws/__init__.py."""
+    config = law.config
     for i in range(3):
         error = reference.governed_rate[i] - x[i]
         feedback = config.Kp * error + config.Ki * law.memory.integral[i]
-        output.demand[i] = reference.governed_acceleration[i] + feedback - f[i] - fhat[i]
-        output.hold[i] = -f[i] - fhat[i]
+        wanted = reference.governed_acceleration[i] + feedback - f[i] - fhat[i]
+        set_demand(axes, i, wanted, -f[i] - fhat[i], 0.0)
 
 
 @kernel

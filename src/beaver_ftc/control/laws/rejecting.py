@@ -45,20 +45,22 @@ limits is put back, the others with it along the covariance: to the likeliest pl
 from the truth.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from math import exp, hypot, inf, pi, radians, sqrt
+from math import exp, hypot, inf, pi, sqrt
 
 import numpy as np
 
-from beaver_ftc.compiled import apart, kernel, record, sized
+from beaver_ftc.aircraft import AXES
+from beaver_ftc.compiled import apart, kernel, record, row_of, sized
 from beaver_ftc.compiled.records import Room
 from beaver_ftc.control import CompiledLaw, accommodation, allocation, laws
 from beaver_ftc.control.accommodation import approach, begin_frame, reported, start_of
+from beaver_ftc.control.engines import between
 from beaver_ftc.control.laws import advance
 from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, QDYN, own_damping
 from beaver_ftc.design.model import effectiveness as control_effectiveness
+from beaver_ftc.diagnosis.bounds import DEFAULT_RATE_RAD_S, servo_data
 from beaver_ftc.diagnosis.state import PITCH
 from beaver_ftc.diagnosis.types import GIVE_UP
 from beaver_ftc.scenario.declared import Declared
@@ -72,8 +74,6 @@ LEAST_LEAD_RATIO, MOST_LEAD = 1.0, 4.0  # lead compensation makes an actuator at
 RESERVE_DB, RESERVE_DEG = 0.5, 2.0  # kept for what an integrator is not: the rest of the aircraft
 N_FREQUENCIES, N_CANDIDATES = 160, 40
 LEAST_PER_S = 0.5
-DEFAULT_RATE_RAD_S = pi / 3.0  # of an actuator with no declared rate limit: the aircraft's default
-GYROS = ("p", "q", "r")
 
 
 @dataclass(frozen=True)
@@ -85,15 +85,6 @@ class Loop:
     share: float
     approach: float
     lead: float
-    delay_s: float = 0.0
-    keep: float = 0.0
-
-
-@dataclass(frozen=True)
-class Gyro:
-    """What is declared of a rate gyro; keep: what its lag keeps from frame to frame."""
-
-    noise_rad_s: float = 0.0
     delay_s: float = 0.0
     keep: float = 0.0
 
@@ -214,87 +205,39 @@ def derive_fading(dt_s: float) -> float:
     return 1.0 - exp(-dt_s / MEMORY_S)
 
 
-def set_up(
-    config: np.void,
-    *,
-    dt_s: float,
-    substeps: int,
-    approach: np.ndarray,
-    speed_rad_s: np.ndarray,
-    gyros: Sequence[Gyro],
-    margin: tuple[float, float],
-    qdyn: np.ndarray,
-    G: np.ndarray,
-    carriers: Sequence[tuple[int, int]],
-) -> None:
-    """Fill the schedule of the law's configuration, and the leads.
-
-    approach (n,): share of the way an actuator goes in a JSBSim frame. speed_rad_s (n,): mean speed of a
-    surface that noise may cause. margin: dB and deg. qdyn (N_POINTS,) Pa and G (N_POINTS, 3, n) there.
-    carriers: axis and surface of each loop.
-    """
-    whole = 1.0 - (1.0 - approach) ** substeps
-    config["dt"], config["share"], config["qdyn"] = dt_s, 1.0 / substeps, qdyn
-    config["fading"] = derive_fading(dt_s)
-    config["lead"] = [lead_of(float(a)) for a in whole]
-    for row, (axis, surface) in enumerate(carriers):
-        gyro = gyros[axis]
-        reach = float(whole[surface])
-        loop = Loop(dt_s, 1.0 / substeps, reach, lead_of(reach), gyro.delay_s, gyro.keep)
-        for j in range(len(qdyn)):
-            speed = float(speed_rad_s[surface])
-            s = fastest(loop, margin, gyro.noise_rad_s, float(G[j, axis, surface]), speed)
-            config["Kp_at"][row, j] = s
-            config["L_rate_at"][row, j], config["L_disturbance_at"][row, j] = corrections(RATIO * s, dt_s)
-
-
 def configure(law: np.void, control: np.void, prediction: np.void, declared: Declared, y: np.ndarray) -> None:
-    """Derive the gains of a declaration into the law's configuration (control.CompiledLaw).
+    """Derive the gains of a declaration into the law's configuration, and the leads (control.CompiledLaw).
 
-    y: the measured signals in trim.
+    y: the measured signals in trim. Of the noise that is allowed, `part` is what the surface of an axis may
+    have: the root of how much of its own damping the axis has, beside the most damped one.
     """
-    config, dt, layout = declared.control, 1.0 / declared.rate_hz, control["layout"]
+    config, wanted, layout = law["config"], declared.control, control["layout"]
+    design, dt, share = prediction["design"], 1.0 / declared.rate_hz, 1.0 / declared.substeps
     speeds_mps = np.linspace(*declared.aircraft.envelope.airspeed_mps, N_POINTS)
     signals = np.tile(y, (N_POINTS, 1))
     signals[:, AIRSPEED], signals[:, QDYN] = speeds_mps, y[QDYN] * (speeds_mps / y[AIRSPEED]) ** 2
+    G = [control_effectiveness(design, each) for each in signals]
+    whole = 1.0 - (1.0 - prediction["actuators"]["approach"]) ** declared.substeps
+    config["dt"], config["share"], config["qdyn"] = dt, share, signals[:, QDYN]
+    config["fading"], config["lead"] = derive_fading(dt), [lead_of(float(way)) for way in whole]
     carriers = [(axis, int(s)) for axis, s in enumerate(layout["main"])]
     if layout["stand_in"] >= 0:
         carriers.append((PITCH, int(layout["stand_in"])))
-    set_up(
-        law["config"],
-        dt_s=dt,
-        substeps=declared.substeps,
-        approach=prediction["actuators"]["approach"],
-        speed_rad_s=config.noise_share * _shares(prediction["design"], y, carriers) * _rate_limits(declared),
-        gyros=[_gyro(getattr(declared.instruments, axis), dt) for axis in GYROS],
-        margin=(config.gain_margin_db, config.phase_margin_deg),
-        qdyn=signals[:, QDYN],
-        G=np.stack([control_effectiveness(prediction["design"], each) for each in signals]),
-        carriers=carriers,
-    )
-
-
-def _shares(design: np.void, y: np.ndarray, carriers: list[tuple[int, int]]) -> np.ndarray:
-    """What part of the noise that is allowed each surface (n,) may have: the root of how much of its own
-    damping the axis has, beside the most damped one."""
     a = np.abs(own_damping(design, y))
-    shares = np.ones(design["G0"].shape[1])
-    for axis, s in carriers:
-        shares[s] = sqrt(a[axis] / a.max())
-    return shares
-
-
-def _rate_limits(declared: Declared) -> np.ndarray:
-    """Declared rate limits (n,) rad/s, the aircraft's default where none is."""
-    surfaces = declared.aircraft.surfaces
-    limits_deg_s = [getattr(declared.servos, surface).rate_limit_deg_s for surface in surfaces]
-    return np.array([radians(limit) or DEFAULT_RATE_RAD_S for limit in limits_deg_s])
-
-
-def _gyro(sensor: RateGyro, dt: float) -> Gyro:
-    noise, _, quantum = sensor.noise_bias_quantum
-    lag = sensor.bandwidth_rad_s
-    return Gyro(hypot(noise, quantum / sqrt(12.0)), sensor.delay_s, exp(-lag * dt) if lag else 0.0)
+    part = {s: sqrt(a[axis] / a.max()) for axis, s in carriers}
+    limits_rad_s = servo_data(declared)["rate_limit_rad_s"]
+    for row, (axis, s) in enumerate(carriers):
+        gyro: RateGyro = getattr(declared.instruments, AXES[axis])
+        noise, _, quantum = gyro.noise_bias_quantum
+        keep = exp(-gyro.bandwidth_rad_s * dt) if gyro.bandwidth_rad_s else 0.0
+        loop = Loop(dt, share, float(whole[s]), config["lead"][s], gyro.delay_s, keep)
+        speed_rad_s = wanted.noise_share * part[s] * float(limits_rad_s[s] or DEFAULT_RATE_RAD_S)
+        margin = wanted.gain_margin_db, wanted.phase_margin_deg
+        for j in range(N_POINTS):
+            noise_rad_s = hypot(noise, quantum / sqrt(12.0))
+            Kp = fastest(loop, margin, noise_rad_s, float(G[j][axis, s]), speed_rad_s)
+            config["Kp_at"][row, j] = Kp
+            config["L_rate_at"][row, j], config["L_disturbance_at"][row, j] = corrections(RATIO * Kp, dt)
 
 
 OBSERVER_ERROR = record(rate=3, disturbance=3)  # e and dd of one acceleration
@@ -415,7 +358,6 @@ NOTHING_LEFT = 0.05  # half of what the law divides by
 OBSERVER = record(begun=int, rate=3, disturbance=3)
 # Sums of the least squares, of the main surface of each axis; named: whether the diagnosis has named it.
 SUMS = record(product=3, square=3, innovation=3, frames=3, named=(int, 3))
-OUTPUT = record(demand=3, hold=3, disturbance=3)  # rad/s2: see allocation.form_demand
 
 
 @sized
@@ -445,7 +387,7 @@ def memory_dtype(n: int) -> np.dtype:
 @sized
 def rejecting_dtype(n: int) -> np.dtype:
     """The law's records for n surfaces."""
-    return record(config=config_dtype(n), observer=OBSERVER, memory=memory_dtype(n), output=OUTPUT)
+    return record(config=config_dtype(n), observer=OBSERVER, memory=memory_dtype(n))
 
 
 @apart
@@ -478,46 +420,31 @@ def accommodate(control, assessment, faults, prediction, measured):
 @apart
 def command(control, assessment, faults, prediction, measured, mode, t):
     """From what is measured to the command of each surface (control.CompiledLaw)."""
-    law, out, surfaces = control.rejecting, control.allocation.output, control.surfaces.output
     laws.prepare(control, assessment, prediction, mode, t)
-    main, share = control.layout.main, out.transfer_share
-    demand(law, control.reference, surfaces, main, share, prediction, measured)
-    found = law.output
-    laws.command_surfaces(
-        control, found.demand, found.hold, found.disturbance, assessment, faults, prediction, True
-    )
+    demand(control, prediction, measured)
+    laws.command_surfaces(control, assessment, faults, prediction, True)
     laws.complete(control, assessment, measured, t)
-    allocation.lead_compensate(out, control.layout, law.config.lead, prediction.u)
+    lead = control.rejecting.config.lead
+    allocation.lead_compensate(control.allocation.output, control.layout, lead, prediction.u)
 
 
 @kernel
 def schedule(config, memory, qdyn, transfer_share):
     """Gains for a dynamic pressure (Pa), held beyond the ends of the table; pitch also for who carries it:
     transfer_share, the part of pitch that its stand-in carries."""
-    points = config.qdyn
-    last = points.size - 1
-    j = 0
-    while j < last - 1 and qdyn > points[j + 1]:
-        j += 1
-    fraction = min(max((qdyn - points[j]) / (points[j + 1] - points[j]), 0.0), 1.0)
-    look_up(memory.Kp, config.Kp_at, j, fraction, transfer_share)
-    look_up(memory.L_rate, config.L_rate_at, j, fraction, transfer_share)
-    look_up(memory.L_disturbance, config.L_disturbance_at, j, fraction, transfer_share)
+    look_up(memory.Kp, config.qdyn, config.Kp_at, qdyn, transfer_share)
+    look_up(memory.L_rate, config.qdyn, config.L_rate_at, qdyn, transfer_share)
+    look_up(memory.L_disturbance, config.qdyn, config.L_disturbance_at, qdyn, transfer_share)
 
 
 @kernel
-def look_up(gains, table, j, fraction, transfer_share):
-    """Fill gains (3,) from a table; transfer_share: the part of pitch that its stand-in carries."""
+def look_up(gains, points, table, qdyn, transfer_share):
+    """Fill gains (3,) from a table over the points; the rest: see `schedule`."""
     for i in range(3):
-        gains[i] = between(table, i, j, fraction)
+        gains[i] = between(qdyn, points.size, points, row_of(table, i))
     if transfer_share > 0.0:
-        gains[PITCH] += transfer_share * (between(table, STAND_IN, j, fraction) - gains[PITCH])
-
-
-@kernel
-def between(table, i, j, fraction):
-    """Row i of a table, `fraction` of the way from point j to the next."""
-    return table[i, j] + fraction * (table[i, j + 1] - table[i, j])
+        by_stand_in = between(qdyn, points.size, points, row_of(table, STAND_IN))
+        gains[PITCH] += transfer_share * (by_stand_in - gains[PITCH])
 
 
 @kernel
@@ -650,28 +577,24 @@ def accumulate(config, memory, i, effectiveness, moment, innovation):
 
 
 @kernel
-def demand(law, reference, surfaces, main, transfer_share, prediction, measured):
-    """Fill the law's demand and hold (3,) rad/s2; main (3,): the surface that leads each axis;
-    transfer_share: the part of pitch that its stand-in carries."""
-    config = law.config
-    observer = law.observer
-    memory = law.memory
-    output = law.output
-    means = prediction.means
-    schedule(config, memory, measured.y[QDYN], transfer_share)
-    observe(law, surfaces, main, measured.x, means.F, means.Gu, means.G)
+def demand(control, prediction, measured):
+    """Fill the law's demand, hold and disturbance of the axes, (3,) rad/s2."""
+    law, surfaces = control.rejecting, control.surfaces.output
+    config, memory, means = law.config, law.memory, prediction.means
+    schedule(config, memory, measured.y[QDYN], control.allocation.output.transfer_share)
+    observe(law, surfaces, control.layout.main, measured.x, means.F, means.Gu, means.G)
     if memory.estimator.active:
         estimate(
             memory.estimator, memory.innovation, memory.L_rate, memory.L_disturbance, config.dt, measured.x,
             measured.y, surfaces.effectiveness, means.Gu,
         )  # fmt: skip
     for i in range(3):
+        d = law.observer.disturbance[i]
         look_ahead(law, surfaces, i, prediction.f, prediction.G, prediction.u)
-        target, after = targets(reference, i, config.share)
+        target, after = targets(control.reference, i, config.share)
         feedback = memory.Kp[i] * (target - memory.ahead[i])
-        output.disturbance[i] = observer.disturbance[i]
-        output.hold[i] = -prediction.f[i] - observer.disturbance[i]
-        output.demand[i] = (after - target) / config.dt + feedback + output.hold[i]
+        hold = -prediction.f[i] - d
+        allocation.set_demand(control.axes, i, (after - target) / config.dt + feedback + hold, hold, d)
 
 
 @kernel

@@ -17,7 +17,7 @@ isolated (accommodation.py, allocation.py); the structure of the law stays.
 import numpy as np
 
 from beaver_ftc.compiled import apart, kernel, record, sized
-from beaver_ftc.control import CompiledLaw, laws
+from beaver_ftc.control import CompiledLaw
 from beaver_ftc.control.accommodation import approach, begin_frame
 from beaver_ftc.control.laws import published
 from beaver_ftc.control.laws.published import FEEDBACK
@@ -99,15 +99,10 @@ def adapt(law, surfaces, main, saturated, error, G, u, dt):
 @apart
 def command(control, assessment, faults, prediction, measured, mode, t):
     """From what is measured to the command of each surface (control.CompiledLaw)."""
-    law, reference, out = control.zhang2005, control.reference, control.zhang2005.feedback.output
-    laws.prepare(control, assessment, prediction, mode, t)
-    published.demand(law.feedback, reference.output, measured.x, prediction.f, law.network.output)
-    laws.command_surfaces(
-        control, out.demand, out.hold, out.disturbance, assessment, faults, prediction, False
+    law = control.zhang2005
+    published.command_by(
+        law.feedback, law.network.output, control, assessment, faults, prediction, measured, mode, t
     )
-    u = control.allocation.output.command
-    published.integrate(law.feedback, control.axes, reference, u, measured.x)
-    laws.complete(control, assessment, measured, t)
 
 
 def unexplained(control: np.void) -> np.ndarray:

@@ -30,6 +30,7 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel, one_of, record, sized
 from beaver_ftc.diagnosis import isolation
+from beaver_ftc.diagnosis.bounds import DEFAULT_RATE_RAD_S, servo_data
 from beaver_ftc.diagnosis.sets import EMPTY_SET, UNLIMITED_SET
 from beaver_ftc.diagnosis.state import PITCH_GROUP, fill
 from beaver_ftc.diagnosis.types import (
@@ -54,7 +55,6 @@ from beaver_ftc.scenario.declared import Declared
 BLOCK_DURATION_S = (
     0.2  # of frames examined together where gyros are noisy: much less than the slowest half-cycle, 3.1 s
 )
-DEFAULT_SERVO_RAD_S = pi / 3.0  # of an actuator with no declared rate limit: the aircraft's default
 
 
 def _load_types() -> tuple[FaultType, ...]:
@@ -248,11 +248,11 @@ def configure_types(
         abrupt=fdi.fault_profile == "abrupt",
     )  # fmt: skip
     fill(types["pair"], first_pitch=-1, enabled=fdi.pairs)
-    names, h = declared.aircraft.surfaces, dt / declared.substeps
-    for s, (name, srf, lo, hi) in enumerate(zip(names, types["surface"], *travel, strict=True)):
+    data, h = servo_data(declared), dt / declared.substeps
+    for s, (srf, lo, hi) in enumerate(zip(types["surface"], *travel, strict=True)):
         approaches, steps, band = (servos[field][s] for field in ("approaches", "steps", "band"))
-        rate_rad_s = radians(getattr(declared.servos, name).rate_limit_deg_s) or DEFAULT_SERVO_RAD_S
-        slowest = 1.0 - getattr(declared.servo_errors, name).rate_limit
+        rate_rad_s = data["rate_limit_rad_s"][s] or DEFAULT_RATE_RAD_S
+        slowest = 1.0 - data["rate_limit_error"][s]
         slow_step = min(radians(fdi.slowest_rate_deg_s) * h, steps[0])
         fill(
             srf["actuator"], stop_lo=lo, stop_hi=hi, reach_lo=min(lo, 0.0), reach_hi=max(hi, 0.0),

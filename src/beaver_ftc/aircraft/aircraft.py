@@ -34,7 +34,7 @@ from beaver_ftc.aircraft.schema import (
 )
 from beaver_ftc.documents.document import Problem
 from beaver_ftc.documents.errors import BadInput, suggestion
-from beaver_ftc.documents.files import PACKAGE, data_root, digest_of_files
+from beaver_ftc.documents.files import PACKAGE, data_root, digest_of_files, inside
 from beaver_ftc.documents.validation import ScenarioError, parse_document, text_of, validate
 from beaver_ftc.plugins import SERVICES, entries
 
@@ -554,12 +554,8 @@ def _inside(beside: Path | None, reference: str) -> Path:
                 f"there is no folder to find {reference!r} in, allowed: ./FOLDER in a scenario that is a file"
             )
         return next(iter(seen))
-    root = beside.resolve()
-    try:
-        folder = (root / reference).resolve()
-    except (OSError, ValueError, RuntimeError):
-        folder = Path("/")
-    if ".." in Path(reference).parts or not folder.is_relative_to(root):
+    root, folder = beside.resolve(), inside(beside, reference)
+    if folder is None:
         raise UnknownAircraft(f"{reference!r} is outside, allowed: a folder below the scenario's own")
     if not folder.is_dir():
         raise UnknownAircraft(f"there is no folder {reference!r}, allowed: {_ALLOWED}")

@@ -28,7 +28,6 @@ if TYPE_CHECKING:
         StatisticalHypothesis,
     )
     from beaver_ftc.diagnosis.state import LOSS, UNANTICIPATED, scheme_number
-    from beaver_ftc.diagnosis.types import DeflectionRelation
     from beaver_ftc.diagnosis.types.registry import DESCRIPTIONS_IN_TYPE_ORDER, TYPE_NAMES, type_index_of
     from beaver_ftc.diagnosis.types.registry import TYPES as TYPE_ROWS
 else:

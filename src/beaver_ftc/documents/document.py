@@ -163,6 +163,14 @@ class Document:
             location = location[:-1]
         return self.lines.get(location, 1)
 
+    def below(self, *at: int | str) -> "Document":
+        """What stands at these keys as a document by itself, with the lines it has here."""
+        data = self.data
+        for part in at:
+            data = data[part]
+        lines = {where[len(at) :]: n for where, n in self.lines.items() if where[: len(at)] == at}
+        return Document(data, lines)
+
 
 def parse(text: str) -> Document:
     """Read one YAML document.

@@ -48,6 +48,13 @@ class ScenarioError(BadInput):
         self.problems = _in_order(problems)
         super().__init__("\n".join(self.lines))
 
+    def below(self, source: str, *at: int | str) -> "ScenarioError":
+        """The same mistakes in a document of this source, of which what was read stands at these keys; those
+        of another file as they are."""
+        if self.source != source:
+            return self
+        return ScenarioError(source, [replace(one, location=(*at, *one.location)) for one in self.problems])
+
     @property
     def lines(self) -> tuple[str, ...]:
         alike: dict[Any, list[Problem]] = {}

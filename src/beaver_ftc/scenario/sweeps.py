@@ -374,13 +374,12 @@ def _base_path(base: str, document: Document, source: str, folder: Path | None) 
 
 
 def _inline(document: Document, source: str, folder: Path | None) -> Scenario:
-    lines = {at[1:]: line for at, line in document.lines.items() if at[:1] == ("base",)}
-    document.data["base"].setdefault("name", document.data["name"])
+    base = document.below("base")
+    base.data.setdefault("name", document.data["name"])
     try:
-        return validate(Scenario, Document(document.data["base"], lines), source, folder)
+        return validate(Scenario, base, source, folder)
     except ScenarioError as error:
-        below = [Problem(one.line, ("base", *one.location), one.says) for one in error.problems]
-        raise ScenarioError(source, below) from None
+        raise error.below(source, "base") from None
 
 
 def _self_contained(data: dict[str, Any], scenario: Scenario) -> tuple[dict[str, Any], Aircraft]:

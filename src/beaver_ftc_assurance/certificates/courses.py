@@ -78,8 +78,7 @@ class SurfaceBounds:
         if upper is not None:
             of_upper = int(self.upper[upper].argmin())
             said.append(self._bound_fields(held, range(upper, upper + 1), of_upper, -1))
-        sides = [[float(value) for value in column] for column in zip(*pairs, strict=True)]
-        return {"theta": "course", **fields, "bounds": said, "sides": sides}
+        return {"theta": "course", **fields, "bounds": said, "sides": np.array(pairs, float).T.tolist()}
 
     def _bound_fields(self, held: Hypothesis, frames: range, axis: int, side: int) -> Document:
         """Fields of frames that bound the surface by an axis: from below (side 1), or above (-1)."""

@@ -115,7 +115,7 @@ class Inequality:
         the same sum of eta_bar, the gyro noise of both ends, and the largest effect of the fault."""
         of, history, d, dt = self.hypothesis, self.history, term.direction, self.history.dt
         start, last, first = term.filter_start, term.last_frame, self._first_written_frame(term)
-        a = 0.0 if isinf(term.pole_per_s) else exp(-term.pole_per_s * dt)
+        a = exp(-term.pole_per_s * dt)
         summed, weights = slice(start + 1, last + 1), _filter_weights(a, last - start)
         value = dt * weights @ (history.innovation_rad_s2[summed] @ d)
         noise = history.gyro_error_change_rad_s @ np.abs(d)

@@ -75,7 +75,7 @@ def _fly(plan: "EvidencePlan", arguments: Arguments) -> "Judged":
     with progress_bar(plan.file.name) as progress:
         document = run_plan(plan, folder.absolute(), arguments.workers or cores(), progress)
     said = document | {"folder": str(folder)}
-    answer(arguments.format, said, lambda: as_text(document, str(folder), sys.stdout.isatty()))
+    answer(arguments.format, said, lambda: as_text(document, str(folder)))
     return Judged(plan.file.name, document["passed"], as_expectations(document))
 
 

@@ -318,17 +318,13 @@ class _Reading:
 
     def _own(self, name: str) -> Source:
         """A scenario or sweep written into the plan."""
-        at, folder = ("flights", name), self._path.parent
-        own = _below(self._document, at)
+        own = self._document.below("flights", name)
         own.data = {"name": name, **own.data}
         read = validate_sweep if is_of_a_sweep(own.data) else validate_scenario
         try:
-            found = read(own, str(self._path), folder)
+            found = read(own, str(self._path), self._path.parent)
         except ScenarioError as error:
-            if error.source != str(self._path):
-                raise
-            moved = [Problem(one.line, (*at, *one.location), one.says) for one in error.problems]
-            raise ScenarioError(error.source, moved) from None
+            raise error.below(str(self._path), "flights", name) from None
         return Source(found.name, name, found)
 
     def _formula(self, requirement: Requirement, at: Location) -> Formula | None:
@@ -362,7 +358,7 @@ class _Reading:
         """What is expected, held against what a flight of this source can show."""
         base = source.base
         data = base.model_dump(mode="json", by_alias=True, exclude_unset=True) | {"expect": given}
-        lines = {("expect", *where): n for where, n in _below(self._document, at).lines.items()}
+        lines = {("expect", *where): n for where, n in self._document.below(*at).lines.items()}
         try:
             with checked_against(base.airframe, base.aircraft):
                 return validate(Scenario, Document(data, lines), "", None, conflicts).expect
@@ -371,15 +367,6 @@ class _Reading:
                 if one.location[:1] == ("expect",):
                     self._problem((*at, *one.location[1:]), one.says)
             return None
-
-
-def _below(document: Document, at: Location) -> Document:
-    """A part of a document by itself, with the lines it has there."""
-    data = document.data
-    for part in at:
-        data = data[part]
-    lines = {where[len(at) :]: n for where, n in document.lines.items() if where[: len(at)] == at}
-    return Document(data, lines)
 
 
 def _columns(scenario: Scenario) -> tuple[str, ...]:

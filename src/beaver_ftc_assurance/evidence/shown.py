@@ -208,7 +208,7 @@ def _cell(cell: Document) -> str:
     return f"{slow:.0f} to {fast:.0f} m/s, {where}"
 
 
-def as_text(document: Document, folder: str, colour: bool = False) -> str:
+def as_text(document: Document, folder: str) -> str:
     """For a terminal."""
     table = _summary(document["requirements"])
     lines = aligned([[row[0], *row[2:]] for row in (table.head, *table.rows)])

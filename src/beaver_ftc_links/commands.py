@@ -73,9 +73,10 @@ def command(options: Options) -> None:
     (scenario,) = load_all([options.scenario])
     for warning in scenario.warnings():
         complain(f"{scenario.name}: warning: {warning}")
+    ground = None if options.mavlink is None else address("--mavlink", options.mavlink)
     served = Served(
         options.protocol, options.host, options.port, options.rate, options.speed, options.hold,
-        options.ground, options.mavlink and address("--mavlink", options.mavlink), options.page,
+        options.ground, ground, options.page,
     )  # fmt: skip
     flight = serve(scenario, served, lambda line: complain(f"{scenario.name}: {line}"))
     folder = flight.save(options.out, report=not options.no_report)

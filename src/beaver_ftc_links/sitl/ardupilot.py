@@ -10,6 +10,7 @@ was lost: it is answered, not flown. A lower one is late, unless it is said agai
 been answered, so that is a count restarted, of an autopilot started again. So is 0 or 1, long after.
 """
 
+import json
 import struct
 from collections.abc import Hashable
 from typing import NamedTuple
@@ -47,18 +48,12 @@ def encoded(now: Instant) -> bytes:
 
     airspeed: true. windvane: the apparent wind, clockwise from ahead. rng_1: the height above its ground.
     """
-    gyro, force, attitude = _vector(now.gyro), _vector(now.force), _vector(now.attitude)
-    return (
-        f'\n{{"timestamp":{now.t_s!r},"imu":{{"gyro":{gyro},"accel_body":{force}}},'
-        f'"position":{_vector(now.position)},"attitude":{attitude},"velocity":{_vector(now.velocity)},'
-        f'"airspeed":{now.airspeed_mps!r},"rng_1":{-now.position[2]!r},'
-        f'"windvane":{{"direction":{now.beta_rad!r},"speed":{now.airspeed_mps!r}}}}}\n'
-    ).encode()
-
-
-def _vector(values: tuple[float, ...]) -> str:
-    x, y, z = values
-    return f"[{x!r},{y!r},{z!r}]"
+    said = {
+        "timestamp": now.t_s, "imu": {"gyro": now.gyro, "accel_body": now.force}, "position": now.position,
+        "attitude": now.attitude, "velocity": now.velocity, "airspeed": now.airspeed_mps,
+        "rng_1": -now.position[2], "windvane": {"direction": now.beta_rad, "speed": now.airspeed_mps},
+    }  # fmt: skip
+    return f"\n{json.dumps(said, separators=(',', ':'))}\n".encode()
 
 
 class Ardupilot:

@@ -3,7 +3,7 @@
 param1 FAILURE_UNIT, param2 FAILURE_TYPE, param3 which of them: of servos the output's number, 0 all.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from beaver_ftc.aircraft import ChannelsSection
@@ -36,14 +36,12 @@ def inject(sim: Flown, channels: ChannelsSection, params: tuple[float, float, fl
     if not places or (kind != OK and kind not in faults):
         return UNSUPPORTED, f"unit {unit}, type {kind}, number {which}: nothing of this aircraft"
     where = "actuator" if unit == SERVO else "sensor"
-    act: Callable[[str], None] = (
-        (lambda name: sim.repair(name if unit == SERVO else f"sensor {name}"))
-        if kind == OK
-        else (lambda name: sim.inject({where: name, **faults[kind]}))
-    )
     try:
         for name in places:
-            act(name)
+            if kind == OK:
+                sim.repair(name if unit == SERVO else f"sensor {name}")
+            else:
+                sim.inject({where: name, **faults[kind]})
     except BadInput as error:
         return DENIED, str(error)
     what = "repaired" if kind == OK else str(faults[kind]["type"]).replace("_", " ")

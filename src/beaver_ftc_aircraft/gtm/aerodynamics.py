@@ -23,7 +23,6 @@ from beaver_ftc_aircraft.gtm.elements import (
     read,
     table,
     unless_zero,
-    value,
 )
 from beaver_ftc_aircraft.gtm.parameters import DAMAGE_CASE, GEAR, OUTPUTS, parameters, surfaces
 from beaver_ftc_aircraft.gtm.systems import engine_functions
@@ -32,7 +31,7 @@ ALPHA, BETA, MIRRORED = "aero/alpha-deg", "aero/beta-deg", "aero/beta-mirrored-d
 # A left surface acts as the right one does at the opposite sideslip, with these signs of CX CY CZ Cl Cm Cn.
 MIRROR = (1.0, -1.0, 1.0, -1.0, 1.0, -1.0)
 LONGITUDINAL, LATERAL = ("CX", "CZ", "Cm"), ("CY", "Cl", "Cn")
-_DAMAGED = do("gt", read(DAMAGE_CASE), value(0.0))
+_DAMAGED = do("gt", read(DAMAGE_CASE), 0.0)
 _CASES = np.arange(1.0, 7.0)
 
 
@@ -104,18 +103,16 @@ def _flow(terms: _Terms, static: Table) -> None:
     """Sideslip mirrored; airspeed as the rates' tables have it; whether the static table goes so far."""
     ends = *static.axes["alpha"][[0, -1]], static.axes["beta"][-1]
     of = parameters()["rates"]
-    terms.helper(
-        MIRRORED, "Sideslip as the left half of the wing has it", do("product", value(-1.0), read(BETA))
-    )
-    knots = do("product", read("velocities/vt-fps"), value(of["knots_per_ft_s"]))
-    within = do("min", value(float(of["most_knots"])), do("max", value(float(of["least_knots"])), knots))
+    terms.helper(MIRRORED, "Sideslip as the left half of the wing has it", do("product", -1.0, read(BETA)))
+    knots = do("product", read("velocities/vt-fps"), of["knots_per_ft_s"])
+    within = do("min", of["most_knots"], do("max", of["least_knots"], knots))
     says = (
         "Airspeed in the dimensionless rates, ft/s: knots made of ft/s and back with the source's own factors"
     )
-    terms.helper("aero/airspeed-of-rates-fps", says, do("product", within, value(of["ft_s_per_knot"])))
+    terms.helper("aero/airspeed-of-rates-fps", says, do("product", within, of["ft_s_per_knot"]))
     inside = (
-        do("ge", read(ALPHA), value(ends[0])), do("le", read(ALPHA), value(ends[1])),
-        do("le", do("abs", read(BETA)), value(ends[2])),
+        do("ge", read(ALPHA), ends[0]), do("le", read(ALPHA), ends[1]),
+        do("le", do("abs", read(BETA)), ends[2]),
     )  # fmt: skip
     terms.helper("aero/envelope-valid", "1 inside the static tables", do("and", *inside))
 
@@ -186,12 +183,12 @@ def _elevator(terms: _Terms, of: Table) -> None:
         parts = [
             do(
                 "product",
-                value(sign * of["arm"] if sign else 1.0),
+                sign * of["arm"] if sign else 1.0,
                 read(f"aero/elevator/{source}-of-{surface}"),
             )
             for surface, of in segments.items()
         ]
-        terms.add(output, "elevator", "Four segments", do("product", value(0.25), do("sum", *parts)))
+        terms.add(output, "elevator", "Four segments", do("product", 0.25, do("sum", *parts)))
 
 
 def _ailerons(terms: _Terms, of: Table) -> None:
@@ -218,8 +215,8 @@ def _rudder(terms: _Terms, of: Table) -> None:
     """Both halves from the table of negative deflections, mirrored for positive ones; each by its shares."""
     upper, lower = surfaces("rudder")
     for surface in (upper, lower):
-        positive = do("ge", read(effective(surface)), value(0.0))
-        sign = do("ifthen", positive, value(-1.0), value(1.0))
+        positive = do("ge", read(effective(surface)), 0.0)
+        sign = do("ifthen", positive, -1.0, 1.0)
         terms.helper(f"aero/{surface}/sign", "-1 where the table is mirrored", sign)
         for name, of_it in (("beta-deg", BETA), ("mirrored-rad", effective(surface))):
             body = do("product", read(f"aero/{surface}/sign"), read(of_it))
@@ -239,7 +236,7 @@ def _rudder(terms: _Terms, of: Table) -> None:
             says = f"{output} of a whole rudder that stands as this half"
             terms.helper(f"aero/rudder/{output}-of-{surface}", says, unless_zero(effective(surface), found))
         shares = [
-            do("product", value(about["share"][i]), read(f"aero/rudder/{output}-of-{surface}"))
+            do("product", about["share"][i], read(f"aero/rudder/{output}-of-{surface}"))
             for surface, about in surfaces("rudder").items()
         ]
         terms.add(output, "rudder", "Upper and lower half", do("sum", *shares))
@@ -260,7 +257,7 @@ def _spoilers(terms: _Terms, of: Table) -> None:
             parts: list[str] = []
             for surface, about in these.items():
                 body = _between(tables, surface, grid, not parts)
-                body = do("product", value(about["share"][i]), body)
+                body = do("product", about["share"][i], body)
                 parts.append(unless_zero(effective(surface), body))
             says = f"{side.capitalize()} spoilers, inboard and outboard"
             terms.add(output, f"{side}_spoilers", says, do("sum", *parts))
@@ -271,9 +268,7 @@ def _flaps(terms: _Terms, base: Database) -> None:
     per_rad = {name: np.degrees(base.flaps[of["table"]]) for name, of in surfaces("flap").items()}
     for i, output in enumerate(OUTPUTS):
         parts = [
-            do("product", value(float(of[i])), read(effective(surface)))
-            for surface, of in per_rad.items()
-            if of[i] != 0.0
+            do("product", of[i], read(effective(surface))) for surface, of in per_rad.items() if of[i] != 0.0
         ]
         terms.add(output, "flaps", "Four flaps", do("sum", *parts))
 
@@ -309,7 +304,7 @@ def _rates(terms: _Terms, base: Database) -> None:
                 scale.data[:, :, k, OUTPUTS.index(output)],
                 [(ALPHA, scale.axes["alpha"]), (DAMAGE_CASE, _CASES)],
             )
-            body = do("product", found, do("ifthen", _DAMAGED, scaled, value(1.0)))
+            body = do("product", found, do("ifthen", _DAMAGED, scaled, 1.0))
             terms.add(output, rate, f"Oscillatory part of {rate}", body)
     parts: list[str] = []
     for k, (rate, *_) in enumerate(_RATES):
@@ -329,7 +324,7 @@ def _rates(terms: _Terms, base: Database) -> None:
 
 def _held(terms: _Terms, rate: str, what: str, key: str, grid: np.ndarray) -> str:
     """A key of a table, in damage within the table's ends."""
-    inside = do("min", value(float(grid[-1])), do("max", value(float(grid[0])), read(key)))
+    inside = do("min", grid[-1], do("max", grid[0], read(key)))
     return terms.helper(
         f"aero/rates/{rate}-at-{what}", f"{key}, in damage held", do("ifthen", _DAMAGED, inside, read(key))
     )
@@ -349,35 +344,34 @@ def _split(terms: _Terms) -> None:
     along_z = read(
         terms.helper("aero/rates/along-z", "Velocity's direction, down", do("product", sin_alpha, cos_beta))
     )
-    zero = value(0.0)
 
     def rest(which: str, rate: str, along: str, other: str, along_other: str) -> str:
         """What the other rate keeps if this one is all rotation; beyond any if that cannot be."""
         kept = do("difference", other, do("product", do("quotient", rate, along), along_other))
-        there = do("and", do("nq", rate, zero), do("nq", along, zero))
+        there = do("and", do("nq", rate, 0.0), do("nq", along, 0.0))
         return read(
             terms.helper(
                 f"aero/rates/left-of-{which}",
                 f"{which} beside a rotation",
-                do("ifthen", there, kept, value(1e30)),
+                do("ifthen", there, kept, 1e30),
             )
         )
 
     def allowed(left: str, of: str) -> str:
-        return do("and", do("le", do("abs", left), do("abs", of)), do("ge", do("product", left, of), zero))
+        return do("and", do("le", do("abs", left), do("abs", of)), do("ge", do("product", left, of), 0.0))
 
     left_of_r = rest("r", p, along_x, r, along_z)
     left_of_p = rest("p", r, along_z, p, along_x)
-    by_p = do("ifthen", allowed(left_of_r, r), do("quotient", p, along_x), zero)
+    by_p = do("ifthen", allowed(left_of_r, r), do("quotient", p, along_x), 0.0)
     by_r = do("ifthen", allowed(left_of_p, p), do("quotient", r, along_z), by_p)
     omega = read(
         terms.helper(
             "aero/rates/rotation-rad_sec",
             "Rotation about the velocity vector",
-            do("ifthen", _DAMAGED, zero, by_r),
+            do("ifthen", _DAMAGED, 0.0, by_r),
         )
     )
-    speed2 = do("product", value(2.0), read("aero/airspeed-of-rates-fps"))
+    speed2 = do("product", 2.0, read("aero/airspeed-of-rates-fps"))
     per = {axis: do("quotient", read(length), speed2) for axis, *_, length in _RATES}
     terms.helper("aero/rates/rotation-hat", "Rotation times b/2V", do("product", omega, per["p"]))
     for axis, rate, along in (("p", p, along_x), ("q", q, sin_beta), ("r", r, along_z)):

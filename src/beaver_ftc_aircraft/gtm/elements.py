@@ -29,16 +29,17 @@ def triple(of: Iterable[float]) -> str:
     return "".join(f"<{axis}>{float(number)!r}</{axis}>" for axis, number in zip("xyz", of, strict=True))
 
 
-def do(operation: str, *arguments: str) -> str:
-    """An operation on its arguments; on one alone a sum or product has nothing to do."""
-    if operation in ("sum", "product") and len(arguments) == 1:
-        return arguments[0]
-    return f"<{operation}>{''.join(arguments)}</{operation}>"
+def do(operation: str, *arguments: str | float) -> str:
+    """An operation on its arguments, numbers among them; on one alone a sum or product has nothing to do."""
+    parts = [of if isinstance(of, str) else value(of) for of in arguments]
+    if operation in ("sum", "product") and len(parts) == 1:
+        return parts[0]
+    return f"<{operation}>{''.join(parts)}</{operation}>"
 
 
 def unless_zero(name: str, otherwise: str) -> str:
     """What is looked up only if a property is not zero."""
-    return do("ifthen", do("eq", read(name), value(0.0)), value(0.0), otherwise)
+    return do("ifthen", do("eq", read(name), 0.0), 0.0, otherwise)
 
 
 def function(name: str, says: str, body: str) -> str:
@@ -107,7 +108,7 @@ def piecewise(key: str, grid: Sequence[float], values: Sequence[str]) -> str:
     if len(grid) == 2:
         (low, high), (at_low, at_high) = grid, values
         parts = [
-            do("product", do("quotient", do("difference", read(key), value(other)), value(here - other)), at)
+            do("product", do("quotient", do("difference", read(key), other), here - other), at)
             for here, other, at in ((low, high, at_low), (high, low, at_high))
             if at
         ]
@@ -115,4 +116,4 @@ def piecewise(key: str, grid: Sequence[float], values: Sequence[str]) -> str:
     middle = len(grid) // 2
     below = piecewise(key, grid[: middle + 1], values[: middle + 1])
     above = piecewise(key, grid[middle:], values[middle:])
-    return do("ifthen", do("lt", read(key), value(float(grid[middle]))), below, above)
+    return do("ifthen", do("lt", read(key), grid[middle]), below, above)

@@ -50,20 +50,14 @@ def _damage() -> str:
     names = list(cases())
     which = value(0.0)
     for number, name in reversed([*enumerate(names, 1)]):
-        is_there = do("gt", read(damage_property(name)), value(0.5))
-        which = do("ifthen", is_there, value(float(number)), which)
+        is_there = do("gt", read(damage_property(name)), 0.5)
+        which = do("ifthen", is_there, number, which)
     parts = [component(DAMAGE_CASE, "Number of the damage in force, 0 for none", which)]
     for surface in can_be_taken():
         taking = [number for number, name in enumerate(names, 1) if surface in cases()[name]["takes"]]
-        gone = do(
-            "or", *(do("eq", read(DAMAGE_CASE), value(float(number))) for number in (*taking, taking[0]))
-        )
-        parts.append(
-            component(
-                present(surface), "Whether damage has left it", do("ifthen", gone, value(0.0), value(1.0))
-            )
-        )
-    down = do("ifthen", do("ge", read(GEAR), value(0.5)), value(1.0), value(0.0))
+        gone = do("or", *(do("eq", read(DAMAGE_CASE), number) for number in (*taking, taking[0])))
+        parts.append(component(present(surface), "Whether damage has left it", do("ifthen", gone, 0.0, 1.0)))
+    down = do("ifthen", do("ge", read(GEAR), 0.5), 1.0, 0.0)
     parts.append(component("gear/mass-down", "Whether the gear's mass is down", down))
     for index, weights in weights_by_case().items():
         says = (
@@ -107,18 +101,16 @@ def _clock() -> str:
     """When a sample of the commands is due: after 5 ms, or a frame if that is longer, and always where time
     stands still. How many samples ago the delay is."""
     frame = read("simulation/dt")
-    still = do("eq", frame, value(0.0))
-    more = do("integer", do("difference", do("quotient", value(_STEP_S), frame), value(1e-6)))
-    frames = do("sum", more, value(1.0))
+    still = do("eq", frame, 0.0)
+    more = do("integer", do("difference", do("quotient", _STEP_S, frame), 1e-6))
+    frames = do("sum", more, 1.0)
     older = do("sum", read(_AGE), frame)
-    due = do("ge", older, do("difference", read(_SPACING), value(1e-9)))
+    due = do("ge", older, do("difference", read(_SPACING), 1e-9))
     ago = do("quotient", do("difference", read(DELAY), read(_AGE)), read(_SPACING))
     parts = [
-        component(
-            _SPACING, "Between samples", do("ifthen", still, value(_STEP_S), do("product", frame, frames))
-        ),
+        component(_SPACING, "Between samples", do("ifthen", still, _STEP_S, do("product", frame, frames))),
         component(_DUE, "Whether to take a sample", do("or", due, still)),
-        component(_AGE, "Since the last sample", do("ifthen", read(_DUE), value(0.0), older)),
+        component(_AGE, "Since the last sample", do("ifthen", read(_DUE), 0.0, older)),
         component(_AGO, "How many samples ago the delay is", ago),
     ]
     return _system(
@@ -130,16 +122,16 @@ def _delayed(text: str, surface: str) -> str:
     """Let the actuator see the command late, by a line between samples. An ideal actuator sees it at once."""
     command, late = f"fcs/{surface}-cmd-rad", f"fcs/{surface}-cmd-late-rad"
     line = [f"fcs/{surface}-cmd-{i}-ago-rad" for i in range(_SAMPLES)]
-    still, parts = do("eq", read("simulation/dt"), value(0.0)), []
+    still, parts = do("eq", read("simulation/dt"), 0.0), []
     for i in reversed(range(_SAMPLES)):
         before = do("ifthen", still, read(command), read(line[i - 1])) if i else read(command)
         body = do("ifthen", read(_DUE), before, read(line[i]))
         parts.append(component(line[i], f"The command {i} samples ago", body))
     between = piecewise(_AGO, [float(i) for i in range(_SAMPLES)], [read(name) for name in line])
-    as_asked = do("ifthen", do("gt", read(_AGO), value(0.0)), between, read(command))
+    as_asked = do("ifthen", do("gt", read(_AGO), 0.0), between, read(command))
     parts.append(component(late, "The command as the servo gets it", as_asked))
     channel = f'<channel name="{surface} delay" execute="{DELAY}">{"".join(parts)}</channel>'
-    seen = do("ifthen", do("gt", read(DELAY), value(0.0)), read(late), read(command))
+    seen = do("ifthen", do("gt", read(DELAY), 0.0), read(late), read(command))
     head, demand, tail = text.partition(f'name="fcs/{surface}-demand-rad"')
     tail = tail.replace(f"<property> {command} </property>", seen, 1)
     return head.replace("<channel", f"{channel}\n  <channel", 1) + demand + tail
@@ -169,13 +161,11 @@ def _spools() -> str:
     s = damping / 2.0
     w = sqrt(stiffness - s * s)
     dt = read("simulation/dt")
-    turn = do("product", value(w), dt)
-    fade = do("exp", do("product", value(-s), dt))
+    turn = do("product", w, dt)
+    fade = do("exp", do("product", -s, dt))
     parts = [
         component("fcs/spool-cosine", "e^(-s dt) cos(w dt)", do("product", fade, do("cos", turn))),
-        component(
-            "fcs/spool-sine", "e^(-s dt) sin(w dt) / w", do("product", value(1.0 / w), fade, do("sin", turn))
-        ),
+        component("fcs/spool-sine", "e^(-s dt) sin(w dt) / w", do("product", 1.0 / w, fade, do("sin", turn))),
     ]
     for engine in ENGINES:
         first, second, throttle = (f"fcs/{engine}-spool-{name}" for name in ("rate", "level", "throttle"))
@@ -187,32 +177,30 @@ def _spool(engine: str, names: tuple[str, str, str], damping: float, stiffness: 
     """States about where they settle, (0, u / stiffness): there they only turn and fade."""
     first, second, held = names
     cosine, sine = read("fcs/spool-cosine"), read("fcs/spool-sine")
-    still = do("eq", read("simulation/dt"), value(0.0))
-    off = do("difference", read(second), do("quotient", read(held), value(stiffness)))
-    throttle = do("product", value(PERCENT), read(f"fcs/{engine}-effective-norm"))
+    still = do("eq", read("simulation/dt"), 0.0)
+    off = do("difference", read(second), do("quotient", read(held), stiffness))
+    throttle = do("product", PERCENT, read(f"fcs/{engine}-effective-norm"))
     off_before = component(f"{second}-off", "The second state, from where it settles", off)
     # [first, off] times exp(A dt), A = [[-damping, -stiffness], [1, 0]], A + s = [[-s, -stiffness], [1, s]]
     s = damping / 2.0
     new_first = do(
         "sum",
-        do("product", read(first), do("difference", cosine, do("product", value(s), sine))),
-        do("product", value(-stiffness), sine, read(f"{second}-off")),
+        do("product", read(first), do("difference", cosine, do("product", s, sine))),
+        do("product", -stiffness, sine, read(f"{second}-off")),
     )
     new_second = do(
         "sum",
         do("product", sine, read(f"{first}-before")),
-        do("product", read(f"{second}-off"), do("sum", cosine, do("product", value(s), sine))),
-        do("quotient", read(held), value(stiffness)),
+        do("product", read(f"{second}-off"), do("sum", cosine, do("product", s, sine))),
+        do("quotient", read(held), stiffness),
     )
-    settled = do("quotient", throttle, value(stiffness))
+    settled = do("quotient", throttle, stiffness)
     a, b = parameters()["engine"]["spool"]["c"]
-    lagged = do("sum", do("product", value(a), read(first)), do("product", value(b), read(second)))
+    lagged = do("sum", do("product", a, read(first)), do("product", b, read(second)))
     return [
         off_before,
         component(f"{first}-before", "The first state, a frame ago", read(first)),
-        component(
-            first, "First state, settled where time stands still", do("ifthen", still, value(0.0), new_first)
-        ),
+        component(first, "First state, settled where time stands still", do("ifthen", still, 0.0, new_first)),
         component(second, "Second state", do("ifthen", still, settled, new_second)),
         component(held, "Throttle over the frame to come, %", throttle),
         component(f"fcs/{engine}-lagged-percent", "Throttle as the engine has followed it, %", lagged),
@@ -232,11 +220,11 @@ def engine_functions() -> str:
         found += _engine(engine)
         for axis, share in zip("xyz", direction(engine), strict=True):
             rpm = read(f"engine/{engine}/rpm-percent")
-            momentum[axis].append(do("product", value(share * per_percent), rpm))
+            momentum[axis].append(do("product", share * per_percent, rpm))
     for axis, parts in momentum.items():
         found.append(function(f"engine/rotors/h-{axis}", "Angular momentum, slug ft2/s", do("sum", *parts)))
     thrust = do("sum", *(read(f"engine/{engine}/thrust-lbs") for engine in ENGINES))
-    dynamic = do("product", do("max", value(0.01), read("aero/qbar-psf")), read("metrics/Sw-sqft"))
+    dynamic = do("product", do("max", 0.01, read("aero/qbar-psf")), read("metrics/Sw-sqft"))
     says = "Thrust of both engines over dynamic pressure and wing area"
     found.append(function("aero/thrust-coefficient", says, do("quotient", thrust, dynamic)))
     return "".join(found)
@@ -284,18 +272,18 @@ def _polynomial(of: list[float], x: str) -> str:
     body = value(float(of[0]))
     for coefficient in of[1:]:
         body = do("product", body, x)
-        body = do("sum", body, value(float(coefficient))) if coefficient else body
+        body = do("sum", body, coefficient) if coefficient else body
     return body
 
 
 def _engine(engine: str) -> list[str]:
     of = parameters()["engine"]
     rpm, static = f"engine/{engine}/rpm-percent", f"engine/{engine}/static-thrust-lbs"
-    thin = do("quotient", read("atmosphere/P-psf"), value(float(of["sea_level_psf"])))
-    ram = do("product", value(of["ram_drag"]), read("aero/qbar-psf"), read("metrics/Sw-sqft"))
+    thin = do("quotient", read("atmosphere/P-psf"), of["sea_level_psf"])
+    ram = do("product", of["ram_drag"], read("aero/qbar-psf"), read("metrics/Sw-sqft"))
     net = do("difference", do("product", read(static), thin), ram)
     return [
         function(rpm, "Speed, %", _polynomial(of["rpm_percent"], read(f"fcs/{engine}-lagged-percent"))),
         function(static, "Thrust at sea level, at rest", _polynomial(of["thrust_lbf"], read(rpm))),
-        function(f"engine/{engine}/thrust-lbs", "Thrust less ram drag", do("max", value(0.0), net)),
+        function(f"engine/{engine}/thrust-lbs", "Thrust less ram drag", do("max", 0.0, net)),
     ]

@@ -11,6 +11,8 @@ from typing import Any, NamedTuple
 from beaver_ftc.results.model import Expectation, Metrics
 from beaver_ftc.scenario.declared import OF_DIAGNOSIS, in_words
 
+MOTION_OF_AXIS = {"p": "roll", "q": "pitch", "r": "yaw"}
+
 
 class Rule(NamedTuple):
     """Where the metrics have what an expectation is of, and how both are said."""
@@ -100,7 +102,7 @@ RULES: dict[str, Rule] = {
     **{
         f"{key}.{axis}": Limit(f"tracking.{key}.{axis}", (f"{name} rate RMS {when} the fault", "deg/s"))
         for key, when in (("pre_fault_rms_deg_s", "before"), ("post_fault_rms_deg_s", "after"))
-        for axis, name in (("p", "roll"), ("q", "pitch"), ("r", "yaw"))
+        for axis, name in MOTION_OF_AXIS.items()
     },
 }
 
@@ -108,15 +110,16 @@ RULES: dict[str, Rule] = {
 def evaluate(expect: Any, metrics: Metrics) -> list[Expectation]:
     """One record for each expectation set in `expect`, in its fields' order; with `reason`, where one is
     known."""
-    return [_judged(name, expected, metrics) for name, expected in _expected(expect)]
+    return [_judged(name, expected, metrics) for name, expected in expected_of(expect)]
 
 
 def expectation_names(expect: Any) -> list[str]:
     """The names of what a scenario expects, as in `evaluate`."""
-    return [name for name, _ in _expected(expect)]
+    return [name for name, _ in expected_of(expect)]
 
 
-def _expected(expect: Any) -> Iterator[tuple[str, Any]]:
+def expected_of(expect: Any) -> Iterator[tuple[str, Any]]:
+    """(name, value) of each expectation set in `expect`, those of a section one by one."""
     for name, expected in expect.model_dump(exclude_none=True).items() if expect else ():
         if isinstance(expected, dict):
             yield from ((f"{name}.{part}", limit) for part, limit in expected.items())
@@ -181,7 +184,7 @@ def expectations_in_words(metrics: Metrics) -> list[ExpectationInWords]:
 
 
 def _in_words(said: Expectation) -> ExpectationInWords:
-    rule = RULES.get(said.name) or Rule("", (said.name.replace("_", " "),))
+    rule = RULES.get(said.name) or Rule("", (without_underscores(said.name),))
     limit, actual = rule.texts(said)
     reason = said.reason if actual or not said.passed else ""
     share = _share_of_limit(said) if isinstance(rule, Limit) else None
@@ -201,6 +204,11 @@ def value_text(value: Any) -> str:
     if isinstance(value, tuple):
         return ", ".join(value_text(entry) for entry in value)
     return value if isinstance(value, str) else three_digits(value)
+
+
+def without_underscores(name: str) -> str:
+    """A name of the code in words."""
+    return name.replace("_", " ")
 
 
 def three_digits(value: float) -> str:

@@ -10,7 +10,12 @@ from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from beaver_ftc.results.expectations import expectations_in_words, value_text
+from beaver_ftc.results.expectations import (
+    MOTION_OF_AXIS,
+    expectations_in_words,
+    value_text,
+    without_underscores,
+)
 from beaver_ftc.results.model import (
     Authority,
     CertificateCounts,
@@ -175,7 +180,7 @@ _AIRCRAFT_PART_OF_SURFACE_WORD = {
 def _surfaces_text(names: Sequence[str]) -> str:
     """One surface, a few by their names, or many counted by the part of the aircraft where they are."""
     if len(names) <= MAX_LISTED_CANDIDATES:
-        return " or ".join(_without_underscores(name) for name in names)
+        return " or ".join(without_underscores(name) for name in names)
     part_of = _AIRCRAFT_PART_OF_SURFACE_WORD.items()
     parts = Counter(next((part for word, part in part_of if word in name), "others") for name in names)
     counted = ", ".join(f"{n} {'' if part == 'others' else 'on the '}{part}" for part, n in parts.items())
@@ -185,12 +190,8 @@ def _surfaces_text(names: Sequence[str]) -> str:
 def _open_types_text(kinds: Sequence[str]) -> str:
     """The types that remain, counted."""
     if len(kinds) == 1:
-        return f"type {_without_underscores(kinds[0])}"
-    return f"type not determined ({len(kinds)} remain: {', '.join(map(_without_underscores, kinds))})"
-
-
-def _without_underscores(name: str) -> str:
-    return name.replace("_", " ")
+        return f"type {without_underscores(kinds[0])}"
+    return f"type not determined ({len(kinds)} remain: {', '.join(map(without_underscores, kinds))})"
 
 
 def _count_and_noun(n: int, what: str) -> str:
@@ -291,7 +292,7 @@ def _fault_text(fault: Fault | None, faults: Sequence[DeclaredFault] = ()) -> st
     if fault is None:
         return "none"
     place = f"sensor {fault.sensor}" if fault.sensor else fault.actuator or ""
-    what = f"{place} {_without_underscores(fault.type)}".strip()
+    what = f"{place} {without_underscores(fault.type)}".strip()
     at = f"at {_seconds_text(fault.at_s)}"
     if not isinstance(fault, DeclaredFault):
         return f"{what} {at}"
@@ -305,7 +306,7 @@ def _masked_text(fault: DeclaredFault, faults: Sequence[DeclaredFault]) -> str:
     later = [one for one in faults if one.at_s > fault.at_s and masking(fault, faults, one.at_s) is one]
     spells = [
         f"from {_seconds_text(one.at_s)}{'' if one.end_s is None else f' to {_seconds_text(one.end_s)}'} "
-        f"({_without_underscores(one.type)})"
+        f"({without_underscores(one.type)})"
         for one in later
     ]
     return f", without effect {' and '.join(spells)}" if spells else ""
@@ -405,7 +406,7 @@ def _withdrawn_texts(heading: str, gone: Sequence[Withdrawn]) -> list[str]:
     """What was named before, each name once: when, and why it was withdrawn, the last time of several."""
     spells: dict[str, list[Withdrawn]] = {}
     for one in gone:
-        kind = f" ({_without_underscores(one.type)})" if one.type else ""
+        kind = f" ({without_underscores(one.type)})" if one.type else ""
         spells.setdefault(f"{one.fault}{kind}", []).append(one)
     said = []
     for name, each in spells.items():
@@ -439,7 +440,7 @@ def _type_text(isolation: Named) -> str:
         return ""
     if isolation.type is None:
         return f", {_open_types_text(isolation.candidates) if isolation.candidates else 'of no known type'}"
-    return "" if isolation.type == "unanticipated" else f", {_without_underscores(isolation.type)}"
+    return "" if isolation.type == "unanticipated" else f", {without_underscores(isolation.type)}"
 
 
 def _estimate_text(isolation: Named) -> str:
@@ -458,7 +459,6 @@ def _supervisor_text(metrics: Metrics) -> str:
 
 
 MAX_SHOWN_AUTHORITY_SHARE = 0.995  # of an axis: nothing to be said
-_AXIS_TITLES = {"p": "roll", "q": "pitch", "r": "yaw"}
 
 
 def _insufficient_authority_text(authority: Authority) -> str:
@@ -482,7 +482,7 @@ def _remaining_authority_text(authority: Authority) -> str:
         if share < MAX_SHOWN_AUTHORITY_SHARE or most:
             engines = f", engines {of.engines_least_rad_s2:.2g} to {most:.2g}" if most else ""
             span = f"{of.least_rad_s2:.2g} to {of.greatest_rad_s2:.2g} rad/s2{engines}"
-            said.append(f"{_AXIS_TITLES[axis]} authority {100 * share:.0f} % ({span})")
+            said.append(f"{MOTION_OF_AXIS[axis]} authority {100 * share:.0f} % ({span})")
     return "; ".join(said)
 
 

@@ -18,11 +18,12 @@ import numpy as np
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.results import log
+from beaver_ftc.results.expectations import MOTION_OF_AXIS, without_underscores
 from beaver_ftc.results.model import Metrics
 from beaver_ftc.scenario.diagnosis import MODES
 from beaver_ftc.scenario.signals import MEAN_S
 
-AXIS_NAMES = {"p": "roll rate p", "q": "pitch rate q", "r": "yaw rate r"}
+AXIS_NAMES = {axis: f"{motion} rate {axis}" for axis, motion in MOTION_OF_AXIS.items()}
 
 SIDES = ("left", "right")
 SURFACE_ROLES = tuple(f"surface {i}" for i in range(8))  # looks of the surfaces, in the aircraft's order
@@ -157,8 +158,10 @@ def views(columns: Sequence[str], power: bool = False, within_mps: float | None 
 
 def power_column(columns: Sequence[str]) -> str:
     """The log's column of the engine power commanded along a profile; empty where there is none."""
-    if BEAVER_POWER_COLUMN in columns or "altitude_command_m" not in columns:
-        return BEAVER_POWER_COLUMN if BEAVER_POWER_COLUMN in columns else ""
+    if BEAVER_POWER_COLUMN in columns:
+        return BEAVER_POWER_COLUMN
+    if "altitude_command_m" not in columns:
+        return ""
     before = list(columns)[list(columns).index("altitude_command_m") - 1]
     return "" if before in ("detected", "watch_test") else before
 
@@ -340,7 +343,7 @@ def _candidates_view(moved: Sequence[str], names: Sequence[str]) -> View:
     excluded."""
     roles = dict(zip(moved, SURFACE_ROLES * len(moved), strict=False))
     traces = [
-        (f"fie_{name}_excluded", _without_underscores(surface), roles[surface])
+        (f"fie_{name}_excluded", without_underscores(surface), roles[surface])
         for surface in moved
         for name in names
         if surface == max((of for of in moved if f"{name}_".startswith(f"{of}_")), key=len, default="")
@@ -353,7 +356,7 @@ def _candidates_view(moved: Sequence[str], names: Sequence[str]) -> View:
 
 def _isolation_view(names: Sequence[str]) -> View:
     panels = tuple(
-        isolation_panel(name, axis, f"{_without_underscores(name)} estimator: {axis}", "threshold")
+        isolation_panel(name, axis, f"{without_underscores(name)} estimator: {axis}", "threshold")
         for name in names
         for axis in AXES
     )
@@ -372,7 +375,7 @@ def _isolation_view(names: Sequence[str]) -> View:
 def _ratio_view(names: Sequence[str]) -> View:
     stems = [
         ("detection estimator", ""),
-        *((f"{_without_underscores(name)} estimator", f"fie_{name}_") for name in names),
+        *((f"{without_underscores(name)} estimator", f"fie_{name}_") for name in names),
     ]
     panels = tuple(
         _ratio_panel(
@@ -383,10 +386,6 @@ def _ratio_view(names: Sequence[str]) -> View:
     )
     title = "Residual over threshold: above 1 is an alarm, or an exclusion"
     return View("ratio", title, panels, n_panel_columns=1 if len(panels) <= 4 else 3)
-
-
-def _without_underscores(name: str) -> str:
-    return name.replace("_", " ")
 
 
 def _effectiveness_view(names: Sequence[str]) -> View:

@@ -226,11 +226,12 @@ def open_loop(
     lost = 1.0 - effectiveness[law.main[PITCH]] if law.stand_in >= 0 else 0.0
     whole = 1.0 - (1.0 - frame.actuators.approach) ** scenario.substeps
     C = outputs(linear.states, y)
+    delay_s, keep = sensors(scenario, len(C), dt)
     demand = allocation(G * effectiveness, law.main, law.stand_in, lost)
+    Kp, L_rate, L_disturbance = interpolated(law.schedule, y[QDYN], lost)
     return OpenLoop(
         linear.A, linear.B, C, np.hstack((f_x, f_y[:, : len(C) - 3])), G * effectiveness, effectiveness,
-        whole, *sensors(scenario, len(C), dt), dt, *interpolated(law.schedule, y[QDYN], lost), demand,
-        law.lead, law.share,
+        whole, delay_s, keep, dt, Kp, L_rate, L_disturbance, demand, law.lead, law.share,
     )  # fmt: skip
 
 

@@ -50,7 +50,7 @@ CAPTIONS = {  # of each figure: what it shows, and what to see
 
 @shared
 def _document() -> Document:
-    return reproduced(2)[0]
+    return reproduced(2)
 
 
 def reproduction_headline() -> str:
@@ -142,7 +142,7 @@ def _beside(document: Document) -> str:
 def reproduction_figures() -> str:
     """One figure for each published one, and how far each number stays from its limit."""
     write_files(Path("images"), {})
-    write_files(Path(FOLDER), figures_of(_document(), fly_published().published))
+    write_files(Path(FOLDER), figures_of(_document(), fly_published()))
     return _figures()
 
 
@@ -162,9 +162,9 @@ def _caption(title: str, name: str) -> str:
 
 def reproduction_probe() -> str:
     """The number of every measured statement in the published flights alone, and ours beside them."""
-    flights = fly_published()
-    said = [f"{claim.statement} {claim.number(flights.published):.6g}" for claim in MEASURED]
-    for (case, whose), flown in flights.beside.items():
+    published = fly_published()
+    said = [f"{claim.statement} {claim.number(published):.6g}" for claim in MEASURED]
+    for (case, whose), flown in beside.fly_beside().items():
         travel = flown.metrics.tracking.surface_travel_deg
         said.append(f"{case}, {whose}: {sum(travel.values()):.6g} deg")
     return "\n".join(said)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from beaver_ftc.aircraft import AXES
+from beaver_ftc.results.expectations import MOTION_OF_AXIS, without_underscores
 from beaver_ftc.results.log import StoredLog
 from beaver_ftc.results.model import Metrics
 from beaver_ftc.results.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION, Mark, marks
@@ -18,7 +19,7 @@ from beaver_ftc.studies.linear_systems import CHANNELS, response
 from beaver_ftc.studies.mismatch.linear import LinearAnalysis
 from beaver_ftc.studies.mismatch.sources import SOURCES
 from beaver_ftc.studies.mismatch.split import CAUSES, ETA_BAR, FAULT, TOTAL, UNEXPLAINED, column
-from beaver_ftc.studies.mismatch.tables import Document, label, percent
+from beaver_ftc.studies.mismatch.tables import Document, percent
 from beaver_ftc.studies.present.figures import heat_map, label_edges, panels
 from beaver_ftc.studies.present.page import Files
 
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-AXIS_NAMES = ("roll p", "pitch q", "yaw r")
+AXIS_NAMES = [f"{motion} {axis}" for axis, motion in MOTION_OF_AXIS.items()]
 BEYOND = 1e6  # the share of a bound of nothing
 SHOWN_SOURCES = 4  # curves an eye can follow in one panel
 LEAST_CURVE = 1e-3  # of the largest source: a smaller one is a line at zero
@@ -85,7 +86,12 @@ def _draw_sources(axes: "Axes", series: dict, axis: str, chosen: list[str], inst
         colour, dashes = SOURCE_LOOKS[name]
         style: Any = (0, dashes) if dashes else "-"
         axes.plot(
-            t, series[column(axis, name)], label=label(name), color=colour, linestyle=style, linewidth=1.3
+            t,
+            series[column(axis, name)],
+            label=without_underscores(name),
+            color=colour,
+            linestyle=style,
+            linewidth=1.3,
         )
     for i, mark in enumerate(instants):
         axes.axvline(mark.time_s, color=mark.colour, linewidth=0.9, linestyle=(0, mark.dash or (1, 0)))
@@ -115,7 +121,7 @@ def bound_figure(found: Document) -> "Figure":
     title = f"Largest share of the bound eta_bar\n{found['scenario']}", "share of eta_bar (1: all of it)"
     size = 11.0, 1.6 + 0.34 * max(len(names), 2)
     ends = LEAST_SHARE, 30.0 * max(values.max(initial=0.0), 1.0)
-    shown = [label(name) for name in names], np.maximum(values, LEAST_SHARE), notes
+    shown = [without_underscores(name) for name in names], np.maximum(values, LEAST_SHARE), notes
     return _bars(size, title, *shown, ends, grey=FAULT)
 
 
@@ -129,7 +135,10 @@ def comparison_figure(entries: Sequence[Document]) -> "Figure":
     needed = [[each[f"{axis}_worst_ratio"] for each in entries] for axis in AXES]
     ratios = np.array([[max(_length(ratio), LEAST_RATIO) for ratio in row] for row in needed])
     notes = [
-        [f"{percent(r)} ({label(each[f'{axis}_dominant'])})" for r, each in zip(row, entries, strict=True)]
+        [
+            f"{percent(r)} ({without_underscores(each[f'{axis}_dominant'])})"
+            for r, each in zip(row, entries, strict=True)
+        ]
         for row, axis in zip(needed, AXES, strict=True)
     ]
     title = "Mismatch at its worst, faults aside, over the bound", "largest mismatch / eta_bar"

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.documents.files import read_json
+from beaver_ftc.results.expectations import without_underscores
 from beaver_ftc.results.model import Document
 from beaver_ftc.results.report import register_section
 from beaver_ftc.results.verdict import printed
@@ -19,11 +20,6 @@ PICTURES = {
     "mismatch-linear": "Poles and frequency responses: truth, FDC equations, design model",
 }
 Table = tuple[str, list[str], list[list[str]]]  # caption, head, rows
-
-
-def label(source: str) -> str:
-    """A source's name in words."""
-    return source.replace("_", " ")
 
 
 def percent(share: float | None) -> str:
@@ -45,9 +41,10 @@ def mismatch_text(found: Document, folder: str, colour: bool = False) -> str:
 def findings(found: Document) -> list[str]:
     """What it comes to, in words, for the terminal and the page."""
     worst = found["dominant"]
-    dominant = "nothing: truth and design agree" if worst is None else (
-        f"{label(worst['source'])}: {percent(worst['bound_share'])} of the bound on {worst['axis']}"
-    )  # fmt: skip
+    dominant = "nothing: truth and design agree"
+    if worst is not None:
+        source, share = without_underscores(worst["source"]), percent(worst["bound_share"])
+        dominant = f"{source}: {share} of the bound on {worst['axis']}"
     lines = [f"dominant     {dominant}"]
     if found["false_alarm"]:
         detection = found["detection"]
@@ -82,7 +79,11 @@ def _case(case: Document) -> str:
 
 
 def _reason(stays: list[Document]) -> str:
-    return label(max(stays, key=lambda stay: stay["peak_ratio"] or 0.0)["source"]) if stays else "-"
+    return (
+        without_underscores(max(stays, key=lambda stay: stay["peak_ratio"] or 0.0)["source"])
+        if stays
+        else "-"
+    )
 
 
 def _needed(axis: str, entry: Document) -> str:
@@ -103,14 +104,14 @@ BOUNDS = (
 )  # fmt: skip
 # Frequency and damping of a mode, and how far the others are from the truth.
 MODES = (
-    ("mode", "mode", label), ("truth rad/s", "truth.frequency_rad_s", _4_DIGITS),
+    ("mode", "mode", without_underscores), ("truth rad/s", "truth.frequency_rad_s", _4_DIGITS),
     ("damping", "truth.damping", "{:.3g}".format), ("FDC off by", "deviation.fdc", percent),
     ("design off by", "deviation.design", percent), ("JSBSim's own off by", "jsbsim_own_deviation", percent),
 )  # fmt: skip
 # A run: worst share of the bound, smallest constant, reason, alarm and guarantee.
 RUNS = (
     ("run", "scenario"), *((axis, partial(_needed, axis)) for axis in AXES),
-    ("dominant", "dominant", lambda source: label(source or "-")),
+    ("dominant", "dominant", lambda source: without_underscores(source or "-")),
     ("false alarm", "false_alarm", lambda is_false: "yes" if is_false else "no"),
     ("certain within", _certain_within),
 )  # fmt: skip
@@ -137,7 +138,7 @@ def _sources(found: Document) -> Table:
     for name in found["axes"]["p"]:
         per_axis = [found["axes"][axis][name] for axis in AXES]
         if any(of["max"] > 0.0 for of in per_axis):
-            rows.append(_row(label(name), per_axis))
+            rows.append(_row(without_underscores(name), per_axis))
         for part in per_axis[0].get("parts", {}):
             rows.append(_row(f"  {part}", [of["parts"][part] for of in per_axis]))
     return caption, head, rows

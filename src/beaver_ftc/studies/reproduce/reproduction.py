@@ -11,7 +11,7 @@ from typing import Any
 from beaver_ftc.commands import Reporter, StudyCommand, WorkersOption
 from beaver_ftc.results.metrics import as_json, versions
 from beaver_ftc.results.model import Document
-from beaver_ftc.studies.engine.study import Progress, Study, fly_all, run_study
+from beaver_ftc.studies.engine.study import Study, fly_all, run_study
 from beaver_ftc.studies.present.page import Makers
 from beaver_ftc.studies.present.tables import finite
 from beaver_ftc.studies.reproduce import beside, truth_and_design
@@ -54,16 +54,6 @@ STUDIED: tuple[tuple[str, Changed], ...] = (  # what is asked of a setting, and 
 )
 
 
-@dataclass(frozen=True)
-class Flights:
-    """What is flown once, for the document and the figures: the published cases, both schemes side by side,
-    and both design models."""
-
-    published: dict[str, Flown]
-    beside: dict[tuple[str, str], Flown]
-    designs: list[tuple[Flown, Flown]]
-
-
 def row_of(studied: tuple[str, Changed]) -> Document:
     """Of a setting the number of every measured claim, in their order, the same without the mechanism, and
     in how many flights adaptation changes no alarm and no name; or whether a healthy flight alarms. A number
@@ -93,14 +83,13 @@ def _found_in(flown: Flown) -> tuple[float | None, str | None, float | None]:
     return found.detection.time_s, found.isolation.fault, found.isolation.time_s
 
 
-def fly_published() -> Flights:
-    """Every flight that is shown."""
-    published = {case.name: fly_case(case) for case in PUBLISHED}
-    return Flights(published, beside.fly_beside(), truth_and_design.fly_designs())
+def fly_published() -> dict[str, Flown]:
+    """The published cases, by name."""
+    return {case.name: fly_case(case) for case in PUBLISHED}
 
 
-def document_of(flights: Flights, rows: Sequence[Document]) -> Document:
-    """Judge the flights; rows: of every setting of STUDIED."""
+def document_of(published: Mapping[str, Flown], rows: Sequence[Document]) -> Document:
+    """Judge the published cases, and fly what is shown beside them; rows: of every setting of STUDIED."""
     settings = {
         setting.name: row for (asked, setting), row in zip(STUDIED, rows, strict=True) if asked == NUMBERS
     }
@@ -110,16 +99,8 @@ def document_of(flights: Flights, rows: Sequence[Document]) -> Document:
         claim: _judged(claim, {name: (numbers[name][i], ablated[name][i]) for name in numbers})
         for i, claim in enumerate(MEASURED)
     }
-    unjudged = {
-        "verdict": CANNOT_BE_JUDGED,
-        "reason": "",
-        "because": "",
-        "number": None,
-        "construction": False,
-    }
     claims = [
-        {"where": c.where, "statement": c.statement} | judged.get(c, unjudged | {"reason": c.reason})
-        for c in CLAIMS
+        {"where": c.where, "statement": c.statement, **(judged.get(c) or _unjudged(c.reason))} for c in CLAIMS
     ]
     counts = Counter(claim["verdict"] for claim in claims)
     return {
@@ -133,9 +114,9 @@ def document_of(flights: Flights, rows: Sequence[Document]) -> Document:
         "claims": claims,
         "ablations": _ablations(claims),
         "beside": beside.document_of(
-            flights.beside, [row[FALSE_ALARM] for row in rows if FALSE_ALARM in row]
+            beside.fly_beside(), [row[FALSE_ALARM] for row in rows if FALSE_ALARM in row]
         ),
-        "truth_and_design": truth_and_design.document_of(flights.designs),
+        "truth_and_design": truth_and_design.document_of(truth_and_design.fly_designs()),
         "choices": [asdict(choice) for choice in (*CHOICES, *OPTIONS)],
         "gains": _gains(ours, numbers),
         "sensitivity": [
@@ -153,7 +134,7 @@ def document_of(flights: Flights, rows: Sequence[Document]) -> Document:
             {
                 "case": case.name,
                 "shown_in": case.shown_in,
-                "metrics": flights.published[case.name].metrics.document(),
+                "metrics": published[case.name].metrics.document(),
             }
             for case in PUBLISHED
         ],
@@ -191,6 +172,13 @@ def _judged(claim: Claim, by_setting: Mapping[str, tuple[float, float]]) -> Docu
         "because": claim.because if verdict == NOT_BORNE_OUT else "",
         "reason": "",
     }
+
+
+def _unjudged(reason: str) -> Document:
+    """A claim that gives nothing to measure."""
+    return {
+        "verdict": CANNOT_BE_JUDGED, "reason": reason, "because": "", "number": None, "construction": False,
+    }  # fmt: skip
 
 
 def _counted_apart(claims: Sequence[Document]) -> Document:
@@ -268,30 +256,23 @@ def _missed(ours: list[float], numbers: list[float]) -> list[Document]:
     ]
 
 
-# Of the document and the flights of its figures.
+# Of the document and the published cases, flown.
 FILES: Makers = {
-    "figures": lambda found: figures_of(found[0], found[1].published),
+    "figures": lambda found: figures_of(*found),
     f"{NAME}.json": lambda found: as_json(found[0]),
     f"{NAME}.md": lambda found: as_markdown(found[0], "figures"),
     f"{NAME}.html": lambda found: partial(as_html, found[0]),
 }
 
 
-def reproduce(out: Path, workers: int, progress: Progress | None = None) -> Document:
-    """Write `out/reproduction/` (tables as JSON, Markdown and HTML, and the figures); return the document."""
-    study = Study(NAME, STUDIED, row_of, _found, FILES)
-    document: Document = run_study(study, out, workers, progress)[0]
-    return document
+def reproduced(workers: int) -> Document:
+    """The document, kept nowhere."""
+    return _found(fly_all(row_of, STUDIED, workers))[0]
 
 
-def reproduced(workers: int) -> tuple[Document, Flights]:
-    """The document and the flights of its figures, kept nowhere."""
-    return _found(fly_all(row_of, STUDIED, workers))
-
-
-def _found(rows: Sequence[Any]) -> tuple[Document, Flights]:
-    flights = fly_published()
-    return document_of(flights, rows), flights
+def _found(rows: Sequence[Any]) -> tuple[Document, dict[str, Flown]]:
+    published = fly_published()
+    return document_of(published, rows), published
 
 
 @dataclass(frozen=True)
@@ -326,7 +307,8 @@ class Reproduce(StudyCommand):
 
     def run(self, reporter: Reporter) -> Document:
         """Fly the published cases, and all settings with their ablations."""
-        document = reproduce(self.out, self.processes, reporter.progress)
+        study = Study(NAME, STUDIED, row_of, _found, FILES)
+        document: Document = run_study(study, self.out, self.processes, reporter.progress)[0]
         return document | {"folder": str(self.out / NAME)}
 
     def as_text(self, document: Document, colour: bool) -> str:

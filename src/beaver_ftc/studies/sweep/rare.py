@@ -18,6 +18,7 @@ import numpy as np
 
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError, SimulationFailed, say_once, suggestion
 from beaver_ftc.documents.files import Document
+from beaver_ftc.results.expectations import expected_of
 from beaver_ftc.results.log import Columns
 from beaver_ftc.results.metrics import as_json, measure, versions
 from beaver_ftc.scenario.builtin import to_yaml
@@ -25,7 +26,6 @@ from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sweeps import Sweep
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial
 from beaver_ftc.studies.engine.study import FlyRound, Study, run_study
-from beaver_ftc.studies.engine.workers import Case
 from beaver_ftc.studies.present.tables import all_finite, number
 from beaver_ftc.studies.sweep.one_flight import scenario_of, warm_up
 from beaver_ftc.studies.sweep.sampling import Assignment, values_at
@@ -143,14 +143,12 @@ def lognormal_mean(values: np.ndarray) -> tuple[float, float, float]:
 
 def scored(sweep: Sweep) -> list[str]:
     """The expectations of a sweep's base scenario whose failure has a score that rises towards it."""
-    found: list[str] = []
-    for name, expected in sweep.scenario({}).expect.model_dump(exclude_none=True).items():
-        several = expected.items() if isinstance(expected, dict) else ()
-        for full_name, one in [(f"{name}.{part}", one) for part, one in several] or [(name, expected)]:
-            is_limit = isinstance(one, float | int) and not isinstance(one, bool)
-            if is_limit or (full_name in ("no_departure", "no_false_alarm") and one is True):
-                found.append(full_name)
-    return found
+    return [
+        name
+        for name, expected in expected_of(sweep.scenario({}).expect)
+        if (name in ("no_departure", "no_false_alarm") and expected is True)
+        or (isinstance(expected, float | int) and not isinstance(expected, bool))
+    ]
 
 
 def check(sweep: Sweep, expectation: str) -> None:
@@ -235,7 +233,7 @@ def run_rare(
         found = document["likeliest"]
         return found and to_yaml(scenario_of(sweep, Assignment(found["run"], found["values"])))
 
-    def lost(case: Case, why: str) -> Document:
+    def lost(case: object, why: str) -> Document:
         say_once(f"{name}: of a flight {why}; such flights count as no event")
         return {"score": -math.inf, "failed": True}
 

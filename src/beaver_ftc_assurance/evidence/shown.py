@@ -42,7 +42,7 @@ def run_plan(
         document=lambda rows: document_of(plan, rows, now),
         files=FILES,
         follows_from=[plan.sha256, [source.sha256 for source in plan.sources.values()]],
-        lost=lambda case, why: failed(plan, case.what, why),
+        lost=lambda case, why: failed(plan, case, why),
     )
     document: Document = run_study(study, folder.parent, workers, progress)
     return document

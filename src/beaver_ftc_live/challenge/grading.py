@@ -18,7 +18,7 @@ from beaver_ftc.studies.compare import ORACLE_LAW as ORACLE
 from beaver_ftc.studies.compare import OUR_LAW as LAW
 from beaver_ftc.studies.compare import OUR_SCHEME as SCHEME
 from beaver_ftc.studies.compare import Entry, Result, result_of, with_entry
-from beaver_ftc.studies.engine import Case, Progress, Study, run_study
+from beaver_ftc.studies.engine import Progress, Study, run_study
 from beaver_ftc.studies.present import (
     Heading,
     Makers,
@@ -82,8 +82,8 @@ def grade(challenge: Path, workers: int, progress: Progress | None) -> Document:
     return run_study(study, challenge, workers, progress)
 
 
-def _lost(case: Case, why: str) -> Graded:
-    return Graded(case.what.student, reason=why, barred=True)
+def _lost(case: Any, why: str) -> Graded:
+    return Graded(case.student, reason=why, barred=True)
 
 
 def tried(source: str, name: str) -> Document:

@@ -9,7 +9,7 @@ import pytest
 
 from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.studies.engine import ray_workers, store, workers
-from beaver_ftc.studies.engine.workers import Batch, Case, Outcome, Work
+from beaver_ftc.studies.engine.workers import Batch, Outcome, Work
 
 
 def test_a_file_is_whole_or_as_it_was(tmp_path):
@@ -34,10 +34,10 @@ def test_a_file_is_whole_or_as_it_was(tmp_path):
 
 
 def double(case):
-    return {"run": case.run, "is": 2 * case.what}
+    return {"is": 2 * case}
 
 
-CASES = tuple(Case(run, 10 + run) for run in range(3))
+CASES = (10, 11, 12)
 
 
 class RayError(Exception):
@@ -109,10 +109,10 @@ def test_tasks_of_a_cluster(ray):
     assert variables == {**workers.ONE_THREAD_EACH, ray_workers.VARIABLE: "somebody:Theirs"}
     assert remote == ("remote", {"num_cpus": 1, "max_retries": 0})
     assert there.slots == 6
-    tasks = [Batch(number, CASES[:number]) for number in (1, 2, 3)]
+    tasks = [Batch(number, range(number), CASES[:number]) for number in (1, 2, 3)]
     for task in tasks:
         there.submit(task)
-    assert there.outcomes(0.5) == [Outcome(tasks[0], [{"run": 0, "is": 20}])]
+    assert there.outcomes(0.5) == [Outcome(tasks[0], [{"is": 20}])]
     assert ray.calls[-1] == ("wait", 1, 0.5)
     ray.ends[:] = [RayError()]
     assert there.outcomes(0.5) == [Outcome(tasks[1], None)]
@@ -126,7 +126,7 @@ def test_tasks_of_a_cluster(ray):
 
 def test_a_node_with_other_versions_does_not_fly():
     same = dict(ray_workers.versions())
-    assert ray_workers.fly_task(Work(double), same, CASES[:1]) == [{"run": 0, "is": 20}]
+    assert ray_workers.fly_task(Work(double), same, CASES[:1]) == [{"is": 20}]
     with pytest.raises(
         SimulationFailed, match=r"a node of the cluster has numpy .* instead of 0: the table would mix"
     ):

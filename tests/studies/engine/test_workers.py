@@ -10,7 +10,7 @@ import pytest
 
 PROGRAM = """
 import sys, time
-from beaver_ftc.studies.engine.workers import Batch, Case, Work, _Worker
+from beaver_ftc.studies.engine.workers import Batch, Work, _Worker
 
 def nap(case):
     time.sleep(20.0)
@@ -18,7 +18,7 @@ def nap(case):
 if __name__ == "__main__":
     workers = [_Worker(Work(nap)) for _ in range(3)]
     for number, worker in enumerate(workers):
-        worker.fly(Batch(number, (Case(0, None),)))
+        worker.fly(Batch(number, [0], [None]))
     time.sleep(float(sys.argv[1]))
     for worker in workers:
         worker.end()
@@ -137,7 +137,7 @@ workers.start_early = start_and_kill
 if __name__ == "__main__":
     try:
         worker = workers._Worker(workers.Work(len))
-        print(worker.fly(workers.Batch(0, (workers.Case(0, "four"),))).result(60), len(set(begun)))
+        print(worker.fly(workers.Batch(0, [0], ["four"])).result(60), len(set(begun)))
         worker.end()
     except workers.SimulationFailed as error:
         print(error)
@@ -147,7 +147,7 @@ if __name__ == "__main__":
 @pytest.mark.skipif(sys.platform == "win32", reason="there workers start afresh")
 @pytest.mark.parametrize(
     ("ends", "says"),
-    [(1, "[2] 2"), (9, "a worker process cannot start: what it is forked from is ended, each time")],
+    [(1, "[4] 2"), (9, "a worker process cannot start: what it is forked from is ended, each time")],
 )
 def test_what_workers_are_forked_from_is_killed(tmp_path, ends, says):
     (tmp_path / "killed.py").write_text(KILLED)

@@ -11,7 +11,6 @@ from beaver_ftc.results.style import BLUE, GREY
 from beaver_ftc.studies.compare.scores import document_of
 from beaver_ftc.studies.compare.trial import LAW, ORACLE, SCHEME, Entry, SetFlight, Trial, fly_case
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
-from beaver_ftc.studies.engine.workers import Case
 from beaver_ftc.studies.present import page
 from beaver_ftc.studies.present.figures import curve_look, marker, panels
 from beaver_ftc.studies.present.tables import Columns, aligned, percent, tabulated
@@ -195,6 +194,6 @@ def run_comparison(
     return run_study(study, out, workers, progress)
 
 
-def lost(case: Case, why: str) -> Trial:
+def lost(case: SetFlight, why: str) -> Trial:
     """What becomes of a case that ends its process: no results, and why."""
-    return Trial(case.what.set, failures=[f"{case.what.scenario.name}: {why}"])
+    return Trial(case.set, failures=[f"{case.scenario.name}: {why}"])

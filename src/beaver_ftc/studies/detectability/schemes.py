@@ -24,7 +24,6 @@ from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.compare import replay
 from beaver_ftc.studies.compare.replay import Recording, Trace
 from beaver_ftc.studies.engine.draws import loss, sines, swings
-from beaver_ftc.studies.engine.workers import Case
 
 STRIKES_S = (8.0, 10.0)  # a fault strikes at random in between
 WATCHED_S = 5.0  # after it
@@ -271,7 +270,7 @@ def with_fdi(flight: Scenario, scheme: str) -> Scenario:
     return flight.with_({f"fdi.{key}": value for key, value in FLOWN_THEMSELVES[scheme].items()})
 
 
-def lost(case: Case, why: str) -> Watched:
+def lost(case: tuple[Block, ...], why: str) -> Watched:
     """A block that ends its process: nothing was watched, and why."""
-    block = case.what[0]
+    block = case[0]
     return Watched(block, failures=[f"{' '.join(block.condition)}, seed {block.seed}: {why}"])

@@ -21,7 +21,6 @@ from beaver_ftc.results.writer import clear_disk_errors, result_folder
 from beaver_ftc.studies.engine import store
 from beaver_ftc.studies.engine.workers import (
     Batch,
-    Case,
     LocalWorkers,
     Nothing,
     Number,
@@ -83,7 +82,7 @@ class Flying:
                 there(number, rows)
         if not missing:
             return
-        self._coming = (Batch(number, tuple(cases_of(runs))) for number, runs in missing.items())
+        self._coming = (Batch(number, runs, cases_of(runs)) for number, runs in missing.items())
         self._left = sum(map(len, missing.values()))  # cases in the batches still to come
         self._waiting, self._flying = deque[Batch](), 0
         self._flown: dict[Number, tuple[Batch, dict[int, Row]]] = {}
@@ -96,50 +95,46 @@ class Flying:
             whole = [batch for outcome in workers.outcomes(POLL_S) for batch in self._gather(*outcome)]
             self._hand_out(workers, stopped())  # first put the workers to work, then see to the disk
             for batch, by_run in whole:
-                rows = [by_run[case.run] for case in batch.cases]
+                rows = [by_run[run] for run in batch.runs]
                 self._land(batch.number, rows)
                 there(batch.number, rows)
 
     def _hand_out(self, workers: Workers, stopped: bool) -> None:
+        """Give each worker a task; a batch is taken apart when the tasks of those before are handed out."""
         while self._flying < workers.slots and not stopped:
-            if not self._waiting:
-                self._open_batch(workers.slots)
+            if not self._waiting and (batch := next(self._coming, None)):
+                self._flown[batch.number] = (batch, {})
+                size = max(1, math.ceil(self._left / (workers.slots * TASKS_A_SLOT)))
+                self._left -= len(batch.cases)
+                self._waiting.extend(_tasks(batch, size))
             if not self._waiting:
                 return
             workers.submit(self._waiting.popleft())
             self._flying += 1
 
-    def _open_batch(self, slots: int) -> None:
-        batch = next(self._coming, None)
-        if batch is not None:
-            self._flown[batch.number] = (batch, {})
-            size = max(1, math.ceil(self._left / (slots * TASKS_A_SLOT)))
-            self._left -= len(batch.cases)
-            self._waiting.extend(_tasks(batch, size))
-
     def _gather(self, task: Batch, rows: list[Row] | None) -> list[tuple[Batch, dict[int, Row]]]:
         """The batch that these rows complete, if they do."""
         self._flying -= 1
         batch, so_far = self._flown[task.number]
-        flown = self._fly_again(task) if rows is None else zip(task.cases, rows, strict=True)
-        so_far.update((case.run, row) for case, row in flown)
-        if len(so_far) < len(batch.cases):
+        so_far.update(zip(task.runs, self._fly_again(task) if rows is None else rows, strict=False))
+        if len(so_far) < len(batch.runs):
             return []
         return [self._flown.pop(task.number)]
 
-    def _fly_again(self, task: Batch) -> list[tuple[Any, Row]]:
-        """See to a lost task; the (case, row) it yields all the same."""
-        key = tuple(case.run for case in task.cases)
+    def _fly_again(self, task: Batch) -> list[Row]:
+        """See to a lost task; the rows that it yields all the same: of one case that is given up."""
+        key = tuple(task.runs)
         self._losses[key] += 1
         if len(key) == 1 and self._losses[key] >= MOST_LOSSES:
-            return [(task.cases[0], self._lost(task.cases[0], LOST))]
+            return [self._lost(task.cases[0], LOST)]
         size = 1 if self._losses[key] > 1 else len(key)
         self._waiting.extendleft(reversed(_tasks(task, size)))
         return []
 
 
 def _tasks(batch: Batch, size: int) -> list[Batch]:
-    return [Batch(batch.number, batch.cases[i : i + size]) for i in range(0, len(batch.cases), size)]
+    parts = [slice(i, i + size) for i in range(0, len(batch.runs), size)]
+    return [Batch(batch.number, batch.runs[part], batch.cases[part]) for part in parts]
 
 
 FlyRound = Callable[[Sequence[Any]], list[Any]]
@@ -185,11 +180,10 @@ def flown(study: Study, out: Path, workers: int = 1, progress: Progress | None =
     """Yield the rows of all cases, in their order whatever the number of workers; or what `rounds` gives.
     They are kept as they land, a part of cases at a time, and read from there: the same rows, whenever they
     were flown. On success they go."""
-    work = Work(partial(_fly_case, study.fly), study.warm_up)
-    make, lost = partial(_workers, work, workers), study.lost or _fail
+    make = partial(_workers, Work(study.fly, study.warm_up), workers)
     with (
         _keeping(study, out) as parts,
-        contextlib.closing(Flying(parts.landed, parts.land, make, lost)) as flying,
+        contextlib.closing(Flying(parts.landed, parts.land, make, study.lost or _fail)) as flying,
     ):
         rounds, part = count(), study.part or (OF_A_PART if study.rounds else 1)
 
@@ -213,7 +207,7 @@ def _fly_pieces(
         if progress:
             progress(len(found) / len(pieces))
 
-    flying.fly(pieces.items(), lambda runs: [Case(n, cases[n]) for n in runs], there)
+    flying.fly(pieces.items(), lambda runs: [cases[n] for n in runs], there)
     return found
 
 
@@ -245,7 +239,7 @@ def fly_all(fly: Fly, cases: Sequence[Any], workers: int, progress: Progress | N
     def nothing(number: Number, of: Any) -> None:
         """None is there, and none is kept."""
 
-    make, pieces = partial(_workers, Work(partial(_fly_case, fly)), workers), store.batches_of(len(cases), 1)
+    make, pieces = partial(_workers, Work(fly), workers), store.batches_of(len(cases), 1)
     with contextlib.closing(Flying(nothing, nothing, make, _fail)) as flying:
         found = _fly_pieces(flying, dict(pieces), cases, progress)
     return [found[n][0] for n in range(len(cases))]
@@ -273,9 +267,5 @@ def _begin(kept: Path, study: Study) -> store.Parts:
     return parts
 
 
-def _fly_case(fly: Fly, case: Case) -> Any:
-    return fly(case.what)
-
-
-def _fail(case: Case, why: str) -> Any:
-    raise SimulationFailed(f"{case.what}: {why}{GO_ON}")
+def _fail(case: Any, why: str) -> Any:
+    raise SimulationFailed(f"{case}: {why}{GO_ON}")

@@ -35,18 +35,12 @@ Number = int | str  # of a batch: what its file is called
 Nothing = Callable[[], None]
 
 
-class Case(NamedTuple):
-    """One case of a study: its place in it, and what there is to fly."""
-
-    run: int
-    what: Any
-
-
 class Batch(NamedTuple):
-    """Cases that land together, or those of them that one worker flies in turn; each has a `run`."""
+    """Cases that land together, or those of them that one worker flies in turn; runs: their places."""
 
     number: Number
-    cases: tuple[Any, ...]
+    runs: Sequence[int]
+    cases: Sequence[Any]
 
 
 class Outcome(NamedTuple):

@@ -110,8 +110,8 @@ def _fly_missing(
         if not options.search:
             fly(batches_of(sweep.flights, batch_size(sweep)), Plan(sweep).assignments)
             return
-        for number, cases in generations(sweep, options.search, store):
-            fly([(number, [case.run for case in cases])], lambda runs, cases=cases: cases)
+        for number, runs, cases in generations(sweep, options.search, store):
+            fly([(number, runs)], lambda runs, cases=cases: cases)
 
 
 def _workers(sweep: Sweep, options: Options, flights: int) -> Workers:

@@ -112,7 +112,7 @@ def generations(sweep: Sweep, objective: str, store: Store) -> Iterator[Batch]:
     evolution = Evolution(sweep.file.seed, len(sweep.keys))
     for number, runs in batches_of(sweep.flights, evolution.members):
         values = [values_at(sweep.file.vary.items(), x) for x in evolution.trials()[: len(runs)]]
-        yield Batch(number, tuple(map(Assignment, runs, values)))
+        yield Batch(number, runs, list(map(Assignment, runs, values)))
         table = store.landed(number, runs)
         if table is None:
             return

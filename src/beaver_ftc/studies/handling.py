@@ -24,7 +24,7 @@ from beaver_ftc.plant.conditions import trimmed
 from beaver_ftc.plant.linear import LinearModel, differences
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.linear_systems import CLASSICAL, Mode, modes
-from beaver_ftc.studies.margins import over_envelope
+from beaver_ftc.studies.margins import N_AIRSPEEDS, over_envelope
 from beaver_ftc.studies.present.tables import aligned, all_finite, grouped, number
 
 WORSE = 4  # than level 3
@@ -130,7 +130,7 @@ def over_airspeeds(scenario: Scenario) -> list[Quality]:
     from beaver_ftc.loop.loop import fly
     from beaver_ftc.results.log import MemoryLog
 
-    found = [quality for flight in over_envelope(scenario) for quality in where_trimmed(flight)]
+    found = [quality for flight in over_envelope(scenario, N_AIRSPEEDS) for quality in where_trimmed(flight)]
     if scenario.faults:
         log = MemoryLog()
         if fly(scenario, log).departure is None:

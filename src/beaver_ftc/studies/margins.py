@@ -177,12 +177,12 @@ def study(scenario: Scenario) -> list[Margin]:
     Raises BadInput for another law: its loop is not this one.
     """
     refuse_other_laws(scenario)
-    return [margin for flight in over_envelope(scenario) for margin in at(flight)]
+    return [margin for flight in over_envelope(scenario, N_AIRSPEEDS) for margin in at(flight)]
 
 
-def over_envelope(scenario: Scenario) -> Iterator[Scenario]:
-    """The scenario at airspeeds of the envelope, evenly spaced from its slowest to its fastest."""
-    airspeeds_mps = np.linspace(*scenario.airframe.envelope.airspeed_mps, N_AIRSPEEDS)
+def over_envelope(scenario: Scenario, count: int) -> Iterator[Scenario]:
+    """The scenario at so many airspeeds of the envelope, evenly spaced from its slowest to its fastest."""
+    airspeeds_mps = np.linspace(*scenario.airframe.envelope.airspeed_mps, count)
     return (scenario.with_({"initial.airspeed_mps": float(V)}) for V in airspeeds_mps)
 
 

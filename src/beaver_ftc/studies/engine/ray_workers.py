@@ -7,6 +7,7 @@ retry.
 import contextlib
 import os
 import sys
+from collections.abc import Sequence
 from typing import Any
 
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
@@ -69,7 +70,7 @@ class RayWorkers:
             return None
 
 
-def fly_task(work: Work, driver_versions: dict[str, str], cases: tuple[Any, ...]) -> list[Row]:
+def fly_task(work: Work, driver_versions: dict[str, str], cases: Sequence[Any]) -> list[Row]:
     """Fly a task on whatever node it is, if that has what the others have."""
     own = versions()
     changed = [

@@ -81,7 +81,7 @@ def _markdown(part: Part, figures: str) -> Iterator[str]:
             yield "\n".join(f"- {sentence}" for sentence in part.sentences)
         case Pictures():
             yield from (f"![{title}]({figures}/{stem}.png)" for title, stem in part.shown)
-        case _:
+        case str():
             yield part
 
 

@@ -35,23 +35,17 @@ def _terms(cell: str) -> list[str]:
 
 
 @cache
-def table(text: str) -> tuple[dict[str, re.Pattern[str]], list[tuple[str, str]]]:
-    """By each avoided term what finds it, and (term, file pattern) of each exception."""
-    avoided = [term for avoid, *_ in rows("Avoided terms", text) for term in _terms(avoid)]
-    return _patterns(avoided), [
-        (term, place) for term, where, _ in rows("Exceptions", text) for place in _terms(where)
+def rules(text: str) -> list[tuple[str, re.Pattern[str], str, list[str]]]:
+    """(avoided term, what finds it, pattern of the files, those of files where it may stand)."""
+    excepted = [(term, place) for term, where, _ in rows("Exceptions", text) for place in _terms(where)]
+    everywhere = [(term, "*") for avoid, *_ in rows("Avoided terms", text) for term in _terms(avoid)]
+    there = [(term, where) for avoid, where, _ in rows("Avoided in a folder", text) for term in _terms(avoid)]
+    found = [(term, where, [at for of, at in excepted if of == term]) for term, where in everywhere]
+    found += [(term, where, []) for term, where in there]
+    return [
+        (term, re.compile(rf"\b{re.escape(term).replace(re.escape('*'), '[a-z]*')}\b", re.IGNORECASE), *rest)
+        for term, *rest in found
     ]
-
-
-def _patterns(terms: list[str]) -> dict[str, re.Pattern[str]]:
-    letters = {term: re.escape(term).replace(r"\*", "[a-z]*") for term in terms}
-    return {term: re.compile(rf"\b{of}\b", re.IGNORECASE) for term, of in letters.items()}
-
-
-@cache
-def of_folders(text: str) -> tuple[tuple[str, dict[str, re.Pattern[str]]], ...]:
-    """(file pattern, what finds each term that is avoided there)."""
-    return tuple((where, _patterns(_terms(avoid))) for avoid, where, _ in rows("Avoided in a folder", text))
 
 
 def _code(text: str) -> Iterator[tuple[int, str]]:
@@ -71,18 +65,17 @@ def _page(text: str) -> Iterator[tuple[int, str]]:
 
 def findings(name: str, text: str, words: str) -> list[str]:
     """What a file has of the avoided terms, one line each; name: below the root, words: of WORDS.md."""
-    avoided, exceptions = table(words)
-    allowed = {term for term, place in exceptions if fnmatchcase(name, place)}
-    wanted = {term: pattern for term, pattern in avoided.items() if term not in allowed}
-    for where, patterns in of_folders(words):
-        if fnmatchcase(name, where):
-            wanted |= patterns
+    wanted = [
+        (term, pattern)
+        for term, pattern, where, excepted in rules(words)
+        if fnmatchcase(name, where) and not any(fnmatchcase(name, place) for place in excepted)
+    ]
     read = _code if name.endswith(".py") else _page
     return list(
         dict.fromkeys(
             f"{name}:{line}: {term!r}: see {PAGE}"
             for line, said in read(text)
-            for term, pattern in wanted.items()
+            for term, pattern in wanted
             if pattern.search(said)
         )
     )

@@ -204,8 +204,8 @@ def test_every_column_of_a_log_has_a_meaning():
             assert columns.pattern_of(column, patterns), column
 
 
-@pytest.mark.parametrize("table", columns.TABLES)
+@pytest.mark.parametrize("table", columns.tables())
 def test_every_meaning_is_of_a_column(table):
     patterns = yaml.safe_load(columns.TEXTS.read_text())[table]["columns"]
-    used = {columns.pattern_of(name, patterns) for name in columns.TABLES[table]()}
+    used = {columns.pattern_of(name, patterns) for name in columns.tables()[table]}
     assert used == set(patterns)

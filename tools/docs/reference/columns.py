@@ -1,7 +1,8 @@
 """The columns of the log and of every table that a command writes: from the code that writes them."""
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -41,53 +42,34 @@ _WORDS = {
 Columns = Mapping[str, str]  # name -> type
 
 
-def _log() -> Columns:
-    aircraft = load()
-    names = log_columns(aircraft, estimator_names("all", aircraft), 3, aircraft.power_setting, PROFILE, True)
-    return dict.fromkeys(names, NUMBER)
+# Columns that are no numbers.
+_OTHERS = {
+    **dict.fromkeys(("sensors", "turbulence", "surface", "scheme", "fault", "confused_with", "other", "why",
+                     "named", *study.PLACE), TEXT),
+    **dict.fromkeys(("false_alarm", "own_false_alarm", "faulty"), FLAG), "seed": "count",
+}  # fmt: skip
 
 
-def _sweep() -> Columns:
-    kinds = {**FIXED, **columns_of(load().surfaces)}
-    return {name: _KINDS[kind] for name, kind in kinds.items()}
-
-
-def _schemes() -> Columns:
-    kinds = dict.fromkeys(("sensors", "turbulence", "surface", "scheme"), TEXT)
-    kinds |= {"seed": "count"} | dict.fromkeys(("false_alarm", "own_false_alarm"), FLAG)
-    return {name: kinds.get(name, NUMBER) for name in probabilities.COLUMNS}
-
-
-def _detectability() -> Columns:
-    texts = ("fault", "confused_with", "other", "why")
-    names = (*certain.COLUMNS, *certain.PAIRS)
-    return {name: TEXT if name in texts else NUMBER for name in names}
-
-
-def _mismatch() -> Columns:
-    return {**dict.fromkeys(study.PLACE, TEXT), **dict.fromkeys(study.FIGURES, NUMBER)}
-
-
-def _mismatch_frames() -> Columns:
-    return dict.fromkeys(split.COLUMNS, NUMBER)
-
-
-def _diagnosis() -> Columns:
-    kinds = {"faulty": FLAG, "named": TEXT}
+@cache
+def tables() -> dict[str, Columns]:
+    """The columns of each table."""
+    aircraft, of_sweep = load(), FIXED | columns_of(load().surfaces)
     no_rows, no_surfaces = np.empty(0), np.empty((0, 1))
     rows = LogRows(no_rows, no_rows, no_rows, no_surfaces, no_surfaces, no_surfaces, no_rows, no_rows)
-    return {name: kinds.get(name, NUMBER) for name in rows.table(["SURFACE"], with_probability=True)}
-
-
-TABLES: dict[str, Callable[[], Columns]] = {
-    "log": _log,
-    "sweep": _sweep,
-    "detectability-grid": _schemes,
-    "detectability": _detectability,
-    "mismatch": _mismatch,
-    "mismatch-frames": _mismatch_frames,
-    "diagnosis": _diagnosis,
-}
+    names = {
+        "detectability-grid": probabilities.COLUMNS,
+        "detectability": (*certain.COLUMNS, *certain.PAIRS),
+        "mismatch": (*study.PLACE, *study.FIGURES),
+        "mismatch-frames": split.COLUMNS,
+        "diagnosis": rows.table(["SURFACE"], with_probability=True),
+    }
+    estimators = estimator_names("all", aircraft)
+    log = log_columns(aircraft, estimators, 3, aircraft.power_setting, PROFILE, True)
+    return {
+        "log": dict.fromkeys(log, NUMBER),
+        "sweep": {name: _KINDS[kind] for name, kind in of_sweep.items()},
+        **{table: {name: _OTHERS.get(name, NUMBER) for name in of} for table, of in names.items()},
+    }
 
 
 _SAYS = """Which columns do the log of a flight and the tables of studies have? *Example.* This program prints
@@ -123,7 +105,9 @@ _NEXT = """## Next
 def page() -> str:
     """The page."""
     texts = yaml.safe_load(TEXTS.read_text(encoding="utf-8"))
-    return "\n\n".join(["# Columns", _said(), *(_table(name, texts[name]) for name in TABLES), _NEXT]) + "\n"
+    return (
+        "\n\n".join(["# Columns", _said(), *(_table(name, texts[name]) for name in tables()), _NEXT]) + "\n"
+    )
 
 
 def _said() -> str:
@@ -148,7 +132,7 @@ def _unit(pattern: str, name: str) -> str:
 def _rows(table: str, meanings: Mapping[str, str]) -> Iterator[tuple[str, ...]]:
     """A row a pattern, where the first column of it stands."""
     done = set()
-    for name, kind in TABLES[table]().items():
+    for name, kind in tables()[table].items():
         pattern = pattern_of(name, meanings)
         if pattern not in done:
             done.add(pattern)

@@ -1,14 +1,52 @@
-"""What README shows."""
+"""What README shows: the published elevator case, from fault to recovery."""
 
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
-from tools.docs.first_figure import write_figure
+from beaver_ftc.results.figures import draw
+from beaver_ftc.results.log import StoredLog
+from beaver_ftc.results.model import Metrics
+from beaver_ftc.results.style import marks
+from beaver_ftc.results.views import Panel, Trace, View, series_of
+from beaver_ftc.results.writer import run
+from beaver_ftc.scenario.schema import load_scenario
 from tools.docs.pictures import lighten
+
+SPAN_S = (6.0, 24.0)
+VIEW = View(
+    "elevator-partial-loss",
+    "Elevator loses 40 % of its effectiveness at 12 s",
+    (
+        Panel(
+            "pitch rate q",
+            (Trace("q_model_rad_s", "reference", "target"), Trace("q_rad_s", "aircraft", "actual")),
+        ),
+        Panel(
+            "residual of q",
+            (
+                Trace("q_threshold_rad_s", "± threshold", "bound"),
+                Trace("q_threshold_rad_s", "", "bound", -1.0),
+                Trace("q_residual_rad_s", "residual", "residual"),
+            ),
+        ),
+        Panel(
+            "surfaces",
+            (
+                Trace("elevator_effective_rad", "elevator", "surface 1"),
+                Trace("flap_effective_rad", "flap", "surface 3"),
+            ),
+        ),
+    ),
+)
 
 
 def first_figure() -> str:
     """The picture a newcomer sees first, drawn of a flight flown now."""
-    folder = Path("images")
-    folder.mkdir(exist_ok=True)
-    picture = lighten(write_figure(folder / "elevator-partial-loss.png"))
-    return f"![Pitch rate, residual and surfaces of the published elevator case]({picture.as_posix()})"
+    with TemporaryDirectory() as folder:
+        metrics = Metrics.of(run(load_scenario(VIEW.name), Path(folder), report=False))
+        series = series_of(StoredLog(Path(folder, VIEW.name, "log.parquet")), VIEW.columns, SPAN_S)
+    said = "detected, isolated, and pitch handed over to the flap"
+    path = Path("images", f"{VIEW.name}.png")
+    path.parent.mkdir(exist_ok=True)
+    draw(VIEW, series, marks(metrics), said).savefig(path, metadata={"Software": "beaver-ftc"})
+    return f"![Pitch rate, residual and surfaces of the published elevator case]({lighten(path).as_posix()})"

@@ -62,12 +62,30 @@ def recorded_alfa() -> str:
     Path("images").mkdir(exist_ok=True)
     picture = result_files(document)["flights.png"]
     write_files(Path("images"), {Path(PICTURE).name: picture})
-    return _alfa(document)
+    part = _part(document, "alfa")
+    rows = (*part["rows"], *part["published"])
+    found = {
+        "method": "method", "precision": "precision .2f", "recall": "recall .2f", "accuracy": "accuracy .2f",
+        "false alarms per hour": "false_alarms_per_hour.value .1f",
+        "95 % interval": lambda row: _interval(row["false_alarms_per_hour"]),
+        "healthy flights alarmed": _healthy,
+    }  # fmt: skip
+    late = (
+        "method",
+        *(head for kind in SURFACE_KINDS for head in (f"{kind}: found", "delay, s")),
+        "within 5 s",
+    )
+    return (
+        f"{table_of([NOT_COUNTED | row for row in rows], found, '')}\n\n{DELAYS}\n\n"
+        f"{markdown_table(late, [_delay_row(row) for row in rows])}"
+    )
 
 
 def recorded_enac() -> str:
     """Labels of the ENAC flight: how many rows each method has right."""
-    return _enac(_benchmark())
+    part = _part(_benchmark(), "enac")
+    rows = [dict.fromkeys(SHOWN) | row for row in (*part["rows"], *part["published"])]
+    return table_of(rows, {"method": "method", **{LABEL_TITLES[key]: f"{key} .3f" for key in SHOWN}}, "")
 
 
 def own_logs() -> str:
@@ -125,26 +143,6 @@ def _part(document: Document, name: str) -> Document:
     return next(part for part in document["sets"] if part["set"] == name)
 
 
-def _alfa(document: Document) -> str:
-    part = _part(document, "alfa")
-    rows = (*part["rows"], *part["published"])
-    found = {
-        "method": "method", "precision": "precision .2f", "recall": "recall .2f", "accuracy": "accuracy .2f",
-        "false alarms per hour": "false_alarms_per_hour.value .1f",
-        "95 % interval": lambda row: _interval(row["false_alarms_per_hour"]),
-        "healthy flights alarmed": _healthy,
-    }  # fmt: skip
-    late = (
-        "method",
-        *(head for kind in SURFACE_KINDS for head in (f"{kind}: found", "delay, s")),
-        "within 5 s",
-    )
-    return (
-        f"{table_of([NOT_COUNTED | row for row in rows], found, '')}\n\n{DELAYS}\n\n"
-        f"{markdown_table(late, [_delay_row(row) for row in rows])}"
-    )
-
-
 def _interval(alarms: Document) -> str:
     return "" if alarms["value"] is None else f"{alarms['low']:.1f} to {alarms['high']:.0f}"
 
@@ -172,9 +170,3 @@ def _delay(of: Document) -> tuple[str, str]:
     if "failures" not in of:
         return "", mean
     return f"{of['found']} of {of['failures']}", mean or "never"
-
-
-def _enac(document: Document) -> str:
-    part = _part(document, "enac")
-    rows = [dict.fromkeys(SHOWN) | row for row in (*part["rows"], *part["published"])]
-    return table_of(rows, {"method": "method", **{LABEL_TITLES[key]: f"{key} .3f" for key in SHOWN}}, "")

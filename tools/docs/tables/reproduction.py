@@ -21,7 +21,6 @@ from beaver_ftc.studies.reproduce.words import (
 from tools.docs.tables import aside, shared, table_of
 
 Document = dict[str, Any]
-FOLDER = "images/reproduction"
 IN_WORDS = {  # names of settings and of ablations that the document has, as the page says them
     "Kp halved, Ki to match": "Kp halved and Ki matched",
     "Kp doubled, Ki to match": "Kp doubled and Ki matched",
@@ -60,11 +59,7 @@ def reproduction_headline() -> str:
 
 def reproduction_not_borne_out() -> str:
     """The statements that do not hold, and why."""
-    return _not_borne_out(_document())
-
-
-def _not_borne_out(document: Document) -> str:
-    shown = [claim for claim in measured(document) if claim["verdict"] == NOT_BORNE_OUT]
+    shown = [claim for claim in measured(_document()) if claim["verdict"] == NOT_BORNE_OUT]
     return markdown_table(("row", "published", "statement", "ours", "limit", "why"), [
         (str(row), claim["where"], claim["statement"], _ours(claim), limit(claim), claim["because"])
         for row, claim in enumerate(shown, 1)
@@ -87,19 +82,13 @@ def _both(claim: Document) -> tuple[str, str, str, str]:
 def reproduction_not_everywhere() -> str:
     """The testable statements that hold as published, but not in every other setting: in how many, and where
     not."""
-    table = _not_everywhere(_document())
-    return aside("reproduction-settings", "Statements that hold in some settings", table)
-
-
-def _not_everywhere(document: Document) -> str:
-    claims = [
-        claim for claim in measured(document) if claim["verdict"] == BORNE_OUT and not claim["construction"]
-    ]
-    return markdown_table(("published", "statement", "settings", "not in"), [
+    document = _document()
+    table = markdown_table(("published", "statement", "settings", "not in"), [
         (claim["where"], claim["statement"].rstrip("."), f"{claim['borne_out_in']} of {claim['elsewhere']}",
          "; ".join(_where_not(document, claim)))
-        for claim in claims
+        for claim in measured(document) if claim["verdict"] == BORNE_OUT and not claim["construction"]
     ])  # fmt: skip
+    return aside("reproduction-settings", "Statements that hold in some settings", table)
 
 
 def _where_not(document: Document, claim: Document) -> Iterator[str]:
@@ -112,23 +101,15 @@ def _where_not(document: Document, claim: Document) -> Iterator[str]:
 
 def reproduction_unsettled() -> str:
     """The testable statements that hold without their mechanism as well."""
-    return _unsettled(_document())
-
-
-def _unsettled(document: Document) -> str:
     return markdown_table(("published", "statement", "ours", "limit", "removed", "ours without it"), [
         (claim["where"], claim["statement"].rstrip("."), *_both(claim))
-        for claim in measured(document) if claim["verdict"] == CANNOT_BE_JUDGED
+        for claim in measured(_document()) if claim["verdict"] == CANNOT_BE_JUDGED
     ])  # fmt: skip
 
 
 def reproduction_beside() -> str:
     """The published cases by the paper's scheme and law, and by our defaults."""
-    return _beside(_document())
-
-
-def _beside(document: Document) -> str:
-    both = document["beside"]
+    both = _document()["beside"]
     table = table_of(both["rows"], {
         "case": "case", "flown by": "flown_by",
         "isolated after, s": lambda row: plain_number(row["isolated_s"]),
@@ -141,16 +122,11 @@ def _beside(document: Document) -> str:
 
 def reproduction_figures() -> str:
     """One figure for each published one, and how far each number stays from its limit."""
-    write_files(Path("images"), {})
-    write_files(Path(FOLDER), figures_of(_document(), fly_published()))
-    return _figures()
-
-
-def _figures() -> str:
+    write_files(Path("images"), {"reproduction": figures_of(_document(), fly_published())})
     titles = [(view.title.partition(":")[0], view.name) for view, _, _ in FIGURES]
     shown = [*titles, ("Numbers and limits", SENSITIVITY)]
     return "\n\n".join(
-        f"![{title}]({FOLDER}/{name}.png)\n\n*Figure {count}. {_caption(title, name)}.*"
+        f"![{title}](images/reproduction/{name}.png)\n\n*Figure {count}. {_caption(title, name)}.*"
         for count, (title, name) in enumerate(shown, 1)
     )
 

@@ -36,7 +36,9 @@ SOON_S = 0.5
 
 def robustness_losses() -> str:
     """Elevator losses under each kind of error."""
-    return _losses_of({condition: _flown(f"robust-elevator-{condition}", 500) for condition in CONDITIONS})
+    return markdown_table(LOSSES_HEAD, [
+        (condition, *_of_losses(_flown(f"robust-elevator-{condition}", 500))) for condition in CONDITIONS
+    ])  # fmt: skip
 
 
 def robustness_losses_probe() -> str:
@@ -60,10 +62,6 @@ LOSSES_HEAD = (
     "errors", "within 0.5 s, %", "from, %", "to, %", "median, s", "95 %, s", "99 %, s", "detected",
     "rightly named", "false alarms",
 )  # fmt: skip
-
-
-def _losses_of(found: dict[str, Rows]) -> str:
-    return markdown_table(LOSSES_HEAD, [(name, *_of_losses(rows)) for name, rows in found.items()])
 
 
 def _of_losses(rows: Rows) -> Iterator[str]:

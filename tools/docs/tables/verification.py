@@ -26,10 +26,7 @@ SCALES = (0.5, 2.0)  # of the references of `fault-free`
 def _surveyed(**where: Any) -> str:
     with TemporaryDirectory() as folder:
         found = run_places(Path(folder), load_scenario("fault-free"), excitations=SCALES, **where)
-    return _map_of(found["points"])
-
-
-def _map_of(rows: list[dict[str, Any]]) -> str:
+    rows = found["points"]
     head = (
         "loss of", "references times", "conditions",
         *(f"{when}: {of}" for when in ("every instant", "half of the instants") for of in COUNTED),

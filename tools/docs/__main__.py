@@ -59,28 +59,29 @@ def _pages(options: argparse.Namespace) -> int:
     from tools.docs import names, prose
     from tools.docs.marks import read
     from tools.docs.pages import chosen
-    from tools.docs.refresh import Wanted, check, slowest, write
+    from tools.docs.refresh import Wanted, refreshed, slowest, write
 
     pages = [read(path) for path in chosen(options.pages)]
     if options.check:
         with ThreadPoolExecutor(1) as beside:  # the last command leaves other cores idle
             words = beside.submit(lambda: names.check(pages, every=not options.pages) + prose.check(pages))
-            findings, printed = check(pages, options.again)
-            findings += words.result()
+            made, printed = refreshed(pages, Wanted(probes=True, again=options.again))
+            found = [finding for page in made for finding in (*page.findings, *page.changes)] + words.result()
     else:
-        wanted = Wanted(dear=options.dear, only=options.only, again=options.again)
-        written, findings = write(pages, wanted)
-        print("".join(f"{name}: written\n" for name in written), end="")
-    wrong = [finding for finding in findings if not finding.said]
-    for finding in findings:
+        made, _ = refreshed(pages, Wanted(dear=options.dear, only=options.only, again=options.again))
+        print("".join(f"{name}: written\n" for page in made for name in write(page)), end="")
+        found = [finding for page in made for finding in page.findings]
+    wrong = sum(not finding.said for finding in found)
+    for finding in found:
         print(f"{finding}{' (only said)' if finding.said else ''}")
     if options.check:
         blocks, numbers = (sum(len(getattr(page, of)) for page in pages) for of in ("blocks", "numbers"))
-        print(f"{len(pages)} pages, {blocks} blocks, {numbers} numbers, {len(printed)} commands:", end=" ")
-        print(f"{len(wrong)} wrong")
+        print(
+            f"{len(pages)} pages, {blocks} blocks, {numbers} numbers, {len(printed)} commands: {wrong} wrong"
+        )
         if options.times:
             print("\n".join(slowest(printed, 20)))
-    return int(bool(wrong))
+    return int(wrong > 0)
 
 
 if __name__ == "__main__":

@@ -112,7 +112,11 @@ def outputs(
     limits = [None if line in dear else LONGEST_S for line in lines]
     with tempfile.TemporaryDirectory() as shared, ThreadPoolExecutor(os.cpu_count()) as threads:
         checkout = Checkout(Path(shared), needed)
-        served = _served(checkout, Path(shared) / BIN) if POSSIBLE and _use_package(lines) else None
+        served = None
+        if POSSIBLE and any("beaver-ftc" in line or "python -m" in line for line in lines):
+            (Path(shared) / BIN).mkdir()  # commands are forked from one process that has imported the package
+            served = Served(Path(sys.executable), _BIN, checkout.environment)
+            served.scripts(Path(shared) / BIN)
         try:
             done = threads.map(lambda line, limit: _output(checkout, line, limit), lines, limits)
             return dict(zip(lines, done, strict=True))
@@ -128,19 +132,6 @@ def outputs(
 def _rank(line: str) -> int:
     """Probes and tables fly most: begun last, one of them would keep one process while others have none."""
     return ("-probe" not in line) + ("tools.docs table" not in line)
-
-
-def _use_package(lines: Iterable[str]) -> bool:
-    """Whether one of the commands is the package's: only then is it worth to import the package for all."""
-    return any("beaver-ftc" in line or "python -m" in line for line in lines)
-
-
-def _served(checkout: Checkout, folder: Path) -> Served:
-    """Commands are forked from one process that has imported the package."""
-    folder.mkdir()
-    served = Served(Path(sys.executable), _BIN, checkout.environment)
-    served.scripts(folder)
-    return served
 
 
 def _output(checkout: Checkout, line: str, longest_s: float | None) -> Output:

@@ -5,7 +5,7 @@ import json
 import os
 import re
 import subprocess
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from itertools import zip_longest
@@ -15,7 +15,6 @@ from typing import Any
 from beaver_ftc.documents.errors import BadInput
 from tools.docs import pictures, values
 from tools.docs.commands import Output, outputs
-from tools.docs.compact import compact
 from tools.docs.kept import Kept
 from tools.docs.marks import Block, Document, Origin, Page
 from tools.docs.pages import ROOT, Finding
@@ -28,6 +27,7 @@ _CODE_OR_LINK = re.compile(
     r"(?P<code>^(?P<mark>`{3,}).*?^(?P=mark)`*$|(?P<ticks>`+)[^\n]*?(?P=ticks))|\]\((?!\w+:|[#/])",
     re.M | re.S,
 )
+_ROW = re.compile(r"^\|.*\|$", re.MULTILINE)  # of a table
 _LONGEST = 90  # of what is quoted in a finding
 
 
@@ -217,6 +217,11 @@ def dressed(old: str, text: str, command: str) -> str:
     return f"```text\n{text}\n```\n"
 
 
+def compact(text: str) -> str:
+    """Markdown with narrower tables: a reader of the page does not see the blanks beside their bars."""
+    return _ROW.sub(lambda row: re.sub(r" ?(?<!\\)\| ?", "|", row[0]), text)
+
+
 def linked(text: str, page: str) -> str:
     """Links of what is printed are as seen from docs/; README lies above it. Code has no links."""
     below = len(Path(page).parts) - 2
@@ -255,29 +260,20 @@ def changed_since(name: str) -> bool:
     return _git("diff", "--quiet", name.rstrip("+"), "--", *DECIDES).returncode != 0
 
 
-def write(pages: Sequence[Page], wanted: Wanted) -> tuple[list[str], list[Finding]]:
-    """Write pages and pictures again: (files that were written, what could not be)."""
+def refreshed(pages: Sequence[Page], wanted: Wanted) -> tuple[list[Refreshed], dict[str, Output]]:
+    """The pages with everything that is printed now; and what every command printed."""
     printed = outputs_of(pages, wanted)
-    written: list[str] = []
-    findings: list[Finding] = []
-    for page in pages:
-        refreshed = Refreshed(page, printed, wanted)
-        findings += refreshed.findings
-        if refreshed.text != page.text:
-            (ROOT / page.name).write_text(refreshed.text, encoding="utf-8")
-            written.append(page.name)
-        for name, content in refreshed.drawn.items():
-            pictures.write(ROOT / "docs" / "images" / name, content)
-            written.append(f"docs/images/{name}")
-    return written, findings
+    return [Refreshed(page, printed, wanted) for page in pages], printed
 
 
-def check(pages: Sequence[Page], again: bool = False) -> tuple[list[Finding], dict[str, Output]]:
-    """What is wrong on the pages, and what is only said; and what every command printed."""
-    wanted = Wanted(probes=True, again=again)
-    printed = outputs_of(pages, wanted)
-    made = [Refreshed(page, printed, wanted) for page in pages]
-    return [finding for page in made for finding in (*page.findings, *page.changes)], printed
+def write(made: Refreshed) -> Iterator[str]:
+    """Write a page and its pictures again: the files that were written."""
+    if made.text != made.page.text:
+        (ROOT / made.page.name).write_text(made.text, encoding="utf-8")
+        yield made.page.name
+    for name, content in made.drawn.items():
+        pictures.write(ROOT / "docs" / "images" / name, content)
+        yield f"docs/images/{name}"
 
 
 def slowest(printed: dict[str, Output], count: int) -> list[str]:

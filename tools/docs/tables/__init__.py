@@ -17,7 +17,6 @@ from collections.abc import Callable, Iterable, Mapping
 from functools import wraps
 from importlib import import_module
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
 
 from filelock import FileLock
@@ -51,19 +50,14 @@ def table(name: str = "") -> str:
     return made
 
 
-def beaver(*arguments: str) -> list[str]:
-    """A command line of `beaver-ftc`: served by `make docs`, of this interpreter without it."""
+def beaver(*arguments: str, cwd: Path, longest_s: float | None = None) -> subprocess.CompletedProcess[str]:
+    """Run `beaver-ftc` in a folder: served by `make docs`, of this interpreter without it."""
     served = Path(os.environ.get(SHARED, "")) / BIN / "beaver-ftc"
-    if SHARED in os.environ and served.exists():
-        return [str(served), *arguments]
-    return [sys.executable, "-c", "from beaver_ftc.cli.main import main; main()", *arguments]
-
-
-def printed_by(*arguments: str) -> str:
-    """What `beaver-ftc` prints for these arguments, in a folder of its own."""
-    with TemporaryDirectory() as folder:
-        command = beaver(*arguments)
-        return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True).stdout
+    own = [sys.executable, "-c", "from beaver_ftc.cli.main import main; main()"]
+    command = [str(served)] if SHARED in os.environ and served.exists() else own
+    return subprocess.run(
+        [*command, *arguments], cwd=cwd, capture_output=True, text=True, timeout=longest_s, check=False
+    )
 
 
 def picture(name: str, says: str, content: bytes) -> str:

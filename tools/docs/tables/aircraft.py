@@ -125,11 +125,9 @@ def _derived(chosen: Iterable[str]) -> str:
 def _derive(name: str) -> tuple[dict | None, str]:
     """What `derive` prints, or why it prints nothing."""
     with tempfile.TemporaryDirectory() as folder:
-        command = beaver("derive", f"jsbsim:{name}", "--out", folder)
+        asked = ("derive", f"jsbsim:{name}", "--out", folder, "--format", "json")
         try:
-            run = subprocess.run(
-                [*command, "--format", "json"], capture_output=True, text=True, timeout=LONGEST_S, check=False
-            )
+            run = beaver(*asked, cwd=Path(folder), longest_s=LONGEST_S)
         except subprocess.TimeoutExpired:
             return None, f"not within {LONGEST_S} s"
     if run.returncode == 0:

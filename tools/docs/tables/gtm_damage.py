@@ -2,8 +2,6 @@
 
 import json
 import os
-import subprocess
-import sys
 import tempfile
 from functools import cache
 from pathlib import Path
@@ -19,7 +17,7 @@ from beaver_ftc.studies.present.tables import markdown_table
 from beaver_ftc_aircraft.gtm.conversion import convert
 from beaver_ftc_aircraft.gtm.parameters import cases
 from beaver_ftc_aircraft.gtm.steady import Bench
-from tools.docs.tables import table_of
+from tools.docs.tables import beaver, table_of
 from tools.gtm.envelope import BANKS_DEG, SIDESLIPS_DEG, SPEEDS_KT, Envelope, Turn
 from tools.gtm.specification import DATABASE
 
@@ -146,9 +144,8 @@ def gtm_laws() -> str:
     """Our laws and the rivals on the flights of SWEEP, by `beaver-ftc compare`; made before, it is read."""
     made = _kept() / "comparisons" / f"gtm-{SWEEP.stem}" / "comparison.json"
     if not made.is_file():
-        code = "from beaver_ftc.cli.main import main; main()"
-        asked = ["compare", "--sweep", str(SWEEP), "--schemes", "adaptive-estimators", "--workers", "1"]
-        subprocess.run([sys.executable, "-c", code, *asked], cwd=_kept(), capture_output=True, check=True)
+        asked = ("compare", "--sweep", str(SWEEP), "--schemes", "adaptive-estimators", "--workers", "1")
+        beaver(*asked, cwd=_kept())
     (of,) = json.loads(made.read_text(encoding="utf-8"))["sets"].values()
     return table_of(of["lines"], {
         "law": "law", "flights": lambda one: str(of["flights"]), "aircraft lost": "departures",

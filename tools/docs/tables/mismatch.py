@@ -1,12 +1,14 @@
 """Tables of docs/results/validation.md, truth against the design model."""
 
 import json
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.scenario.schema import load
 from beaver_ftc.studies.mismatch.linear import analyse, linear_document
 from beaver_ftc.studies.present.tables import markdown_table
-from tools.docs.tables import printed_by, table_of
+from tools.docs.tables import beaver, table_of
 
 DESIGNS = ("declared", "engine-neglected", "linearised", "frozen-alpha", "heavy")
 CONDITIONS = ((30.0, 0.0), (35.0, 1829.0), (45.0, 1829.0), (50.0, 3000.0), (55.0, 4000.0))
@@ -16,10 +18,10 @@ SWING = ("short_period", "phugoid", "dutch_roll")
 def mismatch_designs() -> str:
     """What a wrong design model costs: the published elevator case, each with the published bound."""
     given = ("elevator-partial-loss", "--variant", ",".join(DESIGNS), "--no-report", "--format", "json")
-    flights = {
-        run["scenario"].removeprefix("elevator-partial-loss").lstrip("-") or "declared": run
-        for run in json.loads(printed_by("mismatch", *given))["runs"]
-    }
+    with TemporaryDirectory() as folder:
+        runs = json.loads(beaver("mismatch", *given, cwd=Path(folder)).stdout)["runs"]
+    names = [run["scenario"].removeprefix("elevator-partial-loss").lstrip("-") or "declared" for run in runs]
+    flights = dict(zip(names, runs, strict=True))
     columns = {
         "design model": "name",
         **{f"{axis}, % of bound": f"bound.{axis}.worst_ratio *100 .0f" for axis in AXES},

@@ -2,7 +2,7 @@
 
     python benchmarks/sitl.py latency [--frames 20000]
     python benchmarks/sitl.py memory [--frames 1000000]
-    python benchmarks/sitl.py healthy [--hours 50] [--rate 100] [--seed 0]
+    python benchmarks/sitl.py healthy [--hours 50]
 
 The autopilots are those of tools/autopilots: neither ArduPilot nor PX4 is needed. Exit status 1 where a bar
 is missed.
@@ -29,17 +29,18 @@ from beaver_ftc_links.sitl.link import Link
 from beaver_ftc_links.sitl.vehicle import Vehicle
 
 MOST_LATENCY_MS, MOST_GROWTH_MB = 0.5, 2.0
+RATE_HZ = 100
 HEALTHY = "elevator-loss-in-turbulence"  # its air, sensors, servos, tolerances and what is declared of them
 
 
-def healthy(hours: float, rate_hz: int, seed: int) -> Iterator[str]:
+def healthy(hours: float) -> Iterator[str]:
     """Flights of an hour under the small autopilot in light turbulence, nothing broken: alarms, and how
     near."""
     base = bf.load(HEALTHY).with_({"faults": [], "expect": {}, "duration_s": 3600})
-    alarms, flown_s, lost, nearest, outside_s = 0, 0.0, 0, 0.0, 0.0
+    seed, alarms, flown_s, lost, nearest, outside_s = 0, 0, 0.0, 0, 0.0, 0.0
     while flown_s < 3600 * hours:
         vehicle = Vehicle(base.with_({"seed": seed}), pulses=True, log=False)
-        end, autopilot = Ardupilot(vehicle, Link()), peers.Ardupilot(Small().outputs, rate_hz)
+        end, autopilot = Ardupilot(vehicle, Link()), peers.Ardupilot(Small().outputs, RATE_HZ)
         while not vehicle.over:
             autopilot.hear(end.take(autopilot.next(), "it", 0.0) or b"")
         document = vehicle.flight.land().metrics
@@ -51,7 +52,7 @@ def healthy(hours: float, rate_hz: int, seed: int) -> Iterator[str]:
         vehicle.flight.release()
         seed += 1
         yield f"seed {seed - 1}: {document['frames']} frames, alarm {document['detection']['time_s']}"
-    said = f"{flown_s / 3600:.2f} h at {rate_hz} Hz: {alarms} false alarms, {lost} lost"
+    said = f"{flown_s / 3600:.2f} h at {RATE_HZ} Hz: {alarms} false alarms, {lost} lost"
     yield f"{said}, {outside_s:.0f} s outside the envelope, statistical test at most {nearest:.2f} of its bar"
     if alarms:
         raise SystemExit(1)
@@ -100,7 +101,7 @@ def memory(frames: int) -> Iterator[str]:
     """Resident memory while a flight goes on and on, log and all."""
     base = bf.load("fault-free").with_({"expect": {}, "duration_s": 36_000})
     vehicle = Vehicle(base, pulses=True)
-    end, autopilot = Ardupilot(vehicle, Link()), peers.Ardupilot(Small().outputs, 100)
+    end, autopilot = Ardupilot(vehicle, Link()), peers.Ardupilot(Small().outputs, RATE_HZ)
     seen = []
     for k in range(1, frames + 1):
         autopilot.hear(end.take(autopilot.next(), "it", 0.001 * k) or b"")
@@ -117,8 +118,8 @@ def resident_mb() -> float:
     return int(re.search(r"RssAnon:\s+(\d+)", text)[1]) / 1024
 
 
-# What is measured, and how many frames by itself.
-MEASURED = {"latency": (latency, 20_000), "memory": (memory, 1_000_000)}
+# What is measured, and how much by itself: frames, hours.
+MEASURED = {"latency": (latency, 20_000), "memory": (memory, 1_000_000), "healthy": (healthy, 50.0)}
 
 
 def main() -> None:
@@ -126,18 +127,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("what", choices=(*MEASURED, "healthy"))
-    parser.add_argument("--frames", type=int, default=None)
-    parser.add_argument("--hours", type=float, default=50.0)
-    parser.add_argument("--rate", type=int, default=100)
-    parser.add_argument("--seed", type=int, default=0, help="of the first healthy flight")
+    parser.add_argument("what", choices=MEASURED)
+    parser.add_argument("--frames", dest="amount", metavar="FRAMES", type=int)
+    parser.add_argument("--hours", dest="amount", metavar="HOURS", type=float)
     given = parser.parse_args()
-    if given.what == "healthy":
-        lines = healthy(given.hours, given.rate, given.seed)
-    else:
-        measure, usual = MEASURED[given.what]
-        lines = measure(usual if given.frames is None else given.frames)
-    for line in lines:
+    measure, usual = MEASURED[given.what]
+    for line in measure(given.amount or usual):
         print(line, flush=True)
 
 

@@ -157,11 +157,6 @@ class Px4:
             sensor.time_usec / 1e6, rates, attitude, sensor.pressure_alt, climb, airspeed, sensor.yacc
         )
 
-    def inject(self, unit: int, kind: int, which: int) -> bytes:
-        """MAV_CMD_INJECT_FAILURE."""
-        message = common.MAVLink_command_long_message(1, 191, 420, 0, unit, kind, which, 0, 0, 0, 0)
-        return bytes(message.pack(self._mav))
-
     def fly(self, address: tuple[str, int], frames: int, patience_s: float = 3.0) -> None:
         """Connect and answer until so many HIL_SENSOR have come, or the line is closed."""
         with socket.create_connection(address, timeout=patience_s) as line:

@@ -45,7 +45,7 @@ class Origin:
     probe: str = ""
     needs: str = ""
     machine: bool = False
-    at: tuple[str, str, str] | None = None
+    at: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         parts = [self.command]
@@ -193,12 +193,10 @@ def _origin(text: str, page: Page, line: int) -> Origin:
             page.wrong(line, f"no option of what is dear: {word}, {_OPTIONS}")
         else:
             found |= {str(option.lastgroup): option[str(option.lastgroup)]}
-    at = found.pop("at", "").split()
-    machine = "machine" in found
-    if dear and not found:
+    if dear and not found.keys() - {"at"}:
         page.wrong(line, f"dear without a probe: {command}, allowed: | dear | probe: COMMAND")
-    found.pop("machine", None)
-    return Origin(command, bool(dear), machine=machine, at=(at[0], at[1], at[2]) if at else None, **found)
+    machine, at = "machine" in found, tuple(found.get("at", "").split())
+    return Origin(command, bool(dear), found.get("probe", ""), found.get("needs", ""), machine, at)
 
 
 def _match_numbers(page: Page) -> None:

@@ -162,7 +162,7 @@ class Refreshed:
             self._edits.append((*made.mark, new))
         elif missing(origin):
             self._say(made.line, f"{origin.command} is not checked: it needs {origin.needs}")
-        elif origin.at is None:
+        elif not origin.at:
             self._wrong(made.line, f"never printed: python -m tools.docs {self.page.name} --dear")
         elif probe is not None and origin.at[2] != digest:
             told = f"not flown again since {origin.at[0]}" in self.page.text.replace("`", "")

@@ -82,12 +82,10 @@ def _widest(*given: Any) -> Words:
 
 def _declare_model(truth: Words, bounds: Words) -> None:
     """Coefficients, inertias, inertia coupling and sinusoids."""
-    off = [abs(ratio - 1.0) for ratio in truth.get("coefficients", {}).values()]
-    if off:
-        bounds["coefficients"] = max(*off, bounds.get("coefficients", 0.0))
-    off = [abs(ratio - 1.0) for ratio in truth.get("inertia", {}).values()]
-    if off:
-        bounds["inertia"] = max(*off, bounds.get("inertia", 0.0))
+    for key in ("coefficients", "inertia"):
+        off = [abs(ratio - 1.0) for ratio in truth.get(key, {}).values()]
+        if off:
+            bounds[key] = max(*off, bounds.get(key, 0.0))
     if "actuators" in truth:
         bounds["actuators"] = _widest_servos(truth["actuators"], bounds.get("actuators", {}))
     couplings = truth.get("inertia_coupling", {})

@@ -57,7 +57,7 @@ def chosen_asides() -> str:
 def _others() -> str:
     """The other constants of the diagnosis of logs, each with its value in the code and its origin."""
     rows = [
-        (f"`{name}`", _value_text(file, name), *_origin_and_reason(origin), Path(file).name)
+        (f"`{name}`", _value_text(file, name), *origin.partition(": ")[::2], Path(file).name)
         for file, origins in not_chosen_constants().items()
         for name, origin in origins.items()
     ]
@@ -67,11 +67,6 @@ def _others() -> str:
 def _value_text(file: str, name: str) -> str:
     value = getattr(import_module(f"beaver_ftc_logs.{Path(file).stem}"), name)
     return ", ".join(f"{number:g}" for number in np.atleast_1d(value))
-
-
-def _origin_and_reason(text: str) -> tuple[str, str]:
-    origin, _, reason = text.partition(": ")
-    return origin, reason
 
 
 def not_chosen_constants() -> dict[str, dict[str, str]]:

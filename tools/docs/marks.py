@@ -58,24 +58,15 @@ class Origin:
 
 
 @dataclass(frozen=True)
-class Block:
-    """What a command printed: from begin to end of the text, after the mark that begins at `mark`."""
+class Printed:
+    """What a command prints, by the mark at `mark`: of a block, from begin to end of the text; of a document
+    of which numbers are taken, nowhere."""
 
     origin: Origin
     line: int
     mark: tuple[int, int]
-    begin: int
-    end: int
-
-
-@dataclass(frozen=True)
-class Document:
-    """The document that a command prints, under the name that the page's numbers call it by."""
-
-    name: str
-    origin: Origin
-    line: int
-    mark: tuple[int, int]
+    begin: int = 0
+    end: int = 0
 
 
 @dataclass(frozen=True)
@@ -95,15 +86,15 @@ class Page:
 
     name: str
     text: str
-    blocks: list[Block] = field(default_factory=list)
-    documents: dict[str, Document] = field(default_factory=dict)
+    blocks: list[Printed] = field(default_factory=list)
+    documents: dict[str, Printed] = field(default_factory=dict)  # by the name that numbers call it by
     numbers: list[Number] = field(default_factory=list)
     findings: list[Finding] = field(default_factory=list)
 
     @property
     def origins(self) -> list[Origin]:
         """Of every block and document."""
-        return [made.origin for made in (*self.blocks, *self.documents.values())]
+        return [one.origin for one in (*self.blocks, *self.documents.values())]
 
     def wrong(self, line: int, words: str) -> None:
         """Note what is wrong."""
@@ -118,7 +109,7 @@ def read(path: Path, root: Path = ROOT) -> Page:
 def parsed(text: str, name: str) -> Page:
     """The marks of a page's text."""
     page = Page(name, text)
-    opened: Block | None = None
+    opened: Printed | None = None
     for number, start, line in _outside_fences(text):
         begins = _PRINTED.fullmatch(line.strip())
         if opened is not None:
@@ -130,7 +121,7 @@ def parsed(text: str, name: str) -> Page:
             continue
         if begins:
             origin = _origin(begins[1], page, number)
-            opened = Block(origin, number, (start, start + len(line)), start + len(line) + 1, 0)
+            opened = Printed(origin, number, (start, start + len(line)), start + len(line) + 1)
         else:
             _read_line(page, number, start, line)
     if opened is not None:
@@ -160,8 +151,7 @@ def _read_line(page: Page, number: int, start: int, line: str) -> None:
         if document[1] in page.documents:
             page.wrong(number, f"a second document is called {document[1]}, allowed: one of each name")
         origin = _origin(document[2], page, number)
-        made = Document(document[1], origin, number, (start, start + len(line)))
-        page.documents[document[1]] = made
+        page.documents[document[1]] = Printed(origin, number, (start, start + len(line)))
         return
     if _BEGINS.match(line):
         page.wrong(

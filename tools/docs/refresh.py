@@ -16,7 +16,7 @@ from beaver_ftc.documents.errors import BadInput
 from tools.docs import pictures, values
 from tools.docs.commands import Output, outputs
 from tools.docs.kept import Kept
-from tools.docs.marks import Block, Document, Origin, Page
+from tools.docs.marks import Origin, Page, Printed
 from tools.docs.pages import ROOT, Finding
 
 DECIDES = ("src", "aircraft", "scenarios")  # what a number of a flight depends on
@@ -88,8 +88,8 @@ class Refreshed:
         self._documents: dict[str, Any] = {}
         for block in page.blocks:
             self._block(block)
-        for document in page.documents.values():
-            self._document(document)
+        for name, document in page.documents.items():
+            self._document(name, document)
         for number in page.numbers:
             self._number(number)
         self.findings.sort(key=lambda finding: finding.line)
@@ -103,7 +103,7 @@ class Refreshed:
             text = text[:begin] + new + text[end:]
         return text
 
-    def _block(self, block: Block) -> None:
+    def _block(self, block: Printed) -> None:
         output = self._output(block)
         if output is None:
             return
@@ -112,12 +112,12 @@ class Refreshed:
         self._put(block.line, block.begin, block.end, new, block.origin.command)
         self._pictures(block, output)
 
-    def _document(self, document: Document) -> None:
+    def _document(self, name: str, document: Printed) -> None:
         output = self._output(document)
         if output is None:
             return
         try:
-            self._documents[document.name] = json.loads(output.text)
+            self._documents[name] = json.loads(output.text)
         except json.JSONDecodeError as error:
             self._wrong(document.line, f"{document.origin.command} prints no JSON: {error}")
 
@@ -133,7 +133,7 @@ class Refreshed:
         what = f"{number.name} {number.place.path} of {command}"
         self._put(number.line, number.begin, number.end, new, what)
 
-    def _output(self, made: Block | Document) -> Output | None:
+    def _output(self, made: Printed) -> Output | None:
         """What its command printed, if it was run and can be used."""
         origin = made.origin
         output = self.printed[origin.command] if self.wanted.flies(origin) else None
@@ -144,7 +144,7 @@ class Refreshed:
             self._dear(made)
         return output
 
-    def _dear(self, made: Block | Document) -> None:
+    def _dear(self, made: Printed) -> None:
         """Flown: when, and by what code. Not flown: whether it is of today's code."""
         origin, probe = made.origin, self.printed.get(made.origin.probe)
         if probe is not None and probe.fault:
@@ -188,7 +188,7 @@ class Refreshed:
         words = f"stands {_quoted(stands)}, printed {_quoted(prints)} by {command}"
         self.changes.append(Finding(self.page.name, at, words))
 
-    def _pictures(self, block: Block, output: Output) -> None:
+    def _pictures(self, block: Printed, output: Output) -> None:
         for name, content in output.pictures.items():
             path = ROOT / "docs" / "images" / name
             if not pictures.look_the_same(path, content):

@@ -57,11 +57,16 @@ class Walk:
         if callable(ranged):
             return ranged(self.now, path)
         node = self.resolved(node)
-        for kind, draw in (
-            ("const", self._const), ("enum", self._enum), ("anyOf", self._one_of), ("oneOf", self._one_of),
-        ):  # fmt: skip
-            if kind in node and not (kind == "anyOf" and "properties" in node):
-                return draw(node, path)
+        if "const" in node:
+            return node["const"]
+        if "enum" in node:
+            return node["enum"][self.now.rng.integers(len(node["enum"]))]
+        forms = node.get("oneOf", () if "properties" in node else node.get("anyOf", ()))
+        given = [
+            form for form in forms if form.get("type") != "null"
+        ]  # null: that is what leaving out is for
+        if given:
+            return self.value(given[self.now.rng.integers(len(given))], path)
         return self._by_type(node, path)
 
     def resolved(self, node: Node) -> Node:
@@ -83,17 +88,6 @@ class Walk:
         if kind == "object" or "properties" in node:
             return self._object(node, path)
         raise Undrawable(path)
-
-    def _const(self, node: Node, path: str) -> Any:
-        return node["const"]
-
-    def _enum(self, node: Node, path: str) -> Any:
-        return node["enum"][self.now.rng.integers(len(node["enum"]))]
-
-    def _one_of(self, node: Node, path: str) -> Any:
-        """One of several forms, and never null: that is what leaving out is for."""
-        forms = [form for form in node.get("anyOf", node.get("oneOf")) if form.get("type") != "null"]
-        return self.value(forms[self.now.rng.integers(len(forms))], path)
 
     def _number(self, node: Node) -> float:
         low = node.get("minimum", node.get("exclusiveMinimum", -LARGEST))

@@ -99,21 +99,16 @@ def unexplained(recording: Recording) -> np.ndarray:
     return np.diff(x, axis=0) / recording.context.dt_s - expected[1:]
 
 
-def signature(recording: Recording, surface: str) -> np.ndarray:
-    """What a total loss of a surface would have done in each frame, (frames - 1, 3) rad/s2."""
-    place = recording.context.surfaces.index(surface)
-    return -np.array([measured.contribution[:, place] for measured, _ in recording.seen[1:]])
-
-
 def ratios(recording: Recording, surface: str, noise: Whitener) -> dict[float, np.ndarray]:
     """Of each magnitude the largest log likelihood ratio, at every frame (n,)."""
-    moment = signature(recording, surface)
-    return largest_ratios(recording, moment, noise, MAGNITUDES, EVERY, FURTHEST)
+    place = recording.context.surfaces.index(surface)
+    does = -np.array([measured.contribution[:, place] for measured, _ in recording.seen[1:]])  # a total loss
+    return largest_ratios(recording, does, noise, MAGNITUDES, EVERY)
 
 
 def largest_ratios(
     recording: Recording, does: np.ndarray, noise: Whitener, sizes: tuple[float, ...] = (1.0,),
-    every: int = 1, furthest: int = FURTHEST,
+    every: int = 1,
 ) -> dict[float, np.ndarray]:  # fmt: skip
     """The same of accelerations (n, 3) rad/s2 times each size, since instants so many frames apart."""
     g, n = noise.respond(unexplained(recording)), len(does)
@@ -121,7 +116,7 @@ def largest_ratios(
     response = noise.responses(does)
     age = k[:, None] - since
     began = np.clip(age, 0, ORDER), k[:, None]
-    late = (age >= 0) & (age < furthest)
+    late = (age >= 0) & (age < FURTHEST)
     N, D = (
         np.cumsum(np.where(age >= 0, seen.sum(axis=2)[began], 0.0), axis=0)
         for seen in (response * g, np.square(response))

@@ -49,14 +49,14 @@ def told(answer: bytes) -> Told:
 class Ardupilot:
     """Counts its frames from 0; without an answer for `patience_s` it sends the same packet again."""
 
-    def __init__(self, pilot: Pilot, rate_hz: int = 100, channels: int = 16) -> None:
-        self._pilot, self.rate_hz, self.channels = pilot, rate_hz, channels
+    def __init__(self, pilot: Pilot, rate_hz: int = 100) -> None:
+        self._pilot, self.rate_hz = pilot, rate_hz
         self.count, self._outputs = 0, CENTRED
         self.sent: list[bytes] = []
 
     def next(self) -> bytes:
         """The packet of the frame to come."""
-        return packet(self.count, self.rate_hz, pulses(self._outputs), self.channels)
+        return packet(self.count, self.rate_hz, pulses(self._outputs))
 
     def hear(self, answer: bytes) -> Told:
         """An answer: the count goes on."""

@@ -23,6 +23,7 @@ from tools.autopilots.reader import read
 
 AGAIN_S = 1.0  # without an answer an autopilot asks again
 STEP_S = 0.0025
+RATE_HZ = 400
 ODDS = {
     "lost": 0.01,
     "doubled": 0.01,
@@ -127,7 +128,7 @@ def _flights(line: Line, found: Found, frames: int, a_flight: int) -> Iterator[t
         yield size, found.meant[-1]
 
 
-def ardupilot(body: Any, frames: int, seed: int, rate_hz: int = 400, a_flight: int = 2500) -> Found:
+def ardupilot(body: Any, frames: int, seed: int, a_flight: int) -> Found:
     """So many frames of ArduPilot's protocol over a bad line, restarted after about `a_flight` of them."""
     line, spy, link = Line(seed), Spy(body, number_in_pulses), Link()
     found = Found(flown=spy.flown, happened=line.happened, counts=link.counts)
@@ -136,16 +137,16 @@ def ardupilot(body: Any, frames: int, seed: int, rate_hz: int = 400, a_flight: i
         if len(found.meant) > 1:
             line.now_s += 0.0 if line.rng.random() < 0.5 else 3.0
             port += bool(line.rng.random() < 0.5)  # a process started again mostly has another
-        _fly_ardupilot(line, end, port, size, rate_hz, meant)
+        _fly_ardupilot(line, end, port, size, meant)
     return found
 
 
-def _fly_ardupilot(line: Line, end: Ardupilot, port: int, size: int, rate_hz: int, meant: list[int]) -> None:
+def _fly_ardupilot(line: Line, end: Ardupilot, port: int, size: int, meant: list[int]) -> None:
     before: deque[bytes] = deque(maxlen=40)
     last_s = -1.0
     for count in range(size):
         given = [1500, 1500, 1400, 1500, *[0] * 10, count % 65536, count // 65536]
-        datagram = peers.packet(count, rate_hz, given)
+        datagram = peers.packet(count, RATE_HZ, given)
         answer = None
         while answer is None:
             answer = _asked(line, end, port, datagram, before)
@@ -180,7 +181,7 @@ def number_in_controls(outputs: Any) -> int:
     return round(outputs[15] * 2**20)
 
 
-def px4(body: Any, frames: int, seed: int, a_flight: int = 2500) -> Found:
+def px4(body: Any, frames: int, seed: int, a_flight: int) -> Found:
     """So many frames of PX4's protocol over a bad line; each flight is a connection."""
     line, spy, link = Line(seed), Spy(body, number_in_controls), Link()
     spy.flown.append([])

@@ -41,13 +41,13 @@ _UNUSED_S = 14.0 * 86400.0
 class Kept:
     """Outputs of earlier runs. needed: environment variables that lead to data."""
 
-    def __init__(self, needed: Collection[str] = (), root: Path = ROOT) -> None:
+    def __init__(self, needed: Collection[str]) -> None:
         base = cache_base()
         self._folder = base / "printed" if base else None
         named = "".join(f"{name}={os.environ.get(name)};" for name in sorted(needed))
-        self._code = _digest(root, CODE, named)
-        self._pages = _digest(root, PAGES, self._code)
-        self._shown = _digest(root, RUNS, named + _files_of_readers(root))
+        self._code = _digest(CODE, named)
+        self._pages = _digest(PAGES, self._code)
+        self._shown = _digest(RUNS, named + _files_of_readers())
 
     def _file(self, line: str) -> Path | None:
         whole = self._code if line.startswith(READS_CODE) else self._pages
@@ -81,22 +81,22 @@ class Kept:
         write_whole(file, json.dumps(document).encode())
 
 
-def _digest(root: Path, places: Collection[str], more: str) -> str:
+def _digest(places: Collection[str], more: str) -> str:
     """A name for the contents of these files and folders, and of the environment that runs them."""
     digest = sha256(more.encode())
-    for path in _files(root, places):
+    for path in _files(places):
         content = path.read_bytes()
-        digest.update(f"{path.relative_to(root)} {len(content)} ".encode() + content)
+        digest.update(f"{path.relative_to(ROOT)} {len(content)} ".encode() + content)
     return digest.hexdigest()
 
 
-def _files_of_readers(root: Path) -> str:
+def _files_of_readers() -> str:
     """The YAML and Python that the pages show: of a page, a command of the package reads nothing else."""
-    pages = (path for path in _files(root, PAGES) if path.suffix == ".md")
+    pages = (path for path in _files(PAGES) if path.suffix == ".md")
     return "".join("".join(_FILE_OF_READER.findall(path.read_text(encoding="utf-8"))) for path in pages)
 
 
-def _files(root: Path, places: Collection[str]) -> Iterator[Path]:
+def _files(places: Collection[str]) -> Iterator[Path]:
     for place in places:
-        found = (root / place).rglob("*") if (root / place).is_dir() else [root / place]
+        found = (ROOT / place).rglob("*") if (ROOT / place).is_dir() else [ROOT / place]
         yield from sorted(path for path in found if path.is_file() and "__pycache__" not in path.parts)

@@ -66,11 +66,9 @@ class Drawn:
         return bf.load(self.words)
 
 
-def drawn_flights(
-    seed: int, aircraft: Sequence[str], schema: Node | None = None, kinds: Sequence[Kind] = KINDS
-) -> Iterator[Drawn]:
+def drawn_flights(seed: int, aircraft: Sequence[str], kinds: Sequence[Kind] = KINDS) -> Iterator[Drawn]:
     """One covering array after the other, without end. Flight I of a seed is always the same."""
-    schema, index, arrays = schema or json_schema(), 0, 0
+    schema, index, arrays = json_schema(), 0, 0
     keys = tuple(keys_of(schema))
     while True:
         kind = kinds[arrays % len(kinds)]

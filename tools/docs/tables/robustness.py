@@ -97,12 +97,12 @@ BIASED = {"gyro, bias of 0.5 deg/s": ("pqr", 0.5), "vane, bias of 2 deg": (("alp
 
 def robustness_doubt() -> str:
     """Losses with all errors together, sensors assumed sound and in doubt; then biased instruments."""
-    rows = [_of_doubt(surface, sensors, 60) for surface in DOUBTED for sensors in OF_DOUBT]
-    rows += [_of_doubt(part, "in doubt", 60) for part in BIASED]
+    rows = [_of_doubt(surface, sensors) for surface in DOUBTED for sensors in OF_DOUBT]
+    rows += [_of_doubt(part, "in doubt") for part in BIASED]
     return markdown_table(DOUBT_HEAD, rows)
 
 
-TOLD_FLIGHTS = 12
+DOUBTED_FLIGHTS, TOLD_FLIGHTS = 60, 12
 
 
 def robustness_doubt_bound() -> str:
@@ -124,14 +124,16 @@ def _told(surface: str) -> tuple[str, ...]:
     return surface, str(TOLD_FLIGHTS), f"{least:.0f}", f"{100 * chance:.0f}"
 
 
-def _of_doubt(part: str, sensors: str, count: int) -> tuple[str, ...]:
-    rows = fly_all(partial(fly_one, load_sweep(DOUBTED_SWEEP)), _doubted(part, OF_DOUBT[sensors], count), 2)
+def _of_doubt(part: str, sensors: str) -> tuple[str, ...]:
+    rows = fly_all(
+        partial(fly_one, load_sweep(DOUBTED_SWEEP)), _doubted(part, OF_DOUBT[sensors], DOUBTED_FLIGHTS), 2
+    )
     right = [row for row in rows if row["isolation.correct"]]
     named = [row for row in rows if row["isolation.isolated"]]
     median_s = f"{np.median([row['isolation.delay_s'] for row in right]):.2f}" if right else "-"
     found = sum(row["detection.delay_s"] is not None for row in rows)
     counts = (found, len(right), len(named) - len(right))
-    return (part, sensors, *(f"{count_of} of {count}" for count_of in counts), median_s)
+    return (part, sensors, *(f"{count} of {DOUBTED_FLIGHTS}" for count in counts), median_s)
 
 
 def _doubted(part: str, fdi: dict[str, str], count: int) -> list[Assignment]:

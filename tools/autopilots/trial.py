@@ -6,8 +6,8 @@ frame bears its number in its outputs; `Spy` keeps what is flown.
 """
 
 import struct
-from collections import Counter, deque
-from collections.abc import Iterator, Mapping
+from collections import deque
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -64,13 +64,10 @@ class Spy:
 
 @dataclass
 class Found:
-    """What came of it. meant: the numbers of the frames asked for, a list a flight; happened: what the line
-    did."""
+    """What came of it. meant: the numbers of the frames asked for, flown: of those flown, a list a flight."""
 
+    flown: list[list[int]]
     meant: list[list[int]] = field(default_factory=list)
-    flown: list[list[int]] = field(default_factory=list)
-    happened: Counter = field(default_factory=Counter)
-    counts: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def frames(self) -> int:
@@ -94,13 +91,11 @@ class Line:
     """What happens on it, drawn by a seed."""
 
     def __init__(self, seed: int) -> None:
-        self.rng, self.now_s, self.happened = np.random.default_rng(seed), 0.0, Counter()
+        self.rng, self.now_s = np.random.default_rng(seed), 0.0
 
     def does(self, what: str) -> bool:
         """Whether this happens now."""
-        it_does = bool(self.rng.random() < ODDS[what])
-        self.happened[what] += it_does
-        return it_does
+        return bool(self.rng.random() < ODDS[what])
 
     def wait(self) -> None:
         """A frame's time passes, now and then seconds."""
@@ -130,9 +125,8 @@ def _flights(line: Line, found: Found, frames: int, a_flight: int) -> Iterator[t
 
 def ardupilot(body: Any, frames: int, seed: int, a_flight: int) -> Found:
     """So many frames of ArduPilot's protocol over a bad line, restarted after about `a_flight` of them."""
-    line, spy, link = Line(seed), Spy(body, number_in_pulses), Link()
-    found = Found(flown=spy.flown, happened=line.happened, counts=link.counts)
-    end, port = Ardupilot(spy, link), 1
+    line, spy = Line(seed), Spy(body, number_in_pulses)
+    found, end, port = Found(spy.flown), Ardupilot(spy, Link()), 1
     for size, meant in _flights(line, found, frames, a_flight):
         if len(found.meant) > 1:
             line.now_s += 0.0 if line.rng.random() < 0.5 else 3.0
@@ -183,10 +177,9 @@ def number_in_controls(outputs: Any) -> int:
 
 def px4(body: Any, frames: int, seed: int, a_flight: int) -> Found:
     """So many frames of PX4's protocol over a bad line; each flight is a connection."""
-    line, spy, link = Line(seed), Spy(body, number_in_controls), Link()
+    line, spy = Line(seed), Spy(body, number_in_controls)
     spy.flown.append([])
-    found = Found(flown=spy.flown, happened=line.happened, counts=link.counts)
-    end = Px4(spy, link, Mavlink(), lambda params: (3, ""))
+    found, end = Found(spy.flown), Px4(spy, Link(), Mavlink(), lambda params: (3, ""))
     for size, meant in _flights(line, found, frames, a_flight):
         _fly_px4(line, end, size, meant)
     return found

@@ -123,9 +123,8 @@ def fit_parts(flights: Sequence[Samples]) -> list[FitPart]:
 
 def usable_mask(samples: Samples) -> Mask:
     """Which samples are known to be healthy, or faulty by a known amount, (n,)."""
-    usable = np.ones(len(samples.t_s), dtype=bool)
-    if samples.logged_failures:
-        usable &= samples.t_s < min(failure.t_s for failure in samples.logged_failures) - _FAILURE_MARGIN_S
+    first_s = min((failure.t_s for failure in samples.logged_failures), default=np.inf)
+    usable = samples.t_s < first_s - _FAILURE_MARGIN_S
     labelled = np.isfinite(samples.labels).any(axis=0)
     if not labelled.any():
         return usable
@@ -186,16 +185,15 @@ def bic_by_order(parts: Parts, vehicle: Vehicle) -> dict[tuple[int, int], float]
     coefficients C of m regressors on n samples, it is n log det((y' y - (Z' y)' C) / n) + 3 m log n.
     """
     Z, y, _ = stack_data(parts, vehicle, max(RATE_LAGS), max(COMMAND_LAGS))
-    rms = regression.rms_of_columns(Z)
-    ZZ = (Z / rms).T @ (Z / rms)
-    Zy = (Z / rms).T @ y
+    X = Z / regression.rms_of_columns(Z)
+    ZZ = X.T @ X
+    Zy = X.T @ y
     yy = y.T @ y
-    bic = {}
+    bic, n = {}, len(y)
     for h, L in product(RATE_LAGS, COMMAND_LAGS):
         cols = _order_columns(vehicle, h, L)
         C = np.linalg.lstsq(ZZ[np.ix_(cols, cols)], Zy[cols], rcond=1e-12)[0]
-        log_det = np.linalg.slogdet((yy - Zy[cols].T @ C) / len(y))[1]
-        bic[h, L] = len(y) * log_det + 3 * len(cols) * np.log(len(y))
+        bic[h, L] = n * np.linalg.slogdet((yy - Zy[cols].T @ C) / n)[1] + 3 * len(cols) * np.log(n)
     return bic
 
 
@@ -274,9 +272,9 @@ def _model_of_fit(fit: regression.Regression, parts: Parts, vehicle: Vehicle, h:
         response_sd=fit.standard_errors[first:].reshape(shape).tolist(),
         noise=fit.residual_covariance.tolist(),
     )
-    colours = sorted({part.samples.noise_ma_coefficients for part in parts} - {()})
     noises = []
-    for own in (_parts_in(parts, ma) for ma in colours):
+    for ma in sorted({part.samples.noise_ma_coefficients for part in parts} - {()}):
+        own = _parts_in(parts, ma)
         noise = _fit_noise_model(own, model)
         noises.append(_with_errors(own, model, noise) if vehicle.other_laws else noise)
     return model.model_copy(update={"colours": noises})
@@ -289,28 +287,21 @@ def _parts_in(parts: Parts, ma: Sequence[float]) -> list[FitPart]:
 
 def quick_error_share(parts: Parts, model: Model) -> float:
     """Estimate the error of unusually quick responses, as a share of them, at most 1: the largest of the
-    flights left out; 1 if none of them has such responses."""
-    squares = map(_squared_quick_error, held_out_folds(parts, model))
-    known = [square for square in squares if square is not None]
-    return float(np.sqrt(np.clip(max(known, default=1.0), 0.0, 1.0)))
-
-
-def _squared_quick_error(fold: Fold) -> float | None:
-    """The square of the error of unusually quick responses in a flight left out, as a share of them; None if
-    it has too few.
+    flights left out; 1 if none of them has such responses enough.
 
     In variances of the noise of the fit, the residual of a sample has the variance r (1 + share^2 power),
     with the variance r of the noise of this flight and the power of the quick responses.
     """
-    flight = fold.innovations()
-    power = flight.quick_power(fold.model.rate_hz)
-    unusual = power > flight.noise.usual_quick_power
-    if unusual.sum() < _MIN_QUICK_SAMPLES:
-        return None
-    squares = ((flight.e - np.median(flight.e, axis=0)) @ flight.W) ** 2
-    r = max(regression.noise_scale(squares), 1.0)
-    ratio = squares[unusual].mean(axis=1) / r
-    return float(((ratio - 1.0) / power[unusual]).mean())
+    shares = []
+    for fold in held_out_folds(parts, model):
+        flight = fold.innovations()
+        power = flight.quick_power(fold.model.rate_hz)
+        unusual = power > flight.noise.usual_quick_power
+        if unusual.sum() >= _MIN_QUICK_SAMPLES:
+            squares = ((flight.e - np.median(flight.e, axis=0)) @ flight.W) ** 2
+            r = max(regression.noise_scale(squares), 1.0)
+            shares.append(((squares[unusual].mean(axis=1) / r - 1.0) / power[unusual]).mean())
+    return float(np.sqrt(np.clip(max(shares, default=1.0), 0.0, 1.0)))
 
 
 def _with_errors(own: Parts, model: Model, noise: NoiseModel) -> NoiseModel:
@@ -393,7 +384,8 @@ def gain_overdispersion(parts: Parts, model: Model) -> float:
     errors = [(float(len(model.groups)), len(model.groups))]
     for fold in held_out_folds(parts, model):
         errors += _gain_errors(fold)
-    return sum(error for error, _ in errors) / sum(n for _, n in errors)
+    total, n = np.sum(errors, axis=0)
+    return float(total / n)
 
 
 def _gains(F: Floats, e: Floats) -> tuple[Floats, Floats, Floats]:
@@ -443,14 +435,15 @@ def _with_inflated_noise(parts: Parts, model: Model) -> Model:
         errors = _gain_errors(fold, _GAIN_WINDOW_S, loudness)
         found = windows.setdefault(fold.held_out.samples.noise_ma_coefficients, [])
         found.extend(min(error / max(n, 1), _MAX_INFLATION) for error, n in errors)
-    inflation = {ma: max(float(np.mean(values)), 1.0) for ma, values in windows.items() if values}
-    for ma in inflation if model.vehicle.other_laws else ():
-        # a gyro's noise takes from the next sample what it added to one
-        inflation[ma] *= _GYRO_FACTOR if len(ma) > 1 and ma[1] < 0.0 else _GUST_FACTOR
-    colours = [
-        noise.model_copy(update={"wider": inflation.get(tuple(noise.average), 1.0)})
-        for noise in model.colours
-    ]
+    colours = []
+    for noise in model.colours:
+        ma, wider = tuple(noise.average), 1.0
+        if windows.get(ma):
+            wider = max(float(np.mean(windows[ma])), 1.0)
+            if model.vehicle.other_laws:
+                # a gyro's noise takes from the next sample what it added to one
+                wider *= _GYRO_FACTOR if len(ma) > 1 and ma[1] < 0.0 else _GUST_FACTOR
+        colours.append(noise.model_copy(update={"wider": wider}))
     return model.model_copy(update={"colours": colours})
 
 
@@ -489,19 +482,19 @@ def _estimate_trim_walk(parts: Parts, model: Model) -> list[float]:
     Means of n samples of a random walk, with steps of variance w, and of noise whose mean has the variance
     c / n differ from the next with the variance v = 2 c / n + 2 n w / 3: two n tell w from c.
     """
-    spans = [round(span_s * model.rate_hz) for span_s in _TRIM_SPANS_S]
-    squares: list[list[Floats]] = [[], []]
-    for flight in (fold.innovations() for fold in held_out_folds(parts, model)):
-        for g in flight.residual_runs():
-            for n, found in zip(spans, squares, strict=True):
-                means = g[: len(g) // n * n].reshape(-1, n, 3).mean(axis=1)
-                found.append(np.diff(means, axis=0) ** 2 / np.maximum(np.diag(flight.R), MIN_DIVISOR))
+    flights = [fold.innovations() for fold in held_out_folds(parts, model)]
+    runs = [(run, np.diag(flight.R)) for flight in flights for run in flight.residual_runs()]
+
+    def squared_steps(n: int) -> Floats:
+        means = ((run[: len(run) // n * n].reshape(-1, n, 3).mean(axis=1), r) for run, r in runs)
+        return np.vstack([np.diff(mean, axis=0) ** 2 / np.maximum(r, MIN_DIVISOR) for mean, r in means])
+
+    n1, n2 = (round(span_s * model.rate_hz) for span_s in _TRIM_SPANS_S)
+    short, long = squared_steps(n1), squared_steps(n2)
     usual = np.array(FilterSettings().trim_walk)
-    short, long = map(np.vstack, squares)
     if not len(short) or not len(long):
         return usual.tolist()
     v1, v2 = short.mean(axis=0), long.mean(axis=0)
-    n1, n2 = spans
     w = 1.5 * (n2 * v2 - n1 * v1) / (n2**2 - n1**2)
     return np.maximum(np.sqrt(np.maximum(w, 0.0)), usual).tolist()
 
@@ -522,47 +515,37 @@ def validation_folds(parts: Parts, most: int | None = None) -> list[tuple[list[F
 
 def add_ranges_and_threshold(parts: Parts, model: Model) -> Model:
     """The model with what it was fitted on, and how it did on parts that were left out in turn: at which
-    evidence of a fault they would alarm as often as declared."""
-    peaks = list[extremes.PeaksAndHours]()
-    deviations = list[Floats]()
-    for fold in held_out_folds(parts, model):
-        peaks.append(_healthy_peaks(fold))
-        if len(parts) > 1 and model.vehicle.other_laws:
-            deviations.append(_squared_deviations(fold))
+    evidence of a fault they would alarm as often as the vehicle file asks for, or as is usual. Raises
+    BadInput if they are too short to tell that."""
+    folds = list(held_out_folds(parts, model))
+    peaks = [_healthy_peaks(fold) for fold in folds]
     variance = group_gain_sd(fit_of(parts, model), model) ** 2
     if model.vehicle.other_laws:
         # how far another flight's gains are at most before any is left out counts as one flight
         hidden = [noise.misreads for noise in model.colours] or [[0.0] * len(model.groups)]
+        deviations = [_squared_deviations(fold) for fold in folds] if len(parts) > 1 else []
         variance += np.nanmean([3.0 * np.max(hidden, axis=0) ** 2, *deviations], axis=0)
     gain_sd = np.minimum(np.sqrt(variance), _GAIN_SD_CAP)
     tail = extremes.fit_peak_tail(peaks)
     ranges = trust.compute_fitted_ranges(parts, tied_shares(parts, model), gain_sd).model_copy(
         update={"tail": tail}
     )
-    rate, threshold = _alarm_rate_and_threshold(model, tail, peaks)
-    alarm = {"false_alarms_per_hour": rate, "threshold": threshold}
-    return model.model_copy(
-        update={
-            "fitted": ranges,
-            "settings": model.settings.model_copy(update=alarm),
-            "identified": dict(_cross_validate(peaks, rate, model)),
-        }
-    )
-
-
-def _alarm_rate_and_threshold(
-    model: Model, tail: extremes.PeakTail | None, peaks: Sequence[extremes.PeaksAndHours]
-) -> tuple[float | None, float | None]:
-    """The rate of false alarms, 1/h, that the vehicle file asks for or that is usual, and the evidence at
-    which health reaches it. Raises BadInput if the flights are too short to tell the rate asked for."""
     requested = model.vehicle.false_alarms_per_hour
-    target = _DEFAULT_FALSE_ALARMS if requested is None and not model.settings.levels else requested
     if tail is None and requested is not None:
         minutes = 60.0 * sum(hours for _, hours in peaks)
         reason = f"{minutes:.1f} min of health left out have too few peaks of the evidence to tell"
         allowed = f"{extremes.RULED_OUT_COUNT * 60.0 / requested - minutes:.0f} min more"
         raise BadInput(f"identify: false_alarms_per_hour {requested:g}: {reason}, allowed: {allowed}")
-    return target, _choose_threshold(tail, target, model) if target else None
+    rate = _DEFAULT_FALSE_ALARMS if requested is None and not model.settings.levels else requested
+    threshold = _choose_threshold(tail, rate, model) if rate else None
+    alarm = {"false_alarms_per_hour": rate, "threshold": threshold}
+    return model.model_copy(
+        update={
+            "fitted": ranges,
+            "settings": model.settings.model_copy(update=alarm),
+            "identified": _cross_validate(peaks, rate, model),
+        }
+    )
 
 
 def _squared_deviations(fold: Fold) -> Floats:
@@ -696,8 +679,8 @@ def score_folds(parts: Parts, model: Model) -> tuple[list[Document], float]:
 
 def prediction_quality(fold: Fold) -> Document:
     """Share of the rates' variance that one-step prediction explains, and the residual, an axis."""
-    rows, e = one_step_residual(fold.model, fold.held_out)
-    y = fold.held_out.samples.rates[rows]
+    flight = one_step_innovations(fold.model, fold.held_out)
+    y, e = fold.held_out.samples.rates[flight.rows], flight.e
     if not len(y):
         return {"samples": 0}
     explained = 1.0 - e.var(axis=0) / np.maximum(y.var(axis=0), MIN_DIVISOR)
@@ -708,12 +691,11 @@ def prediction_quality(fold: Fold) -> Document:
     }
 
 
-def one_step_residual(model: Model, part: FitPart) -> tuple[Ints, Floats]:
-    """Places (n,) of the samples in use, and their one-step residuals (n, 3), whatever is known of noise."""
-    flight = part.innovations(model.model_copy(update={"colours": []}))
-    return flight.rows, flight.e
+def one_step_innovations(model: Model, part: FitPart) -> regression.Innovations:
+    """The samples in use by a model, whatever is known of noise."""
+    return part.innovations(model.model_copy(update={"colours": []}))
 
 
 def one_step_residuals(parts: Parts, model: Model) -> Floats:
-    """The same of several flights, one after the other, (n, 3)."""
-    return np.vstack([one_step_residual(model, part)[1] for part in parts])
+    """The residuals of several flights, one after the other, (n, 3), whatever is known of noise."""
+    return np.vstack([one_step_innovations(model, part).e for part in parts])

@@ -325,7 +325,11 @@ def identification_text(model: Model) -> str:
         *(f"  {line}" for line in results.get("assumed", [])),
         *(f"  together, not distinguishable: {', '.join(group)}" for group in model.groups if len(group) > 1),
         *_pressure_lines(model),
-        *dict.fromkeys(map(_noise_text, model.colours)),
+        *dict.fromkeys(
+            f"  noise of the colour {', '.join(f'{c:.3g}' for c in noise.average)}: {noise.wider:.2g} times "
+            "as wide, in squares, as gains of 10 s left out differ, and other laws may"
+            for noise in model.colours
+        ),
         *(f"  {line}" for line in trust.unknown_sentences(model)),
         *(f"  {flight['name']}: {note}" for flight in results["flights"] for note in flight["notes"]),
         *map(_fold_text, results["tests"]),
@@ -348,14 +352,6 @@ def identification_text(model: Model) -> str:
         inflated = f"variance inflated over {_MIN_COLLINEAR:g} times"
         lines.append(f"  {n} {are} collinear ({inflated}), most {most['regressor']} ({times})")
     return "\n".join(lines)
-
-
-def _noise_text(noise: NoiseModel) -> str:
-    colour = ", ".join(f"{c:.3g}" for c in noise.average)
-    return (
-        f"  noise of the colour {colour}: {noise.wider:.2g} times as wide, in squares, as "
-        "gains of 10 s left out differ, and other laws may"
-    )
 
 
 def _day_lines(expected: Document, n_flights: int) -> list[str]:

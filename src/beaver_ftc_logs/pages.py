@@ -15,6 +15,7 @@ from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results import SERIES_COLOURS as SERIES
 from beaver_ftc.results import Document, as_json, result_folder
+from beaver_ftc.studies.present import GRID, panels
 from beaver_ftc_logs import fitting
 from beaver_ftc_logs.diagnose import LogRows
 from beaver_ftc_logs.findings import MAX_BRIEF_EVENT_S, duration_text, events_to_show
@@ -92,20 +93,23 @@ def render_diagnosis(samples: Samples, rows: LogRows, verdict: Document, words: 
 def _log_notes(samples: Samples) -> list[str]:
     n_gaps = int(samples.stretch_number[-1])
     gaps = "1 gap" if n_gaps == 1 else f"{n_gaps} gaps"
-    notes = [f"{len(samples.t_s)} samples at {1.0 / samples.dt_s:.3g} Hz, {gaps} in the log."]
-    notes += [
-        f"{name} has its own stamps: its last value is held, {age_s:.2f} s old on average."
-        for name, age_s in samples.held_age_s.items()
+    return [
+        f"{len(samples.t_s)} samples at {1.0 / samples.dt_s:.3g} Hz, {gaps} in the log.",
+        *(
+            f"{name} has its own stamps: its last value is held, {age_s:.2f} s old on average."
+            for name, age_s in samples.held_age_s.items()
+        ),
+        *samples.notes,
     ]
-    return [*notes, *samples.notes]
 
 
 def flight_figure(samples: Samples, rows: LogRows, words: Words) -> Any:
     """The flight on one page: commands, rates, effectiveness with bounds, probability of a fault."""
     surfaces = words.surfaces
-    figure = _new_figure(11, 3.4 + 1.25 * len(surfaces))
     heights = [1.2, 1.2, *[1.0] * (len(surfaces) + 1)]
-    axes = figure.subplots(len(heights), sharex=True, height_ratios=heights)
+    height = 3.4 + 1.25 * len(surfaces)
+    figure, grid = panels(len(heights), 1, 11, height, sharex=True, height_ratios=heights)
+    axes = grid[:, 0]
     _draw_lines(axes[0], samples.t_s, np.rad2deg(samples.rates), ["p", "q", "r"], "rates, deg/s")
     limit = float(np.rad2deg(np.nanpercentile(np.abs(samples.rates), 99.9))) * 1.3
     axes[0].set_ylim(-max(limit, 1.0), max(limit, 1.0))  # a landing's spike does not flatten the flight
@@ -126,7 +130,7 @@ def _label_axis(axis: Any, label: str, **grid_options: Any) -> None:
     """Axis label, ticks and grid."""
     axis.set_ylabel(label, fontsize=8)
     axis.tick_params(labelsize=8)
-    axis.grid(color="#dddddd", linewidth=0.5, **grid_options)
+    axis.grid(color=GRID, linewidth=0.5, **grid_options)
 
 
 def _draw_lines(axis: Any, t_s: np.ndarray, values: np.ndarray, names: list[str], y_label: str) -> None:
@@ -201,12 +205,6 @@ def render_identification(flights: Sequence[Samples], model: Model) -> str:
     )
 
 
-def _new_figure(width: float, height: float) -> Any:
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=(width, height), layout="constrained", dpi=110)
-
-
 def _encode_png(figure: Any) -> str:
     buffer = BytesIO()
     figure.savefig(buffer, format="png")
@@ -215,10 +213,12 @@ def _encode_png(figure: Any) -> str:
 
 def _prediction_figure(usable: Parts, model: Model) -> Any:
     """Measured and predicted rates over the liveliest part of each flight (or half) that was left out."""
+    from matplotlib.figure import Figure
+
     used = (fold for fold in fitting.held_out_folds(usable, model, None) if fold.held_out.is_usable.any())
     folds = list(islice(used, _MAX_SHOWN_FLIGHTS))
     n = max(len(folds), 1)
-    figure = _new_figure(11, 4.6 * n)
+    figure = Figure(figsize=(11, 4.6 * n), layout="constrained", dpi=110)
     parts = figure.subfigures(n, squeeze=False)[:, 0]
     for part, fold in zip(parts, folds, strict=False):
         axes = part.subplots(3, 1, sharex=True)
@@ -238,10 +238,9 @@ def _prediction_figure(usable: Parts, model: Model) -> Any:
 def _liveliest_window(fold: fitting.Fold, n: int) -> tuple[Floats, Floats, Floats]:
     """Times, rates and residual of the window in which the rates known moved most; nan where nothing is
     known, for lines to end."""
-    rows, residual = fitting.one_step_residual(fold.model, fold.held_out)
-    samples = fold.held_out.samples
+    flight, samples = fitting.one_step_innovations(fold.model, fold.held_out), fold.held_out.samples
     rates, r = np.full((2, *samples.rates.shape), np.nan)
-    rates[rows], r[rows] = samples.rates[rows], residual
+    rates[flight.rows], r[flight.rows] = samples.rates[flight.rows], flight.e
     total = np.concatenate([[0.0], np.cumsum(np.nansum(rates**2, axis=1))])
     first = int(np.argmax(total[n:] - total[:-n])) if len(rates) > n else 0
     window = slice(first, first + n)
@@ -252,8 +251,7 @@ def _spectrum_figure(usable: Parts, model: Model) -> Any:
     """Density of the residual, and what white noise of the same variance would have."""
     residual = fitting.one_step_residuals(usable, model)
     f_hz, power = spectral_density(residual, model.rate_hz)
-    figure = _new_figure(7.5, 3.2)
-    axis = figure.subplots()
+    figure, ((axis,),) = panels(1, 1, 7.5, 3.2)
     for i, name in enumerate("pqr"):
         axis.loglog(f_hz[1:], power[1:, i], color=SERIES[i], linewidth=1.1, label=name)
         white = residual[:, i].var() / (0.5 * model.rate_hz)
@@ -268,8 +266,7 @@ def _spectrum_figure(usable: Parts, model: Model) -> Any:
 def _correlation_figure(fit: Regression, names: list[str]) -> Any:
     """Correlation of the errors of the coefficients."""
     side = 2.5 + 0.19 * len(names)
-    figure = _new_figure(side + 0.8, side)
-    axis = figure.subplots()
+    figure, ((axis,),) = panels(1, 1, side + 0.8, side)
     image = axis.imshow(fit.coefficient_error_correlation, cmap="RdBu_r", vmin=-1.0, vmax=1.0)
     axis.set_xticks(range(len(names)), names, rotation=90, fontsize=6)
     axis.set_yticks(range(len(names)), names, fontsize=6)

@@ -302,7 +302,7 @@ def fit_ols(Z: Floats, y: Floats, stretch: Ints, lag: int) -> Regression:
     Directions that Z does not excite get the least coefficients that fit, and a column of nothing but
     rounding gets 0.
     """
-    rms = np.sqrt((Z**2).mean(axis=0))
+    rms = rms_of_columns(Z)
     s = np.where(rms > _RANK_TOLERANCE * rms.max(), rms, np.inf)
     X = Z / s
     P: Floats = np.asarray(np.linalg.pinv(X.T @ X, rcond=_EIGENVALUE_FLOOR), dtype=np.float64)

@@ -19,6 +19,7 @@ A row uses nothing later than its time.
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import compress
 from typing import NamedTuple
 
 import numpy as np
@@ -56,8 +57,11 @@ _REVERSED_GAIN_LIMIT = -0.5
 def compute_fitted_ranges(parts: Parts, tied: Floats, gain_sd: Floats) -> FittedRanges:
     """Compute the ranges in which a model was fitted. tied (G,): as of `fitting.tied_shares`; gain_sd (G,):
     standard errors, of parts not fitted."""
-    fields = ("rates", "commands", "airspeed", "energy_height_rate_mps")
-    rates, commands, airspeeds, climbs = (_usable(parts, name) for name in fields)
+
+    def usable(name: str) -> Floats:
+        return np.concatenate([getattr(part.samples, name)[part.is_usable] for part in parts])
+
+    airspeeds, climbs = usable("airspeed"), usable("energy_height_rate_mps")
     climbs = climbs[np.isfinite(climbs)]
     is_airspeed_known = np.isfinite(airspeeds).any()
     still: dict[str, float] = {}
@@ -65,19 +69,14 @@ def compute_fitted_ranges(parts: Parts, tied: Floats, gain_sd: Floats) -> Fitted
         for name, still_s in part.samples.unchanged_s.items():
             still[name] = max(still.get(name, 0.0), float(still_s.max(initial=0.0)))
     return FittedRanges(
-        commands=central_ranges(commands),
-        rates=central_ranges(rates),
+        commands=central_ranges(usable("commands")),
+        rates=central_ranges(usable("rates")),
         airspeed=central_ranges(airspeeds[:, None])[0] if is_airspeed_known else None,
         tied=tied.tolist(),
         gain_sd=gain_sd.tolist(),
         still_s=still,
         energy_climb=float(np.quantile(climbs, energy.UNPOWERED_SHARE)) if climbs.size else None,
     )
-
-
-def _usable(parts: Parts, name: str) -> Floats:
-    """A field of all flights, in the samples in use."""
-    return np.concatenate([getattr(part.samples, name)[part.is_usable] for part in parts])
 
 
 def central_ranges(values: Floats) -> list[list[float]]:
@@ -103,8 +102,7 @@ def known_gains(model: Model) -> Mask:
 
 def unknown_surfaces(model: Model) -> set[str]:
     """The surfaces of which nothing is said."""
-    pairs = zip(model.groups, known_effects(model), strict=True)
-    return {name for group, known in pairs if not known for name in group}
+    return {name for group in compress(model.groups, ~known_effects(model)) for name in group}
 
 
 def unknown_sentences(model: Model) -> list[str]:
@@ -195,11 +193,8 @@ def refuse_columns(samples: Samples, model: Model) -> None:
     knows the effect of no surface says nothing of any flight, and refuses none."""
     if not any(known_effects(model)):
         return
-    if (pair := _whiten_likeliest(samples, model)) is None:
-        return
-    flight, likeliest = pair
-    found = answers(flight, likeliest)
-    if found is None:
+    flight, likeliest = _whiten_likeliest(samples, model)
+    if (found := answers(flight, likeliest)) is None:
         return
     mistakes = _mistake_texts(samples, model, found)
     for ma in NOISE_MA_CANDIDATES if mistakes else ():
@@ -213,23 +208,21 @@ def refuse_columns(samples: Samples, model: Model) -> None:
         raise BadInput(f"{samples.name}: {text}, {allowed}")
 
 
-def _whiten_likeliest(samples: Samples, model: Model) -> tuple[Samples, Model] | None:
+def _whiten_likeliest(samples: Samples, model: Model) -> tuple[Samples, Model]:
     """Return the flight whitened by the noise of the model that makes it likeliest, and the model with this
-    noise alone; None where a part of the flight is too short."""
-    found = [(pair, _likelihoods(*pair).mean()) for pair in regression.by_noise(samples, model)]
-    likeliest, likelihood = max(found, key=lambda one: one[1])
-    return likeliest if np.isfinite(likelihood) else None
+    noise alone."""
+    return max(regression.by_noise(samples, model), key=lambda pair: _likelihoods(*pair).mean())
 
 
 def find_reversed(samples: Samples, model: Model) -> list[list[str]]:
     """The groups of known effect to whose command the rates answer the other way round, by least squares
     over all of a flight: a gain nearer to -1 than to 0, which is that of a lost surface."""
-    if (pair := _whiten_likeliest(samples, model)) is None:
+    flight = regression.innovations(*_whiten_likeliest(samples, model))
+    rows = np.flatnonzero(flight.is_known)
+    if regression.split_parts(rows) is None:
         return []
-    flight = regression.innovations(*pair)
-    gains = flight.at(np.flatnonzero(flight.is_known)).gains()
-    rows = zip(model.groups, gains, known_effects(model), strict=True)
-    return [group for group, gain, known in rows if known and gain < _REVERSED_GAIN_LIMIT]
+    is_reversed = known_effects(model) & (flight.at(rows).gains() < _REVERSED_GAIN_LIMIT)
+    return list(compress(model.groups, is_reversed))
 
 
 def _mistake_texts(samples: Samples, model: Model, found: Answers) -> dict[str, str]:

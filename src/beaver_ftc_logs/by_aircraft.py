@@ -7,7 +7,7 @@ outside the aircraft's envelope, after a gap, and where a number is missing.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
 from math import pi
@@ -48,12 +48,8 @@ _START_WINDOW_S = 1.0
 _ATTITUDE_ANGLE_NAMES = ("roll", "pitch", "yaw")
 
 
-@dataclass(frozen=True)
-class DiagnosedAircraft:
-    """The aircraft whose flights are diagnosed, and the errors declared for it: arguments of `Diagnosis`."""
-
-    aircraft: Aircraft
-    declared_errors: Document = field(default_factory=dict)
+DiagnosedAircraft = tuple[Aircraft, Document]
+"""The aircraft whose flights are diagnosed, and the errors declared for it: arguments of `Diagnosis`."""
 
 
 def load_diagnosed(aircraft_name: str, scenario: str | None = None) -> DiagnosedAircraft:
@@ -67,7 +63,7 @@ def load_diagnosed(aircraft_name: str, scenario: str | None = None) -> Diagnosed
     except UnknownAircraft as error:
         raise BadInput(f"--aircraft: {error}") from None
     if scenario is None:
-        return DiagnosedAircraft(aircraft)
+        return aircraft, {}
     loaded = load_scenario(scenario)
     flown, fdi = loaded.airframe.name, loaded.fdi
     reasons = {
@@ -82,7 +78,7 @@ def load_diagnosed(aircraft_name: str, scenario: str | None = None) -> Diagnosed
     for reason, holds in reasons.items():
         if holds:
             raise BadInput(f"--scenario {scenario}: {reason}")
-    return DiagnosedAircraft(loaded.airframe, error_sections(loaded))
+    return loaded.airframe, error_sections(loaded)
 
 
 @dataclass(frozen=True)
@@ -154,16 +150,16 @@ class LogInputs:
         return rows.without_verdict(_doubtful_rows(self, replay, rows))
 
 
-def read_inputs(log: RecordedFlight, vehicle: Vehicle, given: DiagnosedAircraft) -> LogInputs:
+def _read_inputs(log: RecordedFlight, vehicle: Vehicle, given: DiagnosedAircraft) -> LogInputs:
     """Read what the diagnosis is given. Raises BadInput for what the log lacks."""
     from beaver_ftc.loop import Diagnosis
 
-    aircraft = given.aircraft
+    aircraft, declared_errors = given
     airspeed, flow = _flow_columns(log, vehicle, aircraft)
     changes = {"max_rate_hz": _MAX_HZ, "reference_airspeed_mps": None}
     samples = resample(log, vehicle.model_copy(update=changes))
     rate_hz = _log_rate_hz(samples)
-    diagnosis = Diagnosis(aircraft, rate_hz, **given.declared_errors)
+    diagnosis = Diagnosis(aircraft, rate_hz, **declared_errors)
     columns, ages = convert_to_si(log, vehicle).columns, dict(samples.held_age_s)
 
     def sampled_at(name: str) -> Floats:
@@ -196,22 +192,17 @@ def read_inputs(log: RecordedFlight, vehicle: Vehicle, given: DiagnosedAircraft)
 
 def diagnose_aircraft(
     log: RecordedFlight, vehicle: Vehicle, given: DiagnosedAircraft
-) -> tuple[Samples, LogRows, Document]:
-    """The samples, the rows and the document of verdict.json. Raises BadInput for what the log lacks."""
-    inputs = read_inputs(log, vehicle, given)
-    return inputs.samples, *diagnose_inputs(inputs, given)
-
-
-def diagnose_inputs(inputs: LogInputs, given: DiagnosedAircraft) -> tuple[LogRows, Document]:
-    """The rows and the document of verdict.json. Raises BadInput if the log has no alarm once the sign of a
-    command is changed, or two commands are exchanged."""
+) -> tuple[LogInputs, LogRows, Document]:
+    """The inputs, the rows and the document of verdict.json. Raises BadInput for what the log lacks, and if
+    it has no alarm once the sign of a command is changed, or two commands are exchanged."""
+    inputs = _read_inputs(log, vehicle, given)
     replay = inputs.replay()
     rows = inputs.rows(replay)
     if rows.has_credible_alarm():
         for corrected, error in _corrected_inputs(inputs, replay):
             if corrected.rows(corrected.replay()).clears_alarm(rows):
                 raise error
-    return rows, _verdict_document(inputs, rows, replay, given)
+    return inputs, rows, _verdict_document(inputs, rows, replay, given)
 
 
 def _corrected_inputs(inputs: LogInputs, replay: Replayed) -> Iterator[tuple[LogInputs, BadInput]]:
@@ -295,8 +286,8 @@ def _doubtful_rows(inputs: LogInputs, replay: Replayed, rows: LogRows) -> Reason
     aircraft, missing = inputs.aircraft, inputs.has_missing_value
     (low_mps, high_mps), (low, high) = aircraft.envelope.airspeed_mps, aircraft.alpha_rad
     alpha, airspeed = inputs.input_arrays[1][:, 0], inputs.input_arrays[1][:, 2]
-    outside, unexplained, after = (np.zeros(len(alpha), dtype=bool) for _ in range(3))
-    outside[:] = True
+    unexplained, after = np.zeros((2, len(alpha)), dtype=bool)
+    outside = ~after
     for begin, end in inputs.gap_free_stretches:
         outside[begin:end] = False
         t_s = rows.t_s[begin:end]
@@ -324,7 +315,8 @@ def _verdict_document(
     inputs: LogInputs, rows: LogRows, replay: Replayed, given: DiagnosedAircraft
 ) -> Document:
     """The document of verdict.json."""
-    samples, surfaces = inputs.samples, list(given.aircraft.surfaces)
+    samples, (aircraft, declared_errors) = inputs.samples, given
+    surfaces = list(aircraft.surfaces)
     alarms = np.flatnonzero(rows.faulty).tolist()
     last = replay.verdicts[alarms[-1]] if alarms else Verdict()
     since = [k for k in alarms if replay.verdicts[k].isolated == last.isolated]
@@ -334,8 +326,8 @@ def _verdict_document(
     ]
     return {
         "flight": samples.name,
-        "aircraft": given.aircraft.name,
-        "declared": given.declared_errors,
+        "aircraft": aircraft.name,
+        "declared": declared_errors,
         **findings.span_entry(samples),
         "faulty": bool(alarms),
         "detection_s": float(samples.t_s[alarms[0]]) if alarms else None,

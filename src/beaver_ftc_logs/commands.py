@@ -234,7 +234,7 @@ def _check_options_agree(options: DiagnoseOptions) -> None:
 
 
 def _diagnose_with_aircraft(options: DiagnoseOptions) -> None:
-    from beaver_ftc_logs.by_aircraft import diagnose_inputs, load_diagnosed, read_inputs
+    from beaver_ftc_logs.by_aircraft import diagnose_aircraft, load_diagnosed
     from beaver_ftc_logs.findings import as_text
     from beaver_ftc_logs.mixing import load_vehicle_for_logs
     from beaver_ftc_logs.pages import words_of_aircraft
@@ -245,9 +245,9 @@ def _diagnose_with_aircraft(options: DiagnoseOptions) -> None:
     if options.certificate:
         from beaver_ftc_logs import certified
 
-    given = load_diagnosed(str(options.aircraft), options.scenario)
-    words = words_of_aircraft(given.aircraft, BOUND_WINDOW_S)
-    groups = [[name] for name in given.aircraft.surfaces]
+    given = aircraft, _ = load_diagnosed(str(options.aircraft), options.scenario)
+    words = words_of_aircraft(aircraft, BOUND_WINDOW_S)
+    groups = [[name] for name in words.surfaces]
     verdicts: list[Document] = []
     texts: list[str] = []
     for path in options.flights:
@@ -258,8 +258,7 @@ def _diagnose_with_aircraft(options: DiagnoseOptions) -> None:
         loaded, mixing = load_vehicle_for_logs(options.vehicle or str(beside), [path], options.reader)
         texts += mixing
         for log in read_vehicle_parts(path, loaded, options.reader):
-            inputs = read_inputs(log, loaded, given)
-            rows, verdict = diagnose_inputs(inputs, given)
+            inputs, rows, verdict = diagnose_aircraft(log, loaded, given)
             writer = None
             if options.certificate:
                 writer = partial(certified.write_certificate_and_log, inputs, rows)
@@ -277,10 +276,9 @@ def _replay_run_logs(flights: list[Path], out: Path, format: Format) -> None:
     if others:
         reason = "--model is missing, allowed without one: log.parquet beside its scenario.yaml"
         raise BadInput(f"diagnose: {others[0]}: {reason}")
-    replays = [replay_run_log(path) for path in flights]
     verdicts = [
         verdict | {"folder": str(write_results(out, verdict["flight"], columns, verdict))}
-        for columns, verdict in replays
+        for columns, verdict in [replay_run_log(path) for path in flights]
     ]
     answer(format, {"flights": verdicts}, lambda: "\n".join(map(as_text, verdicts)))
 

@@ -229,9 +229,7 @@ def test_the_command_writes_rows_verdict_and_page(flown, tmp_path):
     assert (verdict["aircraft"], verdict["isolated"]) == ("beaver", "elevator")
     assert verdict["score"]["mean_error"] < 0.01
     rows = parquet.read_table(tmp_path / "d" / "flight" / "diagnosis.parquet")
-    each = [
-        f"{name}_{what}" for name in BEAVER.aircraft.surfaces for what in ("effectiveness", "low", "high")
-    ]
+    each = [f"{name}_{what}" for name in BEAVER[0].surfaces for what in ("effectiveness", "low", "high")]
     assert rows.column_names == ["t_s", "faulty", "named", *each, "credible"]
     assert "The model is that of beaver" in (tmp_path / "d" / "flight" / "report.html").read_text()
 

@@ -17,6 +17,7 @@ take these places in their order.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -37,7 +38,13 @@ from beaver_ftc_logs.diagnose import (
 )
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import Floats, RecordedFlight
-from beaver_ftc_logs.regression import expand_groups, group_indices, innovations, trailing_sums
+from beaver_ftc_logs.regression import (
+    expand_groups,
+    group_commands,
+    group_indices,
+    innovations,
+    trailing_sums,
+)
 from beaver_ftc_logs.samples import Samples, unchanged_s
 from beaver_ftc_logs.trust import without_dead_rows
 
@@ -97,16 +104,13 @@ def _rows_of_estimate(samples: Samples, model: Model, e: Floats, sd: Floats) -> 
     low = expand_groups(np.minimum(low, nearest), model)
     high = expand_groups(np.maximum(high, nearest), model)
     names = join_names(lost, model.group_names)
-    return _plain_rows(samples, names, expand_groups(nearest, model), low=low, high=high)
+    return _plain_rows(samples, names, expand_groups(nearest, model), low, high)
 
 
-def _plain_rows(samples: Samples, names: np.ndarray, e: Floats, **given: Floats) -> LogRows:
-    """Rows of a detector with estimate e (n, S): faulty where it names a surface. Of low, high and
-    probability those that are not given: the bounds are the estimate, the probability is 0 or 1."""
+def _plain_rows(samples: Samples, names: np.ndarray, e: Floats, low: Floats, high: Floats) -> LogRows:
+    """Rows of a detector with estimate e and bounds, (n, S) each: faulty where a surface is named."""
     faulty = np.array([bool(name) for name in names], dtype=np.int64)
-    given = {"low": e, "high": e, "probability": faulty.astype(float), **given}
-    t_s = samples.t_s
-    return LogRows(t_s, faulty, names, e, given["low"], given["high"], given["probability"], t_s)
+    return LogRows(samples.t_s, faulty, names, e, low, high, faulty.astype(float), samples.t_s)
 
 
 def diagnose_by_freeze_rule(log: RecordedFlight, samples: Samples, model: Model) -> LogRows | None:
@@ -119,7 +123,8 @@ def diagnose_by_freeze_rule(log: RecordedFlight, samples: Samples, model: Model)
     frozen = np.zeros((len(samples.t_s), len(surfaces)), dtype=bool)
     for name, column in outputs.items():
         frozen[:, surfaces.index(name)] = unchanged_s(column, samples.t_s) > MIN_FROZEN_OUTPUT_S
-    return _plain_rows(samples, join_names(frozen, surfaces), 1.0 - frozen)
+    e = 1.0 - frozen
+    return _plain_rows(samples, join_names(frozen, surfaces), e, e, e)
 
 
 class LinearRateModel:
@@ -155,9 +160,9 @@ def loop_detector_inputs(samples: Samples, model: Model) -> list[tuple[Measured,
     expected = (rates - flight.e - before) / dt_s
     Z = np.zeros((len(rates), 3, _N_LOOP))
     u = np.zeros((len(rates), _N_LOOP))
-    for g, places in enumerate(members):
-        Z[:, :, g] = np.where(flight.is_known[:, None], flight.F[:, g], 0.0) / dt_s
-        u[:, g] = np.nan_to_num(samples.commands[:, places].sum(axis=1))
+    F = np.where(flight.is_known[:, None, None], flight.F, 0.0)
+    Z[:, :, : len(members)] = F.transpose(0, 2, 1) / dt_s
+    u[:, : len(members)] = np.nan_to_num(group_commands(samples, members, labelled=False))
     sd, t_s = _model_error_sd_rad_s2(model), samples.t_s.tolist()
     frames = [
         Measured(t_s[k], rates[k], np.zeros(N_Y), expected[k], Z[k], sd.copy()) for k in range(len(t_s))
@@ -196,9 +201,7 @@ def run_loop_detector(detector: Detector, samples: Samples, model: Model) -> Log
 def rows_of_verdicts(verdicts: list[Verdict], samples: Samples, model: Model) -> LogRows:
     """Verdicts as rows. The bounds are 0 to 1 for each surface that the detector may suspect, else 1."""
     n, members = len(verdicts), group_indices(model)
-    statistic, detected = (
-        np.array([getattr(one, key) for one in verdicts]) for key in ("statistic", "detected")
-    )
+    statistic, detected = np.array([(one.statistic, one.detected) for one in verdicts], dtype=float).T
     # by the statistic of a sample where there is one: the loop's own latch serves one fault a flight
     faulty = np.where(np.isfinite(statistic), statistic > 1.0, detected).astype(np.int64)
     e, low = np.ones((2, n, len(model.vehicle.surfaces)))
@@ -211,13 +214,12 @@ def rows_of_verdicts(verdicts: list[Verdict], samples: Samples, model: Model) ->
         names[k], low[k, members[g]] = model.group_names[g], 0.0
         e[k, members[g]] = _remaining_effectiveness(verdicts[k], g)
     p = np.where(np.isnan(statistic), faulty, np.clip(statistic, 0.0, 1.0))
-    return _plain_rows(samples, names, e, low=low, high=np.ones_like(low), probability=p)
+    return replace(_plain_rows(samples, names, e, low, np.ones_like(low)), fault_probability=p)
 
 
 def _remaining_effectiveness(verdict: Verdict, g: int) -> float:
-    if verdict.effectiveness is not None:
-        return float(np.clip(verdict.effectiveness[g], 0.0, 1.0))
-    return float(np.clip(1.0 + verdict.estimate, 0.0, 1.0)) if verdict.estimate is not None else 1.0
+    given = verdict.effectiveness
+    return float(np.clip(1.0 + (verdict.estimate or 0.0) if given is None else given[g], 0.0, 1.0))
 
 
 _FLIGHT_DETECTORS: dict[str, Callable[[Samples, Model], LogRows]] = {

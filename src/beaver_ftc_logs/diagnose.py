@@ -332,15 +332,14 @@ def _surfaces_at_fault(model: Model, bank: HypothesisBank, P: Floats, faulty: In
     """
     p_fault = np.maximum(P[:, bank.is_fault_hypothesis].sum(axis=1), MIN_DIVISOR)
     faults = [bank.is_fault_of_group(g) for g in range(len(model.groups))]
-    share = np.column_stack([P[:, of_group].sum(axis=1) / p_fault for of_group in faults])
-    likely = (share > _NAME_SHARE) & nameable[:, None]
+    likely = np.column_stack([P[:, of_group].sum(axis=1) / p_fault for of_group in faults]) > _NAME_SHARE
     if model.settings.one_group:
         is_loss = bank.hypothesis_kind == GROUP_LOSS
         p_loss = np.column_stack([P[:, of_group & is_loss].sum(axis=1) for of_group in faults])
-        likely = (p_loss > _EXCLUSION_RISK * p_loss.max(axis=1, keepdims=True)) & nameable[:, None]
+        likely = p_loss > _EXCLUSION_RISK * p_loss.max(axis=1, keepdims=True)
         can_lose = p_loss.max(axis=0) > 0.0
         likely &= ~(likely[:, can_lose].all(axis=1) & (can_lose.sum() > 1))[:, None]
-    names = join_names(likely, model.group_names)
+    names = join_names(likely & nameable[:, None], model.group_names)
     named = np.full(len(P), "", dtype=object)
     offset = P[:, bank.hypothesis_kind == UNKNOWN_OFFSET].sum(axis=1) > p_fault
     n_hold = round(model.settings.rename_s * model.rate_hz)

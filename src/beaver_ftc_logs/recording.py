@@ -180,17 +180,15 @@ def names_of_topics(topics: Mapping[str, Topic]) -> tuple[str, ...]:
 
 
 def columns_of_topics(
-    topics: Mapping[str, Topic],
-    wanted: Wanted,
-    all_topics: Mapping[str, Topic] | None = None,
+    topics: Mapping[str, Topic], wanted: Wanted, all_topics: Mapping[str, Topic]
 ) -> tuple[Columns, tuple[str, ...], float | None]:
     """The wanted columns `topic.field`, all where None, the names of the others, and the first stamp of the
     topics, from which time counts, s.
 
     Where no column is wanted, all have no rows, and there is no first stamp: a log's names are known then.
-    all_topics: of the log, where these are some of them.
+    all_topics: of the log, of which these may be some.
     """
-    names = names_of_topics(all_topics or topics)
+    names = names_of_topics(all_topics)
     if wanted is not None and not {*wanted} & {*names}:
         return dict.fromkeys(names, Column(np.empty(0), np.empty(0))), (), None
     kept = {name: rows_with_increasing_time(name, topic.stamps_us) for name, topic in topics.items()}

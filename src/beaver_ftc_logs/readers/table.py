@@ -10,7 +10,7 @@ import numpy as np
 
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs.readers import LAST_PART_FACTOR, PART_OVERLAP_SHARE, check_is_log_itself
-from beaver_ftc_logs.readers.text import TableCells, TextTable, join_blocks
+from beaver_ftc_logs.readers.text import TableCells, TextTable, join_blocks, unreadable_error
 from beaver_ftc_logs.recording import Column, Floats, RecordedFlight, TimeSource, Wanted, nearest_names_text
 from beaver_ftc_logs.units import TIME_UNITS
 
@@ -108,7 +108,7 @@ def _read_errors(path: Path) -> Iterator[None]:
     except (pa.ArrowException, OSError, ValueError) as error:
         told = getattr(error, "strerror", None)
         reason = told.lower() if told else " ".join(str(error).split())[:200]
-        raise BadInput(f"{path}: is no table that can be read ({reason}), allowed: CSV or Parquet") from None
+        raise unreadable_error(path, reason) from None
 
 
 class _Table:

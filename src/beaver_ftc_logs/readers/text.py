@@ -91,11 +91,11 @@ class TextTable:
         with path.open("rb") as file:
             head = file.read(_LAYOUT_HEAD_BYTES)
         if head[:2] in (b"\xff\xfe", b"\xfe\xff"):
-            raise _unreadable_error(path, "is written in UTF-16, not in UTF-8")
+            raise unreadable_error(path, "is written in UTF-16, not in UTF-8")
         lines = head.decode("utf-8-sig", errors="replace").splitlines()[:_MAX_LAYOUT_LINES]
         tables = [*filter(None, (cls._with_delimiter(lines, delimiter) for delimiter in _DELIMITER_TITLES))]
         if not tables:
-            raise _unreadable_error(path, _describe_unreadable(lines))
+            raise unreadable_error(path, _describe_unreadable(lines))
         return max(tables, key=lambda table: len(table.names))
 
     @classmethod
@@ -132,7 +132,7 @@ class TextTable:
         n_broken, n_lines = len(cells.broken_lines), cells.n_rows + len(cells.broken_lines)
         if n_broken > _BROKEN_SHARE * n_lines:
             reason = f"{n_broken} of {n_lines} lines have another number of cells than the header"
-            raise _unreadable_error(path, f"{reason}, {len(self.names)}: the first {cells.broken_lines[0]!r}")
+            raise unreadable_error(path, f"{reason}, {len(self.names)}: the first {cells.broken_lines[0]!r}")
 
     def blocks(self, path: Path, wanted: Sequence[str]) -> Iterator[TableCells]:
         """The numbers of some columns, block by block, one at least. Every cell is read as text: which of
@@ -171,7 +171,8 @@ class TextTable:
         yield TableCells({name: np.empty(0) for name in wanted}, 0, n_read, broken_lines=broken)
 
 
-def _unreadable_error(path: Path, reason: str) -> BadInput:
+def unreadable_error(path: Path, reason: str) -> BadInput:
+    """The error of a file that holds no table."""
     return BadInput(f"{path}: is no table that can be read ({reason}), allowed: CSV or Parquet")
 
 

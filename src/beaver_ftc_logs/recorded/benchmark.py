@@ -7,7 +7,7 @@ in turn, with settings fitted to the whole flight. Rivals stand beside ours.
 
 import json
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from operator import itemgetter
 from pathlib import Path
 from typing import Any
@@ -192,7 +192,7 @@ def summarize_failures(scores: Sequence[Document]) -> Document:
         "accuracy": n_right / max(len(failed) + len(healthy), 1),
         "healthy_flights": len(healthy),
         "healthy_flights_with_an_alarm": len(healthy) - len(quiet),
-        "false_alarms_per_hour": {"value": rate.value, "low": rate.low, "high": rate.high},
+        "false_alarms_per_hour": asdict(rate),
         "healthy_hours": hours,
         "wrong_group": sum(score["right_group"] is False for score in found),
         "delay_s": {kind: _summarize_delays(failed, kind) for kind in SURFACE_KINDS},
@@ -238,17 +238,18 @@ def score_tables(document: Document) -> list[tuple[str, HeaderAndRows]]:
 
 def _tables_of_other_days(document: Document) -> list[tuple[str, HeaderAndRows]]:
     """A title and a table for each data set: every day, then mean and worst of each kind."""
-    columns = {title: _share(key) for key, title in LABEL_TITLES.items()}
-    columns["classes by sliding least squares"] = _share("beside")
+    columns = LABEL_COLUMNS | {
+        "method": itemgetter("day"),
+        "classes by sliding least squares": _share("beside"),
+    }
     tables = []
     for data in document["sets"]:
-        days = [(day["day"], day) for day in data["rows"] if day["kind"] == "one change"]
+        days = [day for day in data["rows"] if day["kind"] == "one change"]
         for one in data["summary"]:
-            days += [(f"{one['kind']}: {key}", one[key]) for key in ("mean", "worst")]
-        rows = [[title, *(cell_of(day) for cell_of in columns.values())] for title, day in days]
-        tables.append(
-            (f"{data['set']}: other days made of it, halves left out in turn", (["day", *columns], rows))
-        )
+            days += [one[key] | {"day": f"{one['kind']}: {key}"} for key in ("mean", "worst")]
+        rows = [[cell_of(day) for cell_of in columns.values()] for day in days]
+        title = f"{data['set']}: other days made of it, halves left out in turn"
+        tables.append((title, (["day", *[*columns][1:]], rows)))
     return tables
 
 
@@ -313,15 +314,10 @@ def as_markdown(document: Document) -> str:
     return "\n".join(f"### {title}\n\n{markdown_table(head, rows)}\n" for title, (head, rows) in tables)
 
 
-def table_markers(document: Document) -> tuple[str, str]:
-    """Return the marks before and after the tables in a page."""
-    name = "other days" if "other_days" in document else "recorded flights"
-    return f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
-
-
 def update_page(document: Document, page: Path) -> None:
     """Put the tables between the marks of a Markdown page. Raises BadInput where it has none."""
-    replace_between(page, *table_markers(document), as_markdown(document))
+    name = "other days" if "other_days" in document else "recorded flights"
+    replace_between(page, f"<!-- {name}: begin -->", f"<!-- {name}: end -->", as_markdown(document))
 
 
 def draw_comparison_figure(document: Document) -> Any:

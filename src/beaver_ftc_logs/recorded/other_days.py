@@ -52,14 +52,10 @@ class DayChanges:
     trim_drift_sd_commands: float = 0.0
 
 
-def unchanged_day(n: int) -> DayChanges:
-    """The day as it was."""
-    return DayChanges("as it was", np.zeros(n), np.zeros(n), np.ones(n))
-
-
 def one_change_days(mixer: Floats, commands: list[str]) -> list[DayChanges]:
     """One thing changed at a time. mixer (S, C): share of each command in each surface."""
-    unchanged = unchanged_day(len(mixer))
+    n = len(mixer)
+    unchanged = DayChanges("as it was", np.zeros(n), np.zeros(n), np.ones(n))
     days = [unchanged]
     for command, shares in zip(commands, mixer.T, strict=True):
         for shift in (-0.04, 0.04):
@@ -71,7 +67,7 @@ def one_change_days(mixer: Floats, commands: list[str]) -> list[DayChanges]:
     days += [replace(unchanged, name=f"excitation {scale:.1f}", motion_scale=scale) for scale in (0.6, 1.5)]
     days.append(replace(unchanged, name="noise 1.5", noise_ratio=1.5))
     days.append(replace(unchanged, name="trim drifts", trim_drift_sd_commands=0.01))
-    for i, unit in enumerate(np.eye(len(mixer))):
+    for i, unit in enumerate(np.eye(n)):
         for gain in (0.94, 1.06):
             gains = np.where(unit, gain, 1.0)
             days.append(replace(unchanged, name=f"surface {i + 1} by {gain:.2f}", surface_gains=gains))
@@ -80,22 +76,21 @@ def one_change_days(mixer: Floats, commands: list[str]) -> list[DayChanges]:
 
 def random_days(n: int, seeds: range) -> list[DayChanges]:
     """Days on which everything differs a little from the recorded one."""
-    return [_random_day(n, seed) for seed in seeds]
-
-
-def _random_day(n: int, seed: int) -> DayChanges:
-    rng = np.random.default_rng([20, seed])
-    return DayChanges(
-        name=f"drawn {seed}",
-        trim_shift_commands=0.015 * rng.standard_normal(n),
-        neutral_shift_commands=0.01 * rng.standard_normal(n),
-        surface_gains=np.exp(0.03 * rng.standard_normal(n)),
-        common_gain=float(np.exp(0.1 * rng.standard_normal())),
-        command_delay_s=float(0.02 * rng.standard_normal()),
-        motion_scale=float(np.exp(0.25 * rng.standard_normal())),
-        noise_ratio=float(1.0 + 0.3 * abs(rng.standard_normal())),
-        trim_drift_sd_commands=float(0.006 * abs(rng.standard_normal())),
-    )
+    draws = [(seed, np.random.default_rng([20, seed]).standard_normal) for seed in seeds]
+    return [
+        DayChanges(
+            name=f"drawn {seed}",
+            trim_shift_commands=0.015 * draw(n),
+            neutral_shift_commands=0.01 * draw(n),
+            surface_gains=np.exp(0.03 * draw(n)),
+            common_gain=np.exp(0.1 * draw()),
+            command_delay_s=0.02 * draw(),
+            motion_scale=np.exp(0.25 * draw()),
+            noise_ratio=1.0 + 0.3 * abs(draw()),
+            trim_drift_sd_commands=0.006 * abs(draw()),
+        )
+        for seed, draw in draws
+    ]
 
 
 def apply_day_changes(day: DayChanges, samples: Samples, A: Floats, Q: Floats) -> Samples:

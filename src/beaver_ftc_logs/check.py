@@ -129,10 +129,12 @@ def _check_recording(log: RecordedFlight, vehicle: Vehicle) -> tuple[bool, list[
     size = (
         f"{len(samples.t_s)} samples at {1.0 / samples.dt_s:.3g} Hz over {span_s:.4g} s; gaps: {n_gaps}{gap}"
     )
-    rates = zip("pqr", samples.rates.T, strict=True)
-    still = [axis for axis, rate in rates if np.ptp(rate[np.isfinite(rate)]) == 0.0]
-    lines = [f"rate {axis} does not move: nothing can be identified or diagnosed" for axis in still]
-    return not still, [size, *samples.notes, *_compare_angles(log, vehicle), *lines]
+    lines = [
+        f"rate {axis} does not move: nothing can be identified or diagnosed"
+        for axis, rate in zip("pqr", samples.rates.T, strict=True)
+        if np.nanmin(rate) == np.nanmax(rate)
+    ]
+    return not lines, [size, *samples.notes, *_compare_angles(log, vehicle), *lines]
 
 
 def _compare_angles(log: RecordedFlight, vehicle: Vehicle) -> list[str]:
@@ -273,10 +275,9 @@ def _find_time(path: Path, remarks: list[str]) -> TimeSource:
 
 def _guess_angle_unit(name: str, roll: Column, reader: str) -> str:
     """The unit of the attitude: an ArduPilot's is degrees; by its name; by its size."""
-    stated = next((unit for unit in ("deg", "rad") if unit in name.lower()), None)
-    if reader == "ardupilot":
+    if reader == "ardupilot" or "deg" in name.lower():
         return "deg"
-    return stated or ("deg" if largest_magnitude(roll.values) > 2.0 * np.pi else "rad")
+    return "deg" if "rad" not in name.lower() and largest_magnitude(roll.values) > 2.0 * np.pi else "rad"
 
 
 def _guess_rate_unit(

@@ -32,9 +32,7 @@ class CorrectedLog(NamedTuple):
     scaled_signal: str = ""
 
 
-def corrected_logs(
-    samples: Samples, vehicle: Vehicle, unknown: Collection[str] = ()
-) -> Iterator[CorrectedLog]:
+def corrected_logs(samples: Samples, vehicle: Vehicle, unknown: Collection[str]) -> Iterator[CorrectedLog]:
     """The log with two commands or two rates exchanged, or one rate or signal of another sign or unit. A rate
     that the attitude confirms stays as it is. unknown: surfaces whose effect the model does not know: that
     shows nothing of their commands."""

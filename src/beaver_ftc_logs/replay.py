@@ -50,7 +50,10 @@ def _replay_verdict(path: Path, scenario: Any, log: dict[str, Floats], verdicts:
     t_s = log["t_s"]
     detected = [float(at_s) for at_s, one in zip(t_s, verdicts, strict=True) if one.detected]
     detection_s = detected[0] if detected else None
-    isolation_s, name = _last_isolation(t_s, verdicts)
+    # what is named at last, and since when: what was withdrawn before does not count
+    name = verdicts[-1].isolated
+    others = [k for k, one in enumerate(verdicts) if one.isolated != name]
+    isolation_s = float(t_s[max(others, default=-1) + 1]) if name else None
     pairs = zip(log.get("detected", []), verdicts, strict=False)
     return {
         "flight": scenario.name,
@@ -65,15 +68,6 @@ def _replay_verdict(path: Path, scenario: Any, log: dict[str, Floats], verdicts:
         "left_out": _lacking_inputs(scenario),
         "as_flown": _is_as_flown(path, detection_s, isolation_s),
     }
-
-
-def _last_isolation(t_s: Floats, verdicts: list[Any]) -> tuple[float | None, str | None]:
-    """Since when what is named at last has been named: what was withdrawn before does not count."""
-    since_s, name = None, None
-    for time_s, verdict in zip(t_s, verdicts, strict=True):
-        if verdict.isolated != name:
-            since_s, name = float(time_s) if verdict.isolated else None, verdict.isolated
-    return since_s, name
 
 
 def _lacking_inputs(scenario: Any) -> list[str]:

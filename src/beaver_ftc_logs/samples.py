@@ -260,23 +260,18 @@ def _refuse_columns(log: RecordedFlight, used: list[str], rate_names: list[str])
     """Raise BadInput where a column is missing, or holds nothing; rates that no vehicle turns at are in
     another unit."""
     log.check_has(used)
-    largest = {}
     for name in used:
         values = log.columns[name].values
         if not np.isfinite(values).any():
             raise BadInput(f"{log.name}: column {name} holds no number, allowed: a logged quantity")
-        largest[name] = largest_magnitude(values)
-        if largest[name] > _MAX_NUMBER:
-            mistake = f"column {name} holds {largest[name]:g}, allowed: up to {_MAX_NUMBER:g}"
-            raise BadInput(f"{log.name}: {mistake}")
-    for name in rate_names:
-        if largest[name] > _MAX_RATE_RAD_S:
-            as_deg = np.deg2rad(largest[name])
+        largest = largest_magnitude(values)
+        if largest > _MAX_NUMBER:
+            raise BadInput(f"{log.name}: column {name} holds {largest:g}, allowed: up to {_MAX_NUMBER:g}")
+        if name in rate_names and largest > _MAX_RATE_RAD_S:
+            as_deg = np.deg2rad(largest)
             hint = f" (deg/s would be {as_deg:.3g} rad/s: `unit: deg/s`)" if as_deg < _MAX_RATE_RAD_S else ""
-            raise BadInput(
-                f"{log.name}: column {name} reaches {largest[name]:g}, allowed: rates in "
-                f"rad/s, up to {_MAX_RATE_RAD_S:g}{hint}"
-            )
+            allowed = f"rates in rad/s, up to {_MAX_RATE_RAD_S:g}{hint}"
+            raise BadInput(f"{log.name}: column {name} reaches {largest:g}, allowed: {allowed}")
 
 
 def _time_base(flight: str, stamps: Floats, max_hz: float) -> tuple[Floats, Ints, float]:

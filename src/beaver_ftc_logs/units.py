@@ -4,9 +4,7 @@ from math import pi
 
 from beaver_ftc.aircraft import GRAVITY_MPS2, M_PER_FT
 
-RATE, ANGLE, SPEED, ACCELERATION, LENGTH, SHARE, TIME = (
-    "rate", "angle", "speed", "acceleration", "length", "share", "time",
-)  # fmt: skip
+RATE, ANGLE, SPEED, ACCELERATION, LENGTH, SHARE = "rate", "angle", "speed", "acceleration", "length", "share"
 _RAD_PER_DEG = pi / 180.0
 SI_UNITS: dict[str, tuple[str, float]] = {
     "rad/s": (RATE, 1.0), "deg/s": (RATE, _RAD_PER_DEG), "cdeg/s": (RATE, 0.01 * _RAD_PER_DEG),

@@ -82,16 +82,10 @@ class QuantityColumn(Section):
         is_plain = self.unit is None and self.scale == 1.0 and self.offset == 0.0
         return self.column if is_plain else serialize(self)
 
-    @property
-    def si_factor(self) -> float:
-        """Return the factor from the column's numbers to SI."""
-        return self.scale * (SI_UNITS[self.unit][1] if self.unit else 1.0)
-
     def to_si(self, values: Any) -> Any:
         """The column's numbers in SI."""
-        if self.si_factor == 1.0 and self.offset == 0.0:
-            return values
-        return values * self.si_factor + self.offset * self.si_factor / self.scale
+        factor = self.scale * (SI_UNITS[self.unit][1] if self.unit else 1.0)
+        return values * factor + self.offset * factor / self.scale
 
 
 def _expand_column_name(value: Any) -> Any:

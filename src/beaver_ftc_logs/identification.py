@@ -242,8 +242,8 @@ def check_explained(folds: list[Document], parts: Parts, model: Model) -> None:
     """Raise BadInput where a model explains less of an axis than its mean does, on parts not fitted."""
     known = [fold for fold in folds if fold["samples"]]
     counts = [fold["samples"] for fold in known]
-    shares = {axis: [fold["explained"][axis] for fold in known] for axis in "pqr"}
-    means = {axis: float(np.average(values, weights=counts)) for axis, values in shares.items() if known}
+    shares = np.array([[fold["explained"][axis] for axis in "pqr"] for fold in known])
+    means = regression.by_axis(np.average(shares, axis=0, weights=counts)) if known else {}
     if unexplained := {axis: share for axis, share in means.items() if share <= 0.0}:
         minutes = sum(int(part.is_usable.sum()) * part.samples.dt_s for part in parts) / 60.0
         commands = np.vstack([part.samples.commands[part.is_usable] for part in parts])
@@ -472,11 +472,8 @@ def _simulate(th: Floats, u: Floats, y: Floats, dt_s: float) -> Floats:
     s (W, n): positions of the servos; v (W, n): commands u (W, past + m, n) a delay before. th: lag and
     delay, both s, A (3, 3), B (n, 3), c (3,).
     """
-    n = u.shape[2]
-    lag_s, delay_s = th[:2]
-    A = th[2:11].reshape(3, 3)
-    B = th[11 : 11 + 3 * n].reshape(n, 3)
-    c = th[11 + 3 * n :]
+    (lag_s, delay_s), A, B, c = np.split(th, [2, 11, len(th) - 3])
+    A, B = A.reshape(3, 3), B.reshape(-1, 3)
     m = y.shape[1]
     past = u.shape[1] - m
     whole, f = divmod(delay_s / dt_s, 1.0)

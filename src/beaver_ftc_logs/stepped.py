@@ -121,8 +121,17 @@ def rows_of_replay(t_s: Floats, replay: Replayed, surfaces: Sequence[str], fdi: 
     e, high = np.ones((2, *low.shape))
     single = fdi.is_ours and not fdi.pairs
     for k, verdict in enumerate(replay.verdicts):
-        if single:
-            _fill_bounds(verdict, surfaces, (replay.alone_low[k], replay.alone_high[k]), low[k], high[k])
+        suspects = verdict.candidates if verdict.isolated is None else (verdict.isolated,)
+        if single and not verdict.detected:
+            low[k] = replay.alone_low[k]
+        elif single and suspects and set(suspects) <= set(surfaces):
+            places = [surfaces.index(name) for name in suspects]
+            low[k] = 1.0
+            low[k, places] = replay.alone_low[k, places]
+            if verdict.isolated is not None and verdict.type == LOSS_FAULT_TYPE:
+                high[k, places] = replay.alone_high[k, places]
+            elif verdict.isolated is not None:
+                low[k, places] = 0.0
         is_loss = verdict.type in (None, LOSS_FAULT_TYPE)
         if is_loss and verdict.estimate is not None and verdict.isolated in surfaces:
             s = surfaces.index(verdict.isolated)
@@ -138,22 +147,3 @@ def rows_of_replay(t_s: Floats, replay: Replayed, surfaces: Sequence[str], fdi: 
         fault_probability=faulty.astype(float),
         evidence_start_time_s=t_s,
     )
-
-
-def _fill_bounds(
-    verdict: Verdict, surfaces: Sequence[str], alone: tuple[Floats, Floats], low: Floats, high: Floats
-) -> None:
-    """Fill the bounds low and high (S,) of one row, which are given as 0 and 1. alone: low and high (S,) of
-    `Replayed`."""
-    if not verdict.detected:
-        low[:] = alone[0]
-        return
-    suspects = verdict.candidates if verdict.isolated is None else (verdict.isolated,)
-    if not suspects or not set(suspects) <= set(surfaces):
-        return
-    places = [surfaces.index(name) for name in suspects]
-    low[:] = 1.0
-    low[places] = alone[0][places]
-    if verdict.isolated is not None:
-        is_loss = verdict.type == LOSS_FAULT_TYPE
-        low[places], high[places] = (alone[0][places], alone[1][places]) if is_loss else (0.0, 1.0)

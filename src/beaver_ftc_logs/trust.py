@@ -309,12 +309,13 @@ def untrusted_rows(samples: Samples, model: Model) -> Reasons:
     n = np.floor(_CLIPPING_MEMORY_S / samples.dt_s) + 1.0
     recent, _ = regression.trailing_sums(samples.is_rate_clipped, n)
     reasons[f"a rate was clipped in the last {_CLIPPING_MEMORY_S:g} s"] = recent > 0
-    return reasons | _rows_out_of_range(samples, model, model.fitted)
+    return reasons | _rows_out_of_range(samples, model)
 
 
-def _rows_out_of_range(samples: Samples, model: Model, ranges: FittedRanges) -> Reasons:
+def _rows_out_of_range(samples: Samples, model: Model) -> Reasons:
     """Rows in which a command, a rate or the airspeed was outside for most of the last seconds, or of the
     flight so far, by reason."""
+    ranges = model.fitted
     commands = [f"command of {surface}" for surface in model.vehicle.surfaces]
     channels = [
         *zip(commands, samples.commands.T, ranges.commands, strict=False),

@@ -1,5 +1,7 @@
 """What is fitted, of which order, and how it is tested elsewhere: on flights of models that are known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,15 +9,10 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import fitting
 from beaver_ftc_logs.fitting import FitPart
 from beaver_ftc_logs.recording import LoggedFailure
-from beaver_ftc_logs.samples import Samples
 from products.logs import small
 
 MODEL = small.model()
 LOST = ((1, 300, 400, 0.5), (0, 600, 700, 0.4))
-
-
-def changed(samples, **changes):
-    return Samples(**(vars(samples) | changes))
 
 
 def labelled(parts, dt_s=0.5, **changes):
@@ -28,7 +25,7 @@ def labelled(parts, dt_s=0.5, **changes):
         "t_s": dt_s * np.arange(n),
         "stretch_number": np.zeros(n, dtype=int),
     }
-    return changed(small.flight(MODEL, n), **given, **changes)
+    return replace(small.flight(MODEL, n), **given, **changes)
 
 
 NAN = np.nan
@@ -90,9 +87,9 @@ def test_tests_on_what_was_not_fitted(changed, fitted, usable_flights):
 def days(gains):
     """Flights of days on which the right surface acts so many times as the left one does."""
     flown = [small.flight(MODEL, 1500, seed=20 + i, name=f"day-{i}") for i in range(len(gains))]
-    told = [changed(one, labels=np.full_like(one.labels, np.nan)) for one in flown]
+    told = [replace(one, labels=np.full_like(one.labels, np.nan)) for one in flown]
     return fitting.fit_parts(
-        [changed(one, commands=one.commands / [gain, 1.0]) for one, gain in zip(told, gains, strict=True)]
+        [replace(one, commands=one.commands / [gain, 1.0]) for one, gain in zip(told, gains, strict=True)]
     )
 
 

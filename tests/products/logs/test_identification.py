@@ -10,7 +10,6 @@ from beaver_ftc_logs.identification import (
     fit_output_error,
     scale_if_better,
 )
-from beaver_ftc_logs.samples import Samples
 from products.logs import small
 
 MODEL = small.model()
@@ -48,7 +47,7 @@ def lagged(n=1200, lag_s=0.1, delay_s=0.13, seed=4, noise=0.002):
         late = [max(k - whole - i, 0) for i in (0, 1)]
         command = (1 - share) * samples.commands[late[0]] + share * samples.commands[late[1]]
         servo = keep * servo + (1 - keep) * command
-    return Samples(**(vars(samples) | {"rates": rates + noise * rng.standard_normal((n, 3))}))
+    return replace(samples, rates=rates + noise * rng.standard_normal((n, 3)))
 
 
 def test_servo_lag_and_delay_are_found(changed):

@@ -189,7 +189,7 @@ def run_comparison(
     study = Study(
         name, cases, partial(fly_case, entries=tuple(entries), chosen=chosen),
         partial(document_of, entries=entries), files, row=Trial,
-        follows_from=entries if chosen is None else (entries, chosen), lost=lost,
+        follows_from=(entries, chosen), lost=lost,
     )  # fmt: skip
     return run_study(study, out, workers, progress)
 

@@ -53,14 +53,16 @@ def _measured(scenario: Scenario) -> Iterator[Margin]:
 
 def in_trim(scenario: Scenario) -> Scenario:
     """The scenario without faults, references, noise, air and diagnosis."""
-    still: dict[str, object] = {"duration_s": DURATION_S, "faults": [], "reference": {}, "environment": {}}
     sensors = {
         name: {key: value for key in LAG_KEYS if (value := getattr(sensor, key))}
         for name, sensor in scenario.sensors
         if sensor is not None
     }
-    still |= {"sensors": {name: lags for name, lags in sensors.items() if lags}, "expect": {}}
-    return scenario.with_({**still, "fdi.scheme": "none", "fdi.options": {}, "fdi.statistical": None})
+    return scenario.with_({
+        "duration_s": DURATION_S, "faults": [], "expect": {}, "reference": {}, "environment": {},
+        "sensors": {name: lags for name, lags in sensors.items() if lags},
+        "fdi.scheme": "none", "fdi.options": {}, "fdi.statistical": None,
+    })  # fmt: skip
 
 
 def _pulsed(scenario: Scenario, surface: str) -> Scenario:

@@ -7,7 +7,7 @@ the fault, and each value after it that was larger than all before.
 
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from math import inf, isnan
 
 import numpy as np
@@ -85,8 +85,8 @@ class Recording:
     seen: list[tuple[Measured, np.ndarray]]
     built_in: np.ndarray
     onset: Onset
-    known: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=bool))
-    error: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    known: np.ndarray
+    error: np.ndarray
 
     @property
     def fault_at_s(self) -> float:

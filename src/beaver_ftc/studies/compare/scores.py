@@ -2,6 +2,7 @@
 what tables, figure, page and `--format json` are made from.
 """
 
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from math import inf
 from operator import itemgetter
@@ -155,17 +156,19 @@ def document_of(trials: Sequence[Trial], entries: Sequence[Entry]) -> Document:
 
 
 def _set(trials: Sequence[Trial], entries: Sequence[Entry]) -> Document:
-    schemes = list(dict.fromkeys(scheme for trial in trials for scheme in trial.traces))
-    traces = {s: [t.traces[s] for t in trials if s in t.traces] for s in schemes}
+    traces = defaultdict[str, list[Trace]](list)
+    for trial in trials:
+        for scheme, trace in trial.traces.items():
+            traces[scheme].append(trace)
     oracle, ours = (_results(trials, Entry(SCHEME, law)) for law in (ORACLE, LAW))
     lines = [all_finite(line_of(entry, _results(trials, entry), oracle, ours)) for entry in entries]
-    points = {s: trade_off(of) for s, of in traces.items()}
-    free = {s: all_finite(matched(of)) for s, of in points.items()}
+    points = {s: [all_finite(point) for point in trade_off(of)] for s, of in traces.items()}
+    free = {s: matched(of) for s, of in points.items()}
     failed = {result.error for trial in trials for result in trial.results if result.error}
     return {
         "flights": len(trials),
         "lines": lines,
-        "trade_off": {s: [all_finite(point) for point in of] for s, of in points.items()},
+        "trade_off": points,
         "without_false_alarm": free,
         "who_is_better": who_is_better(lines),
         "better_than_ours": better_than_ours(lines, free if any(line["faults"] for line in lines) else {}),
@@ -199,30 +202,27 @@ def leader(
     is between equals.
     """
     sign = -1.0 if more else 1.0
-
-    def badness(name: str) -> float:
-        value = rows[name].get(key)
-        return inf if value is None else sign * value
+    badness = {name: inf if row.get(key) is None else sign * row[key] for name, row in rows.items()}
 
     def said(name: str) -> str:
-        value, low, high = (rows[name].get(key + end) for end in ("", "_low", "_high"))
-        shown = "none" if value is None else cell(value)
-        limits = [("no limit" if limit is None else cell(limit)) for limit in (low, high)]
-        return f"{name} {shown} ({' to '.join(limits)})"
+        value, low, high = (
+            none if rows[name].get(key + end) is None else cell(rows[name][key + end])
+            for end, none in (("", "none"), ("_low", "no limit"), ("_high", "no limit"))
+        )
+        return f"{name} {value} ({low} to {high})"
 
-    rivals = [name for name in rows if name != ours and not name.startswith(ours)]
+    rivals = [name for name in rows if not name.startswith(ours)]
     if not rivals:
         return f"{what}: {said(ours)}."
-    best = min(rivals, key=badness)
-    if badness(best) == badness(ours):
-        alike = [name for name in rivals if badness(name) == badness(ours)]
+    best = min(rivals, key=badness.__getitem__)
+    if badness[best] == badness[ours]:
+        alike = [name for name in rivals if badness[name] == badness[ours]]
         return f"{what}: {ours} and {', '.join(alike)} are equally good: {said(ours)}."
-    first, second = (best, ours) if badness(best) < badness(ours) else (ours, best)
-    duel = rows[best]["against_ours"]
-    wins, losses = (duel["better"], duel["worse"]) if first == best else (duel["worse"], duel["better"])
+    duel, pair = rows[best]["against_ours"], [(best, "better"), (ours, "worse")]
+    (first, wins), (second, losses) = sorted(pair, key=lambda each: badness[each[0]])
     sure = "" if duel["p"] < SIGNIFICANT else ", so this may be chance"
     return (
-        f"{what}: {said(first)} is better than {said(second)}; wins: {wins} against {losses}, "
+        f"{what}: {said(first)} is better than {said(second)}; wins: {duel[wins]} against {duel[losses]}, "
         f"p = {duel['p']:.2g}{sure}."
     )
 

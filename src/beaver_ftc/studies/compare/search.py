@@ -15,7 +15,7 @@ on a parameter, the parameter does not drift to a limit. A range with the result
 widened there, and the search goes on.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from itertools import count
 from math import exp, log
@@ -38,20 +38,20 @@ Cost = Callable[[Values], float]
 
 @dataclass(frozen=True)
 class Found:
-    """The result of a search: the values, their cost, the cost at the start, the ranges, trials made.
+    """The result of a search: the cost at the start, the lowest, its values, the ranges, trials made.
 
     restarts: searches after the first. settled: whether the last of them gained nothing; if not, the budget
     ended the search, and a longer one may find more.
     """
 
-    values: Values
-    cost: float
     start_cost: float
+    cost: float
+    values: Values
     ranges: dict[str, Range]
+    widened: tuple[str, ...]
     trials: int
-    widened: tuple[str, ...] = ()
-    restarts: int = 0
-    settled: bool = False
+    restarts: int
+    settled: bool
 
 
 def on_scale(of: Range, value: float) -> float:
@@ -88,11 +88,10 @@ def search(
     ranges, widened, made, best = dict(ranges), list[str](), 0, dict(start)
     lowest, start_cost, widenings, quiet, done = None, 0.0, 0, 0, 0
     for number in count(seed):
-        tried = _Trials(cost, ranges, best, lowest)
-        tried.search(trials, number)
-        start_cost = tried.costs[0] if lowest is None else start_cost
-        made += len(tried.costs) - (lowest is not None)  # the best so far is not tried again
-        before, (best, lowest) = lowest, tried.best()
+        before = lowest
+        best, lowest, costs = _searched(cost, ranges, best, before, trials, number)
+        start_cost = costs[0] if before is None else start_cost
+        made += len(costs) - (before is not None)  # the best so far is not tried again
         if edges := on_edge(best, ranges):
             if widenings == WIDENINGS:
                 break
@@ -102,7 +101,7 @@ def search(
         gains = before is None or lowest < before - LITTLE * abs(before)
         quiet = 0 if gains else quiet + 1
         if quiet == SETTLED or done == restarts:
-            return Found(best, lowest, start_cost, ranges, made, tuple(widened), done, quiet == SETTLED)
+            return Found(start_cost, lowest, best, ranges, tuple(widened), made, done, quiet == SETTLED)
         done += 1
     raise SimulationFailed(f"on the edge of its range after {WIDENINGS} widenings: {', '.join(edges)}")
 
@@ -113,60 +112,42 @@ def widen(of: Range, upper: bool) -> Range:
     return replace(of, high=limit) if upper else replace(of, low=limit)
 
 
-class _Trials:
-    """Trials of one search, each at a point (n,) of the unit cube. known: the cost of the start, if it has
-    been tried: the search is a restart."""
+def _searched(
+    cost: Cost, ranges: Mapping[str, Range], start: Values, known: float | None, trials: int, seed: int
+) -> tuple[Values, float, list[float]]:
+    """One search, as the module says: the values of the lowest cost (of several within `TIE` of it, those
+    nearest the middle), that cost, and the costs of all trials. known: the cost of the start, if it has been
+    tried: the search is a restart. A trial is at a point (n,) of the unit cube."""
+    from scipy.optimize import minimize
+    from scipy.stats.qmc import LatinHypercube
 
-    def __init__(
-        self, cost: Cost, ranges: Mapping[str, Range], start: Values, known: float | None = None
-    ) -> None:
-        self._cost, self._ranges, self._known = cost, ranges, known
-        self.points: list[np.ndarray] = []
-        self.costs: list[float] = []
-        self._start = np.clip([on_scale(of, start[name]) for name, of in ranges.items()], 0.0, 1.0)
+    n, costs, points = len(ranges), list[float](), list[np.ndarray]()
 
-    def search(self, trials: int, seed: int) -> None:
-        """Spend the trials as the module says."""
-        from scipy.optimize import minimize
-
-        self._try(self._start, self._known)
-        n = len(self._ranges)
-        for point in self._spread((trials - 1) // 2, seed):
-            self._try(point)
-        while (left := trials - len(self.costs)) > n:
-            begin = self.points[int(np.argmin(self.costs))]
-            corners = np.vstack((begin, *(begin + step for step in self._steps(begin))))
-            options = {"maxfev": left, "initial_simplex": corners, "xatol": 1e-3, "fatol": 1e-5}
-            minimize(self._try, begin, method="Nelder-Mead", bounds=[(0.0, 1.0)] * n, options=options)
-
-    def _spread(self, points: int, seed: int) -> np.ndarray:
-        """Points (points, n) of a Latin hypercube; of a restart, every other one near the start."""
-        from scipy.stats.qmc import LatinHypercube
-
-        spread = LatinHypercube(len(self._ranges), rng=seed).random(points)
-        if self._known is not None:
-            spread[::2] = np.clip(self._start + NEAR * (2.0 * spread[::2] - 1.0), 0.0, 1.0)
-        return spread
-
-    def _steps(self, begin: np.ndarray) -> np.ndarray:
-        """First steps, towards the middle of each range."""
-        step = FIRST_STEP if self._known is None else NEAR
-        return np.diag(np.where(begin < 0.5, step, -step))
-
-    def _try(self, point: Sequence[float] | np.ndarray, known: float | None = None) -> float:
-        point = np.asarray(point, dtype=float)
-        self.points.append(point.copy())
-        self.costs.append(self._cost(self._values(point)) if known is None else known)
-        return self.costs[-1]
-
-    def _values(self, point: np.ndarray) -> Values:
-        places = zip(self._ranges.items(), point, strict=True)
+    def values_at(point: np.ndarray) -> Values:
+        places = zip(ranges.items(), point, strict=True)
         return {name: value_at(of, float(place)) for (name, of), place in places}
 
-    def best(self) -> tuple[Values, float]:
-        """The values of the lowest cost, and that cost; of several within `TIE` of it, those nearest the
-        middle."""
-        costs = np.array(self.costs)
-        ties = np.flatnonzero(costs <= costs.min() + TIE * abs(costs.min()))
-        nearest = ties[int(np.argmin([np.abs(self.points[i] - 0.5).max() for i in ties]))]
-        return self._values(self.points[nearest]), self.costs[nearest]
+    def attempt(point: np.ndarray) -> float:
+        points.append(point.copy())
+        costs.append(cost(values_at(point)))
+        return costs[-1]
+
+    first = np.clip([on_scale(of, start[name]) for name, of in ranges.items()], 0.0, 1.0)
+    spread, step = LatinHypercube(n, rng=seed).random((trials - 1) // 2), FIRST_STEP
+    if known is None:
+        attempt(first)
+    else:  # every other point is near the start
+        points.append(first)
+        costs.append(known)
+        spread[::2], step = np.clip(first + NEAR * (2.0 * spread[::2] - 1.0), 0.0, 1.0), NEAR
+    for point in spread:
+        attempt(point)
+    while (left := trials - len(costs)) > n:
+        begin = points[int(np.argmin(costs))]
+        steps = np.diag(np.where(begin < 0.5, step, -step))  # towards the middle of each range
+        corners = np.vstack((begin, begin + steps))
+        options = {"maxfev": left, "initial_simplex": corners, "xatol": 1e-3, "fatol": 1e-5}
+        minimize(attempt, begin, method="Nelder-Mead", bounds=[(0.0, 1.0)] * n, options=options)
+    ties = np.flatnonzero(np.array(costs) <= min(costs) + TIE * abs(min(costs)))
+    nearest = ties[int(np.argmin([np.abs(points[i] - 0.5).max() for i in ties]))]
+    return values_at(points[nearest]), costs[nearest], costs

@@ -37,7 +37,7 @@ from beaver_ftc.studies.compare.criteria import (
     least_margins,
 )
 from beaver_ftc.studies.compare.gain import gain_of
-from beaver_ftc.studies.compare.search import Found, Values, search, value_at
+from beaver_ftc.studies.compare.search import Values, search, value_at
 from beaver_ftc.studies.compare.trial import STATISTICAL
 from beaver_ftc.studies.engine.study import Progress, fly_all
 from beaver_ftc.studies.present.tables import Columns, aligned, tabulated
@@ -124,33 +124,19 @@ def tune_method(method: Method, how: Search) -> Document:
     found = search(cost, method.ranges(), start, how.trials, how.seed, how.restarts)
     gains = found.cost < (1.0 - LEAST_GAIN) * found.start_cost
     values = found.values if gains else start
-    row = {**_row(method, found), "values": values, "flights": len(flights(*on)), **_margins(cost, values)}
-    if how.draw and min(found.cost, found.start_cost) < INADMISSIBLE:
-        row |= gain_of(method.group, method.name, method.grade, (start, found.values), how.draw + how.draws)
-    return row
-
-
-def _row(method: Method, found: Found) -> Document:
-    return {
+    row: Document = {
         "grade": method.grade,
         "kind": TUNED_FILE_KEY_BY_PLUGIN_GROUP[method.group],
         "name": method.name,
-        "start_cost": found.start_cost,
-        "cost": found.cost,
-        "found": found.values,
-        "ranges": {key: asdict(of) for key, of in found.ranges.items()},
-        "widened": list(found.widened),
-        "trials": found.trials,
-        "restarts": found.restarts,
-        "settled": found.settled,
+        **{"found" if key == "values" else key: value for key, value in asdict(found).items()},
+        "values": values,
+        "flights": len(flights(*on)),
     }
-
-
-def _margins(cost: DetectorCost | LawCost, values: Values) -> Document:
-    if isinstance(cost, DetectorCost):
-        return {}
-    gain_db, phase_deg = least_margins(cost.margins(values))
-    return {"gain_margin_db": gain_db, "phase_margin_deg": phase_deg}
+    if isinstance(cost, LawCost):
+        row["gain_margin_db"], row["phase_margin_deg"] = least_margins(cost.margins(values))
+    if how.draw and min(found.cost, found.start_cost) < INADMISSIBLE:
+        row |= gain_of(method.group, method.name, method.grade, (start, found.values), how.draw + how.draws)
+    return row
 
 
 def write_tuned(document: Document, folder: Path) -> Path:

@@ -27,33 +27,30 @@ SIGNALS = ("alpha", "beta", "ph", "qh", "rh", "dpt")  # of the terms of moments
 LEAST_EFFECTIVENESS = 0.1
 
 
-class PublishedModel:
-    """xdot = I^-1 (M - x cross I x), with the moments of the coefficient table."""
+# xdot = I^-1 (M - x cross I x), with the moments of the coefficient table.
+INERTIA = np.array(
+    [[MASS.Ix_kg_m2, 0, -MASS.Jxz_kg_m2], [0, MASS.Iy_kg_m2, 0], [-MASS.Jxz_kg_m2, 0, MASS.Iz_kg_m2]]
+)
+INVERSE = np.linalg.inv(INERTIA)
+COUPLING = np.array([getattr(inertia_coefficients(MASS), name) for name in ("Pqr", "Qpr", "Rpq")])
+LENGTHS_M = np.array([GEOMETRY.span_m, GEOMETRY.chord_m, GEOMETRY.span_m])
+OF_MOMENTS = [term for term in TERMS.values() if term.coefficient in MOMENTS]
+VALUES = np.array([term.value for term in OF_MOMENTS])
+POWERS = np.array([[dict(term.of).get(signal, 0) for signal in SIGNALS] for term in OF_MOMENTS])
+INTO = np.array([  # coefficient, factor, term
+    [[(term.coefficient, term.surface) == (of, by) for term in OF_MOMENTS] for by in (None, *SURFACES)]
+    for of in MOMENTS
+], float)  # fmt: skip
 
-    def __init__(self) -> None:
-        self.inertia = np.array(
-            [[MASS.Ix_kg_m2, 0, -MASS.Jxz_kg_m2], [0, MASS.Iy_kg_m2, 0], [-MASS.Jxz_kg_m2, 0, MASS.Iz_kg_m2]]
-        )
-        self.inverse = np.linalg.inv(self.inertia)
-        inertia = inertia_coefficients(MASS)
-        self.coupling = np.array([inertia.Pqr, inertia.Qpr, inertia.Rpq])
-        self.lengths = np.array([GEOMETRY.span_m, GEOMETRY.chord_m, GEOMETRY.span_m])
-        terms = [term for term in TERMS.values() if term.coefficient in MOMENTS]
-        self.values = np.array([term.value for term in terms])
-        self.powers = np.array([[dict(term.of).get(signal, 0) for signal in SIGNALS] for term in terms])
-        columns = (None, *SURFACES)
-        self.into = np.zeros((len(MOMENTS), len(columns), len(terms)))  # coefficient, factor, term
-        for i, term in enumerate(terms):
-            self.into[MOMENTS.index(term.coefficient), columns.index(term.surface), i] = 1.0
 
-    def f_and_G(self, x: np.ndarray, truth: dict[str, float]) -> tuple[np.ndarray, np.ndarray]:
-        """f (3,) rad/s2 and G (3, 4) rad/s2 per rad at the rates x (3,) rad/s."""
-        rates = x * self.lengths / truth["airspeed_mps"] * np.array([0.5, 1.0, 0.5])
-        signals = np.array([truth["alpha_rad"], truth["beta_rad"], *rates, truth["dpt"]])
-        coefficients = self.into @ (self.values * (signals**self.powers).prod(axis=1))
-        scale = truth["qdyn_pa"] * GEOMETRY.wing_area_m2 * self.lengths
-        moments, slopes = scale * coefficients[:, 0], scale[:, None] * coefficients[:, 1:]
-        return self.inverse @ (moments - np.cross(x, self.inertia @ x)), self.inverse @ slopes
+def f_and_G(x: np.ndarray, truth: dict[str, float]) -> tuple[np.ndarray, np.ndarray]:
+    """f (3,) rad/s2 and G (3, 4) rad/s2 per rad at the rates x (3,) rad/s."""
+    rates = x * LENGTHS_M / truth["airspeed_mps"] * np.array([0.5, 1.0, 0.5])
+    signals = np.array([truth["alpha_rad"], truth["beta_rad"], *rates, truth["dpt"]])
+    coefficients = INTO @ (VALUES * (signals**POWERS).prod(axis=1))
+    scale = truth["qdyn_pa"] * GEOMETRY.wing_area_m2 * LENGTHS_M
+    moments, slopes = scale * coefficients[:, 0], scale[:, None] * coefficients[:, 1:]
+    return INVERSE @ (moments - np.cross(x, INERTIA @ x)), INVERSE @ slopes
 
 
 class Estimators:
@@ -180,7 +177,6 @@ class Straightforward:
         self.scenario, self.at_s = scenario, at_s
         self.start = take_over(scenario, at_s)
         self.plant = self.start.plant
-        self.model = PublishedModel()
         self.references = sample(scenario.reference, at_s + np.arange(frames) / scenario.rate_hz)
         self.prepare()
 
@@ -206,7 +202,7 @@ class Straightforward:
         fdm.run()
         truth = {name: fdm[property_] * factor for name, property_, factor in ch.TRUTH}
         x = np.array([truth[f"{axis}_rad_s"] for axis in AXES])
-        f, G = self.model.f_and_G(x, truth)
+        f, G = f_and_G(x, truth)
         if self.then is None:
             estimators.x_hat = x
         else:
@@ -220,10 +216,10 @@ class Straightforward:
 
     def bound(self, x: np.ndarray) -> np.ndarray:
         """The bound on the uncertainty, (3,) rad/s2: as published, and for the turning Earth."""
-        declared, coupling = Declared.of(self.scenario), self.model.coupling
+        declared = Declared.of(self.scenario)
         cross = np.array([x[1] * x[2], x[0] * x[2], x[0] * x[1]])
         earth = EARTH_RATE_RAD_S * (2.0 * np.abs(x).sum() + EARTH_RATE_RAD_S)
-        published = np.array(declared.coupling) * np.abs(coupling * cross)
+        published = np.array(declared.coupling) * np.abs(COUPLING * cross)
         return published + declared.constant_rad_s2 + earth
 
     def row(self, truth: dict[str, float], x: np.ndarray, reference: np.ndarray) -> dict[str, float]:

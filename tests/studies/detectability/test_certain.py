@@ -92,9 +92,7 @@ def test_a_fault_a_little_larger_is_found_in_time_whatever_the_uncertainty(fligh
     least = best_in_window(detection_magnitude(seen.moment[fault], seen.bound), 50)
     start = int(np.argmin(least))
     struck_s, magnitude = SETTLED_S + start * seen.dt, 1.1 * least[start]
-    flown = fly(
-        flight.model_copy(update={"faults": scenario(faults=[loss(fault, magnitude, struck_s)]).faults})
-    )
+    flown = fly(flight.with_({"faults": [loss(fault, magnitude, struck_s)]}))
     assert flown.guaranteed_delay_s <= 0.5 + 1e-9
     assert flown.detection_time_s - struck_s <= 0.5 + 1e-9
 
@@ -149,8 +147,7 @@ def test_what_a_line_promises_holds_in_flight(flight):
     row |= judge(excitation(here), "aileron")
     size = int(answer(here, row).partition("aileron of ")[2].partition(" %")[0]) / 100.0
     for struck_s in (4.0, 5.0, 6.0, 7.0, 8.0):
-        faults = scenario(faults=[loss("aileron", size, struck_s)]).faults
-        flown = fly(here.model_copy(update={"faults": faults}))
+        flown = fly(here.with_({"faults": [loss("aileron", size, struck_s)]}))
         assert flown.detection_time_s - struck_s <= 0.5 + 1e-9
 
 
@@ -221,10 +218,8 @@ def test_magnitudes_of_moments_that_do_not_change():
 
 def test_a_surface_that_is_hardly_used_and_one_that_another_explains():
     seen = still(aileron=[0.8, 0.0, 0.0], rudder=[2.0, 0.0, 0.5], elevator=[0.0, 3.0, 0.0])
-    weak, hidden = (
-        judge(seen, "aileron"),
-        judge(still(aileron=[2.0, 0.0, 0.0], rudder=[2.2, 0.0, 0.5]), "aileron"),
-    )
+    weak = judge(seen, "aileron")
+    hidden = judge(still(aileron=[2.0, 0.0, 0.0], rudder=[2.2, 0.0, 0.5]), "aileron")
     assert [weak[name] for name in MAGNITUDES] == [None] * 4
     assert (
         weak["why"]
@@ -249,10 +244,7 @@ def test_half_of_the_instants_and_the_worst_of_them():
     found = judge(
         Excitation({"aileron": z, "rudder": np.zeros((25, 3))}, np.full((25, 3), 0.5), 0.1), "aileron"
     )
-    assert (found["detected"], found["isolated"]) == (
-        None,
-        None,
-    )  # from the first instant five frames of nothing
+    assert found["detected"] is found["isolated"] is None  # from the first instant five frames of nothing
     # of 21 instants the first finds nothing, the others 2.0, 2.1, ... 3.9: the eleventh from above is 2.9
     assert found["detected_median"] == pytest.approx(1 / 2.9)
     # of 16 the eighth, from 3.4 down: what excludes has ten frames, and more to see in the last

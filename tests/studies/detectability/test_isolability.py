@@ -58,10 +58,7 @@ def test_another_surface_is_excluded_no_later_than_the_map_says():
     assert row["longest_s"] is not None
     for struck_s in (2.0, 3.1, 4.3):
         log = MemoryLog()
-        fly(
-            flight.model_copy(update={"faults": scenario(faults=[loss("elevator", 1.0, struck_s)]).faults}),
-            log,
-        )
+        fly(flight.with_({"faults": [loss("elevator", 1.0, struck_s)]}), log)
         excluded = log.rows[:, log.columns.index("fie_aileron_excluded")]
         told_s = log.rows[np.flatnonzero(excluded)[0], log.columns.index("t_s")]
         assert told_s - struck_s <= row["longest_s"] + 0.01 + 1e-9

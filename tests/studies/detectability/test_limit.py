@@ -56,32 +56,35 @@ def covariance(context, n):
     return rates.reshape(3 * n, 3 * n)
 
 
+def stands_out(mean, C):
+    """A known mean in Gaussian noise of covariance C: the square root of mean' C^-1 mean."""
+    return np.sqrt(mean @ np.linalg.solve(C, mean))
+
+
 @pytest.mark.parametrize("broken", range(3))
 def test_without_a_gyro_as_with_all_readings_at_once(context, broken):
     """The attitude sums the rates; its noise and where it began are known as well as it is measured."""
     n, before = 60, 150
+    N, declared = before + n, context.declared
     phi = np.cumsum(np.random.default_rng(6).normal(size=(n, 3)), axis=0) * [0.02, 0.01, 0.01]
-    gyro = context.declared.gyro_rad_s**2 + 1e-10
-    angle = (
-        context.declared.further_noise[:3] ** 2 + context.declared.further_resolution[:3] ** 2 / 12 + 1e-10
-    )
-    rates = covariance(context, before + n).reshape(3, before + n, 3, before + n)
-    true = rates - np.einsum("ij,kl,i->ikjl", np.eye(3), np.eye(before + n), gyro)
-    summed = DT * np.tril(np.ones((before + n, before + n)), -1)
-    both = np.zeros((2, 3, before + n, 2, 3, before + n))
+    gyro = declared.gyro_rad_s**2 + 1e-10
+    angle = declared.further_noise[:3] ** 2 + declared.further_resolution[:3] ** 2 / 12 + 1e-10
+    rates = covariance(context, N).reshape(3, N, 3, N)
+    true = rates - np.einsum("ij,kl,i->ikjl", np.eye(3), np.eye(N), gyro)
+    summed = DT * np.tril(np.ones((N, N)), -1)
+    both = np.zeros((2, 3, N, 2, 3, N))
     both[0, :, :, 0] = rates
     both[0, :, :, 1] = np.einsum("ikjl,ml->ikjm", true, summed)
     both[1, :, :, 0] = np.einsum("mk,ikjl->imjl", summed, true)
     both[1, :, :, 1] = np.einsum("mk,ikjn->imjn", summed, both[0, :, :, 1])
     for i in range(3):
-        both[1, i, :, 1, i] += angle[i] * (np.eye(before + n) + 1.0)
-    mean = np.zeros((2, 3, before + n))
+        both[1, i, :, 1, i] += angle[i] * (np.eye(N) + 1.0)
+    mean = np.zeros((2, 3, N))
     mean[0, :, before:] = DT * np.cumsum(phi, axis=0).T
     mean[1] = mean[0] @ summed.T
     kept = [row for row in range(6) if row != broken]
-    C = both.reshape(6, before + n, 6, -1)[kept][:, :, kept].reshape(5 * (before + n), -1)
-    mean = mean.reshape(6, -1)[kept].ravel()
-    expected = np.sqrt(mean @ np.linalg.solve(C, mean))
+    C = both.reshape(6, N, 6, N)[kept][:, :, kept].reshape(5 * N, -1)
+    expected = stands_out(mean.reshape(6, N)[kept].ravel(), C)
     found = WhiteningFilter(context, broken).deflection_by_frame(phi)[-1]
     assert found == pytest.approx(expected, rel=0.01)
     assert found < WhiteningFilter(context).deflection_by_frame(phi)[-1]
@@ -95,17 +98,12 @@ def test_beside_unknown_constants_as_in_the_whole_flight_at_once(context):
     phi[:60] = 0.0
     regressors = np.cumsum(rng.normal(size=(n, 3, 2)), axis=0) * 0.02
     regressors[..., 0] += phi  # so that it explains some of the fault
-    mean = DT * np.cumsum(phi, axis=0).T.ravel()
-    known = DT * np.cumsum(regressors, axis=0).transpose(1, 0, 2).reshape(3 * n, 2) * sigma
-    before = 150
-    C = covariance(context, before + n).reshape(3, before + n, 3, before + n)
-    # what came before tells of the noise, and nothing of fault and constants
-    late = np.zeros((3, before + n))
-    late[:, before:] = mean.reshape(3, n)
-    R = np.zeros((3, before + n, 2))
-    R[:, before:] = known.reshape(3, n, 2)
-    C, R = C.reshape(3 * (before + n), -1), R.reshape(-1, 2)
-    expected = np.sqrt(late.ravel() @ np.linalg.solve(C + R @ R.T, late.ravel()))
+    before = 150  # what came before tells of the noise, and nothing of fault and constants
+    late, R = np.zeros((3, before + n)), np.zeros((3, before + n, 2))
+    late[:, before:] = DT * np.cumsum(phi, axis=0).T
+    R[:, before:] = DT * np.cumsum(regressors, axis=0).transpose(1, 0, 2) * sigma
+    R = R.reshape(-1, 2)
+    expected = stands_out(late.ravel(), covariance(context, before + n) + R @ R.T)
     whitening = WhiteningFilter(context)
     found = whitening.deflection_with_unknowns(phi, regressors, sigma)
     assert found == pytest.approx(expected, rel=0.01)

@@ -5,6 +5,7 @@ size found in a share of flights, by variants of a scenario) and `cells` (the sh
 flights, by schemes). The lines of all three have the columns of HEAD; what no line has is no column.
 """
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from itertools import product
 from operator import itemgetter
@@ -248,10 +249,12 @@ def _interval(found: Document) -> str:
 def rows_of_sizes(document: Document) -> list[Document]:
     """The rows of the CSV file."""
     return [
-        {key: row[key] for key in ("variant", "found", "certain")}
-        | {"total_loss_found": row["total_loss"]["value"]}
+        {
+            "variant": row["variant"], "found": row["found"], "certain": row["certain"],
+            "total_loss_found": row["total_loss"]["value"],
+        }
         for row in _variants(document)
-    ]
+    ]  # fmt: skip
 
 
 # The share found in a grid of flights, by schemes.
@@ -315,14 +318,10 @@ def comparison(document: Document) -> list[str]:
     """How often each of our schemes finds more or fewer faults than others, and is unlikely to by chance."""
     return [
         f"{ours}, faults found within {within_s:g} s, {len(duels)} comparisons: better in "
-        f"{_count(duels, 'better')}, worse in {_count(duels, 'worse')}, no difference at "
-        f"p < {SIGNIFICANT:g} in the rest"
+        f"{ends['better']}, worse in {ends['worse']}, no difference at p < {SIGNIFICANT:g} in the rest"
         for (ours, within_s), duels in grouped(document["comparison"], "ours", "within_s").items()
+        for ends in [Counter(duel["verdict"] for duel in duels)]
     ]
-
-
-def _count(duels: Sequence[Document], verdict: str) -> int:
-    return sum(duel["verdict"] == verdict for duel in duels)
 
 
 def _those(lines: Sequence[Document], **where: Any) -> Iterator[Document]:

@@ -101,8 +101,8 @@ def check(scenario: Scenario, asked: Asked) -> None:
         raise BadInput(f"--surface {asked.surface!r:.60}: allowed: {', '.join(surfaces)}")
     if scenario.fdi.scheme == "none":
         raise BadInput(f"{scenario.name}: fdi.scheme: none diagnoses nothing, allowed: a scheme")
-    if scenario.duration_s < SETTLED_S + 2.0 * asked.within_s:
-        least = SETTLED_S + 2.0 * asked.within_s
+    least = SETTLED_S + 2.0 * asked.within_s
+    if scenario.duration_s < least:
         raise BadInput(f"{scenario.name}: duration_s: too short for --within, allowed: {least:g} or more")
 
 

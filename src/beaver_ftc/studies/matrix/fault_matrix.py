@@ -377,7 +377,9 @@ def heat_map_of(document: Document) -> "Figure":
     for i, j in np.ndindex(grid.shape):
         cell = cells[names[i], surfaces[j]]
         ink = "white" if cell["verdict"] == "WRONG" else "black"
-        labels[i, j] = f"{_label(cell)}\n{_small(cell)}", ink
+        lost = ", LOST" if cell["lost"] else ""
+        label = f"{LOOKS[cell['verdict']][0]} {SHOWN[cell['verdict']]}{lost}"
+        labels[i, j] = f"{label}\n{_small(cell)}", ink
     figure, panel = panels(1, 1, 11.0, 0.5 * len(names) + 1.8)
     colours = ListedColormap([LOOKS[verdict][1] for verdict in VERDICTS])
     heat_map(panel[0, 0], grid, labels, surfaces, names, cmap=colours, vmin=-0.5, vmax=len(VERDICTS) - 0.5)
@@ -390,10 +392,6 @@ FILES: Makers = {
     f"{NAME}.txt": lambda document: as_text(document) + "\n",
     f"{NAME}.png": heat_map_of,
 }
-
-
-def _label(cell: Document) -> str:
-    return f"{LOOKS[cell['verdict']][0]} {SHOWN[cell['verdict']]}{', LOST' if cell['lost'] else ''}"
 
 
 def _small(cell: Document) -> str:

@@ -18,7 +18,7 @@ from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.linear import LinearModel, differences, engine_slope
 from beaver_ftc.plant.trim import trim
 from beaver_ftc.results.log import Columns
-from beaver_ftc.results.metrics import as_json, measure
+from beaver_ftc.results.metrics import as_json, metrics
 from beaver_ftc.results.model import Document
 from beaver_ftc.scenario.airframe import Initial
 from beaver_ftc.scenario.diagnosis import EnginePower
@@ -87,17 +87,17 @@ def _outcome(scenario: Scenario) -> Document:
     """RMS pitch rate and swing of the attitude once settled, null if the aircraft was lost; airspeed, bank
     and stay outside the validated envelope since the fault."""
     kept = Columns(*COLUMNS)
-    found = measure(fly(scenario, kept))
+    found = metrics(fly(scenario, kept))
     late, after = kept.since(SETTLED_S), kept.since(AT_S)
-    lost, power = found.departure is not None, found.engine_power
+    lost = found["departure"] is not None
     return {
         "q_rms_deg_s": None if lost else degrees(float(np.sqrt(np.mean(late["q_rad_s"] ** 2)))),
         "theta_swing_deg": None if lost else degrees(float(np.ptp(late["theta_rad"]))),
         "airspeed_mps": [float(after["airspeed_mps"].min()), float(after["airspeed_mps"].max())],
         "bank_deg": degrees(float(np.abs(after["phi_rad"]).max())),
         "outside_share": float(np.mean(after["envelope_valid"] < 0.5)),
-        "departure": found.departure.document() if found.departure else None,
-        "engine_power": power.document() if power else None,
+        "departure": found["departure"],
+        "engine_power": found["engine_power"],
     }
 
 

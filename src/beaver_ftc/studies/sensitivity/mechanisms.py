@@ -80,11 +80,6 @@ def cases_of(draws: int) -> list[Flight]:
     return [Flight._make((*cell, run)) for cell in product(*FACTORS.values()) for run in range(draws)]
 
 
-def surface_of(flight: Flight) -> str:
-    """The surface that fails; of an unanticipated fault, `-`."""
-    return SURFACES[flight.run % len(SURFACES)] if flight.fault in LOSSES else "-"
-
-
 def scenario_of(flight: Flight, seed: int, system: str) -> Scenario:
     """What a system flies, with all of its mechanisms. Draws depend on the cell and the run alone."""
     places = (values.index(value) for values, value in zip(FACTORS.values(), flight, strict=False))
@@ -119,7 +114,7 @@ def scenario_of(flight: Flight, seed: int, system: str) -> Scenario:
 def _fault(flight: Flight, at_s: float) -> Document:
     if flight.fault == UNANTICIPATED:
         return {"type": "unanticipated", "Cm_alpha3": 10.0, "at_s": at_s}
-    return loss(surface_of(flight), LOSSES[flight.fault], at_s)
+    return loss(SURFACES[flight.run % len(SURFACES)], LOSSES[flight.fault], at_s)
 
 
 def _errors(coupling: float, swing_rad_s2: float, draws: np.random.Generator) -> Document:

@@ -239,8 +239,8 @@ def _ardupilot_mixing(params: _Parameters) -> _Found:
     outputs = []
     for n in kinds:
         message = next((text for last, text in _ARDUPILOT_MESSAGES.items() if n <= last), "RCO?")
-        names, place = {part: f"SERVO{n}_{part}" for part in _PULSE_RANGE_US}, f"SERVO{n}_MIN, _TRIM, _MAX"
-        outputs.append((f"{message}.C{n}", _pulse_reading(params, place, names, f"SERVO{n}_REVERSED")))
+        pulses, place = {part: f"SERVO{n}_{part}" for part in _PULSE_RANGE_US}, f"SERVO{n}_MIN, _TRIM, _MAX"
+        outputs.append((f"{message}.C{n}", _pulse_reading(params, place, pulses, f"SERVO{n}_REVERSED")))
     return surfaces, [outputs], _Axes(_ARDUPILOT_AXIS_COLUMNS, 1.0 / _ARDUPILOT_FULL_COMMAND)
 
 

@@ -111,20 +111,10 @@ def give_back(array: np.ndarray) -> None:
 COUNTERS = (0, 0xD1B54A32D192ED03, 0x8CB92BA72F3D8DD7, 0xA0761D6478BD642F, 0xE7037ED1A0B428DB)
 
 
-def breaks_instruments(scenario: Scenario) -> bool:
-    """Whether an instrument fails in this flight."""
-    return any(of_a_sensor(fault) for fault in scenario.faults)
-
-
 def are_ever_monitored(scenario: Scenario) -> bool:
     """Whether they are at some time of the flight."""
     flown = (scenario, *(then for _, then in stages(scenario)))
     return any(Declared.of(then).monitors_sensors for then in flown)
-
-
-def columns_of_the_monitor(scenario: Scenario) -> int:
-    """How many the log has: none, or share, test, and which reading is missing."""
-    return 3 * are_ever_monitored(scenario)
 
 
 def has_real_engine(scenario: Scenario) -> bool:
@@ -136,7 +126,7 @@ def has_real_engine(scenario: Scenario) -> bool:
 def truth_read(scenario: Scenario) -> tuple[ch.Channel, ...]:
     """What is read from the truth in this flight."""
     usual = ch.truth_channels(scenario.airframe)
-    further = breaks_instruments(scenario) or records_further(scenario)
+    further = any(map(of_a_sensor, scenario.faults)) or records_further(scenario)
     return (*usual, *ch.further_channels(scenario.airframe)) if further else usual
 
 
@@ -310,7 +300,8 @@ def lay_out(frame: np.void, scenario: Scenario, diagnoses_itself: bool) -> tuple
     aircraft, tests = scenario.airframe, fdi["statistical"]["test"]
     estimators = estimator_names(scenario.fdi.fault_class, aircraft) if diagnoses_itself else ()
     logged["estimators"] = fdi["isolation"]["config"]["n_estimators"] if diagnoses_itself else 0
-    watched = logged["sensor_monitor"] = columns_of_the_monitor(scenario)
+    # share, test, and which reading is missing
+    watched = logged["sensor_monitor"] = 3 * are_ever_monitored(scenario)
     sampled = records_further(scenario)
     logged["sampled"] = N_SAMPLED if sampled else 0
     moved = frame["control"]["power"]["config"]["enabled"] or (profile and aircraft.airspeed_by == "power")

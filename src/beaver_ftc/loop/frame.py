@@ -132,13 +132,6 @@ def effect_of_faults(guarantee, truth, prediction, y):
 
 
 @kernel
-def add_effect(guarantee):
-    """Add the effect at an instant inside the frame."""
-    for i in range(3):
-        guarantee.phi_sum[i] += guarantee.phi[i]
-
-
-@kernel
 def follow_guarantee(guarantee, bank, dt, share, k, t):
     """Advance the filtered effect by the elapsed frame and note the first instant t (s) of certainty.
 
@@ -302,15 +295,6 @@ def record_alarm(bank, row, column):
 
 
 @kernel
-def record_used(effectiveness, used, row, column):
-    """What the law takes the effectiveness of each surface for: 1 if it makes no use of it. Returns the next
-    column."""
-    for s in range(effectiveness.size):
-        row[column + s] = effectiveness[s] if used else 1.0
-    return column + effectiveness.size
-
-
-@kernel
 def record_sensor_monitor(monitor, missing, row, column, columns):
     """How near a test between the instruments came to its bound in this frame, and which; and the first
     instrument that gives no reading, missing (N_SENSORS,). Returns the next column."""
@@ -468,7 +452,9 @@ def sense_inside(frame):
     sense(frame)
     if frame.departed != NOT_FINITE:
         accumulate_instant(frame)
-        add_effect(frame.accounts.guarantee)
+        guarantee = frame.accounts.guarantee
+        for i in range(3):
+            guarantee.phi_sum[i] += guarantee.phi[i]
     frame.departed = FLYING
 
 
@@ -594,7 +580,9 @@ def record_row(frame, commanded, row):
             record_estimator(fdi.isolation.estimator[e], fdi.verdict.detected, row, column)
         column += PER_ESTIMATOR
     column = put(row, column, frame.assessment.effectiveness)
-    column = record_used(effectiveness, control.config.uses_verdict, row, column)
+    column = put(row, column, effectiveness)
+    if not control.config.uses_verdict:  # the law takes each surface for a healthy one
+        row[column - effectiveness.size : column] = 1.0
     monitor, missing = fdi.sensor_monitor, frame.measured.missing
     row[column], row[column + 1] = frame.supervisor.mode, fdi.verdict.detected or monitor.output.alarmed
     column += 2

@@ -5,6 +5,7 @@ A `Cockpit` joins one plant and one frame record.
 
 import threading
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import ExitStack
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Protocol
 from weakref import WeakKeyDictionary
@@ -342,11 +343,7 @@ class Loop:
         if not (self._inside or self.cockpit.native):
             self.cockpit.write()
         for _ in range(runs):
-            if self._turbulent:
-                self.cockpit.turn_air()
-            self.plant.run()
-            if not self.cockpit.native:
-                self.cockpit.read()
+            self._run()
             self._look(self.frames)
         self._inside += runs
 
@@ -368,20 +365,14 @@ class Loop:
 
     def _fly_compiled(self, count: int, runs: int) -> int:
         """The same without leaving compiled code, but for an instant now and then: others wait for it."""
-        order, fly_on, status = self._order, self.fly_on, FLYING
-        taken = self.frames, self.references, self.log, order
-        order[0], order[1] = 1, runs
-        if self.after_frame is not None:
-            for _ in range(count):
-                status = fly_on(*taken)
-                self.after_frame()
-                if status:
-                    break
-            return self._landed(status) if status else FLYING
+        order, fly_on, after_frame = self._order, self.fly_on, self.after_frame
+        taken, order[1] = (self.frames, self.references, self.log, order), runs
         while count > 0:
-            order[0] = now = count if count < AT_ONCE else AT_ONCE
+            order[0] = now = min(count, AT_ONCE if after_frame is None else 1)
             count -= now
             status = fly_on(*taken)
+            if after_frame is not None:
+                after_frame()
             if status:
                 return self._landed(status)
         return FLYING
@@ -393,18 +384,22 @@ class Loop:
 
     def _advance(self, runs: int) -> None:
         """Hand the command over, run, and read; between two runs the truth is seen but not acted upon."""
-        native = self.cockpit.native
-        if runs and not native:
-            self.cockpit.write()
-        for left in reversed(range(runs)):
-            if self._turbulent:
-                self.cockpit.turn_air()
-            self.plant.run()
-            if not native:
+        if not self.cockpit.native:
+            if runs:
+                self.cockpit.write()
+            else:
                 self.cockpit.read()
+        for left in reversed(range(runs)):
+            self._run()
             if left:
                 self._look(self.frames)
-        if not runs and not native:
+
+    def _run(self) -> None:
+        """One of JSBSim's frames, and what it shows."""
+        if self._turbulent:
+            self.cockpit.turn_air()
+        self.plant.run()
+        if not self.cockpit.native:
             self.cockpit.read()
 
     @cached_property
@@ -442,21 +437,9 @@ def fly(
     Raises BadInput when the flight cannot be trimmed or asks for what there is not, SimulationFailed when a
     value is not finite. In several threads, one flight is flown after the other.
     """
-    with ONE_FLIES:
-        return _fly(scenario, sink, progress, detector, law, prepare, watch)
-
-
-def _fly(
-    scenario: Scenario,
-    sink: LogSink | None,
-    progress: Callable[[float], None] | None,
-    detector: "Detector | None",
-    law: "Law | None",
-    prepare: Callable[[Plant], None] | None,
-    watch: Callable[[Loop], Callable[[], None]] | None,
-) -> Landing:
-    loop = Loop(scenario, detector, law, prepare)
-    try:
+    with ONE_FLIES, ExitStack() as at_the_end:
+        loop = Loop(scenario, detector, law, prepare)
+        at_the_end.callback(loop.release)
         over = None if watch is None else watch(loop)
         if sink is not None:
             sink.open(loop.columns)
@@ -472,8 +455,6 @@ def _fly(
         if sink is not None:
             sink.close()
         return loop.land()
-    finally:
-        loop.release()
 
 
 def _told(loop: Loop, progress: Callable[[float], None]) -> Callable[[], None]:

@@ -10,6 +10,7 @@ from beaver_ftc.compiled import direct, kernel, row_of
 from beaver_ftc.diagnosis import Measured
 from beaver_ftc.loop import frame as whole
 from beaver_ftc.loop.assembly import y_places
+from beaver_ftc.loop.frame import put
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.loop.stepping import detection_share, diagnose_one
 from beaver_ftc.plant.sensing import NOT_FINITE
@@ -28,10 +29,9 @@ def fly_and_note(frames, references, log, notes):
         return frame.departed
     row[0] = frame.t
     at = put(row, 1, frame.measured.x)
-    for i in range(4 + frame.truth.declared):
-        row[at + i] = frame.measured.y[i]
+    at = put(row, at, frame.measured.y[: 4 + frame.truth.declared])
     means = frame.prediction.means
-    at = put(row, at + 4 + frame.truth.declared, means.F)
+    at = put(row, at, means.F)
     for axis in range(3):
         at = put(row, at, means.Gu[axis])
     at = put(row, put(row, at, frame.fdi.bound.eta_bar), frame.measured.attitude)
@@ -47,14 +47,6 @@ def fly_and_note(frames, references, log, notes):
     row[at] = not error_map.outside
     row[at + 1] = detection_share(frames)
     return frame.departed
-
-
-@kernel
-def put(row, at, values):
-    """Put values (n,) into a row from column `at` on; returns the column after them."""
-    for i in range(values.size):
-        row[at + i] = values[i]
-    return at + values.size
 
 
 class Notes:

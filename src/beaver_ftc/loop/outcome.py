@@ -443,6 +443,16 @@ def verdict_of(frame: np.void, surfaces: Sequence[str]) -> Verdict:
     )
 
 
+def words_follow_from(fdi: np.void) -> bytes:
+    """What a verdict of the built-in diagnosis follows from, but for its estimate: others, if it changes."""
+    types, surfaces = fdi["types"], fdi["types"]["surface"]
+    evidence = surfaces["evidence"]
+    brief = evidence["n_anomalous"] - evidence["n_rest"] < types["config"]["half_frames"]
+    excluded = fdi["isolation"]["estimator"]["excluded"], surfaces["sets"]["excluded"]
+    parts = fdi["verdict"], types["pair"]["group_alarm"], surfaces["status"], brief, *excluded
+    return b"".join(part.tobytes() for part in parts)
+
+
 def estimate_now(fdi: np.void, said: Verdict, surfaces: Sequence[str]) -> float | None:
     """The estimate of a verdict that otherwise still stands, of a diagnosis for every type."""
     surface, types = surfaces.index(str(said.isolated)), fdi["types"]
@@ -504,10 +514,12 @@ def landing_of(
     surfaces, departed, found = scenario.airframe.surfaces, int(frame["departed"]), fdi["verdict"]
     known = slice(int(supervisor["n_modes"]))  # as many as there is room for
     modes = zip(supervisor["mode_at_s"][known], supervisor["mode_is"][known], strict=True)
-    closest = tuple(
-        float(share)
-        for share in fdi["bank"]["output"]["peak"][: max(int(fdi["bank"]["config"]["n_filters"]), 1)]
-    )
+    n_filters = max(int(fdi["bank"]["config"]["n_filters"]), 1)
+    closest = tuple(fdi["bank"]["output"]["peak"][:n_filters].tolist())
+
+    def by_surface(values: np.ndarray) -> dict[str, float]:
+        return dict(zip(surfaces, values.tolist(), strict=True))
+
     return Landing(
         scenario=scenario,
         frames=int(frame["k"]),
@@ -523,7 +535,7 @@ def landing_of(
         outside_at_end=bool(envelope["outside"]),
         end=(float(frame["truth"]["value"][ch.AIRSPEED]), float(frame["truth"]["value"][ch.ALTITUDE])),
         departure=(float(frame["t"]), DEPARTURE_SIGNALS[departed // 10]) if departed else None,
-        saturation_s={s: int(n) * dt for s, n in zip(surfaces, accounts["saturated_frames"], strict=True)},
+        saturation_s=by_surface(accounts["saturated_frames"] * dt),
         worst_residual_ratio=max(*closest, float(fdi["statistical"]["alarm"]["peak"])),
         statistical=_statistical(fdi),
         closest_approach=closest,
@@ -538,9 +550,7 @@ def landing_of(
         withdrawn_types=_withdrawn(found["withdrawn_types"][: int(found["n_gone_types"])], surfaces),
         windows=windows,
         inconclusive=None if verdict is not None else inconclusive_of(frame, scenario.airframe),
-        surface_travel_rad={s: float(x) for s, x in zip(surfaces, accounts["actuator_travel"], strict=True)},
-        surface_energy_rad2_s={
-            s: float(x) for s, x in zip(surfaces, accounts["actuator_energy"], strict=True)
-        },
+        surface_travel_rad=by_surface(accounts["actuator_travel"]),
+        surface_energy_rad2_s=by_surface(accounts["actuator_energy"]),
         **found_so_far(frame, surfaces, verdict),
     )

@@ -99,13 +99,10 @@ class Stepping:
             self._loop.release()
 
     def _make_ready(self) -> None:
-        with ONE_FLIES:
-            self._set_up()
-
-    def _set_up(self) -> None:
         self._scenario, self._faults = self._given, self._given.faults
-        self._loop = self._loop_type(self._scenario, *self._plug_ins, self._prepare)
-        self._loop.read_more()  # a caller is given what there is
+        with ONE_FLIES:
+            self._loop = self._loop_type(self._scenario, *self._plug_ins, self._prepare)
+            self._loop.read_more()  # a caller is given what there is
         self._frame: np.void = self._loop.frames[0]
         self._k_flown, self._rows_flown = (self._loop.frames[name].item for name in ("k", "row"))
         self._next, self._turn_at, self._written = 0, 0, 0
@@ -409,27 +406,24 @@ class Stepping:
 
     def _fly_to(self, end: int, stick_deg_s: Vector | None = None) -> None:
         """Frames up to `end`, chunk by chunk as `Loop.chunks` has them, stopping where something changes."""
-        with ONE_FLIES:
-            self._fly_all(end, stick_deg_s)
-
-    def _fly_all(self, end: int, stick_deg_s: Vector | None) -> None:
         loop, k_flown, rows_flown = self._loop, self._k_flown, self._rows_flown
-        while self._next < end and self._status == FLYING:
-            k = self._next
-            if k % CHUNK_ROWS == 0:
-                self._flush()
-                self._written = 0
-                loop.sample_references(k, min(CHUNK_ROWS, loop.n_frames - k))
-            if k >= self._turn_at:
-                self._turn_at = loop.turn_to(k)
-            stop = min(end, self._turn_at, (k // CHUNK_ROWS + 1) * CHUNK_ROWS)
-            self._steer(k, stop, stick_deg_s)
-            start = rows_flown()
-            try:
-                self._status = loop.fly_segment(k, stop)
-            finally:
-                self._next = k_flown()
-                self._note(loop.log[start : rows_flown()])
+        with ONE_FLIES:
+            while self._next < end and self._status == FLYING:
+                k = self._next
+                if k % CHUNK_ROWS == 0:
+                    self._flush()
+                    self._written = 0
+                    loop.sample_references(k, min(CHUNK_ROWS, loop.n_frames - k))
+                if k >= self._turn_at:
+                    self._turn_at = loop.turn_to(k)
+                stop = min(end, self._turn_at, (k // CHUNK_ROWS + 1) * CHUNK_ROWS)
+                self._steer(k, stop, stick_deg_s)
+                start = rows_flown()
+                try:
+                    self._status = loop.fly_segment(k, stop)
+                finally:
+                    self._next = k_flown()
+                    self._note(loop.log[start : rows_flown()])
 
     def _note(self, rows: Vector) -> None:
         """Keep the rows just flown, (frames, columns), until the next step."""

@@ -13,7 +13,7 @@ from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop import stepping, watching
 from beaver_ftc.loop.assembly import Trim, configure_design, configure_diagnosis_at_trim
-from beaver_ftc.loop.outcome import estimate_now, verdict_of
+from beaver_ftc.loop.outcome import estimate_now, verdict_of, words_follow_from
 from beaver_ftc.plugins import DETECTORS, is_compiled
 from beaver_ftc.scenario.airframe import checked_against
 from beaver_ftc.scenario.declared import Declared
@@ -95,10 +95,8 @@ class Diagnosis:
         self._take = direct(watching.take, self._frames, self._x, self._y, self._command, self._attitude)
         self._diagnose = direct(stepping.diagnose, self._frames)
         self._accommodate_and_advance = direct(watching.accommodate_and_advance, self._frames)
-        self._known = np.zeros(watching.MEMORY, dtype=np.int64)
-        self._news = direct(watching.news, self._frames, self._known)
         self._theta = direct(watching.theta, self._frames)
-        self._said = Verdict()
+        self._said, self._followed = Verdict(), b""
         self._fresh = True
 
     @property
@@ -146,8 +144,11 @@ class Diagnosis:
             raise BadInput(f"the sample after {self.t_s:g} s is not finite, allowed: finite numbers")
         self._diagnose(self._frames)
         self._accommodate_and_advance(self._frames)
-        if self._news(self._frames, self._known):  # its words are looked for only when there are others
-            self._said = verdict_of(self._frame, self._aircraft.surfaces)
+        if not self._fdi["verdict"]["detected"]:
+            return Verdict()
+        # words are looked for only when there are others: of a loss in noise they take a frame's time
+        if (follows := words_follow_from(self._fdi)) != self._followed:
+            self._followed, self._said = follows, verdict_of(self._frame, self._aircraft.surfaces)
         elif self._said.estimate is not None:
             self._said = self._said._replace(estimate=self._estimate())
         return self._said

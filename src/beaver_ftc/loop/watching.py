@@ -11,8 +11,6 @@ from beaver_ftc.diagnosis.model_prediction import evaluate_design, move_surfaces
 from beaver_ftc.loop.frame import accommodate, advance_clock, evaluate_elapsed, isolated_theta, start_clock
 from beaver_ftc.plant.instruments import take_sample
 
-MEMORY = 8 + 5 * 8  # of the verdict's words: `news`
-
 
 @kernel
 def take(frames, x, y, command, attitude):
@@ -56,46 +54,3 @@ def theta(frames):
     """The estimate of the isolated loss of effectiveness, of the published class."""
     fdi = frames[0].fdi
     return isolated_theta(fdi, isolated_surface(fdi.verdict, fdi.isolation.estimator))
-
-
-@kernel
-def news(frames, known):
-    """Whether the verdict says anything else than when `known` was filled last, but for its estimate.
-
-    known (MEMORY,) int64: what the words follow from; brought up to date.
-    """
-    fdi = frames[0].fdi
-    changed = replace(known, 0, fdi.verdict.detected)
-    if not fdi.verdict.detected:
-        return changed
-    changed |= replace(known, 1, fdi.verdict.axis) | replace(known, 2, fdi.verdict.isolated_estimator)
-    excluded = 0
-    for i in range(fdi.isolation.config.n_estimators):
-        excluded = 2 * excluded + fdi.isolation.estimator[i].excluded
-    changed |= replace(known, 3, excluded) | replace(known, 4, fdi.verdict.fault_type)
-    if fdi.config.diagnoses_all_types:
-        for plane in range(fdi.types.pair.group_alarm.size):
-            changed |= replace(known, 5 + plane, fdi.types.pair.group_alarm[plane])
-        for s in range(fdi.types.surface.size):
-            changed |= news_of(fdi.types.surface[s], fdi.types.config.half_frames, known[8 + 5 * s :])
-    return changed
-
-
-@kernel
-def news_of(surface, half_frames, known):
-    """The same of one surface, where every type is asked for; known (5 and more,): its own."""
-    bits = 0
-    for kind in range(surface.sets.excluded.size):
-        bits = 2 * bits + surface.sets.excluded[kind]
-    early = surface.evidence.n_anomalous - surface.evidence.n_rest < half_frames
-    changed = replace(known, 0, surface.status.is_isolated) | replace(known, 1, surface.status.basis)
-    changed |= replace(known, 2, surface.status.fault_type) | replace(known, 3, bits)
-    return changed | replace(known, 4, 1 if early else 0)
-
-
-@kernel
-def replace(known, i, value):
-    """Put an integer into its place; whether another was there."""
-    other = known[i] != value
-    known[i] = value
-    return other

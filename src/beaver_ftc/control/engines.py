@@ -190,13 +190,6 @@ def _slipstream_limits(declared: Declared, layout: np.void) -> tuple[float, floa
 
 
 @kernel
-def unable(surfaces, saturated, s):
-    """Whether surface s is given up or stands at a stop."""
-    given_up = surfaces.output.effectiveness[s] < surfaces.config.least_effectiveness
-    return given_up or saturated[s] == 1
-
-
-@kernel
 def pitch_is_lost(layout, surfaces, saturated, shortfall):
     """Whether elevator and flap are given up, or cannot between them give what pitch demands.
 
@@ -204,12 +197,13 @@ def pitch_is_lost(layout, surfaces, saturated, shortfall):
     shortfall (3,) rad/s2; saturated (n,).
     """
     effectiveness, elevator = surfaces.output.effectiveness, layout.main[PITCH]
+    least = surfaces.config.least_effectiveness
     most = remaining(layout, effectiveness, PITCH)
     for s in range(effectiveness.size):
         if layout.is_backup[s]:
             most = max(most, effectiveness[s])
-    lacking = unable(surfaces, saturated, elevator) and abs(shortfall[PITCH]) > LEAST_LACK_RAD_S2
-    return most < surfaces.config.least_effectiveness or lacking
+    unable = effectiveness[elevator] < least or saturated[elevator] == 1
+    return most < least or (unable and abs(shortfall[PITCH]) > LEAST_LACK_RAD_S2)
 
 
 @kernel

@@ -557,10 +557,9 @@ def effectiveness(design: np.void, y: np.ndarray) -> np.ndarray:
 
 def own_damping(design: np.void, y: np.ndarray) -> np.ndarray:
     """d f_i / d x_i (3,) 1/s at y and no rate, surfaces neutral: each rate's effect on its own axis."""
-    if design["linearised"]:
-        return np.diag(design["f_x"]).copy()
-    f, _ = _split(design, 1j * _STEP * np.eye(3), y[:, None] + 0j)
-    return np.diag(f).imag / _STEP
+    neutral = np.zeros(design["G0"].shape[1])
+    f_x = design["f_x"] if design["linearised"] else jacobian(design, np.zeros(3), y, neutral)[2]
+    return np.diag(f_x).copy()
 
 
 @kernel

@@ -192,14 +192,11 @@ def narrow_sets(fie, nu, nu_max, shared):
 
 
 @kernel
-def clear_mean_effect(mean):
-    """Begin the mean of a fault's effect over a block of frames (EFFECT_RECORD)."""
-    mean.h[:], mean.Z[:], mean.r[:] = (0.0, 0.0, 0.0)
-
-
-@kernel
-def add_to_mean(mean, phi, w):
-    """mean <- mean + w phi, w the share of a frame in the block."""
+def add_to_mean(mean, phi, w, begins):
+    """mean <- mean + w phi, w the share of a frame in the block, which `begins` with this one
+    (EFFECT_RECORD)."""
+    if begins:
+        mean.h[:], mean.Z[:], mean.r[:] = 0.0, 0.0, 0.0
     for i in range(3):
         mean.h[i] += w * phi.h[i]
         mean.Z[i] += w * phi.Z[i]
@@ -291,28 +288,24 @@ def configure_isolation(
 
 
 @kernel
-def update_effect(iso, fie, bank, bound, config, G, Gu, e_Gu):
-    """Fill the effect of an estimator's fault in the elapsed frame, and update its reach in the bank.
+def update_effects(iso, bank, bound, config, detected, G, Gu, e_Gu):
+    """Fill the effect of each estimator's fault in the elapsed frame, and update its reach in the bank, if a
+    later stage reads them.
 
     loss  h = 0, Z = Gu_s        position  h = -Gu_s, Z = G_s        r = e_Gu_s
     """
-    phi, s, stuck = fie.effect, fie.surface, fie.hypothesis_kind == POSITION_HYPOTHESIS
-    for i in range(3):
-        phi.h[i] = -Gu[i, s] if stuck else 0.0
-        phi.Z[i] = G[i, s] if stuck else Gu[i, s]
-        phi.r[i] = e_Gu[i, s]
-    if stuck and (bound.has_eG or bound.error_map.one_free):
-        widen_error(fie, bound, bank.output.innovation, config.n_substeps)
-    if iso.config.reach:
-        advance_reach(bank, fie, config.dt)
-
-
-@kernel
-def update_effects(iso, bank, bound, config, detected, G, Gu, e_Gu):
-    """Call `update_effect` for every estimator, if a later stage reads the effects."""
-    if iso.config.reach or config.diagnoses_all_types or detected:
-        for fie in iso.estimator[: iso.config.n_estimators]:
-            update_effect(iso, fie, bank, bound, config, G, Gu, e_Gu)
+    if not (iso.config.reach or config.diagnoses_all_types or detected):
+        return
+    for fie in iso.estimator[: iso.config.n_estimators]:
+        phi, s, stuck = fie.effect, fie.surface, fie.hypothesis_kind == POSITION_HYPOTHESIS
+        for i in range(3):
+            phi.h[i] = -Gu[i, s] if stuck else 0.0
+            phi.Z[i] = G[i, s] if stuck else Gu[i, s]
+            phi.r[i] = e_Gu[i, s]
+        if stuck and (bound.has_eG or bound.error_map.one_free):
+            widen_error(fie, bound, bank.output.innovation, config.n_substeps)
+        if iso.config.reach:
+            advance_reach(bank, fie, config.dt)
 
 
 @kernel

@@ -1,6 +1,5 @@
 """The ground under an aircraft that can be told of one: laid out, and stood upon."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from math import radians
 
@@ -32,7 +31,7 @@ def stand(plant: Plant, neutral: FlightState, ground_m: float) -> None:
     for name in air:
         plant.write(name, 0.0)
     ground = plant.aircraft.file.ground
-    about = np.array([ground_m + ground.height_m, radians(ground.pitch_deg)])  # type: ignore[union-attr]
+    x = np.array([ground_m + ground.height_m, radians(ground.pitch_deg)])  # type: ignore[union-attr]
     at = replace(neutral, airspeed_mps=0.0, alpha_rad=0.0, beta_rad=0.0, phi_rad=0.0, psi_rad=0.0)
 
     for name, setting in plant.aircraft.engine.settings.items():
@@ -42,19 +41,14 @@ def stand(plant: Plant, neutral: FlightState, ground_m: float) -> None:
         plant.hold(replace(at, altitude_m=float(x[0]), theta_rad=float(x[1])))
         return np.array([plant.read(name) for name in _AT_REST])
 
-    if not _finds_rest(look, about):
-        raise SimulationFailed(f"{plant.aircraft.name} does not come to rest on its wheels")
-    for name, value in air.items():
-        plant.write(name, value)
-
-
-def _finds_rest(look: Callable[[np.ndarray], np.ndarray], x: np.ndarray) -> bool:
-    """Whether Newton's method brings what `look` sees of x, (2,), to nothing."""
     here = look(x)
     for _ in range(_MOST_STEPS):
         if np.abs(here).max() <= _GOAL:
-            return True
+            break
         slopes = [(look(x + step) - here) / step.sum() for step in np.diag(_STEPS)]
         x = x - np.linalg.solve(np.column_stack(slopes), here)
         here = look(x)
-    return False
+    else:
+        raise SimulationFailed(f"{plant.aircraft.name} does not come to rest on its wheels")
+    for name, value in air.items():
+        plant.write(name, value)

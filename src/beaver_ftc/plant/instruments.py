@@ -150,15 +150,17 @@ def read_one(instruments, i, true):
 
 
 @kernel
-def read_each(instruments, signals, start, end):
-    """Put a sample in the place of the truth, of the sensors from start to end."""
-    for i in range(start, end):
-        value = read_one(instruments, i, signals[i])
-        lost = instruments.dropout[i] > 0.0 and uniform(instruments) < instruments.dropout[i]
-        if not lost or instruments.taken[i] == 0:
-            instruments.reading[i] = value
-        instruments.taken[i] += 1
-        signals[i] = instruments.reading[i]
+def sample(instruments, signals, i):
+    """Put a sample of sensor i in the place of the truth; whether it is a new one: between two the last
+    reading stands."""
+    value, first = read_one(instruments, i, signals[i]), instruments.taken[i] == 0
+    lost = instruments.dropout[i] > 0.0 and uniform(instruments) < instruments.dropout[i]
+    due = instruments.taken[i] % instruments.every[i] == 0 and (first or not lost)
+    if due:
+        instruments.reading[i] = value
+    instruments.taken[i] += 1
+    signals[i] = instruments.reading[i]
+    return due
 
 
 @kernel
@@ -166,32 +168,26 @@ def read_all(instruments, signals):
     """Put a sample of every signal but the accelerometers' in the place of the truth; signals (N_SENSORS,),
     SI, as SENSORS."""
     instruments.counter = OF_THE_FIRST
-    read_each(instruments, signals, 0, N_SIGNALS)
-    if signals.size > N_SIGNALS:
-        instruments.counter = OF_THE_FURTHER
-        read_each(instruments, signals, N_SIGNALS, AX)
+    for i in range(AX):
+        if i == N_SIGNALS:
+            instruments.counter = OF_THE_FURTHER
+        sample(instruments, signals, i)
 
 
 @kernel
 def read_forces(instruments, signals):
     """The same of the accelerometers, which are not read in every flight."""
     instruments.counter = OF_FORCES
-    read_each(instruments, signals, AX, N_IN_EQUATIONS)
+    for i in range(AX, N_IN_EQUATIONS):
+        sample(instruments, signals, i)
 
 
 @kernel
 def read_sampled(instruments, signals, fresh):
-    """The same of the sensors with a rate of their own: between two samples the last reading stands."""
+    """The same of the sensors with a rate of their own."""
     instruments.counter = OF_THE_SAMPLED
     for i in range(N_IN_EQUATIONS, N_SENSORS):
-        value, first = read_one(instruments, i, signals[i]), instruments.taken[i] == 0
-        lost = instruments.dropout[i] > 0.0 and uniform(instruments) < instruments.dropout[i]
-        due = instruments.taken[i] % instruments.every[i] == 0 and (first or not lost)
-        if due:
-            instruments.reading[i] = value
-        fresh[i - N_IN_EQUATIONS] = due
-        instruments.taken[i] += 1
-        signals[i] = instruments.reading[i]
+        fresh[i - N_IN_EQUATIONS] = sample(instruments, signals, i)
 
 
 @kernel
@@ -236,20 +232,13 @@ def set_inertial(measured, inertial):
 
 
 @kernel
-def share_force(measured):
-    """From the readings to the force."""
-    for i in range(3):
-        measured.force[i] = measured.signal[AX + i]
-
-
-@kernel
 def share_out(measured):
     """From the readings to x, y, attitude, force and altitude."""
     signal, y = measured.signal, measured.y
     for i in range(3):
         measured.x[i] = signal[i]
         measured.attitude[i] = signal[PHI + i]
-    share_force(measured)
+        measured.force[i] = signal[AX + i]
     y[ALPHA], y[BETA], y[AIRSPEED] = signal[_ALPHA], signal[_BETA], signal[_AIRSPEED]
     y[QDYN] = signal[_QDYN]
     measured.altitude = signal[ALTITUDE]

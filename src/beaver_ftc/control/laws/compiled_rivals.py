@@ -79,23 +79,16 @@ def increment(law, reference, main, prediction, x, axes, u):
         if memory.begun:
             change = (x[i] - memory.x_before[i]) / reference.config.dt
             xdot0 = smooth(memory.rate_filter, i, change, config.keep)
-            given = smooth(memory.surface_filter, i, given_by(prediction.means.Gu, main, i), config.keep)
+            moved = 0.0  # acceleration by the positions of these surfaces over the elapsed frame
+            for s in main:
+                moved += prediction.means.Gu[i, s]
+            given = smooth(memory.surface_filter, i, moved, config.keep)
         nu = reference.output.model_acceleration[i] + config.Kp * error + config.Ki * memory.integral[i]
         set_demand(axes, i, nu - xdot0 + given, 0.0, 0.0)
     solve(prediction.G, main, axes.demand, u)
     for i in range(3):
         set_demand(axes, i, axes.demand[i] - memory.surface_filter[1, i], 0.0, 0.0)
     memory.begun, memory.x_before[:] = 1, x
-
-
-@kernel
-def given_by(Gu, main, i):
-    """Acceleration of axis i, rad/s2, that the positions of the surfaces main (3,) gave over the elapsed
-    frame."""
-    total = 0.0
-    for s in range(3):
-        total += Gu[i, main[s]]
-    return total
 
 
 @kernel

@@ -291,12 +291,6 @@ def begin_estimator(estimator, squares, frames, dt):
         error.rate[:], error.disturbance[:] = 0.0, 0.0
 
 
-@kernel
-def end(estimator):
-    """Estimate no longer: no alarm, or no need."""
-    estimator.active = 0
-
-
 @apart
 def estimate(estimator, innovation, L_rate, L_disturbance, dt, x, y, effectiveness, moments):
     """Take in the innovation of all axes (3,) rad/s; L_rate 1, L_disturbance 1/s (3,): the observer's gains;
@@ -528,7 +522,7 @@ def withdraw(memory, layout, s, saturated, suspected, dt):
 def start_or_end_estimator(memory, layout, detected, dt):
     """From the alarm on estimate which surfaces act, where more move than lead an axis or stand in."""
     if not (detected and layout.general and memory.estimator.found.size > 1):
-        end(memory.estimator)
+        memory.estimator.active = 0
     elif not memory.estimator.active:
         begin_estimator(memory.estimator, memory.sums.innovation, memory.sums.frames, dt)
 

@@ -72,14 +72,6 @@ def continue_isolation(fdi, meas, t, before):
         isolate(fdi, meas, t, before)
 
 
-@kernel
-def worst_case_allows(fdi, fie, x, started):
-    """Whether the fault of estimator fie is possible in the worst case; x (3,) rad/s: measured."""
-    return isolation.fault_possible(
-        fdi.isolation, fie, fdi.bank, fdi.bound.nu_max, fdi.config.abrupt, x, started
-    )
-
-
 @apart(long_loops=True)
 def weigh_loss(fdi, j):
     """Fill `unlikely` of estimator j: whether the statistical detector excludes its loss, after its alarm."""
@@ -116,9 +108,10 @@ def exclude_or_wait(fdi, fie, possible, t):
 @kernel
 def isolate(fdi, meas, t, started):
     """Exclude faults at t s, and decide; started: the isolation started a frame or more ago."""
-    cfg, iso = fdi.config, fdi.isolation
+    cfg, iso, bank = fdi.config, fdi.isolation, fdi.bank
     for j, fie in enumerate(iso.estimator[: iso.config.n_estimators]):
-        possible = worst_case_allows(fdi, fie, meas.x, started) or cfg.variant == STATISTICAL_DETECTOR
+        possible = isolation.fault_possible(iso, fie, bank, fdi.bound.nu_max, cfg.abrupt, meas.x, started)
+        possible = possible or cfg.variant == STATISTICAL_DETECTOR
         if possible and cfg.variant != WORST_CASE_DETECTOR:
             if cfg.diagnoses_all_types:
                 weigh_position(fdi, j)
@@ -128,16 +121,8 @@ def isolate(fdi, meas, t, started):
         exclude_or_wait(fdi, fie, possible, t)
     if cfg.diagnoses_all_types:
         decide_type(fdi, t, started)
-    else:
-        decide_loss(fdi, t)
-
-
-@kernel
-def decide_loss(fdi, t):
-    """Isolate the loss of effectiveness whose estimator is the only one left."""
-    if sensor_monitor.doubts_gyros(fdi.sensor_monitor):
-        return
-    conclusion.set_isolated(fdi.verdict, isolation.decide_isolation(fdi.isolation, t), t)
+    elif not sensor_monitor.doubts_gyros(fdi.sensor_monitor):
+        conclusion.set_isolated(fdi.verdict, isolation.decide_isolation(iso, t), t)
 
 
 @apart

@@ -301,9 +301,3 @@ def observe_error(srf, e, tol):
 def last_error(srf):
     """p - u in the elapsed frame, rad, p in the middle of where it can have been."""
     return 0.5 * (srf.last.lo + srf.last.hi) - srf.last.u
-
-
-def read_last_error(srf: np.void) -> float:
-    """`last_error` of a record outside compiled code, rad."""
-    last = srf["last"]
-    return float(0.5 * (last["lo"] + last["hi"]) - last["u"])

@@ -392,9 +392,7 @@ def extend_block(types, layout, est, nu, bound):
         block.nu[:] = block.nu_bound[:] = 0.0
         block.n_start[:] = bound.n_old
     for j in layout.position:
-        if block.n_so_far == 0:
-            isolation.clear_mean_effect(est[j].mean_effect)
-        isolation.add_to_mean(est[j].mean_effect, est[j].effect, share)
+        isolation.add_to_mean(est[j].mean_effect, est[j].effect, share, block.n_so_far == 0)
     block.n_so_far += 1
     for i in range(3):
         block.nu[i] += share * nu[i]

@@ -31,7 +31,6 @@ from beaver_ftc.diagnosis.types import (
     clip_travel,
     feasible_set,
     middle_estimate,
-    read_last_error,
     set_middle,
 )
 
@@ -222,8 +221,9 @@ def has_run(srf, h, stop):
 
 
 def last_offset(fdi: np.void, s: int, h: int) -> float | None:
-    """Offset in the last frame, rad."""
-    return read_last_error(fdi["types"]["surface"][s])
+    """Offset in the last frame, rad: `types.last_error` outside compiled code."""
+    last = fdi["types"]["surface"][s]["last"]
+    return float(0.5 * (last["lo"] + last["hi"]) - last["u"])
 
 
 BIAS = FaultType(

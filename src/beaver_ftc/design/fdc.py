@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from beaver_ftc.aircraft import Term, load
+from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.aircraft import FORCES, GRAVITY_MPS2, MOMENTS
 from beaver_ftc.design.model import engine_power_kw, slipstream
 
@@ -38,11 +38,6 @@ _STEP = 1e-30  # complex
 def value(name: str) -> float:
     """The coefficient of one term, e.g. value("Cm_de"); KeyError for a name the file lacks."""
     return TERMS[name].value
-
-
-def coefficient_terms(coefficient: str) -> tuple[Term, ...]:
-    """The terms whose sum is `coefficient` (one of COEFFICIENTS)."""
-    return tuple(term for term in TERMS.values() if term.coefficient == coefficient)
 
 
 @dataclass(frozen=True)

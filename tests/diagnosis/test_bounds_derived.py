@@ -10,7 +10,7 @@ from beaver_ftc.diagnosis.bounds import (
     add_declared_bound,
     inertia_bounds,
 )
-from beaver_ftc.diagnosis.detection.filters import advance_gyro
+from beaver_ftc.diagnosis.detection.filters import advance_bound
 from beaver_ftc.loop.assembly import configure_design
 from beaver_ftc.scenario.schema import Scenario
 from samples import samples
@@ -116,6 +116,6 @@ def test_filtered_noise_stays_within_its_bound_and_can_reach_it(seed, a, frames)
         eps, filtered = 0.0, nbar[0]
         for k in range(frames):
             eps = a * eps + n[k + 1] - n[k]
-            filtered = advance_gyro(filtered, nbar[k], a)
+            filtered = advance_bound(filtered, 0.0, a, 1.0, nbar[k])
         assert abs(eps) <= filtered + nbar[-1] + 1e-12
     assert abs(eps) == pytest.approx(filtered + nbar[-1], rel=1e-9)

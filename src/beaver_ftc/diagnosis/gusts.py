@@ -88,7 +88,6 @@ GUST_CONFIG_RECORD = record(
     # error of V leaves, over the variance of that error.
     var_V=float, var_v=float, speed_error_share=float,
     L_roll=float, L_gust=float,  # correlation lengths of the rolling gust and of the gusts, m
-    starts_in_flight=int,  # whether the diagnosis starts in flight, where a gust may already be present
 )  # fmt: skip
 
 GUST_MEMORY_RECORD = record(
@@ -165,18 +164,14 @@ def fill_velocity(gust, y, attitude):
 
 @kernel
 def start_gust(gust, y, attitude):
-    """Start at the first frame of a diagnosis: the estimated gust is zero.
+    """Start at the first frame of a diagnosis, whose record is new: the estimated gust is zero.
 
-    If the diagnosis begins in flight, a gust may be present already; it counts as unmeasured and decays.
+    If the diagnosis begins in flight, a gust may be present already; it counts as unmeasured and decays
+    (`schemes.prepare_takeover`).
     """
-    mem, out = gust.memory, gust.output
     fill_velocity(gust, y, attitude)
     update_axes(gust, 1.0 + 0.0j)
-    mem.w[:] = mem.v_g[:] = 0.0
-    mem.has_prev, mem.turn_now, mem.n_turn = 0, 0.0, 0
-    mem.turn_past = mem.start_share = mem.start_left = float(gust.config.starts_in_flight)
-    out.V = y[AIRSPEED]
-    mem.var_now[:] = mem.var_prev[:] = out.var_turn[:] = 0.0
+    gust.output.V = y[AIRSPEED]
 
 
 @kernel

@@ -39,7 +39,7 @@ from beaver_ftc.diagnosis.conclusion import (
     hold_assessment,
     weighs_statistics,
 )
-from beaver_ftc.diagnosis.detection import filters, statistical
+from beaver_ftc.diagnosis.detection import filters
 from beaver_ftc.diagnosis.detection.filters import nearest_filter
 from beaver_ftc.diagnosis.model_prediction import (
     add_instant,
@@ -551,7 +551,8 @@ def account(frame):
             note_beyond_threshold(sums, frame.fdi, frame.t)
     else:
         filters.keep_bank_peak(frame.fdi.bank)
-        statistical.keep_score_peak(frame.fdi.statistical.alarm)
+        alarm = frame.fdi.statistical.alarm
+        alarm.peak = max(alarm.peak, alarm.ratio)
     saturated, dt = control.allocation.output.saturated, control.reference.config.dt
     account_surfaces(sums, truth, saturated, frame.k, dt)
     note_envelope(sums.envelope, truth.value[ch.ENVELOPE] < 0.5, frame.t)

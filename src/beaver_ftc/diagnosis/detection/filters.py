@@ -70,16 +70,6 @@ def advance_bound(e, eta, a, dt, n=0.0):
 
 
 @kernel
-def advance_gyro(m, n, a):
-    """m <- a m + (1 - a) n: the filtered bound on a gyro's changing error, rad/s; n at the start of the
-    frame.
-
-    An error of the gyro adds at most the filtered bound plus the present n to a residual.
-    """
-    return a * m + (1.0 - a) * n
-
-
-@kernel
 def residual_interval(lo, hi, R_pos, R_neg, Om, th, B):
     """The interval (low, high), rad/s, that holds the residual of the true estimator.
 
@@ -205,14 +195,18 @@ def keep_bank_peak(bank):
 
 
 @kernel
-def along(v, m, i, size):
-    """v_i of a vector v (3,), or, if i = 3, m' v along a direction m (3,); |m|' v if v is a `size`."""
-    if i < 3:
-        return v[i]
+def project(m, v, size):
+    """m' v along a direction m; |m|' v if v is a `size`."""
     total = 0.0
-    for j in range(3):
+    for j in range(m.size):
         total += (abs(m[j]) if size else m[j]) * v[j]
     return total
+
+
+@kernel
+def along(v, m, i, size):
+    """v_i of a vector v (3,), or, if i = 3, its part along a direction m (3,): see `project`."""
+    return v[i] if i < 3 else project(m, v, size)
 
 
 @kernel
@@ -267,9 +261,9 @@ FDAE_NETWORK_RECORD = record(
     output=3,
 )
 
-# xhat: the estimate of the rates, rad/s; residual, threshold rad/s; e, m: see `advance_fdae`.
+# xhat: the estimate of the rates, rad/s; residual, threshold rad/s; m: see `advance_fdae`.
 FDAE_CONFIG_RECORD = record(pole_per_s=3, a=3)
-FDAE_MEMORY_RECORD = record(xhat=3, e=3, m=3)
+FDAE_MEMORY_RECORD = record(xhat=3, m=3)
 FDAE_OUTPUT_RECORD = record(residual=3, threshold=3)
 FDAE_RECORD = record(
     config=FDAE_CONFIG_RECORD,
@@ -299,7 +293,7 @@ def configure_fdae(fdae: np.void, declared: Declared) -> None:
 @kernel
 def start(bank, fdae, x, n):
     """Begin all filters at the first measurement x (3,) rad/s; n (3,) rad/s: errors of the gyros to come."""
-    fdae.memory.xhat[:], fdae.memory.e[:], fdae.memory.m[:] = x, n, n
+    fdae.memory.xhat[:], fdae.memory.m[:] = x, n
     bank.memory.e[: bank.config.n_filters] = n
 
 
@@ -400,12 +394,13 @@ def alarm_axis(bank, authority, alarm):
 
 
 @kernel
-def advance_fdae(fdae, bound, x, F, detected, leaks, dt):
-    """Advance the FDAE and its threshold by a frame; after detection, the network learns what exceeds mu.
+def advance_fdae(fdae, bank, bound, x, F, detected, leaks, dt):
+    """Advance the FDAE by a frame; after detection, the network learns what exceeds mu.
 
-        xhat <- x + dt (F + fhat) + a (xhat - x)      mu as in `update_bank`      m <- a m + (1 - a) n_old
+        xhat <- x + dt (F + fhat) + a (xhat - x)      m <- a m + (1 - a) n_old
 
-    F (3,) rad/s2: with the isolated fault once there is one. m: the part of e by the gyros' errors.
+    F (3,) rad/s2: with the isolated fault once there is one. mu: that of filter 0 of the bank, which is at
+    this frame. An error of a gyro adds at most m + n to a residual.
     """
     M, mu = fdae.memory, fdae.output.threshold
     if detected:
@@ -413,9 +408,8 @@ def advance_fdae(fdae, bound, x, F, detected, leaks, dt):
     for i in range(3):
         a = fdae.config.a[i]
         M.xhat[i] = x[i] + dt * (F[i] + fdae.network.output[i]) + a * (M.xhat[i] - x[i])
-        M.e[i] = advance_bound(M.e[i], bound.eta_bar[i], a, dt, bound.n_old[i])
-        M.m[i] = advance_gyro(M.m[i], bound.n_old[i], a)
-        mu[i] = M.e[i] + bound.n_gyro[i]
+        M.m[i] = advance_bound(M.m[i], 0.0, a, dt, bound.n_old[i])
+        mu[i] = bank.output.threshold[0, i]
 
 
 @kernel

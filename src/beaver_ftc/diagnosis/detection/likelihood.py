@@ -79,7 +79,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel, record, sized
+from beaver_ftc.compiled import kernel, plain, record, sized
 from beaver_ftc.diagnosis.state import LOSS
 
 # A block is a set of axes with correlated noise: pitch, and roll with yaw, the latter twice. The state of a
@@ -162,7 +162,7 @@ def set_signs(b: np.void, kinds: Sequence[int]) -> None:
 @sized
 def block_dtype(size: BlockCapacity) -> np.dtype:
     """A block: its whitening filter and its hypotheses."""
-    n_groups = (size.max_hypotheses + GROUP_SIZE - 1) // GROUP_SIZE
+    n_groups = plain(n_test_groups)(size.max_hypotheses)
     return record(
         axes=(int, 2),  # first: a record that begins as another does is taken for one
         **_FILTER_FIELDS,
@@ -332,7 +332,7 @@ def tests_in_group(b, i):
 @kernel
 def n_test_groups(n_h):
     """The number of groups of onset tests that n_h hypotheses need."""
-    return (n_h + GROUP_SIZE - 1) // GROUP_SIZE
+    return (n_h + (GROUP_SIZE - 1)) // GROUP_SIZE
 
 
 @kernel
@@ -426,28 +426,17 @@ def accumulate_tests(b, t, n, dt, decay):
 def accumulate_regressors(b, t, R, n, decay):
     """Add the frame to R (regressors, tests) of the first n tests of a group t, and fill their e_R:
 
-        R_j <- decay R_j + w' g_Zj      e_R = sum_j tol_j |R_j|
+    R_j <- decay R_j + w' g_Zj      e_R = sum_j tol_j |R_j|
 
-    Regressors go in pairs: weight and bound then pass through memory half as often. LLVM makes vector
-    instructions of the loop as it is written; with an index of its own for the second regressor of a pair it
-    did not, and the detector took a fifth longer (`make cost` shows it).
     """
-    w, e_R, g, tol, n_Z = t.w, t.e_R, b.g_Z, b.tol, b.n_Z
+    w, e_R, g = t.w, t.e_R, b.g_Z
     e_R[:n] = 0.0
-    for j in range(0, n_Z - 1, 2):
-        ga0, ga1, gb0, gb1 = g[j, 0], g[j, 1], g[j + 1, 0], g[j + 1, 1]
-        Ra, Rb, tol_a, tol_b = R[j], R[j + 1], tol[j], tol[j + 1]
+    for j in range(b.n_Z):
+        g_0, g_1, tol_j = g[j, 0], g[j, 1], b.tol[j]
         for k in range(n):
-            w0, w1 = w[0, k], w[1, k]
-            R_a = decay * Ra[k] + (w0 * ga0 + w1 * ga1)
-            R_b = decay * Rb[k] + (w0 * gb0 + w1 * gb1)
-            Ra[k], Rb[k] = R_a, R_b
-            e_R[k] = e_R[k] + tol_a * abs(R_a) + tol_b * abs(R_b)
-    for j in range(n_Z - n_Z % 2, n_Z):
-        g0, g1 = g[j, 0], g[j, 1]
-        for k in range(n):
-            R[j, k] = decay * R[j, k] + (w[0, k] * g0 + w[1, k] * g1)
-            e_R[k] += tol[j] * abs(R[j, k])
+            R_j = decay * R[j, k] + (w[0, k] * g_0 + w[1, k] * g_1)
+            R[j, k] = R_j
+            e_R[k] += tol_j * abs(R_j)
 
 
 @kernel

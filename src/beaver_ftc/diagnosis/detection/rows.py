@@ -28,7 +28,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.aircraft.schema import MAX_MONOMIALS, MAX_SURFACES, MAX_TERMS
-from beaver_ftc.compiled import kernel, record
+from beaver_ftc.compiled import kernel, record, row_of
 from beaver_ftc.design.model import (
     AIRSPEED,
     ALPHA,
@@ -45,6 +45,7 @@ from beaver_ftc.design.model import (
     whole_sum,
 )
 from beaver_ftc.diagnosis.bounds import OFF_MAP_RAD_S2, add_published_bound, extra_bound
+from beaver_ftc.diagnosis.detection.filters import project
 from beaver_ftc.diagnosis.detection.forces import (
     MAX_FORCE_LAG_S,
     MAX_FORCE_REGRESSORS,
@@ -282,21 +283,9 @@ def set_columns(b: np.void, rows: np.void, columns: list[int]) -> None:
 
 
 @kernel
-def seen(m, i, X, k):
-    """m_i X_k in direction i of m (2, 5); X (K, 5)."""
-    total = 0.0
-    for r in range(N_ROWS):
-        total += m[i, r] * X[k, r]
-    return total
-
-
-@kernel
-def seen_at_most(m, i, X, k):
-    """|m_i| X_k; X (K, 5)."""
-    total = 0.0
-    for r in range(N_ROWS):
-        total += abs(m[i, r]) * X[k, r]
-    return total
+def seen(m, i, X, k, size=False):
+    """m_i X_k in direction i of m (2, 5); X (K, 5); |m_i| X_k if X is of sizes."""
+    return project(row_of(m, i), row_of(X, k), size)
 
 
 @kernel
@@ -305,8 +294,8 @@ def look(b, rows):
     m, source = b.m, b.source
     for i in range(b.n):
         b.nu[i] = seen(m, i, rows.nu, source)
-        b.Q_x[i] = seen_at_most(m, i, rows.std, source) ** 2
-        b.eta[i] = seen_at_most(m, i, rows.eta, b.any_position)
+        b.Q_x[i] = seen(m, i, rows.std, source, True) ** 2
+        b.eta[i] = seen(m, i, rows.eta, b.any_position, True)
         b.R_y[i] = 0.0
         for r in range(N_ROWS):
             b.R_y[i] += m[i, r] * m[i, r] * rows.R[r]

@@ -22,6 +22,7 @@ Symbols of the kernels:
     cfg, noise, gust, bound       records of the tests, the noise model, the gust estimate, the bounds
 """
 
+from collections.abc import Iterator
 from math import exp, hypot, sqrt
 from statistics import NormalDist
 from sys import float_info
@@ -55,6 +56,7 @@ from beaver_ftc.diagnosis.detection.likelihood import (
 )
 from beaver_ftc.diagnosis.detection.parity import (
     AXIS_VIEW,
+    ROLL_YAW_PLANE,
     USUAL_SIZE,
     VANE_VIEW,
     ParityDirection,
@@ -84,18 +86,10 @@ from beaver_ftc.diagnosis.gusts import (
     configure_gust,
     configure_gust_speed,
 )
-from beaver_ftc.diagnosis.state import DAMAGE_EXCLUDES, LOSS, SIDE_FORCE
+from beaver_ftc.diagnosis.state import DAMAGE_EXCLUDES, LOSS, PITCH, SIDE_FORCE
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.diagnosis import Statistical
 
-PITCH_AXES, LATERAL_AXES = (1,), (0, 2)
-N_SIGNS = {
-    LOSS: 1,
-    GROWING_LOSS: 1,
-    LOSS_END: 1,
-    STEP_FAULT: 2,
-    ALPHA_CUBED_MOMENT: 2,
-}  # a loss has a sign, a step may go either way
 # Rate kappa of the growing-loss hypothesis. It explains a third of a loss that grows ten times slower or
 # faster; a constant loss explains the rest.
 KAPPA_PER_S = 1.5
@@ -104,17 +98,14 @@ KAPPA_PER_S = 1.5
 LEVEL_NOISE_SHARE = 0.5
 # 42 of 75 flights of a GTM not found before; 15: 23, 8: 36, 0.2 and less: 35 and fewer
 DAMAGE_FREQUENCY_RAD_S = 3.0
-# (kind, surface, axis, raises alarms)
-HypothesisEntry = tuple[int, int, int, int]
 
 
 def hypotheses_by_block(
     aircraft: Aircraft,
-) -> tuple[tuple[tuple[int, ...], tuple[HypothesisEntry, ...]], ...]:
-    """Axes and hypotheses of each block: the losses of the surfaces that turn about its axes, and what they
-    are held against. Roll and yaw are there twice, see above."""
-    blocks = []
-    for axes in (PITCH_AXES, LATERAL_AXES, LATERAL_AXES):
+) -> Iterator[tuple[tuple[int, ...], list[tuple[int, int, int, int]]]]:
+    """Axes and hypotheses (kind, surface, axis, raises alarms) of each block: the losses of the surfaces that
+    turn about its axes, and what they are held against. Roll and yaw are there twice, see above."""
+    for axes in ((PITCH,), ROLL_YAW_PLANE, ROLL_YAW_PLANE):
         losses = [
             (s, axis)
             for s, (name, axis) in enumerate(zip(aircraft.surfaces, aircraft.dominant_axis, strict=True))
@@ -122,10 +113,9 @@ def hypotheses_by_block(
         ]
         rows = [(LOSS, s, axis, 1) for s, axis in losses]
         rows += [(STEP_FAULT, -1, axis, 1) for axis in axes]
-        rows += [(ALPHA_CUBED_MOMENT, -1, 1, 0)] if axes == PITCH_AXES else []
+        rows += [(ALPHA_CUBED_MOMENT, -1, PITCH, 0)] if PITCH in axes else []
         rows += [(kind, s, axis, 0) for s, axis in losses for kind in (GROWING_LOSS, LOSS_END)]
-        blocks.append((axes, tuple(rows)))
-    return tuple(blocks)
+        yield axes, rows
 
 
 def count_tests(aircraft: Aircraft, *directions: ParityDirection) -> int:
@@ -138,7 +128,7 @@ def count_tests(aircraft: Aircraft, *directions: ParityDirection) -> int:
             n_tones += N_TONES
         elif d.nulled == AXIS_VIEW and not d.by_inertia:
             n_tones += N_TONES
-    return N_SLOTS * sum(N_SIGNS[kind] for kind in kinds) + n_tones
+    return N_SLOTS * sum(1 if likelihood.SIGN_OF_KIND[kind] else 2 for kind in kinds) + n_tones
 
 
 def _quantile(p: float) -> float:
@@ -152,11 +142,6 @@ def derive_alarm_level(false_alarms_per_h: float, rate_hz: float, n_tests: int) 
     By the union bound the rate is at most `false_alarms_per_h`.
     """
     return -_quantile(false_alarms_per_h / (3600.0 * rate_hz * n_tests))
-
-
-def derive_margin(p: float, rate_hz: float, aircraft: Aircraft) -> float:
-    """Difference of log-likelihood ratios that noise exceeds in a second with this probability at most."""
-    return 0.5 * _quantile(p / (rate_hz * count_tests(aircraft))) ** 2
 
 
 def configure_statistics(
@@ -191,7 +176,7 @@ def configure_statistics(
     configure_rows(stat, errors, tol, fdi["bound"]["declared_errors"])
     _configure_blocks(stat, declared, rate, dt_s)
     stat["noise"]["rate0"] = settings.uncertainty_rad_s * dt_s
-    _configure_noise(stat, drift_frequency(settings, aircraft), declared, model, trim, dt_s)
+    _configure_noise(stat, settings.uncertainty_rad_s, declared, model, trim, dt_s)
     if views:
         configure_tones(
             stat["tone_test_config"],
@@ -220,7 +205,8 @@ def _configure_levels(cfg: np.void, declared: Declared, n_tests: int, rate_hz: f
     settings, aircraft = declared.fdi.statistical, declared.aircraft
     assert settings is not None
     cfg["alarm_level"] = derive_alarm_level(settings.false_alarms_per_h, rate_hz, n_tests)
-    cfg["margin"] = derive_margin(settings.misnaming, rate_hz, aircraft)
+    # difference of log-likelihood ratios that noise exceeds in a second with the probability `misnaming`
+    cfg["margin"] = 0.5 * _quantile(settings.misnaming / (rate_hz * count_tests(aircraft))) ** 2
     cfg["forget"] = exp(-1.0 / (rate_hz * declared.fdi.forgetting_time_s))
     cfg["mapped"] = aircraft.file.model_error_map is not None and not aircraft.loses_surfaces
 
@@ -292,27 +278,18 @@ def eta_rate(settings: Statistical, aircraft: Aircraft, dt_s: float) -> float:
     return 2.0 if any(aircraft.model_error_rad_s2) else settings.uncertainty_rad_s * dt_s
 
 
-def drift_frequency(settings: Statistical, aircraft: Aircraft) -> float:
-    """Frequency, rad/s, of the bounded uncertainty that the drift of the filters represents.
-
-    The evidence that the uncertainty explains is bounded by its declared rate of change in any case
-    (`likelihood.uncertain_share`). The drift only sets how much of it the filters remove. If
-    damage may take surfaces, a weaker drift detects most: motion that no loss explains is then rarely an
-    error of the model.
-    """
-    return (
-        min(DAMAGE_FREQUENCY_RAD_S, settings.uncertainty_rad_s)
-        if aircraft.loses_surfaces
-        else settings.uncertainty_rad_s
-    )
-
-
 def _configure_noise(
     stat: np.void, omega: float, declared: Declared, model: np.void, trim: TrimState, dt_s: float
 ) -> None:
-    """Fill the drift, for an uncertainty of frequency omega, rad/s, and the model noise by noise of f + G
-    u."""
+    """Fill the drift, for an uncertainty of frequency omega, rad/s, and the model noise by noise of f + G u.
+
+    The evidence that the uncertainty explains is bounded by its declared rate of change in any case
+    (`likelihood.uncertain_share`). The drift only sets how much of it the filters remove. If damage may take
+    surfaces, a weaker drift detects most: motion that no loss explains is then rarely an error of the model.
+    """
     sigma, noise = declared.sensors.each("random"), stat["noise"]
+    if declared.aircraft.loses_surfaces:
+        omega = min(DAMAGE_FREQUENCY_RAD_S, omega)
     eta, level = max(declared.constant_rad_s2), float(stat["test"]["alarm_level"])
     noise["q"] = derive_intensity(eta, omega, float(sigma[:3].max()), level, dt_s)
     _, G, F_x, F_y = jacobian(model, *trim)
@@ -460,12 +437,6 @@ def update_alarm(alarm, cfg, blocks, views, forces, gust, t, bounded=True):
         alarm.ratio = 0.0
     if alarm.ratio > 1.0 and alarm.detected_at_s < 0.0:
         alarm.detected_at_s = t
-
-
-@kernel
-def keep_score_peak(alarm):
-    """Keep the largest score over the alarm level so far."""
-    alarm.peak = max(alarm.peak, alarm.ratio)
 
 
 @kernel

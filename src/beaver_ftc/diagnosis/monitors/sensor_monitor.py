@@ -660,7 +660,7 @@ def add_turn(mon, att, y):
         attitude.restart(att)
         return
     for i in range(3):
-        attitude.add_turn(att, i, mon.residual[i])
+        att.turn[i] += mon.residual[i]
     mon.turn_max = att.turn_max
 
 
@@ -680,14 +680,19 @@ def rule_out_gyros(mon):
 
 
 @kernel
-def allows_isolation(mon, is_earlier):
-    """Whether the data may speak about surfaces; is_earlier: the alarm was a frame or more ago.
+def allows_isolation(mon, is_earlier, detected_at_s):
+    """Whether the data may speak about surfaces, whose alarm was raised at detected_at_s; is_earlier: a frame
+    or more ago.
 
     They do not while a flow sensor is frozen: a surface that moves the aircraft moves its reading. In
-    symmetric flight a sideslip of zero stays zero.
+    symmetric flight a sideslip of zero stays zero. Nor do they after an alarm so early that an error which a
+    flow sensor has had from the start may have caused it: the design model uses its reading from the first
+    frame on.
     """
     if not mon.config.enabled:
         return True
+    if detected_at_s < mon.t_start + INITIAL_WINDOW_S:
+        return False
     for i in (ALPHA, BETA, AIRSPEED, QDYN):
         if stands_still(mon, i):
             return False
@@ -698,13 +703,6 @@ def allows_isolation(mon, is_earlier):
 def doubts_gyros(mon):
     """Whether a gyro may be the cause of the alarm of the surfaces."""
     return mon.config.enabled == 1 and mon.config.noisy == 1 and mon.gyros_excluded == 0
-
-
-@kernel
-def may_be_initial(mon, detected_at_s):
-    """Whether the alarm of the surfaces is so early that an error which a flow sensor has had from the start
-    may have caused it: the design model uses its reading from the first frame on."""
-    return mon.config.enabled and detected_at_s < mon.t_start + INITIAL_WINDOW_S
 
 
 @kernel

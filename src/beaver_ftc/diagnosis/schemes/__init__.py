@@ -84,7 +84,8 @@ def prepare_takeover(fdi: np.void, earlier: np.void, in_flight: bool) -> None:
     if fdi["bank"]["config"]["n_filters"] == earlier["bank"]["config"]["n_filters"]:
         fdi["bank"]["output"]["peak"] = earlier["bank"]["output"]["peak"]
     for name in ("gust", "vaneless", "vaned"):
-        fdi["statistical"][name]["config"]["starts_in_flight"] = in_flight
+        memory = fdi["statistical"][name]["memory"]
+        state.fill(memory, turn_past=in_flight, start_share=in_flight, start_left=in_flight)
     fdi["sensor_monitor"]["substep"] = 0
 
 

@@ -63,12 +63,8 @@ def continue_isolation(fdi, meas, t, before):
         isolation.start_estimators(fdi.isolation, fdi.bound.n_gyro, meas.x)
         if fdi.config.diagnoses_all_types:
             begin_types(fdi)
-    sound = not sensor_monitor.may_be_initial(monitor, fdi.verdict.detected_at_s)
-    if (
-        sound
-        and sensor_monitor.allows_isolation(monitor, before)
-        and not fdi.engine_monitor.output.engine_failed
-    ):
+    allowed = sensor_monitor.allows_isolation(monitor, before, fdi.verdict.detected_at_s)
+    if allowed and not fdi.engine_monitor.output.engine_failed:
         isolate(fdi, meas, t, before)
 
 
@@ -273,7 +269,8 @@ def advance_estimators_to_frame(fdi, prediction, measured, k, t):
     if fdi.config.diagnoses_all_types:
         record_orders(fdi, prediction)
     leaks = found.isolated_estimator >= 0 or found.target >= 0
-    filters.advance_fdae(fdi.fdae, bound, prediction.x_before, prediction.F_known, found.detected, leaks, dt)
+    x, F = prediction.x_before, prediction.F_known
+    filters.advance_fdae(fdi.fdae, fdi.bank, bound, x, F, found.detected, leaks, dt)
 
 
 @apart

@@ -149,7 +149,9 @@ def advance_estimators_to_frame(fdi, prediction, measured):
     adaptive_estimators.update_filters(fdi, prediction, measured)
     adaptive_estimators.update_estimators(fdi, prediction)
     train_if_due(pub, fdi.fdae, fdi.verdict.detected, dt)
-    filters.advance_fdae(fdi.fdae, fdi.bound, prediction.x_before, prediction.means.F, False, False, dt)
+    filters.advance_fdae(
+        fdi.fdae, fdi.bank, fdi.bound, prediction.x_before, prediction.means.F, False, False, dt
+    )
     if mu > 0.0:
         fdi.fdae.output.threshold[:], fdi.bank.output.threshold[0] = mu, mu
         for fie in fdi.isolation.estimator[: fdi.isolation.config.n_estimators]:

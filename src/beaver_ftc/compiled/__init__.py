@@ -138,26 +138,14 @@ def direct(function: Any, *arguments: np.ndarray) -> Any:
 
 @lru_cache(maxsize=64)
 def _entry_point(function, kinds):
-    """The machine code for C-ordered arrays of these types and dimensions."""
-    return _code(function, tuple(_array_of(dtype, dimensions) for dtype, dimensions in kinds))
-
-
-@lru_cache(maxsize=64)
-def _code(function, types):
-    """The same for types of numba's: 9 ms to find, so kept."""
-    found = function.stored(types) if _own_target() else None
-    if found is None:
-        function.compile(types)
-        found = function.overloads[types]
-    return found.entry_point
-
-
-def _array_of(dtype, dimensions):
-    """The type of a C-ordered array; of records that have a size, theirs."""
+    """The machine code for C-ordered arrays of these types and dimensions; of records that have a size,
+    theirs."""
     target = _own_target()
-    if target is None:
-        return numba.types.Array(numba.from_dtype(dtype), dimensions, "C")
-    return target.array_type(dtype, dimensions)
+    if target:
+        return function.result(tuple(target.array_type(*kind) for kind in kinds)).entry_point
+    types = tuple(numba.types.Array(numba.from_dtype(dtype), dimensions, "C") for dtype, dimensions in kinds)
+    function.compile(types)
+    return function.overloads[types].entry_point
 
 
 def row_of(array, i):

@@ -270,19 +270,16 @@ class CodeCache:
 
 def discard_unused(folder: Path) -> None:
     """Remove what was not used for longest, as far as a folder keeps more than `MOST_BYTES`."""
-    files = [(max(at.st_atime, at.st_mtime), at.st_size, path) for path, at in _statuses(folder)]
-    total = 0
+    files, total = [], 0
+    for path in folder.glob("*-*"):
+        with contextlib.suppress(FileNotFoundError):  # another process has removed it
+            if path.is_file():
+                at = path.stat()
+                files.append((max(at.st_atime, at.st_mtime), at.st_size, path))
     for _, size, path in sorted(files, reverse=True):
         total += size
         if total > MOST_BYTES:
             path.unlink(missing_ok=True)
-
-
-def _statuses(folder: Path) -> Iterator[tuple[Path, os.stat_result]]:
-    for path in folder.glob("*-*"):
-        with contextlib.suppress(FileNotFoundError):  # another process has removed it
-            if path.is_file():
-                yield path, path.stat()
 
 
 class Wanted(NamedTuple):
@@ -295,14 +292,6 @@ class Wanted(NamedTuple):
     def of(cls, kernel: Any, kinds: tuple[Any, ...]) -> "Wanted":
         """A kernel as it is named: of one that is called by its address, the code at that address."""
         return cls(getattr(kernel, "called", kernel), kinds)
-
-    @property
-    def is_missing(self) -> bool:
-        return not self.kernel.is_kept(self.kinds)
-
-    def compile(self) -> None:
-        """Compile it, unless it is there or another process is at it."""
-        self.kernel.compile_unless_taken(self.kinds)
 
 
 _expected: list[Callable[[], Iterable[Wanted]]] = []  # of the flight in progress, until they are compiled
@@ -321,7 +310,7 @@ def compile_expected() -> None:
 
 def compile_missing(wanted: Iterable[Wanted]) -> int:
     """Compile those that are not kept; returns how many those were."""
-    missing = [each for each in wanted if each.is_missing]
+    missing = [each for each in wanted if not each.kernel.is_kept(each.kinds)]
     if not missing:
         return 0
     kept = all(each.kernel.folder for each in missing)  # else the second process could not hand over
@@ -329,7 +318,7 @@ def compile_missing(wanted: Iterable[Wanted]) -> int:
     try:
         with announced(sum(each.kernel.size for each in missing) / (1.0 if helper is None else 1.7)):
             for each in missing:
-                each.compile()
+                each.kernel.compile_unless_taken(each.kinds)
             _wait(helper)
     except BaseException:
         _end(helper)
@@ -369,7 +358,7 @@ def _help(missing: Sequence[Wanted], parent: int) -> None:
         for each in missing:
             if os.getppid() != parent:
                 break
-            each.compile()
+            each.kernel.compile_unless_taken(each.kinds)
     finally:
         os._exit(0)
 

@@ -23,9 +23,6 @@ class Room(int):
     def __add__(self, other: int) -> "Room":
         return Room(int(self) + int(other))
 
-    def __sub__(self, other: int) -> "Room":
-        return Room(int(self) - int(other))
-
     def __mul__(self, other: int) -> "Room":
         return Room(int(self) * int(other))
 

@@ -76,18 +76,22 @@ from beaver_ftc.compiled.records import Part, Shape, places, shape_of
 # mypy: disable-error-code="call-arg,override"
 
 
-_BYTE, _WORD = ir.IntType(8), ir.IntType(64)
+_WORD = ir.IntType(64)
 _MEMORY, _PLACES = types.CPointer(types.uint8), types.CPointer(types.int64)
 
 
-class SizedRecord(types.Type):
-    """A record of this shape, whatever its size."""
+class _OfShape:
+    """A type of this shape, whatever the size."""
 
     mutable = True
 
-    def __init__(self, shape: Shape) -> None:
+    def __init__(self, shape: Shape, *more: Any) -> None:
         self.shape = shape
-        super().__init__(f"{type(self).__name__}({shape.digest})")
+        super().__init__(f"{type(self).__name__}({shape.digest})", *more)
+
+
+class SizedRecord(_OfShape, types.Type):
+    """A record."""
 
     def part(self, name: str) -> tuple[int, Part] | None:
         """The part of this name, and which of the places is its first."""
@@ -109,24 +113,17 @@ class SizedRecord(types.Type):
         return types.Array(numba.from_dtype(part.of), len(part.dims), "C")
 
 
-class SizedRecords(types.IterableType):
-    """Records of this shape one behind the other, all of one size."""
-
-    mutable = True
-
-    def __init__(self, shape: Shape) -> None:
-        self.shape = shape
-        super().__init__(f"{type(self).__name__}({shape.digest})")
+class SizedRecords(_OfShape, types.IterableType):
+    """Records one behind the other, all of one size."""
 
     @property
     def iterator_type(self) -> "SizedRecordsIterator":
         return SizedRecordsIterator(self.shape)
 
 
-class SizedRecordsIterator(types.SimpleIteratorType):
+class SizedRecordsIterator(_OfShape, types.SimpleIteratorType):
     def __init__(self, shape: Shape) -> None:
-        self.shape = shape
-        super().__init__(f"{type(self).__name__}({shape.digest})", SizedRecord(shape))
+        super().__init__(shape, SizedRecord(shape))
 
 
 @functools.cache
@@ -150,24 +147,23 @@ def kind_of(dtype: np.dtype, dimensions: int) -> Any:
     return (SizedRecord, SizedRecords)[dimensions](shape) if shape and dimensions < 2 else None
 
 
-@register_model(SizedRecord)
-class _RecordModel(models.StructModel):
-    def __init__(self, manager: Any, kind: Any) -> None:
-        super().__init__(manager, kind, [("memory", _MEMORY), ("places", _PLACES)])
+def _register_struct(kind: Any, members: Callable[[Any], list[tuple[str, Any]]]) -> None:
+    """Compiled code has of a value of this kind these members; members: of its type, names and types."""
+
+    class _Model(models.StructModel):
+        def __init__(self, manager: Any, of: Any) -> None:
+            super().__init__(manager, of, members(of))
+
+    register_model(kind)(_Model)
 
 
-@register_model(SizedRecords)
-class _RecordsModel(models.StructModel):
-    def __init__(self, manager: Any, kind: Any) -> None:
-        members = [("memory", _MEMORY), ("places", _PLACES), ("count", types.intp), ("apart", types.intp)]
-        super().__init__(manager, kind, members)
-
-
-@register_model(SizedRecordsIterator)
-class _IteratorModel(models.StructModel):
-    def __init__(self, manager: Any, kind: Any) -> None:
-        members = [("next", types.EphemeralPointer(types.intp)), ("records", SizedRecords(kind.shape))]
-        super().__init__(manager, kind, members)
+_RECORD = [("memory", _MEMORY), ("places", _PLACES)]
+_register_struct(SizedRecord, lambda of: _RECORD)
+_register_struct(SizedRecords, lambda of: [*_RECORD, ("count", types.intp), ("apart", types.intp)])
+_register_struct(
+    SizedRecordsIterator,
+    lambda of: [("next", types.EphemeralPointer(types.intp)), ("records", SizedRecords(of.shape))],
+)
 
 
 def _struct(context: Any, builder: Any, kind: Any, value: Any = None) -> Any:
@@ -349,7 +345,8 @@ def _places_of(digest: str, argument: Any) -> int:
 def _ask(c: Any, kind: Any, argument: Any) -> tuple[Any, Any]:
     """Code that finds the places, and whether that failed."""
     found, builder, python = cgutils.alloca_once_value(c.builder, _WORD(0)), c.builder, c.pyapi
-    asked = _held(c, functools.partial(_places_of, kind.shape.digest))
+    ask = functools.partial(_places_of, kind.shape.digest)
+    asked = _held(builder, python.pyobj, lambda: python.unserialize(python.serialize_object(ask)))
     answer = python.call_function_objargs(asked, (argument,))
     failed = cgutils.is_null(builder, answer)
     with cgutils.if_likely(builder, builder.not_(failed)):
@@ -358,13 +355,12 @@ def _ask(c: Any, kind: Any, argument: Any) -> tuple[Any, Any]:
     return builder.inttoptr(builder.load(found), _WORD.as_pointer()), failed
 
 
-def _held(c: Any, function: Callable[..., Any]) -> Any:
-    """Code that has a function of Python ready to be called, made the first time and kept."""
-    builder, python = c.builder, c.pyapi
-    place = cgutils.add_global_variable(builder.module, python.pyobj, f"held{len(builder.module.globals)}")
-    place.linkage, place.initializer = "internal", ir.Constant(python.pyobj, None)
+def _held(builder: Any, kind: Any, make: Callable[[], Any]) -> Any:
+    """Code that loads a value, zero at first; make: code that gives it the first time."""
+    place = cgutils.add_global_variable(builder.module, kind, "held")
+    place.linkage, place.initializer = "internal", ir.Constant(kind, None)
     with cgutils.if_unlikely(builder, cgutils.is_null(builder, builder.load(place))):
-        builder.store(python.unserialize(python.serialize_object(function)), place)
+        builder.store(make(), place)
     return builder.load(place)
 
 
@@ -474,10 +470,7 @@ class Codegen(JITCPUCodegen):
     _library_class = Library
 
 
-_ADDRESS = ir.IntType(64)
-
 _known: dict[tuple[str, ...], Any] = {}
-_found: dict[tuple[Any, ...], Any] = {}  # compiled code, kept as long as the process
 
 
 def stub(name: tuple[str, ...], kernel: Any) -> Callable[..., None]:
@@ -499,9 +492,7 @@ def _address(name: tuple[str, ...], packed: bytes) -> int:
     """Where the code of this kernel lies, for arguments of the types packed."""
     import_module(name[0])
     kinds = pickle.loads(zlib.decompress(packed))
-    result = _found.get((name, kinds))
-    if result is None:
-        result = _found[name, kinds] = _known[name].result(kinds)
+    result = _known[name].result(kinds)
     if result.signature.return_type != types.none:
         raise TypeError(f"{'.'.join(name)} returns something")
     with cache.held():
@@ -516,7 +507,8 @@ def _call(name: tuple[str, ...]) -> Any:
     def call(typingctx: Any, arguments: Any) -> Any:
         def codegen(context: Any, builder: Any, signature: Any, values: Any) -> Any:
             kinds = tuple(arguments.types)
-            code = _address_held(context, builder, functools.partial(_address, name, _packed(kinds)))
+            ask = functools.partial(_address, name, zlib.compress(serialize.dumps(kinds)))
+            code = _held(builder, _WORD, lambda: _asked(context, builder, ask))
             convention = context.call_conv
             prototype = convention.get_function_type(types.none, kinds)
             status, _ = convention.call_function(
@@ -535,28 +527,21 @@ def _call(name: tuple[str, ...]) -> Any:
     return call
 
 
-def _packed(kinds: tuple[Any, ...]) -> bytes:
-    return zlib.compress(serialize.dumps(kinds))
-
-
-def _address_held(context: Any, builder: Any, ask: Callable[[], int]) -> Any:
-    """Code that loads the address, and asks for it the first time. An exception ends the call."""
-    place = cgutils.add_global_variable(builder.module, _ADDRESS, "address")
-    place.linkage, place.initializer = "internal", _ADDRESS(0)
-    with cgutils.if_unlikely(builder, builder.icmp_unsigned("==", builder.load(place), _ADDRESS(0))):
-        python = context.get_python_api(builder)
-        lock = python.gil_ensure()
-        asked = python.unserialize(python.serialize_object(ask))
-        answer = python.call_function_objargs(asked, ())
-        python.decref(asked)
-        failed = cgutils.is_null(builder, answer)
-        with cgutils.if_unlikely(builder, failed):
-            python.gil_release(lock)
-            context.call_conv.return_exc(builder)
-        builder.store(python.long_as_longlong(answer), place)
-        python.decref(answer)
+def _asked(context: Any, builder: Any, ask: Callable[[], int]) -> Any:
+    """Code that asks Python for an address. An exception ends the call."""
+    python = context.get_python_api(builder)
+    lock = python.gil_ensure()
+    asked = python.unserialize(python.serialize_object(ask))
+    answer = python.call_function_objargs(asked, ())
+    python.decref(asked)
+    failed = cgutils.is_null(builder, answer)
+    with cgutils.if_unlikely(builder, failed):
         python.gil_release(lock)
-    return builder.load(place)
+        context.call_conv.return_exc(builder)
+    address = python.long_as_longlong(answer)
+    python.decref(answer)
+    python.gil_release(lock)
+    return address
 
 
 # mypy: disable-error-code="attr-defined,misc"
@@ -688,6 +673,7 @@ class Kernel(Dispatcher):
         self.folder, self._cached = folder, folder and CodeCache(folder, function, for_size)
         self.for_size = for_size
         self._inner: set[tuple[Any, ...]] = set()  # arguments for which it is only a part of others so far
+        self._results: dict[tuple[Any, ...], Any] = {}  # kept as long as the process: see `result`
 
     def compile(self, sig: Any) -> Any:
         """Machine code for arguments of these types; inside another kernel only what stands for it."""
@@ -703,7 +689,11 @@ class Kernel(Dispatcher):
                     return there.entry_point
                 if compiling:
                     return self._compiled_as_part(args)
-                return self._loaded(args) or self._compiled(args)
+                found = self._loaded(args)
+                if found is None:
+                    with self._alone(args):  # another process may have come first
+                        found = self._loaded(args) or self._compile_and_keep(args)
+                return found
 
     def typeof_pyval(self, val: Any) -> Any:
         """The type of an argument; in place of Numba's for records that have a size."""
@@ -716,10 +706,11 @@ class Kernel(Dispatcher):
 
     def result(self, args: Any) -> Any:
         """The code with what is known of it."""
-        found = self.stored(args)
+        found = self._results.get(args) or self.stored(args)
         if found is None:
             self.compile(args)
             found = self.overloads[args]
+        self._results[args] = found
         return found
 
     def _loaded(self, args: tuple[Any, ...]) -> Any:
@@ -754,11 +745,6 @@ class Kernel(Dispatcher):
         """Keep other processes from compiling the same meanwhile: see `locked`."""
         place = self._cached.place(args, self.targetctx.codegen()) if self._cached else 0
         return locked(self.folder, place, wait)
-
-    def _compiled(self, args: tuple[Any, ...]) -> Any:
-        """Compile, one process at a time, and keep the code."""
-        with self._alone(args):
-            return self._loaded(args) or self._compile_and_keep(args)  # another process may have come first
 
     def _compile_and_keep(self, args: tuple[Any, ...]) -> Any:
         with announced(self.size):
@@ -822,16 +808,12 @@ def array_type(dtype: Any, dimensions: int) -> Any:
 @intrinsic
 def borrowed_row(typingctx, array, i):
     """Row i of an array (m, n) that nobody counts the users of: it must stay where it is meanwhile."""
-    from numba.np.arrayobj import make_array, populate_array
-
     row_type = types.Array(array.dtype, 1, "C")
 
     def codegen(context, builder, signature, args):
         whole = make_array(signature.args[0])(context, builder, args[0])
         _, columns = cgutils.unpack_tuple(builder, whole.shape, 2)
         first = builder.gep(whole.data, [builder.mul(args[1], columns)])
-        row = make_array(row_type)(context, builder)
-        populate_array(row, first, [columns], [whole.itemsize], whole.itemsize, meminfo=None)
-        return row._getvalue()
+        return _array(context, builder, row_type, first, [columns])
 
     return row_type(array, types.intp), codegen

@@ -44,17 +44,9 @@ def with_hypotheses(block, *kinds, tolerance=()):
     return block
 
 
-def onset_tests_of(block, name):
-    """What the onset tests keep under a name, a copy, (..., tests)."""
-    return np.concatenate(
-        list(block["R"] if name == "R" else block["tests"][name]),
-        axis=-1,
-    )
-
-
 def by_onset(block, name):
     """What the onset tests keep under a name, a copy, (..., slots, hypotheses)."""
-    kept = onset_tests_of(block, name)
+    kept = np.concatenate(list(block["R"] if name == "R" else block["tests"][name]), axis=-1)
     return kept.reshape(*kept.shape[:-1], -1, N_SLOTS).swapaxes(-1, -2)
 
 

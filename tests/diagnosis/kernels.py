@@ -25,16 +25,11 @@ def new_fdi():
     return fdi
 
 
-def holder(record, name):
-    """Where a stage's record has this field: the record itself, its config, memory or output."""
-    sections = [record[part] for part in ("config", "memory", "output") if part in record.dtype.names]
-    return next(part for part in (record, *sections) if name in (part.dtype.names or ()))
-
-
 def fill(record, **values):
-    """Fill fields of a stage's record, wherever it has them. Returns the record."""
+    """Fill fields of a stage's record, in itself or in its config, memory or output. Returns the record."""
+    sections = [record[part] for part in ("config", "memory", "output") if part in record.dtype.names]
     for name, value in values.items():
-        holder(record, name)[name] = value
+        next(part for part in (record, *sections) if name in (part.dtype.names or ()))[name] = value
     return record
 
 

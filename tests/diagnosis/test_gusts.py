@@ -8,7 +8,6 @@ import pytest
 from beaver_ftc.design import Dryden
 from beaver_ftc.diagnosis import gusts
 from beaver_ftc.loop.loop import Loop
-from beaver_ftc.scenario.schema import load as load_given
 from flying import scenario
 
 MEMORY_S = 0.05  # over which the whitening filter compares, about
@@ -21,10 +20,9 @@ class Flown:
     def __init__(self, turbulence="light", **keys):
         environment = {"turbulence": "dryden", "severity": turbulence} if turbulence != "none" else {}
         environment |= keys.pop("environment", {})
-        bounds = {"turbulence": turbulence if turbulence != "none" else "light"}
-        fdi = {"statistical": {}, "bounds": bounds}
+        fdi = {"statistical": {}, "bounds": {"turbulence": environment.get("severity", "light")}}
         keys = {"uncertainty": {}, "environment": environment, "fdi": fdi, **keys}
-        given = load_given(keys) if "aircraft" in keys else scenario(**keys)
+        given = scenario(**keys)
         loop = Loop(given)
         loop.sample_references(0, loop.n_frames)
         nodes = [loop.plant.node(f"atmosphere/{axis}-turb-rad_sec") for axis in "pqr"]
@@ -45,25 +43,20 @@ class Flown:
         self.seen, self.true = rows[:, 0:3], rows[:, 3:6]
         self.airspeed, self.heading = rows[:, 6].mean(), np.unwrap(rows[:, 7])
         self.force, self.felt = rows[:, 8:11], rows[:, 11:14]
-        self.rate_hz, self.turbulence, self.record = given.rate_hz, turbulence, record
+        self.rate_hz, self.turbulence = given.rate_hz, turbulence
 
-    def intensity(self, signal, over_s=MEMORY_S):
-        """Of the random walk that differs as much over so long (3,), as a share of what is declared."""
-        frames = round(over_s * self.rate_hz)
+    def intensity(self, signal):
+        """Of the random walk that differs as much over MEMORY_S (3,), as a share of what is declared."""
+        frames = round(MEMORY_S * self.rate_hz)
         differences = signal[frames:] - signal[:-frames]
         declared = Dryden(self.turbulence).rotation_walk(14.63) * self.airspeed
-        return np.mean(differences**2, axis=0) / over_s / declared
+        return np.mean(differences**2, axis=0) / MEMORY_S / declared
 
 
 @cache
-def _flown(turbulence, airspeed_mps, seed, **keys):
-    return Flown(
-        turbulence,
-        duration_s=20,
-        seed=seed,
-        initial={"airspeed_mps": airspeed_mps, "altitude_m": 1143},
-        **keys,
-    )
+def _flown(turbulence, airspeed_mps, seed):
+    initial = {"airspeed_mps": airspeed_mps, "altitude_m": 1143}
+    return Flown(turbulence, duration_s=20, seed=seed, initial=initial)
 
 
 @pytest.mark.parametrize("seed", [1, 2])

@@ -14,19 +14,10 @@ SPAN, SCALE, ROLLING, GRAVITY, DT = AIRCRAFT.geometry.span_m, 40.0, 30.0, 9.8, 0
 DOWN = np.array([0.0, 0.0, GRAVITY])
 
 
-def new_air(**fields):
+def new_air():
     record = np.zeros(1, GUST_RECORD).view(np.recarray)[0]
-    (
-        record["config"]["span"],
-        record["config"]["gravity"],
-        record["output"]["gusty"],
-        record["output"]["measured"],
-    ) = SPAN, GRAVITY, 1, 1
-    record["config"]["L_gust"], record["config"]["L_roll"] = (
-        SCALE,
-        ROLLING,
-    )
-    return fill(record, **fields)
+    fill(record, span=SPAN, gravity=GRAVITY, L_gust=SCALE, L_roll=ROLLING)
+    return fill(record, gusty=1, measured=1)
 
 
 def to_earth(attitude):
@@ -42,11 +33,11 @@ def vanes(velocity):
 class Flight:
     """Velocity of the aircraft and of the air in axes that stay with the Earth, an instant at a time."""
 
-    def __init__(self, seed, turn_rad=0.06, climb_rad=0.02):
+    def __init__(self, seed):
         self.rng = np.random.default_rng(seed)
         self.attitude = self.rng.uniform(-0.3, 0.3, 3)
         self.attitude[2] = np.pi + self.rng.uniform(-0.01, 0.01)  # where the heading wraps
-        self.steps = np.array([climb_rad, climb_rad, turn_rad])
+        self.steps = np.array([0.02, 0.02, 0.06])
         self.velocity = to_earth(self.attitude).apply([45.0, 1.0, 3.0])
         self.wind, self.before = self.rng.normal(size=3), None
 

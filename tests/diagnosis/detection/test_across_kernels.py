@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from kernels import DT, holder, new_fdi
+from kernels import DT, fill, new_fdi
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.diagnosis.detection import parity, tones
@@ -24,13 +24,7 @@ def fdi(rng):
     """A diagnosis with its views, something in every place that the kernels look at, and air that moves."""
     fdi = new_fdi()
     statistical = fdi["statistical"]
-    (
-        statistical["test"]["forget"],
-        statistical["noise"]["q"],
-    ) = (
-        0.9,
-        2.0,
-    )
+    statistical["test"]["forget"], statistical["noise"]["q"] = 0.9, 2.0
     for block, n, regressors in zip(statistical["block"], (1, 2, 2), (3, 4, 4), strict=True):
         block["n_Z"], block["alarm_level"] = regressors, 5.0
         block["R_y"][:n] = rng.uniform(1e-8, 1e-7, n)
@@ -41,17 +35,8 @@ def fdi(rng):
     configure_parity_views(statistical, load())
     tones.configure_tones(statistical["tone_test_config"], 1e-8, V, 15.0, DT)
     air = statistical["gust"]
-    (
-        air["output"]["gusty"],
-        air["config"]["L_roll"],
-        air["memory"]["Q"],
-    ) = (
-        1,
-        34.0,
-        rng.uniform(1e-5, 1e-4, 3),
-    )
-    for name in ("rate_damping", "C", "C_dot", "var_turn"):
-        holder(air, name)[name] = rng.normal(size=(3, 3))
+    fill(air, gusty=1, L_roll=34.0, Q=rng.uniform(1e-5, 1e-4, 3))
+    fill(air, **{name: rng.normal(size=(3, 3)) for name in ("rate_damping", "C", "C_dot", "var_turn")})
     air["output"]["var_turn"] = air["output"]["var_turn"] @ air["output"]["var_turn"].T
     rows["e_G"][:4, :3] = rng.uniform(0.1, 0.4, (4, 3))
     return fdi

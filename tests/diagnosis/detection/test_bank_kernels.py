@@ -7,30 +7,18 @@ from kernels import DT, POLES, estimator, new_fdi, on, weights
 from beaver_ftc.diagnosis.detection import filters
 
 
-def reach_of(offset, Z, spread, low=-1.0, high=0.5, across=(0.6, 0.0, -0.8)):
-    fdi = new_fdi()
-    fie = estimator(fdi, low=low, high=high)
-    (
-        fie["effect"]["h"],
-        fie["effect"]["Z"],
-        fie["effect"]["r"],
-    ) = (
-        offset,
-        Z,
-        spread,
-    )
-    fie["parity_direction"] = across
-    return fdi, fie
-
-
 @pytest.mark.parametrize("seed", range(4))
 def test_what_a_fault_can_have_done_is_the_filtered_extreme_of_what_it_does(seed):
     """By corners: theta at an end of its set or no fault at all, give or take the spread."""
     rng = np.random.default_rng(seed)
-    fdi, fie = reach_of(0.2 * rng.normal(size=3), rng.normal(size=3), rng.uniform(0, 0.3, 3))
+    fdi = new_fdi()
+    fie = estimator(fdi, low=-1.0, high=0.5)
+    effect, fie["parity_direction"] = fie["effect"], (0.6, 0.0, -0.8)
+    effect["h"], effect["Z"] = 0.2 * rng.normal(size=3), rng.normal(size=3)
+    effect["r"] = rng.uniform(0, 0.3, 3)
     for _ in range(3):
         on(filters.advance_reach, fdi, fie)
-    effect, across = fie["effect"], np.vstack([np.eye(3), fie["parity_direction"]])
+    across = np.vstack([np.eye(3), fie["parity_direction"]])
     at_ends = [effect["h"] + theta * effect["Z"] for theta in (-1.0, 0.5)]
     does = np.array([*at_ends, np.zeros(3)]) @ across.T
     spread = np.abs(across) @ effect["r"]

@@ -32,17 +32,15 @@ def feel(fdi, seen):
     update_forces(statistical["rows"], statistical["forces"], statistical["gust"], du, seen, U, DT)
 
 
-def measured(x=X, y=Y, force=(0.5, 0.3, -9.5), attitude=(0.2, 0.15)):
+def measured(x=X, y=Y, force=(0.5, 0.3, -9.5)):
     record = np.zeros(1, MEASURED).view(np.recarray)[0]
-    record["x"], record["y"][:5], record["force"], record["attitude"][:2] = x, y, force, attitude
+    record["x"], record["y"][:5], record["force"], record["attitude"][:2] = x, y, force, (0.2, 0.15)
     return record
 
 
-def felt(bounds=None, **declared_errors):
-    """A diagnosis whose forces are set up at X, Y, U; admitted: errors of what the engine is told."""
+def felt(**declared):
+    """A diagnosis whose forces are set up at X, Y, U, with these errors declared."""
     fdi = new_fdi()
-    for name, value in declared_errors.items():
-        fdi["bound"]["declared_errors"][name] = value
     statistical = fdi["statistical"]
     air = statistical["gust"]
     fill_table(air["memory"]["table"], AIRCRAFT, AIRCRAFT.measurable_forces, FORCES)
@@ -53,7 +51,7 @@ def felt(bounds=None, **declared_errors):
     air["config"]["L_gust"], statistical["forces"]["in_use"] = 533.4, 1
     air["output"]["uses_accelerometers"] = 1
     statistical["rows"]["first"] = FIRST
-    configure_forces(fdi, declared_in(bounds or Bounds(), AIRCRAFT), (X, Y, U), ALONG_Y, DT)
+    configure_forces(fdi, declared_in(Bounds(**declared), AIRCRAFT), (X, Y, U), ALONG_Y, DT)
     return fdi
 
 
@@ -97,7 +95,7 @@ def test_the_model_is_the_sum_of_its_terms_and_the_rest_is_the_innovation(f, nam
 
 @pytest.mark.parametrize(("f", "name"), [(SIDE_INDEX, "CY"), (NORMAL_INDEX, "CZ")])
 def test_a_surface_s_column_is_the_slope_along_it_and_its_errors_are_shares_of_the_terms(f, name):
-    fdi = felt(Bounds(coefficients=0.05))
+    fdi = felt(coefficients=0.05)
     feel(fdi, measured())
     rows = fdi["statistical"]["rows"]
     for s in range(4):
@@ -135,7 +133,7 @@ def test_noise_of_the_readings_is_jitter_of_the_forces():
         "alpha": {"noise_std_deg": 0.03}, "beta": {"noise_std_deg": 0.02}, "V": {"noise_std_mps": 0.1},
         "qdyn": {"noise_std_pa": 4.0}, **{axis: {"noise_std_deg_s": 0.05} for axis in "pqr"},
     }  # fmt: skip
-    fdi, rng = felt(Bounds(sensors=sensors)), np.random.default_rng(4)
+    fdi, rng = felt(sensors=sensors), np.random.default_rng(4)
     record, drawn = fdi["statistical"]["forces"], []
     std = np.radians([0.03, 0.02]), 0.1, 4.0, np.radians(0.05)
     for _ in range(1500):
@@ -152,7 +150,7 @@ def test_noise_of_the_readings_is_jitter_of_the_forces():
 def test_in_turbulence_gusts_turn_the_flow():
     """By a walk of 3 sigma^2 / (L V) [MIL-F-8785C, 3.7], against a draw of Dryden's vertical gust."""
     still, moving = (
-        felt(Bounds(turbulence=air))["statistical"]["forces"]["component"] for air in ("none", "moderate")
+        felt(turbulence=air)["statistical"]["forces"]["component"] for air in ("none", "moderate")
     )
     gained = moving["Q_e"] - still["Q_e"]
     sigma, L, V, dt, rng = 10.6 * 0.3048, 533.4, 46.0, 0.01, np.random.default_rng(2)

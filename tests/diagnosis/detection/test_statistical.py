@@ -116,18 +116,18 @@ def test_false_alarms_are_no_more_than_declared_and_not_absurdly_fewer(setting, 
     assert poisson_bound(seen, hours, 0.9995, upper=False) > 0.02 * per_h
 
 
-def _share(rate_hz, omega, eta_bar, declared=None, seconds=20, **bounds):
-    """Largest share of the level that eta_bar sin(omega t) reaches, in roll and pitch, or yaw."""
+def _share(rate_hz, omega, eta_bar, sensors):
+    """Largest share of the level that eta_bar sin(omega t) reaches in 20 s, in roll and pitch, or yaw."""
     constant = dict.fromkeys(AXES, eta_bar)
     largest = 0.0
     for axes in ((0, 1), (2,)):
         for phase in (0.0, 0.8, 1.6, 2.4):
             alone = Detector(
                 rate_hz,
-                statistical={"uncertainty_rad_s": declared or omega},
-                bounds={"constant_rad_s2": constant, "inertia_coupling": NO_COUPLING, **bounds},
+                statistical={"uncertainty_rad_s": omega},
+                bounds={"constant_rad_s2": constant, "inertia_coupling": NO_COUPLING, "sensors": sensors},
             )
-            frames = round(seconds * rate_hz)
+            frames = round(20 * rate_hz)
             nu = np.zeros((frames, 3))
             nu[:, axes] = eta_bar * np.sin(omega * np.arange(frames)[:, None] / rate_hz + phase)
             scores = alone.watch(nu, *surfaces_at_work(frames, rate_hz, np.random.default_rng(1)))
@@ -141,4 +141,4 @@ def _share(rate_hz, omega, eta_bar, declared=None, seconds=20, **bounds):
     ("sensors", "eta_bar"), [("ideal", 0.02), ("tactical-grade", 0.02), ("tactical-grade", 0.3)]
 )
 def test_bounded_uncertainty_takes_about_half_the_level_at_most(sensors, eta_bar, rate_hz, omega):
-    assert 0.1 < _share(rate_hz, omega, eta_bar, sensors=sensors) < 0.6
+    assert 0.1 < _share(rate_hz, omega, eta_bar, sensors) < 0.6

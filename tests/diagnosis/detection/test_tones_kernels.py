@@ -42,14 +42,6 @@ def tone_test_config():
     return tone_test_config
 
 
-def listen(view, tone_test_config, samples, regressors=None, heard=True, alarm_level=6.0):
-    for k, sample in enumerate(samples):
-        view["block"]["g"][0] = sample
-        if regressors is not None:
-            view["block"]["g_Z"][:3, 0] = regressors[k]
-        tones.update_tones(view["tones"], view["block"], tone_test_config, alarm_level, heard, DT)
-
-
 @pytest.mark.parametrize(("K_x", "K_d", "keep"), [(0.3, 0.8, 1.0), (0.05, 0.02, 1.0), (0.2, 0.5, 0.95)])
 @pytest.mark.parametrize("frequency_rad_s", [1.0, 5.0, 13.0])
 def test_the_filter_lets_pass_of_a_tone_what_it_does_when_run(view, K_x, K_d, keep, frequency_rad_s):
@@ -102,7 +94,9 @@ def test_no_periodic_uncertainty_of_that_pace_is_heard_louder(steps, x):
 def test_a_tone_is_heard_on_the_grid_and_between(view, tone_test_config, frequency_rad_s):
     view["block"]["eta"] = 0.0
     samples = 0.5 * 0.8 * np.cos(frequency_rad_s * DT * np.arange(1000) + 1.0)  # 0.8 standard deviations
-    listen(view, tone_test_config, samples, alarm_level=LEVEL)
+    for sample in samples:
+        view["block"]["g"][0] = sample
+        tones.update_tones(view["tones"], view["block"], tone_test_config, LEVEL, True, DT)
     whole = (
         0.8 / 2.0 * TONE_MEMORY_S / DT / sqrt(0.5 * 0.5 * TONE_MEMORY_S / DT)
     )  # amplitude over its deviation

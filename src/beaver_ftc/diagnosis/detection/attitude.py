@@ -106,6 +106,12 @@ def restart(att):
 
 
 @kernel
+def add_turn(att, i, turn):
+    """Add what the attitude has turned about axis i beyond the gyro in a sample, rad."""
+    att.turn[i] += turn
+
+
+@kernel
 def compare_attitude(att, blocks, eta, x, dt, detected):
     """Advance the comparison by a frame of dt s that the blocks have whitened.
 

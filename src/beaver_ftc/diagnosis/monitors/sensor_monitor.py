@@ -660,7 +660,7 @@ def add_turn(mon, att, y):
         attitude.restart(att)
         return
     for i in range(3):
-        att.turn[i] += mon.residual[i]
+        attitude.add_turn(att, i, mon.residual[i])
     mon.turn_max = att.turn_max
 
 

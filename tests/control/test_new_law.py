@@ -26,12 +26,11 @@ SLIDING = '''
 import numpy as np
 
 from beaver_ftc.compiled import apart, kernel, record, sized
-from beaver_ftc.control import laws
-from beaver_ftc.control import CompiledLaw
+from beaver_ftc.control import CompiledLaw, allocation, laws
 
 CONFIG = record(slope=float, reach=float, layer=float)
 MEMORY = record(integral=3, frames=int)
-OUTPUT = record(demand=3, hold=3, disturbance=3, surface=3)
+OUTPUT = record(surface=3)
 
 
 @sized
@@ -45,17 +44,14 @@ def configure(law, control, prediction, scenario, y):
 
 @apart
 def command(control, assessment, faults, prediction, measured, mode, t):
-    law, out = control.sliding, control.sliding.output
     laws.prepare(control, assessment, prediction, mode, t)
-    slide(law, control.reference, measured.x, prediction.f)
-    laws.command_surfaces(
-        control, out.demand, out.hold, out.disturbance, assessment, faults, prediction, False
-    )
+    slide(control.sliding, control.axes, control.reference, measured.x, prediction.f)
+    laws.command_surfaces(control, assessment, faults, prediction, False)
     laws.complete(control, assessment, measured, t)
 
 
 @kernel
-def slide(law, reference, x, f):
+def slide(law, axes, reference, x, f):
     config, memory, out = law.config, law.memory, law.output
     memory.frames += 1
     for i in range(3):
@@ -63,9 +59,8 @@ def slide(law, reference, x, f):
         memory.integral[i] += reference.config.dt * error
         out.surface[i] = error + config.slope * memory.integral[i]
         switched = min(max(out.surface[i] / config.layer, -1.0), 1.0)
-        out.hold[i] = -f[i]
         wanted = reference.output.governed_acceleration[i] + config.slope * error
-        out.demand[i] = wanted + config.reach * switched + out.hold[i]
+        allocation.set_demand(axes, i, wanted + config.reach * switched - f[i], -f[i], 0.0)
 
 
 def unexplained(control):

@@ -1,43 +1,17 @@
 """A flight that is replayed on the front page: drawn by what draws a report, and small."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from beaver_ftc.results import report
 from beaver_ftc.results.style import MODE_COLOURS, marks
-from beaver_ftc.results.views import Panel, Trace, View
+from tools.docs.tables import front
 
-SCENARIO = "elevator-partial-loss"  # that of the picture in whose place the replay is
+SCENARIO = front.VIEW.name  # that of the picture in whose place the replay is, with its panels
 LEAD_S, SPAN_S = 4.0, 30.0  # the replay starts so long before the fault, and shows so much of the curves
-VIEW = View(
-    "curves",
-    "",
-    (
-        Panel(
-            "pitch rate",
-            (
-                Trace("q_reference_rad_s", "commanded", "target"),
-                Trace("q_rad_s", "aircraft", "actual"),
-            ),
-        ),
-        Panel(
-            "residual of the pitch rate",
-            (
-                Trace("q_threshold_rad_s", "threshold", "bound"),
-                Trace("q_threshold_rad_s", "", "bound", -1.0),
-                Trace("q_residual_rad_s", "residual", "actual"),
-            ),
-        ),
-        Panel(
-            "surfaces",
-            (
-                Trace("elevator_effective_rad", "elevator", "surface 1"),
-                Trace("flap_effective_rad", "flap", "surface 3"),
-            ),
-        ),
-    ),
-)
+VIEW = replace(front.VIEW, name="curves", title="")
 
 
 def page() -> str:

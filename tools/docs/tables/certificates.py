@@ -74,4 +74,5 @@ def certificate_check() -> str:
     with TemporaryDirectory() as folder:
         for given in (("run", SCENARIO, "--certificate", "--no-report"), ("check", f"runs/{SCENARIO}")):
             run = beaver(*given, cwd=Path(folder))
+            run.check_returncode()
     return run.stdout.strip()

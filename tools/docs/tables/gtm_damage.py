@@ -145,7 +145,7 @@ def gtm_laws() -> str:
     made = _kept() / "comparisons" / f"gtm-{SWEEP.stem}" / "comparison.json"
     if not made.is_file():
         asked = ("compare", "--sweep", str(SWEEP), "--schemes", "adaptive-estimators", "--workers", "1")
-        beaver(*asked, cwd=_kept())
+        beaver(*asked, cwd=_kept()).check_returncode()
     (of,) = json.loads(made.read_text(encoding="utf-8"))["sets"].values()
     return table_of(of["lines"], {
         "law": "law", "flights": lambda one: str(of["flights"]), "aircraft lost": "departures",

@@ -19,7 +19,9 @@ def mismatch_designs() -> str:
     """What a wrong design model costs: the published elevator case, each with the published bound."""
     given = ("elevator-partial-loss", "--variant", ",".join(DESIGNS), "--no-report", "--format", "json")
     with TemporaryDirectory() as folder:
-        runs = json.loads(beaver("mismatch", *given, cwd=Path(folder)).stdout)["runs"]
+        run = beaver("mismatch", *given, cwd=Path(folder))
+        run.check_returncode()
+        runs = json.loads(run.stdout)["runs"]
     names = [run["scenario"].removeprefix("elevator-partial-loss").lstrip("-") or "declared" for run in runs]
     flights = dict(zip(names, runs, strict=True))
     columns = {

@@ -67,7 +67,7 @@ LONGEST = (
     "logs/test_long_logs.py", "evidence/test_evidence.py", "matrix/test_pitch_lost.py",
     "sitl/test_endpoint.py", "bench/test_memory.py", "studies/detectability/test_schemes.py",
     "compiled/test_sized_types.py", "recorded/test_benchmark.py", "loop/test_who_sees_the_truth.py",
-    "studies/sweep/test_rare.py", "results/test_forks.py", "plugins/test_pytest_plugin.py",
+    "studies/sweep/test_rare.py", "results/test_painters.py", "plugins/test_pytest_plugin.py",
     "diagnosis/test_statistical_flights.py", "tools/test_docs_names.py",
 )  # fmt: skip
 

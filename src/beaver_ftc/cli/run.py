@@ -3,6 +3,7 @@
 import sys
 import time
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import partial
@@ -34,9 +35,11 @@ from beaver_ftc.plugins import required
 
 if TYPE_CHECKING:
     from beaver_ftc.plant.adapter import Plant
+    from beaver_ftc.results.painters import Painters
     from beaver_ftc.scenario.schema import Scenario
 
     Prepare = Callable[[Plant], None]
+    Drawn = tuple[Painters, Sequence[str]]  # by whom the figures are drawn, and their formats
 
 
 FORMATS = ("png", "pdf", "svg")  # of figures
@@ -87,7 +90,18 @@ def command(options: Options) -> None:
             emit_json({"passed": False, "runs": [], "errors": str(error).splitlines()})
         write_junit([Judged("scenarios", error=str(error))], options.junit)
         raise
-    raise typer.Exit(_run_all(loaded, options, formats))
+    with _painters(not options.no_report) as at_work:
+        status = _run_all(loaded, options, (at_work, formats))
+    raise typer.Exit(status)
+
+
+def _painters(wanted: bool) -> "AbstractContextManager[Painters]":
+    """Processes that draw the figures meanwhile, where they are wanted."""
+    if not wanted:
+        return nullcontext(())
+    from beaver_ftc.results.painters import painters
+
+    return painters()
 
 
 def _formats(given: str) -> tuple[str, ...]:
@@ -113,7 +127,7 @@ def _shown(given: str | None) -> "Prepare | None":
     return partial(required("flightgear", "--flightgear"), host=host, port=port)
 
 
-def _run_all(scenarios: list["Scenario"], options: Options, figures: Sequence[str]) -> int:
+def _run_all(scenarios: list["Scenario"], options: Options, drawn: "Drawn") -> int:
     """Fly one after the other; one that fails does not stop the rest. Returns the worst exit status."""
     from beaver_ftc.results.model import Judged, Metrics
     from beaver_ftc.results.verdict import verdict_text
@@ -123,7 +137,7 @@ def _run_all(scenarios: list["Scenario"], options: Options, figures: Sequence[st
     for scenario in scenarios:
         began = time.perf_counter()
         try:
-            document = _run_one(scenario, options, prepare, figures)
+            document = _run_one(scenario, options, prepare, drawn)
         except Exception as error:
             failure = failure_of(error)
             took_s = time.perf_counter() - began
@@ -144,9 +158,7 @@ def _run_all(scenarios: list["Scenario"], options: Options, figures: Sequence[st
     return status
 
 
-def _run_one(
-    scenario: "Scenario", options: Options, prepare: "Prepare | None", figures: Sequence[str]
-) -> Document:
+def _run_one(scenario: "Scenario", options: Options, prepare: "Prepare | None", drawn: "Drawn") -> Document:
     from beaver_ftc.results.writer import run
 
     for warning in scenario.warnings():
@@ -157,7 +169,7 @@ def _run_one(
         certified = options.certificate
         document = run(
             scenario, options.out, not options.no_report, progress, exports, prepare, recording, certified,
-            figures,
+            *drawn,
         )  # fmt: skip
     folder = options.out / scenario.name
     return document | {"folder": str(folder)} | (_certificate(folder) if certified else {})

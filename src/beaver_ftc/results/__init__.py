@@ -8,7 +8,6 @@ if TYPE_CHECKING:
     from beaver_ftc.results.expectations import evaluate as evaluate_expectations
     from beaver_ftc.results.expectations import margin as margin_of_expectation
     from beaver_ftc.results.flight import Flight, Proof
-    from beaver_ftc.results.forks import Forks
     from beaver_ftc.results.log import Columns, Log, MemoryLog, ParquetLog, SpooledLog, StoredLog
     from beaver_ftc.results.metrics import Onset, as_json, faults_of, measure, versions
     from beaver_ftc.results.model import DeclaredFault, Document, Expectation, Judged, Metrics, read_metrics

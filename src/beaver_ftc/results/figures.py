@@ -72,12 +72,6 @@ def pictures_of(
     return found
 
 
-def save_all(pictures: Sequence[Picture]) -> None:
-    """Draw pictures into their files."""
-    for picture in pictures:
-        save(picture)
-
-
 def save(picture: Picture) -> None:
     """Draw a picture into its file; vector graphics in the style of a paper."""
     kind = picture.path.suffix.removeprefix(".")

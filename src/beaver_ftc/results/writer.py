@@ -11,7 +11,6 @@ import errno
 import os
 import shutil
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-from functools import partial
 from itertools import takewhile
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -26,6 +25,7 @@ from beaver_ftc.results.model import Document, Metrics
 
 if TYPE_CHECKING:
     from beaver_ftc.plant.adapter import Plant
+    from beaver_ftc.results.painters import Painters
     from beaver_ftc.scenario.schema import Scenario
 
 try:
@@ -57,6 +57,7 @@ def run(
     prepare: "Callable[[Plant], None] | None" = None,
     recording: str | None = None,
     certified: bool = False,
+    painters: "Painters" = (),
     figures: Sequence[str] = ("png",),
 ) -> Document:
     """Fly `scenario`, write `out/<name>/`, and return the metrics document.
@@ -65,7 +66,8 @@ def run(
 
     exports: of "csv" and "acmi". prepare: called with the trimmed plant just before the flight. recording:
     table, ulog or ardupilot, to write the log as a recorder on board would have. certified: write the
-    certificate of its alarm and exclusions. figures: their formats.
+    certificate of its alarm and exclusions. painters: who draws the figures, if not this process.
+    figures: their formats.
 
     Raises BadInput for a flight that cannot be trimmed or certified, SimulationFailed for one not completed
     or kept, NotAllWritten where the log is kept but another file could not be written.
@@ -89,7 +91,7 @@ def run(
                 certificate.write(folder)
         if report and document:
             with _note_failure_and_go_on(folder, "report.html", failed):
-                write_report_files(folder, document, formats=figures)
+                write_report_files(folder, document, painters=painters, formats=figures)
         if "csv" in exports:
             from beaver_ftc.results.exports import write_csv
 
@@ -161,25 +163,24 @@ def write_report_files(
     folder: Path,
     document: Document,
     to: Path | None = None,
+    painters: "Painters" = (),
     formats: Sequence[str] = ("png",),
 ) -> None:
     """Draw the figures and the report of a result folder that holds its log and its scenario.
 
-    to: where to, if not into that folder. formats: of the figures.
+    to: where to, if not into that folder. painters: who draws the figures, if not this process. formats: of
+    the figures.
     """
-    from beaver_ftc.results.figures import pictures_of, save_all
-    from beaver_ftc.results.forks import Forks
+    from beaver_ftc.results.figures import pictures_of
+    from beaver_ftc.results.painters import drawing
     from beaver_ftc.results.report import write_report
 
     to = to or folder
     if formats:
         (to / "figures").mkdir(exist_ok=True)
     pictures = pictures_of(folder / "log.parquet", Metrics.of(document), to / "figures", formats)
-    with Forks() as beside:
-        for share in (pictures[0::2], pictures[1::2]):  # two processes: more would wait for each other
-            beside.give(partial(save_all, share))
+    with drawing(pictures, painters):
         write_report(to / "report.html", [folder])
-        beside.results()
 
 
 def add_report(folder: Path, document: Document) -> str:

@@ -50,7 +50,7 @@ from beaver_ftc.plant import (
     where_files_lie,
 )
 from beaver_ftc.plant import trim_plant as trim_at
-from beaver_ftc.results import Forks
+from beaver_ftc.studies.engine import Forks
 from beaver_ftc_aircraft.derive import outline
 from beaver_ftc_aircraft.derive.derived import NAME as PAGE
 from beaver_ftc_aircraft.derive.derived import Derived, page_of

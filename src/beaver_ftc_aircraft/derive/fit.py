@@ -23,7 +23,7 @@ from beaver_ftc.diagnosis.monitors import (
     yaw_per_thrust,
 )
 from beaver_ftc.plant import ENGINE_SIGNALS
-from beaver_ftc.results import Forks
+from beaver_ftc.studies.engine import Forks
 from beaver_ftc_aircraft.derive.sample import (
     AGES_S,
     REACHES,

@@ -15,7 +15,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import AXES, FLOW_SIGNALS, M_PER_FT, Aircraft
 from beaver_ftc.plant import PA_PER_PSF, FlightState, Plant, translated
-from beaver_ftc.results import Forks
+from beaver_ftc.studies.engine import Forks
 
 REACHES = (0.25, 0.5, 0.75, 1.0)  # of the boxes, as shares of the envelope's half widths
 SHARES = (0.15, 0.35, 0.65, 1.0)  # of the surfaces' travel

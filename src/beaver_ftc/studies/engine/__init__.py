@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 from beaver_ftc.public import lazily
 
 if TYPE_CHECKING:
+    from beaver_ftc.studies.engine.forks import Forks
     from beaver_ftc.studies.engine.statistics import poisson
     from beaver_ftc.studies.engine.store import fingerprint, plug_ins, write_whole
     from beaver_ftc.studies.engine.study import Progress, Study, run_study

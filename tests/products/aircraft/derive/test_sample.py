@@ -8,7 +8,7 @@ import pytest
 from beaver_ftc.aircraft.aircraft import read
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.trim import trim as trimmed
-from beaver_ftc.results import forks
+from beaver_ftc.studies.engine import forks
 from beaver_ftc_aircraft.derive import sample as sampling
 from beaver_ftc_aircraft.derive.sample import Envelope
 
@@ -34,7 +34,7 @@ def test_samples_are_the_same_to_the_bit_whichever_process_looks_at_the_states(s
     found, errors = [], (lambda samples: abs(samples.rate)) if searched else None
     for at_once in (0, 1, 3):
         monkeypatch.setattr(forks, "can_fork", lambda forked=at_once > 0: forked)
-        monkeypatch.setattr(forks.os, "sched_getaffinity", lambda pid, cores=at_once: range(cores))
+        monkeypatch.setattr(forks, "cores", lambda cores=at_once: cores)
         plant = Plant(100)
         level = trimmed(50.0, 1000.0, plant=plant)
         where, properties = replace(ENVELOPE, of_region=not searched), {"pressure": "aero/qbar-psf"}

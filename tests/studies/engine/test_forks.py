@@ -7,14 +7,14 @@ import time
 import pytest
 
 from beaver_ftc.documents.errors import SimulationFailed
-from beaver_ftc.results import forks
-from beaver_ftc.results.forks import Forks
+from beaver_ftc.studies.engine import forks
+from beaver_ftc.studies.engine.forks import Forks
 
 
 @pytest.fixture
 def two(monkeypatch):
     """Two cores, and a process that can be forked."""
-    monkeypatch.setattr(os, "sched_getaffinity", lambda process: {0, 1})
+    monkeypatch.setattr(forks, "cores", lambda: 2)
     monkeypatch.setattr(forks, "can_fork", lambda: True)
 
 

@@ -5,7 +5,6 @@ flight. Where this process cannot be forked, or has one core, it does the work i
 """
 
 import multiprocessing
-import os
 import signal
 import warnings
 from collections.abc import Callable
@@ -15,6 +14,7 @@ from typing import Any, Self
 
 from beaver_ftc.compiled.cache import can_fork
 from beaver_ftc.documents.errors import SimulationFailed
+from beaver_ftc.studies.engine.workers import cores
 
 Work = Callable[[], Any]
 KILLED = "a process that was forked for a part of the work has ended before it was done"
@@ -27,7 +27,7 @@ class Forks:
     """
 
     def __init__(self, wanted: bool = True) -> None:
-        self._at_once = len(os.sched_getaffinity(0)) if wanted and can_fork() else 0
+        self._at_once = cores() if wanted and can_fork() else 0
         self._results: list[Any] = []
         self._busy: dict[Connection, tuple[int, BaseProcess]] = {}
 

@@ -7,6 +7,9 @@ through the same filter [Smeur2016, sec. III]: those that the declared actuators
 commands. G u0 of the elapsed frame is measured.contribution, so that
 
     G u = nu - xdot0 + G u0
+
+A scenario that names the law flies the same in kernels (laws/compiled_rivals.py). `step` flies an object of
+this class that is given to the loop, or that a plug-in registers by another name.
 """
 
 from collections.abc import Mapping
@@ -16,7 +19,7 @@ from typing import ClassVar
 import numpy as np
 
 from beaver_ftc.control import Reference
-from beaver_ftc.control.rivals.tracking import GAINS, Rival
+from beaver_ftc.control.rivals.tracking import GAINS, RivalLaw
 from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis import Measured, Verdict
 
@@ -25,17 +28,17 @@ class LowPass:
     """Second-order low-pass filter with two equal poles, exact for an input held over the frame."""
 
     def __init__(self, pole_per_s: float, dt_s: float, start: np.ndarray) -> None:
-        self._a = exp(-pole_per_s * dt_s)
+        self._keep = exp(-pole_per_s * dt_s)
         self._first, self.value = start.copy(), start.copy()
 
     def step(self, value: np.ndarray) -> np.ndarray:
         """The filtered value."""
-        self._first = self._a * self._first + (1.0 - self._a) * value
-        self.value = self._a * self.value + (1.0 - self._a) * self._first
+        self._first = self._keep * self._first + (1.0 - self._keep) * value
+        self.value = self._keep * self.value + (1.0 - self._keep) * self._first
         return self.value
 
 
-class IncrementalInversion(Rival):
+class IncrementalInversion(RivalLaw):
     """Incremental nonlinear dynamic inversion on filtered angular acceleration [Sieberling2010]."""
 
     name: ClassVar[str] = "indi"
@@ -48,7 +51,6 @@ class IncrementalInversion(Rival):
         self.acceleration = LowPass(pole, dt, np.zeros(3))
         self.leading = list(context.leading)
         self.by_surfaces = LowPass(pole, dt, self.trimmed())
-        self.before: np.ndarray | None = None
 
     def trimmed(self) -> np.ndarray:
         """Acceleration (3,) rad/s2 that the leading surfaces give in trim."""
@@ -66,10 +68,10 @@ class IncrementalInversion(Rival):
 
     def step(self, measured: Measured, reference: Reference, verdict: Verdict) -> np.ndarray:
         """G^-1 (nu - xdot0 + G u0)."""
-        if self.before is not None:
-            self.acceleration.step((measured.x - self.before) / self.context.dt_s)
+        moved = self.moved(measured)
+        if moved is not None:
+            self.acceleration.step(moved / self.context.dt_s)
             self.by_surfaces.step(measured.contribution[:, self.leading].sum(axis=1))
-        self.before = measured.x
         nu = self.demand(measured, reference)
         G = self.context.model.G(measured.y)[:, self.leading]
         return self.command(np.linalg.solve(G, nu - self.acceleration.value + self.by_surfaces.value))

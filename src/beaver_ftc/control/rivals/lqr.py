@@ -3,7 +3,7 @@
     minimise sum e' Qe e + i' Qi i + du' R du,    e = xm - x,  i = int e,  du = u - u_trim - u_feedforward
 
 Weights by Bryson's rule: one over the square of what is acceptable. The gains never change: that is the
-point of it.
+point of it. Kernels and `step` fly the law as those of indi.py do.
 """
 
 from collections.abc import Mapping
@@ -12,7 +12,7 @@ from typing import ClassVar
 import numpy as np
 
 from beaver_ftc.control import Reference
-from beaver_ftc.control.rivals.tracking import Rival
+from beaver_ftc.control.rivals.tracking import RivalLaw
 from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis import Measured, Verdict
 
@@ -27,7 +27,7 @@ def gains(A: np.ndarray, B: np.ndarray, Q: np.ndarray, R: np.ndarray) -> np.ndar
     return np.linalg.solve(R + B.T @ P @ B, B.T @ P @ A)
 
 
-class FixedGainLqr(Rival):
+class FixedGainLqr(RivalLaw):
     """Fixed-gain linear quadratic regulator about the trim, with integral action [Anderson1990]."""
 
     name: ClassVar[str] = "lqr"

@@ -19,7 +19,7 @@ from beaver_ftc.diagnosis.rivals import rival_options
 GAINS = {"proportional_per_s": 2.0, "integral_per_s2": 1.0}
 
 
-class Rival:
+class RivalLaw:
     """A law that moves the surfaces that lead roll, pitch and yaw."""
 
     name: ClassVar[str]
@@ -30,6 +30,12 @@ class Rival:
         """Before a flight: nothing missed yet."""
         self.context, self.option = context, rival_options(self.name, self.defaults, context)
         self.integral, self.saturated = np.zeros(3), False
+        self._before: np.ndarray | None = None
+
+    def moved(self, measured: Measured) -> np.ndarray | None:
+        """Change (3,) rad/s of the measured rates since the frame before; None in the first frame."""
+        before, self._before = self._before, measured.x
+        return None if before is None else measured.x - before
 
     def missed(self, measured: Measured, reference: Reference) -> np.ndarray:
         """Error of the rates (3,) rad/s; its integral stands still while a surface is at its stop."""

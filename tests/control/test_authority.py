@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from beaver_ftc.control import allocation, laws
+from beaver_ftc.control.probe import advance_probe
 from law_records import fields, new_control
 
 DT = 0.01
@@ -53,7 +54,7 @@ class TestProbing:
         probe["from_s"] = probe["to_s"] = -1.0
         history = []
         for k in range(1000):
-            allocation.advance_probe(record, wanted(k), k * DT)
+            advance_probe(record, wanted(k), k * DT)
             history.append(float(probe["deflection"]))
         return probe, np.array(history)
 

@@ -28,7 +28,7 @@ def control_record():
 def allocated(control, G):
     """The surfaces, rad, for the demand in the record."""
     out, effectiveness = control["allocation"]["output"], control["surfaces"]["output"]["effectiveness"]
-    control["axes"]["G"], share = G, allocation.smooth(out["hand_over"])
+    control["axes"]["G"], share = G, allocation.smoothstep(out["hand_over"])
     allocation.allocate(control["axes"], out, control["layout"], effectiveness, share, 0.0)
     return out["command"]
 

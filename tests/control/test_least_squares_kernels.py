@@ -6,19 +6,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
 
-from beaver_ftc.control import allocation
-from beaver_ftc.control.allocation import problem_dtype
+from beaver_ftc.control import allocation, least_squares
+from beaver_ftc.control.least_squares import problem_dtype
 from beaver_ftc.diagnosis.model_prediction import prediction_dtype
 from law_records import new_control
 from samples import samples
 
 
-def problem_of(n, rng, at=None):
+def problem_of(n, rng, side=None):
     problem = np.zeros(1, problem_dtype(n)).view(np.recarray)[0]
     problem["low"], problem["high"] = -rng.uniform(0.05, 0.6, n), rng.uniform(0.05, 0.6, n)
     problem["u_preferred"] = rng.uniform(-0.2, 0.2, n)
     problem["weight"] = 10.0 ** rng.uniform(-3, 0, n)
-    problem["at"] = 0 if at is None else at
+    problem["side"] = 0 if side is None else side
     return problem
 
 
@@ -46,7 +46,7 @@ def cost(problem, B, demand, u):
 def test_it_is_the_minimum_that_scipy_finds(n, seed, size):
     rng = np.random.default_rng(seed)
     problem, B, demand = problem_of(n, rng, rng.integers(-1, 2, n)), columns(n, rng), rng.normal(0, size, 3)
-    allocation.solve(problem, B, demand)
+    least_squares.solve(problem, B, demand)
     other = by_scipy(problem, B, demand)
     ours, theirs = cost(problem, B, demand, problem["u"]), cost(problem, B, demand, other)
     assert ours <= theirs * (1.0 + 1e-6) + 1e-9

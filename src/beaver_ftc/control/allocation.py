@@ -1,160 +1,24 @@
 """Allocation: the surfaces that give the demanded angular accelerations, and what they can give at all.
 
 An aircraft with one surface an axis and a stand-in needs a few lines: the lateral pair, the elevator, and the
-hand-over from elevator to flap. Any other number of surfaces is allocated by constrained least squares,
-started from the frame before; the hand-over is there a matter of each surface's weight.
-
-    min  |B u - d|^2 + slack sum (u - p)^2 / v        low <= u <= high        [Harkegard2002, Bodson2002]
-
-B (3, n) rad/s2 per rad: what is left of each surface; d (3,) rad/s2; p (n,) rad: where a surface is that
-has nothing to do; v (n,) rad2: the weight of its movement, 0 for none. slack is small beside B v B', so
-that what can be given is given, and p and v choose among the ways to give it.
-
-Primal active set [Nocedal2006, alg. 16.3]. With the surfaces at their limits held, the others follow from
-a system of three equations,
-
-    (B v B' + slack I) y = d - B u0,      u = p + v B' y        u0: p, or the limit
-
-and y is the multiplier as well: a surface at its limit stays there while (u - p) / v - B' y pushes
-outwards. The set of the frame before is tried first: as a rule it is right, and one system is solved.
+hand-over from elevator to flap. Any other number of surfaces is allocated by constrained least squares
+(least_squares.py), started from the frame before; the hand-over is there a matter of each surface's weight.
 
 The attainable moment set is the image of the travels under G, with what is given up and what is off already
 in it [Durham1993]; here the interval it spans on each axis. A demand outside it no law can meet.
-
-The probe is active diagnosis: it moves flap and elevator against each other, and a healthy aircraft feels
-nothing of it. The flap goes down and back by (1 - cos) / 2; the allocation gives the elevator what the flap
-does not leave. A surface that does not follow then shows.
 """
-
-from math import pi, radians, sqrt
 
 import numpy as np
 
 from beaver_ftc.aircraft import AXES, Aircraft, main_surface_index_by_axis
 from beaver_ftc.compiled import apart, kernel, record, sized
 from beaver_ftc.control.accommodation import usable_effectiveness
+from beaver_ftc.control.least_squares import FREE, LOW, problem_dtype, solve
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
-from beaver_ftc.scenario.diagnosis import ControlConfig, Probing
+from beaver_ftc.scenario.diagnosis import ControlConfig
 
-LOW, FREE, HIGH = -1, 0, 1
-SLACK = 1e-10  # of the mean of B v B'
-LEAST_SLACK = 1e-14
-ROUNDING = 1e-12  # of a multiplier
-
-
-@sized
-def problem_dtype(n: int) -> np.dtype:
-    """A problem of n surfaces and its solution u. at: which limits hold, kept for the next frame; y: the
-    multipliers."""
-    return record(u_preferred=n, weight=n, low=n, high=n, u=n, at=(int, n), y=3, S=(3, 3), slack=float)
-
-
-@kernel
-def solve(problem, B, demand):
-    """Fill u (n,) rad, from B (3, n) rad/s2 per rad and a demand (3,) rad/s2."""
-    begin(problem, B)
-    n, u = problem.u.size, problem.u
-    for _ in range(4 * n + 4):
-        multipliers(problem, B, demand)
-        blocking, share = farthest(problem, B)
-        for s in range(n):
-            if problem.at[s] == FREE:
-                there = wanted(problem, B, s)
-                u[s] = u[s] + share * (there - u[s]) if blocking >= 0 else there
-        if blocking >= 0:  # it is put on the limit it has met
-            below = wanted(problem, B, blocking) < problem.low[blocking]
-            problem.at[blocking] = LOW if below else HIGH
-            u[blocking] = problem.low[blocking] if below else problem.high[blocking]
-        elif not release(problem, B):
-            return
-
-
-@kernel
-def begin(problem, B):
-    """Put u within the limits, on those that held in the frame before, and find how small slack is."""
-    total = 0.0
-    for s in range(problem.u.size):
-        if problem.at[s] == LOW:
-            problem.u[s] = problem.low[s]
-        elif problem.at[s] == HIGH:
-            problem.u[s] = problem.high[s]
-        problem.u[s] = min(max(problem.u[s], problem.low[s]), problem.high[s])
-        for i in range(3):
-            total += B[i, s] * B[i, s] * problem.weight[s]
-    problem.slack = max(SLACK * total / 3.0, LEAST_SLACK)
-
-
-@kernel
-def wanted(problem, B, s):
-    """Where surface s goes without limits, p + v B' y."""
-    y = problem.y
-    along = B[0, s] * y[0] + B[1, s] * y[1] + B[2, s] * y[2]
-    return problem.u_preferred[s] + problem.weight[s] * along
-
-
-@kernel
-def multipliers(problem, B, demand):
-    """Fill y (3,): what is left of the demand, over slack; S y = d - B u0 by Cholesky, S = L L', L in S."""
-    S, y, slack = problem.S, problem.y, problem.slack
-    S[:], y[:] = 0.0, demand
-    for i in range(3):
-        S[i, i] = slack
-    for s in range(problem.u.size):
-        free = problem.at[s] == FREE
-        at = problem.u_preferred[s] if free else problem.u[s]
-        for i in range(3):
-            y[i] -= B[i, s] * at
-            for j in range(i + 1):
-                S[i, j] += problem.weight[s] * B[i, s] * B[j, s] if free else 0.0
-    for i in range(3):
-        for j in range(i + 1):
-            for k in range(j):
-                S[i, j] -= S[i, k] * S[j, k]
-            S[i, j] = sqrt(max(S[i, j], slack)) if i == j else S[i, j] / S[j, j]
-            if j < i:
-                y[i] -= S[i, j] * y[j]
-        y[i] /= S[i, i]
-    for i in (2, 1, 0):
-        for k in range(i + 1, 3):
-            y[i] -= S[k, i] * y[k]
-        y[i] /= S[i, i]
-
-
-@kernel
-def farthest(problem, B):
-    """The free surface that meets a limit first on its way, or -1, and which share of the way that is."""
-    blocking, share = -1, 1.0
-    for s in range(problem.u.size):
-        there, now = wanted(problem, B, s), problem.u[s]
-        if problem.at[s] == FREE and (there < problem.low[s] or there > problem.high[s]):
-            limit = problem.low[s] if there < problem.low[s] else problem.high[s]
-            part = (limit - now) / (there - now) if there != now else 0.0
-            if blocking < 0 or part < share:
-                blocking, share = s, part
-    return blocking, share
-
-
-@kernel
-def release(problem, B):
-    """Free the surface whose limit holds it back most; whether there is one."""
-    worst, most = -1, ROUNDING
-    for s in range(problem.u.size):
-        # in rad: how far inside of its limit it would be; nothing of one that is free
-        inside = problem.at[s] * (problem.u[s] - wanted(problem, B, s))
-        if inside > most:
-            worst, most = s, inside
-    if worst >= 0:
-        problem.at[worst] = FREE
-    return worst >= 0
-
-
-RELUCTANT, TINY = 1e-4, 1e-300  # weight of a backup that is not asked, beside the others
-
-# Of the flap's movement. amplitude rad; step: rad of phase a frame; frames: how many at most, 0 for no probe.
-PROBE_CONFIG = record(amplitude=float, step=float, frames=int)
-# deflection rad of the flap; probed: frames of the present movement; from_s, to_s: when it began and ended.
-PROBE_MEMORY = record(deflection=float, probed=int, from_s=float, to_s=float)
-PROBE = record(config=PROBE_CONFIG, memory=PROBE_MEMORY)
+RELUCTANT = 1e-4  # least factor of a backup's weight, when nothing is handed over to it
+TINY = 1e-300  # in place of a divisor of zero
 
 
 @sized
@@ -189,7 +53,8 @@ def allocation_dtype(n: int) -> np.dtype:
 
 
 def configure(control: np.void, config: ControlConfig, travel: np.ndarray, aircraft: Aircraft) -> None:
-    """Fill `layout` and `allocation` of a law's record; travel (2, n) rad."""
+    """Fill `layout`, except its trim (loop/assembly.py), and `allocation` of a law's record; travel (2, n)
+    rad."""
     layout = control["layout"]
     layout["low"], layout["high"] = travel
     layout["main"] = main_surface_index_by_axis(aircraft)
@@ -198,15 +63,6 @@ def configure(control: np.void, config: ControlConfig, travel: np.ndarray, aircr
     layout["authority"], layout["general"] = _authority(aircraft, layout), _is_general(aircraft)
     step = control["reference"]["config"]["dt"] / config.hand_over_s
     control["allocation"]["config"]["hand_over_step"] = step
-
-
-def configure_probe(probe: np.void, probing: Probing | None, dt: float) -> None:
-    """Fill the record (dtype PROBE) for frames of dt s."""
-    if probing is not None:
-        probe["config"]["amplitude"] = radians(probing.amplitude_deg)
-        probe["config"]["step"] = 2.0 * pi * probing.frequency_hz * dt
-        probe["config"]["frames"] = round(probing.duration_s / dt)
-        probe["memory"]["from_s"] = probe["memory"]["to_s"] = -1.0
 
 
 def _is_general(aircraft: Aircraft) -> bool:
@@ -299,7 +155,7 @@ def lateral(axes, output, layout):
 
 
 @kernel
-def smooth(share):
+def smoothstep(share):
     """3 s^2 - 2 s^3: from 0 to 1 with no kink at either end."""
     return share * share * (3.0 - 2.0 * share)
 
@@ -374,9 +230,9 @@ def allocate_generally(axes, allocation, layout, effectiveness, prediction, shar
     set_problem(problem, axes.G, layout, effectiveness, prediction, share, probe)
     solve(problem, axes.G, axes.demand)
     for s in range(output.command.size):
-        output.command[s], at = problem.u[s], problem.at[s]
-        stop = layout.low[s] if at < 0 else layout.high[s]
-        output.saturated[s] = at != 0 and problem.u[s] == stop
+        output.command[s], side = problem.u[s], problem.side[s]
+        stop = layout.low[s] if side == LOW else layout.high[s]
+        output.saturated[s] = side != FREE and problem.u[s] == stop
 
 
 @kernel
@@ -429,7 +285,7 @@ def hand_over_pitch(allocation, reallocated, at_once, remains, least):
     given = output.hand_over if remains > 0.0 else 1.0
     if reallocated or remains <= 0.0:
         output.lost_share = 1.0 - remains if remains >= least else 1.0
-    output.transfer_share = smooth(given) * output.lost_share
+    output.transfer_share = smoothstep(given) * output.lost_share
 
 
 @kernel
@@ -456,23 +312,6 @@ def note_shortfall(axes, command, layout, lag, engine_authority):
         axes.shortfall[i] = axes.demand[i] - given
         least, greatest = attainable(G, layout, engine_authority, i)
         axes.beyond[i] = not least <= axes.hold[i] <= greatest
-
-
-@kernel
-def advance_probe(probe, wanted, t):
-    """Bring the probe to the next frame, t s: begin when wanted, end with the movement when no longer."""
-    config, memory = probe.config, probe.memory
-    if memory.probed == 0:
-        if not wanted or memory.from_s >= 0.0:
-            return
-        memory.from_s = t
-    phase = config.step * memory.probed
-    at_rest = phase % (2.0 * np.pi) < config.step
-    if memory.probed > 0 and at_rest and (not wanted or memory.probed >= config.frames):
-        memory.deflection, memory.probed, memory.to_s = 0.0, 0, t
-        return
-    memory.deflection = 0.5 * config.amplitude * (1.0 - np.cos(phase))
-    memory.probed += 1
 
 
 @kernel

@@ -24,7 +24,7 @@ which is damped by 0.7: they take the slow part; the fast one, which they could 
 the aircraft's own damping [Burcham1997]. What they give is in the design model, by the moments of the engines
 among its signals, or the law's observer finds it: e is then what is left. Once the surfaces reach, w fades.
 
-Which engine gives what is constrained least squares (allocation.py) over the accelerations u (m/s2 of the
+Which engine gives what is constrained least squares (least_squares.py) over the accelerations u (m/s2 of the
 whole aircraft's thrust over mass) that the power left above and below the common lever gives; B has
 
     share mass (0, down / Iy, -right / Iz)                       of a force along the body's x axis
@@ -41,8 +41,9 @@ import numpy as np
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.schema import MAX_EFFECTORS, MAX_LEVERS, MAX_THRUST
 from beaver_ftc.compiled import apart, kernel, record
-from beaver_ftc.control import allocation, row_of
-from beaver_ftc.control.allocation import problem_dtype, remaining
+from beaver_ftc.control import least_squares, row_of
+from beaver_ftc.control.allocation import remaining
+from beaver_ftc.control.least_squares import problem_dtype
 from beaver_ftc.design.model import AIRSPEED, DPT, QDYN, engine_power_kw, inertia_coefficients, slipstream
 from beaver_ftc.diagnosis.state import PITCH, YAW
 from beaver_ftc.scenario.declared import Declared
@@ -392,7 +393,7 @@ def steer_by_engines(engines, power, axes, layout, saturated, surfaces, airspeed
     base = power.output.command[0]
     limit(config, memory, output.authority, base)
     want(config, memory, axes, layout, saturated, surfaces)
-    allocation.solve(memory.problem, memory.serving, memory.wanted)
+    least_squares.solve(memory.problem, memory.serving, memory.wanted)
     memory.wanted[:] = 0.0  # what cannot be given is not integrated
     for e in range(config.n):
         u = memory.problem.u[e]

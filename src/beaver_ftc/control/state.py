@@ -12,9 +12,10 @@ import numpy as np
 from beaver_ftc.compiled import one_of, record, sized
 from beaver_ftc.control import MODULES, CompiledLaw, accommodation, allocation, engines, file_of, laws, row_of
 from beaver_ftc.control.accommodation import surfaces_dtype
-from beaver_ftc.control.allocation import PROBE, allocation_dtype, axes_dtype, layout_dtype
+from beaver_ftc.control.allocation import allocation_dtype, axes_dtype, layout_dtype
 from beaver_ftc.control.engines import ENGINES, POWER
 from beaver_ftc.control.laws import REFERENCE
+from beaver_ftc.control.probe import PROBE, configure_probe
 from beaver_ftc.scenario.declared import Declared
 
 FILES: dict[str, CompiledLaw] = {file_of(module): import_module(module).LAW for module in MODULES}
@@ -53,7 +54,7 @@ def configure(control: np.void, declared: Declared, travel: np.ndarray) -> None:
     laws.configure_reference(control["reference"], config, dt)
     accommodation.configure(control["surfaces"], config, row.informed, dt)
     allocation.configure(control, config, travel, declared.aircraft)
-    allocation.configure_probe(control["probe"], declared.fdi.probing, dt)
+    configure_probe(control["probe"], declared.fdi.probing, dt)
     engines.configure_power(control["power"], control["layout"], declared)
     engines.configure_engines(control["engines"], declared)
 

@@ -24,6 +24,7 @@ import numpy as np
 from beaver_ftc.compiled import apart, kernel, record
 from beaver_ftc.control import accommodation, allocation, engines
 from beaver_ftc.control.accommodation import MODE_REALLOCATED
+from beaver_ftc.control.probe import advance_probe
 from beaver_ftc.design.model import AIRSPEED
 from beaver_ftc.diagnosis.state import PITCH
 from beaver_ftc.scenario.diagnosis import ControlConfig
@@ -122,7 +123,7 @@ def prepare(control, assessment, prediction, mode, t):
     allocation.hand_over_pitch(control.allocation, reallocated, at_once, remains, least)
     if control.probe.config.frames > 0:
         wanted = assessment.pitch_undecided and config.uses_verdict and not config.informed
-        allocation.advance_probe(control.probe, wanted, t)
+        advance_probe(control.probe, wanted, t)
 
 
 @apart
@@ -136,7 +137,7 @@ def command_surfaces(control, assessment, faults, prediction, by_observer):
     uses_verdict, effectiveness = control.config.uses_verdict, surfaces.output.effectiveness
     if uses_verdict:
         allocation.subtract_offsets(axes, surfaces.output.offset, prediction.G)
-    share = out.transfer_share if by_observer else allocation.smooth(out.hand_over)
+    share = out.transfer_share if by_observer else allocation.smoothstep(out.hand_over)
     probe = control.probe.memory.deflection
     if layout.general:
         allocation.allocate_generally(

@@ -1,0 +1,43 @@
+"""The probe is active diagnosis: it moves flap and elevator against each other, and a healthy aircraft feels
+nothing of it. The flap goes down and back by (1 - cos) / 2; the allocation gives the elevator what the flap
+does not leave. A surface that does not follow then shows.
+"""
+
+from math import pi, radians
+
+import numpy as np
+
+from beaver_ftc.compiled import kernel, record
+from beaver_ftc.scenario.diagnosis import Probing
+
+# Of the flap's movement. amplitude rad; step: rad of phase a frame; frames: how many at most, 0 for no probe.
+CONFIG = record(amplitude=float, step=float, frames=int)
+# deflection rad of the flap; probed: frames of the present movement; from_s, to_s: when it began and ended.
+MEMORY = record(deflection=float, probed=int, from_s=float, to_s=float)
+PROBE = record(config=CONFIG, memory=MEMORY)
+
+
+def configure_probe(probe: np.void, probing: Probing | None, dt: float) -> None:
+    """Fill the record (dtype PROBE) for frames of dt s."""
+    if probing is not None:
+        probe["config"]["amplitude"] = radians(probing.amplitude_deg)
+        probe["config"]["step"] = 2.0 * pi * probing.frequency_hz * dt
+        probe["config"]["frames"] = round(probing.duration_s / dt)
+        probe["memory"]["from_s"] = probe["memory"]["to_s"] = -1.0
+
+
+@kernel
+def advance_probe(probe, wanted, t):
+    """Bring the probe to the next frame, t s: begin when wanted, end with the movement when no longer."""
+    config, memory = probe.config, probe.memory
+    if memory.probed == 0:
+        if not wanted or memory.from_s >= 0.0:
+            return
+        memory.from_s = t
+    phase = config.step * memory.probed
+    at_rest = phase % (2.0 * pi) < config.step
+    if memory.probed > 0 and at_rest and (not wanted or memory.probed >= config.frames):
+        memory.deflection, memory.probed, memory.to_s = 0.0, 0, t
+        return
+    memory.deflection = 0.5 * config.amplitude * (1.0 - np.cos(phase))
+    memory.probed += 1

@@ -130,10 +130,10 @@ def accommodate(control, assessment, faults, prediction, measured):
 
 
 @kernel
-def begin_frame(output, assessment, informed):
-    """Nothing is given up or parked yet; a slow surface has lost authority."""
+def begin_frame(output, assessment, ignores_lag):
+    """Nothing is given up or parked yet; a slow surface has lost authority, unless the law ignores lag."""
     output.given_up[:], output.parked[:] = 0, 0
-    output.authority_lost = assessment.lags and not informed
+    output.authority_lost = assessment.lags and not ignores_lag
 
 
 @kernel

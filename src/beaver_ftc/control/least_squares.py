@@ -30,7 +30,8 @@ ROUNDING = 1e-12  # rad: a surface this little inside of its limit stays there
 @sized
 def problem_dtype(n: int) -> np.dtype:
     """A problem of n surfaces and its solution u. side: LOW or HIGH where a limit holds the surface, else
-    FREE, kept for the next frame; y: the multipliers; S (3, 3): the matrix of their system, and its factor."""
+    FREE, kept for the next frame; y: the multipliers; S (3, 3): the matrix of their system, then its factor
+    L."""
     return record(u_preferred=n, weight=n, low=n, high=n, u=n, side=(int, n), y=3, S=(3, 3), slack=float)
 
 

@@ -18,10 +18,10 @@ import numpy as np
 
 from beaver_ftc.compiled import apart, kernel, record, sized
 from beaver_ftc.control import CompiledLaw
-from beaver_ftc.control.accommodation import approach, begin_frame
+from beaver_ftc.control.accommodation import begin_frame
 from beaver_ftc.control.laws import published
 from beaver_ftc.control.laws.published import FEEDBACK
-from beaver_ftc.diagnosis.schemes.published import (
+from beaver_ftc.diagnosis.detection.state_network import (
     STATE_NETWORK_RECORD,
     configure_network,
     evaluate_state_network,
@@ -91,7 +91,7 @@ def adapt(law, surfaces, main, saturated, error, G, u, dt):
             slope += signal[i] * G[i, s] * u[s]
         moved = surfaces.output.effectiveness[s] + dt * config.gain * slope
         estimate = min(max(moved, config.least), config.most)
-        approach(surfaces, s, estimate, estimate, False)
+        surfaces.output.target[s] = surfaces.output.effectiveness[s] = estimate
     if config.networks:
         train_state_network(law.network, signal, dt)
 

@@ -21,7 +21,7 @@ from beaver_ftc.diagnosis.detection.filters import bank_share
 from beaver_ftc.diagnosis.detection.parity import USUAL_SIZE, StatisticalSize
 from beaver_ftc.diagnosis.monitors import sensor_monitor
 from beaver_ftc.diagnosis.monitors.redundancy import SENSOR_MONITOR_RECORD
-from beaver_ftc.diagnosis.schemes import adaptive_estimators, published
+from beaver_ftc.diagnosis.schemes import adaptive_estimators, zhang2005
 from beaver_ftc.diagnosis.state import (
     ADAPTIVE_SCHEME,
     NO_SCHEME,
@@ -47,7 +47,7 @@ def fdi_dtype(n: int, size: StatisticalSize = USUAL_SIZE) -> np.dtype:
         fdae=filters.FDAE_RECORD, verdict=conclusions.conclusion_dtype(n), layout=state.layout_dtype(n),
         isolation=isolation.isolation_dtype(n), types=registry.fault_types_dtype(n),
         statistical=statistical.statistical_dtype(size), sensor_monitor=SENSOR_MONITOR_RECORD,
-        published=published.PUBLISHED_RECORD, engine_monitor=monitors.ENGINE_MONITOR_RECORD,
+        published=zhang2005.PUBLISHED_RECORD, engine_monitor=monitors.ENGINE_MONITOR_RECORD,
         plugin_verdict=state.plugin_verdict_dtype(n),
     )  # fmt: skip
 
@@ -67,7 +67,7 @@ def configure_diagnosis(fdi: np.void, pred: np.void, declared: Declared, travel:
     filters.configure_fdae(fdi["fdae"], declared)
     monitors.configure_balance(fdi["engine_monitor"]["config"], aircraft)
     if config.is_published:
-        published.reconfigure_published(fdi, declared, travel)
+        zhang2005.reconfigure(fdi, declared, travel)
     registry.configure_types(fdi["types"], fdi["layout"], pred["actuators"], declared, travel)
     fdi["types"]["config"]["has_eG"] = fdi["bound"]["has_eG"]
     conclusions.reset_conclusion(fdi["verdict"])
@@ -149,7 +149,7 @@ def advance_estimators_to_frame(fdi, prediction, measured, k, t):
     """Bring the estimators from the frame before to frame k at t s."""
     scheme = fdi.config.scheme_number
     if scheme == PUBLISHED_SCHEME:
-        published.advance_estimators_to_frame(fdi, prediction, measured)
+        zhang2005.advance_estimators_to_frame(fdi, prediction, measured)
     elif scheme != NO_SCHEME:
         adaptive_estimators.advance_estimators_to_frame(fdi, prediction, measured, k, t)
 
@@ -161,7 +161,7 @@ def update_verdict(fdi, prediction, measured, t):
     if scheme == ADAPTIVE_SCHEME:
         adaptive_estimators.update_verdict(fdi, prediction, measured, t)
     elif scheme == PUBLISHED_SCHEME:
-        published.update_verdict(fdi, prediction, measured, t)
+        zhang2005.update_verdict(fdi, prediction, measured, t)
     elif scheme == PLUGIN_SCHEME:
         adaptive_estimators.plugin_update(fdi, measured, t)
 
@@ -186,7 +186,7 @@ def kernels_of_scheme(fdi: np.void) -> Iterator[Any]:
     scheme, ours = cfg["scheme_number"], adaptive_estimators
     yield begin_scheme
     if scheme == PUBLISHED_SCHEME:
-        yield from (published.advance_estimators_to_frame, published.update_verdict)
+        yield from (zhang2005.advance_estimators_to_frame, zhang2005.update_verdict)
     elif scheme != NO_SCHEME:
         yield ours.advance_estimators_to_frame
         yield ours.plugin_update if scheme == PLUGIN_SCHEME else ours.update_verdict

@@ -5,20 +5,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from beaver_ftc.diagnosis.schemes import published as published_scheme
+from beaver_ftc.diagnosis.detection import state_network
 
 TRAVEL = np.array([[-0.52, -0.49, -0.44], [0.52, 0.49, 0.44]])
 MAIN = np.arange(3)
 
 
 def network(gain=60.0, limit=20.0):
-    new = np.zeros(1, published_scheme.STATE_NETWORK_RECORD).view(np.recarray)[0]
-    published_scheme.configure_network(new, gain, limit, TRAVEL)
+    new = np.zeros(1, state_network.STATE_NETWORK_RECORD).view(np.recarray)[0]
+    state_network.configure_network(new, gain, limit, TRAVEL)
     return new
 
 
 def at(new, alpha=0.1, beta=0.0, x=(0.0, 0.0, 0.0), u=(0.0, 0.0, 0.0, 0.0)):
-    published_scheme.evaluate_state_network(
+    state_network.evaluate_state_network(
         new, MAIN, np.array(x), np.array([alpha, beta, 45.0, 1000.0, 0.3]), np.array(u)
     )
     return new

@@ -1,0 +1,118 @@
+"""The published scheme, to the letter (`fdi.scheme: zhang2005`) [Zhang2005, sec. IV, eq. (3) and (4)].
+
+    FDAE         xhat0' = -Lambda0 (xhat0 - x) + f + G u + fhat(x, u, th0),     eps0 = x - xhat0
+                 th0' = P{Gamma Z^T D[eps0]},   Z = d fhat / d th0,   th0 = 0 until Td
+    detection    Td = inf {t: |eps0_i(t)| > ebar_i(t), some i},   ebar_i = int e^{-lam (t-tau)} eta_bar_i dtau
+    FIE s        xhats' = -Lambdas (xhats - x) + f + G u + fhats(x, u, ths) + Oms ths',   from Td on
+                 Oms' = -Lambdas Oms + Zs,   Oms(Td) = 0,   ths' = P{Gammas Oms^T epss}
+    thresholds   mu_i^s = k_i^s |Om_i^s| + int_Td^t e^{-lam (t-tau)} eta_bar_i dtau + e^{-lam (t-Td)} w_i
+    isolation    s is excluded once |eps_i^s| > mu_i^s, some i; the one left is the fault; none: not isolable
+
+The estimators are those of detection/filters.py and isolation.py, whose residuals and thresholds these are.
+This file has the differences: Euler steps, a network of (x, u) (detection/state_network.py), gradients
+instead of least squares, and no alarm but the FDAE's. D[eps] is 0 while the residuals of all axes are within
+their thresholds, and the whole of eps otherwise [Zhang2002]. w is 0, since xhats(Td) =
+x(Td); with noisy gyros w is the bound on their noise. What the paper leaves open is an option (plugins.yaml
+lists them, with how each was chosen); some options remove a part of the scheme, to measure the effect of that
+part.
+"""
+
+import numpy as np
+
+from beaver_ftc.compiled import apart, kernel, record
+from beaver_ftc.diagnosis import conclusion
+from beaver_ftc.diagnosis.detection import filters
+from beaver_ftc.diagnosis.detection.state_network import (
+    STATE_NETWORK_RECORD,
+    configure_network,
+    evaluate_state_network,
+    train_state_network,
+)
+from beaver_ftc.diagnosis.monitors import sensor_monitor
+from beaver_ftc.diagnosis.schemes import adaptive_estimators
+from beaver_ftc.diagnosis.state import CONSTANT_THRESHOLD, fill
+from beaver_ftc.plugins import DETECTORS, settings
+from beaver_ftc.scenario.declared import Declared
+
+# waits: whether the network waits for a residual outside the threshold; mu0: rad/s, in the place of all
+# adaptive thresholds, or 0.
+PUBLISHED_CONFIG_RECORD = record(waits=int, mu0=float)
+PUBLISHED_RECORD = record(config=PUBLISHED_CONFIG_RECORD, network=STATE_NETWORK_RECORD)
+
+
+def reconfigure(fdi: np.void, declared: Declared, travel: np.ndarray) -> None:
+    """Turn the stages of a diagnosis, filled in already, into this scheme; travel (2, n) rad: the stops."""
+    config, dt = declared.fdi, 1.0 / declared.rate_hz
+    options = settings(DETECTORS, config.scheme, config.options)
+    scheme, isolation = fdi["published"], fdi["isolation"]
+    limit = options["network_limit_rad_s2"] if options["projection"] else np.inf
+    configure_network(scheme["network"], options["network_gain"], limit, travel[:, fdi["layout"]["main"]])
+    scheme["config"]["waits"] = options["dead_zone"]
+    fdi["fdae"]["config"]["a"] = fdi["bank"]["config"]["a"][0] = euler_decay(config.detection_pole_per_s, dt)
+    fill(
+        isolation["config"], a=euler_decay(config.isolation_pole_per_s, dt), gradient=1,
+        gain=options["adaptation_gain"], free=not options["projection"],
+    )  # fmt: skip
+    isolation["estimator"]["theta"] = options["initial_theta"]
+    if not options["adaptive_threshold"]:
+        scheme["config"]["mu0"] = options["constant_threshold_rad_s"]
+        isolation["config"]["mu_kind"] = CONSTANT_THRESHOLD
+    if options["leave_out"]:
+        isolation["estimator"]["excluded"][int(options["leave_out"]) - 1] = 1
+
+
+def euler_decay(lam: float, dt_s: float) -> float:
+    """Return the decay of a filter's state in an Euler step; 0 for a pole beyond the frame rate."""
+    return max(1.0 - lam * dt_s, 0.0)
+
+
+@kernel
+def train_if_due(pub, fdae, detected, dt):
+    """The FDAE's network learns once a fault is detected, in frames with a residual outside its threshold.
+
+    The residual of one axis is enough for the networks of all three to learn. Without the dead zone they
+    learn from the first frame on, from any residual.
+    """
+    if not pub.config.waits or (detected and fdae_axis(fdae) >= 0):
+        train_state_network(pub.network, fdae.output.residual, dt)
+
+
+@kernel
+def fdae_axis(fdae):
+    """The first axis on which the residual of the FDAE exceeds its threshold, or -1."""
+    for i in range(3):
+        if abs(fdae.output.residual[i]) > fdae.output.threshold[i]:
+            return i
+    return -1
+
+
+@apart
+def advance_estimators_to_frame(fdi, prediction, measured):
+    """Bring isolation, FDAE and its network to this frame."""
+    pub, dt, mu = fdi.published, fdi.config.dt, fdi.published.config.mu0
+    adaptive_estimators.update_filters(fdi, prediction, measured)
+    adaptive_estimators.update_estimators(fdi, prediction)
+    train_if_due(pub, fdi.fdae, fdi.verdict.detected, dt)
+    filters.advance_fdae(
+        fdi.fdae, fdi.bank, fdi.bound, prediction.x_before, prediction.means.F, False, False, dt
+    )
+    if mu > 0.0:
+        fdi.fdae.output.threshold[:], fdi.bank.output.threshold[0] = mu, mu
+        for fie in fdi.isolation.estimator[: fdi.isolation.config.n_estimators]:
+            fie.B[:] = mu
+
+
+@apart
+def update_verdict(fdi, prediction, measured, t):
+    """Raise the alarm by the FDAE, evaluate its network, and isolate."""
+    if sensor_monitor.has_alarm(fdi.sensor_monitor):
+        return
+    before, found, net = fdi.verdict.detected, fdi.verdict, fdi.published.network
+    filters.fdae_residual(fdi.fdae, measured.x)
+    axis = fdae_axis(fdi.fdae)
+    evaluate_state_network(net, fdi.layout.main, measured.x, measured.y, prediction.u)
+    fdi.fdae.network.output[:] = net.output
+    if axis >= 0:
+        conclusion.latch_alarm(found, axis, t)
+    if found.detected:
+        adaptive_estimators.continue_isolation(fdi, measured, t, before)

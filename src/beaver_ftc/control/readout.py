@@ -6,14 +6,21 @@ from typing import NamedTuple
 import numpy as np
 
 
-class Schedule(NamedTuple):
-    """Gains of the default law over dynamic pressure. qdyn_pa (points,), ascending; Kp 1/s, L_rate 1 and
-    L_disturbance 1/s (loops, points): feedback and observer."""
+class DefaultLaw(NamedTuple):
+    """The default law's gains, over dynamic pressure, and what it assumes of actuators and frames.
+
+    - `qdyn_pa` (points,): dynamic pressure, Pa, ascending.
+    - `Kp` 1/s, `L_rate` 1, `L_disturbance` 1/s (loops, points): gains of feedback and observer.
+    - `lead` (surfaces,): command beyond the actuator's position over what is wanted beyond it.
+    - `share`: part of a frame until a command acts.
+    """
 
     qdyn_pa: np.ndarray
     Kp: np.ndarray
     L_rate: np.ndarray
     L_disturbance: np.ndarray
+    lead: np.ndarray
+    share: float
 
 
 class ControlReadout:
@@ -38,18 +45,8 @@ class ControlReadout:
         return np.array(self._control["layout"]["trim"])
 
     @cached_property
-    def schedule(self) -> Schedule:
-        """Gains of the default law."""
+    def default_law(self) -> DefaultLaw:
+        """Gains of the default law, and what it assumes."""
         law = self._control["rejecting"]["config"]
-        return Schedule(*(law[name].copy() for name in ("qdyn", "Kp_at", "L_rate_at", "L_disturbance_at")))
-
-    @cached_property
-    def lead(self) -> np.ndarray:
-        """Of the default law: command beyond the actuator's position over what is wanted beyond it,
-        (surfaces,)."""
-        return np.array(self._control["rejecting"]["config"]["lead"])
-
-    @cached_property
-    def share(self) -> float:
-        """Of the default law: share of a frame until a command acts."""
-        return float(self._control["rejecting"]["config"]["share"])
+        names = "qdyn", "Kp_at", "L_rate_at", "L_disturbance_at", "lead"
+        return DefaultLaw(*(law[name].copy() for name in names), float(law["share"]))

@@ -21,7 +21,7 @@ import numpy as np
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.control import flown_by
 from beaver_ftc.control.laws.rejecting import STAND_IN, margins
-from beaver_ftc.control.readout import Schedule
+from beaver_ftc.control.readout import DefaultLaw
 from beaver_ftc.design.model import QDYN, jacobian
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
 from beaver_ftc.documents.errors import BadInput
@@ -66,7 +66,7 @@ class OpenLoop:
     share: float
 
 
-def interpolated(law: Schedule, qdyn: float, lost: float) -> np.ndarray:
+def interpolated(law: DefaultLaw, qdyn: float, lost: float) -> np.ndarray:
     """Kp, L_rate and L_disturbance, (3, 3) over the axes, of the law's schedule at a dynamic pressure (Pa), a
     share `lost` of pitch handed over."""
     schedules = law.Kp, law.L_rate, law.L_disturbance
@@ -222,16 +222,17 @@ def open_loop(
 ) -> OpenLoop:
     """The loop with this effectiveness (n,), the law knowing it; y: the measured signals in trim."""
     law, dt = frame.control, 1.0 / scenario.rate_hz
+    default = law.default_law
     _, G, f_x, f_y = jacobian(frame.design, np.zeros(3), y, law.trim_rad)
     lost = 1.0 - effectiveness[law.main[PITCH]] if law.stand_in >= 0 else 0.0
     whole = 1.0 - (1.0 - frame.actuators.approach) ** scenario.substeps
     C = outputs(linear.states, y)
     delay_s, keep = sensors(scenario, len(C), dt)
     demand = allocation(G * effectiveness, law.main, law.stand_in, lost)
-    Kp, L_rate, L_disturbance = interpolated(law.schedule, y[QDYN], lost)
+    Kp, L_rate, L_disturbance = interpolated(default, y[QDYN], lost)
     return OpenLoop(
         linear.A, linear.B, C, np.hstack((f_x, f_y[:, : len(C) - 3])), G * effectiveness, effectiveness,
-        whole, delay_s, keep, dt, Kp, L_rate, L_disturbance, demand, law.lead, law.share,
+        whole, delay_s, keep, dt, Kp, L_rate, L_disturbance, demand, default.lead, default.share,
     )  # fmt: skip
 
 

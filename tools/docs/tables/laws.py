@@ -24,11 +24,11 @@ def law_gains() -> str:
     rows = []
     for declared, keys in DECLARED.items():
         scenario = load(keys)
-        law = FrameReadout(Loop(scenario).frames[0]).control
+        law = FrameReadout(Loop(scenario).frames[0]).control.default_law
         slowest = scenario.airframe.envelope.airspeed_mps[0]
-        qdyn_pa = law.schedule.qdyn_pa
+        qdyn_pa = law.qdyn_pa
         pressure = qdyn_pa[0] * (AIRSPEED_MPS / slowest) ** 2
-        for loop, gains, lead in zip(LOOPS, law.schedule.Kp, law.lead, strict=True):
+        for loop, gains, lead in zip(LOOPS, law.Kp, law.lead, strict=True):
             gain = np.interp(pressure, qdyn_pa, gains)
             rows.append((declared, loop, f"{gain:.1f}", f"{RATIO * gain:.1f}", f"{lead:.1f}"))
     return markdown_table(("declared", "loop", "K_p, 1/s", "omega_o, 1/s", "lead"), rows)

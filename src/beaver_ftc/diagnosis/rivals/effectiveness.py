@@ -20,7 +20,7 @@ from beaver_ftc.diagnosis.rivals.rival import UNANTICIPATED
 
 _STEP_RAD_S = 1e-6  # for df/dx: f is quadratic in x, so a central difference is exact to rounding
 _STEPS = _STEP_RAD_S * np.vstack((np.eye(3), -np.eye(3)))
-THETA, N_STATES_WITHOUT_GUSTS = slice(3, 6), 6
+N_RATES, THETA, N_STATES_WITHOUT_GUSTS = 3, slice(3, 6), 6
 _MAX_SQUARE = 1e6
 DEFAULT_OPTIONS = {
     "noise": 3.0,  # standard deviation of the acceleration error over its declared bound
@@ -32,7 +32,7 @@ DEFAULT_OPTIONS = {
 
 
 class EffectivenessFilter(KalmanRival):
-    """Base of the augmented filters; they differ in `predict` and in `update_statistic`."""
+    """Base of the augmented filters; they differ in `predict` and in `statistic`."""
 
     defaults: ClassVar[Mapping[str, float]] = DEFAULT_OPTIONS
 
@@ -40,7 +40,7 @@ class EffectivenessFilter(KalmanRival):
         """Start healthy, with theta known to a tenth."""
         self.fill_model(3, 0.01, self.options["drift_per_s"] ** 2 * self.dt)
         self.fade = exp(-self.dt / self.options["misfit_s"])
-        self.mean_square, self.cusum = 3.0, 0.0
+        self.mean_square, self.cusum = float(N_RATES), 0.0
 
     def transition(self, measured: Measured) -> np.ndarray:
         """F (n, n) of this frame, but for df/dx: [[1, dt G_s u_s], [0, 1]], with the air [.., dt B], a."""
@@ -48,14 +48,14 @@ class EffectivenessFilter(KalmanRival):
         F[:3, THETA] = self.dt * measured.contribution[:, self.leading]
         return F
 
-    def weigh(self, nu: np.ndarray, S: np.ndarray) -> float:
-        """The statistic by nu' S^-1 nu, whose mean is kept."""
+    def update_statistic(self, nu: np.ndarray, S: np.ndarray) -> float:
+        """Limit theta to [-1, 1], update the mean of nu' S^-1 nu, and return the decision statistic."""
         self.z[THETA] = np.clip(self.z[THETA], -1.0, 1.0)
         square = min(float(normalised_innovation_square(nu, S)), _MAX_SQUARE)
         self.mean_square = self.fade * self.mean_square + (1.0 - self.fade) * square
-        return self.update_statistic(square)
+        return self.statistic(square)
 
-    def update_statistic(self, square: float) -> float:
+    def statistic(self, square: float) -> float:
         """The decision statistic, 1 at the alarm, by nu' S^-1 nu."""
         raise NotImplementedError
 
@@ -68,10 +68,11 @@ class EffectivenessFilter(KalmanRival):
         """Name the surface whose theta is most significantly off, or none: innovations misfit, or a surface
         would have gained."""
         i = int(np.argmax(self.wald_statistics()))
-        if self.mean_square > 3.0 * self.options["misfit"] or self.z[3 + i] > 0.0:
+        theta = self.z[THETA]
+        if self.mean_square > N_RATES * self.options["misfit"] or theta[i] > 0.0:
             return UNANTICIPATED
         effectiveness = np.ones(len(self.context.surfaces))
-        effectiveness[self.leading] += np.clip(self.z[THETA], -1.0, 0.0)
+        effectiveness[self.leading] += np.clip(theta, -1.0, 0.0)
         return self.loss(i, float(effectiveness[self.leading[i]] - 1.0), effectiveness)
 
 
@@ -91,7 +92,7 @@ class AugmentedEkf(EffectivenessFilter):
         self.z = self.move(self.z, F, measured.acceleration - J @ x)
         self.P = self.add_noise(F @ self.P @ F.T, measured, self.options["noise"])
 
-    def update_statistic(self, square: float) -> float:
+    def statistic(self, square: float) -> float:
         """The largest theta^2 / variance over the alarm level."""
         return float(self.wald_statistics().max() / self.options["alarm"])
 
@@ -116,7 +117,8 @@ class AugmentedUkf(EffectivenessFilter):
         off = points - self.z
         self.P = self.add_noise((off.T * weights) @ off, measured, self.options["noise"])
 
-    def update_statistic(self, square: float) -> float:
-        """g = max(0, g + (square - 3 allowance)) over the alarm level; 3 is what a healthy flight expects."""
-        self.cusum = max(0.0, self.cusum + square - 3.0 * self.options["allowance"])
+    def statistic(self, square: float) -> float:
+        """g = max(0, g + square - N_RATES allowance) over the alarm level; N_RATES is the mean of a healthy
+        flight."""
+        self.cusum = max(0.0, self.cusum + square - N_RATES * self.options["allowance"])
         return self.cusum / self.options["alarm"]

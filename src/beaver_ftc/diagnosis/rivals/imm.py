@@ -81,7 +81,7 @@ class InteractingMultipleModels(KalmanRival):
         self.z = self.move(z, self.F, acceleration)
         self.P = self.add_noise(self.F @ P @ self.F.T, measured, self.noise)
 
-    def weigh(self, nu: np.ndarray, S: np.ndarray) -> float:
+    def update_statistic(self, nu: np.ndarray, S: np.ndarray) -> float:
         """The logarithm of the odds of any fault, over the alarm level."""
         self.mu = posterior_probabilities(self.mu, log_likelihood(nu, S))
         return float(np.log((1.0 - self.mu[0]) / self.mu[0]) / self.options["alarm"])

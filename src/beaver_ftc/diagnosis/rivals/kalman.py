@@ -16,11 +16,11 @@ Turbulence is the rotation of the air as three more states, a first-order proces
 import numpy as np
 
 from beaver_ftc.diagnosis import Measured
-from beaver_ftc.diagnosis.rivals.rival import Rival
+from beaver_ftc.diagnosis.rivals.rival import RivalDetector
 
 
-class KalmanRival(Rival):
-    """Base of the rivals by Kalman filters: each has `predict` and `weigh`.
+class KalmanRival(RivalDetector):
+    """Base of the rivals by Kalman filters: each has `predict` and `update_statistic`.
 
     F (n, n) without the dynamics of the aircraft; q (n,): diagonal of Q but for the rates; R (3, 3); z, P:
     state and covariance of one filter. before: the measurements of the frame before; None in the first.
@@ -45,7 +45,7 @@ class KalmanRival(Rival):
         self.z = np.zeros(self.n)
 
     def advance(self, measured: Measured, command: np.ndarray) -> float:
-        """Predict over the elapsed frame, update with the measured rates, weigh the innovation."""
+        """Predict over the elapsed frame, update with the measured rates, and judge the innovation."""
         statistic = 0.0
         if self.before is None:
             self.z[..., :3] = measured.x
@@ -53,7 +53,7 @@ class KalmanRival(Rival):
             self.predict(measured, self.before)
             nu = measured.x - self.z[..., :3]
             self.z, self.P, S = update_state_and_covariance(self.z, self.P, nu, self.R)
-            statistic = self.weigh(nu, S)
+            statistic = self.update_statistic(nu, S)
         self.before = measured
         return statistic
 
@@ -61,7 +61,7 @@ class KalmanRival(Rival):
         """Predict z and P over the elapsed frame, which began at the measurements of `before`."""
         raise NotImplementedError
 
-    def weigh(self, nu: np.ndarray, S: np.ndarray) -> float:
+    def update_statistic(self, nu: np.ndarray, S: np.ndarray) -> float:
         """The decision statistic, 1 at the alarm, by the innovation nu and its covariance S."""
         raise NotImplementedError
 
@@ -72,9 +72,10 @@ class KalmanRival(Rival):
         return z
 
     def add_noise(self, P: np.ndarray, measured: Measured, noise: float | np.ndarray) -> np.ndarray:
-        """P + Q. The acceleration that nothing explains has the size of the declared bound times noise (...).
+        """Add Q to P (..., n, n) in place, and return P.
 
-        That bound is eta_bar as long as it is the published one. With more declared it is the sum of all
+        The acceleration that nothing explains has the size of the declared bound times noise (...). That
+        bound is eta_bar as long as it is the published one. With more declared, eta_bar is the sum of all
         worst cases, instruments and air included, which have states or a variance of their own here.
         """
         size = self.own_bound if self.context.declared.errors else measured.eta_bar

@@ -1,6 +1,7 @@
 """Observer residual against a constant threshold: the textbook scheme [Chen1999, ch. 2].
 
-    eps[k+1] = a eps[k] + dt nu,   a = exp(-pole dt)        alarm when |eps_i| > alarm constant_i / pole
+    eps[k+1] = a eps[k] + nu,   a = exp(-pole dt)        alarm when |eps_i| > alarm constant_i / pole
+    nu = x[k+1] - x[k] - dt (f + G u),   rad/s
 
 The residual is that of the published detection estimator; only the threshold does not move with the state.
 From the alarm on, a residual started again is fitted by the filtered effect of each surface, by least squares
@@ -21,7 +22,7 @@ import numpy as np
 
 from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis import Measured, Verdict
-from beaver_ftc.diagnosis.rivals.rival import UNANTICIPATED, Rival
+from beaver_ftc.diagnosis.rivals.rival import UNANTICIPATED, RivalDetector
 
 _LEAST_BOUND_RAD_S2 = 1e-4  # a declared bound of zero would make any rounding an alarm
 
@@ -37,7 +38,7 @@ def healthy_residual_std(context: Context, a: float) -> np.ndarray:
     return np.sqrt((dt * by_model) ** 2 + (dt * by_air) ** 2 + by_gyro**2)
 
 
-class ConstantThresholdObserver(Rival):
+class ConstantThresholdObserver(RivalDetector):
     """Observer residual with a constant threshold; least squares name the surface [Chen1999].
 
         J_s = min over theta in [-1, 0] of sum |eps - theta Omega_s|^2, in units of the threshold

@@ -13,14 +13,15 @@ from beaver_ftc.diagnosis.rivals.gust import VaneGust
 UNANTICIPATED = Verdict(True, None, "unanticipated", "unanticipated")
 
 
-class Rival:
+class RivalDetector:
     """Base of the rival detectors; each has `start`, `advance` and `isolate`."""
 
     name: ClassVar[str] = ""
     defaults: ClassVar[Mapping[str, float]] = {}
 
     def reset(self, context: Context) -> None:
-        """Prepare for a flight."""
+        """Prepare for a flight. Where vanes show the gust, `step` subtracts it: the detector then has the
+        context that declares only the rest of the turbulence."""
         self.options, self.vane_gust = rival_options(self.name, self.defaults, context), VaneGust(context)
         self.context, self.dt = self.vane_gust.context, context.dt_s
         self.leading = list(context.leading)

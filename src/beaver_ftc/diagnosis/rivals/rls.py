@@ -17,7 +17,7 @@ from typing import ClassVar
 import numpy as np
 
 from beaver_ftc.diagnosis import Measured, Verdict
-from beaver_ftc.diagnosis.rivals.rival import Rival
+from beaver_ftc.diagnosis.rivals.rival import RivalDetector
 
 
 class RecursiveLeastSquaresFit:
@@ -61,7 +61,7 @@ class InputOutputPredictionTest:
         return score
 
 
-class RlsMonitor(Rival):
+class RlsMonitor(RivalDetector):
     """Recursive least squares between each surface and its rate, without an aircraft model [Keipour2019]."""
 
     name: ClassVar[str] = "rls-monitor"

@@ -16,7 +16,6 @@ from beaver_ftc.diagnosis.types import (
     SUBTRACT_OFFSET,
     DeflectionRelation,
     FaultType,
-    clip_travel,
     feasible_set,
     middle_estimate,
     set_middle,
@@ -53,36 +52,39 @@ STUCK = FaultType(
 )  # fmt: skip
 
 
+def neutral_of(lo: float, hi: float) -> float:
+    """Neutral, or the stop that is nearest to it, rad."""
+    return min(max(0.0, lo), hi)
+
+
+_neutral_of = kernel(neutral_of)
+
+
 @kernel
 def float_range(c, srf, h, k):
     """At neutral, or at the stop that is nearest to it, rad."""
-    p = clip_travel(srf, 0.0)
+    p = _neutral_of(*travel_range(srf, h))
     return p, p
 
 
 @kernel
 def float_error(srf, h):
     """Neutral position minus the command, rad."""
-    return clip_travel(srf, 0.0) - srf.last.u
-
-
-def neutral_of(lo: float, hi: float) -> float:
-    """Neutral, or the stop that is nearest to it, rad."""
-    return min(max(0.0, lo), hi)
+    return _neutral_of(*travel_range(srf, h)) - srf.last.u
 
 
 def float_deflection(fdi: np.void, s: int, h: int) -> float | None:
-    """Deflection, rad."""
+    """Deflection of surface s afloat, rad."""
     return neutral_of(lower_stop(fdi, s, h), upper_stop(fdi, s, h))
 
 
 def upper_stop(fdi: np.void, s: int, h: int) -> float:
-    """Deflection, rad."""
+    """Upper stop of surface s, rad, where a hardover upwards ends."""
     return float(fdi["types"]["surface"][s]["actuator"]["stop_hi"])
 
 
 def lower_stop(fdi: np.void, s: int, h: int) -> float:
-    """Deflection, rad."""
+    """Lower stop of surface s, rad, where a hardover downwards ends."""
     return float(fdi["types"]["surface"][s]["actuator"]["stop_lo"])
 
 
@@ -103,8 +105,12 @@ FLOAT = FaultType(
 
 @kernel
 def runaway_distance(c, srf, k):
-    """The least way (rad) that a runaway has gone by a frame, runaway block_duration_s n; over a block the
-    mean was reached within it.
+    """The least distance d (rad) that a runaway has gone by frame k since it first showed in frame k_first.
+
+        d = rate T n,    n = k - k_first
+
+    rate rad/s: the slowest runaway; T s: duration of a block of frames. A block has the mean of its frames,
+    which the surface had reached by its end at the latest: of several frames a block, n is one less.
     """
     n = k - srf.evidence.k_first
     if c.frames_per_block > 1:
@@ -114,7 +120,10 @@ def runaway_distance(c, srf, k):
 
 @kernel
 def up_range(c, srf, h, k):
-    """Beyond its way upwards at the least rate, or at the upper stop, rad; anywhere before it has shown."""
+    """min(hi, p0 + d) <= p <= hi, rad, once the runaway has shown; anywhere before.
+
+    lo, hi: the stops; p0: the lowest position at which it first showed; d: `runaway_distance`.
+    """
     act, ev = srf.actuator, srf.evidence
     lo = ev.first_lo + runaway_distance(c, srf, k) if ev.k_first >= 0 else act.stop_lo
     return min(act.stop_hi, lo), act.stop_hi
@@ -122,7 +131,8 @@ def up_range(c, srf, h, k):
 
 @kernel
 def down_range(c, srf, h, k):
-    """The same downwards, rad."""
+    """lo <= p <= max(lo, p0 - d), the same downwards, rad; p0: the highest position at which it first
+    showed."""
     act, ev = srf.actuator, srf.evidence
     hi = ev.first_hi - runaway_distance(c, srf, k) if ev.k_first >= 0 else act.stop_hi
     return act.stop_lo, max(act.stop_lo, hi)

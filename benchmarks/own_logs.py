@@ -32,7 +32,8 @@ import pandas as pd
 from benchmarks.unknown_instant import Whitener, fitted
 
 import beaver_ftc as bf
-from beaver_ftc.design.model import N_Y, DesignFunctions, design_record
+from beaver_ftc.design.model import DesignFunctions, design_record
+from beaver_ftc.design.table import N_Y
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results.exports import RECORDING_FILE_OF_KIND
 from beaver_ftc.results.writer import run

@@ -5,6 +5,8 @@ import numpy as np
 from beaver_ftc.control import row_of
 from beaver_ftc.control.state import control_dtype
 
+AILERON, ELEVATOR, RUDDER, FLAP = range(4)  # places of the built-in aircraft's surfaces
+
 # Their fields have names of other stages' too: filled by `fields`.
 _APART = ("compiled_rivals", "rejecting", "zhang2005", "published", "power", "engines")
 _UNNAMED = {"hedging": ("reference", "active"), "fhat": ("surfaces", "unknown"), "G": ("axes", "G")}

@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.design.model import ALPHA, QDYN, design_of, unanticipated_pitch
+from beaver_ftc.design.model import design_of, unanticipated_pitch
+from beaver_ftc.design.table import ALPHA, QDYN
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.plugins import DETECTORS, LAWS, settings
 from beaver_ftc.results.log import Columns

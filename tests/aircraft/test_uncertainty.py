@@ -5,8 +5,9 @@ from math import sin
 
 import pytest
 
+from beaver_ftc.design.engine import engine_power_kw, slipstream
 from beaver_ftc.design.fdc import GEOMETRY, MASS
-from beaver_ftc.design.model import engine_power_kw, inertia_coefficients, slipstream
+from beaver_ftc.design.model import inertia_coefficients
 
 AXES = "pqr"
 

@@ -5,7 +5,7 @@ import pytest
 
 from beaver_ftc.control import autopilot as loops
 from beaver_ftc.control.autopilot import AUTOPILOT, SPEED
-from beaver_ftc.design.model import DPT, QDYN
+from beaver_ftc.design.table import DPT, QDYN
 from law_records import new_control
 
 G, V, ALPHA_NOW = 9.8, 44.0, 0.08

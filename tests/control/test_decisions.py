@@ -17,9 +17,8 @@ from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.diagnosis.types import GIVE_UP, SCALE_COMMAND, SUBTRACT_OFFSET, WAIT_FOR_SURFACE
 from beaver_ftc.loop import frame as whole
 from beaver_ftc.loop.assembly import frame_dtype
-from law_records import put
+from law_records import ELEVATOR, FLAP, RUDDER, put
 
-ELEVATOR, RUDDER, FLAP = 1, 2, 3
 DT = 0.02
 
 

@@ -8,8 +8,7 @@ from scipy.linalg import expm
 
 from beaver_ftc.control import allocation, laws
 from beaver_ftc.control.laws import published
-from beaver_ftc.design.model import AILERON, ELEVATOR, FLAP, RUDDER
-from law_records import new_control
+from law_records import AILERON, ELEVATOR, FLAP, RUDDER, new_control
 
 DT = 0.01
 G_TYPICAL = np.array([[-9.0, 0.0, 0.6, 0.0], [0.0, -10.0, 0.0, 2.1], [-0.2, 0.0, -2.0, 0.0]])

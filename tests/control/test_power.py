@@ -9,13 +9,13 @@ from scipy.linalg import expm
 from beaver_ftc.control import engines
 from beaver_ftc.design import fdc
 from beaver_ftc.design.fdc import value
-from beaver_ftc.design.model import ELEVATOR, FLAP, RUDDER
 from beaver_ftc.loop.assembly import configure_design
 from beaver_ftc.plant.trim import trim
 from beaver_ftc.scenario.diagnosis import EnginePower
 from beaver_ftc.studies.matrix.fault_matrix import REFERENCE, trimmed_deg
 from beaver_ftc.studies.mismatch.linear import in_fdc
 from flying import flown, scenario
+from law_records import ELEVATOR, FLAP, RUDDER
 from samples import samples
 
 DT = 0.01

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.design.model import engine_power_kw, measured_slipstream, slipstream
+from beaver_ftc.design.engine import engine_power_kw, measured_slipstream, slipstream
 from beaver_ftc.diagnosis.bounds import slipstream_bound
 from beaver_ftc.loop.assembly import configure_design
 from beaver_ftc.scenario.schema import load

@@ -8,12 +8,8 @@ import pytest
 
 from beaver_ftc.aircraft.schema import MAX_MONOMIALS
 from beaver_ftc.design import model
-from beaver_ftc.design.model import (
-    both_responses,
-    design_record,
-    engine_power_kw,
-    slipstream,
-)
+from beaver_ftc.design.engine import engine_power_kw, slipstream
+from beaver_ftc.design.model import design_record, nonlinear_response
 
 REFERENCE = Path(__file__).parents[1] / "data" / "fdc_state_derivatives.csv"
 
@@ -42,7 +38,7 @@ def measured(row):
 
 def split(design, x, y):
     f, G = np.zeros(3), np.zeros((3, 4))
-    both_responses(design, x, y, f, G)
+    nonlinear_response(design, x, y, f, G)
     return f, G
 
 

@@ -8,7 +8,7 @@ frame for frame.
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.design.model import N_Y
+from beaver_ftc.design.table import N_Y
 from beaver_ftc.diagnosis.bounds import ROUNDING_RAD_S2
 from beaver_ftc.diagnosis.detection.filters import keep_bank_peak
 from beaver_ftc.diagnosis.model_prediction import evaluate_design

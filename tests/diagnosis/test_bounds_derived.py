@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from beaver_ftc.design.model import both_responses, design_record
+from beaver_ftc.design.model import design_record, nonlinear_response
 from beaver_ftc.diagnosis.bounds import (
     add_declared_bound,
     inertia_bounds,
@@ -34,7 +34,7 @@ TERMS_USED = (
 def acceleration(x, y, u, **changes):
     design = design_record(**changes)[0]
     f, G = np.zeros(3), np.zeros((3, 4))
-    both_responses(design, x, y, f, G)
+    nonlinear_response(design, x, y, f, G)
     return f + G @ u
 
 

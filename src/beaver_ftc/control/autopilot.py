@@ -53,7 +53,8 @@ from beaver_ftc.control.engines import (
     set_up_engine,
     thrust_per_inhg,
 )
-from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, QDYN, SEA_LEVEL_DENSITY_KG_M3
+from beaver_ftc.design.engine import SEA_LEVEL_DENSITY_KG_M3
+from beaver_ftc.design.table import AIRSPEED, ALPHA, BETA, QDYN
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.signals import MEAN_S, TIME_TOLERANCE_S

@@ -44,7 +44,9 @@ from beaver_ftc.compiled import apart, kernel, record
 from beaver_ftc.control import least_squares, row_of
 from beaver_ftc.control.allocation import remaining
 from beaver_ftc.control.least_squares import problem_dtype
-from beaver_ftc.design.model import AIRSPEED, DPT, QDYN, engine_power_kw, inertia_coefficients, slipstream
+from beaver_ftc.design.engine import engine_power_kw, slipstream
+from beaver_ftc.design.model import inertia_coefficients
+from beaver_ftc.design.table import AIRSPEED, DPT, QDYN
 from beaver_ftc.diagnosis.state import PITCH, YAW
 from beaver_ftc.scenario.declared import Declared
 

@@ -17,15 +17,15 @@ from beaver_ftc.aircraft.aircraft import GRAVITY_MPS2, M_PER_FT
 from beaver_ftc.public import lazily
 
 if TYPE_CHECKING:
+    from beaver_ftc.aircraft import AXES
     from beaver_ftc.design.context import Context, Declared
     from beaver_ftc.design.model import (
-        AXES,
-        N_Y,
         DesignFunctions,
         design_record,
         inertia_coefficients,
         inertial,
     )
+    from beaver_ftc.design.table import N_Y
 else:
     __getattr__, __dir__ = lazily(__name__)
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.aircraft import FORCES, GRAVITY_MPS2, MOMENTS
-from beaver_ftc.design.model import engine_power_kw, slipstream
+from beaver_ftc.design.engine import engine_power_kw, slipstream
 
 _AIRCRAFT = load()  # the equations are those of any aircraft, the engine is that of the built-in one
 GEOMETRY, MASS = _AIRCRAFT.geometry, _AIRCRAFT.mass

@@ -3,23 +3,8 @@
     xdot = f(x, y) + G(y) u     x = (p, q, r), y = (alpha, beta, V, qdyn, declared signals), u: the surfaces
 
 [Zhang2005, eq. (2)] with the moment terms of the aircraft's file. The moment coefficients are linear in
-their values, so they are kept as a table: a bound on a coefficient is then a bound on an acceleration.
-
-*Table.* A term is a value times a monomial of dimensionless signals and, if it has a surface, times that
-surface's deflection. The monomials form a chain: each is an earlier one times one signal, so it costs one
-multiplication. From the same table come the sums without surfaces (f), the slopes per rad of each surface
-(G), what each value multiplies, and the derivative of everything along a signal. A table holds three
-coefficients, Cl, Cm, Cn or CX, CY, CZ; its terms are sorted by coefficient, of each first those without a
-surface.
-
-*Actuators.* The aircraft's own first-order lag, rate limit and stops:
-
-    u[k+1] = u[k] + limited((command - u[k]) (1 - exp(-bandwidth dt))),   |limited| <= rate dt
-
-the discretisation of aircraft/actuator.xml, one step a JSBSim frame, so that a healthy surface is where the
-model has it.
-
-*Engine.* The R-985 Wasp Junior and its slipstream [FDC, Power].
+their values, so they are kept as a table (table.py): a bound on a coefficient is then a bound on an
+acceleration.
 
 *Accelerations.* What multiplies rate products and moments [FDC]:
 
@@ -41,278 +26,36 @@ d(G u0)/dy, and f0 + G0 u0 is the acceleration in trim.
 """
 
 from collections import namedtuple
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
-from beaver_ftc.aircraft import AXES, Aircraft, MassProperties, Term, load
+from beaver_ftc.aircraft import Aircraft, MassProperties, load
 from beaver_ftc.aircraft.aircraft import MOMENTS
-from beaver_ftc.aircraft.schema import FLOW_SIGNALS, MAX_MONOMIALS, MAX_SIGNALS, MAX_TERMS
+from beaver_ftc.aircraft.schema import MAX_MONOMIALS
 from beaver_ftc.compiled import kernel, plain, record, sized
-
-ALPHA, BETA, AIRSPEED, QDYN, DPT = range(5)  # places in y; declared signals begin at the last
-N_Y = 4 + MAX_SIGNALS
-N_SIGNALS = len(FLOW_SIGNALS) + MAX_SIGNALS
-PH, QH, RH = (FLOW_SIGNALS.index(name) for name in ("ph", "qh", "rh"))
-_DECLARED = len(FLOW_SIGNALS)  # where declared signals begin among the signals
-
-TABLE = record(
-    span=float, chord=float, n_declared=int,
-    # monomial k is monomial parent[k] times signal factor[k]; the first is 1
-    n_monomials=int, parent=("u8", MAX_MONOMIALS), factor=("u8", MAX_MONOMIALS),
-    # of each coefficient the terms without a surface, and those with one
-    n_terms=int, free_from=(int, 3), free_to=(int, 3), surface_to=(int, 3), value=MAX_TERMS,
-    monomial=("u8", MAX_TERMS), surface=(int, MAX_TERMS),
-    # scratch: signals and monomials of the state last evaluated
-    signal=N_SIGNALS, power=MAX_MONOMIALS,
-)  # fmt: skip
-
-
-def fill_table(
-    table: np.void,
-    aircraft: Aircraft,
-    terms: Sequence[Term],
-    coefficients: Sequence[str],
-    scale: Mapping[str, float] | None = None,
-) -> None:
-    """Write terms, sorted as `Aircraft.moments` are, into a record; `scale` multiplies single values."""
-    scale = scale or {}
-    table["span"], table["chord"] = aircraft.geometry.span_m, aircraft.geometry.chord_m
-    table["n_declared"], table["n_terms"] = len(aircraft.signals), len(terms)
-    chain = _chain(_monomial(term, aircraft) for term in terms)
-    table["n_monomials"] = len(chain)
-    for k, monomial in enumerate(chain[1:], start=1):
-        table["parent"][k], table["factor"][k] = chain.index(monomial[:-1]), monomial[-1]
-    for k, term in enumerate(terms):
-        table["value"][k] = term.value * scale.get(term.name, 1.0)
-        table["monomial"][k] = chain.index(_monomial(term, aircraft))
-        table["surface"][k] = aircraft.surfaces.index(term.surface) if term.surface else -1
-    first = 0
-    for i, coefficient in enumerate(coefficients):
-        of_it = [term for term in terms if term.coefficient == coefficient]
-        table["free_from"][i] = first
-        table["free_to"][i] = first + sum(term.surface is None for term in of_it)
-        first = table["surface_to"][i] = first + len(of_it)
-
-
-def _monomial(term: Term, aircraft: Aircraft) -> tuple[int, ...]:
-    """The signals a term multiplies, one entry a power, in a fixed order."""
-    return tuple(sorted(aircraft.signal_names.index(name) for name, power in term.of for _ in range(power)))
-
-
-def _chain(wanted: Iterable[tuple[int, ...]]) -> list[tuple[int, ...]]:
-    """Monomials, each one factor longer than an earlier one, that contain all wanted ones."""
-    chain: list[tuple[int, ...]] = [()]
-    for monomial in wanted:
-        for length in range(1, len(monomial) + 1):
-            if monomial[:length] not in chain:
-                chain.append(monomial[:length])
-    if len(chain) > MAX_MONOMIALS:
-        raise ValueError(f"{len(chain)} monomials, allowed: at most {MAX_MONOMIALS}")
-    return chain
-
-
-@kernel
-def signals(table, x, y, out):
-    """Fill out (N_SIGNALS,): alpha, beta rad, ph, qh, rh, declared ones. x (3,) rad/s; y (4 + declared,)."""
-    V = y[AIRSPEED]
-    out[0], out[1] = y[ALPHA], y[BETA]
-    out[2] = x[0] * table.span / (2 * V)
-    out[3] = x[1] * table.chord / V
-    out[4] = x[2] * table.span / (2 * V)
-    for k in range(table.n_declared):
-        out[_DECLARED + k] = y[DPT + k]
-
-
-@kernel
-def monomials(table, signal, out):
-    """Fill out (MAX_MONOMIALS,) with the products of powers that the terms multiply."""
-    parent, factor = table.parent, table.factor
-    out[0] = 1.0
-    for k in range(1, table.n_monomials):
-        out[k] = out[parent[k]] * signal[factor[k]]
-
-
-@kernel
-def slopes(table, signal, power, along, out):
-    """Fill out (MAX_MONOMIALS,) with the derivatives of the monomials `power` with signal `along`."""
-    parent, factor = table.parent, table.factor
-    out[0] = 0.0
-    for k in range(1, table.n_monomials):
-        out[k] = out[parent[k]] * signal[factor[k]]
-        if factor[k] == along:
-            out[k] += power[parent[k]]
-
-
-@kernel
-def directional(table, signal, power, direction, out):
-    """Fill out (MAX_MONOMIALS,) with what the monomials `power` change by as signals go in a direction."""
-    parent, factor = table.parent, table.factor
-    out[0] = 0.0
-    for k in range(1, table.n_monomials):
-        out[k] = out[parent[k]] * signal[factor[k]] + power[parent[k]] * direction[factor[k]]
-
-
-@kernel
-def evaluate(table, x, y):
-    """Bring the table's own signals and monomials to a state; x (3,) rad/s, y (4 + declared,)."""
-    signals(table, x, y, table.signal)
-    monomials(table, table.signal, table.power)
-
-
-@kernel
-def free_sum(table, i, power):
-    """Coefficient i at neutral surfaces, from the monomials."""
-    value, monomial = table.value, table.monomial
-    total = 0.0 * power[0]
-    for k in range(table.free_from[i], table.free_to[i]):
-        total += value[k] * power[monomial[k]]
-    return total
-
-
-@kernel
-def surface_sums(table, power, out):
-    """Fill out (3, surfaces) with each coefficient's slope per rad of each surface."""
-    value, monomial, surface = table.value, table.monomial, table.surface
-    for i in range(3):
-        for s in range(out.shape[1]):
-            out[i, s] = 0.0
-        for k in range(table.free_to[i], table.surface_to[i]):
-            out[i, surface[k]] += value[k] * power[monomial[k]]
-
-
-@kernel
-def whole_sum(table, i, power, u):
-    """Coefficient i with surfaces at u (surfaces,) rad, from the monomials or their derivatives."""
-    value, monomial, surface = table.value, table.monomial, table.surface
-    total = free_sum(table, i, power)
-    for k in range(table.free_to[i], table.surface_to[i]):
-        total += value[k] * power[monomial[k]] * u[surface[k]]
-    return total
-
-
-@kernel
-def regressors(table, power, u, out):
-    """Fill out (MAX_TERMS,) with what each value multiplies, from the monomials; u (surfaces,) rad."""
-    monomial, surface = table.monomial, table.surface
-    for k in range(table.n_terms):
-        out[k] = power[monomial[k]] * (u[surface[k]] if surface[k] >= 0 else 1.0)
-
-
-@sized
-def actuators_dtype(n: int) -> np.dtype:
-    """The actuators of n surfaces."""
-    return record(
-        real=int,
-        approach=n,  # share of the way to the command in one JSBSim frame; 1 without lag
-        step=n,  # rad, the farthest in one JSBSim frame
-        low=n, high=n,
-        # least and greatest of both by the declared errors; rad, how far from its command a surface may stay
-        uncertain=int, approaches=(n, 2), steps=(n, 2), band=n,
-    )  # fmt: skip
-
-
-@kernel
-def nearer(u, wanted, approach, step):
-    """Where a surface at u (rad) is one JSBSim frame later; it rises with u, and never passes `wanted`."""
-    return u + min(max((wanted - u) * approach, -step), step)
-
-
-@kernel
-def farthest(u, command, sign, approaches, steps, band, low, high):
-    """The greatest (sign 1) or least (-1) position, rad, that a surface at u can have one JSBSim frame later.
-
-    approaches, steps (2,): least and greatest of its actuator. It goes as far as it can to that side, and
-    comes back from it as slowly as it can.
-    """
-    wanted = min(max(command + sign * band, low), high)
-    fast = 1 if sign * (wanted - u) > 0.0 else 0
-    return nearer(u, wanted, approaches[fast], steps[fast])
-
-
-@kernel
-def move(actuators, command, u):
-    """Move the surfaces u (n,) rad by one JSBSim frame towards command (n,) rad."""
-    if not actuators.real:
-        u[:] = command
-        return
-    for s in range(u.size):
-        wanted = min(max(command[s], actuators.low[s]), actuators.high[s])
-        there = nearer(u[s], wanted, actuators.approach[s], actuators.step[s])
-        u[s] = min(max(there, actuators.low[s]), actuators.high[s])
-
-
-@kernel
-def move_ends(act, command, lo, hi):
-    """Move lo and hi (n,) rad, between which the surfaces are, by one JSBSim frame towards command (n,)."""
-    for s in range(lo.size):
-        of = act.approaches[s], act.steps[s], act.band[s], act.low[s], act.high[s]
-        lo[s] = farthest(lo[s], command[s], -1.0, *of)
-        hi[s] = farthest(hi[s], command[s], 1.0, *of)
-
-
-SEA_LEVEL_DENSITY_KG_M3 = 1.225
-DPT_0, KW_TO_DPT = 0.08696, 191.18  # dpt = DPT_0 + KW_TO_DPT P / (qdyn V)
-
-
-def engine_power_kw(engine_rpm: float, manifold_pressure_inhg: float, density_kg_m3: float) -> float:
-    """Shaft power from the engine's chart fit: kW from rpm, inHg and kg/m3."""
-    thin_air = (408.0 - 0.0965 * engine_rpm) * (1.0 - density_kg_m3 / SEA_LEVEL_DENSITY_KG_M3)
-    return 0.7355 * (-326.5 + 0.00412 * (manifold_pressure_inhg + 7.4) * (engine_rpm + 2010.0) + thin_air)
-
-
-def slipstream(power_kw: float, density_kg_m3: float, airspeed_mps: float) -> float:
-    """dpt, the dimensionless total pressure rise across the propeller: power in kW, not W."""
-    return DPT_0 + KW_TO_DPT * 2.0 * power_kw / (density_kg_m3 * airspeed_mps**3)
-
-
-_power_kw = kernel(engine_power_kw)
-
-
-@kernel
-def measured_slipstream(engine_rpm, manifold_pressure_inhg, airspeed_mps, qdyn_pa):
-    """dpt from the engine's instruments and the air data, whose density is 2 qdyn / V^2."""
-    power_kw = _power_kw(engine_rpm, manifold_pressure_inhg, 2.0 * qdyn_pa / airspeed_mps**2)
-    return DPT_0 + KW_TO_DPT * power_kw / (qdyn_pa * airspeed_mps)
-
-
-@kernel
-def density_ratio(y):
-    """Density over that at sea level, from the air data in y."""
-    return 2.0 * y[QDYN] / y[AIRSPEED] ** 2 / SEA_LEVEL_DENSITY_KG_M3
-
-
-@kernel
-def slipstream_slopes(y, power_error_kw_per_density_ratio):
-    """What dpt changes by per unit of airspeed, s/m, of dynamic pressure, 1/Pa, and of the power, 1/kW, from
-    which it is worked out; kw1: of that for the whole of the density."""
-    V, qdyn = y[AIRSPEED], y[QDYN]
-    per_kw = KW_TO_DPT / (qdyn * V)
-    thin = per_kw * power_error_kw_per_density_ratio * density_ratio(y)
-    return (2.0 * thin - (y[DPT] - DPT_0)) / V, -(thin + y[DPT] - DPT_0) / qdyn, per_kw
-
-
-def power_error_kw(
-    engine_rpm: float, manifold_pressure_inhg: float, rpm_error: float, inhg_error: float
-) -> tuple[float, float]:
-    """How far the power can be off, kW: for errors of the instruments, and for the whole of the density.
-
-    The readings are within the errors of what is given, the density within that at sea level.
-    """
-    rpm, pressure = engine_rpm + rpm_error, manifold_pressure_inhg + 7.4 + inhg_error
-    by_chart = 0.00412 * (pressure * rpm_error + (rpm + 2010.0) * inhg_error)
-    by_air = 408.0 - 0.0965 * (engine_rpm - rpm_error)
-    return 0.7355 * (by_chart + 0.0965 * rpm_error), 0.7355 * max(by_air, 0.0)
-
-
-# The built-in aircraft's surfaces, for what does not yet look them up in the aircraft.
-AILERON, ELEVATOR, RUDDER, FLAP = range(4)
-
-__all__ = ["AIRSPEED", "ALPHA", "AXES", "BETA", "DPT", "N_Y", "QDYN", "design_dtype", "design_record"]
-
+from beaver_ftc.design.table import (
+    AIRSPEED,
+    ALPHA,
+    N_SIGNALS,
+    N_Y,
+    PH,
+    QDYN,
+    QH,
+    RH,
+    TABLE,
+    directional,
+    evaluate,
+    fill_table,
+    free_sum,
+    monomials,
+    signals,
+    surface_sums,
+    whole_sum,
+)
 
 # What multiplies rate products and moments in the accelerations; SI units.
 InertiaCoefficients = namedtuple("InertiaCoefficients", "Ppq Pqr Pl Pn Qpp Qpr Qrr Qm Rpq Rqr Rl Rn")
@@ -346,7 +89,7 @@ def design_dtype(n: int) -> np.dtype:
     """The design model of an aircraft with n surfaces."""
     return record(
         **dict.fromkeys(InertiaCoefficients._fields, float), S=float, b=float, c=float, moments=TABLE,
-        # of a linearised or frozen model: see `responses`
+        # of a linearised or frozen model: see `response`
         linearised=int, frozen_alpha=int, x0=3, y0=N_Y, f0=3, f_x=(3, 3), f_y=(3, N_Y), G0=(3, n),
     )  # fmt: skip
 
@@ -398,8 +141,9 @@ def accelerate(design, y, C):
 
 
 @kernel
-def evaluated_responses(design, x, y, f, G):
-    """Fill f and G as `both_responses` does, from the table's monomials as they are."""
+def nonlinear_response_from_table(design, x, y, f, G):
+    """Fill f and G as `nonlinear_response` does, from the table's monomials as they are: of another x in it,
+    for example of the rates against the air."""
     table = design.moments
     for i in range(3):
         f[i] = free_sum(table, i, table.power)
@@ -410,11 +154,11 @@ def evaluated_responses(design, x, y, f, G):
 
 
 @kernel
-def both_responses(design, x, y, f, G):
+def nonlinear_response(design, x, y, f, G):
     """Fill f (3,) rad/s2, the angular acceleration at neutral surfaces, and G (3, surfaces) rad/s2 per rad,
     that of each surface, whatever the rates. x (3,) rad/s, y (4 + declared,)."""
     evaluate(design.moments, x, y)
-    evaluated_responses(design, x, y, f, G)
+    nonlinear_response_from_table(design, x, y, f, G)
 
 
 @kernel
@@ -423,8 +167,10 @@ def rate_damping(design, x, y, u, scratch, out):
     against the air. x (3,) rad/s, y (4 + declared,), u (surfaces,) rad; scratch (MAX_MONOMIALS,)."""
     table = design.moments
     evaluate(table, x, y)
-    for j in range(3):
-        slopes(table, table.signal, table.power, PH + j, scratch)
+    for j, rate in enumerate((PH, QH, RH)):
+        direction = np.zeros(N_SIGNALS)
+        direction[rate] = 1.0
+        directional(table, table.signal, table.power, direction, scratch)
         per_rate = design.c / y[AIRSPEED] if j == 1 else design.b / (2 * y[AIRSPEED])
         for i in range(3):
             out[i, j] = whole_sum(table, i, scratch, u) * per_rate
@@ -444,9 +190,6 @@ def acceleration(f, G, u, out):
         out[i] = f[i]
         for s in range(u.size):
             out[i] += G[i, s] * u[s]
-
-
-assert (PH, RH) == (2, 4)  # rates are neighbours among the signals: see rate_damping
 
 
 _STEP = 1e-30  # of a complex step: far below rounding, so the derivative is exact to rounding
@@ -545,18 +288,20 @@ def acceleration_at(design: np.void, x: np.ndarray, y: np.ndarray, u: np.ndarray
 
 
 def unanticipated_at(design: np.void, y: np.ndarray, Cm_alpha3: np.ndarray) -> np.ndarray:
-    """What `unanticipated_pitch` gives at each of y (n, 5) and Cm_alpha3 (n,): (n,) rad/s2."""
+    """What `unanticipated_pitch` gives at each of y (n, 4 + declared) and Cm_alpha3 (n,): (n,) rad/s2."""
     pitch: np.ndarray = plain(unanticipated_pitch)(_fields(design), y.T, Cm_alpha3)
     return pitch
 
 
 def effectiveness(design: np.void, y: np.ndarray) -> np.ndarray:
-    """G (3, 4) rad/s2 per rad at y (5,), without compiled code."""
+    """G (3, n) rad/s2 per rad at y (4 + declared,), without compiled code; alpha is y's even where the model
+    has it frozen."""
     return design["G0"].copy() if design["linearised"] else _split(design, np.zeros(3), y)[1].real
 
 
 def own_damping(design: np.void, y: np.ndarray) -> np.ndarray:
-    """d f_i / d x_i (3,) 1/s at y and no rate, surfaces neutral: each rate's effect on its own axis."""
+    """d f_i / d x_i (3,) 1/s at y and no rate, surfaces neutral: each rate's effect on its own axis; alpha is
+    y's even where the model has it frozen."""
     neutral = np.zeros(design["G0"].shape[1])
     f_x = design["f_x"] if design["linearised"] else jacobian(design, np.zeros(3), y, neutral)[2]
     return np.diag(f_x).copy()
@@ -570,9 +315,9 @@ def response(design, x, y, f, G):
     elif design.frozen_alpha:
         frozen = y.copy()
         frozen[ALPHA] = design.y0[ALPHA]
-        both_responses(design, x, frozen, f, G)
+        nonlinear_response(design, x, frozen, f, G)
     else:
-        both_responses(design, x, y, f, G)
+        nonlinear_response(design, x, y, f, G)
 
 
 @kernel
@@ -591,8 +336,7 @@ def linear_response(design, x, y, f, G):
             f[i] += design.f_x[i, j] * (x[j] - design.x0[j])
         for j in range(y.size):
             f[i] += design.f_y[i, j] * (y[j] - design.y0[j])
-        for s in range(G.shape[1]):
-            G[i, s] = design.G0[i, s]
+    G[:] = design.G0
 
 
 class DesignFunctions:

@@ -49,23 +49,16 @@ from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S
 from beaver_ftc.aircraft.schema import MAX_AGES, MAX_BOXES, MAX_LEVELS
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.design import LEAST_HEIGHT_M
+from beaver_ftc.design.engine import DPT_0, KW_TO_DPT, density_ratio, power_error_kw
 from beaver_ftc.design.model import (
-    AIRSPEED,
-    DPT,
-    DPT_0,
-    KW_TO_DPT,
-    N_Y,
-    QDYN,
     InertiaCoefficients,
     acceleration,
-    density_ratio,
     design_dtype,
-    evaluate,
-    evaluated_responses,
     inertia_coefficients,
     mass_of,
-    power_error_kw,
+    nonlinear_response_from_table,
 )
+from beaver_ftc.design.table import AIRSPEED, DPT, N_Y, QDYN, evaluate
 from beaver_ftc.diagnosis.state import fill
 from beaver_ftc.plant.faults import OF_THE_SLIPSTREAM
 from beaver_ftc.scenario.declared import Declared, SensorErrors
@@ -224,7 +217,7 @@ def add_declared_bound(err, x, y, u, eta):
     fill_magnitudes(err, x, y, u)
     for v in range(2):
         evaluate(err.model[v].moments, err.x_air[v], err.y[v])
-        evaluated_responses(err.model[v], err.x[v], err.y[v], err.f[v], err.G[v])
+        nonlinear_response_from_table(err.model[v], err.x[v], err.y[v], err.f[v], err.G[v])
         acceleration(err.f[v], err.G[v], err.u[v], err.F[v])
     for i in range(3):
         eta[i] += err.F[1, i] - err.F[0, i]

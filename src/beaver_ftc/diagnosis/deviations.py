@@ -11,15 +11,13 @@ from beaver_ftc.aircraft import AXES, MassProperties, Term
 from beaver_ftc.aircraft.aircraft import MOMENTS
 from beaver_ftc.aircraft.schema import RATE_SIGNALS
 from beaver_ftc.design.model import (
-    AIRSPEED,
-    PH,
-    RH,
     DesignFunctions,
     acceleration_at,
     coefficient_slopes,
     inertia_coefficients,
     jacobian,
 )
+from beaver_ftc.design.table import AIRSPEED, PH, RH
 from beaver_ftc.diagnosis.bounds import Y0, inertia_bounds, servo_data
 from beaver_ftc.scenario.declared import Declared, SensorErrors
 

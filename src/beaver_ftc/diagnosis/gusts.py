@@ -48,7 +48,8 @@ from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S, FORCES, GRAVITY_MPS2
 from beaver_ftc.aircraft.schema import MAX_MONOMIALS
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design import SCALE_M, rotation_lengths
-from beaver_ftc.design.model import (
+from beaver_ftc.design.model import rate_damping
+from beaver_ftc.design.table import (
     AIRSPEED,
     ALPHA,
     BETA,
@@ -56,7 +57,6 @@ from beaver_ftc.design.model import (
     TABLE,
     evaluate,
     fill_table,
-    rate_damping,
     whole_sum,
 )
 from beaver_ftc.diagnosis.bounds import least_height

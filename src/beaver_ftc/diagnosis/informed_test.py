@@ -36,8 +36,10 @@ import numpy as np
 from beaver_ftc.aircraft import AXES, Aircraft, Term
 from beaver_ftc.aircraft.aircraft import MOMENTS
 from beaver_ftc.compiled import plain
+from beaver_ftc.design.actuators import nearer
 from beaver_ftc.design.context import Context
-from beaver_ftc.design.model import N_SIGNALS, accelerate, design_record, nearer, signals
+from beaver_ftc.design.model import accelerate, design_record
+from beaver_ftc.design.table import N_SIGNALS, signals
 from beaver_ftc.diagnosis.gusts import MIN_UNMEASURED_SHARES
 
 UNEXPLAINED_MEMORY_S = 0.1

@@ -12,7 +12,8 @@ sum over its n instants, the first of them under the old command.
 import numpy as np
 
 from beaver_ftc.compiled import kernel, record, sized
-from beaver_ftc.design.model import actuators_dtype, design_dtype, design_of, move, move_ends, response
+from beaver_ftc.design.actuators import actuators_dtype, move, move_ends
+from beaver_ftc.design.model import design_dtype, design_of, response
 from beaver_ftc.diagnosis.bounds import extra_bound, fill_bound, n_gyro, servo_data
 from beaver_ftc.scenario.declared import Declared
 

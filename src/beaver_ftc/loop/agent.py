@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from beaver_ftc.compiled import kernel, record
-from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA
+from beaver_ftc.design.table import AIRSPEED, ALPHA, BETA
 from beaver_ftc.loop.stepping import hold
 
 RATE_RAD_S = 0.1  # one unit of an observed rate; a tracking error that costs one unit of reward a second

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.aircraft import Aircraft
+from beaver_ftc.aircraft import AXES, Aircraft
 from beaver_ftc.control.autopilot import (
     AT_ONE_INSTANT,
     BANK_LIMIT,
@@ -28,7 +28,6 @@ from beaver_ftc.control.autopilot import (
     SPEED,
 )
 from beaver_ftc.design import altitude_of
-from beaver_ftc.design.model import AXES
 from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.diagnosis.conclusion import (
     PLUGIN_DECIDES,

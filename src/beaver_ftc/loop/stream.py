@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.compiled import direct
-from beaver_ftc.design.model import N_Y
+from beaver_ftc.design.table import N_Y
 from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop import stepping, watching

@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.compiled import kernel, record, sized
-from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, DPT, N_Y, QDYN, measured_slipstream
+from beaver_ftc.design.engine import measured_slipstream
+from beaver_ftc.design.table import AIRSPEED, ALPHA, BETA, DPT, N_Y, QDYN
 from beaver_ftc.scenario.sensors import N_IN_EQUATIONS, NOISE_LIMIT_SIGMA, ROWS, SIGNALS
 
 N_SIGNALS = len(SIGNALS)

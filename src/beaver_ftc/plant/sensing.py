@@ -8,7 +8,7 @@ import numpy as np
 
 from beaver_ftc.aircraft.schema import MAX_LEVERS
 from beaver_ftc.compiled import kernel, record, sized
-from beaver_ftc.design.model import AIRSPEED, DPT
+from beaver_ftc.design.table import AIRSPEED, DPT
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.channels import read_nodes, write_nodes
 from beaver_ftc.plant.instruments import (

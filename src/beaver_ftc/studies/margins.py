@@ -22,7 +22,8 @@ from beaver_ftc.aircraft import AXES
 from beaver_ftc.control import flown_by
 from beaver_ftc.control.laws.rejecting import STAND_IN, margins
 from beaver_ftc.control.readout import DefaultLaw
-from beaver_ftc.design.model import QDYN, jacobian
+from beaver_ftc.design.model import jacobian
+from beaver_ftc.design.table import QDYN
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.files import Document

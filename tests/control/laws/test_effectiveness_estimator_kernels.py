@@ -5,7 +5,7 @@ import pytest
 
 from beaver_ftc.control.laws import rejecting
 from beaver_ftc.control.laws.rejecting import estimator_dtype
-from beaver_ftc.design.model import ALPHA, BETA
+from beaver_ftc.design.table import ALPHA, BETA
 
 N, DT, FRAMES = 6, 0.02, 200
 PULL, INTO = np.array([0.2, 0.3, 0.25]), np.array([0.8, 1.2, 1.0])

@@ -7,7 +7,7 @@ from kernels import new_fdi
 from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.aircraft import FORCES
 from beaver_ftc.aircraft.schema import SIDESLIP_RATE
-from beaver_ftc.design.model import fill_table
+from beaver_ftc.design.table import fill_table
 from beaver_ftc.diagnosis.detection import forces
 from beaver_ftc.diagnosis.detection.forces import (
     NORMAL_INDEX,

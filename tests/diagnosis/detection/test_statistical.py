@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from innovations import drawn
 
-from beaver_ftc.aircraft import load
+from beaver_ftc.aircraft import AXES, load
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.fdc import MASS
-from beaver_ftc.design.model import AXES
 from beaver_ftc.diagnosis.detection import likelihood, statistical
 from beaver_ftc.diagnosis.detection.likelihood import N_SLOTS
 from beaver_ftc.diagnosis.detection.rows import RATES

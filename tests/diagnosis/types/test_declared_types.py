@@ -9,7 +9,7 @@ from test_fault_types import TYPES, shares, starts, surfaces
 from test_release import HELD, Repaired
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.design.model import both_responses, design_record
+from beaver_ftc.design.model import design_record, nonlinear_response
 from beaver_ftc.diagnosis.types import registry as types
 from beaver_ftc.diagnosis.types.verdict import fault_finding_dict
 from samples import samples
@@ -41,7 +41,7 @@ class RealPlant(DesignPlant):
         prediction["u"], prediction["commanded"] = self.u, self.commanded
         evaluate(self.frames)
         f, G, true_f, true_G = prediction["f"].copy(), prediction["G"].copy(), np.zeros(3), np.zeros((3, 4))
-        both_responses(self.truth, self.x, y, true_f, true_G)
+        nonlinear_response(self.truth, self.x, y, true_f, true_G)
         conclude(self.frames)
         eta = self.rng.uniform(-0.02, 0.02, 3)
         self.x = self.x + self.dt * (true_f + true_G @ self.u + self.effect(true_G) + eta)

@@ -25,7 +25,7 @@ from beaver_ftc.compiled import apart, kernel, record
 from beaver_ftc.control import accommodation, allocation, engines
 from beaver_ftc.control.accommodation import MODE_REALLOCATED
 from beaver_ftc.control.probe import advance_probe
-from beaver_ftc.design.model import AIRSPEED
+from beaver_ftc.design.table import AIRSPEED
 from beaver_ftc.diagnosis.state import PITCH
 from beaver_ftc.scenario.diagnosis import ControlConfig
 

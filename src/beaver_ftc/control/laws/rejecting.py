@@ -58,8 +58,9 @@ from beaver_ftc.control import CompiledLaw, accommodation, allocation, laws
 from beaver_ftc.control.accommodation import approach, begin_frame, reported, start_of
 from beaver_ftc.control.engines import between
 from beaver_ftc.control.laws import advance
-from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, QDYN, own_damping
 from beaver_ftc.design.model import effectiveness as control_effectiveness
+from beaver_ftc.design.model import own_damping
+from beaver_ftc.design.table import AIRSPEED, ALPHA, BETA, QDYN
 from beaver_ftc.diagnosis.bounds import DEFAULT_RATE_RAD_S, servo_data
 from beaver_ftc.diagnosis.state import PITCH
 from beaver_ftc.diagnosis.types import GIVE_UP

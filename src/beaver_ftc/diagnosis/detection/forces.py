@@ -30,7 +30,8 @@ from beaver_ftc.aircraft import AXES, Aircraft, Term
 from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S, FORCES
 from beaver_ftc.aircraft.schema import MAX_SURFACES, MAX_TERMS_OF_ONE, SIDESLIP_RATE
 from beaver_ftc.compiled import kernel, record
-from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, DPT, N_Y, QDYN, slipstream_slopes
+from beaver_ftc.design.engine import slipstream_slopes
+from beaver_ftc.design.table import AIRSPEED, ALPHA, BETA, DPT, N_Y, QDYN
 from beaver_ftc.diagnosis.gusts import drop_accelerometers
 from beaver_ftc.diagnosis.monitors.redundancy import EARTH_M_S2
 from beaver_ftc.diagnosis.state import PITCH, ROLL, SIDE_FORCE, YAW

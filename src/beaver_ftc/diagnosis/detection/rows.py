@@ -29,7 +29,9 @@ import numpy as np
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.aircraft.schema import MAX_MONOMIALS, MAX_SURFACES, MAX_TERMS
 from beaver_ftc.compiled import kernel, record, row_of
-from beaver_ftc.design.model import (
+from beaver_ftc.design.engine import slipstream_slopes
+from beaver_ftc.design.model import accelerate
+from beaver_ftc.design.table import (
     AIRSPEED,
     ALPHA,
     BETA,
@@ -37,11 +39,9 @@ from beaver_ftc.design.model import (
     PH,
     QDYN,
     RH,
-    accelerate,
     directional,
     evaluate,
     regressors,
-    slipstream_slopes,
     whole_sum,
 )
 from beaver_ftc.diagnosis.bounds import OFF_MAP_RAD_S2, add_published_bound, extra_bound

@@ -10,7 +10,7 @@ together of unit length.
 import numpy as np
 
 from beaver_ftc.compiled import kernel, record, row_of
-from beaver_ftc.design.model import ALPHA, BETA
+from beaver_ftc.design.table import ALPHA, BETA
 from beaver_ftc.diagnosis.detection.filters import fill_gaussians, train
 from beaver_ftc.diagnosis.state import PITCH
 

@@ -33,13 +33,8 @@ from beaver_ftc.aircraft import AXES, Aircraft, MassProperties
 from beaver_ftc.aircraft.schema import MAX_SURFACES
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.design import rotation_lengths
-from beaver_ftc.design.model import (
-    AIRSPEED,
-    ALPHA,
-    BETA,
-    QDYN,
-    jacobian,
-)
+from beaver_ftc.design.model import jacobian
+from beaver_ftc.design.table import AIRSPEED, ALPHA, BETA, QDYN
 from beaver_ftc.diagnosis import gusts
 from beaver_ftc.diagnosis.detection import likelihood, parity
 from beaver_ftc.diagnosis.detection.attitude import attitude_dtype, configure_attitude

@@ -29,7 +29,7 @@ from math import exp, pi, sqrt
 import numpy as np
 
 from beaver_ftc.compiled import kernel, record, sized
-from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA
+from beaver_ftc.design.table import AIRSPEED, ALPHA, BETA
 from beaver_ftc.diagnosis.detection.likelihood import evidence_ratio
 
 N_TONES = 16

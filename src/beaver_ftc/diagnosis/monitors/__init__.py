@@ -18,7 +18,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.compiled import kernel, record
-from beaver_ftc.design.model import DPT
+from beaver_ftc.design.table import DPT
 from beaver_ftc.diagnosis.state import fill
 from beaver_ftc.public import lazily
 

@@ -11,7 +11,8 @@ The isolation depends on the fault class, and on the detectors whose exclusions 
 """
 
 from beaver_ftc.compiled import apart, kernel
-from beaver_ftc.design.model import AIRSPEED, ALPHA, BETA, unanticipated_pitch
+from beaver_ftc.design.model import unanticipated_pitch
+from beaver_ftc.design.table import AIRSPEED, ALPHA, BETA
 from beaver_ftc.diagnosis import conclusion, gusts, isolation, monitors
 from beaver_ftc.diagnosis.detection import attitude, filters, forces, parity, statistical
 from beaver_ftc.diagnosis.detection.rows import finish_rows, update_forces

@@ -27,7 +27,7 @@ rad. Symbols: types/__init__.py.
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.design.model import farthest
+from beaver_ftc.design.actuators import farthest
 from beaver_ftc.diagnosis.sets import EMPTY_SET, UNLIMITED_SET
 from beaver_ftc.diagnosis.types import put_set
 

@@ -11,7 +11,9 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.design import fdc
-from beaver_ftc.design.model import ALPHA, design_of, engine_power_kw, jacobian, slipstream
+from beaver_ftc.design.engine import engine_power_kw, slipstream
+from beaver_ftc.design.model import design_of, jacobian
+from beaver_ftc.design.table import ALPHA
 from beaver_ftc.documents.files import Document
 from beaver_ftc.plant.adapter import FlightState
 from beaver_ftc.plant.conditions import trimmed

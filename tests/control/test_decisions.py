@@ -12,7 +12,7 @@ from beaver_ftc.control.accommodation import (
     MODE_UNANTICIPATED,
 )
 from beaver_ftc.control.laws import rejecting
-from beaver_ftc.control.laws.rejecting import OBSERVER_ERROR, observer_response
+from beaver_ftc.control.laws.effectiveness_estimator import OBSERVER_ERROR, observer_response
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.diagnosis.types import GIVE_UP, SCALE_COMMAND, SUBTRACT_OFFSET, WAIT_FOR_SURFACE
 from beaver_ftc.loop import frame as whole

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.control.laws import rejecting
-from beaver_ftc.control.laws.rejecting import estimator_dtype
+from beaver_ftc.control.laws import effectiveness_estimator
+from beaver_ftc.control.laws.effectiveness_estimator import estimator_dtype
 from beaver_ftc.design.table import ALPHA, BETA
 
 N, DT, FRAMES = 6, 0.02, 200
@@ -45,12 +45,12 @@ def flown(seed=1):
 def listened(given, signals, missed, forgets=True):
     """The record after all frames."""
     record = np.zeros(1, estimator_dtype(N)).view(np.recarray)[0]
-    rejecting.begin_estimator(record, np.zeros(3), np.zeros(3), DT)
+    effectiveness_estimator.begin_estimator(record, np.zeros(3), np.zeros(3), DT)
     record.unsure[:] *= forgets
     y = np.zeros(8)
     for moments, signal, off in zip(given, signals, missed, strict=True):
         y[ALPHA], y[BETA] = signal[:2]
-        rejecting.estimate(record, off, PULL, INTO, DT, signal[2:], y, np.ones(N), moments)
+        effectiveness_estimator.estimate(record, off, PULL, INTO, DT, signal[2:], y, np.ones(N), moments)
     return record
 
 
@@ -87,4 +87,4 @@ def test_it_is_least_squares_over_the_whole_past():
 def test_each_surface_is_found_while_the_airframe_has_changed(seed):
     record = listened(*flown(seed))
     assert [1.0 + theta for theta in record.found[:N]] == pytest.approx(1.0 + THETA, abs=0.1)
-    assert rejecting.effectiveness_of(record, 0) == pytest.approx(0.1, abs=0.1)
+    assert effectiveness_estimator.effectiveness_of(record, 0) == pytest.approx(0.1, abs=0.1)

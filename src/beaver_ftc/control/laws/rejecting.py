@@ -25,24 +25,8 @@ effectiveness 1 + theta gives theta G u more than a healthy one: theta is the le
 filtered, to the innovation [Ljung1999, ch. 13: a prediction error in a closed loop]. The last MEMORY_S count.
 An equation error in a closed loop estimates a surface as weaker than it is, since the command answers the
 gust that hides it. This estimate errs the other way, with what the gyro's noise commands. The law uses the
-larger of both: a loop is then no faster than its margins allow.
-
-Effectiveness of every surface, once no known fault fits. The law's disturbance observer has for an
-acceleration a that it does not model the error dynamics
-
-    e' = a - dd,   innovation = e before correction,   e <- (1 - L_rate) innovation,
-    dd <- dd + L_disturbance innovation
-
-which take out what changes slowly: gusts, wrong coefficients. a: rad/s2; e, innovation: rad/s; dd: rad/s2.
-What damage takes stands in no list. After such a fault
-
-    a_i = sum_s theta_s G_is u_s + sum_j A_ij y_j,       -1 <= theta_s <= 0,       y: alpha, beta, p, q, r
-
-G u is what healthy surfaces would give; A is what the airframe does otherwise, for instance a yaw by
-sideslip that has changed its sign: without A the rudders would be blamed for what they answer. theta and A
-follow by recursive least squares from all three axes at once [Ljung1999, ch. 11]. A theta beyond its
-limits is put back, the others with it along the covariance: to the likeliest place within, never further
-from the truth.
+larger of both: a loop is then no faster than its margins allow. Once no known fault fits, it estimates all
+surfaces at once (effectiveness_estimator.py).
 """
 
 from dataclasses import dataclass
@@ -53,14 +37,21 @@ import numpy as np
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.compiled import apart, kernel, record, row_of, sized
-from beaver_ftc.compiled.records import Room
 from beaver_ftc.control import CompiledLaw, accommodation, allocation, laws
 from beaver_ftc.control.accommodation import approach, begin_frame, reported, start_of
 from beaver_ftc.control.engines import between
 from beaver_ftc.control.laws import advance
+from beaver_ftc.control.laws.effectiveness_estimator import (
+    OBSERVER_ERROR,
+    begin_estimator,
+    effectiveness_of,
+    estimate,
+    estimator_dtype,
+    observer_response,
+)
 from beaver_ftc.design.model import effectiveness as control_effectiveness
 from beaver_ftc.design.model import own_damping
-from beaver_ftc.design.table import AIRSPEED, ALPHA, BETA, QDYN
+from beaver_ftc.design.table import AIRSPEED, QDYN
 from beaver_ftc.diagnosis.bounds import DEFAULT_RATE_RAD_S, servo_data
 from beaver_ftc.diagnosis.state import PITCH
 from beaver_ftc.diagnosis.types import GIVE_UP
@@ -239,109 +230,6 @@ def configure(law: np.void, control: np.void, prediction: np.void, declared: Dec
             Kp = fastest(loop, margin, noise_rad_s, float(G[j][axis, s]), speed_rad_s)
             config["Kp_at"][row, j] = Kp
             config["L_rate_at"][row, j], config["L_disturbance_at"][row, j] = corrections(RATIO * Kp, dt)
-
-
-OBSERVER_ERROR = record(rate=3, disturbance=3)  # e and dd of one acceleration
-_SIGNALS = 5
-_FEW = 4  # surfaces: of so few each leads an axis or stands in, and one at a time is looked at (rejecting.py)
-_UNSURE = 0.5  # standard deviation of a surface's theta before anything is seen
-_AIRFRAME = np.array([30.0, 30.0, 3.0, 3.0, 3.0])  # of A, in the order of y: 1/s2 and 1/s
-_CORRELATED = 10.0  # what is missed is no white noise: so many frames count as one
-_LEAST_NOISE_RAD_S2 = 0.05
-_FORGOTTEN_S = 30.0  # what is not seen again in that time may have changed
-
-
-@sized
-def estimator_dtype(n: int) -> np.dtype:
-    """Memory for n surfaces. active: whether it estimates; found (N,): theta of each, then A row by row; P
-    (N, N): their covariance; errors: of the observer, for each surface's moment, each signal and the moments
-    that the law assumes; noise (3,) (rad/s)2: of the innovation in health; unsure (N,): variances begun
-    with; h, Ph (N,): for the update."""
-    many = n > _FEW
-    size, errors = (n + 3 * _SIGNALS, n + _SIGNALS + 1) if many else (Room(1), Room(1))
-    return record(
-        active=int, noise=3, found=size, P=(size, size), h=size, Ph=size, unsure=size,
-        errors=(OBSERVER_ERROR, errors), signal=_SIGNALS,
-    )  # fmt: skip
-
-
-@kernel
-def observer_response(error, i, acceleration, L_rate, L_disturbance, dt):
-    """Innovation (rad/s) of the observer in a frame for an acceleration (rad/s2) of axis i; error: of dtype
-    OBSERVER_ERROR, advanced by the frame."""
-    innovation = error.rate[i] + dt * (acceleration - error.disturbance[i])
-    error.rate[i] = (1.0 - L_rate) * innovation
-    error.disturbance[i] += L_disturbance * innovation
-    return innovation
-
-
-@apart
-def begin_estimator(estimator, squares, frames, dt):
-    """Begin to estimate, with nothing known; squares (3,) (rad/s)2: sums of squares of the innovation over
-    `frames` (3,)."""
-    estimator.active = 1
-    N, n = estimator.found.size, estimator.found.size - 3 * _SIGNALS
-    estimator.P[:], estimator.found[:] = 0.0, 0.0
-    for j in range(N):
-        spread = _UNSURE if j < n else _AIRFRAME[(j - n) % _SIGNALS]
-        estimator.P[j, j] = estimator.unsure[j] = spread * spread
-    least = _LEAST_NOISE_RAD_S2 * dt
-    for i in range(3):
-        estimator.noise[i] = _CORRELATED * max(squares[i] / max(frames[i], 1.0), least * least)
-    for error in estimator.errors:
-        error.rate[:], error.disturbance[:] = 0.0, 0.0
-
-
-@apart
-def estimate(estimator, innovation, L_rate, L_disturbance, dt, x, y, effectiveness, moments):
-    """Take in the innovation of all axes (3,) rad/s; L_rate 1, L_disturbance 1/s (3,): the observer's gains;
-    x (3,) rad/s, y: measured; effectiveness (n,): that the law assumes; moments (3, n) rad/s2: of
-    healthy surfaces."""
-    n, h, signal, unsure = effectiveness.size, estimator.h, estimator.signal, estimator.unsure
-    for j in range(h.size):
-        estimator.P[j, j] = min(
-            estimator.P[j, j] + unsure[j] * dt / _FORGOTTEN_S, max(estimator.P[j, j], unsure[j])
-        )
-    signal[0], signal[1] = y[ALPHA], y[BETA]
-    signal[2:] = x
-    for i in range(3):
-        L, M, errors, assumed = L_rate[i], L_disturbance[i], estimator.errors, 0.0
-        h[:] = 0.0
-        for s in range(n):
-            assumed += (effectiveness[s] - 1.0) * moments[i, s]
-            h[s] = observer_response(errors[s], i, moments[i, s], L, M, dt)
-        for j in range(_SIGNALS):
-            h[n + i * _SIGNALS + j] = observer_response(errors[n + j], i, signal[j], L, M, dt)
-        seen = innovation[i] + observer_response(errors[n + _SIGNALS], i, assumed, L, M, dt)
-        update(estimator, seen, estimator.noise[i])
-    for s in range(n):
-        beyond = estimator.found[s] - min(max(estimator.found[s], -1.0), 0.0)
-        if beyond != 0.0:
-            for j in range(h.size):
-                estimator.found[j] -= estimator.P[j, s] * (beyond / estimator.P[s, s])
-
-
-@kernel
-def update(estimator, seen, noise):
-    """One step of recursive least squares: seen = h found, give or take a variance of `noise`."""
-    N, h, P, Ph = estimator.found.size, estimator.h, estimator.P, estimator.Ph
-    variance, residual = noise, seen
-    for j in range(N):
-        Ph[j] = 0.0
-        for k in range(N):
-            Ph[j] += P[j, k] * h[k]
-        variance += h[j] * Ph[j]
-        residual -= h[j] * estimator.found[j]
-    for j in range(N):
-        estimator.found[j] += Ph[j] / variance * residual
-        for k in range(N):
-            P[j, k] -= Ph[j] * Ph[k] / variance
-
-
-@kernel
-def effectiveness_of(estimator, s):
-    """Effectiveness of surface s, 0 to 1."""
-    return min(max(1.0 + estimator.found[s], 0.0), 1.0)
 
 
 STAND_IN = 3  # the loop of pitch by the surface that stands in

@@ -70,14 +70,9 @@ def rival_options(name: str, defaults: Mapping[str, float], context: Context) ->
             raise BadInput(
                 f"{name}: options.{option_name}: unknown option{suggestion(option_name, defaults)}"
             )
-    declared_uncertainty = context.declared
-    grade = flight_grade(
-        declared_uncertainty.noisy,
-        not declared_uncertainty.bandwidth_rad_s.any() and not declared_uncertainty.rate_limit_rad_s.any(),
-    )
-    tuned_options = {
-        option_name: tuned_value
-        for plugin_group in TUNED_FILE_KEY_BY_PLUGIN_GROUP
-        for option_name, tuned_value in tuned_values(load_tuned_values(), grade, plugin_group, name).items()
-    }
-    return {**defaults, **tuned_options, **context.options}
+    declared, options = context.declared, dict(defaults)
+    has_ideal_actuators = not declared.bandwidth_rad_s.any() and not declared.rate_limit_rad_s.any()
+    grade = flight_grade(declared.noisy, has_ideal_actuators)
+    for plugin_group in TUNED_FILE_KEY_BY_PLUGIN_GROUP:
+        options |= tuned_values(load_tuned_values(), grade, plugin_group, name)
+    return {**options, **context.options}

@@ -56,7 +56,7 @@ def loss_interval(c, srf, h, k):
 
 @kernel
 def loss_range(c, srf, h, k):
-    """(1 + theta) u, least and greatest."""
+    """(1 + theta) u, least and greatest over the set of 1 + theta, rad."""
     lo, hi = srf.sets.low[h] * srf.last.u, srf.sets.high[h] * srf.last.u
     return min(lo, hi), max(lo, hi)
 
@@ -106,7 +106,8 @@ VARYING_LOSS = FaultType(
 )  # fmt: skip
 
 
-# times the least rate of a runaway, half of the rate limit at which it runs
+# An offset that grows faster than this counts as a runaway: times the least rate of a runaway, which is half
+# of the rate limit at which a runaway moves.
 MAX_GROWTH_RATIO = 1.8
 
 
@@ -137,7 +138,7 @@ def bias_middle(srf, h):
 
 @kernel
 def bias_range(c, srf, h, k):
-    """u + b, cut off by the stops."""
+    """u + b, cut off by the stops, least and greatest over the set of b, rad."""
     lo = mean_with_offset(srf, srf.sets.low[h], srf.commands.u_min[0])
     return lo, mean_with_offset(srf, srf.sets.high[h], srf.commands.u_max[0])
 
@@ -256,7 +257,7 @@ GROWING_BIAS = FaultType(
 )  # fmt: skip
 
 
-MIN_HALF_CYCLES = 3
+MIN_HALF_CYCLES = 3  # two whole ones, and the first, which is cut off at its beginning
 
 
 @kernel
@@ -267,7 +268,8 @@ def reset_swing(srf, h):
 
 @kernel
 def add_square(c, srf, h, k, skipped):
-    """Sum (p - u)^2. In a skipped frame it may have swung to the other side, unseen."""
+    """Add (p - u)^2 of this frame to the sum of the half-cycle. In a skipped frame it may have swung to the
+    other side, unseen."""
     lo, hi = error_of_frame(srf)
     srf.oscillatory.square += (0.5 * (lo + hi)) ** 2
     if skipped:
@@ -288,7 +290,7 @@ def update_swing(c, srf, h, k):
         M.since = k + 1
         return UNLIMITED_SET
     if sign != M.sign:
-        if M.sign != 0:  # a half-cycle ends here; the first is cut off at its beginning and does not count
+        if M.sign != 0:  # a half-cycle ends here; the sums begin with the second, the first whole one
             if M.n_half == 0:
                 M.first_end = k
             else:
@@ -302,7 +304,7 @@ def update_swing(c, srf, h, k):
 
 @kernel
 def swing_has_shown(srf, h):
-    """Whether it has swung for two half-cycles and more."""
+    """Whether it has swung for two whole half-cycles."""
     return srf.oscillatory.n_half >= MIN_HALF_CYCLES
 
 
@@ -313,7 +315,7 @@ def swing_amplitude(fdi: np.void, s: int, h: int) -> float | None:
 
 
 def swing_frequency(fdi: np.void, s: int, h: int) -> float | None:
-    """From the half-cycles counted."""
+    """Frequency pi n / T, rad/s, of the n whole half-cycles that took T s."""
     M = fdi["types"]["surface"][s]["oscillatory"]
     n = int(M["n_half"]) - 1
     frames = int(M["last_end"] - M["first_end"])
@@ -325,10 +327,10 @@ OSCILLATORY = FaultType(
     reset_memory=reset_swing, see_frame=add_square, consistent_interval=update_swing,
     memory_record_name="oscillatory",
     memory_dtype=record(
-        sign=int, since=int,
-        n_half=int, first_end=int, last_end=int,
-        # ends of half-cycles, frames
-        # of the deflection error, rad2: this half-cycle, those before
+        # sign of p - u and the frame since which it is that; how many half-cycles have ended, and the frames
+        # in which the first and the last of them did
+        sign=int, since=int, n_half=int, first_end=int, last_end=int,
+        # sums of (p - u)^2, rad2: over this half-cycle, over the whole ones before
         square=float, square_past=float,
     ),
     has_shown=swing_has_shown, show_half_cycles=2, evidence_at_rest=REST_EXCLUDES_TYPE,
@@ -365,10 +367,13 @@ def update_creep(c, srf, h, k):
 
 @kernel
 def narrow_creep(c, srf, M, side):
-    """Take off what the slowest one comes nearer by within the judged frame: a least step an instant, until
-    its lag makes the steps smaller. Where it was at an instant bounds where it is a frame later.
+    """Move the bound on the surface by what the slowest one comes nearer to its command in the judged frame.
 
-    side: 1 if the surface is above its command, -1 if it is below.
+        above its command (side 1)    hi <- max(hi - d, u_hi + near),    d = slow_step instants
+        below it (side -1)            lo <- min(lo + d, u_lo - near)
+
+    u_lo, u_hi: orders of the frame, rad; slow_step: the least step an instant; nearer to the order than
+    `near` the lag makes the steps smaller. Where it was at an instant bounds where it is a frame later.
     """
     motion = c.n_substeps * c.frames_per_block * srf.actuator.slow_step
     near = srf.actuator.near

@@ -49,4 +49,4 @@ class ControlReadout:
         """Gains of the default law, and what it assumes."""
         law = self._control["rejecting"]["config"]
         names = "qdyn", "Kp_at", "L_rate_at", "L_disturbance_at", "lead"
-        return DefaultLaw(*(law[name].copy() for name in names), share=float(law["share"]))
+        return DefaultLaw._make((*(law[name].copy() for name in names), float(law["share"])))

@@ -352,7 +352,7 @@ def alarm_arrays(fdi: np.void, n_estimators: int, has_statistical_detector: bool
         stat = fdi["statistical"]
         blk, gust = stat["block"], stat["gust"]["output"]
         arrays |= {name: blk[name] for name in RECORDED_BLOCK_FIELDS}
-        arrays |= {"signature": blk["hypothesis"]["signature"], "bounded": stat["noise"]["eta"]}
+        arrays |= {"signature": blk["hypothesis"]["signature"], "bounded": stat["rows"]["eta"][0, :3]}
         arrays |= {"air": gust["acc_mean"], "leap": gust["var_turn"]}
     return arrays
 

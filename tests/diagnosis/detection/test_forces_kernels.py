@@ -44,10 +44,8 @@ def felt(**declared):
     statistical = fdi["statistical"]
     air = statistical["gust"]
     fill_table(air["memory"]["table"], AIRCRAFT, AIRCRAFT.measurable_forces, FORCES)
-    air["config"]["S_m"], air["config"]["gravity"] = (
-        AIRCRAFT.geometry.wing_area_m2 / AIRCRAFT.mass.mass_kg,
-        GRAVITY,
-    )
+    air["config"]["S_m"] = AIRCRAFT.geometry.wing_area_m2 / AIRCRAFT.mass.mass_kg
+    air["config"]["gravity"], air["config"]["span"] = GRAVITY, AIRCRAFT.geometry.span_m
     air["config"]["L_gust"], statistical["forces"]["in_use"] = 533.4, 1
     air["output"]["uses_accelerometers"] = 1
     statistical["rows"]["first"] = FIRST
@@ -117,7 +115,7 @@ def test_a_surface_s_column_is_the_slope_along_it_and_its_errors_are_shares_of_t
 def test_the_flow_s_rates_are_those_of_a_body_that_moves_on():
     """The velocity through air at rest a moment later, by v' = a + g - x cross v."""
     record, a, phi, theta = felt()["statistical"]["forces"], np.array([0.5, 0.3, -9.5]), 0.2, 0.15
-    forces.fill_angle_rates(record, measured())
+    forces.fill_angle_rates(record, GRAVITY, measured())
     alpha, beta, V = Y[:3]
     v = V * np.array([np.cos(alpha) * np.cos(beta), np.sin(beta), np.sin(alpha) * np.cos(beta)])
     g = GRAVITY * np.array([-np.sin(theta), np.cos(theta) * np.sin(phi), np.cos(theta) * np.cos(phi)])

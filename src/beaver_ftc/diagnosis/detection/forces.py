@@ -20,7 +20,7 @@ like e, is in rad/s2.
     e, f_hat       innovation; force of the model
     per_C          qdyn S / m c: e of a coefficient of one
     G              e per rad of a surface
-    L              e per rad/s of rotation of the air, 1/s
+    L              force of the model per rad/s of the aircraft against the air, 1/s
     angle, vane    flow angle from inertial motion, rad; of a vane's error, per rad: (acceleration, e)
 """
 
@@ -58,9 +58,9 @@ TrimState = tuple[np.ndarray, np.ndarray, np.ndarray]  # x (3,) rad/s, y and u r
 
 FORCE_RECORD = record(
     innovation=float,  # e at the start of the elapsed frame
-    # e at the flow angle from inertial motion; that angle, rad; bound on its drift, rad/s; e per rad/s of
-    # drift; intensity of the drift of e by errors and gusts, (rad/s2)2/s
-    e_inertial=float, angle=float, drift=float, e_drift=float, Q_e=float,
+    # e at the flow angle from inertial motion; that angle, rad; e per rad/s of its drift; intensity of the
+    # drift of e by errors and gusts, (rad/s2)2/s
+    e_inertial=float, angle=float, e_drift=float, Q_e=float,
     G=MAX_SURFACES,  # e per rad of each surface, now
     # of an error of the vane, per rad: angular acceleration and e, angular acceleration in roll
     vane=2, vane_roll=float,
@@ -71,7 +71,7 @@ FORCE_RECORD = record(
     n_Z=int,  # its columns in rows.py, without that of the drift
 )  # fmt: skip
 FORCES_RECORD = record(
-    in_use=int, c_inv=float, gravity=float, span=float,  # whether forces are used; 1/m; m/s2; m
+    in_use=int, c_inv=float,  # whether forces are used; one over the chord, 1/m
     q_trim=float, q_noise=float, q_ratio=float,  # dynamic pressure: in trim, noise, Pa; over that in trim
     # coefficient of the rate of sideslip; rates of sideslip and incidence of the instant before, rad/s
     CY_bdot=float, angle_rate=2,
@@ -87,7 +87,7 @@ def fill_vaneless_y(forces, w, y):
 
         y_free = y - (e / q_ratio + L' w) / vane[1]
 
-    w (3,) rad/s: rotation of the air in body axes; it damps like the aircraft's own rotation.
+    w (3,) rad/s: rotation of the air in body axes. The aircraft turns at x - w against it: e = -L' w.
     """
     forces.y_free[:] = y
     for i in range(2):
@@ -120,14 +120,16 @@ def update_inertial(forces, f, i, y, dt):
 
 
 @kernel
-def fill_angle_rates(forces, meas):
+def fill_angle_rates(forces, gravity, meas):
     """Fill `angle_rate` with d beta / dt and d alpha / dt in still air, rad/s.
 
-        a = f + gravity      V_dot = e' a      (u, v, w)_dot = a - x x V e      e = V vector / V
+        a = f + g      V_dot = e' a      (u, v, w)_dot = a - x x V e      e = V vector / V
+        beta_dot = (v_dot - V_dot e_y) / (V cos beta)
+        alpha_dot = (w_dot cos alpha - u_dot sin alpha) / (V cos beta)
 
-    f (3,) m/s2: accelerometers; x (3,) rad/s.
+    f (3,) m/s2: accelerometers; g (3,): gravity in body axes, its size `gravity` m/s2; x (3,) rad/s.
     """
-    g, x, f = forces.gravity, meas.x, meas.force
+    g, x, f = gravity, meas.x, meas.force
     phi, th = meas.attitude[0], meas.attitude[1]
     alpha, beta, V = meas.y[ALPHA], meas.y[BETA], meas.y[AIRSPEED]
     e_x, e_y = np.cos(alpha) * np.cos(beta), np.sin(beta)
@@ -159,12 +161,11 @@ def configure_forces(
     stat = fdi["statistical"]
     aircraft = declared.aircraft
     errors = declared.sensors
-    forces, gust, geometry = stat["forces"], stat["gust"], aircraft.geometry
-    forces["c_inv"], forces["gravity"] = 1.0 / geometry.chord_m, gust["config"]["gravity"]
+    forces = stat["forces"]
+    forces["c_inv"] = 1.0 / aircraft.geometry.chord_m
     forces["q_trim"] = y[QDYN]
     forces["q_noise"] = errors["qdyn"].random
     CY_bdot = [t.value for t in aircraft.forces if t.coefficient == "CY" and t.of == ((SIDESLIP_RATE, 1),)]
-    forces["span"] = geometry.span_m
     forces["CY_bdot"] = sum(CY_bdot)
     for i in range(2):
         _configure_force(fdi, declared, trim, slopes, i, dt)
@@ -187,12 +188,12 @@ def _configure_force(
     f["var_trim"] = _force_variances(fdi, errors, y, f_all, vane)
     std = errors[ACCELEROMETERS[1 + i]].random
     f["var_acc"] = (forces["c_inv"] * std) ** 2
-    f["drift"] = _drift_bound(errors, cfg["gravity"], y[AIRSPEED], i)
-    _configure_columns(fdi["statistical"]["rows"], f, declared, terms, y, f_y[vane] / per_C, i)
+    drift = _drift_bound(errors, cfg["gravity"], y[AIRSPEED], i)
+    _configure_columns(fdi["statistical"]["rows"], f, declared, terms, y, f_y[vane] / per_C, drift, i)
     for term in terms:
         if term.surface:
             f["G_trim"][aircraft.surfaces.index(term.surface)] += per_C * abs(term.value)
-    Q_angle = (DRIFT_CHANGE_PER_S * f["drift"]) ** 2 + dt * (std / y[AIRSPEED]) ** 2
+    Q_angle = (DRIFT_CHANGE_PER_S * drift) ** 2 + dt * (std / y[AIRSPEED]) ** 2
     f["Q_e"] = f_y[vane] ** 2 * (Q_angle + declared.air.angle_walk(y[AIRSPEED]))
 
 
@@ -239,11 +240,18 @@ def _drift_bound(errors: SensorErrors, gravity: float, V: float, i: int) -> floa
 
 
 def _configure_columns(
-    rows: np.void, f: np.void, declared: Declared, terms: list[Term], y: np.ndarray, C_vane: float, i: int
+    rows: np.void,
+    f: np.void,
+    declared: Declared,
+    terms: list[Term],
+    y: np.ndarray,
+    C_vane: float,
+    drift: float,
+    i: int,
 ) -> None:
     """Fill the tolerances of the force's columns: of each term, by that of the coefficients and by constant
     errors of vane and pressure; of the rate of sideslip; of the accelerometer's bias, m/s2; of the whole; of
-    the drift. Fill the columns of an error of the vane."""
+    the drift, rad/s. Fill the columns of an error of the vane."""
     tol_C, errors = declared.coefficients.largest, declared.sensors
     vane = errors["alpha" if i == NORMAL_INDEX else "beta"]
     acc = errors[ACCELEROMETERS[1 + i]]
@@ -257,7 +265,7 @@ def _configure_columns(
     if acc.steady:
         rows["Z"][first + len(tol), SIDE_FORCE + i] = 1.0 / declared.aircraft.geometry.chord_m
         tol.append(acc.steady)
-    tol += [MASS_TOLERANCE + acc.slope, f["drift"]]
+    tol += [MASS_TOLERANCE + acc.slope, drift]
     f["n_Z"], rows["tol"][first : first + len(tol)] = len(tol) - 1, tol
     of_vane = rows["G"][MAX_SURFACES + i]
     of_vane[[ROLL, YAW if i == SIDE_INDEX else PITCH, SIDE_FORCE + i]] = f["vane_roll"], *f["vane"]

@@ -65,7 +65,7 @@ from beaver_ftc.scenario.declared import SensorErrors
 # inertial motion, and the rates do not count.
 RAW, RATES, VANED, VANELESS, INERTIAL = range(5)
 MAX_COLUMNS = MAX_TERMS + N_INPUT_READINGS + 2 * (MAX_FORCE_REGRESSORS + 1)
-MIN_GYRO_STD_RAD_S = 1e-9  # of a gyro: exact ones are still doubles, and a variance no difference of zeros
+MIN_GYRO_STD_RAD_S = 1e-9  # of an exact gyro: with a variance of 0 the filters' S would be singular
 _READING_OF = {"alpha": ALPHA, "beta": BETA, "V": AIRSPEED, "qdyn": QDYN}
 _KW_READING = N_INPUT_READINGS - 1  # of the engine, kW
 _DPT = RH + 1  # the first of the declared signals
@@ -76,8 +76,6 @@ NOISE_RECORD = record(
     q=float,
     # share of its bound by which the uncertainty changes in a frame if no surface moves
     rate0=float,
-    eta=3,  # bound on the uncertainty with healthy surfaces, now, rad/s2
-    eta_free=3,  # what one surface anywhere in its travel adds to it, rad/s2
     G_trim=(3, MAX_SURFACES),  # magnitude of the effect of each surface in trim, rad/s2 per rad
     # variance by noise of all inputs of the model; without the air data; (rad/s2)2
     Q=3, Q0=3,
@@ -89,7 +87,8 @@ NOISE_RECORD = record(
 
 ROWS_RECORD = record(
     nu=(5, N_ROWS), std=(5, N_ROWS),  # for each of what may be subtracted
-    eta=(2, N_ROWS), R=N_ROWS,  # eta: surfaces as commanded; one of them anywhere in its travel
+    # bound on the uncertainty, now: with surfaces as commanded; with one of them anywhere in its travel
+    eta=(2, N_ROWS), R=N_ROWS,
     # effect of a surface, and of an error of the side and the other vane, per rad; bound on its error
     G=(MAX_SURFACES + 2, N_ROWS), e_G=(MAX_SURFACES + 2, N_ROWS), Gu=(MAX_SURFACES, N_ROWS),
     per_cubed=float,  # pitch acceleration of a coefficient 1 of alpha^3
@@ -172,10 +171,10 @@ def begin_rows(w, noise, rows, bound, model, meas, u):
 
     eta = published bound + |G| du + mapped error
     """
-    eta, emap = noise.eta, bound.error_map
+    eta, emap = rows.eta[0], bound.error_map
     rows.Z[: rows.n] = 0.0
     add_constants(w, noise, rows, bound.declared_errors, model, meas, u)
-    eta[:] = 0.0
+    eta[:3] = 0.0
     add_published_bound(
         meas.x, model, bound.inertia_coupling_error_share, bound.const, bound.earth_rate_rad_s, eta
     )
@@ -184,9 +183,7 @@ def begin_rows(w, noise, rows, bound, model, meas, u):
             eta[i] += noise.G_trim[i, s] * du
         if emap.n_boxes > 0:
             eta[i] += min(emap.e_now[i], OFF_MAP_RAD_S2)
-        if emap.one_free:
-            noise.eta_free[i] = extra_bound(emap, emap.n_levels - 1, i)
-        rows.eta[0, i], rows.eta[1, i] = eta[i], eta[i] + noise.eta_free[i]
+        rows.eta[1, i] = eta[i] + (extra_bound(emap, emap.n_levels - 1, i) if emap.one_free else 0.0)
         rows.std[RATES, i] = np.sqrt(noise.Q[i])
 
 
@@ -216,7 +213,7 @@ def update_forces(rows, forces, gust, du, meas, u, dt):
     At the first instant the rate of sideslip of the run before is not known; that of this instant is used.
     """
     if forces.n_seen == 0:
-        fill_angle_rates(forces, meas)
+        fill_angle_rates(forces, gust.config.gravity, meas)
     evaluate(gust.memory.table, meas.x, meas.y)
     forces.q_ratio = meas.y[QDYN] / forces.q_trim
     for i, f in enumerate(forces.component):
@@ -231,7 +228,7 @@ def update_forces(rows, forces, gust, du, meas, u, dt):
             eta += f.G_trim[s] * du[s]
         e_lag = MAX_FORCE_LAG_S * abs(f.f_hat - f_prev) / dt if forces.n_seen else 0.0
         rows.eta[0, r] = rows.eta[1, r] = eta * forces.q_ratio + e_lag
-    fill_angle_rates(forces, meas)
+    fill_angle_rates(forces, gust.config.gravity, meas)
     forces.n_seen = min(forces.n_seen + 1, MIN_UPDATES)
 
 
@@ -260,9 +257,8 @@ def update_force(rows, forces, f, gust, i, meas, u):
         rows.Z[c + k - first, r] = Z
         f_hat += table.value[k] * Z
     if i == SIDE_INDEX:
-        f_bdot = (
-            per_C * forces.CY_bdot * forces.angle_rate[SIDE_INDEX] * forces.span / (2.0 * meas.y[AIRSPEED])
-        )
+        span_over_2V = gust.config.span / (2.0 * meas.y[AIRSPEED])
+        f_bdot = per_C * forces.CY_bdot * forces.angle_rate[SIDE_INDEX] * span_over_2V
         rows.Z[c + end - first, r] = f_bdot
         f_hat += f_bdot
     rows.Z[c + f.n_Z - 1, r] = f.f_hat = f_hat

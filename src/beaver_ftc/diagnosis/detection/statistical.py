@@ -270,7 +270,7 @@ def eta_rate(settings: Statistical, aircraft: Aircraft, dt_s: float) -> float:
     from one end of the bound to the other. If the error is mapped, its rate of change is worked out in flight
     (`statistical.update_eta_rate`).
     """
-    return 2.0 if any(aircraft.model_error_rad_s2) else settings.uncertainty_rad_s * dt_s
+    return MAX_ETA_RATE if any(aircraft.model_error_rad_s2) else settings.uncertainty_rad_s * dt_s
 
 
 def _configure_noise(
@@ -324,7 +324,7 @@ def derive_length(stat: np.void, V: float, rate_hz: float, gust_m: float) -> flo
     stronger one, of equal power at low frequency and more power at high frequency.
     """
     if stat["noise"]["q"] == 0.0:
-        # 0 in still air: nothing is declared that drifts, and the two views are one
+        # 0 in still air: nothing is declared that drifts, and the two blocks are one
         return gust_m
     T = 2 ** (N_SLOTS - 1) / rate_hz
     level = float(stat["test"]["alarm_level"])
@@ -335,10 +335,10 @@ def derive_length(stat: np.void, V: float, rate_hz: float, gust_m: float) -> flo
 # Least share of the best log-likelihood ratio that a constant theta explains of a loss growing at any rate
 # (docs/explanation/statistical.md).
 MIN_LLR_SHARE = 0.25
-# The error of a model moves from one end of its bound to the other, by 2 bounds, no faster than a surface
-# moves by this share of its travel.
-REVERSING_SHARE = 0.25
-BOUNDS_PER_TRAVEL = 2.0 / REVERSING_SHARE
+# The error of a model moves from one end of its bound to the other, by 2 bounds, within a frame at most, and
+# no faster than a surface moves by a quarter of its travel.
+MAX_ETA_RATE = 2.0
+BOUNDS_PER_TRAVEL = 8.0
 MIN_TRAVEL_RAD = 1e-6
 
 # Configuration of the tests.
@@ -395,7 +395,10 @@ def update_blocks(cfg, rows, blocks, gust, dt, k, alarmed, may_end=False):
 
 @kernel
 def filter_known(blocks, gust, nu, dt):
-    """Whiten nu (3,), the innovation after known faults; the state x_known tracks its slowly varying mean."""
+    """Whiten nu (3,), the innovation after known faults; the state x_known tracks its slowly varying mean.
+
+    The whitened innovation replaces the `nu` of each block.
+    """
     for b in blocks[: likelihood.REVERTING_BLOCK]:
         for i, axis in enumerate(b.axes[: b.n]):
             b.nu[i] = nu[axis] - gust.output.acc_mean[axis]
@@ -453,9 +456,11 @@ def best_alternative(b, fies, of, s, revived=False):
     for h in b.hypothesis[: b.n_h]:
         if h.kind in (GROWING_LOSS, LOSS_END):
             continue
-        j = of[h.surface]
-        if h.kind != LOSS or (h.surface != s and (revived or j < 0 or not fies[j].excluded)):
-            lo = max(lo, h.llr_lo)
+        if h.kind == LOSS:
+            j = of[h.surface]
+            if h.surface == s or (j >= 0 and fies[j].excluded and not revived):
+                continue
+        lo = max(lo, h.llr_lo)
     return lo
 
 
@@ -536,7 +541,7 @@ def prepare_tests(cfg, noise, rows, blocks, gust, bound, model, meas, u, dt):
     if gust.output.gusty:
         gusts.fill_gust_effect(gust, model, meas.x, meas.y, u)
     begin_rows(cfg.w, noise, rows, bound, model, meas, u)
-    fill_drift(noise, blocks, gust, meas.y[AIRSPEED], dt)
+    fill_drift(noise, rows.eta[0], blocks, gust, meas.y[AIRSPEED], dt)
     if bound.error_map.n_boxes > 0:
         update_eta_rate(noise, blocks, bound.error_map, u)
     if gust.output.gusty:
@@ -547,7 +552,7 @@ def prepare_tests(cfg, noise, rows, blocks, gust, bound, model, meas, u, dt):
 def update_eta_rate(noise, blocks, emap, u):
     """The share of its bound by which a mapped uncertainty can change in the next frame.
 
-    eta_rate = min(rate0 + moved BOUNDS_PER_TRAVEL, 2),   moved = max_s |u_s - u_old_s| / travel_s
+    eta_rate = min(rate0 + moved BOUNDS_PER_TRAVEL, MAX_ETA_RATE),   moved = max_s |u_s - u_old_s| / travel_s
     """
     moved = 0.0
     for s in range(u.size):
@@ -555,7 +560,7 @@ def update_eta_rate(noise, blocks, emap, u):
         moved = max(moved, abs(u[s] - emap.u_old[s]) / width)
         emap.u_old[s] = u[s]
     for b in blocks:
-        b.eta_rate = min(noise.rate0 + BOUNDS_PER_TRAVEL * moved, BOUNDS_PER_TRAVEL * REVERSING_SHARE)
+        b.eta_rate = min(noise.rate0 + BOUNDS_PER_TRAVEL * moved, MAX_ETA_RATE)
 
 
 @kernel
@@ -567,7 +572,7 @@ def add_test_instant(cfg, noise, rows, gust, bound, model, meas, u, dt):
 
 
 @kernel
-def fill_drift(noise, blocks, gust, V, dt):
+def fill_drift(noise, eta, blocks, gust, V, dt):
     """Fill of each block the drift's intensity Q_d and decay a; of the filter without gust the noise, too.
 
     Q_d = Q_scale q_gust + q max(eta, MIN_ETA)^2,  (rad/s2)2/s      a = exp(-dt V / length)
@@ -579,7 +584,7 @@ def fill_drift(noise, blocks, gust, V, dt):
                 gusty = gust.output.gusty
                 q_gust = gusts.unmeasured_drift(gust, V, axis, b.axes[j], reverts) if gusty else 0.0
                 b.Q_d[i, j] = b.Q_scale * q_gust
-            q_eta = noise.q * max(noise.eta[axis], likelihood.MIN_ETA_RAD_S2) ** 2
+            q_eta = noise.q * max(eta[axis], likelihood.MIN_ETA_RAD_S2) ** 2
             b.Q_d[i, i] += q_eta
             b.calm.Q_d[i, i] = q_eta
             b.calm.Q_x[i] = noise.Q[axis]

@@ -168,9 +168,9 @@ def update_tests(fdi, prediction, measured, k, t):
     """Test the innovation of the elapsed frame, which ends frame k at t s, for every hypothesis."""
     stat = fdi.statistical
     y = measured.y
-    eta = stat.noise.eta
     cfg = stat.test
     rows = stat.rows
+    eta = rows.eta[0, :3]
     blocks = stat.block
     gust = stat.gust
     force = stat.forces

@@ -114,7 +114,7 @@ def coefficient_bounds(
     declared: Declared, model: np.void, mass: MassProperties, y: np.ndarray, u: np.ndarray
 ) -> np.ndarray:
     """Tolerance of each moment's term that covers every declared constant error but those of the air data
-    (statistical.py); y, u in trim."""
+    (statistical_design.py); y, u in trim."""
     aircraft, errors = declared.aircraft, declared.sensors
     C = np.abs(model["moments"]["value"][: len(aircraft.moments)])
     own = [2, 7, 11]  # what multiplies a moment there

@@ -26,14 +26,14 @@ from beaver_ftc.control.autopilot import AUTOPILOT, COLUMNS, set_up_autopilot
 from beaver_ftc.design.model import anchor, mass_of
 from beaver_ftc.diagnosis import model_prediction, schemes
 from beaver_ftc.diagnosis.conclusion import assessment_dtype
-from beaver_ftc.diagnosis.detection import statistical
 from beaver_ftc.diagnosis.detection.parity import (
     USUAL_SIZE,
     StatisticalSize,
     required_size,
 )
+from beaver_ftc.diagnosis.detection.statistical_design import configure_statistics
 from beaver_ftc.diagnosis.isolation import estimator_names
-from beaver_ftc.diagnosis.monitors import redundancy
+from beaver_ftc.diagnosis.monitors.records import configure_sensor_monitor
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.frame import accounts_dtype, true_faults_dtype
 from beaver_ftc.plant import channels as ch
@@ -261,9 +261,9 @@ def configure_diagnosis_at_trim(frame: np.void, scenario: Scenario, trim: Trim) 
     for end, sign in (("u_lo", -1.0), ("u_hi", 1.0)):
         prediction[end] = np.clip(trim.command + sign * servos["band"], servos["low"], servos["high"])
     anchor(design, trim.x, trim.y, trim.u)
-    redundancy.configure_sensor_monitor(fdi["sensor_monitor"], declared, design, trim.y)
+    configure_sensor_monitor(fdi["sensor_monitor"], declared, design, trim.y)
     mass = mass_of(declared.design_model, declared.aircraft)
-    statistical.configure_statistics(fdi, declared, design, mass, (trim.x, trim.y, trim.u), scenario.rate_hz)
+    configure_statistics(fdi, declared, design, mass, (trim.x, trim.y, trim.u), scenario.rate_hz)
 
 
 def _assemble_design(scenario: Scenario, travel: np.ndarray, line: int) -> np.ndarray:

@@ -36,7 +36,7 @@ from beaver_ftc.diagnosis.conclusion import (
     SURFACE_REFUTED,
     TYPES_REFUTED,
 )
-from beaver_ftc.diagnosis.monitors.redundancy import sensor_monitor_finding
+from beaver_ftc.diagnosis.monitors.records import sensor_monitor_finding
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, ROLL, STATISTICAL_DETECTOR, UNANTICIPATED, YAW
 from beaver_ftc.diagnosis.types.registry import TYPE_NAMES
 from beaver_ftc.diagnosis.types.verdict import estimate_fault_parameter, fault_finding_dict

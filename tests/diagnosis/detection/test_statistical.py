@@ -7,7 +7,7 @@ from innovations import drawn
 from beaver_ftc.aircraft import AXES, load
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.fdc import MASS
-from beaver_ftc.diagnosis.detection import likelihood, statistical
+from beaver_ftc.diagnosis.detection import likelihood, statistical, statistical_design
 from beaver_ftc.diagnosis.detection.likelihood import N_SLOTS
 from beaver_ftc.diagnosis.detection.rows import RATES
 from beaver_ftc.loop.assembly import configure_design
@@ -39,7 +39,7 @@ class Detector:
         frame = self.frames[0]
         self.fdi, self.dt = frame["fdi"], 1.0 / rate_hz
         design, declared = frame["prediction"]["design"], Declared.of(scenario)
-        statistical.configure_statistics(self.fdi, declared, design, MASS, LEVEL_FLIGHT, rate_hz)
+        statistical_design.configure_statistics(self.fdi, declared, design, MASS, LEVEL_FLIGHT, rate_hz)
         self.detector = self.fdi["statistical"]
         measured = np.zeros(1, MEASURED)[0]
         measured["x"], measured["y"][:5] = LEVEL_FLIGHT[:2]
@@ -105,8 +105,8 @@ def test_false_alarms_are_no_more_than_declared_and_not_absurdly_fewer(setting, 
     """On innovations as declared, a new flight after every alarm. The union bound costs a factor of six or
     so: tests of neighbouring onsets and frames go together."""
     alone = Detector(rate_hz, bounds=SETTINGS[setting])
-    tests = statistical.count_tests(load())
-    alone.detector["test"]["alarm_level"] = statistical.derive_alarm_level(per_h, rate_hz, tests)
+    tests = statistical_design.count_tests(load())
+    alone.detector["test"]["alarm_level"] = statistical_design.derive_alarm_level(per_h, rate_hz, tests)
     hours, rng = 240.0 / 3600.0, np.random.default_rng(8)
     frames = round(hours * 3600.0 * rate_hz)
     scores = alone.watch(alone.innovations(frames, rng), *surfaces_at_work(frames, rate_hz, rng), renew=True)

@@ -6,7 +6,7 @@ from kernels import fill
 from true_flight import UNITS, compared, new_monitor, true_flight
 
 from beaver_ftc.diagnosis.monitors import redundancy
-from beaver_ftc.diagnosis.monitors.redundancy import (
+from beaver_ftc.diagnosis.monitors.records import (
     AIRSPEED,
     ALPHA,
     ALPHA_TEST,

@@ -7,7 +7,7 @@ from true_flight import UNITS, new_monitor, true_flight
 
 from beaver_ftc.diagnosis.model_prediction import prediction_dtype
 from beaver_ftc.diagnosis.monitors import sensor_monitor
-from beaver_ftc.diagnosis.monitors.redundancy import (
+from beaver_ftc.diagnosis.monitors.records import (
     AIRSPEED,
     ALPHA,
     ALPHA_TEST,

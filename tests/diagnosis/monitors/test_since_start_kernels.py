@@ -9,14 +9,7 @@ import pytest
 from true_flight import UNITS, compared, new_monitor, true_flight
 
 from beaver_ftc.diagnosis.monitors import initial_errors
-from beaver_ftc.diagnosis.monitors.redundancy import (
-    H_AIRSPEED,
-    H_ALPHA,
-    H_BETA,
-    H_PHI,
-    H_THETA,
-    N_INITIAL,
-)
+from beaver_ftc.diagnosis.monitors.records import H_AIRSPEED, H_ALPHA, H_BETA, H_PHI, H_THETA, N_INITIAL
 from beaver_ftc.diagnosis.monitors.sensor_monitor import INITIAL_SENSOR
 from beaver_ftc.plant.instruments import SENSORS
 

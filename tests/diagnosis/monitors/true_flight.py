@@ -5,7 +5,7 @@ from kernels import fill
 from scipy.spatial.transform import Rotation
 
 from beaver_ftc.diagnosis.monitors import initial_errors, redundancy
-from beaver_ftc.diagnosis.monitors.redundancy import (
+from beaver_ftc.diagnosis.monitors.records import (
     AIRSPEED,
     ALPHA,
     BETA,

@@ -17,6 +17,6 @@ if TYPE_CHECKING:
         bound_responses as response_of_block,
     )
     from beaver_ftc.diagnosis.detection.likelihood import whiten_step as whiten_frame
-    from beaver_ftc.diagnosis.detection.statistical import LEVEL_NOISE_SHARE
+    from beaver_ftc.diagnosis.detection.statistical_design import LEVEL_NOISE_SHARE
 else:
     __getattr__, __dir__ = lazily(__name__)

@@ -5,8 +5,7 @@ different models of the drift. A random walk reacts fast and ignores constant er
 zero gathers evidence for longer. Pitch has only the latter if no vane measures its gust. The worst-case
 scheme needs no probability; the scenario's `fdi.authority` sets whose alarms and exclusions count.
 
-The noise model (rows.py) follows from what a scenario declares, and the declared rate of false alarms holds
-for the declared noise.
+statistical_design.py fills the records from what a scenario declares.
 
 Symbols of the kernels:
 
@@ -22,315 +21,41 @@ Symbols of the kernels:
     cfg, noise, gust, bound       records of the tests, the noise model, the gust estimate, the bounds
 """
 
-from collections.abc import Iterator
-from math import exp, hypot, sqrt
-from statistics import NormalDist
-from sys import float_info
-
 import numpy as np
 
-from beaver_ftc.aircraft import AXES, Aircraft, MassProperties
+from beaver_ftc.aircraft import AXES
 from beaver_ftc.aircraft.schema import MAX_SURFACES
 from beaver_ftc.compiled import kernel, record, sized
-from beaver_ftc.design import rotation_lengths
-from beaver_ftc.design.model import jacobian
-from beaver_ftc.design.table import AIRSPEED, ALPHA, BETA, QDYN
+from beaver_ftc.design.table import AIRSPEED
 from beaver_ftc.diagnosis import gusts
 from beaver_ftc.diagnosis.detection import likelihood, parity
-from beaver_ftc.diagnosis.detection.attitude import attitude_dtype, configure_attitude
-from beaver_ftc.diagnosis.detection.forces import FORCES_RECORD, TrimState, configure_forces
+from beaver_ftc.diagnosis.detection.attitude import attitude_dtype
+from beaver_ftc.diagnosis.detection.forces import FORCES_RECORD
 from beaver_ftc.diagnosis.detection.likelihood import (
-    ALPHA_CUBED_MOMENT,
     GROWING_LOSS,
     LATERAL_BLOCK,
     LOSS_END,
     N_FILTER_BLOCKS,
-    N_SLOTS,
-    STEP_FAULT,
     block_dtype,
 )
 from beaver_ftc.diagnosis.detection.parity import (
-    AXIS_VIEW,
-    ROLL_YAW_PLANE,
     USUAL_SIZE,
-    VANE_VIEW,
-    ParityDirection,
     StatisticalSize,
-    configure_parity_views,
-    list_directions,
     view_dtype,
 )
 from beaver_ftc.diagnosis.detection.rows import (
     NOISE_RECORD,
-    RATES,
     ROWS_RECORD,
     add_constants,
     add_turn,
     begin_rows,
-    configure_rows,
     look,
-    set_columns,
 )
-from beaver_ftc.diagnosis.detection.tones import N_TONES, TONE_RECORD, configure_tones
-from beaver_ftc.diagnosis.deviations import coefficient_bounds, moment_axis
+from beaver_ftc.diagnosis.detection.tones import TONE_RECORD
 from beaver_ftc.diagnosis.gusts import (
-    FORCE_ERROR_SHARE,
     GUST_RECORD,
-    MIN_UNMEASURED_SHARES,
-    add_gust_noise,
-    configure_gust,
-    configure_gust_speed,
 )
-from beaver_ftc.diagnosis.state import DAMAGE_EXCLUDES, LOSS, PITCH, SIDE_FORCE
-from beaver_ftc.scenario.declared import Declared
-from beaver_ftc.scenario.diagnosis import Statistical
-
-# Rate kappa of the growing-loss hypothesis. It explains a third of a loss that grows ten times slower or
-# faster; a constant loss explains the rest.
-KAPPA_PER_S = 1.5
-
-# Share of the alarm level reserved for noise in addition to an uncertainty at its bound (statistical.md).
-LEVEL_NOISE_SHARE = 0.5
-# 42 of 75 flights of a GTM not found before; 15: 23, 8: 36, 0.2 and less: 35 and fewer
-DAMAGE_FREQUENCY_RAD_S = 3.0
-
-
-def hypotheses_by_block(
-    aircraft: Aircraft,
-) -> Iterator[tuple[tuple[int, ...], list[tuple[int, int, int, int]]]]:
-    """Axes and hypotheses (kind, surface, axis, raises alarms) of each block: the losses of the surfaces that
-    turn about its axes, and what they are held against. Roll and yaw are there twice, see above."""
-    for axes in ((PITCH,), ROLL_YAW_PLANE, ROLL_YAW_PLANE):
-        losses = [
-            (s, axis)
-            for s, (name, axis) in enumerate(zip(aircraft.surfaces, aircraft.dominant_axis, strict=True))
-            if name in aircraft.class_of_losses and axis in axes
-        ]
-        rows = [(LOSS, s, axis, 1) for s, axis in losses]
-        rows += [(STEP_FAULT, -1, axis, 1) for axis in axes]
-        rows += [(ALPHA_CUBED_MOMENT, -1, PITCH, 0)] if PITCH in axes else []
-        rows += [(kind, s, axis, 0) for s, axis in losses for kind in (GROWING_LOSS, LOSS_END)]
-        yield axes, rows
-
-
-def count_tests(aircraft: Aircraft, *directions: ParityDirection) -> int:
-    """The number of one-sided tests that the detector makes in a frame, those of these views included."""
-    kinds = [kind for _, rows in hypotheses_by_block(aircraft) for kind, _, _, alarms in rows if alarms]
-    n_tones = 0
-    for d in directions:
-        if 0 <= d.nulled < VANE_VIEW and any(d.m_0[SIDE_FORCE:]):
-            kinds += [STEP_FAULT, *(LOSS for _ in d.tested_losses)]
-            n_tones += N_TONES
-        elif d.nulled == AXIS_VIEW and not d.by_inertia:
-            n_tones += N_TONES
-    return N_SLOTS * sum(1 if likelihood.SIGN_OF_KIND[kind] else 2 for kind in kinds) + n_tones
-
-
-def _quantile(p: float) -> float:
-    """Quantile p of the normal distribution; of a p that is too small for a number, that of the smallest."""
-    return NormalDist().inv_cdf(max(p, float_info.min))
-
-
-def derive_alarm_level(false_alarms_per_h: float, rate_hz: float, n_tests: int) -> float:
-    """The alarm level, standard deviations, for a rate of false alarms per hour with so many tests a frame.
-
-    By the union bound the rate is at most `false_alarms_per_h`.
-    """
-    return -_quantile(false_alarms_per_h / (3600.0 * rate_hz * n_tests))
-
-
-def configure_statistics(
-    fdi: np.void,
-    declared: Declared,
-    model: np.void,
-    mass: MassProperties,
-    trim: TrimState,
-    rate_hz: float,
-) -> None:
-    """Fill the statistical part of a diagnosis record; trim: x (3,), y and u (surfaces,) in trim."""
-    stat, settings = fdi["statistical"], declared.fdi.statistical
-    stat["alarm"]["detected_at_s"] = -1.0
-    if settings is None or not fdi["config"]["enabled"]:  # a plug-in diagnoses, or nothing does
-        return
-    cfg, gust, aircraft = stat["test"], stat["gust"], declared.aircraft
-    errors, dt_s = declared.sensors, 1.0 / rate_hz
-    n_instants = int(fdi["config"]["n_substeps"])
-    cfg["enabled"], cfg["w"] = 1, 1.0 / max(n_instants, 1)
-    V = float(trim[1][AIRSPEED])
-    rate = eta_rate(settings, aircraft, dt_s)
-    stat["forces"]["in_use"] = declared.uses_accelerometers
-    gust["output"]["uses_accelerometers"] = declared.follows_gusts_by_accelerometers
-    configure_gust(gust, declared, mass)
-    views = declared.fdi.compares_across(n_instants)
-    n_tests = count_tests(
-        aircraft, *(list_directions(aircraft, declared.uses_accelerometers) if views else ())
-    )
-    _configure_levels(cfg, declared, n_tests, rate_hz)
-    configure_gust_speed(gust, declared, float(cfg["alarm_level"]), V)
-    tol = coefficient_bounds(declared, model, mass, *trim[1:])
-    configure_rows(stat, errors, tol, fdi["bound"]["declared_errors"])
-    _configure_blocks(stat, declared, rate, dt_s)
-    stat["noise"]["rate0"] = settings.uncertainty_rad_s * dt_s
-    _configure_noise(stat, settings.uncertainty_rad_s, declared, model, trim, dt_s)
-    if views:
-        configure_tones(
-            stat["tone_test_config"],
-            settings.false_alarms_per_h / (3600.0 * rate_hz * n_tests),
-            V,
-            rate * rate_hz,
-            dt_s,
-        )
-        if declared.uses_accelerometers:
-            configure_forces(fdi, declared, trim, jacobian(model, *trim)[3], dt_s)
-            _configure_view_gusts(stat, declared)
-        configure_parity_views(stat, aircraft)
-    _configure_lengths(stat, V, rate_hz)
-    monitor = fdi["sensor_monitor"]["config"]
-    if monitor["enabled"] and monitor["noisy"]:
-        configure_attitude(stat["attitude"], monitor["D"], errors, float(stat["test"]["margin"]), dt_s)
-    if gust["output"]["gusty"]:
-        # the filters that assume no gust: they trim as the others, with a drift in any direction
-        for name in ("n", "a", "R_y", "P_xx", "P_dd"):
-            stat["block"]["calm"][name] = stat["block"][name]
-        add_gust_noise(stat, errors, model, *trim[1:], dt_s)
-
-
-def _configure_levels(cfg: np.void, declared: Declared, n_tests: int, rate_hz: float) -> None:
-    """Fill the level of the alarm, the margin of isolation, and how evidence is forgotten and bounded."""
-    settings, aircraft = declared.fdi.statistical, declared.aircraft
-    assert settings is not None
-    cfg["alarm_level"] = derive_alarm_level(settings.false_alarms_per_h, rate_hz, n_tests)
-    # difference of log-likelihood ratios that noise exceeds in a second with the probability `misnaming`
-    cfg["margin"] = 0.5 * _quantile(settings.misnaming / (rate_hz * count_tests(aircraft))) ** 2
-    cfg["forget"] = exp(-1.0 / (rate_hz * declared.fdi.forgetting_time_s))
-    cfg["mapped"] = aircraft.file.model_error_map is not None and not aircraft.loses_surfaces
-
-
-def _configure_view_gusts(stat: np.void, declared: Declared) -> None:
-    """Fill the gust estimates of the views: by accelerometers in place of the vanes, and by both.
-
-    The rates use the latter, too, unless accelerometers may break.
-    """
-    gust, vaneless = stat["gust"], stat["vaneless"]
-    gust["output"]["uses_accelerometers"] = 1
-    stat["vaneless"] = stat["vaned"] = gust
-    vaneless["memory"]["share"] = np.minimum(np.add(MIN_UNMEASURED_SHARES, FORCE_ERROR_SHARE), 1.0)
-    gust["output"]["uses_accelerometers"] = not declared.monitors_sensors
-    stat["vaned"]["output"]["gusty"] *= declared.monitors_sensors
-
-
-def _configure_lengths(stat: np.void, V: float, rate_hz: float) -> None:
-    """Fill the correlation length of the drift, m, of the block whose drift reverts to its mean and, where no
-    vane measures the gust, of the pitch block; fill how much of a gust's drift each of them then has."""
-    cfg, out = stat["gust"]["config"], stat["gust"]["output"]
-    roll_m, rotations_m = float(cfg["L_roll"]) if out["gusty"] else 0.0, rotation_lengths(cfg["span"])
-    lengths = [(stat["block"][-1], min(rotations_m) if cfg["coarse_only"] else roll_m, roll_m)]
-    if out["gusty"] and not out["measured"]:
-        lengths.append((stat["block"][likelihood.PITCH_BLOCK], rotations_m[1], rotations_m[1]))
-    for b, longest_m, gust_m in lengths:
-        b["drift_correlation_length_m"] = derive_length(stat, V, rate_hz, float(longest_m))
-        if out["gusty"]:
-            b["Q_scale"] = (gust_m / b["drift_correlation_length_m"]) ** 2
-
-
-def _configure_blocks(stat: np.void, declared: Declared, rate: float, dt_s: float) -> None:
-    """Fill axes and hypotheses of each block, its level, and its unknown constants.
-
-    rate: largest change of the bounded uncertainty within a frame, over its bound. A loss that is declared
-    constant does not grow.
-    """
-    aircraft, cfg, rows = declared.aircraft, stat["test"], stat["rows"]
-    losses = [aircraft.surfaces.index(name) for name in aircraft.class_of_losses]
-    left_out = (GROWING_LOSS, LOSS_END) if declared.fdi.fault_profile == "abrupt" else ()
-    cfg["n_scores"] = len(losses) + len(AXES)
-    for b, (axes, all_entries) in zip(stat["block"], hypotheses_by_block(aircraft), strict=True):
-        own = [k for k, term in enumerate(aircraft.moments) if moment_axis(term) in axes]
-        readings = range(len(aircraft.moments), int(rows["n"]))
-        set_columns(b, rows, [*own, *readings] if rows["n"] else [])
-        b["n"], b["a"], b["Q_scale"], b["eta_rate"], b["source"] = len(axes), 1.0, 1.0, rate, RATES
-        b["alarm_level"] = cfg["alarm_level"]
-        b["noise_share"] = 0.0 if declared.is_noise_free else LEVEL_NOISE_SHARE
-        for i, axis in enumerate(axes):
-            b["axes"][i], b["m"][i, axis] = axis, 1.0
-            b["R_y"][i] = b["P_xx"][i, i] = rows["R"][axis]
-            b["P_dd"][i, i] = likelihood.DRIFT_PRIOR_RAD_S2**2
-        entries = [entry for entry in all_entries if entry[0] not in left_out]
-        b["n_h"], b["hypothesis"]["decay"] = len(entries), exp(-KAPPA_PER_S * dt_s)
-        likelihood.set_signs(b, [kind for kind, *_ in entries])
-        for h, (kind, s, axis, alarms) in zip(b["hypothesis"], entries, strict=False):
-            h["signature"][: len(axes)] = [kind == STEP_FAULT and axis == each for each in axes]
-            h["kind"], h["surface"], h["axis"], h["alarms"] = kind, s, axis, alarms
-            h["column"] = losses.index(s) if kind == LOSS else len(losses) + axis
-
-
-def eta_rate(settings: Statistical, aircraft: Aircraft, dt_s: float) -> float:
-    """Largest change of a bounded uncertainty within a frame, over its bound.
-
-    The error of an aircraft's own terms changes with its surfaces, which a law may move fully within a frame:
-    from one end of the bound to the other. If the error is mapped, its rate of change is worked out in flight
-    (`statistical.update_eta_rate`).
-    """
-    return MAX_ETA_RATE if any(aircraft.model_error_rad_s2) else settings.uncertainty_rad_s * dt_s
-
-
-def _configure_noise(
-    stat: np.void, omega: float, declared: Declared, model: np.void, trim: TrimState, dt_s: float
-) -> None:
-    """Fill the drift, for an uncertainty of frequency omega, rad/s, and the model noise by noise of f + G u.
-
-    The evidence that the uncertainty explains is bounded by its declared rate of change in any case
-    (`likelihood.uncertain_share`). The drift only sets how much of it the filters remove. If damage may take
-    surfaces, a weaker drift detects most: motion that no loss explains is then rarely an error of the model.
-    """
-    sigma, noise = declared.sensors.each("random"), stat["noise"]
-    if declared.aircraft.loses_surfaces:
-        omega = min(DAMAGE_FREQUENCY_RAD_S, omega)
-    eta, level = max(declared.constant_rad_s2), float(stat["test"]["alarm_level"])
-    noise["q"] = derive_intensity(eta, omega, float(sigma[:3].max()), level, dt_s)
-    _, G, F_x, F_y = jacobian(model, *trim)
-    noise["Q0"] = F_x**2 @ sigma[:3] ** 2
-    Q_y = F_y[:, [ALPHA, BETA, AIRSPEED, QDYN]] ** 2 @ sigma[3:] ** 2  # later as `rows.add_constants` says
-    noise["Q"] = noise["Q0"] + Q_y
-    noise["G_trim"][:, : G.shape[1]] = np.abs(G)
-
-
-def derive_intensity(eta: float, omega: float, sigma: float, level: float, dt_s: float) -> float:
-    """Intensity of the random walk that stands for a bounded uncertainty, over its bound squared, 1/s.
-
-    An uncertainty of eta sin(omega t) moves the test for a step by eta omega sqrt(2 sqrt 2 / i w0), w0 = (i /
-    n)^(1/4), for a walk of intensity i and gyro noise of density n = sigma^2 dt (statistical.md). Almost
-    without noise w0 is the frame rate. The evidence for a loss under a moving command grows together with the
-    uncertainty while both have the same sign: by eta sqrt(omega / i) times 1.204, the largest value of sin(z)
-    / sqrt(z / 2), z half of omega t. Half the alarm level is left for it: noise alone then takes up no more
-    than the other half.
-
-    eta rad/s2; omega, sigma rad/s; level in standard deviations.
-    """
-    eta = max(eta, likelihood.MIN_ETA_RAD_S2)
-    iw = 8.0 * sqrt(2.0) * (eta * omega / level) ** 2  # of i w0
-    i_loss = 4.0 * (1.204 * eta / level) ** 2 * omega
-    i_step = (iw * (sigma**2 * dt_s) ** 0.25) ** 0.8
-    return max(hypot(i_step, i_loss), iw * dt_s) / eta**2
-
-
-def derive_length(stat: np.void, V: float, rate_hz: float, gust_m: float) -> float:
-    """Return length V tau, m, of the drift in the second block of roll and yaw, or of pitch without gust
-    estimate.
-
-    gust_m: correlation length of the gust, m; 0 in still air. The drift returns as soon as a bounded
-    uncertainty permits: over the longest window T an uncertainty that oscillates with the fault moves a test,
-    for a drift of intensity i and lag tau, by eta sqrt(T / 2 i) / tau; half the alarm level is left for this.
-    The drift returns no later than the gust. A gust with a longer correlation length is represented by a
-    stronger one, of equal power at low frequency and more power at high frequency.
-    """
-    if stat["noise"]["q"] == 0.0:
-        # 0 in still air: nothing is declared that drifts, and the two blocks are one
-        return gust_m
-    T = 2 ** (N_SLOTS - 1) / rate_hz
-    level = float(stat["test"]["alarm_level"])
-    tau = sqrt(2.0 * T / stat["noise"]["q"]) / level
-    return min(V * tau, gust_m or np.inf)
-
+from beaver_ftc.diagnosis.state import DAMAGE_EXCLUDES, LOSS
 
 # Least share of the best log-likelihood ratio that a constant theta explains of a loss growing at any rate
 # (docs/explanation/statistical.md).

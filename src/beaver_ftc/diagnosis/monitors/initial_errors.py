@@ -55,14 +55,14 @@ in body axes; p, q, r rad/s):
 Gyros need no such hypothesis: all of a gyro's error is in the test of its own axis in every sample. Neither
 does the dynamic pressure: only the density shows it.
 
-mon: record of the monitor (redundancy.py, which says y and y_past), with H, H_m, C, C_m and d; e is its E.
+mon: record of the monitor (records.py), with H, H_m, C, C_m and d; e is its E; y, y_past: redundancy.py.
 """
 
 import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.detection.filters import leak
-from beaver_ftc.diagnosis.monitors.redundancy import (
+from beaver_ftc.diagnosis.monitors.records import (
     ALPHA,
     ALPHA_TEST,
     ANGLE_TEST,
@@ -76,7 +76,6 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     H_BETA,
     H_PHI,
     H_THETA,
-    MIN_QDYN_PA,
     N_INITIAL,
     N_TESTS,
     QDYN,
@@ -88,15 +87,9 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     P,
     Q,
     R,
-    down,
-    exceeds,
-    length,
-    secant,
-    speed,
-    too_steep,
-    unit,
-    vector,
 )
+from beaver_ftc.diagnosis.monitors.redundancy import MIN_QDYN_PA, exceeds, secant, speed, too_steep
+from beaver_ftc.diagnosis.monitors.rotation import down, length, unit, vector
 from beaver_ftc.diagnosis.sets import explain
 from beaver_ftc.plant.instruments import ALTITUDE, PHI
 
@@ -107,7 +100,7 @@ DENSITY_SHARE = 0.25  # of the density from the standard atmosphere at a height,
 MIN_TEMPERATURE_RATIO = 0.05  # temperature over that at sea level, below which none is extrapolated
 # Share of an effect that is left, at least, when speed and flow have changed within a filter's memory
 EFFECT_LEFT = 0.8
-SLOW_POLE = 2  # index in redundancy.FILTER_POLES_PER_S
+SLOW_POLE = 2  # index in records.FILTER_POLES_PER_S
 
 # Of each hypothesis, the tests that react at once to a change of its error; the residual of the first is that
 # change

@@ -64,8 +64,7 @@ from beaver_ftc.diagnosis.monitors.initial_errors import (
     start_bounds,
     update_bounds,
 )
-from beaver_ftc.diagnosis.monitors.redundancy import (
-    AB_NOW,
+from beaver_ftc.diagnosis.monitors.records import (
     AIRSPEED,
     ALPHA,
     ALPHA_TEST,
@@ -84,7 +83,6 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     GYRO_REFUTED,
     H_AIRSPEED,
     H_PHI,
-    MIN_AIRSPEED_MPS,
     N_EQUATIONS,
     N_FROZEN_NEVER,
     N_INITIAL,
@@ -96,15 +94,18 @@ from beaver_ftc.diagnosis.monitors.redundancy import (
     SENSOR_OF,
     SPEED_TEST,
     THETA,
+)
+from beaver_ftc.diagnosis.monitors.redundancy import (
+    AB_NOW,
+    MIN_AIRSPEED_MPS,
     exceeds,
     run_tests,
     speed,
     start_tests,
     store_sample,
     too_steep,
-    turn_share,
-    unit,
 )
+from beaver_ftc.diagnosis.monitors.rotation import components, down, unit
 from beaver_ftc.plant.instruments import (
     AX,
     ENGINE_SPEED,
@@ -154,6 +155,13 @@ HIDDEN_FACTOR = 2.0
 
 ANGLES, FORCES = (PHI, THETA, PSI), (AX, AX + 1, AX + 2)
 INITIAL_SENSOR = tuple(SENSOR_OF[j] for j in CHANGE_TEST)  # of each hypothesis of initial_errors.py
+
+
+@kernel
+def turn_share(y, i, j):
+    """c: rotation about body axis i for a change of phi, theta or psi (j 0, 1, 2), rad/rad, at attitude y."""
+    across = 0.0, np.cos(y[PHI]), -np.sin(y[PHI])
+    return ((1.0, 0.0, 0.0), across, components(down(y)))[j][i]
 
 
 @kernel

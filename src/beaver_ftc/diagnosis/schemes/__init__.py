@@ -20,7 +20,7 @@ from beaver_ftc.diagnosis.detection import filters, statistical
 from beaver_ftc.diagnosis.detection.filters import bank_share
 from beaver_ftc.diagnosis.detection.parity import USUAL_SIZE, StatisticalSize
 from beaver_ftc.diagnosis.monitors import sensor_monitor
-from beaver_ftc.diagnosis.monitors.redundancy import SENSOR_MONITOR_RECORD
+from beaver_ftc.diagnosis.monitors.records import SENSOR_MONITOR_RECORD
 from beaver_ftc.diagnosis.schemes import adaptive_estimators, zhang2005
 from beaver_ftc.diagnosis.state import (
     ADAPTIVE_SCHEME,

@@ -14,10 +14,11 @@ again from the log and from the bounds that the scenario declares, is violated a
 import sys
 from dataclasses import dataclass
 from hashlib import sha256
-from json import JSONDecodeError, dumps, loads
+from json import dumps, loads
 from math import exp, isfinite, pi, radians
 from pathlib import Path
 from statistics import NormalDist
+from typing import NamedTuple
 
 import numpy as np
 import yaml
@@ -31,18 +32,34 @@ ROUNDING_RAD_S2 = 1e-11  # the part of every bound that covers rounding
 MIN_EFFECT_RAD_S2 = 1e-12  # a smaller effect of a fault is rounding
 MAX_RELATIVE_DIFFERENCE = 1e-12  # of a stated side from the recomputed one: order of summation
 MAX_RELATIVE_DIFFERENCE_OF_EFFECT = 1e-9  # of what is stated from what the log has
+MAX_RELATIVE_DIFFERENCE_OF_SHARE = 1e-5  # of the log's share of a level from the recomputed one
+MIN_RELATIVE_EXCESS = 1e-10  # of a sum of frames over its limit, as a share of the larger
+DEFAULT_RATE_RAD_S = pi / 3  # of an actuator without a declared rate limit, as beaver_ftc/diagnosis/bounds.py
+RINGING_FACTOR = 1.2  # of an estimated drift, as beaver_ftc/diagnosis/detection/likelihood.py explains
+NO_PACE = 1e9  # of a bounded drift that may change at any rate
 TESTS = (
     "turning p", "turning q", "turning r", "phi", "theta", "psi", "V", "alpha", "beta", "density", "altitude",
     "engine_rpm", "manifold_pressure",
 )  # fmt: skip
-# How a fault type moves a surface: p = gain u + theta, or p = (gain + theta) u if theta is a share of the
-# command u. By the travel low, high (rad): gain, whether theta is a share, whether it is one number while the
-# fault shows, least and largest theta. A type that neither table has is what the log's columns say of it.
+
+
+class Relation(NamedTuple):
+    """How a fault type moves a surface from its command u to p, rad: p = gain u + theta, or, if theta is a
+    share, p = (gain + theta) u. theta is constant if it is one number while the fault shows."""
+
+    gain: float
+    theta_is_share: bool
+    theta_is_constant: bool
+    theta_low: float
+    theta_high: float
+
+
+# By the travel low, high (rad). A type that neither table has is what the log's columns say of it.
 RELATIONS = {
-    "stuck": lambda low, high: (0.0, False, True, low, high),
-    "float": lambda low, high: (0.0, False, True, *2 * (min(max(0.0, low), high),)),
-    "loss_of_effectiveness": lambda low, high: (1.0, True, True, -1.0, 0.0),
-    "loss_of_effectiveness that varies": lambda low, high: (1.0, True, False, -1.0, 0.0),
+    "stuck": lambda low, high: Relation(0.0, False, True, low, high),
+    "float": lambda low, high: Relation(0.0, False, True, *2 * (min(max(0.0, low), high),)),
+    "loss_of_effectiveness": lambda low, high: Relation(1.0, True, True, -1.0, 0.0),
+    "loss_of_effectiveness that varies": lambda low, high: Relation(1.0, True, False, -1.0, 0.0),
 }
 # Types that many frames exclude: the comparison (section 7 below), and the stop that the surface runs to.
 COURSES = {
@@ -50,7 +67,6 @@ COURSES = {
     "hardover down": ("runaway", -1), "oscillatory": ("swing", 0), "rate_limit": ("approach", 0),
 }  # fmt: skip
 UNREADABLE = ArithmeticError, AttributeError, LookupError, TypeError, ValueError
-RELATION_COLUMNS = "gain", "theta_is_share", "theta_is_constant", "theta_low", "theta_high"
 
 
 class Refused(Exception):
@@ -106,26 +122,38 @@ def is_text(value):
     return isinstance(value, str)
 
 
+def described(text, is_allowed):
+    """Give a check the text by which a refusal says what is allowed."""
+    is_allowed.__doc__ = text
+    return is_allowed
+
+
 def is_one_of(*words):
     """One of these words."""
-    return lambda value: value in words
+    return described(f"One of: {', '.join(map(str, words))}.", lambda value: value in words)
 
 
 def is_null_or(of):
     """Such a value, or null."""
-    return lambda value: value is None or of(value)
+    return described(f"Null, or: {of.__doc__}", lambda value: value is None or of(value))
 
 
 def is_list_of(of, length=None):
     """A list of such values, of this length if one is given."""
-    return lambda value: (
-        isinstance(value, list) and len(value) == (length or len(value)) and all(map(of, value))
+    return described(
+        f"A list of {length or 'any number of'} values, each: {of.__doc__}",
+        lambda value: (
+            isinstance(value, list) and len(value) == (length or len(value)) and all(map(of, value))
+        ),
     )
 
 
 def is_by_axis(of):
     """Such a value for some of the axes p, q, r."""
-    return lambda value: isinstance(value, dict) and set(value) <= set(AXES) and all(map(of, value.values()))
+    return described(
+        f"A mapping from some of p, q, r to a value, each: {of.__doc__}",
+        lambda value: isinstance(value, dict) and set(value) <= set(AXES) and all(map(of, value.values())),
+    )
 
 
 def is_share(value):
@@ -201,8 +229,7 @@ def check_form(document, needed, allowed, where):
         require(name in document, f"{where}: the field {name} is missing")
     for name, value in document.items():
         require(name in fields, f"{where}: the field {name} is not known")
-        allowed_is = fields[name].__doc__ or "another form"
-        require(fields[name](value), f"{where}: {name} is not allowed, allowed: {allowed_is}")
+        require(fields[name](value), f"{where}: {name} is not allowed, allowed: {fields[name].__doc__}")
 
 
 def evidence_kind(said):
@@ -213,7 +240,7 @@ def evidence_kind(said):
 
 
 def check_statement_form(said):
-    """The fields of a statement; the lists in it have as many entries as frames."""
+    """The fields of a statement; the lists in it have as many entries as frames. Returns `evidence_kind`."""
     kind = evidence_kind(said)
     needed, allowed = EVIDENCE[kind]
     check_form(said, FORMS["event"][0] | needed, allowed, "statement")
@@ -230,6 +257,7 @@ def check_statement_form(said):
         require(len(said[kind]) > 0, "the evidence is empty")
     if kind == "likelihood":
         check_likelihood_form(said)
+    return kind
 
 
 def check_lengths(span, names):
@@ -355,26 +383,19 @@ class Frames:
     """
 
     def __init__(self, document, log, declared, block=None):
-        self.log = log
+        self.log, self.declared = log, declared
         length, begin, end = block or (1, 0, len(log["t_s"]))
         require(length >= 1 and 0 <= begin < end <= len(log["t_s"]) and (end - begin) % length == 0,
                 "the block has other rows")  # fmt: skip
         self.length, self.begin, self.rows = length, begin, slice(begin, end)
         self.dt, instants = declared.dt * length, declared.instants
-        self.rates_rad_s = self.last_rows(self.columns("{}_measured_rad_s"))
         self.model_rad_s2, self.eta_bar_rad_s2 = (
             self.mean(self.columns(f"{{}}_{of}_rad_s2")) for of in ("design", "eta_bar")
         )
-        said, earth = document["declared"], document.get("omega_E", 0.0)
-        c, b, g, o, B, m = (
-            np.array([said[name].get(axis, 0.0) for axis in AXES])
-            for name in ("c", "b", "g", "o", "B", "m")  # certificates.md, "The fields", explains the letters
-        )
-        x = self.columns("{}_measured_rad_s")
-        rates = np.abs(x) + (o + m * np.abs(x)) / (1 - m)  # as large as the true rates can be
-        self.gyro_change_rad_s = self.last_rows(o - B + m * rates)
-        of_earth = earth * ((1 + g) * rates.sum(axis=1, keepdims=True) + g * earth)
-        stated_bound = c * rates[:, [1, 0, 0]] * rates[:, [2, 2, 1]] + b + of_earth + ROUNDING_RAD_S2
+        measured = self.columns("{}_measured_rad_s")
+        self.rates_rad_s = self.last_rows(measured)
+        gyro_change, stated_bound = errors_by_row(measured, document)
+        self.gyro_change_rad_s = self.last_rows(gyro_change)
         stated_bound = np.roll(stated_bound, 1, axis=0) / instants  # of the row with which the frame began
         stated_bound[0] = np.nan
         self.stated_bound_rad_s2 = self.mean(stated_bound)
@@ -408,6 +429,23 @@ class Frames:
     def row_of(self, k):
         """The last row of the log in frame k."""
         return self.begin + (k + 1) * self.length - 1
+
+
+def errors_by_row(measured, document):
+    """By row (rows, 3) the bound n on the changing error of the gyros, rad/s, and the stated part of the
+    bound on the model's error, rad/s2, from the measured rates x. y, z: the two other axes. The fields of the
+    certificate explain the other letters (docs/explanation/certificates.md, "The fields").
+
+    w = |x| + (o + m |x|) / (1 - m), as large as the true rates can be;    n = o - B + m w
+    bound = c w_y w_z + b + omega_E ((1 + g) (w_p + w_q + w_r) + g omega_E) + rounding
+    """
+    c, b, g, o, B, m = (
+        np.array([document["declared"][name].get(axis, 0.0) for axis in AXES]) for name in "cbgoBm"
+    )
+    x, earth = np.abs(measured), document.get("omega_E", 0.0)
+    w = x + (o + m * x) / (1 - m)
+    of_earth = earth * ((1 + g) * w.sum(axis=1, keepdims=True) + g * earth)
+    return o - B + m * w, c * w[:, [1, 0, 0]] * w[:, [2, 2, 1]] + b + of_earth + ROUNDING_RAD_S2
 
 
 # --- 4. The event: what the log's own column says --------------------------------------------------------
@@ -500,12 +538,12 @@ def relation_of(what, log, low, high):
     theta says where the surface was; of a swing, how far off its command."""
     kind, course = what.partition(" ")[2], course_of(what, log)
     if course is not None:
-        return float(course[0] == "swing"), False, False, low, high
+        return Relation(float(course[0] == "swing"), False, False, low, high)
     if kind in RELATIONS:
         return RELATIONS[kind](low, high)
-    columns = [f"{what.replace(' ', '_')}_{name}" for name in RELATION_COLUMNS]
+    columns = [f"{what.replace(' ', '_')}_{name}" for name in Relation._fields]
     require(all(name in log for name in columns), f"neither this checker nor the log says what {kind} is")
-    return tuple(constant_value(log[name]) for name in columns)
+    return Relation(*(constant_value(log[name]) for name in columns))
 
 
 def constant_value(values):
@@ -519,24 +557,24 @@ def constant_value(values):
 # --- 6. The sum over filters (docs/explanation/certificates.md, "The inequality") ---------------------
 
 
-def sides_of_terms(said, frames, declared):
-    """Both sides: the sum of `weight` times d.E, and the most that bounds, noise and fault allow."""
+def term_pairs(said, frames):
+    """The sum of `weight` times d.E, and the most that bounds, noise and fault allow."""
     what, effect = said["what"], effect_of_fault(said["what"], frames)
-    of_course = what is not None and " " in what and course_of(what, frames.log) is not None
-    require(not of_course, "a sum of frames says nothing of this type")
-    check_theta(said, effect, declared, frames)
-    sums = [term["weight"] * evaluate_term(term, said, frames, effect, declared) for term in said["terms"]]
+    has_course = what is not None and " " in what and course_of(what, frames.log) is not None
+    require(not has_course, "a sum of frames says nothing of this type")
+    check_theta(said, effect, frames)
+    sums = [term["weight"] * evaluate_term(term, said, frames, effect) for term in said["terms"]]
     value, limit, slope = np.sum(sums, axis=0)
     if said["theta"] != "any" and abs(slope) > MIN_EFFECT_RAD_S2:
         limit += max(effect.theta_low * slope, effect.theta_high * slope)
-    return value, limit
+    return [(value, limit)]
 
 
-def check_theta(said, effect, declared, frames):
+def check_theta(said, effect, frames):
     """The stated ends are those of the log; one constant theta is allowed where the scenario declares it."""
     for end, known in (("least", effect.theta_low), ("most", effect.theta_high)):
         require(said.get(end, known) == known, f"{end} is not the end of theta's range in the log")
-    fdi, alarm = declared.scenario["fdi"], int(np.argmax(np.asarray(frames.log["detected"]) == 1))
+    fdi, alarm = frames.declared.scenario["fdi"], int(np.argmax(np.asarray(frames.log["detected"]) == 1))
     if said["theta"] == "constant":
         declares = fdi["fault_profile"] == "abrupt" or fdi["thresholds"] == "published"
         require(said["what"] and declares, "the scenario does not declare a constant parameter")
@@ -549,7 +587,20 @@ def check_theta(said, effect, declared, frames):
         require("block" not in said, "an alarm is raised by frames, not by blocks")
 
 
-def evaluate_term(term, said, frames, effect, declared):
+def check_term_frames(term, said, frames):
+    """Of a term the frames since, first and k are in order, none is later than the event or too early. A term
+    without a pole has one frame, since = k - 1. Returns `since`."""
+    k, first = term["frame"], term["first"]
+    since = term.get("since", k - 1)
+    begun = frames.declared.start_row if frames.length == 1 else 0
+    require(begun <= since < first <= k < len(frames.rates_rad_s), "the frames of a term are not in order")
+    require(frames.row_of(k) <= said["frame"], "a frame after the event cannot have caused it")
+    require("pole_per_s" in term or first == k, "without a pole a term has one frame")
+    require(said["theta"] != "constant while it shows" or frames.is_unexplained[k], "health explains a frame")
+    return since
+
+
+def evaluate_term(term, said, frames, effect):
     """One filter along d: its value E, the limit on it without theta, and what a constant theta multiplies.
 
     E[k] = sum of a^(k-j) dt nu[j].d    over j = since + 1 ... k
@@ -557,12 +608,7 @@ def evaluate_term(term, said, frames, effect, declared):
     k, first = term["frame"], term["first"]
     dt, d = frames.dt, np.array(term["d"])
     decay = exp(-term["pole_per_s"] * dt) if "pole_per_s" in term else 0.0
-    since = term["since"] if "pole_per_s" in term else k - 1
-    begun = declared.start_row if frames.length == 1 else 0
-    require(begun <= since < first <= k < len(frames.rates_rad_s), "the frames of a term are not in order")
-    require(frames.row_of(k) <= said["frame"], "a frame after the event cannot have caused it")
-    require("pole_per_s" in term or first == k, "without a pole a term has one frame")
-    require(said["theta"] != "constant while it shows" or frames.is_unexplained[k], "health explains a frame")
+    since = check_term_frames(term, said, frames)
     summed, size = np.arange(since + 1, k + 1), np.abs(d)
     weights = decay ** (k - summed.astype(float))  # of each frame's input, at frame k
     noise = frames.gyro_change_rad_s @ size
@@ -611,15 +657,29 @@ def check_logged_values(term, frames, rows):
 # --- 7. The course of a surface (docs/explanation/certificates.md, "Types that pairs exclude") --------
 
 
-def course_pairs(said, frames, declared):
-    """Pairs (what must be more, than what) that a fault type forbids, from where frames say the surface was.
+class Course(NamedTuple):
+    """Bounds on the position p of a surface, its commands u, and its travel (low, high), rad. If the surface
+    deflects to the negative side, the sign of each position is turned.
 
-    In each frame |nu.d - h - theta Z| <= most.|d| + r bounds the position theta from below where Z > 0,
-    from above where Z < 0. Downwards is upwards with every sign of theta turned.
+    p >= lower (n,), u = command (n,) in the frames first, first + 1 ... last
+    p <= upper, u = upper_command in the frame upper_frame; not a number for a swing, which needs none
     """
-    effect, surface = effect_of_fault(said["what"], frames), said["what"].partition(" ")[0]
-    comparison, stop = course_of(said["what"], frames.log) or (None, 0)
-    require(comparison is not None, "this is no type with a course")
+
+    first: int
+    last: int
+    lower: np.ndarray
+    command: np.ndarray
+    upper_frame: int
+    upper: float
+    upper_command: float
+    travel: list
+
+
+def course_pairs(said, frames):
+    """Pairs (what must be more, than what) that a fault type forbids, of single frames' bounds."""
+    effect = effect_of_fault(said["what"], frames)
+    comparison, stop = course_of(said["what"], frames.log) or ("", 0)
+    require(comparison, "this is no type with a course")
     low: dict = {}
     high: dict = {}
     signs = set()
@@ -634,37 +694,89 @@ def course_pairs(said, frames, declared):
         low and sorted(low) == list(range(min(low), max(low) + 1)), "the frames do not follow one another"
     )
     require(len(high) == (comparison != "swing"), "one frame bounds the deflection from above")
-    first, last = min(low), max(low)
-    above, (most, most_command) = next(iter(high.items()), (first, (np.nan, np.nan)))
-    reached, commanded = np.array([low[k] for k in sorted(low)]).T
-    ends = sorted((sign * effect.theta_low, sign * effect.theta_high))
-    if comparison in ("offset", "growing_offset"):
-        stops, offset = said["stops"], reached[0] - commanded[0]
-        require(len(stops) == 2 and stops[0] >= ends[0] - 1e-12 and stops[1] <= ends[1] + 1e-12, "stops")
-        pairs = [(offset, most - most_command), (reached[0], stops[0]), (stops[1], most)]
-        return pairs if comparison == "offset" else [(offset, 0.0), *pairs, (above, first)]
-    if comparison == "runaway":
-        require(sign == stop, "the surface runs the other way")
-        require(said["stops"] == [ends[1]], "the stop is not that of the log")
-        known = declared.scenario.get("design_model", {}).get("actuators") or declared.scenario["actuators"]
-        rate = radians(known[surface]["rate_limit_deg_s"]) or pi / 3
-        require(is_same(said["pace_rad_s"], rate / 2), "pace_rad_s is not half the rate limit")
-        went = reached[0] + said["pace_rad_s"] * frames.dt * (above - first - frames.late_frames)
-        return [(ends[1], most), (above, first), (went, most)]
-    if comparison == "swing":
-        slowest = declared.scenario["fdi"]["slowest_oscillation_rad_s"]
-        require(said["slowest_rad_s"] == slowest, "slowest_rad_s is not that of the scenario")
-        return [(last - first, pi / slowest / frames.dt), (reached.min(), 0.0), (reached.sum(), 0.0)]
-    require(comparison == "approach" and above == first, f"{comparison} is no known course")
-    require(len(said["ordered"]) == len(reached), "ordered: frames are missing")
+    require(comparison in COMPARISONS, f"{comparison} is no known course")
+    require(comparison != "runaway" or sign == stop, "the surface runs the other way")
+    lower, command = np.array([low[k] for k in sorted(low)]).T
+    upper_frame, (upper, upper_command) = next(iter(high.items()), (min(low), (np.nan, np.nan)))
+    travel = sorted((sign * effect.theta_low, sign * effect.theta_high))
+    course = Course(min(low), max(low), lower, command, upper_frame, upper, upper_command, travel)
+    return COMPARISONS[comparison](said, course, frames)
+
+
+def offset_pairs(said, course, frames):
+    """A constant offset p - u from the command u, unless a stop hides it:
+
+    lower - u  >  upper - u_upper,    lower  >  low stop,    high stop  >  upper
+    """
+    stops, travel = said["stops"], course.travel
+    require(len(stops) == 2 and stops[0] >= travel[0] - 1e-12 and stops[1] <= travel[1] + 1e-12, "stops")
+    lower, upper = course.lower[0], course.upper
+    return [(lower - course.command[0], upper - course.upper_command), (lower, stops[0]), (stops[1], upper)]
+
+
+def growing_offset_pairs(said, course, frames):
+    """An offset that grows and keeps its sign: the pairs of a constant one, the upper bound in a later frame;
+
+    lower - u  >  0,    upper_frame  >  first
+    """
+    pairs = offset_pairs(said, course, frames)
+    return [(pairs[0][0], 0.0), *pairs, (course.upper_frame, course.first)]
+
+
+def runaway_pairs(said, course, frames):
+    """A runaway to a stop at half the rate limit or faster; in a later frame the surface is nearer:
+
+    stop  >  upper,    upper_frame  >  first,    lower + pace dt (upper_frame - first - late frames)  >  upper
+    """
+    require(said["stops"] == [course.travel[1]], "the stop is not that of the log")
+    scenario = frames.declared.scenario
+    known = scenario.get("design_model", {}).get("actuators") or scenario["actuators"]
+    rate = radians(known[said["what"].partition(" ")[0]]["rate_limit_deg_s"]) or DEFAULT_RATE_RAD_S
+    require(is_same(said["pace_rad_s"], rate / 2), "pace_rad_s is not half the rate limit")
+    later = course.upper_frame - course.first - frames.late_frames
+    went = course.lower[0] + said["pace_rad_s"] * frames.dt * later
+    return [(course.travel[1], course.upper), (course.upper_frame, course.first), (went, course.upper)]
+
+
+def swing_pairs(said, course, frames):
+    """An oscillation about the command: beyond it for longer than half of the slowest period; theta is p - u.
+
+    last - first  >  pi / (slowest_rad_s dt),    min lower  >  0,    sum lower  >  0
+    """
+    slowest = frames.declared.scenario["fdi"]["slowest_oscillation_rad_s"]
+    require(said["slowest_rad_s"] == slowest, "slowest_rad_s is not that of the scenario")
+    longest = pi / slowest / frames.dt
+    return [(course.last - course.first, longest), (course.lower.min(), 0.0), (course.lower.sum(), 0.0)]
+
+
+def approach_pairs(said, course, frames):
+    """A slow surface comes nearer to its order by a step in each frame, until it is near. Here it is beyond
+    all orders, and farther away in a later frame. lower_n: of the last frame.
+
+    min (lower - ordered)  >  0,    sum (lower - ordered)  >  0
+    lower_n  >  upper - step (last - first - 1),    lower_n  >  near,    1  >  0
+    """
+    require(course.upper_frame == course.first, "the bound from above is not of the first frame")
+    require(len(said["ordered"]) == len(course.lower), "ordered: frames are missing")
     require(said["near"] >= max(said["ordered"]), "near is nearer than the order itself")
-    ahead, come = reached - said["ordered"], said.get("step", 0.0) * (last - first - 1)
-    return [(ahead.min(), 0.0), (ahead.sum(), 0.0), (reached[-1], most - come), (reached[-1], said["near"]),
+    ahead, last = course.lower - said["ordered"], course.lower[-1]
+    come = said.get("step", 0.0) * (course.last - course.first - 1)
+    return [(ahead.min(), 0.0), (ahead.sum(), 0.0), (last, course.upper - come), (last, said["near"]),
             (1.0, 0.0)]  # fmt: skip
 
 
+COMPARISONS = {
+    "offset": offset_pairs, "growing_offset": growing_offset_pairs, "runaway": runaway_pairs,
+    "swing": swing_pairs, "approach": approach_pairs,
+}  # fmt: skip
+
+
 def position_bound(bound, place, k, frames, effect):
-    """The bound on theta that frame k gives, the command -h/Z, and the sign by which theta is turned."""
+    """The bound on theta that frame k gives, the command -h/Z, and the sign by which theta is turned.
+
+    |nu.d - h - theta Z| <= most.|d| + r bounds the position theta from below where Z > 0, from above where
+    Z < 0. Downwards is upwards with every sign of theta turned: the stated Z has the turned sign.
+    """
     require(k < len(frames.rates_rad_s) and frames.is_unexplained[k], "health explains a frame")
     d = np.array(bound["d"])
     h, Z, r = (bound[name][place] for name in "hZr")
@@ -678,12 +790,12 @@ def position_bound(bound, place, k, frames, effect):
 # --- 8. A statistical alarm (docs/explanation/certificates.md, "A statistical alarm") -----------------
 
 
-def likelihood_pairs(said, frames, declared):
+def likelihood_pairs(said, frames):
     """Evidence against its limit; and the log's share of the level against the ratio of the two.
 
     N = sum w.g and D = sum w.g_s, see `whitened_sums`; limit: max(z sqrt D, room + z/2 sqrt D).
     """
-    check_level(said, declared)
+    check_level(said, frames)
     (N, D, *of_constants, foreseen), room = whitened_sums(said, frames)
     require(D >= 0, "the evidence has a negative variance")
     evidence = -N - max(0.0, -foreseen) if said["sense"] == "less" else abs(N)
@@ -692,22 +804,22 @@ def likelihood_pairs(said, frames, declared):
     z = said["level"]
     limit = max(z * D**0.5, room + z / 2 * D**0.5)
     require(said["likelihood"] in frames.log, f"the log has no column {said['likelihood']}")
-    logged = float(frames.log[said["likelihood"]][said["frame"]]) * (1 + 1e-5)
+    logged = float(frames.log[said["likelihood"]][said["frame"]]) * (1 + MAX_RELATIVE_DIFFERENCE_OF_SHARE)
     return [(evidence, limit), (logged, evidence / limit)]
 
 
-def check_level(said, declared):
+def check_level(said, frames):
     """The scenario has this detector; its rate of false alarms allows the level; no frame is missing."""
-    statistical = declared.scenario["fdi"].get("statistical")
+    statistical = frames.declared.scenario["fdi"].get("statistical")
     require(statistical and said["what"] is None, "the scenario declares no statistical detector")
-    one_test = statistical["false_alarms_per_h"] / (3600 / declared.dt)
+    one_test = statistical["false_alarms_per_h"] / (3600 / frames.dt)
     least = -NormalDist().inv_cdf(one_test)
     require(
         said["level"] >= least * (1 - MAX_RELATIVE_DIFFERENCE_OF_EFFECT),
         "level: the declared rate allows no smaller one",
     )
     last = said["first"] + len(said["frames"]) - 1
-    require(last == said["frame"] >= said["first"], "frames are missing")
+    require(last == said["frame"], "frames are missing")
     require(said["likelihood"].endswith("_likelihood_share"), "likelihood: this is no share of the level")
 
 
@@ -715,7 +827,11 @@ def whitened_sums(said, frames):
     """Sums over the frames of w.g for each column g, and the room that a bounded drift needs.
 
     A Kalman filter with the stated variances whitens the columns of Y: innovation, signature g_s, constants.
-    It has two states for each axis, a value and its drift. w = S^-1 g_s, S: covariance of the innovation.
+    It has two states for each axis, a value and its drift. w = S^-1 g_s, S = P_values + R: covariance of the
+    innovation. With the bound D on the drift, the part f that the drift forgets in a frame, and L = ringing
+    factor |pinv(K_drifts)| D:
+
+    room = sum f D / (f K_values / dt + K_drifts).|w| + min(sum L.|w - w before| + L.|w last|, sum pace L.|w|)
     """
     dt, axes, n = frames.dt, said["axes"], len(said["axes"])
     Y, P, R = (array_with_zeros(said[name]) for name in ("Y", "P", "R"))
@@ -738,10 +854,10 @@ def whitened_sums(said, frames):
         sums = sums + w @ np.column_stack([Y[values], its.get("foreseen", np.zeros(n))])
         # Room: a drift that stays at its bound, and one that swings from one end to the other.
         bounded = np.array(its.get("bounded", [0] * n))
-        swing = 1.2 * np.abs(np.linalg.pinv(K[drifts])) @ bounded
+        swing = RINGING_FACTOR * np.abs(np.linalg.pinv(K[drifts])) @ bounded
         swung += swing @ np.abs(w - before)
         last_swing = swing @ np.abs(w)
-        paced += its.get("pace", 1e9) * last_swing
+        paced += its.get("pace", NO_PACE) * last_swing
         stayed += forgets * bounded / (np.diag(K) * forgets / dt + np.diag(K[drifts])) @ np.abs(w)
         # Correction.
         Y, P = Y - K @ Y[values], P - K @ P[values]
@@ -767,14 +883,22 @@ def check_exclusion_by_alarm(said, document, frames):
 # --- 9. An alarm between instruments (docs/explanation/certificates.md, same heading) ----------------
 
 
-def instrument_sides(said, log):
-    """Residual and bound of the test; the log's share in that row is at least as large."""
-    require(said["what"] is None, "instruments raise an alarm, they exclude no surface")
+def missing_pairs(said, frames):
+    """The pair 1 > 0 of a reading that is missing, as the log says too."""
     k = said["frame"]
-    if "missing" in said:
-        require(np.asarray(log.get("watch_missing", []), float)[k : k + 1].tolist() == said["missing"],
-                "the log says that another reading is missing, or none")  # fmt: skip
-        return 1.0, 0.0
+    require(said["what"] is None, "instruments raise an alarm, they exclude no surface")
+    require(np.asarray(frames.log.get("watch_missing", []), float)[k : k + 1].tolist() == said["missing"],
+            "the log says that another reading is missing, or none")  # fmt: skip
+    return [(1.0, 0.0)]
+
+
+def monitor_pairs(said, frames):
+    """Residual and bound of the test; the log's share in that row is at least as large as their ratio.
+
+    sum of (reading - prediction)  >  sum of (largest difference)    over the entries of `looks`
+    """
+    log, k = frames.log, said["frame"]
+    require(said["what"] is None, "instruments raise an alarm, they exclude no surface")
     require({"watch_share", "watch_test"} <= set(log), "the log has no test between instruments")
     require(TESTS[int(log["watch_test"][k])] == said["test"], "the log has another test in this row")
     require(all(most >= 0 for _, _, most in said["looks"]), "looks: a bound is below zero")
@@ -782,37 +906,34 @@ def instrument_sides(said, log):
     bound = sum(most for *_, most in said["looks"])
     logged = log["watch_share"][k] * (1 + MAX_RELATIVE_DIFFERENCE_OF_EFFECT)
     require(bound > 0 and logged > residual / bound, "the log's share is smaller")
-    return residual, bound
+    return [(residual, bound)]
 
 
 # --- 10. All statements ----------------------------------------------------------------------------------
 
-
-def pairs_of(said, frames, declared):
-    """Pairs (what must be more, than what) of a statement's evidence."""
-    if "terms" in said:
-        return [sides_of_terms(said, frames, declared)]
-    if "bounds" in said:
-        return course_pairs(said, frames, declared)
-    if "likelihood" in said:
-        return likelihood_pairs(said, frames, declared)
-    return [instrument_sides(said, frames.log)]
+# Of each kind of evidence the pairs (what must be more, than what); "as" has none.
+PAIRS = {
+    "terms": term_pairs, "bounds": course_pairs, "likelihood": likelihood_pairs, "looks": monitor_pairs,
+    "missing": missing_pairs,
+}  # fmt: skip
 
 
 def check_statement(said, document, log, declared):
     """Raise Refused unless the statement follows from log and scenario."""
-    check_statement_form(said)
+    kind = check_statement_form(said)
     check_event(said, log)
-    kind, frames = evidence_kind(said), Frames(document, log, declared, said.get("block"))
+    frames = Frames(document, log, declared, said.get("block"))
     if kind == "as":
         check_exclusion_by_alarm(said, document, frames)
         return
-    pairs = pairs_of(said, frames, declared)
-    stated = said["sides"] if kind in ("bounds", "likelihood") else [[side] for side in said["sides"]]
-    sides = np.array(pairs, float).T
-    require(np.isfinite(sides).all() and sides.shape == np.shape(stated), "the sides are no numbers")
-    least = 1e-10 * np.abs(sides).max(axis=0) if kind == "terms" else 0.0
-    require((sides[0] > sides[1] + least).all(), f"{sides[0][0]:.6g} is not more than {sides[1][0]:.6g}")
+    sides = np.array(PAIRS[kind](said, frames), float).T
+    stated = np.reshape(said["sides"], (2, -1))  # a single pair is written without inner lists
+    require(np.isfinite(sides).all() and sides.shape == stated.shape, "the sides are no numbers")
+    excess = (
+        sides[0] - sides[1] - (MIN_RELATIVE_EXCESS * np.abs(sides).max(axis=0) if kind == "terms" else 0.0)
+    )
+    greater, less = sides[:, excess.argmin()]
+    require(excess.min() > 0, f"{greater:.6g} is not more than {less:.6g}")
     same = np.allclose(sides, stated, MAX_RELATIVE_DIFFERENCE, 0)
     require(same, "the stated sides are not the recomputed ones")
 
@@ -845,23 +966,33 @@ def failures(document, log, scenario=""):
 def check_document(document, log, scenario):
     """Refuse the document that belongs to another log or scenario; returns what the scenario declares."""
     check_form(document, *FORMS["certificate"], "certificate")
-    known = f"this checker reads format {FORMAT_VERSION}, not {document['format']}"
-    require(document["format"] == FORMAT_VERSION, known)
-    another = "SHA-256 does not match: the file was edited, or belongs to another log"
-    require(digest(document) == document["digest"], another)
+    require(
+        document["format"] == FORMAT_VERSION,
+        f"this checker reads format {FORMAT_VERSION}, not {document['format']}",
+    )
+    require(
+        digest(document) == document["digest"],
+        "SHA-256 does not match: the file was edited, or belongs to another log",
+    )
     rows = len(log["t_s"])
-    another = f"the log has {rows} rows, not {document['rows']}: the certificate belongs to another log"
-    require(rows == document["rows"], another)
-    another = "SHA-256 of scenario.yaml does not match: it was edited, or is of another flight"
-    require(sha256(scenario.encode()).hexdigest() == document["scenario_sha256"], another)
+    require(
+        rows == document["rows"],
+        f"the log has {rows} rows, not {document['rows']}: the certificate belongs to another log",
+    )
+    require(
+        sha256(scenario.encode()).hexdigest() == document["scenario_sha256"],
+        "SHA-256 of scenario.yaml does not match: it was edited, or is of another flight",
+    )
     if not document["statements"]:
         return None
     events = [said.get("frame") for said in document["statements"]]
     require(all(map(is_row, events)), "statement: the field frame is missing, or no row")
     declared = declared_at_row(yaml.safe_load(scenario), min(events))
     check_declared(document, declared)
-    together = np.allclose(np.asarray(log["t_s"], float), np.arange(rows) * declared.dt, 0, 1e-6)
-    require(together, "dt_s: the log's rows are not that far apart")
+    require(
+        np.allclose(np.asarray(log["t_s"], float), np.arange(rows) * declared.dt, 0, 1e-6),
+        "dt_s: the log's rows are not that far apart",
+    )
     return declared
 
 
@@ -921,7 +1052,7 @@ def main(arguments):
     """Print the statements, or why they are refused; returns the exit status."""
     try:
         said, why = check(*arguments)
-    except (OSError, TypeError, ValueError, LookupError, Refused, JSONDecodeError) as error:
+    except (OSError, TypeError, ValueError, LookupError, Refused) as error:
         print(f"no certificate at FOLDER, or CERTIFICATE LOG [SCENARIO]: {error}", file=sys.stderr)
         return 1
     print(*why, sep="\n", end="\n" * bool(why), file=sys.stderr)

@@ -13,7 +13,7 @@ import numpy as np
 from beaver_ftc.diagnosis import DESCRIPTIONS_IN_TYPE_ORDER as WORDS
 from beaver_ftc.diagnosis import TYPE_ROWS as TYPES
 from beaver_ftc.diagnosis import type_index_of
-from beaver_ftc_assurance.certificates.check_certificate import COURSES, RELATION_COLUMNS, RELATIONS
+from beaver_ftc_assurance.certificates.check_certificate import COURSES, RELATIONS, Relation
 from beaver_ftc_assurance.certificates.history import History
 from beaver_ftc_assurance.certificates.inequality import (
     ANY,
@@ -77,12 +77,14 @@ def type_definition_columns(tape: Tape, surface: str, s: int, kind: int) -> dict
         return {f"{name}_course_{row.frames_test.replace(' ', '_')}": row.stop_direction}
     if row.deflection_relation is None:
         return {}
-    low, high = row.deflection_relation.theta_span(*travel_rad(tape, s))
-    values = (
-        row.deflection_relation.command_gain, float(row.deflection_relation.theta_is_share),
-        float(row.has_constant_parameter), low, high,
-    )  # fmt: skip
-    return {f"{name}_{column}": value for column, value in zip(RELATION_COLUMNS, values, strict=True)}
+    its = row.deflection_relation
+    relation = Relation(
+        its.command_gain,
+        its.theta_is_share,
+        row.has_constant_parameter,
+        *its.theta_span(*travel_rad(tape, s)),
+    )
+    return {f"{name}_{column}": float(value) for column, value in relation._asdict().items()}
 
 
 def hypothesis_of_type(tape: Tape, surface: int, fault_type: int) -> Hypothesis:

@@ -50,7 +50,7 @@ SERVICES, WHEN_IMPORTED = "beaver_ftc.services", "beaver_ftc.when_imported"
 # Services of the core itself, for what stands on a lower floor; no package can replace them.
 OF_THE_CORE = {
     "admit": "beaver_ftc.plant.admission:admit",
-    "cores": "beaver_ftc.studies.engine.workers:cores",
+    "cores": "beaver_ftc.studies.engine.processes:cores",
     "scenarios": "beaver_ftc.scenario.builtin:builtin_names",
 }
 _METADATA = (".dist-info", ".egg-info")

@@ -144,7 +144,7 @@ def _compare_on_flights(options: Options, most: int | None) -> None:
     from beaver_ftc.studies.compare.leaderboard import as_text, run_comparison, write_leaderboard
     from beaver_ftc.studies.compare.trial import LAW, SCHEME, entries_of, of_set, of_sweep, set_names
     from beaver_ftc.studies.compare.tune import read_tuned
-    from beaver_ftc.studies.engine.workers import cores
+    from beaver_ftc.studies.engine.processes import cores
 
     if options.sweep is not None:
         cases = of_sweep(options.sweep, most=most)
@@ -203,7 +203,7 @@ def _tune(options: Options, most: int | None) -> None:
     from beaver_ftc.plugins import DETECTORS, LAWS, registered
     from beaver_ftc.studies.compare.trial import STATISTICAL
     from beaver_ftc.studies.compare.tune import Search, as_text, methods_of, tune, write_tuned
-    from beaver_ftc.studies.engine.workers import cores
+    from beaver_ftc.studies.engine.processes import cores
 
     everything = options.schemes is None and options.laws is None
     schemes = [*registered(DETECTORS), STATISTICAL] if everything else _named("--schemes", options.schemes)

@@ -80,7 +80,7 @@ def command(arguments: Arguments) -> None:
     rare: Estimate the probability that a flight misses this expectation.
     """
     if arguments.backend is Backend.local and arguments.replay is None:
-        from beaver_ftc.studies.engine.workers import start_early
+        from beaver_ftc.studies.engine.processes import start_early
 
         start_early()
     from beaver_ftc.scenario.sweeps import load_sweep
@@ -103,7 +103,7 @@ _NOT_WITH_RARE = ("search", "replay", "junit", "ray_address", "backend", "keep_l
 def _rare(sweep: "Sweep", arguments: Arguments) -> None:
     """Estimate the probability that an expectation is not met, with its interval."""
     from beaver_ftc.cli import told
-    from beaver_ftc.studies.engine.workers import cores
+    from beaver_ftc.studies.engine.processes import cores
     from beaver_ftc.studies.sweep.rare import as_text, run_rare
 
     usual = Arguments(arguments.file)

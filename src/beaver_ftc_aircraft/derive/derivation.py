@@ -349,7 +349,7 @@ def _derived(
     tell("check")
     with Forks() as forks:
         if unknown := THRUST_TERM not in plant.aircraft.terms:
-            forks.give(lambda: thrust_of(outline.plant_of(data, folder), trim))
+            forks.submit(lambda: thrust_of(outline.plant_of(data, folder), trim))
         made = _check(data, plant, about, moves, folder, properties, (first, flown))
         if unknown:
             tell("engines")

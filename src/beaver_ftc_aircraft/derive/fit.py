@@ -203,7 +203,7 @@ def fitted(
     with Forks() as forks:
         for axis, engines in enumerate(EXACT_TERMS.values()):
             known_of = samples.signals[engines] if exact[axis] else 0.0
-            forks.give(partial(pursue, columns, w * (C[:, axis] - known_of), most))
+            forks.submit(partial(pursue, columns, w * (C[:, axis] - known_of), most))
         found = forks.results()
     terms: dict[str, list[Term]] = {}
     for axis, (name, engines) in enumerate(EXACT_TERMS.items()):

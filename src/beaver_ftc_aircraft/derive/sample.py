@@ -298,10 +298,10 @@ def sample(
             standing = _Standing(plant, draw, reader, tanks)
             for start in drawn:
                 standing.begin(start)
-                forks.give(partial(standing.look, None), standing.pass_over)
+                forks.submit(partial(standing.look, None), standing.pass_over)
         else:
             for start in drawn:
-                forks.give(partial(_look_at_start, plant, draw, properties, tanks, errors, start))
+                forks.submit(partial(_look_at_start, plant, draw, properties, tanks, errors, start))
         rows = np.concatenate(forks.results())
     tanks.fill(plant, 0.0)
     _together(plant)
@@ -511,7 +511,7 @@ def fly_about_all(
     """The same from the trim of each region; of several, other processes fly: see `sample`."""
     with Forks(len(regions) > 1) as forks:
         for trim in (of.trim for of in regions):
-            forks.give(partial(fly_about, plant, trim, seed, properties), partial(_pass_over, plant, trim))
+            forks.submit(partial(fly_about, plant, trim, seed, properties), partial(_pass_over, plant, trim))
         return joined(forks.results())
 
 

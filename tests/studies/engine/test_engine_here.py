@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 from beaver_ftc.documents.errors import SimulationFailed
-from beaver_ftc.studies.engine import ray_workers, store, workers
+from beaver_ftc.studies.engine import processes, ray_workers, store
 from beaver_ftc.studies.engine.workers import Batch, Outcome, Work
 
 
@@ -106,7 +106,7 @@ def test_tasks_of_a_cluster(ray):
     (_, address, options), remote = ray.calls
     assert (address, options["log_to_driver"], options["include_dashboard"]) == (None, False, False)
     variables = options["runtime_env"]["env_vars"]
-    assert variables == {**workers.ONE_THREAD_EACH, ray_workers.VARIABLE: "somebody:Theirs"}
+    assert variables == {**processes.ONE_THREAD_EACH, ray_workers.VARIABLE: "somebody:Theirs"}
     assert remote == ("remote", {"num_cpus": 1, "max_retries": 0})
     assert there.slots == 6
     tasks = [Batch(number, range(number), CASES[:number]) for number in (1, 2, 3)]

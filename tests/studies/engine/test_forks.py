@@ -19,7 +19,7 @@ def two(monkeypatch):
 
 
 def counted(work):
-    """A counter that each of five pieces takes on by 10, whoever does it, and `instead` by 1."""
+    """A counter that each of five pieces takes on by 10, whoever does it, and `then_here` by 1."""
     counter, here = [0], os.getpid()
 
     def take_on(by):
@@ -27,7 +27,7 @@ def counted(work):
         return counter[0], os.getpid() == here
 
     for _ in range(5):
-        work.give(lambda: take_on(10), lambda: take_on(1))
+        work.submit(lambda: take_on(10), lambda: take_on(1))
     return work.results(), counter[0]
 
 
@@ -54,15 +54,15 @@ def test_results_are_in_the_order_given_whoever_is_first_and_however_large(two):
 
     with Forks() as work:
         for k in range(3):
-            work.give(lambda k=k: late(k))
+            work.submit(lambda k=k: late(k))
         assert [(of[0], len(of)) for of in work.results()] == [(k, 200_000) for k in range(3)]
 
 
 def test_what_a_piece_raises_is_raised_and_the_others_are_ended(two):
     began = time.monotonic()
     with Forks() as work:
-        work.give(lambda: time.sleep(60))
-        work.give(lambda: 1 / 0)
+        work.submit(lambda: time.sleep(60))
+        work.submit(lambda: 1 / 0)
         with pytest.raises(ZeroDivisionError):
             work.results()
     assert time.monotonic() - began < 30
@@ -70,6 +70,6 @@ def test_what_a_piece_raises_is_raised_and_the_others_are_ended(two):
 
 def test_a_process_that_is_killed_is_missed(two):
     with Forks() as work:
-        work.give(lambda: os.kill(os.getpid(), signal.SIGKILL))
+        work.submit(lambda: os.kill(os.getpid(), signal.SIGKILL))
         with pytest.raises(SimulationFailed, match="has ended before it was done"):
             work.results()

@@ -5,8 +5,12 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import Future
 
 import pytest
+
+from beaver_ftc.documents.errors import SimulationFailed
+from beaver_ftc.studies.engine import workers
 
 PROGRAM = """
 import sys, time
@@ -37,9 +41,28 @@ def test_workers_end_before_and_after_they_have_started(tmp_path, seconds):
     assert time.monotonic() - begun < 18.0
 
 
+def test_workers_that_have_started_end_where_another_cannot_start(monkeypatch):
+    class Started:
+        def __init__(self, work):
+            if len(running) == 2:
+                raise SimulationFailed("no more")
+            self.pid = Future()
+            self.pid.set_result(1)
+            running.append(self)
+
+        def end(self):
+            running.remove(self)
+
+    running = []
+    monkeypatch.setattr(workers, "_Worker", Started)
+    with pytest.raises(SimulationFailed, match="no more"):
+        workers.LocalWorkers(workers.Work(len), 4)
+    assert running == []
+
+
 STOPPED = """
 import os, signal, threading, time
-from beaver_ftc.studies.engine import workers
+from beaver_ftc.studies.engine import processes
 
 def send(stop):
     while stop.is_alive():
@@ -52,9 +75,9 @@ if __name__ == "__main__":
     stop = threading.Thread(target=time.sleep, args=(1.5,))
     stop.start()
     threading.Thread(target=send, args=(stop,)).start()
-    workers.start_early()
-    worker = workers.context().Process(target=print, args=("worked",))
-    with workers.single_threaded():
+    processes.start_early()
+    worker = processes.context().Process(target=print, args=("worked",))
+    with processes.single_threaded():
         worker.start()
     worker.join()
     stop.join()
@@ -79,9 +102,9 @@ def test_ctrl_c_while_workers_are_getting_ready_is_for_the_one_who_gives_the_ord
 
 INTERRUPTED = """
 import sys
-from beaver_ftc.studies.engine import workers
+from beaver_ftc.studies.engine import processes, workers
 
-workers._PRELOAD[:] = ["slow"]  # imported by the process that workers are forked from
+processes._PRELOAD[:] = ["slow"]  # imported by the process that workers are forked from
 if __name__ == "__main__":
     print("begun", flush=True)
     try:
@@ -118,7 +141,7 @@ os.execv(sys.argv[1], sys.argv[1:])
 KILLED = """
 import os, signal, threading
 from multiprocessing import forkserver
-from beaver_ftc.studies.engine import workers
+from beaver_ftc.studies.engine import processes, workers
 
 ends, begun = int(__import__("sys").argv[1]), []
 start = workers.start_early
@@ -132,7 +155,7 @@ def start_and_kill():
         threading.Timer(0.3, os.kill, (server, signal.SIGKILL)).start()
     begun.append(server)
 
-workers._PRELOAD[:] = []
+processes._PRELOAD[:] = []
 workers.start_early = start_and_kill
 if __name__ == "__main__":
     try:

@@ -33,7 +33,7 @@ from beaver_ftc.studies.bench.contenders import (
 )
 from beaver_ftc.studies.bench.parts import PARTS, frame_with
 from beaver_ftc.studies.bench.straightforward import Straightforward
-from beaver_ftc.studies.engine.workers import cores, environment
+from beaver_ftc.studies.engine.processes import cores, environment
 from beaver_ftc.studies.present.tables import aligned
 from beaver_ftc.studies.sweep.one_flight import row_of, scenario_of
 from beaver_ftc.studies.sweep.sampling import Plan

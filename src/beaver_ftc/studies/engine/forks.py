@@ -14,16 +14,17 @@ from typing import Any, Self
 
 from beaver_ftc.compiled.cache import can_fork
 from beaver_ftc.documents.errors import SimulationFailed
-from beaver_ftc.studies.engine.workers import cores
+from beaver_ftc.studies.engine.processes import cores
 
-Work = Callable[[], Any]
+Piece = Callable[[], Any]
 KILLED = "a process that was forked for a part of the work has ended before it was done"
 
 
 class Forks:
-    """Pieces of work, as many at once as there are cores; `results` has theirs, in the order given.
+    """Pieces of work, as many at once as there are cores; `results` has what they return, in their order.
 
-    wanted: whether other processes may do them. What a piece changes is lost with its process.
+    wanted: whether other processes may do them. Such a process has a copy of all that is here. The changes
+    that a piece makes to the copy are lost with the process.
     """
 
     def __init__(self, wanted: bool = True) -> None:
@@ -39,34 +40,38 @@ class Forks:
             process.kill()
             process.join()
 
-    def give(self, work: Work, instead: Callable[[], None] = lambda: None) -> None:
-        """Have this done, as things are now. instead: what this process does of it where another does the
-        work, so that later pieces find things as they would be. Raises what an earlier piece has raised."""
+    def submit(self, piece: Piece, then_here: Callable[[], None] = lambda: None) -> None:
+        """Do a piece: in a process that is forked now, or else in this one. Raises what an earlier piece has
+        raised.
+
+        then_here: called in this process if another does the piece. It makes the changes of the piece that
+        later pieces start from.
+        """
         if not self._at_once:
-            self._results.append(work())
+            self._results.append(piece())
             return
         self._wait(self._at_once - 1)
-        self._fork(work)
-        self._results.append(None)
-        instead()
+        self._fork(piece)
+        self._results.append(None)  # until the process sends it
+        then_here()
 
     def results(self) -> list[Any]:
-        """Those of all pieces. Raises what one has raised."""
+        """What the pieces return, in their order. Raises what one has raised."""
         self._wait(0)
         return self._results
 
-    def _fork(self, work: Work) -> None:
+    def _fork(self, piece: Piece) -> None:
         fork = multiprocessing.get_context("fork")
         here, there = fork.Pipe(duplex=False)
-        process = fork.Process(target=_do, args=(work, there), daemon=True)
+        process = fork.Process(target=_do, args=(piece, there), daemon=True)
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # Python's, of threads: a library's own know of a fork
+            warnings.simplefilter("ignore")  # Python's, of threads; those of libraries allow a fork
             process.start()
         there.close()
         self._busy[here] = len(self._results), process
 
     def _wait(self, left: int) -> None:
-        """Until no more than so many are at work."""
+        """Wait until at most so many processes are at work."""
         while len(self._busy) > left:
             for here in wait([*self._busy]):
                 self._take(here)  # type: ignore[arg-type]  # a connection, as all of them
@@ -83,11 +88,11 @@ class Forks:
             raise error
 
 
-def _do(work: Work, there: Connection) -> None:
-    """Be the forked process: ended by any signal without a word."""
+def _do(piece: Piece, there: Connection) -> None:
+    """In the forked process do the piece and send its result, or what it raises. Signals end the process."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_DFL)
     try:
-        there.send((work(), None))
+        there.send((piece(), None))
     except Exception as error:
         there.send((None, error))

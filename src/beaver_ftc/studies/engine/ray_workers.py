@@ -13,7 +13,8 @@ from typing import Any
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.plugins import VARIABLE
 from beaver_ftc.results.metrics import versions
-from beaver_ftc.studies.engine.workers import ONE_THREAD_EACH, Batch, Outcome, Row, Work, silence
+from beaver_ftc.studies.engine.processes import ONE_THREAD_EACH, silence
+from beaver_ftc.studies.engine.workers import Batch, Outcome, Row, Work
 
 QUEUED_A_CPU = 2
 

@@ -22,7 +22,6 @@ from beaver_ftc.studies.engine import store
 from beaver_ftc.studies.engine.workers import (
     Batch,
     LocalWorkers,
-    Nothing,
     Number,
     Row,
     ThisProcess,
@@ -162,7 +161,7 @@ class Study:
     row: Any = dict
     follows_from: Any = None
     lost: Lost | None = None
-    warm_up: Nothing | None = None
+    warm_up: Callable[[], None] | None = None
     part: int | None = None
     rounds: Callable[[FlyRound], Any] | None = None
 

@@ -3,9 +3,6 @@
 A task is a batch, or some of its cases. Workers fly tasks and hand back their rows, or say that one was lost
 over it.
 
-Processes are forked from a clean one that has everything imported. Importing takes that process half a
-second; started early, it does so while this one still reads its input. Nothing heavy is imported here.
-
 Each worker is a pool of its own. In one pool of several, Python's or loky's, one that is killed takes the
 tasks of all the others with it (loky: TerminatedWorkerError in each), so nothing tells which case kills.
 """
@@ -16,23 +13,27 @@ import os
 import signal
 import threading
 import time
-from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from multiprocessing import forkserver, resource_tracker
 from typing import Any, NamedTuple, Protocol
 
 from beaver_ftc.documents.errors import SimulationFailed
+from beaver_ftc.studies.engine.processes import (
+    context,
+    kill_fork_server,
+    silence_this_process,
+    single_threaded,
+    start_early,
+)
 
-LEAVES_S = 5.0  # a pool's thread, once its workers have ended: milliseconds
+MAX_JOIN_S = 5.0  # how long to wait for a pool's thread; it ends milliseconds after its worker
 # Starts of a worker, each later, should the process that it is forked from be killed meanwhile: one that is
 # killed closes its pipe before the system says that it has ended, so what comes at once finds it still there.
 STARTS_AFTER_S = (0.0, 0.1, 1.0)
 
 Row = Any
 Number = int | str  # of a batch: what its file is called
-Nothing = Callable[[], None]
 
 
 class Batch(NamedTuple):
@@ -54,7 +55,7 @@ class Work(NamedTuple):
     """What a worker does: fly a case; and once, before its first, what warms it up. Both can be pickled."""
 
     fly: Callable[[Any], Row]
-    warm_up: Nothing | None = None
+    warm_up: Callable[[], None] | None = None
 
     def all(self, cases: Sequence[Any]) -> list[Row]:
         """Fly one after the other."""
@@ -85,24 +86,21 @@ class ThisProcess:
 
     def __init__(self, work: Work) -> None:
         self._work = work
-        self._tasks: deque[Batch] = deque()
 
     def submit(self, task: Batch) -> None:
-        self._tasks.append(task)
+        self._task = task
 
     def outcomes(self, timeout_s: float) -> list[Outcome]:
-        task = self._tasks.popleft()
-        return [Outcome(task, self._work.all(task.cases))]
+        return [Outcome(self._task, self._work.all(self._task.cases))]
 
     def close(self) -> None:
-        self._tasks.clear()
+        """There is no other process to terminate."""
 
 
 class _Worker:
     """A process of its own: one that dies takes nobody else's task with it."""
 
     def __init__(self, work: Work) -> None:
-        self.pid: Future[int] = Future()
         for pause_s in STARTS_AFTER_S:
             time.sleep(pause_s)
             self._pool = ProcessPoolExecutor(1, mp_context=context(), initializer=_begin, initargs=(work,))
@@ -119,7 +117,7 @@ class _Worker:
             with contextlib.nullcontext() if forked else single_threaded():
                 return self._pool.submit(os.getpid)
         except (KeyboardInterrupt, SystemExit):
-            _begin_no_more()
+            kill_fork_server()
             raise
 
     def fly(self, task: Batch) -> "Future[list[Row]]":
@@ -136,7 +134,7 @@ class _Worker:
         for process in running:
             process.terminate()
         if thread is not None:
-            thread.join(LEAVES_S)
+            thread.join(MAX_JOIN_S)
 
 
 class LocalWorkers:
@@ -145,14 +143,16 @@ class LocalWorkers:
     def __init__(self, work: Work, workers: int) -> None:
         self._work, self.slots = work, workers
         self._busy: dict[Future[list[Row]], tuple[_Worker, Batch]] = {}
-        self._idle = [_Worker(work)]
+        self._idle: list[_Worker] = []
         try:
-            # the first compiles, should that be needed; the others find it done
-            if self._idle[0].pid.exception():
-                raise SimulationFailed("a worker process cannot start: it ended before its first flight")
-            self._idle += [_Worker(work) for _ in range(workers - 1)]
-        except (KeyboardInterrupt, SystemExit):
-            _begin_no_more()
+            for n in range(workers):
+                self._idle.append(_Worker(work))  # one by one: an exception ends those that are there
+                # the first compiles, should that be needed; the others find it done
+                if n == 0 and self._idle[0].pid.exception():
+                    raise SimulationFailed("a worker process cannot start: it ended before its first flight")
+        except BaseException as error:
+            if not isinstance(error, Exception):  # Ctrl-C, or the end of this process
+                kill_fork_server()
             self.close()
             raise
 
@@ -195,7 +195,7 @@ def _begin(work: Work) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # it is for the process that gives the orders
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    _silence()
+    silence_this_process()
     _OF_THIS_PROCESS[:] = [work]
     if work.warm_up:
         work.warm_up()
@@ -211,97 +211,3 @@ def _end_with_parent() -> None:
 
 def _fly(cases: Sequence[Any]) -> list[Row]:
     return _OF_THIS_PROCESS[0].all(cases)
-
-
-def _silence() -> dict[int, int]:
-    """Send whatever a library prints, on whatever level, nowhere; the streams as they were."""
-    kept = {stream: os.dup(stream) for stream in (1, 2)}
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    for stream in kept:
-        os.dup2(nowhere, stream)
-    os.close(nowhere)
-    return kept
-
-
-@contextlib.contextmanager
-def silence() -> Iterator[None]:
-    """Whatever a library prints meanwhile goes nowhere: the output is the study's own."""
-    kept = _silence()
-    try:
-        yield
-    finally:
-        for stream, copy in kept.items():
-            os.dup2(copy, stream)
-            os.close(copy)
-
-
-_PRELOAD = [
-    "beaver_ftc.studies.engine.workers",
-    "beaver_ftc.studies.sweep.one_flight",
-    "beaver_ftc.loop.loop",
-    "beaver_ftc.results.metrics",
-]
-# Environment of a worker: one thread for linear algebra, since the cores are taken by the flights.
-ONE_THREAD_EACH = dict.fromkeys(
-    ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
-)
-
-
-def cores() -> int:
-    """The cores this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def context() -> Any:
-    """The way to start workers here; where they cannot be forked, they start afresh."""
-    if "forkserver" not in multiprocessing.get_all_start_methods():
-        return multiprocessing.get_context("spawn")
-    chosen = multiprocessing.get_context("forkserver")
-    chosen.set_forkserver_preload(_PRELOAD)
-    return chosen
-
-
-def start_early() -> None:
-    """Let the process that workers are forked from begin its imports."""
-    if context().get_start_method() == "forkserver":
-        with single_threaded():
-            forkserver.ensure_running()
-
-
-def _begin_no_more() -> None:
-    """End the process that workers are forked from: one that is forked when nobody waits for it any more
-    finds its pipes gone, and says so in a traceback. The next study starts another."""
-    pid = getattr(getattr(forkserver, "_forkserver", None), "_forkserver_pid", None)
-    if pid is not None:
-        with contextlib.suppress(ProcessLookupError):
-            os.kill(pid, signal.SIGKILL)
-
-
-@contextlib.contextmanager
-def single_threaded() -> Iterator[None]:
-    """Processes started meanwhile have one thread each, and never hear the terminal's Ctrl-C, not even while
-    they import: it is for the process that gives the orders.
-    """
-    blocks = hasattr(signal, "pthread_sigmask")
-    with environment(ONE_THREAD_EACH):
-        if blocks:  # Ctrl-C waits meanwhile, which what is started inherits
-            resource_tracker.ensure_running()  # it would unblock what is blocked here
-            before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-        try:
-            yield
-        finally:
-            if blocks:
-                signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-@contextlib.contextmanager
-def environment(values: Mapping[str, str]) -> Iterator[None]:
-    """These variables of the environment meanwhile have these values."""
-    before = {name: os.environ[name] for name in values if name in os.environ}
-    os.environ.update(values)
-    try:
-        yield
-    finally:
-        for name in values:
-            del os.environ[name]
-        os.environ.update(before)

@@ -34,12 +34,12 @@ def short() -> Sweep:
 @pytest.fixture
 def small_batches(monkeypatch):
     """Batches of a few flights, so that a short sweep has many of them."""
-    monkeypatch.setattr("beaver_ftc.studies.sweep.store.FRAMES_A_BATCH", 400)
+    monkeypatch.setattr("beaver_ftc.studies.sweep.campaign.FRAMES_A_BATCH", 400)
 
 
 COMMAND_LINE = """
 import sys
-import beaver_ftc.studies.sweep.store as source
+import beaver_ftc.studies.sweep.campaign as source
 source.FRAMES_A_BATCH = 400
 from beaver_ftc.cli.main import main
 if __name__ == "__main__":

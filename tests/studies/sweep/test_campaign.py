@@ -23,7 +23,7 @@ def reference(tmp_path_factory):
     """The uninterrupted sweep, one worker, everything drawn: its folder and its summary."""
     out = tmp_path_factory.mktemp("reference")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("beaver_ftc.studies.sweep.store.FRAMES_A_BATCH", 400)
+        patch.setattr("beaver_ftc.studies.sweep.campaign.FRAMES_A_BATCH", 400)
         summary = run_sweep(sweep_of(), Options(out=out, workers=1, source="short.yaml"))
     return out / "short", summary
 

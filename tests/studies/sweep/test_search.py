@@ -12,7 +12,8 @@ from .conftest import SHORT, sweep_of
 def evolve(function, keys, generations, seed=1):
     evolution = Evolution(seed, keys)
     for _ in range(generations):
-        evolution.select(np.array([function(point) for point in evolution.trials()]))
+        trials = evolution.trials()
+        evolution.select(trials, np.array([function(point) for point in trials]))
     return evolution
 
 

@@ -22,13 +22,15 @@ from beaver_ftc.studies.sweep import one_flight
 from beaver_ftc.studies.sweep.one_flight import Keep, counts_of
 from beaver_ftc.studies.sweep.sampling import Assignment, Plan
 from beaver_ftc.studies.sweep.search import found, generations, members
-from beaver_ftc.studies.sweep.store import Store, batch_size, identity_of
+from beaver_ftc.studies.sweep.store import Store, identity_of
 
 if TYPE_CHECKING:
     from beaver_ftc.studies.sweep.outcomes import Flights
 
-
 Landed = Callable[[Counter[str]], None]  # takes the counts of a batch
+FRAMES_A_BATCH = 50_000  # a third of a second of work: little to lose, and a file costs no share worth saying
+MOST_A_BATCH = 256
+MOST_BATCHES = 4_000  # of a sweep of millions: so many files are read again in seconds
 
 
 class SweepStopped(BeaverFtcError):
@@ -113,6 +115,14 @@ def _fly_missing(
             return
         for number, runs, cases in generations(sweep, options.search, store):
             fly([(number, runs)], lambda runs, cases=cases: cases)
+
+
+def batch_size(sweep: Sweep) -> int:
+    """Flights a batch, from the sweep alone, so that a resumed sweep has the same batches."""
+    scenario = sweep.scenario({})
+    frames = scenario.duration_s * scenario.rate_hz * scenario.substeps
+    size = max(1, min(MOST_A_BATCH, round(FRAMES_A_BATCH / frames)))
+    return max(size, -(-sweep.flights // MOST_BATCHES))
 
 
 def _workers(sweep: Sweep, options: Options, flights: int) -> Workers:

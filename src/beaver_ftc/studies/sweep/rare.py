@@ -28,14 +28,13 @@ from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial
 from beaver_ftc.studies.engine.study import FlyRound, Study, run_study
 from beaver_ftc.studies.present.tables import all_finite, number
 from beaver_ftc.studies.sweep.one_flight import scenario_of, warm_up
-from beaver_ftc.studies.sweep.sampling import Assignment, values_at
+from beaver_ftc.studies.sweep.sampling import OF_RARE, Assignment, values_at
 from beaver_ftc.studies.sweep.store import identity_of
 
 RUNS, MEMBERS = 8, 220  # independent runs, flights of each a level: 10^-5 by a hundredth of 10^6 flights
 SHARE = 0.1  # of the flights of a level that reach the next one
 STEP = 0.8  # how much of a point a chain's next one keeps
 MOST_LEVELS = 10  # down to 10^-10
-_OF_RARE = 3
 _BEFORE = -1e-12  # the score of what has just not happened
 _NORMAL = NormalDist()
 
@@ -48,7 +47,7 @@ class Chains:
     """Independent runs of subset simulation abreast: points (runs, members, keys), scores (runs, members)."""
 
     def __init__(self, keys: int, seed: int, runs: int = RUNS, members: int = MEMBERS) -> None:
-        self._generator = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(0, 0, _OF_RARE)))
+        self._generator = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(0, 0, OF_RARE)))
         self.points = self._generator.standard_normal((runs, members, keys))
         self.scores = np.full((runs, members), -math.inf)
         self.share, self.reached = np.ones(runs), np.zeros(runs, bool)

@@ -18,8 +18,10 @@ from beaver_ftc.scenario.sweeps import Sweep, SweepFile, Variation
 
 _ALMOST = 2.0**-53  # keeps a unit number off 0 and 1, where a normal distribution is infinite
 
-# Second word of the seed sequences: what the numbers are for. A flight's own seed is (index,) alone.
-_OF_VALUES, _OF_DESIGN = 1, 2
+# What the numbers are for: the last word of a spawn key. The keys are (index,) of a flight's own seed,
+# (index, OF_VALUES), (0, OF_DESIGN), of a search (generation, 0, OF_SEARCH), and (0, 0, OF_RARE). Keys of two
+# words differ from keys of three: OF_DESIGN and OF_SEARCH may be the same number.
+OF_VALUES, OF_DESIGN, OF_SEARCH, OF_RARE = 1, 2, 2, 3
 
 
 class Assignment(NamedTuple):
@@ -98,9 +100,7 @@ class Plan:
             return self._latin[indices]
         if self._file.sampling == "sobol":
             return _sobol(seed, dimensions, indices)
-        return np.array(
-            [_generator(seed, index, _OF_VALUES).random(dimensions) for index in indices.tolist()]
-        )
+        return np.array([_generator(seed, index, OF_VALUES).random(dimensions) for index in indices.tolist()])
 
     def _values(self, index: int, point: np.ndarray) -> Document:
         values = values_at(self._drawn, point)
@@ -123,7 +123,7 @@ def _latin_hypercube(file: SweepFile, dimensions: int) -> np.ndarray:
 
     Not scipy's `qmc.LatinHypercube`: it draws other numbers, and a seed gives the same flights for good.
     """
-    generator = _generator(file.seed, 0, _OF_DESIGN)
+    generator = _generator(file.seed, 0, OF_DESIGN)
     columns = [
         (generator.permutation(file.flights) + generator.random(file.flights)) / file.flights
         for _ in range(dimensions)
@@ -135,7 +135,7 @@ def _sobol(seed: int, dimensions: int, indices: np.ndarray) -> np.ndarray:
     """Scrambled Sobol points [Owen 1995] at these increasing indices."""
     from scipy.stats import qmc
 
-    engine = qmc.Sobol(dimensions, scramble=True, seed=_generator(seed, 0, _OF_DESIGN))
+    engine = qmc.Sobol(dimensions, scramble=True, seed=_generator(seed, 0, OF_DESIGN))
     points = []
     with warnings.catch_warnings():  # that a sample is no power of 2: the sweep as a whole may be
         warnings.simplefilter("ignore", UserWarning)

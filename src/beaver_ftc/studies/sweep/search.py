@@ -22,11 +22,11 @@ from beaver_ftc.studies.engine.store import batches_of
 from beaver_ftc.studies.engine.workers import Batch
 from beaver_ftc.studies.present.tables import finite
 from beaver_ftc.studies.sweep.one_flight import DEPARTED
-from beaver_ftc.studies.sweep.sampling import Assignment, values_at
+from beaver_ftc.studies.sweep.sampling import OF_SEARCH, Assignment, values_at
 from beaver_ftc.studies.sweep.store import Store
 
 WEIGHT, CROSSOVER = 0.7, 0.9  # [Storn1997] recommend 0.4 to 1 and, for few dependent keys, 0.9
-_OF_SEARCH = 2
+DEPARTED_DEG_S = 1e6  # above all tracking errors: the score of a flight that loses the aircraft at its start
 _ALMOST_ONE = math.nextafter(1.0, 0.0)
 
 
@@ -43,7 +43,7 @@ def delay_score(row: Mapping[str, Any]) -> float:
 def tracking_score(row: Mapping[str, Any]) -> float:
     """Largest RMS tracking error after the fault, deg/s; losing the aircraft is worse, the earlier."""
     if row["status"] == DEPARTED:
-        return 1e6 - row["flown_s"]
+        return DEPARTED_DEG_S - row["flown_s"]
     after = [row[f"tracking.post_fault_rms_deg_s.{axis}"] for axis in AXES]
     return -math.inf if None in after else max(after)
 
@@ -77,7 +77,7 @@ class Evolution:
 
     def trials(self) -> np.ndarray:
         """The points to fly in this generation, (members, keys)."""
-        spawn_key = self.generation, 0, _OF_SEARCH
+        spawn_key = self.generation, 0, OF_SEARCH
         generator = np.random.default_rng(np.random.SeedSequence(self._seed, spawn_key=spawn_key))
         if self.generation == 0:
             slices = [generator.permutation(self.members) for _ in range(self._keys)]
@@ -85,7 +85,10 @@ class Evolution:
         return self._mutants(generator)
 
     def _mutants(self, generator: np.random.Generator) -> np.ndarray:
-        """x + F (best - x) + F (x_a - x_b), a part of its keys left as they were, reflected into the cube."""
+        """x + F (best - x) + F (x_a - x_b), a part of its keys left as they were, reflected into the cube.
+
+        x, best: points, and that of the largest score; a, b: two permutations of the points; F: WEIGHT.
+        """
         x, n = self._points, self.members
         a, b = (generator.permutation(n) for _ in range(2))
         mutants = x + WEIGHT * (x[self._scores.argmax()] - x) + WEIGHT * (x[a] - x[b])
@@ -94,9 +97,8 @@ class Evolution:
         inside = np.abs(np.where(taken, mutants, x))
         return np.minimum(1.0 - np.abs(1.0 - inside % 2.0), _ALMOST_ONE)
 
-    def select(self, scores: np.ndarray) -> None:
+    def select(self, trials: np.ndarray, scores: np.ndarray) -> None:
         """Let each trial that is no worse take its parent's place; a last generation may be cut short."""
-        trials = self.trials()[: scores.size]
         if self.generation == 0:
             self._points, self._scores = trials, scores.copy()
         else:
@@ -111,12 +113,13 @@ def generations(sweep: Sweep, objective: str, store: Store) -> Iterator[Batch]:
         raise BadInput(f"{sweep.name}: vary: nothing varies, allowed in a search: at least one key")
     evolution = Evolution(sweep.file.seed, len(sweep.keys))
     for number, runs in batches_of(sweep.flights, evolution.members):
-        values = [values_at(sweep.file.vary.items(), x) for x in evolution.trials()[: len(runs)]]
+        trials = evolution.trials()[: len(runs)]
+        values = [values_at(sweep.file.vary.items(), x) for x in trials]
         yield Batch(number, runs, list(map(Assignment, runs, values)))
         table = store.landed(number, runs)
         if table is None:
             return
-        evolution.select(np.array([score(objective, row) for row in table.to_pylist()]))
+        evolution.select(trials, np.array([score(objective, row) for row in table.to_pylist()]))
 
 
 def found(objective: str, results: Path, sweep: Sweep) -> Document:

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, Self
 
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
+from beaver_ftc.results.model import Document
 from beaver_ftc.results.writer import clear_disk_errors, refuse_foreign, sync
 from beaver_ftc.scenario.sweeps import Sweep
 from beaver_ftc.studies.engine import store as files
-from beaver_ftc.studies.engine.store import KEPT, UNREADABLE, Document, Parts
 from beaver_ftc.studies.engine.workers import Number
 from beaver_ftc.studies.sweep.one_flight import schema_of, table_of
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 FOLDERS = frozenset({"parts", "figures", "flights"})
 OWN_FILES = frozenset({
-    "lock", files.LOCK, "sweep.json", "results.parquet", "summary.json", "report.html", *FOLDERS,
+    files.LOCK, "sweep.json", "results.parquet", "summary.json", "report.html", *FOLDERS,
 })  # fmt: skip
 ROWS_PER_GROUP = 8192
 _WRITE_OPTIONS: dict[str, Any] = {"compression": "snappy", "write_statistics": False, "use_dictionary": False}
@@ -65,14 +65,14 @@ class Store:
     def __init__(self, folder: Path, sweep: Sweep) -> None:
         codec = RowsAsParquet(sweep)
         self.folder, self.schema = folder, codec.schema
-        self.parts, self.results = Parts(folder / "parts", codec), folder / "results.parquet"
+        self.parts, self.results = files.Parts(folder / "parts", codec), folder / "results.parquet"
         self._manifest = folder / "sweep.json"
         self._open = contextlib.ExitStack()
         self._compacted: pa.Table | None = None
 
     def __enter__(self) -> Self:
         with clear_disk_errors(self.folder):
-            _refuse_foreign(self.folder)
+            _refuse_folder(self.folder)
             self.folder.mkdir(parents=True, exist_ok=True)
             self._open.enter_context(files.locked(self.folder))
         return self
@@ -86,11 +86,12 @@ class Store:
         A finished sweep is replaced unless it is to be resumed; an unfinished one never is.
         """
         there, flown = self._identity(), self.results.exists() or bool(self.parts)
-        if there is None and (flown or self._manifest.exists()):
-            self._set_all_aside(resume)
-        elif there is not None and resume:
+        if there is None:
+            if flown or self._manifest.exists():  # nothing says whose the flights are
+                self._set_all_aside(resume)
+        elif resume:
             files.refuse_other(identity, there, self.folder)
-        elif there is not None and flown and not (self.folder / "summary.json").exists():
+        elif flown and not (self.folder / "summary.json").exists():
             raise BadInput(
                 f"{self.folder}: holds an unfinished sweep, allowed: --resume to go on with it, "
                 "another --out, or to remove it first"
@@ -104,20 +105,27 @@ class Store:
             files.remove_leftovers(self.folder)
 
     def landed(self, batch: Number, runs: Sequence[int]) -> "pa.Table | None":
-        """The table of a batch if it has landed whole."""
-        from pyarrow import ArrowException
-        from pyarrow.parquet import read_table
-
+        """The table of a batch if it has landed whole: of its part, or else of `results.parquet`."""
         table = self.parts.landed(batch, runs)
         if table is not None:
             return table
-        if self._compacted is None and self.results.exists():
-            try:
-                with self.results.open("rb") as file:  # a folder Arrow would read as a table of many files
-                    self._compacted = read_table(file, schema=self.schema)
-            except (ArrowException, OSError, ValueError):
-                files.set_aside(self.results, files.UNREADABLE)
+        if self._compacted is None:
+            self._compacted = self._read_results()
         return self._compacted and self._compacted.slice(runs[0], len(runs))
+
+    def _read_results(self) -> "pa.Table | None":
+        """`results.parquet`; one that cannot be read is set aside."""
+        from pyarrow import ArrowException
+        from pyarrow.parquet import read_table
+
+        if not self.results.exists():
+            return None
+        try:
+            with self.results.open("rb") as file:  # a folder Arrow would read as a table of many files
+                return read_table(file, schema=self.schema)
+        except (ArrowException, OSError, ValueError):
+            files.set_aside(self.results, files.UNREADABLE)
+            return None
 
     def is_compacted(self, flights: int) -> bool:
         """Whether `results.parquet` is there with all flights."""
@@ -131,10 +139,9 @@ class Store:
             return False
 
     def compact(self, batches: Iterable["pa.Table"]) -> None:
-        """Make `results.parquet` of all batches, in order, and remove the parts."""
-        with clear_disk_errors(self.folder, KEPT):
+        """Make `results.parquet` of all batches, in order; the parts are still there."""
+        with clear_disk_errors(self.folder, files.KEPT):
             files.replace_whole(self.results, lambda file: write_tables(file, batches, self.schema))
-            self.parts.remove()
 
     def write(self, name: str, text: str) -> None:
         """Write a file of the folder, whole or not at all."""
@@ -148,14 +155,14 @@ class Store:
 
     def _set_all_aside(self, resume: bool) -> None:
         """Rename all that is there, since nothing says whose it is; BadInput unless the sweep is resumed."""
-        what = UNREADABLE if self._manifest.exists() else "is not there"
+        what = files.UNREADABLE if self._manifest.exists() else "is not there"
         if not resume:
             raise BadInput(
                 f"{self._manifest}: {what}, allowed: --resume, which sets aside what is there and flies "
                 "again, or another --out"
             )
         with clear_disk_errors(self.folder):
-            for name in sorted(OWN_FILES - {"lock", files.LOCK}):
+            for name in sorted(OWN_FILES - {files.LOCK}):
                 if (self.folder / name).exists():
                     files.set_aside(self.folder / name, f"{self._manifest.name} {what}")
 
@@ -175,8 +182,9 @@ class Store:
             (self.folder / "figures" / f"{name}.png").unlink(missing_ok=True)
         with contextlib.suppress(OSError):  # not empty: somebody else's
             (self.folder / "figures").rmdir()
-        for name in (*sorted(OWN_FILES - FOLDERS - {files.LOCK, "sweep.json"}), "sweep.json"):
+        for name in sorted(OWN_FILES - FOLDERS - {files.LOCK, self._manifest.name}):
             (self.folder / name).unlink(missing_ok=True)
+        self._manifest.unlink(missing_ok=True)
 
 
 def write_tables(file: IO[bytes], tables: Iterable["pa.Table"], schema: "pa.Schema") -> None:
@@ -203,7 +211,7 @@ def _is_leftover(name: str) -> bool:
     return name.endswith(".partial") or any(name.startswith(f"{own}{files.DAMAGED}") for own in OWN_FILES)
 
 
-def _refuse_foreign(folder: Path) -> None:
+def _refuse_folder(folder: Path) -> None:
     """Raise SimulationFailed if the folder holds anything that no sweep wrote: it might be lost."""
     if not folder.exists():
         return
@@ -211,22 +219,9 @@ def _refuse_foreign(folder: Path) -> None:
         raise SimulationFailed(f"cannot write {folder}: it exists and is not a folder")
     names = sorted(entry.name for entry in folder.iterdir())
     foreign = [name for name in names if name not in OWN_FILES and not _is_leftover(name)]
-    known = {"sweep.json", "lock", files.LOCK, "flights"}
+    known = {"sweep.json", files.LOCK, "flights"}
     if foreign or (names and not known & set(names) and not any(map(_is_leftover, names))):
         why = f"{foreign[0]}, which is no part of a sweep" if foreign else "no sweep.json, but other files"
         raise SimulationFailed(
             f"will not write into {folder}: it holds {why}; move it away or choose another --out"
         )
-
-
-FRAMES_A_BATCH = 50_000  # a third of a second of work: little to lose, and a file costs no share worth saying
-MOST_A_BATCH = 256
-MOST_BATCHES = 4_000  # of a sweep of millions: so many files are read again in seconds
-
-
-def batch_size(sweep: Sweep) -> int:
-    """Flights a batch, from the sweep alone, so that a resumed sweep has the same batches."""
-    scenario = sweep.scenario({})
-    frames = scenario.duration_s * scenario.rate_hz * scenario.substeps
-    size = max(1, min(MOST_A_BATCH, round(FRAMES_A_BATCH / frames)))
-    return max(size, -(-sweep.flights // MOST_BATCHES))

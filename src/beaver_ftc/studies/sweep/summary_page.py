@@ -4,8 +4,8 @@ Everything is said from the summary document, so that the words and `summary.jso
 """
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.results.metrics import NEAR_THRESHOLD_SHARE
@@ -26,11 +26,15 @@ from beaver_ftc.studies.sweep.pictures import FIGURES
 from beaver_ftc.studies.sweep.summary import OUTCOMES
 
 MANY = 0.1  # of a sweep's flights
+MAX_P_VALUE, MIN_EXPLAINED = 0.05, 0.01  # of a key that an outcome is said to follow
+SHOWN = 3  # keys of an outcome, and worst flights
 _STEERED = "The search steered these flights towards the worst: rates say nothing about flights in general."
 _EXPLAINED = (
     "Share of the ranks of an outcome that a varied key explains (Kruskal and Wallis' epsilon squared), "
     "Spearman's rank correlation, and how often chance alone explains as much."
 )
+value = partial(number, none="none")
+_seconds = partial(number, unit="s", none="never")
 _UNITS = {"delay": " s", "false_alarm": " of the threshold", "tracking": " deg/s"}
 
 
@@ -95,22 +99,13 @@ def verdict(summary: Document) -> Judged:
 
 def expected(level: Document) -> str:
     """A bound in words: `95 % quantile ≤ 0.5 with 95 % confidence`."""
-    part = f"{percent(level['quantile'])} quantile " if "quantile" in level else ""
+    part = f"{exact_percent(level['quantile'])} quantile " if "quantile" in level else ""
     bound = f"≥ {value(level['at_least'])}" if "at_least" in level else f"≤ {value(level['at_most'])}"
-    sure = f" with {percent(level['confidence'])} confidence" if "confidence" in level else ""
+    sure = f" with {exact_percent(level['confidence'])} confidence" if "confidence" in level else ""
     return f"{part}{bound}{sure}"
 
 
-def value(of: Any) -> str:
-    """A number as it is worth reading."""
-    return number(of, none="none")
-
-
-def _seconds(of: float | None) -> str:
-    return number(of, "s", "never")
-
-
-def percent(share: float | None) -> str:
+def exact_percent(share: float | None) -> str:
     """A share in percent, with the digits that matter near 0 and 1."""
     if share is None:
         return "none"
@@ -122,7 +117,7 @@ def percent(share: float | None) -> str:
 def summary_text(summary: Document, colour: bool = False) -> str:
     """The summary as a table for the terminal."""
     # commands each on a line of its own to be copied
-    worst = [f" {'; '.join(flight['why'])}:\n   {flight['replay']}" for flight in summary["worst"][:3]]
+    worst = [f" {'; '.join(flight['why'])}:\n   {flight['replay']}" for flight in summary["worst"][:SHOWN]]
     headline, lines = (title(summary), "bold green" if summary["passed"] else "bold red"), facts(summary)
     for what, p, q, r in tracking(summary):
         unit = "" if what == "ratio" else " deg/s"
@@ -150,7 +145,7 @@ def _search(summary: Document) -> str:
 def _rate(rate: Document, what: str) -> str:
     if not rate["of"]:
         return ""
-    return f"{percent(rate['rate'])} ({_interval(rate)}): {rate['count']} of {rate['of']} {what}"
+    return f"{exact_percent(rate['rate'])} ({_interval(rate)}): {rate['count']} of {rate['of']} {what}"
 
 
 def _quantiles(delays: Document) -> str:
@@ -177,7 +172,7 @@ def _on_the_bound(found: Document) -> str:
         return ""
     return (
         f"in {found['count']} of {found['of']} flights the residual of the healthy flight already reaches "
-        f"{percent(NEAR_THRESHOLD_SHARE)} of its threshold or more; the detection of small faults then "
+        f"{exact_percent(NEAR_THRESHOLD_SHARE)} of its threshold or more; the detection of small faults then "
         "measures the scenario's own uncertainty, not the diagnosis"
     )
 
@@ -198,9 +193,11 @@ def _guarantee(found: Document) -> str:
 
 
 def _drivers(ranking: list[Document]) -> str:
-    told = [entry for entry in ranking if entry["p_value"] <= 0.05 and entry["explained"] >= 0.01][:3]
+    told = [
+        entry for entry in ranking if entry["p_value"] <= MAX_P_VALUE and entry["explained"] >= MIN_EXPLAINED
+    ][:SHOWN]
     return ", ".join(
-        f"{entry['key']} (explains {percent(entry['explained'])} of the ranks)" for entry in told
+        f"{entry['key']} (explains {exact_percent(entry['explained'])} of the ranks)" for entry in told
     )
 
 
@@ -211,7 +208,7 @@ def render(summary: Document, folder: Path) -> str:
 
 
 def _parts(summary: Document, folder: Path, figures: Mapping[str, Path]) -> list[Part]:
-    expected = [("✓ met" if passed else "✗ MISSED", *row) for *row, passed in expectations(summary)]
+    judged = [("✓ met" if passed else "✗ MISSED", *row) for *row, passed in expectations(summary)]
     again = [(each["name"], link) for each in summary["worst"] if (link := _link(folder, each["name"]))]
     explained = [
         each | {"outcome": OUTCOMES[outcome]}
@@ -223,7 +220,7 @@ def _parts(summary: Document, folder: Path, figures: Mapping[str, Path]) -> list
         summary["description"],
         _STEERED if "search" in summary else "",
         *_section("What the flights show", ("", ""), facts(summary)),
-        *_section("Expectations", ("", "of", "expected", "found"), expected),
+        *_section("Expectations", ("", "of", "expected", "found"), judged),
         *_section("Tracking error, median RMS in deg/s", ("", *AXES), tracking(summary)),
         *_section("By fault", *tabulated(BY_FAULT, summary["by_fault"])),
         Heading("Figures"),
@@ -237,20 +234,20 @@ def _parts(summary: Document, folder: Path, figures: Mapping[str, Path]) -> list
     ]
 
 
-def _section(title: str, head: Sequence[str], rows: Rows) -> list[Part]:
+def _section(heading: str, head: Sequence[str], rows: Rows) -> list[Part]:
     """A heading and its table; nothing without rows."""
-    return [Heading(title), Table(head, rows)] if rows else []
+    return [Heading(heading), Table(head, rows)] if rows else []
 
 
 def _interval(rate: Document) -> str:
-    return f"{percent(rate['low'])} to {percent(rate['high'])}"
+    return f"{exact_percent(rate['low'])} to {exact_percent(rate['high'])}"
 
 
 BY_FAULT = (
-    ("fault", "fault"), ("flights", "flights"), ("detected", "detection.rate", percent),
+    ("fault", "fault"), ("flights", "flights"), ("detected", "detection.rate", exact_percent),
     ("95 % interval", "detection", _interval), ("delay: median", "detection.delay_s.median", _seconds),
     ("95 %", "detection.delay_s.p95", _seconds), ("max", "detection.delay_s.max", _seconds),
-    ("named rightly", "isolation.rate", percent), ("95 % interval", "isolation", _interval),
+    ("named rightly", "isolation.rate", exact_percent), ("95 % interval", "isolation", _interval),
     ("named wrongly", "isolation.wrong.count"),
 )  # fmt: skip
 WORST = (("flight", "run"), ("why", "why", "; ".join), ("flies it again", "replay"))

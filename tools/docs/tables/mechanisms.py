@@ -6,7 +6,7 @@ from typing import Any
 
 from beaver_ftc.studies.present.page import Table
 from beaver_ftc.studies.present.tables import markdown_table, number
-from beaver_ftc.studies.sensitivity import shown
+from beaver_ftc.studies.sensitivity import mechanisms_shown as shown
 from beaver_ftc.studies.sensitivity.command import run_mechanisms
 from beaver_ftc.studies.sensitivity.mechanisms import DRAWS, Flight, fly_one
 from beaver_ftc.studies.sensitivity.systems import DIAGNOSIS, LAW
@@ -49,7 +49,7 @@ def _grouped(document: Document) -> str:
     """The sentence of each mechanism, below the title of its group."""
     groups: dict[str, list[str]] = {title: [] for title in GROUPS.values()}
     for row in document["mechanisms"]:
-        found = shown.finding(row)
+        found = shown.mechanism_sentence(row)
         groups[GROUPS[_signs(row)]].append(f"- {found[0].upper()}{found[1:]}".replace(NO_CRITERION, ""))
     return "\n\n".join("\n".join([f"{title}:", "", *says]) for title, says in groups.items() if says)
 
@@ -85,7 +85,9 @@ LEVELS = {
 def mechanisms_asides() -> str:
     """Further tables, as CSV."""
     document = _flown()[0]
-    tables = shown.tables(document) | {name: shown.by_level(document, *of) for name, of in LEVELS.items()}
+    tables = shown.tables(document) | {
+        name: shown.table_by_level(document, *of) for name, of in LEVELS.items()
+    }
     return "\n".join(
         aside(f"mechanisms-{name}", says, _markdown(tables[name])) for name, says in ASIDES.items()
     )

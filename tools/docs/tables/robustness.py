@@ -22,8 +22,8 @@ from beaver_ftc.studies.matrix.clairvoyant import columns_of, seen_when_told
 from beaver_ftc.studies.present.tables import markdown_table, tabulated
 from beaver_ftc.studies.sensitivity.beyond import TOGETHER
 from beaver_ftc.studies.sensitivity.command import run_errors
-from beaver_ftc.studies.sensitivity.shown import COLUMNS
-from beaver_ftc.studies.sensitivity.shown import error_sentences as sentences
+from beaver_ftc.studies.sensitivity.errors_shown import COLUMNS
+from beaver_ftc.studies.sensitivity.errors_shown import error_sentences as sentences
 from beaver_ftc.studies.sweep.one_flight import fly_one, scenario_of
 from beaver_ftc.studies.sweep.sampling import Assignment, Plan
 from tools.docs.tables import moved, picture, table_of

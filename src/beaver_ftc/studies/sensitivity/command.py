@@ -14,7 +14,7 @@ from beaver_ftc.results.model import Document
 from beaver_ftc.scenario.schema import Scenario, load_scenario
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.present.page import as_text
-from beaver_ftc.studies.sensitivity import beyond, effects
+from beaver_ftc.studies.sensitivity import beyond, effects, errors_shown, mechanisms_shown
 from beaver_ftc.studies.sensitivity.errors import errors_of
 from beaver_ftc.studies.sensitivity.mechanisms import (
     DRAWS,
@@ -23,7 +23,6 @@ from beaver_ftc.studies.sensitivity.mechanisms import (
     margin_cells,
     margins_row,
 )
-from beaver_ftc.studies.sensitivity.shown import FILES, NAME, OF_ERRORS, OF_MECHANISMS, page_of
 
 
 def run_errors(
@@ -39,9 +38,9 @@ def run_errors(
     errors = errors_of(scenario)
     cases = beyond.cases_of(errors, flights)
     study = Study(
-        f"{scenario.name[:80]}-{NAME}", cases, partial(beyond.fly_one, scenario, seed),
-        partial(beyond.document_of, scenario, errors, cases, seed), OF_ERRORS, follows_from=[scenario, seed],
-        lost=lambda flight, why: beyond.FAILED,
+        f"{scenario.name[:80]}-{errors_shown.NAME}", cases, partial(beyond.fly_one, scenario, seed),
+        partial(beyond.document_of, scenario, errors, cases, seed), errors_shown.FILES,
+        follows_from=[scenario, seed], lost=lambda flight, why: beyond.FAILED,
     )  # fmt: skip
     return _flown(study, out, workers, progress)
 
@@ -55,8 +54,8 @@ def run_mechanisms(
         margins = [margins_row(cell) for cell in margin_cells()]
         return effects.document_of(seed, draws, rows, margins)
 
-    name, fly = f"mechanisms-{NAME}", partial(fly_one, seed)
-    study = Study(name, cases_of(draws), fly, document, OF_MECHANISMS, follows_from=seed)
+    name, fly = f"mechanisms-{mechanisms_shown.NAME}", partial(fly_one, seed)
+    study = Study(name, cases_of(draws), fly, document, mechanisms_shown.FILES, follows_from=seed)
     return _flown(study, out, workers, progress)
 
 
@@ -107,7 +106,7 @@ class Sensitivity(StudyCommand):
     workers: WorkersOption = None
     out: Path = Path("runs")
 
-    FILES = FILES
+    FILES = tuple(errors_shown.FILES)
 
     def run(self, reporter: Reporter) -> Document:
         """Fly every row, or every draw."""
@@ -120,4 +119,5 @@ class Sensitivity(StudyCommand):
 
     def as_text(self, document: Document, colour: bool) -> str:
         """Findings and tables, and where the files are."""
-        return f"{as_text(page_of(document)[1])}\n\nresults: {document['folder']}"
+        shown = mechanisms_shown if self.mechanisms else errors_shown
+        return f"{as_text(shown.page_of(document)[1])}\n\nresults: {document['folder']}"

@@ -181,6 +181,17 @@ def without_key(mechanism: Mechanism) -> str:
     return f"without {mechanism.key}" if mechanism.without or mechanism.withheld else mechanism.system
 
 
+def system_of(key: str) -> str:
+    """The system of an outcome's key: "default" of "default" and of "without default: bank of poles"."""
+    return key.partition(": ")[0].rpartition(" ")[2]
+
+
+def mechanisms_of(key: str) -> str:
+    """The mechanisms of an outcome's key: "without bank of poles"; "all" if it names the system alone."""
+    first, _, rest = key.partition(" ")
+    return f"{first} {rest.partition(': ')[2]}" if rest else "all"
+
+
 def watch_of(withheld: str) -> Callable[[Loop], Callable[[], None]] | None:
     """What `fly` calls as the flight begins, to withhold something from its law; None if nothing is."""
 

@@ -1,130 +1,21 @@
-"""What larger errors, or the loss of a mechanism, change: as sentences, tables, figures and files."""
+"""What the loss of a mechanism changes: as sentences, tables, a figure and files."""
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from itertools import chain
-from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.results.model import Document
-from beaver_ftc.results.style import BLACK
 from beaver_ftc.studies.present.figures import GRID, SERIES, draw_estimates, label_edges, panels
 from beaver_ftc.studies.present.page import Heading, Part, Pictures, Table, study_files, table, versions_line
-from beaver_ftc.studies.present.tables import estimate, grouped, number, or_never, percent
+from beaver_ftc.studies.present.tables import estimate, number, or_never, percent
+from beaver_ftc.studies.sensitivity.mechanisms import mechanisms_of, system_of
 from beaver_ftc.studies.sensitivity.systems import DEFAULT, PAPER
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 NAME = "sensitivity"
-
-
-def page_of(document: Document) -> tuple[str, Sequence[Part]]:
-    """The title and the parts of a page, and of the text without its pictures."""
-    return _page_of_mechanisms(document) if "mechanisms" in document else _page_of_errors(document)
-
-
-# Larger errors than declared.
-
-CAPTION = (
-    "In brackets 95 % intervals. Delay, tracking and bound used are medians: of the flights in which the "
-    "aircraft is lost the tracking error is infinite. The bound used is the part of the detection bound that "
-    "the healthy part of a flight takes."
-)
-SHOWN = {
-    "false_alarm": "false alarms, %", "named": "named rightly, %", "tracking_deg_s": "RMS rate error, deg/s",
-}  # fmt: skip
-
-
-def _page_of_errors(document: Document) -> tuple[str, Sequence[Part]]:
-    return f"Beyond what is declared: {document['scenario']}", [
-        *error_sentences(document), table(COLUMNS, document["rows"]), CAPTION,
-        Pictures([("False alarms, right names and tracking over the factor", NAME)]),
-        versions_line(document["versions"]),
-    ]  # fmt: skip
-
-
-def error_sentences(document: Document) -> Iterator[str]:
-    """What holds as declared, and the least factor at which an error changes the verdict."""
-    errors = list(grouped(document["rows"], "error").values())
-    alarms, misnamed = _counts(errors[-1][0])
-    yield (
-        f"{document['scenario']}: with every error at the limit of what is declared, {alarms} flights have a "
-        f"false alarm and {misnamed} a wrong name."
-    )
-    yield from map(_onset, errors)
-
-
-def _counts(row: Document) -> list[str]:
-    return ["{count} of {of}".format(**row[name]) for name in ("false_alarm", "misnamed")]
-
-
-def _onset(rows: Sequence[Document]) -> str:
-    """The least factor with a false alarm or a wrong name, of one error."""
-    declared = rows[0]["declared"]
-    size = "the unit" if declared.startswith("none; ") else "the declared size"
-    head = f"{rows[0]['error']} ({declared.replace('none; ', 'not declared; ', 1)})"
-    broken = next((row for row in rows if row["false_alarm"]["count"] or row["misnamed"]["count"]), None)
-    if broken is None:
-        most = rows[-1]["factor"]
-        return f"{head}: no false alarm and no wrong name up to {most:g} times {size}."
-    alarms, misnamed = _counts(broken)
-    return (
-        f"{head}: an error of {broken['factor']:g} times {size} gives a false alarm in {alarms} flights "
-        f"and a wrong name in {misnamed}."
-    )
-
-
-_PERCENT = partial(percent, unit="")
-
-
-def _share(found: Document) -> str:
-    return "{} ({})".format(*estimate(found, _PERCENT))
-
-
-def _interval(found: Document, form: Callable[[Any], str] = or_never) -> str:
-    value, limits = estimate(found, form)
-    return value if found["value"] is None or found["low"] == found["high"] else f"{value} ({limits})"
-
-
-def _used(found: Document) -> str:
-    return _interval(found, lambda share: or_never(share and 100.0 * share))
-
-
-COLUMNS = (
-    ("error", "error"), ("declared", "declared"), ("times", "factor"), ("flights", "flights"),
-    ("false alarms, %", "false_alarm", _share), ("detected, %", "detected", _share),
-    ("named rightly, %", "named", _share), ("named wrongly, %", "misnamed", _share),
-    ("delay, s", "delay_s", _interval), ("tracking RMS, deg/s", "tracking_deg_s", _interval),
-    ("bound used, %", "bound_used", _used),
-)  # fmt: skip
-
-
-def draw_errors(document: Document) -> "Figure":
-    """A row a quantity, a column an error, over the factor; bars are intervals."""
-    errors = [*grouped(document["rows"], "error").values()]
-    titles = [f"{rows[0]['error']}\n{rows[0]['declared']}" for rows in errors]
-    title = f"{document['scenario']}: errors larger than declared"
-    size = 0.8 + 1.9 * len(errors), 0.9 + 1.5 * len(SHOWN)
-    figure, grid = panels(len(SHOWN), len(errors), *size, title, sharex=True, sharey="row")
-    for line, quantity in zip(grid, SHOWN, strict=True):
-        times = 1.0 if quantity.endswith("_deg_s") else 100.0
-        for panel, rows in zip(line, errors, strict=True):
-            known = [row for row in rows if None not in (row[quantity]["value"], row[quantity]["low"])]
-            draw_estimates(
-                panel, [row["factor"] for row in known], [row[quantity] for row in known], times,
-                color=BLACK, marker="o", markersize=4, linewidth=1.2, capsize=2,
-            )  # fmt: skip
-            panel.set_xscale("log", base=2)
-            panel.set_xticks(document["factors"], [f"{factor:g}" for factor in document["factors"]])
-            panel.minorticks_off()
-            panel.grid(color=GRID, linewidth=0.6)
-    label_edges(grid, "times the size", list(SHOWN.values()), titles)
-    return figure
-
-
-# Flights without a mechanism.
-
 CRITERIA = {  # of effects.py, in the words of tables
     "false_alarms": "false alarms",
     "late": "late alarms",
@@ -149,7 +40,8 @@ _FACTOR_WORDS = {
 }  # fmt: skip
 
 
-def _page_of_mechanisms(document: Document) -> tuple[str, Sequence[Part]]:
+def page_of(document: Document) -> tuple[str, Sequence[Part]]:
+    """The title and the parts of the page, and of the text without its pictures."""
     of_each = tables(document)
     return "What each mechanism is worth", [
         *mechanism_sentences(document), Pictures([(CAPTIONS["net"], NAME)]),
@@ -162,7 +54,7 @@ def mechanism_sentences(document: Document) -> Iterator[str]:
     """What was flown, what each mechanism improves or worsens, and whether false alarms have a reason."""
     names = " x ".join(f"{len(values)} {_FACTOR_WORDS[name]}" for name, values in document["factors"].items())
     yield f"{document['draws']} draws over {names}, each flown with and without every mechanism."
-    yield from (finding(row) for row in document["mechanisms"])
+    yield from (mechanism_sentence(row) for row in document["mechanisms"])
     alarms = [row for row in document["false_alarms"] if row["worst_case"]]
     total, without, certified, certifiable = (
         sum(row[key] for row in alarms) for key in ("count", "unexplained", "certified", "certifiable")
@@ -179,7 +71,7 @@ def _label(row: Document) -> str:
     return "{mechanism} ({system})".format(**row)
 
 
-def finding(row: Document) -> str:
+def mechanism_sentence(row: Document) -> str:
     """What the removal of a mechanism changes, beyond chance."""
     flights = row["flights"]
     if row["same_verdict"] == row["same_tracking"] == flights:
@@ -195,27 +87,17 @@ def finding(row: Document) -> str:
 
 def tables(document: Document) -> dict[str, Table]:
     """The table of each of CAPTIONS."""
-    systems = document["systems"]
-    quantities = [("flights", [(str(row["flights"]), "") for row in systems.values()])]
-    quantities += [
-        (words, [estimate(row[name], _PERCENT) for row in systems.values()])
-        for name, words in SYSTEM_SHARES.items()
-    ]
-    quantities += [("error, deg/s", [estimate(row["tracking_deg_s"]) for row in systems.values()])]
     return {
-        "systems": Table(
-            ("quantity", *_with_interval(systems)),
-            [(words, *chain.from_iterable(values)) for words, values in quantities],
-        ),
-        "net": _of_each(
+        "systems": _systems_table(document["systems"]),
+        "net": _mechanism_table(
             document["mechanisms"], _with_interval(f"{words}, points" for words in CRITERIA.values()),
             lambda row: chain.from_iterable(_net(row[name]) for name in CRITERIA),
         ),
-        "same": _of_each(
+        "same": _mechanism_table(
             document["mechanisms"], ("flights", "same verdict", "same tracking"),
             lambda row: map(str, (row["flights"], row["same_verdict"], row["same_tracking"])),
         ),
-        "medians": _of_each(
+        "medians": _mechanism_table(
             document["mechanisms"],
             ("delay with, s", "delay without, s", "error with, deg/s", "error without, deg/s", "error ratio",
              INTERVAL),
@@ -226,17 +108,33 @@ def tables(document: Document) -> dict[str, Table]:
     }  # fmt: skip
 
 
-def by_level(document: Document, factor: str, criterion: str, serves: str) -> Table:
+def _systems_table(systems: Document) -> Table:
+    """A row a quantity, a pair of columns a system."""
+    quantities = [
+        ("flights", [(str(row["flights"]), "") for row in systems.values()]),
+        *(
+            (words, [estimate(row[name], partial(percent, unit="")) for row in systems.values()])
+            for name, words in SYSTEM_SHARES.items()
+        ),
+        ("error, deg/s", [estimate(row["tracking_deg_s"]) for row in systems.values()]),
+    ]
+    return Table(
+        ("quantity", *_with_interval(systems)),
+        [(words, *chain.from_iterable(values)) for words, values in quantities],
+    )
+
+
+def table_by_level(document: Document, factor: str, criterion: str, serves: str) -> Table:
     """By level of a factor, the net share by a criterion, of the mechanisms that serve diagnosis or law."""
     levels = document["factors"][factor]
     names = [f"error {100 * level:g} %" if factor == "error" else str(level) for level in levels]
-    return _of_each(
+    return _mechanism_table(
         [row for row in document["mechanisms"] if row["serves"] == serves], _with_interval(names),
         lambda row: chain.from_iterable(_net(found[criterion]) for found in row["by"][factor].values()),
     )  # fmt: skip
 
 
-def _of_each(rows: Sequence[Document], head: Sequence[str], of: Callable[[Document], Any]) -> Table:
+def _mechanism_table(rows: Sequence[Document], head: Sequence[str], of: Callable[[Document], Any]) -> Table:
     """A row a mechanism, of these cells."""
     return Table(("mechanism", *head), [(_label(row), *of(row)) for row in rows])
 
@@ -257,16 +155,6 @@ def _medians(row: Document) -> Iterator[str]:
     yield from estimate(row["tracking_ratio"])
 
 
-def _system(flown: str) -> str:
-    """Of a key such as "published" or "without default: bank of poles"."""
-    return flown.partition(": ")[0].rpartition(" ")[2]
-
-
-def _mechanisms(flown: str) -> str:
-    first, _, rest = flown.partition(" ")
-    return f"{first} {rest.partition(': ')[2]}" if rest else "all"
-
-
 def _certified(row: Document) -> str:
     return str(row["certified"]) if row["certifiable"] or not row["count"] else "-"
 
@@ -276,7 +164,7 @@ def _unexplained(row: Document) -> str:
 
 
 ALARMS = (
-    ("system", "flown", _system), ("mechanisms", "flown", _mechanisms), ("false alarms", "count"),
+    ("system", "flown", system_of), ("mechanisms", "flown", mechanisms_of), ("false alarms", "count"),
     ("with an undeclared error", "undeclared"), ("certified", _certified), ("unexplained", _unexplained),
 )  # fmt: skip
 MARGINS = (
@@ -315,6 +203,4 @@ def pairs_of(document: Document) -> list[Document]:
     return [{key: row[key] for key in row if key not in left_out} for row in document["mechanisms"]]
 
 
-OF_ERRORS = study_files(NAME, page_of, {NAME: itemgetter("rows")}, {NAME: draw_errors})
-OF_MECHANISMS = study_files(NAME, page_of, {NAME: pairs_of}, {NAME: draw_mechanisms})
-FILES = tuple(OF_ERRORS)
+FILES = study_files(NAME, page_of, {NAME: pairs_of}, {NAME: draw_mechanisms})

@@ -1,0 +1,116 @@
+"""What larger errors change: as sentences, a table, a figure and files."""
+
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from operator import itemgetter
+from typing import TYPE_CHECKING, Any
+
+from beaver_ftc.results.model import Document
+from beaver_ftc.results.style import BLACK
+from beaver_ftc.studies.present.figures import GRID, draw_estimates, label_edges, panels
+from beaver_ftc.studies.present.page import Part, Pictures, study_files, table, versions_line
+from beaver_ftc.studies.present.tables import estimate, grouped, or_never, percent
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+NAME = "sensitivity"
+CAPTION = (
+    "In brackets 95 % intervals. Delay, tracking and bound used are medians: of the flights in which the "
+    "aircraft is lost the tracking error is infinite. The bound used is the part of the detection bound that "
+    "the healthy part of a flight takes."
+)
+SHOWN = {
+    "false_alarm": "false alarms, %", "named": "named rightly, %", "tracking_deg_s": "RMS rate error, deg/s",
+}  # fmt: skip
+
+
+def page_of(document: Document) -> tuple[str, Sequence[Part]]:
+    """The title and the parts of the page, and of the text without its pictures."""
+    return f"Beyond what is declared: {document['scenario']}", [
+        *error_sentences(document), table(COLUMNS, document["rows"]), CAPTION,
+        Pictures([("False alarms, right names and tracking over the factor", NAME)]),
+        versions_line(document["versions"]),
+    ]  # fmt: skip
+
+
+def error_sentences(document: Document) -> Iterator[str]:
+    """What holds as declared, and the least factor at which an error changes the verdict."""
+    errors = list(grouped(document["rows"], "error").values())
+    alarms, misnamed = _counts(errors[-1][0])
+    yield (
+        f"{document['scenario']}: with every error at the limit of what is declared, {alarms} flights have a "
+        f"false alarm and {misnamed} a wrong name."
+    )
+    yield from map(_onset, errors)
+
+
+def _counts(row: Document) -> list[str]:
+    return ["{count} of {of}".format(**row[name]) for name in ("false_alarm", "misnamed")]
+
+
+def _onset(rows: Sequence[Document]) -> str:
+    """The least factor with a false alarm or a wrong name, of one error."""
+    declared = rows[0]["declared"]
+    size = "the unit" if declared.startswith("none; ") else "the declared size"
+    head = f"{rows[0]['error']} ({declared.replace('none; ', 'not declared; ', 1)})"
+    broken = next((row for row in rows if row["false_alarm"]["count"] or row["misnamed"]["count"]), None)
+    if broken is None:
+        most = rows[-1]["factor"]
+        return f"{head}: no false alarm and no wrong name up to {most:g} times {size}."
+    alarms, misnamed = _counts(broken)
+    return (
+        f"{head}: an error of {broken['factor']:g} times {size} gives a false alarm in {alarms} flights "
+        f"and a wrong name in {misnamed}."
+    )
+
+
+_PERCENT = partial(percent, unit="")
+
+
+def _share(found: Document) -> str:
+    return "{} ({})".format(*estimate(found, _PERCENT))
+
+
+def _interval(found: Document, form: Callable[[Any], str] = or_never) -> str:
+    value, limits = estimate(found, form)
+    return value if found["value"] is None or found["low"] == found["high"] else f"{value} ({limits})"
+
+
+def _used(found: Document) -> str:
+    return _interval(found, lambda share: or_never(share and 100.0 * share))
+
+
+COLUMNS = (
+    ("error", "error"), ("declared", "declared"), ("times", "factor"), ("flights", "flights"),
+    ("false alarms, %", "false_alarm", _share), ("detected, %", "detected", _share),
+    ("named rightly, %", "named", _share), ("named wrongly, %", "misnamed", _share),
+    ("delay, s", "delay_s", _interval), ("tracking RMS, deg/s", "tracking_deg_s", _interval),
+    ("bound used, %", "bound_used", _used),
+)  # fmt: skip
+
+
+def draw_errors(document: Document) -> "Figure":
+    """A row a quantity, a column an error, over the factor; bars are intervals."""
+    errors = [*grouped(document["rows"], "error").values()]
+    titles = [f"{rows[0]['error']}\n{rows[0]['declared']}" for rows in errors]
+    title = f"{document['scenario']}: errors larger than declared"
+    size = 0.8 + 1.9 * len(errors), 0.9 + 1.5 * len(SHOWN)
+    figure, grid = panels(len(SHOWN), len(errors), *size, title, sharex=True, sharey="row")
+    for line, quantity in zip(grid, SHOWN, strict=True):
+        times = 1.0 if quantity.endswith("_deg_s") else 100.0
+        for panel, rows in zip(line, errors, strict=True):
+            known = [row for row in rows if None not in (row[quantity]["value"], row[quantity]["low"])]
+            draw_estimates(
+                panel, [row["factor"] for row in known], [row[quantity] for row in known], times,
+                color=BLACK, marker="o", markersize=4, linewidth=1.2, capsize=2,
+            )  # fmt: skip
+            panel.set_xscale("log", base=2)
+            panel.set_xticks(document["factors"], [f"{factor:g}" for factor in document["factors"]])
+            panel.minorticks_off()
+            panel.grid(color=GRID, linewidth=0.6)
+    label_edges(grid, "times the size", list(SHOWN.values()), titles)
+    return figure
+
+
+FILES = study_files(NAME, page_of, {NAME: itemgetter("rows")}, {NAME: draw_errors})

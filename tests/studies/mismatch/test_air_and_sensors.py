@@ -6,8 +6,8 @@ from beaver_ftc.design.model import acceleration_at
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.channels import TRUTH
 from beaver_ftc.plant.trim import trim
-from beaver_ftc.studies.mismatch.models import air_name, states_of
 from beaver_ftc.studies.mismatch.sources import Models, instantaneous
+from beaver_ftc.studies.mismatch.states import column_of, states_of
 from flying import flown, scenario
 
 PROPERTY = {name: (path, factor) for name, path, factor in TRUTH}
@@ -38,7 +38,7 @@ def flight_in_turbulence(frames=200):
 
 def row(plant, t_s):
     of = {name: plant.read(path) * factor for name, (path, factor) in PROPERTY.items()}
-    air = {air_name(f"{axis}_rad_s"): plant.read(f"velocities/{axis}-aero-rad_sec") for axis in "pqr"}
+    air = {column_of("air", f"{axis}_rad_s"): plant.read(f"velocities/{axis}-aero-rad_sec") for axis in "pqr"}
     unused = {f"{axis}_{what}_rad_s2": 0.0 for axis in "pqr" for what in ("eta_bar", "design")}
     return of | air | unused | {"t_s": t_s, "north_m": 0.0}
 

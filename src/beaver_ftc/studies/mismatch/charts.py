@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from beaver_ftc.aircraft import AXES
+from beaver_ftc.documents.files import Document
 from beaver_ftc.results.expectations import MOTION_OF_AXIS, without_underscores
 from beaver_ftc.results.log import StoredLog
 from beaver_ftc.results.model import Metrics
@@ -19,7 +20,7 @@ from beaver_ftc.studies.linear_systems import CHANNELS, response
 from beaver_ftc.studies.mismatch.linear import LinearAnalysis
 from beaver_ftc.studies.mismatch.sources import SOURCES
 from beaver_ftc.studies.mismatch.split import CAUSES, ETA_BAR, FAULT, TOTAL, UNEXPLAINED, column
-from beaver_ftc.studies.mismatch.tables import Document, percent
+from beaver_ftc.studies.mismatch.tables import percent
 from beaver_ftc.studies.present.figures import heat_map, label_edges, panels
 from beaver_ftc.studies.present.page import Files
 
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 
 
 AXIS_NAMES = [f"{motion} {axis}" for axis, motion in MOTION_OF_AXIS.items()]
-BEYOND = 1e6  # the share of a bound of nothing
+LONGEST_BAR = 1e6  # of a share of a bound of nothing
 SHOWN_SOURCES = 4  # curves an eye can follow in one panel
 LEAST_CURVE = 1e-3  # of the largest source: a smaller one is a line at zero
 LEAST_RATIO = 1e-6  # what is smaller is drawn as this
@@ -111,13 +112,15 @@ def _dress(axes: "Axes") -> None:
 
 def bound_figure(found: Document) -> "Figure":
     """How much of the bound each source has used at most, per axis, on a logarithmic scale."""
-    every = {
-        name: [found["axes"][axis][name]["bound_share"] for axis in AXES] for name in (*SOURCES, UNEXPLAINED)
-    }
-    names = [name for name, of in every.items() if max(map(_length, of)) > LEAST_SHARE]
-    shares = [[every[name][i] for name in names] for i in range(len(AXES))]
-    values = np.array([[_length(share) for share in row] for row in shares])
-    notes = [[percent(s) if _length(s) > LEAST_SHARE else "" for s in row] for row in shares]
+    of_axes = [found["axes"][axis] for axis in AXES]
+    names = [
+        name
+        for name in (*SOURCES, UNEXPLAINED)
+        if any(_bar_length(sources[name]["bound_share"]) > LEAST_SHARE for sources in of_axes)
+    ]
+    shares = [[sources[name]["bound_share"] for name in names] for sources in of_axes]
+    values = np.array([[_bar_length(share) for share in row] for row in shares])
+    notes = [[percent(share) if _bar_length(share) > LEAST_SHARE else "" for share in row] for row in shares]
     title = f"Largest share of the bound eta_bar\n{found['scenario']}", "share of eta_bar (1: all of it)"
     size = 11.0, 1.6 + 0.34 * max(len(names), 2)
     ends = LEAST_SHARE, 30.0 * max(values.max(initial=0.0), 1.0)
@@ -125,15 +128,15 @@ def bound_figure(found: Document) -> "Figure":
     return _bars(size, title, *shown, ends, grey=FAULT)
 
 
-def _length(share: float | None) -> float:
-    """Of the bar of a share; one of no bound is far beyond it."""
-    return BEYOND if share is None else share
+def _bar_length(share: float | None) -> float:
+    """A share of the bound as a number; None, a share of a bound of nothing, is the longest bar."""
+    return LONGEST_BAR if share is None else share
 
 
 def comparison_figure(entries: Sequence[Document]) -> "Figure":
     """How much of the bound each flight has needed, per axis, on a logarithmic scale."""
     needed = [[each[f"{axis}_worst_ratio"] for each in entries] for axis in AXES]
-    ratios = np.array([[max(_length(ratio), LEAST_RATIO) for ratio in row] for row in needed])
+    ratios = np.array([[max(_bar_length(ratio), LEAST_RATIO) for ratio in row] for row in needed])
     notes = [
         [
             f"{percent(r)} ({without_underscores(each[f'{axis}_dominant'])})"
@@ -180,7 +183,7 @@ def linear_figure(analysis: LinearAnalysis, name: str) -> "Figure":
     figure, grid = panels(2, 4, 14.0, 6.4, title, width_ratios=[1.4, 1, 1, 1])
     for axes in grid[:, 0]:
         _draw_poles(axes, analysis)
-    grid[1, 0].set(xlim=(-0.12, 0.06), ylim=(-0.5, 0.5), xlabel="real part (1/s)")
+    grid[1, 0].set(xlim=(-0.12, 0.06), ylim=(-0.5, 0.5))
     for (surface, rate), magnitude, phase in zip(CHANNELS, *grid[:, 1:], strict=True):
         _draw_bode(magnitude, phase, analysis, surface, rate)
     titles = "all poles; below, near the origin", *(f"{surface} to {rate}" for surface, rate in CHANNELS)
@@ -203,17 +206,20 @@ def _draw_poles(axes: "Axes", analysis: LinearAnalysis) -> None:
 
 
 def _draw_bode(magnitude: "Axes", phase: "Axes", analysis: LinearAnalysis, surface: str, rate: str) -> None:
-    frequency = np.geomspace(0.01, 50.0, 300)
+    w = np.geomspace(0.01, 50.0, 300)  # rad/s
     for model, (_, look) in MODEL_LOOKS.items():
-        found = response(*analysis.channel(model, surface, rate), frequency)
-        magnitude.semilogx(frequency, 20.0 * np.log10(np.abs(found)), **look)
-        phase.semilogx(frequency, np.degrees(np.unwrap(np.angle(found))), **look)
+        H = response(*analysis.channel(model, surface, rate), w)
+        magnitude.semilogx(w, 20.0 * np.log10(np.abs(H)), **look)
+        phase.semilogx(w, np.degrees(np.unwrap(np.angle(H))), **look)
     for axes in (magnitude, phase):
         _dress(axes)
 
 
 def map_figure(entries: Sequence[Document], name: str) -> "Figure":
-    """The worst share of the bound against speed and altitude, per axis; grey where there is no trim."""
+    """The worst share of the bound against speed and altitude, per axis; grey where there is no trim.
+
+    entries: in the order of altitudes, at each of airspeeds, at each of axes.
+    """
     from matplotlib import colormaps
     from matplotlib.colors import LogNorm
 

@@ -67,7 +67,7 @@ from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.faults import UNANTICIPATED, place_of
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.signals import grown_share, is_before, is_in_force
-from beaver_ftc.studies.mismatch.models import States
+from beaver_ftc.studies.mismatch.states import States
 
 SOURCES = (
     "sensors", "actuators", "fault", "simplification", "engine", "coefficients", "inertia",

@@ -2,6 +2,7 @@
 exceedances."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -14,8 +15,8 @@ from beaver_ftc.results.metrics import measure
 from beaver_ftc.results.model import Metrics
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.studies.mismatch.models import Log, states_of
 from beaver_ftc.studies.mismatch.sources import SOURCES, Contributions, Models, instantaneous
+from beaver_ftc.studies.mismatch.states import Log, states_of
 from beaver_ftc.studies.present.tables import finite
 
 UNEXPLAINED, TOTAL, ETA_BAR, FAULT = "unexplained", "total", "eta_bar", "fault"
@@ -51,13 +52,13 @@ class Split:
     place: np.ndarray
     frame_s: float
 
-    @property
+    @cached_property
     def named(self) -> Contributions:
         """All that adds up: the whole, its sources, and what is left, by name."""
         rest = self.total - sum(self.contributions[name] for name in SOURCES)
         return {TOTAL: self.total, **self.contributions, UNEXPLAINED: rest}
 
-    @property
+    @cached_property
     def uncertainty(self) -> np.ndarray:
         """The mismatch without the faults, (n, 3) rad/s2: the eta that eta_bar shall bound."""
         return self.total - self.contributions[FAULT]
@@ -67,10 +68,15 @@ class Split:
         """The constant part (3,) rad/s2 of a bound that would have covered the flight."""
         return (np.abs(self.uncertainty) - (self.eta_bar - self.constant)).max(axis=0, initial=0.0)
 
+    @cached_property
+    def ratios(self) -> np.ndarray:
+        """The uncertainty as a share of its bound, (n, 3)."""
+        return self.shares(self.uncertainty)
+
     @property
     def exceeded(self) -> bool:
         """Whether the uncertainty was above its bound on any axis."""
-        return bool((self.shares(self.uncertainty) > 1.0).any())
+        return bool((self.ratios > 1.0).any())
 
     def shares(self, values: np.ndarray) -> np.ndarray:
         """Of the bound, (n, 3); nothing is no share of a bound of nothing."""
@@ -78,7 +84,7 @@ class Split:
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.where(size > 0.0, size / self.eta_bar, 0.0)
 
-    def figures(self, values: np.ndarray, axis: int) -> Document:
+    def magnitudes(self, values: np.ndarray, axis: int) -> Document:
         """RMS and largest magnitude of an acceleration on an axis, rad/s2; its share of the whole, and the
         largest of the bound."""
         rms, whole = (float(np.sqrt(np.mean(each[:, axis] ** 2))) for each in (values, self.total))
@@ -91,7 +97,7 @@ class Split:
 
     def bound(self, axis: int) -> Document:
         """An axis against its bound, and the first stays above it."""
-        ratio = self.shares(self.uncertainty)[:, axis]
+        ratio = self.ratios[:, axis]
         stays, worst = _runs(ratio > 1.0), int(ratio.argmax())
         return {
             "constant_rad_s2": float(self.constant[axis]),
@@ -125,8 +131,10 @@ class Split:
 def split(scenario: Scenario, log: Log) -> Split:
     """Split the mismatch of a flight; log: its columns (n,).
 
-    The acceleration over a frame needs the frame's end; at the flight's last row, which nothing follows,
-    JSBSim's acceleration then stands for it.
+    total[k] = (x[k+1] - x[k]) rate_hz - design_mean[k+1],     sampled[k] = xdot[k] - (f + G u)[k]
+    integration = total - sampled
+
+    At the flight's last row, which nothing follows, total is sampled.
     """
     m, s = Models(scenario), states_of(log)
     contributions, details = instantaneous(m, s)
@@ -134,10 +142,15 @@ def split(scenario: Scenario, log: Log) -> Split:
     over_frames = np.diff(s.x, axis=0) * scenario.rate_hz - s.design_mean[1:]
     total = np.concatenate([over_frames, sampled[-1:]])
     return Split(
-        s.t_s, total, contributions | {"integration": total - sampled}, details,
-        np.concatenate([s.eta_bar[1:], s.eta_bar[-1:]]), np.array(Declared.of(scenario).constant_rad_s2),
-        np.column_stack([s.y[:, 2], s.altitude_m, s.y[:, 0]]), 1.0 / scenario.rate_hz,
-    )  # fmt: skip
+        t_s=s.t_s,
+        total=total,
+        contributions=contributions | {"integration": total - sampled},
+        details=details,
+        eta_bar=np.concatenate([s.eta_bar[1:], s.eta_bar[-1:]]),
+        constant=np.array(Declared.of(scenario).constant_rad_s2),
+        place=np.column_stack([s.y[:, 2], s.altitude_m, s.y[:, 0]]),
+        frame_s=1.0 / scenario.rate_hz,
+    )
 
 
 def split_flight(scenario: Scenario) -> tuple[Split, Metrics]:

@@ -28,7 +28,6 @@ from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.mismatch import charts
 from beaver_ftc.studies.mismatch.bound import recommended_for
 from beaver_ftc.studies.mismatch.linear import analyse, linear_document
-from beaver_ftc.studies.mismatch.models import LOGGED
 from beaver_ftc.studies.mismatch.sources import SOURCES
 from beaver_ftc.studies.mismatch.split import (
     CAUSES,
@@ -39,6 +38,7 @@ from beaver_ftc.studies.mismatch.split import (
     split,
     split_flight,
 )
+from beaver_ftc.studies.mismatch.states import LOGGED
 from beaver_ftc.studies.mismatch.tables import show_in_reports
 from beaver_ftc.studies.present.page import Files, write_files
 from beaver_ftc.studies.present.tables import as_csv, finite
@@ -116,10 +116,10 @@ def document(scenario: Scenario, flight: Split, metrics: Metrics) -> Document:
 
 def _axis(flight: Split, i: int) -> Document:
     named = flight.named
-    found = {name: flight.figures(named[name], i) for name in (*SOURCES, UNEXPLAINED, TOTAL)}
+    found = {name: flight.magnitudes(named[name], i) for name in (*SOURCES, UNEXPLAINED, TOTAL)}
     for source, details in flight.details.items():
         if details:
-            found[source]["parts"] = {name: flight.figures(values, i) for name, values in details.items()}
+            found[source]["parts"] = {name: flight.magnitudes(values, i) for name, values in details.items()}
     return found
 
 

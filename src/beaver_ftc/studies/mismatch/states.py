@@ -1,4 +1,4 @@
-"""The log as arrays."""
+"""The columns of a flight's log as arrays, (n, ...), SI and rad."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,25 +11,21 @@ from beaver_ftc.design.fdc import SURFACES
 Log = Mapping[str, np.ndarray]
 
 
-def measured_name(column: str) -> str:
-    """The log column that holds what a sensor made of a true one: `alpha_rad` is `alpha_measured_rad`."""
+def column_of(how: str, column: str) -> str:
+    """The log column of a true one as `measured` by a sensor, or of a rate relative to the turning `air`:
+    `alpha_rad` is `alpha_measured_rad`, `p_rad_s` is `p_air_rad_s`."""
     stem, _, unit = column.partition("_")
-    return f"{stem}_measured_{unit}" if unit else f"{stem}_measured"
-
-
-def air_name(column: str) -> str:
-    """The log column of a rate relative to the turning air: `p_rad_s` is `p_air_rad_s`."""
-    stem, _, unit = column.partition("_")
-    return f"{stem}_air_{unit}"
+    return f"{stem}_{how}_{unit}".rstrip("_")
 
 
 _X = tuple(f"{axis}_rad_s" for axis in AXES)
 _Y = ("alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa", "dpt")  # the design model's order
-_TRUE = {measured_name(column): column for column in (*_X, *_Y)} | {air_name(column): column for column in _X}
+_X_MEASURED, _X_AIR = (tuple(column_of(how, column) for column in _X) for how in ("measured", "air"))
+_Y_MEASURED = tuple(column_of("measured", column) for column in _Y)
+_TRUE = dict(zip((*_X_MEASURED, *_X_AIR, *_Y_MEASURED), (*_X, *_X, *_Y), strict=True))
 _ALONE = ("t_s", "north_m", "altitude_m")
 _TOGETHER = {
-    "x": _X, "x_measured": tuple(map(measured_name, _X)), "x_air": tuple(map(air_name, _X)),
-    "y": _Y, "y_measured": tuple(map(measured_name, _Y)),
+    "x": _X, "x_measured": _X_MEASURED, "x_air": _X_AIR, "y": _Y, "y_measured": _Y_MEASURED,
     "u": tuple(f"{surface}_cmd_rad" for surface in SURFACES),
     "position": tuple(f"{surface}_pos_rad" for surface in SURFACES),
     "effective": tuple(f"{surface}_effective_rad" for surface in SURFACES),
@@ -45,30 +41,23 @@ LOGGED = frozenset((*_ALONE, *(column for columns in _TOGETHER.values() for colu
 
 @dataclass(frozen=True)
 class States:
-    """Frames of a flight; n of them. SI and rad.
-
-    x, x_measured, x_air (n, 3) body rates relative to the Earth, as measured, and relative to the turning
-    air; y, y_measured (n, 5) alpha, beta, V, qdyn, dpt; u, position, effective (n, 4): the command in
-    effect, the actuators' output and what the aerodynamics see; xdot (n, 3) JSBSim's angular
-    acceleration; attitude (n, 3) phi, theta, psi; north_m, altitude_m (n,); eta_bar, design_mean (n, 3)
-    rad/s2: the bound, and f + G u as the diagnosis averaged it, over the frame that ends here.
-    """
+    """Frames of a flight; n of them. SI and rad."""
 
     t_s: np.ndarray
-    x: np.ndarray
+    x: np.ndarray  # (n, 3) body rates p, q, r relative to the Earth
     x_measured: np.ndarray
-    x_air: np.ndarray
-    y: np.ndarray
+    x_air: np.ndarray  # relative to the turning air
+    y: np.ndarray  # (n, 5) alpha, beta, V, qdyn, dpt
     y_measured: np.ndarray
-    u: np.ndarray
-    position: np.ndarray
-    effective: np.ndarray
-    xdot: np.ndarray
-    attitude: np.ndarray
+    u: np.ndarray  # (n, 4) commands in effect
+    position: np.ndarray  # (n, 4) output of the actuators
+    effective: np.ndarray  # (n, 4) what the aerodynamics see
+    xdot: np.ndarray  # (n, 3) JSBSim's angular acceleration
+    attitude: np.ndarray  # (n, 3) phi, theta, psi
     north_m: np.ndarray
     altitude_m: np.ndarray
-    eta_bar: np.ndarray
-    design_mean: np.ndarray
+    eta_bar: np.ndarray  # (n, 3) rad/s2: the bound over the frame that ends here
+    design_mean: np.ndarray  # (n, 3) rad/s2: f + G u as the diagnosis averaged it over that frame
 
 
 def states_of(log: Log) -> States:

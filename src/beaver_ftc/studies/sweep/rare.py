@@ -28,7 +28,7 @@ from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial
 from beaver_ftc.studies.engine.study import FlyRound, Study, run_study
 from beaver_ftc.studies.present.tables import all_finite, number
 from beaver_ftc.studies.sweep.one_flight import scenario_of, warm_up
-from beaver_ftc.studies.sweep.sampling import OF_RARE, Assignment, values_at
+from beaver_ftc.studies.sweep.sampling import OF_RARE, Assignment, generator_of, values_at
 from beaver_ftc.studies.sweep.store import identity_of
 
 RUNS, MEMBERS = 8, 220  # independent runs, flights of each a level: 10^-5 by a hundredth of 10^6 flights
@@ -47,7 +47,7 @@ class Chains:
     """Independent runs of subset simulation abreast: points (runs, members, keys), scores (runs, members)."""
 
     def __init__(self, keys: int, seed: int, runs: int = RUNS, members: int = MEMBERS) -> None:
-        self._generator = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(0, 0, OF_RARE)))
+        self._generator = generator_of(seed, 0, 0, OF_RARE)
         self.points = self._generator.standard_normal((runs, members, keys))
         self.scores = np.full((runs, members), -math.inf)
         self.share, self.reached = np.ones(runs), np.zeros(runs, bool)

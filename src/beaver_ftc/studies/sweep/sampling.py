@@ -100,7 +100,9 @@ class Plan:
             return self._latin[indices]
         if self._file.sampling == "sobol":
             return _sobol(seed, dimensions, indices)
-        return np.array([_generator(seed, index, OF_VALUES).random(dimensions) for index in indices.tolist()])
+        return np.array(
+            [generator_of(seed, index, OF_VALUES).random(dimensions) for index in indices.tolist()]
+        )
 
     def _values(self, index: int, point: np.ndarray) -> Document:
         values = values_at(self._drawn, point)
@@ -114,8 +116,9 @@ def _is_in_turn(file: SweepFile, how: Variation) -> bool:
     return file.sampling == "grid" or how.linspace is not None
 
 
-def _generator(seed: int, index: int, purpose: int) -> np.random.Generator:
-    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(index, purpose)))
+def generator_of(seed: int, *spawn_key: int) -> np.random.Generator:
+    """Random numbers that a spawn key distinguishes from the others of a seed."""
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=spawn_key))
 
 
 def _latin_hypercube(file: SweepFile, dimensions: int) -> np.ndarray:
@@ -123,7 +126,7 @@ def _latin_hypercube(file: SweepFile, dimensions: int) -> np.ndarray:
 
     Not scipy's `qmc.LatinHypercube`: it draws other numbers, and a seed gives the same flights for good.
     """
-    generator = _generator(file.seed, 0, OF_DESIGN)
+    generator = generator_of(file.seed, 0, OF_DESIGN)
     columns = [
         (generator.permutation(file.flights) + generator.random(file.flights)) / file.flights
         for _ in range(dimensions)
@@ -135,7 +138,7 @@ def _sobol(seed: int, dimensions: int, indices: np.ndarray) -> np.ndarray:
     """Scrambled Sobol points [Owen 1995] at these increasing indices."""
     from scipy.stats import qmc
 
-    engine = qmc.Sobol(dimensions, scramble=True, seed=_generator(seed, 0, OF_DESIGN))
+    engine = qmc.Sobol(dimensions, scramble=True, seed=generator_of(seed, 0, OF_DESIGN))
     points = []
     with warnings.catch_warnings():  # that a sample is no power of 2: the sweep as a whole may be
         warnings.simplefilter("ignore", UserWarning)

@@ -22,7 +22,7 @@ from beaver_ftc.studies.engine.store import batches_of
 from beaver_ftc.studies.engine.workers import Batch
 from beaver_ftc.studies.present.tables import finite
 from beaver_ftc.studies.sweep.one_flight import DEPARTED
-from beaver_ftc.studies.sweep.sampling import OF_SEARCH, Assignment, values_at
+from beaver_ftc.studies.sweep.sampling import OF_SEARCH, Assignment, generator_of, values_at
 from beaver_ftc.studies.sweep.store import Store
 
 WEIGHT, CROSSOVER = 0.7, 0.9  # [Storn1997] recommend 0.4 to 1 and, for few dependent keys, 0.9
@@ -77,8 +77,7 @@ class Evolution:
 
     def trials(self) -> np.ndarray:
         """The points to fly in this generation, (members, keys)."""
-        spawn_key = self.generation, 0, OF_SEARCH
-        generator = np.random.default_rng(np.random.SeedSequence(self._seed, spawn_key=spawn_key))
+        generator = generator_of(self._seed, self.generation, 0, OF_SEARCH)
         if self.generation == 0:
             slices = [generator.permutation(self.members) for _ in range(self._keys)]
             return (np.column_stack(slices) + generator.random((self.members, self._keys))) / self.members

@@ -55,32 +55,35 @@ STUDIED: tuple[tuple[str, Changed], ...] = (  # what is asked of a setting, and 
 
 
 def row_of(studied: tuple[str, Changed]) -> Document:
-    """Of a setting the number of every measured claim, in their order, the same without the mechanism, and
-    in how many flights adaptation changes no alarm and no name; or whether a healthy flight alarms. A number
-    that no verdict needs is not flown."""
+    """What is asked of a setting: the numbers of the claims, or whether a healthy flight alarms."""
     asked, setting = studied
-    if asked == FALSE_ALARM:
-        return {FALSE_ALARM: beside.false_alarm_of(setting)}
+    return claims_row(setting) if asked == NUMBERS else {FALSE_ALARM: beside.false_alarm_of(setting)}
+
+
+def claims_row(setting: Changed) -> Document:
+    """Of a setting the number of every measured claim, in their order, the same without the mechanism, and
+    in how many flights adaptation changes no alarm and no name. A number that no verdict needs is not flown:
+    it is nan, which keeps no limit."""
     flown: dict[str, Flown] = {}
-    flights, published = LazyFlights(setting.changes, flown), setting.name == AS_PUBLISHED.name
+    flights, is_published = LazyFlights(setting.changes, flown), setting.name == AS_PUBLISHED.name
 
     def without(claim: Claim) -> float:
         return claim.number(LazyFlights({**setting.changes, **WITHOUT[claim.ablation].changes}, flown))
 
     rigid = LazyFlights({**setting.changes, **NO_ADAPTATION}, flown)
     return {
-        NUMBERS: [claim.number(flights) if published or not claim.because else nan for claim in MEASURED],
+        NUMBERS: [claim.number(flights) if is_published or not claim.because else nan for claim in MEASURED],
         ABLATED: [
-            without(claim) if published or (claim.testable and not claim.because) else nan
+            without(claim) if is_published or (claim.testable and not claim.because) else nan
             for claim in MEASURED
         ],
-        SAME: sum(_found_in(flights[name]) == _found_in(rigid[name]) for name in FAULTY),
+        SAME: sum(_verdict_in(flights[name]) == _verdict_in(rigid[name]) for name in FAULTY),
     }
 
 
-def _found_in(flown: Flown) -> tuple[float | None, str | None, float | None]:
-    found = flown.metrics
-    return found.detection.time_s, found.isolation.fault, found.isolation.time_s
+def _verdict_in(flight: Flown) -> tuple[float | None, str | None, float | None]:
+    metrics = flight.metrics
+    return metrics.detection.time_s, metrics.isolation.fault, metrics.isolation.time_s
 
 
 def fly_published() -> dict[str, Flown]:
@@ -119,17 +122,7 @@ def document_of(published: Mapping[str, Flown], rows: Sequence[Document]) -> Doc
         "truth_and_design": truth_and_design.document_of(truth_and_design.fly_designs()),
         "choices": [asdict(choice) for choice in (*CHOICES, *OPTIONS)],
         "gains": _gains(ours, numbers),
-        "sensitivity": [
-            {
-                "variant": setting.name,
-                "changes": dict(setting.changes),
-                "missed": _missed(ours, numbers[setting.name]),
-                "also_without": _also_without(
-                    numbers[setting.name], ablated[setting.name], ablated[AS_PUBLISHED.name]
-                ),
-            }
-            for setting in ELSEWHERE
-        ],
+        "sensitivity": _sensitivity(numbers, ablated),
         "cases": [
             {
                 "case": case.name,
@@ -147,7 +140,7 @@ def _judged(claim: Claim, by_setting: Mapping[str, tuple[float, float]]) -> Docu
     number, without = by_setting[AS_PUBLISHED.name]
     elsewhere = [] if claim.because else [by_setting[setting.name] for setting in ELSEWHERE]
     measure, verdict = claim.measure, claim.verdict(number, without, elsewhere)
-    flown = [there for there, _ in elsewhere] or [number]
+    everywhere = [there for there, _ in elsewhere] or [number]
     return {
         "measure": measure.of.__name__,
         "quantity": measure.quantity,
@@ -163,8 +156,8 @@ def _judged(claim: Claim, by_setting: Mapping[str, tuple[float, float]]) -> Docu
         "number_without": finite(without),
         "fails_without": not claim.holds(without),
         "construction": claim.construction,
-        "lowest": finite(min(flown)),
-        "highest": finite(max(flown)),
+        "lowest": finite(min(everywhere)),
+        "highest": finite(max(everywhere)),
         "held_in": sum(claim.holds(there) for there, _ in elsewhere),
         "borne_out_in": sum(claim.is_borne_out(*both) for both in elsewhere),
         "elsewhere": len(elsewhere),
@@ -203,16 +196,16 @@ def _counted_apart(claims: Sequence[Document]) -> Document:
 
 def _ablations(claims: list[Document]) -> list[Document]:
     """A row an ablation: how it is made, and how many of the statements that speak of it fail without."""
-    made = {ablation.name: dict(ablation.changes) for ablation in ABLATIONS}
     return [
         {
-            "ablation": name,
-            "takes": TAKES[name],
-            "changes": changes,
-            "statements": sum(claim.get("ablation") == name for claim in claims),
-            "fail": sum(claim.get("ablation") == name and claim["fails_without"] for claim in claims),
+            "ablation": ablation.name,
+            "takes": TAKES[ablation.name],
+            "changes": dict(ablation.changes),
+            "statements": len(fails),
+            "fail": sum(fails),
         }
-        for name, changes in made.items()
+        for ablation in ABLATIONS
+        for fails in [[c["fails_without"] for c in claims if c.get("ablation") == ablation.name]]
     ]
 
 
@@ -226,18 +219,33 @@ def _gains(ours: list[float], numbers: dict[str, list[float]]) -> list[Document]
     return rows
 
 
-def _also_without(numbers: list[float], ablated: list[float], published: list[float]) -> list[Document]:
-    """The testable claims that hold in a setting without their mechanism as well; published: the numbers
-    without it in the published setting, in which they do not."""
+def _sensitivity(numbers: dict[str, list[float]], ablated: dict[str, list[float]]) -> list[Document]:
+    """A row a setting of ELSEWHERE: the claims that no longer hold, and those that hold without their
+    mechanism as well. numbers, ablated: by setting those of MEASURED with their mechanisms, and without."""
     return [
-        _found_of(c, ablated[i]) | {"without": TAKES[c.ablation]}
-        for i, c in enumerate(MEASURED)
-        if c.testable and not c.because
-        if c.holds(numbers[i]) and c.holds(ablated[i]) and not c.holds(published[i])
+        {
+            "variant": setting.name,
+            "changes": dict(setting.changes),
+            "missed": _missed(numbers[AS_PUBLISHED.name], numbers[setting.name]),
+            "also_without": _also_without(
+                numbers[setting.name], ablated[setting.name], ablated[AS_PUBLISHED.name]
+            ),
+        }
+        for setting in ELSEWHERE
     ]
 
 
-def _found_of(claim: Claim, number: float) -> Document:
+def _also_without(numbers: list[float], ablated: list[float], as_published: list[float]) -> list[Document]:
+    """The testable claims that hold in a setting without their mechanism as well. as_published: the numbers
+    without it in the published setting, in which the claims do not hold."""
+    return [
+        _claim_row(c, without) | {"without": TAKES[c.ablation]}
+        for c, number, without, published in zip(MEASURED, numbers, ablated, as_published, strict=True)
+        if c.holds(number) and c.holds(without) and not c.holds(published)
+    ]
+
+
+def _claim_row(claim: Claim, number: float) -> Document:
     return {
         "where": claim.where,
         "statement": claim.statement,
@@ -250,7 +258,7 @@ def _found_of(claim: Claim, number: float) -> Document:
 def _missed(ours: list[float], numbers: list[float]) -> list[Document]:
     """The claims that hold as flown and no longer in a setting, with the number there."""
     return [
-        _found_of(c, number)
+        _claim_row(c, number)
         for c, as_flown, number in zip(MEASURED, ours, numbers, strict=True)
         if c.holds(as_flown) and not c.holds(number)
     ]
@@ -267,10 +275,10 @@ FILES: Makers = {
 
 def reproduced(workers: int) -> Document:
     """The document, kept nowhere."""
-    return _found(fly_all(row_of, STUDIED, workers))[0]
+    return _document_and_cases(fly_all(row_of, STUDIED, workers))[0]
 
 
-def _found(rows: Sequence[Any]) -> tuple[Document, dict[str, Flown]]:
+def _document_and_cases(rows: Sequence[Any]) -> tuple[Document, dict[str, Flown]]:
     published = fly_published()
     return document_of(published, rows), published
 
@@ -307,7 +315,7 @@ class Reproduce(StudyCommand):
 
     def run(self, reporter: Reporter) -> Document:
         """Fly the published cases, and all settings with their ablations."""
-        study = Study(NAME, STUDIED, row_of, _found, FILES)
+        study = Study(NAME, STUDIED, row_of, _document_and_cases, FILES)
         document: Document = run_study(study, self.out, self.processes, reporter.progress)[0]
         return document | {"folder": str(self.out / NAME)}
 

@@ -49,7 +49,7 @@ STILL_AIR = [
 @pytest.mark.parametrize("name", STILL_AIR)
 def test_unexplained_is_at_most_one_percent_of_every_built_in_scenario(name):
     kept, _ = split_flight(load_scenario(name))
-    assert all(kept.figures(kept.named["unexplained"], axis)["share"] <= 0.01 for axis in range(3))
+    assert all(kept.magnitudes(kept.named["unexplained"], axis)["share"] <= 0.01 for axis in range(3))
     assert largest(kept.named["unexplained"]) <= 1e-6
 
 

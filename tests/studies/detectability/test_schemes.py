@@ -34,7 +34,7 @@ from beaver_ftc.studies.detectability.schemes import (
     scenario_of,
     strikes_at_s,
 )
-from beaver_ftc.studies.detectability.shown import comparison, page_of
+from beaver_ftc.studies.detectability.schemes_shown import comparison, page_of
 from beaver_ftc.studies.present.page import Table
 from samples import samples
 

@@ -4,8 +4,8 @@ import pytest
 
 from beaver_ftc.commands import Reporter
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.studies.detectability import places_shown, sizes_shown
 from beaver_ftc.studies.detectability.command import Detectability
-from beaver_ftc.studies.detectability.shown import page_of
 from beaver_ftc.studies.present.page import Table, as_text
 
 
@@ -32,7 +32,7 @@ WHOLE = {
 
 
 def said(found=(0.34, 0.28, 0.41), certain=0.52, **changes):
-    return as_text(page_of(row("as it is", *found, 83, certain) | WHOLE | changes)[1])
+    return as_text(sizes_shown.page_of(row("as it is", *found, 83, certain) | WHOLE | changes)[1])
 
 
 @pytest.mark.parametrize(
@@ -79,7 +79,7 @@ def test_a_line_spans_the_places_where_some_loss_is_certain():
         place("rudder", "aileron", 40.0, None, None, "it barely moves"),
     ]
     points, pairs = map(list, zip(*made, strict=True))
-    parts = page_of({"scenario": "brisk", "points": points, "pairs": pairs})[1]
+    parts = places_shown.page_of({"scenario": "brisk", "points": points, "pairs": pairs})[1]
     assert parts[:2] == [
         "aileron: at 0.5 times the scenario's references a loss of 31 % or more is certain to be detected "
         "and isolated at 1 of 2 places.",

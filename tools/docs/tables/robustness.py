@@ -15,7 +15,7 @@ from beaver_ftc.scenario.sweeps import load_sweep
 from beaver_ftc.studies.detectability.command import run_schemes
 from beaver_ftc.studies.detectability.probabilities import DUELS_S
 from beaver_ftc.studies.detectability.schemes import GRIDS, contenders
-from beaver_ftc.studies.detectability.shown import who_is_better
+from beaver_ftc.studies.detectability.schemes_shown import who_is_better
 from beaver_ftc.studies.engine.statistics import share_within, wilson
 from beaver_ftc.studies.engine.study import fly_all
 from beaver_ftc.studies.matrix.clairvoyant import columns_of, seen_when_told

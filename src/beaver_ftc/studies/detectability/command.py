@@ -23,9 +23,16 @@ from beaver_ftc.commands import (
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.results.model import Document
 from beaver_ftc.scenario.schema import Scenario, load_scenario
-from beaver_ftc.studies.detectability import certain, probabilities, schemes
+from beaver_ftc.studies.detectability import (
+    certain,
+    places_shown,
+    probabilities,
+    schemes,
+    schemes_shown,
+    sizes_shown,
+)
 from beaver_ftc.studies.detectability.schemes import GRIDS, Grid, Watched
-from beaver_ftc.studies.detectability.shown import FILES, NAME, OF_PLACES, OF_SCHEMES, page_of
+from beaver_ftc.studies.detectability.shown import NAME
 from beaver_ftc.studies.detectability.sizes import Asked, run_sizes
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.present.page import as_text
@@ -62,7 +69,7 @@ def run_places(
         altitudes_m = certain.ALTITUDES_M if start_m is None else (start_m,)
     study = Study(
         certain.survey_name(scenario), list(product(speeds_mps, altitudes_m, excitations)),
-        partial(certain.look_at, scenario), partial(certain.document_of, scenario.name), OF_PLACES,
+        partial(certain.look_at, scenario), partial(certain.document_of, scenario.name), places_shown.FILES,
         row=dict[str, list[Document]], follows_from=scenario,
     )  # fmt: skip
     return run_study(study, out, workers, progress)
@@ -76,8 +83,8 @@ def run_schemes(
     cases = [*((block, False) for block in healthy), *((block, True) for block in grid.faulted())]
     study = Study(
         NAME, cases, partial(schemes.fly_block, grid=grid, schemes=names),
-        lambda seen: probabilities.document_of(grid, seen[: len(healthy)], seen[len(healthy) :]), OF_SCHEMES,
-        row=Watched, follows_from=(grid, names), lost=schemes.lost,
+        lambda seen: probabilities.document_of(grid, seen[: len(healthy)], seen[len(healthy) :]),
+        schemes_shown.FILES, row=Watched, follows_from=(grid, names), lost=schemes.lost,
     )  # fmt: skip
     return run_study(study, out, workers, progress)[0]
 
@@ -140,7 +147,7 @@ class Detectability(StudyCommand):
     workers: WorkersOption = None
     out: Path = Path("runs")
 
-    FILES = FILES
+    FILES = tuple(places_shown.FILES)
 
     def run(self, reporter: Reporter) -> Document:
         """By the method that was asked for."""
@@ -203,8 +210,9 @@ class Detectability(StudyCommand):
 
     def as_text(self, document: Document, colour: bool) -> str:
         """The answers in words, else sentences and table; and where the files are."""
+        shown = schemes_shown if self.grid else places_shown if self.within is None else sizes_shown
         lines = document.get("answers") or [
-            as_text(page_of(document)[1]), *certain.geometry(document.get("alike", ())),
+            as_text(shown.page_of(document)[1]), *certain.geometry(document.get("alike", ())),
             *certain.of_engines(document.get("engines", ())),
         ]  # fmt: skip
         return "\n".join([*lines, "", f"results: {document['folder']}"])

@@ -24,8 +24,9 @@ from beaver_ftc.results.model import Document
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.signals import TIME_TOLERANCE_S
+from beaver_ftc.studies.detectability import sizes_shown
 from beaver_ftc.studies.detectability.certain import AMPLITUDES, SETTLED_S, axis_of, scaled
-from beaver_ftc.studies.detectability.shown import NAME, OF_SIZES
+from beaver_ftc.studies.detectability.shown import NAME
 from beaver_ftc.studies.detectability.thresholds import LARGEST, STAGES, of_all, threshold
 from beaver_ftc.studies.engine.draws import loss
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, counted, or_never
@@ -87,7 +88,7 @@ def run_sizes(
     variants = dict(variants_of(scenario, asked.surface))
     study = Study(
         f"{scenario.name[:70]}-{NAME}-{asked.surface}", (), partial(fly_one, variants, asked),
-        dict, OF_SIZES, follows_from=[scenario, asked], lost=lambda flight, why: _row(failed=True),
+        dict, sizes_shown.FILES, follows_from=[scenario, asked], lost=lambda flight, why: _row(failed=True),
         rounds=lambda fly: _document(scenario, asked, variants, _Flown(fly, tell)),
     )  # fmt: skip
     document: Document = run_study(study, out, workers)

@@ -1,0 +1,188 @@
+"""The share found in a grid of flights, by schemes: as sentences, a table, a figure and files."""
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from itertools import product
+from operator import itemgetter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from beaver_ftc.results.metrics import as_json
+from beaver_ftc.results.model import Document
+from beaver_ftc.results.style import SERIES
+from beaver_ftc.studies.compare.scores import leader
+from beaver_ftc.studies.detectability.probabilities import (
+    JUDGED_S,
+    SIGNIFICANT,
+    Row,
+    limit,
+    summary,
+    title_of,
+)
+from beaver_ftc.studies.detectability.schemes import BOTH, BUILT_IN, WATCHED_S, WITHIN_S
+from beaver_ftc.studies.detectability.shown import NAME, SOON, Line, table
+from beaver_ftc.studies.present.figures import GRID, draw_estimates, label_edges, marker, panels
+from beaver_ftc.studies.present.page import Makers, Part, Pictures, study_files
+from beaver_ftc.studies.present.tables import grouped, percent, seconds
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+OWN = ", default level"
+INFORMED = "informed test"
+
+
+def page_of(document: Document) -> tuple[str, Sequence[Part]]:
+    """The title, and the parts of the page: sentences, picture, table and notes."""
+    conditions = document["grid"]["conditions"]
+    said = [f"{title_of(*where)}, {one}" for where in conditions for one in who_is_better(document, *where)]
+    said += comparison(document)
+    said += [f"could not be judged: {failure}" for failure in document["failures"]]
+    lines = [line for condition in conditions for line in _scheme_lines(document, *condition)]
+    drawn = Pictures([("share of the losses that each scheme detects", NAME)])
+    return "Detectability: schemes on the same flights", [*said, drawn, table(lines), *_legend(document)]
+
+
+def _scheme_lines(document: Document, sensors: str, turbulence: str) -> Iterator[Line]:
+    """A line a surface and scheme; ours of both detectors also at its default level."""
+    here = {"sensors": sensors, "turbulence": turbulence}
+    for surface in document["grid"]["surfaces"]:
+        place = {"loss of": surface, "flown": title_of(sensors, turbulence)}
+        for level in _those(document["levels"], **here):
+            found = next(_those(document["totals"], **here, scheme=level["scheme"], surface=surface), None)
+            row = place | {"scheme": level["scheme"], "false alarms/h": _rate(level["calibration"])}
+            yield row | {"before faults/h": _rate(level["before_faults"])} | _soon(found)
+            if level["scheme"] in BUILT_IN:
+                row |= {"scheme": f"{level['scheme']}{OWN}", "false alarms/h": _rate(level["own_level"])}
+                yield row | _soon(found and found["own_level"])
+        for known in _those(document["limits"], **here, surface=surface):
+            shares = "/".join(percent(share, "") for share in known["within"].values())
+            yield place | {"scheme": INFORMED, SOON: shares}
+
+
+def _soon(found: Document | None) -> Line:
+    """Per cent found within each delay, and the median delay."""
+    if not found or not found["flights"]:
+        return {SOON: "-"}
+    shares = "/".join(percent(found["within"][f"{within_s:g}"]["value"], "") for within_s in WITHIN_S)
+    return {SOON: shares, "median delay": seconds(found["median_delay_s"]), "flights": str(found["flights"])}
+
+
+def who_is_better(
+    document: Document, sensors: str, turbulence: str, within_s: float = WATCHED_S
+) -> Iterator[str]:
+    """Of a condition, a sentence a surface: who finds most faults so soon."""
+    here, soon = {"sensors": sensors, "turbulence": turbulence}, f"{within_s:g}"
+    for surface in document["grid"]["surfaces"]:
+        place, rows = here | {"surface": surface}, dict[str, Document]()
+        for total in _those(document["totals"], **place):
+            if total["flights"] and (total["scheme"] == BOTH or total["scheme"] not in BUILT_IN):
+                found, duel = total["within"][soon], {"better": 0, "worse": 0, "p": 1.0}
+                against = {"against": total["scheme"], "ours": BOTH, "within_s": within_s}
+                for one in _those(document["comparison"], **place, **against):
+                    duel = {"better": one["seeds_theirs"], "worse": one["seeds_ours"], "p": one["p"]}
+                rates = {"rate": found["value"], "rate_low": found["low"], "rate_high": found["high"]}
+                rows[total["scheme"]] = rates | {"against_ours": duel}
+        if BOTH in rows:
+            yield leader(rows, BOTH, "rate", f"{surface}, found within {soon} s", percent, more=True)
+
+
+def comparison(document: Document) -> list[str]:
+    """How often each of our schemes finds more or fewer faults than others, and is unlikely to by chance."""
+    return [
+        f"{ours}, faults found within {within_s:g} s, {len(duels)} comparisons: better in "
+        f"{ends['better']}, worse in {ends['worse']}, no difference at p < {SIGNIFICANT:g} in the rest"
+        for (ours, within_s), duels in grouped(document["comparison"], "ours", "within_s").items()
+        for ends in [Counter(duel["verdict"] for duel in duels)]
+    ]
+
+
+def _those(lines: Sequence[Document], **where: Any) -> Iterator[Document]:
+    return (line for line in lines if where.items() <= line.items())
+
+
+def _rate(alarms: Document | None) -> str:
+    if alarms is None or alarms["per_h"] is None:
+        return "-"
+    high = "" if alarms["per_h_high"] is None else f" to {alarms['per_h_high']:.0f}"
+    return f"{alarms['per_h']:.0f} ({alarms['per_h_low']:.0f}{high})"
+
+
+def _legend(document: Document) -> list[str]:
+    grid, per_h = document["grid"], document["false_alarms_per_h"]
+    hours = min((level["calibration"]["hours"] for level in document["levels"]), default=0.0)
+    losses = ", ".join(f"{100 * magnitude:g}" for magnitude in grid["magnitudes"])
+    references = ", ".join(f"{excitation:g}" for excitation in grid["excitations_deg_s"])
+    return [
+        f"Losses of {losses} % under references of {references} deg/s. False alarms/h: every scheme at the "
+        f"level of its statistic with at most {per_h:g} per hour, on the same {hours:.2f} h of healthy "
+        "flight (95 % limits); before faults/h: the same on other flights.",
+        f"By chance alone {per_h * WITHIN_S[-1] / 36.0:.1f} % are detected within {WITHIN_S[-1]:g} s. "
+        "Default level: the one that follows from what the scheme declares.",
+        f"{INFORMED}: knows surface, magnitude and instant, and the gusts that the vanes show; made once in "
+        "that time at the same rate. Plug-ins are given every reading that the statistical scheme uses.",
+    ]
+
+
+def draw_schemes(document: Document, rows: Sequence[Row]) -> "Figure":
+    """Rows air, columns surfaces; in each, a line of dots a scheme: the share detected, a dot a magnitude."""
+    surfaces, conditions = document["grid"]["surfaces"], document["grid"]["conditions"]
+    names = [*dict.fromkeys(row["scheme"] for row in rows), INFORMED]
+    most = f"at most {document['false_alarms_per_h']:g} false alarms per hour"
+    figure, axes = panels(
+        len(conditions), len(surfaces), 2.3 * len(surfaces) + 1.7,
+        (0.3 * len(names) + 0.6) * len(conditions) + 1.2, f"Loss of effectiveness, {most}, all references",
+        dpi=120, sharex=True, sharey=True,
+    )  # fmt: skip
+    here = grouped(rows, "sensors", "turbulence", "surface")
+    for panel, (condition, surface) in zip(axes.flat, product(conditions, surfaces), strict=True):
+        _draw(panel, here.get((*condition, surface), []), names, document)
+    label_edges(
+        axes, f"detected within {JUDGED_S:g} s, %",
+        [title_of(*condition).replace(", ", ",\n") for condition in conditions], surfaces,
+    )  # fmt: skip
+    each = len(document["grid"]["excitations_deg_s"])
+    flights = [each * cell["flights"] for cell in document["cells"]]
+    figure.legend(
+        *axes[0][0].get_legend_handles_labels(), loc="outside lower center",
+        ncols=len(document["grid"]["magnitudes"]), fontsize=8, frameon=False, title_fontsize=8,
+        title=f"of {min(flights, default=0)} to {max(flights, default=0)} flights, exact 95 % interval",
+    )  # fmt: skip
+    return figure
+
+
+def _draw(panel: "Axes", rows: Sequence[Row], names: Sequence[str], document: Document) -> None:
+    """Of each scheme the share detected with its exact 95 % interval, magnitudes below one another."""
+    magnitudes, within = document["grid"]["magnitudes"], f"{JUDGED_S:g}"
+    apart = 0.6 / len(magnitudes)
+    for place, magnitude in enumerate(magnitudes):
+        here = [row for row in rows if row["magnitude"] == magnitude]
+        found = {scheme: summary(of) for (scheme,), of in grouped(here, "scheme").items()}
+        shares = {scheme: cell["within"][within] for scheme, cell in found.items() if cell["flights"]}
+        if here:
+            found_by_it = limit(here, document["false_alarms_per_h"])[within]
+            shares[INFORMED] = {"value": found_by_it, "low": found_by_it, "high": found_by_it}
+        lines = [names.index(of) + apart * (place - 0.5 * (len(magnitudes) - 1)) for of in shares]
+        draw_estimates(
+            panel, lines, [*shares.values()], 100.0, across=True, linestyle="none", marker=marker(place),
+            markersize=4.5, color=SERIES[place], elinewidth=1.0, clip_on=False,
+            label=f"{100 * magnitude:g} % lost",
+        )  # fmt: skip
+    panel.set_yticks(range(len(names)), names)
+    panel.set_ylim(len(names) - 0.5, -0.5)
+    panel.set_xlim(-2, 102)
+    panel.grid(axis="x", alpha=0.3)
+    panel.hlines(np.arange(len(names) - 1) + 0.5, -2, 102, color=GRID, linewidth=0.6)
+    panel.tick_params(labelsize=8)
+
+
+# Of the document and of one row a flight and scheme.
+FILES: Makers = {
+    **study_files(
+        NAME, lambda survey: page_of(survey[0]), {NAME: itemgetter(1)},
+        {NAME: lambda survey: draw_schemes(*survey)},
+    ),
+    f"{NAME}.json": lambda survey: as_json(survey[0]),
+}  # fmt: skip

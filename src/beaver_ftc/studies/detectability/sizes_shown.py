@@ -1,0 +1,122 @@
+"""The size found in a share of flights, by variants of a scenario: as sentences, a table and files."""
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+from beaver_ftc.results.metrics import NEAR_THRESHOLD_SHARE
+from beaver_ftc.results.model import Document
+from beaver_ftc.studies.detectability.shown import NAME, table
+from beaver_ftc.studies.present.page import Makers, Part, study_files
+from beaver_ftc.studies.present.tables import percent
+
+if TYPE_CHECKING:
+    pass
+
+
+def page_of(document: Document) -> tuple[str, Sequence[Part]]:
+    """The title, and the parts of the page: sentences and table."""
+    lines = [
+        {
+            "loss of": document["surface"], "flown": row["variant"],
+            "certain from": percent(row["certain"]["size"]),
+            "found in 90 % from": percent(row["found"]["size"]), "95 % interval": _interval(row["found"]),
+            "flights": str(row["found"]["flights"]),
+        }
+        for row in _variants(document)
+    ]  # fmt: skip
+    title = f"Detectability: {document['surface']} of {document['scenario']}"
+    return title, [*_size_sentences(document), table(lines)]
+
+
+def _variants(document: Document) -> list[Document]:
+    return [document, *document["compared"]]
+
+
+def _size_sentences(document: Document) -> Iterator[str]:
+    """What is certain, what is found, what limits it, and what would help."""
+    certain, found, total = (document[key] for key in ("certain", "found", "total_loss"))
+    surface, within = document["surface"], f"within {document['within_s']:g} s"
+    nothing = f"not even a total loss of {surface}"
+    loss = "a loss of {} of the effectiveness of " + surface
+    size = nothing if certain["size"] is None else f"{loss.format(percent(certain['size']))} and more"
+    yield (
+        f"Certain to be detected {within}, whatever the declared uncertainty does: {size} (a total loss: in "
+        f"{certain['at_total_loss']} of {certain['flights']} flights)."
+    )
+    size = nothing if found["size"] is None else loss.format(f"{percent(found['size'])} ({_interval(found)})")
+    yield (
+        f"Found {within} in {percent(document['share'])} of flights: {size} (a total loss: in "
+        f"{percent(total['value'])}, {percent(total['low'], '')} to {percent(total['high'])}; "
+        f"{total['count']} of {total['of']} flights). Intervals: 95 %."
+    )
+    yield from (
+        f"Nothing can be concluded in part of these flights: {why}." for why in document["inconclusive"]
+    )
+    if document["bound_used"] >= NEAR_THRESHOLD_SHARE:
+        yield (
+            f"Half of these flights use {percent(document['bound_used'])} of the bound or more before the "
+            "loss: the size found then measures the uncertainty that the scenario flies with, not the "
+            "diagnosis."
+        )
+    for count, what in (
+        (document["false_alarms"], "have an alarm before the loss"),
+        (document["failed"], "cannot be flown to the end"),
+    ):
+        if count:
+            yield f"{count} flights with a total loss {what}: these count as not found."
+    for lead, tried, references in (
+        ("What limits it most", "nothing that was left out alone", False),
+        ("Which reference would help", "none of those that were tried", True),
+    ):
+        best = _best(document, references)
+        none = f"{tried} makes a difference outside of the intervals"
+        yield f"{lead}: {none if best is None else _effect(best)}."
+
+
+def _is_better(other: Document, document: Document) -> bool:
+    """Whether a variant finds smaller losses, by intervals that do not overlap; where no loss is found often
+    enough, whether a total one is found more often."""
+    found, base = other["found"], document["found"]
+    if base["size"] is None:
+        return bool(other["total_loss"]["low"] > document["total_loss"]["high"])
+    return found["high"] is not None and base["low"] is not None and bool(found["high"] < base["low"])
+
+
+def _best(document: Document, references: bool) -> Document | None:
+    """The variant that helps most, of those that change a reference, or of the others."""
+    some = [
+        row
+        for row in document["compared"]
+        if ("reference" in row["variant"]) is references and _is_better(row, document)
+    ]
+    return min(some, key=lambda row: (row["found"]["size"] or 2.0, -row["total_loss"]["value"]), default=None)
+
+
+def _effect(row: Document) -> str:
+    found, total = row["found"], row["total_loss"]
+    if found["size"] is None:
+        return f"{row['variant']}, a total loss is found in {percent(total['value'])} of flights"
+    return f"{row['variant']}, it would be {percent(found['size'])} ({_interval(found)})"
+
+
+def _interval(found: Document) -> str:
+    if found["low"] is None:
+        return "more than a total loss"
+    if found["low"] == found["high"]:
+        return percent(found["low"])
+    low = percent(found["low"], "")
+    return f"{low} % or more" if found["high"] is None else f"{low} to {percent(found['high'])}"
+
+
+def rows_of_sizes(document: Document) -> list[Document]:
+    """The rows of the CSV file."""
+    return [
+        {
+            "variant": row["variant"], "found": row["found"], "certain": row["certain"],
+            "total_loss_found": row["total_loss"]["value"],
+        }
+        for row in _variants(document)
+    ]  # fmt: skip
+
+
+FILES: Makers = study_files(NAME, page_of, {NAME: rows_of_sizes}, {})

@@ -41,8 +41,9 @@ from beaver_ftc.studies.present.tables import grouped, markdown_table
 from beaver_ftc_logs.by_aircraft import diagnose_aircraft, load_diagnosed
 from beaver_ftc_logs.diagnose import LogRows, diagnose
 from beaver_ftc_logs.identification import identify, scale_if_better
+from beaver_ftc_logs.loading import load_flights_for_fit, read_vehicle_columns
 from beaver_ftc_logs.model import Model, model_file_text
-from beaver_ftc_logs.samples import load_flights_for_fit, read_vehicle_columns, resample
+from beaver_ftc_logs.samples import resample
 from beaver_ftc_logs.vehicle import Vehicle, load_vehicle
 
 Document = dict[str, Any]

@@ -22,17 +22,11 @@ from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import findings, trust
 from beaver_ftc_logs.diagnose import LogRows, reversed_command_error
-from beaver_ftc_logs.recording import (
-    Floats,
-    Mask,
-    Reasons,
-    RecordedFlight,
-    Runs,
-    largest_magnitude,
-    true_runs,
-)
-from beaver_ftc_logs.samples import Samples, convert_to_si, named_angles, resample, sample_column
+from beaver_ftc_logs.recording import Floats, Mask, Reasons, RecordedFlight, largest_magnitude
+from beaver_ftc_logs.runs import Runs, true_runs
+from beaver_ftc_logs.samples import Samples, convert_to_si, named_angles, resample
 from beaver_ftc_logs.stepped import Replayed, error_sections, replay_samples, rows_of_replay
+from beaver_ftc_logs.time_base import sample_column
 from beaver_ftc_logs.vehicle import Vehicle
 
 if TYPE_CHECKING:

@@ -23,6 +23,7 @@ from beaver_ftc_logs.known_commands import (
     missing_commands_text,
     multicopter_reason,
 )
+from beaver_ftc_logs.loading import read_vehicle_parts
 from beaver_ftc_logs.mixing import Mixing, mixing_of_log
 from beaver_ftc_logs.readers import (
     SELECTIVE_READERS,
@@ -45,13 +46,8 @@ from beaver_ftc_logs.recording import (
     largest_magnitude,
     nearest_names_text,
 )
-from beaver_ftc_logs.samples import (
-    convert_to_si,
-    median_step_s,
-    named_angles,
-    read_vehicle_parts,
-    resample,
-)
+from beaver_ftc_logs.samples import convert_to_si, named_angles, resample
+from beaver_ftc_logs.time_base import median_step_s
 from beaver_ftc_logs.units import ACCELERATION, RATE, SI_UNITS, TIME_UNITS, nearest_unit
 from beaver_ftc_logs.vehicle import Vehicle, unused_keys_as_comments
 

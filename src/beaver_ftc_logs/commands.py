@@ -58,10 +58,10 @@ def identify(
         option = "--vehicle" if vehicle is None else "--out"
         raise BadInput(f"identify: {option} is missing, allowed: --vehicle FILE --out MODEL, or --check")
     from beaver_ftc_logs.identification import identification_text, identify, scale_if_better
+    from beaver_ftc_logs.loading import load_flights_for_fit
     from beaver_ftc_logs.mixing import load_vehicle_for_logs
     from beaver_ftc_logs.model import model_file_text
     from beaver_ftc_logs.pages import refuse_foreign_file, render_identification
-    from beaver_ftc_logs.samples import load_flights_for_fit
     from beaver_ftc_logs.vehicle import with_alarm_rate
 
     page = out.with_suffix(".html")
@@ -168,9 +168,9 @@ def diagnose(options: DiagnoseOptions) -> None:
         return
     from beaver_ftc_logs.detectors import check_detector_name, diagnose_with_detector
     from beaver_ftc_logs.findings import as_text, verdict_document
+    from beaver_ftc_logs.loading import stream_flights
     from beaver_ftc_logs.model import load_model
     from beaver_ftc_logs.pages import words_of_model
-    from beaver_ftc_logs.samples import stream_flights
 
     check_detector_name(options.detector)
     model = load_model(options.model)
@@ -236,10 +236,10 @@ def _check_options_agree(options: DiagnoseOptions) -> None:
 def _diagnose_with_aircraft(options: DiagnoseOptions) -> None:
     from beaver_ftc_logs.by_aircraft import diagnose_aircraft, load_diagnosed
     from beaver_ftc_logs.findings import as_text
+    from beaver_ftc_logs.loading import read_vehicle_parts
     from beaver_ftc_logs.mixing import load_vehicle_for_logs
     from beaver_ftc_logs.pages import words_of_aircraft
     from beaver_ftc_logs.readers import check_exists
-    from beaver_ftc_logs.samples import read_vehicle_parts
     from beaver_ftc_logs.stepped import BOUND_WINDOW_S
 
     if options.certificate:

@@ -38,14 +38,10 @@ from beaver_ftc_logs.diagnose import (
 )
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import Floats, RecordedFlight
-from beaver_ftc_logs.regression import (
-    expand_groups,
-    group_commands,
-    group_indices,
-    innovations,
-    trailing_sums,
-)
-from beaver_ftc_logs.samples import Samples, unchanged_s
+from beaver_ftc_logs.regression import expand_groups, group_commands, group_indices, innovations
+from beaver_ftc_logs.runs import trailing_sums
+from beaver_ftc_logs.samples import Samples
+from beaver_ftc_logs.time_base import unchanged_s
 from beaver_ftc_logs.trust import without_dead_rows
 
 LEAST_SQUARES_MEMORY_S = 20.0
@@ -59,11 +55,11 @@ OUR_DETECTOR = "bank-of-filters"
 
 
 def _least_squares(samples: Samples, model: Model, fades: bool) -> LogRows:
-    """Effectiveness of the groups and the trim, from y = c + sum e_g F_g, whitened, by the last samples k:
+    """Effectiveness a of the groups and trim b, from r = b + sum (a_g - 1) F_g, whitened, of the last rows:
 
-        theta = (M0 + sum X' X)^-1 sum X' y,   e_g - 1 = theta[3 + g]
+        theta = (M0 + sum X' X)^-1 sum X' r,   a_g - 1 = theta[3 + g]
 
-    X (n, 3, 3 + G): regressors of trim, in standard deviations, and of lost effectiveness, whitened; y (n,
+    X (n, 3, 3 + G): regressors of trim, in standard deviations, and of lost effectiveness, whitened; r (n,
     3): the whitened residual of a healthy vehicle. M0: information before. P: covariance of theta.
     """
     flight = innovations(samples, model)
@@ -87,14 +83,14 @@ def _memory_sums(x: Floats, dt_s: float, fades: bool) -> Floats:
     return trailing_sums(x, LEAST_SQUARES_MEMORY_S / dt_s)[0]
 
 
-def _rows_of_estimate(samples: Samples, model: Model, e: Floats, sd: Floats) -> LogRows:
-    """Rows of an estimate e of the effectiveness with standard deviation sd, (n, G) each. With labelled
+def _rows_of_estimate(samples: Samples, model: Model, a: Floats, sd: Floats) -> LogRows:
+    """Rows of an estimate a of the effectiveness with standard deviation sd, (n, G) each. With labelled
     levels, the nearest of them is taken, and below 1 it is a fault; without, it is a fault where it is below
     1 by more than _MIN_LOSS_SD standard deviations."""
     bank = build_bank(model)
-    low, high = (np.clip(e + sign * _SD_OF_90_PERCENT * sd, 0.0, 1.0) for sign in (-1.0, 1.0))
-    nearest = np.clip(e, 0.0, 1.0)
-    lost = e + _MIN_LOSS_SD * sd < 1.0
+    low, high = (np.clip(a + sign * _SD_OF_90_PERCENT * sd, 0.0, 1.0) for sign in (-1.0, 1.0))
+    nearest = np.clip(a, 0.0, 1.0)
+    lost = a + _MIN_LOSS_SD * sd < 1.0
     if model.settings.levels:
         for g, name in enumerate(model.group_names):
             labelled = model.settings.levels.get(name)
@@ -107,10 +103,10 @@ def _rows_of_estimate(samples: Samples, model: Model, e: Floats, sd: Floats) -> 
     return _plain_rows(samples, names, expand_groups(nearest, model), low, high)
 
 
-def _plain_rows(samples: Samples, names: np.ndarray, e: Floats, low: Floats, high: Floats) -> LogRows:
-    """Rows of a detector with estimate e and bounds, (n, S) each: faulty where a surface is named."""
+def _plain_rows(samples: Samples, names: np.ndarray, a: Floats, low: Floats, high: Floats) -> LogRows:
+    """Rows of a detector with estimate a and bounds, (n, S) each: faulty where a surface is named."""
     faulty = np.array([bool(name) for name in names], dtype=np.int64)
-    return LogRows(samples.t_s, faulty, names, e, low, high, faulty.astype(float), samples.t_s)
+    return LogRows(samples.t_s, faulty, names, a, low, high, faulty.astype(float), samples.t_s)
 
 
 def diagnose_by_freeze_rule(log: RecordedFlight, samples: Samples, model: Model) -> LogRows | None:
@@ -123,8 +119,8 @@ def diagnose_by_freeze_rule(log: RecordedFlight, samples: Samples, model: Model)
     frozen = np.zeros((len(samples.t_s), len(surfaces)), dtype=bool)
     for name, column in outputs.items():
         frozen[:, surfaces.index(name)] = unchanged_s(column, samples.t_s) > MIN_FROZEN_OUTPUT_S
-    e = 1.0 - frozen
-    return _plain_rows(samples, join_names(frozen, surfaces), e, e, e)
+    a = 1.0 - frozen
+    return _plain_rows(samples, join_names(frozen, surfaces), a, a, a)
 
 
 class LinearRateModel:
@@ -204,7 +200,7 @@ def rows_of_verdicts(verdicts: list[Verdict], samples: Samples, model: Model) ->
     statistic, detected = np.array([(one.statistic, one.detected) for one in verdicts], dtype=float).T
     # by the statistic of a sample where there is one: the loop's own latch serves one fault a flight
     faulty = np.where(np.isfinite(statistic), statistic > 1.0, detected).astype(np.int64)
-    e, low = np.ones((2, n, len(model.vehicle.surfaces)))
+    a, low = np.ones((2, n, len(model.vehicle.surfaces)))
     names = np.full(n, "", dtype=object)
     for k in np.flatnonzero(faulty):
         if verdicts[k].isolated not in LOOP_SURFACES[: len(members)]:
@@ -212,9 +208,9 @@ def rows_of_verdicts(verdicts: list[Verdict], samples: Samples, model: Model) ->
             continue
         g = LOOP_SURFACES.index(str(verdicts[k].isolated))
         names[k], low[k, members[g]] = model.group_names[g], 0.0
-        e[k, members[g]] = _remaining_effectiveness(verdicts[k], g)
+        a[k, members[g]] = _remaining_effectiveness(verdicts[k], g)
     p = np.where(np.isnan(statistic), faulty, np.clip(statistic, 0.0, 1.0))
-    return replace(_plain_rows(samples, names, e, low, np.ones_like(low)), fault_probability=p)
+    return replace(_plain_rows(samples, names, a, low, np.ones_like(low)), fault_probability=p)
 
 
 def _remaining_effectiveness(verdict: Verdict, g: int) -> float:

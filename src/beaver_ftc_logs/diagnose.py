@@ -2,7 +2,7 @@
 
 Everything a row says comes from samples up to its own time.
 
-P (n, H) is the probability of each hypothesis of the bank, p (n, L) that of each level of one group, e (n, G)
+P (n, H) is the probability of each hypothesis of the bank, p (n, L) that of each level of one group, a (n, G)
 the effectiveness of each group with bounds low and high. alarmed (n,): whether the evidence raises an alarm;
 nameable (n,): whether it is enough for a name; calm (n,): whether health, or no response at all, is the
 likelier.
@@ -23,8 +23,9 @@ from beaver_ftc_logs import energy, trust
 from beaver_ftc_logs.bank import GROUP_LOSS, UNKNOWN_OFFSET, HypothesisBank, build_bank
 from beaver_ftc_logs.filtering import bank_posterior, fault_evidence, page_cusum
 from beaver_ftc_logs.model import Model
-from beaver_ftc_logs.recording import MIN_DIVISOR, Floats, Ints, Mask, Reasons, last_row_at, last_true_row
-from beaver_ftc_logs.regression import expand_groups, innovations, trailing_sums
+from beaver_ftc_logs.recording import MIN_DIVISOR, Floats, Ints, Mask, Reasons
+from beaver_ftc_logs.regression import expand_groups, innovations
+from beaver_ftc_logs.runs import last_row_at, last_true_row, trailing_sums
 from beaver_ftc_logs.samples import Samples
 
 _LOG_RATE_TOLERANCE = 0.25
@@ -264,16 +265,16 @@ def rows_of_posterior(
     per_group = [
         _group_bounds(bank, P_live, g, model, mass or model.settings.bounds) for g in range(len(model.groups))
     ]
-    e, low, high = (np.column_stack(column) for column in zip(*per_group, strict=True))
+    a, low, high = (np.column_stack(column) for column in zip(*per_group, strict=True))
     silent = p_silent > _NO_RESPONSE_LIMIT
-    e[silent], low[silent], high[silent] = 1.0, 0.0, 1.0
+    a[silent], low[silent], high[silent] = 1.0, 0.0, 1.0
     if model.vehicle.other_laws:  # health is not excluded before an alarm excludes it
         high[faulty == 0] = 1.0
     return LogRows(
         t_s=samples.t_s,
         faulty=faulty,
         isolated_surfaces=_surfaces_at_fault(model, bank, P, faulty, _latched(nameable, calm)),
-        effectiveness=expand_groups(e, model),
+        effectiveness=expand_groups(a, model),
         effectiveness_low=expand_groups(low, model),
         effectiveness_high=expand_groups(high, model),
         fault_probability=p_fault,

@@ -9,7 +9,8 @@ fast as in the parts of healthy flight with the engine idling, no surface is nam
 import numpy as np
 
 from beaver_ftc.aircraft import GRAVITY_MPS2
-from beaver_ftc_logs.recording import Floats, last_true_row, true_runs
+from beaver_ftc_logs.recording import Floats
+from beaver_ftc_logs.runs import last_true_row, true_runs
 
 ENGINE, UNKNOWN_SURFACE = "engine", "unknown"
 UNPOWERED_SHARE = 0.15

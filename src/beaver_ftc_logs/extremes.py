@@ -24,7 +24,8 @@ import numpy as np
 from pydantic import Field
 
 from beaver_ftc.documents import Number, Section
-from beaver_ftc_logs.recording import MIN_DIVISOR, Floats, true_runs
+from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
+from beaver_ftc_logs.runs import true_runs
 
 _SHAPE_SD, _SHAPE_GRID = 0.2, np.linspace(-0.5, 0.5, 41)
 _SCALE_RATIOS = np.geomspace(0.2, 5.0, 61)

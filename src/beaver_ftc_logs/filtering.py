@@ -2,13 +2,13 @@
 
 Under hypothesis h, with effectiveness a_h of the groups, the part of the rates unexplained by the past is
 
-    y = c + s (b + sum_g a_hg F_g) + sum_g d_g k_hg F_g + noise = C_h' x + noise,      noise ~ t(0, q r R)
+    y = b + s (c + sum_g a_hg F_g) + sum_g d_g k_hg F_g + noise = C_h' x + noise,      noise ~ t(0, q r R)
 
     n, H, G         samples, hypotheses, groups; N = 4 + G states
-    y, F, b         unexplained rates (n, 3), healthy responses (n, G, 3), intercept (3,), rad/s, as in
+    y, F, c         unexplained rates (n, 3), healthy responses (n, G, 3), intercept (3,), rad/s, as in
                     `regression`
     a, k            effectiveness (H, G), and share of a response that the group's own gain multiplies (H, G)
-    x, P            state: trim c (3,) rad/s, common gain s, gain d (G,) of each group; its covariance
+    x, P            state: trim b (3,) rad/s, common gain s, gain d (G,) of each group; its covariance
     C               what the states do to y, (N, 3)
     p               probability of each hypothesis (H,)
     R               covariance of the noise (3, 3), (rad/s)2; W whitens it
@@ -39,7 +39,8 @@ from beaver_ftc.compiled import kernel
 from beaver_ftc_logs.bank import HypothesisBank, build_noise, build_states
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import Floats
-from beaver_ftc_logs.regression import Innovations, by_noise, innovations, trailing_sums
+from beaver_ftc_logs.regression import Innovations, by_noise, innovations
+from beaver_ftc_logs.runs import trailing_sums
 from beaver_ftc_logs.samples import Samples
 
 _EVIDENCE_MEMORY_S = 600.0
@@ -290,12 +291,12 @@ def _correct(prior, x, P, y, F, bank, noise, r):
 
 
 @kernel
-def _sensitivities(a, k, F, b, N):
+def _sensitivities(a, k, F, c, N):
     """What the states do to the unexplained rates, C (N, 3): the trim; the common gain, which multiplies
-    b + sum_g a_g F_g; each group's own gain, which multiplies k_g F_g. a, k (G,); F (G, 3); b (3,)."""
+    c + sum_g a_g F_g; each group's own gain, which multiplies k_g F_g. a, k (G,); F (G, 3); c (3,)."""
     C = np.zeros((N, 3))
     C[:3] = np.eye(3)
-    C[3] = b
+    C[3] = c
     for g in range(len(a)):
         C[4 + g] = k[g] * F[g]
         C[3] += a[g] * F[g]

@@ -18,10 +18,12 @@ from beaver_ftc_logs import trust
 from beaver_ftc_logs.bank import HypothesisBank, build_bank
 from beaver_ftc_logs.diagnose import UNKNOWN_SURFACE, LogRows
 from beaver_ftc_logs.energy import ENGINE
+from beaver_ftc_logs.least_squares import left_by
 from beaver_ftc_logs.model import Model
-from beaver_ftc_logs.recording import MIN_DIVISOR, Floats, Runs
-from beaver_ftc_logs.regression import innovations, left_by
-from beaver_ftc_logs.samples import Samples, constant_stretches
+from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
+from beaver_ftc_logs.regression import innovations
+from beaver_ftc_logs.runs import Runs, constant_stretches
+from beaver_ftc_logs.samples import Samples
 
 MAX_BRIEF_EVENT_S = 3.0
 DETECTION_HORIZONS_S = (5.0, 20.0, 60.0)
@@ -80,9 +82,9 @@ def _join_runs(rows: LogRows, runs: Runs) -> Runs:
     joined: Runs = []
     for begin, end in runs:
         before = joined[-1] if joined else (begin, begin)
-        first, names, e = before[0], rows.isolated_surfaces, rows.effectiveness
+        first, names, a = before[0], rows.isolated_surfaces, rows.effectiveness
         unnamed = first < begin and names[first] == UNKNOWN_SURFACE and _is_brief(rows, *before)
-        alike = names[first] == names[begin] and (e[first] == e[begin]).all()
+        alike = names[first] == names[begin] and (a[first] == a[begin]).all()
         joins = _is_brief(rows, begin, end) or unnamed or alike
         if first < begin and rows.faulty[first] and rows.faulty[begin] and joins:
             joined[-1] = (first, end)

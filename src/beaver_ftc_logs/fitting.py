@@ -25,7 +25,7 @@ import numpy as np
 
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
-from beaver_ftc_logs import extremes, regression, trust
+from beaver_ftc_logs import extremes, least_squares, regression, trust
 from beaver_ftc_logs.bank import build_bank, build_states
 from beaver_ftc_logs.diagnose import rows_of_posterior
 from beaver_ftc_logs.filtering import (
@@ -35,9 +35,10 @@ from beaver_ftc_logs.filtering import (
     recent_scale,
 )
 from beaver_ftc_logs.model import FilterSettings, FittedRanges, Model, NoiseModel
-from beaver_ftc_logs.recording import MIN_DIVISOR, Floats, Ints, Mask, runs_between
+from beaver_ftc_logs.recording import MIN_DIVISOR, Floats, Ints, Mask
 from beaver_ftc_logs.regression import FitPart, Parts
-from beaver_ftc_logs.samples import Samples, constant_stretches
+from beaver_ftc_logs.runs import constant_stretches, runs_between
+from beaver_ftc_logs.samples import Samples
 from beaver_ftc_logs.scoring import score_against_labels
 from beaver_ftc_logs.vehicle import Vehicle
 
@@ -185,7 +186,7 @@ def bic_by_order(parts: Parts, vehicle: Vehicle) -> dict[tuple[int, int], float]
     coefficients C of m regressors on n samples, it is n log det((y' y - (Z' y)' C) / n) + 3 m log n.
     """
     Z, y, _ = stack_data(parts, vehicle, max(RATE_LAGS), max(COMMAND_LAGS))
-    X = Z / regression.rms_of_columns(Z)
+    X = Z / least_squares.rms_of_columns(Z)
     ZZ = X.T @ X
     Zy = X.T @ y
     yy = y.T @ y
@@ -206,12 +207,12 @@ def _order_columns(vehicle: Vehicle, h: int, L: int) -> Ints:
     return np.flatnonzero(np.concatenate([rates, signals, commands]))
 
 
-def fit_of(parts: Parts, model: Model) -> regression.Regression:
+def fit_of(parts: Parts, model: Model) -> least_squares.Regression:
     """Least squares of a model's order over all flights."""
     return _fitted(parts, model.vehicle, model.history, model.lags)[0]
 
 
-def _fitted(parts: Parts, vehicle: Vehicle, h: int, L: int) -> tuple[regression.Regression, Model]:
+def _fitted(parts: Parts, vehicle: Vehicle, h: int, L: int) -> tuple[least_squares.Regression, Model]:
     """Least squares of given order over all flights, and its model: made once, since every test of a model
     needs the same fits to parts of them."""
     fits, key = parts[0].fits, (vehicle.model_dump_json(), h, L, *map(id, parts))
@@ -222,7 +223,7 @@ def _fitted(parts: Parts, vehicle: Vehicle, h: int, L: int) -> tuple[regression.
     return fits[key][:2]
 
 
-def fit_order(parts: Parts, vehicle: Vehicle, h: int, L: int) -> regression.Regression:
+def fit_order(parts: Parts, vehicle: Vehicle, h: int, L: int) -> least_squares.Regression:
     """Least squares of given order over all flights."""
     Z, y, stretch = stack_data(parts, vehicle, h, L)
     if len(y) < 10 * Z.shape[1]:
@@ -232,7 +233,7 @@ def fit_order(parts: Parts, vehicle: Vehicle, h: int, L: int) -> regression.Regr
     if still:
         raise BadInput(f"identify: rate {still[0]} does not move, allowed: flights in which every rate does")
     dt_s = regression.usual_step_s(parts)
-    return regression.fit_ols(Z, y, stretch, round(_NEWEY_WEST_S / dt_s))
+    return least_squares.fit_ols(Z, y, stretch, round(_NEWEY_WEST_S / dt_s))
 
 
 def stack_data(parts: Parts, vehicle: Vehicle, h: int, L: int) -> tuple[Floats, Floats, Ints]:
@@ -255,7 +256,7 @@ def stack_data(parts: Parts, vehicle: Vehicle, h: int, L: int) -> tuple[Floats, 
     return np.vstack(Z), np.vstack(y), np.concatenate(stretches)
 
 
-def _model_of_fit(fit: regression.Regression, parts: Parts, vehicle: Vehicle, h: int, L: int) -> Model:
+def _model_of_fit(fit: least_squares.Regression, parts: Parts, vehicle: Vehicle, h: int, L: int) -> Model:
     names = list(vehicle.surfaces)
     groups = regression.group_surfaces(vehicle)
     first = len(fit.coefficients) - len(groups) * L
@@ -299,7 +300,7 @@ def quick_error_share(parts: Parts, model: Model) -> float:
         unusual = power > flight.noise.usual_quick_power
         if unusual.sum() >= _MIN_QUICK_SAMPLES:
             squares = ((flight.e - np.median(flight.e, axis=0)) @ flight.W) ** 2
-            r = max(regression.noise_scale(squares), 1.0)
+            r = max(least_squares.noise_scale(squares), 1.0)
             shares.append(((squares[unusual].mean(axis=1) / r - 1.0) / power[unusual]).mean())
     return float(np.sqrt(np.clip(max(shares, default=1.0), 0.0, 1.0)))
 
@@ -617,12 +618,12 @@ def tied_shares(parts: Parts, model: Model) -> Floats:
         y = y - y.mean(axis=0)
         power = float((y**2).sum()) / len(y)
         if power > _MIN_EFFECT_POWER:
-            e = regression.left_by(np.delete(Z, columns, axis=1), y)
+            e = least_squares.left_by(np.delete(Z, columns, axis=1), y)
             shares[g] = max(1.0 - float((e**2).sum()) / len(y) / min(power, _EFFECT_POWER_CAP), 0.0)
     return shares
 
 
-def group_gain_sd(fit: regression.Regression, model: Model) -> Floats:
+def group_gain_sd(fit: least_squares.Regression, model: Model) -> Floats:
     """Standard error of each group's gain, (G,), colour included: of its response summed over lags, along
     itself, weighed by the noise; for `other_laws` of the factor of the whole response. Where a surface's slow
     effect is made up by the past, as an elevator's by alpha, its sum is not known, and its factor is.

@@ -13,9 +13,10 @@ import numpy as np
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import extremes, fitting, gyro_noise, regression, trust
+from beaver_ftc_logs.least_squares import left_by, spectral_density, variance_inflation
 from beaver_ftc_logs.model import FittedRanges, Model, NoiseModel
 from beaver_ftc_logs.recording import Floats
-from beaver_ftc_logs.regression import Groups, Parts, group_indices, spectral_density, variance_inflation
+from beaver_ftc_logs.regression import Groups, Parts, group_indices
 from beaver_ftc_logs.samples import (
     NOISE_MA_CANDIDATES,
     UNFITTED_GYROS_RAD_S,
@@ -140,7 +141,7 @@ def whiten_flights(flights: Sequence[Samples], vehicle: Vehicle) -> list[Samples
         if len(y) < 2:
             known = f"{len(y)} samples known to be healthy"
             raise BadInput(f"identify: {flight.name}: {known}, allowed: at least 2")
-        return regression.left_by(Z, y)
+        return left_by(Z, y)
 
     alone = [{ma: own_residual(flight, ma) for ma in NOISE_MA_CANDIDATES} for flight in flights]
     colours = [_likeliest_ma(residuals)[1] for residuals in alone]

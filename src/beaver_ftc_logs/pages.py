@@ -20,9 +20,11 @@ from beaver_ftc_logs import fitting
 from beaver_ftc_logs.diagnose import LogRows
 from beaver_ftc_logs.findings import MAX_BRIEF_EVENT_S, duration_text, events_to_show
 from beaver_ftc_logs.identification import regressor_names
+from beaver_ftc_logs.least_squares import Regression, spectral_density
 from beaver_ftc_logs.model import Model
-from beaver_ftc_logs.recording import Floats, true_runs
-from beaver_ftc_logs.regression import Parts, Regression, spectral_density
+from beaver_ftc_logs.recording import Floats
+from beaver_ftc_logs.regression import Parts
+from beaver_ftc_logs.runs import true_runs
 from beaver_ftc_logs.samples import Samples
 
 if TYPE_CHECKING:

@@ -9,7 +9,6 @@ from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass, field
 from difflib import SequenceMatcher
 from io import StringIO
-from itertools import pairwise
 from math import isnan
 from pathlib import Path
 from typing import Any
@@ -34,31 +33,6 @@ _S_PER_US = 1e-6
 _N_LISTED_NEAREST_NAMES = 10
 MIN_DIVISOR = float(np.sqrt(np.finfo(float).tiny))
 """Least value of a divisor that may be zero."""
-
-
-Runs = list[tuple[int, int]]
-"""Begin and end of runs of rows."""
-
-
-def last_true_row(mask: Mask) -> Ints:
-    """The last row up to each at which a mask (n,) is true, (n,); -1 before the first."""
-    return np.maximum.accumulate(np.where(mask, np.arange(len(mask)), -1))
-
-
-def last_row_at(stamps: Floats, t_s: Floats) -> Ints:
-    """The row of the last stamp up to each time; the first before it."""
-    return np.maximum(np.searchsorted(stamps, t_s, side="right") - 1, 0)
-
-
-def runs_between(is_edge: Mask) -> Runs:
-    """Begin and end of each run of n rows; is_edge (n - 1,): whether one ends behind the row."""
-    return list(pairwise([0, *(np.flatnonzero(is_edge) + 1).tolist(), len(is_edge) + 1]))
-
-
-def true_runs(mask: Mask) -> Runs:
-    """Begin and end of each run of rows at which a mask (n,) is true."""
-    edges = np.flatnonzero(np.diff(mask.astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
-    return [(begin, end) for begin, end in edges.tolist()]
 
 
 def largest_magnitude(values: Floats) -> float:

@@ -1,10 +1,10 @@
 """The one regression of a flight: the regressors of the next sample's rates, what a model leaves of them
 (`Innovations`), and least squares on both. What identifies, doubts, detects and bounds selects from it.
 
-    rates[k] = b + A' x[k] + sum over groups g of a_g F_g[k] + noise,      F_g[k] = sum_j B_gj u_g[k-j]
+    rates[k] = c + A' x[k] + sum over groups g of a_g F_g[k] + noise,      F_g[k] = sum_j B_gj u_g[k-j]
 
     n, G, h, L, f   samples; groups; past samples of the rates, of the commands, of the X signals
-    b               intercept (3,), rad/s
+    c               intercept (3,), rad/s
     x, A            the past: rates[k-1..k-h], signals[k-1..k-f], (3 h + X f,); its coefficients (.., 3)
     u, U            command of a group, a share of its travel; of all groups at lags 1 to L (n, G, L)
     a               effectiveness of each group (G,)
@@ -14,8 +14,7 @@
     ma, ar          moving average of the noise, 1 first; its predictor from those before, (.., 3, 3)
 
 Surfaces whose commands are proportional to one another move together while they are healthy: their effects
-cannot be distinguished by any fit, so they form one group with one response. Least squares of y on Z (n, m):
-coefficients b (m,) or (m, 3); P is the inverse of Z' Z once each column is divided by its scale s (m,).
+cannot be distinguished by any fit, so they form one group with one response.
 """
 
 from collections.abc import Sequence
@@ -24,20 +23,17 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from beaver_ftc_logs import least_squares
 from beaver_ftc_logs.model import Model, NoiseModel
-from beaver_ftc_logs.recording import MIN_DIVISOR, Floats, Ints, Mask, runs_between
+from beaver_ftc_logs.recording import Floats, Ints, Mask
+from beaver_ftc_logs.runs import runs_between, trailing_sums
 from beaver_ftc_logs.samples import Samples, mixer_matrix, whiten_samples
 from beaver_ftc_logs.vehicle import Vehicle
 
 _PARALLEL_TOLERANCE = 1e-9
-_EIGENVALUE_FLOOR = 1e-10
-_RANK_TOLERANCE = 1e-12
 _N_PARTS, _MIN_PART_ROWS, BOUND_MARGIN = 4, 60, 4.0
 """Parts of a flight, and their rows at least; standard errors."""
-_MEDIAN_CHI2 = 2.366
-"""The median of a square of three axes."""
 _QUICK_SPAN_S = 0.5
 """A response is quick if it differs from its mean over so many seconds."""
 
@@ -57,9 +53,8 @@ class FitPart:
         rows = np.flatnonzero(self.is_usable)
         middle = int(rows[len(rows) // 2]) if len(rows) else 0
         is_first = np.arange(len(self.is_usable)) < middle
-        return FitPart(self.samples, self.is_usable & is_first), FitPart(
-            self.samples, self.is_usable & ~is_first
-        )
+        first, second = self.is_usable & is_first, self.is_usable & ~is_first
+        return FitPart(self.samples, first), FitPart(self.samples, second)
 
     def innovations(self, model: Model) -> "Innovations":
         """The samples in use by a model, commands as effective as labels say."""
@@ -95,7 +90,7 @@ def group_surfaces(vehicle: Vehicle) -> Groups:
 
 
 def build_regressors(
-    samples: Samples, groups: Groups, h: int, L: int, labelled: bool, f: int = 1
+    samples: Samples, groups: Groups, h: int, L: int, labelled: bool, f: int
 ) -> tuple[Floats, Floats, Mask]:
     """The regressors of each sample: the past x (n, 3 h + X f), the commands U (n, G, L) of the groups, and
     whether all of it is known and no gap lies within, (n,).
@@ -105,11 +100,11 @@ def build_regressors(
     v = group_commands(samples, groups, labelled)
     rates = [_delay_rows(samples.rates, k, np.nan) for k in range(1, h + 1)]
     X = np.column_stack([*rates, *(_delay_rows(samples.signals, k, np.nan) for k in range(1, f + 1))])
-    U = np.stack([_delay_rows(v, k, np.nan) for k in range(1, L + 1)], axis=1)
+    U = np.stack([_delay_rows(v, k, np.nan) for k in range(1, L + 1)], axis=2)
     ok = np.isfinite(X).all(axis=1) & np.isfinite(U).all(axis=(1, 2))
     ok &= np.isfinite(samples.rates).all(axis=1)
     ok &= samples.stretch_number == _delay_rows(samples.stretch_number, max(h, L), -1)
-    return X, U.transpose(0, 2, 1), ok
+    return X, U, ok
 
 
 def group_commands(samples: Samples, groups: Groups, labelled: bool) -> Floats:
@@ -174,8 +169,7 @@ class Innovations:
 
     @property
     def log_size(self) -> float:
-        """Logarithm of the size of a sample's noise before it was whitened, log det(R)^1/2 - 3 log sum a; a:
-        weights of its moving average."""
+        """Logarithm of the size of a sample's noise before it was whitened, log det(R)^1/2 - 3 log sum ma."""
         return 0.5 * float(np.linalg.slogdet(self.R)[1]) - 3.0 * float(np.log(sum(self.noise.average)))
 
     def residual_runs(self) -> list[Floats]:
@@ -197,18 +191,25 @@ class Innovations:
         return self.columns().reshape(3 * len(self.F), -1), (self.y @ self.W).ravel()
 
     def gain_bounds(self, share: float) -> tuple[Floats, Floats, float]:
-        """By least squares of y on trim and responses: the gain that each response surely is not below, and
-        not above, (G,) each, 1 as in the model; far apart where columns make one another up. And the scale
-        of the noise, in variances of it. share: effective_sample_share."""
+        """By least squares of v on Z, as of `regression`: the gain that each response surely is not below,
+        and not above, (G,) each, 1 as in the model; and the scale of the noise, in variances of it.
+
+            X = Z / s,   P = (X' X + eps n I)^-1,   b = P X' v,   e = v - X b
+            bounds = (b -+ 4 sqrt(diag(P) mean(e^2) / share)) / s
+
+        eps: a small number, which keeps the bounds finite and far apart where columns make one another up.
+        share: as how many white samples one counts.
+        """
         Z, v = self.regression()
-        s = rms_of_columns(Z)
+        s = least_squares.rms_of_columns(Z)
         X = Z / s
-        P = np.linalg.inv(X.T @ X + _EIGENVALUE_FLOOR * len(X) * np.eye(X.shape[1]))
+        ridge = least_squares.EIGENVALUE_FLOOR * len(X) * np.eye(X.shape[1])
+        P = np.linalg.inv(X.T @ X + ridge)
         b = P @ (X.T @ v)
         e2 = (v - X @ b) ** 2
         margin = BOUND_MARGIN * np.sqrt(np.maximum(np.diag(P), 0.0) * e2.mean() / share)
         low, high = (b - margin) / s, (b + margin) / s
-        return low[3:], high[3:], noise_scale(e2)
+        return low[3:], high[3:], least_squares.noise_scale(e2)
 
     def gains(self) -> Floats:
         """The gain of each response, (G,), by least squares of y on trim and responses."""
@@ -280,105 +281,7 @@ def subtract_noise(values: Floats, ar: Floats) -> Floats:
     return rest
 
 
-@dataclass(frozen=True)
-class Regression:
-    """coefficients (m, 3); residual_covariance (3, 3); standard_errors (m, 3); standard_error_inflation: the
-    factor by which the residuals' colour widens them over those of white ones, (m, 3);
-    coefficient_error_correlation (m, m): of the coefficients' errors, alike on every axis."""
-
-    coefficients: Floats
-    residual_covariance: Floats
-    standard_errors: Floats
-    standard_error_inflation: Floats
-    coefficient_error_correlation: Floats
-
-
-def fit_ols(Z: Floats, y: Floats, stretch: Ints, lag: int) -> Regression:
-    """Ordinary least squares of the rates y (n, 3) on Z (n, m), with Newey-West standard errors:
-
-        X = Z / s,   P = (X' X)^+,   b = P X' y,   e = y - X b,   R = e' e / (n - m)
-
-    stretch (n,): products of e over up to `lag` samples are formed within one gap-free stretch only.
-    Directions that Z does not excite get the least coefficients that fit, and a column of nothing but
-    rounding gets 0.
-    """
-    rms = rms_of_columns(Z)
-    s = np.where(rms > _RANK_TOLERANCE * rms.max(), rms, np.inf)
-    X = Z / s
-    P: Floats = np.asarray(np.linalg.pinv(X.T @ X, rcond=_EIGENVALUE_FLOOR), dtype=np.float64)
-    b = P @ (X.T @ y)
-    e = y - X @ b
-    dof = max(len(y) - Z.shape[1], 1)
-    R = e.T @ e / dof
-    white = np.sqrt(np.maximum(np.outer(np.diag(P), np.diag(R)), 0.0))
-    coloured = np.column_stack([_newey_west(X, e[:, i], P, stretch, lag) for i in range(y.shape[1])])
-    inflation = np.divide(coloured, white, out=np.ones_like(coloured), where=white > 0)
-    d = np.sqrt(np.maximum(np.diag(P), MIN_DIVISOR))
-    return Regression(b / s[:, None], R, coloured / s[:, None], inflation, P / np.outer(d, d))
-
-
-def _newey_west(X: Floats, e: Floats, P: Floats, stretch: Ints, lag: int) -> Floats:
-    """Standard errors (m,) that hold for autocorrelated residuals e (n,), the root of diag(P S P): S sums the
-    products of the scores X e with Bartlett's weights over `lag` lags."""
-    scores, w = X * e[:, None], lag + 1
-    S = np.zeros((X.shape[1], X.shape[1]))
-    for begin, end in runs_between(
-        np.diff(stretch) != 0
-    ):  # Bartlett's weights are those of products of running sums
-        sums = np.cumsum(np.pad(scores[begin:end], ((w, w - 1), (0, 0))), axis=0)
-        windows = sums[w:] - sums[:-w]
-        S += windows.T @ windows / w
-    return np.sqrt(np.maximum(np.diag(P @ S @ P), 0.0))
-
-
-def rms_of_columns(Z: Floats) -> Floats:
-    """Root mean square of each column of Z (n, m), above 0."""
-    return np.maximum(np.sqrt((Z**2).mean(axis=0)), MIN_DIVISOR)
-
-
-def left_by(Z: Floats, y: Floats) -> Floats:
-    """What least squares on Z (n, m) leaves of y (n,) or (n, k)."""
-    return y - Z @ np.linalg.lstsq(Z, y, rcond=None)[0]
-
-
-def trailing_sums(x: NDArray[Any], n: float) -> tuple[Floats, Ints]:
-    """Sums of x (k, ...) over the last n rows, each row's own included, and how many rows these are, (k,)."""
-    end = np.arange(1, len(x) + 1)
-    begin = np.maximum(end - max(round(n), 1), 0)
-    sums = np.concatenate([np.zeros((1, *x.shape[1:])), np.cumsum(x, axis=0)])
-    return sums[end] - sums[begin], end - begin
-
-
-def noise_scale(e2: Floats) -> float:
-    """The scale of the noise by the squares of what is left, (3 n,), which faults of few samples do not
-    change."""
-    return float(np.median(e2.reshape(-1, 3).sum(axis=1)) / _MEDIAN_CHI2)
-
-
 def split_parts(rows: Ints) -> list[Ints] | None:
     """The rows of a flight in its parts; None where one is too short."""
     parts = np.array_split(rows, _N_PARTS)
     return parts if min(map(len, parts)) >= _MIN_PART_ROWS else None
-
-
-def variance_inflation(Z: Floats) -> Floats:
-    """How much the variance of each column's coefficient is inflated by the other columns of Z (n, m): 1
-    alone, inf dependent. That is the diagonal of the inverse of the correlation C = V lam V'."""
-    X = Z - Z.mean(axis=0)
-    norms = np.sqrt((X**2).sum(axis=0))
-    factors = np.full(Z.shape[1], np.inf)
-    varying = norms > 1e-12
-    X = X[:, varying] / norms[varying]
-    lam, V = np.linalg.eigh(X.T @ X)
-    lam = np.where(lam > _RANK_TOLERANCE * lam.max(initial=0.0), lam, _RANK_TOLERANCE**2)
-    factors[varying] = (V**2 / lam).sum(axis=1)
-    return np.where(factors < 1.0 / _RANK_TOLERANCE, factors, np.inf)
-
-
-def spectral_density(e: Floats, rate_hz: float) -> tuple[Floats, Floats]:
-    """Frequencies, Hz, and one-sided spectral density of a residual e (n, 3) at each, by averaged
-    periodograms of at most 256 samples."""
-    from scipy import signal
-
-    f, density = signal.welch(e, fs=rate_hz, nperseg=min(256, len(e)), axis=0)
-    return f, density

@@ -9,7 +9,8 @@ import numpy as np
 
 from beaver_ftc.results import Document, Onset
 from beaver_ftc_logs.diagnose import UNKNOWN_SURFACE, LogRows
-from beaver_ftc_logs.recording import Floats, LoggedFailure, last_row_at
+from beaver_ftc_logs.recording import Floats, LoggedFailure
+from beaver_ftc_logs.runs import last_row_at
 from beaver_ftc_logs.samples import Samples
 
 _SAME_FAILURE_S = 2.0

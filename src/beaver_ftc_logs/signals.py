@@ -6,7 +6,8 @@ fitted to show for how long.
 
 import numpy as np
 
-from beaver_ftc_logs.recording import Column, Floats, Ints, Mask, last_true_row
+from beaver_ftc_logs.recording import Column, Floats, Ints, Mask
+from beaver_ftc_logs.runs import last_true_row
 
 MIN_STILL_S, MIN_STILL_ROWS = 1.5, 12
 """A measured rate that repeats for longer than both is frozen."""

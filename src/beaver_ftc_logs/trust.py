@@ -30,6 +30,7 @@ from beaver_ftc_logs.column_mistakes import corrected_logs, log_without_signal
 from beaver_ftc_logs.model import FittedRanges, Model
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats, Mask, Reasons
 from beaver_ftc_logs.regression import Parts
+from beaver_ftc_logs.runs import trailing_sums
 from beaver_ftc_logs.samples import NOISE_MA_CANDIDATES, Samples, whiten_samples
 from beaver_ftc_logs.signals import MIN_STILL_S
 from beaver_ftc_logs.units import RATE, SI_UNITS, nearest_unit
@@ -307,7 +308,7 @@ def untrusted_rows(samples: Samples, model: Model) -> Reasons:
     """Rows that are not credible, by reason."""
     reasons: Reasons = _still_rows(samples, model)
     n = np.floor(_CLIPPING_MEMORY_S / samples.dt_s) + 1.0
-    recent, _ = regression.trailing_sums(samples.is_rate_clipped, n)
+    recent, _ = trailing_sums(samples.is_rate_clipped, n)
     reasons[f"a rate was clipped in the last {_CLIPPING_MEMORY_S:g} s"] = recent > 0
     return reasons | _rows_out_of_range(samples, model)
 
@@ -329,7 +330,7 @@ def _rows_out_of_range(samples: Samples, model: Model) -> Reasons:
         margins = _AIRSPEED_MARGIN * np.array([lo, hi]) if name == "airspeed" else (margin, margin)
         outside = (values < lo - margins[0]) | (values > hi + margins[1])
         reason = f"{name} is outside {lo:.3g} to {hi:.3g}, where the model was fitted"
-        sums, n = regression.trailing_sums(outside, _RANGE_WINDOW_S / samples.dt_s)
+        sums, n = trailing_sums(outside, _RANGE_WINDOW_S / samples.dt_s)
         reasons[reason] = sums > _MIN_OUTSIDE_SHARE * n
     return reasons
 

@@ -25,9 +25,9 @@ from beaver_ftc_logs.recording import (
     Ints,
     LoggedFailure,
     RecordedFlight,
-    last_row_at,
     rows_with_increasing_time,
 )
+from beaver_ftc_logs.runs import last_row_at
 
 _S_PER_NS = 1e-9
 _TIME_FIELD = "%time"

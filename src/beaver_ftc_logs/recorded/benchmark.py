@@ -31,9 +31,10 @@ from beaver_ftc_logs.fitting import (
     score_folds,
     validation_folds,
 )
+from beaver_ftc_logs.loading import read_vehicle_columns
 from beaver_ftc_logs.model import FilterSettings, Model
 from beaver_ftc_logs.recording import RecordedFlight
-from beaver_ftc_logs.samples import Samples, read_vehicle_columns, resample
+from beaver_ftc_logs.samples import Samples, resample
 from beaver_ftc_logs.vehicle import Vehicle, load_vehicle
 
 HeaderAndRows = tuple[list[str], list[list[str]]]

@@ -9,7 +9,7 @@ import pytest
 from filelock import FileLock
 
 from beaver_ftc_logs.identification import identify
-from beaver_ftc_logs.samples import load_flights_for_fit
+from beaver_ftc_logs.loading import load_flights_for_fit
 from beaver_ftc_logs.vehicle import load_vehicle
 from products.logs import synthetic
 

@@ -15,8 +15,8 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.results.exports import RECORDING_FILE_OF_KIND, write_recording
 from beaver_ftc_logs import stepped
 from beaver_ftc_logs.by_aircraft import diagnose_aircraft, load_diagnosed
+from beaver_ftc_logs.loading import read_vehicle_columns
 from beaver_ftc_logs.recording import Column, RecordedFlight
-from beaver_ftc_logs.samples import read_vehicle_columns
 from beaver_ftc_logs.vehicle import Vehicle, load_vehicle
 from products.logs.small import run
 

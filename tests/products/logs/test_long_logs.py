@@ -10,7 +10,7 @@ import pytest
 from pyarrow import csv, parquet
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc_logs import readers, samples
+from beaver_ftc_logs import loading, readers
 from beaver_ftc_logs.readers import read_parts
 from products.logs import synthetic
 
@@ -32,8 +32,8 @@ print("PEAK", Path("/proc/self/status").read_text().partition("VmHWM:")[2].split
 def parted(monkeypatch):
     """Parts of 500 rows, fits of 600 samples in stretches of 100."""
     monkeypatch.setattr(readers, "ROWS_PER_PART", 500)
-    monkeypatch.setattr(samples, "MAX_FIT_SAMPLES", 600)
-    monkeypatch.setattr(samples, "_FIT_SAMPLES", 100)
+    monkeypatch.setattr(loading, "MAX_FIT_SAMPLES", 600)
+    monkeypatch.setattr(loading, "_FIT_SAMPLES", 100)
 
 
 def write(path, columns):

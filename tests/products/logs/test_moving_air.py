@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc_logs import fitting, gyro_noise, identification, samples, trust
+from beaver_ftc_logs import fitting, gyro_noise, identification, loading, trust
 from beaver_ftc_logs.bank import build_bank
 from beaver_ftc_logs.filtering import bank_posterior
 from beaver_ftc_logs.samples import whiten_samples
@@ -74,7 +74,7 @@ def test_a_model_of_two_colours_takes_the_likelier(flights, moving, colour):
     both = bank_posterior(new, moving, bank)
     alone = bank_posterior(new, moving.model_copy(update={"colours": own}), bank)
     np.testing.assert_allclose(both[300:], alone[300:], atol=1e-6)
-    short = bank_posterior(samples.select_rows(new, slice(600)), moving, bank)
+    short = bank_posterior(loading.select_rows(new, slice(600)), moving, bank)
     np.testing.assert_array_equal(both[:600], short)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc_logs import readers, samples
+from beaver_ftc_logs import loading, readers, samples
 from beaver_ftc_logs.diagnose import diagnose
 from beaver_ftc_logs.readers import read_flight
 from beaver_ftc_logs.vehicle import load_vehicle
@@ -90,8 +90,8 @@ def test_what_was_written_comes_back(reader, path):
 @only_vehicles
 def test_every_format_gives_the_same_samples(reader, path, tmp_path, wing):
     written = synthetic.fly(20.0)
-    (found,) = samples.load_flights_for_fit([reader.write(path, written)], reader.of(tmp_path))
-    (other,) = samples.load_flights_for_fit([synthetic.write_csv(tmp_path / "other.csv", written)], wing)
+    (found,) = loading.load_flights_for_fit([reader.write(path, written)], reader.of(tmp_path))
+    (other,) = loading.load_flights_for_fit([synthetic.write_csv(tmp_path / "other.csv", written)], wing)
     np.testing.assert_array_equal(found.commands, other.commands)
     np.testing.assert_array_equal(found.rates, other.rates)
 
@@ -106,7 +106,7 @@ def test_what_is_wanted_is_read_and_what_is_missing_is_named_beside_what_is_ther
     assert all(np.isnan(column.values).all() for column in found.values())
     wanted = reader.name("roll_command").replace(".", r"\.")
     with pytest.raises(BadInput, match=rf"no column {wanted}, allowed: a log that has it; it has ") as error:
-        samples.load_flights_for_fit([path], reader.of(tmp_path))
+        loading.load_flights_for_fit([path], reader.of(tmp_path))
     assert len(str(error.value).splitlines()) == 1
     assert all(name in str(error.value) for name in names)
 
@@ -158,14 +158,14 @@ def test_parts_of_a_long_log_hold_every_row_and_say_what_the_whole_says(
     reader.write(path, synthetic.fly(240.0, parts=((100, 240, 1.0, 0.3),), seed=5))
     vehicle, name = reader.of(tmp_path), reader.name("q_rad_s")
     log = read_flight(path)
-    parts = [part.columns[name] for part in samples.read_vehicle_parts(path, vehicle)]
+    parts = [part.columns[name] for part in loading.read_vehicle_parts(path, vehicle)]
     assert [len(part.t_s) for part in parts] == [500, 500, 500, 500, 600]
     rows = np.concatenate([parts[0].values, *(part.values[50:] for part in parts[1:])])
     np.testing.assert_array_equal(rows, log.columns[name].values)
     for one, other in pairwise(parts):
         np.testing.assert_array_equal(one.t_s[-50:], other.t_s[:50])
     whole = diagnose(samples.resample(log, vehicle), wing_model)
-    for number, part in enumerate(samples.stream_flights([path], vehicle), 1):
+    for number, part in enumerate(loading.stream_flights([path], vehicle), 1):
         assert part.name == f"flight-part-{number}"
         said = diagnose(part, wing_model)
         settled = said.t_s > said.t_s[0] + 25.0

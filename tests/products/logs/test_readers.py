@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc_logs.loading import load_flights_for_fit
 from beaver_ftc_logs.readers import read_flight
-from beaver_ftc_logs.samples import load_flights_for_fit
 from products.logs import synthetic
 
 

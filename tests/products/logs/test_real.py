@@ -16,7 +16,7 @@ from beaver_ftc_logs.fitting import (
     fit_parts,
     validation_folds,
 )
-from beaver_ftc_logs.samples import load_flights_for_fit
+from beaver_ftc_logs.loading import load_flights_for_fit
 from beaver_ftc_logs.scoring import score_against_failures, score_against_labels
 from beaver_ftc_logs.vehicle import load_vehicle
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beaver_ftc_logs import regression
+from beaver_ftc_logs import least_squares, regression
 from products.logs import small
 
 WING, TAIL = small.model(), small.model(small.TAIL)
@@ -28,7 +28,7 @@ def test_what_a_sample_is_predicted_from(history, lags):
     samples, reach = small.flight(TAIL, 30, gap=12), max(history, lags)
     samples.rates[20, 1] = samples.commands[25, 1] = samples.signals[5, 0] = np.nan
     samples.labels[:] = [0.5, np.nan, 0.25]
-    past, commands, known = regression.build_regressors(samples, [[0, 2], [1]], history, lags, labelled=True)
+    past, commands, known = regression.build_regressors(samples, [[0, 2], [1]], history, lags, True, 1)
     missing = {20 + j for j in range(history + 1)} | {25 + j for j in range(1, lags + 1)} | {6}
     whole = [k for k in range(30) if k % 12 >= reach or k >= 24]
     assert np.flatnonzero(known).tolist() == [
@@ -50,7 +50,7 @@ def drawn(n=40, m=4, seed=1):
 
 def test_least_squares_and_its_covariance():
     x, y, run = drawn()
-    fit = regression.fit_ols(x, y, run, 3)
+    fit = least_squares.fit_ols(x, y, run, 3)
     np.testing.assert_allclose(fit.coefficients, np.linalg.lstsq(x, y, rcond=None)[0], rtol=1e-9)
     rest = y - x @ fit.coefficients
     np.testing.assert_allclose(fit.residual_covariance, rest.T @ rest / 36, rtol=1e-9)
@@ -65,7 +65,7 @@ def test_least_squares_and_its_covariance():
 def test_standard_errors_for_coloured_residuals(reach):
     """Newey and West, pair by pair of samples of one stretch: Bartlett's weight of their distance."""
     x, y, run = drawn()
-    fit = regression.fit_ols(x, y, run, reach)
+    fit = least_squares.fit_ols(x, y, run, reach)
     rest = y - x @ fit.coefficients
     inverse = np.linalg.inv(x.T @ x)
     distance = np.abs(np.subtract.outer(np.arange(40), np.arange(40)))
@@ -81,12 +81,12 @@ def test_what_is_not_excited_gets_no_coefficient():
     """A column of zeros, and one twice: the least coefficients that fit, and colour of one where none is."""
     x, y, run = drawn(m=3)
     wide = np.column_stack([x, x[:, 0], np.zeros(40)])
-    fit = regression.fit_ols(wide, y, run, 2)
-    alone = regression.fit_ols(x, y, run, 2)
+    fit = least_squares.fit_ols(wide, y, run, 2)
+    alone = least_squares.fit_ols(x, y, run, 2)
     np.testing.assert_allclose(fit.coefficients[0], fit.coefficients[3], rtol=1e-6)
     np.testing.assert_allclose(fit.coefficients[0] * 2, alone.coefficients[0], rtol=1e-6)
     assert fit.coefficients[4].tolist() == [0.0] * 3
     assert fit.standard_error_inflation[4].tolist() == [1.0] * 3
     assert np.isfinite(fit.coefficient_error_correlation).all()
-    few = regression.fit_ols(x[:3], y[:3], run[:3], 5)
+    few = least_squares.fit_ols(x[:3], y[:3], run[:3], 5)
     assert np.isfinite(few.residual_covariance).all()

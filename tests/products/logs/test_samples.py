@@ -5,6 +5,7 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import samples as of
+from beaver_ftc_logs.loading import load_flights_for_fit
 from beaver_ftc_logs.recording import Column, LoggedFailure, RecordedFlight
 from products.logs import small
 from products.logs.test_signals import T_S, turning, yawed
@@ -83,9 +84,9 @@ def test_two_flights_of_one_name_are_refused(tmp_path):
         (tmp_path / folder).mkdir()
         synthetic.write_csv(tmp_path / folder / "one.csv", synthetic.fly(8.0))
     paths = [tmp_path / folder / "one.csv" for folder in "ab"]
-    assert [one.name for one in of.load_flights_for_fit(paths[:1], vehicle)] == ["one"]
+    assert [one.name for one in load_flights_for_fit(paths[:1], vehicle)] == ["one"]
     with pytest.raises(BadInput, match="two flights are named one: one result would replace the other"):
-        of.load_flights_for_fit(paths, vehicle)
+        load_flights_for_fit(paths, vehicle)
 
 
 DEG, CDEG = np.pi / 180.0, np.pi / 18000.0

@@ -1,0 +1,127 @@
+"""From files to samples: the columns that a vehicle names, a long log in parts, what a fit takes of it."""
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from beaver_ftc.documents import BadInput
+from beaver_ftc_logs.readers import read_parts, split_long_recording
+from beaver_ftc_logs.recording import RecordedFlight
+from beaver_ftc_logs.samples import Samples, resample
+from beaver_ftc_logs.time_base import median_step_s
+from beaver_ftc_logs.vehicle import Vehicle
+
+MAX_FIT_SAMPLES, _FIT_SAMPLES = 200_000, 5000
+"""Samples of a log read in parts that a fit takes at most, and how many of them in turn."""
+
+
+def read_vehicle_columns(path: Path, vehicle: Vehicle, reader: str | None = None) -> RecordedFlight:
+    """Read the columns of a log that a vehicle file names. Raises BadInput with the reason where it cannot be
+    used."""
+    return next(_read_vehicle_log(path, vehicle, reader, in_parts=False))
+
+
+def read_vehicle_parts(path: Path, vehicle: Vehicle, reader: str | None = None) -> Iterator[RecordedFlight]:
+    """The same, a long log in parts."""
+    for log in _read_vehicle_log(path, vehicle, reader, in_parts=True):
+        column = log.columns.get(vehicle.rates.p.column)
+        if column is None:  # said where the columns are used
+            yield log
+            continue
+        ratio = 1.0 / (median_step_s(column.t_s) * vehicle.max_sample_rate_hz)
+        yield from split_long_recording(log, column.t_s, max(ratio, 1.0))
+
+
+def _read_vehicle_log(
+    path: Path, vehicle: Vehicle, reader: str | None, in_parts: bool
+) -> Iterator[RecordedFlight]:
+    time = (vehicle.time.column, vehicle.time.unit) if vehicle.time else None
+    return read_parts(path, reader or vehicle.reader, time, vehicle.column_names(), in_parts)
+
+
+def stream_flights(paths: Sequence[Path], vehicle: Vehicle, reader: str | None = None) -> Iterator[Samples]:
+    """The flights, one by one, a long one in parts. Raises BadInput before the first with a line for each
+    that cannot be used."""
+    loaded = load_flights_for_fit(paths, vehicle, reader)
+    flights = [flight if flight.n_log_parts == 1 else None for flight in loaded]
+    del loaded  # a long log is read again below: its stretches need not stay in memory
+    for path, samples in zip(paths, flights, strict=True):
+        if samples is not None:
+            yield samples
+        else:
+            yield from (resample(log, vehicle) for log in read_vehicle_parts(path, vehicle, reader))
+
+
+def _read_flight_for_fit(path: Path, vehicle: Vehicle, reader: str | None) -> Samples:
+    """A flight; of a long one stretches that are spread over it evenly.
+
+    Of the stretches seen so far, each of `_FIT_SAMPLES`, every `every`-th is kept. Once they exceed what a
+    fit takes, every second of them is dropped, and from then on half as many are kept.
+    """
+    kept: list[Samples] = []
+    every, n_seen, until_s = 1, 0, -np.inf
+    for part, log in enumerate(read_vehicle_parts(path, vehicle, reader), 1):
+        samples = resample(log, vehicle)
+        first = int(np.searchsorted(samples.t_s, until_s, side="right"))
+        for begin in range(first, len(samples.t_s), _FIT_SAMPLES):
+            if n_seen % every == 0:
+                kept.append(select_rows(samples, slice(begin, begin + _FIT_SAMPLES)))
+            n_seen += 1
+        while len(kept) * _FIT_SAMPLES > MAX_FIT_SAMPLES and part > 1:
+            kept, every = kept[::2], 2 * every
+        until_s = samples.t_s[-1]
+    return samples if part == 1 else _concatenate_samples(path.stem, kept, part)
+
+
+def select_rows(samples: Samples, rows: slice) -> Samples:
+    """Some of the samples, copied."""
+    return _rebuilt([samples], lambda arrays: arrays[0][rows].copy())
+
+
+def _rebuilt(parts: list[Samples], join: Callable[[list[Any]], Any]) -> Samples:
+    """Samples whose arrays are made of those of others."""
+    first = parts[0]
+    names = [name for name, value in vars(first).items() if isinstance(value, np.ndarray)]
+    fields = {name: join([getattr(part, name) for part in parts]) for name in names}
+    fields["log_stamps_s"] = fields["t_s"]
+    unchanged = {name: join([part.unchanged_s[name] for part in parts]) for name in first.unchanged_s}
+    return replace(first, unchanged_s=unchanged, **fields)
+
+
+def _concatenate_samples(name: str, stretches: list[Samples], n_parts: int) -> Samples:
+    """Samples of stretches one after the other, with a gap between."""
+    joined = _rebuilt(stretches, np.concatenate)
+    is_begin = np.diff(joined.stretch_number, prepend=joined.stretch_number[0]) != 0
+    is_begin[np.cumsum([len(stretch.t_s) for stretch in stretches])[:-1]] = True
+    kept = f"{len(is_begin)} samples of it, spread evenly, are looked at"
+    notes = dict.fromkeys(note for stretch in stretches for note in stretch.notes)
+    return replace(
+        joined,
+        name=name,
+        notes=(f"a long log, read in {n_parts} parts: {kept}", *notes),
+        n_log_parts=n_parts,
+        stretch_number=np.cumsum(is_begin),
+        confirmed_rates=frozenset.intersection(*(stretch.confirmed_rates for stretch in stretches)),
+    )
+
+
+def load_flights_for_fit(paths: Sequence[Path], vehicle: Vehicle, reader: str | None = None) -> list[Samples]:
+    """The flights, each on one time base, of a long one what a fit wants of it. Raises BadInput with a line
+    for each that cannot be used."""
+    flights: list[Samples] = []
+    mistakes: list[str] = []
+    for path in paths:
+        try:
+            flights.append(_read_flight_for_fit(path, vehicle, reader))
+        except BadInput as error:
+            mistakes.append(str(error))
+    for name, n in Counter(samples.name for samples in flights).items():
+        if n > 1:
+            mistakes.append(f"two flights are named {name}: one result would replace the other")
+    if mistakes:
+        raise BadInput("\n".join(mistakes))
+    return flights

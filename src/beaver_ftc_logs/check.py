@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -48,7 +48,15 @@ from beaver_ftc_logs.recording import (
 )
 from beaver_ftc_logs.samples import convert_to_si, named_angles, resample
 from beaver_ftc_logs.time_base import median_step_s
-from beaver_ftc_logs.units import ACCELERATION, RATE, SI_UNITS, TIME_UNITS, nearest_unit
+from beaver_ftc_logs.units import (
+    ACCELERATION,
+    HALF_PULSE_RANGE_US,
+    NEUTRAL_PULSE_US,
+    RATE,
+    SI_UNITS,
+    TIME_UNITS,
+    nearest_unit,
+)
 from beaver_ftc_logs.vehicle import Vehicle, unused_keys_as_comments
 
 
@@ -79,9 +87,10 @@ _DERIVED_NAME = (
     r"innov|test_ratio|varian|timestamp|flag|valid|status|count|setpoint|_sp$|desired|demand|target|bias|"
     r"integ|error|_err$|_offset|cov(ariance)?\b|temp|noise|(_|^)(cmd|command)"
 )
-"""Names of what others derive from a quantity, or want of it: none of these is the quantity."""
+"""Names of setpoints of a quantity, its errors, flags and the like: none of these is the quantity."""
 _ANGLE_RATE_NAME = r"rate|speed|accel|veloc|dot|_(deg|rad)_?s(ec)?$"
 _UNIT_OF_PART = {"rad_s": "rad/s", "rad/s": "rad/s", "deg_s": "deg/s", "deg/s": "deg/s", "dps": "deg/s"}
+_USUAL_TIME = (TIME_COLUMN, "s")
 _PWM_RANGE_US = (700.0, 2300.0)
 _LARGEST_RAD_S = 12.0
 _MIN_CORRELATION = 0.7
@@ -101,17 +110,20 @@ def check_log(path: Path, vehicle: Vehicle | None, reader: str | None) -> Docume
     lines: list[str] = []
     guess: Document | None = None
     if vehicle is None:
+        likely = _read_likely(path, reader)
+        lines += likely.remarks
         try:
-            guess = _guess_vehicle(path, reader, lines)
+            guess = _guess_vehicle(path, likely)
         except _NoVehicle as reason:
             lines.append(f"{path}: {reason}")
             return {"log": str(path), "usable": False, "lines": lines, "vehicle": None}
         vehicle = Vehicle.model_validate(guess)
-    parts = [_check_recording(log, vehicle) for log in read_vehicle_parts(path, vehicle, reader)]
-    for part, (_, said) in enumerate(parts, 1):
-        head = f"part {part} of {len(parts)}: " if len(parts) > 1 else ""
-        lines += [f"{head}{line}" for line in said]
-    return {"log": str(path), "usable": all(of for of, _ in parts), "lines": lines, "vehicle": guess}
+    checks = [_check_recording(log, vehicle) for log in read_vehicle_parts(path, vehicle, reader)]
+    for part, (_, remarks) in enumerate(checks, 1):
+        head = f"part {part} of {len(checks)}: " if len(checks) > 1 else ""
+        lines += [f"{head}{remark}" for remark in remarks]
+    usable = all(is_usable for is_usable, _ in checks)
+    return {"log": str(path), "usable": usable, "lines": lines, "vehicle": guess}
 
 
 def _check_recording(log: RecordedFlight, vehicle: Vehicle) -> tuple[bool, list[str]]:
@@ -134,7 +146,7 @@ def _check_recording(log: RecordedFlight, vehicle: Vehicle) -> tuple[bool, list[
 
 
 def _compare_angles(log: RecordedFlight, vehicle: Vehicle) -> list[str]:
-    """That rates and angles agree, or that nothing could be compared."""
+    """That rates and angles agree, or that nothing could be compared: of the columns as logged, in SI."""
     columns = convert_to_si(log, vehicle).columns
     angles = named_angles(columns, vehicle)
     if angles[0] is None:
@@ -156,71 +168,104 @@ def _agrees(fit: physics.AngleFit) -> bool:
     return abs(fit.correlation) > _MIN_CORRELATION
 
 
-def _guess_vehicle(path: Path, reader: str | None, lines: list[str]) -> Document:
-    """The keys of a vehicle file for a log, by its first part. Raises _NoVehicle where rates or commands are
-    not found. lines: receives what is said of the log."""
+class _LikelyLog(NamedTuple):
+    """A log, of a long table its first part, with the columns that may be something.
+
+    time: its column and unit, None where the reader knows them; all_names: of all its columns; mixing: by its
+    parameters; remarks: what is said of both.
+    """
+
+    reader: str
+    time: TimeSource | None
+    log: RecordedFlight
+    all_names: list[str]
+    mixing: Mixing
+    remarks: list[str]
+
+
+def _read_likely(path: Path, reader: str | None) -> _LikelyLog:
+    """Raises BadInput where the log cannot be read, or a table has no time."""
     check_exists(path)
     reader = reader or reader_name_for_path(path)
-    time = _find_time(path, lines) if reader == "table" else None
-    log, in_log, mixing = _read_likely(path, reader, time)
-    lines += mixing.lines
-    names = [name for name, column in log.columns.items() if np.isfinite(column.values).any()]
-    angles = [name for name in names if not re.search(_ANGLE_RATE_NAME, _snake_case(name))]
-    found = {
-        quantity: _shortest_match(pattern, angles if quantity in ("roll", "pitch") else names)
-        for quantity, pattern in _NAME_PATTERNS.items()
-    }
-    if hovers_throughout(log.parameters, log.columns):
-        reason = f"is the log of a VTOL that hovers throughout ({VTOL_MODE} is never 2)"
-        raise _NoVehicle(f"{reason}, allowed: a log with flight on its wing")
-    if not mixing.surfaces:
-        if rotors := multicopter_reason(log.parameters, in_log):
-            reason = f"is the log of a multicopter ({rotors}), which has no surfaces"
-            raise _NoVehicle(f"{reason}, allowed: a log of an aircraft with surfaces")
-        for name in command_names(names, log.parameters)[:_MAX_COMMANDS]:
-            mixing.entry_by_column[name] = _pulse_entry(name, log.columns[name].values)
-            mixing.surfaces[_plain_name(name)] = {name: 1.0}
-    if missing := [axis for axis in "pqr" if found[axis] is None]:
-        nearest = nearest_names_text("rate", in_log)
-        reason = f"no column looks like the rate {missing[0]}, allowed: a vehicle file that names it"
-        raise _NoVehicle(f"{reason}; the log has {nearest}")
-    if not mixing.surfaces:
-        nearest = nearest_names_text("command", in_log)
-        raise _NoVehicle(f"{missing_commands_text(in_log)}; the log has {nearest}")
-    roll = log.columns[found["roll"]] if found["roll"] else None
-    angle_unit = _guess_angle_unit(str(found["roll"]), roll, reader) if roll is not None else "rad"
-    rate_unit = _guess_rate_unit(log, [str(found[axis]) for axis in "pqr"], roll, SI_UNITS[angle_unit][1])
-    vehicle: Document = {"name": _plain_name(path.stem), "reader": reader}
-    if time and time != (TIME_COLUMN, "s"):
-        vehicle["time"] = {"column": time[0], "unit": time[1]}
-    vehicle["rates"] = {axis: _column_entry(found[axis], rate_unit, "rad/s") for axis in "pqr"}
-    vehicle |= {"commands": mixing.commands, "surfaces": mixing.surfaces}
-    if roll is not None:
-        named = [axis for axis in ("roll", "pitch") if found[axis]]
-        vehicle["attitude"] = {axis: _column_entry(found[axis], angle_unit, "rad") for axis in named}
-    if az := found["az"]:
-        median = float(np.nanmedian(np.abs(log.columns[az].values)))
-        if median > 0.0 and (unit := nearest_unit(ACCELERATION, SI_UNITS["g"][1] / median, 2.0)):
-            vehicle["acceleration"] = _column_entry(az, unit, "m/s2")
-    if found["airspeed"]:
-        vehicle["airspeed"] = found["airspeed"]
-    return vehicle
-
-
-def _read_likely(
-    path: Path, reader: str, time: TimeSource | None
-) -> tuple[RecordedFlight, list[str], Mixing]:
-    """The columns of a log, of a long table its first part, that may be something; the names of all; the
-    mixing by its parameters."""
     if reader in SELECTIVE_READERS:
         log = read_flight(path, reader, columns=())
         names = list(log.columns)
         mixing = mixing_of_log(reader, log.parameters, names)
         likely = [*_likely_columns(names, None), *mixing.entry_by_column, *({VTOL_MODE} & {*names})]
-        return read_flight(path, reader, columns=likely), names, mixing
-    wanted = _likely_columns(column_names(path)) if reader == "table" else None
+        log = read_flight(path, reader, columns=likely)
+        return _LikelyLog(reader, None, log, names, mixing, mixing.lines)
+    time = wanted = None
+    remarks: list[str] = []
+    if reader == "table":
+        time, wanted = _find_time(path), _likely_columns(column_names(path))
+        if time != _USUAL_TIME:
+            remarks.append(f"time is in column {time[0]}, its steps fit {time[1]}")
     log = next(read_parts(path, reader, time, wanted))
-    return log, list(log.columns), Mixing()
+    return _LikelyLog(reader, time, log, list(log.columns), Mixing(), remarks)
+
+
+def _guess_vehicle(path: Path, likely: _LikelyLog) -> Document:
+    """The keys of a vehicle file for a log. Raises _NoVehicle where rates or commands are not found."""
+    log, mixing = likely.log, likely.mixing
+    names = [name for name, column in log.columns.items() if np.isfinite(column.values).any()]
+    found = _find_quantities(names)
+    if hovers_throughout(log.parameters, log.columns):
+        raise _NoVehicle(
+            f"is the log of a VTOL that hovers throughout ({VTOL_MODE} is never 2), allowed: a log with "
+            "flight on its wing"
+        )
+    if not mixing.surfaces:
+        _add_commands_by_name(likely, names)
+    if missing := [axis for axis in "pqr" if axis not in found]:
+        raise _NoVehicle(
+            f"no column looks like the rate {missing[0]}, allowed: a vehicle file that names it; the log has "
+            + nearest_names_text("rate", likely.all_names)
+        )
+    if not mixing.surfaces:
+        reason = missing_commands_text(likely.all_names)
+        raise _NoVehicle(f"{reason}; the log has {nearest_names_text('command', likely.all_names)}")
+    roll = log.columns[found["roll"]] if "roll" in found else None
+    angle_unit = _guess_angle_unit(found["roll"], roll, likely.reader) if roll else "rad"
+    rate_unit = _guess_rate_unit(log, [found[axis] for axis in "pqr"], roll, SI_UNITS[angle_unit][1])
+    vehicle: Document = {"name": _plain_name(path.stem), "reader": likely.reader}
+    if likely.time not in (None, _USUAL_TIME):
+        vehicle["time"] = dict(zip(("column", "unit"), likely.time, strict=True))
+    vehicle["rates"] = {axis: _column_entry(found[axis], rate_unit, "rad/s") for axis in "pqr"}
+    vehicle |= {"commands": mixing.commands, "surfaces": mixing.surfaces}
+    if roll:
+        named = [axis for axis in ("roll", "pitch") if axis in found]
+        vehicle["attitude"] = {axis: _column_entry(found[axis], angle_unit, "rad") for axis in named}
+    if az := found.get("az"):
+        median = float(np.nanmedian(np.abs(log.columns[az].values)))
+        if median > 0.0 and (unit := nearest_unit(ACCELERATION, SI_UNITS["g"][1] / median, 2.0)):
+            vehicle["acceleration"] = _column_entry(az, unit, "m/s2")
+    if "airspeed" in found:
+        vehicle["airspeed"] = found["airspeed"]
+    return vehicle
+
+
+def _find_quantities(names: list[str]) -> dict[str, str]:
+    """The columns that look like quantities, by quantity."""
+    angles = [name for name in names if not re.search(_ANGLE_RATE_NAME, _snake_case(name))]
+    matches = {
+        quantity: _shortest_match(pattern, angles if quantity in ("roll", "pitch") else names)
+        for quantity, pattern in _NAME_PATTERNS.items()
+    }
+    return {quantity: name for quantity, name in matches.items() if name}
+
+
+def _add_commands_by_name(likely: _LikelyLog, names: list[str]) -> None:
+    """Add to the mixing a surface for each column that looks like a command. Raises _NoVehicle for a
+    multicopter."""
+    log, mixing = likely.log, likely.mixing
+    if rotors := multicopter_reason(log.parameters, likely.all_names):
+        raise _NoVehicle(
+            f"is the log of a multicopter ({rotors}), which has no surfaces, allowed: a log of an aircraft "
+            "with surfaces"
+        )
+    for name in command_names(names, log.parameters)[:_MAX_COMMANDS]:
+        mixing.entry_by_column[name] = _pulse_entry(name, log.columns[name].values)
+        mixing.surfaces[_plain_name(name)] = {name: 1.0}
 
 
 def _likely_columns(names: Iterable[str], max_columns: int | None = _MAX_READ_COLUMNS) -> list[str]:
@@ -237,7 +282,7 @@ def _snake_case(name: str) -> str:
 
 
 def _shortest_match(pattern: str, names: Sequence[str]) -> str | None:
-    """The column that fits a pattern, and its earliest alternative; the shorter name of two."""
+    """The shortest name that fits a pattern, of two the first in the alphabet; None where none fits."""
     matches = [
         name
         for name in names
@@ -246,7 +291,7 @@ def _shortest_match(pattern: str, names: Sequence[str]) -> str | None:
     return min(matches, key=lambda name: (len(name), name), default=None)
 
 
-def _find_time(path: Path, remarks: list[str]) -> TimeSource:
+def _find_time(path: Path) -> TimeSource:
     """The time column of a table and its unit. Raises BadInput where no column increases like time."""
     names = column_names(path)
     likely = [name for name in names if re.fullmatch(_NAME_PATTERNS["time"], _snake_case(name))]
@@ -260,8 +305,6 @@ def _find_time(path: Path, remarks: list[str]) -> TimeSource:
         units = [unit for unit, seconds in TIME_UNITS.items() if shortest_s <= step * seconds <= longest_s]
         if units:
             unit = next((unit for unit in units if _snake_case(name).endswith(unit)), units[0])
-            if (name, unit) != (TIME_COLUMN, "s"):
-                remarks.append(f"time is in column {name}, its steps fit {unit}")
             return name, unit
     allowed = f"a table with {TIME_COLUMN} in seconds, or another time that increases"
     phrase = f" ({'; '.join(phrases)})" if phrases else ""
@@ -279,8 +322,11 @@ def _guess_angle_unit(name: str, roll: Column, reader: str) -> str:
 def _guess_rate_unit(
     log: RecordedFlight, rate_names: list[str], roll: Column | None, rad_per_roll_unit: float
 ) -> str:
-    """The unit of the rates: by the roll angle, else by their name, else by their size. rad_per_roll_unit:
-    what the roll angle's numbers are multiplied by."""
+    """The unit of the rates. Where they agree with the roll angle, the unit by which they do, else that of
+    their name, else rad/s; where not, that of their name, else by their size.
+
+    rad_per_roll_unit: what the roll angle's numbers are multiplied by.
+    """
     rates, named = [log.columns[name] for name in rate_names], rate_names[0].lower()
     found = next((unit for part, unit in _UNIT_OF_PART.items() if part in named), None)
     if roll is not None:
@@ -292,7 +338,7 @@ def _guess_rate_unit(
     return found or ("deg/s" if largest > _LARGEST_RAD_S else "rad/s")
 
 
-def _column_entry(name: str | None, unit: str, si_unit: str) -> Any:
+def _column_entry(name: str, unit: str, si_unit: str) -> Any:
     return name if unit == si_unit else {"column": name, "unit": unit}
 
 
@@ -300,7 +346,8 @@ def _pulse_entry(name: str, values: Floats) -> Any:
     """A command as a share of travel: pulses of 1100 to 1900 us, per cent, or as it is."""
     median, largest = float(np.nanmedian(values)), largest_magnitude(values)
     if _PWM_RANGE_US[0] < median < _PWM_RANGE_US[1]:
-        return {"column": name, "scale": 0.0025, "offset": -3.75}
+        scale = 1.0 / HALF_PULSE_RANGE_US
+        return {"column": name, "scale": scale, "offset": -scale * NEUTRAL_PULSE_US}
     return {"column": name, "unit": "%"} if 10.0 < largest <= 105.0 else name
 
 

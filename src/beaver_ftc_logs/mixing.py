@@ -22,6 +22,7 @@ from beaver_ftc.documents import validate_model as validate
 from beaver_ftc.results import Document
 from beaver_ftc_logs.readers import SELECTIVE_READERS, check_exists, read_flight, reader_name_for_path
 from beaver_ftc_logs.recording import Floats, Parameters, last_value
+from beaver_ftc_logs.units import HALF_PULSE_RANGE_US, NEUTRAL_PULSE_US
 from beaver_ftc_logs.vehicle import Vehicle, read_vehicle_document
 
 Weights = dict[str, float]
@@ -57,7 +58,8 @@ _MAX_TORQUE = 1000.0
 _PX4_MAX_SURFACES, _PX4_FIRST_SERVO, _PX4_FIXED_WING = 8, 201, 1
 _PX4_AXIS_COLUMNS = tuple(f"vehicle_torque_setpoint.xyz[{i}]" for i in range(3))
 
-_ASSUMED_MIN_US, _ASSUMED_MAX_US = 1100.0, 1900.0
+_ASSUMED_MIN_US = NEUTRAL_PULSE_US - HALF_PULSE_RANGE_US
+_ASSUMED_MAX_US = NEUTRAL_PULSE_US + HALF_PULSE_RANGE_US
 _PULSE_RANGE_US = {"MIN": (500.0, 2200.0), "MAX": (800.0, 2200.0), "TRIM": (800.0, 2200.0)}
 _MIN_MIXING_GAIN, _MAX_MIXING_GAIN, _MAX_MIXING_OFFSET = 0.05, 5.0, 1000.0
 _LEAST_WEIGHT = 1e-9
@@ -277,10 +279,10 @@ def _pulse_reading(
             raise _BadParameter(f"{place} are {low:g}, {trim:g}, {high:g} us, allowed: ascending")
         mask = params.whole_number(reverse, 0, 1 if bit is None else 2**16 - 1)
     except _BadParameter as problem:
-        low, high = _ASSUMED_MIN_US, _ASSUMED_MAX_US
-        scale = 2.0 / (high - low)
-        text = f"; range and sign stay out ({problem}), assumed: {low:g} to {high:g} us"
-        return scale, -0.5 * (low + high) * scale, text
+        scale = 1.0 / HALF_PULSE_RANGE_US
+        assumed = f"{_ASSUMED_MIN_US:g} to {_ASSUMED_MAX_US:g} us"
+        text = f"; range and sign stay out ({problem}), assumed: {assumed}"
+        return scale, -NEUTRAL_PULSE_US * scale, text
     is_reversed = mask >> (bit or 0) & 1
     scale = (-2.0 if is_reversed else 2.0) / (high - low)
     text = f", {low:g} to {high:g} us, neutral at {trim:g} us{', reversed' if is_reversed else ''}"
@@ -344,11 +346,8 @@ def _px4_pulses(params: _Parameters, drivers: Sequence[list[str]]) -> list[_Outp
         return []
     readings = []
     for driver, n in outputs:
-        names, place = (
-            {part: f"{driver}_{part}{n}" for part in ("MIN", "MAX")},
-            f"{driver}_MIN{n}, middle, _MAX",
-        )
-        reading = _pulse_reading(params, place, names, f"{driver}_REV", n - 1)
+        names = {part: f"{driver}_{part}{n}" for part in ("MIN", "MAX")}
+        reading = _pulse_reading(params, f"{driver}_MIN{n}, middle, _MAX", names, f"{driver}_REV", n - 1)
         readings.append((f"actuator_outputs.output[{n - 1}]", reading))
     return [readings]
 

@@ -19,6 +19,8 @@ SI_UNITS: dict[str, tuple[str, float]] = {
     "1": (SHARE, 1.0), "%": (SHARE, 0.01),
 }  # fmt: skip
 """Kind of each unit, and its size in the SI unit."""
+NEUTRAL_PULSE_US, HALF_PULSE_RANGE_US = 1500.0, 400.0
+"""Usual pulse of a servo at neutral, and from there to either end of its travel."""
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 """Units of the time column."""
 UNIT_FACTORS = (-1.0, 1.0 / _RAD_PER_DEG, 1000.0, _RAD_PER_DEG, 1e-3)

@@ -28,6 +28,7 @@ from beaver_ftc_logs.recording import (
     rows_with_increasing_time,
 )
 from beaver_ftc_logs.runs import last_row_at
+from beaver_ftc_logs.units import HALF_PULSE_RANGE_US, NEUTRAL_PULSE_US
 
 _S_PER_NS = 1e-9
 _TIME_FIELD = "%time"
@@ -38,8 +39,8 @@ TopicTable = dict[str, Floats]
 
 
 def _share_of_travel(us: Floats) -> Floats:
-    """Pulse width about its neutral, as a share of the half range of 400 us."""
-    return (us - 1500.0) / 400.0
+    """Pulse width about its neutral, as a share of half its range."""
+    return (us - NEUTRAL_PULSE_US) / HALF_PULSE_RANGE_US
 
 
 _CONVERSION_OF_UNIT: dict[str, Callable[[Floats], Floats]] = {
@@ -58,7 +59,10 @@ def _alfa_names() -> dict[str, dict[str, Any]]:
 
 
 def read(path: Path, _wanted: Any = None) -> RecordedFlight:
-    """The flight in a folder of topics, with all its columns. Raises BadInput if it has none of the gyro."""
+    """The flight in a folder of topics, with all its columns. Raises BadInput if it has none of the gyro.
+
+    _wanted: every reader receives the columns that are wanted; this one reads all of its few topics.
+    """
     if not path.is_dir():
         raise BadInput(f"{path}: is a file, allowed: a folder of the ALFA data set's processed CSV files")
     tables = dict(_read_topic_tables(path))
@@ -102,21 +106,24 @@ def _add_attitude_errors(columns: Columns) -> None:
 
 
 def _add_airspeed_from_wind(columns: Columns) -> None:
-    """Ground speed less the wind last estimated, m/s: most flights have no airspeed of their own."""
-    names = [f"{vector}_{direction}_m_s" for direction in ("north", "east") for vector in ("ground", "wind")]
+    """Ground speed less the wind last estimated, m/s: most flights have no airspeed of their own. Before the
+    first estimate, which is within half a second of the first speed, this first wind counts."""
+    directions = ("north", "east")
+    names = [f"{vector}_{direction}_m_s" for direction in directions for vector in ("ground", "wind")]
     if any(name not in columns or not len(columns[name].t_s) for name in names):
         return
     stamps = columns[names[0]].t_s
 
-    def held_values(name: str) -> Floats:
-        column = columns[name]
+    def held(name: str) -> Floats:
+        column = columns[f"{name}_m_s"]
         return column.values[last_row_at(column.t_s, stamps)]
 
-    north, east = (held_values(names[i]) - held_values(names[i + 1]) for i in (0, 2))
+    north, east = (held(f"ground_{direction}") - held(f"wind_{direction}") for direction in directions)
     columns["airspeed_by_wind_m_s"] = Column(stamps, np.hypot(north, east))
 
 
 def _failure_events(tables: dict[str, TopicTable], zero_ns: float) -> Iterator[LoggedFailure]:
+    """Each failure that a status states, at the first row with its code."""
     for topic, table in tables.items():
         if topic.startswith(_FAILURE_PREFIX):
             part = topic.removeprefix(_FAILURE_PREFIX)

@@ -90,7 +90,6 @@ _DERIVED_NAME = (
 """Names of setpoints of a quantity, its errors, flags and the like: none of these is the quantity."""
 _ANGLE_RATE_NAME = r"rate|speed|accel|veloc|dot|_(deg|rad)_?s(ec)?$"
 _UNIT_OF_PART = {"rad_s": "rad/s", "rad/s": "rad/s", "deg_s": "deg/s", "deg/s": "deg/s", "dps": "deg/s"}
-_USUAL_TIME = (TIME_COLUMN, "s")
 _PWM_RANGE_US = (700.0, 2300.0)
 _LARGEST_RAD_S = 12.0
 _MIN_CORRELATION = 0.7
@@ -171,8 +170,8 @@ def _agrees(fit: physics.AngleFit) -> bool:
 class _LikelyLog(NamedTuple):
     """A log, of a long table its first part, with the columns that may be something.
 
-    time: its column and unit, None where the reader knows them; all_names: of all its columns; mixing: by its
-    parameters; remarks: what is said of both.
+    time: its column and unit, None for the usual ones; all_names: of all its columns; mixing: by its
+    parameters.
     """
 
     reader: str
@@ -180,7 +179,13 @@ class _LikelyLog(NamedTuple):
     log: RecordedFlight
     all_names: list[str]
     mixing: Mixing
-    remarks: list[str]
+
+    @property
+    def remarks(self) -> list[str]:
+        """What is said of the time and the mixing."""
+        if self.time:
+            return [f"time is in column {self.time[0]}, its steps fit {self.time[1]}"]
+        return self.mixing.lines
 
 
 def _read_likely(path: Path, reader: str | None) -> _LikelyLog:
@@ -193,15 +198,13 @@ def _read_likely(path: Path, reader: str | None) -> _LikelyLog:
         mixing = mixing_of_log(reader, log.parameters, names)
         likely = [*_likely_columns(names, None), *mixing.entry_by_column, *({VTOL_MODE} & {*names})]
         log = read_flight(path, reader, columns=likely)
-        return _LikelyLog(reader, None, log, names, mixing, mixing.lines)
+        return _LikelyLog(reader, None, log, names, mixing)
     time = wanted = None
-    remarks: list[str] = []
     if reader == "table":
-        time, wanted = _find_time(path), _likely_columns(column_names(path))
-        if time != _USUAL_TIME:
-            remarks.append(f"time is in column {time[0]}, its steps fit {time[1]}")
+        wanted = _likely_columns(column_names(path))
+        time = _find_time(path)
     log = next(read_parts(path, reader, time, wanted))
-    return _LikelyLog(reader, time, log, list(log.columns), Mixing(), remarks)
+    return _LikelyLog(reader, time, log, list(log.columns), Mixing())
 
 
 def _guess_vehicle(path: Path, likely: _LikelyLog) -> Document:
@@ -228,7 +231,7 @@ def _guess_vehicle(path: Path, likely: _LikelyLog) -> Document:
     angle_unit = _guess_angle_unit(found["roll"], roll, likely.reader) if roll else "rad"
     rate_unit = _guess_rate_unit(log, [found[axis] for axis in "pqr"], roll, SI_UNITS[angle_unit][1])
     vehicle: Document = {"name": _plain_name(path.stem), "reader": likely.reader}
-    if likely.time not in (None, _USUAL_TIME):
+    if likely.time:
         vehicle["time"] = dict(zip(("column", "unit"), likely.time, strict=True))
     vehicle["rates"] = {axis: _column_entry(found[axis], rate_unit, "rad/s") for axis in "pqr"}
     vehicle |= {"commands": mixing.commands, "surfaces": mixing.surfaces}
@@ -247,11 +250,11 @@ def _guess_vehicle(path: Path, likely: _LikelyLog) -> Document:
 def _find_quantities(names: list[str]) -> dict[str, str]:
     """The columns that look like quantities, by quantity."""
     angles = [name for name in names if not re.search(_ANGLE_RATE_NAME, _snake_case(name))]
-    matches = {
-        quantity: _shortest_match(pattern, angles if quantity in ("roll", "pitch") else names)
+    return {
+        quantity: name
         for quantity, pattern in _NAME_PATTERNS.items()
+        if (name := _shortest_match(pattern, angles if quantity in ("roll", "pitch") else names))
     }
-    return {quantity: name for quantity, name in matches.items() if name}
 
 
 def _add_commands_by_name(likely: _LikelyLog, names: list[str]) -> None:
@@ -291,8 +294,9 @@ def _shortest_match(pattern: str, names: Sequence[str]) -> str | None:
     return min(matches, key=lambda name: (len(name), name), default=None)
 
 
-def _find_time(path: Path) -> TimeSource:
-    """The time column of a table and its unit. Raises BadInput where no column increases like time."""
+def _find_time(path: Path) -> TimeSource | None:
+    """The time column of a table and its unit, None for the usual ones. Raises BadInput where no column
+    increases like time."""
     names = column_names(path)
     likely = [name for name in names if re.fullmatch(_NAME_PATTERNS["time"], _snake_case(name))]
     phrases: list[str] = []
@@ -305,7 +309,7 @@ def _find_time(path: Path) -> TimeSource:
         units = [unit for unit, seconds in TIME_UNITS.items() if shortest_s <= step * seconds <= longest_s]
         if units:
             unit = next((unit for unit in units if _snake_case(name).endswith(unit)), units[0])
-            return name, unit
+            return None if (name, unit) == (TIME_COLUMN, "s") else (name, unit)
     allowed = f"a table with {TIME_COLUMN} in seconds, or another time that increases"
     phrase = f" ({'; '.join(phrases)})" if phrases else ""
     nearest = nearest_names_text(TIME_COLUMN, names)

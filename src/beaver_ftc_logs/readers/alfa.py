@@ -27,7 +27,7 @@ from beaver_ftc_logs.recording import (
     RecordedFlight,
     rows_with_increasing_time,
 )
-from beaver_ftc_logs.runs import last_row_at
+from beaver_ftc_logs.time_base import latest_values
 from beaver_ftc_logs.units import HALF_PULSE_RANGE_US, NEUTRAL_PULSE_US
 
 _S_PER_NS = 1e-9
@@ -106,8 +106,8 @@ def _add_attitude_errors(columns: Columns) -> None:
 
 
 def _add_airspeed_from_wind(columns: Columns) -> None:
-    """Ground speed less the wind last estimated, m/s: most flights have no airspeed of their own. Before the
-    first estimate, which is within half a second of the first speed, this first wind counts."""
+    """Ground speed less the wind last estimated, m/s, nan before the first estimate: most flights have no
+    airspeed of their own."""
     directions = ("north", "east")
     names = [f"{vector}_{direction}_m_s" for direction in directions for vector in ("ground", "wind")]
     if any(name not in columns or not len(columns[name].t_s) for name in names):
@@ -116,7 +116,7 @@ def _add_airspeed_from_wind(columns: Columns) -> None:
 
     def held(name: str) -> Floats:
         column = columns[f"{name}_m_s"]
-        return column.values[last_row_at(column.t_s, stamps)]
+        return latest_values(stamps, column.t_s, column.values)
 
     north, east = (held(f"ground_{direction}") - held(f"wind_{direction}") for direction in directions)
     columns["airspeed_by_wind_m_s"] = Column(stamps, np.hypot(north, east))

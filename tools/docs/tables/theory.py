@@ -4,7 +4,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import aircraft
 from beaver_ftc.diagnosis import bounds
-from beaver_ftc.diagnosis.detection import likelihood, statistical, tones
+from beaver_ftc.diagnosis.detection import likelihood, statistical, statistical_design, tones
 from beaver_ftc.diagnosis.monitors import records, redundancy
 from beaver_ftc.plant import instruments
 from beaver_ftc.studies.present.tables import markdown_table
@@ -39,11 +39,11 @@ CONSTANTS = (  # (section, meaning, module, name there, unit)
     (
         7,
         "share of the alarm level for noise, with model error",
-        statistical,
+        statistical_design,
         "LEVEL_NOISE_SHARE",
         "",
     ),
-    (7, "growth rate in the signature of a growing loss", statistical, "KAPPA_PER_S", "1/s"),
+    (7, "growth rate in the signature of a growing loss", statistical_design, "KAPPA_PER_S", "1/s"),
     (
         7,
         "log-likelihood ratio of an excluded loss, share of the largest",

@@ -195,7 +195,7 @@ class Innovations:
         and not above, (G,) each, 1 as in the model; and the scale of the noise, in variances of it.
 
             X = Z / s,   P = (X' X + eps n I)^-1,   b = P X' v,   e = v - X b
-            bounds = (b -+ 4 sqrt(diag(P) mean(e^2) / share)) / s
+            bounds = (b -+ BOUND_MARGIN sqrt(diag(P) mean(e^2) / share)) / s
 
         eps: a small number, which keeps the bounds finite and far apart where columns make one another up.
         share: as how many white samples one counts.

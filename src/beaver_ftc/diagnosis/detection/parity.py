@@ -37,7 +37,7 @@ Letters of the kernels, in addition to those of likelihood.py and rows.py:
 
     m, col      direction of a view and g / |g|, (5,)
     b, f        block of a view; record of a force
-    L           acceleration per rad/s of rotation of the air, 1/s
+    L           acceleration per rad/s of the aircraft against the air, 1/s
     cfg         configuration of the statistical tests
 """
 

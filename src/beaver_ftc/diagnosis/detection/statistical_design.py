@@ -34,11 +34,7 @@ from beaver_ftc.diagnosis.detection.parity import (
     configure_parity_views,
     list_directions,
 )
-from beaver_ftc.diagnosis.detection.rows import (
-    RATES,
-    configure_rows,
-    set_columns,
-)
+from beaver_ftc.diagnosis.detection.rows import RATES, configure_rows, set_columns
 from beaver_ftc.diagnosis.detection.statistical import MAX_ETA_RATE
 from beaver_ftc.diagnosis.detection.tones import N_TONES, configure_tones
 from beaver_ftc.diagnosis.deviations import coefficient_bounds, moment_axis
@@ -73,9 +69,7 @@ class Entry(NamedTuple):
     alarms: bool
 
 
-def hypotheses_by_block(
-    aircraft: Aircraft,
-) -> Iterator[tuple[tuple[int, ...], list[Entry]]]:
+def hypotheses_by_block(aircraft: Aircraft) -> Iterator[tuple[tuple[int, ...], list[Entry]]]:
     """Axes and hypotheses of each block: the losses of the surfaces that turn about its axes, and what they
     are compared with. Roll and yaw are there twice (statistical.py)."""
     for axes in ((PITCH,), ROLL_YAW_PLANE, ROLL_YAW_PLANE):

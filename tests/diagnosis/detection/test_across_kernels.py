@@ -48,7 +48,7 @@ def observe(fdi, innovation, G, frame):
     rows, views = statistical["rows"], statistical["views"][: int(statistical["n_views"])]
     rows["nu"][:, :3], rows["G"][:4, :3], rows["Gu"][:4, :3] = innovation, G.T, 0.05 * G.T
     parts = (statistical[name] for name in ("noise", "rows", "forces", "gust", "gust", "vaneless"))
-    parity.look_at_views(views, *parts, V)
+    parity.project_views(views, *parts, V)
     parity.update_views(views, statistical["test"], statistical["tone_test_config"], FLOW, DT, frame, False)
 
 

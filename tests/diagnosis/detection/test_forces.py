@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from beaver_ftc.diagnosis.detection.rows import INERTIAL, RAW
+from beaver_ftc.diagnosis.state import SIDE_FORCE
 from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.studies.matrix.fault_matrix import declared
 from flying import SINES, scenario
@@ -27,11 +29,11 @@ def test_jsbsim_s_forces_are_those_of_the_aircraft_s_file():
     """Without errors next to nothing is left, in flight with rates and sideslip."""
     everything = {"fault_class": "all", "statistical": {}}
     loop = Loop(flown(sensors="ideal", uncertainty={}, actuators="ideal", fdi=everything))
-    left, forces = [], loop.frames["fdi"]["statistical"]["forces"][0]
+    left, rows = [], loop.frames["fdi"]["statistical"]["rows"][0]
     for k in range(300):
         loop.sample_references(k, 1)
         loop.fly_frames(1, 1 if k else 0)
-        left.append((*forces["component"]["innovation"], *forces["component"]["e_inertial"]))
+        left.append((*rows["nu"][RAW, SIDE_FORCE:], *rows["nu"][INERTIAL, SIDE_FORCE:]))
     loop.release()
     assert np.abs(loop.frames["measured"]["force"][0]).max() > 8.0
     assert np.abs(left)[:, :2].max() < 1e-4

@@ -14,7 +14,8 @@ from beaver_ftc.diagnosis.detection.forces import (
     SIDE_INDEX,
     configure_forces,
 )
-from beaver_ftc.diagnosis.detection.rows import update_forces
+from beaver_ftc.diagnosis.detection.rows import INERTIAL, RAW, update_forces
+from beaver_ftc.diagnosis.state import SIDE_FORCE
 from beaver_ftc.plant.instruments import MEASURED
 from beaver_ftc.scenario.diagnosis import Bounds
 from flying import declared_in
@@ -139,8 +140,9 @@ def test_noise_of_the_readings_is_jitter_of_the_forces():
         feel(fdi, measured(X + std[3] * rng.normal(size=3), y))
         drawn.append(record["component"]["innovation"].copy())
     feel(fdi, measured())
-    assert np.sqrt(record["component"]["var"][:, 0]) == pytest.approx(np.std(drawn, axis=0), rel=0.06)
-    without = record["component"]["var"][:, 0] - record["component"]["var"][:, 1]
+    noise = fdi["statistical"]["rows"]["std"][:, SIDE_FORCE:]
+    assert noise[RAW] == pytest.approx(np.std(drawn, axis=0), rel=0.06)
+    without = noise[RAW] ** 2 - noise[INERTIAL] ** 2
     slopes = record["component"]["vane"][:, 1] * np.radians([0.02, 0.03])
     assert without == pytest.approx(slopes**2, rel=1e-6)
 

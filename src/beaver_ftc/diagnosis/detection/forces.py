@@ -24,6 +24,8 @@ like e, is in rad/s2.
     angle, vane    flow angle from inertial motion, rad; of a vane's error, per rad: (acceleration, e)
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from beaver_ftc.aircraft import AXES, Aircraft, Term
@@ -39,9 +41,24 @@ from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA
 from beaver_ftc.scenario.declared import MASS_TOLERANCE, Declared, SensorErrors
 from beaver_ftc.scenario.sensors import ACCELEROMETERS
 
+
+class Force(NamedTuple):
+    """A force: its coefficient; its vane, in y and by name; the axis that it turns; its accelerometer."""
+
+    coefficient: str
+    vane: int
+    vane_name: str
+    axis: int
+    accelerometer: str
+
+
 SIDE_INDEX, NORMAL_INDEX = range(2)  # across the body, and normal to it
-FORCE_NAMES = ("CY", "CZ")
-VANES = BETA, ALPHA  # of each force, in y
+MEASURED_FORCES = (
+    Force("CY", BETA, "beta", YAW, ACCELEROMETERS[1]),
+    Force("CZ", ALPHA, "alpha", PITCH, ACCELEROMETERS[2]),
+)
+FORCE_NAMES = tuple(force.coefficient for force in MEASURED_FORCES)
+VANES = tuple(force.vane for force in MEASURED_FORCES)
 SIDE_ROW = FORCES.index("CY")
 TYPICAL_RATE_RAD_S, TYPICAL_SLOPE_RAD = 0.2, 0.3  # typical rates and path slope, for the drift
 MIN_UPDATES = 2  # from the second one on the rate of sideslip of the run before is known
@@ -58,13 +75,13 @@ TrimState = tuple[np.ndarray, np.ndarray, np.ndarray]  # x (3,) rad/s, y and u r
 
 FORCE_RECORD = record(
     innovation=float,  # e at the start of the elapsed frame
-    # e at the flow angle from inertial motion; that angle, rad; e per rad/s of its drift; intensity of the
-    # drift of e by errors and gusts, (rad/s2)2/s
-    e_inertial=float, angle=float, e_drift=float, Q_e=float,
+    angle=float,  # flow angle from inertial motion, rad
+    e_drift=float,  # e per rad/s of the drift of that angle
+    Q_e=float,  # intensity of the drift of e at that angle by errors and gusts, (rad/s2)2/s
     G=MAX_SURFACES,  # e per rad of each surface, now
     # of an error of the vane, per rad: angular acceleration and e, angular acceleration in roll
     vane=2, vane_roll=float,
-    var_trim=2, var=2,  # variance of e in trim and now, with the vane and without it, (rad/s2)2
+    var_trim=2,  # variance of f_hat in trim by noise, with that of the vane and without it, (rad/s2)2
     L=3, f_hat=float,
     G_trim=MAX_SURFACES,  # magnitude of e by each surface in trim, per rad
     var_acc=float,  # variance of e by noise of the accelerometer; independent of the pressure
@@ -108,15 +125,15 @@ def drop_forces(forces, gust, vaneless, vaned):
 
 @kernel
 def update_inertial(forces, f, i, y, dt):
-    """Integrate the flow angle of a vane from inertial motion, and fill the innovation of force i at it.
+    """Integrate the flow angle of a vane from inertial motion, and return the innovation of force i at it.
 
-    angle <- angle + dt angle_rate      e_inertial = e - slope (y - angle)      e_drift = sum dt slope
+    angle <- angle + dt angle_rate      returned: e - slope (y - angle)      e_drift = sum dt slope
     """
     angle = y[VANES[i]]
     slope = f.vane[1] * forces.q_ratio
     f.angle = f.angle + dt * forces.angle_rate[i] if forces.n_seen else angle
     f.e_drift += dt * slope
-    f.e_inertial = f.innovation - slope * (angle - f.angle)
+    return f.innovation - slope * (angle - f.angle)
 
 
 @kernel
@@ -177,24 +194,23 @@ def _configure_force(
     """Fill the record of one force; the arguments are those of `configure_forces`."""
     y, aircraft, errors = trim[1], declared.aircraft, declared.sensors
     forces, cfg = fdi["statistical"]["forces"], fdi["statistical"]["gust"]["config"]
-    f, terms = forces["component"][i], terms_of_force(aircraft, i)
-    vane, axis = VANES[i], (2, 1)[i]
+    f, terms, force = forces["component"][i], terms_of_force(aircraft, i), MEASURED_FORCES[i]
     per_C = y[QDYN] * cfg["S_m"] * forces["c_inv"]
-    f_all = per_C * _force_slopes(aircraft, FORCE_NAMES[i], trim)
+    f_all = per_C * _force_slopes(aircraft, force.coefficient, trim)
     f_y = f_all[:-1]
-    f["vane"] = (-slopes[axis, vane], -f_y[vane])
-    f["vane_roll"] = -slopes[0, vane]
+    f["vane"] = (-slopes[force.axis, force.vane], -f_y[force.vane])
+    f["vane_roll"] = -slopes[ROLL, force.vane]
     f["L"] = f_y[3:]
-    f["var_trim"] = _force_variances(fdi, errors, y, f_all, vane)
-    std = errors[ACCELEROMETERS[1 + i]].random
+    f["var_trim"] = _force_variances(fdi, errors, y, f_all, force.vane)
+    std = errors[force.accelerometer].random
     f["var_acc"] = (forces["c_inv"] * std) ** 2
     drift = _drift_bound(errors, cfg["gravity"], y[AIRSPEED], i)
-    _configure_columns(fdi["statistical"]["rows"], f, declared, terms, y, f_y[vane] / per_C, drift, i)
+    _configure_columns(fdi["statistical"]["rows"], f, declared, terms, y, f_y[force.vane] / per_C, drift, i)
     for term in terms:
         if term.surface:
             f["G_trim"][aircraft.surfaces.index(term.surface)] += per_C * abs(term.value)
     Q_angle = (DRIFT_CHANGE_PER_S * drift) ** 2 + dt * (std / y[AIRSPEED]) ** 2
-    f["Q_e"] = f_y[vane] ** 2 * (Q_angle + declared.air.angle_walk(y[AIRSPEED]))
+    f["Q_e"] = f_y[force.vane] ** 2 * (Q_angle + declared.air.angle_walk(y[AIRSPEED]))
 
 
 def _force_variances(
@@ -229,7 +245,7 @@ def _drift_bound(errors: SensorErrors, gravity: float, V: float, i: int) -> floa
     gyros = sum(errors[name].steady + TYPICAL_RATE_RAD_S * errors[name].slope for name in AXES)
     # how far accelerometers can be off across the flow in level flight: that of the axis, and of the one
     # ahead as much as the flow's angle lets it
-    acc = errors[ACCELEROMETERS[1 + i]]
+    acc = errors[MEASURED_FORCES[i].accelerometer]
     a_acc = (
         acc.steady
         + TYPICAL_SLOPE_RAD * errors["ax"].steady
@@ -252,9 +268,8 @@ def _configure_columns(
     """Fill the tolerances of the force's columns: of each term, by that of the coefficients and by constant
     errors of vane and pressure; of the rate of sideslip; of the accelerometer's bias, m/s2; of the whole; of
     the drift, rad/s. Fill the columns of an error of the vane."""
-    tol_C, errors = declared.coefficients.largest, declared.sensors
-    vane = errors["alpha" if i == NORMAL_INDEX else "beta"]
-    acc = errors[ACCELEROMETERS[1 + i]]
+    tol_C, errors, force = declared.coefficients.largest, declared.sensors, MEASURED_FORCES[i]
+    vane, acc = errors[force.vane_name], errors[force.accelerometer]
     tol_q = errors["qdyn"].steady / y[QDYN] + errors["qdyn"].slope
     tol = [
         (tol_C + tol_q + vane.slope) * abs(t.value) + t.is_constant * vane.steady * abs(C_vane) for t in terms
@@ -268,7 +283,7 @@ def _configure_columns(
     tol += [MASS_TOLERANCE + acc.slope, drift]
     f["n_Z"], rows["tol"][first : first + len(tol)] = len(tol) - 1, tol
     of_vane = rows["G"][MAX_SURFACES + i]
-    of_vane[[ROLL, YAW if i == SIDE_INDEX else PITCH, SIDE_FORCE + i]] = f["vane_roll"], *f["vane"]
+    of_vane[[ROLL, force.axis, SIDE_FORCE + i]] = f["vane_roll"], *f["vane"]
     rows["e_G"][MAX_SURFACES + i] = VANE_TOLERANCE * np.abs(of_vane)
 
 

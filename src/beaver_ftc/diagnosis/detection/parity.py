@@ -71,9 +71,9 @@ from beaver_ftc.diagnosis.detection.rows import (
     RAW,
     VANED,
     VANELESS,
-    add_turn,
-    look,
-    look_across,
+    add_turn_variance,
+    fill_leak,
+    project_rows,
     set_columns,
 )
 from beaver_ftc.diagnosis.detection.tones import tones_dtype, update_tones, within_limits
@@ -117,7 +117,7 @@ def view_dtype(size: BlockCapacity) -> np.dtype:
         confirmer=int,  # force of the views that confirm this one; 0 if no vane is used
         # of this frame: whether the view is used; which share of nu along the column leaks into it
         used=int, leak=float,
-        L_rate=3, L_force=3,  # effect of the air's rotation about the body axes, 1/s
+        L_rate=3, L_force=3,  # by the rates and by the forces that it combines, 1/s: fill_view_drift
         peak=float,  # largest score, decaying slowly
         block=likelihood.block_dtype(size), tones=tones_dtype(size.max_regressors),
     )  # fmt: skip
@@ -170,12 +170,12 @@ def fill_view_drift(view, q, gust, own, forces, V):
             for i, f in enumerate(forces.component):
                 view.L_force[j] += m[0, SIDE_FORCE + i] * f.L[j] * forces.q_ratio
         Q_d += view_drift(own, V, view.L_rate, view.L_force, view.block.source != RAW and forces.in_use == 1)
-        add_turn(b, gust)
+        add_turn_variance(b, gust)
     b.Q_d[0, 0] = Q_d
 
 
 @kernel
-def look_at_views(views, noise, rows, forces, gust, vaned, vaneless, V):
+def project_views(views, noise, rows, forces, gust, vaned, vaneless, V):
     """Bring direction, noise, signatures and regressors of each view to the elapsed frame; V m/s.
 
     gust, vaned, vaneless: the estimates that are subtracted: rows.py.
@@ -187,9 +187,9 @@ def look_at_views(views, noise, rows, forces, gust, vaned, vaneless, V):
             continue
         of_view = gust if b.source == RAW else vaned
         view.leak = turn_view(view, rows, of_view) if view.nulled != AXIS_VIEW else 0.0
-        look(b, rows)
+        project_rows(b, rows)
         if view.nulled != AXIS_VIEW and b.n_Z > 0:
-            look_across(b, rows, view.leak, view.col)
+            fill_leak(b, rows, view.leak, view.col)
         own = vaneless if b.source >= VANELESS and forces.in_use else of_view
         fill_view_drift(view, noise.q, of_view, own, forces, V)
 

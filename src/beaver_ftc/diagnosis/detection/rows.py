@@ -219,10 +219,11 @@ def update_forces(rows, forces, gust, du, meas, u, dt):
     for i, f in enumerate(forces.component):
         r, f_prev, eta = SIDE_FORCE + i, f.f_hat, 0.0
         update_force(rows, forces, f, gust, i, meas, u)
-        update_inertial(forces, f, i, meas.y, dt)
-        for source in range(INERTIAL):
-            rows.nu[source, r], rows.std[source, r] = f.innovation, np.sqrt(f.var[0])
-        rows.nu[INERTIAL, r], rows.std[INERTIAL, r] = f.e_inertial, np.sqrt(f.var[1])
+        std = f.f_hat * forces.q_noise / meas.y[QDYN]
+        for source in range(INERTIAL + 1):
+            var = f.var_trim[int(source == INERTIAL)] * forces.q_ratio**2 + std * std + f.var_acc
+            rows.nu[source, r], rows.std[source, r] = f.innovation, np.sqrt(var)
+        rows.nu[INERTIAL, r] = update_inertial(forces, f, i, meas.y, dt)
         rows.Z[rows.first[i] + f.n_Z, r] = f.e_drift
         for s in range(u.size):
             eta += f.G_trim[s] * du[s]
@@ -234,42 +235,53 @@ def update_forces(rows, forces, gust, du, meas, u, dt):
 
 @kernel
 def update_force(rows, forces, f, gust, i, meas, u):
-    """Update force i, whose record is f: its innovation e, the effects of surfaces, and its columns.
+    """Update force i, whose record is f: its innovation e = a_i / c - f_hat, and the effects of surfaces.
 
-        f_hat = sum C_k Z_k,  Z_k = per_C monomial_k u_s,  per_C = qdyn S / m c      e = a_i / c - f_hat
-
-    The last columns are the term in the rate of sideslip, f_bdot, and f_hat itself.
+    The rows have the effects of the frame before, as for the rates: the law reacts to the noise of a reading,
+    which must not be in a signature too (statistical.md, "Signature from the previous frame").
     """
-    table, r, c = gust.memory.table, SIDE_FORCE + i, rows.first[i]
-    first = table.free_from[SIDE_ROW + i]
-    end = table.surface_to[SIDE_ROW + i]
-    per_C = meas.y[QDYN] * gust.config.S_m * forces.c_inv
-    f_hat = 0.0
+    r = SIDE_FORCE + i
     for s in range(u.size):
-        rows.G[s, r], rows.e_G[s, r], f.G[s] = f.G[s], 0.0, 0.0
-    for k in range(first, end):
-        s = table.surface[k]
-        Z = per_C * table.power[table.monomial[k]]
-        if s >= 0:
-            f.G[s] += table.value[k] * Z
-            rows.e_G[s, r] += rows.tol[c + k - first] * abs(Z)
-            Z *= u[s]
-        rows.Z[c + k - first, r] = Z
-        f_hat += table.value[k] * Z
-    if i == SIDE_INDEX:
-        span_over_2V = gust.config.span / (2.0 * meas.y[AIRSPEED])
-        f_bdot = per_C * forces.CY_bdot * forces.angle_rate[SIDE_INDEX] * span_over_2V
-        rows.Z[c + end - first, r] = f_bdot
-        f_hat += f_bdot
-    rows.Z[c + f.n_Z - 1, r] = f.f_hat = f_hat
+        rows.G[s, r] = f.G[s]
+    f.f_hat = f_hat = add_terms(rows, forces, f, gust, i, meas, u)
+    rows.Z[rows.first[i] + f.n_Z - 1, r] = f_hat
     for s in range(u.size):
         if forces.n_seen == 0:
             rows.G[s, r] = f.G[s]
         rows.Gu[s, r] = rows.G[s, r] * u[s]
     f.innovation = meas.force[1 + i] * forces.c_inv - f_hat
-    std = f_hat * forces.q_noise / meas.y[QDYN]
-    for k in range(2):
-        f.var[k] = f.var_trim[k] * forces.q_ratio**2 + std * std + f.var_acc
+
+
+@kernel
+def add_terms(rows, forces, f, gust, i, meas, u):
+    """Fill the columns of the terms of force i, and the effects of surfaces with the bounds on their errors;
+    return f_hat.
+
+        f_hat = sum C_k Z_k,  Z_k = per_C monomial_k u_s,  per_C = qdyn S / m c
+
+    The last of the side force is the term in the rate of sideslip, f_bdot. Column c + k is that of term k.
+    """
+    table, r = gust.memory.table, SIDE_FORCE + i
+    first, end = table.free_from[SIDE_ROW + i], table.surface_to[SIDE_ROW + i]
+    c, f_hat = rows.first[i] - first, 0.0
+    per_C = meas.y[QDYN] * gust.config.S_m * forces.c_inv
+    for s in range(u.size):
+        rows.e_G[s, r], f.G[s] = 0.0, 0.0
+    for k in range(first, end):
+        s = table.surface[k]
+        Z = per_C * table.power[table.monomial[k]]
+        if s >= 0:
+            f.G[s] += table.value[k] * Z
+            rows.e_G[s, r] += rows.tol[c + k] * abs(Z)
+            Z *= u[s]
+        rows.Z[c + k, r] = Z
+        f_hat += table.value[k] * Z
+    if i == SIDE_INDEX:
+        span_over_2V = gust.config.span / (2.0 * meas.y[AIRSPEED])
+        f_bdot = per_C * forces.CY_bdot * forces.angle_rate[SIDE_INDEX] * span_over_2V
+        rows.Z[c + end, r] = f_bdot
+        f_hat += f_bdot
+    return f_hat
 
 
 def set_columns(b: np.void, rows: np.void, columns: list[int]) -> None:
@@ -279,33 +291,34 @@ def set_columns(b: np.void, rows: np.void, columns: list[int]) -> None:
 
 
 @kernel
-def seen(m, i, X, k, size=False):
-    """m_i X_k in direction i of m (2, 5); X (K, 5); |m_i| X_k if X is of sizes."""
+def projection(m, i, X, k, size=False):
+    """m_i X_k, row k of X (K, 5) in direction i of m (2, 5); |m_i| X_k if X is of sizes."""
     return project(row_of(m, i), row_of(X, k), size)
 
 
 @kernel
-def look(b, rows):
-    """Fill what block b sees of the rows of the elapsed frame: nu, noise, bound, signatures, regressors."""
+def project_rows(b, rows):
+    """Fill the rows of the elapsed frame in the directions of block b: nu, noise, bound, signatures,
+    regressors."""
     m, source = b.m, b.source
     for i in range(b.n):
-        b.nu[i] = seen(m, i, rows.nu, source)
-        b.Q_x[i] = seen(m, i, rows.std, source, True) ** 2
-        b.eta[i] = seen(m, i, rows.eta, b.any_position, True)
+        b.nu[i] = projection(m, i, rows.nu, source)
+        b.Q_x[i] = projection(m, i, rows.std, source, True) ** 2
+        b.eta[i] = projection(m, i, rows.eta, b.any_position, True)
         b.R_y[i] = 0.0
         for r in range(N_ROWS):
             b.R_y[i] += m[i, r] * m[i, r] * rows.R[r]
         for h in b.hypothesis[: b.n_h]:
             if h.surface >= 0:
-                h.signature[i] = seen(m, i, rows.Gu, h.surface)
+                h.signature[i] = projection(m, i, rows.Gu, h.surface)
             elif h.kind == ALPHA_CUBED_MOMENT:
                 h.signature[i] = m[i, PITCH] * rows.per_cubed
         for j in range(b.n_Z):
-            b.regressor[j, i] = seen(m, i, rows.Z, b.columns[j])
+            b.regressor[j, i] = projection(m, i, rows.Z, b.columns[j])
 
 
 @kernel
-def look_across(b, rows, leak, col):
+def fill_leak(b, rows, leak, col):
     """The last regressor of a view, leak col' nu: what an error of the column col (5,) lets through."""
     b.regressor[b.n_Z - 1, 0] = 0.0
     for r in range(N_ROWS):
@@ -313,7 +326,7 @@ def look_across(b, rows, leak, col):
 
 
 @kernel
-def add_turn(b, gust):
+def add_turn_variance(b, gust):
     """P_dd <- P_dd + Q_scale m var_turn m': what a fast turn of the gusts' axes may change in the drift."""
     for i in range(b.n):
         for j in range(b.n):

@@ -47,9 +47,9 @@ from beaver_ftc.diagnosis.detection.rows import (
     NOISE_RECORD,
     ROWS_RECORD,
     add_constants,
-    add_turn,
+    add_turn_variance,
     begin_rows,
-    look,
+    project_rows,
 )
 from beaver_ftc.diagnosis.detection.tones import TONE_RECORD
 from beaver_ftc.diagnosis.gusts import (
@@ -103,13 +103,13 @@ def update_blocks(cfg, rows, blocks, gust, dt, k, alarmed, may_end=False):
     for j, b in enumerate(blocks):
         if not alarmed:
             likelihood.reset_slot(b, slot)
-        look(b, rows)
+        project_rows(b, rows)
         b.has_coarse = gust.config.coarse_only
         if gust.config.coarse_only:
             for i, axis in enumerate(b.axes[: b.n]):
                 b.g_c[i] = gust.output.acc_coarse[axis]
         if gust.output.gusty:
-            add_turn(b, gust)
+            add_turn_variance(b, gust)
             if j < likelihood.REVERTING_BLOCK:
                 likelihood.whiten_calm(b, dt)
             else:  # without gust both blocks of roll and yaw have the same filter
@@ -225,7 +225,7 @@ def excludes_loss(cfg, blocks, fies, of, s, pitch_ends, abrupt):
     pitch, because a loss acts on its own axes only. A loss that is not declared `abrupt` may grow. A constant
     theta then explains only a part of its effect, so that share is MIN_LLR_SHARE instead of 1. The same holds
     for a loss that begins inside a frame of several instants, and for the end of a loss there. The end of a
-    loss in pitch counts only if `pitch_ends` is set: a fault outside the class may look like it.
+    loss in pitch counts only if `pitch_ends` is set: a fault outside the class may project_rows like it.
     """
     pitch = blocks[likelihood.PITCH_BLOCK]
     single = cfg.w == 1.0
@@ -302,11 +302,11 @@ def fill_drift(noise, eta, blocks, gust, V, dt):
 
     Q_d = Q_scale q_gust + q max(eta, MIN_ETA)^2,  (rad/s2)2/s      a = exp(-dt V / length)
     """
+    gusty = gust.output.gusty
     for k, b in enumerate(blocks):
         reverts, length = k == likelihood.REVERTING_BLOCK, b.drift_correlation_length_m
         for i, axis in enumerate(b.axes[: b.n]):
             for j in range(b.n):
-                gusty = gust.output.gusty
                 q_gust = gusts.unmeasured_drift(gust, V, axis, b.axes[j], reverts) if gusty else 0.0
                 b.Q_d[i, j] = b.Q_scale * q_gust
             q_eta = noise.q * max(eta[axis], likelihood.MIN_ETA_RAD_S2) ** 2

@@ -193,7 +193,7 @@ def update_tests(fdi, prediction, measured, k, t):
         attitude.compare_attitude(att, blocks, eta, measured.x, dt, detected)
         if detected and att.score > 1.0:
             sensor_monitor.rule_out_gyros(fdi.sensor_monitor)
-    parity.look_at_views(views, stat.noise, rows, force, gust, view_gust, vaneless, y[AIRSPEED])
+    parity.project_views(views, stat.noise, rows, force, gust, view_gust, vaneless, y[AIRSPEED])
     parity.update_views(views, cfg, stat.tone_test_config, y, dt, k, alarmed)
     bounded = fdi.bound.error_map.outside == 0
     statistical.update_alarm(stat.alarm, cfg, blocks, views, force, gust, t, bounded)

@@ -4,8 +4,8 @@
     Memory    written by the kernels of one file
     Output    written by the kernels of one file, read by any
 
-A field counts whose name is declared once, by `record(...)`: whose record a common name belongs to, the tree
-does not say. The lists below are the exceptions: there are none.
+A field counts whose name is declared once, by `record(...)` or in PARTS: whose record a common name belongs
+to, the tree does not say. The lists below are the exceptions: there are none.
 """
 
 import ast
@@ -21,6 +21,7 @@ COMPILED = {"kernel", "apart", "lazy_kernel"}
 
 SEVERAL_FILES: set[str] = set()
 OTHER_FOLDER: set[str] = set()
+PARTS = {"TEST_FIELDS", "ISOLATION_FIELDS"}  # fields of one record, which is put together elsewhere
 
 
 @cache
@@ -73,6 +74,9 @@ def declared_once() -> dict[str, str]:
             if isinstance(node, ast.Call) and name_of(node) == "record":
                 for keyword in node.keywords:
                     declared[keyword.arg].add(place)
+            elif isinstance(node, ast.Assign) and name_of(node.targets[0]) in PARTS:
+                for key in getattr(node.value, "keys", []):
+                    declared[key.value].add(place)
     return {str(field): places.pop() for field, places in declared.items() if len(places) == 1}
 
 

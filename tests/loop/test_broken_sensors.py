@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import beaver_ftc as bf
-from beaver_ftc.diagnosis.monitors.records import ALPHA_TEST, BETA_TEST, RPM_TEST
+from beaver_ftc.diagnosis.monitors.numbering import ALPHA_TEST, BETA_TEST, RPM_TEST
 from beaver_ftc.plant.instruments import AX, SENSORS
 from beaver_ftc.scenario.schema import load
 from flying import SINES

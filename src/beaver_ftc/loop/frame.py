@@ -49,7 +49,7 @@ from beaver_ftc.diagnosis.model_prediction import (
     move_surfaces,
     predict_known,
 )
-from beaver_ftc.diagnosis.monitors import redundancy, sensor_monitor
+from beaver_ftc.diagnosis.monitors import sensor_monitor
 from beaver_ftc.diagnosis.schemes import detection_share, record_isolated_surfaces
 from beaver_ftc.diagnosis.state import PITCH, PLUGIN_SCHEME
 from beaver_ftc.diagnosis.types import verdict
@@ -335,7 +335,7 @@ def monitor_sensors(frame):
     fdi, monitor, engine = frame.fdi, frame.fdi.sensor_monitor, frame.control.power.output
     before, t = monitor.output.alarmed, frame.k * frame.dt
     if engine.in_use:
-        redundancy.expect_pressure(monitor, engine.command[0])
+        sensor_monitor.expect_pressure(monitor, engine.command[0])
     sensor_monitor.check_sensors(
         monitor, frame.prediction, frame.measured, fdi.verdict, fdi.bank, fdi.bound, frame.dt, t
     )

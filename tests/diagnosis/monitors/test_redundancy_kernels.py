@@ -6,18 +6,18 @@ from kernels import fill
 from true_flight import UNITS, compared, new_monitor, true_flight
 
 from beaver_ftc.diagnosis.monitors import redundancy
-from beaver_ftc.diagnosis.monitors.records import (
-    AIRSPEED,
-    ALPHA,
+from beaver_ftc.diagnosis.monitors.numbering import (
     ALPHA_TEST,
     ANGLE_TEST,
-    BETA,
     BETA_TEST,
     CLIMB_TEST,
     DENSITY_TEST,
+    I_AIRSPEED,
+    I_ALPHA,
+    I_BETA,
+    I_QDYN,
     N_EQUATIONS,
     PRESSURE_TEST,
-    QDYN,
     RPM_TEST,
     SPEED_TEST,
     THETA,
@@ -60,8 +60,8 @@ def test_exact_readings_are_predicted(seed):
 # By sensor: the tests that are exceeded at once by a jump of 20 times the declared error
 SHOWN_BY = {
     **{i: {TURN_TEST + i} for i in range(3)}, **{PHI + i: {ANGLE_TEST + i} for i in range(3)},
-    ALPHA: {ALPHA_TEST}, BETA: {BETA_TEST}, AIRSPEED: {SPEED_TEST, DENSITY_TEST},
-    QDYN: {DENSITY_TEST}, ALTITUDE: {CLIMB_TEST}, ENGINE_SPEED: {RPM_TEST}, MANIFOLD: {PRESSURE_TEST},
+    I_ALPHA: {ALPHA_TEST}, I_BETA: {BETA_TEST}, I_AIRSPEED: {SPEED_TEST, DENSITY_TEST},
+    I_QDYN: {DENSITY_TEST}, ALTITUDE: {CLIMB_TEST}, ENGINE_SPEED: {RPM_TEST}, MANIFOLD: {PRESSURE_TEST},
 }  # fmt: skip
 
 

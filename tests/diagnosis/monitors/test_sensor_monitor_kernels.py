@@ -7,17 +7,15 @@ from true_flight import UNITS, new_monitor, true_flight
 
 from beaver_ftc.diagnosis.model_prediction import prediction_dtype
 from beaver_ftc.diagnosis.monitors import sensor_monitor
-from beaver_ftc.diagnosis.monitors.records import (
-    AIRSPEED,
-    ALPHA,
+from beaver_ftc.diagnosis.monitors.numbering import (
     ALPHA_TEST,
     ANGLE_TEST,
-    BETA,
     BETA_TEST,
     CLIMB_TEST,
     DENSITY_TEST,
-    GYRO_OPEN,
-    GYRO_REFUTED,
+    I_AIRSPEED,
+    I_ALPHA,
+    I_BETA,
     PRESSURE_TEST,
     PSI,
     RPM_TEST,
@@ -25,6 +23,7 @@ from beaver_ftc.diagnosis.monitors.records import (
     THETA,
     TURN_TEST,
 )
+from beaver_ftc.diagnosis.monitors.sensor_monitor import GYRO_OPEN, GYRO_REFUTED
 from beaver_ftc.plant.instruments import (
     ALTITUDE,
     AX,
@@ -157,17 +156,17 @@ def suspects(ratios, alarm=None, **fields):
 @pytest.mark.parametrize(
     ("ratios", "who"),
     [
-        ({SPEED_TEST: 2.0}, {AIRSPEED, *FORCES}),
-        ({DENSITY_TEST: 3.0, SPEED_TEST: 2.0}, {AIRSPEED}),
+        ({SPEED_TEST: 2.0}, {I_AIRSPEED, *FORCES}),
+        ({DENSITY_TEST: 3.0, SPEED_TEST: 2.0}, {I_AIRSPEED}),
         ({CLIMB_TEST: 2.0}, {ALTITUDE}),
         ({CLIMB_TEST: 3.0, SPEED_TEST: 2.0}, set()),  # the altitude is in no other test
-        ({DENSITY_TEST: 3.0, CLIMB_TEST: 2.0}, {AIRSPEED}),  # nor is the dynamic pressure
+        ({DENSITY_TEST: 3.0, CLIMB_TEST: 2.0}, {I_AIRSPEED}),  # nor is the dynamic pressure
         ({RPM_TEST: 2.0}, {ENGINE_SPEED}),
         ({PRESSURE_TEST: 2.0}, {MANIFOLD}),
-        ({ALPHA_TEST: 5.0}, {ALPHA, *FORCES}),
-        ({BETA_TEST: 5.0}, {BETA, *FORCES}),
-        ({ALPHA_TEST: 2.0}, {ALPHA, 1, *FORCES}),  # its gyro need not show yet: within twice both bounds
-        ({BETA_TEST: 2.0}, {BETA, 2, *FORCES}),
+        ({ALPHA_TEST: 5.0}, {I_ALPHA, *FORCES}),
+        ({BETA_TEST: 5.0}, {I_BETA, *FORCES}),
+        ({ALPHA_TEST: 2.0}, {I_ALPHA, 1, *FORCES}),  # its gyro need not show yet: within twice both bounds
+        ({BETA_TEST: 2.0}, {I_BETA, 2, *FORCES}),
         ({ALPHA_TEST: 5.0, TURN_TEST + 1: 2.0}, {1}),
         ({BETA_TEST: 5.0, TURN_TEST + 2: 2.0}, {2}),
         ({BETA_TEST: 5.0, TURN_TEST: 2.0}, {0}),  # no sensor of the flow moves the attitude's tests
@@ -227,7 +226,8 @@ def test_faults_drawn_at_random_end_as_kept(i, changed):
         results = {name: output[name] for name in output.dtype.names}
         results |= {name: monitor[name] for name in KEPT_MEMORY}
         results |= {"gyro_verdict": monitor["gyro"]["verdict"]}
-        results |= {"B": monitor["B"], "initial": monitor["E"], "refuted": monitor["refuted"].sum(axis=1)}
+        initial = monitor["initial"]
+        results |= {"B": monitor["B"], "initial": initial["E"], "refuted": initial["refuted"].sum(axis=1)}
         results |= {"given": given.mean(axis=0), "inertial": inertial.sum(), "history": history.sum(axis=0)}
         kept.append(results)
     assert not changed(kept)

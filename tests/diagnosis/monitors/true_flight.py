@@ -5,15 +5,15 @@ from kernels import fill
 from scipy.spatial.transform import Rotation
 
 from beaver_ftc.diagnosis.monitors import initial_errors, redundancy
-from beaver_ftc.diagnosis.monitors.records import (
-    AIRSPEED,
-    ALPHA,
-    BETA,
+from beaver_ftc.diagnosis.monitors.numbering import (
     FILTER_POLES_PER_S,
+    I_AIRSPEED,
+    I_ALPHA,
+    I_BETA,
+    I_QDYN,
     NO_SENSOR,
-    QDYN,
-    SENSOR_MONITOR_RECORD,
 )
+from beaver_ftc.diagnosis.monitors.records import SENSOR_MONITOR_RECORD
 from beaver_ftc.plant.instruments import ALTITUDE, AX, ENGINE_SPEED, MANIFOLD, N_SENSORS, PHI
 
 GRAVITY = 9.8
@@ -39,8 +39,8 @@ def true_flight(rng, n, h, swiftly=True, theta=(-0.2, 0.3)):
         body, air = turn.inv().apply(v), 1.225 * (1.0 - 2.25577e-5 * altitude) ** 4.2559
         V, now = np.linalg.norm(v), turn.apply(motion[3:])
         signal[k, :3], signal[k, PHI : PHI + 3] = motion[:3], turn.as_euler("ZYX")[::-1]
-        signal[k, [ALPHA, BETA, AIRSPEED]] = np.arctan2(body[2], body[0]), np.arcsin(body[1] / V), V
-        signal[k, QDYN], signal[k, ALTITUDE] = 0.5 * 1.1 * air * V * V, altitude  # on a cold day
+        signal[k, [I_ALPHA, I_BETA, I_AIRSPEED]] = np.arctan2(body[2], body[0]), np.arcsin(body[1] / V), V
+        signal[k, I_QDYN], signal[k, ALTITUDE] = 0.5 * 1.1 * air * V * V, altitude  # on a cold day
         signal[k, [ENGINE_SPEED, MANIFOLD]] = 1800.0, 20.0
         signal[k, AX:] = motion[3:] - turn.inv().apply(DOWN)
         v = v + h * (1.5 * now - 0.5 * (now if before is None else before))

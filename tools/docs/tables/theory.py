@@ -5,7 +5,7 @@ import numpy as np
 from beaver_ftc.aircraft import aircraft
 from beaver_ftc.diagnosis import bounds
 from beaver_ftc.diagnosis.detection import likelihood, statistical, statistical_design, tones
-from beaver_ftc.diagnosis.monitors import records, redundancy
+from beaver_ftc.diagnosis.monitors import numbering, redundancy
 from beaver_ftc.plant import instruments
 from beaver_ftc.studies.present.tables import markdown_table
 
@@ -54,7 +54,7 @@ CONSTANTS = (  # (section, meaning, module, name there, unit)
     (7, "number of frequencies of the oscillation tests", tones, "N_TONES", ""),
     (7, "range of the frequencies of the oscillation tests", tones, "TONES_RAD_S", "rad/s"),
     (7, "time constant of the oscillation tests", tones, "TONE_MEMORY_S", "s"),
-    (9, "poles of the filters of the sensor monitor", records, "FILTER_POLES_PER_S", "1/s"),
+    (9, "poles of the filters of the sensor monitor", numbering, "FILTER_POLES_PER_S", "1/s"),
     (
         9,
         "turn rate of the local horizontal",

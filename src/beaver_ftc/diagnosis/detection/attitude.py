@@ -80,9 +80,13 @@ def configure_attitude(att: np.void, D: np.ndarray, errors: SensorErrors, margin
     angles, gyros = [errors[name] for name in ("phi", "theta", "psi")], [errors[name] for name in AXES]
     v, w = max(each.random for each in angles), max(each.random for each in gyros)
     a = np.exp(-dt_s / np.array(LEAK_TIMES_S))
-    att["enabled"], att["level"], att["gyro"] = 1, sqrt(2.0 * margin), -1
-    att["D"], att["R"] = D, v**2
-    att["a"], att["b"] = a, exp(-dt_s / LOSS_MEMORY_S)
+    att["enabled"] = 1
+    att["level"] = sqrt(2.0 * margin)
+    att["gyro"] = -1
+    att["D"] = D
+    att["R"] = v**2
+    att["a"] = a
+    att["b"] = exp(-dt_s / LOSS_MEMORY_S)
     att["P_start"] = v**2, w**2, DRIFT_PRIOR_RAD_S2**2
     att["T_std"] = np.sqrt(2.0 * v**2 / (1.0 + a) + (w * dt_s) ** 2 / (1.0 - a**2))
     drift = max(abs(getattr(errors.declared, name).drift_rad_s) for name in ("phi", "theta", "psi"))
@@ -96,10 +100,10 @@ def configure_attitude(att: np.void, D: np.ndarray, errors: SensorErrors, margin
 @kernel
 def restart(att):
     """Forget what was compared: the attitude shows no turn now."""
-    att.turn[:], att.A[:], att.P[:] = 0.0, 0.0, 0.0
-    att.s[:], att.s_j[:], att.s_h[:] = 0.0, 0.0, 0.0
-    att.z[:], att.z_j[:], att.N[:], att.M[:], att.R_j[:] = 0.0, 0.0, 0.0, 0.0, 0.0
-    att.T[:], att.E[:] = 0.0, 0.0
+    att.turn[:] = att.A[:] = att.P[:] = 0.0
+    att.s[:] = att.s_j[:] = att.s_h[:] = 0.0
+    att.z[:] = att.z_j[:] = att.N[:] = att.M[:] = att.R_j[:] = 0.0
+    att.T[:] = att.E[:] = 0.0
     for i in range(3):
         for k in range(3):
             att.P[i, k, k] = att.P_start[k]
@@ -123,7 +127,8 @@ def compare_attitude(att, blocks, eta, x, dt, detected):
     for i in range(3):
         blk = blocks[PITCH_BLOCK if i == 1 else LATERAL_BLOCK]
         advance_axis(att, i, blk, i // 2, eta[i], dt, detected)
-    att.score, att.gyro = 0.0, -1
+    att.score = 0.0
+    att.gyro = -1
     if detected or max(att.turn_score[0], att.turn_score[1], att.turn_score[2]) > 1.0:
         fill_score(att, blocks)
         find_gyro(att)
@@ -132,7 +137,8 @@ def compare_attitude(att, blocks, eta, x, dt, detected):
 @kernel
 def fill_score(att, blocks):
     """Fill `score`: the larger of both sums over all axes and losses, over the level."""
-    pitch, lateral = blocks[PITCH_BLOCK], blocks[LATERAL_BLOCK]
+    pitch = blocks[PITCH_BLOCK]
+    lateral = blocks[LATERAL_BLOCK]
     att.score = max(largest_correlation(att, pitch, 1, 2), largest_correlation(att, lateral, 0, 2))
     for i in range(3):
         att.score = max(att.score, largest_sum(att, pitch if i == 1 else lateral, i))
@@ -171,7 +177,9 @@ def find_gyro(att):
 def advance_axis(att, i, blk, row, eta, dt, detected):
     """Advance filter, responses and sums of axis i, in this row of its block; N, M and R_j if `detected`."""
     K0, K1, K2, S = advance_P(att, i, blk, row, dt)
-    D, a, n = att.D[i, i], blk.a, blk.n_Z
+    D = att.D[i, i]
+    a = blk.a
+    n = blk.n_Z
     att.n[i] = n + N_FURTHER
     att.A[i] += att.turn[i]
     att.turn[i] = 0.0
@@ -212,7 +220,8 @@ def tol(blk, j, n):
 @kernel
 def largest_sum(att, blk, i):
     """The largest leaky sum of axis i that no constant explains, over the level."""
-    largest, n = 0.0, att.n[i]
+    largest = 0.0
+    n = att.n[i]
     for m, a in enumerate(att.a):
         excess = abs(att.z[i, m])
         for j in range(n):
@@ -225,7 +234,8 @@ def largest_sum(att, blk, i):
 def largest_correlation(att, blk, first, step):
     """The largest correlation with a loss, over the axes of a block, every step-th from the first on, that no
     constant explains, over the level."""
-    largest, n = 0.0, att.n[first]
+    largest = 0.0
+    n = att.n[first]
     for h, hypothesis in enumerate(blk.hypothesis[: blk.n_h]):
         if hypothesis.kind != LOSS:
             continue

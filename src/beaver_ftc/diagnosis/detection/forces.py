@@ -192,9 +192,14 @@ def _configure_force(
     fdi: np.void, declared: Declared, trim: TrimState, slopes: np.ndarray, i: int, dt: float
 ) -> None:
     """Fill the record of one force; the arguments are those of `configure_forces`."""
-    y, aircraft, errors = trim[1], declared.aircraft, declared.sensors
-    forces, cfg = fdi["statistical"]["forces"], fdi["statistical"]["gust"]["config"]
-    f, terms, force = forces["component"][i], terms_of_force(aircraft, i), MEASURED_FORCES[i]
+    y = trim[1]
+    aircraft = declared.aircraft
+    errors = declared.sensors
+    forces = fdi["statistical"]["forces"]
+    cfg = fdi["statistical"]["gust"]["config"]
+    f = forces["component"][i]
+    terms = terms_of_force(aircraft, i)
+    force = MEASURED_FORCES[i]
     per_C = y[QDYN] * cfg["S_m"] * forces["c_inv"]
     f_all = per_C * _force_slopes(aircraft, force.coefficient, trim)
     f_y = f_all[:-1]
@@ -268,8 +273,11 @@ def _configure_columns(
     """Fill the tolerances of the force's columns: of each term, by that of the coefficients and by constant
     errors of vane and pressure; of the rate of sideslip; of the accelerometer's bias, m/s2; of the whole; of
     the drift, rad/s. Fill the columns of an error of the vane."""
-    tol_C, errors, force = declared.coefficients.largest, declared.sensors, MEASURED_FORCES[i]
-    vane, acc = errors[force.vane_name], errors[force.accelerometer]
+    tol_C = declared.coefficients.largest
+    errors = declared.sensors
+    force = MEASURED_FORCES[i]
+    vane = errors[force.vane_name]
+    acc = errors[force.accelerometer]
     tol_q = errors["qdyn"].steady / y[QDYN] + errors["qdyn"].slope
     tol = [
         (tol_C + tol_q + vane.slope) * abs(t.value) + t.is_constant * vane.steady * abs(C_vane) for t in terms
@@ -290,7 +298,8 @@ def _configure_columns(
 def _force_coefficient(aircraft: Aircraft, name: str, state: TrimState) -> float:
     """The force coefficient `name` at x (3,) rad/s, y, u rad."""
     x, y, u = state
-    geometry, V = aircraft.geometry, y[AIRSPEED]
+    geometry = aircraft.geometry
+    V = y[AIRSPEED]
     rates = x * (geometry.span_m / (2.0 * V), geometry.chord_m / V, geometry.span_m / (2.0 * V))
     values = dict(zip(aircraft.surfaces, u, strict=True)) | dict(zip(aircraft.signals, y[4:], strict=True))
     values |= dict(

@@ -102,7 +102,9 @@ def configure_rows(stat: np.void, errors: SensorErrors, tol: np.ndarray, err: np
 
     err: of `errors_dtype`.
     """
-    rows, noise, n = stat["rows"], stat["noise"], len(tol)
+    rows = stat["rows"]
+    noise = stat["noise"]
+    n = len(tol)
     rows["R"][:3] = [max(errors[name].random, MIN_GYRO_STD_RAD_S) ** 2 for name in AXES]
     rows["tol"][:n] = tol
     rows["first"] = n + N_INPUT_READINGS + np.array([0, MAX_FORCE_REGRESSORS + 1])
@@ -171,7 +173,8 @@ def begin_rows(w, noise, rows, bound, model, meas, u):
 
     eta = published bound + |G| du + mapped error
     """
-    eta, emap = rows.eta[0], bound.error_map
+    eta = rows.eta[0]
+    emap = bound.error_map
     rows.Z[: rows.n] = 0.0
     add_constants(w, noise, rows, bound.declared_errors, model, meas, u)
     eta[:3] = 0.0
@@ -195,13 +198,15 @@ def finish_rows(rows, noise, forces, gust, of_views, vaneless, bound, means, nu,
     """
     rows.per_cubed = per_cubed
     for i in range(3):
-        rows.nu[RAW, i], rows.nu[RATES, i] = nu[i], nu[i] - gust.output.acc_mean[i]
+        rows.nu[RAW, i] = nu[i]
+        rows.nu[RATES, i] = nu[i] - gust.output.acc_mean[i]
         rows.nu[VANED, i] = nu[i] - (of_views.output.acc_mean[i] if forces.in_use else 0.0)
         rows.nu[VANELESS, i] = nu[i] - vaneless.output.acc_mean[i]
         rows.std[RAW, i] = rows.std[VANED, i] = np.sqrt(noise.Q[i])
         rows.std[VANELESS, i] = rows.std[RAW, i] + forces.gust_noise[i]
         for s in range(means.G.shape[1]):
-            rows.G[s, i], rows.Gu[s, i] = means.G_old[i, s], means.Gu_old[i, s]
+            rows.G[s, i] = means.G_old[i, s]
+            rows.Gu[s, i] = means.Gu_old[i, s]
             rows.e_G[s, i] = bound.eG[i, s]
 
 
@@ -217,12 +222,15 @@ def update_forces(rows, forces, gust, du, meas, u, dt):
     evaluate(gust.memory.table, meas.x, meas.y)
     forces.q_ratio = meas.y[QDYN] / forces.q_trim
     for i, f in enumerate(forces.component):
-        r, f_prev, eta = SIDE_FORCE + i, f.f_hat, 0.0
+        r = SIDE_FORCE + i
+        f_prev = f.f_hat
+        eta = 0.0
         update_force(rows, forces, f, gust, i, meas, u)
         std = f.f_hat * forces.q_noise / meas.y[QDYN]
         for source in range(INERTIAL + 1):
             var = f.var_trim[int(source == INERTIAL)] * forces.q_ratio**2 + std * std + f.var_acc
-            rows.nu[source, r], rows.std[source, r] = f.innovation, np.sqrt(var)
+            rows.nu[source, r] = f.innovation
+            rows.std[source, r] = np.sqrt(var)
         rows.nu[INERTIAL, r] = update_inertial(forces, f, i, meas.y, dt)
         rows.Z[rows.first[i] + f.n_Z, r] = f.e_drift
         for s in range(u.size):
@@ -261,12 +269,15 @@ def add_terms(rows, forces, f, gust, i, meas, u):
 
     The last of the side force is the term in the rate of sideslip, f_bdot. Column c + k is that of term k.
     """
-    table, r = gust.memory.table, SIDE_FORCE + i
-    first, end = table.free_from[SIDE_ROW + i], table.surface_to[SIDE_ROW + i]
-    c, f_hat = rows.first[i] - first, 0.0
+    table = gust.memory.table
+    r = SIDE_FORCE + i
+    first = table.free_from[SIDE_ROW + i]
+    end = table.surface_to[SIDE_ROW + i]
+    c = rows.first[i] - first
+    f_hat = 0.0
     per_C = meas.y[QDYN] * gust.config.S_m * forces.c_inv
     for s in range(u.size):
-        rows.e_G[s, r], f.G[s] = 0.0, 0.0
+        rows.e_G[s, r] = f.G[s] = 0.0
     for k in range(first, end):
         s = table.surface[k]
         Z = per_C * table.power[table.monomial[k]]

@@ -124,14 +124,17 @@ def configure_statistics(
     Each step reads what those before it have filled: the speed of gusts the alarm level, the blocks the rows,
     the views blocks and forces, the lengths of the drift its intensity.
     """
-    stat, settings = fdi["statistical"], declared.fdi.statistical
+    stat = fdi["statistical"]
+    settings = declared.fdi.statistical
     stat["alarm"]["detected_at_s"] = -1.0
     if settings is None or not fdi["config"]["enabled"]:  # a plug-in diagnoses, or nothing does
         return
     cfg, gust, aircraft = stat["test"], stat["gust"], declared.aircraft
-    errors, dt_s = declared.sensors, 1.0 / rate_hz
+    errors = declared.sensors
+    dt_s = 1.0 / rate_hz
     n_instants = int(fdi["config"]["n_substeps"])
-    cfg["enabled"], cfg["w"] = 1, 1.0 / max(n_instants, 1)
+    cfg["enabled"] = 1
+    cfg["w"] = 1.0 / max(n_instants, 1)
     V = float(trim[1][AIRSPEED])
     rate = eta_rate(settings, aircraft, dt_s)
     stat["forces"]["in_use"] = declared.uses_accelerometers
@@ -173,7 +176,8 @@ def configure_statistics(
 
 def _configure_levels(cfg: np.void, declared: Declared, n_tests: int, rate_hz: float) -> None:
     """Fill the level of the alarm, the margin of isolation, and how evidence is forgotten and bounded."""
-    settings, aircraft = declared.fdi.statistical, declared.aircraft
+    settings = declared.fdi.statistical
+    aircraft = declared.aircraft
     assert settings is not None
     cfg["alarm_level"] = derive_alarm_level(settings.false_alarms_per_h, rate_hz, n_tests)
     # difference of log-likelihood ratios that noise exceeds in a second with the probability `misnaming`
@@ -187,7 +191,8 @@ def _configure_view_gusts(stat: np.void, declared: Declared) -> None:
 
     The rates use the latter, too, unless accelerometers may break.
     """
-    gust, vaneless = stat["gust"], stat["vaneless"]
+    gust = stat["gust"]
+    vaneless = stat["vaneless"]
     gust["output"]["uses_accelerometers"] = 1
     stat["vaneless"] = stat["vaned"] = gust
     vaneless["memory"]["share"] = np.minimum(np.add(MIN_UNMEASURED_SHARES, FORCE_ERROR_SHARE), 1.0)
@@ -258,10 +263,12 @@ def _configure_noise(
     (`likelihood.uncertain_share`). The drift only sets how much of it the filters remove. If damage may take
     surfaces, a weaker drift detects most: motion that no loss explains is then rarely an error of the model.
     """
-    sigma, noise = declared.sensors.each("random"), stat["noise"]
+    sigma = declared.sensors.each("random")
+    noise = stat["noise"]
     if declared.aircraft.loses_surfaces:
         omega = min(DAMAGE_FREQUENCY_RAD_S, omega)
-    eta, level = max(declared.constant_rad_s2), float(stat["test"]["alarm_level"])
+    eta = max(declared.constant_rad_s2)
+    level = float(stat["test"]["alarm_level"])
     noise["q"] = derive_intensity(eta, omega, float(sigma[:3].max()), level, dt_s)
     _, G, F_x, F_y = jacobian(model, *trim)
     noise["Q0"] = F_x**2 @ sigma[:3] ** 2

@@ -23,7 +23,7 @@ from beaver_ftc.diagnosis.state import fill
 from beaver_ftc.public import lazily
 
 if TYPE_CHECKING:
-    from beaver_ftc.diagnosis.monitors.records import N_EQUATIONS, RPM_TEST
+    from beaver_ftc.diagnosis.monitors.numbering import N_EQUATIONS, RPM_TEST
     from beaver_ftc.diagnosis.monitors.redundancy import COMPARISON_ROUNDING
 else:
     __getattr__, __dir__ = lazily(__name__)

@@ -55,30 +55,25 @@ in body axes; p, q, r rad/s):
 Gyros need no such hypothesis: all of a gyro's error is in the test of its own axis in every sample. Neither
 does the dynamic pressure: only the density shows it.
 
-mon: record of the monitor (records.py), with H, H_m, C, C_m and d; e is its E; y, y_past: redundancy.py.
+mon: record of the monitor; its part `initial` has H, H_m, C, C_m and d; e is its E; y, y_past: redundancy.py.
 """
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel
+from beaver_ftc.compiled import kernel, record
 from beaver_ftc.diagnosis.detection.filters import leak
-from beaver_ftc.diagnosis.monitors.records import (
-    ALPHA,
+from beaver_ftc.diagnosis.monitors.numbering import (
     ALPHA_TEST,
     ANGLE_TEST,
-    BETA,
     BETA_TEST,
     CLIMB_TEST,
     DENSITY_TEST,
-    EVIDENCE,
-    H_AIRSPEED,
-    H_ALPHA,
-    H_BETA,
-    H_PHI,
-    H_THETA,
-    N_INITIAL,
+    I_AIRSPEED,
+    I_ALPHA,
+    I_BETA,
+    I_QDYN,
+    N_POLES,
     N_TESTS,
-    QDYN,
     RPM_TEST,
     SENSOR_OF,
     SPEED_TEST,
@@ -88,7 +83,7 @@ from beaver_ftc.diagnosis.monitors.records import (
     Q,
     R,
 )
-from beaver_ftc.diagnosis.monitors.redundancy import MIN_QDYN_PA, exceeds, secant, speed, too_steep
+from beaver_ftc.diagnosis.monitors.redundancy import MIN_AIRSPEED_MPS, MIN_QDYN_PA, secant, too_steep
 from beaver_ftc.diagnosis.monitors.rotation import down, length, unit, vector
 from beaver_ftc.diagnosis.sets import explain
 from beaver_ftc.plant.instruments import ALTITUDE, PHI
@@ -100,8 +95,20 @@ DENSITY_SHARE = 0.25  # of the density from the standard atmosphere at a height,
 MIN_TEMPERATURE_RATIO = 0.05  # temperature over that at sea level, below which none is extrapolated
 # Share of an effect that is left, at least, when speed and flow have changed within a filter's memory
 EFFECT_LEFT = 0.8
-SLOW_POLE = 2  # index in records.FILTER_POLES_PER_S
+SLOW_POLE = 2  # index in FILTER_POLES_PER_S
 
+# The hypotheses: this sensor has been broken since the monitor began.
+H_AIRSPEED, H_ALPHA, H_BETA, H_PHI, H_THETA = range(5)
+N_INITIAL = 5
+# What bounds such an error: its hypothesis, and the tests, first to last, in which its effect shows
+EVIDENCE = (
+    (H_PHI, TURN_TEST + 1, TURN_TEST + 2), (H_PHI, SPEED_TEST, BETA_TEST),
+    (H_THETA, TURN_TEST, TURN_TEST + 2), (H_THETA, SPEED_TEST, BETA_TEST),
+    (H_ALPHA, BETA_TEST, BETA_TEST), (H_BETA, ALPHA_TEST, ALPHA_TEST), (H_ALPHA, CLIMB_TEST, CLIMB_TEST),
+    (H_AIRSPEED, ALPHA_TEST, ALPHA_TEST), (H_AIRSPEED, BETA_TEST, BETA_TEST),
+    (H_AIRSPEED, DENSITY_TEST, DENSITY_TEST),
+)  # fmt: skip
+N_EFFECTS = len(EVIDENCE) + 2  # and the parts of the force
 # Of each hypothesis, the tests that react at once to a change of its error; the residual of the first is that
 # change
 AT_ONCE = (
@@ -113,6 +120,31 @@ AT_ONCE = (
 )
 CHANGE_TEST = tuple(tests[0] for tests in AT_ONCE)
 REACTS = np.array([[j in tests for j in range(N_TESTS)] for tests in AT_ONCE])
+
+INITIAL_RECORD = record(
+    E_start=N_INITIAL, E=N_INITIAL, E_alarm=N_INITIAL, d=N_INITIAL,
+    H=(N_INITIAL, RPM_TEST), H_m=(N_INITIAL, RPM_TEST, N_POLES),
+    C=(complex, N_EFFECTS), C_m=(complex, N_EFFECTS, N_POLES),
+    refuted=(int, N_INITIAL, N_TESTS),  # since the alarm
+)  # fmt: skip
+
+
+@kernel
+def speed(y):
+    """V, m/s, of a reading: where it divides."""
+    return max(y[I_AIRSPEED], MIN_AIRSPEED_MPS)
+
+
+@kernel
+def exceeds(r, k, B, x, H):
+    """Whether no error of a set explains a filtered residual: |r_m| > k B_m + x H_m for some pole m.
+
+    B (poles,): bound for sound sensors; H (poles,): on the effect of a unit of an error, of at most x.
+    """
+    for m in range(r.size):
+        if abs(r[m]) > k * B[m] + x * H[m]:
+            return True
+    return False
 
 
 @kernel
@@ -128,16 +160,17 @@ def start_bounds(mon, y):
     T: temperature of the standard troposphere, over that at sea level. V_air: airspeed by dynamic pressure
     and standard density, m/s; off: reading over truth, less 1, in the thickest or in the thinnest air.
     """
+    own = mon.initial
     T = max(1.0 - 2.25577e-5 * y[ALTITUDE], MIN_TEMPERATURE_RATIO)
-    V_air = np.sqrt(2.0 * max(y[QDYN], MIN_QDYN_PA) / (1.225 * T**4.2559))
+    V_air = np.sqrt(2.0 * max(y[I_QDYN], MIN_QDYN_PA) / (1.225 * T**4.2559))
     ratio = speed(y) / V_air
     off = max(ratio * np.sqrt(1.0 + DENSITY_SHARE) - 1.0, 1.0 - ratio * np.sqrt(1.0 - DENSITY_SHARE))
-    mon.E_start[H_AIRSPEED] = min(off, MAX_SPEED_RATIO - 1.0)
+    own.E_start[H_AIRSPEED] = min(off, MAX_SPEED_RATIO - 1.0)
     for h in (H_ALPHA, H_BETA):
         angle = abs(y[SENSOR_OF[CHANGE_TEST[h]]]) + MAX_FLOW_ANGLE_RAD
-        mon.E_start[h] = 2.0 * np.sin(0.5 * min(angle, np.pi))
-    mon.E_start[H_PHI:] = MAX_CHORD
-    mon.E[:] = mon.E_start
+        own.E_start[h] = 2.0 * np.sin(0.5 * min(angle, np.pi))
+    own.E_start[H_PHI:] = MAX_CHORD
+    own.E[:] = own.E_start
 
 
 @kernel
@@ -149,13 +182,15 @@ def allowed_effect(mon, j, m):
 @kernel
 def widen_bounds(mon):
     """Update d, and widen e by the part of it that the slowest filter forgets in a sample."""
-    m, e = SLOW_POLE, mon.E
+    own = mon.initial
+    m = SLOW_POLE
+    e = own.E
     for h, j in enumerate(CHANGE_TEST):
-        d = allowed_effect(mon, j, m) + e[h] * mon.H_m[h, j, m]
+        d = allowed_effect(mon, j, m) + e[h] * own.H_m[h, j, m]
         if h == H_AIRSPEED:  # from m/s to a share of the truth, which is at least V / (1 + e)
             d *= (1.0 + e[h]) / speed(mon.y_past)
-        mon.d[h] = min(d, mon.E_start[h])
-        e[h] = min(e[h] + (1.0 - mon.decay[m]) * mon.d[h], mon.E_start[h])
+        own.d[h] = min(d, own.E_start[h])
+        e[h] = min(e[h] + (1.0 - mon.decay[m]) * own.d[h], own.E_start[h])
 
 
 @kernel
@@ -171,14 +206,16 @@ def fill_attitude_effects(mon, y, turn, second):
     secants, of reading and truth differ by at most 2 sin(e / 2) over both cosines; in
     theta' = q cos(phi) - r sin(phi) there is no theta.
     """
+    H = mon.initial.H
+    E = mon.initial.E
     # 1 / cos(theta) by its reading, and the largest one if theta is off
-    sec, sec_max = secant(y[THETA]), secant(abs(y[THETA]) + angle_of_chord(mon.E[H_THETA]))
+    sec, sec_max = secant(y[THETA]), secant(abs(y[THETA]) + angle_of_chord(E[H_THETA]))
     # Rotation in a step, rad: about the body's second and third axes; about the vertical, psi' h
     qr, heading = mon.h * abs(turn), mon.h * abs(turn.imag) * sec_max
     by_phi, by_theta = sec * (qr + sec * second), sec * sec_max * second
-    mon.H[H_PHI, :SPEED_TEST] = second, second + qr, second + qr, by_phi, by_phi, by_phi
-    mon.H[H_THETA, :ANGLE_TEST] = second + heading
-    mon.H[H_THETA, ANGLE_TEST:SPEED_TEST] = sec * heading + by_theta, by_theta, sec * heading + by_theta
+    H[H_PHI, :SPEED_TEST] = second, second + qr, second + qr, by_phi, by_phi, by_phi
+    H[H_THETA, :ANGLE_TEST] = second + heading
+    H[H_THETA, ANGLE_TEST:SPEED_TEST] = sec * heading + by_theta, by_theta, sec * heading + by_theta
 
 
 @kernel
@@ -212,11 +249,11 @@ def fill_effects(mon, y_now):
                  take at most all of it, beta' the part sin(phi) along the second axis, and sin(beta) of the
                  rest. The vertical is turned, against v
     """
-    h, g, e, H, y, a = mon.h, mon.g, mon.E, mon.H, mon.y_past, mon.a
-    V, ct, side, z, d = speed(y), np.cos(y[THETA]), unit(y[BETA]), unit(y[ALPHA]), down(y)
+    h, g, e, H, y, a = mon.h, mon.g, mon.initial.E, mon.initial.H, mon.y_past, mon.a
+    V, ct, side, z, d = speed(y), np.cos(y[THETA]), unit(y[I_BETA]), unit(y[I_ALPHA]), down(y)
     cb, sb, s_phi = side.real, abs(side.imag), abs(np.sin(y[PHI]))
-    beta_max = abs(y[BETA]) + angle_of_chord(e[H_BETA])
-    sec, secs = secant(y[BETA]), secant(y[BETA]) * secant(beta_max)
+    beta_max = abs(y[I_BETA]) + angle_of_chord(e[H_BETA])
+    sec, secs = secant(y[I_BETA]), secant(y[I_BETA]) * secant(beta_max)
     rate, acc, vertical = in_plane(z, vector(y)), in_plane(z, a), in_plane(z, d)
     turn = complex(y[Q], y[R]) * unit(y[PHI])
     w, a_max = abs(y[P]) + abs(y[Q]) + abs(y[R]), max(mon.a_size[0], length(a))
@@ -245,7 +282,7 @@ def fill_effects(mon, y_now):
     # phi: (q, r), and gravity g cos(theta) (sin(phi), cos(phi)) across the first axis, are turned by it.
     # alpha off by e: beta' changes by x (roll cos(e / 2) + yaw sin(e / 2)). beta off by e: alpha' changes by
     # x cos(e / 2) roll over both cosines. The part of the force in both, of either sign, comes last
-    mon.C[:] = (
+    mon.initial.C[:] = (
         h * vector(y)[1],
         h * g * d[1],
         h * complex(turn.imag),
@@ -273,13 +310,15 @@ def tighten_bounds(mon):
     The tests of the flow have bounds for a right airspeed: a true one that is 1 + e times smaller makes them
     larger by that. The density shows changes of its error in addition: those are in the airspeed's own test.
     """
-    e, V = mon.E, speed(mon.y_past)
+    own = mon.initial
+    e = own.E
+    V = speed(mon.y_past)
     for m in range(mon.decay.size):
         ratio = 1.0 + e[H_AIRSPEED]
         for n, (h, first, last) in enumerate(EVIDENCE):
-            C, s2 = mon.C_m[n, m], 0.0
+            C, s2 = own.C_m[n, m], 0.0
             for j in range(first, last + 1):
-                effect = allowed_effect(mon, j, m) + 2.0 * mon.d[h] * mon.H_m[h, j, m]
+                effect = allowed_effect(mon, j, m) + 2.0 * own.d[h] * own.H_m[h, j, m]
                 s2 += (effect * V if j > first == SPEED_TEST else effect) ** 2
             s, c = np.sqrt(s2), abs(C)
             if first == DENSITY_TEST:
@@ -288,7 +327,7 @@ def tighten_bounds(mon):
                 s *= ratio
             elif h <= H_BETA and first < CLIMB_TEST:
                 half = 0.5 * angle_of_chord(e[h])
-                force = mon.C_m[len(EVIDENCE) + h - H_ALPHA, m].real
+                force = own.C_m[len(EVIDENCE) + h - H_ALPHA, m].real
                 c = np.cos(half) * abs(C.real) - np.sin(half) * abs(C.imag) - force
             e[h] = explain(0.0, s, EFFECT_LEFT * max(c, 0.0), -e[h], e[h])[1]
 
@@ -296,16 +335,17 @@ def tighten_bounds(mon):
 @kernel
 def update_bounds(mon, y):
     """Update all bounds by the sample y, which has just been tested."""
+    own = mon.initial
     if too_steep(mon, y):
-        mon.C_m[:] = 0.0
+        own.C_m[:] = 0.0
         return
     widen_bounds(mon)
     fill_effects(mon, y)
-    for n, C in enumerate(mon.C):
-        leak(mon.C_m[n], mon.decay, C)
+    for n, C in enumerate(own.C):
+        leak(own.C_m[n], mon.decay, C)
     for h in range(N_INITIAL):
         for j in range(RPM_TEST):
-            leak(mon.H_m[h, j], mon.decay, mon.H[h, j])
+            leak(own.H_m[h, j], mon.decay, own.H[h, j])
     tighten_bounds(mon)
 
 
@@ -315,11 +355,12 @@ def refutes_initial(mon, h, j):
     pole m, r > factor B + x H_m, x = e + d. No hypothesis has an effect on the engine's tests and later
     ones.
     """
+    own = mon.initial
     if j >= RPM_TEST:
         return mon.ratio[j] > 1.0
-    x = mon.E[h] + mon.d[h]
+    x = own.E[h] + own.d[h]
     factor = 1.0 + x if h == H_AIRSPEED and j >= SPEED_TEST else 1.0
-    return exceeds(mon.r[j], factor, mon.B[j], x, mon.H_m[h, j])
+    return exceeds(mon.r[j], factor, mon.B[j], x, own.H_m[h, j])
 
 
 @kernel
@@ -327,7 +368,7 @@ def latch_refuted(mon, exceeded):
     """Record by which of `exceeded` (N_TESTS,) each hypothesis is refuted."""
     for h in range(N_INITIAL):
         for j in range(N_TESTS):
-            mon.refuted[h, j] |= exceeded[j] and refutes_initial(mon, h, j)
+            mon.initial.refuted[h, j] |= exceeded[j] and refutes_initial(mon, h, j)
 
 
 @kernel
@@ -339,6 +380,6 @@ def explains_exceeded(mon, h, alarm):
     the error is constant then, and any refuting test counts. Otherwise those that react at once do not count.
     """
     for j in range(N_TESTS):
-        if mon.refuted[h, j] and (REACTS[h, alarm] or not REACTS[h, j]):
+        if mon.initial.refuted[h, j] and (REACTS[h, alarm] or not REACTS[h, j]):
             return False
     return True

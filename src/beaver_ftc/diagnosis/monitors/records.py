@@ -1,6 +1,6 @@
-"""The sensor monitor's tests by number, its records and their configuration, and its finding in words.
+"""The sensor monitor's record and its configuration, and its finding in words.
 
-Letters as in redundancy.py, sensor_monitor.py and initial_errors.py, which fill the records.
+redundancy.py, initial_errors.py and sensor_monitor.py declare the parts that they fill; letters as there.
 """
 
 from math import exp
@@ -14,6 +14,10 @@ from beaver_ftc.design import Dryden
 from beaver_ftc.design.model import DesignFunctions
 from beaver_ftc.diagnosis.bounds import GUST_LIMIT_SIGMA
 from beaver_ftc.diagnosis.deviations import air_rotation_slopes
+from beaver_ftc.diagnosis.monitors.initial_errors import INITIAL_RECORD
+from beaver_ftc.diagnosis.monitors.numbering import FILTER_POLES_PER_S, NO_SENSOR
+from beaver_ftc.diagnosis.monitors.redundancy import TEST_FIELDS
+from beaver_ftc.diagnosis.monitors.sensor_monitor import ISOLATION_FIELDS, N_FROZEN_NEVER
 from beaver_ftc.diagnosis.state import fill
 from beaver_ftc.plant.instruments import (
     ENGINE_SPEED,
@@ -21,37 +25,11 @@ from beaver_ftc.plant.instruments import (
     N_SENSORS,
     PHI,
     SENSORS,
-    SIGNALS,
 )
 from beaver_ftc.scenario.declared import Declared
-from beaver_ftc.scenario.sensors import ROWS, frames_apart, sensor_words
+from beaver_ftc.scenario.sensors import frames_apart, sensor_words
 
-# The tests by number; 0 to 2 are of turning about axis 0 to 2, 3 to 5 of phi, theta, psi. In each, a jump of
-# one reading appears at once: the rows of the sensors name it.
-TEST_NAMES = (
-    "roll", "pitch", "yaw", "bank angle", "pitch angle", "heading", "speed", "incidence", "sideslip",
-    "density", "climb", "engine speed", "manifold pressure",
-)  # fmt: skip
-TURN_TEST, ANGLE_TEST, SPEED_TEST, ALPHA_TEST, BETA_TEST, DENSITY_TEST, CLIMB_TEST = 0, 3, 6, 7, 8, 9, 10
-RPM_TEST, PRESSURE_TEST = 11, 12
-N_EQUATIONS = len(TEST_NAMES)  # then the tests of sensors that should equal another reading
-_NAMED = [row.test for row in ROWS]
-SENSOR_OF = tuple(_NAMED.index(name) for name in TEST_NAMES)
-DUPLICATES = tuple((SENSORS.index(row.name), row.equal) for row in ROWS if row.equal is not None)
-N_TESTS = N_EQUATIONS + len(DUPLICATES)
-# Of each sensor that should equal another reading (its row in scenario/sensors.py says which): its place in
-# the readings, the place of that reading, the test that an error of that reading exceeds, and the largest
-# difference of the two quantities, SI.
-DUPLICATE = np.array([i for i, _ in DUPLICATES], np.int64)
-COUNTERPART = np.array([SENSORS.index(equal.reading) for _, equal in DUPLICATES], np.int64)
-COUNTERPART_TEST = np.array([TEST_NAMES.index(_NAMED[i]) for i in COUNTERPART], np.int64)
-DUPLICATE_TOLERANCE = np.array([equal.within for _, equal in DUPLICATES], float)
-FILTER_POLES_PER_S = (1e6, 10.0, 1.0)  # of the filters of each test; the first is the residual itself
-N_POLES = len(FILTER_POLES_PER_S)
-NO_SENSOR = -1
 ERRORS = {"e_zero": "worst", "e_slope": "slope", "const": "steady"}  # of a reading, by their declared names
-FORCE_JUMP_M_S2 = 8.0  # a sound specific force changes by less from one sample to the next
-GYRO_OPEN, GYRO_CONFIRMED, GYRO_REFUTED = 0, 1, 2  # verdicts of a gyro
 MAX_AIRSPEED_OVER_TRIM = 1.4  # largest airspeed of a flight, as a share of that in trim
 # at which the attitude corrects a replaced rate, if its noise is declared
 RATE_GAIN_PER_S = 3.0
@@ -59,24 +37,7 @@ RATE_GAIN_PER_S = 3.0
 # than a quarter of its resolution.
 N_FROZEN_EXACT = 3
 N_FROZEN_ROUNDED = 50
-N_FROZEN_NEVER = 1_000_000_000  # JSBSim frames: a sound reading may repeat, if its steps exceed its noise
 UNANTICIPATED_DELAY_S = 1.0  # from the alarm; a sensor not isolated by then makes the fault unanticipated
-P, Q, R, ALPHA, BETA, AIRSPEED, QDYN = range(len(SIGNALS))
-THETA, PSI = PHI + 1, PHI + 2
-
-# Hypotheses of initial_errors.py: this sensor has been broken since the monitor began
-H_AIRSPEED, H_ALPHA, H_BETA, H_PHI, H_THETA = range(5)
-N_INITIAL = 5
-# What bounds such an error: its hypothesis, and the tests, first to last, in which its effect shows
-EVIDENCE = (
-    (H_PHI, TURN_TEST + 1, TURN_TEST + 2), (H_PHI, SPEED_TEST, BETA_TEST),
-    (H_THETA, TURN_TEST, TURN_TEST + 2), (H_THETA, SPEED_TEST, BETA_TEST),
-    (H_ALPHA, BETA_TEST, BETA_TEST), (H_BETA, ALPHA_TEST, ALPHA_TEST), (H_ALPHA, CLIMB_TEST, CLIMB_TEST),
-    (H_AIRSPEED, ALPHA_TEST, ALPHA_TEST), (H_AIRSPEED, BETA_TEST, BETA_TEST),
-    (H_AIRSPEED, DENSITY_TEST, DENSITY_TEST),
-)  # fmt: skip
-N_EFFECTS = len(EVIDENCE) + 2  # and the parts of the force
-
 MONITOR_CONFIG_RECORD = record(
     enabled=int, substeps=int, has_engine=int, y_trim=N_SENSORS,
     rate_gain=float,  # share of its error that a replaced rate corrects in one sample
@@ -93,61 +54,9 @@ MONITOR_OUTPUT_RECORD = record(
     suspect=(int, N_SENSORS), isolated_sensor=int, isolated_at_s=float, is_reading_unused=(int, N_SENSORS),
 )  # fmt: skip
 
-# Of an axis. shown, shown_past, rad/s: error of the gyro if the attitude is right, as this frame begins and
-# as the one before began; most, least: of its size in the other samples of this frame, of the one before
-# (most_past, least_past), of the one before that. gap, B_gap (poles,) rad: filtered difference of the turn
-# that the attitude and w show, and its bound; beyond it no gyro can be broken. replaced: its reading.
-GYRO_RECORD = record(
-    shown=float, shown_past=float, most=float, most_past=float, most_older=float,
-    least=float, least_past=float, gap=N_POLES, B_gap=N_POLES, verdict=int, replaced=int,
-)  # fmt: skip
-
-# Of speed, incidence or sideslip, since the alarm: sums of the residuals, of the part of sound sensors, of
-# the part of an initial error; range of the reading.
-FLOW_RECORD = record(r_sum=float, B_sum=float, H_sum=float, y_min=float, y_max=float)
-
-# Symbols: redundancy.py.
 SENSOR_MONITOR_RECORD = record(
-    config=MONITOR_CONFIG_RECORD, output=MONITOR_OUTPUT_RECORD,
-    h=float, decay=N_POLES, g=float,  # decay: of each filter per sample; g m/s2
-    # Declared turbulence, m/s: bound on a gust's speed; bound on its changes through each filter, which
-    # holds up to max_airspeed_mps, and above low_m: below it a gust changes faster
-    gust_max=float, gust_change=N_POLES, max_airspeed_mps=float, low_m=float,
-    wind_max=float,  # of the vertical wind, m/s
-    # Declared errors, SI: |error| <= e_zero + e_slope |y|, of which const does not change; of the attitude,
-    # rad/s
-    e_zero=N_SENSORS, e_slope=N_SENSORS, const=N_SENSORS, drift=float,
-    # Bounds on the error of each reading; e_drift: part of them by drift, rad
-    e=N_SENSORS, n=N_SENSORS, e_drift=float, e_past=N_SENSORS, e_older=N_SENSORS,
-    # of the sample before; predict_readings turns a_past into the present axes
-    y_past=N_SENSORS, y_older=N_SENSORS, a=(complex, 2), a_past=(complex, 2),
-    # m/s2: |a| in the elapsed step and in the two before it; of a_past
-    a_size=3, a_size_past=float,
-    e_first=float,  # m/s2, in the first step only: no sample precedes it
-    y_pred=N_SENSORS,  # of the engine's readings: the commands
-    # By test, in the unit of the residual. per_s, per_sample: parts of the bound on the residual of one
-    # sample, the first for each second of it; past: per_sample of the sample before. gust: effect on the
-    # residual of 1 m/s that a gust changes by. r: filtered residual. B: bound on |r|; e_sum: the part of it
-    # that the filter sums. ratio: largest |r| / B over the poles.
-    residual=N_TESTS, per_s=N_TESTS, per_sample=N_TESTS, past=N_TESTS, gust=N_TESTS,
-    r=(N_TESTS, N_POLES), B=(N_TESTS, N_POLES), e_sum=(N_TESTS, N_POLES), ratio=N_TESTS,
-    # Errors from the start: symbols of initial_errors.py
-    E_start=N_INITIAL, E=N_INITIAL, E_alarm=N_INITIAL, d=N_INITIAL,
-    H=(N_INITIAL, RPM_TEST), H_m=(N_INITIAL, RPM_TEST, N_POLES),
-    C=(complex, N_EFFECTS), C_m=(complex, N_EFFECTS, N_POLES),
-    refuted=(int, N_INITIAL, N_TESTS),  # since the alarm
-    stage=int, t_start=float, substep=int, exceeded=(int, N_TESTS),
-    # since the alarm, rad: by angle, body axis and pole, filtered residual of turning beyond the part of the
-    # angle's own residual; by angle and pole, filtered size of the angle's residual; by angle and body axis,
-    # largest size of turn_share
-    beyond=(3, 3, N_POLES), swing=(3, N_POLES), c_max=(3, 3),
-    # by axis, rad/s: error of the gyro if the dynamics are right (w of sensor_monitor.py), and its bound
-    w=3, w_bound=3, gyro=(GYRO_RECORD, 3), flow=(FLOW_RECORD, 3),
-    agreed=(int, max(len(DUPLICATES), 1)),  # a sensor with the reading that it should equal
-    gyros_excluded=int, n_same=(int, N_SENSORS), cleared=(int, N_SENSORS), turn_max=float,
-    jump=float,  # of the accelerometers, m/s2, which fades
-    n_since=int,  # samples since the alarm
-    climb=N_POLES,  # m, filtered: error of the climb, of an incidence with the error that its residuals show
+    config=MONITOR_CONFIG_RECORD, output=MONITOR_OUTPUT_RECORD, **TEST_FIELDS, initial=INITIAL_RECORD,
+    **ISOLATION_FIELDS,
 )  # fmt: skip
 
 

@@ -30,22 +30,23 @@ import numpy as np
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design import LEAST_HEIGHT_M
 from beaver_ftc.diagnosis.detection.filters import advance_bound, leak
-from beaver_ftc.diagnosis.monitors.records import (
-    AIRSPEED,
-    ALPHA,
+from beaver_ftc.diagnosis.monitors.numbering import (
     ANGLE_TEST,
-    BETA,
     CLIMB_TEST,
     COUNTERPART,
     DENSITY_TEST,
     DUPLICATE,
     DUPLICATE_TOLERANCE,
-    FORCE_JUMP_M_S2,
+    DUPLICATES,
+    I_AIRSPEED,
+    I_ALPHA,
+    I_BETA,
+    I_QDYN,
     N_EQUATIONS,
+    N_POLES,
     N_TESTS,
     PRESSURE_TEST,
     PSI,
-    QDYN,
     RPM_TEST,
     SENSOR_OF,
     SPEED_TEST,
@@ -66,7 +67,6 @@ from beaver_ftc.diagnosis.monitors.rotation import (
 from beaver_ftc.plant.instruments import (
     ALTITUDE,
     AX,
-    MANIFOLD,
     N_SENSORS,
     PHI,
     wrapped,
@@ -82,7 +82,7 @@ MIN_AIRSPEED_MPS = 1.0  # at least so much where an airspeed divides
 MIN_QDYN_PA = 1.0  # the same of the dynamic pressure
 MIN_HALF_DENSITY = 1e-9  # kg/m3, of which the logarithm is taken: far below half a density
 MIN_SPEED_MPS = 1e-3  # at least so much where a predicted speed divides
-# of a reading that its constant error leaves, at least, under a logarithm
+# A reading less its constant error is at least this share of the reading, where a logarithm is taken.
 MIN_SHARE_LEFT = 0.01
 READING_ROUNDING = 1e-10  # of a reading: the part of each bound that covers rounding
 COMPARISON_ROUNDING = 1e-6  # in the unit of the reading: the same where two readings are compared directly
@@ -91,24 +91,34 @@ AB_NOW, AB_PAST = 1.5, 0.5
 # It integrates the position by their third order, h (23 v - 16 v_before + 5 v_earlier) / 12. That differs
 # from h v, which predicts the altitude, by at most h^2 (11 + 5) / 12 of the largest acceleration.
 POSITION_FACTOR = 4.0 / 3.0
+FORCE_JUMP_M_S2 = 8.0  # a sound specific force changes by less from one sample to the next
 
-
-@kernel
-def speed(y):
-    """V, m/s, of a reading: where it divides."""
-    return max(y[AIRSPEED], MIN_AIRSPEED_MPS)
-
-
-@kernel
-def exceeds(r, k, B, x, H):
-    """Whether no error of a set explains a filtered residual: |r_m| > k B_m + x H_m for some pole m.
-
-    B (poles,): bound for sound sensors; H (poles,): on the effect of a unit of an error, of at most x.
-    """
-    for m in range(r.size):
-        if abs(r[m]) > k * B[m] + x * H[m]:
-            return True
-    return False
+# What the tests read and fill, in the record of the monitor.
+TEST_FIELDS = {
+    "h": float, "decay": N_POLES, "g": float,  # decay: of each filter per sample; g m/s2
+    # Declared turbulence, m/s: bound on a gust's speed; bound on its changes through each filter, which
+    # holds up to max_airspeed_mps, and above low_m: below it a gust changes faster
+    "gust_max": float, "gust_change": N_POLES, "max_airspeed_mps": float, "low_m": float,
+    "wind_max": float,  # of the vertical wind, m/s
+    # Declared errors, SI: |error| <= e_zero + e_slope |y|, of which const does not change; of the attitude,
+    # rad/s
+    "e_zero": N_SENSORS, "e_slope": N_SENSORS, "const": N_SENSORS, "drift": float,
+    # Bounds on the error of each reading; e_drift: part of them by drift, rad
+    "e": N_SENSORS, "n": N_SENSORS, "e_drift": float, "e_past": N_SENSORS, "e_older": N_SENSORS,
+    # of the sample before; predict_readings turns a_past into the present axes
+    "y_past": N_SENSORS, "y_older": N_SENSORS, "a": (complex, 2), "a_past": (complex, 2),
+    # m/s2: |a| in the elapsed step and in the two before it; of a_past
+    "a_size": 3, "a_size_past": float,
+    "e_first": float,  # m/s2, in the first step only: no sample precedes it
+    "y_pred": N_SENSORS,  # of the engine's readings: the commands
+    # By test, in the unit of the residual. per_s, per_sample: parts of the bound on the residual of one
+    # sample, the first for each second of it; past: per_sample of the sample before. gust: effect on the
+    # residual of 1 m/s that a gust changes by. r: filtered residual. B: bound on |r|; e_sum: the part of it
+    # that the filter sums. ratio: largest |r| / B over the poles.
+    "residual": N_TESTS, "per_s": N_TESTS, "per_sample": N_TESTS, "past": N_TESTS, "gust": N_TESTS,
+    "r": (N_TESTS, N_POLES), "B": (N_TESTS, N_POLES), "e_sum": (N_TESTS, N_POLES), "ratio": N_TESTS,
+    "agreed": (int, max(len(DUPLICATES), 1)),  # a sensor with the reading that it should equal
+}  # fmt: skip
 
 
 @kernel
@@ -132,12 +142,6 @@ def store_sample(mon, y, force):
 
 
 @kernel
-def expect_pressure(mon, pressure):
-    """Predict the manifold pressure, inHg, from the command of the law in charge of the engine."""
-    mon.y_pred[MANIFOLD] = pressure
-
-
-@kernel
 def predict_readings(mon):
     """Fill y_pred: attitude, flow and altitude now, from the sample before. Returns the attitude.
 
@@ -156,8 +160,8 @@ def predict_readings(mon):
     y[PHI] = np.angle(roll)
     y[THETA] = np.arcsin(min(max(nose.real, -1.0), 1.0))
     y[PSI] = np.arctan2(nose.imag, abs(q[0]) ** 2 - abs(q[1]) ** 2)
-    flow = past[AIRSPEED] * unit(past[BETA])
-    plane = flow.real * unit(past[ALPHA])
+    flow = past[I_AIRSPEED] * unit(past[I_BETA])
+    plane = flow.real * unit(past[I_ALPHA])
     v = complex(0.0, plane.real), complex(flow.imag, plane.imag)
     climb = times(v, down(past))[0].real  # minus the product of two vectors is their scalar product
     y[ALTITUDE] = past[ALTITUDE] + h * climb
@@ -166,16 +170,16 @@ def predict_readings(mon):
     mon.a_size[:] = length(a), mon.a_size[0], mon.a_size[1]
     mon.a_past[:] = turned(step, mon.a)
     v = turned(step, combined(1.0, v, h, a))
-    y[AIRSPEED] = length(v)
-    y[ALPHA] = np.arctan2(v[1].imag, v[0].imag)
-    y[BETA] = np.arcsin(v[1].real / max(y[AIRSPEED], MIN_SPEED_MPS))
+    y[I_AIRSPEED] = length(v)
+    y[I_ALPHA] = np.arctan2(v[1].imag, v[0].imag)
+    y[I_BETA] = np.arcsin(v[1].real / max(y[I_AIRSPEED], MIN_SPEED_MPS))
     return q
 
 
 @kernel
 def half_density(y):
     """qdyn / V^2, kg/m3."""
-    return max(y[QDYN] / y[AIRSPEED] ** 2, MIN_HALF_DENSITY)
+    return max(y[I_QDYN] / y[I_AIRSPEED] ** 2, MIN_HALF_DENSITY)
 
 
 @kernel
@@ -238,24 +242,28 @@ def bound_acceleration(mon, w_max, e_w):
 
 @kernel
 def bound_attitude(mon, y, w_max, e_w):
-    """Fill the bounds of `bound_residuals` for the tests of the attitude.
+    """Fill the bounds of `bound_residuals` for the tests of the attitude; sec: largest 1 / cos(theta).
 
-    A constant error of the attitude turns with the aircraft: in the rates J(phi, theta) (phi', theta', psi')
-    it changes J. A momentary error turns an axis when it begins, and back when it ends with another
-    J. sec: largest 1 / cos(theta).
+        turning, axis i   per_s = EARTH_TURN + 2 drift + e_i + axes      per_sample = n_i + coupled_i
+        axes =   w_max (e_phi + (1 + sec) e_theta + e_psi)        constant error: it changes J
+               + tilt momentary / h                               it turns an axis, and back with another J
+               + h w_max e_w                                      gyros, to second order in h
+        angles            per_s = sec angles + drift
+        angles = EARTH_TURN + (1 + sec h w_max) e_w               gyros, to second order in h
+               + 2 sec w_max (e_phi + e_theta)                    constant error in the inverse of J
+
+    The rates are J(phi, theta) (phi', theta', psi'). coupled: what a momentary error of psi and theta turns
+    about the other axes.
     """
     h, e, n, past, const = mon.h, mon.e_past, mon.n, mon.y_past, mon.const
-    sec, turn = secant(highest(mon, y, THETA)), h * w_max
+    sec = secant(highest(mon, y, THETA))
+    turn = h * w_max
     tilt = abs(y[PHI] - past[PHI]) + abs(y[THETA] - past[THETA])
     momentary = e[THETA] - const[THETA] + e[PSI] - const[PSI] + n[THETA] + n[PSI]
-    axes = (
-        w_max * (e[PHI] + (1.0 + sec) * e[THETA] + e[PSI])  # a constant error in J
-        + tilt * momentary / h
-        + turn * e_w  # gyros, to second order in h
-    )
-    # gyros, to second order in h, and the error in the inverse of J
+    axes = w_max * (e[PHI] + (1.0 + sec) * e[THETA] + e[PSI]) + tilt * momentary / h + turn * e_w
     angles = EARTH_TURN_RAD_S + (1.0 + sec * turn) * e_w + 2.0 * sec * w_max * (e[PHI] + e[THETA])
-    s_theta, s_phi = abs(np.sin(y[THETA])) + n[THETA], abs(np.sin(y[PHI])) + n[PHI]
+    s_theta = abs(np.sin(y[THETA])) + n[THETA]
+    s_phi = abs(np.sin(y[PHI])) + n[PHI]
     coupled = s_theta * n[PSI], s_phi * n[PSI], s_phi * n[THETA]
     for i in range(3):
         mon.per_s[i] = EARTH_TURN_RAD_S + 2.0 * mon.drift + e[i] + axes
@@ -276,17 +284,17 @@ def bound_flow(mon, y, w_max, e_w):
         climb         gusts and wind + (V + e_V) (e_phi + e_theta + vane) + e_V + lag
     """
     h, e, a_size = mon.h, mon.e_past, mon.a_size
-    V = max(lowest(mon, y, AIRSPEED), MIN_AIRSPEED_MPS)
-    sec = secant(highest(mon, y, BETA))
-    vane, e_V = e[ALPHA] + e[BETA], e[AIRSPEED]
+    V = max(lowest(mon, y, I_AIRSPEED), MIN_AIRSPEED_MPS)
+    sec = secant(highest(mon, y, I_BETA))
+    vane, e_V = e[I_ALPHA] + e[I_BETA], e[I_AIRSPEED]
     e_a = bound_acceleration(mon, w_max, e_w)
     a, growth = a_size[0] + e_a, 1.0 + h * (2.0 * a_size[0] / V + w_max)
     low = max(lowest(mon, y, ALTITUDE), LEAST_HEIGHT_M)
-    gust = np.sqrt(max(y[AIRSPEED] / mon.max_airspeed_mps, 1.0) * max(mon.low_m / low, 1.0))
+    gust = np.sqrt(max(y[I_AIRSPEED] / mon.max_airspeed_mps, 1.0) * max(mon.low_m / low, 1.0))
     flow = growth * (sec**2 * ((e_a + a * (vane + e_V / V)) / V + w_max * vane) + sec * e_w)
     mon.per_s[SPEED_TEST:DENSITY_TEST] = e_a + growth * a * vane + h * (a / V) ** 2 * e_V, flow, flow
     mon.gust[SPEED_TEST:DENSITY_TEST] = gust, gust * sec / V, gust * sec / V
-    path = (mon.y_past[AIRSPEED] + e_V) * (e[PHI] + e[THETA] + vane)
+    path = (mon.y_past[I_AIRSPEED] + e_V) * (e[PHI] + e[THETA] + vane)
     lag = POSITION_FACTOR * h * max(a, a_size[1], a_size[2])
     mon.per_s[CLIMB_TEST] = mon.wind_max + mon.gust_max + path + e_V + lag
 
@@ -298,10 +306,11 @@ def bound_density(mon, y):
 
         e |1 / y - 1 / y_past| / (1 - e / y_min)
     """
-    j, past = DENSITY_TEST, mon.y_past
-    climb = past[AIRSPEED] + mon.e_past[AIRSPEED] + mon.wind_max + mon.gust_max
+    j = DENSITY_TEST
+    past = mon.y_past
+    climb = past[I_AIRSPEED] + mon.e_past[I_AIRSPEED] + mon.wind_max + mon.gust_max
     mon.per_s[j], mon.per_sample[j] = climb / DENSITY_SCALE_HEIGHT_M, 0.0
-    for i, k, least in ((QDYN, 1.0, MIN_QDYN_PA), (AIRSPEED, 2.0, MIN_AIRSPEED_MPS)):
+    for i, k, least in ((I_QDYN, 1.0, MIN_QDYN_PA), (I_AIRSPEED, 2.0, MIN_AIRSPEED_MPS)):
         e, y1, y0 = mon.const[i], max(y[i], least), max(past[i], least)
         e_log = e * abs(1.0 / y1 - 1.0 / y0) / max(1.0 - e / min(y1, y0), MIN_SHARE_LEFT)
         mon.per_s[j] += k * e_log / mon.h
@@ -313,7 +322,8 @@ def bound_residuals(mon, y):
     """Fill per_s and per_sample of each test: the largest effect of sound sensors with the declared errors.
 
     The errors of the sample before act through the prediction, those of this sample through the reading that
-    is compared with it.
+    is compared with it. The causes of the terms of first order are in docs/explanation/instruments.md (Bounds
+    of the sensor monitor).
     """
     e_w = w_max = 0.0
     for i in range(3):
@@ -356,7 +366,8 @@ def restart_tests(mon, n):
 @kernel
 def compare(mon, j, residual, bound):
     """Judge the residual of test j alone, without a filter, by the bound on it."""
-    mon.residual[j], mon.B[j, 0] = residual, bound + COMPARISON_ROUNDING
+    mon.residual[j] = residual
+    mon.B[j, 0] = bound + COMPARISON_ROUNDING
     mon.ratio[j] = abs(residual) / mon.B[j, 0]
 
 

@@ -7,7 +7,7 @@ v      vector: its components x, y, z are (x i, y + z i)
 import numpy as np
 
 from beaver_ftc.compiled import kernel
-from beaver_ftc.diagnosis.monitors.records import PSI, THETA
+from beaver_ftc.diagnosis.monitors.numbering import PSI, THETA
 from beaver_ftc.plant.instruments import (
     PHI,
 )

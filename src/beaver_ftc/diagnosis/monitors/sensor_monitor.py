@@ -54,53 +54,50 @@ about surfaces, bank the detection filters, pred the prediction of the model.
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel
+from beaver_ftc.compiled import kernel, record
 from beaver_ftc.diagnosis.detection import attitude
 from beaver_ftc.diagnosis.detection.filters import bank_axis, leak
 from beaver_ftc.diagnosis.monitors.initial_errors import (
     CHANGE_TEST,
+    H_AIRSPEED,
+    H_PHI,
+    N_INITIAL,
+    exceeds,
     explains_exceeded,
     latch_refuted,
+    speed,
     start_bounds,
     update_bounds,
 )
-from beaver_ftc.diagnosis.monitors.records import (
-    AIRSPEED,
-    ALPHA,
+from beaver_ftc.diagnosis.monitors.numbering import (
     ALPHA_TEST,
     ANGLE_TEST,
-    BETA,
     BETA_TEST,
     CLIMB_TEST,
     COUNTERPART,
-    COUNTERPART_TEST,
     DENSITY_TEST,
     DUPLICATE,
     FILTER_POLES_PER_S,
-    FORCE_JUMP_M_S2,
-    GYRO_CONFIRMED,
-    GYRO_OPEN,
-    GYRO_REFUTED,
-    H_AIRSPEED,
-    H_PHI,
+    I_AIRSPEED,
+    I_ALPHA,
+    I_BETA,
+    I_QDYN,
     N_EQUATIONS,
-    N_FROZEN_NEVER,
-    N_INITIAL,
+    N_POLES,
     N_TESTS,
     NO_SENSOR,
     PSI,
-    QDYN,
     RPM_TEST,
     SENSOR_OF,
     SPEED_TEST,
+    TEST_NAMES,
     THETA,
 )
 from beaver_ftc.diagnosis.monitors.redundancy import (
     AB_NOW,
+    FORCE_JUMP_M_S2,
     MIN_AIRSPEED_MPS,
-    exceeds,
     run_tests,
-    speed,
     start_tests,
     store_sample,
     too_steep,
@@ -116,6 +113,7 @@ from beaver_ftc.plant.instruments import (
     set_inertial,
     share_out,
 )
+from beaver_ftc.scenario.sensors import ROWS
 
 # Accelerometers or flow sensor
 JUMP_WINDOW_S = 1.0  # after the alarm: later, a jump by chance is too likely
@@ -134,12 +132,14 @@ COUPLING_SHARE = 0.03
 # the next frame on: only then the innovation contains the change of a gyro's error between two frames
 FULL_STAGE = 3
 MIN_LEAD_S = 0.5  # before the alarm: a surface detected earlier was detected with sound sensors
+N_FROZEN_NEVER = 1_000_000_000  # JSBSim frames: a sound reading may repeat, if its steps exceed its noise
 INITIAL_WINDOW_S = 1.0  # from the start: an alarm of the surfaces may be caused by an initial error
 VANE_RETURN_S = 20.0  # of the return to trim of a replaced vane: kinematics alone drift
 # index in FILTER_POLES_PER_S: of the filter that gives the first value of a replaced rate
 RATE_POLE = 1
 
 # Gyro or attitude (judge_gyros)
+GYRO_OPEN, GYRO_CONFIRMED, GYRO_REFUTED = 0, 1, 2  # verdicts of a gyro
 # innovation, rad/s2, that an error of 1 rad/s of the gyro itself causes, at most
 MAX_DYNAMICS_PER_S = 10.0
 JUMP_TOLERANCE = 0.1  # share of a gyro's jump by which the innovation may differ from it
@@ -154,7 +154,45 @@ RATE_ROUNDING = 1e-6  # rad/s, and rad/s2: the part of the bounds that covers ro
 HIDDEN_FACTOR = 2.0
 
 ANGLES, FORCES = (PHI, THETA, PSI), (AX, AX + 1, AX + 2)
+# of the reading that a duplicate sensor should equal: the test that an error of it exceeds
+COUNTERPART_TEST = np.array([TEST_NAMES.index(ROWS[i].test) for i in COUNTERPART], np.int64)
 INITIAL_SENSOR = tuple(SENSOR_OF[j] for j in CHANGE_TEST)  # of each hypothesis of initial_errors.py
+
+
+# Of an axis. shown, shown_past, rad/s: error of the gyro if the attitude is right, as this frame begins and
+# as the one before began; most, least: of its size in the other samples of this frame, of the one before
+# (most_past, least_past), of the one before that. gap, B_gap (poles,) rad: filtered difference of the turn
+# that the attitude and w show, and its bound; beyond it no gyro can be broken. replaced: its reading.
+GYRO_RECORD = record(
+    shown=float, shown_past=float, most=float, most_past=float, most_older=float,
+    least=float, least_past=float, gap=N_POLES, B_gap=N_POLES, verdict=int, replaced=int,
+)  # fmt: skip
+
+# Of speed, incidence or sideslip, since the alarm: sums of the residuals, of the part of sound sensors, of
+# the part of an initial error; range of the reading.
+FLOW_RECORD = record(r_sum=float, B_sum=float, H_sum=float, y_min=float, y_max=float)
+
+# What isolation keeps, in the record of the monitor.
+ISOLATION_FIELDS = {
+    "stage": int, "t_start": float, "substep": int, "exceeded": (int, N_TESTS),
+    # since the alarm, rad: by angle, body axis and pole, filtered residual of turning beyond the part of the
+    # angle's own residual; by angle and pole, filtered size of the angle's residual; by angle and body axis,
+    # largest size of turn_share
+    "beyond": (3, 3, N_POLES), "swing": (3, N_POLES), "c_max": (3, 3),
+    # by axis, rad/s: error of the gyro if the dynamics are right (`advance_gyro_estimate`), and its bound
+    "w": 3, "w_bound": 3, "gyro": (GYRO_RECORD, 3), "flow": (FLOW_RECORD, 3),
+    "gyros_excluded": int, "n_same": (int, N_SENSORS), "cleared": (int, N_SENSORS), "turn_max": float,
+    "jump": float,  # of the accelerometers, m/s2, which fades
+    "n_since": int,  # samples since the alarm
+    # m, filtered: error of the climb, of an incidence with the error that its residuals show
+    "climb": N_POLES,
+}  # fmt: skip
+
+
+@kernel
+def expect_pressure(mon, pressure):
+    """Predict the manifold pressure, inHg, from the command of the law in charge of the engine."""
+    mon.y_pred[MANIFOLD] = pressure
 
 
 @kernel
@@ -172,7 +210,9 @@ def check_sensors(mon, pred, measured, found, bank, bound, dt, t):
     """
     y = measured.signal
     if not mon.stage:  # the first sample: there is none to compare it with
-        mon.stage, mon.t_start, mon.e_drift = 1, t, mon.drift * t
+        mon.stage = 1
+        mon.t_start = t
+        mon.e_drift = mon.drift * t
         start_tests(mon, y, measured.force)
         start_bounds(mon, y)
     else:
@@ -205,7 +245,8 @@ def advance_gyro_estimate(mon, nu, eta, dt):
     w, B = mon.w, mon.w_bound
     w0, B0 = (w[0], w[1], w[2]), (B[0], B[1], B[2])
     for i in range(3):
-        w[i], B[i] = dt * nu[i], dt * eta[i]
+        w[i] = dt * nu[i]
+        B[i] = dt * eta[i]
         for j in range(3):
             A = (i == j) - dt * mon.config.D[i, j]
             w[i] += A * w0[j]
@@ -249,7 +290,8 @@ def stands_still(mon, i):
 def follow_gyro_errors(mon):
     """Keep what the attitude shows of each gyro's error, if it is right itself."""
     for i in range(3):
-        g, w = mon.gyro[i], -mon.residual[i] / mon.h
+        g = mon.gyro[i]
+        w = -mon.residual[i] / mon.h
         if mon.substep == 0:
             g.shown_past, g.shown = g.shown, w
             g.most_older, g.most_past, g.most = g.most_past, g.most, 0.0
@@ -264,9 +306,7 @@ def restart_comparison(mon):
     shows neither an error nor its absence.
     """
     mon.stage = 1
-    mon.beyond[:] = 0.0
-    mon.swing[:] = 0.0
-    mon.c_max[:] = 0.0
+    mon.beyond[:] = mon.swing[:] = mon.c_max[:] = 0.0
     for i in range(3):
         mon.gyro[i].gap[:] = mon.gyro[i].B_gap[:] = 0.0
 
@@ -290,7 +330,8 @@ def exclude_gyros(mon):
     gap <- a gap + residual + h w. Where the attitude is noisy, a surface is isolated only after that.
     """
     for i in range(3):
-        g, w = mon.gyro[i], mon.w[i]
+        g = mon.gyro[i]
+        w = mon.w[i]
         leak(g.gap, mon.decay, mon.residual[i] + mon.h * w)
         leak(g.B_gap, mon.decay, mon.h * (mon.w_bound[i] + attitude.DAMPING_TOLERANCE * abs(w)))
         if exceeds(g.gap, 1.0, g.B_gap, 1.0, mon.B[i]):
@@ -300,7 +341,8 @@ def exclude_gyros(mon):
 @kernel
 def isolate_sensor(mon, measured, found, bank, bound, dt, t):
     """Raise the alarm, and isolate the sensor once it is the only suspect."""
-    o, worst = mon.output, np.argmax(mon.ratio)
+    o = mon.output
+    worst = np.argmax(mon.ratio)
     if mon.substep == 0 or mon.ratio[worst] > o.top_ratio:  # of the samples of this frame
         o.worst_test_index, o.top_ratio = worst, mon.ratio[worst]
     for i in range(N_SENSORS):
@@ -311,7 +353,7 @@ def isolate_sensor(mon, measured, found, bank, bound, dt, t):
     if o.top_ratio > 1.0 and not o.alarmed:
         raise_alarm(mon, found, t)
         o.alarm_test = o.worst_test_index
-        mon.E_alarm[:] = mon.E
+        mon.initial.E_alarm[:] = mon.initial.E
     if o.alarmed:
         filter_beyond(mon, measured.signal)
         if mon.substep == 0 and mon.stage == FULL_STAGE:
@@ -331,7 +373,8 @@ def raise_alarm(mon, found, t):
     o = mon.output
     if o.alarmed:
         return
-    o.alarmed, o.alarmed_at_s = 1, t
+    o.alarmed = 1
+    o.alarmed_at_s = t
     if found.detected and found.detected_at_s < t - MIN_LEAD_S:
         o.keeps_surface = 1
         return
@@ -344,7 +387,8 @@ def raise_alarm(mon, found, t):
 def mark_isolated(mon, found, i, t):
     """Isolate a sensor at t s; its alarm is raised by then."""
     raise_alarm(mon, found, t)
-    mon.output.isolated_sensor, mon.output.isolated_at_s = i, t
+    mon.output.isolated_sensor = i
+    mon.output.isolated_at_s = t
     mon.output.is_reading_unused[i] = 1
 
 
@@ -384,7 +428,9 @@ def judge_gyros(mon, bank, bound, dt):
     """
     nu = bank.output.innovation
     for i in range(3):
-        g, estimate, B = mon.gyro[i], abs(mon.w[i]), mon.w_bound[i]
+        g = mon.gyro[i]
+        estimate = abs(mon.w[i])
+        B = mon.w_bound[i]
         if g.verdict != GYRO_OPEN:
             continue
         largest, jump = max(abs(g.shown), abs(g.shown_past)), (g.shown - g.shown_past) / dt  # rad/s, rad/s2
@@ -442,7 +488,8 @@ def flow_jumped(mon, y, i):
     """
     j = mon.output.alarm_test
     per_a = mon.h / (1.0 if j == SPEED_TEST else speed(mon.y_past))
-    ddy, r = abs(y[i] - 2.0 * mon.y_past[i] + mon.y_older[i]), abs(mon.residual[j])
+    ddy = abs(y[i] - 2.0 * mon.y_past[i] + mon.y_older[i])
+    r = abs(mon.residual[j])
     soon = mon.n_since * mon.h < JUMP_WINDOW_S - TIME_ROUNDING_S
     leaps = r > mon.B[j, 0] + FORCE_JUMP_M_S2 * per_a
     return soon and leaps and ddy >= MIN_JUMP_SHARE * r > AB_NOW * mon.jump * per_a
@@ -456,7 +503,8 @@ def sum_flow(mon, y):
     alpha: error of the incidence that the sums leave unexplained, rad; climb: its effect in a sample, m.
     """
     for n in range(3):
-        f, j = mon.flow[n], SPEED_TEST + n
+        f = mon.flow[n]
+        j = SPEED_TEST + n
         now = y[SENSOR_OF[j]]
         if mon.n_since == 0:
             f.y_min = f.y_max = now
@@ -465,11 +513,11 @@ def sum_flow(mon, y):
         else:
             f.r_sum += mon.residual[j]
             f.B_sum += mon.h * mon.per_s[j]
-            f.H_sum += mon.E_alarm[n] * mon.H[n, j]
+            f.H_sum += mon.initial.E_alarm[n] * mon.initial.H[n, j]
             f.y_min, f.y_max = min(f.y_min, now), max(f.y_max, now)
     f = mon.flow[1]
     alpha = f.r_sum - min(max(f.r_sum, -f.B_sum - f.H_sum), f.B_sum + f.H_sum)
-    leak(mon.climb, mon.decay, mon.h * y[AIRSPEED] * alpha * np.cos(y[PHI]) * np.cos(y[THETA]))
+    leak(mon.climb, mon.decay, mon.h * y[I_AIRSPEED] * alpha * np.cos(y[PHI]) * np.cos(y[THETA]))
     mon.n_since += 1
 
 
@@ -489,12 +537,12 @@ def contradicted(mon, y):
     if alarm == BETA_TEST or mon.exceeded[other]:
         return False
     h = alarm - SPEED_TEST
-    e, r, B = mon.E_alarm[h], mon.r[alarm], mon.B[alarm]
+    e, r, B = mon.initial.E_alarm[h], mon.r[alarm], mon.B[alarm]
     # log(density) changes by twice the relative change of the airspeed
     share = 2.0 * (1.0 - min(e, 1.0)) / speed(y)
     for m, climb in enumerate(mon.climb):
         effect = abs(climb) if alarm == ALPHA_TEST else share * (abs(r[m]) - B[m])
-        if effect > CLEAR_FACTOR * (mon.B[other, m] + e * mon.H_m[h, other, m]):
+        if effect > CLEAR_FACTOR * (mon.B[other, m] + e * mon.initial.H_m[h, other, m]):
             return True
     return False
 
@@ -518,7 +566,8 @@ def clear_gyros(mon, y):
 def find_suspects(mon):
     """Fill suspect (N_SENSORS,): the sensors whose error explains all tests. An error of another sensor from
     the start does not explain a frozen suspect."""
-    suspect, alarm = mon.output.suspect, mon.output.alarm_test
+    suspect = mon.output.suspect
+    alarm = mon.output.alarm_test
     suspect[:] = 0
     if alarm >= N_EQUATIONS:
         suspect_duplicate(mon, alarm - N_EQUATIONS)
@@ -565,13 +614,17 @@ def suspect_attitude(mon):
     """Suspect gyros and attitude: one axis alone, or one angle alone, but for what an error of phi or theta
     from the start explains. A gyro's error may appear in an angle first. A frozen angle excludes the gyros;
     it is suspected until it is known not to be frozen."""
-    suspect, ratio = mon.output.suspect, mon.ratio[:ANGLE_TEST]
-    turns, angles = mon.exceeded[:ANGLE_TEST], mon.exceeded[ANGLE_TEST:SPEED_TEST]
-    refuted = mon.refuted[H_PHI:, ANGLE_TEST:SPEED_TEST]
-    frozen, worst = last_frozen(mon, ANGLES) >= 0, np.argmax(ratio)
+    suspect = mon.output.suspect
+    ratio = mon.ratio[:ANGLE_TEST]
+    turns = mon.exceeded[:ANGLE_TEST]
+    angles = mon.exceeded[ANGLE_TEST:SPEED_TEST]
+    refuted = mon.initial.refuted[H_PHI:, ANGLE_TEST:SPEED_TEST]
+    frozen = last_frozen(mon, ANGLES) >= 0
+    worst = np.argmax(ratio)
     for i in range(3):
         suspect[i] = alone(turns, i) and mon.gyro[i].verdict != GYRO_REFUTED and not frozen
-        explains, k = explains_turns(mon, i), PHI + i
+        explains = explains_turns(mon, i)
+        k = PHI + i
         unshared = alone(angles, i) if i == 2 else alone(refuted[i], i)
         only = unshared and (explains or angles[i] == 1)
         axis = worst if ratio[worst] > ratio[i] else i
@@ -586,13 +639,13 @@ def explains_turns(mon, i):
     residual of the angle's own test allows now, or as its residuals since the alarm have shown.
     """
     own, h = ANGLE_TEST + i, min(H_PHI + i, N_INITIAL - 1)
-    initial = mon.E_alarm[h] if i < 2 else 0.0
+    initial = mon.initial.E_alarm[h] if i < 2 else 0.0
     tilt = mon.e[PHI] + mon.e[THETA]
     for j in range(3):
         r, c = mon.r[j], abs(turn_share(mon.y_past, j, i)) + tilt
         for m in range(r.size):
             B = mon.B[own, m]
-            sound = mon.B[j, m] + initial * mon.H_m[h, j, m]
+            sound = mon.B[j, m] + initial * mon.initial.H_m[h, j, m]
             now = abs(r[m]) > c * (abs(mon.r[own, m]) + B) + sound
             since = abs(mon.beyond[i, j, m]) > sound + mon.c_max[i, j] * B + tilt * mon.swing[i, m]
             if mon.exceeded[j] and now and since:
@@ -605,8 +658,11 @@ def suspect_flow(mon, alarm):
     """Suspect a flow sensor, an accelerometer, or a gyro whose error may be hidden in the tests of the
     attitude. No flow sensor moves the attitude's tests.
     """
-    suspect, cleared, turns = mon.output.suspect, mon.cleared, mon.exceeded[:ANGLE_TEST]
-    by_gyro, flow = alarm > SPEED_TEST and turns.any(), SENSOR_OF[alarm]
+    suspect = mon.output.suspect
+    cleared = mon.cleared
+    turns = mon.exceeded[:ANGLE_TEST]
+    by_gyro = alarm > SPEED_TEST and turns.any()
+    flow = SENSOR_OF[alarm]
     for i in range(3 if alarm > SPEED_TEST else 0):
         suspect[i] = alone(turns, i) if by_gyro else gyro_hidden(mon, alarm, i)
     if not by_gyro:
@@ -622,7 +678,7 @@ def gyro_hidden(mon, j, i):
     its axis. All of the error of the gyro across the flow (q for the incidence, r for the sideslip) turns it;
     of another a share, by kinematics; q does not act on the sideslip.
     """
-    z, t = unit(mon.y_past[ALPHA]), np.tan(mon.y_past[BETA])
+    z, t = unit(mon.y_past[I_ALPHA]), np.tan(mon.y_past[I_BETA])
     share = (t * z.real, 1.0, t * z.imag)[i] if j == ALPHA_TEST else (z.imag, 0.0, 1.0)[i]
     full = i == j - SPEED_TEST
     k = HIDDEN_FACTOR if full else 1.0
@@ -636,9 +692,10 @@ def suspect_accelerometers(mon):
     of sound sensors.
     """
     y, dV, da, db = mon.y_past, mon.flow[0], mon.flow[1], mon.flow[2]
-    V, frozen = speed(y), last_frozen(mon, FORCES)
-    plane = complex(dV.r_sum, V * db.r_sum) * unit(y[BETA])
-    body = complex(plane.real, V * np.cos(y[BETA]) * da.r_sum) * unit(y[ALPHA])
+    V = speed(y)
+    frozen = last_frozen(mon, FORCES)
+    plane = complex(dV.r_sum, V * db.r_sum) * unit(y[I_BETA])
+    body = complex(plane.real, V * np.cos(y[I_BETA]) * da.r_sum) * unit(y[I_ALPHA])
     dv = abs(body.real), abs(plane.imag), abs(body.imag)
     least = MIN_AXIS_SHARE * max(dv) - dV.B_sum - V * (da.B_sum + db.B_sum)
     for i in FORCES:
@@ -652,12 +709,13 @@ def suspect_lone(mon, alarm):
     suspect = mon.output.suspect
     suspect[SENSOR_OF[alarm]] = alarm >= RPM_TEST or alone(mon.exceeded[:RPM_TEST], alarm)
     if alarm == DENSITY_TEST:
-        e, H = mon.E_alarm[H_AIRSPEED], mon.H_m[H_AIRSPEED, alarm]
+        e = mon.initial.E_alarm[H_AIRSPEED]
+        H = mon.initial.H_m[H_AIRSPEED, alarm]
         # a relative change of the airspeed changes log(density) by twice as much
         k = 2.0 * HIDDEN_FACTOR * (1.0 + e) / speed(mon.y_past)
         hidden = not exceeds(mon.r[alarm], k, mon.B[SPEED_TEST], e, H)
         # its test need not show an error if it is frozen
-        suspect[AIRSPEED] = mon.exceeded[SPEED_TEST] == 1 or hidden or mon.n_same[AIRSPEED] > 0
+        suspect[I_AIRSPEED] = mon.exceeded[SPEED_TEST] == 1 or hidden or mon.n_same[I_AIRSPEED] > 0
 
 
 @kernel
@@ -678,7 +736,8 @@ def name_gyro(mon, found, i, t):
     o = mon.output
     mark_isolated(mon, found, i, t)
     if o.keeps_surface and found.isolated_estimator < 0:
-        o.keeps_surface, o.alarmed_at_s = 0, found.detected_at_s
+        o.keeps_surface = 0
+        o.alarmed_at_s = found.detected_at_s
 
 
 @kernel
@@ -701,7 +760,7 @@ def allows_isolation(mon, is_earlier, detected_at_s):
         return True
     if detected_at_s < mon.t_start + INITIAL_WINDOW_S:
         return False
-    for i in (ALPHA, BETA, AIRSPEED, QDYN):
+    for i in (I_ALPHA, I_BETA, I_AIRSPEED, I_QDYN):
         if stands_still(mon, i):
             return False
     return is_earlier == 1 or doubts_gyros(mon)
@@ -723,7 +782,8 @@ def has_alarm(mon):
 def replace_readings(mon, pred, measured):
     """Replace the readings of isolated or missing sensors by estimates from the others. Accelerometers are
     not replaced: none of them is used once one of them may be broken."""
-    o, unused = mon.output, mon.output.is_reading_unused
+    o = mon.output
+    unused = mon.output.is_reading_unused
     for i in range(N_SENSORS):
         unused[i] |= measured.missing[i]
         if unused[i] and i < AX:
@@ -733,7 +793,7 @@ def replace_readings(mon, pred, measured):
             set_inertial(measured, 0)
     if unused[:AX].any():
         share_out(measured)
-    slipstream = unused[AIRSPEED] or unused[QDYN] or unused[ENGINE_SPEED] or unused[MANIFOLD]
+    slipstream = unused[I_AIRSPEED] or unused[I_QDYN] or unused[ENGINE_SPEED] or unused[MANIFOLD]
     if slipstream and mon.config.has_engine:
         note_slipstream(measured)
 
@@ -743,12 +803,12 @@ def estimate_reading(mon, pred, y, i):
     """The estimate of a sensor's reading from the other sensors, in its unit."""
     if i < 3:
         return estimate_rate(mon, pred, i)
-    rho = 2.0 * mon.y_past[QDYN] / mon.y_past[AIRSPEED] ** 2
-    if i == AIRSPEED:
-        return np.sqrt(max(2.0 * y[QDYN] / rho, MIN_AIRSPEED_MPS**2))
-    if i == QDYN:
-        return 0.5 * rho * y[AIRSPEED] ** 2
-    back = mon.h / VANE_RETURN_S if i in (ALPHA, BETA) else 0.0
+    rho = 2.0 * mon.y_past[I_QDYN] / mon.y_past[I_AIRSPEED] ** 2
+    if i == I_AIRSPEED:
+        return np.sqrt(max(2.0 * y[I_QDYN] / rho, MIN_AIRSPEED_MPS**2))
+    if i == I_QDYN:
+        return 0.5 * rho * y[I_AIRSPEED] ** 2
+    back = mon.h / VANE_RETURN_S if i in (I_ALPHA, I_BETA) else 0.0
     return mon.y_pred[i] + back * (mon.config.y_trim[i] - mon.y_pred[i])
 
 
@@ -760,7 +820,8 @@ def estimate_rate(mon, pred, i):
     The rate itself is used for the next sample: its own error shows there.
     """
     gain = mon.config.rate_gain
-    acc, u = pred.f[i], pred.u_old if mon.substep == 0 else pred.u
+    acc = pred.f[i]
+    u = pred.u_old if mon.substep == 0 else pred.u
     for s in range(u.size):
         acc += pred.G[i, s] * u[s]
     if mon.output.keeps_surface:

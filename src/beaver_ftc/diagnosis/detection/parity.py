@@ -71,7 +71,7 @@ from beaver_ftc.diagnosis.detection.rows import (
     RAW,
     VANED,
     VANELESS,
-    add_turn_variance,
+    add_turn_to_drift,
     fill_leak,
     project_rows,
     set_columns,
@@ -170,7 +170,7 @@ def fill_view_drift(view, q, gust, own, forces, V):
             for i, f in enumerate(forces.component):
                 view.L_force[j] += m[0, SIDE_FORCE + i] * f.L[j] * forces.q_ratio
         Q_d += view_drift(own, V, view.L_rate, view.L_force, view.block.source != RAW and forces.in_use == 1)
-        add_turn_variance(b, gust)
+        add_turn_to_drift(b, gust)
     b.Q_d[0, 0] = Q_d
 
 

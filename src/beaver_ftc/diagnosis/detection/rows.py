@@ -337,7 +337,7 @@ def fill_leak(b, rows, leak, col):
 
 
 @kernel
-def add_turn_variance(b, gust):
+def add_turn_to_drift(b, gust):
     """P_dd <- P_dd + Q_scale m var_turn m': what a fast turn of the gusts' axes may change in the drift."""
     for i in range(b.n):
         for j in range(b.n):

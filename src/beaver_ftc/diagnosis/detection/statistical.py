@@ -47,7 +47,7 @@ from beaver_ftc.diagnosis.detection.rows import (
     NOISE_RECORD,
     ROWS_RECORD,
     add_constants,
-    add_turn_variance,
+    add_turn_to_drift,
     begin_rows,
     project_rows,
 )
@@ -109,7 +109,7 @@ def update_blocks(cfg, rows, blocks, gust, dt, k, alarmed, may_end=False):
             for i, axis in enumerate(b.axes[: b.n]):
                 b.g_c[i] = gust.output.acc_coarse[axis]
         if gust.output.gusty:
-            add_turn_variance(b, gust)
+            add_turn_to_drift(b, gust)
             if j < likelihood.REVERTING_BLOCK:
                 likelihood.whiten_calm(b, dt)
             else:  # without gust both blocks of roll and yaw have the same filter
@@ -225,7 +225,7 @@ def excludes_loss(cfg, blocks, fies, of, s, pitch_ends, abrupt):
     pitch, because a loss acts on its own axes only. A loss that is not declared `abrupt` may grow. A constant
     theta then explains only a part of its effect, so that share is MIN_LLR_SHARE instead of 1. The same holds
     for a loss that begins inside a frame of several instants, and for the end of a loss there. The end of a
-    loss in pitch counts only if `pitch_ends` is set: a fault outside the class may project_rows like it.
+    loss in pitch counts only if `pitch_ends` is set: a fault outside the class may look like it.
     """
     pitch = blocks[likelihood.PITCH_BLOCK]
     single = cfg.w == 1.0

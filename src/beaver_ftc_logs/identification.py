@@ -1,6 +1,6 @@
 """The whole of an identification: the fit, its tests on what it did not see, and what is said about both.
 
-Letters as in `fitting` and `regression`: Z and y regressors and rates of a fit, e and R its residual and the
+Letters as in `orders` and `regression`: Z and y regressors and rates of a fit, e and R its residual and the
 covariance, ma and ar the colour of the noise. V0 is the airspeed at which the commands count once, m/s.
 """
 
@@ -12,7 +12,8 @@ import numpy as np
 
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
-from beaver_ftc_logs import extremes, fitting, gyro_noise, regression, trust
+from beaver_ftc_logs import extremes, fitting, gyro_noise, orders, regression, trust, validation
+from beaver_ftc_logs.folds import fold_qualities
 from beaver_ftc_logs.least_squares import left_by, spectral_density, variance_inflation
 from beaver_ftc_logs.model import FittedRanges, Model, NoiseModel
 from beaver_ftc_logs.recording import Floats
@@ -43,11 +44,11 @@ def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
     """The model of a vehicle from its flights, with its own account of how good it is in `identified`."""
     vehicle, lines = assume_law_and_air(flights, vehicle)
     _check_units(flights, vehicle)
-    parts = fitting.fit_parts(whiten_flights(flights, vehicle))
+    parts = orders.fit_parts(whiten_flights(flights, vehicle))
     model = fitting.fit_model(parts, vehicle)
-    check_explained(fitting.fold_qualities(parts, model), parts, model)
-    model = add_unseen_noise(fitting.add_ranges_and_threshold(parts, model), flights)
-    folds, mass = fitting.score_folds(parts, model)
+    check_explained(fold_qualities(parts, model), parts, model)
+    model = add_unseen_noise(validation.add_ranges_and_threshold(parts, model), flights)
+    folds, mass = validation.score_folds(parts, model)
     results = {
         "assumed": lines,
         "flights": [
@@ -87,11 +88,11 @@ def add_unseen_noise(model: Model, flights: Sequence[Samples]) -> Model:
     models = list(model.colours)
     for ma in UNFITTED_MA:
         if ma not in known:
-            parts = fitting.fit_parts([whiten_samples(flight, ma) for flight in flights])
-            e = fitting.one_step_residuals(parts, model)
+            parts = orders.fit_parts([whiten_samples(flight, ma) for flight in flights])
+            e = orders.one_step_residuals(parts, model)
             models.append(NoiseModel(average=list(ma), noise=np.cov(e.T).tolist(), **same))
     for gyro_sd in UNFITTED_GYROS_RAD_S:
-        ar, R = gyro_noise.yule_walker_predictor(model, quietest, gyro_sd, fitting.AR_ORDER)
+        ar, R = gyro_noise.yule_walker_predictor(model, quietest, gyro_sd, orders.AR_ORDER)
         models.append(NoiseModel(average=[1.0], before=ar.tolist(), noise=R.tolist(), **same))
     return model.model_copy(update={"colours": models})
 
@@ -134,7 +135,7 @@ def whiten_flights(flights: Sequence[Samples], vehicle: Vehicle) -> list[Samples
 
     def stacked(flights: Sequence[Samples]) -> tuple[Floats, Floats]:
         # the commands get as many lags as the rates, not as many as they have at most: the results rest on it
-        return fitting.stack_data(fitting.fit_parts(flights), vehicle, *[max(fitting.RATE_LAGS)] * 2)[:2]
+        return orders.stack_data(orders.fit_parts(flights), vehicle, *[max(orders.RATE_LAGS)] * 2)[:2]
 
     def own_residual(flight: Samples, ma: tuple[float, ...]) -> Floats:
         Z, y = stacked([whiten_samples(flight, ma)])
@@ -236,7 +237,7 @@ def _scaled(
 
 def _min_bic(flights: Sequence[Samples], vehicle: Vehicle) -> float:
     """The least Bayesian information criterion of any order."""
-    return min(fitting.bic_by_order(fitting.fit_parts(flights), vehicle).values())
+    return min(orders.bic_by_order(orders.fit_parts(flights), vehicle).values())
 
 
 def check_explained(folds: list[Document], parts: Parts, model: Model) -> None:
@@ -272,7 +273,7 @@ def _check_units(flights: Sequence[Samples], vehicle: Vehicle) -> None:
 def collinear_names(parts: Parts, model: Model) -> list[Document]:
     """Regressors whose coefficient's variance the others inflate more than tenfold, worst first; None where
     the others make it up."""
-    Z, _, _ = fitting.stack_data(parts, model.vehicle, model.history, model.lags)
+    Z, _, _ = orders.stack_data(parts, model.vehicle, model.history, model.lags)
     factors = variance_inflation(Z[:, 1:])
     pairs = sorted(zip(regressor_names(model), factors.tolist(), strict=True), key=lambda pair: -pair[1])
     return [
@@ -297,13 +298,13 @@ def regressor_names(model: Model) -> list[str]:
 
 def median_inflation(parts: Parts, model: Model) -> dict[str, float]:
     """By how much the residual's colour widens the standard errors of the responses: the median, an axis."""
-    inflation = fitting.fit_of(parts, model).standard_error_inflation[-len(model.groups) * model.lags :]
+    inflation = orders.fit_of(parts, model).standard_error_inflation[-len(model.groups) * model.lags :]
     return regression.by_axis(np.median(inflation, axis=0))
 
 
 def density_ratios(parts: Parts, model: Model) -> list[Document]:
     """Mean density of the residual by band, over that of white noise of the same variance, an axis."""
-    e = fitting.one_step_residuals(parts, model)
+    e = orders.one_step_residuals(parts, model)
     f, density = spectral_density(e, model.rate_hz)
     white = e.var(axis=0) / (0.5 * model.rate_hz)
     bands = []

@@ -16,9 +16,10 @@ from beaver_ftc.documents import BadInput
 from beaver_ftc.results import SERIES_COLOURS as SERIES
 from beaver_ftc.results import Document, as_json, result_folder
 from beaver_ftc.studies.present import GRID, panels
-from beaver_ftc_logs import fitting
+from beaver_ftc_logs import orders
 from beaver_ftc_logs.diagnose import LogRows
 from beaver_ftc_logs.findings import MAX_BRIEF_EVENT_S, duration_text, events_to_show
+from beaver_ftc_logs.folds import Fold, held_out_folds
 from beaver_ftc_logs.identification import regressor_names
 from beaver_ftc_logs.least_squares import Regression, spectral_density
 from beaver_ftc_logs.model import Model
@@ -192,8 +193,8 @@ def refuse_foreign_file(path: Path) -> None:
 
 def render_identification(flights: Sequence[Samples], model: Model) -> str:
     """The page as HTML text."""
-    usable = fitting.fit_parts(flights)
-    fit = fitting.fit_order(usable, model.vehicle, model.history, model.lags)
+    usable = orders.fit_parts(flights)
+    fit = orders.fit_order(usable, model.vehicle, model.history, model.lags)
     names = ["constant", *regressor_names(model)]
     return load_template("model.html.j2").render(
         mark=PAGE_MARK,
@@ -217,7 +218,7 @@ def _prediction_figure(usable: Parts, model: Model) -> Any:
     """Measured and predicted rates over the liveliest part of each flight (or half) that was left out."""
     from matplotlib.figure import Figure
 
-    used = (fold for fold in fitting.held_out_folds(usable, model, None) if fold.held_out.is_usable.any())
+    used = (fold for fold in held_out_folds(usable, model, None) if fold.held_out.is_usable.any())
     folds = list(islice(used, _MAX_SHOWN_FLIGHTS))
     n = max(len(folds), 1)
     figure = Figure(figsize=(11, 4.6 * n), layout="constrained", dpi=110)
@@ -237,10 +238,10 @@ def _prediction_figure(usable: Parts, model: Model) -> Any:
     return figure
 
 
-def _liveliest_window(fold: fitting.Fold, n: int) -> tuple[Floats, Floats, Floats]:
+def _liveliest_window(fold: Fold, n: int) -> tuple[Floats, Floats, Floats]:
     """Times, rates and residual of the window in which the rates known moved most; nan where nothing is
     known, for lines to end."""
-    flight, samples = fitting.one_step_innovations(fold.model, fold.held_out), fold.held_out.samples
+    flight, samples = orders.one_step_innovations(fold.model, fold.held_out), fold.held_out.samples
     rates, r = np.full((2, *samples.rates.shape), np.nan)
     rates[flight.rows], r[flight.rows] = samples.rates[flight.rows], flight.e
     total = np.concatenate([[0.0], np.cumsum(np.nansum(rates**2, axis=1))])
@@ -251,7 +252,7 @@ def _liveliest_window(fold: fitting.Fold, n: int) -> tuple[Floats, Floats, Float
 
 def _spectrum_figure(usable: Parts, model: Model) -> Any:
     """Density of the residual, and what white noise of the same variance would have."""
-    residual = fitting.one_step_residuals(usable, model)
+    residual = orders.one_step_residuals(usable, model)
     f_hz, power = spectral_density(residual, model.rate_hz)
     figure, ((axis,),) = panels(1, 1, 7.5, 3.2)
     for i, name in enumerate("pqr"):

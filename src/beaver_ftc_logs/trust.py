@@ -56,7 +56,7 @@ _REVERSED_GAIN_LIMIT = -0.5
 
 
 def compute_fitted_ranges(parts: Parts, tied: Floats, gain_sd: Floats) -> FittedRanges:
-    """Compute the ranges in which a model was fitted. tied (G,): as of `fitting.tied_shares`; gain_sd (G,):
+    """Compute the ranges in which a model was fitted. tied (G,): as of `orders.tied_shares`; gain_sd (G,):
     standard errors, of parts not fitted."""
 
     def usable(name: str) -> Floats:

@@ -26,8 +26,7 @@ def test_no_claim_is_of_flights_that_a_constant_was_chosen_on(choice):
 
 @pytest.mark.parametrize("choice", CHOICES, ids=lambda choice: choice["constant"])
 def test_what_was_chosen_is_where_the_table_says(choice):
-    file = ROOT / choice["where"]
-    text = file.read_text()
+    text = "".join((ROOT / file).read_text() for file in choice["where"].split(", "))
     for name in re.findall(r"`([A-Za-z_]+)`", choice["constant"]):
         assert name in text, name
 
@@ -47,10 +46,10 @@ def test_each_number_of_the_diagnosis_of_logs_was_chosen_or_has_an_origin(file):
     chosen = {
         name
         for choice in CHOICES
-        if choice["where"] == file
+        if file in choice["where"].split(", ")
         for name in re.findall(r"`(\w+)`", choice["constant"])
     }
-    assert len(numbers) > 2
+    assert numbers
     assert numbers - chosen == set(NOT_CHOSEN[file])
     assert all(origin.partition(":")[0] in ORIGINS for origin in NOT_CHOSEN[file].values())
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc_logs import fitting
-from beaver_ftc_logs.fitting import FitPart
+from beaver_ftc_logs import fitting, gains, orders, validation
 from beaver_ftc_logs.recording import LoggedFailure
+from beaver_ftc_logs.regression import FitPart
 from products.logs import small
 
 MODEL = small.model()
@@ -42,7 +42,7 @@ USED = {  # at 2 Hz: three samples at either edge of a label, all of what lasts 
 @pytest.mark.parametrize("name", USED)
 def test_which_samples_are_known(name):
     parts, used = USED[name]
-    assert np.flatnonzero(fitting.usable_mask(labelled(parts))).tolist() == used
+    assert np.flatnonzero(orders.usable_mask(labelled(parts))).tolist() == used
 
 
 def test_what_follows_a_failure_is_not_fitted():
@@ -50,7 +50,7 @@ def test_what_follows_a_failure_is_not_fitted():
     samples = labelled(
         [(20, NAN, NAN)], logged_failures=(LoggedFailure(6.0, "rudder"), LoggedFailure(5.0, "elevator"))
     )
-    assert np.flatnonzero(fitting.usable_mask(samples)).tolist() == list(range(8))
+    assert np.flatnonzero(orders.usable_mask(samples)).tolist() == list(range(8))
 
 
 def test_a_fit_wants_ten_samples_a_coefficient():
@@ -58,16 +58,16 @@ def test_a_fit_wants_ten_samples_a_coefficient():
     samples = small.flight(MODEL, 146)
     use = np.ones(146, dtype=bool)
     use[136:] = False
-    assert fitting.fit_order([FitPart(samples, use)], MODEL.vehicle, 2, 3).coefficients.shape == (13, 3)
+    assert orders.fit_order([FitPart(samples, use)], MODEL.vehicle, 2, 3).coefficients.shape == (13, 3)
     use[135] = False
     says = "129 samples known to be healthy, allowed: at least 130 to fit 13 coefficients an axis"
     with pytest.raises(BadInput, match=says):
-        fitting.fit_order([FitPart(samples, use)], MODEL.vehicle, 2, 3)
+        orders.fit_order([FitPart(samples, use)], MODEL.vehicle, 2, 3)
 
 
 @pytest.fixture(scope="module")
 def usable_flights():
-    return fitting.fit_parts([small.flight(MODEL, 1000, lost=LOST)])
+    return orders.fit_parts([small.flight(MODEL, 1000, lost=LOST)])
 
 
 @pytest.fixture(scope="module")
@@ -77,7 +77,7 @@ def fitted(usable_flights):
 
 def test_tests_on_what_was_not_fitted(changed, fitted, usable_flights):
     quick = fitted.settings.model_copy(update={"delays_s": [0.0]})
-    entries, bounds = fitting.score_folds(usable_flights, fitted.model_copy(update={"settings": quick}))
+    entries, bounds = validation.score_folds(usable_flights, fitted.model_copy(update={"settings": quick}))
     assert not changed({"entries": entries, "bounds": bounds})
     assert [entry["left_out"] for entry in entries] == ["second half", "first half"]
     assert all(0.8 < share < 1.0 for entry in entries for share in entry["explained"].values())
@@ -88,22 +88,21 @@ def days(gains):
     """Flights of days on which the right surface acts so many times as the left one does."""
     flown = [small.flight(MODEL, 1500, seed=20 + i, name=f"day-{i}") for i in range(len(gains))]
     told = [replace(one, labels=np.full_like(one.labels, np.nan)) for one in flown]
-    return fitting.fit_parts(
+    return orders.fit_parts(
         [replace(one, commands=one.commands / [gain, 1.0]) for one, gain in zip(told, gains, strict=True)]
     )
 
 
 def test_flights_that_are_alike_tell_all_that_their_noise_allows():
     """The squares of Gaussian gains are as many as these, on average: 12 of them, within three sd of that."""
-    alike = fitting.gain_overdispersion(days([1.0] * 6), MODEL)
+    alike = gains.gain_overdispersion(days([1.0] * 6), MODEL)
     assert alike == pytest.approx(1.0, abs=3.0 * np.sqrt(2.0 / 12.0))
 
 
 def test_days_that_differ_let_a_sample_tell_less():
     """Differences far above what the noise allows: the larger they are, the less."""
     none, some, more = (
-        fitting.gain_overdispersion(days(1.0 + size * np.tile([-1, 1], 3)), MODEL)
-        for size in (0.0, 0.15, 0.3)
+        gains.gain_overdispersion(days(1.0 + size * np.tile([-1, 1], 3)), MODEL) for size in (0.0, 0.15, 0.3)
     )
     assert more > 1.5 * some > 5.0 * none
     assert fitting.estimate_filter_settings(days([0.7, 1.3] * 3), MODEL).power < 0.2

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beaver_ftc_logs import fitting
+from beaver_ftc_logs import orders
 from beaver_ftc_logs.identification import (
     fit_output_error,
     scale_if_better,
@@ -51,7 +51,7 @@ def lagged(n=1200, lag_s=0.1, delay_s=0.13, seed=4, noise=0.002):
 
 
 def test_servo_lag_and_delay_are_found(changed):
-    found = fit_output_error(fitting.fit_parts([lagged()]), [[0], [1]])
+    found = fit_output_error(orders.fit_parts([lagged()]), [[0], [1]])
     assert found["servo_lag_s"] == pytest.approx(0.1, abs=0.02)
     assert found["delay_s"] == pytest.approx(0.13, abs=0.02)
     assert min(found["explained_of_windows_not_fitted"].values()) > 0.98

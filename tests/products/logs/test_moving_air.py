@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc_logs import fitting, gyro_noise, identification, loading, trust
+from beaver_ftc_logs import fitting, gyro_noise, identification, loading, orders, trust
 from beaver_ftc_logs.bank import build_bank
 from beaver_ftc_logs.filtering import bank_posterior
 from beaver_ftc_logs.samples import whiten_samples
@@ -37,7 +37,7 @@ VEHICLE = small.vehicle(
 
 
 def fitted(flights):
-    return fitting.fit_model(fitting.fit_parts(flights), VEHICLE)
+    return fitting.fit_model(orders.fit_parts(flights), VEHICLE)
 
 
 @pytest.fixture(scope="module")

@@ -10,14 +10,12 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.diagnose import diagnose
-from beaver_ftc_logs.fitting import (
-    add_ranges_and_threshold,
-    fit_model,
-    fit_parts,
-    validation_folds,
-)
+from beaver_ftc_logs.fitting import fit_model
+from beaver_ftc_logs.folds import validation_folds
 from beaver_ftc_logs.loading import load_flights_for_fit
+from beaver_ftc_logs.orders import fit_parts
 from beaver_ftc_logs.scoring import score_against_failures, score_against_labels
+from beaver_ftc_logs.validation import add_ranges_and_threshold
 from beaver_ftc_logs.vehicle import load_vehicle
 
 ALFA = "carbonZ_2018-09-11-15-06-34_1_rudder_right_failure"

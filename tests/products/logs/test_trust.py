@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc_logs import fitting, identification, trust
+from beaver_ftc_logs import identification, orders, trust, validation
 from beaver_ftc_logs.diagnose import diagnose
 from beaver_ftc_logs.findings import as_text, verdict_document
 from beaver_ftc_logs.model import FittedRanges
@@ -18,8 +18,8 @@ HEALTHY = small.flight(small.model(), n=1200, seed=2)
 def trusted(flown=HEALTHY, **changes):
     """A model by hand that knows what it was fitted on."""
     model = small.model(**changes)
-    usable_flights = fitting.fit_parts([flown])
-    return fitting.add_ranges_and_threshold(usable_flights, model)
+    usable_flights = orders.fit_parts([flown])
+    return validation.add_ranges_and_threshold(usable_flights, model)
 
 
 @pytest.fixture(scope="module")
@@ -98,8 +98,8 @@ def test_what_the_law_ties_together_is_not_claimed(model):
     flown = small.flight(model, n=2000, seed=3)
     follows = np.vstack([np.zeros(3), flown.rates[:-1]]) @ [0.4, -0.3, 0.2]
     commands = np.column_stack([follows, flown.commands[:, 1]])
-    share = fitting.tied_shares(
-        fitting.fit_parts([small.flight(model, n=2000, commands=commands, rates=flown.rates)]),
+    share = orders.tied_shares(
+        orders.fit_parts([small.flight(model, n=2000, commands=commands, rates=flown.rates)]),
         small.model(history=4, lags=3),
     )
     assert share[0] > 0.98
@@ -107,13 +107,13 @@ def test_what_the_law_ties_together_is_not_claimed(model):
     loose = 1000.0 * (follows + 0.05 * follows.std() * np.random.default_rng(4).standard_normal(2000))
     commands[:, 0] = loose  # all but 1 of 400, of an effect that is a million times the noise
     far = small.flight(model, n=2000, commands=commands, rates=flown.rates)
-    assert fitting.tied_shares(fitting.fit_parts([far]), small.model(history=4, lags=3))[0] == 0.0
+    assert orders.tied_shares(orders.fit_parts([far]), small.model(history=4, lags=3))[0] == 0.0
 
 
 def test_a_model_that_explains_less_than_the_mean_is_refused():
     """By the mean over its tests, each with its samples; with what was noted of the rates."""
     frozen = replace(HEALTHY, notes=("q_rad_s: stands still for 600 s", "pitch: another"))
-    flights, model = fitting.fit_parts([frozen]), small.model()
+    flights, model = orders.fit_parts([frozen]), small.model()
 
     def held_out(*of):
         return [{"samples": n, "explained": dict(zip("pqr", shares, strict=True))} for n, *shares in of]

@@ -31,7 +31,7 @@ COMPARED = "compared"  # every set of the benchmark but those that rivals are tu
 CONSTANTS = {
     "row": "row", "name": "name", "constant": "constant", "value": "value", "determines": "sets",
     "chosen by": lambda choice: f"`{choice['command']}`" if choice["command"] else "by hand",
-    "file": lambda choice: f"`{choice['where']}`",
+    "file": lambda choice: f"`{choice['where']}`".replace(", ", "`, `"),
 }  # fmt: skip
 FLIGHTS = {
     "row": "row", "name": "name", "flights that chose the constant": "flights.says",

@@ -1,0 +1,76 @@
+"""Fit models with a part left out in turn, and predict that part.
+
+Every figure of merit comes from such parts: the two halves of a single flight in turn, or each of several
+flights in turn. Letters as in `orders`; a fold has the model that was fitted without `held_out`.
+"""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from beaver_ftc.results import Document
+from beaver_ftc_logs import regression
+from beaver_ftc_logs.model import FittedRanges, Model
+from beaver_ftc_logs.orders import fit_of, group_gain_sd, one_step_innovations, refit, tied_shares
+from beaver_ftc_logs.recording import MIN_DIVISOR
+from beaver_ftc_logs.regression import FitPart, Parts
+
+_MAX_SPLITS = 12
+
+
+class Fold(NamedTuple):
+    """A part that is left out, its name, the model that is fitted to the others, with the standard errors of
+    its gains, and these."""
+
+    model: Model
+    held_out: FitPart
+    name: str
+    fitted: Parts
+
+    def innovations(self) -> regression.Innovations:
+        """The samples in use of the part left out, by the model of the others."""
+        return self.held_out.innovations(self.model)
+
+
+def held_out_folds(parts: Parts, model: Model, most: int | None = _MAX_SPLITS) -> Iterator[Fold]:
+    """The folds, of more than `most` flights every so many at once."""
+    tied = tied_shares(parts, model).tolist()
+    for fitted, held_out, name in validation_folds(parts, most):
+        gain_sd = group_gain_sd(fit_of(fitted, model), model).tolist()
+        ranges = FittedRanges(commands=[], rates=[], gain_sd=gain_sd, tied=tied)
+        yield Fold(refit(fitted, model).model_copy(update={"fitted": ranges}), held_out, name, fitted)
+
+
+def validation_folds(parts: Parts, most: int | None = None) -> list[tuple[list[FitPart], FitPart, str]]:
+    """Return the fitted flights, the held-out one and its name: halves of one flight; each flight in turn, of
+    more than `most` every so many at once."""
+    if len(parts) == 1:
+        first, second = parts[0].halves
+        return [([first], second, "second half"), ([second], first, "first half")]
+    n = min(len(parts), most or len(parts))
+    return [
+        ([part for i, part in enumerate(parts) if i % n != k], one, one.samples.name)
+        for k in range(n)
+        for one in parts[k::n]
+    ]
+
+
+def fold_qualities(parts: Parts, model: Model) -> list[Document]:
+    """Compute the explained variance of parts left out, one entry a fold."""
+    folds = held_out_folds(parts, model, None)
+    return [{"left_out": fold.name, **prediction_quality(fold)} for fold in folds]
+
+
+def prediction_quality(fold: Fold) -> Document:
+    """Share of the rates' variance that one-step prediction explains, and the residual, an axis."""
+    flight = one_step_innovations(fold.model, fold.held_out)
+    y, e = fold.held_out.samples.rates[flight.rows], flight.e
+    if not len(y):
+        return {"samples": 0}
+    explained = 1.0 - e.var(axis=0) / np.maximum(y.var(axis=0), MIN_DIVISOR)
+    return {
+        "samples": len(y),
+        "explained": regression.by_axis(explained),
+        "residual_rad_s": regression.by_axis(e.std(axis=0)),
+    }

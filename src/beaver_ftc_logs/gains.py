@@ -1,0 +1,143 @@
+"""Estimate how far the groups' gains are from 1 in parts left out, and how much wider noise has to be for it.
+
+Letters as in `orders`, and
+
+    e, F            residual (n, 3) and responses (n, 3, G, 3), in standard deviations of the noise, without
+                    means: after `_standardized`
+    g, S            error of the groups' gains (G,), and their covariance that the filter leaves free (G, G)
+    known           which groups have an effect that is known (G,)
+"""
+
+import numpy as np
+
+from beaver_ftc_logs import regression, trust
+from beaver_ftc_logs.bank import build_states
+from beaver_ftc_logs.filtering import recent_scale
+from beaver_ftc_logs.folds import Fold, held_out_folds
+from beaver_ftc_logs.model import Model
+from beaver_ftc_logs.orders import RANK_TOLERANCE, centred, parts_of_noise
+from beaver_ftc_logs.recording import Floats
+from beaver_ftc_logs.regression import FitPart, Parts
+
+_GAIN_WINDOW_S = 10.0
+"""Gains differ by flight rather than within it: chosen on seeds 11 and 12, in light turbulence."""
+_GYRO_FACTOR, _GUST_FACTOR = 1.7, 2.5
+"""In moving air the noise of another law's flight is so many times wider, gyros' or gusts', for gains too.
+Chosen on seeds 71, 73 and 101 to 106: 3 of 240 healthy flights alarmed, and with no such factor 6 of 150."""
+_MAX_INFLATION = 200.0
+"""Largest noise factor of a window of ten seconds: of few flights one can be far from all others (1,550 of
+seed 205, else 5)."""
+
+
+def gain_overdispersion(parts: Parts, model: Model) -> float:
+    """Estimate how many times as far, in squares, the gains of parts left out are from 1 as the filter
+    believes.
+
+    Residuals e = F (g - 1) + noise of a part give the gains g of its groups, least squares with trims aside.
+    Were the noise white and flights alike, the squares of g - 1 in the covariance (F' F)^-1 + S would be as
+    many as gains, on average; S is what the filter leaves free. What flights differ in and colour make more:
+    so much less does a sample tell of an effectiveness [McCullagh1989, section 4.5]. One part counts as seen
+    that is as believed.
+    """
+    errors = [(float(len(model.groups)), len(model.groups))]
+    for fold in held_out_folds(parts, model):
+        errors += _gain_errors(fold)
+    total, n = np.sum(errors, axis=0)
+    return float(total / n)
+
+
+def widen_noise(parts: Parts, model: Model) -> Model:
+    """The model with the noise of each colour so many times wider as the gains of ten seconds left out, each
+    axis of an answer with its own, are farther from 1, in squares, than it and the filter let them be: quiet
+    gyros show what the model itself lacks."""
+    windows: dict[tuple[float, ...], list[float]] = {}
+    for fold in held_out_folds(parts, model):
+        loudness = _loudness(fold, fold.fitted if len(parts) > 1 else parts)
+        errors = _gain_errors(fold, _GAIN_WINDOW_S, loudness)
+        found = windows.setdefault(fold.held_out.samples.noise_ma_coefficients, [])
+        found.extend(min(error / max(n, 1), _MAX_INFLATION) for error, n in errors)
+    colours = []
+    for noise in model.colours:
+        ma, wider = tuple(noise.average), 1.0
+        if windows.get(ma):
+            wider = max(float(np.mean(windows[ma])), 1.0)
+            if model.vehicle.other_laws:
+                # a gyro's noise takes from the next sample what it added to one
+                wider *= _GYRO_FACTOR if len(ma) > 1 and ma[1] < 0.0 else _GUST_FACTOR
+        colours.append(noise.model_copy(update={"wider": wider}))
+    return model.model_copy(update={"colours": colours})
+
+
+def _loudness(fold: Fold, others: Parts) -> float:
+    """How many times as wide the filter finds the noise of a flight left out as that of the loudest other
+    flight of the same noise; 1 if it is within the range of these, or under the same law. What the filter
+    widens by itself (`recent_scale`) is not counted again."""
+    model, ma = fold.model, fold.held_out.samples.noise_ma_coefficients
+    if not model.vehicle.other_laws:
+        return 1.0
+
+    def scale(part: FitPart) -> float:
+        _, e = _standardized(model, part.innovations(model))
+        scales = recent_scale(e, np.ones(len(e), dtype=bool), model.rate_hz)
+        return float(scales.mean()) if len(scales) else 1.0
+
+    return max(scale(fold.held_out) / max([1.0, *map(scale, parts_of_noise(others, ma))]), 1.0)
+
+
+def _gain_errors(fold: Fold, window_s: float | None = None, loudness: float = 1.0) -> list[tuple[float, int]]:
+    """Squares of the errors g of the groups' gains that a part left out tells, in their covariance and what
+    the filter leaves free, S, and how many gains there are; of each window, with a gain for each axis of an
+    answer, where there are windows. loudness: variance of the noise, where the filter itself widens it.
+
+        g = (F' F)^-1 F' e,    square = g' ((F' F)^-1 + S)^-1 g = (F' e)' (1 + S F' F)^-1 g
+    """
+    known = trust.known_effects(fold.model)
+    flight = fold.innovations()
+    F, e = _standardized(fold.model, flight)
+    if not len(e):  # a part without a residual shows no gain
+        return []
+    P = build_states(fold.model, flight.noise).initial_covariance[3:, 3:]
+    S = P[0, 0] + np.diag(np.diag(P)[1:][known])
+    F, n = F[:, :, known], 1
+    if window_s is None:
+        F = F.sum(axis=3)
+    else:
+        F, S = F.reshape(*e.shape, -1), np.kron(S, np.ones((3, 3)))
+        n = max(round(len(e) * fold.held_out.samples.dt_s / window_s), 1)
+    errors = []
+    for rows in np.array_split(np.arange(len(e)), n):
+        FF, Fe, g = _gains(*(centred(values[rows]) / np.sqrt(loudness) for values in (F, e)))
+        A = np.eye(len(g)) + S @ FF  # singular by rounding where nothing tells a gain
+        error = max(float(Fe @ np.linalg.lstsq(A, g, rcond=RANK_TOLERANCE)[0]), 0.0)
+        errors.append((error, int(np.linalg.matrix_rank(FF, tol=RANK_TOLERANCE * np.trace(FF)))))
+    return errors
+
+
+def squared_deviations(fold: Fold) -> Floats:
+    """Squares of how far the groups' gains are from 1 in a flight left out, beyond the noise's share, (G,);
+    nan of a group whose effect it does not show."""
+    F, e = _standardized(fold.model, fold.innovations())
+    F = F.sum(axis=3)
+    squares = np.full(F.shape[2], np.nan)
+    known = trust.known_effects(fold.model) & F.any(axis=(0, 1))
+    if known.any():  # a part without a residual shows the effect of no group
+        FF, _, g = _gains(F[:, :, known], e)
+        P = np.linalg.pinv(FF, rcond=RANK_TOLERANCE, hermitian=True)
+        squares[known] = np.maximum(g**2 - np.diag(P) * max(float((e**2).mean()), 1.0), 0.0)
+    return squares
+
+
+def _gains(F: Floats, e: Floats) -> tuple[Floats, Floats, Floats]:
+    """Information F' F of errors g of gains, what the residual says of them, F' e, and g by least squares, of
+    e (n, 3) = F g + noise, F (n, 3, m)."""
+    X = F.reshape(e.size, F.shape[2])
+    FF, Fe = X.T @ X, X.T @ e.ravel()
+    return FF, Fe, np.asarray(np.linalg.lstsq(FF, Fe, rcond=RANK_TOLERANCE)[0])
+
+
+def _standardized(model: Model, flight: regression.Innovations) -> tuple[Floats, Floats]:
+    """Return the effect F (n, 3, G, 3) of each axis of each group's answer on the residuals of a flight, and
+    those e (n, 3), both in sd of the noise, without means; where responses are quick, q times that."""
+    sd = np.sqrt(flight.noise.wider * flight.quick_scale(model))[:, None]
+    F = np.einsum("nga,ab->nbga", flight.F, flight.W)
+    return centred(F) / sd[:, :, None, None], centred(flight.e @ flight.W) / sd

@@ -1,0 +1,124 @@
+"""Choose the alarm's threshold on parts left out, and score their diagnosis."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from beaver_ftc.documents import BadInput
+from beaver_ftc.results import Document
+from beaver_ftc_logs import extremes, trust
+from beaver_ftc_logs.bank import build_bank
+from beaver_ftc_logs.diagnose import rows_of_posterior
+from beaver_ftc_logs.filtering import bank_posterior, fault_evidence, page_cusum
+from beaver_ftc_logs.folds import Fold, fold_qualities, held_out_folds
+from beaver_ftc_logs.gains import squared_deviations
+from beaver_ftc_logs.model import Model
+from beaver_ftc_logs.orders import GAIN_SD_CAP, fit_of, group_gain_sd, tied_shares
+from beaver_ftc_logs.regression import Parts
+from beaver_ftc_logs.runs import runs_between
+from beaver_ftc_logs.scoring import score_against_labels
+
+_DEFAULT_FALSE_ALARMS = 1.0
+_LORDEN_FACTOR = 2.0
+"""Under a law that the fit has not seen, so many times the evidence of theory raises an alarm. Chosen on own
+flights, as `_POWER_OTHER_LAWS`."""
+_CREDIBLE_MASSES = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95)
+_COVERAGE_GOAL = 0.93
+"""Coverage the bounds aim at: 90 % and some of what another day takes away."""
+
+
+def add_ranges_and_threshold(parts: Parts, model: Model) -> Model:
+    """The model with what it was fitted on, and how it did on parts that were left out in turn: at which
+    evidence of a fault they would alarm as often as the vehicle file asks for, or as is usual. Raises
+    BadInput if they are too short to tell that."""
+    folds = list(held_out_folds(parts, model))
+    peaks = [_healthy_peaks(fold) for fold in folds]
+    variance = group_gain_sd(fit_of(parts, model), model) ** 2
+    if model.vehicle.other_laws:
+        # how far another flight's gains are at most before any is left out counts as one flight
+        hidden = [noise.misreads for noise in model.colours] or [[0.0] * len(model.groups)]
+        deviations = [squared_deviations(fold) for fold in folds] if len(parts) > 1 else []
+        variance += np.nanmean([3.0 * np.max(hidden, axis=0) ** 2, *deviations], axis=0)
+    gain_sd = np.minimum(np.sqrt(variance), GAIN_SD_CAP)
+    tail = extremes.fit_peak_tail(peaks)
+    ranges = trust.compute_fitted_ranges(parts, tied_shares(parts, model), gain_sd).model_copy(
+        update={"tail": tail}
+    )
+    requested = model.vehicle.false_alarms_per_hour
+    if tail is None and requested is not None:
+        minutes = 60.0 * sum(hours for _, hours in peaks)
+        reason = f"{minutes:.1f} min of health left out have too few peaks of the evidence to tell"
+        allowed = f"{extremes.RULED_OUT_COUNT * 60.0 / requested - minutes:.0f} min more"
+        raise BadInput(f"identify: false_alarms_per_hour {requested:g}: {reason}, allowed: {allowed}")
+    rate = _DEFAULT_FALSE_ALARMS if requested is None and not model.settings.levels else requested
+    threshold = _choose_threshold(tail, rate, model) if rate else None
+    alarm = {"false_alarms_per_hour": rate, "threshold": threshold}
+    return model.model_copy(
+        update={
+            "fitted": ranges,
+            "settings": model.settings.model_copy(update=alarm),
+            "identified": _cross_validate(peaks, rate, model),
+        }
+    )
+
+
+def _choose_threshold(tail: extremes.PeakTail | None, target: float, model: Model) -> float:
+    """Threshold for `target` false alarms an hour: by the tail, or by theory if there is no tail. Under laws
+    of which the parts left out say nothing, by theory if that asks for more."""
+    factor = 1.0 if tail is None or model.vehicle.other_laws else 0.0
+    if model.vehicle.other_laws and not model.vehicle.moving_air:
+        factor = _LORDEN_FACTOR
+    least = factor * extremes.lorden_threshold(model.rate_hz, target)
+    return max(extremes.threshold_for_rate(tail, target), least) if tail is not None else least
+
+
+def _cross_validate(
+    flights: Sequence[extremes.PeaksAndHours], target: float | None, model: Model
+) -> Document:
+    """Test the threshold on parts left out: how many would have alarmed, each at the threshold that the
+    others ask for, and how often."""
+    tails = [extremes.fit_peak_tail([*flights[:i], *flights[i + 1 :]]) for i in range(len(flights))]
+    if target is None or len(flights) < 2 or not all(tails):
+        return {}
+    pairs = zip(flights, tails, strict=True)
+    counts = [int((peaks >= _choose_threshold(tail, target, model)).sum()) for (peaks, _), tail in pairs]
+    return {
+        "parts": len(flights),
+        "minutes": 60.0 * sum(hours for _, hours in flights),
+        "alarmed": sum(n > 0 for n in counts),
+        "alarms": sum(counts),
+    }
+
+
+def _healthy_peaks(fold: Fold) -> extremes.PeaksAndHours:
+    """Return for a part left out the peaks of the alarm statistic in health, and its healthy hours."""
+    bank, samples = build_bank(fold.model), fold.held_out.samples
+    p = bank_posterior(samples, fold.model, bank)
+    z = fault_evidence(p, bank)
+    answers = p[:, -1] < 0.5
+    rows = np.flatnonzero(fold.held_out.is_usable & ~(samples.labels < 1.0).any(axis=1) & answers)
+    runs = [page_cusum(z[rows[begin:end]], np.inf) for begin, end in runs_between(np.diff(rows) > 1)]
+    peaks = np.concatenate([extremes.peaks_between_zeros(cusum) for cusum in runs])
+    return peaks, len(rows) * samples.dt_s / 3600.0
+
+
+def score_folds(parts: Parts, model: Model) -> tuple[list[Document], float]:
+    """One entry a fold, and the posterior mass with which the bounds hold the labels as they should."""
+    entries = fold_qualities(parts, model)
+    usual = model.settings.bounds
+    coverage: list[list[float]] = []
+    for entry, fold in zip(entries, held_out_folds(parts, model, None), strict=True):
+        samples = fold.held_out.samples
+        labels = np.where(fold.held_out.is_usable[:, None], samples.labels, np.nan)
+        if np.isfinite(labels).all(axis=1).any():
+            bank = build_bank(fold.model)
+            p = bank_posterior(samples, fold.model, bank)
+            scores = {
+                mass: score_against_labels(rows_of_posterior(samples, fold.model, bank, p, mass), labels)
+                for mass in (*_CREDIBLE_MASSES, usual)
+            }
+            entry["score"] = scores[usual]
+            coverage.append([scores[mass]["held_by_bounds"] for mass in _CREDIBLE_MASSES])
+    if not coverage:
+        return entries, usual
+    return entries, _CREDIBLE_MASSES[int(np.argmin(np.abs(np.mean(coverage, axis=0) - _COVERAGE_GOAL)))]

@@ -41,7 +41,7 @@ def threads():
     return found
 
 
-rounds = [threads() for _ in range(3)]
+rounds = [threads() for _ in range(2)]
 for i in range(4):
     alone = work(i)
     for found in rounds:

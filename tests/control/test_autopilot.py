@@ -9,7 +9,7 @@ from beaver_ftc.control.autopilot import (
     BANK,
     set_body_rates,
 )
-from beaver_ftc.control.laws.rejecting import margins
+from beaver_ftc.control.laws.loop_design import margins
 from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.results.metrics import metrics
 from beaver_ftc.scenario.schema import Scenario

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from beaver_ftc.aircraft.schema import ThrustSection
-from beaver_ftc.control.engines import (
+from beaver_ftc.control.thrust import (
     ENGINE,
     gained,
     look_up,

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
-from beaver_ftc.control import engines
+from beaver_ftc.control import power
 from beaver_ftc.design import fdc
 from beaver_ftc.design.fdc import value
 from beaver_ftc.loop.assembly import configure_design
@@ -36,13 +36,13 @@ def lose_pitch(control):
 
 def is_lost(control):
     parts = control["layout"], control["surfaces"], control["allocation"]["output"]["saturated"]
-    return engines.pitch_is_lost(*parts, control["axes"]["shortfall"])
+    return power.pitch_is_lost(*parts, control["axes"]["shortfall"])
 
 
 def steer(control, x, y, known, t):
     """A frame of the law; known: there is an alarm."""
     watched = known or control["config"]["informed"]
-    engines.steer_by_power(control["power"], control["reference"], x, y, watched, is_lost(control), t)
+    power.steer_by_power(control["power"], control["reference"], x, y, watched, is_lost(control), t)
 
 
 class TestWithin:

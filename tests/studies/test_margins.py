@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.control.laws import rejecting
+from beaver_ftc.control.laws import loop_design
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.studies.margins import OpenLoop, at, frequencies, loops, study
 from flying import flown, scenario
@@ -13,12 +13,12 @@ REAL = {**OURS, "sensors": "tactical-grade", "actuators": "servo"}
 
 
 @pytest.mark.parametrize(
-    "loop", [rejecting.Loop(0.01, 1.0, 1.0, 1.0), rejecting.Loop(0.05, 0.2, 0.6, 1.7, 0.01, 0.3)]
+    "loop", [loop_design.Loop(0.01, 1.0, 1.0, 1.0), loop_design.Loop(0.05, 0.2, 0.6, 1.7, 0.01, 0.3)]
 )
 def test_three_integrators_are_the_design_loop(loop):
     """No coupling, no aerodynamics: each axis is the loop that the gains were derived for."""
     s, G = 3.0, np.diag([-9.0, -12.0, -4.0])
-    pull, learn = rejecting.corrections(rejecting.RATIO * s, loop.dt_s)
+    pull, learn = loop_design.corrections(s, loop.dt_s)
     even = np.ones(3)
     opened = OpenLoop(
         np.zeros((3, 3)), G, np.eye(3), np.zeros((3, 3)), G, even, loop.approach * even,
@@ -26,7 +26,7 @@ def test_three_integrators_are_the_design_loop(loop):
         s * even, pull * even, learn * even, np.linalg.inv(G), loop.lead * even, loop.share,
     )  # fmt: skip
     omega = frequencies(loop.dt_s)
-    expected = rejecting.open_loop(loop, s, np.exp(1j * omega * loop.dt_s))
+    expected = loop_design.open_loop(loop, s, np.exp(1j * omega * loop.dt_s))
     for axis in range(3):
         np.testing.assert_allclose(loops(opened, omega)[:, axis], expected, rtol=1e-9)
 

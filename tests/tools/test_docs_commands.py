@@ -11,7 +11,7 @@ from tools.docs.constants import constants
 from tools.docs.marks import parsed
 from tools.docs.refresh import Refreshed, Wanted
 
-from beaver_ftc.control.laws import rejecting
+from beaver_ftc.control.laws import loop_design
 
 FAULTS = {
     "exit 2": "ends with status 2: nothing on standard error",
@@ -48,12 +48,12 @@ def test_a_command_that_draws_otherwise_is_red(tmp_path, monkeypatch):
 def test_a_changed_gain_turns_the_page_that_cites_it_red(tmp_path, monkeypatch):
     page = parsed(
         "<!-- from code: python -m tools.docs constants -->\n"
-        f"It is <!--=code modules.control.laws.rejecting.RATIO g-->{rejecting.RATIO:g}<!--/-->.\n",
+        f"It is <!--=code modules.control.laws.loop_design.RATIO g-->{loop_design.RATIO:g}<!--/-->.\n",
         "docs/page.md",
     )
-    alone = tmp_path / "src/beaver_ftc/control/laws/rejecting.py"  # all modules take seconds
+    alone = tmp_path / "src/beaver_ftc/control/laws/loop_design.py"  # all modules take seconds
     alone.parent.mkdir(parents=True)
-    alone.symlink_to(rejecting.__file__)
+    alone.symlink_to(loop_design.__file__)
     monkeypatch.setattr("tools.docs.constants.ROOT", tmp_path)
 
     def changes():
@@ -61,5 +61,5 @@ def test_a_changed_gain_turns_the_page_that_cites_it_red(tmp_path, monkeypatch):
         return Refreshed(page, {"python -m tools.docs constants": output}, Wanted()).changes
 
     assert changes() == []
-    monkeypatch.setattr(rejecting, "RATIO", 41.0)
+    monkeypatch.setattr(loop_design, "RATIO", 41.0)
     assert ['printed "41"' in str(change) for change in changes()] == [True]

@@ -43,10 +43,10 @@ from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.aircraft import GRAVITY_MPS2, THRUST_TERM
 from beaver_ftc.compiled import kernel, record, row_of
 from beaver_ftc.control.allocation import attainable, remaining
-from beaver_ftc.control.engines import (
+from beaver_ftc.control.power import ceiling
+from beaver_ftc.control.thrust import (
     ENGINE,
     between,
-    ceiling,
     gained,
     look_up,
     power_for,

@@ -10,11 +10,22 @@ from importlib import import_module
 import numpy as np
 
 from beaver_ftc.compiled import one_of, record, sized
-from beaver_ftc.control import MODULES, CompiledLaw, accommodation, allocation, engines, file_of, laws, row_of
+from beaver_ftc.control import (
+    MODULES,
+    CompiledLaw,
+    accommodation,
+    allocation,
+    engines,
+    file_of,
+    laws,
+    power,
+    row_of,
+)
 from beaver_ftc.control.accommodation import surfaces_dtype
 from beaver_ftc.control.allocation import allocation_dtype, axes_dtype, layout_dtype
-from beaver_ftc.control.engines import ENGINES, POWER
+from beaver_ftc.control.engines import ENGINES
 from beaver_ftc.control.laws import REFERENCE
+from beaver_ftc.control.power import POWER
 from beaver_ftc.control.probe import PROBE, configure_probe
 from beaver_ftc.scenario.declared import Declared
 
@@ -55,7 +66,7 @@ def configure(control: np.void, declared: Declared, travel: np.ndarray) -> None:
     accommodation.configure(control["surfaces"], config, row.informed, dt)
     allocation.configure(control, config, travel, declared.aircraft)
     configure_probe(control["probe"], declared.fdi.probing, dt)
-    engines.configure_power(control["power"], control["layout"], declared)
+    power.configure_power(control["power"], control["layout"], declared)
     engines.configure_engines(control["engines"], declared)
 
 

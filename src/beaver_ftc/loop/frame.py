@@ -22,7 +22,7 @@ effect phi is the truth's, so this is an analyst's figure: the diagnosis never s
 import numpy as np
 
 from beaver_ftc.compiled import apart, kernel, record, sized
-from beaver_ftc.control import accommodation, allocation, engines, laws, state
+from beaver_ftc.control import accommodation, allocation, laws, power, state
 from beaver_ftc.control.accommodation import MAX_EVENTS
 from beaver_ftc.control.autopilot import SPEED, record_deviations, steer
 from beaver_ftc.design.model import unanticipated_pitch
@@ -518,7 +518,7 @@ def fly_profile(frame, commanded):
         unexplained /= prediction.G[PITCH, elevator]  # rad of the elevator
     steer(autopilot, control, prediction.u, frame.measured, unexplained, frame.t)
     if autopilot.sets_power:
-        engines.follow_autopilot(control.power, autopilot.power_setting, autopilot.power_airspeed)
+        power.follow_autopilot(control.power, autopilot.power_setting, autopilot.power_airspeed)
     record_deviations(
         autopilot, value[ch.ALTITUDE], value[ch.AIRSPEED], value[ch.PHI + 2], value[ch.PHI], frame.t
     )

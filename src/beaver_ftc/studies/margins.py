@@ -6,7 +6,7 @@ surface, a frequency at a time:
     u_s = L_s v_s,   v_s the deflection of surface s, u_s where the loop then wants it, all others closed
 
 The aircraft is the truth linearised by differences (plant/linear.py), held over a frame; the law is that of
-control/laws/rejecting.py with the design model's own derivatives. A loss of effectiveness that is known
+control/laws/loop_design.py with the design model's own derivatives. A loss of effectiveness that is known
 scales the surface and what the law takes it for alike; of a surface that is given up nothing is asked.
 """
 
@@ -20,7 +20,8 @@ import numpy as np
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.control import flown_by
-from beaver_ftc.control.laws.rejecting import STAND_IN, margins
+from beaver_ftc.control.laws.loop_design import margins
+from beaver_ftc.control.laws.rejecting import STAND_IN
 from beaver_ftc.control.readout import DefaultLaw
 from beaver_ftc.design.model import jacobian
 from beaver_ftc.design.table import QDYN

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from beaver_ftc.control.laws.rejecting import (
+from beaver_ftc.control.laws.loop_design import (
     RATIO,
     Loop,
     candidates,
@@ -31,7 +31,7 @@ def grid(loop):
 def simulated(loop, s, scale, frames):
     """Surface (times G) of the loop in time, its gain off by `scale`; from the law's equations as written."""
     dt, share = loop.dt_s, loop.share
-    pull, learn = corrections(RATIO * s, dt)
+    pull, learn = corrections(s, dt)
     x, rate, disturbance, position, before, command = 1e-3, 0.0, 0.0, 0.0, 0.0, 0.0
     positions = []
     for _ in range(frames):
@@ -107,7 +107,7 @@ def test_margins_of_integrators_with_lead_and_delay(integrators, K):
 @pytest.mark.parametrize(("observer", "dt"), [(6.5, 0.01), (40.0, 0.05)])
 def test_both_poles_of_the_observer_are_where_they_were_asked_for(observer, dt):
     """Of its errors in rate and disturbance from frame to frame, corrected by what it missed."""
-    pull, learn = corrections(observer, dt)
+    pull, learn = corrections(observer / RATIO, dt)
     ahead = np.array([[1.0, dt], [0.0, 1.0]])
     errors = (np.eye(2) - np.outer([pull, learn], [1.0, 0.0])) @ ahead
     pole = np.exp(-observer * dt)

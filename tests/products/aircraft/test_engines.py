@@ -10,7 +10,7 @@ import yaml
 import beaver_ftc as bf
 from beaver_ftc.aircraft.aircraft import read
 from beaver_ftc.control import engines
-from beaver_ftc.control.engines import POWER, move_differences
+from beaver_ftc.control.power import POWER, move_differences
 from beaver_ftc.control.state import control_dtype
 from beaver_ftc.documents.validation import ScenarioError
 from beaver_ftc.plant.adapter import Plant

@@ -11,7 +11,7 @@ from unittest.mock import patch
 
 import numpy as np
 
-from beaver_ftc.control.laws import rejecting
+from beaver_ftc.control.laws import loop_design
 from beaver_ftc.diagnosis.rivals import FLIGHT_GRADES
 from beaver_ftc.documents.document import parse
 from beaver_ftc.plugins import LAWS
@@ -114,7 +114,7 @@ def chosen_ratio_gain_probe() -> str:
 
 
 def _of_better(grade: str, most: int | None) -> tuple[str, ...]:
-    ratios = rejecting.RATIO, BETTER_RATIO
+    ratios = loop_design.RATIO, BETTER_RATIO
     costs = [LawCost(LAW, grade, most, draw) for draw in BETTER_DRAWS]
     built_in, better = (np.array(_parts(costs, ratio)) for ratio in ratios)
     gain = relative_gain(built_in, better, geometric_mean)
@@ -143,11 +143,11 @@ def _effort(grade: str, most: int | None, ratio: float) -> float:
 def _observer_ratio(ratio: float) -> Iterator[None]:
     """RATIO of the default law, for the flights inside."""
     try:
-        with patch.object(rejecting, "RATIO", ratio):
-            rejecting.candidates.cache_clear()
+        with patch.object(loop_design, "RATIO", ratio):
+            loop_design.candidates.cache_clear()
             yield
     finally:
-        rejecting.candidates.cache_clear()
+        loop_design.candidates.cache_clear()
 
 
 def choices() -> list[Document]:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from beaver_ftc.control.laws.rejecting import RATIO
+from beaver_ftc.control.laws.loop_design import RATIO
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.loop.readout import FrameReadout
 from beaver_ftc.scenario.schema import load

@@ -22,7 +22,7 @@ command, and what is missing then.
 import numpy as np
 
 from beaver_ftc.compiled import apart, kernel, record
-from beaver_ftc.control import accommodation, allocation, engines
+from beaver_ftc.control import accommodation, allocation, engines, power
 from beaver_ftc.control.accommodation import MODE_REALLOCATED
 from beaver_ftc.control.probe import advance_probe
 from beaver_ftc.design.table import AIRSPEED
@@ -159,8 +159,8 @@ def complete(control, assessment, measured, t):
     allocation.note_shortfall(axes, out.command, layout, surfaces.output.lag, engine.output.authority)
     if lever.config.enabled:
         watched = detected or control.config.informed
-        lost = watched and engines.pitch_is_lost(layout, surfaces, out.saturated, axes.shortfall)
-        engines.steer_by_power(lever, control.reference, measured.x, measured.y, watched, lost, t)
+        lost = watched and power.pitch_is_lost(layout, surfaces, out.saturated, axes.shortfall)
+        power.steer_by_power(lever, control.reference, measured.x, measured.y, watched, lost, t)
     if engine.config.n > 0 and detected:
         engines.steer_by_engines(engine, lever, axes, layout, out.saturated, surfaces, measured.y[AIRSPEED])
-        engines.move_differences(lever, engine.output.difference, engine.config.n, engine.config.step)
+        power.move_differences(lever, engine.output.difference, engine.config.n, engine.config.step)

@@ -16,7 +16,7 @@ from itertools import takewhile
 import numpy as np
 
 from beaver_ftc.control import flown_by
-from beaver_ftc.control.laws.rejecting import margins
+from beaver_ftc.control.laws.loop_design import margins
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies import margins as closed_form

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from beaver_ftc.control.laws.rejecting import margins as margins_of
+from beaver_ftc.control.laws.loop_design import margins as margins_of
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.linear import LinearModel, differences, engine_slope

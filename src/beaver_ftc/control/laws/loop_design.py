@@ -1,0 +1,148 @@
+"""The gains of the default law (rejecting.py), a loop at a time, from what is declared.
+
+Two numbers are chosen, by flights in turbulence beside the rivals: RATIO, and the share of an actuator's
+rate that noise may take (`noise_share`). w, Kp and the lead follow. One number s sets feedback Kp = s and
+observer w = RATIO s of a loop. It is the largest that leaves the margins asked for with the declared
+actuator, one JSBSim frame of delay, the frame rate, and the gyro's declared lag and delay; and, where gyros
+are noisy, that moves the surface no faster than a share of its rate limit. The plant of a loop is an
+integrator, the inversion having made it one: the margins are those of this design loop, with a reserve for
+the rest of the aircraft. A loop's response is found a frequency at a time from the equations of the law,
+z-transformed.
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from math import inf, pi, sqrt
+
+import numpy as np
+
+RATIO = 6.5  # observer over feedback: of those with the same margins, near the least error in turbulence
+LEAST_LEAD_RATIO, MOST_LEAD = 1.0, 4.0  # lead compensation makes an actuator at most this many times as fast
+RESERVE_DB, RESERVE_DEG = 0.5, 2.0  # kept for what an integrator is not: the rest of the aircraft
+N_FREQUENCIES, N_CANDIDATES = 160, 40
+LEAST_PER_S = 0.5
+
+
+@dataclass(frozen=True)
+class Loop:
+    """What limits one loop. dt_s: frame. share: of it until a command acts. approach: of the way to its
+    command the actuator goes in a frame. lead: command beyond its position
+    over what is wanted beyond it. delay_s, keep: the gyro's."""
+
+    dt_s: float
+    share: float
+    approach: float
+    lead: float
+    delay_s: float = 0.0
+    keep: float = 0.0
+
+
+def lead_of(approach: float) -> float:
+    """By how much to lead an actuator that goes this share of the way in a frame; it never overshoots."""
+    if approach <= 1.0 / MOST_LEAD:
+        return MOST_LEAD
+    return 1.0 / approach if approach < 1.0 else LEAST_LEAD_RATIO
+
+
+def frequencies(dt_s: float) -> np.ndarray:
+    """From far below any loop to Nyquist, rad/s."""
+    return np.geomspace(0.002 / dt_s, pi / dt_s, N_FREQUENCIES)
+
+
+def corrections(s: float, dt_s: float) -> tuple[float, float]:
+    """L_rate and L_disturbance (1/s) of an observer with both poles at exp(-w dt), w = RATIO s."""
+    pole = np.exp(-RATIO * s * dt_s)
+    return 1.0 - pole * pole, (1.0 - pole) ** 2 / dt_s
+
+
+def controller(loop: Loop, s: float, z: np.ndarray) -> np.ndarray:
+    """Actuator command over measured rate, times -G: the law's own response (n,), 1/s, at z (n,)."""
+    dt, share = loop.dt_s, loop.share
+    L_rate, L_disturbance = corrections(s, dt)
+    back = 1.0 / z
+    mean = share * back + 1.0 - share  # of the surface's moment over the elapsed frame
+    actuator = loop.approach / (z - 1.0 + loop.approach)
+    one, none = np.ones_like(z), np.zeros_like(z)
+    # unknowns: rate, disturbance, position (times G), command (times G); driven by the measured rate
+    rows = [
+        [one - (1 - L_rate) * back, -(1 - L_rate) * dt * back, -(1 - L_rate) * dt * mean, none],
+        [L_disturbance * back, one - back + L_disturbance * dt * back, L_disturbance * dt * mean, none],
+        [none, none, one, -actuator],
+        [loop.lead * s * one, loop.lead * (1 + s * share * dt) * one,
+         (loop.lead - 1 + loop.lead * s * share * dt) * one, one],
+    ]  # fmt: skip
+    driven = np.stack([L_rate * one, L_disturbance * one, none, none], 1)
+    return -np.linalg.solve(np.moveaxis(np.array(rows), 2, 0), driven[..., None])[..., 3, 0]
+
+
+def open_loop(loop: Loop, s: float, z: np.ndarray) -> np.ndarray:
+    """The loop broken at the surface, (n,)."""
+    plant = loop.dt_s * (loop.share + (1.0 - loop.share) * z) / (z - 1.0)
+    actuator = loop.approach / (z - 1.0 + loop.approach)
+    gyro = z ** (-loop.delay_s / loop.dt_s) * (1.0 - loop.keep) / (1.0 - loop.keep / z)
+    return controller(loop, s, z) * actuator * plant * gyro
+
+
+def margins(L: np.ndarray) -> tuple[float, float, float]:
+    """Upper and lower gain margin, dB, and phase margin, deg, of an open loop sampled along the frequencies.
+
+    Between two samples L is taken as straight in log magnitude and phase. At the last one, Nyquist perhaps,
+    L is real: a crossing if negative. `control.stability_margins` of the sampled loop agrees to 0.1 %, and
+    takes 300 times as long for each of the candidates that a flight's gains are chosen from. A surface that
+    does not move closes no loop.
+    """
+    if not L.any():
+        return inf, inf, inf
+    level, phase = 20.0 * np.log10(np.abs(L)), np.degrees(np.unwrap(np.angle(L)))
+    upper, lower = inf, inf
+    if L[-1].real < -abs(L[-1].imag) * 1e6:
+        upper, lower = (-level[-1], inf) if level[-1] < 0.0 else (inf, level[-1])
+    for turn in np.arange(-180.0 - 360.0 * 3, 181.0, 360.0):
+        at = _where(phase - turn, level)
+        upper = min([upper, *(-x for x in at if x < 0.0)])
+        lower = min([lower, *(x for x in at if x >= 0.0)])
+    away = [abs((x + 180.0) % 360.0) for x in _where(level, phase)]
+    return upper, lower, min([inf, *(min(x, 360.0 - x) for x in away)])
+
+
+def _where(of: np.ndarray, value: np.ndarray) -> list[float]:
+    """`value` wherever `of` passes zero."""
+    i = np.flatnonzero(np.signbit(of[:-1]) != np.signbit(of[1:]))
+    part = of[i] / (of[i] - of[i + 1])
+    return list(value[i] + part * (value[i + 1] - value[i]))
+
+
+def noise_speed(loop: Loop, s: float, z: np.ndarray, omega: np.ndarray) -> float:
+    """Standard deviation of G times the surface's speed, over that of a gyro's sample, 1/s2."""
+    actuator = loop.approach / (z - 1.0 + loop.approach)
+    moved = np.abs((z - 1.0) / loop.dt_s * actuator * controller(loop, s, z) / (1.0 + open_loop(loop, s, z)))
+    return sqrt(float(np.trapezoid(moved**2, omega)) * loop.dt_s / pi)
+
+
+@lru_cache(maxsize=64)
+def candidates(loop: Loop, gain_db: float, phase_deg: float) -> tuple[np.ndarray, np.ndarray]:
+    """Values of s, 1/s, ascending, that leave the margins, and the noise speed of each, 1/s2."""
+    omega = frequencies(loop.dt_s)
+    z = np.exp(1j * omega * loop.dt_s)
+    fastest = 0.5 / (loop.dt_s * (0.5 + loop.share) + loop.delay_s)
+    kept: list[float] = []
+    speeds: list[float] = []
+    for s in np.geomspace(LEAST_PER_S, max(fastest, 2.0 * LEAST_PER_S), N_CANDIDATES):
+        upper, lower, phase = margins(open_loop(loop, float(s), z))
+        if kept and not (min(upper, lower) >= gain_db + RESERVE_DB and phase >= phase_deg + RESERVE_DEG):
+            break
+        kept.append(float(s))
+        speeds.append(noise_speed(loop, float(s), z, omega))
+    return np.array(kept), np.array(speeds)
+
+
+def fastest(
+    loop: Loop, margin: tuple[float, float], noise_rad_s: float, G: float, speed_rad_s: float
+) -> float:
+    """The largest s, 1/s, for these margins (dB, deg) and at most this mean surface speed from noise; G
+    rad/s2 per rad."""
+    values, speeds = candidates(loop, *margin)
+    if noise_rad_s <= 0.0:
+        return float(values[-1])
+    allowed = max(abs(G) * speed_rad_s / noise_rad_s, float(speeds[0]))
+    return float(np.exp(np.interp(np.log(allowed), np.log(speeds), np.log(values))))

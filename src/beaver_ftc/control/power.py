@@ -1,0 +1,220 @@
+"""Engine power as the last means on pitch.
+
+The Beaver's power acts on pitch when neither elevator nor flap does.
+
+    pz = pz_trim - k_V (V - Vbar) + k_att att,    T_V Vbar' = V - Vbar,    att' = q - q_ref - att / T_att
+
+Airspeed fed back to power damps the phugoid, as when an airliner was flown on its engines alone
+[Burcham1997]. It is washed out, so that power does not fight the airspeed to which a jammed elevator trims
+the aircraft: it has not the moment for that. att is what the pitch rate has missed of late: nose too high,
+and more power lowers it, Cm_dpt being negative. Power has little moment and a right-half-plane zero from
+there to the attitude: it can steady the aircraft, not make it follow a pitch rate.
+"""
+
+from math import exp, radians
+from typing import Any
+
+import numpy as np
+
+from beaver_ftc.aircraft import Aircraft
+from beaver_ftc.aircraft.schema import MAX_LEVERS
+from beaver_ftc.compiled import kernel, record
+from beaver_ftc.control import row_of
+from beaver_ftc.control.allocation import remaining
+from beaver_ftc.design.engine import engine_power_kw, slipstream
+from beaver_ftc.design.table import AIRSPEED, DPT, QDYN
+from beaver_ftc.diagnosis.state import PITCH, YAW
+from beaver_ftc.scenario.declared import Declared
+
+LEAST_LACK_RAD_S2 = 0.05  # of pitch acceleration: what 2 to 3 inHg give
+WHOLE_RANGE_S = 5.0  # in which a lever goes from stop to stop
+YAW_SHARE = 0.5  # of the rudder, that engine power may claim: the rest is there to fly with
+
+# impatience, forgiveness: shares a frame; speed_gain inHg per m/s, attitude_gain inHg per rad; smoothing,
+# washout, leak: shares a frame; trim, low, high, step: in the units of the setting, as is the command.
+POWER_CONFIG = record(
+    enabled=int, impatience=float, forgiveness=float, speed_gain=float, attitude_gain=float,
+    smoothing=float, washout=float, leak=float, trim=float, low=float, high=float, step=float,
+    dpt_factor=float, highest_dpt=float,
+)  # fmt: skip
+# base: the setting unless engaged, in trim or by the autopilot.
+SETPOINT = record(base=float)
+POWER_MEMORY = record(lost=float, engaged=int, moved=int, speed=float, usual_speed=float, attitude=float)
+# command: of all engines, then what each that is an effector has beside it (engines.py); in_use: whether the
+# levers are commanded; what is reported: since when and how long engaged, the lowest and highest setting.
+POWER_OUTPUT = record(command=MAX_LEVERS, in_use=int, from_s=float, frames=int, least=float, greatest=float)
+POWER = record(config=POWER_CONFIG, setpoint=SETPOINT, memory=POWER_MEMORY, output=POWER_OUTPUT)
+
+
+def is_at_hand(declared: Declared) -> bool:
+    """Whether the declared built-in law may use the engine."""
+    law = row_of(declared.control.law)
+    diagnoses_all_types = declared.fdi.fault_class == "all" and law.pitch_by_power
+    wanted = declared.control.power.enabled and (law.informed or (law.reallocates and diagnoses_all_types))
+    return wanted and _has_piston_engine(declared.aircraft)
+
+
+def _has_piston_engine(aircraft: Aircraft) -> bool:
+    """Whether the power law knows the engine: manifold pressure is what it moves, at a known engine speed."""
+    return aircraft.power_setting == "manifold_pressure_inhg" and aircraft.has_engine_instruments
+
+
+def configure_power(power: np.void, layout: np.void, declared: Declared) -> None:
+    """Fill the record (dtype POWER); layout: of the surfaces."""
+    settings, dt, config = declared.control.power, 1.0 / declared.rate_hz, power["config"]
+    initial: Any = declared.initial  # its engine's keys are the aircraft's
+    config["enabled"], power["output"]["from_s"] = is_at_hand(declared), -1.0
+    config["impatience"], config["forgiveness"] = dt / settings.patience_s, dt / settings.release_s
+    config["speed_gain"] = settings.speed_gain_inhg_per_mps
+    config["attitude_gain"] = settings.attitude_gain_inhg_per_deg / radians(1.0)
+    lags_s = {
+        "smoothing": settings.smoothing_s,
+        "washout": settings.washout_s,
+        "leak": settings.attitude_memory_s,
+    }
+    for name, lag_s in lags_s.items():
+        config[name] = 1.0 - exp(-dt / lag_s)
+    named = declared.aircraft.file.power_setting
+    if named is None:
+        return
+    name, setting = named
+    trim = getattr(initial, name)
+    config["trim"] = power["setpoint"]["base"] = power["output"]["command"][0] = trim
+    power["output"]["least"] = power["output"]["greatest"] = trim
+    config["low"], config["high"] = low, high = setting.range
+    per_s = (high - low) / WHOLE_RANGE_S
+    if _has_piston_engine(declared.aircraft):
+        config["low"], config["high"] = min(settings.lowest_inhg, trim), max(settings.highest_inhg, trim)
+        config["dpt_factor"], config["highest_dpt"] = _slipstream_limits(declared, layout)
+        per_s = settings.rate_inhg_s
+    config["step"] = per_s * dt
+
+
+def _slipstream_limits(declared: Declared, layout: np.void) -> tuple[float, float]:
+    """rho V^3 d dpt / d pz of the engine [FDC], kg/(m3) (m/s)^3 per inHg; and the dpt at which holding the
+    propeller's yawing moment takes YAW_SHARE of the rudder's travel."""
+    initial: Any = declared.initial
+    aircraft, rudder = declared.aircraft, layout["main"][YAW]
+    rpm, terms = initial.engine_rpm, aircraft.terms.values()
+    rudders = {s for s, axis in zip(aircraft.surfaces, aircraft.dominant_axis, strict=True) if axis == YAW}
+    per_rad = sum(t.value for t in terms if t.coefficient == "Cn" and not t.of and t.surface in rudders)
+    of_slipstream = sum(t.value for t in terms if t.coefficient == "Cn" and t.of == (("dpt", 3),))
+    kw_per_inhg = engine_power_kw(rpm, 1.0, 1.0) - engine_power_kw(rpm, 0.0, 1.0)
+    rudder_rad = min(-layout["low"][rudder], layout["high"][rudder])
+    dpt3 = YAW_SHARE * per_rad * rudder_rad / of_slipstream if of_slipstream else np.inf
+    return slipstream(kw_per_inhg, 1.0, 1.0) - slipstream(0.0, 1.0, 1.0), max(dpt3, 0.0) ** (1.0 / 3.0)
+
+
+@kernel
+def pitch_is_lost(layout, surfaces, saturated, shortfall):
+    """Whether elevator and flap are given up, or cannot between them give what pitch demands.
+
+    A flap that can still act is asked for what the elevator lacks, so a lack says that it has nothing left.
+    shortfall (3,) rad/s2; saturated (n,).
+    """
+    effectiveness, elevator = surfaces.output.effectiveness, layout.main[PITCH]
+    least = surfaces.config.least_effectiveness
+    most = remaining(layout, effectiveness, PITCH)
+    for s in range(effectiveness.size):
+        if layout.is_backup[s]:
+            most = max(most, effectiveness[s])
+    unable = effectiveness[elevator] < least or saturated[elevator] == 1
+    return most < least or (unable and abs(shortfall[PITCH]) > LEAST_LACK_RAD_S2)
+
+
+@kernel
+def watch(power, is_lost, t):
+    """Take over once pitch has been lost for a while, hand back once it has not been for longer. t s.
+
+    lost counts up while it is and down while it is not, between 0 and 1: swings past zero keep what they add.
+    """
+    config, memory, output = power.config, power.memory, power.output
+    change = config.impatience if is_lost else -config.forgiveness
+    memory.lost = min(max(memory.lost + change, 0.0), 1.0)
+    if memory.lost == 1.0 and not memory.engaged:
+        memory.engaged, memory.attitude = 1, 0.0
+        if output.from_s < 0.0:
+            output.from_s = t
+    elif memory.lost == 0.0:
+        memory.engaged = 0
+
+
+@kernel
+def follow(config, memory, reference, x, y):
+    """Bring airspeed, its slow mean and the attitude missed to this frame; x (3,) rad/s, y (5,)."""
+    if memory.usual_speed == 0.0:
+        memory.speed = memory.usual_speed = y[AIRSPEED]
+    memory.speed += config.smoothing * (y[AIRSPEED] - memory.speed)
+    memory.usual_speed += config.washout * (memory.speed - memory.usual_speed)
+    error = x[PITCH] - reference.output.governed_rate[PITCH]
+    memory.attitude += reference.config.dt * error - config.leak * memory.attitude
+
+
+@kernel
+def ceiling(power, y, highest_dpt):
+    """Highest manifold pressure (inHg) whose slipstream leaves the rudder enough to fly with; y (5,).
+
+    The propeller yaws with dpt^3: slow and at full power, more than the rudder can hold. No limit where
+    nothing is known of a slipstream.
+    """
+    if power.config.dpt_factor == 0.0:
+        return np.inf
+    per_inhg = power.config.dpt_factor / (2.0 * y[QDYN] * y[AIRSPEED])
+    return power.output.command[0] + (highest_dpt - y[DPT]) / per_inhg
+
+
+@kernel
+def wanted(power, y):
+    """The law: manifold pressure, inHg, within its limits; the set one unless engaged."""
+    config, memory = power.config, power.memory
+    if not memory.engaged:
+        return power.setpoint.base
+    deviation = memory.speed - memory.usual_speed
+    pressure = power.setpoint.base - config.speed_gain * deviation + config.attitude_gain * memory.attitude
+    return max(min(pressure, ceiling(power, y, config.highest_dpt), config.high), config.low)
+
+
+@kernel
+def steer_by_power(power, reference, x, y, watched, is_lost, t):
+    """Move the manifold pressure by one frame; x (3,) rad/s, y (5,), t s.
+
+    watched: whether it may take over, since there is an alarm; is_lost: `pitch_is_lost` now.
+    """
+    memory, output = power.memory, power.output
+    follow(power.config, memory, reference, x, y)
+    if watched:
+        watch(power, is_lost, t)
+    output.command[0] = moved(output.command[0], wanted(power, y), power.config.step)
+    output.in_use = memory.engaged or memory.moved
+    memory.moved = output.command[0] != power.setpoint.base
+    if output.in_use:
+        output.frames += memory.engaged
+        output.least = min(output.least, output.command[0])
+        output.greatest = max(output.greatest, output.command[0])
+
+
+@kernel
+def moved(before, wanted, step):
+    """The setting `wanted`, as far as one `step` of a frame reaches from `before`."""
+    return min(max(wanted, before - step), before + step)
+
+
+@kernel
+def follow_autopilot(power, setting, airspeed):
+    """Take the setting that the autopilot asks for, and the airspeed (m/s) to hold while power stands in for
+    a lost pitch: this law has an airspeed loop of its own."""
+    power.output.in_use, power.setpoint.base = 1, setting
+    if power.memory.engaged:
+        power.memory.usual_speed = airspeed
+    if not power.config.enabled:
+        power.output.command[0] = moved(power.output.command[0], setting, power.config.step)
+
+
+@kernel
+def move_differences(power, difference, n, step):
+    """Move what each of n engines has beside the common lever towards `difference` (n,), by at most a
+    step."""
+    output = power.output
+    for e in range(n):
+        output.command[1 + e] = moved(output.command[1 + e], difference[e], step)
+        output.in_use = output.in_use or output.command[1 + e] != 0.0

@@ -101,3 +101,24 @@ def test_a_tone_is_heard_on_the_grid_and_between(view, tone_test_config, frequen
         0.8 / 2.0 * TONE_MEMORY_S / DT / sqrt(0.5 * 0.5 * TONE_MEMORY_S / DT)
     )  # amplitude over its deviation
     assert 0.6 * whole < view["tones"]["score"] < 1.1 * whole
+
+
+@given(st.lists(st.tuples(st.booleans(), st.floats(0.0, 0.2)), min_size=16, max_size=16))
+def test_an_error_within_its_bound_is_never_heard_whatever_frames_count(frames):
+    """Sums written out over the frames that count: the bound is summed as the evidence is."""
+    stat = new_fdi()["statistical"]
+    view, config = stat["views"][0], stat["tone_test_config"]
+    block, found = view["block"], view["tones"]
+    tones.configure_tones(config, CHANCE, V, PACE, DT)
+    block["n"], block["a"], block["S_inv"][0, 0] = 1, 1.0, 4.0
+    for inside, bound in frames:
+        block["g"][0] = block["eta"][0] = bound
+        tones.update_tones(found, block, config, LEVEL, inside, DT)
+    ages = (len(frames) - 1) // config["stride"] - np.arange(len(frames)) // config["stride"]
+    sizes = [
+        2.0 * bound * inside * config["a"] ** age for (inside, bound), age in zip(frames, ages, strict=True)
+    ]
+    gain = [tones.tone_gain(0.0, 0.0, 1.0, z, DT) for z in config["z"]]
+    assert found["b_0"] == pytest.approx(np.sum(sizes) * np.array(gain), abs=1e-12)
+    variance = sum(inside * config["a"] ** (2 * age) for (inside, _), age in zip(frames, ages, strict=True))
+    assert found["D"] == pytest.approx(variance, abs=1e-12)

@@ -58,7 +58,8 @@ TONE_RECORD = record(
 def tones_dtype(n_Z: int) -> np.dtype:
     """The oscillation tests of one view, for a number of regressors."""
     return record(
-        n_new=int, sum_g=float, sum_Z=n_Z,  # frames since the last update; sums of g and g_Z over sqrt(S)
+        # since the last update: frames, those that count, sums of g, eta and g_Z over sqrt(S) in these
+        n_frames=int, n_new=int, sum_g=float, sum_eta=float, sum_Z=n_Z,
         N=(complex, N_TONES), R=(complex, n_Z, N_TONES),
         # shares of |N| by errors of coefficients and by a bounded uncertainty; for the latter, sums over the
         # filtered bound, and over its component at twice the frequency
@@ -87,20 +88,23 @@ def update_tones(t, b, c, level, inside, dt):
     """
     weight = np.sqrt(b.S_inv[0, 0]) if inside else 0.0
     t.sum_g += weight * b.g[0]
+    t.sum_eta += weight * b.eta[0]
     for j in range(b.n_Z):
         t.sum_Z[j] += weight * b.g_Z[j, 0]
-    t.n_new += 1
-    if t.n_new < c.stride:
+    t.n_frames += 1
+    t.n_new += inside
+    if t.n_frames < c.stride:
         return
     resonate(t.N, c.rho, t.sum_g)
     for j in range(b.n_Z):
         resonate(t.R[j], c.rho, t.sum_Z[j])
         t.sum_Z[j] = 0.0
     t.D = c.a * c.a * t.D + t.n_new
-    update_tone_eta(t, c, b, weight * b.eta[0], dt)
+    update_tone_eta(t, c, b, dt)
     bound_coefficients(t, b.tol, b.n_Z)
     score_tones(t, c, level)
-    t.sum_g, t.n_new = 0.0, 0
+    t.sum_g = t.sum_eta = 0.0
+    t.n_frames = t.n_new = 0
 
 
 @kernel
@@ -116,23 +120,22 @@ def tone_gain(K_x, K_d, a, z, dt):
 
     g = e + dt (nu - d),  e <- g - K_x g,  d <- a d + K_d g:
     |W| = dt / |1 - (1 - K_x) / z + dt K_d / (z - a)|,  z = exp(i w dt)
-
     """
     return dt / abs(1.0 - (1.0 - K_x) * z.conjugate() + dt * K_d / (z - a))
 
 
 @kernel
-def update_tone_eta(t, c, b, eta, dt):
+def update_tone_eta(t, c, b, dt):
     """Update `eta`: what a bounded uncertainty, |d| <= eta sqrt(S), adds to |N|, nearly the most.
 
-        b_0 <- a b_0 + |W| v      b_2 <- rho2 b_2 + |W| v      eta_k = c (b_0 + |b_2|),  v = eta n_new
+        b_0 <- a b_0 + |W| v      b_2 <- rho2 b_2 + |W| v      eta_k = c (b_0 + |b_2|),  v = sum eta
 
     |cos x| = 2 / pi (1 + 2/3 cos 2x - 2/15 cos 4x + ...). A bound that varies at twice the tone's frequency
     adds most; the last third of |b_2| is for the harmonics above. One that varies at four times the frequency
     or more can add a tenth more than that.
     """
     for k in range(t.eta.size):
-        v = eta * t.n_new * tone_gain(b.K_x[0, 0], b.K_d[0, 0], b.a, c.z[k], dt)
+        v = t.sum_eta * tone_gain(b.K_x[0, 0], b.K_d[0, 0], b.a, c.z[k], dt)
         t.b_0[k] = c.a * t.b_0[k] + v
         t.b_2[k] = c.rho2[k] * t.b_2[k] + v
         t.eta[k] = c.c[k] * (t.b_0[k] + abs(t.b_2[k]))

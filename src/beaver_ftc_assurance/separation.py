@@ -1,4 +1,4 @@
-"""The smallest doublet of the surfaces that is certain to tell the candidates left apart, or why none is.
+"""A doublet of the surfaces that is certain to distinguish the candidates left, or why there is none.
 
 Of a fault whose parameter stays as it is, the data since the alarm leave an interval. With it the deflection
 of its surface at a command u lies in an interval: stuck [c-, c+], floating 0, a loss [e- u, e+ u], a bias
@@ -9,7 +9,8 @@ d G_b = 0, by a frame in which a is off its command by more than 2 |d| B / |d G_
 nothing there. B is the bound on a frame's innovation at the largest rates the doublet may reach.
 
 What the surfaces must reach is then linear, and so are travel, actuators, rates and angle of attack over a
-short horizon in which the rates follow dx/dt = G u: a linear programme finds the least amplitude.
+short horizon in which the rates follow dx/dt = G u: a linear programme finds the least amplitude. The horizon
+is the shortest of a few that has a solution.
 """
 
 import json
@@ -217,14 +218,14 @@ def situation_of(tape: Tape, scenario: Scenario, rate: float) -> Situation:
     """What is known of the aircraft as the flight ends; rate: rad/s at most."""
     frame, aircraft, dt = tape.last, scenario.airframe, 1.0 / scenario.rate_hz
     bound, declared, actuators = frame.diagnosis.declared_bounds, declared_errors_of(frame), frame.actuators
-    coupled, (least_deg, most_deg) = declared.inertia_coupling * rate**2, aircraft.envelope.alpha_deg
+    coupled = declared.inertia_coupling * rate**2
     return Situation(
         G=frame.mean_G, u=frame.expected_u_rad, x=frame.rates_rad_s, rate=rate,
         bound=MARGIN * (bound.eta_bar_rad_s2 + coupled + 2.0 * bound.changing_gyro_error_bound_rad_s / dt),
         stops=np.array([actuators.low_rad, actuators.high_rad]), approach=actuators.approach,
         step=actuators.step_rad, instants=scenario.substeps,
         in_blocks=frame.diagnosis.types_config.frames_per_block > 1, dt=dt,
-        alpha=frame.alpha_rad, alpha_range=(radians(least_deg), radians(most_deg)),
+        alpha=frame.alpha_rad, alpha_range=aircraft.alpha_rad,
     )  # fmt: skip
 
 
@@ -270,7 +271,7 @@ def _interval(of: Hypothesis, history: History, frames: np.ndarray) -> tuple[flo
 
 
 def tell_apart(one: Candidate, other: Candidate, at: Situation, names: Sequence[str]) -> Document:
-    """The smallest doublet that is certain to tell two candidates apart, or the reason why there is none."""
+    """A doublet that is certain to tell two candidates apart, or the reason why there is none."""
     targets: dict[int, float] = {}
     needs: Document = {}
     if one.surface == other.surface and at.in_blocks:
@@ -356,8 +357,8 @@ def _nearest(
 
 
 def doublets(scenario: Scenario, after_s: float, told: float) -> dict[tuple[str, str], Document]:
-    """Of each two surfaces that lead an axis: the smallest doublet that tells losses of this share apart, so
-    long after the start of a healthy flight, or why there is none."""
+    """Of each two surfaces that lead an axis: a doublet that tells losses of this share apart, so long after
+    the start of a healthy flight, or why there is none."""
     frames = round(after_s * scenario.rate_hz)
     healthy = scenario.model_copy(update={"faults": (), "duration_s": after_s})
     at = situation_of(
@@ -373,16 +374,18 @@ def doublets(scenario: Scenario, after_s: float, told: float) -> dict[tuple[str,
 
 
 def doublet(targets: dict[int, float], at: Situation) -> tuple[np.ndarray, int] | None:
-    """Commands (frames, n) rad of the smallest doublet that brings surfaces to these deflections, and the
-    frame in which they are there; None where no doublet does within the limits."""
-    longest = max(int(LONGEST_S / at.dt), 1)
-    tells = 1
-    while tells <= longest:
-        found = _least_amplitude(targets, at, tells)
-        if found is not None:
-            return found, tells + at.held - 1
-        tells *= 4
-    return None
+    """Commands (frames, n) rad of a doublet that brings surfaces to these deflections, and the frame in which
+    they are there; None where no doublet does within the limits.
+
+    Of 1, 4, 16, ... frames on the way, and LONGEST_S, it is the first time that has a doublet, with its least
+    amplitude. A wait makes each doublet a longer one: LONGEST_S has one wherever a shorter time has.
+    """
+    tells, longest = 1, max(int(LONGEST_S / at.dt), 1)
+    while (found := _least_amplitude(targets, at, tells)) is None:
+        if tells == longest:
+            return None
+        tells = min(4 * tells, longest)
+    return found, tells + at.held - 1
 
 
 def _least_amplitude(targets: dict[int, float], at: Situation, tells: int) -> np.ndarray | None:

@@ -140,6 +140,13 @@ def test_where_a_surface_already_tells_it_is_held():
     assert "elevator stuck or elevator bias: elevator held as now, told after 0.03 s" in text
 
 
+def test_a_slow_actuator_has_all_of_the_half_second():
+    """Its travel does not suffice there and back in 16 frames, the time tried before."""
+    commands, tells = doublet({0: 0.1}, replace(PLAIN, approach=np.full(4, 0.04)))
+    assert tells == 50
+    assert abs(commands).max() < 0.3
+
+
 def test_a_limit_on_the_rates_can_leave_none():
     pair = tell_apart(
         Candidate(0, STUCK, 0.1, 0.11), Candidate(0, BIAS, 0.1, 0.11), replace(PLAIN, rate=1e-4), NAMES

@@ -48,10 +48,10 @@ from beaver_ftc.scenario import (
     looks_like_a_path,
     read_file,
     resolve,
-    to_yaml,
     validate_scenario,
     validate_sweep,
 )
+from beaver_ftc.studies.engine import digest_of_aircraft
 from beaver_ftc.studies.sweep import Assignment, Plan, flight_name, scenario_of
 
 MOST_REQUIREMENTS, MOST_FLIGHTS = 500, 100_000
@@ -177,12 +177,13 @@ class Source:
 
     @property
     def sha256(self) -> str:
-        """Of all that it says, resolved."""
+        """Of all that its flights follow from, resolved, and of the files of its aircraft."""
+        file, left_out = self.what, {"description", "expect"}
+        said: list[Any] = [digest_of_aircraft(self.aircraft.folder)]
         if isinstance(self.what, Sweep):
-            file = self.what.file.model_dump(mode="json", exclude={"base", "set", "description", "expect"})
-            text = repr([file, self.what.base])
-        else:
-            text = to_yaml(self.what)
+            file, left_out = self.what.file, {*left_out, "base", "set"}
+            said.append(self.what.base)
+        text = repr([*said, file.model_dump(mode="json", exclude=left_out)])
         return hashlib.sha256(text.encode()).hexdigest()
 
 

@@ -116,18 +116,18 @@ def _ratio(b: Document, a: Document) -> float:
 
 
 def _system_row(outcomes: Sequence[Document]) -> Document:
-    """What a system does with all of its mechanisms."""
-    n = len(outcomes)
+    """What a system does with all of its mechanisms, in the flights that were flown to their end."""
+    flown = [o for o in outcomes if not o["failed"]]
     rates = {
-        "false_alarms": sum(o["false_alarm"] for o in outcomes),
-        "detected": sum(o["delay_s"] is not None for o in outcomes),
-        "named": sum(o["named"] for o in outcomes),
-        "lost": sum(o["tracking_deg_s"] is None for o in outcomes),
+        "false_alarms": sum(o["false_alarm"] for o in flown),
+        "detected": sum(o["delay_s"] is not None for o in flown),
+        "named": sum(o["named"] for o in flown),
+        "lost": sum(o["tracking_deg_s"] is None for o in flown),
     }
     return {
-        "flights": n,
-        **{name: counted(count, n) for name, count in rates.items()},
-        "tracking_deg_s": median(o["tracking_deg_s"] for o in outcomes),
+        "flights": len(flown),
+        **{name: counted(count, len(flown)) for name, count in rates.items()},
+        "tracking_deg_s": median(o["tracking_deg_s"] for o in flown),
     }
 
 

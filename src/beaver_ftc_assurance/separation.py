@@ -3,9 +3,9 @@
 Of a fault whose parameter stays as it is, the data since the alarm leave an interval. With it the deflection
 of its surface at a command u lies in an interval: stuck [c-, c+], floating 0, a loss [e- u, e+ u], a bias
 u + [b-, b+]. Two types on one surface are distinguished by a frame in which these are further from each other
-than twice what the uncertainty hides, 2 B / |G_i|, on some axis, and from the command: a frame that health
-explains says nothing of a fault that may go. Two surfaces a and b are distinguished along d,
-d G_b = 0, by a frame in which a is off its command by more than 2 |d| B / |d G_a|: whatever b does, it does
+than 2 M B / |G_i|, twice what the uncertainty hides and a margin M, on some axis, and from the command: a
+frame that health explains says nothing of a fault that may go. Two surfaces a and b are distinguished along d,
+d G_b = 0, by a frame in which a is off its command by more than 2 M |d| B / |d G_a|: whatever b does, it does
 nothing there. B is the bound on a frame's innovation at the largest rates the doublet may reach.
 
 What the surfaces must reach is then linear, and so are travel, actuators, rates and angle of attack over a
@@ -46,7 +46,7 @@ from beaver_ftc_assurance.certificates.kinds import hypothesis_of_type, travel_r
 from beaver_ftc_assurance.certificates.tape import Recorder, Tape, tape_of_flight_again
 
 FILE, FLOWN = "separation.json", "flown"
-MARGIN = 1.1  # on what is asked: the aircraft flies on while the doublet is flown
+MARGIN = 1.1  # M, on the difference that is asked: the aircraft flies on while the doublet is flown
 LONGEST_S = 0.5  # until the frame that tells
 LARGEST_RATE_DEG_S = 20.0
 GRID = 801  # deflections tried over the travel
@@ -103,8 +103,8 @@ class Situation:
 
     @property
     def held(self) -> int:
-        """For so many frames it must stay there: of several instants a frame in which it moves says little,
-        and one counts between two of its like."""
+        """Number of frames for which the deflection must hold: 3 if a frame has several JSBSim frames, as
+        `History.is_unexplained` then requires the frames before and after too."""
         return 1 if self.instants == 1 else 3
 
 
@@ -145,12 +145,17 @@ def separate(scenario: Scenario, rate_deg_s: float = LARGEST_RATE_DEG_S) -> Docu
     }
 
 
+def _frames(scenario: Scenario) -> int:
+    """Number of frames of a flight."""
+    return round(scenario.duration_s * scenario.rate_hz)
+
+
 def _flown(scenario: Scenario, pair: Document, candidates: Sequence[Candidate]) -> Document:
     """Which of two candidates are left once the doublet has been flown, and exits from the envelope in it."""
     with _longer(scenario, pair) as flight:
         before = 0
         for k in _with_doublet(flight, scenario, pair):
-            if k == round(scenario.duration_s * scenario.rate_hz) - 1:
+            if k == _frames(scenario) - 1:
                 before = flight.readout.envelope_exits
         still, both = {*_left(flight.readout.diagnosis)}, zip(candidates, pair["candidates"], strict=True)
         left = [words for one, words in both if (one.surface, one.kind) in still]
@@ -170,7 +175,7 @@ def _longer(scenario: Scenario, pair: Document) -> Iterator[Stepping]:
 
 def _with_doublet(flight: Stepping, scenario: Scenario, pair: Document) -> Iterator[int]:
     """Fly on to the scenario's end, then the doublet; yields the frame just flown."""
-    frames, names = round(scenario.duration_s * scenario.rate_hz), list(scenario.airframe.surfaces)
+    frames, names = _frames(scenario), list(scenario.airframe.surfaces)
     yield 0
     for k in range(1, frames):
         flight.step()
@@ -221,7 +226,7 @@ def situation_of(tape: Tape, scenario: Scenario, rate: float) -> Situation:
     coupled = declared.inertia_coupling * rate**2
     return Situation(
         G=frame.mean_G, u=frame.expected_u_rad, x=frame.rates_rad_s, rate=rate,
-        bound=MARGIN * (bound.eta_bar_rad_s2 + coupled + 2.0 * bound.changing_gyro_error_bound_rad_s / dt),
+        bound=bound.eta_bar_rad_s2 + coupled + 2.0 * bound.changing_gyro_error_bound_rad_s / dt,
         stops=np.array([actuators.low_rad, actuators.high_rad]), approach=actuators.approach,
         step=actuators.step_rad, instants=scenario.substeps,
         in_blocks=frame.diagnosis.types_config.frames_per_block > 1, dt=dt,
@@ -307,12 +312,14 @@ def _none(because: str, needs: Document) -> Document:
 def _types_apart(one: Candidate, other: Candidate, at: Situation) -> tuple[float | None, Document]:
     """The deflection nearest to the present at which a surface's two types differ, and from health."""
     s = one.surface
-    room = float(np.min(2.0 * MARGIN * at.bound / np.maximum(np.abs(at.G[:, s]), 1e-12)))
+    room = min(
+        (2.0 * MARGIN * B / abs(g) for B, g in zip(at.bound, at.G[:, s], strict=True) if g), default=inf
+    )
     u = _deflections(at, s)
     (low, high), (low_too, high_too) = one.deflection(u), other.deflection(u)
     gap = np.maximum(low - high_too, low_too - high)
     gap = np.minimum(gap, np.minimum(one.off(u), other.off(u)))  # else health explains the frame
-    return _nearest(u, gap, s, at, room, "apart, and off their command,")
+    return _nearest(u, gap, s, at, float(room), "apart, and off their command,")
 
 
 def _surface_shown(one: Candidate, other: Candidate, at: Situation) -> tuple[float | None, Document]:
@@ -356,17 +363,17 @@ def _nearest(
     return target, numbers | {"target_deg": degrees(target)}
 
 
-def doublets(scenario: Scenario, after_s: float, told: float) -> dict[tuple[str, str], Document]:
+def doublets(scenario: Scenario, after_s: float, loss: float) -> dict[tuple[str, str], Document]:
     """Of each two surfaces that lead an axis: a doublet that tells losses of this share apart, so long after
     the start of a healthy flight, or why there is none."""
-    frames = round(after_s * scenario.rate_hz)
     healthy = scenario.model_copy(update={"faults": (), "duration_s": after_s})
+    frames = _frames(healthy)
     at = situation_of(
         tape_of_flight_again(healthy, [frames - 1], frames), healthy, radians(LARGEST_RATE_DEG_S)
     )
     names, found = scenario.airframe.surfaces, {}
     for pair in combinations(scenario.airframe.class_of_losses, 2):
-        one, other = (Candidate(names.index(name), LOSS, -told, -told) for name in pair)
+        one, other = (Candidate(names.index(name), LOSS, -loss, -loss) for name in pair)
         apart = tell_apart(one, other, at, names)
         asked = apart.get("amplitude_deg"), apart.get("time_s"), apart.get("because", "")
         found[pair] = found[pair[::-1]] = dict(zip(DOUBLET_COLUMNS, asked, strict=True))
@@ -391,36 +398,38 @@ def doublet(targets: dict[int, float], at: Situation) -> tuple[np.ndarray, int] 
 def _least_amplitude(targets: dict[int, float], at: Situation, tells: int) -> np.ndarray | None:
     """The linear programme, with the frame that tells given: commands (frames, n) rad there and back.
 
-    Unknown, frame by frame: of each surface the command and where it is at the frame's end, less the present
-    deflection; the rates, less the present ones, and pitch; then the amplitude. A row has a few of them, so
-    that many frames stay quick.
+    Unknown, frame by frame, a block each: of each surface the command and where it is at the frame's end,
+    less the present deflection; the rates p, q, r, less the present ones, and pitch; then the amplitude. A
+    row has a few of them, so that many frames stay quick.
     """
     if (np.abs(at.x) > at.rate).any() or not at.alpha_range[0] <= at.alpha <= at.alpha_range[1]:
         return None
     frames, surfaces = 2 * (tells + at.held - 1), [*targets]
     n, there, every = len(surfaces), np.arange(tells - 1, tells + at.held - 1), np.arange(frames)
-    equal, above = _Rows(2 * n + 4, frames), _Rows(2 * n + 4, frames)
-    turning = [{(2 * n + i, 0): 1.0, (2 * n + i, -1): -1.0} for i in range(3)]
+    arrived = range(n, 2 * n)  # blocks of where the surfaces are; those of the commands come before
+    *pqr, pitch = range(2 * n, 2 * n + 4)
+    equal, above = _Rows(pitch + 1, frames), _Rows(pitch + 1, frames)
+    turning = [{(rate, 0): 1.0, (rate, -1): -1.0} for rate in pqr]
     stops, rates = [(at.stops[:, s] - at.u[s]) for s in surfaces], [(-at.rate - x, at.rate - x) for x in at.x]
-    for j, s in enumerate(surfaces):
+    for u, (p, s) in enumerate(zip(arrived, surfaces, strict=True)):
         away, (left, mean_left) = targets[s] - at.u[s], _left_behind(at, s)
-        equal.add(every, {(j, 0): left - 1.0, (n + j, 0): 1.0, (n + j, -1): -left})
-        equal.add(there[1:], {(j, 0): 1.0, (j, -1): -1.0})
-        moved = {(j, 0): 1.0 - mean_left, (n + j, -1): mean_left}
-        before = {(j, -1): mean_left - 1.0, (n + j, -2): -mean_left}
+        equal.add(every, {(u, 0): left - 1.0, (p, 0): 1.0, (p, -1): -left})
+        equal.add(there[1:], {(u, 0): 1.0, (u, -1): -1.0})
+        moved = {(u, 0): 1.0 - mean_left, (p, -1): mean_left}
+        before = {(u, -1): mean_left - 1.0, (p, -2): -mean_left}
         above.add(there, {k: -np.sign(away) * v for k, v in moved.items()}, -abs(away))
         for sign in (1.0, -1.0):
-            above.add(every, {(j, 0): sign}, amplitude=-1.0)
+            above.add(every, {(u, 0): sign}, amplitude=-1.0)
             if np.isfinite(at.step[s]):
                 pace = {k: sign * v for k, v in (moved | before).items()}
                 above.add(every, pace, at.step[s] * at.instants)
         for row, g in zip(turning, at.G[:, s], strict=True):
             row |= {k: -at.dt * g * v for k, v in moved.items() if g}
-    for row in (*turning, {(2 * n + 3, 0): 1.0, (2 * n + 3, -1): -1.0, (2 * n + 1, 0): -at.dt}):
+    for row in (*turning, {(pitch, 0): 1.0, (pitch, -1): -1.0, (pqr[1], 0): -at.dt}):
         equal.add(every, row)
     ends = [*stops, *[(-inf, inf)] * n, *rates, np.subtract(at.alpha_range, at.alpha)]
     bounds = np.vstack([np.repeat(ends, frames, axis=0), (0.0, inf)])
-    bounds[[(2 * n + i + 1) * frames - 1 for i in range(3)]] = 0.0
+    bounds[[(rate + 1) * frames - 1 for rate in pqr]] = 0.0
     found = _solved(equal, above, bounds)
     if found is None:
         return None

@@ -86,6 +86,13 @@ def test_surfaces_that_act_along_one_direction_cannot_be_told_apart_by_a_frame()
     assert "another direction" in pair["because"]
 
 
+def test_a_surface_without_effect_shows_no_type():
+    none = replace(PLAIN, G=np.zeros((3, 4)))
+    pair = tell_apart(Candidate(1, STUCK, 0.1, 0.11), Candidate(1, FLOAT, 0.0, 0.0), none, NAMES)
+    assert "another direction" in pair["because"]
+    assert pair["needs"]["elevator"]["at_least_deg"] is None
+
+
 def test_surfaces_that_act_along_two_directions_can():
     pair = tell_apart(
         Candidate(0, CONSTANT_LOSS, -0.6, -0.5), Candidate(2, CONSTANT_LOSS, -0.9, -0.8), PLAIN, NAMES

@@ -188,12 +188,12 @@ class Source:
     @property
     def sha256(self) -> str:
         """Of all that its flights follow from, resolved, and of the files of its aircraft."""
-        file, left_out = self.what, {"description", "expect"}
-        said: list[Any] = [digest_of_aircraft(self.aircraft.folder)]
+        aircraft, left_out = digest_of_aircraft(self.aircraft.folder), {"description", "expect"}
         if isinstance(self.what, Sweep):
-            file, left_out = self.what.file, {*left_out, "base", "set"}
-            said.append(self.what.base)
-        text = repr([*said, file.model_dump(mode="json", exclude=left_out)])
+            file = self.what.file.model_dump(mode="json", exclude=left_out | {"base", "set"})
+            text = repr([aircraft, self.what.base, file])
+        else:
+            text = repr([aircraft, self.what.model_dump(mode="json", exclude=left_out)])
         return hashlib.sha256(text.encode()).hexdigest()
 
 
@@ -263,7 +263,7 @@ class _Reading:
                     self._fits(formula, source, (*at, "formula"))
                 if requirement.expect is not None:
                     judged = self._expect(requirement.expect, source, (*at, "expect"))
-                    if judged:  # the same for each source, which only adds what it cannot show
+                    if judged:  # the same for each source: a source only adds problems
                         expect[requirement.id] = judged
         self._unused()
         sources_by_name = self._by_name()

@@ -6,7 +6,8 @@ all other flights.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple
+from functools import cache
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,7 +24,7 @@ from beaver_ftc.scenario.sensors import PRESETS, Sensors
 FREQUENCIES_RAD_S = (5.0, 15.0)  # of an unstructured acceleration where the scenario flies none
 UNDECLARED_SHARE = 0.01  # of a coefficient or a moment of inertia of which no error is declared
 UNDECLARED_SENSORS, UNDECLARED_AIR = "tactical-grade", "light"
-FACTOR_LIMITS = (0.1, 10.0)  # of the factor on a coefficient
+FACTOR_LIMITS = (0.1, 10.0)  # of the factors on a coefficient and on an actuator
 _RANDOM, _SIGNED = ("noise_std", "quantum"), ("bias", "scale_error", "drift")
 _IDEAL = Sensors()
 
@@ -51,7 +52,7 @@ def errors_of(scenario: Scenario) -> tuple[Error, ...]:
     constant = declared.constant_rad_s2
     return (
         _of_ratios("moment coefficients", "uncertainty.coefficients", shares, FACTOR_LIMITS),
-        _of_ratios("moments of inertia", "uncertainty.inertia", inertia, _limits(TrueInertia)["Ix"]),
+        _of_ratios("moments of inertia", "uncertainty.inertia", inertia, _limits(TrueInertia, "Ix")),
         *((_coupling(declared.coupling),) if any(declared.coupling) else ()),
         *((_acceleration(scenario, constant),) if any(constant) else ()),
         *(() if declared.servo_errors.is_none else (_servos(declared),)),
@@ -70,12 +71,11 @@ def changes_of(errors: Sequence[Error], factors: Mapping[str, float], draws: np.
     return truth
 
 
-def _limits(section: type[Section]) -> dict[str, tuple[float, float]]:
-    """The least and the largest value that a scenario may have, by key of a section that limits both."""
-    entries = section.model_json_schema()["properties"]
-    return {
-        key: (of["minimum"], of["maximum"]) for key, of in entries.items() if {"minimum", "maximum"} <= {*of}
-    }
+@cache
+def _limits(section: type[Section], key: str) -> tuple[Any, Any]:
+    """The least and the largest value at a key of a section of a scenario; None without a limit."""
+    of = section.model_json_schema()["properties"][key]
+    return of.get("minimum"), of.get("maximum")
 
 
 def _signs(draws: np.random.Generator, names: Sequence[str]) -> dict[str, float]:
@@ -112,7 +112,7 @@ def _coupling(theta: Sequence[float]) -> Error:
 
 def _acceleration(scenario: Scenario, sizes: Sequence[float]) -> Error:
     """Of the frequencies that the scenario flies, where it flies any."""
-    _, most_rad_s2 = _limits(Sinusoid)["amplitude_rad_s2"]
+    _, most_rad_s2 = _limits(Sinusoid, "amplitude_rad_s2")
     flown = {axis: getattr(scenario.uncertainty.sinusoid, axis) for axis in AXES}
     known = {axis: wave.frequency_rad_s for axis, wave in flown.items() if wave.amplitude_rad_s2}
 
@@ -131,14 +131,14 @@ def _acceleration(scenario: Scenario, sizes: Sequence[float]) -> Error:
 def _servos(declared: Declared) -> Error:
     """Bandwidths and rate limits, each with a sign drawn, and dead bands."""
     bounds = {name: bound.model_dump() for name, bound in declared.servo_errors}
-    limits = _limits(TrueActuator)
+    _, widest_deg = _limits(TrueActuator, "dead_band_deg")
 
     def change(times: float, draws: np.random.Generator) -> Document:
         truth = {}
         for name, bound in bounds.items():
             shares = {key: bound[key] for key in ("bandwidth", "rate_limit")}
-            band_deg = min(times * bound["dead_band_deg"], limits["dead_band_deg"][1])
-            truth[name] = signed(shares, 1.0, limits["bandwidth"], times, draws) | {"dead_band_deg": band_deg}
+            band_deg = min(times * bound["dead_band_deg"], widest_deg)
+            truth[name] = signed(shares, 1.0, FACTOR_LIMITS, times, draws) | {"dead_band_deg": band_deg}
         return {"uncertainty.actuators": truth}
 
     largest = {key: max(bound[key] for bound in bounds.values()) for key in ActuatorBound.model_fields}
@@ -154,11 +154,12 @@ def _sensors(declared: Mapping[str, Mapping[str, float]]) -> Error:
         truth = {}
         for name, keys in bounds.items():
             signs = _signs(draws, list(keys))
-            limits = _limits(type(getattr(_IDEAL, name)))
+            kind: type[Section] = type(getattr(_IDEAL, name))
             truth[name] = {
                 key: float(
                     np.clip(
-                        times * abs(value) * (signs[key] if key.startswith(_SIGNED) else 1.0), *limits[key]
+                        times * abs(value) * (signs[key] if key.startswith(_SIGNED) else 1.0),
+                        *_limits(kind, key),
                     )
                 )
                 for key, value in keys.items()
@@ -171,8 +172,11 @@ def _sensors(declared: Mapping[str, Mapping[str, float]]) -> Error:
 
 
 def _preset(declared: Mapping[str, Mapping[str, float]]) -> str:
-    sizes = {name: {key: value for key, value in of.items() if value} for name, of in declared.items()}
-    used = {name: of for name, of in sizes.items() if of}
+    used = {
+        name: sizes
+        for name, of in declared.items()
+        if (sizes := {key: value for key, value in of.items() if value})
+    }
     return next((name for name, preset in PRESETS.items() if preset == used), "as declared")
 
 

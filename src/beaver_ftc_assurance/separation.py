@@ -4,9 +4,9 @@ Of a fault whose parameter stays as it is, the data since the alarm leave an int
 of its surface at a command u lies in an interval: stuck [c-, c+], floating 0, a loss [e- u, e+ u], a bias
 u + [b-, b+]. Two types on one surface are distinguished by a frame in which these are further from each other
 than 2 M B / |G_i|, twice what the uncertainty hides and a margin M, on some axis, and from the command: a
-frame that health explains says nothing of a fault that may go. Two surfaces a and b are distinguished along d,
-d G_b = 0, by a frame in which a is off its command by more than 2 M |d| B / |d G_a|: whatever b does, it does
-nothing there. B is the bound on a frame's innovation at the largest rates the doublet may reach.
+frame that health explains says nothing of a fault that may go. Two surfaces a and b are distinguished along
+d, d G_b = 0, by a frame in which a is off its command by more than 2 M |d| B / |d G_a|: whatever b does, it
+does nothing there. B is the bound on a frame's innovation at the largest rates the doublet may reach.
 
 What the surfaces must reach is then linear, and so are travel, actuators, rates and angle of attack over a
 short horizon in which the rates follow dx/dt = G u: a linear programme finds the least amplitude. The horizon
@@ -184,7 +184,8 @@ def _with_doublet(flight: Stepping, scenario: Scenario, pair: Document) -> Itera
     for k in range(round(pair["time_s"] * scenario.rate_hz) + 1):
         command = rest.copy()
         for name, course in pair["commands_rad"].items():
-            command[names.index(name)] = course[k] if k < len(course) else rest[names.index(name)]
+            if k < len(course):
+                command[names.index(name)] = course[k]
         flight.step(command)
         yield frames + k
 
@@ -319,7 +320,7 @@ def _types_apart(one: Candidate, other: Candidate, at: Situation) -> tuple[float
     (low, high), (low_too, high_too) = one.deflection(u), other.deflection(u)
     gap = np.maximum(low - high_too, low_too - high)
     gap = np.minimum(gap, np.minimum(one.off(u), other.off(u)))  # else health explains the frame
-    return _nearest(u, gap, s, at, float(room), "apart, and off their command,")
+    return _nearest(u, gap, s, at, room, "apart, and off their command,")
 
 
 def _surface_shown(one: Candidate, other: Candidate, at: Situation) -> tuple[float | None, Document]:
@@ -329,7 +330,7 @@ def _surface_shown(one: Candidate, other: Candidate, at: Situation) -> tuple[flo
         (2.0 * MARGIN * np.abs(d) @ at.bound / abs(d @ at.G[:, a]) for d in _blind_to(b, at, a)), default=inf
     )
     u = _deflections(at, a)
-    return _nearest(u, one.off(u), a, at, float(room), "off its command")
+    return _nearest(u, one.off(u), a, at, room, "off its command")
 
 
 def _deflections(at: Situation, s: int) -> np.ndarray:
@@ -353,10 +354,10 @@ def _nearest(
     """Of deflections u that are off by more than room, the nearest to the present; and the numbers this rests
     on."""
     most, tells = degrees(off.max()), off > room
-    numbers: Document = {"at_least_deg": degrees(room) if np.isfinite(room) else None}
+    numbers: Document = {"at_least_deg": degrees(room) if room < inf else None}
     numbers |= {"at_most_deg": most, "now_deg": degrees(at.u[s])}
     if not tells.any():
-        asked = f"more than {degrees(room):.3g} deg" if np.isfinite(room) else "another direction"
+        asked = f"more than {degrees(room):.3g} deg" if room < inf else "another direction"
         says = f"they must be {what} by {asked}, and are by {most:.3g} deg at most within the travel"
         return None, numbers | {"because": says}
     target = float(u[tells][np.argmin(np.abs(u[tells] - at.u[s]))])

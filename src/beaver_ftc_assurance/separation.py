@@ -1,15 +1,16 @@
-"""The smallest doublet of the surfaces that is certain to tell the candidates left apart, or why none is.
+"""A doublet of the surfaces that is certain to distinguish the candidates left, or why there is none.
 
 Of a fault whose parameter stays as it is, the data since the alarm leave an interval. With it the deflection
 of its surface at a command u lies in an interval: stuck [c-, c+], floating 0, a loss [e- u, e+ u], a bias
 u + [b-, b+]. Two types on one surface are distinguished by a frame in which these are further from each other
-than twice what the uncertainty hides, 2 B / |G_i|, on some axis, and from the command: a frame that health
-explains says nothing of a fault that may go. Two surfaces a and b are distinguished along d,
-d G_b = 0, by a frame in which a is off its command by more than 2 |d| B / |d G_a|: whatever b does, it does
-nothing there. B is the bound on a frame's innovation at the largest rates the doublet may reach.
+than 2 M B / |G_i|, twice what the uncertainty hides and a margin M, on some axis, and from the command: a
+frame that health explains says nothing of a fault that may go. Two surfaces a and b are distinguished along
+d, d G_b = 0, by a frame in which a is off its command by more than 2 M |d| B / |d G_a|: whatever b does, it
+does nothing there. B is the bound on a frame's innovation at the largest rates the doublet may reach.
 
 What the surfaces must reach is then linear, and so are travel, actuators, rates and angle of attack over a
-short horizon in which the rates follow dx/dt = G u: a linear programme finds the least amplitude.
+short horizon in which the rates follow dx/dt = G u: a linear programme finds the least amplitude. The horizon
+is the shortest of a few that has a solution.
 """
 
 import json
@@ -45,7 +46,7 @@ from beaver_ftc_assurance.certificates.kinds import hypothesis_of_type, travel_r
 from beaver_ftc_assurance.certificates.tape import Recorder, Tape, tape_of_flight_again
 
 FILE, FLOWN = "separation.json", "flown"
-MARGIN = 1.1  # on what is asked: the aircraft flies on while the doublet is flown
+MARGIN = 1.1  # M, on the difference that is asked: the aircraft flies on while the doublet is flown
 LONGEST_S = 0.5  # until the frame that tells
 LARGEST_RATE_DEG_S = 20.0
 GRID = 801  # deflections tried over the travel
@@ -102,8 +103,8 @@ class Situation:
 
     @property
     def held(self) -> int:
-        """For so many frames it must stay there: of several instants a frame in which it moves says little,
-        and one counts between two of its like."""
+        """Number of frames for which the deflection must hold: 3 if a frame has several JSBSim frames, as
+        `History.is_unexplained` then requires the frames before and after too."""
         return 1 if self.instants == 1 else 3
 
 
@@ -144,12 +145,17 @@ def separate(scenario: Scenario, rate_deg_s: float = LARGEST_RATE_DEG_S) -> Docu
     }
 
 
+def _frames(scenario: Scenario) -> int:
+    """Number of frames of a flight."""
+    return round(scenario.duration_s * scenario.rate_hz)
+
+
 def _flown(scenario: Scenario, pair: Document, candidates: Sequence[Candidate]) -> Document:
     """Which of two candidates are left once the doublet has been flown, and exits from the envelope in it."""
     with _longer(scenario, pair) as flight:
         before = 0
         for k in _with_doublet(flight, scenario, pair):
-            if k == round(scenario.duration_s * scenario.rate_hz) - 1:
+            if k == _frames(scenario) - 1:
                 before = flight.readout.envelope_exits
         still, both = {*_left(flight.readout.diagnosis)}, zip(candidates, pair["candidates"], strict=True)
         left = [words for one, words in both if (one.surface, one.kind) in still]
@@ -169,7 +175,7 @@ def _longer(scenario: Scenario, pair: Document) -> Iterator[Stepping]:
 
 def _with_doublet(flight: Stepping, scenario: Scenario, pair: Document) -> Iterator[int]:
     """Fly on to the scenario's end, then the doublet; yields the frame just flown."""
-    frames, names = round(scenario.duration_s * scenario.rate_hz), list(scenario.airframe.surfaces)
+    frames, names = _frames(scenario), list(scenario.airframe.surfaces)
     yield 0
     for k in range(1, frames):
         flight.step()
@@ -178,7 +184,8 @@ def _with_doublet(flight: Stepping, scenario: Scenario, pair: Document) -> Itera
     for k in range(round(pair["time_s"] * scenario.rate_hz) + 1):
         command = rest.copy()
         for name, course in pair["commands_rad"].items():
-            command[names.index(name)] = course[k] if k < len(course) else rest[names.index(name)]
+            if k < len(course):
+                command[names.index(name)] = course[k]
         flight.step(command)
         yield frames + k
 
@@ -217,14 +224,14 @@ def situation_of(tape: Tape, scenario: Scenario, rate: float) -> Situation:
     """What is known of the aircraft as the flight ends; rate: rad/s at most."""
     frame, aircraft, dt = tape.last, scenario.airframe, 1.0 / scenario.rate_hz
     bound, declared, actuators = frame.diagnosis.declared_bounds, declared_errors_of(frame), frame.actuators
-    coupled, (least_deg, most_deg) = declared.inertia_coupling * rate**2, aircraft.envelope.alpha_deg
+    coupled = declared.inertia_coupling * rate**2
     return Situation(
         G=frame.mean_G, u=frame.expected_u_rad, x=frame.rates_rad_s, rate=rate,
-        bound=MARGIN * (bound.eta_bar_rad_s2 + coupled + 2.0 * bound.changing_gyro_error_bound_rad_s / dt),
+        bound=bound.eta_bar_rad_s2 + coupled + 2.0 * bound.changing_gyro_error_bound_rad_s / dt,
         stops=np.array([actuators.low_rad, actuators.high_rad]), approach=actuators.approach,
         step=actuators.step_rad, instants=scenario.substeps,
         in_blocks=frame.diagnosis.types_config.frames_per_block > 1, dt=dt,
-        alpha=frame.alpha_rad, alpha_range=(radians(least_deg), radians(most_deg)),
+        alpha=frame.alpha_rad, alpha_range=aircraft.alpha_rad,
     )  # fmt: skip
 
 
@@ -270,7 +277,7 @@ def _interval(of: Hypothesis, history: History, frames: np.ndarray) -> tuple[flo
 
 
 def tell_apart(one: Candidate, other: Candidate, at: Situation, names: Sequence[str]) -> Document:
-    """The smallest doublet that is certain to tell two candidates apart, or the reason why there is none."""
+    """A doublet that is certain to tell two candidates apart, or the reason why there is none."""
     targets: dict[int, float] = {}
     needs: Document = {}
     if one.surface == other.surface and at.in_blocks:
@@ -306,7 +313,9 @@ def _none(because: str, needs: Document) -> Document:
 def _types_apart(one: Candidate, other: Candidate, at: Situation) -> tuple[float | None, Document]:
     """The deflection nearest to the present at which a surface's two types differ, and from health."""
     s = one.surface
-    room = float(np.min(2.0 * MARGIN * at.bound / np.maximum(np.abs(at.G[:, s]), 1e-12)))
+    room = min(
+        (2.0 * MARGIN * B / abs(g) for B, g in zip(at.bound, at.G[:, s], strict=True) if g), default=inf
+    )
     u = _deflections(at, s)
     (low, high), (low_too, high_too) = one.deflection(u), other.deflection(u)
     gap = np.maximum(low - high_too, low_too - high)
@@ -321,7 +330,7 @@ def _surface_shown(one: Candidate, other: Candidate, at: Situation) -> tuple[flo
         (2.0 * MARGIN * np.abs(d) @ at.bound / abs(d @ at.G[:, a]) for d in _blind_to(b, at, a)), default=inf
     )
     u = _deflections(at, a)
-    return _nearest(u, one.off(u), a, at, float(room), "off its command")
+    return _nearest(u, one.off(u), a, at, room, "off its command")
 
 
 def _deflections(at: Situation, s: int) -> np.ndarray:
@@ -345,27 +354,27 @@ def _nearest(
     """Of deflections u that are off by more than room, the nearest to the present; and the numbers this rests
     on."""
     most, tells = degrees(off.max()), off > room
-    numbers: Document = {"at_least_deg": degrees(room) if np.isfinite(room) else None}
+    numbers: Document = {"at_least_deg": degrees(room) if room < inf else None}
     numbers |= {"at_most_deg": most, "now_deg": degrees(at.u[s])}
     if not tells.any():
-        asked = f"more than {degrees(room):.3g} deg" if np.isfinite(room) else "another direction"
+        asked = f"more than {degrees(room):.3g} deg" if room < inf else "another direction"
         says = f"they must be {what} by {asked}, and are by {most:.3g} deg at most within the travel"
         return None, numbers | {"because": says}
     target = float(u[tells][np.argmin(np.abs(u[tells] - at.u[s]))])
     return target, numbers | {"target_deg": degrees(target)}
 
 
-def doublets(scenario: Scenario, after_s: float, told: float) -> dict[tuple[str, str], Document]:
-    """Of each two surfaces that lead an axis: the smallest doublet that tells losses of this share apart, so
-    long after the start of a healthy flight, or why there is none."""
-    frames = round(after_s * scenario.rate_hz)
+def doublets(scenario: Scenario, after_s: float, loss: float) -> dict[tuple[str, str], Document]:
+    """Of each two surfaces that lead an axis: a doublet that tells losses of this share apart, so long after
+    the start of a healthy flight, or why there is none."""
     healthy = scenario.model_copy(update={"faults": (), "duration_s": after_s})
+    frames = _frames(healthy)
     at = situation_of(
         tape_of_flight_again(healthy, [frames - 1], frames), healthy, radians(LARGEST_RATE_DEG_S)
     )
     names, found = scenario.airframe.surfaces, {}
     for pair in combinations(scenario.airframe.class_of_losses, 2):
-        one, other = (Candidate(names.index(name), LOSS, -told, -told) for name in pair)
+        one, other = (Candidate(names.index(name), LOSS, -loss, -loss) for name in pair)
         apart = tell_apart(one, other, at, names)
         asked = apart.get("amplitude_deg"), apart.get("time_s"), apart.get("because", "")
         found[pair] = found[pair[::-1]] = dict(zip(DOUBLET_COLUMNS, asked, strict=True))
@@ -373,51 +382,55 @@ def doublets(scenario: Scenario, after_s: float, told: float) -> dict[tuple[str,
 
 
 def doublet(targets: dict[int, float], at: Situation) -> tuple[np.ndarray, int] | None:
-    """Commands (frames, n) rad of the smallest doublet that brings surfaces to these deflections, and the
-    frame in which they are there; None where no doublet does within the limits."""
-    longest = max(int(LONGEST_S / at.dt), 1)
-    tells = 1
-    while tells <= longest:
-        found = _least_amplitude(targets, at, tells)
-        if found is not None:
-            return found, tells + at.held - 1
-        tells *= 4
-    return None
+    """Commands (frames, n) rad of a doublet that brings surfaces to these deflections, and the frame in which
+    they are there; None where no doublet does within the limits.
+
+    Of 1, 4, 16, ... frames on the way, and LONGEST_S, it is the first time that has a doublet, with its least
+    amplitude. A wait makes each doublet a longer one: LONGEST_S has one wherever a shorter time has.
+    """
+    tells, longest = 1, max(int(LONGEST_S / at.dt), 1)
+    while (found := _least_amplitude(targets, at, tells)) is None:
+        if tells == longest:
+            return None
+        tells = min(4 * tells, longest)
+    return found, tells + at.held - 1
 
 
 def _least_amplitude(targets: dict[int, float], at: Situation, tells: int) -> np.ndarray | None:
     """The linear programme, with the frame that tells given: commands (frames, n) rad there and back.
 
-    Unknown, frame by frame: of each surface the command and where it is at the frame's end, less the present
-    deflection; the rates, less the present ones, and pitch; then the amplitude. A row has a few of them, so
-    that many frames stay quick.
+    Unknown, frame by frame, a block each: of each surface the command and where it is at the frame's end,
+    less the present deflection; the rates p, q, r, less the present ones, and pitch; then the amplitude. A
+    row has a few of them, so that many frames stay quick.
     """
     if (np.abs(at.x) > at.rate).any() or not at.alpha_range[0] <= at.alpha <= at.alpha_range[1]:
         return None
     frames, surfaces = 2 * (tells + at.held - 1), [*targets]
     n, there, every = len(surfaces), np.arange(tells - 1, tells + at.held - 1), np.arange(frames)
-    equal, above = _Rows(2 * n + 4, frames), _Rows(2 * n + 4, frames)
-    turning = [{(2 * n + i, 0): 1.0, (2 * n + i, -1): -1.0} for i in range(3)]
+    arrived = range(n, 2 * n)  # blocks of where the surfaces are; those of the commands come before
+    *pqr, pitch = range(2 * n, 2 * n + 4)
+    equal, above = _Rows(pitch + 1, frames), _Rows(pitch + 1, frames)
+    turning = [{(rate, 0): 1.0, (rate, -1): -1.0} for rate in pqr]
     stops, rates = [(at.stops[:, s] - at.u[s]) for s in surfaces], [(-at.rate - x, at.rate - x) for x in at.x]
-    for j, s in enumerate(surfaces):
+    for u, (p, s) in enumerate(zip(arrived, surfaces, strict=True)):
         away, (left, mean_left) = targets[s] - at.u[s], _left_behind(at, s)
-        equal.add(every, {(j, 0): left - 1.0, (n + j, 0): 1.0, (n + j, -1): -left})
-        equal.add(there[1:], {(j, 0): 1.0, (j, -1): -1.0})
-        moved = {(j, 0): 1.0 - mean_left, (n + j, -1): mean_left}
-        before = {(j, -1): mean_left - 1.0, (n + j, -2): -mean_left}
+        equal.add(every, {(u, 0): left - 1.0, (p, 0): 1.0, (p, -1): -left})
+        equal.add(there[1:], {(u, 0): 1.0, (u, -1): -1.0})
+        moved = {(u, 0): 1.0 - mean_left, (p, -1): mean_left}
+        before = {(u, -1): mean_left - 1.0, (p, -2): -mean_left}
         above.add(there, {k: -np.sign(away) * v for k, v in moved.items()}, -abs(away))
         for sign in (1.0, -1.0):
-            above.add(every, {(j, 0): sign}, amplitude=-1.0)
+            above.add(every, {(u, 0): sign}, amplitude=-1.0)
             if np.isfinite(at.step[s]):
                 pace = {k: sign * v for k, v in (moved | before).items()}
                 above.add(every, pace, at.step[s] * at.instants)
         for row, g in zip(turning, at.G[:, s], strict=True):
             row |= {k: -at.dt * g * v for k, v in moved.items() if g}
-    for row in (*turning, {(2 * n + 3, 0): 1.0, (2 * n + 3, -1): -1.0, (2 * n + 1, 0): -at.dt}):
+    for row in (*turning, {(pitch, 0): 1.0, (pitch, -1): -1.0, (pqr[1], 0): -at.dt}):
         equal.add(every, row)
     ends = [*stops, *[(-inf, inf)] * n, *rates, np.subtract(at.alpha_range, at.alpha)]
     bounds = np.vstack([np.repeat(ends, frames, axis=0), (0.0, inf)])
-    bounds[[(2 * n + i + 1) * frames - 1 for i in range(3)]] = 0.0
+    bounds[[(rate + 1) * frames - 1 for rate in pqr]] = 0.0
     found = _solved(equal, above, bounds)
     if found is None:
         return None

@@ -332,11 +332,11 @@ class _Flight:
         """What all these statements go by."""
         of = [(one, span) for one in said for span in (*one.get("terms", ()), *one.get("bounds", ()))]
         asked = np.any([np.array(span["d"]) != 0.0 for _, span in of], axis=0) if of else np.zeros(3, bool)
-        constant = self.history.with_constant_gyro_errors_on(asked)
-        if not all(_is_unexplained(constant, one, span) for one, span in of):
-            asked = np.ones(3, bool)
+        history = self.history.with_constant_gyro_errors_on(asked)
+        if not all(_is_unexplained(history, one, span) for one, span in of):
+            history = self.history
         rows = np.concatenate([log_rows_of(one, span) for one, span in of]) if of else None
-        about: Document = {"declared": self.history.declared_fields(rows, asked)}
+        about: Document = {"declared": history.declared_fields(rows)}
         if not all("looks" in one or "missing" in one for one in said):
             about["dt_s"] = self.history.dt
         if of:

@@ -1,6 +1,6 @@
 """The log by frames, or by blocks of frames: innovation, its bound, and what was declared."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil, nan
@@ -133,7 +133,7 @@ class History:
         return self.mean(unstated[self.begin :])
 
     def is_unexplained(self, frames: np.ndarray) -> np.ndarray:
-        """Whether health does not explain each of consecutive frames, (frames,). In frames of several
+        """Whether health does not explain each of consecutive frames >= 1, (frames,). In frames of several
         instants, health must not explain the frames before and after either: a fault may begin within one."""
         rows = slice(int(frames[0]) - 1, min(int(frames[-1]) + 2, len(self.rates_rad_s)))
         exceeds = (np.abs(self.innovation_rad_s2[rows]) > self.innovation_bound(rows)).any(axis=1)
@@ -148,17 +148,16 @@ class History:
         constant = self.declared.gyro_constant_rad_s * axes
         return replace(self, declared=replace(self.declared, gyro_constant_rad_s=constant))
 
-    def declared_fields(self, rows: np.ndarray | None, axes: np.ndarray) -> Document:
+    def declared_fields(self, rows: np.ndarray | None) -> Document:
         """The field `declared` of a certificate, by letter and axis (docs/explanation/certificates.md, "The
-        fields"): what is not zero, and adds to the bounds of these rows. axes (3,): 1 where a constant error
-        of the gyro counts."""
+        fields"): what is not zero, and adds to the bounds of these rows."""
         of = self.declared
-        gyro = {"o": of.gyro_offset_rad_s, "B": of.gyro_constant_rad_s * axes, "m": of.gyro_slope}
+        gyro = {"o": of.gyro_offset_rad_s, "B": of.gyro_constant_rad_s, "m": of.gyro_slope}
         if rows is None:
-            return _by_axis(gyro | {name: [] for name in "cbg"})
+            return _by_axis(gyro | dict.fromkeys("cbg", np.zeros(len(AXES))))
         added = of.inertia_coupling * self.products()[rows - 1] * (1.0 / self.instants)
         decides = (added > ROUNDING_SHARE * self.eta_bar[rows]).any(axis=0)
-        gain = of.earth_gain if of.earth_rad_s else np.empty(0)
+        gain = of.earth_gain * (of.earth_rad_s > 0.0)
         return _by_axis(gyro | {"c": of.inertia_coupling * decides, "b": of.constant_rad_s2, "g": gain})
 
 
@@ -167,10 +166,10 @@ def _row_before(values: np.ndarray) -> np.ndarray:
     return np.concatenate([np.full_like(values[:1], nan), values[:-1]])
 
 
-def _by_axis(numbers: Mapping[str, Sequence[float] | np.ndarray]) -> Document:
+def _by_axis(numbers: Mapping[str, np.ndarray]) -> Document:
     """By name and axis the numbers that are not zero."""
     return {
-        name: {axis: float(v) for axis, v in zip(AXES, values, strict=False) if v}
+        name: {axis: float(v) for axis, v in zip(AXES, values, strict=True) if v}
         for name, values in numbers.items()
     }
 
@@ -199,7 +198,8 @@ def in_blocks(tape: Tape, history: History, alarm_frame: int) -> tuple[Tape, His
     diagnosis = tape.alarm.diagnosis
     length = diagnosis.types_config.frames_per_block
     begin = (alarm_frame + 1 - diagnosis.n_frames_in_block_so_far) % length
-    blocks, first_block = replace(history, length=length, begin=begin), ceil((tape.first - begin) / length)
+    blocks = replace(history, length=length, begin=begin)
+    first_block = ceil((tape.first - begin) / length)
     skipped = begin + first_block * length - tape.first
     kept = {
         name: blocks.mean(values[skipped:])

@@ -16,12 +16,13 @@ def command(
     out: Path = Path("runs"),
     format: FormatOption = Format.text,
 ) -> None:
-    """Propose the smallest doublet that separates candidates.
+    """Propose a doublet that separates candidates.
 
-    The command flies the scenario to its end. For each pair of remaining candidates it prints the smallest
-    doublet that is certain to distinguish the two, and the time that this takes. The doublet stays within the
-    limits of travel, actuators, body rates and angle of attack. If no such doublet exists, the command prints
-    the reason. If the scenario contains `fdi.probing`, the command also flies the doublets and reports the
+    The command flies the scenario to its end. For each pair of remaining candidates it prints a doublet that
+    is certain to distinguish the two, and the time that this takes. The doublet stays within the limits of
+    travel, actuators, body rates and angle of attack. The command tries a few times up to 0.5 s. At the
+    shortest time that has a doublet, it takes the smallest amplitude. If no time has one, it prints the
+    reason. If the scenario contains `fdi.probing`, the command also flies the doublets and reports the
     remaining candidates. The folder flown/N/ then contains log and certificate of the flight with doublet N.
 
     The exit status is 1 if a doublet was flown and both candidates remain.

@@ -5,6 +5,7 @@ import hashlib
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from math import inf
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -27,10 +28,9 @@ from beaver_ftc.documents import (
     number,
     parse_document,
     suggestion,
+    validate_model,
 )
-from beaver_ftc.documents import validate_model as validate
-from beaver_ftc.results import Formula, FormulaError
-from beaver_ftc.results import parse_formula as parse
+from beaver_ftc.results import Formula, FormulaError, parse_formula
 from beaver_ftc.scenario import (
     NAME_PATTERN,
     Expect,
@@ -48,14 +48,13 @@ from beaver_ftc.scenario import (
     looks_like_a_path,
     read_file,
     resolve,
-    to_yaml,
     validate_scenario,
     validate_sweep,
 )
+from beaver_ftc.studies.engine import digest_of_aircraft
 from beaver_ftc.studies.sweep import Assignment, Plan, flight_name, scenario_of
 
 MOST_REQUIREMENTS, MOST_FLIGHTS = 500, 100_000
-_KEYS = "name, flights and requirements"
 Text = Annotated[str, StringConstraints(max_length=2000)]
 
 
@@ -175,14 +174,26 @@ class Source:
         """What all of its flights have in common."""
         return self.what.scenario({}) if isinstance(self.what, Sweep) else self.what
 
+    @cached_property
+    def columns(self) -> tuple[str, ...]:
+        """The columns of its logs; none of what cannot fly, which its row will say."""
+        from beaver_ftc.loop import Loop
+
+        with contextlib.suppress(BadInput):
+            loop = Loop(self.base)
+            loop.release()
+            return loop.columns
+        return ()
+
     @property
     def sha256(self) -> str:
-        """Of all that it says, resolved."""
+        """Of all that its flights follow from, resolved, and of the files of its aircraft."""
+        aircraft, left_out = digest_of_aircraft(self.aircraft.folder), {"description", "expect"}
         if isinstance(self.what, Sweep):
-            file = self.what.file.model_dump(mode="json", exclude={"base", "set", "description", "expect"})
-            text = repr([file, self.what.base])
+            file = self.what.file.model_dump(mode="json", exclude=left_out | {"base", "set"})
+            text = repr([aircraft, self.what.base, file])
         else:
-            text = to_yaml(self.what)
+            text = repr([aircraft, self.what.model_dump(mode="json", exclude=left_out)])
         return hashlib.sha256(text.encode()).hexdigest()
 
 
@@ -212,12 +223,12 @@ class EvidencePlan:
 
 
 def load_plan(path_or_name: str) -> EvidencePlan:
-    """The plan in a file or of a built-in name. Raises ScenarioError with one line a mistake."""
+    """The plan in a file or of a built-in name. Raises BadInput with one line a mistake."""
     path = resolve(path_or_name, "plan")
     text = read_file(path, path_or_name, "plan")
-    document = parse_document(text, str(path), f"a plan's keys: {_KEYS}")
+    document = parse_document(text, str(path), "a plan's keys: name, description, flights and requirements")
     document.data.setdefault("name", re.sub(r"[^A-Za-z0-9_-]", "-", path.stem)[:70])
-    file = validate(PlanFile, document, str(path))
+    file = validate_model(PlanFile, document, str(path))
     return _Reading(file, document, path, path_or_name).plan(hashlib.sha256(text.encode()).hexdigest())
 
 
@@ -245,10 +256,14 @@ class _Reading:
             if formula:
                 formulas[requirement.id] = formula
             for k, source in enumerate(sources):
-                self._fits(requirement, formula, source, at, k)
+                if isinstance(requirement.bar, OfSweep) and not isinstance(source.what, Sweep):
+                    says = f"{source.given} is a scenario, allowed with a bar of type sweep: sweeps"
+                    self._problem((*at, "over", k), says)
+                if formula:
+                    self._fits(formula, source, (*at, "formula"))
                 if requirement.expect is not None:
                     judged = self._expect(requirement.expect, source, (*at, "expect"))
-                    if judged:
+                    if judged:  # the same for each source: a source only adds problems
                         expect[requirement.id] = judged
         self._unused()
         sources_by_name = self._by_name()
@@ -331,28 +346,19 @@ class _Reading:
         if requirement.formula is None:
             return None
         try:
-            return parse(requirement.formula)
+            return parse_formula(requirement.formula)
         except FormulaError as error:
             self._problem((*at, "formula"), str(error))
             return None
 
-    def _fits(
-        self, requirement: Requirement, formula: Formula | None, source: Source, at: Location, place: int
-    ) -> None:
-        """Whether this can be judged over that source."""
-        if isinstance(requirement.bar, OfSweep) and not isinstance(source.what, Sweep):
-            says = f"{source.given} is a scenario, allowed with a bar of type sweep: sweeps"
-            self._problem((*at, "over", place), says)
-        if formula is None:
-            return
-        ahead, base = formula.looks_ahead_s, source.base
-        if base.duration_s < ahead < inf:
-            says = f"looks {ahead:g} s ahead, allowed over {source.given}: at most its {base.duration_s:g} s"
-            self._problem((*at, "formula"), says)
-        columns = _columns(base)
-        for column in sorted(formula.columns.difference(columns)) if columns else ():
-            says = f"{column[:60]!r} is no column of {source.given}'s log{suggestion(column, columns)}"
-            self._problem((*at, "formula"), says)
+    def _fits(self, formula: Formula, source: Source, at: Location) -> None:
+        """Whether the logs of this source are long enough for a formula, and have its columns."""
+        ahead, most = formula.looks_ahead_s, source.base.duration_s
+        if most < ahead < inf:
+            self._problem(at, f"looks {ahead:g} s ahead, allowed over {source.given}: at most its {most:g} s")
+        for column in sorted(formula.columns.difference(source.columns)) if source.columns else ():
+            says = f"{column[:60]!r} is no column of {source.given}'s log{suggestion(column, source.columns)}"
+            self._problem(at, says)
 
     def _expect(self, given: dict[str, Any], source: Source, at: Location) -> Expect | None:
         """What is expected, held against what a flight of this source can show."""
@@ -361,18 +367,9 @@ class _Reading:
         lines = {("expect", *where): n for where, n in self._document.below(*at).lines.items()}
         try:
             with checked_against(base.airframe, base.aircraft):
-                return validate(Scenario, Document(data, lines), "", None, conflicts).expect
+                return validate_model(Scenario, Document(data, lines), "", None, conflicts).expect
         except ScenarioError as error:
             for one in error.problems:
                 if one.location[:1] == ("expect",):
                     self._problem((*at, *one.location[1:]), one.says)
             return None
-
-
-def _columns(scenario: Scenario) -> tuple[str, ...]:
-    """The columns of a flight's log; none of what cannot fly, which its row will say."""
-    from beaver_ftc.loop import Loop
-
-    with contextlib.suppress(BadInput):
-        return Loop(scenario).columns
-    return ()

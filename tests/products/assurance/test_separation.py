@@ -86,6 +86,13 @@ def test_surfaces_that_act_along_one_direction_cannot_be_told_apart_by_a_frame()
     assert "another direction" in pair["because"]
 
 
+def test_a_surface_without_effect_shows_no_type():
+    none = replace(PLAIN, G=np.zeros((3, 4)))
+    pair = tell_apart(Candidate(1, STUCK, 0.1, 0.11), Candidate(1, FLOAT, 0.0, 0.0), none, NAMES)
+    assert "another direction" in pair["because"]
+    assert pair["needs"]["elevator"]["at_least_deg"] is None
+
+
 def test_surfaces_that_act_along_two_directions_can():
     pair = tell_apart(
         Candidate(0, CONSTANT_LOSS, -0.6, -0.5), Candidate(2, CONSTANT_LOSS, -0.9, -0.8), PLAIN, NAMES
@@ -138,6 +145,13 @@ def test_where_a_surface_already_tells_it_is_held():
     document = {"scenario": "mine", "time_s": 1.0, "assumes": "it stays", "not_constant": []}
     text = as_text(document | {"pairs": [found | {"candidates": kinds}]})
     assert "elevator stuck or elevator bias: elevator held as now, told after 0.03 s" in text
+
+
+def test_a_slow_actuator_has_all_of_the_half_second():
+    """Its travel does not suffice there and back in 16 frames, the time tried before."""
+    commands, tells = doublet({0: 0.1}, replace(PLAIN, approach=np.full(4, 0.04)))
+    assert tells == 50
+    assert abs(commands).max() < 0.3
 
 
 def test_a_limit_on_the_rates_can_leave_none():

@@ -122,6 +122,14 @@ def test_a_row_is_of_what_was_measured(changes, differs):
     assert row_of(Metrics.of(METRICS | changes), 0.25) == GOOD | differs
 
 
+def test_no_error_is_larger_than_a_scenario_may_have_it():
+    """Four times a slope error of 0.3, and four times 3 rad/s2."""
+    bounds = {"sensors": {"p": {"scale_error": 0.3}}, "constant_rad_s2": {"p": 0, "q": 3, "r": 0}}
+    truth = truth_of(bf.load(SHORT | {"fdi": {"bounds": bounds}}), TOGETHER, 4.0)
+    assert truth.sensors.p.scale_error in (-0.9, 1.0)
+    assert truth.uncertainty.sinusoid.q.amplitude_rad_s2 == 10.0
+
+
 def test_faults_come_later_together_and_end_so_much_later():
     """At most four seconds, and five before the end at the latest; where there is no room, as declared."""
     second = {"actuator": "rudder", "type": "bias", "bias_deg": 2.0, "at_s": 3.0, "end_s": 6.5}

@@ -191,6 +191,14 @@ def test_a_false_alarm_of_a_worst_case_detector_wants_a_reason(few_cells, reason
     assert sum(row["unexplained"] for row in document["false_alarms"] if row["worst_case"]) == (not passed)
 
 
+def test_a_flight_that_failed_is_not_one_without_an_alarm(few_cells):
+    rows = rows_of(None)
+    rows[0][DEFAULT] = mechanisms.FAILED
+    of, flown = document_of(1, 1, rows, [])["systems"][DEFAULT], len(rows) - 1
+    counts = [of[name][key] for name in ("detected", "lost") for key in ("count", "of")]
+    assert (of["flights"], *counts) == (flown, flown, flown, 0, flown)
+
+
 @needs.service("proof")
 def test_a_document_and_its_files(tmp_path, monkeypatch, few_cells):
     monkeypatch.setattr(command, "margin_cells", lambda: [(DEFAULT, "high", "exact sensors")])

@@ -100,7 +100,7 @@ class Detectability(StudyCommand):
     and isolated within 1 s, at several airspeeds and altitudes, and with references scaled by factors from
     0.25 to 2. "Half of onsets": half of the possible start times of the loss. With --surface the command
     prints one sentence for each place. For each pair of surfaces it prints the smallest loss for which they
-    are distinguished, the delay, and the smallest doublet that distinguishes them.
+    are distinguished, the delay, and a doublet that distinguishes them.
 
     SCENARIO --surface --within: fly losses with random seeds and start times. The command prints the smallest
     loss that is certain to be detected within this time, and the smallest that is detected in 90 % of the

@@ -3,8 +3,8 @@
 A pair is a surface that loses effectiveness and another surface that could explain the innovation. For each
 pair the map has, along a flight: the smallest loss for which the other surface is excluded in time, and the
 time until a total loss excludes it; for every instant at which the loss may begin, and for half of them. It
-also has the smallest doublet that is certain to distinguish losses of the two surfaces in straight flight,
-which `separate` finds.
+also has the doublet that is certain to distinguish losses of the two surfaces in straight flight, as
+`separate` finds it.
 """
 
 from collections.abc import Sequence
@@ -55,7 +55,7 @@ def largest_and_median(values: np.ndarray, most: float = inf) -> list[float | No
 
 
 def smallest_doublets(scenario: Scenario, after_s: float) -> dict[tuple[str, str], Document]:
-    """By pair of surfaces: the smallest doublet, flown after_s into a healthy flight, that distinguishes
+    """By pair of surfaces: the doublet, flown after_s into a healthy flight, that distinguishes
     losses of DISTINGUISHED_LOSS of the two; or why there is none."""
     find = offered("doublets")
     pairs = permutations(scenario.airframe.class_of_losses, 2)

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from beaver_ftc.studies.engine.processes import ONE_THREAD_EACH, cores, single_threaded
     from beaver_ftc.studies.engine.processes import context as process_context
     from beaver_ftc.studies.engine.statistics import poisson
-    from beaver_ftc.studies.engine.store import fingerprint, plug_ins, write_whole
+    from beaver_ftc.studies.engine.store import digest_of_aircraft, fingerprint, plug_ins, write_whole
     from beaver_ftc.studies.engine.study import Progress, Study, run_study
 else:
     __getattr__, __dir__ = lazily(__name__)

@@ -235,6 +235,11 @@ def fingerprint() -> str:
     return digest(hashed_files())[:16]
 
 
+def digest_of_aircraft(folder: Path) -> str:
+    """A digest of an aircraft's files: another aircraft of the same name has another digest."""
+    return digest(path for path in sorted(folder.rglob("*")) if path.suffix in (".xml", ".yaml"))
+
+
 def digest(paths: Iterable[Path]) -> str:
     """A digest of files, names and contents."""
     found = hashlib.sha256()

@@ -1,4 +1,4 @@
-"""What pairs of flights, with a mechanism and without it, amount to.
+"""Effect of each mechanism, from pairs of flights with it and without it.
 
 A pair is worse without the mechanism if it then has a false alarm, a late alarm or no right name, or tracks
 worse, and better if the opposite holds. The net share, worse less better, is what the mechanism is worth.
@@ -60,9 +60,9 @@ def effect_of(pairs: Sequence[Pair]) -> Document:
         "same_verdict": sum(a["verdict"] == b["verdict"] for a, b in flown),
         "same_tracking": sum(a["tracking_deg_s"] == b["tracking_deg_s"] for a, b in flown),
         **{name: net(flown, worse) for name, worse in CRITERIA.items()},
-        "delay_s": _both(flown, "delay_s"),
+        "delay_s": _both([p for p in flown if not any(o["false_alarm"] for o in p)], "delay_s"),
         "tracking_deg_s": _both(flown, "tracking_deg_s"),
-        "tracking_ratio": median(_ratio(b, a) for a, b in flown),
+        "tracking_ratio": median(_ratio(a, b) for a, b in flown),
     }
 
 
@@ -88,9 +88,9 @@ def net(pairs: Sequence[Pair], worse: Callable[[Document, Document], bool]) -> D
     Its interval is that of both shares, each exact at half of the error probability: together they hold with
     the whole confidence, whatever the shares depend on [ClopperPearson1934].
     """
-    n, each = len(pairs), (1.0 + CONFIDENCE) / 2.0
+    n, confidence = len(pairs), (1.0 + CONFIDENCE) / 2.0
     lost, gained = sum(worse(a, b) for a, b in pairs), sum(worse(b, a) for a, b in pairs)
-    without, with_ = binomial(lost, n, each), binomial(gained, n, each)
+    without, with_ = binomial(lost, n, confidence), binomial(gained, n, confidence)
     return {
         "worse": lost,
         "better": gained,
@@ -101,33 +101,32 @@ def net(pairs: Sequence[Pair], worse: Callable[[Document, Document], bool]) -> D
 
 
 def _both(pairs: Sequence[Pair], name: str) -> Document:
-    kept = pairs if name != "delay_s" else [p for p in pairs if not any(o["false_alarm"] for o in p)]
     return {
-        "flights": len(kept),
-        "with": median(a[name] for a, _ in kept),
-        "without": median(b[name] for _, b in kept),
+        "flights": len(pairs),
+        "with": median(a[name] for a, _ in pairs),
+        "without": median(b[name] for _, b in pairs),
     }
 
 
-def _ratio(b: Document, a: Document) -> float:
-    """Of the tracking errors; 1 where both aircraft are lost."""
+def _ratio(a: Document, b: Document) -> float:
+    """Tracking error of b over that of a; 1 where both aircraft are lost."""
     over, under = or_never(b["tracking_deg_s"]), or_never(a["tracking_deg_s"])
     return over / under if isfinite(under) else float(not isfinite(over))
 
 
 def _system_row(outcomes: Sequence[Document]) -> Document:
-    """What a system does with all of its mechanisms."""
-    n = len(outcomes)
+    """What a system does with all of its mechanisms, in the flights that were flown to their end."""
+    flown = [o for o in outcomes if not o["failed"]]
     rates = {
-        "false_alarms": sum(o["false_alarm"] for o in outcomes),
-        "detected": sum(o["delay_s"] is not None for o in outcomes),
-        "named": sum(o["named"] for o in outcomes),
-        "lost": sum(o["tracking_deg_s"] is None for o in outcomes),
+        "false_alarms": sum(o["false_alarm"] for o in flown),
+        "detected": sum(o["delay_s"] is not None for o in flown),
+        "named": sum(o["named"] for o in flown),
+        "lost": sum(o["tracking_deg_s"] is None for o in flown),
     }
     return {
-        "flights": n,
-        **{name: counted(count, n) for name, count in rates.items()},
-        "tracking_deg_s": median(o["tracking_deg_s"] for o in outcomes),
+        "flights": len(flown),
+        **{name: counted(count, len(flown)) for name, count in rates.items()},
+        "tracking_deg_s": median(o["tracking_deg_s"] for o in flown),
     }
 
 
@@ -136,7 +135,7 @@ def _alarms_of(key: str, rows: Sequence[Document]) -> Document:
     within the declaration. unexplained: alarms without an undeclared error, or without the certificate that
     this scheme has."""
     reasons = [row[key]["reason"] for row in rows if row[key]["false_alarm"]]
-    worst_case = "statistical" not in key
+    worst_case = key not in [with_key(one) for one in MECHANISMS if "fdi.statistical" in one.present]
     explained = [r["undeclared"] > 0 and (r["certified"] is not False or not worst_case) for r in reasons]
     return {
         "flown": key,

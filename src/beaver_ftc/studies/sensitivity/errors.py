@@ -6,24 +6,27 @@ all other flights.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple
+from functools import cache
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from beaver_ftc.aircraft import AXES
+from beaver_ftc.design import SEVERITIES
+from beaver_ftc.documents.document import Section
 from beaver_ftc.results.model import Document
-from beaver_ftc.scenario.airframe import air_of
+from beaver_ftc.scenario.airframe import TrueActuator, air_of
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.diagnosis import ActuatorBound
-from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.scenario.sensors import PRESETS
+from beaver_ftc.scenario.schema import Scenario, Sinusoid, TrueInertia
+from beaver_ftc.scenario.sensors import PRESETS, Sensors
 
 FREQUENCIES_RAD_S = (5.0, 15.0)  # of an unstructured acceleration where the scenario flies none
 UNDECLARED_SHARE = 0.01  # of a coefficient or a moment of inertia of which no error is declared
 UNDECLARED_SENSORS, UNDECLARED_AIR = "tactical-grade", "light"
-INTENSITY = {"none": 0.0, "light": 1.0, "moderate": 2.0, "severe": 3.0}  # wind at 20 ft: 15, 30, 45 kt
-FACTOR_LIMITS, _INERTIA, _WIDEST_BAND_DEG = (0.1, 10.0), (0.5, 2.0), 10.0  # what the keys of a scenario admit
+FACTOR_LIMITS = (0.1, 10.0)  # of the factors on a coefficient and on an actuator
 _RANDOM, _SIGNED = ("noise_std", "quantum"), ("bias", "scale_error", "drift")
+_IDEAL = Sensors()
 
 Change = Callable[[float, np.random.Generator], Document]
 
@@ -49,7 +52,7 @@ def errors_of(scenario: Scenario) -> tuple[Error, ...]:
     constant = declared.constant_rad_s2
     return (
         _of_ratios("moment coefficients", "uncertainty.coefficients", shares, FACTOR_LIMITS),
-        _of_ratios("moments of inertia", "uncertainty.inertia", inertia, _INERTIA),
+        _of_ratios("moments of inertia", "uncertainty.inertia", inertia, _limits(TrueInertia, "Ix")),
         *((_coupling(declared.coupling),) if any(declared.coupling) else ()),
         *((_acceleration(scenario, constant),) if any(constant) else ()),
         *(() if declared.servo_errors.is_none else (_servos(declared),)),
@@ -66,6 +69,13 @@ def changes_of(errors: Sequence[Error], factors: Mapping[str, float], draws: np.
         made = error.change(factors.get(error.name, 0.0), draws)
         truth |= made if error.name in factors else {}
     return truth
+
+
+@cache
+def _limits(section: type[Section], key: str) -> tuple[Any, Any]:
+    """The least and the largest value at a key of a section of a scenario; None without a limit."""
+    of = section.model_json_schema()["properties"][key]
+    return of.get("minimum"), of.get("maximum")
 
 
 def _signs(draws: np.random.Generator, names: Sequence[str]) -> dict[str, float]:
@@ -102,6 +112,7 @@ def _coupling(theta: Sequence[float]) -> Error:
 
 def _acceleration(scenario: Scenario, sizes: Sequence[float]) -> Error:
     """Of the frequencies that the scenario flies, where it flies any."""
+    _, most_rad_s2 = _limits(Sinusoid, "amplitude_rad_s2")
     flown = {axis: getattr(scenario.uncertainty.sinusoid, axis) for axis in AXES}
     known = {axis: wave.frequency_rad_s for axis, wave in flown.items() if wave.amplitude_rad_s2}
 
@@ -109,7 +120,7 @@ def _acceleration(scenario: Scenario, sizes: Sequence[float]) -> Error:
         drawn = dict(zip(AXES, draws.uniform(*FREQUENCIES_RAD_S, len(AXES)).tolist(), strict=True))
         return {
             "uncertainty.sinusoid": {
-                axis: {"amplitude_rad_s2": times * size, "frequency_rad_s": at}
+                axis: {"amplitude_rad_s2": min(times * size, most_rad_s2), "frequency_rad_s": at}
                 for (axis, at), size in zip((drawn | known).items(), sizes, strict=True)
             }
         }
@@ -120,12 +131,13 @@ def _acceleration(scenario: Scenario, sizes: Sequence[float]) -> Error:
 def _servos(declared: Declared) -> Error:
     """Bandwidths and rate limits, each with a sign drawn, and dead bands."""
     bounds = {name: bound.model_dump() for name, bound in declared.servo_errors}
+    _, widest_deg = _limits(TrueActuator, "dead_band_deg")
 
     def change(times: float, draws: np.random.Generator) -> Document:
         truth = {}
         for name, bound in bounds.items():
             shares = {key: bound[key] for key in ("bandwidth", "rate_limit")}
-            band_deg = min(times * bound["dead_band_deg"], _WIDEST_BAND_DEG)
+            band_deg = min(times * bound["dead_band_deg"], widest_deg)
             truth[name] = signed(shares, 1.0, FACTOR_LIMITS, times, draws) | {"dead_band_deg": band_deg}
         return {"uncertainty.actuators": truth}
 
@@ -142,8 +154,14 @@ def _sensors(declared: Mapping[str, Mapping[str, float]]) -> Error:
         truth = {}
         for name, keys in bounds.items():
             signs = _signs(draws, list(keys))
+            kind: type[Section] = type(getattr(_IDEAL, name))
             truth[name] = {
-                key: times * abs(value) * (signs[key] if key.startswith(_SIGNED) else 1.0)
+                key: float(
+                    np.clip(
+                        times * abs(value) * (signs[key] if key.startswith(_SIGNED) else 1.0),
+                        *_limits(kind, key),
+                    )
+                )
                 for key, value in keys.items()
                 if value and key.startswith((*_RANDOM, *_SIGNED))
             }
@@ -154,20 +172,23 @@ def _sensors(declared: Mapping[str, Mapping[str, float]]) -> Error:
 
 
 def _preset(declared: Mapping[str, Mapping[str, float]]) -> str:
-    sizes = {name: {key: value for key, value in of.items() if value} for name, of in declared.items()}
-    sizes = {name: of for name, of in sizes.items() if of}
-    return next((name for name, preset in PRESETS.items() if preset == sizes), "as declared")
+    used = {
+        name: sizes
+        for name, of in declared.items()
+        if (sizes := {key: value for key, value in of.items() if value})
+    }
+    return next((name for name, preset in PRESETS.items() if preset == used), "as declared")
 
 
 def _air(declared: str) -> Error:
-    """The strongest of the severities that there are, up to so many times the one declared."""
-    base = INTENSITY[declared] or INTENSITY[UNDECLARED_AIR]
+    """The strongest severity up to so many times the one declared: the wind at 20 ft of each, 0, 15, 30 and
+    45 kt, is in proportion to its place in SEVERITIES."""
+    is_declared = declared != "none"
+    base = SEVERITIES.index(declared if is_declared else UNDECLARED_AIR)
 
     def change(times: float, draws: np.random.Generator) -> Document:
-        within = [name for name, intensity in INTENSITY.items() if intensity <= times * base]
-        return {"environment": air_of(within[-1])}
+        return {"environment": air_of(SEVERITIES[min(int(times * base), len(SEVERITIES) - 1)])}
 
-    is_declared = declared != "none"
     return Error("turbulence", declared if is_declared else _unknown(UNDECLARED_AIR), change, is_declared)
 
 

@@ -34,8 +34,7 @@ def identity_of(sweep: Sweep, search: str | None = None) -> Document:
     """The identity of a sweep on this machine, as in `sweep.json`."""
     file = sweep.file.model_dump(mode="json", exclude_none=True)
     asked = {key: value for key, value in file.items() if key not in _NOT_FLOWN}
-    paths = sorted(sweep.aircraft.folder.rglob("*"))  # another one of the same name is not the same
-    aircraft = files.digest(path for path in paths if path.suffix in (".xml", ".yaml"))
+    aircraft = files.digest_of_aircraft(sweep.aircraft.folder)
     flown = {"runs": sweep.flights, "base": sweep.base, "aircraft": aircraft, "search": search}
     return files.identity("sweep", {**asked, **flown})
 

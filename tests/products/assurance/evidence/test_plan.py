@@ -1,7 +1,10 @@
 """Plans: what they may name, and every mistake in a line with its place."""
 
+import shutil
+
 import pytest
 
+import beaver_ftc as bf
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.builtin import builtin_plans
 from beaver_ftc_assurance.evidence.plan import load_plan
@@ -113,3 +116,14 @@ def test_the_plans_that_come_with_the_project_are_right():
         plan = load_plan(name)
         assert plan.file.name == name
         assert all(each.text and each.clause for each in plan.file.requirements)
+
+
+def test_a_change_in_the_files_of_an_own_aircraft_changes_the_hash(write, tmp_path):
+    model = shutil.copytree(bf.aircraft("beaver").folder, tmp_path / "mine") / "beaver.xml"
+    swept = "{base: {aircraft: ./mine}, vary: {initial.airspeed_mps: {linspace: [44, 46, 2]}}}"
+    own = f"{{own: {{aircraft: ./mine}}, swept: {swept}}}"
+    text = f"flights: {own}\nrequirements: [{{id: A, over: [own, swept], expect: {{no_departure: true}}}}]"
+    sources = load_plan(write(text)).sources.values()
+    before = [source.sha256 for source in sources]
+    model.write_text(model.read_text() + "\n")
+    assert all(source.sha256 != then for source, then in zip(sources, before, strict=True))

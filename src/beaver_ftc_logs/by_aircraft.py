@@ -25,7 +25,7 @@ from beaver_ftc_logs.diagnose import LogRows, reversed_command_error
 from beaver_ftc_logs.recording import Floats, Mask, Reasons, RecordedFlight, largest_magnitude
 from beaver_ftc_logs.runs import Runs, true_runs
 from beaver_ftc_logs.samples import Samples, convert_to_si, named_angles, resample
-from beaver_ftc_logs.stepped import Replayed, error_sections, replay_samples, rows_of_replay
+from beaver_ftc_logs.stepped import Replayed, error_sections, named_since, replay_samples, rows_of_replay
 from beaver_ftc_logs.time_base import sample_column
 from beaver_ftc_logs.vehicle import Vehicle
 
@@ -312,8 +312,8 @@ def _verdict_document(
     samples, (aircraft, declared_errors) = inputs.samples, given
     surfaces = list(aircraft.surfaces)
     alarms = np.flatnonzero(rows.faulty).tolist()
-    last = replay.verdicts[alarms[-1]] if alarms else Verdict()
-    since = [k for k in alarms if replay.verdicts[k].isolated == last.isolated]
+    verdicts = [replay.verdicts[k] for k in alarms]
+    last = verdicts[-1] if alarms else Verdict()
     held = [
         f"{name} is held, {age_s:.2g} s old on average: errors declared have to cover it"
         for name, age_s in inputs.held_age_s.items()
@@ -325,7 +325,7 @@ def _verdict_document(
         **findings.span_entry(samples),
         "faulty": bool(alarms),
         "detection_s": float(samples.t_s[alarms[0]]) if alarms else None,
-        "isolation_s": float(samples.t_s[since[0]]) if last.isolated else None,
+        "isolation_s": named_since(samples.t_s[alarms], verdicts),
         "isolated": last.isolated,
         "type": last.type,
         "estimate": last.estimate,

@@ -114,6 +114,17 @@ def _sliding_maximum(x: Floats, n: int) -> Floats:
     return maximum_filter1d(x, n, axis=0, mode="constant", cval=-np.inf, origin=(n - 1) // 2)
 
 
+def named_since(t_s: Floats, verdicts: Sequence[Verdict]) -> float | None:
+    """Since when the fault that the last verdict names has been named without a break, s; None if it names
+    none. A name that was withdrawn and returned counts from its return."""
+    name: str | None = None
+    since_s: float | None = None
+    for at_s, verdict in zip(t_s, verdicts, strict=True):
+        if verdict.isolated != name:
+            name, since_s = verdict.isolated, float(at_s)
+    return since_s if name else None
+
+
 def rows_of_replay(t_s: Floats, replay: Replayed, surfaces: Sequence[str], fdi: Any) -> LogRows:
     """The rows of a flight. fdi: of the scenario, which class of faults its verdicts are of."""
     faulty = np.array([verdict.detected for verdict in replay.verdicts])

@@ -26,7 +26,7 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.studies.bench.measure import by_kind
+from beaver_ftc.studies.bench.sweep_flights import by_kind
 
 HERE = Path(__file__).resolve()
 ROOT = HERE.parents[1]

@@ -6,32 +6,28 @@ log has the guarantees of the loop: no alarm in a healthy flight, no true fault 
 outside the aircraft's envelope, after a gap, and where a number is missing.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
 from math import pi
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.documents import BadInput
+from beaver_ftc.loop import FLOW, Diagnosis
 from beaver_ftc.results import Document
 from beaver_ftc_logs import findings, trust
 from beaver_ftc_logs.diagnose import LogRows, reversed_command_error
-from beaver_ftc_logs.recording import Floats, Mask, Reasons, RecordedFlight, largest_magnitude
+from beaver_ftc_logs.recording import Column, Floats, Mask, Reasons, RecordedFlight, largest_magnitude
 from beaver_ftc_logs.runs import Runs, true_runs
 from beaver_ftc_logs.samples import Samples, convert_to_si, named_angles, resample
-from beaver_ftc_logs.stepped import Replayed, error_sections, replay_samples, rows_of_replay
+from beaver_ftc_logs.stepped import Replayed, error_sections, named_since, replay_samples, rows_of_replay
 from beaver_ftc_logs.time_base import sample_column
 from beaver_ftc_logs.vehicle import Vehicle
-
-if TYPE_CHECKING:
-    from beaver_ftc.loop import Diagnosis
-
 
 _MAX_HZ, _MIN_HZ = 1000.0, 20.0
 _STEP_JITTER = 0.1
@@ -60,17 +56,19 @@ def load_diagnosed(aircraft_name: str, scenario: str | None = None) -> Diagnosed
         return aircraft, {}
     loaded = load_scenario(scenario)
     flown, fdi = loaded.airframe.name, loaded.fdi
-    reasons = {
-        "fdi.sensor_monitor: always wants accelerations, which a log has not, allowed: never": (
-            fdi.sensor_monitor == "always"
+    refusals = (
+        (
+            fdi.sensor_monitor == "always",
+            "fdi.sensor_monitor: always wants accelerations, which a log has not, allowed: never",
         ),
-        "fdi.scheme is none, so no diagnosis would run, allowed: a scenario with a scheme": (
-            fdi.scheme == "none"
+        (
+            fdi.scheme == "none",
+            "fdi.scheme is none, so no diagnosis would run, allowed: a scenario with a scheme",
         ),
-        f"flies {flown}, allowed: a scenario of {aircraft.name}": flown != aircraft.name,
-    }
-    for reason, holds in reasons.items():
-        if holds:
+        (flown != aircraft.name, f"flies {flown}, allowed: a scenario of {aircraft.name}"),
+    )
+    for applies, reason in refusals:
+        if applies:
             raise BadInput(f"--scenario {scenario}: {reason}")
     return loaded.airframe, error_sections(loaded)
 
@@ -84,7 +82,7 @@ class LogInputs:
 
     samples: Samples
     aircraft: Aircraft
-    diagnosis: "Diagnosis"
+    diagnosis: Diagnosis
     rate_hz: float
     input_arrays: list[Floats]
     held_age_s: dict[str, float]
@@ -146,10 +144,8 @@ class LogInputs:
 
 def _read_inputs(log: RecordedFlight, vehicle: Vehicle, given: DiagnosedAircraft) -> LogInputs:
     """Read what the diagnosis is given. Raises BadInput for what the log lacks."""
-    from beaver_ftc.loop import Diagnosis
-
     aircraft, declared_errors = given
-    airspeed, flow = _flow_columns(log, vehicle, aircraft)
+    flow_columns = _flow_columns(log, vehicle, aircraft)
     changes = {"max_rate_hz": _MAX_HZ, "reference_airspeed_mps": None}
     samples = resample(log, vehicle.model_copy(update=changes))
     rate_hz = _log_rate_hz(samples)
@@ -162,19 +158,16 @@ def _read_inputs(log: RecordedFlight, vehicle: Vehicle, given: DiagnosedAircraft
             ages[name] = age_s
         return values
 
-    signals = np.column_stack([sampled_at(name) for name in (*flow[:2], airspeed, *flow[2:])])
+    flow = {name: sampled_at(column) for name, column in flow_columns.items()}
     places = [list(vehicle.surfaces).index(name) for name in aircraft.surfaces]
     full_rad = np.array([vehicle.full_deflection_rad.get(name, 1.0) for name in aircraft.surfaces])
     samples = replace(samples, commands=samples.commands[:, places], labels=samples.labels[:, places])
-    attitude = np.zeros_like(samples.rates)
+    commands, attitude = samples.commands * full_rad, np.zeros_like(samples.rates)
     if diagnosis.declared.air.moves:
-        for axis, angle in enumerate(named_angles(columns, vehicle)):
-            if angle is None:
-                reason = "is missing, allowed: its column, where fdi.bounds declares turbulence"
-                raise BadInput(f"{samples.name}: attitude.{_ATTITUDE_ANGLE_NAMES[axis]}: {reason}")
-            attitude[:, axis] = sampled_at(angle[0])
-    arrays = [samples.rates, signals, samples.commands * full_rad, attitude]
-    _check_plausible(samples.name, signals, arrays[2], aircraft)
+        angles = _attitude_columns(samples.name, columns, vehicle)
+        attitude = np.column_stack([sampled_at(name) for name in angles])
+    _check_plausible(samples.name, flow, commands, aircraft)
+    arrays = [samples.rates, np.column_stack(list(flow.values())), commands, attitude]
     inputs = LogInputs(samples, aircraft, diagnosis, rate_hz, arrays, ages, full_rad)
     if not inputs.gap_free_stretches:
         raise BadInput(
@@ -196,7 +189,7 @@ def diagnose_aircraft(
         for corrected, error in _corrected_inputs(inputs, replay):
             if corrected.rows(corrected.replay()).clears_alarm(rows):
                 raise error
-    return inputs, rows, _verdict_document(inputs, rows, replay, given)
+    return inputs, rows, _verdict_document(inputs, rows, replay, given[1])
 
 
 def _corrected_inputs(inputs: LogInputs, replay: Replayed) -> Iterator[tuple[LogInputs, BadInput]]:
@@ -217,23 +210,34 @@ def _corrected_inputs(inputs: LogInputs, replay: Replayed) -> Iterator[tuple[Log
             yield corrected, BadInput(f"{flight}: {reason}, allowed: commands as of {aircraft.name}")
 
 
-def _flow_columns(log: RecordedFlight, vehicle: Vehicle, aircraft: Aircraft) -> tuple[str, list[str]]:
-    """The columns of the airspeed and of the flow. Raises BadInput if the vehicle file or the log lacks an
-    input of the aircraft's design model."""
+def _flow_columns(log: RecordedFlight, vehicle: Vehicle, aircraft: Aircraft) -> dict[str, str]:
+    """The column of each signal of the aircraft's design model, in their order in the inputs of the
+    diagnosis. Raises BadInput if the vehicle file or the log lacks one."""
     missing = [name for name in aircraft.surfaces if name not in vehicle.surfaces]
     if missing:
         allowed = f"what the commands make of {', '.join(aircraft.surfaces)}"
         raise BadInput(f"vehicle {vehicle.name}: surfaces: no {missing[0]}, allowed: {allowed}")
     if vehicle.airspeed is None:
         raise BadInput(f"vehicle {vehicle.name}: airspeed: is missing, allowed: its column, of true airspeed")
-    names = ["alpha_rad", "beta_rad", "qdyn_pa", *aircraft.signals]
+    signals = (*FLOW, *aircraft.signals)
+    names = [name for name in signals if name != "airspeed_mps"]
     for name in names:
         if name not in vehicle.flow:
             reason = f"flow: no {name}, allowed: a column for each of {', '.join(names)}"
             raise BadInput(f"vehicle {vehicle.name}: {reason}")
-    flow = [vehicle.flow[name].column for name in names]
-    log.check_has([vehicle.airspeed.column, *flow])
-    return vehicle.airspeed.column, flow
+    columns = {"airspeed_mps": vehicle.airspeed.column}
+    columns |= {name: vehicle.flow[name].column for name in names}
+    log.check_has(list(columns.values()))
+    return {name: columns[name] for name in signals}
+
+
+def _attitude_columns(flight: str, columns: dict[str, Column], vehicle: Vehicle) -> Iterator[str]:
+    """The columns of the attitude angles. Raises BadInput for one that is missing."""
+    for name, angle in zip(_ATTITUDE_ANGLE_NAMES, named_angles(columns, vehicle), strict=True):
+        if angle is None:
+            reason = "is missing, allowed: its column, where fdi.bounds declares turbulence"
+            raise BadInput(f"{flight}: attitude.{name}: {reason}")
+        yield angle[0]
 
 
 def _log_rate_hz(samples: Samples) -> float:
@@ -247,14 +251,15 @@ def _log_rate_hz(samples: Samples) -> float:
     return rate_hz
 
 
-def _check_plausible(flight: str, signals: Floats, commands: Floats, aircraft: Aircraft) -> None:
+def _check_plausible(flight: str, flow: Mapping[str, Floats], commands: Floats, aircraft: Aircraft) -> None:
     """Raise BadInput if the size of the flow or of the commands shows another unit."""
-    for i, name in enumerate(("alpha_rad", "beta_rad")):
-        median = _median_without_nan(np.abs(signals[:, i]))
+    for name in ("alpha_rad", "beta_rad"):
+        median = _median_without_nan(np.abs(flow[name]))
         if median > 0.5 * pi:
             raise BadInput(f"{flight}: flow.{name} is {median:.3g} in the middle, allowed: rad; `unit: deg`?")
-    flies = signals[:, 2] > 0.5 * aircraft.envelope.airspeed_mps[0]
-    rho = _median_without_nan(2.0 * signals[flies, 3] / signals[flies, 2] ** 2)
+    airspeed, qdyn = flow["airspeed_mps"], flow["qdyn_pa"]
+    flies = airspeed > 0.5 * aircraft.envelope.airspeed_mps[0]
+    rho = _median_without_nan(2.0 * qdyn[flies] / airspeed[flies] ** 2)
     if flies.any() and not _DENSITIES_KG_M3[0] < rho < _DENSITIES_KG_M3[1]:
         reason = f"airspeed and flow.qdyn_pa make a density of {rho:.3g} kg/m3"
         allowed = "{:g} to {:g}".format(*_DENSITIES_KG_M3)
@@ -279,9 +284,11 @@ def _doubtful_rows(inputs: LogInputs, replay: Replayed, rows: LogRows) -> Reason
     """For each reason the rows (n,) for which there is no verdict."""
     aircraft, missing = inputs.aircraft, inputs.has_missing_value
     (low_mps, high_mps), (low, high) = aircraft.envelope.airspeed_mps, aircraft.alpha_rad
-    alpha, airspeed = inputs.input_arrays[1][:, 0], inputs.input_arrays[1][:, 2]
-    unexplained, after = np.zeros((2, len(alpha)), dtype=bool)
-    outside = ~after
+    flow = dict(zip(FLOW, inputs.input_arrays[1].T, strict=False))  # the aircraft's own signals follow
+    alpha, airspeed = flow["alpha_rad"], flow["airspeed_mps"]
+    unexplained = np.zeros(len(alpha), dtype=bool)
+    after = np.zeros_like(unexplained)
+    outside = np.ones_like(unexplained)
     for begin, end in inputs.gap_free_stretches:
         outside[begin:end] = False
         t_s = rows.t_s[begin:end]
@@ -306,14 +313,14 @@ def _doubtful_rows(inputs: LogInputs, replay: Replayed, rows: LogRows) -> Reason
 
 
 def _verdict_document(
-    inputs: LogInputs, rows: LogRows, replay: Replayed, given: DiagnosedAircraft
+    inputs: LogInputs, rows: LogRows, replay: Replayed, declared_errors: Document
 ) -> Document:
     """The document of verdict.json."""
-    samples, (aircraft, declared_errors) = inputs.samples, given
+    samples, aircraft = inputs.samples, inputs.aircraft
     surfaces = list(aircraft.surfaces)
     alarms = np.flatnonzero(rows.faulty).tolist()
-    last = replay.verdicts[alarms[-1]] if alarms else Verdict()
-    since = [k for k in alarms if replay.verdicts[k].isolated == last.isolated]
+    verdicts = [replay.verdicts[k] for k in alarms]
+    last = verdicts[-1] if alarms else Verdict()
     held = [
         f"{name} is held, {age_s:.2g} s old on average: errors declared have to cover it"
         for name, age_s in inputs.held_age_s.items()
@@ -325,7 +332,7 @@ def _verdict_document(
         **findings.span_entry(samples),
         "faulty": bool(alarms),
         "detection_s": float(samples.t_s[alarms[0]]) if alarms else None,
-        "isolation_s": float(samples.t_s[since[0]]) if last.isolated else None,
+        "isolation_s": named_since(samples.t_s[alarms], verdicts),
         "isolated": last.isolated,
         "type": last.type,
         "estimate": last.estimate,

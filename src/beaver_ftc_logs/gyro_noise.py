@@ -1,4 +1,4 @@
-"""The noise of a flight with noisier gyros than the fitted ones: its colour follows from the model.
+"""The noise model of a flight with noisier gyros than the fitted ones, from the model of the rates.
 
 A gyro's noise v adds to the measured rates, and the model predicts from these. With process noise e of
 covariance Q and gyros of variance s2 the residual is
@@ -9,7 +9,8 @@ a moving average whose autocovariance is known. The predictor of w[k] from earli
 Yule-Walker equations; a white residual is left, which no command of the past is correlated with, whatever the
 law feeds back [Ljung1999, section 13.4].
 
-Q (3, 3) (rad/s)2, s rad/s: standard deviation of a gyro, A (h, 3, 3), M = (1, -A1', ..., -Ah').
+Q (3, 3) (rad/s)2. s rad/s: standard deviation of a gyro. A (h, 3, 3), M (h + 1, 3, 3) = (1, -A1, ..., -Ah).
+Of the model, rows 3 (j - 1) to 3 j of `past` are Aj', since it multiplies from the right.
 """
 
 import numpy as np
@@ -24,7 +25,8 @@ def yule_walker_predictor(model: Model, Q: Floats, s: float, L: int) -> tuple[Fl
 
         P B = S,   rest = R[0] - S' B
 
-    P (3 L, 3 L): covariance of the earlier residuals. S (3 L, 3): covariance of these with the residual.
+    P (3 L, 3 L): covariance of the earlier residuals, (rad/s)2. S (3 L, 3): covariance of these with the
+    residual, (rad/s)2. B has no unit.
     """
     R = _autocovariance(model, Q, s, L)
     both = np.concatenate([R[:0:-1].transpose(0, 2, 1), R])  # at lags -L to L
@@ -37,8 +39,8 @@ def yule_walker_predictor(model: Model, Q: Floats, s: float, L: int) -> tuple[Fl
 
 def _autocovariance(model: Model, Q: Floats, s: float, L: int) -> Floats:
     """R[t] = E w[k] w[k-t]' for lags t = 0 ... L, (L + 1, 3, 3): s2 sum_j M[t+j] M[j]', and Q at t = 0."""
-    A = np.array(model.past)[: 3 * model.history].reshape(model.history, 3, 3)
-    M = np.concatenate([np.eye(3)[None], -A.transpose(0, 2, 1)])
+    A = np.array(model.past)[: 3 * model.history].reshape(model.history, 3, 3).transpose(0, 2, 1)
+    M = np.concatenate([np.eye(3)[None], -A])
     R = np.zeros((max(L, model.history) + 1, 3, 3))
     for t in range(len(M)):
         R[t] = s**2 * np.einsum("jab,jcb->ac", M[t:], M[: len(M) - t])

@@ -15,8 +15,8 @@ from beaver_ftc_logs.samples import Samples, resample
 from beaver_ftc_logs.time_base import median_step_s
 from beaver_ftc_logs.vehicle import Vehicle
 
-MAX_FIT_SAMPLES, _FIT_SAMPLES = 200_000, 5000
-"""Samples of a log read in parts that a fit takes at most, and how many of them in turn."""
+MAX_FIT_SAMPLES = 200_000  # that a fit takes at most of a log read in parts
+_FIT_SAMPLES = 5000  # of these in turn
 
 
 def read_vehicle_columns(path: Path, vehicle: Vehicle, reader: str | None = None) -> RecordedFlight:
@@ -78,7 +78,7 @@ def _read_flight_for_fit(path: Path, vehicle: Vehicle, reader: str | None) -> Sa
 
 
 def select_rows(samples: Samples, rows: slice) -> Samples:
-    """Some of the samples, copied."""
+    """Some of the samples, copied. Their own times `t_s` replace the stamps `log_stamps_s` of the log."""
     return _rebuilt([samples], lambda arrays: arrays[0][rows].copy())
 
 

@@ -47,13 +47,12 @@ def replay_run_log(path: Path) -> tuple[Document, Document]:
 
 def _replay_verdict(path: Path, scenario: Any, log: dict[str, Floats], verdicts: list[Any]) -> Document:
     """Times of detection and isolation, and whether metrics.json and the log of the flight say the same."""
+    from beaver_ftc_logs.stepped import named_since
+
     t_s = log["t_s"]
     detected = [float(at_s) for at_s, one in zip(t_s, verdicts, strict=True) if one.detected]
     detection_s = detected[0] if detected else None
-    # what is named at last, and since when: what was withdrawn before does not count
-    name = verdicts[-1].isolated
-    others = [k for k, one in enumerate(verdicts) if one.isolated != name]
-    isolation_s = float(t_s[max(others, default=-1) + 1]) if name else None
+    isolation_s = named_since(t_s, verdicts)
     pairs = zip(log.get("detected", []), verdicts, strict=False)
     return {
         "flight": scenario.name,
@@ -63,7 +62,7 @@ def _replay_verdict(path: Path, scenario: Any, log: dict[str, Floats], verdicts:
         "credible": {"share": 1.0, "reasons": []},
         "detection_s": detection_s,
         "isolation_s": isolation_s,
-        "isolated": name,
+        "isolated": verdicts[-1].isolated,
         "rows_that_differ": sum(bool(flag) != one.detected for flag, one in pairs),
         "left_out": _lacking_inputs(scenario),
         "as_flown": _is_as_flown(path, detection_s, isolation_s),

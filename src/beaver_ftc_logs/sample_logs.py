@@ -4,14 +4,13 @@ The wing is no real one: its rates follow the elevons with one lag, a law holds 
 change every few seconds, and the attitude follows the rates by Euler's kinematics [SL03, eq. 1.4-4].
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from math import inf
 
 import numpy as np
 
+from beaver_ftc.documents import parse_yaml
 from beaver_ftc_logs.vehicle import unused_keys_as_comments
-
-EffectivenessAtTime = Callable[[float], float]
-"""How much of the left elevon is there at a time, s."""
 
 SAMPLE_RATE_HZ, HEALTHY_FLIGHT_S, FAULTY_FLIGHT_S = 20.0, 600.0, 180.0
 WEAK_ELEVON_FROM_S, WEAK_ELEVON_EFFECTIVENESS = 90.0, 0.4
@@ -19,7 +18,9 @@ _RATE_STATE_MATRIX_PER_S = np.array([[-6.0, 0.0, 0.8], [0.0, -4.0, 0.0], [-0.4, 
 _ACCELERATION_BY_FULL_ELEVON_RAD_S2 = np.array([[22.0, 9.0, -1.2], [22.0, -9.0, -1.2]])
 """Angular acceleration by full right and left elevon, rad/s2: the right one rolls right and pitches up."""
 _TURBULENCE_DRIVING_NOISE = np.array([1.2, 0.8, 0.4])  # rad/s2 per root of a second
+_TURBULENCE_DECAY_PER_S = 2.0
 _GYRO_NOISE_RAD_S = 0.004
+_ATTITUDE_GAIN_PER_RAD, _RATE_GAIN_S_PER_RAD = 1.2, 0.15  # of the law; commands are shares of travel
 _DEMANDED_ATTITUDE_HOLD_S, _ROLL_AMPLITUDE_RAD, _PITCH_AMPLITUDE_RAD = 4.0, 0.5, 0.15
 VEHICLE_FILE_TEXT = """\
 # The vehicle file of two sample logs: which column is what, and in which unit.
@@ -36,32 +37,24 @@ surfaces:                                       # what each elevon makes of them
 attitude: {roll: roll_rad, pitch: pitch_rad}    # what the rates are checked against
 """
 
-_USED_VEHICLE_KEYS = ("name", "time", "rates", "commands", "surfaces", "attitude")
-
 
 def files() -> dict[str, str]:
     """Names and texts of the sample files."""
     return {
-        "vehicle.yaml": VEHICLE_FILE_TEXT + unused_keys_as_comments(_USED_VEHICLE_KEYS),
-        "healthy.csv": _table_text(HEALTHY_FLIGHT_S, seed=1, left_effectiveness=lambda t_s: 1.0),
-        "suspect.csv": _table_text(
-            FAULTY_FLIGHT_S,
-            seed=2,
-            left_effectiveness=lambda t_s: WEAK_ELEVON_EFFECTIVENESS if t_s >= WEAK_ELEVON_FROM_S else 1.0,
-        ),
+        "vehicle.yaml": VEHICLE_FILE_TEXT + unused_keys_as_comments(parse_yaml(VEHICLE_FILE_TEXT).data),
+        "healthy.csv": _table_text(HEALTHY_FLIGHT_S, seed=1),
+        "suspect.csv": _table_text(FAULTY_FLIGHT_S, seed=2, weak_from_s=WEAK_ELEVON_FROM_S),
     }
 
 
-def _table_text(duration_s: float, seed: int, left_effectiveness: EffectivenessAtTime) -> str:
+def _table_text(duration_s: float, seed: int, weak_from_s: float = inf) -> str:
     header = "time_ms,gyro_x,gyro_y,gyro_z,roll_cmd,pitch_cmd,roll_rad,pitch_rad"
-    rows = _simulate_rows(duration_s, np.random.default_rng(seed), left_effectiveness)
+    rows = _simulate_rows(duration_s, np.random.default_rng(seed), weak_from_s)
     return "\n".join([header, *(",".join(f"{cell:.7g}" for cell in row) for row in rows)]) + "\n"
 
 
-def _simulate_rows(
-    duration_s: float, rng: np.random.Generator, left_effectiveness: EffectivenessAtTime
-) -> Iterator[list[float]]:
-    """Row by row: time, rates in deg/s, commands, attitude."""
+def _simulate_rows(duration_s: float, rng: np.random.Generator, weak_from_s: float) -> Iterator[list[float]]:
+    """Row by row: time, rates in deg/s, commands, attitude. The left elevon is weak from weak_from_s on."""
     dt_s = 1.0 / SAMPLE_RATE_HZ
     rates = np.zeros(3)
     turbulence_rad_s2 = np.zeros(3)
@@ -70,13 +63,15 @@ def _simulate_rows(
         t_s = k * dt_s
         if k % round(_DEMANDED_ATTITUDE_HOLD_S * SAMPLE_RATE_HZ) == 0:
             demanded_rad = rng.uniform(-1.0, 1.0, 2) * [_ROLL_AMPLITUDE_RAD, _PITCH_AMPLITUDE_RAD]
-        commands = np.clip(1.2 * (demanded_rad - attitude_rad) - 0.15 * rates[:2], -1.0, 1.0)
+        by_attitude = _ATTITUDE_GAIN_PER_RAD * (demanded_rad - attitude_rad)
+        commands = np.clip(by_attitude - _RATE_GAIN_S_PER_RAD * rates[:2], -1.0, 1.0)
         measured_rates_deg_s = np.rad2deg(rates + _GYRO_NOISE_RAD_S * rng.standard_normal(3))
         yield [1000.0 * t_s, *measured_rates_deg_s, *commands, *attitude_rad]
         right_and_left = np.array([commands.sum(), commands[0] - commands[1]]) / 2.0
-        effective = right_and_left * [1.0, left_effectiveness(t_s)]
+        left_effectiveness = WEAK_ELEVON_EFFECTIVENESS if t_s >= weak_from_s else 1.0
+        effective = right_and_left * [1.0, left_effectiveness]
         gust_rad_s2 = np.sqrt(dt_s) * _TURBULENCE_DRIVING_NOISE * rng.standard_normal(3)
-        turbulence_rad_s2 += dt_s * (-2.0 * turbulence_rad_s2) + gust_rad_s2
+        turbulence_rad_s2 += dt_s * (-_TURBULENCE_DECAY_PER_S * turbulence_rad_s2) + gust_rad_s2
         by_elevons_rad_s2 = effective @ _ACCELERATION_BY_FULL_ELEVON_RAD_S2
         rates = rates + dt_s * (_RATE_STATE_MATRIX_PER_S @ rates + by_elevons_rad_s2 + turbulence_rad_s2)
         p, q, r = rates

@@ -11,7 +11,7 @@ of each healthy surface. e (n, S): effectiveness, 1 + theta, with bounds low and
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,11 +23,16 @@ from beaver_ftc_logs.model import NoiseModel
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
 from beaver_ftc_logs.regression import Innovations, split_parts
 
+if TYPE_CHECKING:
+    from beaver_ftc.aircraft import Aircraft
+    from beaver_ftc.scenario import Scenario
+
 LOSS_FAULT_TYPE = "loss_of_effectiveness"
 BOUND_WINDOW_S = 1.0
-_LOSS_ROUNDING, _ROUNDING_RAD_S2 = 1e-9, 1e-12
+_LOSS_TOLERANCE = 1e-9
+_TOLERANCE_RAD_S2 = 1e-12
 _EFFECTIVE_SAMPLE_SHARE = 0.4
-_ERROR_KEYS = ("fdi", "actuators", "design_model")  # between samples a log has no instants
+_ERROR_KEYS = ("fdi", "actuators", "design_model")  # not `substeps`: a frame of a log has one instant
 
 
 @dataclass(frozen=True)
@@ -46,13 +51,13 @@ class Replayed:
     command_gain_bounds: Floats
 
 
-def error_sections(scenario: Any) -> Document:
+def error_sections(scenario: "Scenario") -> Document:
     """Return the errors that a scenario declares, as `Diagnosis` takes it."""
     values = scenario.model_dump(mode="json", exclude_unset=True)
     return {key: values[key] for key in _ERROR_KEYS if key in values}
 
 
-def input_columns(aircraft: Any) -> tuple[list[str], ...]:
+def input_columns(aircraft: "Aircraft") -> tuple[list[str], ...]:
     """Return the columns of our log that the diagnosis reads at each sample: rates, signals, commands,
     attitude."""
     return (
@@ -66,7 +71,8 @@ def input_columns(aircraft: Any) -> tuple[list[str], ...]:
 def replay_samples(diagnosis: Diagnosis, arrays: Sequence[Floats], rate_hz: float) -> Replayed:
     """The verdicts of evenly spaced samples; arrays: as `input_columns`, (n, ...) each."""
     verdicts: list[Verdict] = []
-    nu, eta = np.empty((2, *arrays[0].shape))
+    nu = np.empty(arrays[0].shape)
+    eta = np.empty_like(nu)
     Z = np.empty((*nu.shape, arrays[2].shape[1]))
     for k, inputs in enumerate(zip(*map(np.ascontiguousarray, arrays), strict=True)):
         verdicts.append(diagnosis.step(*inputs))
@@ -97,14 +103,14 @@ def _command_gains(nu: Floats, Z: Floats) -> tuple[Floats, Floats]:
 def _explaining_losses(nu: Floats, eta: Floats, Z: Floats) -> tuple[Floats, Floats]:
     """Least and greatest theta (n, S) of a loss with |nu - theta Z| <= eta on every axis of the frame;
     least above greatest where none does."""
-    eta = eta + _ROUNDING_RAD_S2
+    eta = eta + _TOLERANCE_RAD_S2
     acts = np.abs(Z) > MIN_DIVISOR
     Z1 = np.where(acts, Z, 1.0)
     ends = np.sort(np.stack([(nu - eta) / Z1, (nu + eta) / Z1]), axis=0)
     within = np.abs(nu) <= eta
     lo = np.where(acts, ends[0], np.where(within, -1.0, 1.0)).max(axis=1)
     hi = np.where(acts, ends[1], np.where(within, 0.0, -2.0)).min(axis=1)
-    return np.maximum(lo - _LOSS_ROUNDING, -1.0), np.minimum(hi + _LOSS_ROUNDING, 0.0)
+    return np.maximum(lo - _LOSS_TOLERANCE, -1.0), np.minimum(hi + _LOSS_TOLERANCE, 0.0)
 
 
 def _sliding_maximum(x: Floats, n: int) -> Floats:
@@ -114,24 +120,46 @@ def _sliding_maximum(x: Floats, n: int) -> Floats:
     return maximum_filter1d(x, n, axis=0, mode="constant", cval=-np.inf, origin=(n - 1) // 2)
 
 
+def named_since(t_s: Floats, verdicts: Sequence[Verdict]) -> float | None:
+    """Since when the fault that the last verdict names has been named without a break, s; None if it names
+    none. A name that was withdrawn and returned counts from its return."""
+    name: str | None = None
+    since_s: float | None = None
+    for at_s, verdict in zip(t_s, verdicts, strict=True):
+        if verdict.isolated != name:
+            name, since_s = verdict.isolated, float(at_s)
+    return since_s if name else None
+
+
+def _bounds(
+    verdict: Verdict, alone_low: Floats, alone_high: Floats, surfaces: Sequence[str]
+) -> tuple[Floats, Floats]:
+    """Bounds (S,) on the effectiveness at a sample, if at most one surface is at fault. alone_low and
+    alone_high (S,): as `Replayed`."""
+    healthy = np.ones(len(surfaces))
+    if not verdict.detected:
+        return alone_low, healthy
+    suspects = verdict.candidates if verdict.isolated is None else (verdict.isolated,)
+    if not suspects or not set(suspects) <= set(surfaces):
+        return np.zeros(len(surfaces)), healthy
+    suspected = np.array([name in suspects for name in surfaces])
+    low = np.where(suspected, alone_low, 1.0)
+    if verdict.isolated is None:
+        return low, healthy
+    if verdict.type == LOSS_FAULT_TYPE:
+        return low, np.where(suspected, alone_high, 1.0)
+    return np.where(suspected, 0.0, 1.0), healthy
+
+
 def rows_of_replay(t_s: Floats, replay: Replayed, surfaces: Sequence[str], fdi: Any) -> LogRows:
     """The rows of a flight. fdi: of the scenario, which class of faults its verdicts are of."""
     faulty = np.array([verdict.detected for verdict in replay.verdicts])
     low = np.zeros_like(replay.alone_low)
-    e, high = np.ones((2, *low.shape))
-    single = fdi.is_ours and not fdi.pairs
+    high = np.ones_like(low)
+    e = np.ones_like(low)
     for k, verdict in enumerate(replay.verdicts):
-        suspects = verdict.candidates if verdict.isolated is None else (verdict.isolated,)
-        if single and not verdict.detected:
-            low[k] = replay.alone_low[k]
-        elif single and suspects and set(suspects) <= set(surfaces):
-            places = [surfaces.index(name) for name in suspects]
-            low[k] = 1.0
-            low[k, places] = replay.alone_low[k, places]
-            if verdict.isolated is not None and verdict.type == LOSS_FAULT_TYPE:
-                high[k, places] = replay.alone_high[k, places]
-            elif verdict.isolated is not None:
-                low[k, places] = 0.0
+        if fdi.is_ours and not fdi.pairs:
+            low[k], high[k] = _bounds(verdict, replay.alone_low[k], replay.alone_high[k], surfaces)
         is_loss = verdict.type in (None, LOSS_FAULT_TYPE)
         if is_loss and verdict.estimate is not None and verdict.isolated in surfaces:
             s = surfaces.index(verdict.isolated)

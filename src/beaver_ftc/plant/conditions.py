@@ -185,6 +185,11 @@ def ready(truth: Truth) -> tuple[Plant, TrimPoint]:
     return (_configured(truth) if searched and plant.n_engines else plant), point
 
 
+def forget_trims() -> None:
+    """Let every trim be searched for again."""
+    _trims.clear()
+
+
 def find_trim(scenario: Scenario) -> TrimPoint:
     """The scenario's trim, kept for its flights. Raises BadInput."""
     truth = Truth.of(scenario)

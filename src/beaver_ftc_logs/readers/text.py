@@ -217,7 +217,8 @@ def _convert_column(cells: Any, mark: str, name: str, table: TableCells, days: D
         texts = []
         for row in np.flatnonzero(~is_number.to_numpy(zero_copy_only=False)).tolist():
             text = cells[row].as_py()
-            values[row] = days.continued(seconds_of_text(text)) if is_clock(text) else seconds_of_text(text)
+            seconds = seconds_of_text(text)
+            values[row] = days.continued(seconds) if is_clock(text) else seconds
             if text and np.isnan(values[row]):
                 texts.append((table.n_rows_before + row + 1, text))
         if texts:

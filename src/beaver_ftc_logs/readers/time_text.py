@@ -11,7 +11,7 @@ _UNIT_PATTERN = re.compile(
 _UNIT_SECONDS = {
     "ms": 1e-3, "mil": 1e-3, "us": 1e-6, "mic": 1e-6, "ns": 1e-9, "min": 60.0, "s": 1.0,
 }  # fmt: skip
-_CLOCK_PATTERN = re.compile(r"(?:(\d{1,2}):)?(\d{1,2}):(\d{2}(?:[.,]\d+)?)")
+_CLOCK_PATTERN = re.compile(r"(?:(\d{1,2}):(?=[0-5]?\d:))?(\d{1,2}):((?:[0-5]\d|60)(?:[.,]\d+)?)")
 _DATE_PATTERN = re.compile(
     r"\d{4}([-/]?)\d{2}\1\d{2}[T ]\d{2}:?\d{2}(:?\d{2}([.,]\d+)?)?\s*(Z|[+-]\d{2}(:?\d{2})?)?"
 )
@@ -27,7 +27,7 @@ def seconds_of_text(text: str) -> float:
         return float(match[1]) * next(factors)
     if match := _CLOCK_PATTERN.fullmatch(text):
         hours, minutes, seconds = int(match[1] or 0), int(match[2]), float(match[3].replace(",", "."))
-        return 3600.0 * hours + 60.0 * minutes + seconds if seconds < 61.0 else nan
+        return 3600.0 * hours + 60.0 * minutes + seconds
     if _DATE_PATTERN.fullmatch(text):
         try:
             moment = datetime.fromisoformat(text.replace("/", "-").replace(",", ".").replace(" Z", "Z"))
@@ -43,10 +43,13 @@ def is_clock(text: str) -> bool:
 
 
 class DayCount:
-    """The midnights that a column of clocks has passed: a step back by more than half a day is one."""
+    """The midnights that a column of clocks has passed: a step back by more than half a day is one.
+
+    A column of minutes and seconds alone (59:59.5, 00:00.0) returns to 0 each hour. It is not continued."""
 
     def __init__(self) -> None:
-        self._days, self._last = 0, nan
+        self._days = 0
+        self._last = 0.0
 
     def continued(self, clock_s: float) -> float:
         """The time since the first midnight, s, of clocks that come one after the other."""

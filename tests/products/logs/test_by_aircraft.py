@@ -11,6 +11,7 @@ from pyarrow import csv as arrow
 from pyarrow import parquet
 
 import beaver_ftc as bf
+from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.results.exports import RECORDING_FILE_OF_KIND, write_recording
 from beaver_ftc_logs import stepped
@@ -71,6 +72,21 @@ def test_the_verdict_is_that_of_the_flight(flown, tmp_path, kind):
     assert (verdict["isolated"], verdict["type"]) == ("elevator", "loss_of_effectiveness")
     assert rows.faulty.tolist() == [int(flag) for flag in flight.log["detected"]]
     assert verdict["credible"] == {"share": 1.0, "reasons": []}
+
+
+def test_a_name_that_was_withdrawn_and_returned_counts_from_its_return(log, monkeypatch):
+    def replayed(diagnosis, arrays, rate_hz):
+        t_s = np.arange(len(arrays[0])) / rate_hz
+        names = np.where((t_s >= 6.5) & (t_s < 7.5), "rudder", "elevator")
+        verdicts = [
+            Verdict(detected=at_s >= 6.0, isolated=str(name) if at_s >= 6.0 else None)
+            for at_s, name in zip(t_s, names, strict=True)
+        ]
+        healthy = np.ones((len(t_s), 4))
+        return stepped.Replayed(verdicts, 0.0 * healthy, healthy, healthy[0], healthy[0])
+
+    monkeypatch.setattr("beaver_ftc_logs.by_aircraft.replay_samples", replayed)
+    assert diagnose_aircraft(*log, BEAVER)[2]["isolation_s"] == pytest.approx(7.5, abs=0.02)
 
 
 def test_bounds_hold_but_for_the_second_in_which_the_fault_begins(log):

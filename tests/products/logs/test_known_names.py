@@ -95,7 +95,9 @@ def test_times_in_words_are_seconds(text, seconds):
     assert seconds_of_text(text) == pytest.approx(seconds, abs=1e-9)
 
 
-@pytest.mark.parametrize("text", ["", "AUTO", "3.2 deg", "12:61:99", "1970-13-01T00:00:00", "7 ticks"])
+@pytest.mark.parametrize(
+    "text", ["", "AUTO", "3.2 deg", "12:61:99", "12:75:00", "1970-13-01T00:00:00", "7 ticks"]
+)
 def test_other_words_are_no_time(text):
     assert np.isnan(seconds_of_text(text))
 
@@ -105,6 +107,13 @@ def test_a_clock_that_passes_midnight_goes_on(tmp_path):
     path.write_text("UTC,p\n23:59:59.5,1\n23:59:59.9,2\n00:00:00.3,3\n00:00:00.7,4\n")
     stamps = read_flight(path, None, ("UTC", "s")).columns["p"].t_s
     np.testing.assert_allclose(np.diff(stamps), 0.4, atol=1e-9)
+
+
+def test_a_cell_that_is_no_clock_does_not_hide_midnight(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("UTC,p,clock\n0,1,23:59:59\n1,2,23:59:75\n2,3,00:00:01\n")
+    clock = read_flight(path, None, ("UTC", "s")).columns["clock"].values
+    np.testing.assert_array_equal(clock, [86399.0, np.nan, 86401.0])
 
 
 def test_a_time_that_cannot_be_read_is_quoted_and_warns_of_nothing(tmp_path, recwarn):

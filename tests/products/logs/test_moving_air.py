@@ -92,6 +92,15 @@ def test_columns_are_compared_in_white(moving, colour):
         trust.refuse_columns(replace(flight, commands=flight.commands * [-1.0, 1.0]), moving)
 
 
+def test_gyro_noise_enters_through_the_whole_matrix_of_the_past():
+    """Without process noise the residual is w[k] = v[k] - A v[k-1], with the variance s2 (1 + A A')."""
+    A = np.array([[0.5, 0.2, 0.0], [0.0, 0.3, -0.1], [0.1, 0.0, 0.4]])
+    model = small.model(history=1, past=A.T.tolist())
+    before, noise = gyro_noise.yule_walker_predictor(model, np.zeros((3, 3)), 0.05, 40)
+    np.testing.assert_allclose(noise, 0.05**2 * np.eye(3), atol=1e-12)
+    np.testing.assert_allclose(before[:3].T, -A, atol=1e-9)
+
+
 @pytest.mark.parametrize("a", [0.9, 0.3])
 def test_the_colour_of_gyro_noise_follows_from_the_model(a):
     """w[k] = e[k] + v[k] - a v[k-1] is MA(1): its innovations have the variance S = g0 - g1^2 / S, and the

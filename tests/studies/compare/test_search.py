@@ -34,7 +34,7 @@ def test_the_lowest_cost_is_found_within_the_budget(best):
     found = search(
         lambda values: tried.append(values) or cost(values), ranges, dict.fromkeys(best, 1.0), 60, 7, 0
     )
-    assert found.values == pytest.approx(best, rel=0.25)
+    assert found.found == pytest.approx(best, rel=0.25)
     assert found.cost < found.start_cost
     assert 60 - len(best) <= len(tried) <= 60
     assert found.trials == len(tried)
@@ -43,7 +43,7 @@ def test_the_lowest_cost_is_found_within_the_budget(best):
 
 def test_a_seed_makes_the_same_search_again_and_another_one_another():
     def values(seed):
-        return search(bowl(a=3.0, b=0.4), {"a": WIDE, "b": WIDE}, {"a": 1.0, "b": 1.0}, 30, seed, 1).values
+        return search(bowl(a=3.0, b=0.4), {"a": WIDE, "b": WIDE}, {"a": 1.0, "b": 1.0}, 30, seed, 1).found
 
     assert values(1) == values(1) != values(2)
 
@@ -68,22 +68,22 @@ def test_a_search_is_restarted_until_none_gains():
     for found in whole:
         assert found.settled
         assert SETTLED <= found.restarts < 20
-    again = [search(valley, found.ranges, found.values, 50, 1234, 0).cost / found.cost for found in whole]
+    again = [search(valley, found.ranges, found.found, 50, 1234, 0).cost / found.cost for found in whole]
     assert np.mean(again) >= 0.85
     assert not any(found.settled for found in once)
 
 
 def test_a_parameter_on_which_nothing_depends_stays_off_the_limits():
     found = search(bowl(a=3.0), {"a": WIDE, "idle": WIDE}, {"a": 1.0, "idle": 900.0}, 60, 1, 0)
-    assert found.values["a"] == pytest.approx(3.0, rel=0.3)
-    assert not on_edge(found.values, found.ranges)
+    assert found.found["a"] == pytest.approx(3.0, rel=0.3)
+    assert not on_edge(found.found, found.ranges)
     assert found.widened == ()
 
 
 def test_a_range_that_holds_the_result_at_its_limit_is_widened():
     narrow = Range(0.1, 10.0)
     found = search(bowl(a=30.0), {"a": narrow}, {"a": 1.0}, 40, 1, 0)
-    assert found.values["a"] == pytest.approx(30.0, rel=0.1)
+    assert found.found["a"] == pytest.approx(30.0, rel=0.1)
     assert (found.widened, found.ranges["a"].low) == (("a",), 0.1)
     assert found.start_cost == pytest.approx(1.0 + log(30.0) ** 2)
     assert found.ranges["a"].high == pytest.approx(100.0, rel=1e-3)

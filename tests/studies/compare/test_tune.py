@@ -149,7 +149,10 @@ def test_ranges_that_are_none_are_refused(monkeypatch, given):
 def test_nothing_to_tune_and_no_file_are_said(tmp_path):
     with pytest.raises(BadInput, match="nothing to tune"):
         tune([], Search(5, 1, 0), 1, None)
-    (tmp_path / "a.json").write_text('{"grades": {"windy": {}}}')
-    for name in ("a.json", "nowhere.json"):
+    path = tmp_path / "a.json"
+    for grades in ({"windy": {}}, ["exact"], {"exact": 5}, {"exact": {"detector": {}}}, None):
+        path.write_text(json.dumps({"grades": grades} if grades else {}))
         with pytest.raises(BadInput, match="allowed: a file that compare --tune wrote"):
-            read_tuned(tmp_path / name)
+            read_tuned(path)
+    with pytest.raises(BadInput, match="allowed: a file that compare --tune wrote"):
+        read_tuned(tmp_path / "nowhere.json")

@@ -3,19 +3,9 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.scenario.diagnosis import EnginePower
 from beaver_ftc.studies.matrix import pitch_lost
-from beaver_ftc.studies.matrix.pitch_lost import (
-    LAWS,
-    LOST,
-    PitchCase,
-    about_trim,
-    fly_case,
-    loop_response,
-    margins,
-    run_pitch_lost,
-    with_law,
-)
+from beaver_ftc.studies.matrix.pitch_lost import LAWS, LOST, PitchCase, fly_case, run_pitch_lost
+from beaver_ftc.studies.matrix.power_margins import about_trim, loop_response, margins, with_law
 from samples import AT_NIGHT
 
 BY_DAY = ("elevator +1 deg", "elevator -4 deg", "elevator floats", "flap 20 deg down")
@@ -52,11 +42,11 @@ def test_a_row_is_the_same_flown_alone(found):
 @pytest.mark.parametrize("airspeed_mps", [32.0, 34.0])
 def test_the_gain_margin_is_where_the_closed_loop_leaves_stability(airspeed_mps):
     A, power = about_trim(airspeed_mps)[0].A, about_trim(airspeed_mps)[1]
-    least_db = margins(airspeed_mps, EnginePower())["gain_margin_db"]
+    least_db = margins(airspeed_mps)["gain_margin_db"]
 
     def stable(gain_db):
         factor = 10 ** (gain_db / 20)
-        F, b, k = with_law(A, factor * power, EnginePower())
+        F, b, k = with_law(A, factor * power)
         return np.linalg.eigvals(F + np.outer(b, k)).real.max() < 0.0
 
     assert stable(0.98 * least_db)
@@ -65,15 +55,15 @@ def test_the_gain_margin_is_where_the_closed_loop_leaves_stability(airspeed_mps)
 
 def test_the_phase_margin_is_the_rotation_that_meets_minus_one():
     model, power, _ = about_trim(32.0)
-    response = loop_response(*with_law(model.A, power, EnginePower()))
-    rotation = np.exp(1j * np.deg2rad(margins(32.0, EnginePower())["phase_margin_deg"]))
+    response = loop_response(*with_law(model.A, power))
+    rotation = np.exp(1j * np.deg2rad(margins(32.0)["phase_margin_deg"]))
     assert min(np.abs(1.0 + response * turn).min() for turn in (rotation, rotation.conjugate())) < 0.01
     assert np.abs(1.0 + response).min() > 0.3
 
 
 def test_margins_over_the_validated_envelope():
     for airspeed_mps in (34.0, 38.0, 45.0, 52.0, 55.0):
-        found = margins(airspeed_mps, EnginePower())
+        found = margins(airspeed_mps)
         alone, damped = found["phugoid_damping"]
         assert alone < 0.1
         assert damped > 0.4

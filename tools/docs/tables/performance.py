@@ -4,7 +4,8 @@ import re
 import subprocess
 import sys
 
-from beaver_ftc.studies.bench.measure import bench, by_kind
+from beaver_ftc.studies.bench.measure import bench
+from beaver_ftc.studies.bench.sweep_flights import by_kind
 from beaver_ftc.studies.present.tables import markdown_table
 from tools.docs.pages import ROOT
 from tools.docs.tables import table_of

@@ -2,12 +2,10 @@
 
 import platform
 import tempfile
-import time
 from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import dataclass
 from importlib.metadata import version
-from operator import itemgetter
 from pathlib import Path
 from typing import Annotated
 
@@ -15,13 +13,11 @@ import numpy as np
 import typer
 
 from beaver_ftc.commands import Reporter, StudyCommand
-from beaver_ftc.loop.loop import Loop, fly
-from beaver_ftc.plant import addresses, conditions
+from beaver_ftc.loop.loop import fly
+from beaver_ftc.plant import addresses
 from beaver_ftc.results.log import ParquetLog
-from beaver_ftc.results.metrics import measure
 from beaver_ftc.results.model import Document
 from beaver_ftc.scenario.schema import Scenario, load_scenario
-from beaver_ftc.scenario.sweeps import Sweep, load_sweep
 from beaver_ftc.studies.bench.contenders import (
     Bare,
     ClosedLoop,
@@ -32,11 +28,10 @@ from beaver_ftc.studies.bench.contenders import (
     take_over,
 )
 from beaver_ftc.studies.bench.parts import PARTS, frame_with
+from beaver_ftc.studies.bench.shown import text_of
 from beaver_ftc.studies.bench.straightforward import Straightforward
+from beaver_ftc.studies.bench.sweep_flights import by_kind
 from beaver_ftc.studies.engine.processes import cores, environment
-from beaver_ftc.studies.present.tables import aligned
-from beaver_ftc.studies.sweep.one_flight import row_of, scenario_of
-from beaver_ftc.studies.sweep.sampling import Plan
 
 SCENARIO = "elevator-partial-loss"
 BEFORE_ALARM_S, AFTER_ALARM_S = 1.0, 14.0  # the fault strikes at 12 s
@@ -117,7 +112,7 @@ def _alternatives(scenario: Scenario, rounds: int) -> Document:
     at_s = AFTER_ALARM_S
     contenders: dict[str, Contender] = {
         "straightforward": Straightforward(scenario, at_s, FRAMES),
-        "python_detector": ClosedLoop(scenario, at_s, InnovationDetector()),
+        "python_detector": ClosedLoop(scenario, at_s, detector=InnovationDetector()),
         "python_law": ClosedLoop(scenario, at_s, law=ProportionalInversion()),
         "python_detector_and_law": ClosedLoop(scenario, at_s, InnovationDetector(), ProportionalInversion()),
     }
@@ -143,99 +138,6 @@ def _whole_flights(scenario: Scenario, rounds: int) -> Document:
     return {"frames": frames, **_against(bare, loop), **figures}
 
 
-OF_WHOLE = ("bare_ms", "frames_ratio", "flight_ratio", "own_part_us")
-STAGES = ("scenario", "aircraft, trim, record", "frames", "metrics and row")
-# kind -> a built-in sweep, and what its flights have besides
-KINDS: dict[str, tuple[str, Document]] = {
-    "published": ("elevator-effectiveness", {}),
-    "class all": (
-        "elevator-effectiveness",
-        {"fdi.fault_class": "all", "fdi.sensor_monitor": "never"},
-    ),
-    "real air, sensors, statistical": ("robust-elevator-all", {}),
-    "class all, every error declared": (
-        "robust-elevator-all",
-        {
-            "fdi.fault_class": "all",
-            "fdi.sensor_monitor": "always",
-            "sensors": "consumer-grade",
-            "fdi.bounds.sensors": "consumer-grade",
-            "fdi.bounds.inertia": 0.05,
-            "fdi.bounds.deflection_deg": 0.2,
-        },
-    ),
-    "autopilot": (
-        "elevator-effectiveness",
-        {"autopilot": {"altitude_m": [{"hold": True}], "heading_deg": [{"hold": True}]}},
-    ),
-    "one beginning": ("elevator-effectiveness", {}),
-}
-ONE_BEGINNING = "one beginning"  # its flights begin alike, as those of `matrix`: one trim for all
-Taken = tuple[np.ndarray, int, float]
-
-
-def by_kind(rounds: int) -> dict[str, Document]:
-    """What a flight of each kind costs, all kinds in each round.
-
-    Processor time: `parts_ms` by part, `bare_ms` for JSBSim's frames alone, `frames_ratio` and `flight_ratio`
-    to those, `frame_us`, a frame of the loop, and `own_part_us`, what it adds to one of JSBSim. Ratios are
-    formed within a round; all are medians over the rounds.
-    """
-    sweeps = {kind: load_sweep(name) for kind, (name, _) in KINDS.items()}
-    seen: dict[str, list[Taken]] = {kind: [] for kind in KINDS}
-    for run in range(-1, rounds):
-        for kind, (_, changes) in KINDS.items():
-            taken = _flown(sweeps[kind], changes, max(run, 0), kind == ONE_BEGINNING)
-            if run >= 0:  # the first is the warm-up
-                seen[kind].append(taken)
-    return {kind: _medians(rows) for kind, rows in seen.items()}
-
-
-def _flown(sweep: Sweep, changes: Document, run: int, alike: bool = False) -> Taken:
-    """Seconds of each part of one flight, JSBSim frames flown, and seconds of as many by JSBSim alone.
-
-    All that `sweep` does for a flight. Its trim is a new one each time, or kept where flights begin alike.
-    """
-    (assignment,) = Plan(sweep).assignments([0 if alike else run])
-    conditions._trims.clear()
-    if alike:
-        conditions.find_trim(scenario_of(sweep, assignment))
-    marks = [time.process_time()]
-    scenario = scenario_of(sweep, assignment)
-    marks.append(time.process_time())
-    if changes:  # not a part of a flight that a sweep makes
-        scenario = scenario.with_(changes)
-        marks = [marks[0] + time.process_time() - marks[1], time.process_time()]
-    loop = Loop(scenario)
-    marks.append(time.process_time())
-    for _ in loop.chunks():
-        pass
-    marks.append(time.process_time())
-    flight = loop.land()
-    row_of(assignment, measure(flight), flight)
-    marks.append(time.process_time())
-    alone, runs = loop.plant.run, flight.frames * scenario.substeps
-    began = time.process_time()
-    for _ in range(runs):
-        alone()
-    alone_s = time.process_time() - began
-    loop.release()
-    return np.diff(marks), runs, alone_s
-
-
-def _medians(rows: list[Taken]) -> Document:
-    parts, runs, alone = (np.array(column) for column in zip(*rows, strict=True))
-    frames_s = parts[:, STAGES.index("frames")]
-    return {
-        "parts_ms": dict(zip(STAGES, (1e3 * np.median(parts, axis=0)).round(3).tolist(), strict=True)),
-        "bare_ms": round(1e3 * float(np.median(alone)), 3),
-        "frames_ratio": round(float(np.median(frames_s / alone)), 3),
-        "flight_ratio": round(float(np.median(parts.sum(axis=1) / alone)), 3),
-        "frame_us": round(1e6 * float(np.median(frames_s / runs)), 3),
-        "own_part_us": round(1e6 * float(np.median((frames_s - alone) / runs)), 3),
-    }
-
-
 class WholeFlight:
     """`fly`, with the log in memory or, given a file, on disk."""
 
@@ -249,58 +151,6 @@ class WholeFlight:
         """Fly the scenario, which must last that many frames."""
         with ParquetLog(self._log) if self._log else nullcontext() as log:
             fly(self._scenario, log)
-
-
-_ALTERNATIVES = {
-    "straightforward": "properties by name, estimators in NumPy",
-    "python_detector": "a detector in Python plugged in",
-    "python_law": "a law in Python plugged in",
-    "python_detector_and_law": "both",
-    "properties_through_python": "properties through JSBSim's Python binding",
-}
-
-
-def text_of(document: Document) -> str:
-    """The document of `bench` as text."""
-    whole, sweeps = document["whole_flight"], document["sweep_flights"]
-    sections = {
-        "after the alarm: every estimator, the network and the fault-tolerant law at work": _rows(document),
-        "before the alarm": _rows(document["before_alarm"]),
-        "other ways, after the alarm": [
-            _row(_ALTERNATIVES[name], figures) for name, figures in document["alternatives"].items()
-        ],
-        f"whole flights of {whole['frames']} frames, loading and trim included": [
-            *_rows(whole),
-            _row("with a log file", whole | {"ratio": whole["with_log_file_ratio"]}, "with_log_file_us"),
-        ],
-        "flights of 15 s in a sweep, ms of processor time; x: of what JSBSim alone takes for its frames": [
-            ["", *STAGES, "frames alone", "frames, x", "flight, x", "us added a frame"],
-            *(
-                [kind, *(f"{x:.3f}" for x in (*of["parts_ms"].values(), *itemgetter(*OF_WHOLE)(of)))]
-                for kind, of in sweeps.items()
-            ),
-        ],
-    }
-    return "\n".join([
-        "{processor}, {cores} cores, Python {python}, JSBSim {jsbsim}".format(**document["machine"]),
-        "us a frame: medians [quartiles] over {rounds} rounds of {frames_a_round} frames".format(**document),
-        *(f"\n{title}\n{aligned(rows)}" for title, rows in sections.items()),
-    ])  # fmt: skip
-
-
-def _rows(phase: Document) -> list[list[str]]:
-    """The bare aircraft, the parts of the loop if they were timed, and the loop."""
-    return [
-        _row("bare aircraft", phase | {"ratio": 1.0}, "bare_us"),
-        *(_row(f"  + {name}", part) for name, part in phase.get("parts", {}).items()),
-        _row("closed loop", phase, "closed_loop_us"),
-    ]
-
-
-def _row(what: str, figures: Document, us: str = "us") -> list[str]:
-    low, high = figures[f"{us}_quartiles"]
-    adds = f"{figures['adds_us']:+.3f}" if "adds_us" in figures else ""
-    return [what, f"{figures[us]:.3f}", f"[{low:.3f}, {high:.3f}]", f"{figures['ratio']:.3f} x", adds]
 
 
 @dataclass(frozen=True)

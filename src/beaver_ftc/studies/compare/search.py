@@ -38,7 +38,7 @@ Cost = Callable[[Values], float]
 
 @dataclass(frozen=True)
 class Found:
-    """The result of a search: the cost at the start, the lowest, its values, the ranges, trials made.
+    """The result of a search: the cost at the start, the lowest, the values found, the ranges, trials made.
 
     restarts: searches after the first. settled: whether the last of them gained nothing; if not, the budget
     ended the search, and a longer one may find more.
@@ -46,7 +46,7 @@ class Found:
 
     start_cost: float
     cost: float
-    values: Values
+    found: Values
     ranges: dict[str, Range]
     widened: tuple[str, ...]
     trials: int

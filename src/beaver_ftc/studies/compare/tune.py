@@ -4,8 +4,9 @@ The same search (search.py) with the same number of trials from the same seed, b
 flights of the sets `calibration-GRADE`, whose seeds are in no set that is compared. Each grade of flights is
 tuned by itself: exact sensors and ideal actuators; actuators that lag; errors of sensors and air. What may be
 tuned is `tunable` in plugins.yaml, or in the class of a plug-in. A method keeps the values that it starts
-with unless the search finds some that cost `LEAST_GAIN` less. Each is tuned again on other draws (gain.py)
-until that gains no more than `LEAST_GAIN`. Both rules are the same for ours and for rivals.
+with unless the search finds some that cost `LEAST_GAIN` less. The rule is the same for ours and for rivals.
+With `Search.draw`, a method is tuned on other draws, and its row has what that gains (gain.py). The record of
+the values that ship, benchmarks/tuning.json, lists the gains of these later searches as `again`.
 
 Two files are written: `tuned.json` has the values to fly with, and `tuning.json` how they were found.
 """
@@ -16,9 +17,11 @@ from dataclasses import asdict, dataclass
 from functools import partial
 from operator import attrgetter
 from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import TypeAdapter
 
 from beaver_ftc.diagnosis.rivals import (
-    FLIGHT_GRADES,
     TUNED_FILE_KEY_BY_PLUGIN_GROUP,
     load_tuned_values,
     tuned_values,
@@ -45,6 +48,12 @@ from beaver_ftc.studies.present.tables import Columns, aligned, tabulated
 PROCEDURE = "beaver-ftc compare --tune; docs/results/benchmark.md"
 LEAST_GAIN = 0.05
 NAME, RECORD = "tuned.json", "tuning.json"
+_GRADES: TypeAdapter[Any] = TypeAdapter(
+    dict[
+        Literal["exact", "actuators", "errors"],
+        dict[Literal["detectors", "laws"], dict[str, dict[str, float]]],
+    ]
+)
 OF_STATISTICAL = {
     "fdi.statistical.false_alarms_per_h": Range(1e-9, 3600.0),
     "fdi.statistical.misnaming": Range(1e-9, 0.49),
@@ -69,7 +78,7 @@ class Method:
         return {key: shipped.get(key, self._default(key, of)) for key, of in self.ranges().items()}
 
     def _default(self, key: str, of: Range) -> float:
-        if "." in key:  # the statistical detector is there if asked for
+        if self.name == STATISTICAL:  # no default of a scenario, so it is asked for here
             return float(attrgetter(key)(Scenario(name="defaults", fdi={"statistical": {}})))
         if is_compiled(self.group, self.name):
             return float(options_of(self.group, self.name)[key]["default"])
@@ -105,13 +114,18 @@ def tune(methods: Sequence[Method], how: Search, workers: int, progress: Progres
     rows = fly_all(partial(tune_method, how=how), methods, workers, progress)
     grades: Document = {}
     for method, row in zip(methods, rows, strict=True):
-        of_kind = grades.setdefault(method.grade, {}).setdefault(
-            TUNED_FILE_KEY_BY_PLUGIN_GROUP[method.group], {}
-        )
-        of_kind[method.name] = row["values"]
-    said = {"procedure": PROCEDURE, **asdict(how)}
-    del said["most"]  # which the numbers of flights in the rows say
-    return said | {"grades": grades, "methods": rows}
+        methods_of_kind = grades.setdefault(method.grade, {}).setdefault(row["kind"], {})
+        methods_of_kind[method.name] = row["values"]
+    return {
+        "procedure": PROCEDURE,
+        "trials": how.trials,
+        "seed": how.seed,
+        "restarts": how.restarts,
+        "draw": how.draw,
+        "draws": how.draws,
+        "grades": grades,
+        "methods": rows,
+    }
 
 
 def tune_method(method: Method, how: Search) -> Document:
@@ -123,19 +137,19 @@ def tune_method(method: Method, how: Search) -> Document:
     start = method.start()
     found = search(cost, method.ranges(), start, how.trials, how.seed, how.restarts)
     gains = found.cost < (1.0 - LEAST_GAIN) * found.start_cost
-    values = found.values if gains else start
+    values = found.found if gains else start
     row: Document = {
         "grade": method.grade,
         "kind": TUNED_FILE_KEY_BY_PLUGIN_GROUP[method.group],
         "name": method.name,
-        **{"found" if key == "values" else key: value for key, value in asdict(found).items()},
+        **asdict(found),
         "values": values,
         "flights": len(flights(*on)),
     }
     if isinstance(cost, LawCost):
         row["gain_margin_db"], row["phase_margin_deg"] = least_margins(cost.margins(values))
     if how.draw and min(found.cost, found.start_cost) < INADMISSIBLE:
-        row |= gain_of(method.group, method.name, method.grade, (start, found.values), how.draw + how.draws)
+        row |= gain_of(method.group, method.name, method.grade, (start, found.found), how.draw + how.draws)
     return row
 
 
@@ -151,10 +165,9 @@ def write_tuned(document: Document, folder: Path) -> Path:
 def read_tuned(path: Path) -> Document:
     """The values in a file that `compare --tune` wrote. Raises BadInput."""
     try:
-        grades: Document = read_json(path)["grades"]
-        assert set(grades) <= set(FLIGHT_GRADES)
+        grades: Document = _GRADES.validate_python(read_json(path)["grades"], strict=True)
         return grades
-    except (OSError, ValueError, KeyError, TypeError, AssertionError) as error:
+    except (OSError, ValueError, KeyError, TypeError) as error:
         raise BadInput(f"{path}: cannot be read, allowed: a file that compare --tune wrote") from error
 
 
@@ -179,7 +192,11 @@ def _remarks(row: Document) -> Iterator[str]:
 
 
 def _cost(cost: float) -> str:
-    return "cannot fly" if cost >= FAILED else "inadmissible" if cost >= INADMISSIBLE else f"{cost:.3f}"
+    if cost >= FAILED:
+        return "cannot fly"
+    if cost >= INADMISSIBLE:
+        return "inadmissible"
+    return f"{cost:.3f}"
 
 
 def _if_any(form: Callable[[float], str], key: str) -> Callable[[Document], str]:

@@ -1,16 +1,13 @@
 """The size found in a share of flights, by variants of a scenario: as sentences, a table and files."""
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
+from math import inf
 
 from beaver_ftc.results.metrics import NEAR_THRESHOLD_SHARE
 from beaver_ftc.results.model import Document
 from beaver_ftc.studies.detectability.shown import NAME, table
 from beaver_ftc.studies.present.page import Makers, Part, study_files
 from beaver_ftc.studies.present.tables import percent
-
-if TYPE_CHECKING:
-    pass
 
 
 def page_of(document: Document) -> tuple[str, Sequence[Part]]:
@@ -58,19 +55,16 @@ def _size_sentences(document: Document) -> Iterator[str]:
             "loss: the size found then measures the uncertainty that the scenario flies with, not the "
             "diagnosis."
         )
-    for count, what in (
-        (document["false_alarms"], "have an alarm before the loss"),
-        (document["failed"], "cannot be flown to the end"),
-    ):
-        if count:
-            yield f"{count} flights with a total loss {what}: these count as not found."
-    for lead, tried, references in (
-        ("What limits it most", "nothing that was left out alone", False),
-        ("Which reference would help", "none of those that were tried", True),
-    ):
-        best = _best(document, references)
-        none = f"{tried} makes a difference outside of the intervals"
-        yield f"{lead}: {none if best is None else _effect(best)}."
+    not_found = "these count as not found."
+    if count := document["false_alarms"]:
+        yield f"{count} flights with a total loss have an alarm before the loss: {not_found}"
+    if count := document["failed"]:
+        yield f"{count} flights with a total loss cannot be flown to the end: {not_found}"
+    none = "makes a difference outside of the intervals"
+    limit = _effect(_best(document, references=False), f"nothing that was left out alone {none}")
+    yield f"What limits it most: {limit}."
+    helpful = _effect(_best(document, references=True), f"none of those that were tried {none}")
+    yield f"Which reference would help: {helpful}."
 
 
 def _is_better(other: Document, document: Document) -> bool:
@@ -89,10 +83,13 @@ def _best(document: Document, references: bool) -> Document | None:
         for row in document["compared"]
         if ("reference" in row["variant"]) is references and _is_better(row, document)
     ]
-    return min(some, key=lambda row: (row["found"]["size"] or 2.0, -row["total_loss"]["value"]), default=None)
+    return min(some, key=lambda row: (row["found"]["size"] or inf, -row["total_loss"]["value"]), default=None)
 
 
-def _effect(row: Document) -> str:
+def _effect(row: Document | None, none: str) -> str:
+    """What a variant would come to; `none` if there is no such variant."""
+    if row is None:
+        return none
     found, total = row["found"], row["total_loss"]
     if found["size"] is None:
         return f"{row['variant']}, a total loss is found in {percent(total['value'])} of flights"

@@ -1,7 +1,6 @@
 """Elevator and flap lost at once: the same flights with engine power on pitch and without.
 
-Beside them engine power as a pitch effector about the trim, linear: what it is worth, and the margins of its
-law.
+The report also has the linear margins of engine power as a pitch effector (power_margins.py).
 """
 
 from collections.abc import Sequence
@@ -12,29 +11,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from beaver_ftc.control.laws.loop_design import margins as margins_of
 from beaver_ftc.loop.loop import fly
-from beaver_ftc.plant.adapter import Plant
-from beaver_ftc.plant.linear import LinearModel, differences, engine_slope
-from beaver_ftc.plant.trim import trim
 from beaver_ftc.results.log import Columns
 from beaver_ftc.results.metrics import as_json, metrics
 from beaver_ftc.results.model import Document
-from beaver_ftc.scenario.airframe import Initial
-from beaver_ftc.scenario.diagnosis import EnginePower
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
-from beaver_ftc.studies.linear_systems import zeros
 from beaver_ftc.studies.matrix.fault_matrix import AIRSPEEDS_MPS, AT_S, REFERENCE, UNCERTAINTY, trimmed_deg
+from beaver_ftc.studies.matrix.power_margins import margins
 from beaver_ftc.studies.present.page import Makers
-from beaver_ftc.studies.present.tables import aligned, finite, tabulated
+from beaver_ftc.studies.present.tables import aligned, tabulated
 
 NAME = "pitch-lost"
 DURATION_S = 100.0
 COLUMNS = ("t_s", "q_rad_s", "theta_rad", "phi_rad", "airspeed_mps", "envelope_valid")
-STATES = ("airspeed", "alpha", "q", "theta")
-FREQUENCIES_RAD_S = np.geomspace(1e-3, 1e2, 20001)
-SLOW_RAD_S = 1.0  # the phugoid is slower than this, the short period faster
 SETTLED_S = 30.0  # from here on the swing is judged: what the fault itself throws off is over
 LAWS = ("fault-tolerant-published", "oracle-published")
 
@@ -116,67 +106,12 @@ def document_of(rows: list[Document], airspeeds_mps: Sequence[float]) -> Documen
     """All flights, the linear margins, and whether power lost an aircraft that was kept without it."""
     harmed = [row for row in rows if row["with"]["departure"] and not row["without"]["departure"]]
     return {
-        "margins": [margins(V, EnginePower()) for V in airspeeds_mps],
+        "margins": [margins(V) for V in airspeeds_mps],
         "flights": rows,
         "saved": sum(bool(row["without"]["departure"] and not row["with"]["departure"]) for row in rows),
         "harmed": len(harmed),
         "passed": not harmed,
     }
-
-
-def margins(airspeed_mps: float, config: EnginePower) -> Document:
-    """Of the loop through engine power at one airspeed, elevator and flap standing still.
-
-    phugoid_damping: without and with the law. gain_margin_db, phase_margin_deg: the least of all crossings,
-    null where there is none. attitude_zero_rad_s: the right-half-plane zero from power to attitude.
-    worth_deg: pitching moment of the throttle closed and opened, in deg of elevator.
-    """
-    model, power, trim_inhg = about_trim(airspeed_mps)
-    A, q, (F, b, k) = model.A, STATES.index("q"), with_law(model.A, power, config)
-    upper_db, lower_db, phase_deg = margins_of(loop_response(F, b, k))
-    ends = np.array([config.lowest_inhg, config.highest_inhg]) - trim_inhg
-    return {
-        "airspeed_mps": airspeed_mps,
-        "phugoid_damping": [_phugoid_damping(system) for system in (A, F + np.outer(b, k))],
-        "gain_margin_db": finite(float(min(upper_db, lower_db))),
-        "phase_margin_deg": finite(float(phase_deg)),
-        "attitude_zero_rad_s": float(zeros(A, power, STATES.index("theta")).real.max()),
-        "worth_deg": np.rad2deg(ends * power[q] / model.B[q, model.inputs.index("elevator")]).tolist(),
-    }
-
-
-def about_trim(airspeed_mps: float) -> tuple[LinearModel, np.ndarray, float]:
-    """The four longitudinal states, the column (4,) of manifold pressure in inHg, and its trim."""
-    plant, point = Plant(100), trim(airspeed_mps, Initial().altitude_m)
-    model = differences(plant, point)
-    rows = [model.states.index(name) for name in STATES]
-    return model.of(STATES), engine_slope(plant, point)[rows], point.manifold_pressure_inhg
-
-
-def with_law(A: np.ndarray, power: np.ndarray, config: EnginePower) -> tuple[np.ndarray, ...]:
-    """The aircraft, the smoothed airspeed, its slow mean and the attitude missed: system matrix F (7, 7), the
-    column b (7,) of manifold pressure in inHg, and the pressure k (7,) that the law asks for."""
-    F, b, k = np.zeros((7, 7)), np.zeros(7), np.zeros(7)
-    F[:4, :4], b[:4] = A, power
-    F[4, [0, 4]] = np.array([1.0, -1.0]) / config.smoothing_s
-    F[5, [4, 5]] = np.array([1.0, -1.0]) / config.washout_s
-    F[6, 2], F[6, 6] = 1.0, -1.0 / config.attitude_memory_s
-    speed_gain, attitude_gain = config.speed_gain_inhg_per_mps, np.rad2deg(config.attitude_gain_inhg_per_deg)
-    k[4:] = -speed_gain, speed_gain, attitude_gain
-    return F, b, k
-
-
-def loop_response(F: np.ndarray, b: np.ndarray, k: np.ndarray) -> np.ndarray:
-    """The loop cut at the manifold pressure, over FREQUENCIES_RAD_S; 1 + L = 0 is the closed loop's."""
-    s = 1j * FREQUENCIES_RAD_S[:, None, None]
-    return -np.linalg.solve(s * np.eye(len(F)) - F, b[:, None])[..., 0] @ k
-
-
-def _phugoid_damping(system: np.ndarray) -> float:
-    """Damping ratio of the slow oscillation; 1 if there is none."""
-    poles = np.linalg.eigvals(system)
-    slow = poles[(np.abs(poles) < SLOW_RAD_S) & (poles.imag > 1e-6)]
-    return float(min(-slow.real / np.abs(slow), default=1.0))
 
 
 LEGEND = (

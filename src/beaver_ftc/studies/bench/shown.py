@@ -1,0 +1,63 @@
+"""The document of `beaver-ftc bench` as text."""
+
+from beaver_ftc.results.model import Document
+from beaver_ftc.studies.bench.sweep_flights import STAGES
+from beaver_ftc.studies.present.tables import Columns, aligned, tabulated
+
+SWEEP_FLIGHTS: Columns = (
+    ("", "kind"),
+    *((stage, f"parts_ms.{stage}", "{:.3f}".format) for stage in STAGES),
+    ("frames alone", "bare_ms", "{:.3f}".format),
+    ("frames, x", "frames_ratio", "{:.3f}".format),
+    ("flight, x", "flight_ratio", "{:.3f}".format),
+    ("us added a frame", "own_part_us", "{:.3f}".format),
+)
+_ALTERNATIVES = {
+    "straightforward": "properties by name, estimators in NumPy",
+    "python_detector": "a detector in Python plugged in",
+    "python_law": "a law in Python plugged in",
+    "python_detector_and_law": "both",
+    "properties_through_python": "properties through JSBSim's Python binding",
+}
+
+
+def text_of(document: Document) -> str:
+    """The document of `bench` as text."""
+    whole = document["whole_flight"]
+    kinds = [{"kind": kind, **figures} for kind, figures in document["sweep_flights"].items()]
+    head, rows = tabulated(SWEEP_FLIGHTS, kinds)
+    sections = {
+        "after the alarm: every estimator, the network and the fault-tolerant law at work": _rows(document),
+        "before the alarm": _rows(document["before_alarm"]),
+        "other ways, after the alarm": [
+            _row(_ALTERNATIVES[name], figures) for name, figures in document["alternatives"].items()
+        ],
+        f"whole flights of {whole['frames']} frames, loading and trim included": [
+            *_rows(whole),
+            _row("with a log file", whole | {"ratio": whole["with_log_file_ratio"]}, "with_log_file_us"),
+        ],
+        "flights of 15 s in a sweep, ms of processor time; x: of what JSBSim alone takes for its frames": [
+            head,
+            *rows,
+        ],
+    }
+    return "\n".join([
+        "{processor}, {cores} cores, Python {python}, JSBSim {jsbsim}".format(**document["machine"]),
+        "us a frame: medians [quartiles] over {rounds} rounds of {frames_a_round} frames".format(**document),
+        *(f"\n{title}\n{aligned(rows)}" for title, rows in sections.items()),
+    ])  # fmt: skip
+
+
+def _rows(phase: Document) -> list[list[str]]:
+    """The bare aircraft, the parts of the loop if they were timed, and the loop."""
+    return [
+        _row("bare aircraft", phase | {"ratio": 1.0}, "bare_us"),
+        *(_row(f"  + {name}", part) for name, part in phase.get("parts", {}).items()),
+        _row("closed loop", phase, "closed_loop_us"),
+    ]
+
+
+def _row(what: str, figures: Document, us: str = "us") -> list[str]:
+    low, high = figures[f"{us}_quartiles"]
+    adds = f"{figures['adds_us']:+.3f}" if "adds_us" in figures else ""
+    return [what, f"{figures[us]:.3f}", f"[{low:.3f}, {high:.3f}]", f"{figures['ratio']:.3f} x", adds]

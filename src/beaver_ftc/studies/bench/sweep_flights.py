@@ -1,0 +1,112 @@
+"""The cost of the flights of sweeps, by kind and by part of a flight."""
+
+import time
+from typing import NamedTuple
+
+import numpy as np
+
+from beaver_ftc.loop.loop import Loop
+from beaver_ftc.plant import conditions
+from beaver_ftc.results.metrics import measure
+from beaver_ftc.results.model import Document
+from beaver_ftc.scenario.sweeps import Sweep, load_sweep
+from beaver_ftc.studies.sweep.one_flight import row_of, scenario_of
+from beaver_ftc.studies.sweep.sampling import Plan
+
+STAGES = ("scenario", "aircraft, trim, record", "frames", "metrics and row")
+Taken = tuple[np.ndarray, int, float]
+
+
+class Kind(NamedTuple):
+    """Flights of a built-in sweep. changes: keys that they have besides. alike: they begin alike, as those
+    of `matrix`, so that one trim is for all."""
+
+    sweep: str
+    changes: Document | None = None
+    alike: bool = False
+
+
+KINDS = {
+    "published": Kind("elevator-effectiveness"),
+    "class all": Kind(
+        "elevator-effectiveness",
+        {"fdi.fault_class": "all", "fdi.sensor_monitor": "never"},
+    ),
+    "real air, sensors, statistical": Kind("robust-elevator-all"),
+    "class all, every error declared": Kind(
+        "robust-elevator-all",
+        {
+            "fdi.fault_class": "all",
+            "fdi.sensor_monitor": "always",
+            "sensors": "consumer-grade",
+            "fdi.bounds.sensors": "consumer-grade",
+            "fdi.bounds.inertia": 0.05,
+            "fdi.bounds.deflection_deg": 0.2,
+        },
+    ),
+    "autopilot": Kind(
+        "elevator-effectiveness",
+        {"autopilot": {"altitude_m": [{"hold": True}], "heading_deg": [{"hold": True}]}},
+    ),
+    "one beginning": Kind("elevator-effectiveness", alike=True),
+}
+
+
+def by_kind(rounds: int) -> dict[str, Document]:
+    """What a flight of each kind costs, all kinds in each round.
+
+    Processor time: `parts_ms` by part, `bare_ms` for JSBSim's frames alone, `frames_ratio` and `flight_ratio`
+    to those, `frame_us`, the loop's time for one of JSBSim's frames, and `own_part_us`, the loop's own part
+    of it. Ratios are formed within a round; all are medians over the rounds.
+    """
+    sweeps = {name: load_sweep(kind.sweep) for name, kind in KINDS.items()}
+    seen: dict[str, list[Taken]] = {name: [] for name in KINDS}
+    for run in (0, *range(rounds)):  # the first is the warm-up
+        for name, kind in KINDS.items():
+            seen[name].append(_flown(sweeps[name], kind, run))
+    return {name: _medians(rows[1:]) for name, rows in seen.items()}
+
+
+def _flown(sweep: Sweep, kind: Kind, run: int) -> Taken:
+    """Seconds of each part of one flight, JSBSim frames flown, and seconds of as many by JSBSim alone.
+
+    All that `sweep` does for a flight. Its trim is a new one each time, or kept where flights begin alike.
+    """
+    (assignment,) = Plan(sweep).assignments([0 if kind.alike else run])
+    conditions.forget_trims()
+    if kind.alike:
+        conditions.find_trim(scenario_of(sweep, assignment))
+    marks = [time.process_time()]
+    scenario = scenario_of(sweep, assignment)
+    marks.append(time.process_time())
+    if kind.changes:  # not a part of a flight that a sweep makes
+        scenario = scenario.with_(kind.changes)
+        marks = [marks[0] + time.process_time() - marks[1], time.process_time()]
+    loop = Loop(scenario)
+    marks.append(time.process_time())
+    for _ in loop.chunks():
+        pass
+    marks.append(time.process_time())
+    flight = loop.land()
+    row_of(assignment, measure(flight), flight)
+    marks.append(time.process_time())
+    alone, runs = loop.plant.run, flight.frames * scenario.substeps
+    began = time.process_time()
+    for _ in range(runs):
+        alone()
+    alone_s = time.process_time() - began
+    loop.release()
+    return np.diff(marks), runs, alone_s
+
+
+def _medians(rows: list[Taken]) -> Document:
+    parts, runs, alone = (np.array(column) for column in zip(*rows, strict=True))
+    frames_s = parts[:, STAGES.index("frames")]
+    return {
+        "parts_ms": dict(zip(STAGES, (1e3 * np.median(parts, axis=0)).round(3).tolist(), strict=True)),
+        "bare_ms": round(1e3 * float(np.median(alone)), 3),
+        "frames_ratio": round(float(np.median(frames_s / alone)), 3),
+        "flight_ratio": round(float(np.median(parts.sum(axis=1) / alone)), 3),
+        "frame_us": round(1e6 * float(np.median(frames_s / runs)), 3),
+        "own_part_us": round(1e6 * float(np.median((frames_s - alone) / runs)), 3),
+    }

@@ -1,0 +1,83 @@
+"""Engine power as a pitch effector about the trim, linear: its moment, and the margins of its law."""
+
+import numpy as np
+
+from beaver_ftc.control.laws.loop_design import margins as margins_of
+from beaver_ftc.plant.adapter import Plant
+from beaver_ftc.plant.linear import LinearModel, differences, engine_slope
+from beaver_ftc.plant.trim import trim
+from beaver_ftc.results.model import Document
+from beaver_ftc.scenario.airframe import Initial
+from beaver_ftc.scenario.diagnosis import EnginePower
+from beaver_ftc.studies.linear_systems import zeros
+from beaver_ftc.studies.present.tables import finite
+
+POWER = EnginePower()
+STATES = ("airspeed", "alpha", "q", "theta")
+FREQUENCIES_RAD_S = np.geomspace(1e-3, 1e2, 20001)
+SLOW_RAD_S = 1.0  # the phugoid is slower than this, the short period faster
+
+
+def margins(airspeed_mps: float) -> Document:
+    """The margins of the loop through engine power at one airspeed, with elevator and flap at rest.
+
+    phugoid_damping: without and with the law. gain_margin_db, phase_margin_deg: the least of all crossings,
+    null where there is none. attitude_zero_rad_s: the right-half-plane zero from power to attitude.
+    worth_deg: pitching moment of the throttle closed and opened, in deg of elevator.
+    """
+    model, power, trim_inhg = about_trim(airspeed_mps)
+    A = model.A
+    F, b, k = with_law(A, power)
+    q = STATES.index("q")
+    upper_db, lower_db, phase_deg = margins_of(loop_response(F, b, k))
+    ends = np.array([POWER.lowest_inhg, POWER.highest_inhg]) - trim_inhg
+    return {
+        "airspeed_mps": airspeed_mps,
+        "phugoid_damping": [_phugoid_damping(system) for system in (A, F + np.outer(b, k))],
+        "gain_margin_db": finite(float(min(upper_db, lower_db))),
+        "phase_margin_deg": finite(float(phase_deg)),
+        "attitude_zero_rad_s": float(zeros(A, power, STATES.index("theta")).real.max()),
+        "worth_deg": np.rad2deg(ends * power[q] / model.B[q, model.inputs.index("elevator")]).tolist(),
+    }
+
+
+def about_trim(airspeed_mps: float) -> tuple[LinearModel, np.ndarray, float]:
+    """The four longitudinal states, the column (4,) of manifold pressure in inHg, and its trim."""
+    plant, point = Plant(100), trim(airspeed_mps, Initial().altitude_m)
+    model = differences(plant, point)
+    rows = [model.states.index(name) for name in STATES]
+    return model.of(STATES), engine_slope(plant, point)[rows], point.manifold_pressure_inhg
+
+
+def with_law(A: np.ndarray, power: np.ndarray) -> tuple[np.ndarray, ...]:
+    """The aircraft, the smoothed airspeed, its slow mean and the attitude missed: system matrix F (7, 7), the
+    column b (7,) of manifold pressure in inHg, and the pressure k (7,) that the law asks for."""
+    F = np.zeros((7, 7))
+    F[:4, :4] = A
+    b = np.zeros(7)
+    b[:4] = power
+    F[4, [0, 4]] = np.array([1.0, -1.0]) / POWER.smoothing_s
+    F[5, [4, 5]] = np.array([1.0, -1.0]) / POWER.washout_s
+    F[6, [2, 6]] = 1.0, -1.0 / POWER.attitude_memory_s
+    speed_gain = POWER.speed_gain_inhg_per_mps
+    attitude_gain = np.rad2deg(POWER.attitude_gain_inhg_per_deg)
+    k = np.zeros(7)
+    k[4:] = -speed_gain, speed_gain, attitude_gain
+    return F, b, k
+
+
+def loop_response(F: np.ndarray, b: np.ndarray, k: np.ndarray) -> np.ndarray:
+    """The loop cut at the manifold pressure, over FREQUENCIES_RAD_S:
+
+        L = -k (s I - F)^-1 b
+
+    The roots of 1 + L = 0 are the poles of F + b k."""
+    s = 1j * FREQUENCIES_RAD_S[:, None, None]
+    return -np.linalg.solve(s * np.eye(len(F)) - F, b[:, None])[..., 0] @ k
+
+
+def _phugoid_damping(system: np.ndarray) -> float:
+    """Damping ratio of the slow oscillation; 1 if there is none."""
+    poles = np.linalg.eigvals(system)
+    slow = poles[(np.abs(poles) < SLOW_RAD_S) & (poles.imag > 1e-6)]
+    return float(min(-slow.real / np.abs(slow), default=1.0))

@@ -44,7 +44,7 @@ from beaver_ftc.design.table import (
     regressors,
     whole_sum,
 )
-from beaver_ftc.diagnosis.bounds import OFF_MAP_RAD_S2, add_published_bound, extra_bound
+from beaver_ftc.diagnosis.bounds import add_published_bound
 from beaver_ftc.diagnosis.detection.filters import project
 from beaver_ftc.diagnosis.detection.forces import (
     MAX_FORCE_LAG_S,
@@ -56,6 +56,7 @@ from beaver_ftc.diagnosis.detection.forces import (
     update_inertial,
 )
 from beaver_ftc.diagnosis.detection.likelihood import ALPHA_CUBED_MOMENT, N_INPUT_READINGS, N_ROWS
+from beaver_ftc.diagnosis.error_map import extra_bound
 from beaver_ftc.diagnosis.state import PITCH, SIDE_FORCE
 from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA
 from beaver_ftc.scenario.declared import SensorErrors
@@ -66,6 +67,9 @@ from beaver_ftc.scenario.declared import SensorErrors
 RAW, RATES, VANED, VANELESS, INERTIAL = range(5)
 MAX_COLUMNS = MAX_TERMS + N_INPUT_READINGS + 2 * (MAX_FORCE_REGRESSORS + 1)
 MIN_GYRO_STD_RAD_S = 1e-9  # of an exact gyro: with a variance of 0 the filters' S would be singular
+# The mapped error outside the map for filters with a covariance, whose noise is 1e-4: above the acceleration
+# of any aircraft.
+OFF_MAP_RAD_S2 = 100.0
 _READING_OF = {"alpha": ALPHA, "beta": BETA, "V": AIRSPEED, "qdyn": QDYN}
 _KW_READING = N_INPUT_READINGS - 1  # of the engine, kW
 _DPT = RH + 1  # the first of the declared signals

@@ -30,7 +30,7 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel, one_of, record, sized
 from beaver_ftc.diagnosis import isolation
-from beaver_ftc.diagnosis.bounds import DEFAULT_RATE_RAD_S, servo_data
+from beaver_ftc.diagnosis.actuators import DEFAULT_RATE_RAD_S, servo_data
 from beaver_ftc.diagnosis.sets import EMPTY_SET, UNLIMITED_SET
 from beaver_ftc.diagnosis.state import PITCH_GROUP, fill
 from beaver_ftc.diagnosis.types import (

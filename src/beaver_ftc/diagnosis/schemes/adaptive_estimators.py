@@ -26,7 +26,7 @@ from beaver_ftc.diagnosis.state import (
     WORST_CASE_DETECTOR,
     YAW,
 )
-from beaver_ftc.diagnosis.types import pairs, registry, verdict
+from beaver_ftc.diagnosis.types import examination, pairs, verdict
 from beaver_ftc.scenario.diagnosis import FdiConfig
 
 
@@ -132,7 +132,7 @@ def decide_type(fdi, t, started):
     if in_pairs:
         pairs.observe_pairs(types, layout, fies, bank, bound.nu_max)
     elif started or fdi.isolation.config.reach:
-        registry.observe_frame(types, layout, fies, bank.output.innovation, bound)
+        examination.observe_frame(types, layout, fies, bank.output.innovation, bound)
     if sensor_monitor.doubts_gyros(fdi.sensor_monitor):
         return
     if in_pairs:
@@ -145,13 +145,13 @@ def decide_type(fdi, t, started):
 @apart
 def begin_types(fdi):
     """Start the feasible sets of all types at the alarm, with no knowledge of any fault."""
-    registry.restart_types(fdi.types)
+    examination.restart_types(fdi.types)
 
 
 @apart
 def record_orders(fdi, prediction):
     """Record what each surface was commanded in the elapsed frame."""
-    registry.record_commands(fdi.types, prediction.commanded, prediction.means)
+    examination.record_commands(fdi.types, prediction.commanded, prediction.means)
 
 
 def whose_exclusions(config: FdiConfig) -> int:

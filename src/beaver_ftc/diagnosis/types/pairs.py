@@ -22,10 +22,10 @@ from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.state import LATERAL_GROUP, PITCH, PITCH_GROUP, ROLL, UNANTICIPATED, YAW
 from beaver_ftc.diagnosis.types import (
     GIVE_UP,
+    examination,
     forget_anomalies,
     last_error,
     observe_error,
-    registry,
     set_anomalous,
     verdict,
 )
@@ -122,10 +122,10 @@ def observe_pairs(types, layout, est, bank, nu_max):
     """Observe the elapsed frame, plane by plane, and judge the one before."""
     nu = bank.output.innovation
     latch_groups(types.pair, bank)
-    registry.observe_surfaces(types, layout, est, nu, nu_max)
+    examination.observe_surfaces(types, layout, est, nu, nu_max)
     locate_lateral(types, layout, est, nu, nu_max)
     observe_pitch(types, layout, est, nu, nu_max)
-    registry.judge_frame(types)
+    examination.judge_frame(types)
 
 
 @kernel
@@ -172,7 +172,7 @@ def begin_second(types, layout):
     srf1.sets.low[:] = srf1.first_sets.low
     srf1.sets.high[:] = srf1.first_sets.high
     srf1.sets.excluded[:] = srf1.first_sets.excluded
-    registry.restart_surface(srf2)
+    examination.restart_surface(srf2)
     for srf in (srf1, srf2):
         srf.status.may_be_sole, srf.status.basis = 0, verdict.DEDUCED_FAULTY
         forget_anomalies(srf)

@@ -179,6 +179,7 @@ def add_published_bound(x, model, share, const, earth, eta):
     [Zhang2005, sec. VII] for the first two. JSBSim integrates rates against inertial space and reports them
     against the Earth: the difference turns with the body, at no more than earth |x| on any axis. k >= 1: the
     largest sum, over an axis, of the factors by which the inertia coupling multiplies products of rates.
+    cross: (Pqr q r, Qpr p r, Rpq p q), the published part of the inertia coupling, rad/s2.
     """
     p, q, r = x[0], x[1], x[2]
     w = abs(p) + abs(q) + abs(r)
@@ -219,14 +220,13 @@ def fill_bound(bound, model, meas, u):
     if err.given:
         set_air_rotation(err, meas.altitude)
         add_declared_bound(err, x, y, u, eta)
-    else:
-        err.x[1, :] = x
     if emap.n_boxes > 0:
         look_up_map(emap, x, y, u, err.du)
         for i in range(3):
             eta[i] += emap.e_now[i]
     share, const, earth = bound.inertia_coupling_error_share, bound.const, bound.earth_rate_rad_s
-    add_published_bound(err.x[1], model, share, const, earth, eta)
+    largest = err.x[1] if err.given else x
+    add_published_bound(largest, model, share, const, earth, eta)
 
 
 GUST_LIMIT_SIGMA = 6.0  # exceeded once in 5e8 independent samples
@@ -241,7 +241,7 @@ def inertia_bounds(tol: float, mass: MassProperties) -> np.ndarray:
     corner.
     """
     nominal = np.array(inertia_coefficients(mass))
-    worst = np.zeros(12)
+    worst = np.zeros(nominal.size)
     for signs in product((-1.0, 1.0), repeat=4):
         inertias = {
             name: getattr(mass, name) * (1 + tol * sign)
@@ -282,13 +282,13 @@ def fill_errors(err: np.void, declared: Declared, model: np.void, mass: MassProp
     err["model"]["moments"]["value"][1, : dC.size] += dC
     for name, e in zip(InertiaCoefficients._fields, dI, strict=True):
         err["model"][name] = abs(model[name]) + np.array([0.0, e])
-    known = errors.is_ideal and declared.servo_errors.is_none
+    no_errors = errors.is_ideal and declared.servo_errors.is_none
     fill(
         err, du=du, du0=declared.deflection_rad, wg=aloft, wg_aloft=aloft,
         wg_1m=GUST_LIMIT_SIGMA * air.low_rotation_limit_rad_s(b),
         h0=errors["altitude"].worst, h1=errors["altitude"].slope,
         e0=errors.each("worst"), e1=errors.each("slope"), steady=errors.each("steady", AXES),
-        given=not known or any(np.any(e) for e in (dC, dI, du, np.array(aloft))),
+        given=not no_errors or any(np.any(e) for e in (dC, dI, du, np.array(aloft))),
     )  # fmt: skip
 
 

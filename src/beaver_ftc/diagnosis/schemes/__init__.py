@@ -57,7 +57,6 @@ def configure_diagnosis(fdi: np.void, pred: np.void, declared: Declared, travel:
     config, aircraft, dt = declared.fdi, declared.aircraft, 1.0 / declared.rate_hz
     rows = isolation.list_estimators(config.fault_class, aircraft)
     state.configure_shared(fdi["config"], declared)
-    fdi["config"]["variant"] = adaptive_estimators.whose_exclusions(config)
     state.configure_layout(fdi["layout"], rows, aircraft)
     isolation.configure_isolation(fdi["isolation"], declared, rows, travel)
     if config.pairs:
@@ -192,7 +191,7 @@ def kernels_of_scheme(fdi: np.void) -> Iterator[Any]:
         yield ours.plugin_update if scheme == PLUGIN_SCHEME else ours.update_verdict
         if cfg["diagnoses_all_types"]:
             yield from (ours.begin_types, ours.record_orders, ours.decide_type)
-        if cfg["variant"] != WORST_CASE_DETECTOR:
+        if cfg["exclusion_authority"] != WORST_CASE_DETECTOR:
             yield ours.weigh_position if cfg["diagnoses_all_types"] else ours.weigh_loss
         if fdi["statistical"]["test"]["enabled"]:
             yield from (ours.update_tests, ours.prepare_gusts)

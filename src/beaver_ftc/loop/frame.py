@@ -529,7 +529,7 @@ def note_beyond_threshold(accounts, fdi, t):
     if fdi.config.scheme_number == PLUGIN_SCHEME:
         is_beyond = fdi.plugin_verdict.detected == 1
     else:
-        uses_statistics = weighs_statistics(detector.test, authority)
+        uses_statistics = weighs_statistics(detector, authority)
         ratio = detection_share(fdi.bank, detector.alarm, authority, uses_statistics)
         is_beyond = ratio > 1.0 or (sensor_monitor.has_alarm(monitor) and monitor.output.top_ratio > 1.0)
     if is_beyond:

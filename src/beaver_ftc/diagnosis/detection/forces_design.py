@@ -144,10 +144,8 @@ def _force_coefficient(aircraft: Aircraft, name: str, state: TrimState) -> float
     geometry = aircraft.geometry
     V = y[AIRSPEED]
     rates = x * (geometry.span_m / (2.0 * V), geometry.chord_m / V, geometry.span_m / (2.0 * V))
-    values = dict(zip(aircraft.surfaces, u, strict=True)) | dict(zip(aircraft.signals, y[4:], strict=True))
-    values |= dict(
-        zip(("alpha", "beta", "ph", "qh", "rh", SIDESLIP_RATE), (y[0], y[1], *rates, 0.0), strict=True)
-    )
+    names = (*aircraft.surfaces, *aircraft.signals, "alpha", "beta", "ph", "qh", "rh", SIDESLIP_RATE)
+    values = dict(zip(names, (*u, *y[4:], *y[:2], *rates, 0.0), strict=True))
     return float(aircraft.coefficient(name, values))
 
 

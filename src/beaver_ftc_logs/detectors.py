@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.design import N_Y, Context, Declared
+from beaver_ftc.design import N_Y, Context, DeclaredErrors
 from beaver_ftc.diagnosis import Detector, Measured, Verdict
 from beaver_ftc.documents import BadInput, suggestion
 from beaver_ftc.plugins import DETECTORS, is_compiled, made, registered
@@ -183,7 +183,7 @@ def loop_detector_context(model: Model) -> Context:
         travel_rad=np.outer((-1.0, 1.0), np.ones(_N_LOOP)),
         constant_rad_s2=np.zeros(3), inertia_coupling=np.zeros(3),
         surfaces=(*LOOP_SURFACES, "flap"),
-        declared=Declared(noise=noise, model_rad_s2=_model_error_sd_rad_s2(model)),
+        declared=DeclaredErrors(noise=noise, model_rad_s2=_model_error_sd_rad_s2(model)),
     )  # fmt: skip
 
 

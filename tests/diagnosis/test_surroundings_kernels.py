@@ -8,6 +8,7 @@ from kernels import new_fdi
 
 from beaver_ftc.design.model import design_record
 from beaver_ftc.diagnosis import bounds
+from beaver_ftc.diagnosis.error_map import share_used
 
 COUPLINGS = ("Ppq", "Pqr", "Qpp", "Qpr", "Qrr", "Rpq", "Rqr")
 COMPONENT = st.floats(-1.0, 1.0)
@@ -48,7 +49,7 @@ def test_the_share_of_its_travel_is_the_farthest_at_any_instant(where, before, i
     """Of n instants the first may be as before, p0; the others make up the mean: (n p - p0) / (n - 1)."""
     error_map = new_fdi()["bound"]["error_map"]
     error_map["stop_lo"][1], error_map["stop_hi"][1] = -0.2, 0.4
-    assert bounds.share_used(error_map, 1, where, before, instants) == pytest.approx(share)
+    assert share_used(error_map, 1, where, before, instants) == pytest.approx(share)
     error_map["stop_lo"][1], error_map["stop_hi"][1] = 0.0, 0.0  # a travel that ends at neutral
     beyond = float(where[0] < 0.0 or where[1] > 0.0)
-    assert bounds.share_used(error_map, 1, where, 0.0, 1) == beyond
+    assert share_used(error_map, 1, where, 0.0, 1) == beyond

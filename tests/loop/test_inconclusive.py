@@ -9,7 +9,7 @@ import yaml
 
 import beaver_ftc as bf
 from beaver_ftc.aircraft import aircraft
-from beaver_ftc.diagnosis.bounds import UNMAPPED_ERROR_RAD_S2
+from beaver_ftc.diagnosis.error_map import UNMAPPED_ERROR_RAD_S2
 
 FULL = {
     "p_rad_s": [-9, 9], "q_rad_s": [-9, 9], "r_rad_s": [-9, 9], "alpha_rad": [-1, 1], "beta_rad": [-1, 1],

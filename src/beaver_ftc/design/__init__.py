@@ -18,7 +18,7 @@ from beaver_ftc.public import lazily
 
 if TYPE_CHECKING:
     from beaver_ftc.aircraft import AXES
-    from beaver_ftc.design.context import Context, Declared
+    from beaver_ftc.design.context import Context, DeclaredErrors
     from beaver_ftc.design.model import (
         DesignFunctions,
         design_record,

@@ -22,7 +22,8 @@ class DeclaredErrors:
     """The errors that `fdi.bounds` declares in addition to the published bounds, and the data of the
     actuators.
 
-    A plug-in receives this record as `Context.declared`. An error that is not declared is zero.
+    A plug-in receives this record as `Context.declared`. An error that is not declared is zero. Defaults are
+    for four surfaces.
 
     - `noise`, `bias`, `resolution`, `slope` (7,): errors of the instruments for p, q, r (rad/s), angle of
       attack, sideslip (rad), airspeed (m/s) and dynamic pressure (Pa). `noise` is the standard deviation of a
@@ -67,7 +68,8 @@ class DeclaredErrors:
 
     @cached_property
     def errors(self) -> bool:
-        """Whether any error is declared."""
+        """Whether an error that changes the rates' residual is declared: of the first seven instruments,
+        turbulence, coefficients, inertia or actuators."""
         servos = self.bandwidth_error, self.rate_limit_error, self.dead_band_rad
         others = self.coefficients, *servos, self.deflection_rad, self.inertia
         return self.noisy or any(np.any(error) for error in others)
@@ -104,10 +106,16 @@ class DeclaredErrors:
     def turbulence_time_s(self) -> np.ndarray:
         """Its correlation time, (3,): the mean of those of the gusts that cause it, by their variance."""
         share = self.gust_effect**2 * self.gust_rad_s**2
+        # where no gust acts on an axis, 0 s
         return share @ self.gust_time_s / np.maximum(share.sum(axis=1), 1e-300)
 
 
-Declared = DeclaredErrors  # the name that plug-ins know
+def __getattr__(name: str) -> type[DeclaredErrors]:
+    """The former name of DeclaredErrors."""
+    if name != "Declared":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    warnings.warn("Declared is now DeclaredErrors, and will be removed", DeprecationWarning, stacklevel=2)
+    return DeclaredErrors
 
 
 @dataclass(frozen=True)

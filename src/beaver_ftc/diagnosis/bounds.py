@@ -16,37 +16,26 @@ out of the difference. Of the changing part n with |n| <= nbar the filter eps[k+
 keeps n[k] - m[k], m[k+1] = a m[k] + (1 - a) n[k]. This is at most nbar[k] plus the filtered nbar: 2 nbar at
 any frame rate.
 
-A derived aircraft declares a map of its model's error. The map has a few boxes of states, one inside the
-other. Each box has the largest error found in it for surfaces within a share of their travel (stand-ins:
-within less). Healthy surfaces are where their commands put them, and a surface that has lost effectiveness
-acts like one with a smaller deflection: the bound is that of the share of travel in use. A stuck surface may
-be anywhere: the additional error of its share, `extra`, belongs to the hypothesis that it is off its command
-(isolation.py). If two surfaces may be off, the bound itself takes the whole travel. Outside all boxes nothing
-has been measured, so nothing is concluded.
+The error of a derived aircraft's model: error_map.py. The same as variances: deviations.py.
 
-The same as variances: deviations.py.
-
-Symbols of the kernels (err: of `errors_dtype`, emap: of `map_dtype`, model: the design model):
+Symbols of the kernels (err: of `errors_dtype`, model: the design model):
 
     x (3,) rad/s, y, u (n,) rad   rates, readings, deflections; in err [0] is the magnitude as measured, [1]
                                   the worst that the errors allow
     eta (3,) rad/s2               bound on the uncertainty
-    z (coordinates,)              place in the map: x, then y with the density in place of dynamic pressure
-    b, j, k                       box, level of travel, row of time of the map
     s, i                          surface, axis
 """
 
 from dataclasses import replace
 from functools import lru_cache
 from itertools import product
-from math import exp, log, pi
 from typing import Any
 
 import numpy as np
 
-from beaver_ftc.aircraft import AXES, Aircraft, MassProperties
+from beaver_ftc.aircraft import AXES, MassProperties
 from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S
-from beaver_ftc.aircraft.schema import MAX_AGES, MAX_BOXES, MAX_LEVELS
+from beaver_ftc.aircraft.schema import MAX_BOXES, MAX_LEVELS
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.design import LEAST_HEIGHT_M
 from beaver_ftc.design.engine import DPT_0, KW_TO_DPT, density_ratio, power_error_kw
@@ -59,10 +48,11 @@ from beaver_ftc.design.model import (
     nonlinear_response_from_table,
 )
 from beaver_ftc.design.table import AIRSPEED, DPT, N_Y, QDYN, evaluate
+from beaver_ftc.diagnosis.error_map import fill_map, look_up_map, map_dtype
 from beaver_ftc.diagnosis.state import fill
 from beaver_ftc.plant.faults import OF_THE_SLIPSTREAM
-from beaver_ftc.scenario.declared import Declared, SensorErrors
-from beaver_ftc.scenario.sensors import ENGINE, NOISE_LIMIT_SIGMA
+from beaver_ftc.scenario.declared import Declared
+from beaver_ftc.scenario.sensors import ENGINE
 
 Y0 = 3  # gyros come first among the signals, then alpha, beta, airspeed, dynamic pressure
 _MIN_V_SHARE = 0.1
@@ -70,11 +60,6 @@ _MIN_V_SHARE = 0.1
 # of f + G u, which stay below 100 rad/s2; a few operations each. Where a frame is of fifty instants it leaves
 # more, 1e-10: the Earth's rate squared, 5e-9, covers that.
 ROUNDING_RAD_S2 = 1e-11
-UNMAPPED_ERROR_RAD_S2 = 1e6  # terms fitted near trim are off by thousands at 0.5 rad
-# The same for filters with a covariance, whose noise is 1e-4: above the acceleration of any aircraft.
-OFF_MAP_RAD_S2 = 100.0
-_EDGE = 1e-9
-N_MAP_COORDINATES = 3 + N_Y  # rates, then y with the density of the air in place of dynamic pressure
 
 
 @sized
@@ -100,24 +85,6 @@ def errors_dtype(n: int) -> np.dtype:
 
 
 @sized
-def map_dtype(n: int, boxes: int = MAX_BOXES) -> np.dtype:
-    """The map of the error of an aircraft's model, with n surfaces.
-
-    one_free: one surface may be anywhere in its travel; two_free: more than one may. lo, hi: ends of each
-    box; share: of the travel, by level; e: error by row of time, box, level and axis, rad/s2. outside:
-    whether the state is outside all boxes; box, row: where it is in the map; e_now: error there, rad/s2.
-    u_old: deflections in the frame before, rad. yaw, yaw_now: bound on the yawing moment of healthy engines,
-    by box and here.
-    """
-    return record(
-        n_boxes=int, n_levels=int, n_rows=int, one_free=int, two_free=int, outside=int, box=int, row=int,
-        time_s=float, until_s=MAX_AGES, lo=(boxes, N_MAP_COORDINATES), hi=(boxes, N_MAP_COORDINATES),
-        share=MAX_LEVELS, e=(MAX_AGES, boxes, MAX_LEVELS, 3), stop_lo=n, stop_hi=n, u_old=n,
-        coordinates=N_MAP_COORDINATES, e_now=3, yaw=boxes, yaw_now=float,
-    )  # fmt: skip
-
-
-@sized
 def bound_dtype(n: int, boxes: int = MAX_BOXES) -> np.dtype:
     """Bounds on the uncertainty.
 
@@ -132,28 +99,6 @@ def bound_dtype(n: int, boxes: int = MAX_BOXES) -> np.dtype:
         error_map=map_dtype(n, boxes), eta_bar=3, eta_now=3, n_gyro=3, n_old=3, nu_max=3, has_eG=int,
         eG=(3, n), eGu=(3, n), extra=(MAX_LEVELS, 3),
     )  # fmt: skip
-
-
-def fill_map(emap: np.void, aircraft: Aircraft, one_free: bool, two_free: bool) -> None:
-    """Write the map of the aircraft, if it has one; one_free, two_free: see `map_dtype`."""
-    declared = aircraft.file.model_error_map
-    if declared is None:
-        return
-    n_levels, n_rows = len(declared.travel_share), len(declared.until_s)
-    share = np.array([declared.stand_ins if s in aircraft.stand_ins else 1.0 for s in aircraft.surfaces])
-    lo, hi = np.transpose([(travel.min_rad, travel.max_rad) for travel in aircraft.travel.values()])
-    fill(
-        emap, one_free=one_free, two_free=two_free, n_boxes=len(declared.boxes), n_levels=n_levels,
-        n_rows=n_rows, stop_lo=share * lo, stop_hi=share * hi,
-    )  # fmt: skip
-    emap["until_s"][:n_rows] = declared.until_s
-    emap["share"][:n_levels] = declared.travel_share
-    for b, box in enumerate(declared.boxes):
-        ends = np.transpose(box.ends(aircraft.signals))
-        emap["lo"][b, : ends.shape[1]], emap["hi"][b, : ends.shape[1]] = ends
-        tables = box.error_p_rad_s2, box.error_q_rad_s2, box.error_r_rad_s2
-        emap["e"][:n_rows, b, :n_levels] = np.stack(tables, axis=-1)
-        emap["yaw"][b] = box.engines_apart or 0.0
 
 
 @kernel
@@ -226,115 +171,6 @@ def add_declared_bound(err, x, y, u, eta):
 
 
 @kernel
-def is_between(lo, z, hi):
-    """lo <= z <= hi, but for rounding."""
-    slack = _EDGE * (1.0 + abs(z))
-    return lo - slack <= z <= hi + slack
-
-
-@kernel
-def in_box(emap, b):
-    """Whether the state is in box b of the map."""
-    for i in range(emap.coordinates.size):
-        if not is_between(emap.lo[b, i], emap.coordinates[i], emap.hi[b, i]):
-            return False
-    return True
-
-
-@kernel
-def outside_span(emap, i):
-    """Whether coordinate i of the state is outside the range that the boxes span together."""
-    lo, hi = np.inf, -np.inf
-    for b in range(emap.n_boxes):  # compiled code with a reduction of an array loads scipy.linalg
-        lo, hi = min(lo, emap.lo[b, i]), max(hi, emap.hi[b, i])
-    return not is_between(lo, emap.coordinates[i], hi)
-
-
-@kernel
-def travel_share(emap, s, u):
-    """The share of its travel that surface s uses at u rad; 1 if it has no travel there."""
-    if u == 0.0:
-        return 0.0
-    stop = emap.stop_hi[s] if u > 0.0 else emap.stop_lo[s]
-    return u / stop if stop != 0.0 else 1.0
-
-
-@kernel
-def level_of_positions(emap, u, du):
-    """Index of the least share of the travel that covers surfaces within du of u; the last index if all of
-    the travel may be used."""
-    if emap.two_free:
-        return emap.n_levels - 1
-    share = 0.0
-    for s in range(u.size):
-        for end in (u[s] - du[s], u[s] + du[s]):
-            share = max(share, travel_share(emap, s, end))
-    return level_of_share(emap, share)
-
-
-@kernel
-def level_of_share(emap, share):
-    """Index of the least share of the travel in the map that is not below `share`; else the last."""
-    last = emap.n_levels - 1
-    for j in range(last):
-        if share <= emap.share[j]:
-            return j
-    return last
-
-
-@kernel
-def share_used(emap, s, between, before, n):
-    """The largest share of its travel that surface s can use at any of n instants of a frame.
-
-    between: (low, high) rad, of the mean position over the instants; before: the share at the start of the
-    frame, where the surface may still be at the first instant.
-    """
-    share = max(travel_share(emap, s, between[0]), travel_share(emap, s, between[1]))
-    if n > 1:
-        share = max(before, (n * share + before) / (n - 1))
-    return min(share, 1.0)
-
-
-@kernel
-def map_row(emap):
-    """The row of the map for the present flight time, -1 if the map ends before."""
-    for k in range(emap.n_rows):
-        if emap.time_s <= emap.until_s[k]:
-            return k
-    return -1
-
-
-@kernel
-def look_up_map(emap, x, y, u, du):
-    """Fill z and e_now, the mapped error at this state."""
-    z = emap.coordinates
-    z[:3], z[3 : 3 + y.size] = x, y
-    z[3 + QDYN] = 2.0 * y[QDYN] / (y[AIRSPEED] * y[AIRSPEED])
-    j = level_of_positions(emap, u, du)
-    k = map_row(emap)
-    for b in range(emap.n_boxes if k >= 0 else 0):
-        if in_box(emap, b):
-            emap.outside = 0
-            emap.e_now[:] = emap.e[k, b, j]
-            emap.box, emap.row = (b, k)
-            emap.yaw_now = emap.yaw[b]
-            return
-    emap.outside = 1
-    emap.e_now[:] = UNMAPPED_ERROR_RAD_S2
-    emap.yaw_now = UNMAPPED_ERROR_RAD_S2
-
-
-@kernel
-def extra_bound(emap, j, i):
-    """By how much the mapped error of axis i at this instant is larger if a surface is at level j of travel,
-    rad/s2.
-    """
-    if emap.outside:
-        return 0.0
-    return max(emap.e[emap.row, emap.box, j, i] - emap.e_now[i], 0.0)
-
-
-@kernel
 def add_published_bound(x, model, share, const, earth, eta):
     """Add to eta the published bound, and what the Earth's rotation adds.
 
@@ -343,6 +179,7 @@ def add_published_bound(x, model, share, const, earth, eta):
     [Zhang2005, sec. VII] for the first two. JSBSim integrates rates against inertial space and reports them
     against the Earth: the difference turns with the body, at no more than earth |x| on any axis. k >= 1: the
     largest sum, over an axis, of the factors by which the inertia coupling multiplies products of rates.
+    cross: (Pqr q r, Qpr p r, Rpq p q), the published part of the inertia coupling, rad/s2.
     """
     p, q, r = x[0], x[1], x[2]
     w = abs(p) + abs(q) + abs(r)
@@ -383,19 +220,17 @@ def fill_bound(bound, model, meas, u):
     if err.given:
         set_air_rotation(err, meas.altitude)
         add_declared_bound(err, x, y, u, eta)
-    else:
-        err.x[1, :] = x
     if emap.n_boxes > 0:
         look_up_map(emap, x, y, u, err.du)
         for i in range(3):
             eta[i] += emap.e_now[i]
     share, const, earth = bound.inertia_coupling_error_share, bound.const, bound.earth_rate_rad_s
-    add_published_bound(err.x[1], model, share, const, earth, eta)
+    largest = err.x[1] if err.given else x
+    add_published_bound(largest, model, share, const, earth, eta)
 
 
 GUST_LIMIT_SIGMA = 6.0  # exceeded once in 5e8 independent samples
 _INERTIA_NAMES = ("Ix_kg_m2", "Iy_kg_m2", "Iz_kg_m2", "Jxz_kg_m2")
-POLE_DELAYS_S = (0.1, 0.5, 2.0)  # within which a pole of the bank finds the smallest fault
 
 
 @lru_cache(maxsize=64)
@@ -406,7 +241,7 @@ def inertia_bounds(tol: float, mass: MassProperties) -> np.ndarray:
     corner.
     """
     nominal = np.array(inertia_coefficients(mass))
-    worst = np.zeros(12)
+    worst = np.zeros(nominal.size)
     for signs in product((-1.0, 1.0), repeat=4):
         inertias = {
             name: getattr(mass, name) * (1 + tol * sign)
@@ -447,13 +282,13 @@ def fill_errors(err: np.void, declared: Declared, model: np.void, mass: MassProp
     err["model"]["moments"]["value"][1, : dC.size] += dC
     for name, e in zip(InertiaCoefficients._fields, dI, strict=True):
         err["model"][name] = abs(model[name]) + np.array([0.0, e])
-    known = errors.is_ideal and declared.servo_errors.is_none
+    no_errors = errors.is_ideal and declared.servo_errors.is_none
     fill(
         err, du=du, du0=declared.deflection_rad, wg=aloft, wg_aloft=aloft,
         wg_1m=GUST_LIMIT_SIGMA * air.low_rotation_limit_rad_s(b),
         h0=errors["altitude"].worst, h1=errors["altitude"].slope,
         e0=errors.each("worst"), e1=errors.each("slope"), steady=errors.each("steady", AXES),
-        given=not known or any(np.any(e) for e in (dC, dI, du, np.array(aloft))),
+        given=not no_errors or any(np.any(e) for e in (dC, dI, du, np.array(aloft))),
     )  # fmt: skip
 
 
@@ -472,39 +307,3 @@ def fill_engine_errors(err: np.void, declared: Declared) -> None:
     bounds = [errors[name].of_reading(reading) for name, reading in largest.items()]
     kw0, kw1 = power_error_kw(initial.engine_rpm, inhg, *bounds)
     fill(err, engine=1, kw0=kw0, kw1=kw1)
-
-
-def poles_for_delays(errors: SensorErrors, eta: float) -> tuple[float, ...]:
-    """Poles (1/s) that find the smallest constant fault phi within each of POLE_DELAYS_S, despite gyro noise.
-
-    After T the residual is phi (1 - exp(-lam T)) / lam, its bound at most eta / lam + 2 nbar. The excess of
-    one over the other is greatest at lam = ln(phi T / (2 nbar)) / T; the smallest phi with any follows.
-    """
-    n2 = 2 * NOISE_LIMIT_SIGMA * float(errors.each("noise", AXES).max())
-    return tuple(_pole_for_delay(T, n2, eta) for T in POLE_DELAYS_S) if n2 > 0 else ()
-
-
-def _pole_for_delay(T: float, n2: float, eta: float) -> float:
-    phi = eta + 8.0 * n2 / T
-    for _ in range(50):
-        lam = max(log(phi * T / n2) / T, 0.1 / T)
-        phi = (n2 * lam + eta) / (1.0 - exp(-lam * T))
-    return lam
-
-
-DEFAULT_RATE_RAD_S = pi / 3.0  # of an actuator with no declared rate limit: the aircraft's default
-
-
-def servo_data(declared: Declared) -> dict[str, np.ndarray]:
-    """The declared actuators and their errors, (surfaces,) each, by the names of `DeclaredErrors`."""
-    servos, off = (
-        [getattr(of, s) for s in declared.aircraft.surfaces]
-        for of in (declared.servos, declared.servo_errors)
-    )
-    return {
-        "bandwidth_rad_s": np.array([servo.bandwidth_rad_s for servo in servos]),
-        "rate_limit_rad_s": np.radians([servo.rate_limit_deg_s for servo in servos]),
-        "bandwidth_error": np.array([error.bandwidth for error in off]),
-        "rate_limit_error": np.array([error.rate_limit for error in off]),
-        "dead_band_rad": np.radians([error.dead_band_deg for error in off]),
-    }

@@ -95,8 +95,12 @@ def record_plugin_verdict(found, plugin, t):
 
 @kernel
 def withdraw_conclusion(found):
-    """Withdraw alarm, isolation and type, because a sensor is broken and no surface; times of isolation of
-    single surfaces and withdrawn isolations stay."""
+    """Withdraw alarm, isolation and type, because a sensor is broken and no surface.
+
+    Times of isolation of single surfaces stay: `update_interval` ends them and stores what is withdrawn. The
+    axis and the time of the type count only with an alarm and a type, and has_effectiveness is a plug-in's,
+    which has no sensor monitor.
+    """
     found.detected, found.isolated_estimator, found.fault_type = 0, NOT_ISOLATED, -1
     found.detected_at_s = found.isolated_at_s = -1.0
     found.target = found.accommodation_mode = -1
@@ -107,18 +111,18 @@ def update_interval(found, s, isolated, t, kind, reason):
     """Record at t s whether surface s is isolated, and of which type `kind` (-1 if open); store what is
     withdrawn, and why.
     """
-    since, before = found.from_s[s], found.isolated_type[s]
-    if isolated and since < 0.0:
+    isolated_since, old_type = found.from_s[s], found.isolated_type[s]
+    if isolated and isolated_since < 0.0:
         found.from_s[s] = t
-    elif since >= 0.0 and not isolated:
-        found.n_gone = store_withdrawn(found.gone, found.n_gone, s, before, since, t, reason)
+    elif isolated_since >= 0.0 and not isolated:
+        found.n_gone = store_withdrawn(found.gone, found.n_gone, s, old_type, isolated_since, t, reason)
         found.from_s[s] = -1.0
-    elif before >= 0 and kind != before:
+    elif old_type >= 0 and kind != old_type:
         found.n_gone_types = store_withdrawn(
-            found.withdrawn_types, found.n_gone_types, s, before, found.type_from_s[s], t, reason
+            found.withdrawn_types, found.n_gone_types, s, old_type, found.type_from_s[s], t, reason
         )
     kind = kind if isolated else -1
-    if kind != before:
+    if kind != old_type:
         found.isolated_type[s], found.type_from_s[s] = kind, t
 
 
@@ -133,7 +137,11 @@ def store_withdrawn(store, n, s, kind, from_s, to_s, reason):
 
 @kernel
 def reason_of_withdrawal(plugin, broken, excluded, left):
-    """Why a surface, or its type, is isolated no longer: the first of the reasons that is given."""
+    """Why a surface, or its type, is isolated no longer: the first reason that holds.
+
+    plugin: a plug-in is the diagnosis; broken: a sensor is found broken; excluded: an estimator refutes the
+    surface; left: a type is left on it.
+    """
     if broken:
         return SENSOR_BROKEN
     if plugin:
@@ -228,15 +236,15 @@ def assess_surface(out, types, layout, fies, s):
 def isolated_theta(cfg, found, layout, fies, stat, s):
     """Estimated theta of the isolated loss of surface s, under noise the most likely one; one over its
     variance, 0 in the worst case."""
-    if weighs_statistics(stat.test, cfg.authority):
+    if weighs_statistics(stat, cfg.authority):
         return statistical.estimate_loss(stat.block, s)
     return fies[found.isolated_estimator].theta[layout.dominant_axis[s]], 0.0
 
 
 @kernel
-def weighs_statistics(cfg, authority):
-    """Whether the estimates of the statistical detector are used."""
-    return cfg.enabled and authority != WORST_CASE_DETECTOR
+def weighs_statistics(stat, authority):
+    """Whether the estimates of the statistical detector are used; stat: of `statistical_dtype`."""
+    return stat.test.enabled and authority != WORST_CASE_DETECTOR
 
 
 @kernel
@@ -248,7 +256,7 @@ def assess_unknown(out, cfg, found, types, layout, stat, fdae, bound):
     unknown = out.unknown_acceleration
     unknown[:] = 0.0
     if found.detected and not (found.target >= 0 and found.accommodation_mode == WAIT_FOR_SURFACE):
-        if weighs_statistics(stat.test, cfg.authority):
+        if weighs_statistics(stat, cfg.authority):
             statistical.fill_unmodelled(stat.block, stat.gust, unknown)
         else:
             filters.fdae_unmodelled(fdae, bound.n_gyro, unknown)

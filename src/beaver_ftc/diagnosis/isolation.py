@@ -55,7 +55,6 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.compiled import kernel, record, sized
-from beaver_ftc.diagnosis.bounds import level_of_share, share_used
 from beaver_ftc.diagnosis.detection import parity, statistical
 from beaver_ftc.diagnosis.detection.filters import (
     advance_bound,
@@ -64,6 +63,7 @@ from beaver_ftc.diagnosis.detection.filters import (
     published_interval,
     residual_interval,
 )
+from beaver_ftc.diagnosis.error_map import level_of_share, share_used
 from beaver_ftc.diagnosis.sets import explain, intersect
 from beaver_ftc.diagnosis.state import (
     CONSTANT_THRESHOLD,

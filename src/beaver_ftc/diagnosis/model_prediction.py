@@ -14,7 +14,9 @@ import numpy as np
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.design.actuators import actuators_dtype, move, move_ends
 from beaver_ftc.design.model import design_dtype, design_of, response
-from beaver_ftc.diagnosis.bounds import extra_bound, fill_bound, n_gyro, servo_data
+from beaver_ftc.diagnosis.actuators import servo_data
+from beaver_ftc.diagnosis.bounds import fill_bound, n_gyro
+from beaver_ftc.diagnosis.error_map import extra_bound
 from beaver_ftc.scenario.declared import Declared
 
 

@@ -10,7 +10,9 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft, main_surface_index_by_axis
 from beaver_ftc.compiled import record, sized
+from beaver_ftc.plugins import DETECTORS, is_compiled
 from beaver_ftc.scenario.declared import Declared
+from beaver_ftc.scenario.diagnosis import FdiConfig
 
 NOT_ISOLATED, UNANTICIPATED = -1, -2
 DAMAGE_EXCLUDES = 2  # value of `weak`: declared damage may have excluded the others
@@ -52,12 +54,12 @@ def layout_dtype(n: int) -> np.dtype:
 
 
 # Configuration that several stages read. enabled: a compiled scheme diagnoses; scheme_number: of that scheme;
-# authority, variant: the detector whose alarms, and whose exclusions count, EITHER_DETECTOR,
+# authority, exclusion_authority: the detector whose alarms, and whose exclusions count, EITHER_DETECTOR,
 # WORST_CASE_DETECTOR or STATISTICAL_DETECTOR; diagnoses_all_types: faults of every type;
 # abrupt: a fault is declared to stay as it is; n_substeps: JSBSim frames in a frame; dt s.
 SHARED_CONFIG_RECORD = record(
-    enabled=int, scheme_number=int, variant=int, authority=int, diagnoses_all_types=int, abrupt=int,
-    n_substeps=int, dt=float,
+    enabled=int, scheme_number=int, exclusion_authority=int, authority=int, diagnoses_all_types=int,
+    abrupt=int, n_substeps=int, dt=float,
 )  # fmt: skip
 
 
@@ -66,9 +68,19 @@ def configure_shared(cfg: np.void, declared: Declared) -> None:
     fdi = declared.fdi
     fill(
         cfg, enabled=fdi.diagnoses, dt=1.0 / declared.rate_hz, scheme_number=scheme_number(fdi.scheme),
-        authority=AUTHORITIES[fdi.authority], diagnoses_all_types=fdi.fault_class == "all",
-        abrupt=fdi.fault_profile == "abrupt", n_substeps=declared.substeps,
+        exclusion_authority=whose_exclusions(fdi), authority=AUTHORITIES[fdi.authority],
+        diagnoses_all_types=fdi.fault_class == "all", abrupt=fdi.fault_profile == "abrupt",
+        n_substeps=declared.substeps,
     )  # fmt: skip
+
+
+def whose_exclusions(config: FdiConfig) -> int:
+    """The detector whose exclusions count: EITHER_DETECTOR, WORST_CASE_DETECTOR or STATISTICAL_DETECTOR. The
+    worst case excludes types of fault for any authority."""
+    if not config.weighs_chance:
+        return WORST_CASE_DETECTOR
+    authority = AUTHORITIES[config.authority]
+    return EITHER_DETECTOR if (config.fault_class, authority) == ("all", STATISTICAL_DETECTOR) else authority
 
 
 def configure_layout(layout: np.void, rows: Sequence[tuple[str, int, int]], aircraft: Aircraft) -> None:
@@ -89,4 +101,4 @@ def configure_layout(layout: np.void, rows: Sequence[tuple[str, int, int]], airc
 
 def scheme_number(name: str) -> int:
     """The number of a scheme by its name in plugins.yaml; of every Python plug-in PLUGIN_SCHEME."""
-    return _SCHEMES.get(name, PLUGIN_SCHEME)
+    return _SCHEMES[name] if is_compiled(DETECTORS, name) else PLUGIN_SCHEME

@@ -28,11 +28,6 @@ from beaver_ftc.control.autopilot import SPEED, record_deviations, steer
 from beaver_ftc.design.model import unanticipated_pitch
 from beaver_ftc.diagnosis import conclusion, monitors, schemes
 from beaver_ftc.diagnosis import conclusion as assessed
-from beaver_ftc.diagnosis.bounds import (
-    N_MAP_COORDINATES,
-    map_row,
-    outside_span,
-)
 from beaver_ftc.diagnosis.conclusion import (
     assess_surfaces,
     assess_unknown,
@@ -41,6 +36,7 @@ from beaver_ftc.diagnosis.conclusion import (
 )
 from beaver_ftc.diagnosis.detection import filters
 from beaver_ftc.diagnosis.detection.filters import nearest_filter
+from beaver_ftc.diagnosis.error_map import N_MAP_COORDINATES, map_row, outside_span
 from beaver_ftc.diagnosis.model_prediction import (
     add_instant,
     begin_sums,
@@ -533,7 +529,7 @@ def note_beyond_threshold(accounts, fdi, t):
     if fdi.config.scheme_number == PLUGIN_SCHEME:
         is_beyond = fdi.plugin_verdict.detected == 1
     else:
-        uses_statistics = weighs_statistics(detector.test, authority)
+        uses_statistics = weighs_statistics(detector, authority)
         ratio = detection_share(fdi.bank, detector.alarm, authority, uses_statistics)
         is_beyond = ratio > 1.0 or (sensor_monitor.has_alarm(monitor) and monitor.output.top_ratio > 1.0)
     if is_beyond:

@@ -266,7 +266,8 @@ def plugged(
             "n_estimators"
         ] = 0
         fdi["statistical"]["test"]["enabled"] = fdi["sensor_monitor"]["config"]["enabled"] = 0
-        fdi["config"]["scheme_number"], fdi["config"]["variant"] = PLUGIN_SCHEME, WORST_CASE_DETECTOR
+        fdi["config"]["scheme_number"] = PLUGIN_SCHEME
+        fdi["config"]["exclusion_authority"] = WORST_CASE_DETECTOR
         fdi["types"]["pair"]["enabled"] = 0
         n = fdi["types"]["surface"].size
         fdi["isolation"]["estimator"]["surface"][:n] = range(n)

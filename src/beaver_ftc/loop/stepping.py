@@ -78,8 +78,8 @@ def finish(frames, references, log):
 def detection_share(frames):
     """The built-in detection's statistic at this frame: see schemes.detection_share."""
     fdi = frames[0].fdi
-    alarm, authority = fdi.statistical.alarm, fdi.config.authority
-    return largest_statistic(fdi.bank, alarm, authority, weighs_statistics(fdi.statistical.test, authority))
+    stat, authority = fdi.statistical, fdi.config.authority
+    return largest_statistic(fdi.bank, stat.alarm, authority, weighs_statistics(stat, authority))
 
 
 @kernel

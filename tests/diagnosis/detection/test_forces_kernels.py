@@ -12,8 +12,8 @@ from beaver_ftc.diagnosis.detection import forces
 from beaver_ftc.diagnosis.detection.forces import (
     NORMAL_INDEX,
     SIDE_INDEX,
-    configure_forces,
 )
+from beaver_ftc.diagnosis.detection.forces_design import configure_forces
 from beaver_ftc.diagnosis.detection.rows import INERTIAL, RAW, update_forces
 from beaver_ftc.diagnosis.state import SIDE_FORCE
 from beaver_ftc.plant.instruments import MEASURED

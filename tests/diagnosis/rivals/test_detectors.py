@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.design.context import Context, Declared
+from beaver_ftc.design.context import Context, DeclaredErrors
 from beaver_ftc.diagnosis import Measured
 from beaver_ftc.diagnosis.rivals.rls import InputOutputPredictionTest
 from beaver_ftc.plugins import DETECTORS, plugin_class
@@ -35,10 +35,10 @@ class Damped(Still):
 def context(declared=None, model=None, **options):
     limits = np.array([[-1.0] * 4, [1.0] * 4])
     return Context(DT, 1, model or Still(), np.zeros(3), np.zeros(5), np.zeros(4), limits, BOUND, np.zeros(3),
-                   options=options, declared=declared or Declared())  # fmt: skip
+                   options=options, declared=declared or DeclaredErrors())  # fmt: skip
 
 
-GUSTY = Declared(
+GUSTY = DeclaredErrors(
     noise=np.array([3e-4] * 3 + [0.0] * 4),
     gust_rad_s=np.array([0.05, 0.03, 0.03]),
     gust_time_s=np.array([0.8, 0.4, 0.3]),
@@ -55,7 +55,7 @@ def flight(theta=(0.0, 0.0, 0.0), at_s=AT_S, noise=0.02, extra=0.0, duration_s=1
     """
     rng = np.random.default_rng(seed)
     x = np.zeros(3)
-    air = air or Declared(gust_time_s=np.ones(3))
+    air = air or DeclaredErrors(gust_time_s=np.ones(3))
     gust, keep = air.gust_rad_s * rng.normal(size=3), np.exp(-DT / air.gust_time_s)
     moments, acceleration, contribution = np.zeros(3), np.zeros(3), np.zeros((3, 4))
     for k in range(round(duration_s / DT)):

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from kernels import new_fdi, on, put_on
 
 from beaver_ftc.diagnosis import types
-from beaver_ftc.diagnosis.types import registry, release
+from beaver_ftc.diagnosis.types import examination, registry, release
 from beaver_ftc.diagnosis.types.registry import N_TYPES, TYPES
 from beaver_ftc.diagnosis.types.table import commanded_surface
 from fault_kinds import (
@@ -37,7 +37,7 @@ def new_surface(left=ALL, low=-0.01, high=0.01, command=0.0, **fields):
     actuator = surface["actuator"]
     actuator["stop_lo"], actuator["stop_hi"], actuator["approaches"], actuator["steps"] = LOW, HIGH, 0.5, 0.1
     actuator["reach_lo"], actuator["reach_hi"] = LOW, HIGH
-    registry.restart_surface(surface)
+    examination.restart_surface(surface)
     surface["sets"]["low"][BIAS], surface["sets"]["high"][BIAS] = -np.inf, np.inf
     judged = surface["judged"]
     judged["lo"], judged["hi"], judged["u"] = low, high, command
@@ -230,7 +230,7 @@ def test_what_holds_a_surface_is_excluded_where_it_is_not(kind, inside, outside)
     for (low, high), excluded in ((inside, 0), (outside, 1)):
         fdi, surface = new_surface(low=low, high=high, k_first=3, first_lo=0.1, first_hi=0.2, runaway=1.0)
         surface["sets"]["low"][STUCK], surface["sets"]["high"][STUCK] = 0.05, 0.3
-        on(registry.judge_types, fdi, surface, 5)
+        on(examination.judge_types, fdi, surface, 5)
         assert surface["sets"]["excluded"][kind] == excluded
     if kind == STUCK:
         assert TYPES[kind].estimate_parameter(fdi, 0, kind) == pytest.approx(0.175)

@@ -3,8 +3,8 @@
 import numpy as np
 
 from beaver_ftc.aircraft import aircraft
-from beaver_ftc.diagnosis import bounds
-from beaver_ftc.diagnosis.detection import likelihood, statistical, statistical_design, tones
+from beaver_ftc.diagnosis import bounds, error_map
+from beaver_ftc.diagnosis.detection import filters, likelihood, statistical, statistical_design, tones
 from beaver_ftc.diagnosis.monitors import numbering, redundancy
 from beaver_ftc.plant import instruments
 from beaver_ftc.studies.present.tables import markdown_table
@@ -23,11 +23,11 @@ CONSTANTS = (  # (section, meaning, module, name there, unit)
     (
         2,
         "bound outside the boxes of a derived model",
-        bounds,
+        error_map,
         "UNMAPPED_ERROR_RAD_S2",
         "rad/s²",
     ),
-    (3, "design delays of the slower filters", bounds, "POLE_DELAYS_S", "s"),
+    (3, "design delays of the slower filters", filters, "POLE_DELAYS_S", "s"),
     (7, "number of onsets tested together", likelihood, "N_SLOTS", ""),
     (
         7,

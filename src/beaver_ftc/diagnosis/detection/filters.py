@@ -41,15 +41,18 @@ Symbols of the kernels:
     bank, bound, net          records: BANK_RECORD, `bound_dtype`, FDAE_NETWORK_RECORD
 """
 
-from math import exp
+from math import exp, log
 
 import numpy as np
 
+from beaver_ftc.aircraft import AXES
 from beaver_ftc.compiled import kernel, record, row_of
-from beaver_ftc.diagnosis.bounds import poles_for_delays
 from beaver_ftc.diagnosis.state import STATISTICAL_DETECTOR, WORST_CASE_DETECTOR
-from beaver_ftc.scenario.declared import Declared
+from beaver_ftc.scenario.declared import Declared, SensorErrors
 from beaver_ftc.scenario.diagnosis import MAX_POLES, FdiConfig
+from beaver_ftc.scenario.sensors import NOISE_LIMIT_SIGMA
+
+POLE_DELAYS_S = (0.1, 0.5, 2.0)  # within which a pole of the bank finds the smallest fault
 
 
 @kernel
@@ -99,6 +102,24 @@ BANK_CONFIG_RECORD = record(n_filters=int, a=MAX_POLES)
 BANK_MEMORY_RECORD = record(e=(MAX_POLES, 3))
 BANK_OUTPUT_RECORD = record(innovation=3, residual=(MAX_POLES, 3), threshold=(MAX_POLES, 3), peak=MAX_POLES)
 BANK_RECORD = record(config=BANK_CONFIG_RECORD, memory=BANK_MEMORY_RECORD, output=BANK_OUTPUT_RECORD)
+
+
+def poles_for_delays(errors: SensorErrors, eta: float) -> tuple[float, ...]:
+    """Poles (1/s) that find the smallest constant fault phi within each of POLE_DELAYS_S, despite gyro noise.
+
+    After T the residual is phi (1 - exp(-lam T)) / lam, its bound at most eta / lam + 2 nbar. The excess of
+    one over the other is greatest at lam = ln(phi T / (2 nbar)) / T; the smallest phi with any follows.
+    """
+    n2 = 2 * NOISE_LIMIT_SIGMA * float(errors.each("noise", AXES).max())
+    return tuple(_pole_for_delay(T, n2, eta) for T in POLE_DELAYS_S) if n2 > 0 else ()
+
+
+def _pole_for_delay(T: float, n2: float, eta: float) -> float:
+    phi = eta + 8.0 * n2 / T
+    for _ in range(50):
+        lam = max(log(phi * T / n2) / T, 0.1 / T)
+        phi = (n2 * lam + eta) / (1.0 - exp(-lam * T))
+    return lam
 
 
 def filter_poles(config: FdiConfig, declared: Declared) -> tuple[float, ...]:

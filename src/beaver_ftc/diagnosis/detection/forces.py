@@ -14,6 +14,8 @@ mass. Noise of the accelerometers is model noise; their declared bias and slope 
 The side force has a term in the rate of sideslip. It is worked out from the accelerometers. JSBSim uses the
 rate of the run before.
 
+forces_design.py fills the records from what a scenario declares.
+
 Letters of the kernels. i is the force, f its record, k a term or an axis, s a surface; a force over m c,
 like e, is in rad/s2.
 
@@ -28,22 +30,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from beaver_ftc.aircraft import AXES, Aircraft, Term
-from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S, FORCES
-from beaver_ftc.aircraft.schema import MAX_SURFACES, MAX_TERMS_OF_ONE, SIDESLIP_RATE
+from beaver_ftc.aircraft import Aircraft, Term
+from beaver_ftc.aircraft.schema import MAX_SURFACES, MAX_TERMS_OF_ONE
 from beaver_ftc.compiled import kernel, record
-from beaver_ftc.design.engine import slipstream_slopes
-from beaver_ftc.design.table import AIRSPEED, ALPHA, BETA, DPT, N_Y, QDYN
+from beaver_ftc.design.table import AIRSPEED, ALPHA, BETA, N_Y
 from beaver_ftc.diagnosis.gusts import drop_accelerometers
-from beaver_ftc.diagnosis.monitors.redundancy import EARTH_M_S2
-from beaver_ftc.diagnosis.state import PITCH, ROLL, SIDE_FORCE, YAW
-from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA
-from beaver_ftc.scenario.declared import MASS_TOLERANCE, Declared, SensorErrors
+from beaver_ftc.diagnosis.state import PITCH, YAW
 from beaver_ftc.scenario.sensors import ACCELEROMETERS
 
 
 class Force(NamedTuple):
-    """A force: its coefficient; its vane, in y and by name; the axis that it turns; its accelerometer."""
+    """A force: its coefficient; the vane of its flow angle, in y and by name; the axis about which that angle
+    turns the aircraft; its accelerometer."""
 
     coefficient: str
     vane: int
@@ -59,19 +57,9 @@ MEASURED_FORCES = (
 )
 FORCE_NAMES = tuple(force.coefficient for force in MEASURED_FORCES)
 VANES = tuple(force.vane for force in MEASURED_FORCES)
-SIDE_ROW = FORCES.index("CY")
-TYPICAL_RATE_RAD_S, TYPICAL_SLOPE_RAD = 0.2, 0.3  # typical rates and path slope, for the drift
 MIN_UPDATES = 2  # from the second one on the rate of sideslip of the run before is known
-# Time between force and flow of one instant in JSBSim, at most; 0.001 was measured.
-MAX_FORCE_LAG_S = 0.002
-DRIFT_CHANGE_PER_S = 0.3  # share of a drift that may change within a second
-# Tolerance of the term in the rate of sideslip, by whether the air moves: gusts have a part in it.
-SIDESLIP_RATE_TOLERANCES = {False: 0.05, True: 0.2}
-VANE_TOLERANCE = 0.1  # relative error of the effect of a vane's error: its column is that of the trim
 # The rate of sideslip, the bias of the accelerometer and the force as a whole come last.
 MAX_FORCE_REGRESSORS = MAX_TERMS_OF_ONE + 3
-
-TrimState = tuple[np.ndarray, np.ndarray, np.ndarray]  # x (3,) rad/s, y and u rad
 
 FORCE_RECORD = record(
     innovation=float,  # e at the start of the elapsed frame
@@ -140,20 +128,20 @@ def update_inertial(forces, f, i, y, dt):
 def fill_angle_rates(forces, gravity, meas):
     """Fill `angle_rate` with d beta / dt and d alpha / dt in still air, rad/s.
 
-        a = f + g      V_dot = e' a      (u, v, w)_dot = a - x x V e      e = V vector / V
+        a = a_m + g d      V_dot = e' a      (u, v, w)_dot = a - x x V e      e = V vector / V
         beta_dot = (v_dot - V_dot e_y) / (V cos beta)
         alpha_dot = (w_dot cos alpha - u_dot sin alpha) / (V cos beta)
 
-    f (3,) m/s2: accelerometers; g (3,): gravity in body axes, its size `gravity` m/s2; x (3,) rad/s.
+    a_m (3,) m/s2: accelerometers; g m/s2: gravity; d (3,): its direction in body axes; x (3,) rad/s.
     """
-    g, x, f = gravity, meas.x, meas.force
+    g, x, a_m = gravity, meas.x, meas.force
     phi, th = meas.attitude[0], meas.attitude[1]
     alpha, beta, V = meas.y[ALPHA], meas.y[BETA], meas.y[AIRSPEED]
     e_x, e_y = np.cos(alpha) * np.cos(beta), np.sin(beta)
     e_z = np.sin(alpha) * np.cos(beta)
-    a_x = f[0] - g * np.sin(th)
-    a_y = f[1] + g * np.cos(th) * np.sin(phi)
-    a_z = f[2] + g * np.cos(th) * np.cos(phi)
+    a_x = a_m[0] - g * np.sin(th)
+    a_y = a_m[1] + g * np.cos(th) * np.sin(phi)
+    a_z = a_m[2] + g * np.cos(th) * np.cos(phi)
     V_dot = e_x * a_x + e_y * a_y + e_z * a_z
     v_dot = a_y + V * (x[0] * e_z - x[2] * e_x)
     forces.angle_rate[SIDE_INDEX] = (v_dot - V_dot * e_y) / (V * np.cos(beta))
@@ -165,154 +153,3 @@ def fill_angle_rates(forces, gravity, meas):
 def terms_of_force(aircraft: Aircraft, i: int) -> list[Term]:
     """The terms of force i, as `update_force` goes through them."""
     return [term for term in aircraft.measurable_forces if term.coefficient == FORCE_NAMES[i]]
-
-
-def configure_forces(
-    fdi: np.void, declared: Declared, trim: TrimState, slopes: np.ndarray, dt: float
-) -> None:
-    """Fill the record of the forces from what is declared.
-
-    slopes (3, y.size): of the angular accelerations with y, in trim. dt s a frame.
-    """
-    y = trim[1]
-    stat = fdi["statistical"]
-    aircraft = declared.aircraft
-    errors = declared.sensors
-    forces = stat["forces"]
-    forces["c_inv"] = 1.0 / aircraft.geometry.chord_m
-    forces["q_trim"] = y[QDYN]
-    forces["q_noise"] = errors["qdyn"].random
-    CY_bdot = [t.value for t in aircraft.forces if t.coefficient == "CY" and t.of == ((SIDESLIP_RATE, 1),)]
-    forces["CY_bdot"] = sum(CY_bdot)
-    for i in range(2):
-        _configure_force(fdi, declared, trim, slopes, i, dt)
-
-
-def _configure_force(
-    fdi: np.void, declared: Declared, trim: TrimState, slopes: np.ndarray, i: int, dt: float
-) -> None:
-    """Fill the record of one force; the arguments are those of `configure_forces`."""
-    y = trim[1]
-    aircraft = declared.aircraft
-    errors = declared.sensors
-    forces = fdi["statistical"]["forces"]
-    cfg = fdi["statistical"]["gust"]["config"]
-    f = forces["component"][i]
-    terms = terms_of_force(aircraft, i)
-    force = MEASURED_FORCES[i]
-    per_C = y[QDYN] * cfg["S_m"] * forces["c_inv"]
-    f_all = per_C * _force_slopes(aircraft, force.coefficient, trim)
-    f_y = f_all[:-1]
-    f["vane"] = (-slopes[force.axis, force.vane], -f_y[force.vane])
-    f["vane_roll"] = -slopes[ROLL, force.vane]
-    f["L"] = f_y[3:]
-    f["var_trim"] = _force_variances(fdi, errors, y, f_all, force.vane)
-    std = errors[force.accelerometer].random
-    f["var_acc"] = (forces["c_inv"] * std) ** 2
-    drift = _drift_bound(errors, cfg["gravity"], y[AIRSPEED], i)
-    _configure_columns(fdi["statistical"]["rows"], f, declared, terms, y, f_y[force.vane] / per_C, drift, i)
-    for term in terms:
-        if term.surface:
-            f["G_trim"][aircraft.surfaces.index(term.surface)] += per_C * abs(term.value)
-    Q_angle = (DRIFT_CHANGE_PER_S * drift) ** 2 + dt * (std / y[AIRSPEED]) ** 2
-    f["Q_e"] = f_y[force.vane] ** 2 * (Q_angle + declared.air.angle_walk(y[AIRSPEED]))
-
-
-def _force_variances(
-    fdi: np.void, errors: SensorErrors, y: np.ndarray, f_all: np.ndarray, vane: int
-) -> tuple[float, float]:
-    """Variance of a predicted force by the noise of all readings, and without that of its vane.
-
-    f_all (7,): slopes of the force as of `_force_slopes`.
-    """
-    f_y = f_all[:-1].copy()
-    f_dpt = f_all[-1]
-    dpt_V, var_dpt = _slipstream_noise(y, fdi["bound"]["declared_errors"], errors)
-    f_y[AIRSPEED] += f_dpt * dpt_V
-    parts = (f_y * errors.each("random", ("alpha", "beta", "V", *AXES))) ** 2
-    var = parts.sum() + f_dpt**2 * var_dpt
-    return var, var - parts[vane]
-
-
-def _slipstream_noise(y: np.ndarray, declared_errors: np.void, errors: SensorErrors) -> tuple[float, float]:
-    """How dpt moves with the reading of the airspeed, s/m; its variance by those of pressure and power."""
-    if not declared_errors["engine"]:
-        return 0.0, 0.0
-    dpt_V, dpt_q, dpt_kw = slipstream_slopes(y, declared_errors["kw1"])
-    noise_kw = declared_errors["kw0"] / NOISE_LIMIT_SIGMA
-    return dpt_V, float((dpt_q * errors["qdyn"].random) ** 2 + (dpt_kw * noise_kw) ** 2)
-
-
-def _drift_bound(errors: SensorErrors, gravity: float, V: float, i: int) -> float:
-    """Bound the drift of the flow angle from inertial motion, rad/s. Gravity acts along the path's slope only
-    on the incidence, and in full on sideslip."""
-    attitude = errors["phi"].steady + errors["theta"].steady
-    gyros = sum(errors[name].steady + TYPICAL_RATE_RAD_S * errors[name].slope for name in AXES)
-    # how far accelerometers can be off across the flow in level flight: that of the axis, and of the one
-    # ahead as much as the flow's angle lets it
-    acc = errors[MEASURED_FORCES[i].accelerometer]
-    a_acc = (
-        acc.steady
-        + TYPICAL_SLOPE_RAD * errors["ax"].steady
-        + gravity * (acc.slope if i == NORMAL_INDEX else 0.0)
-    )
-    a_all = gravity * attitude * (TYPICAL_SLOPE_RAD if i == NORMAL_INDEX else 1.0) + EARTH_M_S2 + a_acc
-    return float(EARTH_RATE_RAD_S + gyros + a_all / V)
-
-
-def _configure_columns(
-    rows: np.void,
-    f: np.void,
-    declared: Declared,
-    terms: list[Term],
-    y: np.ndarray,
-    C_vane: float,
-    drift: float,
-    i: int,
-) -> None:
-    """Fill the tolerances of the force's columns: of each term, by that of the coefficients and by constant
-    errors of vane and pressure; of the rate of sideslip; of the accelerometer's bias, m/s2; of the whole; of
-    the drift, rad/s. Fill the columns of an error of the vane."""
-    tol_C = declared.coefficients.largest
-    errors = declared.sensors
-    force = MEASURED_FORCES[i]
-    vane = errors[force.vane_name]
-    acc = errors[force.accelerometer]
-    tol_q = errors["qdyn"].steady / y[QDYN] + errors["qdyn"].slope
-    tol = [
-        (tol_C + tol_q + vane.slope) * abs(t.value) + t.is_constant * vane.steady * abs(C_vane) for t in terms
-    ]
-    first = int(rows["first"][i])
-    if i == SIDE_INDEX:
-        tol.append(tol_C + SIDESLIP_RATE_TOLERANCES[declared.air.moves])
-    if acc.steady:
-        rows["Z"][first + len(tol), SIDE_FORCE + i] = 1.0 / declared.aircraft.geometry.chord_m
-        tol.append(acc.steady)
-    tol += [MASS_TOLERANCE + acc.slope, drift]
-    f["n_Z"], rows["tol"][first : first + len(tol)] = len(tol) - 1, tol
-    of_vane = rows["G"][MAX_SURFACES + i]
-    of_vane[[ROLL, force.axis, SIDE_FORCE + i]] = f["vane_roll"], *f["vane"]
-    rows["e_G"][MAX_SURFACES + i] = VANE_TOLERANCE * np.abs(of_vane)
-
-
-def _force_coefficient(aircraft: Aircraft, name: str, state: TrimState) -> float:
-    """The force coefficient `name` at x (3,) rad/s, y, u rad."""
-    x, y, u = state
-    geometry = aircraft.geometry
-    V = y[AIRSPEED]
-    rates = x * (geometry.span_m / (2.0 * V), geometry.chord_m / V, geometry.span_m / (2.0 * V))
-    values = dict(zip(aircraft.surfaces, u, strict=True)) | dict(zip(aircraft.signals, y[4:], strict=True))
-    values |= dict(
-        zip(("alpha", "beta", "ph", "qh", "rh", SIDESLIP_RATE), (y[0], y[1], *rates, 0.0), strict=True)
-    )
-    return float(aircraft.coefficient(name, values))
-
-
-def _force_slopes(aircraft: Aircraft, name: str, trim: TrimState) -> np.ndarray:
-    """(7,): its derivatives with alpha, beta (1/rad), airspeed (s/m), rates (s/rad), dpt, by differences."""
-    (x, y, u), step = trim, 1e-5
-    states = [(x, y + step * e, u) for e in np.eye(3, y.size)]
-    states += [(x + step * e, y, u) for e in np.eye(3)]
-    states += [(x, y + step * (np.arange(y.size) == DPT), u)]
-    C = _force_coefficient(aircraft, name, trim)
-    return np.array([(_force_coefficient(aircraft, name, state) - C) / step for state in states])

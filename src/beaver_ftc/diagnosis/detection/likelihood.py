@@ -87,6 +87,7 @@ from beaver_ftc.diagnosis.state import LOSS
 # The last: roll and yaw again, with a drift that returns to zero.
 PITCH_BLOCK, LATERAL_BLOCK, REVERTING_BLOCK = 0, 1, 2
 N_FILTER_BLOCKS = 3
+D0 = 2  # in the state of a filter: the place of d, after e of two axes
 N_SLOTS = 10
 N_INPUT_READINGS = 5  # alpha, beta, airspeed, dynamic pressure, engine power: rows.py
 N_ROWS = 5  # roll, pitch, yaw, side force, normal force: rows.py
@@ -273,14 +274,14 @@ def whiten_step(b, x, v, dt, g):
     x (4,): e, d; advanced in place. g (2,) rad/s, filled: of the innovation it has the covariance S.
     """
     for i in range(b.n):
-        g[i] = x[i] + dt * (v[i] - x[2 + i])
+        g[i] = x[i] + dt * (v[i] - x[D0 + i])
     for i in range(b.n):
         e, d = g[i], 0.0
         for j in range(b.n):
             e -= b.K_x[i, j] * g[j]
             d += b.K_d[i, j] * g[j]
         x[i] = e
-        x[2 + i] = b.a * x[2 + i] + d
+        x[D0 + i] = b.a * x[D0 + i] + d
 
 
 @kernel
@@ -399,15 +400,15 @@ def accumulate_tests(b, t, n, dt, decay):
     x, g_s, w, a, N_c = t.x_s, t.g_s, t.w, b.a, t.correlation_from_coarse_gust
     for i in range(b.n):
         for k in range(n):
-            g_s[i, k] = x[i, k] + dt * (t.s[i, k] - x[2 + i, k])
+            g_s[i, k] = x[i, k] + dt * (t.s[i, k] - x[D0 + i, k])
             x[i, k] = g_s[i, k]
-            x[2 + i, k] *= a
+            x[D0 + i, k] *= a
     for i in range(b.n):
         for j in range(b.n):
             K_x, K_d = b.K_x[i, j], b.K_d[i, j]
             for k in range(n):
                 x[i, k] -= K_x * g_s[j, k]
-                x[2 + i, k] += K_d * g_s[j, k]
+                x[D0 + i, k] += K_d * g_s[j, k]
         S_0, S_1, g, p, g_c = b.S_inv[i, 0], b.S_inv[i, 1], b.g[i], b.p[i], b.g_c[i]
         keep, c, r, r_w = 1.0 if i else decay, b.eta_0[i], b.eta_r[i], b.eta_rate * b.eta_r[i]
         for k in range(n):

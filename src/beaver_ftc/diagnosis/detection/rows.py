@@ -27,6 +27,7 @@ Letters of the kernels, in addition to those of statistical.py: r is a row, c a 
 import numpy as np
 
 from beaver_ftc.aircraft import AXES
+from beaver_ftc.aircraft.aircraft import FORCES
 from beaver_ftc.aircraft.schema import MAX_MONOMIALS, MAX_SURFACES, MAX_TERMS
 from beaver_ftc.compiled import kernel, record, row_of
 from beaver_ftc.design.engine import slipstream_slopes
@@ -44,18 +45,17 @@ from beaver_ftc.design.table import (
     regressors,
     whole_sum,
 )
-from beaver_ftc.diagnosis.bounds import OFF_MAP_RAD_S2, add_published_bound, extra_bound
+from beaver_ftc.diagnosis.bounds import add_published_bound
 from beaver_ftc.diagnosis.detection.filters import project
 from beaver_ftc.diagnosis.detection.forces import (
-    MAX_FORCE_LAG_S,
     MAX_FORCE_REGRESSORS,
     MIN_UPDATES,
     SIDE_INDEX,
-    SIDE_ROW,
     fill_angle_rates,
     update_inertial,
 )
 from beaver_ftc.diagnosis.detection.likelihood import ALPHA_CUBED_MOMENT, N_INPUT_READINGS, N_ROWS
+from beaver_ftc.diagnosis.error_map import extra_bound
 from beaver_ftc.diagnosis.state import PITCH, SIDE_FORCE
 from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA
 from beaver_ftc.scenario.declared import SensorErrors
@@ -65,7 +65,13 @@ from beaver_ftc.scenario.declared import SensorErrors
 # inertial motion, and the rates do not count.
 RAW, RATES, VANED, VANELESS, INERTIAL = range(5)
 MAX_COLUMNS = MAX_TERMS + N_INPUT_READINGS + 2 * (MAX_FORCE_REGRESSORS + 1)
+# Time between force and flow of one instant in JSBSim, at most; 0.001 was measured.
+MAX_FORCE_LAG_S = 0.002
 MIN_GYRO_STD_RAD_S = 1e-9  # of an exact gyro: with a variance of 0 the filters' S would be singular
+# The mapped error outside the map for filters with a covariance, whose noise is 1e-4: above the acceleration
+# of any aircraft.
+OFF_MAP_RAD_S2 = 100.0
+_SIDE_ROW = FORCES.index("CY")
 _READING_OF = {"alpha": ALPHA, "beta": BETA, "V": AIRSPEED, "qdyn": QDYN}
 _KW_READING = N_INPUT_READINGS - 1  # of the engine, kW
 _DPT = RH + 1  # the first of the declared signals
@@ -271,8 +277,8 @@ def add_terms(rows, forces, f, gust, i, meas, u):
     """
     table = gust.memory.table
     r = SIDE_FORCE + i
-    first = table.free_from[SIDE_ROW + i]
-    end = table.surface_to[SIDE_ROW + i]
+    first = table.free_from[_SIDE_ROW + i]
+    end = table.surface_to[_SIDE_ROW + i]
     c = rows.first[i] - first
     f_hat = 0.0
     per_C = meas.y[QDYN] * gust.config.S_m * forces.c_inv

@@ -27,11 +27,11 @@ from beaver_ftc.aircraft import AXES
 from beaver_ftc.aircraft.schema import MAX_SURFACES
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.design.table import AIRSPEED
-from beaver_ftc.diagnosis import gusts
 from beaver_ftc.diagnosis.detection import likelihood, parity
 from beaver_ftc.diagnosis.detection.attitude import attitude_dtype
 from beaver_ftc.diagnosis.detection.forces import FORCES_RECORD
 from beaver_ftc.diagnosis.detection.likelihood import (
+    D0,
     GROWING_LOSS,
     LATERAL_BLOCK,
     LOSS_END,
@@ -54,6 +54,10 @@ from beaver_ftc.diagnosis.detection.rows import (
 from beaver_ftc.diagnosis.detection.tones import TONE_RECORD
 from beaver_ftc.diagnosis.gusts import (
     GUST_RECORD,
+    begin_gust_sums,
+    fill_gust_effect,
+    unmeasured_drift,
+    update_gust,
 )
 from beaver_ftc.diagnosis.state import DAMAGE_EXCLUDES, LOSS
 
@@ -138,7 +142,7 @@ def fill_unmodelled(blocks, gust, out):
     """
     for b in blocks[: likelihood.REVERTING_BLOCK]:
         for i, axis in enumerate(b.axes[: b.n]):
-            out[axis] = b.x_known[2 + i] + gust.output.acc[axis]
+            out[axis] = b.x_known[D0 + i] + gust.output.acc[axis]
 
 
 @kernel
@@ -264,13 +268,13 @@ def prepare_tests(cfg, noise, rows, blocks, gust, bound, model, meas, u, dt):
     u (n,): positions of healthy surfaces.
     """
     if gust.output.gusty:
-        gusts.fill_gust_effect(gust, model, meas.x, meas.y, u)
+        fill_gust_effect(gust, model, meas.x, meas.y, u)
     begin_rows(cfg.w, noise, rows, bound, model, meas, u)
     fill_drift(noise, rows.eta[0], blocks, gust, meas.y[AIRSPEED], dt)
     if bound.error_map.n_boxes > 0:
         update_eta_rate(noise, blocks, bound.error_map, u)
     if gust.output.gusty:
-        gusts.begin_gust_sums(gust, meas.y[AIRSPEED], cfg.w * dt)
+        begin_gust_sums(gust, meas.y[AIRSPEED], cfg.w * dt)
 
 
 @kernel
@@ -292,7 +296,7 @@ def update_eta_rate(noise, blocks, emap, u):
 def add_test_instant(cfg, noise, rows, gust, bound, model, meas, u, dt):
     """Add an instant inside a frame, dt s after the instant before, to gust and rows."""
     if gust.output.gusty:
-        gusts.update_gust(gust, model, meas.x, meas.y, u, meas.attitude, dt)
+        update_gust(gust, model, meas.x, meas.y, u, meas.attitude, dt)
     add_constants(cfg.w, noise, rows, bound.declared_errors, model, meas, u)
 
 
@@ -307,7 +311,7 @@ def fill_drift(noise, eta, blocks, gust, V, dt):
         reverts, length = k == likelihood.REVERTING_BLOCK, b.drift_correlation_length_m
         for i, axis in enumerate(b.axes[: b.n]):
             for j in range(b.n):
-                q_gust = gusts.unmeasured_drift(gust, V, axis, b.axes[j], reverts) if gusty else 0.0
+                q_gust = unmeasured_drift(gust, V, axis, b.axes[j], reverts) if gusty else 0.0
                 b.Q_d[i, j] = b.Q_scale * q_gust
             q_eta = noise.q * max(eta[axis], likelihood.MIN_ETA_RAD_S2) ** 2
             b.Q_d[i, i] += q_eta

@@ -18,7 +18,7 @@ from beaver_ftc.design.model import jacobian
 from beaver_ftc.design.table import AIRSPEED, ALPHA, BETA, QDYN
 from beaver_ftc.diagnosis.detection import likelihood
 from beaver_ftc.diagnosis.detection.attitude import configure_attitude
-from beaver_ftc.diagnosis.detection.forces import TrimState, configure_forces
+from beaver_ftc.diagnosis.detection.forces_design import TrimState, configure_forces
 from beaver_ftc.diagnosis.detection.likelihood import (
     ALPHA_CUBED_MOMENT,
     GROWING_LOSS,

@@ -9,15 +9,17 @@ import numpy as np
 from beaver_ftc.plant.instruments import PHI, SENSORS, SIGNALS
 from beaver_ftc.scenario.sensors import ROWS
 
-# The tests by number; 0 to 2 are of turning about axis 0 to 2, 3 to 5 of phi, theta, psi. In each, a jump of
-# one reading appears at once: the rows of the sensors name it.
+# The tests by number. Each test is named by the sensor (scenario/sensors.py) whose jump it shows at once. The
+# tests of turning about the axes follow each other, and those of phi, theta, psi.
 TEST_NAMES = (
     "roll", "pitch", "yaw", "bank angle", "pitch angle", "heading", "speed", "incidence", "sideslip",
     "density", "climb", "engine speed", "manifold pressure",
 )  # fmt: skip
-TURN_TEST, ANGLE_TEST, SPEED_TEST, ALPHA_TEST, BETA_TEST, DENSITY_TEST, CLIMB_TEST = 0, 3, 6, 7, 8, 9, 10
-RPM_TEST, PRESSURE_TEST = 11, 12
 N_EQUATIONS = len(TEST_NAMES)  # then the tests of sensors that should equal another reading
+TURN_TEST, ANGLE_TEST = TEST_NAMES.index("roll"), TEST_NAMES.index("bank angle")
+SPEED_TEST, ALPHA_TEST, BETA_TEST, DENSITY_TEST, CLIMB_TEST, RPM_TEST, PRESSURE_TEST = range(
+    TEST_NAMES.index("speed"), N_EQUATIONS
+)
 _NAMED = [row.test for row in ROWS]
 SENSOR_OF = tuple(_NAMED.index(name) for name in TEST_NAMES)
 DUPLICATES = tuple((SENSORS.index(row.name), row.equal) for row in ROWS if row.equal is not None)

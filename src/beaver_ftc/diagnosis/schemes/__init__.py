@@ -30,7 +30,7 @@ from beaver_ftc.diagnosis.state import (
     STATISTICAL_DETECTOR,
     WORST_CASE_DETECTOR,
 )
-from beaver_ftc.diagnosis.types import registry
+from beaver_ftc.diagnosis.types import records
 from beaver_ftc.diagnosis.types.registry import SAME_NAME
 from beaver_ftc.diagnosis.types.verdict import DEDUCED_FAULTY, TYPE_UNDECIDED, name_remains
 from beaver_ftc.documents.errors import BadInput
@@ -45,7 +45,7 @@ def fdi_dtype(n: int, size: StatisticalSize = USUAL_SIZE) -> np.dtype:
     return record(
         config=state.SHARED_CONFIG_RECORD, bound=bound_dtype(n, size.n_map_boxes), bank=filters.BANK_RECORD,
         fdae=filters.FDAE_RECORD, verdict=conclusions.conclusion_dtype(n), layout=state.layout_dtype(n),
-        isolation=isolation.isolation_dtype(n), types=registry.fault_types_dtype(n),
+        isolation=isolation.isolation_dtype(n), types=records.fault_types_dtype(n),
         statistical=statistical.statistical_dtype(size), sensor_monitor=SENSOR_MONITOR_RECORD,
         published=zhang2005.PUBLISHED_RECORD, engine_monitor=monitors.ENGINE_MONITOR_RECORD,
         plugin_verdict=state.plugin_verdict_dtype(n),
@@ -57,7 +57,6 @@ def configure_diagnosis(fdi: np.void, pred: np.void, declared: Declared, travel:
     config, aircraft, dt = declared.fdi, declared.aircraft, 1.0 / declared.rate_hz
     rows = isolation.list_estimators(config.fault_class, aircraft)
     state.configure_shared(fdi["config"], declared)
-    fdi["config"]["variant"] = adaptive_estimators.whose_exclusions(config)
     state.configure_layout(fdi["layout"], rows, aircraft)
     isolation.configure_isolation(fdi["isolation"], declared, rows, travel)
     if config.pairs:
@@ -68,7 +67,7 @@ def configure_diagnosis(fdi: np.void, pred: np.void, declared: Declared, travel:
     monitors.configure_balance(fdi["engine_monitor"]["config"], aircraft)
     if config.is_published:
         zhang2005.reconfigure(fdi, declared, travel)
-    registry.configure_types(fdi["types"], fdi["layout"], pred["actuators"], declared, travel)
+    records.configure_types(fdi["types"], fdi["layout"], pred["actuators"], declared, travel)
     fdi["types"]["config"]["has_eG"] = fdi["bound"]["has_eG"]
     conclusions.reset_conclusion(fdi["verdict"])
 
@@ -192,7 +191,7 @@ def kernels_of_scheme(fdi: np.void) -> Iterator[Any]:
         yield ours.plugin_update if scheme == PLUGIN_SCHEME else ours.update_verdict
         if cfg["diagnoses_all_types"]:
             yield from (ours.begin_types, ours.record_orders, ours.decide_type)
-        if cfg["variant"] != WORST_CASE_DETECTOR:
+        if cfg["exclusion_authority"] != WORST_CASE_DETECTOR:
             yield ours.weigh_position if cfg["diagnoses_all_types"] else ours.weigh_loss
         if fdi["statistical"]["test"]["enabled"]:
             yield from (ours.update_tests, ours.prepare_gusts)

@@ -3,7 +3,7 @@
 The acceleration by known faults is part of the prediction, so the estimator of the unknown explains the rest.
 The verdict of a Python plug-in replaces ours; our estimators run on, because the laws use them.
 
-The isolation depends on the fault class, and on the detectors whose exclusions count (`variant`):
+The isolation depends on the fault class, and on the detectors whose exclusions count (`exclusion_authority`):
 
     class        of the bank of estimators excludes  and decides
     published    worst case, likelihoods, or either  the estimator that is left: a loss of one surface
@@ -19,15 +19,12 @@ from beaver_ftc.diagnosis.detection.rows import finish_rows, update_forces
 from beaver_ftc.diagnosis.model_prediction import fill_old_effects, innovation_known
 from beaver_ftc.diagnosis.monitors import sensor_monitor
 from beaver_ftc.diagnosis.state import (
-    AUTHORITIES,
-    EITHER_DETECTOR,
     STATISTICAL_DETECTOR,
     UNANTICIPATED,
     WORST_CASE_DETECTOR,
     YAW,
 )
-from beaver_ftc.diagnosis.types import pairs, registry, verdict
-from beaver_ftc.scenario.diagnosis import FdiConfig
+from beaver_ftc.diagnosis.types import examination, pairs, verdict
 
 
 @kernel
@@ -108,8 +105,8 @@ def isolate(fdi, meas, t, started):
     cfg, iso, bank = fdi.config, fdi.isolation, fdi.bank
     for j, fie in enumerate(iso.estimator[: iso.config.n_estimators]):
         possible = isolation.fault_possible(iso, fie, bank, fdi.bound.nu_max, cfg.abrupt, meas.x, started)
-        possible = possible or cfg.variant == STATISTICAL_DETECTOR
-        if possible and cfg.variant != WORST_CASE_DETECTOR:
+        possible = possible or cfg.exclusion_authority == STATISTICAL_DETECTOR
+        if possible and cfg.exclusion_authority != WORST_CASE_DETECTOR:
             if cfg.diagnoses_all_types:
                 weigh_position(fdi, j)
             else:
@@ -132,7 +129,7 @@ def decide_type(fdi, t, started):
     if in_pairs:
         pairs.observe_pairs(types, layout, fies, bank, bound.nu_max)
     elif started or fdi.isolation.config.reach:
-        registry.observe_frame(types, layout, fies, bank.output.innovation, bound)
+        examination.observe_frame(types, layout, fies, bank.output.innovation, bound)
     if sensor_monitor.doubts_gyros(fdi.sensor_monitor):
         return
     if in_pairs:
@@ -145,22 +142,13 @@ def decide_type(fdi, t, started):
 @apart
 def begin_types(fdi):
     """Start the feasible sets of all types at the alarm, with no knowledge of any fault."""
-    registry.restart_types(fdi.types)
+    examination.restart_types(fdi.types)
 
 
 @apart
 def record_orders(fdi, prediction):
     """Record what each surface was commanded in the elapsed frame."""
-    registry.record_commands(fdi.types, prediction.commanded, prediction.means)
-
-
-def whose_exclusions(config: FdiConfig) -> int:
-    """The detector whose exclusions count: EITHER_DETECTOR, WORST_CASE_DETECTOR or STATISTICAL_DETECTOR. The
-    worst case excludes types of fault for any authority."""
-    if not config.weighs_chance:
-        return WORST_CASE_DETECTOR
-    authority = AUTHORITIES[config.authority]
-    return EITHER_DETECTOR if (config.fault_class, authority) == ("all", STATISTICAL_DETECTOR) else authority
+    examination.record_commands(fdi.types, prediction.commanded, prediction.means)
 
 
 @apart(long_loops=True)

@@ -28,16 +28,16 @@ A file under table/ describes fault types; its `TYPES` are the rows. This file s
 - Observations: where the surface was, if it alone is at fault, in three frames or blocks:
   `last` is of the elapsed frame, `judged` of the one before it, `earlier` of the one before that; rad.
 
-registry.py reads the rows into arrays and records; in each frame it finds where each surface was and tests
-every type. verdict.py and pairs.py conclude; they name no type.
+registry.py reads the rows into arrays, and records.py has the records. In each frame examination.py finds
+where each surface was and tests every type. verdict.py and pairs.py conclude; they name no type.
 
-    s, srf          surface, and its record (`registry.surface_types_dtype`)
+    s, srf          surface, and its record (`records.surface_types_dtype`)
     h               type: its number, the same in every array over types
     k               judged frame, the one before the elapsed
     u, p            command and deflection of the surface, rad; u is where a healthy one is
     lo, hi          interval, rad
     nu, nu_max (3,) innovation and its bound without a fault, rad/s2
-    c, M            TYPES_CONFIG of registry.py, memory of a type
+    c, M            TYPES_CONFIG_RECORD of records.py, memory of a type
     est, fie, eff   estimators of the isolation, one of them, what it supposes of the frame (EFFECT_RECORD)
 """
 

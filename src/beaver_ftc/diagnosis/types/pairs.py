@@ -22,10 +22,10 @@ from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.state import LATERAL_GROUP, PITCH, PITCH_GROUP, ROLL, UNANTICIPATED, YAW
 from beaver_ftc.diagnosis.types import (
     GIVE_UP,
+    examination,
     forget_anomalies,
     last_error,
     observe_error,
-    registry,
     set_anomalous,
     verdict,
 )
@@ -86,8 +86,7 @@ def constant_range(c, srf, k):
 def observe_pitch(types, layout, est, nu, nu_max):
     """Set whether the frame is anomalous in pitch; after a second fault has begun, find where the second
     surface was."""
-    s1 = types.pair.first_pitch
-    if s1 != NO_SURFACE and not types.surface[s1].status.may_be_sole:
+    if has_second(types):
         locate_second(types, layout, est, nu, nu_max)
         return
     for s, srf in enumerate(types.surface):
@@ -122,10 +121,10 @@ def observe_pairs(types, layout, est, bank, nu_max):
     """Observe the elapsed frame, plane by plane, and judge the one before."""
     nu = bank.output.innovation
     latch_groups(types.pair, bank)
-    registry.observe_surfaces(types, layout, est, nu, nu_max)
+    examination.observe_surfaces(types, layout, est, nu, nu_max)
     locate_lateral(types, layout, est, nu, nu_max)
     observe_pitch(types, layout, est, nu, nu_max)
-    registry.judge_frame(types)
+    examination.judge_frame(types)
 
 
 @kernel
@@ -148,7 +147,8 @@ def isolate_lateral(types, layout, t):
 
 @kernel
 def store_first(types, s):
-    """Keep what is known of the one pitch fault, and again when fewer types have been left for a while.
+    """Store the sets of the first pitch fault; store them again once fewer types have been left for
+    `half_frames`.
 
     What refutes a type may be a second fault that begins to show, and is about to refute all of them.
     """
@@ -165,14 +165,25 @@ def store_first(types, s):
 
 
 @kernel
-def begin_second(types, layout):
-    """The one known pitch fault no longer explains the flight: there is a second fault."""
-    srf1 = types.surface[types.pair.first_pitch]
-    srf2 = types.surface[layout.partner[types.pair.first_pitch]]
+def has_second(types):
+    """Whether a second pitch fault has begun."""
+    s1 = types.pair.first_pitch
+    return s1 != NO_SURFACE and not types.surface[s1].status.may_be_sole
+
+
+@kernel
+def begin_second_if_shown(types, layout):
+    """Begin the diagnosis of a second pitch fault when the one known fault no longer explains the flight."""
+    s1 = types.pair.first_pitch
+    if s1 == NO_SURFACE or layout.partner[s1] < 0 or has_second(types):
+        return
+    srf1, srf2 = types.surface[s1], types.surface[layout.partner[s1]]
+    if can_be_faulty(srf1) and constant_remains(srf1):
+        return
     srf1.sets.low[:] = srf1.first_sets.low
     srf1.sets.high[:] = srf1.first_sets.high
     srf1.sets.excluded[:] = srf1.first_sets.excluded
-    registry.restart_surface(srf2)
+    examination.restart_surface(srf2)
     for srf in (srf1, srf2):
         srf.status.may_be_sole, srf.status.basis = 0, verdict.DEDUCED_FAULTY
         forget_anomalies(srf)
@@ -188,28 +199,23 @@ def dismiss_varying(c, srf):
 
 
 @kernel
-def detect_second(types, layout):
-    """Whether a second pitch fault has shown in addition to the known one."""
-    if types.pair.first_pitch == NO_SURFACE or layout.partner[types.pair.first_pitch] < 0:
-        return False
+def update_second(types, layout, t):
+    """Update which of the two surfaces of pitch are at fault, after a second fault has begun."""
     srf1 = types.surface[types.pair.first_pitch]
-    if srf1.status.may_be_sole and not (can_be_faulty(srf1) and constant_remains(srf1)):
-        begin_second(types, layout)
-    return not srf1.status.may_be_sole
+    srf2 = types.surface[layout.partner[types.pair.first_pitch]]
+    anomalous = srf2.evidence.n_anomalous > 0
+    possible = can_be_faulty(srf2) and verdict.left(srf2, ALL)
+    verdict.update_status(srf1, possible or not anomalous, srf1.status.fault_type, t)
+    shows = anomalous and possible and verdict.explains_flight(srf2)
+    verdict.update_status(srf2, shows, verdict.type_on_surface(types.config, srf2), t)
 
 
 @kernel
 def isolate_pitch(types, layout, t):
     """Which surface of pitch is at fault, if any."""
-    if detect_second(types, layout):
-        srf1 = types.surface[types.pair.first_pitch]
-        s2 = layout.partner[types.pair.first_pitch]
-        srf2 = types.surface[s2]
-        anomalous = srf2.evidence.n_anomalous > 0
-        possible = can_be_faulty(srf2) and verdict.left(srf2, ALL)
-        verdict.update_status(srf1, possible or not anomalous, srf1.status.fault_type, t)
-        shows = anomalous and possible and verdict.explains_flight(srf2)
-        verdict.update_status(srf2, shows, verdict.type_on_surface(types.config, srf2), t)
+    begin_second_if_shown(types, layout)
+    if has_second(types):
+        update_second(types, layout, t)
         return
     sole = sole_pitch(types, layout)
     for s, srf in enumerate(types.surface):
@@ -238,12 +244,10 @@ def decide_pairs(types, past, layout, t):
     """
     outside = isolate_lateral(types, layout, t)
     isolate_pitch(types, layout, t)
-    first = NO_SURFACE
+    first, earliest_s = NO_SURFACE, np.inf
     for s, srf in enumerate(types.surface):
-        status = srf.status
-        earliest = types.surface[max(first, 0)].status
-        if status.is_isolated and (first < 0 or status.isolated_at_s < earliest.isolated_at_s):
-            first = s
+        if srf.status.is_isolated and srf.status.isolated_at_s < earliest_s:
+            first, earliest_s = s, srf.status.isolated_at_s
     if first == NO_SURFACE and outside:
         first = UNANTICIPATED
     return verdict.finding_on_surface(types, past, layout, first, t)

@@ -1,0 +1,159 @@
+"""The records of the forces as they follow from what a scenario declares.
+
+Letters as in forces.py; y, x, u of a `TrimState` are in trim.
+"""
+
+import numpy as np
+
+from beaver_ftc.aircraft import AXES, Aircraft
+from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S
+from beaver_ftc.aircraft.schema import MAX_SURFACES, SIDESLIP_RATE
+from beaver_ftc.design.engine import slipstream_slopes
+from beaver_ftc.design.table import AIRSPEED, DPT, QDYN
+from beaver_ftc.diagnosis.detection.forces import MEASURED_FORCES, NORMAL_INDEX, SIDE_INDEX, terms_of_force
+from beaver_ftc.diagnosis.monitors.redundancy import EARTH_M_S2
+from beaver_ftc.diagnosis.state import ROLL, SIDE_FORCE
+from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA
+from beaver_ftc.scenario.declared import MASS_TOLERANCE, Declared, SensorErrors
+
+TYPICAL_RATE_RAD_S, TYPICAL_SLOPE_RAD = 0.2, 0.3  # typical rates and path slope, for the drift
+DRIFT_CHANGE_PER_S = 0.3  # share of a drift that may change within a second
+# Tolerance of the term in the rate of sideslip, by whether the air moves: gusts have a part in it.
+SIDESLIP_RATE_TOLERANCES = {False: 0.05, True: 0.2}
+VANE_TOLERANCE = 0.1  # relative error of the effect of a vane's error: its column is that of the trim
+
+TrimState = tuple[np.ndarray, np.ndarray, np.ndarray]  # x (3,) rad/s, y and u rad
+
+
+def configure_forces(
+    fdi: np.void, declared: Declared, trim: TrimState, slopes: np.ndarray, dt: float
+) -> None:
+    """Fill the record of the forces from what is declared.
+
+    slopes (3, y.size): of the angular accelerations with y, in trim. dt s a frame.
+    """
+    stat, err = fdi["statistical"], fdi["bound"]["declared_errors"]
+    aircraft, forces = declared.aircraft, stat["forces"]
+    forces["c_inv"] = 1.0 / aircraft.geometry.chord_m
+    forces["q_trim"] = trim[1][QDYN]
+    forces["q_noise"] = declared.sensors["qdyn"].random
+    CY_bdot = [t.value for t in aircraft.forces if t.coefficient == "CY" and t.of == ((SIDESLIP_RATE, 1),)]
+    forces["CY_bdot"] = sum(CY_bdot)
+    for i in range(2):
+        _configure_force(stat, err, declared, trim, slopes, i, dt)
+
+
+def _configure_force(
+    stat: np.void, err: np.void, declared: Declared, trim: TrimState, slopes: np.ndarray, i: int, dt: float
+) -> None:
+    """Fill the record of force i; stat: of the detector, err: of the declared errors, other arguments as of
+    `configure_forces`."""
+    y, aircraft, errors = trim[1], declared.aircraft, declared.sensors
+    forces, cfg = stat["forces"], stat["gust"]["config"]
+    f, force = forces["component"][i], MEASURED_FORCES[i]
+    per_C = y[QDYN] * cfg["S_m"] * forces["c_inv"]
+    f_all = per_C * _force_slopes(aircraft, force.coefficient, trim)
+    f_y = f_all[:-1]
+    f["vane"] = (-slopes[force.axis, force.vane], -f_y[force.vane])
+    f["vane_roll"] = -slopes[ROLL, force.vane]
+    f["L"] = f_y[3:]
+    f["var_trim"] = _force_variances(err, errors, y, f_all, force.vane)
+    std = errors[force.accelerometer].random
+    f["var_acc"] = (forces["c_inv"] * std) ** 2
+    drift = _drift_bound(errors, cfg["gravity"], y[AIRSPEED], i)
+    _configure_columns(stat, declared, y, f_y[force.vane] / per_C, drift, i)
+    for term in terms_of_force(aircraft, i):
+        if term.surface:
+            f["G_trim"][aircraft.surfaces.index(term.surface)] += per_C * abs(term.value)
+    Q_angle = (DRIFT_CHANGE_PER_S * drift) ** 2 + dt * (std / y[AIRSPEED]) ** 2
+    f["Q_e"] = f_y[force.vane] ** 2 * (Q_angle + declared.air.angle_walk(y[AIRSPEED]))
+
+
+def _force_variances(
+    err: np.void, errors: SensorErrors, y: np.ndarray, f_all: np.ndarray, vane: int
+) -> tuple[float, float]:
+    """Variance of a predicted force by the noise of all readings, and without that of its vane.
+
+    f_all (7,): slopes of the force as of `_force_slopes`.
+    """
+    f_y = f_all[:-1].copy()
+    f_dpt = f_all[-1]
+    dpt_V, var_dpt = _slipstream_noise(y, err, errors)
+    f_y[AIRSPEED] += f_dpt * dpt_V
+    parts = (f_y * errors.each("random", ("alpha", "beta", "V", *AXES))) ** 2
+    var = parts.sum() + f_dpt**2 * var_dpt
+    return var, var - parts[vane]
+
+
+def _slipstream_noise(y: np.ndarray, err: np.void, errors: SensorErrors) -> tuple[float, float]:
+    """How dpt moves with the reading of the airspeed, s/m; its variance by those of pressure and power."""
+    if not err["engine"]:
+        return 0.0, 0.0
+    dpt_V, dpt_q, dpt_kw = slipstream_slopes(y, err["kw1"])
+    noise_kw = err["kw0"] / NOISE_LIMIT_SIGMA
+    return dpt_V, float((dpt_q * errors["qdyn"].random) ** 2 + (dpt_kw * noise_kw) ** 2)
+
+
+def _drift_bound(errors: SensorErrors, gravity: float, V: float, i: int) -> float:
+    """Bound the drift of the flow angle from inertial motion, rad/s. An error of the attitude turns
+    gravity: in the incidence, only the component by the slope of the path acts; in sideslip, all of it."""
+    attitude = errors["phi"].steady + errors["theta"].steady
+    gyros = sum(errors[name].steady + TYPICAL_RATE_RAD_S * errors[name].slope for name in AXES)
+    # error of the accelerometers across the flow in level flight: all of that along the force, and of the one
+    # ahead the component by the slope of the flow
+    acc = errors[MEASURED_FORCES[i].accelerometer]
+    a_acc = (
+        acc.steady
+        + TYPICAL_SLOPE_RAD * errors["ax"].steady
+        + gravity * (acc.slope if i == NORMAL_INDEX else 0.0)
+    )
+    a_all = gravity * attitude * (TYPICAL_SLOPE_RAD if i == NORMAL_INDEX else 1.0) + EARTH_M_S2 + a_acc
+    return float(EARTH_RATE_RAD_S + gyros + a_all / V)
+
+
+def _configure_columns(
+    stat: np.void, declared: Declared, y: np.ndarray, C_vane: float, drift: float, i: int
+) -> None:
+    """Fill the tolerances of the columns of force i: of each term, by that of the coefficients and by
+    constant errors of vane and pressure; of the rate of sideslip; of the accelerometer's bias, m/s2; of the
+    whole; of the drift, rad/s. Fill the columns of an error of the vane."""
+    rows, f, force = stat["rows"], stat["forces"]["component"][i], MEASURED_FORCES[i]
+    tol_C, errors = declared.coefficients.largest, declared.sensors
+    vane, acc = errors[force.vane_name], errors[force.accelerometer]
+    tol_q = errors["qdyn"].steady / y[QDYN] + errors["qdyn"].slope
+    tol = [
+        (tol_C + tol_q + vane.slope) * abs(t.value) + t.is_constant * vane.steady * abs(C_vane)
+        for t in terms_of_force(declared.aircraft, i)
+    ]
+    first = int(rows["first"][i])
+    if i == SIDE_INDEX:
+        tol.append(tol_C + SIDESLIP_RATE_TOLERANCES[declared.air.moves])
+    if acc.steady:
+        rows["Z"][first + len(tol), SIDE_FORCE + i] = 1.0 / declared.aircraft.geometry.chord_m
+        tol.append(acc.steady)
+    tol += [MASS_TOLERANCE + acc.slope, drift]
+    f["n_Z"], rows["tol"][first : first + len(tol)] = len(tol) - 1, tol
+    of_vane = rows["G"][MAX_SURFACES + i]
+    of_vane[[ROLL, force.axis, SIDE_FORCE + i]] = f["vane_roll"], *f["vane"]
+    rows["e_G"][MAX_SURFACES + i] = VANE_TOLERANCE * np.abs(of_vane)
+
+
+def _force_coefficient(aircraft: Aircraft, name: str, state: TrimState) -> float:
+    """The force coefficient `name` at x (3,) rad/s, y, u rad."""
+    x, y, u = state
+    geometry = aircraft.geometry
+    V = y[AIRSPEED]
+    rates = x * (geometry.span_m / (2.0 * V), geometry.chord_m / V, geometry.span_m / (2.0 * V))
+    names = (*aircraft.surfaces, *aircraft.signals, "alpha", "beta", "ph", "qh", "rh", SIDESLIP_RATE)
+    values = dict(zip(names, (*u, *y[4:], *y[:2], *rates, 0.0), strict=True))
+    return float(aircraft.coefficient(name, values))
+
+
+def _force_slopes(aircraft: Aircraft, name: str, trim: TrimState) -> np.ndarray:
+    """(7,): its derivatives with alpha, beta (1/rad), airspeed (s/m), rates (s/rad), dpt, by differences."""
+    (x, y, u), step = trim, 1e-5
+    states = [(x, y + step * e, u) for e in np.eye(3, y.size)]
+    states += [(x + step * e, y, u) for e in np.eye(3)]
+    states += [(x, y + step * (np.arange(y.size) == DPT), u)]
+    C = _force_coefficient(aircraft, name, trim)
+    return np.array([(_force_coefficient(aircraft, name, state) - C) / step for state in states])

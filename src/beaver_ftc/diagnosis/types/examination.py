@@ -1,0 +1,220 @@
+"""The examination of a frame by every fault type.
+
+In each frame, or block of frames: where was each surface, and was anything wrong? A frame is judged one frame
+later: with several JSBSim frames in one of ours a fault may begin or end within a frame, which then shows a
+part of it; such a frame, next to a healthy one, is skipped.
+
+Where the noise of a gyro makes single frames uninformative, frames are examined in blocks. Summed over a
+block the innovation holds the noise of its two ends alone, n[k+N] - n[k]. So the mean over N frames has the
+bound
+
+    mean eta_bar + (nbar[k] + nbar[k+N]) / (N dt)
+
+which gives the mean position of the surface, weighted by its effectiveness G, whose sign stays. The weighted
+mean of a constant position, offset or effectiveness is exact; that of a varying one lies between its
+extremes. To the types a block is like a frame that consists of several JSBSim frames: a block next to a
+healthy one is skipped.
+
+types: of `fault_types_dtype`. estimators: those of the isolation, by the layout. bound: of `bound_dtype`.
+"""
+
+import numpy as np
+
+from beaver_ftc.compiled import kernel
+from beaver_ftc.diagnosis import isolation
+from beaver_ftc.diagnosis.types import (
+    GIVE_UP,
+    REST_EXCLUDES_TYPE,
+    REST_POSITION_IS_PARAMETER,
+    clip_travel,
+    copy_observation,
+    intersect_set,
+    observe_surface,
+    put_set,
+    release,
+    set_anomalous,
+)
+from beaver_ftc.diagnosis.types.records import N_KEPT
+from beaver_ftc.diagnosis.types.registry import (
+    HOLDS,
+    N_TYPES,
+    REST,
+    STOP_SIDE,
+    consistent_interval,
+    deflection_range,
+    parameter_range,
+    reset_memory,
+    see_frame,
+)
+
+
+@kernel
+def restart_types(types):
+    """Nothing is known of any surface yet."""
+    for srf in types.surface:
+        restart_surface(srf)
+
+
+@kernel
+def restart_surface(srf):
+    """Nothing is known of this surface yet."""
+    srf.sets.excluded[:] = 0
+    srf.last.lo, srf.last.hi = srf.actuator.reach_lo, srf.actuator.reach_hi
+    srf.evidence.k_first = -1
+    srf.evidence.n_anomalous = srf.evidence.n_rest = srf.evidence.n_unhidden = 0
+    for h in range(N_TYPES):
+        put_set(srf, h, parameter_range(h, srf, h))
+        reset_memory(h, srf, h)
+        release.allow_before(srf, h)
+
+
+@kernel
+def record_commands(types, u, ext):
+    """Add a frame to the commands u (n,) of the surfaces; ext: extremes, within it, of where healthy
+    surfaces were and of G, of a `model_prediction.frame_means_dtype`.
+    """
+    n = types.config.frames_per_block
+    for s, srf in enumerate(types.surface):
+        cmd = srf.commands
+        if types.block.n_so_far == 0:
+            for b in range(N_KEPT - 1, 0, -1):
+                cmd.history[b, :n] = cmd.history[b - 1, :n]
+                cmd.cmd_min[b], cmd.cmd_max[b] = (cmd.cmd_min[b - 1], cmd.cmd_max[b - 1])
+            cmd.u_min[1], cmd.u_max[1] = cmd.u_min[0], cmd.u_max[0]
+            cmd.cmd_min[0] = cmd.u_min[0] = cmd.G_min = np.inf
+            cmd.cmd_max[0] = cmd.u_max[0] = cmd.G_max = -np.inf
+        p = clip_travel(srf, u[s])
+        cmd.history[0, types.block.n_so_far] = p
+        cmd.cmd_min[0], cmd.cmd_max[0] = (min(cmd.cmd_min[0], p), max(cmd.cmd_max[0], p))
+        cmd.u_min[0] = min(cmd.u_min[0], ext.u_min[s])
+        cmd.u_max[0] = max(cmd.u_max[0], ext.u_max[s])
+        cmd.G_min = min(cmd.G_min, ext.G_min[s])
+        cmd.G_max = max(cmd.G_max, ext.G_max[s])
+
+
+@kernel
+def observe_surfaces(types, layout, est, nu, nu_max):
+    """Find where each surface was in the elapsed frame, or block, if it alone is at fault."""
+    anomalous = not isolation.eta_explains(nu, nu_max)
+    for s, srf in enumerate(types.surface):
+        copy_observation(srf.earlier, srf.judged)
+        copy_observation(srf.judged, srf.last)
+        set_anomalous(srf, anomalous)
+        fie, axis = est[layout.position[s]], layout.dominant_axis[s]
+        eff = fie.mean_effect if types.config.frames_per_block > 1 else fie.effect
+        observe_surface(types.config, srf, fie, axis, nu, nu_max, eff)
+
+
+@kernel
+def count_anomaly(srf):
+    """Count a frame as evidence, and as evidence since a stop could last hide a swing (`judge_frame`)."""
+    srf.evidence.n_anomalous += 1
+    srf.evidence.n_unhidden += 1
+
+
+@kernel
+def judge_types(c, srf, k):
+    """Test every type of one surface with the judged frame, in which something was wrong."""
+    ev, now = srf.evidence, srf.judged
+    if now.lo > now.hi:
+        return
+    if ev.k_first < 0:
+        (ev.k_first, ev.first_lo, ev.first_hi) = (k, now.lo, now.hi)
+    for h in range(N_TYPES):
+        if HOLDS[h]:
+            intersect_set(srf, h, release.held_set(c, srf, h, *deflection_range(h, c, srf, h, k)))
+        else:
+            intersect_set(srf, h, consistent_interval(h, c, srf, h, k))
+
+
+@kernel
+def judge_frame(types):
+    """Judge the frame before the elapsed one."""
+    c, k = types.config, types.frame_index - 1
+    returns = c.returns_lagged and types.frame_index > 0
+    for s, srf in enumerate(types.surface):
+        rests = c.abrupt and srf.accommodation.mode == GIVE_UP and not srf.judged.anomalous
+        judges = srf.judged.anomalous and (c.single_instant or (srf.earlier.anomalous and srf.last.anomalous))
+        for h in range(N_TYPES):
+            see_frame(h, c, srf, h, k, not (rests or judges))
+            if returns and HOLDS[h]:
+                lo, hi = deflection_range(h, c, srf, h, k if c.single_instant else k - 1)
+                release.begin_release(c, srf, h, lo, hi, STOP_SIDE[h])
+        if rests:
+            count_rest(types, s)
+        if judges:
+            count_anomaly(srf)
+            judge_types(c, srf, k)
+        # the judgement needs the positions with which the judged frame began; from here on those of the next
+        for h in range(N_TYPES):
+            if returns and HOLDS[h]:
+                release.advance_returns(c, srf, h)
+        if srf.judged.hides[0] or srf.judged.hides[1]:
+            srf.evidence.n_unhidden = 0
+    types.frame_index += 1
+
+
+@kernel
+def observe_frame(types, layout, est, nu, bound):
+    """Observe the elapsed frame, or the block that it completes, and judge the one before."""
+    if types.config.frames_per_block > 1:
+        extend_block(types, layout, est, nu, bound)
+        return
+    observe_surfaces(types, layout, est, nu, bound.nu_max)
+    judge_frame(types)
+
+
+@kernel
+def extend_block(types, layout, est, nu, bound):
+    """Add the elapsed frame to the means over its block; with the last frame, observe the block and judge
+    the one before:
+
+    nu_bound = mean eta_bar + (nbar[k] + nbar[k+N]) / (N dt)
+    """
+    c, block = types.config, types.block
+    share = 1.0 / c.frames_per_block
+    if block.n_so_far == 0:
+        block.nu[:] = block.nu_bound[:] = 0.0
+        block.n_start[:] = bound.n_old
+    for j in layout.position:
+        isolation.add_to_mean(est[j].mean_effect, est[j].effect, share, block.n_so_far == 0)
+    block.n_so_far += 1
+    for i in range(3):
+        block.nu[i] += share * nu[i]
+        block.nu_bound[i] += share * bound.eta_bar[i]
+        if block.n_so_far == c.frames_per_block:
+            block.nu_bound[i] += (block.n_start[i] + bound.n_gyro[i]) / c.block_duration_s
+    if block.n_so_far == c.frames_per_block:
+        block.n_so_far = 0
+        observe_surfaces(types, layout, est, block.nu, block.nu_bound)
+        judge_frame(types)
+
+
+@kernel
+def count_rest(types, s):
+    """A surface given up, and commanded to where it happens to be, shows by its quiet that it does not swing.
+
+    That is evidence against the other surfaces too, as far as only one of them all is in question. It takes a
+    fault that is declared to stay: of one that may go, the quiet may be that of health.
+    """
+    srf = types.surface[s]
+    if not agrees_at_rest(srf):
+        return
+    for i, other in enumerate(types.surface):
+        if i == s or (srf.status.may_be_sole and other.status.may_be_sole):
+            count_anomaly(other)
+    srf.evidence.n_rest += 1
+    if srf.evidence.n_rest > types.config.half_frames and not types.config.has_eG:
+        for h in range(N_TYPES):
+            if REST[h] == REST_EXCLUDES_TYPE:
+                srf.sets.excluded[h] = 1
+
+
+@kernel
+def agrees_at_rest(srf):
+    """Whether the judged frame agrees with where the surface is known to stand."""
+    for h in range(N_TYPES):
+        outside = srf.judged.lo > srf.sets.high[h] or srf.judged.hi < srf.sets.low[h]
+        if REST[h] == REST_POSITION_IS_PARAMETER and outside:
+            return False
+    return True

@@ -126,3 +126,11 @@ def steer_by_engines(engines, power, axes, layout, saturated, surfaces, airspeed
         for i in (PITCH, YAW):
             memory.wanted[i] += memory.serving[i, e] * u
         output.difference[e] = power_for(memory.thrust, 0.0, base, u) - base
+
+
+@kernel
+def release_engines(engines):
+    """Want nothing of the engines; `move_differences` brings them back to the common lever, step by step."""
+    engines.memory.wanted[:] = 0.0
+    engines.output.difference[:] = 0.0
+    engines.output.authority[:] = 0.0

@@ -153,14 +153,18 @@ def command_surfaces(control, assessment, faults, prediction, by_observer):
 
 @apart
 def complete(control, assessment, measured, t):
-    """Note whether the demand is met; what is missing in pitch and yaw is left to the engines, at t s."""
-    detected, out, surfaces = assessment.detected, control.allocation.output, control.surfaces
-    axes, layout, lever, engine = control.axes, control.layout, control.power, control.engines
+    """Note whether the demand is met; what is missing in pitch and yaw is left to the engines, at t s.
+    They serve from the alarm on, and at any time for a law that is informed of the truth."""
+    out, surfaces, axes, layout = control.allocation.output, control.surfaces, control.axes, control.layout
+    lever, engine, watched = control.power, control.engines, assessment.detected or control.config.informed
     allocation.note_shortfall(axes, out.command, layout, surfaces.output.lag, engine.output.authority)
     if lever.config.enabled:
-        watched = detected or control.config.informed
         lost = watched and power.pitch_is_lost(layout, surfaces, out.saturated, axes.shortfall)
         power.steer_by_power(lever, control.reference, measured.x, measured.y, watched, lost, t)
-    if engine.config.n > 0 and detected:
-        engines.steer_by_engines(engine, lever, axes, layout, out.saturated, surfaces, measured.y[AIRSPEED])
+    if engine.config.n > 0:
+        if watched:
+            airspeed = measured.y[AIRSPEED]
+            engines.steer_by_engines(engine, lever, axes, layout, out.saturated, surfaces, airspeed)
+        else:
+            engines.release_engines(engine)
         power.move_differences(lever, engine.output.difference, engine.config.n, engine.config.step)

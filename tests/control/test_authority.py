@@ -56,7 +56,13 @@ def test_a_shortfall_on_one_side_scales_the_reference_on_both_and_in_time_it_com
 def test_engines_serve_a_law_that_may_act_and_return_to_the_common_lever_when_it_may_not(law, detected):
     control = put(control_record(), law=law, least_effectiveness=0.1)
     config, difference = control["engines"]["config"], control["power"]["output"]["command"][1:3]
-    config["n"], config["high"], config["step"], config["part"], config["release"] = 2, 1.0, 0.01, 0.02, 0.01
+    config["n"], config["high"], config["step"], config["integral_gain"], config["release"] = (
+        2,
+        1.0,
+        0.01,
+        0.02,
+        0.01,
+    )
     config["B"][YAW, :2] = 0.5, -0.5
     control["engines"]["memory"]["problem"]["weight"][:2] = 1.0
     set_up_engine(control["engines"]["memory"]["thrust"], THRUST, 500.0)

@@ -102,7 +102,7 @@ def govern(reference, commanded, shortfall, authority_lost):
     dt = config.dt
     for i in range(3):
         scale = governor.scale[i] - dt * abs(shortfall[i]) / MISSED_RAD_S
-        if not config.steered:  # outer loops ask again for what was missed
+        if not config.steered:  # where outer loops steer, they ask again for what was missed
             governor.scale[i] = max(scale + dt / RECOVERY_S * (1.0 - scale), 0.0)
         rate, acceleration = output.governed_rate[i], output.governed_acceleration[i]
         rate, acceleration = advance(config, rate, acceleration, governor.scale[i] * commanded[i])

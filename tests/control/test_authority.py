@@ -7,11 +7,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from beaver_ftc.aircraft.schema import ThrustSection
 from beaver_ftc.control import allocation, laws
 from beaver_ftc.control.probe import advance_probe
-from law_records import fields, new_control
+from beaver_ftc.control.thrust import set_up_engine
+from beaver_ftc.design.table import AIRSPEED
+from beaver_ftc.diagnosis.state import YAW
+from beaver_ftc.loop.assembly import frame_dtype
+from law_records import RUDDER, fields, new_control, put
 
 DT = 0.01
+THRUST = ThrustSection(airspeed_mps=[20, 60], setting=[0, 1], force_n=[[0, 2000], [0, 1000]], lag_s=0.8)
 LOW, HIGH = np.array([-0.52, -0.49, -0.44, -0.1]), np.array([0.52, 0.49, 0.44, 1.03])
 
 
@@ -44,6 +50,38 @@ def test_a_shortfall_on_one_side_scales_the_reference_on_both_and_in_time_it_com
     for _ in range(round(5 * laws.RECOVERY_S / DT)):
         laws.govern(control["reference"], np.full(3, 0.05), control["axes"]["shortfall"], False)
     assert control["reference"]["output"]["governed_rate"] == pytest.approx(0.05, rel=0.01)
+
+
+@pytest.mark.parametrize(("law", "detected"), [("fault-tolerant", 1), ("oracle", 0)])
+def test_engines_serve_a_law_that_may_act_and_return_to_the_common_lever_when_it_may_not(law, detected):
+    control = put(control_record(), law=law, least_effectiveness=0.1)
+    config, difference = control["engines"]["config"], control["power"]["output"]["command"][1:3]
+    config["n"], config["high"], config["step"], config["integral_gain"], config["release"] = (
+        2,
+        1.0,
+        0.01,
+        0.02,
+        0.01,
+    )
+    config["B"][YAW, :2] = 0.5, -0.5
+    control["engines"]["memory"]["problem"]["weight"][:2] = 1.0
+    set_up_engine(control["engines"]["memory"]["thrust"], THRUST, 500.0)
+    control["power"]["output"]["command"][0] = 0.5
+    control["surfaces"]["output"]["effectiveness"][RUDDER] = 0.0
+    control["axes"]["demand"] = 0.0, 0.0, 0.2
+    frame = np.zeros(1, frame_dtype(4)).view(np.recarray)[0]
+    frame["assessment"]["detected"], frame["measured"]["y"][AIRSPEED] = detected, 30.0
+    for _ in range(20):
+        laws.complete(control, frame["assessment"], frame["measured"], 0.0)
+    moved = difference.copy()
+    assert moved[0] > 0.0 > moved[1]
+    control["config"]["informed"] = frame["assessment"]["detected"] = 0
+    laws.complete(control, frame["assessment"], frame["measured"], 0.0)
+    assert difference == pytest.approx(moved - np.sign(moved) * 0.01)
+    for _ in range(100):
+        laws.complete(control, frame["assessment"], frame["measured"], 0.0)
+    assert not difference.any()
+    assert not control["engines"]["output"]["authority"].any()
 
 
 class TestProbing:

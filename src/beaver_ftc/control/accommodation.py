@@ -29,7 +29,7 @@ SUPERVISOR = record(mode=int, n_modes=int, mode_at_s=MAX_EVENTS, mode_is=(int, M
 
 @kernel
 def next_mode(now, wanted):
-    """The mode to go to from `now`: whatever is wanted, but never past `adaptive`.
+    """The mode after `now`: the wanted one; from nominal always `adaptive` first.
 
     An isolation in the very frame of the alarm is acted upon one frame later, so that the published sequence
     (compensate the unknown, then use what is known of it) holds whatever the diagnosis is capable of.
@@ -83,7 +83,9 @@ def supervise(supervisor, wanted, t):
     """Go to the mode wanted, as far as that is allowed, and note every change; t s."""
     mode = next_mode(supervisor.mode, wanted)
     if mode != supervisor.mode or supervisor.n_modes == 0:
-        last = min(supervisor.n_modes, MAX_EVENTS - 1)  # of more than there is room for, the latest stays
+        last = min(
+            supervisor.n_modes, MAX_EVENTS - 1
+        )  # a full record keeps its last place for the latest change
         supervisor.mode_at_s[last], supervisor.mode_is[last] = t, mode
         supervisor.n_modes += 1
     supervisor.mode = mode
@@ -189,8 +191,8 @@ def usable_effectiveness(surfaces, s):
 
 @kernel
 def park_failed_surfaces(output, assessment, faults, informed):
-    """Park a surface that does not follow its command. Its trim is where it goes if it comes loose, and that
-    shows. From then on the reference is governed."""
+    """Park a surface that does not follow its command. It is commanded to its trim, so that a surface that
+    comes loose moves there, which the diagnosis detects. From then on the reference is governed."""
     for s in range(output.parked.size):
         immovable = informed and faults.immovable[s]
         fixed = assessment.accommodation_mode[s] == GIVE_UP and output.effectiveness[s] == 0.0

@@ -1,12 +1,12 @@
 """Engines as effectors: they take what surfaces no longer reach.
 
 Each engine turns the aircraft by its arms. A surface about an axis that is given up or at its stop leaves a
-part of the demand, the shortfall e. What the engines are to give is its integral,
+part of the demand, the shortfall e. The engines are to give its integral w,
 
     w' = e / T,   T = 2 lag            over the engines' own lag: w / demand = 1 / (T s (lag s + 1) + 1)
 
 which is damped by 0.7: they take the slow part; the fast one, which they could only answer late, is left to
-the aircraft's own damping [Burcham1997]. What they give is in the design model, by the moments of the engines
+the aircraft's own damping [Burcham1997]. Their moment is in the design model, by the moments of the engines
 among its signals, or the law's observer finds it: e is then what is left. Once the surfaces reach, w fades.
 
 Which engine gives what is constrained least squares (least_squares.py) over the accelerations u (m/s2 of the
@@ -33,10 +33,10 @@ from beaver_ftc.scenario.declared import Declared
 
 LEAST_LAG_S, RELEASE_S = 0.5, 20.0
 
-# n: how many; low, high: of the setting, step: in a frame; part, release: shares a frame. B (3, n) rad/s2 per
-# m/s2.
+# n: how many; low, high: of the setting, step: in a frame; integral_gain, release: shares a frame.
+# B (3, n) rad/s2 per m/s2.
 ENGINES_CONFIG = record(
-    n=int, low=float, high=float, step=float, part=float, release=float, B=(3, MAX_EFFECTORS)
+    n=int, low=float, high=float, step=float, integral_gain=float, release=float, B=(3, MAX_EFFECTORS)
 )  # fmt: skip
 # serving: rows of B of the axes they serve now; wanted (3,) rad/s2: w.
 ENGINES_MEMORY = record(
@@ -58,7 +58,7 @@ def configure_engines(engines: np.void, declared: Declared) -> None:
     config["n"] = len(aircraft.effectors)
     config["low"], config["high"] = low, high = named[1].range
     config["step"] = (high - low) / WHOLE_RANGE_S * dt
-    config["part"] = dt / (2.0 * max(thrust.lag_s if thrust else 0.0, LEAST_LAG_S))
+    config["integral_gain"] = dt / (2.0 * max(thrust.lag_s if thrust else 0.0, LEAST_LAG_S))
     config["release"] = dt / RELEASE_S
     mass, i = aircraft.mass, inertia_coefficients(aircraft.mass)
     set_up_engine(engines["memory"]["thrust"], thrust, mass.mass_kg)
@@ -69,7 +69,7 @@ def configure_engines(engines: np.void, declared: Declared) -> None:
         engines["memory"]["problem"]["weight"][e] = 1.0
 
 
-def effects_of(declared: Declared) -> np.ndarray:
+def effects_of_engines(declared: Declared) -> np.ndarray:
     """B (3, engines): rad/s2 about each axis per m/s2 of each engine that is an effector; of none (3, 0)."""
     engines = np.zeros(1, ENGINES)[0]
     configure_engines(engines, declared)
@@ -77,7 +77,7 @@ def effects_of(declared: Declared) -> np.ndarray:
 
 
 @kernel
-def reaches(layout, saturated, surfaces, i):
+def surface_reaches_demand(layout, saturated, surfaces, i):
     """Whether the surface that leads axis i is neither given up nor at its stop; saturated (n,)."""
     least = surfaces.config.least_effectiveness
     given_up = remaining(layout, surfaces.output.effectiveness, i) < least
@@ -85,13 +85,13 @@ def reaches(layout, saturated, surfaces, i):
 
 
 @kernel
-def want(config, memory, axes, layout, saturated, surfaces):
-    """Bring what they are to give to this frame."""
+def update_engine_demand(config, memory, axes, layout, saturated, surfaces):
+    """Advance w by a frame: release it where the surface reaches, else integrate e."""
     for i in (PITCH, YAW):
-        if reaches(layout, saturated, surfaces, i):
+        if surface_reaches_demand(layout, saturated, surfaces, i):
             memory.wanted[i] -= config.release * memory.wanted[i]
         else:
-            memory.wanted[i] += config.part * axes.shortfall[i]
+            memory.wanted[i] += config.integral_gain * axes.shortfall[i]
         for e in range(config.n):
             memory.serving[i, e] = config.B[i, e] if memory.wanted[i] != 0.0 else 0.0
 
@@ -106,9 +106,9 @@ def limit(config, memory, authority, base):
     for e in range(config.n):
         problem.low[e], problem.high[e] = -most, most
         for i in (PITCH, YAW):
-            one, other = config.B[i, e] * problem.low[e], config.B[i, e] * problem.high[e]
-            authority[0, i] += min(one, other)
-            authority[1, i] += max(one, other)
+            reach = abs(config.B[i, e] * most)
+            authority[0, i] -= reach
+            authority[1, i] += reach
 
 
 @apart
@@ -118,7 +118,7 @@ def steer_by_engines(engines, power, axes, layout, saturated, surfaces, airspeed
     look_up(memory.thrust, airspeed)
     base = power.output.command[0]
     limit(config, memory, output.authority, base)
-    want(config, memory, axes, layout, saturated, surfaces)
+    update_engine_demand(config, memory, axes, layout, saturated, surfaces)
     least_squares.solve(memory.problem, memory.serving, memory.wanted)
     memory.wanted[:] = 0.0  # what cannot be given is not integrated
     for e in range(config.n):
@@ -126,3 +126,11 @@ def steer_by_engines(engines, power, axes, layout, saturated, surfaces, airspeed
         for i in (PITCH, YAW):
             memory.wanted[i] += memory.serving[i, e] * u
         output.difference[e] = power_for(memory.thrust, 0.0, base, u) - base
+
+
+@kernel
+def release_engines(engines):
+    """Want nothing of the engines; `move_differences` brings them back to the common lever, step by step."""
+    engines.memory.wanted[:] = 0.0
+    engines.output.difference[:] = 0.0
+    engines.output.authority[:] = 0.0

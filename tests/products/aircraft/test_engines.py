@@ -80,7 +80,7 @@ def records(jet, lag_s):
     """What the law of the jet keeps, its rudder given up; the engines' table is a straight line."""
     control = np.zeros(1, control_dtype(3)).view(np.recarray)[0]
     engines.configure_engines(control["engines"], Declared.of(scenario(jet, rate_hz=100)))
-    control["engines"]["config"]["part"] = DT / (2.0 * lag_s)
+    control["engines"]["config"]["integral_gain"] = DT / (2.0 * lag_s)
     control["power"] = np.zeros(1, POWER)[0]
     control["power"]["output"]["command"][0] = 0.5
     control["layout"]["main"], control["layout"]["authority"] = (0, 1, 2), np.eye(3)

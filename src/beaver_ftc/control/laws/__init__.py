@@ -102,7 +102,7 @@ def govern(reference, commanded, shortfall, authority_lost):
     dt = config.dt
     for i in range(3):
         scale = governor.scale[i] - dt * abs(shortfall[i]) / MISSED_RAD_S
-        if not config.steered:  # outer loops ask again for what was missed
+        if not config.steered:  # where outer loops steer, they ask again for what was missed
             governor.scale[i] = max(scale + dt / RECOVERY_S * (1.0 - scale), 0.0)
         rate, acceleration = output.governed_rate[i], output.governed_acceleration[i]
         rate, acceleration = advance(config, rate, acceleration, governor.scale[i] * commanded[i])
@@ -153,14 +153,18 @@ def command_surfaces(control, assessment, faults, prediction, by_observer):
 
 @apart
 def complete(control, assessment, measured, t):
-    """Note whether the demand is met; what is missing in pitch and yaw is left to the engines, at t s."""
-    detected, out, surfaces = assessment.detected, control.allocation.output, control.surfaces
-    axes, layout, lever, engine = control.axes, control.layout, control.power, control.engines
+    """Note whether the demand is met; what is missing in pitch and yaw is left to the engines, at t s.
+    They serve from the alarm on, and at any time for a law that is informed of the truth."""
+    out, surfaces, axes, layout = control.allocation.output, control.surfaces, control.axes, control.layout
+    lever, engine, watched = control.power, control.engines, assessment.detected or control.config.informed
     allocation.note_shortfall(axes, out.command, layout, surfaces.output.lag, engine.output.authority)
     if lever.config.enabled:
-        watched = detected or control.config.informed
         lost = watched and power.pitch_is_lost(layout, surfaces, out.saturated, axes.shortfall)
         power.steer_by_power(lever, control.reference, measured.x, measured.y, watched, lost, t)
-    if engine.config.n > 0 and detected:
-        engines.steer_by_engines(engine, lever, axes, layout, out.saturated, surfaces, measured.y[AIRSPEED])
+    if engine.config.n > 0:
+        if watched:
+            airspeed = measured.y[AIRSPEED]
+            engines.steer_by_engines(engine, lever, axes, layout, out.saturated, surfaces, airspeed)
+        else:
+            engines.release_engines(engine)
         power.move_differences(lever, engine.output.difference, engine.config.n, engine.config.step)

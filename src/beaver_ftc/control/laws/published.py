@@ -39,7 +39,7 @@ def command(control, assessment, faults, prediction, measured, mode, t):
 
 @kernel
 def command_by(law, fhat, control, assessment, faults, prediction, measured, mode, t):
-    """The same by a record of type FEEDBACK; fhat (3,) rad/s2: what is unknown beside the model."""
+    """Command from a record of type FEEDBACK; fhat (3,) rad/s2: what is unknown beside the model."""
     axes, reference = control.axes, control.reference
     laws.prepare(control, assessment, prediction, mode, t)
     demand(law, axes, reference.output, measured.x, prediction.f, fhat)
@@ -88,7 +88,11 @@ def unexplained_by(law: np.void, fhat: np.ndarray) -> np.ndarray:
 
 
 def begin(control: np.void, before: np.void, unexplained: np.ndarray, learnt: np.ndarray) -> None:
-    """Take over in flight: the integrators begin where the demand is (control.CompiledLaw)."""
+    """Take over in flight: the integrators begin where the demand is (control.CompiledLaw).
+
+    `learnt` is what the diagnosis' network explains; only a law that uses the verdict and is not informed
+    subtracts it.
+    """
     uses_network = control["config"]["uses_verdict"] and not control["config"]["informed"]
     begin_integrators(control["published"], unexplained, learnt if uses_network else np.zeros(3))
 

@@ -103,7 +103,7 @@ NOTHING_LEFT = 0.05  # half of what the law divides by
 
 # begun: whether rate (3,) rad/s and disturbance (3,) rad/s2 are estimates; a change of law keeps it.
 OBSERVER = record(begun=int, rate=3, disturbance=3)
-# Sums of the least squares, of the main surface of each axis; named: whether the diagnosis has named it.
+# Sums of the least squares, of the main surface of each axis; named: whether the diagnosis has ever named it.
 SUMS = record(product=3, square=3, innovation=3, frames=3, named=(int, 3))
 
 
@@ -211,29 +211,29 @@ def clamp_to_observer_estimate(sums, layout, s, target, least):
 
 
 @kernel
-def larger_estimate(sums, named, i, least):
-    """The larger of both estimates of the main surface of axis i, `named` and the observer's; nothing of it
-    is nothing."""
-    if not sums.named[i]:  # it is not what it was: what was seen before counts no longer
+def larger_estimate(sums, diagnosed, i, least):
+    """The larger of both estimates of the main surface of axis i, `diagnosed` and the observer's; less than
+    NOTHING_LEFT is given as it is."""
+    if not sums.named[i]:  # at its first naming: what was seen of it when healthy no longer counts
         sums.named[i], sums.product[i], sums.square[i] = 1, 0.0, 0.0
-    larger = max(named, min(effectiveness_seen(sums, i, named), 1.0))
+    larger = max(diagnosed, min(effectiveness_seen(sums, i, diagnosed), 1.0))
     return larger if larger < NOTHING_LEFT else max(larger, least)
 
 
 @kernel
-def effectiveness_seen(sums, i, named):
-    """Effectiveness of the main surface of axis i by the observer; named: by the diagnosis."""
+def effectiveness_seen(sums, i, diagnosed):
+    """Effectiveness of the main surface of axis i by the observer; diagnosed: by the diagnosis."""
     if sums.frames[i] == 0.0:
-        return named
+        return diagnosed
     prior = sums.innovation[i] / sums.frames[i] / (UNSURE * UNSURE)
     weight = sums.square[i] + prior
-    return 1.0 + (sums.product[i] + prior * (named - 1.0)) / weight if weight > 0.0 else named
+    return 1.0 + (sums.product[i] + prior * (diagnosed - 1.0)) / weight if weight > 0.0 else diagnosed
 
 
 @kernel
 def is_effective(sums, main, s, least):
-    """Whether the law's observer sees surface s act, enough to be divided by; main (3,), least: of the
-    effectiveness."""
+    """Whether the law's observer sees surface s act, enough to be divided by: theta = product / square
+    exceeds least - 1. False for a surface that leads no axis. main (3,); least: of the effectiveness."""
     for i in range(3):
         if s == main[i] and sums.product[i] > (least - 1.0) * sums.square[i]:
             return True
@@ -266,7 +266,9 @@ def withdraw(memory, layout, s, saturated, suspected, dt):
         if memory.at_stop_s[s] > RETRY_S and is_replaced(layout, s):
             memory.withdrawn[s], memory.at_stop_s[s] = 0, 0.0
     elif not saturated:
-        memory.at_stop_s[s] = max(memory.at_stop_s[s] - 1.5 * dt, 0.0)  # a dead one swings
+        memory.at_stop_s[s] = max(
+            memory.at_stop_s[s] - 1.5 * dt, 0.0
+        )  # a command that swings leaves it briefly
     elif memory.at_stop_s[s] > (PATIENCE_S if is_replaced(layout, s) else LONG_PATIENCE_S):
         memory.withdrawn[s], memory.at_stop_s[s] = 1, 0.0
 

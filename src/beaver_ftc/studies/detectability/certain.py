@@ -24,7 +24,7 @@ from pathlib import Path
 import numpy as np
 
 from beaver_ftc.aircraft import AXES, Aircraft, load
-from beaver_ftc.control.engines import effects_of as effects_of_engines
+from beaver_ftc.control.engines import effects_of_engines
 from beaver_ftc.design.model import design_of, responses_at
 from beaver_ftc.documents.errors import BeaverFtcError, SimulationFailed
 from beaver_ftc.loop.loop import Loop, fly

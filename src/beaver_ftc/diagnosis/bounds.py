@@ -220,13 +220,14 @@ def fill_bound(bound, model, meas, u):
     if err.given:
         set_air_rotation(err, meas.altitude)
         add_declared_bound(err, x, y, u, eta)
+    else:
+        err.x[1, :] = x  # read below
     if emap.n_boxes > 0:
         look_up_map(emap, x, y, u, err.du)
         for i in range(3):
             eta[i] += emap.e_now[i]
     share, const, earth = bound.inertia_coupling_error_share, bound.const, bound.earth_rate_rad_s
-    largest = err.x[1] if err.given else x
-    add_published_bound(largest, model, share, const, earth, eta)
+    add_published_bound(err.x[1], model, share, const, earth, eta)
 
 
 GUST_LIMIT_SIGMA = 6.0  # exceeded once in 5e8 independent samples

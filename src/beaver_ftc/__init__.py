@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario, load
     from beaver_ftc.studies.sweep.table_of_flights import sweep
 
-__version__ = "1.0.0"
+__version__ = "1.1.0"
 
 # Public name -> module, or module:name there, by which it is found at first use.
 _WHERE = {

@@ -83,9 +83,7 @@ def supervise(supervisor, wanted, t):
     """Go to the mode wanted, as far as that is allowed, and note every change; t s."""
     mode = next_mode(supervisor.mode, wanted)
     if mode != supervisor.mode or supervisor.n_modes == 0:
-        last = min(
-            supervisor.n_modes, MAX_EVENTS - 1
-        )  # a full record keeps its last place for the latest change
+        last = min(supervisor.n_modes, MAX_EVENTS - 1)  # once the record is full, its last place
         supervisor.mode_at_s[last], supervisor.mode_is[last] = t, mode
         supervisor.n_modes += 1
     supervisor.mode = mode

@@ -66,14 +66,14 @@ class Cost:
     def pytest_sessionstart(self) -> None:
         from beaver_ftc.compiled import target
 
-        compiled = target.Kernel._compiled
+        compiled = target.Kernel._compile_and_keep
 
         def measured(kernel: Any, types: Any) -> Any:
             name = f"{kernel.py_func.__module__}.{kernel.py_func.__qualname__}"
             with self._measured("compilation", name):
                 return compiled(kernel, types)
 
-        target.Kernel._compiled = measured
+        target.Kernel._compile_and_keep = measured
 
     def pytest_unconfigure(self) -> None:
         self._write("rest", "imports, collection and the rest", _now() - self._inside[0])

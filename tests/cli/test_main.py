@@ -1,7 +1,9 @@
 """The command line around its commands: signals, streams, exit status, helps and plug-ins."""
 
 import errno
+import gc
 import signal
+import sys
 
 import pytest
 
@@ -18,7 +20,9 @@ def as_started():
     """Signals as a shell leaves them, and as they were afterwards."""
     numbers = (signal.SIGTERM, signal.SIGHUP)
     before = {number: signal.signal(number, signal.SIG_DFL) for number in numbers}
+    hook, sys.unraisablehook = sys.unraisablehook, sys.__unraisablehook__
     yield
+    sys.unraisablehook = hook
     for number, handler in before.items():
         signal.signal(number, handler)
 
@@ -33,6 +37,21 @@ def ended(monkeypatch, command):
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_unwinds_with_its_status(monkeypatch, as_started, number):
     assert ended(monkeypatch, lambda: signal.raise_signal(number)) == 128 + number
+
+
+class HalfMade:
+    def __init__(self):
+        signal.raise_signal(signal.SIGTERM)
+        self.pointer = 1
+
+    def __del__(self):
+        assert self.pointer
+
+
+def test_an_object_that_a_signal_leaves_half_made_is_not_heard_of(monkeypatch, as_started, capsys):
+    assert ended(monkeypatch, HalfMade) == 128 + signal.SIGTERM
+    gc.collect()
+    assert capsys.readouterr().err == ""
 
 
 def test_what_is_ignored_stays_ignored(monkeypatch, as_started):

@@ -150,6 +150,7 @@ def every_command() -> dict[str, Any]:
 
 
 def _stop(received: int, _: object) -> NoReturn:
+    sys.unraisablehook = lambda lost: None  # of an object that this leaves half made nobody needs to read
     raise Stopped(128 + received)
 
 

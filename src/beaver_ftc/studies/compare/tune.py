@@ -17,11 +17,11 @@ from dataclasses import asdict, dataclass
 from functools import partial
 from operator import attrgetter
 from pathlib import Path
-from typing import Any, Literal
 
 from pydantic import TypeAdapter
 
 from beaver_ftc.diagnosis.rivals import (
+    FLIGHT_GRADES,
     TUNED_FILE_KEY_BY_PLUGIN_GROUP,
     load_tuned_values,
     tuned_values,
@@ -48,12 +48,7 @@ from beaver_ftc.studies.present.tables import Columns, aligned, tabulated
 PROCEDURE = "beaver-ftc compare --tune; docs/results/benchmark.md"
 LEAST_GAIN = 0.05
 NAME, RECORD = "tuned.json", "tuning.json"
-_GRADES: TypeAdapter[Any] = TypeAdapter(
-    dict[
-        Literal["exact", "actuators", "errors"],
-        dict[Literal["detectors", "laws"], dict[str, dict[str, float]]],
-    ]
-)
+_GRADES = TypeAdapter(dict[str, dict[str, dict[str, dict[str, float]]]])  # by grade, kind and method
 OF_STATISTICAL = {
     "fdi.statistical.false_alarms_per_h": Range(1e-9, 3600.0),
     "fdi.statistical.misnaming": Range(1e-9, 0.49),
@@ -165,8 +160,11 @@ def write_tuned(document: Document, folder: Path) -> Path:
 def read_tuned(path: Path) -> Document:
     """The values in a file that `compare --tune` wrote. Raises BadInput."""
     try:
-        grades: Document = _GRADES.validate_python(read_json(path)["grades"], strict=True)
-        return grades
+        grades = _GRADES.validate_python(read_json(path)["grades"], strict=True)
+        unknown = set(grades) - set(FLIGHT_GRADES)
+        if unknown | set().union(*grades.values()) - set(TUNED_FILE_KEY_BY_PLUGIN_GROUP.values()):
+            raise ValueError("a grade or a kind that is not known")
+        return dict(grades)
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise BadInput(f"{path}: cannot be read, allowed: a file that compare --tune wrote") from error
 

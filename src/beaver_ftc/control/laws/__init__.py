@@ -156,7 +156,8 @@ def complete(control, assessment, measured, t):
     """Note whether the demand is met; what is missing in pitch and yaw is left to the engines, at t s.
     They serve from the alarm on, and at any time for a law that is informed of the truth."""
     out, surfaces, axes, layout = control.allocation.output, control.surfaces, control.axes, control.layout
-    lever, engine, watched = control.power, control.engines, assessment.detected or control.config.informed
+    lever, engine = control.power, control.engines
+    watched = assessment.detected or control.config.informed
     allocation.note_shortfall(axes, out.command, layout, surfaces.output.lag, engine.output.authority)
     if lever.config.enabled:
         lost = watched and power.pitch_is_lost(layout, surfaces, out.saturated, axes.shortfall)

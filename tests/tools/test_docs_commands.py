@@ -43,6 +43,10 @@ def test_a_command_that_draws_otherwise_is_red(tmp_path, monkeypatch):
     assert ["docs/images/a.png" in change.words for change in made.changes] == [True]
     pictures.write(tmp_path / "docs" / "images" / "a.png", made.drawn["a.png"])
     assert Refreshed(parsed(text, "docs/page.md"), output, Wanted()).changes == []
+    hardly_seen = {"a.png": picture(101)}
+    for says, drawn in ((text.splitlines()[1], {}), ("![x](images/a.png) 90 %", hardly_seen)):
+        printed = {"draw": Output(says, pictures=hardly_seen)}
+        assert Refreshed(parsed(text, "docs/page.md"), printed, Wanted()).drawn == drawn
 
 
 def test_a_changed_gain_turns_the_page_that_cites_it_red(tmp_path, monkeypatch):

@@ -80,13 +80,13 @@ def benchmark_gains() -> str:
     rows = json.loads(TUNING.read_text(encoding="utf-8"))["methods"]
     found = [{**row, **again} for row in rows for again in row["again"] if again.get("gain")]
     last = {
-        f"`{row['name']}` on `{row['grade']}`": row["again"][-1]
+        _pair(row): row["again"][-1]
         for row in rows
         if row["again"] and row["again"][-1]["draw"] != row.get("draw")
     }
     kept = sum(again.get("gain") == 0.0 for again in last.values())
     none = [pair for pair, again in last.items() if "gain" not in again]
-    drawn = [f"`{row['name']}` on `{row['grade']}` (draw {row['draw']})" for row in rows if "draw" in row]
+    drawn = [f"{_pair(row)} (draw {row['draw']})" for row in rows if "draw" in row]
     says = (
         f"The table leaves out searches that found no better values. Of {len(rows)} pairs of method and "
         f"grade, {len(last)} were tuned again after their last change. The last search found no better "
@@ -95,6 +95,11 @@ def benchmark_gains() -> str:
     )
     table = table_of(found, GAINS)
     return f"{aside('benchmark-gains', 'Gain of a second tuning', table)}\n\n{says}"
+
+
+def _pair(row: Document) -> str:
+    """What was tuned, and on what: a scheme and a law may have one name."""
+    return f"{'the law ' if row['kind'] == 'laws' else ''}`{row['name']}` on `{row['grade']}`"
 
 
 def _compared(cases: list[SetFlight], workers: int = 2) -> Document:

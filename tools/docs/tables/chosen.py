@@ -26,7 +26,7 @@ FILE = Path(__file__).parents[1] / "chosen.yaml"
 NOT_CHOSEN_FILE = FILE.with_name("not_chosen.yaml")
 ORIGINS = ("derived", "stated", "search", "limit", "judged")
 BENCHMARK = Path(__file__).parents[3] / "scenarios" / "benchmark"
-TUNED_DRAWS = (*range(61), 80, 100, 200)  # of the calibration sets, that tuned.json was chosen on
+TUNED_DRAWS = (*range(61), 80, 100, 200, 250)  # of the calibration sets, that tuned.json was chosen on
 COMPARED = "compared"  # every set of the benchmark but those that rivals are tuned on
 CONSTANTS = {
     "row": "row", "name": "name", "constant": "constant", "value": "value", "determines": "sets",

@@ -4,6 +4,7 @@ import errno
 import gc
 import signal
 import sys
+import time
 
 import pytest
 
@@ -51,6 +52,20 @@ class HalfMade:
 def test_an_object_that_a_signal_leaves_half_made_is_not_heard_of(monkeypatch, as_started, capsys):
     assert ended(monkeypatch, HalfMade) == 128 + signal.SIGTERM
     gc.collect()
+    assert capsys.readouterr().err == ""
+
+
+class Deleted:
+    def __del__(self):
+        signal.raise_signal(signal.SIGTERM)
+
+
+def test_a_signal_where_python_ignores_exceptions_ends_the_command_too(monkeypatch, as_started, capsys):
+    def waits_after_it():
+        Deleted()
+        time.sleep(10.0)
+
+    assert ended(monkeypatch, waits_after_it) == 128 + signal.SIGTERM
     assert capsys.readouterr().err == ""
 
 

@@ -12,6 +12,7 @@ import math
 import os
 import signal
 import sys
+import threading
 import time
 import traceback
 from collections import Counter
@@ -163,6 +164,16 @@ def status_of_stop(error: Exception) -> int | None:
     if isinstance(cause, KeyboardInterrupt):
         return 128 + signal.SIGINT
     return cause.code if isinstance(cause, SystemExit) and isinstance(cause.code, int) else None
+
+
+REPEATED_S = 0.01
+
+
+def repeat(number: int) -> None:
+    """Repeat a signal whose exception arrived where Python ignores exceptions, as in a callback of an
+    import's lock. From a thread and a little later: at once it would arrive there, and be lost again.
+    """
+    threading.Timer(REPEATED_S, os.kill, [os.getpid(), number]).start()
 
 
 def _discard_stdout() -> None:

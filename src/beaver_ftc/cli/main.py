@@ -23,6 +23,7 @@ from beaver_ftc.cli import (
     complain,
     failure_of,
     progress_bar,
+    repeat,
     report_last,
     status_of_stop,
 )
@@ -150,7 +151,12 @@ def every_command() -> dict[str, Any]:
 
 
 def _stop(received: int, _: object) -> NoReturn:
-    sys.unraisablehook = lambda lost: None  # of an object that this leaves half made nobody needs to read
+    def lose(lost: Any) -> None:
+        if issubclass(lost.exc_type, (KeyboardInterrupt, Stopped)):
+            repeat(received)
+        # else: of an object that the signal leaves half made nobody needs to read
+
+    sys.unraisablehook = lose
     raise Stopped(128 + received)
 
 

@@ -181,12 +181,16 @@ def test_finished_runs_stand_side_by_side(tmp_path):
         )
     assert beaver("run", "a.yaml", "b.yaml", "--no-report", cwd=tmp_path).returncode == 0
     folders = [tmp_path / "runs" / name for name in "ab"]
+    metrics = json.loads((folders[0] / "metrics.json").read_text())
+    metrics["envelope"] = {"exits": 65, "outside_s": 3.75, "exits_left_out": 1}  # one more than are listed
+    (folders[0] / "metrics.json").write_text(json.dumps(metrics))
     done = _run(*folders, "--out", tmp_path / "out")
     assert done.exit_code == 0
     rows = {line.split("  ")[0]: line for line in done.output.splitlines()}
     assert "post RMS q, deg/s *" in rows
     assert "law *" in rows
     assert "scheme" in rows
+    assert rows["outside the envelope, s *"].split()[-2:] == ["3.75", "0"]
     assert rows["faults"].count("elevator loss of effectiveness magnitude 0.5 at 2 s") == 2
     assert "* differs between the runs" in rows
     written = {path.name for path in (tmp_path / "out" / "runs").iterdir()}

@@ -82,7 +82,6 @@ DIAGNOSED = {  # what it is called, and where it is in the metrics
 def rows_of(run: Run) -> dict[str, str]:
     """What is compared of a run, name -> text: what was flown, then what came of it."""
     found, flown, departure = run.found, run.flown, run.found.departure
-    outside_s = sum(stay.end_s - stay.start_s for stay in found.envelope_exits)
     return {
         "scenario": found.scenario,
         "law": flown["control"]["law"],
@@ -97,7 +96,7 @@ def rows_of(run: Run) -> dict[str, str]:
             for when in ("pre", "post")
             for axis in AXES
         },
-        "outside the envelope, s": number(outside_s),
+        "outside the envelope, s": number(found.envelope.outside_s),
         "departure": f"{departure.signal} at {departure.time_s:.2f} s" if departure else NOTHING,
         "passed": "yes" if found.passed else "no",
     }

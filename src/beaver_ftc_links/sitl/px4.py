@@ -10,6 +10,7 @@ An autopilot that starts needs time to pass before it answers. Until its first a
 and until it is armed for the first time the law `nominal` flies, level.
 """
 
+from collections.abc import Iterable
 from math import atan2, cos, degrees, hypot, radians, sin, sqrt
 from typing import Any
 
@@ -139,7 +140,7 @@ def sensor(m: Any, now: Instant, stamp_us: int, all_fields: bool) -> Message:
 
 def gps(m: Any, now: Instant, stamp_us: int) -> Message:
     """HIL_GPS: a good fix, of the truth."""
-    north, east, down = (round(100.0 * v) for v in now.velocity)
+    north, east, down = _int16(now.velocity, 100.0)
     course = round(100.0 * degrees(atan2(east, north))) % 36000
     return m.MAVLink_hil_gps_message(
         stamp_us, 3, *_place(now), 30, 40, round(hypot(north, east)), north, east, down, course, 12, 0, NO_YAW
@@ -148,13 +149,17 @@ def gps(m: Any, now: Instant, stamp_us: int) -> Message:
 
 def state(m: Any, now: Instant, stamp_us: int) -> Message:
     """HIL_STATE_QUATERNION: the truth, for logs."""
-    velocity = (round(100.0 * v) for v in now.velocity)
-    speed = round(100.0 * now.airspeed_mps)
-    force = (max(min(round(1000.0 * a / GRAVITY_MPS2), 32767), -32768) for a in now.force)
-    indicated = round(100.0 * sqrt(max(2.0 * now.qdyn_pa / 1.225, 0.0)))
+    velocity, force = _int16(now.velocity, 100.0), _int16(now.force, 1000.0 / GRAVITY_MPS2)
+    indicated_mps = sqrt(max(2.0 * now.qdyn_pa / 1.225, 0.0))
+    indicated, speed = (min(round(100.0 * v), 65535) for v in (indicated_mps, now.airspeed_mps))
     return m.MAVLink_hil_state_quaternion_message(
         stamp_us, quaternion(*now.true_attitude), *now.gyro, *_place(now), *velocity, indicated, speed, *force
     )
+
+
+def _int16(values: Iterable[float], scale: float) -> list[int]:
+    """Scaled values, the largest and the smallest that a field holds where they exceed these."""
+    return [max(min(round(scale * value), 32767), -32768) for value in values]
 
 
 def _place(now: Instant) -> tuple[int, int, int]:

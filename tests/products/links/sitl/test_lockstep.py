@@ -190,10 +190,16 @@ def test_a_state_is_read_again_as_it_was_at_altitude():
 
 
 def test_what_a_field_cannot_hold_is_its_largest():
-    """Forces of more than 32 g; no indicated airspeed of a negative pressure, no course beyond north."""
+    """Forces of more than 32 g, speeds of more than 327 m/s (air: 655); no indicated airspeed of a negative
+    pressure, no course beyond north."""
     line = Mavlink()
     beyond = ALOFT._replace(force=(400.0, -400.0, 0.0), qdyn_pa=-3.0, velocity=(10.0, -1e-4, 0.0))
     (found,) = line.unpack(line.pack(state(line.messages, beyond, 1)))
     assert (found.xacc, found.yacc, found.zacc, found.ind_airspeed) == (32767, -32768, 0, 0)
     (fix,) = line.unpack(line.pack(gps(line.messages, beyond, 1)))
     assert (fix.cog, fix.vel, fix.vn, fix.ve) == (0, 1000, 1000, 0)
+    fast = ALOFT._replace(velocity=(328.0, -400.0, 0.0), airspeed_mps=700.0, qdyn_pa=3e5)
+    (found,) = line.unpack(line.pack(state(line.messages, fast, 1)))
+    assert (found.vx, found.vy, found.true_airspeed, found.ind_airspeed) == (32767, -32768, 65535, 65535)
+    (fix,) = line.unpack(line.pack(gps(line.messages, fast, 1)))
+    assert (fix.vn, fix.ve) == (32767, -32768)

@@ -60,11 +60,11 @@ class Chains:
         """Fly until every run has reached the event, or cannot."""
         self.scores[:] = self._flown(fly, self.points)
         self.plain = int((self.scores >= 0.0).sum()), self.scores.size
-        for _ in range(MOST_LEVELS):
+        while True:
             going = [run for run in range(len(self.scores)) if not self.reached[run]]
             levels = {run: self._level(run) for run in going}
             going = [run for run in going if not self.reached[run]]
-            if not going or self.stuck:
+            if not going or self.stuck or self.levels == MOST_LEVELS:
                 break
             self.levels += 1
             self._continue(going, np.array([levels[run] for run in going]), fly)

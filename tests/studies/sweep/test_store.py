@@ -160,6 +160,7 @@ def test_an_aircraft_whose_files_have_changed_is_another(store, short, tmp_path,
     """Of one folder and one name: what flies it is told from what is written beside it."""
     folder = shutil.copytree(bf.aircraft("beaver").folder, tmp_path / "own")
     path = folder / file
+    (folder / "folder.xml").mkdir()
     own = replace(short, aircraft=bf.aircraft("./own", tmp_path))
     with store:
         store.begin(identity_of(own), resume=False)

@@ -237,7 +237,9 @@ def fingerprint() -> str:
 
 def digest_of_aircraft(folder: Path) -> str:
     """A digest of an aircraft's files: another aircraft of the same name has another digest."""
-    return digest(path for path in sorted(folder.rglob("*")) if path.suffix in (".xml", ".yaml"))
+    return digest(
+        path for path in sorted(folder.rglob("*")) if path.suffix in (".xml", ".yaml") and path.is_file()
+    )
 
 
 def digest(paths: Iterable[Path]) -> str:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.studies.engine.statistics import (
-    binomial,
+    counted,
     median,
     poisson,
     quantile,
@@ -38,7 +38,7 @@ def test_a_quantile_is_the_smallest_value_that_enough_do_not_exceed():
 def test_bounds_without_flights_say_nothing():
     assert (wilson_bound(0, 0, 0.95, upper=True), wilson_bound(0, 0, 0.95, upper=False)) == (1.0, 0.0)
     assert poisson(0, 0.0).high == math.inf
-    assert (binomial(0, 0).low, binomial(0, 0).high) == (0.0, 1.0)
+    assert counted(0, 0) == {"count": 0, "of": 0, "value": None, "low": 0.0, "high": 1.0}
     assert quantile_bound(np.empty(0), 0.5, 0.9, upper=True) == math.inf
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from beaver_ftc.documents.files import Document
-from beaver_ftc.studies.present.tables import finite
+from beaver_ftc.studies.present.tables import all_finite, finite
 
 CONFIDENCE = 0.95
 
@@ -47,7 +47,7 @@ def _rate(count: int, trials: int, confidence: float, method: str) -> Estimate:
 
 def counted(events: int, trials: int) -> Document:
     """A count for a document, as a share with its exact interval."""
-    return {"count": events, "of": trials, **vars(binomial(events, trials))}
+    return {"count": events, "of": trials, **all_finite(vars(binomial(events, trials)))}
 
 
 def wilson_bound(successes: int, trials: int, confidence: float, upper: bool) -> float:

@@ -86,6 +86,8 @@ def _held_age_s(column: Column, t_s: Floats) -> Floats:
 
 def latest_values(t_s: Floats, stamps: Floats, values: Floats) -> Floats:
     """The value of the last stamp up to each time, nan before the first."""
+    if not len(stamps):
+        return np.full(len(t_s), np.nan)
     return np.where(t_s < stamps[0], np.nan, values[last_row_at(stamps, t_s)])
 
 

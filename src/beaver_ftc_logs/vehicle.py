@@ -233,6 +233,8 @@ class Vehicle(Section):
         for surface, weights in self.surfaces.items():
             at = ("surfaces", surface)
             mistakes += _unknown_name_conflicts(at, weights, "command", self.command_columns)
+            if not any(weights.values()):
+                mistakes.append((at, "no command moves it, allowed: a weight that is not 0"))
         tables: dict[str, Collection[str]] = {
             "labels": self.labels,
             "outputs": self.outputs,

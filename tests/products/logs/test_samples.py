@@ -52,6 +52,9 @@ def test_a_log_on_one_time_base():
         given.logged_failures,
         True,
     )
+    silent = recording(height=column(stamps(0.2, 30), np.full(30, np.nan)), speed=column(t_s, t_s))
+    energy = {"altitude": "height", "airspeed": "speed"}
+    assert np.isnan(of.resample(silent, small.vehicle(energy=energy)).energy_height_rate_mps).all()
     tail = of.resample(recording(airspeed_m_s=column(t_s, t_s)), small.vehicle(small.TAIL))
     np.testing.assert_array_equal(tail.signals, t_s[:, None])
 

@@ -119,6 +119,11 @@ TABLE = (
     ),
     Exempt(r"(sim_vehicle.py|PX4_SIM_MODEL=).*", "needs ArduPilot or PX4"),
     Exempt(
+        r"(beaver-ftc compare --tune --grade exact --schemes adaptive-estimators)",
+        "minutes: five trials",
+        r"\1 --trials 5 --restarts 0",
+    ),
+    Exempt(
         r"beaver-ftc compare (--tune|.*--tuned|.*learned-network).*",
         "a search of minutes, which tests/studies/compare does on few flights, or what it writes",
         "beaver-ftc compare --help",

@@ -73,7 +73,7 @@ class Method:
         return {key: shipped.get(key, self._default(key, of)) for key, of in self.ranges().items()}
 
     def _default(self, key: str, of: Range) -> float:
-        if self.name == STATISTICAL:  # no default of a scenario, so it is asked for here
+        if "." in key:  # of the scenario; `fdi.statistical` is none by default, so it is asked for here
             return float(attrgetter(key)(Scenario(name="defaults", fdi={"statistical": {}})))
         if is_compiled(self.group, self.name):
             return float(options_of(self.group, self.name)[key]["default"])

@@ -64,6 +64,12 @@ def test_a_former_name_says_what_to_type_instead(name, tmp_path):
     assert f"beaver-ftc {now[0]} [OPTIONS]" in shown.stdout.splitlines()[0]
 
 
+@pytest.mark.parametrize("digits", ["²", "--5"])
+def test_a_text_that_is_no_whole_number_of_flights_is_a_folder(digits, tmp_path):
+    done = beaver("compare", f"--flights={digits}", cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (2, "")
+
+
 @pytest.mark.parametrize("line", REFUSED)
 def test_what_cannot_be_done_is_said_also_in_a_document_and_leaves_nothing(line, tmp_path):
     one, two = (" ".join(line.split()[:n]) for n in (1, 2))

@@ -10,6 +10,7 @@ import contextlib
 import errno
 import math
 import os
+import re
 import signal
 import sys
 import threading
@@ -355,7 +356,7 @@ def _annotated(parameter: Parameter, help: str | None) -> Parameter:
 def address(option: str, given: str) -> tuple[str, int]:
     """Host and port of HOST:PORT, as an option has it."""
     host, _, port = given.rpartition(":")
-    if not host or not port.isdecimal() or not 0 < int(port) < 65536:
+    if not host or not re.fullmatch("[0-9]{1,5}", port) or not 0 < int(port) < 65536:
         raise BadInput(f"{option}: {given!r} is no address, allowed: HOST:PORT with a port of 1 to 65535")
     return host, int(port)
 

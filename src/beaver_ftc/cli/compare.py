@@ -1,5 +1,6 @@
 """`beaver-ftc compare`: finished runs side by side, or schemes and laws on the same flights."""
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -124,7 +125,7 @@ def _most_or_folder(flights: str | None) -> tuple[int | None, Path | None]:
     """A number of flights, or the folder of recorded ones."""
     if flights is None:
         return None, None
-    if not flights.lstrip("-").isdigit():
+    if not re.fullmatch(r"-?[0-9]{1,9}", flights):
         return None, Path(flights)
     if int(flights) < 1:
         raise BadInput(f"compare: --flights {flights}: allowed: at least 1, or a folder of recorded flights")

@@ -92,6 +92,9 @@ def command(arguments: Arguments) -> None:
 
     def fly() -> "Judged":
         sweep = load_sweep(arguments.file)
+        if wrong := {run for run in options.keep.runs if not 0 <= run < sweep.flights}:
+            says = f"there is no flight {min(wrong)}, allowed: 0 to {sweep.flights - 1}"
+            raise BadInput(f"--keep-logs: {says}")
         return _fly(sweep, options, format) if replay is None else _replay(sweep, options, replay, format)
 
     judged(arguments.file, format, arguments.junit, fly)

@@ -54,6 +54,7 @@ def test_a_mistake_is_in_the_json_too(call):
     [
         (SHORT.replace("runs: 48", "runs: -1"), (), "short.yaml:4: runs: -1 is out of range"),
         (SHORT, ("--keep-logs", "some"), "--keep-logs: 'some' is not known"),
+        (SHORT, ("--keep-logs", "1,48"), "--keep-logs: there is no flight 48, allowed: 0 to 47"),
         (SHORT, ("--replay", "48"), "there is no flight 48, allowed: 0 to 47"),
         (SHORT, ("--backend", "slurm"), "slurm"),
     ],

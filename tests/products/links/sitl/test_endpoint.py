@@ -137,6 +137,6 @@ def test_addresses_that_cannot_be_had():
         ):
             serve(scenario(), Options(Protocol.ardupilot, port=port), print)
     assert address("--mavlink", "10.0.0.1:14550") == ("10.0.0.1", 14550)
-    for given in ("nowhere", ":1", "host:0", "host:x", "host:70000"):
+    for given in ("nowhere", ":1", "host:0", "host:x", "host:70000", "host:" + "1" * 5000):
         with pytest.raises(BadInput, match="is no address, allowed: HOST:PORT"):
             address("--mavlink", given)

@@ -5,6 +5,7 @@ from math import pi, radians
 import numpy as np
 import pytest
 
+from beaver_ftc.documents.validation import ScenarioError
 from beaver_ftc.scenario.schema import load_text
 from beaver_ftc.scenario.signals import sample
 
@@ -84,6 +85,9 @@ def test_a_table_is_straight_lines_held_outside(tmp_path):
     reference = load_text(text, folder=tmp_path).reference
     values = np.degrees(sample(reference, np.array([0.0, 1.0, 1.5, 2.0, 3.5, 9.0]))[:, 1])
     assert values == pytest.approx([0, 0, 1, 2, 4, 4])
+    (tmp_path / "ref.csv").write_text("t_s,rate_deg_s," + 140_000 * "x")
+    with pytest.raises(ScenarioError, match=r"ref.csv' line 1: field larger than field limit"):
+        load_text(text, folder=tmp_path)
 
 
 def test_a_phase_of_90_deg_is_a_cosine():

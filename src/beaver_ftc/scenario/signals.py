@@ -298,7 +298,10 @@ def _inside(folder: Path | None, file: str) -> Path:
 
 
 def _parse(lines: Sequence[str], column: str) -> dict[str, list[float]]:
-    header = [name.strip() for name in next(csv_files.reader(lines[:1]), [])]
+    try:
+        header = [name.strip() for name in next(csv_files.reader(lines[:1]), [])]
+    except csv_files.Error as error:  # a name that is too long
+        raise UnreadableError(f"{error}, allowed: {_FORMAT}", 1) from None
     for name in ("t_s", column):
         if header.count(name) != 1:
             raise UnreadableError(f"the header has no column {name!r}, allowed: {_FORMAT}", 1)

@@ -96,8 +96,10 @@ def test_what_xml_cannot_hold_and_what_is_too_long(tmp_path):
     assert text.startswith("<?xml version='1.0' encoding='utf-8'?>\n<testsuites")
     assert 9_900 < text.count("x") < 10_100
     assert 'tests="3" failures="2" errors="0"' in text
-    write_junit([Judged("one", error="cannot\x07 be\ntrimmed \ud800")], tmp_path / "junit.xml")
-    assert "cannot\\x07 be&#10;trimmed \\ud800" in (tmp_path / "junit.xml").read_text(encoding="utf-8")
+    write_junit([Judged("one\x07", error="cannot\x07 be\ntrimmed \ud800")], tmp_path / "junit.xml")
+    text = (tmp_path / "junit.xml").read_text(encoding="utf-8")
+    assert "cannot\\x07 be&#10;trimmed \\ud800" in text
+    assert 'classname="one\\x07"' in text
     (tmp_path / "file").write_text("")
     with pytest.raises(SimulationFailed, match=r"cannot write .*junit.xml: "):
         write_junit([], tmp_path / "file" / "junit.xml")

@@ -47,6 +47,12 @@ def test_log_that_failed_is_not_mistaken_for_a_whole_one(tmp_path):
     assert StoredLog(path).row_count() == 8
 
 
+def test_other_numbers_than_a_run_writes_are_refused(tmp_path):
+    parquet.write_table(pa.table({"t_s": pa.array([0, 1])}), tmp_path / "log.parquet")
+    with pytest.raises(BadInput, match="has other numbers than a run writes, allowed: float64 alone"):
+        StoredLog(tmp_path / "log.parquet")
+
+
 @pytest.mark.parametrize(("rows", "allowed"), [(1_000_000, True), (1_000_001, False)])
 def test_a_row_group_of_a_million_rows_at_most_is_read(tmp_path, rows, allowed):
     table = pa.table({"t_s": pa.array(np.zeros(rows))})

@@ -50,6 +50,15 @@ def test_the_title_and_the_mood(changes, title, outcome_class):
     )
 
 
+def test_an_axis_about_which_no_surface_acts_has_lost_nothing():
+    names = ("least_rad_s2", "greatest_rad_s2", "healthy_least_rad_s2", "healthy_greatest_rad_s2")
+    of = {"given_share": 1.0, "beyond_s": 0.0}
+    authority = {"p": of | dict(zip(names, (-1.0, 2.0, -2.0, 4.0), strict=True)), "q": of}
+    authority["r"] = of | dict.fromkeys(names, 0.0)
+    said = dict(verdict.verdict_lines(Metrics.of(flown(authority=authority))))
+    assert said["remaining"] == "roll authority 50 % (-1 to 2 rad/s2)"
+
+
 def test_an_alarm_does_not_hide_where_nothing_could_be_concluded():
     reason = {"quantity": "altitude_m", "flown": None, "share": 0.25, "says": "too high"}
     blind = {"share": 0.25, "from_s": 3.5, "reasons": [reason]}

@@ -119,7 +119,9 @@ def _escape_acmi_text(text: str) -> str:
 def _acmi_frames(log_path: Path, metrics: Metrics, aircraft: Aircraft) -> Iterator[str]:
     """A frame of the recording at ACMI_RATE_HZ at most, each event in the first frame not before it."""
     events = sorted(marks(metrics), key=lambda mark: mark.time_s)
-    full_rad = aircraft.travel[FLAP].max_rad if FLAP in aircraft.surfaces else None
+    full_rad = None
+    if FLAP in aircraft.surfaces:
+        full_rad = aircraft.travel[FLAP].max_rad or aircraft.travel[FLAP].min_rad
     columns = _ACMI_COLUMNS if full_rad is None else (*_ACMI_COLUMNS, _FLAP_COLUMN)
     radius_m, flaps = 0.0, ""
     for row in _rows_at_acmi_rate(log.StoredLog(log_path), columns):

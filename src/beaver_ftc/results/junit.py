@@ -34,11 +34,12 @@ def _add_suite(root: ElementTree.Element, run: Judged) -> None:
     asked = list(_cases(run))
     kinds = Counter(kind for _, kind, _, why in asked if why is not None)
     counts = {"tests": len(asked), "failures": kinds["failure"], "errors": kinds["error"]}
-    about = {"name": run.name} | {name: str(count) for name, count in counts.items()}
+    name_of_run = _xml_safe_text(run.name)  # that of a file, if it could not be read
+    about = {"name": name_of_run} | {name: str(count) for name, count in counts.items()}
     suite = ElementTree.SubElement(root, "testsuite", about, time=_seconds_text(run.took_s))
     each_s = _seconds_text(run.took_s / len(asked))
     for name, kind, what, why in asked:
-        case = ElementTree.SubElement(suite, "testcase", classname=run.name, name=name, time=each_s)
+        case = ElementTree.SubElement(suite, "testcase", classname=name_of_run, name=name, time=each_s)
         if why is not None:
             ElementTree.SubElement(case, kind, message=_xml_safe_text(why), type=what)
 

@@ -275,7 +275,7 @@ class StoredLog(Log):
 @contextlib.contextmanager
 def open_parquet_log(path: Path) -> Iterator[Any]:
     """A log, open. Raises BadInput where it is none, or only a part of one."""
-    from pyarrow import ArrowException
+    from pyarrow import ArrowException, float64
     from pyarrow.parquet import ParquetFile
 
     with path.open("rb") as content:
@@ -286,6 +286,8 @@ def open_parquet_log(path: Path) -> Iterator[Any]:
                 if largest > _MAX_ROWS_PER_GROUP:  # than a run writes: a few bytes may stand for billions
                     has = f"has {largest:,} rows in a row group"
                     raise BadInput(f"{path}: {has}, allowed: up to {_MAX_ROWS_PER_GROUP:,}")
+                if {*file.schema_arrow.types} - {float64()}:
+                    raise BadInput(f"{path}: has other numbers than a run writes, allowed: float64 alone")
                 yield file
         except (ArrowException, OSError) as error:
             if getattr(error, "errno", None) is not None:

@@ -478,7 +478,8 @@ def _remaining_authority_text(authority: Authority) -> str:
         if of.least_rad_s2 is None:
             continue
         left, most = of.greatest_rad_s2 - of.least_rad_s2, of.engines_greatest_rad_s2
-        share = left / (of.healthy_greatest_rad_s2 - of.healthy_least_rad_s2)
+        healthy = of.healthy_greatest_rad_s2 - of.healthy_least_rad_s2
+        share = left / healthy if healthy else 1.0  # no surface acts about the axis: none was lost
         if share < MAX_SHOWN_AUTHORITY_SHARE or most:
             engines = f", engines {of.engines_least_rad_s2:.2g} to {most:.2g}" if most else ""
             span = f"{of.least_rad_s2:.2g} to {of.greatest_rad_s2:.2g} rad/s2{engines}"

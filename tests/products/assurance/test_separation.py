@@ -13,14 +13,8 @@ from hypothesis import strategies as st
 
 import beaver_ftc as bf
 from beaver_ftc.cli.main import main
-from beaver_ftc_assurance.separation import (
-    Candidate,
-    Situation,
-    as_text,
-    doublet,
-    separate,
-    tell_apart,
-)
+from beaver_ftc_assurance.doublet import Situation, doublet
+from beaver_ftc_assurance.separation import Candidate, as_text, separate, tell_apart
 from fault_kinds import BIAS, CONSTANT_LOSS, FLOAT, STUCK
 from samples import samples
 

@@ -1,0 +1,167 @@
+"""The doublet of least amplitude that brings surfaces to given deflections and back, within every limit.
+
+Over a short horizon the rates follow dx/dt = G u. Travel, actuators, rates and angle of attack are then
+linear in the commands, and a linear programme finds the least amplitude. The horizon is the shortest of a few
+that has a solution.
+"""
+
+from dataclasses import dataclass
+from math import inf
+from typing import Any
+
+import numpy as np
+
+LONGEST_S = 0.5  # until the frame in which the surfaces are there
+
+
+@dataclass(frozen=True)
+class Situation:
+    """The aircraft at the end of a flight, with n surfaces, and what limits a doublet that begins there.
+
+    G (3, n), rad/s2 per rad: effectiveness of the surfaces. u (n,), rad: their deflections. x (3,), rad/s:
+    body rates. rate, rad/s: largest allowed size of a body rate. bound (3,), rad/s2: on the innovation of a
+    frame without a fault, as long as the rates stay below `rate`. stops (2, n), rad: ends of travel. In a
+    JSBSim frame, of which a frame has `instants`, an actuator goes the share `approach` (n,) of its way, and
+    `step` (n,) rad at most. in_blocks: whether types are tested by blocks of frames. dt, s: length of a
+    frame. alpha, alpha_range, rad: angle of attack and its range.
+    """
+
+    G: np.ndarray
+    u: np.ndarray
+    x: np.ndarray
+    rate: float
+    bound: np.ndarray
+    stops: np.ndarray
+    approach: np.ndarray
+    step: np.ndarray
+    instants: int
+    in_blocks: bool
+    dt: float
+    alpha: float
+    alpha_range: tuple[float, float]
+
+    @property
+    def held(self) -> int:
+        """Number of frames for which the deflection must hold: 3 if a frame has several JSBSim frames, as
+        `History.is_unexplained` then requires the frames before and after too."""
+        return 1 if self.instants == 1 else 3
+
+    def remaining_way(self, s: int) -> tuple[float, float]:
+        """Shares of the way to its command that surface s has not gone, if its rate limit does not act: at
+        the end of a frame, and on average over the frame. In the first of several instants the surface is
+        where it was."""
+        stays = 1.0 - self.approach[s]
+        if self.instants == 1:
+            return stays, stays
+        return stays**self.instants, float(np.mean(stays ** np.arange(self.instants)))
+
+
+def doublet(targets: dict[int, float], at: Situation) -> tuple[np.ndarray, int] | None:
+    """Commands (frames, n), rad, that bring surfaces to these deflections and back, and the frame in which
+    they are there; None if no doublet does within the limits.
+
+    targets: deflection, rad, by place of the surface.
+
+    The times to the deflection are 1, 4, 16, ... frames, and LONGEST_S. The first time that has a doublet is
+    taken, with the least amplitude. A longer time never lacks a doublet that a shorter one has: it can wait.
+    """
+    tells, longest = 1, max(int(LONGEST_S / at.dt), 1)
+    while (found := _least_amplitude(targets, at, tells)) is None:
+        if tells == longest:
+            return None
+        tells = min(4 * tells, longest)
+    return found, tells + at.held - 1
+
+
+def _least_amplitude(targets: dict[int, float], at: Situation, tells: int) -> np.ndarray | None:
+    """Commands (frames, n), rad, of the doublet that is there in frame `tells` - 1; None if there is none.
+
+    The linear programme. Its unknowns are blocks, one value a frame k, each less the present value: of each
+    surface the command u and its deflection p at the end of the frame; the rates x = p, q, r; the pitch
+    angle. After them the amplitude A, which is least. With the shares a, b of `Situation.remaining_way`, and
+    the mean deflection m over a frame:
+
+        p[k] = a p[k-1] + (1 - a) u[k]            m[k] = b p[k-1] + (1 - b) u[k]
+        x[k] = x[k-1] + dt G m[k]                 pitch[k] = pitch[k-1] + dt q[k]
+        |m[k] - m[k-1]| <= instants step          |u[k]| <= A
+        |m[k]| >= |target|, u[k] constant         in the frames in which the deflection must hold
+        x = 0                                     in the last frame
+    """
+    if (np.abs(at.x) > at.rate).any() or not at.alpha_range[0] <= at.alpha <= at.alpha_range[1]:
+        return None
+    frames, surfaces = 2 * (tells + at.held - 1), [*targets]
+    n, there, every = len(surfaces), np.arange(tells - 1, tells + at.held - 1), np.arange(frames)
+    *pqr, pitch = range(2 * n, 2 * n + 4)
+    equal, above = _Rows(pitch + 1, frames), _Rows(pitch + 1, frames)
+    turning = [{(rate, 0): 1.0, (rate, -1): -1.0} for rate in pqr]
+    for u, s in enumerate(surfaces):
+        p, away, (a, b) = n + u, targets[s] - at.u[s], at.remaining_way(s)
+        equal.add(every, {(u, 0): a - 1.0, (p, 0): 1.0, (p, -1): -a})
+        equal.add(there[1:], {(u, 0): 1.0, (u, -1): -1.0})
+        m = {(u, 0): 1.0 - b, (p, -1): b}
+        m_before = {(u, -1): b - 1.0, (p, -2): -b}
+        above.add(there, {k: -np.sign(away) * v for k, v in m.items()}, -abs(away))
+        for sign in (1.0, -1.0):
+            above.add(every, {(u, 0): sign}, amplitude=-1.0)
+            if np.isfinite(at.step[s]):
+                pace = {k: sign * v for k, v in (m | m_before).items()}
+                above.add(every, pace, at.step[s] * at.instants)
+        for row, g in zip(turning, at.G[:, s], strict=True):
+            row |= {k: -at.dt * g * v for k, v in m.items() if g}
+    for row in (*turning, {(pitch, 0): 1.0, (pitch, -1): -1.0, (pqr[1], 0): -at.dt}):
+        equal.add(every, row)
+    stops, rates = [at.stops[:, s] - at.u[s] for s in surfaces], [(-at.rate - x, at.rate - x) for x in at.x]
+    ends = [*stops, *[(-inf, inf)] * n, *rates, np.subtract(at.alpha_range, at.alpha)]
+    bounds = np.vstack([np.repeat(ends, frames, axis=0), (0.0, inf)])
+    bounds[[(rate + 1) * frames - 1 for rate in pqr]] = 0.0
+    found = _solved(equal, above, bounds)
+    if found is None:
+        return None
+    commands = np.tile(at.u, (frames, 1))
+    commands[:, surfaces] += found[: n * frames].reshape(n, frames).T
+    return commands
+
+
+class _Rows:
+    """Rows of a linear programme whose unknowns are blocks of a value for each frame, and an amplitude."""
+
+    def __init__(self, blocks: int, frames: int) -> None:
+        self._blocks, self._frames = blocks, frames
+        self._parts: list[Any] = []
+        self._limits: list[np.ndarray] = []
+
+    def add(
+        self,
+        at: np.ndarray,
+        weights: dict[tuple[int, int], float],
+        limit: float = 0.0,
+        amplitude: float = 0.0,
+    ) -> None:
+        """Add a row for each frame of `at`, with these weights of the amplitude and of each (block, lag): the
+        value of the block that many frames later, 0 before the first frame."""
+        from scipy.sparse import csr_array, eye_array, hstack
+
+        parts = [csr_array((len(at), self._frames))] * self._blocks
+        for (block, lag), weight in weights.items():
+            parts[block] = parts[block] + weight * eye_array(self._frames, k=lag, format="csr")[at]
+        self._parts.append(hstack([*parts, csr_array(np.full((len(at), 1), amplitude))]))
+        self._limits.append(np.full(len(at), limit))
+
+    @property
+    def system(self) -> tuple[Any, np.ndarray]:
+        """The sparse matrix and the limits of all rows."""
+        from scipy.sparse import vstack
+
+        return vstack(self._parts, format="csc"), np.concatenate(self._limits)
+
+
+def _solved(equal: _Rows, above: _Rows, bounds: np.ndarray) -> np.ndarray | None:
+    """The unknowns with the least amplitude; None where there are none within the limits."""
+    from scipy.optimize import linprog
+
+    weight = np.r_[np.zeros(len(bounds) - 1), 1.0]
+    for method in ("highs-ds", "highs-ipm"):  # the second where rounding stops the first
+        result = linprog(weight, *above.system, *equal.system, bounds, method=method)
+        if result.status in (0, 2):  # solved, or infeasible
+            break
+    return np.asarray(result.x) if result.status == 0 else None

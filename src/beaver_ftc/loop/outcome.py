@@ -43,22 +43,22 @@ from beaver_ftc.diagnosis.types.verdict import estimate_fault_parameter, fault_f
 from beaver_ftc.loop.frame import isolated_theta
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.sensing import DEPARTURE_SIGNALS
-from beaver_ftc.scenario.declared import (
+from beaver_ftc.scenario.diagnosis import MODES
+from beaver_ftc.scenario.faults import of_a_sensor
+from beaver_ftc.scenario.measured import (
     ALTITUDE,
     BETWEEN,
     LATE,
     Span,
     as_altitudes,
-    declares_all,
     lies_outside,
     measured_spans,
     outside,
     quantities,
 )
-from beaver_ftc.scenario.diagnosis import MODES
-from beaver_ftc.scenario.faults import of_a_sensor
 from beaver_ftc.scenario.schema import Scenario, stages
 from beaver_ftc.scenario.signals import is_before
+from beaver_ftc.scenario.undeclared import declares_all
 
 SCHEME, NO_DIAGNOSIS = "scheme", "no diagnosis ran: fdi.scheme is none"
 Reason = dict[str, Any]

@@ -41,10 +41,11 @@ from typing import TYPE_CHECKING, Any, Self
 from beaver_ftc.results import model
 from beaver_ftc.results.expectations import evaluate
 from beaver_ftc.results.model import DeclaredFault, Document, Metrics, rounded
-from beaver_ftc.scenario.declared import declares_all, outside_class
 from beaver_ftc.scenario.diagnosis import failing, of_several
 from beaver_ftc.scenario.faults import UNANTICIPATED, Damage, acting_at, is_share, size_at
 from beaver_ftc.scenario.signals import TIME_TOLERANCE_S, first_frame_s, is_before, is_in_force
+from beaver_ftc.scenario.undeclared import declares_all
+from beaver_ftc.scenario.warnings import outside_class
 
 if TYPE_CHECKING:
     from beaver_ftc.loop.outcome import Landing

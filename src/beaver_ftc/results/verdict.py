@@ -34,9 +34,10 @@ from beaver_ftc.results.model import (
     Window,
     Withdrawn,
 )
-from beaver_ftc.scenario.declared import in_words, wider
 from beaver_ftc.scenario.faults import TYPES, acting_at, masking, size_at
+from beaver_ftc.scenario.measured import in_words
 from beaver_ftc.scenario.sensors import QUANTITIES
+from beaver_ftc.scenario.warnings import wider
 
 if TYPE_CHECKING:
     from rich.table import Table

@@ -15,8 +15,9 @@ if TYPE_CHECKING:
         resolve,
         to_yaml,
     )
-    from beaver_ftc.scenario.declared import Declared, measured_spans, plural, span_in_words
+    from beaver_ftc.scenario.declared import Declared
     from beaver_ftc.scenario.diagnosis import Bounds
+    from beaver_ftc.scenario.measured import measured_spans, plural, span_in_words
     from beaver_ftc.scenario.schema import (
         NAME_PATTERN,
         Expect,

@@ -507,7 +507,7 @@ class Scenario(Section, title="beaver-ftc scenario"):
         """Warnings about values that are allowed but unusual. Each warning is one text,
         `key.path: warning`.
         """
-        from beaver_ftc.scenario.declared import warnings_of
+        from beaver_ftc.scenario.warnings import warnings_of
 
         return warnings_of(self)
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from beaver_ftc.scenario.declared import undeclared
+from beaver_ftc.scenario.undeclared import undeclared
 from beaver_ftc.studies.compare import trial
 
 # What stands for what, besides the sets of gusts: a constant error of the model covers wrong coefficients.

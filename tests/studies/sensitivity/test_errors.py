@@ -6,7 +6,7 @@ import pytest
 import beaver_ftc as bf
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.results.model import Metrics
-from beaver_ftc.scenario.declared import undeclared
+from beaver_ftc.scenario.undeclared import undeclared
 from beaver_ftc.studies.sensitivity import beyond
 from beaver_ftc.studies.sensitivity.beyond import (
     TOGETHER,

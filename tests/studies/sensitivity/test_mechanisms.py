@@ -12,7 +12,7 @@ from beaver_ftc.cli.main import app
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import Columns
 from beaver_ftc.results.metrics import measure
-from beaver_ftc.scenario.declared import undeclared
+from beaver_ftc.scenario.undeclared import undeclared
 from beaver_ftc.studies.sensitivity import command, effects, mechanisms
 from beaver_ftc.studies.sensitivity.effects import CRITERIA, document_of, net
 from beaver_ftc.studies.sensitivity.mechanisms import (

@@ -21,8 +21,8 @@ from beaver_ftc.results.log import Columns, MemoryLog
 from beaver_ftc.results.metrics import measure
 from beaver_ftc.results.model import Document, Metrics
 from beaver_ftc.scenario.airframe import air_of
-from beaver_ftc.scenario.declared import undeclared
 from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.scenario.undeclared import undeclared
 from beaver_ftc.studies.compare.criteria import least_margins
 from beaver_ftc.studies.compare.margins_in_flight import margins_of
 from beaver_ftc.studies.engine.draws import loss, sines, swings

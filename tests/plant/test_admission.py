@@ -1,5 +1,6 @@
 """A user's own aircraft: checked as a scenario names it, by the core alone, once for a state of its files."""
 
+import os
 import shutil
 from pathlib import Path
 
@@ -41,6 +42,15 @@ def test_a_property_that_the_model_lacks_is_said_at_its_line(trainer, old, new, 
     line = 1 + next(i for i, text in enumerate(file.read_text().splitlines()) if "no-such" in text)
     with pytest.raises(ScenarioError, match=f"aircraft.yaml:{line}: .*'fcs/no-such-rad' is no property of"):
         airframe.find_aircraft("./trainer", trainer.parent)
+
+
+def test_the_digest_of_an_aircraft_is_of_paths_and_contents_of_any_name(trainer):
+    found = [admission.digest_of(trainer)]
+    for name in (b"\xff.xml", b"a.xml", b"b.xml"):
+        (trainer / os.fsdecode(name)).write_text("<a/>")
+        found.append(admission.digest_of(trainer))
+    (trainer / "b.xml").rename(trainer / "Engines.xml")
+    assert len({*found, admission.digest_of(trainer)}) == 5
 
 
 def test_a_model_that_would_write_is_refused_each_time_whatever_the_cache_has(trainer):

@@ -1,12 +1,13 @@
 """A user's own aircraft is checked as a scenario names it, before JSBSim loads its model in this process.
 
-Its files are read for what would act on the machine. A process of its own loads and flies the model
-(trial.py). Every property that the aircraft file names must be one of the model. The user's cache keeps the
-digest of a folder that has passed: the last two checks are not repeated until a file changes.
+Its files must contain nothing that acts on the machine (model_file.py). A process of its own loads and flies
+the model (trial.py). Every property that the aircraft file names must be one of the model. The user's cache
+keeps the digest of a folder that has passed: the last two checks are not repeated until a file changes.
 """
 
 import contextlib
 import hashlib
+import os
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from importlib.metadata import version
@@ -36,7 +37,8 @@ def admit(aircraft: Aircraft) -> None:
     """
     check_model_has_no_side_effects(aircraft.jsbsim)
     base = cache_base()
-    kept = None if base is None else base / "admitted" / digest_of(aircraft.folder)
+    passed = f"{digest_of(aircraft.folder)}-{digest_of_files(*_CHECKS)}-{version('jsbsim')}"
+    kept = None if base is None else base / "admitted" / passed
     if kept is not None and kept.is_file():
         return
     if why := failure(aircraft.jsbsim):
@@ -49,10 +51,11 @@ def admit(aircraft: Aircraft) -> None:
 
 
 def digest_of(folder: Path) -> str:
-    """Of the files of an aircraft's folder, and of JSBSim's version."""
-    digest = hashlib.sha256(f"{digest_of_files(*_CHECKS)} {version('jsbsim')}".encode())
+    """Digest of the paths, sizes and contents of an aircraft's files, 32 hexadecimal digits."""
+    digest = hashlib.sha256()
     for path in sorted(p for p in folder.rglob("*") if p.suffix in (".xml", ".yaml") and p.is_file()):
-        digest.update(str(path.relative_to(folder)).encode() + path.read_bytes())
+        content = path.read_bytes()
+        digest.update(b"%b %d " % (os.fsencode(path.relative_to(folder)), len(content)) + content)
     return digest.hexdigest()[:32]
 
 
@@ -68,7 +71,7 @@ def _check_properties(aircraft: Aircraft) -> None:
 
 
 def _properties(file: AircraftFile) -> Iterator[tuple[Location, str]]:
-    """Each property the file names, and where."""
+    """Location in the aircraft's file and name of each JSBSim property that the file names."""
     for name, surface in file.surfaces.items():
         for key in ("command", "position", "effective"):
             yield ("surfaces", name, key), getattr(surface, key)
@@ -87,7 +90,7 @@ def _properties(file: AircraftFile) -> Iterator[tuple[Location, str]]:
 
 
 def _mistakes(aircraft: Aircraft, says: Mapping[Location, str]) -> ScenarioError:
-    """These mistakes, at their lines."""
+    """The error with these mistakes, by location in the aircraft's file, at their lines."""
     path = aircraft.folder / FILE
     lines = parse_document(path.read_text(encoding="utf-8"), str(path))
     return ScenarioError(str(path), [Problem(lines.line(at), at, what) for at, what in says.items()])

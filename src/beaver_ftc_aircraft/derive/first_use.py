@@ -1,7 +1,8 @@
 """An aircraft that a scenario names for the first time: derived, or its file compared with its JSBSim model.
 
-Compared are the angular accelerations of both, of an aircraft that the core has admitted. The differences are
-kept in the user's cache under the digest of the folder's files, so that they cost nothing until one changes.
+The comparison is of the angular accelerations, after the core has admitted the aircraft. The user's cache
+keeps the differences under the digest of the folder's files: they are computed again only after a file has
+changed.
 """
 
 import contextlib
@@ -9,6 +10,7 @@ import json
 import sys
 from collections.abc import Iterator
 from functools import lru_cache
+from importlib.metadata import version
 from math import degrees
 
 import numpy as np
@@ -53,7 +55,7 @@ def kept_or_compared(aircraft: Aircraft) -> list[str]:
     base = cache_base()
     if base is None:
         return compared(aircraft)
-    file = base / "compared" / f"{digest_of_aircraft(aircraft.folder)}.json"
+    file = base / "compared" / f"{digest_of_aircraft(aircraft.folder)}-{version('jsbsim')}.json"
     try:
         return list(read_json(file))
     except (OSError, ValueError):

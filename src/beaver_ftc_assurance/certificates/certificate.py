@@ -64,10 +64,10 @@ def certificate(
 ) -> "Certified":
     """The certificate of a flight.
 
-    recorder: has kept what the log does not hold; without one the flight is flown again. text: of the file
-    scenario.yaml beside the log, if it is not the scenario's own.
+    recorder: has kept the quantities that the log lacks; without one the scenario is flown again. text:
+    content of the file scenario.yaml beside the log, if it differs from `to_yaml(scenario)`.
 
-    Raises BadInput where another scheme diagnosed.
+    Raises BadInput if another scheme than ours diagnosed.
     """
     check_scheme(scenario)
     rows = logged_columns(log)
@@ -93,7 +93,7 @@ def certificate(
 
 
 def logged_columns(log: Log) -> Columns:
-    """The columns of a log that certificates take, (rows,)."""
+    """The columns of a log that a certificate reads, each (rows,)."""
     return log.read([
         name for name in log.columns
         if name in _LOGGED_COLUMNS or _EVENT_COLUMN.fullmatch(name) or name.endswith(_SHARE_SUFFIX)
@@ -101,7 +101,7 @@ def logged_columns(log: Log) -> Columns:
 
 
 def event_rows(rows: Columns) -> dict[str, int]:
-    """Of the alarm and of each exclusion that stands at the end: column of the log, and row."""
+    """Column of the log, and row, of the alarm and of each exclusion that is in force at the end."""
     return {
         name: row_set_to_end(flags) for name, flags in rows.items()
         if _EVENT_COLUMN.fullmatch(name) and flags[-1] > 0.0
@@ -115,7 +115,7 @@ def row_set_to_end(flags: np.ndarray) -> int:
 
 
 def check_scheme(scenario: Scenario) -> None:
-    """Refuse flights whose alarm is not our scheme's."""
+    """Raise BadInput for a scenario that another scheme than ours diagnoses."""
     if not scenario.fdi.is_ours:
         says = f"{scenario.fdi.scheme!r} states no bounds that can be recomputed"
         raise BadInput(
@@ -124,7 +124,8 @@ def check_scheme(scenario: Scenario) -> None:
 
 
 def with_digest(document: Document) -> Document:
-    """The same with the SHA-256 of itself in JSON, keys in order, without spaces, its `digest` empty."""
+    """The document with its `digest`: the SHA-256 of its JSON text, keys sorted, without spaces, with an
+    empty `digest`."""
     text = json.dumps(document | {"digest": ""}, sort_keys=True, separators=(",", ":"))
     return document | {"digest": hashlib.sha256(text.encode()).hexdigest()}
 
@@ -135,7 +136,7 @@ def as_text(document: Document) -> str:
 
 
 class OfRun:
-    """The certificate of a flight that is about to be flown: `watch` keeps what it needs."""
+    """The certificate of a flight that is about to be flown; `watch` records the quantities that it needs."""
 
     def __init__(self, scenario: Scenario) -> None:
         """Raises BadInput for a flight whose alarm is not our scheme's."""
@@ -144,15 +145,16 @@ class OfRun:
         self.watch = self._recorder.watch
 
     def write(self, folder: Path) -> None:
-        """Write it into the flight's result folder, which has log and scenario; the log gets the columns that
-        prove it."""
+        """Write the certificate into the flight's result folder, which has log and scenario, and add the
+        columns that prove it to the log."""
         text = (folder / "scenario.yaml").read_text(encoding="utf-8")
         certificate(self._scenario, StoredLog(folder / LOG_NAME), self._recorder, text).write(folder)
 
 
 @dataclass(frozen=True)
 class Certified:
-    """A certificate with all that proves it: the log, the columns that it lacks, the text of its scenario."""
+    """A certificate, and what proves it: the log, the columns that the log lacks, the text of
+    scenario.yaml."""
 
     document: Document
     log: Log
@@ -160,7 +162,7 @@ class Certified:
     scenario: str
 
     def copy_log(self, to: LogSink) -> None:
-        """Copy the log and the columns that it lacks."""
+        """Write the log, with the columns that it lacks, to a sink."""
         to.open([*self.log.columns, *self.columns])
         first = 0
         for chunk in self.log.read_chunks():
@@ -182,8 +184,8 @@ class Certified:
 
 @dataclass(frozen=True)
 class PartialColumn:
-    """A column of which a part is known: `values` from row `first` on. Before them stands their first, after
-    them their last."""
+    """A column known in the rows from `first` on (`values`). The rows before repeat the first of the values,
+    the rows after the last."""
 
     first: int
     values: np.ndarray
@@ -194,7 +196,7 @@ class PartialColumn:
 
 
 def history_of(scenario: Scenario, rows: Columns, tape: Tape) -> History:
-    """What the log says of rates, model and bound, and what was declared."""
+    """Rates, model and bound from the log, and the declared errors from the tape."""
     x, F, eta_bar = (np.column_stack([rows[f"{axis}_{of}"] for axis in AXES]) for of in MEASURED_MODEL_BOUND)
     return History(1.0 / scenario.rate_hz, scenario.substeps, x, F, eta_bar, declared_errors_of(tape.alarm))
 
@@ -209,7 +211,7 @@ class _Flight:
     history: History
 
     def statements(self, events: dict[str, int]) -> Iterator[Document]:
-        """What can be said of each event; one without sides says why it cannot be certified."""
+        """A statement for each event; one without sides says in `because` why it cannot be certified."""
         alarm, diagnosis, tape = events["detected"], self.tape.alarm.diagnosis, self.tape
         about: Document = {"what": None, "column": "detected", "frame": alarm}
         ours = scheme_number("adaptive-estimators")
@@ -231,7 +233,8 @@ class _Flight:
             yield from self._types(max(alarm, 1))  # the first row has no innovation
 
     def _alarm(self, k: int, is_ours: bool) -> Document:
-        """Evidence of the alarm at row k: a filter beyond its bound, instruments that disagree, or chance."""
+        """Evidence of the alarm at row k, from the first source that has it: a filter beyond its bound,
+        sensors that disagree, the statistical detector."""
         monitor = self.tape.alarm.diagnosis.sensor_monitor
         found = self._filter_alarm(k) if is_ours else None
         if found is not None:
@@ -285,7 +288,8 @@ class _Flight:
     def _filter_tests(
         self, e: int, across: np.ndarray, axes: tuple[int, ...], k: int
     ) -> Iterator[list[Term]]:
-        """The detection filters, and the memory of what the fault can have done to them."""
+        """The tests of the detection filters, each with the bound on the fault's effect before the first
+        frame."""
         tape = self.tape
         ways = [([*axis_directions((i,))], i) for i in axes]
         ways += [([across, -across], 3)] if across.any() and len(axes) == 3 else []
@@ -295,7 +299,7 @@ class _Flight:
                     yield [Term(d, pole, tape.since, k, effect_before=float(reach[e, m, i]))]
 
     def _types(self, alarm: int) -> Iterator[Document]:
-        """Of each type excluded, surface by surface; the log has a column for it only with a certificate."""
+        """A statement for each excluded type, surface by surface. Its column is one of `evidence_columns`."""
         tape, history = self.tape, self.history
         if tape.alarm.diagnosis.types_config.frames_per_block > 1:
             tape, history, alarm = in_blocks(tape, history, alarm)
@@ -329,7 +333,7 @@ class _Flight:
         return first_violated(chain.from_iterable(candidates), of, self.history)
 
     def declared_fields(self, said: list[Document]) -> Document:
-        """What all these statements go by."""
+        """The fields of the certificate that all statements share: declared errors, times, Earth's rate."""
         of = [(one, span) for one in said for span in (*one.get("terms", ()), *one.get("bounds", ()))]
         asked = np.any([np.array(span["d"]) != 0.0 for _, span in of], axis=0) if of else np.zeros(3, bool)
         history = self.history.with_constant_gyro_errors_on(asked)

@@ -54,7 +54,7 @@ class Relation(NamedTuple):
     theta_high: float
 
 
-# By the travel low, high (rad). A type that neither table has is what the log's columns say of it.
+# Relation of a type, from the travel low, high (rad). The log's columns define types that are in no table.
 RELATIONS = {
     "stuck": lambda low, high: Relation(0.0, False, True, low, high),
     "float": lambda low, high: Relation(0.0, False, True, *2 * (min(max(0.0, low), high),)),
@@ -222,7 +222,7 @@ EVIDENCE = {
 
 
 def check_form(document, needed, allowed, where):
-    """Every field that is needed, none that is not known, and in each what may stand there."""
+    """Refuse a document that lacks a needed field, has an unknown one, or a value that is not allowed."""
     require(isinstance(document, dict), f"{where}: this is no mapping")
     fields = needed | allowed
     for name in needed:
@@ -240,7 +240,7 @@ def evidence_kind(said):
 
 
 def check_statement_form(said):
-    """The fields of a statement; the lists in it have as many entries as frames. Returns `evidence_kind`."""
+    """Refuse a statement with wrong fields or lists of wrong lengths. Returns its `evidence_kind`."""
     kind = evidence_kind(said)
     needed, allowed = EVIDENCE[kind]
     check_form(said, FORMS["event"][0] | needed, allowed, "statement")
@@ -261,7 +261,7 @@ def check_statement_form(said):
 
 
 def check_lengths(span, names):
-    """A value for each frame from `first` to `frame`; a direction that is not zero."""
+    """Refuse lists without a value for each frame from `first` to `frame`, and a direction of zero."""
     require(1 <= span["first"] <= span["frame"], "the frames are not in order")
     require(any(span["d"]), "the direction is zero")
     for name in names:
@@ -270,7 +270,7 @@ def check_lengths(span, names):
 
 
 def check_likelihood_form(said):
-    """Sizes of the lists of a statistical alarm: n axes, m constants."""
+    """Refuse lists of wrong sizes in a statistical alarm with n axes and m constants."""
     n, m = len(said["axes"]), len(said["tolerance"])
     require(n in (1, 2) and len(set(said["axes"])) == n, "axes: one or two different ones are allowed")
     require(len(said["R"]) == n, "R: one variance for each axis")
@@ -334,10 +334,10 @@ def declared_at_row(scenario, row_number):
 
 
 def check_declared(document, declared):
-    """The bounds in the certificate are those of the scenario.
+    """Refuse bounds that are not those of the scenario.
 
-    A bias of a gyro may be left out: then the bound on its noise is larger, which proves less. c, b and g
-    only explain the bound that the log has; c must be zero where the scenario's share is.
+    The bias B of a gyro may be left out: the bound on its noise is then larger, which proves less. c, b and g
+    only explain the bound in the log. c must be zero on an axis for which the scenario declares no share.
     """
     check_form(document.get("declared"), *FORMS["declared"], "declared")
     for axis, (offset, bias, slope) in declared.gyro_errors.items():
@@ -419,11 +419,11 @@ class Frames:
         return np.column_stack([np.asarray(self.log[name.format(axis)], float) for axis in AXES])
 
     def last_rows(self, values):
-        """Of each block the last row's."""
+        """The value (blocks, ...) of the last row of each block."""
         return values[self.rows][self.length - 1 :: self.length]
 
     def mean(self, values):
-        """Of each block the mean."""
+        """The mean (blocks, ...) over each block."""
         return values[self.rows].reshape(-1, self.length, *values.shape[1:]).mean(axis=1)
 
     def row_of(self, k):
@@ -452,7 +452,7 @@ def errors_by_row(measured, document):
 
 
 def event_column(what, log):
-    """The column that says whether this is excluded; the alarm's if nothing is named."""
+    """The log's column of an exclusion; that of the alarm if `what` is None."""
     if what is None:
         return "detected"
     estimator = f"fie_{what}_excluded"
@@ -460,7 +460,8 @@ def event_column(what, log):
 
 
 def check_event(said, log):
-    """The log's column is set from the stated row to the end, and not in the row before."""
+    """Refuse an event whose column is not set from the stated row to the end, or was set in the row
+    before."""
     name, k = said["column"], said["frame"]
     require(name == event_column(said["what"], log), f"{name} is another column than that of this event")
     require(name in log, f"the log has no column {name}: it was not written with this certificate")
@@ -499,7 +500,7 @@ class Effect:
 
 
 def effect_of_fault(what, frames):
-    """The effect of the fault that is excluded, from the log's columns; of the alarm none."""
+    """The effect of the excluded fault, from the log's columns; for an alarm, which is no fault's, zero."""
     if what is None:
         zero = np.zeros_like(frames.rates_rad_s)
         return Effect(zero, zero, zero, 0.0, 0.0)
@@ -522,7 +523,7 @@ def effect_of_fault(what, frames):
 
 
 def course_of(what, log):
-    """The comparison and the stop of a type that many frames exclude, of another None."""
+    """Comparison and stop of a type that many frames exclude; None for another type."""
     kind = what.partition(" ")[2]
     if kind in RELATIONS or kind in COURSES:
         return COURSES.get(kind)
@@ -534,8 +535,8 @@ def course_of(what, log):
 
 
 def relation_of(what, log, low, high):
-    """How this type moves the surface, see RELATIONS; low, high: the travel, rad. Of a type with a course
-    theta says where the surface was; of a swing, how far off its command."""
+    """How a type moves the surface (RELATIONS); low, high: the travel, rad. For a type with a course, theta
+    is the position of the surface; for a swing, its distance from the command."""
     kind, course = what.partition(" ")[2], course_of(what, log)
     if course is not None:
         return Relation(float(course[0] == "swing"), False, False, low, high)
@@ -547,7 +548,7 @@ def relation_of(what, log, low, high):
 
 
 def constant_value(values):
-    """The one value of a column that says it in some rows."""
+    """The value of a column that is constant, or not a number, in each row."""
     values = np.asarray(values, float)
     found = np.unique(values[np.isfinite(values)])
     require(len(found) == 1, "a column that must be constant is not")
@@ -571,7 +572,7 @@ def term_pairs(said, frames):
 
 
 def check_theta(said, effect, frames):
-    """The stated ends are those of the log; one constant theta is allowed where the scenario declares it."""
+    """Refuse ends of theta's range that are not the log's, and a constant theta that nothing justifies."""
     for end, known in (("least", effect.theta_low), ("most", effect.theta_high)):
         require(said.get(end, known) == known, f"{end} is not the end of theta's range in the log")
     fdi, alarm = frames.declared.scenario["fdi"], int(np.argmax(np.asarray(frames.log["detected"]) == 1))
@@ -588,8 +589,8 @@ def check_theta(said, effect, frames):
 
 
 def check_term_frames(term, said, frames):
-    """Of a term the frames since, first and k are in order, none is later than the event or too early. A term
-    without a pole has one frame, since = k - 1. Returns `since`."""
+    """Refuse frames `since`, `first` and k of a term that are out of order, later than the event, or before
+    the diagnosis started. A term without a pole has one frame, since = k - 1. Returns `since`."""
     k, first = term["frame"], term["first"]
     since = term.get("since", k - 1)
     begun = frames.declared.start_row if frames.length == 1 else 0
@@ -634,7 +635,8 @@ def evaluate_term(term, said, frames, effect):
 
 
 def check_stated_effect(span, effect):
-    """Where h, Z, r are stated they are those of the log; null where the fault adds only rounding."""
+    """Refuse stated h, Z, r that are not the log's. null stands where the fault adds no more than
+    rounding."""
     for name, known in effect.items():
         for stated, value in zip(span.get(name, ()), known, strict=False):
             require(stated is None or is_same_effect(stated, value), f"{name} is not that of the log")
@@ -642,7 +644,7 @@ def check_stated_effect(span, effect):
 
 
 def check_logged_values(term, frames, rows):
-    """What stands in the log as well is the same; eta_bar is a published part and a rest of zero or more."""
+    """Refuse values that are not the log's, and an eta_bar that is not its stated part and a `rest` >= 0."""
     logged = {"x": frames.rates_rad_s, "F": frames.model_rad_s2, "eta_bar": frames.eta_bar_rad_s2}
     for name, values in logged.items():
         require(np.allclose(term[name], values[rows], 1e-13, 0), f"{name} is not that of the log")
@@ -676,7 +678,7 @@ class Course(NamedTuple):
 
 
 def course_pairs(said, frames):
-    """Pairs (what must be more, than what) that a fault type forbids, of single frames' bounds."""
+    """Pairs (greater, less) of the bounds of single frames; the fault type allows only greater <= less."""
     effect = effect_of_fault(said["what"], frames)
     comparison, stop = course_of(said["what"], frames.log) or ("", 0)
     require(comparison, "this is no type with a course")
@@ -809,7 +811,8 @@ def likelihood_pairs(said, frames):
 
 
 def check_level(said, frames):
-    """The scenario has this detector; its rate of false alarms allows the level; no frame is missing."""
+    """Refuse unless the scenario has the statistical detector, its rate of false alarms allows the level, and
+    no frame is missing."""
     statistical = frames.declared.scenario["fdi"].get("statistical")
     require(statistical and said["what"] is None, "the scenario declares no statistical detector")
     one_test = statistical["false_alarms_per_h"] / (3600 / frames.dt)
@@ -870,7 +873,7 @@ def array_with_zeros(values):
 
 
 def check_exclusion_by_alarm(said, document, frames):
-    """The statistical alarm came on axes that this fault does not move: that excludes it."""
+    """Refuse unless an earlier statistical alarm came on axes that this fault does not move."""
     alarm = document["statements"][0]
     require(alarm.get("what", "") is None and "likelihood" in alarm, "there is no statistical alarm before")
     require(alarm["frame"] <= said["frame"] and said["what"] is not None, "the alarm came later")
@@ -884,7 +887,7 @@ def check_exclusion_by_alarm(said, document, frames):
 
 
 def missing_pairs(said, frames):
-    """The pair 1 > 0 of a reading that is missing, as the log says too."""
+    """The pair 1 > 0 of a missing reading; the log's column `watch_missing` must name the same sensor."""
     k = said["frame"]
     require(said["what"] is None, "instruments raise an alarm, they exclude no surface")
     require(np.asarray(frames.log.get("watch_missing", []), float)[k : k + 1].tolist() == said["missing"],
@@ -911,7 +914,7 @@ def monitor_pairs(said, frames):
 
 # --- 10. All statements ----------------------------------------------------------------------------------
 
-# Of each kind of evidence the pairs (what must be more, than what); "as" has none.
+# The pairs (greater, less) of each kind of evidence; a statement holds if greater > less. "as" has none.
 PAIRS = {
     "terms": term_pairs, "bounds": course_pairs, "likelihood": likelihood_pairs, "looks": monitor_pairs,
     "missing": missing_pairs,
@@ -1052,7 +1055,7 @@ def main(arguments):
     """Print the statements, or why they are refused; returns the exit status."""
     try:
         said, why = check(*arguments)
-    except (OSError, TypeError, ValueError, LookupError, Refused) as error:
+    except (OSError, TypeError, ValueError, LookupError, RecursionError, Refused) as error:
         print(f"no certificate at FOLDER, or CERTIFICATE LOG [SCENARIO]: {error}", file=sys.stderr)
         return 1
     print(*why, sep="\n", end="\n" * bool(why), file=sys.stderr)

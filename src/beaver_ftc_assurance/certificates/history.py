@@ -143,8 +143,8 @@ class History:
         return np.asarray(padded[:-2] & padded[1:-1] & padded[2:])
 
     def with_constant_gyro_errors_on(self, axes: np.ndarray) -> "History":
-        """The same, with a constant gyro error on the axes where `axes` (3,) is 1 alone; on others all of the
-        error may change."""
+        """The same history, but with a constant part of the gyro error only on the axes where `axes` (3,) is
+        1; on the other axes, the whole error may change."""
         constant = self.declared.gyro_constant_rad_s * axes
         return replace(self, declared=replace(self.declared, gyro_constant_rad_s=constant))
 
@@ -162,7 +162,7 @@ class History:
 
 
 def _row_before(values: np.ndarray) -> np.ndarray:
-    """Values (rows, 3) moved by a row: in each row those of the row before; in the first not a number."""
+    """In each row the values (rows, 3) of the row before; NaN in the first."""
     return np.concatenate([np.full_like(values[:1], nan), values[:-1]])
 
 

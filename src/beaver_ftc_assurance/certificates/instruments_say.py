@@ -1,5 +1,5 @@
-"""The alarm of instruments: a reading further from what the others predict than sound ones can be
-(docs/explanation/instruments.md).
+"""Evidence of an alarm of the sensor monitor: a reading that differs from its prediction by the other sensors
+more than sound sensors allow (docs/explanation/instruments.md).
 """
 
 from collections.abc import Iterator, Mapping

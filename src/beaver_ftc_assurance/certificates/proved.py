@@ -1,4 +1,5 @@
-"""The certificate of frames that somebody else goes through: a log of others, a flight with a doublet."""
+"""The certificate of frames that other code advances: of a recorded log, of a flight with a doublet; and that
+of a finished flight, which is flown again."""
 
 from collections.abc import Iterable
 
@@ -20,8 +21,8 @@ from beaver_ftc_assurance.certificates.tape import Recorder
 
 
 def proved(scenario: Scenario, frames: np.ndarray, flown: Iterable[int]) -> Certified:
-    """The certificate. frames: the record (1,), of `frame_dtype`; flown: goes on by a frame whenever it is
-    asked. Raises BadInput where another scheme than ours diagnosed."""
+    """The certificate of frames. frames: the record (1,), of `frame_dtype`. flown: yields the number of each
+    frame once the record holds it. Raises BadInput if another scheme than ours diagnosed."""
     check_scheme(scenario)
     recorder = Recorder(scenario)
     recorder.begin(frames)
@@ -40,7 +41,7 @@ def proof(scenario: Scenario, log: Log) -> Proof:
 
 
 def _log(frames: np.ndarray, flown: Iterable[int], scenario: Scenario, recorder: Recorder) -> MemoryLog:
-    """What the diagnosis makes of each frame, in the columns that a certificate takes."""
+    """A log of all frames, with the columns that a certificate reads."""
     log, surfaces = MemoryLog(), scenario.airframe.surfaces
     names = estimator_names(scenario.fdi.fault_class, scenario.airframe)
     columns = ["t_s", *(f"{axis}_{what}" for what in MEASURED_MODEL_BOUND for axis in AXES), "detected"]

@@ -84,13 +84,13 @@ class _RecordWords:
 
 
 class Recorder:
-    """Keeps what a tape takes of a flight's record, frames (1,) of `frame_dtype`, at each `keep`."""
+    """Copies the quantities of a `Tape` from a flight's record, (1,) of `frame_dtype`, at each `keep`."""
 
     def __init__(self, scenario: Scenario) -> None:
         self._scenario = scenario
 
     def watch(self, loop: Loop) -> Callable[[], None]:
-        """Keep every frame of a flight; to be called as it ends: what is returned."""
+        """Keep every frame of a flight. Returns the function to call when the flight ends."""
         self.begin(loop.frames)
         loop.after_frame = self.keep
         return self.land
@@ -122,7 +122,7 @@ class Recorder:
         self._keep_frame(*self._arguments)
 
     def tape(self, events: Sequence[int], rows: int) -> Tape:
-        """The frames around these, of so many rows; the first of them is the alarm's, if one was raised."""
+        """The frames around `events`. rows: number of frames of the flight."""
         last, config = FrameReadout(self._last[0]), self._scenario.fdi
         seen, alarm, clear = self._state[:3].tolist()
         ring, raised = len(self._ring), alarm >= 0
@@ -173,13 +173,13 @@ def keep_frame(record, always, early, kept, ring, alarm, state):
 
 
 def _words_of(frames: np.ndarray) -> np.ndarray:
-    """The words of a record that `memory` gave."""
+    """The memory (words,) of a record from `take_memory` or `copy_memory`, in words of 8 bytes."""
     assert frames.base is not None
     return frames.base[: frames.nbytes].view(np.int64)
 
 
 def tape_of_flight_again(scenario: Scenario, events: Sequence[int], rows: int) -> Tape:
-    """Fly again and keep the frames around these, of so many rows; the first of them is the alarm's."""
+    """`Recorder.tape` of a scenario that is flown again for it."""
     recorder = Recorder(scenario)
     fly(scenario, watch=recorder.watch)
     return recorder.tape(events, rows)

@@ -168,7 +168,8 @@ def check(*arguments):
 def test_a_path_without_a_certificate_ends_in_one_line(tmp_path):
     (tmp_path / "text.json").write_text("no certificate")
     (tmp_path / "list.json").write_text("[1, 2]")
-    for name in ("nothing", "text.json", "list.json", "."):
+    (tmp_path / "deep.json").write_text("[" * 100_000)
+    for name in ("nothing", "text.json", "list.json", "deep.json", "."):
         status, _, says = check(tmp_path / name, "log.parquet")
         assert (status, says.count("\n")) == (1, 1)
         assert says.startswith("no certificate at FOLDER, or CERTIFICATE LOG [SCENARIO]: ")

@@ -22,6 +22,7 @@ from beaver_ftc.loop import LogSink
 from beaver_ftc.results import Log, ParquetLog, StoredLog
 from beaver_ftc.scenario import Declared, Scenario, to_yaml
 from beaver_ftc_assurance.certificates import chance, courses, instruments_say, kinds
+from beaver_ftc_assurance.certificates.check_certificate import FORMAT_VERSION, digest
 from beaver_ftc_assurance.certificates.history import (
     Document,
     History,
@@ -50,7 +51,7 @@ from beaver_ftc_assurance.certificates.tape import (
 
 EvidenceColumns = dict[str, "PartialColumn"]  # column of the log -> what stands in it
 Columns = dict[str, np.ndarray]
-FILE_NAME, LOG_NAME, FORMAT_VERSION = "certificate.json", "log.parquet", 5
+FILE_NAME, LOG_NAME = "certificate.json", "log.parquet"
 MEASURED_MODEL_BOUND = "measured_rad_s", "design_rad_s2", "eta_bar_rad_s2"  # columns of each axis
 _LOGGED_COLUMNS = {"watch_missing"} | {f"{axis}_{of}" for axis in AXES for of in MEASURED_MODEL_BOUND}
 _EVENT_COLUMN = re.compile("detected|fie_.*_excluded")  # columns of the alarm and of exclusions
@@ -126,8 +127,7 @@ def check_scheme(scenario: Scenario) -> None:
 def with_digest(document: Document) -> Document:
     """The document with its `digest`: the SHA-256 of its JSON text, keys sorted, without spaces, with an
     empty `digest`."""
-    text = json.dumps(document | {"digest": ""}, sort_keys=True, separators=(",", ":"))
-    return document | {"digest": hashlib.sha256(text.encode()).hexdigest()}
+    return document | {"digest": digest(document)}
 
 
 def as_text(document: Document) -> str:

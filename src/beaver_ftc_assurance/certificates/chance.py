@@ -1,7 +1,8 @@
-"""The statistical alarm: a fault's likelihood ratio from its onset to the alarm.
+"""Evidence of an alarm by the statistical detector: the likelihood ratio of a fault from its onset to the
+alarm.
 
-docs/explanation/statistical.md derives it. Columns that the log does not have are kept frame by
-frame: signature, regressors of declared constants, variances.
+docs/explanation/statistical.md derives it. The log lacks its inputs (signature, regressors of declared
+constants, variances); the recorder keeps them frame by frame (tape.py).
 """
 
 from collections.abc import Mapping, Sequence
@@ -27,6 +28,7 @@ from beaver_ftc.diagnosis.detection import (
     whiten_frame,
 )
 from beaver_ftc.diagnosis.detection import STEP_HYPOTHESIS as STEP
+from beaver_ftc_assurance.certificates.check_certificate import NO_PACE
 from beaver_ftc_assurance.certificates.history import Document, History
 from beaver_ftc_assurance.certificates.tape import Tape
 
@@ -34,7 +36,6 @@ LOGGED_SCORE_TOLERANCE = 1e-5  # relative; more than all that a certificate leav
 NEGLIGIBLE_SHARE_OF_LIMIT = 1e-7  # what changes evidence and limit by less is left out
 MAX_WRITTEN_CONSTANTS = 6  # in each frame: with more a certificate would have over 200 kB
 MAX_WRITTEN_FRAMES = 520  # with more a certificate would have over 200 kB
-NO_PACE = 1e9  # of a bounded uncertainty: it may change at any rate
 EXCLUSION_NOT_STATED = (
     "chance excluded it, weighing every onset of every fault: more than a certificate can hold"
 )
@@ -44,9 +45,10 @@ ALARM_NOT_STATED = "chance raised it: an onset long before, a tone, or a force"
 def alarm_evidence(
     tape: Tape, history: History, surfaces: Sequence[str], rows: Mapping[str, np.ndarray], k: int
 ) -> Document | None:
-    """The evidence by which chance raised the alarm at row k; None where it is not one onset's, or too old.
+    """The evidence of a statistical alarm at row k; None if its onset is too old, or no single onset explains
+    it.
 
-    The share of the level that the log has, `rows`, is as large, or larger where another view has more.
+    rows: the log, which has the largest share of the level over all views: at least that of this evidence.
     """
     diagnosis = tape.alarm.diagnosis
     b, h = _largest_score(diagnosis.statistical_filters)
@@ -68,8 +70,8 @@ def alarm_evidence(
 
 
 def exclusion_by_alarm(tape: Tape, e: int, alarm: Document) -> Document:
-    """The evidence that chance raised the alarm where the fault of estimator e moves nothing; why there is
-    none where it does."""
+    """The evidence that the statistical alarm came on axes that the fault of estimator e does not move; the
+    reason why there is none, if it moves one of them."""
     if "likelihood" in alarm:
         here = slice(alarm["first"] - 1 - tape.first, alarm["frame"] + 1 - tape.first)
         moved = (values[here, e][:, alarm["axes"]] for values in (tape.slope, tape.offset, tape.spread))
@@ -125,7 +127,7 @@ class LikelihoodRatio:
 
     @property
     def fields(self) -> Document:
-        """The statement's, null where zero stands."""
+        """The fields of the statement, with null for zero."""
         rows = zip(*(values.tolist() for values in self.series.values()), strict=True)
         return {
             "level": self.level, "axes": self.axes, "sense": self.sense, "tolerance": self.tolerance.tolist(),
@@ -135,7 +137,8 @@ class LikelihoodRatio:
         }  # fmt: skip
 
     def without_negligible(self) -> "LikelihoodRatio":
-        """The same without what decides nothing: what the filter has forgotten, bounds that add nothing."""
+        """The same ratio without the numbers that change evidence and limit by no more than a negligible
+        share."""
         said = self
         for name in ("bounded", "pace", "foreseen"):
             without = replace(said, series={key: of for key, of in said.series.items() if key != name})
@@ -154,7 +157,7 @@ class LikelihoodRatio:
         return replace(said, P=said._without_negligible_numbers("P"), R=said._without_negligible_numbers("R"))
 
     def _without_negligible_numbers(self, name: str) -> np.ndarray:
-        """One of R, Y, P, zero where a number decides nothing; of P both that stand opposite."""
+        """R, Y or P, with zero for each negligible number; in P, which is symmetric, for both of a pair."""
         values = getattr(self, name)
         kept = values.copy()
         for place in np.ndindex(values.shape):
@@ -167,20 +170,21 @@ class LikelihoodRatio:
         return kept
 
     def _is_as(self, other: "LikelihoodRatio") -> bool:
-        """Whether evidence and limit differ by nothing that decides; no where P is no covariance."""
+        """Whether evidence and limit of both differ by a negligible share; False if P is no covariance."""
         change = np.abs(np.subtract(self.sides, other.sides))
         return bool((change <= NEGLIGIBLE_SHARE_OF_LIMIT * self.sides[1]).all())
 
     def _with_constants_merged(self) -> "LikelihoodRatio":
-        """One constant in the place of many: all at their worst, which is linear in them."""
+        """The same ratio with one constant instead of many. The sums are linear in the constants, so that all
+        of them at their worst act as one."""
         worst = self.tolerance * np.sign(self.sums()[0][2:])
         Y = np.column_stack([self.Y[:, :2], [worst @ row for row in self.Y[:, 2:].copy()]])
         known = np.array([[worst @ of_frame] for of_frame in self.series["known"].copy()])
         return replace(self, tolerance=np.ones(1), Y=Y, series=self.series | {"known": known})
 
     def sums(self) -> tuple[np.ndarray, float, float]:
-        """Sums over the frames of w.g for each column of Y, (2 + m,); the same of the prediction for calm
-        air; and the room that a bounded uncertainty needs, as it swings or at its rate of change."""
+        """The sums over the frames of w.g for each column of Y, (2 + m,); the sum of w.foreseen; and the room
+        that a bounded uncertainty needs: the smaller one of its swings and of its rate of change."""
         its, n = self.series, len(self.axes)
         count, none = len(self.innovation), np.zeros_like(self.innovation)
         inputs = [self.innovation - its.get("air", 0.0), its["signature"]]

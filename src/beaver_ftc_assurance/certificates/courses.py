@@ -91,9 +91,11 @@ class SurfaceBounds:
 
 
 def _exclude_offset(bounds: SurfaceBounds, grows: bool = False) -> Document | None:
-    """A constant offset: its lower bound by one frame exceeds its upper bound by another. One that only
-    grows, and keeps its sign: a positive one is smaller in a later frame. A stop may hide an offset; it is
-    nearer by the range of the command."""
+    """Exclude a constant offset: its lower bound by one frame exceeds its upper bound by another. Exclude an
+    offset that grows and keeps its sign: a positive one is smaller in a later frame.
+
+    At a stop the position says nothing about the offset. The range of the command in a frame of several
+    instants brings both stops nearer."""
     least, most = bounds.lower.max(axis=1), bounds.upper.min(axis=1)
     low_stop = bounds.stops[0] + bounds.command_range[:, 0]
     high_stop = bounds.stops[1] - bounds.command_range[:, 1]
@@ -119,8 +121,8 @@ def _exclude_offset(bounds: SurfaceBounds, grows: bool = False) -> Document | No
 
 
 def _exclude_runaway(bounds: SurfaceBounds) -> Document | None:
-    """A runaway at its least rate or faster: a later frame shows less travel. In a frame of several instants
-    the lower bound may hold from its last instant on only: a frame less counts."""
+    """Exclude a runaway at its least rate or faster: a later frame shows less travel. In a frame of several
+    instants the lower bound may hold only in the last one: the way of one frame is then not counted."""
     rate, high_stop = bounds.actuator.min_runaway_rate_rad_s, bounds.stops[1]
     step, late_frames = rate * bounds.config.block_duration_s, int(not bounds.config.single_instant)
     least, most = bounds.lower.max(axis=1), bounds.upper.min(axis=1)
@@ -141,8 +143,8 @@ def _exclude_runaway(bounds: SurfaceBounds) -> Document | None:
 
 
 def _exclude_oscillation(bounds: SurfaceBounds) -> Document | None:
-    """An oscillation about the command: the surface is on one side of it for longer than half of the slowest
-    period."""
+    """Exclude an oscillation about the command: the surface is on one side of the command for longer than
+    half of the slowest period."""
     for axis, beyond, starts in bounds.runs_beyond(bounds.command):
         for k in np.flatnonzero(np.arange(len(starts)) - starts > bounds.config.half_blocks)[:1].tolist():
             run = range(int(starts[k]), k + 1)
@@ -153,8 +155,9 @@ def _exclude_oscillation(bounds: SurfaceBounds) -> Document | None:
 
 
 def _exclude_rate_limit(bounds: SurfaceBounds) -> Document | None:
-    """A surface that approaches its order by its least step in every instant, until its lag makes the steps
-    smaller: in a run of frames beyond all orders, a later one shows a position farther away."""
+    """Exclude a reduced rate limit: such a surface approaches its order by at least the least step in each
+    instant, until it is so near that its lag makes the steps smaller. In a run of frames beyond all orders, a
+    later frame shows a position farther away."""
     actuator, config = bounds.actuator, bounds.config
     min_approach = config.n_substeps * config.frames_per_block * actuator.slow_step_rad  # of a frame, rad
     orders, most = bounds.max_order, bounds.upper.min(axis=1)
@@ -190,7 +193,8 @@ RULES: dict[str, Callable[[SurfaceBounds], Document | None]] = {
 def evidence(
     scenario: Scenario, tape: Tape, history: History, surface: int, fault_type: int, alarm_frame: int
 ) -> Document | None:
-    """What excludes a fault type on a surface by its course; None where single frames do not."""
+    """The fields of the statement that excludes a fault type on a surface by its course; None if there is no
+    such statement."""
     held, row = hypothesis_of_type(tape, surface, STUCK), TYPES[fault_type]
     for sign in (row.stop_direction,) if row.stop_direction else (1, -1):
         bounds = _surface_bounds(scenario, tape, history, held, surface, alarm_frame, sign)
@@ -209,8 +213,8 @@ def _surface_bounds(
     alarm_frame: int,
     sign: int,
 ) -> SurfaceBounds:
-    """The bounds of the frames from the alarm on that the diagnosis has tested types with. held: by which a
-    frame bounds the position."""
+    """The bounds of the frames from the alarm on in which the diagnosis has tested types. held: hypothesis by
+    which a frame bounds the position."""
     frames, several = np.arange(alarm_frame, tape.end - 1), not history.has_single_instants
     diagnosis = tape.last.diagnosis
     here = slice(alarm_frame - tape.first, tape.end - 1 - tape.first)

@@ -16,12 +16,12 @@ from math import exp, inf, isinf
 import numpy as np
 
 from beaver_ftc.results import Document
+from beaver_ftc_assurance.certificates.check_certificate import MIN_EFFECT_RAD_S2
 from beaver_ftc_assurance.certificates.history import ROUNDING_SHARE, History
 
 N_WRITTEN_FRAMES = 16  # of a filter; what was before them is stated as the filter's state
 MIN_RELATIVE_MARGIN = 1e-9  # by which the left side is larger, over the larger side: summation may do less
-MIN_EFFECT_RAD_S2 = 1e-12  # a smaller effect of a fault is rounding
-MIN_SLOPE = 1e-12  # of a sum in theta: a smaller one comes from rounding, where theta drops out of two terms
+MIN_SLOPE = 1e-12  # of a sum in theta: a smaller one is rounding, as where theta drops out of two terms
 ANY, CONSTANT, CONSTANT_WHILE_SHOWN = "any", "constant", "constant while it shows"  # theta of a statement
 MEMORY_TIME_CONSTANTS = 16.0  # of a filter: of an older innovation less than e^-16 is left
 
@@ -59,7 +59,7 @@ class Hypothesis:
 
 
 def no_fault(first_frame: int, n_frames: int) -> Hypothesis:
-    """The hypothesis of health."""
+    """The hypothesis of a healthy aircraft."""
     zero = np.zeros((n_frames, 3))
     return Hypothesis(first_frame, zero, zero, zero, 0.0, 0.0)
 
@@ -183,7 +183,7 @@ def _filtered(decay: float, dt: float, effects: np.ndarray, before: float) -> fl
 
 
 def first_violated(candidates: Iterable[list[Term]], of: Hypothesis, history: History) -> Document | None:
-    """The fields of the first inequality that the data violate."""
+    """The statement of the first inequality that the data violate; None if there is none."""
     said = (Inequality(terms, of, history).statement() for terms in candidates if terms)
     return next(filter(None, said), None)
 

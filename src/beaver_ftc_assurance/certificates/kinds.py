@@ -69,7 +69,8 @@ def travel_rad(tape: Tape, s: int) -> tuple[float, float]:
 
 
 def type_definition_columns(tape: Tape, surface: str, s: int, kind: int) -> dict[str, float]:
-    """What a type says of the surface, by column of the log: of a type that the checker does not define."""
+    """The columns of the log, each with its constant, that define a type which the checker does not
+    define."""
     row, name = TYPES[kind], exclusion_name(surface, kind).replace(" ", "_")
     if WORDS[kind] in {*RELATIONS, *COURSES}:
         return {}

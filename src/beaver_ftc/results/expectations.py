@@ -1,8 +1,8 @@
-"""What a scenario expects of its flight (`expect:`), held against the metrics and said in words: a row a key.
+"""The expectations of a scenario (`expect:`), compared with the metrics, and their words: a row for each key.
 
-Where the quantity does not exist (nothing was detected, say) the expectation fails. A name that was given
-before its fault began meets none. If an expectation of the diagnosis is not met because of that, because the
-name was withdrawn, or because there were frames in which nothing could be concluded, the reason is given.
+An expectation fails if its quantity does not exist, for example if there was no alarm. A name that was given
+before its fault began meets no expectation. A failed expectation of the diagnosis has a reason if the name
+was premature or withdrawn, or if there were frames in which the diagnosis could conclude nothing.
 """
 
 from collections.abc import Iterator
@@ -16,22 +16,23 @@ MOTION_OF_AXIS = {"p": "roll", "q": "pitch", "r": "yaw"}
 
 
 class Rule(NamedTuple):
-    """Where the metrics have what an expectation is of, and how both are said."""
+    """An expectation that a value of the metrics equals. path: of the value in the metrics; words: its
+    name."""
 
     path: str
     words: tuple[str, ...]
 
     def actual(self, expected: Any, metrics: Metrics) -> Any:
-        """What was found; of several names, which a list expects, those given in flight."""
+        """The value in the metrics; if a list of names is expected, all names given in flight."""
         found = metrics.at("isolation.names" if isinstance(expected, list) else self.path)
         return list(found) if isinstance(found, tuple) else found
 
     def is_met(self, actual: Any, expected: Any) -> bool:
-        """Whether that will do."""
+        """Whether the actual value meets the expectation."""
         return bool(actual == expected)
 
     def texts(self, said: Expectation) -> tuple[str, str]:
-        """What is expected, and what came out, if that adds anything."""
+        """Expected and actual value in words; the latter empty if it is the same."""
         is_as_expected = said.passed and said.actual == said.expected
         return f"{self.words[0]} {value_text(said.expected)}", "" if is_as_expected else value_text(
             said.actual
@@ -39,22 +40,22 @@ class Rule(NamedTuple):
 
 
 class Among(Rule):
-    """A type, among candidates."""
+    """An expectation that a fault type is among the candidates."""
 
     def is_met(self, actual: Any, expected: Any) -> bool:
-        """Whether one of them is of the type."""
+        """Whether a candidate has the type."""
         return any(expected == candidate.rpartition(":")[2] for candidate in actual)
 
 
 class Limit(Rule):
-    """A size that is not to be exceeded, on either side. words: quantity and unit."""
+    """An expectation that the size of a value is at most a limit. words: quantity and unit."""
 
     def is_met(self, actual: Any, expected: Any) -> bool:
-        """Whether it is known, and within the limit."""
+        """Whether the value exists, and is within the limit."""
         return actual is not None and abs(actual) <= expected
 
     def texts(self, said: Expectation) -> tuple[str, str]:
-        """The limit, and the size with its share of it."""
+        """The limit, and the value with its share of the limit."""
         quantity, unit = self.words
         share = _share_of_limit(said)
         of_limit = "" if share is None else f" ({three_digits(100 * share)} % of the limit)"
@@ -63,19 +64,19 @@ class Limit(Rule):
 
 
 class Flag(Rule):
-    """Whether something is so. words: of true, and of false."""
+    """An expectation of true or false. words: for true, and for false."""
 
     def texts(self, said: Expectation) -> tuple[str, str]:
-        """What is expected, and what came out if that is the opposite."""
+        """The expected words, and the opposite if that came out."""
         is_as_expected = said.passed or said.actual is None
         return self.words[not said.expected], "" if is_as_expected else self.words[not said.actual]
 
 
 class Absence(Flag):
-    """Whether something is not there."""
+    """An expectation that something did not happen: true if the value of the metrics is false, 0 or None."""
 
     def actual(self, expected: Any, metrics: Metrics) -> bool:
-        """Whether there is none."""
+        """True if it did not happen."""
         return not metrics.at(self.path)
 
 
@@ -139,7 +140,7 @@ def _judged(name: str, expected: Any, metrics: Metrics) -> Expectation:
 
 
 def _reason_not_met(expected: Any, early: bool, metrics: Metrics) -> str:
-    """Why what was expected of the diagnosis is not met, if it is known."""
+    """The reason why an expectation of the diagnosis is not met; empty if it is not known."""
     detection, isolation = metrics.detection, metrics.isolation
     if early:
         return f"{isolation.fault} was named at {isolation.time_s:g} s, before the fault began"
@@ -152,8 +153,8 @@ def _reason_not_met(expected: Any, early: bool, metrics: Metrics) -> str:
 
 
 def margin(found: Expectation) -> float | None:
-    """How far inside its limit an expectation is, in the limit's unit and below 0 where it is not met; None
-    where the expectation has no size, or the quantity does not exist."""
+    """Distance of a value from its limit, in the unit of the limit, negative if the limit is exceeded. None
+    if the expectation has no limit, or the quantity does not exist."""
     expected, actual = found.expected, found.actual
     if isinstance(expected, bool) or not isinstance(expected, int | float) or actual is None:
         return None

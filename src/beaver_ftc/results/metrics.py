@@ -1,9 +1,9 @@
-"""What a flight amounts to: the document `metrics.json`, and what the scenario expects of it (`expect:`).
+"""The metrics of a flight: the document metrics.json, with the expectations of the scenario (`expect:`).
 
-Whether an alarm is false, how late it is and whether a name is right is decided here, once, of an event and
-the truth. A fault is in force in the first frame whose time is not before `at_s`. An alarm in that very
-frame, or later, is no false alarm; its delay counts from that frame. A name given before its fault began is
-premature, and is not correct, whatever it says.
+This module alone decides whether an alarm is false, how late it is, and whether a name is correct. A fault is
+in force in the first frame whose time is not before `at_s`. An alarm in that very frame, or later, is no
+false alarm; its delay counts from that frame. A name given before its fault began is premature, and is not
+correct, whatever it says.
 
 Times are seconds from the start of the flight, rates deg/s. Delays are seconds from the first frame in which
 the fault is there: `at_s`, or up to a frame later. A quantity that does not exist is null: a document never
@@ -18,7 +18,7 @@ of a name given before the fault that it names began, or the first one where it 
 such a name is not correct and meets no expectation. Null of nothing. An estimate is that of the last frame,
 unless `estimate_at_s` says another instant.
 
-`windows`, of a flight with several faults or one that ends: each spell in which the same faults are in force,
+`windows`, of a flight with several faults or one that ends: each time in which the same faults are in force,
 with the first frame in it in which a detector is beyond its threshold, and the names and sizes that the
 diagnosis gives in its last frame, held against the faults that act then. A name that stands since before
 counts from the fault's first frame on.
@@ -171,9 +171,10 @@ class Truth:
         return fault is not None and self.onset_of(fault).is_false(time_s)
 
 
-TAKEN_OVER, LONG_S = "reallocated", 1.0  # a change of mode that comes later than this is explained
-NEAR_THRESHOLD_SHARE = 0.9  # of the worst-case test's bound, in healthy flight
-DRIFT_MPS, DRIFT_M = 5.0, 300.0  # a flight that ends further from where it began has wandered off
+# When a hint is given:
+TAKEN_OVER, LONG_S = "reallocated", 1.0  # this mode begins longer after the name
+NEAR_THRESHOLD_SHARE = 0.9  # the residual in healthy flight exceeds this share of its threshold
+DRIFT_MPS, DRIFT_M = 5.0, 300.0  # airspeed, or altitude, changes by more over the flight
 
 
 def metrics(flight: "Landing") -> Document:
@@ -182,7 +183,7 @@ def metrics(flight: "Landing") -> Document:
 
 
 def measure(flight: "Landing") -> Metrics:
-    """What a flight amounts to."""
+    """The metrics of a flight."""
     truth = Truth.of(flight.scenario)
     found = Metrics.of(rounded(_found(flight, truth)) | _declared(flight, truth))
     found = replace(found, hints=tuple(hints(flight, found)))
@@ -191,7 +192,7 @@ def measure(flight: "Landing") -> Metrics:
 
 
 def _declared(flight: "Landing", truth: Truth) -> Document:
-    """What was to be flown, and with what: as it was given."""
+    """The sections that repeat what the scenario declares."""
     scenario, first = flight.scenario, truth.first
     return {
         "scenario": scenario.name, "seed": scenario.seed,
@@ -213,7 +214,8 @@ def _declared(flight: "Landing", truth: Truth) -> Document:
 
 
 def _found(flight: "Landing", truth: Truth) -> Document:
-    """What came of it. A section of the document has the fields of the landing that have its names."""
+    """The sections that are measured. A key of a section, or of the document, that has the name of a field of
+    the landing has its value, unless it stands below."""
     landed, onset = vars(flight), truth.onset
     at_once = truth.first is not None and truth.first.at_s <= 0  # then nothing was measured before it
     return landed | {
@@ -251,7 +253,7 @@ def as_json(document: Any) -> str:
 
 @cache
 def versions() -> Document:
-    """Versions of what produces the numbers."""
+    """Versions of Python and of the packages that compute the numbers."""
     packages = {name: version(name) for name in ("beaver-ftc", "jsbsim", "numpy", "numba")}
     return packages | {"python": platform.python_version()}
 
@@ -271,7 +273,7 @@ def _isolation(flight: "Landing", truth: Truth) -> Document:
 
 
 def _windows(flight: "Landing", truth: Truth) -> list[Document] | None:
-    """What was found in each window; null of a flight that has no more than one, to its end."""
+    """The alarm and the names in each window; None if one window lasts to the end of the flight."""
     known, end_s = flight.windows, flight.frames / truth.rate_hz
     if len(known) > 1 or any(window["to_s"] < end_s for window in known):
         return [_window(rounded(window), truth) for window in known]
@@ -279,7 +281,7 @@ def _windows(flight: "Landing", truth: Truth) -> list[Document] | None:
 
 
 def _window(window: Document, truth: Truth) -> Document:
-    """A name that stands since before a fault of the window counts from that fault on."""
+    """One window. A name given before a fault of the window began counts from the begin of this fault."""
     last_frame_s, alarm_s, found = window["to_s"] - 1.0 / truth.rate_hz, window["alarm_s"], window["found"]
     acting = acting_at(truth.faults, last_frame_s)
     here = truth.within(acting)
@@ -306,8 +308,8 @@ def _name_in_window(found: Document, truth: Truth, last_frame_s: float) -> Docum
 
 
 def _names_given_in_flight(flight: "Landing", truth: Truth) -> tuple[str, ...]:
-    """The names given in flight, those that were withdrawn too, each once, in the order of the faults that
-    they name, and as they were given; without those that were premature."""
+    """All names given in flight that were not premature, also withdrawn ones, each once: in the order of the
+    faults that they name, then of time."""
     given = [(gone["fault"], gone["from_s"]) for gone in flight.withdrawn]
     given += [(one["isolated"], one["isolation_time_s"]) for one in flight.faults or (vars(flight),)]
     said = []
@@ -320,8 +322,8 @@ def _names_given_in_flight(flight: "Landing", truth: Truth) -> tuple[str, ...]:
 
 
 def _named(found: Document, truth: Truth, otherwise: DeclaredFault | None = None) -> Document:
-    """A fault that is named; `fault` is null where it is open between candidates. otherwise: the fault that
-    a name is held against that is right of none."""
+    """A named fault; `fault` is None while several candidates remain. otherwise: the fault with which a wrong
+    name is compared."""
     name, kind, time_s = found["isolated"], found["isolation_type"], found["isolation_time_s"]
     estimate, type_time_s = found.get("estimate"), found.get("type_time_s")
     right = truth.against(name, time_s)
@@ -344,7 +346,7 @@ def _named(found: Document, truth: Truth, otherwise: DeclaredFault | None = None
 
 
 def _deviations(off: Mapping[str, float | None] | None) -> Document | None:
-    """Deviations from the commanded profile; null without an autopilot, or where a channel is not flown."""
+    """Deviations from the commanded profile, angles in deg; None without an autopilot."""
     angles = ("heading_deg", "bank_deg")
     if off is None:
         return None
@@ -355,7 +357,7 @@ def _deviations(off: Mapping[str, float | None] | None) -> Document | None:
 
 
 def _arrival(flight: "Landing") -> Document | None:
-    """Where a flight along a profile has come to; null without an autopilot, or if the aircraft is lost."""
+    """Deviations from the profile at the end; None without an autopilot, or if the aircraft is lost."""
     off = _deviations(flight.arrival)
     return None if off is None or flight.departure else off | {"in_envelope": not flight.outside_at_end}
 
@@ -368,7 +370,7 @@ def _in_deg(angles: Any) -> Any:
 
 
 def _alarm_times_s(flight: "Landing") -> list[float]:
-    """When there was an alarm: of the diagnosis at the end, and of those that changes in flight replaced."""
+    """Times of the alarms of the last diagnosis, and of those that changes in flight replaced."""
     alarms = [flight.detection_time_s, *(change.get("detection_time_s") for change in flight.changes)]
     return [time_s for time_s in alarms if time_s is not None]
 
@@ -381,7 +383,7 @@ def fault_free_s(flight: "Landing") -> float:
 
 
 def _change(change: Document, truth: Truth) -> Document:
-    """A change in flight, with what to think of the alarm of the diagnosis that it ended."""
+    """A change in flight, and whether the alarm of the diagnosis that it ended was a false one."""
     alarm_s = change.get("detection_time_s")
     return change if alarm_s is None else change | {"false_alarm": truth.onset.is_false(alarm_s)}
 
@@ -415,7 +417,7 @@ def _hint_fault_too_small(scenario: "Scenario", flight_metrics: Metrics) -> str:
 
 
 def _hint_alarm_in_one_frame(scenario: "Scenario", flight_metrics: Metrics) -> str:
-    """The shortest delay that there is: it says nothing of a flight in which something is uncertain."""
+    """An alarm in the first frame: of no meaning for flights with errors, noise or wind."""
     delay_s, frame_s = flight_metrics.detection.delay_s, 1.0 / scenario.rate_hz
     if delay_s is None or delay_s > frame_s + TIME_TOLERANCE_S:
         return ""
@@ -430,8 +432,8 @@ def _hint_alarm_in_one_frame(scenario: "Scenario", flight_metrics: Metrics) -> s
 
 
 def _hint_residual_near_threshold(flight: "Landing") -> str:
-    """The worst-case test has next to nothing left before the fault, which any fault then takes, or an error
-    that is larger than declared."""
+    """The residual nearly reaches its threshold in healthy flight: a slightly larger error than declared
+    would exceed it."""
     used = max(flight.closest_approach, default=0.0)
     if not NEAR_THRESHOLD_SHARE <= used <= 1.0:
         return ""
@@ -443,9 +445,8 @@ def _hint_residual_near_threshold(flight: "Landing") -> str:
 
 
 def _hint_late_reallocation(flight_metrics: Metrics) -> str:
-    """Why the law goes on with a surface that has been named long since: another takes over only where it is
-    weak or stuck, which the name alone does not say. Nothing of several faults: which of them another surface
-    took over is not known here."""
+    """Why the demand of a named surface was reallocated late: only a surface that is certainly weak or stuck
+    is replaced. No hint for several faults, as the modes do not say which surface was replaced."""
     isolation = flight_metrics.isolation
     taken_s = [change.time_s for change in flight_metrics.supervisor if change.mode == TAKEN_OVER]
     if not taken_s or isolation.faults or isolation.time_s is None:
@@ -460,7 +461,7 @@ def _hint_late_reallocation(flight_metrics: Metrics) -> str:
 
 
 def _hint_drift(flight: "Landing") -> str:
-    """Attitude, height and speed are left alone unless a scenario has an autopilot."""
+    """Airspeed or altitude changed a lot, as no autopilot held them."""
     if flight.end is None or flight.scenario.autopilot:
         return ""
     initial = flight.scenario.initial

@@ -1,7 +1,9 @@
-"""What a flight amounts to, typed: `metrics.json`, the columns of a sweep and the attributes of a flight.
+"""The document metrics.json as records; the columns of a sweep and the attributes of a `Flight` are of it
+too.
 
-A record's fields are the keys of its section of the document, in their order. Times are s since the start of
-the flight, delays s since the first frame with the fault, rates deg/s; None is what there is not.
+The fields of a record are the keys of its section of the document, in their order. Times are s since the
+start of the flight, delays s since the first frame with the fault, rates deg/s. None: the quantity does not
+exist.
 """
 
 import math
@@ -37,8 +39,8 @@ class Part:
 
     @classmethod
     def of(cls, found: Any) -> Self:
-        """From a section as JSON has it, or a tuple of its values; a key that is not there is None, or an
-        empty list."""
+        """The record of a section of JSON, or of a tuple of its values. A missing key gives None, or an empty
+        list or mapping."""
         part: Any = cls
         if isinstance(found, cls):
             return found
@@ -84,7 +86,7 @@ def without_none(hint: Any) -> Any:
 
 @cache
 def _kind_of(hint: Any) -> tuple[Any, Any, bool]:
-    """Of a field's type, looked into once: what it is, of what, and whether it may be None."""
+    """The type of a field without None, the types of its entries, and whether it may be None."""
     bare = without_none(hint)
     return get_origin(bare) or bare, get_args(bare), bare is not hint
 
@@ -112,8 +114,8 @@ def _as_json_value(value: Any) -> Any:
 
 
 def rounded(value: Any) -> Any:
-    """A value with each number to nine decimals, which have no rounding dust of frame times; null for a
-    number that is not finite."""
+    """A value with each number rounded to nine decimals, which removes the rounding of frame times; None for
+    a number that is not finite."""
     if isinstance(value, float):  # first, as most are
         return round(float(value), 9) if math.isfinite(value) else None
     if isinstance(value, dict):
@@ -123,7 +125,7 @@ def rounded(value: Any) -> Any:
 
 @dataclass(frozen=True)
 class FlightCondition(Part):
-    """The flight condition, and who diagnosed and controlled."""
+    """The flight condition, the scheme of the diagnosis and the control law."""
 
     airspeed_mps: float
     altitude_m: float
@@ -155,7 +157,8 @@ _NO_SIZE = {"actuator", "sensor", "type", "at_s", "end_s", "profile"}
 
 @dataclass(frozen=True)
 class DeclaredFault(Fault):
-    """A fault as it is declared, and as a name is held against it. size: what else its type has."""
+    """A declared fault, with which the names given by the diagnosis are compared. size: the parameters that
+    only its type has."""
 
     end_s: float | None = None
     profile: str = "abrupt"
@@ -399,7 +402,11 @@ class ModeChange(Part):
 
 @dataclass(frozen=True)
 class ChangeInFlight(Part):
-    """What was changed in flight; of a diagnosis that ended with it its alarm and the name it gave."""
+    """A change of law, scheme or sensors in flight.
+
+    If the change restarted the diagnosis (`renewed`): time of the alarm, and name, of the diagnosis before,
+    and whether that alarm was a false one.
+    """
 
     time_s: float
     law: str | None
@@ -412,20 +419,20 @@ class ChangeInFlight(Part):
     renewed: bool = True
 
     def document(self) -> Document:
-        """Of a diagnosis that went on there is nothing to say."""
+        """The section, without alarm and name if the diagnosis went on."""
         found = super().document()
         of_it = () if found.pop("renewed") else ("detection_time_s", "isolated")
         return {key: value for key, value in found.items() if key not in of_it}
 
     @classmethod
     def of(cls, found: Any) -> Self:
-        """From a section as JSON has it."""
+        """The record of a section of JSON."""
         return super().of({**found, "renewed": "detection_time_s" in found})
 
 
 @dataclass(frozen=True)
 class EnvelopeExit(Part):
-    """A spell outside the validated envelope."""
+    """A time outside the validated envelope."""
 
     start_s: float
     end_s: float
@@ -433,7 +440,7 @@ class EnvelopeExit(Part):
 
 @dataclass(frozen=True)
 class EnvelopeExitTotals(Part):
-    """All spells outside together; exits_left_out: how many are not listed."""
+    """Number and sum of the times outside the envelope; exits_left_out: how many the list lacks."""
 
     exits: int
     outside_s: float
@@ -454,8 +461,13 @@ class Departure(Part):
 
 @dataclass(frozen=True)
 class AxisAuthority(Part):
-    """Of one axis after the fault: share of the demanded acceleration given, and for how long holding the
-    rates was beyond the surfaces. What they give at the end, rad/s2, believed and healthy; the engines'."""
+    """Control authority about one axis after the fault.
+
+    - `given_share`: share of the demanded angular acceleration that the surfaces gave. - `beyond_s`: time for
+    which the surfaces could not hold the rate, s. - `least_rad_s2`, `greatest_rad_s2`: range of the
+    acceleration that all surfaces can give at the end, as the
+      law knows them; `healthy_...`: of the healthy aircraft; `engines_...`: of the engines.
+    """
 
     given_share: float
     beyond_s: float
@@ -470,7 +482,7 @@ class AxisAuthority(Part):
 
 @dataclass(frozen=True)
 class Authority(Part):
-    """By axis."""
+    """Control authority by axis."""
 
     p: AxisAuthority
     q: AxisAuthority
@@ -479,7 +491,7 @@ class Authority(Part):
 
 @dataclass(frozen=True)
 class EnginePowerUse(Part):
-    """Since when and for how long pitch was left to the engine, and the manifold pressures, inHg."""
+    """From when and for how long the engine controlled pitch, s; the range of the manifold pressure, inHg."""
 
     from_s: float
     in_charge_s: float
@@ -489,7 +501,7 @@ class EnginePowerUse(Part):
 
 @dataclass(frozen=True)
 class Deviations(Part):
-    """From the commanded profile, by channel; None where it is not flown."""
+    """Deviations from the commanded profile by channel; None for a channel without a command."""
 
     altitude_m: float | None
     airspeed_mps: float | None
@@ -499,8 +511,11 @@ class Deviations(Part):
 
 @dataclass(frozen=True)
 class ProfileDeviations(Deviations):
-    """The largest. Those of the airspeed are of a mean over 10 s, the last excepted. limited: from the
-    commanded airspeed as far as it can be held."""
+    """The largest deviations. Those of the airspeed are of a mean over 10 s.
+
+    - `airspeed_limited_mps`: from the commanded airspeed as limited to what the aircraft can hold.
+    - `airspeed_at_one_instant_mps`: of the airspeed itself, without a mean.
+    """
 
     airspeed_limited_mps: float | None
     airspeed_at_one_instant_mps: float | None
@@ -508,14 +523,15 @@ class ProfileDeviations(Deviations):
 
 @dataclass(frozen=True)
 class ArrivalDeviations(Deviations):
-    """The mean at the end, with its sign; and whether the flight ends in the envelope."""
+    """The mean deviations at the end of the flight, with signs, and whether it ends in the envelope."""
 
     in_envelope: bool
 
 
 @dataclass(frozen=True)
 class ProtectionLimit(Part):
-    """A limit that envelope protection has put on the command."""
+    """A limit of the envelope protection: from when, on which command, on which side, its value and
+    reason."""
 
     time_s: float
     limits: str
@@ -551,8 +567,8 @@ class Expectation(Part):
 
 @dataclass(frozen=True)
 class Judged:
-    """Whether a flight, a sweep or a plan did as expected. error: why it could not be flown; took_s: the time
-    that it took."""
+    """Whether a flight, a sweep or a plan met its expectations. error: why it could not be flown. took_s: its
+    computing time, s."""
 
     name: str
     passed: bool = False
@@ -589,9 +605,11 @@ class PacketIntervalMs(Part):
 
 @dataclass(frozen=True)
 class Link(Part):
-    """How an autopilot was served: rates, counts of packets (beaver_ftc_links/sitl/link.py), times.
-    diagnosed_from_s: when the diagnosis began; speed: multiple of real time, and how far behind it the flight
-    was; said: what the ground station was told."""
+    """The link to an autopilot: rates, counts of packets (beaver_ftc_links/sitl/link.py) and times.
+
+    diagnosed_from_s: begin of the diagnosis. speed: multiple of real time; late_ms: delay behind it. said:
+    messages to the ground station.
+    """
 
     protocol: str
     packets_hz: float
@@ -658,17 +676,17 @@ class Metrics(Part):
 
     @property
     def judged(self) -> Judged:
-        """Whether the flight did as expected."""
+        """The flight with its expectations, as `Judged`."""
         return Judged(self.scenario, self.passed, self.expectations)
 
     @property
     def fault_found_s(self) -> float | None:
-        """From the fault to its alarm; None without one, or where a false alarm came before."""
+        """Delay from the fault to its alarm, s; None without an alarm, or after a false alarm."""
         return None if self.false_alarm else self.detection.delay_s
 
     @property
     def fault_named(self) -> bool:
-        """Whether the fault was named rightly, and no false alarm came before."""
+        """Whether the fault was named correctly, without a false alarm before it."""
         return bool(self.isolation.correct) and not self.false_alarm
 
 

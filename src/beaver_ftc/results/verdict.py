@@ -1,6 +1,6 @@
-"""What a flight amounts to, in words: the verdict in the terminal and at the head of the report.
+"""The verdict of a flight in words, for the terminal and the head of the report.
 
-All words follow from the metrics, so that they cannot disagree with `metrics.json`.
+All words are computed from the metrics, so that they cannot disagree with metrics.json.
 """
 
 import io
@@ -57,7 +57,7 @@ def title(metrics: Metrics) -> str:
 
 
 def outcome_class(metrics: Metrics) -> str:
-    """`good`, `bad`, or `lost` for an aircraft lost in a flight that did as expected: never green."""
+    """`good`, `bad`, or `lost` if the aircraft was lost although all expectations are met."""
     return "bad" if not metrics.passed else "lost" if metrics.departure else "good"
 
 
@@ -99,12 +99,12 @@ def verdict_lines(metrics: Metrics) -> list[tuple[str, str]]:
 
 
 def _if_there(text_of: Callable[[Any], str], section: Any) -> str:
-    """What is said of a section; nothing where the flight has none."""
+    """The text of a section; empty if the flight has no such section."""
     return text_of(section) if section else ""
 
 
 def _filled(form: str, section: Part | None, **more: str) -> str:
-    """A sentence of a section's fields, its times as text; nothing where the flight has none."""
+    """A form filled with the fields of a section, times as text; empty if the flight has no such section."""
     if section is None:
         return ""
     known = {name: _seconds_text(of) if name.endswith("_s") else of for name, of in vars(section).items()}
@@ -132,14 +132,14 @@ _LIMIT_FORM_OF_QUANTITY = {
 
 
 def _window_text(window: Window, metrics: Metrics) -> str:
-    """What was found in one window, and when of it."""
+    """The alarm and the names in one window."""
     alarm = f"alarm after {_seconds_text(window.delay_s)}" if window.detected else "no alarm"
     found = [_found_text(one, metrics, "not isolated") for one in window.isolation]
     return _filled("{from_s} to {to_s}: {found}", window, found="; ".join([alarm, *found]))
 
 
 def _found_text(found: Named, metrics: Metrics, otherwise: str) -> str:
-    """A fault that is named, or its candidates."""
+    """A named fault, or the candidates; `otherwise` if there are none."""
     if found.fault:
         return _named_fault_text(found, metrics)
     return _candidates_text(found.candidates) if found.candidates else otherwise
@@ -153,8 +153,8 @@ def _candidates_text(candidates: Sequence[str]) -> str:
 
 
 def candidates_in_words(candidates: Sequence[str]) -> str:
-    """What is still possible, `surface` or `surface:type`, grouped: surfaces by place, types by kind, both
-    counted where there are many. The metrics document has the whole list."""
+    """The candidates, each `surface` or `surface:type`, in words: first the surfaces, then the types. Many
+    surfaces are counted; the metrics document lists all."""
     places: dict[str, list[str]] = {}
     for candidate in candidates:
         place, _, kind = candidate.partition(":")
@@ -179,7 +179,7 @@ _AIRCRAFT_PART_OF_SURFACE_WORD = {
 
 
 def _surfaces_text(names: Sequence[str]) -> str:
-    """One surface, a few by their names, or many counted by the part of the aircraft where they are."""
+    """The names of a few surfaces, or the number of many on each part of the aircraft."""
     if len(names) <= MAX_LISTED_CANDIDATES:
         return " or ".join(without_underscores(name) for name in names)
     part_of = _AIRCRAFT_PART_OF_SURFACE_WORD.items()
@@ -261,7 +261,7 @@ def _certificate_text(folder: str, written: CertificateCounts) -> str:
 
 
 def _change_text(change: ChangeInFlight) -> str:
-    """What was changed in flight, and what a diagnosis that ended with it had found."""
+    """A change in flight, and the result of the diagnosis that it ended."""
     to = [f"{key} {name}" for key in ("law", "scheme") if (name := getattr(change, key))]
     if change.sensors:
         to.append("sensors")
@@ -289,7 +289,8 @@ def _outside_class_text(metrics: Metrics) -> str:
 
 
 def _fault_text(fault: Fault | None, faults: Sequence[DeclaredFault] = ()) -> str:
-    """A fault, and from when on another one of `faults` masks it. Older documents say less of it."""
+    """A fault with its size and times, and when others of `faults` mask it. Documents of earlier versions
+    have neither size nor end."""
     if fault is None:
         return "none"
     place = f"sensor {fault.sensor}" if fault.sensor else fault.actuator or ""
@@ -303,7 +304,7 @@ def _fault_text(fault: Fault | None, faults: Sequence[DeclaredFault] = ()) -> st
 
 
 def _masked_text(fault: DeclaredFault, faults: Sequence[DeclaredFault]) -> str:
-    """While which other faults a fault does not act."""
+    """The times in which other faults mask a fault."""
     later = [one for one in faults if one.at_s > fault.at_s and masking(fault, faults, one.at_s) is one]
     spells = [
         f"from {_seconds_text(one.at_s)}{'' if one.end_s is None else f' to {_seconds_text(one.end_s)}'} "
@@ -344,14 +345,14 @@ def _profile_text(profile: ProfileDeviations) -> str:
 
 
 def _protection_limit_text(limit: ProtectionLimit) -> str:
-    """What envelope protection has limited, since when and why."""
+    """A limit of the envelope protection: value, time and reason."""
     until = "" if limit.in_force else ", no longer at the end"
     return _filled(_LIMIT_FORM_OF_QUANTITY[limit.limits], limit, until=until)
 
 
 def _true_size_text(isolation: Named, metrics: Metrics) -> str:
-    """The true size at the instant of the estimate, where the fault named is one that was injected. The
-    instant too, unless the size is the same at every one."""
+    """The true size at the time of the estimate, if the named fault was injected; with this time, unless the
+    size is constant."""
     faults = [fault for fault in metrics.faults if fault.actuator == isolation.fault]
     if isolation.estimate is None or all(fault.type != isolation.type for fault in faults):
         return ""
@@ -404,7 +405,7 @@ def _isolation_text(metrics: Metrics) -> str:
 
 
 def _withdrawn_texts(heading: str, gone: Sequence[Withdrawn]) -> list[str]:
-    """What was named before, each name once: when, and why it was withdrawn, the last time of several."""
+    """The names given before, each once: when, how often, and why it was withdrawn the last time."""
     spells: dict[str, list[Withdrawn]] = {}
     for one in gone:
         kind = f" ({without_underscores(one.type)})" if one.type else ""
@@ -463,7 +464,7 @@ MAX_SHOWN_AUTHORITY_SHARE = 0.995  # of an axis: nothing to be said
 
 
 def _insufficient_authority_text(authority: Authority) -> str:
-    """For how long no law could have held a rate, if long enough to matter."""
+    """For how long no law could have held each rate; without times shorter than MIN_SHOWN_BEYOND_S."""
     beyond = ", ".join(
         f"{axis} for {_seconds_text(given.beyond_s)}"
         for axis, given in vars(authority).items()

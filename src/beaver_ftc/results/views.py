@@ -1,10 +1,10 @@
-"""What there is to see in a flight: each view a table of panels, each panel a list of traces of log columns.
+"""The views of a flight: a view is a list of panels, a panel a list of traces, a trace a column of the log.
 
-The figures and the report draw the same views, each with its own means. Units follow from the column's name;
-degrees appear here, at the boundary, and nowhere before.
+The figures and the report draw the same views. The unit of a column follows from its name; radians are shown
+as degrees.
 
-A log is reduced to what an eye can tell apart: of each stretch of a long flight its lowest and highest. It is
-read a row group at a time, so that a ten-hour flight fits; a short flight is shown as it is.
+A long log is cut into stretches of time, and each is reduced to its lowest and highest values. The log is
+read a row group at a time, so that a flight of ten hours fits into memory.
 """
 
 import math
@@ -46,8 +46,8 @@ _SHOWN_UNIT = {"rad/s2": "deg/s²", "rad/s": "deg/s", "rad": "deg", "1": ""}  # 
 
 @dataclass(frozen=True)
 class Trace:
-    """One curve: a log column, what it is called and its role (from which its look follows); offset: added to
-    what is shown."""
+    """One curve: a column of the log, its label, and its role, which determines its look (style.py). Shown is
+    factor * column + offset."""
 
     column: str
     label: str
@@ -57,13 +57,13 @@ class Trace:
 
     @property
     def factor(self) -> float:
-        """From the column's own unit, and sign, to what is shown."""
+        """Factor from the unit of the column to the shown one, with the sign."""
         return self.sign * unit_of(self.column)[1]
 
 
 @dataclass(frozen=True)
 class Panel:
-    """One pair of axes; time in seconds runs along all of them."""
+    """One pair of axes, over the time in seconds."""
 
     label: str
     traces: tuple[Trace, ...]

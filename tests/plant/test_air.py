@@ -5,7 +5,7 @@ import pytest
 
 from beaver_ftc.design import Dryden
 from beaver_ftc.plant.adapter import Plant
-from beaver_ftc.plant.trim import configure, take_off, trim_of
+from beaver_ftc.plant.true_aircraft import configure, take_off, trim_of
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.truth import Truth
 

@@ -11,7 +11,7 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.plant import conditions
 from beaver_ftc.plant.conditions import ready
-from beaver_ftc.plant.trim import take_off
+from beaver_ftc.plant.true_aircraft import take_off
 from beaver_ftc.scenario.schema import load
 from beaver_ftc.scenario.truth import Truth
 from samples import samples

@@ -7,7 +7,7 @@ import pytest
 
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant.adapter import FlightState, Plant, body_axes
-from beaver_ftc.plant.trim import configure
+from beaver_ftc.plant.true_aircraft import configure
 from beaver_ftc.scenario.schema import load
 from trainer import trainer
 

@@ -31,7 +31,7 @@ TYPES_OF_THE_TRUTH = {"Scenario", "ScenarioLike", "Environment", "Uncertainty", 
 OF_THE_ORACLE = "faults"
 HAS_THE_SECTIONS = {
     "beaver_ftc.scenario.schema", "beaver_ftc.scenario.faults", "beaver_ftc.scenario.builtin",
-    "beaver_ftc.plant.conditions", "beaver_ftc.plant.trim", "beaver_ftc.plant.adapter",
+    "beaver_ftc.plant.conditions", "beaver_ftc.plant.true_aircraft", "beaver_ftc.plant.adapter",
 }  # fmt: skip
 
 
@@ -70,7 +70,9 @@ def test_the_two_worlds_share_what_both_are_told_alone():
 
 
 def test_the_plant_is_configured_from_the_truth_alone():
-    assert "Scenario" not in {name for node in ast.walk(tree("plant.trim")) for name in names_in(node)}
+    assert "Scenario" not in {
+        name for node in ast.walk(tree("plant.true_aircraft")) for name in names_in(node)
+    }
 
 
 def names_in(node):

@@ -28,7 +28,7 @@ from beaver_ftc.plant.channels import NodeBank
 from beaver_ftc.plant.conditions import give_back, known_trim, ready
 from beaver_ftc.plant.faults import FaultSchedule, SensorFaultSchedule
 from beaver_ftc.plant.sensing import FLYING, NOT_FINITE
-from beaver_ftc.plant.trim import GustSchedule, take_off
+from beaver_ftc.plant.true_aircraft import GustSchedule, take_off
 from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.faults import HOLDING

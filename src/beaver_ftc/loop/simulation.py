@@ -19,7 +19,7 @@ from beaver_ftc.loop.plugin_frame import measured_of
 from beaver_ftc.loop.readout import FrameReadout
 from beaver_ftc.plant.adapter import Plant, UnknownProperty
 from beaver_ftc.plant.faults import is_there
-from beaver_ftc.plant.trim import GustSchedule
+from beaver_ftc.plant.true_aircraft import GustSchedule
 from beaver_ftc.scenario import interventions
 from beaver_ftc.scenario.airframe import checked_against
 from beaver_ftc.scenario.declared import Declared

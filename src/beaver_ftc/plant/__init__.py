@@ -40,8 +40,8 @@ if TYPE_CHECKING:
     )
     from beaver_ftc.plant.trial import lacking as lacking_in_trial
     from beaver_ftc.plant.trial import probe as probe_model
-    from beaver_ftc.plant.trim import DELAY as ACTUATOR_DELAY
     from beaver_ftc.plant.trim import TrimPoint
     from beaver_ftc.plant.trim import trim as trim_plant
+    from beaver_ftc.plant.true_aircraft import DELAY as ACTUATOR_DELAY
 else:
     __getattr__, __dir__ = lazily(__name__)

@@ -25,7 +25,7 @@ from beaver_ftc.aircraft.aircraft import EARTH_RADIUS_M, M_PER_FT
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.plant.adapter import START_LATITUDE_DEG, FlightState, Plant
 from beaver_ftc.plant.model_file import copy_of
-from beaver_ftc.plant.trim import configure
+from beaver_ftc.plant.true_aircraft import configure
 from beaver_ftc.scenario.truth import Truth
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.plant import conditions
-from beaver_ftc.plant.trim import configure
+from beaver_ftc.plant.true_aircraft import configure
 from beaver_ftc.scenario.builtin import builtin_names
 from beaver_ftc.scenario.schema import load_scenario
 from beaver_ftc.studies.mismatch.sources import SOURCES

@@ -1,4 +1,4 @@
-"""One flight of a plan, flown and held against each requirement over it: a row."""
+"""One flight of a plan, and its result for each requirement: a row."""
 
 import hashlib
 import math
@@ -19,8 +19,8 @@ from beaver_ftc_assurance.evidence.plan import EvidencePlan, OfHandling, OfMargi
 Row = dict[str, Any]
 MET, NOT_MET, NOT_SHOWN = "met", "not met", "not shown"
 WORST_FIRST = NOT_MET, NOT_SHOWN, MET
-BANDS = 3  # of airspeed
-ALTITUDES_M = (1000.0, 2000.0)  # between two bands
+BANDS = 3  # equal bands of airspeed over the envelope
+ALTITUDES_M = (1000.0, 2000.0)  # limits between the altitude bands
 _ALWAYS_WATCHED = ("t_s", "airspeed_mps", "altitude_m", "envelope_valid")
 
 
@@ -51,7 +51,7 @@ class Watched(Columns):
 
 
 def fly_flight(plan: EvidencePlan, case: tuple[str, int]) -> Row:
-    """Fly one flight; whatever goes wrong with it is in its row."""
+    """The row of one flight; if the flight fails, the row has the reason."""
     try:
         return _flown(plan, *case)
     except BadInput as error:
@@ -100,7 +100,8 @@ def _flown(plan: EvidencePlan, name: str, run: int) -> Row:
 def part(
     name: str, expected: Any, actual: Any, verdict: str, inside: float | None = None, says: str = ""
 ) -> Row:
-    """One thing that was asked of a flight. inside: its margin, below 0 where it is not met."""
+    """One condition of a requirement on a flight. inside: its margin, negative if the condition is not
+    met."""
     return {"name": name, "expected": expected, "actual": actual, "verdict": verdict, "margin": inside,
             "says": says}  # fmt: skip
 
@@ -108,7 +109,8 @@ def part(
 def _judged(
     plan: EvidencePlan, requirement: Requirement, scenario: Scenario, found: Metrics, log: Watched
 ) -> list[Row]:
-    """What a flight says of a requirement, part by part; of a sweep's statistics nothing."""
+    """The parts of a requirement with their results; none if the requirement is on the statistics of a
+    sweep."""
     bar, formula = requirement.bar, plan.formulas.get(requirement.id)
     if formula is not None:
         return [_of_formula(requirement.formula or "", formula, scenario.rate_hz, found, log)]
@@ -179,8 +181,8 @@ def _of_margins(bar: OfMargins, scenario: Scenario) -> list[Row]:
 
 
 def cells(columns: Mapping[str, np.ndarray], scenario: Scenario) -> list[int]:
-    """The cells of the envelope that a flight was in, once its first fault had struck: airspeed band after
-    airspeed band, in each by altitude."""
+    """Numbers of the cells of the envelope in which the flight was after its first fault. The number of a
+    cell is (number of altitude bands) * (airspeed band) + (altitude band)."""
     slowest, fastest = scenario.airframe.envelope.airspeed_mps
     since = min((fault.at_s for fault in scenario.faults), default=0.0)
     there = (columns["t_s"] >= since) & (columns["envelope_valid"] > 0.5)

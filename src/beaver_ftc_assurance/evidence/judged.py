@@ -1,5 +1,5 @@
-"""What the rows of a plan amount to: requirement by requirement met, not met or not shown, by what margin and
-by which flight; what has been covered; and what it all follows from.
+"""The document evidence.json: for each requirement its verdict, margin and worst flight; the coverage of the
+envelope by flights; sources and versions.
 """
 
 import io
@@ -31,12 +31,12 @@ from beaver_ftc_assurance.evidence.flown import (
 )
 from beaver_ftc_assurance.evidence.plan import EvidencePlan, OfSweep, Requirement
 
-MOST_NAMED = 50  # flights that do not meet a requirement
-Judged = tuple[str, Row]  # a flight, and one part of what it shows
+MOST_NAMED = 50  # flights that are listed as not meeting a requirement
+Judged = tuple[str, Row]  # name of a flight, and one `part` of its result
 
 
 def document_of(plan: EvidencePlan, rows: Sequence[Row], date: str) -> Document:
-    """The document of evidence.json. date: the one thing in which two of the same plan differ."""
+    """The document evidence.json. date: the only difference between two documents of the same plan."""
     requirements = [_requirement(plan, each, rows) for each in plan.file.requirements]
     counts = _counts(each["verdict"] for each in requirements)
     return {
@@ -110,7 +110,7 @@ def _rank(one: Row) -> tuple[int, float]:
 
 
 def _size(expected: Any) -> float:
-    """What a margin is to be seen against."""
+    """The size of the limit by which a margin is divided; 1 if there is none."""
     if isinstance(expected, dict):
         expected = next((abs(expected[side]) for side in ("at_least", "at_most") if expected.get(side)), 1.0)
     number = isinstance(expected, int | float) and not isinstance(expected, bool)
@@ -118,8 +118,8 @@ def _size(expected: Any) -> float:
 
 
 def _of_sweep(plan: EvidencePlan, bar: OfSweep, name: str, rows: Sequence[Row]) -> list[Judged]:
-    """A sweep's statistics against a bar. Not shown: with a confidence, what the estimate keeps and its bound
-    does not; and what no flight tells."""
+    """The statistics of a sweep, compared with a bar. One is not shown if no flight gives it, or if, with a
+    confidence, its estimate keeps the limit and the bound of the estimate does not."""
     from beaver_ftc.studies.sweep import schema_of, table_of, write_tables
 
     source = plan.sources[name]
@@ -139,7 +139,7 @@ def _of_sweep(plan: EvidencePlan, bar: OfSweep, name: str, rows: Sequence[Row]) 
 
 
 def _worst(flights: Flights, name: str) -> int:
-    """The flight that a statistic suffers from most."""
+    """Number of the flight with the worst contribution to a statistic."""
     quantity, _, axis = name.partition(".")
     against: dict[str, Callable[[], np.ndarray]] = {
         "detection_rate": lambda: flights.faulted & ~flights.detected,
@@ -160,7 +160,7 @@ def _worst(flights: Flights, name: str) -> int:
 
 
 def _levels(bar: OfSweep, but: str = "type") -> SweepExpect:
-    """What a bar says of a sweep, without some key."""
+    """The conditions of a bar, without the key `but` at any level."""
 
     def less(said: Any) -> Any:
         if not isinstance(said, dict):
@@ -185,7 +185,7 @@ def _aircraft(plan: EvidencePlan) -> dict[str, Aircraft]:
 
 
 def _coverage(name: str, plan: EvidencePlan, rows: Sequence[Row]) -> Document:
-    """Of one aircraft: in how many flights each fault on each surface was flown, by cell of the envelope."""
+    """For one aircraft: the number of flights with each fault on each surface, by cell of the envelope."""
     aircraft = _aircraft(plan)[name]
     slowest, fastest = aircraft.envelope.airspeed_mps
     width = (fastest - slowest) / BANDS

@@ -1,4 +1,4 @@
-"""The parts of a page as PDF: the same words as on the HTML page, the summary a page by itself."""
+"""The parts of a page as PDF, with the same text as the HTML page. The summary is on a page of its own."""
 
 import io
 from collections.abc import Iterator, Sequence
@@ -69,7 +69,7 @@ def _flowables(title: str, parts: Sequence[Part], width: float) -> Iterator[Any]
 def _text(
     text: str, size: float, bold: bool = False, colour: str = "#111111", keep: bool = False, before: float = 7
 ) -> Any:
-    """A paragraph, so far below what is before it; what a plan says is text and never markup."""
+    """A paragraph, `before` points below the previous one. Text of a plan is escaped: it is never markup."""
     from reportlab.lib.styles import ParagraphStyle
     from reportlab.platypus import Paragraph
 
@@ -106,7 +106,7 @@ def _cell(cell: str, size: float, table: Table) -> Any:
 
 
 def _widths(table: Table, width: float) -> list[float]:
-    """By the longest cell of each column, within bounds: none starves the others."""
+    """Widths of the columns, points, in proportion to the longest cell of each, at most 40 letters."""
     columns = list(zip(table.head, *table.rows, strict=True))
     if len(columns) == 2:
         return [0.17 * width, 0.83 * width]

@@ -1,4 +1,4 @@
-"""The plan of evidence: requirements over scenarios and sweeps, read, and every mistake in it found."""
+"""The plan of evidence: requirements on scenarios and sweeps. Reading it reports every mistake at once."""
 
 import contextlib
 import hashlib
@@ -137,7 +137,7 @@ def plan_json_schema() -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Source:
-    """What is flown under one name: a scenario, or the flights of a sweep. given: as the plan names it."""
+    """A scenario or a sweep (`what`) to fly. given: its name or path in the plan."""
 
     name: str
     given: str
@@ -150,11 +150,11 @@ class Source:
 
     @property
     def aircraft(self) -> Aircraft:
-        """What flies."""
+        """The aircraft of all its flights."""
         return self.what.aircraft if isinstance(self.what, Sweep) else self.what.airframe
 
     def assignment(self, run: int) -> Assignment | None:
-        """What varies in one of a sweep's flights."""
+        """The varied values of one flight of a sweep; None for a scenario."""
         return Plan(self.what).assignments([run])[0] if isinstance(self.what, Sweep) else None
 
     def flight(self, run: int) -> str:
@@ -171,12 +171,12 @@ class Source:
 
     @property
     def base(self) -> Scenario:
-        """What all of its flights have in common."""
+        """The scenario of all its flights, without variations."""
         return self.what.scenario({}) if isinstance(self.what, Sweep) else self.what
 
     @cached_property
     def columns(self) -> tuple[str, ...]:
-        """The columns of its logs; none of what cannot fly, which its row will say."""
+        """The columns of its logs; none if it cannot fly, which the row of the flight reports."""
         from beaver_ftc.loop import Loop
 
         with contextlib.suppress(BadInput):
@@ -187,7 +187,7 @@ class Source:
 
     @property
     def sha256(self) -> str:
-        """Of all that its flights follow from, resolved, and of the files of its aircraft."""
+        """SHA-256 of the resolved scenario or sweep, and of the files of its aircraft."""
         aircraft, left_out = digest_of_aircraft(self.aircraft.folder), {"description", "expect"}
         if isinstance(self.what, Sweep):
             file = self.what.file.model_dump(mode="json", exclude=left_out | {"base", "set"})
@@ -233,7 +233,7 @@ def load_plan(path_or_name: str) -> EvidencePlan:
 
 
 class _Reading:
-    """What the requirements name, found and held against them; mistakes are gathered."""
+    """Reads the sources of all requirements and checks them; mistakes are collected."""
 
     def __init__(self, file: PlanFile, document: Document, path: Path, given: str) -> None:
         self._file, self._document, self._path, self._given = file, document, path, given
@@ -352,7 +352,7 @@ class _Reading:
             return None
 
     def _fits(self, formula: Formula, source: Source, at: Location) -> None:
-        """Whether the logs of this source are long enough for a formula, and have its columns."""
+        """Note a problem if the logs of a source are too short for a formula, or lack one of its columns."""
         ahead, most = formula.looks_ahead_s, source.base.duration_s
         if most < ahead < inf:
             self._problem(at, f"looks {ahead:g} s ahead, allowed over {source.given}: at most its {most:g} s")
@@ -361,7 +361,7 @@ class _Reading:
             self._problem(at, says)
 
     def _expect(self, given: dict[str, Any], source: Source, at: Location) -> Expect | None:
-        """What is expected, held against what a flight of this source can show."""
+        """The expectations, checked against the base scenario of a source; None if they have a mistake."""
         base = source.base
         data = base.model_dump(mode="json", by_alias=True, exclude_unset=True) | {"expect": given}
         lines = {("expect", *where): n for where, n in self._document.below(*at).lines.items()}

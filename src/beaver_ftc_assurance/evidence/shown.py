@@ -66,7 +66,7 @@ FILES: Makers = {"evidence.json": as_json, "evidence.html": _html, "evidence.pdf
 
 
 def page(document: Document) -> Iterator[Part]:
-    """The summary, which fills a page; from the first heading on the rest."""
+    """The parts of the page: the summary, which fills a page of the PDF, then all under headings."""
     if document["description"]:
         yield document["description"].strip()
     flights = len(document["flights"])
@@ -94,7 +94,7 @@ def page(document: Document) -> Iterator[Part]:
 
 
 def counted(document: Document) -> str:
-    """How many requirements are what."""
+    """The number of requirements, in all and by verdict."""
     counts = document["counts"]
     return f"{sum(counts.values())} requirements: " + ", ".join(
         f"{n} {verdict}" for verdict, n in counts.items()
@@ -102,7 +102,8 @@ def counted(document: Document) -> str:
 
 
 def _summary(requirements: list[Document]) -> Table:
-    """Of more than a page holds, those that are not met come first, and the last line counts the others."""
+    """The table of requirements. If there are more than a page holds, those not met come first, and the last
+    line counts the others."""
     shown = requirements
     if len(shown) > ON_THE_SUMMARY:
         shown = sorted(shown, key=lambda each: WORST_FIRST.index(each["verdict"]))[:ON_THE_SUMMARY]
@@ -133,7 +134,7 @@ def signed(value: float) -> str:
 
 
 def said(value: Any) -> str:
-    """What was asked for, or found, in words."""
+    """An expected or actual value in words."""
     if isinstance(value, dict):
         return ", ".join(f"{key.replace('_', ' ')} {said(each)}" for key, each in value.items())
     if isinstance(value, bool):
@@ -209,7 +210,7 @@ def _cell(cell: Document) -> str:
 
 
 def as_text(document: Document, folder: str) -> str:
-    """For a terminal."""
+    """The text for a terminal."""
     table = _summary(document["requirements"])
     lines = aligned([[row[0], *row[2:]] for row in (table.head, *table.rows)])
     again = [
@@ -221,7 +222,7 @@ def as_text(document: Document, folder: str) -> str:
 
 
 def as_expectations(document: Document) -> tuple[Expectation, ...]:
-    """What JUnit XML says of each requirement, and of one that is not met which command flies it again."""
+    """The requirements for JUnit XML; one that is not met has the command that repeats its worst flight."""
     found = []
     for each in document["requirements"]:
         worst = each["worst"]
@@ -235,7 +236,7 @@ def _expectation(name: str, expected: str, verdict: str, found: Document, again:
 
 
 def of_flight(plan: EvidencePlan, name: str) -> tuple[Any, tuple[Expectation, ...]]:
-    """A flight by name: its scenario, and what each requirement over it says, part by part.
+    """The scenario of a flight, by the name of the flight, and all parts of its requirements.
 
     Raises BadInput for a name that the plan does not have.
     """

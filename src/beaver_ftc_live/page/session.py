@@ -1,4 +1,5 @@
-"""The flight that the page shows: what is asked of it, what happens to it, and what is said of it."""
+"""The flight that the page shows: it carries out requests, notices events, and makes the messages to the
+pages."""
 
 from collections import deque
 from collections.abc import Sequence
@@ -23,15 +24,15 @@ from beaver_ftc_live.page.messages import WHEN, Message, in_words, short, verdic
 LONGEST_S = 3600.0  # of one live flight: its log is 0.4 GB then
 HELD = ("altitude_m", "airspeed_mps", "heading_deg")  # by the autopilot that the page asks for
 EVENTS_KEPT = 400
-STICK_FRAMES = 10  # a coordinated turn is seen to so often
-TURN_STEP = np.radians(0.1)  # rad/s
+STICK_FRAMES = 10  # between two updates of the rates of a coordinated turn
+TURN_STEP = np.radians(0.1)  # rad/s, to which these rates are rounded
 ATTITUDE = ("phi_rad", "theta_rad", "airspeed_mps")
 NO_STICK = messages.Stick(do="stick", rates_deg_s=(0.0, 0.0, 0.0))
 GUST_S = {"rise_s": 0.5, "hold_s": 1.0, "fade_s": 0.5}
-PATIENCE_S = 10.0  # for the diagnosis, once you have spoken
+PATIENCE_S = 10.0  # a round of the game ends so long after the answer, if the diagnosis names no fault
 INSTRUMENTS = "instruments"
-OF_A_FLIGHT = ("break", "repair", "blow", "aim", "change")  # what is asked of a flight that goes on
-CHANGES_NOTHING = ("save", "stick")  # of what has been flown
+OF_A_FLIGHT = ("break", "repair", "blow", "aim", "change")  # requests that a finished flight refuses
+CHANGES_NOTHING = ("save", "stick")  # requests after which a saved folder still has all of the flight
 HIDDEN = (
     "_effective_rad", "_pos_rad", "_excluded", "_effectiveness_estimate", "_effectiveness_used", "mode",
     "detected",
@@ -69,7 +70,8 @@ class Session:
         self._begin(scenario)
 
     def _begin(self, scenario: "bf.Scenario", faults: bool = True) -> None:
-        """A new flight from trim. Raises BadInput, the old one going on, where it cannot be flown."""
+        """Begin a new flight in trim. If it cannot be flown: raises BadInput, and the old flight
+        continues."""
         flown = as_live(scenario if faults else scenario.with_({"faults": [], "expect": {}}))
         sim = bf.Simulation(flown, log=SpooledLog())
         sim.step()
@@ -78,7 +80,7 @@ class Session:
         self._take_up(scenario, flown, sim)
 
     def _take_up(self, scenario: "bf.Scenario", flown: "bf.Scenario", sim: "bf.Simulation") -> None:
-        """Show this flight, of which nothing has been said yet; scenario: what it was made of."""
+        """Show this flight, without any events yet. scenario: as given; flown: as prepared for the page."""
         self._base, self.scenario, self.sim = scenario, flown, sim
         self.columns = sim.columns
         self.surfaces = tuple(c.removesuffix("_cmd_rad") for c in self.columns if c.endswith("_cmd_rad"))
@@ -102,7 +104,7 @@ class Session:
         return self.sim.done
 
     def step(self) -> None:
-        """Fly one frame and notice what it brought."""
+        """Fly one frame, and note its events."""
         self._saved = ""
         if self.game.is_due(self.sim.t_s):
             self._inject(self.game.fault)
@@ -115,7 +117,7 @@ class Session:
             self._tell("game", "the round is over")
 
     def _notice_faults(self) -> None:
-        """Events: what breaks and ends by the scenario itself."""
+        """Note faults of the scenario that begin or end."""
         if not self._turns_s or self.sim.t_s < self._turns_s[0]:
             return
         self._turns_s.popleft()
@@ -128,7 +130,7 @@ class Session:
                 self._tell("repaired", f"{place_of(fault)}: {fault.type.replace('_', ' ')}", secret=True)
 
     def _notice(self) -> None:
-        """Events: the alarm, the name, candidates, the supervisor's mode, the end."""
+        """Note an alarm, a name, new candidates, a new mode of the supervisor, the loss of the aircraft."""
         sim, verdict, t_s = self.sim, self.sim.verdict, self.sim.t_s
         alarm = (verdict.axis or INSTRUMENTS) if verdict.detected else None
         said = (alarm, verdict.isolated, verdict.type, verdict.candidates, sim.departed)
@@ -166,9 +168,9 @@ class Session:
         return told
 
     def handle(self, request: messages.Request, by: str = "") -> str:
-        """Do what is asked, by the method of its name; returns what to say of it. Raises BadInput.
+        """Carry out a request, by the method of its name; returns the reply. Raises BadInput.
 
-        by: the guest who asks, as others are told.
+        by: name of the guest who sent it, for the events.
         """
         if self.over and request.do in OF_A_FLIGHT:
             raise BadInput("the flight is over, allowed: a new flight")
@@ -193,9 +195,10 @@ class Session:
         return ""
 
     def _rates_rad_s(self) -> tuple[float, ...] | None:
-        """What the stick adds; coordinated, with the rates of a level turn at the present bank.
+        """Rates, rad/s, that the stick commands; if coordinated, with those of a level turn at the present
+        bank.
 
-        They are rounded: each change is a row of the scenario that flies this again.
+        The latter are rounded, because each change is a row of the saved scenario.
         """
         rates = np.radians(self.stick.rates_deg_s)
         if self.stick.coordinated:
@@ -250,7 +253,8 @@ class Session:
         return "new flight"
 
     def _scenario(self, name: str | None) -> "bf.Scenario":
-        """The one last flown, the one the command was given, or a built-in one; a page names no files."""
+        """The scenario last flown, the one of the command line, or a built-in one; a page cannot name
+        files."""
         if name is None:
             return self._base
         if name == self._given.name:
@@ -273,7 +277,7 @@ class Session:
         return ""
 
     def _save(self, asked: messages.Save) -> str:
-        """A moment in which nobody flies: of one instant only once, however often it is asked."""
+        """Write the result folder, once for one instant: writing stops the flight for a moment."""
         self._saved = self._saved or self._written()
         return self._saved
 
@@ -308,12 +312,13 @@ class Session:
         return seen | said_of_all
 
     def _effectiveness(self, surface: str) -> float:
-        """How much of its moment a surface gives for its command: none while it does not follow that."""
+        """Share of its moment that a surface gives for its command; 0 while it does not follow the
+        command."""
         stands = any(self.sim.read(f"failures/{surface}/{how}") for how in HOLDING)
         return 0.0 if stands else self.sim.read(f"failures/{surface}/effectiveness")
 
     def state(self) -> Message:
-        """What changes seldom."""
+        """The message about all that changes rarely."""
         there = () if self.game.hidden else self.sim.in_force
         return {
             "k": "s", "over": self.over, "game": self.game.shown(),
@@ -331,14 +336,14 @@ class Session:
 
     @property
     def _knows(self) -> str:
-        """Which faults the diagnosis in charge can name; empty of one that is not ours."""
+        """Which faults the active diagnosis can name; empty for a plug-in and without a diagnosis."""
         if self.flying["scheme"] == "none" or not is_compiled(DETECTORS, self.flying["scheme"]):
             return ""
         every = self.scenario.fdi.fault_class == "all"
         return "knows every fault type" if every else "knows partial loss alone"
 
     def hello(self) -> Message:
-        """What a page needs to know of this flight before its first frame."""
+        """The message that a page receives before the first frame of a flight."""
         scenario = self.scenario
         with checked_against(scenario.airframe):
             sensors = sensors_there()
@@ -359,12 +364,12 @@ class Session:
 
 
 def _mark(fault: Any) -> str:
-    """What a fault stays when it is repaired."""
+    """A key of a fault that a repair does not change."""
     return str(fault.model_dump_json(exclude={"end_s"}))
 
 
 def fault_types() -> Message:
-    """What there is to break a surface with, and how the estimate of each type is put in words."""
+    """The buttons that break a surface, and the words for the estimate of each fault type."""
     buttons = sorted((row.button, kind) for kind, row in TYPES.items() if row.button)
     return {
         "breaks": [[button.says, {"type": kind, **button.keys}] for button, kind in buttons],
@@ -373,7 +378,10 @@ def fault_types() -> Message:
 
 
 def level_turn(phi_rad: float, theta_rad: float, airspeed_mps: float) -> np.ndarray:
-    """Body rates (3,) rad/s of a coordinated level turn: psi' = g tan(phi) / V, seen in body axes."""
+    """Body rates (3,), rad/s, of a coordinated level turn with psi' = g tan(phi) / V:
+
+    (p, q, r) = psi' (-sin(theta), sin(phi) cos(theta), cos(phi) cos(theta))
+    """
     turn = GRAVITY_MPS2 * tan(phi_rad) / airspeed_mps
     return turn * np.array([-sin(theta_rad), sin(phi_rad) * cos(theta_rad), cos(phi_rad) * cos(theta_rad)])
 

@@ -1,9 +1,8 @@
-"""The command line: one module a command, and the options, answers and progress bars that they share.
+"""The command line: one module for each command, and what commands share: options, answers and progress.
 
-An answer is text for people, or one JSON document for machines. On standard error a run or a study shows a
-bar on a terminal, once it takes long enough to be waited for, and a sweep a moving line; elsewhere, as in a
-log, both say a line now and then. Options that several commands share are declared once, and scenarios are
-checked before the first one flies.
+An answer is text, or one JSON document. On a terminal, a run or a study that takes longer than a second shows
+a bar on standard error, and a sweep a line that is written again; elsewhere, as in a log, both print a line
+from time to time. All scenarios of a command are checked before the first one flies.
 """
 
 import contextlib
@@ -45,7 +44,7 @@ class Format(StrEnum):
     json = "json"
 
 
-# Whether this command was asked for a document, and whether it has given one.
+# Whether the command must print a JSON document, and whether it has printed one.
 _document = {"asked": False, "given": False}
 
 
@@ -83,7 +82,7 @@ def emit_json(document: Any) -> None:
 
 
 def answer(format: Format, document: Any, text: Callable[[], str]) -> None:
-    """What a command has found, in the form that was asked for."""
+    """Print the result of a command in the requested format."""
     if format is Format.json:
         emit_json(document)
     else:
@@ -96,7 +95,7 @@ def complain(text: str) -> None:
 
 
 def report(error: BeaverFtcError) -> int:
-    """Say what went wrong, with its traceback if BEAVER_FTC_DEBUG is set; returns the exit status."""
+    """Print an error, with its traceback if BEAVER_FTC_DEBUG is set; returns the exit status."""
     if os.environ.get("BEAVER_FTC_DEBUG"):
         traceback.print_exception(error)
     else:
@@ -105,7 +104,8 @@ def report(error: BeaverFtcError) -> int:
 
 
 def report_last(error: BeaverFtcError) -> int:
-    """`report` what ends the command: who asked for a JSON document and has none gets the errors as one."""
+    """`report` the error that ends the command. If it must print a JSON document and has printed none, the
+    document has the errors."""
     status = report(error)
     if _document["asked"] and not _document["given"]:
         with suppress(SimulationFailed):  # standard output that cannot be written is no second error
@@ -114,7 +114,7 @@ def report_last(error: BeaverFtcError) -> int:
 
 
 def write_junit(runs: list["Judged"], path: Path | None) -> None:
-    """The verdicts as JUnit XML, where they are asked for."""
+    """Write the verdicts as JUnit XML to a path, if there is one."""
     if path is not None:
         from beaver_ftc.results import junit
 
@@ -122,10 +122,10 @@ def write_junit(runs: list["Judged"], path: Path | None) -> None:
 
 
 def judged(what: str, format: Format, junit: Path | None, fly: Callable[[], "Judged"]) -> NoReturn:
-    """Fly what is judged as a whole, and end with its status: what fails is told in JSON and JUnit XML too.
+    """Run a command with one verdict, and end with its exit status. An error is in JSON and JUnit XML too.
 
-    what: the file it is of, where no verdict came to be.
-    fly: flies and answers; the verdict.
+    what: name of the test suite in JUnit XML if there is no verdict.
+    fly: flies, prints the answer, and returns the verdict.
     """
     from beaver_ftc.results.model import Judged
 
@@ -144,7 +144,7 @@ def judged(what: str, format: Format, junit: Path | None, fly: Callable[[], "Jud
 
 
 def failure_of(error: Exception) -> BeaverFtcError:
-    """An error of ours as it is; another as a line for the user, with the error itself as its cause."""
+    """An error of the package as it is; for any other, one with a message of one line and it as its cause."""
     if isinstance(error, BeaverFtcError):
         return error
     said = " ".join(str(error).split())
@@ -160,7 +160,7 @@ def failure_of(error: Exception) -> BeaverFtcError:
 
 
 def status_of_stop(error: Exception) -> int | None:
-    """The exit status where a signal stopped compiled code, whose caller sees it as a SystemError alone."""
+    """The exit status if a signal stopped compiled code, whose caller sees only a SystemError; else None."""
     cause = error.__cause__ if isinstance(error, SystemError) else None
     if isinstance(cause, KeyboardInterrupt):
         return 128 + signal.SIGINT
@@ -182,20 +182,20 @@ def _discard_stdout() -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-PATIENCE_S = 1.0
+PATIENCE_S = 1.0  # before the bar on a terminal
 TERMINAL_S, LOG_S = 0.2, 30.0  # time between two lines
 FIRST_S = 5.0  # before the first line of a log
 
 
 @contextlib.contextmanager
 def progress_bar(label: str) -> Iterator[Callable[[float], None]]:
-    """Yield what a run calls with how far it has come (0 to 1)."""
+    """Yield the function that a run calls with the share that is done, 0 to 1."""
     with contextlib.ExitStack() as stack:
         begin, patience_s = (_bar, PATIENCE_S) if sys.stderr.isatty() else (_lines, FIRST_S)
         started, advance = time.monotonic(), None
 
         def show(done: float) -> None:
-            """Shows itself only once the run has taken longer than anyone waits without asking."""
+            """Begin to show progress once the run has taken longer than `patience_s`."""
             nonlocal advance
             if advance is None and time.monotonic() - started > patience_s:
                 advance = begin(label, stack)
@@ -229,8 +229,8 @@ def _lines(label: str, stack: contextlib.ExitStack) -> Callable[[float], None]:
 
 @contextlib.contextmanager
 def told(terminal_s: float = 0.0, log_s: float = math.inf) -> Iterator[Callable[[str], None]]:
-    """Yield what a study calls with a line on how far it has come: one in place on a terminal, each on its
-    own in a log. terminal_s, log_s: least time between two lines; infinite: none."""
+    """Yield the function that a study calls with a line of progress. On a terminal a line replaces the one
+    before. terminal_s, log_s: least time between two lines there and elsewhere; infinite: no lines."""
     terminal = sys.stderr.isatty()
     every_s, last_s = terminal_s if terminal else log_s, -math.inf
 
@@ -254,7 +254,7 @@ def _write_error(text: str) -> None:
 
 @contextlib.contextmanager
 def live_progress(name: str) -> Iterator[Callable[[Counter[str]], None]]:
-    """Yield what a sweep calls with its counts (campaign.run_sweep)."""
+    """Yield the function that a sweep calls with its counts (campaign.run_sweep)."""
     first, begun = None, 0.0
 
     def show(counts: Counter[str]) -> None:
@@ -270,7 +270,7 @@ def live_progress(name: str) -> Iterator[Callable[[Counter[str]], None]]:
 
 
 def _counted(name: str, counts: Counter[str], rate: float) -> str:
-    """Done, rate, time left, running detection rate. rate: flights a second."""
+    """The counts of a sweep in a line, with the time left. rate: flights per second."""
     done, total = counts["done"], counts["total"]
     to_come = f", {_span((total - done) / rate)} left" if rate > 0 else ""
     parts = [f"{name}: {done} of {total} flights, {_rate(rate)}/s{to_come}"]

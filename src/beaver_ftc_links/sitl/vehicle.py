@@ -1,4 +1,4 @@
-"""The flight an autopilot is the pilot of: outputs in, JSBSim frames flown, an instant out."""
+"""A flight that an autopilot commands: it receives outputs, flies JSBSim frames, and returns an `Instant`."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -28,20 +28,20 @@ from beaver_ftc_links.sitl.outputs import Outputs, power_range
 if TYPE_CHECKING:
     from beaver_ftc.diagnosis import Detector
 
-SLOWEST_HZ, FASTEST_HZ = 20.0, 400.0  # of the diagnosis: where its promises are tested
+SLOWEST_HZ, FASTEST_HZ = 20.0, 400.0  # rates of the diagnosis at which its promises are tested
 FASTEST_PACKETS_HZ = 4000.0
-UP_M, DOWN_M = 5.0, 2.0  # wheels so far above the ground: in flight, and not any more
+UP_M, DOWN_M = 5.0, 2.0  # height of the wheels at which the diagnosis begins after take-off, and ends
 SLOW_MPS = 10.0
 UNDERNEATH_M = -1e4
 GUSTY_M = 609.6  # height above which a flight from the ground is diagnosed in declared turbulence
-WHOLE = 1e-6  # JSBSim frames: so near a whole number is one
-# The surfaces are the autopilot's, and so is where it flies to.
+WHOLE = 1e-6  # JSBSim frames: a number that differs by less from a whole one counts as whole
+# The autopilot commands the surfaces and the flight path: what the scenario says of both is replaced.
 THEIRS = {"control.law": "nominal", "control.options": {}, "reference": {}}
 OF_THE_LAW = ("pre_fault_rms_deg_s", "post_fault_rms_deg_s")
 
 Vector = np.ndarray
 
-_NODES = (  # what no instrument of ours measures, of the truth; factors to SI
+_NODES = (  # properties of the truth that no instrument of the plant measures, and factors to SI
     ("velocities/v-north-fps", M_PER_FT),
     ("velocities/v-east-fps", M_PER_FT),
     ("velocities/v-down-fps", M_PER_FT),
@@ -58,12 +58,12 @@ _AT = {name: i for i, name in enumerate(SENSORS)}
 
 
 class Instant(NamedTuple):
-    """What the autopilot is told. SI, radians; body axes forward, right, down; earth axes north, east, down.
+    """What the autopilot receives. SI, radians; body axes forward, right, down; earth axes north, east, down.
 
-    As the instruments say it, errors and faults included, and to the diagnosis the same: gyro, force
-    (specific: without gravity), attitude (roll, pitch, yaw), airspeed, sideslip, dynamic pressure, altitude
-    above sea level. True, since no instrument of ours measures them: position from where the flight began,
-    with the autopilot's ground as 0; velocity over the ground, latitude and longitude (deg), height above sea
+    Readings of the instruments, with errors and faults, the same as for the diagnosis: gyro, specific force
+    (without gravity), attitude (roll, pitch, yaw), airspeed, sideslip, dynamic pressure, altitude above sea
+    level. True values, which no instrument of the plant measures: position from the start of the flight, with
+    the autopilot's ground as 0; velocity over the ground; latitude and longitude, deg; height above sea
     level.
     """
 
@@ -90,13 +90,13 @@ class OverGround(Loop):
 
 
 class Flown(Simulation):
-    """A flight that another than a law commands, some of JSBSim's frames at a time.
+    """A flight that an autopilot commands instead of a law, some JSBSim frames at a time.
 
-    There is a ground at `ground_m` above sea level, if the aircraft's file knows one. Near it nothing is
-    diagnosed: what wheels do is no fault of a surface, and no declared bound covers it. The diagnosis begins,
-    again, once the aircraft is up and as fast as its model has been validated for; in declared turbulence
-    once the air is what the declaration means. Its verdict stands when the aircraft comes down.
-    listens_from_s: when it began, None before.
+    The ground is `ground_m` above sea level, if the aircraft's file has a section `ground`. Near the ground
+    nothing is diagnosed, as no declared bound covers the forces on the wheels. The diagnosis begins, again,
+    once the aircraft is high and fast enough for its model; with declared turbulence, once it is above the
+    height from which the declaration holds. A verdict remains when the aircraft lands. listens_from_s: time
+    at which the diagnosis first began; None before.
     """
 
     _loop_type = OverGround
@@ -160,8 +160,8 @@ class Flown(Simulation):
         self._diagnoses = False
 
     def _start_or_stop_diagnosis(self) -> None:
-        """End the diagnosis near the ground, begin it again in flight unless it has found something. The
-        wheels know where the ground is; the airspeed is that of the instrument."""
+        """End the diagnosis near the ground; begin it again in flight unless there is an alarm. The height is
+        the true one, the airspeed that of the instrument."""
         height_m = FrameReadout(self._frame).height_m - self._standing_m
         if self._diagnoses:
             if height_m < self._lowest_m:
@@ -181,12 +181,13 @@ class Flown(Simulation):
 
     @property
     def G(self) -> Vector:
-        """What each surface does about each axis now, (3, n) rad/s2 per rad, by the design model."""
+        """Present effectiveness of each surface about each axis, (3, n) rad/s2 per rad, by the design
+        model."""
         return FrameReadout(self._frame).G
 
     @property
     def airframe(self) -> Aircraft:
-        """What flies."""
+        """The aircraft that flies."""
         return self._loop.aircraft
 
     @property
@@ -195,8 +196,9 @@ class Flown(Simulation):
         return FrameReadout(self._frame).alarmed or self._loop.plugin_frame is not None
 
     def pilot(self, runs: int, deflections: Vector | None, power: float | None) -> None:
-        """Fly so many of JSBSim's frames, or to the end, with these deflections (n,) rad and this setting of
-        the engine from the next frame of the loop on. None: the law's; the engine stays."""
+        """Fly `runs` JSBSim frames, or to the end of the flight. From the next frame of the loop on the
+        surfaces have these deflections (n,), rad, and the engine this setting; None: those of the law, and no
+        change."""
         while runs > 0 and not self.done:
             if self._runs == 0:
                 self._take(deflections, power)
@@ -230,7 +232,7 @@ class Flown(Simulation):
         self._runs += runs
 
     def instant(self) -> Instant:
-        """What is known of the JSBSim frame just flown."""
+        """The readings and true values after the last JSBSim frame."""
         signal = self._instruments.readings()
         true = [read() * factor for read, factor in self._nodes]
         north = (true[9] - self._origin.latitude_rad) * self._origin.radius_m

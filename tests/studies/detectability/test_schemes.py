@@ -148,6 +148,10 @@ class TestCounts:
         assert (found["delay_s"], found["own_delay_s"], found["false_alarm"]) == (0.7, 0.2, False)
         assert (missed["delay_s"], missed["false_alarm"], missed["own_false_alarm"]) == (None, True, False)
 
+    def test_what_has_no_level_or_was_not_flown_by_ours_has_no_row(self):
+        level, lost = {(*STILL, "a"): 2.0}, replace(watched(1, a=0.7), deflections=[])
+        assert [row["scheme"] for row in rows_of([watched(1, a=0.7, b=0.7), lost], level)] == ["a"]
+
     def test_the_summary_counts_flights_that_were_still_silent(self):
         rows = [
             {"delay_s": delay, "false_alarm": early, "own_delay_s": 0.1, "own_false_alarm": False}

@@ -28,6 +28,10 @@ def test_units_follow_and_what_is_missing_has_a_word_of_its_own():
     assert [tables.finite(x) for x in (1.5, float("inf"), "inf", 3)] == [1.5, None, "inf", 3]
 
 
+def test_a_file_of_no_rows_is_empty():
+    assert tables.as_csv([]) == ""
+
+
 def test_a_table_is_its_columns_each_with_the_cell_of_a_row():
     columns = (
         ("who", "name"), ("after", "found.delay_s", "s"), ("share", "share", "{:.0%}".format),

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.studies.sweep.outcomes import rank
+from beaver_ftc.studies.sweep.pictures import in_words
 
 
 @pytest.fixture
@@ -40,3 +41,10 @@ def test_names_can_drive_and_missed_faults_rank_last(keys):
 
 def test_an_outcome_that_never_changes_has_no_drivers(keys):
     assert rank(keys, np.zeros(600)) == []
+
+
+def test_a_key_in_a_figure_has_its_unit():
+    keys = "faults[0].kappa_per_s", "faults[1].at_s", "fdi.bounds.constant_rad_s2.p", "sensors.alpha"
+    assert [*map(in_words, keys)] == [
+        "fault 1: kappa (1/s)", "fault 2: at (s)", "fdi: bounds: constant: p (rad/s2)", "sensors: alpha",
+    ]  # fmt: skip

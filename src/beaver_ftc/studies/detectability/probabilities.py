@@ -52,7 +52,8 @@ def _by_condition(watched: Iterable[Watched]) -> dict[Key, list[Trace]]:
 
 
 def rows_of(faulted: Iterable[Watched], levels: dict[Key, float]) -> list[Row]:
-    """One row a flight and scheme.
+    """One row a flight and scheme, of schemes with a level, and of blocks that our own could fly: what the
+    others lack is among the failures.
 
     delay_s at the common level, own_delay_s at the scheme's own; None where there is no alarm. An alarm
     before the fault is a false_alarm and no detection.
@@ -64,8 +65,9 @@ def rows_of(faulted: Iterable[Watched], levels: dict[Key, float]) -> list[Row]:
             *deflections,
         ), strict=True))
         for one in faulted
+        if one.deflections
         for scheme, traces in one.traces.items()
-        for level in [levels[(*one.block.condition, scheme)]]
+        if (level := levels.get((*one.block.condition, scheme))) is not None
         for fault, trace, deflections in zip(one.faults, traces, one.deflections, strict=True)
         if trace.faulted
     ]  # fmt: skip

@@ -166,12 +166,13 @@ def _csv(rows_of: Callable[[Any], Any], document: Any) -> str:
 
 
 def replace_between(path: Path, begin: str, end: str, text: str) -> None:
-    """Put text between two marks of a page, whose other parts stay. Raises BadInput where it has none."""
+    """Put text between two marks of a page, whose other parts stay. Raises BadInput unless it has both, the
+    first before the second."""
     page = path.read_text(encoding="utf-8") if path.is_file() else ""
-    if begin not in page or end not in page:
-        raise BadInput(f"{path}: has no place for the tables, allowed: a page with {begin} and {end}")
     before, _, rest = page.partition(begin)
-    after = rest.partition(end)[2]
+    _, found, after = rest.partition(end)
+    if not found:
+        raise BadInput(f"{path}: has no place for the tables, allowed: a page with {begin} and {end}")
     path.write_text(f"{before}{begin}\n{text}{end}{after}", encoding="utf-8")
 
 

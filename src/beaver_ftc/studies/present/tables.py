@@ -108,7 +108,10 @@ def aligned(rows: Rows) -> str:
 
 
 def as_csv(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Rows of equal keys as CSV with a header; None is an empty cell, and each key of a part a column."""
+    """Rows of equal keys as CSV with a header; None is an empty cell, and each key of a part a column.
+    Without a row there are no columns either: the text is empty."""
+    if not rows:
+        return ""
     text, flat = io.StringIO(), [_flat(row) for row in rows]
     writer = csv.DictWriter(text, fieldnames=list(flat[0]), lineterminator="\n")
     writer.writeheader()

@@ -16,7 +16,7 @@ SYSTEMS: Mapping[str, Changes] = {
     DEFAULT: {"fdi.scheme": "adaptive-estimators", "control.law": "fault-tolerant"},
 }
 DIAGNOSIS, LAW = "diagnosis", "law"
-CONSTANT = "fdi.options.constant_threshold_rad_s"  # its value follows from the flight, see survey.py
+CONSTANT = "fdi.options.constant_threshold_rad_s"  # its value follows from the flight, see mechanisms.py
 ABRUPT: Changes = MappingProxyType({"fdi.fault_profile": "abrupt"})  # sets are intersected with this alone
 NORM_BOUND: Changes = MappingProxyType({"fdi.thresholds": "published"})
 SUDDEN_S = 0.01  # one frame: the shortest hand-over that a scenario admits

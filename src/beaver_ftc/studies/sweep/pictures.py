@@ -40,10 +40,13 @@ _SEARCHED = {
     "false_alarm": "residual / threshold without a fault",
     "tracking": "RMS tracking error after the fault (deg/s)",
 }
-_UNITS = {  # the longest ending first
-    "_rad_s": "rad/s", "_deg_s": "deg/s", "_deg": "deg", "_rad": "rad", "_mps": "m/s", "_hz": "Hz",
-    "_m": "m", "_s": "s",
+_UNITS = {
+    "per_h": "1/h", "per_s": "1/s", "per_s2": "1/s2", "rad_s2": "rad/s2", "rad_s": "rad/s", "deg_s": "deg/s",
+    "deg_h": "deg/h", "mps2": "m/s2", "mps": "m/s", "inhg_s": "inHg/s", "inhg": "inHg", "deg": "deg",
+    "rad": "rad", "hz": "Hz", "rpm": "rpm", "pa": "Pa", "db": "dB", "m": "m", "s": "s",
 }  # fmt: skip
+"""The unit of a key or of its section, by how its name ends."""
+_ENDING = re.compile(rf"_({'|'.join(_UNITS)})(?=\.|$)")
 
 
 def write_figures(flights: Flights, summary: Document, folder: Path) -> list[Path]:
@@ -71,9 +74,9 @@ def _axes(
 def in_words(key: str) -> str:
     """A varied key for people: `faults[0].at_s` is `fault 1: at (s)`."""
     said = re.sub(r"faults\[(\d+)\]", lambda found: f"fault {int(found[1]) + 1}", key)
-    ending = next((ending for ending in _UNITS if said.endswith(ending)), "")
-    name = said.removesuffix(ending).replace(".", ": ").replace("_", " ")
-    return f"{name} ({_UNITS[ending]})" if ending else name
+    unit = _ENDING.search(said)
+    name = _ENDING.sub("", said).replace(".", ": ").replace("_", " ")
+    return f"{name} ({_UNITS[unit[1]]})" if unit else name
 
 
 def _log_of_numbers(axes: "Axes") -> None:

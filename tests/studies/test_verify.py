@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from beaver_ftc.commands import Reporter
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.studies import verify
 from beaver_ftc.studies.verify import PROMISES, Draw, Verify, summarise, summary_text
 from samples import samples
@@ -46,6 +47,11 @@ def test_rows_do_not_depend_on_the_workers(flown, tmp_path, monkeypatch):
     monkeypatch.setattr(verify, "TOGETHER", 2)
     assert conduct(tmp_path, workers=2) == flown
     assert json.loads((tmp_path / "verification" / "verify.json").read_text()) == flown
+
+
+def test_a_campaign_without_flights_is_refused(tmp_path):
+    with pytest.raises(BadInput, match="nothing to fly"):
+        conduct(tmp_path, hours=0, faults=0)
 
 
 def test_each_step_flies_the_same_faults(tmp_path):

@@ -28,7 +28,7 @@ from beaver_ftc.scenario.signals import grown_share
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial_upper, poisson_bound, share_within
 from beaver_ftc.studies.engine.study import Study, run_study
 from beaver_ftc.studies.present.page import Makers
-from beaver_ftc.studies.present.tables import finite, or_never
+from beaver_ftc.studies.present.tables import finite, number_or_never
 
 HEALTHY_S = 100.0  # attitude is open loop: a longer flight wanders out of the validated envelope
 AFTER_FAULT_S = 15.0  # more than a period of the slowest reference
@@ -312,7 +312,7 @@ def _fault_lines(document: Document) -> list[str]:
     for key in ("detected", "detection_certain", "isolated"):
         lines.append(_line(key.replace("_", " "), (str(s[key]) for s in schemes.values())))
     for (label, key), which in product(_SPREADS.items(), ("median", "p90")):
-        lines.append(_line(f"{label}, {which}", (or_never(s[key][which]) for s in schemes.values())))
+        lines.append(_line(f"{label}, {which}", (number_or_never(s[key][which]) for s in schemes.values())))
     if document["delay_shorter_by"] is not None:
         lines += [f"  median detection delay shorter by {document['delay_shorter_by']:.0%}", ""]
     return lines
@@ -361,6 +361,8 @@ class Verify(StudyCommand):
         """Fly all hours and all faults."""
         wanted = {"healthy": ceil(self.hours * 3600.0 / HEALTHY_S), "faulty": self.faults}
         draws = [Draw(self.seed, kind, i) for kind in KINDS for i in range(wanted[kind])]
+        if not draws:
+            raise BadInput("verify: nothing to fly, allowed: --hours or --faults above 0")
         schemes = STEPS if self.steps else SCHEMES
 
         def document(rows: list[Row]) -> Document:

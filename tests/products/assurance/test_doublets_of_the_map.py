@@ -5,12 +5,13 @@ from math import radians
 
 import numpy as np
 
-from beaver_ftc.studies.detectability.certain import SETTLED_S, at, excitation
+from beaver_ftc.studies.detectability.certain import SETTLED_S, excitation
 from beaver_ftc.studies.detectability.isolability import (
     DISTINGUISHED_LOSS,
     DOUBLET_COLUMNS,
     smallest_doublets,
 )
+from beaver_ftc.studies.detectability.places import at
 from beaver_ftc_assurance.separation import LARGEST_RATE_DEG_S
 from flying import scenario
 

@@ -4,6 +4,7 @@ import pytest
 
 from beaver_ftc.scenario.undeclared import undeclared
 from beaver_ftc.studies.compare import trial
+from flying import scenario
 
 # What stands for what, besides the sets of gusts: a constant error of the model covers wrong coefficients.
 COVERED = ("uncertainty.coefficients.", "environment.gust")
@@ -17,3 +18,12 @@ def test_a_set_has_enough_flights_and_draws_inside_what_it_declares(name):
     both = trial.Entry(trial.STATISTICAL, trial.LAW)
     outside = {each.key for case in cases for each in undeclared(trial.with_entry(case.scenario, both))}
     assert not [key for key in outside if not key.startswith(COVERED)]
+
+
+def test_the_time_of_a_frame_is_that_of_the_frames_that_were_flown(monkeypatch):
+    monkeypatch.setattr(trial, "thread_time", iter((0.0, 1.0)).__next__)
+    fault = {"actuator": "elevator", "type": "hardover", "direction": -1, "at_s": 1.0}
+    case = trial.SetFlight("", scenario(duration_s=60.0, faults=[fault]))
+    (result,) = trial.fly_case(case, [trial.Entry("none", "nominal")], trade_off=False).results
+    assert result.departed
+    assert result.us > 1e6 / (60.0 * case.scenario.rate_hz)

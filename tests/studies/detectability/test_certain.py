@@ -16,20 +16,17 @@ from beaver_ftc.studies.detectability.certain import (
     MAGNITUDES,
     SETTLED_S,
     Excitation,
-    alike,
-    answer,
-    at,
     best_in_window,
     detection_magnitude,
     excitation,
     exclusion_magnitude,
-    geometry,
     judge,
     least_distinguished_rad,
     mismatch,
-    with_aircraft,
 )
-from beaver_ftc.studies.detectability.command import run_places
+from beaver_ftc.studies.detectability.in_trim import alike
+from beaver_ftc.studies.detectability.places import at, run_places, with_aircraft
+from beaver_ftc.studies.detectability.places_shown import answer, geometry
 from flying import loss, scenario
 from samples import samples
 
@@ -134,10 +131,12 @@ ROW = {"airspeed_mps": 50.0, "altitude_m": 1800.0, "excitation": 2.0, "fault": "
 
 def test_an_answer_is_a_line_and_rounds_up():
     """3 deg/s of roll in the scenario, twice as much here; 0.301 is no longer 30 %."""
-    assert answer(scenario(), ROW | {"detected": 0.301, "isolated": 0.4}) == (
-        "at 50 m/s and 1800 m, 6 deg/s of roll: a loss of aileron of 31 % and more is certain to be detected "
-        "within 0.5 s, isolated within 1 s from 40 % on"
-    )
+    table = {"file": "p.csv", "time_s": [0.0, 1.0], "values_deg_s": [-3.0, 1.0]}
+    for flown in (scenario(), scenario(reference={"p": [{"csv": table}]})):
+        assert answer(flown, ROW | {"detected": 0.301, "isolated": 0.4}) == (
+            "at 50 m/s and 1800 m, 6 deg/s of roll: a loss of aileron of 31 % and more is certain to be "
+            "detected within 0.5 s, isolated within 1 s from 40 % on"
+        )
 
 
 def test_what_a_line_promises_holds_in_flight(flight):

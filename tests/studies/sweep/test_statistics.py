@@ -4,6 +4,7 @@ import pytest
 
 from beaver_ftc.scenario.sweeps import SweepExpect, load_sweep_text
 from beaver_ftc.studies.sweep.summary import evaluate, summarise
+from beaver_ftc.studies.sweep.summary_page import exact_percent
 
 from .counted import ROWS, SWEEP, detected, flights_of
 
@@ -112,3 +113,8 @@ def test_expectations_hold_the_flights_to_their_bounds(flights, expect, actual, 
     (found,) = evaluate(SweepExpect(**expect), flights)
     assert found["passed"] is passed
     assert found["actual"] == (None if actual is None else pytest.approx(actual, abs=1e-3))
+
+
+def test_a_share_near_its_end_is_not_rounded_to_it():
+    said = ["0 %", "0.001 %", "0.5 %", "50 %", "99.999 %", "100 %"]
+    assert [*map(exact_percent, (0.0, 1e-5, 0.005, 0.5, 0.99999, 1.0))] == said

@@ -14,7 +14,7 @@ from beaver_ftc.diagnosis.isolation import estimator_names
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant.channels import log_columns
 from beaver_ftc.results.log import unit_of
-from beaver_ftc.studies.detectability import certain, probabilities
+from beaver_ftc.studies.detectability import places, probabilities
 from beaver_ftc.studies.detectability.schemes import WITHIN_S
 from beaver_ftc.studies.mismatch import split, study
 from beaver_ftc.studies.mismatch.sources import SOURCES
@@ -58,7 +58,7 @@ def tables() -> dict[str, Columns]:
     rows = LogRows(no_rows, no_rows, no_rows, no_surfaces, no_surfaces, no_surfaces, no_rows, no_rows)
     names = {
         "detectability-grid": probabilities.COLUMNS,
-        "detectability": (*certain.COLUMNS, *certain.PAIRS),
+        "detectability": (*places.COLUMNS, *places.PAIRS),
         "mismatch": (*study.PLACE, *study.FIGURES),
         "mismatch-frames": split.COLUMNS,
         "diagnosis": rows.table(["SURFACE"], with_probability=True),

@@ -5,7 +5,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from beaver_ftc.scenario.schema import load_scenario
-from beaver_ftc.studies.detectability.command import run_places
+from beaver_ftc.studies.detectability.places import run_places
 from beaver_ftc.studies.present.tables import markdown_table
 
 

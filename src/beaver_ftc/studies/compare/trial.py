@@ -96,7 +96,8 @@ class Result:
     fault_free_s: time under observation without a fault, until the first alarm. rms_deg_s: over all axes,
     after the fault (all the flight without one), and infinite after a departure. before_deg_s, after_deg_s:
     the same before and after it. travel_deg_s: path of all surfaces over the time flown.
-    energy_deg2_s2: mean square of their speeds, summed: what moves a mass against friction spends.
+    energy_deg2_s2: mean square of their speeds, summed: what moves a mass against friction spends. us:
+    processor time of a frame, microseconds.
     """
 
     entry: Entry
@@ -212,10 +213,10 @@ def _fly(scenario: Scenario, entry: Entry, chosen: TunedValuesByGrade) -> Result
         began = thread_time()
         for _ in loop.chunks():
             pass
-        us = 1e6 * (thread_time() - began) / loop.n_frames
+        flown_s = thread_time() - began
         flight = loop.land()
         loop.release()
-        return result_of(flight, entry, us)
+        return result_of(flight, entry, 1e6 * flown_s / flight.frames)
     except BeaverFtcError as error:
         return Result(entry, False, 0.0, bool(scenario.faults), error=str(error))
 

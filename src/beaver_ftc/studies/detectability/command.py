@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import partial
-from itertools import product
 from pathlib import Path
 from typing import Annotated
 
@@ -24,7 +23,8 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.results.model import Document
 from beaver_ftc.scenario.schema import Scenario, load_scenario
 from beaver_ftc.studies.detectability import (
-    certain,
+    in_trim,
+    places,
     places_shown,
     probabilities,
     schemes,
@@ -39,40 +39,6 @@ from beaver_ftc.studies.present.page import as_text
 
 GridName = StrEnum("GridName", ["quick", "full"])
 SensorsName = StrEnum("SensorsName", {"ideal": "ideal", "tactical_grade": "tactical-grade"})
-
-
-def run_places(
-    out: Path,
-    scenario: Scenario,
-    speeds_mps: Sequence[float] = (),
-    altitudes_m: Sequence[float] = (),
-    excitations: Sequence[float] = certain.EXCITATIONS,
-    workers: int = 1,
-    progress: Progress | None = None,
-) -> Document:
-    """Write `out/<scenario>-detectability/`; return the document: a row a fault and grid point, and one a
-    fault, other surface and grid point.
-
-    Raises BadInput if another scheme than the sharpened one diagnoses.
-    """
-    fdi = scenario.fdi
-    sharp = fdi.sharpen.pole_bank and fdi.sharpen.memory and fdi.sharpen.shared_effectiveness
-    if fdi.scheme != "adaptive-estimators" or not sharp or max(fdi.pole_bank_per_s, default=0.0) < 1e6:
-        raise BadInput(
-            f"{scenario.name}: fdi: detectability is worked out for the sharpened scheme, allowed: "
-            "scheme adaptive-estimators, sharpen all, a filter of 1e6 in pole_bank_per_s"
-        )
-    aircraft, start_m = scenario.airframe, scenario.airframe.file.start.altitude_m
-    if not speeds_mps:
-        speeds_mps = certain.usual_airspeeds(aircraft, certain.SPEEDS_MPS)
-    if not altitudes_m:  # another aircraft's error is known about the one it starts at
-        altitudes_m = certain.ALTITUDES_M if start_m is None else (start_m,)
-    study = Study(
-        certain.survey_name(scenario), list(product(speeds_mps, altitudes_m, excitations)),
-        partial(certain.look_at, scenario), partial(certain.document_of, scenario.name), places_shown.FILES,
-        row=dict[str, list[Document]], follows_from=scenario,
-    )  # fmt: skip
-    return run_study(study, out, workers, progress)
 
 
 def run_schemes(
@@ -156,22 +122,22 @@ class Detectability(StudyCommand):
             return self._of_schemes(self.grid, reporter)
         scenario = load_scenario(str(self.scenario))
         if self.aircraft is not None:
-            scenario = certain.with_aircraft(scenario, self.aircraft)
+            scenario = places.with_aircraft(scenario, self.aircraft)
         if self.within is not None:
             asked = Asked(str(self.surface), self.within, self.seed)
             return run_sizes(self.out, scenario, asked, self.processes, reporter.say)
         return self._of_places(scenario, reporter)
 
     def _refuse_contradictions(self) -> None:
-        places = (self.airspeed or (), self.altitude or ())
+        where = (self.airspeed or (), self.altitude or ())
         for wrong, allowed in (
             ((self.scenario is None) is (self.grid is None), "exactly one of SCENARIO and --grid"),
             (self.within is not None and self.grid is not None, "--within only with SCENARIO"),
             (self.within is not None and self.surface is None, "--within only with --surface"),
-            (self.within is not None and any(places), "--airspeed and --altitude only without --within"),
+            (self.within is not None and any(where), "--airspeed and --altitude only without --within"),
             (self.grid is None and bool(self.schemes or self.sensors or self.turbulence),
              "--schemes, --sensors and --turbulence only with --grid"),
-            (self.grid is not None and max(map(len, places)) > 1,
+            (self.grid is not None and max(map(len, where)) > 1,
              "with --grid at most one --airspeed and one --altitude"),
         ):  # fmt: skip
             if wrong:
@@ -183,18 +149,19 @@ class Detectability(StudyCommand):
         if self.surface is not None and self.surface not in known:
             raise BadInput(f"--surface {self.surface!r:.60}: allowed: {', '.join(known)}")
         where = self.airspeed or (), self.altitude or ()
-        found = run_places(self.out, scenario, *where, workers=self.processes, progress=reporter.progress)
-        folder = str(self.out / certain.survey_name(scenario))
+        how = self.processes, reporter.progress
+        found = places.run_places(self.out, scenario, *where, places.EXCITATIONS, *how)
+        folder = str(self.out / places.survey_name(scenario))
         if self.surface is not None:
             found |= {
-                part: [row for row in found[part] if row["fault"] == self.surface] for part in certain.PARTS
+                part: [row for row in found[part] if row["fault"] == self.surface] for part in places.PARTS
             }
             return found | {
-                "answers": [certain.answer(scenario, row) for row in found["points"]],
+                "answers": [places_shown.answer(scenario, row) for row in found["points"]],
                 "folder": folder,
             }
-        failures = certain.engine_failures(scenario)
-        found |= {"alike": certain.alike(scenario), "folder": folder}
+        failures = in_trim.engine_failures(scenario)
+        found |= {"alike": in_trim.alike(scenario), "folder": folder}
         return found | ({"engines": failures} if failures else {})
 
     def _of_schemes(self, grid: GridName, reporter: Reporter) -> Document:
@@ -212,7 +179,7 @@ class Detectability(StudyCommand):
         """The answers in words, else sentences and table; and where the files are."""
         shown = schemes_shown if self.grid else places_shown if self.within is None else sizes_shown
         lines = document.get("answers") or [
-            as_text(shown.page_of(document)[1]), *certain.geometry(document.get("alike", ())),
-            *certain.of_engines(document.get("engines", ())),
+            as_text(shown.page_of(document)[1]), *places_shown.geometry(document.get("alike", ())),
+            *places_shown.of_engines(document.get("engines", ())),
         ]  # fmt: skip
         return "\n".join([*lines, "", f"results: {document['folder']}"])

@@ -1,13 +1,16 @@
 """What is certain, by places: as sentences, a table, a figure and files."""
 
 from collections.abc import Callable, Sequence
+from math import ceil
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from beaver_ftc.results.expectations import MOTION_OF_AXIS
 from beaver_ftc.results.model import Document
-from beaver_ftc.studies.detectability.certain import upwards
+from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.studies.detectability.certain import AMPLITUDES, DETECT_WITHIN_S, ISOLATE_WITHIN_S, axis_of
 from beaver_ftc.studies.detectability.isolability import DISTINGUISHED_LOSS
 from beaver_ftc.studies.detectability.shown import NAME, Line, table
 from beaver_ftc.studies.present.figures import heat_map, label_edges, panels
@@ -78,6 +81,52 @@ def _conclusion(fault: str, scale: float, rows: Sequence[Document]) -> str:
         f"{fault}: at {reference} a loss of {upwards(max(certain))} or more is certain to be detected and "
         f"isolated at {places} {len(rows)} places."
     )
+
+
+def answer(scenario: Scenario, row: Document) -> str:
+    """From which loss on a surface's fault is certain to be found at a place, in words."""
+    axis = axis_of(scenario, row["fault"])
+    shapes = (signal.shape for signal in getattr(scenario.reference, axis))
+    sizes = (np.abs(getattr(shape, key, 0.0)).max() for shape in shapes for key in AMPLITUDES)
+    asked = f"{row['excitation'] * float(sum(sizes)):g} deg/s of {MOTION_OF_AXIS[axis]}"
+    place = f"at {row['airspeed_mps']:g} m/s and {row['altitude_m']:g} m, {asked}"
+    fault, detected, isolated = row["fault"], row["detected"], row["isolated"]
+    soon = f"is certain to be detected within {DETECT_WITHIN_S:g} s"
+    if detected is None:
+        return f"{place}: not even a total loss of {fault} {soon} ({row['why']})"
+    named = "none is certain to be isolated"
+    if isolated is not None:
+        named = f"isolated within {ISOLATE_WITHIN_S:g} s from {upwards(isolated)} on"
+    return f"{place}: a loss of {fault} of {upwards(detected)} and more {soon}, {named}"
+
+
+def upwards(magnitude: float) -> str:
+    """A magnitude for which the promise holds: rounded up to per cent."""
+    return f"{ceil(100.0 * magnitude - 1e-9)} %"
+
+
+def geometry(pairs: Sequence[Document]) -> list[str]:
+    """A sentence a pair of surfaces, of those that `in_trim.alike` finds."""
+    lines = []
+    for pair in pairs:
+        apart = {name: x for name, x in pair["told_apart_from_deg"].items() if x is not None}
+        told = " or ".join(f"{name} is at least {x:.2g} deg off its command" for name, x in apart.items())
+        never = f"never distinguish them{', accelerometers do' * pair['by_forces']}"
+        says = f"distinguish them if {told}" if told else never
+        lines.append(f"{' and '.join(pair['surfaces'])} have similar effects on the rates: the rates {says}")
+    return lines
+
+
+def of_engines(failures: Sequence[Document]) -> list[str]:
+    """A sentence an engine, of those of `in_trim.engine_failures`."""
+    signal, against = "; the design model knows its moment", " and monitors it against the thrust"
+    return [
+        f"{of['engine']} failed to idle accelerates the aircraft by {max(of['turns_rad_s2']):.2g} rad/s2, "
+        f"{of['shows']:.2g} times the detection limit of one frame"
+        + signal * of["known"]
+        + against * of["held"]
+        for of in failures
+    ]
 
 
 def draw_pairs(document: Document) -> "Figure":

@@ -25,7 +25,8 @@ from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.signals import TIME_TOLERANCE_S
 from beaver_ftc.studies.detectability import sizes_shown
-from beaver_ftc.studies.detectability.certain import AMPLITUDES, SETTLED_S, axis_of, scaled
+from beaver_ftc.studies.detectability.certain import AMPLITUDES, SETTLED_S, axis_of
+from beaver_ftc.studies.detectability.places import scaled
 from beaver_ftc.studies.detectability.shown import NAME
 from beaver_ftc.studies.detectability.thresholds import LARGEST, STAGES, of_all, threshold
 from beaver_ftc.studies.engine.draws import loss

@@ -24,7 +24,8 @@ from beaver_ftc.scenario.airframe import air_of, find_aircraft, initial_of
 from beaver_ftc.scenario.faults import TYPES
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.schema import load as load_scenario
-from beaver_ftc.studies.detectability.certain import usual_airspeeds
+from beaver_ftc.studies.detectability.certain import axis_of
+from beaver_ftc.studies.detectability.places import usual_airspeeds
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.matrix.clairvoyant import columns_of, seen_when_told
 from beaver_ftc.studies.present.figures import heat_map, label_edges, panels
@@ -193,8 +194,7 @@ def verdict(found: Metrics, surface: str, true_type: str) -> str:
 
 
 def _tracking(flight: Landing, oracle: Landing, case: FaultCase) -> Document:
-    aircraft = flight.scenario.airframe
-    axis = AXES[aircraft.dominant_axis[aircraft.surfaces.index(case.surface)]]
+    axis = axis_of(flight.scenario, case.surface)
     rms_rad_s = [(one.post_fault_rms_rad_s or (0.0,) * 3)[AXES.index(axis)] for one in (flight, oracle)]
     ours, best = map(degrees, rms_rad_s)
     departure_s, signal = flight.departure or (None, None)

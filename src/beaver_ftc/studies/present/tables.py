@@ -3,6 +3,7 @@
 import csv
 import io
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from html import escape
 from math import isfinite
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -46,12 +47,10 @@ def percent(share: float | None, unit: str = " %", none: str = "none") -> str:
     return none if share is None else f"{100.0 * share:.0f}{unit}"
 
 
-def or_never(value: float | None) -> str:
-    """A number; None never comes."""
-    return number(value, none="never")
+number_or_never = partial(number, none="never")
 
 
-def estimate(found: Mapping[str, Any], form: Callable[[Any], str] = or_never) -> tuple[str, str]:
+def estimate(found: Mapping[str, Any], form: Callable[[Any], str] = number_or_never) -> tuple[str, str]:
     """The value of an estimate, and its interval, each number in this form."""
     value, low, high = (form(found[key]) for key in ("value", "low", "high"))
     return value, f"{low} to {high}"

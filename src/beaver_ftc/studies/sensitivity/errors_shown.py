@@ -9,7 +9,7 @@ from beaver_ftc.results.model import Document
 from beaver_ftc.results.style import BLACK
 from beaver_ftc.studies.present.figures import GRID, draw_estimates, label_edges, panels
 from beaver_ftc.studies.present.page import Part, Pictures, study_files, table, versions_line
-from beaver_ftc.studies.present.tables import estimate, grouped, or_never, percent
+from beaver_ftc.studies.present.tables import estimate, grouped, number_or_never, percent
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -72,13 +72,13 @@ def _share(found: Document) -> str:
     return "{} ({})".format(*estimate(found, _PERCENT))
 
 
-def _interval(found: Document, form: Callable[[Any], str] = or_never) -> str:
+def _interval(found: Document, form: Callable[[Any], str] = number_or_never) -> str:
     value, limits = estimate(found, form)
     return value if found["value"] is None or found["low"] == found["high"] else f"{value} ({limits})"
 
 
 def _used(found: Document) -> str:
-    return _interval(found, lambda share: or_never(share and 100.0 * share))
+    return _interval(found, lambda share: number_or_never(share and 100.0 * share))
 
 
 COLUMNS = (

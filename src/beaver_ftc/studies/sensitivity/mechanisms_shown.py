@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from beaver_ftc.results.model import Document
 from beaver_ftc.studies.present.figures import GRID, SERIES, draw_estimates, label_edges, panels
 from beaver_ftc.studies.present.page import Heading, Part, Pictures, Table, study_files, table, versions_line
-from beaver_ftc.studies.present.tables import estimate, number, or_never, percent
+from beaver_ftc.studies.present.tables import estimate, number, number_or_never, percent
 from beaver_ftc.studies.sensitivity.mechanisms import mechanisms_of, system_of
 from beaver_ftc.studies.sensitivity.systems import DEFAULT, PAPER
 
@@ -151,7 +151,7 @@ def _net(found: Document) -> tuple[str, str]:
 
 def _medians(row: Document) -> Iterator[str]:
     for of in ("delay_s", "tracking_deg_s"):
-        yield from (or_never(row[of][which]["value"]) for which in ("with", "without"))
+        yield from (number_or_never(row[of][which]["value"]) for which in ("with", "without"))
     yield from estimate(row["tracking_ratio"])
 
 

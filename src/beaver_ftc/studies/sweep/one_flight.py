@@ -126,7 +126,7 @@ class Keep:
         """Whether the flight of this row is to be kept."""
         if self.policy == "all" or row["run"] in self.runs:
             return True
-        if self.policy in ("failed", "missed") and (row["status"] != "flown" or row["passed"] is False):
+        if self.policy in ("failed", "missed") and (row["status"] != FLOWN or row["passed"] is False):
             return True
         undetected = row["fault.type"] is not None and not row["detection.detected"]
         return self.policy == "missed" and bool(undetected or row["isolation.correct"] is False)

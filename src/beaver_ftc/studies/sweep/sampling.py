@@ -70,7 +70,7 @@ def counted_value(how: Variation, position: int) -> Any:
         return how.choice[position]
     assert how.linspace is not None
     first, last, count = how.linspace
-    return last if position == count - 1 else first + position * (last - first) / max(count - 1, 1)
+    return last if position == count - 1 else first + position * (last - first) / (count - 1)
 
 
 class Plan:

@@ -5,6 +5,7 @@ Everything is said from the summary document, so that the words and `summary.jso
 
 from collections.abc import Mapping, Sequence
 from functools import partial
+from math import floor, log10
 from pathlib import Path
 
 from beaver_ftc.aircraft import AXES
@@ -109,7 +110,8 @@ def exact_percent(share: float | None) -> str:
     """A share in percent, with the digits that matter near 0 and 1."""
     if share is None:
         return "none"
-    digits = 1 if 0.01 <= share <= 0.99 or share in (0, 1) else 2
+    rest = min(share, 1.0 - share)
+    digits = 1 if rest >= 0.01 or not rest else max(2, -floor(log10(100.0 * rest)))
     text = f"{100 * share:.{digits}f}"
     return f"{text.rstrip('0').rstrip('.')} %"
 

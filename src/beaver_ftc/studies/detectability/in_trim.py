@@ -1,0 +1,76 @@
+"""What one frame in trim can show: surfaces with similar effects on the rates, and failures of engines."""
+
+from itertools import combinations
+from math import degrees
+
+import numpy as np
+
+from beaver_ftc.control.engines import effects_of_engines
+from beaver_ftc.loop.loop import Loop
+from beaver_ftc.plant.instrumented import ENGINE_SIGNALS
+from beaver_ftc.results.model import Document
+from beaver_ftc.scenario.declared import Declared
+from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.studies.detectability.certain import (
+    SETTLED_S,
+    detection_magnitude,
+    excitation,
+    least_distinguished_rad,
+)
+from beaver_ftc.studies.present.tables import all_finite
+
+ALIKE_DEG = 3.0  # distinguished only from this deflection on: similar effects on the rates
+
+
+def alike(scenario: Scenario) -> list[Document]:
+    """Pairs of surfaces with similar effects on the rates: the deflection, deg, from which each is certain to
+    be distinguished from the other, None where none is; and whether accelerometers distinguish them."""
+    seen, aircraft = excitation(_short(scenario)), scenario.airframe
+    by_force = [{*aircraft.separated_by_force(force)} for force in ("CY", "CZ")]
+    found = []
+    for s, other in combinations(range(aircraft.n), 2):
+        from_deg = {
+            aircraft.surfaces[i]: degrees(least_distinguished_rad(seen.G[:, i], seen.G[:, j], seen.bound[0]))
+            for i, j in ((s, other), (other, s))
+        }
+        if max(from_deg.values()) > ALIKE_DEG:
+            forces = any({s, other} <= weighed for weighed in by_force)
+            told = {"told_apart_from_deg": all_finite(from_deg), "by_forces": forces}
+            found.append({"surfaces": tuple(from_deg), **told})
+    return found
+
+
+def _short(scenario: Scenario) -> Scenario:
+    """Its beginning, long enough to weigh the surfaces in trim."""
+    return scenario.model_copy(update={"duration_s": SETTLED_S + 1.0, "faults": ()})
+
+
+def engine_failures(scenario: Scenario) -> list[Document]:
+    """Of each engine that is an effector: how a failure to idle turns the aircraft in trim, rad/s2; over what
+    is certain to show in a frame; whether its moment is a signal, so that the design model knows it, and
+    whether that is held against the thrust of all."""
+    aircraft = scenario.airframe
+    thrust, power = aircraft.engine.thrust, aircraft.file.power_setting
+    short = _short(scenario)
+    effects = effects_of_engines(Declared.of(short))
+    if thrust is None or power is None or not effects.size:
+        return []
+    loop, bound = Loop(short), excitation(short).bound[0]
+    setting = loop.trim.settings[power[0]]
+    force_n = [
+        np.interp(loop.trim.airspeed_mps, thrust.airspeed_mps, f) for f in zip(*thrust.force_n, strict=True)
+    ]
+    gained = np.interp(setting, thrust.setting, force_n) / aircraft.mass.mass_kg
+    loop.release()
+    known, mapped = any(name in ENGINE_SIGNALS for name in aircraft.signals), aircraft.file.model_error_map
+    turns = np.abs(effects.T) * gained
+    return [
+        {
+            "engine": name,
+            "turns_rad_s2": of.tolist(),
+            "shows": 1.0 / float(detection_magnitude(of[None], bound[None])[0]),
+            "known": known,
+            "held": known and mapped is not None and mapped.knows_engines,
+        }
+        for name, of in zip(aircraft.effectors, turns, strict=True)
+    ]

@@ -1,0 +1,146 @@
+"""The survey of what is certain: a scenario flown at each of several airspeeds, altitudes and excitations."""
+
+from collections.abc import Collection, Mapping, Sequence
+from functools import partial
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+
+from beaver_ftc.aircraft import Aircraft, load
+from beaver_ftc.documents.errors import BadInput, BeaverFtcError, SimulationFailed
+from beaver_ftc.results.model import Document
+from beaver_ftc.scenario.airframe import find_aircraft
+from beaver_ftc.scenario.schema import Scenario
+from beaver_ftc.studies.detectability import isolability, places_shown
+from beaver_ftc.studies.detectability.certain import (
+    AMPLITUDES,
+    DETECT_WITHIN_S,
+    ISOLATE_WITHIN_S,
+    MAGNITUDES,
+    SETTLED_S,
+    excitation,
+    judge,
+    pairs_of,
+)
+from beaver_ftc.studies.engine.study import Progress, Study, run_study
+
+SPEEDS_MPS, ALTITUDES_M = (36.0, 40.0, 44.0, 48.0, 52.0), (0.0, 1000.0, 2000.0, 3000.0)
+SHARES = (0.9, 1.0, 1.1)  # of the speed another aircraft starts with
+EXCITATIONS = (0.25, 0.5, 1.0, 2.0)  # of the scenario's references
+PLACE = ("airspeed_mps", "altitude_m", "excitation")
+TOO_SHORT = "the flight ends before a fault could be isolated"
+COLUMNS = (*PLACE, "fault", *MAGNITUDES, "confused_with", "why")
+PARTS = ("points", "pairs")  # of the document: a row a fault, and a row a fault and another
+PAIRS = (*PLACE, "fault", "other", *isolability.LOSS_COLUMNS, *isolability.DOUBLET_COLUMNS)
+
+
+def run_places(
+    out: Path,
+    scenario: Scenario,
+    speeds_mps: Sequence[float] = (),
+    altitudes_m: Sequence[float] = (),
+    excitations: Sequence[float] = EXCITATIONS,
+    workers: int = 1,
+    progress: Progress | None = None,
+) -> Document:
+    """Write `out/<scenario>-detectability/`; return the document: a row a fault and grid point, and one a
+    fault, other surface and grid point.
+
+    Raises BadInput if another scheme than the sharpened one diagnoses.
+    """
+    fdi = scenario.fdi
+    sharp = fdi.sharpen.pole_bank and fdi.sharpen.memory and fdi.sharpen.shared_effectiveness
+    if fdi.scheme != "adaptive-estimators" or not sharp or max(fdi.pole_bank_per_s, default=0.0) < 1e6:
+        raise BadInput(
+            f"{scenario.name}: fdi: detectability is worked out for the sharpened scheme, allowed: "
+            "scheme adaptive-estimators, sharpen all, a filter of 1e6 in pole_bank_per_s"
+        )
+    aircraft, start_m = scenario.airframe, scenario.airframe.file.start.altitude_m
+    if not speeds_mps:
+        speeds_mps = usual_airspeeds(aircraft, SPEEDS_MPS)
+    if not altitudes_m:  # another aircraft's error is known about the one it starts at
+        altitudes_m = ALTITUDES_M if start_m is None else (start_m,)
+    study = Study(
+        survey_name(scenario), list(product(speeds_mps, altitudes_m, excitations)),
+        partial(look_at, scenario), partial(document_of, scenario.name), places_shown.FILES,
+        row=dict[str, list[Document]], follows_from=scenario,
+    )  # fmt: skip
+    return run_study(study, out, workers, progress)
+
+
+def usual_airspeeds(aircraft: Aircraft, of_the_beaver: tuple[float, ...]) -> tuple[float, ...]:
+    """These of the built-in aircraft, m/s, or about where another one starts."""
+    if aircraft is load():
+        return of_the_beaver
+    return tuple(round(share * aircraft.usual_airspeed_mps, 1) for share in SHARES)
+
+
+def survey_name(scenario: Scenario) -> str:
+    """The name of the survey's result folder, at most 100 characters."""
+    return f"{scenario.name[:86]}-detectability"
+
+
+def with_aircraft(scenario: Scenario, reference: str) -> Scenario:
+    """The scenario with another aircraft, which starts where its flights do; a folder is looked for in the
+    working directory. What is wrong with the other aircraft's truth is not with this one's."""
+    find_aircraft(reference, Path())
+    given = {"aircraft": reference, "initial": {}, "uncertainty": {}, "actuators": "ideal"}
+    return Scenario.model_validate(_without_faults(scenario) | given)
+
+
+def _without_faults(scenario: Scenario) -> Document:
+    """The keys of a scenario without its faults, what is expected of them, and bounds on its own servos."""
+    document = scenario.model_dump(mode="json", exclude_none=True)
+    del document["fdi"]["bounds"]["actuators"]
+    return {**document, "faults": [], "expect": {}}
+
+
+def look_at(scenario: Scenario, point: tuple[float, float, float]) -> dict[str, list[Document]]:
+    """The rows of each of PARTS at a place: without a result, why there is none."""
+    place, there = dict(zip(PLACE, point, strict=True)), at(scenario, *point)
+    faults = scenario.airframe.class_of_losses
+    try:
+        seen = excitation(there)
+        if len(seen.bound) < seen.windows[1]:
+            raise SimulationFailed(TOO_SHORT)
+        doublets = isolability.smallest_doublets(at(there, *point[:2], 0.0), SETTLED_S)
+    except BeaverFtcError as error:
+        none = dict.fromkeys((*MAGNITUDES, "confused_with")) | {"why": str(error)}
+        points = [{"fault": fault, **none} for fault in faults]
+        pairs = isolability.rows_without_result(faults, str(error))
+    else:
+        points = [{"fault": fault, **judge(seen, fault)} for fault in seen.moment]
+        pairs = [row | doublets[row["fault"], row["other"]] for row in pairs_of(seen)]
+    return {"points": [place | row for row in points], "pairs": [place | row for row in pairs]}
+
+
+def at(scenario: Scenario, speed_mps: float, altitude_m: float, excitation: float) -> Scenario:
+    """The scenario flown elsewhere, its references scaled."""
+    document = _without_faults(scenario)
+    document["initial"] |= {"airspeed_mps": speed_mps, "altitude_m": altitude_m}
+    document["reference"] = {
+        axis: scaled(signals, AMPLITUDES, excitation) for axis, signals in document["reference"].items()
+    }
+    return Scenario.model_validate(document)
+
+
+def scaled(signals: Sequence[Document], keys: Collection[str], times: float) -> list[Document]:
+    """Reference signals with these of their parameters multiplied."""
+    return [
+        {
+            name: of | {key: (np.asarray(of[key]) * times).tolist() for key in of.keys() & {*keys}}
+            for name, of in signal.items()
+        }
+        for signal in signals
+    ]
+
+
+def document_of(name: str, points: Sequence[Mapping[str, Sequence[Document]]]) -> Document:
+    """What the command answers and `detectability.json` holds."""
+    return {
+        "scenario": name,
+        "detect_within_s": DETECT_WITHIN_S,
+        "isolate_within_s": ISOLATE_WITHIN_S,
+        **{what: [row for point in points for row in point[what]] for what in PARTS},
+    }

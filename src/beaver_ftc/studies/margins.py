@@ -94,36 +94,43 @@ def allocation(G: np.ndarray, main: np.ndarray, stand_in: int, lost: float) -> n
 
 
 def law_response(loop: OpenLoop, z: Any) -> np.ndarray:
-    """Where the surfaces go for what is measured, (..., n, m), at each z (...)."""
+    """Positions p (n,) of the surfaces, rad, per measured signal of y (m,), (..., n, m), at each z (...):
+
+        x = K (x / z + dt d / z + dt s (f y + G p)) + L_rate y_pqr
+        d = d / z + L_disturbance (y_pqr - x / z - dt d / z - dt s (f y + G p))
+        p = -a (D Kp x + D (1 + share dt Kp) (d + f y) + (D Kp G share dt + lead - 1) p)
+
+    x (3,) rad/s: estimated rates; d (3,) rad/s2: estimated disturbance; a: of the actuators; D = lead demand,
+    K = 1 - L_rate, s = share / z + 1 - share.
+    """
     n, m, dt = len(loop.effectiveness), len(loop.C), loop.dt_s
     z = np.asarray(z, complex)[..., None, None]
     back = 1.0 / z
-    mean = loop.share * back + 1.0 - loop.share  # of what acts over the elapsed frame
-    actuator = loop.approach / (z - 1.0 + loop.approach)
-    one, keep, all_n = np.eye(3), np.diag(1.0 - loop.L_rate), np.eye(n)
+    mean = loop.share * back + 1.0 - loop.share  # s: of what acts over the elapsed frame
+    approach = loop.approach[:, None]
+    actuator = approach / (z - 1.0 + approach)
+    one, keep, rates = np.eye(3), np.diag(1.0 - loop.L_rate), np.eye(3, m)
     L_disturbance, Kp, lead = np.diag(loop.L_disturbance), np.diag(loop.Kp), np.diag(loop.lead)
-    demand, rates, none = lead @ loop.demand, np.eye(3, m), np.zeros((n, m))
-    ahead = one + loop.share * dt * Kp
-    wide, tall = np.zeros((3, n)), np.zeros((n, 3))
-    # unknowns: rate, disturbance, position, command; driven by what is measured
+    demand, ahead = lead @ loop.demand, one + loop.share * dt * Kp
+    moved = demand @ Kp @ loop.G * loop.share * dt + lead - np.eye(n)
+    # unknowns: rate, disturbance, position; driven by what is measured
     M = [
-        [one - keep * back, -keep * dt * back, -keep @ loop.G * dt * mean, wide],
+        [one - keep * back, -keep * dt * back, -keep @ loop.G * dt * mean],
         [L_disturbance * back, one - one * back + L_disturbance * dt * back,
-         L_disturbance @ loop.G * dt * mean, wide],
-        [tall, tall, all_n, -all_n * actuator],
-        [demand @ Kp, demand @ ahead, demand @ Kp @ loop.G * loop.share * dt + lead - all_n, all_n],
+         L_disturbance @ loop.G * dt * mean],
+        [actuator * (demand @ Kp), actuator * (demand @ ahead), np.eye(n) + actuator * moved],
     ]  # fmt: skip
     driven = [
         [np.diag(loop.L_rate) @ rates + keep @ loop.f * dt * mean],
-        [L_disturbance @ (rates - loop.f * dt * mean)], [none], [-demand @ ahead @ loop.f],
+        [L_disturbance @ (rates - loop.f * dt * mean)], [-actuator * (demand @ ahead @ loop.f)],
     ]  # fmt: skip
+    return np.linalg.solve(_joined(M), _joined(driven))[..., 6:, :]
 
-    def joined(rows: list[list[np.ndarray]]) -> np.ndarray:
-        return np.block(
-            [[np.broadcast_to(of, (*z.shape[:-2], *of.shape[-2:])) for of in row] for row in rows]
-        )
 
-    return np.linalg.solve(joined(M), joined(driven))[..., 6 : 6 + n, :]
+def _joined(rows: list[list[np.ndarray]]) -> np.ndarray:
+    """The matrix of these blocks at each z; a block without z is the same at all."""
+    shape = np.broadcast_shapes(*(of.shape[:-2] for row in rows for of in row))
+    return np.block([[np.broadcast_to(of, (*shape, *of.shape[-2:])) for of in row] for row in rows])
 
 
 def loops(loop: OpenLoop, omega: np.ndarray) -> np.ndarray:

@@ -25,7 +25,7 @@ from beaver_ftc.results.metrics import Truth, as_json, fault_free_s, is_late
 from beaver_ftc.scenario.faults import LossOfEffectiveness
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.signals import grown_share
-from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial_upper, poisson_bound, share_within
+from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial, poisson_bound, share_within
 from beaver_ftc.studies.engine.study import Study, run_study
 from beaver_ftc.studies.present.page import Makers
 from beaver_ftc.studies.present.tables import finite, number_or_never
@@ -40,6 +40,7 @@ _AT_THE_BOUND = 0.3  # share of flights with an uncertainty at its very bound
 
 _COARSE = 0.05  # share of flights with several JSBSim frames in a frame of the loop
 KINDS = ("healthy", "faulty")
+ONE_SIDED = 2.0 * CONFIDENCE - 1.0  # the two-sided confidence whose upper limit has CONFIDENCE
 
 
 @dataclass(frozen=True)
@@ -255,7 +256,10 @@ def _scheme(rows: Sequence[Row]) -> Document:
     errors = [row["estimate_error"] for row in rows if row["estimate_error"] is not None]
     return {
         **counts,
-        **{f"{name}_probability_upper_95": binomial_upper(count, n) for name, count in counts.items()},
+        **{
+            f"{name}_probability_upper_95": binomial(count, n, ONE_SIDED).high
+            for name, count in counts.items()
+        },
         "detected": sum(row["delay_s"] is not None for row in rows),
         "isolated": sum(row["isolation_s"] is not None for row in rows),
         "detection_certain": len(certain),

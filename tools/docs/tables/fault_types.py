@@ -6,7 +6,8 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import beaver_ftc as bf
-from beaver_ftc.studies.matrix.fault_matrix import SHOWN, beside_told, cases, fly_case, run_matrix
+from beaver_ftc.studies.matrix.fault_matrix import beside_told, cases, fly_case, run_matrix
+from beaver_ftc.studies.matrix.matrix_shown import SHOWN
 from beaver_ftc.studies.present.tables import markdown_table
 
 Document = dict[str, Any]

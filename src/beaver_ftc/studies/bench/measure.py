@@ -138,19 +138,20 @@ def _whole_flights(scenario: Scenario, rounds: int) -> Document:
     return {"frames": frames, **_against(bare, loop), **figures}
 
 
+@dataclass(frozen=True)
 class WholeFlight:
     """`fly`, with the log in memory or, given a file, on disk."""
 
-    def __init__(self, scenario: Scenario, log: Path | None = None) -> None:
-        self._scenario, self._log = scenario, log
+    scenario: Scenario
+    log: Path | None = None
 
     def prepare(self) -> None:
         """Every flight is new."""
 
     def fly(self, frames: int) -> None:
         """Fly the scenario, which must last that many frames."""
-        with ParquetLog(self._log) if self._log else nullcontext() as log:
-            fly(self._scenario, log)
+        with ParquetLog(self.log) if self.log else nullcontext() as log:
+            fly(self.scenario, log)
 
 
 @dataclass(frozen=True)

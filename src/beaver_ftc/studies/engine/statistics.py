@@ -56,11 +56,6 @@ def wilson_bound(successes: int, trials: int, confidence: float, upper: bool) ->
     return found.high if upper else found.low
 
 
-def binomial_upper(events: int, trials: int) -> float:
-    """Exact upper limit of a probability after `events` in `trials` [ClopperPearson1934]."""
-    return binomial(events, trials, 2.0 * CONFIDENCE - 1.0).high
-
-
 def duel(pairs: Iterable[tuple[float, float]]) -> tuple[int, int, float]:
     """In how many pairs the first number is the larger, in how many the smaller, and the probability of a
     result at least as uneven between equals, two-sided and exact [Conover1999]."""

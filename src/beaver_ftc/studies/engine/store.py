@@ -7,6 +7,7 @@ import hashlib
 import json
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import IO, Any, Protocol
@@ -105,40 +106,42 @@ class Codec(Protocol):
         """The rows of these runs; any exception, or None, for a file that holds anything else."""
 
 
+@dataclass(frozen=True)
 class Parts:
     """A folder of batches that have landed. kept: what a message about a full disk ends with."""
 
-    def __init__(self, folder: Path, codec: Codec, kept: str = KEPT) -> None:
-        self.folder, self._codec, self._kept = folder, codec, kept
+    folder: Path
+    codec: Codec
+    kept: str = KEPT
 
     def __bool__(self) -> bool:
         """Whether the folder has at least one batch."""
-        return self.folder.is_dir() and any(self.folder.glob(f"*{self._codec.suffix}"))
+        return self.folder.is_dir() and any(self.folder.glob(f"*{self.codec.suffix}"))
 
     def land(self, batch: int | str, rows: Any) -> None:
         """Keep a batch. Raises SimulationFailed if the disk will not have it."""
-        with clear_disk_errors(self.folder.parent, self._kept):
-            replace_whole(self._path(batch), lambda file: self._codec.write(rows, file))
+        with clear_disk_errors(self.folder.parent, self.kept):
+            replace_whole(self._path(batch), lambda file: self.codec.write(rows, file))
 
     def landed(self, batch: int | str, runs: Sequence[int]) -> Any:
         """The rows of a batch if it has landed whole; what cannot be read is set aside, to be flown again."""
         path, rows = self._path(batch), None
         if path.exists():
             with contextlib.suppress(Exception):
-                rows = self._codec.read(path, runs)
+                rows = self.codec.read(path, runs)
             if rows is None:
                 set_aside(path, UNREADABLE)
         return rows
 
     def remove(self) -> None:
         """Remove all parts."""
-        for part in self.folder.glob(f"*{self._codec.suffix}"):
+        for part in self.folder.glob(f"*{self.codec.suffix}"):
             part.unlink()
         with contextlib.suppress(OSError):
             self.folder.rmdir()
 
     def _path(self, batch: int | str) -> Path:
-        return self.folder / f"{batch:0>6}{self._codec.suffix}"
+        return self.folder / f"{batch:0>6}{self.codec.suffix}"
 
 
 class RowsAsJson:

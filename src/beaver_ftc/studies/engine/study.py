@@ -41,6 +41,7 @@ TASKS_A_SLOT = 4  # towards the end tasks get smaller, so that no worker is left
 LOST = "the process that flies it ends, each time it is tried"
 
 
+@dataclass
 class Flying:
     """Flies batches of which nothing has landed: workers fly tasks, rows are gathered, whole batches land.
 
@@ -52,11 +53,11 @@ class Flying:
     process.
     """
 
-    def __init__(
-        self, landed: Callable[..., Any], land: Callable[..., Any], make: Callable[[int], Workers], lost: Lost
-    ) -> None:
-        self._landed, self._land, self._make, self._lost = landed, land, make, lost
-        self._workers: Workers | None = None
+    landed: Callable[..., Any]
+    land: Callable[..., Any]
+    make: Callable[[int], Workers]
+    lost: Lost
+    _workers: Workers | None = None
 
     def close(self) -> None:
         """Terminate the workers."""
@@ -74,7 +75,7 @@ class Flying:
         the number and the rows of each batch, once they are there."""
         missing: dict[Number, Sequence[int]] = {}
         for number, runs in batches:
-            rows = self._landed(number, runs)
+            rows = self.landed(number, runs)
             if rows is None:
                 missing[number] = runs
             else:
@@ -86,7 +87,7 @@ class Flying:
         self._waiting, self._flying = deque[Batch](), 0
         self._flown: dict[Number, tuple[Batch, dict[int, Row]]] = {}
         self._losses = Counter[tuple[int, ...]]()
-        workers = self._workers = self._workers or self._make(self._left)
+        workers = self._workers = self._workers or self.make(self._left)
         while True:
             self._hand_out(workers, stopped())
             if not self._flying:
@@ -95,7 +96,7 @@ class Flying:
             self._hand_out(workers, stopped())  # first put the workers to work, then see to the disk
             for batch, by_run in whole:
                 rows = [by_run[run] for run in batch.runs]
-                self._land(batch.number, rows)
+                self.land(batch.number, rows)
                 there(batch.number, rows)
 
     def _hand_out(self, workers: Workers, stopped: bool) -> None:
@@ -125,7 +126,7 @@ class Flying:
         key = tuple(task.runs)
         self._losses[key] += 1
         if len(key) == 1 and self._losses[key] >= MOST_LOSSES:
-            return [self._lost(task.cases[0], LOST)]
+            return [self.lost(task.cases[0], LOST)]
         size = 1 if self._losses[key] > 1 else len(key)
         self._waiting.extendleft(reversed(_tasks(task, size)))
         return []

@@ -13,7 +13,7 @@ from beaver_ftc.commands import (
     WorkersOption,
 )
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.studies.matrix import fault_matrix
+from beaver_ftc.studies.matrix import fault_matrix, matrix_shown
 from beaver_ftc.studies.matrix import pitch_lost as lost
 
 
@@ -53,7 +53,7 @@ class Matrix(StudyCommand):
     turbulence: TurbulenceName = TurbulenceName.none
     aircraft: str | None = None
 
-    FILES = (*fault_matrix.FILES, *lost.FILES)
+    FILES = (*matrix_shown.FILES, *lost.FILES)
 
     @property
     def label(self) -> str:
@@ -89,5 +89,5 @@ class Matrix(StudyCommand):
 
     def as_text(self, document: Document, colour: bool) -> str:
         """Table, remarks and totals, and where the files are."""
-        shown = lost.as_text if self.pitch_lost else fault_matrix.as_text
+        shown = lost.as_text if self.pitch_lost else matrix_shown.as_text
         return f"{shown(document)}\n\nresults: {document['folder']}"

@@ -8,18 +8,15 @@ from collections import Counter
 from functools import lru_cache
 from math import degrees
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
-
-import numpy as np
+from typing import NamedTuple
 
 from beaver_ftc.aircraft import AXES, DEFAULT, Aircraft
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.loop.outcome import Landing
 from beaver_ftc.plant.adapter import Plant
 from beaver_ftc.plant.trim import trim
-from beaver_ftc.results.metrics import as_json, measure
+from beaver_ftc.results.metrics import measure
 from beaver_ftc.results.model import Document, Metrics
-from beaver_ftc.results.style import VERMILION
 from beaver_ftc.scenario.airframe import air_of, find_aircraft, initial_of
 from beaver_ftc.scenario.faults import TYPES
 from beaver_ftc.scenario.schema import Scenario
@@ -28,30 +25,16 @@ from beaver_ftc.studies.detectability.certain import axis_of
 from beaver_ftc.studies.detectability.places import usual_airspeeds
 from beaver_ftc.studies.engine.study import Progress, Study, run_study
 from beaver_ftc.studies.matrix.clairvoyant import columns_of, seen_when_told
-from beaver_ftc.studies.present.figures import heat_map, label_edges, panels
-from beaver_ftc.studies.present.page import Makers
+from beaver_ftc.studies.matrix.matrix_shown import FILES, NAME, VERDICTS
 from beaver_ftc.studies.reproduce.choices import SETTING
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-NAME, DECLARED = "fault-matrix", "fault-matrix-declared"
 TOLERANCE, SENSORS = 0.05, "tactical-grade"
 AIRSPEEDS_MPS = (38.0, 45.0, 52.0)
 AT_S = 12.0
 DURATION_S = 30.0
 NAMED = ("surface", "named")
+DECLARED = f"{NAME}-declared"
 LIKELY = 0.5  # a test that finds a fault more often than not sees it
-SHOWN = {
-    "WRONG": "WRONG", "unseen": "not detected", "open": "ambiguous", "surface": "surface", "named": "named"
-}  # fmt: skip
-"""Verdicts of the document, and the words for people."""
-
-LOOKS = {  # symbol and colour; lightness orders them in grey
-    "WRONG": ("\u2718", VERMILION), "unseen": ("\u2013", "#c9c9c9"), "open": ("?", "#f3d27f"),
-    "surface": ("\u25d1", "#c3e1f4"), "named": ("\u2714", "#d3f0e5"),
-}  # fmt: skip
-VERDICTS = tuple(LOOKS)  # the worst first
 REFERENCE, UNCERTAINTY = SETTING["reference"], SETTING["uncertainty"]
 
 # Name in the table, and the fault; off_deg: a jam this far off the trimmed command.
@@ -272,7 +255,7 @@ def _cell(fault: str, surface: str, rows: list[Document]) -> Document:
 
 
 def _reason(lost: list[Document]) -> str:
-    """Why not even the oracle kept the aircraft."""
+    """Why the aircraft is lost, as the flights of the oracle show it."""
     beyond_s = max(row["oracle_beyond_s"] for row in lost)
     if beyond_s > 0.0:
         return f"for {beyond_s:.1f} s no deflection could hold the {lost[0]['axis']} rate"
@@ -283,7 +266,7 @@ def _reason(lost: list[Document]) -> str:
 
 
 def _remark(here: list[Document]) -> str:
-    """Why no law could keep the aircraft, where it was lost; why nothing was seen, where nothing was."""
+    """Of how many flights the aircraft is lost, and why; or that the fault has no effect in any of them."""
     lost = [row for row in here if row["departure_s"] is not None]
     if lost:
         also = sum(row["oracle_departure_s"] is not None for row in lost)
@@ -308,93 +291,3 @@ def run_matrix(
     all_cases = cases(airspeeds_mps or airspeeds_of(aircraft), declared, aircraft, turbulence)
     matrix = Study(name_of(declared, turbulence), all_cases, fly_case, document_of, FILES)
     return run_study(matrix, out, workers, progress)
-
-
-LEGEND = (
-    "Cell: verdict, delay of the alarm, ratio of the tracking RMS of the surface's own axis to that of the\n"
-    "informed law; the worst of all airspeeds. named: surface and type are right. surface: the surface is\n"
-    "right, its type not determined. ambiguous: several surfaces remain. not detected: no alarm, the effect\n"
-    "stays within the declared uncertainty. WRONG: a wrong name or a false alarm. *: aircraft lost (remarks)."
-)
-TOLD_LEGEND = (
-    "\no: not even the informed test, which knows surface, course and time of the fault, detects it at any\n"
-    "airspeed at the same rate of false alarms."
-)
-
-
-def as_text(document: Document) -> str:
-    """Table, legend, remarks and totals."""
-    width = max(len(fault) for fault, _ in FAULTS)
-    surfaces, cells = _table(document)
-    lines = [" " * width + "".join(f"  {surface:26}" for surface in surfaces)]
-    for fault, _ in FAULTS:
-        lines.append(f"{fault:{width}}" + "".join(f"  {_cell_text(cells[fault, s]):26}" for s in surfaces))
-    lost = [cell for cell in document["cells"] if cell["lost"]]
-    remarks = ["* {surface} {fault}: {remark}".format(**cell) for cell in lost]
-    totals = (
-        f"{len(document['flights'])} faults flown: {document['wrong']} named wrongly, "
-        f"{document['false_alarms']} false alarms, "
-        f"{len(document['lost_though_the_oracle_was_not'])} aircraft lost although the law oracle kept it"
-    )
-    told = document.get("told")
-    legend, share = (LEGEND + TOLD_LEGEND, [_told(told)]) if told else (LEGEND, [])
-    table = [line.rstrip() for line in lines]
-    return "\n".join([*table, "", legend, "", *remarks, *([""] if remarks else []), totals, *share])
-
-
-def _table(document: Document) -> tuple[list[str], dict[tuple[str, str], Document]]:
-    """The surfaces in the aircraft's order, and the cells by fault and surface."""
-    cells = {(cell["fault"], cell["surface"]): cell for cell in document["cells"]}
-    return list(dict.fromkeys(surface for _, surface in cells)), cells
-
-
-def _cell_text(cell: Document) -> str:
-    delay = "     -" if cell["delay_s"] is None else f"{cell['delay_s']:4.2f} s"
-    ratio = "" if cell["ratio"] is None else f"{cell['ratio']:.1f}x"
-    unseen = "o" if cell.get("told") == 0 else ""
-    return f"{SHOWN[cell['verdict']]:12} {delay} {ratio:>5}{'*' if cell['lost'] else ''}{unseen}"
-
-
-def _told(told: Document) -> str:
-    """How many of the faults that can be seen are named."""
-    if not told["seen"]:
-        return "the informed test, which knows the fault, detects none of them"
-    surfaces = ", ".join(f"{s} {of['named']} of {of['seen']}" for s, of in told["by_surface"].items())
-    return (
-        f"the informed test, which knows the fault, detects {told['seen']} of {told['flights']}. Of these "
-        f"the diagnosis detects {told['detected']},\nnames the right surface in {told['named']} "
-        f"({100 * told['share']:.0f} %: {surfaces}), and keeps the right type in {told['type_kept']}"
-    )
-
-
-def heat_map_of(document: Document) -> "Figure":
-    """Colour and symbol give the verdict, the line below delay and tracking."""
-    from matplotlib.colors import ListedColormap
-
-    names, (surfaces, cells) = [fault for fault, _ in FAULTS], _table(document)
-    grid = np.array([[VERDICTS.index(cells[fault, s]["verdict"]) for s in surfaces] for fault in names])
-    labels = {}
-    for i, j in np.ndindex(grid.shape):
-        cell = cells[names[i], surfaces[j]]
-        ink = "white" if cell["verdict"] == "WRONG" else "black"
-        lost = ", LOST" if cell["lost"] else ""
-        label = f"{LOOKS[cell['verdict']][0]} {SHOWN[cell['verdict']]}{lost}"
-        labels[i, j] = f"{label}\n{_small(cell)}", ink
-    figure, panel = panels(1, 1, 11.0, 0.5 * len(names) + 1.8)
-    colours = ListedColormap([LOOKS[verdict][1] for verdict in VERDICTS])
-    heat_map(panel[0, 0], grid, labels, surfaces, names, cmap=colours, vmin=-0.5, vmax=len(VERDICTS) - 0.5)
-    label_edges(panel, titles=["Each fault on each surface: alarm delay, tracking RMS / the informed law's"])
-    return figure
-
-
-FILES: Makers = {
-    f"{NAME}.json": as_json,
-    f"{NAME}.txt": lambda document: as_text(document) + "\n",
-    f"{NAME}.png": heat_map_of,
-}
-
-
-def _small(cell: Document) -> str:
-    delay = "" if cell["delay_s"] is None else f"{cell['delay_s']:.2f} s"
-    ratio = "" if cell["ratio"] is None else f"tracking {cell['ratio']:.1f}"
-    return ", ".join(filter(None, (delay, ratio)))

@@ -85,15 +85,8 @@ def _draw_sources(axes: "Axes", series: dict, axis: str, chosen: list[str], inst
     axes.plot(t, uncertainty, color=BLACK, linewidth=2.4, alpha=0.35, label="all together")
     for name in chosen:
         colour, dashes = SOURCE_LOOKS[name]
-        style: Any = (0, dashes) if dashes else "-"
-        axes.plot(
-            t,
-            series[column(axis, name)],
-            label=without_underscores(name),
-            color=colour,
-            linestyle=style,
-            linewidth=1.3,
-        )
+        look: dict[str, Any] = {"color": colour, "linestyle": (0, dashes), "linewidth": 1.3}
+        axes.plot(t, series[column(axis, name)], label=without_underscores(name), **look)
     for i, mark in enumerate(instants):
         axes.axvline(mark.time_s, color=mark.colour, linewidth=0.9, linestyle=(0, mark.dash or (1, 0)))
         axes.annotate(

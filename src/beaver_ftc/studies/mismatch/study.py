@@ -200,7 +200,8 @@ def map_name(scenario: Scenario) -> str:
 
 def _cell(scenario: Scenario, condition: tuple[float, float]) -> list[Document]:
     """A row per axis of a flight that starts there, without faults; no figures where there is no trim."""
-    place = dict(zip(("airspeed_mps", "altitude_m"), condition, strict=True))
+    airspeed_mps, altitude_m = condition
+    place = {"airspeed_mps": airspeed_mps, "altitude_m": altitude_m}
     there = {"initial": scenario.initial.model_copy(update=place), "faults": ()}
     try:
         kept, flight = split_flight(scenario.model_copy(update=there))

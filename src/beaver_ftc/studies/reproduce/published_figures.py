@@ -22,6 +22,7 @@ from beaver_ftc.results.views import (
     detection_panel,
     isolation_panel,
 )
+from beaver_ftc.studies.engine.statistics import or_never
 from beaver_ftc.studies.present.page import Files
 from beaver_ftc.studies.reproduce.cases import Flown
 from beaver_ftc.studies.reproduce.choices import FAULT_AT_S
@@ -106,11 +107,9 @@ def shares(claim: Document) -> tuple[float, float, float]:
 
 
 def _share(claim: Document, number: float | None) -> float:
-    if number is None:  # infinite: what never happens, or an error without end
-        return 0.0 if claim["at_least"] else inf
-    if not claim["at_least"]:
-        return (number / claim["limit"] if claim["limit"] else inf) if number else 0.0
-    return claim["limit"] / number if number else inf
+    known, limit = or_never(number), claim["limit"]
+    over, under = (limit, known) if claim["at_least"] else (known, limit)
+    return over / under if under else inf if over > 0.0 else 0.0
 
 
 def margins_figure(document: Document) -> "Figure":

@@ -175,10 +175,9 @@ def assignment_of(sweep: Sweep, options: Options, index: int) -> Assignment:
         raise BadInput(f"{sweep.name}: there is no flight {index}, allowed: 0 to {sweep.flights - 1}")
     if options.search is None:
         return Plan(sweep).assignments([index])[0]
-    for generation in generations(sweep, options.search, Store(options.out / sweep.name, sweep)):
-        for flight in generation.cases:
-            if flight.run == index:
-                return flight
+    for _, runs, cases in generations(sweep, options.search, Store(options.out / sweep.name, sweep)):
+        if index in runs:
+            return cases[index - runs[0]]
     raise BadInput(f"flight {index} of {sweep.name} is not known yet: the search has not come so far")
 
 

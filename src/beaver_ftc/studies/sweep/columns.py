@@ -51,28 +51,22 @@ def _of_each_window(holds: Callable[[Window], bool]) -> Getter:
 
 
 def _first_entry(mode: str) -> Getter:
-    def get(found: Metrics) -> Any:
-        return next((change.time_s for change in found.supervisor if change.mode == mode), None)
-
-    return get
+    return lambda found: next((change.time_s for change in found.supervisor if change.mode == mode), None)
 
 
 def _end_of_pair(name: str, end: int) -> Getter:
-    def get(found: Metrics) -> Any:
-        pair = getattr(found.isolation, name)
-        return pair[end] if pair else None
-
-    return get
+    return lambda found: (getattr(found.isolation, name) or (None, None))[end]
 
 
 # Columns that are not at the path of their name in the metrics: type, and where they come from.
 _ELSEWHERE: dict[str, tuple[str, Getter]] = {
     "flown_s": ("float", lambda found: found.frames / found.flight.rate_hz),
     WORST_RATIO: ("float", lambda found: None),  # which `row_of` has of the landing
-    "isolation.estimate_interval.low": ("float", _end_of_pair("estimate_interval", 0)),
-    "isolation.estimate_interval.high": ("float", _end_of_pair("estimate_interval", 1)),
-    "isolation.probing_s.from": ("float", _end_of_pair("probing_s", 0)),
-    "isolation.probing_s.to": ("float", _end_of_pair("probing_s", 1)),
+    **{
+        f"isolation.{pair}.{end}": ("float", _end_of_pair(pair, place))
+        for pair, ends in (("estimate_interval", ("low", "high")), ("probing_s", ("from", "to")))
+        for place, end in enumerate(ends)
+    },
     "isolation.candidates": ("text", lambda found: " ".join(found.isolation.candidates)),
     "isolation.faults": ("text", _faults),
     "isolation.withdrawn": (
@@ -86,9 +80,10 @@ _ELSEWHERE: dict[str, tuple[str, Getter]] = {
         ),
     ),
     "supervisor.mode": ("text", lambda found: found.supervisor[-1].mode),
-    "supervisor.adaptive_at_s": ("float", _first_entry("adaptive")),
-    "supervisor.reallocated_at_s": ("float", _first_entry("reallocated")),
-    "supervisor.unanticipated_at_s": ("float", _first_entry("unanticipated")),
+    **{
+        f"supervisor.{mode}_at_s": ("float", _first_entry(mode))
+        for mode in ("adaptive", "reallocated", "unanticipated")
+    },
     "envelope_exits.count": ("int", lambda found: found.envelope.exits),
     "envelope_exits.total_s": ("float", lambda found: found.envelope.outside_s),
     "expectations.missed": (

@@ -235,7 +235,7 @@ def _healthy_document(rows: Sequence[Row]) -> Document:
     hours = sum(row["watched_s"] for row in rows) / 3600.0
     alarms = sum(row["alarm"] for row in rows)
     closest = np.max([row["closest"] for row in rows], axis=0).tolist() if rows else []
-    upper = poisson_bound(alarms, hours, CONFIDENCE, upper=True) if hours else None
+    upper = finite(poisson_bound(alarms, hours, CONFIDENCE, upper=True))
     return {
         "flights": len(rows),
         "hours": hours,

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.studies.sweep.outcomes import rank
 from beaver_ftc.studies.sweep.pictures import in_words
+from beaver_ftc.studies.sweep.ranking import rank
 
 
 @pytest.fixture

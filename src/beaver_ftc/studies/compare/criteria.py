@@ -32,6 +32,8 @@ from functools import cache
 from math import exp, inf, isfinite, isnan, log, sqrt
 from statistics import fmean
 
+import numpy as np
+
 from beaver_ftc.documents.errors import BeaverFtcError
 from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.plugins import DETECTORS, LAWS
@@ -165,18 +167,9 @@ class LawCost:
 
     def shortfall(self, values: Values) -> float:
         """By which share the worst margin is too small; zero if all are kept. One that is NaN is none."""
-        asked = self._cases[0].scenario.control
-        shares = [
-            found / least
-            for margin in self.margins(values)
-            for found, least in (
-                (margin.up_db, asked.gain_margin_db),
-                (margin.down_db, asked.gain_margin_db),
-                (margin.phase_deg, asked.phase_margin_deg),
-            )
-        ]
-        worst = max(1.0 if isnan(share) else 1.0 - share for share in shares)
-        return max(0.0, worst)
+        asked, (gain_db, phase_deg) = self._cases[0].scenario.control, least_margins(self.margins(values))
+        shares = gain_db / asked.gain_margin_db, phase_deg / asked.phase_margin_deg
+        return max(0.0, *(1.0 if isnan(share) else 1.0 - share for share in shares))
 
     def _tracking(self, values: Values) -> float:
         results, logs = list[Result](), list[float]()
@@ -213,5 +206,6 @@ def effort(results: Sequence[Result]) -> float:
 
 
 def least_margins(found: Sequence[Margin]) -> tuple[float, float]:
-    """The smallest gain margin, dB, and phase margin, deg."""
-    return min(min(m.up_db, m.down_db) for m in found), min(m.phase_deg for m in found)
+    """The smallest gain margin, dB, and phase margin, deg; NaN if any is."""
+    gains_db = [gain_db for margin in found for gain_db in (margin.up_db, margin.down_db)]
+    return float(np.min(gains_db)), float(np.min([margin.phase_deg for margin in found]))

@@ -1,7 +1,7 @@
-"""One healthy-handed flight, and what any detector would have made of it.
+"""A flight under the nominal law, and what any detector would have made of it.
 
-The nominal law does not listen to a detector, so one flight under it serves them all: it is recorded once
-and played back to each. What is kept of a detector's statistic is exact and short: its largest value before
+The nominal law reads no verdict, so one flight under it serves all detectors: it is recorded once and played
+back to each. What is kept of a detector's statistic is exact and short: its largest value before
 the fault, and each value after it that was larger than all before.
 """
 

@@ -57,8 +57,8 @@ def kill_fork_server() -> None:
 
 @contextlib.contextmanager
 def single_threaded() -> Iterator[None]:
-    """Processes started meanwhile have one thread each, and never hear the terminal's Ctrl-C, not even while
-    they import: it is for the process that gives the orders.
+    """Processes started meanwhile have one thread each, and do not receive Ctrl-C from the terminal, not even
+    while they import: this process does, and ends them.
     """
     blocks = hasattr(signal, "pthread_sigmask")
     with environment(ONE_THREAD_EACH):

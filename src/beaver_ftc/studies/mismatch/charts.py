@@ -209,11 +209,10 @@ def _draw_bode(magnitude: "Axes", phase: "Axes", analysis: LinearAnalysis, surfa
 
 
 def map_figure(entries: Sequence[Document], name: str) -> "Figure":
-    """The worst share of the bound against speed and altitude, per axis; grey where there is no trim.
+    """The worst share of the bound against speed and altitude, per axis; hatched where there is no trim.
 
     entries: in the order of altitudes, at each of airspeeds, at each of axes.
     """
-    from matplotlib import colormaps
     from matplotlib.colors import LogNorm
 
     speeds, altitudes = (list(dict.fromkeys(e[of] for e in entries)) for of in ("airspeed_mps", "altitude_m"))
@@ -224,9 +223,8 @@ def map_figure(entries: Sequence[Document], name: str) -> "Figure":
     title = f"Largest mismatch over the bound eta_bar, no fault\n{name}"
     figure, panel = panels(1, 3, 14.0, 4.6, title, sharey=True)
     names = [f"{V:g}" for V in speeds], [f"{h:g}" for h in altitudes]
-    shades = colormaps["cividis"].with_extremes(bad="0.8")
     for axes, grid in zip(panel[0], grids, strict=True):
-        image = heat_map(axes, grid, _ratios(grid, norm), *names, origin="lower", cmap=shades, norm=norm)
+        image = heat_map(axes, grid, _ratios(grid, norm), *names, origin="lower", cmap="cividis", norm=norm)
     label_edges(panel, "airspeed (m/s)", ["altitude (m)"], AXIS_NAMES)
     figure.colorbar(image, ax=panel, label="mismatch / eta_bar (1: all of the bound)", pad=0.01)
     return figure

@@ -56,19 +56,16 @@ def heat_map(
     columns: Sequence[str],
     rows: Sequence[str],
     fontsize: float = 8,
-    hatched: bool = True,
     **image: Any,
 ) -> Any:
-    """An image of values (rows, columns) with a (text, colour) on some of its cells; returns the image.
-
-    hatched: a cell that has a text and no value is hatched.
-    """
+    """An image of values (rows, columns) with a (text, colour) on some of its cells; returns the image. Cells
+    with a text and no value are hatched."""
     from matplotlib.patches import Rectangle
 
-    for row, column in [place for place in labels if hatched and np.isnan(np.asarray(values)[place])]:
-        look: dict[str, Any] = {"facecolor": GRID, "edgecolor": "white", "hatch": "////", "linewidth": 0.0}
-        axes.add_patch(Rectangle((column - 0.5, row - 0.5), 1.0, 1.0, **look))
+    look: dict[str, Any] = {"facecolor": GRID, "edgecolor": "white", "hatch": "////", "linewidth": 0.0}
     for (row, column), (text, ink) in labels.items():
+        if np.isnan(values[row][column]):
+            axes.add_patch(Rectangle((column - 0.5, row - 0.5), 1.0, 1.0, **look))
         axes.text(column, row, text, ha="center", va="center", fontsize=fontsize, color=ink, zorder=3)
     axes.set_xticks(range(len(columns)), columns, fontsize=fontsize)
     axes.set_yticks(range(len(rows)), rows, fontsize=fontsize)

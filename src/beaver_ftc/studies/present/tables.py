@@ -42,9 +42,9 @@ def _digits(value: float, digits: int) -> str:
     return f"{value:.0f}" if abs(value) >= 10 ** (digits - 1) else f"{value:.{digits}g}"
 
 
-def percent(share: float | None, unit: str = " %", none: str = "none") -> str:
+def percent(share: float | None, unit: str = " %") -> str:
     """A share in whole per cent."""
-    return none if share is None else f"{100.0 * share:.0f}{unit}"
+    return "none" if share is None else f"{100.0 * share:.0f}{unit}"
 
 
 number_or_never = partial(number, none="never")

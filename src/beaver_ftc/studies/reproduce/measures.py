@@ -157,7 +157,7 @@ def left(flown: Flown) -> float:
 def after_mismatch(*flights: Flown) -> float:
     """How long after both an estimator is excluded, at most; one whose mismatch stays below 1 is not counted.
 
-    The mismatch is M_sj of detectability.py, along the flight itself.
+    The mismatch is M_sj of detectability/certain.py, along the flight itself.
     """
     lags = [
         _frames(flown, _after(certain_s, max(certain_s, flown.excluded_at_s(other))))

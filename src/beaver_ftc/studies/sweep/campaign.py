@@ -136,8 +136,9 @@ def _workers(sweep: Sweep, options: Options, flights: int) -> Workers:
 
 def conclude(sweep: Sweep, options: Options, store: Store) -> Document:
     """Write what the flights of a complete `results.parquet` show; `summary.json`, last, says all is done."""
-    from beaver_ftc.studies.sweep.outcomes import Flights, replay_command, worst_flights
+    from beaver_ftc.studies.sweep.outcomes import Flights
     from beaver_ftc.studies.sweep.summary import evaluate, summarise
+    from beaver_ftc.studies.sweep.worst import replay_command, worst_flights
 
     flights = Flights(store.results, sweep)
     document = summarise(flights, sweep)

@@ -1,7 +1,5 @@
 """The flights of a sweep as columns, and the groups of them that statistics are about."""
 
-import shlex
-from collections.abc import Callable, Iterator
 from functools import cache, cached_property
 from pathlib import Path
 from typing import IO
@@ -9,10 +7,9 @@ from typing import IO
 import numpy as np
 
 from beaver_ftc.aircraft import AXES
-from beaver_ftc.documents.files import Document
 from beaver_ftc.results.metrics import strikes_within
 from beaver_ftc.scenario.sweeps import Sweep
-from beaver_ftc.studies.sweep.one_flight import DEPARTED, FLOWN, flight_name, kind_of
+from beaver_ftc.studies.sweep.one_flight import DEPARTED, FLOWN, kind_of
 
 NO_FAULT = "no fault"
 
@@ -128,131 +125,3 @@ def _label(kind: str, actuator: str, several_types: bool) -> str:
     if not actuator:
         return kind
     return f"{actuator} {kind.replace('_', ' ')}" if several_types else actuator
-
-
-BINS = 8
-MOST_FLIGHTS = 4000  # of more, evenly spaced ones are taken: the ranking does not need them all
-PERMUTATIONS = 199
-
-Ranking = list[Document]
-
-
-def rank(keys: dict[str, np.ndarray], outcome: np.ndarray) -> Ranking:
-    """The keys by how much of the outcome they explain, most first.
-
-    keys: name -> values (n,), numbers or texts; outcome (n,), infinite allowed. Each entry: `key`,
-    `explained` (share of rank variance), `rank_correlation` (Spearman's, null for names), `p_value`.
-    """
-    chosen = np.arange(0, outcome.size, max(1, -(-outcome.size // MOST_FLIGHTS)))
-    ranks = ranks_of(outcome[chosen])
-    if ranks.size < 2 * BINS or ranks.min() == ranks.max():
-        return []
-    found = [_entry(key, values[chosen], ranks) for key, values in keys.items()]
-    return sorted(found, key=lambda entry: (-entry["explained"], entry["key"]))
-
-
-def ranks_of(values: np.ndarray) -> np.ndarray:
-    """Ranks from 0, equal values sharing the mean of theirs."""
-    from scipy.stats import rankdata
-
-    return rankdata(values) - 1.0
-
-
-def _entry(key: str, values: np.ndarray, ranks: np.ndarray) -> Document:
-    groups = _groups(values)
-    share = _explained(groups, ranks)
-    generator = np.random.default_rng(0)
-    by_chance = sum(_explained(groups, generator.permutation(ranks)) >= share for _ in range(PERMUTATIONS))
-    return {
-        "key": key,
-        "explained": round(max(share, 0.0), 6),
-        "rank_correlation": _spearman(values, ranks),
-        "p_value": (1 + by_chance) / (1 + PERMUTATIONS),
-    }
-
-
-def _groups(values: np.ndarray) -> np.ndarray:
-    """Group number of each value: its level, or its bin where there are many levels."""
-    levels, group = np.unique(values, return_inverse=True)
-    if values.dtype == object or levels.size <= BINS:
-        return group
-    return np.minimum(ranks_of(values) * BINS // values.size, BINS - 1).astype(int)
-
-
-def _explained(groups: np.ndarray, ranks: np.ndarray) -> float:
-    """1 - (SSW / (n - k)) / (SST / (n - 1))."""
-    counts = np.bincount(groups)
-    used = counts > 0
-    means = np.bincount(groups, ranks)[used] / counts[used]
-    total = ((ranks - ranks.mean()) ** 2).sum()
-    between = (counts[used] * (means - ranks.mean()) ** 2).sum()
-    n, k = ranks.size, int(used.sum())
-    if k < 2 or n <= k:
-        return 0.0
-    return float(1.0 - (total - between) / (n - k) / (total / (n - 1)))
-
-
-def _spearman(values: np.ndarray, ranks: np.ndarray) -> float | None:
-    if values.dtype == object:
-        return None
-    own = ranks_of(values)
-    if own.min() == own.max():
-        return None
-    return round(float(np.corrcoef(own, ranks)[0, 1]), 6)
-
-
-OF_EACH_KIND = 3
-
-
-def worst_flights(flights: Flights, sweep: Sweep, command: str) -> list[Document]:
-    """A few flights of each bad kind, each once: `run`, `name`, `why` (all that is bad), `replay`."""
-    whys: dict[int, list[str]] = {}
-    for position, why in _candidates(flights):
-        whys.setdefault(position, []).append(why)
-    return [
-        {
-            "run": (run := flights["run"].item(position)),
-            "name": flight_name(sweep, run),
-            "why": why,
-            "values": {key: flights[key].item(position) for key in flights.vary},
-            "replay": f"{command} --replay {run}",
-        }
-        for position, why in whys.items()
-    ]
-
-
-def replay_command(source: str, out: Path, search: str | None = None) -> str:
-    """The command line that replays a flight, but for its index."""
-    words = ["beaver-ftc", "sweep", source]
-    words += ["--search", search] if search else []
-    words += ["--out", str(out)] if str(out) != "runs" else []
-    return shlex.join(words)
-
-
-def _candidates(flights: Flights) -> Iterator[tuple[int, str]]:
-    """(position, what is bad about it), the worst kind first."""
-    faulted, named, reason = flights.faulted, flights["isolation.fault"], flights["reason"]
-    wrong = faulted & (named != "") & ~flights["isolation.correct"]
-    yield from _first(~flights.measured, lambda i: f"{flights['status'][i]}: {reason[i]}")
-    yield from _first(flights["false_alarm"] & flights.measured, lambda i: "false alarm")
-    yield from _first(flights.departed, lambda i: f"departed: {reason[i]}")
-    yield from _first(wrong, lambda i: f"named {named[i]}")
-    yield from _first(faulted & ~flights.detected, lambda i: "fault not detected")
-    delay = np.where(flights.detected, flights.detection_delay_s, -np.inf)
-    yield from _largest(delay, lambda i: f"detected after {delay[i]:.3g} s")
-    rms = flights.worst_rms_deg_s
-    rms = np.where(faulted & np.isfinite(rms), rms, -np.inf)
-    yield from _largest(rms, lambda i: f"tracking error {rms[i]:.3g} deg/s RMS")
-    ratio = np.nan_to_num(flights["worst_residual_ratio"], nan=-np.inf)
-    yield from _largest(ratio, lambda i: f"residual {ratio[i]:.4g} of its threshold without a fault")
-
-
-def _first(which: np.ndarray, why: Callable[[int], str]) -> Iterator[tuple[int, str]]:
-    return ((i, why(i)) for i in np.flatnonzero(which)[:OF_EACH_KIND].tolist())
-
-
-def _largest(values: np.ndarray, why: Callable[[int], str]) -> Iterator[tuple[int, str]]:
-    largest = np.argsort(-values, kind="stable")[:OF_EACH_KIND]
-    for i in largest[np.isfinite(values[largest])].tolist():
-        alike = int(np.isclose(values, values[i], rtol=1e-9, atol=0.0).sum())
-        yield i, why(i) + (f", as in {alike - 1} more" if alike > 1 else "")

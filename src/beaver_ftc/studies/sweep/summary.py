@@ -18,7 +18,8 @@ from beaver_ftc.scenario.faults import UNANTICIPATED
 from beaver_ftc.scenario.sweeps import AxisLevels, Level, QuantileLevel, Sweep, SweepExpect
 from beaver_ftc.studies.engine import statistics
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, Estimate, quantile, wilson
-from beaver_ftc.studies.sweep.outcomes import NO_FAULT, Flights, Ranking, rank
+from beaver_ftc.studies.sweep.outcomes import NO_FAULT, Flights
+from beaver_ftc.studies.sweep.ranking import Ranking, rank
 
 QUANTILES = {"median": 0.5, "p90": 0.9, "p95": 0.95, "p99": 0.99, "max": 1.0}
 FALSE_ALARM, NO_ALARM, NOT_ISOLATED = "false alarm", "no alarm", "not isolated"

@@ -1,0 +1,68 @@
+"""The flights of a sweep that are worth a look, and the command that flies one again."""
+
+import shlex
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+
+from beaver_ftc.documents.files import Document
+from beaver_ftc.scenario.sweeps import Sweep
+from beaver_ftc.studies.sweep.one_flight import flight_name
+from beaver_ftc.studies.sweep.outcomes import Flights
+
+OF_EACH_KIND = 3
+
+
+def worst_flights(flights: Flights, sweep: Sweep, command: str) -> list[Document]:
+    """A few flights of each bad kind, each once: `run`, `name`, `why` (all that is bad), `replay`."""
+    whys: dict[int, list[str]] = {}
+    for position, why in _candidates(flights):
+        whys.setdefault(position, []).append(why)
+    return [
+        {
+            "run": (run := flights["run"].item(position)),
+            "name": flight_name(sweep, run),
+            "why": why,
+            "values": {key: flights[key].item(position) for key in flights.vary},
+            "replay": f"{command} --replay {run}",
+        }
+        for position, why in whys.items()
+    ]
+
+
+def replay_command(source: str, out: Path, search: str | None = None) -> str:
+    """The command line that replays a flight, but for its index."""
+    words = ["beaver-ftc", "sweep", source]
+    words += ["--search", search] if search else []
+    words += ["--out", str(out)] if str(out) != "runs" else []
+    return shlex.join(words)
+
+
+def _candidates(flights: Flights) -> Iterator[tuple[int, str]]:
+    """(position, what is bad about it), the worst kind first."""
+    faulted, named, reason = flights.faulted, flights["isolation.fault"], flights["reason"]
+    wrong = faulted & (named != "") & ~flights["isolation.correct"]
+    yield from _first(~flights.measured, lambda i: f"{flights['status'][i]}: {reason[i]}")
+    yield from _first(flights["false_alarm"] & flights.measured, lambda i: "false alarm")
+    yield from _first(flights.departed, lambda i: f"departed: {reason[i]}")
+    yield from _first(wrong, lambda i: f"named {named[i]}")
+    yield from _first(faulted & ~flights.detected, lambda i: "fault not detected")
+    delay = np.where(flights.detected, flights.detection_delay_s, -np.inf)
+    yield from _largest(delay, lambda i: f"detected after {delay[i]:.3g} s")
+    rms = flights.worst_rms_deg_s
+    rms = np.where(faulted & np.isfinite(rms), rms, -np.inf)
+    yield from _largest(rms, lambda i: f"tracking error {rms[i]:.3g} deg/s RMS")
+    ratio = np.nan_to_num(flights["worst_residual_ratio"], nan=-np.inf)
+    yield from _largest(ratio, lambda i: f"residual {ratio[i]:.4g} of its threshold without a fault")
+
+
+def _first(which: np.ndarray, why: Callable[[int], str]) -> Iterator[tuple[int, str]]:
+    return ((i, why(i)) for i in np.flatnonzero(which)[:OF_EACH_KIND].tolist())
+
+
+def _largest(values: np.ndarray, why: Callable[[int], str]) -> Iterator[tuple[int, str]]:
+    largest = np.argsort(-values, kind="stable")[:OF_EACH_KIND]
+    for i in largest[np.isfinite(values[largest])].tolist():
+        alike = int(np.isclose(values, values[i], rtol=1e-9, atol=0.0).sum())
+        yield i, why(i) + (f", as in {alike - 1} more" if alike > 1 else "")

@@ -44,13 +44,14 @@ def published():
 @pytest.mark.parametrize("at_s", [measure.BEFORE_ALARM_S, measure.AFTER_ALARM_S])
 def test_the_bare_aircraft_starts_where_the_loop_does_and_stays_in_the_envelope(published, at_s):
     loop = ClosedLoop(published, at_s)
-    bare = Bare(take_over(published, at_s), 1)
+    moment = take_over(published, at_s)
+    bare = Bare(moment, 1)
     bare.prepare()
     loop.prepare()
-    assert state_of(bare.plant) == state_of(loop.loop.plant)
+    assert state_of(moment.plant) == state_of(loop.loop.plant)
     bare.fly(measure.FRAMES)
-    assert bare.plant.read("aero/envelope-valid") == 1.0
-    assert bare.plant.read("simulation/sim-time-sec") == pytest.approx(measure.FRAMES / published.rate_hz)
+    assert moment.plant.read("aero/envelope-valid") == 1.0
+    assert moment.plant.read("simulation/sim-time-sec") == pytest.approx(measure.FRAMES / published.rate_hz)
 
 
 def test_every_round_flies_what_the_flight_itself_flew():

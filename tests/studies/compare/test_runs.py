@@ -33,3 +33,8 @@ def test_folders_that_are_no_runs_are_named_a_line_each(files, says, tmp_path):
         runs.read_runs([tmp_path / "a", tmp_path / "b"])
     allowed = "allowed: a result folder of beaver-ftc run"
     assert str(said.value).splitlines() == [f"{tmp_path / name}: {says}, {allowed}" for name in ("a", "b")]
+
+
+def test_a_fault_says_which_damage_it_is_and_when_it_ends():
+    damage = {"type": "damage", "case": "tip-off", "at_s": 1.0, "end_s": 3.0}
+    assert runs.fault_words(damage) == "tip-off damage at 1 s to 3 s"

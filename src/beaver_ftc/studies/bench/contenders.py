@@ -115,20 +115,22 @@ class ClosedLoop:
         self.loop.fly_frames(frames, self.loop.scenario.substeps)
 
 
+@dataclass(frozen=True)
 class Bare:
-    """JSBSim alone: an aircraft from a moment on, surfaces held, nothing read, nothing written."""
+    """JSBSim alone: an aircraft from a moment on, surfaces held, nothing read, nothing written; `runs` JSBSim
+    frames to each frame."""
 
-    def __init__(self, moment: Moment, runs: int) -> None:
-        self.plant, self._moment, self._runs = moment.plant, moment, runs
+    moment: Moment
+    runs: int
 
     def prepare(self) -> None:
         """Back to that moment."""
-        self._moment.come_back()
+        self.moment.come_back()
 
     def fly(self, frames: int) -> None:
-        """Fly on; `runs` JSBSim frames to each."""
-        run = self.plant.run
-        for _ in range(frames * self._runs):
+        """Fly on."""
+        run = self.moment.plant.run
+        for _ in range(frames * self.runs):
             run()
 
 

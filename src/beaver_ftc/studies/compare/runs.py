@@ -103,14 +103,16 @@ def rows_of(run: Run) -> dict[str, str]:
 
 
 def fault_words(fault: Document) -> str:
-    """A fault as declared: surface, type, size, and when."""
+    """A fault as declared: surface, sensor or case of damage, type, sizes, and when."""
     sizes = [
         f"{key} {value:g}"
         for key, value in fault.items()
         if key not in ("at_s", "end_s") and isinstance(value, int | float) and not isinstance(value, bool)
     ]
-    where = fault.get("actuator") or fault.get("sensor")
-    return " ".join(filter(None, [where, fault["type"].replace("_", " "), *sizes, f"at {fault['at_s']:g} s"]))
+    where = fault.get("actuator") or fault.get("sensor") or fault.get("case")
+    end = "" if fault.get("end_s") is None else f"to {fault['end_s']:g} s"
+    said = where, fault["type"].replace("_", " "), *sizes, f"at {fault['at_s']:g} s", end
+    return " ".join(filter(None, said))
 
 
 def as_text(runs: Sequence[Run]) -> str:

@@ -21,7 +21,7 @@ from beaver_ftc.studies.engine.statistics import (
     wilson,
     wilson_bound,
 )
-from beaver_ftc.studies.present.tables import all_finite, percent
+from beaver_ftc.studies.present.tables import all_finite, finite, percent
 
 
 def line_of(
@@ -49,7 +49,7 @@ def line_of(
         "false_alarms_per_h": alarms / hours if hours else None,
         "false_alarms_per_h_upper": poisson_bound(alarms, hours, CONFIDENCE, upper=True) if hours else None,
         "faults": n,
-        "detection_rate": detected / n if n else None,
+        "detection_rate": finite(rate.value),
         "detection_rate_lower": wilson_bound(detected, n, CONFIDENCE, upper=False) if n else None,
         **({"detection_rate_low": rate.low, "detection_rate_high": rate.high} if n else {}),
         "delay_median_s": share_within(delays_s, 0.5),

@@ -16,6 +16,7 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 from beaver_ftc.documents.errors import SimulationFailed
@@ -79,19 +80,18 @@ class Workers(Protocol):
         """Terminate all workers, whatever they are doing."""
 
 
+@dataclass
 class ThisProcess:
     """The one worker that needs no other process, and so does not survive a flight that kills it."""
 
+    work: Work
     slots = 1
-
-    def __init__(self, work: Work) -> None:
-        self._work = work
 
     def submit(self, task: Batch) -> None:
         self._task = task
 
     def outcomes(self, timeout_s: float) -> list[Outcome]:
-        return [Outcome(self._task, self._work.all(self._task.cases))]
+        return [Outcome(self._task, self.work.all(self._task.cases))]
 
     def close(self) -> None:
         """There is no other process to terminate."""

@@ -33,7 +33,7 @@ AIRSPEEDS_MPS = (38.0, 45.0, 52.0)
 AT_S = 12.0
 DURATION_S = 30.0
 NAMED = ("surface", "named")
-DECLARED = f"{NAME}-declared"
+DECLARED = "fault-matrix-declared"  # the name of the folder, as NAME
 LIKELY = 0.5  # a test that finds a fault more often than not sees it
 REFERENCE, UNCERTAINTY = SETTING["reference"], SETTING["uncertainty"]
 

@@ -66,7 +66,6 @@ from beaver_ftc.diagnosis.detection.filters import (
 from beaver_ftc.diagnosis.error_map import level_of_share, share_used
 from beaver_ftc.diagnosis.sets import explain, intersect
 from beaver_ftc.diagnosis.state import (
-    CONSTANT_THRESHOLD,
     DAMAGE_EXCLUDES,
     INTERVAL_THRESHOLD,
     LOSS,
@@ -86,10 +85,10 @@ N_ROUNDS = 4  # each round reduces the remaining travel to the share of it that 
 @kernel
 def eta_explains(nu, nu_max):
     """True if the declared uncertainty alone explains an innovation: |nu| <= nu_max."""
-    within = True
     for i in range(3):
-        within = within and abs(nu[i]) <= nu_max[i]
-    return within
+        if not abs(nu[i]) <= nu_max[i]:
+            return False
+    return True
 
 
 @kernel
@@ -185,10 +184,10 @@ def narrow_sets(fie, nu, nu_max, shared):
             if shared or j == i:
                 known = fie.set_lo[j], fie.set_hi[j]
                 fie.set_lo[j], fie.set_hi[j] = intersect(known, between)
-    some = True
     for i in range(3):
-        some = some and fie.set_lo[i] <= fie.set_hi[i]
-    return some
+        if fie.set_lo[i] > fie.set_hi[i]:
+            return False
+    return True
 
 
 @kernel
@@ -328,14 +327,13 @@ def update_residual(fie, kind, x):
     for i in range(3):
         fie.residual[i] = x[i] - fie.xhat[i]
         lo, hi, Om, th, B = fie.theta_min, fie.theta_max, fie.Om[i], fie.theta[i], fie.B[i]
+        mu = -B, B
         if kind == INTERVAL_THRESHOLD:
             mu = residual_interval(lo, hi, fie.R_pos[i], Om - fie.R_pos[i], Om, th, B)
-        elif kind == CONSTANT_THRESHOLD:
-            mu = -B, B
-        else:
+        elif kind == PUBLISHED_THRESHOLD:
             mu = published_interval(lo, hi, Om, th, B)
         fie.mu_lo[i], fie.mu_hi[i] = mu
-        within = within and (fie.mu_lo[i] <= fie.residual[i] <= fie.mu_hi[i] or fie.skip[i])
+        within = within and (mu[0] <= fie.residual[i] <= mu[1] or fie.skip[i])
     return within
 
 

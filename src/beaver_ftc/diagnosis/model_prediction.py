@@ -17,6 +17,7 @@ from beaver_ftc.design.model import design_dtype, design_of, response
 from beaver_ftc.diagnosis.actuators import servo_data
 from beaver_ftc.diagnosis.bounds import fill_bound, n_gyro
 from beaver_ftc.diagnosis.error_map import extra_bound
+from beaver_ftc.diagnosis.state import fill
 from beaver_ftc.scenario.declared import Declared
 
 
@@ -67,20 +68,19 @@ def prediction_dtype(n: int) -> np.dtype:
 
 def configure_prediction(pred: np.void, declared: Declared, travel: np.ndarray) -> None:
     """Fill the design model and the declared actuators; travel (2, n) rad: the stops."""
-    pred["w"] = 1.0 / declared.substeps
-    pred["design"] = design_of(declared.design_model, declared.aircraft)[0]
-    act, h = pred["actuators"], 1.0 / declared.rate_hz / declared.substeps
-    act["real"] = not declared.servos.is_ideal
-    act["uncertain"] = not declared.servo_errors.is_none
-    act["low"], act["high"] = travel
-    servos, ends = servo_data(declared), np.array([-1.0, 1.0])
-    slower_faster = 1.0 + np.outer(servos["bandwidth_error"], ends)
-    omega, rate = servos["bandwidth_rad_s"][:, None], servos["rate_limit_rad_s"]
-    act["approaches"] = np.where(omega > 0.0, 1.0 - np.exp(-omega * h * slower_faster), 1.0)
-    act["approach"] = np.where(omega > 0.0, 1.0 - np.exp(-omega * h), 1.0)[:, 0]
-    act["step"] = np.where(rate > 0.0, rate * h, np.inf)
-    act["steps"] = act["step"][:, None] * (1.0 + np.outer(servos["rate_limit_error"], ends))
-    act["band"] = servos["dead_band_rad"]
+    servos, h = servo_data(declared), 1.0 / declared.rate_hz / declared.substeps
+    slow_to_fast = np.array([-1.0, 0.0, 1.0])  # times the error: slowest, as declared, fastest
+    omega, rate = servos["bandwidth_rad_s"], servos["rate_limit_rad_s"]
+    approaches = 1.0 - np.exp(-h * omega[:, None] * (1.0 + np.outer(servos["bandwidth_error"], slow_to_fast)))
+    approaches[omega == 0.0] = 1.0  # no lag
+    step = np.where(rate > 0.0, rate * h, np.inf)
+    steps = step[:, None] * (1.0 + np.outer(servos["rate_limit_error"], slow_to_fast))
+    fill(pred, w=1.0 / declared.substeps, design=design_of(declared.design_model, declared.aircraft)[0])
+    fill(
+        pred["actuators"], real=not declared.servos.is_ideal, uncertain=not declared.servo_errors.is_none,
+        low=travel[0], high=travel[1], approaches=approaches[:, ::2], approach=approaches[:, 1],
+        step=step, steps=steps[:, ::2], band=servos["dead_band_rad"],
+    )  # fmt: skip
 
 
 @kernel

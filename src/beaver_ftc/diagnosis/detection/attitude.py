@@ -46,9 +46,10 @@ from beaver_ftc.diagnosis.detection.likelihood import (
     PITCH_BLOCK,
     BlockCapacity,
 )
-from beaver_ftc.diagnosis.state import LOSS
+from beaver_ftc.diagnosis.state import LOSS, fill
 from beaver_ftc.scenario.declared import SensorErrors
 
+ANGLES = ("phi", "theta", "psi")
 LEAK_TIMES_S = (0.1, 0.3, 1.0, 3.0)
 LOSS_MEMORY_S = 30.0
 COUPLED_SHARE = 0.05  # of an error of one gyro in the turns about the other axes
@@ -77,24 +78,18 @@ def attitude_dtype(capacity: BlockCapacity) -> np.dtype:
 
 def configure_attitude(att: np.void, D: np.ndarray, errors: SensorErrors, margin: float, dt_s: float) -> None:
     """Fill the comparison; D (3, 3) 1/s. margin: difference of log-likelihood ratios that names a surface."""
-    angles, gyros = [errors[name] for name in ("phi", "theta", "psi")], [errors[name] for name in AXES]
+    angles, gyros = [errors[name] for name in ANGLES], [errors[name] for name in AXES]
     v, w = max(each.random for each in angles), max(each.random for each in gyros)
     a = np.exp(-dt_s / np.array(LEAK_TIMES_S))
-    att["enabled"] = 1
-    att["level"] = sqrt(2.0 * margin)
-    att["gyro"] = -1
-    att["D"] = D
-    att["R"] = v**2
-    att["a"] = a
-    att["b"] = exp(-dt_s / LOSS_MEMORY_S)
-    att["P_start"] = v**2, w**2, DRIFT_PRIOR_RAD_S2**2
-    att["T_std"] = np.sqrt(2.0 * v**2 / (1.0 + a) + (w * dt_s) ** 2 / (1.0 - a**2))
-    drift = max(abs(getattr(errors.declared, name).drift_rad_s) for name in ("phi", "theta", "psi"))
-    att["e_0"] = [each.steady + drift for each in gyros]
-    att["e_slope"] = [each.slope for each in gyros]
-    att["tilt"] = angles[0].steady + angles[1].steady
-    for i in range(3):
-        np.fill_diagonal(att["P"][i], att["P_start"])
+    drift = max(abs(getattr(errors.declared, name).drift_rad_s) for name in ANGLES)
+    P_start = v**2, w**2, DRIFT_PRIOR_RAD_S2**2
+    fill(
+        att, enabled=1, level=sqrt(2.0 * margin), gyro=-1, D=D, R=v**2, a=a, b=exp(-dt_s / LOSS_MEMORY_S),
+        P_start=P_start, P=np.diag(P_start),
+        T_std=np.sqrt(2.0 * v**2 / (1.0 + a) + (w * dt_s) ** 2 / (1.0 - a**2)),
+        e_0=[each.steady + drift for each in gyros], e_slope=[each.slope for each in gyros],
+        tilt=angles[0].steady + angles[1].steady,
+    )  # fmt: skip
 
 
 @kernel
@@ -122,26 +117,18 @@ def compare_attitude(att, blocks, eta, x, dt, detected):
     eta (3,) rad/s2: bound of the uncertainty; x (3,) rad/s: measured rates. `score` and `gyro` are filled if
     they can decide anything: after an alarm of the rates, `detected`, or if a turn is beyond its level.
     """
+    pitch, lateral = blocks[PITCH_BLOCK], blocks[LATERAL_BLOCK]
     sum_turns(att, x, dt)
     att.xi[:] = att.s[:, 1]
-    for i in range(3):
-        blk = blocks[PITCH_BLOCK if i == 1 else LATERAL_BLOCK]
+    for i, blk in enumerate((lateral, pitch, lateral)):
         advance_axis(att, i, blk, i // 2, eta[i], dt, detected)
-    att.score = 0.0
-    att.gyro = -1
-    if detected or max(att.turn_score[0], att.turn_score[1], att.turn_score[2]) > 1.0:
-        fill_score(att, blocks)
-        find_gyro(att)
-
-
-@kernel
-def fill_score(att, blocks):
-    """Fill `score`: the larger of both sums over all axes and losses, over the level."""
-    pitch = blocks[PITCH_BLOCK]
-    lateral = blocks[LATERAL_BLOCK]
-    att.score = max(largest_correlation(att, pitch, 1, 2), largest_correlation(att, lateral, 0, 2))
-    for i in range(3):
-        att.score = max(att.score, largest_sum(att, pitch if i == 1 else lateral, i))
+    att.score, att.gyro = 0.0, -1
+    worst = np.argmax(att.turn_score)
+    if detected or att.turn_score[worst] > 1.0:
+        att.score = max(largest_correlation(att, pitch, 1), largest_correlation(att, lateral, 0))
+        for i, blk in enumerate((lateral, pitch, lateral)):
+            att.score = max(att.score, largest_sum(att, blk, i))
+        find_gyro(att, worst)
 
 
 @kernel
@@ -160,12 +147,9 @@ def sum_turns(att, x, dt):
 
 
 @kernel
-def find_gyro(att):
-    """Fill `gyro`: the only axis about which the attitude does not turn as the gyro says, or -1."""
-    worst = 0
-    for i in range(3):
-        if att.turn_score[i] > att.turn_score[worst]:
-            worst = i
+def find_gyro(att, worst):
+    """Fill `gyro`: the only axis about which the attitude does not turn as the gyro says, or -1. worst: the
+    axis with the largest `turn_score`."""
     if att.turn_score[worst] > 1.0 >= att.score:
         att.gyro = worst
         for i in range(3):
@@ -176,10 +160,8 @@ def find_gyro(att):
 @kernel
 def advance_axis(att, i, blk, row, eta, dt, detected):
     """Advance filter, responses and sums of axis i, in this row of its block; N, M and R_j if `detected`."""
-    K0, K1, K2, S = advance_P(att, i, blk, row, dt)
-    D = att.D[i, i]
-    a = blk.a
-    n = blk.n_Z
+    D, a, n = att.D[i, i], blk.a, blk.n_Z
+    K, S = advance_P(att, i, blk, row, dt)
     att.n[i] = n + N_FURTHER
     att.A[i] += att.turn[i]
     att.turn[i] = 0.0
@@ -192,14 +174,14 @@ def advance_axis(att, i, blk, row, eta, dt, detected):
         if j != i:
             u -= att.r[n + 1 + j]
     std = np.sqrt(S)
-    g = respond(att.s[i], att.A[i], u, D, a, K0, K1, K2, dt) / std
+    g = respond(att.s[i], att.A[i], u, D, a, K, dt) / std
     leak(att.z[i], att.a, g)
     for j in range(att.n[i]):
-        att.g_j[j] = respond(att.s_j[i, j], 0.0, att.r[j], D, a, K0, K1, K2, dt) / std
+        att.g_j[j] = respond(att.s_j[i, j], 0.0, att.r[j], D, a, K, dt) / std
         leak(att.z_j[i, j], att.a, att.g_j[j])
     for h, hypothesis in enumerate(blk.hypothesis[: blk.n_h]):
         if hypothesis.kind == LOSS:
-            g_s = respond(att.s_h[i, h], 0.0, hypothesis.signature[row], D, a, K0, K1, K2, dt) / std
+            g_s = respond(att.s_h[i, h], 0.0, hypothesis.signature[row], D, a, K, dt) / std
             if not detected:
                 continue
             att.N[i, h] = att.b * att.N[i, h] + g_s * g
@@ -231,58 +213,67 @@ def largest_sum(att, blk, i):
 
 
 @kernel
-def largest_correlation(att, blk, first, step):
-    """The largest correlation with a loss, over the axes of a block, every step-th from the first on, that no
-    constant explains, over the level."""
+def largest_correlation(att, blk, first):
+    """The largest correlation with a loss that no constant explains, over the level, of a block: pitch (first
+    axis 1), or roll and yaw (0).
+
+        (|N| - sum_j tol_j |R_j|) / sqrt M      N, M, R_j: sums over the axes of the block
+    """
     largest = 0.0
     n = att.n[first]
     for h, hypothesis in enumerate(blk.hypothesis[: blk.n_h]):
         if hypothesis.kind != LOSS:
             continue
-        N, M, excess = 0.0, 0.0, 0.0
-        for i in range(first, 3, step):
+        N, M = 0.0, 0.0
+        for i in range(first, 3, 2):
             N += att.N[i, h]
             M += att.M[i, h]
+        excess = abs(N)
         for j in range(n):
             R = 0.0
-            for i in range(first, 3, step):
+            for i in range(first, 3, 2):
                 R += att.R_j[i, h, j]
             excess -= tol(blk, j, n) * abs(R)
-        excess += abs(N)
         if M > 0.0:
             largest = max(largest, excess / np.sqrt(M))
     return largest / att.level
 
 
 @kernel
-def respond(s, A, u, D, a, K0, K1, K2, dt):
-    """Advance a state s (psi, xi, d) by one frame of acceleration u, rad/s2, and measurement A, rad; the
-    innovation g, rad."""
+def respond(s, A, u, D, a, K, dt):
+    """Advance a state s (psi, xi, d) by one frame of acceleration u, rad/s2, and measurement A, rad; return
+    the innovation g, rad:
+
+        psi <- psi + dt xi      xi <- xi + dt (d + u - D xi)      d <- a d
+        g = A - psi             s <- s + K g
+    """
     psi, xi, d = s[0] + dt * s[1], s[1] + dt * (s[2] + u - D * s[1]), a * s[2]
     g = A - psi
-    s[0], s[1], s[2] = psi + K0 * g, xi + K1 * g, d + K2 * g
+    s[0], s[1], s[2] = psi + K[0] * g, xi + K[1] * g, d + K[2] * g
     return g
 
 
 @kernel
 def advance_P(att, i, blk, row, dt):
-    """Gains K of the frame for axis i, and S, rad2: P <- F P F' + Q, then P <- P - K P[0]."""
-    P, F_P, D, a = att.P[i], att.F_P, att.D[i, i], blk.a
-    for c in range(3):
-        F_P[0, c] = P[0, c] + dt * P[1, c]
-        F_P[1, c] = (1.0 - dt * D) * P[1, c] + dt * P[2, c]
-        F_P[2, c] = a * P[2, c]
-    for c in range(3):
-        P[c, 0] = F_P[c, 0] + dt * F_P[c, 1]
-        P[c, 1] = (1.0 - dt * D) * F_P[c, 1] + dt * F_P[c, 2]
-        P[c, 2] = a * F_P[c, 2]
+    """Advance P of axis i by a frame of dt s; row: of the axis in its block. Return K (3,) and S, rad2.
+
+    P <- F P F' + Q,  F = [1 dt 0; 0 1 - dt D dt; 0 0 a],  Q = diag(0, dt^2 Q_x, dt Q_d)
+    S = P_00 + R,  K = P_0 / S      P <- P - K P_0'      P_0: the first column, and row, of P
+    """
+    P, F_P = att.P[i], att.F_P
+    F = (1.0, dt, 0.0), (0.0, 1.0 - dt * att.D[i, i], dt), (0.0, 0.0, blk.a)
+    for r in range(3):
+        for c in range(3):
+            F_P[r, c] = F[r][0] * P[0, c] + F[r][1] * P[1, c] + F[r][2] * P[2, c]
+    for r in range(3):
+        for c in range(3):
+            P[r, c] = F[c][0] * F_P[r, 0] + F[c][1] * F_P[r, 1] + F[c][2] * F_P[r, 2]
     P[1, 1] += dt * dt * blk.Q_x[row]
     P[2, 2] += dt * blk.Q_d[row, row]
     S = P[0, 0] + att.R
-    K0, K1, K2 = P[0, 0] / S, P[1, 0] / S, P[2, 0] / S
+    K = P[0, 0] / S, P[1, 0] / S, P[2, 0] / S
     for c in range(3):
-        first = P[0, c]
-        P[0, c] -= K0 * first
-        P[1, c] -= K1 * first
-        P[2, c] -= K2 * first
-    return K0, K1, K2, S
+        P_0c = P[0, c]
+        for r in range(3):
+            P[r, c] -= K[r] * P_0c
+    return K, S

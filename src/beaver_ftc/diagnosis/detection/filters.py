@@ -47,7 +47,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.compiled import kernel, record, row_of
-from beaver_ftc.diagnosis.state import STATISTICAL_DETECTOR, WORST_CASE_DETECTOR
+from beaver_ftc.diagnosis.state import STATISTICAL_DETECTOR, WORST_CASE_DETECTOR, fill
 from beaver_ftc.scenario.declared import Declared, SensorErrors
 from beaver_ftc.scenario.diagnosis import MAX_POLES, FdiConfig
 from beaver_ftc.scenario.sensors import NOISE_LIMIT_SIGMA
@@ -98,10 +98,10 @@ def published_interval(lo, hi, Om, th, B):
 
 # The bank of detection filters; filter 0 is the published one. residual eps_m, threshold mu rad/s, e its
 # part with a memory; innovation nu rad/s2; peak: largest |eps| / mu in healthy flight.
-BANK_CONFIG_RECORD = record(n_filters=int, a=MAX_POLES)
-BANK_MEMORY_RECORD = record(e=(MAX_POLES, 3))
-BANK_OUTPUT_RECORD = record(innovation=3, residual=(MAX_POLES, 3), threshold=(MAX_POLES, 3), peak=MAX_POLES)
-BANK_RECORD = record(config=BANK_CONFIG_RECORD, memory=BANK_MEMORY_RECORD, output=BANK_OUTPUT_RECORD)
+BANK_RECORD = record(
+    config=record(n_filters=int, a=MAX_POLES), memory=record(e=(MAX_POLES, 3)),
+    output=record(innovation=3, residual=(MAX_POLES, 3), threshold=(MAX_POLES, 3), peak=MAX_POLES),
+)  # fmt: skip
 
 
 def poles_for_delays(errors: SensorErrors, eta: float) -> tuple[float, ...]:
@@ -123,7 +123,7 @@ def _pole_for_delay(T: float, n2: float, eta: float) -> float:
 
 
 def filter_poles(config: FdiConfig, declared: Declared) -> tuple[float, ...]:
-    """The filters' poles, 1/s, the published one first."""
+    """The filters' poles, 1/s, the published one first; those for noise only as far as there is room."""
     for_noise = poles_for_delays(declared.sensors, max(declared.constant_rad_s2))
     others = (*config.pole_bank_per_s, *for_noise) if config.sharpen.pole_bank else ()
     return (config.detection_pole_per_s, *others)[:MAX_POLES]
@@ -201,9 +201,8 @@ def nearest_filter(bank, i):
 def bank_share(bank):
     """The largest |eps| / mu in the bank."""
     best = 0.0
-    for m in range(bank.config.n_filters):
-        for i in range(3):
-            best = max(best, filter_share(bank, m, i))
+    for i in range(3):
+        best = max(best, filter_share(bank, nearest_filter(bank, i), i))
     return best
 
 
@@ -283,32 +282,24 @@ FDAE_NETWORK_RECORD = record(
 )
 
 # xhat: the estimate of the rates, rad/s; residual, threshold rad/s; m: see `advance_fdae`.
-FDAE_CONFIG_RECORD = record(pole_per_s=3, a=3)
-FDAE_MEMORY_RECORD = record(xhat=3, m=3)
-FDAE_OUTPUT_RECORD = record(residual=3, threshold=3)
 FDAE_RECORD = record(
-    config=FDAE_CONFIG_RECORD,
-    memory=FDAE_MEMORY_RECORD,
-    output=FDAE_OUTPUT_RECORD,
+    config=record(pole_per_s=3, a=3), memory=record(xhat=3, m=3), output=record(residual=3, threshold=3),
     network=FDAE_NETWORK_RECORD,
-)
+)  # fmt: skip
 
 _GAUSS_RATIO = np.exp(-1.0)
-_N_ALPHA, _N_BETA = len(ALPHA_CENTRES_RAD), len(BETA_CENTRES_RAD)
-_ALPHA_0 = ALPHA_CENTRES_RAD[0]
-_ALPHA_STEP = ALPHA_CENTRES_RAD[1] - ALPHA_CENTRES_RAD[0]
-_BETA_0 = BETA_CENTRES_RAD[0]
-_BETA_STEP = BETA_CENTRES_RAD[1] - BETA_CENTRES_RAD[0]
+# c0, dc, n of `fill_gaussians`
+_ALPHA_GRID, _BETA_GRID = ((c[0], c[1] - c[0], len(c)) for c in (ALPHA_CENTRES_RAD, BETA_CENTRES_RAD))
 
 
 def configure_fdae(fdae: np.void, declared: Declared) -> None:
     """Fill in the estimator's pole, and how its network learns."""
-    control, cfg, net = declared.control, fdae["config"], fdae["network"]["config"]
-    lam = declared.fdi.detection_pole_per_s
-    cfg["pole_per_s"], cfg["a"] = lam, exp(-lam * (1.0 / declared.rate_hz))
-    net["gain"] = control.network_gain_per_s2
-    net["leak"] = control.network_leak_per_s
-    net["w_max"] = control.network_weight_limit_rad_s2
+    control, lam = declared.control, declared.fdi.detection_pole_per_s
+    fill(fdae["config"], pole_per_s=lam, a=exp(-lam * (1.0 / declared.rate_hz)))
+    fill(
+        fdae["network"]["config"], gain=control.network_gain_per_s2, leak=control.network_leak_per_s,
+        w_max=control.network_weight_limit_rad_s2,
+    )  # fmt: skip
 
 
 @kernel
@@ -345,8 +336,7 @@ def fill_basis(alpha, beta, out):
     Each width equals the spacing of its centres.
     """
     norm = np.sqrt(
-        fill_gaussians(alpha, _ALPHA_0, _ALPHA_STEP, _N_ALPHA, 0, out)
-        + fill_gaussians(beta, _BETA_0, _BETA_STEP, _N_BETA, _N_ALPHA, out)
+        fill_gaussians(alpha, *_ALPHA_GRID, 0, out) + fill_gaussians(beta, *_BETA_GRID, _ALPHA_GRID[2], out)
     )
     for j in range(N_BASIS):
         out[j] /= norm

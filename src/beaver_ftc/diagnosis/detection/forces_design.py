@@ -12,7 +12,7 @@ from beaver_ftc.design.engine import slipstream_slopes
 from beaver_ftc.design.table import AIRSPEED, DPT, QDYN
 from beaver_ftc.diagnosis.detection.forces import MEASURED_FORCES, NORMAL_INDEX, SIDE_INDEX, terms_of_force
 from beaver_ftc.diagnosis.monitors.redundancy import EARTH_M_S2
-from beaver_ftc.diagnosis.state import ROLL, SIDE_FORCE
+from beaver_ftc.diagnosis.state import ROLL, SIDE_FORCE, fill
 from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA
 from beaver_ftc.scenario.declared import MASS_TOLERANCE, Declared, SensorErrors
 
@@ -34,11 +34,11 @@ def configure_forces(
     """
     stat, err = fdi["statistical"], fdi["bound"]["declared_errors"]
     aircraft, forces = declared.aircraft, stat["forces"]
-    forces["c_inv"] = 1.0 / aircraft.geometry.chord_m
-    forces["q_trim"] = trim[1][QDYN]
-    forces["q_noise"] = declared.sensors["qdyn"].random
     CY_bdot = [t.value for t in aircraft.forces if t.coefficient == "CY" and t.of == ((SIDESLIP_RATE, 1),)]
-    forces["CY_bdot"] = sum(CY_bdot)
+    fill(
+        forces, c_inv=1.0 / aircraft.geometry.chord_m, q_trim=trim[1][QDYN], CY_bdot=sum(CY_bdot),
+        q_noise=declared.sensors["qdyn"].random,
+    )  # fmt: skip
     for i in range(2):
         _configure_force(stat, err, declared, trim, slopes, i, dt)
 
@@ -54,19 +54,19 @@ def _configure_force(
     per_C = y[QDYN] * cfg["S_m"] * forces["c_inv"]
     f_all = per_C * _force_slopes(aircraft, force.coefficient, trim)
     f_y = f_all[:-1]
-    f["vane"] = (-slopes[force.axis, force.vane], -f_y[force.vane])
-    f["vane_roll"] = -slopes[ROLL, force.vane]
-    f["L"] = f_y[3:]
-    f["var_trim"] = _force_variances(err, errors, y, f_all, force.vane)
     std = errors[force.accelerometer].random
-    f["var_acc"] = (forces["c_inv"] * std) ** 2
     drift = _drift_bound(errors, cfg["gravity"], y[AIRSPEED], i)
+    Q_angle = (DRIFT_CHANGE_PER_S * drift) ** 2 + dt * (std / y[AIRSPEED]) ** 2
+    fill(
+        f, vane=(-slopes[force.axis, force.vane], -f_y[force.vane]), vane_roll=-slopes[ROLL, force.vane],
+        L=f_y[3:], var_trim=_force_variances(err, errors, y, f_all, force.vane),
+        var_acc=(forces["c_inv"] * std) ** 2,
+        Q_e=f_y[force.vane] ** 2 * (Q_angle + declared.air.angle_walk(y[AIRSPEED])),
+    )  # fmt: skip
     _configure_columns(stat, declared, y, f_y[force.vane] / per_C, drift, i)
     for term in terms_of_force(aircraft, i):
         if term.surface:
             f["G_trim"][aircraft.surfaces.index(term.surface)] += per_C * abs(term.value)
-    Q_angle = (DRIFT_CHANGE_PER_S * drift) ** 2 + dt * (std / y[AIRSPEED]) ** 2
-    f["Q_e"] = f_y[force.vane] ** 2 * (Q_angle + declared.air.angle_walk(y[AIRSPEED]))
 
 
 def _force_variances(
@@ -102,13 +102,9 @@ def _drift_bound(errors: SensorErrors, gravity: float, V: float, i: int) -> floa
     # error of the accelerometers across the flow in level flight: all of that along the force, and of the one
     # ahead the component by the slope of the flow
     acc = errors[MEASURED_FORCES[i].accelerometer]
-    a_acc = (
-        acc.steady
-        + TYPICAL_SLOPE_RAD * errors["ax"].steady
-        + gravity * (acc.slope if i == NORMAL_INDEX else 0.0)
-    )
-    a_all = gravity * attitude * (TYPICAL_SLOPE_RAD if i == NORMAL_INDEX else 1.0) + EARTH_M_S2 + a_acc
-    return float(EARTH_RATE_RAD_S + gyros + a_all / V)
+    a = acc.steady + TYPICAL_SLOPE_RAD * errors["ax"].steady + EARTH_M_S2
+    a += gravity * (acc.slope + attitude * TYPICAL_SLOPE_RAD if i == NORMAL_INDEX else attitude)
+    return float(EARTH_RATE_RAD_S + gyros + a / V)
 
 
 def _configure_columns(

@@ -204,9 +204,9 @@ def invert_symmetric(n, S):
     if n == 1:
         S[0, 0] = 1.0 / S[0, 0]
         return
-    c = 0.5 * (S[0, 1] + S[1, 0])
-    det = S[0, 0] * S[1, 1] - c * c
-    S[0, 0], S[1, 1] = S[1, 1] / det, S[0, 0] / det
+    a, c, d = S[0, 0], 0.5 * (S[0, 1] + S[1, 0]), S[1, 1]
+    det = a * d - c * c
+    S[0, 0], S[1, 1] = d / det, a / det
     S[0, 1] = S[1, 0] = -c / det
 
 
@@ -342,10 +342,9 @@ def reset_slot(b, slot):
     for group in range(n_test_groups(b.n_h)):
         t = b.tests[group]
         for k in range(slot, tests_in_group(b, group), N_SLOTS):
-            t.correlation[k] = t.information[k] = t.w[0, k] = t.w[1, k] = 0.0
-            t.e_0[k] = t.e_tv[k] = t.e_w[k] = t.N_p[k] = t.correlation_from_coarse_gust[k] = 0.0
             t.left[k] = 1.0
-            t.x_s[:, k] = b.R[group, : b.n_Z, k] = 0.0
+            t.correlation[k] = t.information[k] = t.N_p[k] = t.correlation_from_coarse_gust[k] = 0.0
+            t.e_0[k] = t.e_tv[k] = t.e_w[k] = t.w[:, k] = t.x_s[:, k] = b.R[group, : b.n_Z, k] = 0.0
 
 
 @kernel
@@ -357,13 +356,11 @@ def bound_responses(b, dt):
     K_d, lost = b.K_d, 1.0 - b.a
     det = K_d[0, 0] * K_d[1, 1] - K_d[0, 1] * K_d[1, 0] if b.n > 1 else K_d[0, 0]
     for i in range(b.n):
-        b.eta_0[i] = b.eta_r[i] = 0.0
+        b.eta_r[i] = 0.0
         for j in range(b.n):
             c = 1.0 if b.n == 1 else (K_d[1 - i, 1 - i] if i == j else K_d[i, j])
             b.eta_r[i] += RINGING_FACTOR * abs(c / det) * b.eta[j]
-        if lost > 0.0:
-            g_0 = dt * lost / (b.K_x[i, i] * lost + dt * K_d[i, i])
-            b.eta_0[i] = g_0 * b.eta[i]
+        b.eta_0[i] = b.eta[i] * dt * lost / (b.K_x[i, i] * lost + dt * K_d[i, i])
 
 
 @kernel
@@ -497,14 +494,12 @@ def evaluate_tests(b, t, n, without_eta, mapped):
     without_eta: the bounds on the ratios leave out eta. mapped: the bounds on hypotheses other than a loss
     always include it, because the model's error is mapped: it is then large and lasting.
     """
-    sign, level, share = t.supporting_correlation_sign, b.alarm_level, b.noise_share
-    r0, r1 = b.eta_r[0], b.eta_r[1]
+    level, share, r0, r1 = b.alarm_level, b.noise_share, b.eta_r[0], b.eta_r[1]
     for k in range(n):
-        N, D = t.correlation[k], t.information[k]
-        signed, known = sign[k] != 0.0, D > 0.0
-        N_s = sign[k] * N if signed else abs(N)
-        e = t.e_R[k] + max(sign[k] * t.N_p[k], 0.0)
-        e += max(sign[k] * t.correlation_from_coarse_gust[k], 0.0)
+        N, D, sign = t.correlation[k], t.information[k], t.supporting_correlation_sign[k]
+        signed, known = sign != 0.0, D > 0.0
+        N_s = sign * N if signed else abs(N)
+        e = t.e_R[k] + max(sign * t.N_p[k], 0.0) + max(sign * t.correlation_from_coarse_gust[k], 0.0)
         eta = uncertain_share(t, k, r0, r1)
         score = evidence_ratio(level, share, N_s - e, eta, D)
         e += 0.0 if without_eta and (signed or not mapped) else eta

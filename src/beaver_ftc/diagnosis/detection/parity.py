@@ -79,7 +79,7 @@ from beaver_ftc.diagnosis.detection.rows import (
 from beaver_ftc.diagnosis.detection.tones import tones_dtype, update_tones, within_limits
 from beaver_ftc.diagnosis.deviations import moment_axis
 from beaver_ftc.diagnosis.gusts import project_gust, view_drift
-from beaver_ftc.diagnosis.state import LOSS, NORMAL_FORCE, PITCH, ROLL, SIDE_FORCE, YAW
+from beaver_ftc.diagnosis.state import LOSS, NORMAL_FORCE, PITCH, ROLL, SIDE_FORCE, YAW, fill
 
 PEAK_MEMORY_RATIO = 5.0  # time constant of `peak` over the one with which evidence is forgotten
 MIN_FORCE_PART = 0.9  # component of a direction of length 1, above which a view counts as one of the force
@@ -377,23 +377,22 @@ def _configure_view(view: np.void, d: ParityDirection, gusty: bool, vaned: bool)
     is_axis, across_vane, by_force = d.nulled == AXIS_VIEW, d.nulled >= VANE_VIEW, any(d.m_0[SIDE_FORCE:])
     i, j = d.plane_pair
     across_gust = across_vane and d.plane_pair == YAW_PLANE and gusty
-    view["nulled"], view["by_force"] = d.nulled, by_force
-    view["places"] = (ROLL, YAW, j) if across_gust else (i, -1, j)
-    view["alarm_axis"] = d.m_0.index(1.0) if is_axis and not d.by_inertia else i
-    view["block"]["source"] = VANED if vaned or by_force else RAW
+    source = VANED if vaned or by_force else RAW
     if d.by_inertia or across_vane:
-        view["block"]["source"] = INERTIAL if d.by_inertia else VANELESS
-    if by_force or vaned:
-        view["confirmer"] = NORMAL_FORCE if j == NORMAL_FORCE else SIDE_FORCE
+        source = INERTIAL if d.by_inertia else VANELESS
+    view["block"]["source"] = source
+    fill(
+        view, nulled=d.nulled, by_force=by_force, places=(ROLL, YAW, j) if across_gust else (i, -1, j),
+        alarm_axis=d.m_0.index(1.0) if is_axis and not d.by_inertia else i,
+        confirmer=(NORMAL_FORCE if j == NORMAL_FORCE else SIDE_FORCE) if by_force or vaned else 0,
+    )  # fmt: skip
 
 
 def _configure_filter(b: np.void, d: ParityDirection, rates: np.void) -> None:
     """Fill direction and filter of a view's block from the block of the rates that the view combines."""
-    b["n"], b["a"], b["Q_scale"], b["m"][0], b["any_position"] = 1, 1.0, 1.0, d.m_0, 1
-    b["P_xx"][0, 0] = rates["R_y"].max()
-    b["P_dd"][0, 0] = likelihood.DRIFT_PRIOR_RAD_S2**2
-    for name in ("alarm_level", "noise_share", "eta_rate"):
-        b[name] = rates[name]
+    same = {name: rates[name] for name in ("alarm_level", "noise_share", "eta_rate")}
+    fill(b, n=1, a=1.0, Q_scale=1.0, any_position=1, **same)
+    b["m"][0], b["P_xx"][0, 0], b["P_dd"][0, 0] = d.m_0, rates["R_y"].max(), likelihood.DRIFT_PRIOR_RAD_S2**2
 
 
 def _configure_columns(

@@ -45,7 +45,7 @@ from beaver_ftc.diagnosis.gusts import (
     configure_gust,
     configure_gust_speed,
 )
-from beaver_ftc.diagnosis.state import LOSS, PITCH, SIDE_FORCE
+from beaver_ftc.diagnosis.state import LOSS, PITCH, SIDE_FORCE, fill
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.diagnosis import Statistical
 
@@ -133,8 +133,7 @@ def configure_statistics(
     errors = declared.sensors
     dt_s = 1.0 / rate_hz
     n_instants = int(fdi["config"]["n_substeps"])
-    cfg["enabled"] = 1
-    cfg["w"] = 1.0 / max(n_instants, 1)
+    fill(cfg, enabled=1, w=1.0 / max(n_instants, 1))
     V = float(trim[1][AIRSPEED])
     rate = eta_rate(settings, aircraft, dt_s)
     stat["forces"]["in_use"] = declared.uses_accelerometers
@@ -179,11 +178,13 @@ def _configure_levels(cfg: np.void, declared: Declared, n_tests: int, rate_hz: f
     settings = declared.fdi.statistical
     aircraft = declared.aircraft
     assert settings is not None
-    cfg["alarm_level"] = derive_alarm_level(settings.false_alarms_per_h, rate_hz, n_tests)
-    # difference of log-likelihood ratios that noise exceeds in a second with the probability `misnaming`
-    cfg["margin"] = 0.5 * _quantile(settings.misnaming / (rate_hz * count_tests(aircraft))) ** 2
-    cfg["forget"] = exp(-1.0 / (rate_hz * declared.fdi.forgetting_time_s))
-    cfg["mapped"] = aircraft.file.model_error_map is not None and not aircraft.loses_surfaces
+    # margin: difference of log-likelihood ratios that noise exceeds in a second with probability `misnaming`
+    fill(
+        cfg, alarm_level=derive_alarm_level(settings.false_alarms_per_h, rate_hz, n_tests),
+        margin=0.5 * _quantile(settings.misnaming / (rate_hz * count_tests(aircraft))) ** 2,
+        forget=exp(-1.0 / (rate_hz * declared.fdi.forgetting_time_s)),
+        mapped=aircraft.file.model_error_map is not None and not aircraft.loses_surfaces,
+    )  # fmt: skip
 
 
 def _configure_view_gusts(stat: np.void, declared: Declared) -> None:
@@ -228,9 +229,10 @@ def _configure_blocks(stat: np.void, declared: Declared, rate: float, dt_s: floa
         own = [k for k, term in enumerate(aircraft.moments) if moment_axis(term) in axes]
         readings = range(len(aircraft.moments), int(rows["n"]))
         set_columns(b, rows, [*own, *readings] if rows["n"] else [])
-        b["n"], b["a"], b["Q_scale"], b["eta_rate"], b["source"] = len(axes), 1.0, 1.0, rate, RATES
-        b["alarm_level"] = cfg["alarm_level"]
-        b["noise_share"] = 0.0 if declared.is_noise_free else LEVEL_NOISE_SHARE
+        fill(
+            b, n=len(axes), a=1.0, Q_scale=1.0, eta_rate=rate, source=RATES, alarm_level=cfg["alarm_level"],
+            noise_share=0.0 if declared.is_noise_free else LEVEL_NOISE_SHARE,
+        )  # fmt: skip
         for i, axis in enumerate(axes):
             b["axes"][i], b["m"][i, axis] = axis, 1.0
             b["R_y"][i] = b["P_xx"][i, i] = rows["R"][axis]
@@ -240,8 +242,8 @@ def _configure_blocks(stat: np.void, declared: Declared, rate: float, dt_s: floa
         likelihood.set_signs(b, [entry.kind for entry in entries])
         for h, (kind, s, axis, alarms) in zip(b["hypothesis"], entries, strict=False):
             h["signature"][: len(axes)] = [kind == STEP_FAULT and axis == each for each in axes]
-            h["kind"], h["surface"], h["axis"], h["alarms"] = kind, s, axis, alarms
-            h["column"] = losses.index(s) if kind == LOSS else len(losses) + axis
+            column = losses.index(s) if kind == LOSS else len(losses) + axis
+            fill(h, kind=kind, surface=s, axis=axis, alarms=alarms, column=column)
 
 
 def eta_rate(settings: Statistical, aircraft: Aircraft, dt_s: float) -> float:
@@ -269,11 +271,10 @@ def _configure_noise(
         omega = min(DAMAGE_FREQUENCY_RAD_S, omega)
     eta = max(declared.constant_rad_s2)
     level = float(stat["test"]["alarm_level"])
-    noise["q"] = derive_intensity(eta, omega, float(sigma[:3].max()), level, dt_s)
     _, G, F_x, F_y = jacobian(model, *trim)
-    noise["Q0"] = F_x**2 @ sigma[:3] ** 2
+    Q0 = F_x**2 @ sigma[:3] ** 2
     Q_y = F_y[:, [ALPHA, BETA, AIRSPEED, QDYN]] ** 2 @ sigma[3:] ** 2  # later as `rows.add_constants` says
-    noise["Q"] = noise["Q0"] + Q_y
+    fill(noise, q=derive_intensity(eta, omega, float(sigma[:3].max()), level, dt_s), Q0=Q0, Q=Q0 + Q_y)
     noise["G_trim"][:, : G.shape[1]] = np.abs(G)
 
 

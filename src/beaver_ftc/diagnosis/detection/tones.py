@@ -31,6 +31,7 @@ import numpy as np
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.design.table import AIRSPEED, ALPHA, BETA
 from beaver_ftc.diagnosis.detection.likelihood import evidence_ratio
+from beaver_ftc.diagnosis.state import fill
 
 N_TONES = 16
 # A memory of T s resolves frequencies 1 / T apart. A tone halfway between two frequencies of the grid appears
@@ -183,9 +184,11 @@ def configure_tones(c: np.void, false_alarm: float, V: float, rate: float, dt: f
     """
     stride = max(round(TONE_INTERVAL_S / dt), 1)
     z, a = np.exp(1j * TONES_RAD_S * dt), exp(-stride * dt / TONE_MEMORY_S)
-    c["V_min"], c["V_max"] = V / MAX_V_FACTOR, V * MAX_V_FACTOR
-    c["stride"], c["a"], c["alarm_level"] = stride, a, sqrt(-2.0 * np.log(false_alarm))
-    c["z"], c["rho"], c["rho2"] = z, a * z**stride, a * z ** (2 * stride)
-    c["c"] = max_tone_mean(TONES_RAD_S, rate)
+    rho = a * z**stride
     # The variances of the two parts differ by |sum exp(2 (i w - 1 / T) t)| / sum exp(-2 t / T).
-    c["v_share"] = 0.5 + 0.5 * (1.0 - a**2) / np.abs(1.0 - (a * z**stride) ** 2)
+    v_share = 0.5 + 0.5 * (1.0 - a**2) / np.abs(1.0 - rho**2)
+    fill(
+        c, V_min=V / MAX_V_FACTOR, V_max=V * MAX_V_FACTOR, stride=stride, a=a, z=z, rho=rho,
+        rho2=a * z ** (2 * stride), alarm_level=sqrt(-2.0 * np.log(false_alarm)),
+        c=max_tone_mean(TONES_RAD_S, rate), v_share=v_share,
+    )  # fmt: skip

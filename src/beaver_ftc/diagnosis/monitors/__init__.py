@@ -33,24 +33,21 @@ THRUST_SIGNAL, YAW_SIGNAL = "thrust", "engines_n"  # signals: CT and Cn
 MAX_OFFSET_M = 0.05
 
 # n_engines: engines, 0 where they are not monitored. i_T, i_n: places of CT and Cn in y. yaw_per_thrust: a.
-# slack: MAX_OFFSET_M / b.
-BALANCE_CONFIG = record(n_engines=int, i_T=int, i_n=int, yaw_per_thrust=float, slack=float)
-# A law has moved an engine apart: the levers are no longer alike.
-BALANCE_MEMORY = record(levers_apart=int)
-BALANCE_OUTPUT = record(engine_failed=int)  # an engine has failed
-ENGINE_MONITOR_RECORD = record(config=BALANCE_CONFIG, memory=BALANCE_MEMORY, output=BALANCE_OUTPUT)
+# slack: MAX_OFFSET_M / b. levers_apart: a law has moved an engine apart, so the levers are no longer alike.
+ENGINE_MONITOR_RECORD = record(
+    config=record(n_engines=int, i_T=int, i_n=int, yaw_per_thrust=float, slack=float),
+    memory=record(levers_apart=int), output=record(engine_failed=int),
+)  # fmt: skip
 
 
 def yaw_per_thrust(aircraft: Aircraft) -> float:
     """a: the yawing moment of the thrust with all levers alike, per CT."""
-    return (
-        -sum(effector.share * effector.right_m for effector in aircraft.effectors.values())
-        / aircraft.geometry.span_m
-    )
+    moment = sum(effector.share * effector.right_m for effector in aircraft.effectors.values())
+    return -moment / aircraft.geometry.span_m
 
 
 def configure_balance(config: np.void, aircraft: Aircraft) -> None:
-    """Fill the record (BALANCE_CONFIG); it stays empty where the symmetry of the engines is not measured."""
+    """Fill `config` of the record; it stays empty where the symmetry of the engines is not measured."""
     error_map, signals = aircraft.file.model_error_map, list(aircraft.signals)
     if error_map is None or not error_map.knows_engines or not {THRUST_SIGNAL, YAW_SIGNAL} <= set(signals):
         return

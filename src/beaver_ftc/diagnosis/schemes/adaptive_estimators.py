@@ -39,11 +39,7 @@ def update_estimators(fdi, pred):
 
     With a broken sensor they stay as they are: the reading in its place follows from the design model.
     """
-    cfg = fdi.config
-    bound = fdi.bound
-    iso = fdi.isolation
-    means = pred.means
-    detected = fdi.verdict.detected
+    cfg, iso, bound, means, detected = fdi.config, fdi.isolation, fdi.bound, pred.means, fdi.verdict.detected
     isolation.update_effects(iso, fdi.bank, bound, cfg, detected, means.G, means.Gu, means.e_Gu)
     if detected and not sensor_monitor.has_alarm(fdi.sensor_monitor):
         isolation.advance_estimators(iso, bound, pred.x_before, means.F, cfg.dt)
@@ -125,14 +121,13 @@ def decide_type(fdi, t, started):
     types, found, layout, bank = fdi.types, fdi.verdict, fdi.layout, fdi.bank
     fies, bound = fdi.isolation.estimator, fdi.bound
     verdict.record_exclusions(types.surface, layout, fies)
-    in_pairs = types.pair.enabled
-    if in_pairs:
+    if types.pair.enabled:
         pairs.observe_pairs(types, layout, fies, bank, bound.nu_max)
     elif started or fdi.isolation.config.reach:
         examination.observe_frame(types, layout, fies, bank.output.innovation, bound)
     if sensor_monitor.doubts_gyros(fdi.sensor_monitor):
         return
-    if in_pairs:
+    if types.pair.enabled:
         finding = pairs.decide_pairs(types, found, layout, t)
     else:
         finding = verdict.decide_single(types, found, layout, t)
@@ -154,34 +149,28 @@ def record_orders(fdi, prediction):
 @apart(long_loops=True)
 def update_tests(fdi, prediction, measured, k, t):
     """Test the innovation of the elapsed frame, which ends frame k at t s, for every hypothesis."""
-    stat = fdi.statistical
-    y = measured.y
-    cfg = stat.test
-    rows = stat.rows
-    eta = rows.eta[0, :3]
-    blocks = stat.block
-    gust = stat.gust
-    force = stat.forces
-    views = stat.views[: stat.n_views]
-    vaneless, view_gust = stat.vaneless, gust_of_views(stat)
-    means = prediction.means
-    nu, dt = fdi.bank.output.innovation, fdi.config.dt
+    stat, means, y, dt = fdi.statistical, prediction.means, measured.y, fdi.config.dt
+    cfg, rows, blocks, force, att = stat.test, stat.rows, stat.block, stat.forces, stat.attitude
+    gust, of_views, vaneless, views = (
+        stat.gust,
+        gust_of_views(stat),
+        stat.vaneless,
+        stat.views[: stat.n_views],
+    )
+    alarmed, detected = stat.alarm.detected_at_s >= 0.0, fdi.verdict.detected
     gusts.finish_gust(gust, prediction.w)
     for own in (vaneless, stat.vaned):
         if own.output.gusty:
             gusts.finish_gust(own, prediction.w)
     fill_old_effects(means)
-    per_cubed = unanticipated_pitch(prediction.design, y, 1.0)
-    finish_rows(rows, stat.noise, force, gust, view_gust, vaneless, fdi.bound, means, nu, per_cubed)
-    alarmed = stat.alarm.detected_at_s >= 0.0
-    may_end = not fdi.config.abrupt
-    statistical.update_blocks(cfg, rows, blocks, gust, dt, k, alarmed, may_end)
-    if stat.attitude.enabled:
-        att, detected = stat.attitude, fdi.verdict.detected
-        attitude.compare_attitude(att, blocks, eta, measured.x, dt, detected)
+    nu, per_cubed = fdi.bank.output.innovation, unanticipated_pitch(prediction.design, y, 1.0)
+    finish_rows(rows, stat.noise, force, gust, of_views, vaneless, fdi.bound, means, nu, per_cubed)
+    statistical.update_blocks(cfg, rows, blocks, gust, dt, k, alarmed, not fdi.config.abrupt)
+    if att.enabled:
+        attitude.compare_attitude(att, blocks, rows.eta[0, :3], measured.x, dt, detected)
         if detected and att.score > 1.0:
             sensor_monitor.rule_out_gyros(fdi.sensor_monitor)
-    parity.project_views(views, stat.noise, rows, force, gust, view_gust, vaneless, y[AIRSPEED])
+    parity.project_views(views, stat.noise, rows, force, gust, of_views, vaneless, y[AIRSPEED])
     parity.update_views(views, cfg, stat.tone_test_config, y, dt, k, alarmed)
     bounded = fdi.bound.error_map.outside == 0
     statistical.update_alarm(stat.alarm, cfg, blocks, views, force, gust, t, bounded)

@@ -36,8 +36,7 @@ from beaver_ftc.scenario.declared import Declared
 
 # waits: whether the network waits for a residual outside the threshold; mu0: rad/s, in the place of all
 # adaptive thresholds, or 0.
-PUBLISHED_CONFIG_RECORD = record(waits=int, mu0=float)
-PUBLISHED_RECORD = record(config=PUBLISHED_CONFIG_RECORD, network=STATE_NETWORK_RECORD)
+PUBLISHED_RECORD = record(config=record(waits=int, mu0=float), network=STATE_NETWORK_RECORD)
 
 
 def reconfigure(fdi: np.void, declared: Declared, travel: np.ndarray) -> None:

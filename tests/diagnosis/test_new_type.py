@@ -177,7 +177,7 @@ FLIGHT = """
 import sys
 sys.path.insert(0, {folder!r})
 from design_plant import UNCERTAINTIES, DesignPlant
-from beaver_ftc.diagnosis.types.verdict import fault_finding_dict
+from beaver_ftc.diagnosis.types.findings import fault_finding_dict
 SURFACES = ("aileron", "elevator", "rudder", "flap")
 reverse = lambda k, u: -u if k >= 20 else u
 plant = DesignPlant(4, 50.0, surface=2, position=reverse, fault_class="all")

@@ -26,11 +26,8 @@ from beaver_ftc.control.autopilot import AUTOPILOT, COLUMNS, set_up_autopilot
 from beaver_ftc.design.model import anchor, mass_of
 from beaver_ftc.diagnosis import model_prediction, schemes
 from beaver_ftc.diagnosis.conclusion import assessment_dtype
-from beaver_ftc.diagnosis.detection.parity import (
-    USUAL_SIZE,
-    StatisticalSize,
-    required_size,
-)
+from beaver_ftc.diagnosis.detection.parity import USUAL_SIZE, StatisticalSize
+from beaver_ftc.diagnosis.detection.parity_design import required_size
 from beaver_ftc.diagnosis.detection.statistical_design import configure_statistics
 from beaver_ftc.diagnosis.isolation import estimator_names
 from beaver_ftc.diagnosis.monitors.records import configure_sensor_monitor

@@ -38,8 +38,8 @@ from beaver_ftc.diagnosis.conclusion import (
 )
 from beaver_ftc.diagnosis.monitors.records import sensor_monitor_finding
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, ROLL, STATISTICAL_DETECTOR, UNANTICIPATED, YAW
+from beaver_ftc.diagnosis.types.findings import estimate_fault_parameter, fault_finding_dict
 from beaver_ftc.diagnosis.types.registry import TYPE_NAMES
-from beaver_ftc.diagnosis.types.verdict import estimate_fault_parameter, fault_finding_dict
 from beaver_ftc.loop.frame import isolated_theta
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.sensing import DEPARTURE_SIGNALS
@@ -135,7 +135,7 @@ class Landing:
     first.
     surface_travel_rad: path of each surface, up and down added. engine_power: if pitch was left to the
     engine, since when and for how long, s, and the lowest and highest manifold pressure, inHg. faults: of
-    several at once (`fdi.pairs`), as in types/verdict.py, the first named first. statistical: when the
+    several at once (`fdi.pairs`), as in types/findings.py, the first named first. statistical: when the
     statistical detector would have raised the alarm, its level in standard deviations, and the largest
     share of it reached in healthy flight. mode_changes, exits: how many there were of `supervisor` and
     `envelope_exits`, which hold the first and the last; the end of an exit that is still open is the end of

@@ -6,7 +6,7 @@ from kernels import DT, fill, new_fdi
 
 from beaver_ftc.aircraft import load
 from beaver_ftc.diagnosis.detection import parity, tones
-from beaver_ftc.diagnosis.detection.parity import configure_parity_views
+from beaver_ftc.diagnosis.detection.parity_design import configure_parity_views
 
 AILERON, ELEVATOR, RUDDER = range(3)
 PITCH_AXIS, ROLL_AXIS, YAW_AXIS, PAST_AILERON, PAST_RUDDER = range(5)

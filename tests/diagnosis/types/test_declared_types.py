@@ -11,7 +11,7 @@ from test_release import HELD, Repaired
 from beaver_ftc.aircraft import load
 from beaver_ftc.design.model import design_record, nonlinear_response
 from beaver_ftc.diagnosis.types import registry as types
-from beaver_ftc.diagnosis.types.verdict import fault_finding_dict
+from beaver_ftc.diagnosis.types.findings import fault_finding_dict
 from samples import samples
 
 NOISE_DEG_S = 0.02

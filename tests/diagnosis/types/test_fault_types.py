@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 import fault_kinds
 from beaver_ftc.diagnosis.types import registry as types
-from beaver_ftc.diagnosis.types.verdict import fault_finding_dict
+from beaver_ftc.diagnosis.types.findings import fault_finding_dict
 from samples import samples
 
 FRAMES = 200

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from test_fault_types import SURFACES, TYPES, shares, uncertainties
 
 from beaver_ftc.diagnosis.types import registry as types
-from beaver_ftc.diagnosis.types.verdict import fault_finding_dict
+from beaver_ftc.diagnosis.types.findings import fault_finding_dict
 from flying import flown
 from samples import samples
 

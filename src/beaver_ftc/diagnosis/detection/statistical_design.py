@@ -26,10 +26,9 @@ from beaver_ftc.diagnosis.detection.likelihood import (
     N_SLOTS,
     STEP_FAULT,
 )
-from beaver_ftc.diagnosis.detection.parity import (
-    AXIS_VIEW,
+from beaver_ftc.diagnosis.detection.parity import AXIS_VIEW, VANE_VIEW
+from beaver_ftc.diagnosis.detection.parity_design import (
     ROLL_YAW_PLANE,
-    VANE_VIEW,
     ParityDirection,
     configure_parity_views,
     list_directions,

@@ -1,17 +1,11 @@
-"""From the types left to a verdict: surface, type, and what the law does; and the findings in words.
+"""From the types left to a verdict: surface, type, and what the law does; findings.py puts it in words.
 
 No type is named here: the columns of the table (`FaultType`) say what distinguishes one from another. Kernels
 of one surface assume that it is at fault; `can_be_faulty` says whether it can be.
 
 types: of `fault_types_dtype`; past: of `conclusion_dtype`, of the frame before; kind: a type, TYPE_UNDECIDED
 or NO_TYPE; mode: of accommodation. Other symbols: types/__init__.py.
-
-`fault_finding_dict` puts the verdict in words: surface, type, candidates, estimate. What the estimate is, and
-in which unit, the type's row says (`FaultType.estimate_parameter`).
 """
-
-from collections.abc import Iterable, Iterator, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -394,138 +388,3 @@ def remaining_effectiveness(types, layout, est, s):
             if MODE[h] == SCALE_COMMAND and type_remains(srf, h):
                 return set_middle(srf, h)
     return 1.0 + est[layout.loss[s]].theta[layout.dominant_axis[s]]
-
-
-FindingDict = dict[str, Any]
-_NO_FINDINGS: FindingDict = {
-    "isolated": None, "isolation_type": None, "estimate": None, "isolation_time_s": None,
-    "candidates": (), "faults": (),
-}  # fmt: skip
-
-
-def fault_finding_dict(fdi: np.void, names: Sequence[str]) -> FindingDict:
-    """isolated, isolation_type, candidates, estimate and more of a Flight diagnosed for every type.
-
-    names: in the order of the aircraft.
-    """
-    if not fdi["verdict"]["detected"]:
-        return dict(_NO_FINDINGS)
-    if fdi["types"]["pair"]["enabled"]:
-        return _find_pair(fdi, names)
-    return _find_one(fdi, names)
-
-
-def _find_pair(fdi: np.void, names: Sequence[str]) -> FindingDict:
-    """The fault named first as if it were alone, and all of them; what is open in a plane where none is."""
-    status = fdi["types"]["surface"]["status"]
-    isolated = sorted(
-        np.flatnonzero(status["is_isolated"]).tolist(), key=lambda s: status["isolated_at_s"][s]
-    )
-    faults = [_finding_on_surface(fdi, s, int(status["fault_type"][s]), names) for s in isolated]
-    alarms = fdi["types"]["pair"]["group_alarm"]
-    groups = [np.flatnonzero(fdi["layout"]["group"] == group).tolist() for group in range(len(alarms))]
-    if not alarms.any() and not faults and int(fdi["verdict"]["isolated_estimator"]) == NOT_ISOLATED:
-        alarms = np.ones_like(alarms)  # a statistical alarm by itself says of no plane that it is there
-    undecided = [
-        {**_NO_FINDINGS, "candidates": tuple(_candidate_texts(fdi, members, names))}
-        for alarm, members in zip(alarms, groups, strict=True)
-        if alarm and not set(members) & set(isolated)
-    ]
-    if faults:
-        return {**faults[0], "faults": (*faults, *undecided)}
-    if int(fdi["verdict"]["isolated_estimator"]) == UNANTICIPATED:
-        return {**_find_one(fdi, names), "faults": tuple(undecided)}
-    texts = tuple(text for finding in undecided for text in finding["candidates"])
-    return {**_NO_FINDINGS, "candidates": texts, "faults": tuple(undecided)}
-
-
-def _find_one(fdi: np.void, names: Sequence[str]) -> FindingDict:
-    estimator = int(fdi["verdict"]["isolated_estimator"])
-    isolated_at_s = float(fdi["verdict"]["isolated_at_s"])
-    if estimator == NOT_ISOLATED:
-        return {**_NO_FINDINGS, "candidates": tuple(_candidate_texts(fdi, range(len(names)), names))}
-    if estimator == UNANTICIPATED:
-        label = "unanticipated"
-        return {**_NO_FINDINGS, "isolated": label, "isolation_type": label, "isolation_time_s": isolated_at_s}
-    s = int(fdi["isolation"]["estimator"][estimator]["surface"])
-    kind = int(fdi["verdict"]["fault_type"])
-    return {
-        **_finding_on_surface(fdi, s, kind, names),
-        "isolation_time_s": isolated_at_s,
-        "type_time_s": float(fdi["verdict"]["typed_at_s"]) if kind >= 0 else None,
-    }
-
-
-def _finding_on_surface(fdi: np.void, s: int, kind: int, names: Sequence[str]) -> FindingDict:
-    """Return the finding on surface s, which is at fault; kind: of which type, -1 if open."""
-    srf = fdi["types"]["surface"][s]
-    return {
-        "isolated": names[s],
-        "isolation_time_s": float(srf["status"]["isolated_at_s"]),
-        "isolation_type": registry.TYPE_NAMES[kind] if kind >= 0 else None,
-        "type_time_s": float(srf["status"]["typed_at_s"]) if kind >= 0 else None,
-        "candidates": (registry.TYPE_NAMES[kind],) if kind >= 0 else tuple(_type_names(fdi, s)),
-        "estimate": estimate_fault_parameter(fdi, s, kind),
-        "estimate_interval": _ask_type(kind, "estimate_parameter_interval", fdi, s, kind),
-        "frequency_rad_s": _ask_type(kind, "estimate_frequency_rad_s", fdi, s, kind),
-    }
-
-
-def estimate_fault_parameter(fdi: np.void, s: int, h: int) -> float | None:
-    """Estimate the size of a fault of this type on surface s; None if it has none."""
-    estimate: float | None = _ask_type(h, "estimate_parameter", fdi, s, h)
-    return estimate
-
-
-def _ask_type(h: int, name: str, *arguments: Any) -> Any:
-    """Return an attribute of a type's row; None while the type is open."""
-    return getattr(registry.TYPES[h], name)(*arguments) if h >= 0 else None
-
-
-def _may_be_faulty(fdi: np.void, s: int) -> bool:
-    srf = fdi["types"]["surface"][s]
-    if srf["status"]["is_isolated"] or srf["status"]["basis"] == DEDUCED_FAULTY:
-        return True
-    return not (srf["status"]["basis"] == DEDUCED_HEALTHY or srf["not_at_position"])
-
-
-def _type_names(fdi: np.void, s: int) -> list[str]:
-    """Types still possible on surface s, each once.
-
-    Where a constant explains the flight, a type that varies and need not show itself counts only until the
-    constant has been seen for long enough, or until those types are excluded that it can look like.
-    """
-    srf = fdi["types"]["surface"][s]
-    kinds = np.flatnonzero(srf["sets"]["excluded"] == 0).tolist() if _may_be_faulty(fdi, s) else []
-    constant = [h for h in kinds if h < N_CONSTANT]
-    if constant and not fdi["types"]["config"]["has_eG"]:
-        ev = srf["evidence"]
-        brief = ev["n_anomalous"] - ev["n_rest"] < fdi["types"]["config"]["half_frames"]
-        alike = CONSTANT | registry.MUST_SHOW | CAN_LOOK_LIKE[:, constant].any(axis=1)
-        kinds = [h for h in kinds if brief or alike[h]]
-    pitch_pair = fdi["types"]["pair"]["enabled"] and fdi["layout"]["group"][s] == PITCH_GROUP
-    if pitch_pair and (MODE[constant] == GIVE_UP).any():
-        # if the other surface is off as well, each constant may be one of another type
-        kinds += sorted(range(N_CONSTANT), key=lambda h: MODE[h] == SCALE_COMMAND)
-    return list(dict.fromkeys(registry.TYPE_NAMES[h] for h in kinds))
-
-
-def _candidate_texts(fdi: np.void, surfaces: Iterable[int], names: Sequence[str]) -> Iterator[str]:
-    """`surface:type` for each that is possible; bare surfaces and `unanticipated` where no type fits.
-
-    Of one plane also both its surfaces, as `elevator+flap`.
-    """
-    first = int(fdi["types"]["pair"]["first_pitch"])
-    if fdi["types"]["pair"]["enabled"] and first in surfaces:
-        status = fdi["types"]["surface"]["status"][first]
-        if not (status["may_be_sole"] or status["is_isolated"]):
-            yield "unanticipated"  # no second fault explains what the first one leaves
-            return
-    possible = [s for s in surfaces if _may_be_faulty(fdi, s)]
-    for s in possible:
-        kinds = _type_names(fdi, s)
-        yield from ((f"{names[s]}:{kind}" for kind in kinds) if kinds else (names[s],))
-    if fdi["types"]["pair"]["enabled"]:
-        yield "+".join(names[s] for s in surfaces)
-    if not any(_type_names(fdi, s) for s in possible):
-        yield "unanticipated"

@@ -12,7 +12,8 @@ the output of the diagnosis. No other file writes it.
 import numpy as np
 
 from beaver_ftc.compiled import kernel, record, sized
-from beaver_ftc.diagnosis.detection import filters, statistical
+from beaver_ftc.diagnosis.detection import statistical
+from beaver_ftc.diagnosis.detection.fdae import fdae_unmodelled
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, WORST_CASE_DETECTOR, fill
 from beaver_ftc.diagnosis.types import (
     GIVE_UP,
@@ -259,7 +260,7 @@ def assess_unknown(out, cfg, found, types, layout, stat, fdae, bound):
         if weighs_statistics(stat, cfg.authority):
             statistical.fill_unmodelled(stat.block, stat.gust, unknown)
         else:
-            filters.fdae_unmodelled(fdae, bound.n_gyro, unknown)
+            fdae_unmodelled(fdae, bound.n_gyro, unknown)
     elevator = types.surface[layout.main[PITCH]]
     waited = elevator.evidence.n_anomalous >= types.config.half_frames and verdict.can_be_faulty(elevator)
     not_isolated = found.detected and found.isolated_estimator == NOT_ISOLATED

@@ -55,7 +55,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.compiled import kernel, record, sized
-from beaver_ftc.diagnosis.detection import parity, statistical
+from beaver_ftc.diagnosis.detection import statistical
 from beaver_ftc.diagnosis.detection.filters import (
     advance_bound,
     advance_reach,
@@ -450,13 +450,6 @@ def advance_estimators(iso, bound, x, F, dt):
     """Advance the estimators by a frame; arguments as in `advance_estimator`."""
     for fie in iso.estimator[: iso.config.n_estimators]:
         advance_estimator(iso, fie, bound, x, F, dt)
-
-
-@kernel
-def update_views(fie, views, cfg, forces, G):
-    """Fill `unlikely` of estimator fie: whether a parity view shows motion that its surface, with this column
-    (3,) of G, cannot cause."""
-    fie.unlikely = parity.views_exclude(views, cfg, forces, fie.surface, G)
 
 
 @kernel

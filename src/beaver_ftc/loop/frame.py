@@ -34,7 +34,7 @@ from beaver_ftc.diagnosis.conclusion import (
     hold_assessment,
     weighs_statistics,
 )
-from beaver_ftc.diagnosis.detection import filters
+from beaver_ftc.diagnosis.detection import fdae, filters
 from beaver_ftc.diagnosis.detection.filters import nearest_filter
 from beaver_ftc.diagnosis.error_map import N_MAP_COORDINATES, map_row, outside_span
 from beaver_ftc.diagnosis.model_prediction import (
@@ -349,7 +349,7 @@ def reset_surface_diagnosis(fdi):
     """Discard what the diagnosis of the surfaces made of a broken sensor."""
     conclusion.withdraw_conclusion(fdi.verdict)
     verdict.clear_modes(fdi.types.surface)
-    filters.reset_network(fdi.fdae.network)
+    fdae.reset_network(fdi.fdae.network)
 
 
 @apart

@@ -34,6 +34,7 @@ from beaver_ftc.aircraft import Aircraft, Term
 from beaver_ftc.aircraft.schema import MAX_SURFACES, MAX_TERMS_OF_ONE
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.table import AIRSPEED, ALPHA, BETA, N_Y
+from beaver_ftc.diagnosis.detection.filters import project
 from beaver_ftc.diagnosis.gusts import drop_accelerometers
 from beaver_ftc.diagnosis.state import PITCH, YAW
 from beaver_ftc.scenario.sensors import ACCELEROMETERS
@@ -95,11 +96,8 @@ def fill_vaneless_y(forces, w, y):
     w (3,) rad/s: rotation of the air in body axes. The aircraft turns at x - w against it: e = -L' w.
     """
     forces.y_free[:] = y
-    for i in range(2):
-        f = forces.component[i]
-        e_w = 0.0
-        for k in range(3):
-            e_w += f.L[k] * w[k]
+    for i, f in enumerate(forces.component):
+        e_w = project(f.L, w, False)
         forces.y_free[VANES[i]] -= (f.innovation / forces.q_ratio + e_w) / f.vane[1]
 
 

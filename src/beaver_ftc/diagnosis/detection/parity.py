@@ -48,8 +48,9 @@ from typing import NamedTuple
 import numpy as np
 
 from beaver_ftc.aircraft.schema import MAX_SURFACES
-from beaver_ftc.compiled import kernel, record, sized
+from beaver_ftc.compiled import kernel, record, row_of, sized
 from beaver_ftc.diagnosis.detection import likelihood
+from beaver_ftc.diagnosis.detection.filters import project
 from beaver_ftc.diagnosis.detection.forces import (
     MIN_UPDATES,
 )
@@ -151,7 +152,7 @@ def fill_view_drift(view, q, gust, own, forces, V):
         Q_d += (view.block.source == INERTIAL) * (m[0, SIDE_FORCE + i] * forces.q_ratio) ** 2 * f.Q_e
     if gust.output.gusty:
         for j in range(3):
-            view.L_rate[j] = m[0, 0] * L[0, j] + m[0, 1] * L[1, j] + m[0, 2] * L[2, j]
+            view.L_rate[j] = project_gust(row_of(m, 0), L, j)
             view.L_force[j] = 0.0
             for i, f in enumerate(forces.component):
                 view.L_force[j] += m[0, SIDE_FORCE + i] * f.L[j] * forces.q_ratio
@@ -193,9 +194,8 @@ def update_views(views, cfg, c, y, dt, k, latched):
         if not latched:
             likelihood.reset_slot(view.block, slot)
         likelihood.update_block(view.block, dt, decay)
-        if (
-            view.block.source != INERTIAL
-        ):  # the error of the integrated angle oscillates with the aircraft's own modes
+        # The error of the integrated angle oscillates with the aircraft's own modes.
+        if view.block.source != INERTIAL:
             update_tones(view.tones, view.block, c, cfg.alarm_level, inside, dt)
         view.peak = max((1.0 - (1.0 - cfg.forget) / PEAK_MEMORY_RATIO) * view.peak, view_score(view))
 
@@ -206,11 +206,10 @@ def changes_view(view, forces, s, G):
 
     The column that the view was turned across is that of the frame before, and zero in the first.
     """
-    m, effect = view.block.m, 0.0
-    for i in range(3):
-        effect += m[0, i] * G[i]
+    m = row_of(view.block.m, 0)
+    effect = project(G, m, False)
     for i, f in enumerate(forces.component):
-        effect += m[0, SIDE_FORCE + i] * f.G[s]
+        effect += m[SIDE_FORCE + i] * f.G[s]
     return view.nulled != s and effect != 0.0
 
 

@@ -337,9 +337,7 @@ def project_rows(b, rows):
 @kernel
 def fill_leak(b, rows, leak, col):
     """The last regressor of a view, leak col' nu: what an error of the column col (5,) lets through."""
-    b.regressor[b.n_Z - 1, 0] = 0.0
-    for r in range(N_ROWS):
-        b.regressor[b.n_Z - 1, 0] += leak * col[r] * rows.nu[b.source, r]
+    b.regressor[b.n_Z - 1, 0] = leak * project(col, row_of(rows.nu, b.source), False)
 
 
 @kernel

@@ -11,7 +11,7 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel, record, row_of
 from beaver_ftc.design.table import ALPHA, BETA
-from beaver_ftc.diagnosis.detection.filters import fill_gaussians, train
+from beaver_ftc.diagnosis.detection.fdae import fill_gaussians, train
 from beaver_ftc.diagnosis.state import PITCH
 
 # Centres of the network's basis functions on each axis of the aircraft: alpha (pitch) or beta, rad; the rate

@@ -16,7 +16,7 @@ from beaver_ftc.compiled import apart, kernel, record, sized
 from beaver_ftc.diagnosis import bounds, isolation, monitors, state
 from beaver_ftc.diagnosis import conclusion as conclusions
 from beaver_ftc.diagnosis.bounds import bound_dtype
-from beaver_ftc.diagnosis.detection import filters, statistical
+from beaver_ftc.diagnosis.detection import fdae, filters, statistical
 from beaver_ftc.diagnosis.detection.filters import bank_share
 from beaver_ftc.diagnosis.detection.parity import USUAL_SIZE, StatisticalSize
 from beaver_ftc.diagnosis.monitors import sensor_monitor
@@ -44,7 +44,7 @@ def fdi_dtype(n: int, size: StatisticalSize = USUAL_SIZE) -> np.dtype:
     statistical detector's record."""
     return record(
         config=state.SHARED_CONFIG_RECORD, bound=bound_dtype(n, size.n_map_boxes), bank=filters.BANK_RECORD,
-        fdae=filters.FDAE_RECORD, verdict=conclusions.conclusion_dtype(n), layout=state.layout_dtype(n),
+        fdae=fdae.FDAE_RECORD, verdict=conclusions.conclusion_dtype(n), layout=state.layout_dtype(n),
         isolation=isolation.isolation_dtype(n), types=records.fault_types_dtype(n),
         statistical=statistical.statistical_dtype(size), sensor_monitor=SENSOR_MONITOR_RECORD,
         published=zhang2005.PUBLISHED_RECORD, engine_monitor=monitors.ENGINE_MONITOR_RECORD,
@@ -63,7 +63,7 @@ def configure_diagnosis(fdi: np.void, pred: np.void, declared: Declared, travel:
         _refuse_pairs(declared)
     bounds.configure_bound(fdi["bound"], declared, pred["design"])
     filters.configure_bank(fdi["bank"], config, declared, dt)
-    filters.configure_fdae(fdi["fdae"], declared)
+    fdae.configure_fdae(fdi["fdae"], declared)
     monitors.configure_balance(fdi["engine_monitor"]["config"], aircraft)
     if config.is_published:
         zhang2005.reconfigure(fdi, declared, travel)
@@ -139,7 +139,7 @@ def detection_share(bank, alarm, authority, likely):
 def begin_scheme(fdi, prediction, measured):
     """Begin the detection filters at the first frame, all of the gyros' errors to come; fix the parity
     direction of each fault."""
-    filters.start(fdi.bank, fdi.fdae, measured.x, fdi.bound.n_gyro)
+    fdae.start(fdi.bank, fdi.fdae, measured.x, fdi.bound.n_gyro)
     filters.set_directions(fdi.isolation, prediction.G)
 
 

@@ -14,7 +14,7 @@ from beaver_ftc.compiled import apart, kernel
 from beaver_ftc.design.model import unanticipated_pitch
 from beaver_ftc.design.table import AIRSPEED, ALPHA, BETA
 from beaver_ftc.diagnosis import conclusion, gusts, isolation, monitors
-from beaver_ftc.diagnosis.detection import attitude, filters, forces, parity, statistical
+from beaver_ftc.diagnosis.detection import attitude, fdae, filters, forces, parity, statistical
 from beaver_ftc.diagnosis.detection.rows import finish_rows, update_forces
 from beaver_ftc.diagnosis.model_prediction import fill_old_effects, innovation_known
 from beaver_ftc.diagnosis.monitors import sensor_monitor
@@ -75,10 +75,11 @@ def weigh_loss(fdi, j):
 
 @apart(long_loops=True)
 def weigh_position(fdi, j):
-    """Fill `unlikely` of estimator j by the parity views."""
+    """Fill `unlikely` of estimator j: whether a parity view shows motion that its surface cannot cause."""
     stat, fies = fdi.statistical, fdi.isolation.estimator
-    G = fies[fdi.layout.position[fies[j].surface]].effect.Z
-    isolation.update_views(fies[j], stat.views[: stat.n_views], stat.test, stat.forces, G)
+    s, views = fies[j].surface, stat.views[: stat.n_views]
+    G = fies[fdi.layout.position[s]].effect.Z
+    fies[j].unlikely = parity.views_exclude(views, stat.test, stat.forces, s, G)
 
 
 @kernel
@@ -248,7 +249,7 @@ def advance_estimators_to_frame(fdi, prediction, measured, k, t):
         record_orders(fdi, prediction)
     leaks = found.isolated_estimator >= 0 or found.target >= 0
     x, F = prediction.x_before, prediction.F_known
-    filters.advance_fdae(fdi.fdae, fdi.bank, bound, x, F, found.detected, leaks, dt)
+    fdae.advance_fdae(fdi.fdae, fdi.bank, bound, x, F, found.detected, leaks, dt)
 
 
 @apart
@@ -257,13 +258,13 @@ def update_verdict(fdi, prediction, measured, t):
     if sensor_monitor.has_alarm(fdi.sensor_monitor):
         return
     before, found = fdi.verdict.detected, fdi.verdict
-    filters.fdae_residual(fdi.fdae, measured.x)
+    fdae.fdae_residual(fdi.fdae, measured.x)
     axis = find_alarm_axis(fdi, measured.y, t)
     if axis >= 0:
         conclusion.latch_alarm(found, axis, t)
     if found.detected:
         continue_isolation(fdi, measured, t, before)
-        filters.evaluate_network(fdi.fdae.network, measured.y[ALPHA], measured.y[BETA])
+        fdae.evaluate_network(fdi.fdae.network, measured.y[ALPHA], measured.y[BETA])
 
 
 @kernel
@@ -281,9 +282,9 @@ def find_alarm_axis(fdi, y, t):
 @apart
 def plugin_update(fdi, measured, t):
     """Take the plug-in's verdict, fdi.plugin_verdict."""
-    filters.fdae_residual(fdi.fdae, measured.x)
+    fdae.fdae_residual(fdi.fdae, measured.x)
     conclusion.record_plugin_verdict(fdi.verdict, fdi.plugin_verdict, t)
     if fdi.verdict.isolated_estimator >= 0:
         fdi.isolation.estimator[fdi.verdict.isolated_estimator].theta[:] = fdi.plugin_verdict.theta
     if fdi.verdict.detected:
-        filters.evaluate_network(fdi.fdae.network, measured.y[ALPHA], measured.y[BETA])
+        fdae.evaluate_network(fdi.fdae.network, measured.y[ALPHA], measured.y[BETA])

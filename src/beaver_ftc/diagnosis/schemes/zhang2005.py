@@ -21,7 +21,7 @@ import numpy as np
 
 from beaver_ftc.compiled import apart, kernel, record
 from beaver_ftc.diagnosis import conclusion
-from beaver_ftc.diagnosis.detection import filters
+from beaver_ftc.diagnosis.detection.fdae import advance_fdae, fdae_residual
 from beaver_ftc.diagnosis.detection.state_network import (
     STATE_NETWORK_RECORD,
     configure_network,
@@ -92,9 +92,8 @@ def advance_estimators_to_frame(fdi, prediction, measured):
     adaptive_estimators.update_filters(fdi, prediction, measured)
     adaptive_estimators.update_estimators(fdi, prediction)
     train_if_due(pub, fdi.fdae, fdi.verdict.detected, dt)
-    filters.advance_fdae(
-        fdi.fdae, fdi.bank, fdi.bound, prediction.x_before, prediction.means.F, False, False, dt
-    )
+    x, F = prediction.x_before, prediction.means.F
+    advance_fdae(fdi.fdae, fdi.bank, fdi.bound, x, F, False, False, dt)
     if mu > 0.0:
         fdi.fdae.output.threshold[:], fdi.bank.output.threshold[0] = mu, mu
         for fie in fdi.isolation.estimator[: fdi.isolation.config.n_estimators]:
@@ -107,7 +106,7 @@ def update_verdict(fdi, prediction, measured, t):
     if sensor_monitor.has_alarm(fdi.sensor_monitor):
         return
     before, found, net = fdi.verdict.detected, fdi.verdict, fdi.published.network
-    filters.fdae_residual(fdi.fdae, measured.x)
+    fdae_residual(fdi.fdae, measured.x)
     axis = fdae_axis(fdi.fdae)
     evaluate_state_network(net, fdi.layout.main, measured.x, measured.y, prediction.u)
     fdi.fdae.network.output[:] = net.output

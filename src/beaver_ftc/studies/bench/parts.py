@@ -65,8 +65,8 @@ PARTS: dict[str, dict[str, Kernel]] = {
     },
     # the network of the detection estimator, which learns after the alarm
     "network": {
-        "diagnosis.detection.filters.train_network": nothing,
-        "diagnosis.detection.filters.evaluate_network": nothing,
+        "diagnosis.detection.fdae.train_network": nothing,
+        "diagnosis.detection.fdae.evaluate_network": nothing,
     },
     # who is in charge
     "supervisor": {"loop.frame.decide": nothing},

@@ -11,7 +11,7 @@ from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S
 from beaver_ftc.control.laws import discretise
 from beaver_ftc.design.fdc import GEOMETRY, MASS, MOMENTS, SURFACES, TERMS
 from beaver_ftc.design.model import inertia_coefficients
-from beaver_ftc.diagnosis.detection.filters import (
+from beaver_ftc.diagnosis.detection.fdae import (
     ALPHA_CENTRES_RAD,
     BETA_CENTRES_RAD,
     N_BASIS,

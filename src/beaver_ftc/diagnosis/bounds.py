@@ -243,11 +243,9 @@ def inertia_bounds(tol: float, mass: MassProperties) -> np.ndarray:
     """
     nominal = np.array(inertia_coefficients(mass))
     worst = np.zeros(nominal.size)
-    for signs in product((-1.0, 1.0), repeat=4):
-        inertias = {
-            name: getattr(mass, name) * (1 + tol * sign)
-            for name, sign in zip(_INERTIA_NAMES, signs, strict=True)
-        }
+    for scales in product((1 - tol, 1 + tol), repeat=4):
+        names = zip(_INERTIA_NAMES, scales, strict=True)
+        inertias = {name: getattr(mass, name) * scale for name, scale in names}
         changed = np.array(inertia_coefficients(replace(mass, **inertias)))
         worst = np.maximum(worst, np.abs(changed - nominal))
     worst.flags.writeable = False  # kept: the same for every flight of a design

@@ -43,9 +43,8 @@ def plugin_errors(declared: Declared, model: np.ndarray, y: np.ndarray, u: np.nd
     }
     dC = declared.coefficients.absolute(aircraft.moments, model["moments"]["value"][0])
     gust, gust_s = declared.air.rotation(float(y[2]), aircraft.geometry.span_m)
-    noise, bias, resolution, _ = list(instruments.values())[:4]
-    sigma = np.sqrt(noise**2 + bias**2 + resolution**2 / 12.0)[Y0:]
-    du = declared.deflections_rad
+    noise, bias, resolution = (errors.each(kind)[Y0:] for kind in ("noise", "steady", "resolution"))
+    sigma = np.sqrt(noise**2 + bias**2 + resolution**2 / 12.0)
     return DeclaredErrors(
         **instruments,
         **servo_data(declared),
@@ -55,7 +54,7 @@ def plugin_errors(declared: Declared, model: np.ndarray, y: np.ndarray, u: np.nd
         coefficients=dC,
         inertia=declared.inertia,
         deflection_rad=declared.deflection_rad,
-        model_rad_s2=model_error_std(model, y, u, sigma, dC, du),
+        model_rad_s2=model_error_std(model, y, u, sigma, dC, declared.deflections_rad),
     )
 
 

@@ -401,7 +401,9 @@ def unmeasured_drift(gust, V, i_1, i_2, as_rolling=False):
 def add_turn_variance(gust, V, dt):
     """Add to var_now the effect of the turn of the gusts' axes in dt s; V m/s.
 
-    dt V sum_j (L C_dot)_ij (L C_dot)_kj tau_j^2 Q_j share_j / 2      j: roll, yaw
+        dt V sum_j (L C_dot)_ij (L C_dot)_kj tau_j^2 Q_j share_j / 2      j: roll, yaw
+
+    share: 1 of the rolling gust, which no vane measures; turn_past of the yawing gust.
     """
     mem = gust.memory
     if not mem.turns_fast:

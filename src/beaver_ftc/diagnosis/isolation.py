@@ -55,7 +55,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.compiled import kernel, record, sized
-from beaver_ftc.diagnosis.detection import statistical
+from beaver_ftc.diagnosis.detection import parity, statistical
 from beaver_ftc.diagnosis.detection.filters import (
     advance_bound,
     advance_reach,
@@ -240,21 +240,21 @@ DAMAGE_HOLD_OFF_S = 4.0  # in still air what damage left over was excluded withi
 LOSS_RANGE = (-1.0, 0.0)
 _THRESHOLD_KINDS = {"interval": INTERVAL_THRESHOLD, "published": PUBLISHED_THRESHOLD}
 
-EstimatorEntry = tuple[str, int, int]  # of an isolation estimator; surface: its index
+# Of an isolation estimator: its name, LOSS or POSITION_HYPOTHESIS, the index of its surface.
+EstimatorEntry = tuple[str, int, int]
 
 
 def list_estimators(fault_class: str, aircraft: Aircraft) -> tuple[EstimatorEntry, ...]:
     """The isolation estimators of a fault class, in the bank's order.
 
-    published: a loss of the surface that leads each axis, and of what turns with it. all: a loss and a
-    position of every surface.
+    published: a loss of the surface that leads each axis, and of what turns with it. all: those, a loss of
+    each stand-in, and a position of every surface.
     """
     index = {name: s for s, name in enumerate(aircraft.surfaces)}
-    losses = tuple((name, LOSS, index[name]) for name in aircraft.class_of_losses)
     if fault_class == "published":
-        return losses
-    stand_ins = tuple((name, LOSS, s) for name in aircraft.stand_ins for s in [index[name]])
-    return (*losses, *stand_ins, *((f"{name}_position", POSITION_HYPOTHESIS, s) for name, s in index.items()))
+        return tuple((name, LOSS, index[name]) for name in aircraft.class_of_losses)
+    losses = ((name, LOSS, index[name]) for name in (*aircraft.class_of_losses, *aircraft.stand_ins))
+    return (*losses, *((f"{name}_position", POSITION_HYPOTHESIS, s) for name, s in index.items()))
 
 
 def estimator_names(fault_class: str, aircraft: Aircraft) -> tuple[str, ...]:
@@ -450,6 +450,13 @@ def advance_estimators(iso, bound, x, F, dt):
     """Advance the estimators by a frame; arguments as in `advance_estimator`."""
     for fie in iso.estimator[: iso.config.n_estimators]:
         advance_estimator(iso, fie, bound, x, F, dt)
+
+
+@kernel
+def weigh_views(fie, views, cfg, forces, G):
+    """Fill `unlikely` of estimator fie: whether a parity view shows motion that its surface, with this column
+    (3,) of G, cannot cause."""
+    fie.unlikely = parity.views_exclude(views, cfg, forces, fie.surface, G)
 
 
 @kernel

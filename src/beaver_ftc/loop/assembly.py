@@ -260,7 +260,7 @@ def configure_diagnosis_at_trim(frame: np.void, scenario: Scenario, trim: Trim) 
     anchor(design, trim.x, trim.y, trim.u)
     configure_sensor_monitor(fdi["sensor_monitor"], declared, design, trim.y)
     mass = mass_of(declared.design_model, declared.aircraft)
-    configure_statistics(fdi, declared, design, mass, (trim.x, trim.y, trim.u), scenario.rate_hz)
+    configure_statistics(fdi, declared, design, mass, (trim.x, trim.y, trim.u))
 
 
 def _assemble_design(scenario: Scenario, travel: np.ndarray, line: int) -> np.ndarray:

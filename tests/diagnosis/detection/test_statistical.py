@@ -39,7 +39,7 @@ class Detector:
         frame = self.frames[0]
         self.fdi, self.dt = frame["fdi"], 1.0 / rate_hz
         design, declared = frame["prediction"]["design"], Declared.of(scenario)
-        statistical_design.configure_statistics(self.fdi, declared, design, MASS, LEVEL_FLIGHT, rate_hz)
+        statistical_design.configure_statistics(self.fdi, declared, design, MASS, LEVEL_FLIGHT)
         self.detector = self.fdi["statistical"]
         measured = np.zeros(1, MEASURED)[0]
         measured["x"], measured["y"][:5] = LEVEL_FLIGHT[:2]

@@ -23,7 +23,8 @@ Symbols of the kernels:
     eps, mu rad/s             residual of a filter and its threshold
     n rad/s                   nbar of bounds.py: bound on the changing part of a gyro's error
     a, m, i                   decay per frame, filter, axis
-    fie, lo, hi, base, Z, e   isolation estimator; its set of theta; its fault base + theta Z +- e, rad/s2
+    fie; h, Z, r rad/s2       isolation estimator; its fault h + theta Z +- r (EFFECT_RECORD of isolation.py)
+    lo, hi                    ends of an interval: of theta, of a residual, of the acceleration by a fault
     bank, bound               records: BANK_RECORD, `bound_dtype`
 """
 
@@ -156,12 +157,20 @@ def update_bank(bank, bound, x, x_old, F, dt):
 
 
 @kernel
+def leaves_bound(bank, i):
+    """Whether a filter of the bank leaves its bound on axis i: |eps| > mu."""
+    for m in range(bank.config.n_filters):
+        if abs(bank.output.residual[m, i]) > bank.output.threshold[m, i]:
+            return True
+    return False
+
+
+@kernel
 def bank_axis(bank):
     """The first axis on which a filter of the bank leaves its bound, or -1."""
     for i in range(3):
-        for m in range(bank.config.n_filters):
-            if abs(bank.output.residual[m, i]) > bank.output.threshold[m, i]:
-                return i
+        if leaves_bound(bank, i):
+            return i
     return -1
 
 

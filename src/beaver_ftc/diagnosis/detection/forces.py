@@ -124,28 +124,25 @@ def update_inertial(forces, f, i, y, dt):
 
 @kernel
 def fill_angle_rates(forces, gravity, meas):
-    """Fill `angle_rate` with d beta / dt and d alpha / dt in still air, rad/s.
+    """Fill `angle_rate` with beta' and alpha' in still air, rad/s.
 
-        a = a_m + g d      V_dot = e' a      (u, v, w)_dot = a - x x V e      e = V vector / V
-        beta_dot = (v_dot - V_dot e_y) / (V cos beta)
-        alpha_dot = (w_dot cos alpha - u_dot sin alpha) / (V cos beta)
+        beta' = p sin(alpha) - r cos(alpha)
+                + (a_y cos(beta) - (a_x cos(alpha) + a_z sin(alpha)) sin(beta)) / V
+        alpha' = q - tan(beta) (p cos(alpha) + r sin(alpha))
+                 + (a_z cos(alpha) - a_x sin(alpha)) / (V cos(beta))
 
-    a_m (3,) m/s2: accelerometers; g m/s2: gravity; d (3,): its direction in body axes; x (3,) rad/s.
+    a (3,) m/s2: accelerometers, and gravity g in body axes; p, q, r rad/s: rates; V m/s: airspeed.
     """
-    g, x, a_m = gravity, meas.x, meas.force
+    g, x, a, V, beta = gravity, meas.x, meas.force, meas.y[AIRSPEED], meas.y[BETA]
+    c, s = np.cos(meas.y[ALPHA]), np.sin(meas.y[ALPHA])
     phi, th = meas.attitude[0], meas.attitude[1]
-    alpha, beta, V = meas.y[ALPHA], meas.y[BETA], meas.y[AIRSPEED]
-    e_x, e_y = np.cos(alpha) * np.cos(beta), np.sin(beta)
-    e_z = np.sin(alpha) * np.cos(beta)
-    a_x = a_m[0] - g * np.sin(th)
-    a_y = a_m[1] + g * np.cos(th) * np.sin(phi)
-    a_z = a_m[2] + g * np.cos(th) * np.cos(phi)
-    V_dot = e_x * a_x + e_y * a_y + e_z * a_z
-    v_dot = a_y + V * (x[0] * e_z - x[2] * e_x)
-    forces.angle_rate[SIDE_INDEX] = (v_dot - V_dot * e_y) / (V * np.cos(beta))
-    u_dot = a_x + V * (x[2] * e_y - x[1] * e_z)
-    w_dot = a_z + V * (x[1] * e_x - x[0] * e_y)
-    forces.angle_rate[NORMAL_INDEX] = (w_dot * np.cos(alpha) - u_dot * np.sin(alpha)) / (V * np.cos(beta))
+    a_x = a[0] - g * np.sin(th)
+    a_y = a[1] + g * np.cos(th) * np.sin(phi)
+    a_z = a[2] + g * np.cos(th) * np.cos(phi)
+    by_a = (a_y * np.cos(beta) - (a_x * c + a_z * s) * np.sin(beta)) / V
+    forces.angle_rate[SIDE_INDEX] = x[0] * s - x[2] * c + by_a
+    by_a = (a_z * c - a_x * s) / (V * np.cos(beta))
+    forces.angle_rate[NORMAL_INDEX] = x[1] - np.tan(beta) * (x[0] * c + x[2] * s) + by_a
 
 
 def terms_of_force(aircraft: Aircraft, i: int) -> list[Term]:

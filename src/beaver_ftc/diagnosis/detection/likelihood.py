@@ -82,10 +82,9 @@ import numpy as np
 from beaver_ftc.compiled import kernel, plain, record, sized
 from beaver_ftc.diagnosis.state import LOSS
 
-# A block is a set of axes with correlated noise: pitch, and roll with yaw, the latter twice. The state of a
-# filter is e, then d.
-# The last: roll and yaw again, with a drift that returns to zero.
-PITCH_BLOCK, LATERAL_BLOCK, REVERTING_BLOCK = 0, 1, 2
+# A block is a set of axes with correlated noise: pitch, roll with yaw, and roll with yaw again, with a drift
+# that returns to zero.
+PITCH_BLOCK, LATERAL_BLOCK, REVERTING_BLOCK = range(3)
 N_FILTER_BLOCKS = 3
 D0 = 2  # in the state of a filter: the place of d, after e of two axes
 N_SLOTS = 10
@@ -154,10 +153,9 @@ FILTER_RECORD = record(**_FILTER_FIELDS)
 
 def set_signs(b: np.void, kinds: Sequence[int]) -> None:
     """Fill the sign of N that supports each hypothesis of a block, in all of its onset tests."""
-    b["tests"]["supporting_correlation_sign"] = 0.0
-    for h, kind in enumerate(kinds):
-        k = (h % GROUP_SIZE) * N_SLOTS
-        b["tests"]["supporting_correlation_sign"][h // GROUP_SIZE, k : k + N_SLOTS] = SIGN_OF_KIND[kind]
+    signs = np.zeros(GROUP_SIZE * len(b["tests"]))
+    signs[: len(kinds)] = [SIGN_OF_KIND[kind] for kind in kinds]
+    b["tests"]["supporting_correlation_sign"] = signs.repeat(N_SLOTS).reshape(-1, N_GROUP_TESTS)
 
 
 @sized

@@ -249,7 +249,9 @@ def update_forces(rows, forces, gust, du, meas, u, dt):
 
 @kernel
 def update_force(rows, forces, f, gust, i, meas, u):
-    """Update force i, whose record is f: its innovation e = a_i / c - f_hat, and the effects of surfaces.
+    """Update force i, whose record is f: its innovation e = a / c - f_hat, and the effects of surfaces.
+
+    a m/s2: reading of the force's accelerometer; c m: the chord.
 
     The rows have the effects of the frame before, as for the rates: the law reacts to the noise of a reading,
     which must not be in a signature too (statistical.md, "Signature from the previous frame").

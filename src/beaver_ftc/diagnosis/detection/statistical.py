@@ -11,7 +11,7 @@ Symbols of the kernels:
 
     nu (3,) rad/s2                innovation of the frame
     eta (3,) rad/s2               bound on the uncertainty
-    x (3,) rad/s, y, u (n,) rad   rates, readings, deflections; F = f + G u of the design model, rad/s2
+    y, u (n,) rad                 readings, deflections
     w                             one over the number of instants in a frame
     dt s, k                       duration and number of the frame
     b, h, v                       block, hypothesis, view

@@ -111,12 +111,7 @@ def derive_alarm_level(false_alarms_per_h: float, rate_hz: float, n_tests: int) 
 
 
 def configure_statistics(
-    fdi: np.void,
-    declared: Declared,
-    model: np.void,
-    mass: MassProperties,
-    trim: TrimState,
-    rate_hz: float,
+    fdi: np.void, declared: Declared, model: np.void, mass: MassProperties, trim: TrimState
 ) -> None:
     """Fill the statistical part of a diagnosis record; trim: x (3,), y and u (surfaces,) in trim.
 
@@ -128,35 +123,26 @@ def configure_statistics(
     stat["alarm"]["detected_at_s"] = -1.0
     if settings is None or not fdi["config"]["enabled"]:  # a plug-in diagnoses, or nothing does
         return
-    cfg, gust, aircraft = stat["test"], stat["gust"], declared.aircraft
-    errors = declared.sensors
+    cfg, gust, aircraft, errors = stat["test"], stat["gust"], declared.aircraft, declared.sensors
+    rate_hz, V = declared.rate_hz, float(trim[1][AIRSPEED])
     dt_s = 1.0 / rate_hz
-    n_instants = int(fdi["config"]["n_substeps"])
-    fill(cfg, enabled=1, w=1.0 / max(n_instants, 1))
-    V = float(trim[1][AIRSPEED])
     rate = eta_rate(settings, aircraft, dt_s)
+    fill(cfg, enabled=1, w=1.0 / declared.substeps)
     stat["forces"]["in_use"] = declared.uses_accelerometers
     gust["output"]["uses_accelerometers"] = declared.follows_gusts_by_accelerometers
     configure_gust(gust, declared, mass)
-    views = declared.fdi.compares_across(n_instants)
-    n_tests = count_tests(
-        aircraft, *(list_directions(aircraft, declared.uses_accelerometers) if views else ())
-    )
-    _configure_levels(cfg, declared, n_tests, rate_hz)
+    views = list_directions(aircraft, declared.uses_accelerometers) if declared.compares_across else ()
+    n_tests = count_tests(aircraft, *views)
+    _configure_levels(cfg, declared, n_tests)
     configure_gust_speed(gust, declared, float(cfg["alarm_level"]), V)
     tol = coefficient_bounds(declared, model, mass, *trim[1:])
     configure_rows(stat, errors, tol, fdi["bound"]["declared_errors"])
     _configure_blocks(stat, declared, rate, dt_s)
     stat["noise"]["rate0"] = settings.uncertainty_rad_s * dt_s
     _configure_noise(stat, settings.uncertainty_rad_s, declared, model, trim, dt_s)
-    if views:
-        configure_tones(
-            stat["tone_test_config"],
-            settings.false_alarms_per_h / (3600.0 * rate_hz * n_tests),
-            V,
-            rate * rate_hz,
-            dt_s,
-        )
+    if declared.compares_across:
+        false_alarm = settings.false_alarms_per_h / (3600.0 * rate_hz * n_tests)
+        configure_tones(stat["tone_test_config"], false_alarm, V, rate * rate_hz, dt_s)
         if declared.uses_accelerometers:
             configure_forces(fdi, declared, trim, jacobian(model, *trim)[3], dt_s)
             _configure_view_gusts(stat, declared)
@@ -164,7 +150,7 @@ def configure_statistics(
     _configure_lengths(stat, V, rate_hz)
     monitor = fdi["sensor_monitor"]["config"]
     if monitor["enabled"] and monitor["noisy"]:
-        configure_attitude(stat["attitude"], monitor["D"], errors, float(stat["test"]["margin"]), dt_s)
+        configure_attitude(stat["attitude"], monitor["D"], errors, float(cfg["margin"]), dt_s)
     if gust["output"]["gusty"]:
         # the filters that assume no gust: they trim as the others, with a drift in any direction
         for name in ("n", "a", "R_y", "P_xx", "P_dd"):
@@ -172,10 +158,9 @@ def configure_statistics(
         add_gust_noise(stat, errors, model, *trim[1:], dt_s)
 
 
-def _configure_levels(cfg: np.void, declared: Declared, n_tests: int, rate_hz: float) -> None:
+def _configure_levels(cfg: np.void, declared: Declared, n_tests: int) -> None:
     """Fill the level of the alarm, the margin of isolation, and how evidence is forgotten and bounded."""
-    settings = declared.fdi.statistical
-    aircraft = declared.aircraft
+    settings, aircraft, rate_hz = declared.fdi.statistical, declared.aircraft, declared.rate_hz
     assert settings is not None
     # margin: difference of log-likelihood ratios that noise exceeds in a second with probability `misnaming`
     fill(

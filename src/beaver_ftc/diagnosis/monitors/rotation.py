@@ -8,9 +8,7 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel
 from beaver_ftc.diagnosis.monitors.numbering import PSI, THETA
-from beaver_ftc.plant.instruments import (
-    PHI,
-)
+from beaver_ftc.plant.instruments import PHI
 
 
 @kernel

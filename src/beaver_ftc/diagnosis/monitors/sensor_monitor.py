@@ -267,7 +267,7 @@ def count_same(mon, y):
 
 @kernel
 def is_frozen(mon, i):
-    """Whether a sensor is frozen: no sound one gives the same reading for so many samples."""
+    """Whether sensor i is frozen: no sound one gives the same reading for so many samples (`n_frozen`)."""
     return mon.n_same[i] >= mon.config.n_frozen[i]
 
 
@@ -373,14 +373,11 @@ def raise_alarm(mon, found, t):
     o = mon.output
     if o.alarmed:
         return
-    o.alarmed = 1
-    o.alarmed_at_s = t
-    if found.detected and found.detected_at_s < t - MIN_LEAD_S:
-        o.keeps_surface = 1
-        return
+    o.alarmed, o.alarmed_at_s = 1, t
     if found.detected:
-        # the same fault, which the rates have shown first
-        o.alarmed_at_s = found.detected_at_s
+        o.keeps_surface = found.detected_at_s < t - MIN_LEAD_S
+        if not o.keeps_surface:  # the same fault, which the rates have shown first
+            o.alarmed_at_s = found.detected_at_s
 
 
 @kernel
@@ -429,10 +426,9 @@ def judge_gyros(mon, bank, bound, dt):
     nu = bank.output.innovation
     for i in range(3):
         g = mon.gyro[i]
-        estimate = abs(mon.w[i])
-        B = mon.w_bound[i]
         if g.verdict != GYRO_OPEN:
             continue
+        estimate, B = abs(mon.w[i]), mon.w_bound[i]
         largest, jump = max(abs(g.shown), abs(g.shown_past)), (g.shown - g.shown_past) / dt  # rad/s, rad/s2
         # of w, rad/s, by the attitude's noise
         noise = SAMPLES_IN_JUMP * mon.per_sample[i] / mon.h
@@ -614,10 +610,8 @@ def suspect_attitude(mon):
     """Suspect gyros and attitude: one axis alone, or one angle alone, but for what an error of phi or theta
     from the start explains. A gyro's error may appear in an angle first. A frozen angle excludes the gyros;
     it is suspected until it is known not to be frozen."""
-    suspect = mon.output.suspect
-    ratio = mon.ratio[:ANGLE_TEST]
-    turns = mon.exceeded[:ANGLE_TEST]
-    angles = mon.exceeded[ANGLE_TEST:SPEED_TEST]
+    suspect, ratio = mon.output.suspect, mon.ratio[:ANGLE_TEST]
+    turns, angles = mon.exceeded[:ANGLE_TEST], mon.exceeded[ANGLE_TEST:SPEED_TEST]
     refuted = mon.initial.refuted[H_PHI:, ANGLE_TEST:SPEED_TEST]
     frozen = last_frozen(mon, ANGLES) >= 0
     worst = np.argmax(ratio)
@@ -658,9 +652,7 @@ def suspect_flow(mon, alarm):
     """Suspect a flow sensor, an accelerometer, or a gyro whose error may be hidden in the tests of the
     attitude. No flow sensor moves the attitude's tests.
     """
-    suspect = mon.output.suspect
-    cleared = mon.cleared
-    turns = mon.exceeded[:ANGLE_TEST]
+    suspect, turns = mon.output.suspect, mon.exceeded[:ANGLE_TEST]
     by_gyro = alarm > SPEED_TEST and turns.any()
     flow = SENSOR_OF[alarm]
     for i in range(3 if alarm > SPEED_TEST else 0):
@@ -669,7 +661,7 @@ def suspect_flow(mon, alarm):
         suspect_accelerometers(mon)
         suspect[flow] = 1
     for i in range(N_SENSORS):
-        suspect[i] &= not cleared[i]
+        suspect[i] &= not mon.cleared[i]
 
 
 @kernel
@@ -782,8 +774,7 @@ def has_alarm(mon):
 def replace_readings(mon, pred, measured):
     """Replace the readings of isolated or missing sensors by estimates from the others. Accelerometers are
     not replaced: none of them is used once one of them may be broken."""
-    o = mon.output
-    unused = mon.output.is_reading_unused
+    o, unused = mon.output, mon.output.is_reading_unused
     for i in range(N_SENSORS):
         unused[i] |= measured.missing[i]
         if unused[i] and i < AX:

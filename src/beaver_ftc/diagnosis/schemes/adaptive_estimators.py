@@ -75,11 +75,10 @@ def weigh_loss(fdi, j):
 
 @apart(long_loops=True)
 def weigh_position(fdi, j):
-    """Fill `unlikely` of estimator j: whether a parity view shows motion that its surface cannot cause."""
+    """Fill `unlikely` of estimator j by the parity views."""
     stat, fies = fdi.statistical, fdi.isolation.estimator
-    s, views = fies[j].surface, stat.views[: stat.n_views]
-    G = fies[fdi.layout.position[s]].effect.Z
-    fies[j].unlikely = parity.views_exclude(views, stat.test, stat.forces, s, G)
+    G = fies[fdi.layout.position[fies[j].surface]].effect.Z
+    isolation.weigh_views(fies[j], stat.views[: stat.n_views], stat.test, stat.forces, G)
 
 
 @kernel

@@ -19,6 +19,7 @@ types/__init__.py.
 import numpy as np
 
 from beaver_ftc.compiled import kernel
+from beaver_ftc.diagnosis.detection.filters import leaves_bound
 from beaver_ftc.diagnosis.state import LATERAL_GROUP, PITCH, PITCH_GROUP, ROLL, UNANTICIPATED, YAW
 from beaver_ftc.diagnosis.types import (
     GIVE_UP,
@@ -37,10 +38,8 @@ from beaver_ftc.diagnosis.types.verdict import NO_SURFACE, can_be_faulty, consta
 def latch_groups(pair, bank):
     """Latch for each group of surfaces whether a residual of the bank has exceeded its threshold."""
     for i in range(3):
-        group = PITCH_GROUP if i == PITCH else LATERAL_GROUP
-        for m in range(bank.config.n_filters):
-            if abs(bank.output.residual[m, i]) > bank.output.threshold[m, i]:
-                pair.group_alarm[group] = 1
+        if leaves_bound(bank, i):
+            pair.group_alarm[PITCH_GROUP if i == PITCH else LATERAL_GROUP] = 1
 
 
 @kernel
@@ -220,7 +219,7 @@ def isolate_pitch(types, layout, t):
     sole = sole_pitch(types, layout)
     for s, srf in enumerate(types.surface):
         if layout.group[s] == PITCH_GROUP:
-            kind = verdict.type_on_surface(types.config, srf) if s == sole else -1
+            kind = verdict.type_on_surface(types.config, srf) if s == sole else verdict.TYPE_UNDECIDED
             # a jam may as well be a trailing surface or one at its stop, if the other is off by a constant
             open_yet = kind >= 0 and MODE[kind] == GIVE_UP
             verdict.update_status(srf, s == sole, verdict.TYPE_UNDECIDED if open_yet else kind, t)

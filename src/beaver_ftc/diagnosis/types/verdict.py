@@ -245,8 +245,8 @@ def decide_single(types, past, layout, t):
 
 @kernel
 def update_status(srf, is_isolated, kind, t):
-    """Name a surface and the type of its fault (-1 if open), or take the name back; t s."""
-    kind = kind if is_isolated else -1
+    """Record at t s whether a surface is isolated, and of which type (TYPE_UNDECIDED if open)."""
+    kind = kind if is_isolated else TYPE_UNDECIDED
     status = srf.status
     if is_isolated and not status.is_isolated:
         status.isolated_at_s = t

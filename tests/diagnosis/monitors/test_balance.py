@@ -27,7 +27,7 @@ def aircraft(signals, knows_engines=True):
 )
 def test_a_monitor_of_engines_reads_their_signals_where_the_aircraft_has_them(signals, thrust, turning):
     """y has alpha, beta, airspeed and dynamic pressure first."""
-    config = np.zeros(1, monitors.BALANCE_CONFIG)[0]
+    config = np.zeros(1, monitors.ENGINE_MONITOR_RECORD)[0]["config"]
     monitors.configure_balance(config, aircraft(signals))
     assert config.tolist() == pytest.approx((3, thrust, turning, -0.95 / 12.0, 0.05 / 12.0))
 
@@ -38,7 +38,7 @@ def test_a_monitor_of_engines_reads_their_signals_where_the_aircraft_has_them(si
      (("engines_n",), True)],
 )  # fmt: skip
 def test_where_the_symmetry_of_engines_is_not_measured_nothing_is_monitored(signals, knows_engines):
-    config = np.zeros(1, monitors.BALANCE_CONFIG)[0]
+    config = np.zeros(1, monitors.ENGINE_MONITOR_RECORD)[0]["config"]
     monitors.configure_balance(config, aircraft(signals, knows_engines))
     assert not any(config.tolist())
 

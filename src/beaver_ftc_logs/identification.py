@@ -6,7 +6,6 @@ covariance, ma and ar the colour of the noise. V0 is the airspeed at which the c
 
 from collections.abc import Sequence
 from itertools import product
-from math import isfinite
 
 import numpy as np
 
@@ -14,10 +13,10 @@ from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import extremes, fitting, gyro_noise, orders, regression, trust, validation
 from beaver_ftc_logs.folds import fold_qualities
-from beaver_ftc_logs.least_squares import left_by, spectral_density, variance_inflation
+from beaver_ftc_logs.least_squares import left_by
 from beaver_ftc_logs.model import FittedRanges, Model, NoiseModel
 from beaver_ftc_logs.recording import Floats
-from beaver_ftc_logs.regression import Groups, Parts, group_indices
+from beaver_ftc_logs.regression import Parts
 from beaver_ftc_logs.samples import (
     NOISE_MA_CANDIDATES,
     UNFITTED_GYROS_RAD_S,
@@ -28,16 +27,11 @@ from beaver_ftc_logs.samples import (
 )
 from beaver_ftc_logs.vehicle import Vehicle
 
-_MIN_COLLINEAR = 10.0
 _SCORES = ("classes", "healthy_or_faulty", "mean_error", "held_by_bounds")
 _DECISIVE_BIC = 10.0
 """By how much a criterion must be less: odds of 150 to 1 [Kass1995, section 3.2]."""
-_SPECTRUM_BANDS_HZ = ((0.0, 0.1), (0.1, 0.5), (0.5, 1.0), (1.0, 2.0), (2.0, 5.0), (5.0, 10.0))
-FREE_RUN_WINDOW_S = 2.0
-_MIN_FREE_RUNS = 400
 _AIRSPEED_POWERS = (0.0, 1.0, 3.0)
 _MAX_ROUNDS = 8
-_MAX_DELAY_S, _MIN_SERVO_LAG_S, _MAX_SERVO_LAG_S = 0.6, 0.005, 1.0
 
 
 def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
@@ -62,10 +56,6 @@ def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
         ],
         "tests": folds,
         "another_day": expect_another_day(folds, model),
-        "collinear": collinear_names(parts, model),
-        "colour": median_inflation(parts, model),
-        "spectrum": density_ratios(parts, model),
-        "output_error": fit_output_error(parts, group_indices(model)),
     }
     settings = model.settings.model_copy(update={"bounds": mass})
     return model.model_copy(update={"settings": settings, "identified": results})
@@ -270,19 +260,6 @@ def _check_units(flights: Sequence[Samples], vehicle: Vehicle) -> None:
         trust.refuse_command_unit(flight.name, flight.commands, flight.rates, first, list(vehicle.surfaces))
 
 
-def collinear_names(parts: Parts, model: Model) -> list[Document]:
-    """Regressors whose coefficient's variance the others inflate more than tenfold, worst first; None where
-    the others make it up."""
-    Z, _, _ = orders.stack_data(parts, model.vehicle, model.history, model.lags)
-    factors = variance_inflation(Z[:, 1:])
-    pairs = sorted(zip(regressor_names(model), factors.tolist(), strict=True), key=lambda pair: -pair[1])
-    return [
-        {"regressor": name, "inflation": factor if isfinite(factor) else None}
-        for name, factor in pairs
-        if factor > _MIN_COLLINEAR
-    ]
-
-
 def regressor_names(model: Model) -> list[str]:
     """Names of the columns of the fit after the constant, in their order."""
     h = model.history
@@ -294,26 +271,6 @@ def regressor_names(model: Model) -> list[str]:
         *((one, model.lags) for one in commands),
     ]
     return [f"{name}[-{k}]" for names, most in lagged for k in range(1, most + 1) for name in names]
-
-
-def median_inflation(parts: Parts, model: Model) -> dict[str, float]:
-    """By how much the residual's colour widens the standard errors of the responses: the median, an axis."""
-    inflation = orders.fit_of(parts, model).standard_error_inflation[-len(model.groups) * model.lags :]
-    return regression.by_axis(np.median(inflation, axis=0))
-
-
-def density_ratios(parts: Parts, model: Model) -> list[Document]:
-    """Mean density of the residual by band, over that of white noise of the same variance, an axis."""
-    e = orders.one_step_residuals(parts, model)
-    f, density = spectral_density(e, model.rate_hz)
-    white = e.var(axis=0) / (0.5 * model.rate_hz)
-    bands = []
-    for lo, hi in _SPECTRUM_BANDS_HZ:
-        inside = (f > lo) & (f <= hi)
-        if inside.any():
-            ratio = density[inside].mean(axis=0) / white
-            bands.append({"from_hz": lo, "to_hz": hi, **regression.by_axis(ratio)})
-    return bands
 
 
 def identification_text(model: Model) -> str:
@@ -336,23 +293,7 @@ def identification_text(model: Model) -> str:
         *(f"  {flight['name']}: {note}" for flight in results["flights"] for note in flight["notes"]),
         *map(_fold_text, results["tests"]),
         *_day_lines(results["another_day"], len(results["flights"])),
-        f"  the residual's colour widens standard errors by {_axis_text(results['colour'])}",
     ]
-    output = results["output_error"]
-    if "delay_s" in output:
-        delay = f"delay {output['delay_s']:.3f} s (sd {output['delay_sd_s']:.3f})"
-        explained = _axis_text(output["explained_of_windows_not_fitted"])
-        lag = f"servo lag {output['servo_lag_s']:.3f} s (sd {output['servo_lag_sd_s']:.3f})"
-        if output["shorter_than_can_be_told"]:
-            lag = "servo lag shorter than this rate can tell"
-        lines.append(f"  output error: {lag}, {delay}, explains of 2 s free runs not fitted {explained}")
-    if results["collinear"]:
-        most, n = results["collinear"][0], len(results["collinear"])
-        are = "regressors are" if n > 1 else "regressor is"
-        factor = most["inflation"]
-        times = "made up by the others" if factor is None else f"{factor:.0f} times"
-        inflated = f"variance inflated over {_MIN_COLLINEAR:g} times"
-        lines.append(f"  {n} {are} collinear ({inflated}), most {most['regressor']} ({times})")
     return "\n".join(lines)
 
 
@@ -410,83 +351,3 @@ def _fold_text(fold: Document) -> str:
 
 def _axis_text(values: dict[str, float]) -> str:
     return ", ".join(f"{axis} {value:.3f}" for axis, value in values.items())
-
-
-def fit_output_error(parts: Parts, groups: Groups) -> Document:
-    """Fit on every other window, test on the rest. Returns servo lag and delay in s, their standard errors,
-    and the share of the rates' variance explained over free-running windows not fitted, an axis.
-
-    th: parameters, as in `_simulate`; P: inverse of their information.
-    """
-    from scipy.optimize import least_squares
-
-    dt_s = regression.usual_step_s(parts)
-    u, y = _cut_windows(parts, groups, round(FREE_RUN_WINDOW_S / dt_s), round(_MAX_DELAY_S / dt_s) + 1)
-    if len(y) < 20 or not np.ptp(y, axis=(0, 1)).all():
-        return {"windows": len(y), "says": "too few gap-free windows in which every rate moves"}
-    fitted, held_out = slice(0, None, 2), slice(1, None, 2)
-    sd = y.std(axis=(0, 1))
-    # lag, delay, A, B and c
-    guess = np.array([0.1, dt_s, *(0.7 * np.eye(3)).ravel(), *np.full(3 * len(groups), 0.01), *np.zeros(3)])
-    free = np.full(len(guess) - 2, np.inf)
-    lower, upper = [_MIN_SERVO_LAG_S, 0.0, *-free], [_MAX_SERVO_LAG_S, _MAX_DELAY_S, *free]
-
-    def error(th: Floats, rows: slice) -> Floats:
-        return ((_simulate(th, u[rows], y[rows], dt_s) - y[rows]) / sd).ravel()
-
-    found = least_squares(error, guess, bounds=(lower, upper), args=(fitted,), loss="soft_l1", max_nfev=40)
-    P = np.linalg.pinv(found.jac.T @ found.jac)
-    errors = np.sqrt(np.maximum(np.diag(P), 0.0) * float(found.fun @ found.fun) / len(found.fun))
-    e = error(found.x, held_out).reshape(-1, 3) * sd
-    explained = 1.0 - e.var(axis=0) / y[held_out].reshape(-1, 3).var(axis=0)
-    return {
-        "windows": len(y),
-        "servo_lag_s": float(found.x[0]),
-        "servo_lag_sd_s": float(errors[0]),
-        "delay_s": float(found.x[1]),
-        "delay_sd_s": float(errors[1]),
-        "shorter_than_can_be_told": bool(found.x[0] < 2.0 * _MIN_SERVO_LAG_S),
-        "explained_of_windows_not_fitted": regression.by_axis(explained),
-    }
-
-
-def _cut_windows(parts: Parts, groups: Groups, n: int, past: int) -> tuple[Floats, Floats]:
-    """Commands u (W, past + n, G) with their past, scaled by labels, and rates y (W, n, 3), of W windows."""
-    windows = []
-    for part in parts:
-        samples = part.samples
-        v = regression.group_commands(samples, groups, labelled=True)
-        rows = np.column_stack([samples.rates, samples.stretch_number, v])[:-1]
-        rows[~part.is_usable[:-1]] = np.nan
-        begin = np.arange(0, len(rows) - past - n + 1, n)
-        cut = rows[begin[:, None] + np.arange(past + n)]
-        windows.append(cut[np.isfinite(cut).all(axis=(1, 2)) & (np.ptp(cut[:, :, 3], axis=1) == 0)])
-    chosen = np.concatenate(windows)
-    chosen = chosen[:: max(len(chosen) // _MIN_FREE_RUNS, 1)]
-    return chosen[:, :, 4:], chosen[:, past:, :3]
-
-
-def _simulate(th: Floats, u: Floats, y: Floats, dt_s: float) -> Floats:
-    """Free runs X (W, m, 3) of all windows at once, rad/s, from the first of the rates y (W, m, 3):
-
-        x[k+1] = A x[k] + B' s[k] + c,    s[k+1] = a s[k] + (1 - a) v[k],    a = exp(-dt / lag)
-
-    s (W, n): positions of the servos; v (W, n): commands u (W, past + m, n) a delay before. th: lag and
-    delay, both s, A (3, 3), B (n, 3), c (3,).
-    """
-    (lag_s, delay_s), A, B, c = np.split(th, [2, 11, len(th) - 3])
-    A, B = A.reshape(3, 3), B.reshape(-1, 3)
-    m = y.shape[1]
-    past = u.shape[1] - m
-    whole, f = divmod(delay_s / dt_s, 1.0)
-    a = np.exp(-dt_s / lag_s)
-    x = y[:, 0].copy()
-    s = u[:, 0].copy()
-    X = np.empty_like(y)
-    for k in range(u.shape[1]):
-        if k >= past:
-            X[:, k - past] = x
-            x = x @ A.T + s @ B + c
-        v = (1.0 - f) * u[:, max(k - int(whole), 0)] + f * u[:, max(k - int(whole) - 1, 0)]
-        s = a * s + (1.0 - a) * v
-    return X

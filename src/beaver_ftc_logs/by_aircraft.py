@@ -260,7 +260,7 @@ def _check_plausible(flight: str, flow: Mapping[str, Floats], commands: Floats, 
     airspeed, qdyn = flow["airspeed_mps"], flow["qdyn_pa"]
     flies = airspeed > 0.5 * aircraft.envelope.airspeed_mps[0]
     rho = _median_without_nan(2.0 * qdyn[flies] / airspeed[flies] ** 2)
-    if flies.any() and not _DENSITIES_KG_M3[0] < rho < _DENSITIES_KG_M3[1]:
+    if rho <= _DENSITIES_KG_M3[0] or rho >= _DENSITIES_KG_M3[1]:
         reason = f"airspeed and flow.qdyn_pa make a density of {rho:.3g} kg/m3"
         allowed = "{:g} to {:g}".format(*_DENSITIES_KG_M3)
         raise BadInput(f"{flight}: {reason}, allowed: {allowed}, true airspeed in m/s and Pa")

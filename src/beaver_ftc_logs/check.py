@@ -139,7 +139,7 @@ def _check_recording(log: RecordedFlight, vehicle: Vehicle) -> tuple[bool, list[
     lines = [
         f"rate {axis} does not move: nothing can be identified or diagnosed"
         for axis, rate in zip("pqr", samples.rates.T, strict=True)
-        if np.nanmin(rate) == np.nanmax(rate)
+        if np.unique(rate[np.isfinite(rate)]).size < 2
     ]
     return not lines, [size, *samples.notes, *_compare_angles(log, vehicle), *lines]
 

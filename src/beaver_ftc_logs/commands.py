@@ -64,6 +64,8 @@ def identify(
     from beaver_ftc_logs.pages import refuse_foreign_file, render_identification
     from beaver_ftc_logs.vehicle import with_alarm_rate
 
+    if not out.name or out.suffix == ".html":
+        raise BadInput(f"identify: --out {out}: allowed: a name such as wing.json; the page is wing.html")
     page = out.with_suffix(".html")
     refuse_foreign_file(page)
     loaded, mixing = load_vehicle_for_logs(vehicle, flights, reader)
@@ -236,7 +238,7 @@ def _check_options_agree(options: DiagnoseOptions) -> None:
 def _diagnose_with_aircraft(options: DiagnoseOptions) -> None:
     from beaver_ftc_logs.by_aircraft import diagnose_aircraft, load_diagnosed
     from beaver_ftc_logs.findings import as_text
-    from beaver_ftc_logs.loading import read_vehicle_parts
+    from beaver_ftc_logs.loading import read_vehicle_parts, refuse_equal_names
     from beaver_ftc_logs.mixing import load_vehicle_for_logs
     from beaver_ftc_logs.pages import words_of_aircraft
     from beaver_ftc_logs.readers import check_exists
@@ -245,6 +247,7 @@ def _diagnose_with_aircraft(options: DiagnoseOptions) -> None:
     if options.certificate:
         from beaver_ftc_logs import certified
 
+    refuse_equal_names(path.stem for path in options.flights)
     given = aircraft, _ = load_diagnosed(str(options.aircraft), options.scenario)
     words = words_of_aircraft(aircraft, BOUND_WINDOW_S)
     groups = [[name] for name in words.surfaces]
@@ -269,6 +272,7 @@ def _diagnose_with_aircraft(options: DiagnoseOptions) -> None:
 
 
 def _replay_run_logs(flights: list[Path], out: Path, format: Format) -> None:
+    from beaver_ftc_logs.loading import refuse_equal_names
     from beaver_ftc_logs.pages import write_results
     from beaver_ftc_logs.replay import as_text, is_log_of_run, replay_run_log
 
@@ -276,9 +280,11 @@ def _replay_run_logs(flights: list[Path], out: Path, format: Format) -> None:
     if others:
         reason = "--model is missing, allowed without one: log.parquet beside its scenario.yaml"
         raise BadInput(f"diagnose: {others[0]}: {reason}")
+    replays = [replay_run_log(path) for path in flights]
+    refuse_equal_names(verdict["flight"] for _, verdict in replays)
     verdicts = [
         verdict | {"folder": str(write_results(out, verdict["flight"], columns, verdict))}
-        for columns, verdict in [replay_run_log(path) for path in flights]
+        for columns, verdict in replays
     ]
     answer(format, {"flights": verdicts}, lambda: "\n".join(map(as_text, verdicts)))
 

@@ -175,7 +175,8 @@ def _add_unknown_surfaces(samples: Samples, model: Model, rows: LogRows) -> LogR
     is not added. If surfaces can be stuck, any is added.
     """
     surfaces = list(model.vehicle.surfaces)
-    moved = np.maximum.accumulate(np.abs(samples.commands - samples.commands[:1]), axis=0) > _COMMAND_ROUNDING
+    u = samples.commands  # a missing number is passed over
+    moved = np.fmax.accumulate(u) - np.fmin.accumulate(u) > _COMMAND_ROUNDING
     moved |= "stuck" in model.vehicle.faults
     unknown = trust.unknown_surfaces(model)
     addable = moved & np.array([surface in unknown for surface in surfaces])

@@ -1,7 +1,7 @@
 """From files to samples: the columns that a vehicle names, a long log in parts, what a fit takes of it."""
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -119,9 +119,14 @@ def load_flights_for_fit(paths: Sequence[Path], vehicle: Vehicle, reader: str | 
             flights.append(_read_flight_for_fit(path, vehicle, reader))
         except BadInput as error:
             mistakes.append(str(error))
-    for name, n in Counter(samples.name for samples in flights).items():
-        if n > 1:
-            mistakes.append(f"two flights are named {name}: one result would replace the other")
     if mistakes:
         raise BadInput("\n".join(mistakes))
+    refuse_equal_names(samples.name for samples in flights)
     return flights
+
+
+def refuse_equal_names(names: Iterable[str]) -> None:
+    """Raise BadInput if two flights have the same name."""
+    for name, n in Counter(names).items():
+        if n > 1:
+            raise BadInput(f"two flights are named {name}: one result would replace the other")

@@ -16,6 +16,7 @@ from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
+from pydantic import ValidationError
 
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs import least_squares, regression
@@ -160,18 +161,23 @@ def _model_of_fit(fit: least_squares.Regression, parts: Parts, vehicle: Vehicle,
     groups = regression.group_surfaces(vehicle)
     first = len(fit.coefficients) - len(groups) * L
     shape = (len(groups), L, 3)
-    model = Model(
-        vehicle=vehicle,
-        rate_hz=1.0 / regression.usual_step_s(parts),
-        groups=[[names[i] for i in group] for group in groups],
-        history=h,
-        lags=L,
-        intercept=fit.coefficients[0].tolist(),
-        past=fit.coefficients[1:first].tolist(),
-        response=fit.coefficients[first:].reshape(shape).tolist(),
-        response_sd=fit.standard_errors[first:].reshape(shape).tolist(),
-        noise=fit.residual_covariance.tolist(),
-    )
+    try:
+        model = Model(
+            vehicle=vehicle,
+            rate_hz=1.0 / regression.usual_step_s(parts),
+            groups=[[names[i] for i in group] for group in groups],
+            history=h,
+            lags=L,
+            intercept=fit.coefficients[0].tolist(),
+            past=fit.coefficients[1:first].tolist(),
+            response=fit.coefficients[first:].reshape(shape).tolist(),
+            response_sd=fit.standard_errors[first:].reshape(shape).tolist(),
+            noise=fit.residual_covariance.tolist(),
+        )
+    except ValidationError as error:
+        reason = f"no model file can hold the {error.errors()[0]['loc'][0]} of this fit"
+        allowed = "three rates of which none follows from the others, commands as shares of travel"
+        raise BadInput(f"identify: {reason}, allowed: {allowed}") from None
     noises = []
     for ma in sorted({part.samples.noise_ma_coefficients for part in parts} - {()}):
         own = parts_of_noise(parts, ma)

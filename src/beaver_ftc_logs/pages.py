@@ -63,7 +63,7 @@ def words_of_model(model: Model) -> Words:
     return Words(
         list(model.vehicle.surfaces),
         "90 % bounds",
-        f"The probability of a fault stayed below the alarm level of {model.settings.alarm}.",
+        "The evidence for a fault raised no alarm.",
         f"The model was identified at {model.rate_hz:.3g} Hz; it predicts a sample from past ones, "
         f"{model.history} of the rates and {model.lags} of the commands.",
     )

@@ -34,9 +34,9 @@ def score_diagnosis(samples: Samples, rows: LogRows, groups: list[list[str]]) ->
 def score_against_labels(rows: LogRows, labels: Floats) -> Document:
     """Scores against labelled effectiveness (n, S), on the rows in which every label is known.
 
-    A setting is a row of labels that makes up at least 0.5 % of the flight. classes: share of rows whose
-    estimate is nearest to the same setting as the label. side: share of rows in which the same surfaces are
-    below 1. Without such a row all figures are None.
+    A setting is a row of labels that makes up at least 0.5 % of the flight, or the most frequent. classes:
+    share of rows whose estimate is nearest to the same setting as the label. side: share of rows in which the
+    same surfaces are below 1. Without such a row all figures are None.
     """
     known = np.isfinite(labels).all(axis=1)
     if not known.any():
@@ -45,7 +45,7 @@ def score_against_labels(rows: LogRows, labels: Floats) -> Document:
     truth = labels[known]
     e, low, high = (x[known] for x in (rows.effectiveness, rows.effectiveness_low, rows.effectiveness_high))
     levels, counts = np.unique(truth, axis=0, return_counts=True)
-    frequent = levels[counts >= 0.005 * len(truth)]
+    frequent = levels[counts >= min(0.005 * len(truth), counts.max())]
     faulty = (truth < 1.0).any(axis=1)
     return {
         "rows": int(known.sum()),

@@ -48,7 +48,7 @@ def add_ranges_and_threshold(parts: Parts, model: Model) -> Model:
     if tail is None and requested is not None:
         minutes = 60.0 * sum(hours for _, hours in peaks)
         reason = f"{minutes:.1f} min of health left out have too few peaks of the evidence to tell"
-        allowed = f"{extremes.RULED_OUT_COUNT * 60.0 / requested - minutes:.0f} min more"
+        allowed = "more minutes of healthy flight, or no such rate"
         raise BadInput(f"identify: false_alarms_per_hour {requested:g}: {reason}, allowed: {allowed}")
     rate = _DEFAULT_FALSE_ALARMS if requested is None and not model.settings.levels else requested
     threshold = _choose_threshold(tail, rate, model) if rate else None

@@ -174,6 +174,7 @@ LACKS = [
     ({"airspeed": None}, {}, "airspeed: is missing"),
     ({"airspeed": "tas"}, {}, "no column tas, allowed: a log that has it; it has "),
     ({}, {"alpha_rad": 57.3 * 12}, "flow.alpha_rad is .* in the middle, allowed: rad"),
+    ({}, {"qdyn_pa": np.nan}, "no 50 samples in turn"),
     ({}, {"qdyn_pa": 0.01}, "make a density of 0.01.* kg/m3, allowed: 0.2 to 1.6"),
     ({}, {"elevator_command": 60.0}, "command of elevator reaches .* rad, allowed: its stop, 0.49 rad"),
 ]

@@ -84,6 +84,12 @@ def test_a_spoilt_log_is_one_line_and_nothing_is_written(folder, tmp_path, name,
     assert [entry.name for entry in tmp_path.iterdir()] == ["spoilt.csv"]
 
 
+@pytest.mark.parametrize("out", [".", "wing.html"])
+def test_a_model_file_that_its_page_would_replace_is_refused(folder, out):
+    with pytest.raises(BadInput, match="allowed: a name such as"):
+        run("identify", folder / "flight.csv", "--vehicle", folder / "wing.yaml", "--out", out)
+
+
 def test_what_is_missing_is_named_the_vehicle_first():
     for given, missing in (
         ([], "--vehicle"),

@@ -65,6 +65,18 @@ def test_a_fit_wants_ten_samples_a_coefficient():
         orders.fit_order([FitPart(samples, use)], MODEL.vehicle, 2, 3)
 
 
+@pytest.mark.parametrize(
+    ("changes", "key"), [({"rates": [0, 0, 2]}, "noise"), ({"commands": 1e-8}, "response")]
+)
+def test_what_no_model_file_can_hold_is_refused(changes, key):
+    """One rate twice; commands a hundred millionth of what they are."""
+    samples = small.flight(MODEL, 300)
+    changed = {"rates": lambda by: samples.rates[:, by], "commands": lambda by: samples.commands * by}
+    told = replace(samples, **{name: changed[name](by) for name, by in changes.items()})
+    with pytest.raises(BadInput, match=f"no model file can hold the {key} of this fit, allowed: three rates"):
+        orders.fitted_order(orders.fit_parts([told]), MODEL.vehicle, 2, 3)
+
+
 @pytest.fixture(scope="module")
 def usable_flights():
     return orders.fit_parts([small.flight(MODEL, 1000, lost=LOST)])

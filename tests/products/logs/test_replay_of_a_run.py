@@ -88,6 +88,12 @@ def test_the_command_writes_rows_and_verdict(run, tmp_path):
     assert rows.num_rows == len(flight.log)
 
 
+def test_two_flights_of_one_name_are_refused(run, tmp_path):
+    log = run[0] / "log.parquet"
+    with pytest.raises(BadInput, match="two flights are named elevator-partial-loss"):
+        small.run("diagnose", log, log, "--out", tmp_path)
+
+
 def test_another_table_wants_a_model(tmp_path):
     path = tmp_path / "flight.csv"
     path.write_text("t_s,p\n0,1\n1,2\n")

@@ -1,5 +1,7 @@
 """From probabilities of hypotheses to rows: when a name stands, and which bounds hold."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,17 @@ from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import diagnose
 from beaver_ftc_logs.bank import UNKNOWN_OFFSET, build_bank
 from products.logs import small
+
+
+def test_a_surface_of_unknown_effect_is_named_once_its_command_moves():
+    """The command of the right elevon has no number at first, moves, and has none again."""
+    model = small.model(fitted={"commands": [], "rates": [], "tied": [1.0, 0.0]})
+    samples = small.flight(model, 4, rates=np.zeros((4, 3)))
+    samples.commands[:, 0] = np.nan, 0.1, 0.2, np.nan
+    rows = replace(small.rows([(4, "left", [1.0, 0.5])]), t_s=samples.t_s)
+    named = diagnose.finish_rows(samples, model, rows).isolated_surfaces
+    assert named.tolist() == ["left", "left", "right+left", "right+left"]
+
 
 SETTINGS = {"level_step": 0.25, "alarm": 0.5, "bounds": 0.8}
 WING = small.model(settings=SETTINGS)

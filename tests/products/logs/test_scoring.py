@@ -37,6 +37,11 @@ def test_figures_by_labels():
     }
 
 
+def test_labels_of_which_none_is_frequent_have_a_setting():
+    ramp = np.linspace(0.0, 1.0, 300)[:, None]
+    assert scoring.score_against_labels(rows(ramp, ramp, ramp), ramp)["classes"] == 1.0
+
+
 FAILURE = (
     LoggedFailure(12.0, "right_aileron"),
     LoggedFailure(13.99, "rudder"),

@@ -20,7 +20,8 @@ from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.documents import BadInput
 from beaver_ftc.loop import FLOW, Diagnosis
 from beaver_ftc.results import Document
-from beaver_ftc_logs import findings, trust
+from beaver_ftc_logs import findings
+from beaver_ftc_logs.column_mistakes import MAX_REVERSED_GAIN
 from beaver_ftc_logs.diagnose import LogRows, reversed_command_error
 from beaver_ftc_logs.recording import Column, Floats, Mask, Reasons, RecordedFlight, largest_magnitude
 from beaver_ftc_logs.runs import Runs, true_runs
@@ -125,7 +126,7 @@ class LogInputs:
         upper = np.min([replay.command_gain_bounds for replay in replays], axis=0)
         if not self.diagnosis.declared.air.moves:  # a law that answers gusts opposes what they turn
             for surface, bound in zip(self.aircraft.surfaces, upper, strict=True):
-                if bound < trust.MAX_REVERSED_GAIN:
+                if bound < MAX_REVERSED_GAIN:
                     reason = f"the rates answer the command of {surface} the other way round in all of it"
                     allowed = f"signs as of {self.aircraft.name}; does `scale: -1` fit?"
                     raise BadInput(f"{self.samples.name}: {reason}, allowed: {allowed}")
@@ -354,7 +355,7 @@ def _excluded_losses(rows: LogRows, surfaces: list[str]) -> list[str]:
     losses = 1.0 - np.median(rows.effectiveness_low[quiet], axis=0)
     return [
         f"{name}: a loss of more than {100.0 * loss:.2g} % shows within a second in half of the flight."
-        if loss < 1.0
+        if loss < 0.995  # two digits are printed
         else f"{name}: in half of the flight not even a complete loss would show within a second."
         for name, loss in zip(surfaces, losses.tolist(), strict=True)
     ]

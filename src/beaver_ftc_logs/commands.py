@@ -64,7 +64,7 @@ def identify(
     from beaver_ftc_logs.pages import refuse_foreign_file, render_identification
     from beaver_ftc_logs.vehicle import with_alarm_rate
 
-    if not out.name or out.suffix == ".html":
+    if not out.name or out.suffix == ".html" or out in (*flights, Path(vehicle)):
         raise BadInput(f"identify: --out {out}: allowed: a name such as wing.json; the page is wing.html")
     page = out.with_suffix(".html")
     refuse_foreign_file(page)

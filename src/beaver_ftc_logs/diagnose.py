@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
-from beaver_ftc_logs import energy, trust
+from beaver_ftc_logs import column_mistakes, energy, trust
 from beaver_ftc_logs.bank import GROUP_LOSS, UNKNOWN_OFFSET, HypothesisBank, build_bank
 from beaver_ftc_logs.filtering import bank_posterior, fault_evidence, page_cusum
 from beaver_ftc_logs.model import Model
@@ -126,7 +126,7 @@ def diagnose(samples: Samples, model: Model) -> LogRows:
     check_log_fits_model(samples, model)
     rows = _diagnose_checked_log(samples, model)
     if rows.has_credible_alarm():
-        for group in trust.find_reversed(samples, model):
+        for group in column_mistakes.find_reversed(samples, model):
             signs = [-1.0 if surface in group else 1.0 for surface in model.vehicle.surfaces]
             corrected = _diagnose_checked_log(replace(samples, commands=samples.commands * signs), model)
             if corrected.clears_alarm(rows):
@@ -240,8 +240,8 @@ def check_log_fits_model(samples: Samples, model: Model) -> None:
             f"{samples.name}: has samples at {rate_hz:.3g} Hz, allowed: within {_LOG_RATE_TOLERANCE:.0%} of "
             f"the {model.rate_hz:.3g} Hz the model was identified at"
         )
-    trust.refuse_rate_unit(samples, model.fitted)
-    trust.refuse_columns(samples, model)
+    column_mistakes.refuse_rate_unit(samples, model.fitted)
+    column_mistakes.refuse_columns(trust.without_dead_rows(samples, model), model)
 
 
 def rows_of_posterior(

@@ -12,6 +12,7 @@ import numpy as np
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import extremes, fitting, gyro_noise, orders, regression, trust, validation
+from beaver_ftc_logs.column_mistakes import refuse_command_unit
 from beaver_ftc_logs.folds import fold_qualities
 from beaver_ftc_logs.least_squares import left_by
 from beaver_ftc_logs.model import FittedRanges, Model, NoiseModel
@@ -257,7 +258,7 @@ def _check_units(flights: Sequence[Samples], vehicle: Vehicle) -> None:
     commands, rates = trust.central_ranges(flights[0].commands), trust.central_ranges(flights[0].rates)
     first = FittedRanges(commands=commands, rates=rates)
     for flight in flights[1:]:
-        trust.refuse_command_unit(flight.name, flight.commands, flight.rates, first, list(vehicle.surfaces))
+        refuse_command_unit(flight.name, flight.commands, flight.rates, first, list(vehicle.surfaces))
 
 
 def regressor_names(model: Model) -> list[str]:

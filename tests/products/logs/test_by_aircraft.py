@@ -89,6 +89,15 @@ def test_a_name_that_was_withdrawn_and_returned_counts_from_its_return(log, monk
     assert diagnose_aircraft(*log, BEAVER)[2]["isolation_s"] == pytest.approx(7.5, abs=0.02)
 
 
+def test_a_loss_of_nearly_all_that_would_show_is_not_a_number_of_one_digit(log, monkeypatch):
+    def replayed(diagnosis, arrays, rate_hz):
+        healthy = np.ones((len(arrays[0]), 4))
+        return stepped.Replayed([Verdict()] * len(healthy), 0.004 * healthy, healthy, healthy[0], healthy[0])
+
+    monkeypatch.setattr("beaver_ftc_logs.by_aircraft.replay_samples", replayed)
+    assert "not even a complete loss would show" in diagnose_aircraft(*log, BEAVER)[2]["can_separate"][0]
+
+
 def test_bounds_hold_but_for_the_second_in_which_the_fault_begins(log):
     recording, vehicle = log
     _, rows, _ = diagnose_aircraft(recording, vehicle, BEAVER)

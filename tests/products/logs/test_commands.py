@@ -84,10 +84,11 @@ def test_a_spoilt_log_is_one_line_and_nothing_is_written(folder, tmp_path, name,
     assert [entry.name for entry in tmp_path.iterdir()] == ["spoilt.csv"]
 
 
-@pytest.mark.parametrize("out", [".", "wing.html"])
-def test_a_model_file_that_its_page_would_replace_is_refused(folder, out):
+@pytest.mark.parametrize("out", [".", "wing.html", "flight.csv", "wing.yaml"])
+def test_a_model_file_in_the_place_of_another_is_refused(folder, monkeypatch, out):
+    monkeypatch.chdir(folder)
     with pytest.raises(BadInput, match="allowed: a name such as"):
-        run("identify", folder / "flight.csv", "--vehicle", folder / "wing.yaml", "--out", out)
+        run("identify", "flight.csv", "--vehicle", "wing.yaml", "--out", out)
 
 
 def test_what_is_missing_is_named_the_vehicle_first():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc_logs import fitting, gyro_noise, identification, loading, orders, trust
+from beaver_ftc_logs import column_mistakes, fitting, gyro_noise, identification, loading, orders
 from beaver_ftc_logs.bank import build_bank
 from beaver_ftc_logs.filtering import bank_posterior
 from beaver_ftc_logs.samples import whiten_samples
@@ -82,14 +82,14 @@ def test_a_model_of_two_colours_takes_the_likelier(flights, moving, colour):
 def test_columns_are_compared_in_white(moving, colour):
     """A command of the other sign is told; one that a law moves by the noise itself is not taken for it."""
     flight = flown(colour, 1.1, 4000, 21)
-    trust.refuse_columns(flight, moving)
-    found = [trust.answers(whiten_samples(flight, one.average), moving) for one in moving.colours]
+    column_mistakes.refuse_columns(flight, moving)
+    found = [column_mistakes.answers(whiten_samples(flight, one.average), moving) for one in moving.colours]
     likeliest = max(found, key=lambda one: one.likelihood.mean())
     assert all(1.0 < gain < 1.6 for gain in likeliest.upper.max(axis=0))
-    plain = trust.answers(flight, moving.model_copy(update={"colours": []}))
+    plain = column_mistakes.answers(flight, moving.model_copy(update={"colours": []}))
     assert colour == (1.0,) or min(plain.upper.max(axis=0)) > 1.9  # what coloured noise does to the fit
     with pytest.raises(BadInput, match="answer the command of right the other way round"):
-        trust.refuse_columns(replace(flight, commands=flight.commands * [-1.0, 1.0]), moving)
+        column_mistakes.refuse_columns(replace(flight, commands=flight.commands * [-1.0, 1.0]), moving)
 
 
 def test_gyro_noise_enters_through_the_whole_matrix_of_the_past():

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc_logs.column_mistakes import refuse_columns
 from beaver_ftc_logs.diagnose import diagnose
 from beaver_ftc_logs.model import FittedRanges
-from beaver_ftc_logs.trust import central_ranges, refuse_columns
+from beaver_ftc_logs.trust import central_ranges
 from products.logs import small
 
 

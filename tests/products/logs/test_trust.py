@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc_logs import identification, orders, trust, validation
+from beaver_ftc_logs import column_mistakes, identification, orders, trust, validation
 from beaver_ftc_logs.diagnose import diagnose
 from beaver_ftc_logs.findings import as_text, verdict_document
 from beaver_ftc_logs.model import FittedRanges
@@ -56,6 +56,13 @@ def test_where_it_was_not_fitted_it_says_nothing(model, change, says):
     assert says in as_text(verdict)
 
 
+def test_a_rate_that_is_frozen_throughout_is_not_taken_for_one_in_another_unit(model):
+    flown = small.flight(model, n=600, seed=4)
+    flown.rates[:, 0] = 0.05
+    rows = diagnose(replace(flown, unchanged_s={"p_rad_s": flown.t_s}), model)
+    assert not rows.credible[30:].any()
+
+
 def test_a_residual_that_is_larger_than_any_fitted_does_not_make_a_row_incredible(model):
     """Noise of 2.5 times the standard deviation: the rows are credible, and a large loss is still named."""
     noise = (6.25 * np.array(small.model().noise)).tolist()
@@ -87,7 +94,7 @@ def test_a_rate_that_never_stood_still_may_for_half_a_second(model, usual, most)
 def test_rates_in_another_unit_than_the_models_own(model, factor, says):
     flown = small.flight(model, n=300, seed=4, rates=HEALTHY.rates[:300] * factor)
     if says is None:
-        trust.refuse_rate_unit(flown, model.fitted)
+        column_mistakes.refuse_rate_unit(flown, model.fitted)
         return
     with pytest.raises(BadInput, match=says):
         diagnose(flown, model)
@@ -148,6 +155,6 @@ def test_a_command_in_another_unit_is_refused_where_rates_move_alike_or_far_less
     flown = commands * [1.0, factor], rates * [1.0, turned, 1.0]
     if refused:
         with pytest.raises(BadInput, match=rf"log: the command of elevator moves {factor:g} times"):
-            trust.refuse_command_unit("log", *flown, fitted, ["aileron", "elevator"])
+            column_mistakes.refuse_command_unit("log", *flown, fitted, ["aileron", "elevator"])
     else:
-        trust.refuse_command_unit("log", *flown, fitted, ["aileron", "elevator"])
+        column_mistakes.refuse_command_unit("log", *flown, fitted, ["aileron", "elevator"])

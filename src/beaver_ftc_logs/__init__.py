@@ -1,6 +1,6 @@
-"""Recorded flights: read them, identify how the vehicle answers its commands, and say what broke and when.
+"""Recorded flights: read them, identify how the rates respond to the commands, and diagnose faults.
 
-The order of the work is the order of the modules: `readers` (one file a format) give a `RecordedFlight`,
-`samples` puts its columns on one time base, `fitting` finds the model and `identification` says how good it
-is, `diagnose` filters a flight with it, `findings` and `pages` say what was found and what cannot be known.
+`readers` (one file for each format) give a `RecordedFlight`. `samples` puts its columns on one time base.
+`identification` calls `fitting` for the model, and tests it. `diagnose` filters a flight with the model.
+`by_aircraft` uses the design model of an aircraft instead. `findings` and `pages` write the results.
 """

@@ -57,7 +57,8 @@ def identify(
     if vehicle is None or out is None:
         option = "--vehicle" if vehicle is None else "--out"
         raise BadInput(f"identify: {option} is missing, allowed: --vehicle FILE --out MODEL, or --check")
-    from beaver_ftc_logs.identification import identification_text, identify, scale_if_better
+    from beaver_ftc_logs.identification import identify, scale_if_better
+    from beaver_ftc_logs.identification_text import identification_text
     from beaver_ftc_logs.loading import load_flights_for_fit
     from beaver_ftc_logs.mixing import load_vehicle_for_logs
     from beaver_ftc_logs.model import model_file_text

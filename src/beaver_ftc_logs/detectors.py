@@ -1,19 +1,18 @@
-"""Who may diagnose a recorded flight: our bank of filters, plain estimators, and the loop's detectors.
+"""The detectors that `diagnose --detector` and `compare --flights` can use on recorded flights.
 
-Plain estimators get the same model; the freeze rule needs none.
+    bank-of-filters             the filters of `diagnose`
+    sliding-least-squares       effectiveness from the last 20 s, all samples with equal weight
+    forgetting-least-squares    effectiveness from all past samples, weights exp(-age / 20 s) [Ljung1999]
+    freeze rule                 a servo output that has not moved for 6 s is faulty; needs no model
+    others                      the detectors of the control loop (`beaver_ftc.diagnosis.Detector`)
 
-sliding-least-squares   the last 20 s, every sample alike
-forgetting-least-squares  all the past, forgotten exponentially with 20 s [Ljung1999]
-freeze                  a servo output that has not moved for 6 s: sees the logged output itself stand still
+A detector of the loop receives the measured rates x, the predicted acceleration, and the part Z of each
+surface in it. Both follow from the identified model, with the residual e of one step, rad/s:
 
-A detector of the loop is told the rates, what the design model makes of the frame before, and how much of
-that each surface did (diagnosis/__init__.py). All three follow from the identified model:
+    acceleration[k] = (x[k] - e[k] - x[k-1]) / dt,      Z_g = F_g / dt
 
-    acceleration = (c + A past + sum_g F_g - rates before) / dt,      contribution_g = F_g / dt
-
-so the innovation a detector forms is the model's one-step residual. Its declared error is the residual's
-standard deviation. Detectors of the loop know the surfaces aileron, elevator and rudder: the vehicle's groups
-take these places in their order.
+The innovation that the detector forms is then e / dt. Its declared error is the standard deviation of e / dt.
+The groups of the vehicle take the places of aileron, elevator and rudder, in this order.
 """
 
 from collections.abc import Callable
@@ -49,18 +48,19 @@ MIN_FROZEN_OUTPUT_S = 6.0
 _MIN_LOSS_SD = 5.0
 _SD_OF_90_PERCENT = 1.645
 LOOP_SURFACES = ("aileron", "elevator", "rudder")
-_N_LOOP = 4
+_N_LOOP = 4  # these and the flap
 _DECLARED_GYRO_RAD_S = 1e-4
 OUR_DETECTOR = "bank-of-filters"
 
 
 def _least_squares(samples: Samples, model: Model, fades: bool) -> LogRows:
-    """Effectiveness a of the groups and trim b, from r = b + sum (a_g - 1) F_g, whitened, of the last rows:
+    """Effectiveness a of the groups, by least squares of the whitened residual r = X theta + noise:
 
-        theta = (M0 + sum X' X)^-1 sum X' r,   a_g - 1 = theta[3 + g]
+        theta = (M0 + sum X' X)^-1 sum X' r,   a_g = 1 + theta[3 + g],   P = (M0 + sum X' X)^-1
 
-    X (n, 3, 3 + G): regressors of trim, in standard deviations, and of lost effectiveness, whitened; r (n,
-    3): the whitened residual of a healthy vehicle. M0: information before. P: covariance of theta.
+    The sums are over the memory of the detector. theta (3 + G,): trim in standard deviations of the noise,
+    and a_g - 1. X (n, 3, 3 + G): their whitened effects on the rates. r (n, 3): of a healthy vehicle.
+    M0: prior information, with a standard deviation of 1/2 for a_g. P: covariance of theta.
     """
     flight = innovations(samples, model)
     sd = [*np.sqrt(np.diag(flight.R)), *np.ones(len(model.groups))]
@@ -84,9 +84,9 @@ def _memory_sums(x: Floats, dt_s: float, fades: bool) -> Floats:
 
 
 def _rows_of_estimate(samples: Samples, model: Model, a: Floats, sd: Floats) -> LogRows:
-    """Rows of an estimate a of the effectiveness with standard deviation sd, (n, G) each. With labelled
-    levels, the nearest of them is taken, and below 1 it is a fault; without, it is a fault where it is below
-    1 by more than _MIN_LOSS_SD standard deviations."""
+    """Rows of an estimate a of the effectiveness with standard deviation sd, (n, G) each. If the model has
+    labelled levels, the nearest level is the estimate, and one below 1 is a fault. Otherwise an estimate
+    below 1 by more than _MIN_LOSS_SD standard deviations is a fault."""
     bank = build_bank(model)
     low, high = (np.clip(a + sign * _SD_OF_90_PERCENT * sd, 0.0, 1.0) for sign in (-1.0, 1.0))
     nearest = np.clip(a, 0.0, 1.0)
@@ -124,13 +124,13 @@ def diagnose_by_freeze_rule(log: RecordedFlight, samples: Samples, model: Model)
 
 
 class LinearRateModel:
-    """The identified model as a detector's design model: only how the rates answer themselves, x (..., 3)."""
+    """The identified model as a detector's design model: the effect of the last rates x (..., 3) alone."""
 
     def __init__(self, past: Floats, dt_s: float) -> None:
         self._transposed_jacobian = (past[:3] - np.eye(3)) / dt_s
 
     def f(self, x: Floats, y: Floats) -> Floats:
-        """Angular acceleration rad/s2 by the rates alone."""
+        """Angular acceleration by the rates, (..., 3) rad/s2."""
         return x @ self._transposed_jacobian
 
     def G(self, y: Floats) -> Floats:
@@ -139,10 +139,10 @@ class LinearRateModel:
 
 
 def loop_detector_inputs(samples: Samples, model: Model) -> list[tuple[Measured, Floats]]:
-    """Return the inputs of a detector at each row: measurements, and the command u (4,) as shares of travel.
+    """The inputs of a detector at each row: measurements, and the command u (4,) as shares of travel.
 
-    Z (n, 3, 4) rad/s2: contribution of each surface. Where the model cannot predict (a gap, a lost sample)
-    the innovation is 0.
+    Z (n, 3, 4), rad/s2: the part of each surface. If the model cannot predict a row (after a gap), the
+    innovation and Z are 0.
     """
     members = group_indices(model)
     if len(members) > len(LOOP_SURFACES):
@@ -172,7 +172,7 @@ def _model_error_sd_rad_s2(model: Model) -> Floats:
 
 
 def loop_detector_context(model: Model) -> Context:
-    """Return the context that a detector is given before the flight."""
+    """The context that a detector receives before the flight."""
     dt_s = 1.0 / model.rate_hz
     noise = np.zeros(7)
     noise[:3] = _DECLARED_GYRO_RAD_S
@@ -198,7 +198,7 @@ def rows_of_verdicts(verdicts: list[Verdict], samples: Samples, model: Model) ->
     """Verdicts as rows. The bounds are 0 to 1 for each surface that the detector may suspect, else 1."""
     n, members = len(verdicts), group_indices(model)
     statistic, detected = np.array([(one.statistic, one.detected) for one in verdicts], dtype=float).T
-    # by the statistic of a sample where there is one: the loop's own latch serves one fault a flight
+    # by the statistic, if there is one: `detected` of the loop stays true after its first alarm
     faulty = np.where(np.isfinite(statistic), statistic > 1.0, detected).astype(np.int64)
     a, low = np.ones((2, n, len(model.vehicle.surfaces)))
     names = np.full(n, "", dtype=object)
@@ -226,7 +226,7 @@ _FLIGHT_DETECTORS: dict[str, Callable[[Samples, Model], LogRows]] = {
 
 
 def detector_names() -> list[str]:
-    """Every detector a recorded flight can be given to, ours first."""
+    """The names of all detectors for recorded flights; the compiled ones of the loop need a simulation."""
     return [*_FLIGHT_DETECTORS, *(name for name in registered(DETECTORS) if not is_compiled(DETECTORS, name))]
 
 

@@ -1,12 +1,11 @@
-"""From rows to a verdict: what happened when, in this flight, and what it can and cannot separate.
+"""From rows to a verdict: the events of a flight, and which faults the flight can and cannot separate.
 
-What can be separated follows from the model, the mixer and how much the commands moved. Under a small loss of
-effectiveness d of group g the rates of a sample shift by -d s F_g. Its information is F_g' R^-1 F_g a sample;
-what trim, gain and the other groups could explain as well is taken off (the Schur complement). A loss shows
-once d^2 / 2 times the information gathered passes the odds against it before.
+A loss of effectiveness d of group g changes the rates of a sample by -d F_g, so a sample has the information
+F_g' F_g about d. `_own_information` is the part of it that neither trim nor other groups explain. On average,
+a loss shows after the time T for which d^2 J T / 2 exceeds the prior odds against this loss.
 
-F (n, G, 3): response of each group at each sample in standard deviations of the noise, so that R = 1. J 1/s:
-information a second about one group. m axes, G groups, n samples.
+    F       response of each group in standard deviations of the noise (n, G, 3), n samples, G groups
+    J       information about one group, 1/s
 """
 
 from itertools import combinations
@@ -65,10 +64,10 @@ def span_entry(samples: Samples) -> Document:
 
 
 def fault_events(rows: LogRows, surfaces: list[str]) -> list[Document]:
-    """Each time with one name and one effectiveness: when, what, how much is left.
+    """The events: periods of an alarm with one name and one effectiveness.
 
-    What lasts less than MAX_BRIEF_EVENT_S between alarms is taken into the event before it; what stands alone
-    is brief. This is hindsight, for the reader; the rows have none.
+    A period of less than MAX_BRIEF_EVENT_S joins the event before it. If there is none, it is an event of its
+    own, marked as brief. Events use later samples, which rows do not.
     """
     _, index = np.unique(rows.isolated_surfaces.astype(str), return_inverse=True)
     columns = np.column_stack([index, rows.faulty, rows.faulty[:, None] * rows.effectiveness])
@@ -77,8 +76,8 @@ def fault_events(rows: LogRows, surfaces: list[str]) -> list[Document]:
 
 
 def _join_runs(rows: LogRows, runs: Runs) -> Runs:
-    """Runs with the brief ones taken into the alarm before them, a brief one without a name into the one
-    after it, and alike neighbours made one."""
+    """The runs, in which an alarm joins the alarm just before it if it is brief, if both are alike, or if the
+    one before is brief and has no name."""
     joined: Runs = []
     for begin, end in runs:
         before = joined[-1] if joined else (begin, begin)
@@ -98,7 +97,7 @@ def _is_brief(rows: LogRows, begin: int, end: int) -> bool:
 
 
 def _fault_event_entry(rows: LogRows, begin: int, end: int, surfaces: list[str]) -> Document:
-    """One event; name and effectiveness as they stood for most of it."""
+    """One event, with its most frequent name and the medians of the effectiveness."""
     names, counts = np.unique(rows.isolated_surfaces[begin:end].astype(str), return_counts=True)
     main = str(names[counts.argmax()])
     shown = surfaces if main in (UNKNOWN_SURFACE, ENGINE) else main.split("+")
@@ -208,17 +207,18 @@ def _group_entry(F: Floats, g: int, model: Model, bank: HypothesisBank, dt_s: fl
 
 
 def _own_information(F: Floats, g: int) -> float:
-    """Information a sample about one group that trim (a constant an axis) and other groups cannot explain:
-    r' r / n, where r is what is left of f = F_g by a fit with the regressors N."""
-    n, G, m = F.shape
+    """Information of a sample about one group that neither trim (a constant for each axis) nor other groups
+    explain: r' r / n, with the residual r of least squares of f_g on the regressors N."""
+    n, G, _ = F.shape
     f = F.transpose(1, 0, 2).reshape(G, -1)
-    N = np.column_stack([np.tile(np.eye(m), (n, 1)), *np.delete(f, g, axis=0)])
+    N = np.column_stack([np.tile(np.eye(3), (n, 1)), *np.delete(f, g, axis=0)])
     r = left_by(N, f[g])
     return float(r @ r) / n
 
 
 def _alarm_odds(model: Model, bank: HypothesisBank, g: int, dt_s: float) -> float:
-    """Log odds that a change to one level of this group overcomes to raise the alarm; inf where none can."""
+    """Log odds that the evidence for a loss of this group must exceed to reach the alarm's probability, for
+    the median of its levels; inf if the bank has no such loss."""
     settings = model.settings
     shares = bank.transition_share[bank.is_fault_of_group(g)]
     if not len(shares):
@@ -228,8 +228,7 @@ def _alarm_odds(model: Model, bank: HypothesisBank, g: int, dt_s: float) -> floa
 
 
 def _smallest_losses(J: float, odds: float) -> dict[str, float | None]:
-    """By horizon T in s the loss d whose mean log likelihood d^2 J T / 2 passes the odds; None where none
-    does."""
+    """The smallest loss d with d^2 J T / 2 >= odds, for each T in s; None if not even d = 1 is enough."""
     losses: dict[str, float | None] = {}
     for T in DETECTION_HORIZONS_S:
         d = np.sqrt(2.0 * odds / (J * T)) if J * T > 0.0 else np.inf
@@ -249,7 +248,7 @@ def _alike_pairs(F: Floats, model: Model) -> list[Document]:
 
 
 def isolability_sentences(isolable: Document) -> list[str]:
-    """The statement in words."""
+    """The sentences of `isolability_document`."""
     lines = [entry["says"] for entry in isolable["together"]]
     for entry in isolable["groups"]:
         lines.append(f"{', '.join(entry['surfaces'])}: {_smallest_loss_text(entry['smallest_loss'])}")

@@ -1,7 +1,8 @@
-"""The whole of an identification: the fit, its tests on what it did not see, and what is said about both.
+"""Identify a vehicle: prepare its flights, fit a model to them, and test the model on parts left out.
 
-Letters as in `orders` and `regression`: Z and y regressors and rates of a fit, e and R its residual and the
-covariance, ma and ar the colour of the noise. V0 is the airspeed at which the commands count once, m/s.
+Z, y, e     regressors (n, m) and rates (n, 3) of a fit, rad/s, and its residual (n, 3), rad/s
+ma          moving average of the noise, 1 first
+V, V0       airspeed, m/s, and the airspeed at which a command has the effect of the model, m/s
 """
 
 from collections.abc import Sequence
@@ -28,15 +29,17 @@ from beaver_ftc_logs.samples import (
 )
 from beaver_ftc_logs.vehicle import Vehicle
 
-_SCORES = ("classes", "healthy_or_faulty", "mean_error", "held_by_bounds")
+SCORES = ("classes", "healthy_or_faulty", "mean_error", "held_by_bounds")
 _DECISIVE_BIC = 10.0
 """By how much a criterion must be less: odds of 150 to 1 [Kass1995, section 3.2]."""
 _AIRSPEED_POWERS = (0.0, 1.0, 3.0)
+"""Powers of the airspeed that the effect of a surface may follow instead of the square."""
 _MAX_ROUNDS = 8
+"""Rounds in which the noise models of the flights and their common fit are found, at most."""
 
 
 def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
-    """The model of a vehicle from its flights, with its own account of how good it is in `identified`."""
+    """The model of a vehicle from its flights; `identified` has the results of its tests."""
     vehicle, lines = assume_law_and_air(flights, vehicle)
     _check_units(flights, vehicle)
     parts = orders.fit_parts(whiten_flights(flights, vehicle))
@@ -63,9 +66,9 @@ def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
 
 
 def add_unseen_noise(model: Model, flights: Sequence[Samples]) -> Model:
-    """In moving air the model with noise that no fitted flight had: gusts held within a sample or not, and
-    noisier gyros, whose colour follows from the model. A law answers noise; which noise a flight has, and how
-    much of it, the flight itself shows (`filtering.recent_scale`)."""
+    """The model with further noise models, in moving air: the moving averages of gusts that no fitted flight
+    had, and noisier gyros, whose noise follows from the model (`gyro_noise`). `diagnose` chooses among all
+    noise models by their likelihood in the suspect flight."""
     if not model.colours:
         return model
     known = [tuple(noise.average) for noise in model.colours]
@@ -89,11 +92,10 @@ def add_unseen_noise(model: Model, flights: Sequence[Samples]) -> Model:
 
 
 def assume_law_and_air(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Vehicle, list[str]]:
-    """The vehicle with what its file leaves open of laws and air, and a line on each with the reason.
+    """The vehicle with the keys `other_laws` and `moving_air` that its file leaves out, and a line on each.
 
-    A log of healthy flight shows neither which law nor which air a later flight has: both are taken to be
-    others, which costs power and raises no false alarm. Labelled faults show what they do under the law that
-    flies, in the air that there is.
+    Healthy flights show neither which law nor which air a later flight has, so both keys are true. That costs
+    evidence, but raises no false alarm. With labelled faults, the later flights are assumed to be as these.
     """
     labelled = any(np.isfinite(flight.labels).any() for flight in flights)
     reason = "labels show faults under it" if labelled else "logs of healthy flight do not tell"
@@ -114,11 +116,11 @@ def assume_law_and_air(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Ve
 
 
 def whiten_flights(flights: Sequence[Samples], vehicle: Vehicle) -> list[Samples]:
-    """In moving air the flights whitened by the colour that leaves least unexplained of each, and one fit of
-    all, in turns.
+    """The flights, in moving air whitened by the likeliest moving average of each.
 
-    A law that answers rates answers their noise: with a residual that is not white, what is noise is taken
-    for what the surface does [Ljung1999, section 13.4].
+    A law feeds the noise of the rates to the surfaces. If the residual is not white, a fit attributes noise
+    to the surfaces [Ljung1999, section 13.4]. The moving averages follow from the residuals of one fit to all
+    flights, and this fit follows from the moving averages: both are repeated until the averages stay.
     """
     if not vehicle.moving_air:
         return list(flights)
@@ -156,40 +158,39 @@ def whiten_flights(flights: Sequence[Samples], vehicle: Vehicle) -> list[Samples
 
 
 def _likeliest_ma(residuals: dict[tuple[float, ...], Floats]) -> tuple[float, tuple[float, ...]]:
-    """The log determinant of what the likeliest moving average leaves, and this: by profile likelihood, as of
-    an ARMAX model. residuals: in a flight that is whitened by each, (n, 3)."""
+    """The log determinant of the residual's covariance by the likeliest moving average, and this average.
+    residuals: of a flight, whitened by each, (n, 3). Whitening by C(1) / C(z) multiplies the noise by the sum
+    C(1) of the average, so the profile likelihood is that of log det - 6 log C(1)."""
     log_dets = {ma: float(np.linalg.slogdet(np.cov(e.T))[1]) for ma, e in residuals.items()}
     best = min(log_dets, key=lambda ma: log_dets[ma] - 6.0 * float(np.log(sum(ma))))
     return log_dets[best], best
 
 
 def expect_another_day(folds: list[Document], model: Model) -> Document:
-    """Estimate the errors on a day that was not fitted, by parts left out: worst and mean of every figure of
-    merit, false alarms an hour and how sure that is, and how many minutes would show it."""
+    """The errors to expect on a day that was not fitted: mean and worst score of the parts left out, the rate
+    of false alarms with its bounds, 1/h, and how many minutes are missing to show it without a tail."""
     scores = [fold["score"] for fold in folds if "score" in fold]
-    values = {key: [score[key] for score in scores] for key in _SCORES if scores}
+    values = {key: [score[key] for score in scores] for key in SCORES if scores}
     expected: Document = {
         key: {"mean": float(np.mean(each)), "worst": float((max if key == "mean_error" else min)(each))}
         for key, each in values.items()
     }
-    tail = model.fitted.tail
-    threshold = model.settings.threshold
-    if tail is None or threshold is None:
+    tail, threshold = model.fitted.tail, model.settings.threshold
+    rate = model.settings.false_alarms_per_hour
+    if tail is None or threshold is None or rate is None:
         return expected
-    target = model.settings.false_alarms_per_hour or 0.0
     return expected | {
-        "false_alarms_per_hour": {"asked": target, **extremes.false_alarm_rate(tail, threshold)},
+        "false_alarms_per_hour": {"asked": rate, **extremes.false_alarm_rate(tail, threshold)},
         "minutes_left_out": tail.minutes,
-        "minutes_missing": max(60.0 * extremes.RULED_OUT_COUNT / target - tail.minutes, 0.0),
+        "minutes_missing": max(60.0 * extremes.RULED_OUT_COUNT / rate - tail.minutes, 0.0),
         **model.identified,
     }
 
 
 def scale_if_better(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Sequence[Samples], Vehicle]:
-    """Flights with commands times the dynamic pressure, and the vehicle that says so, where the airspeed is
-    known and this explains more; else both as they are. Where other laws may fly, each group of surfaces with
-    the power of the airspeed that explains most; another than that of the pressure must explain decisively
-    more."""
+    """The flights with commands times (V / V0)^2, and the vehicle with V0, if this factor explains decisively
+    more; otherwise both as they are. Where other laws may fly, each group of surfaces has the power of V / V0
+    that explains most; another power than 2 must explain decisively more."""
     V = np.concatenate([flight.airspeed for flight in flights])
     V = V[np.isfinite(V)]
     V0 = float(np.median(V)) if V.size else 0.0
@@ -200,7 +201,7 @@ def scale_if_better(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Seque
     if _min_bic(flights, assumed) - _min_bic(_scaled(flights, best), best) < _DECISIVE_BIC:
         return flights, vehicle
     if best.other_laws:
-        # a criterion believes each sample, as only white noise lets it
+        # the criterion counts every sample as independent, which holds for white noise only
         white = whiten_flights(_scaled(flights, best), best) if best.moving_air else None
         least = _min_bic(_scaled(flights, best, white), best) - _DECISIVE_BIC
         names = list(best.surfaces)
@@ -216,8 +217,8 @@ def scale_if_better(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Seque
 def _scaled(
     flights: Sequence[Samples], vehicle: Vehicle, white: Sequence[Samples] | None = None
 ) -> list[Samples]:
-    """Flights with commands times the airspeed over V0 to the power of each surface; whitened as those are
-    that are given."""
+    """The flights with the command of each surface times its power of V / V0, whitened like the flights
+    `white`, if these are given."""
     V0, powers = vehicle.reference_airspeed_mps or 0.0, vehicle.surface_airspeed_powers
     scaled = [scale_by_airspeed(flight, V0, powers) for flight in flights]
     if white is None:
@@ -232,7 +233,7 @@ def _min_bic(flights: Sequence[Samples], vehicle: Vehicle) -> float:
 
 
 def check_explained(folds: list[Document], parts: Parts, model: Model) -> None:
-    """Raise BadInput where a model explains less of an axis than its mean does, on parts not fitted."""
+    """Raise BadInput if a model predicts a rate less well than its mean value does, on parts left out."""
     known = [fold for fold in folds if fold["samples"]]
     counts = [fold["samples"] for fold in known]
     shares = np.array([[fold["explained"][axis] for axis in "pqr"] for fold in known])
@@ -246,8 +247,8 @@ def check_explained(folds: list[Document], parts: Parts, model: Model) -> None:
         notes = [note for part in parts for note in part.samples.notes if note.startswith(prefixes)]
         raise BadInput(
             f"identify: on parts it was not fitted on the model explains less of {', '.join(unexplained)} "
-            f"than the mean does ({_axis_text(unexplained)}), allowed: a model that explains more; what "
-            f"would help: more than these {minutes:.1f} min, commands that move more ({stillest} has a "
+            f"than the mean does ({regression.axis_text(unexplained)}), allowed: a model that explains more; "
+            f"what would help: more than these {minutes:.1f} min, commands that move more ({stillest} has a "
             f"standard deviation of {sds[stillest]:.2g}), or the commands that this vehicle follows"
             + "".join(f"; {note}" for note in notes)
         )
@@ -259,96 +260,3 @@ def _check_units(flights: Sequence[Samples], vehicle: Vehicle) -> None:
     first = FittedRanges(commands=commands, rates=rates)
     for flight in flights[1:]:
         refuse_command_unit(flight.name, flight.commands, flight.rates, first, list(vehicle.surfaces))
-
-
-def regressor_names(model: Model) -> list[str]:
-    """Names of the columns of the fit after the constant, in their order."""
-    h = model.history
-    signals = model.vehicle.regressor_columns
-    commands = [(f"command of {'+'.join(group)}",) for group in model.groups]
-    lagged = [
-        ("pqr", h),
-        (signals, model.vehicle.n_signal_lags(h)),
-        *((one, model.lags) for one in commands),
-    ]
-    return [f"{name}[-{k}]" for names, most in lagged for k in range(1, most + 1) for name in names]
-
-
-def identification_text(model: Model) -> str:
-    """Return the identification as lines of text."""
-    results: Document = dict(model.identified)
-    n_samples = sum(flight["samples"] for flight in results["flights"])
-    lines = [
-        f"{model.vehicle.name}: {n_samples} samples at {model.rate_hz:.3g} Hz, flights: "
-        f"{len(results['flights'])}; "
-        f"past samples of the rates: {model.history}, of the commands: {model.lags}",
-        *(f"  {line}" for line in results.get("assumed", [])),
-        *(f"  together, not distinguishable: {', '.join(group)}" for group in model.groups if len(group) > 1),
-        *_pressure_lines(model),
-        *dict.fromkeys(
-            f"  noise of the colour {', '.join(f'{c:.3g}' for c in noise.average)}: {noise.wider:.2g} times "
-            "as wide, in squares, as gains of 10 s left out differ, and other laws may"
-            for noise in model.colours
-        ),
-        *(f"  {line}" for line in trust.unknown_sentences(model)),
-        *(f"  {flight['name']}: {note}" for flight in results["flights"] for note in flight["notes"]),
-        *map(_fold_text, results["tests"]),
-        *_day_lines(results["another_day"], len(results["flights"])),
-    ]
-    return "\n".join(lines)
-
-
-def _day_lines(expected: Document, n_flights: int) -> list[str]:
-    """Return lines on flights that were not fitted; one flight informs on its halves, not on another day."""
-    unit = "another half of this day, not of another day"
-    if n_flights > 1:
-        unit = "another day, each left out in turn"
-    lines = []
-    if "classes" in expected:
-        scores = [
-            f"{key.replace('_', ' ')} {expected[key]['mean']:.3f} ({expected[key]['worst']:.3f})"
-            for key in _SCORES
-        ]
-        lines.append(f"  expect of {unit}, mean (worst): {', '.join(scores)}")
-    if "false_alarms_per_hour" in expected:
-        alarms = expected["false_alarms_per_hour"]
-        missing = expected["minutes_missing"]
-        lines.append(
-            f"  false alarms: {alarms['asked']:g} an hour asked for, "
-            f"{alarms['low']:.2g} to {alarms['high']:.2g} at 90 %, "
-            f"by {expected['minutes_left_out']:.1f} min of health left out"
-        )
-        if missing:
-            lines.append(f"  to show this rate without a fitted tail {missing:.0f} min of health are missing")
-        if expected.get("parts"):
-            alarmed = f"{expected['alarmed']} of {expected['parts']} parts left out alarm"
-            lines.append(f"  at the threshold of the others {alarmed}")
-    return lines
-
-
-def _pressure_lines(model: Model) -> list[str]:
-    if (V0 := model.vehicle.reference_airspeed_mps) is None:
-        return []
-    powers = "".join(
-        f", {surface} with airspeed^{power:g}"
-        for surface, power in model.vehicle.airspeed_powers.items()
-        if power != 2
-    )
-    return [f"  surfaces work with the dynamic pressure, 1 at {V0:.4g} m/s{powers}"]
-
-
-def _fold_text(fold: Document) -> str:
-    if not fold["samples"]:
-        return f"  without {fold['left_out']}: nothing in it is known"
-    line = f"  without {fold['left_out']}: explains {_axis_text(fold['explained'])} of it"
-    if "score" not in fold:
-        return line
-    scores = fold["score"]
-    return (
-        f"{line}; {len(scores['settings'])} classes {scores['classes']:.3f}, healthy or faulty "
-        f"{scores['healthy_or_faulty']:.3f}, side {scores['side']:.3f}, mean error {scores['mean_error']:.3f}"
-    )
-
-
-def _axis_text(values: dict[str, float]) -> str:
-    return ", ".join(f"{axis} {value:.3f}" for axis, value in values.items())

@@ -269,6 +269,11 @@ def by_axis(values: Floats) -> dict[str, float]:
     return dict(zip("pqr", values.tolist(), strict=True))
 
 
+def axis_text(values: dict[str, float]) -> str:
+    """The numbers of p, q and r as text."""
+    return ", ".join(f"{axis} {value:.3f}" for axis, value in values.items())
+
+
 def subtract_noise(values: Floats, ar: Floats) -> Floats:
     """Values v (n, ..., 3) less their prediction: v[k] - sum_j ar[j-1]' v[k-j], with ar (p, 3, 3)."""
     rest = values.copy()

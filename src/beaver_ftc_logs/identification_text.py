@@ -1,0 +1,83 @@
+"""The printed text of an identification: one line for each assumption, test and remark."""
+
+from beaver_ftc.results import Document
+from beaver_ftc_logs.identification import SCORES
+from beaver_ftc_logs.model import Model
+from beaver_ftc_logs.regression import axis_text
+from beaver_ftc_logs.trust import unknown_sentences
+
+
+def identification_text(model: Model) -> str:
+    """Return the identification as lines of text."""
+    results: Document = dict(model.identified)
+    n_samples = sum(flight["samples"] for flight in results["flights"])
+    lines = [
+        f"{model.vehicle.name}: {n_samples} samples at {model.rate_hz:.3g} Hz, flights: "
+        f"{len(results['flights'])}; "
+        f"past samples of the rates: {model.history}, of the commands: {model.lags}",
+        *(f"  {line}" for line in results.get("assumed", [])),
+        *(f"  together, not distinguishable: {', '.join(group)}" for group in model.groups if len(group) > 1),
+        *_pressure_lines(model),
+        *dict.fromkeys(
+            f"  noise of the colour {', '.join(f'{c:.3g}' for c in noise.average)}: {noise.wider:.2g} times "
+            "as wide, in squares, as gains of 10 s left out differ, and other laws may"
+            for noise in model.colours
+        ),
+        *(f"  {line}" for line in unknown_sentences(model)),
+        *(f"  {flight['name']}: {note}" for flight in results["flights"] for note in flight["notes"]),
+        *map(_fold_text, results["tests"]),
+        *_day_lines(results["another_day"], len(results["flights"])),
+    ]
+    return "\n".join(lines)
+
+
+def _day_lines(expected: Document, n_flights: int) -> list[str]:
+    """Return lines on flights that were not fitted; one flight informs on its halves, not on another day."""
+    unit = "another half of this day, not of another day"
+    if n_flights > 1:
+        unit = "another day, each left out in turn"
+    lines = []
+    if "classes" in expected:
+        scores = [
+            f"{key.replace('_', ' ')} {expected[key]['mean']:.3f} ({expected[key]['worst']:.3f})"
+            for key in SCORES
+        ]
+        lines.append(f"  expect of {unit}, mean (worst): {', '.join(scores)}")
+    if "false_alarms_per_hour" in expected:
+        alarms = expected["false_alarms_per_hour"]
+        missing = expected["minutes_missing"]
+        lines.append(
+            f"  false alarms: {alarms['asked']:g} an hour asked for, "
+            f"{alarms['low']:.2g} to {alarms['high']:.2g} at 90 %, "
+            f"by {expected['minutes_left_out']:.1f} min of health left out"
+        )
+        if missing:
+            lines.append(f"  to show this rate without a fitted tail {missing:.0f} min of health are missing")
+        if expected.get("parts"):
+            alarmed = f"{expected['alarmed']} of {expected['parts']} parts left out alarm"
+            lines.append(f"  at the threshold of the others {alarmed}")
+    return lines
+
+
+def _pressure_lines(model: Model) -> list[str]:
+    if (V0 := model.vehicle.reference_airspeed_mps) is None:
+        return []
+    powers = "".join(
+        f", {surface} with airspeed^{power:g}"
+        for surface, power in model.vehicle.airspeed_powers.items()
+        if power != 2
+    )
+    return [f"  surfaces work with the dynamic pressure, 1 at {V0:.4g} m/s{powers}"]
+
+
+def _fold_text(fold: Document) -> str:
+    if not fold["samples"]:
+        return f"  without {fold['left_out']}: nothing in it is known"
+    line = f"  without {fold['left_out']}: explains {axis_text(fold['explained'])} of it"
+    if "score" not in fold:
+        return line
+    scores = fold["score"]
+    return (
+        f"{line}; {len(scores['settings'])} classes {scores['classes']:.3f}, healthy or faulty "
+        f"{scores['healthy_or_faulty']:.3f}, side {scores['side']:.3f}, mean error {scores['mean_error']:.3f}"
+    )

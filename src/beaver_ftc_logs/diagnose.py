@@ -1,11 +1,13 @@
-"""Filter a recorded flight with a model: what broke, by how much, and how sure that is, sample by sample.
+"""Diagnose a recorded flight with an identified model: alarm, faulty surfaces and effectiveness by sample.
 
-Everything a row says comes from samples up to its own time.
+A row uses only samples up to its own time.
 
-P (n, H) is the probability of each hypothesis of the bank, p (n, L) that of each level of one group, a (n, G)
-the effectiveness of each group with bounds low and high. alarmed (n,): whether the evidence raises an alarm;
-nameable (n,): whether it is enough for a name; calm (n,): whether health, or no response at all, is the
-likelier.
+    P           probability of each hypothesis of the bank (n, H)
+    levels, p   levels of effectiveness of one group (L,), ascending, and their probabilities (n, L)
+    a           effectiveness of each group (n, G), with bounds low and high
+    alarmed     whether the evidence is enough for an alarm (n,)
+    nameable    whether it is enough for a name (n,)
+    calm        whether no fault, or no response to any command, has a probability above 1/2 (n,)
 """
 
 from collections.abc import Iterable, Sequence
@@ -31,6 +33,7 @@ from beaver_ftc_logs.samples import Samples
 _LOG_RATE_TOLERANCE = 0.25
 UNKNOWN_SURFACE = energy.UNKNOWN_SURFACE
 _NAME_SHARE = 0.5
+"""Share of the fault's probability above which a group is named."""
 _EXCLUSION_RISK = 0.001
 """Chance of a name without the surface at fault: a likelihood ratio of two groups passes 1000 against the
 true one with that chance at most (Markov's inequality), where the model is right."""
@@ -168,8 +171,8 @@ def finish_rows(samples: Samples, model: Model, rows: LogRows, silent: Mask | No
 
 
 def _add_unknown_surfaces(samples: Samples, model: Model, rows: LogRows) -> LogRows:
-    """Rows whose name also has each surface of unknown effect that may be at fault in place of the isolated
-    one. If a name has several surfaces, the bounds hold whichever of them is at fault.
+    """Rows whose name also has each surface of unknown effect, since it may be at fault instead of the
+    isolated one. If a name has several surfaces, any of them may be healthy: the upper bound of each is 1.
 
     A loss of effectiveness shows only while the command moves: a surface whose command has not moved so far
     is not added. If surfaces can be stuck, any is added.
@@ -194,7 +197,7 @@ def _add_unknown_surfaces(samples: Samples, model: Model, rows: LogRows) -> LogR
 
 
 def _withdraw_by_engine(samples: Samples, model: Model, rows: LogRows) -> LogRows:
-    """Rows in which no surface is named where an engine may have failed."""
+    """Rows that name no surface while the energy height shows a possible engine failure."""
     unpowered_mps = model.fitted.energy_climb
     rate_mps = samples.energy_height_rate_mps
     if unpowered_mps is None or not np.isfinite(rate_mps).any():
@@ -208,10 +211,9 @@ def _withdraw_by_engine(samples: Samples, model: Model, rows: LogRows) -> LogRow
 def _withdraw_contradicted(samples: Samples, model: Model, rows: LogRows, least: float) -> LogRows:
     """Rows with the name `unknown` where the residual of the last second lies along another group.
 
-    A faulty surface, be it stuck, biased or oscillating, changes the rates along the direction in which it
-    turns the aircraft when healthy. A name is withdrawn where the direction of another group explains the
-    residual better by the log likelihood `least`, whatever the course of time along it. Not used in moving
-    air, since gusts have directions too.
+    A faulty surface (stuck, biased or oscillating) changes the rates along the direction of its healthy
+    effect. A name is withdrawn if the direction of another group explains more of the residual, by at least
+    the log likelihood `least`. Not used in moving air, since gusts have directions too.
 
         gain_g = power / 2 sum over the last second of (r' m_g / |m_g|)^2
 
@@ -233,7 +235,7 @@ def _withdraw_contradicted(samples: Samples, model: Model, rows: LogRows, least:
 
 
 def check_log_fits_model(samples: Samples, model: Model) -> None:
-    """Raise BadInput where a log's rate is not the model's."""
+    """Raise BadInput if the sample rate, the units or the columns of a log are not those of the model."""
     rate_hz = 1.0 / samples.dt_s
     if abs(rate_hz / model.rate_hz - 1.0) > _LOG_RATE_TOLERANCE:
         raise BadInput(
@@ -247,8 +249,8 @@ def check_log_fits_model(samples: Samples, model: Model) -> None:
 def rows_of_posterior(
     samples: Samples, model: Model, bank: HypothesisBank, P: Floats, mass: float | None = None
 ) -> LogRows:
-    """Return the rows that follow from the probabilities of the hypotheses (n, H). mass: posterior mass
-    inside the bounds, that of the model's settings where None."""
+    """The rows that follow from the probabilities P (n, H). mass: probability inside the bounds; that of the
+    model's settings if None."""
     p_silent = P[:, -1]
     p_fault = P[:, bank.is_fault_hypothesis].sum(axis=1)
     P_live = P[:, :-1] / np.maximum(1.0 - p_silent, MIN_DIVISOR)[:, None]
@@ -286,28 +288,29 @@ def rows_of_posterior(
 def _group_bounds(
     bank: HypothesisBank, P_live: Floats, g: int, model: Model, mass: float
 ) -> tuple[Floats, ...]:
-    """A group's effectiveness and its bounds, which hold this posterior mass, (n,) each.
+    """The median effectiveness of a group, and bounds with this probability between them, (n,) each.
 
-    Of several surfaces that move together any may have lost all, or nothing.
+    If surfaces move together, one of them may have lost everything and the others nothing: the bounds of a
+    group with a loss are then 0 and 1.
     """
     levels, p = _group_levels(bank, P_live, g)
-    if model.vehicle.other_laws:  # how rare faults are says nothing of a flight with one: all levels alike
+    if model.vehicle.other_laws:  # all levels are equally probable before the flight
         p = p / _group_levels(bank, bank.prior_probability[None, :-1], g)[1]
         p /= p.sum(axis=1, keepdims=True)
     low, high = _credible_bounds(levels, p, mass)
     if len(model.groups[g]) > 1:
-        low, high = np.where(low < low.max(initial=0.0), 0.0, low), np.ones_like(high)
+        low, high = np.where(low < levels[-2:].mean(), 0.0, low), np.ones_like(high)
     # the median, with half of the probability on either side: the least mean absolute error
     return levels[(np.cumsum(p, axis=1) >= 0.5 - 1e-12).argmax(axis=1)], low, high
 
 
 def _latched(alarmed: Mask, calm: Mask) -> Mask:
-    """An alarm once raised stands until health is the likelier again."""
+    """Whether the last alarmed row is later than the last calm row without an alarm, (n,)."""
     return last_true_row(alarmed) > last_true_row(calm & ~alarmed)
 
 
 def _group_levels(bank: HypothesisBank, P_live: Floats, g: int) -> tuple[Floats, Floats]:
-    """A group's levels, the last of them 1, and the probability of each, (L,) and (n, L)."""
+    """The levels of a group (L,), of which the last is 1, and the probability of each (n, L)."""
     levels, level_of = np.unique(bank.effectiveness[:-1, g], return_inverse=True)
     p = np.zeros((len(P_live), len(levels)))
     for h, j in enumerate(level_of):
@@ -316,7 +319,7 @@ def _group_levels(bank: HypothesisBank, P_live: Floats, g: int) -> tuple[Floats,
 
 
 def _credible_bounds(levels: Floats, p: Floats, mass: float) -> tuple[Floats, Floats]:
-    """The range of the fewest levels that hold a share of the probability, half a step wider each way."""
+    """The range of the fewest levels with this probability in sum, half a step wider on both sides."""
     order = np.argsort(-p, axis=1, kind="stable")
     ranked = np.take_along_axis(p, order, axis=1)
     chosen = np.cumsum(ranked, axis=1) - ranked < mass
@@ -327,10 +330,12 @@ def _credible_bounds(levels: Floats, p: Floats, mass: float) -> tuple[Floats, Fl
 
 
 def _surfaces_at_fault(model: Model, bank: HypothesisBank, P: Floats, faulty: Ints, nameable: Mask) -> Names:
-    """The surfaces of the groups that most of the fault's probability is on; `unknown` where it is split.
+    """The named surfaces by row: those of the groups with more than half of the fault's probability. If only
+    one group may be at fault (`one_group`): those of all groups that are not excluded, and `unknown` if none
+    is.
 
-    Where one group is at fault (`one_group`), each that may be instead is named with it; `unknown` where none
-    that the bank has is left out.
+    A row without a name while the alarm stands is `unknown`. A name stays while the fault is rather an
+    unknown offset, until another has stood for `rename_s`, and, with `one_group`, if another adds surfaces.
     """
     p_fault = np.maximum(P[:, bank.is_fault_hypothesis].sum(axis=1), MIN_DIVISOR)
     faults = [bank.is_fault_of_group(g) for g in range(len(model.groups))]
@@ -349,10 +354,9 @@ def _surfaces_at_fault(model: Model, bank: HypothesisBank, P: Floats, faulty: In
     for k in np.flatnonzero(faulty):
         new, old = names[k] or UNKNOWN_SURFACE, named[k - 1] if k else ""
         n_same = n_same + 1 if k and new == (names[k - 1] or UNKNOWN_SURFACE) else 0
-        # what was once excluded stays so: Ville's inequality bounds the chance of a wrong exclusion
+        # an excluded surface stays excluded: Ville's inequality bounds the chance of a wrong exclusion
         named_again = new == UNKNOWN_SURFACE or set(old.split("+")) <= set(new.split("+"))
         waits = n_same < n_hold or (model.settings.one_group and named_again)
-        # an offset of no known cause, or a name that has not stood, while the alarm does: nothing new
         keeps = old and (offset[k] or (old != UNKNOWN_SURFACE and waits))
         named[k] = old if keeps else new
     return named
@@ -364,7 +368,7 @@ def join_names(flags: Mask, names: Sequence[str]) -> Names:
 
 
 def _at_log_stamps(samples: Samples, rows: LogRows) -> LogRows:
-    """The rows at the log's own stamps: each stamp has the last row up to it."""
+    """The rows at the stamps of the log: each stamp has the last row up to it."""
     if np.array_equal(samples.log_stamps_s, rows.t_s):
         return rows
     last = last_row_at(rows.t_s, samples.log_stamps_s)

@@ -47,6 +47,13 @@ def posterior(bank, *shares):
     return rows
 
 
+def test_a_loss_of_surfaces_that_move_together_has_no_lower_bound():
+    tail = small.model(small.TAIL, settings=SETTINGS)
+    bank, samples = build_bank(tail), small.flight(tail, 1)
+    found = diagnose.rows_of_posterior(samples, tail, bank, posterior(bank, {(0.5, 1.0): 1.0}))
+    assert found.effectiveness_low[0, [0, 2]].tolist() == [0.0, 0.0]
+
+
 RIGHT, LEFT, BOTH = (0.5, 1.0), (1.0, 0.25), (0.5, 0.25)
 
 

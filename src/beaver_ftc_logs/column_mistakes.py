@@ -87,15 +87,17 @@ def refuse_command_unit(
 
 
 def _relative_motion(values: Floats, fitted: Sequence[Sequence[float]]) -> Floats:
-    """Return how many times as far as in the model's flights each column of values (n, S) moves, (S,)."""
+    """Range of each column of values (n, S) over its range in the flights of the model, (S,)."""
     spans = [np.ptp(np.array(ranges).reshape(-1, 2), axis=1) for ranges in (central_ranges(values), fitted)]
     return spans[0] / np.maximum(spans[1], MIN_DIVISOR)
 
 
 class Answers(NamedTuple):
-    """How the rates of each part of a flight answer the groups' commands: bounds of the gains lower and
-    upper, (4, G), 1 as in the model; log likelihood of a sample (4,), but for what all colours have alike;
-    as how many white samples a part counts."""
+    """The response to the commands in each of four parts of a flight.
+
+    lower, upper (4, G): bounds of the gain of each group, 1 in the model. likelihood (4,): mean log
+    likelihood of a sample, without a constant. n_white: as how many white samples the shortest part counts.
+    """
 
     lower: Floats
     upper: Floats
@@ -104,8 +106,8 @@ class Answers(NamedTuple):
 
 
 def answers(samples: Samples, model: Model, most: int | None = None) -> Answers | None:
-    """The answers in all parts of a flight, of a long one by every k-th sample, so that about `most` are
-    left; None where a part is too short."""
+    """The responses in the parts of a flight; None if a part is too short. most: of a longer flight, every
+    k-th sample is used, so that about this many are left."""
     flight = regression.innovations(samples, model)
     rows = np.flatnonzero(flight.is_known)
     step = max(len(rows) // most, 1) if most else 1
@@ -119,13 +121,12 @@ def answers(samples: Samples, model: Model, most: int | None = None) -> Answers 
 
 
 def refuse_columns(samples: Samples, model: Model) -> None:
-    """Raise BadInput where in every part of a flight the rates answer a command or another column as in no
-    flight of the model, or do what no trim and no effectiveness explain: columns, signs or units are others,
-    since no fault has always been there and changes what is not its own.
+    """Raise BadInput if tests 2 or 3 find a mistake in the columns of a flight.
 
-    What a law answers to gusts or to a gyro's noise looks like a command that works the other way round: an
-    answer is refused only where it is wrong by each colour of the noise that is likelier, too. A model that
-    knows the effect of no surface says nothing of any flight, and refuses none."""
+    A law's response to gusts or to gyro noise can look like a command with the opposite effect. A mistake
+    therefore counts only if test 2 finds it with each likelier moving average of the noise, too. A model
+    that knows the effect of no surface refuses no flight.
+    """
     if not any(known_effects(model)):
         return
     flight, likeliest = _whiten_likeliest(samples, model)
@@ -150,8 +151,8 @@ def _whiten_likeliest(samples: Samples, model: Model) -> tuple[Samples, Model]:
 
 
 def find_reversed(samples: Samples, model: Model) -> list[list[str]]:
-    """The groups of known effect to whose command the rates answer the other way round, by least squares
-    over all of a flight: a gain nearer to -1 than to 0, which is that of a lost surface."""
+    """The groups of known effect whose gain in the whole flight, by least squares, is nearer to -1 (another
+    sign) than to 0 (a lost surface)."""
     flight = regression.innovations(*_whiten_likeliest(samples, model))
     rows = np.flatnonzero(flight.is_known)
     if regression.split_parts(rows) is None:
@@ -161,8 +162,7 @@ def find_reversed(samples: Samples, model: Model) -> list[list[str]]:
 
 
 def _mistake_texts(samples: Samples, model: Model, found: Answers) -> dict[str, str]:
-    """Return the mistakes in the rates' answers to a flight's columns, by kind and column, the surest
-    first."""
+    """A text for each command with the wrong sign or in another unit, by kind and group."""
     mistakes = {}
     known, surfaces = known_gains(model), list(model.vehicle.surfaces)
     motions = np.zeros(len(surfaces))
@@ -185,11 +185,10 @@ def _mistake_texts(samples: Samples, model: Model, found: Answers) -> dict[str, 
 
 
 def _likelier_mistake(samples: Samples, model: Model) -> str | None:
-    """The mistake in the columns without which a flight is likelier in every part of it, where there is one.
+    """The correction that makes every part of a flight likelier, if there is one.
 
-    By chance a wrong reading is K times as likely as the true one in at most one part of K (Markov's
-    inequality for a likelihood ratio); all readings together have the chance `_FALSE_MISTAKE_CHANCE`. That
-    holds for a correct model.
+    If the model is correct, a wrong correction makes the log K times as likely with a probability of at most
+    1 / K (Markov's inequality). With N corrections, K = N / `_FALSE_MISTAKE_CHANCE`.
     """
     gains, n = mistake_gains(samples, model)
     if not gains:
@@ -202,12 +201,12 @@ def _likelier_mistake(samples: Samples, model: Model) -> str | None:
 
 
 def mistake_gains(samples: Samples, model: Model) -> tuple[dict[str, float], float]:
-    """By each mistake in the columns how much likelier a sample is without it, in natural logarithms, in the
-    part of the flight where that is least; and as how many samples a part counts.
+    """For each correction of the columns, the gain of the log likelihood of a sample, in the part of the
+    flight with the least gain; and as how many white samples a part counts.
 
-    A mended signal must also be likelier than no signal, by as much in all parts together. Where the model
-    errs in a signal's effect, a smaller or reversed effect may be likelier than the modelled one, while none
-    is likelier still.
+    A corrected signal must also be likelier than no signal, by as much in the sum over the parts. Where the
+    model errs in the effect of a signal, a smaller or reversed effect may be likelier than the modelled one,
+    and no effect likelier still.
     """
     found = answers(samples, model, _MAX_COMPARED_SAMPLES)
     if found is None:

@@ -32,6 +32,7 @@ BOUND_WINDOW_S = 1.0
 _LOSS_TOLERANCE = 1e-9
 _TOLERANCE_RAD_S2 = 1e-12
 _EFFECTIVE_SAMPLE_SHARE = 0.4
+"""As how many white samples one sample counts in the bounds of the command gains."""
 _ERROR_KEYS = ("fdi", "actuators", "design_model")  # not `substeps`: a frame of a log has one instant
 
 
@@ -69,7 +70,8 @@ def input_columns(aircraft: "Aircraft") -> tuple[list[str], ...]:
 
 
 def replay_samples(diagnosis: Diagnosis, arrays: Sequence[Floats], rate_hz: float) -> Replayed:
-    """The verdicts of evenly spaced samples; arrays: as `input_columns`, (n, ...) each."""
+    """The verdicts of evenly spaced samples, and the bounds that follow from their innovations. arrays: the
+    columns of `input_columns`, (n, ...) each."""
     verdicts: list[Verdict] = []
     nu = np.empty(arrays[0].shape)
     eta = np.empty_like(nu)
@@ -78,7 +80,7 @@ def replay_samples(diagnosis: Diagnosis, arrays: Sequence[Floats], rate_hz: floa
         verdicts.append(diagnosis.step(*inputs))
         nu[k], eta[k], Z[k] = diagnosis.innovation()
     theta = _explaining_losses(nu[:, :, None], eta[:, :, None], Z)
-    theta[0][0], theta[1][0] = -1.0, 0.0  # the first sample ends no frame
+    theta[0][0], theta[1][0] = -1.0, 0.0  # the first sample has no innovation
     n = max(round(BOUND_WINDOW_S * rate_hz), 1)
     low = 1.0 + _sliding_maximum(theta[0], n)
     high = 1.0 - _sliding_maximum(-theta[1], n)
@@ -121,8 +123,7 @@ def _sliding_maximum(x: Floats, n: int) -> Floats:
 
 
 def named_since(t_s: Floats, verdicts: Sequence[Verdict]) -> float | None:
-    """Since when the fault that the last verdict names has been named without a break, s; None if it names
-    none. A name that was withdrawn and returned counts from its return."""
+    """Time, s, since which each verdict has had the name of the last one; None if the last one has none."""
     name: str | None = None
     since_s: float | None = None
     for at_s, verdict in zip(t_s, verdicts, strict=True):
@@ -152,7 +153,8 @@ def _bounds(
 
 
 def rows_of_replay(t_s: Floats, replay: Replayed, surfaces: Sequence[str], fdi: Any) -> LogRows:
-    """The rows of a flight. fdi: of the scenario, which class of faults its verdicts are of."""
+    """The rows of a flight. fdi: this section of the scenario. A rival's scheme and verdicts of pairs have
+    bounds of 0 and 1, since the bounds assume that one surface is faulty."""
     faulty = np.array([verdict.detected for verdict in replay.verdicts])
     low = np.zeros_like(replay.alone_low)
     high = np.ones_like(low)

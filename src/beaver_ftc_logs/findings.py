@@ -27,7 +27,7 @@ from beaver_ftc_logs.samples import Samples
 MAX_BRIEF_EVENT_S = 3.0
 DETECTION_HORIZONS_S = (5.0, 20.0, 60.0)
 _ALIKE_COSINE = 0.9
-_MIN_CREDIBLE_SHARE = 0.1
+MIN_CREDIBLE_SHARE = 0.1
 """Share of credible rows below which there is no verdict."""
 _ONE_GROUP_NOTE = (
     "{} get proportional commands while they are healthy: no fit of healthy flight tells their effects "
@@ -140,7 +140,7 @@ def as_text(verdict: Document) -> str:
 def _no_event_text(verdict: Document) -> str:
     """No event: because no fault shows, or because nothing can be said."""
     share = verdict["credible"]["share"]
-    if share < _MIN_CREDIBLE_SHARE:
+    if share < MIN_CREDIBLE_SHARE:
         return "no verdict"
     return "no fault shows" if share >= 1.0 else "no fault shows where the model is credible,"
 

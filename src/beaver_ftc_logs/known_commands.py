@@ -1,7 +1,7 @@
-"""Which columns of a log carry the command of a surface: by the messages and names that are known to do so.
+"""Which columns of a log carry the command of a surface, by the names of known messages and columns.
 
-A word such as `actuator` or `cmd` in a name proves nothing: flags, stamps, counters and mission items have
-such names too. What is not in these tables is no command until a vehicle file names it.
+A word such as `actuator` or `cmd` in a name is not enough: flags, stamps, counters and mission items have
+such names too. Another column is a command only if the vehicle file names it.
 """
 
 import re
@@ -36,8 +36,6 @@ KNOWN_COMMANDS = {
 """Patterns of whole names, in lower case, of columns that carry commands of surfaces, each with an example.
 Columns of plain tables are judged by their words (`_is_plain_command_name`)."""
 
-_NOT_PLAIN_WORDS = r"[^a-z0-9%]+"
-
 
 def is_command_name(column_name: str) -> bool:
     """Whether a column is known to carry the command of a surface."""
@@ -51,7 +49,7 @@ def _is_plain_command_name(name: str) -> bool:
     that is in no table, as in `CMD.Lat`, makes another quantity."""
     if "." in name or "/" in re.sub(r"[\[(].*", "", name):
         return False
-    words = [word for word in re.split(_NOT_PLAIN_WORDS, name) if word]
+    words = [word for word in re.split(r"[^a-z0-9%]+", name) if word]
     text = "_".join(words)
     sides, units = rf"(({_SIDE_WORD})_?)*", rf"(_({_UNIT_WORD}))?"
     surface = rf"(delta_|d_)?{sides}({_SURFACE_WORD})(_?({_SIDE_WORD}))*(_({_COMMAND_WORD}))*{units}"
@@ -67,14 +65,17 @@ _PX4_ROTARY_WINGS = {2: "quadrotor", 3: "coaxial helicopter", 4: "helicopter", 1
                           14: "octorotor", 15: "tricopter", 29: "dodecarotor"}  # fmt: skip
 """MAV_TYPE of vehicles that rotors alone move [MAVLink, common.xml: MAV_TYPE]."""
 _PX4_VTOL_TYPES = range(19, 26)
+"""MAV_TYPE of aircraft that take off vertically and fly on a wing [MAVLink, common.xml: MAV_TYPE]."""
 _PX4_COPTERS = range(4000, 13000)
+"""SYS_AUTOSTART of multicopters [PX4, airframes reference]."""
 _COPTER_PARAMETERS = ("MOT_SPIN_ARM", "MOT_SPIN_ARMED", "MOT_SPIN_MIN", "MOT_THST_EXPO")
 _PLANE_PARAMETER = "Q_ENABLE"
+"""Parameters of ArduCopter, of any release; one of ArduPlane, which ArduCopter has not."""
 _MIN_ROTORS = 3
 
 
 def multicopter_reason(params: Parameters, names: Collection[str]) -> str | None:
-    """What in a log says that rotors alone move the vehicle; None where nothing does."""
+    """The parameter or the columns by which rotors alone move the vehicle; None if there are none."""
     mav_type = last_value(params, "MAV_TYPE")
     if mav_type in _PX4_ROTARY_WINGS:
         return f"MAV_TYPE {mav_type:g}, {_PX4_ROTARY_WINGS[int(mav_type)]}"
@@ -104,8 +105,8 @@ def hovers_throughout(params: Parameters, columns: Columns) -> bool:
 
 
 def command_names(names: Sequence[str], params: Parameters) -> list[str]:
-    """The columns that carry commands of surfaces, those of one message: what several messages say of the
-    same surfaces is said once. Of a VTOL only the group of its wing."""
+    """The columns that carry commands of surfaces. Several messages have the commands of the same surfaces,
+    so only the columns of the first message count; of a VTOL, only those for flight on its wing."""
     commands = [name for name in names if is_command_name(name)]
     if last_value(params, "MAV_TYPE") in _PX4_VTOL_TYPES:
         hovering = r"(actuator_controls_0|vehicle_torque_setpoint)\."

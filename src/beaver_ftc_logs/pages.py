@@ -18,7 +18,7 @@ from beaver_ftc.results import Document, as_json, result_folder
 from beaver_ftc.studies.present import GRID, panels
 from beaver_ftc_logs import orders
 from beaver_ftc_logs.diagnose import LogRows
-from beaver_ftc_logs.findings import MAX_BRIEF_EVENT_S, duration_text, events_to_show
+from beaver_ftc_logs.findings import MAX_BRIEF_EVENT_S, MIN_CREDIBLE_SHARE, duration_text, events_to_show
 from beaver_ftc_logs.folds import Fold, held_out_folds
 from beaver_ftc_logs.least_squares import Regression, spectral_density
 from beaver_ftc_logs.model import Model
@@ -86,6 +86,7 @@ def render_diagnosis(samples: Samples, rows: LogRows, verdict: Document, words: 
         duration_text=duration_text(verdict),
         events=events_to_show(verdict["events"]),
         brief_s=MAX_BRIEF_EVENT_S,
+        min_share=MIN_CREDIBLE_SHARE,
         words=words,
         picture=_encode_png(flight_figure(samples, rows, words)),
         notes=[*_log_notes(samples), words.predicts],

@@ -149,7 +149,7 @@ def _compare_angles(log: RecordedFlight, vehicle: Vehicle) -> list[str]:
     columns = convert_to_si(log, vehicle).columns
     angles = named_angles(columns, vehicle)
     if angles[0] is None:
-        return ["no roll angle is named: whether the rates are in rad/s is not checked"]
+        return ["no roll angle is named and logged: whether the rates are in rad/s is not checked"]
     gyros = [columns[name] for name in vehicle.rate_columns]
     in_si = [angle and angle[1] for angle in angles]
     fits = [physics.fit_angle(gyros, in_si, axis) for axis in range(3)]

@@ -344,7 +344,7 @@ def _surfaces_at_fault(model: Model, bank: HypothesisBank, P: Floats, faulty: In
         is_loss = bank.hypothesis_kind == GROUP_LOSS
         p_loss = np.column_stack([P[:, of_group & is_loss].sum(axis=1) for of_group in faults])
         likely = p_loss > _EXCLUSION_RISK * p_loss.max(axis=1, keepdims=True)
-        can_lose = p_loss.max(axis=0) > 0.0
+        can_lose = np.array([(of_group & is_loss).any() for of_group in faults])
         likely &= ~(likely[:, can_lose].all(axis=1) & (can_lose.sum() > 1))[:, None]
     names = join_names(likely & nameable[:, None], model.group_names)
     named = np.full(len(P), "", dtype=object)

@@ -14,11 +14,13 @@ from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import extremes, fitting, gyro_noise, orders, regression, trust, validation
 from beaver_ftc_logs.column_mistakes import refuse_command_unit
+from beaver_ftc_logs.fit_checks import collinear_names, density_ratios, median_inflation
 from beaver_ftc_logs.folds import fold_qualities
+from beaver_ftc_logs.free_runs import fit_output_error
 from beaver_ftc_logs.least_squares import left_by
 from beaver_ftc_logs.model import FittedRanges, Model, NoiseModel
 from beaver_ftc_logs.recording import Floats
-from beaver_ftc_logs.regression import Parts
+from beaver_ftc_logs.regression import Parts, group_indices
 from beaver_ftc_logs.samples import (
     NOISE_MA_CANDIDATES,
     UNFITTED_GYROS_RAD_S,
@@ -60,6 +62,10 @@ def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
         ],
         "tests": folds,
         "another_day": expect_another_day(folds, model),
+        "collinear": collinear_names(parts, model),
+        "colour": median_inflation(parts, model),
+        "spectrum": density_ratios(parts, model),
+        "output_error": fit_output_error(parts, group_indices(model)),
     }
     settings = model.settings.model_copy(update={"bounds": mass})
     return model.model_copy(update={"settings": settings, "identified": results})

@@ -1,6 +1,7 @@
 """The printed text of an identification: one line for each assumption, test and remark."""
 
 from beaver_ftc.results import Document
+from beaver_ftc_logs.fit_checks import LEAST_INFLATION
 from beaver_ftc_logs.identification import SCORES
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.regression import axis_text
@@ -27,7 +28,23 @@ def identification_text(model: Model) -> str:
         *(f"  {flight['name']}: {note}" for flight in results["flights"] for note in flight["notes"]),
         *map(_fold_text, results["tests"]),
         *_day_lines(results["another_day"], len(results["flights"])),
+        f"  the residual's colour widens standard errors by {axis_text(results['colour'])}",
     ]
+    output = results["output_error"]
+    if "delay_s" in output:
+        delay = f"delay {output['delay_s']:.3f} s (sd {output['delay_sd_s']:.3f})"
+        explained = axis_text(output["explained_of_windows_not_fitted"])
+        lag = f"servo lag {output['servo_lag_s']:.3f} s (sd {output['servo_lag_sd_s']:.3f})"
+        if output["shorter_than_can_be_told"]:
+            lag = "servo lag shorter than this rate can tell"
+        lines.append(f"  output error: {lag}, {delay}, explains of 2 s free runs not fitted {explained}")
+    if results["collinear"]:
+        most, n = results["collinear"][0], len(results["collinear"])
+        are = "regressors are" if n > 1 else "regressor is"
+        factor = most["inflation"]
+        times = "made up by the others" if factor is None else f"{factor:.0f} times"
+        inflated = f"variance inflated over {LEAST_INFLATION:g} times"
+        lines.append(f"  {n} {are} collinear ({inflated}), most {most['regressor']} ({times})")
     return "\n".join(lines)
 
 

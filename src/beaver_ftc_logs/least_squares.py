@@ -25,12 +25,14 @@ _MEDIAN_CHI2 = 2.366
 
 @dataclass(frozen=True)
 class Regression:
-    """coefficients (m, 3); residual_covariance (3, 3); standard_errors (m, 3);
+    """coefficients (m, 3); residual_covariance (3, 3); standard_errors (m, 3); standard_error_inflation: the
+    factor by which the residuals' colour widens them over those of white ones, (m, 3);
     coefficient_error_correlation (m, m): of the coefficients' errors, alike on every axis."""
 
     coefficients: Floats
     residual_covariance: Floats
     standard_errors: Floats
+    standard_error_inflation: Floats
     coefficient_error_correlation: Floats
 
 
@@ -51,9 +53,11 @@ def fit_ols(Z: Floats, y: Floats, stretch: Ints, lag: int) -> Regression:
     e = y - X @ b
     dof = max(len(y) - Z.shape[1], 1)
     R = e.T @ e / dof
-    errors = np.column_stack([_newey_west(X, e[:, i], P, stretch, lag) for i in range(y.shape[1])])
+    white = np.sqrt(np.maximum(np.outer(np.diag(P), np.diag(R)), 0.0))
+    coloured = np.column_stack([_newey_west(X, e[:, i], P, stretch, lag) for i in range(y.shape[1])])
+    inflation = np.divide(coloured, white, out=np.ones_like(coloured), where=white > 0)
     d = np.sqrt(np.maximum(np.diag(P), MIN_DIVISOR))
-    return Regression(b / s[:, None], R, errors / s[:, None], P / np.outer(d, d))
+    return Regression(b / s[:, None], R, coloured / s[:, None], inflation, P / np.outer(d, d))
 
 
 def _newey_west(X: Floats, e: Floats, P: Floats, stretch: Ints, lag: int) -> Floats:
@@ -83,6 +87,20 @@ def noise_scale(e2: Floats) -> float:
     """The scale of the noise by the squares of what is left, (3 n,), which faults of few samples do not
     change."""
     return float(np.median(e2.reshape(-1, 3).sum(axis=1)) / _MEDIAN_CHI2)
+
+
+def variance_inflation(Z: Floats) -> Floats:
+    """How much the variance of each column's coefficient is inflated by the other columns of Z (n, m): 1
+    alone, inf dependent. That is the diagonal of the inverse of the correlation C = V lam V'."""
+    X = Z - Z.mean(axis=0)
+    norms = np.sqrt((X**2).sum(axis=0))
+    factors = np.full(Z.shape[1], np.inf)
+    varying = norms > 1e-12
+    X = X[:, varying] / norms[varying]
+    lam, V = np.linalg.eigh(X.T @ X)
+    lam = np.where(lam > _RANK_TOLERANCE * lam.max(initial=0.0), lam, _RANK_TOLERANCE**2)
+    factors[varying] = (V**2 / lam).sum(axis=1)
+    return np.where(factors < 1.0 / _RANK_TOLERANCE, factors, np.inf)
 
 
 def spectral_density(e: Floats, rate_hz: float) -> tuple[Floats, Floats]:

@@ -23,7 +23,7 @@ from beaver_ftc_logs.folds import Fold, held_out_folds
 from beaver_ftc_logs.least_squares import Regression, spectral_density
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import Floats
-from beaver_ftc_logs.regression import Parts
+from beaver_ftc_logs.regression import Parts, regressor_names
 from beaver_ftc_logs.runs import true_runs
 from beaver_ftc_logs.samples import Samples
 
@@ -195,7 +195,7 @@ def render_identification(flights: Sequence[Samples], model: Model) -> str:
     """The page as HTML text."""
     usable = orders.fit_parts(flights)
     fit = orders.fit_order(usable, model.vehicle, model.history, model.lags)
-    names = ["constant", *_regressor_names(model)]
+    names = ["constant", *regressor_names(model)]
     return load_template("model.html.j2").render(
         mark=PAGE_MARK,
         model=model,
@@ -206,19 +206,6 @@ def render_identification(flights: Sequence[Samples], model: Model) -> str:
         spectrum=_encode_png(_spectrum_figure(usable, model)),
         correlation=_encode_png(_correlation_figure(fit, names)),
     )
-
-
-def _regressor_names(model: Model) -> list[str]:
-    """Names of the columns of the fit after the constant, in their order."""
-    h = model.history
-    signals = model.vehicle.regressor_columns
-    commands = [(f"command of {'+'.join(group)}",) for group in model.groups]
-    lagged = [
-        ("pqr", h),
-        (signals, model.vehicle.n_signal_lags(h)),
-        *((one, model.lags) for one in commands),
-    ]
-    return [f"{name}[-{k}]" for names, most in lagged for k in range(1, most + 1) for name in names]
 
 
 def _encode_png(figure: Any) -> str:

@@ -290,3 +290,16 @@ def split_parts(rows: Ints) -> list[Ints] | None:
     """The rows of a flight in its parts; None where one is too short."""
     parts = np.array_split(rows, _N_PARTS)
     return parts if min(map(len, parts)) >= _MIN_PART_ROWS else None
+
+
+def regressor_names(model: Model) -> list[str]:
+    """Names of the columns of the fit after the constant, in their order."""
+    h = model.history
+    signals = model.vehicle.regressor_columns
+    commands = [(f"command of {'+'.join(group)}",) for group in model.groups]
+    lagged = [
+        ("pqr", h),
+        (signals, model.vehicle.n_signal_lags(h)),
+        *((one, model.lags) for one in commands),
+    ]
+    return [f"{name}[-{k}]" for names, most in lagged for k in range(1, most + 1) for name in names]

@@ -1,10 +1,12 @@
-"""How an identification counts commands: by equations of known flights."""
+"""How an identification counts commands, finds a servo and runs freely: by equations of known flights."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from beaver_ftc_logs import orders
+from beaver_ftc_logs.free_runs import fit_output_error
 from beaver_ftc_logs.identification import scale_if_better
 from products.logs import small
 
@@ -28,3 +30,36 @@ def test_commands_count_with_the_dynamic_pressure_where_that_explains_more():
         assert scale_if_better(plain, its) == (plain, its)
     told = its.model_copy(update={"reference_airspeed_mps": 20.0})
     assert scale_if_better([pressed(flight)], told)[1] == told
+
+
+def lagged(n=1200, lag_s=0.1, delay_s=0.13, seed=4, noise=0.002):
+    """A flight whose rates answer commands late, through a servo; at 10 Hz, from its equations."""
+    rng = np.random.default_rng(seed)
+    samples = small.flight(MODEL, n, seed=seed)
+    keep, share = np.exp(-0.1 / lag_s), delay_s / 0.1 % 1.0
+    whole = int(delay_s / 0.1)
+    a, b = np.diag([0.6, 0.7, 0.8]), np.array([[0.3, 0.1, 0.02], [0.2, -0.15, 0.04]])
+    rates, servo = np.zeros((n, 3)), samples.commands[0].copy()
+    for k in range(n - 1):
+        rates[k + 1] = rates[k] @ a.T + servo @ b + 0.01
+        late = [max(k - whole - i, 0) for i in (0, 1)]
+        command = (1 - share) * samples.commands[late[0]] + share * samples.commands[late[1]]
+        servo = keep * servo + (1 - keep) * command
+    return replace(samples, rates=rates + noise * rng.standard_normal((n, 3)))
+
+
+def test_servo_lag_and_delay_are_found(changed):
+    found = fit_output_error(orders.fit_parts([lagged()]), [[0], [1]])
+    assert found["servo_lag_s"] == pytest.approx(0.1, abs=0.02)
+    assert found["delay_s"] == pytest.approx(0.13, abs=0.02)
+    assert min(found["explained_of_windows_not_fitted"].values()) > 0.98
+    assert found["shorter_than_can_be_told"] is False
+    for what in ("servo_lag", "delay"):
+        assert 0.0 < found[f"{what}_sd_s"] < 0.02
+    assert not changed(
+        {key: value if isinstance(value, int) else _short(value) for key, value in found.items()}
+    )
+
+
+def _short(value):
+    return {k: _short(v) for k, v in value.items()} if isinstance(value, dict) else round(float(value), 5)

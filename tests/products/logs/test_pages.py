@@ -79,6 +79,14 @@ IDENTIFIED = {
         },
         {"left_out": "first half", "samples": 0},
     ],
+    "collinear": [{"regressor": "p[-1]", "inflation": 23.4}],
+    "colour": {"p": 1.1, "q": 1.2, "r": 1.3},
+    "spectrum": [{"from_hz": 0.0, "to_hz": 0.1, "p": 0.9, "q": 1.0, "r": 1.1}],
+    "output_error": {
+        "windows": 40, "servo_lag_s": 0.12, "servo_lag_sd_s": 0.01, "delay_s": 0.05, "delay_sd_s": 0.02,
+        "shorter_than_can_be_told": False,
+        "explained_of_windows_not_fitted": {"p": 0.81, "q": 0.82, "r": 0.83},
+    },
 }  # fmt: skip
 
 

@@ -57,6 +57,8 @@ def test_least_squares_and_its_covariance():
     inverse = np.linalg.inv(x.T @ x)
     size = np.sqrt(np.diag(inverse))
     np.testing.assert_allclose(fit.coefficient_error_correlation, inverse / np.outer(size, size), rtol=1e-6)
+    white = np.outer(size, np.sqrt(np.diag(fit.residual_covariance)))
+    np.testing.assert_allclose(fit.standard_error_inflation, fit.standard_errors / white, rtol=1e-6)
 
 
 @pytest.mark.parametrize("reach", [0, 1, 4, 100])
@@ -76,7 +78,7 @@ def test_standard_errors_for_coloured_residuals(reach):
 
 
 def test_what_is_not_excited_gets_no_coefficient():
-    """A column of zeros, and one twice: the least coefficients that fit."""
+    """A column of zeros, and one twice: the least coefficients that fit, and colour of one where none is."""
     x, y, run = drawn(m=3)
     wide = np.column_stack([x, x[:, 0], np.zeros(40)])
     fit = least_squares.fit_ols(wide, y, run, 2)
@@ -84,6 +86,7 @@ def test_what_is_not_excited_gets_no_coefficient():
     np.testing.assert_allclose(fit.coefficients[0], fit.coefficients[3], rtol=1e-6)
     np.testing.assert_allclose(fit.coefficients[0] * 2, alone.coefficients[0], rtol=1e-6)
     assert fit.coefficients[4].tolist() == [0.0] * 3
+    assert fit.standard_error_inflation[4].tolist() == [1.0] * 3
     assert np.isfinite(fit.coefficient_error_correlation).all()
     few = least_squares.fit_ols(x[:3], y[:3], run[:3], 5)
     assert np.isfinite(few.residual_covariance).all()

@@ -1,0 +1,91 @@
+"""Servo lag and delay of the vehicle: the output error of free runs from the recorded rates."""
+
+import numpy as np
+
+from beaver_ftc.results import Document
+from beaver_ftc_logs import regression
+from beaver_ftc_logs.recording import Floats
+from beaver_ftc_logs.regression import Groups, Parts
+
+_WINDOW_S, _MIN_WINDOWS, _MAX_WINDOWS = 2.0, 20, 400
+_MAX_DELAY_S, _MIN_SERVO_LAG_S, _MAX_SERVO_LAG_S = 0.6, 0.005, 1.0
+
+
+def fit_output_error(parts: Parts, groups: Groups) -> Document:
+    """Fit on every other window, test on the rest. Returns servo lag and delay in s, their standard errors,
+    and the share of the rates' variance explained over free-running windows not fitted, an axis.
+
+    th: parameters, as in `_simulate`; P: inverse of their information.
+    """
+    from scipy.optimize import least_squares
+
+    dt_s = regression.usual_step_s(parts)
+    u, y = _cut_windows(parts, groups, round(_WINDOW_S / dt_s), round(_MAX_DELAY_S / dt_s) + 1)
+    if len(y) < _MIN_WINDOWS or not np.ptp(y, axis=(0, 1)).all():
+        return {"windows": len(y), "says": "too few gap-free windows in which every rate moves"}
+    fitted, held_out = slice(0, None, 2), slice(1, None, 2)
+    sd = y.std(axis=(0, 1))
+    # lag, delay, A, B and c
+    guess = np.array([0.1, dt_s, *(0.7 * np.eye(3)).ravel(), *np.full(3 * len(groups), 0.01), *np.zeros(3)])
+    free = np.full(len(guess) - 2, np.inf)
+    lower, upper = [_MIN_SERVO_LAG_S, 0.0, *-free], [_MAX_SERVO_LAG_S, _MAX_DELAY_S, *free]
+
+    def error(th: Floats, rows: slice) -> Floats:
+        return ((_simulate(th, u[rows], y[rows], dt_s) - y[rows]) / sd).ravel()
+
+    found = least_squares(error, guess, bounds=(lower, upper), args=(fitted,), loss="soft_l1", max_nfev=40)
+    P = np.linalg.pinv(found.jac.T @ found.jac)
+    errors = np.sqrt(np.maximum(np.diag(P), 0.0) * float(found.fun @ found.fun) / len(found.fun))
+    e = error(found.x, held_out).reshape(-1, 3) * sd
+    explained = 1.0 - e.var(axis=0) / y[held_out].reshape(-1, 3).var(axis=0)
+    return {
+        "windows": len(y),
+        "servo_lag_s": float(found.x[0]),
+        "servo_lag_sd_s": float(errors[0]),
+        "delay_s": float(found.x[1]),
+        "delay_sd_s": float(errors[1]),
+        "shorter_than_can_be_told": bool(found.x[0] < 2.0 * _MIN_SERVO_LAG_S),
+        "explained_of_windows_not_fitted": regression.by_axis(explained),
+    }
+
+
+def _cut_windows(parts: Parts, groups: Groups, n: int, past: int) -> tuple[Floats, Floats]:
+    """Commands u (W, past + n, G) with their past, scaled by labels, and rates y (W, n, 3), of W windows."""
+    windows = []
+    for part in parts:
+        samples = part.samples
+        v = regression.group_commands(samples, groups, labelled=True)
+        rows = np.column_stack([samples.rates, samples.stretch_number, v])[:-1]
+        rows[~part.is_usable[:-1]] = np.nan
+        begin = np.arange(0, len(rows) - past - n + 1, n)
+        cut = rows[begin[:, None] + np.arange(past + n)]
+        windows.append(cut[np.isfinite(cut).all(axis=(1, 2)) & (np.ptp(cut[:, :, 3], axis=1) == 0)])
+    chosen = np.concatenate(windows)
+    chosen = chosen[:: max(len(chosen) // _MAX_WINDOWS, 1)]
+    return chosen[:, :, 4:], chosen[:, past:, :3]
+
+
+def _simulate(th: Floats, u: Floats, y: Floats, dt_s: float) -> Floats:
+    """Free runs X (W, m, 3) of all windows at once, rad/s, from the first of the rates y (W, m, 3):
+
+        x[k+1] = A x[k] + B' s[k] + c,    s[k+1] = a s[k] + (1 - a) v[k],    a = exp(-dt / lag)
+
+    s (W, n): positions of the servos; v (W, n): commands u (W, past + m, n) a delay before. th: lag and
+    delay, both s, A (3, 3), B (n, 3), c (3,).
+    """
+    (lag_s, delay_s), A, B, c = np.split(th, [2, 11, len(th) - 3])
+    A, B = A.reshape(3, 3), B.reshape(-1, 3)
+    m = y.shape[1]
+    past = u.shape[1] - m
+    whole, f = divmod(delay_s / dt_s, 1.0)
+    a = np.exp(-dt_s / lag_s)
+    x = y[:, 0].copy()
+    s = u[:, 0].copy()
+    X = np.empty_like(y)
+    for k in range(u.shape[1]):
+        if k >= past:
+            X[:, k - past] = x
+            x = x @ A.T + s @ B + c
+        v = (1.0 - f) * u[:, max(k - int(whole), 0)] + f * u[:, max(k - int(whole) - 1, 0)]
+        s = a * s + (1.0 - a) * v
+    return X

@@ -38,37 +38,25 @@ def next_mode(now, wanted):
 
 
 @kernel
-def mode_of(config, detected, isolated, relieved):
-    """The mode for a law, given the diagnosis: detected 0/1, isolated (estimator index, -1 or -2), and
-    whether another surface can relieve the one isolated. config: what the law is given (control/state.py).
-
-    A law that does not use the verdict has nothing to reconfigure: it stays as it is.
-    """
-    if not config.uses_verdict or not detected:
-        return MODE_NOMINAL
-    if isolated == UNANTICIPATED:
-        return MODE_UNANTICIPATED
-    if config.reallocates and isolated >= 0 and relieved:
-        return MODE_REALLOCATED
-    return MODE_ADAPTIVE
-
-
-@kernel
 def mode_from(config, layout, verdict, assessment):
-    """The mode that the diagnosis asks for; verdict: what it concludes; config: as in `mode_of`."""
-    elevator, relievable = layout.main[PITCH], layout.stand_in >= 0
-    if not assessment.diagnoses_all_types:
-        relieved = assessment.isolated_surface == elevator and relievable
-        return mode_of(config, verdict.detected, verdict.isolated_estimator, relieved)
-    replaced = verdict.accommodation_mode in (SCALE_COMMAND, GIVE_UP)
-    relieved = replaced and verdict.target == elevator and relievable
-    isolated = verdict.target if replaced else min(verdict.isolated_estimator, 0)
-    return mode_of(config, verdict.detected, isolated, relieved)
+    """The mode that the diagnosis asks for; verdict: what it concludes; config: what the law is given
+    (control/state.py). A law that does not use the verdict stays nominal: it has nothing to reconfigure.
+    """
+    if not config.uses_verdict or not verdict.detected:
+        return MODE_NOMINAL
+    surface = assessment.isolated_surface
+    if assessment.diagnoses_all_types:
+        replaced = verdict.accommodation_mode in (SCALE_COMMAND, GIVE_UP)
+        surface = verdict.target if replaced else -1
+    if surface < 0 and verdict.isolated_estimator == UNANTICIPATED:
+        return MODE_UNANTICIPATED
+    relieved = config.reallocates and surface == layout.main[PITCH] and layout.stand_in >= 0
+    return MODE_REALLOCATED if relieved else MODE_ADAPTIVE
 
 
 @kernel
 def true_mode(config, layout, faults):
-    """The mode for a law that knows the true fault the moment it occurs; config: as in `mode_of`."""
+    """The mode for a law that knows the true fault the moment it occurs; config: as in `mode_from`."""
     elevator = layout.main[PITCH]
     if not faults.present:
         return MODE_NOMINAL

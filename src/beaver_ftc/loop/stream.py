@@ -1,6 +1,7 @@
 """The diagnosis as a stream, without JSBSim: for another simulator, a log, an autopilot."""
 
 from collections.abc import Mapping
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -88,11 +89,11 @@ class Diagnosis:
         self._frame = self._frames[0]
         self._fdi = self._frame["fdi"]
         self._fdi["engine_monitor"]["config"]["n_engines"] = 0  # nobody says where levers are
-        self._x, self._command, self._attitude = np.zeros(3), np.zeros(travel.shape[1]), np.zeros(3)
-        self._altitude = np.array([self._scenario.initial.altitude_m])
+        self._attitude, command = np.zeros(3), np.zeros(travel.shape[1])
+        self._altitude_m = self._scenario.initial.altitude_m
         self._y = np.zeros_like(self._frame["measured"]["y"])  # beyond the aircraft's own signals always zero
         self._signals = self._y[: len(FLOW) + len(self._aircraft.signals)]
-        self._take = direct(watching.take, self._frames, self._x, self._y, self._command, self._attitude)
+        self._take = direct(watching.take, self._frames, self._attitude, self._y, command, self._attitude)
         self._diagnose = direct(stepping.diagnose, self._frames)
         self._accommodate_and_advance = direct(watching.accommodate_and_advance, self._frames)
         self._theta = direct(watching.theta, self._frames)
@@ -127,21 +128,22 @@ class Diagnosis:
 
         Raises BadInput for a wrong shape, and for a value that is infinite or NaN. Such a sample is ignored.
         """
-        _put("rates_rad_s", rates_rad_s, self._x)
-        _put("signals", signals, self._signals)
-        _put("command_rad", command_rad, self._command)
+        x = _numbers("rates_rad_s", rates_rad_s, 3)
+        self._signals[:] = _numbers("signals", signals, self._signals.size)
+        command = _numbers("command_rad", command_rad, len(self._aircraft.surfaces))
+        attitude, altitude = self._attitude, self._altitude_m
         if attitude_rad is not None:
-            _put("attitude_rad", attitude_rad, self._attitude)
+            attitude = _numbers("attitude_rad", attitude_rad, 3)
         elif self.declared.air.moves:
             raise BadInput("attitude_rad: is missing, allowed: (3,) rad where fdi.bounds declares turbulence")
         if altitude_m is not None:
-            _put("altitude_m", np.atleast_1d(altitude_m), self._altitude)
+            altitude = float(_numbers("altitude_m", np.atleast_1d(altitude_m), 1)[0])
         if self._fresh:
-            self._begin()
-        self._frame["measured"]["altitude"] = self._altitude[0]
-        flown = self._frames, self._x, self._y, self._command, self._attitude
-        if not (np.isfinite(self._altitude[0]) and self._take(*flown)):
+            self._begin(x, command)
+        self._frame["measured"]["altitude"] = altitude
+        if not (isfinite(altitude) and self._take(self._frames, x, self._y, command, attitude)):
             raise BadInput(f"the sample after {self.t_s:g} s is not finite, allowed: finite numbers")
+        self._attitude, self._altitude_m = attitude, altitude
         self._diagnose(self._frames)
         self._accommodate_and_advance(self._frames)
         if not self._fdi["verdict"]["detected"]:
@@ -188,28 +190,31 @@ class Diagnosis:
             return float(self._theta(self._frames))
         return estimate_now(self._fdi, self._said, self._aircraft.surfaces)
 
-    def _begin(self) -> None:
-        """Configure what holds on to the trim, once its first sample is there."""
-        x, y, u = self._x.copy(), self._signals.copy(), self._command.copy()
+    def _begin(self, x: Vector, command: Vector) -> None:
+        """Configure what depends on the trim: `start`, or the first sample."""
+        first = x, self._signals.copy(), command
         if self._start is not None:
-            for what, place, given in zip(_START, (x, y, u), self._start, strict=True):
-                _put(what, np.asarray(given), place)
-        if not all(np.isfinite(part).all() for part in (x, y, u)):
-            return
-        configure_diagnosis_at_trim(self._frame, self._scenario, Trim(x, y, u, u))
-        self._fresh = False
+            parts = zip(_START, self._start, first, strict=True)
+            first = tuple(_numbers(what, np.asarray(given), part.size) for what, given, part in parts)
+            if not all(np.isfinite(part).all() for part in first):
+                raise BadInput("start: is not finite, allowed: finite numbers")
+        if all(np.isfinite(part).all() for part in first):
+            x, y, u = first
+            configure_diagnosis_at_trim(self._frame, self._scenario, Trim(x, y, u, u))
+            self._fresh = False
 
 
-def _put(what: str, given: Any, place: Vector) -> None:
-    """Copy so many numbers into their place, or say what is wrong with them.
+def _numbers(what: str, given: Any, size: int) -> Vector:
+    """So many numbers, copied, or what is wrong with them.
 
     The loop's own record of the signals has room for more than an aircraft declares: it fits as well.
     """
     try:
-        fits = len(given) in (place.size, N_Y if what == "signals" else place.size)
-        place[:] = given[: place.size]
+        if len(given) in (size, N_Y if what == "signals" else size):
+            numbers = np.empty(size)
+            numbers[:] = given[:size]
+            return numbers
     except (TypeError, ValueError):
-        fits = False
-    if not fits:
-        shown = " ".join(repr(given).split())
-        raise BadInput(f"{what}: {shown:.80} does not fit, allowed: {place.size} numbers")
+        pass
+    shown = " ".join(repr(given).split())
+    raise BadInput(f"{what}: {shown:.80} does not fit, allowed: {size} numbers")

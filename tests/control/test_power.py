@@ -1,11 +1,14 @@
 """Engine power on pitch: when it takes over, what it may do, and that it helps."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
+from beaver_ftc.aircraft import load
 from beaver_ftc.control import power
 from beaver_ftc.design import fdc
 from beaver_ftc.design.fdc import value
@@ -43,6 +46,13 @@ def steer(control, x, y, known, t):
     """A frame of the law; known: there is an alarm."""
     watched = known or control["config"]["informed"]
     power.steer_by_power(control["power"], control["reference"], x, y, watched, is_lost(control), t)
+
+
+def test_a_propeller_that_turns_the_other_way_leaves_the_rudder_as_much(monkeypatch):
+    limit, terms = control_record()["power"]["config"]["highest_dpt"], load().terms
+    mirrored = {**terms, "Cn_dpt3": replace(terms["Cn_dpt3"], value=-value("Cn_dpt3"))}
+    monkeypatch.setitem(vars(load()), "terms", mirrored)
+    assert control_record(patience_s=0.02)["power"]["config"]["highest_dpt"] == limit > 1.0
 
 
 class TestWithin:

@@ -101,8 +101,8 @@ def _slipstream_limits(declared: Declared, layout: np.void) -> tuple[float, floa
     of_slipstream = sum(t.value for t in terms if t.coefficient == "Cn" and t.of == (("dpt", 3),))
     kw_per_inhg = engine_power_kw(rpm, 1.0, 1.0) - engine_power_kw(rpm, 0.0, 1.0)
     rudder_rad = min(-layout["low"][rudder], layout["high"][rudder])
-    dpt3 = YAW_SHARE * per_rad * rudder_rad / of_slipstream if of_slipstream else np.inf
-    return slipstream(kw_per_inhg, 1.0, 1.0) - slipstream(0.0, 1.0, 1.0), max(dpt3, 0.0) ** (1.0 / 3.0)
+    dpt3 = abs(YAW_SHARE * per_rad * rudder_rad / of_slipstream) if of_slipstream else np.inf
+    return slipstream(kw_per_inhg, 1.0, 1.0) - slipstream(0.0, 1.0, 1.0), dpt3 ** (1.0 / 3.0)
 
 
 @kernel

@@ -20,6 +20,7 @@ from beaver_ftc.diagnosis.informed_test import with_measured_gust
 
 PITCHING, YAWING = 1, 2
 _TURNED_SHARE = 0.3  # of noises of airspeed and bank in the flow's angles: attitudes and incidences of 17 deg
+_LEAST_AIRSPEED_MPS = 1.0  # of a broken airspeed sensor: a rotation of the air is over the airspeed
 _GRAVITY = np.array([0.0, 0.0, GRAVITY_MPS2])
 
 
@@ -56,6 +57,7 @@ class VaneGust:
             return measured
         phi, theta, psi = measured.attitude.tolist()
         alpha, beta, V = measured.y[:3].tolist()
+        V = max(V, _LEAST_AIRSPEED_MPS)
         to_level = _level_axes(phi, theta)
         flow = np.array([cos(alpha) * cos(beta), sin(beta), sin(alpha) * cos(beta)])
         velocity, force = V * (to_level @ flow), to_level @ measured.force

@@ -3,13 +3,9 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.control import autopilot as setup
-from beaver_ftc.control.autopilot import (
-    AUTOPILOT,
-    BANK,
-    set_body_rates,
-)
+from beaver_ftc.control.autopilot import AUTOPILOT, GAINS, set_body_rates
 from beaver_ftc.control.laws.loop_design import margins
+from beaver_ftc.control.profile import BANK
 from beaver_ftc.loop.loop import Loop, fly
 from beaver_ftc.results.metrics import metrics
 from beaver_ftc.scenario.schema import Scenario
@@ -73,11 +69,11 @@ def test_the_outer_loops_have_margins():
     """Each broken at its demand, inside out; the inner loop a lag of 4 1/s, the airspeed's smoothing in."""
     s = 1j * np.geomspace(1e-3, 100.0, 4000)
     inner = 1.0 / (1.0 + s / 4.0)
-    attitude, bank = (setup.GAINS[name] / s * inner for name in ("attitude", "bank"))
-    path = (setup.GAINS["altitude"] + setup.GAINS["altitude_i"] / s) / s * attitude / (1.0 + attitude)
-    heading = setup.GAINS["heading"] / s * bank / (1.0 + bank)
-    smoothed = s * (1.0 + setup.GAINS["airspeed_s"] * s)
-    speed = (setup.GAINS["speed"] + setup.GAINS["speed_i"] / s) / smoothed
+    attitude, bank = (GAINS[name] / s * inner for name in ("attitude", "bank"))
+    path = (GAINS["altitude"] + GAINS["altitude_i"] / s) / s * attitude / (1.0 + attitude)
+    heading = GAINS["heading"] / s * bank / (1.0 + bank)
+    smoothed = s * (1.0 + GAINS["airspeed_s"] * s)
+    speed = (GAINS["speed"] + GAINS["speed_i"] / s) / smoothed
     for loop, least_deg in ((attitude, 55.0), (bank, 55.0), (path, 55.0), (heading, 55.0), (speed, 42.0)):
         upper, lower, phase = margins(loop)
         assert min(upper, lower) > 13.0

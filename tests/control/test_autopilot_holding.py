@@ -5,8 +5,9 @@ import pytest
 
 import beaver_ftc as bf
 from beaver_ftc.aircraft import load
-from beaver_ftc.control import autopilot as holding
-from beaver_ftc.control.autopilot import AUTOPILOT, elevator_needed
+from beaver_ftc.control import envelope_protection as holding
+from beaver_ftc.control.autopilot import AUTOPILOT
+from beaver_ftc.control.envelope_protection import elevator_needed
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.metrics import measure, metrics
 from beaver_ftc.results.verdict import verdict_lines

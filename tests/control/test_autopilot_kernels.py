@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from beaver_ftc.control import autopilot as loops
-from beaver_ftc.control.autopilot import AUTOPILOT, SPEED
+from beaver_ftc.control.autopilot import AUTOPILOT
+from beaver_ftc.control.profile import SPEED, wrap_to_half_turn
 from beaver_ftc.design.table import DPT, QDYN
 from law_records import new_control
 
@@ -61,4 +62,4 @@ def test_without_an_airspeed_the_engine_stays_and_descents_are_free():
 
 @pytest.mark.parametrize("angle", [-9.0, -3.2, -3.1, 0.0, 2.0, 3.2, 9.0])
 def test_a_direction_is_given_within_half_a_turn(angle):
-    assert loops.wrap_to_half_turn(angle) == pytest.approx(np.arctan2(np.sin(angle), np.cos(angle)))
+    assert wrap_to_half_turn(angle) == pytest.approx(np.arctan2(np.sin(angle), np.cos(angle)))

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.control import autopilot as loops
-from beaver_ftc.control.autopilot import ALTITUDE, AUTOPILOT, BANK, HEADING, SPEED
+from beaver_ftc.control import profile as loops
+from beaver_ftc.control.autopilot import AUTOPILOT
+from beaver_ftc.control.profile import ALTITUDE, BANK, HEADING, SPEED
 
 DT = 0.1
 WHERE = np.array([1000.0, 45.0, 3.0, 0.1])

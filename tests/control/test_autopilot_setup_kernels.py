@@ -7,8 +7,9 @@ import pytest
 from scipy.optimize import root
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.control import autopilot as profile
-from beaver_ftc.control.autopilot import AUTOPILOT, N_FLAP, N_QDYN
+from beaver_ftc.control import autopilot_setup
+from beaver_ftc.control.autopilot import AUTOPILOT
+from beaver_ftc.control.envelope_protection import N_FLAP, N_QDYN, elevator_needed
 from beaver_ftc.control.state import control_dtype
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
@@ -31,7 +32,7 @@ def filled():
     control["layout"]["low"], control["layout"]["high"] = (-0.5, -0.4, -0.3, -0.1), (0.5, 0.4, 0.3, 1.0)
     control["power"]["config"]["trim"], control["power"]["config"]["low"] = 20.0, 12.0
     control["power"]["config"]["high"], control["power"]["config"]["step"] = 28.0, 0.5
-    profile.set_up_autopilot(pilot, control, Declared.of(Scenario.model_validate(given)))
+    autopilot_setup.set_up_autopilot(pilot, control, Declared.of(Scenario.model_validate(given)))
     return pilot, control
 
 
@@ -76,7 +77,7 @@ def test_the_table_is_that_of_level_flight_between_the_ends_of_speed_and_flap(fi
 def test_what_takes_more_thrust_or_incidence_than_there_is_cannot_be_held(qdyn_pa, flap_rad, held):
     """Too much flap for the speed, or too slow for what flap there is; each beside one that is held."""
     wanted = (("Cm_alpha", 1.2),), (qdyn_pa, 900.0), (0.3, flap_rad)
-    needed = profile.elevator_needed(AIRCRAFT, ("elevator", "flap"), 1.1 * AIRCRAFT.mass.mass_kg, *wanted)
+    needed = elevator_needed(AIRCRAFT, ("elevator", "flap"), 1.1 * AIRCRAFT.mass.mass_kg, *wanted)
     expected = level(qdyn_pa, flap_rad) if held else np.nan
     assert needed[0, 1] == pytest.approx(expected, abs=1e-7, nan_ok=True)
     assert needed[1, 0] == pytest.approx(level(900.0, 0.3), abs=1e-7)

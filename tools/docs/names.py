@@ -57,7 +57,7 @@ def known() -> frozenset[str]:
     """Every name: of code, data, files, columns of a log, properties of JSBSim and options of commands."""
     from beaver_ftc.aircraft import builtin_names, load
     from beaver_ftc.cli.main import every_command
-    from beaver_ftc.control.autopilot import COLUMNS
+    from beaver_ftc.control.profile import COLUMNS
     from beaver_ftc.diagnosis.isolation import estimator_names
     from beaver_ftc.plant.adapter import Plant
     from beaver_ftc.plant.channels import log_columns

@@ -24,7 +24,8 @@ import numpy as np
 from beaver_ftc.compiled import apart, kernel, record, sized
 from beaver_ftc.control import accommodation, allocation, laws, power, state
 from beaver_ftc.control.accommodation import MAX_EVENTS
-from beaver_ftc.control.autopilot import SPEED, record_deviations, steer
+from beaver_ftc.control.autopilot import steer
+from beaver_ftc.control.profile import SPEED, record_deviations
 from beaver_ftc.design.model import unanticipated_pitch
 from beaver_ftc.diagnosis import conclusion, monitors, schemes
 from beaver_ftc.diagnosis import conclusion as assessed

@@ -17,16 +17,8 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.aircraft import AXES, Aircraft
-from beaver_ftc.control.autopilot import (
-    AT_ONE_INSTANT,
-    BANK_LIMIT,
-    CHANNELS,
-    FASTEST,
-    LIMITED,
-    NOT_JUDGED,
-    SLOWEST,
-    SPEED,
-)
+from beaver_ftc.control.envelope_protection import BANK_LIMIT, FASTEST, SLOWEST
+from beaver_ftc.control.profile import AT_ONE_INSTANT, CHANNELS, LIMITED, NOT_JUDGED, SPEED
 from beaver_ftc.design import altitude_of
 from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.diagnosis.conclusion import (

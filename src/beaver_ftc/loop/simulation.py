@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from beaver_ftc.control.autopilot import set_up_profile
+from beaver_ftc.control.profile import set_up_profile
 from beaver_ftc.documents.errors import BadInput, suggestion
 from beaver_ftc.loop.loop import CHUNK_ROWS, FLYING, ONE_FLIES, LogSink, Loop
 from beaver_ftc.loop.outcome import Landing, inconclusive_now, verdict_of

@@ -9,7 +9,7 @@ import numpy as np
 import yaml
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.control.autopilot import COLUMNS as PROFILE
+from beaver_ftc.control.profile import COLUMNS as PROFILE
 from beaver_ftc.diagnosis.isolation import estimator_names
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.plant.channels import log_columns

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from beaver_ftc.aircraft.schema import ThrustSection
 from beaver_ftc.control import allocation, laws
+from beaver_ftc.control.laws import reference
 from beaver_ftc.control.probe import advance_probe
 from beaver_ftc.control.thrust import set_up_engine
 from beaver_ftc.design.table import AIRSPEED
@@ -24,7 +25,8 @@ LOW, HIGH = np.array([-0.52, -0.49, -0.44, -0.1]), np.array([0.52, 0.49, 0.44, 1
 def control_record():
     control = new_control(main=(0, 1, 2), stand_in=3, dt=DT, effectiveness=1.0, scale=1.0)
     control["layout"]["low"], control["layout"]["high"] = LOW, HIGH
-    control["reference"]["config"]["A"], control["reference"]["config"]["B"] = laws.discretise(10.0, 1.0, DT)
+    model = control["reference"]["config"]
+    model["A"], model["B"] = reference.discretise(10.0, 1.0, DT)
     return control
 
 
@@ -42,13 +44,13 @@ def test_a_shortfall_on_one_side_scales_the_reference_on_both_and_in_time_it_com
     control["reference"]["memory"]["active"] = 1
     control["axes"]["shortfall"] = [0.0, 0.5, 0.0]
     for _ in range(10):
-        laws.govern(control["reference"], np.full(3, 0.05), control["axes"]["shortfall"], False)
-    missed = 10 * DT * 0.5 / laws.MISSED_RAD_S
+        reference.govern(control["reference"], np.full(3, 0.05), control["axes"]["shortfall"], False)
+    missed = 10 * DT * 0.5 / reference.MISSED_RAD_S
     assert control["reference"]["memory"]["scale"][1] == pytest.approx(1 - missed, abs=0.01)
     assert control["reference"]["memory"]["scale"][[0, 2]] == pytest.approx([1, 1])
     control["axes"]["shortfall"] = 0.0
-    for _ in range(round(5 * laws.RECOVERY_S / DT)):
-        laws.govern(control["reference"], np.full(3, 0.05), control["axes"]["shortfall"], False)
+    for _ in range(round(5 * reference.RECOVERY_S / DT)):
+        reference.govern(control["reference"], np.full(3, 0.05), control["axes"]["shortfall"], False)
     assert control["reference"]["output"]["governed_rate"] == pytest.approx(0.05, rel=0.01)
 
 

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
-from beaver_ftc.control import allocation, laws
-from beaver_ftc.control.laws import published
+from beaver_ftc.control import allocation
+from beaver_ftc.control.laws import published, reference
 from law_records import AILERON, ELEVATOR, FLAP, RUDDER, new_control
 
 DT = 0.01
@@ -44,7 +44,7 @@ def pulled(control, x, f):
 class TestReferenceModel:
     @given(wn=st.floats(0.5, 50), zeta=st.floats(0.2, 3), dt=st.floats(0.001, 0.05))
     def test_discretisation_is_the_matrix_exponential(self, wn, zeta, dt):
-        A, B = laws.discretise(wn, zeta, dt)
+        A, B = reference.discretise(wn, zeta, dt)
         F = np.array([[0, 1, 0], [-wn * wn, -2 * zeta * wn, wn * wn], [0, 0, 0]])
         expected = expm(F * dt)
         assert pytest.approx(expected[:2, :2], rel=1e-7, abs=1e-7) == A
@@ -52,13 +52,11 @@ class TestReferenceModel:
 
     def test_a_step_is_reached_without_overshoot_when_critically_damped(self):
         control = control_record()
-        control["reference"]["config"]["A"], control["reference"]["config"]["B"] = laws.discretise(
-            10.0, 1.0, DT
-        )
+        model = control["reference"]
+        model["config"]["A"], model["config"]["B"] = reference.discretise(10.0, 1.0, DT)
         history = []
         for _ in range(200):
-            model = control["reference"]
-            laws.follow(model["config"], model["output"], np.array([0.1, 0.0, -0.2]))
+            reference.follow(model["config"], model["output"], np.array([0.1, 0.0, -0.2]))
             history.append(control["reference"]["output"]["model_rate"].copy())
         t = DT * np.arange(1, 201)
         assert np.array(history)[:, 0] == pytest.approx(0.1 * (1 - (1 + 10 * t) * np.exp(-10 * t)), abs=1e-9)

@@ -17,14 +17,13 @@ from beaver_ftc.control import (
     allocation,
     engines,
     file_of,
-    laws,
     power,
     row_of,
 )
 from beaver_ftc.control.accommodation import surfaces_dtype
 from beaver_ftc.control.allocation import allocation_dtype, axes_dtype, layout_dtype
 from beaver_ftc.control.engines import ENGINES
-from beaver_ftc.control.laws import REFERENCE
+from beaver_ftc.control.laws.reference import REFERENCE, configure_reference
 from beaver_ftc.control.power import POWER
 from beaver_ftc.control.probe import PROBE, configure_probe
 from beaver_ftc.scenario.declared import Declared
@@ -62,7 +61,7 @@ def configure(control: np.void, declared: Declared, travel: np.ndarray) -> None:
     """Fill the records that all laws share; travel (2, n) rad: the stops. The law's own: `configure_law`."""
     config, dt, row = declared.control, 1.0 / declared.rate_hz, row_of(declared.control.law)
     control["config"] = row.place, row.uses_verdict, row.reallocates, row.informed
-    laws.configure_reference(control["reference"], config, dt)
+    configure_reference(control["reference"], config, dt)
     accommodation.configure(control["surfaces"], config, row.informed, dt)
     allocation.configure(control, config, travel, declared.aircraft)
     configure_probe(control["probe"], declared.fdi.probing, dt)

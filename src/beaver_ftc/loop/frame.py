@@ -22,9 +22,10 @@ effect phi is the truth's, so this is an analyst's figure: the diagnosis never s
 import numpy as np
 
 from beaver_ftc.compiled import apart, kernel, record, sized
-from beaver_ftc.control import accommodation, allocation, laws, power, state
+from beaver_ftc.control import accommodation, allocation, power, state
 from beaver_ftc.control.accommodation import MAX_EVENTS
 from beaver_ftc.control.autopilot import steer
+from beaver_ftc.control.laws import reference
 from beaver_ftc.control.profile import SPEED, record_deviations
 from beaver_ftc.design.model import unanticipated_pitch
 from beaver_ftc.diagnosis import conclusion, monitors, schemes
@@ -604,9 +605,9 @@ def finish(frame, commanded, row):
         fly_profile(frame, commanded)
     account(frame)
     record_row(frame, commanded, row)
-    laws.follow(control.reference.config, control.reference.output, commanded)
+    reference.follow(control.reference.config, control.reference.output, commanded)
     authority_lost = control.surfaces.output.authority_lost
-    laws.govern(control.reference, commanded, control.axes.shortfall, authority_lost)
+    reference.govern(control.reference, commanded, control.axes.shortfall, authority_lost)
     move_surfaces(prediction, control.allocation.output.command)
     hand_over(frame.truth, prediction.commanded, control.power.output)
     advance_clock(frame)

@@ -5,9 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from beaver_ftc.control import allocation, laws
+from beaver_ftc.control import allocation
 from beaver_ftc.control.laws import rejecting
 from beaver_ftc.control.laws.loop_design import lead_of
+from beaver_ftc.control.laws.reference import discretise
 from beaver_ftc.loop.assembly import configure_design
 from flying import scenario
 from law_records import fields, new_control, put
@@ -24,7 +25,7 @@ def record(seed=0):
     control["layout"]["low"], control["layout"]["high"] = TRAVEL
     put(control, effectiveness=rng.uniform(0.2, 1.0, 4), offset=rng.normal(0, 0.02, 4))
     model = fields(control["reference"])
-    model["A"], model["B"] = laws.discretise(10.0, 1.0, DT)
+    model["A"], model["B"] = discretise(10.0, 1.0, DT)
     for name in ("governed_rate", "governed_acceleration", "commanded_rate", "scale"):
         model[name] = rng.normal(0, 0.1, 3)
     config, law = control["rejecting"]["config"], control["rejecting"]

@@ -14,13 +14,9 @@ the innovation.
 Gains. s sets the feedback Kp = s and the observer w = RATIO s of a loop: loop_design.py derives it from what
 is declared.
 
-Effectiveness of a surface at fault. The innovation also shows how much of it is left. A surface with
-effectiveness 1 + theta gives theta G u more than a healthy one: theta is the least-squares fit of that, so
-filtered, to the innovation [Ljung1999, ch. 13: a prediction error in a closed loop]. The last MEMORY_S count.
-An equation error in a closed loop estimates a surface as weaker than it is, since the command answers the
-gust that hides it. This estimate errs the other way, with what the gyro's noise commands. The law uses the
-larger of both: a loop is then no faster than its margins allow. Once no known fault fits, it estimates all
-surfaces at once (effectiveness_estimator.py).
+Effectiveness of a surface at fault: the diagnosis' estimate, or what the observer's innovation shows of it if
+that is larger (evidence.py). Once no known fault fits, the law estimates all surfaces at once
+(effectiveness_estimator.py).
 """
 
 from math import exp, hypot, sqrt
@@ -31,16 +27,23 @@ from beaver_ftc.aircraft import AXES
 from beaver_ftc.compiled import apart, kernel, record, row_of, sized
 from beaver_ftc.control import CompiledLaw, accommodation, allocation, laws
 from beaver_ftc.control.accommodation import approach, begin_frame, reported, start_of
-from beaver_ftc.control.laws import advance
 from beaver_ftc.control.laws.effectiveness_estimator import (
     OBSERVER_ERROR,
     begin_estimator,
     effectiveness_of,
     estimate,
     estimator_dtype,
-    observer_response,
+)
+from beaver_ftc.control.laws.evidence import (
+    SUMS,
+    accumulate,
+    clamp_to_observer_estimate,
+    derive_fading,
+    is_effective,
+    is_replaced,
 )
 from beaver_ftc.control.laws.loop_design import Loop, corrections, fastest, lead_of
+from beaver_ftc.control.laws.reference import advance
 from beaver_ftc.control.thrust import between
 from beaver_ftc.design.model import effectiveness as control_effectiveness
 from beaver_ftc.design.model import own_damping
@@ -53,12 +56,6 @@ from beaver_ftc.scenario.sensors import RateGyro
 
 N_POINTS = 5  # of the schedule over dynamic pressure
 N_LOOPS = 4  # roll, pitch, yaw, and pitch by the surface that stands in
-MEMORY_S = 5.0  # of the effectiveness seen by the observer: a slow reference's swing
-
-
-def derive_fading(dt_s: float) -> float:
-    """Share of the past that is forgotten in a frame of dt_s seconds."""
-    return 1.0 - exp(-dt_s / MEMORY_S)
 
 
 def configure(law: np.void, control: np.void, prediction: np.void, declared: Declared, y: np.ndarray) -> None:
@@ -98,13 +95,9 @@ def configure(law: np.void, control: np.void, prediction: np.void, declared: Dec
 
 STAND_IN = 3  # the loop of pitch by the surface that stands in
 PATIENCE_S, LONG_PATIENCE_S, RETRY_S = 0.5, 1.0, 20.0
-UNSURE = 0.2  # standard deviation of the diagnosis' estimate that is assumed: it settles the start
-NOTHING_LEFT = 0.05  # half of what the law divides by
 
 # begun: whether rate (3,) rad/s and disturbance (3,) rad/s2 are estimates; a change of law keeps it.
 OBSERVER = record(begun=int, rate=3, disturbance=3)
-# Sums of the least squares, of the main surface of each axis; named: whether the diagnosis has ever named it.
-SUMS = record(product=3, square=3, innovation=3, frames=3, named=(int, 3))
 
 
 @sized
@@ -195,52 +188,6 @@ def look_up(gains, points, table, qdyn, transfer_share):
 
 
 @kernel
-def is_replaced(layout, s):
-    """Whether another surface can take the place of surface s."""
-    return s == layout.main[PITCH] or s == layout.stand_in
-
-
-@kernel
-def clamp_to_observer_estimate(sums, layout, s, target, least):
-    """Effectiveness of surface s: of a loss reported as `target`, of a main surface that nothing replaces, no
-    less than the observer sees. least: of the effectiveness that is used."""
-    for i in range(3):
-        if s == layout.main[i] and target < 1.0 and not is_replaced(layout, s):
-            target = larger_estimate(sums, target, i, least)
-    return target
-
-
-@kernel
-def larger_estimate(sums, diagnosed, i, least):
-    """The larger of both estimates of the main surface of axis i, `diagnosed` and the observer's; less than
-    NOTHING_LEFT is given as it is."""
-    if not sums.named[i]:  # at its first naming: what was seen of it when healthy no longer counts
-        sums.named[i], sums.product[i], sums.square[i] = 1, 0.0, 0.0
-    larger = max(diagnosed, min(effectiveness_seen(sums, i, diagnosed), 1.0))
-    return larger if larger < NOTHING_LEFT else max(larger, least)
-
-
-@kernel
-def effectiveness_seen(sums, i, diagnosed):
-    """Effectiveness of the main surface of axis i by the observer; diagnosed: by the diagnosis."""
-    if sums.frames[i] == 0.0:
-        return diagnosed
-    prior = sums.innovation[i] / sums.frames[i] / (UNSURE * UNSURE)
-    weight = sums.square[i] + prior
-    return 1.0 + (sums.product[i] + prior * (diagnosed - 1.0)) / weight if weight > 0.0 else diagnosed
-
-
-@kernel
-def is_effective(sums, main, s, least):
-    """Whether the law's observer sees surface s act, enough to be divided by: theta = product / square
-    exceeds least - 1. False for a surface that leads no axis. main (3,); least: of the effectiveness."""
-    for i in range(3):
-        if s == main[i] and sums.product[i] > (least - 1.0) * sums.square[i]:
-            return True
-    return False
-
-
-@kernel
 def is_doubtful(assessment, sums, layout, s, target, least):
     """Whether surface s, which is named, may be of no use: another can take its place, or its type is open or
     its effectiveness `target` below `least`, and the observer does not see it act either."""
@@ -308,21 +255,6 @@ def observe(law, surfaces, main, x, design, moments, G):
         accumulate(law.config, memory, i, surfaces.effectiveness[main[i]], moments[i, main[i]], innovation)
         observer.rate[i] += memory.L_rate[i] * innovation
         observer.disturbance[i] += memory.L_disturbance[i] * innovation
-
-
-@kernel
-def accumulate(config, memory, i, effectiveness, moment, innovation):
-    """Add this frame to the sums of axis i; innovation rad/s; effectiveness: that the law assumes, of
-    the main surface; moment: of a healthy one, rad/s2."""
-    sums, fading, dt = memory.sums, config.fading, config.dt
-    L_rate, L_disturbance = memory.L_rate[i], memory.L_disturbance[i]
-    assumed = (effectiveness - 1.0) * moment
-    psi = observer_response(memory.healthy, i, moment, L_rate, L_disturbance, dt)
-    innovation += observer_response(memory.assumed, i, assumed, L_rate, L_disturbance, dt)
-    sums.product[i] += psi * innovation - fading * sums.product[i]
-    sums.square[i] += psi * psi - fading * sums.square[i]
-    sums.innovation[i] += innovation * innovation - fading * sums.innovation[i]
-    sums.frames[i] += 1.0 - fading * sums.frames[i]
 
 
 @kernel

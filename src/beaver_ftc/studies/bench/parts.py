@@ -73,7 +73,7 @@ PARTS: dict[str, dict[str, Kernel]] = {
     # the command, into the aircraft's properties
     "writing": {"plant.channels.write_nodes": nothing},
     # reference model, feedback linearisation, accommodation, allocation, anti-windup
-    "law": {"loop.frame.command": nothing, "control.laws.follow": nothing},
+    "law": {"loop.frame.command": nothing, "control.laws.reference.follow": nothing},
     # every column of the log, and the sums of the metrics
     "logging": {"loop.frame.record_row": nothing, "loop.frame.account": nothing},
 }  # fmt: skip

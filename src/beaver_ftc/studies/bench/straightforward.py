@@ -8,7 +8,7 @@ the modules of the loop have the sources.
 import numpy as np
 
 from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S
-from beaver_ftc.control.laws import discretise
+from beaver_ftc.control.laws.reference import discretise
 from beaver_ftc.design.fdc import GEOMETRY, MASS, MOMENTS, SURFACES, TERMS
 from beaver_ftc.design.model import inertia_coefficients
 from beaver_ftc.diagnosis.detection.fdae import (

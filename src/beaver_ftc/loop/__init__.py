@@ -12,11 +12,11 @@ if TYPE_CHECKING:
     from beaver_ftc.loop.agent import look_of as look_of_agent
     from beaver_ftc.loop.agent import note_trim as note_trim_of_agent
     from beaver_ftc.loop.agent import observe as observe_as_agent
-    from beaver_ftc.loop.assembly import copied as copy_memory
-    from beaver_ftc.loop.assembly import give_back as give_back_memory
-    from beaver_ftc.loop.assembly import taken as take_memory
     from beaver_ftc.loop.changing import take_diagnosis
     from beaver_ftc.loop.loop import LogSink, Loop, fly
+    from beaver_ftc.loop.memory import copied as copy_memory
+    from beaver_ftc.loop.memory import give_back as give_back_memory
+    from beaver_ftc.loop.memory import taken as take_memory
     from beaver_ftc.loop.readout import (
         FrameReadout,
         Instruments,

@@ -8,9 +8,6 @@ A stage is configured at one of two instants, each of which is one function here
                        the sensor monitor.
 
 `assemble` does both. A change in flight assembles the record of its scenario from the same trim.
-
-Before that stand the memory of flights that are over (fresh pages of a record and a log cost 0.3 ms), and
-the record of the instruments.
 """
 
 from math import exp
@@ -19,7 +16,6 @@ from typing import NamedTuple
 import numpy as np
 
 from beaver_ftc.compiled import record, sized
-from beaver_ftc.compiled.records import LINE_BYTES
 from beaver_ftc.control import state as control
 from beaver_ftc.control.accommodation import SUPERVISOR
 from beaver_ftc.control.autopilot import AUTOPILOT
@@ -35,6 +31,7 @@ from beaver_ftc.diagnosis.isolation import estimator_names
 from beaver_ftc.diagnosis.monitors.records import configure_sensor_monitor
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.frame import accounts_dtype, true_faults_dtype
+from beaver_ftc.loop.memory import copied, taken_empty
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.channels import RUNNING
 from beaver_ftc.plant.faults import OF_THE_SLIPSTREAM
@@ -53,57 +50,6 @@ from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.faults import of_a_sensor
 from beaver_ftc.scenario.schema import Scenario, stages
 from beaver_ftc.scenario.sensors import N_IN_EQUATIONS, ROWS, frames_apart
-
-_MOST = 4  # kept: more flights are hardly ever in progress at the same time
-_spare: list[np.ndarray] = []
-
-
-def taken(shape: tuple[int, ...], dtype: np.dtype | type = np.float64) -> np.ndarray:
-    """An array of this shape and type, C-ordered, of whatever is in that memory.
-
-    On a buffer, not as a view: of a record's bytes NumPy would look for objects, field by field.
-    """
-    kind = np.dtype(dtype)
-    n_bytes = kind.itemsize * int(np.prod(shape))
-    for i, memory in enumerate(_spare):
-        if memory.size >= n_bytes:
-            return np.ndarray(shape, kind, _spare.pop(i))
-    return np.ndarray(shape, kind, _new_memory(n_bytes))
-
-
-def _new_memory(n_bytes: int) -> np.ndarray:
-    """New bytes, from the beginning of a line of the processor's cache: see compiled/records.py."""
-    bytes_and_gap = np.empty(n_bytes + LINE_BYTES, np.uint8)
-    gap = -bytes_and_gap.__array_interface__["data"][0] % LINE_BYTES
-    return np.frombuffer(bytes_and_gap.data, np.uint8, n_bytes, gap)
-
-
-def taken_empty(shape: tuple[int, ...], dtype: np.dtype | type = np.float64) -> np.ndarray:
-    """The same, every byte of it zero."""
-    array = taken(shape, dtype)
-    assert array.base is not None
-    array.base[:] = 0
-    return array
-
-
-def copied(record: np.ndarray) -> np.ndarray:
-    """A copy of what `taken` gave, byte by byte: field by field it takes a hundred times as long."""
-    copy = taken(record.shape, record.dtype)
-    assert copy.base is not None
-    assert record.base is not None
-    copy.base[: record.nbytes] = record.base[: record.nbytes]
-    return copy
-
-
-def give_back(array: np.ndarray) -> None:
-    """Return the buffer to the pool; no view of it may be used afterwards."""
-    memory = array
-    while isinstance(memory.base, np.ndarray):
-        memory = memory.base
-    if len(_spare) < _MOST and memory.dtype == np.uint8 and all(memory is not other for other in _spare):
-        _spare.append(memory)
-        _spare.sort(key=len)
-
 
 # What sets the counters of random numbers apart: OF_THE_FIRST, OF_THE_FURTHER, OF_FAULTS, OF_FORCES,
 # OF_THE_SAMPLED.

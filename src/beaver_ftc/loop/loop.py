@@ -16,7 +16,7 @@ from beaver_ftc.aircraft.aircraft import EARTH_RADIUS_M
 from beaver_ftc.compiled import direct
 from beaver_ftc.compiled.cache import expect
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
-from beaver_ftc.loop import assembly
+from beaver_ftc.loop import memory
 from beaver_ftc.loop.assembly import Trim, configure_at_trim, configure_design, lay_out
 from beaver_ftc.loop.outcome import Landing, landing_of
 from beaver_ftc.loop.stepping import fly_frame, fly_on, hold, sense_inside
@@ -192,7 +192,7 @@ class Loop:
         self.plugin_frame = self._with_plugins(detector, law)
         diagnoses_itself = self.plugin_frame is None or self.plugin_frame.detector is None
         self.columns = lay_out(self.frames[0], scenario, diagnoses_itself)
-        self.log = assembly.taken((min(CHUNK_ROWS, self.n_frames), len(self.columns)))
+        self.log = memory.taken((min(CHUNK_ROWS, self.n_frames), len(self.columns)))
         self.references = np.empty((len(self.log), 3))
         self._order = np.zeros(2, np.int64)
         self._inside = 0  # JSBSim frames of the coming frame that have been flown already
@@ -263,8 +263,8 @@ class Loop:
         if self._may_fly_again:
             self._may_fly_again, self.changing = False, None  # which refers back: a collector's work
             give_back(self.plant)
-            assembly.give_back(self.frames)
-            assembly.give_back(self.log)
+            memory.give_back(self.frames)
+            memory.give_back(self.log)
 
     def hold(self, deflections: np.ndarray | None) -> None:
         """Command (n,) rad in the law's place, from the frame just flown on; None gives it back."""

@@ -27,7 +27,7 @@ from beaver_ftc.diagnosis.state import (
 from beaver_ftc.documents.errors import NO_FAILURE, SimulationFailed
 from beaver_ftc.loop import stepping as stages
 from beaver_ftc.loop.assembly import Trim, reads_accelerometers
-from beaver_ftc.loop.outcome import verdict_of
+from beaver_ftc.loop.findings import verdict_of
 from beaver_ftc.plant.sensing import NOT_FINITE
 from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled, made
 from beaver_ftc.scenario.declared import Declared

@@ -13,8 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from beaver_ftc.control.profile import set_up_profile
 from beaver_ftc.documents.errors import BadInput, suggestion
+from beaver_ftc.loop.findings import verdict_of
+from beaver_ftc.loop.inconclusive import inconclusive_now
 from beaver_ftc.loop.loop import CHUNK_ROWS, FLYING, ONE_FLIES, LogSink, Loop
-from beaver_ftc.loop.outcome import Landing, inconclusive_now, verdict_of
+from beaver_ftc.loop.outcome import Landing
 from beaver_ftc.loop.plugin_frame import measured_of
 from beaver_ftc.loop.readout import FrameReadout
 from beaver_ftc.plant.adapter import Plant, UnknownProperty

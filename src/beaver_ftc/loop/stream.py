@@ -14,7 +14,7 @@ from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop import stepping, watching
 from beaver_ftc.loop.assembly import Trim, configure_design, configure_diagnosis_at_trim
-from beaver_ftc.loop.outcome import estimate_now, verdict_of, words_follow_from
+from beaver_ftc.loop.findings import estimate_now, verdict_of, words_follow_from
 from beaver_ftc.plugins import DETECTORS, is_compiled
 from beaver_ftc.scenario.airframe import checked_against
 from beaver_ftc.scenario.declared import Declared
@@ -192,10 +192,10 @@ class Diagnosis:
 
     def _begin(self, x: Vector, command: Vector) -> None:
         """Configure what depends on the trim: `start`, or the first sample."""
-        first = x, self._signals.copy(), command
+        first = [x, self._signals.copy(), command]
         if self._start is not None:
             parts = zip(_START, self._start, first, strict=True)
-            first = tuple(_numbers(what, np.asarray(given), part.size) for what, given, part in parts)
+            first = [_numbers(what, np.asarray(given), part.size) for what, given, part in parts]
             if not all(np.isfinite(part).all() for part in first):
                 raise BadInput("start: is not finite, allowed: finite numbers")
         if all(np.isfinite(part).all() for part in first):

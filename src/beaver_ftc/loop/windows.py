@@ -8,7 +8,7 @@ its threshold.
 
 from typing import Any
 
-from beaver_ftc.loop.outcome import found_so_far
+from beaver_ftc.loop.findings import found_so_far
 
 
 class Windows:

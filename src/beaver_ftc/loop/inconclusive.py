@@ -1,0 +1,76 @@
+"""In what share of a flight's frames the built-in diagnosis could conclude nothing, and why."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from beaver_ftc.aircraft import Aircraft
+from beaver_ftc.design import altitude_of
+from beaver_ftc.scenario.measured import (
+    ALTITUDE,
+    BETWEEN,
+    LATE,
+    Span,
+    as_altitudes,
+    lies_outside,
+    measured_spans,
+    outside,
+    quantities,
+)
+
+SCHEME, NO_DIAGNOSIS = "scheme", "no diagnosis ran: fdi.scheme is none"
+Reason = dict[str, Any]
+
+
+def inconclusive_of(frame: np.void, aircraft: Aircraft) -> dict[str, Any] | None:
+    """share: of all frames; from_s: the first of them; reasons: each with its share, which may overlap, with
+    the span that was measured and that flown outside of it. None if there was no such frame."""
+    counted = frame["accounts"]["inconclusive"]
+    if not counted["frames"]:
+        return None
+    watched = int(counted["watched"])
+    reasons = sorted(_reasons(counted, aircraft, float(frame["t"])), key=lambda reason: -reason["share"])
+    for reason in reasons:
+        reason["share"] /= watched
+    share = int(counted["frames"]) / watched
+    return {"share": share, "from_s": float(counted["from_s"]), "reasons": reasons}
+
+
+def _reasons(counted: np.void, aircraft: Aircraft, end_s: float) -> Iterator[Reason]:
+    """Each reason that was one; share: still the number of frames."""
+    spans = measured_spans(aircraft)
+    if counted["undiagnosed"]:
+        yield {**_reason(SCHEME, int(counted["undiagnosed"]), None, None), "says": NO_DIAGNOSIS}
+    if counted["late"]:
+        yield _reason(LATE, int(counted["late"]), spans[LATE], (spans[LATE][1], end_s))
+    for i, name in enumerate(quantities(aircraft)):
+        if counted["beyond"][i]:
+            flown = float(counted["least"][i]), float(counted["greatest"][i])
+            flown = as_altitudes(flown) if name == ALTITUDE else flown
+            yield _reason(name, int(counted["beyond"][i]), spans[name], flown)
+    if counted["between"]:
+        yield _reason(BETWEEN, int(counted["between"]), None, None)
+
+
+def _reason(quantity: str, frames: int, measured: Span | None, flown: Span | None) -> Reason:
+    return {
+        "quantity": quantity, "share": frames, "measured": measured, "flown": flown,
+        "says": outside(quantity, measured),
+    }  # fmt: skip
+
+
+def inconclusive_now(frame: np.void, aircraft: Aircraft) -> str:
+    """Why the built-in diagnosis can conclude nothing at the frame just flown; empty if it can."""
+    error_map = frame["fdi"]["bound"]["error_map"]
+    if not frame["fdi"]["config"]["enabled"]:
+        return NO_DIAGNOSIS
+    if not error_map["n_boxes"] or not error_map["outside"]:
+        return ""
+    spans, names = measured_spans(aircraft), quantities(aircraft)
+    place = dict(zip(names, error_map["coordinates"].tolist(), strict=False)) | {
+        LATE: float(error_map["time_s"])
+    }
+    place[ALTITUDE] = altitude_of(place[ALTITUDE])
+    why = [outside(name, spans[name]) for name in lies_outside(place, spans)]
+    return "; ".join(why) or outside(BETWEEN, None)

@@ -21,9 +21,8 @@ import beaver_ftc
 from beaver_ftc import Simulation
 
 ROOT = Path(beaver_ftc.__file__).parent
-KERNELS = tuple(
-    str(ROOT / part) for part in ("control", "design", "diagnosis", "loop/frame", "loop/stepping")
-)
+LOOP = ("loop/accounts", "loop/frame", "loop/log_row", "loop/stepping")
+KERNELS = tuple(str(ROOT / part) for part in ("control", "design", "diagnosis", *LOOP))
 PLAIN = "NUMBA_DISABLE_JIT"
 MOST_FIELDS = 6  # of a kernel, printed
 

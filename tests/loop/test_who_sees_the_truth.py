@@ -107,7 +107,7 @@ def test_no_kernel_is_given_the_truth(calls, folder):
 
 def test_what_is_meant_to_see_the_truth_does(calls):
     """The watch would notice: sensing, accounts and the log are given the record."""
-    for name in ("plant.sensing.measure", "loop.frame.track", "loop.frame.record_truth"):
+    for name in ("plant.sensing.measure", "loop.accounts.track", "loop.log_row.record_truth"):
         assert ["truth", "record"] in calls[f"beaver_ftc.{name}"]
 
 

@@ -30,7 +30,8 @@ from beaver_ftc.diagnosis.detection.statistical_design import configure_statisti
 from beaver_ftc.diagnosis.isolation import estimator_names
 from beaver_ftc.diagnosis.monitors.records import configure_sensor_monitor
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.loop.frame import accounts_dtype, true_faults_dtype
+from beaver_ftc.loop.accounts import accounts_dtype
+from beaver_ftc.loop.frame import true_faults_dtype
 from beaver_ftc.loop.memory import copied, taken_empty
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.channels import RUNNING

@@ -5,40 +5,27 @@
     decide      control/accommodation.py  the mode
     command     control/                  the surfaces, and the engine
     outer loops control/autopilot.py      the reference of the next frame, if a profile is to be flown
-    record      here                      the accounts of the flight, a row of the log
+    record      accounts.py, log_row.py   the accounts of the flight, a row of the log
 
 Each stage has records of its own; what a flight remembers is all of them in one (assembly.py), which only the
-kernels of this file see whole. Python calls them through stepping.py. The command computed in a frame is in
-effect from the next on. In a row of the log, what is not there, or has not begun, is left as the row is
-given: not a number.
-
-The accounts are what the metrics are made of. They alone, and the oracle, see the truth. One of them is the
-instant from which detection is certain, whatever the uncertainty does: if
-|int e^{-lam (t - tau)} phi_i dtau| > 2 ebar_i for some i, the fault has been detected by t [Zhang2002]: at
-worst an admissible eta hides ebar_i of the fault's effect. With a bank of poles, the first of theirs. The
-effect phi is the truth's, so this is an analyst's figure: the diagnosis never sees it.
+kernels of these files see whole. Python calls them through stepping.py. The command computed in a frame is
+in effect from the next on.
 """
 
 import numpy as np
 
 from beaver_ftc.compiled import apart, kernel, record, sized
 from beaver_ftc.control import accommodation, allocation, power, state
-from beaver_ftc.control.accommodation import MAX_EVENTS
 from beaver_ftc.control.autopilot import steer
 from beaver_ftc.control.laws import reference
-from beaver_ftc.control.profile import SPEED, record_deviations
-from beaver_ftc.design.model import unanticipated_pitch
+from beaver_ftc.control.profile import record_deviations
 from beaver_ftc.diagnosis import conclusion, monitors, schemes
-from beaver_ftc.diagnosis import conclusion as assessed
 from beaver_ftc.diagnosis.conclusion import (
     assess_surfaces,
     assess_unknown,
     hold_assessment,
-    weighs_statistics,
 )
-from beaver_ftc.diagnosis.detection import fdae, filters
-from beaver_ftc.diagnosis.detection.filters import nearest_filter
-from beaver_ftc.diagnosis.error_map import N_MAP_COORDINATES, map_row, outside_span
+from beaver_ftc.diagnosis.detection import fdae
 from beaver_ftc.diagnosis.model_prediction import (
     add_instant,
     begin_sums,
@@ -48,55 +35,21 @@ from beaver_ftc.diagnosis.model_prediction import (
     predict_known,
 )
 from beaver_ftc.diagnosis.monitors import sensor_monitor
-from beaver_ftc.diagnosis.schemes import detection_share, record_isolated_surfaces
-from beaver_ftc.diagnosis.state import PITCH, PLUGIN_SCHEME
+from beaver_ftc.diagnosis.schemes import record_isolated_surfaces
+from beaver_ftc.diagnosis.state import PITCH
 from beaver_ftc.diagnosis.types import verdict
+from beaver_ftc.loop.accounts import account, add_effect, effect_of_faults, follow_guarantee
+from beaver_ftc.loop.log_row import record_row
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.sensing import (
     FLYING,
     NOT_FINITE,
     effective,
     effectiveness,
-    first_signal,
     flight_status,
     hand_over,
     measure,
-    position,
 )
-from beaver_ftc.scenario.diagnosis import MAX_POLES
-
-GUARANTEE = record(
-    phi=3, phi_sum=3,  # effect of the faults, rad/s2: now, and over the frame
-    effect=(MAX_POLES, 3),  # filtered as the bank filters the innovation, rad/s
-    certain_after_s=float,
-)  # fmt: skip
-TRACKING = record(
-    before=3, frames_before=int,  # squared error before a fault, rad2/s2, and since
-    since=3, frames_since=int,
-)  # fmt: skip
-AUTHORITY = record(demanded=3, lacking=3, beyond_frames=(int, 3))
-ENVELOPE = record(
-    outside=int, n_exits=int, outside_frames=int, exit_at_s=MAX_EVENTS, return_at_s=MAX_EVENTS,
-)  # fmt: skip
-# Frames in which the diagnosis concludes nothing, of so many watched. undiagnosed: there is none. late: the
-# flight is older than any that was measured. beyond: outside the map of the model's error in this quantity,
-# which was then between least and greatest. between: inside the range of each quantity, but in no box.
-INCONCLUSIVE = record(
-    watched=int, frames=int, from_s=float, undiagnosed=int, late=int, between=int,
-    beyond=(int, N_MAP_COORDINATES), least=N_MAP_COORDINATES, greatest=N_MAP_COORDINATES,
-)  # fmt: skip
-
-
-@sized
-def accounts_dtype(n: int) -> np.dtype:
-    """Accounts of a flight with n surfaces; actuator_travel (n,) rad, actuator_energy
-    (n,) rad2/s: the integral of the speed's square. beyond_threshold_at_s: since a window of faults began
-    (windows.py), the first frame in which the diagnosis shows a fault, -1 if none."""
-    return record(
-        guarantee=GUARANTEE, tracking=TRACKING, authority=AUTHORITY, envelope=ENVELOPE,
-        inconclusive=INCONCLUSIVE, beyond_threshold_at_s=float,
-        saturated_frames=(int, n), actuator_travel=n, actuator_energy=n, position_then=n,
-    )  # fmt: skip
 
 
 @sized
@@ -114,216 +67,6 @@ def share_faults(truth, faults):
         faults.effectiveness[s] = effectiveness(truth, s)
         faults.effective[s] = effective(truth, s)
         faults.immovable[s] = truth.immovable[s]
-
-
-@kernel
-def effect_of_faults(guarantee, truth, prediction, y):
-    """Fill guarantee.phi (3,) rad/s2: what the truth's faults do to the angular acceleration, as the design
-    model weighs it."""
-    phi, G, u = guarantee.phi, prediction.G, prediction.u
-    phi[:] = 0.0
-    if truth.faulted:
-        for i in range(3):
-            for s in range(u.size):
-                phi[i] += G[i, s] * (effective(truth, s) - u[s])
-        phi[PITCH] += unanticipated_pitch(prediction.design, y, truth.Cm_alpha3)
-
-
-@kernel
-def follow_guarantee(guarantee, bank, dt, share, k, t):
-    """Advance the filtered effect by the elapsed frame and note the first instant t (s) of certainty.
-
-    share: one over the instants in a frame. The sum then restarts with this instant. k: number of the
-    diagnosis' frame; with its first one, of 0, its filters are empty, whatever went before.
-    """
-    if k == 0:
-        guarantee.effect[:], guarantee.phi_sum[:], guarantee.certain_after_s = 0.0, guarantee.phi, -1.0
-        return
-    for i in range(3):
-        mean = share * guarantee.phi_sum[i]
-        for m in range(bank.config.n_filters):
-            effect = bank.config.a[m] * guarantee.effect[m, i] + dt * mean
-            guarantee.effect[m, i] = effect
-            certain = abs(effect) > 2.0 * bank.output.threshold[m, i] > 0.0
-            if certain and guarantee.certain_after_s < 0.0:
-                guarantee.certain_after_s = t
-        guarantee.phi_sum[i] = guarantee.phi[i]
-
-
-@kernel
-def track(tracking, truth, model_rate):
-    """Add this frame's squared error of the rates, rad2/s2; model_rate (3,) rad/s."""
-    if truth.faulted:
-        sums = tracking.since
-        tracking.frames_since += 1
-    else:
-        sums = tracking.before
-        tracking.frames_before += 1
-    for i in range(3):
-        sums[i] += (model_rate[i] - truth.value[i]) ** 2
-
-
-@kernel
-def account_surfaces(accounts, truth, saturated, k, dt):
-    """How long each surface was saturated, how far it has travelled and how fast."""
-    for s in range(saturated.size):
-        now = position(truth, s)
-        accounts.saturated_frames[s] += saturated[s]
-        if k > 0:
-            moved = now - accounts.position_then[s]
-            accounts.actuator_travel[s] += abs(moved)
-            accounts.actuator_energy[s] += moved * moved / dt
-        accounts.position_then[s] = now
-
-
-@kernel
-def account_authority(authority, axes):
-    """How much of what was demanded after the fault the surfaces could not give, and for how long not even
-    the rates could have been held."""
-    for i in range(3):
-        authority.demanded[i] += abs(axes.demand[i])
-        authority.lacking[i] += abs(axes.shortfall[i])
-        authority.beyond_frames[i] += axes.beyond[i]
-
-
-@kernel
-def note_envelope(envelope, outside, t):
-    """Note when the flight leaves the validated envelope and when it comes back; t s."""
-    envelope.outside_frames += outside
-    exits = outside and not envelope.outside
-    envelope.n_exits += exits
-    last = min(envelope.n_exits, MAX_EVENTS) - 1  # of more than there is room for, the latest stays
-    if exits:
-        envelope.exit_at_s[last], envelope.return_at_s[last] = t, np.inf
-    elif envelope.outside and not outside:
-        envelope.return_at_s[last] = t
-    envelope.outside = outside
-
-
-@kernel
-def note_inconclusive(inconclusive, fdi, t):
-    """Count this frame, and why nothing can be concluded in it; t s."""
-    enabled, error_map = fdi.config.enabled, fdi.bound.error_map
-    inconclusive.watched += 1
-    if enabled and (error_map.n_boxes == 0 or not error_map.outside):
-        return
-    if inconclusive.frames == 0:
-        inconclusive.from_s = t
-    inconclusive.frames += 1
-    if not enabled:
-        inconclusive.undiagnosed += 1
-    elif map_row(error_map) < 0:
-        inconclusive.late += 1
-    else:
-        note_place(inconclusive, error_map)
-
-
-@kernel
-def note_place(inconclusive, error_map):
-    """Count the quantities in which this place is outside the map."""
-    explained = False
-    for i in range(error_map.coordinates.size):
-        if outside_span(error_map, i):
-            now, first = error_map.coordinates[i], inconclusive.beyond[i] == 0
-            inconclusive.least[i] = now if first else min(now, inconclusive.least[i])
-            inconclusive.greatest[i] = now if first else max(now, inconclusive.greatest[i])
-            inconclusive.beyond[i] += 1
-            explained = True
-    inconclusive.between += not explained
-
-
-PER_ESTIMATOR = 10  # columns
-
-
-@kernel
-def put(row, column, values):
-    """Write values into row from column on; returns the next column."""
-    for i in range(values.size):
-        row[column + i] = values[i]
-    return column + values.size
-
-
-@kernel
-def record_truth(truth, t, row):
-    """The first columns: time and the truth. Returns the next column."""
-    value = truth.value
-    row[0] = t
-    row[1], row[2], row[3] = value[ch.AIRSPEED], value[ch.ALPHA], value[ch.BETA]
-    column = put(row, 4, value[0:3])
-    column = put(row, column, value[ch.PHI : ch.PHI + 3])
-    row[column] = (value[ch.LATITUDE] - truth.latitude_0) * truth.radius_m
-    row[column + 1] = (value[ch.LONGITUDE] - truth.longitude_0) * truth.parallel_radius_m
-    row[column + 2] = value[ch.ALTITUDE]
-    column = put(row, column + 3, value[ch.PDOT : ch.PDOT + 3])
-    row[column] = value[ch.QDYN]
-    first = first_signal(truth)
-    column = put(row, column + 1, value[first : first + truth.declared])
-    row[column] = value[ch.ENVELOPE]
-    return column + 1
-
-
-@kernel
-def record_surfaces(truth, commanded, saturated, row, column):
-    """Command in effect, position and effective deflection of each surface; then which are saturated."""
-    for s in range(commanded.size):
-        row[column] = commanded[s]
-        row[column + 1] = position(truth, s)
-        row[column + 2] = effective(truth, s)
-        column += 3
-    return put(row, column, saturated)
-
-
-@kernel
-def record_estimator(fie, started, row, column):
-    """Residuals between their limits, once the estimators have started; and whether the fault is excluded."""
-    if started:
-        for i in range(3):
-            row[column + 3 * i], row[column + 3 * i + 1] = fie.residual[i], fie.mu_lo[i]
-            row[column + 3 * i + 2] = fie.mu_hi[i]
-    row[column + PER_ESTIMATOR - 1] = fie.excluded
-
-
-@kernel
-def record_alarm(bank, row, column):
-    """Residual and threshold of what raises the alarm: on each axis the filter nearest to its bound."""
-    for i in range(3):
-        m = nearest_filter(bank, i)
-        row[column + i], row[column + 3 + i] = bank.output.residual[m, i], bank.output.threshold[m, i]
-    return column + 6
-
-
-@kernel
-def record_sensor_monitor(monitor, missing, row, column, columns):
-    """How near a test between the instruments came to its bound in this frame, and which; and the first
-    instrument that gives no reading, missing (N_SENSORS,). Returns the next column."""
-    if monitor.config.enabled and monitor.stage:
-        row[column], row[column + 1] = (
-            monitor.output.top_ratio,
-            monitor.output.worst_test_index,
-        )
-    for i in range(missing.size - 1, -1, -1):
-        if missing[i]:
-            row[column + 2] = i
-    return column + columns
-
-
-@kernel
-def record_sampled(signal, row, column, columns):
-    """The readings of the last `columns` sensors, those with rates of their own. Returns the next column."""
-    first = signal.size - columns
-    for i in range(columns):
-        row[column + i] = signal[first + i]
-    return column + columns
-
-
-@kernel
-def record_profile(autopilot, row, column):
-    """The commanded profile, of the channels that are flown, and the airspeed of it that can be held."""
-    for c in range(autopilot.command.size):
-        if autopilot.is_commanded[c]:
-            row[column + c] = autopilot.command[c]
-    if autopilot.is_commanded[SPEED]:
-        row[column + autopilot.command.size] = autopilot.airspeed_to_fly
 
 
 @apart
@@ -450,16 +193,14 @@ def sense_inside(frame):
     sense(frame)
     if frame.departed != NOT_FINITE:
         accumulate_instant(frame)
-        guarantee = frame.accounts.guarantee
-        for i in range(3):
-            guarantee.phi_sum[i] += guarantee.phi[i]
+        add_effect(frame.accounts.guarantee)
     frame.departed = FLYING
 
 
 @kernel
 def isolated_theta(fdi, s):
     """Estimated theta of the isolated loss of surface s: see conclusion.py."""
-    return assessed.isolated_theta(
+    return conclusion.isolated_theta(
         fdi.config, fdi.verdict, fdi.layout, fdi.isolation.estimator, fdi.statistical, s
     )[0]
 
@@ -522,79 +263,6 @@ def fly_profile(frame, commanded):
     )
     for i in range(3):
         commanded[i] += autopilot.rates[i]
-
-
-@kernel
-def note_beyond_threshold(accounts, fdi, t):
-    """Note that a detector is beyond its threshold at t s. A plug-in says so itself."""
-    monitor, detector, authority = fdi.sensor_monitor, fdi.statistical, fdi.config.authority
-    if fdi.config.scheme_number == PLUGIN_SCHEME:
-        is_beyond = fdi.plugin_verdict.detected == 1
-    else:
-        uses_statistics = weighs_statistics(detector, authority)
-        ratio = detection_share(fdi.bank, detector.alarm, authority, uses_statistics)
-        is_beyond = ratio > 1.0 or (sensor_monitor.has_alarm(monitor) and monitor.output.top_ratio > 1.0)
-    if is_beyond:
-        accounts.beyond_threshold_at_s = t
-
-
-@kernel
-def account(frame):
-    """Advance the metrics' sums by this frame; before a fault, the closest approach to an alarm."""
-    control, truth, sums = frame.control, frame.truth, frame.accounts
-    track(sums.tracking, truth, control.reference.output.model_rate)
-    if truth.faulted:
-        account_authority(sums.authority, control.axes)
-        if sums.beyond_threshold_at_s < 0.0:
-            note_beyond_threshold(sums, frame.fdi, frame.t)
-    else:
-        filters.keep_bank_peak(frame.fdi.bank)
-        alarm = frame.fdi.statistical.alarm
-        alarm.peak = max(alarm.peak, alarm.ratio)
-    saturated, dt = control.allocation.output.saturated, control.reference.config.dt
-    account_surfaces(sums, truth, saturated, frame.k, dt)
-    note_envelope(sums.envelope, truth.value[ch.ENVELOPE] < 0.5, frame.t)
-    note_inconclusive(sums.inconclusive, frame.fdi, frame.t)
-
-
-@kernel
-def record_row(frame, commanded, row):
-    """Write the row of a frame in the order of channels.log_columns; commanded (3,) rad/s."""
-    control, fdi, prediction, logged = frame.control, frame.fdi, frame.prediction, frame.logged
-    saturated, effectiveness = control.allocation.output.saturated, control.surfaces.output.effectiveness
-    row[:] = np.nan
-    column = record_truth(frame.truth, frame.t, row)
-    column = put(row, column, frame.measured.x)
-    column = put(row, column, commanded)
-    column = put(row, column, control.reference.output.model_rate)
-    column = record_surfaces(frame.truth, prediction.commanded, saturated, row, column)
-    column = record_alarm(fdi.bank, row, column)
-    column = put(row, column, fdi.fdae.output.residual)
-    column = put(row, column, fdi.fdae.output.threshold)
-    column = put(row, column, fdi.bound.eta_bar)
-    column = put(row, column, fdi.fdae.network.output)
-    column = put(row, column, prediction.means.F)
-    for e in range(logged.estimators):
-        if e < fdi.isolation.config.n_estimators:  # else another diagnosis has taken their place
-            record_estimator(fdi.isolation.estimator[e], fdi.verdict.detected, row, column)
-        column += PER_ESTIMATOR
-    column = put(row, column, frame.assessment.effectiveness)
-    column = put(row, column, effectiveness)
-    if not control.config.uses_verdict:  # the law takes each surface for a healthy one
-        row[column - effectiveness.size : column] = 1.0
-    monitor, missing = fdi.sensor_monitor, frame.measured.missing
-    row[column], row[column + 1] = frame.supervisor.mode, fdi.verdict.detected or monitor.output.alarmed
-    column += 2
-    if logged.sensor_monitor:
-        column = record_sensor_monitor(monitor, missing, row, column, logged.sensor_monitor)
-    column = record_sampled(frame.measured.signal, row, column, logged.sampled)
-    column = put(row, column, control.power.output.command[: logged.power])
-    if frame.autopilot.enabled:
-        record_profile(frame.autopilot, row, column)
-    detector = fdi.statistical
-    if logged.tests and detector.test.enabled:
-        n = detector.test.n_scores
-        row[row.size - n :] = detector.alarm.share[:n]
 
 
 @apart

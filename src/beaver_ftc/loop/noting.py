@@ -10,7 +10,7 @@ from beaver_ftc.compiled import direct, kernel, row_of
 from beaver_ftc.diagnosis import Measured
 from beaver_ftc.loop import frame as whole
 from beaver_ftc.loop.assembly import y_places
-from beaver_ftc.loop.frame import put
+from beaver_ftc.loop.log_row import put
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.loop.stepping import detection_share, diagnose_one
 from beaver_ftc.plant.sensing import NOT_FINITE

@@ -1,6 +1,6 @@
 """What a flight has yielded, read off its frame record: the verdict, the accounts, the guaranteed detection.
 
-frame.py finds the instant from which detection was certain, for the worst-case filters of the diagnosis.
+accounts.py finds the instant from which detection was certain, for the worst-case filters of the diagnosis.
 There is no guarantee where these filters raise no alarm (a plug-in, or the statistical test in sole
 authority), where they were no longer evaluated (an alarm before the fault, or of the sensor monitor), and
 where an input was off by more than is declared (a broken sensor, undeclared errors).

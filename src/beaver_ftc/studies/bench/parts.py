@@ -46,7 +46,7 @@ PARTS: dict[str, dict[str, Kernel]] = {
     "reading": {"plant.sensing.measure": nothing, "plant.sensing.flight_status": flying},
     # the design model, the detection estimator and its bank of filters
     "fdae": {
-        "design.model.response": nothing, "loop.frame.effect_of_faults": nothing,
+        "design.model.response": nothing, "loop.accounts.effect_of_faults": nothing,
         "diagnosis.model_prediction.evaluate_frame": nothing, "loop.frame.diagnose": nothing,
     },
     # the isolation estimators, and the decision among them
@@ -75,7 +75,7 @@ PARTS: dict[str, dict[str, Kernel]] = {
     # reference model, feedback linearisation, accommodation, allocation, anti-windup
     "law": {"loop.frame.command": nothing, "control.laws.reference.follow": nothing},
     # every column of the log, and the sums of the metrics
-    "logging": {"loop.frame.record_row": nothing, "loop.frame.account": nothing},
+    "logging": {"loop.log_row.record_row": nothing, "loop.accounts.account": nothing},
 }  # fmt: skip
 
 

@@ -3,7 +3,7 @@
 A flight is the scenario without its own faults, with a loss of one surface: its seed and the instant of the
 loss are drawn, its size is asked for. The loss strikes anywhere between the start, once the references have
 settled, and the end. What is found: an alarm within the time asked for. What is certain: that the condition
-of guaranteed detection (loop/frame.py, `guaranteed_delay_s` of the metrics) holds within that time.
+of guaranteed detection (loop/accounts.py, `guaranteed_delay_s` of the metrics) holds within that time.
 
 The same flights, with one thing left out of scenario and declaration, say what limits the answer; with
 another reference, what would help.

@@ -41,6 +41,7 @@ REFUSED = [
     (Verdict(candidates=(1,)), "verdict.candidates is (1,), allowed: a tuple of str"),
     (Verdict(effectiveness=[1, 1, 1, 1j]), "verdict.effectiveness has type list, allowed: 4 numbers"),
     (Verdict(estimate=float("inf")), "verdict.estimate is inf, allowed: a finite number"),
+    (Verdict(estimate=10**400), f"verdict.estimate is {10**400}, allowed: a finite number"[:500]),
     (Verdict(effectiveness=[1, 2, 3]), "verdict.effectiveness has shape (3,), allowed: 4 numbers"),
     (Verdict(effectiveness=[1, 2, 3, np.nan]),
      "verdict.effectiveness is not finite: [1.0, 2.0, 3.0, nan]"),

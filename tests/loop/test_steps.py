@@ -19,7 +19,7 @@ def _flown(sim):
     """The flight by the script; the rows of each step."""
     pieces = []
     for frames, rate, then in SCRIPT:
-        sim.step(frames=frames, stick=None if rate is None else (0.0, rate, 0.0))
+        sim.step(frames=np.int64(frames), stick=None if rate is None else (0.0, rate, 0.0))
         pieces.append(sim.rows.copy())
         assert np.array_equal(sim.values, pieces[-1][-1], equal_nan=True)
         if then == "jam":

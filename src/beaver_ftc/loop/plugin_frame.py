@@ -42,6 +42,13 @@ def _is_number(given: Any) -> bool:
     return isinstance(given, _NUMBER)
 
 
+def _is_estimate(given: Any) -> bool:
+    try:
+        return given is None or (_is_number(given) and isfinite(given))
+    except OverflowError:  # an int beyond every float
+        return False
+
+
 def _is_text(given: Any) -> bool:
     return isinstance(given, str)
 
@@ -55,7 +62,7 @@ _ALLOWED: tuple[tuple[str, Callable[[Any], bool], str], ...] = (
     ),
     ("axis", lambda given: given is None or (_is_text(given) and given in _AXES), "p, q, r or None"),
     ("type", lambda given: given is None or _is_text(given), "a str or None"),
-    ("estimate", lambda given: given is None or (_is_number(given) and isfinite(given)), "a finite number"),
+    ("estimate", _is_estimate, "a finite number"),
     ("statistic", _is_number, "a number"),
     (
         "candidates",

@@ -220,7 +220,7 @@ class Stepping:
         """
         if self.done:
             raise BadInput(f"{self._scenario.name}: the flight is over at {self.t_s:g} s, allowed: reset()")
-        if not isinstance(frames, int) or frames < 1:
+        if not isinstance(frames, int | np.integer) or frames < 1:
             raise BadInput(f"frames: {frames!r} is out of range, allowed: a whole number of at least 1")
         low, high = self.travel_rad
         deflections = None
@@ -230,10 +230,10 @@ class Stepping:
         if self._next > 0:
             self._last.clear()
         self._begin()
-        self._note_asked("step", frames, command=deflections, stick=stick)
+        self._note_asked("step", int(frames), command=deflections, stick=stick)
         self._loop.hold(deflections)  # in the law's place, from the frame just flown on; None gives it back
         self._by_hand |= deflections is not None
-        self._fly_to(min(self._next + frames, self._loop.n_frames), rate_deg_s)
+        self._fly_to(min(self._next + int(frames), self._loop.n_frames), rate_deg_s)
 
     def inject(self, fault: Mapping[str, Any]) -> None:
         """Inject a fault that begins in the next frame.

@@ -22,8 +22,9 @@ from beaver_ftc.diagnosis.types import GIVE_UP, SCALE_COMMAND
 from beaver_ftc.scenario.diagnosis import MODES, ControlConfig
 
 MODE_NOMINAL, MODE_ADAPTIVE, MODE_REALLOCATED, MODE_UNANTICIPATED = range(len(MODES))
-MAX_EVENTS = 64
+MAX_EVENTS = 64  # of modes, and of exits from the envelope, that a flight records
 
+# mode now; how many modes there were, since when, s, and which: the first ones and the last.
 SUPERVISOR = record(mode=int, n_modes=int, mode_at_s=MAX_EVENTS, mode_is=(int, MAX_EVENTS))
 
 

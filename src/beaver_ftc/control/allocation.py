@@ -272,7 +272,7 @@ def hand_over_pitch(allocation, reallocated, at_once, remains, least):
     """Hand the pitch demand to the flap, or back as soon as it is `reallocated` no longer, by the same step.
 
     at_once: the lost part goes at once, after a jam. remains: effectiveness of the main surface; less than
-    `least` is none. While pitch is handed back, the loss of before counts: the main surface may be believed
+    `least` is none. While pitch is handed back, the loss of before counts: the main surface may be estimated
     whole at once, and nothing is to leap.
     """
     config, output = allocation.config, allocation.output

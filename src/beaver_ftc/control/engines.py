@@ -31,7 +31,8 @@ from beaver_ftc.design.model import inertia_coefficients
 from beaver_ftc.diagnosis.state import PITCH, YAW
 from beaver_ftc.scenario.declared import Declared
 
-LEAST_LAG_S, RELEASE_S = 0.5, 20.0
+LEAST_LAG_S = 0.5  # of an engine that the file gives less lag: the law then integrates no faster
+RELEASE_S = 20.0  # time constant with which w fades
 
 # n: how many; low, high: of the setting, step: in a frame; integral_gain, release: shares a frame.
 # B (3, n) rad/s2 per m/s2.

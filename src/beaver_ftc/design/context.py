@@ -1,4 +1,4 @@
-"""What a detector or a law is told before a flight: the frame, the design model, the trim, the bounds."""
+"""What a detector or a law receives before a flight: the frame, the design model, the trim, the bounds."""
 
 import warnings
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""The design model: what the diagnosis and the laws believe of the (p, q, r) dynamics.
+"""The design model: what the diagnosis and the laws assume of the (p, q, r) dynamics.
 
     xdot = f(x, y) + G(y) u     x = (p, q, r), y = (alpha, beta, V, qdyn, declared signals), u: the surfaces
 
@@ -309,7 +309,8 @@ def own_damping(design: np.void, y: np.ndarray) -> np.ndarray:
 
 @kernel
 def response(design, x, y, f, G):
-    """Fill f (3,) rad/s2 and G (3, n) rad/s2 per rad with what the designer believes at x (3,) and y."""
+    """Fill f (3,) rad/s2 and G (3, n) rad/s2 per rad of the design model, simplified or not, at x (3,) and
+    y."""
     if design.linearised:
         linear_response(design, x, y, f, G)
     elif design.frozen_alpha:

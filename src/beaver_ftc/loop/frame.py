@@ -1,7 +1,7 @@
 """One frame of the closed loop, compiled: measure, diagnose, decide, command, record.
 
     measure     plant/sensing.py          the truth, and what the instruments make of it
-    diagnose    diagnosis/                what is believed of the aircraft, and whether it still holds
+    diagnose    diagnosis/                what the design model predicts, and whether it still holds
     decide      control/accommodation.py  the mode
     command     control/                  the surfaces, and the engine
     outer loops control/autopilot.py      the reference of the next frame, if a profile is to be flown

@@ -20,14 +20,14 @@ RATIO = 6.5  # observer over feedback: of those with the same margins, near the 
 LEAST_LEAD_RATIO, MOST_LEAD = 1.0, 4.0  # lead compensation makes an actuator at most this many times as fast
 RESERVE_DB, RESERVE_DEG = 0.5, 2.0  # kept for what an integrator is not: the rest of the aircraft
 N_FREQUENCIES, N_CANDIDATES = 160, 40
-LEAST_PER_S = 0.5
+LEAST_PER_S = 0.5  # s of the slowest loop, which is taken even if it leaves less than the margins
 
 
 @dataclass(frozen=True)
 class Loop:
-    """What limits one loop. dt_s: frame. share: of it until a command acts. approach: of the way to its
-    command the actuator goes in a frame. lead: command beyond its position
-    over what is wanted beyond it. delay_s, keep: the gyro's."""
+    """What limits one loop. dt_s: length of a frame. share: part of a frame until a command acts. approach:
+    part of the way to its command that the actuator goes in a frame. lead: command beyond the actuator's
+    position over what is wanted beyond it. delay_s, keep: the gyro's delay, and the pole of its lag."""
 
     dt_s: float
     share: float
@@ -121,7 +121,8 @@ def noise_speed(loop: Loop, s: float, z: np.ndarray, omega: np.ndarray) -> float
 
 @lru_cache(maxsize=64)
 def candidates(loop: Loop, gain_db: float, phase_deg: float) -> tuple[np.ndarray, np.ndarray]:
-    """Values of s, 1/s, ascending, that leave the margins, and the noise speed of each, 1/s2."""
+    """LEAST_PER_S and the values of s above it that leave the margins, 1/s, ascending, and the noise speed of
+    each, 1/s2."""
     omega = frequencies(loop.dt_s)
     z = np.exp(1j * omega * loop.dt_s)
     fastest = 0.5 / (loop.dt_s * (0.5 + loop.share) + loop.delay_s)

@@ -20,7 +20,7 @@ from beaver_ftc.diagnosis.informed_test import with_measured_gust
 
 PITCHING, YAWING = 1, 2
 _TURNED_SHARE = 0.3  # of noises of airspeed and bank in the flow's angles: attitudes and incidences of 17 deg
-_LEAST_AIRSPEED_MPS = 1.0  # of a broken airspeed sensor: a rotation of the air is over the airspeed
+_LEAST_AIRSPEED_MPS = 1.0  # a broken sensor may read 0, and the rotation of the air is over the airspeed
 _GRAVITY = np.array([0.0, 0.0, GRAVITY_MPS2])
 
 

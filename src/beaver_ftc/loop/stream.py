@@ -61,6 +61,8 @@ class Diagnosis:
     ) -> None:
         if not isinstance(aircraft, Aircraft):
             raise BadInput(f"aircraft: {aircraft!r:.60} is none, allowed: what aircraft() gives")
+        if not (start is None or (isinstance(start, tuple | list) and len(start) == len(_START))):
+            raise BadInput(f"start: {start!r:.60} is not usable, allowed: three arrays: {', '.join(_START)}")
         said = dict(fdi or {})
         if said.get("sensor_monitor") in (None, "auto"):
             said["sensor_monitor"] = "never"  # `step` takes no accelerations, which the monitor compares

@@ -11,18 +11,15 @@ from law_records import new_control
 
 SITUATIONS = {  # detected, isolated
     "healthy": (0, NOT_ISOLATED), "detected": (1, NOT_ISOLATED), "aileron": (1, 0), "elevator": (1, 1),
-    "rudder": (1, 2), "flap": (1, 3), "unanticipated": (1, UNANTICIPATED),
+    "unanticipated": (1, UNANTICIPATED),
+}  # fmt: skip
+TOLERANT = {
+    "healthy": "nominal", "detected": "adaptive", "aileron": "adaptive", "elevator": "reallocated",
+    "unanticipated": "unanticipated",
 }  # fmt: skip
 EXPECTED = {
-    "nominal": dict.fromkeys(SITUATIONS, "nominal"),
-    "adaptive": {
-        "healthy": "nominal", "detected": "adaptive", "aileron": "adaptive", "elevator": "adaptive",
-        "rudder": "adaptive", "flap": "adaptive", "unanticipated": "unanticipated",
-    },
-    "fault-tolerant": {
-        "healthy": "nominal", "detected": "adaptive", "aileron": "adaptive", "elevator": "reallocated",
-        "rudder": "adaptive", "flap": "adaptive", "unanticipated": "unanticipated",
-    },
+    "nominal": dict.fromkeys(SITUATIONS, "nominal"), "adaptive": TOLERANT | {"elevator": "adaptive"},
+    "fault-tolerant": TOLERANT,
 }  # fmt: skip
 
 

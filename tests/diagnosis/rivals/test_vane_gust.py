@@ -37,10 +37,10 @@ def test_what_is_left_unexplained_is_what_is_declared_of_it():
 
 def test_an_airspeed_of_zero_does_not_end_the_estimate():
     recording = airborne(duration_s=1)
-    gust, seen = VaneGust(recording.context), [measured for measured, _ in recording.seen]
-    blocked = seen[10]._replace(y=seen[10].y * [1, 1, 0, 1, 1])
-    left = [gust.subtracted(each).acceleration for each in (*seen[:10], blocked, *seen[11:])]
-    assert np.isfinite(left).all()
+    gust, (measured, _) = VaneGust(recording.context), recording.seen[0]
+    for V in (1, 0, 1):
+        left = gust.subtracted(measured._replace(y=measured.y * [1, 1, V, 1, 1]))
+    assert np.isfinite(left.acceleration).all()
 
 
 def test_still_air_needs_no_vanes():

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from beaver_ftc.control import autopilot as loops
-from beaver_ftc.control.autopilot import AUTOPILOT
+from beaver_ftc.control.autopilot import AUTOPILOT, acceleration_per_power, path_angle_limits
 from beaver_ftc.control.profile import SPEED, wrap_to_half_turn
 from beaver_ftc.design.table import DPT, QDYN
 from law_records import new_control
@@ -34,9 +33,9 @@ def test_thrust_per_inhg_is_the_slope_of_the_thrust():
         return y[QDYN] * (0.2 * dpt + 0.1 * ALPHA_NOW * dpt**2)
 
     numeric = (thrust(1e-4) - thrust(-1e-4)) / 2e-4
-    assert loops.acceleration_per_power(pilot, power, y) == pytest.approx(numeric, rel=1e-6)
+    assert acceleration_per_power(pilot, power, y) == pytest.approx(numeric, rel=1e-6)
     pilot["thrust"] = -1.0, 0.0
-    assert loops.acceleration_per_power(pilot, power, y) == 1e-3
+    assert acceleration_per_power(pilot, power, y) == 1e-3
 
 
 PUSH = 0.2  # m/s2 per inHg
@@ -45,17 +44,17 @@ PUSH = 0.2  # m/s2 per inHg
 def test_paths_are_bounded_by_the_engine_and_the_airspeed_there_is():
     pilot = new_autopilot(SPEED)
     pilot["airspeed_to_fly"], pilot["full_power"] = 43.0, 28.0
-    low, high = loops.path_angle_limits(pilot, PUSH)
+    low, high = path_angle_limits(pilot, PUSH)
     # idle is 8 inHg below trim, full 8 above; 44 m/s is 1 below 45 and 3 above 41
     assert low == pytest.approx(max(0.01 - 8 * PUSH / G - 0.02 * 1.0, -0.15))
     assert high == pytest.approx(min(0.01 + 8 * PUSH / G + 0.02 * 3.0, 0.15))
-    low, high = loops.path_angle_limits(pilot, 0.01)
+    low, high = path_angle_limits(pilot, 0.01)
     assert low == pytest.approx(0.01 - 0.08 / G - 0.02)
     assert high == pytest.approx(0.01 + 0.08 / G + 0.06)
 
 
 def test_without_an_airspeed_the_engine_stays_and_descents_are_free():
-    low, high = loops.path_angle_limits(new_autopilot(), PUSH)
+    low, high = path_angle_limits(new_autopilot(), PUSH)
     assert low == -0.15
     assert high == pytest.approx(min(0.01 + 0.02 * (V - 35.0), 0.15))
 

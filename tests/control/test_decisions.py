@@ -11,8 +11,8 @@ from beaver_ftc.control.accommodation import (
     MODE_REALLOCATED,
     MODE_UNANTICIPATED,
 )
-from beaver_ftc.control.laws import evidence
 from beaver_ftc.control.laws.effectiveness_estimator import OBSERVER_ERROR, observer_response
+from beaver_ftc.control.laws.evidence import accumulate, derive_fading, effectiveness_seen, is_effective
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
 from beaver_ftc.diagnosis.types import GIVE_UP, SCALE_COMMAND, SUBTRACT_OFFSET, WAIT_FOR_SURFACE
 from beaver_ftc.loop import frame as whole
@@ -91,13 +91,13 @@ def lost_rudder(theta, believed):
     control = new_control()
     law, observer = control["rejecting"], record(OBSERVER_ERROR)
     config, memory = law["config"], law["memory"]
-    memory["L_rate"], memory["L_disturbance"], config["fading"] = 0.3, 2.0, evidence.derive_fading(DT)
+    memory["L_rate"], memory["L_disturbance"], config["fading"] = 0.3, 2.0, derive_fading(DT)
     for k in range(400):
         given = np.zeros((3, 4))
         given[2, RUDDER] = 0.5 * np.sin(0.2 * k)
         unexplained = (theta - (believed - 1.0)) * given[2, RUDDER]
         missed = observer_response(observer, 2, unexplained, 0.3, 2.0, DT)
-        evidence.accumulate(config, memory, 2, believed, given[2, RUDDER], missed)
+        accumulate(config, memory, 2, believed, given[2, RUDDER], missed)
     return memory["sums"]
 
 
@@ -108,12 +108,10 @@ def test_what_is_left_is_found_by_least_squares(theta, believed):
     found = lost_rudder(theta, believed)
     assert found["product"][2] == pytest.approx(theta * found["square"][2], rel=1e-6)
     assert found["innovation"][2] == pytest.approx(theta**2 * found["square"][2], rel=1e-6)
-    assert found["frames"][2] == pytest.approx(
-        (1 - (1 - evidence.derive_fading(DT)) ** 400) / evidence.derive_fading(DT)
-    )
+    assert found["frames"][2] == pytest.approx((1 - (1 - derive_fading(DT)) ** 400) / derive_fading(DT))
     prior = found["innovation"][2] / found["frames"][2] / 0.2**2
     share = prior / (prior + found["square"][2])
     expected = 1.0 + (1 - share) * theta + share * -0.5
-    assert evidence.effectiveness_seen(found, 2, 0.5) == pytest.approx(expected, rel=1e-6)
-    assert bool(evidence.is_effective(found, (0, 1, 2), RUDDER, 0.1)) == (theta > -0.9)
-    assert evidence.effectiveness_seen(found, 1, 0.5) == 0.5  # of pitch nothing has been seen
+    assert effectiveness_seen(found, 2, 0.5) == pytest.approx(expected, rel=1e-6)
+    assert bool(is_effective(found, (0, 1, 2), RUDDER, 0.1)) == (theta > -0.9)
+    assert effectiveness_seen(found, 1, 0.5) == 0.5  # of pitch nothing has been seen

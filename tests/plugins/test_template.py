@@ -1,6 +1,5 @@
 """The template package installs, is listed, flies and is compared."""
 
-import json
 import os
 import shutil
 import subprocess
@@ -50,17 +49,6 @@ def test_it_flies_by_name_and_by_class(site, tmp_path):
     given = ("--plugin", "mine=my_detector:MyCusum")
     done = _beaver(site, tmp_path, "run", "a.yaml", "b.yaml", "--no-report", *given)
     assert done.returncode == 0, done.stdout + done.stderr
-
-
-def test_it_is_compared(site, tmp_path):
-    (tmp_path / "few.sweep.yaml").write_text(SWEEP)
-    arguments = ("--schemes", "my-cusum", "--laws", "nominal", "--workers", "1", "--format", "json")
-    done = _beaver(site, tmp_path, "compare", "--sweep", "few.sweep.yaml", *arguments)
-    assert done.returncode == 0, done.stderr
-    (part,) = json.loads(done.stdout)["sets"].values()
-    rates = {row["scheme"]: row["detection_rate"] for row in part["lines"] if row["law"] == "fault-tolerant"}
-    assert rates == {"adaptive-estimators": 1.0, "my-cusum": 1.0}
-    assert "my-cusum" in part["trade_off"]
 
 
 def test_a_class_of_the_working_folder_flies_and_is_swept_by_several_workers(tmp_path):

@@ -1,7 +1,6 @@
 import io
 import json
 import re
-import shutil
 
 import numpy as np
 import pytest
@@ -9,7 +8,6 @@ from browser import PROGRAM, Browser
 
 import beaver_ftc as bf
 from beaver_ftc.results.log import StoredLog
-from beaver_ftc.results.metrics import as_json
 from beaver_ftc.results.model import Metrics
 from beaver_ftc.results.report import render, write_report
 
@@ -169,24 +167,3 @@ def test_runs_stand_side_by_side_on_the_same_scale(browser, folder, tmp_path):
     assert boxes[0][0] < boxes[1][0]
     assert boxes[0][1] == boxes[1][1]
     assert browser.trouble == []
-
-
-def test_what_damage_takes_is_left_out_from_its_instant_to_its_repair(browser, folder, tmp_path):
-    """The replay draws so many polygons of a jet: all, without fin and rudder, without a tip, all again."""
-    broken = tmp_path / "broken"
-    shutil.copytree(folder, broken)
-    document = json.loads((broken / "metrics.json").read_text())
-    document["faults"] = [
-        {"actuator": None, "type": "damage", "at_s": at_s, "end_s": end_s, "size": {"case": case}}
-        for case, at_s, end_s in (("fin-off", 5.0, 10.0), ("left-wing-tip-off", 8.0, None))
-    ]
-    (broken / "metrics.json").write_text(as_json(document))
-    write_report(tmp_path / "report.html", [broken])
-    browser.open(tmp_path / "report.html")
-    count = """(() => { let n = 0; const run = { ...DATA.runs[0], jet: true };
-      const space = Object.assign(Object.create(Space.prototype), { run }); clock.now = %s;
-      const pen = { beginPath: () => n++, moveTo() {}, lineTo() {}, closePath() {}, fill() {}, stroke() {} };
-      space.drawAircraft(pen, () => [1, 1, 1], { position: [0, 0, 0], attitude: (p) => p }, 1);
-      return n; })()"""
-    drawn = [browser.evaluate(count % t) for t in (4.0, 6.0, 9.0, 11.0)]
-    assert [drawn[0] - n for n in drawn] == [0, 2, 3, 1]

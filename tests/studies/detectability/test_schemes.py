@@ -216,12 +216,6 @@ class TestSurvey:
             assert line["found within 0.5/1/5 s, %"] == ("/".join(shares) or "-")
         assert parts[0].startswith("ideal sensors, still air, aileron, found within 5 s: both")
 
-    def test_it_is_flown_again_into_the_same_folder_to_the_same_numbers(self, survey):
-        document, folder = survey
-        files = {path.name: path.read_bytes() for path in folder.iterdir()}
-        assert run_schemes(folder.parent, SMALL, contenders(["observer-constant"])) == document
-        assert {path.name: path.read_bytes() for path in folder.iterdir()} == files
-
     def test_a_bout_flown_alone_gives_the_same(self, survey):
         document, folder = survey
         block = SMALL.faulted()[-1]

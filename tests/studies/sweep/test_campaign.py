@@ -137,17 +137,6 @@ def test_a_replayed_flight_is_the_flight_in_the_table(reference, tmp_path):
     assert {"scenario.yaml", "log.parquet", "metrics.json"} <= {path.name for path in folder.iterdir()}
 
 
-def test_the_report_leads_to_a_flight_once_it_is_replayed(tmp_path, small_batches):
-    summary = run_sweep(sweep_of(), Options(out=tmp_path, workers=2))
-    worst = summary["worst"][0]
-    page = tmp_path / "short" / "report.html"
-    link = f'href="flights/{worst["name"]}/report.html"'
-    assert worst["replay"] in page.read_text()
-    assert link not in page.read_text()
-    replay(sweep_of(), Options(out=tmp_path), worst["run"])
-    assert link in page.read_text()
-
-
 def test_asked_for_flights_leave_their_logs(tmp_path, small_batches):
     options = Options(out=tmp_path, workers=2, report=False, keep=Keep("selected", frozenset({2, 40})))
     run_sweep(sweep_of(), options)

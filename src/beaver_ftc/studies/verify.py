@@ -287,7 +287,11 @@ def summary_text(document: Document) -> str:
     lines = [*_healthy_lines(document["healthy"]), *_fault_lines(document)]
     if document["skipped"]:
         lines.append(f"{document['skipped']} flights drawn could not be trimmed and are not counted")
-    lines.append("G1 to G3 hold for the sharpened scheme" if document["kept"] else "A GUARANTEE IS VIOLATED")
+    flown = bool(document["healthy"]["flights"]), bool(document["schemes"])
+    held = {(True, True): "G1 to G3 hold", (True, False): "G1 holds", (False, True): "G2 and G3 hold"}.get(
+        flown, "Nothing is tested"
+    )
+    lines.append(f"{held} for the sharpened scheme" if document["kept"] else "A GUARANTEE IS VIOLATED")
     return "\n".join(lines)
 
 
@@ -363,6 +367,8 @@ class Verify(StudyCommand):
 
     def run(self, reporter: Reporter) -> Document:
         """Fly all hours and all faults."""
+        if not (self.hours or self.faults):
+            raise BadInput("verify: --hours 0 --faults 0: allowed: one of them above 0")
         wanted = {"healthy": ceil(self.hours * 3600.0 / HEALTHY_S), "faulty": self.faults}
         draws = [Draw(self.seed, kind, i) for kind in KINDS for i in range(wanted[kind])]
         if not draws:

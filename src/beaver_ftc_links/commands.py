@@ -2,6 +2,7 @@
 
 import sys
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 from typing import Annotated
 
@@ -20,6 +21,7 @@ from beaver_ftc.cli import (
     load_all,
     write_junit,
 )
+from beaver_ftc.documents import BadInput
 from beaver_ftc_links.sitl import Protocol
 
 
@@ -70,6 +72,9 @@ def command(options: Options) -> None:
     from beaver_ftc_links.sitl.serve import Options as Served
     from beaver_ftc_links.sitl.serve import serve
 
+    for name, value in (("--hold", options.hold), ("--ground", options.ground)):
+        if value is not None and not isfinite(value):
+            raise BadInput(f"{name} {value}: allowed: a finite number")
     (scenario,) = load_all([options.scenario])
     for warning in scenario.warnings():
         complain(f"{scenario.name}: warning: {warning}")

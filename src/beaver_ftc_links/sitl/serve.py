@@ -90,7 +90,7 @@ class Endpoint:
 
     def __init__(self, scenario: Scenario, options: Options, say: Say) -> None:
         pulses = options.protocol is Protocol.ardupilot
-        rate_hz = options.rate_hz or (None if pulses else PX4_HZ)
+        rate_hz = PX4_HZ if options.rate_hz is None and not pulses else options.rate_hz
         self.options, self._say, self.ended = options, say, False
         self.link, self._teller = Link(), Teller()
         self.vehicle = Vehicle(scenario, pulses, rate_hz, options.hold_s, options.ground_m)

@@ -281,7 +281,7 @@ class Vehicle:
         self.packets_hz = 0.0
         self.outputs: Outputs
         self.off_rate = 0
-        self.begin(rate_hz or scenario.rate_hz)
+        self.begin(scenario.rate_hz if rate_hz is None else rate_hz)
         self._warm_up()
 
     def _warm_up(self) -> None:

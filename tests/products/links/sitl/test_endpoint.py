@@ -20,6 +20,7 @@ from tools.autopilots.small import Small
 import beaver_ftc as bf
 from beaver_ftc.cli import address
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc_links import commands
 from beaver_ftc_links.sitl import Protocol
 from beaver_ftc_links.sitl.serve import Options, serve
 
@@ -140,3 +141,6 @@ def test_addresses_that_cannot_be_had():
     for given in ("nowhere", ":1", "host:0", "host:x", "host:70000", "host:" + "1" * 5000):
         with pytest.raises(BadInput, match="is no address, allowed: HOST:PORT"):
             address("--mavlink", given)
+    for name in ("hold", "ground"):
+        with pytest.raises(BadInput, match=f"--{name} nan: allowed: a finite number"):
+            commands.command(commands.Options("fault-free", Protocol.px4, **{name: float("nan")}))

@@ -14,7 +14,7 @@ from beaver_ftc.plant.adapter import body_axes
 from beaver_ftc_links.sitl.ardupilot import Ardupilot
 from beaver_ftc_links.sitl.link import Link
 from beaver_ftc_links.sitl.px4 import quaternion
-from beaver_ftc_links.sitl.vehicle import Vehicle, at_rate
+from beaver_ftc_links.sitl.vehicle import Vehicle
 
 NO_PULSE = 0
 
@@ -154,10 +154,10 @@ def test_what_the_autopilot_is_told_is_one_motion():
     assert np.array_equal(attitude, true_attitude)
 
 
-@pytest.mark.parametrize("packets_hz", [19.9, 4000.5])
+@pytest.mark.parametrize("packets_hz", [0.0, 19.9, 4000.5])
 def test_rates_beyond_the_limits_are_refused(packets_hz):
     with pytest.raises(BadInput) as refused:
-        at_rate(scenario(), packets_hz)
+        Vehicle(scenario(), pulses=True, rate_hz=packets_hz)
     says = f"frames of an autopilot at {packets_hz:g} Hz, allowed: 20 to 4000 Hz, or --rate"
     assert str(refused.value) == f"elevator-partial-loss: {says}"
 

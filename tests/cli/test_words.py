@@ -35,6 +35,10 @@ def test_the_editors_schema_offers_nothing_that_a_scenario_refuses(beaver):
         assert (status, "is a class; a scenario names what is registered" in said) == (2, True)
 
 
+def test_the_schema_of_two_kinds_is_refused(beaver):
+    assert beaver("schema", "--sweep", "--plan")[0] == 2
+
+
 def test_a_severity_given_as_turbulence_is_told_where_it_belongs(beaver):
     status, _, said = _validated(beaver, "name: x\nenvironment: {turbulence: moderate}\n")
     assert status == 2

@@ -151,6 +151,8 @@ def schema(sweep: bool = False, plan: bool = False) -> None:
     sweep: Print the schema of a sweep file.
     plan: Print the schema of a plan of evidence.
     """
+    if sweep and plan:
+        raise BadInput("--sweep and --plan exclude each other, allowed: one of them")
     if plan:
         from beaver_ftc.plugins import required
 

@@ -108,6 +108,9 @@ def _refuse_contradictions(options: Options, folder: Path | None) -> None:
     for option, with_it, allowed in (
         (options.only is not None, options.benchmark, "--set: allowed: only with --benchmark"),
         (options.grade is not None, options.tune, "--grade: allowed: only with --tune"),
+        (options.trials != Options.trials, options.tune, "--trials: allowed: only with --tune"),
+        (options.restarts != Options.restarts, options.tune, "--restarts: allowed: only with --tune"),
+        (options.seed != Options.seed, options.tune, "--seed: allowed: only with --tune"),
         (options.draw != 0, options.tune, "--draw: allowed: only with --tune"),
         (options.draws != 1, options.tune, "--draws: allowed: only with --tune"),
         (

@@ -89,6 +89,8 @@ def command(arguments: Arguments) -> None:
     if arguments.rare is not None:
         _rare(load_sweep(arguments.file), arguments)
         return
+    if arguments.ray_address is not None and arguments.backend is not Backend.ray:
+        raise BadInput("--ray-address: allowed: only with --backend ray")
 
     def fly() -> "Judged":
         sweep = load_sweep(arguments.file)

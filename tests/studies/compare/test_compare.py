@@ -106,6 +106,7 @@ def test_the_board_is_written_below_its_mark_and_what_stands_above_stays(compare
         (("--benchmark", "--laws", "lqx", "--flights", "1"), "--laws: unknown law 'lqx'"),
         (("--sweep", "nowhere.yaml"), "no such file"),
         (("--tune", "--set", "published"), "--set: allowed: only with --benchmark"),
+        (("--sweep", "nowhere.yaml", "--trials", "7"), "--trials: allowed: only with --tune"),
         (("nowhere",), "nowhere: holds no metrics.json, allowed: a result folder"),
     ],
 )

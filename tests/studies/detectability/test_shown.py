@@ -105,6 +105,7 @@ def test_a_line_spans_the_places_where_some_loss_is_certain():
             {"scenario": "fault-free", "within": 0.5, "surface": "rudder", "altitude": [0.0]},
             "only without --within",
         ),
+        ({"grid": "quick", "seed": 3}, "--seed only with --within"),
         ({"scenario": "fault-free", "sensors": "ideal"}, "only with --grid"),
         ({"grid": "quick", "airspeed": [40.0, 50.0]}, "at most one --airspeed"),
     ],

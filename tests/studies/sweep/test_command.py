@@ -57,6 +57,7 @@ def test_a_mistake_is_in_the_json_too(call):
         (SHORT, ("--keep-logs", "1,48"), "--keep-logs: there is no flight 48, allowed: 0 to 47"),
         (SHORT, ("--replay", "48"), "there is no flight 48, allowed: 0 to 47"),
         (SHORT, ("--backend", "slurm"), "slurm"),
+        (SHORT, ("--ray-address", "auto"), "--ray-address: allowed: only with --backend ray"),
     ],
 )
 def test_a_mistake_is_one_line_and_exits_with_2(call, text, arguments, says):

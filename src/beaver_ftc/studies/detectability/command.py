@@ -134,6 +134,7 @@ class Detectability(StudyCommand):
             ((self.scenario is None) is (self.grid is None), "exactly one of SCENARIO and --grid"),
             (self.within is not None and self.grid is not None, "--within only with SCENARIO"),
             (self.within is not None and self.surface is None, "--within only with --surface"),
+            (self.within is None and self.seed != Detectability.seed, "--seed only with --within"),
             (self.within is not None and any(where), "--airspeed and --altitude only without --within"),
             (self.grid is None and bool(self.schemes or self.sensors or self.turbulence),
              "--schemes, --sensors and --turbulence only with --grid"),

@@ -367,8 +367,6 @@ class Verify(StudyCommand):
 
     def run(self, reporter: Reporter) -> Document:
         """Fly all hours and all faults."""
-        if not (self.hours or self.faults):
-            raise BadInput("verify: --hours 0 --faults 0: allowed: one of them above 0")
         wanted = {"healthy": ceil(self.hours * 3600.0 / HEALTHY_S), "faulty": self.faults}
         draws = [Draw(self.seed, kind, i) for kind in KINDS for i in range(wanted[kind])]
         if not draws:

@@ -230,9 +230,12 @@ class Vehicle(Section):
         reason = "a surface's name has letters, digits, - and _ only, allowed: one"
         bad = [name for name in self.surfaces if not _SURFACE_NAME_PATTERN.fullmatch(name)]
         mistakes: list[Conflict] = [(("surfaces", name), f"{name!r}: {reason}") for name in bad]
+        commands = self.command_columns
+        again = [i for i, column in enumerate(commands) if column in commands[:i]]
+        mistakes += [(("commands", i), f"{commands[i]!r} stands twice, allowed: each once") for i in again]
         for surface, weights in self.surfaces.items():
             at = ("surfaces", surface)
-            mistakes += _unknown_name_conflicts(at, weights, "command", self.command_columns)
+            mistakes += _unknown_name_conflicts(at, weights, "command", commands)
             if not any(weights.values()):
                 mistakes.append((at, "no command moves it, allowed: a weight that is not 0"))
         tables: dict[str, Collection[str]] = {

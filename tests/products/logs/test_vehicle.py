@@ -15,6 +15,11 @@ from products.logs import synthetic
         ("p: p_rad_s, ", "", "wing.yaml:2: rates.p: required key is missing"),
         ("roll_command: 0.5, pitch_command: -0.5", "roll: 0.5", "surfaces.left.roll: 'roll' is no command"),
         ("roll_command: 0.5, pitch_command: -0.5", "roll_command: 0.0", "left: no command moves it, allowed"),
+        (
+            "[roll_command, ",
+            "[roll_command, roll_command, ",
+            "commands[1]: 'roll_command' stands twice, allowed",
+        ),
         ("labels: {right", "labels: {wrong", "labels.wrong: 'wrong' is no surface"),
         ("0.5, pitch_command: -0.5", "much", "surfaces.left.roll_command: 'much' is text, allowed: a number"),
     ],

@@ -7,7 +7,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.design import altitude_of
-from beaver_ftc.scenario.measured import (
+from beaver_ftc.scenario.measured_range import (
     ALTITUDE,
     BETWEEN,
     LATE,

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 from beaver_ftc.results.model import Expectation, Metrics
-from beaver_ftc.scenario.measured import in_words
+from beaver_ftc.scenario.measured_range import in_words
 from beaver_ftc.scenario.warnings import OF_DIAGNOSIS
 
 MOTION_OF_AXIS = {"p": "roll", "q": "pitch", "r": "yaw"}

@@ -35,7 +35,7 @@ from beaver_ftc.results.model import (
     Withdrawn,
 )
 from beaver_ftc.scenario.faults import TYPES, acting_at, masking, size_at
-from beaver_ftc.scenario.measured import in_words
+from beaver_ftc.scenario.measured_range import in_words
 from beaver_ftc.scenario.sensors import QUANTITIES
 from beaver_ftc.scenario.warnings import wider
 

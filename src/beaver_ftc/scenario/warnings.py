@@ -12,7 +12,7 @@ from typing import Any
 from beaver_ftc.aircraft import AXES, Aircraft
 from beaver_ftc.scenario.diagnosis import FdiConfig, failing, of_several
 from beaver_ftc.scenario.faults import LOSS_OF_EFFECTIVENESS, UNANTICIPATED, of_a_sensor, place_of
-from beaver_ftc.scenario.measured import ALTITUDE, LATE, lies_outside, measured_spans, outside
+from beaver_ftc.scenario.measured_range import ALTITUDE, LATE, lies_outside, measured_spans, outside
 from beaver_ftc.scenario.sensors import sensor_words
 from beaver_ftc.scenario.signals import Chirp
 from beaver_ftc.scenario.undeclared import undeclared

@@ -87,7 +87,7 @@ class FilterSettings(_LastingSection):
     quick_error: error of responses quicker than the fitted flights have, as a share of them
     trim_bound: farthest the trim is adapted, in its spread
     gain_bound: farthest the gain is adapted, in its spread
-    delays_s: delays tried beside the model's, each under a sample
+    delays_s: delays tried beside the model's, each at most a sample
     jam_sd: offset of the rates a sample by a stuck surface, in sd
     power: share of a white residual's information in this one
     tail: degrees of freedom of the residual's t distribution
@@ -264,7 +264,7 @@ class Model(Section):
             arrays.append(((*at, "misreads"), noise.misreads, (G,)))
             if noise.average[0] != 1.0:
                 yield (*at, "average"), "does not begin with 1, allowed: 1, c1, ..."
-        shapes = {"commands": (len(self.fitted.commands), 2), "rates": (3, 2), "airspeed": (2,)}
+        shapes = {"commands": (len(self.vehicle.surfaces), 2), "rates": (3, 2), "airspeed": (2,)}
         for key, shape in (shapes | {"tied": (G,), "gain_sd": (G,)}).items():
             arrays.append((("fitted", key), getattr(self.fitted, key), shape))
         for key_path, lists, shape in arrays:

@@ -117,7 +117,7 @@ def package_errors_as_bad_input(
     """Within this an autopilot's log is read with a package of others: what it prints of damaged files stays
     here. Raises BadInput where the package is missing, or the file is none that it can read.
 
-    log_kind: such a log is called; valid_log_file_text: says which files hold one.
+    log_kind: what such a log is called; valid_log_file_text: which files hold one.
     """
     try:
         with redirect_stdout(StringIO()):
@@ -159,8 +159,8 @@ def columns_of_topics(
     """The wanted columns `topic.field`, all where None, the names of the others, and the first stamp of the
     topics, from which time counts, s.
 
-    Where no column is wanted, all have no rows, and there is no first stamp: a log's names are known then.
-    all_topics: of the log, of which these may be some.
+    Where the log has none of the wanted columns, all have no rows, and there is no first stamp: a log's names
+    are known then. all_topics: of the log, of which these may be some.
     """
     names = names_of_topics(all_topics)
     if wanted is not None and not {*wanted} & {*names}:
@@ -168,6 +168,7 @@ def columns_of_topics(
     kept = {name: rows_with_increasing_time(name, topic.stamps_us) for name, topic in topics.items()}
     first_us = [topics[name].stamps_us[rows[0]] for name, (rows, _) in kept.items() if len(rows)]
     origin_us = min(first_us, default=0.0)
+    origin_s = float(origin_us * _S_PER_US) if first_us else None
     columns: Columns = {}
     for name, topic in topics.items():
         rows, note = kept[name]
@@ -176,7 +177,7 @@ def columns_of_topics(
             if wanted is None or f"{name}.{field_name}" in wanted:
                 values = np.asarray(topic.values(field_name)[rows], dtype=float)
                 columns[f"{name}.{field_name}"] = Column(t_s, values, note)
-    return columns, tuple(name for name in names if name not in columns), float(origin_us * _S_PER_US)
+    return columns, tuple(name for name in names if name not in columns), origin_s
 
 
 def rows_with_increasing_time(topic: str, stamps: Floats) -> tuple[Ints, str]:

@@ -1,7 +1,6 @@
-"""The template package installs, is listed, flies and is compared."""
+"""The template package installs and flies."""
 
 import os
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -10,15 +9,6 @@ import pytest
 
 TEMPLATE = Path(__file__).parents[2] / "examples" / "my-detector"
 BEAVER = Path(sys.executable).with_name("beaver-ftc")
-SWEEP = """
-base:
-  name: few
-  duration_s: 6
-  reference: {q: [{sine: {amplitude_deg_s: 3, frequency_hz: 0.2}}]}
-  faults: [{actuator: elevator, type: loss_of_effectiveness, magnitude: 0.4, at_s: 3}]
-runs: 2
-vary: {"faults[0].magnitude": {uniform: [0.3, 0.9]}}
-"""
 
 
 @pytest.fixture(scope="module")
@@ -49,18 +39,3 @@ def test_it_flies_by_name_and_by_class(site, tmp_path):
     given = ("--plugin", "mine=my_detector:MyCusum")
     done = _beaver(site, tmp_path, "run", "a.yaml", "b.yaml", "--no-report", *given)
     assert done.returncode == 0, done.stdout + done.stderr
-
-
-def test_a_class_of_the_working_folder_flies_and_is_swept_by_several_workers(tmp_path):
-    shutil.copyfile(TEMPLATE / "src/my_detector/__init__.py", tmp_path / "mine.py")
-    (tmp_path / "s.yaml").write_text("name: s\nduration_s: 2\nrate_hz: 20\nfdi: {scheme: my-cusum}\n")
-    (tmp_path / "few.yaml").write_text(
-        "name: few\nbase: s.yaml\nruns: 4\nvary: {initial.airspeed_mps: {uniform: [44, 46]}}\n"
-    )
-    given = ("--no-report", "--plugin", "mine:MyCusum")
-    for arguments in (("run", "s.yaml"), ("sweep", "few.yaml", "--workers", "2")):
-        done = _beaver(tmp_path / "no", tmp_path, *arguments, *given)
-        assert done.returncode == 0, done.stderr
-        done = _beaver(tmp_path / "no", tmp_path, *arguments, "--no-report")
-        assert done.returncode == 2
-        assert "unknown scheme 'my-cusum'" in done.stderr

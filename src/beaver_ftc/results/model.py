@@ -463,10 +463,10 @@ class Departure(Part):
 class AxisAuthority(Part):
     """Control authority about one axis after the fault.
 
-    - `given_share`: share of the demanded angular acceleration that the surfaces gave. - `beyond_s`: time for
-    which the surfaces could not hold the rate, s. - `least_rad_s2`, `greatest_rad_s2`: range of the
-    acceleration that all surfaces can give at the end, as the
-      law knows them; `healthy_...`: of the healthy aircraft; `engines_...`: of the engines.
+    - `given_share`: share of the demanded angular acceleration that the surfaces gave.
+    - `beyond_s`: time for which the surfaces could not hold the rate, s.
+    - `least_rad_s2`, `greatest_rad_s2`: range of the acceleration that all surfaces can give at the end, as
+      the law knows them; `healthy_...`: of the healthy aircraft; `engines_...`: of the engines.
     """
 
     given_share: float

@@ -1,8 +1,8 @@
 """The report of one or more runs as one HTML file that needs nothing else: no network, no other file.
 
-The page draws the same views as the figures, from the log's numbers inside it: whole flight, and at full
-resolution around the fault. It draws them itself (report.js): a plotting library would add one to four
-megabytes to every report and still lack the marks, shades and mode bands that the figures have.
+The page draws the same views as the figures, from the log's numbers inside it: whole flight, and around
+the fault up to 10 000 points of full resolution. It draws them itself (report.js): a plotting library would
+add one to four megabytes to every report and still lack the marks, shades and mode bands of the figures.
 """
 
 import base64
@@ -37,7 +37,7 @@ ReportSection = Callable[[Path], str]
 
 _TEMPLATE_FOLDER = Path(__file__).parent / "templates"
 _REGISTERED_SECTIONS: list[ReportSection] = []  # studies that add to a run's report register theirs
-AROUND_S, AT_FULL_RATE = 2.5, 10_000  # at full rate around the events, this much before and after; points
+AROUND_S, AT_FULL_RATE = 2.5, 10_000  # before and after the events, s, and points of it at full rate
 _FLIGHT_PATH_COLUMNS = ("north_m", "east_m", "altitude_m", "phi_rad", "theta_rad", "psi_rad")
 
 

@@ -4,7 +4,6 @@ Colours are Okabe and Ito's, which colour-blind readers can distinguish; dashes,
 grey.
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -73,7 +72,7 @@ class Mark:
 
 
 def marks(metrics: Metrics) -> list[Mark]:
-    """The event_marks of fault, detection, isolation and departure, as far as they came before the end."""
+    """The marks of fault, detection, isolation and departure that came before the end of the flight."""
     fault, departure = metrics.fault, metrics.departure
     event_marks = (
         ("fault", fault.at_s if fault else None, VERMILION, (), "v", "F"),
@@ -81,14 +80,15 @@ def marks(metrics: Metrics) -> list[Mark]:
         ("isolation", metrics.isolation.time_s, PLUM, (6, 2, 1, 2), "s", "I"),
         ("departure", departure.time_s if departure else None, CRIMSON, (1, 2), "X", "X"),
     )
-    end_s = departure.time_s if departure else math.inf
+    end_s = departure.time_s if departure else metrics.flight.flown_s
     return [
         Mark(name, time, *look) for name, time, *look in event_marks if time is not None and time <= end_s
     ]
 
 
 def closeup_window(event_marks: Sequence[Mark]) -> tuple[float, float] | None:
-    """Where to look closely: from just before the fault (or alarm) to two seconds after the last event."""
+    """Where to look closely: from 0.5 s before the fault (or alarm) to 2 s after the last event, at most 12 s
+    after the first. A departure does not count."""
     if not event_marks:
         return None
     times = [mark.time_s for mark in event_marks if mark.name != "departure"] or [event_marks[0].time_s]

@@ -55,7 +55,7 @@ def alarm_evidence(
     block = diagnosis.statistical_filters[b]
     hypothesis, slot = block.hypotheses[h], int(np.argmax(block.hypothesis_tests_by_onset.score[h]))
     first = next((r for r in range(k, tape.first, -1) if restarting_slot(r - tape.since) == slot), None)
-    if first is None or k - first > MAX_WRITTEN_FRAMES:
+    if first is None or k - first >= MAX_WRITTEN_FRAMES:
         return None
     score = hypothesis.score_in_std / diagnosis.statistical_alarm_level
     ratio = _likelihood_ratio(tape, history, (b, h, slot), range(first, k + 1))

@@ -6,9 +6,10 @@
 Exit status 0 if every statement holds, 1 if not. `beaver-ftc check RUN` runs this same file. It imports
 NumPy, the reader of the log's file, the reader of the scenario's file (PyYAML) and the standard library.
 
-The flight's log and its scenario are taken as true; no number of the certificate is. A statement is accepted
-if the log's own column shows the event in the row that the statement names, and if the inequality, computed
-again from the log and from the bounds that the scenario declares, is violated as stated.
+The flight's log and its scenario are taken as true. Numbers of the certificate that are in neither are only
+tested as Table 2 of docs/explanation/certificates.md says. A statement is accepted if the log's own column
+shows the event in the row that the statement names, and if the inequality, computed again from the log and
+from the bounds that the scenario declares, is violated as stated.
 """
 
 import sys
@@ -711,7 +712,10 @@ def offset_pairs(said, course, frames):
     lower - u  >  upper - u_upper,    lower  >  low stop,    high stop  >  upper
     """
     stops, travel = said["stops"], course.travel
-    require(len(stops) == 2 and stops[0] >= travel[0] - 1e-12 and stops[1] <= travel[1] + 1e-12, "stops")
+    require(
+        len(stops) == 2 and stops[0] >= travel[0] - 1e-12 and stops[1] <= travel[1] + 1e-12,
+        "stops: beyond the travel in the log",
+    )
     lower, upper = course.lower[0], course.upper
     return [(lower - course.command[0], upper - course.upper_command), (lower, stops[0]), (stops[1], upper)]
 
@@ -776,8 +780,9 @@ COMPARISONS = {
 def position_bound(bound, place, k, frames, effect):
     """The bound on theta that frame k gives, the command -h/Z, and the sign by which theta is turned.
 
-    |nu.d - h - theta Z| <= most.|d| + r bounds the position theta from below where Z > 0, from above where
-    Z < 0. Downwards is upwards with every sign of theta turned: the stated Z has the turned sign.
+    |nu.d - h - theta Z| <= eta_bar'.|d| + r, eta_bar' the bound on the innovation, bounds the position theta
+    from below where Z > 0, from above where Z < 0. Downwards is upwards with every sign of theta turned: the
+    stated Z has the turned sign.
     """
     require(k < len(frames.rates_rad_s) and frames.is_unexplained[k], "health explains a frame")
     d = np.array(bound["d"])

@@ -64,6 +64,8 @@ def _flowables(title: str, parts: Sequence[Part], width: float) -> Iterator[Any]
             yield KeepTogether([made]) if len(part.rows) < MOST_TOGETHER else made
         elif isinstance(part, str):
             yield _text(part, 8.5)
+        else:
+            raise TypeError(f"no PDF of {type(part).__name__}")
 
 
 def _text(
@@ -106,7 +108,8 @@ def _cell(cell: str, size: float, table: Table) -> Any:
 
 
 def _widths(table: Table, width: float) -> list[float]:
-    """Widths of the columns, points, in proportion to the longest cell of each, at most 40 letters."""
+    """Widths of the columns, points, in proportion to the longest cell of each, at most 40 letters, and of a
+    head MOST_OF_HEAD. Of two columns the first is narrow."""
     columns = list(zip(table.head, *table.rows, strict=True))
     if len(columns) == 2:
         return [0.17 * width, 0.83 * width]

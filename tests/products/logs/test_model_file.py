@@ -79,6 +79,7 @@ WRONG = [
     ("fitted.rates", [[-1, 2]], "fitted.rates"), ("fitted.airspeed", [1.0], "fitted.airspeed"),
     ("fitted.tied", [0.1], "fitted.tied"),
     ("fitted.gain_sd", [0.1, -0.4], "fitted.gain_sd[1]"), ("fitted.commands", [[1.0]], "fitted.commands"),
+    ("fitted.commands", [[0.0, 1.0]], "fitted.commands"),
     ("settings", {"level_step": 1e-9}, "settings.level_step"),
     ("settings", {"levels": {"tail": [0.5]}}, "settings.levels.tail"),
     ("settings", {"levels": {"left": [1.5]}}, "settings.levels.left[0]"),

@@ -27,3 +27,10 @@ def test_the_time_of_a_frame_is_that_of_the_frames_that_were_flown(monkeypatch):
     (result,) = trial.fly_case(case, [trial.Entry("none", "nominal")], trade_off=False).results
     assert result.departed
     assert result.us > 1e6 / (60.0 * case.scenario.rate_hz)
+
+
+def test_an_option_of_the_scenario_counts_for_its_own_scheme_alone():
+    flight = scenario(fdi={"scheme": "augmented-ekf", "options": {"alarm": 5.0}})
+    chosen = {"exact": {"detectors": {"augmented-ekf": {"alarm": 3.0}, "augmented-ukf": {"alarm": 2.0}}}}
+    both = (trial.with_entry(flight, trial.Entry(f"augmented-{k}kf", trial.LAW), chosen) for k in "eu")
+    assert [each.fdi.options["alarm"] for each in both] == [5.0, 2.0]

@@ -63,7 +63,7 @@ def test_certain_is_the_largest_size_of_all():
     ("size", "low", "high", "narrow"),
     [
         (40.0, 37.5, 43.4, True), (40.0, 37.5, 43.6, False), (8.0, 7.0, 8.9, True), (8.0, 6.9, 9.1, False),
-        (95.0, 88.0, inf, False), (inf, inf, inf, True),
+        (95.0, 88.0, inf, False), (inf, inf, inf, True), (inf, 46.0, inf, False),
     ],
 )  # fmt: skip
 def test_an_interval_is_narrow_beside_its_size_or_by_itself(size, low, high, narrow):

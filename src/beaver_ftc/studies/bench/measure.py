@@ -35,8 +35,8 @@ from beaver_ftc.studies.engine.processes import cores, environment
 
 SCENARIO = "elevator-partial-loss"
 BEFORE_ALARM_S, AFTER_ALARM_S = 1.0, 14.0  # the fault strikes at 12 s
-FRAMES = 1000  # a block: 6 ms, short against changes of its pace, long against the clock
-LONG_FLIGHT_S = 330.0  # two row groups of the log file
+FRAMES = 1000  # a block: 6 ms, short against changes of the pace of the machine, long against the clock
+LONG_FLIGHT_S = 330.0  # three row groups of the log file
 
 Say = Callable[[str], None]
 
@@ -140,7 +140,7 @@ def _whole_flights(scenario: Scenario, rounds: int) -> Document:
 
 @dataclass(frozen=True)
 class WholeFlight:
-    """`fly`, with the log in memory or, given a file, on disk."""
+    """`fly`, without a log or, given a file, with the log on disk."""
 
     scenario: Scenario
     log: Path | None = None
@@ -158,14 +158,15 @@ class WholeFlight:
 class Bench(StudyCommand):
     """Time the closed loop against the bare aircraft.
 
-    The command times the loop and the bare aircraft in turn. It also times each part of the loop: it leaves
-    the part out and measures the difference. In the first run, the code of a frame is compiled again for each
-    part. This compilation takes about two minutes.
+    The command times the loop and the bare aircraft in turn. It also times the parts of the loop: it switches
+    them on one after another and measures what each adds. In the first run, the code of a frame is compiled
+    again for each part. This compilation takes about two minutes.
 
     Examples:
       beaver-ftc bench --no-parts
 
-    rounds: Number of repetitions of each measurement.
+    rounds: Number of repetitions of each measurement of the loop. The alternatives take a sixth of them, and
+      whole flights a tenth, at least 3.
     no_parts: Time only the whole loop, not its parts.
     """
 

@@ -12,6 +12,7 @@ diagnoses.
 
 from collections.abc import Iterator
 from itertools import takewhile
+from math import ceil
 
 import numpy as np
 
@@ -59,7 +60,8 @@ def in_trim(scenario: Scenario) -> Scenario:
         if sensor is not None
     }
     return scenario.with_({
-        "duration_s": DURATION_S, "faults": [], "expect": {}, "reference": {}, "environment": {},
+        "duration_s": DURATION_S, "faults": [], "changes": [], "expect": {}, "reference": {},
+        "environment": {},
         "sensors": {name: lags for name, lags in sensors.items() if lags},
         "fdi.scheme": "none", "fdi.options": {}, "fdi.statistical": None,
     })  # fmt: skip
@@ -81,11 +83,12 @@ def _positions(scenario: Scenario) -> dict[str, np.ndarray]:
 
 
 def _margins(still: np.ndarray, moved: np.ndarray, omega: np.ndarray, dt: float) -> tuple[float, ...]:
-    """Gain margins up and down, dB, and phase margin, deg; zero of a loop that is unstable."""
+    """Gain margins up and down, dB, and phase margin, deg; zero of a loop that is unstable, of a surface at a
+    stop, and where a flight has ended in a departure."""
     if len(still) != len(moved):
         return NO_MARGIN  # one of the flights has ended in a departure
     v, pulse = moved - still, np.zeros(len(still))
-    pulse[round(PULSE_AT_S / dt)] = np.radians(PULSE_DEG)
+    pulse[ceil(PULSE_AT_S / dt - 1e-9)] = np.radians(PULSE_DEG)
     at_a_stop = not v.any()  # there is no loop
     if at_a_stop or not np.abs(v[-len(v) // 5 :]).max() < DECAYED * np.radians(PULSE_DEG):
         return NO_MARGIN

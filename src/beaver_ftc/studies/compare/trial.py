@@ -141,26 +141,25 @@ def with_entry(scenario: Scenario, entry: Entry, chosen: TunedValuesByGrade | No
     scheme or law that it names counts for that one alone, and before what was chosen.
     """
     scheme = SCHEME if entry.scheme == STATISTICAL else entry.scheme
-    kept = scenario.fdi.options if scheme == scenario.fdi.scheme else {}
-    fdi = scenario.fdi.with_scheme(scheme, dict(kept))
+    of_scheme = scenario.fdi.options if scheme == scenario.fdi.scheme else {}
+    fdi = scenario.fdi.with_scheme(scheme, dict(of_scheme))
     if entry.scheme == STATISTICAL and fdi.statistical is None:
         fdi = fdi.model_copy(update={"statistical": Statistical()})
-    kept = scenario.control.options if entry.law == scenario.control.law else {}
-    control = scenario.control.model_copy(update={"law": entry.law, "options": kept})
-    flown, of = scenario.model_copy(update={"fdi": fdi, "control": control}), grade_of(scenario)
-    for group, name in ((DETECTORS, entry.scheme), (LAWS, entry.law)):
-        values = tuned_values(chosen or {}, of, group, name)
-        flown = with_values(flown, group, {k: v for k, v in values.items() if not _says(scenario, k, group)})
+    of_law = scenario.control.options if entry.law == scenario.control.law else {}
+    control = scenario.control.model_copy(update={"law": entry.law, "options": of_law})
+    flown, grade = scenario.model_copy(update={"fdi": fdi, "control": control}), grade_of(scenario)
+    for group, name, options in ((DETECTORS, entry.scheme, of_scheme), (LAWS, entry.law, of_law)):
+        values = tuned_values(chosen or {}, grade, group, name)
+        free = {k: v for k, v in values.items() if k not in options and not _says(scenario, k, group)}
+        flown = with_values(flown, group, free)
     return flown
 
 
 def _says(scenario: Scenario, key: str, group: str) -> bool:
-    """Whether the scenario itself sets a parameter."""
+    """Whether the scenario itself sets a parameter that is a key with dots."""
     name = "fdi" if group == DETECTORS else "control"
-    section, (of, _, option) = getattr(scenario, name), key.partition(".")
-    if option:
-        return of == name and option.split(".")[0] in section.model_fields_set
-    return key in section.options
+    of, _, below = key.partition(".")
+    return of == name and below.split(".")[0] in getattr(scenario, name).model_fields_set
 
 
 def with_values(scenario: Scenario, group: str, values: Mapping[str, float]) -> Scenario:
@@ -226,19 +225,20 @@ def result_of(flight: Landing, entry: Entry, us: float) -> Result:
     found = measure(flight)
     fault, isolation, tracking = found.fault, found.isolation, found.tracking
     end_s, departed = flight.frames / flight.scenario.rate_hz, found.departure is not None
+    faulted = fault is not None and strikes_within(fault.at_s, end_s)
     before, after = _size(tracking.pre_fault_rms_deg_s), _size(tracking.post_fault_rms_deg_s)
     whole = before if tracking.post_fault_rms_deg_s is None else after
     return Result(
         entry=entry,
         false_alarm=found.false_alarm,
         fault_free_s=found.fault_free_s,
-        faulted=fault is not None and strikes_within(fault.at_s, end_s),
+        faulted=faulted,
         delay_s=or_never(found.detection.delay_s),
         isolated=isolation.fault,
         correct=found.fault_named,
         isolation_delay_s=or_never(isolation.delay_s) if found.fault_named else inf,
         rms_deg_s=inf if departed else whole,
-        before_deg_s=inf if departed and fault is None else before,
+        before_deg_s=inf if departed and not faulted else before,
         after_deg_s=inf if departed else after,
         travel_deg_s=sum(tracking.surface_travel_deg.values()) / end_s,
         energy_deg2_s2=sum(tracking.surface_energy_deg2_s.values()) / end_s,

@@ -46,8 +46,8 @@ class Threshold:
     @property
     def is_narrow(self) -> bool:
         """Whether more flights are not worth it; a size beyond every loss cannot be told more exactly."""
-        if isinf(self.low):
-            return True
+        if isinf(self.size):
+            return isinf(self.low)
         return self.high - self.low <= max(RELATIVE_WIDTH * self.size, LEAST_WIDTH)
 
 

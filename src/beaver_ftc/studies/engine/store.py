@@ -51,7 +51,8 @@ def known(manifest: Path) -> Document | None:
         there = read_json(manifest)
     except (OSError, ValueError):
         return None
-    return there if isinstance(there, dict) else None
+    is_one = isinstance(there, dict) and all(isinstance(value, dict) for value in there.values())
+    return there if is_one else None
 
 
 def remove_leftovers(folder: Path) -> None:

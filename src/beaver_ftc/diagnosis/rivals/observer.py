@@ -7,11 +7,12 @@ The residual is that of the published detection estimator; only the threshold do
 From the alarm on, a residual started again is fitted by the filtered effect of each surface, by least squares
 over a fading window; the best fit names the fault, and a window after the alarm the name stands.
 
-What is declared of gyros and air has a known deviation behind that filter; the threshold is `alarm` times all
-of it together:
+What is declared of gyros, air and model has a known deviation behind that filter; the threshold is `alarm`
+times all of it together:
 
     gyro  n[k+1] - n[k], white      -> sigma^2 2 / (1 + a)
     air   first order, r = exp(-dt / tau) -> dt^2 sigma^2 (1 + a r) / ((1 - a^2) (1 - a r))
+    model constant or slow          -> dt^2 (bound^2 + sigma^2) / (1 - a)^2
 """
 
 from collections.abc import Mapping
@@ -81,6 +82,8 @@ class ConstantThresholdObserver(RivalDetector):
         the threshold in the mean."""
         if measured.t_s > self.alarm_s + self.options["window_s"]:
             return self.verdict
+        if not self.filtered[:, 1:].any():  # in the frame of the alarm the residual starts again
+            return Verdict(True, "pqr"[self.alarm_axis])
         scaled = self.filtered[:, 1:] / self.threshold[:, None]
         self.sums = self.fade * self.sums + scaled.T @ scaled
         self.weight = self.fade * self.weight + 1.0

@@ -20,11 +20,12 @@ fault of the surface. Both together are `fdi.fault_class: all`; types/ decides w
 
 Set membership: the parameters theta of a fault that are consistent with the innovation nu on axis i,
 
-    |nu_i - h_i - theta Z_i| <= eta_bar_i
+    |nu_i - h_i - theta Z_i| <= nu_max_i + r_i
 
-nu, h, Z and eta_bar are in rad/s2 (Z per unit of theta). One surface has one parameter, so one theta must
+nu, h, Z, nu_max and r are in rad/s2 (Z per unit of theta). One surface has one parameter, so one theta must
 be consistent on all axes. For a parameter that may change in any way, no test frame by frame is sharper. For
-a constant parameter (`fdi.fault_profile: abrupt`) the sets of all frames since the alarm are intersected.
+a constant loss (`fdi.fault_profile: abrupt`) the sets of all frames since the alarm are intersected, unless a
+second fault may begin later (`fdi.pairs`).
 
 Likelihood ratios exclude a loss of the published class, or confirm it. A confirmed loss is never excluded by
 likelihood. A loss that only the end of an undetected earlier loss could explain is weakly excluded: it is not
@@ -272,7 +273,8 @@ def configure_isolation(
         iso["config"], n_estimators=len(rows), mu_kind=_THRESHOLD_KINDS[config.thresholds],
         forget=exp(-dt / config.forgetting_time_s), a=exp(-config.isolation_pole_per_s * dt),
         reach=config.sharpen.memory, shared=config.sharpen.shared_effectiveness,
-        narrows=config.sharpen.set_membership, hold_s=DAMAGE_HOLD_OFF_S if aircraft.damage else 0.0,
+        narrows=config.sharpen.set_membership and not config.pairs,
+        hold_s=DAMAGE_HOLD_OFF_S if aircraft.damage else 0.0,
         losable=[name in losable for name in aircraft.surfaces],
     )  # fmt: skip
     ends = np.array([np.minimum(travel[0], 0.0), np.maximum(travel[1], 0.0)])  # a share of it can be left

@@ -70,7 +70,7 @@ def varying_loss_set(c, srf, h, k):
 
 
 def theta_of_loss(fdi: np.void, s: int, h: int) -> float | None:
-    """theta; with a second fault present the estimator, which fits all axes of its surface, is not used."""
+    """theta; where pairs are diagnosed, of its set: the estimator fits axes that a second fault may move."""
     return middle_estimate(fdi, s, h) - 1.0 if fdi["types"]["pair"]["enabled"] else theta_fitted(fdi, s, h)
 
 
@@ -81,7 +81,7 @@ def theta_fitted(fdi: np.void, s: int, h: int) -> float:
 
 
 def theta_of_set(fdi: np.void, s: int, h: int) -> tuple[float, float] | None:
-    """Return the interval of theta, or None."""
+    """Return the interval of theta."""
     lo, hi = feasible_set(fdi, s, h)
     return lo - 1.0, hi - 1.0
 
@@ -264,6 +264,7 @@ MIN_HALF_CYCLES = 3  # two whole ones, and the first, which is cut off at its be
 def reset_swing(srf, h):
     """No half-cycle has been seen."""
     srf.oscillatory.n_half = srf.oscillatory.sign = 0
+    srf.oscillatory.square = srf.oscillatory.square_past = 0.0
 
 
 @kernel
@@ -351,7 +352,7 @@ def reset_creep(srf, h):
 def update_creep(c, srf, h, k):
     """It never moves away from its command, so while it stands on one side it comes nearer.
 
-    Of several JSBSim frames in one of ours the first is the old command's.
+    Of several JSBSim steps in a frame the first is the old command's.
     """
     seen, M, side, away = srf.judged, srf.rate_limit, side_of_commands(c, srf), False
     if side == 0 or side != M.side or k != M.k_last + 1:
@@ -369,8 +370,8 @@ def update_creep(c, srf, h, k):
 def narrow_creep(c, srf, M, side):
     """Move the bound on the surface by what the slowest one comes nearer to its command in the judged frame.
 
-        above its command (side 1)    hi <- max(hi - d, u_hi + near),    d = slow_step instants
-        below it (side -1)            lo <- min(lo + d, u_lo - near)
+        above its command (side 1)    hi <- min(hi, max(hi - d, u_hi + near)),    d = slow_step instants
+        below it (side -1)            lo <- max(lo, min(lo + d, u_lo - near))
 
     u_lo, u_hi: orders of the frame, rad; slow_step: the least step an instant; nearer to the order than
     `near` the lag makes the steps smaller. Where it was at an instant bounds where it is a frame later.

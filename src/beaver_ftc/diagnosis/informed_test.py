@@ -134,15 +134,18 @@ def detection_probability(d: float, interval_s: float, alarms_per_h: float) -> f
 
 
 def healthy_positions(context: Context, columns: FlightColumns, surface: str) -> np.ndarray:
-    """The positions of a healthy surface under the commands of a flight, (frames,) rad."""
+    """Positions of a healthy surface, without a dead band, under the commands of a flight, (frames,) rad."""
     s, commands = context.surfaces.index(surface), columns[f"{surface}_cmd_rad"]
     bandwidth = context.declared.bandwidth_rad_s[s]
     rate = context.declared.rate_limit_rad_s[s]
-    a = 1.0 - np.exp(-bandwidth * context.dt_s) if bandwidth else 1.0
-    step = rate * context.dt_s if rate else np.inf
+    h = context.dt_s / context.substeps
+    a = 1.0 - np.exp(-bandwidth * h) if bandwidth else 1.0
+    step = rate * h if rate else np.inf
     u, positions = columns[f"{surface}_effective_rad"][0], np.empty_like(commands)
     for k, command in enumerate(np.clip(commands, *context.travel_rad[:, s])):
-        u = positions[k] = plain(nearer)(u, command, a, step)
+        for _ in range(context.substeps):
+            u = plain(nearer)(u, command, a, step)
+        positions[k] = u
     return positions
 
 

@@ -36,8 +36,8 @@ class DeclaredErrors:
     - `coefficients`: absolute tolerance of each moment coefficient, in the order of `Aircraft.moments`.
     - `inertia`: relative tolerance of the moments of inertia: 0.05 is 5 %.
     - `deflection_rad`: largest difference between a surface and its actuator, rad.
-    - `model_rad_s2` (3,): standard deviation of the model error in trim, rad/s². The model error includes all
-      errors above, except those of the gyros and of the air.
+    - `model_rad_s2` (3,): standard deviation of the model error in trim, rad/s², from the errors of angle of
+      attack, sideslip, airspeed and dynamic pressure, of coefficients and of deflections.
     - `bandwidth_rad_s`, `rate_limit_rad_s` (surfaces,): bandwidth, rad/s, and rate limit, rad/s, of the
       actuators; 0 if the actuator is ideal.
     - `bandwidth_error`, `rate_limit_error` (surfaces,): their relative tolerances.

@@ -56,7 +56,7 @@ def layout_dtype(n: int) -> np.dtype:
 # Configuration that several stages read. enabled: a compiled scheme diagnoses; scheme_number: of that scheme;
 # authority, exclusion_authority: the detector whose alarms, and whose exclusions count, EITHER_DETECTOR,
 # WORST_CASE_DETECTOR or STATISTICAL_DETECTOR; diagnoses_all_types: faults of every type;
-# abrupt: a fault is declared to stay as it is; n_substeps: JSBSim frames in a frame; dt s.
+# abrupt: a fault is declared to stay as it is; n_substeps: JSBSim steps in a frame; dt s.
 SHARED_CONFIG_RECORD = record(
     enabled=int, scheme_number=int, exclusion_authority=int, authority=int, diagnoses_all_types=int,
     abrupt=int, n_substeps=int, dt=float,

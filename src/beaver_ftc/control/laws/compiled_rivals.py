@@ -93,7 +93,7 @@ def increment(law, reference, main, prediction, x, axes, u):
 
 @kernel
 def smooth(filtered, i, value, keep):
-    """Two equal poles, exact for an input held over the frame; filtered (2, 3), in place."""
+    """Two equal filters in series, each holds its input over the frame; filtered (2, 3), in place."""
     filtered[0, i] = keep * filtered[0, i] + (1.0 - keep) * value
     filtered[1, i] = keep * filtered[1, i] + (1.0 - keep) * filtered[0, i]
     return filtered[1, i]

@@ -25,7 +25,7 @@ from beaver_ftc.diagnosis import Measured, Verdict
 
 
 class LowPass:
-    """Second-order low-pass filter with two equal poles, exact for an input held over the frame."""
+    """Two equal low-pass filters of first order in series, each of which holds its input over the frame."""
 
     def __init__(self, pole_per_s: float, dt_s: float, start: np.ndarray) -> None:
         self._keep = exp(-pole_per_s * dt_s)

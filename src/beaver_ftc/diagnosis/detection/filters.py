@@ -8,7 +8,7 @@ eps[k] + dt eta[k], and its bound obeys the same with eta_bar in place of eta. T
 therefore hold at any frame rate, without an allowance for discretisation.
 
 Every filter has the exact bound of its own pole, so the alarm is the first of theirs without further false
-alarms. A pole far above the frame rate (`DEADBEAT_PER_S`) tests the innovation itself, |nu| > eta_bar; for a
+alarms. A pole far above the frame rate (`DEADBEAT_PER_S`) tests the innovation itself, |nu| > nu_max; for a
 bound that holds instant by instant no filter, window or sum of innovations can alarm earlier (detection.md,
 "The guarantees"). Slower poles detect more if errors are correlated over frames, as measurement errors are.
 The reach of a fault is its possible effect on the filters since the start of the flight.
@@ -44,7 +44,7 @@ POLE_DELAYS_S = (0.1, 0.5, 2.0)  # within which a pole of the bank finds the sma
 
 @kernel
 def leak(x, a, v):
-    """x <- a x + v: filters of poles a (m,); x (m,)."""
+    """x <- a x + v: filters that keep shares a (m,) of x (m,) in a frame."""
     for m in range(a.size):
         x[m] = a[m] * x[m] + v
 
@@ -94,8 +94,9 @@ BANK_RECORD = record(
 def poles_for_delays(errors: SensorErrors, eta: float) -> tuple[float, ...]:
     """Poles (1/s) that find the smallest constant fault phi within each of POLE_DELAYS_S, despite gyro noise.
 
-    After T the residual is phi (1 - exp(-lam T)) / lam, its bound at most eta / lam + 2 nbar. The excess of
-    one over the other is greatest at lam = ln(phi T / (2 nbar)) / T; the smallest phi with any follows.
+    After T the residual is phi (1 - exp(-lam T)) / lam, its bound at most eta / lam + 2 nbar. lam times the
+    excess of one over the other is greatest at lam = ln(phi T / (2 nbar)) / T; the smallest phi with any
+    follows.
     """
     n2 = 2 * NOISE_LIMIT_SIGMA * float(errors.each("noise", AXES).max())
     return tuple(_pole_for_delay(T, n2, eta) for T in POLE_DELAYS_S) if n2 > 0 else ()

@@ -38,9 +38,10 @@ YAW_PLANE = (YAW, SIDE_FORCE)
 class ParityDirection(NamedTuple):
     """A parity direction as it is set up.
 
-    nulled: the surface to whose column it is orthogonal, or VANE_VIEW, or AXIS_VIEW; m_0: at the start of the
-    flight; tested_losses: indices of surfaces; by_inertia: the force is that at the flow angle from inertial
-    motion.
+    nulled: the surface to whose column it is orthogonal, VANE_VIEW + the index of a force, or AXIS_VIEW; m_0:
+    ones on the rates and forces that it sees, which `turn_view` replaces in flight unless it is an axis;
+    plane_pair: the two rows that it combines; tested_losses: indices of surfaces; by_inertia: the force is
+    that at the flow angle from inertial motion.
     """
 
     nulled: int
@@ -59,26 +60,26 @@ def list_directions(aircraft: Aircraft, with_forces: bool = False) -> Iterator[P
     """
     pitch = [s for s, axis in enumerate(aircraft.dominant_axis) if axis == PITCH]
     lateral = [s for s, axis in enumerate(aircraft.dominant_axis) if axis != PITCH]
-    yield ParityDirection(AXIS_VIEW, _unit_sum((PITCH,)), PITCH_PLANE, pitch, uses_vane_gust=True)
-    yield ParityDirection(AXIS_VIEW, _unit_sum((ROLL,)), ROLL_YAW_PLANE, lateral)
-    yield ParityDirection(AXIS_VIEW, _unit_sum((YAW,)), ROLL_YAW_PLANE, lateral, uses_vane_gust=True)
+    yield ParityDirection(AXIS_VIEW, _ones_at((PITCH,)), PITCH_PLANE, pitch, uses_vane_gust=True)
+    yield ParityDirection(AXIS_VIEW, _ones_at((ROLL,)), ROLL_YAW_PLANE, lateral)
+    yield ParityDirection(AXIS_VIEW, _ones_at((YAW,)), ROLL_YAW_PLANE, lateral, uses_vane_gust=True)
     for s in lateral:
         rolls = aircraft.dominant_axis[s] == ROLL
         others = [other for other in lateral if other != s]
-        yield ParityDirection(s, _unit_sum((ROLL,)), ROLL_YAW_PLANE, others, uses_vane_gust=rolls)
+        yield ParityDirection(s, _ones_at((ROLL,)), ROLL_YAW_PLANE, others, uses_vane_gust=rolls)
     if not with_forces:
         return
     for i, plane, tested in ((NORMAL_INDEX, PITCH_PLANE, pitch), (SIDE_INDEX, YAW_PLANE, lateral)):
         separable = aircraft.separated_by_force(FORCE_NAMES[i])
         for s in separable:
             pair = aircraft.dominant_axis[s], plane[1]
-            yield ParityDirection(s, _unit_sum(pair), pair, [other for other in tested if other != s])
+            yield ParityDirection(s, _ones_at(pair), pair, [other for other in tested if other != s])
         if separable:
-            yield ParityDirection(VANE_VIEW + i, _unit_sum(plane), plane, tested)
-            yield ParityDirection(AXIS_VIEW, _unit_sum(plane[1:]), plane, tested, by_inertia=True)
+            yield ParityDirection(VANE_VIEW + i, _ones_at(plane), plane, tested)
+            yield ParityDirection(AXIS_VIEW, _ones_at(plane[1:]), plane, tested, by_inertia=True)
 
 
-def _unit_sum(ones: tuple[int, ...]) -> tuple[float, ...]:
+def _ones_at(ones: tuple[int, ...]) -> tuple[float, ...]:
     return tuple(float(i in ones) for i in range(NORMAL_FORCE + 1))
 
 

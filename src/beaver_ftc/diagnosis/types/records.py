@@ -15,7 +15,7 @@ from beaver_ftc.diagnosis.types import OBSERVATION_RECORD
 from beaver_ftc.diagnosis.types.registry import N_TYPES, TYPES
 from beaver_ftc.scenario.declared import Declared
 
-# Of frames examined together where gyros are noisy: much less than the slowest half-cycle, 3.1 s.
+# Of frames examined together where gyros are noisy: much less than the slowest half-cycle, by default 3.1 s.
 BLOCK_DURATION_S = 0.2
 MAX_BLOCK = 256  # frames of a block
 N_KEPT = 3  # frames, or blocks, of which the orders are kept: the elapsed one and two before it
@@ -29,8 +29,8 @@ COMMANDS_RECORD = record(
     G_min=float, G_max=float,
 )  # fmt: skip
 
-# Configuration: the actuator of one surface, rad. It acts where it can reach: a part of its travel is nearer
-# to zero.
+# Configuration: the actuator of one surface; rad. runaway: rad/s; approaches: shares of the way in a JSBSim
+# step; uncertain: 0 or 1. It acts where it can reach: a part of its travel is nearer to zero.
 ACTUATOR_CONFIG_RECORD = record(
     stop_lo=float, stop_hi=float, reach_lo=float, reach_hi=float, runaway=float,
     approaches=2, steps=2, band=float, uncertain=int,

@@ -73,8 +73,8 @@ def exclusion_by_alarm(tape: Tape, e: int, alarm: Document) -> Document:
     """The evidence that the statistical alarm came on axes that the fault of estimator e does not move; the
     reason why there is none, if it moves one of them."""
     if "likelihood" in alarm:
-        here = slice(alarm["first"] - 1 - tape.first, alarm["frame"] + 1 - tape.first)
-        moved = (values[here, e][:, alarm["axes"]] for values in (tape.slope, tape.offset, tape.spread))
+        span = slice(alarm["first"] - 1 - tape.first, alarm["frame"] + 1 - tape.first)
+        moved = (values[span, e][:, alarm["axes"]] for values in (tape.slope, tape.offset, tape.spread))
         if not any(values.any() for values in moved):
             return {"as": "alarm"}
     return {"because": EXCLUSION_NOT_STATED}
@@ -108,9 +108,13 @@ def _largest_score(blocks: Sequence[StatisticalBlock]) -> tuple[int, int]:
 class LikelihoodRatio:
     """A test of n axes from its onset on: the fields of its statement, and the innovation (frames, n) rad/s2.
 
-    Y (2 n, 2 + m): innovation, signature and m constants through the filter before the first frame.
-    tolerance (m,): of the constants. P (2 n, 2 n), R (n,): variances before the first frame, and of gyros.
-    series: the filter's inputs by name, (frames, ...).
+    Y (2 n, 2 + m): states of the filter before the first frame: a row for the rate error of each axis, rad/s,
+    then one for minus the drift of each axis, rad/s2; a column for the innovation, for the signature, and for
+    each of m constants. tolerance (m,): largest magnitude of each constant. P (2 n, 2 n): covariance of the
+    states before the first frame. R (n,): variance of a reading of each gyro, (rad/s)2. series: the filter's
+    inputs in each frame, (frames, ...), under the names and in the units of the fields of a frame
+    (docs/explanation/certificate-fields.csv). level: the alarm level, standard deviations. sense: "less" if
+    only a negative correlation supports the fault, else "either". first: row of the first frame. dt, s.
     """
 
     level: float
@@ -139,33 +143,35 @@ class LikelihoodRatio:
     def without_negligible(self) -> "LikelihoodRatio":
         """The same ratio without the numbers that change evidence and limit by no more than a negligible
         share."""
-        said = self
+        short = self
         for name in ("bounded", "pace", "foreseen"):
-            without = replace(said, series={key: of for key, of in said.series.items() if key != name})
-            said = without if said._is_as(without) else said
+            without = replace(short, series={key: of for key, of in short.series.items() if key != name})
+            short = without if short._is_as(without) else short
         alone = np.diag(self.tolerance)
         matters = [
             j for j, one in enumerate(alone) if not self._is_as(replace(self, tolerance=self.tolerance - one))
         ]
         if len(matters) > MAX_WRITTEN_CONSTANTS:
-            said, matters = said._with_constants_merged(), [0]
-        Y, series = said.Y[:, [0, 1, *(2 + j for j in matters)]], said.series
+            short, matters = short._with_constants_merged(), [0]
+        Y, series = short.Y[:, [0, 1, *(2 + j for j in matters)]], short.series
         if "known" in series:
             series = series | {"known": series["known"][:, matters]}
-        said = replace(said, tolerance=said.tolerance[matters], Y=Y, series=series)
-        said = replace(said, Y=said._without_negligible_numbers("Y"))
-        return replace(said, P=said._without_negligible_numbers("P"), R=said._without_negligible_numbers("R"))
+        short = replace(short, tolerance=short.tolerance[matters], Y=Y, series=series)
+        short = replace(short, Y=short._without_negligible_numbers("Y"))
+        return replace(
+            short, P=short._without_negligible_numbers("P"), R=short._without_negligible_numbers("R")
+        )
 
     def _without_negligible_numbers(self, name: str) -> np.ndarray:
         """R, Y or P, with zero for each negligible number; in P, which is symmetric, for both of a pair."""
         values = getattr(self, name)
-        kept = values.copy()
+        kept = values.copy()  # self keeps its numbers: each change is compared with it
         for place in np.ndindex(values.shape):
-            left = values.copy()
-            left[place] = 0.0
+            without_one = values.copy()
+            without_one[place] = 0.0
             if name == "P":
-                left[place[::-1]] = 0.0
-            if self._is_as(replace(self, **{name: left})):
+                without_one[place[::-1]] = 0.0
+            if self._is_as(replace(self, **{name: without_one})):
                 kept[place] = 0.0
         return kept
 
@@ -177,35 +183,40 @@ class LikelihoodRatio:
     def _with_constants_merged(self) -> "LikelihoodRatio":
         """The same ratio with one constant instead of many. The sums are linear in the constants, so that all
         of them at their worst act as one."""
+        # Copies are in C order: the last digits of a product depend on the order in memory.
         worst = self.tolerance * np.sign(self.sums()[0][2:])
         Y = np.column_stack([self.Y[:, :2], [worst @ row for row in self.Y[:, 2:].copy()]])
         known = np.array([[worst @ of_frame] for of_frame in self.series["known"].copy()])
         return replace(self, tolerance=np.ones(1), Y=Y, series=self.series | {"known": known})
 
     def sums(self) -> tuple[np.ndarray, float, float]:
-        """The sums over the frames of w.g for each column of Y, (2 + m,); the sum of w.foreseen; and the room
-        that a bounded uncertainty needs: the smaller one of its swings and of its rate of change."""
-        its, n = self.series, len(self.axes)
+        """The sums over the frames of w.g for each column of Y, (2 + m,); N_f, the sum of w.foreseen; and the
+        room: the most that a model error within its bound (`bounded`) can add to the first sum.
+
+        room = constant error + min(swings between the ends of the bound, changes at the rate `pace`)
+        """
+        series, n = self.series, len(self.axes)
         count, none = len(self.innovation), np.zeros_like(self.innovation)
-        inputs = [self.innovation - its.get("air", 0.0), its["signature"]]
-        inputs += [*np.moveaxis(its["known"], 1, 0)] if "known" in its else []
+        inputs = [self.innovation - series.get("air", 0.0), series["signature"]]
+        inputs += [*np.moveaxis(series["known"], 1, 0)] if "known" in series else []
         states = np.zeros((len(inputs), 4))
+        # Y has minus the drift, and no rows of a second axis if there is one axis
         states[:, :n], states[:, 2 : 2 + n] = self.Y[:n].T, -self.Y[n:].T
-        sums, room = np.zeros(len(inputs)), np.zeros(5)
-        of_axes = np.stack(inputs, axis=1), its["drift"], its["jitter"] / (self.dt * self.dt)
-        bounds = its.get("bounded", none), its.get("foreseen", none)
-        shares = its.get("keep", np.ones(count)), its.get("pace", np.full(count, NO_PACE))
+        sums, parts = np.zeros(len(inputs)), np.zeros(5)
+        of_axes = np.stack(inputs, axis=1), series["drift"], series["jitter"] / (self.dt * self.dt)
+        bounds = series.get("bounded", none), series.get("foreseen", none)
+        shares = series.get("keep", np.ones(count)), series.get("pace", np.full(count, NO_PACE))
         given = map(np.ascontiguousarray, (*of_axes, *bounds, *shares))
-        add_whitened_frames(new_filter_block(self.P, self.R), *given, states, sums, room, self.dt)
-        swings, changes, last, stays, calm = room.tolist()
-        return sums, calm, min(stays + swings + last, stays + changes)
+        add_whitened_frames(new_filter_block(self.P, self.R), *given, states, sums, parts, self.dt)
+        swings, changes, last, constant, N_f = parts.tolist()
+        return sums, N_f, min(constant + swings + last, constant + changes)
 
     @property
     def sides(self) -> tuple[float, float]:
         """Evidence, and the limit that it must exceed."""
-        (N, D, *constants), calm, room = self.sums()
+        (N, D, *constants), N_f, room = self.sums()
         root = self.level * sqrt(D) if D >= 0.0 else nan
-        evidence = -N - max(0.0, -calm) if self.sense == "less" else abs(N)
+        evidence = -N - max(0.0, -N_f) if self.sense == "less" else abs(N)
         evidence -= sum(tol * abs(total) for tol, total in zip(self.tolerance, constants, strict=True))
         return float(evidence), float(max(root, room + LEVEL_NOISE_SHARE * root))
 
@@ -217,57 +228,65 @@ def _null_for_zero(values: np.ndarray) -> list[float | None]:
 def _likelihood_ratio(
     tape: Tape, history: History, test: tuple[int, int, int], rows: range
 ) -> LikelihoodRatio:
-    """A test by block, hypothesis and onset's slot, with these frames."""
+    """The ratio of a test (numbers of its block, hypothesis and onset's slot) from its first row to its last.
+
+    recorded: quantities of the block at the end of the row before the first, then of each row. The states are
+    those of the row before the first. The detector prepares noise, decay, bound and rate of change of the
+    drift at the end of the row before (`previous`); it fills inputs and responses in the row itself
+    (`current`). moved: the places in the block of the axes that the fault moves.
+    """
     (b, h, slot), dt, diagnosis = test, history.dt, tape.alarm.diagnosis
-    block, here = diagnosis.statistical_filters[b], slice(rows[0] - 1 - tape.first, rows[-1] + 1 - tape.first)
-    of = {name: tape.filters[name][here, b] for name in (*RECORDED_BLOCK_FIELDS, "signature")}
-    then, now = ({name: values[part] for name, values in of.items()} for part in (np.s_[:-1], np.s_[1:]))
-    felt = _affected_axes(of, now["signature"][:, h], len(block.axis_indices))
-    n, states, axes = len(felt), [*felt, *(2 + i for i in felt)], [block.axis_indices[i] for i in felt]
+    block, span = diagnosis.statistical_filters[b], slice(rows[0] - 1 - tape.first, rows[-1] + 1 - tape.first)
+    recorded = {name: tape.filters[name][span, b] for name in (*RECORDED_BLOCK_FIELDS, "signature")}
+    previous, current = (
+        {name: values[part] for name, values in recorded.items()} for part in (np.s_[:-1], np.s_[1:])
+    )
+    moved = _affected_axes(recorded, current["signature"][:, h], len(block.axis_indices))
+    n, states, axes = len(moved), [*moved, *(2 + i for i in moved)], [block.axis_indices[i] for i in moved]
     known = [j for j in np.flatnonzero(block.regressor_coefficient_error_bound > 0.0).tolist()
-             if now["g_Z"][:, j][:, felt].any()]  # fmt: skip
-    drift = dt * then["Q_d"][np.ix_(range(len(rows)), felt, felt)]  # which is felt a frame later
-    drift[1:], drift[0] = drift[:-1].copy(), 0.0
-    before = then["x_Z"][:, known][..., states]
-    its = {
-        "signature": now["signature"][:, h][:, felt],
-        "jitter": dt * dt * then["Q_x"][:, felt],
-        "drift": drift, "bounded": tape.filters["bounded"][here][:-1][:, axes],
-        "pace": then["eta_rate"],
+             if current["g_Z"][:, j][:, moved].any()]  # fmt: skip
+    drift = dt * previous["Q_d"][np.ix_(range(len(rows)), moved, moved)]
+    # The detector adds Q_d after the decay of the drift, `add_whitened_frames` before it: a frame later.
+    drift[1:], drift[0] = drift[:-1], 0.0
+    x_Z = previous["x_Z"][:, known][..., states]
+    series = {
+        "signature": current["signature"][:, h][:, moved],
+        "jitter": dt * dt * previous["Q_x"][:, moved],
+        "drift": drift, "bounded": tape.filters["bounded"][span][:-1][:, axes],
+        "pace": previous["eta_rate"],
     }  # fmt: skip
     if block.drift_correlation_length_m > 0.0:
-        its["keep"] = then["a"]
-    if known:  # the inputs that gave this response
-        its["known"] = (now["g_Z"][:, known][..., felt] - before[..., :n]) / dt + before[..., n:]
+        series["keep"] = previous["a"]
+    if known:  # their filter's g = e + dt (v - d), x_Z = (e, d), solved for the input v
+        series["known"] = (current["g_Z"][:, known][..., moved] - x_Z[..., :n]) / dt + x_Z[..., n:]
     if diagnosis.gust.is_turbulence_declared:
-        its["air"] = tape.filters["air"][here][1:][:, axes]
-        leap = tape.filters["leap"][here][1:][np.ix_(range(len(rows)), axes, axes)]
-        drift += block.factor_on_gust_drift_intensity * leap
+        series["air"] = tape.filters["air"][span][1:][:, axes]
+        leap = tape.filters["leap"][span][1:][np.ix_(range(len(rows)), axes, axes)]
+        series["drift"] = drift + block.factor_on_gust_drift_intensity * leap  # the gust's axes turn
     tests = block.hypothesis_tests_by_onset
     sense = tests.supporting_correlation_sign[h, slot]
-    explained = {
+    predictable = {
         "p": tests.correlation_predictable_in_calm_air,
         "g_c": tests.correlation_from_coarse_gust,
     }
-    taken = [now[name] for name, values in explained.items() if sense * values[h, slot] > 0.0]
-    if taken:  # each of them where it speaks for the loss
-        its["foreseen"] = np.sum(taken, axis=0)[:, felt]
-    state = then["state"][0, states]
-    Y = np.array([state, np.zeros(2 * n), *before[0]]).T
-    xx, xd, dd = (of[name][0] for name in ("P_xx", "P_xd", "P_dd"))
+    supporting = [current[name] for name, values in predictable.items() if sense * values[h, slot] > 0.0]
+    if supporting:  # those parts of the innovation whose correlation supports the fault
+        series["foreseen"] = np.sum(supporting, axis=0)[:, moved]
+    Y = np.array([previous["state"][0, states], np.zeros(2 * n), *x_Z[0]]).T
+    xx, xd, dd = (recorded[name][0] for name in ("P_xx", "P_xd", "P_dd"))
     P = np.block([[xx, xd], [xd.T, dd]])[np.ix_(states, states)]
     innovation = history.innovation_rad_s2[rows[0] : rows[-1] + 1, axes]
     return LikelihoodRatio(
         level=diagnosis.statistical_alarm_level, axes=axes, sense="less" if sense else "either",
-        tolerance=block.regressor_coefficient_error_bound[known], R=of["R_y"][0, felt],
-        Y=np.vstack([Y[:n], -Y[n:]]), P=0.5 * (P + P.T),  # else rounding sets both sides apart
-        first=rows[0], series=its, innovation=innovation, dt=dt,
+        tolerance=block.regressor_coefficient_error_bound[known], R=recorded["R_y"][0, moved],
+        Y=np.vstack([Y[:n], -Y[n:]]), P=0.5 * (P + P.T),  # the checker refuses rounding
+        first=rows[0], series=series, innovation=innovation, dt=dt,
     )  # fmt: skip
 
 
-def _affected_axes(of: dict[str, np.ndarray], signature: np.ndarray, n: int) -> list[int]:
-    """The axes of a block of n that the fault moves; both where what is not known moves them together."""
-    together = n > 1 and any(of[name][..., 0, 1].any() for name in ("P_xx", "P_xd", "P_dd", "Q_d"))
+def _affected_axes(recorded: dict[str, np.ndarray], signature: np.ndarray, n: int) -> list[int]:
+    """Places of the axes of a block of n that the fault moves; both if their covariances are not zero."""
+    together = n > 1 and any(recorded[name][..., 0, 1].any() for name in ("P_xx", "P_xd", "P_dd", "Q_d"))
     return [i for i in range(n) if together or signature[:, i].any()]
 
 
@@ -278,8 +297,9 @@ def add_whitened_frames(blocks, inputs, drift, jitter, bounded, foreseen, keep, 
     `likelihood.accumulate_tests`.
 
     inputs (frames, columns, n); drift (frames, n, n); jitter, bounded, foreseen (frames, n): of n axes.
-    states (columns, 4): advanced in place. room (5,): what a bounded uncertainty can add as it swings, at its
-    pace, in the last frame, as it stays; and the sum of w.foreseen.
+    states (columns, 4): advanced in place. room (5,), filled: what a model error within its bound can add to
+    the sum of the innovation if it swings between the ends of the bound before the last frame, if it changes
+    at its pace, by the swing after the last frame, and if it is constant; and the sum of w.foreseen.
     """
     block, g, w = blocks[0], np.zeros((len(states), 2)), np.zeros(2)
     for k in range(len(inputs)):

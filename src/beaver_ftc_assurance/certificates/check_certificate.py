@@ -370,17 +370,23 @@ def check_declared(document, declared):
 
 
 class Frames:
-    """Innovation and bounds of each frame, arrays (frames, 3).
+    """Innovation nu and bounds of each frame k, arrays (frames, 3) of the axes p, q, r.
 
-    docs/explanation/detection.md derives them: "The innovation", "The bound on the model error", "Changing
+    nu[k] = (x[k] - x[k-1]) / dt - F[k]        without a fault |nu[k]| <= eta_bar[k] + (n[k] + n[k-1]) / dt
+
+    docs/explanation/detection.md derives both: "The innovation", "The bound on the model error", "Changing
     error of a gyro".
 
-    rates: measured. model: acceleration by the design model. eta_bar: bound on the model's error;
-    stated_bound: the part of it that c, b, g and the Earth's rate explain. gyro_change: bound on the changing
-    error of the gyros. innovation_bound: on the innovation without a fault. is_unexplained (frames,): health
-    does not explain the frame; late_frames: 1 if a frame has several instants, and so may show a fault that
-    has begun within it. A block of L rows counts as one frame of several instants: rates and gyro_change of
-    its last row, all else the mean.
+    rates_rad_s: x, measured. model_rad_s2: F, the acceleration by the design model. eta_bar_rad_s2: bound on
+    the error of F, from the log; stated_bound_rad_s2: the part of eta_bar that c, b, g and the Earth's rate
+    explain. gyro_change_rad_s: n, bound on the changing error of the gyros. innovation_bound_rad_s2: the
+    right side. late_frames: 1 if a frame has several instants, so that a fault may begin within it, else 0.
+    is_unexplained (frames,): health does not explain the frame, nor its late_frames neighbours on each side:
+    nu exceeds its bound on an axis, and eta_bar is below the stated bound on none.
+
+    A block (length, first row, row after the last) divides these rows of the log into frames of so many rows;
+    without one each row is a frame. A frame of several rows has the rates and n of its last row, and the mean
+    of all else.
     """
 
     def __init__(self, document, log, declared, block=None):
@@ -603,9 +609,18 @@ def check_term_frames(term, said, frames):
 
 
 def evaluate_term(term, said, frames, effect):
-    """One filter along d: its value E, the limit on it without theta, and what a constant theta multiplies.
+    """One filter along d: its value E, the limit on E without theta, and the slope that a constant theta
+    multiplies. E and the limit are in rad/s.
 
-    E[k] = sum of a^(k-j) dt nu[j].d    over j = since + 1 ... k
+    E     = sum a^(k-j) dt nu[j].d                     over j = since + 1 ... k,    a = exp(-pole_per_s dt)
+    limit = sum a^(k-j) (dt eta_bar[j].|d| + (1 - a) n[j-1].|d|)             over the same j
+            + a^(k-since) n[since].|d| + n[k].|d|                            gyro noise, with the term above
+            + sum a^(k-j) dt phi[j]  over j = first ... k,    + a^(k+1-first) fault
+    slope = sum a^(k-j) dt Z[j]      over j = first ... k,    0 if theta may change in each frame ("any")
+
+    Without a pole a is 0, and the sums have the one frame k. phi[j], rad/s2: largest effect of the fault,
+    without theta if theta is constant. The field `fault`, rad/s, is the effect that the filter has summed up
+    to frame first - 1; it must be at least the sum of the logged effects there.
     """
     k, first = term["frame"], term["first"]
     dt, d = frames.dt, np.array(term["d"])
@@ -761,6 +776,8 @@ def approach_pairs(said, course, frames):
 
     min (lower - ordered)  >  0,    sum (lower - ordered)  >  0
     lower_n  >  upper - step (last - first - 1),    lower_n  >  near,    1  >  0
+
+    The last pair belongs to the format alone: it is always true.
     """
     require(course.upper_frame == course.first, "the bound from above is not of the first frame")
     require(len(said["ordered"]) == len(course.lower), "ordered: frames are missing")

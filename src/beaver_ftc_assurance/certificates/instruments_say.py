@@ -20,24 +20,28 @@ ROUNDING_SHARE = 1e-13  # of a limit: a smaller number is rounding
 
 def alarm_evidence(monitor: SensorMonitor, rows: Mapping[str, np.ndarray], k: int) -> Document:
     """The test that sound instruments would have passed, or the reading that the log's column `watch_missing`
-    says is missing; why there is none where no test was failed. The sides of a missing reading: number of
-    missing readings, and how many sound instruments leave out.
+    says is missing; why there is no evidence where the row shows neither. The sides of a missing reading: the
+    number of missing readings, and the number that sound instruments leave out.
 
-    monitor: at the alarm, in row k of the log.
+    monitor: at the alarm, in row k of the log. The certificate's field `looks` lists the comparisons that the
+    residual of the test adds up: (reading, prediction, largest difference with sound instruments).
     """
     number, failed = monitor.worst_test_index, monitor.top_ratio > 1.0
     if failed and number >= N_EQUATIONS:
         return {"because": BECAUSE_NO_EQUATION}
     if failed:
-        looks = [look for look in _looks(monitor) if any(look)]
-        value = sum(reading - predicted for reading, predicted, _ in looks)
-        limit = sum(bound for *_, bound in looks)
-        if value < 0.0:  # the other way round
-            looks, value = [[predicted, reading, bound] for reading, predicted, bound in looks], -value
-        if value > limit:
-            return {"test": TESTS[number], "looks": looks, "sides": [value, limit]}
+        compared = [comparison for comparison in _comparisons(monitor) if any(comparison)]
+        value = sum(reading - predicted for reading, predicted, _ in compared)
+        limit = sum(bound for *_, bound in compared)
+        if value < 0.0:  # the checker requires a positive sum: exchange reading and prediction
+            compared, value = [[predicted, reading, bound] for reading, predicted, bound in compared], -value
+        return (
+            {"test": TESTS[number], "looks": compared, "sides": [value, limit]}
+            if value > limit
+            else {"because": BECAUSE_BETWEEN_ROWS}
+        )
     sensor = monitor.isolated_sensor_index
-    if sensor < 0 or not monitor.is_reading_unused[sensor] or failed:
+    if sensor < 0 or not monitor.is_reading_unused[sensor]:
         return {"because": BECAUSE_BETWEEN_ROWS}
     if "watch_missing" in rows and rows["watch_missing"][k] == sensor:
         return {"missing": [sensor], "sides": [1.0, 0.0]}
@@ -45,14 +49,17 @@ def alarm_evidence(monitor: SensorMonitor, rows: Mapping[str, np.ndarray], k: in
     return {"because": f"there was no reading of {name}, and no column that says so"}
 
 
-def _looks(monitor: SensorMonitor) -> Iterator[list[float]]:
-    """Triples (reading, prediction, largest difference with sound instruments) in the residual's unit: of the
-    last sample; then what the filter and its bound keep of all samples before."""
+def _comparisons(monitor: SensorMonitor) -> Iterator[list[float]]:
+    """Comparisons [reading, prediction, largest difference with sound instruments] in the residual's unit.
+
+    First that of the last sample; for a filtered test then [sum, 0, bound] of all samples before, as the
+    filter with the largest ratio of residual to bound keeps them.
+    """
     test, number = monitor.worst_test, monitor.worst_test_index
-    reading = TESTS[number]
-    predicted = float(monitor.predicted_reading[SENSORS.index(reading)]) if reading in SENSORS else 0.0
-    if number >= RPM_TEST:
-        bound = float(monitor.reading_bound[SENSORS.index(reading)]) + COMPARISON_ROUNDING
+    name = TESTS[number]  # of a sensor; else (rotation, density) only the residual is known
+    predicted = float(monitor.predicted_reading[SENSORS.index(name)]) if name in SENSORS else 0.0
+    if number >= RPM_TEST:  # the tests of the engine are not filtered
+        bound = float(monitor.reading_bound[SENSORS.index(name)]) + COMPARISON_ROUNDING
         yield [predicted + test.residual, predicted, bound]
         return
     pole = int(np.argmax(np.abs(test.filtered_residual) / test.filtered_bound))
@@ -62,7 +69,7 @@ def _looks(monitor: SensorMonitor) -> Iterator[list[float]]:
         + test.gust_gain * monitor.gust_change_mps[pole]
     )
     yield [predicted + test.residual, predicted, sample_bound]
-    filtered, bound = test.filtered_residual[pole], test.filtered_bound[pole]
-    earlier = np.array([filtered - test.residual, bound - sample_bound])
-    earlier[np.abs(earlier) <= ROUNDING_SHARE * np.array([abs(filtered), bound])] = 0.0
+    total, total_bound = test.filtered_residual[pole], test.filtered_bound[pole]
+    earlier = np.array([total - test.residual, total_bound - sample_bound])
+    earlier[np.abs(earlier) <= ROUNDING_SHARE * np.array([abs(total), total_bound])] = 0.0
     yield [float(earlier[0]), 0.0, max(float(earlier[1]), 0.0)]

@@ -35,7 +35,7 @@ def margins_of(scenario: Scenario) -> list[Margin]:
     axis."""
     flights = closed_form.over_envelope(scenario, N_AIRSPEEDS)
     if scenario.control.law in flown_by("rejecting"):
-        return [
+        return [  # `closed_form.at` yields the margins of the healthy aircraft ("none") before all others
             margin
             for flight in flights
             for margin in takewhile(lambda each: each.fault == "none", closed_form.at(flight))

@@ -26,8 +26,10 @@ from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.compare.replay import Trace, record, replay, trace
 from beaver_ftc.studies.engine.statistics import or_never
 
-CALIBRATION = "calibration-"  # and the grade: the sets that methods are tuned on
-DRAW = 1000  # between the seeds of two draws of a set: the seeds of all sets are smaller
+SCHEME, LAW, ORACLE = "adaptive-estimators", "fault-tolerant", "oracle"
+STATISTICAL = f"{SCHEME} with fdi.statistical"  # our scheme with its statistical detector beside it
+CALIBRATION = "calibration-"  # then the grade: name of a set that methods are tuned on
+DRAW = 1000  # step of the seed from one draw of a set to the next: the seeds of all sets are smaller
 
 
 @dataclass(frozen=True)
@@ -77,10 +79,6 @@ def of_set(name: str, most: int | None = None, draw: int = 0) -> list[SetFlight]
     return [case for path in sorted(folder.glob("*.yaml")) for case in of_sweep(path, name, most, draw)]
 
 
-SCHEME, LAW, ORACLE = "adaptive-estimators", "fault-tolerant", "oracle"
-STATISTICAL = f"{SCHEME} with fdi.statistical"  # our scheme with its statistical detector beside it
-
-
 @dataclass(frozen=True)
 class Entry:
     """A scheme and a law that fly together."""
@@ -96,8 +94,8 @@ class Result:
     fault_free_s: time under observation without a fault, until the first alarm. rms_deg_s: over all axes,
     after the fault (all the flight without one), and infinite after a departure. before_deg_s, after_deg_s:
     the same before and after it. travel_deg_s: path of all surfaces over the time flown.
-    energy_deg2_s2: mean square of their speeds, summed: what moves a mass against friction spends. us:
-    processor time of a frame, microseconds.
+    energy_deg2_s2: mean square of their speeds, (deg/s)2, summed over the surfaces: proportional to the power
+    that viscous friction takes. us: processor time of a frame, microseconds.
     """
 
     entry: Entry
@@ -120,7 +118,7 @@ class Result:
 
 @dataclass
 class Trial:
-    """All results of one case of a set; traces by scheme, and why one is missing."""
+    """All results of one case of a set; traces by scheme; failures: why a trace is missing."""
 
     set: str
     results: list[Result] = field(default_factory=list)
@@ -137,8 +135,8 @@ def entries_of(schemes: Sequence[str], laws: Sequence[str]) -> list[Entry]:
 def with_entry(scenario: Scenario, entry: Entry, chosen: TunedValuesByGrade | None = None) -> Scenario:
     """The scenario with this scheme and this law, each with the values chosen for it on such flights.
 
-    chosen: as tuned.json has them; without it, each flies with its defaults. What the scenario says of the
-    scheme or law that it names counts for that one alone, and before what was chosen.
+    chosen: values as in tuned.json; without them, each flies with its defaults. Options in the scenario count
+    for the scheme or law that the scenario names alone, and replace the chosen values.
     """
     scheme = SCHEME if entry.scheme == STATISTICAL else entry.scheme
     of_scheme = scenario.fdi.options if scheme == scenario.fdi.scheme else {}
@@ -182,7 +180,8 @@ def fly_case(
 ) -> Trial:
     """Fly a case with every entry; record it under the nominal law for the trade-off of each scheme.
 
-    chosen: values of schemes and laws; those that ship without it. trade_off: whether it is asked for.
+    chosen: tuned values of schemes and laws; if None, the values that ship with the package. trade_off:
+    whether to record the case, and so fill `traces`.
     """
     chosen = load_tuned_values() if chosen is None else chosen
     trial = Trial(case.set, [_fly(case.scenario, entry, chosen) for entry in entries])
@@ -197,8 +196,9 @@ def fly_case(
         try:
             fdi = with_entry(case.scenario, Entry(scheme, LAW), chosen).fdi
             if scheme != SCHEME and (scheme == STATISTICAL or is_compiled(DETECTORS, scheme)):
-                own = record(case.scenario.model_copy(update={"fdi": fdi}))  # with which its statistic comes
-                trial.traces[scheme] = trace(own, own.built_in)
+                # The compiled frame alone has this statistic: the case is flown again with the scheme.
+                with_scheme = record(case.scenario.model_copy(update={"fdi": fdi}))
+                trial.traces[scheme] = trace(with_scheme, with_scheme.built_in)
             else:
                 trial.traces[scheme] = replay(recording, scheme, fdi.options)
         except Exception as error:  # what a plug-in fails over is not the end of the comparison
@@ -221,7 +221,7 @@ def _fly(scenario: Scenario, entry: Entry, chosen: TunedValuesByGrade) -> Result
 
 
 def result_of(flight: Landing, entry: Entry, us: float) -> Result:
-    """Boil a flight down."""
+    """The result of a flight. us: processor time of a frame, microseconds."""
     found = measure(flight)
     fault, isolation, tracking = found.fault, found.isolation, found.tracking
     end_s, departed = flight.frames / flight.scenario.rate_hz, found.departure is not None
@@ -248,5 +248,5 @@ def result_of(flight: Landing, entry: Entry, us: float) -> Result:
 
 
 def _size(rms: Rates | None) -> float:
-    """Over all axes; infinite of a part of the flight there is not."""
+    """The RMS error over all axes, deg/s; infinite if the flight has no such part."""
     return inf if rms is None else hypot(*vars(rms).values())

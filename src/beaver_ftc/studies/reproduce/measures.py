@@ -1,6 +1,7 @@
 """How the statements of [Zhang2005] are read as numbers: the measures of `claims.yaml`, functions of flights.
 
-What never happens is infinite; nothing is there to be seen of a flight that ends before.
+The time to an event that never happens is infinite, and so is an error over a part that the flight does not
+have. claims.yaml has the unit of each measure under `measures`.
 """
 
 from collections.abc import Iterator
@@ -19,22 +20,22 @@ from beaver_ftc.studies.reproduce.cases import ESTIMATORS, SETTLED_S, Flown
 from beaver_ftc.studies.reproduce.choices import AMPLITUDE_DEG_S
 
 RATES = ("p", "q", "r")  # among the states of a linear aircraft
-TRANSIENT_S = 3.0  # after the fault: detection, isolation and hand-over
+TRANSIENT_S = 3.0  # from the fault on: detection, isolation and hand-over
 GOOD, TAKEN_OVER = 0.1, 0.2  # the limits `good` and `taken-over` of claims.yaml
 
 
 def _after(earlier_s: float, later_s: float) -> float:
-    """From an event to another, s; infinite if either is missing."""
+    """From an earlier event to a later one, s, both at instants in s; infinite if either is missing."""
     return round(later_s - earlier_s, 9) if np.isfinite([earlier_s, later_s]).all() else np.inf
 
 
 def _frames(flown: Flown, span_s: float) -> float:
-    """A span of time in frames, whichever way."""
+    """A span of time in frames, without its sign: the later event may come first."""
     return abs(round(span_s / flown.frame_s)) if np.isfinite(span_s) else np.inf
 
 
 def _ratio(error: float, other: float) -> float:
-    """Of two errors; infinite where the first is, whatever the other."""
+    """The first error over the other; infinite if the first is, even if the other is too."""
     return error / other if np.isfinite(error) else np.inf
 
 
@@ -42,7 +43,7 @@ def _ratio(error: float, other: float) -> float:
 
 
 def detection(flown: Flown) -> float:
-    """From the fault to the alarm."""
+    """From the fault to the alarm, s."""
     return or_never(flown.metrics.detection.delay_s)
 
 
@@ -52,7 +53,7 @@ def detected(*flights: Flown) -> float:
 
 
 def isolation(flown: Flown) -> float:
-    """From the alarm to the right name; infinite if anything else is named in the end."""
+    """From the alarm to the right name, s; infinite if anything else is named in the end."""
     return _after(flown.alarm_s, flown.rightly_named_s)
 
 
@@ -62,33 +63,33 @@ def isolated(*flights: Flown) -> float:
 
 
 def handled(*flights: Flown) -> float:
-    """How many of the faults are detected, rightly named, and leave tracking good."""
+    """How many of the faults are detected, rightly named, and tracked with an error of at most GOOD."""
     return sum(isolated(flown) and tracking(flown, flown.axis) <= GOOD for flown in flights)
 
 
 def order(*flights: Flown) -> float:
-    """The fewest frames between fault and detection, or detection and isolation."""
+    """The fewest frames between fault and detection, or detection and isolation; 0 if one never happens."""
     steps = [step(flown) for flown in flights for step in (detection, isolation)]
     return _frames(flights[0], min(steps)) if np.isfinite(steps).all() else 0.0
 
 
 def before_fault(flown: Flown) -> float:
-    """How near the detection estimator comes to a false alarm."""
+    """Largest |residual| / threshold of the detection estimator before the fault; above 1: a false alarm."""
     return float(np.max(flown.shares()[:, flown.between(0.0, flown.fault_at_s)]))
 
 
 def own_estimator(*flights: Flown) -> float:
-    """How near the isolation estimators of the true faults come to being excluded."""
+    """Largest |residual| / threshold of the isolation estimators of the true faults; above 1 excludes one."""
     return max(float(np.max(flown.shares_of(flown.struck))) for flown in flights)
 
 
 def alarm_lag(flown: Flown) -> float:
-    """From the first residual beyond its threshold to the alarm."""
+    """From the first residual beyond its threshold to the alarm, frames."""
     return _frames(flown, _after(flown.first_beyond_s(flown.shares()), flown.alarm_s))
 
 
 def exclusion_lag(flown: Flown) -> float:
-    """From a residual beyond its threshold to the exclusion, of the slower of those that do not fit."""
+    """From a residual beyond its threshold to the exclusion, frames, of the slowest that does not fit."""
     return max(
         _frames(flown, _after(flown.first_beyond_s(flown.shares_of(other)), flown.excluded_at_s(other)))
         for other in _others(flown)
@@ -101,26 +102,27 @@ def _others(flown: Flown) -> list[str]:
 
 
 def _last_exclusion_s(flown: Flown) -> float:
+    """When the last estimator that does not fit the fault was excluded, s."""
     return max(map(flown.excluded_at_s, _others(flown)))
 
 
 def last_to_go(flown: Flown) -> float:
-    """From the alarm to the exclusion of the last estimator that does not fit."""
+    """From the alarm to the exclusion of the last estimator that does not fit, s."""
     return _after(flown.alarm_s, _last_exclusion_s(flown))
 
 
 def conclusion_lag(flown: Flown) -> float:
-    """From the exclusion of the last estimator that does not fit to the right name."""
+    """From the exclusion of the last estimator that does not fit to the right name, frames."""
     return _frames(flown, _after(_last_exclusion_s(flown), flown.rightly_named_s))
 
 
 def estimators(flown: Flown) -> float:
-    """The detection estimator and every isolation estimator that has a residual."""
+    """How many estimators work: the detection estimator, and each isolation estimator with a residual."""
     return 1.0 + sum(bool(flown.residuals_of(other).any()) for other in ESTIMATORS)
 
 
 def at_work(flown: Flown) -> float:
-    """The same, to be at most so many."""
+    """The number `estimators` again: claims.yaml limits it from above here, and from below there."""
     return estimators(flown)
 
 
@@ -130,13 +132,13 @@ def residuals(flown: Flown) -> float:
 
 
 def activation(flown: Flown) -> float:
-    """Between the alarm and the first residual of any isolation estimator."""
+    """Between the alarm and the first residual of any isolation estimator, frames."""
     begun = np.any([flown.residuals_of(other).any(axis=0) for other in ESTIMATORS], axis=0)
     return _frames(flown, _after(flown.alarm_s, flown.first_s(begun)))
 
 
 def generalised(*flights: Flown) -> float:
-    """In how many of the pairs an estimator is excluded exactly if the fault is not its own."""
+    """In how many pairs of flight and estimator it is excluded exactly if the fault is not its own."""
     return sum(
         bool(flown.residuals_of(e).any()) and np.isfinite(flown.excluded_at_s(e)) == (e != flown.struck)
         for flown in flights
@@ -145,7 +147,7 @@ def generalised(*flights: Flown) -> float:
 
 
 def named(flown: Flown) -> float:
-    """For how long a known fault was the only one left, none of them being there."""
+    """For how long exactly one known fault was left, s: a wrong name, as the flight has an unknown fault."""
     return round(sum(map(flown.named_s, ESTIMATORS)), 9)
 
 
@@ -155,7 +157,8 @@ def left(flown: Flown) -> float:
 
 
 def after_mismatch(*flights: Flown) -> float:
-    """How long after both an estimator is excluded, at most; one whose mismatch stays below 1 is not counted.
+    """The most frames from the alarm, or from a mismatch above 1 if that is later, to an exclusion. An
+    estimator whose mismatch stays at 1 or below is not counted; infinite if none is counted.
 
     The mismatch is M_sj of detectability/certain.py, along the flight itself.
     """
@@ -168,7 +171,8 @@ def after_mismatch(*flights: Flown) -> float:
 
 
 def _certain_at_s(flown: Flown) -> Iterator[tuple[str, float]]:
-    """Each other fault whose mismatch with a loss exceeds 1 after it, and when, s, not before the alarm."""
+    """Each other fault whose mismatch with the flight's loss exceeds 1, and when: the later one of the first
+    such instant after the loss and of the alarm, s. Nothing if the fault is no loss."""
     fault = flown.scenario.faults[0]
     if not isinstance(fault, LossOfEffectiveness):
         return
@@ -184,13 +188,14 @@ def _certain_at_s(flown: Flown) -> Iterator[tuple[str, float]]:
 
 
 def learnt_before(flown: Flown) -> float:
-    """What the network of the detection estimator takes for a fault before there is an alarm."""
+    """Largest output of the detection estimator's network before the alarm, rad/s2."""
     early = flown.log["detected"] == 0
     return max(float(np.max(np.abs(flown.log[f"{a}_network_rad_s2"][early]))) for a in AXES)
 
 
 def unapproximated(flown: Flown) -> float:
-    """RMS of what the detection estimator's network leaves of the unexplained acceleration, over its RMS."""
+    """Pitching that neither the design model nor the detection estimator's network explains, over that which
+    the model alone does not explain: RMS accelerations, from SETTLED_S after the fault on."""
     after = flown.between(flown.fault_at_s + SETTLED_S)
     if flown.metrics.departure or not after.any():
         return np.inf
@@ -200,7 +205,10 @@ def unapproximated(flown: Flown) -> float:
 
 
 def learning(*flights: Flown) -> float:
-    """What is left of the tracking error once a fault has been there for a while; of the worst of several."""
+    """RMS tracking error from 13 s after the fault on over that of its first 5 s; the largest of several.
+
+    These flights last 18 s after the fault (cases.AFTER_S), so both spans are 5 s long.
+    """
     return max(
         _ratio(
             flown.kept_deg_s(flown.axis, flown.fault_at_s + 13.0),
@@ -211,7 +219,7 @@ def learning(*flights: Flown) -> float:
 
 
 def outside(*flights: Flown) -> float:
-    """How far a theta that diagnosis or law estimates, one less than the effectiveness, leaves [-1, 0]."""
+    """How far an estimate of theta = effectiveness - 1, of diagnosis or law, lies outside [-1, 0] at most."""
     columns = [f"{surface}_effectiveness_{what}" for surface in ESTIMATORS for what in ("estimate", "used")]
     effectiveness = np.concatenate([flown.log[column] for flown in flights for column in columns])
     return float(np.nanmax(np.maximum(effectiveness - 1.0, -effectiveness).clip(0.0)))
@@ -232,7 +240,8 @@ def unbounded(flown: Flown) -> float:
 
 
 def separation(flown: Flown) -> float:
-    """Slowest pole of p, q, r over the fastest of the other states; each with those of the other held."""
+    """Magnitude of the slowest pole of the rates over that of the fastest pole of the other states. Either
+    group's poles are those with the states of the other group held."""
     plant, trim = trimmed(flown.scenario)
     linear = differences(plant, trim)
     inner = np.isin(linear.states, RATES)
@@ -241,28 +250,29 @@ def separation(flown: Flown) -> float:
 
 
 def tracking(flown: Flown, axis: str) -> float:
-    """RMS error of an axis after the fault, once settled; infinite if the aircraft is lost."""
+    """RMS error of an axis from SETTLED_S after the fault on, as a share of the amplitude of its reference;
+    infinite if the aircraft is lost."""
     return flown.kept_deg_s(axis, flown.fault_at_s + SETTLED_S) / AMPLITUDE_DEG_S
 
 
 def worst_tracking(*flights: Flown) -> float:
-    """The same, of the worst of several faults, each on the axis where it shows."""
+    """The largest `tracking` of several faults, each on the axis where it shows."""
     return max(tracking(flown, flown.axis) for flown in flights)
 
 
 def healthy_tracking(flown: Flown) -> float:
-    """RMS error of the worst axis of a healthy flight."""
+    """RMS error of the worst axis of a healthy flight, as a share of the amplitude of its reference."""
     return max(flown.kept_deg_s(axis, SETTLED_S) for axis in AXES) / AMPLITUDE_DEG_S
 
 
 def deterioration(flown: Flown) -> float:
-    """RMS pitch rate error after the fault over that before, over all the flight there is."""
+    """RMS pitch rate error from the fault to the end of the flight, over that from SETTLED_S to the fault."""
     return flown.rms_deg_s("q", flown.fault_at_s) / flown.rms_deg_s("q", SETTLED_S, flown.fault_at_s)
 
 
 def _beside(flights: tuple[Flown, ...], after_s: float) -> float:
-    """RMS error from so long after the fault on over that of another law, of the worst of the faults, each on
-    the axis where it shows; the flights of the other law come second."""
+    """RMS error from after_s after the fault on, over that of another law; the largest of several faults,
+    each on the axis where it shows. The second half of the flights has the same faults with the other law."""
     pairs = zip(flights[: len(flights) // 2], flights[len(flights) // 2 :], strict=True)
     return max(
         _ratio(ours.kept_deg_s(*where), other.rms_deg_s(*where))
@@ -272,12 +282,13 @@ def _beside(flights: tuple[Flown, ...], after_s: float) -> float:
 
 
 def beside_passive(*flights: Flown) -> float:
-    """RMS error after the fault over that of a robust law without a diagnosis, of the worst of the faults."""
+    """RMS error from SETTLED_S after the fault on, over that of a robust law without a diagnosis; the largest
+    of several faults."""
     return _beside(flights, SETTLED_S)
 
 
 def transient(*flights: Flown) -> float:
-    """RMS pitch rate error of the first TRANSIENT_S after the fault, over that of another hand-over."""
+    """RMS pitch rate error of the first TRANSIENT_S after the fault, over that with a sudden hand-over."""
     gradual, sudden = (
         flown.rms_deg_s("q", flown.fault_at_s, flown.fault_at_s + TRANSIENT_S) for flown in flights
     )
@@ -285,38 +296,38 @@ def transient(*flights: Flown) -> float:
 
 
 def beside_nominal(*flights: Flown) -> float:
-    """RMS error after the fault over that of the nominal law, of the worst of several faults."""
+    """RMS error after the fault over that of the nominal law, the largest of several faults."""
     return _beside(flights, 0.0)
 
 
 def flown_on(flown: Flown) -> float:
-    """How long the aircraft is kept after the fault."""
+    """For how long the aircraft flies after the fault, s."""
     return float(flown.log["t_s"][-1] - flown.fault_at_s)
 
 
 def in_charge(flown: Flown) -> float:
-    """From the alarm to the adaptive law."""
+    """From the alarm to the adaptive law, s."""
     return _after(flown.alarm_s, flown.mode_at_s("adaptive"))
 
 
 def activated_near_10(flown: Flown) -> float:
-    """How far from 10 s the adaptive law takes over."""
+    """Time between 10 s of the flight and the instant at which the adaptive law takes over, s."""
     return abs(_after(10.0, flown.mode_at_s("adaptive")))
 
 
 def reallocation(flown: Flown) -> float:
-    """From the name to the reallocation."""
+    """From the name to the reallocation, s."""
     return _after(or_never(flown.metrics.isolation.time_s), flown.mode_at_s("reallocated"))
 
 
 def decisions(flown: Flown) -> float:
-    """Reconfigured, and the demand carried by another surface."""
+    """How many of two decisions were taken: the adaptive law took over; the flap carries the demand."""
     adaptive = np.isfinite(flown.mode_at_s("adaptive"))
     return float(adaptive) + float(share_of_elevator(flown) <= TAKEN_OVER)
 
 
 def share_of_elevator(flown: Flown) -> float:
-    """Range of the elevator's command over that of the flap's, after the hand-over."""
+    """Range of the elevator's command over that of the flap's, from TRANSIENT_S after the fault on."""
     after = flown.between(flown.fault_at_s + TRANSIENT_S)
     if not after.any():
         return np.inf
@@ -325,6 +336,6 @@ def share_of_elevator(flown: Flown) -> float:
 
 
 def flap_rate(flown: Flown) -> float:
-    """Fastest motion the flap is commanded."""
+    """Largest rate of the flap's command, deg/s."""
     rates = np.diff(flown.log["flap_cmd_rad"]) / np.diff(flown.log["t_s"])
     return float(np.max(np.abs(np.degrees(rates))))

@@ -51,17 +51,21 @@ def write_report(path: Path, folders: Sequence[Path], names: Sequence[str] = ())
 
 
 def render(folders: Sequence[Path], names: Sequence[str] = ()) -> str:
-    """The report as HTML text."""
+    """The report as HTML text.
+
+    The legend has one entry for each name of a mark (fault, detection, ...) that any run has: the mark of the
+    last run that has it. The legend shows times only if there is a single run.
+    """
     from markupsafe import Markup
 
     documents = [json.loads((folder / "metrics.json").read_text(encoding="utf-8")) for folder in folders]
-    shown = {mark.name: mark for document in documents for mark in marks(Metrics.of(document))}.values()
+    last_marks = {mark.name: mark for document in documents for mark in marks(Metrics.of(document))}.values()
     return template(_TEMPLATE_FOLDER / "report.html.j2").render(
         runs=list(map(_verdict_entry, documents, folders)),
         names=names,
         modes=MODE_COLOURS,
-        marks=shown,
-        first_mark_s=next((mark.time_s for mark in shown), 0.0),
+        marks=last_marks,
+        first_mark_s=next((mark.time_s for mark in last_marks), 0.0),
         **script_style_and_data(folders, documents, names),
         # what studies have found in a folder, if they have been there
         sections=[Markup("".join(section(folder) for section in _REGISTERED_SECTIONS)) for folder in folders],
@@ -98,7 +102,7 @@ def script_style_and_data(
 ) -> Document:
     """Script, style and data of a page that replays flights.
 
-    documents: their metrics. shown: the views on the page, without them all that the flights have in common.
+    documents: their metrics. shown: the views on the page, None for all that the flights have in common.
     """
     from markupsafe import Markup
 
@@ -116,7 +120,10 @@ def _page_data(
     names: Sequence[str],
     shown: Sequence[View] | None,
 ) -> Document:
-    """What the page draws from."""
+    """The runs with their curves and marks, the views, and the looks, from which the script draws the page.
+
+    shown: the views on the page, None for all that the runs have in common.
+    """
     logs = [log.StoredLog(folder / "log.parquet") for folder in folders]
     found = [Metrics.of(document) for document in documents]
     shown = _common_views(logs, found) if shown is None else shown
@@ -164,7 +171,7 @@ def _run_entry(source: log.Log, metrics: Metrics, columns: Sequence[str], name: 
         "marks": [asdict(mark) for mark in event_marks],
         "window": window or ((float(t_s[0]), float(t_s[-1])) if t_s.size else (0.0, 0.0)),
         "levels": [
-            {name: _base64_floats(name, values) for name, values in level.items()} for level in levels
+            {column: _base64_floats(column, values) for column, values in level.items()} for level in levels
         ],
     }
 

@@ -1,5 +1,8 @@
-"""What has been flown is there to stay: files whole or not at all, folders locked while in use, and what rows
-follow from, since those of an earlier start go with new ones only if nothing of it has changed.
+"""How a study keeps the rows of the flights that it has flown, so that a later start can resume it.
+
+Files are written as a whole or not at all. A process locks the folder that it writes to. A study also keeps
+its identity: the request, the versions and the code that its rows follow from. It resumes only if the
+identity is the same, so that old and new rows may stand in one table.
 """
 
 import contextlib
@@ -31,7 +34,7 @@ def write_whole(path: Path, content: bytes) -> None:
 
 
 def replace_whole(path: Path, fill: Callable[[IO[bytes]], object]) -> None:
-    """The same for a file that `fill` writes."""
+    """Write a file atomically, as `write_whole` does: `fill` writes its content."""
     partial = path.with_name(f".{path.name}.partial")
     try:
         with partial.open("wb") as file:
@@ -46,7 +49,7 @@ def replace_whole(path: Path, fill: Callable[[IO[bytes]], object]) -> None:
 
 
 def known(manifest: Path) -> Document | None:
-    """The identity that a file has; None where there is no such file, or it cannot be read."""
+    """The identity in a file; None if there is no such file, or if it cannot be read."""
     try:
         there = read_json(manifest)
     except (OSError, ValueError):
@@ -63,7 +66,7 @@ def remove_leftovers(folder: Path) -> None:
 
 @contextlib.contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Hold a folder for this process alone; what marks it goes with it, or with the process.
+    """Hold a folder for this process alone. The lock ends with the block or the process.
 
     Raises SimulationFailed where another process has it.
     """
@@ -85,7 +88,7 @@ def locked(folder: Path) -> Iterator[None]:
 
 
 def set_aside(path: Path, why: str) -> Path:
-    """Rename what is damaged, and say so in a line; nothing of it is lost."""
+    """Rename a damaged file, so that nothing of it is lost, and print one line. Returns its new path."""
     name, n = f"{path.name}{DAMAGED}", 1
     while (path.parent / name).exists():
         n += 1
@@ -109,7 +112,7 @@ class Codec(Protocol):
 
 @dataclass(frozen=True)
 class Parts:
-    """A folder of batches that have landed. kept: what a message about a full disk ends with."""
+    """A folder of batches of rows, one file for each. kept: the end of the message about a full disk."""
 
     folder: Path
     codec: Codec
@@ -120,12 +123,12 @@ class Parts:
         return self.folder.is_dir() and any(self.folder.glob(f"*{self.codec.suffix}"))
 
     def land(self, batch: int | str, rows: Any) -> None:
-        """Keep a batch. Raises SimulationFailed if the disk will not have it."""
+        """Write a batch. Raises SimulationFailed if the disk does not take it."""
         with clear_disk_errors(self.folder.parent, self.kept):
             replace_whole(self._path(batch), lambda file: self.codec.write(rows, file))
 
     def landed(self, batch: int | str, runs: Sequence[int]) -> Any:
-        """The rows of a batch if it has landed whole; what cannot be read is set aside, to be flown again."""
+        """The rows of a batch, None if it has no file. A file that cannot be read is set aside: None, too."""
         path, rows = self._path(batch), None
         if path.exists():
             with contextlib.suppress(Exception):
@@ -171,11 +174,13 @@ def batches_of(count: int, size: int) -> Iterator[tuple[int, range]]:
 
 
 PACKAGE = Path(__file__).resolve().parents[2]
-NO_ROWS = ("cli", "commands", "pytest_plugin")  # they ask for rows, or show them
+# Folders and modules of a package whose code starts studies or prints rows: no number in a row depends on it.
+NO_ROWS = ("cli", "commands", "pytest_plugin")
 
 
 def identity(what: str, asked: Document) -> Document:
-    """What was asked, resolved, under its name, and what flew it: this machine's versions and code."""
+    """The identity of a study: the resolved request `asked` under the key `what`, then the versions of this
+    machine's packages and the fingerprint of its code."""
     document = {what: asked, "versions": {**versions(), **plug_ins(), "flight code": fingerprint()}}
     return json.loads(json.dumps(document))
 
@@ -220,8 +225,8 @@ def plug_ins() -> dict[str, str]:
 
 
 def hashed_files() -> list[Path]:
-    """The sources and data that rows may follow from: of the core, and of each package that offers it a
-    service, all but the folders that make none."""
+    """The sources and data that rows may depend on: those of the core and of each package that offers it a
+    service, without NO_ROWS, and all files of the aircraft."""
     sources = [
         path
         for package in (PACKAGE, *folders(SERVICES))
@@ -235,7 +240,7 @@ def hashed_files() -> list[Path]:
 
 @cache
 def fingerprint() -> str:
-    """A digest of those files: a version number sees no edit."""
+    """A digest of `hashed_files`, because a version number does not change with an edit."""
     return digest(hashed_files())[:16]
 
 

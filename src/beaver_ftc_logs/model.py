@@ -71,35 +71,36 @@ class _LastingSection(Section):
 
 
 class FilterSettings(_LastingSection):
-    """Prior settings of the filter.
+    """Prior settings of the filter. sd: standard deviation. trim (3,): offset of the rates of a sample,
+    rad/s, that neither past nor commands explain. gain: factor on the response to the commands.
 
     changes_per_hour: how often a surface changes its effectiveness
     repair_share: share of the changes that restore health
     levels: likelier levels of effectiveness, by group
     level_share: share of faults at the likelier levels
-    trim_sd: free spread of the trim between flights, in residual sd
-    trim_shift: spread of the trim as a shift of each group's command
-    trim_walk: drift of the trim a sample, in residual sd
-    gain_sd: spread of the control gain
-    gain_time_s: in which the control gain returns to the model's, s
-    own_gain_sd: spread of each group's gain about the common
-    own_gain_time_s: in which that returns to the common gain, s
-    quick_error: error of responses quicker than the fitted flights have, as a share of them
-    trim_bound: farthest the trim is adapted, in its spread
-    gain_bound: farthest the gain is adapted, in its spread
-    delays_s: delays tried beside the model's, each at most a sample
-    jam_sd: offset of the rates a sample by a stuck surface, in sd
-    power: share of a white residual's information in this one
+    trim_sd: sd of the trim between flights, in residual sd
+    trim_shift: sd of the trim by a shift of each group's command, share of travel
+    trim_walk: sd of the change of the trim in a sample, in residual sd, for p, q, r
+    gain_sd: sd of the common gain of all groups
+    gain_time_s: time constant with which the common gain returns to the model's, s
+    own_gain_sd: sd of each group's gain about the common gain
+    own_gain_time_s: time constant with which a group's gain returns to the common gain, s
+    quick_error: error of responses quicker than those of the fitted flights, as a share of them
+    trim_bound: largest distance of the trim from zero, in its sd before the flight
+    gain_bound: largest distance of a gain from its mean before the flight, in its sd before the flight
+    delays_s: extra delays of the commands that the filter tries, s, each at most a sample
+    jam_sd: sd of the offset of the rates in a sample by a stuck surface, in residual sd
+    power: information of a sample of the residual, as a share of that of white noise
     tail: degrees of freedom of the residual's t distribution
     noise_memory_s: memory of the running scale of the residual, s
-    alarm: probability of a fault that raises the alarm
-    false_alarms_per_hour: the rate that was asked for
-    threshold: evidence for a fault that raises the alarm, instead of both: for that rate
-    name_evidence: evidence for a name, over that for an alarm
+    alarm: probability of a fault that raises the alarm; used if threshold is null
+    false_alarms_per_hour: the requested rate, from which `identify` computed threshold
+    threshold: Page's sum of the evidence for a fault that raises the alarm, natural logarithm of odds
+    name_evidence: Page's sum from which on a fault is named, as a multiple of threshold
     rename_s: for how long another name stands before it counts, s
     one_group: whether one group alone is at fault: a name has every group that is not excluded
     level_step: step of the grid of effectiveness
-    bounds: posterior mass inside the bounds
+    bounds: posterior probability that the effectiveness lies inside its bounds
     """
 
     changes_per_hour: Positive = 12.0
@@ -142,7 +143,7 @@ class FittedRanges(_LastingSection):
     gain_sd: standard error of each group's gain
     still_s: longest time each column stood still, s
     energy_climb: rate of the energy height as without power, m/s
-    tail: highest alarm statistic on parts not fitted
+    tail: highest peaks of the alarm statistic (Page's sum) in healthy flights that were not fitted
     """
 
     commands: CoefRows
@@ -156,7 +157,7 @@ class FittedRanges(_LastingSection):
 
 
 NOTHING_FITTED = FittedRanges(commands=[], rates=[])
-"""Of a model that knows nothing of its flights."""
+"""The ranges of a model whose file states none."""
 
 
 def _or_nothing(given: Any) -> Any:
@@ -164,15 +165,16 @@ def _or_nothing(given: Any) -> Any:
 
 
 class NoiseModel(Section):
-    """The noise of some flights: another gyro, air or law colours what is not explained.
+    """The noise of some flights. Another gyro, other air or another law gives the residual another spectrum.
 
-    average: 1, c1, ...: its moving average, newest first
-    noise: covariance of the residual whitened by that, (3, 3), (rad/s)2
+    average: 1, c1, ...: moving average of the noise, newest first
+    noise: covariance of the residual whitened by average, (3, 3), (rad/s)2
     before: AR coefficients: the previous residuals predict the next, latest first, (3 L, 3)
-    wider: how many times as far, in squares, gains left out and other laws' differ
+    wider: variance inflation: factor on noise, since gains scatter more in held-out parts, and under
+    other laws, than the fit states
     misreads: share of its effect by which the fit may misread each group in this noise
-    quick: power of the quick part of the responses, in variances of the noise, that the
-    fitted flights exceed in a tenth of their samples
+    quick: power, in variances of the noise, that the quick part of the responses exceeds in a tenth
+    of the samples fitted; quick part: difference from the mean over the last half second; null: unknown
     """
 
     average: CoefRow = Field(min_length=1, max_length=1000)
@@ -228,7 +230,7 @@ class Model(Section):
         n_signals = len(self.vehicle.regressor_columns) * self.vehicle.n_signal_lags(self.history)
         n, n_past = len(self.past), 3 * self.history + n_signals
         reason = f"has {n} rows, allowed: {n_past}, as `identify` writes them: identify it again"
-        conflicts: list[Conflict] = [(("past",), reason)] * (n != n_past)
+        conflicts = [(("past",), reason)] if n != n_past else []
         refuse([*conflicts, *self._name_mistakes(), *self._shape_mistakes()])
         return self
 

@@ -156,11 +156,16 @@ def names_of_topics(topics: Mapping[str, Topic]) -> tuple[str, ...]:
 def columns_of_topics(
     topics: Mapping[str, Topic], wanted: Wanted, all_topics: Mapping[str, Topic]
 ) -> tuple[Columns, tuple[str, ...], float | None]:
-    """The wanted columns `topic.field`, all where None, the names of the others, and the first stamp of the
-    topics, from which time counts, s.
+    """The columns `topic.field` of a log: those of the wanted names, all of `topics` if wanted is None.
 
-    Where the log has none of the wanted columns, all have no rows, and there is no first stamp: a log's names
-    are known then. all_topics: of the log, of which these may be some.
+    topics: the topics that were read, those of the wanted columns among them. all_topics: gives names only.
+    It is `topics` itself if these have every wanted column, or are all that the log has. A reader that reads
+    some topics passes all topics of the log if a wanted column is missing, for the message that says so.
+
+    Returns three values: the columns by name; the names in all_topics that are no such column; the earliest
+    stamp of `topics` in s, from which the times of the columns count, None if no row has a stamp. If
+    all_topics has none of the wanted names, the columns are all of its names, without rows; then there are no
+    other names, and no stamp.
     """
     names = names_of_topics(all_topics)
     if wanted is not None and not {*wanted} & {*names}:

@@ -35,11 +35,9 @@ def alarm_evidence(monitor: SensorMonitor, rows: Mapping[str, np.ndarray], k: in
         limit = sum(bound for *_, bound in compared)
         if value < 0.0:  # the checker requires a positive sum: exchange reading and prediction
             compared, value = [[predicted, reading, bound] for reading, predicted, bound in compared], -value
-        return (
-            {"test": TESTS[number], "looks": compared, "sides": [value, limit]}
-            if value > limit
-            else {"because": BECAUSE_BETWEEN_ROWS}
-        )
+        if value > limit:
+            return {"test": TESTS[number], "looks": compared, "sides": [value, limit]}
+        return {"because": BECAUSE_BETWEEN_ROWS}
     sensor = monitor.isolated_sensor_index
     if sensor < 0 or not monitor.is_reading_unused[sensor]:
         return {"because": BECAUSE_BETWEEN_ROWS}

@@ -19,7 +19,7 @@ from beaver_ftc.control import accommodation, allocation, power, state
 from beaver_ftc.control.autopilot import steer
 from beaver_ftc.control.laws import reference
 from beaver_ftc.control.profile import record_deviations
-from beaver_ftc.diagnosis import conclusion, monitors, schemes
+from beaver_ftc.diagnosis import conclusion, schemes
 from beaver_ftc.diagnosis.conclusion import (
     assess_surfaces,
     assess_unknown,
@@ -34,7 +34,7 @@ from beaver_ftc.diagnosis.model_prediction import (
     move_surfaces,
     predict_known,
 )
-from beaver_ftc.diagnosis.monitors import sensor_monitor
+from beaver_ftc.diagnosis.monitors import engine_monitor, sensor_monitor
 from beaver_ftc.diagnosis.schemes import record_isolated_surfaces
 from beaver_ftc.diagnosis.state import PITCH
 from beaver_ftc.diagnosis.types import verdict
@@ -148,7 +148,7 @@ def diagnose(frame):
     fdi, prediction, measured, k = frame.fdi, frame.prediction, frame.measured, frame.k - frame.since
     diagnoses_all_types = fdi.config.diagnoses_all_types
     applied, found, informed = frame.control.surfaces.output, frame.assessment, frame.control.config.informed
-    monitors.disable_if_apart(fdi.engine_monitor, frame.control.power.output.command[1:])
+    engine_monitor.disable_if_apart(fdi.engine_monitor, frame.control.power.output.command[1:])
     if k == 0:
         schemes.begin_scheme(fdi, prediction, measured)
     else:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from kernels import fill, new_fdi
 
-from beaver_ftc.diagnosis import monitors
+from beaver_ftc.diagnosis.monitors import engine_monitor
 from beaver_ftc.diagnosis.schemes import adaptive_estimators
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED, YAW
 
@@ -27,8 +27,8 @@ def aircraft(signals, knows_engines=True):
 )
 def test_a_monitor_of_engines_reads_their_signals_where_the_aircraft_has_them(signals, thrust, turning):
     """y has alpha, beta, airspeed and dynamic pressure first."""
-    config = np.zeros(1, monitors.ENGINE_MONITOR_RECORD)[0]["config"]
-    monitors.configure_balance(config, aircraft(signals))
+    config = np.zeros(1, engine_monitor.ENGINE_MONITOR_RECORD)[0]["config"]
+    engine_monitor.configure_balance(config, aircraft(signals))
     assert config.tolist() == pytest.approx((3, thrust, turning, -0.95 / 12.0, 0.05 / 12.0))
 
 
@@ -38,8 +38,8 @@ def test_a_monitor_of_engines_reads_their_signals_where_the_aircraft_has_them(si
      (("engines_n",), True)],
 )  # fmt: skip
 def test_where_the_symmetry_of_engines_is_not_measured_nothing_is_monitored(signals, knows_engines):
-    config = np.zeros(1, monitors.ENGINE_MONITOR_RECORD)[0]["config"]
-    monitors.configure_balance(config, aircraft(signals, knows_engines))
+    config = np.zeros(1, engine_monitor.ENGINE_MONITOR_RECORD)[0]["config"]
+    engine_monitor.configure_balance(config, aircraft(signals, knows_engines))
     assert not any(config.tolist())
 
 
@@ -56,14 +56,14 @@ def test_engines_under_one_lever_that_yaw_beyond_the_bound_have_failed_and_stay_
 ):
     """|Cn + 0.1 CT| > 0.005 + 0.02 |CT|, which is 0.013 here."""
     monitor = fill(
-        np.zeros(1, monitors.ENGINE_MONITOR_RECORD).view(np.recarray)[0],
+        np.zeros(1, engine_monitor.ENGINE_MONITOR_RECORD).view(np.recarray)[0],
         n_engines=engines, i_T=3, i_n=1,
         yaw_per_thrust=-0.1, slack=0.02,
     )  # fmt: skip
-    monitors.disable_if_apart(monitor, np.array(levers))
+    engine_monitor.disable_if_apart(monitor, np.array(levers))
     y = np.array([7.0, -0.1 * thrust + excess, 7.0, thrust])
-    assert monitors.detect_engine_failure(monitor, 0.005, y) == failed
-    assert monitors.detect_engine_failure(monitor, 0.005, 0.0 * y) == failed
+    assert engine_monitor.detect_engine_failure(monitor, 0.005, y) == failed
+    assert engine_monitor.detect_engine_failure(monitor, 0.005, 0.0 * y) == failed
     fdi = new_fdi()
     fdi["engine_monitor"], fdi["bound"]["error_map"]["yaw_now"] = monitor, 0.005
     fdi["verdict"]["isolated_estimator"] = NOT_ISOLATED

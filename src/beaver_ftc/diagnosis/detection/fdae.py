@@ -23,7 +23,8 @@ from math import exp
 import numpy as np
 
 from beaver_ftc.compiled import kernel, record, row_of
-from beaver_ftc.diagnosis.detection.filters import advance_bound, project
+from beaver_ftc.diagnosis.detection.directions import project
+from beaver_ftc.diagnosis.detection.filters import advance_bound
 from beaver_ftc.diagnosis.state import fill
 from beaver_ftc.scenario.declared import Declared
 

@@ -1,10 +1,13 @@
 """The worst-case detector: a bank of filters of the innovation with adaptive thresholds.
 
-    nu[k] = (x[k+1] - x[k]) / dt - F[k] = eta[k] + phi[k]
-    eps_m[k+1] = a_m eps_m[k] + dt nu[k],   a_m = exp(-lam_m dt)
+    nu[k] = (x[k] - x[k-1]) / dt - F[k] = eta[k] + phi[k]
+    eps_m[k] = a_m eps_m[k-1] + dt nu[k],   a_m = exp(-lam_m dt)
 
-All filters are exact for the discrete truth x[k+1] = x[k] + dt (F[k] + eta[k]): a residual obeys eps[k+1] = a
-eps[k] + dt eta[k], and its bound obeys the same with eta_bar in place of eta. The guarantees of the theory
+Frame k lasts from sample k-1 to sample k, as in detection.md; F[k], eta[k] and phi[k] are means over it.
+lam_m, 1/s, is the pole of filter m, and a_m its decay per frame.
+
+All filters are exact for the discrete truth x[k] = x[k-1] + dt (F[k] + eta[k]): a residual obeys eps[k] = a
+eps[k-1] + dt eta[k], and its bound obeys the same with eta_bar in place of eta. The guarantees of the theory
 therefore hold at any frame rate, without an allowance for discretisation.
 
 Every filter has the exact bound of its own pole, so the alarm is the first of theirs without further false
@@ -34,17 +37,18 @@ import numpy as np
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.compiled import kernel, record, row_of
+from beaver_ftc.diagnosis.detection.directions import along
 from beaver_ftc.diagnosis.state import STATISTICAL_DETECTOR, WORST_CASE_DETECTOR
 from beaver_ftc.scenario.declared import Declared, SensorErrors
 from beaver_ftc.scenario.diagnosis import MAX_POLES, FdiConfig
 from beaver_ftc.scenario.sensors import NOISE_LIMIT_SIGMA
 
-POLE_DELAYS_S = (0.1, 0.5, 2.0)  # within which a pole of the bank finds the smallest fault
+POLE_DELAYS_S = (0.1, 0.5, 2.0)  # detection delays for which `poles_for_delays` chooses a pole each
 
 
 @kernel
 def leak(x, a, v):
-    """x <- a x + v: filters that keep shares a (m,) of x (m,) in a frame."""
+    """x <- a x + v: filters x (m,) of decays a (m,) per frame, all of input v. The monitors use it too."""
     for m in range(a.size):
         x[m] = a[m] * x[m] + v
 
@@ -53,8 +57,8 @@ def leak(x, a, v):
 def advance_bound(e, eta, a, dt, n=0.0):
     """a e + dt eta + (1 - a) n: bound on a residual, rad/s, a frame later [Zhang2005, sec. IV].
 
-    eta rad/s2: bound on the uncertainty; n rad/s: on the changing part of the gyro's error when the frame
-    began.
+    a: decay per frame; eta rad/s2: bound on the uncertainty; n rad/s: bound on the changing part of the
+    gyro's error when the frame began.
     """
     return a * e + dt * eta + (1.0 - a) * n
 
@@ -83,8 +87,9 @@ def published_interval(lo, hi, Om, th, B):
     return -mu, mu
 
 
-# The bank of detection filters; filter 0 is the published one. residual eps_m, threshold mu rad/s, e its
-# part with a memory; innovation nu rad/s2; peak: largest |eps| / mu in healthy flight.
+# The bank of detection filters; filter 0 is the published one. a: decays per frame; e rad/s: the part of the
+# threshold mu that has a memory; innovation nu rad/s2; residual eps, threshold mu rad/s; peak: largest
+# |eps| / mu in healthy flight.
 BANK_RECORD = record(
     config=record(n_filters=int, a=MAX_POLES), memory=record(e=(MAX_POLES, 3)),
     output=record(innovation=3, residual=(MAX_POLES, 3), threshold=(MAX_POLES, 3), peak=MAX_POLES),
@@ -118,26 +123,10 @@ def filter_poles(config: FdiConfig, declared: Declared) -> tuple[float, ...]:
 
 
 def configure_bank(bank: np.void, config: FdiConfig, declared: Declared, dt: float) -> None:
-    """Fill in the filters' poles: those of the scenario, and those that noise asks for."""
+    """Fill in the filters' decays, from the poles of the scenario and those that noise requires."""
     poles = filter_poles(config, declared)
     bank["config"]["n_filters"] = len(poles)
     bank["config"]["a"][: len(poles)] = [exp(-lam * dt) for lam in poles]
-
-
-@kernel
-def set_directions(isolation, G):
-    """Fix, once, the direction m = (G_r, 0, -G_p) / |.| along which each fault has least effect.
-
-    G (3, n) rad/s2 per rad: at the start of the flight. m has unit length, in the roll-yaw plane, whose two
-    axes are the only ones that one surface moves together. The bound is exact for any fixed direction; this
-    one has power while G keeps its direction, which depends on alpha alone, and weakly.
-    """
-    for fie in isolation.estimator[: isolation.config.n_estimators]:
-        Gp, Gr = G[0, fie.surface], G[2, fie.surface]
-        norm = np.hypot(Gp, Gr)
-        if norm > 0.0:
-            fie.parity_direction[0] = Gr / norm
-            fie.parity_direction[2] = -Gp / norm
 
 
 @kernel
@@ -220,23 +209,8 @@ def keep_bank_peak(bank):
 
 
 @kernel
-def project(m, v, size):
-    """m' v along a direction m; |m|' v if v is a `size`."""
-    total = 0.0
-    for j in range(m.size):
-        total += (abs(m[j]) if size else m[j]) * v[j]
-    return total
-
-
-@kernel
-def along(v, m, i, size):
-    """v_i of a vector v (3,), or, if i = 3, its part along a direction m (3,): see `project`."""
-    return v[i] if i < 3 else project(m, v, size)
-
-
-@kernel
 def fault_range(fie, i):
-    """Least and greatest acceleration on axis i, or along m if i = 3, rad/s2:
+    """Least and greatest acceleration by the fault on axis i, or along its parity direction if i = 3, rad/s2:
 
     h + theta Z +- r,  theta in its set, or no fault at all
     """
@@ -249,7 +223,7 @@ def fault_range(fie, i):
 
 @kernel
 def advance_reach(bank, fie, dt):
-    """Advance the reach of the fault in each filter since the flight began; index 3: along m.
+    """Advance the reach of the fault in each filter since the flight began; 3: along its parity direction.
 
     reach_lo <- a reach_lo + dt lo      reach_hi <- a reach_hi + dt hi
     """
@@ -264,7 +238,7 @@ def advance_reach(bank, fie, dt):
 def is_reachable(bank, fie, shared):
     """True if reach_lo - mu <= eps <= reach_hi + mu for each filter and axis that is not skipped.
 
-    shared: the axes share one parameter; the residual along m is then tested as well.
+    shared: the axes share one parameter; the residual along the parity direction is then tested as well.
     """
     for m in range(bank.config.n_filters):
         for i in range(4):

@@ -34,7 +34,7 @@ from beaver_ftc.aircraft import Aircraft, Term
 from beaver_ftc.aircraft.schema import MAX_SURFACES, MAX_TERMS_OF_ONE
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.table import AIRSPEED, ALPHA, BETA, N_Y
-from beaver_ftc.diagnosis.detection.filters import project
+from beaver_ftc.diagnosis.detection.directions import project
 from beaver_ftc.diagnosis.gusts import drop_accelerometers
 from beaver_ftc.diagnosis.state import PITCH, YAW
 from beaver_ftc.scenario.sensors import ACCELEROMETERS

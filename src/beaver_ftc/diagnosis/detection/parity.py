@@ -50,7 +50,7 @@ import numpy as np
 from beaver_ftc.aircraft.schema import MAX_SURFACES
 from beaver_ftc.compiled import kernel, record, row_of, sized
 from beaver_ftc.diagnosis.detection import likelihood
-from beaver_ftc.diagnosis.detection.filters import project
+from beaver_ftc.diagnosis.detection.directions import project
 from beaver_ftc.diagnosis.detection.forces import (
     MIN_UPDATES,
 )

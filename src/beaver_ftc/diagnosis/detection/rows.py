@@ -46,7 +46,7 @@ from beaver_ftc.design.table import (
     whole_sum,
 )
 from beaver_ftc.diagnosis.bounds import add_published_bound
-from beaver_ftc.diagnosis.detection.filters import project
+from beaver_ftc.diagnosis.detection.directions import project
 from beaver_ftc.diagnosis.detection.forces import (
     MAX_FORCE_REGRESSORS,
     MIN_UPDATES,

@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.compiled import apart, kernel, record, sized
-from beaver_ftc.diagnosis import bounds, isolation, monitors, state
+from beaver_ftc.diagnosis import bounds, isolation, state
 from beaver_ftc.diagnosis import conclusion as conclusions
 from beaver_ftc.diagnosis.bounds import bound_dtype
-from beaver_ftc.diagnosis.detection import fdae, filters, statistical
+from beaver_ftc.diagnosis.detection import directions, fdae, filters, statistical
 from beaver_ftc.diagnosis.detection.filters import bank_share
 from beaver_ftc.diagnosis.detection.parity import USUAL_SIZE, StatisticalSize
-from beaver_ftc.diagnosis.monitors import sensor_monitor
+from beaver_ftc.diagnosis.monitors import engine_monitor, sensor_monitor
 from beaver_ftc.diagnosis.monitors.records import SENSOR_MONITOR_RECORD
 from beaver_ftc.diagnosis.schemes import adaptive_estimators, zhang2005
 from beaver_ftc.diagnosis.state import (
@@ -47,7 +47,7 @@ def fdi_dtype(n: int, size: StatisticalSize = USUAL_SIZE) -> np.dtype:
         fdae=fdae.FDAE_RECORD, verdict=conclusions.conclusion_dtype(n), layout=state.layout_dtype(n),
         isolation=isolation.isolation_dtype(n), types=records.fault_types_dtype(n),
         statistical=statistical.statistical_dtype(size), sensor_monitor=SENSOR_MONITOR_RECORD,
-        published=zhang2005.PUBLISHED_RECORD, engine_monitor=monitors.ENGINE_MONITOR_RECORD,
+        published=zhang2005.PUBLISHED_RECORD, engine_monitor=engine_monitor.ENGINE_MONITOR_RECORD,
         plugin_verdict=state.plugin_verdict_dtype(n),
     )  # fmt: skip
 
@@ -64,7 +64,7 @@ def configure_diagnosis(fdi: np.void, pred: np.void, declared: Declared, travel:
     bounds.configure_bound(fdi["bound"], declared, pred["design"])
     filters.configure_bank(fdi["bank"], config, declared, dt)
     fdae.configure_fdae(fdi["fdae"], declared)
-    monitors.configure_balance(fdi["engine_monitor"]["config"], aircraft)
+    engine_monitor.configure_balance(fdi["engine_monitor"]["config"], aircraft)
     if config.is_published:
         zhang2005.reconfigure(fdi, declared, travel)
     records.configure_types(fdi["types"], fdi["layout"], pred["actuators"], declared, travel)
@@ -140,7 +140,7 @@ def begin_scheme(fdi, prediction, measured):
     """Begin the detection filters at the first frame, all of the gyros' errors to come; fix the parity
     direction of each fault."""
     fdae.start(fdi.bank, fdi.fdae, measured.x, fdi.bound.n_gyro)
-    filters.set_directions(fdi.isolation, prediction.G)
+    directions.set_directions(fdi.isolation, prediction.G)
 
 
 @kernel

@@ -13,11 +13,11 @@ The isolation depends on the fault class, and on the detectors whose exclusions 
 from beaver_ftc.compiled import apart, kernel
 from beaver_ftc.design.model import unanticipated_pitch
 from beaver_ftc.design.table import AIRSPEED, ALPHA, BETA
-from beaver_ftc.diagnosis import conclusion, gusts, isolation, monitors
+from beaver_ftc.diagnosis import conclusion, gusts, isolation
 from beaver_ftc.diagnosis.detection import attitude, fdae, filters, forces, parity, statistical
 from beaver_ftc.diagnosis.detection.rows import finish_rows, update_forces
 from beaver_ftc.diagnosis.model_prediction import fill_old_effects, innovation_known
-from beaver_ftc.diagnosis.monitors import sensor_monitor
+from beaver_ftc.diagnosis.monitors import engine_monitor, sensor_monitor
 from beaver_ftc.diagnosis.state import (
     STATISTICAL_DETECTOR,
     UNANTICIPATED,
@@ -272,7 +272,7 @@ def find_alarm_axis(fdi, y, t):
     no surface is isolated then. y: measured signals."""
     limit = fdi.bound.error_map.yaw_now
     found = fdi.verdict
-    if not found.detected and monitors.detect_engine_failure(fdi.engine_monitor, limit, y):
+    if not found.detected and engine_monitor.detect_engine_failure(fdi.engine_monitor, limit, y):
         conclusion.set_isolated(found, UNANTICIPATED, t)
         return YAW
     return filters.alarm_axis(fdi.bank, fdi.config.authority, fdi.statistical.alarm)

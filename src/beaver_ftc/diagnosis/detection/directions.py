@@ -1,0 +1,41 @@
+"""Projections on a direction, and the parity direction of each isolation estimator.
+
+m (3,)      direction of length 1 in roll, pitch and yaw; other files project on directions of other sizes
+v           vector, or size: bounds of the components of a vector
+G (3, n)    effect of each surface, rad/s2 per rad
+"""
+
+import numpy as np
+
+from beaver_ftc.compiled import kernel
+
+
+@kernel
+def project(m, v, size):
+    """m' v along a direction m; |m|' v if v is a `size`."""
+    total = 0.0
+    for j in range(m.size):
+        total += (abs(m[j]) if size else m[j]) * v[j]
+    return total
+
+
+@kernel
+def along(v, m, i, size):
+    """v_i of a vector v (3,), or, if i = 3, its part along a direction m (3,): see `project`."""
+    return v[i] if i < 3 else project(m, v, size)
+
+
+@kernel
+def set_directions(isolation, G):
+    """Fix, once, the direction m = (G_r, 0, -G_p) / |.| along which each fault has least effect.
+
+    G (3, n) rad/s2 per rad: at the start of the flight. m has unit length, in the roll-yaw plane, whose two
+    axes are the only ones that one surface moves together. The bound is exact for any fixed direction; this
+    one has power while G keeps its direction, which depends on alpha alone, and weakly.
+    """
+    for fie in isolation.estimator[: isolation.config.n_estimators]:
+        Gp, Gr = G[0, fie.surface], G[2, fie.surface]
+        norm = np.hypot(Gp, Gr)
+        if norm > 0.0:
+            fie.parity_direction[0] = Gr / norm
+            fie.parity_direction[2] = -Gp / norm

@@ -80,7 +80,9 @@ from beaver_ftc.diagnosis.state import (
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.diagnosis import MAX_POLES
 
-N_ROUNDS = 4  # each round reduces the remaining travel to the share of it that the tolerance is
+# Rounds of `widen_error`. Each one multiplies the distance of u from its limit by eG / |Z|, the relative
+# error of the surface's effect.
+N_ROUNDS = 4
 
 
 @kernel
@@ -118,10 +120,13 @@ def widen_error(fie, bound, nu, n_substeps):
         r <- r + max(eG (u + first) - eGu, 0) + extra
 
     eta_bar contains these errors at the commanded position. They grow with u, the distance from neutral. How
-    far the surface can have been follows from the frame itself, on the axis of the largest Z, in a few rounds
-    from its travel inwards; every round gives a valid bound. If a frame has several substeps, the surface may
-    still be where it was a frame before at the first of them. The same holds for a map of the model's error,
-    which is for healthy surfaces.
+    far the surface can have been follows from the frame itself, on the axis of the largest Z, in N_ROUNDS
+    rounds that begin with its whole travel; every round gives a valid bound. The same holds for a map of the
+    model's error, which is for healthy surfaces.
+
+    If a frame has n substeps, the surface may at the first of them still be where it was a frame before, at
+    most u_far from neutral. Its mean position may then be p although the other substeps are further out, to
+    make up for the first:  mean |position| <= |p| + first,  first = 2 u_far / n.
     """
     s, phi, emap, i = fie.surface, fie.effect, bound.error_map, 0
     for j in range(1, 3):
@@ -172,8 +177,8 @@ def theta_explains(fie, nu, nu_max):
 
 @kernel
 def narrow_sets(fie, nu, nu_max, shared):
-    """Intersect the sets of a constant theta, on each axis or one if `shared`, with those of frame and
-    filtered residual; false if one is empty.
+    """Intersect the sets of a constant theta with what the frame and the filtered residual allow; false if
+    one of them is empty. Each axis narrows its own set, or, if `shared`, every axis narrows all three.
 
     |eps + Omega thetahat - Omega theta| <= B       for any course of the estimate
     """
@@ -193,8 +198,8 @@ def narrow_sets(fie, nu, nu_max, shared):
 
 @kernel
 def add_to_mean(mean, phi, w, begins):
-    """mean <- mean + w phi, w the share of a frame in the block, which `begins` with this one
-    (EFFECT_RECORD)."""
+    """mean <- mean + w phi (EFFECT_RECORD); w: share of a frame in its block. If the block `begins` with this
+    frame, the mean is zero before."""
     if begins:
         mean.h[:], mean.Z[:], mean.r[:] = 0.0, 0.0, 0.0
     for i in range(3):
@@ -206,15 +211,16 @@ def add_to_mean(mean, phi, w, begins):
 # Acceleration by a fault, rad/s2: h + theta Z, within +/- r.
 EFFECT_RECORD = record(h=3, Z=3, r=3)
 
+# An isolation estimator: its hypothesis, the tests that exclude it, its estimate.
 ESTIMATOR_RECORD = record(
     hypothesis_kind=int, surface=int,
     theta_min=float, theta_max=float,  # the known set of theta
     excluded=int, excluded_at_s=float, pending=int, skip=(int, 3), xhat=3, residual=3, mu_lo=3, mu_hi=3,
     confirmed=int, weak=int, unlikely=int,  # by likelihood ratios
-    # Omega, and the same of the positive part of Z
+    # R_pos: as Omega, of the positive part of Z; residual, B, mu_lo, mu_hi: rad/s
     Om=3, R_pos=3, B=3, B_lag=3, theta=3, P=3, effect=EFFECT_RECORD,
     mean_effect=EFFECT_RECORD,
-    # that the surface can have had: rad; share of its travel
+    # the largest deflection that the surface can have had in the last frame: rad; as a share of its travel
     u_far=float, share_far=float,
     # on the residuals of the bank (filters.py)
     parity_direction=3, reach_lo=(MAX_POLES, 4), reach_hi=(MAX_POLES, 4),
@@ -227,8 +233,14 @@ def isolation_dtype(n: int) -> np.dtype:
     """The isolation estimators, a loss and a position of each surface at most, and how the decision among
     them is sharpened.
 
-    gradient: else by least squares; free: their estimates may leave the known set. hold_s: for so long the
-    one left is not isolated yet. losable (n,): whether damage can take a surface.
+    n_estimators: how many are in use; mu_kind: INTERVAL_THRESHOLD, PUBLISHED_THRESHOLD or CONSTANT_THRESHOLD.
+    a (3,): decay per frame of the estimators' filters, by axis; forget: factor on the information of the
+    least-squares estimate, per frame; gradient: theta is estimated by gradient with this `gain`, not by least
+    squares; free: an estimate may leave the known set.
+    Tests: reach (is a residual of the bank within the fault's reach?), shared (the axes share one theta),
+    narrows (the sets of a constant theta are intersected over frames).
+    hold_s: time, s, for which the last estimator left must have been alone before its fault is isolated.
+    losable (n,): whether damage can take a surface.
     """
     config = record(
         n_estimators=int, mu_kind=int, forget=float, a=3, reach=int, shared=int, narrows=int, gradient=int,
@@ -237,11 +249,12 @@ def isolation_dtype(n: int) -> np.dtype:
     return record(config=config, estimator=(ESTIMATOR_RECORD, 2 * n))
 
 
-DAMAGE_HOLD_OFF_S = 4.0  # in still air what damage left over was excluded within 3.2 s, in 210 flights
+# In 210 flights with damage in still air, the last fault that the damage had left was excluded within 3.2 s.
+DAMAGE_HOLD_OFF_S = 4.0
 LOSS_RANGE = (-1.0, 0.0)
 _THRESHOLD_KINDS = {"interval": INTERVAL_THRESHOLD, "published": PUBLISHED_THRESHOLD}
 
-# Of an isolation estimator: its name, LOSS or POSITION_HYPOTHESIS, the index of its surface.
+# An isolation estimator: its name; LOSS or POSITION_HYPOTHESIS; the index of its surface.
 EstimatorEntry = tuple[str, int, int]
 
 
@@ -277,14 +290,16 @@ def configure_isolation(
         hold_s=DAMAGE_HOLD_OFF_S if aircraft.damage else 0.0,
         losable=[name in losable for name in aircraft.surfaces],
     )  # fmt: skip
-    ends = np.array([np.minimum(travel[0], 0.0), np.maximum(travel[1], 0.0)])  # a share of it can be left
+    # The range of a position contains 0, because a surface that has lost effectiveness acts nearer to 0.
+    ends = np.array([np.minimum(travel[0], 0.0), np.maximum(travel[1], 0.0)])
     for fie, (_, kind, s) in zip(iso["estimator"], rows, strict=False):
         fie["hypothesis_kind"], fie["surface"] = kind, s
         fie["theta_min"], fie["theta_max"] = LOSS_RANGE if kind == LOSS else ends[:, s]
         if config.pairs:  # each plane by itself: pitch by its two surfaces, roll and yaw by theirs
             fie["skip"] = (1, 0, 1) if aircraft.dominant_axis[s] == PITCH else (0, 1, 0)
-    # Damage is outside the class: with declared damage, the last fault left after statistical exclusion is
-    # not isolated yet.
+    # Damage is not in the fault class. If the aircraft declares damage and likelihood ratios exclude faults,
+    # the damage may be what has excluded the others. So each estimator begins weakly excluded: its fault is
+    # isolated only once it is confirmed.
     iso["estimator"]["weak"] = DAMAGE_EXCLUDES if config.weighs_chance and aircraft.damage else 0
 
 

@@ -38,10 +38,16 @@ YAW_PLANE = (YAW, SIDE_FORCE)
 class ParityDirection(NamedTuple):
     """A parity direction as it is set up.
 
-    nulled: the surface to whose column it is orthogonal, VANE_VIEW + the index of a force, or AXIS_VIEW; m_0:
-    ones on the rates and forces that it sees, which `turn_view` replaces in flight unless it is an axis;
-    plane_pair: the two rows that it combines; tested_losses: indices of surfaces; by_inertia: the force is
-    that at the flow angle from inertial motion.
+    nulled: the index of the surface to whose column of G the direction is orthogonal; VANE_VIEW + i if it is
+    orthogonal to the effect of an error of the vane of force i (SIDE_INDEX or NORMAL_INDEX); AXIS_VIEW if it
+    is one row by itself.
+    m_0 (5,): the direction at the start, 1 on each row that the view sees: roll, pitch, yaw, side force,
+    normal force. In flight `turn_view` replaces it, unless nulled is AXIS_VIEW.
+    plane_pair: the two rows in whose plane the direction lies: two rates, or a rate and a force.
+    tested_losses: the indices of the surfaces for whose loss the view tests.
+    by_inertia: the force is that at the flow angle from inertial motion.
+    uses_vane_gust: a view of rates alone may subtract the gust estimate of the vanes. It is false if the
+    direction is roll, or mainly roll, because the vanes measure no rolling gust.
     """
 
     nulled: int
@@ -49,7 +55,7 @@ class ParityDirection(NamedTuple):
     plane_pair: tuple[int, int]
     tested_losses: list[int]
     by_inertia: bool = False
-    uses_vane_gust: bool = False  # for the gust estimate in moving air, which has no rolling component
+    uses_vane_gust: bool = False
 
 
 def list_directions(aircraft: Aircraft, with_forces: bool = False) -> Iterator[ParityDirection]:
@@ -64,7 +70,7 @@ def list_directions(aircraft: Aircraft, with_forces: bool = False) -> Iterator[P
     yield ParityDirection(AXIS_VIEW, _ones_at((ROLL,)), ROLL_YAW_PLANE, lateral)
     yield ParityDirection(AXIS_VIEW, _ones_at((YAW,)), ROLL_YAW_PLANE, lateral, uses_vane_gust=True)
     for s in lateral:
-        rolls = aircraft.dominant_axis[s] == ROLL
+        rolls = aircraft.dominant_axis[s] == ROLL  # then the direction across its column is mainly yaw
         others = [other for other in lateral if other != s]
         yield ParityDirection(s, _ones_at((ROLL,)), ROLL_YAW_PLANE, others, uses_vane_gust=rolls)
     if not with_forces:
@@ -84,7 +90,15 @@ def _ones_at(ones: tuple[int, ...]) -> tuple[float, ...]:
 
 
 def required_size(aircraft: Aircraft) -> StatisticalSize:
-    """The capacities that the records of an aircraft need."""
+    """The capacities that the records of an aircraft need.
+
+    Regressors of a block of rates: the readings and the terms of its moments. A view has in addition the
+    terms of a force, the MAX_FORCE_REGRESSORS - MAX_TERMS_OF_ONE further constants of a force (forces.py),
+    and 2: the drift of the flow angle from inertial motion, and the leak.
+    Hypotheses of a block of rates: 3 for each surface (loss, growing loss, end of a loss), and 2: a step on
+    roll and on yaw, or in pitch a step and a moment in alpha^3. A view has the losses that it tests and 1
+    step.
+    """
     directions = list(list_directions(aircraft, aircraft.forces_separate_surfaces))
     n_rate = N_INPUT_READINGS + _largest_block([moment_axis(term) for term in aircraft.moments])
     n_force = (
@@ -111,12 +125,17 @@ def configure_parity_views(stat: np.void, aircraft: Aircraft) -> None:
     """Fill the views of a statistical record whose rows, blocks and forces are already set up."""
     forces = stat["forces"]
     gusty = bool(stat["gust"]["output"]["gusty"])
+    # Rates subtract the gust estimate of the vanes only if both forces are used and separate surfaces
+    # (parity.py).
     subtracts = forces["in_use"] and gusty and all(aircraft.separated_by_force(name) for name in FORCE_NAMES)
+    # The views have a gust estimate of their own, `vaned`, only if accelerometers may break.
+    accelerometers_may_break = stat["vaned"]["output"]["gusty"]
     directions = list(list_directions(aircraft, bool(forces["in_use"])))
     stat["n_views"] = len(directions)
     for view, d in zip(stat["views"][: len(directions)], directions, strict=True):
-        may_alarm = d.nulled == AXIS_VIEW  # and no alarm rests on accelerometers that may break
-        vaned = subtracts and d.uses_vane_gust and not (may_alarm and stat["vaned"]["output"]["gusty"])
+        # The view of an axis may raise an alarm, and the gust estimate uses accelerometers: no alarm may
+        # depend on accelerometers that may break.
+        vaned = subtracts and d.uses_vane_gust and not (d.nulled == AXIS_VIEW and accelerometers_may_break)
         _configure_view(view, d, gusty, vaned)
         rates = stat["block"][PITCH_BLOCK if d.plane_pair == PITCH_PLANE else LATERAL_BLOCK]
         _configure_filter(view["block"], d, rates)
@@ -125,12 +144,15 @@ def configure_parity_views(stat: np.void, aircraft: Aircraft) -> None:
 
 
 def _configure_view(view: np.void, d: ParityDirection, gusty: bool, vaned: bool) -> None:
-    """Fill the rows that a view combines, the axis that its alarm names, and which errors it does not see.
+    """Fill the rows that a view combines, the axis that its alarm names, what is subtracted from its rates
+    (`source`), and the force of the views that confirm it.
 
-    vaned: whether the gust estimate by vanes is subtracted, although it sees no force.
+    vaned: whether the gust estimate of the vanes is subtracted from a view that sees no force. A view that
+    sees a force always has it subtracted, unless that view excludes the vane.
     """
     is_axis, across_vane, by_force = d.nulled == AXIS_VIEW, d.nulled >= VANE_VIEW, any(d.m_0[SIDE_FORCE:])
     i, j = d.plane_pair
+    # In moving air a view across the error of the side vane is orthogonal to the rolling gust as well.
     across_gust = across_vane and d.plane_pair == YAW_PLANE and gusty
     source = VANED if vaned or by_force else RAW
     if d.by_inertia or across_vane:
@@ -171,8 +193,10 @@ def _configure_columns(
 
 def _configure_hypotheses(b: np.void, d: ParityDirection, gusty: bool) -> None:
     """Fill the hypotheses of a view: a step of its innovation, and a loss of each surface that it tests."""
-    # A law that uses the vanes reacts to a gust before the gyros measure its pitching effect, and these
-    # views do not use the vanes. The elevator's effect then correlates with the noise: no loss is tested.
+    # In moving air a view that sees the pitch rate tests no loss. A law that uses the vanes reacts to a gust,
+    # and to the noise of the vanes, before the gyros measure a pitching effect. The effect of the elevator
+    # then correlates with the noise of the view: with the whole gust, or, if the gust estimate of the vanes
+    # is subtracted, with the noise of that estimate and the gust that it leaves.
     lost = [] if gusty and d.m_0[PITCH] else d.tested_losses
     kinds = [STEP_FAULT, *(LOSS for _ in lost)]
     b["n_h"] = len(kinds)

@@ -1,5 +1,8 @@
 """The records of the fault types, and their configuration.
 
+Frames are examined in blocks of `frames_per_block` frames. Where that is 1, a block is one frame, and "block"
+below means a frame. (2, N_TYPES): the slots EARLIER and LATER of release.py, by type.
+
 types: of `fault_types_dtype`.
 """
 
@@ -15,79 +18,101 @@ from beaver_ftc.diagnosis.types import OBSERVATION_RECORD
 from beaver_ftc.diagnosis.types.registry import N_TYPES, TYPES
 from beaver_ftc.scenario.declared import Declared
 
-# Of frames examined together where gyros are noisy: much less than the slowest half-cycle, by default 3.1 s.
+# Duration of a block where gyros are noisy: much less than the slowest half-cycle, by default 3.1 s.
 BLOCK_DURATION_S = 0.2
 MAX_BLOCK = 256  # frames of a block
-N_KEPT = 3  # frames, or blocks, of which the orders are kept: the elapsed one and two before it
+N_KEPT = 3  # blocks whose commands are kept: the elapsed one and two before it
 
-# Commands to one surface, rad; [0] belongs to the elapsed frame or block, [1] to the one before.
+# Commands to one surface, limited by its stops, rad. First index: 0 the elapsed block, 1 the one before, 2
+# the one before that.
 COMMANDS_RECORD = record(
-    history=(N_KEPT, MAX_BLOCK), cmd_min=N_KEPT,
-    cmd_max=N_KEPT,
-    u_min=2, u_max=2,  # where a healthy surface was within it
-    # G of the surface within the elapsed frame or block, on its dominant axis, rad/s2 per rad
+    history=(N_KEPT, MAX_BLOCK),  # the command of each frame of the block
+    cmd_min=N_KEPT, cmd_max=N_KEPT,  # the least and the greatest of them
+    u_min=2, u_max=2,  # least and greatest deflection of a healthy surface within the block
+    # least and greatest G within the elapsed block, on the surface's dominant axis, rad/s2 per rad
     G_min=float, G_max=float,
 )  # fmt: skip
 
-# Configuration: the actuator of one surface; rad. runaway: rad/s; approaches: shares of the way in a JSBSim
-# step; uncertain: 0 or 1. It acts where it can reach: a part of its travel is nearer to zero.
+# Configuration: the actuator of one surface. A step is one JSBSim step.
 ACTUATOR_CONFIG_RECORD = record(
-    stop_lo=float, stop_hi=float, reach_lo=float, reach_hi=float, runaway=float,
-    approaches=2, steps=2, band=float, uncertain=int,
-    # the least step of a slow one, and from where on its lag or dead band makes steps smaller
-    slow_step=float, near=float,
+    stop_lo=float, stop_hi=float,  # rad
+    # Deflections, rad, whose moment the surface can have: its travel, extended to 0, because a surface that
+    # has lost effectiveness acts like one nearer to 0.
+    reach_lo=float, reach_hi=float,
+    runaway=float,  # least rate of a runaway, rad/s
+    approaches=2,  # least and greatest share of the way to its command that it moves in a step
+    steps=2, band=float,  # least and greatest limit of a step; how far from its command it may stay; rad
+    uncertain=int,  # whether errors of the actuators are declared
+    slow_step=float,  # least step of a surface under a rate-limit fault, rad
+    near=float,  # within this distance from its command lag or dead band may make that step smaller, rad
 )  # fmt: skip
 
-# The set of each type's parameter: types/__init__.py; and what was known of the first of two faults when it
-# was named: pairs.py.
+# The feasible set of each type's parameter, its least and greatest value, and whether the type is excluded.
 FEASIBLE_SETS_RECORD = record(low=N_TYPES, high=N_TYPES, excluded=(int, N_TYPES))
 
-# Counts of frames in which something was wrong: all; those in which a surface that was given up stayed at its
-# rest position; those since a stop could last hide a deflection. The first such frame, and where the surface
-# was in it, rad.
+# Evidence, counted in blocks that are judged.
 EVIDENCE_RECORD = record(
-    n_anomalous=int, n_rest=int, n_unhidden=int, k_first=int, first_lo=float, first_hi=float
-)
+    # blocks in which something was wrong, and blocks in which nothing was, but a surface that was given up
+    # stayed where it rests: that is evidence too (`count_rest`)
+    n_anomalous=int,
+    n_rest=int,  # of n_anomalous, the blocks in which this surface stayed where it rests
+    n_unhidden=int,  # of n_anomalous, the blocks since a stop could last hide a deflection
+    k_first=int,  # the first block in which something was wrong, -1 for none
+    first_lo=float, first_hi=float,  # where the surface was in block k_first, rad
+)  # fmt: skip
 
-# Whether the surface may be the only one at fault; what decides whether it can be at fault:
-# BY_ESTIMATOR, DEDUCED_FAULTY or DEDUCED_HEALTHY (verdict.py);
-# whether it is isolated, of which type, -1 if open, and since when, s: pairs.py.
 STATUS_RECORD = record(
-    may_be_sole=int, basis=int, is_isolated=int, isolated_at_s=float, fault_type=int, typed_at_s=float
-)
+    may_be_sole=int,  # whether the surface may be the only one at fault
+    # what decides whether it can be at fault: BY_ESTIMATOR, DEDUCED_FAULTY or DEDUCED_HEALTHY (verdict.py)
+    basis=int,
+    is_isolated=int, isolated_at_s=float,
+    fault_type=int, typed_at_s=float,  # type of the isolated fault, -1 if open; since when, s
+)  # fmt: skip
 
-# The mode of accommodation, -1 for none; frames since the fault last showed: verdict.py.
+# The mode of accommodation, -1 for none; frames since the fault last showed.
 ACCOMMODATION_RECORD = record(mode=int, n_silent=int)
 
-# Where a surface can be that a type has held and released, rad: release.py. held: where it is held by then;
-# set: the set of the type before the release.
+# The return of a surface that a type has held and released, rad; release.py has the theory. back: where the
+# surface can be on its way; released: whether it has been released; held: where the type holds it by then;
+# set: the set of the type's parameter before the release.
 RELEASE_RECORD = record(
     back_lo=(2, N_TYPES), back_hi=(2, N_TYPES), released=(int, N_TYPES), held_lo=N_TYPES, held_hi=N_TYPES,
     set_lo=(2, N_TYPES), set_hi=(2, N_TYPES),
 )  # fmt: skip
 
-# What the types go by: whether a frame shows one instant, instants in it, whether a surface returns by its
-# actuator, frames of half of the slowest oscillation, whether a fault is declared to stay as it is and errors
-# of the surfaces' own terms are; frames of a block and its duration; dt s.
+# Configuration that all types read.
 TYPES_CONFIG_RECORD = record(
-    single_instant=int, n_substeps=int, returns_lagged=int, half_frames=int, abrupt=int, has_eG=int,
+    single_instant=int,  # whether a block is one JSBSim step
+    n_substeps=int,  # JSBSim steps in a frame
+    returns_lagged=int,  # whether a repaired surface returns with lag or rate limit
+    half_frames=int,  # blocks in half a cycle of the slowest oscillation
+    abrupt=int,  # whether a fault is declared to stay as it is
+    has_eG=int,  # whether errors of the surfaces' own terms are declared
     frames_per_block=int, block_duration_s=float, dt=float,
 )  # fmt: skip
 
-# Two faults at once: pairs.py; alarms of the groups, and what is known of the first fault in pitch.
-# n_unstored: frames since a type was excluded on its surface that is not yet excluded in the stored sets.
+# Two faults at once (pairs.py).
 FAULT_PAIR_RECORD = record(
-    enabled=int, group_alarm=(int, 2), lateral_outside=int, first_pitch=int, n_unstored=int
-)
+    enabled=int,
+    group_alarm=(int, 2),  # whether PITCH_GROUP and LATERAL_GROUP have an alarm
+    lateral_outside=int,  # whether no deflections of ailerons and rudder within reach explain a frame
+    first_pitch=int,  # surface of the first fault in pitch, -1 for none
+    n_unstored=int,  # frames since its `sets` exclude a type that its `first_sets` do not
+)  # fmt: skip
 
-# Blocks of frames.
+# The block that is being filled: frames so far; means of innovation and bound, rad/s2; nbar at its start,
+# rad/s.
 FRAME_BLOCK_RECORD = record(n_so_far=int, nu=3, nu_bound=3, n_start=3)
 
 
 @lru_cache
 def surface_types_dtype() -> np.dtype:
-    """One surface's records: configuration, observations (types/__init__.py), the memories of the types, and
-    what is concluded. not_at_position: as verdict.py keeps it."""
+    """The records of one surface: configuration, observations of three blocks (types/__init__.py), the
+    memories of the types, and what is concluded.
+
+    not_at_position: whether the estimator of its position is excluded. first_sets: its feasible sets as
+    stored when its fault was the first of two (pairs.py).
+    """
     memories = {row.memory_record_name: row.memory_dtype for row in TYPES if row.memory_dtype}
     return record(
         actuator=ACTUATOR_CONFIG_RECORD, commands=COMMANDS_RECORD, last=OBSERVATION_RECORD,
@@ -102,7 +127,7 @@ def surface_types_dtype() -> np.dtype:
 
 @sized
 def fault_types_dtype(n: int) -> np.dtype:
-    """Faults of every type on n surfaces: types/."""
+    """Faults of every type on n surfaces."""
     return record(
         config=TYPES_CONFIG_RECORD,
         frame_index=int,

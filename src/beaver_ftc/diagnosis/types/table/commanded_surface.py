@@ -12,6 +12,9 @@ half-cycles above a level that noise cannot reach is how oscillatory failures ar
 
 *Rate limit*: p moves only towards its command, at any rate down to the slowest declared. A slower surface
 counts as stuck: the two types are each other's limit, and only a least rate distinguishes them.
+
+`consistent_interval` and what it calls test the judged frame: srf.judged, srf.commands[1]. `deflection_range`
+gives the deflection in the elapsed frame: srf.last, srf.commands[0]. With blocks, each is a block of frames.
 """
 
 from math import pi, sqrt
@@ -56,7 +59,7 @@ def loss_interval(c, srf, h, k):
 
 @kernel
 def loss_range(c, srf, h, k):
-    """(1 + theta) u, least and greatest over the set of 1 + theta, rad."""
+    """(1 + theta) u in the elapsed frame, least and greatest over the set of 1 + theta, rad."""
     lo, hi = srf.sets.low[h] * srf.last.u, srf.sets.high[h] * srf.last.u
     return min(lo, hi), max(lo, hi)
 
@@ -69,8 +72,9 @@ def varying_loss_set(c, srf, h, k):
     return EMPTY_SET if lo > hi and not changed else UNLIMITED_SET
 
 
-def theta_of_loss(fdi: np.void, s: int, h: int) -> float | None:
-    """theta; where pairs are diagnosed, of its set: the estimator fits axes that a second fault may move."""
+def theta_of_loss(fdi: np.void, s: int, h: int) -> float:
+    """theta of the estimator. Where pairs are diagnosed, the middle of the set of theta instead, because the
+    estimator fits axes that a second fault may move."""
     return middle_estimate(fdi, s, h) - 1.0 if fdi["types"]["pair"]["enabled"] else theta_fitted(fdi, s, h)
 
 
@@ -80,7 +84,7 @@ def theta_fitted(fdi: np.void, s: int, h: int) -> float:
     return float(estimator["theta"][int(fdi["layout"]["dominant_axis"][s])])
 
 
-def theta_of_set(fdi: np.void, s: int, h: int) -> tuple[float, float] | None:
+def theta_of_set(fdi: np.void, s: int, h: int) -> tuple[float, float]:
     """Return the interval of theta."""
     lo, hi = feasible_set(fdi, s, h)
     return lo - 1.0, hi - 1.0
@@ -115,8 +119,8 @@ MAX_GROWTH_RATIO = 1.8
 def bias_of_frame(c, srf, h, k):
     """b = p - u of the surface in the judged frame, (lo, hi) rad: unlimited at a stop.
 
-    A surface at its stop may be off by more than it shows; so may one that was there at an instant of it.
-    Nothing but a loss takes it beyond.
+    A surface that was at its stop at any instant of the frame may have a larger offset than it shows. An
+    offset takes no surface beyond its stop: NO_THETA.
     """
     seen, cmd, act = srf.judged, srf.commands, srf.actuator
     if seen.hi < act.stop_lo or seen.lo > act.stop_hi:
@@ -138,14 +142,14 @@ def bias_middle(srf, h):
 
 @kernel
 def bias_range(c, srf, h, k):
-    """u + b, cut off by the stops, least and greatest over the set of b, rad."""
+    """u + b in the elapsed frame, cut off by the stops, least and greatest over the set of b, rad."""
     lo = mean_with_offset(srf, srf.sets.low[h], srf.commands.u_min[0])
     return lo, mean_with_offset(srf, srf.sets.high[h], srf.commands.u_max[0])
 
 
 @kernel
 def mean_with_offset(srf, b, u_end):
-    """Mean of u + b (rad) over the frame; if a stop is met at an instant, that of u_end + b."""
+    """Mean of u + b, rad, over the elapsed frame; if u + b meets a stop there, that of u_end + b."""
     cmd, act = srf.commands, srf.actuator
     stops = cmd.u_min[0] + b < act.stop_lo or cmd.u_max[0] + b > act.stop_hi
     return clip_travel(srf, u_end + b) if stops else srf.last.u + b
@@ -159,7 +163,7 @@ def bias_interval(fdi: np.void, s: int, h: int) -> tuple[float, float] | None:
 
 @kernel
 def reset_growing(srf, h):
-    """It has not grown yet."""
+    """The offset has not grown yet."""
     M = srf.growing_bias
     M.up = M.down = 0.0
     M.has_run[:] = 0
@@ -183,9 +187,11 @@ def widen_offset(c, srf, h, k, skipped):
 
 @kernel
 def narrow_offset(c, srf, lo, hi):
-    """Hold an offset b in (lo, hi) rad against what a slower one than a runaway can be.
+    """Narrow the interval of an offset that is slower than a runaway by the observed b in (lo, hi), rad; if
+    the two do not meet, the offset has run.
 
-    A mean over several instants may be that of the last of them.
+    The next frame begins with the offset at the end of this one. If this frame has several instants, the
+    offset at its end differs from the observed mean by up to `max_growth`.
     """
     M = srf.growing_bias
     if hi < M.b_lo:
@@ -199,7 +205,7 @@ def narrow_offset(c, srf, lo, hi):
 
 @kernel
 def update_growing(c, srf, h, k):
-    """It keeps its sign and does not shrink; at a stop it may be larger than it shows."""
+    """The offset keeps its sign and does not shrink; at a stop it may be larger than it shows."""
     lo, hi = bias_of_frame(c, srf, h, k)
     if lo <= hi:
         narrow_offset(c, srf, lo, hi)
@@ -221,8 +227,8 @@ def has_run(srf, h, stop):
     return srf.growing_bias.has_run[1 if stop == 1 else 0] == 1
 
 
-def last_offset(fdi: np.void, s: int, h: int) -> float | None:
-    """Offset in the last frame, rad: `types.last_error` outside compiled code."""
+def last_offset(fdi: np.void, s: int, h: int) -> float:
+    """Offset in the elapsed frame, rad: as `types.last_error`, for Python code."""
     last = fdi["types"]["surface"][s]["last"]
     return float(0.5 * (last["lo"] + last["hi"]) - last["u"])
 
@@ -243,13 +249,14 @@ GROWING_BIAS = FaultType(
     reset_memory=reset_growing, see_frame=widen_offset, consistent_interval=update_growing,
     memory_record_name="growing_bias",
     memory_dtype=record(
-        up=float, down=float,  # how far it has certainly grown, rad
-        # between what a slower one lies, rad; whether it has certainly run as fast as a runaway, down and up
-        b_lo=float, b_hi=float, has_run=(int, 2),
+        up=float, down=float,  # how far the offset has certainly grown, upwards and downwards, rad
+        b_lo=float, b_hi=float,  # interval of an offset that is slower than a runaway, rad
+        has_run=(int, 2),  # whether the offset has certainly run as fast as a runaway: down, up
     ),
-    # an offset that grows ends as good as constant, with any commands
+    # an offset that has stopped growing is constant under any command
     follows_command=False,
-    # as the command happens to go it looks like a jam or a loss; come to the stop by and by, like a runaway
+    # For some courses of the command p = u + b looks like a jam or a loss; once b has slowly moved the
+    # surface to its stop, it looks like a runaway.
     can_look_like=("loss_of_effectiveness", "stuck", "float", "hardover"),
     motion_rules_out=has_run,
     accommodation_mode=SUBTRACT_OFFSET, frames_test="growing offset",
@@ -262,15 +269,15 @@ MIN_HALF_CYCLES = 3  # two whole ones, and the first, which is cut off at its be
 
 @kernel
 def reset_swing(srf, h):
-    """No half-cycle has been seen."""
+    """No half-cycle has been counted."""
     srf.oscillatory.n_half = srf.oscillatory.sign = 0
     srf.oscillatory.square = srf.oscillatory.square_past = 0.0
 
 
 @kernel
 def add_square(c, srf, h, k, skipped):
-    """Add (p - u)^2 of this frame to the sum of the half-cycle. In a skipped frame it may have swung to the
-    other side, unseen."""
+    """Add (p - u)^2 of the judged frame to the sum of the half-cycle. In a skipped frame the surface may have
+    swung to the other side, unseen."""
     lo, hi = error_of_frame(srf)
     srf.oscillatory.square += (0.5 * (lo + hi)) ** 2
     if skipped:
@@ -281,8 +288,8 @@ def add_square(c, srf, h, k, skipped):
 def update_swing(c, srf, h, k):
     """Count half-cycles; a sign that stays for longer than the slowest half-cycle is no oscillation.
 
-    At a stop half of a swing is hidden: where several instants are seen at once, the mean of a quick one
-    keeps its sign.
+    At a stop half of a swing is hidden. If a frame has several instants, the mean of a quick swing over them
+    then keeps its sign, so such a frame is no evidence against an oscillation.
     """
     M = srf.oscillatory
     lo, hi = error_of_frame(srf)
@@ -305,17 +312,17 @@ def update_swing(c, srf, h, k):
 
 @kernel
 def swing_has_shown(srf, h):
-    """Whether it has swung for two whole half-cycles."""
+    """Whether the surface has swung for two whole half-cycles."""
     return srf.oscillatory.n_half >= MIN_HALF_CYCLES
 
 
-def swing_amplitude(fdi: np.void, s: int, h: int) -> float | None:
+def swing_amplitude(fdi: np.void, s: int, h: int) -> float:
     """Amplitude sqrt(2 mean (p - u)^2), rad."""
     M = fdi["types"]["surface"][s]["oscillatory"]
     return float(sqrt(2.0 * M["square_past"] / (M["last_end"] - M["first_end"])))
 
 
-def swing_frequency(fdi: np.void, s: int, h: int) -> float | None:
+def swing_frequency(fdi: np.void, s: int, h: int) -> float:
     """Frequency pi n / T, rad/s, of the n whole half-cycles that took T s."""
     M = fdi["types"]["surface"][s]["oscillatory"]
     n = int(M["n_half"]) - 1
@@ -344,15 +351,16 @@ OSCILLATORY = FaultType(
 
 @kernel
 def reset_creep(srf, h):
-    """No frame has been seen, and none before it."""
+    """No frame has been judged: k_last + 1 = -1 is before the first frame, 0."""
     srf.rate_limit.k_last = -2
 
 
 @kernel
 def update_creep(c, srf, h, k):
-    """It never moves away from its command, so while it stands on one side it comes nearer.
+    """A slow surface never moves away from its command, so while it stands on one side it comes nearer.
 
-    Of several JSBSim steps in a frame the first is the old command's.
+    If a frame has several JSBSim steps, the first still follows the command of the frame before
+    (`commands_of_frame`).
     """
     seen, M, side, away = srf.judged, srf.rate_limit, side_of_commands(c, srf), False
     if side == 0 or side != M.side or k != M.k_last + 1:
@@ -373,12 +381,12 @@ def narrow_creep(c, srf, M, side):
         above its command (side 1)    hi <- min(hi, max(hi - d, u_hi + near)),    d = slow_step instants
         below it (side -1)            lo <- max(lo, min(lo + d, u_lo - near))
 
-    u_lo, u_hi: orders of the frame, rad; slow_step: the least step an instant; nearer to the order than
+    u_lo, u_hi: `commands_of_frame`, rad; slow_step: the least step in an instant; nearer to the command than
     `near` the lag makes the steps smaller. Where it was at an instant bounds where it is a frame later.
     """
     motion = c.n_substeps * c.frames_per_block * srf.actuator.slow_step
     near = srf.actuator.near
-    lo, hi = orders_of_frame(c, srf)
+    lo, hi = commands_of_frame(c, srf)
     if side == 1:
         M.hi = min(M.hi, max(M.hi - motion, hi + near))
     else:
@@ -386,16 +394,20 @@ def narrow_creep(c, srf, M, side):
 
 
 @kernel
-def orders_of_frame(c, srf):
-    """The least and greatest order that moved it towards and within the judged frame, rad."""
+def commands_of_frame(c, srf):
+    """The least and greatest command that moved the surface into and within the judged frame, rad.
+
+    If the frame has one instant, only the command of the frame before it has moved the surface; otherwise the
+    commands of both frames have.
+    """
     cmd, b = srf.commands, 2 if c.single_instant else 1
     return min(cmd.cmd_min[2], cmd.cmd_min[b]), max(cmd.cmd_max[2], cmd.cmd_max[b])
 
 
 @kernel
 def side_of_commands(c, srf):
-    """1 for a surface certainly above all it was ordered to, -1 below, 0 otherwise."""
-    lo, hi = orders_of_frame(c, srf)
+    """1 for a surface certainly above all commands of the frame, -1 for one below them, 0 otherwise."""
+    lo, hi = commands_of_frame(c, srf)
     return 1 if srf.judged.lo > hi else (-1 if srf.judged.hi < lo else 0)
 
 
@@ -404,11 +416,10 @@ RATE_LIMIT = FaultType(
     reset_memory=reset_creep, consistent_interval=update_creep,
     memory_record_name="rate_limit",
     memory_dtype=record(
-        # where it can be while it stands on one side of its command, rad
-        lo=float, hi=float,
-        side=int, k_last=int,  # which side, and the last frame of which that is known
+        lo=float, hi=float,  # where the surface can be while it stands on one side of its command, rad
+        side=int, k_last=int,  # as `side_of_commands`, and the last judged frame, in which that was the side
     ),
-    # a slow surface that has not been seen to creep looks as if it stood still
+    # a slow surface that has not moved visibly looks like one that stands still
     evidence_at_rest=REST_HIDES_TYPE, can_look_like=("stuck", "float", "hardover"),
     accommodation_mode=WAIT_FOR_SURFACE,
     frames_test="approach",

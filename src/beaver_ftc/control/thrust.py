@@ -1,8 +1,13 @@
 """Thrust over power, and power over thrust.
 
-Of a piston engine whose slipstream is among the forces, the slope of thrust over power where it is now; of
-any other, a table of steady thrust over airspeed and power, as the aircraft's file has it. Power is in the
-units of its setting.
+If the engine is a piston engine whose slipstream is among the forces, its thrust has a slope over the
+manifold pressure, taken at the present state. Any other engine has a table of steady thrust over airspeed and
+setting, `engine.thrust` of the aircraft's file.
+
+    power       engine setting, in its own units: inHg of a piston engine
+    trim        the setting in trim, same units
+    push        slope of the acceleration over the setting, m/s2 per unit; used if there is no table
+    engine      record, ENGINE
 """
 
 from typing import Any
@@ -16,10 +21,12 @@ from beaver_ftc.design.table import DPT, QDYN
 LEAST_PUSH = 1e-3  # m/s2 per inHg
 LEAST_RISE = 1e-4  # m/s2 from one setting to the next, so that each has its own
 
-# Settings and airspeeds (m/s) there are, thrust over mass (m/s2) at these, and at the airspeed of the frame.
+# The table of an engine; `settings` is 0 if there is none.
 ENGINE = record(
-    settings=int, airspeeds=int, setting=MAX_THRUST, airspeed=MAX_THRUST, table=(MAX_THRUST, MAX_THRUST),
-    now=MAX_THRUST,
+    settings=int, airspeeds=int,  # how many of each are in use
+    setting=MAX_THRUST, airspeed=MAX_THRUST,  # both rising; in units of the setting, m/s
+    table=(MAX_THRUST, MAX_THRUST),  # [airspeed, setting]: thrust over mass, m/s2
+    now=MAX_THRUST,  # by setting, at the airspeed of the frame: thrust over mass, m/s2
 )  # fmt: skip
 
 
@@ -45,22 +52,28 @@ def between(at, n, x, y):
 
 @kernel
 def look_up(engine, airspeed):
-    """Fill engine.now for an airspeed, m/s."""
+    """Fill engine.now (settings,), m/s2, from the table at an airspeed, m/s."""
     for j in range(engine.settings):
         engine.now[j] = between(airspeed, engine.airspeeds, engine.airspeed, engine.table[:, j])
 
 
 @kernel
-def thrust_per_inhg(thrust, alpha, airspeed, power, y):
-    """Acceleration along the path per inHg of manifold pressure, m/s2; thrust (2,): of the slipstream."""
-    dpt_per_inhg = power.config.dpt_factor / (2.0 * y[QDYN] * airspeed)
+def thrust_per_inhg(thrust, alpha, airspeed, control, y):
+    """Acceleration along the path per inHg of manifold pressure, m/s2, and no less than LEAST_PUSH.
+
+        d/dinHg [qdyn (thrust[0] dpt + thrust[1] alpha dpt^2)]
+
+    thrust (2,), m/s2 per Pa: acceleration by dpt, and by dpt^2 per rad of alpha, over qdyn. alpha rad,
+    airspeed m/s; control: POWER record of power.py; y: readings.
+    """
+    dpt_per_inhg = control.config.dpt_factor / (2.0 * y[QDYN] * airspeed)
     slope = thrust[0] + 2.0 * thrust[1] * alpha * y[DPT]
     return max(y[QDYN] * slope * dpt_per_inhg, LEAST_PUSH)
 
 
 @kernel
 def gained(engine, push, trim, power):
-    """The acceleration by which a power exceeds that in trim, m/s2; push: its slope if there is no table."""
+    """How much more acceleration the setting `power` gives than the setting `trim`, m/s2."""
     if engine.settings == 0:
         return push * (power - trim)
     there = between(power, engine.settings, engine.setting, engine.now)
@@ -69,7 +82,7 @@ def gained(engine, push, trim, power):
 
 @kernel
 def power_for(engine, push, trim, acceleration):
-    """The power whose acceleration exceeds that in trim by so much, m/s2: the inverse of `gained`."""
+    """The setting that gives `acceleration`, m/s2, more than the setting `trim`: the inverse of `gained`."""
     if engine.settings == 0:
         return trim + acceleration / push
     wanted = acceleration + between(trim, engine.settings, engine.setting, engine.now)

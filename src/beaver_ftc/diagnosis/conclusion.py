@@ -36,13 +36,23 @@ WITHDRAWN_RECORD = record(surface=int, fault_type=int, from_s=float, to_s=float,
 
 @sized
 def conclusion_dtype(n: int) -> np.dtype:
-    """The conclusion about n surfaces.
+    """The conclusion about n surfaces; times in s.
 
-    isolated_estimator: that of the isolated fault, NOT_ISOLATED or UNANTICIPATED. fault_type: of the isolated
-    fault, -1 if open. target, accommodation_mode: the surface the law acts upon, and its accommodation mode.
-    effectiveness: of every surface, where a plug-in estimates it (has_effectiveness). from_s: since when each
-    surface is isolated, -1 if it is not; isolated_type, type_from_s: its type, -1 if open, and since when.
-    gone, withdrawn_types: what was isolated before, and of which other type.
+    The fault:
+    detected, detected_at_s, axis: whether there is an alarm, since when, on which axis
+    isolated_estimator, isolated_at_s: estimator of the isolated fault, NOT_ISOLATED or UNANTICIPATED
+    fault_type, typed_at_s: number of its type, -1 if open
+    target, accommodation_mode: the surface on which the law acts, and how; -1 for none
+    has_effectiveness, effectiveness (n,): of every surface, if a plug-in estimates it
+
+    Each surface (n,):
+    from_s: since when the surface is isolated, -1 if it is not
+    isolated_type, type_from_s: its type, -1 if open, and since when. Types of one name have one number here,
+    that of the first (SAME_NAME of types/registry.py).
+
+    Isolations that were withdrawn, and how many there were:
+    gone, n_gone: surfaces
+    withdrawn_types, n_gone_types: types of surfaces that stayed isolated
     """
     return record(
         detected=int, detected_at_s=float, axis=int, isolated_estimator=int, isolated_at_s=float,
@@ -169,8 +179,9 @@ def assessment_dtype(n: int) -> np.dtype:
     detected: a fault; no_target: true without a fault as well; isolated_surface: -1 for none. lags: a surface
     follows its command late. accommodation_mode: of each surface, -1 where open, or where faults of every
     type are not diagnosed; effectiveness; at_once: whether the law applies it at once, not gradually; offset,
-    lag rad. unknown_acceleration (3,) rad/s2: explained by no known fault. pitch_undecided: the elevator may
-    be at fault, and it has long been open. held: the surfaces are assessed as before a sensor broke.
+    lag rad. unknown_acceleration (3,) rad/s2: explained by no known fault. pitch_undecided: the main surface
+    of pitch may be at fault, and it has long been open. held: the surfaces are assessed as before a sensor
+    broke.
     """
     return record(
         detected=int, no_target=int, diagnoses_all_types=int, isolated_surface=int, lags=int,
@@ -235,8 +246,11 @@ def assess_surface(out, types, layout, fies, s):
 
 @kernel
 def isolated_theta(cfg, found, layout, fies, stat, s):
-    """Estimated theta of the isolated loss of surface s, under noise the most likely one; one over its
-    variance, 0 in the worst case."""
+    """The estimated theta of the isolated loss of surface s, and one over its variance.
+
+    The statistical detector gives the most likely theta. If its estimates are not used, theta is that of the
+    loss's estimator, whose variance is not known: 0 stands for one over it.
+    """
     if weighs_statistics(stat, cfg.authority):
         return statistical.estimate_loss(stat.block, s)
     return fies[found.isolated_estimator].theta[layout.dominant_axis[s]], 0.0
@@ -261,7 +275,7 @@ def assess_unknown(out, cfg, found, types, layout, stat, fdae, bound):
             statistical.fill_unmodelled(stat.block, stat.gust, unknown)
         else:
             fdae_unmodelled(fdae, bound.n_gyro, unknown)
-    elevator = types.surface[layout.main[PITCH]]
-    waited = elevator.evidence.n_anomalous >= types.config.half_frames and verdict.can_be_faulty(elevator)
+    main = types.surface[layout.main[PITCH]]
+    waited = main.evidence.n_anomalous >= types.config.half_frames and verdict.can_be_faulty(main)
     not_isolated = found.detected and found.isolated_estimator == NOT_ISOLATED
     out.pitch_undecided = cfg.diagnoses_all_types and not_isolated and waited

@@ -124,9 +124,9 @@ def widen_error(fie, bound, nu, n_substeps):
     rounds that begin with its whole travel; every round gives a valid bound. The same holds for a map of the
     model's error, which is for healthy surfaces.
 
-    If a frame has n substeps, the surface may at the first of them still be where it was a frame before, at
-    most u_far from neutral. Its mean position may then be p although the other substeps are further out, to
-    make up for the first:  mean |position| <= |p| + first,  first = 2 u_far / n.
+    If a frame has n substeps, the surface may at the first of them still be where it was a frame before. That
+    is taken to be within u_far of neutral. For the mean position p the surface is then further out at the
+    other substeps, to make up for the first:  mean |position| <= |p| + first,  first = 2 u_far / n.
     """
     s, phi, emap, i = fie.surface, fie.effect, bound.error_map, 0
     for j in range(1, 3):
@@ -220,9 +220,11 @@ ESTIMATOR_RECORD = record(
     # R_pos: as Omega, of the positive part of Z; residual, B, mu_lo, mu_hi: rad/s
     Om=3, R_pos=3, B=3, B_lag=3, theta=3, P=3, effect=EFFECT_RECORD,
     mean_effect=EFFECT_RECORD,
-    # the largest deflection that the surface can have had in the last frame: rad; as a share of its travel
+    # in the last frame: the largest mean deflection that the surface can have had, rad; the largest share of
+    # its travel that it can have used
     u_far=float, share_far=float,
-    # on the residuals of the bank (filters.py)
+    # test on the residuals of the bank (filters.py): the parity direction m; the reach, rad/s, by filter, on
+    # roll, pitch, yaw and along m
     parity_direction=3, reach_lo=(MAX_POLES, 4), reach_hi=(MAX_POLES, 4),
     set_lo=3, set_hi=3,  # what the frames since the alarm leave of the known set
 )  # fmt: skip

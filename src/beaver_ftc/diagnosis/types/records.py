@@ -40,8 +40,9 @@ ACTUATOR_CONFIG_RECORD = record(
     # has lost effectiveness acts like one nearer to 0.
     reach_lo=float, reach_hi=float,
     runaway=float,  # least rate of a runaway, rad/s
-    approaches=2,  # least and greatest share of the way to its command that it moves in a step
-    steps=2, band=float,  # least and greatest limit of a step; how far from its command it may stay; rad
+    approaches=2,  # least and greatest share of the way to its command that the surface moves in a step
+    steps=2,  # least and greatest limit of a step, rad
+    band=float,  # dead band: within this distance from its command the surface may stay, rad
     uncertain=int,  # whether errors of the actuators are declared
     slow_step=float,  # least step of a surface under a rate-limit fault, rad
     near=float,  # within this distance from its command lag or dead band may make that step smaller, rad

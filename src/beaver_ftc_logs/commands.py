@@ -65,8 +65,10 @@ def identify(
     from beaver_ftc_logs.pages import refuse_foreign_file, render_identification
     from beaver_ftc_logs.vehicle import with_alarm_rate
 
-    if not out.name or out.suffix == ".html" or out in (*flights, Path(vehicle)):
-        raise BadInput(f"identify: --out {out}: allowed: a name such as wing.json; the page is wing.html")
+    given = {path.resolve() for path in (*flights, Path(vehicle))}
+    if not out.name or out.suffix == ".html" or out.resolve() in given:
+        allowed = "a name such as wing.json, of no log or vehicle file; the page is wing.html"
+        raise BadInput(f"identify: --out {out}: allowed: {allowed}")
     page = out.with_suffix(".html")
     refuse_foreign_file(page)
     loaded, mixing = load_vehicle_for_logs(vehicle, flights, reader)

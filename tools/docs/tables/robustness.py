@@ -86,6 +86,7 @@ DOUBT_HEAD = (
     "median time to the name, s",
 )
 DOUBTED_SWEEP = "robust-elevator-all"
+DOUBTED_S = 30.0  # the attitude needs some seconds to refute a gyro error
 DOUBTED = ("elevator", "rudder", "aileron")
 OF_DOUBT = {
     "sound": {"sensor_monitor": "never"},
@@ -143,13 +144,13 @@ def _doubted(part: str, fdi: dict[str, str], count: int) -> list[Assignment]:
 
 
 def _with_fault(one: Assignment, part: str) -> Document:
-    """What varies in a flight of 20 s, with the loss on another surface, or a biased instrument instead."""
+    """What varies in a long flight, with the loss on another surface, or a biased instrument instead."""
     if part in DOUBTED:
-        return {**one.values, "faults[0].actuator": part, "duration_s": 20.0}
+        return {**one.values, "faults[0].actuator": part, "duration_s": DOUBTED_S}
     (sensors, size), at_s = BIASED[part], one.values["faults[0].at_s"]
     fault = {"sensor": sensors[one.run % len(sensors)], "type": "bias", "magnitude": size, "at_s": at_s}
     kept = {key: value for key, value in one.values.items() if not key.startswith("faults")}
-    return kept | {"faults": [fault], "duration_s": 20.0}
+    return kept | {"faults": [fault], "duration_s": DOUBTED_S}
 
 
 def robustness_power() -> str:

@@ -75,8 +75,11 @@ class Cost:
 
         target.Kernel._compile_and_keep = measured
 
-    def pytest_unconfigure(self) -> None:
-        self._write("rest", "imports, collection and the rest", _now() - self._inside[0])
+    def pytest_unconfigure(self, config: Any) -> None:
+        if getattr(config.option, "numprocesses", None):  # it has waited for workers, which write their own
+            self._write("rest", "sharing tests out", sum(os.times()[:2]))
+        else:
+            self._write("rest", "imports, collection and the rest", _now() - self._inside[0])
 
 
 def pytest_configure(config: Any) -> None:

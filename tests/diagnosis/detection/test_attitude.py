@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 import beaver_ftc as bf
 from beaver_ftc.diagnosis.detection.attitude import attitude_dtype, compare_attitude, configure_attitude
 from beaver_ftc.diagnosis.detection.likelihood import N_FILTER_BLOCKS, BlockCapacity, block_dtype
+from beaver_ftc.diagnosis.state import LOSS
 from beaver_ftc.scenario.declared import SensorErrors
 from beaver_ftc.scenario.schema import Scenario
 
@@ -23,8 +24,8 @@ D = np.array([[5.0, 0.1, -2.0], [0.0, 3.0, 0.0], [0.3, 0.0, 0.7]])
 ERRORS = SensorErrors(Scenario(name="x", sensors="tactical-grade").sensors)
 
 
-def compared(gyro_error, fault):
-    """Largest score after each frame: gyro_error (N, 3) rad/s, fault (N, 3) rad/s2.
+def compared(gyro_error, fault, eta=0.0):
+    """Largest score after each frame: gyro_error (N, 3) rad/s, fault (N, 3) rad/s2, bound eta rad/s2.
 
     Rates and attitude are exact but for the gyros; they follow x' = phi - D x."""
     capacity = BlockCapacity(1, 1)
@@ -32,14 +33,15 @@ def compared(gyro_error, fault):
     configure_attitude(att[0], D, ERRORS, 16.0, DT_S)
     for block, axes in zip(blocks, ((1, 0), (0, 2), (0, 2)), strict=True):
         block["axes"], block["n"], block["a"] = axes, len(set(axes)), 1.0
-        block["Q_d"] = 1e-6 * np.eye(2)
+        block["Q_d"], block["n_h"] = 1e-6 * np.eye(2), 1
+        block["hypothesis"]["kind"], block["hypothesis"]["signature"] = LOSS, (1.0, -1.0)
     x, found = np.zeros(3), []
     for e, e_before, phi in zip(gyro_error, [np.zeros(3), *gyro_error[:-1]], fault, strict=True):
         read, x = x + e_before, x + DT_S * (phi - D @ x)
         nu = (x + e - read) / DT_S + D @ read
         att["turn"] = -DT_S * e_before
         blocks[0]["nu"][0], blocks[1]["nu"] = nu[1], nu[[0, 2]]
-        compare_attitude(att.view(np.recarray)[0], blocks.view(np.recarray), np.zeros(3), read, DT_S, True)
+        compare_attitude(att.view(np.recarray)[0], blocks.view(np.recarray), np.full(3, eta), read, DT_S, True)
         found.append((float(att["score"][0]), int(att["gyro"][0])))
     return np.array(found).T
 
@@ -69,6 +71,12 @@ def test_a_fault_of_a_surface_is_left_and_grows_with_its_turn(axis):
     assert score.max() > 1.0
     twice, _ = compared(np.zeros((N, 3)), 2.0 * phi)
     assert np.flatnonzero(twice > 1.0)[0] < np.flatnonzero(score > 1.0)[0]
+
+
+@pytest.mark.parametrize("phi", [(0.1, 0.1, 0.1), (0.1, 0.1, -0.1)])
+def test_what_is_within_the_bound_of_each_axis_is_no_fault(phi):
+    score, _ = compared(np.zeros((N, 3)), np.tile(phi, (N, 1)), 0.1)
+    assert score.max() < 0.01
 
 
 def scenario(fault, **more):

@@ -17,9 +17,9 @@ what was before the fault only adds noise:
 
     z <- a z + g / sqrt S          N <- b N + g_s g / S      M <- b M + g_s^2 / S
 
-Unknown constants c_j, |c_j| <= tol_j, multiply known accelerations r_j: the coefficients, the bounded
-uncertainty, the damping. Through the same filter they add z_j and R_j to the sums. Without a fault of a
-surface
+Unknown constants c_j, |c_j| <= tol_j, multiply known accelerations r_j: the coefficients, and of each axis
+alone the bounded uncertainty and the damping. Through the same filter they add z_j and R_j to the sums.
+Without a fault of a surface
 
     (|z| - sum_j tol_j |z_j|) sqrt(1 - a^2)          (|N| - sum_j tol_j |R_j|) / sqrt M
 
@@ -68,7 +68,7 @@ def attitude_dtype(capacity: BlockCapacity) -> np.dtype:
         turn=3, A=3,  # rad: beyond the gyros' turn, in this frame and in all
         s=(3, 3), s_j=(3, n, 3), s_h=(3, n_h, 3),  # by axis: states (psi, xi, d) of g, g_j and g_s
         n=(int, 3), r=n, g_j=n, xi=3, z=(3, n_a), z_j=(3, n, n_a), N=(3, n_h), M=(3, n_h), R_j=(3, n_h, n),
-        score=float,  # the larger sum of the frame, over its level, after an alarm
+        score=float,  # the larger sum of the frame, over its level, or 0 if it is not filled
         e_0=3, e_slope=3, tilt=float,  # of e_T: rad/s; share of the axis' rate; rad, of all rates
         T=(3, n_a), E=(3, n_a), T_std=n_a,
         turn_score=3, gyro=int,  # by axis, over the level; the axis whose gyro is broken, or -1
@@ -114,8 +114,8 @@ def add_turn(att, i, turn):
 def compare_attitude(att, blocks, eta, x, dt, detected):
     """Advance the comparison by a frame of dt s that the blocks have whitened.
 
-    eta (3,) rad/s2: bound of the uncertainty; x (3,) rad/s: measured rates. `score` and `gyro` are filled if
-    they can decide anything: after an alarm of the rates, `detected`, or if a turn is beyond its level.
+    eta (3,) rad/s2: bound of the uncertainty; x (3,) rad/s: measured rates. `score` and `gyro` are filled
+    after an alarm of the rates, `detected`, or if a turn is beyond its level; else they are 0 and -1.
     """
     pitch, lateral = blocks[PITCH_BLOCK], blocks[LATERAL_BLOCK]
     sum_turns(att, x, dt)
@@ -218,6 +218,8 @@ def largest_correlation(att, blk, first):
     axis 1), or roll and yaw (0).
 
         (|N| - sum_j tol_j |R_j|) / sqrt M      N, M, R_j: sums over the axes of the block
+
+    R_j of an uncertainty or a damping is a sum of absolute values: each axis has a constant of its own.
     """
     largest = 0.0
     n = att.n[first]
@@ -232,7 +234,7 @@ def largest_correlation(att, blk, first):
         for j in range(n):
             R = 0.0
             for i in range(first, 3, 2):
-                R += att.R_j[i, h, j]
+                R += abs(att.R_j[i, h, j]) if j >= n - N_FURTHER else att.R_j[i, h, j]
             excess -= tol(blk, j, n) * abs(R)
         if M > 0.0:
             largest = max(largest, excess / np.sqrt(M))

@@ -34,7 +34,7 @@ help:
 	@echo "make nightly    all tests with all that they draw, browsers, notebooks, drawn scenarios, mutants"
 	@echo "make core-test  the core's tests, in a copy without the products"
 	@echo "make promises   what is promised, and which tests hold each promise"
-	@echo "make acceptance the installed command from outside: every scenario, page and mistake"
+	@echo "make acceptance the installed command from outside: every scenario, page and mistake; the longest tests"
 	@echo "make cost       what a flight costs beside bare JSBSim: no more than a tenth above the recorded revision?"
 	@echo "make waits      how long a person waits for what: one table, beside its bars (WAITS='--beside REVISION': in pairs)"
 	@echo "make test-fast  the tests that fly little or nothing: less than a minute"
@@ -81,12 +81,12 @@ demo: $(VENV)/.demo
 test: $(VENV)/.test
 	@$(BRING) & installing=$$!; $(BIN)/python tests/warm.py >/dev/null 2>&1 & \
 	  NUMBA_DISABLE_JIT=1 nice $(PYTEST) -m "not nightly" $(PLAIN) && wait $$installing
-	$(PYTEST) -n $(WAITING) -m "not nightly" $(addprefix --ignore=,tests/acceptance $(PLAIN))
+	$(PYTEST) -n $(WAITING) -m "not nightly and not acceptance" $(addprefix --ignore=,tests/acceptance $(PLAIN))
 
 # Every test with all that it draws, what tests/nightly.yaml lists too; then drawn scenarios, mutants.
 nightly: $(VENV)/.dev
 	BEAVER_FTC_NIGHT=1 NUMBA_DISABLE_JIT=1 $(PYTEST) $(PLAIN)
-	BEAVER_FTC_NIGHT=1 $(PYTEST) $(addprefix --ignore=,tests/acceptance $(PLAIN))
+	BEAVER_FTC_NIGHT=1 $(PYTEST) -m "not acceptance" $(addprefix --ignore=,tests/acceptance $(PLAIN))
 	BEAVER_FTC_NIGHT=1 $(MAKE) acceptance
 	$(MAKE) core-test
 	$(BIN)/python -m tools.arithmetics
@@ -120,7 +120,7 @@ waits: $(VENV)/.dev
 	$(BIN)/python benchmarks/waits.py $(WAITS)
 
 test-fast: $(VENV)/.dev
-	$(PYTEST) -m "not nightly" $(FAST)
+	$(PYTEST) -m "not nightly and not acceptance" $(FAST)
 
 # Compiled kernels and commands that tests start as processes are not seen: what is counted is Python in the tests.
 coverage: $(VENV)/.dev

@@ -12,7 +12,7 @@ from hypothesis import settings
 sys.path.insert(0, str(Path(__file__).parent / "diagnosis"))
 sys.path.insert(0, str(Path(__file__).parent))
 
-from tools.promises import is_at_night, is_spared
+from tools.promises import is_at_night, is_spared, longest
 
 import kept
 import warm
@@ -79,7 +79,7 @@ def _rank(file):
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
-    """The longest files come first; what tests/nightly.yaml keeps for the night has the mark `nightly`."""
+    """The longest files come first; what tests/nightly.yaml lists has the marks `nightly` or `acceptance`."""
     files = [item.nodeid.partition("::")[0] for item in items]
     ranks = {file: (_rank(file), file) for file in files}
     items.sort(key=lambda item: ranks[item.nodeid.partition("::")[0]])
@@ -88,6 +88,8 @@ def pytest_collection_modifyitems(items):
         of = item.nodeid.partition("[")[0]
         if (of in seen and is_spared(item.nodeid)) or is_at_night(item.nodeid):
             item.add_marker("nightly")
+        elif item.nodeid.startswith(longest()):
+            item.add_marker("acceptance")
         seen.add(of)
 
 

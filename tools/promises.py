@@ -9,6 +9,7 @@ import sys
 from collections.abc import Collection, Iterator
 from fnmatch import fnmatchcase
 from functools import cache
+from itertools import chain
 from pathlib import Path
 from typing import Any
 from zlib import crc32
@@ -26,7 +27,7 @@ def table() -> dict[str, Any]:
 
 @cache
 def at_night() -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """How the names of tests begin that `make test` leaves out, and of those among them that it runs."""
+    """How the names of tests begin that are for the night, and of those among them that are not."""
     night, day = (tuple(name for row in rows() for name in row.get(when, ())) for when in ("night", "day"))
     return night, tuple(name for name in day if name.startswith(night))
 
@@ -54,9 +55,20 @@ def is_spared(test: str) -> bool:
 
 
 def is_at_night(test: str) -> bool:
-    """Whether `make test` leaves a test out."""
+    """Whether `make nightly` alone runs a test."""
     night, day = at_night()
     return test.startswith(night) and not (day and test.startswith(day))
+
+
+@cache
+def longest() -> tuple[str, ...]:
+    """How the names of tests begin that `make acceptance` runs in place of `make test`."""
+    return tuple(name for row in rows() for name in row.get("acceptance", ()))
+
+
+def is_by_day(test: str) -> bool:
+    """Whether `make test` runs a test."""
+    return not (is_at_night(test) or test.startswith(longest()))
 
 
 def tests() -> Iterator[str]:
@@ -79,7 +91,7 @@ def doubts(promised: dict[str, Any], known: Collection[str]) -> Iterator[str]:
     for name, row in promised.items():
         found = {test: [each for each in known if fnmatchcase(each, test)] for test in row["tests"]}
         yield from (f"{name}: no such test: {test}" for test, there in found.items() if not there)
-        if not [each for there in found.values() for each in there if not is_at_night(each)]:
+        if not any(map(is_by_day, chain(*found.values()))):
             yield f"{name}: no test of every day holds it"
 
 

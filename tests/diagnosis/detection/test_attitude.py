@@ -41,7 +41,8 @@ def compared(gyro_error, fault, eta=0.0):
         nu = (x + e - read) / DT_S + D @ read
         att["turn"] = -DT_S * e_before
         blocks[0]["nu"][0], blocks[1]["nu"] = nu[1], nu[[0, 2]]
-        compare_attitude(att.view(np.recarray)[0], blocks.view(np.recarray), np.full(3, eta), read, DT_S, True)
+        records = att.view(np.recarray)[0], blocks.view(np.recarray)
+        compare_attitude(*records, np.full(3, eta), read, DT_S, True)
         found.append((float(att["score"][0]), int(att["gyro"][0])))
     return np.array(found).T
 

@@ -45,6 +45,14 @@ def test_what_is_hidden_is_for_its_owner_and_new_each_time(tmp_path):
     assert min(len(seed) for seed in seeds) > 12
 
 
+def test_the_order_of_the_flights_tells_nothing(tmp_path, monkeypatch):
+    folders.new(tmp_path / "one", 60, grading.rules())
+    monkeypatch.setattr(folders, "submissions", lambda _: [])
+    monkeypatch.setattr(grading, "run_study", lambda study, *_: study.fly.keywords["flights"])
+    broken = [bool(flight.faults) for flight in grading.grade(tmp_path / "one", 1, None)]
+    assert broken != sorted(broken)
+
+
 def test_hidden_flights_among_what_students_may_read_are_refused(challenge, monkeypatch):
     monkeypatch.setattr(folders, "readable", lambda: [str(challenge)])
     with pytest.raises(BadInput, match="lies among Python's packages"):

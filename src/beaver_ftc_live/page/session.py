@@ -26,7 +26,6 @@ HELD = ("altitude_m", "airspeed_mps", "heading_deg")  # by the autopilot that th
 EVENTS_KEPT = 400
 STICK_FRAMES = 10  # between two updates of the rates of a coordinated turn
 TURN_STEP = np.radians(0.1)  # rad/s, to which these rates are rounded
-ATTITUDE = ("phi_rad", "theta_rad", "airspeed_mps")
 NO_STICK = messages.Stick(do="stick", rates_deg_s=(0.0, 0.0, 0.0))
 GUST_S = {"rise_s": 0.5, "hold_s": 1.0, "fade_s": 0.5}
 PATIENCE_S = 10.0  # a round of the game ends so long after the answer, if the diagnosis names no fault
@@ -195,15 +194,17 @@ class Session:
         return ""
 
     def _rates_rad_s(self) -> tuple[float, ...] | None:
-        """Rates, rad/s, that the stick commands; if coordinated, with those of a level turn at the present
-        bank.
+        """Rates, rad/s, that the stick commands; if coordinated, with those of a level turn at the bank that
+        the instruments show.
 
         The latter are rounded, because each change is a row of the saved scenario.
         """
         rates = np.radians(self.stick.rates_deg_s)
         if self.stick.coordinated:
-            now = [float(self.sim.values[self.columns.index(name)]) for name in ATTITUDE]
-            rates = rates + np.round(level_turn(*now) / TURN_STEP) * TURN_STEP
+            read = self.sim.measured
+            roll_rad, pitch_rad, _ = read.attitude
+            turn = level_turn(roll_rad, pitch_rad, airspeed_mps=read.y[2])
+            rates = rates + np.round(turn / TURN_STEP) * TURN_STEP
         return tuple(map(float, rates)) if rates.any() else None
 
     def _blow(self, asked: messages.Blow) -> str:

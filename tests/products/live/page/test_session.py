@@ -143,6 +143,14 @@ def test_the_game_hides_what_is_broken_and_what_the_diagnosis_says(session):
     assert {"broken", "alarm", "named"} <= {event["kind"] for event in session.take_events()}
 
 
+def test_a_coordinated_turn_is_that_of_the_bank_that_the_instruments_show(tmp_path):
+    session = Session(bf.load("fault-free").with_({"sensors.phi.bias_deg": 15}), tmp_path, seed=1)
+    asked(session, do="stick", rates_deg_s=[0, 0, 0], coordinated=True)
+    flown(session, 2)
+    _, _, r = session._rates_rad_s()
+    assert r == pytest.approx(level_turn(np.radians(15), 0.0, 45.0)[2], abs=0.01)
+
+
 def test_a_lost_aircraft_ends_the_flight_and_can_still_be_saved(session, tmp_path):
     asked(session, do="stick", rates_deg_s=[20, 0, 0])
     while not session.over:

@@ -1,8 +1,8 @@
 """A flight of our own once more through the diagnosis that flew it: its log.parquet, without JSBSim.
 
-What the log has are the measured rates, the commands and the flow as the aircraft had it: where no errors
-of any sensor but the gyros were declared, that is what the diagnosis was
-given, and the verdicts are the same to the bit.
+What the log has are the measured rates, the commands and the flow as the aircraft had it: where no sensor
+but the gyros had errors or broke, that is what the diagnosis was given, and the verdicts are the same to the
+bit.
 """
 
 from itertools import chain
@@ -14,6 +14,7 @@ import numpy as np
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document, Metrics, read_metrics
 from beaver_ftc.scenario import TIME_TOLERANCE_S
+from beaver_ftc.scenario.faults import of_a_sensor
 from beaver_ftc_logs.readers.table import check_time, read_numbers
 from beaver_ftc_logs.recording import Floats
 
@@ -72,9 +73,15 @@ def _replay_verdict(path: Path, scenario: Any, log: dict[str, Floats], verdicts:
 def _lacking_inputs(scenario: Any) -> list[str]:
     """Return the inputs that the diagnosis had in flight and the log lacks."""
     ideal = type(scenario.sensors)()
-    declared = [name for name, settings in scenario.sensors if settings != getattr(ideal, name)]
-    lacking = [name for name in declared if name not in ("p", "q", "r")]
-    return [f"the declared errors of {name}: the log has the true value" for name in lacking]
+    flown = [scenario.sensors, *(each.sensors for each in scenario.changes if each.sensors)]
+    errors = {name for each in flown for name, settings in each if settings != getattr(ideal, name)}
+    broken = {fault.sensor for fault in scenario.faults if of_a_sensor(fault)}
+    return [
+        f"the {what} of {name}: the log has the true value"
+        for what, names in (("declared errors", errors), ("fault", broken))
+        for name, _ in scenario.sensors
+        if name in names and name not in ("p", "q", "r")
+    ]
 
 
 def _is_as_flown(path: Path, *times_s: float | None) -> bool | None:

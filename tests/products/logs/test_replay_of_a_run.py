@@ -35,6 +35,13 @@ def test_detection_and_isolation_are_those_of_the_flight(changes, tmp_path):
     assert columns["faulty"].tolist() == [int(flag) for flag in flight.log["detected"]]
 
 
+def test_a_reading_that_the_log_lacks_is_told(tmp_path):
+    fault = {"type": "bias", "sensor": "alpha", "magnitude": 6, "at_s": 1.0}
+    folder, _ = flown(tmp_path, {"faults": [fault], "duration_s": 2.0})
+    _, verdict = replay_run_log(folder / "log.parquet")
+    assert verdict["left_out"] == ["the fault of alpha: the log has the true value"]
+
+
 def test_a_changed_log_is_not_as_flown(run, tmp_path):
     """One rate of one row is off: the replay reads the log, it does not copy the flight's verdict."""
     folder, flight = run

@@ -161,7 +161,7 @@ class Flown(Simulation):
 
     def _start_or_stop_diagnosis(self) -> None:
         """End the diagnosis near the ground; begin it again in flight unless there is an alarm. The height is
-        the true one, the airspeed that of the instrument."""
+        that of a radar altimeter without error, the true one; the airspeed is that of the instrument."""
         height_m = FrameReadout(self._frame).height_m - self._standing_m
         if self._diagnoses:
             if height_m < self._lowest_m:

@@ -68,3 +68,9 @@ def test_what_mistakes_are_called(changed):
 def test_points_of_a_grid_and_flights(given, grid, flights):
     file = SweepFile.model_validate({"name": "x", "base": "fault-free", **given})
     assert (file.grid_size, file.flights) == (grid, flights)
+
+
+def test_a_law_does_not_know_the_sensors_of_its_flight():
+    sweep = load_sweep_text(HEAD + "vary:\n  sensors.q.delay_s: {choice: [0.03]}\n")
+    flown = sweep.scenario({"sensors.q.delay_s": 0.03})
+    assert (flown.sensors.q.delay_s, flown.known_sensors.q.delay_s) == (0.03, 0.0)

@@ -5,7 +5,7 @@ Loaded, its base is self-contained, and every key has been tried on it before it
 
 import contextlib
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -216,7 +216,8 @@ class SweepFile(Section, title="beaver-ftc sweep"):
     seed: seed of all random values of the sweep
     sampling: how values are drawn. `lhs` (Latin hypercube) and `sobol` fill the ranges more evenly. `grid`:
     all combinations of `linspace` and `choice`
-    vary: keys of the base that vary, and how each key varies. A key is written as in `set`
+    vary: keys of the base that vary, and how each key varies. A key is written as in `set`. Where keys of
+    `sensors` vary, the law knows the sensors of the base, unless `design_model.sensors` is set
     expect: conditions that the statistics must meet
     """
 
@@ -343,7 +344,15 @@ def validate_sweep(document: Document, source: str = "", folder: Path | None = N
         problems = problems or [*_key_problems(base, file.vary, document)]
     if problems:
         raise ScenarioError(source, problems)
-    return Sweep(file, base, aircraft)
+    return Sweep(file, _with_known_sensors(base, file.vary), aircraft)
+
+
+def _with_known_sensors(base: dict[str, Any], vary: Iterable[str]) -> dict[str, Any]:
+    """The base. Where keys of `sensors` vary, the law knows those of the base, not each flight's."""
+    model = base.get("design_model") or {}
+    if "sensors" in model or not any(key.startswith("sensors.") for key in vary):
+        return base
+    return {**base, "design_model": {**model, "sensors": base.get("sensors", "ideal")}}
 
 
 def _base(

@@ -25,15 +25,18 @@ N_NODES = N_CENTRES[0] * N_CENTRES[1] * N_CENTRES[2]
 # projection P limits it, or infinite. part: Gaussians of each input. output: fhat, rad/s2.
 STATE_NETWORK_RECORD = record(
     config=record(gain=float, w_max=float, c0=(3, 3), dc=(3, 3)),
-    memory=record(part=(3, N_CENTRES[0]), weights=(3, N_NODES), basis=(3, N_NODES)),
+    memory=record(part=(3, max(N_CENTRES)), weights=(3, N_NODES), basis=(3, N_NODES)),
     output=3,
 )
 
 
-def configure_network(net: np.void, gain: float, W_max: float, travel: np.ndarray) -> None:
-    """Fill the network's record; travel (2, 3) rad: of the surfaces that lead roll, pitch and yaw."""
+def configure_network(net: np.void, gain: float, w_max: float, travel: np.ndarray) -> None:
+    """Fill the network's record; travel (2, 3) rad: of the surfaces that lead roll, pitch and yaw.
+
+    gain: Gamma, 1/s2.
+    """
     cfg = net["config"]
-    cfg["gain"], cfg["w_max"] = gain, W_max
+    cfg["gain"], cfg["w_max"] = gain, w_max
     for i in range(3):
         angles = ALPHA_CENTRES_RAD if i == PITCH else BETA_CENTRES_RAD
         deflections = travel[0, i] + TRAVEL_SHARE_CENTRES * (travel[1, i] - travel[0, i])
@@ -42,8 +45,12 @@ def configure_network(net: np.void, gain: float, W_max: float, travel: np.ndarra
 
 
 @kernel
-def fill_input_basis(net, i, j, n, v):
-    """part[j, k] = exp(-(z - k)^2 / 2) / |.|, z = (v - c0) / dc: Gaussians of input j of axis i at v."""
+def fill_input_basis(net, i, j, v):
+    """part[j, k] = exp(-(z - k)^2 / 2) / |.|, z = (v - c0) / dc: Gaussians of input j of axis i at v.
+
+    If v is outside the centres, they are those at the nearest edge. Elements from N_CENTRES[j] on are unused.
+    """
+    n = N_CENTRES[j]
     part = row_of(net.memory.part, j)
     norm = np.sqrt(fill_gaussians(v, net.config.c0[i, j], net.config.dc[i, j], n, 0, part))
     for k in range(n):
@@ -54,11 +61,12 @@ def fill_input_basis(net, i, j, n, v):
 def evaluate_state_network(net, main, x, y, u):
     """Fill basis, of unit length on each axis, and fhat = th^T basis, (3,) rad/s2, at (x, u).
 
-    main (3,): the surface that leads each axis.
+    x (3,) rad/s: rates; y: readings, with alpha and beta in rad; u (n,) rad: deflections; main (3,): the
+    surface that leads each axis.
     """
     for i in range(3):
         for j, v in enumerate((y[ALPHA] if i == PITCH else y[BETA], x[i], u[main[i]])):
-            fill_input_basis(net, i, j, N_CENTRES[j], v)
+            fill_input_basis(net, i, j, v)
         n, fhat, part = 0, 0.0, net.memory.part
         for a in range(N_CENTRES[0]):
             for b in range(N_CENTRES[1]):

@@ -1,17 +1,19 @@
 """The map of the error of an aircraft's design model.
 
 A derived aircraft declares a map of its model's error. The map has a few boxes of states, one inside the
-other. Each box has the largest error found in it for surfaces within a share of their travel (stand-ins:
-within less). Healthy surfaces are where their commands put them, and a surface that has lost effectiveness
-acts like one with a smaller deflection: the bound is that of the share of travel in use. A stuck surface may
-be anywhere: the additional error of its share, `extra`, belongs to the hypothesis that it is off its command
-(isolation.py). If two surfaces may be off, the bound itself takes the whole travel. Outside all boxes nothing
-has been measured, so nothing is concluded.
+other. Each box has the largest error found in it for surfaces within a share of their travel. Stand-ins,
+which take over from the surface that leads pitch, stay within less. Healthy surfaces are where their
+commands put them, and a surface that has lost effectiveness acts like one with a smaller deflection: the
+bound is that of the share of travel in use. A stuck surface may be anywhere: the additional error of its
+share, `extra_bound`, belongs to the hypothesis that it is off its command (isolation.py). If two surfaces may
+be off, the bound itself takes the whole travel. Outside all boxes nothing has been measured, so nothing is
+concluded.
 
 Symbols of the kernels (emap: of `map_dtype`):
 
     x (3,) rad/s, y, u (n,) rad   rates, readings, deflections
-    z (coordinates,)              place in the map: x, then y with the density in place of dynamic pressure
+    z (N_MAP_COORDINATES,)        `coordinates`, the place in the map: x, then y with the density of
+                                  the air in place of dynamic pressure
     b, j, k                       box, level of travel, row of time of the map
     s, i                          surface, axis
 """
@@ -25,7 +27,8 @@ from beaver_ftc.design.table import AIRSPEED, N_Y, QDYN
 from beaver_ftc.diagnosis.state import fill
 
 UNMAPPED_ERROR_RAD_S2 = 1e6  # terms fitted near trim are off by thousands at 0.5 rad
-_EDGE = 1e-9
+UNMAPPED_CN = 1e6
+_EDGE = 1e-9  # tolerance of the edges of a box, by which rounding may move the state
 N_MAP_COORDINATES = 3 + N_Y  # rates, then y with the density of the air in place of dynamic pressure
 
 
@@ -36,14 +39,14 @@ def map_dtype(n: int, boxes: int = MAX_BOXES) -> np.dtype:
     one_free: one surface may be anywhere in its travel; two_free: more than one may. lo, hi: ends of each
     box; share: of the travel, by level; e: error by row of time, box, level and axis, rad/s2. outside:
     whether the state is outside all boxes; box, row: where it is in the map; e_now: error there, rad/s2.
-    u_old: deflections in the frame before, rad. yaw, yaw_now: bound on the yawing moment of healthy engines,
-    by box and here.
+    u_old: deflections in the frame before, rad. Cn, Cn_now: bound on the coefficient of the yawing moment of
+    healthy engines, by box and here.
     """
     return record(
         n_boxes=int, n_levels=int, n_rows=int, one_free=int, two_free=int, outside=int, box=int, row=int,
         time_s=float, until_s=MAX_AGES, lo=(boxes, N_MAP_COORDINATES), hi=(boxes, N_MAP_COORDINATES),
         share=MAX_LEVELS, e=(MAX_AGES, boxes, MAX_LEVELS, 3), stop_lo=n, stop_hi=n, u_old=n,
-        coordinates=N_MAP_COORDINATES, e_now=3, yaw=boxes, yaw_now=float,
+        coordinates=N_MAP_COORDINATES, e_now=3, Cn=boxes, Cn_now=float,
     )  # fmt: skip
 
 
@@ -66,7 +69,7 @@ def fill_map(emap: np.void, aircraft: Aircraft, one_free: bool, two_free: bool) 
         emap["lo"][b, : ends.shape[1]], emap["hi"][b, : ends.shape[1]] = ends
         tables = box.error_p_rad_s2, box.error_q_rad_s2, box.error_r_rad_s2
         emap["e"][:n_rows, b, :n_levels] = np.stack(tables, axis=-1)
-        emap["yaw"][b] = box.engines_apart or 0.0
+        emap["Cn"][b] = box.engines_apart or 0.0
 
 
 @kernel
@@ -83,15 +86,6 @@ def in_box(emap, b):
         if not is_between(emap.lo[b, i], emap.coordinates[i], emap.hi[b, i]):
             return False
     return True
-
-
-@kernel
-def outside_span(emap, i):
-    """Whether coordinate i of the state is outside the range that the boxes span together."""
-    lo, hi = np.inf, -np.inf
-    for b in range(emap.n_boxes):  # compiled code with a reduction of an array loads scipy.linalg
-        lo, hi = min(lo, emap.lo[b, i]), max(hi, emap.hi[b, i])
-    return not is_between(lo, emap.coordinates[i], hi)
 
 
 @kernel
@@ -153,7 +147,7 @@ def map_row(emap):
 
 @kernel
 def look_up_map(emap, x, y, u, du):
-    """Fill z and e_now, the mapped error at this state."""
+    """Fill `coordinates`, `outside`, `box` and `row`, and the bounds e_now and Cn_now at this state."""
     z = emap.coordinates
     z[:3], z[3 : 3 + y.size] = x, y
     z[3 + QDYN] = 2.0 * y[QDYN] / (y[AIRSPEED] * y[AIRSPEED])
@@ -163,12 +157,22 @@ def look_up_map(emap, x, y, u, du):
         if in_box(emap, b):
             emap.outside = 0
             emap.e_now[:] = emap.e[k, b, j]
-            emap.box, emap.row = (b, k)
-            emap.yaw_now = emap.yaw[b]
+            emap.box = b
+            emap.row = k
+            emap.Cn_now = emap.Cn[b]
             return
     emap.outside = 1
     emap.e_now[:] = UNMAPPED_ERROR_RAD_S2
-    emap.yaw_now = UNMAPPED_ERROR_RAD_S2
+    emap.Cn_now = UNMAPPED_CN
+
+
+@kernel
+def outside_span(emap, i):
+    """Whether coordinate i of the state is outside the range that the boxes span together."""
+    lo, hi = np.inf, -np.inf
+    for b in range(emap.n_boxes):  # compiled code with a reduction of an array loads scipy.linalg
+        lo, hi = min(lo, emap.lo[b, i]), max(hi, emap.hi[b, i])
+    return not is_between(lo, emap.coordinates[i], hi)
 
 
 @kernel

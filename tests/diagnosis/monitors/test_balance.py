@@ -65,7 +65,7 @@ def test_engines_under_one_lever_that_yaw_beyond_the_bound_have_failed_and_stay_
     assert engine_monitor.detect_engine_failure(monitor, 0.005, y) == failed
     assert engine_monitor.detect_engine_failure(monitor, 0.005, 0.0 * y) == failed
     fdi = new_fdi()
-    fdi["engine_monitor"], fdi["bound"]["error_map"]["yaw_now"] = monitor, 0.005
+    fdi["engine_monitor"], fdi["bound"]["error_map"]["Cn_now"] = monitor, 0.005
     fdi["verdict"]["isolated_estimator"] = NOT_ISOLATED
     axis = adaptive_estimators.find_alarm_axis(fdi, y, 7.5)
     verdict = fdi["verdict"]["isolated_estimator"], fdi["verdict"]["isolated_at_s"]

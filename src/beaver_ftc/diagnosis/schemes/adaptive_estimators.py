@@ -270,7 +270,7 @@ def update_verdict(fdi, prediction, measured, t):
 def find_alarm_axis(fdi, y, t):
     """The axis on which a detector raises the alarm, or -1. An engine that has failed is outside the class:
     no surface is isolated then. y: measured signals."""
-    limit = fdi.bound.error_map.yaw_now
+    limit = fdi.bound.error_map.Cn_now
     found = fdi.verdict
     if not found.detected and engine_monitor.detect_engine_failure(fdi.engine_monitor, limit, y):
         conclusion.set_isolated(found, UNANTICIPATED, t)

@@ -99,8 +99,8 @@ def test_what_kind_of_fault_it_may_be(kinds, fixed, one_type, sole_shown):
     _, surface = one(*kinds)
     same_name = verdict.SAME_NAME[sole_shown] if sole_shown >= 0 else -1
     assert (verdict.choose_mode(surface) == GIVE_UP) == fixed
-    assert max(verdict.sole(surface, verdict.CONSTANT), -1) == one_type
-    found = verdict.sole_shown(surface, verdict.ALL)
+    assert max(verdict.sole_type(surface, verdict.CONSTANT), -1) == one_type
+    found = verdict.sole_shown_type(surface, verdict.ALL)
     assert (verdict.SAME_NAME[found] if found >= 0 else -1) == same_name
 
 

@@ -135,7 +135,7 @@ def isolate_lateral(types, layout, t):
     both = not can_be_faulty(roll) and not can_be_faulty(yaw)
     refuted, explained = types.pair.lateral_outside == 1, True
     for srf in (roll, yaw):
-        refuted = refuted or not verdict.left(srf, ALL)
+        refuted = refuted or not verdict.any_remains(srf, ALL)
         explained = explained and verdict.explains_flight(srf)
     isolates = types.pair.group_alarm[LATERAL_GROUP] == 1 and not (both and (refuted or not explained))
     for srf, other in ((roll, yaw), (yaw, roll)):
@@ -191,7 +191,7 @@ def begin_second_if_shown(types, layout):
 @kernel
 def dismiss_varying(c, srf):
     """Whether a slow oscillation, a slow surface or a growing bias would have shown by now."""
-    imitated = verdict.can_be_another(srf, verdict.sole(srf, CONSTANT), False)
+    imitated = verdict.can_be_another(srf, verdict.sole_type(srf, CONSTANT), False)
     doubt = imitated or verdict.may_be_hidden(c, srf)
     long_enough = srf.evidence.n_anomalous >= c.half_frames
     return long_enough and verdict.would_have_shown(c, srf) and not doubt
@@ -203,7 +203,7 @@ def update_second(types, layout, t):
     srf1 = types.surface[types.pair.first_pitch]
     srf2 = types.surface[layout.partner[types.pair.first_pitch]]
     anomalous = srf2.evidence.n_anomalous > 0
-    possible = can_be_faulty(srf2) and verdict.left(srf2, ALL)
+    possible = can_be_faulty(srf2) and verdict.any_remains(srf2, ALL)
     verdict.update_status(srf1, possible or not anomalous, srf1.status.fault_type, t)
     shows = anomalous and possible and verdict.explains_flight(srf2)
     verdict.update_status(srf2, shows, verdict.type_on_surface(types.config, srf2), t)

@@ -4,7 +4,10 @@ No type is named here: the columns of the table (`FaultType`) say what distingui
 of one surface assume that it is at fault; `can_be_faulty` says whether it can be.
 
 types: of `fault_types_dtype`; past: of `conclusion_dtype`, of the frame before; kind: a type, TYPE_UNDECIDED
-or NO_TYPE; mode: of accommodation. Other symbols: types/__init__.py.
+or NO_TYPE; mode: of accommodation. A finding is a tuple of four: an estimator, NOT_ISOLATED or UNANTICIPATED;
+the instant of its isolation, s; the kind; the instant since which it is of this kind, s. In
+has_shown(h, srf, h) the first h selects the kernel of the type, and the second is its argument. Other
+symbols: types/__init__.py.
 """
 
 import numpy as np
@@ -49,7 +52,7 @@ NO_SURFACE, SEVERAL_SURFACES = -1, -2
 TYPE_UNDECIDED, NO_TYPE = -1, -2  # the type of a fault of which more than one type is left, or none
 # What decides whether a surface can be at fault: its estimator, or what is known of the other (pairs.py).
 BY_ESTIMATOR, DEDUCED_FAULTY, DEDUCED_HEALTHY = range(3)
-MAX_SILENCE_S = 0.2  # a fault that has not shown for so long is taken for gone
+MAX_SILENCE_S = 0.2  # a fault that has not shown for as long is taken for gone
 _TIME_TOLERANCE_S = 1e-9
 
 
@@ -75,8 +78,8 @@ def type_remains(srf, h):
 
 
 @kernel
-def left(srf, mask):
-    """Whether a type of a mask (N_TYPES,) is left."""
+def any_remains(srf, mask):
+    """Whether any type of a mask (N_TYPES,) is left."""
     # A loop: compiled code with np.any loads scipy.linalg, which takes longer than the flight.
     for h in range(N_TYPES):
         if mask[h] and type_remains(srf, h):
@@ -87,13 +90,13 @@ def left(srf, mask):
 @kernel
 def constant_remains(srf):
     """Whether a type with a constant parameter is left."""
-    return left(srf, CONSTANT)
+    return any_remains(srf, CONSTANT)
 
 
 @kernel
 def name_remains(srf, named):
     """Whether a type of this name is left; with TYPE_UNDECIDED, one of any name."""
-    return left(srf, NAMED[named])
+    return any_remains(srf, NAMED[named])
 
 
 @kernel
@@ -115,7 +118,7 @@ def would_have_shown(c, srf):
 
 
 @kernel
-def sole(srf, mask):
+def sole_type(srf, mask):
     """The one type of a mask that is left, NO_TYPE, or TYPE_UNDECIDED if there are several; of several of one
     name, the first."""
     kind = NO_TYPE
@@ -128,9 +131,9 @@ def sole(srf, mask):
 
 
 @kernel
-def sole_shown(srf, mask):
+def sole_shown_type(srf, mask):
     """The one type of a mask that is left, if it has shown itself; else TYPE_UNDECIDED."""
-    kind = sole(srf, mask)
+    kind = sole_type(srf, mask)
     return kind if kind >= 0 and has_shown(kind, srf, kind) else TYPE_UNDECIDED
 
 
@@ -141,7 +144,7 @@ def may_be_hidden(c, srf):
     return (
         constant_remains(srf)
         and srf.evidence.n_anomalous - srf.evidence.n_rest < c.half_frames
-        and left(srf, HIDDEN_AT_REST)
+        and any_remains(srf, HIDDEN_AT_REST)
     )
 
 
@@ -174,9 +177,13 @@ def sole_surface(surfs, constant):
 def find_surface(types, layout):
     """The surface the fault is on, NOT_ISOLATED or UNANTICIPATED.
 
-    What acts on pitch alone shows no direction, so a surface left over there must also have a type that
-    explains it. Of elevator and flap, each of which can do what the other does if it only moves accordingly,
-    the one is named for which a constant suffices, once a type of the other that must show itself would have.
+    1. No surface can be at fault: UNANTICIPATED.
+    2. One can: that surface. What acts on pitch alone shows no direction, so there a type must explain the
+       flight as well.
+    3. Several can. If elevator or flap moves in a certain way, it has the effect of a constant fault of the
+       other. So the one surface that a constant fault explains is isolated, once `others_dismissed`.
+
+    In all other cases NOT_ISOLATED.
     """
     s = sole_surface(types.surface, False)
     if s == NO_SURFACE:
@@ -189,15 +196,15 @@ def find_surface(types, layout):
 
 @kernel
 def others_dismissed(types, sole):
-    """Whether every other surface can only have a fault that depends on the command of the chosen one.
+    """Whether every other surface than `sole` can only have a fault that depends on its command.
 
-    A type that must show itself is given the time to. Where errors are declared that a course can hide in,
-    every type of the others must have been excluded.
+    A type that must show itself is given the time to. If errors of the surfaces' effects are declared
+    (has_eG), a varying fault can hide in them, and every type of the others must have been excluded.
     """
     c, n = types.config, 1
     for s, srf in enumerate(types.surface):
         if s != sole and srf.status.may_be_sole and can_be_faulty(srf):
-            if c.has_eG and left(srf, ALL):
+            if c.has_eG and any_remains(srf, ALL):
                 return False
             if not would_have_shown(c, srf):
                 return False
@@ -212,20 +219,25 @@ def others_dismissed(types, sole):
 @kernel
 def type_on_surface(c, srf):
     """The type of the fault on a surface, taken to be at fault; TYPE_UNDECIDED while more than one fits or
-    one may yet show itself."""
+    one may yet show itself.
+
+        errors of effects (has_eG)       the sole type left, once it has shown itself
+        a constant type left             the sole constant type, unless it can be another
+        no constant type left            the sole varying type that need not show itself, unless it can be
+                                         another; if there is none, the sole one that has shown itself
+    """
     if srf.evidence.n_anomalous < c.half_frames or may_be_hidden(c, srf):
         return TYPE_UNDECIDED
     if c.has_eG:  # in coarse sets a constant proves nothing
-        return sole_shown(srf, ALL)
+        return sole_shown_type(srf, ALL)
     shown = would_have_shown(c, srf)
     if constant_remains(srf):
-        kind = sole(srf, CONSTANT)
+        kind = sole_type(srf, CONSTANT)
         return kind if shown and not can_be_another(srf, kind, True) else TYPE_UNDECIDED
-    # No constant explains it: the one type left that need not show itself; else the one that has.
-    kind = sole(srf, VARYING_QUIET)
+    kind = sole_type(srf, VARYING_QUIET)
     if kind == NO_TYPE:
-        return sole_shown(srf, VARYING_SHOWN)
-    if kind < 0 or not shown or left(srf, VARYING_LIKE[kind]):
+        return sole_shown_type(srf, VARYING_SHOWN)
+    if kind < 0 or not shown or any_remains(srf, VARYING_LIKE[kind]):
         return TYPE_UNDECIDED
     return kind
 
@@ -239,25 +251,26 @@ def decide_single(types, past, layout, t):
     """
     s = find_surface(types, layout)
     for i, srf in enumerate(types.surface):
-        update_status(srf, i == s, type_on_surface(types.config, srf) if i == s else TYPE_UNDECIDED, t)
+        update_status(srf, i == s, type_on_surface(types.config, srf), t)
     return finding_on_surface(types, past, layout, s, t)
 
 
 @kernel
 def update_status(srf, is_isolated, kind, t):
-    """Record at t s whether a surface is isolated, and of which type (TYPE_UNDECIDED if open)."""
+    """Record at t s whether a surface is isolated, and, if so, the kind of its fault."""
     kind = kind if is_isolated else TYPE_UNDECIDED
     status = srf.status
     if is_isolated and not status.is_isolated:
         status.isolated_at_s = t
     if kind != status.fault_type:
         status.typed_at_s = t
-    status.is_isolated, status.fault_type = is_isolated, kind
+    status.is_isolated = is_isolated
+    status.fault_type = kind
 
 
 @kernel
 def finding_on_surface(types, past, layout, s, t):
-    """The finding on surface s, NOT_ISOLATED or UNANTICIPATED: estimator, since when, type, since when."""
+    """The finding on surface s, or if s is NOT_ISOLATED or UNANTICIPATED."""
     if s >= 0:
         status = types.surface[s].status
         estimator = estimator_of_fault(layout, s, status.fault_type)
@@ -284,7 +297,7 @@ def choose_mode(srf):
                 return mode
     else:
         for mode in (SCALE_COMMAND, WAIT_FOR_SURFACE, GIVE_UP):
-            if left(srf, VARYING_OF_MODE[mode]):
+            if any_remains(srf, VARYING_OF_MODE[mode]):
                 return mode
     return SUBTRACT_OFFSET
 
@@ -353,7 +366,10 @@ def accommodate(types, layout):
 
 @kernel
 def fault_shows(c, srf, mode, possible):
-    """Whether the fault of a surface shows, or did a moment ago."""
+    """Whether the fault of a surface shows, or did less than MAX_SILENCE_S ago.
+
+    n_silent: number of frames since it has shown.
+    """
     last, acc = srf.last, srf.accommodation
     p = deflection_error(srf, possible) + last.u
     agrees = last.lo <= p <= last.hi or mode == SCALE_COMMAND
@@ -380,7 +396,8 @@ def deflection_error(srf, possible):
 def remaining_effectiveness(types, layout, est, s):
     """Return the remaining effectiveness of surface s, dimensionless.
 
-    The estimator fits both axes of a surface, so with a second fault the set of a constant loss is used.
+    The estimator fits both axes of a surface, so with a second fault the set of a constant loss is used. When
+    all types are diagnosed, every surface has an estimator of its loss (isolation.py).
     """
     srf = types.surface[s]
     if types.pair.enabled and can_be_faulty(srf):

@@ -146,5 +146,5 @@ def fill_angle_rates(forces, gravity, meas):
 
 
 def terms_of_force(aircraft: Aircraft, i: int) -> list[Term]:
-    """The terms of force i, as `update_force` goes through them."""
+    """The terms of force i, as `rows.predict_force` goes through them."""
     return [term for term in aircraft.measurable_forces if term.coefficient == FORCE_NAMES[i]]

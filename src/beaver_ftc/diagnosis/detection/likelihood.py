@@ -230,6 +230,16 @@ def predict_covariance(b, dt):
 
 
 @kernel
+def add_turn_to_drift(b, gust):
+    """P_dd <- P_dd + Q_scale m var_turn m': what a fast turn of the gusts' axes may change in the drift."""
+    for i in range(b.n):
+        for j in range(b.n):
+            for r in range(3):
+                for q in range(3):
+                    b.P_dd[i, j] += b.Q_scale * b.m[i, r] * b.m[j, q] * gust.output.var_turn[r, q]
+
+
+@kernel
 def fill_kalman_gains(b):
     """Fill the Kalman gains K_x = P_xx S^-1 and K_d = P_xd' S^-1, (n, n)."""
     for i in range(b.n):

@@ -36,7 +36,8 @@ used.
 Letters of the kernels, in addition to those of likelihood.py and rows.py:
 
     m, col      direction of a view and g / |g|, (5,)
-    b, f        block of a view; record of a force
+    b, f        block of a view; record of a force; b.source: what is subtracted from its rates (rows.py);
+                from VANELESS on no vane is used
     L           acceleration per rad/s of the aircraft against the air, 1/s
     cfg         configuration of the statistical tests
 
@@ -51,19 +52,13 @@ from beaver_ftc.aircraft.schema import MAX_SURFACES
 from beaver_ftc.compiled import kernel, record, row_of, sized
 from beaver_ftc.diagnosis.detection import likelihood
 from beaver_ftc.diagnosis.detection.directions import project
-from beaver_ftc.diagnosis.detection.forces import (
-    MIN_UPDATES,
-)
-from beaver_ftc.diagnosis.detection.likelihood import (
-    USUAL_HYPOTHESES,
-    BlockCapacity,
-)
+from beaver_ftc.diagnosis.detection.forces import MIN_UPDATES
+from beaver_ftc.diagnosis.detection.likelihood import USUAL_HYPOTHESES, BlockCapacity, add_turn_to_drift
 from beaver_ftc.diagnosis.detection.rows import (
     INERTIAL,
     RAW,
     VANED,
     VANELESS,
-    add_turn_to_drift,
     fill_leak,
     project_rows,
 )
@@ -99,9 +94,10 @@ def view_dtype(size: BlockCapacity) -> np.dtype:
     return record(
         nulled=int,  # whose column of `rows.G` the direction is orthogonal to, or AXIS_VIEW
         alarm_axis=int,  # reported with an alarm of this view
-        places=(int, 3), col=5,  # the rows that it combines, or -1; g / |g|
+        # the rows (i, k, j) that it combines, k = -1 if only two; j: of the force, if it sees one; g / |g|
+        places=(int, 3), col=5,
         by_force=int,  # whether it sees a force
-        confirmer=int,  # force of the views that confirm this one; 0 if no vane is used
+        confirmer=int,  # row of the force of the views that confirm this one; -1 if no vane is used
         # of this frame: whether the view is used; which share of nu along the column leaks into it
         used=int, leak=float,
         L_rate=3, L_force=3,  # by the rates and by the forces that it combines, 1/s: fill_view_drift
@@ -116,47 +112,55 @@ def turn_view(view, rows, gust):
 
         m = g x q / |g x q|      col = g / |g|      on the rows i, k, j of `places`
 
-    q: the effect of the rolling gust on i and k, 1/s, or, without a row k, along the place of k. Returns the
-    share of the innovation along g that errors e of g let leak into the view, |m|' e / (|g| - |col|' e).
+    q: the effect of the rolling gust on i and k, 1/s, or, without a row k, along the place of k; it has no
+    part along j. Returns the share of the innovation along g that errors e of g let leak into the view,
+    |m|' e / (|g| - |col|' e). If g x q = 0, as in the first frame, the view keeps its direction.
     """
-    m, col, c, e, e_col = view.block.m[0], view.col, view.nulled, 0.0, 0.0
+    m, col, c = view.block.m[0], view.col, view.nulled
     i, k, j = view.places[0], view.places[1], view.places[2]
-    g_i, g_k, g_j, q_i, q_k = rows.G[c, i], 0.0, rows.G[c, j], 0.0, 1.0
+    g_i, g_k, g_j = rows.G[c, i], 0.0, rows.G[c, j]
+    q_i, q_k = 0.0, 1.0
     if k >= 0:
         L, C = gust.output.rate_damping, gust.output.C
-        g_k, q_i, q_k = rows.G[c, k], project_gust(L[i], C, 0), project_gust(L[k], C, 0)
+        g_k = rows.G[c, k]
+        q_i, q_k = project_gust(L[i], C, 0), project_gust(L[k], C, 0)
     m_i, m_k, m_j = -g_j * q_k, g_j * q_i, g_i * q_k - g_k * q_i
-    norm, norm_m = np.sqrt(g_i * g_i + g_k * g_k + g_j * g_j), np.sqrt(m_i * m_i + m_k * m_k + m_j * m_j)
+    norm = np.sqrt(g_i * g_i + g_k * g_k + g_j * g_j)
+    norm_m = np.sqrt(m_i * m_i + m_k * m_k + m_j * m_j)
     if norm_m == 0.0:
         return 0.0
+    e, e_col = 0.0, 0.0
     for r, g_r, m_r in ((i, g_i, m_i), (k, g_k, m_k), (j, g_j, m_j)):
         if r >= 0:
-            m[r], col[r] = m_r / norm_m, g_r / norm
+            m[r] = m_r / norm_m
+            col[r] = g_r / norm
             e += abs(m[r]) * rows.e_G[c, r]
             e_col += abs(col[r]) * rows.e_G[c, r]
     return e / max(norm - e_col, MIN_NORM_SHARE * norm)
 
 
 @kernel
-def fill_view_drift(view, q, gust, own, forces, V):
+def fill_view_drift(view, q, gust, subtracted, forces, V):
     """Fill the drift of a view, (rad/s2)2/s, at a speed V m/s.
 
     It is that of a bounded uncertainty, that of the flow angle from inertial motion, and that of the rotation
     of the air, by L_rate = m' L and L_force = sum over the forces of m L_f.
 
-    q: see NOISE_RECORD. gust: the estimate of the views; own: that which this view subtracts, if any.
+    q: see NOISE_RECORD. gust: the estimate of the views; subtracted: that which this view subtracts, if any.
     """
-    b, m, L = view.block, view.block.m, gust.output.rate_damping
+    b, L = view.block, gust.output.rate_damping
+    m = row_of(b.m, 0)
     Q_d = q * max(b.eta[0], likelihood.MIN_ETA_RAD_S2) ** 2
     for i, f in enumerate(forces.component):
-        Q_d += (view.block.source == INERTIAL) * (m[0, SIDE_FORCE + i] * forces.q_ratio) ** 2 * f.Q_e
+        Q_d += (b.source == INERTIAL) * (m[SIDE_FORCE + i] * forces.q_ratio) ** 2 * f.Q_e
     if gust.output.gusty:
         for j in range(3):
-            view.L_rate[j] = project_gust(row_of(m, 0), L, j)
+            view.L_rate[j] = project_gust(m, L, j)
             view.L_force[j] = 0.0
             for i, f in enumerate(forces.component):
-                view.L_force[j] += m[0, SIDE_FORCE + i] * f.L[j] * forces.q_ratio
-        Q_d += view_drift(own, V, view.L_rate, view.L_force, view.block.source != RAW and forces.in_use == 1)
+                view.L_force[j] += m[SIDE_FORCE + i] * f.L[j] * forces.q_ratio
+        is_subtracted = b.source != RAW and forces.in_use == 1
+        Q_d += view_drift(subtracted, V, view.L_rate, view.L_force, is_subtracted)
         add_turn_to_drift(b, gust)
     b.Q_d[0, 0] = Q_d
 
@@ -165,7 +169,7 @@ def fill_view_drift(view, q, gust, own, forces, V):
 def project_views(views, noise, rows, forces, gust, vaned, vaneless, V):
     """Bring direction, noise, signatures and regressors of each view to the elapsed frame; V m/s.
 
-    gust, vaned, vaneless: the estimates that are subtracted: rows.py.
+    gust, vaned, vaneless: the estimates that are subtracted (rows.py).
     """
     for view in views:
         b = view.block
@@ -177,8 +181,8 @@ def project_views(views, noise, rows, forces, gust, vaned, vaneless, V):
         project_rows(b, rows)
         if view.nulled != AXIS_VIEW and b.n_Z > 0:
             fill_leak(b, rows, view.leak, view.col)
-        own = vaneless if b.source >= VANELESS and forces.in_use else of_view
-        fill_view_drift(view, noise.q, of_view, own, forces, V)
+        subtracted = vaneless if b.source >= VANELESS and forces.in_use else of_view
+        fill_view_drift(view, noise.q, of_view, subtracted, forces, V)
 
 
 @kernel
@@ -246,7 +250,7 @@ def view_alarm_score(view, views, cfg, forces, gust):
     """The score with which a view raises the alarm, 0 if it raises none.
 
     Views raise it only where no block of the rates tests: for an oscillation about an axis, and for a
-    force, if accelerometers cannot break.
+    force. A force raises it only if accelerometers cannot break: then the blocks' gust estimate uses them.
     """
     if view.nulled == AXIS_VIEW:
         return view.tones.score if view.block.source != INERTIAL else 0.0

@@ -161,7 +161,7 @@ def _configure_view(view: np.void, d: ParityDirection, gusty: bool, vaned: bool)
     fill(
         view, nulled=d.nulled, by_force=by_force, places=(ROLL, YAW, j) if across_gust else (i, -1, j),
         alarm_axis=d.m_0.index(1.0) if is_axis and not d.by_inertia else i,
-        confirmer=(NORMAL_FORCE if j == NORMAL_FORCE else SIDE_FORCE) if by_force or vaned else 0,
+        confirmer=(NORMAL_FORCE if j == NORMAL_FORCE else SIDE_FORCE) if by_force or vaned else -1,
     )  # fmt: skip
 
 

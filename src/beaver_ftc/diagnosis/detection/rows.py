@@ -21,6 +21,20 @@ power, airspeed and dynamic pressure, so it has their errors. Noise of the readi
 
     Z_j <- Z_j + w dF_j      Q = Q0 + sum_j (dF_j sigma_j)^2, (rad/s2)2      dF_j: per unit of the constant
 
+Z has these columns; a row that does not see a column has a zero there:
+
+    0 ...           coefficients of the moments, then readings of the air data: rows.n of them, perhaps none
+    first[0] ...    side force: coefficients, rate of sideslip, bias of the accelerometer if any, scale, drift
+    first[1] ...    normal force: the same without the rate of sideslip
+
+A frame has one instant or more. The rows of a frame are filled in this order:
+
+    at its start            update_forces: rows of the forces
+                            begin_rows: of the rates Z, at the first instant, eta and std[RATES]
+    at each instant inside  add_constants: of the rates Z is summed, and Q becomes that of this instant
+    at its end              finish_rows: of the rates nu, G, Gu and the other std, from Q of the last instant
+                            project_rows, fill_leak: the directions of each block and view
+
 Letters of the kernels, in addition to those of statistical.py: r is a row, c a column of Z, k a term.
 """
 
@@ -57,8 +71,8 @@ from beaver_ftc.diagnosis.detection.forces import (
 from beaver_ftc.diagnosis.detection.likelihood import ALPHA_CUBED_MOMENT, N_INPUT_READINGS, N_ROWS
 from beaver_ftc.diagnosis.error_map import extra_bound
 from beaver_ftc.diagnosis.state import PITCH, SIDE_FORCE
-from beaver_ftc.plant.instruments import NOISE_LIMIT_SIGMA
 from beaver_ftc.scenario.declared import SensorErrors
+from beaver_ftc.scenario.sensors import NOISE_LIMIT_SIGMA
 
 # What is subtracted from the innovation of the rates: nothing; the gust of the rates' blocks; that of the
 # views, by vanes; that by accelerometers alone. With the last the forces are those at the flow angle from
@@ -177,7 +191,8 @@ def add_constants(w, noise, rows, err, model, meas, u):
 def begin_rows(w, noise, rows, bound, model, meas, u):
     """Begin the rows of the next frame at this instant: constants, eta, and the noise that the blocks take.
 
-    eta = published bound + |G| du + mapped error
+    eta[0] = published bound + |G| du + min(mapped error, OFF_MAP_RAD_S2)
+    eta[1] = eta[0], and, if one surface may be anywhere, the further error of the map over the whole travel
     """
     eta = rows.eta[0]
     emap = bound.error_map
@@ -209,6 +224,7 @@ def finish_rows(rows, noise, forces, gust, of_views, vaneless, bound, means, nu,
         rows.nu[VANED, i] = nu[i] - (of_views.output.acc_mean[i] if forces.in_use else 0.0)
         rows.nu[VANELESS, i] = nu[i] - vaneless.output.acc_mean[i]
         rows.std[RAW, i] = rows.std[VANED, i] = np.sqrt(noise.Q[i])
+        # The deviation of a sum is at most the sum of the deviations, for any correlation of the noises.
         rows.std[VANELESS, i] = rows.std[RAW, i] + forces.gust_noise[i]
         for s in range(means.G.shape[1]):
             rows.G[s, i] = means.G_old[i, s]
@@ -218,8 +234,10 @@ def finish_rows(rows, noise, forces, gust, of_views, vaneless, bound, means, nu,
 
 @kernel
 def update_forces(rows, forces, gust, du, meas, u, dt):
-    """Update the rows of the forces at this instant, dt s after the last; u (n,) rad: surfaces; du: their
-    errors.
+    """Update the rows of the forces at this instant, dt s after the last.
+
+    u (n,) rad: surfaces; du (n,) rad: bounds on their errors. eta = |G| du + the change of the force during
+    MAX_FORCE_LAG_S, rad/s2.
 
     At the first instant the rate of sideslip of the run before is not known; that of this instant is used.
     """
@@ -230,8 +248,7 @@ def update_forces(rows, forces, gust, du, meas, u, dt):
     for i, f in enumerate(forces.component):
         r = SIDE_FORCE + i
         f_prev = f.f_hat
-        eta = 0.0
-        update_force(rows, forces, f, gust, i, meas, u)
+        predict_force(rows, forces, f, gust, i, meas, u)
         std = f.f_hat * forces.q_noise / meas.y[QDYN]
         for source in range(INERTIAL + 1):
             var = f.var_trim[int(source == INERTIAL)] * forces.q_ratio**2 + std * std + f.var_acc
@@ -239,6 +256,7 @@ def update_forces(rows, forces, gust, du, meas, u, dt):
             rows.std[source, r] = np.sqrt(var)
         rows.nu[INERTIAL, r] = update_inertial(forces, f, i, meas.y, dt)
         rows.Z[rows.first[i] + f.n_Z, r] = f.e_drift
+        eta = 0.0
         for s in range(u.size):
             eta += f.G_trim[s] * du[s]
         e_lag = MAX_FORCE_LAG_S * abs(f.f_hat - f_prev) / dt if forces.n_seen else 0.0
@@ -248,8 +266,8 @@ def update_forces(rows, forces, gust, du, meas, u, dt):
 
 
 @kernel
-def update_force(rows, forces, f, gust, i, meas, u):
-    """Update force i, whose record is f: its innovation e = a / c - f_hat, and the effects of surfaces.
+def predict_force(rows, forces, f, gust, i, meas, u):
+    """Predict force i, whose record is f, and fill its innovation a / c - f_hat and the effects of surfaces.
 
     a m/s2: reading of the force's accelerometer; c m: the chord.
 
@@ -340,13 +358,3 @@ def project_rows(b, rows):
 def fill_leak(b, rows, leak, col):
     """The last regressor of a view, leak col' nu: what an error of the column col (5,) lets through."""
     b.regressor[b.n_Z - 1, 0] = leak * project(col, row_of(rows.nu, b.source), False)
-
-
-@kernel
-def add_turn_to_drift(b, gust):
-    """P_dd <- P_dd + Q_scale m var_turn m': what a fast turn of the gusts' axes may change in the drift."""
-    for i in range(b.n):
-        for j in range(b.n):
-            for r in range(3):
-                for q in range(3):
-                    b.P_dd[i, j] += b.Q_scale * b.m[i, r] * b.m[j, q] * gust.output.var_turn[r, q]

@@ -47,7 +47,6 @@ from beaver_ftc.diagnosis.detection.rows import (
     NOISE_RECORD,
     ROWS_RECORD,
     add_constants,
-    add_turn_to_drift,
     begin_rows,
     project_rows,
 )
@@ -113,7 +112,7 @@ def update_blocks(cfg, rows, blocks, gust, dt, k, alarmed, may_end=False):
             for i, axis in enumerate(b.axes[: b.n]):
                 b.g_c[i] = gust.output.acc_coarse[axis]
         if gust.output.gusty:
-            add_turn_to_drift(b, gust)
+            likelihood.add_turn_to_drift(b, gust)
             if j < likelihood.REVERTING_BLOCK:
                 likelihood.whiten_calm(b, dt)
             else:  # without gust both blocks of roll and yaw have the same filter

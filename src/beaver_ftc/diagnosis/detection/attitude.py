@@ -29,8 +29,19 @@ A gyro is broken if the rates raise an alarm and the attitude shows no turn for 
 
     T <- a T + dA      E <- a E + dt e_T      (|T| - E) / std(T)
 
-exceeds the same margin about one axis, and no sum above does. e_T, rad/s, bounds what the constant errors of
-gyros and attitude turn.
+exceeds the same margin about one axis, and no sum above does. dA, rad, is the turn of a frame beyond that of
+the gyro; e_T, rad/s, bounds what the constant errors of gyros and attitude turn.
+
+Letters of the record and of the kernels, for each axis i:
+
+    s, s_j, s_h     states (psi, xi, d) of the filters of g, of g_j and of g_s
+    P, K, S         covariance and gain of these filters; variance of g, rad2
+    r, g_j          known accelerations r_j, rad/s2; responses to them over sqrt S
+    n               number of the constants: those of the block, then the N_FURTHER
+    z, z_j          leaky sums of g and g_j over sqrt S; m counts their leaks a
+    N, M, R_j       correlations with the loss h; b: their leak
+    T, E            leaky sums of dA, and of its bound by constant errors, rad
+    blk, row        block of the rates (likelihood.py) and row of the axis in it
 """
 
 from math import exp, sqrt
@@ -63,10 +74,10 @@ def attitude_dtype(capacity: BlockCapacity) -> np.dtype:
     n, n_h, n_a = capacity.max_regressors + N_FURTHER, capacity.max_hypotheses, len(LEAK_TIMES_S)
     return record(
         enabled=int, level=float,  # level of both sums, standard deviations
-        D=(3, 3), R=float, a=n_a, b=float,  # 1/s; variance of v, rad2; leaks per frame
-        P_start=3, P=(3, 3, 3), F_P=(3, 3),  # by axis: covariance of (psi, xi, d)
+        D=(3, 3), R=float, a=n_a, b=float,  # 1/s; variance of v, rad2; factors per frame
+        P_start=3, P=(3, 3, 3), F_P=(3, 3),  # P_start: diagonal of P at the start; F_P: the product F P
         turn=3, A=3,  # rad: beyond the gyros' turn, in this frame and in all
-        s=(3, 3), s_j=(3, n, 3), s_h=(3, n_h, 3),  # by axis: states (psi, xi, d) of g, g_j and g_s
+        s=(3, 3), s_j=(3, n, 3), s_h=(3, n_h, 3),
         n=(int, 3), r=n, g_j=n, xi=3, z=(3, n_a), z_j=(3, n, n_a), N=(3, n_h), M=(3, n_h), R_j=(3, n_h, n),
         score=float,  # the larger sum of the frame, over its level, or 0 if it is not filled
         e_0=3, e_slope=3, tilt=float,  # of e_T: rad/s; share of the axis' rate; rad, of all rates
@@ -121,6 +132,7 @@ def compare_attitude(att, blocks, eta, x, dt, detected):
     sum_turns(att, x, dt)
     att.xi[:] = att.s[:, 1]
     for i, blk in enumerate((lateral, pitch, lateral)):
+        # Roll and pitch are row 0 of their block, yaw is row 1.
         advance_axis(att, i, blk, i // 2, eta[i], dt, detected)
     att.score, att.gyro = 0.0, -1
     worst = np.argmax(att.turn_score)
@@ -134,11 +146,11 @@ def compare_attitude(att, blocks, eta, x, dt, detected):
 @kernel
 def sum_turns(att, x, dt):
     """Advance T and E by a frame of dt s, and fill `turn_score`; x (3,) rad/s: measured rates."""
-    w = abs(x[0]) + abs(x[1]) + abs(x[2])
+    rates = abs(x[0]) + abs(x[1]) + abs(x[2])
     att.turn_max = 0.0
     for i in range(3):
         leak(att.T[i], att.a, att.turn[i])
-        leak(att.E[i], att.a, dt * (att.e_0[i] + att.e_slope[i] * abs(x[i]) + att.tilt * w))
+        leak(att.E[i], att.a, dt * (att.e_0[i] + att.e_slope[i] * abs(x[i]) + att.tilt * rates))
         att.turn_score[i] = 0.0
         for m in range(att.a.size):
             excess = (abs(att.T[i, m]) - att.E[i, m]) / (att.T_std[m] * att.level)
@@ -159,7 +171,10 @@ def find_gyro(att, worst):
 
 @kernel
 def advance_axis(att, i, blk, row, eta, dt, detected):
-    """Advance filter, responses and sums of axis i, in this row of its block; N, M and R_j if `detected`."""
+    """Advance filter, responses and sums of axis i, in this row of its block; N, M and R_j if `detected`.
+
+    eta rad/s2: bound of its uncertainty.
+    """
     D, a, n = att.D[i, i], blk.a, blk.n_Z
     K, S = advance_P(att, i, blk, row, dt)
     att.n[i] = n + N_FURTHER
@@ -168,7 +183,7 @@ def advance_axis(att, i, blk, row, eta, dt, detected):
     for j in range(n):
         att.r[j] = blk.regressor[j, row]
     att.r[n] = eta
-    u = -blk.nu[row]
+    u = -blk.nu[row]  # and, of the other axes, the damping
     for j in range(3):
         att.r[n + 1 + j] = att.D[i, j] * att.xi[j]
         if j != i:
@@ -182,12 +197,11 @@ def advance_axis(att, i, blk, row, eta, dt, detected):
     for h, hypothesis in enumerate(blk.hypothesis[: blk.n_h]):
         if hypothesis.kind == LOSS:
             g_s = respond(att.s_h[i, h], 0.0, hypothesis.signature[row], D, a, K, dt) / std
-            if not detected:
-                continue
-            att.N[i, h] = att.b * att.N[i, h] + g_s * g
-            att.M[i, h] = att.b * att.M[i, h] + g_s * g_s
-            for j in range(att.n[i]):
-                att.R_j[i, h, j] = att.b * att.R_j[i, h, j] + g_s * att.g_j[j]
+            if detected:
+                att.N[i, h] = att.b * att.N[i, h] + g_s * g
+                att.M[i, h] = att.b * att.M[i, h] + g_s * g_s
+                for j in range(att.n[i]):
+                    att.R_j[i, h, j] = att.b * att.R_j[i, h, j] + g_s * att.g_j[j]
 
 
 @kernel

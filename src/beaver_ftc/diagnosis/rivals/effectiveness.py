@@ -3,7 +3,7 @@
     z = (p, q, r, theta of the surface that leads roll, pitch, yaw)
     x[k+1] = x[k] + dt (f + G u + sum_s theta_s G_s u_s),     theta[k+1] = theta[k] + a random walk
 
-theta is the lost effectiveness of the fault class [Zhang2005, eq. (4)]. The declared bound on the
+theta in [-1, 0] is minus the lost share of the effectiveness [Zhang2005, eq. (4)]. The declared bound on the
 uncertainty is taken for a standard deviation, times `noise`: it is no white noise, which is what the
 filters assume. Declared gyro noise is the measurement's; declared turbulence adds states (kalman.py).
 """
@@ -21,7 +21,7 @@ from beaver_ftc.diagnosis.rivals.rival import UNANTICIPATED
 _STEP_RAD_S = 1e-6  # for df/dx: f is quadratic in x, so a central difference is exact to rounding
 _STEPS = _STEP_RAD_S * np.vstack((np.eye(3), -np.eye(3)))
 N_RATES, THETA, N_STATES_WITHOUT_GUSTS = 3, slice(3, 6), 6
-_MAX_SQUARE = 1e6
+_MAX_SQUARE = 1e6  # of an innovation: a broken sensor may read far off, and the mean must recover
 DEFAULT_OPTIONS = {
     "noise": 3.0,  # standard deviation of the acceleration error over its declared bound
     "drift_per_s": 0.1,  # random walk of theta, 1/sqrt(s)
@@ -43,7 +43,10 @@ class EffectivenessFilter(KalmanRival):
         self.mean_square, self.cusum = float(N_RATES), 0.0
 
     def transition(self, measured: Measured) -> np.ndarray:
-        """F (n, n) of this frame, but for df/dx: [[1, dt G_s u_s], [0, 1]], with the air [.., dt B], a."""
+        """F (n, n) of this frame, without df/dx, for (p, q, r), theta and, if declared, g of kalman.py:
+
+        F = [1, dt G_s u_s, dt B; 0, 1, 0; 0, 0, a]
+        """
         F = self.F.copy()
         F[:3, THETA] = self.dt * measured.contribution[:, self.leading]
         return F
@@ -102,9 +105,9 @@ class AugmentedUkf(EffectivenessFilter):
 
     name: ClassVar[str] = "augmented-ukf"
     defaults: ClassVar[Mapping[str, float]] = DEFAULT_OPTIONS | {
-        "alarm": 20.0,
-        "allowance": 3.0,
-        "spread": float(N_STATES_WITHOUT_GUSTS),
+        "alarm": 20.0,  # level of the CUSUM g
+        "allowance": 3.0,  # of nu' S^-1 nu per frame, over its mean in a healthy flight
+        "spread": float(N_STATES_WITHOUT_GUSTS),  # n + kappa of the sigma points, without gusts
     }
 
     def predict(self, measured: Measured, before: Measured) -> None:

@@ -1,8 +1,9 @@
 """Interacting multiple models: one Kalman filter a hypothesis, and the probability of each.
 
-Hypotheses: healthy; each surface with a quarter, half and nine tenths of its effectiveness lost; and one that
-explains anything badly, by noise alone, for faults outside the class. Mixing, filtering, combination as in
-[Blom1988]; actuator faults as modes as in [Zhang1998]. Declared turbulence is a state of each (kalman.py).
+Hypotheses: healthy; a quarter, half and nine tenths of the effectiveness lost by the leader of each axis; and
+one that explains anything badly, by noise alone, for faults outside the class. Mixing, filtering, combination
+as in [Blom1988]; actuator faults as modes as in [Zhang1998]. Declared turbulence is a state of each
+(kalman.py).
 """
 
 from collections.abc import Mapping
@@ -42,7 +43,7 @@ def mix_states(
 
 
 def posterior_probabilities(predicted: np.ndarray, log_likelihoods: np.ndarray) -> np.ndarray:
-    """Bayes' rule, in logarithms so that nothing underflows."""
+    """Bayes' rule, in logarithms so that nothing underflows; predicted, log_likelihoods (M,)."""
     log_mu = np.log(predicted) + log_likelihoods
     mu = np.exp(log_mu - log_mu.max())
     mu = np.maximum(mu / mu.sum(), _MIN_MODE_PROBABILITY)
@@ -56,10 +57,10 @@ class InteractingMultipleModels(KalmanRival):
     defaults: ClassVar[Mapping[str, float]] = {
         "alarm": 5.0,  # logarithm of the odds of a fault
         "isolate": 0.9,  # probability at which a surface is named
-        "noise": 3.0,  # as in effectiveness.py
+        "noise": 3.0,  # standard deviation of the acceleration error over its declared bound
         "unknown_noise": 30.0,  # the same of the hypothesis that explains anything badly
-        "stay": 0.9999,  # a frame
-        "measurement_rad_s": 1e-5,
+        "stay": 0.9999,  # probability that the hypothesis stays true for a frame
+        "measurement_rad_s": 1e-5,  # standard deviation of the rate measured by a perfect gyro
     }
 
     def start(self) -> None:
@@ -74,7 +75,7 @@ class InteractingMultipleModels(KalmanRival):
 
     def predict(self, measured: Measured, before: Measured) -> None:
         """Mix the hypotheses, and predict each over the elapsed frame."""
-        z, P, self.mu = mix_states(self.z, self.P, self.mu, self.chain)
+        z, P, self.predicted_mu = mix_states(self.z, self.P, self.mu, self.chain)
         acceleration = np.tile(measured.acceleration, (N_MODES, 1))
         effects = measured.contribution.T[self.leading]
         acceleration[1:-1] += np.einsum("l,ia->ila", LOSS_THETA_LEVELS, effects).reshape(-1, 3)
@@ -83,11 +84,15 @@ class InteractingMultipleModels(KalmanRival):
 
     def update_statistic(self, nu: np.ndarray, S: np.ndarray) -> float:
         """The logarithm of the odds of any fault, over the alarm level."""
-        self.mu = posterior_probabilities(self.mu, log_likelihood(nu, S))
+        self.mu = posterior_probabilities(self.predicted_mu, log_likelihood(nu, S))
         return float(np.log((1.0 - self.mu[0]) / self.mu[0]) / self.options["alarm"])
 
     def isolate(self, measured: Measured) -> Verdict:
-        """The surface by the sum of its hypotheses."""
+        """The surface whose hypotheses together have a probability above `isolate`, with their mean theta.
+
+        If the last hypothesis has it, the fault is unanticipated. If none has it, the candidates are the
+        surfaces above 1 - `isolate`.
+        """
         least, levels = self.options["isolate"], self.mu[1:-1].reshape(3, N_LEVELS)
         if self.mu[-1] > least:
             return UNANTICIPATED

@@ -67,10 +67,9 @@ def test_without_a_gyro_as_with_all_readings_at_once(context, broken):
     n, before = 60, 150
     N, declared = before + n, context.declared
     phi = np.cumsum(np.random.default_rng(6).normal(size=(n, 3)), axis=0) * [0.02, 0.01, 0.01]
-    gyro = declared.gyro_rad_s**2 + 1e-10
     angle = declared.further_noise[:3] ** 2 + declared.further_resolution[:3] ** 2 / 12 + 1e-10
     rates = covariance(context, N).reshape(3, N, 3, N)
-    true = rates - np.einsum("ij,kl,i->ikjl", np.eye(3), np.eye(N), gyro)
+    true = rates - np.einsum("ij,kl,i->ikjl", np.eye(3), np.eye(N), declared.gyro_rad_s**2 + 1e-10)
     summed = DT * np.tril(np.ones((N, N)), -1)
     both = np.zeros((2, 3, N, 2, 3, N))
     both[0, :, :, 0] = rates
@@ -84,9 +83,10 @@ def test_without_a_gyro_as_with_all_readings_at_once(context, broken):
     mean[1] = mean[0] @ summed.T
     kept = [row for row in range(6) if row != broken]
     C = both.reshape(6, N, 6, N)[kept][:, :, kept].reshape(5 * N, -1)
-    expected = stands_out(mean.reshape(6, N)[kept].ravel(), C)
-    found = WhiteningFilter(context, broken).deflection_by_frame(phi)[-1]
-    assert found == pytest.approx(expected, rel=0.01)
+    whitening = WhiteningFilter(context, broken)
+    found = whitening.deflection_by_frame(phi)[-1]
+    assert found == pytest.approx(stands_out(mean.reshape(6, N)[kept].ravel(), C), rel=0.01)
+    assert np.array_equal(whitening.S, whitening.S.T)
     assert found < WhiteningFilter(context).deflection_by_frame(phi)[-1]
 
 
@@ -103,10 +103,10 @@ def test_beside_unknown_constants_as_in_the_whole_flight_at_once(context):
     late[:, before:] = DT * np.cumsum(phi, axis=0).T
     R[:, before:] = DT * np.cumsum(regressors, axis=0).transpose(1, 0, 2) * sigma
     R = R.reshape(-1, 2)
-    expected = stands_out(late.ravel(), covariance(context, before + n) + R @ R.T)
     whitening = WhiteningFilter(context)
     found = whitening.deflection_with_unknowns(phi, regressors, sigma)
-    assert found == pytest.approx(expected, rel=0.01)
+    C = covariance(context, before + n) + R @ R.T
+    assert found == pytest.approx(stands_out(late.ravel(), C), rel=0.01)
     assert found < 0.98 * whitening.deflection_by_frame(phi)[-1]
     nothing = whitening.deflection_with_unknowns(phi, regressors[..., :0], sigma[:0])
     assert nothing == pytest.approx(whitening.deflection_by_frame(phi)[-1])
@@ -125,10 +125,9 @@ def test_of_a_flight_it_takes_what_the_surface_gave(context):
     at_s = strikes_at_s(block)
     recording = record(scenario_of(block, at_s + 1.0, [loss("elevator", 0.7, at_s)]))
     seen = [measured for measured, _ in recording.seen]
-    frames = round(at_s * 100)
-    effect = np.array([-0.7 * measured.contribution[:, 1] for measured in seen[frames + 1 :]])
-    shown = VaneGust(recording.context).context  # a test that knows the gusts that the vanes show
-    d = WhiteningFilter(shown).deflection_by_frame(effect)
+    effect = np.array([-0.7 * measured.contribution[:, 1] for measured in seen[round(at_s * 100) + 1 :]])
+    # A test that knows the gusts that the vanes show:
+    d = WhiteningFilter(VaneGust(recording.context).context).deflection_by_frame(effect)
     assert deflections(recording, "elevator", 0.7, (0.5, 1.0)) == pytest.approx([d[49], d[-1]])
     assert not effect[:, [0, 2]].any()
 

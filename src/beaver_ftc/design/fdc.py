@@ -48,7 +48,7 @@ class Engine:
     manifold_pressure_inhg: float
 
 
-def atmosphere(altitude_m):
+def air_density(altitude_m):
     """Density kg/m3 at an altitude m."""
     temperature = _SEA_LEVEL_TEMPERATURE_K - _LAPSE_K_PER_M * altitude_m
     exponent = gravity(altitude_m) / (_LAPSE_K_PER_M * _GAS_J_PER_KG_K)
@@ -66,7 +66,7 @@ def aerodynamic_coefficients(
 ) -> dict:
     """CX, CY (without the betadot term), CZ, Cl, Cm, Cn and qdyn Pa; ratio multiplies single terms."""
     V, alpha, beta, p, q, r = state[:6]
-    density = atmosphere(state[11])
+    density = air_density(state[11])
     power = engine_power_kw(engine.speed_rpm, engine.manifold_pressure_inhg, density)
     b, c = GEOMETRY.span_m, GEOMETRY.chord_m
     of = {
@@ -82,38 +82,41 @@ def derivatives(
     state: np.ndarray, surfaces: np.ndarray, engine: Engine, ratio: Mapping[str, float] | None = None
 ) -> np.ndarray:
     """Time derivative of the state, (12,) per s [FDC, chapter 3]."""
-    of = aerodynamic_coefficients(state, surfaces, engine, ratio)
+    coef = aerodynamic_coefficients(state, surfaces, engine, ratio)
     betadot_ratio = (ratio or {}).get("CY_betadot", 1.0)
-    linear, angular = _flow_rates(state, of, betadot_ratio), _body_accelerations(state, of)
+    linear, angular = _flow_rates(state, coef, betadot_ratio), _body_accelerations(state, coef)
     return np.concatenate([linear, angular, _euler_rates(state), _track(state)])
 
 
-def _flow_rates(state: np.ndarray, of: Mapping, betadot_ratio: float) -> np.ndarray:
-    """Vdot, alphadot, betadot; the force of betadot acts across the flight path: it changes betadot alone."""
+def _flow_rates(state: np.ndarray, coef: Mapping, betadot_ratio: float) -> np.ndarray:
+    """Vdot, alphadot, betadot; the force of betadot acts across the flight path: it changes betadot alone.
+
+    alphadot = (Z cos(alpha) - X sin(alpha)) / (m V cos(beta)) + q - (p cos(alpha) + r sin(alpha)) tan(beta)
+    betadot = betadot_0 + side betadot,  side = CY_betadot qdyn S b / (2 V) / (m V)
+    """
     V, alpha, beta, p, q, r = state[:6]
-    area, down = of["qdyn"] * GEOMETRY.wing_area_m2, _to_body(*state[6:9])[:, 2]
-    force = area * np.array([of[name] for name in FORCES]) + MASS.mass_kg * gravity(state[11]) * down
+    area, down = coef["qdyn"] * GEOMETRY.wing_area_m2, _to_body(*state[6:9])[:, 2]
+    force = area * np.array([coef[name] for name in FORCES]) + MASS.mass_kg * gravity(state[11]) * down
     X, Y, Z = force
     ca, sa, cb, sb = np.cos(alpha), np.sin(alpha), np.cos(beta), np.sin(beta)
     mV = MASS.mass_kg * V
     Vdot = force @ _flow(alpha, beta) / MASS.mass_kg
     alphadot = (Z * ca - X * sa) / (mV * cb) + q - (p * ca + r * sa) * sb / cb
     betadot = (Y * cb - (X * ca + Z * sa) * sb) / mV + p * sa - r * ca
-    side = betadot_ratio * _CY_BETADOT * area * GEOMETRY.span_m / (2 * V) / mV
+    side = betadot_ratio * value("CY_betadot") * area * GEOMETRY.span_m / (2 * V) / mV
     return np.array([Vdot, alphadot, betadot / (1.0 - side)])
 
 
-_CY_BETADOT = _AIRCRAFT.terms["CY_betadot"].value
 _INERTIA_KG_M2 = np.array(
     [[MASS.Ix_kg_m2, 0.0, -MASS.Jxz_kg_m2], [0.0, MASS.Iy_kg_m2, 0.0], [-MASS.Jxz_kg_m2, 0.0, MASS.Iz_kg_m2]]
 )
 
 
-def _body_accelerations(state: np.ndarray, of: Mapping) -> np.ndarray:
+def _body_accelerations(state: np.ndarray, coef: Mapping) -> np.ndarray:
     """pdot, qdot, rdot: I x' = M - x x I x."""
     x, lengths = state[3:6], (GEOMETRY.span_m, GEOMETRY.chord_m, GEOMETRY.span_m)
-    arms = of["qdyn"] * GEOMETRY.wing_area_m2 * np.array(lengths)
-    M = arms * np.array([of[name] for name in MOMENTS])
+    arms = coef["qdyn"] * GEOMETRY.wing_area_m2 * np.array(lengths)
+    M = arms * np.array([coef[name] for name in MOMENTS])
     return np.linalg.solve(_INERTIA_KG_M2, M - np.cross(x, _INERTIA_KG_M2 @ x))
 
 

@@ -107,7 +107,7 @@ def designed_derivatives(scenario: Scenario, point: FlightState) -> tuple[np.nda
 
 def air_data(point: FlightState, faster_mps: Any = 0.0, higher_m: Any = 0.0) -> np.ndarray:
     """V, qdyn, dpt (3,) with the point's engine setting, there or a step away, real or complex."""
-    V, density = point.airspeed_mps + faster_mps, fdc.atmosphere(point.altitude_m + higher_m)
+    V, density = point.airspeed_mps + faster_mps, fdc.air_density(point.altitude_m + higher_m)
     power = engine_power_kw(point.engine_rpm, point.manifold_pressure_inhg, density)
     return np.array([V, 0.5 * density * V**2, slipstream(power, density, V)])
 

@@ -148,8 +148,8 @@ def fill_unmodelled(blocks, gust, out):
 def update_alarm(alarm, cfg, blocks, views, forces, gust, t, bounded=True):
     """Fill the scores over the alarm level, the largest, its axis, and at the first alarm its time t s.
 
-    Scores of forces and of oscillations are in the column of the step on their axis. The largest is 0 unless
-    `bounded`: outside its map, the model's error has no bound.
+    Scores of forces and of oscillations are in the column of the step on their axis: the last three columns
+    of `share`. The largest is 0 unless `bounded`: outside its map, the model's error has no bound.
     """
     alarm.ratio, alarm.share[:] = 0.0, 0.0
     for b in blocks:
@@ -222,26 +222,27 @@ def confirms_loss(cfg, blocks, fies, of, s):
 def excludes_loss(cfg, blocks, fies, of, s, pitch_ends, abrupt):
     """True if an alternative explains the data better than a loss of surface s:
 
-        best - max(hi_loss, hi_end) > margin,   hi_loss < share best,   hi_end < end_share best
+        best - max(hi, hi_end) > margin,   hi < share best,   hi_end < share_end best
 
-    best: the largest lo of the alternatives. Each block of roll and yaw is compared together with that of
-    pitch, because a loss acts on its own axes only. A loss that is not declared `abrupt` may grow. A constant
-    theta then explains only a part of its effect, so that share is MIN_LLR_SHARE instead of 1. The same holds
-    for a loss that begins inside a frame of several instants, and for the end of a loss there. The end of a
-    loss in pitch counts only if `pitch_ends` is set: a fault outside the class may look like it.
+    best: the largest lo of the alternatives; hi, hi_end: bounds of the loss and of its end. Each block of
+    roll and yaw is compared together with that of pitch, because a loss acts on its own axes only. A loss
+    that is not declared `abrupt` may grow. A constant theta then explains only a part of its effect, so that
+    share is MIN_LLR_SHARE instead of 1. The same holds for a loss that begins inside a frame of several
+    instants, and for the end of a loss there. The end of a loss in pitch counts only if `pitch_ends` is set:
+    a fault outside the class may look like it.
     """
     pitch = blocks[likelihood.PITCH_BLOCK]
     single = cfg.w == 1.0
     share = 1.0 if abrupt and single else MIN_LLR_SHARE
-    end_share = 1.0 if single else MIN_LLR_SHARE
+    share_end = 1.0 if single else MIN_LLR_SHARE
+    best_pitch = best_alternative(pitch, fies, of, s)
+    hi_pitch = loss_bounds(pitch, s, False)[1]
+    hi_end_pitch = loss_bounds(pitch, s, True)[1] if pitch_ends else 0.0
     for b in blocks[LATERAL_BLOCK:]:
-        best = best_alternative(pitch, fies, of, s)
-        best = max(best, best_alternative(b, fies, of, s))
-        hi = max(loss_bounds(pitch, s, False)[1], loss_bounds(b, s, False)[1])
-        hi_end = loss_bounds(b, s, True)[1]
-        if pitch_ends:
-            hi_end = max(hi_end, loss_bounds(pitch, s, True)[1])
-        low = hi < share * best and hi_end < end_share * best
+        best = max(best_pitch, best_alternative(b, fies, of, s))
+        hi = max(hi_pitch, loss_bounds(b, s, False)[1])
+        hi_end = max(hi_end_pitch, loss_bounds(b, s, True)[1])
+        low = hi < share * best and hi_end < share_end * best
         if low and best - max(hi, hi_end) > cfg.margin:
             return True
     return False
@@ -278,9 +279,11 @@ def prepare_tests(cfg, noise, rows, blocks, gust, bound, model, meas, u, dt):
 
 @kernel
 def update_eta_rate(noise, blocks, emap, u):
-    """The share of its bound by which a mapped uncertainty can change in the next frame.
+    """Fill eta_rate, the share of its bound by which a mapped uncertainty can change in the next frame.
 
     eta_rate = min(rate0 + moved BOUNDS_PER_TRAVEL, MAX_ETA_RATE),   moved = max_s |u_s - u_old_s| / travel_s
+
+    `emap.u_old` becomes u.
     """
     moved = 0.0
     for s in range(u.size):
@@ -303,7 +306,8 @@ def add_test_instant(cfg, noise, rows, gust, bound, model, meas, u, dt):
 def fill_drift(noise, eta, blocks, gust, V, dt):
     """Fill of each block the drift's intensity Q_d and decay a; of the filter without gust the noise, too.
 
-    Q_d = Q_scale q_gust + q max(eta, MIN_ETA)^2,  (rad/s2)2/s      a = exp(-dt V / length)
+    Q_d,ij = Q_scale q_gust,ij + [i = j] q max(eta_i, MIN_ETA_RAD_S2)^2,  (rad/s2)2/s
+    a = exp(-dt V / length)
     """
     gusty = gust.output.gusty
     for k, b in enumerate(blocks):

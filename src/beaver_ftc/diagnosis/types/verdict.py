@@ -273,8 +273,8 @@ def finding_on_surface(types, past, layout, s, t):
     """The finding on surface s, or if s is NOT_ISOLATED or UNANTICIPATED."""
     if s >= 0:
         status = types.surface[s].status
-        estimator = estimator_of_fault(layout, s, status.fault_type)
-        return (estimator, status.isolated_at_s, status.fault_type, status.typed_at_s)
+        kind = status.fault_type
+        return (estimator_of_fault(layout, s, kind), status.isolated_at_s, kind, status.typed_at_s)
     return (s, t if s != past.isolated_estimator else past.isolated_at_s, TYPE_UNDECIDED, past.typed_at_s)
 
 

@@ -148,8 +148,8 @@ def fill_unmodelled(blocks, gust, out):
 def update_alarm(alarm, cfg, blocks, views, forces, gust, t, bounded=True):
     """Fill the scores over the alarm level, the largest, its axis, and at the first alarm its time t s.
 
-    Scores of forces and of oscillations are in the column of the step on their axis: the last three columns
-    of `share`. The largest is 0 unless `bounded`: outside its map, the model's error has no bound.
+    Scores of forces and of oscillations are in the column of the step on their axis: the last three of the
+    n_scores in `share`. The largest is 0 unless `bounded`: outside its map, the model's error has no bound.
     """
     alarm.ratio, alarm.share[:] = 0.0, 0.0
     for b in blocks:

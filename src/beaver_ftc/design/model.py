@@ -20,6 +20,7 @@ right.
     engine terms neglected, other coefficients, another mass or inertia     only other numbers in the record
     frozen alpha                f(x, y0) and G(y0) with alpha held at its trim value, all else as measured
     linearised about trim       f = f0 + f_x (x - x0) + f_y (y - y0), G = G0
+    both                        the linear model without its derivative with alpha: f_y[:, ALPHA] = 0
 
 The linear model is that of f + G u at (x0, y0, u0): the surfaces' moments vary with y too, so f_y holds
 d(G u0)/dy, and f0 + G0 u0 is the acceleration in trim.
@@ -57,6 +58,8 @@ from beaver_ftc.design.table import (
     whole_sum,
 )
 
+_STEP = 1e-30  # of a complex step: far below rounding, so the derivative is exact to rounding
+
 # What multiplies rate products and moments in the accelerations; SI units.
 InertiaCoefficients = namedtuple("InertiaCoefficients", "Ppq Pqr Pl Pn Qpp Qpr Qrr Qm Rpq Rqr Rl Rn")
 
@@ -75,13 +78,6 @@ def inertia_coefficients(mass: MassProperties) -> InertiaCoefficients:
 def inertia_of(design: np.void) -> InertiaCoefficients:
     """Those of a design model's record (dtype `design_dtype`)."""
     return InertiaCoefficients(*(float(design[name]) for name in InertiaCoefficients._fields))
-
-
-def inertial(inertia: InertiaCoefficients, x: np.ndarray) -> np.ndarray:
-    """The angular acceleration (n, 3) rad/s2 of turning with no moment, from the rate products [FDC]."""
-    f = np.zeros((3, len(x)))
-    plain(add_coupling)(inertia, x.T, f)
-    return f.T
 
 
 @sized
@@ -121,36 +117,36 @@ def design_record(
 
 
 @kernel
-def add_coupling(design, x, f):
-    """Add to f (3,) rad/s2 what the inertia makes of the rates x (3,) rad/s."""
-    p, q, r = x[0], x[1], x[2]
-    f[0] += design.Ppq * p * q + design.Pqr * q * r
-    f[1] += design.Qpp * p * p + design.Qpr * p * r + design.Qrr * r * r
-    f[2] += design.Rpq * p * q + design.Rqr * q * r
+def response(design, x, y, f, G):
+    """Fill f (3,) rad/s2 and G (3, n) rad/s2 per rad of the design model, simplified or not, at x (3,) and
+    y."""
+    if design.linearised:
+        linear_response(design, x, y, f, G)
+    elif design.frozen_alpha:
+        frozen = y.copy()
+        frozen[ALPHA] = design.y0[ALPHA]
+        nonlinear_response(design, x, frozen, f, G)
+    else:
+        nonlinear_response(design, x, y, f, G)
 
 
 @kernel
-def accelerate(design, y, C):
-    """Turn C (3, columns) from coefficients Cl, Cm, Cn into the accelerations that they cause, rad/s2."""
-    qS = y[QDYN] * design.S
-    for k in range(C.shape[1]):
-        L, M, N = qS * design.b * C[0, k], qS * design.c * C[1, k], qS * design.b * C[2, k]
-        C[0, k] = design.Pl * L + design.Pn * N
-        C[1, k] = design.Qm * M
-        C[2, k] = design.Rl * L + design.Rn * N
+def responses(design, x, y, f, G):
+    """The same at each of x (n, 3) and y (n, 4 + declared), into f (n, 3) and G (n, 3, surfaces)."""
+    for i in range(x.shape[0]):
+        response(design, x[i], y[i], f[i], G[i])
 
 
 @kernel
-def nonlinear_response_from_table(design, x, y, f, G):
-    """Fill f and G as `nonlinear_response` does, from the table's monomials as they are: of another x in it,
-    for example of the rates against the air."""
-    table = design.moments
+def linear_response(design, x, y, f, G):
+    """Fill f and G with the linear model about (x0, y0)."""
     for i in range(3):
-        f[i] = free_sum(table, i, table.power)
-    surface_sums(table, table.power, G)
-    accelerate(design, y, f.reshape(3, 1))
-    accelerate(design, y, G)
-    add_coupling(design, x, f)
+        f[i] = design.f0[i]
+        for j in range(3):
+            f[i] += design.f_x[i, j] * (x[j] - design.x0[j])
+        for j in range(y.size):
+            f[i] += design.f_y[i, j] * (y[j] - design.y0[j])
+    G[:] = design.G0
 
 
 @kernel
@@ -162,9 +158,52 @@ def nonlinear_response(design, x, y, f, G):
 
 
 @kernel
+def nonlinear_response_from_table(design, x, y, f, G):
+    """Fill f and G as `nonlinear_response` does, from the monomials that are already in the table.
+
+    Those may be of the rates against the air; x (3,) rad/s: rates against the ground.
+    """
+    table = design.moments
+    for i in range(3):
+        f[i] = free_sum(table, i, table.power)
+    surface_sums(table, table.power, G)
+    accelerate(design, y, f.reshape(3, 1))
+    accelerate(design, y, G)
+    add_coupling(design, x, f)
+
+
+@kernel
+def accelerate(design, y, C):
+    """Turn C (3, columns) from coefficients Cl, Cm, Cn into the accelerations that they cause, rad/s2.
+
+    L = qdyn S b Cl      M = qdyn S c Cm      N = qdyn S b Cn      N m
+    """
+    qS = y[QDYN] * design.S
+    for k in range(C.shape[1]):
+        L = qS * design.b * C[0, k]
+        M = qS * design.c * C[1, k]
+        N = qS * design.b * C[2, k]
+        C[0, k] = design.Pl * L + design.Pn * N
+        C[1, k] = design.Qm * M
+        C[2, k] = design.Rl * L + design.Rn * N
+
+
+@kernel
+def add_coupling(design, x, f):
+    """Add to f (3,) rad/s2 what the inertia makes of the rates x (3,) rad/s."""
+    p, q, r = x[0], x[1], x[2]
+    f[0] += design.Ppq * p * q + design.Pqr * q * r
+    f[1] += design.Qpp * p * p + design.Qpr * p * r + design.Qrr * r * r
+    f[2] += design.Rpq * p * q + design.Rqr * q * r
+
+
+@kernel
 def rate_damping(design, x, y, u, scratch, out):
     """Fill out (3, 3) 1/s: what the aerodynamic moments' accelerations change by per rate of the aircraft
-    against the air. x (3,) rad/s, y (4 + declared,), u (surfaces,) rad; scratch (MAX_MONOMIALS,)."""
+    against the air. x (3,) rad/s, y (4 + declared,), u (surfaces,) rad; scratch (MAX_MONOMIALS,).
+
+    The table has the rates as ph = p b / 2V, qh = q c / V, rh = r b / 2V; per_rate is their scale, s.
+    """
     table = design.moments
     evaluate(table, x, y)
     for j, rate in enumerate((PH, QH, RH)):
@@ -190,9 +229,6 @@ def acceleration(f, G, u, out):
         out[i] = f[i]
         for s in range(u.size):
             out[i] += G[i, s] * u[s]
-
-
-_STEP = 1e-30  # of a complex step: far below rounding, so the derivative is exact to rounding
 
 
 def design_of(model: Any, aircraft: Aircraft | None = None) -> np.ndarray:
@@ -232,22 +268,22 @@ def jacobian(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """f (3,), G (3, n) and the derivatives of f + G u with x (3, 3) and with y (3, y.size): complex steps."""
     steps = 1j * _STEP * np.eye(3 + y.size)  # a column is a direction
-    f, G = _split(design, x[:, None] + steps[:3], y[:, None] + steps[3:])
+    f, G = _nonlinear_f_and_G(design, x[:, None] + steps[:3], y[:, None] + steps[3:])
     along = (f + np.einsum("isk,s->ik", G, u)).imag / _STEP
     return f[:, 0].real, G[:, :, 0].real, along[:, :3], along[:, 3:]
 
 
-def _split(design: np.void, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _nonlinear_f_and_G(design: np.void, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The nonlinear f (3, ...) and G (3, n, ...) by the evaluator's plain functions, which take complex
     numbers and any number of states at once: x (3, ...), y (4 + declared, ...)."""
-    record, table = _fields(design), _fields(design["moments"])
+    model, table = _fields(design), _fields(design["moments"])
     states = np.broadcast_shapes(x.shape[1:], y.shape[1:])
     signal = np.zeros((N_SIGNALS, *states), np.result_type(x, y))
     plain(signals)(table, x, y, signal)
-    f, G = _coefficients(table, signal, record.G0.shape[1])
-    plain(accelerate)(record, y, f[:, None])
-    plain(accelerate)(record, y, G)
-    plain(add_coupling)(record, x, f)
+    f, G = _coefficients(table, signal, model.G0.shape[1])
+    plain(accelerate)(model, y, f[:, None])
+    plain(accelerate)(model, y, G)
+    plain(add_coupling)(model, x, f)
     return f, G
 
 
@@ -260,9 +296,9 @@ def _coefficients(table: Any, signal: np.ndarray, n: int) -> tuple[np.ndarray, n
     return np.array([plain(free_sum)(table, i, power) for i in range(3)]), per_rad
 
 
-def _fields(record: np.void) -> SimpleNamespace:
+def _fields(fields: np.void) -> SimpleNamespace:
     """A record's fields as attributes; NumPy's own records take ten times as long to find one."""
-    return SimpleNamespace(**{name: record[name] for name in record.dtype.names or ()})
+    return SimpleNamespace(**{name: fields[name] for name in fields.dtype.names or ()})
 
 
 def coefficient_slopes(design: np.void, x: np.ndarray, y: np.ndarray, u: np.ndarray) -> np.ndarray:
@@ -271,6 +307,13 @@ def coefficient_slopes(design: np.void, x: np.ndarray, y: np.ndarray, u: np.ndar
     plain(signals)(table, x, y, signal)
     free, per_rad = _coefficients(table, signal[:, None] + 1j * _STEP * np.eye(N_SIGNALS), u.size)
     return (free + np.einsum("isk,s->ik", per_rad, u)).imag / _STEP
+
+
+def inertial(inertia: InertiaCoefficients, x: np.ndarray) -> np.ndarray:
+    """The angular acceleration (n, 3) rad/s2 of turning with no moment, from the rate products [FDC]."""
+    f = np.zeros((3, len(x)))
+    plain(add_coupling)(inertia, x.T, f)
+    return f.T
 
 
 def responses_at(design: np.void, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -294,50 +337,21 @@ def unanticipated_at(design: np.void, y: np.ndarray, Cm_alpha3: np.ndarray) -> n
 
 
 def effectiveness(design: np.void, y: np.ndarray) -> np.ndarray:
-    """G (3, n) rad/s2 per rad at y (4 + declared,), without compiled code; alpha is y's even where the model
-    has it frozen."""
-    return design["G0"].copy() if design["linearised"] else _split(design, np.zeros(3), y)[1].real
+    """G (3, n) rad/s2 per rad at y (4 + declared,), without compiled code.
+
+    A linearised model has the G of its trim at any y. If alpha is frozen, it is that of y all the same.
+    """
+    return design["G0"].copy() if design["linearised"] else _nonlinear_f_and_G(design, np.zeros(3), y)[1].real
 
 
 def own_damping(design: np.void, y: np.ndarray) -> np.ndarray:
-    """d f_i / d x_i (3,) 1/s at y and no rate, surfaces neutral: each rate's effect on its own axis; alpha is
-    y's even where the model has it frozen."""
+    """d f_i / d x_i (3,) 1/s at y and no rate, surfaces neutral: each rate's effect on its own axis.
+
+    A linearised model has those of its trim at any y. If alpha is frozen, it is that of y all the same.
+    """
     neutral = np.zeros(design["G0"].shape[1])
     f_x = design["f_x"] if design["linearised"] else jacobian(design, np.zeros(3), y, neutral)[2]
     return np.diag(f_x).copy()
-
-
-@kernel
-def response(design, x, y, f, G):
-    """Fill f (3,) rad/s2 and G (3, n) rad/s2 per rad of the design model, simplified or not, at x (3,) and
-    y."""
-    if design.linearised:
-        linear_response(design, x, y, f, G)
-    elif design.frozen_alpha:
-        frozen = y.copy()
-        frozen[ALPHA] = design.y0[ALPHA]
-        nonlinear_response(design, x, frozen, f, G)
-    else:
-        nonlinear_response(design, x, y, f, G)
-
-
-@kernel
-def responses(design, x, y, f, G):
-    """The same at each of x (n, 3) and y (n, 4 + declared), into f (n, 3) and G (n, 3, surfaces)."""
-    for i in range(x.shape[0]):
-        response(design, x[i], y[i], f[i], G[i])
-
-
-@kernel
-def linear_response(design, x, y, f, G):
-    """Fill f and G with the linear model about (x0, y0)."""
-    for i in range(3):
-        f[i] = design.f0[i]
-        for j in range(3):
-            f[i] += design.f_x[i, j] * (x[j] - design.x0[j])
-        for j in range(y.size):
-            f[i] += design.f_y[i, j] * (y[j] - design.y0[j])
-    G[:] = design.G0
 
 
 class DesignFunctions:
@@ -348,14 +362,14 @@ class DesignFunctions:
     - `u` (surfaces,) rad: deflections of the surfaces from neutral.
     """
 
-    def __init__(self, record: np.ndarray) -> None:
-        self._record = record[0]
+    def __init__(self, design: np.ndarray) -> None:
+        self._design = design[0]
 
     def f(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Angular acceleration (3,) rad/s² at neutral surfaces. For `x` (n, 3) the result is (n, 3)."""
         rows = np.atleast_2d(x)
-        return responses_at(self._record, rows, np.tile(y, (len(rows), 1)))[0].reshape(np.shape(x))
+        return responses_at(self._design, rows, np.tile(y, (len(rows), 1)))[0].reshape(np.shape(x))
 
     def G(self, y: np.ndarray) -> np.ndarray:
         """Effectiveness matrix (3, surfaces), rad/s² per rad: acceleration for each rad of a surface."""
-        return responses_at(self._record, np.zeros((1, 3)), y[None])[1][0]
+        return responses_at(self._design, np.zeros((1, 3)), y[None])[1][0]

@@ -84,8 +84,8 @@ def derivatives(
     """Time derivative of the state, (12,) per s [FDC, chapter 3]."""
     coef = aerodynamic_coefficients(state, surfaces, engine, ratio)
     betadot_ratio = (ratio or {}).get("CY_betadot", 1.0)
-    linear, angular = _flow_rates(state, coef, betadot_ratio), _body_accelerations(state, coef)
-    return np.concatenate([linear, angular, _euler_rates(state), _track(state)])
+    flow = _flow_rates(state, coef, betadot_ratio)
+    return np.concatenate([flow, _body_accelerations(state, coef), _euler_rates(state), _track(state)])
 
 
 def _flow_rates(state: np.ndarray, coef: Mapping, betadot_ratio: float) -> np.ndarray:
@@ -114,8 +114,9 @@ _INERTIA_KG_M2 = np.array(
 
 def _body_accelerations(state: np.ndarray, coef: Mapping) -> np.ndarray:
     """pdot, qdot, rdot: I x' = M - x x I x."""
-    x, lengths = state[3:6], (GEOMETRY.span_m, GEOMETRY.chord_m, GEOMETRY.span_m)
-    arms = coef["qdyn"] * GEOMETRY.wing_area_m2 * np.array(lengths)
+    x = state[3:6]
+    lengths = np.array([GEOMETRY.span_m, GEOMETRY.chord_m, GEOMETRY.span_m])
+    arms = coef["qdyn"] * GEOMETRY.wing_area_m2 * lengths
     M = arms * np.array([coef[name] for name in MOMENTS])
     return np.linalg.solve(_INERTIA_KG_M2, M - np.cross(x, _INERTIA_KG_M2 @ x))
 

@@ -67,8 +67,8 @@ def fill_map(emap: np.void, aircraft: Aircraft, one_free: bool, two_free: bool) 
     for b, box in enumerate(declared.boxes):
         ends = np.transpose(box.ends(aircraft.signals))
         emap["lo"][b, : ends.shape[1]], emap["hi"][b, : ends.shape[1]] = ends
-        tables = box.error_p_rad_s2, box.error_q_rad_s2, box.error_r_rad_s2
-        emap["e"][:n_rows, b, :n_levels] = np.stack(tables, axis=-1)
+        errors = np.stack([box.error_p_rad_s2, box.error_q_rad_s2, box.error_r_rad_s2], axis=-1)
+        emap["e"][:n_rows, b, :n_levels] = errors
         emap["Cn"][b] = box.engines_apart or 0.0
 
 

@@ -1,5 +1,5 @@
 """Checks of a log's units by mechanics: the integrals of p, q and r are the changes of roll, pitch and yaw,
-and the mean of the specific force is 1 g.
+and the median magnitude of the acceleration along z is 1 g.
 
     phi' = p + tan(theta) (q sin(phi) + r cos(phi))        [SL03, eq. 1.4-4]
     theta' = q cos(phi) - r sin(phi)
@@ -17,22 +17,31 @@ import numpy as np
 from beaver_ftc_logs.recording import Column, Columns, Floats, largest_magnitude
 from beaver_ftc_logs.units import ACCELERATION, ANGLE, RATE, SI_UNITS, UNIT_FACTORS, nearest_unit
 
-_ANGLE_WINDOW_S, _MIN_WINDOWS = 1.0, 8
-_EXCHANGED, _AGREEING, _CLOSE, _EXACT = 0.2, 0.7, 0.95, 0.99
-_SLOPE_FACTOR, _UNIT_RATIO = 1.8, 1.3
+_ANGLE_WINDOW_S = 1.0  # over which the change of an angle is compared with the integral of its rate
+_MIN_WINDOWS = 8  # with fewer windows nothing is compared
+# Magnitudes of the correlation of an angle's change with the integral of a rate:
+_EXCHANGED = 0.2  # below it the rate is that of another axis
+_AGREEING = 0.7  # above it the two belong together, whatever the unit of the rate
+_CLOSE = 0.95  # between _AGREEING and this a column takes the place of the rate only if it is _EXACT
+_EXACT = 0.99  # above it the angle confirms the rate, if the slope is within _UNIT_RATIO of 1
+_SLOPE_FACTOR = 1.8  # slopes from its inverse to it say nothing: no two units differ by so little
+_UNIT_RATIO = 1.3  # the most by which a slope differs from the factor of a unit that fits
 _MIN_RMS_RAD_S = 1e-3
 """Level and north turn with the earth, by 7.3e-5 rad/s, and with the way over it, by 4.7e-5 rad/s at 300 m/s.
 A change of an angle that is not far above them says nothing of a rate."""
 _GRAVITY_MPS2 = SI_UNITS["g"][1]
-_GRAVITIES_G = (0.5, 2.0)
-_MAX_ANGLE_RAD, _FAST_RAD_S = 1.02 * 2.0 * np.pi, 12.0
-_MAX_PITCH_RAD, _STEEP_PITCH_RAD = 1.02 * 0.5 * np.pi, 1.0
+_GRAVITIES_G = (0.5, 2.0)  # a median magnitude along z between these is in m/s2
+_MAX_ANGLE_RAD = 1.02 * 2.0 * np.pi  # a full circle, with 2 % for rounding and filters
+_MAX_PITCH_RAD = 1.02 * 0.5 * np.pi  # a quarter of it, likewise
+_FAST_RAD_S = 12.0  # no vehicle turns so fast
+_STEEP_PITCH_RAD = 1.0  # above it roll and yaw are hard to distinguish
 
 
 @dataclass(frozen=True)
 class AngleFit:
-    """slope: change of an angle over the integral of its rate; correlation of the two; max_angle_magnitude,
-    max_rate_magnitude: as the log says."""
+    """How one of roll, pitch and yaw follows its rate. slope: change of the angle over the integral of the
+    rate; correlation of the two; max_angle_magnitude, max_rate_magnitude: largest of each, in the unit of the
+    log."""
 
     slope: float
     correlation: float
@@ -41,41 +50,51 @@ class AngleFit:
 
 
 def fit_angle(gyros: Sequence[Column], angles: Sequence[Column | None], axis: int) -> AngleFit | None:
-    """How one of roll, pitch and yaw follows the rates, all as the log says, the rates in one unit; None
-    where too little moves, or this angle or roll is not known.
+    """Fit the angle of an axis to the rates, all in the unit of the log, the rates in one unit; None if too
+    little moves, or if this angle or roll is not known.
 
-    Not where the nose is so steep that roll and yaw are hard to distinguish.
+    Where the nose is steep, roll and yaw are hard to distinguish: such windows are left out for both.
     """
     roll, pitch, _ = angles
     angle, t = angles[axis], gyros[0].t_s
     if roll is None or angle is None:
         return None
-    p, q, r = (_interpolate(gyro, t) for gyro in gyros)
+    rates = [_interpolate(gyro, t) for gyro in gyros]
     # The circle is known whatever the unit.
-    phi = _interpolate(roll, t) * 2.0 * np.pi / _full_circle(roll.values)
+    circle = _full_circle(roll.values)
+    phi = _interpolate(roll, t, circle) * 2.0 * np.pi / circle
     theta = np.zeros(len(t))
     if pitch is not None:
+        # Pitch goes up to a quarter of the circle only.
         circle = _full_circle(np.append(4.0 * pitch.values, roll.values))
         theta = _interpolate(pitch, t) * 2.0 * np.pi / circle
-    turn = [q * np.sin(phi), r * np.cos(phi)]
+    terms = _terms_of_change(rates, phi, theta, axis)
+    whole = None if axis == 1 else _full_circle(angle.values)
+    fit = _fit_first_term(*_changes_by_window(t, _interpolate(angle, t, whole), terms, theta, whole))
+    return fit and AngleFit(*fit, largest_magnitude(angle.values), largest_magnitude(rates[axis]))
+
+
+def _terms_of_change(rates: list[Floats], phi: Floats, theta: Floats, axis: int) -> list[Floats]:
+    """The terms (n,) whose sum is the rate of change of an angle, that of its own rate first."""
+    p, q, r = rates
     if axis == 1:
-        return _fit_angle(t, _interpolate(angle, t), [q * np.cos(phi), -r * np.sin(phi)])
+        return [q * np.cos(phi), -r * np.sin(phi)]
+    turn = [q * np.sin(phi), r * np.cos(phi)]
     if axis == 0:
-        terms = [p, *(np.tan(theta) * part for part in turn)]
-    else:
-        terms = [(turn[0] + turn[1]) / np.cos(theta)]
-    return _fit_angle(t, _interpolate(angle, t), terms, _full_circle(angle.values), theta)
+        return [p, *(np.tan(theta) * part for part in turn)]
+    return [(turn[0] + turn[1]) / np.cos(theta)]
 
 
-def _fit_angle(
-    t: Floats, angle: Floats, terms: list[Floats], circle: float | None = None, theta: Floats | None = None
-) -> AngleFit | None:
-    """How an angle follows the first term of its rate of change, the others in whatever unit they are.
+def _changes_by_window(
+    t: Floats, angle: Floats, terms: list[Floats], theta: Floats, circle: float | None
+) -> tuple[Floats, Floats]:
+    """Changes of an angle, y (w,), and of the integrals S of m terms, X (w, m), in w windows from a to b:
 
-        y = X beta + error,   y = angle(b) - angle(a),   X = S(b) - S(a),   S: integral of the terms
+        y = angle(b) - angle(a),   X = S(b) - S(a)
 
-    y (w,), X (w, m): changes from the begin a to the end b of w windows. circle: a circle, where the angle
-    may go round. theta: windows in which the pitch angle is steep say nothing.
+    A window with a gap or without a number is left out. circle: a full circle in the unit of the angle, which
+    may go round; None for pitch. Where it is given, windows in which the pitch angle theta (n,) is steep are
+    left out too.
     """
     h = np.diff(t)
     means = [np.nan_to_num(0.5 * (term[1:] + term[:-1])) for term in terms]
@@ -84,39 +103,50 @@ def _fit_angle(
     n = max(round(_ANGLE_WINDOW_S / max(float(np.median(h)), 1e-9)), 1)
     a = np.arange(0, len(t) - n, n)
     b = a + n
-    ok = (t[b] - t[a]) < 2.0 * _ANGLE_WINDOW_S
-    if theta is not None:
-        steep = np.cumsum(np.abs(theta) > _STEEP_PITCH_RAD)
-        ok &= steep[b] == steep[a]
-    y = (angle[b] - angle[a])[ok]
-    X = (S[b] - S[a])[ok]
+    y, X = angle[b] - angle[a], S[b] - S[a]
+    ok = (t[b] - t[a] < 2.0 * _ANGLE_WINDOW_S) & np.isfinite(y) & np.isfinite(X).all(axis=1)
     if circle is not None:
         y = (y + 0.5 * circle) % circle - 0.5 * circle
-    known = np.isfinite(y) & np.isfinite(X).all(axis=1)
-    y, X = y[known], X[known]
+        steep = np.cumsum(np.abs(theta) > _STEEP_PITCH_RAD)
+        ok &= steep[b] == steep[a]
+    return y[ok], X[ok]
+
+
+def _fit_first_term(y: Floats, X: Floats) -> tuple[float, float] | None:
+    """Slope and correlation of y (w,) with the first column of X (w, m); None if too little moves:
+
+        y = X beta + error,   v = y - X[:, 1:] beta[1:],   x = X[:, 0]
+        slope = sign(x' v) sqrt(v' v / x' x),   correlation = x' v / sqrt(x' x v' v)
+
+    The other columns may be in whatever unit they are. The slope is a ratio of sizes and not x' v / x' x,
+    which noise in the rate would bring nearer to 0.
+    """
     if len(y) < _MIN_WINDOWS or y @ y < len(y) * (_MIN_RMS_RAD_S * _ANGLE_WINDOW_S) ** 2:
         return None
     beta = np.linalg.lstsq(X, y, rcond=None)[0]
-    y = y - X[:, 1:] @ beta[1:]
+    v = y - X[:, 1:] @ beta[1:]
     x = X[:, 0]
-    xx, xy, yy = float(x @ x), float(x @ y), float(y @ y)
-    if not xx * yy > 0.0:
+    xx, xv, vv = float(x @ x), float(x @ v), float(v @ v)
+    if not xx * vv > 0.0:
         return None
-    return AngleFit(
-        slope=np.sign(xy) * np.sqrt(yy / xx),
-        correlation=xy / np.sqrt(xx * yy),
-        max_angle_magnitude=largest_magnitude(angle),
-        max_rate_magnitude=largest_magnitude(terms[0]),
-    )
+    return np.sign(xv) * np.sqrt(vv / xx), xv / np.sqrt(xx * vv)
 
 
-def _interpolate(column: Column, t: Floats) -> Floats:
+def _interpolate(column: Column, t: Floats, circle: float | None = None) -> Floats:
+    """The numbers of a column at the stamps t (n,) s, nan before its first and after its last.
+
+    circle: a full circle in the unit of an angle that may go round: a step of more than half of it is a
+    passage through its end.
+    """
     if np.array_equal(column.t_s, t):
         return column.values
     known = np.isfinite(column.values)
     if not known.any():
         return np.full(len(t), np.nan)
-    return np.interp(t, column.t_s[known], column.values[known], left=np.nan, right=np.nan)
+    values = column.values[known]
+    if circle is not None:
+        values = np.unwrap(values, period=circle)
+    return np.interp(t, column.t_s[known], values, left=np.nan, right=np.nan)
 
 
 def _full_circle(angle: Floats) -> float:
@@ -191,7 +221,8 @@ def _factor_remark(fit: AngleFit, rate: str, angle: str) -> str | None:
     """Describe a mistake in a rate or its angle by their proportion, and which factor fits; None where
     nothing is. rate, angle: their columns.
 
-    Either may be; an angle that goes round more than once is, and a rate that no vehicle turns at.
+    Either may be wrong. It is the angle if it exceeds a full circle; else the rate if no vehicle turns so
+    fast.
     """
     slope = abs(fit.slope)
     near = 1.0 / _SLOPE_FACTOR < slope < _SLOPE_FACTOR
@@ -219,8 +250,8 @@ def _pitch_remark(name: str, pitch: Column) -> str | None:
 
 
 def gravity_remark(az: Column, name: str) -> str | None:
-    """Describe a mistake in the acceleration along z by its mean, and which unit fits; None where nothing
-    is."""
+    """Describe a mistake in the acceleration along z by its median magnitude, and which unit fits; None where
+    nothing is."""
     known = az.values[np.isfinite(az.values)]
     g = float(np.median(np.abs(known))) if known.size else 0.0
     if _GRAVITIES_G[0] < g / _GRAVITY_MPS2 < _GRAVITIES_G[1]:
@@ -231,4 +262,4 @@ def gravity_remark(az: Column, name: str) -> str | None:
         if unit
         else "no unit fits: is 1 g in it?"
     )
-    return f"{name}: is {g:.4g} m/s2 on the middle of the flight, 1 g is {_GRAVITY_MPS2:.4g}: {hint}"
+    return f"{name}: its median magnitude is {g:.4g} m/s2, 1 g is {_GRAVITY_MPS2:.4g}: {hint}"

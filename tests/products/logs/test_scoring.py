@@ -75,22 +75,11 @@ def test_an_alarm_before_and_after_the_failure():
 
 def test_a_failure_that_is_not_found_and_a_flight_without_any():
     missed = scoring.score_against_failures(told([(9, "")]), FAILURE, GROUPS)
-    assert (missed["detected"], missed["delay_s"], missed["named"], missed["right_group"]) == (
-        False,
-        None,
-        {},
-        None,
-    )
+    assert missed | {"detected": False, "delay_s": None, "named": {}, "right_group": None} == missed
     quiet = scoring.score_against_failures(told([(4, ""), (2, "rudder"), (3, "")]), (), GROUPS)
     assert quiet == {
         "failure": None, "failure_s": None, "healthy_s": 4.0, "false_alarms": 1, "detected": False,
         "delay_s": None, "named": {}, "right_group": None,
     }  # fmt: skip
-    from_the_start = scoring.score_against_failures(
-        told([(3, "rudder")]), (LoggedFailure(10.0, "rudder"),), GROUPS
-    )
-    assert (from_the_start["healthy_s"], from_the_start["false_alarms"], from_the_start["delay_s"]) == (
-        0.0,
-        0,
-        0.0,
-    )
+    at_once = scoring.score_against_failures(told([(3, "rudder")]), (LoggedFailure(10.0, "rudder"),), GROUPS)
+    assert at_once | {"healthy_s": 0.0, "false_alarms": 0, "delay_s": 0.0} == at_once

@@ -79,10 +79,8 @@ def _terms_of_change(rates: list[Floats], phi: Floats, theta: Floats, axis: int)
     p, q, r = rates
     if axis == 1:
         return [q * np.cos(phi), -r * np.sin(phi)]
-    turn = [q * np.sin(phi), r * np.cos(phi)]
-    if axis == 0:
-        return [p, *(np.tan(theta) * part for part in turn)]
-    return [(turn[0] + turn[1]) / np.cos(theta)]
+    turn = np.array([q * np.sin(phi), r * np.cos(phi)])
+    return [p, *np.tan(theta) * turn] if axis == 0 else [turn.sum(axis=0) / np.cos(theta)]
 
 
 def _changes_by_window(
@@ -171,7 +169,7 @@ def attitude_mistake(named: Columns, angles: Sequence[NamedColumn | None], other
         fit = _fit_with(named, angles, axis, named[rate])
         if fit is None:
             continue
-        for name, column in {**named, **others}.items():
+        for name, column in (named | others).items():
             trial = _fit_with(named, angles, axis, column)
             if trial is not None and abs(trial.correlation) > _replacing_correlation(fit, name in named):
                 return (
@@ -232,10 +230,14 @@ def _factor_remark(fit: AngleFit, rate: str, angle: str) -> str | None:
     if near:
         return f"{ratio}: one of them has the other sign, `scale: -1` fits"
     if fit.max_angle_magnitude > _MAX_ANGLE_RAD and (unit := nearest_unit(ANGLE, 1.0 / slope, _UNIT_RATIO)):
-        return f"{ratio}: {angle} is in {unit}, a factor of {SI_UNITS[unit][1]:.4g} fits"
+        return f"{ratio}: {angle} {_unit_text(unit)}"
     if fit.max_rate_magnitude > _FAST_RAD_S and (unit := nearest_unit(RATE, slope, _UNIT_RATIO)):
-        return f"{ratio}: {rate} is in {unit}, a factor of {SI_UNITS[unit][1]:.4g} fits"
+        return f"{ratio}: {rate} {_unit_text(unit)}"
     return f"{ratio}: a factor of {slope:.4g} on {rate} fits, or of {1.0 / slope:.4g} on {angle}"
+
+
+def _unit_text(unit: str) -> str:
+    return f"is in {unit}, a factor of {SI_UNITS[unit][1]:.4g} fits"
 
 
 def _pitch_remark(name: str, pitch: Column) -> str | None:
@@ -245,7 +247,7 @@ def _pitch_remark(name: str, pitch: Column) -> str | None:
     if largest <= _MAX_PITCH_RAD:
         return None
     unit = next((u for u in ("deg", "cdeg") if largest * SI_UNITS[u][1] <= _MAX_PITCH_RAD), None)
-    hint = f"it is in {unit}, a factor of {SI_UNITS[unit][1]:.4g} fits" if unit else "no unit fits"
+    hint = f"it {_unit_text(unit)}" if unit else "no unit fits"
     return f"{name} reaches {largest:.4g} rad, a pitch angle at most 1.571: {hint}; look at the rates' too"
 
 
@@ -257,9 +259,5 @@ def gravity_remark(az: Column, name: str) -> str | None:
     if _GRAVITIES_G[0] < g / _GRAVITY_MPS2 < _GRAVITIES_G[1]:
         return None
     unit = nearest_unit(ACCELERATION, _GRAVITY_MPS2 / g, 2.0) if g > 0.0 else None
-    hint = (
-        f"it is in {unit}, a factor of {SI_UNITS[unit][1]:.4g} fits"
-        if unit
-        else "no unit fits: is 1 g in it?"
-    )
+    hint = f"it {_unit_text(unit)}" if unit else "no unit fits: is 1 g in it?"
     return f"{name}: its median magnitude is {g:.4g} m/s2, 1 g is {_GRAVITY_MPS2:.4g}: {hint}"

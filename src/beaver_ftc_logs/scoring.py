@@ -13,14 +13,15 @@ from beaver_ftc_logs.recording import Floats, LoggedFailure
 from beaver_ftc_logs.runs import last_row_at
 from beaver_ftc_logs.samples import Samples
 
-_SAME_FAILURE_S = 2.0
+_SAME_FAILURE_S = 2.0  # surfaces that fail within this time of the first belong to one failure
 
 
 def score_diagnosis(samples: Samples, rows: LogRows, groups: list[list[str]]) -> Document:
     """All figures that the log allows: by its labels, or by its failure if it has no labels.
 
     Where the log has more rows than samples, each row is compared with the label of the last sample up to its
-    time. Surfaces without a label are left out.
+    time. The effectiveness of surfaces without a label is left out, but an alarm that names
+    one counts in healthy_or_faulty.
     """
     labelled = np.isfinite(samples.labels).any(axis=0)
     if not labelled.any():
@@ -34,9 +35,15 @@ def score_diagnosis(samples: Samples, rows: LogRows, groups: list[list[str]]) ->
 def score_against_labels(rows: LogRows, labels: Floats) -> Document:
     """Scores against labelled effectiveness (n, S), on the rows in which every label is known.
 
-    A setting is a row of labels that makes up at least 0.5 % of the flight, or the most frequent. classes:
-    share of rows whose estimate is nearest to the same setting as the label. side: share of rows in which the
-    same surfaces are below 1. Without such a row all figures are None.
+    A setting is a row of labels that makes up at least 0.5 % of the known rows, or the most frequent.
+
+    classes             share of rows whose estimate is nearest to the same setting as the label
+    healthy_or_faulty   share of rows with an alarm if a label is below 1, and without one if none is
+    side                share of rows in which estimate and label are below 1 for the same surfaces
+    mean_error          mean magnitude of estimate less label, over rows and surfaces
+    held_by_bounds      share of rows and surfaces whose label is within the bounds of the estimate
+
+    If no row has all labels, these figures are None.
     """
     known = np.isfinite(labels).all(axis=1)
     if not known.any():
@@ -60,15 +67,18 @@ def score_against_labels(rows: LogRows, labels: Floats) -> Document:
 
 def nearest_setting(e: Floats, levels: Floats) -> np.ndarray:
     """Index of the setting nearest to each row of the effectiveness e (n, S), (n,)."""
-    distance = ((e[:, None, :] - levels[None, :, :]) ** 2).sum(axis=2)
+    distance = ((e[:, None] - levels) ** 2).sum(axis=2)
     return distance.argmin(axis=1)
 
 
 def score_against_failures(
     rows: LogRows, failures: tuple[LoggedFailure, ...], groups: list[list[str]]
 ) -> Document:
-    """Scores against the first failure in the log: alarms before it are false, the first one after it has the
-    delay delay_s."""
+    """Scores against the first failure in the log. Alarms that begin before it are false. The delay delay_s,
+    s, is that of the first row with an alarm from the failure on.
+
+    An alarm that lasts over the failure counts as both: it is false, and it detects with the delay 0 s.
+    """
     first_s = min((failure.t_s for failure in failures), default=np.inf)
     onset = Onset(None if np.isinf(first_s) else float(first_s))
     failed = sorted({failure.surface for failure in failures if failure.t_s < first_s + _SAME_FAILURE_S})
@@ -93,7 +103,10 @@ def _is_main_name_right(
     shares: dict[str, float], surfaces: list[str], groups: list[list[str]]
 ) -> bool | None:
     """Whether the most frequent name after the failure of some surfaces is a group that failed; None without
-    a failure or name."""
+    a failure or name.
+
+    A log may name a kind of surface for one of them: a failed `aileron` is right_aileron or left_aileron.
+    """
     suffixes = tuple(f"_{surface}" for surface in surfaces)
     has_failed = [any(name in surfaces or name.endswith(suffixes) for name in group) for group in groups]
     shares = {name: share for name, share in shares.items() if name != UNKNOWN_SURFACE}

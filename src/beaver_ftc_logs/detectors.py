@@ -3,8 +3,10 @@
     bank-of-filters             the filters of `diagnose`
     sliding-least-squares       effectiveness from the last 20 s, all samples with equal weight
     forgetting-least-squares    effectiveness from all past samples, weights exp(-age / 20 s) [Ljung1999]
-    freeze rule                 a servo output that has not moved for 6 s is faulty; needs no model
     others                      the detectors of the control loop (`beaver_ftc.diagnosis.Detector`)
+
+`compare --flights` alone also uses the freeze rule, which needs no model: a servo output that has not moved
+for 6 s is faulty.
 
 A detector of the loop receives the measured rates x, the predicted acceleration, and the part Z of each
 surface in it. Both follow from the identified model, with the residual e of one step, rad/s:
@@ -45,11 +47,12 @@ from beaver_ftc_logs.trust import without_dead_rows
 
 LEAST_SQUARES_MEMORY_S = 20.0
 MIN_FROZEN_OUTPUT_S = 6.0
-_MIN_LOSS_SD = 5.0
-_SD_OF_90_PERCENT = 1.645
+_MIN_LOSS_SD = 5.0  # least loss that is an alarm, in standard deviations of its estimate
+_SD_OF_90_PERCENT = 1.645  # half the width of an interval that holds 90 % of the normal law
+_PRIOR_INFORMATION = 4.0  # 1 / (1/2)^2: a gain of standard deviation 1/2
 LOOP_SURFACES = ("aileron", "elevator", "rudder")
 _N_LOOP = 4  # these and the flap
-_DECLARED_GYRO_RAD_S = 1e-4
+_DECLARED_GYRO_RAD_S = 1e-4  # small: the declared error of the model contains the noise of the gyros
 OUR_DETECTOR = "bank-of-filters"
 
 
@@ -67,7 +70,7 @@ def _least_squares(samples: Samples, model: Model, fades: bool) -> LogRows:
     X = np.where(flight.is_known[:, None, None], flight.columns() * sd, 0.0)
     M = _memory_sums(np.einsum("nai,naj->nij", X, X), samples.dt_s, fades)
     b = _memory_sums(np.einsum("nai,na->ni", X, flight.e @ flight.W), samples.dt_s, fades)
-    M0 = np.diag([*np.full(3, 1.0 / model.settings.trim_sd**2), *np.full(X.shape[2] - 3, 4.0)])
+    M0 = np.diag([1.0 / model.settings.trim_sd**2] * 3 + [_PRIOR_INFORMATION] * len(model.groups))
     P = np.linalg.inv(M + M0)
     theta = np.einsum("nij,nj->ni", P, b)
     errors = np.sqrt(np.maximum(np.diagonal(P, axis1=1, axis2=2)[:, 3:], 0.0))
@@ -75,7 +78,7 @@ def _least_squares(samples: Samples, model: Model, fades: bool) -> LogRows:
 
 
 def _memory_sums(x: Floats, dt_s: float, fades: bool) -> Floats:
-    """Sums over the memory that ends at each sample."""
+    """Sums of x (n, ...) over the memory that ends at each sample. fades: with weights exp(-age / 20 s)."""
     if fades:
         from scipy.signal import lfilter
 
@@ -105,7 +108,7 @@ def _rows_of_estimate(samples: Samples, model: Model, a: Floats, sd: Floats) -> 
 
 def _plain_rows(samples: Samples, names: np.ndarray, a: Floats, low: Floats, high: Floats) -> LogRows:
     """Rows of a detector with estimate a and bounds, (n, S) each: faulty where a surface is named."""
-    faulty = np.array([bool(name) for name in names], dtype=np.int64)
+    faulty = (names != "").astype(np.int64)
     return LogRows(samples.t_s, faulty, names, a, low, high, faulty.astype(float), samples.t_s)
 
 
@@ -214,12 +217,12 @@ def rows_of_verdicts(verdicts: list[Verdict], samples: Samples, model: Model) ->
 
 
 def _remaining_effectiveness(verdict: Verdict, g: int) -> float:
+    """Effectiveness of a group by a verdict, 0 to 1; a verdict with neither figure counts as no loss."""
     given = verdict.effectiveness
     return float(np.clip(1.0 + (verdict.estimate or 0.0) if given is None else given[g], 0.0, 1.0))
 
 
 _FLIGHT_DETECTORS: dict[str, Callable[[Samples, Model], LogRows]] = {
-    OUR_DETECTOR: diagnose,
     "sliding-least-squares": partial(_least_squares, fades=False),
     "forgetting-least-squares": partial(_least_squares, fades=True),
 }
@@ -227,7 +230,8 @@ _FLIGHT_DETECTORS: dict[str, Callable[[Samples, Model], LogRows]] = {
 
 def detector_names() -> list[str]:
     """The names of all detectors for recorded flights; the compiled ones of the loop need a simulation."""
-    return [*_FLIGHT_DETECTORS, *(name for name in registered(DETECTORS) if not is_compiled(DETECTORS, name))]
+    of_the_loop = [name for name in registered(DETECTORS) if not is_compiled(DETECTORS, name)]
+    return [OUR_DETECTOR, *_FLIGHT_DETECTORS, *of_the_loop]
 
 
 def check_detector_name(name: str) -> None:

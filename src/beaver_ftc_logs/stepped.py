@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 
 LOSS_FAULT_TYPE = "loss_of_effectiveness"
 BOUND_WINDOW_S = 1.0
-_LOSS_TOLERANCE = 1e-9
-_TOLERANCE_RAD_S2 = 1e-12
+_LOSS_TOLERANCE = 1e-9  # of theta: rounding must not empty an intersection of sets that touch
+_TOLERANCE_RAD_S2 = 1e-12  # of |nu - theta Z|: rounding must not exclude a theta on its bound
 _EFFECTIVE_SAMPLE_SHARE = 0.4
 """As how many white samples one sample counts in the bounds of the command gains."""
 _ERROR_KEYS = ("fdi", "actuators", "design_model")  # not `substeps`: a frame of a log has one instant
@@ -79,18 +79,25 @@ def replay_samples(diagnosis: Diagnosis, arrays: Sequence[Floats], rate_hz: floa
     for k, inputs in enumerate(zip(*map(np.ascontiguousarray, arrays), strict=True)):
         verdicts.append(diagnosis.step(*inputs))
         nu[k], eta[k], Z[k] = diagnosis.innovation()
-    theta = _explaining_losses(nu[:, :, None], eta[:, :, None], Z)
-    theta[0][0], theta[1][0] = -1.0, 0.0  # the first sample has no innovation
+    lo, hi = _explaining_losses(nu[:, :, None], eta[:, :, None], Z)
+    # The first sample has no innovation: every loss explains it.
+    lo[0] = -1.0
+    hi[0] = 0.0
     n = max(round(BOUND_WINDOW_S * rate_hz), 1)
-    low = 1.0 + _sliding_maximum(theta[0], n)
-    high = 1.0 - _sliding_maximum(-theta[1], n)
+    low = 1.0 + _sliding_maximum(lo, n)
+    high = 1.0 - _sliding_maximum(-hi, n)
+    # If no constant loss explains a window, it says nothing.
     empty = low > high
     return Replayed(verdicts, np.where(empty, 0.0, low), np.where(empty, 1.0, high), *_command_gains(nu, Z))
 
 
 def _command_gains(nu: Floats, Z: Floats) -> tuple[Floats, Floats]:
     """The gains and their upper bounds (S,) of `Replayed`: 1 + beta of nu = constant + Z beta, each axis in
-    standard deviations of nu."""
+    standard deviations of nu.
+
+    `Innovations` does this regression; here it holds rad/s2 instead of rad/s. Its noise only weights the
+    axes: it is built without the checks and the other fields of a noise that was fitted.
+    """
     rows = np.flatnonzero(np.isfinite(nu).all(axis=1) & (np.arange(len(nu)) > 0))
     if (parts := split_parts(rows)) is None:
         return np.ones(Z.shape[2]), np.ones(Z.shape[2])
@@ -136,7 +143,11 @@ def _bounds(
     verdict: Verdict, alone_low: Floats, alone_high: Floats, surfaces: Sequence[str]
 ) -> tuple[Floats, Floats]:
     """Bounds (S,) on the effectiveness at a sample, if at most one surface is at fault. alone_low and
-    alone_high (S,): as `Replayed`."""
+    alone_high (S,): as `Replayed`.
+
+    An isolated surface has these bounds only if the type of its fault is a loss. A fault of another type, or
+    of none, may be no loss: its bounds are 0 and 1.
+    """
     healthy = np.ones(len(surfaces))
     if not verdict.detected:
         return alone_low, healthy
@@ -154,7 +165,10 @@ def _bounds(
 
 def rows_of_replay(t_s: Floats, replay: Replayed, surfaces: Sequence[str], fdi: Any) -> LogRows:
     """The rows of a flight. fdi: this section of the scenario. A rival's scheme and verdicts of pairs have
-    bounds of 0 and 1, since the bounds assume that one surface is faulty."""
+    bounds of 0 and 1, since the bounds assume that one surface is faulty.
+
+    The estimate of a fault without a type is read as theta of a loss; its bounds stay 0 and 1.
+    """
     faulty = np.array([verdict.detected for verdict in replay.verdicts])
     low = np.zeros_like(replay.alone_low)
     high = np.ones_like(low)

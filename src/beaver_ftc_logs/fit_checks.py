@@ -1,4 +1,4 @@
-"""What a reader is told of a fit beside its quality: collinear regressors, and the colour of the residual."""
+"""Figures of a fit beside its quality: collinear regressors, and the colour of the residual."""
 
 from math import isfinite
 
@@ -11,13 +11,13 @@ from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.regression import Parts
 
 LEAST_INFLATION = 10.0
-"""Of the variance of a coefficient by the other regressors, from which it is said."""
+"""Regressors are reported if the others inflate the variance of their coefficient more than this."""
 _BANDS_HZ = ((0.0, 0.1), (0.1, 0.5), (0.5, 1.0), (1.0, 2.0), (2.0, 5.0), (5.0, 10.0))
 
 
 def collinear_names(parts: Parts, model: Model) -> list[Document]:
-    """Regressors whose coefficient's variance the others inflate more than tenfold, worst first; None where
-    the others make it up."""
+    """Regressors whose coefficient's variance the others inflate more than tenfold, worst first. The
+    inflation of a regressor is None where the others determine it."""
     Z, _, _ = orders.stack_data(parts, model.vehicle, model.history, model.lags)
     factors = variance_inflation(Z[:, 1:]).tolist()
     named = zip(factors, regression.regressor_names(model), strict=True)
@@ -29,13 +29,17 @@ def collinear_names(parts: Parts, model: Model) -> list[Document]:
 
 
 def median_inflation(parts: Parts, model: Model) -> dict[str, float]:
-    """By how much the residual's colour widens the standard errors of the responses: the median, an axis."""
+    """By how much the residual's colour widens the standard errors of the responses: the median by axis."""
+    # The responses are the last rows, `lags` of each group.
     inflation = orders.fit_of(parts, model).standard_error_inflation[-len(model.groups) * model.lags :]
     return regression.by_axis(np.median(inflation, axis=0))
 
 
 def density_ratios(parts: Parts, model: Model) -> list[Document]:
-    """Mean density of the residual by band, over that of white noise of the same variance, an axis."""
+    """Mean spectral density of the residual by band and axis, over that of white noise of the same variance.
+
+    The frequency 0 is left out, and so is a band that holds none of the frequencies of the density.
+    """
     e = orders.one_step_residuals(parts, model)
     f, density = spectral_density(e, model.rate_hz)
     white = e.var(axis=0) / (0.5 * model.rate_hz)

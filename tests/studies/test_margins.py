@@ -5,7 +5,8 @@ import pytest
 
 from beaver_ftc.control.laws import loop_design
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.studies.margins import OpenLoop, at, frequencies, loops, study
+from beaver_ftc.studies.margins import at, study
+from beaver_ftc.studies.margins_loop import OpenLoop, frequencies, loops
 from flying import flown, scenario
 
 OURS = {"control": {"law": "fault-tolerant"}, "uncertainty": {}}

@@ -1,10 +1,6 @@
 """Margins of the default law on the whole aircraft: what `beaver-ftc linearise` shows.
 
-Every surface's loop over the envelope, healthy and with each fault that is accommodated, broken at that
-surface, a frequency at a time:
-
-    u_s = L_s v_s,   v_s the deflection of surface s, u_s where the loop then wants it, all others closed
-
+Every surface's loop (margins_loop.py) over the envelope, healthy and with each fault that is accommodated.
 The aircraft is the truth linearised by differences (plant/linear.py), held over a frame; the law is that of
 control/laws/loop_design.py with the design model's own derivatives. A loss of effectiveness that is known
 scales the surface and what the law takes it for alike; of a surface that is given up nothing is asked.
@@ -14,7 +10,6 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from itertools import product
 from math import exp, inf
-from typing import Any
 
 import numpy as np
 
@@ -33,130 +28,8 @@ from beaver_ftc.loop.readout import FrameReadout
 from beaver_ftc.plant.conditions import trimmed
 from beaver_ftc.plant.linear import LinearModel, differences
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.studies.linear_systems import held_over_frame
+from beaver_ftc.studies.margins_loop import OpenLoop, frequencies, loops
 from beaver_ftc.studies.present.tables import aligned, all_finite, grouped
-
-N_FREQUENCIES = 600
-LOWEST_RAD_S = 0.3  # below, the autopilot flies: a body rate says little of a phugoid
-
-
-@dataclass(frozen=True)
-class OpenLoop:
-    """The law, and what it is closed around, at one condition; n surfaces, m measured signals, rates first.
-
-    A, B: aircraft; C (m, states). f (3, m): the law's model of the rates' accelerations; G (3, n) with the
-    effectiveness (n,) in it. approach (n,): of the actuators in a frame. delay_s, keep (m,): of the sensors.
-    Kp 1/s, L_rate 1, L_disturbance 1/s (3,); demand (n, 3): command of each surface for a demanded
-    acceleration, rad per rad/s2; lead (n,); share: of a frame until a command acts.
-    """
-
-    A: np.ndarray
-    B: np.ndarray
-    C: np.ndarray
-    f: np.ndarray
-    G: np.ndarray
-    effectiveness: np.ndarray
-    approach: np.ndarray
-    delay_s: np.ndarray
-    keep: np.ndarray
-    dt_s: float
-    Kp: np.ndarray
-    L_rate: np.ndarray
-    L_disturbance: np.ndarray
-    demand: np.ndarray
-    lead: np.ndarray
-    share: float
-
-
-def interpolated(law: DefaultLaw, qdyn: float, lost: float) -> np.ndarray:
-    """Kp, L_rate and L_disturbance, (3, 3) over the axes, of the law's schedule at a dynamic pressure (Pa), a
-    share `lost` of pitch handed over."""
-    schedules = law.Kp, law.L_rate, law.L_disturbance
-    found = np.array([[np.interp(qdyn, law.qdyn_pa, row) for row in rows] for rows in schedules])
-    found[:, PITCH] += lost * (found[:, STAND_IN] - found[:, PITCH])
-    return found[:, :3]
-
-
-def allocation(G: np.ndarray, main: np.ndarray, stand_in: int, lost: float) -> np.ndarray:
-    """Commands per demanded acceleration, (n, 3), as control/allocation.py gives them within the travels."""
-    commands, (a, e, r) = np.zeros((G.shape[1], 3)), main[[ROLL, PITCH, YAW]]
-    flap = lost if stand_in >= 0 else 0.0
-    shares = [(PITCH, stand_in, flap), (PITCH, e, 1.0 - flap)]
-    lateral = G[np.ix_([ROLL, YAW], [a, r])]
-    if np.linalg.det(lateral):
-        commands[np.ix_([a, r], [ROLL, YAW])] = np.linalg.inv(lateral)
-    else:
-        shares += [(ROLL, a, 1.0), (YAW, r, 1.0)]
-    for axis, s, share in shares:
-        if share and G[axis, s]:
-            commands[s, axis] = share / G[axis, s]
-    return commands
-
-
-def law_response(loop: OpenLoop, z: Any) -> np.ndarray:
-    """Positions p (n,) of the surfaces, rad, per measured signal of y (m,), (..., n, m), at each z (...):
-
-        x = K (x / z + dt d / z + dt s (f y + G p)) + L_rate y_pqr
-        d = d / z + L_disturbance (y_pqr - x / z - dt d / z - dt s (f y + G p))
-        p = -a (D Kp x + D (1 + share dt Kp) (d + f y) + (D Kp G share dt + lead - 1) p)
-
-    x (3,) rad/s: estimated rates; d (3,) rad/s2: estimated disturbance; a: of the actuators; D = lead demand,
-    K = 1 - L_rate, s = share / z + 1 - share.
-    """
-    n, m, dt = len(loop.effectiveness), len(loop.C), loop.dt_s
-    z = np.asarray(z, complex)[..., None, None]
-    back = 1.0 / z
-    mean = loop.share * back + 1.0 - loop.share  # s: of what acts over the elapsed frame
-    approach = loop.approach[:, None]
-    actuator = approach / (z - 1.0 + approach)
-    one, keep, rates = np.eye(3), np.diag(1.0 - loop.L_rate), np.eye(3, m)
-    L_disturbance, Kp, lead = np.diag(loop.L_disturbance), np.diag(loop.Kp), np.diag(loop.lead)
-    demand, ahead = lead @ loop.demand, one + loop.share * dt * Kp
-    moved = demand @ Kp @ loop.G * loop.share * dt + lead - np.eye(n)
-    # unknowns: rate, disturbance, position; driven by what is measured
-    M = [
-        [one - keep * back, -keep * dt * back, -keep @ loop.G * dt * mean],
-        [L_disturbance * back, one - one * back + L_disturbance * dt * back,
-         L_disturbance @ loop.G * dt * mean],
-        [actuator * (demand @ Kp), actuator * (demand @ ahead), np.eye(n) + actuator * moved],
-    ]  # fmt: skip
-    driven = [
-        [np.diag(loop.L_rate) @ rates + keep @ loop.f * dt * mean],
-        [L_disturbance @ (rates - loop.f * dt * mean)], [-actuator * (demand @ ahead @ loop.f)],
-    ]  # fmt: skip
-    return np.linalg.solve(_joined(M), _joined(driven))[..., 6:, :]
-
-
-def _joined(rows: list[list[np.ndarray]]) -> np.ndarray:
-    """The matrix of these blocks at each z; a block without z is the same at all."""
-    shape = np.broadcast_shapes(*(of.shape[:-2] for row in rows for of in row))
-    return np.block([[np.broadcast_to(of, (*shape, *of.shape[-2:])) for of in row] for row in rows])
-
-
-def loops(loop: OpenLoop, omega: np.ndarray) -> np.ndarray:
-    """L_s (omega, n) of every surface, the others' loops closed."""
-    Ad, Bd = held_over_frame(loop.A, loop.B * loop.effectiveness, loop.dt_s)
-    z = np.exp(1j * omega * loop.dt_s)[:, None]
-    sensors = z ** (-loop.delay_s / loop.dt_s) * (1.0 - loop.keep) / (1.0 - loop.keep / z)
-    z = z[..., None]
-    whole = np.linalg.solve(z * np.eye(len(Ad)) - Ad, np.broadcast_to(Bd, (len(omega), *Bd.shape)))
-    aircraft = loop.C @ whole * (loop.share + (1.0 - loop.share) * z)
-    around = law_response(loop, z[:, 0, 0]) @ (sensors[..., None] * aircraft)
-    return np.stack([-_others_closed(around, s) for s in range(len(loop.effectiveness))], axis=1)
-
-
-def _others_closed(around: np.ndarray, s: int) -> Any:
-    """What comes back to surface s, (...), of what goes around all of them, (..., n, n)."""
-    rest = np.delete(np.arange(around.shape[-1]), s)
-    inner = np.eye(len(rest)) - around[..., rest[:, None], rest]
-    answered = np.linalg.solve(inner, around[..., rest, s][..., None])
-    return around[..., s, s] + (around[..., [s], rest][..., None, :] @ answered)[..., 0, 0]
-
-
-def frequencies(dt_s: float) -> np.ndarray:
-    """From LOWEST_RAD_S to Nyquist, rad/s."""
-    return np.geomspace(LOWEST_RAD_S, np.pi / dt_s, N_FREQUENCIES)
-
 
 N_AIRSPEEDS = 5
 NUMBERS = ("up_db", "down_db", "phase_deg")
@@ -231,18 +104,43 @@ def open_loop(
 ) -> OpenLoop:
     """The loop with this effectiveness (n,), the law knowing it; y: the measured signals in trim."""
     law, dt = frame.control, 1.0 / scenario.rate_hz
-    default = law.default_law
     _, G, f_x, f_y = jacobian(frame.design, np.zeros(3), y, law.trim_rad)
     lost = 1.0 - effectiveness[law.main[PITCH]] if law.stand_in >= 0 else 0.0
-    whole = 1.0 - (1.0 - frame.actuators.approach) ** scenario.substeps
     C = outputs(linear.states, y)
     delay_s, keep = sensors(scenario, len(C), dt)
-    demand = allocation(G * effectiveness, law.main, law.stand_in, lost)
-    Kp, L_rate, L_disturbance = interpolated(default, y[QDYN], lost)
+    Kp, L_rate, L_disturbance = interpolated(law.default_law, y[QDYN], lost)
     return OpenLoop(
-        linear.A, linear.B, C, np.hstack((f_x, f_y[:, : len(C) - 3])), G * effectiveness, effectiveness,
-        whole, delay_s, keep, dt, Kp, L_rate, L_disturbance, demand, default.lead, default.share,
+        A=linear.A, B=linear.B, C=C, f=np.hstack((f_x, f_y)), G=G * effectiveness,
+        effectiveness=effectiveness, approach=1.0 - (1.0 - frame.actuators.approach) ** scenario.substeps,
+        delay_s=delay_s, keep=keep, dt_s=dt, Kp=Kp, L_rate=L_rate, L_disturbance=L_disturbance,
+        demand=allocation(G * effectiveness, law.main, law.stand_in, lost), lead=law.default_law.lead,
+        share=law.default_law.share,
     )  # fmt: skip
+
+
+def interpolated(law: DefaultLaw, qdyn: float, lost: float) -> np.ndarray:
+    """Kp, L_rate and L_disturbance, (3, 3) over the axes, of the law's schedule at a dynamic pressure (Pa), a
+    share `lost` of pitch handed over."""
+    schedules = law.Kp, law.L_rate, law.L_disturbance
+    found = np.array([[np.interp(qdyn, law.qdyn_pa, row) for row in rows] for rows in schedules])
+    found[:, PITCH] += lost * (found[:, STAND_IN] - found[:, PITCH])
+    return found[:, :3]
+
+
+def allocation(G: np.ndarray, main: np.ndarray, stand_in: int, lost: float) -> np.ndarray:
+    """Commands per demanded acceleration, (n, 3), as control/allocation.py gives them within the travels."""
+    commands, (a, e, r) = np.zeros((G.shape[1], 3)), main[[ROLL, PITCH, YAW]]
+    flap = lost if stand_in >= 0 else 0.0
+    shares = [(PITCH, stand_in, flap), (PITCH, e, 1.0 - flap)]
+    lateral = G[np.ix_([ROLL, YAW], [a, r])]
+    if np.linalg.det(lateral):
+        commands[np.ix_([a, r], [ROLL, YAW])] = np.linalg.inv(lateral)
+    else:
+        shares += [(ROLL, a, 1.0), (YAW, r, 1.0)]
+    for axis, s, share in shares:
+        if share and G[axis, s]:
+            commands[s, axis] = share / G[axis, s]
+    return commands
 
 
 def outputs(states: tuple[str, ...], y: np.ndarray) -> np.ndarray:
@@ -260,7 +158,7 @@ def outputs(states: tuple[str, ...], y: np.ndarray) -> np.ndarray:
 
 
 def sensors(scenario: Scenario, m: int, dt: float) -> np.ndarray:
-    """delay_s and keep, (2, m), of what is measured."""
+    """Delay, s, and pole of the lag of each measured signal, (2, m); declared signals have neither."""
     found = np.zeros((2, m))
     for i, name in enumerate((*AXES, "alpha", "beta", "V", "qdyn")):
         sensor = getattr(scenario.sensors, name)

@@ -21,7 +21,8 @@ from beaver_ftc.control.laws.loop_design import margins
 from beaver_ftc.loop.loop import Loop
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies import margins as closed_form
-from beaver_ftc.studies.margins import Margin, frequencies
+from beaver_ftc.studies.margins import Margin
+from beaver_ftc.studies.margins_loop import frequencies
 
 PULSE_DEG, PULSE_AT_S, DURATION_S = 0.1, 0.5, 4.0
 N_AIRSPEEDS = 2  # the slowest and the fastest of the envelope

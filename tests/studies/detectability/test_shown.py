@@ -49,7 +49,11 @@ def said(found=(0.34, 0.28, 0.41), certain=0.52, **changes):
         ({"found": (0.95, 0.9, None)}, "a loss of 95 % (90 % or more) of"),
         ({"compared": COMPARED[3:]}, "What limits it most: nothing that was left out alone"),
         ({"bound_used": 0.998}, "Half of these flights use 100 % of the bound or more before the loss"),
-        ({"false_alarms": 3}, "3 flights with a total loss have an alarm before the loss"),
+        (
+            {"false_alarms": 3, "failed": 1},
+            "3 flights with a total loss have an alarm before the loss: these count as not found.\n"
+            "1 flight with a total loss cannot be flown to the end: it counts as not found.",
+        ),
         ({"inconclusive": ["too fast"]}, "Nothing can be concluded in part of these flights: too fast."),
     ],
 )

@@ -9,6 +9,19 @@ from beaver_ftc.studies.detectability.shown import NAME, table
 from beaver_ftc.studies.present.page import Makers, Part, study_files
 from beaver_ftc.studies.present.tables import percent
 
+NOT_FOUND = (  # key of a number of flights; what is said of one flight, and of several
+    (
+        "false_alarms",
+        "with a total loss has an alarm before the loss: it counts as not found.",
+        "with a total loss have an alarm before the loss: these count as not found.",
+    ),
+    (
+        "failed",
+        "with a total loss cannot be flown to the end: it counts as not found.",
+        "with a total loss cannot be flown to the end: these count as not found.",
+    ),
+)
+
 
 def page_of(document: Document) -> tuple[str, Sequence[Part]]:
     """The title, and the parts of the page: sentences and table."""
@@ -16,55 +29,64 @@ def page_of(document: Document) -> tuple[str, Sequence[Part]]:
         {
             "loss of": document["surface"], "flown": row["variant"],
             "certain from": percent(row["certain"]["size"]),
-            "found in 90 % from": percent(row["found"]["size"]), "95 % interval": _interval(row["found"]),
+            f"found in {percent(document['share'])} from": percent(row["found"]["size"]),
+            "95 % interval": _interval(row["found"]),
             "flights": str(row["found"]["flights"]),
         }
         for row in _variants(document)
     ]  # fmt: skip
     title = f"Detectability: {document['surface']} of {document['scenario']}"
-    return title, [*_size_sentences(document), table(lines)]
+    return title, [*_sentences(document), table(lines)]
 
 
 def _variants(document: Document) -> list[Document]:
     return [document, *document["compared"]]
 
 
-def _size_sentences(document: Document) -> Iterator[str]:
-    """What is certain, what is found, what limits it, and what would help."""
-    certain, found, total = (document[key] for key in ("certain", "found", "total_loss"))
-    surface, within = document["surface"], f"within {document['within_s']:g} s"
+def _sentences(document: Document) -> Iterator[str]:
+    """What is certain, what is found, what casts doubt on that, what limits it, and what would help."""
+    yield from _sizes(document)
+    yield from _doubts(document)
+    none = "makes a difference outside of the intervals"
+    limit = _effect(_best(document, references=False), f"nothing that was left out alone {none}")
+    yield f"What limits it most: {limit}."
+    helpful = _effect(_best(document, references=True), f"none of those that were tried {none}")
+    yield f"Which reference would help: {helpful}."
+
+
+def _sizes(document: Document) -> Iterator[str]:
+    certain, found, total, surface = (document[key] for key in ("certain", "found", "total_loss", "surface"))
+    within = f"within {document['within_s']:g} s"
     nothing = f"not even a total loss of {surface}"
-    loss = "a loss of {} of the effectiveness of " + surface
-    size = nothing if certain["size"] is None else f"{loss.format(percent(certain['size']))} and more"
+    size = nothing
+    if certain["size"] is not None:
+        size = f"a loss of {percent(certain['size'])} of the effectiveness of {surface} and more"
     yield (
         f"Certain to be detected {within}, whatever the declared uncertainty does: {size} (a total loss: in "
         f"{certain['at_total_loss']} of {certain['flights']} flights)."
     )
-    size = nothing if found["size"] is None else loss.format(f"{percent(found['size'])} ({_interval(found)})")
+    size = nothing
+    if found["size"] is not None:
+        size = f"a loss of {percent(found['size'])} ({_interval(found)}) of the effectiveness of {surface}"
     yield (
         f"Found {within} in {percent(document['share'])} of flights: {size} (a total loss: in "
         f"{percent(total['value'])}, {percent(total['low'], '')} to {percent(total['high'])}; "
         f"{total['count']} of {total['of']} flights). Intervals: 95 %."
     )
-    yield from (
-        f"Nothing can be concluded in part of these flights: {why}." for why in document["inconclusive"]
-    )
+
+
+def _doubts(document: Document) -> Iterator[str]:
+    for why in document["inconclusive"]:
+        yield f"Nothing can be concluded in part of these flights: {why}."
     if document["bound_used"] >= NEAR_THRESHOLD_SHARE:
         yield (
             f"Half of these flights use {percent(document['bound_used'])} of the bound or more before the "
             "loss: the size found then measures the uncertainty that the scenario flies with, not the "
             "diagnosis."
         )
-    not_found = "these count as not found."
-    if count := document["false_alarms"]:
-        yield f"{count} flights with a total loss have an alarm before the loss: {not_found}"
-    if count := document["failed"]:
-        yield f"{count} flights with a total loss cannot be flown to the end: {not_found}"
-    none = "makes a difference outside of the intervals"
-    limit = _effect(_best(document, references=False), f"nothing that was left out alone {none}")
-    yield f"What limits it most: {limit}."
-    helpful = _effect(_best(document, references=True), f"none of those that were tried {none}")
-    yield f"Which reference would help: {helpful}."
+    for key, one, many in NOT_FOUND:
+        if count := document[key]:
+            yield f"1 flight {one}" if count == 1 else f"{count} flights {many}"
 
 
 def _is_better(other: Document, document: Document) -> bool:
@@ -77,7 +99,8 @@ def _is_better(other: Document, document: Document) -> bool:
 
 
 def _best(document: Document, references: bool) -> Document | None:
-    """The variant that helps most, of those that change a reference, or of the others."""
+    """The variant that helps most, of those that change a reference (sizes.py says so in their names), or of
+    the others."""
     some = [
         row
         for row in document["compared"]
@@ -87,7 +110,7 @@ def _best(document: Document, references: bool) -> Document | None:
 
 
 def _effect(row: Document | None, none: str) -> str:
-    """What a variant would come to; `none` if there is no such variant."""
+    """The name of a variant, and the size found in its flights; `none` if there is no such variant."""
     if row is None:
         return none
     found, total = row["found"], row["total_loss"]

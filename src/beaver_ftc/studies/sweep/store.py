@@ -24,6 +24,7 @@ OWN_FILES = frozenset({
     files.LOCK, "sweep.json", "results.parquet", "summary.json", "report.html", *FOLDERS,
 })  # fmt: skip
 ROWS_PER_GROUP = 8192
+# A sweep is read whole, so that statistics of row groups help nobody; most columns are numbers.
 _WRITE_OPTIONS: dict[str, Any] = {"compression": "snappy", "write_statistics": False, "use_dictionary": False}
 _IDENTITY = ("sweep", "versions")  # the parts of sweep.json
 # Words, verdicts, and what the resolved base says better: no flight follows from them.
@@ -53,7 +54,10 @@ class RowsAsParquet:
     def read(self, path: Path, runs: Sequence[int]) -> "pa.Table | None":
         from pyarrow.parquet import read_table
 
-        table = read_table(path)
+        return self.if_of(runs, read_table(path))
+
+    def if_of(self, runs: Sequence[int], table: "pa.Table") -> "pa.Table | None":
+        """The table if it has these runs and the columns of the sweep."""
         same = table.schema.equals(self.schema) and table.column("run").to_pylist() == list(runs)
         return table if same else None
 
@@ -62,9 +66,11 @@ class Store:
     """The folder of one sweep, locked; a context manager."""
 
     def __init__(self, folder: Path, sweep: Sweep) -> None:
-        codec = RowsAsParquet(sweep)
-        self.folder, self.schema = folder, codec.schema
-        self.parts, self.results = files.Parts(folder / "parts", codec), folder / "results.parquet"
+        self._codec = RowsAsParquet(sweep)
+        self.folder = folder
+        self.schema = self._codec.schema
+        self.parts = files.Parts(folder / "parts", self._codec)
+        self.results = folder / "results.parquet"
         self._manifest = folder / "sweep.json"
         self._open = contextlib.ExitStack()
         self._compacted: pa.Table | None = None
@@ -84,10 +90,11 @@ class Store:
 
         A finished sweep is replaced unless it is to be resumed; an unfinished one never is.
         """
-        there, flown = self._identity(), self.results.exists() or bool(self.parts)
+        there = self._identity()
+        flown = self.results.exists() or bool(self.parts)
         if there is None:
             if flown or self._manifest.exists():  # nothing says whose the flights are
-                self._set_all_aside(resume)
+                self._refuse_or_set_aside(resume)
         elif resume:
             files.refuse_other(identity, there, self.folder)
         elif flown and not (self.folder / "summary.json").exists():
@@ -110,7 +117,9 @@ class Store:
             return table
         if self._compacted is None:
             self._compacted = self._read_results()
-        return self._compacted and self._compacted.slice(runs[0], len(runs))
+        if self._compacted is None:
+            return None
+        return self._codec.if_of(runs, self._compacted.slice(runs[0], len(runs)))
 
     def _read_results(self) -> "pa.Table | None":
         """`results.parquet`; one that cannot be read is set aside."""
@@ -121,7 +130,7 @@ class Store:
             return None
         try:
             with self.results.open("rb") as file:  # a folder Arrow would read as a table of many files
-                return read_table(file, schema=self.schema)
+                return read_table(file)
         except (ArrowException, OSError, ValueError):
             files.set_aside(self.results, files.UNREADABLE)
             return None
@@ -152,8 +161,8 @@ class Store:
         there = files.known(self._manifest) or {}
         return there if all(isinstance(there.get(key), dict) for key in _IDENTITY) else None
 
-    def _set_all_aside(self, resume: bool) -> None:
-        """Rename all that is there, since nothing says whose it is; BadInput unless the sweep is resumed."""
+    def _refuse_or_set_aside(self, resume: bool) -> None:
+        """Raise BadInput, since nothing says whose flights these are; if the sweep is resumed, rename all."""
         what = files.UNREADABLE if self._manifest.exists() else "is not there"
         if not resume:
             raise BadInput(
@@ -218,8 +227,9 @@ def _refuse_folder(folder: Path) -> None:
         raise SimulationFailed(f"cannot write {folder}: it exists and is not a folder")
     names = sorted(entry.name for entry in folder.iterdir())
     foreign = [name for name in names if name not in OWN_FILES and not _is_leftover(name)]
-    known = {"sweep.json", files.LOCK, "flights"}
-    if foreign or (names and not known & set(names) and not any(map(_is_leftover, names))):
+    marks = {"sweep.json", files.LOCK, "flights"}  # flights are kept before there is a part or a result
+    is_marked = any(name in marks or _is_leftover(name) for name in names)
+    if foreign or (names and not is_marked):
         why = f"{foreign[0]}, which is no part of a sweep" if foreign else "no sweep.json, but other files"
         raise SimulationFailed(
             f"will not write into {folder}: it holds {why}; move it away or choose another --out"

@@ -86,6 +86,7 @@ def quantiles(values: np.ndarray) -> Document:
 
 
 def _told(values: np.ndarray) -> np.ndarray:
+    """The values of the flights that have one, sorted: NaN is left out."""
     return np.sort(values[~np.isnan(values)])
 
 
@@ -98,9 +99,12 @@ def _reasons(flights: Flights) -> list[Document]:
     kinds = [_NUMBERS.sub("#", reason) for reason in flights["reason"][failed]]
     first = dict(zip(reversed(kinds), reversed(failed.tolist()), strict=True))
     return [
-        {"reason": flights["reason"][i], "count": count, "first_run": int(flights["run"][i])}
+        {
+            "reason": flights["reason"][first[kind]],
+            "count": count,
+            "first_run": int(flights["run"][first[kind]]),
+        }
         for kind, count in Counter(kinds).most_common(MOST_REASONS)
-        for i in (first[kind],)
     ]
 
 
@@ -143,6 +147,7 @@ def _guarantee(flights: Flights) -> Document:
 
 def _by_fault(flights: Flights) -> list[Document]:
     labels = flights.fault_labels
+    groups = {label: labels == label for label in sorted(set(labels[flights.faulted]))}
     return [
         {
             "fault": label,
@@ -150,23 +155,24 @@ def _by_fault(flights: Flights) -> list[Document]:
             "detection": _detection(flights, flights.faulted & alike),
             "isolation": _isolation(flights, flights.faulted & alike),
         }
-        for label in sorted(set(labels[flights.faulted]))
-        for alike in (labels == label,)
+        for label, alike in groups.items()
     ]
 
 
 def _confusion(flights: Flights) -> Document:
     """Declared fault against diagnosis, of all flights that have metrics."""
-    faults, said = flights.fault_labels, flights["isolation.fault"]
+    faults = flights.fault_labels
+    said = flights["isolation.fault"]
     said = np.where(said != "", said, NOT_ISOLATED)
     said = np.where(flights["detection.detected"], said, NO_ALARM)
     said = np.where(flights["false_alarm"] & (faults != NO_FAULT), FALSE_ALARM, said)
     pairs = Counter(zip(faults[flights.measured], said[flights.measured], strict=True))
-    rows, found = ({pair[side] for pair in pairs} for side in (0, 1))
+    rows = sorted({fault for fault, _ in pairs})
+    found = {diagnosis for _, diagnosis in pairs}
     last = [name for name in (UNANTICIPATED, NOT_ISOLATED, NO_ALARM, FALSE_ALARM) if name in found]
     columns = [*sorted(found.difference(last)), *last]
-    counts = [[pairs[row, column] for column in columns] for row in sorted(rows)]
-    return {"faults": sorted(rows), "diagnoses": columns, "counts": counts}
+    counts = [[pairs[row, column] for column in columns] for row in rows]
+    return {"faults": rows, "diagnoses": columns, "counts": counts}
 
 
 def _tracking(flights: Flights, axis: str) -> Document:
@@ -244,7 +250,7 @@ def estimate_of(flights: Flights, name: str, level: Level) -> tuple[int, float, 
     if name in _RATES:
         count, trials = _counts(*_RATES[name](flights))
         return trials, wilson(count, trials).value, partial(statistics.wilson_bound, count, trials)
-    count, hours = flights.false_alarms
+    count, hours = flights.false_alarms  # the one quantity that is left: false_alarms_per_hour
     told = int(flights.measured.sum()) if hours > 0 else 0
     return told, statistics.poisson(count, hours).value, partial(statistics.poisson_bound, count, hours)
 

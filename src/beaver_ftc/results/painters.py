@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from beaver_ftc.results.figures import Picture
 
-N_PAINTERS = 2  # the process that flies waits for them
+N_PAINTERS = 2  # one for each of two cores: the process that flies waits for them
 Painters = Sequence[Connection]
 
 
@@ -48,18 +48,21 @@ def painters(wanted: bool = True) -> Iterator[Painters]:
 
 def _can_fork() -> bool:
     """Whether painters can work beside this process, and a fork copies no lock that another thread holds."""
-    if not sys.platform.startswith("linux") or (os.cpu_count() or 1) < N_PAINTERS:
+    if not sys.platform.startswith("linux") or len(os.sched_getaffinity(0)) < N_PAINTERS:
         return False
     return threading.active_count() == 1
 
 
 @contextmanager
-def drawing(pictures: "Sequence[Picture]", painters: Painters) -> Iterator[None]:
+def drawing(pictures: "Sequence[Picture]", connections: Painters) -> Iterator[None]:
     """Have the pictures drawn during the block: they are there at its end. Raises what went wrong."""
-    shares = shares_of_equal_work(pictures, len(painters) or 1)
+    if not connections:
+        yield
+        save_all(pictures)
+        return
     asked: list[tuple[Connection, list[Picture]]] = []
-    left = [] if painters else shares[0]
-    for painter, own in zip(painters, shares, strict=False):
+    left: list[Picture] = []
+    for painter, own in zip(connections, shares_of_equal_work(pictures, len(connections)), strict=True):
         try:
             painter.send(own)
             asked.append((painter, own))
@@ -125,7 +128,7 @@ def _draw_until_closed(connection: Connection) -> None:
 
 
 def shares_of_equal_work(pictures: "Sequence[Picture]", among: int) -> "list[list[Picture]]":
-    """As much to draw for each: the largest first, to the process that has least."""
+    """As much to draw for each. Greedy: the largest picture first, to the process that has least."""
     shares: list[list[Picture]] = [[] for _ in range(among)]
     for picture in sorted(pictures, key=lambda each: -len(each.view.panels)):
         min(shares, key=lambda given: sum(1 + len(each.view.panels) for each in given)).append(picture)

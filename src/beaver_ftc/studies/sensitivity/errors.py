@@ -50,15 +50,16 @@ def errors_of(scenario: Scenario) -> tuple[Error, ...]:
     shares = {term.name: declared.coefficients.of(term.name) for term in scenario.airframe.moments}
     inertia = dict.fromkeys(("Ix", "Iy", "Iz"), bounds.inertia)
     constant = declared.constant_rad_s2
-    return (
+    found = (
         _of_ratios("moment coefficients", "uncertainty.coefficients", shares, FACTOR_LIMITS),
         _of_ratios("moments of inertia", "uncertainty.inertia", inertia, _limits(TrueInertia, "Ix")),
-        *((_coupling(declared.coupling),) if any(declared.coupling) else ()),
-        *((_acceleration(scenario, constant),) if any(constant) else ()),
-        *(() if declared.servo_errors.is_none else (_servos(declared),)),
+        _coupling(declared.coupling) if any(declared.coupling) else None,
+        _acceleration(scenario, constant) if any(constant) else None,
+        None if declared.servo_errors.is_none else _servos(declared),
         _sensors({} if bounds.sensors.is_ideal else bounds.sensors.model_dump()),
         _air(bounds.turbulence),
     )
+    return tuple(filter(None, found))
 
 
 def changes_of(errors: Sequence[Error], factors: Mapping[str, float], draws: np.random.Generator) -> Document:
@@ -73,7 +74,7 @@ def changes_of(errors: Sequence[Error], factors: Mapping[str, float], draws: np.
 
 @cache
 def _limits(section: type[Section], key: str) -> tuple[Any, Any]:
-    """The least and the largest value at a key of a section of a scenario; None without a limit."""
+    """The least and the largest value that a key of a section may have; None without a limit."""
     of = section.model_json_schema()["properties"][key]
     return of.get("minimum"), of.get("maximum")
 
@@ -86,13 +87,13 @@ def signed(
     sizes: Mapping[str, float], usual: float, limits: tuple[float, float], times: float,
     draws: np.random.Generator,
 ) -> dict[str, float]:  # fmt: skip
-    """Of each key its usual value, so many times its size more or less, within the limits."""
+    """The value of each key: usual + times * sign * size, sign drawn, within the limits."""
     signs = _signs(draws, [*sizes])
     return {key: float(np.clip(usual + times * signs[key] * size, *limits)) for key, size in sizes.items()}
 
 
 def _of_ratios(what: str, section: str, shares: Mapping[str, float], limits: tuple[float, float]) -> Error:
-    """Factors of the truth that are off by shares of which some are declared, or by a unit of its own."""
+    """Factors of the truth that are off by these shares; by UNDECLARED_SHARE if no share is declared."""
     known = any(shares.values())
     shares = shares if known else dict.fromkeys(shares, UNDECLARED_SHARE)
     largest = f"{100.0 * max(shares.values()):g} %"
@@ -111,7 +112,7 @@ def _coupling(theta: Sequence[float]) -> Error:
 
 
 def _acceleration(scenario: Scenario, sizes: Sequence[float]) -> Error:
-    """Of the frequencies that the scenario flies, where it flies any."""
+    """A sine on each axis, of the frequency that the scenario flies there, or else of a drawn one."""
     _, most_rad_s2 = _limits(Sinusoid, "amplitude_rad_s2")
     flown = {axis: getattr(scenario.uncertainty.sinusoid, axis) for axis in AXES}
     known = {axis: wave.frequency_rad_s for axis, wave in flown.items() if wave.amplitude_rad_s2}
@@ -172,6 +173,7 @@ def _sensors(declared: Mapping[str, Mapping[str, float]]) -> Error:
 
 
 def _preset(declared: Mapping[str, Mapping[str, float]]) -> str:
+    """The name of the preset that declares these errors, zeros left out."""
     used = {
         name: sizes
         for name, of in declared.items()
@@ -181,8 +183,8 @@ def _preset(declared: Mapping[str, Mapping[str, float]]) -> str:
 
 
 def _air(declared: str) -> Error:
-    """The strongest severity up to so many times the one declared: the wind at 20 ft of each, 0, 15, 30 and
-    45 kt, is in proportion to its place in SEVERITIES."""
+    """The strongest severity whose wind at 20 ft is at most so many times that of the one declared. The wind
+    of each severity, 0, 15, 30 and 45 kt, is in proportion to its place in SEVERITIES."""
     is_declared = declared != "none"
     base = SEVERITIES.index(declared if is_declared else UNDECLARED_AIR)
 

@@ -46,7 +46,7 @@ from beaver_ftc.studies.engine.study import Progress, fly_all
 from beaver_ftc.studies.present.tables import Columns, aligned, tabulated
 
 PROCEDURE = "beaver-ftc compare --tune; docs/results/benchmark.md"
-LEAST_GAIN = 0.05
+LEAST_GAIN = 0.05  # share of the cost at the start
 NAME, RECORD = "tuned.json", "tuning.json"
 _GRADES = TypeAdapter(dict[str, dict[str, dict[str, dict[str, float]]]])  # by grade, kind and method
 OF_STATISTICAL = {
@@ -109,8 +109,7 @@ def tune(methods: Sequence[Method], how: Search, workers: int, progress: Progres
     rows = fly_all(partial(tune_method, how=how), methods, workers, progress)
     grades: Document = {}
     for method, row in zip(methods, rows, strict=True):
-        methods_of_kind = grades.setdefault(method.grade, {}).setdefault(row["kind"], {})
-        methods_of_kind[method.name] = row["values"]
+        grades.setdefault(method.grade, {}).setdefault(row["kind"], {})[method.name] = row["values"]
     return {
         "procedure": PROCEDURE,
         "trials": how.trials,
@@ -124,8 +123,10 @@ def tune(methods: Sequence[Method], how: Search, workers: int, progress: Progres
 
 
 def tune_method(method: Method, how: Search) -> Document:
-    """A row: the values chosen, their cost, that of the values at the start, trials, ranges, flights of a
-    trial, margins; on a draw that does not choose what ships, the gain of the values found, small or large.
+    """A row: the values chosen, the fields of `Found` (search.py), flights of a trial, and a law's margins.
+
+    On a draw that does not choose what ships, the fields of `gain_of` are added: how much the values found
+    gain, small or large. `flights` is then the number of parts of the costs that are compared.
     """
     on = method.grade, how.most, how.draw, how.draws
     cost = DetectorCost(method.name, flights(*on)) if method.group == DETECTORS else LawCost(method.name, *on)
@@ -174,8 +175,10 @@ def as_text(document: Document) -> str:
     columns = (*COLUMNS, *(GAINS if document["draw"] else ()), VALUES)
     table, rows = tabulated(columns, document["methods"])
     said = [sentence for row in document["methods"] for sentence in _remarks(row)]
-    head = f"up to {document['trials']} trials a search, seed {document['seed']}, "
-    head += f"up to {document['restarts']} restarts for each method and grade"
+    head = (
+        f"up to {document['trials']} trials a search, seed {document['seed']}, "
+        f"up to {document['restarts']} restarts for each method and grade"
+    )
     return "\n".join([head, "", aligned([table, *rows]), *said])
 
 
@@ -189,7 +192,7 @@ def _remarks(row: Document) -> Iterator[str]:
         yield f"{who}: the budget ended the search; more --restarts may find a lower cost"
 
 
-def _cost(cost: float) -> str:
+def _cost_text(cost: float) -> str:
     if cost >= FAILED:
         return "cannot fly"
     if cost >= INADMISSIBLE:
@@ -207,14 +210,14 @@ def _percent(share: float) -> str:
 
 
 COLUMNS: Columns = (
-    ("grade", "grade"), ("method", "name"), ("cost at the start", "start_cost", _cost),
-    ("cost found", "cost", _cost),
+    ("grade", "grade"), ("method", "name"), ("cost at the start", "start_cost", _cost_text),
+    ("cost found", "cost", _cost_text),
     ("margins dB, deg", lambda row: "{gain_margin_db:.1f}, {phase_margin_deg:.0f}".format(**row)
      if "gain_margin_db" in row else "-"),
 )  # fmt: skip
 # Of a method that was tuned again: both costs on other flights, and the gain with its interval.
 GAINS: Columns = (
-    ("cost, built in", _if_any(_cost, "built_in")), ("cost, retuned", _if_any(_cost, "retuned")),
+    ("cost, built in", _if_any(_cost_text, "built_in")), ("cost, retuned", _if_any(_cost_text, "retuned")),
     ("gain, %", _if_any(_percent, "gain")), ("from, %", _if_any(_percent, "gain_low")),
     ("to, %", _if_any(_percent, "gain_high")),
 )  # fmt: skip

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from beaver_ftc_assurance.certificates import check_certificate, courses
-from beaver_ftc_assurance.certificates.chance import LikelihoodRatio
 from beaver_ftc_assurance.certificates.inequality import no_fault
+from beaver_ftc_assurance.certificates.likelihood_ratio import LikelihoodRatio
 from telling import numbers
 
 

@@ -90,8 +90,8 @@ class Inequality:
     def statement(self) -> Document | None:
         """The fields of a statement: every number that the inequality takes, and none that decides nothing.
         None unless the data exceed the limit of the hypothesis by more than rounding."""
-        of, found = self.hypothesis, [self._evaluate(term) for term in self.terms]
-        said, sums, deciding = zip(*found, strict=True)
+        of = self.hypothesis
+        said, sums, deciding = zip(*map(self._evaluate, self.terms), strict=True)
         value, limit, slope = np.sum(sums, axis=0).tolist()
         by_theta = max(of.theta_low * slope, of.theta_high * slope) if abs(slope) > MIN_SLOPE else 0.0
         limit += by_theta
@@ -99,7 +99,7 @@ class Inequality:
             return None
         decides = np.any(deciding, axis=0)
         if of.theta != ANY:
-            decides = np.array([by_theta and slope < 0.0, by_theta and slope > 0.0])
+            decides = np.array([slope < 0.0, slope > 0.0]) & bool(by_theta)
             if abs(slope) > MIN_SLOPE and not by_theta:  # the end of the range that counts is zero: no effect
                 said = [{name: entry for name, entry in one.items() if name != "Z"} for one in said]
         ends = dict(compress({"least": of.theta_low, "most": of.theta_high}.items(), decides))
@@ -111,12 +111,16 @@ class Inequality:
         factor of a constant theta in that limit; whether the least, and the greatest, theta decides in any
         frame.
 
-        E = sum of a^(k-j) dt nu[j].d over the frames j after filter_start, k: last_frame; and its limit:
-        the same sum of eta_bar, the gyro noise of both ends, and the largest effect of the fault."""
+            E     = sum_{s<j<=k} a^(k-j) dt nu[j].d
+            limit = sum_{s<j<=k} a^(k-j) dt eta_bar[j].|d| + noise + largest effect of the fault
+            noise = n[k] + a^(k-s-1) n[s] + (1-a) sum_{s<j<k} a^(k-1-j) n[j],   n = |change of gyro error|.|d|
+
+        s: filter_start; k: last_frame; a: decay of the filter in a frame, 0 for an infinite pole."""
         of, history, d, dt = self.hypothesis, self.history, term.direction, self.history.dt
         start, last, first = term.filter_start, term.last_frame, self._first_written_frame(term)
         a = exp(-term.pole_per_s * dt)
-        summed, weights = slice(start + 1, last + 1), _filter_weights(a, last - start)
+        summed = slice(start + 1, last + 1)
+        weights = _filter_weights(a, last - start)
         value = dt * weights @ (history.innovation_rad_s2[summed] @ d)
         noise = history.gyro_error_change_rad_s @ np.abs(d)
         gyro = a * weights[0] * noise[start] + (1.0 - a) * weights @ noise[start:last] + noise[last]
@@ -127,10 +131,12 @@ class Inequality:
         h, Z, r = of.along(d, rows)
         at_low, at_high = h + of.theta_low * Z, h + of.theta_high * Z
         if of.theta == ANY:
-            done, slope = of.max_effects(d, rows), 0.0
+            done = of.max_effects(d, rows)
+            slope = 0.0
             adds = np.maximum(at_low, at_high) > MIN_EFFECT_RAD_S2
         else:
-            done, slope = h + r, float(dt * _filter_weights(a, len(Z)) @ Z)
+            done = h + r
+            slope = float(dt * _filter_weights(a, len(Z)) @ Z)
             adds = np.ones(len(h), bool)
         limit += _filtered(a, dt, done, before)
         decides = bool((adds & (at_low > at_high)).any()), bool((adds & (at_high > at_low)).any())
@@ -190,7 +196,7 @@ def first_violated(candidates: Iterable[list[Term]], of: Hypothesis, history: Hi
 
 def axis_directions(axes: tuple[int, ...]) -> Iterator[np.ndarray]:
     """Both directions (3,) along each of the axes."""
-    return (way for d in np.eye(3)[[*axes]] for way in (d, 0.0 - d))
+    return (way for d in np.eye(3)[[*axes]] for way in (d, 0.0 - d))  # -d would write -0.0
 
 
 def filters(pole_per_s: float, start: int, last: int, axes: tuple[int, ...]) -> Iterator[list[Term]]:
@@ -238,11 +244,11 @@ def constant_theta_tests(hypothesis: Hypothesis, history: History, frames: np.nd
         return []
     lower, upper, slope = theta_bounds_by_frame(hypothesis, history, frames)
     terms = []
-    for place, sign, bounds in (
-        (np.unravel_index(np.argmax(lower), lower.shape), 1.0, lower[lower > hypothesis.theta_low]),
-        (np.unravel_index(np.argmin(upper), upper.shape), -1.0, upper[upper < hypothesis.theta_high]),
+    for place, sign, is_bound in (
+        (np.unravel_index(np.argmax(lower), lower.shape), 1.0, lower.max() > hypothesis.theta_low),
+        (np.unravel_index(np.argmin(upper), upper.shape), -1.0, upper.min() < hypothesis.theta_high),
     ):
-        if len(bounds):  # the term that bounds theta from below, or above
+        if is_bound:  # the term that bounds theta from below, or above
             frame, direction = int(frames[0] + place[0]), np.zeros(3)
             direction[place[1]] = sign * np.sign(slope[place])
             weight = 1.0 / (history.dt * abs(float(slope[place])))

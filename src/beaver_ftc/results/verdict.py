@@ -23,7 +23,6 @@ from beaver_ftc.results.model import (
     DeclaredFault,
     Fault,
     FlightCondition,
-    Inconclusive,
     Link,
     Metrics,
     Named,
@@ -70,7 +69,7 @@ def verdict_lines(metrics: Metrics) -> list[tuple[str, str]]:
         ("assumed", ", ".join(_ASSUMPTION_TEXT.get(name, name) for name in metrics.assumes)),
         ("outside", _outside_class_text(metrics)),
         ("detection", _detection_text(metrics)),
-        ("inconclusive", _if_there(_inconclusive_text, metrics.detection.inconclusive)),
+        ("inconclusive", _if_there(lambda found: in_words(found.document()), metrics.detection.inconclusive)),
         ("statistical", _if_there(_statistical_text, metrics.detection.statistical)),
         ("isolation", _isolation_text(metrics)),
         *(
@@ -382,10 +381,6 @@ def _detection_text(metrics: Metrics) -> str:
     elif detection.guaranteed_delay_s is not None:
         form += " (certain within {guaranteed_delay_s})"
     return _filled(form, detection, source=source)
-
-
-def _inconclusive_text(found: Inconclusive) -> str:
-    return in_words(found.document())
 
 
 def _statistical_text(said: Statistical) -> str:

@@ -90,10 +90,6 @@ def _needed(axis: str, entry: Document) -> str:
     return f"{percent(entry[f'{axis}_worst_ratio'])} / {entry[f'{axis}_smallest_constant_rad_s2']:.3g}"
 
 
-def _certain_within(entry: Document) -> str:
-    return "void" if entry["guarantee_void"] else seconds(entry["guaranteed_delay_s"])
-
-
 _4_DIGITS = "{:.4g}".format
 # An axis against its bound, how far it was used and exceeded, and the smallest that would have done.
 BOUNDS = (
@@ -113,7 +109,10 @@ RUNS = (
     ("run", "scenario"), *((axis, partial(_needed, axis)) for axis in AXES),
     ("dominant", "dominant", lambda source: without_underscores(source or "-")),
     ("false alarm", "false_alarm", lambda is_false: "yes" if is_false else "no"),
-    ("certain within", _certain_within),
+    (
+        "certain within",
+        lambda entry: "void" if entry["guarantee_void"] else seconds(entry["guaranteed_delay_s"]),
+    ),
 )  # fmt: skip
 
 

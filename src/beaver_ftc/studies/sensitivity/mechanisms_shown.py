@@ -159,13 +159,10 @@ def _certified(row: Document) -> str:
     return str(row["certified"]) if row["certifiable"] or not row["count"] else "-"
 
 
-def _unexplained(row: Document) -> str:
-    return str(row["unexplained"]) if row["worst_case"] else "-"
-
-
 ALARMS = (
     ("system", "flown", system_of), ("mechanisms", "flown", mechanisms_of), ("false alarms", "count"),
-    ("with an undeclared error", "undeclared"), ("certified", _certified), ("unexplained", _unexplained),
+    ("with an undeclared error", "undeclared"), ("certified", _certified),
+    ("unexplained", lambda row: str(row["unexplained"]) if row["worst_case"] else "-"),
 )  # fmt: skip
 MARGINS = (
     ("system", "system"), ("bandwidth", "bandwidth"), ("instruments", "instruments"),

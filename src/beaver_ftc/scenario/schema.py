@@ -269,7 +269,7 @@ class DesignModel(Section):
     coefficients: factors on aerodynamic terms, by name
     actuators: actuators for the diagnosis and the laws. Left out: as `actuators`
     sensors: sensors as the laws know them, in the forms of `sensors`. Left out: as `sensors`, in a sweep of
-    keys of `sensors` as the base's
+    `sensors` as the base's
     """
 
     engine_terms: Flag = True

@@ -216,8 +216,9 @@ class SweepFile(Section, title="beaver-ftc sweep"):
     seed: seed of all random values of the sweep
     sampling: how values are drawn. `lhs` (Latin hypercube) and `sobol` fill the ranges more evenly. `grid`:
     all combinations of `linspace` and `choice`
-    vary: keys of the base that vary, and how each key varies. A key is written as in `set`. Where keys of
-    `sensors` vary, the law knows the sensors of the base, unless `design_model.sensors` is set
+    vary: keys of the base that vary, and how each key varies. A key is written as in `set`. Where `sensors`
+    varies, the law knows the sensors of the base, unless `design_model.sensors` is set. Diagnosis and law
+    know `actuators`, also where it varies: unknown errors of servos are keys of `uncertainty.actuators`
     expect: conditions that the statistics must meet
     """
 
@@ -348,9 +349,9 @@ def validate_sweep(document: Document, source: str = "", folder: Path | None = N
 
 
 def _with_known_sensors(base: dict[str, Any], vary: Iterable[str]) -> dict[str, Any]:
-    """The base. Where keys of `sensors` vary, the law knows those of the base, not each flight's."""
+    """The base. Where `sensors` varies, the law knows those of the base, not each flight's."""
     model = base.get("design_model") or {}
-    if "sensors" in model or not any(key.startswith("sensors.") for key in vary):
+    if "sensors" in model or not any(parse_key(key)[0] == "sensors" for key in vary):
         return base
     return {**base, "design_model": {**model, "sensors": base.get("sensors", "ideal")}}
 

@@ -109,10 +109,7 @@ def result_files(document: Document) -> Files:
 
 def _compare_methods(data: DataSet) -> Document:
     usable = fit_parts(data.flights)
-    is_single = len(data.flights) == 1
-    # Neither half of a single flight has all levels of effectiveness, so the settings, and only they, are
-    # fitted to the whole flight.
-    settings = whole_settings(usable, data) if is_single else None
+    settings = settings_of_single(usable, data)
     entries: list[Document] = []
     for fitted, held_out, name in validation_folds(usable):
         model = add_ranges_and_threshold(fitted, fit_model(fitted, data.vehicle, settings))
@@ -128,7 +125,7 @@ def _compare_methods(data: DataSet) -> Document:
         "set": data.name,
         "vehicle": data.vehicle.name,
         "scored_by": "labels" if by_labels else "events",
-        "left_out": "halves of the one flight in turn" if is_single else "each flight in turn",
+        "left_out": "each flight in turn" if settings is None else "halves of the one flight in turn",
         "rows": [{"method": title, **summarize(scores)} for title, scores in by_method.items()],
         "published": json.loads(PUBLISHED_SCORES_FILE.read_text(encoding="utf-8")).get(data.name, []),
         "flights": entries,
@@ -145,8 +142,12 @@ def _diagnose_each(log: RecordedFlight, held_out: FitPart, model: Model) -> Iter
         yield FREEZE_RULE_TITLE, frozen
 
 
-def whole_settings(usable: list[FitPart], data: DataSet) -> FilterSettings:
-    """Return the settings fitted to a whole flight: levels, rate of change, and the mass of the bounds."""
+def settings_of_single(usable: list[FitPart], data: DataSet) -> FilterSettings | None:
+    """Return the settings fitted to the whole of a single flight, half of which is judged: levels, rate of
+    change, and the mass of the bounds. Neither half has all levels. None if there are other flights to fit.
+    """
+    if len(data.flights) > 1:
+        return None
     model = fit_model(usable, data.vehicle)
     if len(usable) > 1:
         return model.settings

@@ -2,8 +2,9 @@
 
 The rates are kept and the commands changed to those that would have given them, or the other way round: the
 log satisfies the equation of motion of the vehicle. Labels stay as they are. A model is identified from one
-half of a labelled flight and scored on the other half, altered. The settings were chosen on the first drawn
-days (TUNING_SEEDS); the result is that of the others (TEST_SEEDS).
+half of a labelled flight and scored on the other half, altered; of several flights, from all but one. The
+levels of effectiveness are fitted to the whole of a single flight. The settings were chosen on the first
+drawn days (TUNING_SEEDS); the result is that of the others (TEST_SEEDS).
 """
 
 from collections.abc import Iterator, Sequence
@@ -158,7 +159,7 @@ def run_other_days(folder: Path) -> Document:
 
 def _test_data_set(data: benchmark.DataSet) -> Document:
     usable = fit_parts(data.flights)
-    settings = benchmark.whole_settings(usable, data)
+    settings = benchmark.settings_of_single(usable, data)
     parts = validation_folds(usable)
     folds = [(fit_model(fitted, data.vehicle, settings), held_out) for fitted, held_out, _ in parts]
     model = fit_model(usable, data.vehicle, settings)

@@ -114,16 +114,3 @@ def test_what_is_dear_is_red_when_its_probe_prints_otherwise():
     assert "never printed" in finding.words
     (finding,) = refreshed(STANDS, {"fly near": Output("", "prints nothing")}).findings
     assert not finding.said
-
-
-@pytest.mark.usefixtures("same_code")
-def test_what_is_dear_is_written_with_revision_date_and_digest_when_it_is_flown():
-    stale = DEAR.format("1ab 2026-01-02 0f")
-    made = refreshed(stale, NEAR, Wanted(dear=True))
-    assert "13 h" in made.text
-    again = refreshed(made.text, NEAR)
-    assert again.findings == []
-    assert again.page.origins[0].at[0] == "2cd"
-    assert refreshed(stale, NEAR, Wanted(dear=True, only="near")).text == stale
-    failed = refreshed(stale, {**NEAR, "fly far": Output("", "prints nothing")}, Wanted(dear=True))
-    assert (failed.text, len(failed.findings)) == (stale, 1)

@@ -1,9 +1,5 @@
 """`beaver-ftc bench`: what it reports, and that all contenders fly the same flight. Never how fast."""
 
-import json
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 
@@ -73,12 +69,3 @@ def test_the_plug_ins_do_a_detectors_and_a_laws_work(published):
     flight = fly(published, detector=InnovationDetector(), law=ProportionalInversion())
     assert 12.0 <= flight.detection_time_s <= 12.1
     assert flight.departure is None
-
-
-def test_json_is_one_document_and_nothing_else():
-    program = "from beaver_ftc.cli.main import main; main()"
-    arguments = ["bench", "--rounds", "3", "--no-parts", "--format", "json"]
-    done = subprocess.run(
-        [sys.executable, "-c", program, *arguments], capture_output=True, text=True, check=True
-    )
-    assert json.loads(done.stdout)["ratio"] > 0

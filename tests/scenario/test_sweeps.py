@@ -70,7 +70,8 @@ def test_points_of_a_grid_and_flights(given, grid, flights):
     assert (file.grid_size, file.flights) == (grid, flights)
 
 
-def test_a_law_does_not_know_the_sensors_of_its_flight():
-    sweep = load_sweep_text(HEAD + "vary:\n  sensors.q.delay_s: {choice: [0.03]}\n")
-    flown = sweep.scenario({"sensors.q.delay_s": 0.03})
+@pytest.mark.parametrize("key", ["sensors", "sensors.q.delay_s"])
+def test_a_law_does_not_know_the_sensors_of_its_flight(key):
+    value = 0.03 if key != "sensors" else {"q": {"delay_s": 0.03}}
+    flown = load_sweep_text(HEAD + f"vary:\n  {key}: {{choice: [{value}]}}\n").scenario({key: value})
     assert (flown.sensors.q.delay_s, flown.known_sensors.q.delay_s) == (0.03, 0.0)

@@ -362,8 +362,8 @@ class DesignFunctions:
     - `u` (surfaces,) rad: deflections of the surfaces from neutral.
     """
 
-    def __init__(self, design: np.ndarray) -> None:
-        self._design = design[0]
+    def __init__(self, record: np.ndarray) -> None:
+        self._design = record[0]
 
     def f(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Angular acceleration (3,) rad/s² at neutral surfaces. For `x` (n, 3) the result is (n, 3)."""

@@ -72,6 +72,19 @@ def test_a_diagnosis_changed_begins_anew_and_is_flown_again_to_the_bit(scheme):
     assert (second["detection_time_s"] is None) == (scheme == "none")
 
 
+def test_a_broken_instrument_stays_broken_when_the_sensors_change():
+    fault = {"type": "bias", "sensor": "manifold_pressure", "magnitude": 8, "at_s": 0.2}
+    sim = flown((0.4, {"sensors": {"q": {"noise_std_deg_s": 0.01}}}), seconds=0.6, faults=[fault])
+    assert sim.measured.y[4] - sim["aero/dpt"] > 0.3
+
+
+def test_an_autopilot_forgets_what_the_oracle_knew():
+    change = 0.6, {"law": "nominal"}
+    flight = {"faults": [loss("rudder", at_s=0.1, magnitude=1.0)], "control": {"law": "oracle"}}
+    sim = flown(change, seconds=0.62, autopilot={"heading_deg": [{"hold": True}]}, **flight)
+    assert sim.records[0]["autopilot"]["yaw_loss_share"] == 0.0
+
+
 def test_an_alarm_before_the_fault_stays_a_false_one():
     """Undeclared sensor errors raise it; a diagnosis begun anew does not make it undone."""
     bad = {"sensors": {"q": {"bias_deg_s": 3.0}}}

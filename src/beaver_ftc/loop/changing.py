@@ -86,6 +86,7 @@ class Changing:
             take_diagnosis(frame, new, stage.frame)
         if change.sensors is not None:
             take_configuration(frame["instruments"], new["instruments"])
+            loop.sensor_schedule.apply(stage.frame)  # what is broken stays so
         loop.read_more()
         frame["control"]["power"]["config"]["enabled"] = new["control"]["power"]["config"]["enabled"]
         before = loop.plugin_frame
@@ -118,6 +119,9 @@ def take_law(frame: np.void, new: np.void) -> None:
     """Put a law, configured in `new`, in the place of another, without a bump."""
     fdi = frame["fdi"]
     learnt = fdi["fdae"]["network"]["output"].copy() if fdi["verdict"]["detected"] else np.zeros(3)
+    if frame["control"]["config"]["informed"] and not new["config"]["informed"]:
+        for name in ("roll_loss_share", "yaw_loss_share", "engines_alone_yaw_share"):
+            frame["autopilot"][name] = 0.0  # they follow from the true effectiveness
     take_over(new, frame["control"], learnt)
     frame["control"] = new
     frame["faults"] = np.zeros_like(frame["faults"])  # of the truth: an informed law is told again

@@ -149,6 +149,12 @@ def take_over(autopilot, y, attitude):
     autopilot.climb_in_trim = attitude[PITCH] - y[ALPHA]
 
 
+def forget_losses(autopilot: np.void) -> None:
+    """Forget which surfaces are gone: the law that takes over from an oracle is not told it."""
+    for name in ("roll_loss_share", "yaw_loss_share", "engines_alone_yaw_share"):
+        autopilot[name] = 0.0
+
+
 @kernel
 def smooth_signals_and_losses(autopilot, layout, surfaces, saturated, engines_yaw, y):
     """Smooth what is noisy, and note whether the ailerons or the rudder are gone; ailerons at their stop give

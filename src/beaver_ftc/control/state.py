@@ -77,13 +77,18 @@ def configure_law(control: np.void, prediction: np.void, declared: Declared, y: 
         law.configure(control[row.file], control, prediction, declared, y)
 
 
+def is_told_no_more(new: np.void, before: np.void) -> bool:
+    """Whether the law in `before` knows the true effectiveness and the one in `new` does not."""
+    return bool(before["config"]["informed"] and not new["config"]["informed"])
+
+
 def take_over(new: np.void, before: np.void, learnt: np.ndarray) -> None:
     """Let a law, configured in `new`, take over from the one in `before` without a bump: the stages in KEPT
     go on, and its integrators begin where the demand is.
 
     learnt (3,) rad/s2: what the diagnosis' network explains.
     """
-    told = before["config"]["informed"] and not new["config"]["informed"]
+    told = is_told_no_more(new, before)
     for stage, part in KEPT if told else (*KEPT, *KNOWN):
         new[stage][part] = before[stage][part]
     if told:

@@ -10,7 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from beaver_ftc.control.state import take_over
+from beaver_ftc.control.autopilot import forget_losses
+from beaver_ftc.control.state import is_told_no_more, take_over
 from beaver_ftc.diagnosis.schemes import prepare_takeover
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.assembly import assemble
@@ -119,9 +120,8 @@ def take_law(frame: np.void, new: np.void) -> None:
     """Put a law, configured in `new`, in the place of another, without a bump."""
     fdi = frame["fdi"]
     learnt = fdi["fdae"]["network"]["output"].copy() if fdi["verdict"]["detected"] else np.zeros(3)
-    if frame["control"]["config"]["informed"] and not new["config"]["informed"]:
-        for name in ("roll_loss_share", "yaw_loss_share", "engines_alone_yaw_share"):
-            frame["autopilot"][name] = 0.0  # they follow from the true effectiveness
+    if is_told_no_more(new, frame["control"]):
+        forget_losses(frame["autopilot"])
     take_over(new, frame["control"], learnt)
     frame["control"] = new
     frame["faults"] = np.zeros_like(frame["faults"])  # of the truth: an informed law is told again

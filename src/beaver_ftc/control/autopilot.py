@@ -150,9 +150,11 @@ def take_over(autopilot, y, attitude):
 
 
 def forget_losses(autopilot: np.void) -> None:
-    """Forget which surfaces are gone: the law that takes over from an oracle is not told it."""
+    """Forget which surfaces are gone, and which airspeeds can be held then: the law that takes over from an
+    oracle is not told it."""
     for name in ("roll_loss_share", "yaw_loss_share", "engines_alone_yaw_share"):
         autopilot[name] = 0.0
+    autopilot["holding"]["n_averaged_frames"] = autopilot["holding"]["limits_airspeed"] = 0
 
 
 @kernel

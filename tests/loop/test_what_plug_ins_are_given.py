@@ -58,12 +58,6 @@ def test_accelerometers_are_read_whatever_fails_later(faults):
     assert np.linalg.norm(sim.measured.force) == pytest.approx(9.8, abs=0.5)
 
 
-def test_a_law_that_takes_over_in_flight_reads_accelerometers():
-    sim = Simulation(scenario(duration_s=1, changes=[{"at_s": 0.5, "law": "lqr"}]))
-    sim.step(frames=60)
-    assert np.linalg.norm(sim.measured.force) == pytest.approx(9.8, abs=0.5)
-
-
 def test_nothing_in_the_context_tells_of_the_noise():
     """Flights that differ by their seed alone differ in every reading, and not in a bit of the context: what
     rebuilds the noise of one from its context gives the same for the other, which has another noise."""

@@ -48,7 +48,6 @@ from beaver_ftc.plant.instruments import (
 from beaver_ftc.plant.sensing import truth_dtype
 from beaver_ftc.scenario.builtin import texts_of
 from beaver_ftc.scenario.declared import Declared
-from beaver_ftc.scenario.faults import of_a_sensor
 from beaver_ftc.scenario.schema import Scenario, stages
 from beaver_ftc.scenario.sensors import N_IN_EQUATIONS, ROWS, frames_apart
 
@@ -67,13 +66,6 @@ def has_real_engine(scenario: Scenario) -> bool:
     """Whether dpt is to be worked out from readings that can be wrong from the start."""
     real = any(not getattr(scenario.sensors, name).is_ideal for name in OF_THE_SLIPSTREAM)
     return real and scenario.airframe.has_engine_instruments
-
-
-def truth_read(scenario: Scenario) -> tuple[ch.Channel, ...]:
-    """What is read from the truth in this flight."""
-    usual = ch.truth_channels(scenario.airframe)
-    further = any(map(of_a_sensor, scenario.faults)) or records_further(scenario)
-    return (*usual, *ch.further_channels(scenario.airframe)) if further else usual
 
 
 def records_further(scenario: Scenario) -> bool:
@@ -178,9 +170,8 @@ def assemble(scenario: Scenario, trim: Trim, travel: np.ndarray) -> np.ndarray:
 def configure_design(scenario: Scenario, travel: np.ndarray) -> np.ndarray:
     """A record in which every stage that needs no trim is configured: a copy of that of its design."""
     initial = tuple(scenario.initial.model_dump(exclude={"airspeed_mps"}).values())
-    rates, n_read = (scenario.rate_hz, scenario.substeps), len(truth_read(scenario))
-    line = line_for(scenario)
-    key = scenario.airframe, texts_of(scenario, _DESIGN), rates, n_read, line, initial, travel.tobytes()
+    rates, line = (scenario.rate_hz, scenario.substeps), line_for(scenario)
+    key = scenario.airframe, texts_of(scenario, _DESIGN), rates, line, initial, travel.tobytes()
     if key not in _designs:
         if len(_designs) >= _MOST_DESIGNS:
             _designs.clear()
@@ -218,7 +209,7 @@ def _assemble_design(scenario: Scenario, travel: np.ndarray, line: int) -> np.nd
     frames = taken_empty((1,), frame_dtype(aircraft.n, required_size(aircraft), line))
     frame, instant_s = frames[0], dt / scenario.substeps
     frame["dt"], frame["accounts"]["guarantee"]["certain_after_s"] = dt, -1.0
-    truth, channels = frame["truth"], truth_read(scenario)
+    truth, channels = frame["truth"], ch.truth_channels(aircraft)
     truth["n"], truth["declared"] = len(channels), len(aircraft.signals)
     truth["factor"][: len(channels)] = [factor for _, _, factor in channels]
     configure(frame["instruments"], scenario, instant_s)
@@ -233,11 +224,6 @@ def _assemble_design(scenario: Scenario, travel: np.ndarray, line: int) -> np.nd
 def y_places(frame: np.void) -> list[int]:
     """Where in the truth the measured signals beside the rates are: y without noise, (4 + declared,)."""
     return ch.signal_places(frame["prediction"]["u"].size, int(frame["truth"]["declared"]))
-
-
-def reads_accelerometers(frame: np.void) -> bool:
-    """Whether accelerometers are read in this flight: their channels stand after all others."""
-    return bool(frame["truth"]["n"] > y_places(frame)[-1] + 1)
 
 
 def lay_out(frame: np.void, scenario: Scenario, diagnoses_itself: bool) -> tuple[str, ...]:

@@ -88,7 +88,6 @@ class Changing:
         if change.sensors is not None:
             take_configuration(frame["instruments"], new["instruments"])
             loop.sensor_schedule.apply(stage.frame)  # what is broken stays so
-        loop.read_more()
         frame["control"]["power"]["config"]["enabled"] = new["control"]["power"]["config"]["enabled"]
         before = loop.plugin_frame
         if stage.plugins is not None and before is not None and stage.plugins.detector is before.detector:

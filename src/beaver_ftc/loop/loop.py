@@ -48,7 +48,7 @@ UNANTICIPATED = "failures/unanticipated/Cm-alpha3"
 LEAST_HEIGHT_M = 500.0  # above the ground at the start; the ground is at sea level, or lower if need be
 
 # Of aircraft that are flown again.
-_banks_of: "WeakKeyDictionary[Plant, dict[int, tuple[NodeBank, ...]]]" = WeakKeyDictionary()
+_banks_of: "WeakKeyDictionary[Plant, tuple[NodeBank, ...]]" = WeakKeyDictionary()
 
 
 class Cockpit:
@@ -58,10 +58,9 @@ class Cockpit:
     def __init__(self, plant: Plant, frames: np.ndarray) -> None:
         self._frames, self._plant = frames, plant  # whose executive tied properties read from
         truth, running = frames["truth"][0], frames["running"][0]
-        n, banks = int(truth["n"]), _banks_of.setdefault(plant, {})
-        if n not in banks:
-            banks[n] = _banks(plant, n)
-        self._read, self._write, self._engine, self._air = banks[n]
+        if plant not in _banks_of:
+            _banks_of[plant] = _banks(plant)
+        self._read, self._write, self._engine, self._air = _banks_of[plant]
         self.native = plant.native
         truth["native"] = self.native
         truth["getter"], truth["setter"] = address(GETTER), address(SETTER)
@@ -95,14 +94,13 @@ class Cockpit:
         axes.set_double_value(-heading.get_double_value())
 
 
-def _banks(plant: Plant, n: int) -> tuple[NodeBank, ...]:
-    """What is read of the truth, n channels; where the command goes, and the engines'; heading and axes of
+def _banks(plant: Plant) -> tuple[NodeBank, ...]:
+    """What is read of the truth; where the command goes, and the engines'; heading and axes of
     the turbulence."""
     aircraft = plant.aircraft
     differences = [effector.throttle for effector in aircraft.effectors.values()]
-    channels = (*ch.truth_channels(aircraft), *ch.further_channels(aircraft))[:n]
     return (
-        NodeBank([plant.node(name) for _, name, _ in channels]),
+        NodeBank([plant.node(name) for _, name, _ in ch.truth_channels(aircraft)]),
         NodeBank([plant.input(name) for name in ch.command_properties(aircraft)]),
         NodeBank([plant.input(name) for name in (aircraft.trim.throttle, *differences)]),
         NodeBank([plant.node("attitude/psi-rad"), plant.input("atmosphere/psiw-rad")]),
@@ -183,8 +181,8 @@ class Loop:
         self.trimmed = Trim(*known_trim(declared), command)
         configure_at_trim(self.frames[0], scenario, self.trimmed)
         self.schedule = FaultSchedule(scenario.faults, self.plant, scenario.rate_hz)
-        instruments, has_engine = self.frames["instruments"][0], self.aircraft.has_engine_instruments
-        self.sensor_schedule = SensorFaultSchedule(scenario.faults, instruments, scenario.rate_hz, has_engine)
+        instruments = self.frames["instruments"][0]
+        self.sensor_schedule = SensorFaultSchedule(scenario.faults, instruments, scenario.rate_hz)
         self._turbulent = scenario.environment.is_turbulent
         self.frames["running"]["turbulent"] = self._turbulent
         self.gust = GustSchedule(scenario.environment.gusts, self.plant, scenario.rate_hz)
@@ -233,10 +231,7 @@ class Loop:
             detector = named_detector(self.scenario)
         if law is None:
             law = named_law(self.frames, self.scenario, self.trimmed)
-        plugins = plugged(self.frames, self.scenario, self.trimmed, detector, law)
-        if plugins is not None:
-            self.read_more()  # plug-ins are given what there is
-        return plugins
+        return plugged(self.frames, self.scenario, self.trimmed, detector, law)
 
     def fly_with(self, plugins: "PluginFrame | None") -> None:
         """Fly on with these plug-ins, or with none. fly_frame: what Python is to call, None if nothing."""
@@ -316,17 +311,6 @@ class Loop:
         """Take these faults for the flight's, between two frames."""
         self.schedule.declare(faults)
         self.sensor_schedule.declare(faults)
-        if self.sensor_schedule.any:
-            self.read_more()
-
-    def read_more(self) -> None:
-        """Have the further instruments read from the next frame on."""
-        truth = self.frames[0]["truth"]
-        channels = (*ch.truth_channels(self.aircraft), *ch.further_channels(self.aircraft))
-        if truth["n"] < len(channels):
-            truth["n"] = len(channels)
-            truth["factor"][: len(channels)] = [factor for _, _, factor in channels]
-            self.cockpit = Cockpit(self.plant, self.frames)
 
     def fly_segment(self, k: int, stop: int) -> int:
         """Frames k to stop, in which no fault changes."""

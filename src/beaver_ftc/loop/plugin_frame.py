@@ -7,7 +7,7 @@ taken by `diagnose` (adaptive_estimators.plugin_update).
 """
 
 from collections.abc import Callable, Mapping
-from math import isfinite, nan
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -26,7 +26,7 @@ from beaver_ftc.diagnosis.state import (
 )
 from beaver_ftc.documents.errors import NO_FAILURE, SimulationFailed
 from beaver_ftc.loop import stepping as stages
-from beaver_ftc.loop.assembly import Trim, reads_accelerometers
+from beaver_ftc.loop.assembly import Trim
 from beaver_ftc.loop.findings import verdict_of
 from beaver_ftc.plant.sensing import NOT_FINITE
 from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled, made
@@ -201,7 +201,7 @@ def measured_of(frame: np.void) -> Measured:
         frame["prediction"]["means"]["Gu"].copy(),
         frame["fdi"]["bound"]["eta_bar"].copy(),
         frame["measured"]["attitude"].copy(),
-        frame["measured"]["force"].copy() if reads_accelerometers(frame) else np.full(3, nan),
+        frame["measured"]["force"].copy(),
         float(frame["measured"]["altitude"]),
     )
 

@@ -104,7 +104,6 @@ class Stepping:
         self._scenario, self._faults = self._given, self._given.faults
         with ONE_FLIES:
             self._loop = self._loop_type(self._scenario, *self._plug_ins, self._prepare)
-            self._loop.read_more()  # a caller is given what there is
         self._frame: np.void = self._loop.frames[0]
         self._k_flown, self._rows_flown = (self._loop.frames[name].item for name in ("k", "row"))
         self._next, self._turn_at, self._written = 0, 0, 0

@@ -73,9 +73,8 @@ PDOT, ENVELOPE = _INDEX["pdot_rad_s2"], _INDEX["envelope_valid"]
 POS = len(FIXED)
 
 
-@lru_cache(maxsize=32)
-def truth_channels(aircraft: Aircraft) -> tuple[Channel, ...]:
-    """Channels that are read from the truth of an aircraft, in order."""
+def usual_channels(aircraft: Aircraft) -> tuple[Channel, ...]:
+    """The first channels of `truth_channels`: what the usual sensors and the log read."""
     return (
         *FIXED,
         *((f"{s}_pos_rad", of.position, 1.0) for s, of in aircraft.surface.items()),
@@ -92,8 +91,8 @@ def signal_places(n: int, declared: int) -> list[int]:
     return [ALPHA, BETA, AIRSPEED, QDYN, *range(first, first + declared)]
 
 
-# Read where a flight needs more than the usual sensors: m/s2 times slug, slug; then the sensors that the
-# monitor alone uses; then the engine's.
+# What stands after them: m/s2 times slug, slug; then the sensors that the monitor alone uses; then the
+# engine's.
 _INERTIAL: tuple[Channel, ...] = (
     ("force_x", "forces/fbx-total-lbs", M_PER_FT),
     ("force_y", "forces/fby-total-lbs", M_PER_FT),
@@ -106,11 +105,12 @@ N_FURTHER = len(_INERTIAL) + len(_SAMPLED) + len(_ENGINE)
 
 
 @lru_cache(maxsize=32)
-def further_channels(aircraft: Aircraft) -> tuple[Channel, ...]:
-    """What is read from the truth after `truth_channels` where there are more instruments than usual."""
+def truth_channels(aircraft: Aircraft) -> tuple[Channel, ...]:
+    """Channels that are read from the truth of an aircraft, in order: the same in every flight, whatever
+    will break in it."""
     settings = aircraft.engine.settings
     engine = [(name, settings[name].property, 1.0) for name in _ENGINE if aircraft.has_engine_instruments]
-    return (*_INERTIAL, *_SAMPLED, *engine)
+    return (*usual_channels(aircraft), *_INERTIAL, *_SAMPLED, *engine)
 
 
 def most_channels(n: int) -> int:
@@ -124,7 +124,7 @@ def command_properties(aircraft: Aircraft) -> tuple[str, ...]:
 
 
 # Of the built-in aircraft, for what does not yet ask the aircraft.
-TRUTH = truth_channels(load())
+TRUTH = usual_channels(load())
 COMMANDS = command_properties(load())
 
 _STATES = (

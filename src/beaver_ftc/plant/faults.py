@@ -181,33 +181,24 @@ class FaultSchedule(_Schedule):
 
 
 class SensorFaultSchedule(_Schedule):
-    """Breaks and mends the instruments (`instruments.instruments_dtype`).
-
-    has_engine: the aircraft has instruments from which dpt follows.
-    """
+    """Breaks and mends the instruments (`instruments.instruments_dtype`)."""
 
     of_instruments = True
 
-    def __init__(
-        self, faults: Sequence[Any], instruments: np.void, rate_hz: float, has_engine: bool = False
-    ) -> None:
+    def __init__(self, faults: Sequence[Any], instruments: np.void, rate_hz: float) -> None:
         super().__init__(faults, rate_hz)
-        self._instruments, self._has_engine = instruments, has_engine
+        self._instruments = instruments
 
     def apply(self, k: int) -> None:
-        """Bring the instruments to frame k; again is harmless. From the first fault of theirs on, dpt is what
-        engine and air data say."""
+        """Bring the instruments to frame k; again is harmless."""
         if not self._events:
             return
         record = self._instruments["fault"]
         record["bias"] = record["scale"] = record["noise"] = 0.0
         record["frozen"] = record["lost"] = 0
         for event in self._events:
-            sensor = event.fault.sensor
-            if event.first <= k and self._has_engine and sensor in OF_THE_SLIPSTREAM:
-                self._instruments["engine"] = 1
             if event.in_force(k):
-                _take(record[_SENSORS.index(sensor)], event.fault)
+                _take(record[_SENSORS.index(event.fault.sensor)], event.fault)
         self._instruments["broken"] = 1  # from now on: a mended one must let go of what it holds
 
 

@@ -208,13 +208,17 @@ def break_one(instruments, i, reading):
 @kernel
 def break_all(instruments, signals, missing):
     """Put what broken instruments say in the place of their readings; missing (N_SENSORS,): none there.
+    Whether a reading from which dpt follows has another value now.
 
     A frozen instrument stays at its first reading of the fault.
     """
-    instruments.counter = OF_FAULTS
+    instruments.counter, errs = OF_FAULTS, False
     for i in range(signals.size):
-        signals[i] = break_one(instruments, i, signals[i])
+        sound = signals[i]
+        signals[i] = break_one(instruments, i, sound)
         missing[i] = instruments.fault[i].lost
+        errs |= signals[i] != sound and i in (_AIRSPEED, _QDYN, ENGINE_SPEED, MANIFOLD)
+    return errs
 
 
 @kernel

@@ -90,18 +90,15 @@ def measure(truth, instruments, measured):
     for i in range(3):
         signal[PHI + i] = value[ch.PHI + i]
     signal[ALTITUDE] = value[ch.ALTITUDE]
-    further = first_signal(truth) + truth.declared
-    if truth.n > further:
-        read_further(value, further, truth.n, measured)
+    read_further(value, first_signal(truth) + truth.declared, truth.n, measured)
     if instruments.real:
         read_all(instruments, signal)
-        if truth.n > further:
-            read_forces(instruments, signal)
-    if N_SAMPLED > 0 and truth.n > further:
-        read_sampled(instruments, signal, measured.fresh)
+        read_forces(instruments, signal)
+    read_sampled(instruments, signal, measured.fresh)
+    errs = instruments.engine
     if instruments.broken:
-        break_all(instruments, signal, measured.missing)
-    distribute_readings(truth, instruments, measured)
+        errs |= break_all(instruments, signal, measured.missing) and measured.engine
+    distribute_readings(truth, errs, measured)
 
 
 @kernel
@@ -119,16 +116,16 @@ def read_further(value, first, n, measured):
 
 
 @kernel
-def distribute_readings(truth, instruments, measured):
+def distribute_readings(truth, errs, measured):
     """Copy the readings in `signal` to the records of their users. Declared signals have no instrument: their
-    readings are exact."""
+    readings are exact; but that of the slipstream follows from other readings where one of these errs."""
     share_out(measured)
     y, first = measured.y, first_signal(truth)
     if y[AIRSPEED] < MIN_AIRSPEED_ON_WHEELS_MPS and truth.slow_mps > 0.0:
         y[AIRSPEED] = MIN_AIRSPEED_ON_WHEELS_MPS  # rates over an airspeed stay finite
     for j in range(truth.declared):
         y[DPT + j] = truth.value[first + j]
-    if instruments.engine:
+    if errs:
         note_slipstream(measured)
 
 

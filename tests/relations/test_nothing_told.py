@@ -6,7 +6,8 @@
 """
 
 import ast
-from dataclasses import fields
+import pickle
+from dataclasses import fields, replace
 from functools import cache
 
 import numpy as np
@@ -14,6 +15,7 @@ import pytest
 
 import beaver_ftc as bf
 from beaver_ftc.loop.loop import Loop
+from beaver_ftc.loop.plugin_frame import context_of
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import load
 from beaver_ftc.scenario.truth import Truth
@@ -189,10 +191,12 @@ CONFIGURED = ("prediction", "fdi", "assessment", "supervisor", "control", "autop
 
 
 def configured(scenario):
-    """What the diagnosis and the law are configured with, as bytes by field."""
+    """What the diagnosis, the law and plug-ins are configured with, as bytes by field."""
     loop = Loop(scenario)
     records = {stage: leaves(loop.frames[stage][0]) for stage in CONFIGURED}
     found = {f"{stage}.{name}": value for stage, leaf in records.items() for name, value in leaf}
+    context = context_of(loop.frames, scenario, loop.trimmed, {})
+    found["context"] = pickle.dumps(replace(context, model=None, trim_rad=None))
     loop.release()
     return found
 

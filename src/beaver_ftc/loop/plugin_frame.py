@@ -226,7 +226,7 @@ def context_of(frames: np.ndarray, scenario: Scenario, trim: Trim, options: Mapp
         surfaces=aircraft.surfaces,
         leading=(int(layout["main"][0]), int(layout["main"][1]), int(layout["main"][2])),
         options=dict(options),
-        declared=plugin_errors(Declared.of(scenario), design, trim.y, trim.command),
+        declared=plugin_errors(Declared.of(scenario), design, trim.y, trim.u),
     )
 
 

@@ -199,7 +199,7 @@ class SensorFaultSchedule(_Schedule):
         for event in self._events:
             if event.in_force(k):
                 _take(record[_SENSORS.index(event.fault.sensor)], event.fault)
-        self._instruments["broken"] = 1  # from now on: a mended one must let go of what it holds
+        self._instruments["broken"] = self.begun(k)  # or mended: it must let go of what it holds
 
 
 def _take(record: np.void, fault: Any) -> None:

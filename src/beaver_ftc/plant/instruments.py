@@ -17,7 +17,7 @@ import numpy as np
 
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.design.engine import measured_slipstream
-from beaver_ftc.design.table import AIRSPEED, ALPHA, BETA, DPT, N_Y, QDYN
+from beaver_ftc.design.table import AIRSPEED, ALPHA, BETA, N_Y, QDYN
 from beaver_ftc.scenario.sensors import N_IN_EQUATIONS, NOISE_LIMIT_SIGMA, ROWS, SIGNALS
 
 N_SIGNALS = len(SIGNALS)
@@ -208,17 +208,13 @@ def break_one(instruments, i, reading):
 @kernel
 def break_all(instruments, signals, missing):
     """Put what broken instruments say in the place of their readings; missing (N_SENSORS,): none there.
-    Whether a reading from which dpt follows has another value now.
 
     A frozen instrument stays at its first reading of the fault.
     """
-    instruments.counter, errs = OF_FAULTS, False
+    instruments.counter = OF_FAULTS
     for i in range(signals.size):
-        sound = signals[i]
-        signals[i] = break_one(instruments, i, sound)
+        signals[i] = break_one(instruments, i, signals[i])
         missing[i] = instruments.fault[i].lost
-        errs |= signals[i] != sound and i in (_AIRSPEED, _QDYN, ENGINE_SPEED, MANIFOLD)
-    return errs
 
 
 @kernel
@@ -250,9 +246,7 @@ def share_out(measured):
 
 
 @kernel
-def note_slipstream(measured):
-    """Work dpt out from the readings of the engine and of the air."""
+def slipstream_read(measured):
+    """dpt from the readings of the engine and of the air."""
     signal = measured.signal
-    measured.y[DPT] = measured_slipstream(
-        signal[ENGINE_SPEED], signal[MANIFOLD], signal[_AIRSPEED], signal[_QDYN]
-    )
+    return measured_slipstream(signal[ENGINE_SPEED], signal[MANIFOLD], signal[_AIRSPEED], signal[_QDYN])

@@ -19,12 +19,12 @@ from beaver_ftc.plant.instruments import (
     N_SAMPLED,
     PHI,
     break_all,
-    note_slipstream,
     read_all,
     read_forces,
     read_sampled,
     set_inertial,
     share_out,
+    slipstream_read,
 )
 
 FLYING, DEPARTED, NOT_FINITE = 0, 1, 2
@@ -95,10 +95,14 @@ def measure(truth, instruments, measured):
         read_all(instruments, signal)
         read_forces(instruments, signal)
     read_sampled(instruments, signal, measured.fresh)
-    errs = instruments.engine
+    dpt_error = 0.0
     if instruments.broken:
-        errs |= break_all(instruments, signal, measured.missing) and measured.engine
-    distribute_readings(truth, errs, measured)
+        if measured.engine:
+            dpt_error = -slipstream_read(measured)
+        break_all(instruments, signal, measured.missing)
+        if measured.engine:
+            dpt_error += slipstream_read(measured)
+    distribute_readings(truth, instruments, dpt_error, measured)
 
 
 @kernel
@@ -116,17 +120,20 @@ def read_further(value, first, n, measured):
 
 
 @kernel
-def distribute_readings(truth, errs, measured):
+def distribute_readings(truth, instruments, dpt_error, measured):
     """Copy the readings in `signal` to the records of their users. Declared signals have no instrument: their
-    readings are exact; but that of the slipstream follows from other readings where one of these errs."""
+    readings are exact, but for what broken instruments change in dpt, `dpt_error`. With errors of the
+    instruments it is worked out from the readings."""
     share_out(measured)
     y, first = measured.y, first_signal(truth)
     if y[AIRSPEED] < MIN_AIRSPEED_ON_WHEELS_MPS and truth.slow_mps > 0.0:
         y[AIRSPEED] = MIN_AIRSPEED_ON_WHEELS_MPS  # rates over an airspeed stay finite
     for j in range(truth.declared):
         y[DPT + j] = truth.value[first + j]
-    if errs:
-        note_slipstream(measured)
+    if instruments.engine:
+        y[DPT] = slipstream_read(measured)
+    elif dpt_error != 0.0:
+        y[DPT] += dpt_error
 
 
 @kernel

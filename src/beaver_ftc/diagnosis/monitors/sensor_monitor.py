@@ -55,6 +55,7 @@ about surfaces, bank the detection filters, pred the prediction of the model.
 import numpy as np
 
 from beaver_ftc.compiled import kernel, record
+from beaver_ftc.design.table import DPT
 from beaver_ftc.diagnosis.detection import attitude
 from beaver_ftc.diagnosis.detection.filters import bank_axis, leak
 from beaver_ftc.diagnosis.monitors.initial_errors import (
@@ -109,9 +110,9 @@ from beaver_ftc.plant.instruments import (
     MANIFOLD,
     N_SENSORS,
     PHI,
-    note_slipstream,
     set_inertial,
     share_out,
+    slipstream_read,
 )
 from beaver_ftc.scenario.sensors import ROWS
 
@@ -786,7 +787,7 @@ def replace_readings(mon, pred, measured):
         share_out(measured)
     slipstream = unused[I_AIRSPEED] or unused[I_QDYN] or unused[ENGINE_SPEED] or unused[MANIFOLD]
     if slipstream and mon.config.has_engine:
-        note_slipstream(measured)
+        measured.y[DPT] = slipstream_read(measured)
 
 
 @kernel

@@ -150,10 +150,11 @@ def take_over(autopilot, y, attitude):
 
 
 def forget_losses(autopilot: np.void) -> None:
-    """Forget which surfaces are gone, and which airspeeds can be held then: the law that takes over from an
-    oracle is not told it."""
-    for name in ("roll_loss_share", "yaw_loss_share", "engines_alone_yaw_share"):
-        autopilot[name] = 0.0
+    """Forget which surfaces are gone, what that left missing, and which airspeeds can be held then: the law
+    that takes over from an oracle is not told it."""
+    for loss in ("roll_loss_share", "yaw_loss_share", "engines_alone_yaw_share"):
+        autopilot[loss] = 0.0
+    autopilot["missing_roll_rate"] = autopilot["missing_turn_rate"] = 0.0
     autopilot["holding"]["n_averaged_frames"] = autopilot["holding"]["limits_airspeed"] = 0
 
 

@@ -84,7 +84,8 @@ def is_told_no_more(new: np.void, before: np.void) -> bool:
 
 def take_over(new: np.void, before: np.void, learnt: np.ndarray) -> None:
     """Let a law, configured in `new`, take over from the one in `before` without a bump: the stages in KEPT
-    go on, and its integrators begin where the demand is.
+    go on, and its integrators begin where the demand is. Of a law that knew the truth, what that has left in
+    a stage does not go on.
 
     learnt (3,) rad/s2: what the diagnosis' network explains.
     """
@@ -94,6 +95,9 @@ def take_over(new: np.void, before: np.void, learnt: np.ndarray) -> None:
     if told:
         for name in ("hand_over", "lost_share", "transfer_share"):
             new["allocation"]["output"][name] = 0.0
+        reference, before = new["reference"]["output"], new
+        for kind in ("rate", "acceleration"):
+            reference[f"governed_{kind}"] = reference[f"model_{kind}"]
     law, next_law, unexplained = in_charge(before), in_charge(new), np.zeros(3)
     if not told:
         unexplained = law.unexplained(before) if law.unexplained else before["surfaces"]["output"]["unknown"]

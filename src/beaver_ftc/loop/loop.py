@@ -177,8 +177,9 @@ class Loop:
         self.frames = configure_design(scenario, declared.travel_rad)
         self.cockpit = Cockpit(self.plant, self.frames)
         self.cockpit.read()
-        command = np.array(list(self.trim.surfaces_rad.values()))
-        self.trimmed = Trim(*known_trim(declared), command)
+        known = known_trim(declared)
+        held = known.u if self.from_ground and scenario.initial.on_ground else self.trim.surfaces_rad.values()
+        self.trimmed = Trim(*known, np.array(list(held)))
         configure_at_trim(self.frames[0], scenario, self.trimmed)
         self.schedule = FaultSchedule(scenario.faults, self.plant, scenario.rate_hz)
         instruments = self.frames["instruments"][0]

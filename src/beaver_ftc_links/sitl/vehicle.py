@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from beaver_ftc.aircraft import M_PER_FT, MOST_CHANNELS, Aircraft
+from beaver_ftc.design import DesignFunctions
 from beaver_ftc.documents import BadInput
 from beaver_ftc.loop import (
     FrameReadout,
@@ -32,7 +33,6 @@ SLOWEST_HZ, FASTEST_HZ = 20.0, 400.0  # rates of the diagnosis at which its prom
 FASTEST_PACKETS_HZ = 4000.0
 UP_M, DOWN_M = 5.0, 2.0  # height of the wheels at which the diagnosis begins after take-off, and ends
 SLOW_MPS = 10.0
-UNDERNEATH_M = -1e4
 GUSTY_M = 609.6  # height above which a flight from the ground is diagnosed in declared turbulence
 WHOLE = 1e-6  # JSBSim frames: a number that differs by less from a whole one counts as whole
 # The autopilot commands the surfaces and the flight path: what the scenario says of both is replaced.
@@ -181,9 +181,9 @@ class Flown(Simulation):
 
     @property
     def G(self) -> Vector:
-        """Present effectiveness of each surface about each axis, (3, n) rad/s2 per rad, by the design
-        model."""
-        return FrameReadout(self._frame).G
+        """Effectiveness of each surface about each axis, (3, n) rad/s2 per rad, by the design model at the
+        trim that the designer knows."""
+        return DesignFunctions(self._loop.frames["prediction"]["design"]).G(self._loop.trimmed.y)
 
     @property
     def airframe(self) -> Aircraft:
@@ -275,7 +275,6 @@ class Vehicle:
             says = "has no meaning on the ground, which is at initial.altitude_m, allowed: to leave it out"
             raise BadInput(f"{scenario.name}: {what} {says}")
         self._ground_m = scenario.initial.altitude_m if self._on_ground else ground_m or 0.0
-        self._effects = _effects(scenario) if self._on_ground else None
         self.sim: Flown | None = None
         self.scenario = scenario
         self.packets_hz = 0.0
@@ -309,9 +308,8 @@ class Vehicle:
                 before.release()
         self.packets_hz = packets_hz
         self._jsbsim_hz = self.scenario.rate_hz * self.scenario.substeps
-        G = self.sim.G if self._effects is None else self._effects
         self.outputs = Outputs(
-            self.scenario.airframe, G, self.sim.trim_rad, self.sim.travel_rad, self._pulses
+            self.scenario.airframe, self.sim.G, self.sim.trim_rad, self.sim.travel_rad, self._pulses
         )
 
     @property
@@ -353,14 +351,6 @@ class Vehicle:
     def instant(self) -> Instant:
         """What is known of the frame just flown."""
         return self.flight.instant()
-
-
-def _effects(scenario: Scenario) -> Vector:
-    """What each surface does about each axis in the flight the trim is of: on the ground nothing."""
-    in_flight = Flown(scenario.with_({"initial.on_ground": None}), log=False, ground_m=UNDERNEATH_M)
-    effects = in_flight.G
-    in_flight.release()
-    return effects
 
 
 def at_rate(scenario: Scenario, packets_hz: float) -> Scenario:

@@ -345,15 +345,15 @@ def validate_sweep(document: Document, source: str = "", folder: Path | None = N
         problems = problems or [*_key_problems(base, file.vary, document)]
     if problems:
         raise ScenarioError(source, problems)
-    return Sweep(file, _with_known_sensors(base, file.vary), aircraft)
+    return Sweep(file, _with_known_parts(base, file.vary), aircraft)
 
 
-def _with_known_sensors(base: dict[str, Any], vary: Iterable[str]) -> dict[str, Any]:
-    """The base. Where `sensors` varies, the law knows those of the base, not each flight's."""
-    model = base.get("design_model") or {}
-    if "sensors" in model or not any(parse_key(key)[0] == "sensors" for key in vary):
-        return base
-    return {**base, "design_model": {**model, "sensors": base.get("sensors", "ideal")}}
+def _with_known_parts(base: dict[str, Any], vary: Iterable[str]) -> dict[str, Any]:
+    """The base. Where `sensors` or `actuators` vary, the designer knows those of the base, not each
+    flight's."""
+    varied = [part for part in ("actuators", "sensors") if any(parse_key(key)[0] == part for key in vary)]
+    known = {part: base.get(part, "ideal") for part in varied} | (base.get("design_model") or {})
+    return {**base, "design_model": known} if varied else base
 
 
 def _base(

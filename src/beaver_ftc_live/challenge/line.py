@@ -34,6 +34,9 @@ MOST_ASKED = 1000  # times in a frame
 MOST_ROWS = 64  # of x that the design model is asked for at once
 MOST_TEXT = 200
 POLL_S = 0.02
+PACE_S = (
+    0.001  # least from an answer to the next question: the frame of a fault takes longer to fly than others
+)
 _READY = re.compile(r"(detector|law|fault-tolerant law):([A-Za-z_]\w{0,60})", re.ASCII)
 
 
@@ -112,7 +115,7 @@ class SubmittedCode:
         self._allowance = allowance
         self._process: subprocess.Popen[bytes] | None = None
         self._deadline, self._late, self._t_s, self._frame = float("inf"), False, 0.0, 0
-        self._last_chance, self._accounts = False, _Accounts(None)
+        self._last_chance, self._accounts, self._answered_s = False, _Accounts(None), 0.0
         self._before = (0.0, 0.0, 0.0)  # limit, waited and computed, s, as the wait for an answer began
         self.kind, self.class_name, self.walls = "", "", ""
         self._model: Any = None
@@ -186,8 +189,11 @@ class SubmittedCode:
     def asked(self, kind: bytes, measured: Measured, *besides: Any) -> np.ndarray:
         """Show it a frame; its answer's numbers, finite or not."""
         self._t_s, self._frame = measured.t_s, self._frame + 1
+        time.sleep(max(self._answered_s + PACE_S - time.monotonic(), 0.0))
         self._send(pickle.dumps((measured, *besides)))
-        return np.frombuffer(self._answer(kind, self._length(kind), FRAME_S))
+        answer = np.frombuffer(self._answer(kind, self._length(kind), FRAME_S))
+        self._answered_s = time.monotonic()
+        return answer
 
     def _length(self, kind: bytes) -> int:
         return 8 * (self._sizes[1] + (7 if kind == pilot.VERDICT else 0))

@@ -33,9 +33,10 @@ INSTRUMENTS = "instruments"
 OF_A_FLIGHT = ("break", "repair", "blow", "aim", "change")  # requests that a finished flight refuses
 CHANGES_NOTHING = ("save", "stick")  # requests after which a saved folder still has all of the flight
 HIDDEN = (
-    "_effective_rad", "_pos_rad", "_excluded", "_effectiveness_estimate", "_effectiveness_used", "mode",
-    "detected",
+    "_effective_rad", "_pos_rad", "_effectiveness_estimate", "_effectiveness_used", "mode", "detected",
+    "_residual_rad_s", "_threshold_rad_s", "_network_rad_s2", "_likelihood_share",
 )  # fmt: skip
+HIDDEN_WHOLE = ("fie_", "watch_")
 
 
 MOST_LISTED = 4  # candidates: more are counted
@@ -83,7 +84,8 @@ class Session:
         self._base, self.scenario, self.sim = scenario, flown, sim
         self.columns = sim.columns
         self.surfaces = tuple(c.removesuffix("_cmd_rad") for c in self.columns if c.endswith("_cmd_rad"))
-        self._hidden = [i for i, name in enumerate(self.columns) if name.endswith(HIDDEN)]
+        told = (name.endswith(HIDDEN) or name.startswith(HIDDEN_WHOLE) for name in self.columns)
+        self._hidden = [i for i, tells in enumerate(told) if tells]
         self.fresh_events: list[Message] = []
         self.told: deque[Message] = deque(maxlen=EVENTS_KEPT)
         self.flying = {"law": flown.control.law, "scheme": flown.fdi.scheme}

@@ -1,7 +1,7 @@
-"""A sensor that is unlike those there is added to a copy of the package: by its row, and its presets.
+"""Sensors that are unlike those there are added to a copy of the package: by their rows, and presets.
 
-A radio altimeter measures in feet, five times a second. Nothing else of the copy is touched: scenarios,
-schema, log and the sensor monitor follow from the row.
+A radio altimeter measures in feet, five times a second. A vertical speed indicator has an equation of its
+own. Nothing else of the copy is touched: scenarios, schema, log and the sensor monitor follow from the rows.
 """
 
 import filecmp
@@ -22,13 +22,43 @@ class RadioAltimeter(_Sensor):
     """Height above the ground."""
 
 
+@_reads("mps", "m/s", 50)
+class VerticalSpeed(_Sensor):
+    """Rate of climb."""
+
+
 class Equal(NamedTuple):'''
 ROW = """    Row(
         "radio_altitude", RadioAltimeter, 500.0, truth=("position/h-agl-ft", 0.3048),
         column="radio_altitude_measured_m", rate_hz=5.0, equal=Equal("altitude", 0.5),
     ),
+    Row(
+        "vertical_speed", VerticalSpeed, 100.0, "vertical speed", truth=("velocities/h-dot-fps", 0.3048),
+        column="vertical_speed_measured_mps",
+    ),
 )
 """
+# An error of another sensor contradicts the altitude, or the flow, but not both.
+EQUATION = '''VERTICAL_TEST = N_EQUATIONS - 1
+VERTICAL = SENSOR_OF[VERTICAL_TEST]
+
+
+@kernel
+def judge_vertical_speed(mon, y):
+    """Judge h times the vertical speed by the change of the altitude, filtered, and by that of the flow."""
+    j, past = VERTICAL_TEST, mon.y_past
+    climbed = mon.h * past[VERTICAL]
+    mon.residual[j] = y[ALTITUDE] - past[ALTITUDE] - climbed
+    mon.per_s[j] = mon.per_s[CLIMB_TEST] + mon.e_past[VERTICAL]
+    mon.per_sample[j] = mon.per_sample[CLIMB_TEST]
+    filter_test(mon, j)
+    by_flow = abs(mon.y_pred[ALTITUDE] - past[ALTITUDE] - climbed) / (mon.h * mon.per_s[j])
+    mon.ratio[j] = min(mon.ratio[j], by_flow)
+
+
+@kernel
+def start_tests('''
+CALL = "    judge_vertical_speed(mon, y)\n    if mon.config.has_engine:\n"
 PRESET = "consumer-grade:\n  radio_altitude: {noise_std_ft: 0.5, bias_ft: 1.0, quantum_ft: 0.1}\n"
 FLIGHT = """
 import json, sys
@@ -67,6 +97,9 @@ def copied(tmp_path_factory):
     rows = package / "scenario" / "sensors.py"
     text = rows.read_text().replace("class Equal(NamedTuple):", ERRORS)
     rows.write_text(text.replace(")\n# The first rows:", ROW + "# The first rows:"))
+    equations = package / "diagnosis" / "monitors" / "redundancy.py"
+    text = equations.read_text().replace("@kernel\ndef start_tests(", EQUATION)
+    equations.write_text(text.replace("    if mon.config.has_engine:\n", CALL))
     presets = rows.with_name("presets.yaml")
     presets.write_text(presets.read_text().replace("consumer-grade:\n", PRESET))
     return root
@@ -80,6 +113,7 @@ BROKEN = {  # what happens, who is named, and how soon the alarm comes, s
     "bias": (fault("bias", magnitude=60.0), "radio_altitude", 0.2),
     "freeze": (fault("freeze"), "radio_altitude", 2.0),
     "altimeter": (fault("bias", sensor="altitude", magnitude=-18.0), "altitude", 0.2),
+    "vertical speed": (fault("bias", sensor="vertical_speed", magnitude=9.0), "vertical_speed", 1.0),
 }
 
 
@@ -95,7 +129,7 @@ def flown(copied):
     return json.loads(done.stdout)
 
 
-def test_two_files_are_touched(copied):
+def test_three_files_are_touched(copied):
     ours, package = Path(beaver_ftc.__path__[0]), copied / "beaver_ftc"
     touched = [
         path.relative_to(package).as_posix()
@@ -103,7 +137,9 @@ def test_two_files_are_touched(copied):
         if path.is_file() and "data" not in path.parts and "__pycache__" not in path.parts
         and not filecmp.cmp(path, ours / path.relative_to(package), shallow=False)
     ]  # fmt: skip
-    assert sorted(touched) == ["scenario/presets.yaml", "scenario/sensors.py"]
+    assert sorted(touched) == [
+        "diagnosis/monitors/redundancy.py", "scenario/presets.yaml", "scenario/sensors.py",
+    ]  # fmt: skip
 
 
 def test_it_is_read_at_its_own_rate_and_logged_in_metres(flown):

@@ -3,7 +3,7 @@ break.
 
 A sensor that is left out of a scenario's `sensors` measures perfectly. To add a sensor, add a row to ROWS,
 and what its presets are to `presets.yaml`: it is then read at its own rate, logged, broken by scenarios,
-and compared with the reading that it should equal. Nothing else has to be written.
+and compared with the reading that it should equal. Only an equation of its own has to be written besides.
 
 If an instrument breaks, the reading goes wrong, the aircraft does not. Magnitudes of its faults are in the
 unit in which `sensors` has the instrument.
@@ -180,9 +180,9 @@ class Row(NamedTuple):
     which a jump of its reading appears at once. words: another name of it in a scenario's faults. says: what
     it measures.
 
-    Only of a sensor that no equation of the diagnosis uses: truth is the JSBSim property that it measures,
-    and that property's unit in SI; column is its log column; rate_hz is how often it is read, 0 for every
-    JSBSim frame; equal is its redundancy.
+    Only of a sensor that the sensor monitor alone uses: truth is the JSBSim property that it measures, and
+    that property's unit in SI; column is its log column; rate_hz is how often it is read, 0 for every JSBSim
+    frame; equal is its redundancy, or test is the name of an equation of its own.
     """
 
     name: str

@@ -7,14 +7,14 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from beaver_ftc.diagnosis import SensorMonitor
-from beaver_ftc.diagnosis.monitors import COMPARISON_ROUNDING, N_EQUATIONS, RPM_TEST
+from beaver_ftc.diagnosis.monitors import COMPARISON_ROUNDING, RPM_TEST
 from beaver_ftc.plant import SENSORS
 from beaver_ftc.results import Document
 from beaver_ftc.scenario import sensor_words
 from beaver_ftc_assurance.certificates.check_certificate import TESTS
 
 BECAUSE_BETWEEN_ROWS = "instruments raised it between two rows of the log"
-BECAUSE_NO_EQUATION = "a sensor raised it that no equation of the diagnosis uses"
+BECAUSE_NO_EQUATION = "a sensor raised it that no equation of the checker uses"
 ROUNDING_SHARE = 1e-13  # of a limit: a smaller number is rounding
 
 
@@ -27,7 +27,7 @@ def alarm_evidence(monitor: SensorMonitor, rows: Mapping[str, np.ndarray], k: in
     residual of the test adds up: (reading, prediction, largest difference with sound instruments).
     """
     number, failed = monitor.worst_test_index, monitor.top_ratio > 1.0
-    if failed and number >= N_EQUATIONS:
+    if failed and number >= len(TESTS):
         return {"because": BECAUSE_NO_EQUATION}
     if failed:
         compared = [comparison for comparison in _comparisons(monitor) if any(comparison)]

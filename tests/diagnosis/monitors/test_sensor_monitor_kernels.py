@@ -55,7 +55,7 @@ def flown(readings, true, missing=None, air=None, **fields):
     measured, pred = (np.zeros(1, dtype).view(np.recarray)[0] for dtype in (MEASURED, prediction_dtype(4)))
     error = (readings - true)[:, :3]
     for k, y in enumerate(readings):
-        measured["signal"], measured["force"], measured["inertial"] = y, y[AX:], 1
+        measured["signal"], measured["force"], measured["inertial"] = y, y[AX : AX + 3], 1
         if missing is not None and k >= FROM:
             measured["missing"][missing] = 1
         if k % n == 0:

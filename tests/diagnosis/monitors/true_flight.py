@@ -18,8 +18,10 @@ from beaver_ftc.plant.instruments import ALTITUDE, AX, ENGINE_SPEED, MANIFOLD, N
 
 GRAVITY = 9.8
 DOWN = np.array([0.0, 0.0, GRAVITY])
+FORCES = slice(AX, AX + 3)
 # Errors of each sensor, SI
-UNITS = np.array([0.02, 0.02, 0.02, 0.01, 0.01, 1, 30, 0.01, 0.01, 0.01, 5, 10, 0.5, 0.5, 0.5, 0.5])
+UNITS = np.full(N_SENSORS, 0.5)
+UNITS[:MANIFOLD] = 0.02, 0.02, 0.02, 0.01, 0.01, 1, 30, 0.01, 0.01, 0.01, 5, 10
 
 
 def true_flight(rng, n, h, swiftly=True, theta=(-0.2, 0.3)):
@@ -42,7 +44,7 @@ def true_flight(rng, n, h, swiftly=True, theta=(-0.2, 0.3)):
         signal[k, [I_ALPHA, I_BETA, I_AIRSPEED]] = np.arctan2(body[2], body[0]), np.arcsin(body[1] / V), V
         signal[k, I_QDYN], signal[k, ALTITUDE] = 0.5 * 1.1 * air * V * V, altitude  # on a cold day
         signal[k, [ENGINE_SPEED, MANIFOLD]] = 1800.0, 20.0
-        signal[k, AX:] = motion[3:] - turn.inv().apply(DOWN)
+        signal[k, FORCES] = motion[3:] - turn.inv().apply(DOWN)
         v = v + h * (1.5 * now - 0.5 * (now if before is None else before))
         altitude -= h * np.dot((23.0, -16.0, 5.0), moved)[2] / 12.0
         moved, before, rate = [v, *moved[:2]], now, np.linalg.norm(motion[:3])
@@ -62,7 +64,7 @@ def new_monitor(h, e_zero=0.0, const=0.0, **fields):
 
 def compared(monitor, readings):
     """Ratios and residuals of the tests after each sample but the first; errors from the start are judged."""
-    redundancy.start_tests(monitor, readings[0], readings[0, AX:])
+    redundancy.start_tests(monitor, readings[0], readings[0, FORCES])
     initial_errors.start_bounds(monitor, readings[0])
     for y in readings[1:]:
         redundancy.run_tests(monitor, y, np.ones(1, int))
@@ -70,4 +72,4 @@ def compared(monitor, readings):
         monitor["exceeded"] |= monitor["ratio"] > 1.0
         initial_errors.latch_refuted(monitor, monitor["exceeded"])
         yield monitor["ratio"].copy(), monitor["residual"].copy()
-        redundancy.store_sample(monitor, y, y[AX:])
+        redundancy.store_sample(monitor, y, y[FORCES])

@@ -7,20 +7,20 @@ reading.
 import numpy as np
 
 from beaver_ftc.plant.instruments import PHI, SENSORS, SIGNALS
-from beaver_ftc.scenario.sensors import ROWS
+from beaver_ftc.scenario.sensors import N_IN_EQUATIONS, ROWS
 
+_NAMED = [row.test for row in ROWS]
 # The tests by number. Each test is named by the sensor (scenario/sensors.py) whose jump it shows at once. The
-# tests of turning about the axes follow each other, and those of phi, theta, psi.
+# tests of turning about the axes follow each other, and those of phi, theta, psi. The tests that rows of
+# sampled sensors name come last.
 TEST_NAMES = (
     "roll", "pitch", "yaw", "bank angle", "pitch angle", "heading", "speed", "incidence", "sideslip",
     "density", "climb", "engine speed", "manifold pressure",
+    *filter(None, _NAMED[N_IN_EQUATIONS:]),
 )  # fmt: skip
 N_EQUATIONS = len(TEST_NAMES)  # then the tests of sensors that should equal another reading
-TURN_TEST, ANGLE_TEST = TEST_NAMES.index("roll"), TEST_NAMES.index("bank angle")
-SPEED_TEST, ALPHA_TEST, BETA_TEST, DENSITY_TEST, CLIMB_TEST, RPM_TEST, PRESSURE_TEST = range(
-    TEST_NAMES.index("speed"), N_EQUATIONS
-)
-_NAMED = [row.test for row in ROWS]
+TURN_TEST, ANGLE_TEST = 0, 3
+SPEED_TEST, ALPHA_TEST, BETA_TEST, DENSITY_TEST, CLIMB_TEST, RPM_TEST, PRESSURE_TEST = range(6, 13)
 SENSOR_OF = tuple(_NAMED.index(name) for name in TEST_NAMES)
 DUPLICATES = tuple((SENSORS.index(row.name), row.equal) for row in ROWS if row.equal is not None)
 N_TESTS = N_EQUATIONS + len(DUPLICATES)

@@ -397,7 +397,7 @@ def start_tests(mon, y, force):
     mon.a_size[:2] = length(mon.a) + FORCE_JUMP_M_S2
     mon.e_first = AB_PAST * FORCE_JUMP_M_S2
     bound_residuals(mon, y)
-    restart_tests(mon, RPM_TEST)
+    restart_tests(mon, N_EQUATIONS)
 
 
 @kernel

@@ -12,6 +12,7 @@ and that test is within its bound.
                                                         other test
     climb                  altitude                     any other test
     engine                 the sensor of the test
+    equation of a row      the sensor of the row
     equal                  the sensor, the reading      that reading's own test
                            that it should equal
     any                    alpha, beta, airspeed, phi,  the tests that an error from the start does not

@@ -71,7 +71,7 @@ from beaver_ftc.scenario.faults import Button, Past, Properties, Switched, const
 class Overdrive(Switched):
     """The surface moves too far, the more so the more it has moved."""
 
-    follows_actuator, size = True, ("by", "%")
+    follows_surface, size = True, ("by", "%")
     in_words = constant(growth_per_deg=lambda value: f"{100 * value:g} % more with each degree")
     examples = (("worn feedback", {"growth_per_deg": 0.01}),)
     button = Button(8, "wear", {"growth_per_deg": 0.02})
@@ -80,10 +80,10 @@ class Overdrive(Switched):
     actuator: Actuator = entry(..., "the surface that fails")
     growth_per_deg: Number = number(..., "share of 1", "more with each degree", gt=0, le=1, examples=[0.02])
 
-    def follow(self, past: Past, actuator_rad: float) -> None:
-        was_rad = past.kept.get("was_rad", actuator_rad)
-        past.kept["travel_rad"] = past.kept.get("travel_rad", 0.0) + abs(actuator_rad - was_rad)
-        past.kept["was_rad"] = actuator_rad
+    def follow(self, past: Past, position_rad: float) -> None:
+        was_rad = past.kept.get("was_rad", position_rad)
+        past.kept["travel_rad"] = past.kept.get("travel_rad", 0.0) + abs(position_rad - was_rad)
+        past.kept["was_rad"] = position_rad
 
     def strike(self, of: Properties, share: float, past: Past) -> None:
         of["effectiveness"] *= 1.0 + min(self.growth_per_deg * degrees(past.kept["travel_rad"]), 1.0)

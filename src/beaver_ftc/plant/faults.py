@@ -76,17 +76,17 @@ class _Event:
             return self.first
         if k >= self.last:
             return NEVER
-        changes = k < self.grown or getattr(self.fault, "follows_actuator", False)
+        changes = k < self.grown or getattr(self.fault, "follows_surface", False)
         return min(k + 1 if changes else NEVER, self.last)
 
-    def note(self, k: int, actuator_rad: Callable[[str], float]) -> None:
-        """Bring the fault's memory to frame k; actuator_rad: where the actuator of a surface is now."""
+    def note(self, k: int, position_rad: Callable[[str], float]) -> None:
+        """Bring the fault's memory to frame k; position_rad: where a surface is now."""
         if not self.in_force(k) or not isinstance(self.fault, SurfaceFault):
             return
         if self.fault.stays_where_it_is and not self.struck:
-            self.past.at_rad = actuator_rad(place_of(self.fault))
-        if self.fault.follows_actuator and k > self.followed:
-            self.fault.follow(self.past, actuator_rad(place_of(self.fault)))
+            self.past.at_rad = position_rad(place_of(self.fault))
+        if self.fault.follows_surface and k > self.followed:
+            self.fault.follow(self.past, position_rad(place_of(self.fault)))
         self.struck, self.followed = True, k
 
 
@@ -145,7 +145,7 @@ class FaultSchedule(_Schedule):
     def apply(self, k: int) -> None:
         """Bring the aircraft's failures to frame k. Call it before that frame's runs; again is harmless."""
         for event in self._events:
-            event.note(k, self._actuator_rad)
+            event.note(k, self._position_rad)
         wanted = self._wanted(k)
         changed = {name: value for name, value in wanted.items() if self._written.get(name) != value}
         for name, value in changed.items():
@@ -154,7 +154,7 @@ class FaultSchedule(_Schedule):
         if changed and k == 0:
             self._plant.settle()  # nothing runs before frame 0 is read: its accelerations must show the fault
 
-    def _actuator_rad(self, surface: str) -> float:
+    def _position_rad(self, surface: str) -> float:
         return self._plant.read(self._plant.aircraft.surface[surface].position)
 
     def _wanted(self, k: int) -> dict[str, float]:

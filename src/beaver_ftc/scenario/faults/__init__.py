@@ -51,8 +51,8 @@ class Hidden(NamedTuple):
 
 @dataclass
 class Past:
-    """The memory of one fault in one flight. at_rad: where the actuator was when the fault struck. kept: what
-    a row that follows its actuator keeps."""
+    """The memory of one fault in one flight. at_rad: position of the surface when the fault struck, with the
+    offsets of all faults. kept: what a row that follows its surface keeps."""
 
     at_rad: float = 0.0
     kept: dict[str, float] = field(default_factory=dict)
@@ -65,8 +65,8 @@ class SurfaceFault(Section):
     properties: ClassVar[tuple[tuple[str, float], ...]] = ()  # those it changes, with their healthy values
     holds: ClassVar[str] = ""  # the property that, other than 0, keeps a surface from following its command
     adds: ClassVar[bool] = True  # whether a second one of the like changes anything
-    stays_where_it_is: ClassVar[bool] = False  # whether it must be known where the actuator was
-    follows_actuator: ClassVar[bool] = False  # whether `follow` is called in every frame
+    stays_where_it_is: ClassVar[bool] = False  # whether it must be known where the surface was
+    follows_surface: ClassVar[bool] = False  # whether `follow` is called in every frame
     truth: ClassVar[str] = ""  # the property that an estimate is of, as its difference from the healthy value
     masks: ClassVar[tuple[str, ...]] = ()  # types that do not act on a surface where this one is in force
     replaces_like: ClassVar[bool] = False  # of two of this type the later acts; else the earlier does
@@ -108,8 +108,9 @@ class SurfaceFault(Section):
         """Change the failure properties of its place, given how far it has grown (0 to 1) and its memory."""
         raise NotImplementedError
 
-    def follow(self, past: Past, actuator_rad: float) -> None:
-        """Take in where the actuator is as a frame begins in which the fault is in force."""
+    def follow(self, past: Past, position_rad: float) -> None:
+        """Take in the position of the surface as a frame begins in which the fault is in force: that of the
+        actuator with the offsets of all faults, this fault's own among them."""
 
 
 class Switched(SurfaceFault):

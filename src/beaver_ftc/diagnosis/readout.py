@@ -308,28 +308,6 @@ def disable_diagnosis(fdi: np.void) -> None:
     fdi["config"]["enabled"] = fdi["sensor_monitor"]["config"]["enabled"] = False
 
 
-def frame_arrays(fdi: np.void, n_estimators: int, diagnoses_all_types: bool) -> dict[str, np.ndarray]:
-    """The arrays of which a certificate wants every frame, not copies.
-
-    eta_bar, noise: as of `DeclaredBounds`. offset, slope, spread (n_estimators, 3): effect of each
-    hypothesis' fault. excluded, types: what is excluded. Of faults of every type: least and greatest order to
-    each surface, and position of a healthy one, rad.
-    """
-    est, srf = fdi["isolation"]["estimator"][:n_estimators], fdi["types"]["surface"]
-    arrays = {
-        "eta_bar": fdi["bound"]["eta_bar"], "noise": fdi["bound"]["n_gyro"],
-        "offset": est["effect"]["h"],
-        "slope": est["effect"]["Z"],
-        "spread": est["effect"]["r"], "excluded": est["excluded"],
-        "types": srf["sets"]["excluded"],
-    }  # fmt: skip
-    if diagnoses_all_types:
-        cmd = srf["commands"]
-        arrays |= {"command_low": cmd["cmd_min"], "command_high": cmd["cmd_max"]}
-        arrays |= {"least": cmd["u_min"], "greatest": cmd["u_max"]}
-    return arrays
-
-
 # State, covariances and inputs of a filter of the statistical detector, of which a certificate wants the
 # frames up to the alarm.
 RECORDED_BLOCK_FIELDS = (
@@ -339,22 +317,35 @@ RECORDED_BLOCK_FIELDS = (
 )  # fmt: skip
 
 
-def alarm_arrays(fdi: np.void, n_estimators: int, has_statistical_detector: bool) -> dict[str, np.ndarray]:
-    """The arrays of which a certificate wants the frames up to the alarm, not copies.
+def certificate_arrays(
+    fdi: np.void, n_estimators: int, diagnoses_all_types: bool, has_statistical_detector: bool
+) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """The arrays of which a certificate wants every frame, and those of which it wants the frames up to the
+    alarm; not copies.
 
-    reach_low, reach_high: what each hypothesis' fault can have done to the detection filters. Of the
-    statistical detector: RECORDED_BLOCK_FIELDS of each filter, signatures of its hypotheses, what is bounded
-    besides, and the gust as the vanes see it.
+    offset, slope, spread (n_estimators, 3): effect of each hypothesis' fault. excluded, types: what is
+    excluded. Of faults of every type: least and greatest order to each surface, and position of a healthy
+    one, rad. Up to the alarm: reach_low, reach_high: what each hypothesis' fault can have done to the
+    detection filters. Of the statistical detector: RECORDED_BLOCK_FIELDS of each filter, signatures of its
+    hypotheses, what is bounded besides, and the gust as the vanes see it.
     """
-    est = fdi["isolation"]["estimator"][:n_estimators]
-    arrays = {"reach_low": est["reach_lo"], "reach_high": est["reach_hi"]}
+    est, srf = fdi["isolation"]["estimator"][:n_estimators], fdi["types"]["surface"]
+    always = {
+        "offset": est["effect"]["h"], "slope": est["effect"]["Z"], "spread": est["effect"]["r"],
+        "excluded": est["excluded"], "types": srf["sets"]["excluded"],
+    }  # fmt: skip
+    if diagnoses_all_types:
+        cmd = srf["commands"]
+        always |= {"command_low": cmd["cmd_min"], "command_high": cmd["cmd_max"]}
+        always |= {"least": cmd["u_min"], "greatest": cmd["u_max"]}
+    early = {"reach_low": est["reach_lo"], "reach_high": est["reach_hi"]}
     if has_statistical_detector:
         stat = fdi["statistical"]
         blk, gust = stat["block"], stat["gust"]["output"]
-        arrays |= {name: blk[name] for name in RECORDED_BLOCK_FIELDS}
-        arrays |= {"signature": blk["hypothesis"]["signature"], "bounded": stat["rows"]["eta"][0, :3]}
-        arrays |= {"air": gust["acc_mean"], "leap": gust["var_turn"]}
-    return arrays
+        early |= {name: blk[name] for name in RECORDED_BLOCK_FIELDS}
+        early |= {"signature": blk["hypothesis"]["signature"], "bounded": stat["rows"]["eta"][0, :3]}
+        early |= {"air": gust["acc_mean"], "leap": gust["var_turn"]}
+    return always, early
 
 
 def alarm_flags(fdi: np.void) -> tuple[np.int64, np.int64]:

@@ -24,8 +24,7 @@ if TYPE_CHECKING:
         command_power,
         end_outer_loops,
         hold_from_start,
-        recorded_always,
-        recorded_until_alarm,
+        recorded_arrays,
         set_ground,
         stop_diagnosis,
     )

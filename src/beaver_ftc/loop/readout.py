@@ -162,18 +162,11 @@ def alarm_flags(frame: np.void) -> tuple[np.int64, np.int64]:
     return of_diagnosis.alarm_flags(frame["fdi"])
 
 
-def recorded_always(frame: np.void, n: int, diagnoses_all_types: bool) -> dict[str, np.ndarray]:
-    """The arrays of which a certificate wants every frame, not copies: measured rates x and the model's
-    acceleration, rad/s and rad/s2; the rest, and n and diagnoses_all_types: as
-    `diagnosis.readout.frame_arrays`."""
-    means = frame["prediction"]["means"]
-    own = {"x": frame["measured"]["x"], "model": means["F"]}
-    return own | of_diagnosis.frame_arrays(frame["fdi"], n, diagnoses_all_types)
-
-
-def recorded_until_alarm(frame: np.void, n: int, statistical: bool) -> dict[str, np.ndarray]:
-    """Those of which it wants the frames up to the alarm: see `diagnosis.readout.alarm_arrays`."""
-    return of_diagnosis.alarm_arrays(frame["fdi"], n, statistical)
+def recorded_arrays(
+    frame: np.void, n: int, diagnoses_all_types: bool, statistical: bool
+) -> tuple[dict[str, np.ndarray], ...]:
+    """The arrays that a certificate wants: see `diagnosis.readout.certificate_arrays`."""
+    return of_diagnosis.certificate_arrays(frame["fdi"], n, diagnoses_all_types, statistical)
 
 
 def switch_statistical_tests(frame: np.void, enabled: bool) -> None:

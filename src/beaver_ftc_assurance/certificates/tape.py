@@ -17,8 +17,7 @@ from beaver_ftc.loop import (
     copy_memory,
     fly,
     give_back_memory,
-    recorded_always,
-    recorded_until_alarm,
+    recorded_arrays,
     take_memory,
 )
 from beaver_ftc.scenario import Scenario
@@ -34,12 +33,10 @@ class Tape:
     """Frames `first` to `first + frames - 1` of the flight, rows of its log.
 
     alarm, last: the flight at the alarm and at its end. since: the frame with which the diagnosis began.
-    kept, by frame: measured rates x (3,) rad/s; acceleration of the design model and its bound eta_bar (3,)
-    rad/s2; noise (3,) rad/s, the change of a gyro's error within the frame; of each isolation estimator the
-    offset (rad/s2), slope and spread (rad/s2 per unit of its parameter) of its fault's effect
-    (estimators, 3). filters: the filter states of the statistical detector, by frame up to the alarm.
-    reach_low, reach_high (estimators, poles, 4): bounds on the effect of a fault in the filters before the
-    first frame.
+    kept, by frame: of each isolation estimator the offset (rad/s2), slope and spread (rad/s2 per unit of its
+    parameter) of its fault's effect (estimators, 3); what is excluded; the orders to the surfaces. filters:
+    the filter states of the statistical detector, by frame up to the alarm. reach_low, reach_high
+    (estimators, poles, 4): bounds on the effect of a fault in the filters before the first frame.
     """
 
     first: int
@@ -100,11 +97,12 @@ class Recorder:
         numbers = take_memory((1,), frames.dtype)
         _words_of(numbers)[:] = np.arange(frames.nbytes // 8)
         config, n = self._scenario.fdi, len(FrameReadout(frames[0]).diagnosis.estimators)
-        self._always = _RecordWords(recorded_always(numbers[0], n, config.fault_class == "all"))
-        self._early = _RecordWords(recorded_until_alarm(numbers[0], n, config.statistical is not None))
+        every_type, statistical = config.fault_class == "all", config.statistical is not None
+        arrays = recorded_arrays(numbers[0], n, every_type, statistical)
+        self._always, self._early = map(_RecordWords, arrays)
         self._state = np.array([0, -1, 0, *alarm_flags(numbers[0])])
         give_back_memory(numbers)
-        ring = 1 + (FRAMES_BEFORE_ALARM if config.statistical is None else STATISTICAL_FRAMES_BEFORE_ALARM)
+        ring = 1 + (STATISTICAL_FRAMES_BEFORE_ALARM if statistical else FRAMES_BEFORE_ALARM)
         self._ring = np.empty((ring, len(self._early.words)), np.int64)
         self._kept = np.empty((ring + MAX_FRAMES_AFTER_ALARM, len(self._always.words)), np.int64)
         self._frames, self._alarm = frames, copy_memory(frames)

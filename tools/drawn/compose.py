@@ -28,7 +28,8 @@ from tools.drawn.factors import (
     together,
 )
 from tools.drawn.ranges import DECLARED_ONLY, RANGES, size_of_sensor_fault
-from tools.drawn.walk import Circumstances, Node, Undrawable, Walk, log_uniform
+from tools.drawn.walk import Circumstances, Undrawable, Walk, log_uniform
+from tools.schema import Node, inlined
 
 SHORTEST_S, LONGEST_S = 3.0, 6.0
 RATES_HZ = {"slow": (20, 40), "usual": (50, 150), "fast": (200, 500)}
@@ -68,7 +69,7 @@ class Drawn:
 
 def drawn_flights(seed: int, aircraft: Sequence[str], kinds: Sequence[Kind] = KINDS) -> Iterator[Drawn]:
     """One covering array after the other, without end. Flight I of a seed is always the same."""
-    schema, index, arrays = json_schema(), 0, 0
+    schema, index, arrays = inlined(json_schema()), 0, 0
     keys = tuple(keys_of(schema))
     while True:
         kind = kinds[arrays % len(kinds)]
@@ -111,7 +112,7 @@ class Composer:
         self._schema, self._row, self._rng, self._declared = schema, row, rng, declared
         self._aircraft = _airframe(row["aircraft"])
         self._now = Circumstances(rng, self._aircraft, float(rng.uniform(SHORTEST_S, LONGEST_S)))
-        self._walk = Walk(schema, DECLARED_ONLY if declared else RANGES, self._now)
+        self._walk = Walk(DECLARED_ONLY if declared else RANGES, self._now)
 
     def words(self) -> Words:
         """As in a file."""

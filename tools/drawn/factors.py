@@ -14,7 +14,8 @@ import yaml
 from beaver_ftc.plugins import DETECTORS, LAWS, OURS, registered
 from tools.drawn.array import Factor, Forbidden
 from tools.drawn.ranges import DECLARED_ONLY, RANGES
-from tools.drawn.walk import NEVER, Node
+from tools.drawn.walk import NEVER
+from tools.schema import Node
 
 LEFT_OUT, DRAWN = "-", "drawn"
 TOGETHER = Path(__file__).with_name("together.yaml")
@@ -35,41 +36,39 @@ def factors_of(schema: Node, aircraft: Sequence[str], declared: bool) -> list[Fa
     of_keys = [
         Factor(path, (LEFT_OUT, *levels))
         for path, node in keys_of(schema)
-        if path not in SPOKEN_FOR and ranges.of(path) != NEVER and (levels := levels_of(schema, node))
+        if path not in SPOKEN_FOR and ranges.of(path) != NEVER and (levels := levels_of(node))
     ]
     return [*_own(schema, aircraft), *of_keys]
 
 
-def keys_of(schema: Node, node: Node | None = None, path: str = "") -> Iterator[tuple[str, Node]]:
+def keys_of(node: Node, path: str = "") -> Iterator[tuple[str, Node]]:
     """(path, schema) of every key that is a factor by itself."""
-    for name, below in (node or schema)["properties"].items():
-        inside, here = section_of(schema, below), f"{path}.{name}" if path else name
+    for name, below in node["properties"].items():
+        inside, here = section_of(below), f"{path}.{name}" if path else name
         if inside and here not in WHOLE and (not path or here in DEEPER):
-            yield from keys_of(schema, inside, here)
+            yield from keys_of(inside, here)
         else:
             yield here, below
 
 
-def section_of(schema: Node, node: Node) -> Node | None:
+def section_of(node: Node) -> Node | None:
     """The keys under a key that has nothing but keys under it."""
-    forms = [form for form in forms_of(schema, node) if form.get("type") != "null"]
+    forms = [form for form in forms_of(node) if form.get("type") != "null"]
     return forms[0] if len(forms) == 1 and "properties" in forms[0] and "anyOf" not in forms[0] else None
 
 
-def forms_of(schema: Node, node: Node) -> list[Node]:
-    """What may stand there, references followed."""
-    while "$ref" in node:
-        node = schema["$defs"][node["$ref"].rpartition("/")[2]]
+def forms_of(node: Node) -> list[Node]:
+    """What may stand there."""
     inside = node.get("anyOf") or node.get("oneOf")
     if not inside or "properties" in node:
         return [node]
-    return [form for one in inside for form in forms_of(schema, one)]
+    return [form for one in inside for form in forms_of(one)]
 
 
-def levels_of(schema: Node, node: Node) -> tuple[str, ...]:
+def levels_of(node: Node) -> tuple[str, ...]:
     """Values of an enumeration, true and false, or `drawn`."""
     levels: list[str] = []
-    for form in forms_of(schema, node):
+    for form in forms_of(node):
         if form.get("type") == "boolean":
             levels += ["true", "false"]
         elif "enum" in form:
@@ -107,19 +106,19 @@ def registered_of(group: str) -> tuple[str, ...]:
 
 def severities(schema: Node) -> tuple[str, ...]:
     """Of turbulence."""
-    return levels_of(schema, schema["$defs"]["Environment"]["properties"]["severity"])
+    return levels_of(schema["$defs"]["Environment"]["properties"]["severity"])
 
 
 def fault_types(schema: Node) -> dict[str, Node]:
     """Fault type of a surface, or of the aircraft -> its schema; not damage, which none of these declares."""
-    variants = forms_of(schema, schema["properties"]["faults"]["items"])
+    variants = forms_of(schema["properties"]["faults"]["items"])
     of_ours = (one for one in variants if not {"sensor", "case"} & one["properties"].keys())
     return {one["properties"]["type"]["const"]: one for one in of_ours}
 
 
 def sensor_fault_types(schema: Node) -> dict[str, Node]:
     """Fault type of an instrument -> its schema."""
-    variants = forms_of(schema, schema["properties"]["faults"]["items"])
+    variants = forms_of(schema["properties"]["faults"]["items"])
     return {one["properties"]["type"]["const"]: one for one in variants if "sensor" in one["properties"]}
 
 

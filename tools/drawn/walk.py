@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-Node = Mapping[str, Any]
+from tools.schema import Node
+
 Random = np.random.Generator
 GIVEN_SHARE = 0.3  # of the keys of a section that may be left out
 FACTOR = 2.0  # a number with a positive default is drawn within this factor of it
@@ -47,8 +48,7 @@ class Undrawable(Exception):
 class Walk:
     """Draws from a schema."""
 
-    def __init__(self, schema: Node, ranges: Ranges, now: Circumstances) -> None:
-        self._definitions = schema.get("$defs", {})
+    def __init__(self, ranges: Ranges, now: Circumstances) -> None:
         self._ranges, self.now = ranges, now
 
     def value(self, node: Node, path: str) -> Any:
@@ -56,7 +56,6 @@ class Walk:
         ranged = self._ranges.of(path)
         if callable(ranged):
             return ranged(self.now, path)
-        node = self.resolved(node)
         if "const" in node:
             return node["const"]
         if "enum" in node:
@@ -68,12 +67,6 @@ class Walk:
         if given:
             return self.value(given[self.now.rng.integers(len(given))], path)
         return self._by_type(node, path)
-
-    def resolved(self, node: Node) -> Node:
-        """With a reference followed."""
-        while "$ref" in node:
-            node = self._definitions[node["$ref"].rpartition("/")[2]]
-        return node
 
     def _by_type(self, node: Node, path: str) -> Any:
         kind = node.get("type")

@@ -6,8 +6,8 @@ from math import ceil, floor
 from typing import Any
 
 from beaver_ftc.results.log import unit_of
+from tools.schema import Node, inlined
 
-Node = Mapping[str, Any]
 Path = tuple[str, ...]
 NAME, ITEM = "NAME", "[]"  # in a path: any name, an item of a list
 NUMBERS = ("number", "integer")
@@ -111,9 +111,8 @@ class Sections:
     """Every section of a schema, by its title, in the order in which a reader meets them."""
 
     def __init__(self, schema: Node) -> None:
-        self._definitions = schema.get("$defs", {})
         self.found: dict[str, Section] = {}
-        self._meet(schema["title"], schema, Place(()))
+        self._meet(schema["title"], inlined(schema), Place(()))
 
     def __iter__(self) -> Iterator[Section]:
         return iter(self.found.values())
@@ -126,36 +125,33 @@ class Sections:
             self.found[title] = Section(title, node.get("description", ""), made)
         self.found[title].places.append(place)
         for name, of in keys:
-            for below in self._below(of, (*place.path, name)):
+            for below in _below(of, (*place.path, name)):
                 self._meet(*below[1:], Place(below[0], of.get("unit", "") or place.unit))
 
     def _key(self, name: str, node: Node, required: bool) -> Key:
-        sections = tuple(dict.fromkeys(title for _, title, _ in self._below(node, ())))
-        return Key(name, node, tuple(self._forms(node)), required, sections)
+        sections = tuple(dict.fromkeys(title for _, title, _ in _below(node, ())))
+        return Key(name, node, tuple(_forms(node)), required, sections)
 
-    def _forms(self, node: Node) -> Iterator[Node]:
-        """What may stand here, references followed."""
-        if "$ref" in node:
-            yield from self._forms(self._definitions[node["$ref"].rpartition("/")[2]])
-        elif branches := _branches(node):
-            for branch in branches:
-                yield from self._forms(branch)
-        elif node.get("type") != "null":
-            inner = {key: {"anyOf": [*self._forms(of)]} for key, of in _inner(node)}
-            yield {**node, **inner}
 
-    def _below(self, node: Node, path: Path) -> Iterator[tuple[Path, str, Node]]:
-        """(path, title, schema) of each section in what may stand here."""
-        if "$ref" in node:
-            title = node["$ref"].rpartition("/")[2]
-            yield from self._below({**self._definitions[title], "title": title}, path)
-        elif node.get("properties"):
-            yield path, node["title"], node
-        else:
-            for branch in _branches(node):
-                yield from self._below({"title": node.get("title"), **branch}, path)
-            for key, of in _inner(node):
-                yield from self._below(of, (*path, ITEM if key == "items" else NAME))
+def _forms(node: Node) -> Iterator[Node]:
+    """What may stand here."""
+    if branches := _branches(node):
+        for branch in branches:
+            yield from _forms(branch)
+    elif node.get("type") != "null":
+        inner = {key: {"anyOf": [*_forms(of)]} for key, of in _inner(node)}
+        yield {**node, **inner}
+
+
+def _below(node: Node, path: Path) -> Iterator[tuple[Path, str, Node]]:
+    """(path, title, schema) of each section in what may stand here."""
+    if node.get("properties"):
+        yield path, node["title"], node
+    else:
+        for branch in _branches(node):
+            yield from _below({"title": node.get("title"), **branch}, path)
+        for key, of in _inner(node):
+            yield from _below(of, (*path, ITEM if key == "items" else NAME))
 
 
 def _branches(node: Node) -> list[Node]:

@@ -60,11 +60,16 @@ def beaver(*arguments: str, cwd: Path, longest_s: float | None = None) -> subpro
     )
 
 
-def picture(name: str, says: str, content: bytes) -> str:
-    """Save a picture beside the pages, and return the line that shows it."""
+def picture(name: str, says: str, content: Any, **how: Any) -> str:
+    """Save a picture beside the pages, and return the line that shows it. content: of a file, or a figure,
+    drawn as `how` says; the same figure gives the same bytes."""
     path = Path("images", name)
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(content)
+    if isinstance(content, bytes):
+        path.write_bytes(content)
+    else:
+        stamps = ("Date", "Creator") if path.suffix == ".svg" else ("Software",)
+        content.savefig(path, metadata=dict.fromkeys(stamps), **how)
     return f"![{says}]({path.as_posix()})"
 
 

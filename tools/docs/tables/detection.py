@@ -1,14 +1,12 @@
 """Figures of docs/explanation/detection.md and isolation.md, from one built-in flight."""
 
 from functools import cache
-from io import BytesIO
 from itertools import pairwise
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from scipy.signal import lfilter
 
 import beaver_ftc as bf
@@ -59,7 +57,7 @@ def residual_and_threshold() -> str:
             _draw_filter(axis, pole)
         axes[1].set_xlabel("time since the fault, s")
         figure.subplots_adjust(left=0.1, right=0.84, top=0.95, bottom=0.1, hspace=0.25)
-        return _saved(figure, "residual-and-threshold", "Residual and threshold about the fault")
+        return picture("residual-and-threshold.svg", "Residual and threshold about the fault", figure)
 
 
 def _draw_filter(axis: Axes, pole_per_s: float) -> None:
@@ -126,11 +124,4 @@ def feasible_set() -> str:
         axis.set_ylim(0.0, 32.0)
         axis.set_xlim(0.0, SHOWN_S)
         figure.subplots_adjust(left=0.09, right=0.98, top=0.96, bottom=0.16)
-        return _saved(figure, "feasible-set", "The feasible set of the loss shrinks")
-
-
-def _saved(figure: Figure, name: str, says: str) -> str:
-    drawn = BytesIO()
-    figure.savefig(drawn, format="svg", metadata={"Date": None, "Creator": None})
-    plt.close(figure)
-    return picture(f"{name}.svg", says, drawn.getvalue())
+        return picture("feasible-set.svg", "The feasible set of the loss shrinks", figure)

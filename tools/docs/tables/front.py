@@ -10,7 +10,7 @@ from beaver_ftc.results.style import marks
 from beaver_ftc.results.views import Panel, Trace, View, series_of
 from beaver_ftc.results.writer import run
 from beaver_ftc.scenario.schema import load_scenario
-from tools.docs.pictures import lighten
+from tools.docs.tables import picture
 
 SPAN_S = (6.0, 24.0)
 VIEW = View(
@@ -46,7 +46,5 @@ def first_figure() -> str:
         metrics = Metrics.of(run(load_scenario(VIEW.name), Path(folder), report=False))
         series = series_of(StoredLog(Path(folder, VIEW.name, "log.parquet")), VIEW.columns, SPAN_S)
     said = "detected, isolated, and pitch handed over to the flap"
-    path = Path("images", f"{VIEW.name}.png")
-    path.parent.mkdir(exist_ok=True)
-    draw(VIEW, series, marks(metrics), said).savefig(path, metadata={"Software": "beaver-ftc"})
-    return f"![Pitch rate, residual and surfaces of the published elevator case]({lighten(path).as_posix()})"
+    says = "Pitch rate, residual and surfaces of the published elevator case"
+    return picture(f"{VIEW.name}.png", says, draw(VIEW, series, marks(metrics), said))

@@ -8,15 +8,15 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.figure import Figure
 
 from beaver_ftc.studies.present.tables import markdown_table
 from beaver_ftc_aircraft.gtm.steady import Bench, Condition, Steady
-from tools.docs.tables import aside, shared
+from tools.docs.tables import aside, picture, shared
 from tools.gtm import flights
 from tools.gtm.flights import ADAMS_BASHFORTH, FINE_S, MOTION
 from tools.gtm.specification import SURFACES, Specification, axes_of
 
-PICTURE = "images/gtm-flights.png"
 SPEEDS_KT = (46, 55, 65, 75, 85, 95, 105, 115, 130)
 ALPHAS_DEG = (2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16)
 BETWEEN_DEG = (3.0, 5.0, 7.0, 8.5, 9.5, 10.5, 11.5)
@@ -86,13 +86,12 @@ def gtm_flights() -> str:
         differ = [100.0 * flights.largest(mine, other)[MOTION].max() for other in (fine, usual, source)]
         rows.append([name, *(f"{share:.2f}" for share in differ)])
     head = ("flight", "integrator 1 kHz, %", "integrator 200 Hz, %", "gravity, %")
-    _draw()
     alt = "Airspeed and body rates of eight flights: specification and JSBSim at 1 kHz"
     table = aside("gtm-flights", TITLES["flights"], markdown_table(head, rows))
-    return f"{table}\n\n![{alt}]({PICTURE})"
+    return f"{table}\n\n{picture('gtm-flights.png', alt, _drawn(), dpi=110)}"
 
 
-def _draw() -> None:
+def _drawn() -> Figure:
     """A row a flight: the specification as a broad line, JSBSim at 1 kHz as a thin one in it."""
     flown = _flown()
     figure, axes = plt.subplots(len(flown), len(_SHOWN), figsize=(11, 1.45 * len(flown)), sharex="row")
@@ -118,9 +117,7 @@ def _draw() -> None:
         *axes[-1, 0].get_legend_handles_labels(), loc="upper center", ncols=3, fontsize=9, frameon=False
     )
     figure.tight_layout(rect=(0.0, 0.0, 1.0, 0.98))
-    Path("images").mkdir(exist_ok=True)
-    figure.savefig(PICTURE, dpi=110, metadata={"Software": None})
-    plt.close(figure)
+    return figure
 
 
 def gtm_checks() -> str:

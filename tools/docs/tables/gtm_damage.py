@@ -11,17 +11,17 @@ import numpy as np
 import yaml
 from benchmarks import gtm_damage as campaign
 from benchmarks import gtm_informed as informed
+from matplotlib.figure import Figure
 
 import beaver_ftc as bf
 from beaver_ftc.studies.present.tables import markdown_table
 from beaver_ftc_aircraft.gtm.conversion import convert
 from beaver_ftc_aircraft.gtm.parameters import cases
 from beaver_ftc_aircraft.gtm.steady import Bench
-from tools.docs.tables import beaver, table_of
+from tools.docs.tables import beaver, picture, table_of
 from tools.gtm.envelope import BANKS_DEG, SIDESLIPS_DEG, SPEEDS_KT, Envelope, Turn
 from tools.gtm.specification import DATABASE
 
-PICTURE = "images/gtm-envelope.png"
 LAWS = ("fault-tolerant", "oracle", "nominal")
 FLIGHTS, CALM = 600, 120
 OURS_AND_PAGE = (
@@ -50,9 +50,9 @@ def gtm_envelope() -> str:
         level = [turn.speed_kt for turn in held if turn.bank_deg == 0]
         flown = ["" if name == "whole" else str(_flown(name, law)) for law in LAWS]
         rows.append([name, str(len(turns)), str(len(held)), str(min(level)), *flown])
-    _draw(of)
     head = ("case", "turns tried", "turns held", "slowest level flight, kt", *LAWS)
-    return markdown_table(head, rows) + f"\n\n![Level turns held]({PICTURE})"
+    shown = picture("gtm-envelope.png", "Level turns held", _drawn(of), dpi=110, bbox_inches="tight")
+    return f"{markdown_table(head, rows)}\n\n{shown}"
 
 
 def _flown(case: str, law: str) -> int:
@@ -79,7 +79,7 @@ def _flown(case: str, law: str) -> int:
     return kept
 
 
-def _draw(of: dict[str, list[Turn]]) -> None:
+def _drawn(of: dict[str, list[Turn]]) -> Figure:
     """A panel a case: speed against bank, and how many of the sideslips asked for can be held."""
     figure, axes = plt.subplots(1, len(of), figsize=(13, 2.6), sharey=True)
     for axis, (name, turns) in zip(axes, of.items(), strict=True):
@@ -104,9 +104,7 @@ def _draw(of: dict[str, list[Turn]]) -> None:
     bar = figure.colorbar(drawn, ax=axes, fraction=0.015, pad=0.01)
     bar.set_label("share of the sideslips\nin which the turn is held\n(x: none)", fontsize=8)
     bar.ax.tick_params(labelsize=7)
-    Path("images").mkdir(exist_ok=True)
-    figure.savefig(PICTURE, dpi=110, bbox_inches="tight", metadata={"Software": None})
-    plt.close(figure)
+    return figure
 
 
 def gtm_damage() -> str:

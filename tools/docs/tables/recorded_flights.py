@@ -10,13 +10,11 @@ from typing import Any
 
 from benchmarks import own_logs as own
 
-from beaver_ftc.studies.present.page import write_files
 from beaver_ftc.studies.present.tables import markdown_table
 from beaver_ftc_logs.recorded.benchmark import LABEL_TITLES, SURFACE_KINDS, result_files, run_benchmark
-from tools.docs.tables import aside, shared, table_of
+from tools.docs.tables import aside, picture, shared, table_of
 
 Document = dict[str, Any]
-PICTURE = "images/recorded-flights.png"
 OWN_SEEDS = (209, 210, 211)
 AIRCRAFT_SEEDS = (9403, 9404)
 CLAIMED_SEEDS = (*OWN_SEEDS, *AIRCRAFT_SEEDS)
@@ -59,9 +57,7 @@ def _benchmark() -> Document:
 def recorded_alfa() -> str:
     """Failures of the ALFA flights: what each method finds, how late, and what else it finds."""
     document = _benchmark()
-    Path("images").mkdir(exist_ok=True)
-    picture = result_files(document)["flights.png"]
-    write_files(Path("images"), {Path(PICTURE).name: picture})
+    picture("recorded-flights.png", "", result_files(document)["flights.png"])
     part = _part(document, "alfa")
     rows = (*part["rows"], *part["published"])
     found = {

@@ -23,7 +23,8 @@ from typing import Any
 import numpy as np
 
 import beaver_ftc as bf
-from beaver_ftc.plugins import DETECTORS, LAWS, OURS, registered
+from beaver_ftc.plugins import DETECTORS, LAWS
+from tools.drawn.factors import registered_of
 
 RATES_HZ = (50.0, 100.0, 200.0)
 AT_MOST_S = 65.0  # of a mission
@@ -32,11 +33,7 @@ Case = tuple[str, str, str, float]
 
 def cases() -> Iterator[Case]:
     """Scenario, law, scheme and frame rate of each flight."""
-    laws, schemes = (
-        [name for name, entry in registered(group).items() if entry.package == OURS]
-        for group in (LAWS, DETECTORS)
-    )
-    return product(bf.scenarios(), laws, schemes, RATES_HZ)
+    return product(bf.scenarios(), registered_of(LAWS), registered_of(DETECTORS), RATES_HZ)
 
 
 def changed(name: str, law: str, scheme: str, rate_hz: float) -> bf.Scenario:

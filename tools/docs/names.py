@@ -16,11 +16,10 @@ import yaml
 
 from beaver_ftc.documents.errors import nearest
 from tools.docs.marks import Page
-from tools.docs.pages import ROOT, Finding, is_generated
+from tools.docs.pages import COMMENT, ROOT, Finding, blanked, is_generated
 
 FOREIGN = Path(__file__).with_name("foreign.yaml")
 _BLOCK = re.compile(r"^ *(`{3,}|~{3,}).*?^ *\1`* *$|^ {4}\S[^\n]*$", re.MULTILINE | re.DOTALL)
-_COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 _SPAN = re.compile(r"(?<!`)`([^`\n]+(?:\n[^`\n]+)*)`(?!`)")
 _WORD = re.compile(r"(?<![\w-])(?:--)?[A-Za-z_][\w-]*")
 _TEXT = re.compile(r"[\w./-]+")
@@ -128,9 +127,7 @@ def is_name(word: str, own: frozenset[str]) -> bool:
 
 def spans(text: str) -> Iterator[tuple[int, str]]:
     """(line, span) of everything in backticks that is prose."""
-    prose = text
-    for left_out in (_BLOCK, _COMMENT):
-        prose = left_out.sub(lambda found: re.sub(r"[^\n]", " ", found[0]), prose)
+    prose = blanked(text, _BLOCK, COMMENT)
     for found in _SPAN.finditer(prose):
         yield prose.count("\n", 0, found.start()) + 1, found[1]
 

@@ -1,5 +1,6 @@
 """Where the pages are, and what is known of a place on them."""
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +21,16 @@ class Finding:
 
     def __str__(self) -> str:
         return f"{self.page}:{self.line}: {self.words}"
+
+
+COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
+
+
+def blanked(text: str, *patterns: re.Pattern[str]) -> str:
+    """As many lines and letters, with blanks in the place of what these find."""
+    for pattern in patterns:
+        text = pattern.sub(lambda found: re.sub(r"[^\n]", " ", found[0]), text)
+    return text
 
 
 def every_page(root: Path = ROOT) -> list[Path]:

@@ -11,13 +11,12 @@ from collections.abc import Iterator, Sequence
 from functools import cache
 
 from tools.docs.marks import Page
-from tools.docs.pages import ROOT, Finding, is_generated
+from tools.docs.pages import COMMENT, ROOT, Finding, blanked, is_generated
 
 GLOSSARY = ROOT / "docs/reference/glossary.md"
 RESULTS = "docs/results/"
 _HOME = ("README.md", "docs/README.md")  # they are the way to all pages
 _FENCE = re.compile(r"^ *(`{3,}|~{3,}).*?^ *\1`* *$", re.MULTILINE | re.DOTALL)
-_MARK = re.compile(r"<!--.*?-->", re.DOTALL)
 _RULE = re.compile(r"^\|(?: ?:?-+:? ?\|)+$")
 _MATHS = re.compile(r"\$\$(.+?)\$\$|(?<!\$)\$([^$\n]+?)\$(?!\$)", re.DOTALL)
 _WORDS_IN_MATHS = re.compile(r"\\(?:text|mathrm|begin|end|operatorname|tag)\{[^}]*\}|`[^`]*`")
@@ -58,7 +57,7 @@ def check(pages: Sequence[Page]) -> list[Finding]:
 
 def faults(page: Page) -> Iterator[tuple[int, str]]:
     """(line, what is wrong) of a page."""
-    text = _MARK.sub(_blank, _FENCE.sub(_blank, page.text))
+    text = blanked(page.text, _FENCE, COMMENT)
     yield from _tables(text)
     yield from _symbols(text)
     if page.name.startswith("docs/") and page.name not in _HOME and not _names_a_next_step(text):
@@ -66,11 +65,6 @@ def faults(page: Page) -> Iterator[tuple[int, str]]:
         yield text.count("\n"), says
     for line, words in numbers(page.text) if page.name.startswith(RESULTS) else ():
         yield line, f'a number that no command prints: "{words[:80]}", allowed: a mark, or no number'
-
-
-def _blank(found: re.Match[str]) -> str:
-    """As many lines, so that places stay what they were."""
-    return re.sub(r"[^\n]", " ", found[0])
 
 
 def _names_a_next_step(text: str) -> bool:
@@ -139,7 +133,7 @@ def _symbols(text: str) -> Iterator[tuple[int, str]]:
 
 def numbers(text: str) -> Iterator[tuple[int, str]]:
     """(line, sentence) of each sentence with a number that no command prints."""
-    prose = _LEFT_OUT.sub(lambda found: re.sub(r"[^\n]", " ", found[0]), text)
+    prose = blanked(text, _LEFT_OUT)
     start = 0
     for end in [*(found.end() for found in _SENTENCE.finditer(prose)), len(prose)]:
         sentence = prose[start:end]

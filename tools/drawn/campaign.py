@@ -1,12 +1,15 @@
 """Drawn flights, one after the other: flown, held against their promises, kept if they break one."""
 
+import json
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import yaml
 
 import beaver_ftc as bf
 from tools.drawn.compose import Drawn
+from tools.drawn.declare import Words
 from tools.drawn.promises import broken, flown_again
 from tools.drawn.shrink import smaller
 
@@ -55,10 +58,7 @@ def keep_it(folder: Path, drawn: Drawn, outcome: Outcome, shrink: bool) -> None:
     path.write_text(heading + yaml.safe_dump(plain(words), sort_keys=False, width=110), encoding="utf-8")
 
 
-def plain(value: object) -> object:
+def plain(words: Words) -> Words:
     """Without tuples and NumPy's numbers, which YAML has not."""
-    if isinstance(value, dict):
-        return {str(key): plain(one) for key, one in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(one) for one in value]
-    return value.item() if hasattr(value, "item") else value
+    found: Words = json.loads(json.dumps(words, default=np.generic.item))
+    return found

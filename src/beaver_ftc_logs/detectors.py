@@ -103,13 +103,7 @@ def _rows_of_estimate(samples: Samples, model: Model, a: Floats, sd: Floats) -> 
     low = expand_groups(np.minimum(low, nearest), model)
     high = expand_groups(np.maximum(high, nearest), model)
     names = join_names(lost, model.group_names)
-    return _plain_rows(samples, names, expand_groups(nearest, model), low, high)
-
-
-def _plain_rows(samples: Samples, names: np.ndarray, a: Floats, low: Floats, high: Floats) -> LogRows:
-    """Rows of a detector with estimate a and bounds, (n, S) each: faulty where a surface is named."""
-    faulty = (names != "").astype(np.int64)
-    return LogRows(samples.t_s, faulty, names, a, low, high, faulty.astype(float), samples.t_s)
+    return LogRows.of_names(samples.t_s, names, expand_groups(nearest, model), low, high)
 
 
 def diagnose_by_freeze_rule(log: RecordedFlight, samples: Samples, model: Model) -> LogRows | None:
@@ -123,7 +117,7 @@ def diagnose_by_freeze_rule(log: RecordedFlight, samples: Samples, model: Model)
     for name, column in outputs.items():
         frozen[:, surfaces.index(name)] = unchanged_s(column, samples.t_s) > MIN_FROZEN_OUTPUT_S
     a = 1.0 - frozen
-    return _plain_rows(samples, join_names(frozen, surfaces), a, a, a)
+    return LogRows.of_names(samples.t_s, join_names(frozen, surfaces), a, a, a)
 
 
 class LinearRateModel:
@@ -213,7 +207,7 @@ def rows_of_verdicts(verdicts: list[Verdict], samples: Samples, model: Model) ->
         names[k], low[k, members[g]] = model.group_names[g], 0.0
         a[k, members[g]] = _remaining_effectiveness(verdicts[k], g)
     p = np.where(np.isnan(statistic), faulty, np.clip(statistic, 0.0, 1.0))
-    return replace(_plain_rows(samples, names, a, low, np.ones_like(low)), fault_probability=p)
+    return replace(LogRows.of_names(samples.t_s, names, a, low, np.ones_like(low)), fault_probability=p)
 
 
 def _remaining_effectiveness(verdict: Verdict, g: int) -> float:

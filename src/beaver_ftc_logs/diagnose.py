@@ -95,6 +95,13 @@ class LogRows:
         other columns, is credible here too."""
         return not self.has_credible_alarm() and bool((self.credible >= other.credible).all())
 
+    @classmethod
+    def of_names(cls, t_s: Floats, names: Names, a: Floats, low: Floats, high: Floats) -> "LogRows":
+        """Rows of a diagnosis without probabilities, with estimate a and bounds, (n, S) each: faulty where a
+        surface is named."""
+        faulty = (names != "").astype(np.int64)
+        return cls(t_s, faulty, names, a, low, high, faulty.astype(float), t_s)
+
     def credibility(self) -> Document:
         """The entry of verdict.json with the share of credible rows, and the reasons for the others with
         their shares."""

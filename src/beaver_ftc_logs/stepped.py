@@ -181,13 +181,4 @@ def rows_of_replay(t_s: Floats, replay: Replayed, surfaces: Sequence[str], fdi: 
             s = surfaces.index(verdict.isolated)
             e[k, s] = min(max(1.0 + float(verdict.estimate), low[k, s]), high[k, s])
     isolated = [one.isolated if one.isolated in surfaces else UNKNOWN_SURFACE for one in replay.verdicts]
-    return LogRows(
-        t_s=t_s,
-        faulty=faulty.astype(np.int64),
-        isolated_surfaces=np.where(faulty, np.array(isolated, dtype=object), ""),
-        effectiveness=e,
-        effectiveness_low=low,
-        effectiveness_high=high,
-        fault_probability=faulty.astype(float),
-        evidence_start_time_s=t_s,
-    )
+    return LogRows.of_names(t_s, np.where(faulty, np.array(isolated, dtype=object), ""), e, low, high)

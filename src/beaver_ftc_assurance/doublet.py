@@ -77,9 +77,10 @@ def _least_amplitude(targets: dict[int, float], at: Situation, tells: int) -> np
     """Commands (frames, n), rad, of the doublet that is there in frame `tells` - 1; None if there is none.
 
     The linear programme. Its unknowns are blocks, one value a frame k, each less the present value: of each
-    surface the command u and its deflection p at the end of the frame; the rates x = p, q, r; the pitch
-    angle. After them the amplitude A, which is least. With the shares a, b of `Situation.remaining_way`, and
-    the mean deflection m over a frame:
+    surface the command u; of each its deflection p at the end of the frame; the rates x = p, q, r; the pitch
+    angle. After them the amplitude A, which is least. In the code, each letter is the matrix that takes it
+    from the unknowns. With the shares a, b of `Situation.remaining_way`, and the mean deflection m over a
+    frame:
 
         p[k] = a p[k-1] + (1 - a) u[k]            m[k] = b p[k-1] + (1 - b) u[k]
         x[k] = x[k-1] + dt G m[k]                 pitch[k] = pitch[k-1] + dt q[k]
@@ -87,34 +88,38 @@ def _least_amplitude(targets: dict[int, float], at: Situation, tells: int) -> np
         |m[k]| >= |target|, u[k] constant         in the frames in which the deflection must hold
         x = 0                                     in the last frame
     """
+    from scipy.sparse import csr_array, eye_array, vstack
+
     if (np.abs(at.x) > at.rate).any() or not at.alpha_range[0] <= at.alpha <= at.alpha_range[1]:
         return None
     frames, surfaces = 2 * (tells + at.held - 1), [*targets]
-    n, there, every = len(surfaces), np.arange(tells - 1, tells + at.held - 1), np.arange(frames)
-    *pqr, pitch = range(2 * n, 2 * n + 4)
-    equal, above = _Rows(pitch + 1, frames), _Rows(pitch + 1, frames)
-    turning = [{(rate, 0): 1.0, (rate, -1): -1.0} for rate in pqr]
-    for u, s in enumerate(surfaces):
-        p, away, (a, b) = n + u, targets[s] - at.u[s], at.remaining_way(s)
-        equal.add(every, {(u, 0): a - 1.0, (p, 0): 1.0, (p, -1): -a})
-        equal.add(there[1:], {(u, 0): 1.0, (u, -1): -1.0})
-        m = {(u, 0): 1.0 - b, (p, -1): b}
-        m_before = {(u, -1): b - 1.0, (p, -2): -b}
-        above.add(there, {k: -np.sign(away) * v for k, v in m.items()}, -abs(away))
+    n, there, every = len(surfaces), slice(tells - 1, tells + at.held - 1), np.arange(frames)
+    unknowns = (2 * n + 4) * frames + 1
+    blocks = [eye_array(frames, unknowns, k=block * frames, format="csr") for block in range(2 * n + 4)]
+    A = csr_array((np.ones(frames), (every, np.full(frames, unknowns - 1))), shape=(frames, unknowns))
+    before = eye_array(frames, k=-1, format="csr")  # times a block: its values a frame earlier, 0 at first
+    *x, pitch = blocks[2 * n :]
+    turning = [rate - before @ rate for rate in x]
+    equal: list[Any] = []  # rows that are zero
+    above: list[tuple[Any, float]] = []  # rows, and what they are at most
+    for u, p, s in zip(blocks[:n], blocks[n:], surfaces, strict=False):
+        away, (a, b) = targets[s] - at.u[s], at.remaining_way(s)
+        m = b * (before @ p) + (1.0 - b) * u
+        equal += [p - a * (before @ p) - (1.0 - a) * u, (u - before @ u)[there][1:]]
+        above.append((-np.sign(away) * m[there], -abs(away)))
         for sign in (1.0, -1.0):
-            above.add(every, {(u, 0): sign}, amplitude=-1.0)
+            above.append((sign * u - A, 0.0))
             if np.isfinite(at.step[s]):
-                pace = {k: sign * v for k, v in (m | m_before).items()}
-                above.add(every, pace, at.step[s] * at.instants)
-        for row, g in zip(turning, at.G[:, s], strict=True):
-            row |= {k: -at.dt * g * v for k, v in m.items() if g}
-    for row in (*turning, {(pitch, 0): 1.0, (pitch, -1): -1.0, (pqr[1], 0): -at.dt}):
-        equal.add(every, row)
+                above.append((sign * (m - before @ m), at.step[s] * at.instants))
+        turning = [row - at.dt * g * m for row, g in zip(turning, at.G[:, s], strict=True)]
+    equal += [*turning, pitch - before @ pitch - at.dt * x[1]]
     stops, rates = [at.stops[:, s] - at.u[s] for s in surfaces], [(-at.rate - x, at.rate - x) for x in at.x]
     ends = [*stops, *[(-inf, inf)] * n, *rates, np.subtract(at.alpha_range, at.alpha)]
     bounds = np.vstack([np.repeat(ends, frames, axis=0), (0.0, inf)])
-    bounds[[(rate + 1) * frames - 1 for rate in pqr]] = 0.0
-    found = _solved(equal, above, bounds)
+    bounds[[(block + 1) * frames - 1 for block in range(2 * n, 2 * n + 3)]] = 0.0  # the last rates
+    most = np.repeat([limit for _, limit in above], [rows.shape[0] for rows, _ in above])
+    rows = vstack([rows for rows, _ in above], format="csc")
+    found = _solved(rows, most, vstack(equal, format="csc"), bounds)
     if found is None:
         return None
     commands = np.tile(at.u, (frames, 1))
@@ -122,46 +127,15 @@ def _least_amplitude(targets: dict[int, float], at: Situation, tells: int) -> np
     return commands
 
 
-class _Rows:
-    """Rows of a linear programme whose unknowns are blocks of a value for each frame, and an amplitude."""
-
-    def __init__(self, blocks: int, frames: int) -> None:
-        self._blocks, self._frames = blocks, frames
-        self._parts: list[Any] = []
-        self._limits: list[np.ndarray] = []
-
-    def add(
-        self,
-        at: np.ndarray,
-        weights: dict[tuple[int, int], float],
-        limit: float = 0.0,
-        amplitude: float = 0.0,
-    ) -> None:
-        """Add a row for each frame of `at`, with these weights of the amplitude and of each (block, lag): the
-        value of the block that many frames later, 0 before the first frame."""
-        from scipy.sparse import csr_array, eye_array, hstack
-
-        parts = [csr_array((len(at), self._frames))] * self._blocks
-        for (block, lag), weight in weights.items():
-            parts[block] = parts[block] + weight * eye_array(self._frames, k=lag, format="csr")[at]
-        self._parts.append(hstack([*parts, csr_array(np.full((len(at), 1), amplitude))]))
-        self._limits.append(np.full(len(at), limit))
-
-    @property
-    def system(self) -> tuple[Any, np.ndarray]:
-        """The sparse matrix and the limits of all rows."""
-        from scipy.sparse import vstack
-
-        return vstack(self._parts, format="csc"), np.concatenate(self._limits)
-
-
-def _solved(equal: _Rows, above: _Rows, bounds: np.ndarray) -> np.ndarray | None:
-    """The unknowns with the least amplitude; None where there are none within the limits."""
+def _solved(above: Any, most: np.ndarray, equal: Any, bounds: np.ndarray) -> np.ndarray | None:
+    """The unknowns with the least amplitude, of which rows `above` give at most `most`, and `equal` zero;
+    None where there are none within the limits.
+    """
     from scipy.optimize import linprog
 
     weight = np.r_[np.zeros(len(bounds) - 1), 1.0]
     for method in ("highs-ds", "highs-ipm"):  # the second where rounding stops the first
-        result = linprog(weight, *above.system, *equal.system, bounds, method=method)
+        result = linprog(weight, above, most, equal, np.zeros(equal.shape[0]), bounds, method=method)
         if result.status in (0, 2):  # solved, or infeasible
             break
     return np.asarray(result.x) if result.status == 0 else None

@@ -8,7 +8,6 @@ from tools.drawn.array import CoveringArray, Factor
 from tools.drawn.campaign import fly
 from tools.drawn.compose import EVERYTHING, array_of, drawn_flights
 from tools.drawn.promises import broken
-from tools.schema import inlined
 
 import beaver_ftc as bf
 from beaver_ftc.scenario.schema import json_schema
@@ -37,7 +36,7 @@ def test_every_pair_of_levels_stands_together_in_some_row():
 
 
 def rows_of(seed):
-    return array_of(inlined(json_schema()), AIRCRAFT, EVERYTHING, np.random.default_rng([seed, 0])).rows()
+    return array_of(json_schema(), AIRCRAFT, EVERYTHING, np.random.default_rng([seed, 0])).rows()
 
 
 def test_every_key_of_the_schema_is_drawn_sometime():

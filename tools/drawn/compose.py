@@ -85,6 +85,7 @@ def drawn_flights(seed: int, aircraft: Sequence[str], kinds: Sequence[Kind] = KI
 
 def array_of(schema: Node, aircraft: Sequence[str], kind: Kind, rng: np.random.Generator) -> CoveringArray:
     """The array of every factor there is."""
+    schema = inlined(schema)
     factors = [
         replace(factor, levels=kind.only.get(factor.name, factor.levels))
         for factor in factors_of(schema, aircraft, kind.declared)

@@ -100,9 +100,12 @@ class Specification:
             )
         return self._tables[name]
 
-    def _look(self, name: str, axes: str, at: list[float], hold: bool = False) -> np.ndarray:
+    def _look(
+        self, name: str, axes: str, at: list[float], hold: bool = False, row: int | None = None
+    ) -> np.ndarray:
+        """Of a table at these places of its axes. row: on the axis behind these, where there is one."""
         data, grids = self._table(name, *axes.split())
-        return multilinear(data, grids, at, hold)
+        return multilinear(data if row is None else data.take(row, len(grids)), grids, at, hold)
 
     def coefficients(
         self, alpha: float, beta: float, V: float, rates: np.ndarray, deg: dict[str, float], case: int = 0,
@@ -112,20 +115,17 @@ class Specification:
         a, b = degrees(alpha), degrees(beta)
         c = self._look("C6_bas", "alpha beta", [a, b])
         if case:
-            data, grids = self._table("dC6_damage.bas", "alpha", "beta")
-            c = c + multilinear(data[:, :, case - 1], grids, [a, b], hold=True)
+            c = c + self._look("dC6_damage.bas", "alpha beta", [a, b], hold=True, row=case - 1)
         gone = self.of["damage"]["cases"][case]["gain_0"] if case else []
         c = c + self._surfaces(a, b, {name: 0.0 if name in gone else deg[name] for name in deg}, deg["STAB"])
         if gear:
-            c[_LONGITUDINAL] += multilinear(*self._gear(), [a])
+            c[_LONGITUDINAL] += self._look("dC3_lgr", "alpha", [a], row=1)
         return c + self._rates(a, b, alpha, beta, V, rates, case)
 
-    def _gear(self) -> tuple[np.ndarray, list[list[float]]]:
-        data, grids = self._table("dC3_lgr", "alpha")
-        return data[:, 1], grids
-
     def _surfaces(self, a: float, b: float, deg: dict[str, float], stab: float) -> np.ndarray:
-        """Increments; a lost surface stands at zero here, `stab` is where the stabiliser really stands."""
+        """Increments; a lost surface stands at zero here, `stab` is where the stabiliser really stands. A
+        table of ailerons, rudders or spoilers has one side: it is mirrored for the other.
+        """
         c = np.zeros(6)
         shares = self.of["aero_shares"]
         s0 = self._look("dC3_ele", "alpha beta stab elev", [a, b, stab, 0.0])
@@ -137,20 +137,15 @@ class Specification:
                 c[_LONGITUDINAL] += part
                 c[3] += arm * part[1]
                 c[5] -= arm * part[0]
-        c += self._look("dC6_ail", "alpha beta ail", [a, b, deg["AILR"]])
-        c += _MIRROR * self._look("dC6_ail", "alpha beta ail", [a, -b, deg["AILL"]])
+        parts = [("ail", deg["AILR"], False, 1.0), ("ail", deg["AILL"], True, 1.0)]
         for name, which in (("RUDU", "upper"), ("RUDL", "lower")):
-            s = -1.0 if deg[name] >= 0.0 else 1.0
-            found = self._look("dC6_rud", "alpha beta rud", [a, s * b, -abs(deg[name])])
-            c += np.where(_MIRROR < 0.0, s, 1.0) * found * shares[f"rudder_{which}"]
+            parts.append(("rud", -abs(deg[name]), deg[name] >= 0.0, shares[f"rudder_{which}"]))
         for name in ("SPLLIB", "SPLLOB", "SPLRIB", "SPLROB"):
-            if deg[name]:
-                left, share = (
-                    name[3] == "L",
-                    shares["spoiler_inboard" if name[4:] == "IB" else "spoiler_outboard"],
-                )
-                found = self._look("dC6_spo", "alpha beta spo", [a, -b if left else b, deg[name]])
-                c += (_MIRROR if left else 1.0) * found * share
+            which = "inboard" if name.endswith("IB") else "outboard"
+            parts += [("spo", deg[name], name[3] == "L", shares[f"spoiler_{which}"])] * bool(deg[name])
+        for kind, angle, mirrored, share in parts:
+            at = [a, -b if mirrored else b, angle]
+            c += (_MIRROR if mirrored else 1.0) * self._look(f"dC6_{kind}", f"alpha beta {kind}", at) * share
         for name in ("FLAPLIB", "FLAPLOB", "FLAPRIB", "FLAPROB"):
             c += deg[name] * np.asarray(getattr(self.base["flaps"], name.lower()))
         return c
@@ -158,36 +153,22 @@ class Specification:
     def _rates(
         self, a: float, b: float, alpha: float, beta: float, V: float, rates: np.ndarray, case: int
     ) -> np.ndarray:
-        p, _, r = rates
+        """Of body rates. Without damage, the part that turns about the flow has a table of its own."""
         knots = min(max(V * 0.592487, 1.0), 10000.0)
         over = np.array([6.8488, 0.9153, 6.8488]) / (2.0 * knots * 1.689)
-        c = np.zeros(6)
-        if case:
-            hats = rates * over
-            (scales, at), (added, of) = (
-                self._table(f"dC6_damage.{x}", "alpha") for x in ("ddscale", "ddinc")
-            )
-            scale = multilinear(scales[:, case - 1], at, [a], hold=True)
-            inc = multilinear(added[:, case - 1], of, [a])
-            for k, (name, hat, outputs) in enumerate(_OF_RATES):
-                six = np.zeros(6)
-                six[outputs] = self._look(name, f"alpha {hat}", [a, hats[k]], hold=True)
-                c += six * scale[k]
-            c[1] += inc[:, 1] @ hats
-            return c
         along = axes_of(alpha, beta)
-        omega = 0.0
-        if along[0] != 0.0 and p != 0.0:
-            left = r - p / along[0] * along[2]
-            omega = p / along[0] if abs(left) <= abs(r) and left * r >= 0.0 else omega
-        if along[2] != 0.0 and r != 0.0:
-            left = p - r / along[2] * along[0]
-            omega = r / along[2] if abs(left) <= abs(p) and left * p >= 0.0 else omega
-        what = float(np.clip(omega * over[0], -0.5, 0.5))
-        c += self._look("dC6_w", "alpha what beta", [a, what, b])
-        hats = (rates - omega * along) * over
+        omega = 0.0 if case else _about_flow(rates, along)
+        hats, scale, c = (rates - omega * along) * over, np.ones((3, 6)), np.zeros(6)
+        if case:
+            scale = self._look("dC6_damage.ddscale", "alpha", [a], hold=True, row=case - 1)
+        else:
+            what = float(np.clip(omega * over[0], -0.5, 0.5))
+            c += self._look("dC6_w", "alpha what beta", [a, what, b])
         for k, (name, hat, outputs) in enumerate(_OF_RATES):
-            c[outputs] += self._look(name, f"alpha {hat}", [a, hats[k]])
+            found = self._look(name, f"alpha {hat}", [a, hats[k]], hold=bool(case))
+            c[outputs] += found * scale[k][outputs]
+        if case:
+            c[1] += self._look("dC6_damage.ddinc", "alpha", [a], row=case - 1)[:, 1] @ hats
         return c
 
     def mass(self, case: int = 0) -> tuple[float, np.ndarray, np.ndarray]:
@@ -257,6 +238,16 @@ class Specification:
         k2 = self.rates_of_change(x + 0.5 * dt * k1, controls, case)
         k3 = self.rates_of_change(x + 0.75 * dt * k2, controls, case)
         return np.asarray(x + dt * (2.0 * k1 + 3.0 * k2 + 4.0 * k3) / 9.0)
+
+
+def _about_flow(rates: np.ndarray, along: np.ndarray) -> float:
+    """The largest rate about the flow that leaves no larger rates, and none of another sign, rad/s."""
+    omega = 0.0
+    for i, j in ((0, 2), (2, 0)):
+        if along[i] != 0.0 and rates[i] != 0.0:
+            left = rates[j] - rates[i] / along[i] * along[j]
+            omega = rates[i] / along[i] if abs(left) <= abs(rates[j]) and left * rates[j] >= 0.0 else omega
+    return float(omega)
 
 
 _OF_RATES = (("dC3_p", "phat", _LATERAL), ("dC3_q", "qhat", _LONGITUDINAL), ("dC3_r", "rhat", _LATERAL))

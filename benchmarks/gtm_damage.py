@@ -1,11 +1,12 @@
-"""The GTM is damaged in flights nobody chose: is it found, and is anything named that is still there?
+"""Damage of the GTM in random flights: does the diagnosis detect it, and does it name an intact surface?
 
-`python -m tools.docs table gtm-damage` prints it. Every case of damage in turn, 70 to 110 kt, a bank held to
-45 deg either way, light turbulence, tactical-grade sensors, servos, sines asked of the rates that the
-autopilot leaves free; the instant is drawn. Calm: the same in still air with exact sensors. A row a case:
-flights, alarms before the damage; found within 1 s, later, not at all; how many end `unanticipated`, with a
-lost surface named, open with a lost one among the candidates, open without; wrong: a name, at the end or
-before, that is none of the lost ones. Rows already in the file are not flown again. Needs `aircraft: gtm`
+`python -m tools.docs table gtm-damage` prints the table. The flights have each case of damage in turn, 70 to
+110 kt, a bank of up to 45 deg to either side, light turbulence, tactical-grade sensors, servos, and sines as
+references of the rates that the autopilot does not use. The instant of the damage is random. The calm flights
+are the same in still air with exact sensors. A row for each case counts: flights; alarms before the damage;
+damage detected within 1 s, later, never; flights that end with the name `unanticipated`, with a lost surface
+named, undecided with a lost surface among the candidates, undecided without; flights in which an intact
+surface was named at any time. Rows that the file has are not flown again. The aircraft `gtm` must be there
 (`beaver-ftc import gtm`).
 """
 
@@ -33,7 +34,7 @@ Document = dict[str, Any]
 
 
 def scenario(k: int, calm: bool = False, seed: int = SEED) -> Document:
-    """The k-th flight."""
+    """The scenario of flight number k."""
     cases, rng = list(load("gtm").damage), np.random.default_rng([seed, k])
 
     def drawn(low: float, high: float, digits: int = 2) -> float:
@@ -62,7 +63,7 @@ def scenario(k: int, calm: bool = False, seed: int = SEED) -> Document:
 
 
 def flown(k: int, calm: bool) -> Document:
-    """A row of the k-th flight."""
+    """The row of flight number k."""
     given = scenario(k, calm)
     metrics = bf.fly(load_text(json.dumps(given)), log=False).metrics
     found, isolation, case = metrics["detection"], metrics["isolation"], given["faults"][0]["case"]
@@ -79,7 +80,7 @@ def flown(k: int, calm: bool) -> Document:
 
 
 def rows(of: list[Document]) -> Iterator[list[Any]]:
-    """A row a case, and one of all."""
+    """Yield a row for each case, and one for all."""
     for case in (*dict.fromkeys(each["case"] for each in of), "all"):
         there = [each for each in of if case in (each["case"], "all")]
         delays = [each["delay_s"] for each in there if each["delay_s"] is not None]
@@ -95,12 +96,12 @@ def rows(of: list[Document]) -> Iterator[list[Any]]:
 
 
 def fly_all(flights: int, calm: bool, out: Path) -> list[Document]:
-    """The rows of so many flights."""
+    """The rows of this number of flights."""
     return list(rows_in(out, range(flights), lambda k: flown(k, calm)).values())
 
 
 def rows_in(out: Path, wanted: Iterable[int], made: Callable[[int], Document]) -> dict[int, Document]:
-    """Row after row by its number `k`: those in the file, and the others, made and added to it."""
+    """The wanted rows by number `k`: rows that the file has, and new ones, which are added to the file."""
     done = map(json.loads, out.read_text().splitlines()) if out.is_file() else ()
     of = {each["k"]: each for each in done}
     with out.open("a", encoding="utf-8") as file:

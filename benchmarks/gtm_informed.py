@@ -1,24 +1,25 @@
-"""Which of the damage could be found at all: beside a test that is told everything of it but when it strikes.
+"""Which damage can a test detect that knows the damage, but not its instant?
 
-`python -m tools.docs table gtm-damage-informed` prints it. The flights are those of gtm_damage.py; each is
-flown again under the nominal law, recorded as a detector sees it. Told is which case; what it does to the
-three rates' accelerations in every frame (every third, straight lines between), worked out from the true
-flight by the specification (tools/gtm: moments, mass, centre of gravity and inertia, with the case less
-without); and noise as it is, the model's errors in it, by a vector autoregression fitted to flights without
-damage at that speed. The test is Page's (unknown_instant.py). A likelihood ratio that
-begins at one instant ever reaches h with probability exp(-h) at most [Ville], so that an instant a frame
-gives the declared rate of false alarms, or fewer, at h = ln(frames per hour / alarms per hour); its level is
-that, or more where it reached more before the damage in any flight of its case.
+`python -m tools.docs table gtm-damage-informed` prints the table. The flights are those of gtm_damage.py;
+each is flown again with the nominal law, and recorded as a detector sees it. The test knows the case, its
+effect on the angular acceleration, and the noise. The effect is computed from the true flight by the
+specification (tools/gtm: moments, mass, centre of gravity and inertia, with the damage minus without it) in
+every third frame, with straight lines between. The noise, which contains the errors of the model, is a vector
+autoregression that is fitted to flights without damage at that speed. The test is Page's
+(unknown_instant.py). A likelihood ratio that begins at one instant ever reaches h with a probability of at
+most exp(-h) [Ville]. With an instant in each frame, h = ln(frames per hour / alarms per hour) therefore gives
+at most the declared rate of false alarms. The level of a case is this h, or the largest value before the
+damage in any flight of the case, if that is larger.
 
-That test knows how far the model is off. A detector knows a bound alone: an error within it may hide the
-damage, but for what of its effect is beyond the bound. Of each flight that ours does not find in time, flown
-as it was, under our law, `certain` is the chance that the same test finds what is left of the effect within
-1 s: its log likelihood ratio is normal, of mean d^2 / 2 and variance d^2. No detector that keeps to the
-declared error is surer. Where the model's error is not known, nothing is left.
+The test knows the error of the model. A detector knows only a bound on it: an error within the bound may hide
+the damage, except for the part of its effect that exceeds the bound. `certain` is the chance that the same
+test finds this part within 1 s, in each flight, with our law, in which our diagnosis is late. Its log
+likelihood ratio is normal with mean d^2 / 2 and variance d^2. No detector that relies on the declared bound
+has a larger chance. Where the error of the model is not known, no part exceeds the bound.
 
-A row a case: flights, found within 1 s by ours, by the informed test; of the flights that ours does not find
-in time, the sum of the chances. Rows that a file holds are not flown again. Needs BEAVER_FTC_GTM and
-`aircraft: gtm`.
+A row for each case has the flights, those that our diagnosis and the informed test detect within 1 s, and the
+sum of the chances over the flights in which ours is late. Rows that the file has are not flown again. The
+variable BEAVER_FTC_GTM must be set, and the aircraft `gtm` must be there.
 """
 
 import json
@@ -50,13 +51,13 @@ LEVEL = log(3600.0 * 100.0 / PER_H)
 
 
 def recorded(given: Document) -> Recording:
-    """A flight as a detector sees it."""
+    """A flight, recorded as a detector sees it."""
     return record(load_text(json.dumps(given)))
 
 
 @cache
 def noise(band: int) -> Whitener:
-    """Of flights without damage between two speeds."""
+    """The noise model of flights without damage in a band of speeds."""
     low, high = (knots * M_S_PER_KT for knots in BANDS_KT[band : band + 2])
     flights = (scenario(k, seed=SEED + 1000) | {"faults": []} for k in range(100 * HEALTHY))
     there = [one for one in flights if low <= one["initial"]["airspeed_mps"] < high][:HEALTHY]
@@ -64,13 +65,14 @@ def noise(band: int) -> Whitener:
 
 
 def band_of(given: Document) -> int:
-    """Which band of speed a flight begins in."""
+    """The number of the band of speeds in which a flight begins."""
     found = np.searchsorted(BANDS_KT, given["initial"]["airspeed_mps"] / M_S_PER_KT) - 1
     return int(np.clip(found, 0, len(BANDS_KT) - 2))
 
 
 def effect(spec: Specification, given: Document, case: int) -> np.ndarray:
-    """What the damage does, or would do, in each frame but the first, (frames - 1, 3) rad/s2."""
+    """The effect that the damage has, or would have, on the angular acceleration in each frame except the
+    first, (frames - 1, 3) rad/s2."""
     log = {name: np.asarray(of) for name, of in bf.fly(load_text(json.dumps(given))).log.items()}
     names = [f"{name}_pos_rad" for name in NAMES.values()]
     frames = np.arange(len(log["t_s"]) - 1)
@@ -100,14 +102,15 @@ _STATE = (
 
 
 def deflected(late_s: np.ndarray, does: np.ndarray, white: Whitener) -> float:
-    """How far they stand out of the noise WITHIN_S after the damage; late_s (n,): frames after it."""
+    """Deflection d of an effect `does` (n, 3) rad/s2 until WITHIN_S after the damage, in standard deviations
+    of the noise. late_s (n,): time of each frame after the damage, s."""
     response = white.respond(does * (late_s > 1e-9)[:, None])
     return float(np.sqrt(np.square(response[late_s <= WITHIN_S + 1e-9]).sum()))
 
 
 def bounds_in(given: Document) -> np.ndarray:
-    """The bound on the model's error in each elapsed frame of a flight, (frames - 1, 3) rad/s2: the less of
-    those at its ends."""
+    """The bound on the error of the model in each frame of a flight, (frames - 1, 3) rad/s2: the smaller one
+    of those at its two ends."""
     there: list[np.ndarray] = []
 
     def watch(loop: Loop) -> Callable[[], None]:
@@ -120,7 +123,7 @@ def bounds_in(given: Document) -> np.ndarray:
 
 
 def beyond(k: int, spec: Specification, case: int) -> float:
-    """How far what the k-th flight's damage does beyond the bound stands out of the noise."""
+    """Deflection of the part of the damage in flight number k that exceeds the bound."""
     given = shortened(k)
     does, bound = effect(spec, given, case), bounds_in(given)
     n = min(len(does), len(bound))
@@ -130,14 +133,14 @@ def beyond(k: int, spec: Specification, case: int) -> float:
 
 
 def shortened(k: int) -> Document:
-    """The k-th flight, until the second after its damage is over."""
+    """Flight number k, cut off a second after its damage."""
     given = scenario(k)
     return given | {"duration_s": round(given["faults"][0]["at_s"] + WITHIN_S + 0.05, 2)}
 
 
 def seen(k: int, spec: Specification, late: bool) -> Document:
-    """Of the k-th flight: the informed test's largest value before the damage, and within WITHIN_S of it; if
-    ours was late, how far out of the noise what is beyond the bound stands."""
+    """The row of flight number k: the largest value of the informed test before the damage, and within
+    WITHIN_S after it; `beyond` if our diagnosis was late."""
     given = shortened(k) | {"control": {"law": "nominal"}}
     damage = given["faults"][0]
     case = CASES.index(damage["case"]) + 1
@@ -152,7 +155,7 @@ def seen(k: int, spec: Specification, late: bool) -> Document:
 
 
 def rows(ours: dict[int, Document], of: dict[int, Document]) -> Iterator[list[str]]:
-    """A row a case, and one of all."""
+    """Yield a row for each case, and one for all."""
     total = np.zeros(4)
     for case in load("gtm").damage:
         there = [k for k in of if ours[k]["case"] == case]
@@ -167,17 +170,17 @@ def rows(ours: dict[int, Document], of: dict[int, Document]) -> Iterator[list[st
 
 
 def is_late(row: Document) -> bool:
-    """Whether ours did not find it within WITHIN_S."""
+    """Whether our diagnosis did not detect the damage within WITHIN_S."""
     return row["delay_s"] is None or row["delay_s"] > WITHIN_S + 1e-9
 
 
 def level_of(rows_of_case: list[Document]) -> float:
-    """The informed test's level for a case."""
+    """The level of the informed test for a case."""
     return max([LEVEL, *(row["before"] for row in rows_of_case)])
 
 
 def certain(row: Document, level: float) -> float:
-    """The chance that the informed test finds what is beyond the bound."""
+    """The chance that the informed test finds the part of the effect that exceeds the bound."""
     d = row["beyond"]
     return NormalDist().cdf((0.5 * d * d - level) / d) if d > 0.0 else 0.0
 
@@ -187,7 +190,8 @@ def _printed(case: str, row: np.ndarray) -> list[str]:
 
 
 def see_all(ours: dict[int, Document], out: Path) -> dict[int, Document]:
-    """What the informed test makes of our flights: the rows in the file, and the others, added to it."""
+    """The rows of the informed test on our flights, by number: those in the file, and new ones, which are
+    added to it."""
     where = folder()
     assert where is not None
     spec = Specification(where)

@@ -1,24 +1,25 @@
-"""What of all there is to see is found: beside a test that is told everything of a loss but when it strikes.
+"""Losses that our detectors find, beside those of a test that knows the loss, but not its instant.
 
-`python -m tools.docs table unknown-instant` prints it for aircraft of the jsbsim package.
+`python -m tools.docs table unknown-instant` prints the comparison for aircraft of the jsbsim package.
 
-Page's test [Page1954]: the largest log likelihood ratio of "this fault, since some instant" that any instant
-has. Where observations have one distribution before and one after, no test has a shorter worst mean delay at
-the same mean time between false alarms. It is told surface, magnitude and the design model, and the noise by
-the truth's own innovations: a vector autoregression of ORDER frames, fitted to what the design model leaves
-of the healthy flights, whitens them and the fault's signature. Errors of the model, gusts and gyros are in it
-as they are, not as they are declared. Instants are 0.05 s apart and at most 10 s back.
+Page's test [Page1954] computes the log likelihood ratio of "this fault since this instant" for each instant,
+and takes the largest. If the observations have one distribution before the fault and one after it, no test
+has a shorter worst mean delay at the same mean time between false alarms. The test knows the surface, the
+magnitude, the design model and the noise. The noise is that of the true innovations: a vector autoregression
+of ORDER frames is fitted to the accelerations that the design model does not explain in healthy flights. It
+whitens the innovations and the signature of the fault. So it contains the errors of the model, the gusts and
+the noise of the gyros as they are, not as they are declared. Instants are 0.05 s apart and at most 10 s back.
 
-Flights are those of `beaver-ftc detectability --grid`. What is declared is what is there: sensors, air, and
-the error of the aircraft's own model, at the measured pace. It is known within an envelope alone; outside
-nothing is concluded, and losses within a second of which the aircraft is outside are left out.
+The flights are those of `beaver-ftc detectability --grid`. The declaration equals the truth: sensors, air,
+and the error of the aircraft's own model at its measured rate of change. That error is known only within an
+envelope. Outside of it, the diagnosis concludes nothing; a loss is left out if the aircraft leaves the
+envelope within a second of it.
 
-Each surface is lost by 40 and 100 % at 3 and 6 deg/s. Counted are the losses found within 1 s by Page's test
-and by our two detectors, first with levels that give at most 20 false alarms per hour on the healthy flights,
-then at the level that follows from the declaration, 0.001 an hour: Page's level is raised by the logarithm of
-how much rarer its false alarms are to be, which is what it takes of the greatest of many likelihood ratios
-[Lorden1971]. Intervals: 95 % of RESAMPLED draws of flights, a flight's losses kept together, and of the
-healthy flights, from which levels are taken anew.
+Each surface loses 40 and 100 % at 3 and 6 deg/s. The table counts the losses that Page's test and our two
+detectors find within 1 s: first at levels that give at most 20 false alarms per hour on the healthy flights,
+then at the default level, 0.001 an hour. For this, the level of Page's test is raised by the logarithm of the
+ratio of the two rates [Lorden1971]. The intervals hold 95 % of RESAMPLED draws: of the faulty flights, with
+the losses of a flight kept together, and of the healthy flights, which give the levels.
 """
 
 from collections.abc import Iterator
@@ -57,18 +58,19 @@ OWN_ALONE = {
 
 
 class Whitener(NamedTuple):
-    """What is known of noise: from frames before each, (3 ORDER, 3), and the rest's inverse root (3, 3)."""
+    """A model of the noise. before (3 ORDER, 3): predicts a frame from those before it. root (3, 3): inverse
+    root of the covariance of the prediction error."""
 
     before: np.ndarray
     root: np.ndarray
 
     def respond(self, z: np.ndarray) -> np.ndarray:
-        """Accelerations z (n, 3) rad/s2 as they are in the white noise of variance one."""
+        """The whitened accelerations z (n, 3) rad/s2: their noise is white, with variance one."""
         return self.responses(z)[ORDER]
 
     def responses(self, z: np.ndarray) -> np.ndarray:
-        """The same, (ORDER + 1, n, 3), of accelerations that began so many frames before each; the last: or
-        more."""
+        """The same, (ORDER + 1, n, 3), of accelerations that are zero until j frames before each frame, j = 0
+        to ORDER; the last one begins at any earlier frame."""
         rest = np.repeat(z[None], ORDER + 1, axis=0)
         for j, part in enumerate(self.before.reshape(ORDER, 3, 3), start=1):
             rest[j:, j:] -= z[:-j] @ part
@@ -76,7 +78,7 @@ class Whitener(NamedTuple):
 
 
 def fitted(unexplained: list[np.ndarray]) -> Whitener:
-    """Of healthy flights, (n, 3) rad/s2 each."""
+    """The noise model of healthy flights. unexplained: their accelerations, (n, 3) rad/s2 each."""
     past = np.vstack([_past(z)[SETTLED:] for z in unexplained])
     now = np.vstack([z[SETTLED:] for z in unexplained])
     before = np.linalg.lstsq(past, now, rcond=None)[0]
@@ -90,7 +92,8 @@ def _past(z: np.ndarray) -> np.ndarray:
 
 
 def unexplained(recording: Recording) -> np.ndarray:
-    """What design model and vanes' gust leave of each frame's acceleration, (frames - 1, 3) rad/s2."""
+    """The acceleration of each frame that neither the design model nor the gust at the vanes explains,
+    (frames - 1, 3) rad/s2."""
     gust = VaneGust(recording.context)
     seen = [gust.subtracted(measured) for measured, _ in recording.seen]
     x, expected = (
@@ -100,7 +103,7 @@ def unexplained(recording: Recording) -> np.ndarray:
 
 
 def ratios(recording: Recording, surface: str, noise: Whitener) -> dict[float, np.ndarray]:
-    """Of each magnitude the largest log likelihood ratio, at every frame (n,)."""
+    """By magnitude: the largest log likelihood ratio at every frame, (n,)."""
     place = recording.context.surfaces.index(surface)
     does = -np.array([measured.contribution[:, place] for measured, _ in recording.seen[1:]])  # a total loss
     return largest_ratios(recording, does, noise, MAGNITUDES, EVERY)
@@ -110,7 +113,8 @@ def largest_ratios(
     recording: Recording, does: np.ndarray, noise: Whitener, sizes: tuple[float, ...] = (1.0,),
     every: int = 1,
 ) -> dict[float, np.ndarray]:  # fmt: skip
-    """The same of accelerations (n, 3) rad/s2 times each size, since instants so many frames apart."""
+    """By size: the same for a fault that adds accelerations does (n, 3) rad/s2 times this size, since
+    instants that are `every` frames apart."""
     g, n = noise.respond(unexplained(recording)), len(does)
     k, since = np.arange(n), np.arange(0, n, every)
     response = noise.responses(does)
@@ -129,7 +133,8 @@ def largest_ratios(
 
 @dataclass(frozen=True)
 class Survey:
-    """Which aircraft in which air, how many flights a cell and in health; flights' seeds begin at `seed`."""
+    """The flights of one aircraft in one kind of air. flights: number for each cell; healthy: number without
+    a fault; seed: of the first flight."""
 
     aircraft: str
     turbulence: str
@@ -138,7 +143,7 @@ class Survey:
     seed: int
 
     def flown(self, block: Block, duration_s: float, faults: list[dict]) -> Recording:
-        """A flight as shown to plug-ins."""
+        """A flight, recorded as a plug-in sees it."""
         flight = scenario_of(block, duration_s, faults, {"aircraft": self.aircraft})
         return record(with_fdi(flight, BOTH).with_(OWN_ALONE))
 
@@ -151,7 +156,7 @@ class Survey:
         return [self.flown(self.block(speeds[i], 100_000 + i), 18.0, []) for i in range(self.healthy)]
 
     def lost(self, surface: str) -> Iterator[tuple[float, Recording]]:
-        """Magnitude of the loss and the flight."""
+        """Yield the magnitude of each loss of a surface, and its flight."""
         for excitation in EXCITATIONS_DEG_S:
             for number in range(self.flights):
                 block = self.block(excitation, 1000 * int(excitation) + number)
@@ -169,8 +174,8 @@ def is_known(recording: Recording) -> bool:
 
 @dataclass(frozen=True)
 class Seen:
-    """What of a statistic decides about alarms at any level: of each loss (n,) its largest value before, and
-    from then until WITHIN_S after; of healthy flights, their traces."""
+    """The values of a statistic that decide about alarms at any level. before, soon (n,): of each loss, the
+    largest value before it, and from then until WITHIN_S later; healthy: traces of the healthy flights."""
 
     before: np.ndarray
     soon: np.ndarray
@@ -178,12 +183,12 @@ class Seen:
 
     @classmethod
     def of(cls, losses: list[Trace], healthy: list[Trace]) -> "Seen":
-        """Of traces."""
+        """The values of these traces."""
         soon = [max((v for t, v in one.records if t <= WITHIN_S + 1e-9), default=0.0) for one in losses]
         return cls(np.array([one.before for one in losses]), np.array(soon), healthy)
 
     def level(self, drawn: np.ndarray) -> float:
-        """Of PER_H false alarms, of the healthy flights drawn."""
+        """The level with PER_H false alarms an hour on the healthy flights drawn."""
         return level_for([self.healthy[i] for i in drawn], PER_H)
 
     def found(self, level: float) -> np.ndarray:
@@ -193,8 +198,8 @@ class Seen:
 
 @dataclass(frozen=True)
 class Cell:
-    """A surface of an aircraft: of each loss (n,) its flight and magnitude; what Page's test, of each
-    magnitude, and ours made of it."""
+    """The losses of one surface of an aircraft: the flight and the magnitude of each, (n,); the statistic of
+    Page's test by magnitude, and ours."""
 
     aircraft: str
     surface: str
@@ -204,8 +209,8 @@ class Cell:
     ours: Seen
 
     def counts(self, drawn: np.ndarray, losses: np.ndarray) -> np.ndarray:
-        """Of the losses, which may be drawn repeatedly: how many count, found by Page's test, by ours, and
-        at the level as shipped by Page's, by ours."""
+        """Numbers of losses (5,): all, those that Page's test finds, those that ours finds, and the same two
+        at the default level. A loss may be drawn repeatedly."""
         page, shipped = np.zeros((2, len(self.flight)), dtype=bool)
         for magnitude, seen in self.page.items():
             level, of_it = seen.level(drawn), self.magnitude == magnitude
@@ -252,8 +257,8 @@ def counted(cells: list[Cell]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def shares_of(cells: list[Cell]) -> tuple[int, list[list[float]]]:
-    """Losses that count; at equal rates, then as shipped, the share that Page's test finds, ours, ours over
-    its, and the ends of that."""
+    """The number of losses; at equal rates, then at the default level: the share that Page's test finds, the
+    share that ours finds, the ratio of both, and the ends of its interval."""
     total, draws = counted(cells)
     found = []
     for page, ours in ((1, 2), (3, 4)):
@@ -265,7 +270,7 @@ def shares_of(cells: list[Cell]) -> tuple[int, list[list[float]]]:
 
 
 def cells_of(survey: Survey) -> list[Cell]:
-    """All cells of an aircraft."""
+    """The cells of all surfaces of an aircraft."""
     healthy = survey.in_health()
     noise = fitted([unexplained(one) for one in healthy])
     known = find_aircraft(survey.aircraft, Path()).class_of_losses

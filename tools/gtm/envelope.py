@@ -1,8 +1,9 @@
-"""Where the damaged aircraft can be flown: level turns at a speed, a bank and a sideslip, by what is left.
+"""The flight envelope of the damaged aircraft: level turns at a speed, a bank and a sideslip.
 
-Elevators go together, ailerons against one another, rudders together, throttles together; where the rudders
-are lost the sideslip is what it comes to. Newton's method on JSBSim's own six accelerations of a steady turn,
-from the neighbour found before. A point is in the envelope where all accelerations vanish within the travels.
+All elevators move alike, the ailerons in opposite directions, all rudders alike, all throttles alike. If the
+rudders are lost, the sideslip is free. Newton's method makes JSBSim's six accelerations of a steady turn
+zero, and begins at a neighbour that was found before. A point belongs to the envelope if all accelerations
+vanish within the travels.
 """
 
 from collections.abc import Iterator, Sequence
@@ -34,8 +35,8 @@ _LARGEST = np.array([0.05, 0.15, 0.15, 0.15, 0.3, 0.2])
 
 @dataclass(frozen=True)
 class Turn:
-    """A point asked for, and what holds it, rad and shares: alpha, elevator, right aileron, rudder (or
-    sideslip), throttle, turn rate; held: whether all is within its travel."""
+    """A point of the envelope. x: alpha, elevator, right aileron, rudder (sideslip without one), rad,
+    throttle, share of 1, and turn rate, rad/s, that hold it; held: whether all are within their ranges."""
 
     speed_kt: float
     bank_deg: float
@@ -45,7 +46,7 @@ class Turn:
 
 
 class Envelope:
-    """The turns of one case of damage; 0: none."""
+    """The turns with one case of damage; case 0 is the undamaged aircraft."""
 
     def __init__(self, bench: Bench, case: int) -> None:
         taken = list(cases().values())[case - 1]["takes"] if case else ()
@@ -60,7 +61,7 @@ class Envelope:
         self, speeds: Sequence[float] = SPEEDS_KT, banks: Sequence[float] = BANKS_DEG,
         sideslips: Sequence[float] = SIDESLIPS_DEG,
     ) -> Iterator[Turn]:  # fmt: skip
-        """Every point of the grid; from the middle outwards, so that each has a neighbour to begin with."""
+        """Yield every point of the grid, from the middle outwards, so that each has a neighbour to begin at."""
         at = self._start(90.0)
         for speed in sorted(speeds, key=lambda v: abs(v - 90.0)):
             level = min(self.known, key=lambda of: abs(of - speed), default=None)

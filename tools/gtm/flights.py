@@ -1,4 +1,4 @@
-"""The same manoeuvres by JSBSim and by the specification: trim, linear modes, doublets, spin, damage."""
+"""Trim, linear modes, doublets, spin and damage, by JSBSim and by the specification, to compare both."""
 
 import csv
 from collections.abc import Callable
@@ -62,12 +62,13 @@ MOTION = slice(0, 6)  # of SIGNALS: u v w p q r
 
 @cache
 def bench(where: Path, scratch: Path) -> Bench:
-    """The converted model, written into an empty folder."""
+    """The converted model, which is written into an empty folder."""
     return Bench(write_model(read(where / DATABASE), scratch / "gtm"))
 
 
 def of_commands(elevator: float, aileron: float, rudder: float, throttle: float) -> Controls:
-    """Elevators together, ailerons against one another, rudders and throttles together; deg and %."""
+    """Controls that move all elevators alike, the ailerons in opposite directions, and all rudders and all
+    throttles alike; deg and %."""
     found = dict.fromkeys(SURFACES, 0.0)
     found |= dict.fromkeys(("ELLOB", "ELLIB", "ELROB", "ELRIB"), elevator) | dict.fromkeys(
         ("RUDU", "RUDL"), rudder
@@ -76,18 +77,18 @@ def of_commands(elevator: float, aileron: float, rudder: float, throttle: float)
 
 
 def of_steady(steady: Steady) -> Controls:
-    """What holds a steady flight."""
+    """The controls that hold a steady flight."""
     return of_commands(steady.elevator_deg, steady.aileron_deg, steady.rudder_deg, steady.throttle_percent)
 
 
 def state_of(steady: Steady, altitude_ft: float = 800.0) -> State:
-    """Where it is."""
+    """The state of a steady flight."""
     angles = radians(steady.phi_deg), radians(steady.theta_deg), radians(HEADING_DEG)
     return State(*steady.velocity_fps, 0.0, 0.0, 0.0, *angles, altitude_ft)
 
 
 def specified_trim(spec: Specification, wanted: Condition, guess: Steady) -> Steady:
-    """Steady flight by the specification's own equations; wings free, no sideslip."""
+    """The trim by the equations of the specification, without sideslip; the bank angle is free."""
 
     def made(x: np.ndarray) -> Steady:
         first, phi, elevator, aileron, rudder, throttle = map(float, x)
@@ -122,7 +123,7 @@ def _command(model: Bench, controls: Controls) -> None:
 
 @dataclass(frozen=True)
 class Manoeuvre:
-    """A name, where it starts, what is commanded, how long, and the damage of it."""
+    """A manoeuvre: its first state, its commands over time, its duration, and the damage with its instant."""
 
     name: str
     start: State
@@ -132,7 +133,7 @@ class Manoeuvre:
     onset_s: float = 10.0
 
     def by_specification(self, spec: Specification) -> np.ndarray:
-        """SIGNALS at every step of 5 ms, (n, 10)."""
+        """SIGNALS at every step of 5 ms, (n, 10), by the specification."""
         servos, x, rows = Servos(spec.of, self.plan(0.0)), self.start.array(), []
         for k in range(round(self.end_s / STEP_S) + 1):
             rows.append(x)
@@ -141,7 +142,7 @@ class Manoeuvre:
         return np.array(rows)
 
     def by_jsbsim(self, model: Bench, dt: float = STEP_S, integrator: int = EULER) -> np.ndarray:
-        """The same at the same times. A command is that of the time at which the frame that reads it ends."""
+        """SIGNALS at the same times, by JSBSim. A frame reads the command of the time at which it ends."""
         fdm, start = model.fdm, self.start
         fdm["simulation/integrator/rate/rotational"] = integrator
         fdm.set_dt(dt)
@@ -171,7 +172,7 @@ class Manoeuvre:
 
 
 def doublets(steady: Steady) -> Manoeuvre:
-    """2 deg of elevator at 1 s, rudder at 4 s, ailerons at 7 s, each half a second to either side."""
+    """Doublets of 2 deg: elevator at 1 s, rudder at 4 s, ailerons at 7 s, half a second to either side."""
 
     def plan(t: float) -> Controls:
         size = {at: 2.0 * ((at <= t < at + 0.5) - 1.0 * (at + 0.5 <= t < at + 1.0)) for at in (1.0, 4.0, 7.0)}
@@ -188,7 +189,7 @@ _ENDS_S = {2: 12.0}
 
 
 def damaged(steady: Steady, case: int) -> Manoeuvre:
-    """In a turn, which an aileron pulse at 6 s begins; damage at 10 s, with the controls as they are."""
+    """Damage at 10 s, in a turn that an aileron pulse at 6 s begins; the controls stay as they are."""
 
     def plan(t: float) -> Controls:
         pulse = -2.0 if 6.0 <= t < 6.8 else 0.0
@@ -203,8 +204,8 @@ SPIN = {"alpha": 23.2, "beta": 0.9, "p": -363.0, "q": 27.0, "r": -155.0}
 
 
 def spin(spec: Specification) -> Manoeuvre:
-    """From a steady spin of the specification near the published one: airspeed, attitude and controls
-    as six accelerations of zero want them."""
+    """A steady spin of the specification near the published one: its airspeed, attitude and controls make
+    all six accelerations zero."""
     rates = np.array([SPIN[axis] for axis in "pqr"]) * np.pi / 180.0
     size = float(np.linalg.norm(rates))
     down = -rates / size  # a steady spin turns about the vertical, this one to the left
@@ -231,7 +232,7 @@ def spin(spec: Specification) -> Manoeuvre:
 
 
 def linear(of: Callable[[np.ndarray], np.ndarray], x: np.ndarray) -> np.ndarray:
-    """Jacobian (8, 8) of u v w p q r phi theta by differences; `of` gives the six accelerations."""
+    """Jacobian (8, 8) of u, v, w, p, q, r, phi, theta by differences. of: returns the six accelerations."""
 
     def all_of(state: np.ndarray) -> np.ndarray:
         p, q, r, phi, theta = state[3:8]
@@ -244,7 +245,7 @@ def linear(of: Callable[[np.ndarray], np.ndarray], x: np.ndarray) -> np.ndarray:
 
 
 def modes(matrix: np.ndarray) -> dict[str, tuple[float, float]]:
-    """Frequency rad/s and damping: short period and phugoid; the roots of the lateral motion."""
+    """Frequency, rad/s, and damping of each oscillation of the longitudinal and of the lateral motion."""
     longitudinal, lateral = [0, 2, 4, 7], [1, 3, 5, 6]
     found: dict[str, tuple[float, float]] = {}
     for kind, states in (("longitudinal", longitudinal), ("lateral", lateral)):
@@ -258,7 +259,7 @@ def modes(matrix: np.ndarray) -> dict[str, tuple[float, float]]:
 
 
 def linear_jsbsim(model: Bench, steady: Steady) -> np.ndarray:
-    """Of the converted model."""
+    """The Jacobian of the converted model."""
     for name, number in steady.commands().items():
         model.fdm[name] = number
 
@@ -271,7 +272,7 @@ def linear_jsbsim(model: Bench, steady: Steady) -> np.ndarray:
 
 
 def linear_specified(spec: Specification, steady: Steady) -> np.ndarray:
-    """Of the specification."""
+    """The Jacobian of the specification."""
     controls, whole = of_steady(steady), state_of(steady).array()
     return linear(lambda x: spec.rates_of_change(np.array([*x, *whole[8:]]), controls, 0)[:6], whole[:8])
 
@@ -280,7 +281,7 @@ def coefficients(
     model: Bench, alpha: float, beta: float, V: float, rates: Any, deg: dict[str, float], case: int = 0,
     gear: float = 0.0,
 ) -> np.ndarray:  # fmt: skip
-    """CX CY CZ Cl Cm Cn of the converted model, its stops out of the way."""
+    """The coefficients CX, CY, CZ, Cl, Cm, Cn of the converted model, with its stops out of reach."""
     fdm, travel = model.fdm, parameters()["surfaces"]
     for letters, name in NAMES.items():
         fdm[f"fcs/{name}-cmd-rad"] = radians(deg[letters])
@@ -300,7 +301,7 @@ def coefficients(
 
 
 def at_the_given_points(model: Bench, where: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Coefficients at the points of the source, (60, 6) each: as given, and of the converted model."""
+    """Coefficients at the points of the source, (60, 6) each: those given, and those of the converted model."""
     with (where / "points.csv").open() as file:
         rows = [{name: float(text) for name, text in row.items()} for row in csv.DictReader(file)]
     given = np.array([[row[name] for name in OUTPUTS] for row in rows])
@@ -327,15 +328,15 @@ def masses(model: Bench, case: int) -> np.ndarray:
 
 
 def gravity_of(model: Bench, spec: Specification) -> float:
-    """What JSBSim's Earth leaves of the weight in the check point's flight, over the mass, ft/s2: of two
-    equal lifts at equal angle of attack the speeds squared are as the weights."""
+    """The gravity of JSBSim's Earth less the centrifugal part of the flight at the check point, ft/s2. At
+    equal angles of attack, the squares of the trim speeds are proportional to the weights."""
     here = model.steady(Condition(alpha_deg=3.0))
     there = specified_trim(spec, Condition(alpha_deg=3.0), here)
     return float(spec.gravity * (here.airspeed_fps / there.airspeed_fps) ** 2)
 
 
 def largest(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Largest difference of each signal as a share of its span in the first; of a span below a tenth of the
-    signal's size, as a share of that tenth."""
+    """Largest difference of each signal, as a share of its span in the first flight, or of a tenth of its
+    size, if the span is smaller."""
     span = np.maximum(np.ptp(one, axis=0), 0.1 * np.abs(one).max(axis=0))
     return np.asarray(np.abs(one - other).max(axis=0) / np.maximum(span, 1e-9))

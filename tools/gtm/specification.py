@@ -1,10 +1,10 @@
-"""The Generic Transport Model from the words of its specification, with nothing of the converter.
+"""The Generic Transport Model, written from its specification, without any code of the converter.
 
-It reads the data base and `parameters.yaml` of one folder (`BEAVER_FTC_GTM`, or ../shared/reference/gtm
-beside the checkout). Tables are interpolated where they are, all axes at once; the flight is integrated by
-Bogacki and Shampine's third-order method at 5 ms, over a flat Earth with the source's gravity, in the US
-standard atmosphere of 1976 below 11 km. Units: ft, slug, lbf, s; angles of tables and surfaces in deg,
-throttles in %.
+The module reads the data base and `parameters.yaml` of one folder (`BEAVER_FTC_GTM`, or
+../shared/reference/gtm beside the checkout). A table is interpolated over all axes at once. Bogacki and
+Shampine's third-order method integrates the flight in steps of 5 ms, over a flat Earth with the gravity of
+the source, in the US standard atmosphere of 1976 below 11 km. Units: ft, slug, lbf, s; angles of tables and
+surfaces in deg, throttles in %.
 """
 
 import os
@@ -31,19 +31,20 @@ STEP_S = 0.005
 
 
 def folder() -> Path | None:
-    """Where data base and parameters are, if they are."""
+    """The folder with data base and parameters; None if they are not there."""
     found = Path(os.environ.get(WHERE) or Path(__file__).parents[3] / "shared" / "reference" / "gtm")
     there = (found / DATABASE).is_file() and (found / "parameters.yaml").is_file()
     return found if there else None
 
 
 def axes_of(alpha: float, beta: float) -> np.ndarray:
-    """The way of the flow at these angles, rad, in body axes."""
+    """Unit vector of the airspeed in body axes at these flow angles, rad."""
     return np.array([cos(alpha) * cos(beta), sin(beta), sin(alpha) * cos(beta)])
 
 
 def multilinear(data: np.ndarray, axes: list[list[float]], at: list[float], hold: bool = False) -> np.ndarray:
-    """Between breakpoints; beyond them along the last cell, or held."""
+    """The value of a table at a point, by multilinear interpolation. Beyond the breakpoints, the last cell is
+    extended, or its end value is held."""
     for grid, place in zip(axes, at, strict=True):
         x = min(max(place, grid[0]), grid[-1]) if hold else place
         i = min(max(bisect_right(grid, x) - 1, 0), len(grid) - 2)
@@ -54,7 +55,7 @@ def multilinear(data: np.ndarray, axes: list[list[float]], at: list[float], hold
 
 @dataclass
 class State:
-    """u v w ft/s, p q r rad/s, phi theta psi rad, altitude ft."""
+    """The state: u, v, w in ft/s; p, q, r in rad/s; phi, theta, psi in rad; altitude in ft."""
 
     u: float
     v: float
@@ -68,20 +69,20 @@ class State:
     altitude: float = 800.0
 
     def array(self) -> np.ndarray:
-        """In this order."""
+        """The state as an array, in the order of the fields."""
         return np.array(list(vars(self).values()))
 
 
 @dataclass
 class Controls:
-    """Where surfaces stand, deg, and throttles as the engines follow them, %."""
+    """Deflections of the surfaces, deg, and throttles that the engines follow, %."""
 
     surfaces: dict[str, float] = field(default_factory=lambda: dict.fromkeys(SURFACES, 0.0))
     throttles: tuple[float, float] = (40.0, 40.0)
 
 
 class Specification:
-    """The aircraft. gravity: ft/s2, the source's unless given."""
+    """The aircraft. gravity: ft/s2; that of the source if none is given."""
 
     def __init__(self, where: Path, gravity: float | None = None) -> None:
         self.of: dict[str, Any] = yaml.safe_load((where / "parameters.yaml").read_text(encoding="utf-8"))
@@ -111,7 +112,7 @@ class Specification:
         self, alpha: float, beta: float, V: float, rates: np.ndarray, deg: dict[str, float], case: int = 0,
         gear: bool = False,
     ) -> np.ndarray:  # fmt: skip
-        """CX CY CZ Cl Cm Cn; alpha, beta in rad."""
+        """The coefficients CX, CY, CZ, Cl, Cm, Cn; alpha and beta in rad."""
         a, b = degrees(alpha), degrees(beta)
         c = self._look("C6_bas", "alpha beta", [a, b])
         if case:
@@ -172,7 +173,7 @@ class Specification:
         return c
 
     def mass(self, case: int = 0) -> tuple[float, np.ndarray, np.ndarray]:
-        """Weight lbf, centre of gravity ft, inertia slug ft2, in the source's way."""
+        """Weight, lbf, centre of gravity, ft, and inertia, slug ft2, as the source computes them."""
         of = self.of["mass"]
         i = dict(of["inertia"])
         for name, polynomial in of["inertia_fuel_polynomials"].items():
@@ -189,14 +190,14 @@ class Specification:
         return weight, cg, tensor
 
     def air(self, altitude: float) -> tuple[float, float]:
-        """Pressure lbf/ft2, density slug/ft3."""
+        """Pressure, lbf/ft2, and density, slug/ft3, of the air."""
         earth = self.of["constants"]["earth_radius_atmosphere_ft"]
         warm = 1.0 - 6.8755856e-6 * earth * altitude / (earth + altitude)
         pressure = 2116.22 * warm**5.2558797
         return pressure, pressure / (self.of["constants"]["gas_constant"] * 518.67 * warm)
 
     def rates_of_change(self, x: np.ndarray, controls: Controls, case: int) -> np.ndarray:
-        """Of a state's array."""
+        """The derivative of a state, both as arrays."""
         velocity, omega, (phi, theta, _), altitude = x[:3], x[3:6], x[6:9], x[9]
         V = float(np.linalg.norm(velocity))
         alpha, beta = atan2(velocity[2], velocity[0]), asin(velocity[1] / V)
@@ -241,7 +242,8 @@ class Specification:
 
 
 def _about_flow(rates: np.ndarray, along: np.ndarray) -> float:
-    """The largest rate about the flow that leaves no larger rates, and none of another sign, rad/s."""
+    """The rate about the flow, rad/s, whose removal makes neither p nor r larger nor changes its sign; 0 if
+    there is none."""
     omega = 0.0
     for i, j in ((0, 2), (2, 0)):
         if along[i] != 0.0 and rates[i] != 0.0:
@@ -254,8 +256,9 @@ _OF_RATES = (("dC3_p", "phat", _LATERAL), ("dC3_q", "qhat", _LONGITUDINAL), ("dC
 
 
 class Servos:
-    """Surfaces and engines on their way: 15 ms late, first order at 5 Hz within 300 deg/s and the stops; the
-    engines' spool. Exact for a command that stays for a step, but where the rate is limited."""
+    """Surfaces and engines between command and position. A surface has a delay of 15 ms, and follows as a
+    first-order system of 5 Hz, within 300 deg/s and its stops; an engine has its spool. The step is exact for
+    a command that is constant in it, unless the rate is limited."""
 
     def __init__(self, of: dict[str, Any], command: Controls) -> None:
         self.limits = {name: ends for name, ends in of["actuators"]["limits"].items() if name in SURFACES}
@@ -269,7 +272,7 @@ class Servos:
         self.spools = [np.array([0.0, throttle / 0.7314]) for throttle in command.throttles]
 
     def move(self, command: Controls) -> Controls:
-        """One step on."""
+        """Advance by one step; returns the positions."""
         self._late.append(dict(command.surfaces))
         asked = self._late.pop(0)
         share, most = 1.0 - np.exp(-2.0 * pi * 5.0 * STEP_S), 300.0 * STEP_S

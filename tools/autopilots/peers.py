@@ -1,4 +1,4 @@
-"""The autopilots' ends of both protocols, around a `Small` or any other that gives outputs."""
+"""The autopilot's side of both protocols, around a `Small` or another function that computes outputs."""
 
 import socket
 import struct
@@ -19,7 +19,7 @@ MOST_BYTES = 65536
 
 
 def pulses(outputs: Outputs) -> list[int]:
-    """Pulses, us, of roll, pitch, throttle, yaw, in the usual channels."""
+    """Pulses, us, of roll, pitch, throttle and yaw, in the usual channels."""
     roll, pitch, throttle, yaw = outputs
     return [
         round(1500 + 500 * roll),
@@ -30,14 +30,14 @@ def pulses(outputs: Outputs) -> list[int]:
 
 
 def packet(count: int, rate_hz: int, outputs_us: Iterable[int], channels: int = 16) -> bytes:
-    """A datagram of ArduPilot's."""
+    """A datagram as ArduPilot sends it."""
     magic, form = FORMS[channels]
     given = list(outputs_us)
     return struct.pack(form, magic, rate_hz, count, *given, *[0] * (channels - len(given)))
 
 
 def told(answer: bytes) -> Told:
-    """What ArduPilot makes of an answer."""
+    """The quantities that ArduPilot reads from an answer."""
     values = read(answer)
     (t_s,), (_, _, down), (_, _, sinking) = values["timestamp"], values["position"], values["velocity"]
     rates, attitude = values["imu/gyro"], values["attitude"]
@@ -47,7 +47,7 @@ def told(answer: bytes) -> Told:
 
 
 class Ardupilot:
-    """Counts its frames from 0; without an answer for `patience_s` it sends the same packet again."""
+    """ArduPilot: it counts its frames from 0, and repeats a packet after `patience_s` without an answer."""
 
     def __init__(self, pilot: Pilot, rate_hz: int = 100) -> None:
         self._pilot, self.rate_hz = pilot, rate_hz
@@ -55,18 +55,18 @@ class Ardupilot:
         self.sent: list[bytes] = []
 
     def next(self) -> bytes:
-        """The packet of the frame to come."""
+        """The packet of the next frame."""
         return packet(self.count, self.rate_hz, pulses(self._outputs))
 
     def hear(self, answer: bytes) -> Told:
-        """An answer: the count goes on."""
+        """Read an answer, and go on to the next frame."""
         now = told(answer)
         self._outputs = self._pilot(now)
         self.count += 1
         return now
 
     def fly(self, address: tuple[str, int], frames: int, patience_s: float = 1.0) -> Told | None:
-        """So many frames over UDP, or until nobody answers any more."""
+        """Fly frames over UDP, until there are no more answers."""
         now = None
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as line:
             line.connect(address)
@@ -93,10 +93,10 @@ class Ardupilot:
 
 
 class Px4:
-    """In lockstep: each HIL_SENSOR is its time, and is answered with HIL_ACTUATOR_CONTROLS of that stamp.
+    """PX4 in lockstep: each HIL_SENSOR sets its time, and it answers with HIL_ACTUATOR_CONTROLS of that time.
 
-    silent: so many HIL_SENSOR at the start are not answered, as an autopilot that starts; armed_after: so
-    many answers bear no armed bit. texts, acks: what came besides.
+    silent: number of HIL_SENSOR messages at the start without an answer, while the autopilot starts;
+    armed_after: number of answers without the armed bit. texts, acks: other messages that came.
     """
 
     def __init__(self, pilot: Pilot, silent: int = 5, armed_after: int = 5) -> None:
@@ -111,7 +111,7 @@ class Px4:
         self.acks: list[tuple[int, int]] = []
 
     def hear(self, data: bytes) -> bytes:
-        """What it answers to these bytes."""
+        """The answer to these bytes."""
         answer = b""
         for message in self._mav.parse_buffer(data) or []:
             kind = message.get_type()
@@ -142,8 +142,7 @@ class Px4:
         return bytes(message.pack(self._mav))
 
     def _told(self, sensor: Any) -> Told:
-        """Attitude and climb of the truth, which a filter of its own would estimate; the rest as it is
-        sensed."""
+        """The measured quantities. Attitude and climb are the true ones, which PX4 would estimate."""
         w, x, y, z = self.state.attitude_quaternion
         attitude = (
             atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)),
@@ -158,7 +157,7 @@ class Px4:
         )
 
     def fly(self, address: tuple[str, int], frames: int, patience_s: float = 3.0) -> None:
-        """Connect and answer until so many HIL_SENSOR have come, or the line is closed."""
+        """Connect and answer until this number of HIL_SENSOR messages has come, or the line is closed."""
         with socket.create_connection(address, timeout=patience_s) as line:
             while len(self.stamps) < frames:
                 try:

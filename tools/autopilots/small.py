@@ -1,8 +1,8 @@
-"""A small autopilot: attitude, altitude, speed and heading by cascaded gains, for an aircraft like the
+"""A small autopilot: cascaded gains hold attitude, altitude, speed and heading of an aircraft like the
 Beaver.
 
-What it is told is what the protocols tell; what it gives is outputs: roll, pitch and yaw, -1 to 1, throttle 0
-to 1. More is: roll right, pitch up, yaw right, more power.
+Its inputs are the quantities that the protocols transmit. Its outputs are roll, pitch and yaw from -1 to 1
+and throttle from 0 to 1; a larger output rolls right, pitches up, yaws right or adds power.
 """
 
 from dataclasses import dataclass, field, replace
@@ -24,7 +24,7 @@ STEEPEST_MPS = 3.0
 
 @dataclass(frozen=True)
 class Told:
-    """What an autopilot knows. SI, radians; side_mps2: specific force to the right."""
+    """The inputs of an autopilot, in SI units and radians. side_mps2: specific force to the right."""
 
     t_s: float
     rates: tuple[float, float, float]
@@ -36,13 +36,13 @@ class Told:
 
 
 def clipped(value: float, most: float) -> float:
-    """Within -most and most."""
+    """A value, limited to -most and most."""
     return min(max(value, -most), most)
 
 
 @dataclass
 class Small:
-    """Flies the circuit from where it begins. legs: of the circuit."""
+    """Flies a circuit from its first position. legs: climb, bank and speed of each leg."""
 
     legs: tuple[tuple[float, float, float], ...] = CIRCUIT
     _from: Told | None = field(default=None)
@@ -55,7 +55,7 @@ class Small:
         self._level = 0.0  # pitch attitude of level flight, beyond the first one
 
     def outputs(self, told: Told) -> tuple[float, float, float, float]:
-        """Roll, pitch, throttle, yaw: in the order of the usual channels 1 to 4."""
+        """Roll, pitch, throttle and yaw, in the order of the usual channels 1 to 4."""
         if self._from is None or told.t_s < self._t_s:
             self._begin(told)
         assert self._from is not None
@@ -76,8 +76,8 @@ class Small:
         return clipped(self._roll + 0.8 * off - 0.2 * told.rates[0], 0.6)
 
     def _to_path(self, told: Told, climb: float, dt: float) -> float:
-        """Towards the altitude by climbing, towards the climb by attitude, towards the attitude by the
-        elevator."""
+        """The pitch output. The altitude error sets the climb, the climb error sets the attitude, and the
+        attitude error sets the elevator."""
         assert self._from is not None
         wanted = climb + clipped(0.1 * (self._altitude_m - told.altitude_m), STEEPEST_MPS)
         off = (wanted - told.climb_mps) / told.airspeed_mps
@@ -93,7 +93,7 @@ class Small:
         return clipped(self._pitch + 1.0 * off - 0.5 * (told.rates[1] - turning), 0.6)
 
     def _to_slip(self, told: Told, dt: float) -> float:
-        """Against the side force, with the rates of a coordinated turn."""
+        """The yaw output: it reduces the side force, and yaws as in a coordinated turn."""
         turning = G_MPS2 / told.airspeed_mps * sin(told.attitude[0])
         self._yaw = clipped(self._yaw - 0.06 * told.side_mps2 * dt, 0.4)
         return clipped(self._yaw - 0.15 * told.side_mps2 + 0.8 * (turning - told.rates[2]), 0.9)
@@ -112,9 +112,9 @@ FLARE_M = 5.0
 
 @dataclass
 class Circuit(Small):
-    """Takes off, climbs, turns, lands and rolls out. Height is that above where it stood.
+    """Takes off, climbs, turns, lands and rolls out. Heights are above its first position.
 
-    top_m: to which height it climbs. turn_deg: by how much it turns. phase: of these, where it is.
+    top_m: height to which it climbs. turn_deg: angle by which it turns. phase: its present phase.
     """
 
     top_m: float = 40.0
@@ -123,7 +123,7 @@ class Circuit(Small):
     _stood: Told | None = field(default=None)
 
     def outputs(self, told: Told) -> tuple[float, float, float, float]:
-        """As `Small`."""
+        """The outputs, as of `Small`."""
         if self._stood is None or told.t_s < self._t_s:
             self._stood, self.phase, self._heading = told, "roll", told.attitude[2]
             self._begin(told)
@@ -176,5 +176,5 @@ class Circuit(Small):
 
 
 def _wrapped(angle: float) -> float:
-    """Within -pi and pi."""
+    """An angle, rad, between -pi and pi."""
     return (angle + pi) % (2.0 * pi) - pi

@@ -1,8 +1,8 @@
-"""A bad line between an autopilot and an endpoint: what is flown twice, or lost?
+"""A bad line between an autopilot and an endpoint: is a frame flown twice, or lost?
 
-Packets are lost, doubled, overtaken, cut; garbage and other senders come between; either side is silent for
-seconds; the autopilot is started again. The line's own clock runs, so that nothing has to be waited for. Each
-frame bears its number in its outputs; `Spy` keeps what is flown.
+The line loses, doubles, reorders and cuts packets. Garbage and packets of other senders arrive. Either side
+is silent for seconds, and the autopilot is restarted. The line has a clock of its own, so that no test waits.
+The outputs of each frame contain its number, and `Spy` records the numbers of the frames that are flown.
 """
 
 import struct
@@ -35,7 +35,7 @@ ODDS = {
 
 
 class Spy:
-    """A body that keeps the number each frame bears, and hands it on. flown: a list a flight."""
+    """A vehicle that records the number of each frame, and flies it. flown: a list for each flight."""
 
     def __init__(self, body: Any, number_of: Any) -> None:
         self._body, self._number_of = body, number_of
@@ -64,59 +64,60 @@ class Spy:
 
 @dataclass
 class Found:
-    """What came of it. meant: the numbers of the frames asked for, flown: of those flown, a list a flight."""
+    """The frames of a trial. meant, flown: numbers of the frames that were requested, and of those that were
+    flown; a list for each flight."""
 
     flown: list[list[int]]
     meant: list[list[int]] = field(default_factory=list)
 
     @property
     def frames(self) -> int:
-        """Frames asked for."""
+        """Number of requested frames."""
         return sum(map(len, self.meant))
 
     @property
     def twice(self) -> int:
-        """Frames flown that had been flown, or that nobody had asked for in this place."""
+        """Number of frames that were flown before, or that were not requested at this place."""
         return sum(len(flown) - len(set(flown)) for flown in self.flown)
 
     @property
     def lost(self) -> int:
-        """Frames asked for and never flown, or not in order."""
+        """Number of requested frames that were not flown, or not in order."""
         pairs = zip(self.meant, self.flown, strict=False)
         wrong = sum(list(meant) != list(flown) and len(set(meant) ^ set(flown)) + 1 for meant, flown in pairs)
         return wrong + abs(len(self.meant) - len(self.flown))
 
 
 class Line:
-    """What happens on it, drawn by a seed."""
+    """The random events of a line. seed: of the random numbers."""
 
     def __init__(self, seed: int) -> None:
         self.rng, self.now_s = np.random.default_rng(seed), 0.0
 
     def does(self, what: str) -> bool:
-        """Whether this happens now."""
+        """Whether an event happens now."""
         return bool(self.rng.random() < ODDS[what])
 
     def wait(self) -> None:
-        """A frame's time passes, now and then seconds."""
+        """Let the time of a frame pass, sometimes some seconds."""
         self.now_s += STEP_S
         if self.does("silence"):
             self.now_s += float(self.rng.uniform(1.5, 8.0))
 
     def noise(self) -> bytes:
-        """Garbage: bytes, or what begins like a packet."""
+        """Garbage: random bytes, or bytes that begin like a packet."""
         some = self.rng.bytes(int(self.rng.integers(0, 80)))
         return some if self.rng.random() < 0.5 else struct.pack("<HHI", 18458, 400, 7) + some[:20]
 
 
 def number_in_pulses(outputs: Any) -> int:
-    """The frame's number, in channels 15 and 16."""
+    """The number of a frame, from channels 15 and 16."""
     return int(outputs[14]) + 65536 * int(outputs[15])
 
 
 def _flights(line: Line, found: Found, frames: int, a_flight: int) -> Iterator[tuple[int, list[int]]]:
-    """The size of each flight, about `a_flight` frames, until so many are asked for; and where its frames are
-    noted."""
+    """Yield the size of each flight, about `a_flight` frames, until so many frames are requested, and the
+    list for its frames."""
     while (left := frames - found.frames) > 0:
         size = min(int(line.rng.integers(a_flight // 2, 2 * a_flight)), left)
         found.meant.append([])
@@ -124,7 +125,7 @@ def _flights(line: Line, found: Found, frames: int, a_flight: int) -> Iterator[t
 
 
 def ardupilot(body: Any, frames: int, seed: int, a_flight: int) -> Found:
-    """So many frames of ArduPilot's protocol over a bad line, restarted after about `a_flight` of them."""
+    """Fly frames of ArduPilot's protocol over a bad line, with a restart after about `a_flight` of them."""
     line, spy = Line(seed), Spy(body, number_in_pulses)
     found, end, port = Found(spy.flown), Ardupilot(spy, Link()), 1
     for size, meant in _flights(line, found, frames, a_flight):
@@ -153,7 +154,7 @@ def _fly_ardupilot(line: Line, end: Ardupilot, port: int, size: int, meant: list
 
 
 def _asked(line: Line, end: Ardupilot, port: int, datagram: bytes, before: deque[bytes]) -> bytes | None:
-    """The answer that gets through to one sending of a packet."""
+    """The answer to a packet that is sent once; None if packet or answer is lost."""
     line.wait()
     if line.does("garbage"):
         assert end.take(line.noise(), port, line.now_s) is None
@@ -171,12 +172,12 @@ def _asked(line: Line, end: Ardupilot, port: int, datagram: bytes, before: deque
 
 
 def number_in_controls(outputs: Any) -> int:
-    """The frame's number, in the last control."""
+    """The number of a frame, from the last control."""
     return round(outputs[15] * 2**20)
 
 
 def px4(body: Any, frames: int, seed: int, a_flight: int) -> Found:
-    """So many frames of PX4's protocol over a bad line; each flight is a connection."""
+    """Fly frames of PX4's protocol over a bad line, with a connection for each flight."""
     line, spy = Line(seed), Spy(body, number_in_controls)
     spy.flown.append([])
     found, end = Found(spy.flown), Px4(spy, Link(), Mavlink(), lambda params: (3, ""))
@@ -213,9 +214,9 @@ def _fly_px4(line: Line, end: Px4, size: int, meant: list[int]) -> None:
 
 
 def _told(line: Line, end: Px4, answer: bytes, before: deque[bytes]) -> bytes:
-    """What comes back for an answer, or for none: then time passes until the endpoint says its last again.
+    """The bytes that come back for an answer. If none come, time passes until the endpoint repeats its last.
 
-    The first answer gets through: until then the endpoint takes the autopilot for one that starts.
+    The first answer is not lost: until it arrives, the endpoint assumes that the autopilot starts.
     """
     if len(before) == 1:
         return end.take(answer, line.now_s)

@@ -1,8 +1,8 @@
-"""Whole scenarios drawn from the schema, and every promise that a flight of one must keep.
+"""Whole scenarios drawn from the schema, and the promises that a flight of each must keep.
 
     schema.json_schema() -> factors.py -> array.py -> compose.py -> fly -> promises.py -> shrink.py
 
-What a scenario may say is read from its JSON schema: a new key is a new factor by itself. `ranges.py` has
-what the schema does not say: ranges in which a flight means something. `declare.py` makes `fdi.bounds` cover
-what was drawn of the truth. `python -m tools.drawn --help` says how to fly them.
+The JSON schema says which scenarios exist, so a new key is a new factor. `ranges.py` has the ranges in which
+a flight means something, which the schema does not have. `declare.py` makes `fdi.bounds` contain the drawn
+truth. `python -m tools.drawn --help` explains how to fly the scenarios.
 """

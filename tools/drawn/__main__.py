@@ -23,7 +23,7 @@ WORDS = ("flights", "refused", "detected", "named", "broken")
 
 
 def main() -> None:
-    """Fly, say what is broken, and how often which promise."""
+    """Fly, print the broken promises, and how often each is broken."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--flights", type=int, default=600)
     parser.add_argument("--seed", type=int, default=1)

@@ -1,7 +1,8 @@
 """A covering array: rows in which every pair of levels of any two factors stands together at least once.
 
-Greedy, a row at a time: a row begins with a pair that none has yet, and each further cell takes the level
-that brings the most new pairs. The rows are few dozen more than the two largest factors multiplied.
+The algorithm is greedy. A row begins with a pair that no row has yet, and each further cell takes the level
+that adds the most new pairs. The number of rows is a few dozen more than the product of the two largest
+factors.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -17,8 +18,8 @@ TRIES = 20  # rows begun for a pair before it is said to be impossible
 
 @dataclass(frozen=True)
 class Factor:
-    """needs: the cell means something only where another factor has one of these levels, e.g. a profile only
-    where there is a fault."""
+    """A factor and its levels. needs: levels that another factor must have for this factor to mean something;
+    a profile needs a fault, for example."""
 
     name: str
     levels: tuple[str, ...]
@@ -26,7 +27,7 @@ class Factor:
 
 
 class CoveringArray:
-    """The rows for some factors. impossible: pairs that cannot stand in any row, found on the way.
+    """The rows for some factors. impossible: pairs that no row can have, as far as they were found.
 
     forbidden(factor, level, other factor, other level): whether two levels may not stand together.
     """
@@ -60,7 +61,7 @@ class CoveringArray:
         return clash
 
     def rows(self) -> Iterator[Row]:
-        """Until no pair is left; a cell that means nothing in a row is not in it."""
+        """Yield rows until no pair is left. A row has no cell that means nothing in it."""
         while (left := np.argwhere(np.triu(self._open))).size:
             pair = left[self._rng.integers(len(left))]
             for _ in range(TRIES):
@@ -75,7 +76,7 @@ class CoveringArray:
             yield dict(self.cells[i] for i in chosen)
 
     def _row(self, pair: np.ndarray) -> list[int] | None:
-        """A row with this pair, as cells; None where it has come to a dead end."""
+        """The cells of a row with this pair; None if the row cannot be completed."""
         chosen: dict[str, int] = {}
         for i in pair:
             if not self._put(int(i), chosen):
@@ -97,7 +98,7 @@ class CoveringArray:
         return list(chosen.values())
 
     def _put(self, place: int, chosen: dict[str, int]) -> bool:
-        """Take a cell, and what it needs; whether that was possible."""
+        """Add a cell, and cells that it needs. Returns whether that was possible."""
         name, _ = self.cells[place]
         if name in chosen:
             return chosen[name] == place

@@ -20,7 +20,7 @@ NO_TRIM = ("trim", "no steady straight flight")  # a refusal that the schema can
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a flight. refused: why it was not flown."""
+    """The outcome of a flight. refused: the reason why it was not flown."""
 
     index: int
     broken: tuple[str, ...] = ()
@@ -30,7 +30,7 @@ class Outcome:
 
 
 def fly(drawn: Drawn, again: bool | None = None) -> Outcome:
-    """Fly it, and hold it against every promise. again: whether to fly it twice; every so many-th."""
+    """Fly a scenario, and test every promise. again: whether to fly it twice; by default every third one."""
     again = drawn.index % AGAIN == 0 if again is None else again
     try:
         flight = bf.fly(drawn.scenario(), log=False)
@@ -48,7 +48,7 @@ def fly(drawn: Drawn, again: bool | None = None) -> Outcome:
 
 
 def keep_it(folder: Path, drawn: Drawn, outcome: Outcome, shrink: bool) -> None:
-    """Write a counterexample where it can be flown again, and a smaller one that breaks the same."""
+    """Write a counterexample to a file, or with `shrink` a smaller one that breaks the same promise."""
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{drawn.words['name']}.yaml"
     words = drawn.words
@@ -59,6 +59,6 @@ def keep_it(folder: Path, drawn: Drawn, outcome: Outcome, shrink: bool) -> None:
 
 
 def plain(words: Words) -> Words:
-    """Without tuples and NumPy's numbers, which YAML has not."""
+    """The data without tuples and NumPy numbers, which YAML cannot write."""
     found: Words = json.loads(json.dumps(words, default=np.generic.item))
     return found

@@ -1,15 +1,15 @@
-"""Certificates of drawn flights: does the checker accept the true ones, and refuse what is altered or false?
+"""Certificates of drawn flights: does the checker accept true ones, and refuse altered and false ones?
 
     python -m tools.drawn.certificates [--flights N] [--seed S] [--altered A] [--forged F]
 
-The certificates of N flights of our scheme, drawn from the schema (`python -m tools.drawn`), and of N healthy
-ones are checked. A times a number, index or frame of one of them is altered: as it is, and with the digest
-written again, so that only what is recomputed is left to refuse it. F times a false statement is put into
-one: an alarm in a row in which there was none, an exclusion of a fault that is not excluded, or at another
-time. Its evidence, of another event or made up (forged.yaml), is changed by one to three EDITS, the digest is
-written again. What is refused for its sides alone is deceived as well: they come last, and who forges can
-write them. Log and scenario stay as they are. Exit status 1 where a true certificate is refused, or another
-one accepted.
+The program checks the certificates of N flights of our scheme, drawn from the schema (`python -m
+tools.drawn`), and of N healthy flights. A times it alters a number, index or frame of one of them, once with
+the old digest and once with a new one, so that only the recomputation can refuse it. F times it puts a false
+statement into one: an alarm in a row without one, or an exclusion of a fault that is not excluded, or at
+another time. The evidence is that of another event, or made up (forged.yaml), and one to three EDITS change
+it; the digest is new. If the checker refuses a statement for its sides alone, the statement counts as
+accepted, since a forger can write the right sides. Log and scenario stay as they are. The exit status is 1 if
+a true certificate is refused, or another one accepted.
 """
 
 import argparse
@@ -42,7 +42,7 @@ FORGED = yaml.safe_load(Path(__file__).with_name("forged.yaml").read_text(encodi
 
 
 def main() -> None:
-    """Fly, check, alter, forge, count."""
+    """Fly, check, alter, forge and count."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--flights", type=int, default=40)
     parser.add_argument("--seed", type=int, default=1)
@@ -104,7 +104,7 @@ def _healthy(k: int) -> Document:
 
 
 def places(node: Any, place: tuple = ()) -> Iterator[tuple]:
-    """Where numbers stand in a document; words are none."""
+    """Yield the places of the numbers of a document."""
     if isinstance(node, dict | list):
         for key, value in node.items() if isinstance(node, dict) else enumerate(node):
             yield from places(value, (*place, key))
@@ -113,7 +113,7 @@ def places(node: Any, place: tuple = ()) -> Iterator[tuple]:
 
 
 def alterations(rng: np.random.Generator, written: Document, n: int) -> Iterator[tuple[Document, tuple]]:
-    """So many documents with a number altered, as they are and with the digest written again; and where."""
+    """Yield n documents with one number altered, with the old and with a new digest, and the place."""
     known = [*places(written)] if written["statements"] else []
     for place in (known[i] for i in rng.integers(len(known), size=max(n, 0))) if known else ():
         other = altered(written, place)
@@ -122,7 +122,7 @@ def alterations(rng: np.random.Generator, written: Document, n: int) -> Iterator
 
 
 def altered(certificate: Document, place: tuple) -> Document:
-    """The same with one number altered: a frame or index by one, a number by a hundredth."""
+    """The certificate with one number altered: a frame or index by one, another number by a hundredth."""
     other = copy.deepcopy(certificate)
     node, key = reduce(getitem, place[:-1], other), place[-1]
     value = node[key]
@@ -136,7 +136,7 @@ def altered(certificate: Document, place: tuple) -> Document:
 def forgeries(
     rng: np.random.Generator, written: Document, log: Log, scenario: str, n: int
 ) -> Iterator[tuple[Document, tuple]]:
-    """So many documents with a statement that is false, and the edits by which each was made to hold."""
+    """Yield n documents with a false statement, and the edits that try to make it hold."""
     for _ in range(n):
         forged, said = false_statement(rng, written, log)
         edits = tuple(rng.choice([*EDITS], size=rng.integers(1, 4), p=SHARES))
@@ -181,7 +181,7 @@ def _is_event(what: str | None, k: int, log: Log) -> bool:
 
 
 def _move(said: Document, by: int, rows: int, log: Log) -> None:
-    """The evidence at another time, with what the log has of its frames then."""
+    """Move the evidence to another time, with the numbers of the log at that time."""
     for one in (*said.get("terms", ()), *said.get("bounds", ())):
         if "block" not in said and 0 < one["first"] + by <= one["frame"] + by < rows:
             one["first"], one["frame"] = one["first"] + by, one["frame"] + by
@@ -198,7 +198,7 @@ def _move(said: Document, by: int, rows: int, log: Log) -> None:
 
 
 def _restate(forged: Document, said: Document, log: Log, scenario: str) -> None:
-    """Write `rest` of the terms as log and scenario have it."""
+    """Write the field `rest` of the terms so that it agrees with log and scenario."""
     with suppress(ArithmeticError, LookupError, TypeError, ValueError, checker.Refused):
         declared = checker.declared_at_row(yaml.safe_load(scenario), said["frame"])
         frames = checker.Frames(forged, log, declared, said.get("block"))
@@ -211,7 +211,7 @@ def _restate(forged: Document, said: Document, log: Log, scenario: str) -> None:
 
 
 def _number(rng: np.random.Generator, forged: Document, said: Document) -> None:
-    """A number, mostly of the statement, or all of its list become others; frames stay whole."""
+    """Change a number, mostly of the statement, or all numbers of its list; frames stay whole numbers."""
     whole = said if rng.random() < 0.8 else forged
     known = [*places(whole)]
     place = known[rng.integers(len(known))]
@@ -222,7 +222,7 @@ def _number(rng: np.random.Generator, forged: Document, said: Document) -> None:
 
 
 def _field(rng: np.random.Generator, forged: Document, said: Document) -> None:
-    """A field of the document, of the statement or of all of its parts is given a value, or is gone."""
+    """Give a field of the document, of the statement or of all of its parts a value, or delete the field."""
     kind = str(rng.choice(["document", "statement", "part"], p=[0.2, 0.2, 0.6]))
     parts = [one for name in ("terms", "bounds") for one in said.get(name) or () if isinstance(one, dict)]
     known = [(name, of) for name, of in FORGED["fields"][kind].items() if kind != "statement" or name in said]
@@ -236,7 +236,7 @@ def _field(rng: np.random.Generator, forged: Document, said: Document) -> None:
 
 
 def _odd(rng: np.random.Generator, forged: Document, said: Document) -> None:
-    """A value of another type in some field of the statement."""
+    """Put a value of another type into a field of the statement."""
     said[str(rng.choice([*said]))] = FORGED["odd"][rng.integers(len(FORGED["odd"]))]
 
 

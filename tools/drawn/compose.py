@@ -38,7 +38,8 @@ COUNTS = {"one": (1, 2), "two": (2, 3), "many": (3, 7)}
 
 @dataclass(frozen=True)
 class Kind:
-    """Of an array. declared: every error of the truth is. only: what a factor is restricted to."""
+    """A kind of covering array. declared: whether every error of the truth is declared. only: levels to which
+    a factor is restricted."""
 
     declared: bool
     only: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
@@ -63,7 +64,7 @@ class Drawn:
     declared: bool
 
     def scenario(self) -> bf.Scenario:
-        """Raises BadInput."""
+        """The scenario. Raises BadInput if it cannot be flown."""
         return bf.load(self.words)
 
 
@@ -84,7 +85,7 @@ def drawn_flights(seed: int, aircraft: Sequence[str], kinds: Sequence[Kind] = KI
 
 
 def array_of(schema: Node, aircraft: Sequence[str], kind: Kind, rng: np.random.Generator) -> CoveringArray:
-    """The array of every factor there is."""
+    """The covering array of all factors."""
     schema = inlined(schema)
     factors = [
         replace(factor, levels=kind.only.get(factor.name, factor.levels))
@@ -99,7 +100,7 @@ def _airframe(reference: str) -> Any:
 
 
 class Composer:
-    """One scenario of one row."""
+    """Makes the scenario of a row."""
 
     def __init__(
         self,
@@ -116,7 +117,7 @@ class Composer:
         self._walk = Walk(DECLARED_ONLY if declared else RANGES, self._now)
 
     def words(self) -> Words:
-        """As in a file."""
+        """The scenario as the data of a file."""
         words: Words = {"aircraft": self._row["aircraft"], "duration_s": self._now.duration_s}
         for path, node in self._keys:
             self._put_key(words, path, node)
@@ -128,7 +129,7 @@ class Composer:
         return words
 
     def _put_key(self, words: Words, path: str, node: Node) -> None:
-        """A key that is a factor by itself."""
+        """Set a key that is a factor by itself."""
         level = self._row.get(path, LEFT_OUT)
         if level == LEFT_OUT or (path.startswith("initial.") and not self._is_of_aircraft(path)):
             return
@@ -145,12 +146,13 @@ class Composer:
         put(words, path, value)
 
     def _of_its_surfaces(self, actuators: Words) -> Words:
-        """The schema names the surfaces of our aircraft."""
+        """The actuators without the surfaces of the Beaver that this aircraft does not have: the schema names
+        the surfaces of the Beaver."""
         ours = set(load("beaver").surfaces) - set(self._aircraft.surfaces)
         return {key: value for key, value in actuators.items() if key not in ours}
 
     def _is_of_aircraft(self, path: str) -> bool:
-        """Whether the aircraft has this key of its flight condition."""
+        """Whether the aircraft has this key of the section `initial`."""
         key = path.removeprefix("initial.")
         return (
             key == "altitude_m"
@@ -232,7 +234,8 @@ class Composer:
         return self._fault(kind, str(self._rng.choice(courses)), int(self._rng.integers(1, 5)))
 
     def _fault(self, kind: str, profile: str, surface: int) -> Words:
-        """Every key of its own is given, but for where a jam is; the course is as the row has it."""
+        """A fault with all keys of its type, sometimes without the position of a jam; the profile is that of
+        the row."""
         node = fault_types(self._schema)[kind]
         keys = {
             key: below
@@ -270,7 +273,7 @@ class Composer:
 
 
 def put(words: Words, path: str, value: Any) -> None:
-    """Give a key its value."""
+    """Set a key, and make the sections above it."""
     *sections, key = path.split(".")
     for name in sections:
         words = words.setdefault(name, {})
@@ -278,7 +281,8 @@ def put(words: Words, path: str, value: Any) -> None:
 
 
 def _is_masked(fault: Words, faults: list[Words]) -> bool:
-    """Whether another fault of its surface leaves nothing of a fault as it begins, which is refused."""
+    """Whether another fault of the same surface hides a fault at its beginning; a scenario with such a fault
+    is refused."""
     for other in faults:
         same = other is not fault and "actuator" in fault and other.get("actuator") == fault["actuator"]
         if same and other["at_s"] <= fault["at_s"] < other.get("end_s", inf):

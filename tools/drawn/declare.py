@@ -1,4 +1,4 @@
-"""What a drawn scenario must say: so that its parts fit, and that `fdi.bounds` covers its truth."""
+"""Changes of a drawn scenario: its keys must agree, and `fdi.bounds` must contain its true errors."""
 
 from math import pi
 from typing import Any
@@ -18,7 +18,7 @@ ROOM = 0.9  # what is declared of an oscillation or a slow surface, beside its o
 
 
 def fit(words: Words) -> None:
-    """Mend what the schema alone cannot say: orders, and keys that want or exclude one another."""
+    """Correct what the schema alone cannot express: orders, and keys that require or exclude one another."""
     for axis in words.get("reference", {}).values():
         for signal in axis:
             for shape in signal.values():
@@ -42,7 +42,7 @@ def _drop(section: Words, beginnings: tuple[str, ...]) -> None:
 
 
 def declare(words: Words) -> None:
-    """Raise `fdi.bounds`, and what is declared of faults, to what this scenario's truth does."""
+    """Raise `fdi.bounds`, and the declared limits of faults, until they contain the truth of the scenario."""
     fdi = words.setdefault("fdi", {})
     bounds = fdi.setdefault("bounds", {})
     _declare_sensors(words, bounds)
@@ -52,7 +52,7 @@ def declare(words: Words) -> None:
 
 
 def _declare_sensors(words: Words, bounds: Words) -> None:
-    """The widest of each error that is flown under one declaration."""
+    """Declare the largest of each error of the sensors that fly while a declaration is in force."""
     for change in words.get("changes", ()):
         if "declared_sensors" in change:
             change["declared_sensors"] = _widest(
@@ -62,7 +62,7 @@ def _declare_sensors(words: Words, bounds: Words) -> None:
 
 
 def _flown_from(words: Words, at_s: float) -> list[Any]:
-    """The sensors from a declaration on until the next one."""
+    """The sensors that fly from a declaration until the next one."""
     changes = words.get("changes", ())
     until_s = min((c["at_s"] for c in changes if "declared_sensors" in c and c["at_s"] > at_s), default=1e9)
     timed = [(0.0, words.get("sensors", {})), *((c["at_s"], c["sensors"]) for c in changes if "sensors" in c)]
@@ -81,7 +81,7 @@ def _widest(*given: Any) -> Words:
 
 
 def _declare_model(truth: Words, bounds: Words) -> None:
-    """Coefficients, inertias, inertia coupling and sinusoids."""
+    """Declare the errors of coefficients, inertias and servos, the inertia coupling and the sinusoids."""
     for key in ("coefficients", "inertia"):
         off = [abs(ratio - 1.0) for ratio in truth.get(key, {}).values()]
         if off:
@@ -96,8 +96,8 @@ def _declare_model(truth: Words, bounds: Words) -> None:
 
 
 def _widest_servos(truth: Words, known: Words) -> Words:
-    """Errors of the actuators as large as those of the truth, and as those known. A key beside the surfaces
-    is for those without their own."""
+    """The larger ones of the true and the declared errors of the actuators. A key beside the surfaces is for
+    the surfaces without this key."""
     exact = {"bandwidth": 1.0, "rate_limit": 1.0, "dead_band_deg": 0.0}
     widest: Words = {}
     for name in ("", *(name for name in {**truth, **known} if name not in exact)):
@@ -133,7 +133,8 @@ def _steepest_mps2(gust: Words) -> float:
 
 
 def _declare_faults(words: Words, fdi: Words) -> None:
-    """A servo slower than what is declared counts as a jam, an oscillation slower as a bias."""
+    """Declare the slowest servo and oscillation: the diagnosis takes a slower servo for a jam, and a slower
+    oscillation for a bias."""
     actuators = words.get("design_model", {}).get("actuators") or words.get("actuators", {})
     for fault in words.get("faults", ()):
         if fault["type"] == "rate_limit":

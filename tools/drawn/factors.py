@@ -1,7 +1,8 @@
-"""The factors of the covering array: every key of a scenario, down to two levels, and what only several say.
+"""The factors of the covering array: the keys of a scenario, down to two levels, and combinations of keys.
 
-A key that the schema has is a factor with the levels `-` (left out), each value of an enumeration, `true` and
-`false`, or `drawn`. What is said by several keys together, or has no list in the schema, stands in `OWN`.
+A key of the schema is a factor with the levels `-` (left out), each value of an enumeration, `true` and
+`false`, or `drawn`. Factors that several keys express together, or whose levels the schema does not list, are
+those of `_own`.
 """
 
 from collections.abc import Iterator, Sequence
@@ -31,7 +32,7 @@ SPOKEN_FOR = (
 
 
 def factors_of(schema: Node, aircraft: Sequence[str], declared: bool) -> list[Factor]:
-    """Every factor. declared: of flights whose every error is declared."""
+    """All factors. declared: whether the flights declare every error."""
     ranges = DECLARED_ONLY if declared else RANGES
     of_keys = [
         Factor(path, (LEFT_OUT, *levels))
@@ -42,7 +43,7 @@ def factors_of(schema: Node, aircraft: Sequence[str], declared: bool) -> list[Fa
 
 
 def keys_of(node: Node, path: str = "") -> Iterator[tuple[str, Node]]:
-    """(path, schema) of every key that is a factor by itself."""
+    """Yield path and schema of every key that is a factor by itself."""
     for name, below in node["properties"].items():
         inside, here = section_of(below), f"{path}.{name}" if path else name
         if inside and here not in WHOLE and (not path or here in DEEPER):
@@ -52,13 +53,13 @@ def keys_of(node: Node, path: str = "") -> Iterator[tuple[str, Node]]:
 
 
 def section_of(node: Node) -> Node | None:
-    """The keys under a key that has nothing but keys under it."""
+    """The schema of a key that can only be a section; None for another key."""
     forms = [form for form in forms_of(node) if form.get("type") != "null"]
     return forms[0] if len(forms) == 1 and "properties" in forms[0] and "anyOf" not in forms[0] else None
 
 
 def forms_of(node: Node) -> list[Node]:
-    """What may stand there."""
+    """The schemas of the values that are allowed."""
     inside = node.get("anyOf") or node.get("oneOf")
     if not inside or "properties" in node:
         return [node]
@@ -66,7 +67,7 @@ def forms_of(node: Node) -> list[Node]:
 
 
 def levels_of(node: Node) -> tuple[str, ...]:
-    """Values of an enumeration, true and false, or `drawn`."""
+    """The levels of a key: the values of an enumeration, `true` and `false`, or `drawn`."""
     levels: list[str] = []
     for form in forms_of(node):
         if form.get("type") == "boolean":
@@ -105,7 +106,7 @@ def registered_of(group: str) -> tuple[str, ...]:
 
 
 def severities(schema: Node) -> tuple[str, ...]:
-    """Of turbulence."""
+    """The severities of turbulence."""
     return levels_of(schema["$defs"]["Environment"]["properties"]["severity"])
 
 
@@ -123,7 +124,7 @@ def sensor_fault_types(schema: Node) -> dict[str, Node]:
 
 
 def grows(schema: Node, kind: str) -> bool:
-    """Whether a fault of this type may be incipient."""
+    """Whether a fault of this type can be incipient."""
     return "incipient" in fault_types(schema)[kind]["properties"]["profile"].get("enum", ())
 
 

@@ -1,9 +1,7 @@
-"""What every flight must keep, and what of it a flight breaks.
+"""The promises that every flight must keep, and those that a flight breaks.
 
-`broken` looks at the metrics alone, `flown_again` at the numbers of the scenario read back from its text.
-
-Whether an alarm is false, a detection late or a name right is asked of `beaver_ftc.results.metrics`, as
-everywhere.
+`broken` reads the metrics alone; `flown_again` flies the scenario again from its text. The module
+`beaver_ftc.results.metrics` decides whether an alarm is false, a detection late or a name right.
 """
 
 import json
@@ -27,7 +25,7 @@ DEFAULT_LIMIT_DEG_S = 60.0
 
 
 def broken(scenario: bf.Scenario, metrics: Document, declared: bool) -> Iterator[str]:
-    """A line for each promise that the flight breaks. declared: whether every error of the truth is."""
+    """Yield a line for each promise that the flight breaks. declared: whether every error is declared."""
     yield from _sane(scenario, metrics)
     if declared:
         yield from _false_alarms(scenario, metrics)
@@ -36,7 +34,7 @@ def broken(scenario: bf.Scenario, metrics: Document, declared: bool) -> Iterator
 
 
 def _sane(scenario: bf.Scenario, metrics: Document) -> Iterator[str]:
-    """What no document may contradict by itself."""
+    """Contradictions inside of the metrics."""
     frames = round(scenario.duration_s * scenario.rate_hz)
     if metrics["departure"] is None and abs(metrics["frames"] - frames) > 1:
         yield f"frames: {metrics['frames']} of {frames}, and no departure"
@@ -55,7 +53,8 @@ def _sane(scenario: bf.Scenario, metrics: Document) -> Iterator[str]:
 
 
 def _alarms(scenario: bf.Scenario, metrics: Document) -> Iterator[tuple[float | None, str]]:
-    """(when or None, whose alarm) of each diagnosis of a flight in turn, that of its end last."""
+    """Yield the time of the alarm, or None, and the scheme of each diagnosis of a flight, the last one
+    last."""
     scheme = scenario.fdi.scheme
     for change in metrics["changes"]:
         yield change.get("detection_time_s"), scheme
@@ -64,14 +63,14 @@ def _alarms(scenario: bf.Scenario, metrics: Document) -> Iterator[tuple[float | 
 
 
 def _began_s(metrics: Document) -> float:
-    """When the diagnosis that is there at the end began: a change that says what came of the one before."""
+    """When the last diagnosis began, s: at the last change that reports the result of the one before it."""
     return max(
         (change["time_s"] for change in metrics["changes"] if "detection_time_s" in change), default=0.0
     )
 
 
 def _false_alarms(scenario: bf.Scenario, metrics: Document) -> Iterator[str]:
-    """An alarm before there is a fault."""
+    """Alarms before the fault."""
     onset = Truth.of(scenario).onset
     for time_s, scheme in _alarms(scenario, metrics):
         if time_s is not None and onset.is_false(time_s) and scheme == OURS:
@@ -79,7 +78,8 @@ def _false_alarms(scenario: bf.Scenario, metrics: Document) -> Iterator[str]:
 
 
 def _late(scenario: bf.Scenario, metrics: Document) -> Iterator[str]:
-    """Later than what was said to be certain. A broken instrument is an error that nothing declares."""
+    """An alarm later than the instant from which it is certain. A broken instrument is an undeclared error,
+    and makes nothing certain."""
     certain_s = metrics["detection"]["guaranteed_delay_s"]
     if certain_s is None or any(map(_sensor, scenario.faults)) or metrics["false_alarm"]:
         return
@@ -101,7 +101,7 @@ def _surface(fault: Any) -> str | None:
 
 
 def _misnamed(scenario: bf.Scenario, metrics: Document) -> Iterator[str]:
-    """Something else named than what broke, or what broke excluded, where theory promises that it is not."""
+    """A wrong name, or an exclusion of the true fault, in flights for which the theory promises neither."""
     if not metrics["detection"]["detected"] or metrics["false_alarm"]:
         return
     if list(_alarms(scenario, metrics))[-1][1] != OURS:
@@ -123,7 +123,8 @@ def _in_class(scenario: bf.Scenario, fault: Any) -> bool:
 def _instrument(
     scenario: bf.Scenario, metrics: Document, sensors: list[Any], surfaces: list[Any]
 ) -> Iterator[str]:
-    """One broken instrument, watched since before it broke: no surface and no other instrument is named."""
+    """One broken instrument that was monitored before it broke: no surface and no other instrument is
+    named."""
     fault, named = sensors[0], metrics["isolation"]["fault"]
     watched = scenario.fdi.monitors_sensors and _began_s(metrics) < fault.at_s
     if surfaces or len(sensors) > 1 or not watched:
@@ -133,7 +134,8 @@ def _instrument(
 
 
 def _surfaces(scenario: bf.Scenario, metrics: Document, faults: list[Any]) -> Iterator[str]:
-    """Faults of the class: of one surface, or with `pairs` of two, held against what is named and left."""
+    """Faults of the declared class on one surface, or with `pairs` on two: names and candidates must be
+    right."""
     fdi, isolation = scenario.fdi, metrics["isolation"]
     changing = any(fault.profile != "abrupt" or fault.end_s is not None for fault in faults)
     if changing and fdi.thresholds == "published":  # that test supposes a constant parameter
@@ -164,7 +166,7 @@ def _surfaces(scenario: bf.Scenario, metrics: Document, faults: list[Any]) -> It
 
 
 def _left_out(scenario: bf.Scenario, left: list[str], surface: str, kinds: set[Any]) -> Iterator[str]:
-    """The true surface, or its one type, is not among the candidates."""
+    """The candidates lack the true surface, or its type."""
     mine = [one for one in left if one.split(":")[0] == surface]
     open_type = surface in mine or scenario.fdi.fault_class != "all" or len(kinds) > 1
     if not mine or not (open_type or f"{surface}:{next(iter(kinds))}" in mine):
@@ -172,13 +174,13 @@ def _left_out(scenario: bf.Scenario, left: list[str], surface: str, kinds: set[A
 
 
 def _kinds(faults: list[Any]) -> set[Any]:
-    """The types of the faults of a surface; to both stops is more than one."""
+    """The types of the faults of a surface; hardovers to both stops count as two more."""
     stops = {fault.direction for fault in faults if fault.type == "hardover"}
     return {fault.type for fault in faults} | (stops if len(stops) > 1 else set())
 
 
 def _runs_away(scenario: bf.Scenario, fault: Any) -> bool:
-    """Whether a bias grows so fast that at its stop it counts as a runaway (fault-types.md)."""
+    """Whether a bias grows so fast that the diagnosis takes it for a runaway at the stop (fault-types.md)."""
     if fault.type != "bias" or fault.profile == "abrupt":
         return False
     limit_deg_s = getattr(scenario.known_actuators, fault.actuator).rate_limit_deg_s or DEFAULT_LIMIT_DEG_S
@@ -186,12 +188,12 @@ def _runs_away(scenario: bf.Scenario, fault: Any) -> bool:
 
 
 def flown_again(flight: bf.Flight) -> Iterator[str]:
-    """What differs in the same flight from the text that a result folder has, with a log."""
+    """Differences to the flight of the text that a result folder has, flown with a log."""
     return differences(flight.metrics, bf.fly(load_text(to_yaml(flight.scenario))).metrics)
 
 
 def differences(one: Any, other: Any, path: str = "again") -> Iterator[str]:
-    """Where two documents differ."""
+    """Yield a line for each place at which two documents differ."""
     if isinstance(one, dict) and isinstance(other, dict) and one.keys() == other.keys():
         for key in one:
             yield from differences(one[key], other[key], f"{path}.{key}")

@@ -25,60 +25,60 @@ UNDECLARABLE = (
 
 
 def within(now: Circumstances, path: str, low: float, high: float) -> float:
-    """Equally likely anywhere."""
+    """A number from a uniform distribution."""
     return float(now.rng.uniform(low, high))
 
 
 def over_decades(now: Circumstances, path: str, low: float, high: float) -> float:
-    """Equally likely on a logarithmic scale."""
+    """A number whose logarithm is from a uniform distribution."""
     return log_uniform(now.rng, low, high)
 
 
 def none_or_within(now: Circumstances, path: str, low: float, high: float) -> float:
-    """0 now and then."""
+    """0 in some flights, otherwise as `within`."""
     return 0.0 if now.rng.random() < AT_THE_BOUND else within(now, path, low, high)
 
 
 def about(now: Circumstances, path: str, middle: float, bound: float) -> float:
-    """Off by up to a bound to either side, and often right by it."""
+    """The middle plus an error within a bound, often exactly the bound."""
     return middle + signed(now, bound)
 
 
 def size(now: Circumstances, path: str, bound: float) -> float:
-    """Up to a bound, and often right at it."""
+    """A magnitude up to a bound, often exactly the bound."""
     return abs(signed(now, bound))
 
 
 def vector(now: Circumstances, path: str, bound: float) -> list[float]:
-    """Three of either sign."""
+    """Three numbers as of `signed`."""
     return [signed(now, bound) for _ in range(3)]
 
 
 def signed(now: Circumstances, bound: float) -> float:
-    """Anywhere within a bound of either sign, and often right at it."""
+    """A number of either sign within a bound, often exactly at it."""
     largest = bound if now.rng.random() < AT_THE_BOUND else now.rng.uniform(0.0, bound)
     return float(largest * now.rng.choice([-1.0, 1.0]))
 
 
 def share_of_flight(now: Circumstances, path: str, low: float, high: float) -> float:
-    """A time."""
+    """A time as a share of the flight, s."""
     return float(now.rng.uniform(low, high) * now.duration_s)
 
 
 def amplitude(now: Circumstances, path: str) -> float:
-    """Of a reference, deg/s."""
+    """The amplitude of a reference, deg/s."""
     largest = 140.0 if now.rng.random() < LARGE_REFERENCES else 5.0
     return log_uniform(now.rng, 0.1, largest) * float(now.rng.choice([-1, 1]))
 
 
 def table(now: Circumstances, path: str) -> dict[str, Any]:
-    """As a fully resolved scenario has it: the numbers stand beside the file's name."""
+    """A table of a resolved scenario: the name of the file and its numbers."""
     times = sorted({round(float(now.rng.uniform(0, now.duration_s)), 3) for _ in range(4)})
     return {"file": "drawn.csv", "time_s": times, "values_deg_s": [signed(now, 4.0) for _ in times]}
 
 
 def ratios(now: Circumstances, path: str, share: float) -> dict[str, float]:
-    """A few aerodynamic terms, or all, off by up to a share."""
+    """Ratios of a few aerodynamic terms, or of all, with errors up to a share."""
     names = list(now.aircraft.terms)
     if now.rng.random() < 0.5:
         names = [names[i] for i in now.rng.integers(len(names), size=3)]
@@ -86,7 +86,7 @@ def ratios(now: Circumstances, path: str, share: float) -> dict[str, float]:
 
 
 def of_an_instrument(now: Circumstances, path: str) -> float:
-    """An error of a reading: up to twice a consumer-grade instrument's, often less."""
+    """An error of an instrument: up to twice that of a consumer-grade one, often less."""
     _, signal, key = path.rsplit(".", 2)
     known = COARSEST.get(signal, {})
     error = log_uniform(now.rng, 0.01, 2.0) * (
@@ -96,17 +96,17 @@ def of_an_instrument(now: Circumstances, path: str) -> float:
 
 
 def surface(now: Circumstances, path: str) -> str:
-    """One of the aircraft's."""
+    """The name of one surface of the aircraft."""
     return str(now.rng.choice(list(now.aircraft.surfaces)))
 
 
 def loss(now: Circumstances, path: str) -> float:
-    """Of effectiveness: often all of it."""
+    """A loss of effectiveness, often a complete one."""
     return float(now.rng.choice([1.0, now.rng.uniform(0.1, 1.0)]))
 
 
 def jam(now: Circumstances, path: str) -> float:
-    """Within the travel of any surface."""
+    """A position within the travel of every surface, deg."""
     travels = now.aircraft.travel.values()
     least = max(degrees(travel.min_rad) for travel in travels)
     most = min(degrees(travel.max_rad) for travel in travels)
@@ -122,7 +122,7 @@ _SENSOR_SIZES = {
 
 
 def size_of_sensor_fault(now: Circumstances, sensor: str, kind: str) -> float:
-    """In the sensor's unit; a scale as a share."""
+    """The size of the fault of a sensor, in its unit; that of a scale error as a share."""
     if kind == "scale":
         return signed(now, 0.8)
     error = log_uniform(now.rng, *_SENSOR_SIZES.get(sensor, (0.1, 1.0)))

@@ -1,4 +1,4 @@
-"""A counterexample with as much left out as still breaks the same promise."""
+"""A smaller counterexample, which breaks the same promise."""
 
 from collections.abc import Callable, Iterator, Sequence
 from copy import deepcopy
@@ -15,10 +15,10 @@ KEPT = ("name", "seed")
 
 
 def smaller(drawn: Drawn, broken: Sequence[str], flown: Callable[[Drawn], Sequence[str]]) -> Words:
-    """Keys, and entries of lists, left out one by one for as long as a promise of the same kind breaks. The
-    declaration stays, so that what is left is as well declared as before.
+    """The scenario without keys and entries that are not needed to break a promise of the same kind. The
+    declaration stays as it is, so that the smaller scenario is declared as well as the large one.
 
-    broken: what the flight breaks. flown: flies and says what breaks.
+    broken: promises that the flight breaks. flown: flies a scenario, and returns the broken promises.
     """
     kinds = {line.partition(":")[0] for line in broken}
     words, flights, again = drawn.words, 0, True
@@ -38,7 +38,7 @@ def smaller(drawn: Drawn, broken: Sequence[str], flown: Callable[[Drawn], Sequen
 
 
 def places(node: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
-    """Where something may be left out, the large things first."""
+    """Yield the places of keys and entries that can be left out, large ones first."""
     inside = node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else ()
     below = [(key, value) for key, value in inside if path or key not in KEPT]
     yield from ((*path, key) for key, _ in below)
@@ -47,7 +47,7 @@ def places(node: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
 
 
 def without(words: Words, place: tuple[Any, ...]) -> Words | None:
-    """A copy with one thing left out; nothing of the bounds, and not what is left out already."""
+    """A copy without the entry at a place; None for an entry of the bounds, or one that is not there."""
     if place[:2] == ("fdi", "bounds") or "declared_sensors" in place:
         return None
     less = deepcopy(words)

@@ -20,7 +20,7 @@ LARGEST = 100.0  # of a number without limits
 
 @dataclass(frozen=True)
 class Circumstances:
-    """What a range may depend on."""
+    """Quantities on which a range may depend."""
 
     rng: Random
     aircraft: Any  # beaver_ftc.aircraft.Aircraft
@@ -36,17 +36,17 @@ class Ranges:
 
     @cache  # noqa: B019 (there are two, as long as the process)
     def of(self, path: str) -> Any:
-        """What is said of a path; None where nothing is."""
+        """The range of a path; None if there is none."""
         fitting = (ranged for pattern, ranged in self._given.items() if fnmatchcase(path, pattern))
         return next(fitting, None)
 
 
 class Undrawable(Exception):
-    """There is no telling what may stand here."""
+    """The schema does not say which values are allowed."""
 
 
 class Walk:
-    """Draws from a schema."""
+    """Draws values that a schema allows."""
 
     def __init__(self, ranges: Ranges, now: Circumstances) -> None:
         self._ranges, self.now = ranges, now
@@ -112,5 +112,5 @@ class Walk:
 
 
 def log_uniform(rng: Random, low: float, high: float) -> float:
-    """Equally likely on a logarithmic scale."""
+    """A number whose logarithm is from a uniform distribution."""
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))

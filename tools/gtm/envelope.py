@@ -61,7 +61,8 @@ class Envelope:
         self, speeds: Sequence[float] = SPEEDS_KT, banks: Sequence[float] = BANKS_DEG,
         sideslips: Sequence[float] = SIDESLIPS_DEG,
     ) -> Iterator[Turn]:  # fmt: skip
-        """Yield every point of the grid, from the middle outwards, so that each has a neighbour to begin at."""
+        """Yield every point of the grid, from the middle outwards, so that each has a neighbour to begin
+        at."""
         at = self._start(90.0)
         for speed in sorted(speeds, key=lambda v: abs(v - 90.0)):
             level = min(self.known, key=lambda of: abs(of - speed), default=None)

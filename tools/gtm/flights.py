@@ -301,7 +301,8 @@ def coefficients(
 
 
 def at_the_given_points(model: Bench, where: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Coefficients at the points of the source, (60, 6) each: those given, and those of the converted model."""
+    """Coefficients at the points of the source, (60, 6) each: those given, and those of the converted
+    model."""
     with (where / "points.csv").open() as file:
         rows = [{name: float(text) for name, text in row.items()} for row in csv.DictReader(file)]
     given = np.array([[row[name] for name in OUTPUTS] for row in rows])

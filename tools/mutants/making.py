@@ -1,4 +1,4 @@
-"""Mutants of a module: every small change that can be made in it, each as new source."""
+"""The mutants of a module: small changes of it, each as new source."""
 
 import ast
 from collections import Counter
@@ -25,7 +25,7 @@ FUNCTIONS = {"min": "max", "max": "min", "any": "all", "all": "any"}
 
 @dataclass(frozen=True)
 class Mutant:
-    """One change of a module: which node, in the order of a walk, and which of its changes."""
+    """One change of a module. place: number of the node in the order of a walk; number: of its change."""
 
     file: Path
     place: int
@@ -37,11 +37,11 @@ class Mutant:
     within: str  # the line of source, and of its like in this module which one it is
 
     def name(self, package: Path) -> str:
-        """What it is called whatever else changes in its module."""
+        """A name that does not depend on other changes of the module."""
         return f"{self.file.relative_to(package).as_posix()}: {self.within}: {self.before} -> {self.after}"
 
     def source(self) -> str:
-        """The whole module with the change made."""
+        """The source of the module with the change."""
         tree = _parsed(self.file.read_text())
         target = list(ast.walk(tree))[self.place]
         _, new = list(_changes(target))[self.number]
@@ -50,7 +50,7 @@ class Mutant:
 
 
 def mutants(file: Path) -> list[Mutant]:
-    """All of a module."""
+    """All mutants of a module."""
     text = file.read_text()
     tree, lines = _parsed(text), text.splitlines()
     apart, statement = _no_code(tree), _statements(tree)
@@ -70,7 +70,8 @@ def mutants(file: Path) -> list[Mutant]:
 
 
 def _parsed(text: str) -> ast.Module:
-    """A module; what is the length of a record's array knows it: to be longer makes no difference."""
+    """The tree of a module. Numbers that are the length of an array of a record are marked, since a longer
+    array changes no result."""
     tree = ast.parse(text)
     for node in ast.walk(tree):
         match node:
@@ -81,7 +82,7 @@ def _parsed(text: str) -> ast.Module:
 
 
 def _no_code(tree: ast.Module) -> set[ast.AST]:
-    """What is within annotations and decorators, or makes no difference."""
+    """Nodes in annotations and decorators, and those that change no result."""
     unseen = UNSEEN | LOOKS
     roots = [node for node in ast.walk(tree) if isinstance(node, ast.keyword) and node.arg in unseen]
     for node in ast.walk(tree):
@@ -108,7 +109,7 @@ class _Replace(ast.NodeTransformer):
 
 
 def _changes(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
-    """What could be there instead of this node: (kind, new node)."""
+    """Yield the kind of each change of a node, and the new node."""
     yield from _of_operators(node)
     yield from _of_numbers(node)
     if _is_of_effect(node):
@@ -139,7 +140,7 @@ def _swapped(operator: ast.AST) -> Iterator[ast.AST]:
 
 
 def _with_fields(node: ast.AST, **changed: object) -> ast.AST:
-    """The same with other fields, and no place in the source."""
+    """A node with other fields, without a place in the source."""
     return type(node)(**{**dict(ast.iter_fields(node)), **changed})
 
 
@@ -156,7 +157,7 @@ def _of_numbers(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
 
 
 def _is_of_effect(node: ast.AST) -> bool:
-    """A line without which the others still run: a local name left unset would be found by any test."""
+    """Whether the other lines run without this one. A local name without a value would fail in any test."""
     match node:
         case ast.Assign(targets=[ast.Subscript() | ast.Attribute()]) | ast.AugAssign():
             return True

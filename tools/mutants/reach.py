@@ -1,4 +1,4 @@
-"""Which tests execute a line, and how long each of them takes."""
+"""The tests that execute a line, and the time that each of them takes."""
 
 import functools
 import hashlib
@@ -39,7 +39,8 @@ KEPT = ROOT / ".mutants"
 
 
 class Reach:
-    """The tests of some files: what they execute, and those that are none for this."""
+    """The lines that the tests of some files execute, their times, and how many tests are left out, by
+    reason."""
 
     def __init__(self, files: Iterable[dict]) -> None:
         self.seconds: dict[str, float] = {}
@@ -54,13 +55,14 @@ class Reach:
                     known.setdefault(int(line), set()).update(of)
 
     def reaching(self, mutant: Mutant) -> dict[str, float]:
-        """The tests that execute the changed line, and how long each takes."""
+        """The tests that execute the changed line, and the time of each, s."""
         reached = self.of(mutant.file.relative_to(ROOT).as_posix(), mutant.lines)
         return {test: self.seconds[test] for test in sorted(reached)}
 
     def of(self, name: str, lines: Iterable[int]) -> set[str]:
-        """Those that execute the first of the lines; of one that runs at import, those it concerns; of a
-        module without functions, all that execute what imports it.
+        """The tests that execute the first of the lines. For a line that runs at import: the tests that
+        read its constants. For a module without functions: all tests that execute a module which imports
+        it.
         """
         by_line, lines = self._lines.get(name), list(lines)
         if not by_line:
@@ -71,8 +73,8 @@ class Reach:
         return next((of for line in lines if (of := by_line.get(line))), set())
 
     def _readers(self, name: str, constants: set[str]) -> set[str]:
-        """The tests that execute a line with one of a module's constants in it; none where one is worked out
-        from it at import.
+        """The tests that execute a line which reads one of the constants of a module; none if another module
+        computes something from it at import.
         """
         found: set[str] = set()
         for file in self._lines:
@@ -88,13 +90,14 @@ class Reach:
 
 
 def _imports(file: Path, name: str) -> bool:
-    """Whether a module imports something of another, that of a file below src/."""
+    """Whether a module imports a name from another one, that of a file below src/."""
     module = ".".join(Path(name).with_suffix("").parts[1:])
     return file.exists() and f"from {module} import" in file.read_text()
 
 
 def reach(mode: str, jobs: int, say: Callable[[str], None]) -> Reach:
-    """What the tests of a mode execute. Kept a test file each, until a source it executes changes."""
+    """The lines that the tests of a mode execute. The result of a test file is kept until a source that it
+    executes changes."""
     files = tests(mode)
     due = [file for file in files if _known(mode, file) is None]
     if due:
@@ -107,13 +110,13 @@ def reach(mode: str, jobs: int, say: Callable[[str], None]) -> Reach:
 
 
 def kept_so_far(mode: str) -> Reach:
-    """What was found out of the tests of a mode, of sources that may have changed since; nothing is tried."""
+    """The kept results of the tests of a mode; sources may have changed since. No test is run."""
     files = [_kept(mode, file) for file in tests(mode)]
     return Reach(json.loads(file.read_text(encoding="utf-8")) for file in files if file.exists())
 
 
 def _load(mode: str) -> None:
-    """The whole package, and compiled code: once, not once a test file."""
+    """Import the whole package, and load compiled code, once for all test files."""
     turn_to(mode)
     few_examples()
     for module in pkgutil.walk_packages([str(SOURCES)]):
@@ -144,7 +147,8 @@ def _digests(sources: Iterable[str]) -> dict[str, str]:
 
 
 def _measure(mode: str, file: Path) -> bool:
-    """Whether it failed, in a process of its own: what one test file leaves is not there for the next."""
+    """Measure a test file in a process of its own, so that it changes nothing for the next. Returns
+    whether that failed."""
     return in_a_child(lambda: _write(mode, file), HANGS_S) != SURVIVED
 
 
@@ -184,7 +188,7 @@ def _read(file: Path) -> coverage.CoverageData:
 
 
 def _lines(data: coverage.CoverageData, timed: "_Timed") -> dict[str, dict[int, list[str]]]:
-    """{file: {line: tests}} of the files of which a test executes anything."""
+    """{file: {line: tests}} of the files of which a test executes a line."""
     found = {}
 
     def known(contexts: list[str]) -> list[str]:
@@ -199,7 +203,7 @@ def _lines(data: coverage.CoverageData, timed: "_Timed") -> dict[str, dict[int, 
 
 
 def _tests_own() -> set[str]:
-    """The modules of tests/ and tools/ that are loaded, but for what all tests share and executes nothing."""
+    """The loaded modules of tests/ and tools/, without those that all tests share."""
     files = (getattr(module, "__file__", None) for module in list(sys.modules.values()))
     roots = (ROOT / "tests", ROOT / "tools")
     inside = (Path(f) for f in files if f and any(Path(f).is_relative_to(root) for root in roots))
@@ -211,7 +215,7 @@ def _tests_own() -> set[str]:
 
 
 def few_examples() -> None:
-    """From now on no property test draws more than `EXAMPLES`: what they draw is the same each time."""
+    """Let each property test draw at most `EXAMPLES` examples, the same ones each time."""
     begin = hypothesis.settings.__init__
 
     def begin_with_few(self, parent=None, **given) -> None:
@@ -222,8 +226,8 @@ def few_examples() -> None:
 
 
 def forget() -> None:
-    """What the package keeps once a process, as the shape of a record, each test works out again: else only
-    the first of a process would be known to execute it.
+    """Clear the caches of the package, so that each test computes their values again. Otherwise only the
+    first test of a process would execute those lines.
     """
     for name, module in list(sys.modules.items()):
         if name.startswith("beaver_ftc") and not name.startswith(APART):
@@ -233,7 +237,7 @@ def forget() -> None:
 
 
 class _Timed:
-    """Notes for each test that passes how long it took, and gives up one that is slow."""
+    """A plug-in that records the time of each test that passes, and skips a test that is slow."""
 
     def __init__(self, watch: coverage.Coverage, slow_s: float) -> None:
         self._watch, self._slow_s = watch, slow_s
@@ -254,7 +258,7 @@ class _Timed:
 
     @pytest.hookimpl(wrapper=True)
     def pytest_fixture_setup(self, fixturedef: pytest.FixtureDef, request: pytest.FixtureRequest):
-        """What a shared fixture executes, every test executes that uses it: each may be run alone."""
+        """Count the lines that a shared fixture executes for every test that uses it."""
         if fixturedef.scope == "function":
             return (yield)
         self._count_for(fixturedef.argname)
@@ -299,8 +303,8 @@ def _function(test: str) -> str:
 
 @contextmanager
 def _limit(give_up: Callable[[], None], slow_s: float) -> Iterator[None]:
-    """Give up what runs inside after so many seconds of processor, or a good while of waiting for other
-    processes; and again and again, since a process at work may not have released it.
+    """Call `give_up` after this processor time, or after a long wait for other processes, and repeat the
+    call, since running code may catch the first one.
     """
     clocks = {signal.SIGPROF: (signal.ITIMER_PROF, slow_s), signal.SIGALRM: (signal.ITIMER_REAL, WAITS_S)}
 

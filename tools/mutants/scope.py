@@ -1,4 +1,4 @@
-"""Which modules mutants are made of, why not of the others, which tests reach each, what a seed draws."""
+"""The modules that get mutants, the test files of each mode, and the mutants that a seed draws."""
 
 import ast
 import hashlib
@@ -40,7 +40,7 @@ LEFT_OUT = {
 
 
 def kind(file: Path) -> str:
-    """KERNELS, GLUE, or why no mutants are made of a module (a key of LEFT_OUT)."""
+    """KERNELS or GLUE, or the reason why a module gets no mutants (a key of LEFT_OUT)."""
     for place, reason in APART.items():
         if file.is_relative_to(SOURCES / place):
             return reason
@@ -60,7 +60,7 @@ def kind_of(mutant: Mutant) -> str:
 
 
 def _in_compiled_code(file: Path, line: int) -> bool:
-    """Whether a kernel follows from a line: its own, a constant's, or one that lays out a record."""
+    """Whether a line changes a kernel: a line of a kernel, of a constant, or of the layout of a record."""
     if file not in _compiled(SOURCES):
         return False
     around = (node for node in _tree(file).body if node.lineno <= line <= (node.end_lineno or 0))
@@ -73,7 +73,7 @@ def _in_compiled_code(file: Path, line: int) -> bool:
 
 @cache
 def _compiled(sources: Path) -> frozenset[Path]:
-    """The modules with kernels, and those whose constants they have in them."""
+    """The modules with kernels, and the modules whose constants these kernels contain."""
     found = {file for file in sources.rglob("*.py") if "beaver_ftc.compiled" in _imports(file)}
     due = list(found)
     while due:
@@ -87,13 +87,13 @@ def _compiled(sources: Path) -> frozenset[Path]:
 
 
 def _imports(file: Path) -> dict[str, list[str]]:
-    """{module: names} of what a module imports from others."""
+    """{module: names} that a module imports."""
     nodes = (node for node in ast.walk(_tree(file)) if isinstance(node, ast.ImportFrom))
     return {node.module or "": [alias.name for alias in node.names] for node in nodes}
 
 
 def left_out() -> list[str]:
-    """A line a reason: how many modules no mutants are made of, and why."""
+    """A line for each reason: the number of modules without mutants, and the reason."""
     kinds = Counter(kind(file) for file in SOURCES.rglob("*.py"))
     return [f"{kinds[reason]} modules: {text}" for reason, text in LEFT_OUT.items() if kinds[reason]]
 
@@ -116,10 +116,10 @@ def _plain() -> list[Path]:
 
 
 def drawn(seed: int, patterns: Sequence[str]) -> tuple[list[tuple[str, Mutant]], Counter[str]]:
-    """(kind, mutant) of a seed, one of the kernels and one of the glue by turns; how many there are of each.
+    """Kind and mutant in the order of a seed, kernels and glue in turn, and the number of each kind.
 
-    The order depends on each mutant alone: a change elsewhere in the package changes nothing in it. Those
-    listed as equivalent are left out.
+    The order depends on each mutant alone, so a change elsewhere in the package does not change it. Mutants
+    that are listed as equivalent are left out.
     """
     known = equivalent()
     files = sorted({file for pattern in patterns for file in SOURCES.glob(pattern)})
@@ -134,13 +134,13 @@ def drawn(seed: int, patterns: Sequence[str]) -> tuple[list[tuple[str, Mutant]],
 
 
 def equivalent() -> set[str]:
-    """The names of the mutants that make no difference; the file says why of each."""
+    """The names of the mutants that change no result; the file has the reasons."""
     listed = yaml.safe_load(EQUIVALENT.read_text()) or {}
     return {f"{file}: {change}" for file, changes in listed.items() for change in changes}
 
 
 def stale() -> list[str]:
-    """Names in the list of equivalent mutants that are none of any mutant today."""
+    """Names in the list of equivalent mutants that no mutant has today."""
     known = equivalent()
     files = {SOURCES / name.split(":")[0] for name in known}
     there = {mutant.name(SOURCES) for file in files if file.exists() for mutant in mutants(file)}
@@ -148,7 +148,7 @@ def stale() -> list[str]:
 
 
 def runs_at_import(file: Path, line: int) -> bool:
-    """Whether a line is in no function: every user of the module uses its result."""
+    """Whether a line is outside of all functions, so that every user of the module uses its result."""
     functions = (node for node in ast.walk(_tree(file)) if isinstance(node, ast.FunctionDef))
     return not any(node.body[0].lineno <= line <= (node.end_lineno or 0) for node in functions)
 

@@ -1,6 +1,6 @@
-"""Counts lines in every Python that a test starts, while it is found out what tests execute.
+"""Counts lines in every Python process that a test starts, while reach.py measures what tests execute.
 
-Python loads it first, by PYTHONPATH (reach.py); the environment names the test.
+PYTHONPATH makes Python import this module first; the environment has the name of the test.
 """
 
 import atexit

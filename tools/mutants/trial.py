@@ -1,4 +1,4 @@
-"""One mutant on trial: a package in which it stands in for the true module, and the tests that reach it."""
+"""The trial of a mutant: a copy of the package with the mutant in it, and the tests that reach it."""
 
 import contextlib
 import os
@@ -49,7 +49,7 @@ def _outcome(mutant: Mutant, mode: str, seconds: dict[str, float]) -> str:
 
 
 def _chosen(file: Path, seconds: dict[str, float], budget_s: float) -> list[str]:
-    """As many as the budget allows: those of the module's own folder first, and the quickest of them."""
+    """The tests within a budget: those of the folder of the module first, quick ones before slow ones."""
     own = f"tests/{_place_of_tests(file)}/"
     taken, spent = [], 0.0
     for test in sorted(seconds, key=lambda test: (not test.startswith(own), seconds[test])):
@@ -120,20 +120,21 @@ def _first(folder: str) -> Iterator[None]:
 
 
 def turn_to(mode: str) -> None:
-    """From now on this process, and those that it starts, compile kernels or do not."""
+    """Let this process, and those that it starts, compile kernels, or run them as plain Python."""
     os.environ["NUMBA_DISABLE_JIT"] = "1" if mode == PLAIN else "0"
     numba.config.reload_config()
 
 
 def processor_s() -> float:
-    """What this process has taken, and those that it has started."""
+    """Processor time of this process and of those that it has started, s."""
     return sum(os.times()[:4])
 
 
 def in_a_child(work: Callable[[], int], limit_s: float) -> str:
-    """SURVIVED if `work` returns 0, KILLED if it does not, HANGS if it takes so much of the processor.
+    """SURVIVED if `work` returns 0, KILLED if it returns another status, HANGS if it exceeds the limit of
+    processor time.
 
-    A child has the libraries loaded already, and leaves nothing behind: no process that a test has started.
+    The child process has the libraries loaded already. Processes that a test has started end with it.
     """
     child = os.fork()
     if child == 0:
@@ -172,7 +173,7 @@ def _end(child: int, wait_s: float) -> str:
 
 
 def pytest_quietly(arguments: list[str], plugins: list) -> int:
-    """Run tests as a child of this does: without a word, and without what earlier ones have found."""
+    """Run tests without output, and without results of earlier runs."""
     with tempfile.TemporaryDirectory() as scratch, open(os.devnull, "w") as nowhere:
         os.environ["HYPOTHESIS_STORAGE_DIRECTORY"] = scratch
         os.environ["PYTHONDONTWRITEBYTECODE"] = "1"
@@ -185,7 +186,7 @@ def pytest_quietly(arguments: list[str], plugins: list) -> int:
 
 
 class _Note:
-    """Writes down which test failed."""
+    """A plug-in that writes the name of a failed test to a file."""
 
     def __init__(self, file: Path) -> None:
         self._file = file

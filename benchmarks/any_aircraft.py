@@ -1,14 +1,14 @@
-"""Whether the promises hold for aircraft nobody wrote by hand: no false alarm, no fault named wrongly.
+"""Do the guarantees hold for derived aircraft: no false alarm, and no wrong name?
 
-`python -m tools.docs table any-aircraft` prints a row an aircraft of the jsbsim package: hours flown in
-health and their false alarms; how many losses of effectiveness of 40 % and more were detected, named, named
-wrongly, and how often the true surface was left out of what is still possible; how many the theory of
-`detectability` is certain to detect within 0.5 s, weighed along the same flight in health, and how many of
-these were not.
+`python -m tools.docs table any-aircraft` prints a row for each aircraft of the jsbsim package: hours of
+healthy flight, and false alarms in them; losses of effectiveness of 40 % or more, and how many of them were
+detected, named, and named wrongly; how often the candidates lacked the true surface. The last columns count
+the losses that are certain to be detected within 0.5 s by the theory of `detectability`, computed along the
+same flight without the loss, and those of them that were not.
 
-Speeds, frame rates, references, magnitudes, times and profiles are drawn by the seed, with the published
-bound declared and no error but the aircraft's own. There is no autopilot, so that some flights end early, out
-of the altitudes that are simulated: further healthy ones follow until the hours are full.
+Speeds, frame rates, references, magnitudes, times and profiles are random. The published bound is declared,
+and the only error is that of the derived model. There is no autopilot, so some flights leave the simulated
+altitudes and end early; further healthy flights follow until the hours are reached.
 """
 
 from collections import Counter
@@ -37,7 +37,7 @@ COUNTED = ("false", "losses", "detected", "named", "wrong", "left out", "certain
 
 
 def signal(rng: np.random.Generator) -> dict[str, Any]:
-    """One reference: amplitudes as in the built-in scenarios, up to twice that."""
+    """A random reference: its amplitude is up to twice that of the built-in scenarios."""
     size = float(rng.uniform(0.5, 4.0))
     shape = str(rng.choice(SHAPES))
     if shape in ("sine", "square"):
@@ -75,7 +75,8 @@ def scenario(name: str, surface: str | None, seed: int, index: int) -> Scenario:
 
 
 def flown(name: str, surface: str | None, flights: int, hours: float, seed: int) -> Iterator[Any]:
-    """What came of so many flights, and in health of so many hours; none of a speed without a trim."""
+    """Yield the landings of flights with a loss, or of hours of healthy flight; a flight without a trim is
+    left out."""
     index, flown_s, refused = 0, 0.0, 0
     wanted_s = 3600.0 * hours if surface is None else 0.0
     while index < flights or (flown_s < wanted_s and refused < MOST_REFUSED):
@@ -89,7 +90,8 @@ def flown(name: str, surface: str | None, flights: int, hours: float, seed: int)
 
 
 def is_certain(faulty: Scenario) -> bool:
-    """Whether theory is certain to detect the loss of a flight in time, wherever its uncertainty is."""
+    """Whether the theory guarantees that the loss of a flight is detected in time, for all declared
+    errors."""
     fault = faulty.faults[0]
     end_s = fault.at_s + DETECT_WITHIN_S
     healthy = faulty.with_({"duration_s": max(end_s + 0.1, SETTLED_S + 1.0)})

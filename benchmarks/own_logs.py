@@ -2,22 +2,24 @@
 
     python -m benchmarks.own_logs [--seed 1] [--aircraft beaver] [--air none] [--by identified]
 
-Three laws, two airspeeds, references drawn by the seed (sines and doublets on three axes), admitted errors of
-inertia and air drawn as well, gyros ideal or with declared noise. Healthy flights, and losses of 0.3, 0.6 and
-0.9 of whatever turns the aircraft. Each flight is written as a recorder on board would have, read again, and
-diagnosed as `diagnose --aircraft` does (`by` aircraft), and by a model that `identify` has of twelve healthy
-flights of a minute: two of the laws, other airspeeds, other days. Both read the log by the vehicle file that
-`run --as table` writes. `--air light` flies in turbulence, declared to the aircraft's own model, and
-to `identify` by nothing.
+The flights have three laws, two airspeeds, random references (sines and doublets on three axes), random
+errors of inertia and air within the declared bounds, and gyros that are ideal or have the declared noise.
+They are healthy, or a primary surface loses 0.3, 0.6 or 0.9 of its effectiveness. Each flight is written
+as a recorder on board would write it, and read again. It is diagnosed as `diagnose --aircraft` does (`by`
+aircraft), and by a model that `identify` made of twelve healthy flights of a minute, with two of the laws,
+other airspeeds and other random numbers (`by` identified). Both read the log by the vehicle file that `run
+--as table` writes. With `--air light` the flights are in turbulence. The scenario declares it to the
+aircraft's own model; `identify` gets no declaration.
 
-Prints a row for each model and size: flights, refused logs, alarms before the fault, found, named rightly,
-named wrongly in any row (a group of surfaces that cannot be told apart is wrong where the surface at fault is
-not in it), share of samples and surfaces whose effectiveness the bounds hold, the same of the surface at
-fault alone (1, of the others, is an end of the range), share of those of which more is said than 0 to 1,
-their width, the share of credible samples, and of how many losses a test that is told surface, size, instant,
-the aircraft's design model and the noise (a vector autoregression of what that model leaves of the training
-flights, with quiet and with noisy gyros) is sure enough for one false alarm an hour: its log likelihood ratio
-exceeds the logarithm of the samples in an hour [Lorden1971].
+The table has a row for each model and size: flights, refused logs, alarms before the fault, detected
+faults, right names, wrong names in any row (the name of a group is wrong if the surface at fault is not in
+it). Then it has the share of samples and surfaces whose effectiveness lies within the bounds, and the same
+for the surface at fault alone, both where the bounds are narrower than 0 to 1; the share and the median
+width of these bounds; and the share of credible samples. The last column counts the losses that an
+informed test detects at one false alarm an hour: its log likelihood ratio exceeds the logarithm of the
+number of samples in an hour [Lorden1971]. This test knows the surface, the size, the instant, the design
+model of the aircraft, and the noise: a vector autoregression of the accelerations that the model does not
+explain in the training flights, for quiet and for noisy gyros.
 """
 
 import argparse
@@ -67,7 +69,7 @@ HEAD = [
 
 
 class Campaign(NamedTuple):
-    """What is flown: a reference of an aircraft, moving air, and how it is drawn."""
+    """The flights: reference of the aircraft, severity of the turbulence, and seed of the random numbers."""
 
     aircraft: str = "beaver"
     air: str = "none"
@@ -75,7 +77,7 @@ class Campaign(NamedTuple):
 
 
 def scenarios(of: Campaign) -> Iterator[Document]:
-    """Scenario after scenario: every law and airspeed, healthy and with each fault of each surface."""
+    """Yield the scenarios: each law and airspeed, healthy and with each loss on each surface."""
     plain = bf.load({"name": "plain", "aircraft": of.aircraft})
     for law in LAWS:
         for share in TESTED:
@@ -89,7 +91,7 @@ def scenarios(of: Campaign) -> Iterator[Document]:
 
 
 def training(of: Campaign) -> Iterator[Document]:
-    """Healthy flights of other days, by some of the laws at other airspeeds."""
+    """Yield healthy flights with other random numbers, with some of the laws, at other airspeeds."""
     usual_mps = bf.load({"name": "plain", "aircraft": of.aircraft}).initial.airspeed_mps
     for i in range(TRAINING):
         law, share = TRAINING_LAWS[i % 2], TRAINED[i // 2 % 2]
@@ -141,7 +143,7 @@ def _sinusoid(rng: np.random.Generator) -> Document:
 
 
 class Log(NamedTuple):
-    """A flight as a recorder on board has written it, with its scenario beside it."""
+    """The log of a flight as a recorder on board writes it, with its scenario beside it."""
 
     flown: Any
     folder: Path
@@ -149,7 +151,7 @@ class Log(NamedTuple):
 
 
 def recorded(document: Document, folder: Path) -> Log:
-    """Fly it, and write its log."""
+    """Fly a scenario, and write its log."""
     scenario = bf.load(document)
     run(scenario, folder, report=False, recording="table")
     place = folder / scenario.name
@@ -157,11 +159,11 @@ def recorded(document: Document, folder: Path) -> Log:
 
 
 Said = tuple[LogRows, str | None]
-"""The rows, and the surface that is named in the end."""
+"""The rows, and the surface that is named at the end."""
 
 
 def by_aircraft(log: Log, of: Campaign) -> Said:
-    """As `diagnose --aircraft`."""
+    """The diagnosis as of `diagnose --aircraft`."""
     vehicle = load_vehicle(str(log.folder / "vehicle.yaml"))
     told = load_diagnosed(of.aircraft, str(log.folder / "scenario.yaml"))
     _, rows, verdict = diagnose_aircraft(read_vehicle_columns(log.path, vehicle), vehicle, told)
@@ -169,7 +171,7 @@ def by_aircraft(log: Log, of: Campaign) -> Said:
 
 
 def identified(logs: list[Log]) -> Model:
-    """As `identify` writes it to a file, from healthy flights of other days."""
+    """The model that `identify` writes to a file, from healthy flights."""
     vehicle: Vehicle = load_vehicle(str(logs[0].folder / "vehicle.yaml"))
     vehicle = vehicle.model_copy(update={"faults": ["loss"]})
     named = [log.path.rename(log.path.with_stem(log.flown.name)) for log in logs]
@@ -178,8 +180,8 @@ def identified(logs: list[Log]) -> Model:
 
 
 def unexplained(log: Log) -> tuple[np.ndarray, np.ndarray]:
-    """What the design model leaves of each frame's acceleration, (n, 3) rad/s2, and what each surface would
-    do by its command while healthy, (n, 3, S)."""
+    """The acceleration of each frame that the design model does not explain, (n, 3) rad/s2, and the effect of
+    each healthy surface, (n, 3, S) rad/s2."""
     aircraft, table = log.flown.airframe, pd.read_parquet(log.folder / "log.parquet")
     model = DesignFunctions(design_record(aircraft))
     rates = table[[f"{axis}_measured_rad_s" for axis in "pqr"]].to_numpy()
@@ -192,19 +194,19 @@ def unexplained(log: Log) -> tuple[np.ndarray, np.ndarray]:
 
 
 def noisy(log: Log) -> bool:
-    """Whether its gyros have noise."""
+    """Whether the gyros have noise."""
     return bool(log.flown.sensors.p.noise_std_deg_s > 0.0)
 
 
 def noises(logs: list[Log]) -> dict[bool, Whitener]:
-    """The noise of healthy flights, with quiet and with noisy gyros."""
+    """The noise model of healthy flights, for quiet (False) and for noisy gyros (True)."""
     left = {log.folder: unexplained(log)[0] for log in logs}
     kinds = {noisy(log) for log in logs}
     return {kind: fitted([left[one.folder] for one in logs if noisy(one) == kind]) for kind in kinds}
 
 
 def told(log: Log, noise: dict[bool, Whitener]) -> bool:
-    """Whether a test that is told all of a loss is sure of it before the flight ends."""
+    """Whether the informed test detects the loss before the flight ends."""
     if noisy(log) not in noise or not log.flown.faults:
         return False
     (fault,), (left, does) = log.flown.faults, unexplained(log)
@@ -217,14 +219,14 @@ def told(log: Log, noise: dict[bool, Whitener]) -> bool:
 
 
 def by_model(log: Log, model: Model) -> Said:
-    """As `diagnose --model`."""
+    """The diagnosis as of `diagnose --model`."""
     rows = diagnose(resample(read_vehicle_columns(log.path, model.vehicle), model.vehicle), model)
     names, count = np.unique(rows.isolated_surfaces[rows.faulty == 1].astype(str), return_counts=True)
     return rows, str(names[count.argmax()]) if len(names) else None
 
 
 def _tried(by: str, log: Log, way: Callable[[Log], Said]) -> Document:
-    """What was right; of a log that is refused nothing is said."""
+    """The row of a diagnosed log; that of a refused log has no results."""
     size = f"{LOSS} {log.flown.faults[0].magnitude:g}" if log.flown.faults else "none"
     found = {"by": by, "size": size, "refused": False}
     try:
@@ -235,7 +237,7 @@ def _tried(by: str, log: Log, way: Callable[[Log], Said]) -> Document:
 
 
 def judged(log: Log, said_of: Said) -> Document:
-    """What was right."""
+    """The row of a diagnosed log: which alarms, names and bounds are right."""
     (rows, isolated), low, high = said_of, said_of[0].effectiveness_low, said_of[0].effectiveness_high
     truth, actual, began_s = np.ones_like(low), None, np.inf
     for fault in log.flown.faults:
@@ -258,7 +260,7 @@ def judged(log: Log, said_of: Said) -> Document:
 
 
 def table(results: list[Document]) -> list[list[str]]:
-    """A row for each model and size of the fault."""
+    """The table: a row for each model and size of the fault."""
     rows = []
     for (by, size), of in grouped(results, "by", "size").items():
         total = {key: sum(one[key] for one in of) for key in (*_COUNTED, *_SUMMED)}
@@ -283,7 +285,7 @@ def _share(part: int, whole: int) -> str:
 
 
 def main() -> None:
-    """Fly, write, read, diagnose, print."""
+    """Fly, write, read and diagnose the flights, and print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--aircraft", default="beaver")
@@ -295,7 +297,7 @@ def main() -> None:
 
 
 def ways(of: Campaign, by: Sequence[str], logs: list[Log]) -> dict[str, Callable[[Log], Said]]:
-    """The diagnosis by each of these models; logs: of the training flights."""
+    """The function that diagnoses a log by each of these models. logs: of the training flights."""
     found: dict[str, Callable[[Log], Said]] = {"aircraft": lambda log: by_aircraft(log, of)}
     if "identified" in by:
         model = identified(logs)

@@ -212,7 +212,7 @@ def mistake_gains(samples: Samples, model: Model) -> tuple[dict[str, float], flo
     if found is None:
         return {}, 0.0
     without = {
-        signal: _likelihoods(log_without_signal(samples, model.vehicle, signal), model)
+        signal: _likelihoods(_altered(samples, model.vehicle, {}, {signal: 0.0}), model)
         for signal in model.vehicle.signal_columns
     }
     gains = {}
@@ -265,11 +265,6 @@ def corrected_logs(samples: Samples, vehicle: Vehicle, unknown: Collection[str])
             scaled = _altered(samples, vehicle, {}, {name: factor})
             also = (float(np.log(abs(factor))), "") if name in doubtful else (0.0, name)
             yield CorrectedLog(f"`scale: {factor:.4g}` on {name}", scaled, *also)
-
-
-def log_without_signal(samples: Samples, vehicle: Vehicle, signal: str) -> Samples:
-    """The log in which a signal, and what the airspeed makes of it, is always 0."""
-    return _altered(samples, vehicle, {}, {signal: 0.0})
 
 
 def _altered(

@@ -160,10 +160,6 @@ NOTHING_FITTED = FittedRanges(commands=[], rates=[])
 """The ranges of a model whose file states none."""
 
 
-def _or_nothing(given: Any) -> Any:
-    return NOTHING_FITTED if given is None else given
-
-
 class NoiseModel(Section):
     """The noise of some flights. Another gyro, other air or another law gives the residual another spectrum.
 
@@ -222,7 +218,9 @@ class Model(Section):
     noise: Covariance
     colours: list[NoiseModel] = Field([])
     settings: FilterSettings = FilterSettings()
-    fitted: Annotated[FittedRanges, BeforeValidator(_or_nothing)] = NOTHING_FITTED
+    fitted: Annotated[FittedRanges, BeforeValidator(lambda of: NOTHING_FITTED if of is None else of)] = (
+        NOTHING_FITTED
+    )
     identified: dict[str, object] = Field({})
 
     @model_validator(mode="after")

@@ -18,18 +18,13 @@ SI_UNITS: dict[str, tuple[str, float]] = {
     "m": (LENGTH, 1.0), "cm": (LENGTH, 0.01), "ft": (LENGTH, M_PER_FT),
     "1": (SHARE, 1.0), "%": (SHARE, 0.01),
 }  # fmt: skip
-"""Kind of each unit, and its size in the SI unit."""
+"""Kind of each unit, and its size in the SI unit; of each kind the SI unit first."""
 NEUTRAL_PULSE_US, HALF_PULSE_RANGE_US = 1500.0, 400.0
 """Usual pulse of a servo at neutral, and from there to either end of its travel."""
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 """Units of the time column."""
 UNIT_FACTORS = (-1.0, 1.0 / _RAD_PER_DEG, 1000.0, _RAD_PER_DEG, 1e-3)
 """What mends a column of another sign or unit: degrees for radians, thousandths for one, and the reverse."""
-
-
-def units_of_kind(kind: str) -> list[str]:
-    """The units of one kind, the SI unit first."""
-    return [name for name, (unit_kind, _) in SI_UNITS.items() if unit_kind == kind]
 
 
 def nearest_unit(kind: str, si_factor: float, max_ratio: float) -> str | None:

@@ -34,7 +34,6 @@ from beaver_ftc_logs.units import (
     SI_UNITS,
     SPEED,
     TIME_UNITS,
-    units_of_kind,
 )
 
 _MAX_FILE_BYTES = 1_000_000
@@ -88,11 +87,9 @@ class QuantityColumn(Section):
         return values * factor + self.offset * factor / self.scale
 
 
-def _expand_column_name(value: Any) -> Any:
-    return {"column": value} if isinstance(value, str) else value
-
-
-ColumnSpec = Annotated[QuantityColumn, BeforeValidator(_expand_column_name)]
+ColumnSpec = Annotated[
+    QuantityColumn, BeforeValidator(lambda of: {"column": of} if isinstance(of, str) else of)
+]
 
 
 class TimeColumn(Section):
@@ -250,7 +247,8 @@ class Vehicle(Section):
         two_ways: list[Conflict] = []
         for location, kind, quantity in self.located_quantities():
             if kind and quantity.unit is not None and SI_UNITS[quantity.unit][0] != kind:
-                reason = f"{quantity.unit!r} is no unit of it, allowed: {', '.join(units_of_kind(kind))}"
+                units = [name for name, (of, _) in SI_UNITS.items() if of == kind]
+                reason = f"{quantity.unit!r} is no unit of it, allowed: {', '.join(units)}"
                 mistakes.append(((*location, "unit"), reason))
             if kind is not None and first.setdefault(quantity.column, quantity) != quantity:
                 reason = f"{quantity.column!r} is read in two ways, allowed: one unit, scale and offset"

@@ -38,15 +38,10 @@ _FAILURE_PREFIX = "failure_status-"
 TopicTable = dict[str, Floats]
 
 
-def _share_of_travel(us: Floats) -> Floats:
-    """Pulse width about its neutral, as a share of half its range."""
-    return (us - NEUTRAL_PULSE_US) / HALF_PULSE_RANGE_US
-
-
 _CONVERSION_OF_UNIT: dict[str, Callable[[Floats], Floats]] = {
     "": np.asarray,
     "deg": np.deg2rad,
-    "us": _share_of_travel,
+    "us": lambda us: (us - NEUTRAL_PULSE_US) / HALF_PULSE_RANGE_US,  # share of travel
 }
 
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.documents import BadInput
-from beaver_ftc_logs.readers.time_text import DayCount, is_clock, seconds_of_text
+from beaver_ftc_logs.readers.time_text import DayCount
 from beaver_ftc_logs.recording import Floats
 
 _DELIMITER_TITLES = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars"}
@@ -217,8 +217,7 @@ def _convert_column(cells: Any, mark: str, name: str, table: TableCells, days: D
         texts = []
         for row in np.flatnonzero(~is_number.to_numpy(zero_copy_only=False)).tolist():
             text = cells[row].as_py()
-            seconds = seconds_of_text(text)
-            values[row] = days.continued(seconds) if is_clock(text) else seconds
+            values[row] = days.seconds_of_text(text)
             if text and np.isnan(values[row]):
                 texts.append((table.n_rows_before + row + 1, text))
         if texts:

@@ -37,11 +37,6 @@ def seconds_of_text(text: str) -> float:
     return nan
 
 
-def is_clock(text: str) -> bool:
-    """Whether a cell states a time of day, which begins again at midnight."""
-    return _CLOCK_PATTERN.fullmatch(text.strip()) is not None
-
-
 class DayCount:
     """The midnights that a column of clocks has passed: a step back by more than half a day is one.
 
@@ -51,8 +46,11 @@ class DayCount:
         self._days = 0
         self._last = 0.0
 
-    def continued(self, clock_s: float) -> float:
-        """The time since the first midnight, s, of clocks that come one after the other."""
-        self._days += clock_s < self._last - 0.5 * _S_PER_DAY
-        self._last = clock_s
-        return clock_s + _S_PER_DAY * self._days
+    def seconds_of_text(self, text: str) -> float:
+        """The time that a cell states, s: of a clock since the first midnight."""
+        seconds = seconds_of_text(text)
+        if not _CLOCK_PATTERN.fullmatch(text.strip()):
+            return seconds
+        self._days += seconds < self._last - 0.5 * _S_PER_DAY
+        self._last = seconds
+        return seconds + _S_PER_DAY * self._days

@@ -110,16 +110,8 @@ def symbols_of(text: str) -> Iterator[str]:
         for symbol in _SYMBOL.findall(formula):
             if symbol.startswith("\\"):
                 yield symbol
-            elif symbol not in _NO_SYMBOLS:
-                yield from _letters(symbol)
-
-
-def _letters(word: str) -> Iterator[str]:
-    """A word of a formula: a differential or frame length as a whole, else letter by letter, as it is set."""
-    if word in ("dt", "tol"):
-        yield word
-    else:
-        yield from word
+            elif symbol not in _NO_SYMBOLS:  # other words are set letter by letter
+                yield from [symbol] if symbol in ("dt", "tol") else symbol
 
 
 def _symbols(text: str) -> Iterator[tuple[int, str]]:

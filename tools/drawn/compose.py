@@ -121,7 +121,7 @@ class Composer:
         words: Words = {"aircraft": self._row["aircraft"], "duration_s": self._now.duration_s}
         for path, node in self._keys:
             self._put_key(words, path, node)
-        for part in (self._frame, self._air, self._diagnosis, self._law, self._changes, self._faults):
+        for part in (self._frame, self._air, self._diagnosis, self._changes, self._faults):
             part(words)
         fit(words)
         if self._declared:
@@ -185,15 +185,13 @@ class Composer:
 
     def _diagnosis(self, words: Words) -> None:
         put(words, "fdi.scheme", self._row["scheme"])
+        put(words, "control.law", self._row["law"])
         detector = self._row["detector"]
         if detector == "worst-case":
             return
         node = self._schema["$defs"]["Statistical"]
         put(words, "fdi.statistical", self._walk.value(node, "fdi.statistical"))
         put(words, "fdi.authority", detector.replace("both, worst-case counts", "worst-case"))
-
-    def _law(self, words: Words) -> None:
-        put(words, "control.law", self._row["law"])
 
     def _changes(self, words: Words) -> None:
         level = self._row["changes"]

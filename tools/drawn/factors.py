@@ -86,7 +86,8 @@ def _own(schema: Node, aircraft: Sequence[str]) -> Iterator[Factor]:
     yield Factor("airspeed", ("middle", "slow", "fast"))
     yield Factor("rate", ("usual", "slow", "fast"))
     yield Factor("substeps", ("1", "2", "many"))
-    yield Factor("air", (LEFT_OUT, *severities(schema)))
+    severity = schema["$defs"]["Environment"]["properties"]["severity"]
+    yield Factor("air", (LEFT_OUT, *levels_of(severity)))
     yield Factor("gusts", (LEFT_OUT, "one", "several"))
     yield Factor("detector", ("worst-case", "statistical", "either", "both, worst-case counts"))
     yield Factor("scheme", registered_of(DETECTORS))
@@ -103,11 +104,6 @@ def _own(schema: Node, aircraft: Sequence[str]) -> Iterator[Factor]:
 def registered_of(group: str) -> tuple[str, ...]:
     """Names of our own detectors or laws, the compiled ones first."""
     return tuple(name for name, entry in registered(group).items() if entry.package == OURS)
-
-
-def severities(schema: Node) -> tuple[str, ...]:
-    """The severities of turbulence."""
-    return levels_of(schema["$defs"]["Environment"]["properties"]["severity"])
 
 
 def fault_types(schema: Node) -> dict[str, Node]:

@@ -1,7 +1,7 @@
 """Check a log before a fit: columns, units, gaps, dead signals, and a vehicle file for it.
 
-Which column is what is guessed from its name; its unit from the name, from the size of its numbers, and from
-what mechanics says: the integral of p is the change of roll, the mean of the acceleration is 1 g.
+The name of a column says which quantity it is. Its unit follows from the name, from the size of its numbers,
+and from mechanics: the integral of p is the change of roll, the mean of the acceleration is 1 g.
 """
 
 import re
@@ -98,13 +98,14 @@ _LOG_STEPS_S = (1.0 / 2000.0, 1.0 / 4.0)
 
 
 class _NoVehicle(Exception):
-    """No vehicle file can be proposed for a log; the text says why."""
+    """No vehicle file can be proposed for a log; the text has the reason."""
 
 
 def check_log(path: Path, vehicle: Vehicle | None, reader: str | None) -> Document:
-    """Return a description of a log in `lines`, and a `vehicle` for it: the one given, or a guess.
+    """The document of a log: a description in `lines`, and `vehicle`, the proposal if none is given.
 
-    usable: whether it could be identified or diagnosed so. Raises BadInput where it cannot be read at all.
+    usable: whether the log can be identified or diagnosed with the vehicle. Raises BadInput if the log cannot
+    be read at all.
     """
     lines: list[str] = []
     guess: Document | None = None
@@ -126,7 +127,7 @@ def check_log(path: Path, vehicle: Vehicle | None, reader: str | None) -> Docume
 
 
 def _check_recording(log: RecordedFlight, vehicle: Vehicle) -> tuple[bool, list[str]]:
-    """Whether a log could be identified or diagnosed, and what is said of it."""
+    """Whether a log can be identified or diagnosed, and the lines that describe it."""
     try:
         samples = resample(log, vehicle)
     except BadInput as error:
@@ -145,7 +146,7 @@ def _check_recording(log: RecordedFlight, vehicle: Vehicle) -> tuple[bool, list[
 
 
 def _compare_angles(log: RecordedFlight, vehicle: Vehicle) -> list[str]:
-    """That rates and angles agree, or that nothing could be compared: of the columns as logged, in SI."""
+    """Lines on the agreement of rates and angles, both in SI, or the reason why they cannot be compared."""
     columns = convert_to_si(log, vehicle).columns
     angles = named_angles(columns, vehicle)
     if angles[0] is None:
@@ -168,10 +169,10 @@ def _agrees(fit: physics.AngleFit) -> bool:
 
 
 class _LikelyLog(NamedTuple):
-    """A log, of a long table its first part, with the columns that may be something.
+    """A log with the columns that may be quantities or commands; of a long table, the first part.
 
-    time: its column and unit, None for the usual ones; all_names: of all its columns; mixing: by its
-    parameters.
+    time: column and unit of the time, None for the usual ones; all_names: the names of all columns; mixing:
+    by the parameters of the log.
     """
 
     reader: str
@@ -182,14 +183,14 @@ class _LikelyLog(NamedTuple):
 
     @property
     def remarks(self) -> list[str]:
-        """What is said of the time and the mixing."""
+        """Lines on the time and the mixing."""
         if self.time:
             return [f"time is in column {self.time[0]}, its steps fit {self.time[1]}"]
         return self.mixing.lines
 
 
 def _read_likely(path: Path, reader: str | None) -> _LikelyLog:
-    """Raises BadInput where the log cannot be read, or a table has no time."""
+    """Read a log. Raises BadInput if it cannot be read, or if a table has no time."""
     check_exists(path)
     reader = reader or reader_name_for_path(path)
     if reader in SELECTIVE_READERS:
@@ -208,7 +209,7 @@ def _read_likely(path: Path, reader: str | None) -> _LikelyLog:
 
 
 def _guess_vehicle(path: Path, likely: _LikelyLog) -> Document:
-    """The keys of a vehicle file for a log. Raises _NoVehicle where rates or commands are not found."""
+    """The keys of a vehicle file for a log. Raises _NoVehicle if it has no rates or no commands."""
     log, mixing = likely.log, likely.mixing
     names = [name for name, column in log.columns.items() if np.isfinite(column.values).any()]
     found = _find_quantities(names)
@@ -248,7 +249,7 @@ def _guess_vehicle(path: Path, likely: _LikelyLog) -> Document:
 
 
 def _find_quantities(names: list[str]) -> dict[str, str]:
-    """The columns that look like quantities, by quantity."""
+    """By quantity, the column that looks like it."""
     angles = [name for name in names if not re.search(_ANGLE_RATE_NAME, _snake_case(name))]
     return {
         quantity: name
@@ -272,20 +273,21 @@ def _add_commands_by_name(likely: _LikelyLog, names: list[str]) -> None:
 
 
 def _likely_columns(names: Iterable[str], max_columns: int | None = _MAX_READ_COLUMNS) -> list[str]:
-    """Columns that may be something: a log with many is not read whole."""
+    """Columns that may be quantities or commands: a log with many columns is not read as a whole."""
     pattern = "|".join(f"({part})" for part in _NAME_PATTERNS.values())
     likely = [name for name in names if re.fullmatch(pattern, _snake_case(name)) or is_command_name(name)]
     return likely[:max_columns]
 
 
 def _snake_case(name: str) -> str:
-    """A column's name as the patterns have it: `Roll rate [deg/s]` is `roll_rate_deg_s`."""
+    """The name of a column in the form of the patterns: `Roll rate [deg/s]` is `roll_rate_deg_s`."""
     text = re.sub(r"\s*[\[(]\s*([^\d\])][^\])]*?)\s*[\])]\s*$", r"_\1", name.strip().lower())
     return re.sub(r"(?<=\w)_{2,}(?=\w)|[\s/,-]+_*", "_", text).strip("_")
 
 
 def _shortest_match(pattern: str, names: Sequence[str]) -> str | None:
-    """The shortest name that fits a pattern, of two the first in the alphabet; None where none fits."""
+    """The shortest name that fits a pattern, the first in the alphabet if there are two; None if none
+    fits."""
     matches = [
         name
         for name in names
@@ -317,7 +319,7 @@ def _find_time(path: Path) -> TimeSource | None:
 
 
 def _guess_angle_unit(name: str, roll: Column, reader: str) -> str:
-    """The unit of the attitude: an ArduPilot's is degrees; by its name; by its size."""
+    """The unit of the attitude: degrees for ArduPilot, otherwise by the name, otherwise by the size."""
     if reader == "ardupilot" or "deg" in name.lower():
         return "deg"
     return "deg" if "rad" not in name.lower() and largest_magnitude(roll.values) > 2.0 * np.pi else "rad"
@@ -326,10 +328,10 @@ def _guess_angle_unit(name: str, roll: Column, reader: str) -> str:
 def _guess_rate_unit(
     log: RecordedFlight, rate_names: list[str], roll: Column | None, rad_per_roll_unit: float
 ) -> str:
-    """The unit of the rates. Where they agree with the roll angle, the unit by which they do, else that of
-    their name, else rad/s; where not, that of their name, else by their size.
+    """The unit of the rates. If they agree with the roll angle, it is the unit in which they agree, otherwise
+    that of their name, otherwise rad/s. If they do not agree, it is that of their name, otherwise by size.
 
-    rad_per_roll_unit: what the roll angle's numbers are multiplied by.
+    rad_per_roll_unit: factor on the numbers of the roll angle.
     """
     rates, named = [log.columns[name] for name in rate_names], rate_names[0].lower()
     found = next((unit for part, unit in _UNIT_OF_PART.items() if part in named), None)
@@ -347,7 +349,8 @@ def _column_entry(name: str, unit: str, si_unit: str) -> Any:
 
 
 def _pulse_entry(name: str, values: Floats) -> Any:
-    """A command as a share of travel: pulses of 1100 to 1900 us, per cent, or as it is."""
+    """The entry that converts a command to a share of travel: from pulses of 1100 to 1900 us, from per cent,
+    or without a factor."""
     median, largest = float(np.nanmedian(values)), largest_magnitude(values)
     if _PWM_RANGE_US[0] < median < _PWM_RANGE_US[1]:
         scale = 1.0 / HALF_PULSE_RANGE_US
@@ -372,6 +375,6 @@ def vehicle_file_text(vehicle: Document) -> str:
 
 
 def as_text(findings: Document) -> str:
-    """Return the findings as lines of text."""
+    """The document of `check_log` as lines of text."""
     usable = "can be used" if findings["usable"] else "cannot be used so"
     return "\n".join([f"{findings['log']}: {usable}", *(f"  {line}" for line in findings["lines"])])

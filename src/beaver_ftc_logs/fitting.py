@@ -18,12 +18,13 @@ from beaver_ftc_logs.regression import Parts
 from beaver_ftc_logs.vehicle import Vehicle
 
 _POWER_UNLABELLED = 0.9
-"""Where no labels say how often things break, an alarm asks for more: for how much, the benchmark decided.
-With parts enough that are not fitted, the rate of false alarms decides instead."""
+"""Largest `power` if no labels show how often faults occur: an alarm then needs more evidence. The benchmark
+decided how much; if enough parts are left out, the rate of false alarms decides instead."""
 _TRIM_SPANS_S = (2.0, 8.0)
-"""Spans whose means tell the drift of the trim from the residual's colour."""
+"""Spans of the means that distinguish the drift of the trim from the colour of the residual."""
 _POWER_LABELLED = 0.8
-"""A coloured residual tells less than a white one: by how much, blocked tests decided."""
+"""`power` of labelled flights: a coloured residual has less information than a white one. Blocked tests
+decided how much."""
 _OTHER_DAYS: Document = {
     "trim_sd": 0.1,
     "trim_shift": 0.03,
@@ -32,8 +33,8 @@ _OTHER_DAYS: Document = {
     "gain_time_s": 300.0,
     "own_gain_sd": 0.03,
 }
-"""How far another day may be: chosen on days drawn from one flight, judged on others (`--other-days`). The
-drift of the trim is what the means of the residual over 30 s show in that flight."""
+"""Largest difference of another day: chosen on days that were made from one flight, judged on others
+(`--other-days`). The drift of the trim is that of the means of the residual over 30 s in that flight."""
 _OTHER_LAWS: Document = {
     "own_gain_sd": 0.05,
     "own_gain_time_s": 20.0,
@@ -42,8 +43,8 @@ _OTHER_LAWS: Document = {
     "one_group": True,
     "bounds": 0.97,
 }
-"""How far each group's gain wanders under a law and air that the fit has not seen (a law that answers what is
-not modelled ties the command to it), and what a name asks for then. Chosen on simulated flights
+"""Variation of the gain of each group under a law and air that the fit has not seen, and the evidence that a
+name then needs. A law that reacts to what the model lacks ties the command to it. Chosen on simulated flights
 (`own_logs.py`, seeds 1 to 6).
 
 bounds: the posterior mass of 90 % bounds where no labels choose it. For a second or two after a loss most of
@@ -51,18 +52,18 @@ the mass still claims health: 0.9 of it held the truth at the fault in 0.70 to 0
 large losses; 0.97 in 0.83 to 0.99, on seeds 401 to 403, which chose it."""
 _MOVING_AIR: Document = {"own_gain_sd": 0.08, "own_gain_time_s": 100.0}
 _POWER_OTHER_LAWS = 0.4
-"""A law may feed a gyro's noise to the surfaces, which doubles the residual of one that does not: a sample
-then tells less than the fit knows. Chosen on seed 1 of five aircraft."""
+"""Largest `power` under other laws. A law may feed the noise of a gyro to the surfaces, which doubles the
+residual, so a sample has less information than in the fit. Chosen on seed 1 of five aircraft."""
 _DELAYS_SAMPLES = (-0.4, 0.0, 0.4)
-"""Delays beside the model's that a flight may have, in samples."""
+"""Delays that the commands of a flight may have beside that of the model, in samples."""
 _MIN_QUICK_SAMPLES = 10
-"""Samples with quick responses that a flight must have, for the mean of their errors."""
+"""Number of samples with quick responses that a flight must have for a mean of their errors."""
 _N_PRIOR_CHANGES = 20
-"""Changes that count as seen before the labels are read, half of them repairs."""
+"""Number of changes that are assumed before the labels are read; half of them are repairs."""
 
 
 def fit_model(parts: Parts, vehicle: Vehicle, settings: FilterSettings | None = None) -> Model:
-    """The model that fits these flights. Raises BadInput where there is too little to fit."""
+    """The model that fits these flights. Raises BadInput if they have too few samples."""
     bic = bic_by_order(parts, vehicle)
     model = fitted_order(parts, vehicle, *min(bic, key=lambda order: bic[order]))[1]
     model = model.model_copy(update={"settings": settings or estimate_filter_settings(parts, model)})

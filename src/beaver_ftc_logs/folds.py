@@ -20,8 +20,8 @@ _MAX_SPLITS = 12
 
 
 class Fold(NamedTuple):
-    """A part that is left out, its name, the model that is fitted to the others, with the standard errors of
-    its gains, and these."""
+    """A part that is left out (`held_out`), its name, the parts that are fitted, and their model, with the
+    standard errors of its gains."""
 
     model: Model
     held_out: FitPart
@@ -29,12 +29,12 @@ class Fold(NamedTuple):
     fitted: Parts
 
     def innovations(self) -> regression.Innovations:
-        """The samples in use of the part left out, by the model of the others."""
+        """The usable samples of the part left out, by the model of the others."""
         return self.held_out.innovations(self.model)
 
 
 def held_out_folds(parts: Parts, model: Model, most: int | None = _MAX_SPLITS) -> Iterator[Fold]:
-    """The folds, of more than `most` flights every so many at once."""
+    """Yield the folds. Of more than `most` flights, every `most`-th is left out at once."""
     tied = tied_shares(parts, model).tolist()
     for fitted, held_out, name in validation_folds(parts, most):
         gain_sd = group_gain_sd(fit_of(fitted, model), model).tolist()
@@ -43,8 +43,8 @@ def held_out_folds(parts: Parts, model: Model, most: int | None = _MAX_SPLITS) -
 
 
 def validation_folds(parts: Parts, most: int | None = None) -> list[tuple[list[FitPart], FitPart, str]]:
-    """Return the fitted flights, the held-out one and its name: halves of one flight; each flight in turn, of
-    more than `most` every so many at once."""
+    """The fitted flights, the held-out one and its name, for each fold: the halves of one flight, or each of
+    several flights. Of more than `most` flights, every `most`-th is left out at once."""
     if len(parts) == 1:
         first, second = parts[0].halves
         return [([first], second, "second half"), ([second], first, "first half")]

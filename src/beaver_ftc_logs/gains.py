@@ -1,4 +1,4 @@
-"""Estimate how far the groups' gains are from 1 in parts left out, and how much wider noise has to be for it.
+"""The errors of the gains of the groups in parts left out, and the inflation of the noise that covers them.
 
 Letters as in `orders`, and
 
@@ -22,22 +22,22 @@ from beaver_ftc_logs.regression import FitPart, Parts
 _GAIN_WINDOW_S = 10.0
 """Gains differ by flight rather than within it: chosen on seeds 11 and 12, in light turbulence."""
 _GYRO_FACTOR, _GUST_FACTOR = 1.7, 2.5
-"""In moving air the noise of another law's flight is so many times wider, gyros' or gusts', for gains too.
-Chosen on seeds 71, 73 and 101 to 106: 3 of 240 healthy flights alarmed, and with no such factor 6 of 150."""
+"""Factors on the variance of the noise, of gyros and of gusts, in moving air under another law, for the gains
+too. Chosen on seeds 71, 73 and 101 to 106: 3 of 240 healthy flights alarmed, and 6 of 150 without the
+factors."""
 _MAX_INFLATION = 200.0
-"""Largest noise factor of a window of ten seconds: of few flights one can be far from all others (1,550 of
-seed 205, else 5)."""
+"""Largest noise factor of a window of ten seconds. If there are few flights, one of them can be far from all
+others (1,550 in seed 205, otherwise 5)."""
 
 
 def gain_overdispersion(parts: Parts, model: Model) -> float:
-    """Estimate how many times as far, in squares, the gains of parts left out are from 1 as the filter
-    believes.
+    """Ratio of the squared errors of the gains of parts left out to those that the filter expects.
 
-    Residuals e = F (g - 1) + noise of a part give the gains g of its groups, least squares with trims aside.
-    Were the noise white and flights alike, the squares of g - 1 in the covariance (F' F)^-1 + S would be as
-    many as gains, on average; S is what the filter leaves free. What flights differ in and colour make more:
-    so much less does a sample tell of an effectiveness [McCullagh1989, section 4.5]. One part counts as seen
-    that is as believed.
+    In a part, least squares of the residual e = F (g - 1) + noise gives the gains g of the groups; trims are
+    removed. If the noise were white and all flights alike, the sum of the squares of g - 1, each in the
+    covariance (F' F)^-1 + S, would on average equal the number of gains. Differences between flights and the
+    colour of the noise make it larger. By this ratio, a sample has less information about an effectiveness
+    [McCullagh1989, section 4.5]. One further part with the ratio 1 is counted.
     """
     errors = [(float(len(model.groups)), len(model.groups))]
     for fold in held_out_folds(parts, model):
@@ -47,9 +47,9 @@ def gain_overdispersion(parts: Parts, model: Model) -> float:
 
 
 def widen_noise(parts: Parts, model: Model) -> Model:
-    """The model with the noise of each colour so many times wider as the gains of ten seconds left out, each
-    axis of an answer with its own, are farther from 1, in squares, than it and the filter let them be: quiet
-    gyros show what the model itself lacks."""
+    """The model with an inflated noise of each colour. The factor is the mean ratio of the squared errors of
+    the gains in windows of ten seconds left out to the expected ones, with a gain for each axis of a
+    response. Flights with quiet gyros show the errors of the model itself."""
     windows: dict[tuple[float, ...], list[float]] = {}
     for fold in held_out_folds(parts, model):
         loudness = _loudness(fold, fold.fitted if len(parts) > 1 else parts)
@@ -69,9 +69,9 @@ def widen_noise(parts: Parts, model: Model) -> Model:
 
 
 def _loudness(fold: Fold, others: Parts) -> float:
-    """How many times as wide the filter finds the noise of a flight left out as that of the loudest other
-    flight of the same noise; 1 if it is within the range of these, or under the same law. What the filter
-    widens by itself (`recent_scale`) is not counted again."""
+    """Ratio of the variance that the filter finds in a flight left out to that of the loudest other flight of
+    the same noise; 1 if it is not louder, or if the law is the same. The filter widens its noise by this
+    ratio itself (`recent_scale`), so it is not counted again."""
     model, ma = fold.model, fold.held_out.samples.noise_ma_coefficients
     if not model.vehicle.other_laws:
         return 1.0
@@ -85,9 +85,9 @@ def _loudness(fold: Fold, others: Parts) -> float:
 
 
 def _gain_errors(fold: Fold, window_s: float | None = None, loudness: float = 1.0) -> list[tuple[float, int]]:
-    """Squares of the errors g of the groups' gains that a part left out tells, in their covariance and what
-    the filter leaves free, S, and how many gains there are; of each window, with a gain for each axis of an
-    answer, where there are windows. loudness: variance of the noise, where the filter itself widens it.
+    """The square of the errors g of the gains in a part left out, in their covariance plus S, and the number
+    of gains; for each window, with a gain for each axis of a response, if there are windows. loudness: ratio
+    of the variance of the noise, by which the filter widens its noise itself.
 
         g = (F' F)^-1 F' e,    square = g' ((F' F)^-1 + S)^-1 g = (F' e)' (1 + S F' F)^-1 g
     """
@@ -114,8 +114,8 @@ def _gain_errors(fold: Fold, window_s: float | None = None, loudness: float = 1.
 
 
 def squared_deviations(fold: Fold) -> Floats:
-    """Squares of how far the groups' gains are from 1 in a flight left out, beyond the noise's share, (G,);
-    nan of a group whose effect it does not show."""
+    """Squared error of the gain of each group in a flight left out, less the part that the noise causes,
+    (G,); nan for a group whose effect the flight does not show."""
     F, e = _standardized(fold.model, fold.innovations())
     F = F.sum(axis=3)
     squares = np.full(F.shape[2], np.nan)
@@ -128,16 +128,15 @@ def squared_deviations(fold: Fold) -> Floats:
 
 
 def _gains(F: Floats, e: Floats) -> tuple[Floats, Floats, Floats]:
-    """Information F' F of errors g of gains, what the residual says of them, F' e, and g by least squares, of
-    e (n, 3) = F g + noise, F (n, 3, m)."""
+    """F' F, F' e, and the errors g of the gains by least squares, of e (n, 3) = F g + noise, F (n, 3, m)."""
     X = F.reshape(e.size, F.shape[2])
     FF, Fe = X.T @ X, X.T @ e.ravel()
     return FF, Fe, np.asarray(np.linalg.lstsq(FF, Fe, rcond=RANK_TOLERANCE)[0])
 
 
 def _standardized(model: Model, flight: regression.Innovations) -> tuple[Floats, Floats]:
-    """Return the effect F (n, 3, G, 3) of each axis of each group's answer on the residuals of a flight, and
-    those e (n, 3), both in sd of the noise, without means; where responses are quick, q times that."""
+    """The effect F (n, 3, G, 3) of each axis of each group's response on the residuals of a flight, and the
+    residuals e (n, 3), both without means and in standard deviations of the noise, `quick_scale` included."""
     sd = np.sqrt(flight.noise.wider * flight.quick_scale(model))[:, None]
     F = np.einsum("nga,ab->nbga", flight.F, flight.W)
     return centred(F) / sd[:, :, None, None], centred(flight.e @ flight.W) / sd

@@ -66,14 +66,15 @@ _LEAST_WEIGHT = 1e-9
 
 
 class _BadParameter(Exception):
-    """A parameter is missing, or has a value that none can have; the text says so."""
+    """A parameter is missing, or its value is not allowed; the text has the reason."""
 
 
 @dataclass
 class Mixing:
-    """What a log's parameters say of its surfaces, in the form of the vehicle file.
+    """The surfaces by the parameters of a log, in the form of the vehicle file.
 
-    entry_by_column: `commands` by column; surfaces: as the key; lines: what was found, and what stays out.
+    entry_by_column: entry of `commands` by column; surfaces: as the key of the file; lines: remarks on what
+    was found, and on what stays out.
     """
 
     entry_by_column: Document = field(default_factory=dict)
@@ -91,8 +92,8 @@ class Mixing:
 class _Surface:
     """A surface by its parameters.
 
-    place: where it stands in them; kind: surfaces of one kind get one command; axis_shares: of roll, pitch
-    and yaw command in it, None where they are not known; reason, mixer_reason: the parameters that say so.
+    place: its channel or number; kind: surfaces of one kind get the same command; axis_shares: shares of the
+    roll, pitch and yaw command, None if they are not known; reason, mixer_reason: text with the parameters.
     """
 
     name: str
@@ -111,39 +112,39 @@ class _Surface:
 
 
 Reading = tuple[float, float, str]
-"""Scale and offset from the numbers of a column to the command, and a text on them."""
+"""Scale and offset from the numbers of a column to the command, and a remark."""
 _Outputs = list[tuple[str, Reading]]
 """The column of each surface's output, and how it is read."""
 
 
 @dataclass(frozen=True)
 class _Axes:
-    """The columns of the commands of roll, pitch and yaw, and their scale. problem: why none is used."""
+    """The columns of the roll, pitch and yaw command, and their scale. problem: reason not to use them."""
 
     columns: Sequence[str]
     scale: float
     problem: str = ""
 
     def weights(self, surface: _Surface) -> Weights:
-        """The surface as a mix of these commands; empty where its mix is not known."""
+        """The surface as a mix of these commands; empty if the mix is not known."""
         if surface.axis_shares is None:
             return {}
         return _tidy(dict(zip(self.columns, surface.axis_shares.tolist(), strict=True)))
 
     def problem_of(self, surface: _Surface, names: set[str]) -> str:
-        """Why a surface cannot be a mix of these commands, empty where it can."""
+        """The reason why a surface cannot be a mix of these commands; empty if it can."""
         weights = self.weights(surface)
         missing = [f"{column} is not either" for column in weights if column not in names]
         return self.problem or next(iter(missing), "" if weights else "its mix is not known")
 
 
 _Found = tuple[list[_Surface], list[_Outputs], _Axes]
-"""Surfaces, the ways in which their outputs may be logged, and the commands before the mixer."""
+"""The surfaces, the ways in which their outputs can be logged, and the commands before the mixer."""
 
 
 def mixing_of_log(reader: str, params: Parameters, column_names: Collection[str]) -> Mixing:
-    """The mixing that the parameters of a log say, with commands out of these columns. Without surfaces where
-    they say none, or their commands are not in the log."""
+    """The mixing by the parameters of a log, with commands from these columns. It has no surfaces if the
+    parameters give none, or if the log has none of their commands."""
     mixing, names = Mixing(), set(column_names)
     if reader not in SELECTIVE_READERS:
         return mixing
@@ -165,7 +166,7 @@ def mixing_of_log(reader: str, params: Parameters, column_names: Collection[str]
 
 @dataclass
 class _Parameters:
-    """Access to the parameters of a log that says what is wrong with one. lines: receive what stays out."""
+    """Checked access to the parameters of a log. lines: receive a remark on each that stays out."""
 
     values_by_name: Parameters
     lines: list[str]
@@ -198,8 +199,8 @@ class _Parameters:
         other: str,
         unused: Collection[int],
     ) -> dict[int, int]:
-        """The known kinds by number, of the parameters with these names; what stays out is said, but of
-        unused kinds."""
+        """The kind by number, of the parameters with these names. A remark is added for each unknown kind,
+        except for unused ones."""
         kinds: dict[int, int] = {}
         for number, name in names.items():
             try:
@@ -215,7 +216,7 @@ class _Parameters:
 
 
 def _full_name(name: str, number: int, kinds: Mapping[int, int]) -> str:
-    """The name of a surface; with its number where several are of its kind."""
+    """The name of a surface, with its number if there are several of its kind."""
     return name if [*kinds.values()].count(kinds[number]) == 1 else f"{name}_{number}"
 
 
@@ -247,8 +248,8 @@ def _ardupilot_mixing(params: _Parameters) -> _Found:
 
 
 def _ardupilot_mixers(params: _Parameters, kinds: Collection[int]) -> tuple[Floats | None, str]:
-    """The factors of the mixers on aileron, elevator and rudder, None where they are not known, and the
-    parameters that say so [ArduPlane, servos.cpp: channel_function_mixer]."""
+    """The factors of the mixers on aileron, elevator and rudder, None if they are not known, and a text with
+    the parameters [ArduPlane, servos.cpp: channel_function_mixer]."""
     if not any(_ARDUPILOT_SURFACES[kind][2] for kind in kinds):
         return None, ""
     try:
@@ -322,7 +323,7 @@ def _px4_mixing(params: _Parameters, column_names: set[str]) -> _Found:
 
 def _px4_axis_shares(params: _Parameters, indices: Collection[int]) -> dict[int, Any]:
     """The share of each torque command in each surface: the pseudo-inverse of the torques of all surfaces
-    [PX4, ControlAllocationPseudoInverse]. None of any where a torque is not known."""
+    [PX4, ControlAllocationPseudoInverse]. None for every surface if a torque is not known."""
     try:
         torques = [
             [params.number(f"CA_SV_CS{i}_TRQ_{axis}", -_MAX_TORQUE, _MAX_TORQUE) for axis in "RPY"]
@@ -336,7 +337,8 @@ def _px4_axis_shares(params: _Parameters, indices: Collection[int]) -> dict[int,
 
 
 def _px4_pulses(params: _Parameters, drivers: Sequence[list[str]]) -> list[_Outputs]:
-    """The pulses of each surface's first output; none where one has none, or where there are two drivers.
+    """The pulses of the first output of each surface; none if a surface has no output, or if there are two
+    drivers.
 
     drivers: of each surface the parameters that give it an output, such as PWM_MAIN_FUNC3.
     """
@@ -357,8 +359,8 @@ def _add_surfaces_by_output(
 ) -> None:
     """Each surface follows the command of its own output.
 
-    Commands that depend on those before are none of their own: the surface is said to follow these, since a
-    fit cannot distinguish what moves together.
+    A command that is a combination of earlier ones is not used: its surface follows that combination, since a
+    fit cannot distinguish commands that move together.
     """
     pairs = [*zip(all_surfaces, outputs, strict=True)]
     for surface, (column, _) in pairs:
@@ -393,8 +395,8 @@ def _weights_of_own_columns(surfaces: Sequence[_Surface]) -> Floats:
 
 
 def _rows_of_commands(surfaces: Sequence[_Surface]) -> Floats:
-    """The shares of roll, pitch and yaw in each surface; where one is not known, a direction of its own for
-    each kind."""
+    """The shares of roll, pitch and yaw in each surface; if one is not known, a direction for each kind of
+    surface instead."""
     known = [surface.axis_shares for surface in surfaces if surface.axis_shares is not None]
     if len(known) == len(surfaces):
         return np.array(known)
@@ -430,8 +432,9 @@ def _command_entry(column: str, scale: float, offset: float) -> Any:
 def load_vehicle_for_logs(
     vehicle: str | Path, logs: Sequence[Path], reader: str | None = None
 ) -> tuple[Vehicle, list[str]]:
-    """The vehicle in a file, and lines on what its logs' parameters say where the file leaves out `commands`
-    or `surfaces`: what the file has overrides. Raises ScenarioError and BadInput with one line a mistake."""
+    """The vehicle in a file. If the file leaves out `commands` or `surfaces`, they follow from the
+    parameters of the logs, with remarks in the lines. Raises ScenarioError and BadInput with one line for
+    each mistake."""
     document, path = read_vehicle_document(vehicle)
     missing = [key for key in ("commands", "surfaces") if key not in document.data]
     lines: list[str] = []
@@ -451,7 +454,7 @@ def load_vehicle_for_logs(
 def _missing_keys_of_log(
     log: Path, reader: str | None, data: Mapping[str, Any], missing: Sequence[str]
 ) -> tuple[Document, list[str]]:
-    """The keys that a vehicle file leaves out, by a log's parameters; none in a format without parameters."""
+    """The keys that a vehicle file leaves out, by the parameters of a log, if its format has parameters."""
     check_exists(log)
     used_reader = reader or data.get("reader") or reader_name_for_path(log)
     if used_reader not in SELECTIVE_READERS:
@@ -469,8 +472,8 @@ def _missing_keys_of_log(
 
 
 def _columns_in_file(data: Mapping[str, Any]) -> set[str] | None:
-    """The columns of the commands that a vehicle file names in one of the two keys, None where it has
-    neither; what is no name is left for the file's own check."""
+    """The columns of the commands that a vehicle file names in one of the two keys, None if it has neither.
+    The check of the file reports entries that are no names."""
     if isinstance(commands := data.get("commands"), list):
         columns = [entry.get("column") if isinstance(entry, dict) else entry for entry in commands]
         return {column for column in columns if isinstance(column, str)}

@@ -37,19 +37,19 @@ _NEWEY_WEST_S = 2.0
 _MIN_RATE_SD = 1e-6
 _FAILURE_MARGIN_S = 1.0
 AR_ORDER = 20
-"""A flight's own noise model has an AR predictor of so many samples: chosen on seeds 11 and 12, in light
-turbulence; what a name asks for on a pa28's seed 11."""
+"""Samples of the AR predictor in the noise model of a flight: chosen on seeds 11 and 12, in light turbulence,
+and for the evidence that a name needs on seed 11 of a pa28."""
 _USUAL_SHARE = 0.9
 """Share of the samples of the fit whose responses count as usual."""
 RANK_TOLERANCE = 1e-9
 _MIN_EFFECT_POWER, _EFFECT_POWER_CAP = 1e-6, 12.5
-"""Of an effect of so many variances of the noise a sample, a fiftieth is half a standard deviation."""
+"""Variances of the noise in a sample: a fiftieth of the cap is half a standard deviation."""
 GAIN_SD_CAP = 0.33
 """A gain that is known no better than to a third is not known to be there."""
 
 
 def fit_parts(flights: Sequence[Samples]) -> list[FitPart]:
-    """Return each flight with the samples that are known well enough for the fit."""
+    """Each flight, with the samples that are known well enough for the fit."""
     return [FitPart(samples, usable_mask(samples)) for samples in flights]
 
 
@@ -113,8 +113,8 @@ def refit(parts: Parts, model: Model) -> Model:
 
 
 def fitted_order(parts: Parts, vehicle: Vehicle, h: int, L: int) -> tuple[least_squares.Regression, Model]:
-    """Least squares of given order over all flights, and its model: made once, since every test of a model
-    needs the same fits to parts of them."""
+    """Least squares of given order over all flights, and its model. Each fit is made once: every test of a
+    model needs the same fits to parts of the flights."""
     fits, key = parts[0].fits, (vehicle.model_dump_json(), h, L, *map(id, parts))
     if key not in fits:
         fit = fit_order(parts, vehicle, h, L)
@@ -137,8 +137,7 @@ def fit_order(parts: Parts, vehicle: Vehicle, h: int, L: int) -> least_squares.R
 
 
 def stack_data(parts: Parts, vehicle: Vehicle, h: int, L: int) -> tuple[Floats, Floats, Ints]:
-    """Regressors, rates and run number over all flights; the same first samples are left out
-    for any order.
+    """Regressors, rates and run number over all flights. Every order leaves out the same first samples.
 
     Columns of the regressors: one, the past, the commands of each group by lag.
     """
@@ -232,12 +231,13 @@ def centred(values: Floats) -> Floats:
 
 
 def tied_shares(parts: Parts, model: Model) -> Floats:
-    """Share of each group's effect on the rates that past, signals and the other groups make up, (G,): where
-    it is near 1 the law ties the group to what it answers to, and its effect cannot be told; 1 where the
-    group never moved. An effect far above the noise may be made up to a larger share: what is left counts.
+    """Share of the effect of each group on the rates that past, signals and the other groups explain, (G,).
+    If it is near 1, the law ties the group to the quantities that it controls, and its effect is not
+    identifiable; it is 1 if the group never moved. If the effect is far above the noise, the unexplained part
+    decides: the share may be larger.
 
-    The effect y = U_g B_g W is in standard deviations of the noise, e = y - Z b what the other columns of the
-    fit do not make up of it."""
+    The effect y = U_g B_g W is in standard deviations of the noise; e = y - Z b is the part that the other
+    columns of the fit do not explain."""
     Z, _, _ = stack_data(parts, model.vehicle, model.history, model.lags)
     B, W = np.array(model.response), np.linalg.inv(np.linalg.cholesky(np.array(model.noise))).T
     shares = np.ones(len(B))
@@ -252,12 +252,14 @@ def tied_shares(parts: Parts, model: Model) -> Floats:
 
 
 def group_gain_sd(fit: least_squares.Regression, model: Model) -> Floats:
-    """Standard error of each group's gain, (G,), colour included: of its response summed over lags, along
-    itself, weighed by the noise; for `other_laws` of the factor of the whole response. Where a surface's slow
-    effect is made up by the past, as an elevator's by alpha, its sum is not known, and its factor is.
+    """Standard error of the gain of each group, (G,), with the colour of the residual. The gain is that of
+    the response summed over the lags, weighted by the noise, or, with `other_laws`, the factor of the whole
+    response: if the past explains the slow effect of a surface, as alpha does for an elevator, the sum is not
+    known, but the factor is.
 
-    Responses z with errors of covariance C tell their factor with the variance 1 / (z' C^-1 z), both in the
-    standard errors s (L, 3) of the coefficients; b (3,) is the sum over lags, in sd of the noise.
+    A response z with errors of covariance C determines its factor with the variance 1 / (z' C^-1 z), both in
+    the standard errors s (L, 3) of the coefficients; b (3,) is the sum over the lags, in standard deviations
+    of the noise.
     """
     n, L = len(model.groups), model.lags
     first = len(fit.coefficients) - n * L
@@ -279,10 +281,10 @@ def group_gain_sd(fit: least_squares.Regression, model: Model) -> Floats:
 
 
 def one_step_innovations(model: Model, part: FitPart) -> regression.Innovations:
-    """The samples in use by a model, whatever is known of noise."""
+    """The usable samples by a model without its noise models."""
     return part.innovations(model.model_copy(update={"colours": []}))
 
 
 def one_step_residuals(parts: Parts, model: Model) -> Floats:
-    """The residuals of several flights, one after the other, (n, 3), whatever is known of noise."""
+    """The residuals of several flights by a model without its noise models, one after the other, (n, 3)."""
     return np.vstack([one_step_innovations(model, part).e for part in parts])

@@ -19,10 +19,10 @@ MAX_FIT_SAMPLES = 200_000  # that a fit takes at most of a log read in parts
 _FIT_SAMPLES = 5000  # of these in turn
 
 
-def read_vehicle_columns(path: Path, vehicle: Vehicle, reader: str | None = None) -> RecordedFlight:
+def read_vehicle_columns(path: Path, vehicle: Vehicle) -> RecordedFlight:
     """Read the columns of a log that a vehicle file names. Raises BadInput with the reason where it cannot be
     used."""
-    return next(_read_vehicle_log(path, vehicle, reader, in_parts=False))
+    return next(_read_vehicle_log(path, vehicle, None, in_parts=False))
 
 
 def read_vehicle_parts(path: Path, vehicle: Vehicle, reader: str | None = None) -> Iterator[RecordedFlight]:

@@ -430,7 +430,7 @@ def _command_entry(column: str, scale: float, offset: float) -> Any:
 
 
 def load_vehicle_for_logs(
-    vehicle: str | Path, logs: Sequence[Path], reader: str | None = None
+    vehicle: str | Path, logs: Sequence[Path], reader: str | None
 ) -> tuple[Vehicle, list[str]]:
     """The vehicle in a file. If the file leaves out `commands` or `surfaces`, they follow from the
     parameters of the logs, with remarks in the lines. Raises ScenarioError and BadInput with one line for

@@ -162,9 +162,9 @@ def _is_rate_clipped(rates: Sequence[Column], t_s: Floats) -> Mask:
     return np.logical_or.reduce(np.nan_to_num(held))
 
 
-def scale_by_airspeed(samples: Samples, V0: float, powers: Sequence[float] = (2.0,)) -> Samples:
+def scale_by_airspeed(samples: Samples, V0: float, powers: Sequence[float]) -> Samples:
     """The flight with what the airspeed V does of its own: commands times (V / V0)^n, n the power of each
-    surface, (S,) or one, and, as further signals, rates and signals times V / V0 - 1, since damping and
+    surface, (S,), and, as further signals, rates and signals times V / V0 - 1, since damping and
     stability grow with it. V = V0 m/s where the airspeed is unknown; (V / V0)^2 is limited to 0.1 to 10."""
     ratio = np.clip(np.nan_to_num(samples.airspeed / V0, nan=1.0) ** 2, *_QDYN_RATIOS)[:, None]
     products = np.column_stack([samples.rates, samples.signals]) * (np.sqrt(ratio) - 1.0)

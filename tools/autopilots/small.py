@@ -133,7 +133,7 @@ class Circuit(Small):
         self._turn_page(told, height)
         if self.phase in ("roll", "stop"):
             return self._on_wheels(told, dt)
-        return self._in_flight(told, height, dt)
+        return self._in_flight(told, dt)
 
     def _turn_page(self, told: Told, height: float) -> None:
         turned = abs(_wrapped(told.attitude[2] - self._heading))
@@ -159,7 +159,7 @@ class Circuit(Small):
         self._power = 0.0 if lands else min(TAKE_OFF, self._power + 0.4 * dt)
         return roll, lift if speed > TAIL_UP_MPS else 0.25, self._power, yaw
 
-    def _in_flight(self, told: Told, height: float, dt: float) -> tuple[float, float, float, float]:
+    def _in_flight(self, told: Told, dt: float) -> tuple[float, float, float, float]:
         climb, bank, speed = {
             "climb": (3.0, 0.0, CRUISE_MPS),
             "turn": (0.0, radians(20.0), CRUISE_MPS),

@@ -33,7 +33,7 @@ def blanked(text: str, *patterns: re.Pattern[str]) -> str:
     return text
 
 
-def every_page(root: Path = ROOT) -> list[Path]:
+def every_page(root: Path) -> list[Path]:
     """README and every page of docs/."""
     return [root / "README.md", *sorted((root / "docs").rglob("*.md"))]
 

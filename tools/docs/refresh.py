@@ -109,7 +109,7 @@ class Refreshed:
             return
         old = self.page.text[block.begin : block.end]
         new = dressed(old, linked(output.text, self.page.name), block.origin.command)
-        self._put(block.line, block.begin, block.end, new, block.origin.command)
+        self._put(block.begin, block.end, new, block.origin.command)
         self._pictures(block, output, moved=new != old)
 
     def _document(self, name: str, document: Printed) -> None:
@@ -131,7 +131,7 @@ class Refreshed:
             return
         command = self.page.documents[number.name].origin.command
         what = f"{number.name} {number.place.path} of {command}"
-        self._put(number.line, number.begin, number.end, new, what)
+        self._put(number.begin, number.end, new, what)
 
     def _output(self, made: Printed) -> Output | None:
         """What its command printed, if it was run and can be used."""
@@ -177,7 +177,7 @@ class Refreshed:
                 made.line, f"the code has changed since {origin.at[0]} ({origin.at[1]}): {origin.command}"
             )
 
-    def _put(self, line: int, begin: int, end: int, new: str, command: str) -> None:
+    def _put(self, begin: int, end: int, new: str, command: str) -> None:
         """Put text in the place of what stands, and note where they differ first."""
         old = self.page.text[begin:end]
         self._edits.append((begin, end, new))

@@ -42,7 +42,7 @@ def axes_of(alpha: float, beta: float) -> np.ndarray:
     return np.array([cos(alpha) * cos(beta), sin(beta), sin(alpha) * cos(beta)])
 
 
-def multilinear(data: np.ndarray, axes: list[list[float]], at: list[float], hold: bool = False) -> np.ndarray:
+def multilinear(data: np.ndarray, axes: list[list[float]], at: list[float], hold: bool) -> np.ndarray:
     """The value of a table at a point, by multilinear interpolation. Beyond the breakpoints, the last cell is
     extended, or its end value is held."""
     for grid, place in zip(axes, at, strict=True):

@@ -95,66 +95,77 @@ def _largest_score(blocks: Sequence[StatisticalBlock]) -> tuple[int, int]:
 def _likelihood_ratio(
     tape: Tape, history: History, test: tuple[int, int, int], rows: range
 ) -> LikelihoodRatio:
-    """The ratio of a test (numbers of its block, hypothesis and onset's slot) from its first row to its last.
+    """The ratio of a test (block, hypothesis, slot of the onset: their numbers) from first to last row.
 
-    recorded: quantities of the block at the end of the row before the first, then of each row. The states are
-    those of the row before the first. The detector prepares noise, decay, bound and rate of change of the
-    drift at the end of the row before (`previous`); it fills inputs and responses in the row itself
-    (`current`). moved: the places in the block of the axes that the fault moves.
+    before, now: quantities recorded at the end of the row before each, and of the row. The detector prepares
+    noise, decay, bound and rate of change of the drift at the end of the row before; it fills inputs and
+    responses in the row itself. moved: places in the block of the axes that the fault moves; states: of
+    their rate errors, then drifts. known: the declared constants that act on these axes.
     """
     b, h, slot = test
-    dt = history.dt
-    diagnosis = tape.alarm.diagnosis
+    dt, diagnosis = history.dt, tape.alarm.diagnosis
     block = diagnosis.statistical_filters[b]
     span = slice(rows[0] - 1 - tape.first, rows[-1] + 1 - tape.first)
-    recorded = {name: tape.filters[name][span, b] for name in (*RECORDED_BLOCK_FIELDS, "signature")}
-    previous, current = (
-        {name: values[part] for name, values in recorded.items()} for part in (np.s_[:-1], np.s_[1:])
-    )
-    moved = _affected_axes(recorded, current["signature"][:, h], len(block.axis_indices))
-    n = len(moved)
+    recorded = {name: tape.filters[name][span] for name in ("bounded", "air", "leap")}
+    recorded |= {name: tape.filters[name][span, b] for name in RECORDED_BLOCK_FIELDS}
+    recorded["signature"] = tape.filters["signature"][span, b, h]
+    before, now = ({name: one[part] for name, one in recorded.items()} for part in (np.s_[:-1], np.s_[1:]))
+    moved = _affected_axes(recorded, now["signature"], len(block.axis_indices))
     states = [*moved, *(2 + i for i in moved)]
     axes = [block.axis_indices[i] for i in moved]
-    known = [j for j in np.flatnonzero(block.regressor_coefficient_error_bound > 0.0).tolist()
-             if current["g_Z"][:, j][:, moved].any()]  # fmt: skip
-    drift = dt * previous["Q_d"][:, moved][:, :, moved]
-    # The detector adds Q_d after the decay of the drift, `add_whitened_frames` before it: a frame later.
-    drift[1:] = drift[:-1]
-    drift[0] = 0.0
-    x_Z = previous["x_Z"][:, known][..., states]
+    tolerance = block.regressor_coefficient_error_bound
+    known = [j for j in np.flatnonzero(tolerance > 0.0).tolist() if now["g_Z"][:, j][:, moved].any()]
     series = {
-        "signature": current["signature"][:, h][:, moved],
-        "jitter": dt * dt * previous["Q_x"][:, moved],
-        "drift": drift, "bounded": tape.filters["bounded"][span][:-1][:, axes],
-        "pace": previous["eta_rate"],
-    }  # fmt: skip
+        "signature": now["signature"][:, moved],
+        "jitter": dt * dt * before["Q_x"][:, moved],
+        "drift": _a_frame_later(dt * before["Q_d"][:, moved][:, :, moved]),
+        "bounded": before["bounded"][:, axes],
+        "pace": before["eta_rate"],
+    }
     if block.drift_correlation_length_m > 0.0:
-        series["keep"] = previous["a"]
+        series["keep"] = before["a"]
     if known:  # their filter's g = e + dt (v - d), x_Z = (e, d), solved for the input v
-        series["known"] = (current["g_Z"][:, known][..., moved] - x_Z[..., :n]) / dt + x_Z[..., n:]
+        e, d = np.split(before["x_Z"][:, known][..., states], 2, axis=2)
+        series["known"] = (now["g_Z"][:, known][..., moved] - e) / dt + d
     if diagnosis.gust.is_turbulence_declared:
-        series["air"] = tape.filters["air"][span][1:][:, axes]
-        leap = tape.filters["leap"][span][1:][:, axes][:, :, axes]
-        series["drift"] = drift + block.factor_on_gust_drift_intensity * leap  # the gust's axes turn
+        series["air"] = now["air"][:, axes]
+        leap = now["leap"][:, axes][:, :, axes]  # the gust's axes turn
+        series["drift"] += block.factor_on_gust_drift_intensity * leap
+    sense = block.hypothesis_tests_by_onset.supporting_correlation_sign[h, slot]
+    if supporting := _supporting_parts(block, h, slot):
+        series["foreseen"] = np.sum([now[name] for name in supporting], axis=0)[:, moved]
+    Y, P = _states_of({name: values[0] for name, values in before.items()}, states, known)
+    return LikelihoodRatio(
+        level=diagnosis.statistical_alarm_level, axes=axes, sense="less" if sense else "either",
+        tolerance=tolerance[known], R=before["R_y"][0, moved], Y=Y, P=P, first=rows[0], series=series,
+        innovation=history.innovation_rad_s2[rows[0] : rows[-1] + 1, axes], dt=dt,
+    )  # fmt: skip
+
+
+def _a_frame_later(drift: np.ndarray) -> np.ndarray:
+    """The detector adds Q_d after the decay of the drift, `add_whitened_frames` before it."""
+    return np.concatenate([np.zeros_like(drift[:1]), drift[:-1]])
+
+
+def _supporting_parts(block: StatisticalBlock, h: int, slot: int) -> list[str]:
+    """Those parts of the innovation that can be foreseen and whose correlation supports the fault."""
     tests = block.hypothesis_tests_by_onset
-    sense = tests.supporting_correlation_sign[h, slot]
     predictable = {
         "p": tests.correlation_predictable_in_calm_air,
         "g_c": tests.correlation_from_coarse_gust,
     }
-    supporting = [current[name] for name, values in predictable.items() if sense * values[h, slot] > 0.0]
-    if supporting:  # those parts of the innovation whose correlation supports the fault
-        series["foreseen"] = np.sum(supporting, axis=0)[:, moved]
-    Y = np.array([previous["state"][0, states], np.zeros(2 * n), *x_Z[0]]).T
-    xx, xd, dd = (recorded[name][0] for name in ("P_xx", "P_xd", "P_dd"))
-    P = np.block([[xx, xd], [xd.T, dd]])[np.ix_(states, states)]
-    innovation = history.innovation_rad_s2[rows[0] : rows[-1] + 1, axes]
-    return LikelihoodRatio(
-        level=diagnosis.statistical_alarm_level, axes=axes, sense="less" if sense else "either",
-        tolerance=block.regressor_coefficient_error_bound[known], R=recorded["R_y"][0, moved],
-        Y=np.vstack([Y[:n], -Y[n:]]), P=0.5 * (P + P.T),  # the checker refuses rounding
-        first=rows[0], series=series, innovation=innovation, dt=dt,
-    )  # fmt: skip
+    sense = tests.supporting_correlation_sign[h, slot]
+    return [name for name, values in predictable.items() if sense * values[h, slot] > 0.0]
+
+
+def _states_of(
+    one: Mapping[str, np.ndarray], states: list[int], known: list[int]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Y and P of `LikelihoodRatio` from the quantities of one row."""
+    Y = np.array([one["state"][states], np.zeros(len(states)), *one["x_Z"][known][:, states]]).T
+    Y[len(states) // 2 :] *= -1.0
+    P = np.block([[one["P_xx"], one["P_xd"]], [one["P_xd"].T, one["P_dd"]]])[np.ix_(states, states)]
+    return Y, 0.5 * (P + P.T)  # the checker refuses rounding
 
 
 def _affected_axes(recorded: dict[str, np.ndarray], signature: np.ndarray, n: int) -> list[int]:

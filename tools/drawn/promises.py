@@ -5,7 +5,7 @@
 """
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import beaver_ftc as bf
@@ -19,7 +19,7 @@ Document = dict[str, Any]
 
 OURS, NONE = "adaptive-estimators", "none"
 LOSS = "loss_of_effectiveness"
-PLANES = (("elevator", "flap"), ("aileron", "rudder"))
+PLANES = ({"elevator", "flap"}, {"aileron", "rudder"})
 DUST_S = 1e-6
 DEFAULT_LIMIT_DEG_S = 60.0
 
@@ -81,7 +81,11 @@ def _late(scenario: bf.Scenario, metrics: Document) -> Iterator[str]:
     """An alarm later than the instant from which it is certain. A broken instrument is an undeclared error,
     and makes nothing certain."""
     certain_s = metrics["detection"]["guaranteed_delay_s"]
-    if certain_s is None or any(map(_sensor, scenario.faults)) or metrics["false_alarm"]:
+    if (
+        certain_s is None
+        or any(fault.sensor for fault in Truth.of(scenario).faults)
+        or metrics["false_alarm"]
+    ):
         return
     if scenario.fdi.scheme != OURS:
         return
@@ -92,77 +96,73 @@ def _late(scenario: bf.Scenario, metrics: Document) -> Iterator[str]:
         yield f"late: certain after {certain_s:g} s, alarm after {delay_s:g} s"
 
 
-def _sensor(fault: Any) -> str | None:
-    return getattr(fault, "sensor", None)
-
-
-def _surface(fault: Any) -> str | None:
-    return getattr(fault, "actuator", None)
-
-
 def _misnamed(scenario: bf.Scenario, metrics: Document) -> Iterator[str]:
     """A wrong name, or an exclusion of the true fault, in flights for which the theory promises neither."""
     if not metrics["detection"]["detected"] or metrics["false_alarm"]:
         return
     if list(_alarms(scenario, metrics))[-1][1] != OURS:
         return
-    broken_sensors = [fault for fault in scenario.faults if _sensor(fault)]
-    surfaces = [fault for fault in scenario.faults if not _sensor(fault)]
-    if broken_sensors:
-        yield from _instrument(scenario, metrics, broken_sensors, surfaces)
-    elif surfaces and all(_in_class(scenario, fault) for fault in surfaces):
-        yield from _surfaces(scenario, metrics, surfaces)
+    faults = Truth.of(scenario).faults
+    if any(fault.sensor for fault in faults):
+        yield from _instrument(scenario, metrics, faults)
+    elif faults and all(_in_class(scenario, fault) for fault in faults):
+        yield from _surfaces(scenario, metrics, faults)
 
 
-def _in_class(scenario: bf.Scenario, fault: Any) -> bool:
+def _in_class(scenario: bf.Scenario, fault: DeclaredFault) -> bool:
+    """Whether a fault is one of those that the diagnosis is to tell from one another."""
     if scenario.fdi.fault_class == "all":
-        return _surface(fault) is not None
+        return fault.actuator is not None
     return fault.type == LOSS and fault.actuator in scenario.airframe.primary
 
 
-def _instrument(
-    scenario: bf.Scenario, metrics: Document, sensors: list[Any], surfaces: list[Any]
-) -> Iterator[str]:
+def _instrument(scenario: bf.Scenario, metrics: Document, faults: Sequence[DeclaredFault]) -> Iterator[str]:
     """One broken instrument that was monitored before it broke: no surface and no other instrument is
     named."""
-    fault, named = sensors[0], metrics["isolation"]["fault"]
+    fault, named = faults[0], metrics["isolation"]["fault"]
     watched = scenario.fdi.monitors_sensors and _began_s(metrics) < fault.at_s
-    if surfaces or len(sensors) > 1 or not watched:
-        return
-    if named is not None and not DeclaredFault.of_scenario(fault).is_named_by(named):
+    if len(faults) == 1 and watched and named is not None and not fault.is_named_by(named):
         yield f"wrong name: {named}, broken is sensor {fault.sensor}"
 
 
-def _surfaces(scenario: bf.Scenario, metrics: Document, faults: list[Any]) -> Iterator[str]:
-    """Faults of the declared class on one surface, or with `pairs` on two: names and candidates must be
-    right."""
-    fdi, isolation = scenario.fdi, metrics["isolation"]
-    changing = any(fault.profile != "abrupt" or fault.end_s is not None for fault in faults)
-    if changing and fdi.thresholds == "published":  # that test supposes a constant parameter
+def _surfaces(scenario: bf.Scenario, metrics: Document, faults: Sequence[DeclaredFault]) -> Iterator[str]:
+    """Faults of the declared class: names, types and candidates must be right.
+
+    true: types by broken surface. one_name: the diagnosis has to name one surface, else a pair of them.
+    """
+    isolation = metrics["isolation"]
+    true = {one.actuator: _kinds([of for of in faults if of.actuator == one.actuator]) for one in faults}
+    if not _is_name_promised(scenario.fdi, faults, len(true)):
         return
-    true = {_surface(one): _kinds([of for of in faults if _surface(of) == _surface(one)]) for one in faults}
-    alone = len(true) == 1
-    if alone and fdi.fault_profile == "abrupt" and len(faults) > 1:
-        return
-    if not alone and not (len(faults) == 2 and fdi.pairs):
-        return
-    one_name = alone and (isolation["fault"] or not fdi.pairs)
+    one_name = len(true) == 1 and (isolation["fault"] or not scenario.fdi.pairs)
     found = [isolation] if one_name else isolation["faults"]
     named = {one["fault"]: one for one in found if one["fault"]}
     for name in named.keys() - true.keys():
         yield f"{'excluded' if name == UNANTICIPATED else 'wrong name'}: {name}, broken are {sorted(true)}"
+    may_be_hardover = any(_runs_away(scenario, fault) for fault in faults)
     for surface in named.keys() & true.keys():
         kind, left, kinds = named[surface]["type"], named[surface]["candidates"], true[surface]
-        fast = kind == "hardover" and any(_runs_away(scenario, fault) for fault in faults)
-        wrong = kind not in kinds if kind is not None else (left or one_name) and not kinds & set(left)
-        if wrong and not fast and len(kinds) == 1:
+        says = {kind} if kind is not None else {*left} if left or one_name else kinds
+        if len(kinds) == 1 and not kinds & says and not (may_be_hardover and kind == "hardover"):
             yield f"wrong type: {kind or left}, broken is {kinds} of {surface}"
-    if one_name and not named:
-        yield from _left_out(scenario, isolation["candidates"], *next(iter(true.items())))
-    for plane in () if one_name else PLANES:
-        hit = true.keys() & set(plane)
-        if hit and not named.keys() & set(plane) and isolation["fault"] == UNANTICIPATED:
-            yield f"excluded: {sorted(hit)}"
+    if one_name:
+        if not named:
+            yield from _left_out(scenario, isolation["candidates"], *next(iter(true.items())))
+    elif isolation["fault"] == UNANTICIPATED:
+        for hit in (true.keys() & plane for plane in PLANES if not named.keys() & plane):
+            if hit:
+                yield f"excluded: {sorted(hit)}"
+
+
+def _is_name_promised(fdi: Any, faults: Sequence[DeclaredFault], n_surfaces: int) -> bool:
+    """Whether faults on so many surfaces are among those whose names the theory promises: on one surface, or
+    with `pairs` one on each of two."""
+    changing = any(fault.profile != "abrupt" or fault.end_s is not None for fault in faults)
+    if changing and fdi.thresholds == "published":  # that test supposes a constant parameter
+        return False
+    if n_surfaces == 1:
+        return len(faults) == 1 or fdi.fault_profile != "abrupt"
+    return len(faults) == 2 and fdi.pairs
 
 
 def _left_out(scenario: bf.Scenario, left: list[str], surface: str, kinds: set[Any]) -> Iterator[str]:
@@ -173,18 +173,18 @@ def _left_out(scenario: bf.Scenario, left: list[str], surface: str, kinds: set[A
         yield f"excluded: {surface} {kinds}, left {left}"
 
 
-def _kinds(faults: list[Any]) -> set[Any]:
+def _kinds(faults: Sequence[DeclaredFault]) -> set[Any]:
     """The types of the faults of a surface; hardovers to both stops count as two more."""
-    stops = {fault.direction for fault in faults if fault.type == "hardover"}
+    stops = {fault.size["direction"] for fault in faults if fault.type == "hardover"}
     return {fault.type for fault in faults} | (stops if len(stops) > 1 else set())
 
 
-def _runs_away(scenario: bf.Scenario, fault: Any) -> bool:
+def _runs_away(scenario: bf.Scenario, fault: DeclaredFault) -> bool:
     """Whether a bias grows so fast that the diagnosis takes it for a runaway at the stop (fault-types.md)."""
     if fault.type != "bias" or fault.profile == "abrupt":
         return False
     limit_deg_s = getattr(scenario.known_actuators, fault.actuator).rate_limit_deg_s or DEFAULT_LIMIT_DEG_S
-    return abs(fault.bias_deg) * fault.kappa_per_s > 0.9 * limit_deg_s
+    return abs(fault.size["bias_deg"]) * fault.size["kappa_per_s"] > 0.9 * limit_deg_s
 
 
 def flown_again(flight: bf.Flight) -> Iterator[str]:

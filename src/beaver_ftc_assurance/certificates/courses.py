@@ -103,20 +103,33 @@ def _exclude_offset(bounds: SurfaceBounds, grows: bool = False) -> Document | No
     below_stop = bounds.is_unexplained & (most < high_stop - MIN_POSITION_DIFFERENCE_RAD)
     lower = np.where(above_stop, least - bounds.command, -np.inf)
     upper = np.where(below_stop, most - bounds.command, np.inf)
-    for j in np.flatnonzero(upper < np.inf).tolist() if grows else [int(np.argmin(upper))]:
-        i = int(np.argmax(lower[: j + 1] if grows else lower))
-        limit = max(upper[j], 0.0) if grows else upper[j]
-        if (grows and i >= j) or not lower[i] > limit + MIN_POSITION_DIFFERENCE_RAD:
-            continue
-        greater = least[i] - bounds.axis_commands[i, bounds.lower[i].argmax()]
-        less = most[j] - bounds.axis_commands[j, bounds.upper[j].argmin()]
-        pairs = [(greater, less), (least[i], low_stop[i]), (high_stop[j], most[j])]
-        if grows:
-            pairs = [(greater, 0.0), *pairs, (bounds.first_frame + j, bounds.first_frame + i)]
-        if greater > less and not (grows and greater <= 0.0):
-            stops = [float(low_stop[i]), float(high_stop[j])]
-            return bounds.statement(range(i, i + 1), j, pairs, {"stops": stops})
+    if (frames := (_first_smaller if grows else _farthest)(lower, upper)) is None:
         return None
+    i, j = frames
+    greater = least[i] - bounds.axis_commands[i, bounds.lower[i].argmax()]
+    less = most[j] - bounds.axis_commands[j, bounds.upper[j].argmin()]
+    pairs = [(greater, less), (least[i], low_stop[i]), (high_stop[j], most[j])]
+    if grows:
+        pairs = [(greater, 0.0), *pairs, (bounds.first_frame + j, bounds.first_frame + i)]
+    if not all(more > limit for more, limit in pairs):  # by the commands of single axes
+        return None
+    stops = [float(low_stop[i]), float(high_stop[j])]
+    return bounds.statement(range(i, i + 1), j, pairs, {"stops": stops})
+
+
+def _farthest(lower: np.ndarray, upper: np.ndarray) -> tuple[int, int] | None:
+    """The frames with the greatest lower and the least upper bound, if these contradict one another."""
+    i, j = int(np.argmax(lower)), int(np.argmin(upper))
+    return (i, j) if lower[i] > upper[j] + MIN_POSITION_DIFFERENCE_RAD else None
+
+
+def _first_smaller(lower: np.ndarray, upper: np.ndarray) -> tuple[int, int] | None:
+    """The frame with the greatest lower bound so far, if it is positive, and the first one later whose upper
+    bound contradicts it."""
+    for j in np.flatnonzero(upper < np.inf).tolist():
+        i = int(np.argmax(lower[: j + 1]))
+        if i < j and lower[i] > max(upper[j], 0.0) + MIN_POSITION_DIFFERENCE_RAD:
+            return i, j
     return None
 
 

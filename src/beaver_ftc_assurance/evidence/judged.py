@@ -38,6 +38,7 @@ Judged = tuple[str, Row]  # name of a flight, and one `part` of its result
 def document_of(plan: EvidencePlan, rows: Sequence[Row], date: str) -> Document:
     """The document evidence.json. date: the only difference between two documents of the same plan."""
     requirements = [_requirement(plan, each, rows) for each in plan.file.requirements]
+    aircraft = {source.aircraft.name: source.aircraft for source in plan.sources.values()}
     counts = _counts(each["verdict"] for each in requirements)
     return {
         "plan": plan.file.name,
@@ -46,7 +47,7 @@ def document_of(plan: EvidencePlan, rows: Sequence[Row], date: str) -> Document:
         "passed": counts[MET] == len(requirements),
         "counts": counts,
         "requirements": requirements,
-        "coverage": [_coverage(name, plan, rows) for name in _aircraft(plan)],
+        "coverage": [_coverage(each, rows) for each in aircraft.values()],
         "sources": [
             {"name": each.name, "given": each.given, "flights": each.flights, "sha256": each.sha256}
             for each in plan.sources.values()
@@ -180,13 +181,8 @@ def _of_bound(found: Document, plain: Document) -> Row:
     return part(found["name"], expected, actual, verdict, inside, says)
 
 
-def _aircraft(plan: EvidencePlan) -> dict[str, Aircraft]:
-    return {source.aircraft.name: source.aircraft for source in plan.sources.values()}
-
-
-def _coverage(name: str, plan: EvidencePlan, rows: Sequence[Row]) -> Document:
+def _coverage(aircraft: Aircraft, rows: Sequence[Row]) -> Document:
     """For one aircraft: the number of flights with each fault on each surface, by cell of the envelope."""
-    aircraft = _aircraft(plan)[name]
     slowest, fastest = aircraft.envelope.airspeed_mps
     width = (fastest - slowest) / BANDS
     ends_m = (None, *ALTITUDES_M, None)
@@ -196,7 +192,7 @@ def _coverage(name: str, plan: EvidencePlan, rows: Sequence[Row]) -> Document:
     ]  # fmt: skip
     counts: Counter[tuple[str, str, int]] = Counter()
     for row in rows:
-        if row["aircraft"] == name and row["status"] in RESULTS:
+        if row["aircraft"] == aircraft.name and row["status"] in RESULTS:
             kinds = {(surface, kind) for surface, kind in row["faults"] if surface} or {("none", "none")}
             counts.update((*kind, cell) for kind in kinds for cell in row["cells"])
     flown = [
@@ -206,7 +202,7 @@ def _coverage(name: str, plan: EvidencePlan, rows: Sequence[Row]) -> Document:
     types, surfaces = [kind for kind in TYPES if kind not in (DAMAGE, UNANTICIPATED)], list(aircraft.surfaces)
     with_fault = sum(n > 0 and key[0] != "none" for key, n in counts.items())
     return {
-        "aircraft": name, "cells": bands, "flown": flown, "combinations": with_fault,
+        "aircraft": aircraft.name, "cells": bands, "flown": flown, "combinations": with_fault,
         "of": len(types) * len(surfaces) * len(bands),
         "never": [[s, t] for s in surfaces for t in types if not any(key[:2] == (s, t) for key in counts)],
     }  # fmt: skip

@@ -222,17 +222,15 @@ def as_text(document: Document, folder: str) -> str:
 
 
 def as_expectations(document: Document) -> tuple[Expectation, ...]:
-    """The requirements for JUnit XML; one that is not met has the command that repeats its worst flight."""
-    found = []
-    for each in document["requirements"]:
-        worst = each["worst"]
-        again = f"; again: {worst['command']}" if worst["command"] else ""
-        found.append(_expectation(each["id"], _asked(each["asked"]), each["verdict"], worst, again))
-    return tuple(found)
+    """The requirements for JUnit XML, each by its worst flight."""
+    asked = ((each["id"], _asked(each["asked"]), each["worst"]) for each in document["requirements"])
+    return tuple(_expectation(*each) for each in asked)
 
 
-def _expectation(name: str, expected: str, verdict: str, found: Document, again: str = "") -> Expectation:
-    return Expectation(name, verdict == MET, expected, f"{verdict}: {_found(found)}{again}")
+def _expectation(name: str, expected: str, found: Document) -> Expectation:
+    """What a flight shows of a requirement, with the command that repeats the flight if one is known."""
+    again = f"; again: {found['command']}" if found.get("command") else ""
+    return Expectation(name, found["verdict"] == MET, expected, f"{found['verdict']}: {_found(found)}{again}")
 
 
 def of_flight(plan: EvidencePlan, name: str) -> tuple[Any, tuple[Expectation, ...]]:
@@ -249,7 +247,7 @@ def of_flight(plan: EvidencePlan, name: str) -> tuple[Any, tuple[Expectation, ..
         )
     found, (source, run) = fly_flight(plan, named[name])["found"], named[name]
     judged = tuple(
-        _expectation(id, said(one["expected"]), one["verdict"], one)
+        _expectation(id, said(one["expected"]), one)
         for id, parts in found.items() for one in parts
     )  # fmt: skip
     return plan.sources[source].scenario(run), judged

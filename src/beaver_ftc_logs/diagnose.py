@@ -337,22 +337,11 @@ def _credible_bounds(levels: Floats, p: Floats, mass: float) -> tuple[Floats, Fl
 
 
 def _surfaces_at_fault(model: Model, bank: HypothesisBank, P: Floats, faulty: Ints, nameable: Mask) -> Names:
-    """The named surfaces by row: those of the groups with more than half of the fault's probability. If only
-    one group may be at fault (`one_group`): those of all groups that are not excluded, and `unknown` if none
-    is.
-
-    A row without a name while the alarm stands is `unknown`. A name stays while the fault is rather an
-    unknown offset, until another has stood for `rename_s`, and, with `one_group`, if another adds surfaces.
-    """
+    """The named surfaces by row, those of the likely groups. A row without a name while the alarm stands is
+    `unknown`. A name stays while the fault is rather an unknown offset, until another has stood for
+    `rename_s`, and, with `one_group`, if another adds surfaces."""
     p_fault = np.maximum(P[:, bank.is_fault_hypothesis].sum(axis=1), MIN_DIVISOR)
-    faults = [bank.is_fault_of_group(g) for g in range(len(model.groups))]
-    likely = np.column_stack([P[:, of_group].sum(axis=1) / p_fault for of_group in faults]) > _NAME_SHARE
-    if model.settings.one_group:
-        is_loss = bank.hypothesis_kind == GROUP_LOSS
-        p_loss = np.column_stack([P[:, of_group & is_loss].sum(axis=1) for of_group in faults])
-        likely = p_loss > _EXCLUSION_RISK * p_loss.max(axis=1, keepdims=True)
-        can_lose = np.array([(of_group & is_loss).any() for of_group in faults])
-        likely &= ~(likely[:, can_lose].all(axis=1) & (can_lose.sum() > 1))[:, None]
+    likely = _likely_groups(model, bank, P, p_fault)
     names = join_names(likely & nameable[:, None], model.group_names)
     named = np.full(len(P), "", dtype=object)
     offset = P[:, bank.hypothesis_kind == UNKNOWN_OFFSET].sum(axis=1) > p_fault
@@ -367,6 +356,22 @@ def _surfaces_at_fault(model: Model, bank: HypothesisBank, P: Floats, faulty: In
         keeps = old and (offset[k] or (old != UNKNOWN_SURFACE and waits))
         named[k] = old if keeps else new
     return named
+
+
+def _likely_groups(model: Model, bank: HypothesisBank, P: Floats, p_fault: Floats) -> Mask:
+    """The groups, (n, G), with more than half of the fault's probability p_fault (n,). If only one group may
+    be at fault (`one_group`): all that are not excluded, and none where none is."""
+    faults = [bank.is_fault_of_group(g) for g in range(len(model.groups))]
+    if not model.settings.one_group:
+        p_groups = [P[:, of_group].sum(axis=1) / p_fault for of_group in faults]
+        return np.column_stack(p_groups) > _NAME_SHARE
+    losses = [of_group & (bank.hypothesis_kind == GROUP_LOSS) for of_group in faults]
+    p_loss = np.column_stack([P[:, of_group].sum(axis=1) for of_group in losses])
+    likely = p_loss > _EXCLUSION_RISK * p_loss.max(axis=1, keepdims=True)
+    can_lose = np.any(losses, axis=1)
+    if can_lose.sum() > 1:
+        likely &= ~likely[:, can_lose].all(axis=1, keepdims=True)
+    return likely
 
 
 def join_names(flags: Mask, names: Sequence[str]) -> Names:

@@ -30,8 +30,61 @@ from tools.docs.tables import moved, picture, table_of
 
 Document = dict[str, Any]
 Rows = list[dict[str, Any]]
+
+# Losses under each kind of error.
 CONDITIONS = ("sensors", "servo", "coefficients", "air", "all", "all-published")
 SOON_S = 0.5
+LOSSES_HEAD = (
+    "errors", "within 0.5 s, %", "from, %", "to, %", "median, s", "95 %, s", "99 %, s", "detected",
+    "rightly named", "false alarms",
+)  # fmt: skip
+
+# Losses and biased instruments, with sensors in doubt.
+DOUBT_HEAD = (
+    "part", "sensors", "detected", "rightly named", "wrongly named", "median time to the name, s",
+)  # fmt: skip
+DOUBTED_SWEEP = "robust-elevator-all"
+DOUBTED_S = 30.0  # the attitude needs some seconds to refute a gyro error
+DOUBTED_FLIGHTS, TOLD_FLIGHTS = 60, 12
+DOUBTED = ("elevator", "rudder", "aileron")
+OF_DOUBT = {
+    "sound": {"sensor_monitor": "never"},
+    "in doubt": {"sensor_monitor": "always"},
+    "in doubt, all fault types": {"fault_class": "all"},
+}
+BIASED = {"gyro, bias of 0.5 deg/s": ("pqr", 0.5), "vane, bias of 2 deg": (("alpha", "beta"), 2.0)}
+
+# Losses found by scheme, surface and air.
+AIRS = {"none": "still", "light": "light"}
+SURFACES = ("aileron", "rudder", "elevator")
+CAPTION_BY_TIME_S = {
+    "1": "*Table 2. Share of the faults that are found within 1 s, %; rows as explained above.*",
+    "5": "*Table 3. Share of the faults that are found within 5 s, %.*",
+}
+
+# Verdicts beyond what is declared.
+DECAYS = ("elevator-loss-in-turbulence", "elevator-partial-loss")  # all of it declared; next to nothing
+DECAY_HEAD = (
+    "error", "declared", "times", "false alarms, %", "detected, %", "named rightly, %", "named wrongly, %",
+    "tracking RMS, deg/s",
+)  # fmt: skip
+DECAY_WORDS = ("error", "declared")
+DECAY_CAPTION = (
+    "*Table 1. Verdicts beyond the declaration. Shares in % of the flights; tracking: median of the flights, "
+    "deg/s. Columns as explained above.*"
+)
+DECAY_TITLE = "Verdicts beyond the declaration: shares in % of the flights, and median tracking error"
+DECAY_FIGURE = (
+    "*Figure 2. False alarms, right names (both in % of the flights) and tracking RMS (deg/s) for "
+    "`elevator-loss-in-turbulence`. Horizontal: size of the error divided by its declared size, or by its "
+    "unit. Columns: error, with its declared size or unit. Bars: 95 % intervals.*"
+)
+_PICTURED = "False alarms, right names and tracking over the size of each error, with 95 % intervals"
+PUBLISHED = "The published case has no margin"
+PUBLISHED_COLUMNS = {
+    "error": "error", "declared": "declared", "times": "factor g", "false alarms": "false_alarm.count",
+    "named wrongly": "misnamed.count",
+}  # fmt: skip
 
 
 def robustness_losses() -> str:
@@ -58,13 +111,8 @@ def _flown(name: str, count: int, workers: int = 2) -> Rows:
     return fly_all(partial(fly_one, sweep), list(Plan(sweep).assignments(range(count))), workers)
 
 
-LOSSES_HEAD = (
-    "errors", "within 0.5 s, %", "from, %", "to, %", "median, s", "95 %, s", "99 %, s", "detected",
-    "rightly named", "false alarms",
-)  # fmt: skip
-
-
 def _of_losses(rows: Rows) -> Iterator[str]:
+    """The cells of LOSSES_HEAD, but for the first."""
     delays = [row["detection.delay_s"] for row in rows]
     found = [row for row in rows if row["detection.delay_s"] is not None]
     soon = wilson(sum(row["detection.delay_s"] <= SOON_S + 1e-9 for row in found), len(rows))
@@ -77,33 +125,11 @@ def _of_losses(rows: Rows) -> Iterator[str]:
     yield str(sum(bool(row["false_alarm"]) for row in rows))
 
 
-DOUBT_HEAD = (
-    "part",
-    "sensors",
-    "detected",
-    "rightly named",
-    "wrongly named",
-    "median time to the name, s",
-)
-DOUBTED_SWEEP = "robust-elevator-all"
-DOUBTED_S = 30.0  # the attitude needs some seconds to refute a gyro error
-DOUBTED = ("elevator", "rudder", "aileron")
-OF_DOUBT = {
-    "sound": {"sensor_monitor": "never"},
-    "in doubt": {"sensor_monitor": "always"},
-    "in doubt, all fault types": {"fault_class": "all"},
-}
-BIASED = {"gyro, bias of 0.5 deg/s": ("pqr", 0.5), "vane, bias of 2 deg": (("alpha", "beta"), 2.0)}
-
-
 def robustness_doubt() -> str:
     """Losses with all errors together, sensors assumed sound and in doubt; then biased instruments."""
     rows = [_of_doubt(surface, sensors) for surface in DOUBTED for sensors in OF_DOUBT]
     rows += [_of_doubt(part, "in doubt") for part in BIASED]
     return markdown_table(DOUBT_HEAD, rows)
-
-
-DOUBTED_FLIGHTS, TOLD_FLIGHTS = 60, 12
 
 
 def robustness_doubt_bound() -> str:
@@ -114,6 +140,7 @@ def robustness_doubt_bound() -> str:
 
 
 def _told(surface: str) -> tuple[str, ...]:
+    """The row of a surface: the least deflection of a few flights, and their mean chance."""
     seen = []
     for one in _doubted(surface, {"sensor_monitor": "always"}, TOLD_FLIGHTS):
         scenario = scenario_of(load_sweep(DOUBTED_SWEEP), one)
@@ -126,6 +153,7 @@ def _told(surface: str) -> tuple[str, ...]:
 
 
 def _of_doubt(part: str, sensors: str) -> tuple[str, ...]:
+    """The row of DOUBT_HEAD for a surface or BIASED instruments, with the settings OF_DOUBT."""
     rows = fly_all(
         partial(fly_one, load_sweep(DOUBTED_SWEEP)), _doubted(part, OF_DOUBT[sensors], DOUBTED_FLIGHTS), 2
     )
@@ -138,6 +166,7 @@ def _of_doubt(part: str, sensors: str) -> tuple[str, ...]:
 
 
 def _doubted(part: str, fdi: dict[str, str], count: int) -> list[Assignment]:
+    """The first flights of DOUBTED_SWEEP, with this part at fault."""
     keys = {f"fdi.{key}": value for key, value in fdi.items()}
     drawn = Plan(load_sweep(DOUBTED_SWEEP)).assignments(range(count))
     return [one._replace(values=_with_fault(one, part) | keys) for one in drawn]
@@ -171,17 +200,11 @@ def robustness_power_probe() -> str:
     return "\n".join((_power_of(document), *levels))
 
 
-AIRS = {"none": "still", "light": "light"}
-SURFACES = ("aileron", "rudder", "elevator")
-SOON = {"1": "*Table 2. Share of the faults that are found within 1 s, %; rows as explained above.*",
-        "5": "*Table 3. Share of the faults that are found within 5 s, %.*"}  # fmt: skip
-
-
 def _power_of(document: Document) -> str:
     """At the same rate of false alarms for all; `both` at its default level as well."""
     parts = [
         part
-        for soon, title in SOON.items()
+        for soon, title in CAPTION_BY_TIME_S.items()
         for part in (title, _power_within(document, soon), _best(document, soon))
     ]
     return "\n\n".join([*parts, *(_duels(document["comparison"], within_s) for within_s in DUELS_S)])
@@ -231,33 +254,8 @@ def _duels(comparison: list[Document], within_s: float) -> str:
 
 
 def _share(within: Any) -> float:
+    """The share itself, of one that may have an interval."""
     return within["value"] if isinstance(within, dict) else within
-
-
-DECAYS = ("elevator-loss-in-turbulence", "elevator-partial-loss")  # all of it declared; next to nothing
-DECAY_HEAD = (
-    "error", "declared", "times", "false alarms, %", "detected, %", "named rightly, %", "named wrongly, %",
-    "tracking RMS, deg/s",
-)  # fmt: skip
-DECAY_WORDS = ("error", "declared")
-DECAY_CAPTION = (
-    "*Table 1. Verdicts beyond the declaration. Shares in % of the flights; tracking: median of the flights, "
-    "deg/s. Columns as explained above.*"
-)
-
-
-DECAY_TITLE = "Verdicts beyond the declaration: shares in % of the flights, and median tracking error"
-PUBLISHED = "The published case has no margin"
-PUBLISHED_COLUMNS = {
-    "error": "error", "declared": "declared", "times": "factor g", "false alarms": "false_alarm.count",
-    "named wrongly": "misnamed.count",
-}  # fmt: skip
-DECAY_FIGURE = (
-    "*Figure 2. False alarms, right names (both in % of the flights) and tracking RMS (deg/s) for "
-    "`elevator-loss-in-turbulence`. Horizontal: size of the error divided by its declared size, or by its "
-    "unit. Columns: error, with its declared size or unit. Bars: 95 % intervals.*"
-)
-_PICTURED = "False alarms, right names and tracking over the size of each error, with 95 % intervals"
 
 
 def robustness_decay() -> str:
@@ -316,4 +314,5 @@ def _published(document: Document) -> str:
 
 
 def _is_undeclared(document: Document, row: Document) -> bool:
+    """Whether no bound covers the error of a row."""
     return any(e["error"] == row["error"] and not e["is_declared"] for e in document["errors"])

@@ -84,6 +84,7 @@ def effect(spec: Specification, given: Document, case: int) -> np.ndarray:
 def _effect(
     spec: Specification, log: dict[str, np.ndarray], names: list[str], case: int, k: int
 ) -> np.ndarray:
+    """What the damage adds to the angular accelerations in frame k, by the specification."""
     at = {name: float(of[k]) for name, of in log.items() if name in _STATE}
     V, a, b = at["airspeed_mps"] / M_PER_FT, at["alpha_rad"], at["beta_rad"]
     velocity = [V * cos(a) * cos(b), V * sin(b), V * sin(a) * cos(b)]

@@ -102,6 +102,7 @@ def training(of: Campaign) -> Iterator[Document]:
 def _drawn(
     of: Campaign, law: str, airspeed_mps: float, drawn_by: tuple[int, ...], faults: list[Document]
 ) -> Document:
+    """The scenario of a log: references, errors and noise are drawn."""
     rng = np.random.default_rng([*drawn_by, LAWS.index(law), round(airspeed_mps)])
     noisy, moves = rng.uniform() < 0.5, of.air != "none"
     bounds: Document = {"sensors": dict.fromkeys("pqr", NOISE)} if noisy else {}

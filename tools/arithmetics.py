@@ -56,6 +56,7 @@ def _write(row: list[Any]) -> None:
 
 
 def _flown(settings: dict[str, str], tests: list[str]) -> list[list[Any]]:
+    """What the tests compared under these settings of the environment, a row a value or a test."""
     with tempfile.TemporaryDirectory() as folder:
         to = Path(folder) / "rows"
         to.touch()
@@ -69,6 +70,7 @@ def _flown(settings: dict[str, str], tests: list[str]) -> list[list[Any]]:
 
 
 def _row(name: str, rows: list[list[Any]]) -> str:
+    """The row of a setting: tests passed, numbers compared, and by how much they differ."""
     values = [row[1:] for row in rows if row[0] == "value"]
     ends = [row[2] for row in rows if row[0] == "test"]
     numbers = [(was, now) for _, was, now, _ in values if isinstance(was, float) and isinstance(now, float)]

@@ -97,6 +97,7 @@ def response_agreement(folder: Path, surface: str, rate_hz: int) -> list[Agreeme
 
 
 def _fly(table: np.ndarray, rate_hz: int) -> dict[str, np.ndarray]:
+    """The responses of our plant to the surfaces of a table, at its samples."""
     plant = Plant(rate_hz=rate_hz)
     plant.start(flight_state(table[0]))
     frames = round(SAMPLE_S * rate_hz)

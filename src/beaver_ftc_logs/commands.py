@@ -97,6 +97,8 @@ def identify(
 def _check_logs(
     flights: list[Path], vehicle: str | None, out: Path | None, reader: str | None, format: Format
 ) -> None:
+    """Say of each log whether it can be used, and write the vehicle file that was guessed. Exit status 2
+    if one cannot."""
     from beaver_ftc_logs.check import as_text, check_log, vehicle_file_text
     from beaver_ftc_logs.mixing import load_vehicle_for_logs
 
@@ -239,6 +241,7 @@ def _check_options_agree(options: DiagnoseOptions) -> None:
 
 
 def _diagnose_with_aircraft(options: DiagnoseOptions) -> None:
+    """Diagnose logs by the model of an aircraft; the vehicle file may lie beside a log."""
     from beaver_ftc_logs.by_aircraft import diagnose_aircraft, load_diagnosed
     from beaver_ftc_logs.findings import as_text
     from beaver_ftc_logs.loading import read_vehicle_parts, refuse_equal_names
@@ -275,6 +278,7 @@ def _diagnose_with_aircraft(options: DiagnoseOptions) -> None:
 
 
 def _replay_run_logs(flights: list[Path], out: Path, format: Format) -> None:
+    """Replay logs of our own runs, each with its scenario beside it."""
     from beaver_ftc_logs.loading import refuse_equal_names
     from beaver_ftc_logs.pages import write_results
     from beaver_ftc_logs.replay import as_text, is_log_of_run, replay_run_log

@@ -156,6 +156,8 @@ def stack_data(parts: Parts, vehicle: Vehicle, h: int, L: int) -> tuple[Floats, 
 
 
 def _model_of_fit(fit: least_squares.Regression, parts: Parts, vehicle: Vehicle, h: int, L: int) -> Model:
+    """The model file of a fit, with a noise model for each moving average. Raises BadInput where a number
+    of the fit is none that a file can hold."""
     names = list(vehicle.surfaces)
     groups = regression.group_surfaces(vehicle)
     first = len(fit.coefficients) - len(groups) * L

@@ -223,6 +223,8 @@ class Vehicle(Section):
 
     @model_validator(mode="after")
     def _check_names(self) -> "Vehicle":
+        """Refuse names of surfaces that no column may have, names that the file does not define, units of
+        another kind, and a column that is read in two ways."""
         # the name of a surface is part of a column's
         reason = "a surface's name has letters, digits, - and _ only, allowed: one"
         bad = [name for name in self.surfaces if not _SURFACE_NAME_PATTERN.fullmatch(name)]

@@ -136,6 +136,7 @@ class Circuit(Small):
         return self._in_flight(told, dt)
 
     def _turn_page(self, told: Told, height: float) -> None:
+        """Begin the next phase where this one has arrived."""
         turned = abs(_wrapped(told.attitude[2] - self._heading))
         if self.phase == "roll" and height > LOWEST_M:
             self.phase, self._from = "climb", replace(told, airspeed_mps=CRUISE_MPS)
@@ -150,6 +151,7 @@ class Circuit(Small):
             self.phase, self._pitch = "stop", 0.0
 
     def _on_wheels(self, told: Told, dt: float) -> tuple[float, float, float, float]:
+        """Outputs on the ground: along the first heading, with full power or none."""
         off = _wrapped(self._heading - told.attitude[2])
         yaw = clipped(6.0 * off - 3.0 * told.rates[2], 1.0)
         roll = clipped(-1.0 * told.attitude[0] - 0.3 * told.rates[0], 0.5)
@@ -160,6 +162,7 @@ class Circuit(Small):
         return roll, lift if speed > TAIL_UP_MPS else 0.25, self._power, yaw
 
     def _in_flight(self, told: Told, dt: float) -> tuple[float, float, float, float]:
+        """Outputs in the air: path, bank and speed of the phase."""
         climb, bank, speed = {
             "climb": (3.0, 0.0, CRUISE_MPS),
             "turn": (0.0, radians(20.0), CRUISE_MPS),

@@ -137,6 +137,7 @@ def ardupilot(body: Any, frames: int, seed: int, a_flight: int) -> Found:
 
 
 def _fly_ardupilot(line: Line, end: Ardupilot, port: int, size: int, meant: list[int]) -> None:
+    """A flight of `size` packets, each sent again until its answer arrives."""
     before: deque[bytes] = deque(maxlen=40)
     last_s = -1.0
     for count in range(size):
@@ -187,6 +188,7 @@ def px4(body: Any, frames: int, seed: int, a_flight: int) -> Found:
 
 
 def _fly_px4(line: Line, end: Px4, size: int, meant: list[int]) -> None:
+    """A flight that answers each new time of a sensor message; it ends once the last answer was flown."""
     mav = common.MAVLink(None, srcSystem=1, srcComponent=1)
     mav.robust_parsing = True
     before: deque[bytes] = deque(maxlen=40)

@@ -56,6 +56,7 @@ def _options() -> argparse.Namespace:
 
 
 def _pages(options: argparse.Namespace) -> int:
+    """Check the pages, or write what has changed; 1 if anything is wrong."""
     from tools.docs import names, prose
     from tools.docs.marks import read
     from tools.docs.pages import chosen

@@ -161,6 +161,7 @@ class Composer:
         )
 
     def _frame(self, words: Words) -> None:
+        """Write airspeed, rate and substeps."""
         rng, (low, high) = self._rng, self._aircraft.envelope.airspeed_mps
         third = (high - low) / 3.0
         begin = low + {"slow": 0, "middle": 1, "fast": 2}[self._row["airspeed"]] * third
@@ -170,6 +171,7 @@ class Composer:
         words["substeps"] = int(rng.integers(3, 11)) if many else int(self._row["substeps"])
 
     def _air(self, words: Words) -> None:
+        """Write turbulence, and gusts that follow one another."""
         severity, gusts = self._row["air"], self._row["gusts"]
         if severity != LEFT_OUT:
             put(words, "environment.turbulence", "dryden")
@@ -184,6 +186,7 @@ class Composer:
         put(words, "environment.gust", blown[0] if gusts == "one" else blown)
 
     def _diagnosis(self, words: Words) -> None:
+        """Write scheme, law and detectors."""
         put(words, "fdi.scheme", self._row["scheme"])
         put(words, "control.law", self._row["law"])
         detector = self._row["detector"]
@@ -194,6 +197,7 @@ class Composer:
         put(words, "fdi.authority", detector.replace("both, worst-case counts", "worst-case"))
 
     def _changes(self, words: Words) -> None:
+        """Write what changes in flight, and when."""
         level = self._row["changes"]
         if level == LEFT_OUT:
             return
@@ -213,6 +217,7 @@ class Composer:
         return self._walk.value(node, f"changes.{key}")
 
     def _faults(self, words: Words) -> None:
+        """Write the faults, without those that another one hides."""
         broken = []
         if self._row["faults"] != "none":
             count = int(self._rng.integers(*COUNTS[self._row["faults"]]))

@@ -80,6 +80,7 @@ def levels_of(node: Node) -> tuple[str, ...]:
 
 
 def _own(schema: Node, aircraft: Sequence[str]) -> Iterator[Factor]:
+    """The factors that no key of the schema is by itself."""
     at_fault = {"faults": STRUCK}
     change = schema["$defs"]["Change"]["properties"]
     yield Factor("aircraft", tuple(aircraft))

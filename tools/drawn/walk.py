@@ -83,6 +83,7 @@ class Walk:
         raise Undrawable(path)
 
     def _number(self, node: Node) -> float:
+        """A number near the default if this is positive, else one of the range."""
         low = node.get("minimum", node.get("exclusiveMinimum", -LARGEST))
         high = node.get("maximum", node.get("exclusiveMaximum", max(LARGEST, low + LARGEST)))
         default = node.get("default")
@@ -93,12 +94,14 @@ class Walk:
         return float(self.now.rng.uniform(low + 1e-6 * span, high - 1e-6 * span))
 
     def _array(self, node: Node, path: str) -> list[Any]:
+        """A list of a few drawn items."""
         if "prefixItems" in node:
             return [self.value(item, path) for item in node["prefixItems"]]
         least, most = node.get("minItems", 1), min(node.get("maxItems", MOST_ITEMS), MOST_ITEMS)
         return [self.value(node["items"], path) for _ in range(self.now.rng.integers(least, most + 1))]
 
     def _object(self, node: Node, path: str) -> dict[str, Any]:
+        """An object with its required keys and some of the others."""
         properties, required = node.get("properties", {}), set(node.get("required", ()))
         if not properties:
             raise Undrawable(path)

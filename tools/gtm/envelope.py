@@ -81,6 +81,7 @@ class Envelope:
         return np.array([radians(min(12.0, 3.5 * (90.0 / speed) ** 2)), 0.03, 0.0, 0.0, 0.4, 0.0])
 
     def _turn(self, speed: float, bank: float, sideslip: float, guess: np.ndarray) -> Turn:
+        """The turn by Newton steps from a guess, not a number where these do not arrive."""
         x = guess.copy()
         for _ in range(_STEPS):
             off = self._off(speed, bank, sideslip, x)
@@ -96,6 +97,7 @@ class Envelope:
         return Turn(speed, bank, sideslip, x if found else np.full(6, np.nan), found and self._within(x))
 
     def _within(self, x: np.ndarray) -> bool:
+        """Whether surfaces, throttle and angle of attack are within their ranges."""
         travel = parameters()["surfaces"]
         angles = {"left_inboard_elevator": x[1], "right_aileron": x[2], "left_aileron": -x[2]}
         angles |= {} if self.no_rudder else {"upper_rudder": x[3]}
@@ -104,6 +106,7 @@ class Envelope:
         return inside and 0.0 <= x[4] <= 1.0 and abs(x[0]) <= MOST_ALPHA_RAD
 
     def _off(self, speed: float, bank: float, sideslip: float, x: np.ndarray) -> np.ndarray:
+        """Accelerations of the bench at the unknowns x of a turn."""
         alpha, elevator, aileron, side, throttle, turning = map(float, x)
         beta, rudder = (side, 0.0) if self.no_rudder else (radians(sideslip), side)
         phi, V = radians(bank), speed * FT_S_PER_KNOT / self.thin

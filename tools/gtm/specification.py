@@ -223,6 +223,7 @@ class Specification:
         return np.array([*accelerated, *turned, *angles, -float(down @ velocity)])
 
     def _engine(self, side: str, throttle: float, pressure: float, load: float) -> tuple[np.ndarray, ...]:
+        """Thrust, its point of attack and the angular momentum of the rotor of one engine."""
         of = self.of["engines"]
         rpm = np.polyval(of["rpm_percent"]["polynomial"], throttle)
         thrust = max(0.0, np.polyval(of["thrust"]["polynomial"], rpm) * pressure / 2116.22 - 0.010 * load)

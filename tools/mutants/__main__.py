@@ -69,6 +69,7 @@ def _tests(jobs: int) -> dict[str, Reach]:
 def _trials(
     taken: list[tuple[str, Mutant]], found: dict[str, Reach], options: argparse.Namespace
 ) -> Counter[tuple[str, str]]:
+    """How often mutants of each kind came to each end, tried side by side."""
     few_examples()
     ends: Counter[tuple[str, str]] = Counter()
     tests = [{mode: found[mode].reaching(mutant) for mode in MODES[kind]} for kind, mutant in taken]

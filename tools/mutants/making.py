@@ -117,6 +117,7 @@ def _changes(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
 
 
 def _of_operators(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
+    """Another sign, operator, comparison or function."""
     match node:
         case ast.UnaryOp(op=ast.USub()):
             yield "sign", node.operand
@@ -145,6 +146,7 @@ def _with_fields(node: ast.AST, **changed: object) -> ast.AST:
 
 
 def _of_numbers(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
+    """Another index or constant."""
     match node:
         case ast.Subscript(slice=ast.Constant(value=int(at))) if not isinstance(at, bool):
             yield "index", ast.Subscript(node.value, ast.Constant(at - 1 if at > 0 else at + 1), node.ctx)

@@ -75,6 +75,7 @@ def failed(plan: EvidencePlan, case: tuple[str, int], why: str, status: str = CR
 
 
 def _flown(plan: EvidencePlan, name: str, run: int) -> Row:
+    """The row of a flight that is flown and measured."""
     from beaver_ftc.loop import fly
 
     source = plan.sources[name]
@@ -130,6 +131,7 @@ def _judged(
 
 
 def _of_formula(text: str, formula: Formula, rate_hz: float, found: Metrics, log: Watched) -> Row:
+    """The robustness of a formula; not shown where the log ends before what it asks for."""
     r = formula.robustness(log, rate_hz)
     lost = found.departure
     if not math.isfinite(r):
@@ -142,6 +144,7 @@ def _of_formula(text: str, formula: Formula, rate_hz: float, found: Metrics, log
 
 
 def _of_handling(bar: OfHandling, scenario: Scenario, found: Metrics, log: Watched) -> list[Row]:
+    """A part for each mode: its level of handling qualities."""
     from beaver_ftc.studies import HANDLING_LIMITS as LIMITS
     from beaver_ftc.studies import where_ended, where_trimmed
 
@@ -162,6 +165,7 @@ def _of_handling(bar: OfHandling, scenario: Scenario, found: Metrics, log: Watch
 
 
 def _of_margins(bar: OfMargins, scenario: Scenario) -> list[Row]:
+    """The least gain margin and the least phase margin over all surfaces and losses."""
     from beaver_ftc.studies import margins_at as at
     from beaver_ftc.studies import refuse_laws_without_margins as refuse_other_laws
 

@@ -66,6 +66,7 @@ def command(plan: EvidencePlan, flight: str) -> str:
 
 
 def _requirement(plan: EvidencePlan, requirement: Requirement, rows: Sequence[Row]) -> Document:
+    """A requirement with its verdict and margin, its worst flight, and the flights that do not meet it."""
     over, of_sweep = plan.over[requirement.id], isinstance(requirement.bar, OfSweep)
     if isinstance(requirement.bar, OfSweep):
         judged = [one for name in over for one in _of_sweep(plan, requirement.bar, name, rows)]

@@ -49,6 +49,7 @@ def _register() -> None:
 
 
 def _flowables(title: str, parts: Sequence[Part], width: float) -> Iterator[Any]:
+    """The parts of the page; the first heading begins a new page."""
     from reportlab.platypus import KeepTogether, PageBreak
 
     yield _text(title, 15, bold=True, before=0)
@@ -83,6 +84,7 @@ def _text(
 
 
 def _table(table: Table, width: float) -> Any:
+    """A table that begins each page with its head."""
     from reportlab.platypus import LongTable
 
     wide = len(table.head) > 6

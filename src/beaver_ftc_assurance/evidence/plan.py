@@ -242,6 +242,7 @@ class _Reading:
         self._sources: dict[str, Source | None] = {}  # by what the plan calls them
 
     def plan(self, sha256: str) -> EvidencePlan:
+        """The plan; its mistakes are raised together."""
         over: dict[str, tuple[str, ...]] = {}
         expect: dict[str, Expect] = {}
         formulas: dict[str, Formula] = {}
@@ -279,6 +280,7 @@ class _Reading:
             raise BadInput("\n".join(dict.fromkeys([*lines, *self._elsewhere])))
 
     def _by_name(self) -> dict[str, Source]:
+        """The sources by their own names, which must differ."""
         found: dict[str, Source] = {}
         for source in filter(None, self._sources.values()):
             if source.name in found:
@@ -312,6 +314,7 @@ class _Reading:
         return self._sources[given]
 
     def _read(self, given: str, at: Location) -> Source:
+        """The scenario or sweep that a name or path stands for. Raises ScenarioError where there is none."""
         if given in self._file.flights:
             return self._own(given)
         if given in builtin_names() or given in builtin_sweeps():

@@ -145,6 +145,7 @@ def said(value: Any) -> str:
 
 
 def _requirement(each: Document) -> Iterator[Part]:
+    """The table of a requirement."""
     worst = each["worst"]
     rows = [
         ("verdict", each["verdict"]),
@@ -182,6 +183,7 @@ def _found(worst: Document) -> str:
 
 
 def _coverage(each: Document) -> Iterator[Part]:
+    """The fault types of each surface by cell of the envelope, and those never flown."""
     yield (
         f"{each['aircraft']}: {each['combinations']} of {each['of']} combinations of surface, fault type and "
         "cell of the envelope flown. Numbers are flights that were in the cell after the fault had struck."

@@ -135,6 +135,8 @@ class _Table:
     def _join_blocks(
         self, blocks: Iterator[TableCells], part_rows: int | None
     ) -> Iterator[tuple[TableCells, bool]]:
+        """Yield the table in parts that overlap, and whether more follows; whole, if no `part_rows` are
+        given."""
         held: list[TableCells] = []
         with _read_errors(self._path):
             for block in blocks:

@@ -108,6 +108,7 @@ def result_files(document: Document) -> Files:
 
 
 def _compare_methods(data: DataSet) -> Document:
+    """The document of a data set: the scores of each method on each part that was left out of the fit."""
     usable = fit_parts(data.flights)
     settings = settings_of_single(usable, data)
     entries: list[Document] = []

@@ -158,6 +158,7 @@ def run_other_days(folder: Path) -> Document:
 
 
 def _test_data_set(data: benchmark.DataSet) -> Document:
+    """The scores of a data set on each other day, with a summary for each kind of day."""
     usable = fit_parts(data.flights)
     settings = benchmark.settings_of_single(usable, data)
     parts = validation_folds(usable)

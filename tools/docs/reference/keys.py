@@ -188,6 +188,8 @@ def _of_sections(heading: str, part: str, key: Key, sections: Sections, shown: M
 
 
 def _of_values(part: str, key: Key, section: Section) -> Row:
+    """The row of a key with a value. A key that ends with the unit of its instrument stands for those of
+    all."""
     units = list(dict.fromkeys(key.unit(place) for place in section.places)) if key.number else []
     says = _in_a_row(key.says)
     says = next((says.removesuffix(end) for unit in units if says.endswith(end := f", {unit or 1}")), says)

@@ -114,6 +114,7 @@ def chosen_ratio_gain_probe() -> str:
 
 
 def _of_better(grade: str, most: int | None) -> tuple[str, ...]:
+    """The row of a grade: by how much the other ratio tracks better, and what it costs."""
     ratios = loop_design.RATIO, BETTER_RATIO
     costs = [LawCost(LAW, grade, most, draw) for draw in BETTER_DRAWS]
     built_in, better = (np.array(_parts(costs, ratio)) for ratio in ratios)

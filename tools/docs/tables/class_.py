@@ -16,6 +16,7 @@ def class_answers() -> str:
 
 
 def _live() -> list[tuple[str, str]]:
+    """Answers of exercise 1."""
     names = ("elevator-partial-loss", "rudder-stuck", "elevator-float")
     weak, jam, trailing = (bf.fly(name, log=False) for name in names)
     modes = " → ".join(change["mode"] for change in weak.metrics["supervisor"])
@@ -29,6 +30,7 @@ def _live() -> list[tuple[str, str]]:
 
 
 def _paper() -> list[tuple[str, str]]:
+    """Answers of exercise 2."""
     ours = bf.fly("elevator-partial-loss")
     nominal = bf.fly("elevator-partial-loss-nominal", log=False)
     errors = [flight.metrics["tracking"]["post_fault_rms_deg_s"]["q"] for flight in (nominal, ours)]
@@ -45,6 +47,7 @@ def _paper() -> list[tuple[str, str]]:
 
 
 def _small() -> list[tuple[str, str]]:
+    """Answers of exercise 3: the smallest loss that is found."""
     base = bf.load("elevator-partial-loss").with_(
         {"duration_s": 20, "expect": {}, "uncertainty": {}, "faults[0].actuator": "aileron"}
     )
@@ -63,6 +66,7 @@ def _small() -> list[tuple[str, str]]:
 
 
 def _detector() -> list[tuple[str, str]]:
+    """Answers of exercise 4."""
     package = "beaver_ftc_live.challenge"
     source = files(package).joinpath("handout/detector.py.txt").read_text(encoding="utf-8")
     handed_out = "memory_s, level = 2.0, 6.0"
@@ -77,6 +81,7 @@ def _detector() -> list[tuple[str, str]]:
 
 
 def _sweep() -> list[tuple[str, str]]:
+    """Answers of exercise 5."""
     base = bf.load("elevator-partial-loss").with_(
         {"duration_s": 10, "expect": {}, "faults[0].at_s": 4, "uncertainty": {}}
     )

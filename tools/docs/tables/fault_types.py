@@ -72,6 +72,7 @@ def _closely(row: Document) -> str:
 
 
 def _matrix(declared: bool, turbulence: str = "none") -> str:
+    """The table of verdicts by fault and surface, and a summary; in moving air the summary alone."""
     with TemporaryDirectory() as folder:
         document = run_matrix(Path(folder), declared=declared, turbulence=turbulence)
     cells = {(cell["fault"], cell["surface"]): cell for cell in document["cells"]}

@@ -131,6 +131,7 @@ def _drawn(
 
 
 def _reference(rng: np.random.Generator) -> list[Document]:
+    """A sine, and in half of the cases a doublet too."""
     size = float(rng.uniform(1.0, 4.0))
     sine = {"amplitude_deg_s": size, "frequency_hz": float(rng.uniform(0.1, 0.5))}
     start_s = float(rng.uniform(0.0, 15.0))

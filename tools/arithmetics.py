@@ -87,6 +87,7 @@ def _row(name: str, rows: list[list[Any]]) -> str:
 
 
 def _wrong(rows: list[list[Any]]) -> Iterator[str]:
+    """Yield a line for each test that fails, and each value that differs by more than the test allows."""
     for kind, where, *rest in rows:
         if kind == "value" and (rest[2] is None or rest[2] > 1.0):
             yield f"  {where}: {str(rest[0])[:80]} -> {str(rest[1])[:80]}"

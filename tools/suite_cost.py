@@ -98,6 +98,7 @@ def tables(rows: list[tuple[str, str, float]]) -> Iterator[str]:
 
 
 def _table(title: str, parts: Iterable[tuple[str, float]]) -> Iterator[str]:
+    """Yield the lines of a table: time and number of the parts, the longest first."""
     seconds: dict[str, float] = {}
     times = Counter[str]()
     for name, part_s in parts:

@@ -153,6 +153,7 @@ def reversed_command_error(flight: str, surface: str, allowed: str) -> BadInput:
 
 
 def _diagnose_checked_log(samples: Samples, model: Model) -> LogRows:
+    """The rows of a flight whose columns fit the model."""
     bank = build_bank(model)
     known = trust.without_dead_rows(samples, model)
     P = bank_posterior(known, model, bank)

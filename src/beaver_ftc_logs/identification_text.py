@@ -88,6 +88,7 @@ def _pressure_lines(model: Model) -> list[str]:
 
 
 def _fold_text(fold: Document) -> str:
+    """The line of a part that was left out: how well the others explain it."""
     if not fold["samples"]:
         return f"  without {fold['left_out']}: nothing in it is known"
     line = f"  without {fold['left_out']}: explains {axis_text(fold['explained'])} of it"

@@ -225,6 +225,7 @@ class Model(Section):
 
     @model_validator(mode="after")
     def _check_arrays(self) -> "Model":
+        """Refuse arrays and names that do not belong to this vehicle, history and lags."""
         n_signals = len(self.vehicle.regressor_columns) * self.vehicle.n_signal_lags(self.history)
         n, n_past = len(self.past), 3 * self.history + n_signals
         reason = f"has {n} rows, allowed: {n_past}, as `identify` writes them: identify it again"

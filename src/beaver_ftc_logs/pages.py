@@ -94,6 +94,7 @@ def render_diagnosis(samples: Samples, rows: LogRows, verdict: Document, words: 
 
 
 def _log_notes(samples: Samples) -> list[str]:
+    """Sentences about the samples of a log: rate, gaps, held values."""
     n_gaps = int(samples.stretch_number[-1])
     gaps = "1 gap" if n_gaps == 1 else f"{n_gaps} gaps"
     return [

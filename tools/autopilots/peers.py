@@ -128,6 +128,7 @@ class Px4:
         return answer
 
     def _controls(self, sensor: Any) -> bytes:
+        """The answer to a sensor message: none at first, nor to one that is sent again."""
         if len(self.stamps) < self._silent:
             self.stamps.append(sensor.time_usec)
             return b""

@@ -135,6 +135,7 @@ def _rank(line: str) -> int:
 
 
 def _output(checkout: Checkout, line: str, longest_s: float | None) -> Output:
+    """What a command prints in a folder of its own, with its pictures."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         try:
@@ -159,6 +160,7 @@ def _lay_out(line: str, folder: Path, checkout: Checkout) -> None:
 
 
 def _fault(status: int, text: str, err: str, used: float, longest_s: float | None, folder: Path) -> str:
+    """Why what a command printed cannot stand in a page; empty if it can."""
     if longest_s is not None and (used > longest_s or status == -signal.SIGKILL):
         return f"takes more than {longest_s:g} s, make it dear"
     if status not in (0, 1) or "Traceback (most recent call last)" in err:

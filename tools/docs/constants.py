@@ -47,6 +47,7 @@ def _of_modules() -> Iterator[tuple[str, dict[str, Any]]]:
 
 
 def _is_shown(value: Any) -> bool:
+    """Whether a value is short enough to be read, and the same on every machine."""
     if isinstance(value, dict):
         return len(value) <= _LONGEST and all(map(_is_shown, value.values()))
     if isinstance(value, list | tuple | set | frozenset | range):

@@ -71,6 +71,7 @@ def _without_notices(outputs: list[Any]) -> list[Any]:
 
 
 def _reduced(picture: str) -> str:
+    """A picture with fewer pixels and colours."""
     from PIL import Image
 
     image = Image.open(io.BytesIO(base64.b64decode(picture))).convert("RGB")

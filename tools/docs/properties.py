@@ -146,6 +146,7 @@ def meaning_of(name: str) -> str:
 
 
 def _output_rows(elements: Sequence[Element]) -> list[tuple[str, ...]]:
+    """A row for each output; the parts of one correction stand together."""
     rows = {shared(e.get("name", "")): _description(e) for e in elements}
     first = list(rows).index(_TILTED)  # the parts of one correction stand together
     names = sorted(rows, key=lambda name: first if name in _PARTS else list(rows).index(name))

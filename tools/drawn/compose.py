@@ -260,6 +260,7 @@ class Composer:
         return fault
 
     def _sensor_fault(self, kind: str) -> Words:
+        """A fault of this type of an instrument that the aircraft has."""
         node = sensor_fault_types(self._schema)[kind]["properties"]
         there = [
             name

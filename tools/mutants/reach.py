@@ -160,6 +160,7 @@ def _write(mode: str, file: Path) -> int:
 
 
 def _measured(mode: str, file: Path) -> dict:
+    """Lines that each test of a file runs, and how long it takes."""
     watch = coverage.Coverage(data_file=None, source=[str(SOURCES)], config_file=False, messages=False)
     timed = _Timed(watch, SLOW_S[mode])
     with tempfile.TemporaryDirectory() as others:

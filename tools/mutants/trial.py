@@ -36,6 +36,8 @@ def outcome(mutant: Mutant, tests: dict[str, dict[str, float]]) -> str:
 
 
 def _outcome(mutant: Mutant, mode: str, seconds: dict[str, float]) -> str:
+    """How the tests of a mode end. A test that also fails without the mutant is left out, and the rest run
+    again."""
     tests = _chosen(mutant.file, seconds, BUDGET_S[mode])
     while tests:
         limit_s = ENDLESS_S + ENDLESS * sum(seconds[test] for test in tests)
@@ -158,6 +160,7 @@ def _work(work: Callable[[], int], limit_s: float) -> None:
 
 
 def _end(child: int, wait_s: float) -> str:
+    """Wait for a child process; it hangs if it takes longer than this."""
     started = time.monotonic()
     while True:
         done, status = os.waitpid(child, os.WNOHANG)

@@ -173,6 +173,7 @@ def _levels(bar: OfSweep, but: str = "type") -> SweepExpect:
 
 
 def _of_bound(found: Document, plain: Document) -> Row:
+    """A statistic as a part. plain: the same without the confidence that the bar asks for."""
     verdict, says = MET, f"{found['of']} flights tell"
     if not found["passed"]:
         verdict = NOT_SHOWN if not found["of"] or plain["passed"] else NOT_MET

@@ -302,6 +302,7 @@ class _Reading:
                 )
 
     def _source(self, given: str, at: Location) -> Source | None:
+        """The source of this name, read once; its mistakes are noted."""
         if given not in self._sources:
             self._sources[given] = None
             try:

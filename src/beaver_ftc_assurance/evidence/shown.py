@@ -175,6 +175,7 @@ def _asked(asked: Document) -> str:
 
 
 def _found(worst: Document) -> str:
+    """What the worst flight shows, with what was asked."""
     if worst["name"] == "robustness":
         return " ".join(filter(None, (f"robustness {said(worst['actual'])}", worst["says"])))
     allowed = "" if worst["expected"] is None else f", asked {said(worst['expected'])}"
@@ -202,6 +203,7 @@ def _coverage(each: Document) -> Iterator[Part]:
 
 
 def _cell(cell: Document) -> str:
+    """The airspeeds and altitudes of a cell of the envelope."""
     slow, fast = cell["airspeed_mps"]
     low, high = cell["altitude_m"]
     if low is None:

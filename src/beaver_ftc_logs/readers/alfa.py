@@ -73,6 +73,7 @@ def read(path: Path, _wanted: Any = None) -> RecordedFlight:
 
 
 def _read_topic_tables(path: Path) -> Iterator[tuple[str, TopicTable]]:
+    """Yield each topic of a flight that is wanted, or says a failure, with its table."""
     wanted = {topic for topic, _, _ in _alfa_names()["columns"].values()}
     for file in sorted(path.glob("*.csv")):
         topic = file.stem.removeprefix(path.name).removeprefix("-")
@@ -85,6 +86,7 @@ def _read_topic_tables(path: Path) -> Iterator[tuple[str, TopicTable]]:
 def _read_columns(
     tables: dict[str, TopicTable], kept: dict[str, tuple[Ints, str]], zero_ns: float
 ) -> Iterator[tuple[str, Column]]:
+    """Yield the columns in our units, each with the rows kept of its topic."""
     for name, (topic, field, unit) in _alfa_names()["columns"].items():
         if field in tables.get(topic, {}):
             rows, note = kept[topic]

@@ -192,6 +192,7 @@ class _ParquetTable:
 
 
 def _parquet_batches(file: Any, names: Sequence[str]) -> Iterator[TableCells]:
+    """Yield the cells of a file in batches; the last is empty."""
     n_read = 0
     with file:
         for batch in file.iter_batches(_BATCH_ROWS, columns=list(names)):

@@ -79,6 +79,7 @@ def load_data_sets(folder: Path) -> list[DataSet]:
 
 
 def _load_data_set(path: Path) -> DataSet | None:
+    """The data set in a folder: tables beside a vehicle file, or ALFA flights; None for another folder."""
     if not path.is_dir():
         return None
     if (path / VEHICLE_FILE).is_file():

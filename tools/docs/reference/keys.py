@@ -157,6 +157,7 @@ def _all_of(names: list[str], every: list[str]) -> str:
 def _rows(
     heading: str, members: Iterable[Section], sections: Sections, shown: Mapping[str, str]
 ) -> Iterator[Row]:
+    """Yield a row for each key of these sections."""
     for section in members:
         part = _part(section)
         for key in section.keys:

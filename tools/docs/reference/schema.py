@@ -87,6 +87,7 @@ class Key:
         return self.node.get("needs", {})
 
     def _examples(self) -> Iterator[Any]:
+        """Values that may stand there, the best example first."""
         default = self.node.get("default")
         for one in (self.node, *self.forms):
             yield from one.get("examples", ())

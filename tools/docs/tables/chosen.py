@@ -175,6 +175,7 @@ def _given(numbers: Sequence[int] | str) -> Sequence[int]:
 
 
 def _of_sets(sets: list[str] | str) -> list[int]:
+    """The seeds of the flights of these sets."""
     known = sorted(path.name for path in BENCHMARK.iterdir() if path.is_dir())
     if sets == COMPARED:
         sets = [name for name in known if not name.startswith(CALIBRATION)]

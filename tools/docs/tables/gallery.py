@@ -59,6 +59,7 @@ def _row(name: str) -> tuple[str, str, str]:
 
 
 def _outcome(flight: Flight) -> str:
+    """What the diagnosis found in a flight."""
     detection, isolation = flight.detection, flight.isolation
     if not flight.fault:
         return "no alarm" if not detection.detected else f"alarm at {detection.time_s:.2f} s"

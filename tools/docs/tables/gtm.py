@@ -160,6 +160,7 @@ def _points() -> tuple[float, float]:
 
 
 def _masses() -> float:
+    """The largest relative difference of weight, centre of gravity and inertia, over all cases."""
     worst = 0.0
     for case in range(7):
         weight, cg, inertia = _specifications()[0].mass(case)
@@ -188,6 +189,7 @@ def _trims() -> list[tuple[float, int]]:
 
 
 def _modes() -> tuple[float, float]:
+    """The largest relative difference of a frequency, and that of a damping ratio."""
     frequency = damping = 0.0
     for alpha_deg in BETWEEN_DEG:
         here = _bench().steady(Condition(alpha_deg=alpha_deg))

@@ -48,6 +48,7 @@ def hidden_faults() -> str:
 
 
 def _outcome(metrics: dict[str, Any]) -> tuple[str, str, str]:
+    """Delay of the alarm, name, and what is left."""
     detection, isolation = metrics["detection"], metrics["isolation"]
     if not detection["detected"]:
         return "no alarm", "-", "-"

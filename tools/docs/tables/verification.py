@@ -24,6 +24,7 @@ SCALES = (0.5, 2.0)  # of the references of `fault-free`
 
 
 def _surveyed(**where: Any) -> str:
+    """The smallest losses that are found, by size of the references."""
     with TemporaryDirectory() as folder:
         found = run_places(Path(folder), load_scenario("fault-free"), excitations=SCALES, **where)
     rows = found["points"]

@@ -1,4 +1,4 @@
-"""The compiled rivals against their classes, frame by frame on random rates: no aircraft, no flight."""
+"""The rivals in the loop's kernels against `step`, frame by frame on random rates, without an aircraft."""
 
 from types import SimpleNamespace
 
@@ -18,22 +18,14 @@ DT = 0.02
 A = np.array([[-4.0, 0.3, 1.0], [0.2, -3.0, 0.1], [-0.2, 0.4, -0.8]])
 G = np.array([[-9.0, 0.7, 0.5, 0.1], [0.4, -12.0, 0.2, 3.0], [-0.4, 0.3, -4.0, 0.2]])
 TRIM_X, TRIM = np.array([0.01, -0.02, 0.03]), np.array([0.02, -0.05, 0.01, 0.1])
-
-
-class Linear:
-    """A design model that couples all axes: xdot = A x + G u."""
-
-    def f(self, x, y):
-        return A @ x
-
-    def G(self, y):
-        return G
+# A design model that couples all axes: xdot = A x + G u
+LINEAR = SimpleNamespace(f=lambda x, y: A @ x, G=lambda y: G)
 
 
 def context(most):
     travel = np.array([[-most] * 4, [0.8 * most] * 4])
     return Context(
-        DT, 1, Linear(), TRIM_X, np.zeros(5), TRIM, travel, np.zeros(3), np.zeros(3), leading=(0, 1, 2)
+        DT, 1, LINEAR, TRIM_X, np.zeros(5), TRIM, travel, np.zeros(3), np.zeros(3), leading=(0, 1, 2)
     )
 
 
@@ -58,7 +50,7 @@ def test_both_command_the_same_within_the_travel_and_at_the_stops(rival, most):
         reference["model_rate"], reference["model_acceleration"], frame[1].x = rate, acceleration, x
         compiled_rivals.command(control, None, None, *frame, MODE_NOMINAL, k * DT)
         assert out["command"] == pytest.approx(wanted, abs=1e-9)
-        at_stop = np.isclose(wanted, -most) | np.isclose(wanted, 0.8 * most)
+        at_stop = np.isin(wanted, (-most, 0.8 * most))
         assert out["saturated"].tolist() == at_stop.tolist()
         stops += at_stop.sum()
     assert (stops > 5) == (most < 1.0)

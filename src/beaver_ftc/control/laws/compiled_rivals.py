@@ -1,4 +1,4 @@
-"""The rivals that fly compiled, so that a comparison is of laws: lqr.py and indi.py have their equations.
+"""The kernels of the rivals lqr.py and indi.py, which have the equations; their classes fly by these too.
 
 The surfaces that lead roll, pitch and yaw move; the others stay in trim.
 """
@@ -7,7 +7,7 @@ import numpy as np
 
 from beaver_ftc.compiled import apart, kernel, record, sized
 from beaver_ftc.control import CompiledLaw
-from beaver_ftc.control.allocation import set_demand, take_command
+from beaver_ftc.control.allocation import take_command
 
 # Filled by `compile_into` of the rival's class. incremental: whether it is incremental inversion, else the
 # regulator. The regulator: gains on error and integral, the linear model, its inverse, the trim. Incremental
@@ -31,14 +31,14 @@ def rival_dtype(n: int) -> np.dtype:
 @apart
 def command(control, assessment, faults, prediction, measured, mode, t):
     """From what is measured to the command of each surface (control.CompiledLaw)."""
-    law, reference, layout, x = control.compiled_rivals, control.reference, control.layout, measured.x
-    memory, allocated = law.memory, control.allocation.output
+    law, reference, layout = control.compiled_rivals, control.reference, control.layout
+    memory, allocated, target = law.memory, control.allocation.output, reference.output
     u = allocated.command
     u[:] = layout.trim
-    if law.config.incremental:
-        increment(law, reference, layout.main, prediction, x, control.axes, u)
-    else:
-        regulate(law, reference, layout.main, x, u)
+    add_command(
+        law, reference.config.dt, target.model_rate, target.model_acceleration, layout.main, measured.x,
+        prediction.means.Gu, prediction.G, control.axes.demand, u,
+    )  # fmt: skip
     take_command(allocated, layout, u)
     memory.saturated = 0
     for s in range(u.size):
@@ -46,48 +46,64 @@ def command(control, assessment, faults, prediction, measured, mode, t):
 
 
 @kernel
-def missed(memory, reference, i, x):
-    """Tracking error of axis i, rad/s. Its integral is held while a surface is at its stop."""
-    error = reference.output.model_rate[i] - x[i]
-    if not memory.saturated:
-        memory.integral[i] += reference.config.dt * error
-    return error
+def add_command(law, dt, rate, acceleration, main, x, Gu, G, demand, u):
+    """Add to u (n,) rad, in trim, what the law commands of the surfaces main (3,) that lead the axes.
+
+    dt s: a frame; rate (3,) rad/s, acceleration (3,) rad/s2: xm and xm'; x (3,) rad/s: measured; Gu (3, n)
+    rad/s2: effect of each surface over the elapsed frame; G (3, n) rad/s2 per rad. Incremental inversion
+    fills demand (3,) rad/s2.
+    """
+    if law.config.incremental:
+        increment(law, dt, rate, acceleration, main, x, Gu, G, demand, u)
+    else:
+        regulate(law, dt, rate, acceleration, main, x, u)
 
 
 @kernel
-def regulate(law, reference, main, x, u):
-    """Add to the command u (n,) rad, in trim, what the linear model asks for to follow the reference, and K
-    times what is missing."""
-    config, memory, target = law.config, law.memory, reference.output
+def missed(memory, dt, i, e):
+    """Integrate the tracking error e of axis i, rad/s, unless a surface is at its stop; returns the
+    integral."""
+    if not memory.saturated:
+        memory.integral[i] += dt * e
+    return memory.integral[i]
+
+
+@kernel
+def regulate(law, dt, rate, acceleration, main, x, u):
+    """u <- u + B^-1 (xm' - A (xm - x_trim)) + K (e, int e),    e = xm - x."""
+    config = law.config
     for i in range(3):
-        error = missed(memory, reference, i, x)
-        needed = target.model_acceleration[i]
+        e = rate[i] - x[i]
+        integral = missed(law.memory, dt, i, e)
+        needed = acceleration[i]
         for j in range(3):
-            needed -= config.A[i, j] * (target.model_rate[j] - config.trim_x[j])
+            needed -= config.A[i, j] * (rate[j] - config.trim_x[j])
         for s in range(3):
-            back = config.K[s, i] * error + config.K[s, 3 + i] * memory.integral[i]
+            back = config.K[s, i] * e + config.K[s, 3 + i] * integral
             u[main[s]] += config.B_inverse[s, i] * needed + back
 
 
 @kernel
-def increment(law, reference, main, prediction, x, axes, u):
-    """G^-1 (nu - xdot0 + G u0), into the command u (n,) rad; the demand of the axes: nu - xdot0."""
+def increment(law, dt, rate, acceleration, main, x, Gu, G, demand, u):
+    """u <- G^-1 (nu - xdot0 + G u0),    nu = xm' + Kp e + Ki int e;    demand: nu - xdot0.
+
+    xdot0 and G u0 pass the same filter.
+    """
     config, memory = law.config, law.memory
     for i in range(3):
-        error = missed(memory, reference, i, x)
+        e = rate[i] - x[i]
+        integral = missed(memory, dt, i, e)
         xdot0, given = memory.rate_filter[1, i], memory.surface_filter[1, i]
         if memory.begun:
-            change = (x[i] - memory.x_before[i]) / reference.config.dt
-            xdot0 = smooth(memory.rate_filter, i, change, config.keep)
+            xdot0 = smooth(memory.rate_filter, i, (x[i] - memory.x_before[i]) / dt, config.keep)
             moved = 0.0  # acceleration by the positions of these surfaces over the elapsed frame
             for s in main:
-                moved += prediction.means.Gu[i, s]
+                moved += Gu[i, s]
             given = smooth(memory.surface_filter, i, moved, config.keep)
-        nu = reference.output.model_acceleration[i] + config.Kp * error + config.Ki * memory.integral[i]
-        set_demand(axes, i, nu - xdot0 + given, 0.0, 0.0)
-    solve(prediction.G, main, axes.demand, u)
+        demand[i] = acceleration[i] + config.Kp * e + config.Ki * integral - xdot0 + given
+    solve(G, main, demand, u)
     for i in range(3):
-        set_demand(axes, i, axes.demand[i] - memory.surface_filter[1, i], 0.0, 0.0)
+        demand[i] -= memory.surface_filter[1, i]
     memory.begun, memory.x_before[:] = 1, x
 
 

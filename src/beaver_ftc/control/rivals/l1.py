@@ -3,6 +3,7 @@
     xhat' = f + G u + sigma - a e,    e = xhat - x
     sigma = -A / Phi e,      A = e^{-a dt},  Phi = (1 - A) / a
     G_lead u_lead = nu - f - C sigma - G_others u_trim,      C a first-order low-pass filter
+    nu = xm' + Kp e_m + Ki int e_m,    e_m = xm - x
 
 u: all surfaces, of which those that lead roll, pitch and yaw are commanded and the others stay in trim.
 The adaptation is as fast as the frame allows; what reaches the surfaces is limited by C alone.
@@ -22,9 +23,10 @@ from typing import ClassVar
 import numpy as np
 
 from beaver_ftc.control import Reference
-from beaver_ftc.control.rivals.tracking import GAINS, RivalLaw, with_others
+from beaver_ftc.control.rivals.kernel_law import GAINS
 from beaver_ftc.design.context import Context
 from beaver_ftc.diagnosis import Measured, Verdict
+from beaver_ftc.diagnosis.rivals import rival_options
 
 
 class Predictor:
@@ -43,27 +45,40 @@ class Predictor:
         return self.sigma
 
 
-class L1Adaptive(RivalLaw):
+class L1Adaptive:
     """L1 adaptive control, piecewise-constant adaptation behind a low-pass filter [Hovakimyan2010]."""
 
     name: ClassVar[str] = "l1-adaptive"
     defaults: ClassVar[Mapping[str, float]] = GAINS | {"predictor_per_s": 1.0, "bandwidth_per_s": 20.0}
+    fault_tolerant = False
 
     def reset(self, context: Context) -> None:
-        """Nothing unexplained yet."""
-        self.begin(context)
+        """Nothing missed and nothing unexplained yet."""
+        self.context, self.option = context, rival_options(self.name, self.defaults, context)
         self.predictor = Predictor(self.option["predictor_per_s"], context.dt_s)
         self.keep = exp(-self.option["bandwidth_per_s"] * context.dt_s)
-        self.compensated = np.zeros(3)
+        self.compensated, self.integral, self.saturated = np.zeros(3), np.zeros(3), False
+        self.before: np.ndarray | None = None
 
     def step(self, measured: Measured, reference: Reference, verdict: Verdict) -> np.ndarray:
         """Learn what the elapsed frame did not explain, and demand the rest."""
-        moved = self.moved(measured)
-        if moved is not None:
-            sigma = self.predictor.step(moved, measured.acceleration)
+        if self.before is not None:
+            sigma = self.predictor.step(measured.x - self.before, measured.acceleration)
             self.compensated = self.keep * self.compensated + (1.0 - self.keep) * sigma
-        nu = self.demand(measured, reference)
-        model, G = self.context.model, self.context.model.G(measured.y)
-        others = G @ with_others(np.zeros(3), self.context)
-        rest = nu - model.f(measured.x, measured.y) - self.compensated - others
-        return self.command(np.linalg.solve(G[:, self.context.leading], rest))
+        self.before = measured.x
+        context, leading, nu = self.context, list(self.context.leading), self.demand(measured.x, reference)
+        G, wanted = context.model.G(measured.y), context.trim_rad.copy()
+        wanted[leading] = 0.0
+        rest = nu - context.model.f(measured.x, measured.y) - self.compensated - G @ wanted
+        wanted[leading] = np.linalg.solve(G[:, leading], rest)
+        command: np.ndarray = np.clip(wanted, *context.travel_rad)
+        self.saturated = bool((command != wanted).any())
+        return command
+
+    def demand(self, x: np.ndarray, reference: Reference) -> np.ndarray:
+        """nu (3,) rad/s2. The integral of the error stands still while a surface is at its stop."""
+        error, option = reference.rate - x, self.option
+        if not self.saturated:
+            self.integral = self.integral + self.context.dt_s * error
+        following: np.ndarray = reference.acceleration + option["proportional_per_s"] * error
+        return following + option["integral_per_s2"] * self.integral

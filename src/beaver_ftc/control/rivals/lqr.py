@@ -3,7 +3,7 @@
     minimise sum e' Qe e + i' Qi i + du' R du,    e = xm - x,  i = int e,  du = u - u_trim - u_feedforward
 
 Weights by Bryson's rule: one over the square of what is acceptable. The gains never change: that is the
-point of it. Kernels and `step` fly the law as those of indi.py do.
+point of it. Flown by kernels (kernel_law.py).
 """
 
 from collections.abc import Mapping
@@ -11,10 +11,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from beaver_ftc.control import Reference
-from beaver_ftc.control.rivals.tracking import RivalLaw
+from beaver_ftc.control.rivals.kernel_law import KernelLaw
 from beaver_ftc.design.context import Context
-from beaver_ftc.diagnosis import Measured, Verdict
 
 _STEP = 1e-6
 
@@ -27,40 +25,23 @@ def gains(A: np.ndarray, B: np.ndarray, Q: np.ndarray, R: np.ndarray) -> np.ndar
     return np.linalg.solve(R + B.T @ P @ B, B.T @ P @ A)
 
 
-class FixedGainLqr(RivalLaw):
+class FixedGainLqr(KernelLaw):
     """Fixed-gain linear quadratic regulator about the trim, with integral action [Anderson1990]."""
 
     name: ClassVar[str] = "lqr"
     defaults: ClassVar[Mapping[str, float]] = {"error_deg_s": 0.5, "integral_deg": 0.5, "deflection_deg": 3.0}
 
-    def reset(self, context: Context) -> None:
+    def compile_into(self, law: np.void) -> None:
         """Linearise about the trim and solve for the gains, once."""
-        self.begin(context)
-        option = self.option
-        self.A, self.B = linearised(context)
-        dt = context.dt_s
-        A = np.block([[np.eye(3) + dt * self.A, np.zeros((3, 3))], [dt * np.eye(3), np.eye(3)]])
-        B = np.vstack((dt * self.B, np.zeros((3, 3))))
+        config, option, dt = law["config"], self.option, self.context.dt_s
+        A, B = linearised(self.context)
+        z_A = np.block([[np.eye(3) + dt * A, np.zeros((3, 3))], [dt * np.eye(3), np.eye(3)]])
+        z_B = np.vstack((dt * B, np.zeros((3, 3))))
         acceptable = [option["error_deg_s"]] * 3 + [option["integral_deg"]] * 3
         Q = np.diag(1.0 / np.radians(acceptable) ** 2)
         R = np.eye(3) / np.radians(option["deflection_deg"]) ** 2
-        self.K = gains(A, B, Q, R)
-
-    def compile_into(self, law: np.void) -> None:
-        """Fill the record of compiled_rivals.py, in trim."""
-        config = law["config"]
-        config["K"], config["A"], config["B_inverse"] = self.K, self.A, np.linalg.inv(self.B)
+        config["K"], config["A"], config["B_inverse"] = gains(z_A, z_B, Q, R), A, np.linalg.inv(B)
         config["trim_x"] = self.context.trim_x
-
-    def step(self, measured: Measured, reference: Reference, verdict: Verdict) -> np.ndarray:
-        """Trim, what the linear model asks for to follow the reference, and K times what is missing."""
-        context = self.context
-        error = self.missed(measured, reference)
-        needed = reference.acceleration - self.A @ (reference.rate - context.trim_x)
-        ahead = np.linalg.solve(self.B, needed)
-        back = self.K @ np.concatenate((error, self.integral))
-        trim = context.trim_rad[list(context.leading)]
-        return self.command(trim + ahead + back)
 
 
 def linearised(context: Context) -> tuple[np.ndarray, np.ndarray]:

@@ -11,7 +11,7 @@ import pytest
 from beaver_ftc import compiled
 from beaver_ftc.compiled import cache
 from beaver_ftc.compiled.cache import Wanted
-from beaver_ftc.compiled.target import array_type
+from beaver_ftc.compiled.sized_types import array_type
 
 KINDS = (array_type(np.dtype(float), 1),)
 BODIES = ("return 2.0 * x[0]", "return x[0] - 1.0", "return x[0] * x[0]", "return x[0] + x[1]")

@@ -8,7 +8,7 @@ Compiled code is kept in the user's cache, each kernel under what its code follo
 again what it changes. It also works where the package is read-only. Nobody else may write there: what is
 kept is run.
 
-target.py compiles by parts of Numba that are known from inside. With a version that is not in `KNOWN`, or
+target.py and sized_types.py use parts of Numba that are known from inside. With a version that is not in `KNOWN`, or
 with BEAVER_FTC_COMPILER=numba, Numba compiles by its own means, again in each process; flights are the same.
 
 Compiled code calls only kernels that it can name. `one_of` names each kernel of a table in turn, so the
@@ -20,7 +20,6 @@ import contextlib
 import functools
 import os
 from collections.abc import Callable, Mapping
-from functools import lru_cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -46,7 +45,7 @@ ALONE = "numba {} compiles by its own means: each start takes minutes, known fro
 _FOLDER = Path(__file__).parent
 
 
-@lru_cache(maxsize=1)
+@functools.cache
 def cache_folder() -> Path | None:
     """Where compiled kernels are kept; None where nothing can be written: each process compiles its own.
 
@@ -106,7 +105,7 @@ def compile_into(folder: Path | None, function, for_size=False):
     return target.Kernel(folder, function, for_size) if target else numba.njit(error_model="numpy")(function)
 
 
-@lru_cache(maxsize=1)
+@functools.cache
 def _own_target() -> ModuleType | None:
     """Our own target of the compiler; None if this version of Numba is not known from inside, or lacks a part
     all the same."""
@@ -121,7 +120,7 @@ def _own_target() -> ModuleType | None:
 
 
 def borrows() -> bool:
-    """Whether kernels are compiled by parts that Numba does not promise: see target.py."""
+    """Whether kernels are compiled by parts that Numba does not promise."""
     return _own_target() is not None
 
 
@@ -136,13 +135,14 @@ def direct(function: Any, *arguments: np.ndarray) -> Any:
     return _entry_point(function, tuple((argument.dtype, argument.ndim) for argument in arguments))
 
 
-@lru_cache(maxsize=64)
+@functools.cache
 def _entry_point(function, kinds):
     """The machine code for C-ordered arrays of these types and dimensions; of records that have a size,
     theirs."""
-    target = _own_target()
-    if target:
-        return function.result(tuple(target.array_type(*kind) for kind in kinds)).entry_point
+    if borrows():
+        from beaver_ftc.compiled.sized_types import array_type
+
+        return function.result(tuple(array_type(*kind) for kind in kinds)).entry_point
     types = tuple(numba.types.Array(numba.from_dtype(dtype), dimensions, "C") for dtype, dimensions in kinds)
     function.compile(types)
     return function.overloads[types].entry_point
@@ -162,7 +162,7 @@ def row_of(array, i):
 def _row_of(array, i):
     if not borrows():
         return lambda array, i: array[i]
-    from beaver_ftc.compiled.target import borrowed_row
+    from beaver_ftc.compiled.sized_types import borrowed_row
 
     def row(array, i):
         return borrowed_row(array, i)  # type: ignore[call-arg]

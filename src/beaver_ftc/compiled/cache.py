@@ -45,6 +45,13 @@ from numba.core.compiler import CompileResult
 from beaver_ftc.documents.errors import say_once
 from beaver_ftc.documents.files import digest_of_files, read_own
 
+BY_ADDRESS = "called_by_address"  # an attribute of a kernel that its callers look up by name when they run
+COMPILING = "compiling flight code that is new to this machine, once: about {:.0f} s on an idle one"
+PER_S = 17_000  # characters of `what_follows` compiled in a second: 11000 to 25000, by the kernel
+PATIENCE_S = 1.0  # what takes less needs no word
+MOST_BYTES = 500_000_000  # of code kept in a folder: some hundred versions of the flight code
+_DIGEST_BYTES = 32  # before the code in a file
+_LOCK = "lock"  # the name of the file that is locked
 _HELD = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 
 
@@ -69,9 +76,6 @@ def held() -> Iterator[None]:
             signal.signal(number, handler)
         for number in arrived[:1]:
             signal.raise_signal(number)
-
-
-BY_ADDRESS = "called_by_address"  # an attribute of a kernel that its callers look up by name when they run
 
 
 def digest_of(function: FunctionType) -> str:
@@ -147,16 +151,6 @@ def _value(value: Any, seen: dict[int, int]) -> Iterator[str]:
         yield from _parts(plain, seen)
     else:
         yield f"{type(value).__qualname__} {getattr(value, '__name__', '')}"
-
-
-COMPILING = "compiling flight code that is new to this machine, once: about {:.0f} s on an idle one"
-PER_S = 17_000  # characters of `what_follows` compiled in a second: 11000 to 25000, by the kernel
-PATIENCE_S = 1.0  # what takes less needs no word
-
-MOST_BYTES = 500_000_000  # of code kept in a folder: some hundred versions of the flight code
-
-_DIGEST_BYTES = 32
-_LOCK = "lock"
 
 
 @contextlib.contextmanager

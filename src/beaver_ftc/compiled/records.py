@@ -2,7 +2,7 @@
 
 What has the same size in each comes first in such a record, always in the same places. Behind it is what has
 not: where each part begins and how long it is follows from the record's NumPy type. Compiled code asks for
-these numbers (`places`) when Python calls it, and is the same for all sizes: compiled/target.py.
+these numbers (`places`) when Python calls it, and is the same for all sizes: sized_types.py.
 """
 
 import functools
@@ -58,13 +58,14 @@ class Shape(NamedTuple):
 
     @property
     def digest(self) -> str:
-        return _digest_of(self)
+        return short_digest(self)
 
 
 @functools.cache
-def _digest_of(shape: Shape) -> str:
-    """2 ms for a large record, and asked for at each use of one while code is compiled."""
-    return hashlib.sha256(repr(shape).encode()).hexdigest()[:16]
+def short_digest(value: Any) -> str:
+    """A name for what a value prints: of a large record's shape it takes 2 ms, and is asked for at each use
+    of the record while code is compiled."""
+    return hashlib.sha256(repr(value).encode()).hexdigest()[:16]
 
 
 _shapes: dict[np.dtype, Shape] = {}

@@ -155,7 +155,7 @@ def kernels_flown(frames: np.ndarray, arrays: tuple[np.ndarray, ...]) -> Iterato
     """What a flight calls that flies these frames by `fly_on` with these further arrays: see stepping.py."""
     if not borrows():  # then they are all parts of one
         return
-    from beaver_ftc.compiled.target import array_type  # there is none in every version of Numba
+    from beaver_ftc.compiled.sized_types import array_type  # there is none in every version of Numba
 
     frame = frames[0]
     yield Wanted.of(fly_on, tuple(array_type(each.dtype, each.ndim) for each in (frames, *arrays)))
@@ -194,7 +194,7 @@ def _kinds(wanted: Callable[..., Any], frame: np.void) -> tuple[Any, ...]:
 def _kind(name: str, frame: np.dtype) -> Any:
     if name in _NUMBERS:
         return _NUMBERS[name]
-    from beaver_ftc.compiled.target import kind_of
+    from beaver_ftc.compiled.sized_types import kind_of
 
     kind = kind_of(frame, 0)
     return kind if name == "frame" else kind.typeof(name) or kind.typeof("control").typeof(name)

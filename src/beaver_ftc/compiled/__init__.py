@@ -8,8 +8,9 @@ Compiled code is kept in the user's cache, each kernel under what its code follo
 again what it changes. It also works where the package is read-only. Nobody else may write there: what is
 kept is run.
 
-target.py and sized_types.py use parts of Numba that are known from inside. With a version that is not in `KNOWN`, or
-with BEAVER_FTC_COMPILER=numba, Numba compiles by its own means, again in each process; flights are the same.
+target.py and sized_types.py use parts of Numba that are known from inside. With a version that is not in
+`KNOWN`, or with BEAVER_FTC_COMPILER=numba, Numba compiles by its own means, again in each process; flights
+are the same.
 
 Compiled code calls only kernels that it can name. `one_of` names each kernel of a table in turn, so the
 caller's code does not depend on how many rows there are. Give it lazy kernels (`apart`): a flight then
@@ -29,14 +30,14 @@ import numpy as np
 from numba.extending import overload
 
 from beaver_ftc.compiled.cache import BY_ADDRESS
-from beaver_ftc.compiled.records import record, sized
+from beaver_ftc.compiled.records import fill, record, sized
 from beaver_ftc.documents.errors import say_once
 from beaver_ftc.documents.files import cache_of_version, digest_of_files
 
 # mypy: disable-error-code="attr-defined,method-assign,assignment"
 
 
-__all__ = ["apart", "direct", "kernel", "plain", "record", "row_of", "sized"]
+__all__ = ["apart", "direct", "fill", "kernel", "plain", "record", "row_of", "sized"]
 
 KNOWN = ("0.68",)  # versions of Numba whose inside is as we have found it
 VARIABLE = "BEAVER_FTC_COMPILER"  # `numba`: as with a version that is not known

@@ -163,3 +163,9 @@ def places(dtype: np.dtype) -> Iterator[int]:
             if part.dims:
                 yield element.itemsize
             yield from places(element)
+
+
+def fill(record: np.void, **values: Any) -> None:
+    """Write these fields of a record."""
+    for name, value in values.items():
+        record[name] = value

@@ -15,7 +15,7 @@ surfaces, and projected: a surface weaker than `least_effectiveness` is given up
 
 import numpy as np
 
-from beaver_ftc.compiled import apart, kernel, record, sized
+from beaver_ftc.compiled import apart, fill, kernel, record, sized
 from beaver_ftc.design.model import unanticipated_pitch
 from beaver_ftc.diagnosis.state import PITCH, UNANTICIPATED
 from beaver_ftc.diagnosis.types import GIVE_UP, SCALE_COMMAND
@@ -101,9 +101,9 @@ def surfaces_dtype(n: int) -> np.dtype:
 
 def configure(surfaces: np.void, config: ControlConfig, informed: bool, dt_s: float) -> None:
     """Fill the record (`surfaces_dtype`); informed: whether the law knows the true faults, at once."""
+    step = np.inf if informed else config.effectiveness_rate_per_s * dt_s
+    fill(surfaces["config"], least_effectiveness=config.least_effectiveness, effectiveness_step=step)
     surfaces["output"]["effectiveness"] = 1.0
-    surfaces["config"]["least_effectiveness"] = config.least_effectiveness
-    surfaces["config"]["effectiveness_step"] = np.inf if informed else config.effectiveness_rate_per_s * dt_s
 
 
 @apart

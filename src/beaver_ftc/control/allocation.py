@@ -11,7 +11,7 @@ in it [Durham1993]; here the interval it spans on each axis. A demand outside it
 import numpy as np
 
 from beaver_ftc.aircraft import AXES, Aircraft, main_surface_index_by_axis
-from beaver_ftc.compiled import apart, kernel, record, sized
+from beaver_ftc.compiled import apart, fill, kernel, record, sized
 from beaver_ftc.control.accommodation import usable_effectiveness
 from beaver_ftc.control.least_squares import FREE, LOW, problem_dtype, solve
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
@@ -56,11 +56,13 @@ def configure(control: np.void, config: ControlConfig, travel: np.ndarray, aircr
     """Fill `layout`, except its trim (loop/assembly.py), and `allocation` of a law's record; travel (2, n)
     rad."""
     layout = control["layout"]
-    layout["low"], layout["high"] = travel
-    layout["main"] = main_surface_index_by_axis(aircraft)
-    layout["stand_in"] = aircraft.surfaces.index(aircraft.stand_ins[0]) if aircraft.stand_ins else -1
-    layout["is_backup"] = [surface in aircraft.stand_ins for surface in aircraft.surfaces]
-    layout["authority"], layout["general"] = _authority(aircraft, layout), _is_general(aircraft)
+    fill(
+        layout, low=travel[0], high=travel[1], main=main_surface_index_by_axis(aircraft),
+        stand_in=aircraft.surfaces.index(aircraft.stand_ins[0]) if aircraft.stand_ins else -1,
+        is_backup=[surface in aircraft.stand_ins for surface in aircraft.surfaces],
+        general=_is_general(aircraft),
+    )  # fmt: skip
+    layout["authority"] = _authority(aircraft, layout)
     step = control["reference"]["config"]["dt"] / config.hand_over_s
     control["allocation"]["config"]["hand_over_step"] = step
 

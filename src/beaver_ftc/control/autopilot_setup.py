@@ -6,6 +6,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.aircraft import GRAVITY_MPS2, THRUST_TERM
+from beaver_ftc.compiled import fill
 from beaver_ftc.control.autopilot import GAINS
 from beaver_ftc.control.envelope_protection import MOST_BANK_DEG, set_up_level_flight_table
 from beaver_ftc.control.profile import NOT_JUDGED, set_up_profile
@@ -25,19 +26,17 @@ def set_up_autopilot(autopilot: np.void, control: np.void, declared: Declared) -
     profile = declared.autopilot
     if profile is None or not profile.channels:
         return
-    autopilot["enabled"], autopilot["dt"] = 1, 1.0 / declared.rate_hz
     set_up_profile(autopilot, declared)
-    autopilot["changed_at_s"], autopilot["largest_deviation"] = -inf, NOT_JUDGED
-    autopilot["gain"] = tuple(_gains(declared.aircraft).values())
-    autopilot["gravity"] = GRAVITY_MPS2
     _set_up_aircraft_values(autopilot, declared)
     less, more = (declared.aircraft.envelope.alpha_deg[1] - spare for spare in SPARE_ALPHA_DEG)
-    autopilot["steepest_alpha"] = radians(min(less, max(STEEPEST_ALPHA_DEG, more)))
-    autopilot["max_healthy_rate"] = np.radians(MOST_DEG_S)
-    autopilot["max_healthy_bank"] = radians(MOST_BANK_DEG)
-    for name in ("trim", "low", "high"):
-        autopilot[f"{name}_power"] = control["power"]["config"][name]
-    autopilot["allowed_power"] = control["power"]["config"]["high"]
+    trim, low, high = (control["power"]["config"][name] for name in ("trim", "low", "high"))
+    fill(
+        autopilot, enabled=1, dt=1.0 / declared.rate_hz, changed_at_s=-inf, largest_deviation=NOT_JUDGED,
+        gain=tuple(_gains(declared.aircraft).values()), gravity=GRAVITY_MPS2,
+        steepest_alpha=radians(min(less, max(STEEPEST_ALPHA_DEG, more))),
+        max_healthy_rate=np.radians(MOST_DEG_S), max_healthy_bank=radians(MOST_BANK_DEG),
+        trim_power=trim, low_power=low, high_power=high, allowed_power=high,
+    )  # fmt: skip
     control["reference"]["config"]["steered"] = 1
     set_up_level_flight_table(autopilot["holding"], control["layout"], declared)
 
@@ -55,16 +54,18 @@ def _set_up_aircraft_values(autopilot: np.void, declared: Declared) -> None:
     terms = {name: term.value for name, term in aircraft.terms.items()}
     mass_kg = aircraft.mass.mass_kg * declared.design_model.mass
     per_mass = aircraft.geometry.wing_area_m2 / mass_kg
-    autopilot["thrust"] = per_mass * np.array([terms.get(THRUST_TERM, 0.0), terms.get("CX_adpt2", 0.0)])
-    autopilot["pitch_holds_airspeed"] = aircraft.airspeed_by == "pitch"
     if aircraft.airspeed_by == "power" and THRUST_TERM not in terms:
         set_up_engine(autopilot["engine"], aircraft.engine.thrust, mass_kg)
     by_sideslip = terms.get("Cl_beta", 0.0) / terms.get("Cl_p", -1.0)
-    autopilot["dihedral"] = max(by_sideslip, LEAST_DIHEDRAL) * 2.0 / aircraft.geometry.span_m
-    autopilot["dpt_cubed_held_by_sideslip"] = inf
+    dpt_cubed, beta = inf, POWER_SIDESLIP_RAD
     if terms.get("Cn_dpt3"):
-        beta = POWER_SIDESLIP_RAD
         held = terms.get("Cn_beta", 0.0) * beta + terms.get("Cn_beta3", 0.0) * beta**3
-        autopilot["dpt_cubed_held_by_sideslip"] = max(held / abs(terms["Cn_dpt3"]), 0.0)
+        dpt_cubed = max(held / abs(terms["Cn_dpt3"]), 0.0)
     slowest, fastest = aircraft.envelope.airspeed_mps
-    autopilot["slowest_mps"] = slowest + min(SPARE_MPS, SPARE_SHARE * (fastest - slowest))
+    fill(
+        autopilot, pitch_holds_airspeed=aircraft.airspeed_by == "pitch",
+        thrust=per_mass * np.array([terms.get(THRUST_TERM, 0.0), terms.get("CX_adpt2", 0.0)]),
+        dihedral=max(by_sideslip, LEAST_DIHEDRAL) * 2.0 / aircraft.geometry.span_m,
+        dpt_cubed_held_by_sideslip=dpt_cubed,
+        slowest_mps=slowest + min(SPARE_MPS, SPARE_SHARE * (fastest - slowest)),
+    )  # fmt: skip

@@ -21,7 +21,7 @@ not asked of them: they roll by sideslip, which the outer loops ask for.
 import numpy as np
 
 from beaver_ftc.aircraft.schema import MAX_EFFECTORS
-from beaver_ftc.compiled import apart, kernel, record
+from beaver_ftc.compiled import apart, fill, kernel, record
 from beaver_ftc.control import least_squares, row_of
 from beaver_ftc.control.allocation import remaining
 from beaver_ftc.control.least_squares import problem_dtype
@@ -56,11 +56,12 @@ def configure_engines(engines: np.void, declared: Declared) -> None:
     may_use = row_of(declared.control.law).uses_verdict and declared.control.power.enabled
     if not aircraft.effectors or not may_use or named is None:
         return
-    config["n"] = len(aircraft.effectors)
-    config["low"], config["high"] = low, high = named[1].range
-    config["step"] = (high - low) / WHOLE_RANGE_S * dt
-    config["integral_gain"] = dt / (2.0 * max(thrust.lag_s if thrust else 0.0, LEAST_LAG_S))
-    config["release"] = dt / RELEASE_S
+    low, high = named[1].range
+    T = 2.0 * max(thrust.lag_s if thrust else 0.0, LEAST_LAG_S)
+    fill(
+        config, n=len(aircraft.effectors), low=low, high=high, step=(high - low) / WHOLE_RANGE_S * dt,
+        integral_gain=dt / T, release=dt / RELEASE_S,
+    )  # fmt: skip
     mass, i = aircraft.mass, inertia_coefficients(aircraft.mass)
     set_up_engine(engines["memory"]["thrust"], thrust, mass.mass_kg)
     for e, of in enumerate(aircraft.effectors.values()):

@@ -21,7 +21,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.aircraft import GRAVITY_MPS2
-from beaver_ftc.compiled import kernel, record, row_of
+from beaver_ftc.compiled import fill, kernel, record, row_of
 from beaver_ftc.control.profile import SPEED, clamp
 from beaver_ftc.control.thrust import between
 from beaver_ftc.design.engine import SEA_LEVEL_DENSITY_KG_M3
@@ -162,20 +162,20 @@ def record_limit(hold, kind, value, bites, t):
 def set_up_level_flight_table(holding: np.void, layout: np.void, declared: Declared) -> None:
     """The table of level flight, where the aircraft's file has forces and a flap for the elevator."""
     aircraft, flap = declared.aircraft, int(layout["stand_in"])
-    holding["from_s"], holding["bank"], holding["fastest"] = -1.0, radians(MOST_BANK_DEG), np.inf
+    fill(holding, from_s=-1.0, bank=radians(MOST_BANK_DEG), fastest=np.inf)
     if flap < 0 or not aircraft.forces or THRUST not in aircraft.signals:
         return
     speeds_mps = np.linspace(*aircraft.envelope.airspeed_mps, N_QDYN)
-    holding["qdyn"] = 0.5 * SEA_LEVEL_DENSITY_KG_M3 * speeds_mps**2
-    holding["flap"] = np.linspace(layout["low"][flap], layout["high"][flap], N_FLAP)
+    qdyn_pa = 0.5 * SEA_LEVEL_DENSITY_KG_M3 * speeds_mps**2
+    flap_rad = np.linspace(layout["low"][flap], layout["high"][flap], N_FLAP)
     surfaces = aircraft.surfaces[layout["main"][PITCH]], aircraft.surfaces[flap]
     model = declared.design_model
     mass_kg, scale = aircraft.mass.mass_kg * model.mass, tuple(model.coefficients.items())
-    qdyn_pa, flap_rad = tuple(holding["qdyn"]), tuple(holding["flap"])
-    needed = elevator_needed(aircraft, surfaces, mass_kg, scale, qdyn_pa, flap_rad)
-    holding["has_table"], holding["elevator"] = bool(np.isfinite(needed).all()), needed
-    holding["max_airspeed_rate_mps2"] = MAX_AIRSPEED_RATE_MPS2
-    holding["flap_reserve"] = radians(FLAP_RESERVE_DEG)
+    needed = elevator_needed(aircraft, surfaces, mass_kg, scale, tuple(qdyn_pa), tuple(flap_rad))
+    fill(
+        holding, qdyn=qdyn_pa, flap=flap_rad, has_table=np.isfinite(needed).all(), elevator=needed,
+        max_airspeed_rate_mps2=MAX_AIRSPEED_RATE_MPS2, flap_reserve=radians(FLAP_RESERVE_DEG),
+    )  # fmt: skip
 
 
 @lru_cache(maxsize=32)

@@ -18,7 +18,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.schema import MAX_LEVERS
-from beaver_ftc.compiled import kernel, record
+from beaver_ftc.compiled import fill, kernel, record
 from beaver_ftc.control import row_of
 from beaver_ftc.control.allocation import remaining
 from beaver_ftc.design.engine import engine_power_kw, slipstream
@@ -63,31 +63,29 @@ def configure_power(power: np.void, layout: np.void, declared: Declared) -> None
     """Fill the record (dtype POWER); layout: of the surfaces."""
     settings, dt, config = declared.control.power, 1.0 / declared.rate_hz, power["config"]
     initial: Any = declared.initial  # its engine's keys are the aircraft's
-    config["enabled"], power["output"]["from_s"] = is_at_hand(declared), -1.0
-    config["impatience"], config["forgiveness"] = dt / settings.patience_s, dt / settings.release_s
-    config["speed_gain"] = settings.speed_gain_inhg_per_mps
-    config["attitude_gain"] = settings.attitude_gain_inhg_per_deg / radians(1.0)
-    lags_s = {
-        "smoothing": settings.smoothing_s,
-        "washout": settings.washout_s,
-        "leak": settings.attitude_memory_s,
-    }
-    for name, lag_s in lags_s.items():
-        config[name] = 1.0 - exp(-dt / lag_s)
+    lags_s = settings.smoothing_s, settings.washout_s, settings.attitude_memory_s
+    smoothing, washout, leak = (1.0 - exp(-dt / lag_s) for lag_s in lags_s)
+    fill(
+        config, enabled=is_at_hand(declared), impatience=dt / settings.patience_s,
+        forgiveness=dt / settings.release_s, speed_gain=settings.speed_gain_inhg_per_mps,
+        attitude_gain=settings.attitude_gain_inhg_per_deg / radians(1.0), smoothing=smoothing,
+        washout=washout, leak=leak,
+    )  # fmt: skip
+    power["output"]["from_s"] = -1.0
     named = declared.aircraft.file.power_setting
     if named is None:
         return
     name, setting = named
     trim = getattr(initial, name)
-    config["trim"] = power["setpoint"]["base"] = power["output"]["command"][0] = trim
-    power["output"]["least"] = power["output"]["greatest"] = trim
-    config["low"], config["high"] = low, high = setting.range
+    power["setpoint"]["base"] = power["output"]["command"][0] = trim
+    fill(power["output"], least=trim, greatest=trim)
+    low, high = setting.range
     per_s = (high - low) / WHOLE_RANGE_S
     if _has_piston_engine(declared.aircraft):
-        config["low"], config["high"] = min(settings.lowest_inhg, trim), max(settings.highest_inhg, trim)
+        low, high = min(settings.lowest_inhg, trim), max(settings.highest_inhg, trim)
         config["dpt_factor"], config["highest_dpt"] = _slipstream_limits(declared, layout)
         per_s = settings.rate_inhg_s
-    config["step"] = per_s * dt
+    fill(config, trim=trim, low=low, high=high, step=per_s * dt)
 
 
 def _slipstream_limits(declared: Declared, layout: np.void) -> tuple[float, float]:

@@ -7,7 +7,7 @@ from math import pi, radians
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel, record
+from beaver_ftc.compiled import fill, kernel, record
 from beaver_ftc.scenario.diagnosis import Probing
 
 # Of the flap's movement. amplitude rad; step: rad of phase a frame; frames: how many at most, 0 for no probe.
@@ -20,10 +20,11 @@ PROBE = record(config=CONFIG, memory=MEMORY)
 def configure_probe(probe: np.void, probing: Probing | None, dt: float) -> None:
     """Fill the record (dtype PROBE) for frames of dt s."""
     if probing is not None:
-        probe["config"]["amplitude"] = radians(probing.amplitude_deg)
-        probe["config"]["step"] = 2.0 * pi * probing.frequency_hz * dt
-        probe["config"]["frames"] = round(probing.duration_s / dt)
-        probe["memory"]["from_s"] = probe["memory"]["to_s"] = -1.0
+        fill(
+            probe["config"], amplitude=radians(probing.amplitude_deg),
+            step=2.0 * pi * probing.frequency_hz * dt, frames=round(probing.duration_s / dt),
+        )  # fmt: skip
+        fill(probe["memory"], from_s=-1.0, to_s=-1.0)
 
 
 @kernel

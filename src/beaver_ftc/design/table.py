@@ -14,7 +14,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft, Term
 from beaver_ftc.aircraft.schema import FLOW_SIGNALS, MAX_MONOMIALS, MAX_SIGNALS, MAX_TERMS
-from beaver_ftc.compiled import kernel, record
+from beaver_ftc.compiled import fill, kernel, record
 
 ALPHA, BETA, AIRSPEED, QDYN, DPT = range(5)  # places in y; declared signals begin at the last
 N_Y = 4 + MAX_SIGNALS
@@ -44,11 +44,12 @@ def fill_table(
 ) -> None:
     """Write terms, sorted as `Aircraft.moments` are, into a record; `scale` multiplies single values."""
     scale = scale or {}
-    table["span"], table["chord"] = aircraft.geometry.span_m, aircraft.geometry.chord_m
-    table["n_declared"], table["n_terms"] = len(aircraft.signals), len(terms)
     of_terms = [_monomial(term, aircraft) for term in terms]
     chain = _chain(of_terms)
-    table["n_monomials"] = len(chain)
+    fill(
+        table, span=aircraft.geometry.span_m, chord=aircraft.geometry.chord_m, n_terms=len(terms),
+        n_declared=len(aircraft.signals), n_monomials=len(chain),
+    )  # fmt: skip
     for k, monomial in enumerate(chain[1:], start=1):
         table["parent"][k], table["factor"][k] = chain.index(monomial[:-1]), monomial[-1]
     for k, (term, monomial) in enumerate(zip(terms, of_terms, strict=True)):

@@ -36,7 +36,7 @@ import numpy as np
 from beaver_ftc.aircraft import AXES, MassProperties
 from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S
 from beaver_ftc.aircraft.schema import MAX_BOXES, MAX_LEVELS
-from beaver_ftc.compiled import kernel, record, sized
+from beaver_ftc.compiled import fill, kernel, record, sized
 from beaver_ftc.design import LEAST_HEIGHT_M
 from beaver_ftc.design.engine import DPT_0, KW_TO_DPT, density_ratio, power_error_kw
 from beaver_ftc.design.model import (
@@ -49,7 +49,6 @@ from beaver_ftc.design.model import (
 )
 from beaver_ftc.design.table import AIRSPEED, DPT, N_Y, QDYN, evaluate
 from beaver_ftc.diagnosis.error_map import fill_map, look_up_map, map_dtype
-from beaver_ftc.diagnosis.state import fill
 from beaver_ftc.plant.faults import OF_THE_SLIPSTREAM
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.sensors import ENGINE

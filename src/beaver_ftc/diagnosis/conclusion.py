@@ -11,10 +11,10 @@ the output of the diagnosis. No other file writes it.
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel, record, sized
+from beaver_ftc.compiled import fill, kernel, record, sized
 from beaver_ftc.diagnosis.detection import statistical
 from beaver_ftc.diagnosis.detection.fdae import fdae_unmodelled
-from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, WORST_CASE_DETECTOR, fill
+from beaver_ftc.diagnosis.state import NOT_ISOLATED, PITCH, WORST_CASE_DETECTOR
 from beaver_ftc.diagnosis.types import (
     GIVE_UP,
     SCALE_COMMAND,

@@ -22,9 +22,8 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.schema import MAX_AGES, MAX_BOXES, MAX_LEVELS
-from beaver_ftc.compiled import kernel, record, sized
+from beaver_ftc.compiled import fill, kernel, record, sized
 from beaver_ftc.design.table import AIRSPEED, N_Y, QDYN
-from beaver_ftc.diagnosis.state import fill
 
 UNMAPPED_ERROR_RAD_S2 = 1e6  # terms fitted near trim are off by thousands at 0.5 rad
 UNMAPPED_CN = 1e6

@@ -46,7 +46,7 @@ import numpy as np
 from beaver_ftc.aircraft import MassProperties
 from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S, FORCES, GRAVITY_MPS2
 from beaver_ftc.aircraft.schema import MAX_MONOMIALS
-from beaver_ftc.compiled import kernel, record
+from beaver_ftc.compiled import fill, kernel, record
 from beaver_ftc.design import SCALE_M, rotation_lengths
 from beaver_ftc.design.model import rate_damping
 from beaver_ftc.design.table import (
@@ -62,7 +62,6 @@ from beaver_ftc.design.table import (
 from beaver_ftc.diagnosis.bounds import least_height
 from beaver_ftc.diagnosis.deviations import flow_noise, gust_noise
 from beaver_ftc.diagnosis.monitors.redundancy import EARTH_M_S2
-from beaver_ftc.diagnosis.state import fill
 from beaver_ftc.plant.instruments import wrapped
 from beaver_ftc.scenario.declared import MASS_TOLERANCE, Declared, SensorErrors
 

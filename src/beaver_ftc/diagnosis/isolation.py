@@ -55,7 +55,7 @@ from math import exp
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.compiled import kernel, record, sized
+from beaver_ftc.compiled import fill, kernel, record, sized
 from beaver_ftc.diagnosis.detection import parity, statistical
 from beaver_ftc.diagnosis.detection.filters import (
     advance_bound,
@@ -75,7 +75,6 @@ from beaver_ftc.diagnosis.state import (
     POSITION_HYPOTHESIS,
     PUBLISHED_THRESHOLD,
     UNANTICIPATED,
-    fill,
 )
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.diagnosis import MAX_POLES

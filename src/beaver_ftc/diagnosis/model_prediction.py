@@ -11,13 +11,12 @@ sum over its n instants, the first of them under the old command.
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel, record, sized
+from beaver_ftc.compiled import fill, kernel, record, sized
 from beaver_ftc.design.actuators import actuators_dtype, move, move_ends
 from beaver_ftc.design.model import design_dtype, design_of, response
 from beaver_ftc.diagnosis.actuators import servo_data
 from beaver_ftc.diagnosis.bounds import fill_bound, n_gyro
 from beaver_ftc.diagnosis.error_map import extra_bound
-from beaver_ftc.diagnosis.state import fill
 from beaver_ftc.scenario.declared import Declared
 
 

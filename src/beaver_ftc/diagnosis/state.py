@@ -4,12 +4,11 @@ The number of a scheme decides which kernels fly: schemes/__init__.py.
 """
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft, main_surface_index_by_axis
-from beaver_ftc.compiled import record, sized
+from beaver_ftc.compiled import fill, record, sized
 from beaver_ftc.plugins import DETECTORS, is_compiled
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.diagnosis import FdiConfig
@@ -29,12 +28,6 @@ _SCHEMES = {"adaptive-estimators": ADAPTIVE_SCHEME, "zhang2005": PUBLISHED_SCHEM
 LOSS, POSITION_HYPOTHESIS = 0, 1  # kinds of hypothesis: isolation.py
 PITCH_GROUP, LATERAL_GROUP = 0, 1  # groups of surfaces
 ROLL, PITCH, YAW, SIDE_FORCE, NORMAL_FORCE = range(5)  # axes, and components of the force: forces.py
-
-
-def fill(record: np.void, **values: Any) -> None:
-    """Write these fields of a record."""
-    for name, value in values.items():
-        record[name] = value
 
 
 @sized

@@ -8,7 +8,7 @@ in the effectiveness in G and in who carries the demand: plugins.yaml says what 
 
 import numpy as np
 
-from beaver_ftc.compiled import apart, kernel, record, sized
+from beaver_ftc.compiled import apart, fill, kernel, record, sized
 from beaver_ftc.control import CompiledLaw, laws
 from beaver_ftc.control.allocation import set_demand
 from beaver_ftc.scenario.declared import Declared
@@ -27,7 +27,7 @@ def published_dtype(n: int) -> np.dtype:
 def configure(law: np.void, control: np.void, prediction: np.void, declared: Declared, y: np.ndarray) -> None:
     """Fill the gains (control.CompiledLaw)."""
     config = declared.control
-    law["config"]["Kp"], law["config"]["Ki"] = config.proportional_per_s, config.integral_per_s2
+    fill(law["config"], Kp=config.proportional_per_s, Ki=config.integral_per_s2)
 
 
 @apart

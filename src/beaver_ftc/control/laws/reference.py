@@ -13,7 +13,7 @@ would ratchet the attitude, so what is missed on one side is asked for on neithe
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel, record
+from beaver_ftc.compiled import fill, kernel, record
 from beaver_ftc.scenario.diagnosis import ControlConfig
 
 MISSED_RAD_S = 0.1  # a rate missed in all by this much: the reference is given up
@@ -32,10 +32,9 @@ REFERENCE = record(config=REFERENCE_CONFIG, memory=GOVERNOR, output=REFERENCE_OU
 
 def configure_reference(reference: np.void, config: ControlConfig, dt_s: float) -> None:
     """Fill the record (dtype REFERENCE) for frames of dt_s seconds."""
-    reference["config"]["dt"], reference["memory"]["scale"] = dt_s, 1.0
-    reference["config"]["A"], reference["config"]["B"] = discretise(
-        config.reference_natural_frequency_rad_s, config.reference_damping, dt_s
-    )
+    A, B = discretise(config.reference_natural_frequency_rad_s, config.reference_damping, dt_s)
+    fill(reference["config"], dt=dt_s, A=A, B=B)
+    reference["memory"]["scale"] = 1.0
 
 
 def discretise(wn: float, zeta: float, dt: float) -> tuple[np.ndarray, np.ndarray]:

@@ -24,7 +24,7 @@ from math import exp, hypot, sqrt
 import numpy as np
 
 from beaver_ftc.aircraft import AXES
-from beaver_ftc.compiled import apart, kernel, record, row_of, sized
+from beaver_ftc.compiled import apart, fill, kernel, record, row_of, sized
 from beaver_ftc.control import CompiledLaw, accommodation, allocation, laws
 from beaver_ftc.control.accommodation import approach, begin_frame, reported, start_of
 from beaver_ftc.control.laws.effectiveness_estimator import (
@@ -56,13 +56,18 @@ from beaver_ftc.scenario.sensors import RateGyro
 
 N_POINTS = 5  # of the schedule over dynamic pressure
 N_LOOPS = 4  # roll, pitch, yaw, and pitch by the surface that stands in
+STAND_IN = 3  # the last of them
+# How long a suspected surface stands at its stop until it is given up: one that another replaces, and others;
+# and after how long it is tried again
+PATIENCE_S, LONG_PATIENCE_S, RETRY_S = 0.5, 1.0, 20.0
 
 
 def configure(law: np.void, control: np.void, prediction: np.void, declared: Declared, y: np.ndarray) -> None:
-    """Derive the gains of a declaration into the law's configuration, and the leads (control.CompiledLaw).
+    """Derive the leads, and the gains of each loop at each point of the schedule (control.CompiledLaw).
 
-    y: the measured signals in trim. Of the noise that is allowed, `part` is what the surface of an axis may
-    have: the root of how much of its own damping the axis has, beside the most damped one.
+    y: the measured signals in trim. A gyro's noise may move a surface at this share of its rate limit:
+
+        noise_share sqrt(a / a_max)        a: own damping of the axis, 1/s; a_max: that of the most damped axis
     """
     config, wanted, layout = law["config"], declared.control, control["layout"]
     design, dt, share = prediction["design"], 1.0 / declared.rate_hz, 1.0 / declared.substeps
@@ -71,30 +76,27 @@ def configure(law: np.void, control: np.void, prediction: np.void, declared: Dec
     signals[:, AIRSPEED], signals[:, QDYN] = speeds_mps, y[QDYN] * (speeds_mps / y[AIRSPEED]) ** 2
     G = [control_effectiveness(design, each) for each in signals]
     whole = 1.0 - (1.0 - prediction["actuators"]["approach"]) ** declared.substeps
-    config["dt"], config["share"], config["qdyn"] = dt, share, signals[:, QDYN]
-    config["fading"], config["lead"] = derive_fading(dt), [lead_of(float(way)) for way in whole]
+    leads = [lead_of(float(way)) for way in whole]
+    fill(config, dt=dt, share=share, qdyn=signals[:, QDYN], fading=derive_fading(dt), lead=leads)
     carriers = [(axis, int(s)) for axis, s in enumerate(layout["main"])]
     if layout["stand_in"] >= 0:
         carriers.append((PITCH, int(layout["stand_in"])))
     a = np.abs(own_damping(design, y))
     part = {s: sqrt(a[axis] / a.max()) for axis, s in carriers}
     limits_rad_s = servo_data(declared)["rate_limit_rad_s"]
+    margin = wanted.gain_margin_db, wanted.phase_margin_deg
     for row, (axis, s) in enumerate(carriers):
         gyro: RateGyro = getattr(declared.instruments, AXES[axis])
         noise, _, quantum = gyro.noise_bias_quantum
+        noise_rad_s = hypot(noise, quantum / sqrt(12.0))
         keep = exp(-gyro.bandwidth_rad_s * dt) if gyro.bandwidth_rad_s else 0.0
         loop = Loop(dt, share, float(whole[s]), config["lead"][s], gyro.delay_s, keep)
         speed_rad_s = wanted.noise_share * part[s] * float(limits_rad_s[s] or DEFAULT_RATE_RAD_S)
-        margin = wanted.gain_margin_db, wanted.phase_margin_deg
         for j in range(N_POINTS):
-            noise_rad_s = hypot(noise, quantum / sqrt(12.0))
             Kp = fastest(loop, margin, noise_rad_s, float(G[j][axis, s]), speed_rad_s)
             config["Kp_at"][row, j] = Kp
             config["L_rate_at"][row, j], config["L_disturbance_at"][row, j] = corrections(Kp, dt)
 
-
-STAND_IN = 3  # the loop of pitch by the surface that stands in
-PATIENCE_S, LONG_PATIENCE_S, RETRY_S = 0.5, 1.0, 20.0
 
 # begun: whether rate (3,) rad/s and disturbance (3,) rad/s2 are estimates; a change of law keeps it.
 OBSERVER = record(begun=int, rate=3, disturbance=3)

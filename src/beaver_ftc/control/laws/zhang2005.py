@@ -16,7 +16,7 @@ isolated (accommodation.py, allocation.py); the structure of the law stays.
 
 import numpy as np
 
-from beaver_ftc.compiled import apart, kernel, record, sized
+from beaver_ftc.compiled import apart, fill, kernel, record, sized
 from beaver_ftc.control import CompiledLaw
 from beaver_ftc.control.accommodation import begin_frame
 from beaver_ftc.control.laws import published
@@ -44,22 +44,22 @@ def zhang2005_dtype(n: int) -> np.dtype:
 
 def configure(law: np.void, control: np.void, prediction: np.void, declared: Declared, y: np.ndarray) -> None:
     """Fill the law's configuration (control.CompiledLaw)."""
-    settled, config = declared.control, law["config"]
+    settled = declared.control
     option = settings(LAWS, settled.law, settled.options)
     published.configure(law["feedback"], control, prediction, declared, y)
     if not option["hand_over"]:
         control["config"]["reallocates"] = 0
-    config["adapts"], config["networks"] = option["adaptation"], option["network"]
-    config["gain"] = option["parametric_gain"]
     Kp, Ki = settled.proportional_per_s, settled.integral_per_s2
-    config["integral_weight"] = Kp / (option["rate_weight"] * Ki + 1.0)
-    limit = option["network_limit_rad_s2"] if option["projection"] else np.inf
+    projects = option["projection"]
+    fill(
+        law["config"], adapts=option["adaptation"], networks=option["network"],
+        gain=option["parametric_gain"], integral_weight=Kp / (option["rate_weight"] * Ki + 1.0),
+        least=settled.least_effectiveness if projects else -np.inf, most=1.0 if projects else np.inf,
+    )  # fmt: skip
+    limit = option["network_limit_rad_s2"] if projects else np.inf
     layout = control["layout"]
     travel = np.array([layout["low"], layout["high"]])[:, layout["main"]]
     configure_network(law["network"], option["network_gain"], limit, travel)
-    config["least"], config["most"] = -np.inf, np.inf
-    if option["projection"]:
-        config["least"], config["most"] = settled.least_effectiveness, 1.0
 
 
 @apart

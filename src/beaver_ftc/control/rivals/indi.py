@@ -17,6 +17,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from beaver_ftc.compiled import fill
 from beaver_ftc.control.rivals.kernel_law import GAINS, KernelLaw
 
 
@@ -28,8 +29,10 @@ class IncrementalInversion(KernelLaw):
 
     def compile_into(self, law: np.void) -> None:
         """Fill gains and filters; the filter of G u0 begins with what the leading surfaces give in trim."""
-        config, option, context = law["config"], self.option, self.context
-        config["incremental"], config["keep"] = 1, exp(-option["filter_per_s"] * context.dt_s)
-        config["Kp"], config["Ki"] = option["proportional_per_s"], option["integral_per_s2"]
+        option, context = self.option, self.context
+        fill(
+            law["config"], incremental=1, keep=exp(-option["filter_per_s"] * context.dt_s),
+            Kp=option["proportional_per_s"], Ki=option["integral_per_s2"],
+        )  # fmt: skip
         given = context.model.G(context.trim_y) * context.trim_rad
         law["memory"]["surface_filter"] = given[:, list(context.leading)].sum(axis=1)

@@ -11,6 +11,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from beaver_ftc.compiled import fill
 from beaver_ftc.control.rivals.kernel_law import KernelLaw
 from beaver_ftc.design.context import Context
 
@@ -33,15 +34,15 @@ class FixedGainLqr(KernelLaw):
 
     def compile_into(self, law: np.void) -> None:
         """Linearise about the trim and solve for the gains, once."""
-        config, option, dt = law["config"], self.option, self.context.dt_s
+        option, dt = self.option, self.context.dt_s
         A, B = linearised(self.context)
         z_A = np.block([[np.eye(3) + dt * A, np.zeros((3, 3))], [dt * np.eye(3), np.eye(3)]])
         z_B = np.vstack((dt * B, np.zeros((3, 3))))
         acceptable = [option["error_deg_s"]] * 3 + [option["integral_deg"]] * 3
         Q = np.diag(1.0 / np.radians(acceptable) ** 2)
         R = np.eye(3) / np.radians(option["deflection_deg"]) ** 2
-        config["K"], config["A"], config["B_inverse"] = gains(z_A, z_B, Q, R), A, np.linalg.inv(B)
-        config["trim_x"] = self.context.trim_x
+        K = gains(z_A, z_B, Q, R)
+        fill(law["config"], K=K, A=A, B_inverse=np.linalg.inv(B), trim_x=self.context.trim_x)
 
 
 def linearised(context: Context) -> tuple[np.ndarray, np.ndarray]:

@@ -49,7 +49,7 @@ from math import exp, sqrt
 import numpy as np
 
 from beaver_ftc.aircraft import AXES
-from beaver_ftc.compiled import kernel, record, sized
+from beaver_ftc.compiled import fill, kernel, record, sized
 from beaver_ftc.diagnosis.detection.filters import leak
 from beaver_ftc.diagnosis.detection.likelihood import (
     DRIFT_PRIOR_RAD_S2,
@@ -57,7 +57,7 @@ from beaver_ftc.diagnosis.detection.likelihood import (
     PITCH_BLOCK,
     BlockCapacity,
 )
-from beaver_ftc.diagnosis.state import LOSS, fill
+from beaver_ftc.diagnosis.state import LOSS
 from beaver_ftc.scenario.declared import SensorErrors
 
 ANGLES = ("phi", "theta", "psi")

@@ -22,10 +22,9 @@ from math import exp
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel, record, row_of
+from beaver_ftc.compiled import fill, kernel, record, row_of
 from beaver_ftc.diagnosis.detection.directions import project
 from beaver_ftc.diagnosis.detection.filters import advance_bound
-from beaver_ftc.diagnosis.state import fill
 from beaver_ftc.scenario.declared import Declared
 
 # Centres of the network's basis functions, rad; and its record. gain 1/s2, w_max rad/s2; output fhat, rad/s2.

@@ -10,6 +10,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.schema import MAX_TERMS_OF_ONE
+from beaver_ftc.compiled import fill
 from beaver_ftc.diagnosis.detection import likelihood
 from beaver_ftc.diagnosis.detection.forces import (
     FORCE_NAMES,
@@ -28,7 +29,7 @@ from beaver_ftc.diagnosis.detection.likelihood import (
 from beaver_ftc.diagnosis.detection.parity import AXIS_VIEW, VANE_VIEW, StatisticalSize
 from beaver_ftc.diagnosis.detection.rows import INERTIAL, RAW, VANED, VANELESS, set_columns
 from beaver_ftc.diagnosis.deviations import moment_axis
-from beaver_ftc.diagnosis.state import LOSS, NORMAL_FORCE, PITCH, ROLL, SIDE_FORCE, YAW, fill
+from beaver_ftc.diagnosis.state import LOSS, NORMAL_FORCE, PITCH, ROLL, SIDE_FORCE, YAW
 
 PITCH_PLANE = (PITCH, NORMAL_FORCE)
 ROLL_YAW_PLANE = (ROLL, YAW)

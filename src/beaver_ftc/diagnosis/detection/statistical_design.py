@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from beaver_ftc.aircraft import AXES, Aircraft, MassProperties
+from beaver_ftc.compiled import fill
 from beaver_ftc.design import rotation_lengths
 from beaver_ftc.design.model import jacobian
 from beaver_ftc.design.table import AIRSPEED, ALPHA, BETA, QDYN
@@ -44,7 +45,7 @@ from beaver_ftc.diagnosis.gusts import (
     configure_gust,
     configure_gust_speed,
 )
-from beaver_ftc.diagnosis.state import LOSS, PITCH, SIDE_FORCE, fill
+from beaver_ftc.diagnosis.state import LOSS, PITCH, SIDE_FORCE
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.diagnosis import Statistical
 

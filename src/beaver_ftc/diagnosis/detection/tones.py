@@ -28,10 +28,9 @@ from math import exp, pi, sqrt
 
 import numpy as np
 
-from beaver_ftc.compiled import kernel, record, sized
+from beaver_ftc.compiled import fill, kernel, record, sized
 from beaver_ftc.design.table import AIRSPEED, ALPHA, BETA
 from beaver_ftc.diagnosis.detection.likelihood import evidence_ratio
-from beaver_ftc.diagnosis.state import fill
 
 N_TONES = 16
 # A memory of T s resolves frequencies 1 / T apart. A tone halfway between two frequencies of the grid appears

@@ -20,9 +20,8 @@ cause that. The monitor detects neither a failed engine on the centre line nor e
 import numpy as np
 
 from beaver_ftc.aircraft import Aircraft
-from beaver_ftc.compiled import kernel, record
+from beaver_ftc.compiled import fill, kernel, record
 from beaver_ftc.design.table import DPT
-from beaver_ftc.diagnosis.state import fill
 
 THRUST_SIGNAL, YAW_SIGNAL = "thrust", "engines_n"  # signals: CT and Cn
 MAX_OFFSET_M = 0.05  # of the centre of gravity to one side, by fuel

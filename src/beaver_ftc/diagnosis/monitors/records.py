@@ -9,7 +9,7 @@ from typing import Any, cast
 import numpy as np
 
 from beaver_ftc.aircraft.aircraft import EARTH_RADIUS_M, GRAVITY_MPS2
-from beaver_ftc.compiled import record
+from beaver_ftc.compiled import fill, record
 from beaver_ftc.design import Dryden
 from beaver_ftc.design.model import DesignFunctions
 from beaver_ftc.diagnosis.bounds import GUST_LIMIT_SIGMA
@@ -18,7 +18,6 @@ from beaver_ftc.diagnosis.monitors.initial_errors import INITIAL_RECORD
 from beaver_ftc.diagnosis.monitors.numbering import FILTER_POLES_PER_S, NO_SENSOR
 from beaver_ftc.diagnosis.monitors.redundancy import TEST_FIELDS
 from beaver_ftc.diagnosis.monitors.sensor_monitor import ISOLATION_FIELDS, N_FROZEN_NEVER
-from beaver_ftc.diagnosis.state import fill
 from beaver_ftc.plant.instruments import (
     ENGINE_SPEED,
     MANIFOLD,

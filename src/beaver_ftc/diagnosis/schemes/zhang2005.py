@@ -19,7 +19,7 @@ part.
 
 import numpy as np
 
-from beaver_ftc.compiled import apart, kernel, record
+from beaver_ftc.compiled import apart, fill, kernel, record
 from beaver_ftc.diagnosis import conclusion
 from beaver_ftc.diagnosis.detection.fdae import advance_fdae, fdae_residual
 from beaver_ftc.diagnosis.detection.state_network import (
@@ -30,7 +30,7 @@ from beaver_ftc.diagnosis.detection.state_network import (
 )
 from beaver_ftc.diagnosis.monitors import sensor_monitor
 from beaver_ftc.diagnosis.schemes import adaptive_estimators
-from beaver_ftc.diagnosis.state import CONSTANT_THRESHOLD, fill
+from beaver_ftc.diagnosis.state import CONSTANT_THRESHOLD
 from beaver_ftc.plugins import DETECTORS, settings
 from beaver_ftc.scenario.declared import Declared
 

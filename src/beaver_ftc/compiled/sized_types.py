@@ -134,6 +134,7 @@ _register_struct(
 
 
 def _struct(context: Any, builder: Any, kind: Any, value: Any = None) -> Any:
+    """The members of a value of this kind; without a value, members to be filled."""
     return cgutils.create_struct_proxy(kind)(context, builder, value=value)
 
 
@@ -154,6 +155,8 @@ class _Fields(AttributeTemplate):
 
 @lower_getattr_generic(SizedRecord)
 def _get(context: Any, builder: Any, kind: Any, value: Any, name: str) -> Any:
+    """A field: by Numba's own means if it is the same in all sizes; else a record, records or an array that
+    begins, and is as long, as the places say."""
     record, found = _struct(context, builder, kind, value), kind.part(name)
     if found is None:
         fixed = fixed_part(kind)
@@ -174,6 +177,7 @@ def _get(context: Any, builder: Any, kind: Any, value: Any, name: str) -> Any:
 
 
 def _sizes(builder: Any, record: Any, part: Part, k: int) -> Iterator[Any]:
+    """The sizes of an array: those that are given, and from place k on those that are not."""
     for size in part.dims:
         yield _place(builder, record, k) if size is None else WORD(size)
         k += size is None
@@ -196,6 +200,7 @@ def _array(context: Any, builder: Any, kind: Any, memory: Any, sizes: list[Any])
 
 @lower_setattr_generic(SizedRecord)
 def _set(context: Any, builder: Any, sig: Any, args: Any, name: str) -> None:
+    """Assign to a field that is the same in all sizes."""
     kind, given = sig.args
     fixed = fixed_part(kind)
     if name not in fixed.fields:
@@ -207,6 +212,7 @@ def _set(context: Any, builder: Any, sig: Any, args: Any, name: str) -> None:
 
 
 def _at(context: Any, builder: Any, kind: Any, records: Any, i: Any) -> Any:
+    """Record i of records; kind: their type."""
     record = _struct(context, builder, SizedRecord(kind.shape))
     record.memory = builder.gep(records.memory, [builder.mul(i, records.apart)], inbounds=True)
     record.places = records.places
@@ -215,6 +221,8 @@ def _at(context: Any, builder: Any, kind: Any, records: Any, i: Any) -> Any:
 
 @intrinsic
 def _record_at(typingctx: Any, records: Any, i: Any) -> Any:
+    """records[i]; i is not negative."""
+
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         return _at(context, builder, records, _struct(context, builder, records, args[0]), args[1])
 
@@ -223,6 +231,8 @@ def _record_at(typingctx: Any, records: Any, i: Any) -> Any:
 
 @intrinsic
 def _some_of(typingctx: Any, records: Any, first: Any, count: Any) -> Any:
+    """records[first : first + count]."""
+
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         some = _struct(context, builder, records, args[0])
         some.memory = builder.gep(some.memory, [builder.mul(args[1], some.apart)], inbounds=True)
@@ -234,6 +244,8 @@ def _some_of(typingctx: Any, records: Any, first: Any, count: Any) -> Any:
 
 @intrinsic
 def _count(typingctx: Any, records: Any) -> Any:
+    """How many records there are."""
+
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         return _struct(context, builder, records, args[0]).count
 
@@ -272,6 +284,7 @@ def _slice(records, index):
 
 @lower_builtin("getiter", SizedRecords)
 def _iterator(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    """iter(records): at the first."""
     iterator = _struct(context, builder, sig.return_type)
     iterator.next = cgutils.alloca_once_value(builder, context.get_constant(types.intp, 0))
     iterator.records = args[0]
@@ -281,6 +294,7 @@ def _iterator(context: Any, builder: Any, sig: Any, args: Any) -> Any:
 @lower_builtin("iternext", SizedRecordsIterator)
 @iternext_impl(RefType.BORROWED)
 def _next(context: Any, builder: Any, sig: Any, args: Any, result: Any) -> None:
+    """The next record, unless the last one was given before."""
     (kind,) = sig.args
     iterator, of = _struct(context, builder, kind, args[0]), SizedRecords(kind.shape)
     records = _struct(context, builder, of, iterator.records)
@@ -340,6 +354,7 @@ def held_value(builder: Any, kind: Any, make: Callable[[], Any]) -> Any:
 
 @unbox(SizedRecord)
 def _unbox_record(kind: Any, given: Any, c: Any) -> NativeValue:
+    """A record from Python: its memory, which stays Python's, and its places."""
     record, buffer = _struct(c.context, c.builder, kind), c.pyapi.alloca_buffer()
     record.memory = c.pyapi.extract_record_data(given, buffer)
     no_data = cgutils.is_null(c.builder, record.memory)
@@ -353,6 +368,7 @@ def _unbox_record(kind: Any, given: Any, c: Any) -> NativeValue:
 
 @unbox(SizedRecords)
 def _unbox_records(kind: Any, given: Any, c: Any) -> NativeValue:
+    """A row of records from Python, kept alive for as long as the call lasts."""
     records = _struct(c.context, c.builder, kind)
     builder = c.builder
     bytes_of = types.Array(types.uint8, 1, "A")

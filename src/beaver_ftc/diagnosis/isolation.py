@@ -294,8 +294,8 @@ def configure_isolation(
     # The range of a position contains 0, because a surface that has lost effectiveness acts nearer to 0.
     ends = np.array([np.minimum(travel[0], 0.0), np.maximum(travel[1], 0.0)])
     for fie, (_, kind, s) in zip(iso["estimator"], rows, strict=False):
-        fie["hypothesis_kind"], fie["surface"] = kind, s
-        fie["theta_min"], fie["theta_max"] = LOSS_RANGE if kind == LOSS else ends[:, s]
+        lo, hi = LOSS_RANGE if kind == LOSS else ends[:, s]
+        fill(fie, hypothesis_kind=kind, surface=s, theta_min=lo, theta_max=hi)
         if config.pairs:  # each plane by itself: pitch by its two surfaces, roll and yaw by theirs
             fie["skip"] = (1, 0, 1) if aircraft.dominant_axis[s] == PITCH else (0, 1, 0)
     # Damage is not in the fault class. If the aircraft declares damage and likelihood ratios exclude faults,

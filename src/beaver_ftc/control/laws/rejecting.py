@@ -67,7 +67,7 @@ def configure(law: np.void, control: np.void, prediction: np.void, declared: Dec
 
     y: the measured signals in trim. A gyro's noise may move a surface at this share of its rate limit:
 
-        noise_share sqrt(a / a_max)        a: own damping of the axis, 1/s; a_max: that of the most damped axis
+        noise_share sqrt(a / a_max)        a: own damping of the axis, 1/s; a_max: of the most damped
     """
     config, wanted, layout = law["config"], declared.control, control["layout"]
     design, dt, share = prediction["design"], 1.0 / declared.rate_hz, 1.0 / declared.substeps

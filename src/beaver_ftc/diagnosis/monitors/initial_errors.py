@@ -229,25 +229,33 @@ def in_plane(z, v):
 def fill_effects(mon, y_now):
     """Fill H (N_INITIAL, RPM_TEST) and C, taken at the sample before, y, from which y_now is predicted.
 
-    h2: h and the second order in h. A, n: bound on |a| in the step, and over V; G: gravity; P: |(p, r)|; each
-    times h2. ct, sb, cb: sines and cosines of theta, beta; d: the vertical; sec: 1 / cos(beta) by its
-    reading; secs: times the largest if beta is off. x: the error of the hypothesis.
+    H      SPEED      ALPHA_FLOW                 BETA_FLOW            DENSITY    CLIMB
+    V      0          sec n                      sec n                |density|  climb
+    alpha  A          sec (n + P_h sb)           P_h + n sb           0          vert = h V cb |vertical|
+    beta   A          secs (h2 |rate.real| + n)  n                    0          h V |(vertical.real, d_y)|
+    phi    G across   sec G ct / V               sec G ct / V         0          h V across
+    theta  G          sec G / V                  G (s_phi + sb) / V   0          h V
 
-    alpha off    V' = a . v / V, the direction of v is turned by alpha and changes by x at most; in alpha'
-                 (a_z, a_x) / (V cos(beta)) and tan(beta) (p, r) are turned by alpha, in beta' (p, r) and
-                 sin(beta) (a_x, a_z) / V; in altitude' (cos(alpha), sin(alpha)), times V cos(beta), along
-                 (sin(theta), -cos(phi) cos(theta))
-    beta off     V' likewise; in alpha' tangents, and secants, of reading and truth differ by x over both
-                 cosines; in beta' a is turned by beta; in altitude' (cos(beta), -sin(beta)), times V
-    V off        in alpha', beta' a / truth = (1 + x) a / reading; the true climb is the predicted one over
-                 1 + x, which differ by x / (1 + x) of the latter; log V changes by (1 + x) times the change
-                 of the reading's logarithm: the density, with -2 log V, by x times twice that
-    phi off      a has the error x g cos(theta) across the body's first axis. V' takes its part along v, of
-                 which |(sin(beta), sin(alpha) cos(beta))| lies there; alpha' and beta' take at most all of
-                 it. The vertical's part cos(theta) is turned, against the part of v across the first axis
-    theta off    a has the error x g, in the plane of the body's first axis and the vertical. V' and alpha'
-                 take at most all of it, beta' the part sin(phi) along the second axis, and sin(beta) of the
-                 rest. The vertical is turned, against v
+    h2: h and the second order in h. A, n: bound on |a| in the step, and over V; G: gravity; P_h: |(p, r)|;
+    each times h2. ct, cb: cosines of theta and beta; sb, s_phi: sizes of the sines of beta and phi; d: the
+    vertical; rate, vertical, acc: `in_plane` of (p, q, r), d and a. sec: 1 / cos(beta) by its reading; secs:
+    that times the largest if beta is off. Why, with x the error of the hypothesis:
+
+    V        in alpha', beta' a / truth = (1 + x) a / reading. The true climb is the predicted one over 1 + x,
+             which differ by x / (1 + x) of the latter. log V changes by (1 + x) times the change of the
+             reading's logarithm: the density, with -2 log V, by x times twice that
+    alpha    in V' = a . v / V the direction of v is turned by alpha, and changes by x at most. In alpha'
+             (a_z, a_x) / (V cos(beta)) and tan(beta) (p, r) are turned by alpha, in beta' (p, r) and
+             sin(beta) (a_x, a_z) / V. In altitude' (cos(alpha), sin(alpha)), times V cos(beta), is turned
+             along (sin(theta), -cos(phi) cos(theta))
+    beta     V' likewise. In alpha' tangents, and secants, of reading and truth differ by x over both cosines.
+             In beta' a is turned by beta, in altitude' (cos(beta), -sin(beta)), times V
+    phi      a has the error x g cos(theta) across the body's first axis. V' takes its part along v: the share
+             of v there is |(sin(beta), sin(alpha) cos(beta))|, which times ct is `across`. alpha' and beta'
+             take at most all of it. In altitude' the vertical's part cos(theta) is turned, against `across`
+    theta    a has the error x g, in the plane of the body's first axis and the vertical. V' and alpha' take
+             at most all of it, beta' the part sin(phi) along the second axis, and sin(beta) of the rest. In
+             altitude' the vertical is turned, against v
     """
     h, g, e, H, y, a = mon.h, mon.g, mon.initial.E, mon.initial.H, mon.y_past, mon.a
     V, ct, side, z, d = speed(y), np.cos(y[THETA]), unit(y[I_BETA]), unit(y[I_ALPHA]), down(y)
@@ -264,7 +272,6 @@ def fill_effects(mon, y_now):
     climb = abs(mon.y_pred[ALTITUDE] - y[ALTITUDE]) / slower
     density = 2.0 * np.log(speed(y_now) / V)
     fill_attitude_effects(mon, y, turn, (h * w) ** 2)
-    # By hypothesis: V, alpha, beta, phi, theta
     by_beta, by_phi, by_theta = secs * (h2 * abs(rate.real) + n), sec * G * ct / V, sec * G / V
     H[:, SPEED_TEST] = 0.0, A, A, G * across, G
     H[:, ALPHA_TEST] = sec * n, sec * (n + P_h * sb), by_beta, by_phi, by_theta
@@ -279,20 +286,20 @@ def fill_effects(mon, y_now):
     # tan(gamma) = tan(theta) / cos(phi). The sines of reading and truth differ by x cos(mean of gamma -
     # alpha)
     path = abs(np.angle(complex(-vertical.imag, vertical.real))) + 0.5 * angle_of_chord(e[H_ALPHA])
-    # phi: (q, r), and gravity g cos(theta) (sin(phi), cos(phi)) across the first axis, are turned by it.
-    # alpha off by e: beta' changes by x (roll cos(e / 2) + yaw sin(e / 2)). beta off by e: alpha' changes by
-    # x cos(e / 2) roll over both cosines. The part of the force in both, of either sign, comes last
+    # In the order of EVIDENCE. alpha off by e: beta' changes by x (rate.real cos(e / 2) + rate.imag
+    # sin(e / 2)). beta off by e: alpha' changes by x cos(e / 2) rate.real over both cosines
     mon.initial.C[:] = (
-        h * vector(y)[1],
-        h * g * d[1],
-        h * complex(turn.imag),
-        h * g * complex(np.cos(mean)),
-        h * rate,
-        h * complex(rate.real),
-        vert * complex(np.cos(min(path, 0.5 * np.pi))),
-        -h * complex(acc.imag) * sec / V,
-        h * complex(a[1].real * cb - acc.real * side.imag) / V,
-        complex(density),
+        h * vector(y)[1],  # phi turns (q, r)
+        h * g * d[1],  # phi turns the part of gravity across the first axis
+        h * complex(turn.imag),  # theta turns the vertical, about which the aircraft turns at psi'
+        h * g * complex(np.cos(mean)),  # theta turns gravity
+        h * rate,  # alpha in BETA_FLOW
+        h * complex(rate.real),  # beta in ALPHA_FLOW
+        vert * complex(np.cos(min(path, 0.5 * np.pi))),  # alpha in CLIMB
+        -h * complex(acc.imag) * sec / V,  # V in ALPHA_FLOW
+        h * complex(a[1].real * cb - acc.real * side.imag) / V,  # V in BETA_FLOW
+        complex(density),  # V in DENSITY
+        # the part of the force, of either sign: in that of alpha in BETA_FLOW, of beta in ALPHA_FLOW
         h * complex(sb) * a_max / V,
         h * complex(np.sin(min(beta_max, 0.5 * np.pi)) * abs(acc.imag)) * secs / V,
     )

@@ -36,8 +36,8 @@ TunedValuesByGrade = dict[str, Any]  # grade -> "detectors" or "laws" -> method 
 @cache
 def load_tuned_values() -> TunedValuesByGrade:
     """The values that `beaver-ftc compare --tune` chose, as shipped."""
-    tuned_values_by_grade: TunedValuesByGrade = json.loads(TUNED_FILE.read_text(encoding="utf-8"))["grades"]
-    return tuned_values_by_grade
+    grades: TunedValuesByGrade = json.loads(TUNED_FILE.read_text(encoding="utf-8"))["grades"]
+    return grades
 
 
 def flight_grade(has_sensor_or_air_errors: bool, has_ideal_actuators: bool) -> str:
@@ -48,16 +48,12 @@ def flight_grade(has_sensor_or_air_errors: bool, has_ideal_actuators: bool) -> s
     return EXACT_GRADE if has_ideal_actuators else LAGGING_ACTUATORS_GRADE
 
 
-def tuned_values(
-    tuned_values_by_grade: TunedValuesByGrade, grade: str, plugin_group: str, method_name: str
-) -> dict[str, float]:
-    """The values chosen for a method on a grade of flights; none if nothing was chosen there."""
-    tuned_value_by_option: dict[str, float] = (
-        tuned_values_by_grade.get(grade, {})
-        .get(TUNED_FILE_KEY_BY_PLUGIN_GROUP[plugin_group], {})
-        .get(method_name, {})
-    )
-    return tuned_value_by_option
+def tuned_values(grades: TunedValuesByGrade, grade: str, group: str, name: str) -> dict[str, float]:
+    """The values chosen for a method, of a group of plug-ins, on a grade of flights; none if nothing was
+    chosen there."""
+    of_group = grades.get(grade, {}).get(TUNED_FILE_KEY_BY_PLUGIN_GROUP[group], {})
+    values: dict[str, float] = of_group.get(name, {})
+    return values
 
 
 def rival_options(name: str, defaults: Mapping[str, float], context: Context) -> dict[str, float]:
@@ -65,14 +61,12 @@ def rival_options(name: str, defaults: Mapping[str, float], context: Context) ->
 
     The last one counts. Raises BadInput for one it does not have.
     """
-    for option_name in context.options:
-        if option_name not in defaults:
-            raise BadInput(
-                f"{name}: options.{option_name}: unknown option{suggestion(option_name, defaults)}"
-            )
+    for option in context.options:
+        if option not in defaults:
+            raise BadInput(f"{name}: options.{option}: unknown option{suggestion(option, defaults)}")
     declared, options = context.declared, dict(defaults)
     has_ideal_actuators = not declared.bandwidth_rad_s.any() and not declared.rate_limit_rad_s.any()
     grade = flight_grade(declared.noisy, has_ideal_actuators)
-    for plugin_group in TUNED_FILE_KEY_BY_PLUGIN_GROUP:
-        options |= tuned_values(load_tuned_values(), grade, plugin_group, name)
+    for group in TUNED_FILE_KEY_BY_PLUGIN_GROUP:
+        options |= tuned_values(load_tuned_values(), grade, group, name)
     return {**options, **context.options}

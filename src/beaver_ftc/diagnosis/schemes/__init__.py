@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from beaver_ftc.compiled import apart, kernel, record, sized
+from beaver_ftc.compiled import apart, fill, kernel, record, sized
 from beaver_ftc.diagnosis import bounds, isolation, state
 from beaver_ftc.diagnosis import conclusion as conclusions
 from beaver_ftc.diagnosis.bounds import bound_dtype
@@ -84,7 +84,7 @@ def prepare_takeover(fdi: np.void, earlier: np.void, in_flight: bool) -> None:
         fdi["bank"]["output"]["peak"] = earlier["bank"]["output"]["peak"]
     for name in ("gust", "vaneless", "vaned"):
         memory = fdi["statistical"][name]["memory"]
-        state.fill(memory, turn_past=in_flight, start_share=in_flight, start_left=in_flight)
+        fill(memory, turn_past=in_flight, start_share=in_flight, start_left=in_flight)
     fdi["sensor_monitor"]["substep"] = 0
 
 

@@ -16,6 +16,7 @@ from beaver_ftc.diagnosis.types import (
     SUBTRACT_OFFSET,
     DeflectionRelation,
     FaultType,
+    clip_travel,
     feasible_set,
     middle_estimate,
     set_middle,
@@ -57,20 +58,17 @@ def neutral_of(lo: float, hi: float) -> float:
     return min(max(0.0, lo), hi)
 
 
-_neutral_of = kernel(neutral_of)
-
-
 @kernel
 def float_range(c, srf, h, k):
     """At neutral, or at the stop that is nearest to it, rad."""
-    p = _neutral_of(*travel_range(srf, h))
+    p = clip_travel(srf, 0.0)
     return p, p
 
 
 @kernel
 def float_error(srf, h):
     """Neutral position minus the command, rad."""
-    return _neutral_of(*travel_range(srf, h)) - srf.last.u
+    return clip_travel(srf, 0.0) - srf.last.u
 
 
 def float_deflection(fdi: np.void, s: int, h: int) -> float | None:

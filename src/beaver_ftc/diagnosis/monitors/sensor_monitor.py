@@ -117,42 +117,40 @@ from beaver_ftc.plant.instruments import (
 )
 from beaver_ftc.scenario.sensors import ROWS
 
-# Accelerometers or flow sensor
-JUMP_WINDOW_S = 1.0  # after the alarm: later, a jump by chance is too likely
+# Accelerometers or flow sensor (clear_sensors)
+JUMP_WINDOW_S = 1.0  # a jump counts within this time after the alarm: later, one by chance is too likely
 JUMP_MEMORY_S = 2.0  # time constant with which the largest jump of an accelerometer fades
-MIN_JUMP_SHARE = 0.5  # of the residual, by which the flow sensor's own reading jumps, at least
-MIN_SUM_RATIO = 30.0  # ratio; a scale error within 3 % of -1 gives so much
-# An effect that a sensor's error would have clears the sensor only beyond so many times the bound on it
-CLEAR_FACTOR = 3.0
-# of the spurious velocity, along the axis of a suspected accelerometer
-MIN_AXIS_SHARE = 0.5
+MIN_JUMP_SHARE = 0.5  # the flow sensor's own reading jumps by at least this share of the residual
+# Least ratio of summed residuals to the range of the reading: a scale error within 3 % of -1 gives so much
+MIN_SUM_RATIO = 30.0
+CLEAR_FACTOR = 3.0  # an effect clears a sensor only beyond so many times the bound on it
+MIN_AXIS_SHARE = 0.5  # least share of the spurious velocity along the axis of a suspected accelerometer
 TIME_ROUNDING_S = 1e-9
 
-# A smaller share of the largest of three residuals is the effect of its error on the two other axes or angles
+# A residual below this share of the largest of the three axes, or angles, is taken for its coupling
 COUPLING_SHARE = 0.03
 # stage: 1 after the first sample and while the pitch is too steep, 2 with the first whole frame, 3 from
 # the next frame on: only then the innovation contains the change of a gyro's error between two frames
 FULL_STAGE = 3
-MIN_LEAD_S = 0.5  # before the alarm: a surface detected earlier was detected with sound sensors
+MIN_LEAD_S = 0.5  # a surface detected this long before the alarm was detected with sound sensors
 N_FROZEN_NEVER = 1_000_000_000  # JSBSim frames: a sound reading may repeat, if its steps exceed its noise
-INITIAL_WINDOW_S = 1.0  # from the start: an alarm of the surfaces may be caused by an initial error
-VANE_RETURN_S = 20.0  # of the return to trim of a replaced vane: kinematics alone drift
-# index in FILTER_POLES_PER_S: of the filter that gives the first value of a replaced rate
-RATE_POLE = 1
+INITIAL_WINDOW_S = 1.0  # an alarm of the surfaces within this time from the start may be an initial error's
+VANE_RETURN_S = 20.0  # time constant with which a replaced vane returns to trim: kinematics alone drift
+RATE_POLE = 1  # index in FILTER_POLES_PER_S of the filter that gives the first value of a replaced rate
 
 # Gyro or attitude (judge_gyros)
 GYRO_OPEN, GYRO_CONFIRMED, GYRO_REFUTED = 0, 1, 2  # verdicts of a gyro
-# innovation, rad/s2, that an error of 1 rad/s of the gyro itself causes, at most
-MAX_DYNAMICS_PER_S = 10.0
+MAX_DYNAMICS_PER_S = 10.0  # largest innovation, rad/s2, by 1 rad/s of a gyro's error itself
 JUMP_TOLERANCE = 0.1  # share of a gyro's jump by which the innovation may differ from it
-MIN_ESTIMATED_SHARE = 0.7  # of a gyro's error, which w shows
+MIN_ESTIMATED_SHARE = 0.7  # w shows at least this share of a gyro's error
 SAMPLES_IN_JUMP = 4.0  # a jump is the difference of two residuals, each with the noise of two samples
-MIN_TRANSIENT = 2.0  # of the size of a transient to the bound on noise: else noise may be all of it
-TRANSIENT_LEFT = 0.003  # of a jump of the attitude within a frame, in the next frame
+MIN_TRANSIENT = 2.0  # least size of a transient over the bound on noise: noise may be all of a smaller one
+TRANSIENT_LEFT = 0.003  # largest share of a transient that is left in the next frame
 RATE_ROUNDING = 1e-6  # rad/s, and rad/s2: the part of the bounds that covers rounding
 
-# Errors that a test within its bound B hides: the effect of sound sensors, up to B, may have the other sign.
-# For the gyro that turns the flow by all of its error, also the margin on the bound of the flow's test.
+# A test within its bound B hides an error whose effect is up to this factor times B, because the effect of
+# sound sensors, up to B, may have the other sign. For the gyro that turns the flow by all of its error it is
+# also the margin on the bound of the flow's test.
 HIDDEN_FACTOR = 2.0
 
 ANGLES, FORCES = (PHI, THETA, PSI), (AX, AX + 1, AX + 2)

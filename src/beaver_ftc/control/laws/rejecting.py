@@ -174,19 +174,13 @@ def command(control, assessment, faults, prediction, measured, mode, t):
 def schedule(config, memory, qdyn, transfer_share):
     """Gains for a dynamic pressure (Pa), held beyond the ends of the table; pitch also for who carries it:
     transfer_share, the part of pitch that its stand-in carries."""
-    look_up(memory.Kp, config.qdyn, config.Kp_at, qdyn, transfer_share)
-    look_up(memory.L_rate, config.qdyn, config.L_rate_at, qdyn, transfer_share)
-    look_up(memory.L_disturbance, config.qdyn, config.L_disturbance_at, qdyn, transfer_share)
-
-
-@kernel
-def look_up(gains, points, table, qdyn, transfer_share):
-    """Fill gains (3,) from a table over the points; the rest: see `schedule`."""
-    for i in range(3):
-        gains[i] = between(qdyn, points.size, points, row_of(table, i))
-    if transfer_share > 0.0:
-        by_stand_in = between(qdyn, points.size, points, row_of(table, STAND_IN))
-        gains[PITCH] += transfer_share * (by_stand_in - gains[PITCH])
+    tables = config.Kp_at, config.L_rate_at, config.L_disturbance_at
+    for k, gains in enumerate((memory.Kp, memory.L_rate, memory.L_disturbance)):
+        for i in range(3):
+            gains[i] = between(qdyn, N_POINTS, config.qdyn, row_of(tables[k], i))
+        if transfer_share > 0.0:
+            by_stand_in = between(qdyn, N_POINTS, config.qdyn, row_of(tables[k], STAND_IN))
+            gains[PITCH] += transfer_share * (by_stand_in - gains[PITCH])
 
 
 @kernel

@@ -31,7 +31,7 @@ from beaver_ftc.scenario.declared import Declared
 
 ACTING_S = 4.0  # over which the balance is averaged: gusts pitch within a second
 HOLD_SETTLED_S = 0.5  # and before which nothing is concluded from it
-NOTED_MPS, NOTED_RAD = 0.5, 0.02  # a limit that bites by so much is announced
+NOTED_MPS, NOTED_RAD = 0.5, 0.02  # a limit that takes so much is announced
 MOST_BANK_DEG = 30.0  # of a healthy aircraft
 # Of 0, 0.7, 1.5 and 3 deg kept of the flap at the end of the airspeeds that can be held, the one with which
 # most jams were kept; and how fast a limit moves the command: about as fast as drag slows the aircraft down.
@@ -53,7 +53,7 @@ HOLDING = record(
     mean_acting_elevator=float, mean_commanded_elevator=float,
     fastest=float, slowest=float,  # m/s, between which level flight can be held
     bank=float,  # rad: the bank limit, smoothed
-    # of each limit whether it bites now, since when it has, s, and its last value, m/s or rad
+    # of each limit whether it is in force now, since when, s, and its last value, m/s or rad
     in_force=(int, 3), from_s=3, value=3,
 )  # fmt: skip
 
@@ -93,13 +93,18 @@ def average_acting_elevator(hold, dt, offset, commanded, unexplained):
 
 @kernel
 def find_airspeeds_that_can_be_held(hold, layout, surfaces, y):
-    """The fastest and the slowest airspeed that can be held, m/s."""
+    """Fill the fastest and the slowest airspeed that can be held, m/s.
+
+    The flap may stand at one end of its travel, less the reserve. What acts like the elevator may then be
+
+        fixed + left u,    u in its travel        fixed, rad: acts without a command; left: its effectiveness
+    """
     e, f = layout.main[PITCH], layout.stand_in
-    left, effectiveness = surfaces.output.effectiveness[e], surfaces.output.effectiveness[f]
-    least = hold.mean_acting_elevator - hold.mean_commanded_elevator + left * layout.low[e]
-    greatest = hold.mean_acting_elevator - hold.mean_commanded_elevator + left * layout.high[e]
+    elevator_left, flap_left = surfaces.output.effectiveness[e], surfaces.output.effectiveness[f]
+    fixed = hold.mean_acting_elevator - hold.mean_commanded_elevator
+    least, greatest = fixed + elevator_left * layout.low[e], fixed + elevator_left * layout.high[e]
     up, down = layout.low[f] + hold.flap_reserve, layout.high[f] - hold.flap_reserve
-    if effectiveness < surfaces.config.least_effectiveness:
+    if flap_left < surfaces.config.least_effectiveness:
         up = down = min(max(surfaces.output.offset[f], layout.low[f]), layout.high[f])
     per_pa = 2.0 * y[QDYN] / y[AIRSPEED] ** 2
     hold.fastest = np.sqrt(2.0 * dynamic_pressure_limit(hold, up, greatest, True) / per_pa)
@@ -139,7 +144,7 @@ def approach_airspeed_to_fly(autopilot):
 
 @kernel
 def record_limits_in_force(autopilot, main, effectiveness, t):
-    """Note since when a limit has bitten, and what it is at last; main (3,): who leads each axis."""
+    """Note since when a limit is in force, and what it is at last; main (3,): who leads each axis."""
     hold, command = autopilot.holding, autopilot.command[SPEED]
     if autopilot.is_commanded[SPEED]:
         record_limit(hold, FASTEST, hold.fastest, hold.fastest < command - NOTED_MPS, t)
@@ -150,10 +155,10 @@ def record_limits_in_force(autopilot, main, effectiveness, t):
 
 
 @kernel
-def record_limit(hold, kind, value, bites, t):
-    """Keep a limit that bites now."""
-    hold.in_force[kind] = bites
-    if bites:
+def record_limit(hold, kind, value, in_force, t):
+    """Keep a limit that is in force now."""
+    hold.in_force[kind] = in_force
+    if in_force:
         if hold.from_s[kind] < 0.0:
             hold.from_s[kind] = t
         hold.value[kind] = value

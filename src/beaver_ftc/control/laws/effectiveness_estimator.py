@@ -78,9 +78,16 @@ def begin_estimator(estimator, squares, frames, dt):
 
 @apart
 def estimate(estimator, innovation, L_rate, L_disturbance, dt, x, y, effectiveness, moments):
-    """Take in the innovation of all axes (3,) rad/s; L_rate 1, L_disturbance 1/s (3,): the observer's gains;
-    x (3,) rad/s, y: measured; effectiveness (n,): that the law assumes; moments (3, n) rad/s2: of
-    healthy surfaces."""
+    """Take in the innovation of all axes (3,) rad/s, axis by axis:
+
+        P_jj <- min(P_jj + unsure_j dt / FORGOTTEN_S, max(P_jj, unsure_j))        what is old may have changed
+        seen = innovation_i + observed((effectiveness - 1)' moments_i) = h' found,  h: observed(moments_i, y)
+        found <- found - P_s (found_s - limited(found_s)) / P_ss        for each surface s beyond [-1, 0]
+
+    observed: `observer_response`, with L_rate 1 and L_disturbance 1/s (3,), the observer's gains.
+    x (3,) rad/s, y: measured; effectiveness (n,): that the law assumes; moments (3, n) rad/s2: of healthy
+    surfaces.
+    """
     n, h, signal, unsure = effectiveness.size, estimator.h, estimator.signal, estimator.unsure
     for j in range(h.size):
         estimator.P[j, j] = min(
@@ -107,7 +114,10 @@ def estimate(estimator, innovation, L_rate, L_disturbance, dt, x, y, effectivene
 
 @kernel
 def update(estimator, seen, noise):
-    """One step of recursive least squares: seen = h found, give or take a variance of `noise`."""
+    """One step of recursive least squares, for seen = h' found + noise; noise: its variance.
+
+    found <- found + P h (seen - h' found) / v,    P <- P - P h h' P / v,    v = noise + h' P h
+    """
     N, h, P, Ph = estimator.found.size, estimator.h, estimator.P, estimator.Ph
     variance, residual = noise, seen
     for j in range(N):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from beaver_ftc.aircraft import M_PER_FT, MOST_CHANNELS, Aircraft
-from beaver_ftc.design import DesignFunctions
+from beaver_ftc.design import DesignFunctions, design_record
 from beaver_ftc.documents import BadInput
 from beaver_ftc.loop import (
     FrameReadout,
@@ -181,9 +181,9 @@ class Flown(Simulation):
 
     @property
     def G(self) -> Vector:
-        """Effectiveness of each surface about each axis, (3, n) rad/s2 per rad, by the design model at the
-        trim that the designer knows."""
-        return DesignFunctions(self._loop.frames["prediction"]["design"]).G(self._loop.trimmed.y)
+        """Effectiveness of each surface about each axis, (3, n) rad/s2 per rad, by the equations of its file
+        at the trim that the designer knows."""
+        return DesignFunctions(design_record(self.airframe)).G(self._loop.trimmed.y)
 
     @property
     def airframe(self) -> Aircraft:

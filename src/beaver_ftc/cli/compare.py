@@ -145,10 +145,11 @@ def _compare_runs(folders: list[Path], out: Path, format: Format) -> None:
 
 def _compare_on_flights(options: Options, most: int | None) -> None:
     """Schemes and laws on the flights of a sweep, or of the standard sets."""
-    from beaver_ftc.studies.compare.leaderboard import as_text, run_comparison, write_leaderboard
+    from beaver_ftc.studies.compare.leaderboard import as_text, comparison_study, write_leaderboard
     from beaver_ftc.studies.compare.trial import LAW, SCHEME, entries_of, of_set, of_sweep, set_names
     from beaver_ftc.studies.compare.tune import read_tuned
     from beaver_ftc.studies.engine.processes import cores
+    from beaver_ftc.studies.engine.study import run_into
 
     if options.sweep is not None:
         cases = of_sweep(options.sweep, most=most)
@@ -163,14 +164,10 @@ def _compare_on_flights(options: Options, most: int | None) -> None:
         _chosen("--laws", options.laws, LAW, alone=options.schemes is None),
     )
     with progress_bar(f"{len(cases)} flights, {len(entries)} times each") as progress:
-        workers = options.workers or cores()
-        document = run_comparison(options.out, name, cases, entries, workers, progress, chosen)
-    folder = options.out / name
-    answer(
-        options.format,
-        document | {"folder": str(folder)},
-        lambda: f"{as_text(document)}page: {folder / 'comparison.html'}",
-    )
+        study = comparison_study(name, cases, entries, chosen)
+        document = run_into(study, options.out, options.workers or cores(), progress)
+    page = options.out / name / "comparison.html"
+    answer(options.format, document, lambda: f"{as_text(document)}page: {page}")
     if options.leaderboard is not None:
         write_leaderboard(document, options.leaderboard)
 

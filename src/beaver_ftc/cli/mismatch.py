@@ -119,9 +119,10 @@ def _compare(
 
 
 def _map(scenario: "Scenario", out: Path, report: bool, say: Say) -> list[Document]:
-    from beaver_ftc.studies.mismatch.study import map_name, run_map
+    from beaver_ftc.studies.engine.study import run_into
+    from beaver_ftc.studies.mismatch.study import map_study
 
     with progress_bar(f"{scenario.name}: envelope") as progress:
-        entries = run_map(out, scenario, report, progress)
-    say(f"map          {out / map_name(scenario)}")
-    return entries
+        found = run_into(map_study(scenario, report), out, progress=progress)
+    say(f"map          {found['folder']}")
+    return found["map"]

@@ -109,14 +109,16 @@ def _rare(sweep: "Sweep", arguments: Arguments) -> None:
     """Estimate the probability that an expectation is not met, with its interval."""
     from beaver_ftc.cli import told
     from beaver_ftc.studies.engine.processes import cores
-    from beaver_ftc.studies.sweep.rare import as_text, run_rare
+    from beaver_ftc.studies.engine.study import run_into
+    from beaver_ftc.studies.sweep.rare import as_text, rare_study
 
     usual = Arguments(arguments.file)
     given = [name for name in _NOT_WITH_RARE if getattr(arguments, name) != getattr(usual, name)]
     if given:
         raise BadInput(f"--rare and --{given[0].replace('_', '-')} exclude each other, allowed: one of them")
     with told() as tell:
-        document = run_rare(sweep, str(arguments.rare), arguments.out, arguments.workers or cores(), tell)
+        study = rare_study(sweep, str(arguments.rare), tell)
+        document = run_into(study, arguments.out, arguments.workers or cores())
     answer(arguments.format, document, lambda: as_text(document))
 
 

@@ -25,8 +25,9 @@ from beaver_ftc.studies.detectability.certain import (
     mismatch,
 )
 from beaver_ftc.studies.detectability.in_trim import alike
-from beaver_ftc.studies.detectability.places import at, run_places, with_aircraft
+from beaver_ftc.studies.detectability.places import at, places_study, with_aircraft
 from beaver_ftc.studies.detectability.places_shown import answer, geometry
+from beaver_ftc.studies.engine.study import run_study
 from flying import loss, scenario
 from samples import samples
 
@@ -120,7 +121,7 @@ def test_a_fault_is_its_surfaces_wherever_the_file_has_it(tmp_path):
 
 
 def test_what_cannot_be_trimmed_is_said_not_dropped(flight, tmp_path):
-    document = run_places(tmp_path, flight, speeds_mps=[45.0, 21.0], altitudes_m=[1000.0], excitations=[1.0])
+    document = run_study(places_study(flight, [45.0, 21.0], [1000.0], [1.0]), tmp_path)
     rows = document["points"]
     assert len(rows) == 2 * len(FAULTS)
     assert all(row["detected"] is None and row["why"] for row in rows[len(FAULTS) :])
@@ -257,6 +258,6 @@ def test_half_of_the_instants_and_the_worst_of_them():
         *({"sharpen": {name: False}} for name in ("memory", "pole_bank", "shared_effectiveness")),
     ],
 )  # fmt: skip
-def test_it_is_worked_out_for_one_scheme(fdi, tmp_path):
+def test_it_is_worked_out_for_one_scheme(fdi):
     with pytest.raises(BadInput, match="detectability is worked out for the sharpened scheme"):
-        run_places(tmp_path, scenario(fdi=fdi), [40.0], [0.0], [1.0])
+        places_study(scenario(fdi=fdi))

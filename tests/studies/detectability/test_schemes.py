@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from beaver_ftc.diagnosis.informed_test import detection_probability
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.studies.compare.replay import Trace, alarms_at, record
-from beaver_ftc.studies.detectability.command import run_schemes
+from beaver_ftc.studies.detectability.command import schemes_study
 from beaver_ftc.studies.detectability.probabilities import (
     JUDGED_S,
     document_of,
@@ -35,6 +35,7 @@ from beaver_ftc.studies.detectability.schemes import (
     strikes_at_s,
 )
 from beaver_ftc.studies.detectability.schemes_shown import comparison, page_of
+from beaver_ftc.studies.engine.study import run_study
 from beaver_ftc.studies.present.page import Table
 from samples import samples
 
@@ -55,7 +56,8 @@ SMALL = replace(
 @pytest.fixture(scope="module")
 def survey(tmp_path_factory):
     folder = tmp_path_factory.mktemp("grid")
-    return run_schemes(folder, SMALL, contenders(["observer-constant"]), workers=2), folder / "detectability"
+    study = schemes_study(SMALL, contenders(["observer-constant"]))
+    return run_study(study, folder, 2), folder / "detectability"
 
 
 class TestFlights:
@@ -149,7 +151,8 @@ class TestCounts:
         assert (missed["delay_s"], missed["false_alarm"], missed["own_false_alarm"]) == (None, True, False)
 
     def test_what_has_no_level_or_was_not_flown_by_ours_has_no_row(self):
-        level, lost = {(*STILL, "a"): 2.0}, replace(watched(1, a=0.7), deflections=[])
+        level = {(*STILL, "a"): 2.0}
+        lost = replace(watched(1, a=0.7), deflections=[])
         assert [row["scheme"] for row in rows_of([watched(1, a=0.7, b=0.7), lost], level)] == ["a"]
 
     def test_the_summary_counts_flights_that_were_still_silent(self):
@@ -177,7 +180,7 @@ class TestCounts:
         ours = next(iter(BUILT_IN))
         both = [watched(seed, **{ours: 0.3, "x": None}) for seed in range(9) for _ in range(2)]
         quiet = [replace_traces(watched(1_000_000, **{ours: None, "x": None}))]
-        document, _ = document_of(SMALL, quiet, both)
+        document = document_of(SMALL, quiet, both)
         (duel,) = [
             duel for duel in document["comparison"] if (duel["ours"], duel["within_s"]) == (ours, JUDGED_S)
         ]

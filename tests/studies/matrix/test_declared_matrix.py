@@ -7,7 +7,8 @@ from test_random_faults import drawn
 from beaver_ftc.aircraft import load
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.metrics import measure
-from beaver_ftc.studies.matrix.fault_matrix import declared, run_matrix, verdict
+from beaver_ftc.studies.engine.study import run_study
+from beaver_ftc.studies.matrix.fault_matrix import declared, matrix_study, verdict
 from flying import scenario
 from samples import samples
 
@@ -17,7 +18,7 @@ FLIGHTS = samples(200)
 
 @pytest.fixture(scope="module")
 def matrix(tmp_path_factory):
-    return run_matrix(tmp_path_factory.mktemp("matrix"), (45.0,), declared=True)
+    return run_study(matrix_study((45.0,), declared=True), tmp_path_factory.mktemp("matrix"))
 
 
 def test_no_false_alarm_no_wrong_surface_no_wrong_type(matrix):
@@ -54,7 +55,8 @@ def random_flight(rng, faulty):
 
 def test_random_faults_are_not_named_wrongly():
     rng = np.random.default_rng(9)
-    wrong, named = [], 0
+    wrong = []
+    named = 0
     for _ in range(FLIGHTS):
         flight = fly(random_flight(rng, faulty=True))
         fault = flight.scenario.faults[0]

@@ -5,11 +5,12 @@ from types import SimpleNamespace
 import pytest
 
 from beaver_ftc.design.fdc import SURFACES
+from beaver_ftc.studies.engine.study import run_study
 from beaver_ftc.studies.matrix.fault_matrix import (
     AIRSPEEDS_MPS,
     cases,
     fly_case,
-    run_matrix,
+    matrix_study,
     verdict,
 )
 from samples import AT_NIGHT
@@ -22,7 +23,7 @@ PERIODS_S = {"1 rad/s": 6.283, "5 rad/s": 1.257, "10 rad/s": 0.628}
 @pytest.fixture(scope="module")
 def matrix(tmp_path_factory):
     folder = tmp_path_factory.mktemp("matrix")
-    return run_matrix(folder, SPEEDS_MPS), folder / "fault-matrix"
+    return run_study(matrix_study(SPEEDS_MPS), folder), folder / "fault-matrix"
 
 
 def flights(matrix, *words, surfaces=tuple(ALLOWED_S)):

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from beaver_ftc.studies.engine.study import run_study
 from beaver_ftc.studies.matrix import pitch_lost
-from beaver_ftc.studies.matrix.pitch_lost import LAWS, LOST, PitchCase, fly_case, run_pitch_lost
+from beaver_ftc.studies.matrix.pitch_lost import LAWS, LOST, PitchCase, fly_case, pitch_lost_study
 from beaver_ftc.studies.matrix.power_margins import about_trim, loop_response, margins, with_law
 from samples import AT_NIGHT
 
@@ -16,7 +17,7 @@ def found(tmp_path_factory):
     some = LOST if AT_NIGHT else {name: LOST[name] for name in BY_DAY}
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(pitch_lost, "LOST", some)
-        return run_pitch_lost(tmp_path_factory.mktemp("pitch"), (45.0,))
+        return run_study(pitch_lost_study((45.0,)), tmp_path_factory.mktemp("pitch"))
 
 
 def test_power_loses_no_aircraft_and_keeps_some(found):

@@ -68,7 +68,8 @@ def flight_of(rng, repaired=False, **more):
 def flown(flights, **more):
     """(what was named wrongly, how many surfaces were named) in so many random flights."""
     rng = np.random.default_rng(77)
-    wrong, named = [], 0
+    wrong = []
+    named = 0
     for _ in range(flights):
         flight = fly(flight_of(rng, **more))
         fault = flight.scenario.faults[0]

@@ -47,7 +47,8 @@ def mistakes(document, faults):
     named = {found["fault"]: found for found in document["isolation"]["faults"] if found["fault"]}
     wrong = [surface for surface in named if surface not in true]
     for surface in named.keys() & true.keys():
-        kind, left = named[surface]["type"], named[surface]["candidates"]
+        kind = named[surface]["type"]
+        left = named[surface]["candidates"]
         if (kind or true[surface]) != true[surface] or (left and true[surface] not in left):
             wrong.append((surface, kind, left))
     for plane in PLANES:
@@ -72,7 +73,8 @@ def excluded_in(document, plane, surface, kind):
 @pytest.mark.parametrize(("actuators", "repaired"), [("ideal", False), ("servo", True)])
 def test_no_pair_is_named_wrongly_or_excluded(actuators, repaired):
     rng = np.random.default_rng(2024)
-    wrong, both = [], 0
+    wrong = []
+    both = 0
     for _ in range(FLIGHTS):
         flight = fly(flight_of(rng, actuators, repaired))
         document = metrics(flight)
@@ -115,7 +117,8 @@ def test_ailerons_and_rudder_at_once_and_one_after_the_other(later_s):
 
 
 def test_two_faults_of_pitch_at_once_stay_open():
-    jam, flap = fault("elevator", "stuck", 8, position_deg=0), fault("flap", "stuck", 8, position_deg=5)
+    jam = fault("elevator", "stuck", 8, position_deg=0)
+    flap = fault("flap", "stuck", 8, position_deg=5)
     flight = fly(scenario(duration_s=28, faults=[jam, flap], fdi={"fault_class": "all", "pairs": True}))
     assert flight.isolated is None
     assert "elevator+flap" in flight.candidates

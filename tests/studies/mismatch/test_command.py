@@ -2,12 +2,14 @@
 
 import csv
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import commands
 from beaver_ftc.results.log import StoredLog
+from beaver_ftc.studies.engine.study import run_into
 from beaver_ftc.studies.mismatch import study
 from beaver_ftc.studies.mismatch.sources import SOURCES
 from beaver_ftc.studies.mismatch.study import VARIANTS, variant_of
@@ -147,7 +149,8 @@ def test_the_map_covers_the_envelope_and_names_the_reason(monkeypatch, tmp_path)
     monkeypatch.setattr(study, "AIRSPEEDS_MPS", (40.0, 50.0))
     monkeypatch.setattr(study, "ALTITUDES_M", (500.0, 2500.0))
     case = scenario(duration_s=2, faults=[loss(at_s=1)], design_model={"engine_terms": False})
-    entries = study.run_map(tmp_path, case)
+    found = run_into(study.map_study(case), tmp_path)
+    entries = found["map"]
     assert len(entries) == 2 * 2 * 3
     slow, fast = (
         next(e for e in entries if e["axis"] == "q" and e["airspeed_mps"] == V and e["altitude_m"] == 500.0)
@@ -155,7 +158,7 @@ def test_the_map_covers_the_envelope_and_names_the_reason(monkeypatch, tmp_path)
     )
     assert slow["dominant"] == fast["dominant"] == "engine"
     assert slow["worst_ratio"] > fast["worst_ratio"] > 1.0  # the slipstream matters more at low speed
-    folder = tmp_path / study.map_name(case)
+    folder = Path(found["folder"])
     assert (folder / "figures" / "mismatch-map.png").exists()
     with (folder / "mismatch.csv").open() as file:
         assert len(list(csv.DictReader(file))) == 12

@@ -50,7 +50,8 @@ def test_belief_is_what_the_compiled_loop_evaluates(keys):
 
 
 def test_a_body_at_rest_among_the_stars_keeps_its_rates_against_the_earth():
-    attitude, latitude = np.array([[0.4, -0.3, 2.0]]), np.array([0.7])
+    attitude = np.array([[0.4, -0.3, 2.0]])
+    latitude = np.array([0.7])
     at_rest = -earth_in_body(attitude, latitude)
     inertia = inertia_coefficients(MASS)
     total = inertial(inertia, at_rest) + earth_rotation(inertia, at_rest, attitude, latitude)

@@ -15,7 +15,7 @@ from beaver_ftc.studies.sensitivity.beyond import (
     row_of,
     scenario_of,
 )
-from beaver_ftc.studies.sensitivity.command import run_errors
+from beaver_ftc.studies.sensitivity.command import errors_study
 from beaver_ftc.studies.sensitivity.errors import errors_of
 from flying import loss
 
@@ -170,6 +170,6 @@ def test_a_summary_counts_flights_that_were_flown_and_what_never_came_as_longest
     assert found["bound_used"] == {"value": 0.03, "low": None, "high": None}
 
 
-def test_a_scenario_without_a_diagnosis_is_refused(tmp_path):
+def test_a_scenario_without_a_diagnosis_is_refused():
     with pytest.raises(BadInput, match="scheme: none diagnoses nothing"):
-        run_errors(tmp_path, bf.load(SHORT | {"fdi": {"scheme": "none"}}))
+        errors_study(bf.load(SHORT | {"fdi": {"scheme": "none"}}))

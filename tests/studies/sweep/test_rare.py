@@ -15,7 +15,9 @@ from beaver_ftc.results.flight import fly
 from beaver_ftc.scenario.sweeps import load_sweep
 from beaver_ftc.studies.engine import study
 from beaver_ftc.studies.sweep import rare
-from beaver_ftc.studies.sweep.rare import Chains, as_text, run_rare, scored
+from beaver_ftc.studies.sweep.rare import Chains, as_text, rare_study, scored
+
+TRACKED = "post_fault_rms_deg_s.q"
 
 
 @pytest.mark.parametrize("problem", ANALYTIC)
@@ -70,7 +72,8 @@ def test_where_it_cannot_get_there_it_says_so(score, why):
 
 
 def test_an_event_that_the_last_level_reaches_is_known():
-    chains, p = Chains(2, 3), 1e-9
+    chains = Chains(2, 3)
+    p = 1e-9
     chains.go(lambda points: points[:, 0] + NormalDist().inv_cdf(p))
     found = chains.estimate()
     assert (found["levels"], found["why"]) == (10, "")
@@ -103,7 +106,7 @@ def test_flights_give_a_number_an_interval_and_the_likeliest_of_them(drift, tmp_
     monkeypatch.setattr(rare, "MEMBERS", 20)
     monkeypatch.setattr(Chains.__init__, "__defaults__", (3, 20))
     said = []
-    document = run_rare(drift, "post_fault_rms_deg_s.q", tmp_path / "runs", tell=said.append)
+    document = study.run_into(rare_study(drift, TRACKED, said.append), tmp_path / "runs")
     folder = tmp_path / "runs" / "drift-rare-post_fault_rms_deg_s-q"
     assert document["folder"] == str(folder)
     assert json.loads((folder / "rare.json").read_text())["probability"] == document["probability"]
@@ -116,7 +119,7 @@ def test_flights_give_a_number_an_interval_and_the_likeliest_of_them(drift, tmp_
     assert document["flights"] == int(said[-1].split(": ")[1].split()[0])
     again = fly(str(folder / "flight.yaml"))
     missed = {one.name for one in again.expectations if not one.passed}
-    assert "post_fault_rms_deg_s.q" in missed
+    assert TRACKED in missed
     assert sorted(path.name for path in (tmp_path / "runs").iterdir()) == [folder.name]
     text = as_text(document)
     assert f"beaver-ftc run {folder}/flight.yaml" in text
@@ -128,8 +131,9 @@ def test_flights_give_a_number_an_interval_and_the_likeliest_of_them(drift, tmp_
 def test_what_is_stopped_goes_on_where_it_was(drift, tmp_path, monkeypatch):
     monkeypatch.setattr(Chains.__init__, "__defaults__", (2, 10))
     monkeypatch.setattr(study, "OF_A_PART", 6)
-    whole = run_rare(drift, "post_fault_rms_deg_s.q", tmp_path / "whole")
-    flown, stops = [], [16]
+    whole = study.run_study(rare_study(drift, TRACKED), tmp_path / "whole")
+    flown = []
+    stops = [16]
 
     def stopped(*case):
         flown.append(case)
@@ -141,11 +145,10 @@ def test_what_is_stopped_goes_on_where_it_was(drift, tmp_path, monkeypatch):
         rare, "_fly", lambda sweep, name, case: {"score": stopped(sweep, name, case), "failed": False}
     )
     with pytest.raises(KeyboardInterrupt):
-        run_rare(drift, "post_fault_rms_deg_s.q", tmp_path / "parts")
+        study.run_study(rare_study(drift, TRACKED), tmp_path / "parts")
     flown.clear()
     stops.clear()
-    parts = run_rare(drift, "post_fault_rms_deg_s.q", tmp_path / "parts")
-    assert {**parts, "folder": 0} == {**whole, "folder": 0}
+    assert study.run_study(rare_study(drift, TRACKED), tmp_path / "parts") == whole
     assert len(flown) == whole["flights"] - 12
 
 
@@ -160,16 +163,15 @@ def test_an_alarm_or_a_loss_that_is_wanted_has_no_score(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["isolated_as", "no_departur", "", "x" * 500])
-def test_what_the_base_does_not_expect_is_refused(name, drift, tmp_path):
+def test_what_the_base_does_not_expect_is_refused(name, drift):
     with pytest.raises(BadInput, match=r"^--rare: .* is nothing that drift expects.* allowed: detected_"):
-        run_rare(drift, name, tmp_path)
-    assert [path.name for path in tmp_path.iterdir()] == ["drift.yaml"]
+        rare_study(drift, name)
 
 
 def test_nothing_varies(tmp_path):
     (tmp_path / "still.yaml").write_text(yaml.safe_dump({**SWEEP, "vary": {}}))
     with pytest.raises(BadInput, match="vary: nothing varies"):
-        run_rare(load_sweep(tmp_path / "still.yaml"), "no_departure", tmp_path)
+        rare_study(load_sweep(tmp_path / "still.yaml"), "no_departure")
 
 
 @pytest.mark.parametrize(
@@ -177,7 +179,7 @@ def test_nothing_varies(tmp_path):
     [
         ("no_departure", 0.5, False), ("no_departure", 25.0, True),
         ("detected_within_s", 3.0, False), ("detected_within_s", 0.0, True),
-        ("post_fault_rms_deg_s.q", 0.2, False), ("post_fault_rms_deg_s.q", 9.0, True),
+        (TRACKED, 0.2, False), (TRACKED, 9.0, True),
     ],
 )  # fmt: skip
 def test_a_score_is_below_zero_until_the_event_has_come(name, bias, event, drift):

@@ -6,7 +6,8 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import beaver_ftc as bf
-from beaver_ftc.studies.matrix.fault_matrix import beside_told, cases, fly_case, run_matrix
+from beaver_ftc.studies.engine.study import run_study
+from beaver_ftc.studies.matrix.fault_matrix import beside_told, cases, fly_case, matrix_study
 from beaver_ftc.studies.matrix.matrix_shown import SHOWN
 from beaver_ftc.studies.present.tables import markdown_table
 
@@ -74,7 +75,7 @@ def _closely(row: Document) -> str:
 def _matrix(declared: bool, turbulence: str = "none") -> str:
     """The table of verdicts by fault and surface, and a summary; in moving air the summary alone."""
     with TemporaryDirectory() as folder:
-        document = run_matrix(Path(folder), declared=declared, turbulence=turbulence)
+        document = run_study(matrix_study(declared=declared, turbulence=turbulence), Path(folder))
     cells = {(cell["fault"], cell["surface"]): cell for cell in document["cells"]}
     surfaces = list(dict.fromkeys(surface for _, surface in cells))
     table = markdown_table(

@@ -4,10 +4,11 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from beaver_ftc.studies.engine.study import run_into
 from beaver_ftc.studies.present.page import Table
 from beaver_ftc.studies.present.tables import markdown_table, number
 from beaver_ftc.studies.sensitivity import mechanisms_shown as shown
-from beaver_ftc.studies.sensitivity.command import run_mechanisms
+from beaver_ftc.studies.sensitivity.command import mechanisms_study
 from beaver_ftc.studies.sensitivity.mechanisms import DRAWS, Flight, fly_one
 from beaver_ftc.studies.sensitivity.systems import DIAGNOSIS, LAW
 from tools.docs.tables import aside, picture, shared
@@ -34,7 +35,7 @@ _PICTURED = (
 @shared
 def _flown() -> tuple[Document, bytes]:
     with TemporaryDirectory() as name:
-        document = run_mechanisms(Path(name), DRAWS, SEED, workers=2)
+        document = run_into(mechanisms_study(DRAWS, SEED), Path(name), 2)
         return document, Path(document["folder"], f"{shown.NAME}.png").read_bytes()
 
 

@@ -4,13 +4,14 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from beaver_ftc.studies.present.page import write_files
+from beaver_ftc.studies.engine.study import fly_all
+from beaver_ftc.studies.present.page import Summary, write_files
 from beaver_ftc.studies.present.tables import markdown_table
 from beaver_ftc.studies.present.tables import number as plain_number
 from beaver_ftc.studies.reproduce import beside
 from beaver_ftc.studies.reproduce.claims import BORNE_OUT, CANNOT_BE_JUDGED, MEASURED, NOT_BORNE_OUT
 from beaver_ftc.studies.reproduce.published_figures import FIGURES, SENSITIVITY, figures_of
-from beaver_ftc.studies.reproduce.reproduction import fly_published, reproduced
+from beaver_ftc.studies.reproduce.reproduction import STUDIED, document_of, fly_published, row_of
 from beaver_ftc.studies.reproduce.words import (
     adaptation_sentence,
     headline,
@@ -49,7 +50,7 @@ CAPTIONS = {  # of each figure: what it shows, and what to see
 
 @shared
 def _document() -> Document:
-    return reproduced(2)
+    return dict(document_of(fly_all(row_of, STUDIED, 2)))
 
 
 def reproduction_headline() -> str:
@@ -122,7 +123,7 @@ def reproduction_beside() -> str:
 
 def reproduction_figures() -> str:
     """One figure for each published one, and how far each number stays from its limit."""
-    write_files(Path("images"), {"reproduction": figures_of(_document(), fly_published())})
+    write_files(Path("images"), {"reproduction": figures_of(Summary(_document(), fly_published()))})
     titles = [(view.title.partition(":")[0], view.name) for view, _, _ in FIGURES]
     shown = [*titles, ("Numbers and limits", SENSITIVITY)]
     return "\n\n".join(

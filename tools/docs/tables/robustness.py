@@ -12,16 +12,16 @@ import numpy as np
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.scenario.schema import load_scenario
 from beaver_ftc.scenario.sweeps import load_sweep
-from beaver_ftc.studies.detectability.command import run_schemes
+from beaver_ftc.studies.detectability.command import schemes_study
 from beaver_ftc.studies.detectability.probabilities import DUELS_S
 from beaver_ftc.studies.detectability.schemes import GRIDS, contenders
 from beaver_ftc.studies.detectability.schemes_shown import who_is_better
 from beaver_ftc.studies.engine.statistics import share_within, wilson
-from beaver_ftc.studies.engine.study import fly_all
+from beaver_ftc.studies.engine.study import fly_all, run_into, run_study
 from beaver_ftc.studies.matrix.clairvoyant import columns_of, seen_when_told
 from beaver_ftc.studies.present.tables import markdown_table, tabulated
 from beaver_ftc.studies.sensitivity.beyond import TOGETHER
-from beaver_ftc.studies.sensitivity.command import run_errors
+from beaver_ftc.studies.sensitivity.command import errors_study
 from beaver_ftc.studies.sensitivity.errors_shown import COLUMNS
 from beaver_ftc.studies.sensitivity.errors_shown import error_sentences as sentences
 from beaver_ftc.studies.sweep.one_flight import fly_one, scenario_of
@@ -185,7 +185,7 @@ def _with_fault(one: Assignment, part: str) -> Document:
 def robustness_power() -> str:
     """Share of losses found under tactical-grade sensors, by scheme, surface and air; and a picture of it."""
     with TemporaryDirectory() as name:
-        document = run_schemes(Path(name), GRIDS["quick"], contenders(None), 2)
+        document = run_study(schemes_study(GRIDS["quick"], contenders(None)), Path(name), 2)
         picture("power-tactical-grade.png", "", Path(name, "detectability", "detectability.png").read_bytes())
     return _power_of(document)
 
@@ -195,7 +195,7 @@ def robustness_power_probe() -> str:
     scheme where shares of a few flights do not. That of multiple-models is 0 if no odds favour a fault."""
     grid = replace(GRIDS["quick"], blocks=1, magnitudes=(1.0,), excitations_deg_s=(3.0,), healthy_h=0.01)
     with TemporaryDirectory() as name:
-        document = run_schemes(Path(name), grid, contenders(None))
+        document = run_study(schemes_study(grid, contenders(None)), Path(name))
     levels = (f"{each['turbulence']}, {each['scheme']}: {each['level']:.6g}" for each in document["levels"])
     return "\n".join((_power_of(document), *levels))
 
@@ -261,7 +261,8 @@ def _share(within: Any) -> float:
 def robustness_decay() -> str:
     """How verdicts decay beyond what is declared, of two scenarios; and a picture of the first."""
     with TemporaryDirectory() as name:
-        whole, published = (run_errors(Path(name), load_scenario(one), workers=2) for one in DECAYS)
+        studies = (errors_study(load_scenario(one)) for one in DECAYS)
+        whole, published = (run_into(study, Path(name), 2) for study in studies)
         shown = picture("decay.png", _PICTURED, Path(whole["folder"], "sensitivity.png").read_bytes())
     pictured = f"{shown}\n\n{DECAY_FIGURE}"
     table = moved(_decay_table(whole), "*Table 1.", "robustness-decay", DECAY_TITLE)
@@ -271,7 +272,7 @@ def robustness_decay() -> str:
 def robustness_decay_probe() -> str:
     """Two flights of each row of the first."""
     with TemporaryDirectory() as name:
-        document = run_errors(Path(name), load_scenario(DECAYS[0]), 2)
+        document = run_study(errors_study(load_scenario(DECAYS[0]), 2), Path(name))
     says = "\n".join(f"- {sentence}" for sentence in sentences(document))
     flown = f"`{document['scenario']}`, {document['flights']} flights a row"
     return f"{flown}:\n\n{says}\n\n{_decay_table(document)}"

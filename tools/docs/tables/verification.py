@@ -5,7 +5,8 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from beaver_ftc.scenario.schema import load_scenario
-from beaver_ftc.studies.detectability.places import run_places
+from beaver_ftc.studies.detectability.places import places_study
+from beaver_ftc.studies.engine.study import run_study
 from beaver_ftc.studies.present.tables import markdown_table
 
 
@@ -26,7 +27,8 @@ SCALES = (0.5, 2.0)  # of the references of `fault-free`
 def _surveyed(**where: Any) -> str:
     """The smallest losses that are found, by size of the references."""
     with TemporaryDirectory() as folder:
-        found = run_places(Path(folder), load_scenario("fault-free"), excitations=SCALES, **where)
+        study = places_study(load_scenario("fault-free"), excitations=SCALES, **where)
+        found = run_study(study, Path(folder))
     rows = found["points"]
     head = (
         "loss of", "references times", "conditions",

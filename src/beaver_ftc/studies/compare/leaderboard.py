@@ -10,7 +10,7 @@ from beaver_ftc.results.model import Document
 from beaver_ftc.results.style import BLUE, GREY
 from beaver_ftc.studies.compare.scores import document_of
 from beaver_ftc.studies.compare.trial import LAW, ORACLE, SCHEME, Entry, SetFlight, Trial, fly_case
-from beaver_ftc.studies.engine.study import Progress, Study, run_study
+from beaver_ftc.studies.engine.study import Study
 from beaver_ftc.studies.present import page
 from beaver_ftc.studies.present.figures import curve_look, marker, panels
 from beaver_ftc.studies.present.tables import Columns, aligned, percent, tabulated
@@ -177,21 +177,16 @@ def _draw_ratios(axis: "Axes", part: Document) -> None:
     axis.grid(alpha=0.3)
 
 
-def run_comparison(
-    out: Path, name: str, cases: Sequence[SetFlight], entries: Sequence[Entry], workers: int,
-    progress: Progress | None, chosen: TunedValuesByGrade | None = None,
-) -> Document:  # fmt: skip
-    """Write `out/<name>/` (document, figure, page) of every case with every entry; return the document.
-
-    chosen: values of schemes and laws, as in trial.py.
-    """
+def comparison_study(
+    name: str, cases: Sequence[SetFlight], entries: Sequence[Entry], chosen: TunedValuesByGrade | None = None
+) -> Study:
+    """Every case with every entry; chosen: values of schemes and laws, as in trial.py."""
     files = page.study_files("comparison", partial(page_of, name=name), {}, {"comparison": figure_of})
-    study = Study(
+    return Study(
         name, cases, partial(fly_case, entries=tuple(entries), chosen=chosen),
         partial(document_of, entries=entries), files, row=Trial,
         follows_from=(entries, chosen), lost=lost,
     )  # fmt: skip
-    return run_study(study, out, workers, progress)
 
 
 def lost(case: SetFlight, why: str) -> Trial:

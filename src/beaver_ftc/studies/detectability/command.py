@@ -33,26 +33,24 @@ from beaver_ftc.studies.detectability import (
 )
 from beaver_ftc.studies.detectability.schemes import GRIDS, Grid, Watched
 from beaver_ftc.studies.detectability.shown import NAME
-from beaver_ftc.studies.detectability.sizes import Asked, run_sizes
-from beaver_ftc.studies.engine.study import Progress, Study, run_study
+from beaver_ftc.studies.detectability.sizes import Asked, sizes_study
+from beaver_ftc.studies.engine.study import Study, run_into
 from beaver_ftc.studies.present.page import as_text
 
 GridName = StrEnum("GridName", ["quick", "full"])
 SensorsName = StrEnum("SensorsName", {"ideal": "ideal", "tactical_grade": "tactical-grade"})
 
 
-def run_schemes(
-    out: Path, grid: Grid, names: Sequence[str], workers: int = 1, progress: Progress | None = None
-) -> Document:
-    """Write `out/detectability/`; return the document."""
-    names, healthy = tuple(names), grid.healthy()
+def schemes_study(grid: Grid, names: Sequence[str]) -> Study:
+    """How much these schemes find in the flights of a grid."""
+    names = tuple(names)
+    healthy = grid.healthy()
     cases = [*((block, False) for block in healthy), *((block, True) for block in grid.faulted())]
-    study = Study(
+    return Study(
         NAME, cases, partial(schemes.fly_block, grid=grid, schemes=names),
         lambda seen: probabilities.document_of(grid, seen[: len(healthy)], seen[len(healthy) :]),
         schemes_shown.FILES, row=Watched, follows_from=(grid, names), lost=schemes.lost,
     )  # fmt: skip
-    return run_study(study, out, workers, progress)[0]
 
 
 @dataclass(frozen=True)
@@ -125,7 +123,7 @@ class Detectability(StudyCommand):
             scenario = places.with_aircraft(scenario, self.aircraft)
         if self.within is not None:
             asked = Asked(str(self.surface), self.within, self.seed)
-            return run_sizes(self.out, scenario, asked, self.processes, reporter.say)
+            return run_into(sizes_study(scenario, asked, reporter.say), self.out, self.processes)
         return self._of_places(scenario, reporter)
 
     def _refuse_contradictions(self) -> None:
@@ -149,18 +147,15 @@ class Detectability(StudyCommand):
         known = scenario.airframe.class_of_losses
         if self.surface is not None and self.surface not in known:
             raise BadInput(f"--surface {self.surface!r:.60}: allowed: {', '.join(known)}")
-        where = self.airspeed or (), self.altitude or ()
-        how = self.processes, reporter.progress
-        found = places.run_places(self.out, scenario, *where, places.EXCITATIONS, *how)
-        folder = str(self.out / places.survey_name(scenario))
+        study = places.places_study(scenario, self.airspeed or (), self.altitude or ())
+        found = run_into(study, self.out, self.processes, reporter.progress)
+        folder = found.pop("folder")  # the last key but the engines
         if self.surface is not None:
             found |= {
                 part: [row for row in found[part] if row["fault"] == self.surface] for part in places.PARTS
             }
-            return found | {
-                "answers": [places_shown.answer(scenario, row) for row in found["points"]],
-                "folder": folder,
-            }
+            answers = [places_shown.answer(scenario, row) for row in found["points"]]
+            return found | {"answers": answers, "folder": folder}
         failures = in_trim.engine_failures(scenario)
         found |= {"alike": in_trim.alike(scenario), "folder": folder}
         return found | ({"engines": failures} if failures else {})
@@ -173,8 +168,7 @@ class Detectability(StudyCommand):
         )
         flown = GRIDS[grid].only(self.sensors, self.turbulence)
         flown = flown.elsewhere(self.aircraft, airspeed_mps, altitude_m, self.surface)
-        document = run_schemes(self.out, flown, chosen, self.processes, reporter.progress)
-        return document | {"folder": str(self.out / NAME)}
+        return run_into(schemes_study(flown, chosen), self.out, self.processes, reporter.progress)
 
     def as_text(self, document: Document, colour: bool) -> str:
         """The answers in words, else sentences and table; and where the files are."""

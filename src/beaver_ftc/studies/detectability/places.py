@@ -23,7 +23,8 @@ from beaver_ftc.studies.detectability.certain import (
     judge,
     pairs_of,
 )
-from beaver_ftc.studies.engine.study import Progress, Study, run_study
+from beaver_ftc.studies.detectability.shown import NAME
+from beaver_ftc.studies.engine.study import Study
 
 SPEEDS_MPS, ALTITUDES_M = (36.0, 40.0, 44.0, 48.0, 52.0), (0.0, 1000.0, 2000.0, 3000.0)
 SHARES = (0.9, 1.0, 1.1)  # of the speed another aircraft starts with
@@ -35,17 +36,14 @@ PARTS = ("points", "pairs")  # of the document: a row a fault, and a row a fault
 PAIRS = (*PLACE, "fault", "other", *isolability.LOSS_COLUMNS, *isolability.DOUBLET_COLUMNS)
 
 
-def run_places(
-    out: Path,
+def places_study(
     scenario: Scenario,
     speeds_mps: Sequence[float] = (),
     altitudes_m: Sequence[float] = (),
     excitations: Sequence[float] = EXCITATIONS,
-    workers: int = 1,
-    progress: Progress | None = None,
-) -> Document:
-    """Write `out/<scenario>-detectability/`; return the document: a row a fault and grid point, and one a
-    fault, other surface and grid point.
+) -> Study:
+    """What is certain in a scenario at these places: a row a fault and place, and one a fault, other surface
+    and place.
 
     Raises BadInput if another scheme than the sharpened one diagnoses.
     """
@@ -56,17 +54,16 @@ def run_places(
             f"{scenario.name}: fdi: detectability is worked out for the sharpened scheme, allowed: "
             "scheme adaptive-estimators, sharpen all, a filter of 1e6 in pole_bank_per_s"
         )
-    aircraft, start_m = scenario.airframe, scenario.airframe.file.start.altitude_m
+    start_m = scenario.airframe.file.start.altitude_m
     if not speeds_mps:
-        speeds_mps = usual_airspeeds(aircraft, SPEEDS_MPS)
+        speeds_mps = usual_airspeeds(scenario.airframe, SPEEDS_MPS)
     if not altitudes_m:  # another aircraft's error is known about the one it starts at
         altitudes_m = ALTITUDES_M if start_m is None else (start_m,)
-    study = Study(
-        survey_name(scenario), list(product(speeds_mps, altitudes_m, excitations)),
+    return Study(
+        f"{scenario.name[:86]}-{NAME}", list(product(speeds_mps, altitudes_m, excitations)),
         partial(look_at, scenario), partial(document_of, scenario.name), places_shown.FILES,
         row=dict[str, list[Document]], follows_from=scenario,
     )  # fmt: skip
-    return run_study(study, out, workers, progress)
 
 
 def usual_airspeeds(aircraft: Aircraft, of_the_beaver: tuple[float, ...]) -> tuple[float, ...]:
@@ -74,11 +71,6 @@ def usual_airspeeds(aircraft: Aircraft, of_the_beaver: tuple[float, ...]) -> tup
     if aircraft is load():
         return of_the_beaver
     return tuple(round(share * aircraft.usual_airspeed_mps, 1) for share in SHARES)
-
-
-def survey_name(scenario: Scenario) -> str:
-    """The name of the survey's result folder, at most 100 characters."""
-    return f"{scenario.name[:86]}-detectability"
 
 
 def with_aircraft(scenario: Scenario, reference: str) -> Scenario:

@@ -12,6 +12,7 @@ from beaver_ftc.results.model import Document
 from beaver_ftc.studies.compare.replay import Trace, alarms_at
 from beaver_ftc.studies.detectability.schemes import BUILT_IN, WATCHED_S, WITHIN_S, Grid, Watched
 from beaver_ftc.studies.engine.statistics import binomial, duel, or_never, poisson, share_within
+from beaver_ftc.studies.present.page import Summary
 from beaver_ftc.studies.present.tables import finite, grouped
 
 
@@ -108,10 +109,9 @@ JUDGED_S = 1.0
 DUELS_S = (JUDGED_S, WATCHED_S)
 
 
-def document_of(
-    grid: Grid, healthy: Sequence[Watched], faulted: Sequence[Watched]
-) -> tuple[Document, list[Row]]:
-    """The document, and the rows behind it. Raises BadInput where not one flight could be judged."""
+def document_of(grid: Grid, healthy: Sequence[Watched], faulted: Sequence[Watched]) -> Summary:
+    """The document, with the rows of `rows_of` behind it. Raises BadInput where not one flight could be
+    judged."""
     watched, struck = _by_condition(healthy), _by_condition(faulted)
     failures = sorted({failure for one in (*healthy, *faulted) for failure in one.failures})
     if failures and not watched:
@@ -146,7 +146,7 @@ def document_of(
         "failures": failures,
         "versions": dict(versions()),
     }
-    return document, rows
+    return Summary(document, rows)
 
 
 def title_of(sensors: str, turbulence: str) -> str:

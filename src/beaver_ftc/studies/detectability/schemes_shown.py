@@ -3,12 +3,11 @@
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from itertools import product
-from operator import itemgetter
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from beaver_ftc.results.metrics import as_json
 from beaver_ftc.results.model import Document
 from beaver_ftc.results.style import SERIES
 from beaver_ftc.studies.compare.scores import leader
@@ -23,7 +22,7 @@ from beaver_ftc.studies.detectability.probabilities import (
 from beaver_ftc.studies.detectability.schemes import BOTH, BUILT_IN, WATCHED_S, WITHIN_S
 from beaver_ftc.studies.detectability.shown import NAME, SOON, Line, table
 from beaver_ftc.studies.present.figures import GRID, draw_estimates, label_edges, marker, panels
-from beaver_ftc.studies.present.page import Makers, Part, Pictures, study_files
+from beaver_ftc.studies.present.page import Part, Pictures, Summary, study_files
 from beaver_ftc.studies.present.tables import grouped, percent, seconds
 
 if TYPE_CHECKING:
@@ -126,8 +125,9 @@ def _legend(document: Document) -> list[str]:
     ]
 
 
-def draw_schemes(document: Document, rows: Sequence[Row]) -> "Figure":
+def draw_schemes(document: Summary) -> "Figure":
     """Rows air, columns surfaces; in each, a line of dots a scheme: the share detected, a dot a magnitude."""
+    rows: Sequence[Row] = document.behind
     surfaces, conditions = document["grid"]["surfaces"], document["grid"]["conditions"]
     names = [*dict.fromkeys(row["scheme"] for row in rows), INFORMED]
     most = f"at most {document['false_alarms_per_h']:g} false alarms per hour"
@@ -178,11 +178,4 @@ def _draw(panel: "Axes", rows: Sequence[Row], names: Sequence[str], document: Do
     panel.tick_params(labelsize=8)
 
 
-# Of the document and of one row a flight and scheme.
-FILES: Makers = {
-    **study_files(
-        NAME, lambda survey: page_of(survey[0]), {NAME: itemgetter(1)},
-        {NAME: lambda survey: draw_schemes(*survey)},
-    ),
-    f"{NAME}.json": lambda survey: as_json(survey[0]),
-}  # fmt: skip
+FILES = study_files(NAME, page_of, {NAME: attrgetter("behind")}, {NAME: draw_schemes})

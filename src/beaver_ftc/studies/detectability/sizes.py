@@ -9,10 +9,9 @@ The same flights, with one thing left out of scenario and declaration, say what 
 another reference, what would help.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -31,7 +30,7 @@ from beaver_ftc.studies.detectability.shown import NAME
 from beaver_ftc.studies.detectability.thresholds import LARGEST, STAGES, of_all, threshold
 from beaver_ftc.studies.engine.draws import loss
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, counted, or_never
-from beaver_ftc.studies.engine.study import FlyRound, Study, run_study
+from beaver_ftc.studies.engine.study import FlyRound, Study
 from beaver_ftc.studies.present.tables import finite
 
 SHARE = 0.9  # of flights
@@ -63,7 +62,7 @@ class _Flown:
     """Flights as they are flown, each once; fly: a round of them."""
 
     fly: FlyRound
-    tell: Any
+    tell: Callable[[str], None]
     rows: dict[Flight, Document] = field(default_factory=dict)
 
     def of(self, variant: str, runs: Sequence[int], size: int) -> list[Document]:
@@ -78,22 +77,16 @@ class _Flown:
         return [row[key] for row in self.of(variant, runs, size)]
 
 
-def run_sizes(
-    out: Path, scenario: Scenario, asked: Asked, workers: int = 1, tell: Any = lambda line: None
-) -> Document:
-    """Write `out/<scenario>-detectability-<surface>/`; return the document.
-
-    Raises BadInput where the scenario cannot answer.
-    """
+def sizes_study(scenario: Scenario, asked: Asked, tell: Callable[[str], None] = lambda line: None) -> Study:
+    """The study of a scenario and surface; tell: takes a line a round. Raises BadInput where the scenario
+    cannot answer."""
     check(scenario, asked)
     variants = dict(variants_of(scenario, asked.surface))
-    study = Study(
+    return Study(
         f"{scenario.name[:70]}-{NAME}-{asked.surface}", (), partial(fly_one, variants, asked),
         dict, sizes_shown.FILES, follows_from=[scenario, asked], lost=lambda flight, why: _row(failed=True),
         rounds=lambda fly: _document(scenario, asked, variants, _Flown(fly, tell)),
     )  # fmt: skip
-    document: Document = run_study(study, out, workers)
-    return document | {"folder": str(out / study.name)}
 
 
 def check(scenario: Scenario, asked: Asked) -> None:

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from beaver_ftc.documents.errors import SimulationFailed, say_once
+from beaver_ftc.documents.files import Document
 from beaver_ftc.results.writer import clear_disk_errors, result_folder
 from beaver_ftc.studies.engine import store
 from beaver_ftc.studies.engine.workers import (
@@ -173,6 +174,11 @@ def run_study(study: Study, out: Path, workers: int = 1, progress: Progress | No
         document = study.document(rows)
         write_files(folder, contents(study.files, document))
     return document
+
+
+def run_into(study: Study, out: Path, workers: int = 1, progress: Progress | None = None) -> Document:
+    """The same; the document with the folder that it is kept in, as commands answer it."""
+    return run_study(study, out, workers, progress) | {"folder": str(out / study.name)}
 
 
 @contextlib.contextmanager

@@ -13,6 +13,7 @@ from beaver_ftc.commands import (
     WorkersOption,
 )
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.studies.engine.study import run_into
 from beaver_ftc.studies.matrix import fault_matrix, matrix_shown
 from beaver_ftc.studies.matrix import pitch_lost as lost
 
@@ -66,15 +67,11 @@ class Matrix(StudyCommand):
         speeds_mps = tuple(self.airspeed) if self.airspeed else None
         reporter.progress(0.0)
         if self.pitch_lost:
-            name = lost.NAME
-            document = lost.run_pitch_lost(self.out, speeds_mps, self.processes, reporter.progress)
+            study = lost.pitch_lost_study(speeds_mps)
         else:
-            name = fault_matrix.name_of(self.declared, self.turbulence)
-            document = fault_matrix.run_matrix(
-                self.out, speeds_mps, self.processes, reporter.progress, self.declared,
-                self.aircraft or DEFAULT, self.turbulence.value,
-            )  # fmt: skip
-        return document | {"folder": str(self.out / name)}
+            aircraft = self.aircraft or DEFAULT
+            study = fault_matrix.matrix_study(speeds_mps, self.declared, aircraft, self.turbulence.value)
+        return run_into(study, self.out, self.processes, reporter.progress)
 
     def _check(self) -> None:
         if self.pitch_lost and self.declared:

@@ -23,7 +23,7 @@ from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.schema import load as load_scenario
 from beaver_ftc.studies.detectability.certain import axis_of
 from beaver_ftc.studies.detectability.places import usual_airspeeds
-from beaver_ftc.studies.engine.study import Progress, Study, run_study
+from beaver_ftc.studies.engine.study import Study
 from beaver_ftc.studies.matrix.clairvoyant import columns_of, seen_when_told
 from beaver_ftc.studies.matrix.matrix_shown import FILES, NAME, VERDICTS
 from beaver_ftc.studies.reproduce.choices import SETTING
@@ -276,18 +276,12 @@ def _remark(here: list[Document]) -> str:
     return ""
 
 
-def name_of(declared: bool, turbulence: str) -> str:
-    """The result folder's name of the matrix, with errors or without, in such air."""
-    name = DECLARED if declared else NAME
-    return name if turbulence == "none" else f"{name}-{turbulence}"
-
-
-def run_matrix(
-    out: Path, airspeeds_mps: tuple[float, ...] | None = None, workers: int = 1,
-    progress: Progress | None = None, declared: bool = False, aircraft: str = DEFAULT,
+def matrix_study(
+    airspeeds_mps: tuple[float, ...] | None = None, declared: bool = False, aircraft: str = DEFAULT,
     turbulence: str = "none",
-) -> Document:  # fmt: skip
-    """Write table, JSON and heat map into the folder that `name_of` says, in `out`; return the document."""
+) -> Study:  # fmt: skip
+    """The matrix of an aircraft, with errors or without, in such air."""
+    name = DECLARED if declared else NAME
+    folder = name if turbulence == "none" else f"{name}-{turbulence}"
     all_cases = cases(airspeeds_mps or airspeeds_of(aircraft), declared, aircraft, turbulence)
-    matrix = Study(name_of(declared, turbulence), all_cases, fly_case, document_of, FILES)
-    return run_study(matrix, out, workers, progress)
+    return Study(folder, all_cases, fly_case, document_of, FILES)

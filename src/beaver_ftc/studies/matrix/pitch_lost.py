@@ -6,7 +6,6 @@ The report also has the linear margins of engine power as a pitch effector (powe
 from collections.abc import Sequence
 from functools import partial
 from math import degrees
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +15,7 @@ from beaver_ftc.results.log import Columns
 from beaver_ftc.results.metrics import as_json, metrics
 from beaver_ftc.results.model import Document
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.studies.engine.study import Progress, Study, run_study
+from beaver_ftc.studies.engine.study import Study
 from beaver_ftc.studies.matrix.fault_matrix import AIRSPEEDS_MPS, AT_S, REFERENCE, UNCERTAINTY, trimmed_deg
 from beaver_ftc.studies.matrix.power_margins import margins
 from beaver_ftc.studies.present.page import Makers
@@ -91,15 +90,11 @@ def _outcome(scenario: Scenario) -> Document:
     }
 
 
-def run_pitch_lost(
-    out: Path, airspeeds_mps: tuple[float, ...] | None = None, workers: int = 1,
-    progress: Progress | None = None,
-) -> Document:  # fmt: skip
-    """Write `out/pitch-lost/` (table, JSON); return the document."""
+def pitch_lost_study(airspeeds_mps: tuple[float, ...] | None = None) -> Study:
+    """Every pair of faults at these airspeeds under both laws."""
     airspeeds_mps = airspeeds_mps or AIRSPEEDS_MPS
     cases = [PitchCase(name, V, law) for law in LAWS for name in LOST for V in airspeeds_mps]
-    document = partial(document_of, airspeeds_mps=airspeeds_mps)
-    return run_study(Study(NAME, cases, fly_case, document, FILES), out, workers, progress)
+    return Study(NAME, cases, fly_case, partial(document_of, airspeeds_mps=airspeeds_mps), FILES)
 
 
 def document_of(rows: list[Document], airspeeds_mps: Sequence[float]) -> Document:

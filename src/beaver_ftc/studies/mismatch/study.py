@@ -24,7 +24,7 @@ from beaver_ftc.results.metrics import as_json, measure
 from beaver_ftc.results.model import Document, Metrics
 from beaver_ftc.results.writer import result_folder, write_documents, write_report_files
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.studies.engine.study import Progress, Study, run_study
+from beaver_ftc.studies.engine.study import Progress, Study
 from beaver_ftc.studies.mismatch import charts
 from beaver_ftc.studies.mismatch.bound import recommended_for
 from beaver_ftc.studies.mismatch.linear import analyse, linear_document
@@ -172,30 +172,20 @@ def write_comparison(out: Path, entries: list[Document], recommended: Document, 
     return out / COMPARISON
 
 
-def run_map(
-    out: Path, scenario: Scenario, report: bool = True, progress: Progress | None = None
-) -> list[Document]:
-    """Write `out/<scenario>-mismatch-map/`: the map as JSON and CSV, and a figure. Return its entries.
-
-    One entry per axis, speed and altitude: worst share of the bound, smallest constant, and why.
-    """
+def map_study(scenario: Scenario, report: bool = True) -> Study:
+    """The map of a scenario: an entry an axis, speed and altitude, with the worst share of the bound, the
+    smallest constant, and why. report: whether it is drawn."""
 
     def drawn(found: Document) -> Files | None:
         return {f"{MAP}.png": charts.map_figure(found["map"], scenario.name)} if report else None
 
     conditions = [(V, h) for h in ALTITUDES_M for V in AIRSPEEDS_MPS]
-    flights = Study(
-        map_name(scenario), conditions, partial(_cell, scenario),
+    return Study(
+        f"{scenario.name}-{MAP}", conditions, partial(_cell, scenario),
         lambda cells: {"scenario": scenario.name, "map": [entry for cell in cells for entry in cell]},
         {"mismatch.json": as_json, "mismatch.csv": lambda found: as_csv(found["map"]), "figures": drawn},
         row=list[Document], follows_from=scenario,
     )  # fmt: skip
-    return run_study(flights, out, progress=progress)["map"]
-
-
-def map_name(scenario: Scenario) -> str:
-    """The name of the map's result folder."""
-    return f"{scenario.name}-{MAP}"
 
 
 def _cell(scenario: Scenario, condition: tuple[float, float]) -> list[Document]:

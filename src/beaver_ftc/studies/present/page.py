@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from beaver_ftc.documents.errors import BadInput
+from beaver_ftc.documents.files import Document
 from beaver_ftc.results.metrics import as_json
 from beaver_ftc.studies.present.tables import (
     Columns,
@@ -159,6 +160,14 @@ def study_files(
         **{f"{stem}.png": draw for stem, draw in figures.items()},
         f"{name}.html": html,
     }
+
+
+class Summary(dict[str, Any]):
+    """A document, and what is behind it: its files show that too, but the document does not have it."""
+
+    def __init__(self, document: Document, behind: Any) -> None:
+        super().__init__(document)
+        self.behind = behind
 
 
 def _csv(rows_of: Callable[[Any], Any], document: Any) -> str:

@@ -3,7 +3,6 @@
 Beside them the sensitivity study in one: how far each number stays from its limit, whatever is changed.
 """
 
-from collections.abc import Mapping
 from math import inf
 from textwrap import fill
 from typing import TYPE_CHECKING
@@ -23,7 +22,7 @@ from beaver_ftc.results.views import (
     isolation_panel,
 )
 from beaver_ftc.studies.engine.statistics import or_never
-from beaver_ftc.studies.present.page import Files
+from beaver_ftc.studies.present.page import Files, Summary
 from beaver_ftc.studies.reproduce.cases import Flown
 from beaver_ftc.studies.reproduce.choices import FAULT_AT_S
 from beaver_ftc.studies.reproduce.claims import BORNE_OUT, CANNOT_BE_JUDGED, NOT_BORNE_OUT, STRONGER
@@ -86,9 +85,10 @@ FIGURES: tuple[tuple[View, str, tuple[float, float]], ...] = tuple(  # view, cas
 )
 
 
-def figures_of(document: Document, flights: Mapping[str, Flown]) -> Files:
-    """Every figure by the name of its file: a figure for each published one, and the sensitivity study's."""
-    drawn = {f"{view.name}.png": _drawn(view, flights[case], span) for view, case, span in FIGURES}
+def figures_of(document: Summary) -> Files:
+    """Every figure by the name of its file: a figure for each published one, and the sensitivity study's.
+    document: with the published cases, flown, behind it."""
+    drawn = {f"{view.name}.png": _drawn(view, document.behind[case], span) for view, case, span in FIGURES}
     return {**drawn, f"{SENSITIVITY}.png": margins_figure(document)}
 
 

@@ -6,13 +6,12 @@ from dataclasses import asdict, dataclass
 from functools import partial
 from math import nan
 from pathlib import Path
-from typing import Any
 
 from beaver_ftc.commands import Reporter, StudyCommand, WorkersOption
 from beaver_ftc.results.metrics import as_json, versions
 from beaver_ftc.results.model import Document
-from beaver_ftc.studies.engine.study import Study, fly_all, run_study
-from beaver_ftc.studies.present.page import Makers
+from beaver_ftc.studies.engine.study import Study, run_into
+from beaver_ftc.studies.present.page import Makers, Summary
 from beaver_ftc.studies.present.tables import finite
 from beaver_ftc.studies.reproduce import beside, truth_and_design
 from beaver_ftc.studies.reproduce.cases import (
@@ -91,8 +90,10 @@ def fly_published() -> dict[str, Flown]:
     return {case.name: fly_case(case) for case in PUBLISHED}
 
 
-def document_of(published: Mapping[str, Flown], rows: Sequence[Document]) -> Document:
-    """Judge the published cases, and fly what is shown beside them; rows: of every setting of STUDIED."""
+def document_of(rows: Sequence[Document]) -> Summary:
+    """Judge the published cases, and fly what is shown beside them; rows: of every setting of STUDIED. Behind
+    it: the published cases, flown, by name."""
+    published = fly_published()
     settings = {
         setting.name: row for (asked, setting), row in zip(STUDIED, rows, strict=True) if asked == NUMBERS
     }
@@ -106,7 +107,7 @@ def document_of(published: Mapping[str, Flown], rows: Sequence[Document]) -> Doc
         {"where": c.where, "statement": c.statement, **(judged.get(c) or _unjudged(c.reason))} for c in CLAIMS
     ]
     counts = Counter(claim["verdict"] for claim in claims)
-    return {
+    document = {
         "passed": all(claim["verdict"] != NOT_BORNE_OUT or claim["because"] for claim in claims),
         "counts": {verdict: counts[verdict] for verdict in VERDICTS},
         **_counted_apart(claims),
@@ -133,6 +134,7 @@ def document_of(published: Mapping[str, Flown], rows: Sequence[Document]) -> Doc
         ],
         "versions": dict(versions()),
     }
+    return Summary(document, published)
 
 
 def _judged(claim: Claim, by_setting: Mapping[str, tuple[float, float]]) -> Document:
@@ -264,23 +266,12 @@ def _missed(ours: list[float], numbers: list[float]) -> list[Document]:
     ]
 
 
-# Of the document and the published cases, flown.
 FILES: Makers = {
-    "figures": lambda found: figures_of(*found),
-    f"{NAME}.json": lambda found: as_json(found[0]),
-    f"{NAME}.md": lambda found: as_markdown(found[0], "figures"),
-    f"{NAME}.html": lambda found: partial(as_html, found[0]),
+    "figures": figures_of,
+    f"{NAME}.json": as_json,
+    f"{NAME}.md": partial(as_markdown, figures="figures"),
+    f"{NAME}.html": lambda document: partial(as_html, document),
 }
-
-
-def reproduced(workers: int) -> Document:
-    """The document, kept nowhere."""
-    return _document_and_cases(fly_all(row_of, STUDIED, workers))[0]
-
-
-def _document_and_cases(rows: Sequence[Any]) -> tuple[Document, dict[str, Flown]]:
-    published = fly_published()
-    return document_of(published, rows), published
 
 
 @dataclass(frozen=True)
@@ -315,9 +306,8 @@ class Reproduce(StudyCommand):
 
     def run(self, reporter: Reporter) -> Document:
         """Fly the published cases, and all settings with their ablations."""
-        study = Study(NAME, STUDIED, row_of, _document_and_cases, FILES)
-        document: Document = run_study(study, self.out, self.processes, reporter.progress)[0]
-        return document | {"folder": str(self.out / NAME)}
+        study = Study(NAME, STUDIED, row_of, document_of, FILES)
+        return run_into(study, self.out, self.processes, reporter.progress)
 
     def as_text(self, document: Document, colour: bool) -> str:
         """The tables, and what the sensitivity study says."""

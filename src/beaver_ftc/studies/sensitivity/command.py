@@ -12,7 +12,7 @@ from beaver_ftc.commands import SCENARIO, Reporter, StudyCommand, WorkersOption
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.results.model import Document
 from beaver_ftc.scenario.schema import Scenario, load_scenario
-from beaver_ftc.studies.engine.study import Progress, Study, run_study
+from beaver_ftc.studies.engine.study import Study, run_into
 from beaver_ftc.studies.present.page import as_text
 from beaver_ftc.studies.sensitivity import beyond, effects, errors_shown, mechanisms_shown
 from beaver_ftc.studies.sensitivity.errors import errors_of
@@ -25,43 +25,28 @@ from beaver_ftc.studies.sensitivity.mechanisms import (
 )
 
 
-def run_errors(
-    out: Path, scenario: Scenario, flights: int = beyond.FLIGHTS, seed: int = 1, workers: int = 1,
-    progress: Progress | None = None,
-) -> Document:  # fmt: skip
-    """Write `out/<scenario>-sensitivity/`; return the document.
-
-    Raises BadInput where nothing is diagnosed.
-    """
+def errors_study(scenario: Scenario, flights: int = beyond.FLIGHTS, seed: int = 1) -> Study:
+    """What errors larger than declared change in a scenario. Raises BadInput where nothing is diagnosed."""
     if scenario.fdi.scheme == "none":
         raise BadInput(f"{scenario.name}: fdi.scheme: none diagnoses nothing, allowed: a scheme")
     errors = errors_of(scenario)
     cases = beyond.cases_of(errors, flights)
-    study = Study(
+    return Study(
         f"{scenario.name[:80]}-{errors_shown.NAME}", cases, partial(beyond.fly_one, scenario, seed),
         partial(beyond.document_of, scenario, errors, cases, seed), errors_shown.FILES,
         follows_from=[scenario, seed], lost=lambda flight, why: beyond.FAILED,
     )  # fmt: skip
-    return _flown(study, out, workers, progress)
 
 
-def run_mechanisms(
-    out: Path, draws: int, seed: int, workers: int, progress: Progress | None = None
-) -> Document:
-    """Write `out/mechanisms-sensitivity/`; return the document."""
+def mechanisms_study(draws: int, seed: int) -> Study:
+    """What the mechanisms of both systems are worth."""
 
     def document(rows: Sequence[Document]) -> Document:
         margins = [margins_row(cell) for cell in margin_cells()]
         return effects.document_of(seed, draws, rows, margins)
 
     name, fly = f"mechanisms-{mechanisms_shown.NAME}", partial(fly_one, seed)
-    study = Study(name, cases_of(draws), fly, document, mechanisms_shown.FILES, follows_from=seed)
-    return _flown(study, out, workers, progress)
-
-
-def _flown(study: Study, out: Path, workers: int, progress: Progress | None) -> Document:
-    document: Document = run_study(study, out, workers, progress)
-    return document | {"folder": str(out / study.name)}
+    return Study(name, cases_of(draws), fly, document, mechanisms_shown.FILES, follows_from=seed)
 
 
 @dataclass(frozen=True)
@@ -112,10 +97,11 @@ class Sensitivity(StudyCommand):
         """Fly every row, or every draw."""
         if (self.scenario is None) is not self.mechanisms:
             raise BadInput("sensitivity: allowed: exactly one of SCENARIO and --mechanisms")
-        how = self.seed, self.processes, reporter.progress
         if self.mechanisms:
-            return run_mechanisms(self.out, self.draws, *how)
-        return run_errors(self.out, load_scenario(str(self.scenario)), self.flights, *how)
+            study = mechanisms_study(self.draws, self.seed)
+        else:
+            study = errors_study(load_scenario(str(self.scenario)), self.flights, self.seed)
+        return run_into(study, self.out, self.processes, reporter.progress)
 
     def as_text(self, document: Document, colour: bool) -> str:
         """Findings and tables, and where the files are."""

@@ -11,7 +11,6 @@ import hashlib
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
-from pathlib import Path
 from statistics import NormalDist
 
 import numpy as np
@@ -25,7 +24,7 @@ from beaver_ftc.scenario.builtin import to_yaml
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sweeps import Sweep
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial
-from beaver_ftc.studies.engine.study import FlyRound, Study, run_study
+from beaver_ftc.studies.engine.study import FlyRound, Study
 from beaver_ftc.studies.present.tables import all_finite, number
 from beaver_ftc.studies.sweep.one_flight import scenario_of, warm_up
 from beaver_ftc.studies.sweep.sampling import OF_RARE, Assignment, generator_of, values_at
@@ -199,21 +198,17 @@ def _fly(sweep: Sweep, expectation: str, case: tuple[int, list[float]]) -> Docum
         return {"score": -math.inf, "failed": True}
 
 
-def run_rare(
-    sweep: Sweep, expectation: str, out: Path, workers: int = 1, tell: Callable[[str], None] = lambda _: None
-) -> Document:
-    """Estimate the probability that a sweep's flights do not meet an expectation of its base scenario; write
-    `out/<sweep>-rare-<expectation>/` and return its document.
+def rare_study(sweep: Sweep, expectation: str, tell: Callable[[str], None] = lambda _: None) -> Study:
+    """The probability that a sweep's flights do not meet an expectation of its base scenario.
 
-    tell: told how far it has come. Raises BadInput for what the base does not expect, SimulationFailed if no
-    flight could be flown.
+    tell: told how far it has come. Raises BadInput for what the base does not expect; flown, SimulationFailed
+    if no flight could be.
     """
     check(sweep, expectation)
     name = f"{sweep.name}-rare-{expectation.replace('.', '-')}"
-    chains = Chains(len(sweep.keys), sweep.file.seed)
 
     def rounds(flies: FlyRound) -> Document:
-        failed = 0
+        chains, failed = Chains(len(sweep.keys), sweep.file.seed), 0
 
         def fly(points: np.ndarray) -> Scores:
             nonlocal failed
@@ -236,13 +231,11 @@ def run_rare(
         say_once(f"{name}: of a flight {why}; such flights count as no event")
         return {"score": -math.inf, "failed": True}
 
-    study = Study(
+    return Study(
         name, (), partial(_fly, sweep, expectation), dict, {"rare.json": as_json, "flight.yaml": likeliest},
         follows_from=[identity_of(sweep, expectation), RUNS, MEMBERS], lost=lost,
         warm_up=partial(warm_up, sweep), rounds=rounds,
     )  # fmt: skip
-    document: Document = run_study(study, out, workers)
-    return document | {"folder": str(out / name)}
 
 
 def _document(sweep: Sweep, expectation: str, chains: Chains, failed: int) -> Document:

@@ -86,12 +86,22 @@ LEVELS = {
 def mechanisms_asides() -> str:
     """Further tables, as CSV."""
     document = _flown()[0]
-    tables = shown.tables(document) | {
-        name: shown.table_by_level(document, *of) for name, of in LEVELS.items()
-    }
+    tables = shown.tables(document) | {name: _by_level(document, *of) for name, of in LEVELS.items()}
     return "\n".join(
         aside(f"mechanisms-{name}", says, _markdown(tables[name])) for name, says in ASIDES.items()
     )
+
+
+def _by_level(document: Document, factor: str, criterion: str, serves: str) -> Table:
+    """By level of a factor, the net share by a criterion, of the mechanisms that serve diagnosis or law."""
+    levels = document["factors"][factor]
+    names = [f"error {100 * level:g} %" if factor == "error" else str(level) for level in levels]
+    rows = [
+        [shown.label(row), *(c for of in row["by"][factor].values() for c in shown.net_points(of[criterion]))]
+        for row in document["mechanisms"]
+        if row["serves"] == serves
+    ]
+    return Table(("mechanism", *(head for name in names for head in (name, shown.INTERVAL))), rows)
 
 
 def _markdown(of: Table) -> str:

@@ -13,14 +13,13 @@ from beaver_ftc.studies.compare.trial import LAW, ORACLE, SCHEME, Entry, SetFlig
 from beaver_ftc.studies.engine.study import Study
 from beaver_ftc.studies.present import page
 from beaver_ftc.studies.present.figures import curve_look, marker, panels
-from beaver_ftc.studies.present.tables import Columns, aligned, percent, tabulated
+from beaver_ftc.studies.present.tables import Columns, aligned, bare_percent, tabulated
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 Cell = Callable[[Document], str]
-_PERCENT = partial(percent, unit="")
 
 
 def _cell(form: Callable[[Any], str], *keys: str, none: str = "-") -> Cell:
@@ -41,16 +40,19 @@ def _free(row: Document) -> str:
     """What a scheme finds at the most sensitive level without a false alarm."""
     if row.get("free") is None:
         return "-"
-    rate, delay = _cell(_PERCENT, "detection_rate"), _cell("{:.2f}".format, "delay_median_s", none="never")
+    rate, delay = (
+        _cell(bare_percent, "detection_rate"),
+        _cell("{:.2f}".format, "delay_median_s", none="never"),
+    )
     return f"{rate(row['free'])} / {delay(row['free'])}"
 
 
 DIAGNOSIS: Columns = (
     ("scheme", "scheme"),
     ("false alarms/h (95 %)", _alarms),
-    ("detected %", _cell(_PERCENT, "detection_rate")),
+    ("detected %", _cell(bare_percent, "detection_rate")),
     ("delay s 50/90 %", _of_faults(_cell("{:.2f}".format, "delay_median_s", "delay_90_s", none="never"))),
-    ("isolated %", _cell(_PERCENT, "isolation_rate")),
+    ("isolated %", _cell(bare_percent, "isolation_rate")),
     ("with no false alarm: detected % / delay s", _of_faults(_free)),
     ("tracking/oracle 50/90 %", _cell("{:.2f}".format, "ratio_median", "ratio_90", none="lost")),
     ("lost", "departures"),

@@ -23,7 +23,7 @@ from beaver_ftc.studies.detectability.schemes import BOTH, BUILT_IN, WATCHED_S, 
 from beaver_ftc.studies.detectability.shown import NAME, SOON, Line, table
 from beaver_ftc.studies.present.figures import GRID, draw_estimates, label_edges, marker, panels
 from beaver_ftc.studies.present.page import Part, Pictures, Summary, study_files
-from beaver_ftc.studies.present.tables import grouped, percent, seconds
+from beaver_ftc.studies.present.tables import bare_percent, grouped, percent, seconds
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -57,7 +57,7 @@ def _scheme_lines(document: Document, sensors: str, turbulence: str) -> Iterator
                 row |= {"scheme": f"{level['scheme']}{OWN}", "false alarms/h": _rate(level["own_level"])}
                 yield row | _soon(found and found["own_level"])
         for known in _those(document["limits"], **here, surface=surface):
-            shares = "/".join(percent(share, "") for share in known["within"].values())
+            shares = "/".join(map(bare_percent, known["within"].values()))
             yield place | {"scheme": INFORMED, SOON: shares}
 
 
@@ -65,7 +65,7 @@ def _soon(found: Document | None) -> Line:
     """Per cent found within each delay, and the median delay."""
     if not found or not found["flights"]:
         return {SOON: "-"}
-    shares = "/".join(percent(found["within"][f"{within_s:g}"]["value"], "") for within_s in WITHIN_S)
+    shares = "/".join(bare_percent(found["within"][f"{within_s:g}"]["value"]) for within_s in WITHIN_S)
     return {SOON: shares, "median delay": seconds(found["median_delay_s"]), "flights": str(found["flights"])}
 
 

@@ -7,7 +7,7 @@ from beaver_ftc.results.metrics import NEAR_THRESHOLD_SHARE
 from beaver_ftc.results.model import Document
 from beaver_ftc.studies.detectability.shown import NAME, table
 from beaver_ftc.studies.present.page import Makers, Part, study_files
-from beaver_ftc.studies.present.tables import percent
+from beaver_ftc.studies.present.tables import bare_percent, percent
 
 NOT_FOUND = (  # key of a number of flights; what is said of one flight, and of several
     (
@@ -70,7 +70,7 @@ def _sizes(document: Document) -> Iterator[str]:
         size = f"a loss of {percent(found['size'])} ({_interval(found)}) of the effectiveness of {surface}"
     yield (
         f"Found {within} in {percent(document['share'])} of flights: {size} (a total loss: in "
-        f"{percent(total['value'])}, {percent(total['low'], '')} to {percent(total['high'])}; "
+        f"{percent(total['value'])}, {bare_percent(total['low'])} to {percent(total['high'])}; "
         f"{total['count']} of {total['of']} flights). Intervals: 95 %."
     )
 
@@ -124,7 +124,7 @@ def _interval(found: Document) -> str:
         return "more than a total loss"
     if found["low"] == found["high"]:
         return percent(found["low"])
-    low = percent(found["low"], "")
+    low = bare_percent(found["low"])
     return f"{low} % or more" if found["high"] is None else f"{low} to {percent(found['high'])}"
 
 

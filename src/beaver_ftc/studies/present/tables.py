@@ -47,6 +47,7 @@ def percent(share: float | None, unit: str = " %") -> str:
     return "none" if share is None else f"{100.0 * share:.0f}{unit}"
 
 
+bare_percent = partial(percent, unit="")  # below a head that has the unit
 number_or_never = partial(number, none="never")
 
 

@@ -1,7 +1,6 @@
 """What larger errors change: as sentences, a table, a figure and files."""
 
 from collections.abc import Callable, Iterator, Sequence
-from functools import partial
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
@@ -9,7 +8,7 @@ from beaver_ftc.results.model import Document
 from beaver_ftc.results.style import BLACK
 from beaver_ftc.studies.present.figures import GRID, draw_estimates, label_edges, panels
 from beaver_ftc.studies.present.page import Part, Pictures, study_files, table, versions_line
-from beaver_ftc.studies.present.tables import estimate, grouped, number_or_never, percent
+from beaver_ftc.studies.present.tables import bare_percent, estimate, grouped, number_or_never
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -65,11 +64,8 @@ def _onset(rows: Sequence[Document]) -> str:
     )
 
 
-_PERCENT = partial(percent, unit="")
-
-
 def _share(found: Document) -> str:
-    return "{} ({})".format(*estimate(found, _PERCENT))
+    return "{} ({})".format(*estimate(found, bare_percent))
 
 
 def _interval(found: Document, form: Callable[[Any], str] = number_or_never) -> str:

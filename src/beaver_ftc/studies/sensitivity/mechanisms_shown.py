@@ -3,12 +3,12 @@
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from itertools import chain
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from beaver_ftc.results.model import Document
 from beaver_ftc.studies.present.figures import GRID, SERIES, draw_estimates, label_edges, panels
 from beaver_ftc.studies.present.page import Heading, Part, Pictures, Table, study_files, table, versions_line
-from beaver_ftc.studies.present.tables import estimate, number, number_or_never, percent
+from beaver_ftc.studies.present.tables import Columns, bare_percent, estimate, number, number_or_never
 from beaver_ftc.studies.sensitivity.mechanisms import mechanisms_of, system_of
 from beaver_ftc.studies.sensitivity.systems import DEFAULT, PAPER
 
@@ -66,7 +66,7 @@ def mechanism_sentences(document: Document) -> Iterator[str]:
     )
 
 
-def _label(row: Document) -> str:
+def label(row: Document) -> str:
     """A mechanism with its system."""
     return "{mechanism} ({system})".format(**row)
 
@@ -75,37 +75,26 @@ def mechanism_sentence(row: Document) -> str:
     """What the removal of a mechanism changes, beyond chance."""
     flights = row["flights"]
     if row["same_verdict"] == row["same_tracking"] == flights:
-        return f"{_label(row)}: without it all {flights} flights are the same."
+        return f"{label(row)}: without it all {flights} flights are the same."
     certain = {name: row[name] for name in CRITERIA if row[name]["low"] > 0.0 or row[name]["high"] < 0.0}
     if not certain:
         changed = flights - row["same_verdict"]
         differ = f"{changed} of {flights} verdicts differ" if changed else "no verdict differs"
-        return f"{_label(row)}: without it {differ}, and no criterion changes beyond chance."
+        return f"{label(row)}: without it {differ}, and no criterion changes beyond chance."
     said = (f"{CRITERIA[name]} {100 * found['value']:+.1f} points" for name, found in certain.items())
-    return f"{_label(row)}: without it, {', '.join(said)}."
+    return f"{label(row)}: without it, {', '.join(said)}."
 
 
 def tables(document: Document) -> dict[str, Table]:
     """The table of each of CAPTIONS."""
     return {
         "systems": _systems_table(document["systems"]),
-        "net": _mechanism_table(
-            document["mechanisms"], _with_interval(f"{words}, points" for words in CRITERIA.values()),
-            lambda row: chain.from_iterable(_net(row[name]) for name in CRITERIA),
-        ),
-        "same": _mechanism_table(
-            document["mechanisms"], ("flights", "same verdict", "same tracking"),
-            lambda row: map(str, (row["flights"], row["same_verdict"], row["same_tracking"])),
-        ),
-        "medians": _mechanism_table(
-            document["mechanisms"],
-            ("delay with, s", "delay without, s", "error with, deg/s", "error without, deg/s", "error ratio",
-             INTERVAL),
-            _medians,
-        ),
+        "net": table(NET, document["mechanisms"]),
+        "same": table(SAME, document["mechanisms"]),
+        "medians": table(MEDIANS, document["mechanisms"]),
         "alarms": table(ALARMS, document["false_alarms"]),
         "margins": table(MARGINS, document["margins"]),
-    }  # fmt: skip
+    }
 
 
 def _systems_table(systems: Document) -> Table:
@@ -113,52 +102,49 @@ def _systems_table(systems: Document) -> Table:
     quantities = [
         ("flights", [(str(row["flights"]), "") for row in systems.values()]),
         *(
-            (words, [estimate(row[name], partial(percent, unit="")) for row in systems.values()])
+            (words, [estimate(row[name], bare_percent) for row in systems.values()])
             for name, words in SYSTEM_SHARES.items()
         ),
         ("error, deg/s", [estimate(row["tracking_deg_s"]) for row in systems.values()]),
     ]
     return Table(
-        ("quantity", *_with_interval(systems)),
+        ("quantity", *(head for system in systems for head in (system, INTERVAL))),
         [(words, *chain.from_iterable(values)) for words, values in quantities],
     )
 
 
-def table_by_level(document: Document, factor: str, criterion: str, serves: str) -> Table:
-    """By level of a factor, the net share by a criterion, of the mechanisms that serve diagnosis or law."""
-    levels = document["factors"][factor]
-    names = [f"error {100 * level:g} %" if factor == "error" else str(level) for level in levels]
-    return _mechanism_table(
-        [row for row in document["mechanisms"] if row["serves"] == serves], _with_interval(names),
-        lambda row: chain.from_iterable(_net(found[criterion]) for found in row["by"][factor].values()),
-    )  # fmt: skip
-
-
-def _mechanism_table(rows: Sequence[Document], head: Sequence[str], of: Callable[[Document], Any]) -> Table:
-    """A row a mechanism, of these cells."""
-    return Table(("mechanism", *head), [(_label(row), *of(row)) for row in rows])
-
-
-def _with_interval(names: Any) -> list[str]:
-    return [head for name in names for head in (name, INTERVAL)]
-
-
-def _net(found: Document) -> tuple[str, str]:
+def net_points(found: Document) -> tuple[str, str]:
     """A net share and its interval, percentage points."""
     value, limits = estimate(found, lambda share: f"{100.0 * share:+.1f}")
     return "0.0" if value[1:] == "0.0" else value, limits
 
 
-def _medians(row: Document) -> Iterator[str]:
-    for of in ("delay_s", "tracking_deg_s"):
-        yield from (number_or_never(row[of][which]["value"]) for which in ("with", "without"))
-    yield from estimate(row["tracking_ratio"])
+def _with_interval(head: str, key: str, cells: Callable[[Document], tuple[str, str]] = estimate) -> Columns:
+    """The columns of an estimate and of its interval."""
+    return (head, key, lambda found: cells(found)[0]), (INTERVAL, key, lambda found: cells(found)[1])
 
 
 def _certified(row: Document) -> str:
     return str(row["certified"]) if row["certifiable"] or not row["count"] else "-"
 
 
+MECHANISM = ("mechanism", label)
+NET = (
+    MECHANISM,
+    *(column for name, words in CRITERIA.items()
+      for column in _with_interval(f"{words}, points", name, net_points)),
+)  # fmt: skip
+SAME = (
+    MECHANISM, ("flights", "flights"), ("same verdict", "same_verdict"), ("same tracking", "same_tracking"),
+)  # fmt: skip
+MEDIANS = (
+    MECHANISM,
+    ("delay with, s", "delay_s.with.value", number_or_never),
+    ("delay without, s", "delay_s.without.value", number_or_never),
+    ("error with, deg/s", "tracking_deg_s.with.value", number_or_never),
+    ("error without, deg/s", "tracking_deg_s.without.value", number_or_never),
+    *_with_interval("error ratio", "tracking_ratio"),
+)
 ALARMS = (
     ("system", "flown", system_of), ("mechanisms", "flown", mechanisms_of), ("false alarms", "count"),
     ("with an undeclared error", "undeclared"), ("certified", _certified),
@@ -186,7 +172,7 @@ def draw_mechanisms(document: Document) -> "Figure":
         panel.grid(axis="x", color=GRID, linewidth=0.6)
         panel.set_title(words, fontsize=9)
         panel.tick_params(labelsize=8)
-    grid[0][0].set_yticks(range(len(rows)), [_label(row) for row in rows], fontsize=8)
+    grid[0][0].set_yticks(range(len(rows)), [label(row) for row in rows], fontsize=8)
     grid[0][0].invert_yaxis()
     label_edges(grid, "worse without it, net points")
     known = grid[0][0].get_legend_handles_labels()

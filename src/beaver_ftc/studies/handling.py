@@ -83,7 +83,8 @@ def of_model(linear: LinearModel, airspeed_mps: float, where: str) -> list[Quali
 def _values(found: Mapping[str, Mode], g_per_rad: float) -> list[float]:
     """What LIMITS are about, in their order; g_per_rad: load factor per angle of attack."""
     short, dutch, phugoid = found["short_period"], found["dutch_roll"], found["phugoid"]
-    roll, spiral = found["roll"].pole, found["spiral"].pole.real
+    roll = found["roll"].pole
+    spiral = found["spiral"].pole.real
     cap = short.frequency_rad_s**2 / g_per_rad if g_per_rad > 0.0 else inf
     swing = dutch.damping * dutch.frequency_rad_s
     coupled = -roll.real if roll.imag else inf  # then neither is a mode of its own

@@ -103,7 +103,8 @@ def open_loop(
     scenario: Scenario, frame: FrameReadout, linear: LinearModel, y: np.ndarray, effectiveness: np.ndarray
 ) -> OpenLoop:
     """The loop with this effectiveness (n,), the law knowing it; y: the measured signals in trim."""
-    law, dt = frame.control, 1.0 / scenario.rate_hz
+    law = frame.control
+    dt = 1.0 / scenario.rate_hz
     _, G, f_x, f_y = jacobian(frame.design, np.zeros(3), y, law.trim_rad)
     lost = 1.0 - effectiveness[law.main[PITCH]] if law.stand_in >= 0 else 0.0
     C = outputs(linear.states, y)
@@ -129,7 +130,8 @@ def interpolated(law: DefaultLaw, qdyn: float, lost: float) -> np.ndarray:
 
 def allocation(G: np.ndarray, main: np.ndarray, stand_in: int, lost: float) -> np.ndarray:
     """Commands per demanded acceleration, (n, 3), as control/allocation.py gives them within the travels."""
-    commands, (a, e, r) = np.zeros((G.shape[1], 3)), main[[ROLL, PITCH, YAW]]
+    commands = np.zeros((G.shape[1], 3))
+    a, e, r = main[[ROLL, PITCH, YAW]]
     flap = lost if stand_in >= 0 else 0.0
     shares = [(PITCH, stand_in, flap), (PITCH, e, 1.0 - flap)]
     lateral = G[np.ix_([ROLL, YAW], [a, r])]

@@ -62,10 +62,13 @@ def law_response(loop: OpenLoop, z: np.ndarray) -> np.ndarray:
     s = loop.share * back + 1.0 - loop.share  # of what acts over the elapsed frame
     approach = loop.approach[:, None]
     a = approach / (z - 1.0 + approach)
-    one, rates = np.eye(3), np.eye(3, m)
+    one = np.eye(3)
+    rates = np.eye(3, m)
     K, L_rate, L_disturbance = map(np.diag, (1.0 - loop.L_rate, loop.L_rate, loop.L_disturbance))
-    Kp, lead = np.diag(loop.Kp), np.diag(loop.lead)
-    D, ahead = lead @ loop.demand, one + loop.share * dt * Kp
+    Kp = np.diag(loop.Kp)
+    lead = np.diag(loop.lead)
+    D = lead @ loop.demand
+    ahead = one + loop.share * dt * Kp
     moved = D @ Kp @ loop.G * loop.share * dt + lead - np.eye(n)
     # columns x, d, p of what is unknown = what is measured; rows:
     M = [

@@ -32,12 +32,16 @@ from beaver_ftc.studies.present.tables import finite, number_or_never
 
 HEALTHY_S = 100.0  # attitude is open loop: a longer flight wanders out of the validated envelope
 AFTER_FAULT_S = 15.0  # more than a period of the slowest reference
-_AIRSPEED_MPS, _ALTITUDE_M = (35.0, 52.0), (0.0, 3000.0)
+_AIRSPEED_MPS = (35.0, 52.0)
+_ALTITUDE_M = (0.0, 3000.0)
 _RATE_HZ = {"healthy": (20, 50), "faulty": (20, 100)}  # a slow hour flies sooner
-_MAGNITUDE, _KAPPA_PER_S, _FAULT_AT_S = (0.05, 1.0), (0.2, 10.0), (3.0, 8.0)
-_INERTIA, _AMPLITUDE_RAD_S2, _FREQUENCY_RAD_S = 0.25, 0.02, (0.1, 60.0)
+_MAGNITUDE = (0.05, 1.0)
+_KAPPA_PER_S = (0.2, 10.0)
+_FAULT_AT_S = (3.0, 8.0)
+_INERTIA = 0.25
+_AMPLITUDE_RAD_S2 = 0.02
+_FREQUENCY_RAD_S = (0.1, 60.0)
 _AT_THE_BOUND = 0.3  # share of flights with an uncertainty at its very bound
-
 _COARSE = 0.05  # share of flights with several JSBSim frames in a frame of the loop
 KINDS = ("healthy", "faulty")
 ONE_SIDED = 2.0 * CONFIDENCE - 1.0  # the two-sided confidence whose upper limit has CONFIDENCE
@@ -129,7 +133,8 @@ STEPS: dict[str, Document] = {
     SHARPENED: SCHEMES[SHARPENED],
     "constant": {"fault_profile": "abrupt"},
 }
-NAME, TOGETHER = "verification", 50  # flights that are kept together
+NAME = "verification"
+TOGETHER = 50  # flights that are kept together
 _CONSTANT_ONLY = "constant"  # for faults that are: one that grows is outside what this step declares
 
 Row = Document
@@ -169,7 +174,8 @@ def _faulty(draw: Draw, schemes: Schemes) -> Row:
 
 def judge(flight: Landing) -> Row:
     """What became of the promises in a flight with one fault; delays in s from the first frame with it."""
-    truth, guaranteed_s = Truth.of(flight.scenario), flight.guaranteed_delay_s
+    truth = Truth.of(flight.scenario)
+    guaranteed_s = flight.guaranteed_delay_s
     alarm_s = flight.detection_time_s
     delay_s = truth.onset.delay_s(alarm_s)
     left = (*flight.candidates, flight.isolated)

@@ -94,7 +94,8 @@ class ClosedLoop:
         first = round(at_s * scenario.rate_hz)
         self.loop.fly_chunk(0, first)
         self.loop.sample_references(first, self.loop.n_frames - first)
-        self.moment, self._frames = Moment.of(self.loop.plant), self.loop.frames.copy()
+        self.moment = Moment.of(self.loop.plant)
+        self._frames = self.loop.frames.copy()
         self._fly_on = self.loop.fly_on if self.loop.fly_frame is None else None
 
     def with_frame(self, compiled_frame: Callable[..., int]) -> "ClosedLoop":
@@ -166,7 +167,8 @@ class ProportionalInversion:
 
     def reset(self, context: Context) -> None:
         """Keep the model and the trim."""
-        self._model, self._flap_rad = context.model, context.trim_rad[3]
+        self._model = context.model
+        self._flap_rad = context.trim_rad[3]
 
     def step(self, measured: Measured, reference: Reference, verdict: Verdict) -> np.ndarray:
         """Ask the three main surfaces for what the reference model does, and for what is missing."""

@@ -49,7 +49,8 @@ def f_and_G(x: np.ndarray, truth: dict[str, float]) -> tuple[np.ndarray, np.ndar
     signals = np.array([truth["alpha_rad"], truth["beta_rad"], *rates, truth["dpt"]])
     coefficients = INTO @ (VALUES * (signals**POWERS).prod(axis=1))
     scale = truth["qdyn_pa"] * GEOMETRY.wing_area_m2 * LENGTHS_M
-    moments, slopes = scale * coefficients[:, 0], scale[:, None] * coefficients[:, 1:]
+    moments = scale * coefficients[:, 0]
+    slopes = scale[:, None] * coefficients[:, 1:]
     return INVERSE @ (moments - np.cross(x, INERTIA @ x)), INVERSE @ slopes
 
 
@@ -58,20 +59,24 @@ class Estimators:
 
     def __init__(self, scenario: Scenario, dt: float) -> None:
         fdi = scenario.fdi
-        self.dt, self.gain = dt, scenario.control.network_gain_per_s2
+        self.dt = dt
+        self.gain = scenario.control.network_gain_per_s2
         self.keep = np.exp(-scenario.control.network_leak_per_s * dt)
         self.decay = np.exp(-fdi.detection_pole_per_s * dt)
         self.fie_decay = np.exp(-fdi.isolation_pole_per_s * dt)
         self.forgetting = np.exp(-dt / fdi.forgetting_time_s)
         self.pole = fdi.detection_pole_per_s
-        self.x_hat, self.threshold, self.residual = np.zeros(3), np.zeros(3), np.zeros(3)
+        self.x_hat = np.zeros(3)
+        self.threshold = np.zeros(3)
+        self.residual = np.zeros(3)
         self.weights = np.zeros((3, N_BASIS))
         self.basis = np.zeros(N_BASIS)
         self.detected = False
         self.excluded = np.zeros(3, bool)
         self.fie = np.zeros((3, 3))
         self.omega, self.rise, self.fall, self.bound = (np.zeros((3, 3)) for _ in range(4))
-        self.theta, self.covariance = np.zeros((3, 3)), np.full((3, 3), 1.0 / 12.0)
+        self.theta = np.zeros((3, 3))
+        self.covariance = np.full((3, 3), 1.0 / 12.0)
         self.fie_residual, self.lower, self.upper = (np.full((3, 3), np.nan) for _ in range(3))
 
     def predict(self, x: np.ndarray, rate: np.ndarray, Z: np.ndarray, eta_bar: np.ndarray) -> None:
@@ -98,7 +103,8 @@ class Estimators:
         self.covariance = np.minimum(self.covariance * share / self.forgetting, 1.0 / 12.0)
         omega = a * self.omega + dt * Z
         self.fie = x + dt * (rate + Z * self.theta) + a * (self.fie - x) + omega * (theta - self.theta)
-        self.omega, self.theta = omega, theta
+        self.omega = omega
+        self.theta = theta
         self.rise = a * self.rise + dt * np.maximum(Z, 0.0)
         self.fall = a * self.fall + dt * np.minimum(Z, 0.0)
         self.bound = a * self.bound + dt * eta_bar
@@ -132,7 +138,8 @@ class Estimators:
     @property
     def effectiveness(self) -> np.ndarray:
         """What is believed of the surfaces, (4,): 1 but for the isolated one."""
-        believed, isolated = np.ones(4), self.isolated
+        believed = np.ones(4)
+        isolated = self.isolated
         if isolated is not None:
             believed[isolated] = max(1.0 + self.theta[isolated, isolated], LEAST_EFFECTIVENESS)
         return believed
@@ -152,7 +159,9 @@ class FeedbackLinearisation:
 
     def __init__(self, scenario: Scenario, dt: float, flap_rad: float) -> None:
         control = scenario.control
-        self.dt, self.Kp, self.Ki = dt, control.proportional_per_s, control.integral_per_s2
+        self.dt = dt
+        self.Kp = control.proportional_per_s
+        self.Ki = control.integral_per_s2
         self.A, self.B = discretise(control.reference_natural_frequency_rad_s, control.reference_damping, dt)
         self.model = np.zeros((2, 3))  # rate and acceleration of the reference model
         self.integral = np.zeros(3)
@@ -174,7 +183,8 @@ class Straightforward:
     """A contender: flies a scenario from `at_s` on, as the loop does."""
 
     def __init__(self, scenario: Scenario, at_s: float, frames: int) -> None:
-        self.scenario, self.at_s = scenario, at_s
+        self.scenario = scenario
+        self.at_s = at_s
         self.start = take_over(scenario, at_s)
         self.plant = self.start.plant
         self.references = sample(scenario.reference, at_s + np.arange(frames) / scenario.rate_hz)
@@ -198,7 +208,8 @@ class Straightforward:
 
     def step(self, reference: np.ndarray) -> None:
         """One frame; reference (3,) rad/s."""
-        fdm, estimators = self.plant.fdm, self.estimators
+        fdm = self.plant.fdm
+        estimators = self.estimators
         fdm.run()
         truth = {name: fdm[property_] * factor for name, property_, factor in ch.TRUTH}
         x = np.array([truth[f"{axis}_rad_s"] for axis in AXES])

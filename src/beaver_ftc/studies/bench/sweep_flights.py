@@ -90,7 +90,8 @@ def _flown(sweep: Sweep, kind: Kind, run: int) -> Taken:
     flight = loop.land()
     row_of(assignment, measure(flight), flight)
     marks.append(time.process_time())
-    alone, runs = loop.plant.run, flight.frames * scenario.substeps
+    alone = loop.plant.run
+    runs = flight.frames * scenario.substeps
     began = time.process_time()
     for _ in range(runs):
         alone()

@@ -59,7 +59,8 @@ EFFORT = 1.1
 INADMISSIBLE = 1e3
 FAILED = 1e6  # of a candidate that cannot be flown at all
 DELAY_S = 1.0
-LEAST_FLIGHTS, HOPELESS = 4, 1.5
+LEAST_FLIGHTS = 4
+HOPELESS = 1.5
 
 Values = Mapping[str, float]
 
@@ -85,7 +86,8 @@ class _FalseAlarm(Exception):
 
 
 def _end_with_false_alarm(loop: Loop) -> Callable[[], None]:
-    plugins, is_false = loop.plugin_frame, Truth.of(loop.scenario).onset.is_false
+    plugins = loop.plugin_frame
+    is_false = Truth.of(loop.scenario).onset.is_false
 
     def after_frame() -> None:
         if plugins is not None and plugins.verdict.detected and is_false(plugins.t_s):
@@ -109,7 +111,9 @@ class DetectorCost:
     """J of a detector."""
 
     def __init__(self, name: str, cases: Sequence[SetFlight]) -> None:
-        self._entry, self._cases, self._lowest = Entry(name, LAW), cases, inf
+        self._entry = Entry(name, LAW)
+        self._cases = cases
+        self._lowest = inf
         self._faulted = sum(bool(case.scenario.faults) for case in cases)
 
     def __call__(self, values: Values) -> float:
@@ -167,12 +171,14 @@ class LawCost:
 
     def shortfall(self, values: Values) -> float:
         """By which share the worst margin is too small; zero if all are kept. One that is NaN is none."""
-        asked, (gain_db, phase_deg) = self._cases[0].scenario.control, least_margins(self.margins(values))
+        asked = self._cases[0].scenario.control
+        gain_db, phase_deg = least_margins(self.margins(values))
         shares = gain_db / asked.gain_margin_db, phase_deg / asked.phase_margin_deg
         return max(0.0, *(1.0 if isnan(share) else 1.0 - share for share in shares))
 
     def _tracking(self, values: Values) -> float:
-        results, logs = list[Result](), list[float]()
+        results = list[Result]()
+        logs = list[float]()
         for case, best in zip(self._cases, self._oracle, strict=True):
             results.append(flown(case, self._entry, LAWS, values))
             logs.append(log(_ratio(results[-1], best)))

@@ -31,9 +31,11 @@ def gain_of(group: str, name: str, grade: str, settings: Sequence[Values], first
     size: Size
     if group == DETECTORS:
         cases = [case for each in draws for case in flights(grade, None, each)]
-        costs, size = [DetectorCost(name, cases)], np.sum
+        costs = [DetectorCost(name, cases)]
+        size = np.sum
     else:
-        costs, size = [LawCost(name, grade, None, each) for each in draws], geometric_mean
+        costs = [LawCost(name, grade, None, each) for each in draws]
+        size = geometric_mean
     before, after = settings
     built_in = _parts(costs, before)
     found = built_in if after == before else _parts(costs, after)

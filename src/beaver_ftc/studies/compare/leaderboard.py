@@ -32,7 +32,8 @@ def _of_faults(cell: Cell) -> Cell:
 
 
 def _alarms(row: Document) -> str:
-    rate, upper = row["false_alarms_per_h"], row["false_alarms_per_h_upper"]
+    rate = row["false_alarms_per_h"]
+    upper = row["false_alarms_per_h_upper"]
     return "-" if rate is None else f"{rate:.3g} (<{float(f'{upper:.2g}'):g})"
 
 
@@ -40,10 +41,8 @@ def _free(row: Document) -> str:
     """What a scheme finds at the most sensitive level without a false alarm."""
     if row.get("free") is None:
         return "-"
-    rate, delay = (
-        _cell(bare_percent, "detection_rate"),
-        _cell("{:.2f}".format, "delay_median_s", none="never"),
-    )
+    rate = _cell(bare_percent, "detection_rate")
+    delay = _cell("{:.2f}".format, "delay_median_s", none="never")
     return f"{rate(row['free'])} / {delay(row['free'])}"
 
 

@@ -24,7 +24,9 @@ from beaver_ftc.studies import margins as closed_form
 from beaver_ftc.studies.margins import Margin
 from beaver_ftc.studies.margins_loop import frequencies
 
-PULSE_DEG, PULSE_AT_S, DURATION_S = 0.1, 0.5, 4.0
+PULSE_DEG = 0.1
+PULSE_AT_S = 0.5
+DURATION_S = 4.0
 N_AIRSPEEDS = 2  # the slowest and the fastest of the envelope
 DECAYED = 0.2  # of the pulse: more than that at the end, and the loop is unstable
 LAG_KEYS = ("delay_s", "bandwidth_rad_s")
@@ -46,7 +48,8 @@ def margins_of(scenario: Scenario) -> list[Margin]:
 
 def _measured(scenario: Scenario) -> Iterator[Margin]:
     trimmed = in_trim(scenario)
-    still, omega = _positions(trimmed), frequencies(1.0 / scenario.rate_hz)
+    still = _positions(trimmed)
+    omega = frequencies(1.0 / scenario.rate_hz)
     for surface in scenario.airframe.primary:
         moved = _positions(_pulsed(trimmed, surface))
         numbers = _margins(still[surface], moved[surface], omega, 1.0 / scenario.rate_hz)
@@ -88,7 +91,8 @@ def _margins(still: np.ndarray, moved: np.ndarray, omega: np.ndarray, dt: float)
     stop, and where a flight has ended in a departure."""
     if len(still) != len(moved):
         return NO_MARGIN  # one of the flights has ended in a departure
-    v, pulse = moved - still, np.zeros(len(still))
+    v = moved - still
+    pulse = np.zeros(len(still))
     pulse[ceil(PULSE_AT_S / dt - 1e-9)] = np.radians(PULSE_DEG)
     at_a_stop = not v.any()  # there is no loop
     if at_a_stop or not np.abs(v[-len(v) // 5 :]).max() < DECAYED * np.radians(PULSE_DEG):

@@ -125,7 +125,8 @@ def replay_together(recordings: Sequence[Recording], scheme: str) -> list[Trace]
 
     What they have in common is played once; from there on each has a copy of the detector.
     """
-    common, context = _frames_in_common(recordings), replace(recordings[0].context, options={})
+    common = _frames_in_common(recordings)
+    context = replace(recordings[0].context, options={})
     detector: Detector = made(DETECTORS, scheme)
     detector.reset(context)
     before = _statistics(detector, recordings[0].seen[:common])

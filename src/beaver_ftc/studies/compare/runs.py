@@ -45,7 +45,8 @@ class Run:
 
 def read_runs(folders: Sequence[Path]) -> list[Run]:
     """The runs in result folders. Raises BadInput with a line a folder that is none."""
-    runs, mistakes = [], []
+    runs = []
+    mistakes = []
     for folder in folders:
         try:
             runs.append(_read(folder))
@@ -81,7 +82,9 @@ DIAGNOSED = {  # what it is called, and where it is in the metrics
 
 def rows_of(run: Run) -> dict[str, str]:
     """What is compared of a run, name -> text: what was flown, then what came of it."""
-    found, flown, departure = run.found, run.flown, run.found.departure
+    found = run.found
+    flown = run.flown
+    departure = run.found.departure
     return {
         "scenario": found.scenario,
         "law": flown["control"]["law"],

@@ -35,9 +35,12 @@ def line_of(
     flown = [(mine, best) for mine, best in zip(results, oracle, strict=True) if mine.error is None]
     mine = [result for result, _ in flown]
     faulted = [result for result in mine if result.faulted]
-    alarms, hours = sum(r.false_alarm for r in mine), sum(r.fault_free_s for r in mine) / 3600.0
-    detected, n = sum(r.delay_s < inf for r in faulted), len(faulted)
-    delays_s, rate = [r.delay_s for r in faulted], wilson(detected, n)
+    alarms = sum(r.false_alarm for r in mine)
+    hours = sum(r.fault_free_s for r in mine) / 3600.0
+    detected = sum(r.delay_s < inf for r in faulted)
+    n = len(faulted)
+    delays_s = [r.delay_s for r in faulted]
+    rate = wilson(detected, n)
     ratios = [m.rms_deg_s / o.rms_deg_s for m, o in flown if o.error is None and 0 < o.rms_deg_s < inf]
     return {
         "scheme": entry.scheme,
@@ -114,7 +117,8 @@ def point_at(traces: Sequence[Trace], level: float) -> Document:
     alarms, hours = alarms_at(traces, level)
     delays = [trace.delay_s(level) for trace in traces if trace.faulted and not trace.false_alarm(level)]
     rate = sum(delay < inf for delay in delays) / len(delays) if delays else 0.0
-    per_h, median_s = alarms / hours if hours else 0.0, share_within(delays, 0.5)
+    per_h = alarms / hours if hours else 0.0
+    median_s = share_within(delays, 0.5)
     return {"level": level, "false_alarms_per_h": per_h, "detection_rate": rate, "delay_median_s": median_s}
 
 
@@ -218,7 +222,8 @@ def leader(
     if badness[best] == badness[ours]:
         alike = [name for name in rivals if badness[name] == badness[ours]]
         return f"{what}: {ours} and {', '.join(alike)} are equally good: {said(ours)}."
-    duel, pair = rows[best]["against_ours"], [(best, "better"), (ours, "worse")]
+    duel = rows[best]["against_ours"]
+    pair = [(best, "better"), (ours, "worse")]
     (first, wins), (second, losses) = sorted(pair, key=lambda each: badness[each[0]])
     sure = "" if duel["p"] < SIGNIFICANT else ", so this may be chance"
     return (
@@ -248,7 +253,8 @@ def better_than_ours(lines: Sequence[Document], free: Document) -> list[str]:
 def _better(row: Document, ours: Document, compared: Mapping[str, str], name: str) -> Iterator[str]:
     """None is the worst there is: a delay that never ends, a rate of nothing."""
     for key, what in compared.items():
-        value, than = row.get(key), ours.get(key)
+        value = row.get(key)
+        than = ours.get(key)
         if value is None:
             continue
         sign = 1 if key in MORE_IS_BETTER else -1

@@ -30,7 +30,8 @@ WIDENINGS = 3
 TIE = 0.005  # share of the lowest cost
 FIRST_STEP = 0.1  # of Nelder-Mead in the first search, share of a range
 NEAR = 0.05  # of a restart: share of a range to each side, and its first step
-SETTLED, LITTLE = 2, 0.01  # restarts in a row; share of the lowest cost
+SETTLED = 2  # restarts in a row
+LITTLE = 0.01  # share of the lowest cost
 
 Values = dict[str, float]
 Cost = Callable[[Values], float]
@@ -85,8 +86,12 @@ def search(
 ) -> Found:
     """The values with the lowest cost, by searches of so many trials each. restarts: the most after the
     first; a widened range does not count. Raises SimulationFailed if one has to be widened too often."""
-    ranges, widened, made, best = dict(ranges), list[str](), 0, dict(start)
-    lowest, start_cost, widenings, quiet, done = None, 0.0, 0, 0, 0
+    ranges = dict(ranges)
+    widened = list[str]()
+    best = dict(start)
+    lowest = None
+    start_cost = 0.0
+    made = widenings = quiet = done = 0
     for number in count(seed):
         before = lowest
         best, lowest, costs = _searched(cost, ranges, best, before, trials, number)
@@ -95,7 +100,8 @@ def search(
         if edges := on_edge(best, ranges):
             if widenings == WIDENINGS:
                 break
-            widenings, widened = widenings + 1, [*widened, *edges]
+            widenings += 1
+            widened += edges
             ranges |= {name: widen(ranges[name], upper) for name, upper in edges.items()}
             continue
         gains = before is None or lowest < before - LITTLE * abs(before)
@@ -121,7 +127,9 @@ def _searched(
     from scipy.optimize import minimize
     from scipy.stats.qmc import LatinHypercube
 
-    n, costs, points = len(ranges), list[float](), list[np.ndarray]()
+    n = len(ranges)
+    costs = list[float]()
+    points = list[np.ndarray]()
 
     def values_at(point: np.ndarray) -> Values:
         places = zip(ranges.items(), point, strict=True)
@@ -133,13 +141,15 @@ def _searched(
         return costs[-1]
 
     first = np.clip([on_scale(of, start[name]) for name, of in ranges.items()], 0.0, 1.0)
-    spread, step = LatinHypercube(n, rng=seed).random((trials - 1) // 2), FIRST_STEP
+    spread = LatinHypercube(n, rng=seed).random((trials - 1) // 2)
+    step = FIRST_STEP
     if known is None:
         attempt(first)
     else:  # every other point is near the start
         points.append(first)
         costs.append(known)
-        spread[::2], step = np.clip(first + NEAR * (2.0 * spread[::2] - 1.0), 0.0, 1.0), NEAR
+        spread[::2] = np.clip(first + NEAR * (2.0 * spread[::2] - 1.0), 0.0, 1.0)
+        step = NEAR
     for point in spread:
         attempt(point)
     while (left := trials - len(costs)) > n:

@@ -145,7 +145,8 @@ def with_entry(scenario: Scenario, entry: Entry, chosen: TunedValuesByGrade | No
         fdi = fdi.model_copy(update={"statistical": Statistical()})
     of_law = scenario.control.options if entry.law == scenario.control.law else {}
     control = scenario.control.model_copy(update={"law": entry.law, "options": of_law})
-    flown, grade = scenario.model_copy(update={"fdi": fdi, "control": control}), grade_of(scenario)
+    flown = scenario.model_copy(update={"fdi": fdi, "control": control})
+    grade = grade_of(scenario)
     for group, name, options in ((DETECTORS, entry.scheme, of_scheme), (LAWS, entry.law, of_law)):
         values = tuned_values(chosen or {}, grade, group, name)
         free = {k: v for k, v in values.items() if k not in options and not _says(scenario, k, group)}
@@ -223,8 +224,11 @@ def _fly(scenario: Scenario, entry: Entry, chosen: TunedValuesByGrade) -> Result
 def result_of(flight: Landing, entry: Entry, us: float) -> Result:
     """The result of a flight. us: processor time of a frame, microseconds."""
     found = measure(flight)
-    fault, isolation, tracking = found.fault, found.isolation, found.tracking
-    end_s, departed = flight.frames / flight.scenario.rate_hz, found.departure is not None
+    fault = found.fault
+    isolation = found.isolation
+    tracking = found.tracking
+    end_s = flight.frames / flight.scenario.rate_hz
+    departed = found.departure is not None
     faulted = fault is not None and strikes_within(fault.at_s, end_s)
     before, after = _size(tracking.pre_fault_rms_deg_s), _size(tracking.post_fault_rms_deg_s)
     whole = before if tracking.post_fault_rms_deg_s is None else after

@@ -47,7 +47,8 @@ from beaver_ftc.studies.present.tables import Columns, aligned, tabulated
 
 PROCEDURE = "beaver-ftc compare --tune; docs/results/benchmark.md"
 LEAST_GAIN = 0.05  # share of the cost at the start
-NAME, RECORD = "tuned.json", "tuning.json"
+NAME = "tuned.json"
+RECORD = "tuning.json"
 _GRADES = TypeAdapter(dict[str, dict[str, dict[str, dict[str, float]]]])  # by grade, kind and method
 OF_STATISTICAL = {
     "fdi.statistical.false_alarms_per_h": Range(1e-9, 3600.0),

@@ -25,7 +25,8 @@ ALIKE_DEG = 3.0  # distinguished only from this deflection on: similar effects o
 def alike(scenario: Scenario) -> list[Document]:
     """Pairs of surfaces with similar effects on the rates: the deflection, deg, from which each is certain to
     be distinguished from the other, None where none is; and whether accelerometers distinguish them."""
-    seen, aircraft = excitation(_short(scenario)), scenario.airframe
+    seen = excitation(_short(scenario))
+    aircraft = scenario.airframe
     by_force = [{*aircraft.separated_by_force(force)} for force in ("CY", "CZ")]
     found = []
     for s, other in combinations(range(aircraft.n), 2):
@@ -50,19 +51,22 @@ def engine_failures(scenario: Scenario) -> list[Document]:
     is certain to show in a frame; whether its moment is a signal, so that the design model knows it, and
     whether that is held against the thrust of all."""
     aircraft = scenario.airframe
-    thrust, power = aircraft.engine.thrust, aircraft.file.power_setting
+    thrust = aircraft.engine.thrust
+    power = aircraft.file.power_setting
     short = _short(scenario)
     effects = effects_of_engines(Declared.of(short))
     if thrust is None or power is None or not effects.size:
         return []
-    loop, bound = Loop(short), excitation(short).bound[0]
+    loop = Loop(short)
+    bound = excitation(short).bound[0]
     setting = loop.trim.settings[power[0]]
     force_n = [
         np.interp(loop.trim.airspeed_mps, thrust.airspeed_mps, f) for f in zip(*thrust.force_n, strict=True)
     ]
     gained = np.interp(setting, thrust.setting, force_n) / aircraft.mass.mass_kg
     loop.release()
-    known, mapped = any(name in ENGINE_SIGNALS for name in aircraft.signals), aircraft.file.model_error_map
+    known = any(name in ENGINE_SIGNALS for name in aircraft.signals)
+    mapped = aircraft.file.model_error_map
     turns = np.abs(effects.T) * gained
     return [
         {

@@ -34,7 +34,8 @@ def loss_limits(excluded: np.ndarray, frames: int, dt: float) -> Document:
     where no loss does. frames: number of frames within which the other surface has to be excluded. dt s: of a
     frame. A delay includes the frame in which the loss begins.
     """
-    least, n = best_in_window(excluded, frames), len(excluded)
+    least = best_in_window(excluded, frames)
+    n = len(excluded)
     next_exclusion = np.where(excluded <= 1.0, np.arange(n), n)
     next_exclusion = np.minimum.accumulate(next_exclusion[::-1])[::-1]
     delay_s = np.where(next_exclusion < n, (next_exclusion - np.arange(n) + 1) * dt, inf)

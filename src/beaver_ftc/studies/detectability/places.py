@@ -26,7 +26,8 @@ from beaver_ftc.studies.detectability.certain import (
 from beaver_ftc.studies.detectability.shown import NAME
 from beaver_ftc.studies.engine.study import Study
 
-SPEEDS_MPS, ALTITUDES_M = (36.0, 40.0, 44.0, 48.0, 52.0), (0.0, 1000.0, 2000.0, 3000.0)
+SPEEDS_MPS = (36.0, 40.0, 44.0, 48.0, 52.0)
+ALTITUDES_M = (0.0, 1000.0, 2000.0, 3000.0)
 SHARES = (0.9, 1.0, 1.1)  # of the speed another aircraft starts with
 EXCITATIONS = (0.25, 0.5, 1.0, 2.0)  # of the scenario's references
 PLACE = ("airspeed_mps", "altitude_m", "excitation")
@@ -90,7 +91,8 @@ def _without_faults(scenario: Scenario) -> Document:
 
 def look_at(scenario: Scenario, point: tuple[float, float, float]) -> dict[str, list[Document]]:
     """The rows of each of PARTS at a place: without a result, why there is none."""
-    place, there = dict(zip(PLACE, point, strict=True)), at(scenario, *point)
+    place = dict(zip(PLACE, point, strict=True))
+    there = at(scenario, *point)
     faults = scenario.airframe.class_of_losses
     try:
         seen = excitation(there)

@@ -90,7 +90,9 @@ def answer(scenario: Scenario, row: Document) -> str:
     sizes = (np.abs(getattr(shape, key, 0.0)).max() for shape in shapes for key in AMPLITUDES)
     asked = f"{row['excitation'] * float(sum(sizes)):g} deg/s of {MOTION_OF_AXIS[axis]}"
     place = f"at {row['airspeed_mps']:g} m/s and {row['altitude_m']:g} m, {asked}"
-    fault, detected, isolated = row["fault"], row["detected"], row["isolated"]
+    fault = row["fault"]
+    detected = row["detected"]
+    isolated = row["isolated"]
     soon = f"is certain to be detected within {DETECT_WITHIN_S:g} s"
     if detected is None:
         return f"{place}: not even a total loss of {fault} {soon} ({row['why']})"
@@ -119,7 +121,8 @@ def geometry(pairs: Sequence[Document]) -> list[str]:
 
 def of_engines(failures: Sequence[Document]) -> list[str]:
     """A sentence an engine, of those of `in_trim.engine_failures`."""
-    signal, against = "; the design model knows its moment", " and monitors it against the thrust"
+    signal = "; the design model knows its moment"
+    against = " and monitors it against the thrust"
     return [
         f"{of['engine']} failed to idle accelerates the aircraft by {max(of['turns_rad_s2']):.2g} rad/s2, "
         f"{of['shows']:.2g} times the detection limit of one frame"
@@ -140,9 +143,11 @@ def draw_pairs(document: Document) -> "Figure":
     size = len(pairs) * (1.55 * len(faults) + 0.3) + 1.2, 0.65 * len(faults) + 1.6
     figure, grid = panels(1, len(pairs), *size, title, sharey=True)
     for axes, ((scale,), rows) in zip(grid[0], pairs.items(), strict=True):
-        values, texts = np.full((len(faults), len(faults)), np.nan), {}
+        values = np.full((len(faults), len(faults)), np.nan)
+        texts = {}
         for (fault, other), of in grouped(rows, "fault", "other").items():
-            at, half = (faults.index(fault), faults.index(other)), [row["magnitude_median"] for row in of]
+            at = (faults.index(fault), faults.index(other))
+            half = [row["magnitude_median"] for row in of]
             values[at] = np.nan if None in half else max(half)
             texts[at] = "\n".join(reversed(_spans(of, "magnitude").values())), "black"
         look: dict[str, Any] = {"cmap": "viridis_r", "vmin": 0.0, "vmax": 1.0, "alpha": 0.6}

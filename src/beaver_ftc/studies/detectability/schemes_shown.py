@@ -73,12 +73,15 @@ def who_is_better(
     document: Document, sensors: str, turbulence: str, within_s: float = WATCHED_S
 ) -> Iterator[str]:
     """Of a condition, a sentence a surface: who finds most faults so soon."""
-    here, soon = {"sensors": sensors, "turbulence": turbulence}, f"{within_s:g}"
+    here = {"sensors": sensors, "turbulence": turbulence}
+    soon = f"{within_s:g}"
     for surface in document["grid"]["surfaces"]:
-        place, rows = here | {"surface": surface}, dict[str, Document]()
+        place = here | {"surface": surface}
+        rows = dict[str, Document]()
         for total in _those(document["totals"], **place):
             if total["flights"] and (total["scheme"] == BOTH or total["scheme"] not in BUILT_IN):
-                found, duel = total["within"][soon], {"better": 0, "worse": 0, "p": 1.0}
+                found = total["within"][soon]
+                duel = {"better": 0, "worse": 0, "p": 1.0}
                 against = {"against": total["scheme"], "ours": BOTH, "within_s": within_s}
                 for one in _those(document["comparison"], **place, **against):
                     duel = {"better": one["seeds_theirs"], "worse": one["seeds_ours"], "p": one["p"]}
@@ -110,7 +113,8 @@ def _rate(alarms: Document | None) -> str:
 
 
 def _legend(document: Document) -> list[str]:
-    grid, per_h = document["grid"], document["false_alarms_per_h"]
+    grid = document["grid"]
+    per_h = document["false_alarms_per_h"]
     hours = min((level["calibration"]["hours"] for level in document["levels"]), default=0.0)
     losses = ", ".join(f"{100 * magnitude:g}" for magnitude in grid["magnitudes"])
     references = ", ".join(f"{excitation:g}" for excitation in grid["excitations_deg_s"])
@@ -128,7 +132,8 @@ def _legend(document: Document) -> list[str]:
 def draw_schemes(document: Summary) -> "Figure":
     """Rows air, columns surfaces; in each, a line of dots a scheme: the share detected, a dot a magnitude."""
     rows: Sequence[Row] = document.behind
-    surfaces, conditions = document["grid"]["surfaces"], document["grid"]["conditions"]
+    surfaces = document["grid"]["surfaces"]
+    conditions = document["grid"]["conditions"]
     names = [*dict.fromkeys(row["scheme"] for row in rows), INFORMED]
     most = f"at most {document['false_alarms_per_h']:g} false alarms per hour"
     figure, axes = panels(
@@ -155,7 +160,8 @@ def draw_schemes(document: Summary) -> "Figure":
 
 def _draw(panel: "Axes", rows: Sequence[Row], names: Sequence[str], document: Document) -> None:
     """Of each scheme the share detected with its exact 95 % interval, magnitudes below one another."""
-    magnitudes, within = document["grid"]["magnitudes"], f"{JUDGED_S:g}"
+    magnitudes = document["grid"]["magnitudes"]
+    within = f"{JUDGED_S:g}"
     apart = 0.6 / len(magnitudes)
     for place, magnitude in enumerate(magnitudes):
         here = [row for row in rows if row["magnitude"] == magnitude]

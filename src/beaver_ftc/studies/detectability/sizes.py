@@ -36,7 +36,9 @@ from beaver_ftc.studies.present.tables import finite
 SHARE = 0.9  # of flights
 AS_IT_IS = "as it is"
 NOTHING = {"p": 0.0, "q": 0.0, "r": 0.0}
-ADDED_DEG_S, ADDED_HZ = 3.0, 0.25  # of a sine, where an axis has no reference
+# Of a sine, where an axis has no reference.
+ADDED_DEG_S = 3.0
+ADDED_HZ = 0.25
 FIRST = STAGES[:1]  # flights of a comparison, and of the size that is certain
 
 
@@ -116,7 +118,8 @@ def fly_one(variants: dict[str, Scenario], asked: Asked, flight: Flight) -> Docu
         found = measure(landing)
     except BeaverFtcError:
         return _row(failed=True)
-    within_s, detection = asked.within_s + TIME_TOLERANCE_S, found.detection
+    within_s = asked.within_s + TIME_TOLERANCE_S
+    detection = found.detection
     return _row(
         found=or_never(detection.delay_s) <= within_s,
         certain=or_never(detection.guaranteed_delay_s) <= within_s,
@@ -139,7 +142,8 @@ def variants_of(scenario: Scenario, surface: str) -> Iterator[tuple[str, Scenari
 
 def _left_out(scenario: Scenario) -> Iterator[tuple[str, Document]]:
     """What may hide a fault, left out of the flight and of what is declared."""
-    declared, environment = Declared.of(scenario), scenario.environment
+    declared = Declared.of(scenario)
+    environment = scenario.environment
     if environment.is_turbulent or environment.gusts or declared.air.moves:
         yield "without turbulence", {"environment": {}, "fdi.bounds.turbulence": "none"}
     if not (scenario.sensors.is_ideal and declared.sensors.is_ideal):

@@ -92,7 +92,8 @@ def _doubts(document: Document) -> Iterator[str]:
 def _is_better(other: Document, document: Document) -> bool:
     """Whether a variant finds smaller losses, by intervals that do not overlap; where no loss is found often
     enough, whether a total one is found more often."""
-    found, base = other["found"], document["found"]
+    found = other["found"]
+    base = document["found"]
     if base["size"] is None:
         return bool(other["total_loss"]["low"] > document["total_loss"]["high"])
     return found["high"] is not None and base["low"] is not None and bool(found["high"] < base["low"])
@@ -113,7 +114,8 @@ def _effect(row: Document | None, none: str) -> str:
     """The name of a variant, and the size found in its flights; `none` if there is no such variant."""
     if row is None:
         return none
-    found, total = row["found"], row["total_loss"]
+    found = row["found"]
+    total = row["total_loss"]
     if found["size"] is None:
         return f"{row['variant']}, a total loss is found in {percent(total['value'])} of flights"
     return f"{row['variant']}, it would be {percent(found['size'])} ({_interval(found)})"

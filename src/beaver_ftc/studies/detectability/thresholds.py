@@ -27,7 +27,8 @@ from beaver_ftc.studies.engine.statistics import CONFIDENCE, quantile, quantile_
 LARGEST = 100  # per cent: a total loss
 NEVER = LARGEST + 1  # not even that is found
 STAGES = (60, 120, 240, 480)  # flights in all after each stage
-RELATIVE_WIDTH, LEAST_WIDTH = 0.15, 2.0  # of an interval that is narrow enough; per cent
+RELATIVE_WIDTH = 0.15  # of an interval that is narrow enough, over its size
+LEAST_WIDTH = 2.0  # per cent: of one that is narrow enough whatever its size
 
 IsFound = Callable[[Sequence[int], int], Sequence[bool]]
 """Whether each of these flights finds its fault at this size, per cent."""
@@ -56,16 +57,20 @@ class Sizes:
     `_found`. flights: how many of them count."""
 
     def __init__(self, is_found: IsFound, most: int) -> None:
-        self._is_found, self.flights = is_found, most
-        self._missed, self._found = np.zeros(most, int), np.full(most, NEVER)
+        self._is_found = is_found
+        self.flights = most
+        self._missed = np.zeros(most, int)
+        self._found = np.full(most, NEVER)
 
     def count(self, size: int) -> int:
         """How many flights find this size; those of which it is not known are flown."""
-        missed, found = self._missed[: self.flights], self._found[: self.flights]
+        missed = self._missed[: self.flights]
+        found = self._found[: self.flights]
         unknown = np.flatnonzero((missed < size) & (size < found))
         if len(unknown):
             is_found = np.array(self._is_found(unknown.tolist(), size), bool)
-            found[unknown[is_found]], missed[unknown[~is_found]] = size, size
+            found[unknown[is_found]] = size
+            missed[unknown[~is_found]] = size
         return int((found <= size).sum())
 
     def ordered(self, rank: int) -> float:
@@ -81,7 +86,8 @@ class Sizes:
 
 def threshold(is_found: IsFound, share: float, stages: Sequence[int] = STAGES) -> Threshold:
     """The size found in a share of flights, with its two-sided interval."""
-    sizes, one_sided = Sizes(is_found, stages[-1]), 1.0 - 0.5 * (1.0 - CONFIDENCE) / len(stages)
+    sizes = Sizes(is_found, stages[-1])
+    one_sided = 1.0 - 0.5 * (1.0 - CONFIDENCE) / len(stages)
     for flights in stages:
         sizes.flights = flights
         ranks = np.arange(1, flights + 1, dtype=float)

@@ -28,7 +28,8 @@ class RayWorkers:
         except ImportError:
             allowed = "pip install 'beaver-ftc[ray]'"
             raise BadInput(f"--backend ray: Ray is not installed, allowed: {allowed}") from None
-        self._ray, self._ours = ray, _join(ray, address)
+        self._ray = ray
+        self._ours = _join(ray, address)
         self._most = workers
         self._work = self._ray.put(work)
         self._versions = dict(versions())

@@ -62,7 +62,8 @@ def duel(pairs: Iterable[tuple[float, float]]) -> tuple[int, int, float]:
     from scipy.stats import binomtest
 
     larger = [a > b for a, b in pairs if a != b]
-    more, n = sum(larger), len(larger)
+    more = sum(larger)
+    n = len(larger)
     return more, n - more, float(binomtest(more, n).pvalue) if n else 1.0
 
 

@@ -89,7 +89,8 @@ def locked(folder: Path) -> Iterator[None]:
 
 def set_aside(path: Path, why: str) -> Path:
     """Rename a damaged file, so that nothing of it is lost, and print one line. Returns its new path."""
-    name, n = f"{path.name}{DAMAGED}", 1
+    name = f"{path.name}{DAMAGED}"
+    n = 1
     while (path.parent / name).exists():
         n += 1
         name = f"{path.name}{DAMAGED}-{n}"
@@ -129,7 +130,8 @@ class Parts:
 
     def landed(self, batch: int | str, runs: Sequence[int]) -> Any:
         """The rows of a batch, None if it has no file. A file that cannot be read is set aside: None, too."""
-        path, rows = self._path(batch), None
+        path = self._path(batch)
+        rows = None
         if path.exists():
             with contextlib.suppress(Exception):
                 rows = self.codec.read(path, runs)
@@ -194,7 +196,8 @@ def refuse_other(mine: Document, there: Document, folder: Path) -> None:
             f"{folder}: the {what} file has changed since these flights ({', '.join(changed)}): "
             f"resuming would mix two {what}s, allowed: the unchanged file, or another --out"
         )
-    then, now = there.get("versions", {}), mine["versions"]
+    then = there.get("versions", {})
+    now = mine["versions"]
     changed = [f"{name} {then.get(name)} then, {now.get(name)} now" for name in differences(then, now)]
     if changed:
         raise BadInput(

@@ -85,7 +85,8 @@ class Flying:
             return
         self._coming = (Batch(number, runs, cases_of(runs)) for number, runs in missing.items())
         self._left = sum(map(len, missing.values()))  # cases in the batches still to come
-        self._waiting, self._flying = deque[Batch](), 0
+        self._waiting = deque[Batch]()
+        self._flying = 0
         self._flown: dict[Number, tuple[Batch, dict[int, Row]]] = {}
         self._losses = Counter[tuple[int, ...]]()
         workers = self._workers = self._workers or self.make(self._left)
@@ -191,7 +192,8 @@ def flown(study: Study, out: Path, workers: int = 1, progress: Progress | None =
         _keeping(study, out) as parts,
         contextlib.closing(Flying(parts.landed, parts.land, make, study.lost or _fail)) as flying,
     ):
-        rounds, part = count(), study.part or (OF_A_PART if study.rounds else 1)
+        rounds = count()
+        part = study.part or (OF_A_PART if study.rounds else 1)
 
         def fly(cases: Sequence[Any]) -> list[Any]:
             number = next(rounds)
@@ -220,7 +222,8 @@ def _fly_pieces(
 @contextlib.contextmanager
 def _keeping(study: Study, out: Path) -> Iterator[store.Parts]:
     """The parts of a study while it is under way; on success they go, without any so does the folder."""
-    kept, new = out / f".{study.name}.flown", not out.exists()
+    kept = out / f".{study.name}.flown"
+    new = not out.exists()
     with clear_disk_errors(kept):
         kept.mkdir(parents=True, exist_ok=True)
     with store.locked(kept):
@@ -245,7 +248,8 @@ def fly_all(fly: Fly, cases: Sequence[Any], workers: int, progress: Progress | N
     def nothing(number: Number, of: Any) -> None:
         """None is there, and none is kept."""
 
-    make, pieces = partial(_workers, Work(fly), workers), store.batches_of(len(cases), 1)
+    make = partial(_workers, Work(fly), workers)
+    pieces = store.batches_of(len(cases), 1)
     with contextlib.closing(Flying(nothing, nothing, make, _fail)) as flying:
         found = _fly_pieces(flying, dict(pieces), cases, progress)
     return [found[n][0] for n in range(len(cases))]
@@ -260,7 +264,8 @@ def _begin(kept: Path, study: Study) -> store.Parts:
     """The parts of this very study; those of another, or of other versions, are of no use to it."""
     asked = {"cases": repr(list(study.cases)), "asked": repr(study.follows_from)}
     identity = store.identity("study", asked)
-    manifest, parts = kept / "study.json", store.Parts(kept / "parts", store.RowsAsJson(study.row), GO_ON)
+    manifest = kept / "study.json"
+    parts = store.Parts(kept / "parts", store.RowsAsJson(study.row), GO_ON)
     there = store.known(manifest)
     with clear_disk_errors(kept):
         if there is None and parts:  # nothing says whose they are

@@ -141,7 +141,8 @@ class LocalWorkers:
     """Processes on this machine. One that dies is replaced, and its task handed back as lost."""
 
     def __init__(self, work: Work, workers: int) -> None:
-        self._work, self.slots = work, workers
+        self._work = work
+        self.slots = workers
         self._busy: dict[Future[list[Row]], tuple[_Worker, Batch]] = {}
         self._idle: list[_Worker] = []
         try:

@@ -42,7 +42,8 @@ def seen_when_told(scenario: "Scenario", kept: Columns, surface: str) -> Documen
     If sensors are in doubt, of telling it from the error of any gyro.
     """
     assert scenario.fdi.statistical is not None
-    aircraft, (context, coefficients) = scenario.airframe, _declared(scenario)
+    aircraft = scenario.airframe
+    context, coefficients = _declared(scenario)
     at_s = scenario.faults[0].at_s
     struck = kept["t_s"] > at_s + 0.5 * context.dt_s
     off_rad = np.where(

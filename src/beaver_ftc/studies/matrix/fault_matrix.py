@@ -28,7 +28,8 @@ from beaver_ftc.studies.matrix.clairvoyant import columns_of, seen_when_told
 from beaver_ftc.studies.matrix.matrix_shown import FILES, NAME, VERDICTS
 from beaver_ftc.studies.reproduce.choices import SETTING
 
-TOLERANCE, SENSORS = 0.05, "tactical-grade"
+TOLERANCE = 0.05
+SENSORS = "tactical-grade"
 AIRSPEEDS_MPS = (38.0, 45.0, 52.0)
 AT_S = 12.0
 DURATION_S = 30.0

@@ -43,7 +43,8 @@ def margins(airspeed_mps: float) -> Document:
 
 def about_trim(airspeed_mps: float) -> tuple[LinearModel, np.ndarray, float]:
     """The four longitudinal states, the column (4,) of manifold pressure in inHg, and its trim."""
-    plant, point = Plant(100), trim(airspeed_mps, Initial().altitude_m)
+    plant = Plant(100)
+    point = trim(airspeed_mps, Initial().altitude_m)
     model = differences(plant, point)
     rows = [model.states.index(name) for name in STATES]
     return model.of(STATES), engine_slope(plant, point)[rows], point.manifold_pressure_inhg

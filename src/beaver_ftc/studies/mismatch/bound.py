@@ -49,7 +49,8 @@ def guarantee_with(constant_rad_s2: PerAxis, like: Scenario) -> Document:
     Delays are in s from the fault's first frame, None for never.
     """
     flight = fly(published_case(constant_rad_s2, like))
-    onset, alarm_s = Truth.of(flight.scenario).onset, flight.detection_time_s
+    onset = Truth.of(flight.scenario).onset
+    alarm_s = flight.detection_time_s
     return {
         "constant_rad_s2": constant_rad_s2,
         "guaranteed_delay_s": flight.guaranteed_delay_s,
@@ -78,7 +79,8 @@ def recommended_for(scenarios: Sequence[Scenario], needed: Sequence[np.ndarray])
     coverage: the chance that one more run of the same kind stays within it, runs / (runs + 1): it is as
     likely as any other to be the worst of all.
     """
-    first, runs = scenarios[0], len(scenarios)
+    first = scenarios[0]
+    runs = len(scenarios)
     declared = first.fdi.bounds.constant_rad_s2.model_dump()
     case = published_case(declared, first)
     constant, settled = settle([*scenarios, case], [*needed, split_flight(case)[0].smallest_constant])

@@ -79,7 +79,8 @@ def largest_sources(found: Document, axis: str) -> list[str]:
 
 
 def _draw_sources(axes: "Axes", series: dict, axis: str, chosen: list[str], instants: Sequence[Mark]) -> None:
-    t, bound = series["t_s"], series[column(axis, ETA_BAR)]
+    t = series["t_s"]
+    bound = series[column(axis, ETA_BAR)]
     axes.fill_between(t, -bound, bound, color=SKY, alpha=0.25, linewidth=0, label="± bound eta_bar")
     uncertainty = series[column(axis, TOTAL)] - series[column(axis, FAULT)]
     axes.plot(t, uncertainty, color=BLACK, linewidth=2.4, alpha=0.35, label="all together")

@@ -89,7 +89,9 @@ def designed(scenario: Scenario, point: FlightState, equations: LinearModel) -> 
     A, B = equations.A.copy(), equations.B.copy()
     turning = slice(3, 6)
     A[turning] = 0.0
-    A[turning, 3:6], A[turning, 1:3], B[turning] = f_x, f_y[:, :2], G
+    A[turning, 3:6] = f_x
+    A[turning, 1:3] = f_y[:, :2]
+    B[turning] = G
     for column, step in ((0, (1j * _STEP, 0j)), (11, (0j, 1j * _STEP))):  # airspeed, altitude
         A[turning, column] = f_y[:, 2:] @ (air_data(point, *step).imag / _STEP)
     return replace(equations, A=A, B=B)

@@ -89,12 +89,15 @@ def healthy_positions(scenario: Scenario, commands: np.ndarray) -> np.ndarray:
 
 def _servo(scenario: Scenario, surface: str, dt: float) -> tuple[float, ...]:
     """Of an actuator in a JSBSim frame: share of the way, reach, dead band and stops, rad."""
-    servo, off = getattr(scenario.actuators, surface), getattr(scenario.uncertainty.actuators, surface)
-    bandwidth, rate = servo.bandwidth_rad_s * off.bandwidth, servo.rate_limit_deg_s * off.rate_limit
+    servo = getattr(scenario.actuators, surface)
+    off = getattr(scenario.uncertainty.actuators, surface)
+    bandwidth = servo.bandwidth_rad_s * off.bandwidth
+    rate = servo.rate_limit_deg_s * off.rate_limit
     stops = TRAVEL[surface].min_rad, TRAVEL[surface].max_rad
     if servo.travel_deg is not None:
         stops = radians(servo.travel_deg[0]), radians(servo.travel_deg[1])
-    share, reach = 1.0 - exp(-bandwidth * dt) if bandwidth else 1.0, radians(rate) * dt if rate else inf
+    share = 1.0 - exp(-bandwidth * dt) if bandwidth else 1.0
+    reach = radians(rate) * dt if rate else inf
     return share, reach, radians(off.dead_band_deg), *stops
 
 
@@ -143,8 +146,11 @@ class Models:
     """
 
     def __init__(self, scenario: Scenario) -> None:
-        model, true = scenario.design_model, scenario.uncertainty.coefficients
-        self.scenario, self.design, mass = scenario, design_of(model)[0], mass_of(model)
+        model = scenario.design_model
+        true = scenario.uncertainty.coefficients
+        self.scenario = scenario
+        self.design = design_of(model)[0]
+        mass = mass_of(model)
         anchor(self.design, *known_trim(Declared.of(scenario)))
         kept = {k: v for k, v in model.coefficients.items() if model.engine_terms or k not in ENGINE_TERMS}
         self.untied = design_record(engine_terms=model.engine_terms, scale=model.coefficients, mass=mass)[0]
@@ -216,7 +222,8 @@ def _displaced(faults: list, t_s: np.ndarray, way: np.ndarray) -> Iterator[tuple
 def inertia_coupling(m: Models, s: States) -> np.ndarray:
     """The declared relative errors of the rate products [Zhang2005, sec. VII]."""
     p, q, r = s.x.T
-    theta, of = m.scenario.uncertainty.inertia_coupling, m.inertia
+    theta = m.scenario.uncertainty.inertia_coupling
+    of = m.inertia
     return np.column_stack([theta.p * of.Pqr * q * r, theta.q * of.Qpr * p * r, theta.r * of.Rpq * p * q])
 
 
@@ -246,8 +253,10 @@ def earth(m: Models, s: States) -> np.ndarray:
 
 def instantaneous(m: Models, s: States) -> tuple[Contributions, dict[str, Contributions]]:
     """All sources but the integration at every frame, and the single faults and single coefficients."""
-    healthy, (_, G) = healthy_positions(m.scenario, s.u), responses_at(m.design, s.x, s.y)
-    faults, nothing = fault_effects(m, s, G, healthy), np.zeros_like(s.x)
+    healthy = healthy_positions(m.scenario, s.u)
+    _, G = responses_at(m.design, s.x, s.y)
+    faults = fault_effects(m, s, G, healthy)
+    nothing = np.zeros_like(s.x)
     measured = acceleration_at(m.design, s.x_measured, s.y_measured, s.u)
     ways = (m.design, m.untied, m.whole, m.turning, m.truth)
     on_the_way = [acceleration_at(model, s.x, s.y, s.effective) for model in ways]

@@ -98,7 +98,8 @@ class Split:
     def bound(self, axis: int) -> Document:
         """An axis against its bound, and the first stays above it."""
         ratio = self.ratios[:, axis]
-        stays, worst = _runs(ratio > 1.0), int(ratio.argmax())
+        stays = _runs(ratio > 1.0)
+        worst = int(ratio.argmax())
         return {
             "constant_rad_s2": float(self.constant[axis]),
             "smallest_constant_rad_s2": float(self.smallest_constant[axis]),
@@ -136,7 +137,8 @@ def split(scenario: Scenario, log: Log) -> Split:
 
     At the flight's last row, which nothing follows, total is sampled.
     """
-    m, s = Models(scenario), states_of(log)
+    m = Models(scenario)
+    s = states_of(log)
     contributions, details = instantaneous(m, s)
     sampled = s.xdot - acceleration_at(m.design, s.x_measured, s.y_measured, s.u)
     over_frames = np.diff(s.x, axis=0) * scenario.rate_hz - s.design_mean[1:]

@@ -43,7 +43,8 @@ from beaver_ftc.studies.mismatch.tables import show_in_reports
 from beaver_ftc.studies.present.page import Files, write_files
 from beaver_ftc.studies.present.tables import as_csv, finite
 
-COMPARISON, MAP = "mismatch-comparison", "mismatch-map"
+COMPARISON = "mismatch-comparison"
+MAP = "mismatch-map"
 AIRSPEEDS_MPS = (30.0, 35.0, 40.0, 45.0, 50.0, 55.0)  # the validated envelope
 ALTITUDES_M = (0.0, 1000.0, 2000.0, 3000.0, 4000.0)
 _OF_BOUND = ("worst_ratio", "smallest_constant_rad_s2", "exceeded_s")

@@ -43,7 +43,8 @@ def findings(found: Document) -> list[str]:
     worst = found["dominant"]
     dominant = "nothing: truth and design agree"
     if worst is not None:
-        source, share = without_underscores(worst["source"]), percent(worst["bound_share"])
+        source = without_underscores(worst["source"])
+        share = percent(worst["bound_share"])
         dominant = f"{source}: {share} of the bound on {worst['axis']}"
     lines = [f"dominant     {dominant}"]
     if found["false_alarm"]:
@@ -54,7 +55,8 @@ def findings(found: Document) -> list[str]:
 
 def _advice(found: Document) -> list[str]:
     """The bound to declare, and what becomes of the published elevator case with it."""
-    recommended, guarantee = found["recommended"], found["guarantee"]
+    recommended = found["recommended"]
+    guarantee = found["guarantee"]
     constant = "  ".join(f"{axis} {recommended['constant_rad_s2'][axis]:g}" for axis in AXES)
     doubt = "" if recommended["settled"] else ", still exceeded when flown"
     advised = f"recommended  constant bound {constant} rad/s2, from {recommended['runs']} run(s){doubt}"
@@ -71,7 +73,8 @@ def _advice(found: Document) -> list[str]:
 def _case(case: Document) -> str:
     if case["false_alarm"]:
         return "FALSE ALARM before the fault"
-    detected, certain = case["detection_delay_s"], case["guaranteed_delay_s"]
+    detected = case["detection_delay_s"]
+    certain = case["guaranteed_delay_s"]
     return (
         f"{'not detected' if detected is None else f'detected after {detected:.2f} s'}, "
         f"{'never certain' if certain is None else f'certain within {certain:.2f} s'}"

@@ -112,7 +112,8 @@ def as_csv(rows: Sequence[Mapping[str, Any]]) -> str:
     Without a row there are no columns either: the text is empty."""
     if not rows:
         return ""
-    text, flat = io.StringIO(), [_flat(row) for row in rows]
+    text = io.StringIO()
+    flat = [_flat(row) for row in rows]
     writer = csv.DictWriter(text, fieldnames=list(flat[0]), lineterminator="\n")
     writer.writeheader()
     writer.writerows(flat)

@@ -66,7 +66,8 @@ def document_of(flights: Mapping[tuple[str, str], Flown], alarms: Sequence[float
 
 
 def _row(case: str, whose: str, flown: Flown) -> Document:
-    found, axis = flown.metrics, AXIS.get(case, "q")
+    found = flown.metrics
+    axis = AXIS.get(case, "q")
     tracked = found.tracking
     return {
         "case": case,

@@ -26,7 +26,8 @@ from beaver_ftc.studies.reproduce.choices import FAULT_AT_S, GIVEN, gains, scena
 
 ESTIMATORS = ("aileron", "elevator", "rudder")
 AXIS = {"aileron": "p", "elevator": "q", "rudder": "r", "unanticipated": "q"}  # where a fault shows
-PUBLISHED_LOSS, AFTER_S = 0.4, 18.0  # of the effectiveness; flown on after the fault, s
+PUBLISHED_LOSS = 0.4  # of the effectiveness
+AFTER_S = 18.0  # flown on after the fault, s
 SETTLED_S = 2.0  # from rest, or from a fault, to steady tracking: four error time constants
 
 
@@ -194,7 +195,8 @@ def fly_case(case: Changed, changes: Mapping[str, Any] | None = None) -> Flown:
 def keys_of(case: Changed, changes: Mapping[str, Any]) -> Document:
     """The dotted keys of a case with further changes: two with the same keys are the same flight."""
     merged = _apt({**case.changes, **changes})
-    size, at_s = merged.pop(SIZE, PUBLISHED_LOSS), merged.pop(AT, FAULT_AT_S)
+    size = merged.pop(SIZE, PUBLISHED_LOSS)
+    at_s = merged.pop(AT, FAULT_AT_S)
     faults = [fault | _struck(fault, size, at_s) for fault in merged.get("faults", [])]
     later = {"duration_s": AFTER_S + at_s} if at_s != FAULT_AT_S else {}
     return merged | ({"faults": faults} if "faults" in merged else {}) | later
@@ -215,7 +217,8 @@ class LazyFlights(Mapping[str, Flown]):
     """The published cases in a setting, each flown when a measure asks for it; flown: by keys, shared."""
 
     def __init__(self, changes: Mapping[str, Any], flown: dict[str, Flown]) -> None:
-        self._changes, self._flown = changes, flown
+        self._changes = changes
+        self._flown = flown
 
     def __getitem__(self, name: str) -> Flown:
         keys = keys_of(CASES[name], self._changes)

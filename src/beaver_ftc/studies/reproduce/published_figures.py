@@ -107,7 +107,8 @@ def shares(claim: Document) -> tuple[float, float, float]:
 
 
 def _share(claim: Document, number: float | None) -> float:
-    known, limit = or_never(number), claim["limit"]
+    known = or_never(number)
+    limit = claim["limit"]
     over, under = (limit, known) if claim["at_least"] else (known, limit)
     return over / under if under else inf if over > 0.0 else 0.0
 

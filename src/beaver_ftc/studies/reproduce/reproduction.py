@@ -64,7 +64,8 @@ def claims_row(setting: Changed) -> Document:
     in how many flights adaptation changes no alarm and no name. A number that no verdict needs is not flown:
     it is nan, which keeps no limit."""
     flown: dict[str, Flown] = {}
-    flights, is_published = LazyFlights(setting.changes, flown), setting.name == AS_PUBLISHED.name
+    flights = LazyFlights(setting.changes, flown)
+    is_published = setting.name == AS_PUBLISHED.name
 
     def without(claim: Claim) -> float:
         return claim.number(LazyFlights({**setting.changes, **WITHOUT[claim.ablation].changes}, flown))

@@ -17,7 +17,8 @@ from beaver_ftc.studies.reproduce.published_figures import FIGURES, SENSITIVITY
 if TYPE_CHECKING:
     from rich.table import Table
 
-NAME, WIDTH = "reproduction", 132
+NAME = "reproduction"
+WIDTH = 132
 VERDICT_HEAD = ("Published", "Statement", "Our number", "Limit", "Without", "Verdict", "Remark")
 _SAYS = parse(Path(__file__).with_name("page.yaml").read_text(encoding="utf-8")).data
 ELSEWHERE_TOO = "borne out, elsewhere too"
@@ -144,9 +145,12 @@ GAINS = (
 
 def headline(document: Document) -> str:
     """What became of the statements, in sentences."""
-    tested, built = document["testable"], document["construction"]
+    tested = document["testable"]
+    built = document["construction"]
     settings = len(document["sensitivity"])
-    some, count, background = built["hold"], built["statements"], document["background"]
+    some = built["hold"]
+    count = built["statements"]
+    background = document["background"]
     holding = f"All {count} hold" if some == count else f"{some} of these {count} hold"
     return (
         f"The paper has {tested['statements'] + count + background} statements. {tested['statements']} of "
@@ -178,7 +182,8 @@ def summary(document: Document) -> str:
 
 def as_text(document: Document, folder: str, colour: bool = False) -> str:
     """The tables, what the sensitivity study says, and where the rest lies."""
-    both, unjudged = document["beside"], Counter(c["reason"] for c in document["claims"] if c["reason"])
+    both = document["beside"]
+    unjudged = Counter(c["reason"] for c in document["claims"] if c["reason"])
     side_by_side = tables.plain("Side by side", *tabulated(beside.COLUMNS, both["rows"]))
     flown = tabulated(truth_and_design.FLOWN, document["truth_and_design"]["designs"])
     designs = tables.plain("Truth and design", *flown)
@@ -202,7 +207,8 @@ def _table(document: Document) -> "Table":
     for head in ("Published", "Statement", "Our number", "Without", "Verdict"):
         table.add_column(head)
     for claim in measured(document):
-        found, verdict = f"{ours(claim)} ({limit(claim)})", claim["verdict"]
+        found = f"{ours(claim)} ({limit(claim)})"
+        verdict = claim["verdict"]
         more = remark(claim)
         table.add_row(
             claim["where"], claim["statement"], f"{found}; {more}" if more else found, without(claim),
@@ -223,7 +229,9 @@ def as_html(document: Document, folder: Path) -> str:
 
 
 def _page(document: Document) -> list[page.Part]:
-    missed, both, designs = exceptions(document), document["beside"], document["truth_and_design"]
+    missed = exceptions(document)
+    both = document["beside"]
+    designs = document["truth_and_design"]
     changes = "; ".join(row["variant"] for row in document["sensitivity"])
     return [
         _SAYS["introduction"], summary(document),

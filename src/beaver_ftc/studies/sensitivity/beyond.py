@@ -25,7 +25,8 @@ COUNTED = ("false_alarm", "detected", "named", "misnamed", "lost")
 MEASURED = ("delay_s", "tracking_deg_s", "bound_used")
 FAILED = {"failed": True}  # the row of a flight that cannot be flown to its end
 FLIGHTS = 40  # of a row: an event that none of them has is rarer than 9 % (95 %)
-LATER_S, LEFT_S = 4.0, 5.0  # the faults come so much later at most, and so long before the end
+LATER_S = 4.0  # the faults come so much later at most
+LEFT_S = 5.0  # and so long before the end
 
 
 class Flight(NamedTuple):
@@ -87,7 +88,8 @@ def fly_one(scenario: Scenario, seed: int, flight: Flight) -> Document:
 
 def row_of(found: Metrics, bound_used: float) -> Document:
     """What is counted of a flight."""
-    isolation, tracked = found.isolation, found.tracking
+    isolation = found.isolation
+    tracked = found.tracking
     rms = tracked.post_fault_rms_deg_s if found.fault else tracked.pre_fault_rms_deg_s
     return {
         "failed": False,

@@ -45,7 +45,8 @@ def mechanisms_study(draws: int, seed: int) -> Study:
         margins = [margins_row(cell) for cell in margin_cells()]
         return effects.document_of(seed, draws, rows, margins)
 
-    name, fly = f"mechanisms-{mechanisms_shown.NAME}", partial(fly_one, seed)
+    name = f"mechanisms-{mechanisms_shown.NAME}"
+    fly = partial(fly_one, seed)
     return Study(name, cases_of(draws), fly, document, mechanisms_shown.FILES, follows_from=seed)
 
 

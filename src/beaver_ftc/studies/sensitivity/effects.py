@@ -88,7 +88,8 @@ def net(pairs: Sequence[Pair], worse: Callable[[Document, Document], bool]) -> D
     Its interval is that of both shares, each exact at half of the error probability: together they hold with
     the whole confidence, whatever the shares depend on [ClopperPearson1934].
     """
-    n, confidence = len(pairs), (1.0 + CONFIDENCE) / 2.0
+    n = len(pairs)
+    confidence = (1.0 + CONFIDENCE) / 2.0
     lost, gained = sum(worse(a, b) for a, b in pairs), sum(worse(b, a) for a, b in pairs)
     without, with_ = binomial(lost, n, confidence), binomial(gained, n, confidence)
     return {

@@ -23,9 +23,11 @@ from beaver_ftc.scenario.sensors import PRESETS, Sensors
 
 FREQUENCIES_RAD_S = (5.0, 15.0)  # of an unstructured acceleration where the scenario flies none
 UNDECLARED_SHARE = 0.01  # of a coefficient or a moment of inertia of which no error is declared
-UNDECLARED_SENSORS, UNDECLARED_AIR = "tactical-grade", "light"
+UNDECLARED_SENSORS = "tactical-grade"
+UNDECLARED_AIR = "light"
 FACTOR_LIMITS = (0.1, 10.0)  # of the factors on a coefficient and on an actuator
-_RANDOM, _SIGNED = ("noise_std", "quantum"), ("bias", "scale_error", "drift")
+_RANDOM = ("noise_std", "quantum")
+_SIGNED = ("bias", "scale_error", "drift")
 _IDEAL = Sensors()
 
 Change = Callable[[float, np.random.Generator], Document]
@@ -46,7 +48,8 @@ class Error(NamedTuple):
 
 def errors_of(scenario: Scenario) -> tuple[Error, ...]:
     """Every kind of error that the bounds of a scenario may declare, and that a truth may have."""
-    bounds, declared = scenario.fdi.bounds, Declared.of(scenario)
+    bounds = scenario.fdi.bounds
+    declared = Declared.of(scenario)
     shares = {term.name: declared.coefficients.of(term.name) for term in scenario.airframe.moments}
     inertia = dict.fromkeys(("Ix", "Iy", "Iz"), bounds.inertia)
     constant = declared.constant_rad_s2

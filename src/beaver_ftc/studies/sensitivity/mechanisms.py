@@ -60,8 +60,11 @@ FACTORS: Mapping[str, tuple[Any, ...]] = {
     "fault": FAULTS, "bandwidth": tuple(BANDWIDTHS), "error": ERRORS, "instruments": tuple(INSTRUMENTS),
 }  # fmt: skip
 DRAWS = 3  # of a cell
-AIRSPEED_MPS, STRIKES_S, AFTER_S = (38.0, 52.0), (6.0, 9.0), 8.0
-RATE_HZ, AMPLITUDE_DEG_S = 100.0, 3.0
+AIRSPEED_MPS = (38.0, 52.0)
+STRIKES_S = (6.0, 9.0)
+AFTER_S = 8.0
+RATE_HZ = 100.0
+AMPLITUDE_DEG_S = 3.0
 SWINGS_RAD_S = (1.0, 15.0)  # frequencies of the unstructured acceleration
 
 
@@ -208,7 +211,8 @@ def outcome_of(scenario: Scenario, withheld: str = "") -> Document:
         found = measure(fly(scenario, watch=watch_of(withheld)))
     except BeaverFtcError as error:
         return FAILED | {"error": str(error)}
-    detection, isolation = found.detection, found.isolation
+    detection = found.detection
+    isolation = found.isolation
     return {
         "failed": False,
         "false_alarm": found.false_alarm,

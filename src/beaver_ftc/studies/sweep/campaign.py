@@ -104,7 +104,8 @@ def _fly_missing(
     sweep: Sweep, options: Options, store: Store, landed: Landed, stopped: Callable[[], bool]
 ) -> None:
     """Fly what is not there; of a search each generation once the one before has landed."""
-    make, lost = partial(_workers, sweep, options), partial(one_flight.lost, sweep)
+    make = partial(_workers, sweep, options)
+    lost = partial(one_flight.lost, sweep)
     with closing(Flying(store.landed, store.parts.land, make, lost)) as flying:
 
         def fly(batches: Iterable[tuple[Number, Sequence[int]]], cases_of: Callable[..., Any]) -> None:

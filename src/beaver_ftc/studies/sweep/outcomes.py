@@ -21,7 +21,8 @@ class Flights:
     """
 
     def __init__(self, file: Path | IO[bytes], sweep: Sweep) -> None:
-        self._file, self.vary = file, sweep.file.vary
+        self._file = file
+        self.vary = sweep.file.vary
         self._columns: dict[str, np.ndarray] = {}
 
     def __getitem__(self, name: str) -> np.ndarray:
@@ -96,7 +97,8 @@ class Flights:
     @cached_property
     def fault_labels(self) -> np.ndarray:
         """What broke in each flight, in words: the surface, with the type where there are several types."""
-        kinds, actuators = self["fault.type"], self["fault.actuator"]
+        kinds = self["fault.type"]
+        actuators = self["fault.actuator"]
         several = len(set(kinds[kinds != ""])) > 1
         pairs = zip(kinds, actuators, strict=True)
         return np.array([_label(kind, actuator, several) for kind, actuator in pairs], dtype=object)

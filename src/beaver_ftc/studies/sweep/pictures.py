@@ -100,7 +100,8 @@ def detection_probability(flights: Flights, summary: Document) -> "Figure | None
         return None
     figure, axes = _axes("Detection probability (bars: 95 % intervals)", in_words(key), "share detected")
     for place, (label, group) in enumerate(_faults(flights)):
-        values, hits = flights[key][group], flights.detected[group]
+        values = flights[key][group]
+        hits = flights.detected[group]
         bins = _levels(values) if flights.vary[key].count else _bins(values)
         found = [vars(wilson(int(hits[bin].sum()), bin.size)) for bin in bins]
         draw_estimates(

@@ -66,7 +66,8 @@ def _explained(groups: np.ndarray, ranks: np.ndarray) -> float:
     means = np.bincount(groups, ranks)[used] / counts[used]
     total = ((ranks - ranks.mean()) ** 2).sum()
     between = (counts[used] * (means - ranks.mean()) ** 2).sum()
-    n, k = ranks.size, int(used.sum())
+    n = ranks.size
+    k = int(used.sum())
     if k < 2 or n <= k:
         return 0.0
     return float(1.0 - (total - between) / (n - k) / (total / (n - 1)))

@@ -30,7 +30,8 @@ from beaver_ftc.studies.sweep.one_flight import scenario_of, warm_up
 from beaver_ftc.studies.sweep.sampling import OF_RARE, Assignment, generator_of, values_at
 from beaver_ftc.studies.sweep.store import identity_of
 
-RUNS, MEMBERS = 8, 220  # independent runs, flights of each a level: 10^-5 by a hundredth of 10^6 flights
+RUNS = 8  # independent runs
+MEMBERS = 220  # flights of each run a level: 10^-5 by a hundredth of 10^6 flights
 SHARE = 0.1  # of the flights of a level that reach the next one
 STEP = 0.8  # how much of a point a chain's next one keeps
 MOST_LEVELS = 10  # down to 10^-10
@@ -49,8 +50,11 @@ class Chains:
         self._generator = generator_of(seed, 0, 0, OF_RARE)
         self.points = self._generator.standard_normal((runs, members, keys))
         self.scores = np.full((runs, members), -math.inf)
-        self.share, self.reached = np.ones(runs), np.zeros(runs, bool)
-        self.stuck, self.flights, self.levels = False, 0, 0
+        self.share = np.ones(runs)
+        self.reached = np.zeros(runs, bool)
+        self.stuck = False
+        self.flights = 0
+        self.levels = 0
         self.design: tuple[float, int, np.ndarray] | None = (
             None  # the likeliest event: distance, flight, point
         )
@@ -90,13 +94,16 @@ class Chains:
             for run, level in zip(going, levels, strict=True)
         ])  # fmt: skip
         rows = np.array(going)[:, None]
-        here, scores = self.points[rows, at], self.scores[rows, at]
-        kept, values = [here], [scores]
+        here = self.points[rows, at]
+        scores = self.scores[rows, at]
+        kept = [here]
+        values = [scores]
         for _ in range(math.ceil(members / seeds) - 1):
             moved = STEP * here + math.sqrt(1.0 - STEP**2) * self._generator.standard_normal(here.shape)
             found = self._flown(fly, moved)
             better = found >= levels[:, None]
-            here, scores = np.where(better[..., None], moved, here), np.where(better, found, scores)
+            here = np.where(better[..., None], moved, here)
+            scores = np.where(better, found, scores)
             kept.append(here)
             values.append(scores)
         self.points[going] = np.concatenate(kept, axis=1)[:, :members]
@@ -116,7 +123,8 @@ class Chains:
         """What the runs amount to: a probability with its two-sided interval; why: what it lacks, if
         anything."""
         events, of = self.plain
-        (probability, low, high), why = (math.nan, 0.0, float(self.share.max())), ""
+        probability, low, high = math.nan, 0.0, float(self.share.max())
+        why = ""
         if self.reached.all():
             probability, low, high = lognormal_mean(self.share)
         else:
@@ -133,7 +141,8 @@ def lognormal_mean(values: np.ndarray) -> tuple[float, float, float]:
     from scipy.stats import t
 
     logs = np.log(values)
-    spread, n = float(logs.var(ddof=1)), len(values)
+    spread = float(logs.var(ddof=1))
+    n = len(values)
     half = float(t.ppf(0.5 + 0.5 * CONFIDENCE, n - 1)) * math.sqrt(spread / n + spread**2 / (2 * (n - 1)))
     middle = float(logs.mean()) + 0.5 * spread
     return float(values.mean()), math.exp(middle - half), min(1.0, math.exp(middle + half))
@@ -208,7 +217,8 @@ def rare_study(sweep: Sweep, expectation: str, tell: Callable[[str], None] = lam
     name = f"{sweep.name}-rare-{expectation.replace('.', '-')}"
 
     def rounds(flies: FlyRound) -> Document:
-        chains, failed = Chains(len(sweep.keys), sweep.file.seed), 0
+        chains = Chains(len(sweep.keys), sweep.file.seed)
+        failed = 0
 
         def fly(points: np.ndarray) -> Scores:
             nonlocal failed
@@ -255,7 +265,9 @@ def _document(sweep: Sweep, expectation: str, chains: Chains, failed: int) -> Do
 
 def as_text(document: Document) -> str:
     """For a terminal."""
-    plain, likeliest, p = document["plain"], document["likeliest"], document["probability"]
+    plain = document["plain"]
+    likeliest = document["likeliest"]
+    p = document["probability"]
     said = f"{p:.2g}" if p is not None else f"not known: {document['why']}"
     lines = [
         f"{document['sweep']}: {document['expectation']} not met",

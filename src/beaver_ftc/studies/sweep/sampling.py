@@ -93,7 +93,8 @@ class Plan:
 
     def _points(self, indices: np.ndarray) -> np.ndarray:
         """Points of the unit cube, (flights, drawn keys)."""
-        seed, dimensions = self._file.seed, len(self._drawn)
+        seed = self._file.seed
+        dimensions = len(self._drawn)
         if not dimensions or not indices.size:
             return np.empty((indices.size, dimensions))
         if self._latin is not None:

@@ -25,7 +25,8 @@ from beaver_ftc.studies.sweep.one_flight import DEPARTED
 from beaver_ftc.studies.sweep.sampling import OF_SEARCH, Assignment, generator_of, values_at
 from beaver_ftc.studies.sweep.store import Store
 
-WEIGHT, CROSSOVER = 0.7, 0.9  # [Storn1997] recommend 0.4 to 1 and, for few dependent keys, 0.9
+WEIGHT = 0.7  # [Storn1997] recommend 0.4 to 1
+CROSSOVER = 0.9  # and, for few dependent keys, 0.9
 DEPARTED_DEG_S = 1e6  # above all tracking errors: the score of a flight that loses the aircraft at its start
 _ALMOST_ONE = math.nextafter(1.0, 0.0)
 
@@ -70,7 +71,8 @@ class Evolution:
 
     def __init__(self, seed: int, keys: int) -> None:
         self.members = members(keys)
-        self._seed, self._keys = seed, keys
+        self._seed = seed
+        self._keys = keys
         self.generation = 0
         self._points = np.empty((0, keys))
         self._scores = np.empty(0)
@@ -88,7 +90,8 @@ class Evolution:
 
         x, best: points, and that of the largest score; a, b: two permutations of the points; F: WEIGHT.
         """
-        x, n = self._points, self.members
+        x = self._points
+        n = self.members
         a, b = (generator.permutation(n) for _ in range(2))
         mutants = x + WEIGHT * (x[self._scores.argmax()] - x) + WEIGHT * (x[a] - x[b])
         taken = generator.random(x.shape) < CROSSOVER
@@ -99,10 +102,12 @@ class Evolution:
     def select(self, trials: np.ndarray, scores: np.ndarray) -> None:
         """Let each trial that is no worse take its parent's place; a last generation may be cut short."""
         if self.generation == 0:
-            self._points, self._scores = trials, scores.copy()
+            self._points = trials
+            self._scores = scores.copy()
         else:
             better = np.flatnonzero(scores >= self._scores[: scores.size])
-            self._points[better], self._scores[better] = trials[better], scores[better]
+            self._points[better] = trials[better]
+            self._scores[better] = scores[better]
         self.generation += 1
 
 

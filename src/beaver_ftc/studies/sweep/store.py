@@ -46,7 +46,8 @@ class RowsAsParquet:
     suffix = ".parquet"
 
     def __init__(self, sweep: Sweep) -> None:
-        self.schema, self._sweep = schema_of(sweep), sweep
+        self.schema = schema_of(sweep)
+        self._sweep = sweep
 
     def write(self, rows: Any, file: IO[bytes]) -> None:
         write_tables(file, [table_of(self._sweep, self.schema, rows)], self.schema)

@@ -27,7 +27,9 @@ from beaver_ftc.studies.sweep.pictures import FIGURES
 from beaver_ftc.studies.sweep.summary import OUTCOMES
 
 MANY = 0.1  # of a sweep's flights
-MAX_P_VALUE, MIN_EXPLAINED = 0.05, 0.01  # of a key that an outcome is said to follow
+# Of a key that an outcome is said to follow.
+MAX_P_VALUE = 0.05
+MIN_EXPLAINED = 0.01
 SHOWN = 3  # keys of an outcome, and worst flights
 _STEERED = "The search steered these flights towards the worst: rates say nothing about flights in general."
 _EXPLAINED = (
@@ -48,7 +50,8 @@ def title(summary: Document) -> str:
 
 def facts(summary: Document) -> list[tuple[str, str]]:
     """(what, what the flights show) for each thing worth knowing."""
-    lost, wrong = summary["departures"], summary["isolation"]["wrong"]
+    lost = summary["departures"]
+    wrong = summary["isolation"]["wrong"]
     said = (
         ("flights", _flights(summary)),
         ("searched for", _search(summary)),
@@ -120,7 +123,8 @@ def summary_text(summary: Document, colour: bool = False) -> str:
     """The summary as a table for the terminal."""
     # commands each on a line of its own to be copied
     worst = [f" {'; '.join(flight['why'])}:\n   {flight['replay']}" for flight in summary["worst"][:SHOWN]]
-    headline, lines = (title(summary), "bold green" if summary["passed"] else "bold red"), facts(summary)
+    headline = (title(summary), "bold green" if summary["passed"] else "bold red")
+    lines = facts(summary)
     for what, p, q, r in tracking(summary):
         unit = "" if what == "ratio" else " deg/s"
         label = "tracking RMS, median" if what.startswith("before") else ""

@@ -41,7 +41,9 @@ def replay_command(source: str, out: Path, search: str | None = None) -> str:
 
 def _candidates(flights: Flights) -> Iterator[tuple[int, str]]:
     """(position, what is bad about it), the worst kind first."""
-    faulted, named, reason = flights.faulted, flights["isolation.fault"], flights["reason"]
+    faulted = flights.faulted
+    named = flights["isolation.fault"]
+    reason = flights["reason"]
     wrong = faulted & (named != "") & ~flights["isolation.correct"]
     yield from _first(~flights.measured, lambda i: f"{flights['status'][i]}: {reason[i]}")
     yield from _first(flights["false_alarm"] & flights.measured, lambda i: "false alarm")

@@ -141,7 +141,8 @@ def _judged(name: str, expected: Any, metrics: Metrics) -> Expectation:
 
 def _reason_not_met(expected: Any, early: bool, metrics: Metrics) -> str:
     """The reason why an expectation of the diagnosis is not met; empty if it is not known."""
-    detection, isolation = metrics.detection, metrics.isolation
+    detection = metrics.detection
+    isolation = metrics.isolation
     if early:
         return f"{isolation.fault} was named at {isolation.time_s:g} s, before the fault began"
     gone = [one for one in (isolation.withdrawn if isolation else ()) if one.fault == expected]
@@ -155,7 +156,8 @@ def _reason_not_met(expected: Any, early: bool, metrics: Metrics) -> str:
 def margin(found: Expectation) -> float | None:
     """Distance of a value from its limit, in the unit of the limit, negative if the limit is exceeded. None
     if the expectation has no limit, or the quantity does not exist."""
-    expected, actual = found.expected, found.actual
+    expected = found.expected
+    actual = found.actual
     if isinstance(expected, bool) or not isinstance(expected, int | float) or actual is None:
         return None
     return float(expected - abs(actual))

@@ -24,7 +24,8 @@ from beaver_ftc.results.model import Metrics
 from beaver_ftc.results.style import marks
 
 ACMI_RATE_HZ = 25.0  # smooth to look at; a viewer interpolates
-FLAP, _FLAP_COLUMN = "flap", "flap_pos_rad"  # a surface of this name is shown as a share of its travel
+FLAP = "flap"  # a surface of this name is shown as a share of its travel
+_FLAP_COLUMN = "flap_pos_rad"
 # Any time will do as reference; it is the same for every run, so that runs overlay.
 _ACMI_HEAD = """\
 FileType=text/acmi/tacview
@@ -123,7 +124,8 @@ def _acmi_frames(log_path: Path, metrics: Metrics, aircraft: Aircraft) -> Iterat
     if FLAP in aircraft.surfaces:
         full_rad = aircraft.travel[FLAP].max_rad or aircraft.travel[FLAP].min_rad
     columns = _ACMI_COLUMNS if full_rad is None else (*_ACMI_COLUMNS, _FLAP_COLUMN)
-    radius_m, flaps = 0.0, ""
+    radius_m = 0.0
+    flaps = ""
     for row in _rows_at_acmi_rate(log.StoredLog(log_path), columns):
         radius_m = radius_m or EARTH_RADIUS_M + row["altitude_m"]  # of the first
         latitude = START_LATITUDE_DEG + degrees(row["north_m"] / radius_m)
@@ -137,7 +139,8 @@ def _acmi_frames(log_path: Path, metrics: Metrics, aircraft: Aircraft) -> Iterat
 
 
 def _rows_at_acmi_rate(source: log.Log, columns: tuple[str, ...]) -> Iterator[dict[str, float]]:
-    every, seen = max(1, ceil(1.0 / (ACMI_RATE_HZ * source.frame_s) - 1e-9)), 0
+    every = max(1, ceil(1.0 / (ACMI_RATE_HZ * source.frame_s) - 1e-9))
+    seen = 0
     for chunk in source.read_chunks(columns):
         rows = len(chunk["t_s"])
         for i in range(-seen % every, rows, every):
@@ -186,7 +189,8 @@ def write_recording(
 def _vehicle_file_text(named: dict[str, dict[str, str]], travel_rad: dict[str, float], kind: str) -> str:
     """The vehicle file: which column is what."""
     angle = "{{column: {}, unit: deg}}" if kind == "ardupilot" else "{!r}"
-    commands, flow = named["commands"], named["flow"]
+    commands = named["commands"]
+    flow = named["flow"]
     return _VEHICLE_FILE.format(
         kind=kind,
         rates=_flow_mapping(named["rates"], "{!r}"),
@@ -262,7 +266,9 @@ def _packed_messages(head: bytes, t_us: NDArray[np.int64], fields: log.Values) -
     """The messages of one topic: each its head, the stamp, and the fields as doubles."""
     layout = [("head", "u1", (len(head),)), ("t", "<u8"), ("v", "<f8", (len(fields),))]
     rows = np.zeros(len(t_us), dtype=layout)
-    rows["head"], rows["t"], rows["v"] = list(head), t_us, np.column_stack(list(fields.values()))
+    rows["head"] = list(head)
+    rows["t"] = t_us
+    rows["v"] = np.column_stack(list(fields.values()))
     return rows
 
 

@@ -33,7 +33,9 @@ LEGEND_LINE_INCHES = 0.17  # inches, of one more line of the legend
 _PNG_OPTIONS: dict[str, Any] = {"pil_kwargs": {"compress_level": 1}}
 MIN_SHOWN_RATIO = 0.1  # of a logarithmic axis: what is smaller is noise
 STYLES = ("screen", "paper")
-PAPER_WIDTH, PAPER_DPI, PAPER_FONT = 8.4 / 2.54, 300, 8  # inches: a column of a journal
+PAPER_WIDTH = 8.4 / 2.54  # inches: a column of a journal
+PAPER_DPI = 300
+PAPER_FONT = 8  # points
 
 
 @dataclass(frozen=True)
@@ -148,7 +150,8 @@ def figure_class() -> "type[Figure]":
 def _empty_figure_and_axes(view: View, new_figure: Any) -> tuple["Figure", Any]:
     """An empty figure with its grid of axes, laid out in inches: a solver would double the time."""
     first_of_rows = view.panels[:: view.n_panel_columns]
-    down, is_single = len(first_of_rows), view.n_panel_columns == 1
+    down = len(first_of_rows)
+    is_single = view.n_panel_columns == 1
     heights = [
         0.25 + 0.25 * len(panel.steps) if panel.steps else 1.75 if is_single else 1.5
         for panel in first_of_rows
@@ -225,7 +228,8 @@ def _draw_bars(axes: "Axes", panel: Panel, series: Values) -> None:
     for place, row in enumerate(panel.steps):
         of = [trace for trace in panel.traces if trace.label == row]
         values = np.array([series[trace.column] for trace in of])
-        asked, candidate = series[panel.bars_during_column] == 1, (values == 0).any(axis=0)
+        asked = series[panel.bars_during_column] == 1
+        candidate = (values == 0).any(axis=0)
         excluded = asked & (values == 1).any(axis=0) & ~candidate
         for where, half, colour in (
             (asked & candidate, 0.36, LOOKS[of[0].role].colour), (excluded, 0.04, GREY)
@@ -313,9 +317,11 @@ def _legend_handle_of_label(grid: Sequence["Axes"]) -> dict[str, Any]:
 def _draw_legend(figure: "Figure", grid: Sequence["Axes"]) -> None:
     """One legend for the figure: each label once, but for the single curves that panel titles name."""
     shown = _legend_handle_of_label(grid)
-    columns, tall = _max_legend_columns(list(shown), figure.get_figwidth()), figure.get_figheight()
+    columns = _max_legend_columns(list(shown), figure.get_figwidth())
+    tall = figure.get_figheight()
     more = LEGEND_LINE_INCHES * (-(-len(shown) // columns) - 1) / tall
-    top, share = 1 - TOP / tall, 1 - more * tall / (tall - TOP - BOTTOM)
+    top = 1 - TOP / tall
+    share = 1 - more * tall / (tall - TOP - BOTTOM)
     for axes in grid if more else ():  # lower, to make room
         old = axes.get_position()
         axes.set_position((old.x0, top - share * (top - old.y0), old.width, share * old.height))

@@ -73,7 +73,8 @@ class ParquetLog:
         """Write what is left and complete the file."""
         if self._writer is None:
             return
-        writer, self._writer = self._writer, None
+        writer = self._writer
+        self._writer = None
         try:
             if self._used:
                 self._flush(writer)
@@ -93,7 +94,8 @@ class ParquetLog:
         import pyarrow as pa
 
         # Not pa.array: it imports pandas, if that is installed, only to see whether it was given a series.
-        used, float64 = self._used, pa.float64()
+        used = self._used
+        float64 = pa.float64()
         values = (pa.py_buffer(column[:used]) for column in self._buffer)
         arrays = [pa.Array.from_buffers(float64, used, [None, column]) for column in values]
         writer.write_table(pa.Table.from_arrays(arrays, schema=self._schema))
@@ -143,7 +145,8 @@ class MemoryLog(Log):
 
     def open(self, columns: Sequence[str]) -> None:
         """Start an empty log with these columns, in this order."""
-        self.columns, self._chunks = tuple(columns), []
+        self.columns = tuple(columns)
+        self._chunks = []
 
     def write(self, rows: np.ndarray) -> None:
         """Append a copy of `rows`, a float64 array (n, columns)."""
@@ -164,7 +167,8 @@ class MemoryLog(Log):
         the second.
         """
         now = MemoryLog()
-        now.columns, now._chunks = self.columns, list(self._chunks)
+        now.columns = self.columns
+        now._chunks = list(self._chunks)
         return now
 
     def copy_to(self, path: Path) -> None:
@@ -325,7 +329,8 @@ def log_dataframe(log: "Log", found: Metrics) -> "DataFrame":
         table = DataFrame(np.asfortranarray(log.rows), columns=list(log.columns), copy=False)
     else:
         table = DataFrame(log.read())
-    detection, isolation = found.detection, found.isolation
+    detection = found.detection
+    isolation = found.isolation
     verdict = {
         "passed": found.passed, "false_alarm": found.false_alarm,
         "detected": detection.detected, "detection_delay_s": detection.delay_s,

@@ -113,7 +113,8 @@ class Truth:
         damage = scenario.airframe.damage
         cases = [fault.case for fault in scenario.faults if isinstance(fault, Damage)]
         removed_surfaces = frozenset(surface for case in cases for surface in damage[case].takes)
-        began_s, beyond = sorted(failing(scenario).values()), None
+        began_s = sorted(failing(scenario).values())
+        beyond = None
         if not scenario.fdi.pairs and len(began_s) > 1:
             beyond = DeclaredFault(None, UNANTICIPATED, began_s[1])
         return cls(tuple(faults), scenario.rate_hz, removed_surfaces, beyond)
@@ -157,7 +158,8 @@ class Truth:
 
     def faults_named_rightly_by(self, name: str | None, time_s: float | None) -> tuple[DeclaredFault, ...]:
         """The declared faults of which a name given then is right, as they strike."""
-        candidates, beyond = self.faults, self.outside_class_from_second_fault
+        candidates = self.faults
+        beyond = self.outside_class_from_second_fault
         if beyond is not None and time_s is not None and not self.onset_of(beyond).is_false(time_s):
             candidates += (beyond,)
         return tuple(fault for fault in candidates if fault.is_named_by(name, self.removed_surfaces))
@@ -172,7 +174,8 @@ class Truth:
 
 
 # When a hint is given:
-TAKEN_OVER, LONG_S = "reallocated", 1.0  # this mode begins longer after the name
+TAKEN_OVER = "reallocated"  # this mode begins
+LONG_S = 1.0  # so long after the name, or longer
 NEAR_THRESHOLD_SHARE = 0.9  # the residual in healthy flight exceeds this share of its threshold
 DRIFT_MPS, DRIFT_M = 5.0, 300.0  # airspeed, or altitude, changes by more over the flight
 
@@ -193,7 +196,8 @@ def measure(flight: "Landing") -> Metrics:
 
 def _declared(flight: "Landing", truth: Truth) -> Document:
     """The sections that repeat what the scenario declares."""
-    scenario, first = flight.scenario, truth.first
+    scenario = flight.scenario
+    first = truth.first
     return {
         "scenario": scenario.name, "seed": scenario.seed,
         "flight": model.FlightCondition(
@@ -216,7 +220,8 @@ def _declared(flight: "Landing", truth: Truth) -> Document:
 def _found(flight: "Landing", truth: Truth) -> Document:
     """The sections that are measured. A key of a section, or of the document, that has the name of a field of
     the landing has its value, unless it stands below."""
-    landed, onset = vars(flight), truth.onset
+    landed = vars(flight)
+    onset = truth.onset
     at_once = truth.first is not None and truth.first.at_s <= 0  # then nothing was measured before it
     return landed | {
         "detection": landed | {
@@ -274,7 +279,8 @@ def _isolation(flight: "Landing", truth: Truth) -> Document:
 
 def _windows(flight: "Landing", truth: Truth) -> list[Document] | None:
     """The alarm and the names in each window; None if one window lasts to the end of the flight."""
-    known, end_s = flight.windows, flight.frames / truth.rate_hz
+    known = flight.windows
+    end_s = flight.frames / truth.rate_hz
     if len(known) > 1 or any(window["to_s"] < end_s for window in known):
         return [_window(rounded(window), truth) for window in known]
     return None
@@ -282,7 +288,9 @@ def _windows(flight: "Landing", truth: Truth) -> list[Document] | None:
 
 def _window(window: Document, truth: Truth) -> Document:
     """One window. A name given before a fault of the window began counts from the begin of this fault."""
-    last_frame_s, alarm_s, found = window["to_s"] - 1.0 / truth.rate_hz, window["alarm_s"], window["found"]
+    last_frame_s = window["to_s"] - 1.0 / truth.rate_hz
+    alarm_s = window["alarm_s"]
+    found = window["found"]
     acting = acting_at(truth.faults, last_frame_s)
     here = truth.within(acting)
     return window | {
@@ -324,11 +332,15 @@ def _names_given_in_flight(flight: "Landing", truth: Truth) -> tuple[str, ...]:
 def _named(found: Document, truth: Truth, otherwise: DeclaredFault | None = None) -> Document:
     """A named fault; `fault` is None while several candidates remain. otherwise: the fault with which a wrong
     name is compared."""
-    name, kind, time_s = found["isolated"], found["isolation_type"], found["isolation_time_s"]
-    estimate, type_time_s = found.get("estimate"), found.get("type_time_s")
+    name = found["isolated"]
+    kind = found["isolation_type"]
+    time_s = found["isolation_time_s"]
+    estimate = found.get("estimate")
+    type_time_s = found.get("type_time_s")
     right = truth.against(name, time_s)
     fault = right or otherwise
-    onset, premature = truth.onset_of(fault), truth.is_premature(name, time_s, fault)
+    onset = truth.onset_of(fault)
+    premature = truth.is_premature(name, time_s, fault)
     type_is_right = truth.is_type_right(fault, kind, type_time_s)
     # several are named by our diagnosis alone, which excludes all others
     return {"so_far": None if name is None else True, **found} | {
@@ -418,7 +430,8 @@ def _hint_fault_too_small(scenario: "Scenario", flight_metrics: Metrics) -> str:
 
 def _hint_alarm_in_one_frame(scenario: "Scenario", flight_metrics: Metrics) -> str:
     """An alarm in the first frame: of no meaning for flights with errors, noise or wind."""
-    delay_s, frame_s = flight_metrics.detection.delay_s, 1.0 / scenario.rate_hz
+    delay_s = flight_metrics.detection.delay_s
+    frame_s = 1.0 / scenario.rate_hz
     if delay_s is None or delay_s > frame_s + TIME_TOLERANCE_S:
         return ""
     if not (scenario.sensors.is_ideal and scenario.actuators.is_ideal and scenario.environment.is_still):

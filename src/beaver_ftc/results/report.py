@@ -37,7 +37,8 @@ ReportSection = Callable[[Path], str]
 
 _TEMPLATE_FOLDER = Path(__file__).parent / "templates"
 _REGISTERED_SECTIONS: list[ReportSection] = []  # studies that add to a run's report register theirs
-AROUND_S, AT_FULL_RATE = 2.5, 10_000  # before and after the events, s, and points of it at full rate
+AROUND_S = 2.5  # before and after the events, s
+AT_FULL_RATE = 10_000  # points of that at full rate
 _FLIGHT_PATH_COLUMNS = ("north_m", "east_m", "altitude_m", "phi_rad", "theta_rad", "psi_rad")
 
 
@@ -81,7 +82,8 @@ def register_section(section: ReportSection) -> None:
 def _verdict_entry(metrics: Document, folder: Path) -> Document:
     import yaml
 
-    found, scenario = Metrics.of(metrics), (folder / "scenario.yaml").read_text(encoding="utf-8")
+    found = Metrics.of(metrics)
+    scenario = (folder / "scenario.yaml").read_text(encoding="utf-8")
     return {
         "metrics": metrics,
         "title": verdict.title(found),

@@ -73,7 +73,8 @@ class Mark:
 
 def marks(metrics: Metrics) -> list[Mark]:
     """The marks of fault, detection, isolation and departure that came before the end of the flight."""
-    fault, departure = metrics.fault, metrics.departure
+    fault = metrics.fault
+    departure = metrics.departure
     event_marks = (
         ("fault", fault.at_s if fault else None, VERMILION, (), "v", "F"),
         ("detection", metrics.detection.time_s, BLACK, (4, 2), "D", "D"),

@@ -19,7 +19,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-MOST_CHARACTERS, MOST_DEPTH = 4000, 40
+MOST_CHARACTERS = 4000
+MOST_DEPTH = 40
 
 _TOKEN_PATTERN = re.compile(
     r"\s*(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+(?:[eE][-+]?\d+)?|[A-Za-z_][\w.]*|->|<=|>=|[-+*/()<>\[\]:,])"
@@ -95,7 +96,9 @@ class _Parser:
     """Operators by their power; bounded in depth, so that no text can exhaust the stack."""
 
     def __init__(self, tokens: list[str]) -> None:
-        self._tokens, self._at, self._depth = [*tokens, ""], 0, 0
+        self._tokens = [*tokens, ""]
+        self._at = 0
+        self._depth = 0
 
     def parse_all(self) -> Formula:
         found = self._parse_operand(0)
@@ -225,12 +228,15 @@ def _robustness_by_frame(
 def _future_minimum(values: np.ndarray, begin: int, end: int) -> np.ndarray:
     """min(values[k + begin : k + end + 1]) at each k, infinite where that is beyond the log: twice as long a
     stretch at each step."""
-    frames, width = len(values), min(end, len(values)) - begin + 1
+    frames = len(values)
+    width = min(end, len(values)) - begin + 1
     if width < 1:
         return np.full(frames, np.inf)
-    least, span = np.concatenate((values[begin:], np.full(begin + width, np.inf))), 1
+    least = np.concatenate((values[begin:], np.full(begin + width, np.inf)))
+    span = 1
     while 2 * span <= width:
-        least, span = np.minimum(least[:-span], least[span:]), 2 * span
+        least = np.minimum(least[:-span], least[span:])
+        span = 2 * span
     return np.minimum(least[:frames], least[width - span :][:frames])
 
 

@@ -62,7 +62,8 @@ def outcome_class(metrics: Metrics) -> str:
 
 def verdict_lines(metrics: Metrics) -> list[tuple[str, str]]:
     """(name, text) of each line of the verdict, in the order of events."""
-    declared, isolation = metrics.faults or (metrics.fault,), metrics.isolation
+    declared = metrics.faults or (metrics.fault,)
+    isolation = metrics.isolation
     said = (
         ("flight", _if_there(_condition_text, metrics.flight)),
         *(("" if i else "fault", _fault_text(fault, metrics.faults)) for i, fault in enumerate(declared)),
@@ -264,10 +265,12 @@ def _change_text(change: ChangeInFlight) -> str:
     to = [f"{key} {name}" for key in ("law", "scheme") if (name := getattr(change, key))]
     if change.sensors:
         to.append("sensors")
-    form, alarm = "{what} at {time_s}", "FALSE ALARM" if change.false_alarm else "alarm"
+    form = "{what} at {time_s}"
+    alarm = "FALSE ALARM" if change.false_alarm else "alarm"
     if change.detection_time_s is not None:
         form += "; the diagnosis before: {alarm} at {detection_time_s}, {named}"
-    what, named = ", ".join(to) or "declared sensors", change.isolated or "not isolated"
+    what = ", ".join(to) or "declared sensors"
+    named = change.isolated or "not isolated"
     return _filled(form, change, what=what, alarm=alarm, named=named)
 
 
@@ -283,7 +286,8 @@ def _outside_class_text(metrics: Metrics) -> str:
     """The faults that the diagnosis cannot name, as its class does not have them."""
     if not metrics.outside_class:
         return ""
-    outside, cure = " and ".join(metrics.outside_class), wider(metrics.flight.fault_class)
+    outside = " and ".join(metrics.outside_class)
+    cure = wider(metrics.flight.fault_class)
     return f"{outside}: outside the declared class, so that it cannot be named; {cure}"
 
 
@@ -319,7 +323,8 @@ _FORM_OF_SENSOR_FAULT = {"bias": "{:+g} {}", "noise": "{:g} {}", "scale": "{:+.0
 def _fault_size_texts(fault: DeclaredFault) -> list[str]:
     """The size of an injected fault in words, that of an instrument's in the unit of the instrument."""
     if fault.sensor:
-        unit, size = QUANTITIES[fault.sensor].unit, fault.size.get("magnitude")
+        unit = QUANTITIES[fault.sensor].unit
+        size = fault.size.get("magnitude")
         return [] if size is None else [_FORM_OF_SENSOR_FAULT[fault.type].format(size, unit)]
     words_of = TYPES[fault.type].in_words if fault.type in TYPES else {}
     return [words_of[key](value) for key, value in fault.size.items() if key in words_of]
@@ -355,7 +360,8 @@ def _true_size_text(isolation: Named, metrics: Metrics) -> str:
     faults = [fault for fault in metrics.faults if fault.actuator == isolation.fault]
     if isolation.estimate is None or all(fault.type != isolation.type for fault in faults):
         return ""
-    flown, at_s = metrics.flight, isolation.estimate_at_s
+    flown = metrics.flight
+    at_s = isolation.estimate_at_s
     if at_s is None:
         at_s = flown.flown_s - 1.0 / flown.rate_hz if flown and flown.rate_hz else math.inf
     lasts = faults[0].end_s is None and faults[0].profile == "abrupt" and len(faults) == 1
@@ -390,7 +396,8 @@ def _statistical_text(said: Statistical) -> str:
 
 
 def _isolation_text(metrics: Metrics) -> str:
-    isolation, found = metrics.isolation, "none"
+    isolation = metrics.isolation
+    found = "none"
     if isolation.isolated:
         found = _named_fault_text(isolation, metrics)
     elif metrics.detection.detected and isolation.candidates:
@@ -474,7 +481,8 @@ def _remaining_authority_text(authority: Authority) -> str:
     for axis, of in vars(authority).items():
         if of.least_rad_s2 is None:
             continue
-        left, most = of.greatest_rad_s2 - of.least_rad_s2, of.engines_greatest_rad_s2
+        left = of.greatest_rad_s2 - of.least_rad_s2
+        most = of.engines_greatest_rad_s2
         healthy = of.healthy_greatest_rad_s2 - of.healthy_least_rad_s2
         share = left / healthy if healthy else 1.0  # no surface acts about the axis: none was lost
         if share < MAX_SHOWN_AUTHORITY_SHARE or most:
@@ -487,7 +495,8 @@ def _remaining_authority_text(authority: Authority) -> str:
 def _envelope_text(metrics: Metrics) -> str:
     if not metrics.envelope_exits:
         return ""
-    times, first = _count_and_noun(metrics.envelope.exits, "time"), metrics.envelope_exits[0].start_s
+    times = _count_and_noun(metrics.envelope.exits, "time")
+    first = metrics.envelope_exits[0].start_s
     form = "left {times}, {outside_s} in all, first at {first}"
     return _filled(form, metrics.envelope, times=times, first=_seconds_text(first))
 

@@ -145,7 +145,9 @@ def expected_airspeed_mps(metrics: Metrics) -> float | None:
 def views(columns: Sequence[str], power: bool = False, within_mps: float | None = None) -> tuple[View, ...]:
     """Every view that a log with these columns allows; power: the law has used the engine; within_mps: of the
     commanded airspeed, as the scenario expects its mean."""
-    known, moved, engine = set(columns), surfaces(columns), power_column(columns)
+    known = set(columns)
+    moved = surfaces(columns)
+    engine = power_column(columns)
     isolating = estimators(columns)
     named = (
         _TRACKING, _profile_view(ATTAINABLE_AIRSPEED_COLUMN in known, engine, within_mps),
@@ -293,7 +295,8 @@ def detection_panel(axis: str, label: str, role: str = "residual") -> Panel:
 
 def isolation_panel(name: str, axis: str, label: str, threshold: str = "± threshold") -> Panel:
     """The residual of an isolation estimator on an axis, within its thresholds."""
-    stem, shade = f"fie_{name}_{axis}", f"fie_{name}_excluded"
+    stem = f"fie_{name}_{axis}"
+    shade = f"fie_{name}_excluded"
     bounds = (f"{stem}_lower_rad_s", threshold, "bound"), (f"{stem}_upper_rad_s", "", "bound")
     residual = f"{stem}_residual_rad_s", "residual", "actual"
     return _panel(label, *bounds, residual, shade_column=shade, shade_label="excluded")

@@ -39,7 +39,8 @@ FILES_OF_A_RUN = frozenset({
     "scenario.yaml", "log.parquet", "metrics.json", "report.html", "figures", "aircraft",
     "log.csv", "flight.acmi", "flight.csv", "flight.ulg", "flight.bin", "vehicle.yaml",
 })  # fmt: skip
-AIRCRAFT, MODEL_FILES = "aircraft", frozenset({".xml", ".yaml"})  # an own aircraft, to fly it again
+AIRCRAFT = "aircraft"  # an own aircraft, to fly it again
+MODEL_FILES = frozenset({".xml", ".yaml"})  # of it
 SOFTWARE_MARK = "beaver-ftc"  # the software that a picture of ours names in its metadata
 _PICTURE_END_BYTES = 2048  # of a picture: its metadata come first, those of a PDF last
 _AT_FDCWD = -100
@@ -78,7 +79,8 @@ def run(
     watch = certificate.watch if certificate else None
     failed: list[Exception] = []
     with result_folder(out, scenario.name) as folder:
-        log_path, aircraft = folder / "log.parquet", scenario.airframe
+        log_path = folder / "log.parquet"
+        aircraft = scenario.airframe
         with ParquetLog(log_path) as log:
             flight = fly(scenario, log, progress, prepare=prepare, watch=watch)
         write_scenario(folder, scenario)
@@ -214,7 +216,8 @@ def result_folder(out: Path, name: str, files: Iterable[str] = ()) -> Iterator[P
         created = _make_parents(out)
         _remove_stale(out, name)
         own = uuid4().hex
-        unnamed, partial = out / f".beaver-ftc-{own}", out / f"{_partial_folder_prefix(name)}{own}"
+        unnamed = out / f".beaver-ftc-{own}"
+        partial = out / f"{_partial_folder_prefix(name)}{own}"
         unnamed.mkdir()
         try:
             with _locked(unnamed):  # before it bears the name by which another run would look for stale ones

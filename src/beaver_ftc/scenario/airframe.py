@@ -192,7 +192,8 @@ def initial_of(aircraft: Aircraft) -> type[Initial]:
         says = setting.says or name
         keys[name] = Number, number(setting.default, setting.unit, says, ge=low, le=high)
     for surface in aircraft.left_by_trim:
-        travel, says = aircraft.travel[surface], f"{surface} deflection"
+        travel = aircraft.travel[surface]
+        says = f"{surface} deflection"
         low, high = degrees(travel.min_rad), degrees(travel.max_rad)
         of = number(0.0, "deg", says, ge=low, le=high, examples=[round(0.25 * high, 1)])
         keys[f"{surface}_deg"] = Number, of
@@ -214,7 +215,8 @@ def highest_of(aircraft: Aircraft) -> float:
 
 def _flow_keys(aircraft: Aircraft) -> dict[str, Any]:
     """Airspeed and altitude, whose range and default make room for the aircraft's own."""
-    (low, high), start = aircraft.envelope.airspeed_mps, aircraft.file.start
+    low, high = aircraft.envelope.airspeed_mps
+    start = aircraft.file.start
     slowest, fastest = airspeeds_of(aircraft)
     default = start.airspeed_mps or (45.0 if low <= 45.0 <= high else 0.5 * (low + high))
     says = f"true airspeed. The model is valid from {low:g} to {high:g} m/s"
@@ -310,7 +312,8 @@ class Actuators(OfSurfaces):
     it."""
 
     __pydantic_extra__: dict[str, ActuatorDynamics]
-    of_one, presets = ActuatorDynamics, PRESETS
+    of_one = ActuatorDynamics
+    presets = PRESETS
 
     @property
     def is_ideal(self) -> bool:

@@ -54,7 +54,8 @@ class SensorErrors(dict[str, Error]):
         self.declared = sensors
         for name, sensor in sensors:
             noise, bias, resolution = sensor.noise_bias_quantum
-            worst, slope = NOISE_LIMIT_SIGMA * noise + abs(bias) + resolution / 2, abs(sensor.scale_error)
+            worst = NOISE_LIMIT_SIGMA * noise + abs(bias) + resolution / 2
+            slope = abs(sensor.scale_error)
             self[name] = Error(noise, abs(bias), resolution, slope, sensor.random_error, worst)
 
     def each(self, of_it: str, names: Iterable[str] = SIGNALS) -> np.ndarray:

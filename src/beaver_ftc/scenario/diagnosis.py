@@ -85,7 +85,8 @@ def of_several(scenario: Any) -> str:
     ]
     if not any(a[2] != b[2] and a[0] < b[1] and b[0] < a[1] for a in spans for b in spans):
         return ""
-    fdi, says = scenario.fdi, "faults on several surfaces at once: the diagnosis looks for one"
+    fdi = scenario.fdi
+    says = "faults on several surfaces at once: the diagnosis looks for one"
     if not fdi.is_ours:
         return f"{says}; fdi.pairs, which looks for two, is of scheme adaptive-estimators alone"
     declared = (fdi.bounds.sensors, *(sensors for _, sensors in _declared_later(scenario)))

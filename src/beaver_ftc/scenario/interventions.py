@@ -35,7 +35,8 @@ OneThing = TypeVar("OneThing", bound=Section)
 
 def _begun(model: type[OneThing], given: Mapping[str, Any], at_s: float, keys: str) -> OneThing:
     """What the mapping describes, as the only field of a model; mistakes are named without that field."""
-    (what,), data = model.model_fields, plain(given)
+    (what,) = model.model_fields
+    data = plain(given)
     if not isinstance(data, dict):
         raise BadInput(f"{given!r:.60} is no {what}, allowed: a mapping of {keys}")
     if "at_s" in data:
@@ -95,7 +96,8 @@ def with_targets(scenario: Scenario, targets: Mapping[str, float], now_s: float)
     """
     if scenario.autopilot is None or not scenario.autopilot.channels:
         raise BadInput("autopilot: this flight has none, allowed: a scenario with `autopilot`")
-    known, changes = tuple(Autopilot.model_fields), {}
+    known = tuple(Autopilot.model_fields)
+    changes = {}
     for channel, value in targets.items():
         if channel not in known:
             raise BadInput(f"autopilot: {channel!r:.60} is not known{suggestion(str(channel), known)}")

@@ -14,7 +14,8 @@ from beaver_ftc.design import altitude_of
 Span = tuple[float, float]
 ALTITUDE = "altitude_m"
 # Two more reasons to be outside: flown longer than measured; every quantity in its range, but in no one box.
-LATE, BETWEEN = "flown_s", "between"
+LATE = "flown_s"
+BETWEEN = "between"
 _FLOW = ("p_rad_s", "q_rad_s", "r_rad_s", "alpha_rad", "beta_rad", "airspeed_mps", ALTITUDE)
 _PLURAL = {
     "p_rad_s": "roll rates", "q_rad_s": "pitch rates", "r_rad_s": "yaw rates",

@@ -124,7 +124,8 @@ def conflicts(said: Mapping[str, Any]) -> Iterator[Conflict]:
     yield from _too_late("changes", changes_s or (), duration_s)
     yield from _without_effect(said.get("faults", ()))
     yield from _out_of_order(changes_s or ())
-    expect, autopilot = said.get("expect"), said.get("autopilot")
+    expect = said.get("expect")
+    autopilot = said.get("autopilot")
     if faults_s is not None and not faults_s:
         yield from _expected_of_no_fault(expect)
     if isinstance(autopilot, Mapping | None):
@@ -457,7 +458,8 @@ class Scenario(Section, title="beaver-ftc scenario"):
         try:
             aircraft = aircraft_called(reference, folder_of(info))
         except UnknownAircraft:
-            aircraft, reference = load_aircraft(), None
+            aircraft = load_aircraft()
+            reference = None
         with checked_against(aircraft, reference):
             scenario = read(given)
         if isinstance(given, dict):

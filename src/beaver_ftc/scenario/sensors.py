@@ -97,7 +97,8 @@ def _reads(suffix: str, unit: str, most: float, si: float = 1.0) -> Callable[[ty
     }
 
     def made(cls: type[_S]) -> type[_S]:
-        cls.si, cls.unit = (*keys, si), unit
+        cls.si = (*keys, si)
+        cls.unit = unit
         return create_model(
             cls.__name__, __base__=cls, __module__=cls.__module__, __doc__=cls.__doc__, **fields
         )

@@ -307,7 +307,8 @@ def _parse(lines: Sequence[str], column: str) -> dict[str, list[float]]:
             raise UnreadableError(f"the header has no column {name!r}, allowed: {_FORMAT}", 1)
     if len(lines) - 1 > MAX_ROWS:
         raise UnreadableError(f"too many rows ({len(lines) - 1}), allowed: at most {MAX_ROWS}")
-    at, of = header.index("t_s"), header.index(column)
+    at = header.index("t_s")
+    of = header.index(column)
     rows = [_row(line, number, (at, of)) for number, line in enumerate(lines[1:], start=2) if line.strip()]
     if not rows:
         raise UnreadableError(f"there are no rows, allowed: {_FORMAT}", 2)
@@ -317,7 +318,8 @@ def _parse(lines: Sequence[str], column: str) -> dict[str, list[float]]:
 def _row(line: str, number: int, columns: tuple[int, int]) -> tuple[float, float]:
     cells = line.split(",")
     try:
-        at, of = float(cells[columns[0]]), float(cells[columns[1]])
+        at = float(cells[columns[0]])
+        of = float(cells[columns[1]])
     except (ValueError, IndexError):
         raise UnreadableError(f"{line[:40]!r} is not a row of numbers, allowed: {_FORMAT}", number) from None
     if not (isfinite(at) and isfinite(of)):

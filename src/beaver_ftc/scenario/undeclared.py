@@ -84,7 +84,8 @@ def _moments(scenario: Any, declared: Declared) -> Iterator[Undeclared]:
     truth = scenario.uncertainty
     for name, ratio in truth.coefficients.items():
         if name[:2] in MOMENTS:
-            key, allowed = f"uncertainty.coefficients.{name}", declared.coefficients.of(name)
+            key = f"uncertainty.coefficients.{name}"
+            allowed = declared.coefficients.of(name)
             yield from _ratio(key, "fdi.bounds.coefficients", ratio, allowed)
     for axis, ratio in truth.inertia:
         yield from _ratio(f"uncertainty.inertia.{axis}", "fdi.bounds.inertia", ratio, declared.inertia)
@@ -93,20 +94,25 @@ def _moments(scenario: Any, declared: Declared) -> Iterator[Undeclared]:
 def _servos(scenario: Any, declared: Declared) -> Iterator[Undeclared]:
     """Actuators, as ratios to the designer's, and their dead bands."""
     for name in declared.aircraft.surfaces:
-        key, cover = f"uncertainty.actuators.{name}", f"fdi.bounds.actuators.{name}"
+        key = f"uncertainty.actuators.{name}"
+        cover = f"fdi.bounds.actuators.{name}"
         of = (scenario.actuators, declared.servos, scenario.uncertainty.actuators, declared.servo_errors)
         nominal, known, off, bound = (getattr(section, name) for section in of)
         for word, unit in (("bandwidth", "_rad_s"), ("rate_limit", "_deg_s")):
-            true, expected = getattr(nominal, word + unit), getattr(known, word + unit)
+            true = getattr(nominal, word + unit)
+            expected = getattr(known, word + unit)
             ratio = getattr(off, word) * true / expected if expected else 1.0 if not true else inf
             yield from _ratio(f"{key}.{word}", f"{cover}.{word}", ratio, getattr(bound, word))
-        word, allowed = "dead_band_deg", bound.dead_band_deg + degrees(declared.deflection_rad)
+        word = "dead_band_deg"
+        allowed = bound.dead_band_deg + degrees(declared.deflection_rad)
         yield from _larger(f"{key}.{word}", f"{cover}.{word}", off.dead_band_deg, allowed, " deg")
 
 
 def _forces(scenario: Any, declared: Declared) -> Iterator[Undeclared]:
     """Errors of the forces that accelerometers are compared with."""
-    truth, allowed, by = scenario.uncertainty, declared.coefficients.largest, _BY_ACCELEROMETERS
+    truth = scenario.uncertainty
+    allowed = declared.coefficients.largest
+    by = _BY_ACCELEROMETERS
     for name, ratio in truth.coefficients.items():
         if name[:2] in _FORCES:
             key = f"uncertainty.coefficients.{name}"
@@ -122,9 +128,11 @@ def _sensors(scenario: Any, declared: Declared) -> Iterator[Undeclared]:
     if beyond:
         preset = next((name for name in PRESETS if _covers(name, scenario.sensors)), None)
         cure = f"`fdi.bounds.sensors: {preset}` declares" if preset else "the same keys there declare"
-        key, whose = "sensors", f"the errors of {', '.join(beyond)}"
+        key = "sensors"
+        whose = f"the errors of {', '.join(beyond)}"
         if len(beyond) == 1:
-            key, whose = f"sensors.{beyond[0]}", "its errors"
+            key = f"sensors.{beyond[0]}"
+            whose = "its errors"
         says = f"{whose} are not within fdi.bounds.sensors, so alarms without a fault may come; {cure} them"
         yield Undeclared(key, says)
 
@@ -136,7 +144,8 @@ def _covers(preset: str, truth: Sensors) -> bool:
 
 def _severity(scenario: Any, declared: Declared) -> Iterator[Undeclared]:
     """Turbulence stronger than the declared one."""
-    flown, known = Dryden(scenario.environment.severity or "none"), declared.air
+    flown = Dryden(scenario.environment.severity or "none")
+    known = declared.air
     if flown.rank > known.rank:
         says = f"{flown.severity} is more than fdi.bounds.turbulence, {known.severity}"
         yield Undeclared("environment.severity", says)
@@ -144,15 +153,19 @@ def _severity(scenario: Any, declared: Declared) -> Iterator[Undeclared]:
 
 def _unstructured(scenario: Any, declared: Declared) -> Iterator[Undeclared]:
     """Inertia coupling and sinusoidal accelerations."""
-    truth, statistical = scenario.uncertainty, scenario.fdi.statistical
+    truth = scenario.uncertainty
+    statistical = scenario.fdi.statistical
     for axis, coupling, constant in zip(AXES, declared.coupling, declared.constant_rad_s2, strict=True):
-        theta, sinusoid = getattr(truth.inertia_coupling, axis), getattr(truth.sinusoid, axis)
-        key, swing = f"uncertainty.sinusoid.{axis}", sinusoid.amplitude_rad_s2
+        theta = getattr(truth.inertia_coupling, axis)
+        sinusoid = getattr(truth.sinusoid, axis)
+        key = f"uncertainty.sinusoid.{axis}"
+        swing = sinusoid.amplitude_rad_s2
         word = f"inertia_coupling.{axis}"
         yield from _larger(f"uncertainty.{word}", f"fdi.bounds.{word}", theta, coupling)
         yield from _larger(key, f"fdi.bounds.constant_rad_s2.{axis}", swing, constant, " rad/s2")
         if swing > 0 and statistical:
-            rad_s, slowest = sinusoid.frequency_rad_s, statistical.uncertainty_rad_s
+            rad_s = sinusoid.frequency_rad_s
+            slowest = statistical.uncertainty_rad_s
             says = f"{rad_s:g} rad/s is faster than fdi.statistical.uncertainty_rad_s, {slowest:g}"
             yield from _beyond(key, rad_s, slowest, says)
 
@@ -160,7 +173,8 @@ def _unstructured(scenario: Any, declared: Declared) -> Iterator[Undeclared]:
 def _air(scenario: Any, declared: Declared) -> Iterator[Undeclared]:
     """Gusts, whose moments only a constant bound covers, and vertical wind, which the altimeter's test
     limits."""
-    environment, key = scenario.environment, "environment.gust"
+    environment = scenario.environment
+    key = "environment.gust"
     if any(any(gust.velocity_mps) for gust in environment.gusts):
         yield Undeclared(key, "what a gust does is covered by fdi.bounds.constant_rad_s2 only")
         if declared.follows_gusts_by_forces:

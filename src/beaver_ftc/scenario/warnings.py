@@ -131,7 +131,8 @@ def _airspeed(scenario: Any) -> Iterator[str]:
 
 def _power(scenario: Any) -> Iterator[str]:
     """An altitude is commanded, but the aircraft needs all its power for level flight where flights start."""
-    aircraft, profile = scenario.airframe, scenario.autopilot
+    aircraft = scenario.airframe
+    profile = scenario.autopilot
     if not profile or not profile.altitude_m or aircraft.engine.thrust is None:
         return
     setting = aircraft.engine.settings[aircraft.power_setting]

@@ -139,7 +139,8 @@ class Gradual(SurfaceFault):
     )
 
     def _conflicts(self) -> list[Conflict]:
-        incipient, given = self.profile == "incipient", self.kappa_per_s is not None
+        incipient = self.profile == "incipient"
+        given = self.kappa_per_s is not None
         if incipient and not given:
             says = "required key is missing, allowed: the growth rate of the incipient fault, 1/s"
         else:
@@ -194,7 +195,8 @@ class LossOfEffectiveness(Gradual):
     """
 
     properties = (("effectiveness", 1.0),)
-    truth, size = "effectiveness", ("of", "%")
+    truth = "effectiveness"
+    size = ("of", "%")
     in_words = growing(magnitude=lambda value: f"{100 * value:g} %")
     examples = (("40 % loss", {"magnitude": 0.4}), ("total loss", {"magnitude": 1.0}))
     button = Button(1, "lose 40 %", {"magnitude": 0.4})
@@ -223,12 +225,18 @@ class Stuck(Switched):
     position_deg: position of the jam; left out: the position at the start of the fault, deg
     """
 
-    properties, holds = (("stuck", 0.0), ("stuck-at-rad", 0.0)), "stuck"
-    adds, stays_where_it_is, truth, size = False, True, "stuck-at-rad", ("at", "deg")
+    properties = (("stuck", 0.0), ("stuck-at-rad", 0.0))
+    holds = "stuck"
+    adds = False
+    stays_where_it_is = True
+    truth = "stuck-at-rad"
+    size = ("at", "deg")
     masks = ("stuck", "float", "hardover", "bias", "rate_limit", "oscillatory")
     in_words = constant(position_deg="{:g} deg".format)
     examples = (("stuck +3 deg", {"off_deg": 3.0}), ("stuck -3 deg", {"off_deg": -3.0}))
-    button, hidden, mavlink = Button(2, "jam", {}), (Hidden(2, {}),), (2, {})
+    button = Button(2, "jam", {})
+    hidden = (Hidden(2, {}),)
+    mavlink = (2, {})
 
     type: Literal["stuck"]
     actuator: Actuator
@@ -253,11 +261,16 @@ class Stuck(Switched):
 class Hardover(Switched):
     """The surface runs to a stop at its rate limit."""
 
-    properties, holds = (("hardover", 0.0),), "hardover"
-    adds, size, masks, replaces_like = False, ("at", "deg"), ("hardover",), True
+    properties = (("hardover", 0.0),)
+    holds = "hardover"
+    adds = False
+    size = ("at", "deg")
+    masks = ("hardover",)
+    replaces_like = True
     in_words = constant(direction=lambda value: f"to the {'upper' if value > 0 else 'lower'} stop")
     examples = (("hardover +", {"direction": 1}), ("hardover -", {"direction": -1}))
-    button, hidden = Button(4, "hardover", {"direction": 1}), (Hidden(1, {"direction": 1}, True),)
+    button = Button(4, "hardover", {"direction": 1})
+    hidden = (Hidden(1, {"direction": 1}, True),)
     mavlink = 4, {"direction": 1}
 
     type: Literal["hardover"]
@@ -271,10 +284,13 @@ class Hardover(Switched):
 class Float(Switched):
     """The surface floats freely in the airflow and gives no moment."""
 
-    properties, holds, adds = (("float", 0.0),), "float", False
+    properties = (("float", 0.0),)
+    holds = "float"
+    adds = False
     masks = ("float", "hardover", "bias", "rate_limit", "oscillatory")
     examples = (("float", {}),)
-    button, mavlink = Button(3, "float", {}), (1, {})
+    button = Button(3, "float", {})
+    mavlink = (1, {})
 
     type: Literal["float"]
     actuator: Actuator = entry(..., SURFACE_SAYS)
@@ -287,7 +303,8 @@ class Bias(Gradual):
     """A constant is added to the position of the surface."""
 
     properties = (("bias-rad", 0.0),)
-    truth, size = "bias-rad", ("of", "deg")
+    truth = "bias-rad"
+    size = ("of", "deg")
     in_words = growing(bias_deg="{:+g} deg".format)
     examples = (("bias +2 deg", {"bias_deg": 2.0}), ("bias -2 deg", {"bias_deg": -2.0}))
     button = Button(6, "bias", {"bias_deg": 3})
@@ -306,7 +323,8 @@ class RateLimit(Gradual):
     properties = (("rate-scale", 1.0),)
     in_words = growing(scale=lambda value: f"{100 * value:g} % of its rate")
     examples = (("rate limit 1.2 deg/s", {"scale": 0.02}),)
-    button, mavlink = Button(7, "rate limit", {"scale": 0.05}), (5, {"scale": 0.1})
+    button = Button(7, "rate limit", {"scale": 0.05})
+    mavlink = (5, {"scale": 0.1})
 
     type: Literal["rate_limit"]
     actuator: Actuator = entry(..., SURFACE_SAYS)
@@ -322,8 +340,10 @@ class Oscillatory(Gradual):
     """The surface oscillates about its commanded position."""
 
     properties = (("oscillation-amplitude-rad", 0.0), ("oscillation-frequency-rad_sec", 0.0))
-    truth, size = "oscillation-amplitude-rad", ("by", "deg")
-    masks, replaces_like = ("oscillatory",), True
+    truth = "oscillation-amplitude-rad"
+    size = ("by", "deg")
+    masks = ("oscillatory",)
+    replaces_like = True
     in_words = growing(amplitude_deg="{:g} deg".format, frequency_rad_s="{:g} rad/s".format)
     examples = (
         ("oscillation 0.5 deg, 1 rad/s", {"amplitude_deg": 0.5, "frequency_rad_s": 1.0}),

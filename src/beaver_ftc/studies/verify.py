@@ -25,6 +25,7 @@ from beaver_ftc.results.metrics import Truth, as_json, fault_free_s, is_late
 from beaver_ftc.scenario.faults import LossOfEffectiveness
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.signals import grown_share
+from beaver_ftc.studies.engine.draws import generator_of, loss
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial, poisson_bound, share_within
 from beaver_ftc.studies.engine.study import Study, run_study
 from beaver_ftc.studies.present.page import Makers
@@ -57,8 +58,7 @@ class Draw:
 
     def scenario(self, fdi: Document | None = None) -> Scenario:
         """The flight, diagnosed as `fdi` says."""
-        key = KINDS.index(self.kind), self.index
-        rng = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=key))
+        rng = generator_of(self.seed, KINDS.index(self.kind), self.index)
         fault = _fault(rng) if self.kind == "faulty" else None
         return Scenario.model_validate({
             "name": f"{self.kind}-{self.index}",
@@ -78,12 +78,7 @@ def _log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
 
 
 def _fault(rng: np.random.Generator) -> Document:
-    fault = {
-        "actuator": str(rng.choice(load().primary)),
-        "type": "loss_of_effectiveness",
-        "magnitude": rng.uniform(*_MAGNITUDE),
-        "at_s": rng.uniform(*_FAULT_AT_S),
-    }
+    fault = loss(str(rng.choice(load().primary)), rng.uniform(*_MAGNITUDE), rng.uniform(*_FAULT_AT_S))
     if rng.random() < 0.5:
         fault |= {"profile": "incipient", "kappa_per_s": _log_uniform(rng, *_KAPPA_PER_S)}
     return fault

@@ -1,4 +1,4 @@
-"""What random flights of several studies have in common: references, a loss, and errors of the model."""
+"""Parts that random flights of several studies share: numbers, references, a loss, errors of the model."""
 
 from collections.abc import Sequence
 
@@ -8,6 +8,11 @@ from beaver_ftc.aircraft import AXES
 from beaver_ftc.documents.files import Document
 
 FREQUENCY_HZ = {"p": 0.25, "q": 0.2, "r": 0.15}
+
+
+def generator_of(seed: int, *spawn_key: int) -> np.random.Generator:
+    """Random numbers that a spawn key distinguishes from the others of a seed."""
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=spawn_key))
 
 
 def sines(rng: np.random.Generator, amplitude_deg_s: float) -> Document:

@@ -98,10 +98,9 @@ def document_of(rows: Sequence[Document]) -> Summary:
     settings = {
         setting.name: row for (asked, setting), row in zip(STUDIED, rows, strict=True) if asked == NUMBERS
     }
-    numbers, ablated = ({name: row[key] for name, row in settings.items()} for key in (NUMBERS, ABLATED))
-    ours = numbers[AS_PUBLISHED.name]
+    found = {name: list(zip(row[NUMBERS], row[ABLATED], strict=True)) for name, row in settings.items()}
     judged = {
-        claim: _judged(claim, {name: (numbers[name][i], ablated[name][i]) for name in numbers})
+        claim: _judged(claim, {name: pairs[i] for name, pairs in found.items()})
         for i, claim in enumerate(MEASURED)
     }
     claims = [
@@ -123,8 +122,8 @@ def document_of(rows: Sequence[Document]) -> Summary:
         ),
         "truth_and_design": truth_and_design.document_of(truth_and_design.fly_designs()),
         "choices": [asdict(choice) for choice in (*CHOICES, *OPTIONS)],
-        "gains": _gains(ours, numbers),
-        "sensitivity": _sensitivity(numbers, ablated),
+        "gains": _gains(found),
+        "sensitivity": _sensitivity(found),
         "cases": [
             {
                 "case": case.name,
@@ -138,8 +137,12 @@ def document_of(rows: Sequence[Document]) -> Summary:
     return Summary(document, published)
 
 
+Pairs = list[tuple[float, float]]
+"""Of each of MEASURED its number in a setting, and that without its mechanism."""
+
+
 def _judged(claim: Claim, by_setting: Mapping[str, tuple[float, float]]) -> Document:
-    """A measured claim. by_setting: its number, and that without its mechanism, by name of setting."""
+    """A measured claim. by_setting: its pair of numbers by name of setting."""
     number, without = by_setting[AS_PUBLISHED.name]
     elsewhere = [] if claim.because else [by_setting[setting.name] for setting in ELSEWHERE]
     measure, verdict = claim.measure, claim.verdict(number, without, elsewhere)
@@ -212,38 +215,35 @@ def _ablations(claims: list[Document]) -> list[Document]:
     ]
 
 
-def _gains(ours: list[float], numbers: dict[str, list[float]]) -> list[Document]:
-    """A row a gain: what no longer holds when it is halved and doubled."""
+def _gains(found: Mapping[str, Pairs]) -> list[Document]:
+    """A row a gain: the claims that no longer hold when it is halved and doubled. found: by setting."""
     rows = []
     for gain in gains():
-        halved, doubled = (s.name for s in GAINS if gain.key in s.changes)
-        missed = {"halved": _missed(ours, numbers[halved]), "doubled": _missed(ours, numbers[doubled])}
-        rows.append({**gain._asdict(), **missed})
+        halved, doubled = (_missed(found, s.name) for s in GAINS if gain.key in s.changes)
+        rows.append({**gain._asdict(), "halved": halved, "doubled": doubled})
     return rows
 
 
-def _sensitivity(numbers: dict[str, list[float]], ablated: dict[str, list[float]]) -> list[Document]:
+def _sensitivity(found: Mapping[str, Pairs]) -> list[Document]:
     """A row a setting of ELSEWHERE: the claims that no longer hold, and those that hold without their
-    mechanism as well. numbers, ablated: by setting those of MEASURED with their mechanisms, and without."""
+    mechanism as well. found: by setting."""
     return [
         {
             "variant": setting.name,
             "changes": dict(setting.changes),
-            "missed": _missed(numbers[AS_PUBLISHED.name], numbers[setting.name]),
-            "also_without": _also_without(
-                numbers[setting.name], ablated[setting.name], ablated[AS_PUBLISHED.name]
-            ),
+            "missed": _missed(found, setting.name),
+            "also_without": _also_without(found, setting.name),
         }
         for setting in ELSEWHERE
     ]
 
 
-def _also_without(numbers: list[float], ablated: list[float], as_published: list[float]) -> list[Document]:
-    """The testable claims that hold in a setting without their mechanism as well. as_published: the numbers
-    without it in the published setting, in which the claims do not hold."""
+def _also_without(found: Mapping[str, Pairs], setting: str) -> list[Document]:
+    """The testable claims that hold in a setting without their mechanism as well, but not as published."""
+    pairs = zip(MEASURED, found[setting], found[AS_PUBLISHED.name], strict=True)
     return [
         _claim_row(c, without) | {"without": TAKES[c.ablation]}
-        for c, number, without, published in zip(MEASURED, numbers, ablated, as_published, strict=True)
+        for c, (number, without), (_, published) in pairs
         if c.holds(number) and c.holds(without) and not c.holds(published)
     ]
 
@@ -258,12 +258,13 @@ def _claim_row(claim: Claim, number: float) -> Document:
     }
 
 
-def _missed(ours: list[float], numbers: list[float]) -> list[Document]:
-    """The claims that hold as flown and no longer in a setting, with the number there."""
+def _missed(found: Mapping[str, Pairs], setting: str) -> list[Document]:
+    """The claims that hold as published and no longer in a setting, with the number there."""
+    pairs = zip(MEASURED, found[AS_PUBLISHED.name], found[setting], strict=True)
     return [
         _claim_row(c, number)
-        for c, as_flown, number in zip(MEASURED, ours, numbers, strict=True)
-        if c.holds(as_flown) and not c.holds(number)
+        for c, (published, _), (number, _) in pairs
+        if c.holds(published) and not c.holds(number)
     ]
 
 

@@ -23,11 +23,12 @@ from beaver_ftc.results.metrics import as_json, measure, versions
 from beaver_ftc.scenario.builtin import to_yaml
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sweeps import Sweep
+from beaver_ftc.studies.engine.draws import generator_of
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial
 from beaver_ftc.studies.engine.study import FlyRound, Study
 from beaver_ftc.studies.present.tables import all_finite, number
 from beaver_ftc.studies.sweep.one_flight import scenario_of, warm_up
-from beaver_ftc.studies.sweep.sampling import OF_RARE, Assignment, generator_of, values_at
+from beaver_ftc.studies.sweep.sampling import OF_RARE, Assignment, values_at
 from beaver_ftc.studies.sweep.store import identity_of
 
 RUNS = 8  # independent runs

@@ -15,6 +15,7 @@ import numpy as np
 
 from beaver_ftc.documents.files import Document
 from beaver_ftc.scenario.sweeps import Sweep, SweepFile, Variation
+from beaver_ftc.studies.engine.draws import generator_of
 
 _ALMOST = 2.0**-53  # keeps a unit number off 0 and 1, where a normal distribution is infinite
 
@@ -115,11 +116,6 @@ class Plan:
 
 def _is_in_turn(file: SweepFile, how: Variation) -> bool:
     return file.sampling == "grid" or how.linspace is not None
-
-
-def generator_of(seed: int, *spawn_key: int) -> np.random.Generator:
-    """Random numbers that a spawn key distinguishes from the others of a seed."""
-    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=spawn_key))
 
 
 def _latin_hypercube(file: SweepFile, dimensions: int) -> np.ndarray:

@@ -18,11 +18,12 @@ from beaver_ftc.aircraft import AXES
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.files import Document
 from beaver_ftc.scenario.sweeps import Sweep
+from beaver_ftc.studies.engine.draws import generator_of
 from beaver_ftc.studies.engine.store import batches_of
 from beaver_ftc.studies.engine.workers import Batch
 from beaver_ftc.studies.present.tables import finite
 from beaver_ftc.studies.sweep.one_flight import DEPARTED
-from beaver_ftc.studies.sweep.sampling import OF_SEARCH, Assignment, generator_of, values_at
+from beaver_ftc.studies.sweep.sampling import OF_SEARCH, Assignment, values_at
 from beaver_ftc.studies.sweep.store import Store
 
 WEIGHT = 0.7  # [Storn1997] recommend 0.4 to 1

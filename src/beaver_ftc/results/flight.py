@@ -63,7 +63,7 @@ class Flight:
 
     @classmethod
     def landed(cls, landing: "Landing", log: Log | None) -> "Flight":
-        """Of what the loop yields."""
+        """The flight of a landing."""
         return cls(landing.scenario, metrics(landing), log)
 
     @cached_property

@@ -560,7 +560,7 @@ class Expectation(Part):
 
     @property
     def expected_and_actual_text(self) -> str:
-        """What was expected and what came out, as tests and CI show them."""
+        """Expected and actual value, as tests and CI show them."""
         expected, actual = map(_as_json_value, (self.expected, self.actual))
         return f"expected {expected}, actual {actual}"
 
@@ -579,7 +579,7 @@ class Judged:
 
 @dataclass(frozen=True)
 class CertificateCounts(Part):
-    """Of a certificate: statements that it proves, and alarms or exclusions without a proof."""
+    """The counts of a certificate: statements that it proves, and alarms or exclusions without a proof."""
 
     statements: int
     without: int

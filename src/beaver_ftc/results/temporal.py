@@ -204,7 +204,7 @@ _FRAMEWISE_FUNCTION_OF_OPERATOR: dict[str, _ValueFunction] = {
 def _robustness_by_frame(
     formula: Formula, columns: Mapping[str, np.ndarray], rate_hz: float, frames: int
 ) -> np.ndarray:
-    """What a formula is worth at each frame, (frames,)."""
+    """The robustness of a formula at each frame, (frames,)."""
     operator = formula.operator
     if operator in ("number", "column"):
         return (

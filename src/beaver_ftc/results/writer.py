@@ -157,7 +157,7 @@ def write_scenario(folder: Path, scenario: "Scenario") -> None:
 
 
 def _files_not_of_model(folder: str, names: list[str]) -> set[str]:
-    """What is no part of a JSBSim model and of its description."""
+    """The files that are no part of a JSBSim model and of its description."""
     return {n for n in names if Path(folder, n).is_file() and Path(n).suffix not in MODEL_FILES}
 
 
@@ -252,7 +252,7 @@ def refuse_foreign(folder: Path, files: Iterable[str] = ()) -> None:
 
 
 def _foreign_files_in(folder: Path, files: Iterable[str]) -> list[str]:
-    """What lies in a result folder and is none of ours, by its name or beside our pictures."""
+    """The files of a result folder that are none of ours, by their name or beside our pictures."""
     unknown = {entry.name for entry in folder.iterdir()} - FILES_OF_A_RUN - {*files}
     if unknown:
         from beaver_ftc.commands import files_of_commands

@@ -33,7 +33,7 @@ _STATES = ("alpha_rad", "beta_rad", "p_rad_s", "q_rad_s", "r_rad_s", "phi_rad", 
 
 @dataclass(frozen=True)
 class Limit:
-    """What levels 1 to 3 ask of one quantity of a mode: (least, most) each [MIL-F-8785C]."""
+    """The requirements of levels 1 to 3 on one quantity of a mode: (least, most) each [MIL-F-8785C]."""
 
     mode: str
     quantity: str
@@ -48,7 +48,7 @@ class Limit:
         return next(kept, WORSE)
 
     def margin(self, value: float, level: int) -> float:
-        """How far inside a level's limits it is."""
+        """Distance of the value from the nearer limit of a level; negative outside."""
         least, most = self.levels[level - 1]
         return min(value - least, most - value)
 
@@ -81,7 +81,7 @@ def of_model(linear: LinearModel, airspeed_mps: float, where: str) -> list[Quali
 
 
 def _values(found: Mapping[str, Mode], g_per_rad: float) -> list[float]:
-    """What LIMITS are about, in their order; g_per_rad: load factor per angle of attack."""
+    """The quantities of LIMITS, in their order; g_per_rad: load factor per angle of attack."""
     short, dutch, phugoid = found["short_period"], found["dutch_roll"], found["phugoid"]
     roll = found["roll"].pole
     spiral = found["spiral"].pole.real
@@ -96,18 +96,19 @@ def _values(found: Mapping[str, Mode], g_per_rad: float) -> list[float]:
 
 
 def _double_s(real: float) -> float:
-    """In which time it doubles, s; infinite where it does not diverge. real: of its pole, 1/s."""
+    """Time in which a mode doubles, s; infinite if it does not diverge. real: part of its pole, 1/s."""
     return log(2.0) / real if real > 0.0 else inf
 
 
 def where_trimmed(scenario: Scenario) -> list[Quality]:
-    """Of a scenario's aircraft, healthy, at its flight condition. Raises BadInput as a trim does."""
+    """The qualities of a scenario's healthy aircraft in trim. Raises BadInput as a trim does."""
     plant, point = trimmed(scenario)
     return of_model(differences(plant, point), point.airspeed_mps, "trimmed")
 
 
 def where_ended(scenario: Scenario, end: Mapping[str, float]) -> list[Quality]:
-    """Of its aircraft where a flight ended: the log's last row, by column; surfaces as effective as they are.
+    """The qualities of its aircraft where a flight ended, with the surfaces as effective as they are then.
+    end: the last row of the log by column.
 
     Raises SimulationFailed where nothing can be linearised there.
     """
@@ -126,8 +127,8 @@ def where_ended(scenario: Scenario, end: Mapping[str, float]) -> list[Quality]:
 
 
 def over_airspeeds(scenario: Scenario) -> list[Quality]:
-    """Of its aircraft, healthy, over the airspeeds of the envelope; and, if anything breaks in the scenario,
-    where its flight ends."""
+    """The qualities of its healthy aircraft over the airspeeds of the envelope; and, if the scenario has a
+    fault, where its flight ends."""
     from beaver_ftc.loop.loop import fly
     from beaver_ftc.results.log import MemoryLog
 

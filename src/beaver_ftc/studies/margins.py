@@ -39,7 +39,7 @@ LEAST_LOOP = 1e-3  # of a surface that hardly moves there is no loop to speak of
 
 @dataclass(frozen=True)
 class Margin:
-    """Of one surface's loop: how much its gain may grow and shrink, dB, and its phase lag, deg."""
+    """The margins of one surface's loop: of its gain, upwards and downwards, dB, and of its phase, deg."""
 
     airspeed_mps: float
     fault: str
@@ -91,7 +91,7 @@ def at(scenario: Scenario) -> Iterator[Margin]:
 
 
 def cases(main: np.ndarray, surfaces: tuple[str, ...]) -> Iterator[tuple[str, np.ndarray]]:
-    """What a fault is called, and the effectiveness (n,) it leaves."""
+    """The name of each fault, and the effectiveness (n,) that it leaves."""
     healthy = np.ones(len(surfaces))
     yield "none", healthy
     for s, left in product(main, REMAINING):
@@ -146,7 +146,7 @@ def allocation(G: np.ndarray, main: np.ndarray, stand_in: int, lost: float) -> n
 
 
 def outputs(states: tuple[str, ...], y: np.ndarray) -> np.ndarray:
-    """What is measured, (7 + declared signals, states): rates, alpha, beta, V, qdyn, and what goes with V.
+    """The measured signals, (7 + declared signals, states): rates, alpha, beta, V, qdyn, and those of V.
 
     qdyn goes with V^2, the slipstream (the Beaver's one declared signal) with V^-3; with altitude neither.
     """

@@ -106,7 +106,7 @@ def loops(loop: OpenLoop, omega: np.ndarray) -> np.ndarray:
 
 
 def _others_closed(around: np.ndarray, s: int) -> Any:
-    """What comes back to surface s, (...), of what goes around all of them, (..., n, n)."""
+    """Response that returns to surface s, (...), from the response around all surfaces, (..., n, n)."""
     rest = np.delete(np.arange(around.shape[-1]), s)
     inner = np.eye(len(rest)) - around[..., rest[:, None], rest]
     answered = np.linalg.solve(inner, around[..., rest, s][..., None])

@@ -145,7 +145,8 @@ def fly_draw(draw: Draw, schemes: Schemes) -> Row:
 
 
 def _healthy(draw: Draw) -> Row:
-    """The published filter is the sharpened scheme's first, so one flight tells of both."""
+    """The row of a flight without a fault. The first filter of the sharpened scheme is the published one, so
+    that one flight is enough for both."""
     flight = fly(draw.scenario())
     return {
         "index": draw.index,
@@ -168,7 +169,7 @@ def _faulty(draw: Draw, schemes: Schemes) -> Row:
 
 
 def judge(flight: Landing) -> Row:
-    """What became of the promises in a flight with one fault; delays in s from the first frame with it."""
+    """The outcome of each promise in a flight with one fault; delays in s from the first frame with it."""
     truth = Truth.of(flight.scenario)
     guaranteed_s = flight.guaranteed_delay_s
     alarm_s = flight.detection_time_s
@@ -189,7 +190,7 @@ def judge(flight: Landing) -> Row:
 
 
 def _estimate_error(flight: Landing) -> float | None:
-    """How far the estimated parameter is from the true one as the flight ends."""
+    """Distance of the estimated parameter from the true one at the end of the flight."""
     fault = flight.scenario.faults[0]
     if flight.estimate is None or not isinstance(fault, LossOfEffectiveness):
         return None
@@ -278,13 +279,13 @@ def _quantiles(values: Iterable[float | None]) -> dict[str, float | None]:
 
 
 def _shorter(schemes: Document) -> float | None:
-    """By what share the sharpened scheme's median delay is shorter than the published one's."""
+    """The share by which the sharpened scheme's median delay is shorter than the published one's."""
     published, sharpened = (schemes[name]["delay_s"]["median"] for name in SCHEMES)
     return 1.0 - sharpened / published if published and sharpened is not None else None
 
 
 def summary_text(document: Document) -> str:
-    """The document for people."""
+    """The document in words."""
     lines = [*_healthy_lines(document["healthy"]), *_fault_lines(document)]
     if document["skipped"]:
         lines.append(f"{document['skipped']} flights drawn could not be trimmed and are not counted")

@@ -1,4 +1,4 @@
-"""Who is timed: each flies the same seconds of the same flight, from the same state."""
+"""The contenders that are timed: each flies the same seconds of the same flight, from the same state."""
 
 import gc
 import time

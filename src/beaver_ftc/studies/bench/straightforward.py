@@ -137,7 +137,7 @@ class Estimators:
 
     @property
     def effectiveness(self) -> np.ndarray:
-        """What is believed of the surfaces, (4,): 1 but for the isolated one."""
+        """The estimated effectiveness of the surfaces, (4,): 1 but for the isolated one."""
         believed = np.ones(4)
         isolated = self.isolated
         if isolated is not None:

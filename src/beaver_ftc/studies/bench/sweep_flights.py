@@ -53,7 +53,7 @@ KINDS = {
 
 
 def by_kind(rounds: int) -> dict[str, Document]:
-    """What a flight of each kind costs, all kinds in each round.
+    """The cost of a flight of each kind, all kinds in each round.
 
     Processor time: `parts_ms` by part, `bare_ms` for JSBSim's frames alone, `frames_ratio` and `flight_ratio`
     to those, `frame_us`, the loop's time for one of JSBSim's frames, and `own_part_us`, the loop's own part

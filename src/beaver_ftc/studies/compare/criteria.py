@@ -130,11 +130,11 @@ class DetectorCost:
         return total
 
     def parts(self, values: Values) -> list[float]:
-        """What each flight adds to J with these values."""
+        """The part of each flight in J with these values."""
         return [self._of_flight(flown(case, self._entry, DETECTORS, values)) for case in self._cases]
 
     def _of_flight(self, result: Result) -> float:
-        """What one flight adds to J."""
+        """The part of one flight in J."""
         cost = result.false_alarm / len(self._cases)
         if result.faulted:
             d = result.delay_s
@@ -166,7 +166,7 @@ class LawCost:
         return [log(_ratio(result, best)) for result, best in zip(results, self._oracle, strict=True)]
 
     def margins(self, values: Values) -> list[Margin]:
-        """Of the healthy loop."""
+        """The margins of the healthy loop."""
         return margins_of(with_values(with_entry(self._cases[0].scenario, self._entry), LAWS, values))
 
     def shortfall(self, values: Values) -> float:
@@ -200,7 +200,7 @@ def _ratio(result: Result, oracle_deg_s: float) -> float:
 
 @cache
 def yardsticks(grade: str, most: int | None, draw: int, draws: int) -> tuple[tuple[float, ...], float]:
-    """Of each faulted flight the oracle's error, deg/s; and the default law's RMS surface rate, deg/s."""
+    """The oracle's error in each faulted flight, deg/s; and the default law's RMS surface rate, deg/s."""
     cases = [case for case in flights(grade, most, draw, draws) if case.scenario.faults]
     oracle = tuple(flown(case, Entry(SCHEME, ORACLE), LAWS, {}).rms_deg_s for case in cases)
     return oracle, effort([flown(case, Entry(SCHEME, LAW), LAWS, {}) for case in cases])

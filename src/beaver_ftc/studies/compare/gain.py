@@ -74,5 +74,5 @@ def relative_gain(before: np.ndarray, after: np.ndarray, size: Size) -> Estimate
 
 
 def geometric_mean(logs: np.ndarray, axis: int = -1) -> np.ndarray:
-    """Of numbers with these logarithms, along an axis."""
+    """The geometric mean of numbers with these logarithms, along an axis."""
     return np.exp(np.mean(logs, axis=axis))

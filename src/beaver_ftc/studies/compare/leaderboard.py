@@ -38,7 +38,7 @@ def _alarms(row: Document) -> str:
 
 
 def _free(row: Document) -> str:
-    """What a scheme finds at the most sensitive level without a false alarm."""
+    """The rate and delay of a scheme at the most sensitive level without a false alarm."""
     if row.get("free") is None:
         return "-"
     rate = _cell(bare_percent, "detection_rate")
@@ -191,5 +191,5 @@ def comparison_study(
 
 
 def lost(case: SetFlight, why: str) -> Trial:
-    """What becomes of a case that ends its process: no results, and why."""
+    """The trial of a case that ends its process: no results, and why."""
     return Trial(case.set, failures=[f"{case.scenario.name}: {why}"])

@@ -102,7 +102,7 @@ def _margins(still: np.ndarray, moved: np.ndarray, omega: np.ndarray, dt: float)
 
 
 def _transform(values: np.ndarray, angles: np.ndarray) -> np.ndarray:
-    """Of values (n,) that are zero before and after, at angles (m,) of the unit circle. Changes from frame to
-    frame are transformed instead of positions: an integrator leaves the position somewhere else."""
+    """The transform of values (n,) that are zero before and after, at angles (m,) of the unit circle. Changes
+    from frame to frame are transformed instead of positions: an integrator leaves the position elsewhere."""
     transform: np.ndarray = np.exp(-1j * np.outer(angles, np.arange(len(values)))) @ values
     return transform

@@ -139,7 +139,7 @@ def replay_together(recordings: Sequence[Recording], scheme: str) -> list[Trace]
 
 
 def _statistics(detector: Detector, seen: Sequence[tuple[Measured, np.ndarray]]) -> list[float]:
-    """Of each frame; a detector without a statistic has only its alarm: well above the level, or well
+    """The statistic of each frame; that of a detector with an alarm alone is well above the level, or well
     below."""
     verdicts = [detector.step(*shown) for shown in seen]
     return [1e6 * each.detected if isnan(each.statistic) else each.statistic for each in verdicts]

@@ -81,7 +81,7 @@ DIAGNOSED = {  # what it is called, and where it is in the metrics
 
 
 def rows_of(run: Run) -> dict[str, str]:
-    """What is compared of a run, name -> text: what was flown, then what came of it."""
+    """The rows of a run, name -> text: what was flown, then what came of it."""
     found = run.found
     flown = run.flown
     departure = run.found.departure
@@ -129,7 +129,7 @@ def as_text(runs: Sequence[Run]) -> str:
 
 
 def labels(runs: Sequence[Run]) -> list[str]:
-    """What to call each run: its folder's name, or the whole path where names repeat."""
+    """The label of each run: its folder's name, or the whole path where names repeat."""
     names = [run.folder.resolve().name for run in runs]
     distinct = len(set(names)) == len(names)
     return [one_line(name, 200) for name in (names if distinct else [str(run.folder) for run in runs])]

@@ -109,7 +109,7 @@ def trade_off(traces: Sequence[Trace]) -> list[Document]:
 
 
 def point_at(traces: Sequence[Trace], level: float) -> Document:
-    """What a level of a scheme's statistic costs in false alarms, and what it buys.
+    """The false alarms of a scheme at a level of its statistic, and its detections.
 
     Detections and delays are of the flights in which the fault was still to be detected: no false alarm
     before it.

@@ -89,7 +89,7 @@ class Entry:
 
 @dataclass(frozen=True)
 class Result:
-    """What an entry made of a case. Times in s, errors in deg/s; infinite where there is none.
+    """The result of an entry in a case. Times in s, errors in deg/s; infinite where there is none.
 
     fault_free_s: time under observation without a fault, until the first alarm. rms_deg_s: over all axes,
     after the fault (all the flight without one), and infinite after a departure. before_deg_s, after_deg_s:
@@ -169,7 +169,7 @@ def with_values(scenario: Scenario, group: str, values: Mapping[str, float]) -> 
 
 
 def grade_of(scenario: Scenario) -> str:
-    """Which grade of flights a scenario belongs to."""
+    """The grade of flights that a scenario belongs to."""
     return flight_grade(not Declared.of(scenario).is_noise_free, scenario.known_actuators.is_ideal)
 
 

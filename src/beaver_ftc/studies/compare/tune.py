@@ -65,7 +65,7 @@ class Method:
     grade: str
 
     def ranges(self) -> dict[str, Range]:
-        """What may be tuned of it."""
+        """The range of each parameter that may be tuned."""
         return OF_STATISTICAL if self.name == STATISTICAL else tunable(self.group, self.name)
 
     def start(self) -> Values:
@@ -104,7 +104,7 @@ class Search:
 
 
 def tune(methods: Sequence[Method], how: Search, workers: int, progress: Progress | None) -> Document:
-    """What both files say: the values of each grade, and a row a method."""
+    """The content of both files: the values of each grade, and a row for each method."""
     if not methods:
         raise BadInput("compare --tune: nothing to tune, allowed: methods that declare `tunable`")
     rows = fly_all(partial(tune_method, how=how), methods, workers, progress)

@@ -56,7 +56,7 @@ class Excitation:
 
     @cached_property
     def excluding(self) -> dict[str, dict[str, np.ndarray]]:
-        """Of each fault and each other the least magnitude (n,) from which each frame excludes the other."""
+        """By fault and other fault, the least magnitude (n,) from which each frame excludes the other."""
         return {
             fault: {
                 other: exclusion_magnitude(z, of, self.bound)
@@ -169,7 +169,7 @@ def judge(seen: Excitation, fault: str) -> Document:
 
 
 def pairs_of(seen: Excitation) -> list[Document]:
-    """Of each fault and each other, what a flight shows: how small, and how soon."""
+    """A row for each fault and other fault: from which size and how soon a flight distinguishes them."""
     return [
         {"fault": fault, "other": other, **loss_limits(least, seen.windows[1], seen.dt)}
         for fault, of_others in seen.excluding.items()
@@ -178,7 +178,7 @@ def pairs_of(seen: Excitation) -> list[Document]:
 
 
 def _why(seen: Excitation, fault: str, rival: str, detected: float, excluded: np.ndarray, frames: int) -> str:
-    """What limits this fault at the worst instant for it to strike."""
+    """The limit on this fault, in words, at the worst instant for it to strike."""
     if detected > 1.0:
         share = 1.0 / detected
         return (

@@ -42,7 +42,7 @@ SensorsName = StrEnum("SensorsName", {"ideal": "ideal", "tactical_grade": "tacti
 
 
 def schemes_study(grid: Grid, names: Sequence[str]) -> Study:
-    """How much these schemes find in the flights of a grid."""
+    """The study of these schemes in the flights of a grid."""
     names = tuple(names)
     healthy = grid.healthy()
     cases = [*((block, False) for block in healthy), *((block, True) for block in grid.faulted())]

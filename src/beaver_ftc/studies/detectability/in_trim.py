@@ -1,4 +1,4 @@
-"""What one frame in trim can show: surfaces with similar effects on the rates, and failures of engines."""
+"""Limits of one frame in trim: surfaces with similar effects on the rates, and failures of engines."""
 
 from itertools import combinations
 from math import degrees
@@ -47,9 +47,9 @@ def _short(scenario: Scenario) -> Scenario:
 
 
 def engine_failures(scenario: Scenario) -> list[Document]:
-    """Of each engine that is an effector: how a failure to idle turns the aircraft in trim, rad/s2; over what
-    is certain to show in a frame; whether its moment is a signal, so that the design model knows it, and
-    whether that is held against the thrust of all."""
+    """A row for each engine that is an effector: how a failure to idle turns the aircraft in trim, rad/s2;
+    the same over the detection limit of a frame; whether its moment is a signal, so that the design model
+    knows it, and whether that is held against the thrust of all."""
     aircraft = scenario.airframe
     thrust = aircraft.engine.thrust
     power = aircraft.file.power_setting

@@ -49,7 +49,7 @@ def best_in_window(values: np.ndarray, frames: int) -> np.ndarray:
 
 
 def largest_and_median(values: np.ndarray, most: float = inf) -> list[float | None]:
-    """Of values (n,), None for one that is beyond `most` or infinite."""
+    """The largest of values (n,) and their median, None for one that is beyond `most` or infinite."""
     ordered = np.sort(values)
     both = float(ordered[-1]), quantile(ordered, 0.5)
     return [finite(value) if value <= most else None for value in both]

@@ -43,8 +43,8 @@ def places_study(
     altitudes_m: Sequence[float] = (),
     excitations: Sequence[float] = EXCITATIONS,
 ) -> Study:
-    """What is certain in a scenario at these places: a row a fault and place, and one a fault, other surface
-    and place.
+    """The survey of a scenario at these places: a row for each fault and place, and for each fault, other
+    surface and place.
 
     Raises BadInput if another scheme than the sharpened one diagnoses.
     """
@@ -131,7 +131,7 @@ def scaled(signals: Sequence[Document], keys: Collection[str], times: float) -> 
 
 
 def document_of(name: str, points: Sequence[Mapping[str, Sequence[Document]]]) -> Document:
-    """What the command answers and `detectability.json` holds."""
+    """The document `detectability.json`."""
     return {
         "scenario": name,
         "detect_within_s": DETECT_WITHIN_S,

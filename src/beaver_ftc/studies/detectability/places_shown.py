@@ -1,4 +1,4 @@
-"""What is certain, by places: as sentences, a table, a figure and files."""
+"""The losses that are certain to be found, by places: as sentences, a table, a figure and files."""
 
 from collections.abc import Callable, Sequence
 from math import ceil
@@ -84,7 +84,7 @@ def _conclusion(fault: str, scale: float, rows: Sequence[Document]) -> str:
 
 
 def answer(scenario: Scenario, row: Document) -> str:
-    """From which loss on a surface's fault is certain to be found at a place, in words."""
+    """The loss from which on a surface's fault is certain to be found at a place, in words."""
     axis = axis_of(scenario, row["fault"])
     shapes = (signal.shape for signal in getattr(scenario.reference, axis))
     sizes = (np.abs(getattr(shape, key, 0.0)).max() for shape in shapes for key in AMPLITUDES)

@@ -28,7 +28,7 @@ def level_for(healthy: Sequence[Trace], per_h: float) -> float:
 
 
 def _counted(traces: Sequence[Trace], level: float) -> Document:
-    """What a level costs in false alarms, over the time until they were raised, with exact limits."""
+    """The false alarms of a level, over the time until they were raised, with exact limits."""
     alarms, hours = alarms_at(traces, level)
     rates = vars(poisson(alarms, hours)).values()
     names = ("per_h", "per_h_low", "per_h_high")
@@ -158,7 +158,7 @@ def title_of(sensors: str, turbulence: str) -> str:
 def _lines(
     rows: Sequence[Row], names: Sequence[str], what: Callable[[Sequence[Row]], Document]
 ) -> list[Document]:
-    """What there is to say of each group of rows that are alike in these columns."""
+    """A row for each group of rows that are alike in these columns."""
     return [{**dict(zip(names, key, strict=True)), **what(of)} for key, of in grouped(rows, *names).items()]
 
 

@@ -1,4 +1,4 @@
-"""Which flights of the survey are flown, and what every scheme makes of them.
+"""The flights of the survey, and the statistic of every scheme in them.
 
 A block is flown once for each fault; every scheme watches the same flights.
 """
@@ -33,7 +33,7 @@ UNEXPLAINED_UP_TO_RAD_S = 15.0  # the faster of the published sinusoids, and wha
 
 
 class Condition(NamedTuple):
-    """What a designer is told, and may set his alarm level for."""
+    """The instruments and the air that a designer knows, and may set an alarm level for."""
 
     sensors: str
     turbulence: str
@@ -218,7 +218,7 @@ def deflections(
 
 @dataclass
 class Watched:
-    """What came of a block: of every scheme, a trace for each of its flights, in order; why one is missing.
+    """The outcome of a block: by scheme, a trace for each of its flights, in order; why one is missing.
 
     deflections: how far each fault stands out of the noise, after each of WITHIN_S (probabilities.py).
     """

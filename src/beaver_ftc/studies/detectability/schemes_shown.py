@@ -72,7 +72,7 @@ def _soon(found: Document | None) -> Line:
 def who_is_better(
     document: Document, sensors: str, turbulence: str, within_s: float = WATCHED_S
 ) -> Iterator[str]:
-    """Of a condition, a sentence a surface: who finds most faults so soon."""
+    """A sentence for each surface under a condition: the scheme that finds most faults so soon."""
     here = {"sensors": sensors, "turbulence": turbulence}
     soon = f"{within_s:g}"
     for surface in document["grid"]["surfaces"]:
@@ -159,7 +159,7 @@ def draw_schemes(document: Summary) -> "Figure":
 
 
 def _draw(panel: "Axes", rows: Sequence[Row], names: Sequence[str], document: Document) -> None:
-    """Of each scheme the share detected with its exact 95 % interval, magnitudes below one another."""
+    """The share that each scheme detects with its exact 95 % interval, magnitudes below one another."""
     magnitudes = document["grid"]["magnitudes"]
     within = f"{JUDGED_S:g}"
     apart = 0.6 / len(magnitudes)

@@ -1,4 +1,4 @@
-"""What all answers of `detectability` are shown with: one table, its columns, the name of the files."""
+"""The table that all answers of `detectability` share: its columns, and the name of the files."""
 
 from collections.abc import Sequence
 

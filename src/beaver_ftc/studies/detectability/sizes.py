@@ -1,4 +1,4 @@
-"""Which flights answer how small a loss is found in time, and what limits it.
+"""The flights that show how small a loss is found in time, and what limits it.
 
 A flight is the scenario without its own faults, with a loss of one surface: its seed and the instant of the
 loss are drawn, its size is asked for. The loss strikes anywhere between the start, once the references have
@@ -141,7 +141,7 @@ def variants_of(scenario: Scenario, surface: str) -> Iterator[tuple[str, Scenari
 
 
 def _left_out(scenario: Scenario) -> Iterator[tuple[str, Document]]:
-    """What may hide a fault, left out of the flight and of what is declared."""
+    """Effects that may hide a fault, left out of the flight and of the declaration."""
     declared = Declared.of(scenario)
     environment = scenario.environment
     if environment.is_turbulent or environment.gusts or declared.air.moves:

@@ -44,7 +44,7 @@ def _variants(document: Document) -> list[Document]:
 
 
 def _sentences(document: Document) -> Iterator[str]:
-    """What is certain, what is found, what casts doubt on that, what limits it, and what would help."""
+    """The sizes that are certain and found, doubts about them, their limit, and a remedy, a sentence each."""
     yield from _sizes(document)
     yield from _doubts(document)
     none = "makes a difference outside of the intervals"

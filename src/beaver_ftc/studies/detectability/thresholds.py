@@ -53,7 +53,7 @@ class Threshold:
 
 
 class Sizes:
-    """What is known of the smallest size at which each flight finds its fault: above `_missed`, at most
+    """Limits of the smallest size at which each flight finds its fault: it is above `_missed`, and at most
     `_found`. flights: how many of them count."""
 
     def __init__(self, is_found: IsFound, most: int) -> None:

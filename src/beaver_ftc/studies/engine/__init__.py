@@ -1,4 +1,4 @@
-"""What every study has in common: cases flown by workers, kept as they land, resumed, and counted."""
+"""The parts that all studies share: workers fly cases, rows are kept as they land, resumed, and counted."""
 
 from typing import TYPE_CHECKING
 

@@ -56,7 +56,7 @@ class Forks:
         then_here()
 
     def results(self) -> list[Any]:
-        """What the pieces return, in their order. Raises what one has raised."""
+        """The results of the pieces, in their order. Raises the exception of a piece, if one has failed."""
         self._wait(0)
         return self._results
 

@@ -1,4 +1,4 @@
-"""What a number of flights can say with confidence: bounds for rates, counts and quantiles.
+"""Conclusions from a number of flights, with confidence: bounds for rates, counts and quantiles.
 
 All are functions of counts alone. A bound that the flights do not give is infinite.
 """

@@ -145,7 +145,7 @@ FlyRound = Callable[[Sequence[Any]], list[Any]]
 
 @dataclass(frozen=True)
 class Study:
-    """What is a study's own: its cases, how each is flown, what their rows amount to, and its files.
+    """A study: its cases, how each is flown, the document of all their rows, and its files.
 
     name: of the result folder. fly: from a case to its row, a value of the type `row`; it can be pickled, as
     the cases can. document: of all rows. files: their names, with what makes the content of each from the

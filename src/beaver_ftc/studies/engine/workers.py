@@ -1,4 +1,4 @@
-"""Who flies: the contract of a backend, worker processes on this machine, and this very process.
+"""Workers that fly: the contract of a backend, worker processes on this machine, and this very process.
 
 A task is a batch, or some of its cases. Workers fly tasks and hand back their rows, or say that one was lost
 over it.
@@ -46,14 +46,14 @@ class Batch(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """What became of a task: its rows, or None if the worker was lost over it."""
+    """The outcome of a task: its rows, or None if the worker was lost over it."""
 
     task: Batch
     rows: list[Row] | None
 
 
 class Work(NamedTuple):
-    """What a worker does: fly a case; and once, before its first, what warms it up. Both can be pickled."""
+    """The work of a worker: to fly a case; and once, before its first, to warm up. Both can be pickled."""
 
     fly: Callable[[Any], Row]
     warm_up: Callable[[], None] | None = None

@@ -1,4 +1,4 @@
-"""Whether a test that is told the fault sees it in a flight of the matrix, at the same rate of false alarms.
+"""The informed test: whether a test that knows the fault detects it, at the same rate of false alarms.
 
 What the fault adds to the accelerations is known from the truth: where the surface was, less where a healthy
 one would have been under the same commands. Coefficients are unknown constants, even over their tolerance.
@@ -31,7 +31,7 @@ COLUMNS = (
 
 
 def columns_of(aircraft: Aircraft) -> Columns:
-    """What the test needs of a flight, still empty."""
+    """The columns that the test needs of a flight, still empty."""
     surfaces = [f"{s}_{of_it}_rad" for s in aircraft.surfaces for of_it in ("cmd", "effective")]
     return Columns(*COLUMNS, *aircraft.signals, *surfaces)
 
@@ -62,8 +62,8 @@ def seen_when_told(scenario: "Scenario", kept: Columns, surface: str) -> Documen
 
 
 def _declared(scenario: "Scenario") -> tuple[Context, np.ndarray]:
-    """What is declared of a flight but the coefficients, the air as the vanes show it, if they
-    do; and their tolerances, absolute."""
+    """The declaration of a flight without the coefficients, the air as the vanes show it if they do; and the
+    tolerances of the coefficients, absolute."""
     from beaver_ftc.loop.loop import Loop
     from beaver_ftc.loop.plugin_frame import context_of
     from beaver_ftc.loop.readout import FrameReadout

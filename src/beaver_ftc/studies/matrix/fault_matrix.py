@@ -1,4 +1,4 @@
-"""Every fault type on every surface: what the diagnosis makes of it, and what the flight costs.
+"""Every fault type on every surface: the verdict of the diagnosis, and the tracking of the flight.
 
 Each flight is flown with the fault-tolerant law and with the oracle; a cell of the matrix is a fault on a
 surface, the worst of its airspeeds.
@@ -216,7 +216,7 @@ def document_of(rows: list[Document]) -> Document:
 
 
 def beside_told(rows: list[Document]) -> Document:
-    """What becomes of the flights in which a test that is told the fault sees it.
+    """The outcome of the flights in which a test that knows the fault detects it.
 
     named: the right surface, whether or not its type is still open; type_kept: the right type is named or
     among the candidates.
@@ -267,7 +267,7 @@ def _reason(lost: list[Document]) -> str:
 
 
 def _remark(here: list[Document]) -> str:
-    """Of how many flights the aircraft is lost, and why; or that the fault has no effect in any of them."""
+    """How many flights lose the aircraft, and why; or that the fault has no effect in any of them."""
     lost = [row for row in here if row["departure_s"] is not None]
     if lost:
         also = sum(row["oracle_departure_s"] is not None for row in lost)

@@ -50,7 +50,7 @@ MODEL_LOOKS: dict[str, tuple[str, dict[str, Any]]] = {  # marker of a pole, and 
 
 
 def figures(folder: Path, found: Document, flown: Metrics, analysis: LinearAnalysis) -> Files:
-    """Of the mismatch of a result folder that holds `mismatch.parquet`, by the name of their files."""
+    """The figures of a result folder that holds `mismatch.parquet`, by the name of their files."""
     return {
         "mismatch-sources.png": sources_figure(folder / "mismatch.parquet", found, marks(flown)),
         "mismatch-bound.png": bound_figure(found),
@@ -232,7 +232,7 @@ def map_figure(entries: Sequence[Document], name: str) -> "Figure":
 
 
 def _ratios(grid: np.ndarray, norm: Any) -> dict[Any, tuple[str, str]]:
-    """What stands on the cells of a map, and its colour."""
+    """The text on each cell of a map, and its colour."""
     labels = dict.fromkeys(np.ndindex(grid.shape), ("no trim", "black"))
     for at, ratio in np.ndenumerate(grid):
         if np.isfinite(ratio):

@@ -37,7 +37,7 @@ class LinearAnalysis:
     own_deviation: dict[str, float]
 
     def channel(self, name: str, surface: str, rate: str) -> tuple[np.ndarray, np.ndarray, int]:
-        """Of a model: A, the column of a surface, and which state a rate is."""
+        """A of a model, the column of a surface, and the place of a rate among the states."""
         model = self.models[name]
         return model.A, model.B[:, model.inputs.index(surface)], model.states.index(rate)
 

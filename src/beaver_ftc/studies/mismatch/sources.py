@@ -88,7 +88,7 @@ def healthy_positions(scenario: Scenario, commands: np.ndarray) -> np.ndarray:
 
 
 def _servo(scenario: Scenario, surface: str, dt: float) -> tuple[float, ...]:
-    """Of an actuator in a JSBSim frame: share of the way, reach, dead band and stops, rad."""
+    """The servo of a surface in a JSBSim frame: share of the way, reach, dead band and stops, rad."""
     servo = getattr(scenario.actuators, surface)
     off = getattr(scenario.uncertainty.actuators, surface)
     bandwidth = servo.bandwidth_rad_s * off.bandwidth
@@ -131,14 +131,14 @@ def earth_in_body(attitude: np.ndarray, latitude: np.ndarray) -> np.ndarray:
 def earth_rotation(
     inertia: InertiaCoefficients, x: np.ndarray, attitude: np.ndarray, latitude: np.ndarray
 ) -> np.ndarray:
-    """What the Earth's rotation adds to the angular acceleration, (n, 3) rad/s2."""
+    """The part of the angular acceleration that comes from the Earth's rotation, (n, 3) rad/s2."""
     W = earth_in_body(attitude, latitude)
     inertial_rate = x + W
     return inertial(inertia, inertial_rate) - inertial(inertia, x) + np.cross(inertial_rate, W)
 
 
 class Models:
-    """Of a flight: moment models from the one in use to the truth, each with one error less.
+    """The moment models of a flight, from the one in use to the truth, each with one error less.
 
     design: in use, tied to the trim where it is linearised or frozen. untied: without that. whole: with the
     engine's terms, as in the table. turning: with the truth's coefficients. truth: with its inertia as well.
@@ -196,7 +196,7 @@ def share(fault: Any, t_s: np.ndarray) -> np.ndarray:
 
 
 def _lost(faults: list, states: States, position: np.ndarray) -> Iterator[tuple[Any, np.ndarray]]:
-    """What each loss takes from the effective deflection, (n,) rad, of what those before it have left."""
+    """The part of the effective deflection that each loss takes, (n,) rad, after those before it."""
     remaining = np.ones_like(position)
     for fault in faults:
         if fault.type == LOSS:
@@ -206,8 +206,8 @@ def _lost(faults: list, states: States, position: np.ndarray) -> Iterator[tuple[
 
 
 def _displaced(faults: list, t_s: np.ndarray, way: np.ndarray) -> Iterator[tuple[Any, np.ndarray]]:
-    """Which of the other faults moves the surface so far, (n,) rad: who struck last, also what lingers after
-    a repair."""
+    """The way of the surface, (n,) rad, by the other fault that moves it: the one that struck last, also if
+    its effect remains after a repair."""
     order = sorted((fault for fault in faults if fault.type != LOSS), key=lambda fault: fault.at_s)
     struck = [~is_before(t_s, fault.at_s) for fault in order]
     there = [is_in_force(fault, t_s) for fault in order]

@@ -79,7 +79,7 @@ class Split:
         return bool((self.ratios > 1.0).any())
 
     def shares(self, values: np.ndarray) -> np.ndarray:
-        """Of the bound, (n, 3); nothing is no share of a bound of nothing."""
+        """Values as shares of the bound, (n, 3); the share of nothing is 0, also of a bound of nothing."""
         size = np.abs(values)
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.where(size > 0.0, size / self.eta_bar, 0.0)

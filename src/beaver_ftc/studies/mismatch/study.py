@@ -99,7 +99,7 @@ def refuse_other_aircraft(scenarios: Iterable[Scenario]) -> None:
 
 
 def document(scenario: Scenario, flight: Split, metrics: Metrics) -> Document:
-    """What the split of a flight amounts to."""
+    """The document of the split of a flight."""
     return {
         "scenario": scenario.name,
         "frames": len(flight.t_s),

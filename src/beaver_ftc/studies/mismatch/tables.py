@@ -39,7 +39,7 @@ def mismatch_text(found: Document, folder: str, colour: bool = False) -> str:
 
 
 def findings(found: Document) -> list[str]:
-    """What it comes to, in words, for the terminal and the page."""
+    """The result in sentences, for the terminal and the page."""
     worst = found["dominant"]
     dominant = "nothing: truth and design agree"
     if worst is not None:

@@ -1,4 +1,4 @@
-"""What a document looks like: numbers and tables in words, figures, pages, and the files they go into."""
+"""Documents for people: numbers and tables in words, figures, pages, and the files that contain them."""
 
 from typing import TYPE_CHECKING
 

@@ -186,7 +186,7 @@ def replace_between(path: Path, begin: str, end: str, text: str) -> None:
 
 
 def versions_line(versions: Mapping[str, str]) -> str:
-    """What made the numbers, in a line."""
+    """The versions that made the numbers, in a line."""
     return ", ".join(f"{name} {version}" for name, version in versions.items())
 
 

@@ -33,7 +33,7 @@ SETTLED_S = 2.0  # from rest, or from a fault, to steady tracking: four error ti
 
 @dataclass(frozen=True)
 class Changed:
-    """What is changed in the published setting, as dotted scenario keys, and where the paper shows it."""
+    """A change of the published setting, as dotted scenario keys, and where the paper shows it."""
 
     name: str
     changes: Mapping[str, Any]
@@ -139,7 +139,7 @@ class Flown:
         return self.first_s(shares.max(axis=0) > 1.0)
 
     def between(self, start_s: float, end_s: float = np.inf) -> np.ndarray:
-        """Which frames lie in a span of time."""
+        """Whether each frame lies in a span of time, (frames,)."""
         return (self.log["t_s"] >= start_s) & (self.log["t_s"] < end_s)
 
     def excluded_at_s(self, estimator: str) -> float:
@@ -180,7 +180,7 @@ class Flown:
         return np.diff(rate, prepend=rate[0]) / self.frame_s - self.log[f"{axis}_design_rad_s2"]
 
     def named_s(self, estimator: str) -> float:
-        """For how long this was the only estimator left, s."""
+        """Time for which this was the only estimator left, s."""
         others = [self.log[f"fie_{name}_excluded"] == 1 for name in ESTIMATORS if name != estimator]
         alone = np.all(others, axis=0) & (self.log[f"fie_{estimator}_excluded"] != 1)
         alone &= self.log["detected"] == 1

@@ -1,4 +1,4 @@
-"""What [Zhang2005] gives, and what it leaves open: every choice of ours, in one place, with its reason."""
+"""The setting that [Zhang2005] gives, and our choices for all that it leaves open, each with its reason."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

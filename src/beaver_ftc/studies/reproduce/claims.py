@@ -27,8 +27,8 @@ ABLATIONS = tuple(Changed(name, row["changes"], "") for name, row in _FILE["abla
 
 
 class Measure(NamedTuple):
-    """What a number is of, how it is measured, its unit, whether it is to be at least its limit, and what to
-    say of an infinite one. beside: how the names of the flights end that these are compared with, if any."""
+    """How a number is measured, its quantity and unit, whether it is to be at least its limit, and the word
+    for an infinite one. beside: how the names of the flights end that these are compared with, if any."""
 
     of: Callable[..., float]
     quantity: str
@@ -69,7 +69,7 @@ class Claim(NamedTuple):
         return not self.reason and not self.construction
 
     def number(self, flights: Mapping[str, Flown]) -> float:
-        """What is measured in the flights."""
+        """The number that is measured in the flights."""
         beside = [name + self.measure.beside for name in self.names if self.measure.beside]
         of = (name if name in AXES else flights[name] for name in (*self.names, *beside))
         return float(self.measure.of(*of))

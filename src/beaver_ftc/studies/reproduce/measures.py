@@ -49,7 +49,7 @@ def detection(flown: Flown) -> float:
 
 
 def detected(*flights: Flown) -> float:
-    """How many of the faults raise the alarm."""
+    """Number of faults that raise the alarm."""
     return sum(map(np.isfinite, map(detection, flights)))
 
 
@@ -59,12 +59,12 @@ def isolation(flown: Flown) -> float:
 
 
 def isolated(*flights: Flown) -> float:
-    """How many of the faults are detected and rightly named."""
+    """Number of faults that are detected and rightly named."""
     return sum(np.isfinite(isolation(flown) + detection(flown)) for flown in flights)
 
 
 def handled(*flights: Flown) -> float:
-    """How many of the faults are detected, rightly named, and tracked with an error of at most GOOD."""
+    """Number of faults that are detected, rightly named, and tracked with an error of at most GOOD."""
     return sum(isolated(flown) and tracking(flown, flown.axis) <= GOOD for flown in flights)
 
 
@@ -118,7 +118,7 @@ def conclusion_lag(flown: Flown) -> float:
 
 
 def estimators(flown: Flown) -> float:
-    """How many estimators work: the detection estimator, and each isolation estimator with a residual."""
+    """Number of estimators at work: the detection estimator, each isolation estimator with a residual."""
     return 1.0 + sum(bool(flown.residuals_of(other).any()) for other in ESTIMATORS)
 
 
@@ -128,7 +128,7 @@ def at_work(flown: Flown) -> float:
 
 
 def residuals(flown: Flown) -> float:
-    """How many residuals the isolation estimators generate."""
+    """Number of residuals that the isolation estimators generate."""
     return sum(int(flown.residuals_of(other).any(axis=1).sum()) for other in ESTIMATORS)
 
 
@@ -139,7 +139,7 @@ def activation(flown: Flown) -> float:
 
 
 def generalised(*flights: Flown) -> float:
-    """In how many pairs of flight and estimator it is excluded exactly if the fault is not its own."""
+    """Number of pairs of flight and estimator in which it is excluded exactly if the fault is not its own."""
     return sum(
         bool(flown.residuals_of(e).any()) and np.isfinite(flown.excluded_at_s(e)) == (e != flown.struck)
         for flown in flights
@@ -148,12 +148,12 @@ def generalised(*flights: Flown) -> float:
 
 
 def named(flown: Flown) -> float:
-    """For how long exactly one known fault was left, s: a wrong name, as the flight has an unknown fault."""
+    """Time with exactly one known fault left, s: a wrong name, as the flight has an unknown fault."""
     return round(sum(map(flown.named_s, ESTIMATORS)), 9)
 
 
 def left(flown: Flown) -> float:
-    """How many isolation estimators are not excluded."""
+    """Number of isolation estimators that are not excluded."""
     return sum(not np.isfinite(flown.excluded_at_s(estimator)) for estimator in ESTIMATORS)
 
 
@@ -221,16 +221,16 @@ def learning(*flights: Flown) -> float:
 
 
 def outside(*flights: Flown) -> float:
-    """How far an estimate of theta = effectiveness - 1, of diagnosis or law, lies outside [-1, 0] at most."""
+    """Largest distance of an estimate of theta = effectiveness - 1, of diagnosis or law, from [-1, 0]."""
     columns = [f"{surface}_effectiveness_{what}" for surface in ESTIMATORS for what in ("estimate", "used")]
     effectiveness = np.concatenate([flown.log[column] for flown in flights for column in columns])
     return float(np.nanmax(np.maximum(effectiveness - 1.0, -effectiveness).clip(0.0)))
 
 
 def unbounded(flown: Flown) -> float:
-    """By how much the model error before the fault exceeds the bound of the paper, ppm of this bound; below 0
-    if it stays within. Our thresholds also contain the Earth's rotation and rounding; the paper's bound does
-    not."""
+    """Excess of the model error before the fault over the bound of the paper, ppm of this bound; below 0 if
+    the error stays within. Our thresholds also contain the Earth's rotation and rounding; the paper's bound
+    does not."""
     healthy = flown.between(SETTLED_S, flown.fault_at_s)
     rates = np.roll(sum(np.abs(flown.log[f"{axis}_rad_s"]) for axis in AXES), 1)  # of the row before
     ours = EARTH_RATE_RAD_S * (2.0 * rates + EARTH_RATE_RAD_S) + ROUNDING_RAD_S2  # bounds.add_published_bound
@@ -303,7 +303,7 @@ def beside_nominal(*flights: Flown) -> float:
 
 
 def flown_on(flown: Flown) -> float:
-    """For how long the aircraft flies after the fault, s."""
+    """Time that the aircraft flies after the fault, s."""
     return float(flown.log["t_s"][-1] - flown.fault_at_s)
 
 
@@ -323,7 +323,7 @@ def reallocation(flown: Flown) -> float:
 
 
 def decisions(flown: Flown) -> float:
-    """How many of two decisions were taken: the adaptive law took over; the flap carries the demand."""
+    """Number of decisions taken, of two: the adaptive law took over; the flap carries the demand."""
     adaptive = np.isfinite(flown.mode_at_s("adaptive"))
     return float(adaptive) + float(share_of_elevator(flown) <= TAKEN_OVER)
 

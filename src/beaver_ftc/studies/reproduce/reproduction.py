@@ -54,14 +54,14 @@ STUDIED: tuple[tuple[str, Changed], ...] = (  # what is asked of a setting, and 
 
 
 def row_of(studied: tuple[str, Changed]) -> Document:
-    """What is asked of a setting: the numbers of the claims, or whether a healthy flight alarms."""
+    """The row of a setting: the numbers of the claims, or whether a healthy flight alarms."""
     asked, setting = studied
     return claims_row(setting) if asked == NUMBERS else {FALSE_ALARM: beside.false_alarm_of(setting)}
 
 
 def claims_row(setting: Changed) -> Document:
-    """Of a setting the number of every measured claim, in their order, the same without the mechanism, and
-    in how many flights adaptation changes no alarm and no name. A number that no verdict needs is not flown:
+    """The number of every measured claim in a setting, in their order, the same without the mechanism, and in
+    how many flights adaptation changes no alarm and no name. A number that no verdict needs is not flown:
     it is nan, which keeps no limit."""
     flown: dict[str, Flown] = {}
     flights = LazyFlights(setting.changes, flown)

@@ -1,4 +1,4 @@
-"""What flies, and what the design model has of it: eq. (2) of [Zhang2005] as printed omits the engine."""
+"""The truth that flies beside the design model: eq. (2) of [Zhang2005] as printed omits the engine."""
 
 from collections.abc import Mapping
 from functools import partial

@@ -53,7 +53,7 @@ def limit(claim: Document) -> str:
 
 
 def without(claim: Document) -> str:
-    """What is taken out, and the number then."""
+    """The mechanism that is taken out, and the number then."""
     return f"{claim['without']}: {_found(claim, 'number_without')}"
 
 
@@ -144,7 +144,7 @@ GAINS = (
 
 
 def headline(document: Document) -> str:
-    """What became of the statements, in sentences."""
+    """The verdicts on the statements, in sentences."""
     tested = document["testable"]
     built = document["construction"]
     settings = len(document["sensitivity"])
@@ -164,7 +164,7 @@ def headline(document: Document) -> str:
 
 
 def adaptation_sentence(document: Document) -> str:
-    """What the adaptation of the isolation estimators changes."""
+    """The effect of the adaptation of the isolation estimators, in a sentence."""
     return (
         "Each isolation estimator adapts its estimate of the fault in flight. Without this adaptation "
         "(gain 0), the alarm, the named surface and the times stay the same in {same} of {flights} flights "

@@ -1,4 +1,4 @@
-"""Which flights show how a verdict decays, and what they amount to.
+"""The flights that show how a verdict decays, and their summary.
 
 A flight is the scenario with its own faults, later by a draw, and a truth whose errors are multiples of what
 `fdi.bounds` declares (`errors.py`). Errors are raised one at a time while the others that are declared stay
@@ -59,7 +59,7 @@ def factors_of(errors: Sequence[Error], flight: Flight) -> dict[str, float]:
 
 
 def scenario_of(scenario: Scenario, errors: Sequence[Error], seed: int, flight: Flight) -> Scenario:
-    """What flies: draws depend on the number of the flight alone, so that rows differ by the error. The law
+    """The scenario of a flight: draws depend on its number alone, so that rows differ by the error. The law
     knows the sensors of the scenario, whatever theirs are in the flight."""
     draws = np.random.default_rng([seed, flight.run])
     changes: Document = {"seed": int(draws.integers(2**31)), "expect": {}}
@@ -87,7 +87,7 @@ def fly_one(scenario: Scenario, seed: int, flight: Flight) -> Document:
 
 
 def row_of(found: Metrics, bound_used: float) -> Document:
-    """What is counted of a flight."""
+    """The row of a flight that was flown."""
     isolation = found.isolation
     tracked = found.tracking
     rms = tracked.post_fault_rms_deg_s if found.fault else tracked.pre_fault_rms_deg_s

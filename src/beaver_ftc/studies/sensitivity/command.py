@@ -26,7 +26,7 @@ from beaver_ftc.studies.sensitivity.mechanisms import (
 
 
 def errors_study(scenario: Scenario, flights: int = beyond.FLIGHTS, seed: int = 1) -> Study:
-    """What errors larger than declared change in a scenario. Raises BadInput where nothing is diagnosed."""
+    """The study of errors larger than declared. Raises BadInput where nothing is diagnosed."""
     if scenario.fdi.scheme == "none":
         raise BadInput(f"{scenario.name}: fdi.scheme: none diagnoses nothing, allowed: a scheme")
     errors = errors_of(scenario)
@@ -39,7 +39,7 @@ def errors_study(scenario: Scenario, flights: int = beyond.FLIGHTS, seed: int = 
 
 
 def mechanisms_study(draws: int, seed: int) -> Study:
-    """What the mechanisms of both systems are worth."""
+    """The study of the mechanisms of both systems."""
 
     def document(rows: Sequence[Document]) -> Document:
         margins = [margins_row(cell) for cell in margin_cells()]

@@ -51,8 +51,8 @@ def _row_of(mechanism: Mechanism, cases: Sequence[Flight], rows: Sequence[Docume
 
 
 def effect_of(pairs: Sequence[Pair]) -> Document:
-    """What the mechanism does in these pairs: shares of flights that are worse without it, less those that
-    are better; and medians of both."""
+    """The effect of the mechanism in these pairs: shares of flights that are worse without it, less those
+    that are better; and medians of both."""
     flown = [pair for pair in pairs if not any(outcome["failed"] for outcome in pair)]
     return {
         "flights": len(flown),
@@ -116,7 +116,7 @@ def _ratio(a: Document, b: Document) -> float:
 
 
 def _system_row(outcomes: Sequence[Document]) -> Document:
-    """What a system does with all of its mechanisms, in the flights that were flown to their end."""
+    """The row of a system with all of its mechanisms, in the flights that were flown to their end."""
     flown = [o for o in outcomes if not o["failed"]]
     rates = {
         "false_alarms": sum(o["false_alarm"] for o in flown),

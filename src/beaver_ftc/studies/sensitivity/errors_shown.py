@@ -1,4 +1,4 @@
-"""What larger errors change: as sentences, a table, a figure and files."""
+"""The effects of larger errors: as sentences, a table, a figure and files."""
 
 from collections.abc import Callable, Iterator, Sequence
 from operator import itemgetter
@@ -34,7 +34,7 @@ def page_of(document: Document) -> tuple[str, Sequence[Part]]:
 
 
 def error_sentences(document: Document) -> Iterator[str]:
-    """What holds as declared, and the least factor at which an error changes the verdict."""
+    """The result as declared, and the least factor at which an error changes the verdict."""
     errors = list(grouped(document["rows"], "error").values())
     alarms, misnamed = _counts(errors[-1][0])
     yield (

@@ -1,4 +1,4 @@
-"""Which flights show what a mechanism is worth, and what pairs of flights amount to.
+"""The flights that show the worth of a mechanism, and their outcomes.
 
 A draw is a flight: fault, airspeed, references, instant, and errors of the model within what is declared.
 Every system flies it, with all of its mechanisms and without each of them. Cells of the survey are all
@@ -84,7 +84,7 @@ def cases_of(draws: int) -> list[Flight]:
 
 
 def scenario_of(flight: Flight, seed: int, system: str) -> Scenario:
-    """What a system flies, with all of its mechanisms. Draws depend on the cell and the run alone."""
+    """The flight of a system with all of its mechanisms. Draws depend on the cell and the run alone."""
     places = (values.index(value) for values, value in zip(FACTORS.values(), flight, strict=False))
     draws = np.random.default_rng([seed, *places, flight.run])
     at_s = round(draws.uniform(*STRIKES_S) * RATE_HZ) / RATE_HZ
@@ -145,7 +145,7 @@ def _bandwidth(flight: Flight, system: str) -> Changes:
 
 
 def without_mechanism(scenario: Scenario, mechanism: Mechanism) -> Scenario:
-    """What flies without it; what is withheld from the law is no key.
+    """The scenario without a mechanism; one that is withheld from the law has no key.
 
     In place of adaptive thresholds stands the least constant that promises the same: the largest value of the
     adaptive threshold in the same flight as declared and without the fault.
@@ -196,7 +196,7 @@ def mechanisms_of(key: str) -> str:
 
 
 def watch_of(withheld: str) -> Callable[[Loop], Callable[[], None]] | None:
-    """What `fly` calls as the flight begins, to withhold something from its law; None if nothing is."""
+    """A function for `fly` that withholds something from the law as the flight begins; None for nothing."""
 
     def begin(loop: Loop) -> Callable[[], None]:
         withhold_from_law(loop.frames[0], withheld)
@@ -206,7 +206,7 @@ def watch_of(withheld: str) -> Callable[[Loop], Callable[[], None]] | None:
 
 
 def outcome_of(scenario: Scenario, withheld: str = "") -> Document:
-    """What counts of a flight. withheld: from the law, as in `withhold_from_law`."""
+    """The outcome of a flight. withheld: from the law, as in `withhold_from_law`."""
     try:
         found = measure(fly(scenario, watch=watch_of(withheld)))
     except BeaverFtcError as error:
@@ -237,8 +237,8 @@ def _tracking(found: Metrics) -> float | None:
 
 
 def reason_of(scenario: Scenario) -> Document:
-    """Of a false alarm: how many errors of the truth are undeclared; and whether a certificate proves that
-    the data are outside what is declared, of a scheme whose alarms have one."""
+    """The reason of a false alarm: how many errors of the truth are undeclared; and, if the alarms of the
+    scheme have a certificate, whether it proves that the data are outside of the declaration."""
     beyond = sum(1 for _ in undeclared(scenario))
     if not scenario.fdi.is_ours:
         return {"undeclared": beyond, "certified": None}

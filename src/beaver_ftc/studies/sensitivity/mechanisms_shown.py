@@ -1,4 +1,4 @@
-"""What the loss of a mechanism changes: as sentences, tables, a figure and files."""
+"""The effects of the loss of a mechanism: as sentences, tables, a figure and files."""
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
@@ -51,7 +51,7 @@ def page_of(document: Document) -> tuple[str, Sequence[Part]]:
 
 
 def mechanism_sentences(document: Document) -> Iterator[str]:
-    """What was flown, what each mechanism improves or worsens, and whether false alarms have a reason."""
+    """The flights, what each mechanism improves or worsens, and whether false alarms have a reason."""
     names = " x ".join(f"{len(values)} {_FACTOR_WORDS[name]}" for name, values in document["factors"].items())
     yield f"{document['draws']} draws over {names}, each flown with and without every mechanism."
     yield from (mechanism_sentence(row) for row in document["mechanisms"])
@@ -72,7 +72,7 @@ def label(row: Document) -> str:
 
 
 def mechanism_sentence(row: Document) -> str:
-    """What the removal of a mechanism changes, beyond chance."""
+    """The changes by the removal of a mechanism, beyond chance."""
     flights = row["flights"]
     if row["same_verdict"] == row["same_tracking"] == flights:
         return f"{label(row)}: without it all {flights} flights are the same."

@@ -1,4 +1,4 @@
-"""The columns of a sweep's table that say what came of a flight: of its metrics, by path, and a few more.
+"""The columns of a sweep's table with the outcome of a flight: its metrics, by path, and a few more.
 
 A path's type follows from the metrics model; `*` is each surface.
 """
@@ -115,7 +115,7 @@ def _kind(path: str) -> str:
 
 @cache
 def getter_of(name: str) -> Getter:
-    """What a column says of a flight; None where a section on the way to it is."""
+    """The function that reads a column from the metrics; it gives None where a section on the way is None."""
     if name in _ELSEWHERE:
         return _ELSEWHERE[name][1]
     return lambda found: found.at(name)

@@ -115,7 +115,7 @@ KEEP_POLICIES = ("none", "failed", "missed", "worst", "all")
 
 @dataclass(frozen=True)
 class Keep:
-    """Which flights leave a result folder of their own, and where; certified: with their certificates."""
+    """The flights that leave a result folder of their own, and its place; certified: with certificates."""
 
     policy: str = "none"
     runs: frozenset[int] = field(default_factory=frozenset)

@@ -96,7 +96,7 @@ class Flights:
 
     @cached_property
     def fault_labels(self) -> np.ndarray:
-        """What broke in each flight, in words: the surface, with the type where there are several types."""
+        """The fault of each flight in words: the surface, with the type where there are several types."""
         kinds = self["fault.type"]
         actuators = self["fault.actuator"]
         several = len(set(kinds[kinds != ""])) > 1

@@ -1,4 +1,4 @@
-"""Which varied keys explain an outcome, by ranks: whatever the shape of the dependence on a key.
+"""The varied keys that explain an outcome, by ranks: whatever the shape of the dependence on a key.
 
 Explained is the share of the variance of the outcome's ranks that lies between groups of flights with similar
 values of the key, corrected for chance (Kruskal and Wallis' epsilon squared). Its p-value is that of random

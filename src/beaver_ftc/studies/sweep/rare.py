@@ -121,8 +121,8 @@ class Chains:
         return scores.reshape(points.shape[:-1])
 
     def estimate(self) -> Document:
-        """What the runs amount to: a probability with its two-sided interval; why: what it lacks, if
-        anything."""
+        """The result of the runs: a probability with its two-sided interval; why: the reason if it is not
+        known."""
         events, of = self.plain
         probability, low, high = math.nan, 0.0, float(self.share.max())
         why = ""

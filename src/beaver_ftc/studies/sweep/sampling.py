@@ -1,4 +1,4 @@
-"""Which values each flight of a sweep flies with: a function of the sweep and the flight's index alone.
+"""The values that each flight of a sweep has: a function of the sweep and the flight's index alone.
 
 `linspace` keys, and all keys of a grid, are gone through in turn, the last key fastest. The others come from
 a point of the unit cube through the inverse of their distribution; the sampling is where those points come

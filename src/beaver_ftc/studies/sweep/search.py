@@ -58,7 +58,7 @@ OBJECTIVES: dict[str, Callable[[Mapping[str, Any]], float]] = {
 
 
 def score(objective: str, row: Mapping[str, Any]) -> float:
-    """What the search makes as large as it can; minus infinity for a flight without metrics."""
+    """The number that the search maximises; minus infinity for a flight without metrics."""
     return -math.inf if row["frames"] is None else float(OBJECTIVES[objective](row))
 
 
@@ -128,7 +128,7 @@ def generations(sweep: Sweep, objective: str, store: Store) -> Iterator[Batch]:
 
 
 def found(objective: str, results: Path, sweep: Sweep) -> Document:
-    """What the search found: the worst flight, and the worst score after each generation."""
+    """The result of the search: the worst flight, and the worst score after each generation."""
     from pyarrow.parquet import read_table
 
     rows = read_table(results).to_pylist()

@@ -1,4 +1,4 @@
-"""What a sweep shows: the document `summary.json`.
+"""The summary of a sweep: the document `summary.json`.
 
 A rate comes with its count, what it is of, and its 95 % interval. What the flights do not tell is null.
 """

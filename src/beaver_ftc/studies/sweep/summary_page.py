@@ -1,4 +1,4 @@
-"""What a sweep shows, in words: for the terminal and at the head of the report.
+"""The summary of a sweep in words: for the terminal and at the head of the report.
 
 Everything is said from the summary document, so that the words and `summary.json` cannot disagree.
 """

@@ -216,6 +216,7 @@ ScenarioArgument = Annotated[str, SCENARIO]
 WorkersOption = Annotated[
     int | None, typer.Option(min=1, max=1024, help="Number of processes. Default: one for each core.")
 ]
+SeedOption = Annotated[int, typer.Option(min=0)]
 AirspeedOption = Annotated[float | None, typer.Option(min=1, max=1000)]
 AirspeedsOption = Annotated[list[float] | None, typer.Option(min=1, max=1000)]
 AltitudesOption = Annotated[list[float] | None, typer.Option(min=-300, max=30000)]

@@ -16,7 +16,7 @@ import numpy as np
 import typer
 
 from beaver_ftc.aircraft import AXES, load
-from beaver_ftc.commands import Reporter, StudyCommand, WorkersOption
+from beaver_ftc.commands import Reporter, SeedOption, StudyCommand, WorkersOption
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.files import Document
 from beaver_ftc.loop.loop import fly
@@ -359,7 +359,7 @@ class Verify(StudyCommand):
 
     hours: Annotated[float, typer.Option(min=0.0, max=1e6)] = 2.0
     faults: Annotated[int, typer.Option(min=0, max=10_000_000)] = 200
-    seed: Annotated[int, typer.Option(min=0)] = 1
+    seed: SeedOption = 1
     workers: WorkersOption = None
     out: Path = Path("runs")
     steps: bool = False

@@ -19,7 +19,7 @@ ENTRY = Entry("a", "b")
 
 def _result(**changes):
     values = {"entry": ENTRY, "false_alarm": False, "fault_free_s": 360.0, "faulted": True, "delay_s": 0.1,
-              "isolated": "rudder", "correct": True, "isolation_delay_s": 0.2, "rms_deg_s": 1.0}  # fmt: skip
+              "correct": True, "isolation_delay_s": 0.2, "rms_deg_s": 1.0}  # fmt: skip
     return Result(**{**values, **changes})
 
 

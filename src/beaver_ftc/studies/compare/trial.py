@@ -103,7 +103,6 @@ class Result:
     fault_free_s: float
     faulted: bool
     delay_s: float = inf
-    isolated: str | None = None
     correct: bool = False
     isolation_delay_s: float = inf
     rms_deg_s: float = inf
@@ -225,7 +224,6 @@ def result_of(flight: Landing, entry: Entry, us: float) -> Result:
     """The result of a flight. us: processor time of a frame, microseconds."""
     found = measure(flight)
     fault = found.fault
-    isolation = found.isolation
     tracking = found.tracking
     end_s = flight.frames / flight.scenario.rate_hz
     departed = found.departure is not None
@@ -238,9 +236,8 @@ def result_of(flight: Landing, entry: Entry, us: float) -> Result:
         fault_free_s=found.fault_free_s,
         faulted=faulted,
         delay_s=or_never(found.detection.delay_s),
-        isolated=isolation.fault,
         correct=found.fault_named,
-        isolation_delay_s=or_never(isolation.delay_s) if found.fault_named else inf,
+        isolation_delay_s=or_never(found.isolation.delay_s) if found.fault_named else inf,
         rms_deg_s=inf if departed else whole,
         before_deg_s=inf if departed and not faulted else before,
         after_deg_s=inf if departed else after,

@@ -14,6 +14,7 @@ from beaver_ftc.commands import (
     AirspeedsOption,
     AltitudesOption,
     Reporter,
+    SeedOption,
     StudyCommand,
     TurbulenceName,
     WorkersOption,
@@ -107,7 +108,7 @@ class Detectability(StudyCommand):
     schemes: str | None = None
     sensors: SensorsName | None = None
     turbulence: TurbulenceName | None = None
-    seed: Annotated[int, typer.Option(min=0)] = 1
+    seed: SeedOption = 1
     workers: WorkersOption = None
     out: Path = Path("runs")
 

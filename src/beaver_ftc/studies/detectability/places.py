@@ -50,7 +50,7 @@ def places_study(
     """
     fdi = scenario.fdi
     sharp = fdi.sharpen.pole_bank and fdi.sharpen.memory and fdi.sharpen.shared_effectiveness
-    if fdi.scheme != "adaptive-estimators" or not sharp or max(fdi.pole_bank_per_s, default=0.0) < 1e6:
+    if not fdi.is_ours or not sharp or max(fdi.pole_bank_per_s, default=0.0) < 1e6:
         raise BadInput(
             f"{scenario.name}: fdi: detectability is worked out for the sharpened scheme, allowed: "
             "scheme adaptive-estimators, sharpen all, a filter of 1e6 in pole_bank_per_s"

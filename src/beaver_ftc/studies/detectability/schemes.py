@@ -31,6 +31,17 @@ WITHIN_S = (0.5, 1.0, WATCHED_S)  # how soon is soon
 _RATE_HZ = 100.0
 UNEXPLAINED_UP_TO_RAD_S = 15.0  # the faster of the published sinusoids, and what is declared of them
 
+ESTIMATORS = "adaptive-estimators"
+STATISTICAL, BOTH = "statistical", "both"
+# Schemes of which the statistic comes with the flight itself, and what its `fdi` says beside the bounds.
+BUILT_IN: dict[str, Document] = {
+    ESTIMATORS: {},
+    STATISTICAL: {"statistical": {}, "authority": "statistical"},
+    BOTH: {"statistical": {}},
+}
+# The same of the published scheme, which is not ours.
+FLOWN_THEMSELVES = BUILT_IN | {"zhang2005": {"scheme": "zhang2005"}}
+
 
 class Condition(NamedTuple):
     """The instruments and the air that a designer knows, and may set an alarm level for."""
@@ -165,20 +176,6 @@ def _uncertainty(block: Block) -> Document:
         "inertia_coupling": dict(zip("pqr", coupling, strict=True)),
         "sinusoid": swings(draws, [0.02] * 3, (1.0, UNEXPLAINED_UP_TO_RAD_S)),
     }
-
-
-ESTIMATORS = "adaptive-estimators"
-
-
-STATISTICAL, BOTH = "statistical", "both"
-# Schemes of which the statistic comes with the flight itself, and what its `fdi` says beside the bounds.
-BUILT_IN: dict[str, Document] = {
-    ESTIMATORS: {},
-    STATISTICAL: {"statistical": {}, "authority": "statistical"},
-    BOTH: {"statistical": {}},
-}
-# The same of the published scheme, which is not ours.
-FLOWN_THEMSELVES = BUILT_IN | {"zhang2005": {"scheme": "zhang2005"}}
 
 
 def contenders(names: list[str] | None = None) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from beaver_ftc.commands import SCENARIO, Reporter, StudyCommand, WorkersOption
+from beaver_ftc.commands import SCENARIO, Reporter, SeedOption, StudyCommand, WorkersOption
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.results.model import Document
 from beaver_ftc.scenario.schema import Scenario, load_scenario
@@ -88,7 +88,7 @@ class Sensitivity(StudyCommand):
     mechanisms: bool = False
     flights: Annotated[int, typer.Option(min=1, max=10_000)] = beyond.FLIGHTS
     draws: Annotated[int, typer.Option(min=1, max=1000)] = DRAWS
-    seed: Annotated[int, typer.Option(min=0)] = 1
+    seed: SeedOption = 1
     workers: WorkersOption = None
     out: Path = Path("runs")
 

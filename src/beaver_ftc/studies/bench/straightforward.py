@@ -27,7 +27,8 @@ SIGNALS = ("alpha", "beta", "ph", "qh", "rh", "dpt")  # of the terms of moments
 LEAST_EFFECTIVENESS = 0.1
 
 
-# xdot = I^-1 (M - x cross I x), with the moments of the coefficient table.
+# xdot = I^-1 (M - x cross I x), x rad/s. M, N m: a sum of terms, each a value times powers of SIGNALS, into
+# one coefficient (Cl, Cm, Cn), alone or as the factor of a surface.
 INERTIA = np.array(
     [[MASS.Ix_kg_m2, 0, -MASS.Jxz_kg_m2], [0, MASS.Iy_kg_m2, 0], [-MASS.Jxz_kg_m2, 0, MASS.Iz_kg_m2]]
 )
@@ -37,7 +38,7 @@ LENGTHS_M = np.array([GEOMETRY.span_m, GEOMETRY.chord_m, GEOMETRY.span_m])
 OF_MOMENTS = [term for term in TERMS.values() if term.coefficient in MOMENTS]
 VALUES = np.array([term.value for term in OF_MOMENTS])
 POWERS = np.array([[dict(term.of).get(signal, 0) for signal in SIGNALS] for term in OF_MOMENTS])
-INTO = np.array([  # coefficient, factor, term
+INTO = np.array([  # (coefficient, none or surface, term): 1 where a term goes
     [[(term.coefficient, term.surface) == (of, by) for term in OF_MOMENTS] for by in (None, *SURFACES)]
     for of in MOMENTS
 ], float)  # fmt: skip
@@ -55,7 +56,14 @@ def f_and_G(x: np.ndarray, truth: dict[str, float]) -> tuple[np.ndarray, np.ndar
 
 
 class Estimators:
-    """The detection estimator, its network, the isolation estimators; arrays (3,) or (estimator, axis)."""
+    """The detection estimator, its network, the isolation estimators.
+
+    x_hat, threshold, residual (3,) rad/s: of the detection estimator. weights (3, N_BASIS) rad/s2, basis
+    (N_BASIS,): of its network. fie, omega, rise, fall, bound, lower, upper, fie_residual (estimator, axis)
+    rad/s: estimates, filtered regressors with their positive and negative parts, the filtered bound, and
+    each residual with its limits. theta, covariance (estimator, axis): the loss of effectiveness, -1 to 0,
+    and the variance of its estimate.
+    """
 
     def __init__(self, scenario: Scenario, dt: float) -> None:
         fdi = scenario.fdi

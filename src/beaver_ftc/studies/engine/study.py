@@ -73,7 +73,10 @@ class Flying:
         stopped: Callable[[], bool] = lambda: False,
     ) -> None:
         """Fly what is missing; once `stopped`, only what is in the air. cases_of: these runs. there: takes
-        the number and the rows of each batch, once they are there."""
+        the number and the rows of each batch, once they are there.
+
+        Meanwhile: batches still _coming, with the cases _left in them; tasks _waiting for a worker, and how
+        many are _flying; by number the batches begun and their rows so far, _flown; _losses of each task."""
         missing: dict[Number, Sequence[int]] = {}
         for number, runs in batches:
             rows = self.landed(number, runs)
@@ -84,7 +87,7 @@ class Flying:
         if not missing:
             return
         self._coming = (Batch(number, runs, cases_of(runs)) for number, runs in missing.items())
-        self._left = sum(map(len, missing.values()))  # cases in the batches still to come
+        self._left = sum(map(len, missing.values()))
         self._waiting = deque[Batch]()
         self._flying = 0
         self._flown: dict[Number, tuple[Batch, dict[int, Row]]] = {}

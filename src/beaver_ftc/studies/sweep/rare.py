@@ -45,7 +45,12 @@ FlyPoints = Callable[[np.ndarray], Scores]
 
 
 class Chains:
-    """Independent runs of subset simulation abreast: points (runs, members, keys), scores (runs, members)."""
+    """Independent runs of subset simulation abreast: points (runs, members, keys), scores (runs, members).
+
+    share (runs,): probability of the level that a run has reached, the product of its shares so far. reached
+    (runs,): whether that is the event. stuck: whether a run cannot go on. flights, levels: how many so far.
+    plain: events and flights of the first round. design: of the likeliest event its distance, flight, point.
+    """
 
     def __init__(self, keys: int, seed: int, runs: int = RUNS, members: int = MEMBERS) -> None:
         self._generator = generator_of(seed, 0, 0, OF_RARE)
@@ -56,9 +61,7 @@ class Chains:
         self.stuck = False
         self.flights = 0
         self.levels = 0
-        self.design: tuple[float, int, np.ndarray] | None = (
-            None  # the likeliest event: distance, flight, point
-        )
+        self.design: tuple[float, int, np.ndarray] | None = None
 
     def go(self, fly: FlyPoints) -> None:
         """Fly until every run has reached the event, or cannot."""

@@ -93,12 +93,14 @@ def who_is_better(
 
 def comparison(document: Document) -> list[str]:
     """How often each of our schemes finds more or fewer faults than others, and is unlikely to by chance."""
-    return [
-        f"{ours}, faults found within {within_s:g} s, {len(duels)} comparisons: better in "
-        f"{ends['better']}, worse in {ends['worse']}, no difference at p < {SIGNIFICANT:g} in the rest"
-        for (ours, within_s), duels in grouped(document["comparison"], "ours", "within_s").items()
-        for ends in [Counter(duel["verdict"] for duel in duels)]
-    ]
+    said = []
+    for (ours, within_s), duels in grouped(document["comparison"], "ours", "within_s").items():
+        ends = Counter(duel["verdict"] for duel in duels)
+        said.append(
+            f"{ours}, faults found within {within_s:g} s, {len(duels)} comparisons: better in "
+            f"{ends['better']}, worse in {ends['worse']}, no difference at p < {SIGNIFICANT:g} in the rest"
+        )
+    return said
 
 
 def _those(lines: Sequence[Document], **where: Any) -> Iterator[Document]:

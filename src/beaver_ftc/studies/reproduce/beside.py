@@ -61,7 +61,7 @@ def document_of(flights: Mapping[tuple[str, str], Flown], alarms: Sequence[float
         "rows": rows,
         "healthy_flights": each,
         "false_alarms": dict(zip(WHOSE, counts, strict=True)),
-        "paper_better": list(_better(rows)),
+        "paper_better": _better(rows),
     }
 
 

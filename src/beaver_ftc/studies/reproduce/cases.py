@@ -166,8 +166,7 @@ class Flown:
             np.array([self.log[f"{axis}_{what}_rad_s"] for axis in AXES])
             for what in ("residual", "threshold")
         )
-        zero = residual == 0
-        return np.abs(residual) / np.where(zero, 1.0, threshold)
+        return np.abs(residual) / np.where(residual == 0, 1.0, threshold)
 
     def residuals_of(self, estimator: str) -> np.ndarray:
         """The residuals of an isolation estimator, (3, frames) rad/s; zero while it is not at work."""

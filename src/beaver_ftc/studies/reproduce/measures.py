@@ -275,12 +275,12 @@ def deterioration(flown: Flown) -> float:
 def _beside(flights: tuple[Flown, ...], after_s: float) -> float:
     """RMS error from after_s after the fault on, over that of another law; the largest of several faults,
     each on the axis where it shows. The second half of the flights has the same faults with the other law."""
-    pairs = zip(flights[: len(flights) // 2], flights[len(flights) // 2 :], strict=True)
-    return max(
-        _ratio(ours.kept_deg_s(*where), other.rms_deg_s(*where))
-        for ours, other in pairs
-        for where in [(ours.axis, ours.fault_at_s + after_s)]
-    )
+    half = len(flights) // 2
+    ratios = []
+    for ours, other in zip(flights[:half], flights[half:], strict=True):
+        where = ours.axis, ours.fault_at_s + after_s
+        ratios.append(_ratio(ours.kept_deg_s(*where), other.rms_deg_s(*where)))
+    return max(ratios)
 
 
 def beside_passive(*flights: Flown) -> float:

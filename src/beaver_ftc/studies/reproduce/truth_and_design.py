@@ -23,15 +23,12 @@ DESIGNS: tuple[tuple[str, str, Mapping[str, Any]], ...] = (  # name, bound, chan
 def terms() -> list[Document]:
     """Moment by moment: the terms of the truth, and which of them eq. (2) has."""
     aircraft = load()
-    engine = {t.name for t in aircraft.moments if any(signal in aircraft.signals for signal, _ in t.of)}
-    return [
-        {
-            "moment": moment,
-            "truth": [t.name for t in aircraft.moments if t.coefficient == moment],
-            "omitted": [t.name for t in aircraft.moments if t.coefficient == moment and t.name in engine],
-        }
-        for moment in MOMENTS
-    ]
+    rows = []
+    for moment in MOMENTS:
+        of = [term for term in aircraft.moments if term.coefficient == moment]
+        engine = [term.name for term in of if any(signal in aircraft.signals for signal, _ in term.of)]
+        rows.append({"moment": moment, "truth": [term.name for term in of], "omitted": engine})
+    return rows
 
 
 def fly_designs() -> list[tuple[Flown, Flown]]:

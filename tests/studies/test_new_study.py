@@ -36,7 +36,7 @@ from beaver_ftc.results.log import Columns
 from beaver_ftc.results.metrics import as_json
 from beaver_ftc.scenario.schema import load
 from beaver_ftc.commands import Document, Reporter, StudyCommand, WorkersOption
-from beaver_ftc.studies.engine.study import Study, run_study
+from beaver_ftc.studies.engine.study import Study, run_into
 from beaver_ftc.studies.present.figures import panels
 from beaver_ftc.studies.present.page import Makers, Pictures, Table, as_html
 from beaver_ftc.studies.present.tables import aligned, as_csv
@@ -113,8 +113,7 @@ class Curve(StudyCommand):
         """Fly each airspeed, and fit."""
         speeds_mps = self.airspeed or [38.0, 41.0, 44.0, 47.0, 50.0]
         study = Study(NAME, speeds_mps, fly_one, lambda rows: document_of(rows, self.degree), FILES)
-        document = run_study(study, self.out, self.workers or 1, reporter.progress)
-        return document | {"folder": str(self.out / NAME)}
+        return run_into(study, self.out, self.workers or 1, reporter.progress)
 
     def as_text(self, document: Document, colour: bool) -> str:
         """A table and the fit."""

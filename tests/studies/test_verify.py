@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from beaver_ftc.commands import Reporter
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.studies import verify
-from beaver_ftc.studies.verify import PROMISES, Draw, Verify, summarise, summary_text
+from beaver_ftc.studies.random_flights import Draw
+from beaver_ftc.studies.verify import PROMISES, Verify, summarise, summary_text
 from samples import samples
 
 

@@ -8,7 +8,8 @@ import pytest
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies import verify
-from beaver_ftc.studies.verify import Draw, fly_draw, judge
+from beaver_ftc.studies.random_flights import Draw
+from beaver_ftc.studies.verify import fly_draw, judge
 
 
 def landing(at_s=4.995, rate_hz=50.0, **changes):

@@ -1,8 +1,4 @@
-"""The promises of the theory, on random flights inside everything the diagnosis declares: the flight
-condition, the references, the uncertainty, the fault.
-
-Flight number i of a seed is the same whatever else is flown, by whom, and in which order.
-"""
+"""The promises of the theory, counted on random flights inside everything the diagnosis declares."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -12,10 +8,8 @@ from math import ceil
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import typer
 
-from beaver_ftc.aircraft import AXES, load
 from beaver_ftc.commands import Reporter, SeedOption, StudyCommand, WorkersOption
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.files import Document
@@ -23,100 +17,16 @@ from beaver_ftc.loop.loop import fly
 from beaver_ftc.loop.outcome import Landing
 from beaver_ftc.results.metrics import Truth, as_json, fault_free_s, is_late
 from beaver_ftc.scenario.faults import LossOfEffectiveness
-from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.signals import grown_share
-from beaver_ftc.studies.engine.draws import generator_of, loss
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial, poisson_bound, share_within
 from beaver_ftc.studies.engine.study import Study, run_study
 from beaver_ftc.studies.present.page import Makers
 from beaver_ftc.studies.present.tables import finite, number_or_never
+from beaver_ftc.studies.random_flights import HEALTHY_S, KINDS, Draw
 
-HEALTHY_S = 100.0  # attitude is open loop: a longer flight wanders out of the validated envelope
-AFTER_FAULT_S = 15.0  # more than a period of the slowest reference
-_AIRSPEED_MPS = (35.0, 52.0)
-_ALTITUDE_M = (0.0, 3000.0)
-_RATE_HZ = {"healthy": (20, 50), "faulty": (20, 100)}  # a slow hour flies sooner
-_MAGNITUDE = (0.05, 1.0)
-_KAPPA_PER_S = (0.2, 10.0)
-_FAULT_AT_S = (3.0, 8.0)
-_INERTIA = 0.25
-_AMPLITUDE_RAD_S2 = 0.02
-_FREQUENCY_RAD_S = (0.1, 60.0)
-_AT_THE_BOUND = 0.3  # share of flights with an uncertainty at its very bound
-_COARSE = 0.05  # share of flights with several JSBSim frames in a frame of the loop
-KINDS = ("healthy", "faulty")
 ONE_SIDED = 2.0 * CONFIDENCE - 1.0  # the two-sided confidence whose upper limit has CONFIDENCE
-
-
-@dataclass(frozen=True)
-class Draw:
-    """One flight of a seed: kind is `healthy` or `faulty`, index counts from 0."""
-
-    seed: int
-    kind: str
-    index: int
-
-    def scenario(self, fdi: Document | None = None) -> Scenario:
-        """The flight, diagnosed as `fdi` says."""
-        rng = generator_of(self.seed, KINDS.index(self.kind), self.index)
-        fault = _fault(rng) if self.kind == "faulty" else None
-        return Scenario.model_validate({
-            "name": f"{self.kind}-{self.index}",
-            "duration_s": fault["at_s"] + AFTER_FAULT_S if fault else HEALTHY_S,
-            "rate_hz": round(_log_uniform(rng, *_RATE_HZ[self.kind])),
-            "substeps": int(rng.integers(2, 5)) if rng.random() < _COARSE else 1,
-            "initial": {"airspeed_mps": rng.uniform(*_AIRSPEED_MPS), "altitude_m": rng.uniform(*_ALTITUDE_M)},
-            "reference": {axis: [_signal(rng) for _ in range(rng.integers(1, 3))] for axis in AXES},
-            "faults": [fault] if fault else [],
-            "uncertainty": _uncertainty(rng),
-            "fdi": fdi or {},
-        })  # fmt: skip
-
-
-def _log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
-    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
-
-
-def _fault(rng: np.random.Generator) -> Document:
-    fault = loss(str(rng.choice(load().primary)), rng.uniform(*_MAGNITUDE), rng.uniform(*_FAULT_AT_S))
-    if rng.random() < 0.5:
-        fault |= {"profile": "incipient", "kappa_per_s": _log_uniform(rng, *_KAPPA_PER_S)}
-    return fault
-
-
-def _signal(rng: np.random.Generator) -> Document:
-    """Zero on average, or the attitude would run away under open outer loops."""
-    amplitude = {"amplitude_deg_s": rng.uniform(0.5, 5.0)}
-    wave = {**amplitude, "frequency_hz": _log_uniform(rng, 0.1, 0.7), "phase_deg": rng.uniform(0, 360)}
-    kind = rng.choice(["sine", "square", "doublet", "chirp"], p=[0.5, 0.2, 0.15, 0.15])
-    if kind == "doublet":
-        return {"doublet": {**amplitude, "start_s": rng.uniform(0, 15), "width_s": rng.uniform(0.5, 3)}}
-    if kind == "chirp":
-        sweep = {"start_s": 0.0, "end_s": rng.uniform(20, HEALTHY_S), "start_frequency_hz": 0.1}
-        return {"chirp": {**amplitude, **sweep, "end_frequency_hz": rng.uniform(0.2, 1.0)}}
-    return {str(kind): wave}
-
-
-def _within(rng: np.random.Generator, bound: float) -> float:
-    """Anywhere within the bound, and often right at it."""
-    return bound if rng.random() < _AT_THE_BOUND else rng.uniform(0.0, bound)
-
-
-def _uncertainty(rng: np.random.Generator) -> Document:
-    """All that the published bounds admit [Zhang2005, sec. VII]."""
-    sign = {axis: rng.choice([-1.0, 1.0]) for axis in AXES}
-    coupling = {axis: sign[axis] * _within(rng, _INERTIA) for axis in AXES}
-    sinusoid = {
-        axis: {
-            "amplitude_rad_s2": _within(rng, _AMPLITUDE_RAD_S2),
-            "frequency_rad_s": _log_uniform(rng, *_FREQUENCY_RAD_S),
-        }
-        for axis in AXES
-    }
-    return {"inertia_coupling": coupling, "sinusoid": sinusoid}
-
-
 PUBLISHED, SHARPENED = "published", "sharpened"
+_CONSTANT_ONLY = "constant"  # for faults that are: one that grows is outside what this step declares
 _OFF = {"pole_bank": False, "memory": False, "shared_effectiveness": False}
 SCHEMES: dict[str, Document] = {PUBLISHED: {"thresholds": "published"}, SHARPENED: {}}
 # From the published scheme to the default, and on to what takes a declaration, one step after the other.
@@ -126,11 +36,10 @@ STEPS: dict[str, Document] = {
     "pole bank": {"sharpen": {**_OFF, "pole_bank": True}},
     "memory": {"sharpen": {"shared_effectiveness": False}},
     SHARPENED: SCHEMES[SHARPENED],
-    "constant": {"fault_profile": "abrupt"},
+    _CONSTANT_ONLY: {"fault_profile": "abrupt"},
 }
 NAME = "verification"
 TOGETHER = 50  # flights that are kept together
-_CONSTANT_ONLY = "constant"  # for faults that are: one that grows is outside what this step declares
 
 Row = Document
 Schemes = dict[str, Document]
@@ -145,8 +54,8 @@ def fly_draw(draw: Draw, schemes: Schemes) -> Row:
 
 
 def _healthy(draw: Draw) -> Row:
-    """The row of a flight without a fault. The first filter of the sharpened scheme is the published one, so
-    that one flight is enough for both."""
+    """The row of a flight without a fault: one for both schemes, as the first filter of the sharpened scheme
+    is the published one."""
     flight = fly(draw.scenario())
     return {
         "index": draw.index,
@@ -205,7 +114,7 @@ _BROKEN = {
 }  # fmt: skip
 PROMISES = tuple(_BROKEN)
 # The guarantee that each violates, as docs/explanation numbers them; a wrong name follows from G2.
-GUARANTEES = dict(zip(PROMISES, ("G1", "G2", "G2", "G3"), strict=True))
+_GUARANTEES = ("G1", "G2", "G2", "G3")
 _SPREADS = {
     "detection delay, s": "delay_s", "isolation delay, s": "isolation_delay_s",
     "delay / guaranteed": "delay_over_guaranteed", "error of the estimate": "estimate_error",
@@ -227,8 +136,8 @@ def summarise(rows: dict[str, list[Row]]) -> Document:
     }
     if faulty:
         document["delay_shorter_by"] = _shorter(document["schemes"])
-    document["kept"] = document["healthy"]["false_alarms"] == 0 and all(
-        document["schemes"][SHARPENED][promise] == 0 for promise in PROMISES if faulty
+    document["kept"] = not document["healthy"]["false_alarms"] and not any(
+        document["schemes"][SHARPENED][promise] for promise in PROMISES if faulty
     )
     return document
 
@@ -236,14 +145,13 @@ def summarise(rows: dict[str, list[Row]]) -> Document:
 def _healthy_document(rows: Sequence[Row]) -> Document:
     hours = sum(row["watched_s"] for row in rows) / 3600.0
     alarms = sum(row["alarm"] for row in rows)
-    closest = np.max([row["closest"] for row in rows], axis=0).tolist() if rows else []
-    upper = finite(poisson_bound(alarms, hours, CONFIDENCE, upper=True))
+    closest = map(max, zip(*(row["closest"] for row in rows), strict=True))
     return {
         "flights": len(rows),
         "hours": hours,
         "false_alarms": alarms,
         "false_alarms_per_hour": alarms / hours if hours else None,
-        "false_alarms_per_hour_upper_95": upper,
+        "false_alarms_per_hour_upper_95": finite(poisson_bound(alarms, hours, CONFIDENCE, upper=True)),
         "departures": sum(row["departed"] for row in rows),
         "hours_outside_envelope": sum(row["outside_s"] for row in rows) / 3600.0,
         "closest_approach": dict(zip(SCHEMES, closest, strict=False)),
@@ -316,9 +224,9 @@ def _fault_lines(document: Document) -> list[str]:
     if not schemes:
         return []
     lines = [f"{document['faults']} random faults{'':17}" + "".join(f"{name:>18}" for name in schemes)]
-    for promise in PROMISES:
+    for guarantee, promise in zip(_GUARANTEES, PROMISES, strict=True):
         cells = [f"{s[promise]} (p < {s[promise + '_probability_upper_95']:.1e})" for s in schemes.values()]
-        lines.append(_line(f"{GUARANTEES[promise]} {promise.replace('_', ' ')}", cells))
+        lines.append(_line(f"{guarantee} {promise.replace('_', ' ')}", cells))
     for key in ("detected", "detection_certain", "isolated"):
         lines.append(_line(key.replace("_", " "), (str(s[key]) for s in schemes.values())))
     for (label, key), which in product(_SPREADS.items(), ("median", "p90")):

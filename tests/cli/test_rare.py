@@ -8,7 +8,7 @@ import pytest
 from beaver_ftc.cli import Format
 from beaver_ftc.cli.sweep import Arguments, Backend, Objective, command
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.studies.sweep.rare import Chains
+from beaver_ftc.studies.sweep.subset_simulation import Chains
 
 SWEEP = """\
 name: mine

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import chi2, norm
 
-from beaver_ftc.studies.sweep.rare import Chains
+from beaver_ftc.studies.sweep.subset_simulation import Chains
 
 ANALYTIC: dict[str, tuple[Callable[[np.ndarray], np.ndarray], int, float]] = {
     "a sum of two": (lambda u: u.sum(1) / math.sqrt(2) - norm.isf(1e-5), 2, 1e-5),

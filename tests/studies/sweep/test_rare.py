@@ -15,7 +15,8 @@ from beaver_ftc.results.flight import fly
 from beaver_ftc.scenario.sweeps import load_sweep
 from beaver_ftc.studies.engine import study
 from beaver_ftc.studies.sweep import rare
-from beaver_ftc.studies.sweep.rare import Chains, as_text, rare_study, scored
+from beaver_ftc.studies.sweep.rare import as_text, rare_study, scored
+from beaver_ftc.studies.sweep.subset_simulation import Chains
 
 TRACKED = "post_fault_rms_deg_s.q"
 

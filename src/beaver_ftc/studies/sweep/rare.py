@@ -1,10 +1,7 @@
 """The probability that an expectation is not met, where plain flights would take a million to see it once.
 
-Subset simulation [AuBeck2001]: levels of a score that rises towards the event, each reached by a tenth of the
-flights that reached the one before; these are continued as Markov chains in the space of standard normals
-behind the varied keys, by conditional sampling [Papaioannou2015]. A step draws the flight's own seed again,
-so sensors and air are part of the chain. It is done in independent runs: their mean is the estimate, and what
-they differ by the interval, that of a lognormal mean [Cox, in Land1972].
+Subset simulation in the space of standard normals behind the varied keys. A step draws the flight's own seed
+again, so sensors and air are part of the chain.
 """
 
 import hashlib
@@ -23,133 +20,16 @@ from beaver_ftc.results.metrics import as_json, measure, versions
 from beaver_ftc.scenario.builtin import to_yaml
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.sweeps import Sweep
-from beaver_ftc.studies.engine.draws import generator_of
-from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial
+from beaver_ftc.studies.engine.statistics import CONFIDENCE
 from beaver_ftc.studies.engine.study import FlyRound, Study
 from beaver_ftc.studies.present.tables import all_finite, number
 from beaver_ftc.studies.sweep.one_flight import scenario_of, warm_up
-from beaver_ftc.studies.sweep.sampling import OF_RARE, Assignment, values_at
+from beaver_ftc.studies.sweep.sampling import Assignment, values_at
 from beaver_ftc.studies.sweep.store import identity_of
+from beaver_ftc.studies.sweep.subset_simulation import MEMBERS, RUNS, Chains, Scores
 
-RUNS = 8  # independent runs
-MEMBERS = 220  # flights of each run a level: 10^-5 by a hundredth of 10^6 flights
-SHARE = 0.1  # of the flights of a level that reach the next one
-STEP = 0.8  # how much of a point a chain's next one keeps
-MOST_LEVELS = 10  # down to 10^-10
 _BEFORE = -1e-12  # the score of what has just not happened
 _NORMAL = NormalDist()
-
-Scores = np.ndarray
-FlyPoints = Callable[[np.ndarray], Scores]
-"""From a round's points (flights, keys), standard normals, to scores (flights,); events from 0."""
-
-
-class Chains:
-    """Independent runs of subset simulation abreast: points (runs, members, keys), scores (runs, members).
-
-    share (runs,): probability of the level that a run has reached, the product of its shares so far. reached
-    (runs,): whether that is the event. stuck: whether a run cannot go on. flights, levels: how many so far.
-    plain: events and flights of the first round. design: of the likeliest event its distance, flight, point.
-    """
-
-    def __init__(self, keys: int, seed: int, runs: int = RUNS, members: int = MEMBERS) -> None:
-        self._generator = generator_of(seed, 0, 0, OF_RARE)
-        self.points = self._generator.standard_normal((runs, members, keys))
-        self.scores = np.full((runs, members), -math.inf)
-        self.share = np.ones(runs)
-        self.reached = np.zeros(runs, bool)
-        self.stuck = False
-        self.flights = 0
-        self.levels = 0
-        self.design: tuple[float, int, np.ndarray] | None = None
-
-    def go(self, fly: FlyPoints) -> None:
-        """Fly until every run has reached the event, or cannot."""
-        self.scores[:] = self._flown(fly, self.points)
-        self.plain = int((self.scores >= 0.0).sum()), self.scores.size
-        while True:
-            going = [run for run in range(len(self.scores)) if not self.reached[run]]
-            levels = {run: self._level(run) for run in going}
-            going = [run for run in going if not self.reached[run]]
-            if not going or self.stuck or self.levels == MOST_LEVELS:
-                break
-            self.levels += 1
-            self._continue(going, np.array([levels[run] for run in going]), fly)
-
-    def _level(self, run: int) -> float:
-        """The next level of a run, whose share of flights goes into its probability."""
-        scores = self.scores[run]
-        level = float(np.sort(scores)[-max(1, round(SHARE * scores.size))])
-        if not math.isfinite(level):  # too few have a score: nothing is known below the level before
-            self.stuck = True
-            return level
-        level, self.reached[run] = min(level, 0.0), level >= 0.0
-        share = float((scores >= level).mean())
-        self.stuck |= share == 1.0 and not self.reached[run]  # all alike: nothing leads on
-        self.share[run] *= share
-        return level
-
-    def _continue(self, going: list[int], levels: np.ndarray, fly: FlyPoints) -> None:
-        """Chains from the flights that reached their level, all runs abreast."""
-        members = self.scores.shape[1]
-        seeds = max(1, round(SHARE * members))
-        at = np.array([
-            self._generator.choice(np.flatnonzero(self.scores[run] >= level), seeds, replace=False)
-            for run, level in zip(going, levels, strict=True)
-        ])  # fmt: skip
-        rows = np.array(going)[:, None]
-        here = self.points[rows, at]
-        scores = self.scores[rows, at]
-        kept = [here]
-        values = [scores]
-        for _ in range(math.ceil(members / seeds) - 1):
-            moved = STEP * here + math.sqrt(1.0 - STEP**2) * self._generator.standard_normal(here.shape)
-            found = self._flown(fly, moved)
-            better = found >= levels[:, None]
-            here = np.where(better[..., None], moved, here)
-            scores = np.where(better, found, scores)
-            kept.append(here)
-            values.append(scores)
-        self.points[going] = np.concatenate(kept, axis=1)[:, :members]
-        self.scores[going] = np.concatenate(values, axis=1)[:, :members]
-
-    def _flown(self, fly: FlyPoints, points: np.ndarray) -> Scores:
-        flat = points.reshape(-1, points.shape[-1])
-        scores = fly(flat)
-        for i in np.flatnonzero(scores >= 0.0).tolist():
-            distance = float(np.linalg.norm(flat[i]))
-            if self.design is None or distance < self.design[0]:
-                self.design = distance, self.flights + i, flat[i].copy()
-        self.flights += len(flat)
-        return scores.reshape(points.shape[:-1])
-
-    def estimate(self) -> Document:
-        """The result of the runs: a probability with its two-sided interval; why: the reason if it is not
-        known."""
-        events, of = self.plain
-        probability, low, high = math.nan, 0.0, float(self.share.max())
-        why = ""
-        if self.reached.all():
-            probability, low, high = lognormal_mean(self.share)
-        else:
-            why = "the score stops rising before the event" if self.stuck else "too rare for so many levels"
-        return {
-            "probability": probability, "low": low, "high": high,
-            "flights": self.flights, "levels": self.levels,
-            "plain": {"events": events, "of": of, **vars(binomial(events, of))}, "why": why,
-        }  # fmt: skip
-
-
-def lognormal_mean(values: np.ndarray) -> tuple[float, float, float]:
-    """Mean of some lognormal values (n,) and its two-sided interval, Cox's with Student's t."""
-    from scipy.stats import t
-
-    logs = np.log(values)
-    spread = float(logs.var(ddof=1))
-    n = len(values)
-    half = float(t.ppf(0.5 + 0.5 * CONFIDENCE, n - 1)) * math.sqrt(spread / n + spread**2 / (2 * (n - 1)))
-    middle = float(logs.mean()) + 0.5 * spread
-    return float(values.mean()), math.exp(middle - half), min(1.0, math.exp(middle + half))
 
 
 def scored(sweep: Sweep) -> list[str]:
@@ -281,8 +161,7 @@ def as_text(document: Document) -> str:
     if document["failed"]:
         lines.append(f"  not flown    {document['failed']} flights, counted as no event")
     if likeliest:
-        values = likeliest["values"].items()
-        listed = ", ".join(f"{key} {number(value, digits=4)}" for key, value in values)
+        listed = ", ".join(f"{key} {number(value, digits=4)}" for key, value in likeliest["values"].items())
         lines += [
             f"  likeliest    {listed}",
             f"  flies it     beaver-ftc run {document['folder']}/flight.yaml",

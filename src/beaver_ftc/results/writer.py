@@ -11,6 +11,7 @@ import errno
 import os
 import shutil
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from functools import partial
 from itertools import takewhile
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -79,41 +80,43 @@ def run(
     watch = certificate.watch if certificate else None
     failed: list[Exception] = []
     with result_folder(out, scenario.name) as folder:
+        written = partial(_note_failure_and_go_on, failed, folder)
         log_path = folder / "log.parquet"
         aircraft = scenario.airframe
         with ParquetLog(log_path) as log:
             flight = fly(scenario, log, progress, prepare=prepare, watch=watch)
         write_scenario(folder, scenario)
         document: Document = {}
-        with _note_failure_and_go_on(folder, "metrics.json", failed):
+        with written("metrics.json"):
             document = metrics(flight)
             (folder / "metrics.json").write_text(as_json(document), encoding="utf-8")
         if certificate:
-            with _note_failure_and_go_on(folder, CERTIFICATE_FILE, failed):
+            with written(CERTIFICATE_FILE):
                 certificate.write(folder)
         if report and document:
-            with _note_failure_and_go_on(folder, "report.html", failed):
+            with written("report.html"):
                 write_report_files(folder, document, painters=painters, formats=figures)
         if "csv" in exports:
             from beaver_ftc.results.exports import write_csv
 
-            with _note_failure_and_go_on(folder, "log.csv", failed):
+            with written("log.csv"):
                 write_csv(log_path, folder / "log.csv")
         if "acmi" in exports and document:
             from beaver_ftc.results.exports import write_acmi
 
-            with _note_failure_and_go_on(folder, "flight.acmi", failed):
+            with written("flight.acmi"):
                 write_acmi(log_path, Metrics.of(document), folder / "flight.acmi", aircraft)
         if recording is not None:
             from beaver_ftc.results.exports import write_recording
 
             stops_rad = {s: max(abs(to.min_rad), abs(to.max_rad)) for s, to in aircraft.travel.items()}
-            with _note_failure_and_go_on(folder, f"the recording ({recording})", failed):
+            with written(f"the recording ({recording})"):
                 write_recording(log_path, stops_rad, recording, folder, tuple(aircraft.signals))
     if failed:
         why = "; ".join(" ".join(str(error).split()) for error in failed)
-        kept = f"{out / scenario.name}: the flight and its log are kept"
-        raise NotAllWritten(f"{kept}, but {why}") from failed[0]
+        raise NotAllWritten(f"{out / scenario.name}: the flight and its log are kept, but {why}") from failed[
+            0
+        ]
     return document
 
 
@@ -122,7 +125,7 @@ class NotAllWritten(SimulationFailed):
 
 
 @contextlib.contextmanager
-def _note_failure_and_go_on(folder: Path, what: str, failed: list[Exception]) -> Iterator[None]:
+def _note_failure_and_go_on(failed: list[Exception], folder: Path, what: str) -> Iterator[None]:
     """Write one part of the results; where that fails, note why and leave nothing of that part."""
     before = set(folder.iterdir())
     try:
@@ -190,15 +193,15 @@ def add_report(folder: Path, document: Document) -> str:
     folder is as it was. They appear whole, and in no folder that has taken its place meanwhile."""
     failed: list[Exception] = []
     with (
-        TemporaryDirectory(prefix=_partial_folder_prefix(folder.name), dir=folder.parent) as partial,
-        _locked(Path(partial)),
-        _note_failure_and_go_on(folder, "report.html", failed),
+        TemporaryDirectory(prefix=_partial_folder_prefix(folder.name), dir=folder.parent) as hidden,
+        _locked(Path(hidden)),
+        _note_failure_and_go_on(failed, folder, "report.html"),
     ):
         drawn_for = folder.stat()
-        write_report_files(folder, document, Path(partial))
+        write_report_files(folder, document, Path(hidden))
         if os.path.samestat(drawn_for, folder.stat()):
             for name in ("figures", "report.html"):
-                Path(partial, name).rename(folder / name)
+                Path(hidden, name).rename(folder / name)
     return "".join(map(str, failed))
 
 
@@ -217,17 +220,17 @@ def result_folder(out: Path, name: str, files: Iterable[str] = ()) -> Iterator[P
         _remove_stale(out, name)
         own = uuid4().hex
         unnamed = out / f".beaver-ftc-{own}"
-        partial = out / f"{_partial_folder_prefix(name)}{own}"
+        hidden = out / f"{_partial_folder_prefix(name)}{own}"
         unnamed.mkdir()
         try:
             with _locked(unnamed):  # before it bears the name by which another run would look for stale ones
-                unnamed.rename(partial)
-                yield partial
-                for path in (*partial.rglob("*"), partial):  # on the disk before its name says that it is
+                unnamed.rename(hidden)
+                yield hidden
+                for path in (*hidden.rglob("*"), hidden):  # on the disk before its name says that it is
                     sync(path)
-                _move_into_place(partial, final, files)
+                _move_into_place(hidden, final, files)
         except BaseException:
-            shutil.rmtree(partial, ignore_errors=True)
+            shutil.rmtree(hidden, ignore_errors=True)
             with contextlib.suppress(OSError):
                 for folder in created:
                     folder.rmdir()
@@ -334,20 +337,20 @@ def sync(path: Path) -> None:
         os.close(descriptor)
 
 
-def _move_into_place(partial: Path, final: Path, files: Iterable[str]) -> None:
+def _move_into_place(hidden: Path, final: Path, files: Iterable[str]) -> None:
     refuse_foreign(final, files)
     try:
-        partial.rename(final)  # tried, not asked first: another run of this name may end in between
+        hidden.rename(final)  # tried, not asked first: another run of this name may end in between
         return
     except OSError:
         if not final.exists():
             raise
-    if _swap_folders(partial, final):
-        shutil.rmtree(partial, ignore_errors=True)
+    if _swap_folders(hidden, final):
+        shutil.rmtree(hidden, ignore_errors=True)
     else:
-        retired = partial.with_name(f"{partial.name}-replaced")
+        retired = hidden.with_name(f"{hidden.name}-replaced")
         final.rename(retired)
-        partial.rename(final)
+        hidden.rename(final)
         shutil.rmtree(retired, ignore_errors=True)
 
 

@@ -120,9 +120,8 @@ def _fresh_kernel_modules(kernel: Callable[..., Kernel]) -> Iterator[None]:
         for name, module in sys.modules.items()
         if name.startswith("beaver_ftc.") and module is not compiled and getattr(module, "kernel", 0) is usual
     }
-    packages = {
-        name: sys.modules[name.rpartition(".")[0]] for name in modules
-    }  # some have kernels themselves
+    # taken down before any module goes: some packages have kernels themselves
+    packages = {name: sys.modules[name.rpartition(".")[0]] for name in modules}
     for name, package in packages.items():
         del sys.modules[name]
         vars(package).pop(name.rpartition(".")[2], None)

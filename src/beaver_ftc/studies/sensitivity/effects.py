@@ -5,6 +5,7 @@ worse, and better if the opposite holds. The net share, worse less better, is wh
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from itertools import compress
 from math import isfinite
 
 from beaver_ftc.results.metrics import versions
@@ -40,12 +41,15 @@ def document_of(seed: int, draws: int, rows: Sequence[Document], margins: list[D
 
 
 def _row_of(mechanism: Mechanism, cases: Sequence[Flight], rows: Sequence[Document]) -> Document:
+    """The row of a mechanism: its effect in all pairs, and by each value of each factor."""
     pairs = [(row[with_key(mechanism)], row[without_key(mechanism)]) for row in rows]
     by = {
-        factor: {str(value): effect_of([p for p, case in zip(pairs, cases, strict=True)
-                                        if getattr(case, factor) == value]) for value in values}
+        factor: {
+            str(value): effect_of([*compress(pairs, (getattr(case, factor) == value for case in cases))])
+            for value in values
+        }
         for factor, values in FACTORS.items()
-    }  # fmt: skip
+    }
     about = {"system": mechanism.system, "mechanism": mechanism.name, "serves": mechanism.serves}
     return {**about, **effect_of(pairs), "by": by}
 

@@ -17,6 +17,7 @@ from beaver_ftc.results.metrics import measure, versions
 from beaver_ftc.results.model import Document, Metrics
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, counted, median
+from beaver_ftc.studies.present.tables import grouped
 from beaver_ftc.studies.sensitivity.errors import Error, changes_of, errors_of
 
 FACTORS = (1.0, 1.5, 2.0, 4.0)
@@ -108,9 +109,8 @@ def document_of(
     scenario: Scenario, errors: Sequence[Error], cases: Sequence[Flight], seed: int, rows: Sequence[Document]
 ) -> Document:
     """A row an error and factor, of the rows of all flights."""
-    flown: dict[tuple[str, float], list[Document]] = {}
-    for case, row in zip(cases, rows, strict=True):
-        flown.setdefault((case.error, case.factor), []).append(row)
+    flights = (case._asdict() | row for case, row in zip(cases, rows, strict=True))
+    flown = grouped(flights, "error", "factor")
     shared = flown[TOGETHER, FACTORS[0]]
     says = {error.name: error.says for error in errors} | {TOGETHER: "all that are declared"}
     return {

@@ -12,6 +12,7 @@ from beaver_ftc.results.model import Metrics
 BLACK, ORANGE, SKY, GREEN, BLUE, VERMILION, PURPLE, GREY = (
     "#000000", "#e69f00", "#56b4e9", "#009e73", "#0072b2", "#d55e00", "#cc79a7", "#8a8a8a",
 )  # fmt: skip
+SOFTWARE_MARK = "beaver-ftc"  # the software that a picture of ours names in its metadata
 SERIES = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, GREY, BLACK)  # of curves that are just several
 
 

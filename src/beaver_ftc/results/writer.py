@@ -42,7 +42,6 @@ FILES_OF_A_RUN = frozenset({
 })  # fmt: skip
 AIRCRAFT = "aircraft"  # an own aircraft, to fly it again
 MODEL_FILES = frozenset({".xml", ".yaml"})  # of it
-SOFTWARE_MARK = "beaver-ftc"  # the software that a picture of ours names in its metadata
 _PICTURE_END_BYTES = 2048  # of a picture: its metadata come first, those of a PDF last
 _AT_FDCWD = -100
 _RENAME_EXCHANGE = 2
@@ -269,6 +268,8 @@ def _foreign_files_in(folder: Path, files: Iterable[str]) -> list[str]:
 
 def _is_our_picture(path: Path) -> bool:
     """Whether it bears the mark that every picture of ours is saved with."""
+    from beaver_ftc.results.style import SOFTWARE_MARK
+
     if path.is_symlink() or not path.is_file():
         return False
     with path.open("rb") as file:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.files import Document
 from beaver_ftc.results.metrics import as_json
+from beaver_ftc.results.style import SOFTWARE_MARK
 from beaver_ftc.studies.present.tables import (
     Columns,
     Rows,
@@ -222,5 +223,5 @@ def _write(path: Path, content: Content) -> None:
 
 def save(figure: "Figure", path: Path) -> Path:
     """Write a figure as PNG; the same figure gives the same bytes."""
-    figure.savefig(path, metadata={"Software": "beaver-ftc"})
+    figure.savefig(path, metadata={"Software": SOFTWARE_MARK})
     return path

@@ -4,8 +4,6 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 WORKERS ?= 2
-# One more than cores: some tests wait for a server, a child or the clock.
-WAITING := $(shell expr $(WORKERS) + 1)
 BRING = $(MAKE) --silent $(VENV)/.dev
 SEED ?= 1
 # One thread of linear algebra to a worker: two workers with two each wait for each other half a minute in one test.
@@ -80,8 +78,8 @@ demo: $(VENV)/.demo
 # since the second run waits for the compiled code. It compiles the rest.
 test: $(VENV)/.test
 	@$(BRING) & installing=$$!; $(BIN)/python tests/warm.py >/dev/null 2>&1 & \
-	  NUMBA_DISABLE_JIT=1 nice $(PYTEST) -m "not nightly" $(PLAIN) && wait $$installing
-	$(PYTEST) -n $(WAITING) -m "not nightly and not acceptance" $(addprefix --ignore=,tests/acceptance $(PLAIN))
+	  NUMBA_DISABLE_JIT=1 nice $(PYTEST) -m "not nightly and not acceptance" $(PLAIN) && wait $$installing
+	$(PYTEST) -m "not nightly and not acceptance" $(addprefix --ignore=,tests/acceptance $(PLAIN))
 
 # Every test with all that it draws, what tests/nightly.yaml lists too; then drawn scenarios, mutants.
 nightly: $(VENV)/.dev

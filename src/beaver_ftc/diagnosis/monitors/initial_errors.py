@@ -61,6 +61,7 @@ mon: record of the monitor; its part `initial` has H, H_m, C, C_m and d; e is it
 import numpy as np
 
 from beaver_ftc.compiled import kernel, record
+from beaver_ftc.design.engine import SEA_LEVEL_DENSITY_KG_M3
 from beaver_ftc.diagnosis.detection.filters import leak
 from beaver_ftc.diagnosis.monitors.numbering import (
     ALPHA_TEST,
@@ -96,11 +97,15 @@ MIN_TEMPERATURE_RATIO = 0.05  # temperature over that at sea level, below which 
 # Share of an effect that is left, at least, when speed and flow have changed within a filter's memory
 EFFECT_LEFT = 0.8
 SLOW_POLE = 2  # index in FILTER_POLES_PER_S
+# Troposphere of the standard atmosphere (ISO 2533): lapse rate over the temperature at sea level, 1/m; the
+# density ratio is the temperature ratio to this power, g / (R lapse rate) - 1
+LAPSE_PER_M, DENSITY_POWER = 2.25577e-5, 4.2559
 
 # The hypotheses: this sensor has been broken since the monitor began.
 H_AIRSPEED, H_ALPHA, H_BETA, H_PHI, H_THETA = range(5)
 N_INITIAL = 5
-# What bounds such an error: its hypothesis, and the tests, first to last, in which its effect shows
+# What bounds such an error: its hypothesis, and the tests, first to last, in which its effect shows. Entry n
+# of C is the effect of row n; after the rows C has the parts of the force, of alpha and of beta.
 EVIDENCE = (
     (H_PHI, TURN_TEST + 1, TURN_TEST + 2), (H_PHI, SPEED_TEST, BETA_TEST),
     (H_THETA, TURN_TEST, TURN_TEST + 2), (H_THETA, SPEED_TEST, BETA_TEST),
@@ -160,17 +165,17 @@ def start_bounds(mon, y):
     T: temperature of the standard troposphere, over that at sea level. V_air: airspeed by dynamic pressure
     and standard density, m/s; off: reading over truth, less 1, in the thickest or in the thinnest air.
     """
-    own = mon.initial
-    T = max(1.0 - 2.25577e-5 * y[ALTITUDE], MIN_TEMPERATURE_RATIO)
-    V_air = np.sqrt(2.0 * max(y[I_QDYN], MIN_QDYN_PA) / (1.225 * T**4.2559))
+    E = mon.initial.E_start
+    T = max(1.0 - LAPSE_PER_M * y[ALTITUDE], MIN_TEMPERATURE_RATIO)
+    V_air = np.sqrt(2.0 * max(y[I_QDYN], MIN_QDYN_PA) / (SEA_LEVEL_DENSITY_KG_M3 * T**DENSITY_POWER))
     ratio = speed(y) / V_air
     off = max(ratio * np.sqrt(1.0 + DENSITY_SHARE) - 1.0, 1.0 - ratio * np.sqrt(1.0 - DENSITY_SHARE))
-    own.E_start[H_AIRSPEED] = min(off, MAX_SPEED_RATIO - 1.0)
+    E[H_AIRSPEED] = min(off, MAX_SPEED_RATIO - 1.0)
     for h in (H_ALPHA, H_BETA):
         angle = abs(y[SENSOR_OF[CHANGE_TEST[h]]]) + MAX_FLOW_ANGLE_RAD
-        own.E_start[h] = 2.0 * np.sin(0.5 * min(angle, np.pi))
-    own.E_start[H_PHI:] = MAX_CHORD
-    own.E[:] = own.E_start
+        E[h] = 2.0 * np.sin(0.5 * min(angle, np.pi))
+    E[H_PHI:] = MAX_CHORD
+    mon.initial.E[:] = E
 
 
 @kernel
@@ -207,9 +212,8 @@ def fill_attitude_effects(mon, y, turn, second):
     theta' = q cos(phi) - r sin(phi) there is no theta.
     """
     H = mon.initial.H
-    E = mon.initial.E
     # 1 / cos(theta) by its reading, and the largest one if theta is off
-    sec, sec_max = secant(y[THETA]), secant(abs(y[THETA]) + angle_of_chord(E[H_THETA]))
+    sec, sec_max = secant(y[THETA]), secant(abs(y[THETA]) + angle_of_chord(mon.initial.E[H_THETA]))
     # Rotation in a step, rad: about the body's second and third axes; about the vertical, psi' h
     qr, heading = mon.h * abs(turn), mon.h * abs(turn.imag) * sec_max
     by_phi, by_theta = sec * (qr + sec * second), sec * sec_max * second
@@ -272,9 +276,9 @@ def fill_effects(mon, y_now):
     climb = abs(mon.y_pred[ALTITUDE] - y[ALTITUDE]) / slower
     density = 2.0 * np.log(speed(y_now) / V)
     fill_attitude_effects(mon, y, turn, (h * w) ** 2)
-    by_beta, by_phi, by_theta = secs * (h2 * abs(rate.real) + n), sec * G * ct / V, sec * G / V
+    by_phi = sec * G * ct / V
     H[:, SPEED_TEST] = 0.0, A, A, G * across, G
-    H[:, ALPHA_TEST] = sec * n, sec * (n + P_h * sb), by_beta, by_phi, by_theta
+    H[:, ALPHA_TEST] = sec * n, sec * (n + P_h * sb), secs * (h2 * abs(rate.real) + n), by_phi, sec * G / V
     H[:, BETA_TEST] = sec * n, P_h + n * sb, n, by_phi, G * (s_phi + sb) / V
     H[H_AIRSPEED, DENSITY_TEST] = abs(density)
     H[:, CLIMB_TEST] = climb, vert, h * V * np.hypot(vertical.real, d[1].real), h * V * across, h * V

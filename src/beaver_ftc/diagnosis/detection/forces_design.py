@@ -111,9 +111,17 @@ def _drift_bound(errors: SensorErrors, gravity: float, V: float, i: int) -> floa
 def _configure_columns(
     stat: np.void, declared: Declared, y: np.ndarray, C_vane: float, drift: float, i: int
 ) -> None:
-    """Fill the tolerances of the columns of force i: of each term, by that of the coefficients and by
-    constant errors of vane and pressure; of the rate of sideslip; of the accelerometer's bias, m/s2; of the
-    whole; of the drift, rad/s. Fill the columns of an error of the vane."""
+    """Fill the tolerances of the columns of force i, and the columns of an error of the vane.
+
+    The columns follow each other in Z from `first` on. rows.py fills all but the bias, which is constant:
+
+        column            there                     tolerance                        Z filled by
+        each term         always                    coefficients, vane, pressure     add_terms
+        rate of sideslip  in the side force         coefficients, motion of the air  add_terms, after them
+        bias              if the sensor has one     m/s2                             here, after those
+        whole force       always                    mass, slope of the sensor        predict_force, n_Z - 1
+        drift             always                    rad/s                            update_forces, n_Z
+    """
     rows, f, force = stat["rows"], stat["forces"]["component"][i], MEASURED_FORCES[i]
     tol_C, errors = declared.coefficients.largest, declared.sensors
     vane, acc = errors[force.vane_name], errors[force.accelerometer]

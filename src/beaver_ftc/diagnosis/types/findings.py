@@ -32,7 +32,15 @@ def fault_finding_dict(fdi: np.void, names: Sequence[str]) -> FindingDict:
 
 
 def _find_pair(fdi: np.void, names: Sequence[str]) -> FindingDict:
-    """The fault named first as if it were alone, and all of them; what is open in a plane where none is."""
+    """The fault named first as if it were alone, and all of them; what is open in a plane where none is.
+
+        surfaces isolated    verdict            the finding itself            `faults`
+        some                 any                the first isolated            those, then the open planes
+        none                 unanticipated      unanticipated                 the open planes
+        none                 another            candidates of open planes     the open planes
+
+    An open plane has an alarm and no isolated surface.
+    """
     status, alarms = fdi["types"]["surface"]["status"], fdi["types"]["pair"]["group_alarm"]
     estimator = fdi["verdict"]["isolated_estimator"]
     isolated = np.flatnonzero(status["is_isolated"]).tolist()
@@ -40,7 +48,8 @@ def _find_pair(fdi: np.void, names: Sequence[str]) -> FindingDict:
     faults = [_finding_on_surface(fdi, s, int(status["fault_type"][s]), names) for s in isolated]
     groups = [np.flatnonzero(fdi["layout"]["group"] == group).tolist() for group in range(len(alarms))]
     if not alarms.any() and not faults and estimator == NOT_ISOLATED:
-        alarms = np.ones_like(alarms)  # a statistical alarm by itself says of no plane that it is there
+        # A statistical alarm names no plane: while no surface is isolated, the fault may be in any of them
+        alarms = np.ones_like(alarms)
     undecided = [
         {**_NO_FINDINGS, "candidates": tuple(_candidate_texts(fdi, members, names))}
         for alarm, members in zip(alarms, groups, strict=True)
@@ -104,8 +113,11 @@ def _may_be_faulty(fdi: np.void, s: int) -> bool:
 def _type_names(fdi: np.void, s: int) -> list[str]:
     """Types still possible on surface s, each once.
 
-    Where a constant explains the flight, a type that varies and need not show itself counts only until the
-    constant has been seen for long enough, or until those types are excluded that it can look like.
+    1. None if the surface cannot be faulty (`_may_be_faulty`), else those that are not excluded.
+    2. Where a constant explains the flight, a type that varies and need not show itself counts only until the
+       constant has been seen for long enough, or until those types are excluded that it can look like.
+    3. If a constant that gives up the surface is possible in the plane of pitch, and a pair of faults is too,
+       then every constant type is: the other surface may be off as well.
     """
     srf = fdi["types"]["surface"][s]
     kinds = np.flatnonzero(srf["sets"]["excluded"] == 0).tolist() if _may_be_faulty(fdi, s) else []
@@ -123,9 +135,14 @@ def _type_names(fdi: np.void, s: int) -> list[str]:
 
 
 def _candidate_texts(fdi: np.void, surfaces: Iterable[int], names: Sequence[str]) -> Iterator[str]:
-    """`surface:type` for each that is possible; bare surfaces and `unanticipated` where no type fits.
+    """What is possible on these surfaces.
 
-    Of one plane also both its surfaces, as `elevator+flap`.
+    case                                                        texts
+    pairs, plane of pitch, no second fault fits the first       unanticipated, nothing else
+    a surface that may be faulty, with types                    surface:type for each type
+    a surface that may be faulty, without                       surface
+    pairs are diagnosed                                         also both, as elevator+flap
+    no surface has a type                                       also unanticipated
     """
     first = int(fdi["types"]["pair"]["first_pitch"])
     if fdi["types"]["pair"]["enabled"] and first in surfaces:

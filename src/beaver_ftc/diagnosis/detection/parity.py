@@ -33,6 +33,25 @@ the rates use no gust estimate that rests on accelerometers. An alarm of the rat
 part is broken, and after it the views count as usual. Forces that are known or suspected to be wrong are not
 used.
 
+What each view may do, by what is subtracted from its rates (`source`), if the forces are used:
+
+    view                             source      raises the alarm      excludes    confirmation
+    of an axis                       RAW         by an oscillation     yes         not needed
+    of an axis                       VANED       by an oscillation     yes         needed to exclude
+    of a force, by inertia           INERTIAL    no                    no          given
+    across the column of a surface   RAW         no                    yes         not needed
+    across the column of a surface   VANED       if of a force (*)     yes         needed for both
+    across the column of a vane      VANELESS    no                    no          given
+
+(*) Its direction has |m_j| > MIN_FORCE_PART in the row j of its force, and accelerometers cannot break. A
+view whose row j is `confirmer` gives the confirmation. The score of the confirmed view is then
+
+    min(peak, P alarm_level / sqrt(2 margin)),    P: the largest peak of the views that confirm
+
+so P need only reach sqrt(2 margin), the level of the isolation. If the forces are not used, a view that sees
+a force scores 0, and no other needs confirmation. A view never excludes a surface that moves it
+(`changes_view`).
+
 Letters of the kernels, in addition to those of likelihood.py and rows.py:
 
     m, col      direction of a view and g / |g|, (5,)

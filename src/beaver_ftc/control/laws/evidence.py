@@ -20,7 +20,9 @@ from beaver_ftc.diagnosis.state import PITCH
 
 MEMORY_S = 5.0  # of the effectiveness seen by the observer: a slow reference's swing
 UNSURE = 0.2  # standard deviation of the diagnosis' estimate that is assumed: it settles the start
-NOTHING_LEFT = 0.05  # half of what the law divides by
+# An effectiveness below it counts as a lost surface: half of the default `least_effectiveness`, whatever a
+# scenario sets
+NOTHING_LEFT = 0.05
 
 # Of the main surface of each axis, fading sums over frames: of psi e, psi^2 and e^2, (rad/s)^2, and of 1.
 # named: whether the diagnosis has ever named it.
@@ -50,8 +52,11 @@ def clamp_to_observer_estimate(sums, layout, s, target, least):
 
 @kernel
 def larger_estimate(sums, diagnosed, i, least):
-    """The larger of both estimates of the main surface of axis i, `diagnosed` and the observer's; less than
-    NOTHING_LEFT is given as it is."""
+    """The larger of both estimates of the main surface of axis i, `diagnosed` and the observer's.
+
+    A law gives up a surface below `least`. If both estimates are below NOTHING_LEFT, the larger is returned
+    as it is. From NOTHING_LEFT on it is raised to `least`, so that the law keeps a weak surface in use.
+    """
     if not sums.named[i]:  # at its first naming: what was seen of it when healthy no longer counts
         sums.named[i], sums.product[i], sums.square[i] = 1, 0.0, 0.0
     larger = max(diagnosed, min(effectiveness_seen(sums, i, diagnosed), 1.0))

@@ -116,8 +116,17 @@ def configure_statistics(
 ) -> None:
     """Fill the statistical part of a diagnosis record; trim: x (3,), y and u (surfaces,) in trim.
 
-    Each step reads what those before it have filled: the speed of gusts the alarm level, the blocks the rows,
-    the views blocks and forces, the lengths of the drift its intensity.
+    The order of the calls is fixed, because a step reads what earlier ones have filled:
+
+        step                      reads                              filled by
+        configure_gust_speed      test.alarm_level                   _configure_levels
+        _configure_blocks         test.alarm_level, rows             _configure_levels, configure_rows
+        _configure_noise          test.alarm_level                   _configure_levels
+        configure_forces          rows, gust                         configure_rows, configure_gust
+        _configure_view_gusts     gust                               configure_gust_speed
+        configure_parity_views    block, forces, rows, vaned         _configure_blocks and the two before
+        _configure_lengths        noise.q, block, gust               _configure_noise, _configure_blocks
+        calm blocks               block                              _configure_lengths
     """
     stat = fdi["statistical"]
     settings = declared.fdi.statistical
@@ -263,23 +272,26 @@ def _configure_noise(
     noise["G_trim"][:, : G.shape[1]] = np.abs(G)
 
 
-def derive_intensity(eta: float, omega: float, sigma: float, level: float, dt_s: float) -> float:
+def derive_intensity(b: float, omega: float, sigma: float, z: float, dt_s: float) -> float:
     """Intensity of the random walk that stands for a bounded uncertainty, over its bound squared, 1/s.
 
-    An uncertainty of eta sin(omega t) moves the test for a step by eta omega sqrt(2 sqrt 2 / i w0), w0 = (i /
-    n)^(1/4), for a walk of intensity i and gyro noise of density n = sigma^2 dt (statistical.md). Almost
-    without noise w0 is the frame rate. The evidence for a loss under a moving command grows together with the
-    uncertainty while both have the same sign: by eta sqrt(omega / i) times 1.204, the largest value of sin(z)
-    / sqrt(z / 2), z half of omega t. Half the alarm level is left for it: noise alone then takes up no more
-    than the other half.
+        max(hypot((v (sigma^2 dt)^(1/4))^(4/5), 4 (1.204 b / z)^2 omega), v dt) / b^2
+        v = 8 sqrt(2) (b omega / z)^2                                                  (statistical.md)
 
-    eta rad/s2; omega, sigma rad/s; level in standard deviations.
+    An uncertainty of b sin(omega t) moves the test for a step by b omega sqrt(2 sqrt 2 / i w0), w0 = (i /
+    n)^(1/4), for a walk of intensity i and gyro noise of density n = sigma^2 dt; v is the i w0 at which that
+    is z / 2. Almost without noise w0 is the frame rate. The evidence for a loss under a moving command grows
+    together with the uncertainty while both have the same sign: by b sqrt(omega / i) times 1.204, the largest
+    value of sin(x) / sqrt(x / 2), x half of omega t. Half the alarm level is left for it: noise alone then
+    takes up no more than the other half.
+
+    b rad/s2: bound; omega, sigma rad/s; z: alarm level, standard deviations.
     """
-    eta = max(eta, likelihood.MIN_ETA_RAD_S2)
-    iw = 8.0 * sqrt(2.0) * (eta * omega / level) ** 2  # of i w0
-    i_loss = 4.0 * (1.204 * eta / level) ** 2 * omega
-    i_step = (iw * (sigma**2 * dt_s) ** 0.25) ** 0.8
-    return max(hypot(i_step, i_loss), iw * dt_s) / eta**2
+    b = max(b, likelihood.MIN_ETA_RAD_S2)
+    v = 8.0 * sqrt(2.0) * (b * omega / z) ** 2
+    i_loss = 4.0 * (1.204 * b / z) ** 2 * omega
+    i_step = (v * (sigma**2 * dt_s) ** 0.25) ** 0.8
+    return max(hypot(i_step, i_loss), v * dt_s) / b**2
 
 
 def derive_length(stat: np.void, V: float, rate_hz: float, gust_m: float) -> float:

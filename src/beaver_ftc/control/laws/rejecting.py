@@ -60,6 +60,9 @@ STAND_IN = 3  # the last of them
 # How long a suspected surface stands at its stop until it is given up: one that another replaces, and others;
 # and after how long it is tried again
 PATIENCE_S, LONG_PATIENCE_S, RETRY_S = 0.5, 1.0, 20.0
+# Frames subtracted from the time at the stop in a frame off it, which itself adds one: a command that swings
+# leaves the stop only briefly
+STOP_RECOVERY = 1.5
 
 
 def configure(law: np.void, control: np.void, prediction: np.void, declared: Declared, y: np.ndarray) -> None:
@@ -199,19 +202,28 @@ def withdraw(memory, layout, s, saturated, suspected, dt):
     """Give up surface s if it is suspected of a fault and has stood at its stop for a while.
 
     It does not follow its command, and at its stop the command shows nothing of the reason: jams, offsets and
-    losses look alike. In trim the reason shows; where another surface takes its place, it is tried again
-    after RETRY_S.
+    losses look alike. In trim the reason shows; where another surface takes its place, it is tried again.
+    T: at_stop_s, the time at the stop, or in trim since it was given up, s.
+
+        state       condition                               T                           next state
+        any         not suspected                           0                           in use
+        withdrawn   T > RETRY_S, another takes its place    0                           in use
+        withdrawn   otherwise                               T + dt                      withdrawn
+        in use      not saturated                           max(T + dt - k dt, 0)       in use
+        in use      saturated, T > patience                 0                           withdrawn
+        in use      saturated, otherwise                    T + dt                      in use
+
+    T in a condition counts this frame. patience: PATIENCE_S if another surface takes its place, else
+    LONG_PATIENCE_S. k: STOP_RECOVERY.
     """
     memory.at_stop_s[s] += dt
-    if not suspected:
+    retries = memory.withdrawn[s] and memory.at_stop_s[s] > RETRY_S and is_replaced(layout, s)
+    if retries or not suspected:
         memory.withdrawn[s], memory.at_stop_s[s] = 0, 0.0
     elif memory.withdrawn[s]:
-        if memory.at_stop_s[s] > RETRY_S and is_replaced(layout, s):
-            memory.withdrawn[s], memory.at_stop_s[s] = 0, 0.0
+        return
     elif not saturated:
-        memory.at_stop_s[s] = max(
-            memory.at_stop_s[s] - 1.5 * dt, 0.0
-        )  # a command that swings leaves it briefly
+        memory.at_stop_s[s] = max(memory.at_stop_s[s] - STOP_RECOVERY * dt, 0.0)
     elif memory.at_stop_s[s] > (PATIENCE_S if is_replaced(layout, s) else LONG_PATIENCE_S):
         memory.withdrawn[s], memory.at_stop_s[s] = 1, 0.0
 

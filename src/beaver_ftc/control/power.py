@@ -2,7 +2,11 @@
 
 The Beaver's power acts on pitch when neither elevator nor flap does.
 
-    pz = pz_trim - k_V (V - Vbar) + k_att att,    T_V Vbar' = V - Vbar,    att' = q - q_ref - att / T_att
+    pz = pz_trim - k_V (V_f - V_bar) + k_att att,    T_f V_f' = V - V_f,    T_V V_bar' = V_f - V_bar,
+    att' = q - q_ref - att / T_att
+
+V_f is the airspeed through a lag, `speed`, V_bar its slow mean, `usual_speed`, m/s; att is `attitude`, rad.
+T_f, T_V and T_att, s, are given as the shares of a frame `smoothing`, `washout` and `leak`.
 
 Airspeed fed back to power damps the phugoid, as when an airliner was flown on its engines alone
 [Burcham1997]. It is washed out, so that power does not fight the airspeed to which a jammed elevator trims
@@ -124,7 +128,8 @@ def pitch_is_lost(layout, surfaces, saturated, shortfall):
 def watch(power, is_lost, t):
     """Take over once pitch has been lost for a while, hand back once it has not been for longer. t s.
 
-    lost counts up while it is and down while it is not, between 0 and 1: swings past zero keep what they add.
+    The hysteresis: `lost` rises by `impatience` in a frame in which pitch is lost and falls by `forgiveness`
+    in any other, between 0 and 1. Power takes over at 1 and hands back at 0; between them it stays as it is.
     """
     config, memory, output = power.config, power.memory, power.output
     change = config.impatience if is_lost else -config.forgiveness

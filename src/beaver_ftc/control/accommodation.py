@@ -11,6 +11,10 @@ instead: the loop fills in the true faults of the instant (loop/frame.py), and n
 
 The laws divide by the effectiveness in `output`. It is rate limited, so that a decision never kicks the
 surfaces, and projected: a surface weaker than `least_effectiveness` is given up.
+
+Arguments of the kernels are records. This file defines supervisor, surfaces and its output and config;
+diagnosis/conclusion.py verdict and assessment; loop/frame.py faults; control/state.py the law's config;
+control/allocation.py layout.
 """
 
 import numpy as np

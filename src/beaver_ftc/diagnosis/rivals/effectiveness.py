@@ -32,15 +32,21 @@ DEFAULT_OPTIONS = {
 
 
 class EffectivenessFilter(KalmanRival):
-    """Base of the augmented filters; they differ in `predict` and in `statistic`."""
+    """Base of the augmented filters; they differ in `predict` and in `statistic`.
+
+    KalmanRival provides z and P, the mean and covariance of the state; F, the constant part of the
+    transition; `fill_model`, `move` and `add_noise`. RivalDetector provides options, context, dt and
+    `leading`, the index of the surface that leads each axis.
+    """
 
     defaults: ClassVar[Mapping[str, float]] = DEFAULT_OPTIONS
 
     def start(self) -> None:
         """Start healthy, with theta known to a tenth."""
-        self.fill_model(3, 0.01, self.options["drift_per_s"] ** 2 * self.dt)
+        self.fill_model(n_theta=3, theta_variance=0.01, walk=self.options["drift_per_s"] ** 2 * self.dt)
         self.fade = exp(-self.dt / self.options["misfit_s"])
-        self.mean_square, self.cusum = float(N_RATES), 0.0
+        self.mean_square = float(N_RATES)
+        self.cusum = 0.0
 
     def transition(self, measured: Measured) -> np.ndarray:
         """F (n, n) of this frame, without df/dx, for (p, q, r), theta and, if declared, g of kalman.py:

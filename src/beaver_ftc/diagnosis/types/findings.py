@@ -144,16 +144,17 @@ def _candidate_texts(fdi: np.void, surfaces: Iterable[int], names: Sequence[str]
     pairs are diagnosed                                         also both, as elevator+flap
     no surface has a type                                       also unanticipated
     """
-    first = int(fdi["types"]["pair"]["first_pitch"])
-    if fdi["types"]["pair"]["enabled"] and first in surfaces:
-        status = fdi["types"]["surface"]["status"][first]
-        if not (status["may_be_sole"] or status["is_isolated"]):
-            yield "unanticipated"  # no second fault explains what the first one leaves
-            return
+    pair = fdi["types"]["pair"]
+    first = int(pair["first_pitch"])
+    status = fdi["types"]["surface"]["status"][first]
+    explained_by_first = status["may_be_sole"] or status["is_isolated"]
+    if pair["enabled"] and first in surfaces and not explained_by_first:
+        yield "unanticipated"  # no second fault explains what the first one leaves
+        return
     kinds = {s: _type_names(fdi, s) for s in surfaces if _may_be_faulty(fdi, s)}
     for s, own in kinds.items():
         yield from [f"{names[s]}:{kind}" for kind in own] or [names[s]]
-    if fdi["types"]["pair"]["enabled"]:
+    if pair["enabled"]:
         yield "+".join(names[s] for s in surfaces)
     if not any(kinds.values()):
         yield "unanticipated"

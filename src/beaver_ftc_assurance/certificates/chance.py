@@ -19,7 +19,7 @@ from beaver_ftc.diagnosis import (
 from beaver_ftc.diagnosis.detection import STEP_HYPOTHESIS as STEP
 from beaver_ftc.diagnosis.detection import restarting_slot
 from beaver_ftc_assurance.certificates.history import Document, History
-from beaver_ftc_assurance.certificates.likelihood_ratio import LikelihoodRatio
+from beaver_ftc_assurance.certificates.likelihood_ratio import Inputs, LikelihoodRatio
 from beaver_ftc_assurance.certificates.tape import Tape
 
 LOGGED_SCORE_TOLERANCE = 1e-5  # relative; more than all that a certificate leaves out changes the score by
@@ -115,25 +115,23 @@ def _likelihood_ratio(
     axes = [block.axis_indices[i] for i in moved]
     tolerance = block.regressor_coefficient_error_bound
     known = [j for j in np.flatnonzero(tolerance > 0.0).tolist() if now["g_Z"][:, j][:, moved].any()]
-    series = {
-        "signature": now["signature"][:, moved],
-        "jitter": dt * dt * before["Q_x"][:, moved],
-        "drift": _a_frame_later(dt * before["Q_d"][:, moved][:, :, moved]),
-        "bounded": before["bounded"][:, axes],
-        "pace": before["eta_rate"],
-    }
-    if block.drift_correlation_length_m > 0.0:
-        series["keep"] = before["a"]
+    regressors = air = None
+    drift = _a_frame_later(dt * before["Q_d"][:, moved][:, :, moved])
     if known:  # their filter's g = e + dt (v - d), x_Z = (e, d), solved for the input v
         e, d = np.split(before["x_Z"][:, known][..., states], 2, axis=2)
-        series["known"] = (now["g_Z"][:, known][..., moved] - e) / dt + d
+        regressors = (now["g_Z"][:, known][..., moved] - e) / dt + d
     if diagnosis.gust.is_turbulence_declared:
-        series["air"] = now["air"][:, axes]
+        air = now["air"][:, axes]
         leap = now["leap"][:, axes][:, :, axes]  # the gust's axes turn
-        series["drift"] += block.factor_on_gust_drift_intensity * leap
+        drift += block.factor_on_gust_drift_intensity * leap
     sense = block.hypothesis_tests_by_onset.supporting_correlation_sign[h, slot]
-    if supporting := _supporting_parts(block, h, slot):
-        series["foreseen"] = np.sum([now[name] for name in supporting], axis=0)[:, moved]
+    supporting = [now[name] for name in _supporting_parts(block, h, slot)]
+    series = Inputs(
+        signature=now["signature"][:, moved], jitter=dt * dt * before["Q_x"][:, moved], drift=drift,
+        bounded=before["bounded"][:, axes], pace=before["eta_rate"], known=regressors, air=air,
+        keep=before["a"] if block.drift_correlation_length_m > 0.0 else None,
+        foreseen=np.sum(supporting, axis=0)[:, moved] if supporting else None,
+    )  # fmt: skip
     Y, P = _states_of({name: values[0] for name, values in before.items()}, states, known)
     return LikelihoodRatio(
         level=diagnosis.statistical_alarm_level, axes=axes, sense="less" if sense else "either",

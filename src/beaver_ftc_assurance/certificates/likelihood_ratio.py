@@ -3,10 +3,16 @@
     evidence = |sum of w.g of the innovation| - sum over the constants of tolerance |sum of w.g of a constant|
     limit    = max(level sqrt(D), room + LEVEL_NOISE_SHARE level sqrt(D)),   D = sum of w.g of the signature
 
-w = S^-1 g of the signature, g: whitened. The evidence is that of sense "either". `room`: the most that a
-bounded model error adds. docs/explanation/statistical.md derives all of it.
+    room     = sum of eta_0 |w| + min(sum of eta_r |w - w before| + eta_r |w last|, sum of pace eta_r |w|)
+
+w = S^-1 g of the signature, g: whitened, 1/(rad/s) and rad/s. The evidence is that of sense "either".
+room: the most that a model error within its bound adds: what is constant, and the lesser of what swings
+between the ends of the bound and what changes at the rate `pace`. eta_0, eta_r, rad/s: the effect of a
+constant bound on g, and of one that swings; sums are over the frames and the axes.
+docs/explanation/statistical.md derives all of it.
 """
 
+from collections import namedtuple
 from dataclasses import dataclass, replace
 from math import nan, sqrt
 
@@ -27,6 +33,23 @@ NEGLIGIBLE_SHARE_OF_LIMIT = 1e-7  # what changes evidence and limit by less is l
 MAX_WRITTEN_CONSTANTS = 6  # in each frame: with more a certificate would have over 200 kB
 
 
+class Inputs(namedtuple("Inputs", "signature jitter drift bounded pace keep known air foreseen")):
+    """Inputs of the filter in each of N frames, for n axes and m constants. These fields of a frame, in this
+    order, are those of a certificate (docs/explanation/certificate-fields.csv), which lacks those that are
+    None.
+
+    signature  (N, n)     rad/s2   acceleration that the fault causes
+    jitter     (N, n)     rad2/s2  variance that the frame adds to the rate
+    drift      (N, n, n)  rad2/s4  covariance that the frame adds to the drifts
+    bounded    (N, n)     rad/s2   bound eta_bar on the model error; None: 0
+    pace       (N,)       1        largest change of the model error, share of its bound; None: NO_PACE
+    keep       (N,)       1        factor on the drift; None: 1
+    known      (N, m, n)  rad/s2   regressor of each constant; None if m = 0
+    air        (N, n)     rad/s2   acceleration that the measured gust causes; None: 0
+    foreseen   (N, n)     rad/s    part of g that the filter for calm air predicts; None: 0
+    """
+
+
 @dataclass(frozen=True)
 class LikelihoodRatio:
     """A test of n axes from its onset on: the fields of its statement, and the innovation (frames, n) rad/s2.
@@ -34,10 +57,9 @@ class LikelihoodRatio:
     Y (2 n, 2 + m): states of the filter before the first frame: a row for the rate error of each axis, rad/s,
     then one for minus the drift of each axis, rad/s2; a column for the innovation, for the signature, and for
     each of m constants. tolerance (m,): largest magnitude of each constant. P (2 n, 2 n): covariance of the
-    states before the first frame. R (n,): variance of a reading of each gyro, (rad/s)2. series: the filter's
-    inputs in each frame, (frames, ...), under the names and in the units of the fields of a frame
-    (docs/explanation/certificate-fields.csv). level: the alarm level, standard deviations. sense: "less" if
-    only a negative correlation supports the fault, else "either". first: row of the first frame. dt, s.
+    states before the first frame. R (n,): variance of a reading of each gyro, (rad/s)2. level: the alarm
+    level, standard deviations. sense: "less" if only a negative correlation supports the fault, else
+    "either". first: row of the first frame. dt, s.
     """
 
     level: float
@@ -48,19 +70,19 @@ class LikelihoodRatio:
     Y: np.ndarray
     P: np.ndarray
     first: int
-    series: dict[str, np.ndarray]
+    series: Inputs
     innovation: np.ndarray
     dt: float
 
     @property
     def fields(self) -> Document:
         """The fields of the statement, with null for zero."""
-        rows = zip(*(values.tolist() for values in self.series.values()), strict=True)
+        written = {name: of.tolist() for name, of in self.series._asdict().items() if of is not None}
         return {
             "level": self.level, "axes": self.axes, "sense": self.sense, "tolerance": self.tolerance.tolist(),
             "R": _null_for_zero(self.R), "Y": [*map(_null_for_zero, self.Y)],
             "P": [*map(_null_for_zero, self.P)], "first": self.first,
-            "frames": [dict(zip(self.series, row, strict=True)) for row in rows],
+            "frames": [dict(zip(written, row, strict=True)) for row in zip(*written.values(), strict=True)],
         }  # fmt: skip
 
     def without_negligible(self) -> "LikelihoodRatio":
@@ -73,7 +95,7 @@ class LikelihoodRatio:
         """
         short = self
         for name in ("bounded", "pace", "foreseen"):
-            without = replace(short, series={key: of for key, of in short.series.items() if key != name})
+            without = replace(short, series=short.series._replace(**{name: None}))
             short = without if short._is_as(without) else short
         matters = [
             j
@@ -84,8 +106,8 @@ class LikelihoodRatio:
             short, matters = short._with_constants_merged(), [0]
         Y = short.Y[:, [0, 1, *(2 + j for j in matters)]]
         series = short.series
-        if "known" in series:
-            series = series | {"known": series["known"][:, matters]}
+        if series.known is not None:
+            series = series._replace(known=series.known[:, matters])
         short = replace(short, tolerance=short.tolerance[matters], Y=Y, series=series)
         short = replace(short, Y=short._without_negligible_numbers("Y"))
         return replace(
@@ -116,35 +138,30 @@ class LikelihoodRatio:
         # Copies are in C order: the last digits of a product depend on the order in memory.
         worst = self.tolerance * np.sign(self.sums()[0][2:])
         Y = np.column_stack([self.Y[:, :2], [worst @ row for row in self.Y[:, 2:].copy()]])
-        known = np.array([[worst @ of_frame] for of_frame in self.series["known"].copy()])
-        return replace(self, tolerance=np.ones(1), Y=Y, series=self.series | {"known": known})
+        known = np.array([[worst @ of_frame] for of_frame in self.series.known.copy()])
+        return replace(self, tolerance=np.ones(1), Y=Y, series=self.series._replace(known=known))
 
     def sums(self) -> tuple[np.ndarray, float, float]:
         """The sums over the frames of w.g for each column of Y, (2 + m,); N_f, the sum of w.foreseen; and the
-        room: the most that a model error within its bound (`bounded`) can add to the first sum.
-
-        room = constant error + min(swings between the ends of the bound, changes at the rate `pace`)
+        room.
         """
-        series = self.series
         n = len(self.axes)
-        count = len(self.innovation)
-        none = np.zeros_like(self.innovation)
-        inputs = [self.innovation - series.get("air", 0.0), series["signature"]]
-        inputs += [*np.moveaxis(series["known"], 1, 0)] if "known" in series else []
-        states = np.zeros((len(inputs), 4))
         # Y has minus the drift, and no rows of a second axis if there is one axis
+        states = np.zeros((self.Y.shape[1], 4))
         states[:, :n] = self.Y[:n].T
         states[:, 2 : 2 + n] = -self.Y[n:].T
-        sums = np.zeros(len(inputs))
-        parts = np.zeros(5)
-        Q_x = series["jitter"] / (self.dt * self.dt)
-        of_axes = np.stack(inputs, axis=1), series["drift"], Q_x
-        bounds = series.get("bounded", none), series.get("foreseen", none)
-        shares = series.get("keep", np.ones(count)), series.get("pace", np.full(count, NO_PACE))
-        given = map(np.ascontiguousarray, (*of_axes, *bounds, *shares))
-        add_whitened_frames(new_filter_block(self.P, self.R), *given, states, sums, parts, self.dt)
-        swings, changes, last, constant, N_f = parts.tolist()
-        return sums, N_f, min(constant + swings + last, constant + changes)
+        sums = np.zeros(len(states))
+        none = np.zeros_like(self.innovation)
+        ones = np.ones(len(none))
+        neutral = Inputs(none, none, none, none, NO_PACE * ones, ones, none[:, None][:, :0], none, none)
+        series = Inputs(*(zero if of is None else of for of, zero in zip(self.series, neutral, strict=True)))
+        nu = self.innovation - series.air
+        inputs = np.concatenate([nu[:, None], series.signature[:, None], series.known], axis=1)
+        Q_x = series.jitter / (self.dt * self.dt)
+        of_frames = inputs, series.drift, Q_x, series.bounded, series.foreseen, series.keep, series.pace
+        given = map(np.ascontiguousarray, of_frames)
+        N_f, room = add_whitened_frames(new_filter_block(self.P, self.R), *given, states, sums, self.dt)
+        return sums, N_f, room
 
     @property
     def sides(self) -> tuple[float, float]:
@@ -161,19 +178,19 @@ def _null_for_zero(values: np.ndarray) -> list[float | None]:
 
 
 @kernel
-def add_whitened_frames(blocks, inputs, drift, jitter, bounded, foreseen, keep, pace, states, sums, room, dt):
+def add_whitened_frames(blocks, inputs, drift, jitter, bounded, foreseen, keep, pace, states, sums, dt):
     """Run a filter, blocks (1,), over the frames of a `LikelihoodRatio`, and add w.g of each frame to `sums`
     (columns,): g, the whitened innovation of each column, w = S^-1 g of the second, the signature. See
     `likelihood.accumulate_tests`.
 
     inputs (frames, columns, n); drift (frames, n, n); jitter, bounded, foreseen (frames, n): of n axes.
-    states (columns, 4): advanced in place. room (5,), filled: what a model error within its bound can add to
-    the sum of the innovation if it swings between the ends of the bound before the last frame, if it changes
-    at its pace, by the swing after the last frame, and if it is constant; and the sum of w.foreseen.
+    states (columns, 4): advanced in place. Returns N_f, the sum of w.foreseen, and the room (module
+    docstring): e_0 + min(e_tv + last, e_w).
     """
     block = blocks[0]
     g = np.zeros((len(states), 2))
     w = np.zeros(2)
+    e_0 = e_tv = e_w = last = N_f = 0.0
     for k in range(len(inputs)):
         block.a = keep[k]
         for i in range(block.n):
@@ -185,16 +202,17 @@ def add_whitened_frames(blocks, inputs, drift, jitter, bounded, foreseen, keep, 
         response_of_block(block, dt)
         for c in range(len(states)):
             whiten_frame(block, states[c], inputs[k, c], dt, g[c])
-        room[2] = 0.0
+        last = 0.0
         for i in range(block.n):
             before = w[i]
             w[i] = 0.0
             for j in range(block.n):
                 w[i] += block.S_inv[i, j] * g[1, j]
-            room[0] += block.eta_r[i] * abs(w[i] - before)
-            room[1] += pace[k] * block.eta_r[i] * abs(w[i])
-            room[2] += block.eta_r[i] * abs(w[i])
-            room[3] += block.eta_0[i] * abs(w[i])
-            room[4] += w[i] * foreseen[k, i]
+            e_tv += block.eta_r[i] * abs(w[i] - before)
+            e_w += pace[k] * block.eta_r[i] * abs(w[i])
+            last += block.eta_r[i] * abs(w[i])
+            e_0 += block.eta_0[i] * abs(w[i])
+            N_f += w[i] * foreseen[k, i]
             for c in range(len(states)):
                 sums[c] += w[i] * g[c, i]
+    return N_f, min(e_0 + e_tv + last, e_0 + e_w)

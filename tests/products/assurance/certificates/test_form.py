@@ -10,7 +10,7 @@ import pytest
 
 from beaver_ftc_assurance.certificates import check_certificate, courses
 from beaver_ftc_assurance.certificates.inequality import no_fault
-from beaver_ftc_assurance.certificates.likelihood_ratio import LikelihoodRatio
+from beaver_ftc_assurance.certificates.likelihood_ratio import Inputs, LikelihoodRatio
 from telling import numbers
 
 
@@ -43,13 +43,13 @@ def test_writer_and_checker_follow_the_same_filter(pace, keep):
     """Of two axes with everything: sums, and the room of a bounded drift, by its pace or as it swings."""
     n, count, dt, first = 2, 6, 0.02, 3
     nu = numbers(first + count, 3, seed=1)
-    inputs = {
-        "signature": numbers(count, n, seed=2), "jitter": abs(numbers(count, n, seed=3)) * 1e-4,
-        "drift": np.array([np.diag(row) for row in abs(numbers(count, n, seed=4)) * 1e-3]),
-        "bounded": abs(numbers(count, n, seed=5)), "foreseen": numbers(count, n, seed=6),
-        "known": numbers(count, 1, n, seed=7), "air": numbers(count, n, seed=8) * 0.1,
-        "pace": np.full(count, pace), "keep": np.full(count, keep),
-    }  # fmt: skip
+    inputs = Inputs(
+        signature=numbers(count, n, seed=2), jitter=abs(numbers(count, n, seed=3)) * 1e-4,
+        drift=np.array([np.diag(row) for row in abs(numbers(count, n, seed=4)) * 1e-3]),
+        bounded=abs(numbers(count, n, seed=5)), foreseen=numbers(count, n, seed=6),
+        known=numbers(count, 1, n, seed=7), air=numbers(count, n, seed=8) * 0.1,
+        pace=np.full(count, pace), keep=np.full(count, keep),
+    )  # fmt: skip
     half = numbers(4, 4, seed=9)
     ours = LikelihoodRatio(
         level=5.0, axes=[0, 2], sense="either", tolerance=np.array([0.3]), R=np.array([0.5, 0.7]),
@@ -57,8 +57,7 @@ def test_writer_and_checker_follow_the_same_filter(pace, keep):
         innovation=nu[first:, [0, 2]],
     )  # fmt: skip
     totals, calm, ours_room = ours.sums()
-    frames = SimpleNamespace(dt=dt, innovation_rad_s2=nu)
-    sums, room = check_certificate.whitened_sums(ours.fields, frames)
+    sums, room = check_certificate.whitened_sums(ours.fields, SimpleNamespace(dt=dt, innovation_rad_s2=nu))
     np.testing.assert_allclose(sums, [*totals, calm], rtol=1e-7)
     assert room == pytest.approx(ours_room, rel=1e-6)
 

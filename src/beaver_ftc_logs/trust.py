@@ -19,20 +19,33 @@ from beaver_ftc_logs.runs import trailing_sums
 from beaver_ftc_logs.samples import Samples
 from beaver_ftc_logs.signals import MIN_STILL_S
 
+# Quantiles at the ends of a range; judged: one sample in 500 is an outlier.
 _RANGE_QUANTILES = (0.001, 0.999)
-_RANGE_MARGIN_SHARE, _AIRSPEED_MARGIN = 0.5, 0.15
-"""A number is outside if it passes a range by more than this share of its width; an airspeed, if it passes
-the least or the largest by more than this share of it."""
-_RANGE_WINDOW_S, _MIN_OUTSIDE_SHARE = 5.0, 0.5
-"""A row is outside if more than this share of the last seconds is."""
+# A number is outside if it passes a range by more than this share of its width; judged.
+_RANGE_MARGIN_SHARE = 0.5
+# An airspeed is outside if it passes the least or the largest by more than this share of it; judged: the
+# effect of a surface, which grows with the square of the airspeed, changes by at most 32 %.
+_AIRSPEED_MARGIN = 0.15
+# A row is outside if more than a share of these last seconds is; the length is judged.
+_RANGE_WINDOW_S = 5.0
+# This share; derived: most of the seconds.
+_MIN_OUTSIDE_SHARE = 0.5
+# A column may stand still this many times as long as it did in the flights of the model; judged.
 _MAX_STILL_FACTOR = 3.0
+# Rows are not credible for this time after a rate was clipped; judged.
 _CLIPPING_MEMORY_S = 30.0
+# Nothing is said of a group if other quantities explain this share of its effect or more; judged: a fiftieth
+# of the effect is left.
 _MAX_TIED_SHARE = 0.98
 
 
 def compute_fitted_ranges(parts: Parts, tied: Floats, gain_sd: Floats) -> FittedRanges:
-    """Compute the ranges in which a model was fitted. tied (G,): as of `orders.tied_shares`; gain_sd (G,):
-    standard errors, of parts not fitted."""
+    """Compute the ranges in which a model was fitted.
+
+    tied (G,): share of the effect of each group on the rates that past rates, signals and the other groups
+    explain (`orders.tied_shares`). gain_sd (G,): standard error of the gain of each group, 1 in the model, in
+    parts not fitted.
+    """
 
     def usable(name: str) -> Floats:
         return np.concatenate([getattr(part.samples, name)[part.is_usable] for part in parts])
@@ -124,8 +137,14 @@ def _rows_out_of_range(samples: Samples, model: Model) -> Reasons:
 
 
 def _still_rows(samples: Samples, model: Model) -> Reasons:
-    """Rows in which a column has stood still for too long, by reason: a measured rate may hardly, another
-    thrice as long as in the model's flights; a rate of which these are known, from MIN_STILL_S / 3 on."""
+    """Rows in which a column has stood still for longer than its limit, by reason. still_s: the longest time
+    for which it stood still in the flights of the model.
+
+        column                  limit, s
+        a rate, still_s known   max(MIN_STILL_S / 3, _MAX_STILL_FACTOR still_s)
+        a rate, unknown         MIN_STILL_S
+        another, still_s known  max(MIN_STILL_S, _MAX_STILL_FACTOR still_s); without a limit if unknown
+    """
     fitted = model.fitted.still_s
     rates = model.vehicle.rate_columns
     reasons = {}

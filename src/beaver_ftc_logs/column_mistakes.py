@@ -5,12 +5,11 @@ A large residual may come from a fault, from the air, or from such a mistake. Th
 1. All rates, or a command, move much more or less than in the flights of the model (`refuse_rate_unit`,
    `refuse_command_unit`).
 2. The gain of a command is opposite to that of the model, or as small or large as its motion is large or
-   small (`_mistake_texts`).
+   small (`_command_mistakes`).
 3. The log is likelier with one mistake corrected (`mistake_gains`).
 
 A mistake is there from the first sample to the last, so tests 2 and 3 must find it in each of four parts.
 
-    y, F            unexplained rates (n, 3), rad/s, and responses (n, G, 3), as in `regression`
     lo, hi          least and largest gain of a group, 1 in the model
     ll              log likelihood of a sample
 """
@@ -31,18 +30,33 @@ from beaver_ftc_logs.trust import central_ranges, known_effects, known_gains, un
 from beaver_ftc_logs.units import RATE, SI_UNITS, UNIT_FACTORS, nearest_unit
 from beaver_ftc_logs.vehicle import Vehicle
 
-_MAX_AXIS_RATIO, _UNIT_FACTOR_ROOT = 10.0, 1.6
-"""Ratio of the motions of two rates in one unit, at most; square root of the largest error of a unit."""
-_MAX_ALIKE_FACTOR, _MIN_UNIT_FACTOR = 3.0, 12.0
-"""By how much a motion differs between flights at most; by how much another unit changes it at least."""
+# The rates are in one unit if their motions, relative to the flights of the model, differ by less.
+_MAX_AXIS_RATIO = 10.0
+# Square root of the largest error of a unit that is guessed from the motions.
+_UNIT_FACTOR_ROOT = 1.6
+# A motion differs between flights by this factor at most.
+_MAX_ALIKE_FACTOR = 3.0
+# Another unit changes a motion by this factor at least.
+_MIN_UNIT_FACTOR = 12.0
 _COMMAND_UNIT_HINT = ": one unit (57.3 is deg for rad, 100 percent: `unit`, `scale`)"
-MAX_REVERSED_GAIN, _MIN_COMMAND_GAIN = -0.3, 0.2
-"""Gains below which a command has the opposite effect, or hardly any. Of 576 correct logs with faults of any
-kind none was below 0.98, in light turbulence 0.93 (`own_logs.py`, seeds 31 to 42; 71 to 201)."""
+_CHANGED_EFFECT = "the command of {} moves {:.3g} times as much as in the flights of the model, and does "
+# By the kind of a mistake its text: of the group, the motion over that of the model's flights, the gain.
+_COMMAND_MISTAKES = {
+    "sign": "the rates answer the command of {} the other way round in all of it (does `scale: -1` fit?)",
+    "weak": f"{_CHANGED_EFFECT}at most {{:.2g}} of what it did{_COMMAND_UNIT_HINT}",
+    "strong": f"{_CHANGED_EFFECT}at least {{:.3g}} times what it did{_COMMAND_UNIT_HINT}",
+}
+# Below this gain a command has the opposite effect. Of 576 correct logs with faults of any kind, the least
+# gain was 0.98, in light turbulence 0.93 (`own_logs.py`, seeds 31 to 42; 71 to 201).
+MAX_REVERSED_GAIN = -0.3
+# Below this gain a command has hardly any effect (same logs).
+_MIN_COMMAND_GAIN = 0.2
+# Half-way from the gain of a wrong sign, -1, to that of a lost surface, 0.
 _REVERSED_GAIN_LIMIT = -0.5
-"""Half-way from the gain of a wrong sign, -1, to that of a lost surface, 0."""
-_FALSE_MISTAKE_CHANCE, _MAX_COMPARED_SAMPLES = 0.001, 8000
-"""Probability with which chance alone may look like a mistake in the columns; samples that are compared."""
+# Probability with which chance alone may look like a mistake in the columns.
+_FALSE_MISTAKE_CHANCE = 0.001
+# Of a longer flight, about so many samples are compared (computing time).
+_MAX_COMPARED_SAMPLES = 8000
 
 
 def refuse_rate_unit(samples: Samples, ranges: FittedRanges) -> None:
@@ -132,13 +146,14 @@ def refuse_columns(samples: Samples, model: Model) -> None:
     flight, likeliest = _whiten_likeliest(samples, model)
     if (found := answers(flight, likeliest)) is None:
         return
-    mistakes = _mistake_texts(samples, model, found)
+    mistakes = _command_mistakes(samples, model, found)
     for ma in NOISE_MA_CANDIDATES if mistakes else ():
         other = answers(whiten_samples(samples, ma), model)
         if other is not None and other.likelihood.mean() > found.likelihood.mean():
-            likelier = _mistake_texts(samples, model, other)
-            mistakes = {key: text for key, text in mistakes.items() if key in likelier}
-    text = next(iter(mistakes.values()), None) or _likelier_mistake(flight, likeliest)
+            likelier = _command_mistakes(samples, model, other)
+            mistakes = {key: sizes for key, sizes in mistakes.items() if key in likelier}
+    texts = (_COMMAND_MISTAKES[kind].format(group, *sizes) for (kind, group), sizes in mistakes.items())
+    text = next(texts, None) or _likelier_mistake(flight, likeliest)
     if text is not None:
         allowed = "allowed: columns, signs and units as in the flights of the model"
         raise BadInput(f"{samples.name}: {text}, {allowed}")
@@ -161,26 +176,25 @@ def find_reversed(samples: Samples, model: Model) -> list[list[str]]:
     return list(compress(model.groups, is_reversed))
 
 
-def _mistake_texts(samples: Samples, model: Model, found: Answers) -> dict[str, str]:
-    """A text for each command with the wrong sign or in another unit, by kind and group."""
+def _command_mistakes(
+    samples: Samples, model: Model, found: Answers
+) -> dict[tuple[str, str], tuple[float, float]]:
+    """The commands with the wrong sign or in another unit: by the kind of the mistake and the group, the
+    motion of the command over that in the flights of the model, and its gain."""
     mistakes = {}
-    known, surfaces = known_gains(model), list(model.vehicle.surfaces)
-    motions = np.zeros(len(surfaces))
-    if model.fitted.commands:
-        motions = _relative_motion(samples.commands, model.fitted.commands)
+    surfaces = list(model.vehicle.surfaces)
+    fitted = model.fitted.commands
+    motions = _relative_motion(samples.commands, fitted) if fitted else np.zeros(len(surfaces))
     highest, lowest = found.upper.max(axis=0), found.lower.min(axis=0)
-    for group, sure, hi, lo in zip(model.groups, known, highest, lowest, strict=True):
+    for group, is_known, hi, lo in zip(model.groups, known_gains(model), highest, lowest, strict=True):
         name = "+".join(group)
         motion = max(motions[surfaces.index(surface)] for surface in group)
-        command = f"the command of {name}"
-        moves = f"{command} moves {motion:.3g} times as much as in the flights of the model, and does"
         if hi < MAX_REVERSED_GAIN:
-            text = f"the rates answer {command} the other way round in all of it (does `scale: -1` fit?)"
-            mistakes[f"sign {name}"] = text
-        elif sure and hi < _MIN_COMMAND_GAIN and motion > _MAX_ALIKE_FACTOR:
-            mistakes[f"unit {name}"] = f"{moves} at most {hi:.2g} of what it did{_COMMAND_UNIT_HINT}"
-        elif sure and lo > 1.0 / _MIN_COMMAND_GAIN and 0.0 < motion < 1.0 / _MAX_ALIKE_FACTOR:
-            mistakes[f"unit {name}"] = f"{moves} at least {lo:.3g} times what it did{_COMMAND_UNIT_HINT}"
+            mistakes["sign", name] = motion, hi
+        elif is_known and hi < _MIN_COMMAND_GAIN and motion > _MAX_ALIKE_FACTOR:
+            mistakes["weak", name] = motion, hi
+        elif is_known and lo > 1.0 / _MIN_COMMAND_GAIN and 0.0 < motion < 1.0 / _MAX_ALIKE_FACTOR:
+            mistakes["strong", name] = motion, lo
     return mistakes
 
 

@@ -11,7 +11,7 @@ from difflib import SequenceMatcher
 from io import StringIO
 from math import isnan
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,8 +67,8 @@ class RecordedFlight:
     """One flight: its columns by name, what went wrong by the log's own word, remarks on the reading, and the
     autopilot's parameters that the log carries.
 
-    unread_column_names: names of further columns of the log, for the message that a wanted column is missing.
-    A reader of wanted columns gives them where the log lacks one of these.
+    unread_column_names: names of columns of the log, those that were not read among them, for the message
+    that a wanted column is missing. A reader of wanted columns gives them where the log lacks one of these.
     """
 
     name: str
@@ -153,23 +153,30 @@ def names_of_topics(topics: Mapping[str, Topic]) -> tuple[str, ...]:
     return tuple(f"{name}.{field}" for name, topic in topics.items() for field in topic.fields)
 
 
+class TopicColumns(NamedTuple):
+    """The columns of a log by name; the names of all its columns; the stamp, s, from which the times count,
+    None if no row has one."""
+
+    columns: Columns
+    all_names: tuple[str, ...]
+    origin_s: float | None
+
+
 def columns_of_topics(
     topics: Mapping[str, Topic], wanted: Wanted, all_topics: Mapping[str, Topic]
-) -> tuple[Columns, tuple[str, ...], float | None]:
+) -> TopicColumns:
     """The columns `topic.field` of a log: those of the wanted names, all of `topics` if wanted is None.
 
     topics: the topics that were read, those of the wanted columns among them. all_topics: gives names only.
     It is `topics` itself if these have every wanted column, or are all that the log has. A reader that reads
     some topics passes all topics of the log if a wanted column is missing, for the message that says so.
 
-    Returns three values: the columns by name; the names in all_topics that are no such column; the earliest
-    stamp of `topics` in s, from which the times of the columns count, None if no row has a stamp. If
-    all_topics has none of the wanted names, the columns are all of its names, without rows; then there are no
-    other names, and no stamp.
+    The origin of the times is the earliest stamp of `topics`. If all_topics has none of the wanted names, the
+    columns are all of its names, without rows.
     """
     names = names_of_topics(all_topics)
     if wanted is not None and not {*wanted} & {*names}:
-        return dict.fromkeys(names, Column(np.empty(0), np.empty(0))), (), None
+        return TopicColumns(dict.fromkeys(names, Column(np.empty(0), np.empty(0))), names, None)
     kept = {name: rows_with_increasing_time(name, topic.stamps_us) for name, topic in topics.items()}
     first_us = [topics[name].stamps_us[rows[0]] for name, (rows, _) in kept.items() if len(rows)]
     origin_us = min(first_us, default=0.0)
@@ -182,7 +189,7 @@ def columns_of_topics(
             if wanted is None or f"{name}.{field_name}" in wanted:
                 values = np.asarray(topic.values(field_name)[rows], dtype=float)
                 columns[f"{name}.{field_name}"] = Column(t_s, values, note)
-    return columns, tuple(name for name in names if name not in columns), origin_s
+    return TopicColumns(columns, names, origin_s)
 
 
 def rows_with_increasing_time(topic: str, stamps: Floats) -> tuple[Ints, str]:

@@ -53,8 +53,8 @@ def read(path: Path, wanted: Wanted = None) -> RecordedFlight:
         if not topics:
             reason = "holds no message with a time stamp, allowed: a dataflash log of a flight"
             raise BadInput(f"{path}: {reason}")
-        columns, unread, _ = columns_of_topics(topics, wanted, topics)
-    return RecordedFlight(path.stem, columns, parameters=params, unread_column_names=unread)
+        columns, names, _ = columns_of_topics(topics, wanted, topics)
+    return RecordedFlight(path.stem, columns, parameters=params, unread_column_names=names)
 
 
 def _topics_of_instances(name: str, messages: Any) -> Iterator[tuple[str, Topic]]:

@@ -38,9 +38,9 @@ def read(path: Path, wanted: Wanted = None) -> RecordedFlight:
             all_topics = _read_topics(path, None, {})
         if not all_topics:
             raise BadInput(f"{path}: holds no message, allowed: a log of a flight")
-        columns, unread, origin_s = columns_of_topics(topics, wanted, all_topics)
+        columns, names, origin_s = columns_of_topics(topics, wanted, all_topics)
     notes = () if origin_s is None else (f"time counts from {origin_s:.3f} s of the autopilot's clock",)
-    return RecordedFlight(path.stem, columns, notes=notes, parameters=params, unread_column_names=unread)
+    return RecordedFlight(path.stem, columns, notes=notes, parameters=params, unread_column_names=names)
 
 
 def _read_topics(path: Path, wanted: Wanted, params: Parameters) -> dict[str, Topic]:

@@ -19,7 +19,7 @@ from beaver_ftc.control.laws.loop_design import margins
 from beaver_ftc.control.laws.rejecting import STAND_IN
 from beaver_ftc.control.readout import DefaultLaw
 from beaver_ftc.design.model import jacobian
-from beaver_ftc.design.table import QDYN
+from beaver_ftc.design.table import AIRSPEED, DPT, QDYN
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.documents.files import Document
@@ -64,16 +64,18 @@ def study(scenario: Scenario) -> list[Margin]:
 
 def over_envelope(scenario: Scenario, count: int) -> Iterator[Scenario]:
     """The scenario at so many airspeeds of the envelope, evenly spaced from its slowest to its fastest."""
-    airspeeds_mps = np.linspace(*scenario.airframe.envelope.airspeed_mps, count)
-    return (scenario.with_({"initial.airspeed_mps": float(V)}) for V in airspeeds_mps)
+    ends_mps = scenario.airframe.envelope.airspeed_mps
+    return (scenario.with_({"initial.airspeed_mps": float(V)}) for V in np.linspace(*ends_mps, count))
 
 
 def refuse_other_laws(scenario: Scenario) -> None:
     """Raise BadInput unless the law is one whose loop this is."""
     allowed = flown_by("rejecting")
     if scenario.control.law not in allowed:
-        says = f"margins are known of the default law's loop, allowed: {', '.join(allowed)}"
-        raise BadInput(f"{scenario.name}: control.law: {scenario.control.law}: {says}")
+        raise BadInput(
+            f"{scenario.name}: control.law: {scenario.control.law}: margins are known of the default law's "
+            f"loop, allowed: {', '.join(allowed)}"
+        )
 
 
 def at(scenario: Scenario) -> Iterator[Margin]:
@@ -121,7 +123,7 @@ def open_loop(
 
 def interpolated(law: DefaultLaw, qdyn: float, lost: float) -> np.ndarray:
     """Kp, L_rate and L_disturbance, (3, 3) over the axes, of the law's schedule at a dynamic pressure (Pa), a
-    share `lost` of pitch handed over."""
+    share `lost` of pitch handed over. The twin of `schedule` in control/laws/rejecting.py."""
     schedules = law.Kp, law.L_rate, law.L_disturbance
     found = np.array([[np.interp(qdyn, law.qdyn_pa, row) for row in rows] for rows in schedules])
     found[:, PITCH] += lost * (found[:, STAND_IN] - found[:, PITCH])
@@ -129,7 +131,8 @@ def interpolated(law: DefaultLaw, qdyn: float, lost: float) -> np.ndarray:
 
 
 def allocation(G: np.ndarray, main: np.ndarray, stand_in: int, lost: float) -> np.ndarray:
-    """Commands per demanded acceleration, (n, 3), as control/allocation.py gives them within the travels."""
+    """Commands per demanded acceleration, (n, 3), within the travels. The twin of `allocate` in
+    control/allocation.py."""
     commands = np.zeros((G.shape[1], 3))
     a, e, r = main[[ROLL, PITCH, YAW]]
     flap = lost if stand_in >= 0 else 0.0
@@ -153,9 +156,9 @@ def outputs(states: tuple[str, ...], y: np.ndarray) -> np.ndarray:
     C = np.zeros((3 + len(y), len(states)))
     for row, name in enumerate((*AXES, "alpha", "beta", "airspeed")):
         C[row, states.index(name)] = 1.0
-    V = states.index("airspeed")
-    C[6, V] = 2.0 * y[QDYN] / y[2]
-    C[7:, V] = -3.0 * y[4:] / y[2]
+    C_V = C[3:, states.index("airspeed")]  # of y
+    C_V[QDYN] = 2.0 * y[QDYN] / y[AIRSPEED]
+    C_V[DPT:] = -3.0 * y[DPT:] / y[AIRSPEED]
     return C
 
 

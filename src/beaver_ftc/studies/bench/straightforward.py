@@ -25,6 +25,7 @@ from beaver_ftc.studies.bench.contenders import take_over
 AXES = "pqr"
 SIGNALS = ("alpha", "beta", "ph", "qh", "rh", "dpt")  # of the terms of moments
 LEAST_EFFECTIVENESS = 0.1
+MAX_DEFLECTION_RAD = 0.44  # of aileron, elevator and rudder alike: about 25 deg
 
 
 # xdot = I^-1 (M - x cross I x), x rad/s. M, N m: a sum of terms, each a value times powers of SIGNALS, into
@@ -59,10 +60,10 @@ class Estimators:
     """The detection estimator, its network, the isolation estimators.
 
     x_hat, threshold, residual (3,) rad/s: of the detection estimator. weights (3, N_BASIS) rad/s2, basis
-    (N_BASIS,): of its network. fie, omega, rise, fall, bound, lower, upper, fie_residual (estimator, axis)
-    rad/s: estimates, filtered regressors with their positive and negative parts, the filtered bound, and
-    each residual with its limits. theta, covariance (estimator, axis): the loss of effectiveness, -1 to 0,
-    and the variance of its estimate.
+    (N_BASIS,): of its network. (estimator, axis), rad/s: fie, the estimates; Om, R_pos, R_neg (R+, R-): the
+    filtered regressors and their positive and negative parts; B: the filtered bound; fie_residual, lower,
+    upper: eps, each residual, and its limits. theta, P (estimator, axis): the loss of effectiveness, -1 to 0,
+    and the variance of its estimate. docs/explanation/isolation.md derives what `adapt` and `judge` compute.
     """
 
     def __init__(self, scenario: Scenario, dt: float) -> None:
@@ -82,13 +83,17 @@ class Estimators:
         self.detected = False
         self.excluded = np.zeros(3, bool)
         self.fie = np.zeros((3, 3))
-        self.omega, self.rise, self.fall, self.bound = (np.zeros((3, 3)) for _ in range(4))
+        self.Om, self.R_pos, self.R_neg, self.B = (np.zeros((3, 3)) for _ in range(4))
         self.theta = np.zeros((3, 3))
-        self.covariance = np.full((3, 3), 1.0 / 12.0)
+        self.P = np.full((3, 3), 1.0 / 12.0)
         self.fie_residual, self.lower, self.upper = (np.full((3, 3), np.nan) for _ in range(3))
 
     def predict(self, x: np.ndarray, rate: np.ndarray, Z: np.ndarray, eta_bar: np.ndarray) -> None:
-        """One frame on.
+        """One frame on, each axis.
+
+            x_hat     <- x + dt (rate + w.basis + (effectiveness - 1) Z) + decay (x_hat - x)
+            threshold <- decay threshold + dt eta_bar
+            w         <- keep (w + dt gain outside basis),  outside: the residual beyond its threshold
 
         x (3,) rad/s as it began; rad/s2: rate (3,) = f + G u, Z (3, 3) what each surface gives of it.
         """
@@ -102,31 +107,40 @@ class Estimators:
         self.threshold = self.decay * self.threshold + self.dt * eta_bar
 
     def adapt(self, x: np.ndarray, rate: np.ndarray, Z: np.ndarray, eta_bar: np.ndarray) -> None:
-        """The same for the isolation estimators, by least squares projected onto [-1, 0]."""
-        a, dt, noise = self.fie_decay, self.dt, self.bound**2
-        scale = noise + self.omega**2 * self.covariance
-        gain = np.divide(self.covariance * self.omega, scale, out=np.zeros((3, 3)), where=scale > 0)
+        """The same for the isolation estimators, by least squares projected onto [-1, 0].
+
+        D  = clip(theta + P Om eps / (B^2 + Om^2 P), -1, 0) - theta,  eps = x - x_hat
+        P  <- min(P B^2 / (B^2 + Om^2 P) / forgetting, 1/12)
+        Om <- a Om + dt Z,  x_hat <- x + dt (rate + Z theta) + a (x_hat - x) + Om D,  theta <- theta + D
+        R+ <- a R+ + dt max(Z, 0),  R- <- a R- + dt min(Z, 0),  B <- a B + dt eta_bar
+        """
+        a, dt, noise = self.fie_decay, self.dt, self.B**2
+        scale = noise + self.Om**2 * self.P
+        gain = np.divide(self.P * self.Om, scale, out=np.zeros((3, 3)), where=scale > 0)
         theta = np.clip(self.theta + gain * self.fie_residual, -1.0, 0.0)
         share = np.divide(noise, scale, out=np.ones((3, 3)), where=scale > 0)
-        self.covariance = np.minimum(self.covariance * share / self.forgetting, 1.0 / 12.0)
-        omega = a * self.omega + dt * Z
-        self.fie = x + dt * (rate + Z * self.theta) + a * (self.fie - x) + omega * (theta - self.theta)
-        self.omega = omega
+        self.P = np.minimum(self.P * share / self.forgetting, 1.0 / 12.0)
+        Om = a * self.Om + dt * Z
+        self.fie = x + dt * (rate + Z * self.theta) + a * (self.fie - x) + Om * (theta - self.theta)
+        self.Om = Om
         self.theta = theta
-        self.rise = a * self.rise + dt * np.maximum(Z, 0.0)
-        self.fall = a * self.fall + dt * np.minimum(Z, 0.0)
-        self.bound = a * self.bound + dt * eta_bar
+        self.R_pos = a * self.R_pos + dt * np.maximum(Z, 0.0)
+        self.R_neg = a * self.R_neg + dt * np.minimum(Z, 0.0)
+        self.B = a * self.B + dt * eta_bar
 
     def judge(self, x: np.ndarray, alpha: float, beta: float) -> None:
-        """Compare with the measured x (3,) rad/s: raise the alarm, exclude faults."""
+        """Compare with the measured x (3,) rad/s: raise the alarm, exclude faults.
+
+        alarm: |x - x_hat| > threshold;  not excluded: -R+ - Om theta - B <= eps <= -R- - Om theta + B
+        """
         self.residual = x - self.x_hat
         if not self.detected and (np.abs(self.residual) > self.threshold).any():
             self.detected = True
             self.fie = np.tile(x, (3, 1))
         if self.detected:
             self.fie_residual = x - self.fie
-            self.lower = -self.rise - self.omega * self.theta - self.bound
-            self.upper = -self.fall - self.omega * self.theta + self.bound
+            self.lower = -self.R_pos - self.Om * self.theta - self.B
+            self.upper = -self.R_neg - self.Om * self.theta + self.B
             within = (self.lower <= self.fie_residual) & (self.fie_residual <= self.upper)
             self.excluded |= ~within.all(axis=1)
             self.basis = _basis(alpha, beta)
@@ -140,8 +154,7 @@ class Estimators:
     @property
     def unknown(self) -> np.ndarray:
         """The unknown acceleration, as far as it has been learnt since the alarm, (3,) rad/s2."""
-        learnt = self.weights @ self.basis + self.pole * self.residual
-        return learnt if self.detected else np.zeros(3)
+        return self.weights @ self.basis + self.pole * self.residual if self.detected else np.zeros(3)
 
     @property
     def effectiveness(self) -> np.ndarray:
@@ -184,7 +197,7 @@ class FeedbackLinearisation:
         demand = self.model[1] + self.Kp * error + self.Ki * self.integral - f - unknown
         three = np.linalg.solve(G[:, :3], demand - G[:, 3] * self.flap_rad)
         self.model = self.A @ self.model + np.outer(self.B, reference)
-        return np.append(np.clip(three, -0.44, 0.44), self.flap_rad)
+        return np.append(np.clip(three, -MAX_DEFLECTION_RAD, MAX_DEFLECTION_RAD), self.flap_rad)
 
 
 class Straightforward:
@@ -238,8 +251,7 @@ class Straightforward:
         declared = Declared.of(self.scenario)
         cross = np.array([x[1] * x[2], x[0] * x[2], x[0] * x[1]])
         earth = EARTH_RATE_RAD_S * (2.0 * np.abs(x).sum() + EARTH_RATE_RAD_S)
-        published = np.array(declared.coupling) * np.abs(COUPLING * cross)
-        return published + declared.constant_rad_s2 + earth
+        return np.array(declared.coupling) * np.abs(COUPLING * cross) + declared.constant_rad_s2 + earth
 
     def row(self, truth: dict[str, float], x: np.ndarray, reference: np.ndarray) -> dict[str, float]:
         """A row of the log."""

@@ -204,9 +204,8 @@ class Columns(dict[str, np.ndarray]):
 
     def open(self, columns: Sequence[str]) -> None:
         """A flight begins, with these columns in its rows."""
-        names = list(columns)
-        self._names = self._wanted or tuple(names)
-        self._places = [names.index(name) for name in self._names]
+        self._names = self._wanted or tuple(columns)
+        self._places = [columns.index(name) for name in self._names]
         self._chunks: list[np.ndarray] = []
 
     def write(self, rows: np.ndarray) -> None:
@@ -216,7 +215,7 @@ class Columns(dict[str, np.ndarray]):
 
     def close(self) -> None:
         """The flight is over."""
-        whole = np.concatenate(self._chunks, axis=1) if len(self._chunks) > 1 else self._chunks[0]
+        whole = np.concatenate([np.empty((len(self._names), 0)), *self._chunks], axis=1)
         self.update(zip(self._names, whole, strict=True))
 
     def since(self, from_s: float) -> Values:

@@ -96,8 +96,10 @@ class ParquetLog:
         # Not pa.array: it imports pandas, if that is installed, only to see whether it was given a series.
         used = self._used
         float64 = pa.float64()
-        values = (pa.py_buffer(column[:used]) for column in self._buffer)
-        arrays = [pa.Array.from_buffers(float64, used, [None, column]) for column in values]
+        arrays = [
+            pa.Array.from_buffers(float64, used, [None, pa.py_buffer(column[:used])])
+            for column in self._buffer
+        ]
         writer.write_table(pa.Table.from_arrays(arrays, schema=self._schema))
         self._used = 0
 
@@ -224,12 +226,13 @@ class Columns(dict[str, np.ndarray]):
         return {name: column[late] for name, column in self.items()}
 
 
-class SpooledLog(MemoryLog):
-    """A `MemoryLog` that is kept in a temporary file: an hour of flight is 0.3 GB."""
+class SpooledLog:
+    """A `LogSink` that keeps the rows in a temporary file: an hour of flight is 0.3 GB. `frozen_copy` reads
+    them."""
 
     def open(self, columns: Sequence[str]) -> None:
         """Start again; what `frozen_copy` gave before stays readable."""
-        super().open(columns)
+        self.columns = tuple(columns)
         self._file = tempfile.TemporaryFile()  # noqa: SIM115 -- gone with this log, or the process
         self._frames = 0
 
@@ -237,6 +240,9 @@ class SpooledLog(MemoryLog):
         """Keep a copy of `rows`, shape (n, columns), float64."""
         self._file.write(rows.tobytes())
         self._frames += len(rows)
+
+    def close(self) -> None:
+        """The file stays open for copies."""
 
     def frozen_copy(self) -> MemoryLog:
         """The log as it is now, read from the file as it is asked for."""
@@ -336,6 +342,7 @@ def log_dataframe(log: "Log", found: Metrics) -> "DataFrame":
         "isolated": isolation.fault, "type": isolation.type, "isolation_delay_s": isolation.delay_s,
         "departed": found.departure is not None,
     }  # fmt: skip
-    about = {"scenario": found.scenario, "seed": found.seed}
-    table.attrs = {**about, "verdict": verdict, "units": units(log.columns)}
+    table.attrs = {
+        "scenario": found.scenario, "seed": found.seed, "verdict": verdict, "units": units(log.columns),
+    }  # fmt: skip
     return table

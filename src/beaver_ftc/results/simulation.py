@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Self, cast
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.simulation import Asked, Stepping
 from beaver_ftc.results.flight import Flight, check_plug_in
-from beaver_ftc.results.log import MemoryLog
+from beaver_ftc.results.log import MemoryLog, SpooledLog
 from beaver_ftc.scenario.schema import ScenarioLike, load
 
 if TYPE_CHECKING:
@@ -60,12 +60,12 @@ class Simulation(Stepping):
         *,
         detector: "Detector | None" = None,
         law: "Law | None" = None,
-        log: bool | MemoryLog = True,
+        log: bool | MemoryLog | SpooledLog = True,
         prepare: "Callable[[Plant], None] | None" = None,
     ) -> None:
         check_plug_in("detector", detector)
         check_plug_in("law", law)
-        self._kept = log if isinstance(log, MemoryLog) else MemoryLog() if log else None
+        self._kept = log if isinstance(log, MemoryLog | SpooledLog) else MemoryLog() if log else None
         super().__init__(load(scenario), detector, law, self._kept, prepare)
 
     @property
@@ -95,7 +95,7 @@ class Simulation(Stepping):
         """The flight up to the last frame, as a `Flight`. The simulation can continue afterwards."""
         outcome = self._outcome()
         self._flush()
-        return Flight.landed(outcome, self._kept and self._kept.frozen_copy())
+        return Flight.landed(outcome, None if self._kept is None else self._kept.frozen_copy())
 
     def save(self, out: str | PathLike[str] = "runs", *, report: bool = True) -> Path:
         """Write a result folder of the flight up to the last frame, and return the path of the folder. See

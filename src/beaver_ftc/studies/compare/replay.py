@@ -146,7 +146,11 @@ def _statistics(detector: Detector, seen: Sequence[tuple[Measured, np.ndarray]])
 
 
 def _frames_in_common(recordings: Sequence[Recording]) -> int:
-    """Frames before any fault in which all flights were measured alike, to the bit; zero if they differ."""
+    """Frames before any fault in which all flights are the same, to the bit; zero if they differ.
+
+    Only the last of these frames is compared. That is enough: the flights follow from trim and seed, so if
+    one differs from another in some frame, their states differ in every later frame as well.
+    """
     count = min(
         sum(recording.onset.is_false(measured.t_s) for measured, _ in recording.seen)
         for recording in recordings

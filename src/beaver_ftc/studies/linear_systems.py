@@ -16,6 +16,7 @@ LONGITUDINAL = ("airspeed", "alpha", "q", "theta")
 LATERAL = ("beta", "p", "r", "phi")
 CLASSICAL = LONGITUDINAL + LATERAL
 MODES = ("short_period", "phugoid", "roll", "dutch_roll", "spiral")
+MAX_ZERO_PER_S = 1e6  # a larger root is a zero at infinity, made finite by rounding
 CHANNELS = (("aileron", "p"), ("elevator", "q"), ("rudder", "r"))
 
 
@@ -37,7 +38,12 @@ class Mode:
 
 
 def modes(A: np.ndarray) -> dict[str, Mode]:
-    """The five modes of a system matrix (8, 8) over CLASSICAL, by name."""
+    """The five modes of a system matrix (8, 8) over CLASSICAL, by name.
+
+    The lateral poles are assumed to be a complex pair, the dutch roll, and two real roots: the faster is the
+    roll, the slower the spiral. If these form a second pair (a lateral phugoid), both names get a pole of
+    it. Of the four longitudinal poles the fastest is the short period, the slowest the phugoid.
+    """
     poles, shapes = np.linalg.eig(A)
     share = np.abs(shapes * np.linalg.inv(shapes).T)  # participation of each state in each mode
     lateral = share[len(LONGITUDINAL) :].sum(axis=0) / share.sum(axis=0)
@@ -70,9 +76,8 @@ def zeros(A: np.ndarray, b: np.ndarray, row: int) -> np.ndarray:
     n = len(A)
     c = np.eye(n)[row]
     system = np.block([[A, b[:, None]], [c[None, :], np.zeros((1, 1))]])
-    descriptor = np.diag([1.0] * n + [0.0])
-    found = eigvals(system, descriptor)
-    finite = found[np.isfinite(found) & (np.abs(found) < 1e6)]
+    found = eigvals(system, np.diag([1.0] * n + [0.0]))
+    finite = found[np.isfinite(found) & (np.abs(found) < MAX_ZERO_PER_S)]
     size = [float(f"{each:.6g}") for each in np.abs(finite)]  # the last digits of a pair differ by machine
     return finite[np.lexsort((-finite.imag, size))]
 

@@ -41,22 +41,22 @@ def error_sentences(document: Document) -> Iterator[str]:
         f"{document['scenario']}: with every error at the limit of what is declared, {alarms} flights have a "
         f"false alarm and {misnamed} a wrong name."
     )
-    yield from map(_onset, errors)
+    undeclared = [each["error"] for each in document["errors"] if not each["is_declared"]]
+    for rows in errors:
+        yield _onset(rows, rows[0]["error"] not in undeclared)
 
 
 def _counts(row: Document) -> list[str]:
     return ["{count} of {of}".format(**row[name]) for name in ("false_alarm", "misnamed")]
 
 
-def _onset(rows: Sequence[Document]) -> str:
+def _onset(rows: Sequence[Document], is_declared: bool) -> str:
     """The least factor with a false alarm or a wrong name, of one error."""
-    declared = rows[0]["declared"]
-    size = "the unit" if declared.startswith("none; ") else "the declared size"
-    head = f"{rows[0]['error']} ({declared.replace('none; ', 'not declared; ', 1)})"
+    size = "the declared size" if is_declared else "the unit"
+    head = "{error} ({declared})".format(**rows[0]).replace("(none; ", "(not declared; ", 1)
     broken = next((row for row in rows if row["false_alarm"]["count"] or row["misnamed"]["count"]), None)
     if broken is None:
-        most = rows[-1]["factor"]
-        return f"{head}: no false alarm and no wrong name up to {most:g} times {size}."
+        return f"{head}: no false alarm and no wrong name up to {rows[-1]['factor']:g} times {size}."
     alarms, misnamed = _counts(broken)
     return (
         f"{head}: an error of {broken['factor']:g} times {size} gives a false alarm in {alarms} flights "
@@ -89,10 +89,17 @@ COLUMNS = (
 def draw_errors(document: Document) -> "Figure":
     """A row a quantity, a column an error, over the factor; bars are intervals."""
     errors = [*grouped(document["rows"], "error").values()]
-    titles = [f"{rows[0]['error']}\n{rows[0]['declared']}" for rows in errors]
+    titles = ["{error}\n{declared}".format(**rows[0]) for rows in errors]
     title = f"{document['scenario']}: errors larger than declared"
-    size = 0.8 + 1.9 * len(errors), 0.9 + 1.5 * len(SHOWN)
-    figure, grid = panels(len(SHOWN), len(errors), *size, title, sharex=True, sharey="row")
+    figure, grid = panels(
+        len(SHOWN),
+        len(errors),
+        0.8 + 1.9 * len(errors),
+        0.9 + 1.5 * len(SHOWN),
+        title,
+        sharex=True,
+        sharey="row",
+    )
     for line, quantity in zip(grid, SHOWN, strict=True):
         times = 1.0 if quantity.endswith("_deg_s") else 100.0
         for panel, rows in zip(line, errors, strict=True):

@@ -476,7 +476,8 @@ def configure_gust(gust: np.void, declared: Declared, mass: MassProperties) -> N
     known = bool(aircraft.measurable_forces)
     measured = known or output["uses_accelerometers"]  # only where forces are known
     fill(output, gusty=air.moves, measured=measured)
-    fill_table(memory["table"], aircraft, aircraft.measurable_forces, FORCES)
+    ratio = declared.design_model.coefficients
+    fill_table(memory["table"], aircraft, aircraft.measurable_forces, FORCES, ratio)
     aloft = air.rotation_walk(span)
     fill(memory, Q=aloft, share=MIN_UNMEASURED_SHARES if measured else 1.0)
     fill(

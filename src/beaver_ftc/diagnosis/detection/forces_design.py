@@ -5,8 +5,8 @@ Letters as in forces.py; y, x, u of a `TrimState` are in trim.
 
 import numpy as np
 
-from beaver_ftc.aircraft import AXES, Aircraft
-from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S
+from beaver_ftc.aircraft import AXES
+from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S, Term
 from beaver_ftc.aircraft.schema import MAX_SURFACES, SIDESLIP_RATE
 from beaver_ftc.compiled import fill
 from beaver_ftc.design.engine import slipstream_slopes
@@ -35,9 +35,10 @@ def configure_forces(
     """
     stat, err = fdi["statistical"], fdi["bound"]["declared_errors"]
     aircraft, forces = declared.aircraft, stat["forces"]
-    CY_bdot = [t.value for t in aircraft.forces if t.coefficient == "CY" and t.of == ((SIDESLIP_RATE, 1),)]
+    CY_bdot = [t for t in aircraft.forces if t.coefficient == "CY" and t.of == ((SIDESLIP_RATE, 1),)]
     fill(
-        forces, c_inv=1.0 / aircraft.geometry.chord_m, q_trim=trim[1][QDYN], CY_bdot=sum(CY_bdot),
+        forces, c_inv=1.0 / aircraft.geometry.chord_m, q_trim=trim[1][QDYN],
+        CY_bdot=sum(_known(declared, term) for term in CY_bdot),
         q_noise=declared.sensors["qdyn"].random,
     )  # fmt: skip
     for i in range(2):
@@ -53,7 +54,7 @@ def _configure_force(
     forces, cfg = stat["forces"], stat["gust"]["config"]
     f, force = forces["component"][i], MEASURED_FORCES[i]
     per_C = y[QDYN] * cfg["S_m"] * forces["c_inv"]
-    f_all = per_C * _force_slopes(aircraft, force.coefficient, trim)
+    f_all = per_C * _force_slopes(declared, force.coefficient, trim)
     f_y = f_all[:-1]
     std = errors[force.accelerometer].random
     drift = _drift_bound(errors, cfg["gravity"], y[AIRSPEED], i)
@@ -67,7 +68,7 @@ def _configure_force(
     _configure_columns(stat, declared, y, f_y[force.vane] / per_C, drift, i)
     for term in terms_of_force(aircraft, i):
         if term.surface:
-            f["G_trim"][aircraft.surfaces.index(term.surface)] += per_C * abs(term.value)
+            f["G_trim"][aircraft.surfaces.index(term.surface)] += per_C * abs(_known(declared, term))
 
 
 def _force_variances(
@@ -127,7 +128,7 @@ def _configure_columns(
     vane, acc = errors[force.vane_name], errors[force.accelerometer]
     tol_q = errors["qdyn"].steady / y[QDYN] + errors["qdyn"].slope
     tol = [
-        (tol_C + tol_q + vane.slope) * abs(t.value) + t.is_constant * vane.steady * abs(C_vane)
+        (tol_C + tol_q + vane.slope) * abs(_known(declared, t)) + t.is_constant * vane.steady * abs(C_vane)
         for t in terms_of_force(declared.aircraft, i)
     ]
     first = int(rows["first"][i])
@@ -143,22 +144,27 @@ def _configure_columns(
     rows["e_G"][MAX_SURFACES + i] = VANE_TOLERANCE * np.abs(of_vane)
 
 
-def _force_coefficient(aircraft: Aircraft, name: str, state: TrimState) -> float:
+def _known(declared: Declared, term: Term) -> float:
+    """The value of a term in the design model."""
+    return term.value * declared.design_model.coefficients.get(term.name, 1.0)
+
+
+def _force_coefficient(declared: Declared, name: str, state: TrimState) -> float:
     """The force coefficient `name` at x (3,) rad/s, y, u rad."""
     x, y, u = state
-    geometry = aircraft.geometry
+    aircraft, geometry = declared.aircraft, declared.aircraft.geometry
     V = y[AIRSPEED]
     rates = x * (geometry.span_m / (2.0 * V), geometry.chord_m / V, geometry.span_m / (2.0 * V))
     names = (*aircraft.surfaces, *aircraft.signals, "alpha", "beta", "ph", "qh", "rh", SIDESLIP_RATE)
     values = dict(zip(names, (*u, *y[4:], *y[:2], *rates, 0.0), strict=True))
-    return float(aircraft.coefficient(name, values))
+    return float(aircraft.coefficient(name, values, declared.design_model.coefficients))
 
 
-def _force_slopes(aircraft: Aircraft, name: str, trim: TrimState) -> np.ndarray:
+def _force_slopes(declared: Declared, name: str, trim: TrimState) -> np.ndarray:
     """(7,): its derivatives with alpha, beta (1/rad), airspeed (s/m), rates (s/rad), dpt, by differences."""
     (x, y, u), step = trim, 1e-5
     states = [(x, y + step * e, u) for e in np.eye(3, y.size)]
     states += [(x + step * e, y, u) for e in np.eye(3)]
     states += [(x, y + step * (np.arange(y.size) == DPT), u)]
-    C = _force_coefficient(aircraft, name, trim)
-    return np.array([(_force_coefficient(aircraft, name, state) - C) / step for state in states])
+    C = _force_coefficient(declared, name, trim)
+    return np.array([(_force_coefficient(declared, name, state) - C) / step for state in states])

@@ -155,7 +155,8 @@ def forget_losses(autopilot: np.void) -> None:
     for loss in ("roll_loss_share", "yaw_loss_share", "engines_alone_yaw_share"):
         autopilot[loss] = 0.0
     autopilot["missing_roll_rate"] = autopilot["missing_turn_rate"] = 0.0
-    autopilot["holding"]["n_averaged_frames"] = autopilot["holding"]["limits_airspeed"] = 0
+    for held in ("n_averaged_frames", "limits_airspeed", "mean_acting_elevator", "mean_commanded_elevator"):
+        autopilot["holding"][held] = 0
 
 
 @kernel

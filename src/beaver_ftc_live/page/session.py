@@ -34,7 +34,8 @@ OF_A_FLIGHT = ("break", "repair", "blow", "aim", "change")  # requests that a fi
 CHANGES_NOTHING = ("save", "stick")  # requests after which a saved folder still has all of the flight
 HIDDEN = (
     "_effective_rad", "_pos_rad", "_effectiveness_estimate", "_effectiveness_used", "mode", "detected",
-    "_residual_rad_s", "_threshold_rad_s", "_network_rad_s2", "_likelihood_share",
+    "_residual_rad_s", "_threshold_rad_s", "_network_rad_s2", "_likelihood_share", "_design_rad_s2",
+    "_eta_bar_rad_s2",
 )  # fmt: skip
 HIDDEN_WHOLE = ("fie_", "watch_")
 

@@ -352,8 +352,9 @@ def _with_known_parts(base: dict[str, Any], vary: Iterable[str]) -> dict[str, An
     """The base. Where `sensors` or `actuators` vary, the designer knows those of the base, not each
     flight's."""
     varied = [part for part in ("actuators", "sensors") if any(parse_key(key)[0] == part for key in vary)]
-    known = {part: base.get(part, "ideal") for part in varied} | (base.get("design_model") or {})
-    return {**base, "design_model": known} if varied else base
+    known = {part: base.get(part, "ideal") for part in varied}
+    said = {key: value for key, value in (base.get("design_model") or {}).items() if value is not None}
+    return {**base, "design_model": known | said} if varied else base
 
 
 def _base(

@@ -217,8 +217,8 @@ class SweepFile(Section, title="beaver-ftc sweep"):
     sampling: how values are drawn. `lhs` (Latin hypercube) and `sobol` fill the ranges more evenly. `grid`:
     all combinations of `linspace` and `choice`
     vary: keys of the base that vary, and how each key varies. A key is written as in `set`. Where `sensors`
-    varies, the law knows the sensors of the base, unless `design_model.sensors` is set. Diagnosis and law
-    know `actuators`, also where it varies: unknown errors of servos are keys of `uncertainty.actuators`
+    or `actuators` vary, the designer knows those of the base, unless `design_model` has them. Unknown errors
+    of servos are keys of `uncertainty.actuators`
     expect: conditions that the statistics must meet
     """
 

@@ -127,8 +127,9 @@ class Context:
     - `model`: the design model. `model.f(x, y)` (3,) rad/s² is the angular acceleration at neutral surfaces,
       for rates x (3,) rad/s and signals y as in `Measured.y`. `model.G(y)` (3, surfaces) rad/s² for each rad
       is the effect of each surface.
-    - `trim_x` (3,) rad/s, `trim_y` (4 + signals,), `trim_rad` (surfaces,) rad: rates, signals and deflections
-      of the surfaces in trim, at the start of the flight. `trim_y` has the order and units of `Measured.y`.
+    - `trim_x` (3,) rad/s, `trim_y` (4 + signals,): rates and signals in the trim that the designer knows.
+      `trim_y` has the order and units of `Measured.y`.
+    - `trim_rad` (surfaces,) rad: deflections in force at the start, which hold the true aircraft.
     - `travel_rad` (2, surfaces) rad: lower and upper limit of each surface.
     - `constant_rad_s2` (3,) rad/s²: declared bound on the constant error of the angular acceleration.
       `inertia_coupling` (3,): declared bound on the relative error of the inertia coupling.

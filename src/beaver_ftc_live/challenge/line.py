@@ -34,7 +34,7 @@ MOST_ASKED = 1000  # times in a frame
 MOST_ROWS = 64  # of x that the design model is asked for at once
 MOST_TEXT = 200
 POLL_S = 0.02
-PACE_S = 0.003  # at least from an answer to the next question: a fault's first frame takes longest to fly
+PACE_S = 0.002  # at least from an answer to the next question: a fault's first frame takes longest to fly
 _READY = re.compile(r"(detector|law|fault-tolerant law):([A-Za-z_]\w{0,60})", re.ASCII)
 
 

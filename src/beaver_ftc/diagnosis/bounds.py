@@ -49,9 +49,8 @@ from beaver_ftc.design.model import (
 )
 from beaver_ftc.design.table import AIRSPEED, DPT, N_Y, QDYN, evaluate
 from beaver_ftc.diagnosis.error_map import fill_map, look_up_map, map_dtype
-from beaver_ftc.plant.faults import OF_THE_SLIPSTREAM
 from beaver_ftc.scenario.declared import Declared
-from beaver_ftc.scenario.sensors import ENGINE
+from beaver_ftc.scenario.sensors import ENGINE, OF_THE_SLIPSTREAM
 
 Y0 = 3  # gyros come first among the signals, then alpha, beta, airspeed, dynamic pressure
 _MIN_V_SHARE = 0.1

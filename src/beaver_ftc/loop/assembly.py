@@ -35,7 +35,6 @@ from beaver_ftc.loop.frame import true_faults_dtype
 from beaver_ftc.loop.memory import copied, taken_empty
 from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.channels import RUNNING
-from beaver_ftc.plant.faults import OF_THE_SLIPSTREAM
 from beaver_ftc.plant.instruments import (
     LONGEST_DELAY,
     MEASURED,
@@ -49,7 +48,7 @@ from beaver_ftc.plant.sensing import truth_dtype
 from beaver_ftc.scenario.builtin import texts_of
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario, stages
-from beaver_ftc.scenario.sensors import N_IN_EQUATIONS, ROWS, frames_apart
+from beaver_ftc.scenario.sensors import N_IN_EQUATIONS, OF_THE_SLIPSTREAM, ROWS, frames_apart
 
 # What sets the counters of random numbers apart: OF_THE_FIRST, OF_THE_FURTHER, OF_FAULTS, OF_FORCES,
 # OF_THE_SAMPLED.

@@ -21,14 +21,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from beaver_ftc.scenario.faults import DAMAGE, HEALTHY, Past, SensorFault, SurfaceFault, place_of
-from beaver_ftc.scenario.sensors import ENGINE, QUANTITIES, Sensors
+from beaver_ftc.scenario.sensors import QUANTITIES, Sensors
 from beaver_ftc.scenario.signals import frame_of, grown_share
 
 if TYPE_CHECKING:
     from beaver_ftc.plant.adapter import Plant
 
 _SENSORS = tuple(Sensors.model_fields)
-OF_THE_SLIPSTREAM = ("V", "qdyn", *ENGINE)  # what dpt is worked out from
 NEVER = sys.maxsize
 OF_DAMAGE = f"failures/{DAMAGE}"
 

@@ -241,6 +241,7 @@ class Quantity(NamedTuple):
 QUANTITIES = {row.name: Quantity(row.errors.unit, row.errors.si[-1], row.most, row.words) for row in ROWS}
 ALIASES = {row.words: row.name for row in ROWS if row.words}
 ENGINE = ("engine_rpm", "manifold_pressure")  # sensors of an engine like the Beaver's
+OF_THE_SLIPSTREAM = ("V", "qdyn", *ENGINE)  # what dpt is worked out from
 ACCELEROMETERS = ("ax", "ay", "az")
 
 

@@ -234,6 +234,12 @@ def test_the_design_follows_the_servos_that_the_designer_knows():
     assert of_designer == configured(base.with_({"actuators": known})) != configured(base)
 
 
+@pytest.mark.parametrize("term", ["CY_beta", "CZ_alpha", "Cm_alpha"])
+def test_the_diagnosis_knows_each_term_of_the_design_model(term):
+    base = declared("statistical, noisy")
+    assert configured(base.with_({f"design_model.coefficients.{term}": 0.7})) != configured(base)
+
+
 def test_the_designers_trim_is_that_of_a_truth_as_declared():
     nominal = declared("published")
     off = nominal.with_({"uncertainty": {"coefficients": {"Cm_0": 1.2}, "inertia": {"Iy": 1.1}}})

@@ -75,3 +75,8 @@ def test_a_law_does_not_know_the_sensors_of_its_flight(key):
     value = 0.03 if key != "sensors" else {"q": {"delay_s": 0.03}}
     flown = load_sweep_text(HEAD + f"vary:\n  {key}: {{choice: [{value}]}}\n").scenario({key: value})
     assert (flown.sensors.q.delay_s, flown.known_sensors.q.delay_s) == (0.03, 0.0)
+
+
+def test_the_designer_does_not_know_the_actuators_of_its_flight():
+    flown = load_sweep_text(HEAD + "vary:\n  actuators: {choice: [servo]}\n").scenario({"actuators": "servo"})
+    assert flown.known_actuators != flown.actuators

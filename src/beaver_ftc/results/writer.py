@@ -113,9 +113,8 @@ def run(
                 write_recording(log_path, stops_rad, recording, folder, tuple(aircraft.signals))
     if failed:
         why = "; ".join(" ".join(str(error).split()) for error in failed)
-        raise NotAllWritten(f"{out / scenario.name}: the flight and its log are kept, but {why}") from failed[
-            0
-        ]
+        kept = f"{out / scenario.name}: the flight and its log are kept"
+        raise NotAllWritten(f"{kept}, but {why}") from failed[0]
     return document
 
 

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from beaver_ftc.control.accommodation import MODES, mode_from, next_mode
+from beaver_ftc.control.accommodation import MODES, SUPERVISOR, mode_from, supervise
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
 from law_records import new_control
 
@@ -34,7 +34,11 @@ def test_mode(law, situation):
     assert MODES[mode_from(control["config"], control["layout"], said, said)] == EXPECTED[law][situation]
 
 
-@pytest.mark.parametrize(("now", "wanted"), list(itertools.product(MODES, MODES)))
-def test_the_way_out_of_nominal_leads_through_adaptive(now, wanted):
-    reached = MODES[next_mode(MODES.index(now), MODES.index(wanted))]
-    assert reached == ("adaptive" if now == "nominal" and wanted != "nominal" else wanted)
+@pytest.mark.parametrize(("told", "now", "wanted"), list(itertools.product((0, 1), MODES, MODES)))
+def test_the_way_out_of_nominal_leads_through_adaptive(told, now, wanted):
+    """As does that of a law which takes over from one that was told."""
+    supervisor = np.zeros(1, SUPERVISOR).view(np.recarray)[0]
+    supervisor.mode, supervisor.informed = MODES.index(now), told
+    supervise(supervisor, MODES.index(wanted), 0, 1.0)
+    leaves_nominal = (told or now == "nominal") and wanted != "nominal"
+    assert MODES[supervisor.mode] == ("adaptive" if leaves_nominal else wanted)

@@ -10,8 +10,8 @@ import numpy as np
 from beaver_ftc.compiled import kernel
 from beaver_ftc.design.table import N_Y
 from beaver_ftc.diagnosis.bounds import ROUNDING_RAD_S2
-from beaver_ftc.diagnosis.detection.filters import keep_bank_peak
 from beaver_ftc.diagnosis.model_prediction import evaluate_design
+from beaver_ftc.loop.accounts import keep_closest
 from beaver_ftc.loop.assembly import configure_design
 from beaver_ftc.loop.frame import evaluate_elapsed
 from beaver_ftc.loop.stepping import diagnose
@@ -32,7 +32,8 @@ def evaluate(frames):
 @kernel
 def note(frames):
     """How close the residuals have come to their thresholds."""
-    keep_bank_peak(frames[0].fdi.bank)
+    frame = frames[0]
+    keep_closest(frame.accounts.closest, frame.fdi.bank, frame.fdi.statistical.alarm)
 
 
 def conclude(frames):

@@ -65,9 +65,8 @@ def test_no_admissible_uncertainty_raises_an_alarm(flight, uncertainty, threshol
     plant = DesignPlant(thresholds=thresholds, **flight).fly(FRAMES, uncertainty)
     assert not plant.fdi["verdict"]["detected"]
     assert not any(plant.excluded(s) for s in range(3))
-    assert (
-        max(plant.fdi["bank"]["output"]["peak"]) <= 1.0
-    )  # of every filter, however near the uncertainty drives it
+    # of every filter, however near the uncertainty drives it
+    assert max(plant.frame["accounts"]["closest"]["filter"]) <= 1.0
 
 
 @settings(max_examples=samples(150), deadline=None)

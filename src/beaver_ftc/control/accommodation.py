@@ -28,18 +28,9 @@ from beaver_ftc.scenario.diagnosis import MODES, ControlConfig
 MODE_NOMINAL, MODE_ADAPTIVE, MODE_REALLOCATED, MODE_UNANTICIPATED = range(len(MODES))
 MAX_EVENTS = 64  # of modes, and of exits from the envelope, that a flight records
 
-# mode now; how many modes there were, since when, s, and which: the first ones and the last.
-SUPERVISOR = record(mode=int, n_modes=int, mode_at_s=MAX_EVENTS, mode_is=(int, MAX_EVENTS))
-
-
-@kernel
-def next_mode(now, wanted):
-    """The mode after `now`: the wanted one; from nominal always `adaptive` first.
-
-    An isolation in the very frame of the alarm is acted upon one frame later, so that the published sequence
-    (compensate the unknown, then use what is known of it) holds whatever the diagnosis is capable of.
-    """
-    return MODE_ADAPTIVE if now == MODE_NOMINAL and wanted != MODE_NOMINAL else wanted
+# mode now, and whether the law in charge is informed; how many modes there were, since when, s, and which:
+# the first ones and the last.
+SUPERVISOR = record(mode=int, informed=int, n_modes=int, mode_at_s=MAX_EVENTS, mode_is=(int, MAX_EVENTS))
 
 
 @kernel
@@ -72,14 +63,20 @@ def true_mode(config, layout, faults):
 
 
 @kernel
-def supervise(supervisor, wanted, t):
-    """Go to the mode wanted, as far as that is allowed, and note every change; t s."""
-    mode = next_mode(supervisor.mode, wanted)
+def supervise(supervisor, wanted, informed, t):
+    """Go to the mode wanted, from nominal always to `adaptive` first, and note every change; t s.
+
+    An isolation in the very frame of the alarm is acted upon one frame later, so that the published sequence
+    (compensate the unknown, then use what is known of it) holds whatever the diagnosis is capable of. A law
+    that is not informed begins as nominal after one that was.
+    """
+    nominal = supervisor.mode == MODE_NOMINAL or supervisor.informed > informed
+    mode = MODE_ADAPTIVE if nominal and wanted != MODE_NOMINAL else wanted
     if mode != supervisor.mode or supervisor.n_modes == 0:
         last = min(supervisor.n_modes, MAX_EVENTS - 1)  # once the record is full, its last place
         supervisor.mode_at_s[last], supervisor.mode_is[last] = t, mode
         supervisor.n_modes += 1
-    supervisor.mode = mode
+    supervisor.mode, supervisor.informed = mode, informed
 
 
 # The largest change of an effectiveness a frame; the least that a law divides by.

@@ -15,7 +15,7 @@ from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.control.accommodation import MAX_EVENTS
 from beaver_ftc.design.model import unanticipated_pitch
 from beaver_ftc.diagnosis.conclusion import weighs_statistics
-from beaver_ftc.diagnosis.detection.filters import keep_bank_peak
+from beaver_ftc.diagnosis.detection.filters import filter_share
 from beaver_ftc.diagnosis.error_map import N_MAP_COORDINATES, map_row, outside_span
 from beaver_ftc.diagnosis.monitors import sensor_monitor
 from beaver_ftc.diagnosis.schemes import detection_share
@@ -34,6 +34,8 @@ TRACKING = record(
     since=3, frames_since=int,
 )  # fmt: skip
 AUTHORITY = record(demanded=3, lacking=3, beyond_frames=(int, 3))
+# Largest shares of an alarm in healthy flight: |eps| / mu of each filter, and the score of the statistics.
+CLOSEST = record(filter=MAX_POLES, score=float)
 ENVELOPE = record(
     outside=int, n_exits=int, outside_frames=int, exit_at_s=MAX_EVENTS, return_at_s=MAX_EVENTS,
 )  # fmt: skip
@@ -52,8 +54,8 @@ def accounts_dtype(n: int) -> np.dtype:
     (n,) rad2/s: the integral of the speed's square. beyond_threshold_at_s: since a window of faults began
     (windows.py), the first frame in which the diagnosis shows a fault, -1 if none."""
     return record(
-        guarantee=GUARANTEE, tracking=TRACKING, authority=AUTHORITY, envelope=ENVELOPE,
-        inconclusive=INCONCLUSIVE, beyond_threshold_at_s=float,
+        guarantee=GUARANTEE, tracking=TRACKING, authority=AUTHORITY, closest=CLOSEST,
+        envelope=ENVELOPE, inconclusive=INCONCLUSIVE, beyond_threshold_at_s=float,
         saturated_frames=(int, n), actuator_travel=n, actuator_energy=n, position_then=n,
     )  # fmt: skip
 
@@ -196,6 +198,15 @@ def note_beyond_threshold(accounts, fdi, t):
 
 
 @kernel
+def keep_closest(closest, bank, alarm):
+    """Keep the largest share of its threshold that each filter has reached, and that of the detector."""
+    closest.score = max(closest.score, alarm.ratio)
+    for m in range(bank.config.n_filters):
+        for i in range(3):
+            closest.filter[m] = max(closest.filter[m], filter_share(bank, m, i))
+
+
+@kernel
 def account(frame):
     """Advance the metrics' sums by this frame; before a fault, the closest approach to an alarm."""
     control, truth, sums = frame.control, frame.truth, frame.accounts
@@ -205,9 +216,7 @@ def account(frame):
         if sums.beyond_threshold_at_s < 0.0:
             note_beyond_threshold(sums, frame.fdi, frame.t)
     else:
-        keep_bank_peak(frame.fdi.bank)
-        alarm = frame.fdi.statistical.alarm
-        alarm.peak = max(alarm.peak, alarm.ratio)
+        keep_closest(sums.closest, frame.fdi.bank, frame.fdi.statistical.alarm)
     saturated, dt = control.allocation.output.saturated, control.reference.config.dt
     account_surfaces(sums, truth, saturated, frame.k, dt)
     note_envelope(sums.envelope, truth.value[ch.ENVELOPE] < 0.5, frame.t)

@@ -128,5 +128,7 @@ def take_law(frame: np.void, new: np.void) -> None:
 
 def take_diagnosis(frame: np.void, new: np.void, k: int) -> None:
     """Begin the diagnosis again with frame k, as configured in `new`."""
-    prepare_takeover(new["fdi"], frame["fdi"], in_flight=k > 0)
+    prepare_takeover(new["fdi"], in_flight=k > 0)
+    if new["fdi"]["bank"]["config"]["n_filters"] != frame["fdi"]["bank"]["config"]["n_filters"]:
+        frame["accounts"]["closest"]["filter"] = 0.0  # of other filters nothing is known
     frame["fdi"], frame["since"] = new["fdi"], k

@@ -214,7 +214,7 @@ def decide(frame):
         wanted = accommodation.true_mode(control.config, layout, frame.faults)
     else:
         wanted = accommodation.mode_from(control.config, layout, frame.fdi.verdict, frame.assessment)
-    accommodation.supervise(frame.supervisor, wanted, frame.t)
+    accommodation.supervise(frame.supervisor, wanted, informed, frame.t)
 
 
 @kernel

@@ -222,15 +222,15 @@ def _limits(frame: np.void, surfaces: Sequence[str]) -> tuple[dict[str, Any], ..
     return tuple(sorted(began, key=lambda limit: tuple(limit.values())))
 
 
-def _statistical(fdi: np.void) -> dict[str, float | None] | None:
+def _statistical(frame: np.void) -> dict[str, float | None] | None:
     """What the statistical detector made of the flight, if there was one."""
-    tests, alarm = fdi["statistical"]["test"], fdi["statistical"]["alarm"]
+    tests, alarm = (frame["fdi"]["statistical"][part] for part in ("test", "alarm"))
     if not tests["enabled"]:
         return None
     return {
         "time_s": instant(alarm["detected_at_s"]),
         "alarm_level": float(tests["alarm_level"]),
-        "closest_approach": float(alarm["peak"]),
+        "closest_approach": float(frame["accounts"]["closest"]["score"]),
     }
 
 
@@ -298,7 +298,7 @@ def landing_of(
     known = slice(int(supervisor["n_modes"]))  # as many as there is room for
     modes = zip(supervisor["mode_at_s"][known], supervisor["mode_is"][known], strict=True)
     n_filters = max(int(fdi["bank"]["config"]["n_filters"]), 1)
-    closest = tuple(fdi["bank"]["output"]["peak"][:n_filters].tolist())
+    closest = tuple(accounts["closest"]["filter"][:n_filters].tolist())
 
     def by_surface(values: np.ndarray) -> dict[str, float]:
         return dict(zip(surfaces, values.tolist(), strict=True))
@@ -319,8 +319,8 @@ def landing_of(
         end=(float(frame["truth"]["value"][ch.AIRSPEED]), float(frame["truth"]["value"][ch.ALTITUDE])),
         departure=(float(frame["t"]), DEPARTURE_SIGNALS[departed // 10]) if departed else None,
         saturation_s=by_surface(accounts["saturated_frames"] * dt),
-        worst_residual_ratio=max(*closest, float(fdi["statistical"]["alarm"]["peak"])),
-        statistical=_statistical(fdi),
+        worst_residual_ratio=max(*closest, float(accounts["closest"]["score"])),
+        statistical=_statistical(frame),
         closest_approach=closest,
         authority=_authority(frame),
         probing_s=_probing_s(frame),

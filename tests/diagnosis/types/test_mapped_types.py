@@ -67,7 +67,7 @@ def test_no_healthy_flight_alarms(uncertainty):
     for seed in range(5):
         plant = Mapped(seed=seed).fly(FRAMES, UNCERTAINTIES[uncertainty])
         assert plant.detected_at_s == np.inf
-        assert plant.fdi["bank"]["output"]["peak"].max() > 0.9
+        assert plant.frame["accounts"]["closest"]["filter"].max() > 0.9
 
 
 @pytest.mark.parametrize("course", POSITIONS)

@@ -88,11 +88,10 @@ def published_interval(lo, hi, Om, th, B):
 
 
 # The bank of detection filters; filter 0 is the published one. a: decays per frame; e rad/s: the part of the
-# threshold mu that has a memory; innovation nu rad/s2; residual eps, threshold mu rad/s; peak: largest
-# |eps| / mu in healthy flight.
+# threshold mu that has a memory; innovation nu rad/s2; residual eps, threshold mu rad/s.
 BANK_RECORD = record(
     config=record(n_filters=int, a=MAX_POLES), memory=record(e=(MAX_POLES, 3)),
-    output=record(innovation=3, residual=(MAX_POLES, 3), threshold=(MAX_POLES, 3), peak=MAX_POLES),
+    output=record(innovation=3, residual=(MAX_POLES, 3), threshold=(MAX_POLES, 3)),
 )  # fmt: skip
 
 
@@ -198,14 +197,6 @@ def bank_share(bank):
     for i in range(3):
         best = max(best, filter_share(bank, nearest_filter(bank, i), i))
     return best
-
-
-@kernel
-def keep_bank_peak(bank):
-    """Keep the largest |eps| / mu that each filter has reached."""
-    for m in range(bank.config.n_filters):
-        for i in range(3):
-            bank.output.peak[m] = max(bank.output.peak[m], filter_share(bank, m, i))
 
 
 @kernel

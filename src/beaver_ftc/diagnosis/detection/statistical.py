@@ -79,9 +79,9 @@ TESTING_RECORD = record(
     mapped=int,  # if the error is mapped and no surface can be lost
 )  # fmt: skip
 
-# Output of the detector: largest score over the alarm level and its axis; the largest so far in healthy
-# flight; time of the first alarm, s, or -1. share: n_scores of the log, of losses, then of steps.
-ALARM_RECORD = record(ratio=float, axis=int, peak=float, detected_at_s=float, share=MAX_SURFACES + len(AXES))
+# Output of the detector: largest score over the alarm level and its axis; time of the first alarm, s, or -1.
+# share: n_scores of the log, of losses, then of steps.
+ALARM_RECORD = record(ratio=float, axis=int, detected_at_s=float, share=MAX_SURFACES + len(AXES))
 
 
 @sized

@@ -72,16 +72,12 @@ def configure_diagnosis(fdi: np.void, pred: np.void, declared: Declared, travel:
     conclusions.reset_conclusion(fdi["verdict"])
 
 
-def prepare_takeover(fdi: np.void, earlier: np.void, in_flight: bool) -> None:
-    """Prepare a configured diagnosis to take over from the one in `earlier`, of the same flight.
+def prepare_takeover(fdi: np.void, in_flight: bool) -> None:
+    """Prepare a configured diagnosis to take over from another of the same flight, of which nothing goes on.
 
-    Nothing of a diagnosis goes on but how close healthy flight has come to an alarm, by the same filters.
     in_flight: whether the air moves by then. The sensor monitor's first JSBSim frame begins a frame of the
     loop.
     """
-    fdi["statistical"]["alarm"]["peak"] = earlier["statistical"]["alarm"]["peak"]
-    if fdi["bank"]["config"]["n_filters"] == earlier["bank"]["config"]["n_filters"]:
-        fdi["bank"]["output"]["peak"] = earlier["bank"]["output"]["peak"]
     for name in ("gust", "vaneless", "vaned"):
         memory = fdi["statistical"][name]["memory"]
         fill(memory, turn_past=in_flight, start_share=in_flight, start_left=in_flight)

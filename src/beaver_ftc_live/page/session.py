@@ -31,6 +31,7 @@ GUST_S = {"rise_s": 0.5, "hold_s": 1.0, "fade_s": 0.5}
 PATIENCE_S = 10.0  # a round of the game ends so long after the answer, if the diagnosis names no fault
 INSTRUMENTS = "instruments"
 OF_A_FLIGHT = ("break", "repair", "blow", "aim", "change")  # requests that a finished flight refuses
+OF_A_ROUND = ("stick", "aim", "blow", "fresh", "game")  # requests whose replies cannot tell what is hidden
 CHANGES_NOTHING = ("save", "stick")  # requests after which a saved folder still has all of the flight
 HIDDEN = (
     "_effective_rad", "_pos_rad", "_effectiveness_estimate", "_effectiveness_used", "mode", "detected",
@@ -176,6 +177,8 @@ class Session:
         """
         if self.over and request.do in OF_A_FLIGHT:
             raise BadInput("the flight is over, allowed: a new flight")
+        if self.game.hidden and request.do not in OF_A_ROUND + ("break",) * self.game.may_break:
+            raise BadInput(f"{request.do}: a round is on, allowed: after it")
         self._by = by
         self._saved = self._saved if request.do in CHANGES_NOTHING else ""
         try:
@@ -218,8 +221,6 @@ class Session:
 
     def _change(self, asked: messages.Change) -> str:
         """Exchange law, diagnosis, sensors; errors of sensors are declared to the diagnosis as well."""
-        if self.game.hidden:
-            raise BadInput("a round is on, allowed: changes after it")
         change = asked.model_dump(include={"law", "scheme", "sensors"}, exclude_none=True)
         declared = {"declared_sensors": asked.sensors} if asked.sensors is not None else {}
         self.sim.change({**change, **declared})

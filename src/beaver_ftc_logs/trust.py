@@ -56,7 +56,7 @@ def compute_fitted_ranges(parts: Parts, tied: Floats, gain_sd: Floats) -> Fitted
     still: dict[str, float] = {}
     for part in parts:
         for name, still_s in part.samples.unchanged_s.items():
-            still[name] = max(still.get(name, 0.0), float(still_s.max(initial=0.0)))
+            still[name] = max(still.get(name, 0.0), float(still_s[part.is_usable].max(initial=0.0)))
     return FittedRanges(
         commands=central_ranges(usable("commands")),
         rates=central_ranges(usable("rates")),

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import law_records
+from beaver_ftc.compiled import fill
 from beaver_ftc.control import accommodation
 from beaver_ftc.control.accommodation import (
     MODE_ADAPTIVE,
@@ -58,24 +59,12 @@ def test_the_mode_that_the_diagnosis_asks_for(
 ):
     frame = new_frame(stand_in)
     fdi = frame["fdi"]
-    fdi["config"]["diagnoses_all_types"], fdi["isolation"]["estimator"]["surface"][4:8] = (
-        diagnoses_all_types,
-        range(4),
-    )
-    verdict = fdi["verdict"]
-    (
-        verdict["detected"],
-        verdict["isolated_estimator"],
-        verdict["target"],
-        verdict["accommodation_mode"],
-    ) = (
-        1,
-        isolated,
-        lead,
-        accommodation_mode,
-    )
+    fill(fdi["config"], diagnoses_all_types=diagnoses_all_types)
+    fdi["isolation"]["estimator"]["surface"][4:8] = range(4)
+    said = {"isolated_estimator": isolated, "target": lead, "accommodation_mode": accommodation_mode}
+    fill(fdi["verdict"], detected=1, **said)
     assert asked_for(frame) == mode
-    verdict["detected"] = 0
+    fdi["verdict"]["detected"] = 0
     assert asked_for(frame) == MODE_NOMINAL
 
 

@@ -8,7 +8,7 @@ scenario, and body-rate references and an engine setting for that.
              theta' = k (theta_c - theta)
     speed    a = V' + k (Vc - V) + what was found missing + g (gamma_c - gamma in trim), by engine power
     gliding  gamma_c = gamma in trim - (V' + k (Vc - V) + what was found missing) / g: airspeed by pitch
-    heading  phi_c = V / g k (psi_c - psi),   phi' = k (phi_c - phi)
+    heading  phi_c = V / g (psi' + k (psi_c - psi) + what was found missing),   phi' = k (phi_c - phi)
     turn     psi' = g tan phi / V: coordinated [Etkin1996, sec. 7.6]; and the body rates of these angles'
              rates, with sideslip washed out by the rudder
 

@@ -7,8 +7,9 @@ r_g, both rad/s [MIL-F-8785C, 3.7]:
 
 w_g, v_g, m/s, are the gust downwards and to the right; b, m, is the span; V, m/s, the speed. Vanes and
 airspeed give the aircraft's velocity relative to the moving air. Forces, attitude and gravity predict how
-this velocity would change in still air. The difference is the change of the gust. The rolling gust, which
-varies across the span, cannot be measured.
+this velocity would change in still air. The predicted minus the measured velocity is the change of the gust:
+air that begins to move downwards lowers the aircraft's downward velocity relative to it. The rolling gust,
+which varies across the span, cannot be measured.
 
 If the design model has no forces (as that of the GTM), the accelerometers supply them. Without either, a
 change of the aircraft's own velocity cannot be distinguished from a gust; no gust estimate is then subtracted
@@ -211,7 +212,8 @@ def fill_axes_rate(gust, dt, V):
 def advance_gust(gust, y, attitude, dt):
     """Update w (3,) rad/s for the elapsed dt s; the rolling gust stays unknown.
 
-        v <- v + dt (3 a - a_prev) / 2,  a = T' f + gravity,  in the level axes of now
+        v_still = v + dt (3 a - a_prev) / 2,  a = T' f + gravity,  in the level axes of now
+        dv = v_still - v,  v as measured now: change of the gust
 
     y (5,) and attitude (3,) rad as measured now; f and T in memory are those dt s ago. If the heading turns
     so fast that the vanes mostly measure this turn, as when the nose passes the vertical, the yawing gust
@@ -227,7 +229,7 @@ def advance_gust(gust, y, attitude, dt):
     mem.has_prev = 1
     prev[:] = turned(a, z)
     v_still = turned(v, z)
-    fill_velocity(gust, y, attitude)
+    fill_velocity(gust, y, attitude)  # v is as measured now
     dv = v_still[0] - v[0], v_still[1] - v[1], v_still[2] - v[2]
     update_gust_speed(gust, dv, y[AIRSPEED], dt)
     update_axes(gust, z)

@@ -6,9 +6,9 @@
 Frame k lasts from sample k-1 to sample k, as in detection.md; F[k], eta[k] and phi[k] are means over it.
 lam_m, 1/s, is the pole of filter m, and a_m its decay per frame.
 
-All filters are exact for the discrete truth x[k] = x[k-1] + dt (F[k] + eta[k]): a residual obeys eps[k] = a
-eps[k-1] + dt eta[k], and its bound obeys the same with eta_bar in place of eta. The guarantees of the theory
-therefore hold at any frame rate, without an allowance for discretisation.
+All filters are exact for the discrete truth x[k] = x[k-1] + dt (F[k] + phi[k] + eta[k]): without a fault
+phi, a residual obeys eps[k] = a eps[k-1] + dt eta[k], and its bound the same with eta_bar in place of eta.
+The guarantees of the theory therefore hold at any frame rate, without an allowance for discretisation.
 
 Every filter has the exact bound of its own pole, so the alarm is the first of theirs without further false
 alarms. A pole far above the frame rate (`DEADBEAT_PER_S`) tests the innovation itself, |nu| > nu_max; for a
@@ -99,8 +99,8 @@ def poles_for_delays(errors: SensorErrors, eta: float) -> tuple[float, ...]:
     """Poles (1/s) that find the smallest constant fault phi within each of POLE_DELAYS_S, despite gyro noise.
 
     After T the residual is phi (1 - exp(-lam T)) / lam, its bound at most eta / lam + 2 nbar. lam times the
-    excess of one over the other is greatest at lam = ln(phi T / (2 nbar)) / T; the smallest phi with any
-    follows.
+    excess of one over the other is greatest at lam = ln(phi T / (2 nbar)) / T, which is at least 0.1 / T
+    here; the smallest phi with any follows, by iteration. detection.md calls 2 nbar nbar.
     """
     n2 = 2 * NOISE_LIMIT_SIGMA * float(errors.each("noise", AXES).max())
     return tuple(_pole_for_delay(T, n2, eta) for T in POLE_DELAYS_S) if n2 > 0 else ()

@@ -19,6 +19,7 @@ from beaver_ftc.design.table import ALPHA, QDYN
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.plugins import DETECTORS, LAWS, settings
 from beaver_ftc.results.log import Columns
+from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.reproduce.choices import scenario
 
@@ -96,7 +97,7 @@ def _measured(gain: Gain, case: Scenario, log: Columns) -> float:
     if t[-1] < DURATION_S - 0.1:
         return np.inf
     if gain.group == DETECTORS and gain.flights is UNKNOWN:
-        design = design_of(case.design_model, case.airframe)[0]
+        design = design_of(Declared.of(case))[0]
         y = np.zeros((5, settled.sum()))
         y[ALPHA], y[QDYN] = log["alpha_rad"][settled], log["qdyn_pa"][settled]
         phi = unanticipated_pitch.py_func(design.view(np.recarray), y, case.faults[0].Cm_alpha3)

@@ -187,14 +187,13 @@ OF_THE_COMMAND = {
     "prediction.u", "prediction.u_lo", "prediction.u_hi", "prediction.commanded",
     "control.layout.trim", "control.allocation.output.command",
 }  # fmt: skip
-CONFIGURED = ("prediction", "fdi", "assessment", "supervisor", "control", "autopilot")
+CONFIGURED = ["prediction", "fdi", "assessment", "supervisor", "control", "autopilot"]
 
 
 def configured(scenario):
     """What the diagnosis, the law and plug-ins are configured with, as bytes by field."""
     loop = Loop(scenario)
-    records = {stage: leaves(loop.frames[stage][0]) for stage in CONFIGURED}
-    found = {f"{stage}.{name}": value for stage, leaf in records.items() for name, value in leaf}
+    found = dict(leaves(loop.frames[CONFIGURED][0]))
     context = context_of(loop.frames, scenario, loop.trimmed, {})
     found["context"] = pickle.dumps(replace(context, model=None, trim_rad=None))
     loop.release()
@@ -218,7 +217,7 @@ def leaves(record):
 def test_nothing_is_configured_by_the_truth(name, truth):
     """Another truth may be trimmed by another command, which is known."""
     scenario = declared(name)
-    known = {"actuators": scenario.actuators.model_dump(), "sensors": scenario.sensors.model_dump()}
+    known = scenario.model_dump(include={"actuators", "sensors"})
     scenario = scenario.with_({f"design_model.{key}": value for key, value in known.items()})
     other = changed(scenario, TRUTHS[truth])
     if other is None:
@@ -234,10 +233,20 @@ def test_the_design_follows_the_servos_that_the_designer_knows():
     assert of_designer == configured(base.with_({"actuators": known})) != configured(base)
 
 
-@pytest.mark.parametrize("term", ["CY_beta", "CZ_alpha", "Cm_alpha"])
-def test_the_diagnosis_knows_each_term_of_the_design_model(term):
-    base = declared("statistical, noisy")
-    assert configured(base.with_({f"design_model.coefficients.{term}": 0.7})) != configured(base)
+@pytest.mark.parametrize(
+    ("term", "field"),
+    {
+        "CY_beta": "fdi.statistical.gust.memory.table.value",
+        "CY_dr": "fdi.statistical.forces.component.0.G_trim",
+        "CX_dpt": "autopilot.thrust", "Cl_beta": "autopilot.dihedral",
+        "Cn_beta": "autopilot.dpt_cubed_held_by_sideslip", "Cn_dr": "control.power.config.highest_dpt",
+        "Cl_da_left": "control.layout.authority",
+    }.items(),
+)  # fmt: skip
+def test_each_stage_takes_the_terms_of_the_design_model(term, field):
+    base = declared("split").with_(DECLARED["all, noisy"] | DECLARED["oracle"])
+    other = base.with_({f"design_model.coefficients.{term}": 0.7})
+    assert configured(other)[field] != configured(base)[field]
 
 
 def test_the_designers_trim_is_that_of_a_truth_as_declared():

@@ -153,9 +153,9 @@ class Aircraft:
         """Who can stand in for whom, in the order of hand-over."""
         return MappingProxyType(dict(self.file.groups))
 
-    @cached_property
-    def effect(self) -> Mapping[str, list[float]]:
-        """What each surface does about p, q and r at `usual_signals`, up to a factor."""
+    def effects(self, scale: Mapping[str, float]) -> Mapping[str, list[float]]:
+        """What each surface does about p, q and r at `usual_signals`, up to a factor about each axis; `scale`
+        as in `coefficient`."""
         mass, geometry = self.mass, self.geometry
         arms = (geometry.span_m / mass.Ix_kg_m2, geometry.chord_m / mass.Iy_kg_m2)
         per_axis = dict(zip(MOMENTS, (*arms, geometry.span_m / mass.Iz_kg_m2), strict=True))
@@ -163,9 +163,9 @@ class Aircraft:
         usual = self.usual_signals
         for term in self.moments:
             if term.surface:
-                value = term.value * prod(usual[signal] ** power for signal, power in term.of)
+                value = term.value * scale.get(term.name, 1.0) * prod(usual[s] ** n for s, n in term.of)
                 effect[term.surface][MOMENTS.index(term.coefficient)] += value * per_axis[term.coefficient]
-        return MappingProxyType(effect)
+        return effect
 
     @cached_property
     def dominant_axis(self) -> tuple[int, ...]:
@@ -174,7 +174,7 @@ class Aircraft:
         An axis that none turns most about (a rudder high above the wing rolls more than it yaws) is that of
         the surface that turns most about it, of those that share theirs with another.
         """
-        effect = self.effect
+        effect = self.effects({})
         axes = [max(range(3), key=lambda axis: abs(effect[s][axis])) for s in self.surfaces]
         for axis in set(range(3)) - set(axes):
             turns = {s: abs(effect[name][axis]) for s, name in enumerate(self.surfaces)}

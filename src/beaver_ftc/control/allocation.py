@@ -15,7 +15,7 @@ from beaver_ftc.compiled import apart, fill, kernel, record, sized
 from beaver_ftc.control.accommodation import usable_effectiveness
 from beaver_ftc.control.least_squares import FREE, LOW, problem_dtype, solve
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
-from beaver_ftc.scenario.diagnosis import ControlConfig
+from beaver_ftc.scenario.declared import Declared
 
 RELUCTANT = 1e-4  # least factor of a backup's weight, when nothing is handed over to it
 TINY = 1e-300  # in place of a divisor of zero
@@ -52,18 +52,18 @@ def allocation_dtype(n: int) -> np.dtype:
     )  # fmt: skip
 
 
-def configure(control: np.void, config: ControlConfig, travel: np.ndarray, aircraft: Aircraft) -> None:
+def configure(control: np.void, declared: Declared, travel: np.ndarray) -> None:
     """Fill `layout`, except its trim (loop/assembly.py), and `allocation` of a law's record; travel (2, n)
     rad."""
-    layout = control["layout"]
+    layout, aircraft = control["layout"], declared.aircraft
     fill(
         layout, low=travel[0], high=travel[1], main=main_surface_index_by_axis(aircraft),
         stand_in=aircraft.surfaces.index(aircraft.stand_ins[0]) if aircraft.stand_ins else -1,
         is_backup=[surface in aircraft.stand_ins for surface in aircraft.surfaces],
         general=_is_general(aircraft),
     )  # fmt: skip
-    layout["authority"] = _authority(aircraft, layout)
-    step = control["reference"]["config"]["dt"] / config.hand_over_s
+    layout["authority"] = _authority(declared, layout)
+    step = control["reference"]["config"]["dt"] / declared.control.hand_over_s
     control["allocation"]["config"]["hand_over_step"] = step
 
 
@@ -74,17 +74,19 @@ def _is_general(aircraft: Aircraft) -> bool:
     return several or len(aircraft.primary) < len(AXES)
 
 
-def _authority(aircraft: Aircraft, layout: np.void) -> np.ndarray:
+def _authority(declared: Declared, layout: np.void) -> np.ndarray:
     """(3, n): what part of the authority about each axis is whose, of the surfaces that turn most about it;
     where one leads each, or none turns most about it, the one that leads has all."""
+    aircraft = declared.aircraft
     shares = np.zeros((3, aircraft.n))
     if not _is_general(aircraft):
         shares[range(3), layout["main"]] = 1.0
         return shares
+    effects = aircraft.effects(declared.scale)
     for s, (surface, axis) in enumerate(zip(aircraft.surfaces, aircraft.dominant_axis, strict=True)):
         if axis != PITCH or not layout["is_backup"][s]:
             travel = aircraft.travel[surface]
-            shares[axis, s] = abs(aircraft.effect[surface][axis]) * (travel.max_rad - travel.min_rad)
+            shares[axis, s] = abs(effects[surface][axis]) * (travel.max_rad - travel.min_rad)
     for axis, s in enumerate(layout["main"]):
         shares[axis, s] = shares[axis, s] or float(not shares[axis].any())
     return shares / shares.sum(axis=1, keepdims=True)

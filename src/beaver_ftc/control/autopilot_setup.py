@@ -50,13 +50,11 @@ def _gains(aircraft: Aircraft) -> dict[str, float]:
 
 def _set_up_aircraft_values(autopilot: np.void, declared: Declared) -> None:
     """What the loops take from the aircraft: thrust, roll by sideslip, slowest airspeed."""
-    aircraft = declared.aircraft
-    terms = {name: term.value for name, term in aircraft.terms.items()}
-    mass_kg = aircraft.mass.mass_kg * declared.design_model.mass
+    aircraft, terms, mass_kg = declared.aircraft, declared.terms, declared.mass.mass_kg
     per_mass = aircraft.geometry.wing_area_m2 / mass_kg
     if aircraft.airspeed_by == "power" and THRUST_TERM not in terms:
         set_up_engine(autopilot["engine"], aircraft.engine.thrust, mass_kg)
-    by_sideslip = terms.get("Cl_beta", 0.0) / terms.get("Cl_p", -1.0)
+    by_sideslip = terms.get("Cl_beta", 0.0) / (terms.get("Cl_p") or -1.0)
     dpt_cubed, beta = inf, POWER_SIDESLIP_RAD
     if terms.get("Cn_dpt3"):
         held = terms.get("Cn_beta", 0.0) * beta + terms.get("Cn_beta3", 0.0) * beta**3

@@ -62,7 +62,7 @@ def configure_engines(engines: np.void, declared: Declared) -> None:
         config, n=len(aircraft.effectors), low=low, high=high, step=(high - low) / WHOLE_RANGE_S * dt,
         integral_gain=dt / T, release=dt / RELEASE_S,
     )  # fmt: skip
-    mass, i = aircraft.mass, inertia_coefficients(aircraft.mass)
+    mass, i = declared.mass, inertia_coefficients(declared.mass)
     set_up_engine(engines["memory"]["thrust"], thrust, mass.mass_kg)
     for e, of in enumerate(aircraft.effectors.values()):
         force_n = of.share * mass.mass_kg

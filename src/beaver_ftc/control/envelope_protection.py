@@ -174,8 +174,7 @@ def set_up_level_flight_table(holding: np.void, layout: np.void, declared: Decla
     qdyn_pa = 0.5 * SEA_LEVEL_DENSITY_KG_M3 * speeds_mps**2
     flap_rad = np.linspace(layout["low"][flap], layout["high"][flap], N_FLAP)
     surfaces = aircraft.surfaces[layout["main"][PITCH]], aircraft.surfaces[flap]
-    model = declared.design_model
-    mass_kg, scale = aircraft.mass.mass_kg * model.mass, tuple(model.coefficients.items())
+    mass_kg, scale = declared.mass.mass_kg, tuple(declared.scale.items())
     needed = elevator_needed(aircraft, surfaces, mass_kg, scale, tuple(qdyn_pa), tuple(flap_rad))
     fill(
         holding, qdyn=qdyn_pa, flap=flap_rad, has_table=np.isfinite(needed).all(), elevator=needed,

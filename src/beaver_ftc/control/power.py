@@ -99,8 +99,12 @@ def _slipstream_limits(declared: Declared, layout: np.void) -> tuple[float, floa
     aircraft, rudder = declared.aircraft, layout["main"][YAW]
     rpm, terms = initial.engine_rpm, aircraft.terms.values()
     rudders = {s for s, axis in zip(aircraft.surfaces, aircraft.dominant_axis, strict=True) if axis == YAW}
-    per_rad = sum(t.value for t in terms if t.coefficient == "Cn" and not t.of and t.surface in rudders)
-    of_slipstream = sum(t.value for t in terms if t.coefficient == "Cn" and t.of == (("dpt", 3),))
+    per_rad = sum(
+        declared.terms[t.name] for t in terms if t.coefficient == "Cn" and not t.of and t.surface in rudders
+    )
+    of_slipstream = sum(
+        declared.terms[t.name] for t in terms if t.coefficient == "Cn" and t.of == (("dpt", 3),)
+    )
     kw_per_inhg = engine_power_kw(rpm, 1.0, 1.0) - engine_power_kw(rpm, 0.0, 1.0)
     rudder_rad = min(-layout["low"][rudder], layout["high"][rudder])
     dpt3 = abs(YAW_SHARE * per_rad * rudder_rad / of_slipstream) if of_slipstream else np.inf

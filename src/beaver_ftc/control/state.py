@@ -63,7 +63,7 @@ def configure(control: np.void, declared: Declared, travel: np.ndarray) -> None:
     control["config"] = row.place, row.uses_verdict, row.reallocates, row.informed
     configure_reference(control["reference"], config, dt)
     accommodation.configure(control["surfaces"], config, row.informed, dt)
-    allocation.configure(control, config, travel, declared.aircraft)
+    allocation.configure(control, declared, travel)
     configure_probe(control["probe"], declared.fdi.probing, dt)
     power.configure_power(control["power"], control["layout"], declared)
     engines.configure_engines(control["engines"], declared)

@@ -28,7 +28,6 @@ d(G u0)/dy, and f0 + G0 u0 is the acceleration in trim.
 
 from collections import namedtuple
 from collections.abc import Mapping
-from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -93,26 +92,21 @@ def design_dtype(n: int) -> np.dtype:
 def design_record(
     aircraft: Aircraft | None = None,
     *,
-    engine_terms: bool = True,
     scale: Mapping[str, float] | None = None,
     mass: MassProperties | None = None,
 ) -> np.ndarray:
     """The design model as a record array of shape (1,), dtype `design_dtype`.
 
-    `engine_terms=False` neglects the declared signals in the moments: of the slipstream, as published.
-    `scale` multiplies single coefficients, `mass` is what the designer takes the inertia for: deliberate
-    errors of the designer.
+    `scale` multiplies single terms, `mass` is what the designer takes the inertia for: deliberate errors of
+    the designer.
     """
     aircraft = aircraft or load()
     design = np.zeros(1, design_dtype(aircraft.n))
-    geometry, ratio = aircraft.geometry, dict(scale or {})
+    geometry = aircraft.geometry
     design["S"], design["b"], design["c"] = geometry.wing_area_m2, geometry.span_m, geometry.chord_m
     for name, number in inertia_coefficients(mass or aircraft.mass)._asdict().items():
         design[name] = number
-    for term in aircraft.moments:
-        if not engine_terms and any(signal in aircraft.signals for signal, _ in term.of):
-            ratio[term.name] = 0.0
-    fill_table(design["moments"][0], aircraft, aircraft.moments, MOMENTS, ratio)
+    fill_table(design["moments"][0], aircraft, aircraft.moments, MOMENTS, scale)
     return design
 
 
@@ -231,25 +225,18 @@ def acceleration(f, G, u, out):
             out[i] += G[i, s] * u[s]
 
 
-def design_of(model: Any, aircraft: Aircraft | None = None) -> np.ndarray:
-    """The design record (1,) of a scenario's `design_model`: what the designer leaves out or gets wrong.
+def design_of(declared: Any) -> np.ndarray:
+    """The design record (1,) of a `Declared`: the aircraft's file with what the designer leaves out or gets
+    wrong.
 
     One that is tied to the trim wants `anchor` as well.
     """
-    mass = mass_of(model, aircraft)
-    design = design_record(aircraft, engine_terms=model.engine_terms, scale=model.coefficients, mass=mass)
+    model, design = (
+        declared.design_model,
+        design_record(declared.aircraft, scale=declared.scale, mass=declared.mass),
+    )
     design["linearised"], design["frozen_alpha"] = model.linearised, model.frozen_alpha
     return design
-
-
-def mass_of(model: Any, aircraft: Aircraft | None = None) -> MassProperties:
-    """What a scenario's `design_model` takes for mass and inertia; a heavier aircraft of the same shape has
-    its inertia in proportion."""
-    nominal, inertia = (aircraft or load()).mass, {}
-    for name in ("Ix", "Iy", "Iz", "Jxz"):
-        own = getattr(nominal, f"{name}_kg_m2")
-        inertia[f"{name}_kg_m2"] = own * model.mass * getattr(model.inertia, name)
-    return replace(nominal, mass_kg=nominal.mass_kg * model.mass, **inertia)
 
 
 def anchor(design: np.void, x: np.ndarray, y: np.ndarray, u: np.ndarray) -> None:

@@ -44,7 +44,6 @@ from beaver_ftc.design.model import (
     acceleration,
     design_dtype,
     inertia_coefficients,
-    mass_of,
     nonlinear_response_from_table,
 )
 from beaver_ftc.design.table import AIRSPEED, DPT, N_Y, QDYN, evaluate
@@ -260,7 +259,7 @@ def configure_bound(bound: np.void, declared: Declared, model: np.void) -> None:
         const += aircraft.model_error_rad_s2
     fill_map(bound["error_map"], aircraft, all_types, all_types and declared.fdi.pairs)
     err = bound["declared_errors"]
-    fill_errors(err, declared, model, mass_of(declared.design_model, aircraft))
+    fill_errors(err, declared, model)
     fill_engine_errors(err, declared)
     fill(
         bound, inertia_coupling_error_share=declared.coupling, earth_rate_rad_s=EARTH_RATE_RAD_S, const=const,
@@ -268,12 +267,12 @@ def configure_bound(bound: np.void, declared: Declared, model: np.void) -> None:
     )  # fmt: skip
 
 
-def fill_errors(err: np.void, declared: Declared, model: np.void, mass: MassProperties) -> None:
-    """Fill the declared errors; model, mass: record and mass properties of the design model."""
+def fill_errors(err: np.void, declared: Declared, model: np.void) -> None:
+    """Fill the declared errors; model: record of the design model."""
     errors, air, b = declared.sensors, declared.air, declared.aircraft.geometry.span_m
     aloft = GUST_LIMIT_SIGMA * air.rotation_limit_rad_s(b)
     dC = declared.coefficients.absolute(declared.aircraft.moments, model["moments"]["value"])
-    dI, du = inertia_bounds(declared.inertia, mass), declared.deflections_rad
+    dI, du = inertia_bounds(declared.inertia, declared.mass), declared.deflections_rad
     err["model"] = model
     err["model"]["moments"]["value"] = np.abs(model["moments"]["value"])
     err["model"]["moments"]["value"][1, : dC.size] += dC

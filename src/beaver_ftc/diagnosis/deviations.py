@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from beaver_ftc.aircraft import AXES, MassProperties, Term
+from beaver_ftc.aircraft import AXES, Term
 from beaver_ftc.aircraft.aircraft import MOMENTS
 from beaver_ftc.aircraft.schema import RATE_SIGNALS
 from beaver_ftc.design.model import (
@@ -110,15 +110,14 @@ def moment_axis(term: Term) -> int:
     return MOMENTS.index(term.coefficient)
 
 
-def coefficient_bounds(
-    declared: Declared, model: np.void, mass: MassProperties, y: np.ndarray, u: np.ndarray
-) -> np.ndarray:
+def coefficient_bounds(declared: Declared, model: np.void, y: np.ndarray, u: np.ndarray) -> np.ndarray:
     """Tolerance of each moment's term that covers every declared constant error but those of the air data
     (statistical_design.py); y, u in trim."""
     aircraft, errors = declared.aircraft, declared.sensors
     C = np.abs(model["moments"]["value"][: len(aircraft.moments)])
     own = [2, 7, 11]  # what multiplies a moment there
-    by_inertia = inertia_bounds(declared.inertia, mass)[own] / np.abs(inertia_coefficients(mass))[own]
+    by_inertia = inertia_bounds(declared.inertia, declared.mass)[own]
+    by_inertia /= np.abs(inertia_coefficients(declared.mass))[own]
     relative = by_inertia.max() + [_signal_error(errors, term) for term in aircraft.moments]
     tol = declared.coefficients.absolute(aircraft.moments, C) + relative * C
     b, c = aircraft.geometry.span_m, aircraft.geometry.chord_m

@@ -44,7 +44,6 @@ from math import pi
 
 import numpy as np
 
-from beaver_ftc.aircraft import MassProperties
 from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S, FORCES, GRAVITY_MPS2
 from beaver_ftc.aircraft.schema import MAX_MONOMIALS
 from beaver_ftc.compiled import fill, kernel, record
@@ -471,20 +470,19 @@ def effect_product(gust, C, i_1, i_2, j):
     return project_gust(L[i_1], C, j) * project_gust(L[i_2], C, j)
 
 
-def configure_gust(gust: np.void, declared: Declared, mass: MassProperties) -> None:
-    """Fill the record with the declared turbulence, for an aircraft of this mass."""
+def configure_gust(gust: np.void, declared: Declared) -> None:
+    """Fill the record with the declared turbulence."""
     air, aircraft, span = declared.air, declared.aircraft, declared.aircraft.geometry.span_m
     output, memory, altitude = gust["output"], gust["memory"], declared.sensors["altitude"]
     known = bool(aircraft.measurable_forces)
     measured = known or output["uses_accelerometers"]  # only where forces are known
     fill(output, gusty=air.moves, measured=measured)
-    ratio = declared.design_model.coefficients
-    fill_table(memory["table"], aircraft, aircraft.measurable_forces, FORCES, ratio)
+    fill_table(memory["table"], aircraft, aircraft.measurable_forces, FORCES, declared.scale)
     aloft = air.rotation_walk(span)
     fill(memory, Q=aloft, share=MIN_UNMEASURED_SHARES if measured else 1.0)
     fill(
         gust["config"], has_forces=known, coarse_only=air.moves and not measured, span=span, Q_aloft=aloft,
-        S_m=aircraft.geometry.wing_area_m2 / mass.mass_kg, Q_1m=air.rotation_walk_at_1_m(span),
+        S_m=aircraft.geometry.wing_area_m2 / declared.mass.mass_kg, Q_1m=air.rotation_walk_at_1_m(span),
         gravity=GRAVITY_MPS2,  # standard; what is constant has no part in a change of the gust
         h0=altitude.worst, h1=altitude.slope, L_gust=SCALE_M, L_roll=rotation_lengths(span)[0],
     )  # fmt: skip

@@ -74,7 +74,7 @@ def configure_prediction(pred: np.void, declared: Declared, travel: np.ndarray) 
     approaches[omega == 0.0] = 1.0  # no lag
     step = np.where(rate > 0.0, rate * h, np.inf)
     steps = step[:, None] * (1.0 + np.outer(servos["rate_limit_error"], slow_to_fast))
-    fill(pred, w=1.0 / declared.substeps, design=design_of(declared.design_model, declared.aircraft)[0])
+    fill(pred, w=1.0 / declared.substeps, design=design_of(declared)[0])
     fill(
         pred["actuators"], real=not declared.servos.is_ideal, uncertain=not declared.servo_errors.is_none,
         low=travel[0], high=travel[1], approaches=approaches[:, ::2], approach=approaches[:, 1],

@@ -21,7 +21,7 @@ from beaver_ftc.control.accommodation import SUPERVISOR
 from beaver_ftc.control.autopilot import AUTOPILOT
 from beaver_ftc.control.autopilot_setup import set_up_autopilot
 from beaver_ftc.control.profile import COLUMNS
-from beaver_ftc.design.model import anchor, mass_of
+from beaver_ftc.design.model import anchor
 from beaver_ftc.diagnosis import model_prediction, schemes
 from beaver_ftc.diagnosis.conclusion import assessment_dtype
 from beaver_ftc.diagnosis.detection.parity import USUAL_SIZE, StatisticalSize
@@ -198,8 +198,7 @@ def configure_diagnosis_at_trim(frame: np.void, scenario: Scenario, trim: Trim) 
         prediction[end] = np.clip(trim.command + sign * servos["band"], servos["low"], servos["high"])
     anchor(design, trim.x, trim.y, trim.u)
     configure_sensor_monitor(fdi["sensor_monitor"], declared, design, trim.y)
-    mass = mass_of(declared.design_model, declared.aircraft)
-    configure_statistics(fdi, declared, design, mass, (trim.x, trim.y, trim.u))
+    configure_statistics(fdi, declared, design, (trim.x, trim.y, trim.u))
 
 
 def _assemble_design(scenario: Scenario, travel: np.ndarray, line: int) -> np.ndarray:

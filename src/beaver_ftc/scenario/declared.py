@@ -6,13 +6,14 @@ scenario: a `schema.Scenario`, not named as such because the schema imports this
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from math import radians
 from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from beaver_ftc.aircraft import Aircraft, Term
+from beaver_ftc.aircraft import Aircraft, MassProperties, Term
 from beaver_ftc.design import Dryden
 from beaver_ftc.scenario.airframe import Actuators, Initial
 from beaver_ftc.scenario.builtin import KeptBySections
@@ -141,6 +142,30 @@ class Declared:
             scenario.known_actuators,
             scenario.known_sensors,
         )
+
+    @cached_property
+    def scale(self) -> dict[str, float]:
+        """What the designer multiplies terms of the aircraft's file by, by name. Without engine terms, 0 for
+        each moment of a declared signal: of the slipstream, as published."""
+        scale = dict(self.design_model.coefficients)
+        for term in self.aircraft.moments:
+            if not self.design_model.engine_terms and self.aircraft.signals.keys() & dict(term.of):
+                scale[term.name] = 0.0
+        return scale
+
+    @cached_property
+    def terms(self) -> dict[str, float]:
+        """The designer's value of each term of the aircraft's file, by name."""
+        return {name: t.value * self.scale.get(name, 1.0) for name, t in self.aircraft.terms.items()}
+
+    @cached_property
+    def mass(self) -> MassProperties:
+        """The designer's mass and inertia. A heavier aircraft of the same shape has its inertia in
+        proportion."""
+        of_file, times, inertia = self.aircraft.mass, self.design_model.mass, {}
+        for name, ratio in self.design_model.inertia:
+            inertia[f"{name}_kg_m2"] = getattr(of_file, f"{name}_kg_m2") * times * ratio
+        return replace(of_file, mass_kg=of_file.mass_kg * times, **inertia)
 
     @property
     def travel_rad(self) -> np.ndarray:

@@ -6,7 +6,6 @@ from innovations import drawn
 
 from beaver_ftc.aircraft import AXES, load
 from beaver_ftc.compiled import kernel
-from beaver_ftc.design.fdc import MASS
 from beaver_ftc.diagnosis.detection import likelihood, statistical, statistical_design
 from beaver_ftc.diagnosis.detection.likelihood import N_SLOTS
 from beaver_ftc.diagnosis.detection.rows import RATES
@@ -39,7 +38,7 @@ class Detector:
         frame = self.frames[0]
         self.fdi, self.dt = frame["fdi"], 1.0 / rate_hz
         design, declared = frame["prediction"]["design"], Declared.of(scenario)
-        statistical_design.configure_statistics(self.fdi, declared, design, MASS, LEVEL_FLIGHT)
+        statistical_design.configure_statistics(self.fdi, declared, design, LEVEL_FLIGHT)
         self.detector = self.fdi["statistical"]
         measured = np.zeros(1, MEASURED)[0]
         measured["x"], measured["y"][:5] = LEVEL_FLIGHT[:2]

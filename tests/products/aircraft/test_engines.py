@@ -55,10 +55,11 @@ def test_the_arms_are_those_of_the_model_file(jet):
 
 
 def test_the_column_is_arm_times_thrust_over_inertia(jet):
-    """As JSBSim turns: the thrust of each engine is read at its place, not from our signals."""
+    """As JSBSim turns: the thrust of each engine is read at its place, not from our signals. The designer's
+    inertia in yaw is twice that of the file."""
     aircraft = read(jet / "aircraft" / "737")
-    plant, record = Plant(100, aircraft=aircraft), np.zeros(1, engines.ENGINES)[0]
-    engines.configure_engines(record, Declared.of(scenario(jet)))
+    plant = Plant(100, aircraft=aircraft)
+    B = engines.effects_of_engines(Declared.of(scenario(jet, design_model={"inertia": {"Iz": 2}})))
     point = trim(aircraft.usual_airspeed_mps, 1500.0, plant=plant, throttle=0.6)
     seen = []
     for difference in (0.0, 0.15):
@@ -71,7 +72,7 @@ def test_the_column_is_arm_times_thrust_over_inertia(jet):
         thrust_n = [plant.read(f"propulsion/engine[{e}]/thrust-lbs") * N_PER_LBF for e in range(2)]
         seen.append((*thrust_n, plant.read("accelerations/rdot-rad_sec2")))
     left, right, turned = np.subtract(seen[1], seen[0])
-    per_n = record["config"]["B"][YAW, :2] / (aircraft.mass.mass_kg * 0.5)
+    per_n = 2 * B[YAW] / (aircraft.mass.mass_kg * 0.5)
     assert per_n[0] == pytest.approx(4.902 / aircraft.mass.Iz_kg_m2, rel=2e-3)
     assert turned == pytest.approx(per_n[0] * left + per_n[1] * right, rel=0.02)
 

@@ -8,6 +8,7 @@ from beaver_ftc.design.model import DesignFunctions, design_of, inertia_coeffici
 from beaver_ftc.diagnosis.informed_test import term_acceleration
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import Columns
+from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.matrix.clairvoyant import columns_of, seen_when_told
 from beaver_ftc.studies.matrix.fault_matrix import FaultCase, beside_told, scenario_of, trimmed_deg
@@ -37,7 +38,7 @@ def test_terms_add_up_to_what_the_design_model_makes_of_a_surface_and_of_none():
     kept |= {name: rng.uniform(-0.2, 0.2, n) for name in ("p_rad_s", "q_rad_s", "r_rad_s", "dpt")}
     kept |= {"alpha_rad": rng.uniform(0, 0.2, n), "beta_rad": rng.uniform(-0.2, 0.2, n)}
     kept |= {"airspeed_mps": rng.uniform(35, 55, n), "qdyn_pa": rng.uniform(700, 1500, n)}
-    model = DesignFunctions(design_of(Scenario(name="any").design_model, AIRCRAFT))
+    model = DesignFunctions(design_of(Declared.of(Scenario(name="any"))))
     deflection = rng.uniform(-0.2, 0.2, n)
     apart(deflection=deflection, **kept)
     x = np.column_stack([kept[f"{axis}_rad_s"] for axis in "pqr"])

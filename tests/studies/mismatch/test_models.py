@@ -12,6 +12,7 @@ from beaver_ftc.design.model import (
     inertial,
     response,
 )
+from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.studies.mismatch.sources import (
     earth_in_body,
     earth_rotation,
@@ -39,7 +40,7 @@ def random_states(n=40, seed=3):
 def test_belief_is_what_the_compiled_loop_evaluates(keys):
     case = scenario(design_model=keys)
     x, y, u = random_states()
-    design = design_of(case.design_model)[0]
+    design = design_of(Declared.of(case))[0]
     anchor(design, x[0], y[0], u[0])
     found = acceleration_at(design, x, y, u)
     record = np.array([design]).view(np.recarray)[0]

@@ -12,6 +12,7 @@ from scipy.signal import lfilter
 import beaver_ftc as bf
 from beaver_ftc.design.model import design_of, response
 from beaver_ftc.results.style import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILION
+from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.diagnosis import DEADBEAT_PER_S
 from tools.docs.tables import picture
 
@@ -38,11 +39,11 @@ def _frames() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
 
 def _regressor(scenario: bf.Scenario, log: pd.DataFrame, rates: np.ndarray) -> np.ndarray:
     """Z of pitch, rad/s2: the moment that the healthy surface gives, from the frame before."""
-    design = design_of(scenario.design_model, scenario.airframe)[0].view(np.recarray)
+    design = design_of(Declared.of(scenario))[0].view(np.recarray)
     signals = ("alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa", "dpt")
     y, s = log[list(signals)].to_numpy(), scenario.airframe.surfaces.index(SURFACE)
     u, Z = log[f"{SURFACE}_cmd_rad"].to_numpy(), np.full(len(rates), np.nan)
-    f, G = np.zeros(3), np.zeros((3, len(scenario.airframe.surfaces)))
+    f, G = np.zeros(3), np.zeros_like(design.G0)
     for k in range(1, len(rates)):
         response(design, rates[k - 1], y[k - 1], f, G)
         Z[k] = G[PITCH, s] * u[k - 1]

@@ -6,7 +6,7 @@ Letters as in forces.py; y, x, u of a `TrimState` are in trim.
 import numpy as np
 
 from beaver_ftc.aircraft import AXES
-from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S, Term
+from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S
 from beaver_ftc.aircraft.schema import MAX_SURFACES, SIDESLIP_RATE
 from beaver_ftc.compiled import fill
 from beaver_ftc.design.engine import slipstream_slopes
@@ -38,7 +38,7 @@ def configure_forces(
     CY_bdot = [t for t in aircraft.forces if t.coefficient == "CY" and t.of == ((SIDESLIP_RATE, 1),)]
     fill(
         forces, c_inv=1.0 / aircraft.geometry.chord_m, q_trim=trim[1][QDYN],
-        CY_bdot=sum(_known(declared, term) for term in CY_bdot),
+        CY_bdot=sum(declared.terms[term.name] for term in CY_bdot),
         q_noise=declared.sensors["qdyn"].random,
     )  # fmt: skip
     for i in range(2):
@@ -68,7 +68,7 @@ def _configure_force(
     _configure_columns(stat, declared, y, f_y[force.vane] / per_C, drift, i)
     for term in terms_of_force(aircraft, i):
         if term.surface:
-            f["G_trim"][aircraft.surfaces.index(term.surface)] += per_C * abs(_known(declared, term))
+            f["G_trim"][aircraft.surfaces.index(term.surface)] += per_C * abs(declared.terms[term.name])
 
 
 def _force_variances(
@@ -128,7 +128,7 @@ def _configure_columns(
     vane, acc = errors[force.vane_name], errors[force.accelerometer]
     tol_q = errors["qdyn"].steady / y[QDYN] + errors["qdyn"].slope
     tol = [
-        (tol_C + tol_q + vane.slope) * abs(_known(declared, t)) + t.is_constant * vane.steady * abs(C_vane)
+        (tol_C + tol_q + vane.slope) * abs(declared.terms[t.name]) + t.is_constant * vane.steady * abs(C_vane)
         for t in terms_of_force(declared.aircraft, i)
     ]
     first = int(rows["first"][i])
@@ -144,11 +144,6 @@ def _configure_columns(
     rows["e_G"][MAX_SURFACES + i] = VANE_TOLERANCE * np.abs(of_vane)
 
 
-def _known(declared: Declared, term: Term) -> float:
-    """The value of a term in the design model."""
-    return term.value * declared.design_model.coefficients.get(term.name, 1.0)
-
-
 def _force_coefficient(declared: Declared, name: str, state: TrimState) -> float:
     """The force coefficient `name` at x (3,) rad/s, y, u rad."""
     x, y, u = state
@@ -157,7 +152,7 @@ def _force_coefficient(declared: Declared, name: str, state: TrimState) -> float
     rates = x * (geometry.span_m / (2.0 * V), geometry.chord_m / V, geometry.span_m / (2.0 * V))
     names = (*aircraft.surfaces, *aircraft.signals, "alpha", "beta", "ph", "qh", "rh", SIDESLIP_RATE)
     values = dict(zip(names, (*u, *y[4:], *y[:2], *rates, 0.0), strict=True))
-    return float(aircraft.coefficient(name, values, declared.design_model.coefficients))
+    return float(aircraft.coefficient(name, values, declared.scale))
 
 
 def _force_slopes(declared: Declared, name: str, trim: TrimState) -> np.ndarray:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from beaver_ftc.aircraft import AXES, Aircraft, MassProperties
+from beaver_ftc.aircraft import AXES, Aircraft
 from beaver_ftc.compiled import fill
 from beaver_ftc.design import rotation_lengths
 from beaver_ftc.design.model import jacobian
@@ -111,9 +111,7 @@ def derive_alarm_level(false_alarms_per_h: float, rate_hz: float, n_tests: int) 
     return -_quantile(false_alarms_per_h / (3600.0 * rate_hz * n_tests))
 
 
-def configure_statistics(
-    fdi: np.void, declared: Declared, model: np.void, mass: MassProperties, trim: TrimState
-) -> None:
+def configure_statistics(fdi: np.void, declared: Declared, model: np.void, trim: TrimState) -> None:
     """Fill the statistical part of a diagnosis record; trim: x (3,), y and u (surfaces,) in trim.
 
     The order of the calls is fixed, because a step reads what earlier ones have filled:
@@ -140,12 +138,12 @@ def configure_statistics(
     fill(cfg, enabled=1, w=1.0 / declared.substeps)
     stat["forces"]["in_use"] = declared.uses_accelerometers
     gust["output"]["uses_accelerometers"] = declared.follows_gusts_by_accelerometers
-    configure_gust(gust, declared, mass)
+    configure_gust(gust, declared)
     views = list_directions(aircraft, declared.uses_accelerometers) if declared.compares_across else ()
     n_tests = count_tests(aircraft, *views)
     _configure_levels(cfg, declared, n_tests)
     configure_gust_speed(gust, declared, float(cfg["alarm_level"]), V)
-    tol = coefficient_bounds(declared, model, mass, *trim[1:])
+    tol = coefficient_bounds(declared, model, *trim[1:])
     configure_rows(stat, errors, tol, fdi["bound"]["declared_errors"])
     _configure_blocks(stat, declared, rate, dt_s)
     stat["noise"]["rate0"] = settings.uncertainty_rad_s * dt_s

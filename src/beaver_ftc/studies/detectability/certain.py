@@ -26,6 +26,7 @@ from beaver_ftc.design.model import design_of, responses_at
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import Columns
 from beaver_ftc.results.model import Document
+from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.detectability.isolability import best_in_window, largest_and_median, loss_limits
 
@@ -88,7 +89,7 @@ def moments_of(
     y = _side_by_side(log, "alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa", *aircraft.signals)
     u = _side_by_side(log, *(f"{surface}_cmd_rad" for surface in aircraft.surfaces))
     bound = _side_by_side(log, *(f"{axis}_eta_bar_rad_s2" for axis in AXES))
-    design = design_of(scenario.design_model, aircraft)[0]
+    design = design_of(Declared.of(scenario))[0]
     design["linearised"] = design["frozen_alpha"] = False
     G = responses_at(design, np.zeros((len(y), 3)), y)[1]
     moment = G * u[:, None, :]

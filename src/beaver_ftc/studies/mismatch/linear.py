@@ -18,6 +18,7 @@ from beaver_ftc.documents.files import Document
 from beaver_ftc.plant.adapter import FlightState
 from beaver_ftc.plant.conditions import trimmed
 from beaver_ftc.plant.linear import LinearModel, differences, own
+from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.linear_systems import CHANNELS, CLASSICAL, MODES, Mode, deviation, modes, zeros
 
@@ -99,7 +100,7 @@ def designed(scenario: Scenario, point: FlightState, equations: LinearModel) -> 
 
 def designed_derivatives(scenario: Scenario, point: FlightState) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """f_x (3, 3), f_y (3, 5) and G (3, 4) of the design model at a trim, where it is frozen or linearised."""
-    design = design_of(scenario.design_model)[0]
+    design = design_of(Declared.of(scenario))[0]
     y = np.array([point.alpha_rad, point.beta_rad, *air_data(point)])
     _, G, f_x, f_y = jacobian(design, np.zeros(3), y, in_fdc(point)[1])
     if scenario.design_model.frozen_alpha:

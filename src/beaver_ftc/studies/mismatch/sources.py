@@ -57,7 +57,6 @@ from beaver_ftc.design.model import (
     design_record,
     inertia_of,
     inertial,
-    mass_of,
     responses_at,
     unanticipated_at,
 )
@@ -149,11 +148,11 @@ class Models:
         model = scenario.design_model
         true = scenario.uncertainty.coefficients
         self.scenario = scenario
-        self.design = design_of(model)[0]
-        mass = mass_of(model)
-        anchor(self.design, *known_trim(Declared.of(scenario)))
+        declared = Declared.of(scenario)
+        self.design, mass = design_of(declared)[0], declared.mass
+        anchor(self.design, *known_trim(declared))
         kept = {k: v for k, v in model.coefficients.items() if model.engine_terms or k not in ENGINE_TERMS}
-        self.untied = design_record(engine_terms=model.engine_terms, scale=model.coefficients, mass=mass)[0]
+        self.untied = design_record(scale=declared.scale, mass=mass)[0]
         self.whole, self.turning = (design_record(scale=scale, mass=mass)[0] for scale in (kept, true))
         self.truth = design_record(scale=true)[0]
         self.inertia = inertia_of(self.truth)

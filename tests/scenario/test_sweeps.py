@@ -62,7 +62,6 @@ def test_what_mistakes_are_called(changed):
         ({"vary": {"a": {"linspace": (1, 2, 1_000_000)}, "b": {"linspace": (1, 2, 10)}}}, 10**7, 10**7),
         ({"runs": 4, "vary": {"a": {"choice": (1, 2)}}}, 1, 4),
         ({"sampling": "grid", "vary": {"a": {"choice": (1, 2)}, "b": {"choice": (1, 2, 3)}}}, 6, 6),
-        ({"vary": {"a": {"linspace": (1, 2, 2)}}}, 2, 2),
     ],
 )
 def test_points_of_a_grid_and_flights(given, grid, flights):
@@ -77,6 +76,10 @@ def test_a_law_does_not_know_the_sensors_of_its_flight(key):
     assert (flown.sensors.q.delay_s, flown.known_sensors.q.delay_s) == (0.03, 0.0)
 
 
-def test_the_designer_does_not_know_the_actuators_of_its_flight():
-    flown = load_sweep_text(HEAD + "vary:\n  actuators: {choice: [servo]}\n").scenario({"actuators": "servo"})
-    assert flown.known_actuators != flown.actuators
+def test_the_designer_knows_the_actuators_of_its_flight_only_if_its_own_model_has_them():
+    vary = "vary:\n  actuators: {choice: [servo]}\n  design_model: {choice: [{}, {actuators: servo}]}\n"
+    untold, told = (
+        load_sweep_text(HEAD + vary).scenario({"actuators": "servo", "design_model": model})
+        for model in ({}, {"actuators": "servo"})
+    )
+    assert untold.known_actuators != untold.actuators == told.known_actuators

@@ -298,15 +298,14 @@ class Sweep:
 
         Raises pydantic's ValidationError if they contradict each other.
         """
-        places = {parse_key(key): value for key, value in values.items()}
         ready = self._base_read.sections_beside(values) if self._base_read else {}
-        rest = {name: value for name, value in self.base.items() if name not in ready}
         with checked_against(self.aircraft, self.base.get("aircraft")):
-            return Scenario.model_validate({**with_values(rest, places), **ready, **settings})
+            return Scenario.model_validate({**self.data_with(values), **ready, **settings})
 
     def data_with(self, values: dict[str, Any]) -> dict[str, Any]:
         """The data of the base with these values at these dotted keys."""
-        return with_values(self.base, {parse_key(key): value for key, value in values.items()})
+        data = with_values(self.base, {parse_key(key): value for key, value in values.items()})
+        return _with_known_parts(data, self.base, self.keys)
 
     @cached_property
     def _base_read(self) -> Scenario | None:
@@ -345,16 +344,16 @@ def validate_sweep(document: Document, source: str = "", folder: Path | None = N
         problems = problems or [*_key_problems(base, file.vary, document)]
     if problems:
         raise ScenarioError(source, problems)
-    return Sweep(file, _with_known_parts(base, file.vary), aircraft)
+    return Sweep(file, _with_known_parts(base, base, file.vary), aircraft)
 
 
-def _with_known_parts(base: dict[str, Any], vary: Iterable[str]) -> dict[str, Any]:
-    """The base. Where `sensors` or `actuators` vary, the designer knows those of the base, not each
-    flight's."""
-    varied = [part for part in ("actuators", "sensors") if any(parse_key(key)[0] == part for key in vary)]
+def _with_known_parts(data: dict[str, Any], base: dict[str, Any], vary: Iterable[str]) -> dict[str, Any]:
+    """The data of the base or of a flight. Where `sensors` or `actuators` vary, the designer knows those of
+    the base, unless `design_model` of the data has its own."""
+    varied = sorted({"actuators", "sensors"} & {parse_key(key)[0] for key in vary})
     known = {part: base.get(part, "ideal") for part in varied}
-    said = {key: value for key, value in (base.get("design_model") or {}).items() if value is not None}
-    return {**base, "design_model": known | said} if varied else base
+    said = {key: value for key, value in (data.get("design_model") or {}).items() if value is not None}
+    return {**data, "design_model": known | said} if varied else data
 
 
 def _base(

@@ -231,10 +231,8 @@ def design_of(declared: Any) -> np.ndarray:
 
     One that is tied to the trim wants `anchor` as well.
     """
-    model, design = (
-        declared.design_model,
-        design_record(declared.aircraft, scale=declared.scale, mass=declared.mass),
-    )
+    model = declared.design_model
+    design = design_record(declared.aircraft, scale=declared.scale, mass=declared.mass)
     design["linearised"], design["frozen_alpha"] = model.linearised, model.frozen_alpha
     return design
 

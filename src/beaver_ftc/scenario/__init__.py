@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     )
     from beaver_ftc.scenario.declared import Declared
     from beaver_ftc.scenario.diagnosis import Bounds
+    from beaver_ftc.scenario.interventions import fault_of
     from beaver_ftc.scenario.measured_range import measured_spans, plural, span_in_words
     from beaver_ftc.scenario.schema import (
         NAME_PATTERN,

@@ -35,11 +35,6 @@ class Game:
         """Whether the page must not show what is broken, nor what the diagnosis says."""
         return self.phase in (WAITING, BROKEN)
 
-    @property
-    def may_break(self) -> bool:
-        """Whether the round waits for the second person, who breaks one thing."""
-        return self.phase == WAITING and self.mode == "second"
-
     def next_round(self, mode: str, now_s: float, kinds: list[Fault], rng: np.random.Generator) -> "Game":
         """A new round; in `random` one of these faults will come at a time nobody is told."""
         game = Game(phase=WAITING, mode=mode, score=self.score)

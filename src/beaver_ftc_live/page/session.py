@@ -15,10 +15,10 @@ from beaver_ftc.aircraft import GRAVITY_MPS2, Aircraft
 from beaver_ftc.documents import BadInput, suggestion
 from beaver_ftc.plugins import DETECTORS, LAWS, is_compiled, registered
 from beaver_ftc.results import SpooledLog
-from beaver_ftc.scenario import channels_of, checked_against, sensors_there
+from beaver_ftc.scenario import channels_of, checked_against, fault_of, sensors_there
 from beaver_ftc.scenario.faults import HOLDING, TYPES, place_of
 from beaver_ftc_live.page import messages
-from beaver_ftc_live.page.game import NOTHING, Fault, Game, hidden_faults
+from beaver_ftc_live.page.game import BROKEN, NOTHING, Fault, Game, hidden_faults
 from beaver_ftc_live.page.messages import WHEN, Message, in_words, short, verdict_in_words
 
 LONGEST_S = 3600.0  # of one live flight: its log is 0.4 GB then
@@ -36,7 +36,7 @@ CHANGES_NOTHING = ("save", "stick")  # requests after which a saved folder still
 HIDDEN = (
     "_effective_rad", "_pos_rad", "_effectiveness_estimate", "_effectiveness_used", "mode", "detected",
     "_residual_rad_s", "_threshold_rad_s", "_network_rad_s2", "_likelihood_share", "_design_rad_s2",
-    "_eta_bar_rad_s2",
+    "_eta_bar_rad_s2", "airspeed_limited_mps",
 )  # fmt: skip
 HIDDEN_WHOLE = ("fie_", "watch_")
 
@@ -177,7 +177,7 @@ class Session:
         """
         if self.over and request.do in OF_A_FLIGHT:
             raise BadInput("the flight is over, allowed: a new flight")
-        if self.game.hidden and request.do not in OF_A_ROUND + ("break",) * self.game.may_break:
+        if self.game.hidden and request.do not in OF_A_ROUND + ("break",) * (self.game.mode == "second"):
             raise BadInput(f"{request.do}: a round is on, allowed: after it")
         self._by = by
         self._saved = self._saved if request.do in CHANGES_NOTHING else ""
@@ -230,6 +230,10 @@ class Session:
         return says
 
     def _break(self, asked: messages.Break) -> str:
+        if self.game.phase == BROKEN:  # the first counts, and the reply does not tell that there was one
+            with checked_against(self.scenario.airframe):
+                fault_of(asked.fault, self.sim.t_s)
+            return ""
         return self._inject(dict(asked.fault))
 
     def _inject(self, fault: Fault) -> str:

@@ -18,6 +18,7 @@ The groups of the vehicle take the places of aileron, elevator and rudder, in th
 """
 
 from collections.abc import Callable
+from copy import deepcopy
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -188,7 +189,7 @@ def run_loop_detector(detector: Detector, samples: Samples, model: Model) -> Log
     """Step a detector of the loop through a flight. An alarm lasts while its statistic exceeds 1."""
     inputs = loop_detector_inputs(samples, model)
     detector.reset(loop_detector_context(model))
-    return rows_of_verdicts([detector.step(*frame) for frame in inputs], samples, model)
+    return rows_of_verdicts([detector.step(*deepcopy(frame)) for frame in inputs], samples, model)
 
 
 def rows_of_verdicts(verdicts: list[Verdict], samples: Samples, model: Model) -> LogRows:

@@ -1,10 +1,12 @@
 """One recorded flight serves every detector: its traces are what a flight of its own would have given."""
 
 from math import inf
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.studies.compare.replay import (
     record,
@@ -31,6 +33,15 @@ def test_the_alarm_of_a_replay_is_that_of_a_flight(recorded, scheme):
     assert seen.healthy_s == pytest.approx(6.0)
     assert recorded.known.all()  # the error of the Beaver's model, wherever it flies
     assert recorded.error.shape == (900, 3)
+
+
+def test_a_detector_is_shown_a_copy_of_one_frame(recorded, monkeypatch):
+    """Not a view of a whole flight, with frames to come; nor what the next detector is shown."""
+    views = []
+    peeking = SimpleNamespace(reset=id, step=lambda of, _: views.append(of.x.base) or Verdict())
+    monkeypatch.setattr("beaver_ftc.studies.compare.replay.made", lambda *_: peeking)
+    replay(recorded, "peeking")
+    assert views == [None] * 900
 
 
 @pytest.mark.parametrize("scheme", ["augmented-ekf", "observer-constant", "multiple-models", "rls-monitor"])

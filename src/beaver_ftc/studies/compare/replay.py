@@ -139,9 +139,9 @@ def replay_together(recordings: Sequence[Recording], scheme: str) -> list[Trace]
 
 
 def _statistics(detector: Detector, seen: Sequence[tuple[Measured, np.ndarray]]) -> list[float]:
-    """The statistic of each frame; that of a detector with an alarm alone is well above the level, or well
-    below."""
-    verdicts = [detector.step(*shown) for shown in seen]
+    """The statistic of each frame, of which alone the detector is shown a copy; that of a detector with an
+    alarm alone is well above the level, or well below."""
+    verdicts = [detector.step(*deepcopy(shown)) for shown in seen]
     return [1e6 * each.detected if isnan(each.statistic) else each.statistic for each in verdicts]
 
 

@@ -24,7 +24,7 @@ from beaver_ftc.scenario.schema import load_text
 M_S_PER_KT = 0.514444
 ALTITUDE_M = 1000.0  # below 2000 ft the turbulence declared is another
 DURATION_S = 14.0
-SEED = 1
+SEED = 2  # flights of seed 1 chose a constant and rules of the diagnosis (docs/results/choices.md)
 REAL = ("sensors", "actuators", "environment", "fdi")
 HEAD = (
     "case", "flights", "false alarms", "within 1 s", "later", "not found", "unanticipated", "lost named",
@@ -49,7 +49,7 @@ def scenario(k: int, calm: bool = False, seed: int = SEED) -> Document:
         "name": f"damaged-{k}",
         "aircraft": "gtm",
         "duration_s": DURATION_S,
-        "seed": k,
+        "seed": 1000 * seed + k,
         "initial": {"airspeed_mps": airspeed_mps, "altitude_m": ALTITUDE_M},
         "autopilot": {"airspeed_mps": hold, "altitude_m": hold, "bank_deg": [{"value": bank_deg}]},
         "reference": sines,

@@ -147,9 +147,12 @@ def _left_out(scenario: Scenario) -> Iterator[tuple[str, Document]]:
     if environment.is_turbulent or environment.gusts or declared.air.moves:
         yield "without turbulence", {"environment": {}, "fdi.bounds.turbulence": "none"}
     if not (scenario.sensors.is_ideal and declared.sensors.is_ideal):
-        yield "with perfect sensors", {"sensors": "ideal", "fdi.bounds.sensors": "ideal"}
+        yield (
+            "with perfect sensors",
+            {"sensors": "ideal", "fdi.bounds.sensors": "ideal", "design_model.sensors": None},
+        )
     if not (scenario.actuators.is_ideal and declared.servo_errors.is_none):
-        known = {"fdi.bounds.deflection_deg": 0.0, "fdi.bounds.actuators": {}}
+        known = {"fdi.bounds.deflection_deg": 0.0, "fdi.bounds.actuators": {}, "design_model.actuators": None}
         yield "with perfect servos", {"actuators": "ideal", "uncertainty.actuators": {}, **known}
     exact = {"coefficients": 0.0, "inertia": 0.0, "inertia_coupling": NOTHING, "constant_rad_s2": NOTHING}
     none = {f"fdi.bounds.{key}": value for key, value in exact.items()}

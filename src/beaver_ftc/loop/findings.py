@@ -1,6 +1,7 @@
 """What the diagnosis has found by a frame: alarm, names, types and estimates, read off the frame record."""
 
 from collections.abc import Sequence
+from itertools import compress
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ from beaver_ftc.aircraft import AXES
 from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.diagnosis.monitors.records import sensor_monitor_finding
 from beaver_ftc.diagnosis.state import NOT_ISOLATED, UNANTICIPATED
-from beaver_ftc.diagnosis.types.findings import estimate_fault_parameter, fault_finding_dict
+from beaver_ftc.diagnosis.types.findings import NO_FINDINGS, estimate_fault_parameter, fault_finding_dict
 from beaver_ftc.loop.frame import isolated_theta
 
 
@@ -19,8 +20,8 @@ def instant(seconds: float) -> float | None:
 
 
 def _estimate(fdi: np.void, surface: int) -> float:
-    """theta of the isolated loss. Compiled code is asked only where it must be: the first call from Python
-    takes a quarter of a second."""
+    """theta in [-1, 0] of the isolated loss. Only the statistical detector's needs compiled code, whose first
+    call from Python takes a quarter of a second."""
     if fdi["statistical"]["test"]["enabled"]:
         return float(isolated_theta(fdi, surface))
     axis, estimator = int(fdi["layout"]["dominant_axis"][surface]), int(fdi["verdict"]["isolated_estimator"])
@@ -28,31 +29,29 @@ def _estimate(fdi: np.void, surface: int) -> float:
 
 
 def _isolation(fdi: np.void, surfaces: Sequence[str]) -> dict[str, Any]:
-    """isolated, isolation_type, candidates, estimate, isolation_time_s of a Landing."""
-    if fdi["config"]["diagnoses_all_types"]:
+    """isolated, isolation_type, candidates, estimate, isolation_time_s of a Landing.
+
+    If losses of effectiveness are the only types, the candidates are the surfaces whose estimators are not
+    excluded, and, while no surface is isolated, all surfaces that a damage may take: excluding the loss of a
+    surface does not exclude its damage.
+    """
+    verdict, isolation = fdi["verdict"], fdi["isolation"]
+    isolated = int(verdict["isolated_estimator"])
+    if fdi["config"]["diagnoses_all_types"] or not verdict["detected"] or isolated == UNANTICIPATED:
         return fault_finding_dict(fdi, surfaces)
-    isolated = int(fdi["verdict"]["isolated_estimator"])
-    said: dict[str, Any] = {"isolated": None, "isolation_type": None, "estimate": None, "candidates": ()}
-    said["isolation_time_s"] = None
-    if not fdi["verdict"]["detected"]:
-        return said
-    if isolated == UNANTICIPATED:
-        said |= {"isolated": "unanticipated", "isolation_type": "unanticipated"}
-    else:
-        estimators = fdi["isolation"]["estimator"][: int(fdi["isolation"]["config"]["n_estimators"])]
-        left = [surfaces[int(fie["surface"])] for fie in estimators if not fie["excluded"]]
-        if isolated == NOT_ISOLATED:  # a loss that is excluded is no damage excluded
-            left += [
-                s for s, taken in zip(surfaces, fdi["isolation"]["config"]["losable"], strict=True) if taken
-            ]
-        said["candidates"] = tuple(dict.fromkeys(left))
-    if isolated >= 0:
-        surface = int(fdi["isolation"]["estimator"][isolated]["surface"])
-        said |= {"isolated": surfaces[surface], "isolation_type": "loss_of_effectiveness"}
-        said["estimate"] = _estimate(fdi, surface)
-    if isolated != NOT_ISOLATED:
-        said["isolation_time_s"] = float(fdi["verdict"]["isolated_at_s"])
-    return said
+    estimators = isolation["estimator"][: int(isolation["config"]["n_estimators"])]
+    left = [surfaces[s] for s in estimators["surface"][estimators["excluded"] == 0]]
+    if isolated == NOT_ISOLATED:
+        left += compress(surfaces, isolation["config"]["losable"])
+        return {**NO_FINDINGS, "candidates": tuple(dict.fromkeys(left))}
+    s = int(estimators["surface"][isolated])
+    return {
+        "isolated": surfaces[s],
+        "isolation_type": "loss_of_effectiveness",
+        "candidates": tuple(dict.fromkeys(left)),
+        "estimate": _estimate(fdi, s),
+        "isolation_time_s": float(verdict["isolated_at_s"]),
+    }
 
 
 def _alarm(fdi: np.void) -> dict[str, Any]:
@@ -65,25 +64,34 @@ def _alarm(fdi: np.void) -> dict[str, Any]:
 
 
 def _findings(frame: np.void, surfaces: Sequence[str]) -> dict[str, Any]:
-    """What `_alarm` and `_isolation` have, of surfaces, of an instrument, or of both."""
-    fdi, monitor = frame["fdi"], frame["fdi"]["sensor_monitor"]["output"]
-    broken = sensor_monitor_finding(fdi["sensor_monitor"], float(frame["t"]))
+    """The findings on surfaces (`_alarm`, `_isolation`), on the sensors, or on both:
+
+        sensor broken    alarm of surfaces    fault of surfaces    finding     `faults`
+        no               -                    -                    surfaces    of surfaces
+        yes              void                 -                    sensor      none
+        yes              kept                 isolated             surfaces    of surfaces, sensor
+        yes              kept                 open                 sensor      sensor, of surfaces
+
+    The alarm of surfaces is kept if it came long before that of the sensors: the sensors were sound then.
+    """
+    fdi, monitor = frame["fdi"], frame["fdi"]["sensor_monitor"]
+    broken = sensor_monitor_finding(monitor, float(frame["t"]))
     if broken is not None:
         broken["so_far"] = False if broken["isolated"] else None
-        if not monitor["keeps_surface"]:
+        if not monitor["output"]["keeps_surface"]:
             return {"detection_axis": None, **broken}
-    alarm, said = _alarm(fdi), _isolation(fdi, surfaces)
-    said["so_far"] = None if said["isolated"] is None else said["isolated"] in surfaces
+    alarm, finding = _alarm(fdi), _isolation(fdi, surfaces)
+    isolated = finding["isolated"]
+    finding["so_far"] = None if isolated is None else isolated in surfaces
     if broken is None:
-        return alarm | said
-    if said["isolated"] in surfaces:  # its estimate is of the last frame with a sound sensor
-        said["estimate_at_s"] = float(monitor["alarmed_at_s"]) - float(frame["dt"])
+        return alarm | finding
+    if isolated in surfaces:  # its estimate is of the last frame with a sound sensor
+        finding["estimate_at_s"] = float(monitor["output"]["alarmed_at_s"]) - float(frame["dt"])
         if not fdi["config"]["diagnoses_all_types"]:
-            effectiveness = frame["assessment"]["effectiveness"][surfaces.index(said["isolated"])]
-            said["estimate"] = float(effectiveness) - 1.0
-    found = said.get("faults") or (said,)
-    parts = (*found, broken) if said["isolated"] else (broken, *found)
-    return {**parts[0], **alarm, "faults": parts}
+            finding["estimate"] = float(frame["assessment"]["effectiveness"][surfaces.index(isolated)]) - 1.0
+    of_surfaces = finding.get("faults") or (finding,)
+    faults = (*of_surfaces, broken) if isolated else (broken, *of_surfaces)
+    return {**faults[0], **alarm, "faults": faults}
 
 
 def found_so_far(frame: np.void, surfaces: Sequence[str], verdict: Verdict | None) -> dict[str, Any]:
@@ -96,19 +104,22 @@ def verdict_of(frame: np.void, surfaces: Sequence[str]) -> Verdict:
     fdi = frame["fdi"]
     if not (fdi["verdict"]["detected"] or fdi["sensor_monitor"]["output"]["alarmed"]):
         return Verdict()
-    said = _findings(frame, surfaces)
+    finding = _findings(frame, surfaces)
     return Verdict(
         detected=True,
-        axis=said["detection_axis"],
-        isolated=said["isolated"],
-        type=said["isolation_type"],
-        estimate=said["estimate"],
-        candidates=said["candidates"],
+        axis=finding["detection_axis"],
+        isolated=finding["isolated"],
+        type=finding["isolation_type"],
+        estimate=finding["estimate"],
+        candidates=finding["candidates"],
     )
 
 
 def words_follow_from(fdi: np.void) -> bytes:
-    """What a verdict of the built-in diagnosis follows from, but for its estimate: others, if it changes."""
+    """The state on which every part of a verdict depends but its estimate: the same state, the same words.
+
+    brief: whether a constant was seen for too short a time to exclude types that vary (types/findings.py).
+    """
     types, surfaces = fdi["types"], fdi["types"]["surface"]
     evidence = surfaces["evidence"]
     brief = evidence["n_anomalous"] - evidence["n_rest"] < types["config"]["half_frames"]
@@ -118,11 +129,10 @@ def words_follow_from(fdi: np.void) -> bytes:
 
 
 def estimate_now(fdi: np.void, said: Verdict, surfaces: Sequence[str]) -> float | None:
-    """The estimate of a verdict that otherwise still stands, of a diagnosis for every type."""
-    surface, types = surfaces.index(str(said.isolated)), fdi["types"]
-    pairs = types["pair"]["enabled"]
-    status = types["surface"][surface]["status"] if pairs else fdi["verdict"]
-    return estimate_fault_parameter(fdi, surface, int(status["fault_type"]))
+    """The estimate at this frame of the fault that `said` names, by a diagnosis of every type."""
+    s, types = surfaces.index(str(said.isolated)), fdi["types"]
+    status = types["surface"][s]["status"] if types["pair"]["enabled"] else fdi["verdict"]
+    return estimate_fault_parameter(fdi, s, int(status["fault_type"]))
 
 
 def _of_verdict(fdi: np.void, verdict: Verdict) -> dict[str, Any]:

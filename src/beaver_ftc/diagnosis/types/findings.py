@@ -16,7 +16,7 @@ from beaver_ftc.diagnosis.types.registry import CAN_LOOK_LIKE, CONSTANT, MODE, N
 from beaver_ftc.diagnosis.types.verdict import DEDUCED_FAULTY, DEDUCED_HEALTHY
 
 FindingDict = dict[str, Any]
-_NO_FINDINGS: FindingDict = {
+NO_FINDINGS: FindingDict = {
     "isolated": None, "isolation_type": None, "estimate": None, "isolation_time_s": None,
     "candidates": (), "faults": (),
 }  # fmt: skip
@@ -25,7 +25,7 @@ _NO_FINDINGS: FindingDict = {
 def fault_finding_dict(fdi: np.void, names: Sequence[str]) -> FindingDict:
     """isolated, isolation_type, candidates, estimate and more of a flight diagnosed for every type."""
     if not fdi["verdict"]["detected"]:
-        return dict(_NO_FINDINGS)
+        return dict(NO_FINDINGS)
     if fdi["types"]["pair"]["enabled"]:
         return _find_pair(fdi, names)
     return _find_one(fdi, names)
@@ -51,7 +51,7 @@ def _find_pair(fdi: np.void, names: Sequence[str]) -> FindingDict:
         # A statistical alarm names no plane: while no surface is isolated, the fault may be in any of them
         alarms = np.ones_like(alarms)
     undecided = [
-        {**_NO_FINDINGS, "candidates": tuple(_candidate_texts(fdi, members, names))}
+        {**NO_FINDINGS, "candidates": tuple(_candidate_texts(fdi, members, names))}
         for alarm, members in zip(alarms, groups, strict=True)
         if alarm and not set(members) & set(isolated)
     ]
@@ -60,7 +60,7 @@ def _find_pair(fdi: np.void, names: Sequence[str]) -> FindingDict:
     if estimator == UNANTICIPATED:
         return {**_find_one(fdi, names), "faults": tuple(undecided)}
     texts = tuple(text for finding in undecided for text in finding["candidates"])
-    return {**_NO_FINDINGS, "candidates": texts, "faults": tuple(undecided)}
+    return {**NO_FINDINGS, "candidates": texts, "faults": tuple(undecided)}
 
 
 def _find_one(fdi: np.void, names: Sequence[str]) -> FindingDict:
@@ -68,10 +68,10 @@ def _find_one(fdi: np.void, names: Sequence[str]) -> FindingDict:
     found = fdi["verdict"]
     estimator = int(found["isolated_estimator"])
     if estimator == NOT_ISOLATED:
-        return {**_NO_FINDINGS, "candidates": tuple(_candidate_texts(fdi, range(len(names)), names))}
+        return {**NO_FINDINGS, "candidates": tuple(_candidate_texts(fdi, range(len(names)), names))}
     if estimator == UNANTICIPATED:
         label, at_s = "unanticipated", float(found["isolated_at_s"])
-        return {**_NO_FINDINGS, "isolated": label, "isolation_type": label, "isolation_time_s": at_s}
+        return {**NO_FINDINGS, "isolated": label, "isolation_type": label, "isolation_time_s": at_s}
     s = int(fdi["isolation"]["estimator"][estimator]["surface"])
     return _finding_on_surface(fdi, s, int(found["fault_type"]), names)
 

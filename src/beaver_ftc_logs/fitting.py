@@ -51,6 +51,7 @@ bounds: the posterior mass of 90 % bounds where no labels choose it. For a secon
 the mass still claims health: 0.9 of it held the truth at the fault in 0.70 to 0.94 of the samples, fewest of
 large losses; 0.97 in 0.83 to 0.99, on seeds 401 to 403, which chose it."""
 _MOVING_AIR: Document = {"own_gain_sd": 0.08, "own_gain_time_s": 100.0}
+"""What of this differs if the fitted flights were in moving air."""
 _POWER_OTHER_LAWS = 0.4
 """Largest `power` under other laws. A law may feed the noise of a gyro to the surfaces, which doubles the
 residual, so a sample has less information than in the fit. Chosen on seed 1 of five aircraft."""
@@ -65,41 +66,61 @@ _N_PRIOR_CHANGES = 20
 def fit_model(parts: Parts, vehicle: Vehicle, settings: FilterSettings | None = None) -> Model:
     """The model that fits these flights. Raises BadInput if they have too few samples."""
     bic = bic_by_order(parts, vehicle)
-    model = fitted_order(parts, vehicle, *min(bic, key=lambda order: bic[order]))[1]
+    _, model = fitted_order(parts, vehicle, *min(bic, key=bic.__getitem__))
     model = model.model_copy(update={"settings": settings or estimate_filter_settings(parts, model)})
     return widen_noise(parts, model) if model.colours else model
 
 
 def estimate_filter_settings(parts: Parts, model: Model) -> FilterSettings:
-    """Estimate the settings of later faults from the flights: levels seen, and how often they changed."""
-    moving, other_laws = model.vehicle.moving_air, model.vehicle.other_laws
-    extra: Document = {"delays_s": [d / model.rate_hz for d in ((0.0,) if moving else _DELAYS_SAMPLES)]}
-    if other_laws:
-        extra |= _OTHER_LAWS | (_MOVING_AIR if moving else {})
+    """The settings of the filter for later flights. Labels that show a fault give the rate of changes and the
+    levels; without one, the parts left out give the drift of the trim and the information of a sample."""
+    moving = model.vehicle.moving_air
+    settings: Document = {"delays_s": [0.0] if moving else [d / model.rate_hz for d in _DELAYS_SAMPLES]}
+    max_power = _POWER_UNLABELLED
+    if model.vehicle.other_laws:
+        settings |= _OTHER_LAWS | (_MOVING_AIR if moving else {})
+        max_power = 1.0 if moving else _POWER_OTHER_LAWS
         if model.colours:
-            extra["quick_error"] = quick_error_share(parts, model)
+            settings["quick_error"] = quick_error_share(parts, model)
+    if labelled := _labelled_faults(parts, model):
+        return FilterSettings(**(_OTHER_DAYS | settings | labelled), power=_POWER_LABELLED)
+    settings["trim_walk"] = _estimate_trim_walk(parts, model)
+    drifting = model.model_copy(update={"settings": FilterSettings(**settings)})
+    return FilterSettings(**settings, power=min(max_power, 1.0 / gain_overdispersion(parts, drifting)))
+
+
+def _labelled_faults(parts: Parts, model: Model) -> Document:
+    """levels, changes_per_hour and repair_share by the labels of surfaces that are a group of their own;
+    empty if these labels show no fault.
+
+        changes_per_hour = sqrt(usual (n + 1) / hours),      repair_share = (m + n0 / 2) / (n + n0)
+
+    n, m: changes of the labels, and those among them that restore health; n0: _N_PRIOR_CHANGES; hours: of all
+    flights. A flight may be tested less hard than these, so the rate is the geometric mean of theirs and the
+    usual one.
+    """
     surfaces = list(model.vehicle.surfaces)
-    alone = [group[0] for group in model.groups if len(group) == 1]
-    labelled = {name: _label_levels(parts, surfaces.index(name)) for name in alone}
-    faults = {name: {level for one in each for level in one if level < 1} for name, each in labelled.items()}
-    if levels := {name: sorted(seen) for name, seen in faults.items() if seen}:
-        changed_to = [level for each in labelled.values() for one in each for level in one[1:]]
-        n, hours = len(changed_to), sum(part.is_usable.sum() * part.samples.dt_s for part in parts) / 3600.0
-        # A flight may be tested less hard than these: the rate is the geometric mean of theirs and the usual.
-        rate = np.sqrt((n + 1) / hours * FilterSettings().changes_per_hour)
-        repair_share = (changed_to.count(1.0) + _N_PRIOR_CHANGES / 2) / (n + _N_PRIOR_CHANGES)
-        seen = {"levels": levels, "changes_per_hour": float(rate), "repair_share": repair_share}
-        return FilterSettings(**(_OTHER_DAYS | extra | seen), power=_POWER_LABELLED)
-    extra |= {"trim_walk": _estimate_trim_walk(parts, model)}
-    drifting = model.model_copy(update={"settings": FilterSettings(**extra)})
-    most = (1.0 if moving else _POWER_OTHER_LAWS) if other_laws else _POWER_UNLABELLED
-    return FilterSettings(**extra, power=min(most, 1.0 / gain_overdispersion(parts, drifting)))
+    levels: dict[str, list[float]] = {}
+    changed_to: list[float] = []
+    for name in [group[0] for group in model.groups if len(group) == 1]:
+        flights = _label_levels(parts, surfaces.index(name))
+        changed_to += [level for flight in flights for level in flight[1:]]
+        if faults := {level for flight in flights for level in flight if level < 1}:
+            levels[name] = sorted(faults)
+    if not levels:
+        return {}
+    n = len(changed_to)
+    hours = sum(part.is_usable.sum() * part.samples.dt_s for part in parts) / 3600.0
+    rate = np.sqrt((n + 1) / hours * FilterSettings().changes_per_hour)
+    repair_share = (changed_to.count(1.0) + _N_PRIOR_CHANGES / 2) / (n + _N_PRIOR_CHANGES)
+    return {"levels": levels, "changes_per_hour": float(rate), "repair_share": repair_share}
 
 
 def _label_levels(parts: Parts, i: int) -> list[list[float]]:
-    """The levels of one surface's label in their order, edges left out, of each flight."""
+    """The levels of the label of surface i in their order, each once until it changes, of each flight; NaN at
+    an edge is left out."""
     labels = [part.samples.labels[:, i][part.is_usable] for part in parts]
-    return [[round(level, 6) for level, _ in groupby(one[np.isfinite(one)].tolist())] for one in labels]
+    return [[round(level, 6) for level, _ in groupby(c[np.isfinite(c)].tolist())] for c in labels]
 
 
 def quick_error_share(parts: Parts, model: Model) -> float:
@@ -125,7 +146,9 @@ def _estimate_trim_walk(parts: Parts, model: Model) -> list[float]:
     """Drift of the trim a sample, in residual sd, that parts left out show; the usual at least.
 
     Means of n samples of a random walk, with steps of variance w, and of noise whose mean has the variance
-    c / n differ from the next with the variance v = 2 c / n + 2 n w / 3: two n tell w from c.
+    c / n, differ from the next with the variance v. Two n tell w from c:
+
+        v = 2 c / n + 2 n w / 3,      w = 3 (n2 v2 - n1 v1) / (2 (n2^2 - n1^2))
     """
     flights = [fold.innovations() for fold in held_out_folds(parts, model)]
     runs = [(run, np.diag(flight.R)) for flight in flights for run in flight.residual_runs()]

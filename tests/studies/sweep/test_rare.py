@@ -142,9 +142,7 @@ def test_what_is_stopped_goes_on_where_it_was(drift, tmp_path, monkeypatch):
             raise KeyboardInterrupt
         return rare.score_of(rare.scenario_at(drift, *case[2]), case[1])
 
-    monkeypatch.setattr(
-        rare, "_fly", lambda sweep, name, case: {"score": stopped(sweep, name, case), "failed": False}
-    )
+    monkeypatch.setattr(rare, "_fly", lambda sweep, name, case: {"score": stopped(sweep, name, case)})
     with pytest.raises(KeyboardInterrupt):
         study.run_study(rare_study(drift, TRACKED), tmp_path / "parts")
     flown.clear()

@@ -24,7 +24,7 @@ from beaver_ftc.studies.engine.statistics import CONFIDENCE
 from beaver_ftc.studies.engine.study import FlyRound, Study
 from beaver_ftc.studies.present.tables import all_finite, number
 from beaver_ftc.studies.sweep.one_flight import scenario_of, warm_up
-from beaver_ftc.studies.sweep.sampling import Assignment, values_at
+from beaver_ftc.studies.sweep.sampling import MAX_U, Assignment, values_at
 from beaver_ftc.studies.sweep.store import identity_of
 from beaver_ftc.studies.sweep.subset_simulation import MEMBERS, RUNS, Chains, Scores
 
@@ -53,7 +53,16 @@ def check(sweep: Sweep, expectation: str) -> None:
 
 
 def score_of(scenario: Scenario, expectation: str) -> float:
-    """Fly, and say how near it came to what is not expected: below 0 before, 0 and above once it has come."""
+    """Fly, and return a score that rises towards a failure of the expectation:
+
+        expectation              score
+        no_departure             max |signal| / limit - 1, of all signals and frames
+        no_false_alarm           max |residual| / threshold - 1
+        a number                 |actual| / expected - 1, or |actual| if 0 is expected
+        the same, not reached    time from the fault to the end of the flight, s: the later, the worse
+
+    It is cut at 0: below 0 if the expectation is met, otherwise 0 or more.
+    """
     from beaver_ftc.loop.loop import fly
     from beaver_ftc.plant.sensing import DEPARTURE_LIMITS
 
@@ -68,14 +77,14 @@ def score_of(scenario: Scenario, expectation: str) -> float:
         score = flight.worst_residual_ratio - 1.0
     elif found.actual is not None:
         score = abs(found.actual) / found.expected - 1.0 if found.expected else abs(found.actual)
-    else:  # it never came: the later it could have, the worse
+    else:
         score = max(0.0, flight.frames / scenario.rate_hz - (amounts.fault.at_s if amounts.fault else 0.0))
     return min(score, _BEFORE) if found.passed else max(score, 0.0)
 
 
 def values_of(sweep: Sweep, point: Sequence[float]) -> Document:
     """The varied keys at a point of standard normals."""
-    return values_at(sweep.file.vary.items(), (min(_NORMAL.cdf(u), 1.0 - 2.0**-53) for u in point))
+    return values_at(sweep.file.vary.items(), (min(_NORMAL.cdf(u), MAX_U) for u in point))
 
 
 def scenario_at(sweep: Sweep, run: int, point: Sequence[float]) -> Scenario:
@@ -84,37 +93,35 @@ def scenario_at(sweep: Sweep, run: int, point: Sequence[float]) -> Scenario:
 
 
 def _fly(sweep: Sweep, expectation: str, case: tuple[int, list[float]]) -> Document:
-    """The row of one flight; one that cannot be flown is no event."""
+    """The row of one flight; one that cannot be flown has the score -inf, so that it is no event."""
     try:
-        return {"score": score_of(scenario_at(sweep, *case), expectation), "failed": False}
+        return {"score": score_of(scenario_at(sweep, *case), expectation)}
     except BeaverFtcError:
-        return {"score": -math.inf, "failed": True}
+        return {"score": -math.inf}
 
 
 def rare_study(sweep: Sweep, expectation: str, tell: Callable[[str], None] = lambda _: None) -> Study:
     """The probability that a sweep's flights do not meet an expectation of its base scenario.
 
-    tell: told how far it has come. Raises BadInput for what the base does not expect; flown, SimulationFailed
-    if no flight could be.
+    tell: takes a line of progress after each round. Raises BadInput if the base does not expect this; when it
+    is flown, SimulationFailed if none of the first round can be flown.
     """
     check(sweep, expectation)
     name = f"{sweep.name}-rare-{expectation.replace('.', '-')}"
 
     def rounds(flies: FlyRound) -> Document:
         chains = Chains(len(sweep.keys), sweep.file.seed)
-        failed = 0
 
         def fly(points: np.ndarray) -> Scores:
-            nonlocal failed
             rows = flies([(chains.flights + i, point.tolist()) for i, point in enumerate(points)])
-            failed += sum(row["failed"] for row in rows)
-            if not chains.flights and failed == len(rows):
+            scores = np.array([row["score"] for row in rows])
+            if not chains.flights and np.isneginf(scores).all():
                 raise SimulationFailed(f"{sweep.name}: no flight could be flown")
             tell(f"{name}: {chains.flights + len(rows)} flights, level {chains.levels}")
-            return np.array([row["score"] for row in rows])
+            return scores
 
         chains.go(fly)
-        return _document(sweep, expectation, chains, failed)
+        return _document(sweep, expectation, chains)
 
     def likeliest(document: Document) -> str | None:
         """The scenario of the likeliest event that was flown."""
@@ -123,7 +130,7 @@ def rare_study(sweep: Sweep, expectation: str, tell: Callable[[str], None] = lam
 
     def lost(case: object, why: str) -> Document:
         say_once(f"{name}: of a flight {why}; such flights count as no event")
-        return {"score": -math.inf, "failed": True}
+        return {"score": -math.inf}
 
     return Study(
         name, (), partial(_fly, sweep, expectation), dict, {"rare.json": as_json, "flight.yaml": likeliest},
@@ -132,7 +139,7 @@ def rare_study(sweep: Sweep, expectation: str, tell: Callable[[str], None] = lam
     )  # fmt: skip
 
 
-def _document(sweep: Sweep, expectation: str, chains: Chains, failed: int) -> Document:
+def _document(sweep: Sweep, expectation: str, chains: Chains) -> Document:
     found = chains.estimate()
     plain = all_finite(found.pop("plain"))
     likeliest = None
@@ -142,7 +149,7 @@ def _document(sweep: Sweep, expectation: str, chains: Chains, failed: int) -> Do
     return {
         "sweep": sweep.name, "expectation": expectation, "confidence": CONFIDENCE,
         **all_finite(found), "plain": plain,
-        "failed": failed, "likeliest": likeliest,
+        "failed": chains.failed, "likeliest": likeliest,
         "sweep_sha256": hashlib.sha256(repr(sweep.file).encode()).hexdigest(), "versions": dict(versions()),
     }  # fmt: skip
 

@@ -17,7 +17,9 @@ from beaver_ftc.documents.files import Document
 from beaver_ftc.scenario.sweeps import Sweep, SweepFile, Variation
 from beaver_ftc.studies.engine.draws import generator_of
 
-_ALMOST = 2.0**-53  # keeps a unit number off 0 and 1, where a normal distribution is infinite
+# The least unit number, and the greatest below 1: a normal distribution is infinite at 0 and 1
+MIN_U = 2.0**-53
+MAX_U = 1.0 - MIN_U
 
 # What the numbers are for: the last word of a spawn key. The keys are (index,) of a flight's own seed,
 # (index, OF_VALUES), (0, OF_DESIGN), of a search (generation, 0, OF_SEARCH), and (0, 0, OF_RARE). Keys of two
@@ -56,7 +58,7 @@ def _normal(distribution: NormalDist, within: tuple[float, float] | None, u: flo
     """The normal distribution's inverse, cut to an interval by drawing from the part inside."""
     low, high = within or (-math.inf, math.inf)
     below, above = distribution.cdf(low), distribution.cdf(high)
-    share = min(max(below + u * (above - below), _ALMOST), 1.0 - _ALMOST)
+    share = min(max(below + u * (above - below), MIN_U), MAX_U)
     return min(max(distribution.inv_cdf(share), low), high)
 
 

@@ -23,13 +23,12 @@ from beaver_ftc.studies.engine.store import batches_of
 from beaver_ftc.studies.engine.workers import Batch
 from beaver_ftc.studies.present.tables import finite
 from beaver_ftc.studies.sweep.one_flight import DEPARTED
-from beaver_ftc.studies.sweep.sampling import OF_SEARCH, Assignment, values_at
+from beaver_ftc.studies.sweep.sampling import MAX_U, OF_SEARCH, Assignment, values_at
 from beaver_ftc.studies.sweep.store import Store
 
 WEIGHT = 0.7  # [Storn1997] recommend 0.4 to 1
 CROSSOVER = 0.9  # and, for few dependent keys, 0.9
 DEPARTED_DEG_S = 1e6  # above all tracking errors: the score of a flight that loses the aircraft at its start
-_ALMOST_ONE = math.nextafter(1.0, 0.0)
 
 
 def delay_score(row: Mapping[str, Any]) -> float:
@@ -98,7 +97,7 @@ class Evolution:
         taken = generator.random(x.shape) < CROSSOVER
         taken[np.arange(n), generator.integers(self._keys, size=n)] = True
         inside = np.abs(np.where(taken, mutants, x))
-        return np.minimum(1.0 - np.abs(1.0 - inside % 2.0), _ALMOST_ONE)
+        return np.minimum(1.0 - np.abs(1.0 - inside % 2.0), MAX_U)
 
     def select(self, trials: np.ndarray, scores: np.ndarray) -> None:
         """Let each trial that is no worse take its parent's place; a last generation may be cut short."""

@@ -31,7 +31,8 @@ class Chains:
     """Independent runs of subset simulation abreast: points (runs, members, keys), scores (runs, members).
 
     share (runs,): probability of the level that a run has reached, the product of its shares so far. reached
-    (runs,): whether that is the event. stuck: whether a run cannot go on. flights, levels: how many so far.
+    (runs,): whether that is the event. stuck: whether a run cannot go on. flights, levels: how many so far;
+    failed: flights without a score (-inf).
     plain: events and flights of the first round. design: of the likeliest event its distance, flight, point.
     """
 
@@ -43,6 +44,7 @@ class Chains:
         self.reached = np.zeros(runs, bool)
         self.stuck = False
         self.flights = 0
+        self.failed = 0
         self.levels = 0
         self.design: tuple[float, int, np.ndarray] | None = None
 
@@ -103,6 +105,7 @@ class Chains:
             if self.design is None or distance < self.design[0]:
                 self.design = distance, self.flights + i, flat[i].copy()
         self.flights += len(flat)
+        self.failed += int(np.isneginf(scores).sum())
         return scores.reshape(points.shape[:-1])
 
     def estimate(self) -> Document:

@@ -17,7 +17,7 @@ from math import inf, pi, sqrt
 import numpy as np
 
 RATIO = 6.5  # observer over feedback: of those with the same margins, near the least error in turbulence
-LEAST_LEAD_RATIO, MOST_LEAD = 1.0, 4.0  # lead compensation makes an actuator at most this many times as fast
+MOST_LEAD = 4.0  # lead compensation makes an actuator at most this many times as fast
 RESERVE_DB, RESERVE_DEG = 0.5, 2.0  # kept for what an integrator is not: the rest of the aircraft
 N_FREQUENCIES, N_CANDIDATES = 160, 40
 LEAST_PER_S = 0.5  # s of the slowest loop, which is taken even if it leaves less than the margins
@@ -39,9 +39,7 @@ class Loop:
 
 def lead_of(approach: float) -> float:
     """By how much to lead an actuator that goes this share of the way in a frame; it never overshoots."""
-    if approach <= 1.0 / MOST_LEAD:
-        return MOST_LEAD
-    return 1.0 / approach if approach < 1.0 else LEAST_LEAD_RATIO
+    return 1.0 / min(max(approach, 1.0 / MOST_LEAD), 1.0)
 
 
 def frequencies(dt_s: float) -> np.ndarray:

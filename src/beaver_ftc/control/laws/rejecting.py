@@ -19,7 +19,7 @@ that is larger (evidence.py). Once no known fault fits, the law estimates all su
 (effectiveness_estimator.py).
 """
 
-from math import exp, hypot, sqrt
+from math import exp, sqrt
 
 import numpy as np
 
@@ -55,8 +55,8 @@ from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.sensors import RateGyro
 
 N_POINTS = 5  # of the schedule over dynamic pressure
-N_LOOPS = 4  # roll, pitch, yaw, and pitch by the surface that stands in
-STAND_IN = 3  # the last of them
+N_LOOPS = 4  # rows of the tables of gains: roll, pitch, yaw, and pitch by the surface that stands in
+STAND_IN = 3  # the last of these rows
 # How long a suspected surface stands at its stop until it is given up: one that another replaces, and others;
 # and after how long it is tried again
 PATIENCE_S, LONG_PATIENCE_S, RETRY_S = 0.5, 1.0, 20.0
@@ -68,35 +68,35 @@ STOP_RECOVERY = 1.5
 def configure(law: np.void, control: np.void, prediction: np.void, declared: Declared, y: np.ndarray) -> None:
     """Derive the leads, and the gains of each loop at each point of the schedule (control.CompiledLaw).
 
-    y: the measured signals in trim. A gyro's noise may move a surface at this share of its rate limit:
+    y (n_y,): the measured signals in trim. The points differ from it in airspeed V, m/s, and in dynamic
+    pressure, Pa, which goes with V^2. A gyro's noise may move a surface at this share of its rate limit:
 
         noise_share sqrt(a / a_max)        a: own damping of the axis, 1/s; a_max: of the most damped
     """
     config, wanted, layout = law["config"], declared.control, control["layout"]
     design, dt, share = prediction["design"], 1.0 / declared.rate_hz, 1.0 / declared.substeps
-    speeds_mps = np.linspace(*declared.aircraft.envelope.airspeed_mps, N_POINTS)
-    signals = np.tile(y, (N_POINTS, 1))
-    signals[:, AIRSPEED], signals[:, QDYN] = speeds_mps, y[QDYN] * (speeds_mps / y[AIRSPEED]) ** 2
-    G = [control_effectiveness(design, each) for each in signals]
-    whole = 1.0 - (1.0 - prediction["actuators"]["approach"]) ** declared.substeps
-    leads = [lead_of(float(way)) for way in whole]
-    fill(config, dt=dt, share=share, qdyn=signals[:, QDYN], fading=derive_fading(dt), lead=leads)
-    carriers = [(axis, int(s)) for axis, s in enumerate(layout["main"])]
+    V = np.linspace(*declared.aircraft.envelope.airspeed_mps, N_POINTS)
+    points = np.tile(y, (N_POINTS, 1))
+    points[:, AIRSPEED] = V
+    points[:, QDYN] = y[QDYN] * (V / y[AIRSPEED]) ** 2
+    G = [control_effectiveness(design, point) for point in points]
+    way = 1.0 - (1.0 - prediction["actuators"]["approach"]) ** declared.substeps  # of a frame
+    lead = [lead_of(float(part)) for part in way]
+    fill(config, dt=dt, share=share, qdyn=points[:, QDYN], fading=derive_fading(dt), lead=lead)
+    loops = list(enumerate(layout["main"].tolist()))
     if layout["stand_in"] >= 0:
-        carriers.append((PITCH, int(layout["stand_in"])))
+        loops.append((PITCH, int(layout["stand_in"])))
     a = np.abs(own_damping(design, y))
-    part = {s: sqrt(a[axis] / a.max()) for axis, s in carriers}
+    part = {s: sqrt(a[axis] / a.max()) for axis, s in loops}  # one that leads two axes has that of the latter
     limits_rad_s = servo_data(declared)["rate_limit_rad_s"]
     margin = wanted.gain_margin_db, wanted.phase_margin_deg
-    for row, (axis, s) in enumerate(carriers):
+    for row, (axis, s) in enumerate(loops):
         gyro: RateGyro = getattr(declared.instruments, AXES[axis])
-        noise, _, quantum = gyro.noise_bias_quantum
-        noise_rad_s = hypot(noise, quantum / sqrt(12.0))
         keep = exp(-gyro.bandwidth_rad_s * dt) if gyro.bandwidth_rad_s else 0.0
-        loop = Loop(dt, share, float(whole[s]), config["lead"][s], gyro.delay_s, keep)
+        loop = Loop(dt, share, float(way[s]), config["lead"][s], gyro.delay_s, keep)
         speed_rad_s = wanted.noise_share * part[s] * float(limits_rad_s[s] or DEFAULT_RATE_RAD_S)
         for j in range(N_POINTS):
-            Kp = fastest(loop, margin, noise_rad_s, float(G[j][axis, s]), speed_rad_s)
+            Kp = fastest(loop, margin, gyro.random_error, float(G[j][axis, s]), speed_rad_s)
             config["Kp_at"][row, j] = Kp
             config["L_rate_at"][row, j], config["L_disturbance_at"][row, j] = corrections(Kp, dt)
 
@@ -107,10 +107,10 @@ OBSERVER = record(begun=int, rate=3, disturbance=3)
 
 @sized
 def config_dtype(n: int) -> np.dtype:
-    """qdyn (N_POINTS,) Pa: the schedule's points, ascending. Kp 1/s, L_rate 1, L_disturbance 1/s (N_LOOPS,
-    N_POINTS): feedback, and the observer's gains. share: of a frame until a command acts. lead (n,): command
-    beyond the actuator's position over what is wanted beyond it. fading: share of SUMS that goes in a
-    frame."""
+    """qdyn (N_POINTS,) Pa: the schedule's points, ascending. Kp_at 1/s, L_rate_at 1, L_disturbance_at 1/s
+    (N_LOOPS, N_POINTS): feedback, and the observer's gains. share: of a frame until a command acts. lead
+    (n,): command beyond the actuator's position over what is wanted beyond it. fading: share of SUMS that
+    goes in a frame."""
     table = (N_LOOPS, N_POINTS)
     return record(
         dt=float, share=float, fading=float, qdyn=N_POINTS, Kp_at=table, L_rate_at=table,

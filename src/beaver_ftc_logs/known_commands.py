@@ -15,7 +15,20 @@ _SURFACE_WORD = (
 _SIDE_WORD = r"left|right|l|r|lh|rh|port|starboard|upper|lower|inner|outer|inboard|outboard|\d"
 _PLAIN_WORD = r"cmd|cmds|command|commands|commanded"
 _COMMAND_WORD = rf"{_PLAIN_WORD}|setpoint|sp|demand|servo|pwm"
-_UNIT_WORD = r"norm|rad|deg|pct|percent|us|%|1"
+_SHARE_UNIT = r"norm|pct|percent|%|1"
+_UNIT = rf"(_({_SHARE_UNIT}|rad|deg|us))?"
+_SURFACE = rf"(({_SIDE_WORD})_?)*({_SURFACE_WORD})(_?({_SIDE_WORD}))*"
+_AXIS = r"(roll|pitch|yaw)"
+
+_PLAIN_COMMANDS = (
+    rf"(delta_|d_)?{_SURFACE}(_({_COMMAND_WORD}))*{_UNIT}",  # elevator, left_aileron_command_norm
+    rf"({_COMMAND_WORD})_{_SURFACE}{_UNIT}",  # cmd_elevon_left
+    rf"({_AXIS}_?({_PLAIN_WORD})|({_PLAIN_WORD})_?{_AXIS})(_({_SHARE_UNIT}))?",  # roll_cmd, cmd_roll
+    rf"servo_?\d+(_({_PLAIN_WORD}|pwm))?(_us)?",  # servo3
+    r"d(elta)?_?[aer](_(cmd|rad|deg|norm))?",  # da
+)
+"""Patterns of the words of commands in plain tables, in lower case, with `_` between two words; each with
+examples."""
 
 KNOWN_COMMANDS = {
     # PX4 message actuator_controls: control 0 to 2 of groups 0 and 1 are roll, pitch, yaw
@@ -44,21 +57,13 @@ def is_command_name(column_name: str) -> bool:
 
 
 def _is_plain_command_name(name: str) -> bool:
-    """Whether each word of a name in a plain table is of a surface's command: `Left aileron command (norm)`,
-    `elevon_left`, `roll_cmd`, `servo3`, `da`. A word that is none, as in `elevator_position`, or a message
-    that is in no table, as in `CMD.Lat`, makes another quantity."""
+    """Whether each word of a name in a plain table is of a surface's command, as in `Left aileron command
+    (norm)`. With another word, as in `elevator_position`, or a message that is in no table, as in `CMD.Lat`,
+    it is another quantity."""
     if "." in name or "/" in re.sub(r"[\[(].*", "", name):
         return False
-    words = [word for word in re.split(r"[^a-z0-9%]+", name) if word]
-    text = "_".join(words)
-    sides, units = rf"(({_SIDE_WORD})_?)*", rf"(_({_UNIT_WORD}))?"
-    surface = rf"(delta_|d_)?{sides}({_SURFACE_WORD})(_?({_SIDE_WORD}))*(_({_COMMAND_WORD}))*{units}"
-    command_first = rf"({_COMMAND_WORD})_{sides}({_SURFACE_WORD})(_?({_SIDE_WORD}))*{units}"
-    axis = rf"(roll|pitch|yaw)_?({_PLAIN_WORD})(_(norm|pct|percent|%|1))?"
-    command_of_axis = rf"({_PLAIN_WORD})_?(roll|pitch|yaw)(_(norm|pct|percent|%|1))?"
-    output = rf"servo_?\d+(_({_PLAIN_WORD}|pwm))?(_us)?"
-    short = r"d(elta)?_?[aer](_(cmd|rad|deg|norm))?"
-    return bool(re.fullmatch("|".join((surface, command_first, axis, command_of_axis, output, short)), text))
+    words = "_".join(re.findall(r"[a-z0-9%]+", name))
+    return any(re.fullmatch(pattern, words) for pattern in _PLAIN_COMMANDS)
 
 
 _PX4_ROTARY_WINGS = {2: "quadrotor", 3: "coaxial helicopter", 4: "helicopter", 13: "hexarotor",

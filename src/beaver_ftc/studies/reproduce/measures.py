@@ -122,9 +122,7 @@ def estimators(flown: Flown) -> float:
     return 1.0 + sum(bool(flown.residuals_of(other).any()) for other in ESTIMATORS)
 
 
-def at_work(flown: Flown) -> float:
-    """The number `estimators` again: claims.yaml limits it from above here, and from below there."""
-    return estimators(flown)
+at_work = estimators  # claims.yaml limits this one from above, and `estimators` from below
 
 
 def residuals(flown: Flown) -> float:

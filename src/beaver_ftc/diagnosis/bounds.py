@@ -20,8 +20,8 @@ The error of a derived aircraft's model: error_map.py. The same as variances: de
 
 Symbols of the kernels (err: of `errors_dtype`, model: the design model):
 
-    x (3,) rad/s, y, u (n,) rad   rates, readings, deflections; in err [0] is the magnitude as measured, [1]
-                                  the worst that the errors allow
+    x (3,) rad/s, y, u (n,) rad   rates, readings, deflections; in err, [MEASURED] is the magnitude as
+                                  measured, [WORST] the worst that the errors allow
     eta (3,) rad/s2               bound on the uncertainty
     s, i                          surface, axis
 """
@@ -52,6 +52,7 @@ from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.sensors import ENGINE, OF_THE_SLIPSTREAM
 
 Y0 = 3  # gyros come first among the signals, then alpha, beta, airspeed, dynamic pressure
+MEASURED, WORST = 0, 1
 _MIN_V_SHARE = 0.1
 # Double precision leaves 1e-16 of a rate below 6 rad/s, divided by a frame of 1 ms or more, and of the terms
 # of f + G u, which stay below 100 rad/s2; a few operations each. Where a frame is of fifty instants it leaves
@@ -74,7 +75,7 @@ def errors_dtype(n: int) -> np.dtype:
         wg_aloft=float, wg_1m=float, h0=float, h1=float,
         # of dpt: see `slipstream_bound`
         engine=int, kw0=float, kw1=float,
-        # the design model of magnitudes [0], and of the largest magnitudes that the errors allow [1]
+        # the design model of magnitudes: MEASURED, and WORST
         model=(design_dtype(n), 2),
         # the same of rates, also relative to the air, of readings and deflections; what the models give there
         x=(2, 3), x_air=(2, 3), y=(2, N_Y), u=(2, n), f=(2, 3), G=(2, 3, n), F=(2, 3), eG=(3, n),
@@ -143,18 +144,19 @@ def fill_magnitudes(err, x, y, u):
         for s in range(u.size):
             err.u[v, s] = abs(u[s]) + v * err.du[s]
     if err.engine:
-        err.y[1, DPT] += slipstream_bound(err, y)
+        err.y[WORST, DPT] += slipstream_bound(err, y)
     V = y[AIRSPEED]
-    err.y[1, AIRSPEED] = max(2.0 * V - err.y[1, AIRSPEED], _MIN_V_SHARE * V)
+    err.y[WORST, AIRSPEED] = max(2.0 * V - err.y[WORST, AIRSPEED], _MIN_V_SHARE * V)
 
 
 @kernel
 def add_declared_bound(err, x, y, u, eta):
     """Add to eta the bound by the declared errors, and fill eG, that on the effect of each surface, per rad.
 
-        eta <- eta + F_1 - F_0      eG = G_1 - G_0      F = f + G u
+        eta <- eta + F_worst - F_measured      eG = G_worst - G_measured      F = f + G u
 
-    F_0, F_1: the design model of magnitudes, at the magnitudes as measured and at the largest possible ones.
+    F_measured, F_worst (3,) rad/s2: the design model of magnitudes, at the magnitudes as measured and at the
+    worst ones.
     """
     fill_magnitudes(err, x, y, u)
     for v in range(2):
@@ -162,9 +164,9 @@ def add_declared_bound(err, x, y, u, eta):
         nonlinear_response_from_table(err.model[v], err.x[v], err.y[v], err.f[v], err.G[v])
         acceleration(err.f[v], err.G[v], err.u[v], err.F[v])
     for i in range(3):
-        eta[i] += err.F[1, i] - err.F[0, i]
+        eta[i] += err.F[WORST, i] - err.F[MEASURED, i]
         for s in range(u.size):
-            err.eG[i, s] = err.G[1, i, s] - err.G[0, i, s]
+            err.eG[i, s] = err.G[WORST, i, s] - err.G[MEASURED, i, s]
 
 
 @kernel
@@ -203,10 +205,8 @@ def least_height(h, h0, h1):
 
 @kernel
 def set_air_rotation(err, h):
-    """Set the bound on the air's rotation, rad/s, for altitude h, m."""
-    if err.wg_1m > 0.0:
-        least = least_height(h, err.h0, err.h1)
-        err.wg[:] = max(err.wg_aloft, err.wg_1m / np.sqrt(least))
+    """wg = max(wg_aloft, wg_1m / sqrt(h_least)): bound on the air's rotation, rad/s, for altitude h, m."""
+    err.wg[:] = max(err.wg_aloft, err.wg_1m / np.sqrt(least_height(h, err.h0, err.h1)))
 
 
 @kernel
@@ -218,13 +218,13 @@ def fill_bound(bound, model, meas, u):
         set_air_rotation(err, meas.altitude)
         add_declared_bound(err, x, y, u, eta)
     else:
-        err.x[1, :] = x  # read below
+        err.x[WORST, :] = x  # without errors, the worst rates are those measured
     if emap.n_boxes > 0:
         look_up_map(emap, x, y, u, err.du)
         for i in range(3):
             eta[i] += emap.e_now[i]
     share, const, earth = bound.inertia_coupling_error_share, bound.const, bound.earth_rate_rad_s
-    add_published_bound(err.x[1], model, share, const, earth, eta)
+    add_published_bound(err.x[WORST], model, share, const, earth, eta)
 
 
 GUST_LIMIT_SIGMA = 6.0  # exceeded once in 5e8 independent samples
@@ -275,16 +275,16 @@ def fill_errors(err: np.void, declared: Declared, model: np.void) -> None:
     dI, du = inertia_bounds(declared.inertia, declared.mass), declared.deflections_rad
     err["model"] = model
     err["model"]["moments"]["value"] = np.abs(model["moments"]["value"])
-    err["model"]["moments"]["value"][1, : dC.size] += dC
+    err["model"]["moments"]["value"][WORST, : dC.size] += dC
     for name, e in zip(InertiaCoefficients._fields, dI, strict=True):
-        err["model"][name] = abs(model[name]) + np.array([0.0, e])
+        err["model"][name] = abs(model[name]) + np.array([0.0, e])  # measured, worst
     no_errors = errors.is_ideal and declared.servo_errors.is_none
     fill(
-        err, du=du, du0=declared.deflection_rad, wg=aloft, wg_aloft=aloft,
+        err, du=du, du0=declared.deflection_rad, wg_aloft=aloft,
         wg_1m=GUST_LIMIT_SIGMA * air.low_rotation_limit_rad_s(b),
         h0=errors["altitude"].worst, h1=errors["altitude"].slope,
         e0=errors.each("worst"), e1=errors.each("slope"), steady=errors.each("steady", AXES),
-        given=not no_errors or any(np.any(e) for e in (dC, dI, du, np.array(aloft))),
+        given=not no_errors or any(np.any(e) for e in (dC, dI, du, aloft)),
     )  # fmt: skip
 
 

@@ -84,7 +84,7 @@ class Episode(Simulation):
         shares = _numbers("action", action, (self._size,))
         if shares.shape != (self._size,) or not self._acts(self._loop.frames, shares):
             raise BadInput(f"action: {action!r:.80} is not usable, allowed: {self._size} finite numbers")
-        self._asked.append(Asked("act", {"action": shares.copy()}, (0, frames)))
+        self._asked.append(Asked("act", {"action": shares.copy()}, frames))
         self._cost, self._by_hand = 0.0, True
         self._fly_to(min(self._next + frames, self._loop.n_frames))
         return self._cost

@@ -39,7 +39,7 @@ from beaver_ftc.scenario.truth import Truth
 if TYPE_CHECKING:
     from beaver_ftc.compiled.cache import Wanted
     from beaver_ftc.control import Law
-    from beaver_ftc.diagnosis import Detector
+    from beaver_ftc.diagnosis import Detector, Verdict
     from beaver_ftc.loop.changing import Changing
     from beaver_ftc.loop.plugin_frame import PluginFrame
 
@@ -189,8 +189,7 @@ class Loop:
         self.gust = GustSchedule(scenario.environment.gusts, self.plant, scenario.rate_hz)
         self.n_frames = round(scenario.duration_s * scenario.rate_hz)
         self.plugin_frame = self._with_plugins(detector, law)
-        diagnoses_itself = self.plugin_frame is None or self.plugin_frame.detector is None
-        self.columns = lay_out(self.frames[0], scenario, diagnoses_itself)
+        self.columns = lay_out(self.frames[0], scenario, self.plugin_verdict is None)
         self.log = memory.taken((min(CHUNK_ROWS, self.n_frames), len(self.columns)))
         self.references = np.empty((len(self.log), 3))
         self._order = np.zeros(2, np.int64)
@@ -234,6 +233,12 @@ class Loop:
             law = named_law(self.frames, self.scenario, self.trimmed)
         return plugged(self.frames, self.scenario, self.trimmed, detector, law)
 
+    @property
+    def plugin_verdict(self) -> "Verdict | None":
+        """The last verdict of the plug-in that diagnoses; None if the built-in diagnosis does."""
+        plugins = self.plugin_frame
+        return None if plugins is None or plugins.detector is None else plugins.verdict
+
     def fly_with(self, plugins: "PluginFrame | None") -> None:
         """Fly on with these plug-ins, or with none. fly_frame: what Python is to call, None if nothing."""
         self.plugin_frame = plugins
@@ -247,11 +252,10 @@ class Loop:
 
     def land(self, scenario: Scenario | None = None) -> Landing:
         """What the flight has yielded so far; scenario: another that says what was flown."""
-        verdict = self.plugin_frame.verdict if self.plugin_frame and self.plugin_frame.detector else None
-        replaced, windows = self.changing.replaced if self.changing else (), self.windows.until_now(self)
-        return landing_of(
-            scenario or self.scenario, self.frames[0], self.columns, verdict, tuple(replaced), tuple(windows)
-        )
+        replaced = tuple(self.changing.replaced if self.changing else ())
+        windows = tuple(self.windows.until_now(self))
+        flown = scenario or self.scenario
+        return landing_of(flown, self.frames[0], self.columns, self.plugin_verdict, replaced, windows)
 
     def release(self) -> None:
         """Give aircraft and memory back for another flight. This flight cannot be used any more."""

@@ -47,16 +47,20 @@ Vector = NDArray[np.float64]
 
 
 class Asked(NamedTuple):
-    """What a flight was asked for: the method's name, its arguments, and the frames of a step; those of the
-    last one by themselves."""
+    """What a flight was asked for: the method's name, its arguments, and the frames of a step.
+
+    Steps in a row with the same arguments are one. before: frames of all of them but the last, whose rows the
+    flight still has (`rows`).
+    """
 
     what: str
     given: Mapping[str, Any]
-    frames: tuple[int, int]
+    frames: int = 0
+    before: int = 0
 
-    def is_of(self, what: str, given: Mapping[str, Any]) -> bool:
-        """Whether it is a step with these arguments."""
-        if not any(self.frames) or self.what != what:
+    def is_same(self, what: str, given: Mapping[str, Any]) -> bool:
+        """Whether it is a call of this method with these arguments."""
+        if self.what != what:
             return False
         both = ((of, given[name]) for name, of in self.given.items())
         return all(a is b or (a is not None and b is not None and np.array_equal(a, b)) for a, b in both)
@@ -106,8 +110,11 @@ class Stepping:
             self._loop = self._loop_type(self._scenario, *self._plug_ins, self._prepare)
         self._frame: np.void = self._loop.frames[0]
         self._k_flown, self._rows_flown = (self._loop.frames[name].item for name in ("k", "row"))
-        self._next, self._turn_at, self._written = 0, 0, 0
-        self._status, self._by_hand = FLYING, False
+        self._next = 0  # frame to be flown
+        self._turn_at = 0  # frame before which the loop must be told what changes
+        self._written = 0  # rows of this chunk of the log that the sink has
+        self._status = FLYING
+        self._by_hand = False  # whether a step had a command of the surfaces
         self._stick = StickTrack()
         self._asked: list[Asked] = []  # of this flight, so far
         self._unsteered: tuple[int, Vector] | None = None  # references of a chunk, and its first frame
@@ -165,15 +172,13 @@ class Stepping:
     @property
     def verdict(self) -> "Verdict":
         """What the diagnosis makes of the flight so far."""
-        plugins = self._loop.plugin_frame
-        return plugins.verdict if plugins and plugins.detector else verdict_of(self._frame, self._surfaces)
+        return self._loop.plugin_verdict or verdict_of(self._frame, self._surfaces)
 
     @property
     def inconclusive(self) -> str:
         """Why the built-in diagnosis can conclude nothing at this frame; empty if it can, or a plug-in
         diagnoses."""
-        plugins = self._loop.plugin_frame
-        plugged = plugins is not None and plugins.detector is not None
+        plugged = self._loop.plugin_verdict is not None
         return "" if plugged else inconclusive_now(self._frame, self._loop.aircraft)
 
     @property
@@ -337,12 +342,13 @@ class Stepping:
     __getitem__ = read
 
     def _note_asked(self, what: str, frames: int = 0, **given: Any) -> None:
-        """Keep what this flight was asked for. frames: of a step; steps that ask for the same are one."""
+        """Keep what this flight was asked for; frames: of a step."""
         given = {name: copy(of) for name, of in given.items()}
         before = 0
-        if frames and self._asked and self._asked[-1].is_of(what, given):
-            before = sum(self._asked.pop().frames)
-        self._asked.append(Asked(what, given, (before, frames)))
+        if frames and self._asked and self._asked[-1].is_same(what, given):
+            last = self._asked.pop()
+            before = last.before + last.frames
+        self._asked.append(Asked(what, given, frames, before))
 
     def _do_again(self, asked: Iterable["Asked"], frames: int) -> None:
         """Fly what another flight of this scenario was asked for; frames: how many it has flown."""
@@ -350,10 +356,10 @@ class Stepping:
             self._begin()
         for each in asked:
             do = getattr(self, each.what)
-            if not any(each.frames):
+            if not each.frames:
                 do(**each.given)
-            for some in filter(None, each.frames):
-                do(frames=some, **each.given)
+            for n in filter(None, (each.before, each.frames)):
+                do(frames=n, **each.given)
 
     def scenario_flown(self) -> Scenario:
         """A scenario that repeats this flight with exactly the same numbers.

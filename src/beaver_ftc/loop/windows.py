@@ -33,12 +33,10 @@ class Windows:
         if not any(self._in_force) or frame["k"] <= self._from_frame:
             return self._closed
         alarm_s = float(frame["accounts"]["beyond_threshold_at_s"])
-        plugins = loop.plugin_frame
-        verdict = plugins.verdict if plugins and plugins.detector else None
         window = {
             "from_s": self._from_frame / rate_hz,
             "to_s": int(frame["k"]) / rate_hz,
             "alarm_s": alarm_s if alarm_s >= 0.0 else None,
-            "found": found_so_far(frame, loop.aircraft.surfaces, verdict),
+            "found": found_so_far(frame, loop.aircraft.surfaces, loop.plugin_verdict),
         }
         return [*self._closed, window]

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import dataclass
 from importlib.metadata import version
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated
 
@@ -58,8 +59,9 @@ def bench(rounds: int, with_parts: bool, say: Say = lambda text: None) -> Docume
     document["whole_flight"] = _whole_flights(scenario, max(rounds // 10, 3))
     say("flights of sweeps, taken apart, by kind")
     document["sweep_flights"] = by_kind(rounds)
-    asked = {"scenario": SCENARIO, "rounds": rounds, "frames_a_round": FRAMES}
-    return document | asked | {"machine": machine()}
+    return document | {
+        "scenario": SCENARIO, "rounds": rounds, "frames_a_round": FRAMES, "machine": machine()
+    }  # fmt: skip
 
 
 def machine() -> Document:
@@ -83,15 +85,18 @@ def _processor() -> str:
 
 
 def _phase(scenario: Scenario, at_s: float, rounds: int, with_parts: bool) -> Document:
-    """The bare aircraft, the loop, the loop with ever more of its parts; all in one aircraft, one memory."""
+    """The bare aircraft, the loop, the loop with ever more of its parts; all in one aircraft, one memory.
+
+    us: time of a frame, microseconds, in each round (rounds,); before: that without the part.
+    """
     names = ["calling", *PARTS] if with_parts else []
     whole = ClosedLoop(scenario, at_s)
     stages = [whole.with_frame(frame_with(i)) for i in range(len(names))]
     contenders: list[Contender] = [Bare(whole.moment, scenario.substeps), whole, *stages]
     bare, loop, *steps = interleave(contenders, rounds, FRAMES).T
     parts = {
-        name: _figures("us", us) | _figures("adds_us", us - less) | _figures("ratio", us / bare)
-        for name, us, less in zip(names, steps, [bare, *steps], strict=False)  # less: the step before
+        name: _figures("us", us) | _figures("adds_us", us - before) | _figures("ratio", us / bare)
+        for name, (before, us) in zip(names, pairwise([bare, *steps]), strict=True)
     }
     return _against(bare, loop) | {"parts": parts}
 

@@ -54,7 +54,14 @@ def _table_text(duration_s: float, seed: int, weak_from_s: float = inf) -> str:
 
 
 def _simulate_rows(duration_s: float, rng: np.random.Generator, weak_from_s: float) -> Iterator[list[float]]:
-    """Row by row: time, rates in deg/s, commands, attitude. The left elevon is weak from weak_from_s on."""
+    """Row by row: time, rates in deg/s, commands, attitude. The left elevon is weak from weak_from_s on.
+
+        w' = A w + B e + d,     d' = -D d + noise
+        phi' = p + tan(theta) (q sin(phi) + r cos(phi)),     theta' = q cos(phi) - r sin(phi)
+
+    w (3,) rad/s: rates p, q, r; e (2,): right and left elevon, shares of travel, as far as they act; d (3,)
+    rad/s2: turbulence; phi, theta rad: roll and pitch angle.
+    """
     dt_s = 1.0 / SAMPLE_RATE_HZ
     rates = np.zeros(3)
     turbulence_rad_s2 = np.zeros(3)

@@ -39,38 +39,38 @@ NAMES = (
 _KINDS = {float: "float", int: "int", bool: "flag", str: "text"}
 
 
-def _faults(found: Metrics) -> str:
+def _faults(metrics: Metrics) -> str:
     """surface:type of each fault that was named, of several at once."""
-    named = (one for one in found.isolation.faults if one.fault)
+    named = (one for one in metrics.isolation.faults if one.fault)
     return " ".join(f"{one.fault}:{one.type or 'open'}" for one in named)
 
 
 def _of_each_window(holds: Callable[[Window], bool]) -> Getter:
     """`yes` or `no` of each window, in the order of time; empty without windows."""
-    return lambda found: " ".join("yes" if holds(one) else "no" for one in found.windows or ())
+    return lambda metrics: " ".join("yes" if holds(one) else "no" for one in metrics.windows or ())
 
 
 def _first_entry(mode: str) -> Getter:
-    return lambda found: next((change.time_s for change in found.supervisor if change.mode == mode), None)
+    return lambda metrics: next((change.time_s for change in metrics.supervisor if change.mode == mode), None)
 
 
 def _end_of_pair(name: str, end: int) -> Getter:
-    return lambda found: (getattr(found.isolation, name) or (None, None))[end]
+    return lambda metrics: (getattr(metrics.isolation, name) or (None, None))[end]
 
 
-# Columns that are not at the path of their name in the metrics: type, and where they come from.
+# Columns whose names are no paths of the metrics: their types, and the functions that read them.
 _ELSEWHERE: dict[str, tuple[str, Getter]] = {
-    "flown_s": ("float", lambda found: found.frames / found.flight.rate_hz),
-    WORST_RATIO: ("float", lambda found: None),  # which `row_of` has of the landing
+    "flown_s": ("float", lambda metrics: metrics.frames / metrics.flight.rate_hz),
+    WORST_RATIO: ("float", lambda metrics: None),  # which `row_of` has of the landing
     **{
         f"isolation.{pair}.{end}": ("float", _end_of_pair(pair, place))
         for pair, ends in (("estimate_interval", ("low", "high")), ("probing_s", ("from", "to")))
         for place, end in enumerate(ends)
     },
-    "isolation.candidates": ("text", lambda found: " ".join(found.isolation.candidates)),
+    "isolation.candidates": ("text", lambda metrics: " ".join(metrics.isolation.candidates)),
     "isolation.faults": ("text", _faults),
     "isolation.withdrawn": (
-        "text", lambda found: " ".join(gone.fault for gone in found.isolation.withdrawn),
+        "text", lambda metrics: " ".join(gone.fault for gone in metrics.isolation.withdrawn),
     ),
     "windows.detected": ("text", _of_each_window(lambda window: window.detected)),
     "windows.correct": (
@@ -79,15 +79,15 @@ _ELSEWHERE: dict[str, tuple[str, Getter]] = {
             lambda window: all(one.correct and one.type_correct is not False for one in window.isolation)
         ),
     ),
-    "supervisor.mode": ("text", lambda found: found.supervisor[-1].mode),
+    "supervisor.mode": ("text", lambda metrics: metrics.supervisor[-1].mode),
     **{
         f"supervisor.{mode}_at_s": ("float", _first_entry(mode))
         for mode in ("adaptive", "reallocated", "unanticipated")
     },
-    "envelope_exits.count": ("int", lambda found: found.envelope.exits),
-    "envelope_exits.total_s": ("float", lambda found: found.envelope.outside_s),
+    "envelope_exits.count": ("int", lambda metrics: metrics.envelope.exits),
+    "envelope_exits.total_s": ("float", lambda metrics: metrics.envelope.outside_s),
     "expectations.missed": (
-        "text", lambda found: " ".join(one.name for one in found.expectations if not one.passed),
+        "text", lambda metrics: " ".join(one.name for one in metrics.expectations if not one.passed),
     ),
 }  # fmt: skip
 
@@ -107,7 +107,7 @@ def _kind(path: str) -> str:
     if path in _ELSEWHERE:
         return _ELSEWHERE[path][0]
     hint: Any = Metrics
-    for part in path.split("."):
+    for part in path.split("."):  # a mapping, of surfaces or axes, has values of one type
         hint = get_args(hint)[1] if get_origin(hint) is dict else get_type_hints(hint)[part]
         hint = without_none(hint)
     return _KINDS[hint]
@@ -118,4 +118,4 @@ def getter_of(name: str) -> Getter:
     """The function that reads a column from the metrics; it gives None where a section on the way is None."""
     if name in _ELSEWHERE:
         return _ELSEWHERE[name][1]
-    return lambda found: found.at(name)
+    return lambda metrics: metrics.at(name)

@@ -227,11 +227,11 @@ def outside(*flights: Flown) -> float:
 
 def unbounded(flown: Flown) -> float:
     """Excess of the model error before the fault over the bound of the paper, ppm of this bound; below 0 if
-    the error stays within. Our thresholds also contain the Earth's rotation and rounding; the paper's bound
-    does not."""
+    the error stays within. Our thresholds also contain `ours`, for the Earth's rotation and rounding; the
+    paper's bound does not. It is that of bounds.add_published_bound, whose k is 1 for the Beaver."""
     healthy = flown.between(SETTLED_S, flown.fault_at_s)
     rates = np.roll(sum(np.abs(flown.log[f"{axis}_rad_s"]) for axis in AXES), 1)  # of the row before
-    ours = EARTH_RATE_RAD_S * (2.0 * rates + EARTH_RATE_RAD_S) + ROUNDING_RAD_S2  # bounds.add_published_bound
+    ours = EARTH_RATE_RAD_S * (2.0 * rates + EARTH_RATE_RAD_S) + ROUNDING_RAD_S2
     shares = [np.abs(flown.unexplained_rad_s2(a)) / (flown.log[f"{a}_eta_bar_rad_s2"] - ours) for a in AXES]
     return 1e6 * (max(float(np.max(share[healthy])) for share in shares) - 1.0)
 
@@ -244,9 +244,9 @@ def separation(flown: Flown) -> float:
     group's poles are those with the states of the other group held."""
     plant, trim = trimmed(flown.scenario)
     linear = differences(plant, trim)
-    inner = np.isin(linear.states, RATES)
-    poles = [np.abs(np.linalg.eigvals(linear.A[np.ix_(of, of)])) for of in (inner, ~inner)]
-    return float(poles[0].min() / poles[1].max())
+    is_rate = np.isin(linear.states, RATES)
+    rates, others = (np.abs(np.linalg.eigvals(linear.A[np.ix_(of, of)])) for of in (is_rate, ~is_rate))
+    return float(rates.min() / others.max())
 
 
 def tracking(flown: Flown, axis: str) -> float:

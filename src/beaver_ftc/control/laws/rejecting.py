@@ -57,9 +57,10 @@ from beaver_ftc.scenario.sensors import RateGyro
 N_POINTS = 5  # of the schedule over dynamic pressure
 N_LOOPS = 4  # rows of the tables of gains: roll, pitch, yaw, and pitch by the surface that stands in
 STAND_IN = 3  # the last of these rows
-# How long a suspected surface stands at its stop until it is given up: one that another replaces, and others;
-# and after how long it is tried again
-PATIENCE_S, LONG_PATIENCE_S, RETRY_S = 0.5, 1.0, 20.0
+# How long a suspected surface stands at its stop until it is given up
+PATIENCE_S = 0.5  # if another replaces it
+LONG_PATIENCE_S = 1.0  # otherwise
+RETRY_S = 20.0  # after which it is tried again
 # Frames subtracted from the time at the stop in a frame off it, which itself adds one: a command that swings
 # leaves the stop only briefly
 STOP_RECOVERY = 1.5
@@ -68,17 +69,17 @@ STOP_RECOVERY = 1.5
 def configure(law: np.void, control: np.void, prediction: np.void, declared: Declared, y: np.ndarray) -> None:
     """Derive the leads, and the gains of each loop at each point of the schedule (control.CompiledLaw).
 
-    y (n_y,): the measured signals in trim. The points differ from it in airspeed V, m/s, and in dynamic
-    pressure, Pa, which goes with V^2. A gyro's noise may move a surface at this share of its rate limit:
+    y (n_y,): the measured signals in trim. A gyro's noise may move a surface at this share of its rate limit:
 
         noise_share sqrt(a / a_max)        a: own damping of the axis, 1/s; a_max: of the most damped
     """
-    config, wanted, layout = law["config"], declared.control, control["layout"]
-    design, dt, share = prediction["design"], 1.0 / declared.rate_hz, 1.0 / declared.substeps
-    V = np.linspace(*declared.aircraft.envelope.airspeed_mps, N_POINTS)
-    points = np.tile(y, (N_POINTS, 1))
-    points[:, AIRSPEED] = V
-    points[:, QDYN] = y[QDYN] * (V / y[AIRSPEED]) ** 2
+    config = law["config"]
+    wanted = declared.control
+    layout = control["layout"]
+    design = prediction["design"]
+    dt = 1.0 / declared.rate_hz
+    share = 1.0 / declared.substeps
+    points = schedule_points(declared, y)
     G = [control_effectiveness(design, point) for point in points]
     way = 1.0 - (1.0 - prediction["actuators"]["approach"]) ** declared.substeps  # of a frame
     lead = [lead_of(float(part)) for part in way]
@@ -99,6 +100,15 @@ def configure(law: np.void, control: np.void, prediction: np.void, declared: Dec
             Kp = fastest(loop, margin, gyro.random_error, float(G[j][axis, s]), speed_rad_s)
             config["Kp_at"][row, j] = Kp
             config["L_rate_at"][row, j], config["L_disturbance_at"][row, j] = corrections(Kp, dt)
+
+
+def schedule_points(declared: Declared, y: np.ndarray) -> np.ndarray:
+    """The signals at the points of the schedule, (N_POINTS, n_y): those in trim, y (n_y,), but for airspeed V
+    m/s, which spans the envelope, and dynamic pressure, Pa, which goes with V^2."""
+    points = np.tile(y, (N_POINTS, 1))
+    points[:, AIRSPEED] = V = np.linspace(*declared.aircraft.envelope.airspeed_mps, N_POINTS)
+    points[:, QDYN] = y[QDYN] * (V / y[AIRSPEED]) ** 2
+    return points
 
 
 # begun: whether rate (3,) rad/s and disturbance (3,) rad/s2 are estimates; a change of law keeps it.
@@ -146,7 +156,9 @@ def accommodate(control, assessment, faults, prediction, measured):
         accommodation.accommodate(control, assessment, faults, prediction, measured)
         return
     law, surfaces, layout = control.rejecting, control.surfaces, control.layout
-    memory, dt, least = law.memory, law.config.dt, surfaces.config.least_effectiveness
+    memory = law.memory
+    dt = law.config.dt
+    least = surfaces.config.least_effectiveness
     begin_frame(surfaces.output, assessment, False)
     start_or_end_estimator(memory, layout, assessment.detected, dt)
     for s in range(surfaces.output.target.size):
@@ -175,14 +187,17 @@ def command(control, assessment, faults, prediction, measured, mode, t):
 
 @kernel
 def schedule(config, memory, qdyn, transfer_share):
-    """Gains for a dynamic pressure (Pa), held beyond the ends of the table; pitch also for who carries it:
-    transfer_share, the part of pitch that its stand-in carries."""
-    tables = config.Kp_at, config.L_rate_at, config.L_disturbance_at
-    for k, gains in enumerate((memory.Kp, memory.L_rate, memory.L_disturbance)):
+    """Fill the gains at a dynamic pressure, Pa; beyond the schedule those at its end. The gains of pitch lie
+    between those of the main surface and of its stand-in, which carries the part transfer_share."""
+    for table, gains in (
+        (config.Kp_at, memory.Kp),
+        (config.L_rate_at, memory.L_rate),
+        (config.L_disturbance_at, memory.L_disturbance),
+    ):
         for i in range(3):
-            gains[i] = between(qdyn, N_POINTS, config.qdyn, row_of(tables[k], i))
+            gains[i] = between(qdyn, N_POINTS, config.qdyn, row_of(table, i))
         if transfer_share > 0.0:
-            by_stand_in = between(qdyn, N_POINTS, config.qdyn, row_of(tables[k], STAND_IN))
+            by_stand_in = between(qdyn, N_POINTS, config.qdyn, row_of(table, STAND_IN))
             gains[PITCH] += transfer_share * (by_stand_in - gains[PITCH])
 
 
@@ -219,13 +234,15 @@ def withdraw(memory, layout, s, saturated, suspected, dt):
     memory.at_stop_s[s] += dt
     retries = memory.withdrawn[s] and memory.at_stop_s[s] > RETRY_S and is_replaced(layout, s)
     if retries or not suspected:
-        memory.withdrawn[s], memory.at_stop_s[s] = 0, 0.0
+        memory.withdrawn[s] = 0
+        memory.at_stop_s[s] = 0.0
     elif memory.withdrawn[s]:
         return
     elif not saturated:
         memory.at_stop_s[s] = max(memory.at_stop_s[s] - STOP_RECOVERY * dt, 0.0)
     elif memory.at_stop_s[s] > (PATIENCE_S if is_replaced(layout, s) else LONG_PATIENCE_S):
-        memory.withdrawn[s], memory.at_stop_s[s] = 1, 0.0
+        memory.withdrawn[s] = 1
+        memory.at_stop_s[s] = 0.0
 
 
 @kernel

@@ -54,6 +54,7 @@ from beaver_ftc.scenario.sensors import ENGINE, OF_THE_SLIPSTREAM
 Y0 = 3  # gyros come first among the signals, then alpha, beta, airspeed, dynamic pressure
 MEASURED, WORST = 0, 1
 _MIN_V_SHARE = 0.1
+MAX_ERROR_SHARE = 0.9
 # Double precision leaves 1e-16 of a rate below 6 rad/s, divided by a frame of 1 ms or more, and of the terms
 # of f + G u, which stay below 100 rad/s2; a few operations each. Where a frame is of fifty instants it leaves
 # more, 1e-10: the Earth's rate squared, 5e-9, covers that.
@@ -118,14 +119,18 @@ def slipstream_bound(err, y):
     data.
 
         grown b kW / (q V) + (grown - 1) |dpt - a|,   grown = 1 / ((1 - eq) (1 - eV)),   kW = kw0 + kw1 rho d
+        rho = (1 + eq) / (1 - eV)^2 - 1
 
-    eq, eV, rho: relative errors of dynamic pressure, airspeed and density. kw0: error of the power by the
-    instruments, kW; kw1: by the density, for all of it; d: density over that at sea level.
+    eq, eV, rho: relative errors of dynamic pressure, airspeed and density; where they are subtracted, eq and
+    eV count as MAX_ERROR_SHARE at most, so that the bound stays finite. kw0: error of the power by the
+    instruments, kW; kw1: by the density, for all of it; d: density over that at sea level. a: DPT_0; b:
+    KW_TO_DPT.
     """
     eq = reading_bound(err, Y0 + QDYN, y[QDYN]) / y[QDYN]
     eV = reading_bound(err, Y0 + AIRSPEED, y[AIRSPEED]) / y[AIRSPEED]
-    grown = 1.0 / ((1.0 - min(eq, 0.9)) * (1.0 - min(eV, 0.9)))
-    rho = (1.0 + eq) / (1.0 - min(eV, 0.9)) ** 2 - 1.0
+    least_V = 1.0 - min(eV, MAX_ERROR_SHARE)
+    grown = 1.0 / ((1.0 - min(eq, MAX_ERROR_SHARE)) * least_V)
+    rho = (1.0 + eq) / least_V**2 - 1.0
     kw = err.kw0 + err.kw1 * rho * density_ratio(y)
     return grown * KW_TO_DPT * kw / (y[QDYN] * y[AIRSPEED]) + (grown - 1.0) * abs(y[DPT] - DPT_0)
 
@@ -299,7 +304,7 @@ def fill_engine_errors(err: np.void, declared: Declared) -> None:
         return
     initial: Any = declared.initial
     inhg = declared.aircraft.engine.settings["manifold_pressure_inhg"].range[1]
-    largest = dict(zip(ENGINE, (initial.engine_rpm, inhg), strict=True))
-    bounds = [errors[name].of_reading(reading) for name, reading in largest.items()]
-    kw0, kw1 = power_error_kw(initial.engine_rpm, inhg, *bounds)
+    largest = initial.engine_rpm, inhg
+    bounds = [errors[name].of_reading(reading) for name, reading in zip(ENGINE, largest, strict=True)]
+    kw0, kw1 = power_error_kw(*largest, *bounds)
     fill(err, engine=1, kw0=kw0, kw1=kw1)

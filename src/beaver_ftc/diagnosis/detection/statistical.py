@@ -14,10 +14,10 @@ Symbols of the kernels:
     y, u (n,) rad                 readings, deflections
     w                             one over the number of instants in a frame
     dt s, k                       duration and number of the frame
-    b, h, v                       block, hypothesis, view
-    s, i, j                       surface, axis, reading or term
-    fies, of (n,)                 isolation estimators; number of that of each surface's loss, or -1
-    lo, hi                        bounds on a log-likelihood ratio
+    b, m, h, v                    block and its number, hypothesis, view
+    s; i, j                       surface; axes of a block
+    fies, of (n,)                 isolation estimators; number e of that of each surface's loss, or -1
+    lo, hi                        bounds on a log-likelihood ratio: places LO and HI of a pair
     cfg, noise, gust, bound       records of the tests, the noise model, the gust estimate, the bounds
 """
 
@@ -63,6 +63,7 @@ from beaver_ftc.diagnosis.state import DAMAGE_EXCLUDES, LOSS
 # Least share of the best log-likelihood ratio that a constant theta explains of a loss growing at any rate
 # (docs/explanation/statistical.md).
 MIN_LLR_SHARE = 0.25
+LO, HI = 0, 1
 # The error of a model moves from one end of its bound to the other, by 2 bounds, within a frame at most, and
 # no faster than a surface moves by a quarter of its travel.
 MAX_ETA_RATE = 2.0
@@ -103,7 +104,7 @@ def update_blocks(cfg, rows, blocks, gust, dt, k, alarmed, may_end=False):
     """
     decay = cfg.forget if alarmed else 1.0
     slot = likelihood.restarting_slot(k)
-    for j, b in enumerate(blocks):
+    for m, b in enumerate(blocks):
         if not alarmed:
             likelihood.reset_slot(b, slot)
         project_rows(b, rows)
@@ -113,7 +114,7 @@ def update_blocks(cfg, rows, blocks, gust, dt, k, alarmed, may_end=False):
                 b.g_c[i] = gust.output.acc_coarse[axis]
         if gust.output.gusty:
             likelihood.add_turn_to_drift(b, gust)
-            if j < likelihood.REVERTING_BLOCK:
+            if m < likelihood.REVERTING_BLOCK:
                 likelihood.whiten_calm(b, dt)
             else:  # without gust both blocks of roll and yaw have the same filter
                 b.calm.g[:] = blocks[LATERAL_BLOCK].calm.g
@@ -151,7 +152,8 @@ def update_alarm(alarm, cfg, blocks, views, forces, gust, t, bounded=True):
     Scores of forces and of oscillations are in the column of the step on their axis: the last three of the
     n_scores in `share`. The largest is 0 unless `bounded`: outside its map, the model's error has no bound.
     """
-    alarm.ratio, alarm.share[:] = 0.0, 0.0
+    alarm.ratio = 0.0
+    alarm.share[:] = 0.0
     for b in blocks:
         for h in b.hypothesis[: b.n_h]:
             if h.alarms:
@@ -185,8 +187,8 @@ def best_alternative(b, fies, of, s, revived=False):
         if h.kind in (GROWING_LOSS, LOSS_END):
             continue
         if h.kind == LOSS:
-            j = of[h.surface]
-            if h.surface == s or (j >= 0 and fies[j].excluded and not revived):
+            e = of[h.surface]
+            if h.surface == s or (e >= 0 and fies[e].excluded and not revived):
                 continue
         lo = max(lo, h.llr_lo)
     return lo
@@ -196,7 +198,7 @@ def best_alternative(b, fies, of, s, revived=False):
 def loss_bounds(b, s, ended):
     """max_h (lo_h, hi_h) over the losses of surface s in block b, or, if `ended`, over their ends; 0 without
     any."""
-    lo, hi = 0.0, 0.0
+    lo = hi = 0.0
     for h in b.hypothesis[: b.n_h]:
         if h.surface == s and (h.kind == LOSS_END) == ended:
             lo, hi = max(lo, h.llr_lo), max(hi, h.llr_hi)
@@ -213,7 +215,7 @@ def confirms_loss(cfg, blocks, fies, of, s):
     """
     revived = of[s] >= 0 and fies[of[s]].weak == DAMAGE_EXCLUDES
     for b in blocks:
-        if loss_bounds(b, s, False)[0] - best_alternative(b, fies, of, s, revived) > cfg.margin:
+        if loss_bounds(b, s, False)[LO] - best_alternative(b, fies, of, s, revived) > cfg.margin:
             return True
     return False
 
@@ -226,22 +228,21 @@ def excludes_loss(cfg, blocks, fies, of, s, pitch_ends, abrupt):
 
     best: the largest lo of the alternatives; hi, hi_end: bounds of the loss and of its end. Each block of
     roll and yaw is compared together with that of pitch, because a loss acts on its own axes only. A loss
+    that begins or ends inside a frame of several instants (w < 1) is not constant in this frame, and a loss
     that is not declared `abrupt` may grow. A constant theta then explains only a part of its effect, so that
-    share is MIN_LLR_SHARE instead of 1. The same holds for a loss that begins inside a frame of several
-    instants, and for the end of a loss there. The end of a loss in pitch counts only if `pitch_ends` is set:
-    a fault outside the class may look like it.
+    share and share_end are MIN_LLR_SHARE instead of 1. The end of a loss in pitch counts only if `pitch_ends`
+    is set: a fault outside the class may look like it.
     """
     pitch = blocks[likelihood.PITCH_BLOCK]
-    single = cfg.w == 1.0
-    share = 1.0 if abrupt and single else MIN_LLR_SHARE
-    share_end = 1.0 if single else MIN_LLR_SHARE
+    share_end = 1.0 if cfg.w == 1.0 else MIN_LLR_SHARE
+    share = share_end if abrupt else MIN_LLR_SHARE
     best_pitch = best_alternative(pitch, fies, of, s)
-    hi_pitch = loss_bounds(pitch, s, False)[1]
-    hi_end_pitch = loss_bounds(pitch, s, True)[1] if pitch_ends else 0.0
+    hi_pitch = loss_bounds(pitch, s, False)[HI]
+    hi_end_pitch = loss_bounds(pitch, s, True)[HI] if pitch_ends else 0.0
     for b in blocks[LATERAL_BLOCK:]:
         best = max(best_pitch, best_alternative(b, fies, of, s))
-        hi = max(hi_pitch, loss_bounds(b, s, False)[1])
-        hi_end = max(hi_end_pitch, loss_bounds(b, s, True)[1])
+        hi = max(hi_pitch, loss_bounds(b, s, False)[HI])
+        hi_end = max(hi_end_pitch, loss_bounds(b, s, True)[HI])
         low = hi < share * best and hi_end < share_end * best
         if low and best - max(hi, hi_end) > cfg.margin:
             return True
@@ -253,7 +254,7 @@ def estimate_loss(blocks, s):
     """(theta, D): estimate in [-1, 0] of a loss of surface s, where the block knows it best, and one over its
     variance.
     """
-    th, D = 0.0, 0.0
+    th = D = 0.0
     for b in blocks:
         for h in b.hypothesis[: b.n_h]:
             if h.kind == LOSS and h.surface == s and h.D > D:
@@ -306,12 +307,13 @@ def add_test_instant(cfg, noise, rows, gust, bound, model, meas, u, dt):
 def fill_drift(noise, eta, blocks, gust, V, dt):
     """Fill of each block the drift's intensity Q_d and decay a; of the filter without gust the noise, too.
 
-    Q_d,ij = Q_scale q_gust,ij + [i = j] q max(eta_i, MIN_ETA_RAD_S2)^2,  (rad/s2)2/s
-    a = exp(-dt V / length)
+        Q_d,ij = Q_scale q_gust,ij + [i = j] q max(eta_i, MIN_ETA_RAD_S2)^2,      a = exp(-dt V / length)
+
+    Q_d, q_gust (3, 3): (rad/s2)2/s; V m/s; length m; q 1/s.
     """
     gusty = gust.output.gusty
-    for k, b in enumerate(blocks):
-        reverts, length = k == likelihood.REVERTING_BLOCK, b.drift_correlation_length_m
+    for m, b in enumerate(blocks):
+        reverts, length = m == likelihood.REVERTING_BLOCK, b.drift_correlation_length_m
         for i, axis in enumerate(b.axes[: b.n]):
             for j in range(b.n):
                 q_gust = unmeasured_drift(gust, V, axis, b.axes[j], reverts) if gusty else 0.0

@@ -27,12 +27,15 @@ from beaver_ftc.documents import Number, Section
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
 from beaver_ftc_logs.runs import true_runs
 
-_SHAPE_SD, _SHAPE_GRID = 0.2, np.linspace(-0.5, 0.5, 41)
+_SHAPE_SD = 0.2
+"""Standard deviation of the prior of the shape, whose mean is 0."""
+_SHAPE_GRID = np.linspace(-0.5, 0.5, 41)
 _SCALE_RATIOS = np.geomspace(0.2, 5.0, 61)
-"""The grid of the shape, and of the scale over the mean excess."""
+"""Grid of the scale over the mean excess."""
 _RATE_QUANTILES = (np.arange(40) + 0.5) / 40.0
-_MIN_PEAKS, _PEAKS_PER_ROOT = 10, 2.0
-"""Peaks over the level: so many at least, else so many times the root of their number."""
+_MIN_PEAKS = 10
+_PEAKS_PER_ROOT = 2.0
+"""Peaks over the level: _PEAKS_PER_ROOT times the root of the number of all peaks, at least _MIN_PEAKS."""
 _INTERVAL = (0.05, 0.95)
 _MORE_ALARMS_CHANCE = 0.05
 """Chance that the declared rate itself raises more alarms in the held-out flights than are permitted."""
@@ -118,7 +121,7 @@ def threshold_for_rate(tail: PeakTail, rate: float) -> float:
 
 def _excess_for_rate(tail: PeakTail, rate: float) -> float:
     """Excess over the level of the tail at which the posterior mean of the rate is this; 0 if the rate at the
-    level is lower."""
+    level is lower. A tail that is still more frequent beyond _MAX_EXCESS has the end of the search."""
     from scipy.optimize import brentq
 
     xi, sigma, p = _pareto_posterior(tail)

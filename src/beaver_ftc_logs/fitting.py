@@ -127,8 +127,12 @@ def quick_error_share(parts: Parts, model: Model) -> float:
     """Estimate the error of unusually quick responses, as a share of them, at most 1: the largest of the
     flights left out; 1 if none of them has such responses enough.
 
-    In variances of the noise of the fit, the residual of a sample has the variance r (1 + share^2 power),
-    with the variance r of the noise of this flight and the power of the quick responses.
+    In variances of the noise of the fit, the residual of a sample has the variance r (1 + share^2 power):
+
+        share^2 = mean over the unusual samples of (square / r - 1) / power
+
+    r: variance of the noise of this flight; power (n,): of the quick responses; square (n,): of the residual,
+    the mean of three axes.
     """
     shares = []
     for fold in held_out_folds(parts, model):

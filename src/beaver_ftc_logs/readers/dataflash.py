@@ -20,8 +20,11 @@ from pymavlink.DFReader import FORMAT_TO_STRUCT, DFFormat, null_term
 
 from beaver_ftc_logs.recording import Floats
 
-_HEADER, _HEADER_BYTES = b"\xa3\x95", 3
-_FORMAT_KIND, _FORMAT_LAYOUT, _FORMAT_BYTES = 0x80, "<BB4s16s64s", 89
+_HEADER = b"\xa3\x95"
+_HEADER_BYTES = 3  # these two and the kind of the message
+_FORMAT_KIND = 0x80  # of the messages that describe a format: its kind, length, name, codes and columns
+_FORMAT_LAYOUT = "<BB4s16s64s"
+_FORMAT_BYTES = 89
 
 
 @dataclass(frozen=True)

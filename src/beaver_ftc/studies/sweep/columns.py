@@ -51,10 +51,12 @@ def _of_each_window(holds: Callable[[Window], bool]) -> Getter:
 
 
 def _first_entry(mode: str) -> Getter:
+    """When the supervisor first entered a mode, s."""
     return lambda metrics: next((change.time_s for change in metrics.supervisor if change.mode == mode), None)
 
 
 def _end_of_pair(name: str, end: int) -> Getter:
+    """The first (0) or second (1) value of a pair in the section `isolation`."""
     return lambda metrics: (getattr(metrics.isolation, name) or (None, None))[end]
 
 
@@ -62,11 +64,10 @@ def _end_of_pair(name: str, end: int) -> Getter:
 _ELSEWHERE: dict[str, tuple[str, Getter]] = {
     "flown_s": ("float", lambda metrics: metrics.frames / metrics.flight.rate_hz),
     WORST_RATIO: ("float", lambda metrics: None),  # which `row_of` has of the landing
-    **{
-        f"isolation.{pair}.{end}": ("float", _end_of_pair(pair, place))
-        for pair, ends in (("estimate_interval", ("low", "high")), ("probing_s", ("from", "to")))
-        for place, end in enumerate(ends)
-    },
+    "isolation.estimate_interval.low": ("float", _end_of_pair("estimate_interval", 0)),
+    "isolation.estimate_interval.high": ("float", _end_of_pair("estimate_interval", 1)),
+    "isolation.probing_s.from": ("float", _end_of_pair("probing_s", 0)),
+    "isolation.probing_s.to": ("float", _end_of_pair("probing_s", 1)),
     "isolation.candidates": ("text", lambda metrics: " ".join(metrics.isolation.candidates)),
     "isolation.faults": ("text", _faults),
     "isolation.withdrawn": (
@@ -80,10 +81,9 @@ _ELSEWHERE: dict[str, tuple[str, Getter]] = {
         ),
     ),
     "supervisor.mode": ("text", lambda metrics: metrics.supervisor[-1].mode),
-    **{
-        f"supervisor.{mode}_at_s": ("float", _first_entry(mode))
-        for mode in ("adaptive", "reallocated", "unanticipated")
-    },
+    "supervisor.adaptive_at_s": ("float", _first_entry("adaptive")),
+    "supervisor.reallocated_at_s": ("float", _first_entry("reallocated")),
+    "supervisor.unanticipated_at_s": ("float", _first_entry("unanticipated")),
     "envelope_exits.count": ("int", lambda metrics: metrics.envelope.exits),
     "envelope_exits.total_s": ("float", lambda metrics: metrics.envelope.outside_s),
     "expectations.missed": (

@@ -42,8 +42,8 @@ class Detector:
         self.detector = self.fdi["statistical"]
         measured = np.zeros(1, MEASURED)[0]
         measured["x"], measured["y"][:5] = LEVEL_FLIGHT[:2]
-        parts = (self.detector[name] for name in ("test", "noise", "rows", "block", "gust"))
-        statistical.prepare_tests(*parts, self.fdi["bound"], design, measured, LEVEL_FLIGHT[2], self.dt)
+        bound, u = self.fdi["bound"], LEVEL_FLIGHT[2]
+        statistical.prepare_tests(self.detector, bound, design, measured, u, self.dt)
         self.frame = 0
 
     @property
@@ -71,14 +71,13 @@ class Detector:
 def watch_all(detector, innovations, Gu, cubic, first, renew, dt, scores):
     """The frames of a flight without one: innovations (k, 3), Gu (k, 3, 4) rad/s2, cubic (k,)."""
     for k in range(len(innovations)):
-        blocks, alarm, tests = detector.block, detector.alarm, detector.test
-        rows, still = detector.rows, detector.gust
+        blocks, alarm, rows = detector.block, detector.alarm, detector.rows
         rows.per_cubed = cubic[k]
         for i in range(3):
             rows.nu[RATES, i], rows.Gu[:4, i] = innovations[k, i], Gu[k, i]
-        statistical.update_blocks(tests, rows, blocks, still, dt, first + k, 0)
+        statistical.update_blocks(detector, dt, first + k, 0)
         views = detector.views[: detector.n_views]
-        statistical.update_alarm(alarm, tests, blocks, views, detector.forces, still, (first + k) * dt)
+        statistical.update_alarm(detector, views, (first + k) * dt)
         scores[k] = alarm.ratio
         if renew and alarm.ratio > 1.0:
             for slot in range(N_SLOTS):

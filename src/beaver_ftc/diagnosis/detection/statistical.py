@@ -18,6 +18,7 @@ Symbols of the kernels:
     s; i, j                       surface; axes of a block
     fies, of (n,)                 isolation estimators; number e of that of each surface's loss, or -1
     lo, hi                        bounds on a log-likelihood ratio: places LO and HI of a pair
+    stat                          the record of the detector, of `statistical_dtype`
     cfg, noise, gust, bound       records of the tests, the noise model, the gust estimate, the bounds
 """
 
@@ -97,17 +98,20 @@ def statistical_dtype(size: StatisticalSize = USUAL_SIZE) -> np.dtype:
 
 
 @kernel
-def update_blocks(cfg, rows, blocks, gust, dt, k, alarmed, may_end=False):
+def update_blocks(stat, dt, k, alarmed, may_end=False):
     """Update the blocks with frame k: each whitens what it sees of the rows, and tests it.
 
     alarmed: the detector has raised its alarm; may_end: a loss may end.
     """
+    cfg = stat.test
+    gust = stat.gust
+    blocks = stat.block
     decay = cfg.forget if alarmed else 1.0
     slot = likelihood.restarting_slot(k)
     for m, b in enumerate(blocks):
         if not alarmed:
             likelihood.reset_slot(b, slot)
-        project_rows(b, rows)
+        project_rows(b, stat.rows)
         b.has_coarse = gust.config.coarse_only
         if gust.config.coarse_only:
             for i, axis in enumerate(b.axes[: b.n]):
@@ -146,20 +150,22 @@ def fill_unmodelled(blocks, gust, out):
 
 
 @kernel
-def update_alarm(alarm, cfg, blocks, views, forces, gust, t, bounded=True):
+def update_alarm(stat, views, t, bounded=True):
     """Fill the scores over the alarm level, the largest, its axis, and at the first alarm its time t s.
 
     Scores of forces and of oscillations are in the column of the step on their axis: the last three of the
     n_scores in `share`. The largest is 0 unless `bounded`: outside its map, the model's error has no bound.
     """
+    alarm = stat.alarm
+    cfg = stat.test
     alarm.ratio = 0.0
     alarm.share[:] = 0.0
-    for b in blocks:
+    for b in stat.block:
         for h in b.hypothesis[: b.n_h]:
             if h.alarms:
                 keep_score(alarm, h.score / cfg.alarm_level, h.axis, h.column)
     for v in views:
-        share = parity.view_alarm_score(v, views, cfg, forces, gust) / cfg.alarm_level
+        share = parity.view_alarm_score(v, views, cfg, stat.forces, stat.gust) / cfg.alarm_level
         keep_score(alarm, share, v.alarm_axis, cfg.n_scores - 3 + v.alarm_axis)
     if not bounded:
         alarm.ratio = 0.0
@@ -263,19 +269,23 @@ def estimate_loss(blocks, s):
 
 
 @kernel
-def prepare_tests(cfg, noise, rows, blocks, gust, bound, model, meas, u, dt):
+def prepare_tests(stat, bound, model, meas, u, dt):
     """Prepare the next frame: gust, rows, and drift of the blocks at this instant.
 
     u (n,): positions of healthy surfaces.
     """
+    noise = stat.noise
+    gust = stat.gust
+    w = stat.test.w
+    V = meas.y[AIRSPEED]
     if gust.output.gusty:
         fill_gust_effect(gust, model, meas.x, meas.y, u)
-    begin_rows(cfg.w, noise, rows, bound, model, meas, u)
-    fill_drift(noise, rows.eta[0], blocks, gust, meas.y[AIRSPEED], dt)
+    begin_rows(w, noise, stat.rows, bound, model, meas, u)
+    fill_drift(noise, stat.rows.eta[0], stat.block, gust, V, dt)
     if bound.error_map.n_boxes > 0:
-        update_eta_rate(noise, blocks, bound.error_map, u)
+        update_eta_rate(noise, stat.block, bound.error_map, u)
     if gust.output.gusty:
-        begin_gust_sums(gust, meas.y[AIRSPEED], cfg.w * dt)
+        begin_gust_sums(gust, V, w * dt)
 
 
 @kernel
@@ -296,11 +306,11 @@ def update_eta_rate(noise, blocks, emap, u):
 
 
 @kernel
-def add_test_instant(cfg, noise, rows, gust, bound, model, meas, u, dt):
+def add_test_instant(stat, bound, model, meas, u, dt):
     """Add an instant inside a frame, dt s after the instant before, to gust and rows."""
-    if gust.output.gusty:
-        update_gust(gust, model, meas.x, meas.y, u, meas.attitude, dt)
-    add_constants(cfg.w, noise, rows, bound.declared_errors, model, meas, u)
+    if stat.gust.output.gusty:
+        update_gust(stat.gust, model, meas.x, meas.y, u, meas.attitude, dt)
+    add_constants(stat.test.w, stat.noise, stat.rows, bound.declared_errors, model, meas, u)
 
 
 @kernel
@@ -313,7 +323,8 @@ def fill_drift(noise, eta, blocks, gust, V, dt):
     """
     gusty = gust.output.gusty
     for m, b in enumerate(blocks):
-        reverts, length = m == likelihood.REVERTING_BLOCK, b.drift_correlation_length_m
+        reverts = m == likelihood.REVERTING_BLOCK
+        length = b.drift_correlation_length_m
         for i, axis in enumerate(b.axes[: b.n]):
             for j in range(b.n):
                 q_gust = unmeasured_drift(gust, V, axis, b.axes[j], reverts) if gusty else 0.0

@@ -149,31 +149,34 @@ def record_orders(fdi, prediction):
 @apart(long_loops=True)
 def update_tests(fdi, prediction, measured, k, t):
     """Test the innovation of the elapsed frame, which ends frame k at t s, for every hypothesis."""
-    stat, means, y, dt = fdi.statistical, prediction.means, measured.y, fdi.config.dt
-    cfg, rows, blocks, force, att = stat.test, stat.rows, stat.block, stat.forces, stat.attitude
-    gust, of_views, vaneless, views = (
-        stat.gust,
-        gust_of_views(stat),
-        stat.vaneless,
-        stat.views[: stat.n_views],
-    )
-    alarmed, detected = stat.alarm.detected_at_s >= 0.0, fdi.verdict.detected
+    stat = fdi.statistical
+    means = prediction.means
+    y = measured.y
+    dt = fdi.config.dt
+    rows, blocks, force, att = stat.rows, stat.block, stat.forces, stat.attitude
+    gust = stat.gust
+    vaneless = stat.vaneless
+    of_views = gust_of_views(stat)
+    views = stat.views[: stat.n_views]
+    alarmed = stat.alarm.detected_at_s >= 0.0
+    detected = fdi.verdict.detected
     gusts.finish_gust(gust, prediction.w)
     for own in (vaneless, stat.vaned):
         if own.output.gusty:
             gusts.finish_gust(own, prediction.w)
     fill_old_effects(means)
-    nu, per_cubed = fdi.bank.output.innovation, unanticipated_pitch(prediction.design, y, 1.0)
+    nu = fdi.bank.output.innovation
+    per_cubed = unanticipated_pitch(prediction.design, y, 1.0)
     finish_rows(rows, stat.noise, force, gust, of_views, vaneless, fdi.bound, means, nu, per_cubed)
-    statistical.update_blocks(cfg, rows, blocks, gust, dt, k, alarmed, not fdi.config.abrupt)
+    statistical.update_blocks(stat, dt, k, alarmed, not fdi.config.abrupt)
     if att.enabled:
         attitude.compare_attitude(att, blocks, rows.eta[0, :3], measured.x, dt, detected)
         if detected and att.score > 1.0:
             sensor_monitor.rule_out_gyros(fdi.sensor_monitor)
     parity.project_views(views, stat.noise, rows, force, gust, of_views, vaneless, y[AIRSPEED])
-    parity.update_views(views, cfg, stat.tone_test_config, y, dt, k, alarmed)
+    parity.update_views(views, stat.test, stat.tone_test_config, y, dt, k, alarmed)
     bounded = fdi.bound.error_map.outside == 0
-    statistical.update_alarm(stat.alarm, cfg, blocks, views, force, gust, t, bounded)
+    statistical.update_alarm(stat, views, t, bounded)
     innovation_known(prediction, measured.x, dt)
     statistical.filter_known(blocks, gust, prediction.nu_known, dt)
 
@@ -183,20 +186,14 @@ def prepare_gusts(fdi, prediction, measured, k):
     """Prepare the tests of the frame after frame k: the gust that the vanes measure, noise, coefficients."""
     stat, dt = fdi.statistical, fdi.config.dt
     update_gusts(stat, fdi.bound.declared_errors.du, prediction, measured, k, dt)
-    statistical.prepare_tests(
-        stat.test, stat.noise, stat.rows, stat.block, stat.gust, fdi.bound, prediction.design, measured,
-        prediction.u, dt,
-    )  # fmt: skip
+    statistical.prepare_tests(stat, fdi.bound, prediction.design, measured, prediction.u, dt)
 
 
 @apart(long_loops=True)
 def add_gust_instant(fdi, prediction, measured):
     """Add an instant inside a frame to the gust that the vanes measure, and to its effect on the aircraft."""
-    stat = fdi.statistical
     h = prediction.w * fdi.config.dt
-    statistical.add_test_instant(
-        stat.test, stat.noise, stat.rows, stat.gust, fdi.bound, prediction.design, measured, prediction.u, h
-    )
+    statistical.add_test_instant(fdi.statistical, fdi.bound, prediction.design, measured, prediction.u, h)
 
 
 @kernel

@@ -64,12 +64,12 @@ from beaver_ftc.diagnosis.state import DAMAGE_EXCLUDES, LOSS
 # Least share of the best log-likelihood ratio that a constant theta explains of a loss growing at any rate
 # (docs/explanation/statistical.md).
 MIN_LLR_SHARE = 0.25
-LO, HI = 0, 1
 # The error of a model moves from one end of its bound to the other, by 2 bounds, within a frame at most, and
 # no faster than a surface moves by a quarter of its travel.
 MAX_ETA_RATE = 2.0
 BOUNDS_PER_TRAVEL = 8.0
 MIN_TRAVEL_RAD = 1e-6
+LO, HI = 0, 1
 
 # Configuration of the tests.
 TESTING_RECORD = record(

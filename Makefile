@@ -17,7 +17,7 @@ FAST := tests/aircraft tests/design tests/plant tests/results tests/scenario $(w
 # Files whose tests compile nothing are among them: together they take about as long as tests/warm.py, for which all other
 # tests wait.
 PLAIN := tests/design $(wildcard tests/*/test_*_kernels.py tests/*/*/test_*_kernels.py) \
-  $(addprefix tests/diagnosis/,test_model_prediction_coarse_frames.py test_isolation_membership.py test_short_flights.py types/test_types_verdict.py) \
+  $(addprefix tests/diagnosis/,test_model_prediction_coarse_frames.py test_isolation_membership.py test_short_flights.py types/test_types_verdict.py test_bounds_derived.py detection/test_likelihood.py) \
   $(addprefix tests/control/test_,decisions.py laws.py supervisor.py compiled_rivals.py) \
   tests/control/laws/test_gains.py tests/diagnosis/rivals/test_filters.py \
   $(addprefix tests/scenario/test_,dump.py given.py loader.py aircraft_folder.py) \
@@ -74,11 +74,11 @@ demo: $(VENV)/.demo
 	$(BIN)/beaver-ftc run elevator-partial-loss --out runs
 	@echo "report: runs/elevator-partial-loss/report.html"
 
-# What most flights use is compiled, and what is missing installed, while plain kernels are tried: these give way,
-# since the second run waits for the compiled code. It compiles the rest.
+# What most flights use is compiled, and what is missing installed, while plain kernels are tried, in one process:
+# the other processor is busy. The second run waits for both, and compiles the rest.
 test: $(VENV)/.test
 	@$(BRING) & installing=$$!; $(BIN)/python tests/warm.py >/dev/null 2>&1 & \
-	  NUMBA_DISABLE_JIT=1 nice $(PYTEST) -m "not nightly and not acceptance" $(PLAIN) && wait $$installing
+	  NUMBA_DISABLE_JIT=1 $(PYTEST) -n 0 -m "not nightly and not acceptance" $(PLAIN) && wait $$installing && wait
 	$(PYTEST) -m "not nightly and not acceptance" $(addprefix --ignore=,tests/acceptance $(PLAIN))
 
 # Every test with all that it draws, what tests/nightly.yaml lists too; then drawn scenarios, mutants.

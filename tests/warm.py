@@ -1,5 +1,4 @@
-"""Compiles what most flights use and derives what several tests fly, unless that has been done for the
-package's sources as they are.
+"""Compiles what most flights use, unless that has been done for the package's sources as they are.
 
 `python tests/warm.py`, from the checkout's root; conftest.py does it, or waits for it, before the first test.
 """
@@ -13,8 +12,6 @@ from filelock import FileLock
 
 from beaver_ftc.compiled import cache_folder
 from beaver_ftc.documents.files import PACKAGE, digest_of_files
-
-DERIVED = "jsbsim:c172p"
 
 
 def main():
@@ -31,16 +28,12 @@ def main():
 
 def _warm():
     import beaver_ftc as bf
-    from beaver_ftc import plugins
     from beaver_ftc.control.rivals.indi import IncrementalInversion
     from beaver_ftc.diagnosis.rivals.rls import RlsMonitor
     from beaver_ftc.loop.loop import fly
     from beaver_ftc.scenario.schema import load_scenario
     from flying import loss, scenario
 
-    derive = plugins.offered("derive")
-    if derive:
-        derive(DERIVED)
     for plugged in ({}, {"detector": RlsMonitor()}, {"law": IncrementalInversion()}):
         fly(scenario(duration_s=0.2, substeps=2, fdi={"statistical": {}}), **plugged)
     published = load_scenario("elevator-partial-loss")  # after an alarm other kernels are used

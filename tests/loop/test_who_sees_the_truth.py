@@ -66,7 +66,7 @@ print(json.dumps(calls))
 """
 STUCK = [{"actuator": "elevator", "type": "stuck", "at_s": 0.3}]
 LOSS = [{"actuator": "aileron", "type": "loss_of_effectiveness", "magnitude": 0.8, "at_s": 0.3}]
-COMMON = {"name": "watched", "duration_s": 0.8, "rate_hz": 20}
+COMMON = {"name": "watched", "duration_s": 0.5, "rate_hz": 20}
 GYRO = [{"sensor": "q", "type": "bias", "magnitude": 2, "at_s": 0.3}]
 WEIGHED = {"fault_class": "all", "statistical": {}, "bounds": {"turbulence": "light"}}
 FLIGHTS = [

@@ -22,7 +22,6 @@ from beaver_ftc.scenario.truth import Truth
 from beaver_ftc.studies.sensitivity.beyond import Flight, scenario_of
 from beaver_ftc.studies.sensitivity.errors import errors_of
 from flying import SINES
-from samples import AT_NIGHT
 from test_architecture import modules, tree
 
 TOLD_NOTHING = ("diagnosis", "control", "design")
@@ -131,11 +130,6 @@ def declared(name):
     return load(base | {"aircraft": DECLARED[name].get("aircraft", "beaver")}).with_(DECLARED[name])
 
 
-def of_the_day(cases, every):
-    """All at night; by day one in `every`, those of each row in turn."""
-    return cases if AT_NIGHT else cases[::every]
-
-
 PAIRS = [(name, later) for name in DECLARED for later in LATER]
 
 
@@ -153,7 +147,7 @@ def log_of(name):
     return bf.fly(declared(name)).log
 
 
-@pytest.mark.parametrize(("name", "later"), of_the_day(PAIRS, 3), ids=str)
+@pytest.mark.parametrize(("name", "later"), PAIRS, ids=str)
 def test_the_past_does_not_depend_on_the_future(name, later):
     other = changed(declared(name), LATER[later])
     if other is None:

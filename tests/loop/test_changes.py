@@ -1,5 +1,7 @@
 """Law, diagnosis and sensors changed in flight: when asked for, without a bump, and again to the bit."""
 
+from types import SimpleNamespace
+
 import pytest
 
 import beaver_ftc as bf
@@ -130,6 +132,7 @@ def test_a_diagnosis_that_begins_in_moving_air_takes_none_of_it_for_a_fault():
         ({"law": "lqrr"}, "law: unknown law 'lqrr', did you mean lqr?"),
         ({"declared_sensors": {"p": {"delay_s": 0.1}}}, "declared_sensors.p: a lag, a delay"),
         ({"at_s": 3, "law": "lqr"}, "at_s: has no meaning here"),
+        ({"declared_sensors": "ideal"}, "with a detector object"),
         (
             {"sensors": {name: {"delay_s": 1.0} for name in ("p", "q", "r", "alpha", "beta", "V")}},
             r"sensors: delays of 612 samples in all, allowed: 512 in this flight",
@@ -137,7 +140,8 @@ def test_a_diagnosis_that_begins_in_moving_air_takes_none_of_it_for_a_fault():
     ],
 )
 def test_a_mistake_is_said_in_one_line_and_the_flight_goes_on(change, says):
-    sim = bf.Simulation(scenario(duration_s=1.0))
+    detector = SimpleNamespace(reset=id, step=lambda *_: bf.Verdict())
+    sim = bf.Simulation(scenario(duration_s=1.0), detector=detector)
     sim.step(frames=10)
     with pytest.raises(bf.BadInput, match=says) as refusal:
         sim.change(change)

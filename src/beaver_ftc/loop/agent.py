@@ -29,7 +29,7 @@ def look_of(columns: Sequence[str]) -> np.ndarray:
 
 
 def note_trim(look: np.ndarray, y: np.ndarray) -> None:
-    """Note the trim, y: alpha rad, beta rad, airspeed m/s."""
+    """Note the first readings, y: alpha rad, beta rad, airspeed m/s."""
     for name, value in zip(("alpha", "beta", "airspeed"), y, strict=False):
         look[name] = value
 

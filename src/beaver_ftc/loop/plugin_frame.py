@@ -7,6 +7,7 @@ taken by `diagnose` (adaptive_estimators.plugin_update).
 """
 
 from collections.abc import Callable, Mapping
+from copy import deepcopy
 from math import isfinite
 from typing import Any
 
@@ -141,7 +142,10 @@ class PluginFrame:
         reference = Reference(
             commanded.copy(), model["model_rate"].copy(), model["model_acceleration"].copy()
         )
-        verdict = self.verdict if self.detector is not None else verdict_of(frame, self._surfaces)
+        if self.detector is None:
+            verdict = verdict_of(frame, self._surfaces)
+        else:  # which may have written into its own
+            verdict, measured = self.verdict, deepcopy(measured)
         answer = self._ask(name, self.law.step, measured, reference, verdict)
         self._stage(stages.take_command, frames, self._a_number_each(name, "the command", answer))
 

@@ -2,6 +2,7 @@
 
 import pytest
 
+from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.undeclared import undeclared
 from beaver_ftc.studies.compare import trial
 from flying import scenario
@@ -34,3 +35,10 @@ def test_an_option_of_the_scenario_counts_for_its_own_scheme_alone():
     chosen = {"exact": {"detectors": {"augmented-ekf": {"alarm": 3.0}, "augmented-ukf": {"alarm": 2.0}}}}
     both = (trial.with_entry(flight, trial.Entry(f"augmented-{k}kf", trial.LAW), chosen) for k in "eu")
     assert [each.fdi.options["alarm"] for each in both] == [5.0, 2.0]
+
+
+def test_flights_that_change_to_another_law_compare_none(tmp_path):
+    base = "{name: x, changes: [{at_s: 3, law: oracle}]}"
+    (tmp_path / "x.yaml").write_text(f"{{name: x, runs: 1, base: {base}}}")
+    with pytest.raises(BadInput, match="changes: each scheme and each law flies to the end"):
+        trial.of_sweep(tmp_path / "x.yaml")

@@ -55,17 +55,14 @@ class MadeRay:
 
     exceptions = SimpleNamespace(RayError=RayError, RayTaskError=RayTaskError)
 
-    def __init__(self, cpus=3, running=False, refuses=None):
-        self.cpus, self.running, self.refuses = cpus, running, refuses
+    def __init__(self):
         self.calls, self.ends = [], []
 
     def is_initialized(self):
-        return self.running
+        return False
 
     def init(self, address, **options):
         self.calls.append(("init", address, options))
-        if self.refuses:
-            raise self.refuses
 
     def put(self, value):
         return value
@@ -74,7 +71,7 @@ class MadeRay:
         return lambda function: SimpleNamespace(remote=lambda *given: partial(function, *given))
 
     def cluster_resources(self):
-        return {"CPU": self.cpus} if self.cpus else {}
+        return {"CPU": 3}
 
     def wait(self, references, num_returns, timeout):
         return references[:num_returns], references[num_returns:]

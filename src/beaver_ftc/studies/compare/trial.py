@@ -56,7 +56,10 @@ def of_sweep(
         sweep = replace(sweep, file=sweep.file.model_copy(update={"seed": sweep.file.seed + DRAW * draw}))
     count = sweep.flights if most is None else min(most, sweep.flights)
     assignments = Plan(sweep).assignments(range(count))
-    return [SetFlight(set_name or sweep.name, scenario_of(sweep, flight)) for flight in assignments]
+    flights = [SetFlight(set_name or sweep.name, scenario_of(sweep, flight)) for flight in assignments]
+    if any(case.scenario.changes for case in flights):
+        raise BadInput(f"{path}: changes: each scheme and each law flies to the end, allowed: a base without")
+    return flights
 
 
 def benchmark_folder() -> Path:

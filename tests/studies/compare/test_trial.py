@@ -38,7 +38,7 @@ def test_an_option_of_the_scenario_counts_for_its_own_scheme_alone():
 
 
 def test_flights_that_change_to_another_law_compare_none(tmp_path):
-    base = "{name: x, changes: [{at_s: 3, law: oracle}]}"
-    (tmp_path / "x.yaml").write_text(f"{{name: x, runs: 1, base: {base}}}")
+    file = tmp_path / "x.yaml"
+    file.write_text("{name: x, runs: 1, base: {name: x, changes: [{at_s: 3, law: oracle}]}}")
     with pytest.raises(BadInput, match="changes: each scheme and each law flies to the end"):
-        trial.of_sweep(tmp_path / "x.yaml")
+        trial.of_sweep(file)

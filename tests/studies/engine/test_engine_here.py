@@ -100,7 +100,6 @@ def test_tasks_of_a_cluster(ray):
     there = ray_workers.RayWorkers(Work(double), None, None)
     variables = ray.calls[0][2]["runtime_env"]["env_vars"]
     assert variables == {**processes.ONE_THREAD_EACH, ray_workers.VARIABLE: "somebody:Theirs"}
-    assert there.slots == 6
     tasks = [Batch(number, range(number), CASES[:number]) for number in (1, 2, 3)]
     for task in tasks:
         there.submit(task)

@@ -12,6 +12,7 @@ from beaver_ftc.aircraft.aircraft import MOMENTS
 from beaver_ftc.aircraft.schema import RATE_SIGNALS
 from beaver_ftc.design.model import (
     DesignFunctions,
+    InertiaCoefficients,
     acceleration_at,
     coefficient_slopes,
     inertia_coefficients,
@@ -36,15 +37,15 @@ def plugin_errors(declared: Declared, model: np.ndarray, y: np.ndarray, u: np.nd
     from beaver_ftc.design.context import DeclaredErrors  # for plug-ins alone
 
     aircraft, errors = declared.aircraft, declared.sensors
-    instruments = {
-        f"{prefix}{name}": errors.each("steady" if name == "bias" else name, *readings)
-        for prefix, readings in (("", ()), ("further_", (_FURTHER_READINGS,)))
-        for name in ("noise", "bias", "resolution", "slope")
-    }
+    instruments = {}
+    for name in ("noise", "bias", "resolution", "slope"):
+        of_it = "steady" if name == "bias" else name
+        instruments[name] = errors.each(of_it)
+        instruments[f"further_{name}"] = errors.each(of_it, _FURTHER_READINGS)
+    noise, bias, resolution = (instruments[name][Y0:] for name in ("noise", "bias", "resolution"))
+    sigma = np.sqrt(noise**2 + bias**2 + resolution**2 / 12.0)  # a rounding error is uniform: variance 1/12
     dC = declared.coefficients.absolute(aircraft.moments, model["moments"]["value"][0])
-    gust, gust_s = declared.air.rotation(float(y[2]), aircraft.geometry.span_m)
-    noise, bias, resolution = (errors.each(kind)[Y0:] for kind in ("noise", "steady", "resolution"))
-    sigma = np.sqrt(noise**2 + bias**2 + resolution**2 / 12.0)
+    gust, gust_s = declared.air.rotation(float(y[AIRSPEED]), aircraft.geometry.span_m)
     return DeclaredErrors(
         **instruments,
         **servo_data(declared),
@@ -59,7 +60,8 @@ def plugin_errors(declared: Declared, model: np.ndarray, y: np.ndarray, u: np.nd
 
 
 def air_rotation_slopes(model: DesignFunctions, y: np.ndarray) -> np.ndarray:
-    """Angular acceleration of an aircraft at rest in air that rotates, (3, 3) 1/s: -df/dx without rates."""
+    """Angular acceleration of an aircraft at rest in air that rotates, (3, 3) 1/s: -df/dx without rates, by
+    central differences with steps of 1e-4 rad/s."""
     steps = 1e-4 * np.eye(3)
     return -((model.f(steps, y) - model.f(-steps, y)) / 2e-4).T
 
@@ -67,28 +69,35 @@ def air_rotation_slopes(model: DesignFunctions, y: np.ndarray) -> np.ndarray:
 def model_error_std(
     model: np.ndarray, y: np.ndarray, u: np.ndarray, sigma: np.ndarray, dC: np.ndarray, du: np.ndarray
 ) -> np.ndarray:
-    """Standard deviation (3,) rad/s2 of f + G u at y and u, all errors independent.
+    """Standard deviation (3,) rad/s2 of a = f + G u at y and u, all errors e independent:
+
+        sqrt(sum over e of (a(e) - a(0))^2)
 
     sigma (4,): errors of alpha, beta, airspeed, dynamic pressure; dC (terms,): of the coefficients, absolute;
     du (surfaces,) rad: of the deflections.
     """
-    off_y = np.pad(np.diag(sigma), ((1, u.size), (0, y.size - sigma.size)))
-    off_u = np.pad(np.diag(du), ((1 + sigma.size, 0), (0, 0)))
-    rest = np.zeros((len(off_y), 3))
-    F = acceleration_at(model[0], rest, y + off_y, u + off_u)
-    dF = [*(F[1:] - F[0])]
+
+    def a(model: np.ndarray, y: np.ndarray, u: np.ndarray) -> np.ndarray:
+        return acceleration_at(model[0], np.zeros((1, 3)), y[None], u[None])[0]
+
+    a_e = [a(model, y + dy, u) for dy in np.diag(np.pad(sigma, (0, y.size - sigma.size)))]
+    a_e += [a(model, y, u + du_s) for du_s in np.diag(du)]
     for k in np.flatnonzero(dC):
         changed = model.copy()
         changed["moments"]["value"][0][k] += dC[k]
-        dF.append(acceleration_at(changed[0], rest[:1], y[None], u[None])[0] - F[0])
-    return np.sqrt(np.square(dF).sum(axis=0))
+        a_e.append(a(changed, y, u))
+    return np.sqrt(np.square(a_e - a(model, y, u)).sum(axis=0))
 
 
 def flow_noise(errors: SensorErrors, V: float) -> np.ndarray:
     """Standard deviation (2,) rad of the noise of the flow's angles in level axes, computed from vanes,
-    airspeed and attitude. An error of pitch attitude or heading turns the flow as much as an error of a
-    vane."""
-    angle = 0.3  # attitudes and incidences of up to 17 deg
+    airspeed and attitude:
+
+        hypot(sigma_vane, sigma_attitude) + angle (sigma_V / V + sigma_phi)
+
+    An error of pitch attitude or heading turns the flow as much as an error of a vane. V: airspeed, m/s.
+    """
+    angle = 0.3  # rad: attitudes and incidences of up to 17 deg
     pairs = (("alpha", "theta"), ("beta", "psi"))
     sigma = [hypot(errors[vane].random, errors[attitude].random) for vane, attitude in pairs]
     return np.array(sigma) + angle * (errors["V"].random / V + errors["phi"].random)
@@ -96,13 +105,16 @@ def flow_noise(errors: SensorErrors, V: float) -> np.ndarray:
 
 def gust_noise(sigma: np.ndarray, model: np.void, y: np.ndarray, u: np.ndarray, b: float) -> np.ndarray:
     """Standard deviation (3,) rad/s2 of the estimated effect of a gust, by the noise sigma (2,) rad of the
-    flow's angles; b: span, m.
+    flow's angles:
+
+        sqrt((F_q s_q)^2 + (F_r s_r)^2)      s_q = pi V / 4 b sigma_alpha      s_r = pi V / 3 b sigma_beta
+
+    s: noise of the rotation of the air, rad/s (gusts.py); F (3,) 1/s: d(f + G u) / d rate; b: span, m; V:
+    airspeed, m/s.
     """
-    V = y[AIRSPEED]
-    sq, sr = sigma * pi * V / (np.array([4.0, 3.0]) * b)
-    # without rates all of it is aerodynamic
-    F_x = jacobian(model, np.zeros(3), y, u)[2]
-    return np.sqrt((F_x[:, 1] * sq) ** 2 + (F_x[:, 2] * sr) ** 2)
+    s_q, s_r = sigma * pi * y[AIRSPEED] / (np.array([4.0, 3.0]) * b)
+    _, F_q, F_r = jacobian(model, np.zeros(3), y, u)[2].T  # without rates all of it is aerodynamic
+    return np.sqrt((F_q * s_q) ** 2 + (F_r * s_r) ** 2)
 
 
 def moment_axis(term: Term) -> int:
@@ -111,14 +123,20 @@ def moment_axis(term: Term) -> int:
 
 
 def coefficient_bounds(declared: Declared, model: np.void, y: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """Tolerance of each moment's term that covers every declared constant error but those of the air data
-    (statistical_design.py); y, u in trim."""
+    """Tolerance (terms,) of each moment's term that covers every declared constant error but those of the air
+    data (statistical_design.py); y, u in trim:
+
+        dC + (e_inertia + e_signals) |C| + [constant term] sum_j |d(Cl, Cm, Cn) / d(ph, qh, rh)_j| e_j
+
+    C, dC: values of the terms and their declared errors; e_inertia: largest relative error of what multiplies
+    a moment about its own axis; e_j: steady error of ph = p b / 2V, qh = q c / V, rh = r b / 2V by the gyros.
+    """
     aircraft, errors = declared.aircraft, declared.sensors
     C = np.abs(model["moments"]["value"][: len(aircraft.moments)])
-    own = [2, 7, 11]  # what multiplies a moment there
-    by_inertia = inertia_bounds(declared.inertia, declared.mass)[own]
-    by_inertia /= np.abs(inertia_coefficients(declared.mass))[own]
-    relative = by_inertia.max() + [_signal_error(errors, term) for term in aircraft.moments]
+    dI = InertiaCoefficients(*inertia_bounds(declared.inertia, declared.mass))
+    nominal = inertia_coefficients(declared.mass)
+    e_inertia = max(dI.Pl / nominal.Pl, dI.Qm / nominal.Qm, dI.Rn / nominal.Rn)
+    relative = e_inertia + [_signal_error(errors, term) for term in aircraft.moments]
     tol = declared.coefficients.absolute(aircraft.moments, C) + relative * C
     b, c = aircraft.geometry.span_m, aircraft.geometry.chord_m
     slopes = np.abs(coefficient_slopes(model, np.zeros(3), y, u))[:, PH : RH + 1]
@@ -129,12 +147,13 @@ def coefficient_bounds(declared: Declared, model: np.void, y: np.ndarray, u: np.
 
 def _signal_error(errors: SensorErrors, term: Term) -> float:
     """Relative error of the signals that a term multiplies, by the slopes of gyros, vanes, airspeed and
-    pressure."""
+    pressure; n: power of a signal. A rate counts with its gyro and with the airspeed that divides it."""
     own = AXES[moment_axis(term)]  # a slope of it is counted once for all terms of the axis
     e = errors[own].slope + errors["qdyn"].slope
     for name, n in term.of:
-        gyro = _GYRO_OF.get(name)
-        err = errors.get(gyro or name)
-        e += n * errors["V"].slope if gyro else 0.0
-        e += n * err.slope if err is not None and gyro != own else 0.0
+        if name in _GYRO_OF:
+            e += n * errors["V"].slope
+        instrument = _GYRO_OF.get(name, name)
+        if instrument in errors and instrument != own:
+            e += n * errors[instrument].slope
     return e

@@ -147,22 +147,6 @@ def store_withdrawn(store, n, s, kind, from_s, to_s, reason):
 
 
 @kernel
-def reason_of_withdrawal(plugin, broken, excluded, left):
-    """Why a surface, or its type, is isolated no longer: the first reason that holds.
-
-    plugin: a plug-in is the diagnosis; broken: a sensor is found broken; excluded: an estimator refutes the
-    surface; left: a type is left on it.
-    """
-    if broken:
-        return SENSOR_BROKEN
-    if plugin:
-        return PLUGIN_DECIDES
-    if excluded:
-        return SURFACE_REFUTED
-    return SEVERAL_POSSIBLE if left else TYPES_REFUTED
-
-
-@kernel
 def isolated_surface(found, fies):
     """The surface of the isolated fault, or -1."""
     return fies[found.isolated_estimator].surface if found.isolated_estimator >= 0 else -1

@@ -14,7 +14,6 @@ import numpy as np
 from beaver_ftc.compiled import kernel, record, sized
 from beaver_ftc.control.accommodation import MAX_EVENTS
 from beaver_ftc.design.model import unanticipated_pitch
-from beaver_ftc.diagnosis.conclusion import weighs_statistics
 from beaver_ftc.diagnosis.detection.filters import filter_share
 from beaver_ftc.diagnosis.error_map import N_MAP_COORDINATES, map_row, outside_span
 from beaver_ftc.diagnosis.monitors import sensor_monitor
@@ -186,13 +185,12 @@ def note_place(inconclusive, error_map):
 @kernel
 def note_beyond_threshold(accounts, fdi, t):
     """Note that a detector is beyond its threshold at t s. A plug-in says so itself."""
-    monitor, detector, authority = fdi.sensor_monitor, fdi.statistical, fdi.config.authority
+    monitor = fdi.sensor_monitor
     if fdi.config.scheme_number == PLUGIN_SCHEME:
         is_beyond = fdi.plugin_verdict.detected == 1
     else:
-        uses_statistics = weighs_statistics(detector, authority)
-        ratio = detection_share(fdi.bank, detector.alarm, authority, uses_statistics)
-        is_beyond = ratio > 1.0 or (sensor_monitor.has_alarm(monitor) and monitor.output.top_ratio > 1.0)
+        by_monitor = sensor_monitor.has_alarm(monitor) and monitor.output.top_ratio > 1.0
+        is_beyond = by_monitor or detection_share(fdi) > 1.0
     if is_beyond:
         accounts.beyond_threshold_at_s = t
 

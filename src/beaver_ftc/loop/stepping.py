@@ -20,7 +20,6 @@ from beaver_ftc.compiled import apart, borrows, kernel, row_of
 from beaver_ftc.compiled.cache import Wanted
 from beaver_ftc.control import CompiledLaw, accommodation, allocation, laws
 from beaver_ftc.control.state import in_charge
-from beaver_ftc.diagnosis.conclusion import weighs_statistics
 from beaver_ftc.diagnosis.model_prediction import redo_move
 from beaver_ftc.diagnosis.schemes import detection_share as largest_statistic
 from beaver_ftc.diagnosis.schemes import kernels_of_scheme
@@ -77,9 +76,7 @@ def finish(frames, references, log):
 @kernel
 def detection_share(frames):
     """The built-in detection's statistic at this frame: see schemes.detection_share."""
-    fdi = frames[0].fdi
-    stat, authority = fdi.statistical, fdi.config.authority
-    return largest_statistic(fdi.bank, stat.alarm, authority, weighs_statistics(stat, authority))
+    return largest_statistic(frames[0].fdi)
 
 
 @kernel

@@ -16,6 +16,13 @@ from beaver_ftc.compiled import apart, fill, kernel, record, sized
 from beaver_ftc.diagnosis import bounds, isolation, state
 from beaver_ftc.diagnosis import conclusion as conclusions
 from beaver_ftc.diagnosis.bounds import bound_dtype
+from beaver_ftc.diagnosis.conclusion import (
+    PLUGIN_DECIDES,
+    SENSOR_BROKEN,
+    SEVERAL_POSSIBLE,
+    SURFACE_REFUTED,
+    TYPES_REFUTED,
+)
 from beaver_ftc.diagnosis.detection import directions, fdae, filters, statistical
 from beaver_ftc.diagnosis.detection.filters import bank_share
 from beaver_ftc.diagnosis.detection.parity import USUAL_SIZE, StatisticalSize
@@ -97,38 +104,44 @@ def record_isolated_surfaces(fdi, t):
     found, monitor = fdi.verdict, fdi.sensor_monitor
     void = sensor_monitor.has_alarm(monitor) and not monitor.output.keeps_surface
     sole = conclusions.isolated_surface(found, fdi.isolation.estimator)
-    all_types, fies = fdi.config.diagnoses_all_types, fdi.isolation.estimator
     for s, surf in enumerate(fdi.types.surface):
         isolated, kind = s == sole, found.fault_type
         if fdi.types.pair.enabled:
             isolated, kind = surf.status.is_isolated, surf.status.fault_type
-        j = fdi.layout.position[s] if all_types else fdi.layout.loss[s]
-        refuted = s == fdi.types.pair.first_pitch and surf.status.basis == DEDUCED_FAULTY
-        named = found.isolated_type[s] if isolated else TYPE_UNDECIDED
-        reason = conclusions.reason_of_withdrawal(
-            fdi.config.scheme_number == PLUGIN_SCHEME,
-            void,
-            j >= 0 and fies[j].excluded,
-            not all_types or (name_remains(surf, named) and not refuted),
-        )
+        reason = SENSOR_BROKEN if void else reason_of_withdrawal(fdi, s, isolated)
         conclusions.update_interval(
             found, s, isolated and not void, t, SAME_NAME[kind] if kind >= 0 else -1, reason
         )
 
 
 @kernel
-def detection_share(bank, alarm, authority, likely):
+def reason_of_withdrawal(fdi, s, isolated):
+    """Why surface s is isolated no longer, or else its type: the first reason that holds."""
+    cfg, surf = fdi.config, fdi.types.surface[s]
+    j = fdi.layout.position[s] if cfg.diagnoses_all_types else fdi.layout.loss[s]
+    if cfg.scheme_number == PLUGIN_SCHEME:
+        return PLUGIN_DECIDES
+    if j >= 0 and fdi.isolation.estimator[j].excluded:
+        return SURFACE_REFUTED
+    refuted = s == fdi.types.pair.first_pitch and surf.status.basis == DEDUCED_FAULTY
+    named = fdi.verdict.isolated_type[s] if isolated else TYPE_UNDECIDED
+    if cfg.diagnoses_all_types and (refuted or not name_remains(surf, named)):
+        return TYPES_REFUTED
+    return SEVERAL_POSSIBLE
+
+
+@kernel
+def detection_share(fdi):
     """The largest share of its threshold that the built-in detection reaches at this frame.
 
-    alarm: of the statistical detector (ALARM_RECORD); likely: whether its estimates count. Of two detectors,
-    the worst-case one counts beyond its bound only: it has no rate of false alarms that a lower level could
-    trade for power.
+    Of two detectors, the worst-case one counts beyond its bound only: it has no rate of false alarms that a
+    lower level could trade for power.
     """
-    score = alarm.ratio if likely else 0.0
-    if authority == STATISTICAL_DETECTOR:
-        return score
-    share = bank_share(bank)
-    return max(score, share) if share > 1.0 or not likely else score
+    stat, authority = fdi.statistical, fdi.config.authority
+    share = 0.0 if authority == STATISTICAL_DETECTOR else bank_share(fdi.bank)
+    if not conclusions.weighs_statistics(stat, authority):
+        return share
+    return max(stat.alarm.ratio, share) if share > 1.0 else stat.alarm.ratio
 
 
 @apart

@@ -1,7 +1,8 @@
 """A sweep from beginning to end: fly what is missing, then say what it all shows."""
 
+import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -27,7 +28,7 @@ from beaver_ftc.studies.sweep.store import Store, identity_of
 if TYPE_CHECKING:
     from beaver_ftc.studies.sweep.outcomes import Flights
 
-Landed = Callable[[Counter[str]], None]  # takes the counts of a batch
+There = Callable[[Number, Any], None]  # takes the number and the rows of each batch, once they are there
 FRAMES_A_BATCH = 50_000  # a third of a second of work: little to lose, and a file costs no share worth saying
 MOST_A_BATCH = 256
 MOST_BATCHES = 4_000  # of a sweep of millions: so many files are read again in seconds
@@ -84,46 +85,44 @@ def run_sweep(
         if not store.is_compacted(sweep.flights):
             (folder / "summary.json").unlink(missing_ok=True)  # let nobody take the sweep for finished
 
-            def landed(counts: Counter[str]) -> None:
-                so_far.update(counts)
+            def there(number: Number, rows: Any) -> None:
+                so_far.update(counts_of(rows))
                 progress(so_far)
 
-            _fly_missing(sweep, options, store, landed, stopped)
+            _fly_missing(sweep, options, store, there, stopped)
             if so_far["done"] < so_far["total"]:
                 raise SweepStopped(
                     f"{sweep.name}: stopped, {so_far['done']} of {so_far['total']} flights are kept; "
                     "go on with the same command and --resume"
                 )
-            size = members(len(sweep.keys)) if options.search else batch_size(sweep)
-            store.compact(store.landed(*batch) for batch in batches_of(sweep.flights, size))
+            store.compact(store.landed(*batch) for batch in _batches(sweep, options))
         store.parts.remove()
         return conclude(sweep, options, store)
 
 
 def _fly_missing(
-    sweep: Sweep, options: Options, store: Store, landed: Landed, stopped: Callable[[], bool]
+    sweep: Sweep, options: Options, store: Store, there: There, stopped: Callable[[], bool]
 ) -> None:
     """Fly what is not there; of a search each generation once the one before has landed."""
     make = partial(_workers, sweep, options)
     lost = partial(one_flight.lost, sweep)
     with closing(Flying(store.landed, store.parts.land, make, lost)) as flying:
-
-        def fly(batches: Iterable[tuple[Number, Sequence[int]]], cases_of: Callable[..., Any]) -> None:
-            flying.fly(batches, cases_of, lambda number, rows: landed(counts_of(rows)), stopped)
-
         if not options.search:
-            fly(batches_of(sweep.flights, batch_size(sweep)), Plan(sweep).assignments)
+            flying.fly(_batches(sweep, options), Plan(sweep).assignments, there, stopped)
             return
         for number, runs, cases in generations(sweep, options.search, store):
-            fly([(number, runs)], lambda runs, cases=cases: cases)
+            flying.fly([(number, runs)], {runs: cases}.__getitem__, there, stopped)
 
 
-def batch_size(sweep: Sweep) -> int:
-    """Flights a batch, from the sweep alone, so that a resumed sweep has the same batches."""
+def _batches(sweep: Sweep, options: Options) -> Iterator[tuple[int, range]]:
+    """(number, runs) of each batch, from the sweep alone, so that a resumed sweep has the same batches. Of a
+    search each is a generation."""
+    if options.search:
+        return batches_of(sweep.flights, members(len(sweep.keys)))
     scenario = sweep.scenario({})
     frames = scenario.duration_s * scenario.rate_hz * scenario.substeps
     size = max(1, min(MOST_A_BATCH, round(FRAMES_A_BATCH / frames)))
-    return max(size, -(-sweep.flights // MOST_BATCHES))
+    return batches_of(sweep.flights, max(size, math.ceil(sweep.flights / MOST_BATCHES)))
 
 
 def _workers(sweep: Sweep, options: Options, flights: int) -> Workers:
@@ -147,13 +146,14 @@ def conclude(sweep: Sweep, options: Options, store: Store) -> Document:
         document["search"] = found(options.search, store.results, sweep)
     command = replay_command(options.source, options.out, options.search)
     document["worst"] = worst_flights(flights, sweep, command)
-    steered = options.search is not None  # its rates say nothing about the flights in general
-    document["expectations"] = [] if steered else evaluate(sweep.file.expect, flights)
+    # the rates of a search say nothing about the flights in general
+    document["expectations"] = [] if options.search else evaluate(sweep.file.expect, flights)
     document["passed"] = all(expectation["passed"] for expectation in document["expectations"])
     document["versions"] = dict(versions())
-    for flight in document["worst"] if options.keep.policy == "worst" else ():
-        kept = assignment_of(sweep, options, flight["run"])
-        one_flight.keep_flight(sweep, kept, options.keep, report=True)
+    if options.keep.policy == "worst":
+        for flight in document["worst"]:
+            kept = assignment_of(sweep, options, flight["run"])
+            one_flight.keep_flight(sweep, kept, options.keep, report=True)
     if options.report:
         _draw(sweep, flights, document, store)
     store.write("summary.json", as_json(document))

@@ -31,7 +31,9 @@ from beaver_ftc.compiled import kernel
 from beaver_ftc.design import LEAST_HEIGHT_M
 from beaver_ftc.diagnosis.detection.filters import advance_bound, leak
 from beaver_ftc.diagnosis.monitors.numbering import (
+    ALPHA_TEST,
     ANGLE_TEST,
+    BETA_TEST,
     CLIMB_TEST,
     COUNTERPART,
     DENSITY_TEST,
@@ -143,12 +145,15 @@ def store_sample(mon, y, force):
 
 @kernel
 def predict_readings(mon):
-    """Fill y_pred: attitude, flow and altitude now, from the sample before. Returns the attitude.
+    """Fill y_pred: attitude, altitude and flow now, from the sample before. Returns the attitude as q.
 
-    q <- q (1, h w / 2) / |...|: the turn of an Euler step; v <- v + h (3/2 a - 1/2 a_past), turned by -h w,
-    as a_past is then. Of q = z1 + z2 j
+        step = (1, h w / 2) / |...|                       turn of an Euler step
+        q <- q step                                       q = z1 + z2 j, of which
+        phi = arg(z1^2 - z2*^2),  2 z1 z2 = sin(theta) + i cos(theta) sin(psi)
+        altitude <- altitude + h (v upwards)
+        v <- v + h (3/2 a - 1/2 a_past)                   then turned by step; in the axes before it till then
 
-        phi = arg(z1^2 - z2*^2),    2 z1 z2 = sin(theta) + i cos(theta) sin(psi)
+    At the end a, turned by step, is the a_past of the next sample.
     """
     h, y, past = mon.h, mon.y_pred, mon.y_past
     w = vector(past)
@@ -282,6 +287,8 @@ def bound_flow(mon, y, w_max, e_w):
         speed         e_a + growth a vane + h (a / V)^2 e_V
         each angle    growth (sec^2 ((e_a + a (vane + e_V / V)) / V + w_max vane) + sec e_w)
         climb         gusts and wind + (V + e_V) (e_phi + e_theta + vane) + e_V + lag
+
+    A gust of 1 m/s changes the speed by gust, and each angle by gust sec / V.
     """
     h, e, a_size = mon.h, mon.e_past, mon.a_size
     V = max(lowest(mon, y, I_AIRSPEED), MIN_AIRSPEED_MPS)
@@ -291,9 +298,11 @@ def bound_flow(mon, y, w_max, e_w):
     a, growth = a_size[0] + e_a, 1.0 + h * (2.0 * a_size[0] / V + w_max)
     low = max(lowest(mon, y, ALTITUDE), LEAST_HEIGHT_M)
     gust = np.sqrt(max(y[I_AIRSPEED] / mon.max_airspeed_mps, 1.0) * max(mon.low_m / low, 1.0))
-    flow = growth * (sec**2 * ((e_a + a * (vane + e_V / V)) / V + w_max * vane) + sec * e_w)
-    mon.per_s[SPEED_TEST:DENSITY_TEST] = e_a + growth * a * vane + h * (a / V) ** 2 * e_V, flow, flow
-    mon.gust[SPEED_TEST:DENSITY_TEST] = gust, gust * sec / V, gust * sec / V
+    angle = growth * (sec**2 * ((e_a + a * (vane + e_V / V)) / V + w_max * vane) + sec * e_w)
+    mon.per_s[SPEED_TEST] = e_a + growth * a * vane + h * (a / V) ** 2 * e_V
+    mon.gust[SPEED_TEST] = gust
+    mon.per_s[ALPHA_TEST] = mon.per_s[BETA_TEST] = angle
+    mon.gust[ALPHA_TEST] = mon.gust[BETA_TEST] = gust * sec / V
     path = (mon.y_past[I_AIRSPEED] + e_V) * (e[PHI] + e[THETA] + vane)
     lag = POSITION_FACTOR * h * max(a, a_size[1], a_size[2])
     mon.per_s[CLIMB_TEST] = mon.wind_max + mon.gust_max + path + e_V + lag
@@ -302,19 +311,21 @@ def bound_flow(mon, y, w_max, e_w):
 @kernel
 def bound_density(mon, y):
     """Fill the bounds of `bound_residuals` for the logarithm of the density: climb over the scale height, and
-    log(y) of the dynamic pressure and, twice, of the airspeed: of a constant error e
+    log(y^power) of the dynamic pressure and of the airspeed: of a constant error e
 
-        e |1 / y - 1 / y_past| / (1 - e / y_min)
+        power e |1 / y - 1 / y_past| / (1 - e / y_min)
+
+    and of n    power n / (y - e)
     """
-    j = DENSITY_TEST
     past = mon.y_past
     climb = past[I_AIRSPEED] + mon.e_past[I_AIRSPEED] + mon.wind_max + mon.gust_max
-    mon.per_s[j], mon.per_sample[j] = climb / DENSITY_SCALE_HEIGHT_M, 0.0
-    for i, k, least in ((I_QDYN, 1.0, MIN_QDYN_PA), (I_AIRSPEED, 2.0, MIN_AIRSPEED_MPS)):
+    per_s, per_sample = climb / DENSITY_SCALE_HEIGHT_M, 0.0
+    for i, power, least in ((I_QDYN, 1.0, MIN_QDYN_PA), (I_AIRSPEED, 2.0, MIN_AIRSPEED_MPS)):
         e, y1, y0 = mon.const[i], max(y[i], least), max(past[i], least)
         e_log = e * abs(1.0 / y1 - 1.0 / y0) / max(1.0 - e / min(y1, y0), MIN_SHARE_LEFT)
-        mon.per_s[j] += k * e_log / mon.h
-        mon.per_sample[j] += k * mon.n[i] / max(y[i] - mon.e[i], least)
+        per_s += power * e_log / mon.h
+        per_sample += power * mon.n[i] / max(y[i] - mon.e[i], least)
+    mon.per_s[DENSITY_TEST], mon.per_sample[DENSITY_TEST] = per_s, per_sample
 
 
 @kernel
@@ -391,8 +402,7 @@ def start_tests(mon, y, force):
     """Start with the first sample, before which no reading is known; force (3,) m/s2."""
     bound_readings(mon, y)
     store_sample(mon, y, force)
-    mon.y_older[:] = y
-    mon.e_older[:] = mon.e_past
+    store_sample(mon, y, force)  # also for the sample before it
     mon.a_past[:] = mon.a
     mon.a_size[:2] = length(mon.a) + FORCE_JUMP_M_S2
     mon.e_first = AB_PAST * FORCE_JUMP_M_S2

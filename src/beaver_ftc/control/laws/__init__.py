@@ -17,14 +17,18 @@ from beaver_ftc.diagnosis.state import PITCH
 @apart
 def prepare(control, assessment, prediction, mode, t):
     """Bring the effectiveness matrix, the hand-over of pitch and the probe to this frame, t s. mode: the
-    supervisor's."""
+    supervisor's.
+
+    Pitch is handed over at once where the reference is governed from this frame on, or where the diagnosis of
+    all types has found that less than least_effectiveness is left of the main surface.
+    """
     surfaces, config = control.surfaces, control.config
     allocation.form_effectiveness_matrix(control.axes, prediction.G, surfaces, config.uses_verdict)
     remains = allocation.remaining(control.layout, surfaces.output.effectiveness, PITCH)
-    least, reallocated = surfaces.config.least_effectiveness, mode == MODE_REALLOCATED
-    governed = control.reference.memory.active or surfaces.output.authority_lost  # from this frame on
+    least = surfaces.config.least_effectiveness
+    governed = control.reference.memory.active or surfaces.output.authority_lost
     at_once = governed or (remains < least and assessment.diagnoses_all_types)
-    allocation.hand_over_pitch(control.allocation, reallocated, at_once, remains, least)
+    allocation.hand_over_pitch(control.allocation, mode == MODE_REALLOCATED, at_once, remains, least)
     if control.probe.config.frames > 0:
         wanted = assessment.pitch_undecided and config.uses_verdict and not config.informed
         advance_probe(control.probe, wanted, t)
@@ -32,7 +36,11 @@ def prepare(control, assessment, prediction, mode, t):
 
 @apart
 def command_surfaces(control, assessment, faults, prediction, by_observer):
-    """From the law's demand, in control.axes, to the command of each surface.
+    """From the law's demand, in control.axes, to the command u (n,) rad of each surface:
+
+        demand <- demand - G offset         if the law uses the verdict
+        G u = demand                        as far as the travels allow
+        u = trim                            of a surface that is parked
 
     by_observer: whether the law's observer finds what a surface does not do; the stand-in then carries what
     the main surface has lost, and the flap takes what an elevator at its stop leaves.
@@ -49,8 +57,8 @@ def command_surfaces(control, assessment, faults, prediction, by_observer):
         )
     else:
         allocation.allocate(axes, out, layout, effectiveness, share, probe)
-    if not layout.general and by_observer and uses_verdict and assessment.detected:
-        allocation.spill_to_flap(axes, out, layout)
+        if by_observer and uses_verdict and assessment.detected:
+            allocation.spill_to_flap(axes, out, layout)
     accommodation.park_failed_surfaces(surfaces.output, assessment, faults, control.config.informed)
     allocation.park(out, layout, surfaces.output.parked)
 
@@ -64,7 +72,7 @@ def complete(control, assessment, measured, t):
     watched = assessment.detected or control.config.informed
     allocation.note_shortfall(axes, out.command, layout, surfaces.output.lag, engine.output.authority)
     if lever.config.enabled:
-        lost = watched and power.pitch_is_lost(layout, surfaces, out.saturated, axes.shortfall)
+        lost = power.pitch_is_lost(layout, surfaces, out.saturated, axes.shortfall)
         power.steer_by_power(lever, control.reference, measured.x, measured.y, watched, lost, t)
     if engine.config.n > 0:
         if watched:

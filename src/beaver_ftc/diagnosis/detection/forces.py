@@ -123,7 +123,7 @@ def update_inertial(forces, f, i, y, dt):
 
 
 @kernel
-def fill_angle_rates(forces, gravity, meas):
+def fill_angle_rates(forces, g, meas):
     """Fill `angle_rate` with beta' and alpha' in still air, rad/s.
 
         beta' = p sin(alpha) - r cos(alpha)
@@ -131,18 +131,19 @@ def fill_angle_rates(forces, gravity, meas):
         alpha' = q - tan(beta) (p cos(alpha) + r sin(alpha))
                  + (a_z cos(alpha) - a_x sin(alpha)) / (V cos(beta))
 
-    a (3,) m/s2: accelerometers, and gravity g in body axes; p, q, r rad/s: rates; V m/s: airspeed.
+    a (3,) m/s2: accelerometers, and gravity g, m/s2, in body axes; p, q, r rad/s: rates; V m/s: airspeed;
+    c, s: cosine and sine of alpha.
     """
-    g, x, a, V, beta = gravity, meas.x, meas.force, meas.y[AIRSPEED], meas.y[BETA]
-    c, s = np.cos(meas.y[ALPHA]), np.sin(meas.y[ALPHA])
+    a, V, beta = meas.force, meas.y[AIRSPEED], meas.y[BETA]
+    p, q, r = meas.x[0], meas.x[1], meas.x[2]
     phi, th = meas.attitude[0], meas.attitude[1]
+    c, s = np.cos(meas.y[ALPHA]), np.sin(meas.y[ALPHA])
     a_x = a[0] - g * np.sin(th)
     a_y = a[1] + g * np.cos(th) * np.sin(phi)
     a_z = a[2] + g * np.cos(th) * np.cos(phi)
-    by_a = (a_y * np.cos(beta) - (a_x * c + a_z * s) * np.sin(beta)) / V
-    forces.angle_rate[SIDE_INDEX] = x[0] * s - x[2] * c + by_a
-    by_a = (a_z * c - a_x * s) / (V * np.cos(beta))
-    forces.angle_rate[NORMAL_INDEX] = x[1] - np.tan(beta) * (x[0] * c + x[2] * s) + by_a
+    rate = forces.angle_rate
+    rate[SIDE_INDEX] = p * s - r * c + (a_y * np.cos(beta) - (a_x * c + a_z * s) * np.sin(beta)) / V
+    rate[NORMAL_INDEX] = q - np.tan(beta) * (p * c + r * s) + (a_z * c - a_x * s) / (V * np.cos(beta))
 
 
 def terms_of_force(aircraft: Aircraft, i: int) -> list[Term]:

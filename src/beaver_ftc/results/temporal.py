@@ -21,6 +21,7 @@ import numpy as np
 
 MOST_CHARACTERS = 4000
 MOST_DEPTH = 40
+MOST_SECONDS = 360_000  # a hundred hours
 
 _TOKEN_PATTERN = re.compile(
     r"\s*(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+(?:[eE][-+]?\d+)?|[A-Za-z_][\w.]*|->|<=|>=|[-+*/()<>\[\]:,])"
@@ -125,9 +126,11 @@ class _Parser:
         while _BINDING_POWER.get(self._next_token, 0) > power:
             operator = self._take_token()
             interval = self._parse_interval() if operator == "until" else None
-            # to the right the same operator: a - b - c is (a - b) - c, but a -> b -> c is a -> (b -> c)
-            right = self._parse_operand(_BINDING_POWER[operator] - (_BINDING_POWER[operator] == 1))
-            left = _formula("implies" if operator == "->" else operator, left, right, interval=interval)
+            if operator in ("->", "implies"):  # a - b - c is (a - b) - c, but a -> b -> c is a -> (b -> c)
+                left = _formula("implies", left, self._parse_operand(0))
+            else:
+                right = self._parse_operand(_BINDING_POWER[operator])
+                left = _formula(operator, left, right, interval=interval)
         self._depth -= 1
         return left
 
@@ -174,8 +177,10 @@ class _Parser:
 
     def _parse_seconds(self) -> float:
         token = self._take_token()
-        if not re.fullmatch(r"[\d.].*", token) or float(token) > 360_000:
-            raise FormulaError(f"{token or 'the end'!r} is no time, allowed: seconds from 0 to 360000")
+        if not re.fullmatch(r"[\d.].*", token) or float(token) > MOST_SECONDS:
+            raise FormulaError(
+                f"{token or 'the end'!r} is no time, allowed: seconds from 0 to {MOST_SECONDS}"
+            )
         return float(token)
 
 
@@ -206,12 +211,10 @@ def _robustness_by_frame(
 ) -> np.ndarray:
     """The robustness of a formula at each frame, (frames,)."""
     operator = formula.operator
-    if operator in ("number", "column"):
-        return (
-            np.full(frames, formula.column_or_number)
-            if operator == "number"
-            else columns[str(formula.column_or_number)]
-        )
+    if operator == "number":
+        return np.full(frames, formula.column_or_number)
+    if operator == "column":
+        return columns[str(formula.column_or_number)]
     parts = [_robustness_by_frame(part, columns, rate_hz, frames) for part in formula.parts]
     if operator in _FRAMEWISE_FUNCTION_OF_OPERATOR:
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -219,17 +222,17 @@ def _robustness_by_frame(
     begin, end = (round(t * rate_hz) for t in formula.interval or (0.0, frames / rate_hz))
     if operator == "until":
         return _until_robustness(parts[0], parts[1], begin, min(end, frames))
-    past = operator in ("once", "historically")
     sign = 1.0 if operator in ("always", "historically") else -1.0
-    values = sign * parts[0][:: -1 if past else 1]
-    return sign * _future_minimum(values, begin, end)[:: -1 if past else 1]
+    # the past is the future of the flight backwards
+    along = -1 if operator in ("once", "historically") else 1
+    return sign * _future_minimum(sign * parts[0][::along], begin, end)[::along]
 
 
 def _future_minimum(values: np.ndarray, begin: int, end: int) -> np.ndarray:
     """min(values[k + begin : k + end + 1]) at each k, infinite where that is beyond the log: twice as long a
     stretch at each step."""
     frames = len(values)
-    width = min(end, len(values)) - begin + 1
+    width = min(end, frames) - begin + 1
     if width < 1:
         return np.full(frames, np.inf)
     least = np.concatenate((values[begin:], np.full(begin + width, np.inf)))

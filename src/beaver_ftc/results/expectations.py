@@ -16,8 +16,11 @@ MOTION_OF_AXIS = {"p": "roll", "q": "pitch", "r": "yaw"}
 
 
 class Rule(NamedTuple):
-    """An expectation that a value of the metrics equals. path: of the value in the metrics; words: its
-    name."""
+    """An expectation that a value of the metrics equals.
+
+    path: of the value in the metrics. words: its name; a `Limit` has its unit as well, a `Flag` a text for
+    true and one for false.
+    """
 
     path: str
     words: tuple[str, ...]
@@ -132,25 +135,27 @@ def expected_of(expect: Any) -> Iterator[tuple[str, Any]]:
 def _judged(name: str, expected: Any, metrics: Metrics) -> Expectation:
     rule = RULES[name]
     actual = rule.actual(expected, metrics)
-    of_one_name = rule.path.startswith("isolation.") and not isinstance(expected, list)
-    early = of_one_name and bool(metrics.at("isolation.premature"))  # a list holds none that is premature
-    passed = rule.is_met(actual, expected) and not early
-    why = "" if passed or name not in OF_DIAGNOSIS else _reason_not_met(expected, early, metrics)
-    return Expectation(name, passed, expected, actual, reason=why or None)
+    is_of_one_name = rule.path.startswith("isolation.") and not isinstance(expected, list)
+    is_early = is_of_one_name and bool(metrics.at("isolation.premature"))  # a list holds no premature name
+    passed = rule.is_met(actual, expected) and not is_early
+    reason = None
+    if not passed and name in OF_DIAGNOSIS:
+        reason = _reason_not_met(expected, is_early, metrics)
+    return Expectation(name, passed, expected, actual, reason=reason)
 
 
-def _reason_not_met(expected: Any, early: bool, metrics: Metrics) -> str:
-    """The reason why an expectation of the diagnosis is not met; empty if it is not known."""
+def _reason_not_met(expected: Any, is_early: bool, metrics: Metrics) -> str | None:
+    """The reason why an expectation of the diagnosis is not met; None if it is not known. is_early: the fault
+    was named before it began."""
     detection = metrics.detection
     isolation = metrics.isolation
-    if early:
+    if is_early:
         return f"{isolation.fault} was named at {isolation.time_s:g} s, before the fault began"
-    gone = [one for one in (isolation.withdrawn if isolation else ()) if one.fault == expected]
-    if gone:
-        last = gone[-1]
-        return f"{expected} was named at {last.from_s:g} s, and the name withdrawn at {last.to_s:g} s"
+    for last in reversed(isolation.withdrawn if isolation else ()):
+        if last.fault == expected:
+            return f"{expected} was named at {last.from_s:g} s, and the name withdrawn at {last.to_s:g} s"
     inconclusive = detection and detection.inconclusive
-    return in_words(inconclusive.document()) if inconclusive else ""
+    return in_words(inconclusive.document()) if inconclusive else None
 
 
 def margin(found: Expectation) -> float | None:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.documents.files import read_json
-from beaver_ftc.results.expectations import without_underscores
+from beaver_ftc.results.expectations import value_text, without_underscores
 from beaver_ftc.results.model import Document
 from beaver_ftc.results.report import register_section
 from beaver_ftc.results.verdict import printed
@@ -23,7 +23,7 @@ Table = tuple[str, list[str], list[list[str]]]  # caption, head, rows
 
 
 def percent(share: float | None) -> str:
-    """A share as a percentage; None is a share of nothing."""
+    """A share as a percentage, of two digits below 10 %; None is a share of nothing."""
     if share is None:
         return "no bound"
     value = 100.0 * share
@@ -44,8 +44,7 @@ def findings(found: Document) -> list[str]:
     dominant = "nothing: truth and design agree"
     if worst is not None:
         source = without_underscores(worst["source"])
-        share = percent(worst["bound_share"])
-        dominant = f"{source}: {share} of the bound on {worst['axis']}"
+        dominant = f"{source}: {percent(worst['bound_share'])} of the bound on {worst['axis']}"
     lines = [f"dominant     {dominant}"]
     if found["false_alarm"]:
         detection = found["detection"]
@@ -73,23 +72,21 @@ def _advice(found: Document) -> list[str]:
 def _case(case: Document) -> str:
     if case["false_alarm"]:
         return "FALSE ALARM before the fault"
-    detected = case["detection_delay_s"]
-    certain = case["guaranteed_delay_s"]
-    return (
-        f"{'not detected' if detected is None else f'detected after {detected:.2f} s'}, "
-        f"{'never certain' if certain is None else f'certain within {certain:.2f} s'}"
-    )
+    detected, certain = case["detection_delay_s"], case["guaranteed_delay_s"]
+    alarm = "not detected" if detected is None else f"detected after {detected:.2f} s"
+    latest = "never certain" if certain is None else f"certain within {certain:.2f} s"
+    return f"{alarm}, {latest}"
 
 
-def _reason(stays: list[Document]) -> str:
-    return (
-        without_underscores(max(stays, key=lambda stay: stay["peak_ratio"] or 0.0)["source"])
-        if stays
-        else "-"
-    )
+def _reason(exceedances: list[Document]) -> str:
+    """The source of the exceedance of the bound that went furthest."""
+    if not exceedances:
+        return "-"
+    return without_underscores(max(exceedances, key=lambda one: one["peak_ratio"] or 0.0)["source"])
 
 
 def _needed(axis: str, entry: Document) -> str:
+    """Of the bound on an axis: the largest share used, and the smallest constant that would do, rad/s2."""
     return f"{percent(entry[f'{axis}_worst_ratio'])} / {entry[f'{axis}_smallest_constant_rad_s2']:.3g}"
 
 
@@ -111,7 +108,7 @@ MODES = (
 RUNS = (
     ("run", "scenario"), *((axis, partial(_needed, axis)) for axis in AXES),
     ("dominant", "dominant", lambda source: without_underscores(source or "-")),
-    ("false alarm", "false_alarm", lambda is_false: "yes" if is_false else "no"),
+    ("false alarm", "false_alarm", value_text),
     (
         "certain within",
         lambda entry: "void" if entry["guarantee_void"] else seconds(entry["guaranteed_delay_s"]),

@@ -54,13 +54,13 @@ from beaver_ftc.studies.compare.trial import (
 )
 from beaver_ftc.studies.margins import Margin
 
-LOST = 100.0
-EFFORT = 1.1
-INADMISSIBLE = 1e3
+DELAY_S = 1.0  # an alarm this late costs half of a missed one
+LOST = 100.0  # times e_oracle
+EFFORT = 1.1  # times the default law's
+INADMISSIBLE = 1e3  # above every J
 FAILED = 1e6  # of a candidate that cannot be flown at all
-DELAY_S = 1.0
 LEAST_FLIGHTS = 4
-HOPELESS = 1.5
+HOPELESS = 1.5  # times the lowest J
 
 Values = Mapping[str, float]
 
@@ -86,6 +86,7 @@ class _FalseAlarm(Exception):
 
 
 def _end_with_false_alarm(loop: Loop) -> Callable[[], None]:
+    """Watch a flight (`fly`): end it with the first false alarm of its plug-in. At its end nothing is due."""
     plugins = loop.plugin_frame
     is_false = Truth.of(loop.scenario).onset.is_false
 

@@ -23,12 +23,13 @@ def finite(value: Any) -> Any:
 
 
 def all_finite(row: Mapping[str, Any]) -> Document:
-    """The same of each value."""
+    """A row with each value as `finite` returns it."""
     return {key: finite(value) for key, value in row.items()}
 
 
 def number(value: Any, unit: str = "", none: str = "-", digits: int = 3) -> str:
-    """A number with the digits worth reading, without an exponent, and its unit; None is `none`."""
+    """A number with the digits worth reading, without an exponent, and its unit; None is `none`, and a text
+    stays."""
     if value is None or isinstance(value, str):
         return value or none
     return f"{_digits(float(value), digits)} {unit}".rstrip()
@@ -73,8 +74,8 @@ def grouped(rows: Iterable[Document], *names: str) -> dict[tuple[Any, ...], list
 class Column(NamedTuple):
     """A column of a table: its head, and its cell of a row.
 
-    of: what makes the cell of a row, or the key of its value, with dots where that is in a part. form: of the
-    value, or its unit.
+    of: a function from a row to its cell; or the key of the value in the row, `part.key` for a value inside a
+    part. form: a function from that value to its cell, or the unit of a number.
     """
 
     head: str

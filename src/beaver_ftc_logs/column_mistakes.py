@@ -69,13 +69,14 @@ def refuse_rate_unit(samples: Samples, ranges: FittedRanges) -> None:
         return
     ratio = float(np.exp(np.mean(np.log(ratios))))
     hints = (
-        (1.0 / ratio, "a factor of {0:.4g} (`unit: {2}`) fits"),
-        (ratio, "a factor of {1:.4g} fits: the model's own were in {2}?"),
+        (1.0 / ratio, "a factor of {to_si:.4g} (`unit: {unit}`) fits"),
+        (ratio, "a factor of {from_si:.4g} fits: the model's own were in {unit}?"),
     )
     for size, hint in hints:
         unit = nearest_unit(RATE, size, _UNIT_FACTOR_ROOT**2)
         if unit not in (None, "rad/s"):
-            text = hint.format(SI_UNITS[unit][1], 1.0 / SI_UNITS[unit][1], unit)
+            to_si = SI_UNITS[unit][1]
+            text = hint.format(to_si=to_si, from_si=1.0 / to_si, unit=unit)
             motion = f"rates spread {ratio:.3g} times as widely as in the flights of the model"
             raise BadInput(f"{samples.name}: {motion}, allowed: rates in rad/s; {text}")
 
@@ -148,10 +149,10 @@ def refuse_columns(samples: Samples, model: Model) -> None:
         return
     mistakes = _command_mistakes(samples, model, found)
     for ma in NOISE_MA_CANDIDATES if mistakes else ():
-        other = answers(whiten_samples(samples, ma), model)
-        if other is not None and other.likelihood.mean() > found.likelihood.mean():
-            likelier = _command_mistakes(samples, model, other)
-            mistakes = {key: sizes for key, sizes in mistakes.items() if key in likelier}
+        likelier = answers(whiten_samples(samples, ma), model)
+        if likelier is not None and likelier.likelihood.mean() > found.likelihood.mean():
+            again = _command_mistakes(samples, model, likelier)
+            mistakes = {key: sizes for key, sizes in mistakes.items() if key in again}
     texts = (_COMMAND_MISTAKES[kind].format(group, *sizes) for (kind, group), sizes in mistakes.items())
     text = next(texts, None) or _likelier_mistake(flight, likeliest)
     if text is not None:
@@ -276,9 +277,13 @@ def corrected_logs(samples: Samples, vehicle: Vehicle, unknown: Collection[str])
         yield CorrectedLog(f"{first} and {second} exchanged", exchanged)
     for name in [*doubtful, *vehicle.signal_columns]:
         for factor in UNIT_FACTORS:
-            scaled = _altered(samples, vehicle, {}, {name: factor})
-            also = (float(np.log(abs(factor))), "") if name in doubtful else (0.0, name)
-            yield CorrectedLog(f"`scale: {factor:.4g}` on {name}", scaled, *also)
+            mended = CorrectedLog(
+                f"`scale: {factor:.4g}` on {name}", _altered(samples, vehicle, {}, {name: factor})
+            )
+            if name in doubtful:
+                yield mended._replace(log_jacobian=float(np.log(abs(factor))))
+            else:
+                yield mended._replace(scaled_signal=name)
 
 
 def _altered(

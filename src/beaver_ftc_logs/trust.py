@@ -127,9 +127,10 @@ def _rows_out_of_range(samples: Samples, model: Model) -> Reasons:
         channels.append(("airspeed", samples.airspeed, ranges.airspeed))
     reasons = {}
     for name, values, (lo, hi) in channels:
-        margin = _RANGE_MARGIN_SHARE * (hi - lo) + MIN_DIVISOR
-        margins = _AIRSPEED_MARGIN * np.array([lo, hi]) if name == "airspeed" else (margin, margin)
-        outside = (values < lo - margins[0]) | (values > hi + margins[1])
+        below = above = _RANGE_MARGIN_SHARE * (hi - lo) + MIN_DIVISOR
+        if name == "airspeed":
+            below, above = _AIRSPEED_MARGIN * lo, _AIRSPEED_MARGIN * hi
+        outside = (values < lo - below) | (values > hi + above)
         reason = f"{name} is outside {lo:.3g} to {hi:.3g}, where the model was fitted"
         sums, n = trailing_sums(outside, _RANGE_WINDOW_S / samples.dt_s)
         reasons[reason] = sums > _MIN_OUTSIDE_SHARE * n

@@ -4,6 +4,7 @@ import contextlib
 import json
 import shutil
 from collections.abc import Iterable, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, Self
 
@@ -74,7 +75,6 @@ class Store:
         self.results = folder / "results.parquet"
         self._manifest = folder / "sweep.json"
         self._open = contextlib.ExitStack()
-        self._compacted: pa.Table | None = None
 
     def __enter__(self) -> Self:
         with clear_disk_errors(self.folder):
@@ -114,16 +114,13 @@ class Store:
     def landed(self, batch: Number, runs: Sequence[int]) -> "pa.Table | None":
         """The table of a batch if it has landed whole: of its part, or else of `results.parquet`."""
         table = self.parts.landed(batch, runs)
-        if table is not None:
-            return table
-        if self._compacted is None:
-            self._compacted = self._read_results()
-        if self._compacted is None:
-            return None
-        return self._codec.if_of(runs, self._compacted.slice(runs[0], len(runs)))
+        if table is None and self._compacted is not None:
+            return self._codec.if_of(runs, self._compacted.slice(runs[0], len(runs)))
+        return table
 
-    def _read_results(self) -> "pa.Table | None":
-        """`results.parquet`; one that cannot be read is set aside."""
+    @cached_property
+    def _compacted(self) -> "pa.Table | None":
+        """`results.parquet` of an earlier start; one that cannot be read is set aside."""
         from pyarrow import ArrowException
         from pyarrow.parquet import read_table
 

@@ -150,9 +150,9 @@ def diagnose(options: DiagnoseOptions) -> None:
     """Diagnose recorded flights with a model or an aircraft.
 
     For each flight the command writes diagnosis.parquet, verdict.json and report.html into a folder of its
-    own. The table diagnosis.parquet has one row for each sample. A row uses only samples up to its own time.
-    A log.parquet that `run` wrote needs no model, because it is diagnosed with the design model of its
-    scenario.
+    own. The table diagnosis.parquet has one row for each sample. A row uses samples up to its own time, but
+    for the exceptions that the tutorial on flight logs names. A log.parquet that `run` wrote needs no model,
+    because it is diagnosed with the design model of its scenario.
 
     Examples:
       beaver-ftc diagnose my-logs/suspect.csv --model wing.json

@@ -44,7 +44,7 @@ from beaver_ftc.loop import Asked
 from beaver_ftc.loop import act_as_agent as act
 from beaver_ftc.loop import cost_of_agent as cost
 from beaver_ftc.loop import look_of_agent as look_of
-from beaver_ftc.loop import note_trim_of_agent as note_trim
+from beaver_ftc.loop import note_first_readings_of_agent as note_first_readings
 from beaver_ftc.loop import observe_as_agent as observe
 from beaver_ftc.results import Simulation
 from beaver_ftc.scenario import ScenarioLike, load
@@ -77,7 +77,7 @@ class Episode(Simulation):
         self._costs = direct(cost, frames, log, self._look)
         self._observes = direct(observe, frames, log, self._look, seen)
         self._begin()
-        note_trim(self._look, self.measured.y)
+        note_first_readings(self._look, self.measured.y)
 
     def act(self, action: ArrayLike, frames: int) -> float:
         """Fly so many frames, or to the end, with an action (surfaces,) held; returns what they cost."""

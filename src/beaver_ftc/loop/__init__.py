@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from beaver_ftc.loop.agent import act as act_as_agent
     from beaver_ftc.loop.agent import cost as cost_of_agent
     from beaver_ftc.loop.agent import look_of as look_of_agent
-    from beaver_ftc.loop.agent import note_trim as note_trim_of_agent
+    from beaver_ftc.loop.agent import note_first_readings as note_first_readings_of_agent
     from beaver_ftc.loop.agent import observe as observe_as_agent
     from beaver_ftc.loop.changing import take_diagnosis
     from beaver_ftc.loop.loop import LogSink, Loop, fly

@@ -17,18 +17,19 @@ ANGLE_RAD = 0.1
 LARGEST = 100.0  # of an observation: a departure is at 60
 BESIDE_SURFACES = 12
 
-# Where a row of the log has the measured p and the reference model's, which q and r follow; trim, in SI.
+# Where a row of the log has the measured p and the reference model's, which q and r follow; first
+# readings, in SI.
 LOOK = record(measured=int, model=int, alpha=float, beta=float, airspeed=float)
 
 
 def look_of(columns: Sequence[str]) -> np.ndarray:
-    """What an agent of a log with these columns looks at, (1,) of LOOK; still without the trim."""
+    """What an agent of a log with these columns looks at, (1,) of LOOK; still without the first readings."""
     look = np.zeros(1, LOOK)
     look["measured"], look["model"] = (columns.index(f"p_{what}_rad_s") for what in ("measured", "model"))
     return look
 
 
-def note_trim(look: np.ndarray, y: np.ndarray) -> None:
+def note_first_readings(look: np.ndarray, y: np.ndarray) -> None:
     """Note the first readings, y: alpha rad, beta rad, airspeed m/s."""
     for name, value in zip(("alpha", "beta", "airspeed"), y, strict=False):
         look[name] = value

@@ -61,11 +61,11 @@ class Changing:
         renews = change.scheme is not None or change.declared_sensors is not None
         detector, law = (before.detector, before.law) if before else (None, None)
         if renews:
-            given, detector = detector, named_detector(then)
-            if given is not None and change.scheme is None and detector is None:
-                raise BadInput(
-                    "changes.declared_sensors: with a detector object, allowed: one named in fdi.scheme"
-                )
+            named = named_detector(then)
+            if change.scheme is None and named is None and detector is not None:
+                allowed = "one named in fdi.scheme"
+                raise BadInput(f"changes.declared_sensors: with a detector object, allowed: {allowed}")
+            detector = named
         if change.law is not None:
             law = named_law(frames, then, loop.trimmed)
         plugins = plugged(frames, then, loop.trimmed, detector, law, before)

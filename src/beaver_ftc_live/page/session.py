@@ -177,7 +177,8 @@ class Session:
         """
         if self.over and request.do in OF_A_FLIGHT:
             raise BadInput("the flight is over, allowed: a new flight")
-        if self.game.hidden and request.do not in OF_A_ROUND + ("break",) * (self.game.mode == "second"):
+        allowed = (*OF_A_ROUND, "break") if self.game.mode == "second" else OF_A_ROUND
+        if self.game.hidden and request.do not in allowed:
             raise BadInput(f"{request.do}: a round is on, allowed: after it")
         self._by = by
         self._saved = self._saved if request.do in CHANGES_NOTHING else ""

@@ -24,7 +24,7 @@ from beaver_ftc.scenario.schema import load_text
 M_S_PER_KT = 0.514444
 ALTITUDE_M = 1000.0  # below 2000 ft the turbulence declared is another
 DURATION_S = 14.0
-SEED = 2  # flights of seed 1 chose a constant and rules of the diagnosis (docs/results/choices.md)
+SEEDS = (2,)  # of the printed flights; flights of seed 1 chose what docs/results/choices.md says
 REAL = ("sensors", "actuators", "environment", "fdi")
 HEAD = (
     "case", "flights", "false alarms", "within 1 s", "later", "not found", "unanticipated", "lost named",
@@ -33,7 +33,7 @@ HEAD = (
 Document = dict[str, Any]
 
 
-def scenario(k: int, calm: bool = False, seed: int = SEED) -> Document:
+def scenario(k: int, calm: bool = False, seed: int = SEEDS[0]) -> Document:
     """The scenario of flight number k."""
     cases, rng = list(load("gtm").damage), np.random.default_rng([seed, k])
 

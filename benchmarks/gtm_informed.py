@@ -30,7 +30,7 @@ from pathlib import Path
 from statistics import NormalDist
 
 import numpy as np
-from benchmarks.gtm_damage import M_S_PER_KT, SEED, Document, rows_in, scenario
+from benchmarks.gtm_damage import M_S_PER_KT, SEEDS, Document, rows_in, scenario
 from benchmarks.unknown_instant import WITHIN_S, Whitener, fitted, largest_ratios, unexplained
 from tools.gtm.flights import CASES, NAMES
 from tools.gtm.specification import Controls, Specification, folder
@@ -59,7 +59,7 @@ def recorded(given: Document) -> Recording:
 def noise(band: int) -> Whitener:
     """The noise model of flights without damage in a band of speeds."""
     low, high = (knots * M_S_PER_KT for knots in BANDS_KT[band : band + 2])
-    flights = (scenario(k, seed=SEED + 1000) | {"faults": []} for k in range(100 * HEALTHY))
+    flights = (scenario(k, seed=SEEDS[0] + 1000) | {"faults": []} for k in range(100 * HEALTHY))
     there = [one for one in flights if low <= one["initial"]["airspeed_mps"] < high][:HEALTHY]
     return fitted([unexplained(recorded(one)) for one in there])
 

@@ -564,7 +564,10 @@ def update_block(b, dt, decay, hi_decay=0.0, mapped=False):
 
 @kernel
 def estimate_theta(kind, N, D):
-    """The most likely theta: N / D; for a loss with a prior that is uniform on its set [-1, 0]."""
+    """The most likely theta: N / D; of a loss, in [-1, 0], with the mean and variance that a uniform one has:
+
+    th = (N - LOSS_PRIOR / 2) / (D + LOSS_PRIOR)
+    """
     if kind not in (LOSS, GROWING_LOSS, LOSS_END):
         return N / D
     th = (N - 0.5 * LOSS_PRIOR) / (D + LOSS_PRIOR)

@@ -31,6 +31,7 @@ _HANDOUT = Path(__file__).with_name("handout")
 _NAME = re.compile(r"[A-Za-z0-9_-]{1,40}", re.ASCII)
 _FILE = re.compile(r"([A-Za-z0-9_-]{1,40}?)-([1-9][0-9]{0,5})\.py", re.ASCII)
 _OTHERS = 0o077
+_SEEDS = 2**40  # too many to try: the table of an aircraft's trim shows a submission what a seed has drawn
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,7 @@ def new(folder: Path, flights: int, rules: Mapping[str, float]) -> None:
             (folder / PUBLIC / name).write_text(text, encoding="utf-8")
         healthy = max(1, flights // HEALTHY_SHARE)
         for kind, runs in (("healthy", healthy), ("loss", flights - healthy)):
-            text = _flights(kind, "hidden", runs, secrets.randbits(63))
+            text = _flights(kind, "hidden", runs, secrets.randbits(62) + 2**62)
             path = os.open(folder / TEACHER / f"{kind}.yaml", os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600)
             with os.fdopen(path, "w", encoding="utf-8") as file:
                 file.write(text)
@@ -92,7 +93,9 @@ def practice() -> "Scenario":
 
 
 def hidden_flights(challenge: Path) -> list["Scenario"]:
-    """The flights of every sweep file of the teacher's part. Raises BadInput, also if others may read it."""
+    """The flights of every sweep file of the teacher's part. Raises BadInput, also if others may read it or
+    work out its seed."""
+    from beaver_ftc.scenario import load_sweep
     from beaver_ftc.studies.compare import of_sweep
 
     files = sorted((challenge / TEACHER).glob("*.yaml"))
@@ -107,6 +110,11 @@ def hidden_flights(challenge: Path) -> list["Scenario"]:
             )
         if any(path.resolve().is_relative_to(shown) for shown in readable()):
             raise BadInput(f"challenge grade: {path}: lies among Python's packages, allowed: another folder")
+    for path in files:
+        if load_sweep(path).file.seed < _SEEDS:
+            raise BadInput(
+                f"challenge grade: {path}: seed: a submission could find it, allowed: random, from {_SEEDS}"
+            )
     return [case.scenario for path in files for case in of_sweep(path)]
 
 

@@ -1,7 +1,6 @@
 """Compiled code of one size of record is that of all, on whatever copy of a record, and refuses any other."""
 
 import json
-import multiprocessing
 import os
 import subprocess
 import sys
@@ -111,23 +110,6 @@ def test_one_compiled_code_serves_all_sizes():
     assert "SizedRecords" in str(kinds[0])
     direct(everything, filled(2, 2), np.zeros(6))(filled(7, 1), np.zeros(6))
     assert len(everything.overloads) == 1
-
-
-def _in_a_worker(records):
-    found = np.zeros(6)
-    everything(records, found)
-    return records, found
-
-
-def test_a_record_sent_to_a_worker_and_back_is_as_good():
-    """The worker's process begins with nothing: it is told of the record's type by the record."""
-    records = filled(3, 2, 7)
-    expected, totals = as_plain(records)
-    with multiprocessing.get_context("spawn").Pool(1) as pool:
-        back, found = pool.apply(_in_a_worker, (records,))
-    assert np.array_equal(back, expected)
-    assert found == pytest.approx(totals)
-    check(back)
 
 
 @of_known

@@ -1,11 +1,8 @@
 """Commands of the marks: each once, in a folder of its own, within its time; tables and constants."""
 
-import io
 import json
 
-import numpy as np
-from PIL import Image
-from tools.docs import pages, pictures
+from tools.docs import pages
 from tools.docs.commands import Output, outputs
 from tools.docs.constants import constants
 from tools.docs.marks import parsed
@@ -27,26 +24,6 @@ FAULTS = {
 def test_what_cannot_be_used_says_why():
     found = outputs(FAULTS)
     assert {line: output.fault for line, output in found.items()} == FAULTS
-
-
-def picture(shade):
-    content = io.BytesIO()
-    Image.fromarray(np.full((40, 40, 3), shade, np.uint8)).save(content, "PNG")
-    return content.getvalue()
-
-
-def test_a_command_that_draws_otherwise_is_red(tmp_path, monkeypatch):
-    monkeypatch.setattr("tools.docs.refresh.ROOT", tmp_path)
-    text = "<!-- printed: draw -->\n![x](images/a.png)\n<!-- /printed -->\n"
-    output = {"draw": Output("![x](images/a.png)", pictures={"a.png": picture(100)})}
-    made = Refreshed(parsed(text, "docs/page.md"), output, Wanted())
-    assert ["docs/images/a.png" in change.words for change in made.changes] == [True]
-    pictures.write(tmp_path / "docs" / "images" / "a.png", made.drawn["a.png"])
-    assert Refreshed(parsed(text, "docs/page.md"), output, Wanted()).changes == []
-    hardly_seen = {"a.png": picture(101)}
-    for says, drawn in ((text.splitlines()[1], {}), ("![x](images/a.png) 90 %", hardly_seen)):
-        printed = {"draw": Output(says, pictures=hardly_seen)}
-        assert Refreshed(parsed(text, "docs/page.md"), printed, Wanted()).drawn == drawn
 
 
 def test_a_changed_gain_turns_the_page_that_cites_it_red(tmp_path, monkeypatch):

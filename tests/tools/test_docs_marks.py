@@ -3,8 +3,6 @@
 import json
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from tools.docs import refresh
 from tools.docs.commands import Output
 from tools.docs.marks import parsed
@@ -76,13 +74,6 @@ def test_a_broken_mark_is_a_line(text):
     found = words(parsed(text, "docs/page.md").findings)
     assert any(BROKEN[text] in line and line.startswith("docs/page.md:") for line in found), found
     assert all("\n" not in line for line in found)
-
-
-@given(st.text(st.sampled_from("<!->/ =ab:|`\nprinted from"), max_size=80))
-def test_no_text_breaks_the_reader_and_what_is_no_mark_stays(text):
-    page = parsed(text, "docs/page.md")
-    nothing = {origin.command: Output("", "no") for origin in page.origins}
-    assert Refreshed(page, nothing, Wanted()).text == text
 
 
 DEAR = "<!-- printed: fly far | dear | probe: fly near | at {} -->\n```text\n12 h\n```\n<!-- /printed -->\n"

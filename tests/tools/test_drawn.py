@@ -1,10 +1,9 @@
 """Scenarios drawn from the schema: every pair is there, new keys take part, flights keep their promises."""
 
-from itertools import combinations, islice
+from itertools import islice
 
 import numpy as np
 import pytest
-from tools.drawn.array import CoveringArray, Factor
 from tools.drawn.campaign import fly
 from tools.drawn.compose import EVERYTHING, array_of, drawn_flights
 from tools.drawn.promises import broken
@@ -14,25 +13,6 @@ from beaver_ftc.scenario.schema import json_schema
 
 AIRCRAFT = ("beaver", "jsbsim:c172p")
 SEED = 2026
-
-
-def pairs_of(rows):
-    return {frozenset(pair) for row in rows for pair in combinations(row.items(), 2)}
-
-
-def test_every_pair_of_levels_stands_together_in_some_row():
-    factors = [
-        Factor(name, tuple("abcd"[:n])) for name, n in (("one", 4), ("two", 3), ("three", 3), ("four", 2))
-    ]
-    rows = list(CoveringArray(factors, lambda *pair: False, np.random.default_rng(1)).rows())
-    wanted = {
-        frozenset([(one.name, a), (other.name, b)])
-        for one, other in combinations(factors, 2)
-        for a in one.levels
-        for b in other.levels
-    }
-    assert pairs_of(rows) == wanted
-    assert len(rows) <= 16  # 4 times 3 is the least there can be
 
 
 def rows_of(seed):

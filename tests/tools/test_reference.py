@@ -5,14 +5,12 @@ from functools import cache
 
 import pytest
 import yaml
-from tools.docs.reference import columns, commands, keys, page
+from tools.docs.reference import columns, keys, page
 from tools.docs.reference.schema import ITEM, NAME, Sections
 
 import beaver_ftc as bf
 from beaver_ftc.aircraft import load
 from beaver_ftc.aircraft.schema import AircraftFile
-from beaver_ftc.cli.main import every_command
-from beaver_ftc.commands import registered as registered_commands
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.scenario.schema import load_text
 from beaver_ftc.scenario.signals import Signal
@@ -185,15 +183,6 @@ def test_the_example_of_a_whole_file_loads(kind, tmp_path):
         load_plan(str(tmp_path / "plan.yaml"))
     else:
         LOADERS[kind](text, tmp_path)
-
-
-def test_every_command_and_option_is_there():
-    text = commands.page()
-    for name in registered_commands():
-        section = text.partition(f"\n## {name}\n")[2].partition("\n## ")[0]
-        options = [option for each in every_command()[name].params for option in each.opts if "--" in option]
-        assert [option for option in options if option not in section] == [], name
-    assert "`--flightgear HOST:PORT`" in text
 
 
 def test_every_column_of_a_log_has_a_meaning():

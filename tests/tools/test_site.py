@@ -76,16 +76,6 @@ def test_the_flight_on_the_front_page_can_be_replayed(opened):
 
 
 @needs_browser
-def test_search_works_from_disk(opened):
-    page = opened("index.html")
-    page.locator("input[name=query]").click()
-    page.keyboard.type("loss_of_effectiveness")
-    found = page.locator(".md-search-result__link", has_text="Scenario keys").first
-    found.wait_for()
-    assert "loss_of_effectiveness" in found.locator("xpath=..").inner_text()
-
-
-@needs_browser
 @pytest.mark.parametrize(
     "name",
     [

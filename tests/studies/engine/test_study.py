@@ -90,13 +90,6 @@ def test_a_case_that_kills_every_process_is_said_and_the_rest_is_kept(tmp_path):
     assert [row.delay_s for row in lost] == [*(square(i).delay_s for i in range(5)), -1.0]
 
 
-def test_a_case_that_kills_every_process_is_found_among_those_that_fly_with_it(tmp_path):
-    fly = partial(kills_itself, marks=tmp_path, always=5)
-    options = {"lost": lambda case, why: Row(case, -1.0), "part": 4}
-    rows = rows_of(tmp_path / "study", range(8), fly, workers=2, **options)
-    assert [row.delay_s for row in rows] == [-1.0 if i == 5 else square(i).delay_s for i in range(8)]
-
-
 def stopped_after(count):
     def progress(share):
         if share * 6 > count - 0.5:

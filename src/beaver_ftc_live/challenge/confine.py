@@ -43,6 +43,8 @@ clock_gettime 228 113, clock_getres 229 114, clock_nanosleep 230 115, exit_group
 set_robust_list 273 99, getrandom 318 278, membarrier 324 283, statx 332 291, rseq 334 293, faccessat2
 439 439
 """
+_OF_CLOCKS = {"clock_gettime", "clock_getres", "clock_nanosleep"}
+_CLOCKS = 16  # of the system; beyond it begin the clocks of what other processes have computed
 _MACHINES = {
     "x86_64": (0xC000003E, 1),
     "aarch64": (0xC00000B7, 2),
@@ -154,15 +156,16 @@ def _allow(system: Any, rules: int, path: str, right: int) -> bool:
 
 
 def _restrict_calls() -> bool:
-    """Seccomp: what is not in the table is answered as forbidden; another machine's calls end the process."""
+    """Seccomp: what is not in the table is answered as forbidden, and so is a clock of another process;
+    another machine's calls end the process."""
     system, (machine, column) = _linux(), _MACHINES[platform.machine()]
-    numbers = [
-        int(row.split()[column]) for row in _CALLS.split(",") if row.split()[column] != "0" or column == 1
-    ]
+    rows = [row.split() for row in _CALLS.split(",")]
+    calls = [(int(row[column]), row[0] in _OF_CLOCKS) for row in rows if row[column] != "0" or column == 1]
     code = [(_LOAD, 0, 0, 4), (_EQUAL, 1, 0, machine), (_RETURN, 0, 0, _KILL), (_LOAD, 0, 0, 0)]
-    code += [(_AT_LEAST, len(numbers), 0, _X32)]
-    code += [(_EQUAL, len(numbers) - i, 0, number) for i, number in enumerate(numbers)]
+    code += [(_AT_LEAST, len(calls), 0, _X32)]
+    code += [(_EQUAL, len(calls) - i + of_clock, 0, number) for i, (number, of_clock) in enumerate(calls)]
     code += [(_RETURN, 0, 0, _EPERM), (_RETURN, 0, 0, _ALLOW)]
+    code += [(_LOAD, 0, 0, 16), (_AT_LEAST, 1, 0, _CLOCKS), (_RETURN, 0, 0, _ALLOW), (_RETURN, 0, 0, _EPERM)]
     packed = ctypes.create_string_buffer(b"".join(struct.pack("HBBI", *line) for line in code))
     program = struct.pack("HxxxxxxP", len(code), ctypes.addressof(packed))
     system.prctl(_NO_NEW_PRIVS, 1, 0, 0, 0)

@@ -37,7 +37,7 @@ def test_all_that_it_is_told_beside_the_frames_is_where_the_package_lies(graded)
 
 
 BARE = """
-import os, resource, socket, sys
+import os, resource, socket, sys, time
 from beaver_ftc_live.challenge import confine
 
 hidden, parent = sys.argv[1], os.getppid()
@@ -50,8 +50,9 @@ tried = {
     "date": lambda: os.utime(os.__file__), "mode": lambda: os.chmod(os.__file__, 0o777),
     "remove": lambda: os.remove(os.__file__), "folder": lambda: os.mkdir("/tmp/state"),
     "priority": lambda: os.setpriority(os.PRIO_PROCESS, parent, 19), "truth": lambda: open(sys.argv[2]),
-    "limits": lambda: resource.prlimit(parent, 7),
+    "limits": lambda: resource.prlimit(parent, 7), "clock": lambda: time.clock_gettime(~parent << 3 | 2),
 }
+time.process_time(), time.clock_getres(3)
 for name, act in tried.items():
     try:
         act()
@@ -74,5 +75,5 @@ def test_the_system_itself_refuses_without_python_being_asked(tmp_path):
     if "AssertionError" in done.stderr:
         pytest.skip("this system has not all walls")
     said = dict(line.split() for line in done.stdout.splitlines())
-    assert len(said) == 15, done.stderr
+    assert len(said) == 16, done.stderr
     assert {*said.values()} <= {"PermissionError", "BlockingIOError"}, said

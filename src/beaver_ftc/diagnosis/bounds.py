@@ -1,20 +1,20 @@
 """The declared uncertainty: the worst case that it allows in xdot.
 
 The design model is a sum of products: inertia coefficient times dynamic pressure times aerodynamic
-coefficient times powers of measured signals. If every factor f is known to within e, then
+coefficient times powers of measured signals. If every factor v has an error dv of at most e, then
 
-    |prod (f + e) - prod f| <= prod (|f| + |e|) - prod |f|
+    |prod (v + dv) - prod v| <= prod (|v| + e) - prod |v|
 
-and the sum of these over the terms bounds |F(truth) - F(measured)| at this state. The sum of prod |f| is the
-design model with |f| in place of each factor, and that of prod (|f| + |e|) the same with |f| + |e|: the bound
+and the sum of these over the terms bounds |F(truth) - F(measured)| at this state. The sum of prod |v| is the
+design model with |v| in place of each factor, and that of prod (|v| + e) the same with |v| + e: the bound
 is the difference of two evaluations of one model. If all errors have one sign, each term reaches its bound.
 The same bound serves the isolation estimators: a lost share of a surface multiplies its terms by 1 + theta in
 [0, 1], and with them their error.
 
 A gyro's error appears once more, because xdot is computed from the gyro's readings. Its constant part drops
-out of the difference. Of the changing part n with |n| <= nbar the filter eps[k+1] = a eps[k] + n[k+1] - n[k]
-keeps n[k] - m[k], m[k+1] = a m[k] + (1 - a) n[k]. This is at most nbar[k] plus the filtered nbar: 2 nbar at
-any frame rate.
+out of the difference. Of the changing part c with |c| <= n the filter E[k] = a E[k-1] + c[k] - c[k-1] keeps
+c[k] - m[k], m[k] = a m[k-1] + (1 - a) c[k-1]. This is at most n[k] plus the filtered n: 2 n at any frame
+rate.
 
 The error of a derived aircraft's model: error_map.py. The same as variances: deviations.py.
 
@@ -101,53 +101,59 @@ def bound_dtype(n: int, boxes: int = MAX_BOXES) -> np.dtype:
 
 
 @kernel
-def reading_bound(err, j, y):
-    """(e0 + e1 |y|) / (1 - e1): bound on the error of reading j, in its unit."""
-    return (err.e0[j] + err.e1[j] * abs(y)) / (1.0 - err.e1[j])
+def reading_bound(err, j, v):
+    """e = (o + s |v|) / (1 - s): bound on the error of reading j, whose value is v, in its unit.
+
+    o, s: the errors `e0`, of the offset, and `e1`, of the slope.
+    """
+    return (err.e0[j] + err.e1[j] * abs(v)) / (1.0 - err.e1[j])
 
 
 @kernel
 def n_gyro(err, i, x):
-    """e0 - steady + e1 (|x| + e): bound on the changing error of gyro i, rad/s: noise, resolution, slope."""
-    n0 = err.e0[i] - err.steady[i]
-    return n0 + err.e1[i] * (abs(x) + reading_bound(err, i, x))
+    """n_i = o - |bias| + s (|x_i| + e): bound on the changing error of gyro i, rad/s.
+
+    o, s, e: as of `reading_bound`; |bias|: `steady`, what does not change of o; x rad/s: the reading.
+    """
+    return err.e0[i] - err.steady[i] + err.e1[i] * (abs(x) + reading_bound(err, i, x))
 
 
 @kernel
 def slipstream_bound(err, y):
-    """Bound the error of dpt = a + b P / (qdyn V) [FDC], computed from the engine's instruments and the air
-    data.
+    """Bound the error of dpt = DPT_0 + KW_TO_DPT P / (qdyn V) [FDC], computed from the engine's instruments
+    and the air data.
 
-        grown b kW / (q V) + (grown - 1) |dpt - a|,   grown = 1 / ((1 - eq) (1 - eV)),   kW = kw0 + kw1 rho d
-        rho = (1 + eq) / (1 - eV)^2 - 1
+        s KW_TO_DPT e_P / (qdyn V) + (s - 1) |dpt - DPT_0|,      s = 1 / ((1 - e_q) (1 - e_V))
+        e_P = kw0 + kw1 e_rho d,      1 + e_rho = (1 + e_q) / (1 - e_V)^2
 
-    eq, eV, rho: relative errors of dynamic pressure, airspeed and density; where they are subtracted, eq and
-    eV count as MAX_ERROR_SHARE at most, so that the bound stays finite. kw0: error of the power by the
-    instruments, kW; kw1: by the density, for all of it; d: density over that at sea level. a: DPT_0; b:
-    KW_TO_DPT.
+    e_q, e_V, e_rho: relative errors of dynamic pressure, airspeed and density; where they are subtracted, e_q
+    and e_V count as MAX_ERROR_SHARE at most, so that the bound stays finite. e_P kW: error of the power P;
+    kw0: by the instruments; kw1: by the density, for all of it; d: density over that at sea level.
     """
-    eq = reading_bound(err, Y0 + QDYN, y[QDYN]) / y[QDYN]
-    eV = reading_bound(err, Y0 + AIRSPEED, y[AIRSPEED]) / y[AIRSPEED]
-    least_V = 1.0 - min(eV, MAX_ERROR_SHARE)
-    grown = 1.0 / ((1.0 - min(eq, MAX_ERROR_SHARE)) * least_V)
-    rho = (1.0 + eq) / least_V**2 - 1.0
-    kw = err.kw0 + err.kw1 * rho * density_ratio(y)
-    return grown * KW_TO_DPT * kw / (y[QDYN] * y[AIRSPEED]) + (grown - 1.0) * abs(y[DPT] - DPT_0)
+    e_q = reading_bound(err, Y0 + QDYN, y[QDYN]) / y[QDYN]
+    e_V = reading_bound(err, Y0 + AIRSPEED, y[AIRSPEED]) / y[AIRSPEED]
+    least_V = 1.0 - min(e_V, MAX_ERROR_SHARE)
+    s = 1.0 / ((1.0 - min(e_q, MAX_ERROR_SHARE)) * least_V)
+    e_rho = (1.0 + e_q) / least_V**2 - 1.0
+    e_P = err.kw0 + err.kw1 * e_rho * density_ratio(y)
+    return s * KW_TO_DPT * e_P / (y[QDYN] * y[AIRSPEED]) + (s - 1.0) * abs(y[DPT] - DPT_0)
 
 
 @kernel
 def fill_magnitudes(err, x, y, u):
-    """Fill x, y, u with |signal| as measured, and with the largest |signal| that the errors allow; for
-    airspeed, the smallest. x_air: these rates with the air's rotation.
+    """Fill x, y, u with the magnitudes |v| as measured, and with the largest that the errors allow, |v| + e;
+    for airspeed, which divides, with the smallest, V - e. x_air: these rates with the air's rotation.
+
+    n: how many times the errors count, 0 in the row MEASURED, 1 in the row WORST.
     """
-    for v in range(2):
+    for n in (MEASURED, WORST):
         for i in range(3):
-            err.x[v, i] = abs(x[i]) + v * reading_bound(err, i, x[i])
-            err.x_air[v, i] = err.x[v, i] + v * err.wg[i]
+            err.x[n, i] = abs(x[i]) + n * reading_bound(err, i, x[i])
+            err.x_air[n, i] = err.x[n, i] + n * err.wg[i]
         for i in range(y.size):
-            err.y[v, i] = abs(y[i]) + (v * reading_bound(err, Y0 + i, y[i]) if i < DPT else 0.0)
+            err.y[n, i] = abs(y[i]) + (n * reading_bound(err, Y0 + i, y[i]) if i < DPT else 0.0)
         for s in range(u.size):
-            err.u[v, s] = abs(u[s]) + v * err.du[s]
+            err.u[n, s] = abs(u[s]) + n * err.du[s]
     if err.engine:
         err.y[WORST, DPT] += slipstream_bound(err, y)
     V = y[AIRSPEED]
@@ -156,12 +162,14 @@ def fill_magnitudes(err, x, y, u):
 
 @kernel
 def add_declared_bound(err, x, y, u, eta):
-    """Add to eta the bound by the declared errors, and fill eG, that on the effect of each surface, per rad.
+    """Add to eta the bound eta_e by the declared errors, and fill eG, that on the effect of each surface, per
+    rad.
 
-        eta <- eta + F_worst - F_measured      eG = G_worst - G_measured      F = f + G u
+        eta_e = sum over the terms of prod (|v| + e) - prod |v| = F_worst - F_measured      F = f + G u
+        eG = G_worst - G_measured
 
-    F_measured, F_worst (3,) rad/s2: the design model of magnitudes, at the magnitudes as measured and at the
-    worst ones.
+    F_measured, F_worst (3,) rad/s2: the design model of magnitudes, at the magnitudes |v| as measured and at
+    the worst ones, |v| + e.
     """
     fill_magnitudes(err, x, y, u)
     for v in range(2):
@@ -175,27 +183,30 @@ def add_declared_bound(err, x, y, u, eta):
 
 
 @kernel
-def add_published_bound(x, model, share, const, earth, eta):
+def add_published_bound(x, model, c, b, w_E, eta):
     """Add to eta the published bound, and what the Earth's rotation adds.
 
-        eta_i <- eta_i + share_i |cross_i| + const_i + earth ((1 + k) (|p| + |q| + |r|) + k earth) + rounding
+        eta_i <- eta_i + c_i |C_i x_j x_l| + b_i + w_E ((1 + kappa_i) (|p| + |q| + |r|) + kappa_i w_E) + rho
 
     [Zhang2005, sec. VII] for the first two. JSBSim integrates rates against inertial space and reports them
-    against the Earth: the difference turns with the body, at no more than earth |x| on any axis. k >= 1: the
-    largest sum, over an axis, of the factors by which the inertia coupling multiplies products of rates.
-    cross: (Pqr q r, Qpr p r, Rpq p q), the published part of the inertia coupling, rad/s2.
+    against the Earth: the difference turns with the body, at no more than w_E |x| on any axis.
+
+    x (3,) rad/s: rates p, q, r; c (3,): error share of the inertia coupling; C_i x_j x_l rad/s2: its main
+    product, Pqr q r, Qpr p r or Rpq p q; b (3,) rad/s2: constant; w_E rad/s: rate of the Earth; kappa_i: sum
+    of the factors of all products of rates on axis i, at least 1; rho: ROUNDING_RAD_S2.
     """
     p, q, r = x[0], x[1], x[2]
-    w = abs(p) + abs(q) + abs(r)
-    cross = model.Pqr * q * r, model.Qpr * p * r, model.Rpq * p * q
+    total = abs(p) + abs(q) + abs(r)
+    coupling = model.Pqr * q * r, model.Qpr * p * r, model.Rpq * p * q
     factor = (
         abs(model.Ppq) + abs(model.Pqr),
         abs(model.Qpr) + 2.0 * max(abs(model.Qpp), abs(model.Qrr)),
         abs(model.Rpq) + abs(model.Rqr),
     )
     for i in range(3):
-        k = max(factor[i], 1.0)
-        eta[i] += share[i] * abs(cross[i]) + const[i] + earth * ((1.0 + k) * w + k * earth) + ROUNDING_RAD_S2
+        kappa = max(factor[i], 1.0)
+        by_earth = w_E * ((1.0 + kappa) * total + kappa * w_E)
+        eta[i] += c[i] * abs(coupling[i]) + b[i] + by_earth + ROUNDING_RAD_S2
 
 
 @kernel
@@ -216,7 +227,14 @@ def set_air_rotation(err, h):
 
 @kernel
 def fill_bound(bound, model, meas, u):
-    """Fill eta_now, the bound on the uncertainty at this instant."""
+    """Fill eta_now (3,) rad/s2, the bound on the uncertainty at this instant (detection.md, Table 1):
+
+        eta_i = c_i |C_i x_j x_l| + b_i + w_E ((1 + kappa_i) (|p| + |q| + |r|) + kappa_i w_E) + rho
+                + eta_e,i + mu_i
+
+    eta_e: of `add_declared_bound`; mu: of the map of the model's error, `e_now`; the others: of
+    `add_published_bound`, at the worst rates. model: the design model; u (n,) rad: deflections.
+    """
     x, y, err, emap, eta = meas.x, meas.y, bound.declared_errors, bound.error_map, bound.eta_now
     eta[:] = 0.0
     if err.given:
@@ -228,8 +246,8 @@ def fill_bound(bound, model, meas, u):
         look_up_map(emap, x, y, u, err.du)
         for i in range(3):
             eta[i] += emap.e_now[i]
-    share, const, earth = bound.inertia_coupling_error_share, bound.const, bound.earth_rate_rad_s
-    add_published_bound(err.x[WORST], model, share, const, earth, eta)
+    c, b, w_E = bound.inertia_coupling_error_share, bound.const, bound.earth_rate_rad_s
+    add_published_bound(err.x[WORST], model, c, b, w_E, eta)
 
 
 GUST_LIMIT_SIGMA = 6.0  # exceeded once in 5e8 independent samples

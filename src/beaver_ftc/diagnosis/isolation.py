@@ -169,7 +169,12 @@ def consistent_on_axes(nu, nu_max, fie, phi, axis):
 
 @kernel
 def theta_explains(fie, nu, nu_max):
-    """True if one theta, or no fault at all, is consistent with the elapsed frame on every axis."""
+    """True if one theta of the known set, or no fault at all, is consistent with the elapsed frame:
+
+        |nu_i - h_i - theta Z_i| <= eta_bar_i + r_i + (n_i[k] + n_i[k-1]) / dt      on every axis i
+
+    eta_bar + (n[k] + n[k-1]) / dt is nu_max (`filters.update_bank`).
+    """
     lo, hi = consistent_on_axes(nu, nu_max, fie, fie.effect, -1)
     return lo <= hi or eta_explains(nu, nu_max)
 
@@ -179,7 +184,10 @@ def narrow_sets(fie, nu, nu_max, shared):
     """Intersect the sets of a constant theta with what the frame and the filtered residual allow; false if
     one of them is empty. Each axis narrows its own set, or, if `shared`, every axis narrows all three.
 
-    |eps + Omega thetahat - Omega theta| <= B       for any course of the estimate
+        |eps + Om th - Om theta| <= B      |nu - h - theta Z| <= nu_max + r
+
+    The first holds for any course of the estimate th. Its theta are those from (eps + Om th - B) / Om to (eps
+    + Om th + B) / Om.
     """
     for i in range(3):
         eps = fie.residual[i] + fie.Om[i] * fie.theta[i]
@@ -306,10 +314,10 @@ def configure_isolation(
 
 @kernel
 def update_effects(iso, bank, bound, config, detected, G, Gu, e_Gu):
-    """Fill the effect of each estimator's fault in the elapsed frame, and update its reach in the bank, if a
-    later stage reads them.
+    """Fill the effect phi = h + theta Z, within +- r, of each estimator's fault in the elapsed frame, and
+    update its reach in the bank, if a later stage reads them.
 
-    loss  h = 0, Z = Gu_s        position  h = -Gu_s, Z = G_s        r = e_Gu_s
+        loss of surface s   h = 0, Z = Gu_s        position   h = -Gu_s, Z = G_s        r = e_Gu_s
     """
     if not (iso.config.reach or config.diagnoses_all_types or detected):
         return
@@ -340,7 +348,9 @@ def start_estimators(iso, n, x):
 
 @kernel
 def update_residual(fie, kind, x):
-    """eps = x - xhat and its thresholds mu; true if it is within them on every axis that is not skipped."""
+    """Fill eps = x - xhat, rad/s, and its thresholds (mu_lo, mu_hi) by `kind`: of `residual_interval`, of
+    `published_interval`, or +- B; true if eps is within them on every axis that is not skipped.
+    """
     within = True
     for i in range(3):
         fie.residual[i] = x[i] - fie.xhat[i]
@@ -404,17 +414,18 @@ def decide_isolation(iso, t):
 def least_squares_step(fie, i, eps, forget):
     """One least-squares step of theta_i on a residual eps, rad/s, projected onto its set; returns the step.
 
-        K = P Om / S,  S = R + Om P Om,  R = B^2      th <- th + K eps      P <- min(P R / S / forget, prior)
+        S = B^2 + Om^2 P      th <- th + P Om / S eps      P <- min(P B^2 / S / forget, prior)
 
-    R is the square of the bound on the filtered uncertainty, so the estimate changes no faster than its
-    information allows.
+    forget = exp(-dt / tau), tau s: forgetting_time_s. prior: the variance (theta_max - theta_min)^2 / 12 of a
+    uniform theta. B bounds the filtered uncertainty, so the estimate changes no faster than its information
+    allows.
     """
-    th, R, POm = fie.theta[i], fie.B[i] ** 2, fie.P[i] * fie.Om[i]
-    S = R + fie.Om[i] * POm
+    th, B2, P_Om = fie.theta[i], fie.B[i] ** 2, fie.P[i] * fie.Om[i]
+    S = B2 + fie.Om[i] * P_Om
     if S <= 0.0:
         return 0.0
-    fie.theta[i] = min(max(th + POm / S * eps, fie.set_lo[i]), fie.set_hi[i])
-    fie.P[i] = min(fie.P[i] * R / S / forget, (fie.theta_max - fie.theta_min) ** 2 / 12.0)
+    fie.theta[i] = min(max(th + P_Om / S * eps, fie.set_lo[i]), fie.set_hi[i])
+    fie.P[i] = min(fie.P[i] * B2 / S / forget, (fie.theta_max - fie.theta_min) ** 2 / 12.0)
     return fie.theta[i] - th
 
 
@@ -437,11 +448,13 @@ def joint_least_squares(fie, forget):
 def advance_estimator(iso, fie, bound, x, F, dt):
     """Advance one estimator by a frame: estimate, predicted rates, and filtered Z and bounds.
 
-        xhat <- x + dt (F + h + Z th) + a (xhat - x) + Om[k+1] (step of th)
-        Om <- a Om + dt Z      R_pos <- a R_pos + dt max(Z, 0)
+        Om <- a Om + dt Z      R_pos <- a R_pos + dt max(Z, 0)      R_neg = Om - R_pos
+        xhat <- x + dt (F + h + Z th) + a (xhat - x) + Om step
+        B_lag <- a B_lag + dt (eta_bar + r) + (1 - a) n_old         B = B_lag + n
         th <- P{th + dt gain Om eps} by gradient [Zhang2005, sec. IV], or by least squares
 
-    x: at the start of the frame, as the residual eps; fie.effect must be that of this frame.
+    B_lag = B_eta + T_n; step: of th, Delta in isolation.md. x: at the start of the frame, as the residual
+    eps; fie.effect must be that of this frame.
     """
     cfg, phi, th = iso.config, fie.effect, fie.theta
     for i in range(3):

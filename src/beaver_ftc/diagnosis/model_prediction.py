@@ -136,7 +136,8 @@ def fill_old_effects(means):
 
 @kernel
 def fill_change_tolerance(pred):
-    """e_Gu = w |z0 - z|, (3, n) rad/s2: the error of the mean effect if a fault changes within the frame.
+    """e_Gu = w |z0 - z|, (3, n) rad/s2: the error of the mean effect if a fault changes within the frame; it
+    is r_s in isolation.md.
 
     A fault changes between frames, that is between the first JSBSim step of a frame and the others. z0 and z
     are the effects of a healthy surface in the first and in the other n - 1 steps, w = 1 / n. The mean effect

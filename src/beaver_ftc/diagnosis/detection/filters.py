@@ -1,13 +1,13 @@
 """The worst-case detector: a bank of filters of the innovation with adaptive thresholds.
 
     nu[k] = (x[k] - x[k-1]) / dt - F[k] = eta[k] + phi[k]
-    eps_m[k] = a_m eps_m[k-1] + dt nu[k],   a_m = exp(-lam_m dt)
+    E_m[k] = a_m E_m[k-1] + dt nu[k],   a_m = exp(-lam_m dt)        alarm: |E_m| > T_m on some axis
 
 Frame k lasts from sample k-1 to sample k, as in detection.md; F[k], eta[k] and phi[k] are means over it.
 lam_m, 1/s, is the pole of filter m, and a_m its decay per frame.
 
 All filters are exact for the discrete truth x[k] = x[k-1] + dt (F[k] + phi[k] + eta[k]): without a fault
-phi, a residual obeys eps[k] = a eps[k-1] + dt eta[k], and its bound the same with eta_bar in place of eta.
+phi, a residual obeys E[k] = a E[k-1] + dt eta[k], and its bound the same with eta_bar in place of eta.
 The guarantees of the theory therefore hold at any frame rate, without an allowance for discretisation.
 
 Every filter has the exact bound of its own pole, so the alarm is the first of theirs without further false
@@ -23,8 +23,9 @@ Symbols of the kernels:
     nu (3,) rad/s2            innovation of the elapsed frame
     F (3,) rad/s2             f + G u of the healthy aircraft, mean over the frame
     x, x_old (3,) rad/s       measured now and a frame ago
-    eps, mu rad/s             residual of a filter and its threshold
-    n rad/s                   nbar of bounds.py: bound on the changing part of a gyro's error
+    E, T rad/s                residual of a filter and its threshold
+    e rad/s                   the part of T that has a memory, T_eta + T_n
+    n rad/s                   bound on the changing part of a gyro's error (`bounds.n_gyro`)
     a, m, i                   decay per frame, filter, axis
     fie; h, Z, r rad/s2       isolation estimator; its fault h + theta Z +- r (EFFECT_RECORD of isolation.py)
     lo, hi                    ends of an interval: of theta, of a residual, of the acceleration by a fault
@@ -88,29 +89,33 @@ def published_interval(lo, hi, Om, th, B):
 
 
 # The bank of detection filters; filter 0 is the published one. a: decays per frame; e rad/s: the part of the
-# threshold mu that has a memory; innovation nu rad/s2; residual eps, threshold mu rad/s.
+# threshold T that has a memory; innovation nu rad/s2; residual E, threshold T rad/s.
 BANK_RECORD = record(
     config=record(n_filters=int, a=MAX_POLES), memory=record(e=(MAX_POLES, 3)),
     output=record(innovation=3, residual=(MAX_POLES, 3), threshold=(MAX_POLES, 3)),
 )  # fmt: skip
 
 
-def poles_for_delays(errors: SensorErrors, eta: float) -> tuple[float, ...]:
-    """Poles (1/s) that find the smallest constant fault phi within each of POLE_DELAYS_S, despite gyro noise.
+def poles_for_delays(errors: SensorErrors, b: float) -> tuple[float, ...]:
+    """Poles, 1/s, that find the smallest constant fault within each of POLE_DELAYS_S, despite gyro noise;
+    none without noise. b rad/s2: largest constant bound on the error of the model."""
+    n_bar = 2 * NOISE_LIMIT_SIGMA * float(errors.each("noise", AXES).max())
+    return tuple(_pole_for_delay(tau, n_bar, b) for tau in POLE_DELAYS_S) if n_bar > 0 else ()
 
-    After T the residual is phi (1 - exp(-lam T)) / lam, its bound at most eta / lam + 2 nbar. lam times the
-    excess of one over the other is greatest at lam = ln(phi T / (2 nbar)) / T, which is at least 0.1 / T
-    here; the smallest phi with any follows, by iteration. detection.md calls 2 nbar nbar.
+
+def _pole_for_delay(tau: float, n_bar: float, b: float) -> float:
+    """The pole lam, 1/s, with which the smallest constant fault phi reaches its threshold within tau s:
+
+        lam = max(ln(phi tau / n_bar), 0.1) / tau      phi = (n_bar lam + b) / (1 - exp(-lam tau))
+
+    by iteration from phi = b + 8 n_bar / tau. After tau the residual is phi (1 - exp(-lam tau)) / lam, its
+    bound at most b / lam + n_bar. lam times the excess of one over the other is greatest at that lam; both
+    are equal at that phi. n_bar rad/s: twice the limit of a gyro's noise; b, phi rad/s2.
     """
-    n2 = 2 * NOISE_LIMIT_SIGMA * float(errors.each("noise", AXES).max())
-    return tuple(_pole_for_delay(T, n2, eta) for T in POLE_DELAYS_S) if n2 > 0 else ()
-
-
-def _pole_for_delay(T: float, n2: float, eta: float) -> float:
-    phi = eta + 8.0 * n2 / T
+    phi = b + 8.0 * n_bar / tau
     for _ in range(50):
-        lam = max(log(phi * T / n2) / T, 0.1 / T)
-        phi = (n2 * lam + eta) / (1.0 - exp(-lam * T))
+        lam = max(log(phi * tau / n_bar) / tau, 0.1 / tau)
+        phi = (n_bar * lam + b) / (1.0 - exp(-lam * tau))
     return lam
 
 
@@ -130,24 +135,26 @@ def configure_bank(bank: np.void, config: FdiConfig, declared: Declared, dt: flo
 
 @kernel
 def update_bank(bank, bound, x, x_old, F, dt):
-    """Form the innovation of the elapsed frame and pass it through the bank.
+    """Form the innovation of the elapsed frame, and advance residual and threshold of each filter:
 
-    nu = (x - x_old) / dt - F     nu_max = eta_bar + (n + n_old) / dt
-    eps <- a eps + dt nu          e <- a e + dt eta_bar + (1 - a) n_old      mu = e + n
+        nu = (x - x_old) / dt - F      nu_max = eta_bar + (n + n_old) / dt
+        E <- a E + dt nu               e <- a e + dt eta_bar + (1 - a) n_old      T = e + n
+
+    e = T_eta + T_n; nu_max rad/s2: bound on nu without a fault.
     """
-    nu, eps, mu, e = bank.output.innovation, bank.output.residual, bank.output.threshold, bank.memory.e
+    nu, E, T, e = bank.output.innovation, bank.output.residual, bank.output.threshold, bank.memory.e
     for i in range(3):
         nu[i] = (x[i] - x_old[i]) / dt - F[i]
         bound.nu_max[i] = bound.eta_bar[i] + (bound.n_gyro[i] + bound.n_old[i]) / dt
         for m, a in enumerate(bank.config.a[: bank.config.n_filters]):
-            eps[m, i] = a * eps[m, i] + dt * nu[i]
+            E[m, i] = a * E[m, i] + dt * nu[i]
             e[m, i] = advance_bound(e[m, i], bound.eta_bar[i], a, dt, bound.n_old[i])
-            mu[m, i] = e[m, i] + bound.n_gyro[i]
+            T[m, i] = e[m, i] + bound.n_gyro[i]
 
 
 @kernel
 def leaves_bound(bank, i):
-    """Whether a filter of the bank leaves its bound on axis i: |eps| > mu."""
+    """Whether a filter of the bank leaves its bound on axis i: |E| > T."""
     for m in range(bank.config.n_filters):
         if abs(bank.output.residual[m, i]) > bank.output.threshold[m, i]:
             return True
@@ -174,9 +181,9 @@ def alarm_axis(bank, authority, alarm):
 
 @kernel
 def filter_share(bank, m, i):
-    """|eps| / mu of filter m on axis i."""
-    mu = bank.output.threshold[m, i]
-    return abs(bank.output.residual[m, i]) / mu if mu > 0.0 else 0.0
+    """|E| / T of filter m on axis i; 0 while T is 0, before the first frame."""
+    T = bank.output.threshold[m, i]
+    return abs(bank.output.residual[m, i]) / T if T > 0.0 else 0.0
 
 
 @kernel
@@ -192,7 +199,7 @@ def nearest_filter(bank, i):
 
 @kernel
 def bank_share(bank):
-    """The largest |eps| / mu in the bank."""
+    """The largest |E| / T in the bank."""
     best = 0.0
     for i in range(3):
         best = max(best, filter_share(bank, nearest_filter(bank, i), i))
@@ -201,9 +208,10 @@ def bank_share(bank):
 
 @kernel
 def fault_range(fie, i):
-    """Least and greatest acceleration by the fault on axis i, or along its parity direction if i = 3, rad/s2:
+    """(lo, hi), the least and greatest acceleration by the fault on axis i, or along its parity direction if
+    i = 3, rad/s2; 0 covers the frames before the fault:
 
-    h + theta Z +- r,  theta in its set, or no fault at all
+        lo = min(0, h + theta_min Z, h + theta_max Z) - r      hi = max(0, ...) + r
     """
     phi, m = fie.effect, fie.parity_direction
     h, Z = along(phi.h, m, i, False), along(phi.Z, m, i, False)
@@ -214,9 +222,12 @@ def fault_range(fie, i):
 
 @kernel
 def advance_reach(bank, fie, dt):
-    """Advance the reach of the fault in each filter since the flight began; 3: along its parity direction.
+    """Advance the reach (L, U) of the fault in each filter since the flight began; axis 3: along its parity
+    direction.
 
-    reach_lo <- a reach_lo + dt lo      reach_hi <- a reach_hi + dt hi
+        L <- a L + dt lo      U <- a U + dt hi      lo, hi: of `fault_range`
+
+    L, U rad/s: reach_lo and reach_hi of the estimator, (MAX_POLES, 4).
     """
     for i in range(4):
         lo, hi = fault_range(fie, i)
@@ -227,15 +238,16 @@ def advance_reach(bank, fie, dt):
 
 @kernel
 def is_reachable(bank, fie, shared):
-    """True if reach_lo - mu <= eps <= reach_hi + mu for each filter and axis that is not skipped.
+    """True if L - T <= E <= U + T for each filter and axis that is not skipped.
 
-    shared: the axes share one parameter; the residual along the parity direction is then tested as well.
+    shared: the axes share one parameter; the residual along the parity direction m is then tested as well,
+    m' E with the threshold |m|' T.
     """
     for m in range(bank.config.n_filters):
         for i in range(4):
-            eps = along(row_of(bank.output.residual, m), fie.parity_direction, i, False)
-            mu = along(row_of(bank.output.threshold, m), fie.parity_direction, i, True)
+            E = along(row_of(bank.output.residual, m), fie.parity_direction, i, False)
+            T = along(row_of(bank.output.threshold, m), fie.parity_direction, i, True)
             counts = not fie.skip[i] if i < 3 else shared
-            if counts and not fie.reach_lo[m, i] - mu <= eps <= fie.reach_hi[m, i] + mu:
+            if counts and not fie.reach_lo[m, i] - T <= E <= fie.reach_hi[m, i] + T:
                 return False
     return True

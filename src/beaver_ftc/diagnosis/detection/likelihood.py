@@ -279,7 +279,8 @@ def whiten_step(b, x, v, dt, g):
 
         g = e + dt (v - d)      e <- g - K_x g      d <- a d + K_d g
 
-    x (4,): e, d; advanced in place. g (2,) rad/s, filled: of the innovation it has the covariance S.
+    x (4,): e, rad/s, and d, rad/s2; advanced in place. g (2,) rad/s, filled: with v = nu it has the
+    covariance S and is nu~ in statistical.md; e is x~ there, and a alpha_d.
     """
     for i in range(b.n):
         g[i] = x[i] + dt * (v[i] - x[D0 + i])
@@ -432,8 +433,9 @@ def accumulate_tests(b, t, n, dt, decay):
 def accumulate_regressors(b, t, R, n, decay):
     """Add the frame to R (regressors, tests) of the first n tests of a group t, and fill their e_R:
 
-    R_j <- decay R_j + w' g_Zj      e_R = sum_j tol_j |R_j|
+        R_j <- decay R_j + w' g_Zj      e_R = sum_j tol_j |R_j|
 
+    R_j is N_j in statistical.md.
     """
     w, e_R, g = t.w, t.e_R, b.g_Z
     e_R[:n] = 0.0
@@ -458,9 +460,12 @@ def accumulate_evidence(b, dt, decay):
 
 @kernel
 def uncertain_share(t, k, r0, r1):
-    """The share of |N| in test k that a bounded uncertainty explains: e_0 + min(e_tv + eta_r' |w|, e_w).
+    """The share of |N| in test k that a bounded uncertainty explains, the room of statistical.md:
 
-    r0, r1: eta_r. eta_r' |w| is the variation when the weight drops to zero at the end.
+        room = eta_bar (|g_0| sum |w| + 1.2 / K_d sum |dw|) = e_0 + min(e_tv + eta_r' |w|, e_w)
+
+    dw: change of w from frame to frame; r0, r1: eta_r. eta_r' |w| is the change when the weight drops to zero
+    at the end; e_w takes the place of the changes if the uncertainty is slow.
     """
     drop = r0 * abs(t.w[0, k]) + r1 * abs(t.w[1, k])
     return t.e_0[k] + min(t.e_tv[k] + drop, t.e_w[k])
@@ -468,9 +473,11 @@ def uncertain_share(t, k, r0, r1):
 
 @kernel
 def max_llr(signed, N, D):
-    """Largest log-likelihood ratio of a fault against none: N^2 / 2 D.
+    """Largest log-likelihood ratio of a fault against none, over all sizes theta:
 
-    If signed, |theta| is at most 1, as that of a loss: N - D / 2 where N > D.
+        max_theta theta N - theta^2 D / 2 = N^2 / 2 D
+
+    If signed, |theta| is at most 1, as that of a loss: N - D / 2 where N > D. 0 for an N of the other sign.
     """
     llr = 0.5 * N * N / D
     if signed and N > D:
@@ -480,37 +487,40 @@ def max_llr(signed, N, D):
 
 
 @kernel
-def evidence_ratio(level, share, N, eta, D):
-    """Evidence over what noise, and uncertainty with noise, allow.
+def evidence_ratio(z, share, N, room, D):
+    """The score of a test: evidence over what noise, and uncertainty with noise, allow.
 
-        N / max(sqrt(D), eta / level + share sqrt(D))
+        N / max(sqrt(D), room / z + share sqrt(D))
 
-    eta: share of N that a bounded uncertainty explains. level: that of the alarm, with which the result is
-    compared; share: share of it that is reserved for noise in addition.
+    N: evidence after the allowances; D: its variance; room: what a bounded uncertainty explains of it. z:
+    alarm level, with which the score is compared; share: share of z that is reserved for noise in addition to
+    room.
     """
     std = sqrt(D)
-    return N / (std if eta <= 0.0 else max(std, eta / level + share * std))
+    return N / (std if room <= 0.0 else max(std, room / z + share * std))
 
 
 @kernel
 def evaluate_tests(b, t, n, without_eta, mapped):
     """Fill the score and the log-likelihood ratios of the first n tests of a group t; 0 without information.
 
-        score = (N_s - e) over noise and eta      llr(N_s)      llr_lo, llr_hi: llr(N_s -+ (e + eta))
+        score = (N_s - e) / max(sqrt(D), room / z + share sqrt(D))
+        llr = max_llr(N_s)      llr_lo, llr_hi = max_llr(N_s -+ (e + room))
 
-    N_s: sign N, or |N| without a sign; e = e_R + max(sign N_p, 0) + max(sign N_c, 0); eta: `uncertain_share`.
-    without_eta: the bounds on the ratios leave out eta. mapped: the bounds on hypotheses other than a loss
+    N_s: sign N, or |N| without a sign; e = e_R + max(sign N_p, 0) + max(sign N_c, 0); room: of
+    `uncertain_share`; z: the alarm level.
+    without_eta: the bounds on the ratios leave out room. mapped: the bounds on hypotheses other than a loss
     always include it, because the model's error is mapped: it is then large and lasting.
     """
-    level, share, r0, r1 = b.alarm_level, b.noise_share, b.eta_r[0], b.eta_r[1]
+    z, share, r0, r1 = b.alarm_level, b.noise_share, b.eta_r[0], b.eta_r[1]
     for k in range(n):
         N, D, sign = t.correlation[k], t.information[k], t.supporting_correlation_sign[k]
         signed, known = sign != 0.0, D > 0.0
         N_s = sign * N if signed else abs(N)
         e = t.e_R[k] + max(sign * t.N_p[k], 0.0) + max(sign * t.correlation_from_coarse_gust[k], 0.0)
-        eta = uncertain_share(t, k, r0, r1)
-        score = evidence_ratio(level, share, N_s - e, eta, D)
-        e += 0.0 if without_eta and (signed or not mapped) else eta
+        room = uncertain_share(t, k, r0, r1)
+        score = evidence_ratio(z, share, N_s - e, room, D)
+        e += 0.0 if without_eta and (signed or not mapped) else room
         llr, lo, hi = max_llr(signed, N_s, D), max_llr(signed, N_s - e, D), max_llr(signed, N_s + e, D)
         t.score[k] = score if known else 0.0
         t.llr_lo[k] = lo if known else 0.0

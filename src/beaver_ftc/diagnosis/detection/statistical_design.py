@@ -104,7 +104,9 @@ def _quantile(p: float) -> float:
 
 
 def derive_alarm_level(false_alarms_per_h: float, rate_hz: float, n_tests: int) -> float:
-    """The alarm level, standard deviations, for a rate of false alarms per hour with so many tests a frame.
+    """The alarm level, standard deviations, for a rate of false alarms per hour with so many tests a frame:
+
+        z = -probit(false_alarms_per_h / (3600 rate_hz n_tests))
 
     By the union bound the rate is at most `false_alarms_per_h`.
     """
@@ -293,12 +295,15 @@ def derive_intensity(b: float, omega: float, sigma: float, z: float, dt_s: float
 
 
 def derive_length(stat: np.void, V: float, rate_hz: float, gust_m: float) -> float:
-    """Return length V tau, m, of the drift in the second block of roll and yaw, or of pitch without gust
-    estimate.
+    """Return the length, m, of the drift in the second block of roll and yaw, or of pitch without gust
+    estimate:
 
-    gust_m: correlation length of the gust, m; 0 in still air. The drift returns as soon as a bounded
-    uncertainty permits: over the longest window T an uncertainty that oscillates with the fault moves a test,
-    for a drift of intensity i and lag tau, by eta sqrt(T / 2 i) / tau; half the alarm level is left for this.
+        min(V tau, gust_m),      tau = sqrt(2 T / q) / z
+
+    V m/s: airspeed in trim; gust_m m: correlation length of the gust, 0 in still air; z: alarm level; q 1/s:
+    intensity of the drift over the bound eta squared (NOISE_RECORD). The drift returns as soon as a bounded
+    uncertainty permits: over the longest window, of T s, an uncertainty that oscillates with the fault moves
+    a test, for a drift of lag tau s, by sqrt(T / 2 q) / tau; half the alarm level is left for this.
     The drift returns no later than the gust. A gust with a longer correlation length is represented by a
     stronger one, of equal power at low frequency and more power at high frequency.
     """
@@ -306,6 +311,6 @@ def derive_length(stat: np.void, V: float, rate_hz: float, gust_m: float) -> flo
         # 0 in still air: nothing is declared that drifts, and the two blocks are one
         return gust_m
     T = 2 ** (N_SLOTS - 1) / rate_hz
-    level = float(stat["test"]["alarm_level"])
-    tau = sqrt(2.0 * T / stat["noise"]["q"]) / level
+    z = float(stat["test"]["alarm_level"])
+    tau = sqrt(2.0 * T / stat["noise"]["q"]) / z
     return min(V * tau, gust_m or np.inf)

@@ -83,8 +83,11 @@ def within_limits(c, y):
 def update_tones(t, b, c, level, inside, dt):
     """Update the tests of a view with one frame, which its block b has whitened; dt s.
 
-    level: alarm level of the detector, standard deviations. Unless `inside`, the frame counts as zero, so the
-    sums decay.
+        N <- exp((i w - 1 / T) dt_u) N + g / sqrt(S)      R_j: the same of g_Zj
+
+    Once per update, of dt_u = stride dt s, with the sums over its frames; their ages differ by less than
+    dt_u. level: alarm level of the detector, standard deviations. Unless `inside`, the frame counts as zero,
+    so the sums decay.
     """
     weight = np.sqrt(b.S_inv[0, 0]) if inside else 0.0
     t.sum_g += weight * b.g[0]

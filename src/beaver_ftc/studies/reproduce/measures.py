@@ -228,7 +228,7 @@ def outside(*flights: Flown) -> float:
 def unbounded(flown: Flown) -> float:
     """Excess of the model error before the fault over the bound of the paper, ppm of this bound; below 0 if
     the error stays within. Our thresholds also contain `ours`, for the Earth's rotation and rounding; the
-    paper's bound does not. It is that of bounds.add_published_bound, whose k is 1 for the Beaver."""
+    paper's bound does not. It is that of bounds.add_published_bound, whose kappa is 1 for the Beaver."""
     healthy = flown.between(SETTLED_S, flown.fault_at_s)
     rates = np.roll(sum(np.abs(flown.log[f"{axis}_rad_s"]) for axis in AXES), 1)  # of the row before
     ours = EARTH_RATE_RAD_S * (2.0 * rates + EARTH_RATE_RAD_S) + ROUNDING_RAD_S2

@@ -182,13 +182,13 @@ def assess_surfaces(out, cfg, found, types, layout, fies, stat):
     """
     all_types, j = cfg.diagnoses_all_types, found.isolated_estimator
     at_fault = isolated_surface(found, fies)
-    out.held, out.lags = 0, 0
+    out.held = out.lags = 0
     out.detected, out.diagnoses_all_types, out.isolated_surface = found.detected, all_types, at_fault
     out.no_target = j < 0 and found.target < 0 and not found.has_effectiveness
     for s in range(out.accommodation_mode.size):
         out.accommodation_mode[s] = types.surface[s].accommodation.mode if all_types else -1
         out.effectiveness[s], out.at_once[s] = 1.0, 0
-        out.offset[s], out.lag[s] = 0.0, 0.0
+        out.offset[s] = out.lag[s] = 0.0
         if found.has_effectiveness and found.detected:
             out.effectiveness[s] = found.effectiveness[s]
         elif out.accommodation_mode[s] >= 0:

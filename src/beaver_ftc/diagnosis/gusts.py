@@ -62,6 +62,7 @@ from beaver_ftc.design.table import (
 from beaver_ftc.diagnosis.bounds import least_height
 from beaver_ftc.diagnosis.deviations import flow_noise, gust_noise
 from beaver_ftc.diagnosis.monitors.redundancy import EARTH_M_S2
+from beaver_ftc.diagnosis.state import ROLL, YAW
 from beaver_ftc.plant.instruments import wrapped
 from beaver_ftc.scenario.declared import MASS_TOLERANCE, Declared, SensorErrors
 
@@ -406,10 +407,10 @@ def add_turn_variance(gust, V, dt):
     share: 1 of the rolling gust, which no vane measures; turn_past of the yawing gust.
     """
     mem = gust.memory
-    if not mem.turns_fast:
-        return
-    add_variance(gust, mem.C_dot, 0, 0.5 * dt * V * gust_lag(gust, 0, V) ** 2 * mem.Q[0])
-    add_variance(gust, mem.C_dot, 2, 0.5 * dt * V * gust_lag(gust, 2, V) ** 2 * mem.Q[2] * mem.turn_past)
+    if mem.turns_fast:
+        for j, share in ((ROLL, 1.0), (YAW, mem.turn_past)):
+            walk = 0.5 * dt * V * gust_lag(gust, j, V) ** 2 * mem.Q[j] * share
+            add_variance(gust, mem.C_dot, j, walk)
 
 
 @kernel

@@ -49,14 +49,22 @@ MIN_GYRO_STD_RAD_S, MIN_ATTITUDE_STD_RAD = 1e-5, 1e-5  # what perfect instrument
 _SETTLING_FRAMES = 400
 
 
+# Places in the state: rates, rad/s; attitude, rad; rotation of the air, rad/s; unexplained acceleration,
+# rad/s2.
+RATES, ATTITUDE, AIR, UNEXPLAINED = np.arange(12).reshape(4, 3)
+
 FlightColumns = Mapping[str, np.ndarray]  # columns of a log, (frames,) each
 
 
 class WhiteningFilter:
-    """The settled Kalman filter of rates, attitude, air and the unexplained, (12,) in this order.
+    """The settled Kalman filter of rates x, attitude, rotation w of the air, and unexplained acceleration v:
 
-    It measures the rates, H (m, 12). If gyro `broken` may have any error, it measures the two other rates and
-    the attitude, which moves with the rates as in level flight.
+        x <- x + dt (L w + v + model noise)      attitude <- attitude + dt x
+        w <- a w + noise                         v <- a v + noise,      a = exp(-dt / tau)
+
+    F (12, 12): its matrix; L 1/s: effect of the rotation. It measures the rates, H (m, 12). If gyro `broken`
+    may have any error, it measures the two other rates and the attitude, which moves with the rates as in
+    level flight. K (12, m), S (m, m): gain, and covariance of the innovations.
     """
 
     def __init__(self, context: Context, broken: int | None = None) -> None:
@@ -64,10 +72,9 @@ class WhiteningFilter:
         tau = np.concatenate((declared.gust_time_s, np.full(3, UNEXPLAINED_MEMORY_S)))
         sigma = np.concatenate((declared.gust_rad_s, context.constant_rad_s2 / np.sqrt(2.0)))
         a = np.exp(-dt / tau)
-        self.F, self.dt = np.eye(12), dt
-        self.F[3:6, :3] = self.F[:3, 9:] = dt * np.eye(3)
-        self.F[:3, 6:9] = dt * declared.gust_effect
-        self.F[range(6, 12), range(6, 12)] = a
+        self.F, self.dt = np.diag(np.concatenate((np.ones(6), a))), dt
+        self.F[ATTITUDE, RATES] = self.F[RATES, UNEXPLAINED] = dt  # axis by axis
+        self.F[np.ix_(RATES, AIR)] = dt * declared.gust_effect
         measured = [i for i in range(3 if broken is None else 6) if i != broken]
         attitude = np.hypot(declared.further_noise, declared.further_resolution / np.sqrt(12.0))[:3]
         variance = np.concatenate(
@@ -95,7 +102,7 @@ class WhiteningFilter:
         g = np.empty((len(phi), len(WH), *phi.shape[2:]))
         for k, phi_k in enumerate(phi):
             delta = np.tensordot(A, delta, 1)
-            delta[:3] += self.dt * phi_k
+            delta[RATES] += self.dt * phi_k
             g[k] = np.tensordot(WH, delta, 1)
         return g
 
@@ -132,7 +139,9 @@ def with_measured_gust(context: Context, gust_noise: np.ndarray) -> Context:
 
 
 def detection_probability(d: float, interval_s: float, alarms_per_h: float) -> float:
-    """Probability that the informed test detects a fault of deflection d.
+    """Probability that the informed test detects a fault of deflection d:
+
+        Phi(d - Phi^-1(1 - alpha)),      alpha = alarms_per_h interval_s / 3600, at most a half
 
     The test is made once every interval_s and raises alarms_per_h false alarms per hour.
     """
@@ -161,7 +170,9 @@ def healthy_positions(context: Context, columns: FlightColumns, surface: str) ->
 def term_acceleration(
     aircraft: Aircraft, term: Term, columns: FlightColumns, deflection: np.ndarray | None
 ) -> np.ndarray:
-    """Acceleration by a coefficient of one, (frames, 3) rad/s2; deflection (frames,) rad: of its surface."""
+    """Acceleration by a term whose coefficient is one, (frames, 3) rad/s2, along a flight: the product of its
+    factors, scaled to a moment and divided by the inertia. deflection (frames,) rad: of its surface, if
+    any."""
     x = np.array([columns[f"{axis}_rad_s"] for axis in AXES])
     names = "alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa", *aircraft.signals
     y, design = np.array([columns[name] for name in names]), design_record(aircraft).view(np.recarray)[0]

@@ -208,7 +208,7 @@ def add_to_mean(mean, phi, w, begins):
     """mean <- mean + w phi (EFFECT_RECORD); w: share of a frame in its block. If the block `begins` with this
     frame, the mean is zero before."""
     if begins:
-        mean.h[:], mean.Z[:], mean.r[:] = 0.0, 0.0, 0.0
+        mean.h[:] = mean.Z[:] = mean.r[:] = 0.0
     for i in range(3):
         mean.h[i] += w * phi.h[i]
         mean.Z[i] += w * phi.Z[i]

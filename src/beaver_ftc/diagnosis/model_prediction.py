@@ -22,7 +22,8 @@ from beaver_ftc.scenario.declared import Declared
 
 @sized
 def frame_sums_dtype(n: int) -> np.dtype:
-    """Means over the instants of a frame so far, n surfaces: F, G, G u, bounds; eG, eGu as in bounds.py."""
+    """Means over the instants of a frame so far, of n surfaces: F, G u, bounds eta_bar, rad/s2; G, rad/s2 per
+    rad; eG, eGu as of `bound_dtype`. An instant adds w of itself."""
     return record(
         F=3, G=(3, n), Gu=(3, n), eta_bar=3, eG=(3, n), eGu=(3, n),
         Gu_first=(3, n),  # of the first instant alone
@@ -90,7 +91,11 @@ def evaluate_design(pred, meas):
 
 @kernel
 def add_to_sums(pred, bound, layout, all_types):
-    """Add w times this instant to the means over the frame and, for faults of all types, to the extremes."""
+    """Add w times this instant to the means over the frame and, for faults of all types, to the extremes:
+
+    F <- F + w (f + sum_s G_s u_s)      Gu_s <- Gu_s + w G_s u_s      eGu_s <- eGu_s + w eG_s |u_s|
+    G, eG, eta_bar likewise             extra_j <- extra_j + w extra_bound(j)      j: level of travel
+    """
     sums, G, u, w, eG = pred.sums, pred.G, pred.u, pred.w, bound.declared_errors.eG
     for i in range(3):
         sums.F[i] += w * pred.f[i]
@@ -116,9 +121,12 @@ def fill_means(pred, bound):
     """Fill the means over the elapsed frame: G, G u of each surface, F = f + G u, and the bound."""
     sums, means = pred.sums, pred.means
     means.G_old[:] = means.G
-    means.G[:], means.Gu[:], means.F[:], bound.eta_bar[:] = sums.G, sums.Gu, sums.F, sums.eta_bar
+    means.G[:] = sums.G
+    means.Gu[:] = sums.Gu
+    means.F[:] = sums.F
     means.G_min[:], means.G_max[:] = sums.G_min, sums.G_max
     means.u_min[:], means.u_max[:] = sums.u_min, sums.u_max
+    bound.eta_bar[:] = sums.eta_bar
     if bound.has_eG:
         bound.eG[:], bound.eGu[:] = sums.eG, sums.eGu
     if pred.w < 1.0:
@@ -168,17 +176,18 @@ def begin_sums(pred, bound, layout, all_types, meas):
     """Start the next frame's means with this instant, at which the old command is still in effect."""
     sums = pred.sums
     pred.x_before[:], bound.n_old[:] = meas.x, bound.n_gyro
-    sums.F[:], sums.eta_bar[:], sums.G[:], sums.Gu[:], bound.extra[:] = 0.0, 0.0, 0.0, 0.0, 0.0
-    sums.eG[:], sums.eGu[:] = 0.0, 0.0
-    sums.G_min[:], sums.G_max[:] = np.inf, -np.inf
-    sums.u_min[:], sums.u_max[:] = np.inf, -np.inf
+    sums.F[:] = sums.eta_bar[:] = bound.extra[:] = 0.0
+    sums.G[:] = sums.Gu[:] = sums.eG[:] = sums.eGu[:] = 0.0
+    sums.G_min[:] = sums.u_min[:] = np.inf
+    sums.G_max[:] = sums.u_max[:] = -np.inf
     add_to_sums(pred, bound, layout, all_types)
     sums.Gu_first[:] = sums.Gu
 
 
 @kernel
 def redo_move(pred, command):
-    """Move the healthy surfaces by the same JSBSim frame towards another command (n,) rad."""
+    """Take back the last `move_surfaces`, and move by the same JSBSim frame towards another command (n,) rad,
+    which replaces it (`stepping.hold`)."""
     pred.u[:], pred.u_lo[:], pred.u_hi[:] = pred.u_old, pred.u_lo_old, pred.u_hi_old
     move_surfaces(pred, command)
 

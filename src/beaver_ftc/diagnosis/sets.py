@@ -9,12 +9,17 @@ import numpy as np
 from beaver_ftc.compiled import kernel
 
 UNLIMITED_SET, EMPTY_SET = (-np.inf, np.inf), (np.inf, -np.inf)
-NO_THETA = (1.0, -1.0)  # an empty set with ends that an estimate can be limited to
+NO_THETA = (1.0, -1.0)  # an empty set, too, but with ends to which an estimate can be limited
 
 
 @kernel
 def explain(nu, e, Z, lo, hi):
-    """The theta of [lo, hi] with |nu - theta Z| <= e."""
+    """The theta of [lo, hi] with |nu - theta Z| <= e:
+
+        [lo, hi] n [(nu -+ e) / Z]      Z = 0: [lo, hi] if |nu| <= e, else none
+
+    nu, e rad/s2, or rad/s of a filtered residual; Z the same per unit of theta. lo > hi in the result: none.
+    """
     if Z == 0.0:
         return (lo, hi) if abs(nu) <= e else NO_THETA
     a = (nu - e) / Z
@@ -24,5 +29,5 @@ def explain(nu, e, Z, lo, hi):
 
 @kernel
 def intersect(a, b):
-    """What two sets have in common."""
+    """What two sets a, b = (lo, hi) have in common: (max lo, min hi)."""
     return max(a[0], b[0]), min(a[1], b[1])

@@ -13,10 +13,10 @@ from beaver_ftc.plugins import DETECTORS, is_compiled
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.diagnosis import FdiConfig
 
-NOT_ISOLATED, UNANTICIPATED = -1, -2
+NOT_ISOLATED, UNANTICIPATED = -1, -2  # in place of an estimator: no fault isolated; one outside the class
 DAMAGE_EXCLUDES = 2  # value of `weak`: declared damage may have excluded the others
-INTERVAL_THRESHOLD, PUBLISHED_THRESHOLD, CONSTANT_THRESHOLD = 0, 1, 2  # thresholds
-EITHER_DETECTOR, WORST_CASE_DETECTOR, STATISTICAL_DETECTOR = 0, 1, 2  # whose alarms count
+INTERVAL_THRESHOLD, PUBLISHED_THRESHOLD, CONSTANT_THRESHOLD = 0, 1, 2  # of a residual: isolation.py
+EITHER_DETECTOR, WORST_CASE_DETECTOR, STATISTICAL_DETECTOR = 0, 1, 2  # whose alarms, or exclusions, count
 AUTHORITIES = {
     "either": EITHER_DETECTOR,
     "worst-case": WORST_CASE_DETECTOR,
@@ -68,12 +68,12 @@ def configure_shared(cfg: np.void, declared: Declared) -> None:
 
 
 def whose_exclusions(config: FdiConfig) -> int:
-    """The detector whose exclusions count: EITHER_DETECTOR, WORST_CASE_DETECTOR or STATISTICAL_DETECTOR. The
-    worst case excludes types of fault for any authority."""
+    """The detector whose exclusions count: EITHER_DETECTOR, WORST_CASE_DETECTOR or STATISTICAL_DETECTOR."""
     if not config.weighs_chance:
         return WORST_CASE_DETECTOR
-    authority = AUTHORITIES[config.authority]
-    return EITHER_DETECTOR if (config.fault_class, authority) == ("all", STATISTICAL_DETECTOR) else authority
+    if config.fault_class == "all" and config.authority == "statistical":
+        return EITHER_DETECTOR  # the worst case excludes types of fault for any authority
+    return AUTHORITIES[config.authority]
 
 
 def configure_layout(layout: np.void, rows: Sequence[tuple[str, int, int]], aircraft: Aircraft) -> None:

@@ -32,10 +32,14 @@ A gyro is broken if the rates raise an alarm and the attitude shows no turn for 
 exceeds the same margin about one axis, and no sum above does. dA, rad, is the turn of a frame beyond that of
 the gyro; e_T, rad/s, bounds what the constant errors of gyros and attitude turn.
 
+A loss acts on roll and yaw together, so an axis i has a `row` in a block of the rates: pitch is row 0 of its
+block, roll is row 0 and yaw row 1 of theirs.
+
 Letters of the record and of the kernels, for each axis i:
 
-    s, s_j, s_h     states (psi, xi, d) of the filters of g, of g_j and of g_s
-    P, K, S         covariance and gain of these filters; variance of g, rad2
+    s, s_j, s_h     states (psi rad, xi rad/s, d rad/s2) of the filters of g, of g_j and of the g_s of loss h
+    P, K, S         covariance (3, 3) and gain (3,) of these filters; variance of g, rad2
+    u               the input d + phi - D xi of the filter of g without the damping of its own axis, rad/s2
     r, g_j          known accelerations r_j, rad/s2; responses to them over sqrt S
     n               number of the constants: those of the block, then the N_FURTHER
     z, z_j          leaky sums of g and g_j over sqrt S; m counts their leaks a
@@ -66,6 +70,7 @@ LOSS_MEMORY_S = 30.0
 COUPLED_SHARE = 0.05  # of an error of one gyro in the turns about the other axes
 DAMPING_TOLERANCE = 0.2  # relative error of D away from trim
 N_FURTHER = 4  # after the regressors of a block: the bounded uncertainty, and the axis' row of D
+BLOCK_ROWS = (0, 0, 1)  # row of roll, pitch and yaw in the block that has the axis
 
 
 @sized
@@ -132,8 +137,7 @@ def compare_attitude(att, blocks, eta, x, dt, detected):
     sum_turns(att, x, dt)
     att.xi[:] = att.s[:, 1]
     for i, blk in enumerate((lateral, pitch, lateral)):
-        # Roll and pitch are row 0 of their block, yaw is row 1.
-        advance_axis(att, i, blk, i // 2, eta[i], dt, detected)
+        advance_axis(att, i, blk, BLOCK_ROWS[i], eta[i], dt, detected)
     att.score, att.gyro = 0.0, -1
     worst = np.argmax(att.turn_score)
     if detected or att.turn_score[worst] > 1.0:
@@ -145,7 +149,13 @@ def compare_attitude(att, blocks, eta, x, dt, detected):
 
 @kernel
 def sum_turns(att, x, dt):
-    """Advance T and E by a frame of dt s, and fill `turn_score`; x (3,) rad/s: measured rates."""
+    """Advance T and E by a frame of dt s, and fill `turn_score`, the largest over the leaks a of
+
+        (|T| - E) / (T_std level)      T <- a T + dA      E <- a E + dt e_T
+        e_T = e_0 + e_slope |x_i| + tilt (|x_0| + |x_1| + |x_2|)
+
+    x (3,) rad/s: measured rates. turn_max rad: the largest |T| that sound gyros explain.
+    """
     rates = abs(x[0]) + abs(x[1]) + abs(x[2])
     att.turn_max = 0.0
     for i in range(3):
@@ -173,21 +183,15 @@ def find_gyro(att, worst):
 def advance_axis(att, i, blk, row, eta, dt, detected):
     """Advance filter, responses and sums of axis i, in this row of its block; N, M and R_j if `detected`.
 
+        z <- a z + g / sqrt S      z_j <- a z_j + g_j / sqrt S
+
     eta rad/s2: bound of its uncertainty.
     """
-    D, a, n = att.D[i, i], blk.a, blk.n_Z
-    K, S = advance_P(att, i, blk, row, dt)
-    att.n[i] = n + N_FURTHER
+    D, a = att.D[i, i], blk.a
     att.A[i] += att.turn[i]
     att.turn[i] = 0.0
-    for j in range(n):
-        att.r[j] = blk.regressor[j, row]
-    att.r[n] = eta
-    u = -blk.nu[row]  # and, of the other axes, the damping
-    for j in range(3):
-        att.r[n + 1 + j] = att.D[i, j] * att.xi[j]
-        if j != i:
-            u -= att.r[n + 1 + j]
+    u = fill_known(att, i, blk, row, eta)
+    K, S = advance_P(att, i, blk, row, dt)
     std = np.sqrt(S)
     g = respond(att.s[i], att.A[i], u, D, a, K, dt) / std
     leak(att.z[i], att.a, g)
@@ -198,10 +202,39 @@ def advance_axis(att, i, blk, row, eta, dt, detected):
         if hypothesis.kind == LOSS:
             g_s = respond(att.s_h[i, h], 0.0, hypothesis.signature[row], D, a, K, dt) / std
             if detected:
-                att.N[i, h] = att.b * att.N[i, h] + g_s * g
-                att.M[i, h] = att.b * att.M[i, h] + g_s * g_s
-                for j in range(att.n[i]):
-                    att.R_j[i, h, j] = att.b * att.R_j[i, h, j] + g_s * att.g_j[j]
+                correlate(att, i, h, g_s, g)
+
+
+@kernel
+def fill_known(att, i, blk, row, eta):
+    """Fill the n known accelerations r of axis i, rad/s2, and return its u:
+
+    r = (regressors of the block, eta, D_i0 xi_0, D_i1 xi_1, D_i2 xi_2)      u = -nu - sum_{j != i} D_ij
+    xi_j
+    """
+    n = blk.n_Z
+    att.n[i] = n + N_FURTHER
+    for j in range(n):
+        att.r[j] = blk.regressor[j, row]
+    att.r[n] = eta
+    u = -blk.nu[row]
+    for j in range(3):
+        att.r[n + 1 + j] = att.D[i, j] * att.xi[j]
+        if j != i:
+            u -= att.r[n + 1 + j]
+    return u
+
+
+@kernel
+def correlate(att, i, h, g_s, g):
+    """Add the frame to the correlations of axis i with the loss h; g_s, g and g_j are over sqrt S.
+
+    N <- b N + g_s g      M <- b M + g_s^2      R_j <- b R_j + g_s g_j
+    """
+    att.N[i, h] = att.b * att.N[i, h] + g_s * g
+    att.M[i, h] = att.b * att.M[i, h] + g_s * g_s
+    for j in range(att.n[i]):
+        att.R_j[i, h, j] = att.b * att.R_j[i, h, j] + g_s * att.g_j[j]
 
 
 @kernel
@@ -215,7 +248,10 @@ def tol(blk, j, n):
 
 @kernel
 def largest_sum(att, blk, i):
-    """The largest leaky sum of axis i that no constant explains, over the level."""
+    """The largest leaky sum of axis i that no constant explains, over the level:
+
+    (|z| - sum_j tol_j |z_j|) sqrt(1 - a^2) / level
+    """
     largest = 0.0
     n = att.n[i]
     for m, a in enumerate(att.a):
@@ -240,7 +276,7 @@ def largest_correlation(att, blk, first):
     for h, hypothesis in enumerate(blk.hypothesis[: blk.n_h]):
         if hypothesis.kind != LOSS:
             continue
-        N, M = 0.0, 0.0
+        N = M = 0.0
         for i in range(first, 3, 2):
             N += att.N[i, h]
             M += att.M[i, h]
@@ -270,20 +306,28 @@ def respond(s, A, u, D, a, K, dt):
 
 
 @kernel
+def dot(a, b):
+    """a' b; a, b (3,)."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@kernel
 def advance_P(att, i, blk, row, dt):
     """Advance P of axis i by a frame of dt s; row: of the axis in its block. Return K (3,) and S, rad2.
 
-    P <- F P F' + Q,  F = [1 dt 0; 0 1 - dt D dt; 0 0 a],  Q = diag(0, dt^2 Q_x, dt Q_d)
-    S = P_00 + R,  K = P_0 / S      P <- P - K P_0'      P_0: the first column, and row, of P
+        P <- F P F' + Q,  F = [1 dt 0; 0 1 - dt D dt; 0 0 a],  Q = diag(0, dt^2 Q_x, dt Q_d)
+        S = P_00 + R,  K = P_0 / S      P <- P - K P_0'      P_0: the first column, and row, of P
+
+    Q_x (rad/s2)2, Q_d (rad/s2)2/s, a: noise of the rate, of the drift, and decay of the drift in the block.
     """
     P, F_P = att.P[i], att.F_P
     F = (1.0, dt, 0.0), (0.0, 1.0 - dt * att.D[i, i], dt), (0.0, 0.0, blk.a)
     for r in range(3):
         for c in range(3):
-            F_P[r, c] = F[r][0] * P[0, c] + F[r][1] * P[1, c] + F[r][2] * P[2, c]
+            F_P[r, c] = dot(F[r], P[:, c])
     for r in range(3):
         for c in range(3):
-            P[r, c] = F[c][0] * F_P[r, 0] + F[c][1] * F_P[r, 1] + F[c][2] * F_P[r, 2]
+            P[r, c] = dot(F[c], F_P[r])
     P[1, 1] += dt * dt * blk.Q_x[row]
     P[2, 2] += dt * blk.Q_d[row, row]
     S = P[0, 0] + att.R

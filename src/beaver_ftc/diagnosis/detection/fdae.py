@@ -138,7 +138,7 @@ def train_network(net, eps, mu, leaks, dt):
 @kernel
 def reset_network(net):
     """Set the weights and the output of the network to zero."""
-    net.memory.weights[:], net.output[:] = 0.0, 0.0
+    net.memory.weights[:] = net.output[:] = 0.0
 
 
 @kernel

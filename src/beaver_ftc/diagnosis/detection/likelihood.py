@@ -244,7 +244,7 @@ def fill_kalman_gains(b):
     """Fill the Kalman gains K_x = P_xx S^-1 and K_d = P_xd' S^-1, (n, n)."""
     for i in range(b.n):
         for j in range(b.n):
-            K_x, K_d = 0.0, 0.0
+            K_x = K_d = 0.0
             for k in range(b.n):
                 K_x += b.P_xx[i, k] * b.S_inv[k, j]
                 K_d += b.P_xd[k, i] * b.S_inv[k, j]

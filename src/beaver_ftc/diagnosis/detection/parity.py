@@ -148,7 +148,7 @@ def turn_view(view, rows, gust):
     norm_m = np.sqrt(m_i * m_i + m_k * m_k + m_j * m_j)
     if norm_m == 0.0:
         return 0.0
-    e, e_col = 0.0, 0.0
+    e = e_col = 0.0
     for r, g_r, m_r in ((i, g_i, m_i), (k, g_k, m_k), (j, g_j, m_j)):
         if r >= 0:
             m[r] = m_r / norm_m

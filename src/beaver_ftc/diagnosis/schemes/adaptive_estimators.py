@@ -46,6 +46,16 @@ def update_estimators(fdi, pred):
 
 
 @kernel
+def follow_alarm(fdi, meas, axis, t):
+    """Latch an alarm on an axis, or -1 for none, at t s; from the first alarm on, isolate its cause."""
+    before = fdi.verdict.detected
+    if axis >= 0:
+        conclusion.latch_alarm(fdi.verdict, axis, t)
+    if fdi.verdict.detected:
+        continue_isolation(fdi, meas, t, before)
+
+
+@kernel
 def continue_isolation(fdi, meas, t, before):
     """From the alarm on, exclude faults and decide; before: the alarm came a frame or more ago.
 
@@ -148,37 +158,44 @@ def record_orders(fdi, prediction):
 
 @apart(long_loops=True)
 def update_tests(fdi, prediction, measured, k, t):
-    """Test the innovation of the elapsed frame, which ends frame k at t s, for every hypothesis."""
-    stat = fdi.statistical
-    means = prediction.means
-    y = measured.y
-    dt = fdi.config.dt
-    rows, blocks, force, att = stat.rows, stat.block, stat.forces, stat.attitude
-    gust = stat.gust
-    vaneless = stat.vaneless
-    of_views = gust_of_views(stat)
+    """Test the innovation of the elapsed frame, which ends frame k at t s, for every hypothesis: in the
+    blocks of the rates, against the attitude, and in the parity views."""
+    stat, y, dt = fdi.statistical, measured.y, fdi.config.dt
     views = stat.views[: stat.n_views]
     alarmed = stat.alarm.detected_at_s >= 0.0
-    detected = fdi.verdict.detected
+    fill_rows(fdi, prediction, y)
+    statistical.update_blocks(stat, dt, k, alarmed, not fdi.config.abrupt)
+    if stat.attitude.enabled:
+        compare_attitude(fdi, measured.x)
+    gust, vaned, vaneless = stat.gust, gust_of_views(stat), stat.vaneless
+    parity.project_views(views, stat.noise, stat.rows, stat.forces, gust, vaned, vaneless, y[AIRSPEED])
+    parity.update_views(views, stat.test, stat.tone_test_config, y, dt, k, alarmed)
+    statistical.update_alarm(stat, views, t, fdi.bound.error_map.outside == 0)
+    innovation_known(prediction, measured.x, dt)
+    statistical.filter_known(stat.block, gust, prediction.nu_known, dt)
+
+
+@kernel
+def fill_rows(fdi, prediction, y):
+    """Finish the gust estimates of the elapsed frame, and fill the rows that blocks and views read."""
+    stat, nu, means = fdi.statistical, fdi.bank.output.innovation, prediction.means
+    gust, vaned, vaneless = stat.gust, gust_of_views(stat), stat.vaneless
     gusts.finish_gust(gust, prediction.w)
     for own in (vaneless, stat.vaned):
         if own.output.gusty:
             gusts.finish_gust(own, prediction.w)
     fill_old_effects(means)
-    nu = fdi.bank.output.innovation
     per_cubed = unanticipated_pitch(prediction.design, y, 1.0)
-    finish_rows(rows, stat.noise, force, gust, of_views, vaneless, fdi.bound, means, nu, per_cubed)
-    statistical.update_blocks(stat, dt, k, alarmed, not fdi.config.abrupt)
-    if att.enabled:
-        attitude.compare_attitude(att, blocks, rows.eta[0, :3], measured.x, dt, detected)
-        if detected and att.score > 1.0:
-            sensor_monitor.rule_out_gyros(fdi.sensor_monitor)
-    parity.project_views(views, stat.noise, rows, force, gust, of_views, vaneless, y[AIRSPEED])
-    parity.update_views(views, stat.test, stat.tone_test_config, y, dt, k, alarmed)
-    bounded = fdi.bound.error_map.outside == 0
-    statistical.update_alarm(stat, views, t, bounded)
-    innovation_known(prediction, measured.x, dt)
-    statistical.filter_known(blocks, gust, prediction.nu_known, dt)
+    finish_rows(stat.rows, stat.noise, stat.forces, gust, vaned, vaneless, fdi.bound, means, nu, per_cubed)
+
+
+@kernel
+def compare_attitude(fdi, x):
+    """Compare the turn of the attitude with the rates x; if both turn, no gyro is the cause of the alarm."""
+    stat, att, detected = fdi.statistical, fdi.statistical.attitude, fdi.verdict.detected
+    attitude.compare_attitude(att, stat.block, stat.rows.eta[0, :3], x, fdi.config.dt, detected)
+    if detected and att.score > 1.0:
+        sensor_monitor.rule_out_gyros(fdi.sensor_monitor)
 
 
 @apart(long_loops=True)
@@ -229,7 +246,8 @@ def step_view_gust(gust, y, pred, meas, k, dt):
 
 @kernel
 def gust_of_views(stat):
-    """The gust estimate of the views that use vanes: their own, or that of the rates."""
+    """The gust estimate of the views that use vanes: their own, if accelerometers may break, or that of the
+    rates."""
     return stat.vaned if stat.vaned.output.gusty else stat.gust
 
 
@@ -253,13 +271,9 @@ def update_verdict(fdi, prediction, measured, t):
     """From residuals to the alarm and a verdict, unless a sensor is at fault."""
     if sensor_monitor.has_alarm(fdi.sensor_monitor):
         return
-    before, found = fdi.verdict.detected, fdi.verdict
     fdae.fdae_residual(fdi.fdae, measured.x)
-    axis = find_alarm_axis(fdi, measured.y, t)
-    if axis >= 0:
-        conclusion.latch_alarm(found, axis, t)
-    if found.detected:
-        continue_isolation(fdi, measured, t, before)
+    follow_alarm(fdi, measured, find_alarm_axis(fdi, measured.y, t), t)
+    if fdi.verdict.detected:
         fdae.evaluate_network(fdi.fdae.network, measured.y[ALPHA], measured.y[BETA])
 
 

@@ -20,7 +20,6 @@ part.
 import numpy as np
 
 from beaver_ftc.compiled import apart, fill, kernel, record
-from beaver_ftc.diagnosis import conclusion
 from beaver_ftc.diagnosis.detection.fdae import advance_fdae, fdae_residual
 from beaver_ftc.diagnosis.detection.state_network import (
     STATE_NETWORK_RECORD,
@@ -95,7 +94,7 @@ def advance_estimators_to_frame(fdi, prediction, measured):
     x, F = prediction.x_before, prediction.means.F
     advance_fdae(fdi.fdae, fdi.bank, fdi.bound, x, F, False, False, dt)
     if mu > 0.0:
-        fdi.fdae.output.threshold[:], fdi.bank.output.threshold[0] = mu, mu
+        fdi.fdae.output.threshold[:] = fdi.bank.output.threshold[0] = mu
         for fie in fdi.isolation.estimator[: fdi.isolation.config.n_estimators]:
             fie.B[:] = mu
 
@@ -105,12 +104,8 @@ def update_verdict(fdi, prediction, measured, t):
     """Raise the alarm by the FDAE, evaluate its network, and isolate."""
     if sensor_monitor.has_alarm(fdi.sensor_monitor):
         return
-    before, found, net = fdi.verdict.detected, fdi.verdict, fdi.published.network
+    net = fdi.published.network
     fdae_residual(fdi.fdae, measured.x)
-    axis = fdae_axis(fdi.fdae)
     evaluate_state_network(net, fdi.layout.main, measured.x, measured.y, prediction.u)
     fdi.fdae.network.output[:] = net.output
-    if axis >= 0:
-        conclusion.latch_alarm(found, axis, t)
-    if found.detected:
-        adaptive_estimators.continue_isolation(fdi, measured, t, before)
+    adaptive_estimators.follow_alarm(fdi, measured, fdae_axis(fdi.fdae), t)

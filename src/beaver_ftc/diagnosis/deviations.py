@@ -19,8 +19,8 @@ from beaver_ftc.design.model import (
     jacobian,
 )
 from beaver_ftc.design.table import AIRSPEED, PH, RH
-from beaver_ftc.diagnosis.actuators import servo_data
 from beaver_ftc.diagnosis.bounds import Y0, inertia_bounds
+from beaver_ftc.diagnosis.model_prediction import servo_data
 from beaver_ftc.scenario.declared import Declared, SensorErrors
 
 if TYPE_CHECKING:

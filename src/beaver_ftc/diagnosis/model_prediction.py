@@ -9,15 +9,18 @@ and then by the accelerations of the other instants, under u[k+1]. The mean over
 sum over its n instants, the first of them under the old command.
 """
 
+from math import pi
+
 import numpy as np
 
 from beaver_ftc.compiled import fill, kernel, record, sized
 from beaver_ftc.design.actuators import actuators_dtype, move, move_ends
 from beaver_ftc.design.model import design_dtype, design_of, response
-from beaver_ftc.diagnosis.actuators import servo_data
 from beaver_ftc.diagnosis.bounds import fill_bound, n_gyro
 from beaver_ftc.diagnosis.error_map import extra_bound
 from beaver_ftc.scenario.declared import Declared
+
+DEFAULT_RATE_RAD_S = pi / 3.0  # of an actuator with no declared rate limit: the aircraft's default
 
 
 @sized
@@ -64,6 +67,21 @@ def prediction_dtype(n: int) -> np.dtype:
         F_known=3,  # mean acceleration of the elapsed frame, known faults included
         nu_known=3,  # measured minus expected mean acceleration
     )  # fmt: skip
+
+
+def servo_data(declared: Declared) -> dict[str, np.ndarray]:
+    """The declared actuators and their errors, (surfaces,) each, by the names of `DeclaredErrors`: rad,
+    rad/s, 1/s; the errors of bandwidth and rate limit are relative. 0 stands for no lag and for no limit."""
+    names = declared.aircraft.surfaces
+    servos = [getattr(declared.servos, s) for s in names]
+    errors = [getattr(declared.servo_errors, s) for s in names]
+    return {
+        "bandwidth_rad_s": np.array([servo.bandwidth_rad_s for servo in servos]),
+        "rate_limit_rad_s": np.radians([servo.rate_limit_deg_s for servo in servos]),
+        "bandwidth_error": np.array([error.bandwidth for error in errors]),
+        "rate_limit_error": np.array([error.rate_limit for error in errors]),
+        "dead_band_rad": np.radians([error.dead_band_deg for error in errors]),
+    }
 
 
 def configure_prediction(pred: np.void, declared: Declared, travel: np.ndarray) -> None:
@@ -226,8 +244,7 @@ def innovation_known(pred, x, dt):
 @kernel
 def move_surfaces(pred, command):
     """Move the healthy surfaces by one JSBSim frame towards the new command (n,) rad."""
-    for s in range(command.size):
-        pred.commanded[s] = command[s]
+    pred.commanded[:] = command
     pred.u_old[:], pred.u_lo_old[:], pred.u_hi_old[:] = pred.u, pred.u_lo, pred.u_hi
     move_healthy(pred)
 

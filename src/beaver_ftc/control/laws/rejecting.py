@@ -48,7 +48,7 @@ from beaver_ftc.control.thrust import between
 from beaver_ftc.design.model import effectiveness as control_effectiveness
 from beaver_ftc.design.model import own_damping
 from beaver_ftc.design.table import AIRSPEED, QDYN
-from beaver_ftc.diagnosis.actuators import DEFAULT_RATE_RAD_S, servo_data
+from beaver_ftc.diagnosis.model_prediction import DEFAULT_RATE_RAD_S, servo_data
 from beaver_ftc.diagnosis.state import PITCH
 from beaver_ftc.diagnosis.types import GIVE_UP
 from beaver_ftc.scenario.declared import Declared

@@ -21,14 +21,17 @@ V is the speed relative to the field of gusts. The mean wind carries that field 
 the speed relative to the mean air. The airspeed differs from V by the gust itself. The gust velocity is the
 sum of its changes; unknown are its initial value and the drift of accelerometers and attitude. The record's
 `v_g` is that sum, with a decay as slow as this drift permits. A relative error e
-of V leaves at most e^2 / 4 of the gust's intensity unmeasured (`speed_error_share`).
+of V leaves at most e^2 / 4 of the gust's intensity unmeasured (`gusts_design.speed_error_share`).
 
 The intensity of turbulence is that above 2000 ft, or that at the height flown if it is larger.
 
 The velocity is integrated as in JSBSim, by the two-step method of Adams and Bashforth:
 v' = v + dt (3 a - a_prev) / 2.
 
-Letters of the kernels. i is a body axis, j an axis of the gusts; p, q, r at the end: roll, pitch, yaw.
+gusts_design.py fills the record from what a scenario declares.
+
+Letters of the kernels. i is a body axis, j an axis of the gusts, about which they roll, pitch or yaw; q, r at
+the end: pitch, yaw.
 
     v, v_g         velocity relative to the air; gust since the start, m/s in level axes
     V              speed relative to the mean air, m/s
@@ -44,37 +47,18 @@ from math import pi
 
 import numpy as np
 
-from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S, FORCES, GRAVITY_MPS2
 from beaver_ftc.aircraft.schema import MAX_MONOMIALS
-from beaver_ftc.compiled import fill, kernel, record
-from beaver_ftc.design import SCALE_M, rotation_lengths
+from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.model import rate_damping
-from beaver_ftc.design.table import (
-    AIRSPEED,
-    ALPHA,
-    BETA,
-    QDYN,
-    TABLE,
-    evaluate,
-    fill_table,
-    whole_sum,
-)
+from beaver_ftc.design.table import AIRSPEED, ALPHA, BETA, QDYN, TABLE, evaluate, whole_sum
 from beaver_ftc.diagnosis.bounds import least_height
-from beaver_ftc.diagnosis.deviations import flow_noise, gust_noise
-from beaver_ftc.diagnosis.monitors.redundancy import EARTH_M_S2
-from beaver_ftc.diagnosis.state import ROLL, YAW
+from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
 from beaver_ftc.plant.instruments import wrapped
-from beaver_ftc.scenario.declared import MASS_TOLERANCE, Declared, SensorErrors
 
 # Share of the intensity of the rolling, pitching and yawing gust that remains unmeasured with vanes. With
 # exact vanes and over a filter's memory it is smaller (`tests/diagnosis/test_gusts.py`).
 MIN_UNMEASURED_SHARES = (1.0, 0.003, 0.03)
-FORCE_ERROR_SHARE = 0.01  # share left unmeasured by an error of a tenth in the forces
-INTEGRATION_NOISE_GAIN = 1.6  # noise gain of the two-step method: sqrt(1.5^2 + 0.5^2)
 MIN_BANK_COSINE = 0.5  # cosine of the steepest bank at which lift is assumed to balance the weight
-MAX_GUST_STDS = 4.0  # limit of the estimated gust velocity, standard deviations
-MAX_PATH_SLOPE_RAD = 0.3  # of the path, along which gravity acts
-MAX_DRAG_OVER_WEIGHT = 0.3  # upper limit of drag over weight: errors of coefficients are a share of it
 # share of a gust's own intensity below which the turn of its axes is ignored
 FAST_TURN_SHARE = 0.01
 
@@ -205,7 +189,7 @@ def fill_axes_rate(gust, dt, V):
         for j in range(3):
             C_dot[i, j] = (C[i, j] - C_dot[i, j]) / dt
             fastest = max(fastest, abs(C_dot[i, j]))
-    gust.memory.turns_fast = 0.5 * (fastest * gust_lag(gust, 0, V)) ** 2 > FAST_TURN_SHARE
+    gust.memory.turns_fast = 0.5 * (fastest * gust_lag(gust, ROLL, V)) ** 2 > FAST_TURN_SHARE
 
 
 @kernel
@@ -252,16 +236,17 @@ def update_rotation(gust, dv, psi_dot, dt):
         share = psi_dot^2 b L / (pi V^2)
     """
     cfg, mem, V = gust.config, gust.memory, gust.output.V
-    tau_q, tau_r = gust_lag(gust, 1, V), gust_lag(gust, 2, V)
+    tau_q, tau_r = gust_lag(gust, PITCH, V), gust_lag(gust, YAW, V)
     a_q, a_r = np.exp(-dt / tau_q), np.exp(-dt / tau_r)
-    previous, mem.turn_now = mem.turn_now, psi_dot * psi_dot * cfg.span * cfg.L_gust / (pi * V * V)
-    larger = max(previous, mem.turn_now)
+    share = psi_dot * psi_dot * cfg.span * cfg.L_gust / (pi * V * V)
+    larger = max(mem.turn_now, share)
+    mem.turn_now = share
     mem.turn_past = min(max(a_r * mem.turn_past, larger), 1.0)
     mem.start_share *= a_q
-    mem.w[1] = a_q * mem.w[1] + dv[2] / (V * tau_q)
-    mem.w[2] *= a_r
+    mem.w[PITCH] = a_q * mem.w[PITCH] + dv[2] / (V * tau_q)
+    mem.w[YAW] *= a_r
     if larger < 1.0:
-        mem.w[2] += dv[1] / (V * tau_r)
+        mem.w[YAW] += dv[1] / (V * tau_r)
     else:
         mem.v_g[:], mem.start_left = 0.0, 1.0
 
@@ -288,11 +273,14 @@ def update_gust_speed(gust, dv, V, dt):
 
 @kernel
 def set_intensity(gust, altitude):
-    """Fill Q at this altitude, m."""
+    """Fill Q at this altitude, m: Q_j = max(Q_aloft_j, Q_1m_j / h), of the rolling gust Q_1m_j / h^(3/2).
+
+    h m: the least height for that reading. Near the ground the gusts' scale is the height, sigma constant.
+    """
     cfg = gust.config
     h = least_height(altitude, cfg.h0, cfg.h1)
     for j in range(3):
-        gust.memory.Q[j] = max(cfg.Q_aloft[j], cfg.Q_1m[j] / (h**1.5 if j == 0 else h))
+        gust.memory.Q[j] = max(cfg.Q_aloft[j], cfg.Q_1m[j] / (h**1.5 if j == ROLL else h))
 
 
 @kernel
@@ -306,26 +294,35 @@ def step_gust(gust, y, attitude, dt, k):
 
 @kernel
 def fill_gust_effect(gust, design, x, y, u):
-    """Fill acc (3,) rad/s2, the effect of the gust from now on, -L C w, and f, m/s2.
+    """Fill acc (3,) rad/s2, the effect -L C w of the measured gust from now on, or acc_coarse, that of a gust
+    known coarsely; the other is 0. Also fill f for the next instant.
 
     x (3,) rad/s and y (5,) as measured; u (n,) rad: positions of healthy surfaces.
     """
-    cfg, mem, out = gust.config, gust.memory, gust.output
-    if out.uses_accelerometers:
+    mem, out = gust.memory, gust.output
+    fill_specific_force(gust, x, y, u)
+    rate_damping(design, x, y, u, mem.scratch, out.rate_damping)
+    mem.w_body[:] = out.acc[:] = out.acc_coarse[:] = 0.0
+    if out.measured or gust.config.coarse_only:
+        for i in range(3):
+            mem.w_body[i] = out.C[i, PITCH] * mem.w[PITCH] + out.C[i, YAW] * mem.w[YAW]
+    acc = out.acc if out.measured else out.acc_coarse
+    for i in range(3):
+        acc[i] = -project_gust(mem.w_body, out.rate_damping.T, i)
+
+
+@kernel
+def fill_specific_force(gust, x, y, u):
+    """Fill f (3,) m/s2, of this instant: by accelerometers, by a lift that balances the weight and turns with
+    the bank, or by the design model; arguments as in `fill_force`."""
+    mem = gust.memory
+    if gust.output.uses_accelerometers:
         mem.f[:] = mem.f_read
-    elif cfg.coarse_only:  # lift balances the weight, and turns with the bank
+    elif gust.config.coarse_only:
         mem.f[0] = mem.f[1] = 0.0
-        mem.f[2] = -cfg.gravity / max(mem.T[2, 2], MIN_BANK_COSINE)
+        mem.f[2] = -gust.config.gravity / max(mem.T[2, 2], MIN_BANK_COSINE)
     else:
         fill_force(gust, x, y, u, mem.f)
-    rate_damping(design, x, y, u, mem.scratch, out.rate_damping)
-    mem.w_body[:] = 0.0
-    if out.measured or cfg.coarse_only:
-        for i in range(3):
-            mem.w_body[i] = out.C[i, 1] * mem.w[1] + out.C[i, 2] * mem.w[2]
-    acc, other = (out.acc, out.acc_coarse) if out.measured else (out.acc_coarse, out.acc)
-    for i in range(3):
-        acc[i], other[i] = -project_gust(mem.w_body, out.rate_damping.T, i), 0.0
 
 
 @kernel
@@ -358,27 +355,34 @@ def drop_accelerometers(gust):
     out.uses_accelerometers = 0
     if out.measured and not gust.config.has_forces:
         out.measured, mem.share[:] = 0, 1.0
-        for j in range(1, 3):
+        for j in (PITCH, YAW):
             add_variance(gust, out.C, j, 0.5 * gust_lag(gust, j, 1.0) * mem.Q[j])
 
 
 @kernel
 def unmeasured_share(gust, j):
-    """Share of the intensity of the gust about axis j that is unmeasured in this frame."""
+    """Share of the intensity of the gust about axis j that is unmeasured in this frame, at most 1:
+
+        share_j + speed_error_share (var_V + start_left var_v) / V^2 + passing
+
+    share_j: what vanes leave; the second term: by the error of V; passing: of the pitching gust that was
+    there at the start, or of the yawing gust by turns. The rolling gust has only the first.
+    """
     cfg, mem, V = gust.config, gust.memory, max(gust.output.V, 1.0)
-    if j == 0:
+    if j == ROLL:
         return min(mem.share[j], 1.0)
     var = cfg.var_V + mem.start_left * cfg.var_v if gust.output.measured else 0.0
-    by_time = mem.start_share if j == 1 else mem.turn_past
-    return min(mem.share[j] + cfg.speed_error_share * var / V**2 + by_time, 1.0)
+    passing = mem.start_share if j == PITCH else mem.turn_past
+    return min(mem.share[j] + cfg.speed_error_share * var / V**2 + passing, 1.0)
 
 
 @kernel
 def gust_lag(gust, j, V):
-    """tau of the gust about axis j, s, at a speed V m/s: its correlation length over V."""
-    if j == 0:
+    """tau of the gust about axis j, s, at a speed V m/s: L_roll / V, tau_q = 4 b / pi V or tau_r = 3 b / pi
+    V."""
+    if j == ROLL:
         return gust.config.L_roll / V
-    return (4.0 if j == 1 else 3.0) * gust.config.span / (pi * V)
+    return (4.0 if j == PITCH else 3.0) * gust.config.span / (pi * V)
 
 
 @kernel
@@ -453,7 +457,7 @@ def view_drift(gust, V, L_rate, L_force, subtracted):
     (3,) 1/s: gust sensitivity of the rates and of the forces, about the body axes.
     """
     C, mem, Q_V = gust.output.C, gust.memory, 0.0
-    tau = 0.0 if subtracted or not mem.turns_fast else gust_lag(gust, 0, V)
+    tau = 0.0 if subtracted or not mem.turns_fast else gust_lag(gust, ROLL, V)
     for j in range(3):
         share = unmeasured_share(gust, j) if subtracted else 1.0
         L = np.sqrt(share) * abs(project_gust(L_rate, C, j)) + abs(project_gust(L_force, C, j))
@@ -469,77 +473,3 @@ def effect_product(gust, C, i_1, i_2, j):
     """
     L = gust.output.rate_damping
     return project_gust(L[i_1], C, j) * project_gust(L[i_2], C, j)
-
-
-def configure_gust(gust: np.void, declared: Declared) -> None:
-    """Fill the record with the declared turbulence."""
-    air, aircraft, span = declared.air, declared.aircraft, declared.aircraft.geometry.span_m
-    output, memory, altitude = gust["output"], gust["memory"], declared.sensors["altitude"]
-    known = bool(aircraft.measurable_forces)
-    measured = known or output["uses_accelerometers"]  # only where forces are known
-    fill(output, gusty=air.moves, measured=measured)
-    fill_table(memory["table"], aircraft, aircraft.measurable_forces, FORCES, declared.scale)
-    aloft = air.rotation_walk(span)
-    fill(memory, Q=aloft, share=MIN_UNMEASURED_SHARES if measured else 1.0)
-    fill(
-        gust["config"], has_forces=known, coarse_only=air.moves and not measured, span=span, Q_aloft=aloft,
-        S_m=aircraft.geometry.wing_area_m2 / declared.mass.mass_kg, Q_1m=air.rotation_walk_at_1_m(span),
-        gravity=GRAVITY_MPS2,  # standard; what is constant has no part in a change of the gust
-        h0=altitude.worst, h1=altitude.slope, L_gust=SCALE_M, L_roll=rotation_lengths(span)[0],
-    )  # fmt: skip
-
-
-def add_gust_noise(
-    stat: np.void, errors: SensorErrors, design: np.void, y: np.ndarray, u: np.ndarray, dt: float
-) -> None:
-    """Add the noise of the gust estimate to the model noise of the detector.
-
-    It is the noise of the vanes and of the force that predicts the velocity; for the estimate without vanes
-    that of the forces as well. y, u: in trim.
-    """
-    std, forces, gust = flow_noise(errors, y[AIRSPEED]), stat["forces"], stat["gust"]
-    span = float(gust["config"]["span"])
-    if forces["in_use"] or gust["output"]["uses_accelerometers"]:
-        std += INTEGRATION_NOISE_GAIN * errors.each("random", ("az", "ay")) * dt / y[AIRSPEED]
-    if forces["in_use"]:
-        each = forces["component"][::-1]  # normal to the body, and across
-        by_forces = np.sqrt(each["var_acc"]) / np.abs(each["vane"][:, 1])
-        forces["gust_noise"] = gust_noise(by_forces, design, y, u, span)
-    for name in ("Q0", "Q"):
-        stat["noise"][name] += gust_noise(std, design, y, u, span) ** 2
-
-
-def configure_gust_speed(gust: np.void, declared: Declared, level: float, V: float) -> None:
-    """Fill the decay rate of the gust velocity and the error variance of the speed; V: in trim, m/s.
-
-    level: of the alarm, standard deviations. An acceleration error b, m/s2, gives the sum, of decay rate a,
-    1/s, an error b / a. Of a gust of deviation sigma and return rate V / L the sum misses the variance
-    sigma^2 a / (a + V / L). Their total is least near a^3 = 2 b^2 V / (L sigma^2).
-    """
-    sigma, errors, out = declared.air.sigma_mps, declared.sensors, gust["output"]
-    if not (out["gusty"] and out["measured"]):
-        return
-    rate, of_V, drag = V / SCALE_M, errors["V"], GRAVITY_MPS2 * MAX_DRAG_OVER_WEIGHT
-    b = 2.0 * EARTH_RATE_RAD_S * V + MAX_PATH_SLOPE_RAD * EARTH_M_S2  # Coriolis; gravity with place
-    b += GRAVITY_MPS2 * (errors["phi"].steady + errors["theta"].steady)
-    if out["uses_accelerometers"]:
-        b += errors["ax"].steady + drag * errors["ax"].slope
-    else:
-        b += drag * (declared.coefficients.largest + MASS_TOLERANCE)
-    a = (2.0 * b**2 * rate / sigma**2) ** (1.0 / 3.0)
-    var_V = sigma**2 * a / (a + rate) + (b / a) ** 2 + of_V.random**2 + (of_V.steady + of_V.slope * V) ** 2
-    fill(
-        gust["config"], var_v=sigma**2, v_max=MAX_GUST_STDS * sigma, a_v=a, var_V=var_V,
-        speed_error_share=speed_error_share(level),
-    )  # fmt: skip
-
-
-def speed_error_share(level: float) -> float:
-    """Share of a gust's intensity that a relative error e of the speed leaves, over the variance of e.
-
-    The error adds (e / tau) q to the gust's equation. Its spectrum is e^2 (w / tau)^2 / (w^2 + 1 / tau^2)^2
-    times that of a random walk of the gust's intensity: e^2 / 4 at most. e is normal and independent of the
-    noise. The product of two normal numbers exceeds x deviations with a probability of exp(-x). This equals
-    that of the alarm level, exp(-level^2 / 2), if e is taken to be level / 2 deviations.
-    """
-    return (0.5 * level) ** 2 / 4.0

@@ -167,26 +167,28 @@ def update_tests(fdi, prediction, measured, k, t):
     statistical.update_blocks(stat, dt, k, alarmed, not fdi.config.abrupt)
     if stat.attitude.enabled:
         compare_attitude(fdi, measured.x)
-    gust, vaned, vaneless = stat.gust, gust_of_views(stat), stat.vaneless
-    parity.project_views(views, stat.noise, stat.rows, stat.forces, gust, vaned, vaneless, y[AIRSPEED])
+    vaned, V = gust_of_views(stat), y[AIRSPEED]
+    parity.project_views(views, stat.noise, stat.rows, stat.forces, stat.gust, vaned, stat.vaneless, V)
     parity.update_views(views, stat.test, stat.tone_test_config, y, dt, k, alarmed)
     statistical.update_alarm(stat, views, t, fdi.bound.error_map.outside == 0)
     innovation_known(prediction, measured.x, dt)
-    statistical.filter_known(stat.block, gust, prediction.nu_known, dt)
+    statistical.filter_known(stat.block, stat.gust, prediction.nu_known, dt)
 
 
 @kernel
 def fill_rows(fdi, prediction, y):
     """Finish the gust estimates of the elapsed frame, and fill the rows that blocks and views read."""
-    stat, nu, means = fdi.statistical, fdi.bank.output.innovation, prediction.means
-    gust, vaned, vaneless = stat.gust, gust_of_views(stat), stat.vaneless
-    gusts.finish_gust(gust, prediction.w)
-    for own in (vaneless, stat.vaned):
+    stat, means, nu = fdi.statistical, prediction.means, fdi.bank.output.innovation
+    gusts.finish_gust(stat.gust, prediction.w)
+    for own in (stat.vaneless, stat.vaned):
         if own.output.gusty:
             gusts.finish_gust(own, prediction.w)
     fill_old_effects(means)
-    per_cubed = unanticipated_pitch(prediction.design, y, 1.0)
-    finish_rows(stat.rows, stat.noise, stat.forces, gust, vaned, vaneless, fdi.bound, means, nu, per_cubed)
+    alpha_cubed = unanticipated_pitch(prediction.design, y, 1.0)
+    finish_rows(
+        stat.rows, stat.noise, stat.forces, stat.gust, gust_of_views(stat), stat.vaneless, fdi.bound, means,
+        nu, alpha_cubed,
+    )  # fmt: skip
 
 
 @kernel

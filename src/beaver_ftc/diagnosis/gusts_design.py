@@ -1,0 +1,97 @@
+"""The record of the gust estimate, and its noise, as they follow from what a scenario declares.
+
+Letters as in gusts.py; b m/s2: error of the acceleration that predicts the velocity; sigma m/s: standard
+deviation of a gust.
+"""
+
+import numpy as np
+
+from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S, FORCES, GRAVITY_MPS2
+from beaver_ftc.compiled import fill
+from beaver_ftc.design import SCALE_M, rotation_lengths
+from beaver_ftc.design.table import AIRSPEED, fill_table
+from beaver_ftc.diagnosis.deviations import flow_noise, gust_noise
+from beaver_ftc.diagnosis.gusts import MIN_UNMEASURED_SHARES
+from beaver_ftc.diagnosis.monitors.redundancy import EARTH_M_S2
+from beaver_ftc.scenario.declared import MASS_TOLERANCE, Declared, SensorErrors
+
+INTEGRATION_NOISE_GAIN = 1.6  # noise gain of the two-step method: sqrt(1.5^2 + 0.5^2)
+MAX_GUST_STDS = 4.0  # limit of the estimated gust velocity, standard deviations
+MAX_PATH_SLOPE_RAD = 0.3  # of the path, along which gravity acts
+MAX_DRAG_OVER_WEIGHT = 0.3  # upper limit of drag over weight: errors of coefficients are a share of it
+
+
+def configure_gust(gust: np.void, declared: Declared) -> None:
+    """Fill the record with the declared turbulence."""
+    air, aircraft, span = declared.air, declared.aircraft, declared.aircraft.geometry.span_m
+    output, memory, altitude = gust["output"], gust["memory"], declared.sensors["altitude"]
+    known = bool(aircraft.measurable_forces)
+    measured = known or output["uses_accelerometers"]  # only where forces are known
+    fill(output, gusty=air.moves, measured=measured)
+    fill_table(memory["table"], aircraft, aircraft.measurable_forces, FORCES, declared.scale)
+    aloft = air.rotation_walk(span)
+    fill(memory, Q=aloft, share=MIN_UNMEASURED_SHARES if measured else 1.0)
+    fill(
+        gust["config"], has_forces=known, coarse_only=air.moves and not measured, span=span, Q_aloft=aloft,
+        S_m=aircraft.geometry.wing_area_m2 / declared.mass.mass_kg, Q_1m=air.rotation_walk_at_1_m(span),
+        gravity=GRAVITY_MPS2,  # standard; what is constant has no part in a change of the gust
+        h0=altitude.worst, h1=altitude.slope, L_gust=SCALE_M, L_roll=rotation_lengths(span)[0],
+    )  # fmt: skip
+
+
+def add_gust_noise(
+    stat: np.void, errors: SensorErrors, design: np.void, y: np.ndarray, u: np.ndarray, dt: float
+) -> None:
+    """Add the noise of the gust estimate to the model noise of the detector.
+
+    It is the noise of the vanes and of the force that predicts the velocity; for the estimate without vanes
+    that of the forces as well. y, u: in trim.
+    """
+    std, forces, gust = flow_noise(errors, y[AIRSPEED]), stat["forces"], stat["gust"]
+    span = float(gust["config"]["span"])
+    if forces["in_use"] or gust["output"]["uses_accelerometers"]:
+        std += INTEGRATION_NOISE_GAIN * errors.each("random", ("az", "ay")) * dt / y[AIRSPEED]
+    if forces["in_use"]:
+        each = forces["component"][::-1]  # normal to the body, and across
+        by_forces = np.sqrt(each["var_acc"]) / np.abs(each["vane"][:, 1])
+        forces["gust_noise"] = gust_noise(by_forces, design, y, u, span)
+    for name in ("Q0", "Q"):
+        stat["noise"][name] += gust_noise(std, design, y, u, span) ** 2
+
+
+def configure_gust_speed(gust: np.void, declared: Declared, level: float, V: float) -> None:
+    """Fill the decay rate of the gust velocity and the error variance of the speed; V: in trim, m/s.
+
+        a^3 = 2 b^2 V / (L sigma^2)      var_V = sigma^2 a / (a + V / L) + (b / a)^2 + errors of the airspeed
+
+    level: of the alarm, standard deviations. An acceleration error b gives the sum, of decay rate a, 1/s, an
+    error b / a. Of a gust of return rate V / L, L m: its length, the sum misses the variance
+    sigma^2 a / (a + V / L). The total of both is least near that a.
+    """
+    sigma, errors, out = declared.air.sigma_mps, declared.sensors, gust["output"]
+    if not (out["gusty"] and out["measured"]):
+        return
+    rate, of_V, drag = V / SCALE_M, errors["V"], GRAVITY_MPS2 * MAX_DRAG_OVER_WEIGHT
+    b = 2.0 * EARTH_RATE_RAD_S * V + MAX_PATH_SLOPE_RAD * EARTH_M_S2  # Coriolis; gravity with place
+    b += GRAVITY_MPS2 * (errors["phi"].steady + errors["theta"].steady)
+    if out["uses_accelerometers"]:
+        b += errors["ax"].steady + drag * errors["ax"].slope
+    else:
+        b += drag * (declared.coefficients.largest + MASS_TOLERANCE)
+    a = (2.0 * b**2 * rate / sigma**2) ** (1.0 / 3.0)
+    var_V = sigma**2 * a / (a + rate) + (b / a) ** 2 + of_V.random**2 + (of_V.steady + of_V.slope * V) ** 2
+    fill(
+        gust["config"], var_v=sigma**2, v_max=MAX_GUST_STDS * sigma, a_v=a, var_V=var_V,
+        speed_error_share=speed_error_share(level),
+    )  # fmt: skip
+
+
+def speed_error_share(level: float) -> float:
+    """Share of a gust's intensity that a relative error e of the speed leaves, over the variance of e.
+
+    The error adds (e / tau) q to the gust's equation. Its spectrum is e^2 (w / tau)^2 / (w^2 + 1 / tau^2)^2
+    times that of a random walk of the gust's intensity: e^2 / 4 at most. e is normal and independent of the
+    noise. The product of two normal numbers exceeds x deviations with a probability of exp(-x). This equals
+    that of the alarm level, exp(-level^2 / 2), if e is taken to be level / 2 deviations.
+    """
+    return (0.5 * level) ** 2 / 4.0

@@ -146,7 +146,11 @@ def map_row(emap):
 
 @kernel
 def look_up_map(emap, x, y, u, du):
-    """Fill `coordinates`, `outside`, `box` and `row`, and the bounds e_now and Cn_now at this state."""
+    """Fill `coordinates`, `outside`, `box` and `row`, and the bounds e_now and Cn_now at this state: those of
+    the smallest box that contains it, at the row k of the present time and the level j of the travel in use.
+
+    Outside all boxes, or after the last row, the bounds are the UNMAPPED ones. Density: 2 qdyn / V^2.
+    """
     z = emap.coordinates
     z[:3], z[3 : 3 + y.size] = x, y
     z[3 + QDYN] = 2.0 * y[QDYN] / (y[AIRSPEED] * y[AIRSPEED])

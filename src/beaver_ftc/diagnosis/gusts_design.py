@@ -10,6 +10,7 @@ from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S, FORCES, GRAVITY_MPS2
 from beaver_ftc.compiled import fill
 from beaver_ftc.design import SCALE_M, rotation_lengths
 from beaver_ftc.design.table import AIRSPEED, fill_table
+from beaver_ftc.diagnosis.detection.forces import VANE_E
 from beaver_ftc.diagnosis.deviations import flow_noise, gust_noise
 from beaver_ftc.diagnosis.gusts import MIN_UNMEASURED_SHARES
 from beaver_ftc.diagnosis.monitors.redundancy import EARTH_M_S2
@@ -53,7 +54,7 @@ def add_gust_noise(
         std += INTEGRATION_NOISE_GAIN * errors.each("random", ("az", "ay")) * dt / y[AIRSPEED]
     if forces["in_use"]:
         each = forces["component"][::-1]  # normal to the body, and across
-        by_forces = np.sqrt(each["var_acc"]) / np.abs(each["vane"][:, 1])
+        by_forces = np.sqrt(each["var_acc"]) / np.abs(each["vane"][:, VANE_E])
         forces["gust_noise"] = gust_noise(by_forces, design, y, u, span)
     for name in ("Q0", "Q"):
         stat["noise"][name] += gust_noise(std, design, y, u, span) ** 2

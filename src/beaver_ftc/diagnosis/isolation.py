@@ -95,8 +95,8 @@ def eta_explains(nu, nu_max):
 
 @kernel
 def consistent_on(nu, nu_max, fie, phi, i):
-    """The theta of the known set with |nu - h - theta Z| <= nu_max + r on axis i; the whole set if i is
-    skipped.
+    """The theta of the known set with |nu_i - h_i - theta Z_i| <= nu_max_i + r_i; the whole set if axis i is
+    skipped, because it cannot exclude this fault.
     """
     if fie.skip[i]:
         return fie.theta_min, fie.theta_max
@@ -392,7 +392,7 @@ def exclude_fault(fie, t, waits, in_doubt):
 
 @kernel
 def decide_isolation(iso, t):
-    """The fault isolated by the generalised observer scheme: the one estimator that is not excluded.
+    """The fault isolated at t s by the generalised observer scheme: the one estimator that is not excluded.
 
     NOT_ISOLATED if several are left; UNANTICIPATED if none is left: the fault is outside the class. A weakly
     excluded estimator is not isolated unless it is confirmed. On an aircraft that declares damage, neither is
@@ -405,9 +405,9 @@ def decide_isolation(iso, t):
         else:
             n += 1
             left = NOT_ISOLATED if fie.weak and not fie.confirmed else j
-    if t - last < iso.config.hold_s:
-        left = NOT_ISOLATED
-    return NOT_ISOLATED if n > 1 else (left if n == 1 else UNANTICIPATED)
+    if n == 0:
+        return UNANTICIPATED
+    return left if n == 1 and t - last >= iso.config.hold_s else NOT_ISOLATED
 
 
 @kernel
@@ -501,9 +501,8 @@ def update_likelihood(fie, cfg, blocks, iso, of, abrupt, hidden):
     fies, s = iso.estimator, fie.surface
     fie.unlikely = 0
     if not fie.confirmed and (fie.weak or not abrupt):
-        fie.confirmed = statistical.confirms_loss(
-            cfg, blocks, fies, of, s
-        )  # what follows later may be its end
+        # a confirmed loss stays: what contradicts it later may be its end
+        fie.confirmed = statistical.confirms_loss(cfg, blocks, fies, of, s)
     if fie.confirmed or not statistical.excludes_loss(cfg, blocks, fies, of, s, False, abrupt):
         return
     fie.unlikely = statistical.excludes_loss(cfg, blocks, fies, of, s, True, abrupt)

@@ -100,12 +100,8 @@ def fill_basis(alpha, beta, out):
 
 @kernel
 def beyond_bound(eps, mu):
-    """D[eps]: zero within the threshold mu, the excess over it outside."""
-    if eps > mu:
-        return eps - mu
-    if eps < -mu:
-        return eps + mu
-    return 0.0
+    """D[eps] = eps - clip(eps, -mu, mu): zero within the threshold mu, the excess over it outside."""
+    return eps - min(max(eps, -mu), mu)
 
 
 @kernel

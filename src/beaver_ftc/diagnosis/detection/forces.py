@@ -58,6 +58,7 @@ MEASURED_FORCES = (
 )
 FORCE_NAMES = tuple(force.coefficient for force in MEASURED_FORCES)
 VANES = tuple(force.vane for force in MEASURED_FORCES)
+VANE_E = 1  # in `vane` of a force: the place of e
 MIN_UPDATES = 2  # from the second one on the rate of sideslip of the run before is known
 # The rate of sideslip, the bias of the accelerometer and the force as a whole come last.
 MAX_FORCE_REGRESSORS = MAX_TERMS_OF_ONE + 3
@@ -91,14 +92,14 @@ FORCES_RECORD = record(
 def fill_vaneless_y(forces, w, y):
     """Fill `y_free` with the readings y, but alpha and beta worked out from the forces.
 
-        y_free = y - (e / q_ratio + L' w) / vane[1]
+        y_free = y - (e / q_ratio + L' w) / e_vane      e_vane = vane[VANE_E]: e per rad of the vane's error
 
     w (3,) rad/s: rotation of the air in body axes. The aircraft turns at x - w against it: e = -L' w.
     """
     forces.y_free[:] = y
     for i, f in enumerate(forces.component):
         e_w = project(f.L, w, False)
-        forces.y_free[VANES[i]] -= (f.innovation / forces.q_ratio + e_w) / f.vane[1]
+        forces.y_free[VANES[i]] -= (f.innovation / forces.q_ratio + e_w) / f.vane[VANE_E]
 
 
 @kernel
@@ -113,10 +114,12 @@ def drop_forces(forces, gust, vaneless, vaned):
 def update_inertial(forces, f, i, y, dt):
     """Integrate the flow angle of a vane from inertial motion, and return the innovation of force i at it.
 
-    angle <- angle + dt angle_rate      returned: e - slope (y - angle)      e_drift = sum dt slope
+        angle <- angle + dt angle_rate      returned: e - slope (y - angle)      e_drift = sum dt slope
+
+    y (5,): readings, of which y is the vane's, rad; slope rad/s2 per rad: e of an error of the vane.
     """
     angle = y[VANES[i]]
-    slope = f.vane[1] * forces.q_ratio
+    slope = f.vane[VANE_E] * forces.q_ratio
     f.angle = f.angle + dt * forces.angle_rate[i] if forces.n_seen else angle
     f.e_drift += dt * slope
     return f.innovation - slope * (angle - f.angle)

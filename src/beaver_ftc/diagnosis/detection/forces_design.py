@@ -49,7 +49,14 @@ def _configure_force(
     stat: np.void, err: np.void, declared: Declared, trim: TrimState, slopes: np.ndarray, i: int, dt: float
 ) -> None:
     """Fill the record of force i; stat: of the detector, err: of the declared errors, other arguments as of
-    `configure_forces`."""
+    `configure_forces`.
+
+        f_all = per_C dC / d(alpha, beta, V, p, q, r, dpt),      per_C = qdyn S / m c
+        Q_e = f_vane^2 (Q_angle + walk),      Q_angle = (DRIFT_CHANGE_PER_S drift)^2 + dt (std / V)^2
+
+    f_vane rad/s2 per rad: element of f_all of the force's vane; Q_angle rad2/s: intensity of the drift of the
+    flow angle from inertial motion; walk rad2/s: by gusts; std m/s2: noise of the accelerometer.
+    """
     y, aircraft, errors = trim[1], declared.aircraft, declared.sensors
     forces, cfg = stat["forces"], stat["gust"]["config"]
     f, force = forces["component"][i], MEASURED_FORCES[i]
@@ -74,9 +81,12 @@ def _configure_force(
 def _force_variances(
     err: np.void, errors: SensorErrors, y: np.ndarray, f_all: np.ndarray, vane: int
 ) -> tuple[float, float]:
-    """Variance of a predicted force by the noise of all readings, and without that of its vane.
+    """Variance of a predicted force by the noise of all readings, (rad/s2)2, and without that of its vane:
 
-    f_all (7,): slopes of the force as of `_force_slopes`.
+        sum_k (f_k sigma_k)^2 + f_dpt^2 var_dpt,      k: alpha, beta, V, p, q, r
+
+    f_all (7,): slopes of the force as of `_force_slopes`, that of dpt last. dpt moves with the airspeed: its
+    part dpt_V counts in f_V, the rest is var_dpt.
     """
     f_y = f_all[:-1].copy()
     f_dpt = f_all[-1]
@@ -97,8 +107,11 @@ def _slipstream_noise(y: np.ndarray, err: np.void, errors: SensorErrors) -> tupl
 
 
 def _drift_bound(errors: SensorErrors, gravity: float, V: float, i: int) -> float:
-    """Bound the drift of the flow angle from inertial motion, rad/s. An error of the attitude turns
-    gravity: in the incidence, only the component by the slope of the path acts; in sideslip, all of it."""
+    """Bound the drift of the flow angle from inertial motion, rad/s: w_E + gyros + a / V.
+
+    a m/s2: error of the acceleration across the flow. An error of the attitude turns gravity: in the
+    incidence, only the component by the slope of the path acts; in sideslip, all of it.
+    """
     attitude = errors["phi"].steady + errors["theta"].steady
     gyros = sum(errors[name].steady + TYPICAL_RATE_RAD_S * errors[name].slope for name in AXES)
     # error of the accelerometers across the flow in level flight: all of that along the force, and of the one

@@ -358,9 +358,11 @@ def reset_slot(b, slot):
 
 @kernel
 def bound_responses(b, dt):
-    """Fill `eta_0` = eta |g_0| and `eta_r` = eta RINGING |K_d^-1|, (2,).
+    """Fill eta_0 = eta |g_0| and eta_r = RINGING_FACTOR |K_d^-1| eta, (2,) rad/s.
 
-    g_0 = dt (1 - a) / (K_x (1 - a) + dt K_d)      K_d^-1: cofactors c over det
+        g_0 = dt (1 - a) / (K_x (1 - a) + dt K_d)      |K_d^-1|: magnitudes of the cofactors c, over det
+
+    g_0 s: what the drift leaves of a unit constant, on an axis by itself.
     """
     K_d, lost = b.K_d, 1.0 - b.a
     det = K_d[0, 0] * K_d[1, 1] - K_d[0, 1] * K_d[1, 0] if b.n > 1 else K_d[0, 0]
@@ -416,7 +418,8 @@ def accumulate_tests(b, t, n, dt, decay):
                 x[i, k] -= K_x * g_s[j, k]
                 x[D0 + i, k] += K_d * g_s[j, k]
         S_0, S_1, g, p, g_c = b.S_inv[i, 0], b.S_inv[i, 1], b.g[i], b.p[i], b.g_c[i]
-        keep, c, r, r_w = 1.0 if i else decay, b.eta_0[i], b.eta_r[i], b.eta_rate * b.eta_r[i]
+        keep = 1.0 if i else decay  # the sums of both axes decay once a frame
+        c, r, r_w = b.eta_0[i], b.eta_r[i], b.eta_rate * b.eta_r[i]
         for k in range(n):
             w_i = S_0 * g_s[0, k] + S_1 * g_s[1, k]
             t.correlation[k] = keep * t.correlation[k] + w_i * g

@@ -88,6 +88,7 @@ from beaver_ftc.diagnosis.state import SIDE_FORCE
 PEAK_MEMORY_RATIO = 5.0  # time constant of `peak` over the one with which evidence is forgotten
 MIN_FORCE_PART = 0.9  # component of a direction of length 1, above which a view counts as one of the force
 MIN_NORM_SHARE = 0.1  # least length that the errors leave of a column, as a share of its length
+FORCE_PLACE = 2  # in `places`: of the row j, of the force
 
 # Values of `nulled` besides a surface: a view of an axis; one across the column of an error of the side vane,
 # of the other vane.
@@ -206,7 +207,12 @@ def project_views(views, noise, rows, forces, gust, vaned, vaneless, V):
 
 @kernel
 def update_views(views, cfg, c, y, dt, k, latched):
-    """Update filter and tests of each view with frame k, as `statistical.update_blocks`; y (5,) measured."""
+    """Update filter and tests of each view with frame k, as `statistical.update_blocks`; y (5,) measured.
+
+        peak <- max((1 - (1 - forget) / PEAK_MEMORY_RATIO) peak, score)
+
+    c: of TONE_RECORD; latched: the detector has raised its alarm, so evidence decays and no slot restarts.
+    """
     inside = within_limits(c, y)
     decay = cfg.forget if latched else 1.0
     slot = likelihood.restarting_slot(k)
@@ -225,7 +231,8 @@ def update_views(views, cfg, c, y, dt, k, latched):
 
 @kernel
 def changes_view(view, forces, s, G):
-    """True if a fault of surface s changes the projection of a view; G (3,): its effect on the rates now.
+    """True if a fault of surface s changes the projection of a view, m' (G, G_f) != 0; G (3,), G_f (2,): its
+    effect on the rates and on the forces now.
 
     The column that the view was turned across is that of the frame before, and zero in the first.
     """
@@ -247,7 +254,9 @@ def view_score(view):
 
 @kernel
 def confirmed_score(view, views, cfg, forces):
-    """The score of a view, limited by the views that confirm that it is not an error of a vane.
+    """The score of a view, limited by the views that confirm that it is not an error of a vane:
+
+        min(peak, P alarm_level / sqrt(2 margin))      P: the largest peak of the views that confirm
 
     A view of the rates alone from which no gust is subtracted needs no confirmation: no error of a vane
     changes the rates alone. Peak scores are compared because the view and its confirmation may reach their
@@ -259,7 +268,7 @@ def confirmed_score(view, views, cfg, forces):
         return view_score(view)
     peak = 0.0
     for other in views:
-        if other.block.source >= VANELESS and other.places[2] == view.confirmer:
+        if other.block.source >= VANELESS and other.places[FORCE_PLACE] == view.confirmer:
             peak = max(peak, other.peak)
     return min(view.peak, peak * cfg.alarm_level / np.sqrt(2.0 * cfg.margin))
 
@@ -273,7 +282,7 @@ def view_alarm_score(view, views, cfg, forces, gust):
     """
     if view.nulled == AXIS_VIEW:
         return view.tones.score if view.block.source != INERTIAL else 0.0
-    of_force = view.by_force and abs(view.block.m[0, view.places[2]]) > MIN_FORCE_PART
+    of_force = view.by_force and abs(view.block.m[0, view.places[FORCE_PLACE]]) > MIN_FORCE_PART
     if of_force and view.block.source == VANED and gust.output.uses_accelerometers == 1:
         return confirmed_score(view, views, cfg, forces)
     return 0.0

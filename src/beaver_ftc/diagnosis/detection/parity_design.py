@@ -155,14 +155,18 @@ def _configure_view(view: np.void, d: ParityDirection, gusty: bool, vaned: bool)
     i, j = d.plane_pair
     # In moving air a view across the error of the side vane is orthogonal to the rolling gust as well.
     across_gust = across_vane and d.plane_pair == YAW_PLANE and gusty
-    source = VANED if vaned or by_force else RAW
-    if d.by_inertia or across_vane:
-        source = INERTIAL if d.by_inertia else VANELESS
+    if d.by_inertia:
+        source = INERTIAL
+    elif across_vane:
+        source = VANELESS
+    else:
+        source = VANED if vaned or by_force else RAW
     view["block"]["source"] = source
     fill(
         view, nulled=d.nulled, by_force=by_force, places=(ROLL, YAW, j) if across_gust else (i, -1, j),
         alarm_axis=d.m_0.index(1.0) if is_axis and not d.by_inertia else i,
-        confirmer=(NORMAL_FORCE if j == NORMAL_FORCE else SIDE_FORCE) if by_force or vaned else -1,
+        # the row of a force is the last; the side force confirms a view of roll and yaw
+        confirmer=max(j, SIDE_FORCE) if by_force or vaned else -1,
     )  # fmt: skip
 
 

@@ -157,6 +157,8 @@ def fill_signal_slopes(tab, err, y, j, ds):
 def add_constants(w, noise, rows, err, model, meas, u):
     """Add an instant, w of the frame, to Z of the rates, rad/s2 per unit; and fill Q as it is now.
 
+        Z_c <- Z_c + w dF_c      Q = Q0 + sum_j (dF_j sigma_j)^2,  j: readings      dF: acceleration by C
+
     C (3, n): the coefficients of the moments per unit of each constant: the term's monomial, with the
     deflection of its surface; for reading j, sum C dm + [j is qdyn] sum C m / q.
     """
@@ -213,9 +215,12 @@ def begin_rows(w, noise, rows, bound, model, meas, u):
 
 @kernel
 def finish_rows(rows, noise, forces, gust, of_views, vaneless, bound, means, nu, per_cubed):
-    """Fill the rows of the elapsed frame; nu (3,) rad/s2: innovation of the rates.
+    """Fill the rows of the rates for the elapsed frame; nu (3,) rad/s2: their innovation.
 
-    gust, of_views, vaneless: the estimates that are subtracted. per_cubed: see ROWS_RECORD.
+        rows.nu[source] = nu - acc_mean of the gust estimate that the source subtracts, RAW: none
+
+    gust, of_views, vaneless: the estimates that RATES, VANED and VANELESS subtract. per_cubed: see
+    ROWS_RECORD. Effects of surfaces are those with G of the frame before.
     """
     rows.per_cubed = per_cubed
     for i in range(3):
@@ -236,8 +241,10 @@ def finish_rows(rows, noise, forces, gust, of_views, vaneless, bound, means, nu,
 def update_forces(rows, forces, gust, du, meas, u, dt):
     """Update the rows of the forces at this instant, dt s after the last.
 
-    u (n,) rad: surfaces; du (n,) rad: bounds on their errors. eta = |G| du + the change of the force during
-    MAX_FORCE_LAG_S, rad/s2.
+        std^2 = var_trim q_ratio^2 + (f_hat q_noise / qdyn)^2 + var_acc
+        eta = q_ratio sum_s G_trim_s du_s + MAX_FORCE_LAG_S |f_hat'|
+
+    u (n,) rad: surfaces; du (n,) rad: bounds on their errors; f_hat' rad/s3: rate of change of the force.
 
     At the first instant the rate of sideslip of the run before is not known; that of this instant is used.
     """
@@ -249,9 +256,9 @@ def update_forces(rows, forces, gust, du, meas, u, dt):
         r = SIDE_FORCE + i
         f_prev = f.f_hat
         predict_force(rows, forces, f, gust, i, meas, u)
-        std = f.f_hat * forces.q_noise / meas.y[QDYN]
+        by_q = f.f_hat * forces.q_noise / meas.y[QDYN]
         for source in range(INERTIAL + 1):
-            var = f.var_trim[int(source == INERTIAL)] * forces.q_ratio**2 + std * std + f.var_acc
+            var = f.var_trim[int(source == INERTIAL)] * forces.q_ratio**2 + by_q * by_q + f.var_acc
             rows.nu[source, r] = f.innovation
             rows.std[source, r] = np.sqrt(var)
         rows.nu[INERTIAL, r] = update_inertial(forces, f, i, meas.y, dt)
@@ -335,8 +342,13 @@ def projection(m, i, X, k, size=False):
 
 @kernel
 def project_rows(b, rows):
-    """Fill the rows of the elapsed frame in the directions of block b: nu, noise, bound, signatures,
-    regressors."""
+    """Fill what block b sees of the rows of the elapsed frame, in each of its directions m (5,):
+
+        nu = m nu,  Q_x = (|m| std)^2,  eta = |m| eta,  R_y = m^2 R,  signature = m Gu_s,  regressor_j = m Z_j
+
+    The signature of a moment in alpha^3 is m per_cubed in pitch; those of the other hypotheses without a
+    surface stay.
+    """
     m, source = b.m, b.source
     for i in range(b.n):
         b.nu[i] = projection(m, i, rows.nu, source)
@@ -356,5 +368,5 @@ def project_rows(b, rows):
 
 @kernel
 def fill_leak(b, rows, leak, col):
-    """The last regressor of a view, leak col' nu: what an error of the column col (5,) lets through."""
+    """Fill the last regressor of a view, leak col' nu: what an error of the column col (5,) lets through."""
     b.regressor[b.n_Z - 1, 0] = leak * project(col, row_of(rows.nu, b.source), False)

@@ -153,8 +153,9 @@ def fill_unmodelled(blocks, gust, out):
 def update_alarm(stat, views, t, bounded=True):
     """Fill the scores over the alarm level, the largest, its axis, and at the first alarm its time t s.
 
-    Scores of forces and of oscillations are in the column of the step on their axis: the last three of the
-    n_scores in `share`. The largest is 0 unless `bounded`: outside its map, the model's error has no bound.
+    Scores of forces and of oscillations are in the column of the step on their axis: the last ones of the
+    n_scores in `share`, one an axis. The largest is 0 unless `bounded`: outside its map, the model's error
+    has no bound.
     """
     alarm = stat.alarm
     cfg = stat.test
@@ -166,7 +167,7 @@ def update_alarm(stat, views, t, bounded=True):
                 keep_score(alarm, h.score / cfg.alarm_level, h.axis, h.column)
     for v in views:
         share = parity.view_alarm_score(v, views, cfg, stat.forces, stat.gust) / cfg.alarm_level
-        keep_score(alarm, share, v.alarm_axis, cfg.n_scores - 3 + v.alarm_axis)
+        keep_score(alarm, share, v.alarm_axis, cfg.n_scores - len(AXES) + v.alarm_axis)
     if not bounded:
         alarm.ratio = 0.0
     if alarm.ratio > 1.0 and alarm.detected_at_s < 0.0:

@@ -82,7 +82,8 @@ def hypotheses_by_block(aircraft: Aircraft) -> Iterator[tuple[tuple[int, ...], l
 
 
 def count_tests(aircraft: Aircraft, *directions: ParityDirection) -> int:
-    """The number of one-sided tests that the detector makes in a frame, those of these views included."""
+    """The number of one-sided tests that the detector makes in a frame, those of these views included: one of
+    each onset and sign of a hypothesis that can raise the alarm, and one of each frequency."""
     kinds = [entry.kind for _, entries in hypotheses_by_block(aircraft) for entry in entries if entry.alarms]
     n_tones = 0
     for d in directions:
@@ -168,7 +169,8 @@ def _configure_levels(cfg: np.void, declared: Declared, n_tests: int) -> None:
     """Fill the level of the alarm, the margin of isolation, and how evidence is forgotten and bounded."""
     settings, aircraft, rate_hz = declared.fdi.statistical, declared.aircraft, declared.rate_hz
     assert settings is not None
-    # margin: difference of log-likelihood ratios that noise exceeds in a second with probability `misnaming`
+    # margin: the difference z_m^2 / 2 of log-likelihood ratios that noise exceeds in a second with
+    # probability `misnaming`; z_m: the quantile of its share in one test
     fill(
         cfg, alarm_level=derive_alarm_level(settings.false_alarms_per_h, rate_hz, n_tests),
         margin=0.5 * _quantile(settings.misnaming / (rate_hz * count_tests(aircraft))) ** 2,

@@ -55,7 +55,7 @@ def reconfigure(fdi: np.void, declared: Declared, travel: np.ndarray) -> None:
     if not options["adaptive_threshold"]:
         scheme["config"]["mu0"] = options["constant_threshold_rad_s"]
         isolation["config"]["mu_kind"] = CONSTANT_THRESHOLD
-    if options["leave_out"]:
+    if options["leave_out"]:  # the number of an estimator, the first is 1
         isolation["estimator"]["excluded"][int(options["leave_out"]) - 1] = 1
 
 

@@ -119,8 +119,8 @@ def withdraw_conclusion(found):
 
 @kernel
 def update_interval(found, s, isolated, t, kind, reason):
-    """Record at t s whether surface s is isolated, and of which type `kind` (-1 if open); store what is
-    withdrawn, and why.
+    """Record at t s whether surface s is isolated, and of which type `kind` (-1 if open); store what ends
+    with this frame, and why: the isolation, or, while it goes on, its type.
     """
     isolated_since, old_type = found.from_s[s], found.isolated_type[s]
     if isolated and isolated_since < 0.0:
@@ -139,7 +139,8 @@ def update_interval(found, s, isolated, t, kind, reason):
 
 @kernel
 def store_withdrawn(store, n, s, kind, from_s, to_s, reason):
-    """Fill the next record of a store (MAX_WITHDRAWN,), or the last; returns how many there were."""
+    """Fill the next record of a store (MAX_WITHDRAWN,), whose n records are filled, or the last if it is
+    full; return how many there were, n + 1."""
     gone = store[min(n, MAX_WITHDRAWN - 1)]
     gone.surface, gone.fault_type, gone.reason = s, kind, reason
     gone.from_s, gone.to_s = from_s, to_s

@@ -31,8 +31,8 @@ _GYRO_OF = dict(zip(RATE_SIGNALS, AXES, strict=True))
 
 
 def plugin_errors(declared: Declared, model: np.ndarray, y: np.ndarray, u: np.ndarray) -> "DeclaredErrors":
-    """Return the declared errors for a plug-in, at the trim y and u rad; model: record of the design model,
-    (1,).
+    """Return the declared errors for a plug-in, at the trim y (4 + signals,) and u (surfaces,) rad; model:
+    record of the design model, (1,). The variance of a reading is noise^2 + bias^2 + resolution^2 / 12.
     """
     from beaver_ftc.design.context import DeclaredErrors  # for plug-ins alone
 

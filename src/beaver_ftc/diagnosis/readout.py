@@ -323,11 +323,19 @@ def certificate_arrays(
     """The arrays of which a certificate wants every frame, and those of which it wants the frames up to the
     alarm; not copies.
 
-    offset, slope, spread (n_estimators, 3): effect of each hypothesis' fault. excluded, types: what is
-    excluded. Of faults of every type: least and greatest order to each surface, and position of a healthy
-    one, rad. Up to the alarm: reach_low, reach_high: what each hypothesis' fault can have done to the
-    detection filters. Of the statistical detector: RECORDED_BLOCK_FIELDS of each filter, signatures of its
-    hypotheses, what is bounded besides, and the gust as the vanes see it.
+    Every frame:
+
+        offset, slope, spread     h, Z, r of each estimator's fault, (n_estimators, 3) rad/s2
+        excluded, types           whether each estimator, and each type on each surface, is excluded
+        command_low, _high        of faults of every type: least and greatest command of a surface, rad
+        least, greatest           the same of the position of a healthy surface, rad
+
+    Up to the alarm:
+
+        reach_low, reach_high     L and U of each estimator's fault, (n_estimators, MAX_POLES, 4) rad/s
+        RECORDED_BLOCK_FIELDS     of each filter of the statistical detector
+        signature, bounded        of its hypotheses, rad/s2; bound eta of its rates, (3,) rad/s2
+        air, leap                 gust estimate: acc_mean, (3,) rad/s2, and var_turn, (3, 3) (rad/s2)2
     """
     est, srf = fdi["isolation"]["estimator"][:n_estimators], fdi["types"]["surface"]
     always = {
@@ -354,7 +362,8 @@ def alarm_flags(fdi: np.void) -> tuple[np.int64, np.int64]:
 
 
 def _read(kind: type[Read], record: np.void, names: str, *others: Any) -> Read:
-    """An object of a class, its first fields copied from the fields of a record with these names."""
+    """An object of a class, its first fields copied from the fields of a record that `names` lists in this
+    order, each turned into the type of the field; others: the values of the further fields."""
     hints = get_type_hints(kind).values()
     copies = {np.ndarray: np.array}
     return kind(

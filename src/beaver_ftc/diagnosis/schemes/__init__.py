@@ -2,9 +2,10 @@
 
 `begin_scheme`, `advance_estimators_to_frame`, `update_verdict`, `prepare_next_frame` and
 `accumulate_substep` say which kernels fly for which scheme, in the order in which the frame (loop/frame.py)
-calls them. prediction, measured: the records of the prediction and the sensors.
+calls them.
 
-fdi: of `fdi_dtype`; t s.
+Arguments of the kernels: fdi, of `fdi_dtype`; prediction, of `model_prediction.prediction_dtype`; measured,
+the readings of the sensors; k, number of the frame; t s, its time.
 """
 
 from collections.abc import Iterator
@@ -99,15 +100,14 @@ def _refuse_pairs(declared: Declared) -> None:
 
 @kernel
 def record_isolated_surfaces(fdi, t):
-    """Record at t s which surfaces are isolated: those of a pair, or the isolated one; none once a sensor is
-    found broken."""
-    found, monitor = fdi.verdict, fdi.sensor_monitor
+    """Record at t s which surfaces are isolated, and of which type: those that the pairs leave, or the one
+    surface of the conclusion; none (`void`) once a sensor is found broken."""
+    found, monitor, pairs = fdi.verdict, fdi.sensor_monitor, fdi.types.pair.enabled
     void = sensor_monitor.has_alarm(monitor) and not monitor.output.keeps_surface
     sole = conclusions.isolated_surface(found, fdi.isolation.estimator)
     for s, surf in enumerate(fdi.types.surface):
-        isolated, kind = s == sole, found.fault_type
-        if fdi.types.pair.enabled:
-            isolated, kind = surf.status.is_isolated, surf.status.fault_type
+        isolated = surf.status.is_isolated if pairs else s == sole
+        kind = surf.status.fault_type if pairs else found.fault_type
         reason = SENSOR_BROKEN if void else reason_of_withdrawal(fdi, s, isolated)
         conclusions.update_interval(
             found, s, isolated and not void, t, SAME_NAME[kind] if kind >= 0 else -1, reason
@@ -132,7 +132,8 @@ def reason_of_withdrawal(fdi, s, isolated):
 
 @kernel
 def detection_share(fdi):
-    """The largest share of its threshold that the built-in detection reaches at this frame.
+    """The largest share of its threshold that the built-in detection reaches at this frame, |E| / T of the
+    bank or score / z of the statistical detector.
 
     Of two detectors, the worst-case one counts beyond its bound only: it has no rate of false alarms that a
     lower level could trade for power.

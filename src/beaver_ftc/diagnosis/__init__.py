@@ -12,10 +12,10 @@ import numpy as np
 
 from beaver_ftc.public import lazily
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # for annotations
     from beaver_ftc.design.context import Context
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # what the folder publishes: public.py
     from beaver_ftc.diagnosis.bounds import ROUNDING_RAD_S2
     from beaver_ftc.diagnosis.isolation import estimator_names
     from beaver_ftc.diagnosis.readout import (

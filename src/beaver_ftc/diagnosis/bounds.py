@@ -143,17 +143,18 @@ def slipstream_bound(err, y):
 def fill_magnitudes(err, x, y, u):
     """Fill x, y, u with the magnitudes |v| as measured, and with the largest that the errors allow, |v| + e;
     for airspeed, which divides, with the smallest, V - e. x_air: these rates with the air's rotation.
-
-    n: how many times the errors count, 0 in the row MEASURED, 1 in the row WORST.
     """
-    for n in (MEASURED, WORST):
-        for i in range(3):
-            err.x[n, i] = abs(x[i]) + n * reading_bound(err, i, x[i])
-            err.x_air[n, i] = err.x[n, i] + n * err.wg[i]
-        for i in range(y.size):
-            err.y[n, i] = abs(y[i]) + (n * reading_bound(err, Y0 + i, y[i]) if i < DPT else 0.0)
-        for s in range(u.size):
-            err.u[n, s] = abs(u[s]) + n * err.du[s]
+    for i in range(3):
+        err.x[:, i] = err.x_air[:, i] = abs(x[i])
+        err.x[WORST, i] += reading_bound(err, i, x[i])
+        err.x_air[WORST, i] = err.x[WORST, i] + err.wg[i]
+    for i in range(y.size):
+        err.y[:, i] = abs(y[i])
+        if i < DPT:
+            err.y[WORST, i] += reading_bound(err, Y0 + i, y[i])
+    for s in range(u.size):
+        err.u[:, s] = abs(u[s])
+        err.u[WORST, s] += err.du[s]
     if err.engine:
         err.y[WORST, DPT] += slipstream_bound(err, y)
     V = y[AIRSPEED]

@@ -120,8 +120,9 @@ def add_to_sums(pred, bound, layout, all_types):
         sums.eta_bar[i] += w * bound.eta_now[i]
         for s in range(u.size):
             sums.G[i, s] += w * G[i, s]
-            sums.Gu[i, s] += w * G[i, s] * u[s]
-            sums.F[i] += w * G[i, s] * u[s]
+            Gu = w * G[i, s] * u[s]
+            sums.Gu[i, s] += Gu
+            sums.F[i] += Gu
             if bound.has_eG:
                 sums.eG[i, s] += w * eG[i, s]
                 sums.eGu[i, s] += w * eG[i, s] * abs(u[s])

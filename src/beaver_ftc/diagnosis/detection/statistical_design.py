@@ -140,7 +140,7 @@ def configure_statistics(fdi: np.void, declared: Declared, model: np.void, trim:
     configure_gust(gust, declared)
     views = list_directions(aircraft, declared.uses_accelerometers) if declared.compares_across else ()
     n_tests = count_tests(aircraft, *views)
-    _configure_levels(cfg, declared, n_tests)
+    _configure_levels(cfg, declared, settings, n_tests)
     configure_gust_speed(gust, declared, float(cfg["alarm_level"]), V)
     tol = coefficient_bounds(declared, model, *trim[1:])
     configure_rows(stat, errors, tol, fdi["bound"]["declared_errors"])
@@ -165,10 +165,9 @@ def configure_statistics(fdi: np.void, declared: Declared, model: np.void, trim:
         add_gust_noise(stat, errors, model, *trim[1:], dt_s)
 
 
-def _configure_levels(cfg: np.void, declared: Declared, n_tests: int) -> None:
+def _configure_levels(cfg: np.void, declared: Declared, settings: Statistical, n_tests: int) -> None:
     """Fill the level of the alarm, the margin of isolation, and how evidence is forgotten and bounded."""
-    settings, aircraft, rate_hz = declared.fdi.statistical, declared.aircraft, declared.rate_hz
-    assert settings is not None
+    aircraft, rate_hz = declared.aircraft, declared.rate_hz
     # margin: the difference z_m^2 / 2 of log-likelihood ratios that noise exceeds in a second with
     # probability `misnaming`; z_m: the quantile of its share in one test
     fill(

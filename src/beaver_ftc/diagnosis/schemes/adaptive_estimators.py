@@ -217,13 +217,13 @@ def add_gust_instant(fdi, prediction, measured):
 
 @kernel
 def update_gusts(stat, du, pred, meas, k, dt):
-    """Update the gust estimate from vanes and accelerometers, and the rows of the forces; du (n,) rad: errors
-    of the deflections."""
+    """Update the gust estimates, and the rows of the forces; without inertial readings to trust, stop using
+    accelerometers. du (n,) rad: errors of the deflections."""
     gust, vaneless, vaned, force = stat.gust, stat.vaneless, stat.vaned, stat.forces
     if gust.output.gusty:
         gusts.set_intensity(gust, meas.altitude)
         gusts.step_gust(gust, meas.y, meas.attitude, pred.w * dt, k)
-    if (force.in_use or gust.output.uses_accelerometers) and not meas.inertial:
+    if not meas.inertial:
         forces.drop_forces(force, gust, vaneless, vaned)
     if force.in_use or gust.output.uses_accelerometers:
         gust.memory.f_read[:] = meas.force

@@ -39,7 +39,8 @@ Letters of the record and of the kernels, for each axis i:
 
     s, s_j, s_h     states (psi rad, xi rad/s, d rad/s2) of the filters of g, of g_j and of the g_s of loss h
     P, K, S         covariance (3, 3) and gain (3,) of these filters; variance of g, rad2
-    u               the input d + phi - D xi of the filter of g without the damping of its own axis, rad/s2
+    u               input of a filter, rad/s2: of g, -nu less the damping by the other axes; of g_j, r_j; of
+                    g_s, the signature of the loss
     r, g_j          known accelerations r_j, rad/s2; responses to them over sqrt S
     n               number of the constants: those of the block, then the N_FURTHER
     z, z_j          leaky sums of g and g_j over sqrt S; m counts their leaks a

@@ -241,7 +241,6 @@ def finish_rows(rows, noise, forces, gust, of_views, vaneless, bound, means, nu,
 def update_forces(rows, forces, gust, du, meas, u, dt):
     """Update the rows of the forces at this instant, dt s after the last.
 
-        std^2 = var_trim q_ratio^2 + (f_hat q_noise / qdyn)^2 + var_acc
         eta = q_ratio sum_s G_trim_s du_s + MAX_FORCE_LAG_S |f_hat'|
 
     u (n,) rad: surfaces; du (n,) rad: bounds on their errors; f_hat' rad/s3: rate of change of the force.
@@ -256,11 +255,7 @@ def update_forces(rows, forces, gust, du, meas, u, dt):
         r = SIDE_FORCE + i
         f_prev = f.f_hat
         predict_force(rows, forces, f, gust, i, meas, u)
-        by_q = f.f_hat * forces.q_noise / meas.y[QDYN]
-        for source in range(INERTIAL + 1):
-            var = f.var_trim[int(source == INERTIAL)] * forces.q_ratio**2 + by_q * by_q + f.var_acc
-            rows.nu[source, r] = f.innovation
-            rows.std[source, r] = np.sqrt(var)
+        fill_force_row(rows, forces, f, r, meas.y[QDYN])
         rows.nu[INERTIAL, r] = update_inertial(forces, f, i, meas.y, dt)
         rows.Z[rows.first[i] + f.n_Z, r] = f.e_drift
         eta = 0.0
@@ -270,6 +265,21 @@ def update_forces(rows, forces, gust, du, meas, u, dt):
         rows.eta[0, r] = rows.eta[1, r] = eta * forces.q_ratio + e_lag
     fill_angle_rates(forces, gust.config.gravity, meas)
     forces.n_seen = min(forces.n_seen + 1, MIN_UPDATES)
+
+
+@kernel
+def fill_force_row(rows, forces, f, r, qdyn):
+    """Fill nu and std of row r, of the force f, with each of what may be subtracted from the rates:
+
+        nu = e      std^2 = var_trim q_ratio^2 + (f_hat q_noise / qdyn)^2 + var_acc
+
+    var_trim: with the noise of the vane; with INERTIAL, which reads no vane, without it. qdyn Pa.
+    """
+    by_q = f.f_hat * forces.q_noise / qdyn
+    for source in range(INERTIAL + 1):
+        var = f.var_trim[int(source == INERTIAL)] * forces.q_ratio**2 + by_q * by_q + f.var_acc
+        rows.nu[source, r] = f.innovation
+        rows.std[source, r] = np.sqrt(var)
 
 
 @kernel

@@ -17,6 +17,7 @@ from beaver_ftc.compiled import fill
 from beaver_ftc.design import rotation_lengths
 from beaver_ftc.design.model import jacobian
 from beaver_ftc.design.table import AIRSPEED, ALPHA, BETA, QDYN
+from beaver_ftc.diagnosis.bounds import Y0
 from beaver_ftc.diagnosis.detection import likelihood
 from beaver_ftc.diagnosis.detection.attitude import configure_attitude
 from beaver_ftc.diagnosis.detection.forces_design import TrimState, configure_forces
@@ -255,6 +256,11 @@ def _configure_noise(
     The evidence that the uncertainty explains is bounded by its declared rate of change in any case
     (`likelihood.uncertain_share`). The drift only sets how much of it the filters remove. If damage may take
     surfaces, a weaker drift detects most: motion that no loss explains is then rarely an error of the model.
+
+        Q0 = sum_x (F_x sigma_x)^2      Q = Q0 + sum_y (F_y sigma_y)^2, in trim; later as of
+        `rows.add_constants`
+
+    F_x, F_y: slopes of f + G u with rates and air data; sigma: noise of the readings, gyros first.
     """
     sigma = declared.sensors.each("random")
     noise = stat["noise"]
@@ -263,9 +269,9 @@ def _configure_noise(
     eta = max(declared.constant_rad_s2)
     level = float(stat["test"]["alarm_level"])
     _, G, F_x, F_y = jacobian(model, *trim)
-    Q0 = F_x**2 @ sigma[:3] ** 2
-    Q_y = F_y[:, [ALPHA, BETA, AIRSPEED, QDYN]] ** 2 @ sigma[3:] ** 2  # later as `rows.add_constants` says
-    fill(noise, q=derive_intensity(eta, omega, float(sigma[:3].max()), level, dt_s), Q0=Q0, Q=Q0 + Q_y)
+    Q0 = F_x**2 @ sigma[:Y0] ** 2
+    Q_y = F_y[:, [ALPHA, BETA, AIRSPEED, QDYN]] ** 2 @ sigma[Y0:] ** 2
+    fill(noise, q=derive_intensity(eta, omega, float(sigma[:Y0].max()), level, dt_s), Q0=Q0, Q=Q0 + Q_y)
     noise["G_trim"][:, : G.shape[1]] = np.abs(G)
 
 

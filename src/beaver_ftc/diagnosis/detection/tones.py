@@ -41,6 +41,7 @@ TONE_INTERVAL_S = 0.04
 # Share of the alarm level reserved for noise in addition to a bounded uncertainty. It is reserved without
 # noise too, because `tone_gain` assumes constant gains, and the gains vary with a varying bound.
 TONE_NOISE_SHARE = 0.5
+SQRT2_LESS_1 = sqrt(2.0) - 1.0  # see `bound_coefficients`
 # The tests run at airspeeds within this ratio of the trim airspeed, and at vane angles within this limit.
 MAX_V_FACTOR, MAX_VANE_RAD = 2.0, 0.5
 
@@ -148,18 +149,22 @@ def update_tone_eta(t, c, b, dt):
 def bound_coefficients(t, tol, n_Z):
     """Fill e_R = sum_j tol_j |R_j|: the most that the errors of the first n_Z coefficients add to |N|.
 
-    |R_j| is at most its larger part plus (sqrt 2 - 1) times its smaller part.
+    |R_j| is at most its larger part plus (sqrt 2 - 1) times its smaller part, which needs no square root.
     """
     t.e_R[:] = 0.0
     for j in range(n_Z):
         for k in range(t.e_R.size):
             x, y = abs(t.R[j, k].real), abs(t.R[j, k].imag)
-            t.e_R[k] += tol[j] * (max(x, y) + 0.41421356237309515 * min(x, y))
+            t.e_R[k] += tol[j] * (max(x, y) + SQRT2_LESS_1 * min(x, y))
 
 
 @kernel
 def score_tones(t, c, level):
-    """Fill `score`, the largest over the frequencies: |N| - e_R over noise and eta, scaled to the level."""
+    """Fill `score`, the largest over the frequencies, scaled from the level z of a tone to the detector's
+    level:
+
+        (|N| - e_R) / max(sqrt(v D), eta / z + TONE_NOISE_SHARE sqrt(v D)) level / z,      v = v_share
+    """
     score = 0.0
     for k in range(t.e_R.size):
         N = abs(t.N[k]) - t.e_R[k]

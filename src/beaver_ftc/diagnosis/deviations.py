@@ -78,6 +78,7 @@ def model_error_std(
     """
 
     def a(model: np.ndarray, y: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """f + G u (3,) rad/s2 at rest, by the record of a model, (1,)."""
         return acceleration_at(model[0], np.zeros((1, 3)), y[None], u[None])[0]
 
     a_e = [a(model, y + dy, u) for dy in np.diag(np.pad(sigma, (0, y.size - sigma.size)))]

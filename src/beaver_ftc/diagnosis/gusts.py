@@ -127,8 +127,9 @@ def fill_rotation(phi, th, T):
 
 @kernel
 def project_gust(v, C, j):
-    """v' C_j: component j, in the axes whose rotation to body axes is C, of a vector v (3,) in body axes; and
-    sensitivity to the gust about axis j, from that to rotation about the body axes."""
+    """v' C_j, along column j of a rotation C (3, 3): component j, in the axes that C turns to body axes, of a
+    vector v (3,) in body axes; or the sensitivity to the gust about axis j, of one v to rotation about the
+    body axes."""
     return v[0] * C[0, j] + v[1] * C[1, j] + v[2] * C[2, j]
 
 
@@ -378,8 +379,10 @@ def unmeasured_share(gust, j):
 
 @kernel
 def gust_lag(gust, j, V):
-    """tau of the gust about axis j, s, at a speed V m/s: L_roll / V, tau_q = 4 b / pi V or tau_r = 3 b / pi
-    V."""
+    """The lag of the gust about axis j, s, at a speed V m/s:
+
+    L_roll / V      tau_q = 4 b / pi V      tau_r = 3 b / pi V
+    """
     if j == ROLL:
         return gust.config.L_roll / V
     return (4.0 if j == PITCH else 3.0) * gust.config.span / (pi * V)

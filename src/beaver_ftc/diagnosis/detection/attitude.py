@@ -209,10 +209,10 @@ def advance_axis(att, i, blk, row, eta, dt, detected):
 
 @kernel
 def fill_known(att, i, blk, row, eta):
-    """Fill the n known accelerations r of axis i, rad/s2, and return its u:
+    """Fill the n known accelerations r of axis i, rad/s2, and return the input u of its filter, rad/s2:
 
-    r = (regressors of the block, eta, D_i0 xi_0, D_i1 xi_1, D_i2 xi_2)      u = -nu - sum_{j != i} D_ij
-    xi_j
+    r = (regressors of the block, eta, D_i0 xi_0, D_i1 xi_1, D_i2 xi_2)
+    u = -nu - sum_j D_ij xi_j,  j != i
     """
     n = blk.n_Z
     att.n[i] = n + N_FURTHER

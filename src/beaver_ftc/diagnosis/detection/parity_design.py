@@ -87,6 +87,7 @@ def list_directions(aircraft: Aircraft, with_forces: bool = False) -> Iterator[P
 
 
 def _ones_at(ones: tuple[int, ...]) -> tuple[float, ...]:
+    """A direction m_0 (5,) that is 1 on these rows and 0 on the others."""
     return tuple(float(i in ones) for i in range(NORMAL_FORCE + 1))
 
 

@@ -71,6 +71,9 @@ at the end is an axis.
     eta_rate       omega dt
     e_0, e_tv, e_w shares of |N| by eta_bar: sums of eta_0 |w|, eta_r TV(w), eta_r eta_rate |w|
     th             theta
+
+statistical.md writes nu~ for g, nu~_chi for g_s, x~ for e, alpha_d for a, chi for s, N_j for R_j, room for
+the share of |N| by eta_bar, z for the alarm level.
 """
 
 from collections.abc import Sequence
@@ -304,9 +307,11 @@ def whiten_calm(b, dt):
 def update_calm_part(b, dt):
     """Fill `p` (2,) rad/s with lam p, the part of g that calm air makes predictable.
 
-        p = g - g_0      lam = sum p' S^-1 g / sum p' S^-1 p
+        p = g - g_0      pg = sum p' S^-1 g      pp = sum p' S^-1 p
+        lam = (pg + CALM_PRIOR + CALM_STDS sqrt D) / D in [0, 1],      D = pp + CALM_PRIOR
 
-    The sums, pg and pp, are over the last CALM_MEMORY_S. g_0: of `whiten_calm`, which ran before.
+    The sums are over the last CALM_MEMORY_S. g_0: of `whiten_calm`, which ran before. lam is that of the
+    least squares, with a prior for calm air, and CALM_STDS standard deviations larger.
     """
     p, g, decay = b.p, b.g, np.exp(-dt / CALM_MEMORY_S)
     b.pg *= decay
@@ -452,7 +457,8 @@ def accumulate_regressors(b, t, R, n, decay):
 
 @kernel
 def accumulate_evidence(b, dt, decay):
-    """Add the frame just whitened to the sums of every hypothesis and onset; earlier ones decay."""
+    """Add the frame just whitened to the sums of every hypothesis and onset; decay: factor on earlier frames,
+    1 before the alarm."""
     for h in range(b.n_h):
         update_signatures(b.hypothesis[h], b.tests[h // GROUP_SIZE], (h % GROUP_SIZE) * N_SLOTS)
     for i in range(n_test_groups(b.n_h)):

@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from beaver_ftc.design.context import Context
 
 _ROWS = compiled_rows(LAWS)
-MODULES = tuple(
-    dict.fromkeys(row["kernels"] for row in _ROWS.values())
-)  # of kernels, in order of their places
+# The modules of kernels: a law's place is that of its module
+MODULES = tuple(dict.fromkeys(row["kernels"] for row in _ROWS.values()))
+# What plugins.yaml need not say of a law
 _GIVEN = {"uses_verdict": False, "reallocates": False, "informed": False, "pitch_by_power": True}
 
 

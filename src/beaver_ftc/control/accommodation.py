@@ -20,6 +20,7 @@ control/allocation.py layout.
 import numpy as np
 
 from beaver_ftc.compiled import apart, fill, kernel, record, sized
+from beaver_ftc.control.profile import clamp
 from beaver_ftc.design.model import unanticipated_pitch
 from beaver_ftc.diagnosis.state import PITCH, UNANTICIPATED
 from beaver_ftc.diagnosis.types import GIVE_UP, SCALE_COMMAND
@@ -111,52 +112,66 @@ def configure(surfaces: np.void, config: ControlConfig, informed: bool, dt_s: fl
 def accommodate(control, assessment, faults, prediction, measured):
     """Bring the estimates of all surfaces and of the unknown acceleration to this frame
     (control.CompiledLaw)."""
-    surfaces, informed = control.surfaces, control.config.informed
-    begin_frame(surfaces.output, assessment, informed)
-    for s in range(surfaces.output.target.size):
-        target = reported(surfaces.output, assessment, faults, s, prediction.u[s], informed)
-        approach(surfaces, s, start_of(surfaces.output, assessment, s, informed), target, False)
-    estimate_unknown(surfaces.output, control.config, assessment, faults, prediction, measured.y)
+    surfaces, output, informed = control.surfaces, control.surfaces.output, control.config.informed
+    begin_frame(output, assessment.lags and not informed)
+    if informed:
+        follow_truth(surfaces, faults, prediction.u)
+    else:
+        take_offsets(output, assessment)
+        for s in range(output.target.size):
+            approach(surfaces, s, start_of(output, assessment, s), assessment.effectiveness[s])
+    estimate_unknown(output, control.config, assessment, faults, prediction, measured.y)
 
 
 @kernel
-def begin_frame(output, assessment, ignores_lag):
-    """Nothing is given up or parked yet; a slow surface has lost authority, unless the law ignores lag."""
-    output.given_up[:], output.parked[:] = 0, 0
-    output.authority_lost = assessment.lags and not ignores_lag
+def begin_frame(output, authority_lost):
+    """Nothing is given up or parked yet; authority_lost: whether a surface is slow, if the law uses
+    it."""
+    output.given_up[:], output.parked[:], output.authority_lost = 0, 0, authority_lost
 
 
 @kernel
-def reported(output, assessment, faults, s, u, informed):
-    """Take offset and lag of surface s from the diagnosis, from the truth if the law is `informed`; returns
-    its effectiveness, 0 if it does not move. u rad: where it would be if healthy."""
-    if not informed:
-        output.offset[s], output.lag[s] = assessment.offset[s], assessment.lag[s]
-        return assessment.effectiveness[s]
-    effectiveness = 0.0 if faults.immovable[s] else faults.effectiveness[s]
-    output.offset[s], output.lag[s] = 0.0, 0.0
-    if faults.present:
-        output.offset[s] = faults.effective[s] - effectiveness * u
-    return effectiveness
+def take_offsets(output, assessment):
+    """Take offset and lag (n,) rad of all surfaces from the diagnosis."""
+    output.offset[:], output.lag[:] = assessment.offset, assessment.lag
 
 
 @kernel
-def start_of(output, assessment, s, informed):
+def follow_truth(surfaces, faults, u):
+    """Take effectiveness E_s, 0 if surface s does not move, and offset of all surfaces from the truth:
+
+        offset_s = delta_s - E_s u_s        while a fault is present, else 0
+
+    delta, u (n,) rad: effective deflections, and those of healthy surfaces.
+    """
+    output = surfaces.output
+    output.offset[:], output.lag[:] = 0.0, 0.0
+    for s in range(u.size):
+        E = 0.0 if faults.immovable[s] else faults.effectiveness[s]
+        approach(surfaces, s, output.effectiveness[s], E)
+        if faults.present:
+            output.offset[s] = faults.effective[s] - E * u[s]
+
+
+@kernel
+def start_of(output, assessment, s):
     """Effectiveness of surface s from which this frame's step begins. A jam bypasses the rate limit, as does
     an effectiveness that is well known."""
-    jumps = assessment.at_once[s] and not informed
-    return assessment.effectiveness[s] if jumps else output.effectiveness[s]
+    return assessment.effectiveness[s] if assessment.at_once[s] else output.effectiveness[s]
 
 
 @kernel
-def approach(surfaces, s, start, target, given_up):
-    """Move the effectiveness of surface s from `start` towards `target` by at most one step; to zero at once
-    if the law has given it up."""
+def approach(surfaces, s, start, target):
+    """Move the effectiveness of surface s from `start` towards `target` by at most one step."""
     output, step = surfaces.output, surfaces.config.effectiveness_step
-    if given_up:
-        start, target = 0.0, 0.0
-    output.given_up[s], output.target[s] = given_up, target
-    output.effectiveness[s] = start + min(max(target - start, -step), step)
+    output.target[s] = target
+    output.effectiveness[s] = start + clamp(target - start, step)
+
+
+@kernel
+def give_up(output, s):
+    """Use surface s no more: without a step, its effectiveness is none."""
+    output.given_up[s], output.target[s], output.effectiveness[s] = 1, 0.0, 0.0
 
 
 @kernel
@@ -180,7 +195,8 @@ def usable_effectiveness(surfaces, s):
 @kernel
 def park_failed_surfaces(output, assessment, faults, informed):
     """Park a surface that does not follow its command. It is commanded to its trim, so that a surface that
-    comes loose moves there, which the diagnosis detects. From then on the reference is governed."""
+    comes loose moves there, which the diagnosis detects. From then on the reference is governed (hedged and
+    scaled, laws/reference.py)."""
     for s in range(output.parked.size):
         immovable = informed and faults.immovable[s]
         fixed = assessment.accommodation_mode[s] == GIVE_UP and output.effectiveness[s] == 0.0

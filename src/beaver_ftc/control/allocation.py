@@ -102,9 +102,15 @@ def remaining(layout, effectiveness, i):
 
 
 @kernel
+def within_stops(layout, s, deflection):
+    """The deflection, rad, of surface s that is nearest to this one within its travel."""
+    return min(max(deflection, layout.low[s]), layout.high[s])
+
+
+@kernel
 def clip(output, layout, s, deflection):
     """Limit a deflection (rad) to the travel of surface s and note saturation."""
-    limited = min(max(deflection, layout.low[s]), layout.high[s])
+    limited = within_stops(layout, s, deflection)
     output.saturated[s] = limited != deflection
     return limited
 
@@ -134,8 +140,8 @@ def subtract_offsets(axes, offset, G):
 
 @kernel
 def form_effectiveness_matrix(axes, G, surfaces, uses_verdict):
-    """Fill axes.G (3, n) rad/s2 per rad: the design model's G, with the surfaces' effectiveness in it for a
-    law that uses the verdict."""
+    """Fill axes.G (3, n) rad/s2 per rad: the design model's G, of a law that uses the verdict times the
+    surfaces' `usable_effectiveness`."""
     if not uses_verdict:
         axes.G[:] = G
         return
@@ -147,8 +153,12 @@ def form_effectiveness_matrix(axes, G, surfaces, uses_verdict):
 
 @kernel
 def lateral(axes, output, layout):
-    """Aileron and rudder for the roll and yaw demand; when one saturates the other makes the best of its
-    own axis."""
+    """Aileron a and rudder r for the roll and yaw demand, rad/s2: the solution of
+
+        G_roll,a u_a + G_roll,r u_r = roll,    G_yaw,a u_a + G_yaw,r u_r = yaw
+
+    When one saturates, the other makes the best of its own axis.
+    """
     G, u = axes.G, output.command
     a, r = layout.main[ROLL], layout.main[YAW]
     roll, yaw = axes.demand[ROLL], axes.demand[YAW]
@@ -160,7 +170,7 @@ def lateral(axes, output, layout):
 
 @kernel
 def smoothstep(share):
-    """3 s^2 - 2 s^3: from 0 to 1 with no kink at either end."""
+    """3 s^2 - 2 s^3 of a share s: from 0 to 1 with no kink at either end."""
     return share * share * (3.0 - 2.0 * share)
 
 
@@ -168,10 +178,15 @@ def smoothstep(share):
 def pitch(axes, output, layout, effectiveness, share, probe):
     """Elevator and flap for the pitch demand, rad/s2.
 
-    Before the hand-over (share 0) the elevator carries all. After it (1), the elevator holds its trimmed
-    moment, the flap carries what moves, and what the flap's short upward travel cannot give goes back to what
-    is left of the elevator. Without a flap the elevator carries what it can. effectiveness: of the elevator;
-    probe: rad of the flap.
+    Before the hand-over (share 0) the elevator e carries all. After it (1), the elevator holds its trimmed
+    moment, the flap f carries what moves, and what the flap's short upward travel cannot give goes back to
+    what is left of the elevator. Without a flap the elevator carries what it can.
+
+        u_f = trim_f + share ((demand - G_e / effectiveness trim_e) / G_f - trim_f) + probe
+        u_e = (demand - G_f u_f) / G_e
+
+    G_e, G_f: of pitch, with effectiveness in it, rad/s2 per rad; effectiveness: of the elevator; probe: rad
+    of the flap.
     """
     G, u, needed = axes.G, output.command, axes.demand[PITCH]
     e, f = layout.main[PITCH], layout.stand_in
@@ -192,8 +207,16 @@ def allocate(axes, output, layout, effectiveness, share, probe):
 
 @kernel
 def set_problem(problem, G, layout, effectiveness, prediction, share, probe):
-    """Set the limits of the surfaces within a frame, where each of them prefers to be, and the weight with
-    which it leaves that; G (3, n); effectiveness (n,); share, probe: as in `pitch`.
+    """Set the limits low, high of the surfaces within a frame, rad, where each of them prefers to be,
+    u_preferred, rad, and the weight with which it leaves that, rad2; G (3, n) rad/s2 per rad; effectiveness
+    (n,); share, probe: as in `pitch`.
+
+        low, high = u -+ reach, within the stops        reach: by the rate limit in a frame, rad
+        u_preferred = trim / effectiveness, within the stops
+        weight = half^2,  of a backup half^2 ratio      half: half the travel, rad
+        ratio = share own / ((1 - share) waiting)       own, waiting: sum of half^2 G_pitch^2 of those that
+        are
+                                                        no backups, and of all that are
 
     A backup gives `share` of what pitch demands beyond the trimmed moments: of two that move pitch alone
     that is the published hand-over. A probe is held, and the others give what it does not leave.
@@ -203,12 +226,15 @@ def set_problem(problem, G, layout, effectiveness, prediction, share, probe):
         reach = prediction.actuators.step[s] / prediction.w
         half, left = 0.5 * (layout.high[s] - layout.low[s]), effectiveness[s]
         hold = layout.trim[s] / left if left > 0.0 else layout.trim[s]
-        problem.u_preferred[s] = min(max(hold, layout.low[s]), layout.high[s])
+        problem.u_preferred[s] = within_stops(layout, s, hold)
         problem.weight[s] = half * half
-        problem.low[s] = min(max(layout.low[s], u[s] - reach), layout.high[s])
+        problem.low[s] = within_stops(layout, s, u[s] - reach)
         problem.high[s] = max(min(layout.high[s], u[s] + reach), problem.low[s])
         moment = half * half * G[PITCH, s] ** 2
-        own, waiting = own + (0.0 if layout.is_backup[s] else moment), waiting + moment * layout.is_backup[s]
+        if layout.is_backup[s]:
+            waiting += moment
+        else:
+            own += moment
     ratio = share * own / max((1.0 - share) * waiting, TINY)
     for s in range(u.size):
         if layout.is_backup[s]:
@@ -263,12 +289,12 @@ def park(output, layout, parked):
 
 @kernel
 def lead_compensate(output, layout, lead, u):
-    """Command beyond what is wanted, by `lead` (n,), so that a lagging actuator at u (n,) rad is there
-    sooner."""
+    """Command beyond what is wanted, u + lead (command - u), so that a lagging actuator is there sooner;
+    lead, u (n,): u rad is where the actuators are."""
     command = output.command
     for s in range(u.size):
         if lead[s] > 1.0:
-            command[s] = min(max(u[s] + lead[s] * (command[s] - u[s]), layout.low[s]), layout.high[s])
+            command[s] = within_stops(layout, s, u[s] + lead[s] * (command[s] - u[s]))
 
 
 @kernel
@@ -278,6 +304,8 @@ def hand_over_pitch(allocation, reallocated, at_once, remains, least):
     at_once: the lost part goes at once, after a jam. remains: effectiveness of the main surface; less than
     `least` is none. While pitch is handed back, the loss of before counts: the main surface may be estimated
     whole at once, and nothing is to leap.
+
+        transfer_share = smoothstep(hand_over) lost_share,    lost_share = 1 - remains; 1 below `least`
     """
     config, output = allocation.config, allocation.output
     if reallocated:
@@ -294,8 +322,12 @@ def hand_over_pitch(allocation, reallocated, at_once, remains, least):
 
 @kernel
 def attainable(G, layout, engine_authority, i):
-    """Least and greatest acceleration of axis i, rad/s2, within the travel; G (3, n). engine_authority (2, 3)
-    rad/s2: what engines give at least and at most."""
+    """Least and greatest acceleration of axis i, rad/s2, within the travel [Durham1993]:
+
+        sum_s min(G_is low_s, G_is high_s),    sum_s max(G_is low_s, G_is high_s)
+
+    G (3, n); engine_authority (2, 3) rad/s2: what engines give at least and at most, added to both.
+    """
     least, greatest = engine_authority[0, i], engine_authority[1, i]
     for s in range(layout.low.size):
         one, other = G[i, s] * layout.low[s], G[i, s] * layout.high[s]
@@ -306,8 +338,13 @@ def attainable(G, layout, engine_authority, i):
 
 @kernel
 def note_shortfall(axes, command, layout, lag, engine_authority):
-    """What was demanded and is not given by the command (n,) rad; and whether the rates could at least be
-    held. lag (n,) rad: of surfaces behind their command; engine_authority: as in `attainable`."""
+    """What was demanded and is not given by the command u (n,) rad; and whether the rates could at least be
+    held: `hold` is attainable.
+
+        shortfall = demand - G (u + lag),    rad/s2
+
+    lag (n,) rad: of surfaces behind their command; engine_authority: as in `attainable`.
+    """
     G = axes.G
     for i in range(3):
         given = 0.0

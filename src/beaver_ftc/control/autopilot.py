@@ -3,14 +3,19 @@
 The autopilot computes where each channel of the commanded profile should be now, from the legs of the
 scenario, and body-rate references and an engine setting for that.
 
-    climb    gamma_c = (h' + k (hc - h)) / V + what was found missing
-             theta_c = gamma_c + alpha cos(bank) (smoothed)
-             theta' = k (theta_c - theta)
-    speed    a = V' + k (Vc - V) + what was found missing + g (gamma_c - gamma in trim), by engine power
-    gliding  gamma_c = gamma in trim - (V' + k (Vc - V) + what was found missing) / g: airspeed by pitch
-    heading  phi_c = V / g (psi' + k (psi_c - psi) + what was found missing),   phi' = k (phi_c - phi)
-    turn     psi' = g tan phi / V: coordinated [Etkin1996, sec. 7.6]; and the body rates of these angles'
-             rates, with sideslip washed out by the rudder
+    altitude  gamma_c = (H_c' + K (H_c - H)) / V + M                            `path_angle_to_fly`
+    pitch     theta_c' = K (theta_c - theta),  theta_c = gamma_c + alpha cos phi   `pitch_attitude_rate`
+    airspeed  A = V_c' + K (V_c - V) + M + g (gamma_c - gamma_trim)             `set_power`
+    gliding   gamma_c = gamma_trim - (V_c' + K (V_c - V) + M) / g               `glide_path_angle`
+    heading   phi_c = V / g (psi_c' + K (psi_c - psi) + M)                      `bank_to_turn`
+    bank      phi_c' = K (phi_c - phi) + M                                      `bank_angle_rate`
+    turn      psi' = g tan phi / V: coordinated [Etkin1996, sec. 7.6]           `set_body_rates`
+
+    H, V                      m, m/s   altitude, airspeed
+    gamma, alpha, theta, psi, phi  rad   path, incidence, pitch attitude, heading, bank; V and alpha smoothed
+    A, g                      m/s2     acceleration along the path, by engine power; gravity
+    K                         1/s      gain of the loop
+    M                                  found missing: the integral of the loop's error, in the unit of its sum
 
 Every demand is limited, and what a limit cut off is not integrated. The limits on rates and bank shrink with
 what the surfaces that are left can give; climb and descent are bounded by the power there is, so that the
@@ -41,8 +46,8 @@ from beaver_ftc.control.thrust import ENGINE, gained, look_up, power_for, thrust
 from beaver_ftc.design.table import AIRSPEED, ALPHA, BETA
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
 
-# Of each loop, 1/s and of what it finds missing 1/s2; smoothing, s; and what bounds the demands. Attitudes a
-# fifth as fast as the inner loops, the path a quarter of that: gusts set the gains, not comfort.
+# K of each loop, 1/s, and of its integral M, `_i`, 1/s2; smoothing, s; and what bounds the demands.
+# Attitudes a fifth as fast as the inner loops, the path a quarter of that: gusts set the gains, not comfort.
 GAINS = {
     "altitude": 0.8, "altitude_i": 0.04, "attitude": 3.0, "speed": 0.3, "speed_i": 0.015,
     "bank": 1.0, "bank_i": 0.2, "heading": 0.25, "heading_i": 0.004,
@@ -101,6 +106,7 @@ AUTOPILOT = record(
 
 MOST_PATH_RAD = 0.15
 MOST_SIDESLIP_RAD = 0.14
+LEAST_COS_BANK = 0.1  # where the turn rate divides: 84 deg, beyond any bank that is asked for
 MOST_MISSING = 0.1  # rad of path angle, and times gravity of acceleration
 MOST_DRIFT_RAD_S = 0.1  # of turning that a bank without a turn stands for
 RECENT_AIRSPEED_S = 20.0  # over which the recent airspeed is averaged
@@ -116,7 +122,7 @@ BY_POWER_S = 5.0  # since when that counts
 def steer(autopilot, control, u, measured, unexplained, t):
     """One frame, at t s: fill autopilot.rates (3,) rad/s, and the engine setting where an airspeed is
     commanded. control: the records of the law (control/state.py). u, unexplained: see
-    `limit_airspeed_to_fly`.
+    `limit_airspeed_to_fly`. path, rolling, pitching: gamma_c rad; phi_c', theta_c' rad/s.
     """
     layout, surfaces, saturated = control.layout, control.surfaces, control.allocation.output.saturated
     axes, power, by_engines = control.axes, control.power, control.engines.output.authority
@@ -164,16 +170,16 @@ def smooth_signals_and_losses(autopilot, layout, surfaces, saturated, engines_ya
     """Smooth what is noisy, and note whether the ailerons or the rudder are gone; ailerons at their stop give
     no more roll, whatever their estimated effectiveness. engines_yaw: whether engines can yaw the
     aircraft."""
-    dt = autopilot.dt
+    dt, gain = autopilot.dt, autopilot.gain
     least = surfaces.config.least_effectiveness
     effectiveness = surfaces.output.effectiveness
-    autopilot.alpha += dt / autopilot.gain.alpha_s * (y[ALPHA] - autopilot.alpha)
-    autopilot.airspeed += dt / autopilot.gain.airspeed_s * (y[AIRSPEED] - autopilot.airspeed)
+    autopilot.alpha += dt / gain.alpha_s * (y[ALPHA] - autopilot.alpha)
+    autopilot.airspeed += dt / gain.airspeed_s * (y[AIRSPEED] - autopilot.airspeed)
     at_stop = saturated[layout.main[ROLL]] == 1
     gone = remaining(layout, effectiveness, ROLL) < least or at_stop
-    autopilot.roll_loss_share += dt / autopilot.gain.jammed_s * (gone - autopilot.roll_loss_share)
+    autopilot.roll_loss_share += dt / gain.jammed_s * (gone - autopilot.roll_loss_share)
     free = remaining(layout, effectiveness, YAW) < least
-    autopilot.yaw_loss_share += dt / autopilot.gain.jammed_s * (free - autopilot.yaw_loss_share)
+    autopilot.yaw_loss_share += dt / gain.jammed_s * (free - autopilot.yaw_loss_share)
     if engines_yaw:
         by_power = free or saturated[layout.main[YAW]] == 1
         autopilot.engines_alone_yaw_share += dt / BY_POWER_S * (by_power - autopilot.engines_alone_yaw_share)
@@ -181,17 +187,26 @@ def smooth_signals_and_losses(autopilot, layout, surfaces, saturated, engines_ya
 
 @kernel
 def limit_rates_and_bank(autopilot, layout, G, hold, engine_authority):
-    """Rates and bank that the surfaces left can give: their spare acceleration for a while. G (3, n): with
-    the effectiveness of each in it; hold (3,) rad/s2; engine_authority: as in `allocation.attainable`."""
+    """Rates (rad/s) and bank (rad) that the surfaces left can give: their spare acceleration for a while.
+
+        rate_i = min(max_healthy_rate_i, authority_s spare_i)
+        spare_i = min(greatest_i - hold_i, hold_i - least_i)
+        rate_roll >= roll_loss_share dihedral V MOST_SIDESLIP_RAD           by sideslip
+        bank = min(max_healthy_bank (1 - less), bank_s rate_roll)           less: the greater share lost
+
+    G (3, n): with the effectiveness of each in it; hold (3,) rad/s2; least, greatest, engine_authority: as in
+    `allocation.attainable`.
+    """
+    rate, gain, rolls_less = autopilot.rate_limit, autopilot.gain, autopilot.roll_loss_share
     for i in range(3):
         least, greatest = attainable(G, layout, engine_authority, i)
         spare = max(min(greatest - hold[i], hold[i] - least), 0.0)
-        autopilot.rate_limit[i] = min(autopilot.max_healthy_rate[i], spare * autopilot.gain.authority_s)
-    by_sideslip = autopilot.roll_loss_share * autopilot.dihedral * autopilot.airspeed * MOST_SIDESLIP_RAD
-    autopilot.rate_limit[ROLL] = max(autopilot.rate_limit[ROLL], by_sideslip)
-    less = max(BANK_LOST_WITH_ROLL * autopilot.roll_loss_share, BANK_LOST_WITH_YAW * autopilot.yaw_loss_share)
+        rate[i] = min(autopilot.max_healthy_rate[i], spare * gain.authority_s)
+    by_sideslip = rolls_less * autopilot.dihedral * autopilot.airspeed * MOST_SIDESLIP_RAD
+    rate[ROLL] = max(rate[ROLL], by_sideslip)
+    less = max(BANK_LOST_WITH_ROLL * rolls_less, BANK_LOST_WITH_YAW * autopilot.yaw_loss_share)
     steepest = autopilot.max_healthy_bank * (1.0 - less)
-    autopilot.bank_limit = min(steepest, autopilot.rate_limit[ROLL] * autopilot.gain.bank_s)
+    autopilot.bank_limit = min(steepest, rate[ROLL] * gain.bank_s)
 
 
 @kernel
@@ -210,7 +225,10 @@ def highest_power(autopilot, power, left, at_stop, y):
 
     What the rudder lacks, sideslip makes up for. The slower, the less: a climb beyond it ends in slow flight.
     A rudder at its stop holds no more, whatever its estimate: power is then reduced until it comes off.
-    left: effectiveness of the rudder.
+
+        dpt^3 held = left highest_dpt^3 + (1 - left) dpt_cubed_held_by_sideslip
+
+    left: effectiveness of the rudder; at_stop: whether it is there; y (n_y,).
     """
     high = autopilot.high_power
     if at_stop:
@@ -227,26 +245,33 @@ def highest_power(autopilot, power, left, at_stop, y):
 
 @kernel
 def path_angle_to_fly(autopilot, measured, push):
-    """Path angle to fly, rad; the one that is flown where no altitude is commanded."""
+    """gamma_c, path angle to fly, rad; the one that is flown where no altitude is commanded.
+
+        gamma_c = (H_c' + K (H_c - H)) / V + M,    M <- M + dt K_i (H_c - H) / V        unless limited
+
+    M: missing_path_angle. push: as in thrust.py.
+    """
     if autopilot.pitch_holds_airspeed and autopilot.is_commanded[SPEED]:
         return glide_path_angle(autopilot)
     if not autopilot.is_commanded[ALTITUDE]:
         return measured.attitude[PITCH] - autopilot.alpha
-    V = autopilot.airspeed
+    V, gain, M = autopilot.airspeed, autopilot.gain, autopilot.missing_path_angle
     error = autopilot.command[ALTITUDE] - measured.altitude
-    climb_mps = autopilot.command_rate[ALTITUDE] + autopilot.gain.altitude * error
-    wanted = climb_mps / V + autopilot.missing_path_angle
+    climb_mps = autopilot.command_rate[ALTITUDE] + gain.altitude * error
+    wanted = climb_mps / V + M
     low, high = path_angle_limits(autopilot, push)
     path = min(max(wanted, low), high)
     if path == wanted:
-        lift = autopilot.missing_path_angle + autopilot.dt * autopilot.gain.altitude_i * error / V
-        autopilot.missing_path_angle = clamp(lift, MOST_MISSING)
+        autopilot.missing_path_angle = clamp(M + autopilot.dt * gain.altitude_i * error / V, MOST_MISSING)
     return path
 
 
 @kernel
 def glide_path_angle(autopilot):
-    """Path angle at which gravity brings the airspeed to where it is commanded, rad."""
+    """Path angle at which gravity brings the airspeed to where it is commanded, rad:
+
+    gamma_c = gamma_trim - (V_c' + K (V_c - V) + M) / g,    M: missing_acceleration, m/s2
+    """
     error = autopilot.airspeed_to_fly - autopilot.airspeed
     along = autopilot.airspeed_to_fly_rate + autopilot.missing_acceleration + autopilot.gain.speed * error
     steeper = along / autopilot.gravity
@@ -258,31 +283,40 @@ def glide_path_angle(autopilot):
 
 @kernel
 def integrate_missing_acceleration(autopilot, error):
-    """Integrate the acceleration that an airspeed takes in addition to the computed one; error m/s."""
+    """M <- M + dt K_i error: the acceleration, m/s2, that an airspeed takes in addition to the computed one;
+    error m/s."""
     found = autopilot.missing_acceleration + autopilot.dt * autopilot.gain.speed_i * error
     autopilot.missing_acceleration = clamp(found, MOST_MISSING * autopilot.gravity)
 
 
 @kernel
 def path_angle_limits(autopilot, push):
-    """The steepest descent and climb, rad: what the engine sustains, and what airspeed there is to spare."""
+    """The steepest descent and climb, rad: what the engine sustains, and what airspeed there is to spare.
+
+        low = gamma_trim + gained(idle) / g - path_per_mps (fast - V)
+        high = gamma_trim + gained(full) / g + path_per_mps (V - slow)
+
+    slow, fast: the airspeeds, m/s, at which height no longer goes before airspeed; gained: thrust.py, m/s2.
+    """
+    gain = autopilot.gain
     slow = autopilot.slowest_mps
     fast, idle, full = np.inf, autopilot.trim_power, autopilot.trim_power
     if autopilot.is_commanded[SPEED]:
-        slow = max(slow, autopilot.airspeed_to_fly - autopilot.gain.spare_mps)
-        fast = autopilot.airspeed_to_fly + autopilot.gain.spare_mps
+        slow = max(slow, autopilot.airspeed_to_fly - gain.spare_mps)
+        fast = autopilot.airspeed_to_fly + gain.spare_mps
         idle, full = autopilot.low_power, max(autopilot.full_power, autopilot.low_power)
     trim, engine = autopilot.trim_power, autopilot.engine
     at_idle = autopilot.climb_in_trim + gained(engine, push, trim, idle) / autopilot.gravity
     at_full = autopilot.climb_in_trim + gained(engine, push, trim, full) / autopilot.gravity
-    low = at_idle - autopilot.gain.path_per_mps * (fast - autopilot.airspeed)
-    high = at_full + autopilot.gain.path_per_mps * (autopilot.airspeed - slow)
-    return max(low, -MOST_PATH_RAD), min(max(high, -MOST_PATH_RAD), MOST_PATH_RAD)
+    low = at_idle - gain.path_per_mps * (fast - autopilot.airspeed)
+    high = at_full + gain.path_per_mps * (autopilot.airspeed - slow)
+    return max(low, -MOST_PATH_RAD), clamp(high, MOST_PATH_RAD)
 
 
 @kernel
 def pitch_attitude_rate(autopilot, y, attitude, path):
-    """The rate of the pitch attitude, rad/s."""
+    """theta_c' = K (theta_c - theta), the rate of the pitch attitude, rad/s: within its limit, and no more
+    than `protection` times the incidence left below its limit. theta_c = path + alpha cos phi."""
     glides = autopilot.pitch_holds_airspeed and autopilot.is_commanded[SPEED]
     if not (autopilot.is_commanded[ALTITUDE] or glides):
         return 0.0
@@ -293,7 +327,8 @@ def pitch_attitude_rate(autopilot, y, attitude, path):
 
 @kernel
 def bank_angle_rate(autopilot, attitude):
-    """The rate of the bank angle, rad/s; slower where engines alone yaw and roll."""
+    """phi_c' = share K (phi_c - phi) + roll_loss M, the rate of the bank angle, rad/s; slower where engines
+    alone yaw and roll. M: missing_roll_rate, rad/s, integrated as far as ailerons are lost."""
     gain, roll_loss = autopilot.gain, autopilot.roll_loss_share
     share = 1.0 - roll_loss * autopilot.engines_alone_yaw_share * (1.0 - LOOP_GAIN_SHARE_BY_POWER)
     if autopilot.is_commanded[HEADING]:
@@ -312,8 +347,9 @@ def bank_angle_rate(autopilot, attitude):
 
 @kernel
 def bank_to_turn(autopilot, share, heading):
-    """Bank, rad, of the coordinated turn to the commanded heading, at a share of the loop's gain. Where
-    nothing acts in yaw, the loop is slower, and integrates what it misses."""
+    """phi_c = V / g (psi_c' + share left K (psi_c - psi) + M), rad: bank of the coordinated turn to the
+    commanded heading. Where nothing acts in yaw, the loop is slower (left), and integrates what it misses: M,
+    missing_turn_rate, rad/s."""
     gain, yaw_loss = autopilot.gain, autopilot.yaw_loss_share
     error = wrap_to_half_turn(autopilot.command[HEADING] - heading)
     left = 1.0 - yaw_loss * (1.0 - gain.loose)
@@ -325,14 +361,21 @@ def bank_to_turn(autopilot, share, heading):
 
 @kernel
 def set_body_rates(autopilot, y, attitude, rolling, pitching):
-    """Body rates of the attitude's rates (rad/s) in a coordinated turn; the rudder keeps the sideslip."""
+    """Body rates (p, q, r), rad/s, of the rates of bank and pitch attitude in a coordinated turn:
+
+        p = phi' - psi' sin theta,    q = theta' cos phi + psi' cos theta sin phi
+        r = psi' cos theta cos phi - theta' sin phi + K (beta - beta_c),    psi' = g tan phi / V
+
+    beta_c, rad: the sideslip that rolls the aircraft as far as ailerons are lost, -phi' / (dihedral V).
+    Without a commanded turn psi' and r are 0. rolling, pitching: phi', theta', rad/s.
+    """
     rates = autopilot.rates
     sin_roll, cos_roll = np.sin(attitude[ROLL]), np.cos(attitude[ROLL])
     sin_pitch, cos_pitch = np.sin(attitude[PITCH]), np.cos(attitude[PITCH])
     lateral = autopilot.is_commanded[HEADING] or autopilot.is_commanded[BANK]
     turning = 0.0
     if lateral:
-        turning = autopilot.gravity / autopilot.airspeed * sin_roll / max(cos_roll, 0.1)
+        turning = autopilot.gravity / autopilot.airspeed * sin_roll / max(cos_roll, LEAST_COS_BANK)
     rates[ROLL] = rolling - turning * sin_pitch
     rates[PITCH] = pitching * cos_roll + turning * cos_pitch * sin_roll
     rates[YAW] = 0.0
@@ -346,8 +389,14 @@ def set_body_rates(autopilot, y, attitude, rolling, pitching):
 
 @kernel
 def set_power(autopilot, power, y, path, push):
-    """Set the power; while power stands in for a lost pitch, also the airspeed for its law and the
-    acceleration that the path takes: that law has an airspeed loop of its own."""
+    """Set the power that gives the acceleration along the path
+
+        A = V_c' + K (V_c - V) + M + g (gamma_c - gamma_trim),    m/s2
+
+    V_c: airspeed_to_fly; M: missing_acceleration, integrated unless the power is limited. While power stands
+    in for a lost pitch, K is 0 and power_airspeed is set: the law of power.py has an airspeed loop of its
+    own. path: gamma_c, rad.
+    """
     V, fly = autopilot.airspeed, autopilot.airspeed_to_fly
     error = fly - V
     autopilot.recent_airspeed_mps += autopilot.dt / RECENT_AIRSPEED_S * (V - autopilot.recent_airspeed_mps)

@@ -80,7 +80,8 @@ def effects_of_engines(declared: Declared) -> np.ndarray:
 
 @kernel
 def surface_reaches_demand(layout, saturated, surfaces, i):
-    """Whether the surface that leads axis i is neither given up nor at its stop; saturated (n,)."""
+    """Whether the surface that leads axis i is neither given up nor at its stop; saturated (n,): which
+    are."""
     least = surfaces.config.least_effectiveness
     given_up = remaining(layout, surfaces.output.effectiveness, i) < least
     return not given_up and saturated[layout.main[i]] == 0
@@ -88,7 +89,8 @@ def surface_reaches_demand(layout, saturated, surfaces, i):
 
 @kernel
 def update_engine_demand(config, memory, axes, layout, saturated, surfaces):
-    """Advance w by a frame: release it where the surface reaches, else integrate e."""
+    """Advance w (3,) rad/s2 by a frame: w <- w - release w where the surface reaches, else w + integral_gain
+    e, e the shortfall. serving: rows of B of the axes whose w is not 0."""
     for i in (PITCH, YAW):
         if surface_reaches_demand(layout, saturated, surfaces, i):
             memory.wanted[i] -= config.release * memory.wanted[i]
@@ -100,8 +102,9 @@ def update_engine_demand(config, memory, axes, layout, saturated, surfaces):
 
 @kernel
 def limit(config, memory, authority, base):
-    """How far each goes from the common lever `base`, and what all give about each axis at most, `authority`
-    (2, 3) rad/s2: as far up as down, so that their sum, which holds the airspeed, stays."""
+    """How far each goes from the common lever `base`, |u| <= most, m/s2, and what all give about each axis
+    at most, `authority` (2, 3) = -+ sum |B_ie most|, rad/s2: as far up as down, so that their sum, which
+    holds the airspeed, stays."""
     problem, table = memory.problem, memory.thrust
     authority[:] = 0.0
     most = min(gained(table, 0.0, base, config.high), -gained(table, 0.0, base, config.low))
@@ -115,7 +118,8 @@ def limit(config, memory, authority, base):
 
 @apart
 def steer_by_engines(engines, power, axes, layout, saturated, surfaces, airspeed):
-    """Fill output.difference, the setting of each engine beside the common lever; airspeed m/s."""
+    """Fill output.difference, the setting of each engine less that of the common lever: of the accelerations
+    u (n,) m/s2 that give w best within the limits. airspeed m/s."""
     config, memory, output = engines.config, engines.memory, engines.output
     look_up(memory.thrust, airspeed)
     base = power.output.command[0]

@@ -1,17 +1,21 @@
 """Envelope protection: the airspeeds that can be held with the remaining authority of the surfaces.
 
-Level flight of the design model takes an elevator that depends on dynamic pressure and flap:
+Level flight of the design model takes an elevator that depends on dynamic pressure and flap
+(`elevator_needed`):
 
     qdyn S CX = m g sin alpha,   qdyn S CZ + m g cos alpha = 0,   Cm = 0
 
-in angle of attack, slipstream and elevator: wings level, no rates, no sideslip, the engine free. What acts
-like the elevator now is estimated from the balance of the pitch moments,
+in angle of attack, slipstream and elevator: wings level, no rates, no sideslip, the engine free. S m2: wing
+area; m kg: mass; g m/s2: gravity. What acts like the elevator now, rad, is estimated from the balance of the
+pitch moments (`average_acting_elevator`),
 
-    acting = offset + left u + d / G,    d: what the law's observer finds unexplained
+    acting = offset + left u + d / G
 
-so a jam is known where it stands before its type is. The speeds at which the flap, less a reserve to fly
-with, makes up for the rest are those that can be held; the commanded airspeed is brought among them. A speed
-for which the elevator, or what is left of it, does not suffice cannot be held by any law.
+offset rad, left: the elevator's offset and remaining effectiveness; u rad: its position; d rad/s2: what the
+law's observer finds unexplained; G rad/s2 per rad: its effectiveness in pitch. So a jam is known where it
+stands before its type is. The speeds at which the flap, less a reserve to fly with, makes up for the rest
+are those that can be held; the commanded airspeed is brought among them. A speed for which the elevator, or
+what is left of it, does not suffice cannot be held by any law.
 """
 
 from functools import lru_cache
@@ -22,6 +26,7 @@ import numpy as np
 from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.aircraft.aircraft import GRAVITY_MPS2
 from beaver_ftc.compiled import fill, kernel, record, row_of
+from beaver_ftc.control.allocation import within_stops
 from beaver_ftc.control.profile import SPEED, clamp
 from beaver_ftc.control.thrust import between
 from beaver_ftc.design.engine import SEA_LEVEL_DENSITY_KG_M3
@@ -82,8 +87,9 @@ def limit_airspeed_to_fly(autopilot, layout, surfaces, u, unexplained, y, t):
 
 @kernel
 def average_acting_elevator(hold, dt, offset, commanded, unexplained):
-    """Average the elevator that would account for the pitch moments there are, rad: `offset` is how
-    far it is off, `commanded` what its remaining effectiveness gives."""
+    """Average the elevator that would account for the pitch moments there are, acting = offset + commanded +
+    unexplained, rad, over ACTING_S, at first over all frames alike: `offset` is how far it is off,
+    `commanded` what its remaining effectiveness gives."""
     acting = offset + commanded + unexplained
     hold.n_averaged_frames += 1
     weight = max(dt / ACTING_S, 1.0 / hold.n_averaged_frames)
@@ -98,6 +104,10 @@ def find_airspeeds_that_can_be_held(hold, layout, surfaces, y):
     The flap may stand at one end of its travel, less the reserve. What acts like the elevator may then be
 
         fixed + left u,    u in its travel        fixed, rad: acts without a command; left: its effectiveness
+
+    and the limits are V = sqrt(2 qdyn / rho), rho of the air by readings; the flap up and the
+    elevator's greatest give the fastest, the flap down and its least the slowest. A flap of no use stands
+    where it is off.
     """
     e, f = layout.main[PITCH], layout.stand_in
     elevator_left, flap_left = surfaces.output.effectiveness[e], surfaces.output.effectiveness[f]
@@ -105,7 +115,7 @@ def find_airspeeds_that_can_be_held(hold, layout, surfaces, y):
     least, greatest = fixed + elevator_left * layout.low[e], fixed + elevator_left * layout.high[e]
     up, down = layout.low[f] + hold.flap_reserve, layout.high[f] - hold.flap_reserve
     if flap_left < surfaces.config.least_effectiveness:
-        up = down = min(max(surfaces.output.offset[f], layout.low[f]), layout.high[f])
+        up = down = within_stops(layout, f, surfaces.output.offset[f])
     per_pa = 2.0 * y[QDYN] / y[AIRSPEED] ** 2
     hold.fastest = np.sqrt(2.0 * dynamic_pressure_limit(hold, up, greatest, True) / per_pa)
     hold.slowest = np.sqrt(2.0 * dynamic_pressure_limit(hold, down, least, False) / per_pa)
@@ -191,7 +201,11 @@ def elevator_needed(
     qdyn_pa: tuple[float, ...],
     flap_rad: tuple[float, ...],
 ) -> np.ndarray:
-    """Deflection (n, m) rad for level flight at qdyn (n,) and flap (m,); not a number where there is none.
+    """Deflection (n, m) rad for level flight at qdyn (n,) Pa and flap (m,) rad; not a number where there is
+    none.
+
+    Newton's method, z <- z - J^-1 F, for all n m points at once: z (n m, 3) = (alpha, slipstream, elevator),
+    F = (CX - load sin alpha, CZ + load cos alpha, Cm), load = m g / (qdyn S), J = dF/dz by complex steps.
 
     surfaces: elevator and flap of this aircraft. scale: what the designer multiplies single terms by.
     """
@@ -201,6 +215,7 @@ def elevator_needed(
     ratio = dict(scale)
 
     def imbalance(unknown: np.ndarray) -> np.ndarray:
+        """F (n m, 3) at z (n m, 3)."""
         alpha, thrust, elevator = unknown.T
         of = neutral | {"alpha": alpha, THRUST: thrust, surfaces[0]: elevator, surfaces[1]: flap}
         CX, CZ, Cm = (aircraft.coefficient(name, of, ratio) for name in ("CX", "CZ", "Cm"))

@@ -61,7 +61,8 @@ def solve(problem, B, demand):
 
 @kernel
 def warm_start(problem, B):
-    """Begin with the limits that held in the frame before: put u on them, and all within; and fill slack."""
+    """Begin with the limits that held in the frame before: put u on them, and all within; and fill slack,
+    SLACK of the mean of the diagonal of B v B'."""
     total = 0.0
     for s in range(problem.u.size):
         if problem.side[s] == LOW:
@@ -76,7 +77,7 @@ def warm_start(problem, B):
 
 @kernel
 def wanted(problem, B, s):
-    """Where surface s goes without limits, p + v B' y."""
+    """Where surface s goes without limits, rad: p + v B' y."""
     y = problem.y
     along = B[0, s] * y[0] + B[1, s] * y[1] + B[2, s] * y[2]
     return problem.u_preferred[s] + problem.weight[s] * along
@@ -84,7 +85,12 @@ def wanted(problem, B, s):
 
 @kernel
 def multipliers(problem, B, demand):
-    """Fill y (3,): what is left of the demand, over slack; S y = d - B u0 by Cholesky, S = L L', L in S."""
+    """Fill y (3,), what is left of the demand over slack: the solution of
+
+        S y = d - B u0,    S = B v B' + slack I        v of free surfaces alone; u0: p if free, else the limit
+
+    by Cholesky: S = L L', L z = d - B u0, L' y = z. L takes the place of S, and z that of y in between.
+    """
     S, y, slack = problem.S, problem.y, problem.slack
     S[:], y[:] = 0.0, demand
     for i in range(3):
@@ -126,7 +132,8 @@ def blocking_surface(problem, B):
 
 @kernel
 def release(problem, B):
-    """Free the surface whose limit holds it back most; whether there is one."""
+    """Free the surface whose limit holds it back most, by side (u - (p + v B' y)) rad; returns whether there
+    is one."""
     worst, most = -1, ROUNDING
     for s in range(problem.u.size):
         # in rad: how far inside of its limit it would be; nothing of one that is free

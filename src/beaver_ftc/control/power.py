@@ -2,17 +2,21 @@
 
 The Beaver's power acts on pitch when neither elevator nor flap does.
 
-    pz = pz_trim - k_V (V_f - V_bar) + k_att att,    T_f V_f' = V - V_f,    T_V V_bar' = V_f - V_bar,
-    att' = q - q_ref - att / T_att
+    P = P_trim - K_V (V - V_bar) + K_theta theta_m                                   `wanted`
+    tau_V V_bar' = V - V_bar,    theta_m' = q - q_ref - theta_m / tau_theta          `follow`
 
-V_f is the airspeed through a lag, `speed`, V_bar its slow mean, `usual_speed`, m/s; att is `attitude`, rad.
-T_f, T_V and T_att, s, are given as the shares of a frame `smoothing`, `washout` and `leak`.
+    P                  inHg        manifold pressure
+    V, V_bar           m/s         airspeed through a lag, and its slow mean: `speed`, `usual_speed`
+    theta_m            rad         recent error of the pitch attitude: `attitude`
+    q, q_ref           rad/s       pitch rate, and its reference
+    K_V, K_theta                   `speed_gain`, inHg per m/s, and `attitude_gain`, inHg per rad
+    tau_V, tau_theta   s           given as the shares of a frame `washout` and `leak`
 
 Airspeed fed back to power damps the phugoid, as when an airliner was flown on its engines alone
 [Burcham1997]. It is washed out, so that power does not fight the airspeed to which a jammed elevator trims
-the aircraft: it has not the moment for that. att is what the pitch rate has missed of late: nose too high,
-and more power lowers it, Cm_dpt being negative. Power has little moment and a right-half-plane zero from
-there to the attitude: it can steady the aircraft, not make it follow a pitch rate.
+the aircraft: it has not the moment for that. theta_m is what the pitch rate has missed of late: nose too
+high, and more power lowers it, Cm_dpt being negative. Power has little moment and a right-half-plane zero
+from there to the attitude: it can steady the aircraft, not make it follow a pitch rate.
 """
 
 from math import exp, radians
@@ -34,8 +38,10 @@ LEAST_LACK_RAD_S2 = 0.05  # of pitch acceleration: what 2 to 3 inHg give
 WHOLE_RANGE_S = 5.0  # in which a lever goes from stop to stop
 YAW_SHARE = 0.5  # of the rudder, that engine power may claim: the rest is there to fly with
 
-# impatience, forgiveness: shares a frame; speed_gain inHg per m/s, attitude_gain inHg per rad; smoothing,
-# washout, leak: shares a frame; trim, low, high, step: in the units of the setting, as is the command.
+# impatience, forgiveness: see `engage`; speed_gain, attitude_gain: K_V, K_theta; smoothing, washout, leak: 1
+# - exp(-dt / tau) of the lag of V, of V_bar and of theta_m; trim, low, high, step: in the units of the
+# setting, as is the command; dpt_factor, highest_dpt: see `_slipstream_limits`, 0 if nothing is known of a
+# slipstream.
 POWER_CONFIG = record(
     enabled=int, impatience=float, forgiveness=float, speed_gain=float, attitude_gain=float,
     smoothing=float, washout=float, leak=float, trim=float, low=float, high=float, step=float,
@@ -43,6 +49,7 @@ POWER_CONFIG = record(
 )  # fmt: skip
 # base: the setting unless engaged, in trim or by the autopilot.
 SETPOINT = record(base=float)
+# lost: see `engage`; engaged: whether the law holds; moved: whether it has left the setting, and returns.
 POWER_MEMORY = record(lost=float, engaged=int, moved=int, speed=float, usual_speed=float, attitude=float)
 # command: of all engines, then what each that is an effector has beside it (engines.py); in_use: whether the
 # levers are commanded; what is reported: since when and how long engaged, the lowest and highest setting.
@@ -93,8 +100,11 @@ def configure_power(power: np.void, layout: np.void, declared: Declared) -> None
 
 
 def _slipstream_limits(declared: Declared, layout: np.void) -> tuple[float, float]:
-    """rho V^3 d dpt / d pz of the engine [FDC], kg/(m3) (m/s)^3 per inHg; and the dpt at which holding the
-    propeller's yawing moment takes YAW_SHARE of the rudder's travel."""
+    """dpt_factor, rho V^3 d dpt / d P of the engine [FDC], kg/m3 (m/s)^3 per inHg; and highest_dpt, at which
+    holding the propeller's yawing moment takes YAW_SHARE of the rudder's travel:
+
+        |Cn_dpt3| dpt^3 = YAW_SHARE |Cn_dr| rudder
+    """
     initial: Any = declared.initial
     aircraft, rudder = declared.aircraft, layout["main"][YAW]
     rpm, terms = initial.engine_rpm, aircraft.terms.values()
@@ -113,7 +123,8 @@ def _slipstream_limits(declared: Declared, layout: np.void) -> tuple[float, floa
 
 @kernel
 def pitch_is_lost(layout, surfaces, saturated, shortfall):
-    """Whether elevator and flap are given up, or cannot between them give what pitch demands.
+    """Whether elevator and flap are given up, or cannot between them give what pitch demands: the elevator is
+    given up or at its stop, and the shortfall is more than LEAST_LACK_RAD_S2.
 
     A flap that can still act is asked for what the elevator lacks, so a lack says that it has nothing left.
     shortfall (3,) rad/s2; saturated (n,).
@@ -129,7 +140,7 @@ def pitch_is_lost(layout, surfaces, saturated, shortfall):
 
 
 @kernel
-def watch(power, is_lost, t):
+def engage(power, is_lost, t):
     """Take over once pitch has been lost for a while, hand back once it has not been for longer. t s.
 
     The hysteresis: `lost` rises by `impatience` in a frame in which pitch is lost and falls by `forgiveness`
@@ -148,7 +159,11 @@ def watch(power, is_lost, t):
 
 @kernel
 def follow(config, memory, reference, x, y):
-    """Bring airspeed, its slow mean and the attitude missed to this frame; x (3,) rad/s, y (5,)."""
+    """Bring V, V_bar and theta_m to this frame of dt s; x (3,) rad/s, y (n_y,): measured.
+
+    V <- V + smoothing (airspeed - V),    V_bar <- V_bar + washout (V - V_bar)
+    theta_m <- theta_m + dt (q - q_ref) - leak theta_m
+    """
     if memory.usual_speed == 0.0:
         memory.speed = memory.usual_speed = y[AIRSPEED]
     memory.speed += config.smoothing * (y[AIRSPEED] - memory.speed)
@@ -159,7 +174,9 @@ def follow(config, memory, reference, x, y):
 
 @kernel
 def ceiling(power, y, highest_dpt):
-    """Highest manifold pressure (inHg) whose slipstream leaves the rudder enough to fly with; y (5,).
+    """Highest manifold pressure (inHg) whose slipstream leaves the rudder enough to fly with; y (n_y,).
+
+        P + (highest_dpt - dpt) / (d dpt / d P),    d dpt / d P = dpt_factor / (2 qdyn V)
 
     The propeller yaws with dpt^3: slow and at full power, more than the rudder can hold. No limit where
     nothing is known of a slipstream.
@@ -172,25 +189,26 @@ def ceiling(power, y, highest_dpt):
 
 @kernel
 def wanted(power, y):
-    """The law: manifold pressure, inHg, within its limits; the set one unless engaged."""
+    """The law: P = base - K_V (V - V_bar) + K_theta theta_m, inHg, within its limits; `base`, P_trim or the
+    autopilot's, unless engaged."""
     config, memory = power.config, power.memory
+    P, V, V_bar, theta_m = power.setpoint.base, memory.speed, memory.usual_speed, memory.attitude
     if not memory.engaged:
-        return power.setpoint.base
-    deviation = memory.speed - memory.usual_speed
-    pressure = power.setpoint.base - config.speed_gain * deviation + config.attitude_gain * memory.attitude
-    return max(min(pressure, ceiling(power, y, config.highest_dpt), config.high), config.low)
+        return P
+    P = P - config.speed_gain * (V - V_bar) + config.attitude_gain * theta_m
+    return max(min(P, ceiling(power, y, config.highest_dpt), config.high), config.low)
 
 
 @kernel
-def steer_by_power(power, reference, x, y, watched, is_lost, t):
-    """Move the manifold pressure by one frame; x (3,) rad/s, y (5,), t s.
+def steer_by_power(power, reference, x, y, may_engage, is_lost, t):
+    """Move the manifold pressure by one frame; x (3,) rad/s, y (n_y,), t s.
 
-    watched: whether it may take over, since there is an alarm; is_lost: `pitch_is_lost` now.
+    may_engage: whether power may take over, since there is an alarm; is_lost: `pitch_is_lost` now.
     """
     memory, output = power.memory, power.output
     follow(power.config, memory, reference, x, y)
-    if watched:
-        watch(power, is_lost, t)
+    if may_engage:
+        engage(power, is_lost, t)
     output.command[0] = moved(output.command[0], wanted(power, y), power.config.step)
     output.in_use = memory.engaged or memory.moved
     memory.moved = output.command[0] != power.setpoint.base

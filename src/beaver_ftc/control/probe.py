@@ -1,6 +1,6 @@
 """The probe is active diagnosis: it moves flap and elevator against each other, and a healthy aircraft feels
-nothing of it. The flap goes down and back by (1 - cos) / 2; the allocation gives the elevator what the flap
-does not leave. A surface that does not follow then shows.
+nothing of it. The flap goes down and back by (1 - cos phase) / 2; the allocation gives the elevator what the
+flap does not leave. A surface that does not follow then shows.
 """
 
 from math import pi, radians
@@ -29,7 +29,10 @@ def configure_probe(probe: np.void, probing: Probing | None, dt: float) -> None:
 
 @kernel
 def advance_probe(probe, wanted, t):
-    """Bring the probe to the next frame, t s: begin when wanted, end with the movement when no longer."""
+    """Bring the probe to the next frame, t s: begin when wanted, end with the movement when no longer.
+
+    deflection = amplitude (1 - cos phase) / 2,    rad
+    """
     config, memory = probe.config, probe.memory
     if memory.probed == 0:
         if not wanted or memory.from_s >= 0.0:

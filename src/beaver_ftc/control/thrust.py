@@ -42,7 +42,10 @@ def set_up_engine(engine: np.void, thrust: Any, mass_kg: float) -> None:
 
 @kernel
 def between(at, n, x, y):
-    """y (n,) at `at`, linear between the rising x (n,); beyond its ends the nearest."""
+    """y (n,) at `at`, linear between the rising x (n,); beyond its ends the nearest:
+
+    y_k + (at - x_k) / (x_k+1 - x_k) (y_k+1 - y_k),    x_k <= at <= x_k+1
+    """
     k = 0
     while k < n - 2 and at > x[k + 1]:
         k += 1

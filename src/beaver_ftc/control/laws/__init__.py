@@ -19,15 +19,16 @@ def prepare(control, assessment, prediction, mode, t):
     """Bring the effectiveness matrix, the hand-over of pitch and the probe to this frame, t s. mode: the
     supervisor's.
 
-    Pitch is handed over at once where the reference is governed from this frame on, or where the diagnosis of
-    all types has found that less than least_effectiveness is left of the main surface.
+    Pitch is handed over at once where a surface is or was slow or parked (the reference is governed,
+    reference.py), or where the diagnosis of all types has found that less than least_effectiveness is left of
+    the main surface.
     """
     surfaces, config = control.surfaces, control.config
+    output, least = surfaces.output, surfaces.config.least_effectiveness
     allocation.form_effectiveness_matrix(control.axes, prediction.G, surfaces, config.uses_verdict)
-    remains = allocation.remaining(control.layout, surfaces.output.effectiveness, PITCH)
-    least = surfaces.config.least_effectiveness
-    governed = control.reference.memory.active or surfaces.output.authority_lost
-    at_once = governed or (remains < least and assessment.diagnoses_all_types)
+    remains = allocation.remaining(control.layout, output.effectiveness, PITCH)
+    useless = remains < least and assessment.diagnoses_all_types
+    at_once = control.reference.memory.active or output.authority_lost or useless
     allocation.hand_over_pitch(control.allocation, mode == MODE_REALLOCATED, at_once, remains, least)
     if control.probe.config.frames > 0:
         wanted = assessment.pitch_undecided and config.uses_verdict and not config.informed
@@ -66,16 +67,19 @@ def command_surfaces(control, assessment, faults, prediction, by_observer):
 @apart
 def complete(control, assessment, measured, t):
     """Note whether the demand is met; what is missing in pitch and yaw is left to the engines, at t s.
-    They serve from the alarm on, and at any time for a law that is informed of the truth."""
+
+    engines_serve: whether they may, from the alarm on, and at any time for a law that is informed of the
+    truth.
+    """
     out, surfaces, axes, layout = control.allocation.output, control.surfaces, control.axes, control.layout
     lever, engine = control.power, control.engines
-    watched = assessment.detected or control.config.informed
+    engines_serve = assessment.detected or control.config.informed
     allocation.note_shortfall(axes, out.command, layout, surfaces.output.lag, engine.output.authority)
     if lever.config.enabled:
         lost = power.pitch_is_lost(layout, surfaces, out.saturated, axes.shortfall)
-        power.steer_by_power(lever, control.reference, measured.x, measured.y, watched, lost, t)
+        power.steer_by_power(lever, control.reference, measured.x, measured.y, engines_serve, lost, t)
     if engine.config.n > 0:
-        if watched:
+        if engines_serve:
             airspeed = measured.y[AIRSPEED]
             engines.steer_by_engines(engine, lever, axes, layout, out.saturated, surfaces, airspeed)
         else:

@@ -10,8 +10,9 @@ from beaver_ftc.control import CompiledLaw
 from beaver_ftc.control.allocation import take_command
 
 # Filled by `compile_into` of the rival's class. incremental: whether it is incremental inversion, else the
-# regulator. The regulator: gains on error and integral, the linear model, its inverse, the trim. Incremental
-# inversion: gains, and what its filter keeps from frame to frame.
+# regulator. The regulator: gains K, rad per rad/s and rad per rad, on error and integral; the linear model A,
+# 1/s, and inverse of B, rad per rad/s2; the trim, rad/s. Incremental inversion: gains Kp 1/s, Ki 1/s2, and
+# the share that its filter keeps from frame to frame.
 CONFIG = record(
     incremental=int, K=(3, 6), A=(3, 3), B_inverse=(3, 3), trim_x=3, Kp=float, Ki=float, keep=float
 )
@@ -70,7 +71,8 @@ def missed(memory, dt, i, e):
 
 @kernel
 def regulate(law, dt, rate, acceleration, main, x, u):
-    """u <- u + B^-1 (xm' - A (xm - x_trim)) + K (e, int e),    e = xm - x."""
+    """u <- u + B^-1 (xm' - A (xm - x_trim)) + K (e, int e),    e = xm - x, rad/s; u (n,) rad, its leading
+    surfaces alone."""
     config = law.config
     for i in range(3):
         e = rate[i] - x[i]
@@ -109,7 +111,8 @@ def increment(law, dt, rate, acceleration, main, x, Gu, G, demand, u):
 
 @kernel
 def smooth(filtered, i, value, keep):
-    """Two equal filters in series, each holds its input over the frame; filtered (2, 3), in place."""
+    """Two equal filters in series, y <- keep y + (1 - keep) input, each holds its input over the frame;
+    filtered (2, 3): outputs of the first and the second, in place. Returns that of the second, axis i."""
     filtered[0, i] = keep * filtered[0, i] + (1.0 - keep) * value
     filtered[1, i] = keep * filtered[1, i] + (1.0 - keep) * filtered[0, i]
     return filtered[1, i]
@@ -124,7 +127,12 @@ def cross(G, i, j, k):
 
 @kernel
 def solve(G, main, demand, out):
-    """Put into out the deflections of the surfaces main (3,) that give demand (3,), by Cramer's rule."""
+    """Put into out the deflections of the surfaces main (3,) that give demand (3,), by Cramer's rule:
+
+        u_s = demand . (G_s+1 x G_s+2) / (G_0 . (G_1 x G_2))
+
+    G_s: column of G (3, n) rad/s2 per rad of surface main[s], s modulo 3.
+    """
     determinant = 0.0
     for k in range(3):
         determinant += G[k, main[0]] * cross(G, main[1], main[2], k)

@@ -26,7 +26,7 @@ from beaver_ftc.compiled.records import Room
 from beaver_ftc.design.table import ALPHA, BETA
 
 OBSERVER_ERROR = record(rate=3, disturbance=3)  # e and dd of one acceleration
-_SIGNALS = 5
+_SIGNALS = 5  # in y: alpha, beta, p, q, r
 _FEW = 4  # surfaces: of so few each leads an axis or stands in, and rejecting.py estimates one at a time
 _UNSURE = 0.5  # standard deviation of a surface's theta before anything is seen
 _AIRFRAME = np.array([30.0, 30.0, 3.0, 3.0, 3.0])  # of A, in the order of y: 1/s2 and 1/s
@@ -51,8 +51,11 @@ def estimator_dtype(n: int) -> np.dtype:
 
 @kernel
 def observer_response(error, i, acceleration, L_rate, L_disturbance, dt):
-    """Innovation (rad/s) of the observer in a frame for an acceleration (rad/s2) of axis i; error: of dtype
-    OBSERVER_ERROR, advanced by the frame."""
+    """Advance the observer's error, of dtype OBSERVER_ERROR, by a frame of dt s with an acceleration a,
+    rad/s2, of axis i; returns the innovation, rad/s:
+
+        innovation = e + dt (a - dd),    e <- (1 - L_rate) innovation,    dd <- dd + L_disturbance innovation
+    """
     innovation = error.rate[i] + dt * (acceleration - error.disturbance[i])
     error.rate[i] = (1.0 - L_rate) * innovation
     error.disturbance[i] += L_disturbance * innovation
@@ -61,8 +64,11 @@ def observer_response(error, i, acceleration, L_rate, L_disturbance, dt):
 
 @apart
 def begin_estimator(estimator, squares, frames, dt):
-    """Begin to estimate, with nothing known; squares (3,) (rad/s)2: sums of squares of the innovation over
-    `frames` (3,)."""
+    """Begin to estimate, with nothing known: found = 0, P diagonal, of the variances of theta and A.
+
+    noise_i = _CORRELATED squares_i / frames_i, (rad/s)2, from sums of squares of the innovation over `frames`
+    (3,) in health; at least _LEAST_NOISE_RAD_S2 over a frame of dt s.
+    """
     estimator.active = 1
     N, n = estimator.found.size, estimator.found.size - 3 * _SIGNALS
     estimator.P[:], estimator.found[:] = 0.0, 0.0
@@ -89,14 +95,13 @@ def estimate(estimator, innovation, L_rate, L_disturbance, dt, x, y, effectivene
     surfaces.
     """
     n, h, signal, unsure = effectiveness.size, estimator.h, estimator.signal, estimator.unsure
+    P, found, errors = estimator.P, estimator.found, estimator.errors
     for j in range(h.size):
-        estimator.P[j, j] = min(
-            estimator.P[j, j] + unsure[j] * dt / _FORGOTTEN_S, max(estimator.P[j, j], unsure[j])
-        )
+        P[j, j] = min(P[j, j] + unsure[j] * dt / _FORGOTTEN_S, max(P[j, j], unsure[j]))
     signal[0], signal[1] = y[ALPHA], y[BETA]
     signal[2:] = x
     for i in range(3):
-        L, M, errors, assumed = L_rate[i], L_disturbance[i], estimator.errors, 0.0
+        L, M, assumed = L_rate[i], L_disturbance[i], 0.0
         h[:] = 0.0
         for s in range(n):
             assumed += (effectiveness[s] - 1.0) * moments[i, s]
@@ -106,33 +111,35 @@ def estimate(estimator, innovation, L_rate, L_disturbance, dt, x, y, effectivene
         seen = innovation[i] + observer_response(errors[n + _SIGNALS], i, assumed, L, M, dt)
         update(estimator, seen, estimator.noise[i])
     for s in range(n):
-        beyond = estimator.found[s] - min(max(estimator.found[s], -1.0), 0.0)
+        beyond = found[s] - min(max(found[s], -1.0), 0.0)
         if beyond != 0.0:
             for j in range(h.size):
-                estimator.found[j] -= estimator.P[j, s] * (beyond / estimator.P[s, s])
+                found[j] -= P[j, s] * (beyond / P[s, s])
 
 
 @kernel
 def update(estimator, seen, noise):
-    """One step of recursive least squares, for seen = h' found + noise; noise: its variance.
+    """One step of recursive least squares, for seen = h' found + noise; noise: its variance, (rad/s)2.
 
-    found <- found + P h (seen - h' found) / v,    P <- P - P h h' P / v,    v = noise + h' P h
+        found <- found + P h r / v,    P <- P - P h h' P / v,    r = seen - h' found,    v = noise + h' P h
+
+    found, h (N,), P (N, N); Ph: P h.
     """
-    N, h, P, Ph = estimator.found.size, estimator.h, estimator.P, estimator.Ph
-    variance, residual = noise, seen
-    for j in range(N):
+    found, h, P, Ph = estimator.found, estimator.h, estimator.P, estimator.Ph
+    v, r = noise, seen
+    for j in range(h.size):
         Ph[j] = 0.0
-        for k in range(N):
+        for k in range(h.size):
             Ph[j] += P[j, k] * h[k]
-        variance += h[j] * Ph[j]
-        residual -= h[j] * estimator.found[j]
-    for j in range(N):
-        estimator.found[j] += Ph[j] / variance * residual
-        for k in range(N):
-            P[j, k] -= Ph[j] * Ph[k] / variance
+        v += h[j] * Ph[j]
+        r -= h[j] * found[j]
+    for j in range(h.size):
+        found[j] += Ph[j] / v * r
+        for k in range(h.size):
+            P[j, k] -= Ph[j] * Ph[k] / v
 
 
 @kernel
 def effectiveness_of(estimator, s):
-    """Effectiveness of surface s, 0 to 1."""
+    """Effectiveness of surface s, 1 + theta_s, 0 to 1."""
     return min(max(1.0 + estimator.found[s], 0.0), 1.0)

@@ -65,7 +65,12 @@ def larger_estimate(sums, diagnosed, i, least):
 
 @kernel
 def effectiveness_seen(sums, i, diagnosed):
-    """Effectiveness of the main surface of axis i by the observer; diagnosed: by the diagnosis."""
+    """Effectiveness of the main surface of axis i by the observer, 1 + theta:
+
+        theta = (sum psi e + lam (diagnosed - 1)) / (sum psi^2 + lam),    lam = sum e^2 / frames / UNSURE^2
+
+    diagnosed: by the diagnosis, which is returned while nothing has been seen.
+    """
     if sums.frames[i] == 0.0:
         return diagnosed
     prior = sums.innovation[i] / sums.frames[i] / (UNSURE * UNSURE)
@@ -85,14 +90,18 @@ def is_effective(sums, main, s, least):
 
 @kernel
 def accumulate(config, memory, i, effectiveness, moment, innovation):
-    """Add this frame to the sums of axis i; innovation rad/s: of the law's observer; effectiveness: that the
-    law assumes, of the main surface; moment: G u of a healthy one, rad/s2."""
+    """Add this frame to the sums of axis i, sum <- sum + term - fading sum, for psi e, psi^2, e^2 and 1.
+
+    psi, e, rad/s: the observer's answers to moment and to innovation + (effectiveness - 1) moment; innovation
+    rad/s: of the law's observer; effectiveness: that the law assumes, of the main surface; moment: G u of a
+    healthy one, rad/s2.
+    """
     sums, fading, dt = memory.sums, config.fading, config.dt
     L_rate, L_disturbance = memory.L_rate[i], memory.L_disturbance[i]
     assumed = (effectiveness - 1.0) * moment
     psi = observer_response(memory.healthy, i, moment, L_rate, L_disturbance, dt)
-    innovation += observer_response(memory.assumed, i, assumed, L_rate, L_disturbance, dt)
-    sums.product[i] += psi * innovation - fading * sums.product[i]
+    e = innovation + observer_response(memory.assumed, i, assumed, L_rate, L_disturbance, dt)
+    sums.product[i] += psi * e - fading * sums.product[i]
     sums.square[i] += psi * psi - fading * sums.square[i]
-    sums.innovation[i] += innovation * innovation - fading * sums.innovation[i]
+    sums.innovation[i] += e * e - fading * sums.innovation[i]
     sums.frames[i] += 1.0 - fading * sums.frames[i]

@@ -1,8 +1,8 @@
 """The gains of the default law (rejecting.py), a loop at a time, from what is declared.
 
 Two numbers are chosen, by flights in turbulence beside the rivals: RATIO, and the share of an actuator's
-rate that noise may take (`noise_share`). w, Kp and the lead follow. One number s sets feedback Kp = s and
-observer w = RATIO s of a loop. It is the largest that leaves the margins asked for with the declared
+rate that noise may take (`noise_share`). w_o, Kp and the lead follow. One number s, 1/s, sets feedback Kp = s
+and observer w_o = RATIO s of a loop. It is the largest that leaves the margins asked for with the declared
 actuator, one JSBSim frame of delay, the frame rate, and the gyro's declared lag and delay; and, where gyros
 are noisy, that moves the surface no faster than a share of its rate limit. The plant of a loop is an
 integrator, the inversion having made it one: the margins are those of this design loop, with a reserve for
@@ -38,7 +38,8 @@ class Loop:
 
 
 def lead_of(approach: float) -> float:
-    """By how much to lead an actuator that goes this share of the way in a frame; it never overshoots."""
+    """lead = 1 / approach, from 1 to MOST_LEAD: an actuator that goes this share of the way in a frame is
+    there after one, and never overshoots."""
     return 1.0 / min(max(approach, 1.0 / MOST_LEAD), 1.0)
 
 
@@ -48,24 +49,41 @@ def frequencies(dt_s: float) -> np.ndarray:
 
 
 def corrections(s: float, dt_s: float) -> tuple[float, float]:
-    """L_rate and L_disturbance (1/s) of an observer with both poles at exp(-w dt), w = RATIO s."""
+    """L_rate and L_disturbance (1/s) of an observer with both poles at exp(-w_o dt), w_o = RATIO s:
+
+    L_rate = 1 - exp(-2 w_o dt),    L_disturbance = (1 - exp(-w_o dt))^2 / dt
+    """
     pole = np.exp(-RATIO * s * dt_s)
     return 1.0 - pole * pole, (1.0 - pole) ** 2 / dt_s
 
 
+def actuator_response(loop: Loop, z: np.ndarray) -> np.ndarray:
+    """Position over command, approach / (z - 1 + approach), (n,): the actuator goes this share of its way in
+    a frame."""
+    return loop.approach / (z - 1.0 + loop.approach)
+
+
 def controller(loop: Loop, s: float, z: np.ndarray) -> np.ndarray:
-    """Actuator command over measured rate, times -G: the law's own response (n,), 1/s, at z (n,)."""
+    """Actuator command over measured rate, times -G: the law's own response (n,), 1/s, at z (n,).
+
+    The law's equations (rejecting.py), z-transformed, of one axis with f = 0 and xm = 0; positions p and
+    commands c times G, innovation e, L and M for L_rate and L_disturbance, m: mean of p over the frame:
+
+        xhat = xhat/z + dt (d/z + m p) + L e,    d = d/z + M e,    e = x - xhat/z - dt (d/z + m p)
+        p = `actuator_response` c,    c = p + lead (-s x+ - d - p)
+        x+ = xhat + share dt (p + d),    m = share/z + 1 - share
+
+    A row is an equation; its columns are xhat, d, p and c, and `driven` is what x multiplies.
+    """
     dt, share = loop.dt_s, loop.share
     L_rate, L_disturbance = corrections(s, dt)
-    back = 1.0 / z
-    mean = share * back + 1.0 - share  # of the surface's moment over the elapsed frame
-    actuator = loop.approach / (z - 1.0 + loop.approach)
+    keep, back = 1 - L_rate, 1.0 / z
+    mean = share * back + 1.0 - share
     one, none = np.ones_like(z), np.zeros_like(z)
-    # unknowns: rate, disturbance, position (times G), command (times G); driven by the measured rate
     rows = [
-        [one - (1 - L_rate) * back, -(1 - L_rate) * dt * back, -(1 - L_rate) * dt * mean, none],
+        [one - keep * back, -keep * dt * back, -keep * dt * mean, none],
         [L_disturbance * back, one - back + L_disturbance * dt * back, L_disturbance * dt * mean, none],
-        [none, none, one, -actuator],
+        [none, none, one, -actuator_response(loop, z)],
         [loop.lead * s * one, loop.lead * (1 + s * share * dt) * one,
          (loop.lead - 1 + loop.lead * s * share * dt) * one, one],
     ]  # fmt: skip
@@ -74,11 +92,14 @@ def controller(loop: Loop, s: float, z: np.ndarray) -> np.ndarray:
 
 
 def open_loop(loop: Loop, s: float, z: np.ndarray) -> np.ndarray:
-    """The loop broken at the surface, (n,)."""
+    """The loop broken at the surface, (n,): controller, actuator, plant and gyro in series.
+
+    plant: dt (share + (1 - share) z) / (z - 1), an integrator of the surface's moment
+    gyro: z^(-delay / dt) (1 - keep) / (1 - keep / z)
+    """
     plant = loop.dt_s * (loop.share + (1.0 - loop.share) * z) / (z - 1.0)
-    actuator = loop.approach / (z - 1.0 + loop.approach)
     gyro = z ** (-loop.delay_s / loop.dt_s) * (1.0 - loop.keep) / (1.0 - loop.keep / z)
-    return controller(loop, s, z) * actuator * plant * gyro
+    return controller(loop, s, z) * actuator_response(loop, z) * plant * gyro
 
 
 def margins(L: np.ndarray) -> tuple[float, float, float]:
@@ -95,7 +116,7 @@ def margins(L: np.ndarray) -> tuple[float, float, float]:
     upper, lower = inf, inf
     if L[-1].real < -abs(L[-1].imag) * 1e6:
         upper, lower = (-level[-1], inf) if level[-1] < 0.0 else (inf, level[-1])
-    for turn in np.arange(-180.0 - 360.0 * 3, 181.0, 360.0):
+    for turn in (-1260.0, -900.0, -540.0, -180.0, 180.0):  # deg, where L is real and negative
         at = _where(phase - turn, level)
         upper = min([upper, *(-x for x in at if x < 0.0)])
         lower = min([lower, *(x for x in at if x >= 0.0)])
@@ -104,23 +125,31 @@ def margins(L: np.ndarray) -> tuple[float, float, float]:
 
 
 def _where(of: np.ndarray, value: np.ndarray) -> list[float]:
-    """`value` wherever `of` passes zero."""
+    """`value` (n,) wherever `of` (n,) passes zero, both taken as straight between two samples."""
     i = np.flatnonzero(np.signbit(of[:-1]) != np.signbit(of[1:]))
     part = of[i] / (of[i] - of[i + 1])
     return list(value[i] + part * (value[i + 1] - value[i]))
 
 
 def noise_speed(loop: Loop, s: float, z: np.ndarray, omega: np.ndarray) -> float:
-    """Standard deviation of G times the surface's speed, over that of a gyro's sample, 1/s2."""
-    actuator = loop.approach / (z - 1.0 + loop.approach)
-    moved = np.abs((z - 1.0) / loop.dt_s * actuator * controller(loop, s, z) / (1.0 + open_loop(loop, s, z)))
+    """Standard deviation of G times the surface's speed, over that of a gyro's sample, 1/s2:
+
+        sqrt(dt / pi integral |H|^2 d omega),    H = (z - 1) / dt actuator controller / (1 + open loop)
+
+    omega (n,) rad/s: up to Nyquist; z = exp(i omega dt).
+    """
+    speed = (z - 1.0) / loop.dt_s * actuator_response(loop, z)
+    moved = np.abs(speed * controller(loop, s, z) / (1.0 + open_loop(loop, s, z)))
     return sqrt(float(np.trapezoid(moved**2, omega)) * loop.dt_s / pi)
 
 
 @lru_cache(maxsize=64)
 def candidates(loop: Loop, gain_db: float, phase_deg: float) -> tuple[np.ndarray, np.ndarray]:
     """LEAST_PER_S and the values of s above it that leave the margins, 1/s, ascending, and the noise speed of
-    each, 1/s2."""
+    each, 1/s2.
+
+    The fastest has s = 1 / (2 delay); delay: that of a frame's hold, of the command and of the gyro, s.
+    """
     omega = frequencies(loop.dt_s)
     z = np.exp(1j * omega * loop.dt_s)
     fastest = 0.5 / (loop.dt_s * (0.5 + loop.share) + loop.delay_s)
@@ -138,8 +167,8 @@ def candidates(loop: Loop, gain_db: float, phase_deg: float) -> tuple[np.ndarray
 def fastest(
     loop: Loop, margin: tuple[float, float], noise_rad_s: float, G: float, speed_rad_s: float
 ) -> float:
-    """The largest s, 1/s, for these margins (dB, deg) and at most this mean surface speed from noise; G
-    rad/s2 per rad."""
+    """The largest s, 1/s, for these margins (dB, deg) and at most this mean surface speed from noise: of the
+    candidates, log s over log noise speed is taken as straight. G rad/s2 per rad."""
     values, speeds = candidates(loop, *margin)
     if noise_rad_s <= 0.0:
         return float(values[-1])

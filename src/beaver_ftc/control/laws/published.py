@@ -50,8 +50,13 @@ def command_by(law, fhat, control, assessment, faults, prediction, measured, mod
 
 @kernel
 def demand(law, axes, reference, x, f, fhat):
-    """Fill demand and hold of the axes, (3,) rad/s2. x (3,) rad/s; f, fhat (3,) rad/s2: the model's
-    acceleration and what is unknown beside it; reference: the Output of laws/__init__.py."""
+    """Fill demand and hold of the axes, (3,) rad/s2:
+
+        demand = xm' + Kp e + Ki int e - f - fhat,    e = xm - x,    hold = -f - fhat
+
+    x (3,) rad/s; f, fhat (3,) rad/s2: the model's acceleration and what is unknown beside it; reference: the
+    output of laws/reference.py, whose governed rate and acceleration are xm, xm'.
+    """
     config = law.config
     for i in range(3):
         error = reference.governed_rate[i] - x[i]
@@ -62,7 +67,9 @@ def demand(law, axes, reference, x, f, fhat):
 
 @kernel
 def integrate(law, axes, reference, u, x):
-    """Advance the integrators; what the limited surfaces could not give is taken back (anti-windup).
+    """Advance the integrators; what the limited surfaces could not give is taken back (anti-windup):
+
+        int e <- int e + dt (e + (G u - demand) / Kp)
 
     u (n,) rad: the command; x (3,) rad/s. The back-calculation gain 1/Kp unwinds within one closed-loop time
     constant.

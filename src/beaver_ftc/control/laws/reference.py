@@ -55,7 +55,10 @@ def discretise(wn: float, zeta: float, dt: float) -> tuple[np.ndarray, np.ndarra
 
 @kernel
 def advance(config, rate, acceleration, wanted):
-    """Rate (rad/s) and acceleration (rad/s2) of the model a frame on, `wanted` (rad/s) held."""
+    """Rate xm (rad/s) and acceleration xm' (rad/s2) of the model a frame on, ref = `wanted` (rad/s) held:
+
+    (xm, xm') <- A (xm, xm') + B ref
+    """
     A, B = config.A, config.B
     following = A[0, 0] * rate + A[0, 1] * acceleration + B[0] * wanted
     return following, A[1, 0] * rate + A[1, 1] * acceleration + B[1] * wanted
@@ -73,7 +76,11 @@ def follow(config, output, commanded):
 
 @kernel
 def govern(reference, commanded, shortfall, authority_lost):
-    """Bring what the law follows to the next frame.
+    """Bring what the law follows, xm and xm', to the next frame: the model's, until the reference is
+    governed, then
+
+        scale <- scale - dt |shortfall| / MISSED_RAD_S,    then scale + dt / RECOVERY_S (1 - scale), 0 or more
+        (xm, xm') <- A (xm, xm') + B scale commanded,    xm <- xm - dt shortfall
 
     commanded (3,) rad/s; shortfall (3,) rad/s2: what was demanded and not given. authority_lost: whether a
     surface is slow or parked now: from then on the reference is governed.

@@ -1,18 +1,21 @@
 """Inversion with a disturbance observer: gusts and model errors are rejected from the first frame on.
 
-    z' = f + G u + d + 2 w (x - z),   d' = w^2 (x - z)                 [Han2009, Chen2016]
-    demand = xm' + Kp (xm - x+) - f - d,                                then G u = demand
+    xhat' = f + G u + d + 2 w_o (x - xhat),   d' = w_o^2 (x - xhat)    [Han2009, Chen2016]   `observe`
+    G u_c = xm' + Kp (xm - x+) - f - d                                                       `demand`
+
+    x, xhat, xm   (3,) rad/s      body rates: measured, of the observer, of the reference model
+    x+            (3,) rad/s      xhat at the instant from which the command acts (`look_ahead`)
+    d             (3,) rad/s2     disturbance
+    f, G          (3,), (3, n)    design model: rad/s2 without surfaces, rad/s2 per rad
+    u, u_c        (n,) rad        where the actuators are; command
+    w_o, Kp       1/s             bandwidth of the observer, feedback
 
 d is what the model does not explain: rotation of the air, wrong coefficients, a fault that is not named
 yet. u is where the actuators are, not their command, so that neither their lag nor their stops count as a
-disturbance: there is nothing that could wind up. x+ is the rate at the instant from which the command
-acts, one JSBSim frame from now, and xm is taken there too.
+disturbance: there is nothing that could wind up. The command acts one JSBSim frame from now, and xm is taken
+there too.
 
-Discrete: z and d are corrected by L_rate = 1 - e^{-2 w dt} and L_disturbance = (1 - e^{-w dt})^2 / dt of
-the innovation.
-
-Gains. s sets the feedback Kp = s and the observer w = RATIO s of a loop: loop_design.py derives it from what
-is declared.
+Gains. Kp = s and w_o = RATIO s of a loop: loop_design.py derives s from what is declared.
 
 Effectiveness of a surface at fault: the diagnosis' estimate, or what the observer's innovation shows of it if
 that is larger (evidence.py). Once no known fault fits, the law estimates all surfaces at once
@@ -26,7 +29,7 @@ import numpy as np
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.compiled import apart, fill, kernel, record, row_of, sized
 from beaver_ftc.control import CompiledLaw, accommodation, allocation, laws
-from beaver_ftc.control.accommodation import approach, begin_frame, reported, start_of
+from beaver_ftc.control.accommodation import approach, begin_frame, give_up, start_of, take_offsets
 from beaver_ftc.control.laws.effectiveness_estimator import (
     OBSERVER_ERROR,
     begin_estimator,
@@ -71,7 +74,7 @@ def configure(law: np.void, control: np.void, prediction: np.void, declared: Dec
 
     y (n_y,): the measured signals in trim. A gyro's noise may move a surface at this share of its rate limit:
 
-        noise_share sqrt(a / a_max)        a: own damping of the axis, 1/s; a_max: of the most damped
+        noise_share sqrt(D / D_max)        D: own damping of the axis, 1/s; D_max: of the most damped
     """
     config = law["config"]
     wanted = declared.control
@@ -87,8 +90,8 @@ def configure(law: np.void, control: np.void, prediction: np.void, declared: Dec
     loops = list(enumerate(layout["main"].tolist()))
     if layout["stand_in"] >= 0:
         loops.append((PITCH, int(layout["stand_in"])))
-    a = np.abs(own_damping(design, y))
-    part = {s: sqrt(a[axis] / a.max()) for axis, s in loops}  # one that leads two axes has that of the latter
+    D = np.abs(own_damping(design, y))
+    part = {s: sqrt(D[axis] / D.max()) for axis, s in loops}  # one that leads two axes has that of the latter
     limits_rad_s = servo_data(declared)["rate_limit_rad_s"]
     margin = wanted.gain_margin_db, wanted.phase_margin_deg
     for row, (axis, s) in enumerate(loops):
@@ -156,14 +159,14 @@ def accommodate(control, assessment, faults, prediction, measured):
         accommodation.accommodate(control, assessment, faults, prediction, measured)
         return
     law, surfaces, layout = control.rejecting, control.surfaces, control.layout
-    memory = law.memory
+    memory, output = law.memory, surfaces.output
     dt = law.config.dt
     least = surfaces.config.least_effectiveness
-    begin_frame(surfaces.output, assessment, False)
+    begin_frame(output, assessment.lags)
+    take_offsets(output, assessment)
     start_or_end_estimator(memory, layout, assessment.detected, dt)
-    for s in range(surfaces.output.target.size):
-        target = reported(surfaces.output, assessment, faults, s, 0.0, False)
-        start = start_of(surfaces.output, assessment, s, False)
+    for s in range(output.target.size):
+        target = assessment.effectiveness[s]
         if assessment.no_target and memory.estimator.active:
             target = effectiveness_of(memory.estimator, s)
         elif assessment.accommodation_mode[s] != GIVE_UP and not assessment.held:
@@ -171,7 +174,10 @@ def accommodate(control, assessment, faults, prediction, measured):
         named = assessment.detected and s == assessment.isolated_surface
         suspected = named and is_doubtful(assessment, memory.sums, layout, s, target, least)
         withdraw(memory, layout, s, control.allocation.output.saturated[s], suspected, dt)
-        approach(surfaces, s, start, target, memory.withdrawn[s])
+        if memory.withdrawn[s]:
+            give_up(output, s)
+        else:
+            approach(surfaces, s, start_of(output, assessment, s), target)
 
 
 @apart
@@ -187,8 +193,12 @@ def command(control, assessment, faults, prediction, measured, mode, t):
 
 @kernel
 def schedule(config, memory, qdyn, transfer_share):
-    """Fill the gains at a dynamic pressure, Pa; beyond the schedule those at its end. The gains of pitch lie
-    between those of the main surface and of its stand-in, which carries the part transfer_share."""
+    """Fill the gains at a dynamic pressure qdyn, Pa; beyond the schedule those at its end.
+
+        gains_q <- gains_q + transfer_share (gains of the stand-in - gains_q)        in pitch
+
+    transfer_share: the part of pitch that the stand-in carries.
+    """
     for table, gains in (
         (config.Kp_at, memory.Kp),
         (config.L_rate_at, memory.L_rate),
@@ -256,8 +266,13 @@ def start_or_end_estimator(memory, layout, detected, dt):
 
 @kernel
 def explained(surfaces, i, design, moments, G):
-    """Acceleration of axis i that the law assumes, rad/s2: the design model's with the faults in it;
-    surfaces: the Output of accommodation.py."""
+    """Acceleration of axis i that the law assumes, f + G u with the faults in it, rad/s2:
+
+        design_i + sum_s (effectiveness_s - 1) moments_is + G_is offset_s
+
+    design (3,): f + G u of healthy surfaces; moments (3, n): of each, G u, rad/s2; surfaces: the output of
+    accommodation.py.
+    """
     total = design[i]
     for s in range(G.shape[1]):
         total += (surfaces.effectiveness[s] - 1.0) * moments[i, s] + G[i, s] * surfaces.offset[s]
@@ -266,25 +281,37 @@ def explained(surfaces, i, design, moments, G):
 
 @kernel
 def observe(law, surfaces, main, x, design, moments, G):
-    """Bring rate and disturbance to this frame: x (3,) rad/s; design (3,) rad/s2, moments, G (3, n): f + G u
-    of healthy surfaces, their moments and effectiveness, means over the frame that has elapsed."""
+    """Bring the observer's rate xhat (3,) rad/s and disturbance d (3,) rad/s2 to this frame:
+
+        xhat <- xhat + dt (f + G u + d),    e = x - xhat
+        xhat <- xhat + L_rate e,    d <- d + L_disturbance e        L: `loop_design.corrections`
+
+    x (3,) rad/s: measured; e: the innovation, rad/s. f + G u is `explained`, a mean over the elapsed frame,
+    as are design (3,), moments (3, n) and G (3, n), which give it.
+    """
     observer, memory = law.observer, law.memory
+    xhat, d = observer.rate, observer.disturbance
     if not observer.begun:
         observer.begun = 1
-        observer.rate[:] = x
+        xhat[:] = x
         return
     for i in range(3):
-        expected = explained(surfaces, i, design, moments, G) + observer.disturbance[i]
-        observer.rate[i] += law.config.dt * expected
-        innovation = memory.innovation[i] = x[i] - observer.rate[i]
-        accumulate(law.config, memory, i, surfaces.effectiveness[main[i]], moments[i, main[i]], innovation)
-        observer.rate[i] += memory.L_rate[i] * innovation
-        observer.disturbance[i] += memory.L_disturbance[i] * innovation
+        xhat[i] += law.config.dt * (explained(surfaces, i, design, moments, G) + d[i])
+        e = memory.innovation[i] = x[i] - xhat[i]
+        accumulate(law.config, memory, i, surfaces.effectiveness[main[i]], moments[i, main[i]], e)
+        xhat[i] += memory.L_rate[i] * e
+        d[i] += memory.L_disturbance[i] * e
 
 
 @kernel
 def demand(control, prediction, measured):
-    """Fill the law's demand, hold and disturbance of the axes, (3,) rad/s2."""
+    """Fill the law's demand G u_c, hold and disturbance d of the axes, (3,) rad/s2:
+
+        demand = xm' + Kp (xm - x+) - f - d,    hold = -f - d
+
+    xm: `target`, of the instant at which the command acts; xm' = (after - target) / dt, `after` a frame
+    later; x+: `memory.ahead`.
+    """
     law, surfaces = control.rejecting, control.surfaces.output
     config, memory, means = law.config, law.memory, prediction.means
     schedule(config, memory, measured.y[QDYN], control.allocation.output.transfer_share)
@@ -305,7 +332,12 @@ def demand(control, prediction, measured):
 
 @kernel
 def look_ahead(law, surfaces, i, f, G, u):
-    """Rate of axis i when the command acts; f (3,), G (3, n), u (n,) rad: of this instant."""
+    """Fill x+ of axis i, the rate when the command acts, rad/s, `share` of a frame from now:
+
+        x+ = xhat + share dt (f + d + sum_s G_is (effectiveness_s u_s + offset_s))
+
+    f (3,), G (3, n), u (n,) rad: of this instant; surfaces: the output of accommodation.py.
+    """
     now = f[i] + law.observer.disturbance[i]
     for s in range(u.size):
         now += G[i, s] * (surfaces.effectiveness[s] * u[s] + surfaces.offset[s])
@@ -314,7 +346,8 @@ def look_ahead(law, surfaces, i, f, G, u):
 
 @kernel
 def targets(reference, i, share):
-    """The reference of axis i when the command acts, and a frame later, rad/s."""
+    """The reference of axis i, rad/s, when the command acts, `share` of a frame from now, and a frame later:
+    between the frames linear."""
     config, output = reference.config, reference.output
     rate, acceleration = output.governed_rate[i], output.governed_acceleration[i]
     wanted = reference.memory.scale[i] * output.commanded_rate[i]

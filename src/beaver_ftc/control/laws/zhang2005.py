@@ -66,7 +66,7 @@ def configure(law: np.void, control: np.void, prediction: np.void, declared: Dec
 def accommodate(control, assessment, faults, prediction, measured):
     """Bring both parts to this frame: what surfaces and the unknown are taken for (control.CompiledLaw)."""
     law, surfaces, main, x = control.zhang2005, control.surfaces, control.layout.main, measured.x
-    begin_frame(surfaces.output, assessment, True)
+    begin_frame(surfaces.output, False)
     if assessment.detected and law.config.adapts:
         saturated, reference = control.allocation.output.saturated, control.reference
         error = reference.output.governed_rate - x
@@ -76,8 +76,11 @@ def accommodate(control, assessment, faults, prediction, measured):
 
 @kernel
 def adapt(law, surfaces, main, saturated, error, G, u, dt):
-    """Both parts, by a step of dt s. error (3,) rad/s: e; G (3, n) rad/s2 per rad; u (n,) rad.
+    """Both parts, by a step of dt s, with signal = -s (3,), rad/s:
 
+        s = e + c int e,    effectiveness_s <- P(effectiveness_s + dt gamma sum_i signal_i G_is u_s)
+
+    error (3,) rad/s: e; G (3, n) rad/s2 per rad; u (n,) rad; gamma: config.gain, c: config.integral_weight.
     While the surface that leads an axis is at its stop, what the axis misses teaches nothing.
     """
     config, signal = law.config, law.memory.signal

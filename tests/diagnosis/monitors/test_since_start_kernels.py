@@ -15,9 +15,9 @@ from beaver_ftc.diagnosis.monitors.initial_errors import (
     H_BETA,
     H_PHI,
     H_THETA,
+    INITIAL_SENSOR,
     N_INITIAL,
 )
-from beaver_ftc.diagnosis.monitors.sensor_monitor import INITIAL_SENSOR
 from beaver_ftc.plant.instruments import SENSORS
 
 SAMPLES = 100

@@ -32,8 +32,9 @@ sum of squares. For the airspeed it counts 1 + e times in the tests of flow; in 
     r > (1 + e + d) B + (e + d) H_m     for the airspeed, in SPEED and the tests after it
 
 since a residual is the sum of the effect of sound sensors, at most B, and of the effect of the error. So an
-error from the start, of any size, never excludes the broken sensor. Where sensor_monitor.py excludes a sensor
-by the effect that its error would have from now on, the limit is B + e_alarm H_m, e as of the alarm.
+error from the start, of any size, never excludes the broken sensor. Where flow_errors.py or suspects.py
+excludes a sensor by the effect that its error would have from now on, the limit is B + e_alarm H_m, e as of
+the alarm.
 
 What each effect follows from (v m/s: velocity, V its length; a m/s2: acceleration, gravity g included; both
 in body axes; p, q, r rad/s):
@@ -107,12 +108,17 @@ N_INITIAL = 5
 # What bounds such an error: its hypothesis, and the tests, first to last, in which its effect shows. Entry n
 # of C is the effect of row n; after the rows C has the parts of the force, of alpha and of beta.
 EVIDENCE = (
-    (H_PHI, TURN_TEST + 1, TURN_TEST + 2), (H_PHI, SPEED_TEST, BETA_TEST),
-    (H_THETA, TURN_TEST, TURN_TEST + 2), (H_THETA, SPEED_TEST, BETA_TEST),
-    (H_ALPHA, BETA_TEST, BETA_TEST), (H_BETA, ALPHA_TEST, ALPHA_TEST), (H_ALPHA, CLIMB_TEST, CLIMB_TEST),
-    (H_AIRSPEED, ALPHA_TEST, ALPHA_TEST), (H_AIRSPEED, BETA_TEST, BETA_TEST),
+    (H_PHI, TURN_TEST + 1, TURN_TEST + 2),  # turns (q, r)
+    (H_PHI, SPEED_TEST, BETA_TEST),  # turns the part of gravity across the first axis
+    (H_THETA, TURN_TEST, TURN_TEST + 2),  # turns the vertical, about which the aircraft turns at psi'
+    (H_THETA, SPEED_TEST, BETA_TEST),  # turns gravity
+    (H_ALPHA, BETA_TEST, BETA_TEST),
+    (H_BETA, ALPHA_TEST, ALPHA_TEST),
+    (H_ALPHA, CLIMB_TEST, CLIMB_TEST),
+    (H_AIRSPEED, ALPHA_TEST, ALPHA_TEST),
+    (H_AIRSPEED, BETA_TEST, BETA_TEST),
     (H_AIRSPEED, DENSITY_TEST, DENSITY_TEST),
-)  # fmt: skip
+)
 N_EFFECTS = len(EVIDENCE) + 2  # and the parts of the force
 # Of each hypothesis, the tests that react at once to a change of its error; the residual of the first is that
 # change
@@ -124,6 +130,7 @@ AT_ONCE = (
     (ANGLE_TEST + 1, TURN_TEST, TURN_TEST + 1, TURN_TEST + 2),
 )
 CHANGE_TEST = tuple(tests[0] for tests in AT_ONCE)
+INITIAL_SENSOR = tuple(SENSOR_OF[j] for j in CHANGE_TEST)  # of each hypothesis
 REACTS = np.array([[j in tests for j in range(N_TESTS)] for tests in AT_ONCE])
 
 INITIAL_RECORD = record(
@@ -172,7 +179,7 @@ def start_bounds(mon, y):
     off = max(ratio * np.sqrt(1.0 + DENSITY_SHARE) - 1.0, 1.0 - ratio * np.sqrt(1.0 - DENSITY_SHARE))
     E[H_AIRSPEED] = min(off, MAX_SPEED_RATIO - 1.0)
     for h in (H_ALPHA, H_BETA):
-        angle = abs(y[SENSOR_OF[CHANGE_TEST[h]]]) + MAX_FLOW_ANGLE_RAD
+        angle = abs(y[INITIAL_SENSOR[h]]) + MAX_FLOW_ANGLE_RAD
         E[h] = 2.0 * np.sin(0.5 * min(angle, np.pi))
     E[H_PHI:] = MAX_CHORD
     mon.initial.E[:] = E
@@ -180,13 +187,18 @@ def start_bounds(mon, y):
 
 @kernel
 def allowed_effect(mon, j, m):
-    """r + B: bound on the effect of any error on a test through a filter, in the unit of the residual."""
+    """r + B of test j and pole m: bound on the effect of any error through the filter, in the unit of the
+    residual."""
     return abs(mon.r[j, m]) + mon.B[j, m]
 
 
 @kernel
 def widen_bounds(mon):
-    """Update d, and widen e by the part of it that the slowest filter forgets in a sample."""
+    """Update d, and widen e by the part of it that the slowest filter m forgets in a sample:
+
+    d <- min(r + B + e H_m, e_start),    of the airspeed (1 + e) / V times the sum
+    e <- min(e + (1 - a_m) d, e_start)
+    """
     own = mon.initial
     m = SLOW_POLE
     e = own.E
@@ -313,7 +325,11 @@ def fill_effects(mon, y_now):
 def tighten_bounds(mon):
     """Lower the bound on each error to what the tests allow, filter by filter: of each row of EVIDENCE
 
-        e <- min(e, s / (EFFECT_LEFT |C_m|)),    s^2 = sum over its tests of (r + B + 2 d H_m)^2
+        e <- min(e, s / (EFFECT_LEFT c)),    s^2 = sum over its tests of (r + B + 2 d H_m)^2,    c = |C_m|
+
+        density       s + 2 (1 + e) / V (r + B of SPEED)                        in place of s
+        flow by V     (1 + e) s                                                 in place of s
+        vane, flow    cos(e / 2) |Re C_m| - sin(e / 2) |Im C_m| - force         in place of c
 
     The present error was up to d larger or smaller while the filter summed its effect. Together, the tests of
     speed and flow show a velocity, m/s. The effect of a vane on the other has a part of the force in it.

@@ -109,10 +109,13 @@ def n_frozen(noise: float, resolution: float) -> int:
 
 
 def bound_gusts(air: Dryden, V: float, h: float) -> tuple[float, np.ndarray]:
-    """Bounds on the speed of gusts, m/s, and on their changes through each filter (poles,), m/s.
+    """Bounds on the speed of gusts, m/s, and on their changes through each filter (poles,), m/s:
 
-    The speed of a gust is a random walk of intensity Q (`Dryden.velocity_walk`); a filter with a pole of
-    lam 1/s keeps T = h / (1 - exp(-2 lam h)) of it. V m/s: airspeed in trim.
+        6 sigma,    6 sqrt(Q h / (1 - exp(-2 lam h)))        6: GUST_LIMIT_SIGMA
+
+    The speed of a gust is a random walk of intensity Q = 3 sigma^2 V_m / L, m2/s3 (`Dryden.velocity_walk`),
+    with V_m = MAX_AIRSPEED_OVER_TRIM V; a filter with a pole of lam 1/s keeps T = h / (1 - exp(-2 lam h)) of
+    it. V m/s: airspeed in trim; h s: a sample.
     """
     sigma = air.sigma_mps
     Q = air.velocity_walk(V, MAX_AIRSPEED_OVER_TRIM)

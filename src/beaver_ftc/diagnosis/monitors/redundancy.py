@@ -247,7 +247,8 @@ def bound_acceleration(mon, w_max, e_w):
 
 @kernel
 def bound_attitude(mon, y, w_max, e_w):
-    """Fill the bounds of `bound_residuals` for the tests of the attitude; sec: largest 1 / cos(theta).
+    """Fill the bounds b (per_s) and n (per_sample) for the tests of the attitude; sec: largest 1 /
+    cos(theta).
 
         turning, axis i   per_s = EARTH_TURN + 2 drift + e_i + axes      per_sample = n_i + coupled_i
         axes =   w_max (e_phi + (1 + sec) e_theta + e_psi)        constant error: it changes J
@@ -278,8 +279,8 @@ def bound_attitude(mon, y, w_max, e_w):
 
 @kernel
 def bound_flow(mon, y, w_max, e_w):
-    """Fill the bounds of `bound_residuals` for the tests of flow and climb: the largest derivative of their
-    kinematics with respect to each reading, times the bound e of the reading.
+    """Fill the bounds b (per_s) for the tests of flow and climb: the largest derivative of their kinematics
+    with respect to each reading, times the bound e of the reading.
 
     sec: largest 1 / cos(beta); growth: 1 and the second order in h; gust: how much faster a gust changes;
     lag: what the altitude's integration differs from h v, m/s.
@@ -310,8 +311,8 @@ def bound_flow(mon, y, w_max, e_w):
 
 @kernel
 def bound_density(mon, y):
-    """Fill the bounds of `bound_residuals` for the logarithm of the density: climb over the scale height, and
-    log(y^power) of the dynamic pressure and of the airspeed: of a constant error e
+    """Fill the bounds b (per_s) and n (per_sample) for the logarithm of the density: climb over the scale
+    height, and log(y^power) of the dynamic pressure and of the airspeed: of a constant error e
 
         power e |1 / y - 1 / y_past| / (1 - e / y_min)
 
@@ -330,7 +331,8 @@ def bound_density(mon, y):
 
 @kernel
 def bound_residuals(mon, y):
-    """Fill per_s and per_sample of each test: the largest effect of sound sensors with the declared errors.
+    """Fill b (per_s) and n (per_sample) of each test: the largest effect of sound sensors with declared
+    errors.
 
     The errors of the sample before act through the prediction, those of this sample through the reading that
     is compared with it. The causes of the terms of first order are in docs/explanation/instruments.md (Bounds
@@ -351,9 +353,11 @@ def bound_residuals(mon, y):
 def filter_test(mon, j):
     """Pass the residual of test j through its filters, a = exp(-pole h); find its largest ratio to the bound:
 
-    r <- a r + residual,    B = e_sum + per_sample + gust gust_change,    ratio = max |r| / B
+        r <- a r + residual,    B = T_b + T_n + n + gust gust_change,    ratio = max |r| / B
+        T_b <- a T_b + h b,    T_n <- a T_n + (1 - a) n_past        `filters.advance_bound`
 
-    e_sum, the part that the filter sums, as that of a detection filter.
+    b: per_s, n: per_sample, n_past: of the sample before; T_b + T_n: e_sum, the part that the filter sums;
+    all of the test, in the unit of its residual, b over s.
     """
     r, e, B, n = mon.r[j], mon.e_sum[j], mon.B[j], mon.per_sample[j]
     mon.ratio[j] = 0.0

@@ -31,9 +31,13 @@ the laws, until the end of the flight. Accelerometers are not replaced: the diag
 broken (`measured.inertial`).
 
 *Gyro or attitude?* Both move the same tests. The dynamics of the rates separate them: a jump of a gyro is an
-acceleration that no model explains, a jump of the attitude is none. With D the damping of the rates (3, 3),
-1/s, and nu the innovation, rad/s2, the filter w' = -D w + nu follows a gyro's error exactly, and stays within
-its bound for an error of the attitude (`judge_gyros`).
+acceleration that no model explains, a jump of the attitude is none. With D_x the damping of the rates (3, 3),
+1/s, and nu the innovation (3,), rad/s2, the filter
+
+    W' = nu - D_x W        `advance_gyro_estimate`
+
+follows a gyro's error exactly, and stays within its bound for an error of the attitude (`judge_gyros`). W is
+`w` in the record, rad/s.
 
 *Accelerometers or flow sensor?* A test of the flow (airspeed, incidence, sideslip) compares a flow sensor
 with the accelerometers, so an error of either moves it. An accelerometer's error e integrates into a velocity
@@ -60,9 +64,9 @@ from beaver_ftc.design.table import DPT
 from beaver_ftc.diagnosis.detection import attitude
 from beaver_ftc.diagnosis.detection.filters import bank_axis, leak
 from beaver_ftc.diagnosis.monitors.initial_errors import (
-    CHANGE_TEST,
     H_AIRSPEED,
     H_PHI,
+    INITIAL_SENSOR,
     N_INITIAL,
     exceeds,
     explains_exceeded,
@@ -156,7 +160,6 @@ HIDDEN_FACTOR = 2.0
 ANGLES, FORCES = (PHI, THETA, PSI), (AX, AX + 1, AX + 2)
 # of the reading that a duplicate sensor should equal: the test that an error of it exceeds
 COUNTERPART_TEST = np.array([TEST_NAMES.index(ROWS[i].test) for i in COUNTERPART], np.int64)
-INITIAL_SENSOR = tuple(SENSOR_OF[j] for j in CHANGE_TEST)  # of each hypothesis of initial_errors.py
 
 
 # Of an axis. shown, shown_past, rad/s: error of the gyro if the attitude is right, as this frame begins and
@@ -197,7 +200,9 @@ def expect_pressure(mon, pressure):
 
 @kernel
 def turn_share(y, i, j):
-    """c: rotation about body axis i for a change of phi, theta or psi (j 0, 1, 2), rad/rad, at attitude y."""
+    """c: rotation about body axis i for a change of phi, theta or psi (j 0, 1, 2), rad/rad, at attitude y:
+    that of phi turns about the first body axis, of theta about the level second axis, of psi about the
+    vertical."""
     across = 0.0, np.cos(y[PHI]), -np.sin(y[PHI])
     return ((1.0, 0.0, 0.0), across, components(down(y)))[j][i]
 
@@ -236,9 +241,10 @@ def check_sensors(mon, pred, measured, found, bank, bound, dt, t):
 
 @kernel
 def advance_gyro_estimate(mon, nu, eta, dt):
-    """Advance w, the gyro's error (3,) rad/s if the dynamics are right, and its bound B by a frame of dt s:
+    """Advance W, the gyro's error (3,) rad/s if the dynamics are right, W' = nu - D_x W, and its bound B by a
+    frame of dt s:
 
-    w <- A w + dt nu,    B <- |A| B + dt eta,    A = I - dt D
+    W <- A W + dt nu,    B <- |A| B + dt eta,    A = I - dt D_x
 
     nu, eta (3,): innovation and its bound, rad/s2.
     """
@@ -267,7 +273,7 @@ def count_same(mon, y):
 
 @kernel
 def is_frozen(mon, i):
-    """Whether sensor i is frozen: no sound one gives the same reading for so many samples (`n_frozen`)."""
+    """Whether sensor i is frozen."""
     return mon.n_same[i] >= mon.config.n_frozen[i]
 
 
@@ -288,7 +294,7 @@ def stands_still(mon, i):
 
 @kernel
 def follow_gyro_errors(mon):
-    """Keep what the attitude shows of each gyro's error, if it is right itself."""
+    """Keep what the attitude shows of each gyro's error, rad/s, if it is right itself: -residual / h."""
     for i in range(3):
         g = mon.gyro[i]
         w = -mon.residual[i] / mon.h
@@ -325,9 +331,12 @@ def advance_stage(mon):
 
 @kernel
 def exclude_gyros(mon):
-    """Record that no gyro can be broken: w and the attitude disagree by more than both bounds.
+    """Record that no gyro can be broken: W and the attitude disagree by more than both bounds.
 
-    gap <- a gap + residual + h w. Where the attitude is noisy, a surface is isolated only after that.
+        gap <- a gap + residual + h W,    B_gap <- a B_gap + h (W_bound + DAMPING_TOLERANCE |W|)
+        |gap| > B_gap + B        for some pole
+
+    Where the attitude is noisy, a surface is isolated only after that.
     """
     for i in range(3):
         g = mon.gyro[i]
@@ -418,6 +427,13 @@ def judge_gyros(mon, bank, bound, dt):
                                                  w would show it (not allowed)
         yes                     no               undecided otherwise
 
+        shows      |nu| > nu_max, or a residual of the bank exceeds its threshold, or |W| > W_bound
+        fits       |nu - jump| <= nu_max + tol + noise / dt,    jump = (shown - shown_past) / dt
+        allowed    MIN_ESTIMATED_SHARE |shown| <= W_bound + |W| + noise
+
+    shown: error by the attitude, rad/s; noise: of `shown`, by the attitude's noise, rad/s; tol: by the
+    dynamics and by rounding of the jump, rad/s2; dt s.
+
     A transient appears inside a frame, and is absent in all samples of the next. It is no gyro's: an error of
     a gyro stays, and one that varies is not as small in every sample. If an error is there in every sample
     and varies between them, as noise does (varies), the innovation cannot be compared with its jump: the
@@ -429,8 +445,7 @@ def judge_gyros(mon, bank, bound, dt):
         if g.verdict != GYRO_OPEN:
             continue
         estimate, B = abs(mon.w[i]), mon.w_bound[i]
-        largest, jump = max(abs(g.shown), abs(g.shown_past)), (g.shown - g.shown_past) / dt  # rad/s, rad/s2
-        # of w, rad/s, by the attitude's noise
+        largest, jump = max(abs(g.shown), abs(g.shown_past)), (g.shown - g.shown_past) / dt
         noise = SAMPLES_IN_JUMP * mon.per_sample[i] / mon.h
         nu_max = bound.nu_max[i] + RATE_ROUNDING
         shows = abs(nu[i]) > nu_max or bank_axis(bank) >= 0 or estimate > B + RATE_ROUNDING
@@ -480,7 +495,10 @@ def flow_jumped(mon, y, i):
     """Whether, soon after the alarm, the residual exceeds any jump of an accelerometer in one sample, and the
     reading of the flow sensor i jumps with it.
 
-    per_a: residual for an acceleration error of 1 m/s2 in one sample. ddy: second difference of the reading.
+        |r| > B + FORCE_JUMP_M_S2 per_a,    |ddy| >= MIN_JUMP_SHARE |r| > 3/2 jump per_a
+
+    r: residual of the sample; per_a: residual for an acceleration error of 1 m/s2 in one sample; ddy: second
+    difference of the reading; jump: largest of an accelerometer, m/s2; 3/2: its weight in the integration.
     """
     j = mon.output.alarm_test
     per_a = mon.h / (1.0 if j == SPEED_TEST else speed(mon.y_past))
@@ -493,10 +511,14 @@ def flow_jumped(mon, y, i):
 
 @kernel
 def sum_flow(mon, y):
-    """Add up, after the sample of the alarm, the residuals of the flow, the part of sound sensors and that of
-    an error from the start; and find the range of each reading.
+    """Add up, after the sample of the alarm, the residuals of speed, incidence and sideslip, the part of
+    sound sensors and that of an error from the start; and find the range of each reading.
 
-    alpha: error of the incidence that the sums leave unexplained, rad; climb: its effect in a sample, m.
+        r_sum <- r_sum + residual,    B_sum <- B_sum + h per_s,    H_sum <- H_sum + E H
+        climb <- a climb + h V alpha cos(phi) cos(theta)
+
+    alpha: error of the incidence that the sums leave unexplained, rad: r_sum beyond B_sum + H_sum; climb: its
+    effect on the altitude, m, filtered.
     """
     for n in range(3):
         f = mon.flow[n]
@@ -511,7 +533,7 @@ def sum_flow(mon, y):
             f.B_sum += mon.h * mon.per_s[j]
             f.H_sum += mon.initial.E_alarm[n] * mon.initial.H[n, j]
             f.y_min, f.y_max = min(f.y_min, now), max(f.y_max, now)
-    f = mon.flow[1]
+    f = mon.flow[ALPHA_TEST - SPEED_TEST]
     alpha = f.r_sum - min(max(f.r_sum, -f.B_sum - f.H_sum), f.B_sum + f.H_sum)
     leak(mon.climb, mon.decay, mon.h * y[I_AIRSPEED] * alpha * np.cos(y[PHI]) * np.cos(y[THETA]))
     mon.n_since += 1
@@ -519,7 +541,10 @@ def sum_flow(mon, y):
 
 @kernel
 def sum_exceeds_range(f):
-    """Whether the residuals add up to more than an error of a flow sensor whose reading has this range."""
+    """Whether the residuals add up to more than an error of a flow sensor whose reading has this range:
+
+    |r_sum| > MIN_SUM_RATIO (y_max - y_min) + CLEAR_FACTOR (B_sum + H_sum)
+    """
     span = f.y_max - f.y_min
     return span > 0.0 and abs(f.r_sum) > MIN_SUM_RATIO * span + CLEAR_FACTOR * (f.B_sum + f.H_sum)
 
@@ -527,7 +552,13 @@ def sum_exceeds_range(f):
 @kernel
 def contradicted(mon, y):
     """Whether an airspeed of this error would exceed the test of the density, or an incidence that of the
-    climb, while that test is within its bound."""
+    climb, while that test is within its bound, for some pole by
+
+        effect > CLEAR_FACTOR (B + e H)
+
+    effect: |climb| of `sum_flow`, m, or of the airspeed 2 (1 - e) / V (|r| - B_speed); e, H: bound on an
+    error from the start, and its effect.
+    """
     alarm = mon.output.alarm_test
     other = DENSITY_TEST if alarm == SPEED_TEST else CLIMB_TEST
     if alarm == BETA_TEST or mon.exceeded[other]:
@@ -601,7 +632,7 @@ def suspect_duplicate(mon, d):
 
 @kernel
 def alone(shown, i):
-    """Whether none of these tests but test i shows an error."""
+    """Whether none of these tests but test i shows an error; shown (tests,)."""
     return shown.sum() == shown[i]
 
 
@@ -609,7 +640,12 @@ def alone(shown, i):
 def suspect_attitude(mon):
     """Suspect gyros and attitude: one axis alone, or one angle alone, but for what an error of phi or theta
     from the start explains. A gyro's error may appear in an angle first. A frozen angle excludes the gyros;
-    it is suspected until it is known not to be frozen."""
+    it is suspected until it is known not to be frozen.
+
+    turns, angles (3,): which tests of turning and of the angles have been exceeded; refuted (2, 3): by which
+    of the latter an error from the start of phi, and of theta; axis: of the gyro that would be at fault
+    instead.
+    """
     suspect, ratio = mon.output.suspect, mon.ratio[:ANGLE_TEST]
     turns, angles = mon.exceeded[:ANGLE_TEST], mon.exceeded[ANGLE_TEST:SPEED_TEST]
     refuted = mon.initial.refuted[H_PHI:, ANGLE_TEST:SPEED_TEST]
@@ -629,8 +665,16 @@ def suspect_attitude(mon):
 
 @kernel
 def explains_turns(mon, i):
-    """Whether an error x of angle i (phi, theta, psi) explains the tests of the axes: one as large as the
+    """Whether an error of angle i (phi, theta, psi) explains the tests of the axes: one as large as the
     residual of the angle's own test allows now, or as its residuals since the alarm have shown.
+
+    It does not if an axis j that has exceeded its bound has for some pole m
+
+        now      |r_j| > c (|r_own| + B_own) + B_j + E H
+        since    |beyond_ij| > B_j + E H + c_max B_own + tilt swing_i
+
+    c: |turn_share| + tilt, rad/rad: the attitude may be off by tilt = e_phi + e_theta, rad; E, H: bound on an
+    error from the start and its effect (initial_errors.py), of psi none.
     """
     own, h = ANGLE_TEST + i, min(H_PHI + i, N_INITIAL - 1)
     initial = mon.initial.E_alarm[h] if i < 2 else 0.0
@@ -667,8 +711,13 @@ def suspect_flow(mon, alarm):
 @kernel
 def gyro_hidden(mon, j, i):
     """Whether an error of gyro i explains the test j of the flow, and stays within the bound of the test of
-    its axis. All of the error of the gyro across the flow (q for the incidence, r for the sideslip) turns it;
-    of another a share, by kinematics; q does not act on the sideslip.
+    its axis: |r_j| <= k B_j + HIDDEN_FACTOR |share| B_i for each pole.
+
+        alpha' = q - tan(beta) (p cos(alpha) + r sin(alpha)) + ...
+        beta' = p sin(alpha) - r cos(alpha) + ...
+
+    share: of the error of p, q, r by these kinematics; all of that of the gyro across the flow (q for the
+    incidence, r for the sideslip) turns it, and k is then HIDDEN_FACTOR, else 1.
     """
     z, t = unit(mon.y_past[I_ALPHA]), np.tan(mon.y_past[I_BETA])
     share = (t * z.real, 1.0, t * z.imag)[i] if j == ALPHA_TEST else (z.imag, 0.0, 1.0)[i]
@@ -679,9 +728,12 @@ def gyro_hidden(mon, j, i):
 
 @kernel
 def suspect_accelerometers(mon):
-    """Suspect the accelerometers along whose axis most of the spurious velocity dv is. The sums of the flow
-    are dv in its axes, m/s and rad; plane: turned by beta; body: then by alpha. least: less the bound on |dv|
-    of sound sensors.
+    """Suspect the accelerometers along whose axis most of the spurious velocity dv is, m/s:
+
+        dv_i >= MIN_AXIS_SHARE max(dv) - B,    B = B_V + V (B_alpha + B_beta)        of sound sensors
+
+    The residuals of the flow add up to dv in its axes, m/s and rad; plane: turned by beta; body: then by
+    alpha.
     """
     y, dV, da, db = mon.y_past, mon.flow[0], mon.flow[1], mon.flow[2]
     V = speed(y)
@@ -697,13 +749,18 @@ def suspect_accelerometers(mon):
 @kernel
 def suspect_lone(mon, alarm):
     """Suspect the sensor that takes part in no other test, of kinematics if none is exceeded; and the
-    airspeed, unless the error that the density shows would exceed the bound of the airspeed's own test."""
+    airspeed, unless the error that the density shows would exceed the bound of the airspeed's own test:
+
+        |r_density| > 2 HIDDEN_FACTOR (1 + e) / V B_speed + e H
+
+    e: bound on an error of the airspeed from the start, a share; H: its effect.
+    """
     suspect = mon.output.suspect
     suspect[SENSOR_OF[alarm]] = alarm >= RPM_TEST or alone(mon.exceeded[:RPM_TEST], alarm)
     if alarm == DENSITY_TEST:
         e = mon.initial.E_alarm[H_AIRSPEED]
         H = mon.initial.H_m[H_AIRSPEED, alarm]
-        # a relative change of the airspeed changes log(density) by twice as much
+        # 2: a relative change of the airspeed changes log(density) by twice as much
         k = 2.0 * HIDDEN_FACTOR * (1.0 + e) / speed(mon.y_past)
         hidden = not exceeds(mon.r[alarm], k, mon.B[SPEED_TEST], e, H)
         # its test need not show an error if it is frozen
@@ -791,7 +848,13 @@ def replace_readings(mon, pred, measured):
 
 @kernel
 def estimate_reading(mon, pred, y, i):
-    """The estimate of a sensor's reading from the other sensors, in its unit."""
+    """The estimate of a sensor's reading from the other sensors, in its unit:
+
+    rates       `estimate_rate`
+    airspeed    sqrt(2 qdyn / rho)
+    qdyn        rho airspeed^2 / 2,    rho = 2 qdyn / airspeed^2 of the sample before
+    others      the prediction of redundancy.py, which of a vane returns to trim
+    """
     if i < 3:
         return estimate_rate(mon, pred, i)
     rho = 2.0 * mon.y_past[I_QDYN] / mon.y_past[I_AIRSPEED] ** 2
@@ -806,7 +869,11 @@ def estimate_reading(mon, pred, y, i):
 @kernel
 def estimate_rate(mon, pred, i):
     """Body rate about axis i, rad/s: that of the attitude by the sample before, and the model's change since,
-    with the surface faults that stay isolated.
+    with the surface faults that stay isolated:
+
+        y_i = y_past_i + gain residual_i / h + h acc_i,    acc = f + G u [+ F_known - F]
+
+    When it is replaced first, the filtered residual times its pole takes the place of the second term.
 
     The rate itself is used for the next sample: its own error shows there.
     """

@@ -22,6 +22,7 @@ from beaver_ftc.diagnosis.gusts import fill_rotation
 from beaver_ftc.diagnosis.informed_test import with_measured_gust
 
 _SHOWN = slice(1, 3)  # q_g and r_g, of the rotation (p_g, q_g, r_g)
+_AZ_AY = [5, 4]  # of the further instruments: three angles, accelerations (a_x, a_y, a_z), altitude
 _TURNED_SHARE = 0.3  # of noises of airspeed and bank in the flow's angles: attitudes and incidences of 17 deg
 _LEAST_AIRSPEED_MPS = 1.0  # a broken sensor may read 0, and the rotation of the air is over the airspeed
 _GRAVITY = np.array([0.0, 0.0, GRAVITY_MPS2])
@@ -55,14 +56,22 @@ class VaneGust:
         declared, V = context.declared, self._airspeed
         air = np.hypot(declared.noise[3:], declared.resolution[3:] / np.sqrt(12.0))
         further = np.hypot(declared.further_noise, declared.further_resolution / np.sqrt(12.0))
-        phi, theta_psi, az_ay = further[0], further[1:3], further[[5, 4]]
+        phi, theta_psi, az_ay = further[0], further[1:3], further[_AZ_AY]
         angles = np.hypot(air[:2], theta_psi) + _TURNED_SHARE * (air[2] / V + phi) + az_ay * self._dt / V
         rotation = angles / self._lag_s[_SHOWN]
         of_level_axes = self._effect @ _level_axes(0.0, float(context.trim_y[0])).T  # straight and level
         return np.hypot(*(of_level_axes[:, _SHOWN] * rotation).T)
 
     def subtracted(self, measured: Measured) -> Measured:
-        """The measurements, with the effect of the gust in the acceleration of the elapsed frame."""
+        """The measurements, with the effect of the gust in the acceleration of the elapsed frame, from which
+        the rotation of the air moves on:
+
+            acceleration + V / V_trim B (0, q_g, r_g)
+            (q_g, r_g) <- exp(-dt / tau) (q_g, r_g) + (dw_z, dw_y) / (V tau)
+
+        B: gust_effect; dw, m/s: the air's, downwards and to the right of the heading as the frame began; tau
+        s.
+        """
         if not self._is_measured:
             return measured
         phi, theta, psi = measured.attitude.tolist()

@@ -26,6 +26,8 @@ from beaver_ftc.diagnosis import Measured, Verdict
 from beaver_ftc.diagnosis.rivals.rival import UNANTICIPATED, RivalDetector
 
 _LEAST_BOUND_RAD_S2 = 1e-4  # a declared bound of zero would make any rounding an alarm
+_TINY = 1e-300  # in place of a divisor of zero
+_N_AXES = 3
 
 
 def healthy_residual_std(context: Context, a: float) -> np.ndarray:
@@ -44,8 +46,9 @@ class ConstantThresholdObserver(RivalDetector):
 
         J_s = min over theta in [-1, 0] of sum |eps - theta Omega_s|^2, in units of the threshold
 
-    filtered (3, 5): eps since the start; eps and Omega (a column a surface) since the alarm. sums (4, 4):
-    fading sums of the products of the last four columns.
+    filtered (3, 5): eps since the start; eps and Omega (a column a surface) since the alarm, rad/s. sums (4,
+    4): fading sums of the products of the last four columns, in units of the threshold; weight: of the
+    frames in them.
     """
 
     name: ClassVar[str] = "observer-constant"
@@ -79,7 +82,12 @@ class ConstantThresholdObserver(RivalDetector):
 
     def isolate(self, measured: Measured) -> Verdict:
         """The surface that fits, until a window after the alarm; none fits if what it leaves is still over
-        the threshold in the mean."""
+        the threshold in the mean of axes and frames.
+
+        theta_s = N_s / M_s within [-1, 0],    misfit_s = sum eps^2 - 2 theta_s N_s + theta_s^2 M_s
+
+        N_s = sum eps Omega_s, M_s = sum Omega_s^2: fading sums, in units of the threshold.
+        """
         if measured.t_s > self.alarm_s + self.options["window_s"]:
             return self.verdict
         if not self.filtered[:, 1:].any():  # in the frame of the alarm the residual starts again
@@ -88,10 +96,10 @@ class ConstantThresholdObserver(RivalDetector):
         self.sums = self.fade * self.sums + scaled.T @ scaled
         self.weight = self.fade * self.weight + 1.0
         N, M = self.sums[0, 1:], np.diagonal(self.sums)[1:]
-        theta = np.clip(N / np.maximum(M, 1e-300), -1.0, 0.0)
+        theta = np.clip(N / np.maximum(M, _TINY), -1.0, 0.0)
         misfit = self.sums[0, 0] - 2.0 * theta * N + theta**2 * M
         s = int(np.argmin(misfit))
-        fits = misfit[s] <= 3.0 * self.weight
+        fits = misfit[s] <= _N_AXES * self.weight
         verdict = self.loss(s, float(theta[s])) if fits else UNANTICIPATED
         self.verdict = verdict._replace(axis="pqr"[self.alarm_axis])
         return self.verdict

@@ -1,10 +1,11 @@
 """Which type of fault is on a surface: exact feasible sets, frame by frame.
 
 The innovation nu = eta + G_s (p_s - u_s) and |eta| <= eta_bar put the surface's true deflection p_s of each
-frame in an interval, its axes agreeing on one. A type is a statement about p_s that holds in every frame in
-which something is wrong; the set of its one parameter is the intersection over those frames, and the type is
-excluded when nothing is left. For a bound that holds instant by instant this is the exact feasible set: no
-test can exclude a type sooner without excluding a true one at some time.
+frame in an interval, its axes agreeing on one (p: delta in docs/explanation/fault-types.md). A type is a
+statement about p_s that holds in every frame in which something is wrong; the set of its one parameter is
+the intersection over those frames, and the type is excluded when nothing is left. For a bound that holds
+instant by instant this is the exact feasible set: no test can exclude a type sooner without excluding a true
+one at some time.
 
     loss            p = (1 + theta) u      1 + theta in [0, 1], constant
     varying loss    the same               1 + theta anywhere in [0, 1] in every frame (incipient)
@@ -237,8 +238,8 @@ def intersect_set(srf, h, other):
         srf.sets.excluded[h] = 1
 
 
-# u: where a healthy surface was; lo, hi: where this one can have been; anomalous: whether more than the
-# declared uncertainty was at work; kappa: (G_max - G_min) / (4 |mean G|), by so much of the range of its
+# u: where a healthy surface was, rad; lo, hi: where this one can have been, rad; anomalous: whether more than
+# the declared uncertainty was at work; kappa: (G_max - G_min) / (4 |mean G|), by so much of the range of its
 # positions a mean weighted by G may be off; hides: whether the lower and the upper stop can cut a deflection
 # off unseen.
 OBSERVATION_RECORD = record(u=float, lo=float, hi=float, anomalous=int, kappa=float, hides=(int, 2))
@@ -265,9 +266,13 @@ def forget_anomalies(srf):
 
 @kernel
 def observe_surface(c, srf, fie, m, nu, nu_max, eff):
-    """Find where a surface can have been: the p that agree with |nu - G (p - u)| <= nu_max on every axis.
+    """Find where a surface can have been: the interval of the deflections p, rad, with
 
-    m: the axis on which it has most effect.
+        |nu - G (p - u)| <= nu_max        on every axis; over a block on axis m alone
+
+    from the innovation nu = eta + G (p - u) and |eta| <= nu_max, (3,) rad/s2. m: the axis on which the
+    surface has most effect; eff: Z = G, rad/s2 per rad, h = -G u, rad/s2, tolerance r, rad/s2; fie: its
+    estimator.
     """
     last, cmd = srf.last, srf.commands
     last.u = -eff.h[m] / eff.Z[m]
@@ -288,7 +293,8 @@ def mark_stops(srf, width):
 
 @kernel
 def observe_error(srf, e, tol):
-    """A surface was off its command by e +- tol (rad). False: nowhere within its reach."""
+    """A surface was off its command by e +- tol, rad: p in [u + e - tol, u + e + tol] within its reach.
+    Returns whether any is."""
     last, act = srf.last, srf.actuator
     last.lo = max(act.reach_lo, last.u + e - tol)
     last.hi = min(act.reach_hi, last.u + e + tol)

@@ -70,8 +70,9 @@ def restart_surface(srf):
 
 @kernel
 def record_commands(types, u, ext):
-    """Add a frame to the commands u (n,) of the surfaces; ext: extremes, within it, of where healthy
-    surfaces were and of G, of a `model_prediction.frame_means_dtype`.
+    """Add a frame to the commands u (n,) rad of the surfaces; with the first frame of a block, the record
+    moves on by a block. ext: extremes, within the frame, of where healthy surfaces were and of G, of a
+    `model_prediction.frame_means_dtype`.
     """
     n = types.config.frames_per_block
     for s, srf in enumerate(types.surface):
@@ -129,7 +130,11 @@ def judge_types(c, srf, k):
 
 @kernel
 def judge_frame(types):
-    """Judge the frame before the elapsed one."""
+    """Judge the frame before the elapsed one, k, surface by surface:
+
+    rests     given up, and nothing wrong (of a fault declared to stay)    `count_rest`
+    judges    something wrong in it; with several instants a frame also in the one before and after
+    """
     c, k = types.config, types.frame_index - 1
     returns = c.returns_lagged and types.frame_index > 0
     for s, srf in enumerate(types.surface):

@@ -128,8 +128,13 @@ def observe_pairs(types, layout, est, bank, nu_max):
 
 @kernel
 def isolate_lateral(types, layout, t):
-    """Set the isolation of the surfaces of roll and yaw. Whether the fault of this plane is outside the
-    class.
+    """Set the isolation of the surfaces of roll and yaw; returns whether the fault of this plane is outside
+    the class: neither alone can be faulty (`both`), and both together are refuted.
+
+        isolated       a surface, if the other alone cannot be faulty
+        none           before the plane's alarm; if neither alone can be faulty, and deflections out of reach
+        or
+                       all types excluded refute both together, or a type that has to show itself has not
     """
     roll, yaw = types.surface[layout.main[ROLL]], types.surface[layout.main[YAW]]
     both = not can_be_faulty(roll) and not can_be_faulty(yaw)
@@ -190,7 +195,9 @@ def begin_second_if_shown(types, layout):
 
 @kernel
 def dismiss_varying(c, srf):
-    """Whether a slow oscillation, a slow surface or a growing bias would have shown by now."""
+    """Whether a slow oscillation, a slow surface or a growing bias would have shown by now: the constant
+    that is left looks like none of them, none is hidden, and the flight has been anomalous for half a
+    cycle."""
     imitated = verdict.can_be_another(srf, verdict.sole_type(srf, CONSTANT), False)
     doubt = imitated or verdict.may_be_hidden(c, srf)
     long_enough = srf.evidence.n_anomalous >= c.half_frames
@@ -199,7 +206,9 @@ def dismiss_varying(c, srf):
 
 @kernel
 def update_second(types, layout, t):
-    """Update which of the two surfaces of pitch are at fault, after a second fault has begun."""
+    """Update which of the two surfaces of pitch are at fault, at t s, after a second fault has begun: the
+    first (srf1) unless nothing on the second (srf2) explains what refuted it; the second once a type on it
+    shows."""
     srf1 = types.surface[types.pair.first_pitch]
     srf2 = types.surface[layout.partner[types.pair.first_pitch]]
     anomalous = srf2.evidence.n_anomalous > 0

@@ -20,8 +20,8 @@ Where the parameter is the position itself (stuck), conclusions about it are not
 already have been returning after a repair. So its set before the earliest return still possible is kept, and
 is restored when the surface looks healthy.
 
-b: slot of releases, EARLIER or LATER; rel: record of the releases; lo, hi: where a type holds the surface,
-rad. Symbols: types/__init__.py.
+b: slot of releases, EARLIER or LATER; rel: record of the releases (records.RELEASE_RECORD); lo, hi: where a
+type holds the surface, rad. Symbols: types/__init__.py.
 """
 
 import numpy as np
@@ -133,8 +133,8 @@ def narrow_return(c, srf, b, h):
     if healthy or low - tol > seen.hi or high + tol < seen.lo:
         return False
     if not srf.actuator.uncertain:
-        lo = rel.back_lo[b, h] + max(seen.lo - low - tol, 0.0)
-        set_return(rel, b, h, lo, rel.back_hi[b, h] - max(high - tol - seen.hi, 0.0))
+        lo, hi = rel.back_lo[b, h], rel.back_hi[b, h]
+        set_return(rel, b, h, lo + max(seen.lo - low - tol, 0.0), hi - max(high - tol - seen.hi, 0.0))
     return True
 
 
@@ -170,9 +170,12 @@ def begin_release(c, srf, h, lo, hi, stop):
         rel.set_lo[LATER, h], rel.set_hi[LATER, h] = srf.sets.low[h], srf.sets.high[h]
     rel.held_lo[h], rel.held_hi[h] = EMPTY_SET
     if max(lo, seen.lo) <= min(hi, seen.hi) and not rel.released[h]:
-        rel.held_lo[h] = lo if stop == -1 and not c.single_instant else max(lo, seen.lo)
-        rel.held_hi[h] = hi if stop == 1 and not c.single_instant else min(hi, seen.hi)
-        widen_later(rel, h, rel.held_lo[h], rel.held_hi[h])
+        if c.single_instant or stop != -1:
+            lo = max(lo, seen.lo)
+        if c.single_instant or stop != 1:
+            hi = min(hi, seen.hi)
+        rel.held_lo[h], rel.held_hi[h] = lo, hi
+        widen_later(rel, h, lo, hi)
 
 
 @kernel

@@ -121,16 +121,6 @@ from beaver_ftc.plant.instruments import (
 )
 from beaver_ftc.scenario.sensors import ROWS
 
-# Accelerometers or flow sensor (clear_sensors)
-JUMP_WINDOW_S = 1.0  # a jump counts within this time after the alarm: later, one by chance is too likely
-JUMP_MEMORY_S = 2.0  # time constant with which the largest jump of an accelerometer fades
-MIN_JUMP_SHARE = 0.5  # the flow sensor's own reading jumps by at least this share of the residual
-# Least ratio of summed residuals to the range of the reading: a scale error within 3 % of -1 gives so much
-MIN_SUM_RATIO = 30.0
-CLEAR_FACTOR = 3.0  # an effect clears a sensor only beyond so many times the bound on it
-MIN_AXIS_SHARE = 0.5  # least share of the spurious velocity along the axis of a suspected accelerometer
-TIME_ROUNDING_S = 1e-9
-
 # A residual below this share of the largest of the three axes, or angles, is taken for its coupling
 COUPLING_SHARE = 0.03
 # stage: 1 after the first sample and while the pitch is too steep, 2 with the first whole frame, 3 from
@@ -139,27 +129,8 @@ FULL_STAGE = 3
 MIN_LEAD_S = 0.5  # a surface detected this long before the alarm was detected with sound sensors
 N_FROZEN_NEVER = 1_000_000_000  # JSBSim frames: a sound reading may repeat, if its steps exceed its noise
 INITIAL_WINDOW_S = 1.0  # an alarm of the surfaces within this time from the start may be an initial error's
-VANE_RETURN_S = 20.0  # time constant with which a replaced vane returns to trim: kinematics alone drift
-RATE_POLE = 1  # index in FILTER_POLES_PER_S of the filter that gives the first value of a replaced rate
-
-# Gyro or attitude (judge_gyros)
-GYRO_OPEN, GYRO_CONFIRMED, GYRO_REFUTED = 0, 1, 2  # verdicts of a gyro
-MAX_DYNAMICS_PER_S = 10.0  # largest innovation, rad/s2, by 1 rad/s of a gyro's error itself
-JUMP_TOLERANCE = 0.1  # share of a gyro's jump by which the innovation may differ from it
-MIN_ESTIMATED_SHARE = 0.7  # w shows at least this share of a gyro's error
-SAMPLES_IN_JUMP = 4.0  # a jump is the difference of two residuals, each with the noise of two samples
-MIN_TRANSIENT = 2.0  # least size of a transient over the bound on noise: noise may be all of a smaller one
-TRANSIENT_LEFT = 0.003  # largest share of a transient that is left in the next frame
-RATE_ROUNDING = 1e-6  # rad/s, and rad/s2: the part of the bounds that covers rounding
-
-# A test within its bound B hides an error whose effect is up to this factor times B, because the effect of
-# sound sensors, up to B, may have the other sign. For the gyro that turns the flow by all of its error it is
-# also the margin on the bound of the flow's test.
-HIDDEN_FACTOR = 2.0
 
 ANGLES, FORCES = (PHI, THETA, PSI), (AX, AX + 1, AX + 2)
-# of the reading that a duplicate sensor should equal: the test that an error of it exceeds
-COUNTERPART_TEST = np.array([TEST_NAMES.index(ROWS[i].test) for i in COUNTERPART], np.int64)
 
 
 # Of an axis. shown, shown_past, rad/s: error of the gyro if the attitude is right, as this frame begins and
@@ -192,19 +163,13 @@ ISOLATION_FIELDS = {
 }  # fmt: skip
 
 
+# The monitor: alarm, isolation, and what others ask of it
+
+
 @kernel
 def expect_pressure(mon, pressure):
     """Predict the manifold pressure, inHg, from the command of the law in charge of the engine."""
     mon.y_pred[MANIFOLD] = pressure
-
-
-@kernel
-def turn_share(y, i, j):
-    """c: rotation about body axis i for a change of phi, theta or psi (j 0, 1, 2), rad/rad, at attitude y:
-    that of phi turns about the first body axis, of theta about the level second axis, of psi about the
-    vertical."""
-    across = 0.0, np.cos(y[PHI]), -np.sin(y[PHI])
-    return ((1.0, 0.0, 0.0), across, components(down(y)))[j][i]
 
 
 @kernel
@@ -240,23 +205,122 @@ def check_sensors(mon, pred, measured, found, bank, bound, dt, t):
 
 
 @kernel
-def advance_gyro_estimate(mon, nu, eta, dt):
-    """Advance W, the gyro's error (3,) rad/s if the dynamics are right, W' = nu - D_x W, and its bound B by a
-    frame of dt s:
+def isolate_sensor(mon, measured, found, bank, bound, dt, t):
+    """Raise the alarm, and isolate the sensor once it is the only suspect."""
+    o = mon.output
+    worst = np.argmax(mon.ratio)
+    if mon.substep == 0 or mon.ratio[worst] > o.top_ratio:  # of the samples of this frame
+        o.worst_test_index, o.top_ratio = worst, mon.ratio[worst]
+    for i in range(N_SENSORS):
+        if measured.missing[i] and o.isolated_sensor == NO_SENSOR:
+            mark_isolated(mon, found, i, t)
+    if o.isolated_sensor != NO_SENSOR:
+        return
+    if o.top_ratio > 1.0 and not o.alarmed:
+        raise_alarm(mon, found, t)
+        o.alarm_test = o.worst_test_index
+        mon.initial.E_alarm[:] = mon.initial.E
+    if o.alarmed:
+        filter_beyond(mon, measured.signal)
+        if mon.substep == 0 and mon.stage == FULL_STAGE:
+            judge_gyros(mon, bank, bound, dt)
+        latch_exceeded(mon)
+        if SPEED_TEST <= o.alarm_test <= BETA_TEST:
+            clear_sensors(mon, measured.signal)
+        find_suspects(mon)
+        if o.suspect.sum() == 1:
+            mark_isolated(mon, found, np.argmax(o.suspect), t)
 
-    W <- A W + dt nu,    B <- |A| B + dt eta,    A = I - dt D_x
 
-    nu, eta (3,): innovation and its bound, rad/s2.
+@kernel
+def raise_alarm(mon, found, t):
+    """Raise the alarm of the sensors at t s. A surface detected long before was detected with sound sensors,
+    and stays detected. Otherwise the conclusion about surfaces is void."""
+    o = mon.output
+    if o.alarmed:
+        return
+    o.alarmed, o.alarmed_at_s = 1, t
+    if found.detected:
+        o.keeps_surface = found.detected_at_s < t - MIN_LEAD_S
+        if not o.keeps_surface:  # the same fault, which the rates have shown first
+            o.alarmed_at_s = found.detected_at_s
+
+
+@kernel
+def mark_isolated(mon, found, i, t):
+    """Isolate a sensor at t s; its alarm is raised by then."""
+    raise_alarm(mon, found, t)
+    mon.output.isolated_sensor = i
+    mon.output.isolated_at_s = t
+    mon.output.is_reading_unused[i] = 1
+
+
+@kernel
+def latch_exceeded(mon):
+    """Record the tests that have exceeded their bounds since the alarm; of turning, and of the angles, those
+    that exceed them by more than an error on another axis explains.
     """
-    w, B = mon.w, mon.w_bound
-    w0, B0 = (w[0], w[1], w[2]), (B[0], B[1], B[2])
+    exceeded = mon.exceeded
+    for j in range(N_TESTS):
+        least = 0.0
+        for i in range(j - j % 3, j - j % 3 + 3):
+            least = max(least, COUPLING_SHARE * abs(mon.r[i, 0])) if j < SPEED_TEST else -1.0
+        exceeded[j] |= mon.ratio[j] > 1.0 and abs(mon.r[j, 0]) > least
+    latch_refuted(mon, exceeded)
+
+
+@kernel
+def name_gyro(mon, found, i, t):
+    """Isolate gyro i at t s. What was concluded of surfaces is void, unless one was isolated before."""
+    o = mon.output
+    mark_isolated(mon, found, i, t)
+    if o.keeps_surface and found.isolated_estimator < 0:
+        o.keeps_surface = 0
+        o.alarmed_at_s = found.detected_at_s
+
+
+@kernel
+def has_alarm(mon):
+    """Whether the monitor has raised its alarm: no surface is isolated then."""
+    return mon.config.enabled and mon.output.alarmed
+
+
+@kernel
+def doubts_gyros(mon):
+    """Whether a gyro may be the cause of the alarm of the surfaces."""
+    return mon.config.enabled == 1 and mon.config.noisy == 1 and mon.gyros_excluded == 0
+
+
+@kernel
+def allows_isolation(mon, is_earlier, detected_at_s):
+    """Whether the data may speak about surfaces, whose alarm was raised at detected_at_s; is_earlier: a frame
+    or more ago.
+
+    They do not while a flow sensor is frozen: a surface that moves the aircraft moves its reading. In
+    symmetric flight a sideslip of zero stays zero. Nor do they after an alarm so early that an error which a
+    flow sensor has had from the start may have caused it: the design model uses its reading from the first
+    frame on.
+    """
+    if not mon.config.enabled:
+        return True
+    if detected_at_s < mon.t_start + INITIAL_WINDOW_S:
+        return False
+    for i in (I_ALPHA, I_BETA, I_AIRSPEED, I_QDYN):
+        if stands_still(mon, i):
+            return False
+    return is_earlier == 1 or doubts_gyros(mon)
+
+
+@kernel
+def add_turn(mon, att, y):
+    """Add to the comparison of attitude and rates what the attitude has turned beyond the gyros in this
+    sample; near the vertical it shows no turn."""
+    if too_steep(mon, y):
+        attitude.restart(att)
+        return
     for i in range(3):
-        w[i] = dt * nu[i]
-        B[i] = dt * eta[i]
-        for j in range(3):
-            A = (i == j) - dt * mon.config.D[i, j]
-            w[i] += A * w0[j]
-            B[i] += abs(A) * B0[j]
+        attitude.add_turn(att, i, mon.residual[i])
+    mon.turn_max = att.turn_max
 
 
 @kernel
@@ -290,6 +354,47 @@ def last_frozen(mon, sensors):
 def stands_still(mon, i):
     """Whether a sensor is frozen at a reading that is not zero: a sound one may read zero."""
     return mon.y_past[i] != 0.0 and is_frozen(mon, i)
+
+
+# Gyro or attitude?
+
+GYRO_OPEN, GYRO_CONFIRMED, GYRO_REFUTED = 0, 1, 2  # verdicts of a gyro
+MAX_DYNAMICS_PER_S = 10.0  # largest innovation, rad/s2, by 1 rad/s of a gyro's error itself
+JUMP_TOLERANCE = 0.1  # share of a gyro's jump by which the innovation may differ from it
+MIN_ESTIMATED_SHARE = 0.7  # w shows at least this share of a gyro's error
+SAMPLES_IN_JUMP = 4.0  # a jump is the difference of two residuals, each with the noise of two samples
+MIN_TRANSIENT = 2.0  # least size of a transient over the bound on noise: noise may be all of a smaller one
+TRANSIENT_LEFT = 0.003  # largest share of a transient that is left in the next frame
+RATE_ROUNDING = 1e-6  # rad/s, and rad/s2: the part of the bounds that covers rounding
+
+
+@kernel
+def turn_share(y, i, j):
+    """c: rotation about body axis i for a change of phi, theta or psi (j 0, 1, 2), rad/rad, at attitude y:
+    that of phi turns about the first body axis, of theta about the level second axis, of psi about the
+    vertical."""
+    across = 0.0, np.cos(y[PHI]), -np.sin(y[PHI])
+    return ((1.0, 0.0, 0.0), across, components(down(y)))[j][i]
+
+
+@kernel
+def advance_gyro_estimate(mon, nu, eta, dt):
+    """Advance W, the gyro's error (3,) rad/s if the dynamics are right, W' = nu - D_x W, and its bound B by a
+    frame of dt s:
+
+    W <- A W + dt nu,    B <- |A| B + dt eta,    A = I - dt D_x
+
+    nu, eta (3,): innovation and its bound, rad/s2.
+    """
+    w, B = mon.w, mon.w_bound
+    w0, B0 = (w[0], w[1], w[2]), (B[0], B[1], B[2])
+    for i in range(3):
+        w[i] = dt * nu[i]
+        B[i] = dt * eta[i]
+        for j in range(3):
+            A = (i == j) - dt * mon.config.D[i, j]
+            w[i] += A * w0[j]
+            B[i] += abs(A) * B0[j]
 
 
 @kernel
@@ -348,54 +453,9 @@ def exclude_gyros(mon):
 
 
 @kernel
-def isolate_sensor(mon, measured, found, bank, bound, dt, t):
-    """Raise the alarm, and isolate the sensor once it is the only suspect."""
-    o = mon.output
-    worst = np.argmax(mon.ratio)
-    if mon.substep == 0 or mon.ratio[worst] > o.top_ratio:  # of the samples of this frame
-        o.worst_test_index, o.top_ratio = worst, mon.ratio[worst]
-    for i in range(N_SENSORS):
-        if measured.missing[i] and o.isolated_sensor == NO_SENSOR:
-            mark_isolated(mon, found, i, t)
-    if o.isolated_sensor != NO_SENSOR:
-        return
-    if o.top_ratio > 1.0 and not o.alarmed:
-        raise_alarm(mon, found, t)
-        o.alarm_test = o.worst_test_index
-        mon.initial.E_alarm[:] = mon.initial.E
-    if o.alarmed:
-        filter_beyond(mon, measured.signal)
-        if mon.substep == 0 and mon.stage == FULL_STAGE:
-            judge_gyros(mon, bank, bound, dt)
-        latch_exceeded(mon)
-        if SPEED_TEST <= o.alarm_test <= BETA_TEST:
-            clear_sensors(mon, measured.signal)
-        find_suspects(mon)
-        if o.suspect.sum() == 1:
-            mark_isolated(mon, found, np.argmax(o.suspect), t)
-
-
-@kernel
-def raise_alarm(mon, found, t):
-    """Raise the alarm of the sensors at t s. A surface detected long before was detected with sound sensors,
-    and stays detected. Otherwise the conclusion about surfaces is void."""
-    o = mon.output
-    if o.alarmed:
-        return
-    o.alarmed, o.alarmed_at_s = 1, t
-    if found.detected:
-        o.keeps_surface = found.detected_at_s < t - MIN_LEAD_S
-        if not o.keeps_surface:  # the same fault, which the rates have shown first
-            o.alarmed_at_s = found.detected_at_s
-
-
-@kernel
-def mark_isolated(mon, found, i, t):
-    """Isolate a sensor at t s; its alarm is raised by then."""
-    raise_alarm(mon, found, t)
-    mon.output.isolated_sensor = i
-    mon.output.isolated_at_s = t
-    mon.output.is_reading_unused[i] = 1
+def rule_out_gyros(mon):
+    """No gyro can be broken: a surface may be isolated."""
+    mon.gyros_excluded = 1
 
 
 @kernel
@@ -461,18 +521,15 @@ def judge_gyros(mon, bank, bound, dt):
             g.verdict = GYRO_REFUTED
 
 
-@kernel
-def latch_exceeded(mon):
-    """Record the tests that have exceeded their bounds since the alarm; of turning, and of the angles, those
-    that exceed them by more than an error on another axis explains.
-    """
-    exceeded = mon.exceeded
-    for j in range(N_TESTS):
-        least = 0.0
-        for i in range(j - j % 3, j - j % 3 + 3):
-            least = max(least, COUPLING_SHARE * abs(mon.r[i, 0])) if j < SPEED_TEST else -1.0
-        exceeded[j] |= mon.ratio[j] > 1.0 and abs(mon.r[j, 0]) > least
-    latch_refuted(mon, exceeded)
+# Accelerometers or flow sensor?
+
+JUMP_WINDOW_S = 1.0  # a jump counts within this time after the alarm: later, one by chance is too likely
+JUMP_MEMORY_S = 2.0  # time constant with which the largest jump of an accelerometer fades
+MIN_JUMP_SHARE = 0.5  # the flow sensor's own reading jumps by at least this share of the residual
+# Least ratio of summed residuals to the range of the reading: a scale error within 3 % of -1 gives so much
+MIN_SUM_RATIO = 30.0
+CLEAR_FACTOR = 3.0  # an effect clears a sensor only beyond so many times the bound on it
+TIME_ROUNDING_S = 1e-9
 
 
 @kernel
@@ -587,6 +644,17 @@ def clear_gyros(mon, y):
         return
     for i in range(3):
         mon.cleared[i] |= abs(mon.residual[i]) < mon.turn_max
+
+
+# The suspects
+
+MIN_AXIS_SHARE = 0.5  # least share of the spurious velocity along the axis of a suspected accelerometer
+# A test within its bound B hides an error whose effect is up to this factor times B, because the effect of
+# sound sensors, up to B, may have the other sign. For the gyro that turns the flow by all of its error it is
+# also the margin on the bound of the flow's test.
+HIDDEN_FACTOR = 2.0
+# of the reading that a duplicate sensor should equal: the test that an error of it exceeds
+COUNTERPART_TEST = np.array([TEST_NAMES.index(ROWS[i].test) for i in COUNTERPART], np.int64)
 
 
 @kernel
@@ -767,64 +835,10 @@ def suspect_lone(mon, alarm):
         suspect[I_AIRSPEED] = mon.exceeded[SPEED_TEST] == 1 or hidden or mon.n_same[I_AIRSPEED] > 0
 
 
-@kernel
-def add_turn(mon, att, y):
-    """Add to the comparison of attitude and rates what the attitude has turned beyond the gyros in this
-    sample; near the vertical it shows no turn."""
-    if too_steep(mon, y):
-        attitude.restart(att)
-        return
-    for i in range(3):
-        attitude.add_turn(att, i, mon.residual[i])
-    mon.turn_max = att.turn_max
+# Substitutes of broken sensors
 
-
-@kernel
-def name_gyro(mon, found, i, t):
-    """Isolate gyro i at t s. What was concluded of surfaces is void, unless one was isolated before."""
-    o = mon.output
-    mark_isolated(mon, found, i, t)
-    if o.keeps_surface and found.isolated_estimator < 0:
-        o.keeps_surface = 0
-        o.alarmed_at_s = found.detected_at_s
-
-
-@kernel
-def rule_out_gyros(mon):
-    """No gyro can be broken: a surface may be isolated."""
-    mon.gyros_excluded = 1
-
-
-@kernel
-def allows_isolation(mon, is_earlier, detected_at_s):
-    """Whether the data may speak about surfaces, whose alarm was raised at detected_at_s; is_earlier: a frame
-    or more ago.
-
-    They do not while a flow sensor is frozen: a surface that moves the aircraft moves its reading. In
-    symmetric flight a sideslip of zero stays zero. Nor do they after an alarm so early that an error which a
-    flow sensor has had from the start may have caused it: the design model uses its reading from the first
-    frame on.
-    """
-    if not mon.config.enabled:
-        return True
-    if detected_at_s < mon.t_start + INITIAL_WINDOW_S:
-        return False
-    for i in (I_ALPHA, I_BETA, I_AIRSPEED, I_QDYN):
-        if stands_still(mon, i):
-            return False
-    return is_earlier == 1 or doubts_gyros(mon)
-
-
-@kernel
-def doubts_gyros(mon):
-    """Whether a gyro may be the cause of the alarm of the surfaces."""
-    return mon.config.enabled == 1 and mon.config.noisy == 1 and mon.gyros_excluded == 0
-
-
-@kernel
-def has_alarm(mon):
-    """Whether the monitor has raised its alarm: no surface is isolated then."""
-    return mon.config.enabled and mon.output.alarmed
+VANE_RETURN_S = 20.0  # time constant with which a replaced vane returns to trim: kinematics alone drift
+RATE_POLE = 1  # index in FILTER_POLES_PER_S of the filter that gives the first value of a replaced rate
 
 
 @kernel

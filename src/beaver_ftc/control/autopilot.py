@@ -3,19 +3,21 @@
 The autopilot computes where each channel of the commanded profile should be now, from the legs of the
 scenario, and body-rate references and an engine setting for that.
 
-    altitude  gamma_c = (H_c' + K (H_c - H)) / V + M                            `path_angle_to_fly`
-    pitch     theta_c' = K (theta_c - theta),  theta_c = gamma_c + alpha cos phi   `pitch_attitude_rate`
-    airspeed  A = V_c' + K (V_c - V) + M + g (gamma_c - gamma_trim)             `set_power`
-    gliding   gamma_c = gamma_trim - (V_c' + K (V_c - V) + M) / g               `glide_path_angle`
-    heading   phi_c = V / g (psi_c' + K (psi_c - psi) + M)                      `bank_to_turn`
-    bank      phi_c' = K (phi_c - phi) + M                                      `bank_angle_rate`
-    turn      psi' = g tan phi / V: coordinated [Etkin1996, sec. 7.6]           `set_body_rates`
+    altitude  gamma_c = (H_c' + K (H_c - H)) / V + M                              `path_angle_to_fly`
+    pitch     theta_c' = K (theta_c - theta),  theta_c = gamma_c + alpha cos phi  `pitch_attitude_rate`
+    airspeed  A = V_c' + K (V_c - V) + M + g (gamma_c - gamma_trim)               `set_power`
+    gliding   gamma_c = gamma_trim - (V_c' + K (V_c - V) + M) / g                 `glide_path_angle`
+    heading   phi_c = V / g (psi_c' + K (psi_c - psi) + M)                        `bank_to_turn`
+    bank      phi_c' = K (phi_c - phi) + M                                        `bank_angle_rate`
+    turn      psi' = g tan phi / V: coordinated [Etkin1996, sec. 7.6]             `set_body_rates`
 
-    H, V                      m, m/s   altitude, airspeed
-    gamma, alpha, theta, psi, phi  rad   path, incidence, pitch attitude, heading, bank; V and alpha smoothed
-    A, g                      m/s2     acceleration along the path, by engine power; gravity
-    K                         1/s      gain of the loop
-    M                                  found missing: the integral of the loop's error, in the unit of its sum
+    H, V           m, m/s    altitude; airspeed, smoothed
+    gamma, alpha   rad       path angle; incidence, smoothed
+    theta, phi     rad       pitch attitude, bank
+    psi            rad       heading
+    A, g           m/s2      acceleration along the path, by engine power; gravity
+    K              1/s       gain of the loop
+    M                        found missing: the integral of the loop's error, in the unit of the sum it is in
 
 Every demand is limited, and what a limit cut off is not integrated. The limits on rates and bank shrink with
 what the surfaces that are left can give; climb and descent are bounded by the power there is, so that the

@@ -162,7 +162,7 @@ def start_of(output, assessment, s):
 
 @kernel
 def approach(surfaces, s, start, target):
-    """Move the effectiveness of surface s from `start` towards `target` by at most one step."""
+    """Move the effectiveness of surface s from `start` towards `target` by at most the step of a frame."""
     output, step = surfaces.output, surfaces.config.effectiveness_step
     output.target[s] = target
     output.effectiveness[s] = start + clamp(target - start, step)

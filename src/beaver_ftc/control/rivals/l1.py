@@ -38,8 +38,11 @@ class Predictor:
         self.error, self.sigma = np.zeros(3), np.zeros(3)
 
     def step(self, moved: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
-        """moved (3,) rad/s: change of the measured rates over the frame; acceleration (3,) rad/s2: f + G u
-        in it."""
+        """e <- A e + dt acceleration + Phi sigma - moved,    sigma = -A / Phi e; returns sigma (3,) rad/s2.
+
+        moved (3,) rad/s: change of the measured rates over the frame; acceleration (3,) rad/s2: f + G u in
+        it.
+        """
         self.error = self._decay * self.error + self._dt * acceleration + self._Phi * self.sigma - moved
         self.sigma = -self._decay / self._Phi * self.error
         return self.sigma
@@ -76,7 +79,8 @@ class L1Adaptive:
         return command
 
     def demand(self, x: np.ndarray, reference: Reference) -> np.ndarray:
-        """nu (3,) rad/s2. The integral of the error stands still while a surface is at its stop."""
+        """nu = xm' + Kp e_m + Ki int e_m (3,) rad/s2. The integral of the error stands still while a surface
+        is at its stop."""
         error, option = reference.rate - x, self.option
         if not self.saturated:
             self.integral = self.integral + self.context.dt_s * error

@@ -19,7 +19,10 @@ _STEP = 1e-6
 
 
 def gains(A: np.ndarray, B: np.ndarray, Q: np.ndarray, R: np.ndarray) -> np.ndarray:
-    """K (m, n) of u = -K z for z[k+1] = A z + B u, from the discrete algebraic Riccati equation."""
+    """K (m, n) of u = -K z for z[k+1] = A z + B u that minimises sum z' Q z + u' R u:
+
+    K = (R + B' P B)^-1 B' P A,    P: solution of the discrete algebraic Riccati equation
+    """
     from scipy.linalg import solve_discrete_are
 
     P = solve_discrete_are(A, B, Q, R)
@@ -33,7 +36,10 @@ class FixedGainLqr(KernelLaw):
     defaults: ClassVar[Mapping[str, float]] = {"error_deg_s": 0.5, "integral_deg": 0.5, "deflection_deg": 3.0}
 
     def compile_into(self, law: np.void) -> None:
-        """Linearise about the trim and solve for the gains, once."""
+        """Linearise about the trim and solve for the gains, once, of z = (x - xm, int x - xm):
+
+        z[k+1] = ((I + dt A) z_1 + dt B du, z_2 + dt z_1)
+        """
         option, dt = self.option, self.context.dt_s
         A, B = linearised(self.context)
         z_A = np.block([[np.eye(3) + dt * A, np.zeros((3, 3))], [dt * np.eye(3), np.eye(3)]])

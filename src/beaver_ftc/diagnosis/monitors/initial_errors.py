@@ -169,6 +169,10 @@ def angle_of_chord(x):
 def start_bounds(mon, y):
     """e_start: bound each error at the first sample: an aircraft can fly at the truth.
 
+        alpha, beta    2 sin((|reading| + MAX_FLOW_ANGLE_RAD) / 2)
+        phi, theta     MAX_CHORD
+        airspeed       max(V / V_air sqrt(1 + s) - 1, 1 - V / V_air sqrt(1 - s))        s: DENSITY_SHARE
+
     T: temperature of the standard troposphere, over that at sea level. V_air: airspeed by dynamic pressure
     and standard density, m/s; off: reading over truth, less 1, in the thickest or in the thinnest air.
     """

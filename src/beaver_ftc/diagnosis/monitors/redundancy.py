@@ -227,7 +227,10 @@ def too_steep(mon, y):
 
 @kernel
 def bound_acceleration(mon, w_max, e_w):
-    """e_a: bound on the error of the acceleration of the elapsed step, m/s2.
+    """e_a: bound on the error of the acceleration of the elapsed step, m/s2:
+
+        EARTH + e_first + h/2 e_w |a_past| + g sum (e_i + h w_max const_i)        i: phi, theta
+              + sum h w_max const_i + sqrt(sum e_i^2)                             i: accelerometers
 
     A sensor adds to 3/2 y - 1/2 y_before the error 3/2 e_past + 1/2 e_older - const at most: accelerometers,
     and the attitude, which gives gravity its direction. Turning the previous acceleration into the present

@@ -32,8 +32,13 @@ def transition_matrix(stay: float, n: int) -> np.ndarray:
 def mix_states(
     z: np.ndarray, P: np.ndarray, mu: np.ndarray, chain: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Mixed states (M, n), covariances (M, n, n) and predicted probabilities (M,) [Blom1988, steps 1 and
-    2]. mu (M,): probabilities."""
+    """Mixed states (M, n), covariances (M, n, n) and predicted probabilities (M,) [Blom1988, steps 1 and 2]:
+
+        predicted_j = sum_i mu_i chain_ij,    w_ij = chain_ij mu_i / predicted_j
+        mixed_j = sum_i w_ij z_i,    P_j = sum_i w_ij (P_i + (z_i - mixed_j) (z_i - mixed_j)')
+
+    mu (M,): probabilities.
+    """
     predicted = mu @ chain
     weights = chain * mu[:, None] / predicted
     mixed = weights.T @ z
@@ -43,7 +48,8 @@ def mix_states(
 
 
 def posterior_probabilities(predicted: np.ndarray, log_likelihoods: np.ndarray) -> np.ndarray:
-    """Bayes' rule, in logarithms so that nothing underflows; predicted, log_likelihoods (M,)."""
+    """Bayes' rule, mu_j ~ predicted_j exp(log_likelihoods_j), in logarithms so that nothing underflows; all
+    (M,). None is below _MIN_MODE_PROBABILITY."""
     log_mu = np.log(predicted) + log_likelihoods
     mu = np.exp(log_mu - log_mu.max())
     mu = np.maximum(mu / mu.sum(), _MIN_MODE_PROBABILITY)

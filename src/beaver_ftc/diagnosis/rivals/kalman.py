@@ -88,7 +88,12 @@ class KalmanRival(RivalDetector):
 def update_state_and_covariance(
     z: np.ndarray, P: np.ndarray, nu: np.ndarray, R: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Condition (z, P) on the innovation nu (..., m) of the first m states; returns z, P, S (..., m, m)."""
+    """Condition (z, P) on the innovation nu (..., m) of the first m states; returns z, P, S (..., m, m):
+
+        S = H P H' + R,    K = P H' S^-1,    z <- z + K nu,    P <- P - K H P        H: the first m rows of I
+
+    z (..., n), P (..., n, n), R (..., m, m).
+    """
     m = nu.shape[-1]
     S = P[..., :m, :m] + R
     K = np.linalg.solve(S, P[..., :m, :]).swapaxes(-1, -2)
@@ -102,15 +107,21 @@ def normalised_innovation_square(nu: np.ndarray, S: np.ndarray) -> np.ndarray:
 
 
 def log_likelihood(nu: np.ndarray, S: np.ndarray) -> np.ndarray:
-    """Logarithm of the Gaussian density of the innovation."""
+    """Logarithm of the Gaussian density of the innovation nu (..., m):
+
+    -(nu' S^-1 nu + log det S + m log(2 pi)) / 2
+    """
     constant = nu.shape[-1] * np.log(2.0 * np.pi)
     return -0.5 * (normalised_innovation_square(nu, S) + np.linalg.slogdet(S)[1] + constant)
 
 
 def sigma_points(z: np.ndarray, P: np.ndarray, spread: float) -> tuple[np.ndarray, np.ndarray]:
-    """2 n + 1 points (2 n + 1, n) and their weights (2 n + 1,) with the mean z and the covariance P.
+    """2 n + 1 points (2 n + 1, n) and their weights (2 n + 1,) with the mean z and the covariance P:
 
-    spread is n + kappa [Julier2004, eq. 12]; 3 matches the fourth moment of a Gaussian in one dimension.
+        z, z + L_j, z - L_j,    weights 1 - n / spread, then 1 / (2 spread)        L L' = spread P
+
+    L_j: column j of L. spread is n + kappa [Julier2004, eq. 12]; 3 matches the fourth moment of a Gaussian
+    in one dimension.
     """
     offsets = _matrix_root(spread * P).T
     weights = np.full(2 * z.size + 1, 0.5 / spread)

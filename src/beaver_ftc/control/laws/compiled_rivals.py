@@ -41,9 +41,7 @@ def command(control, assessment, faults, prediction, measured, mode, t):
         prediction.means.Gu, prediction.G, control.axes.demand, u,
     )  # fmt: skip
     take_command(allocated, layout, u)
-    memory.saturated = 0
-    for s in range(u.size):
-        memory.saturated += allocated.saturated[s]
+    memory.saturated = allocated.saturated.sum()
 
 
 @kernel

@@ -179,12 +179,8 @@ def check_sensors(mon, pred, measured, found, bank, bound, dt, t):
     bank: with the innovation of the elapsed frame, of dt s; bound: with the bound on that innovation.
     """
     y = measured.signal
-    if not mon.stage:  # the first sample: there is none to compare it with
-        mon.stage = 1
-        mon.t_start = t
-        mon.e_drift = mon.drift * t
-        start_tests(mon, y, measured.force)
-        start_bounds(mon, y)
+    if not mon.stage:
+        start_monitor(mon, y, measured.force, t)
     else:
         if mon.substep == 0:
             advance_gyro_estimate(mon, bank.output.innovation, bound.eta_bar, dt)
@@ -205,8 +201,20 @@ def check_sensors(mon, pred, measured, found, bank, bound, dt, t):
 
 
 @kernel
+def start_monitor(mon, y, force, t):
+    """Start with the first sample, at t s: there is none to compare it with; force (3,) m/s2."""
+    mon.stage, mon.t_start, mon.e_drift = 1, t, mon.drift * t
+    start_tests(mon, y, force)
+    start_bounds(mon, y)
+
+
+@kernel
 def isolate_sensor(mon, measured, found, bank, bound, dt, t):
-    """Raise the alarm, and isolate the sensor once it is the only suspect."""
+    """Raise the alarm, and isolate the sensor once it is the only suspect.
+
+    A missing reading isolates its sensor. The test with the largest ratio beyond 1 raises the alarm; from
+    then on each sample adds to what gyros, flow sensors and tests have shown, until all but one are excluded.
+    """
     o = mon.output
     worst = np.argmax(mon.ratio)
     if mon.substep == 0 or mon.ratio[worst] > o.top_ratio:  # of the samples of this frame

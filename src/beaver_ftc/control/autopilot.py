@@ -137,8 +137,8 @@ def steer(autopilot, control, u, measured, unexplained, t):
     limit_airspeed_to_fly(autopilot, layout, surfaces, u, unexplained, y, t)
     push = acceleration_per_power(autopilot, power, y)
     rudder = layout.main[YAW]
-    left, at_stop = surfaces.output.effectiveness[rudder], saturated[rudder]
-    autopilot.full_power = highest_power(autopilot, power, left, at_stop, y)
+    change_allowed_power(autopilot, power, saturated[rudder], y)
+    autopilot.full_power = highest_power(autopilot, power, surfaces.output.effectiveness[rudder], y)
     path = path_angle_to_fly(autopilot, measured, push)
     rolling = bank_angle_rate(autopilot, attitude)
     pitching = pitch_attitude_rate(autopilot, y, attitude, path)
@@ -152,8 +152,8 @@ def steer(autopilot, control, u, measured, unexplained, t):
 def take_over(autopilot, y, attitude):
     """In trim: smoothed signals and the engine as they are."""
     autopilot.flying = 1
-    autopilot.alpha, autopilot.airspeed = y[ALPHA], y[AIRSPEED]
-    autopilot.recent_airspeed_mps = y[AIRSPEED]
+    autopilot.alpha = y[ALPHA]
+    autopilot.airspeed = autopilot.recent_airspeed_mps = y[AIRSPEED]
     autopilot.climb_in_trim = attitude[PITCH] - y[ALPHA]
 
 
@@ -222,16 +222,9 @@ def acceleration_per_power(autopilot, power, y):
 
 
 @kernel
-def highest_power(autopilot, power, left, at_stop, y):
-    """The highest power with what is left of the rudder: the Beaver's propeller yaws with dpt^3.
-
-    What the rudder lacks, sideslip makes up for. The slower, the less: a climb beyond it ends in slow flight.
-    A rudder at its stop holds no more, whatever its estimate: power is then reduced until it comes off.
-
-        dpt^3 held = left highest_dpt^3 + (1 - left) dpt_cubed_held_by_sideslip
-
-    left: effectiveness of the rudder; at_stop: whether it is there; y (n_y,).
-    """
+def change_allowed_power(autopilot, power, at_stop, y):
+    """A rudder at its stop holds no more, whatever its estimate: reduce the power allowed until it comes
+    off, and then raise it again. at_stop: whether it is there; y (n_y,)."""
     high = autopilot.high_power
     if at_stop:
         lowest = ceiling(power, y, autopilot.dpt_cubed_held_by_sideslip ** (1.0 / 3.0))
@@ -239,6 +232,18 @@ def highest_power(autopilot, power, left, at_stop, y):
         autopilot.allowed_power = min(max(cut, lowest), high)
     else:
         autopilot.allowed_power = min(autopilot.allowed_power + RAISE_INHG_S * autopilot.dt, high)
+
+
+@kernel
+def highest_power(autopilot, power, left, y):
+    """The highest power with what is left of the rudder: the Beaver's propeller yaws with dpt^3.
+
+    What the rudder lacks, sideslip makes up for. The slower, the less: a climb beyond it ends in slow flight.
+
+        dpt^3 held = left highest_dpt^3 + (1 - left) dpt_cubed_held_by_sideslip
+
+    left: effectiveness of the rudder; y (n_y,).
+    """
     if left >= 1.0:
         return autopilot.allowed_power
     held = max(left, 0.0) * power.config.highest_dpt**3 + (1.0 - left) * autopilot.dpt_cubed_held_by_sideslip

@@ -46,8 +46,17 @@ def clamp_to_observer_estimate(sums, layout, s, target, least):
     less than the observer sees. least: of the effectiveness that is used."""
     for i in range(3):
         if s == layout.main[i] and target < 1.0 and not is_replaced(layout, s):
+            forget_health(sums, i)
             target = larger_estimate(sums, target, i, least)
     return target
+
+
+@kernel
+def forget_health(sums, i):
+    """At the first naming of the main surface of axis i, what was seen of it when healthy no longer
+    counts."""
+    if not sums.named[i]:
+        sums.named[i], sums.product[i], sums.square[i] = 1, 0.0, 0.0
 
 
 @kernel
@@ -57,8 +66,6 @@ def larger_estimate(sums, diagnosed, i, least):
     A law gives up a surface below `least`. If both estimates are below NOTHING_LEFT, the larger is returned
     as it is. From NOTHING_LEFT on it is raised to `least`, so that the law keeps a weak surface in use.
     """
-    if not sums.named[i]:  # at its first naming: what was seen of it when healthy no longer counts
-        sums.named[i], sums.product[i], sums.square[i] = 1, 0.0, 0.0
     larger = max(diagnosed, min(effectiveness_seen(sums, i, diagnosed), 1.0))
     return larger if larger < NOTHING_LEFT else max(larger, least)
 

@@ -348,15 +348,17 @@ def clear_modes(surfs):
 
 @kernel
 def accommodate(types, layout):
-    """Settle what the law does about each surface. Returns the lead, which the supervisor follows, and what
-    is done about it: a replaced elevator leads before all others."""
+    """Settle what the law does about each surface whose fault shows, or did less than MAX_SILENCE_S ago.
+    Returns the lead, which the supervisor follows, and what is done about it: a replaced elevator leads
+    before all others."""
     lead, mode, presumed = NO_SURFACE, -1, presumed_surface(types, layout)
     clear_modes(types.surface)
     for s, srf in enumerate(types.surface):
         if srf.status.is_isolated or s == presumed:
             possible = srf.status.is_isolated == 1 or can_be_faulty(srf)
             own = choose_mode(srf) if possible else SUBTRACT_OFFSET
-            if fault_shows(types.config, srf, own, possible):
+            count_silence(srf, own, possible)
+            if srf.accommodation.n_silent * types.config.dt < MAX_SILENCE_S - _TIME_TOLERANCE_S:
                 srf.accommodation.mode = own
                 leads = s == layout.main[PITCH] and own in (SCALE_COMMAND, GIVE_UP)
                 if lead == NO_SURFACE or leads:
@@ -365,17 +367,16 @@ def accommodate(types, layout):
 
 
 @kernel
-def fault_shows(c, srf, mode, possible):
-    """Whether the fault of a surface shows, or did less than MAX_SILENCE_S ago.
+def count_silence(srf, mode, possible):
+    """Count the frames since the fault of a surface has shown, n_silent. It shows in a frame that agrees with
+    its deflection error (`deflection_error`), and always if the mode scales the command.
 
-    n_silent: number of frames since it has shown.
+    possible: whether the surface can be faulty.
     """
     last, acc = srf.last, srf.accommodation
     p = deflection_error(srf, possible) + last.u
     agrees = last.lo <= p <= last.hi or mode == SCALE_COMMAND
     acc.n_silent = 0 if agrees else acc.n_silent + 1
-    silence_s = acc.n_silent * c.dt
-    return silence_s < MAX_SILENCE_S - _TIME_TOLERANCE_S
 
 
 @kernel

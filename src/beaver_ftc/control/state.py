@@ -87,22 +87,24 @@ def take_over(new: np.void, before: np.void, learnt: np.ndarray) -> None:
     go on, and its integrators begin where the demand is. Of a law that knew the truth, what that has left in
     a stage does not go on.
 
-    learnt (3,) rad/s2: what the diagnosis' network explains.
+    learnt (3,) rad/s2: what the diagnosis' network explains. source: the records with which the integrators
+    may begin; unexplained (3,) rad/s2: what the law in them attributes to no model.
     """
-    told = is_told_no_more(new, before)
-    for stage, part in KEPT if told else (*KEPT, *KNOWN):
+    loses_truth = is_told_no_more(new, before)
+    for stage, part in KEPT if loses_truth else (*KEPT, *KNOWN):
         new[stage][part] = before[stage][part]
-    if told:
+    if loses_truth:
         for name in ("hand_over", "lost_share", "transfer_share"):
             new["allocation"]["output"][name] = 0.0
-        reference, before = new["reference"]["output"], new
+        reference = new["reference"]["output"]
         for kind in ("rate", "acceleration"):
             reference[f"governed_{kind}"] = reference[f"model_{kind}"]
-    law, next_law, unexplained = in_charge(before), in_charge(new), np.zeros(3)
-    if not told:
+        source, unexplained = new, np.zeros(3)
+    else:
+        law, source = in_charge(before), before
         unexplained = law.unexplained(before) if law.unexplained else before["surfaces"]["output"]["unknown"]
-    if next_law.begin is not None:
-        next_law.begin(new, before, unexplained, learnt)
+    if (begin := in_charge(new).begin) is not None:
+        begin(new, source, unexplained, learnt)
 
 
 def in_charge(control: np.void) -> CompiledLaw:

@@ -53,8 +53,8 @@ error e t; an error of a flow sensor is a step, which its own reading contains. 
 The direction of the spurious velocity dv, which the residuals add up to, says which accelerometer is broken.
 
 Symbols: redundancy.py and initial_errors.py; i sensor or axis, j test, m pole, d duplicate, h hypothesis of
-initial_errors.py. mon: record of the monitor; o its output; found the conclusion
-about surfaces, bank the detection filters, pred the prediction of the model.
+initial_errors.py. mon: record of the monitor; o: its output; found: the conclusion about surfaces; bank: the
+detection filters; pred: the prediction of the model.
 """
 
 import numpy as np

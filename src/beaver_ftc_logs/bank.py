@@ -28,12 +28,13 @@ _PAIR_SHARE = 0.02
 _OFFSET_SHARE = 0.05
 _SILENT_SHARE = 0.02
 _PAIR_LEVELS = (0.25, 0.5, 0.75)
-_PRIOR_HEALTHY, _PRIOR_NO_RESPONSE = 0.7, 0.2
+_PRIOR_HEALTHY = 0.7
+_PRIOR_NO_RESPONSE = 0.2
 _MAX_SQUARE = 30.0  # of a whitened flight: the predictor needs a fraction of a second to adapt to a fault
 
 
+# Effectiveness of each group, kind, transition share, variance of the rate offset.
 HypothesisRow = tuple[Floats, int, float, Floats]
-"""Effectiveness of each group, kind, transition share, variance of the rate offset."""
 
 
 class HypothesisBank(NamedTuple):
@@ -109,7 +110,8 @@ def _levels_and_shares(model: Model, g: int) -> tuple[Floats, Floats]:
     grid = np.arange(0.0, 1.0 - 0.5 * settings.level_step, settings.level_step)
     levels = np.unique(np.round(np.concatenate([grid, np.array(labelled, dtype=float)]), 6))
     is_labelled = np.isin(levels, np.round(labelled, 6))
-    n, share = int(is_labelled.sum()), settings.level_share
+    n = int(is_labelled.sum())
+    share = settings.level_share
     if n in (0, len(levels)):
         return levels, np.full(len(levels), 1.0 / len(levels))
     return levels, np.where(is_labelled, share / n, (1.0 - share) / (len(levels) - n))
@@ -118,7 +120,8 @@ def _levels_and_shares(model: Model, g: int) -> tuple[Floats, Floats]:
 def _offset_variances(model: Model, g: int) -> list[Floats]:
     """Variances of the rates' offset that may come with a loss, (3,) each: none, or that of the group stuck
     anywhere within its travel, along the axes it moves most."""
-    B, R = np.array(model.response), np.array(model.noise)
+    B = np.array(model.response)
+    R = np.array(model.noise)
     total = np.abs(B[g]).sum(axis=0) / np.sqrt(np.diag(R))
     ratio = np.clip(total / max(total.max(), MIN_DIVISOR), 0.3, 1.0)
     stuck = np.diag(R) * (model.settings.jam_sd * ratio) ** 2

@@ -30,7 +30,8 @@ from beaver_ftc_logs.stepped import Replayed, error_sections, named_since, repla
 from beaver_ftc_logs.time_base import sample_column
 from beaver_ftc_logs.vehicle import Vehicle
 
-_MAX_HZ, _MIN_HZ = 1000.0, 20.0
+_MAX_HZ = 1000.0
+_MIN_HZ = 20.0
 _STEP_JITTER = 0.1
 _MIN_SAMPLES = 50
 _DENSITIES_KG_M3 = (0.2, 1.6)
@@ -39,8 +40,8 @@ _START_WINDOW_S = 1.0
 _ATTITUDE_ANGLE_NAMES = ("roll", "pitch", "yaw")
 
 
+# The aircraft whose flights are diagnosed, and the errors declared for it: arguments of `Diagnosis`.
 DiagnosedAircraft = tuple[Aircraft, Document]
-"""The aircraft whose flights are diagnosed, and the errors declared for it: arguments of `Diagnosis`."""
 
 
 def load_diagnosed(aircraft_name: str, scenario: str | None = None) -> DiagnosedAircraft:
@@ -56,7 +57,8 @@ def load_diagnosed(aircraft_name: str, scenario: str | None = None) -> Diagnosed
     if scenario is None:
         return aircraft, {}
     loaded = load_scenario(scenario)
-    flown, fdi = loaded.airframe.name, loaded.fdi
+    flown = loaded.airframe.name
+    fdi = loaded.fdi
     refusals = (
         (
             fdi.sensor_monitor == "always",
@@ -131,10 +133,13 @@ class LogInputs:
                     allowed = f"signs as of {self.aircraft.name}; does `scale: -1` fit?"
                     raise BadInput(f"{self.samples.name}: {reason}, allowed: {allowed}")
         n = len(self.samples.t_s)
-        verdicts, low, high = [Verdict()] * n, np.zeros((n, len(gains))), np.ones((n, len(gains)))
+        verdicts = [Verdict()] * n
+        low = np.zeros((n, len(gains)))
+        high = np.ones((n, len(gains)))
         for (begin, end), replay in zip(self.gap_free_stretches, replays, strict=True):
             verdicts[begin:end] = replay.verdicts
-            low[begin:end], high[begin:end] = replay.alone_low, replay.alone_high
+            low[begin:end] = replay.alone_low
+            high[begin:end] = replay.alone_high
         return Replayed(verdicts, low, high, gains, upper)
 
     def rows(self, replay: Replayed) -> LogRows:
@@ -151,7 +156,8 @@ def _read_inputs(log: RecordedFlight, vehicle: Vehicle, given: DiagnosedAircraft
     samples = resample(log, vehicle.model_copy(update=changes))
     rate_hz = _log_rate_hz(samples)
     diagnosis = Diagnosis(aircraft, rate_hz, **declared_errors)
-    columns, ages = convert_to_si(log, vehicle).columns, dict(samples.held_age_s)
+    columns = convert_to_si(log, vehicle).columns
+    ages = dict(samples.held_age_s)
 
     def sampled_at(name: str) -> Floats:
         values, age_s = sample_column(columns[name], samples.t_s, samples.dt_s)
@@ -163,7 +169,8 @@ def _read_inputs(log: RecordedFlight, vehicle: Vehicle, given: DiagnosedAircraft
     places = [list(vehicle.surfaces).index(name) for name in aircraft.surfaces]
     full_rad = np.array([vehicle.full_deflection_rad.get(name, 1.0) for name in aircraft.surfaces])
     samples = replace(samples, commands=samples.commands[:, places], labels=samples.labels[:, places])
-    commands, attitude = samples.commands * full_rad, np.zeros_like(samples.rates)
+    commands = samples.commands * full_rad
+    attitude = np.zeros_like(samples.rates)
     if diagnosis.declared.air.moves:
         angles = _attitude_columns(samples.name, columns, vehicle)
         attitude = np.column_stack([sampled_at(name) for name in angles])
@@ -196,7 +203,8 @@ def diagnose_aircraft(
 def _corrected_inputs(inputs: LogInputs, replay: Replayed) -> Iterator[tuple[LogInputs, BadInput]]:
     """The inputs with one mistake in the commands mended, and the error that says so. With a fault a changed
     sign leaves a larger innovation, since no surface has a negative effectiveness."""
-    flight, aircraft = inputs.samples.name, inputs.aircraft
+    flight = inputs.samples.name
+    aircraft = inputs.aircraft
     for s in np.flatnonzero(replay.command_gains < 0.0):
         commands = inputs.input_arrays[2] * np.where(np.arange(len(aircraft.surfaces)) == s, -1.0, 1.0)
         error = reversed_command_error(flight, aircraft.surfaces[s], f"of {aircraft.name}")
@@ -258,7 +266,8 @@ def _check_plausible(flight: str, flow: Mapping[str, Floats], commands: Floats, 
         median = _median_without_nan(np.abs(flow[name]))
         if median > 0.5 * pi:
             raise BadInput(f"{flight}: flow.{name} is {median:.3g} in the middle, allowed: rad; `unit: deg`?")
-    airspeed, qdyn = flow["airspeed_mps"], flow["qdyn_pa"]
+    airspeed = flow["airspeed_mps"]
+    qdyn = flow["qdyn_pa"]
     flies = airspeed > 0.5 * aircraft.envelope.airspeed_mps[0]
     rho = _median_without_nan(2.0 * qdyn[flies] / airspeed[flies] ** 2)
     if rho <= _DENSITIES_KG_M3[0] or rho >= _DENSITIES_KG_M3[1]:
@@ -283,10 +292,13 @@ def _median_without_nan(values: Floats) -> float:
 
 def _doubtful_rows(inputs: LogInputs, replay: Replayed, rows: LogRows) -> Reasons:
     """For each reason the rows (n,) for which there is no verdict."""
-    aircraft, missing = inputs.aircraft, inputs.has_missing_value
-    (low_mps, high_mps), (low, high) = aircraft.envelope.airspeed_mps, aircraft.alpha_rad
+    aircraft = inputs.aircraft
+    missing = inputs.has_missing_value
+    (low_mps, high_mps) = aircraft.envelope.airspeed_mps
+    (low, high) = aircraft.alpha_rad
     flow = dict(zip(FLOW, inputs.input_arrays[1].T, strict=False))  # the aircraft's own signals follow
-    alpha, airspeed = flow["alpha_rad"], flow["airspeed_mps"]
+    alpha = flow["alpha_rad"]
+    airspeed = flow["airspeed_mps"]
     unexplained = np.zeros(len(alpha), dtype=bool)
     after = np.zeros_like(unexplained)
     outside = np.ones_like(unexplained)
@@ -317,7 +329,8 @@ def _verdict_document(
     inputs: LogInputs, rows: LogRows, replay: Replayed, declared_errors: Document
 ) -> Document:
     """The document of verdict.json."""
-    samples, aircraft = inputs.samples, inputs.aircraft
+    samples = inputs.samples
+    aircraft = inputs.aircraft
     surfaces = list(aircraft.surfaces)
     alarms = np.flatnonzero(rows.faulty).tolist()
     verdicts = [replay.verdicts[k] for k in alarms]

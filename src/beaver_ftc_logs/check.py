@@ -83,17 +83,18 @@ _NAME_PATTERNS = {
     "time": r"(real|totl|total|sim|simulation|utc|gps|log|date|sys|system)_?time|date|datetime|clock|utc|"
     r"%?t(ime)?(_?(s|ms|us|ns|usec|stamp|boot))?\w*|(milli|micro|nano)?s(ec(ond)?s?)?|millis|micros",
 }
+# Names of setpoints of a quantity, its errors, flags and the like: none of these is the quantity.
 _DERIVED_NAME = (
     r"innov|test_ratio|varian|timestamp|flag|valid|status|count|setpoint|_sp$|desired|demand|target|bias|"
     r"integ|error|_err$|_offset|cov(ariance)?\b|temp|noise|(_|^)(cmd|command)"
 )
-"""Names of setpoints of a quantity, its errors, flags and the like: none of these is the quantity."""
 _ANGLE_RATE_NAME = r"rate|speed|accel|veloc|dot|_(deg|rad)_?s(ec)?$"
 _UNIT_OF_PART = {"rad_s": "rad/s", "rad/s": "rad/s", "deg_s": "deg/s", "deg/s": "deg/s", "dps": "deg/s"}
 _PWM_RANGE_US = (700.0, 2300.0)
 _LARGEST_RAD_S = 12.0
 _MIN_CORRELATION = 0.7
-_MAX_COMMANDS, _MAX_READ_COLUMNS = 8, 60
+_MAX_COMMANDS = 8
+_MAX_READ_COLUMNS = 60
 _LOG_STEPS_S = (1.0 / 2000.0, 1.0 / 4.0)
 
 
@@ -132,7 +133,8 @@ def _check_recording(log: RecordedFlight, vehicle: Vehicle) -> tuple[bool, list[
         samples = resample(log, vehicle)
     except BadInput as error:
         return False, [str(error)]
-    n_gaps, span_s = int(samples.stretch_number[-1]), float(samples.t_s[-1] - samples.t_s[0])
+    n_gaps = int(samples.stretch_number[-1])
+    span_s = float(samples.t_s[-1] - samples.t_s[0])
     gap = f", the longest of {np.diff(samples.t_s).max():.4g} s" if n_gaps else ""
     size = (
         f"{len(samples.t_s)} samples at {1.0 / samples.dt_s:.3g} Hz over {span_s:.4g} s; gaps: {n_gaps}{gap}"
@@ -210,7 +212,8 @@ def _read_likely(path: Path, reader: str | None) -> _LikelyLog:
 
 def _guess_vehicle(path: Path, likely: _LikelyLog) -> Document:
     """The keys of a vehicle file for a log. Raises _NoVehicle if it has no rates or no commands."""
-    log, mixing = likely.log, likely.mixing
+    log = likely.log
+    mixing = likely.mixing
     names = [name for name, column in log.columns.items() if np.isfinite(column.values).any()]
     found = _find_quantities(names)
     if hovers_throughout(log.parameters, log.columns):
@@ -261,7 +264,8 @@ def _find_quantities(names: list[str]) -> dict[str, str]:
 def _add_commands_by_name(likely: _LikelyLog, names: list[str]) -> None:
     """Add to the mixing a surface for each column that looks like a command. Raises _NoVehicle for a
     multicopter."""
-    log, mixing = likely.log, likely.mixing
+    log = likely.log
+    mixing = likely.mixing
     if rotors := multicopter_reason(log.parameters, likely.all_names):
         raise _NoVehicle(
             f"is the log of a multicopter ({rotors}), which has no surfaces, allowed: a log of an aircraft "
@@ -307,7 +311,8 @@ def _find_time(path: Path) -> TimeSource | None:
         stamps = cells.numbers[name][np.isfinite(cells.numbers[name])]
         if phrase := text_of_column_phrase(cells, name):
             phrases.append(f"{name} holds {phrase.removeprefix(', but ')}")
-        step, (shortest_s, longest_s) = median_step_s(stamps), _LOG_STEPS_S
+        step = median_step_s(stamps)
+        (shortest_s, longest_s) = _LOG_STEPS_S
         units = [unit for unit, seconds in TIME_UNITS.items() if shortest_s <= step * seconds <= longest_s]
         if units:
             unit = next((unit for unit in units if _snake_case(name).endswith(unit)), units[0])
@@ -333,7 +338,8 @@ def _guess_rate_unit(
 
     rad_per_roll_unit: factor on the numbers of the roll angle.
     """
-    rates, named = [log.columns[name] for name in rate_names], rate_names[0].lower()
+    rates = [log.columns[name] for name in rate_names]
+    named = rate_names[0].lower()
     found = next((unit for part, unit in _UNIT_OF_PART.items() if part in named), None)
     if roll is not None:
         in_rad = replace(roll, values=roll.values * rad_per_roll_unit)
@@ -351,7 +357,8 @@ def _column_entry(name: str, unit: str, si_unit: str) -> Any:
 def _pulse_entry(name: str, values: Floats) -> Any:
     """The entry that converts a command to a share of travel: from pulses of 1100 to 1900 us, from per cent,
     or without a factor."""
-    median, largest = float(np.nanmedian(values)), largest_magnitude(values)
+    median = float(np.nanmedian(values))
+    largest = largest_magnitude(values)
     if _PWM_RANGE_US[0] < median < _PWM_RANGE_US[1]:
         scale = 1.0 / HALF_PULSE_RANGE_US
         return {"column": name, "scale": scale, "offset": -scale * NEUTRAL_PULSE_US}

@@ -186,7 +186,8 @@ def _command_mistakes(
     surfaces = list(model.vehicle.surfaces)
     fitted = model.fitted.commands
     motions = _relative_motion(samples.commands, fitted) if fitted else np.zeros(len(surfaces))
-    highest, lowest = found.upper.max(axis=0), found.lower.min(axis=0)
+    highest = found.upper.max(axis=0)
+    lowest = found.lower.min(axis=0)
     for group, is_known, hi, lo in zip(model.groups, known_gains(model), highest, lowest, strict=True):
         name = "+".join(group)
         motion = max(motions[surfaces.index(surface)] for surface in group)
@@ -269,7 +270,8 @@ def corrected_logs(samples: Samples, vehicle: Vehicle, unknown: Collection[str])
     doubtful = [name for name in vehicle.rate_columns if name not in samples.confirmed_rates]
     for i, j in combinations([s for s, name in enumerate(surfaces) if name not in unknown], 2):
         order = list(range(len(surfaces)))
-        order[i], order[j] = j, i
+        order[i] = j
+        order[j] = i
         exchanged = replace(samples, commands=samples.commands[:, order])
         yield CorrectedLog(f"the commands of {surfaces[i]} and {surfaces[j]} exchanged", exchanged)
     for first, second in combinations(doubtful, 2):

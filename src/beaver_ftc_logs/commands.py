@@ -215,7 +215,8 @@ def _write_diagnosis(
 def _check_options_agree(options: DiagnoseOptions) -> None:
     """Raise BadInput for options that contradict one another, or that would change nothing."""
     own_detector = options.detector == "bank-of-filters"
-    by_aircraft, by_model = options.aircraft is not None, options.model is not None
+    by_aircraft = options.aircraft is not None
+    by_model = options.model is not None
     if by_aircraft and by_model:
         raise BadInput("diagnose: --model and --aircraft: allowed: one of them")
     if by_aircraft and not own_detector:

@@ -148,7 +148,8 @@ def loop_detector_inputs(samples: Samples, model: Model) -> list[tuple[Measured,
             f"{model.vehicle.name}: {len(members)} groups of surfaces, allowed for a "
             f"detector of the loop: at most {len(LOOP_SURFACES)}"
         )
-    flight, dt_s = innovations(samples, model), 1.0 / model.rate_hz
+    flight = innovations(samples, model)
+    dt_s = 1.0 / model.rate_hz
     rates = np.nan_to_num(samples.rates)
     before = np.vstack([rates[:1], rates[:-1]])
     expected = (rates - flight.e - before) / dt_s
@@ -157,7 +158,8 @@ def loop_detector_inputs(samples: Samples, model: Model) -> list[tuple[Measured,
     F = np.where(flight.is_known[:, None, None], flight.F, 0.0)
     Z[:, :, : len(members)] = F.transpose(0, 2, 1) / dt_s
     u[:, : len(members)] = np.nan_to_num(group_commands(samples, members, labelled=False))
-    sd, t_s = _model_error_sd_rad_s2(model), samples.t_s.tolist()
+    sd = _model_error_sd_rad_s2(model)
+    t_s = samples.t_s.tolist()
     frames = [
         Measured(t_s[k], rates[k], np.zeros(N_Y), expected[k], Z[k], sd.copy()) for k in range(len(t_s))
     ]
@@ -194,7 +196,8 @@ def run_loop_detector(detector: Detector, samples: Samples, model: Model) -> Log
 
 def rows_of_verdicts(verdicts: list[Verdict], samples: Samples, model: Model) -> LogRows:
     """Verdicts as rows. The bounds are 0 to 1 for each surface that the detector may suspect, else 1."""
-    n, members = len(verdicts), group_indices(model)
+    n = len(verdicts)
+    members = group_indices(model)
     statistic, detected = np.array([(one.statistic, one.detected) for one in verdicts], dtype=float).T
     # by the statistic, if there is one: `detected` of the loop stays true after its first alarm
     faulty = np.where(np.isfinite(statistic), statistic > 1.0, detected).astype(np.int64)
@@ -202,10 +205,12 @@ def rows_of_verdicts(verdicts: list[Verdict], samples: Samples, model: Model) ->
     names = np.full(n, "", dtype=object)
     for k in np.flatnonzero(faulty):
         if verdicts[k].isolated not in LOOP_SURFACES[: len(members)]:
-            names[k], low[k] = UNKNOWN_SURFACE, 0.0
+            names[k] = UNKNOWN_SURFACE
+            low[k] = 0.0
             continue
         g = LOOP_SURFACES.index(str(verdicts[k].isolated))
-        names[k], low[k, members[g]] = model.group_names[g], 0.0
+        names[k] = model.group_names[g]
+        low[k, members[g]] = 0.0
         a[k, members[g]] = _remaining_effectiveness(verdicts[k], g)
     p = np.where(np.isnan(statistic), faulty, np.clip(statistic, 0.0, 1.0))
     return replace(LogRows.of_names(samples.t_s, names, a, low, np.ones_like(low)), fault_probability=p)

@@ -32,16 +32,16 @@ from beaver_ftc_logs.samples import Samples
 
 _LOG_RATE_TOLERANCE = 0.25
 UNKNOWN_SURFACE = energy.UNKNOWN_SURFACE
+# Share of the fault's probability above which a group is named.
 _NAME_SHARE = 0.5
-"""Share of the fault's probability above which a group is named."""
+# Chance of a name without the surface at fault: a likelihood ratio of two groups passes 1000 against the true
+# one with that chance at most (Markov's inequality), where the model is right.
 _EXCLUSION_RISK = 0.001
-"""Chance of a name without the surface at fault: a likelihood ratio of two groups passes 1000 against the
-true one with that chance at most (Markov's inequality), where the model is right."""
 _DIRECTION_WINDOW_S = 1.0
+# Share of travel that a command moves by rounding alone.
 _COMMAND_ROUNDING = 1e-6
-"""Share of travel that a command moves by rounding alone."""
+# Probability that nothing answers the commands above which nothing is said of any surface.
 _NO_RESPONSE_LIMIT = 0.5
-"""Probability that nothing answers the commands above which nothing is said of any surface."""
 
 
 Names = NDArray[np.object_]
@@ -191,7 +191,8 @@ def _add_unknown_surfaces(samples: Samples, model: Model, rows: LogRows) -> LogR
     moved |= "stuck" in model.vehicle.faults
     unknown = trust.unknown_surfaces(model)
     addable = moved & np.array([surface in unknown for surface in surfaces])
-    names, high = rows.isolated_surfaces.copy(), rows.effectiveness_high.copy()
+    names = rows.isolated_surfaces.copy()
+    high = rows.effectiveness_high.copy()
     for k in np.flatnonzero(rows.faulty == 1):
         named = set(str(names[k]).split("+"))
         if not named <= set(surfaces):
@@ -278,7 +279,9 @@ def rows_of_posterior(
     ]
     a, low, high = (np.column_stack(column) for column in zip(*per_group, strict=True))
     silent = p_silent > _NO_RESPONSE_LIMIT
-    a[silent], low[silent], high[silent] = 1.0, 0.0, 1.0
+    a[silent] = 1.0
+    low[silent] = 0.0
+    high[silent] = 1.0
     if model.vehicle.other_laws:  # health is not excluded before an alarm excludes it
         high[faulty == 0] = 1.0
     return LogRows(
@@ -307,7 +310,8 @@ def _group_bounds(
         p /= p.sum(axis=1, keepdims=True)
     low, high = _credible_bounds(levels, p, mass)
     if len(model.groups[g]) > 1:
-        low, high = np.where(low < levels[-2:].mean(), 0.0, low), np.ones_like(high)
+        low = np.where(low < levels[-2:].mean(), 0.0, low)
+        high = np.ones_like(high)
     # the median, with half of the probability on either side: the least mean absolute error
     return levels[(np.cumsum(p, axis=1) >= 0.5 - 1e-12).argmax(axis=1)], low, high
 
@@ -332,7 +336,8 @@ def _credible_bounds(levels: Floats, p: Floats, mass: float) -> tuple[Floats, Fl
     ranked = np.take_along_axis(p, order, axis=1)
     chosen = np.cumsum(ranked, axis=1) - ranked < mass
     kept = np.where(chosen, levels[order], np.nan)
-    low, high = np.nanmin(kept, axis=1), np.nanmax(kept, axis=1)
+    low = np.nanmin(kept, axis=1)
+    high = np.nanmax(kept, axis=1)
     edges = np.concatenate([[0.0], 0.5 * (levels[1:] + levels[:-1]), [1.0]])
     return edges[np.searchsorted(levels, low)], edges[np.searchsorted(levels, high) + 1]
 
@@ -349,7 +354,8 @@ def _surfaces_at_fault(model: Model, bank: HypothesisBank, P: Floats, faulty: In
     n_hold = round(model.settings.rename_s * model.rate_hz)
     n_same = 0
     for k in np.flatnonzero(faulty):
-        new, old = names[k] or UNKNOWN_SURFACE, named[k - 1] if k else ""
+        new = names[k] or UNKNOWN_SURFACE
+        old = named[k - 1] if k else ""
         n_same = n_same + 1 if k and new == (names[k - 1] or UNKNOWN_SURFACE) else 0
         # an excluded surface stays excluded: Ville's inequality bounds the chance of a wrong exclusion
         named_again = new == UNKNOWN_SURFACE or set(old.split("+")) <= set(new.split("+"))

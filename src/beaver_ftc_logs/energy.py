@@ -12,10 +12,12 @@ from beaver_ftc.aircraft import GRAVITY_MPS2
 from beaver_ftc_logs.recording import Floats
 from beaver_ftc_logs.runs import last_true_row, true_runs
 
-ENGINE, UNKNOWN_SURFACE = "engine", "unknown"
+ENGINE = "engine"
+UNKNOWN_SURFACE = "unknown"
+# Share of healthy flight in which the energy height falls as fast as without power.
 UNPOWERED_SHARE = 0.15
-"""Share of healthy flight in which the energy height falls as fast as without power."""
-_WINDOW_S, _NAMING_DELAY_S = 5.0, 3.0
+_WINDOW_S = 5.0
+_NAMING_DELAY_S = 3.0
 
 
 def energy_climb_mps(t: Floats, h: Floats, V: Floats, stretch: np.ndarray) -> Floats:

@@ -27,26 +27,26 @@ from beaver_ftc.documents import Number, Section
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
 from beaver_ftc_logs.runs import true_runs
 
+# Standard deviation of the prior of the shape, whose mean is 0.
 _SHAPE_SD = 0.2
-"""Standard deviation of the prior of the shape, whose mean is 0."""
 _SHAPE_GRID = np.linspace(-0.5, 0.5, 41)
+# Grid of the scale over the mean excess.
 _SCALE_RATIOS = np.geomspace(0.2, 5.0, 61)
-"""Grid of the scale over the mean excess."""
 _RATE_QUANTILES = (np.arange(40) + 0.5) / 40.0
 _MIN_PEAKS = 10
+# Peaks over the level: _PEAKS_PER_ROOT times the root of the number of all peaks, at least _MIN_PEAKS.
 _PEAKS_PER_ROOT = 2.0
-"""Peaks over the level: _PEAKS_PER_ROOT times the root of the number of all peaks, at least _MIN_PEAKS."""
 _INTERVAL = (0.05, 0.95)
+# Chance that the declared rate itself raises more alarms in the held-out flights than are permitted.
 _MORE_ALARMS_CHANCE = 0.05
-"""Chance that the declared rate itself raises more alarms in the held-out flights than are permitted."""
+# -ln 0.05: with no alarm in so many of the hours asked for one, the rate is shown without a tail.
 RULED_OUT_COUNT = 3.0
-"""-ln 0.05: with no alarm in so many of the hours asked for one, the rate is shown without a tail."""
 _MAX_EXCESS = 1e4
+# Of a sum of probabilities: a quantile between two rates must not hang on its last digits.
 _PROBABILITY_ROUNDING = 1e-9
-"""Of a sum of probabilities: a quantile between two rates must not hang on its last digits."""
 
+# Peaks (k,) of the alarm statistic in one held-out flight, and its healthy hours.
 PeaksAndHours = tuple[Floats, float]
-"""Peaks (k,) of the alarm statistic in one held-out flight, and its healthy hours."""
 
 
 class PeakTail(Section):

@@ -45,17 +45,19 @@ from beaver_ftc_logs.samples import Samples
 
 _EVIDENCE_MEMORY_S = 600.0
 _MIN_PROBABILITY = 1e-15
-_MIN_NOISE_SCALE, _MAX_NOISE_SCALE = 0.3, 6.0
+_MIN_NOISE_SCALE = 0.3
+_MAX_NOISE_SCALE = 6.0
 _SQUARE_CLIP = 3.0
-_SUM_SPANS_S, _VARIANCE_WINDOW_S = (0.0, 0.1), 2.0
-"""Spans over which a residual is summed, and the window in which its variance is taken."""
+# Spans over which a residual is summed, and the window in which its variance is taken.
+_SUM_SPANS_S = (0.0, 0.1)
+_VARIANCE_WINDOW_S = 2.0
+# Mean of the clipped square of a residual per axis when the scale is right.
 _MEAN_SQUARE = 0.93
-"""Mean of the clipped square of a residual per axis when the scale is right."""
+# Probability of a noise model below which it is left out.
 _MIN_NOISE_WEIGHT = 1e-3
-"""Probability of a noise model below which it is left out."""
 
+# As `run_bank` returns it.
 BankRun = tuple[Floats, Floats]
-"""As `run_bank` returns it."""
 
 
 def bank_posterior(samples: Samples, model: Model, bank: HypothesisBank) -> Floats:
@@ -112,7 +114,8 @@ def page_cusum(z, top):
 
     S[k] = min(max(S[k-1] + z[k], 0), top)
     """
-    s, S = 0.0, np.zeros(len(z))
+    s = 0.0
+    S = np.zeros(len(z))
     for k in range(len(z)):
         s = min(max(s + z[k], 0.0), top)
         S[k] = s
@@ -127,7 +130,8 @@ def _with_command_delay(samples: Samples, delay_s: float) -> Samples:
     """
     if delay_s == 0.0:
         return samples
-    a, u = min(abs(delay_s) / samples.dt_s, 1.0), samples.commands
+    a = min(abs(delay_s) / samples.dt_s, 1.0)
+    u = samples.commands
     other = np.vstack([u[:1], u[:-1]] if delay_s > 0 else [u[1:], u[-1:]])
     return replace(samples, commands=(1.0 - a) * u + a * other)
 
@@ -151,7 +155,8 @@ def run_flight(flight: Innovations, model: Model, bank: HypothesisBank) -> BankR
         white = flight.e @ flight.W / np.sqrt(flight.noise.wider * q[:, None])
         r_min = recent_scale(white, flight.is_known, model.rate_hz)
     y, F = (np.ascontiguousarray(values) for values in (flight.y, flight.F))
-    states, noise = build_states(model, flight.noise), build_noise(model, flight.noise, flight.c)
+    states = build_states(model, flight.noise)
+    noise = build_noise(model, flight.noise, flight.c)
     run: BankRun = run_bank(y, F, flight.is_known, bank, states, noise, r_min, q)
     return run
 
@@ -330,7 +335,8 @@ def _invert(S):
     """Inverse and determinant of a symmetric matrix S (3, 3), by its cofactors A."""
     A = np.empty((3, 3))
     for i in range(3):
-        a, b = S[i - 2], S[i - 1]  # the next rows, cyclically
+        a = S[i - 2]  # the next rows, cyclically
+        b = S[i - 1]
         for j in range(3):
             A[i, j] = a[j - 2] * b[j - 1] - a[j - 1] * b[j - 2]
     det = S[0] @ A[0]

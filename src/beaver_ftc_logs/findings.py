@@ -27,8 +27,8 @@ from beaver_ftc_logs.samples import Samples
 MAX_BRIEF_EVENT_S = 3.0
 DETECTION_HORIZONS_S = (5.0, 20.0, 60.0)
 _ALIKE_COSINE = 0.9
+# Share of credible rows below which there is no verdict.
 MIN_CREDIBLE_SHARE = 0.1
-"""Share of credible rows below which there is no verdict."""
 _ONE_GROUP_NOTE = (
     "{} get proportional commands while they are healthy: no fit of healthy flight tells their effects "
     "apart. A loss in any of them is named as all of them, and the effectiveness given is that of all "
@@ -81,7 +81,9 @@ def _join_runs(rows: LogRows, runs: Runs) -> Runs:
     joined: Runs = []
     for begin, end in runs:
         before = joined[-1] if joined else (begin, begin)
-        first, names, a = before[0], rows.isolated_surfaces, rows.effectiveness
+        first = before[0]
+        names = rows.isolated_surfaces
+        a = rows.effectiveness
         unnamed = first < begin and names[first] == UNKNOWN_SURFACE and _is_brief(rows, *before)
         alike = names[first] == names[begin] and (a[first] == a[begin]).all()
         joins = _is_brief(rows, begin, end) or unnamed or alike
@@ -124,7 +126,8 @@ def events_to_show(events: list[Document]) -> list[Document]:
 
 def as_text(verdict: Document) -> str:
     """The verdict in lines for people."""
-    shown, n_events = events_to_show(verdict["events"]), len(verdict["events"])
+    shown = events_to_show(verdict["events"])
+    n_events = len(verdict["events"])
     summary = f"{len(shown)} event{'s' if len(shown) > 1 else ''}" if shown else _no_event_text(verdict)
     lines = [f"{verdict['flight']}: {summary} in {duration_text(verdict)}", *map(_event_text, shown)]
     lines += credibility_lines(verdict)
@@ -241,7 +244,8 @@ def _alike_pairs(F: Floats, model: Model) -> list[Document]:
     """Pairs of groups whose effects in this flight were nearly proportional."""
     pairs = []
     for g, h in combinations(range(len(model.groups)), 2):
-        f_g, f_h = F[:, g].ravel(), F[:, h].ravel()
+        f_g = F[:, g].ravel()
+        f_h = F[:, h].ravel()
         cosine = float(f_g @ f_h) / max(float(np.sqrt((f_g @ f_g) * (f_h @ f_h))), MIN_DIVISOR)
         surfaces = [model.groups[g], model.groups[h]]
         pairs.append({"surfaces": surfaces, "cosine": cosine, "separable": abs(cosine) < _ALIKE_COSINE})

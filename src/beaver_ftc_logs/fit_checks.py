@@ -10,8 +10,8 @@ from beaver_ftc_logs.least_squares import spectral_density, variance_inflation
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.regression import Parts
 
+# Regressors are reported if the others inflate the variance of their coefficient more than this.
 LEAST_INFLATION = 10.0
-"""Regressors are reported if the others inflate the variance of their coefficient more than this."""
 _BANDS_HZ = ((0.0, 0.1), (0.1, 0.5), (0.5, 1.0), (1.0, 2.0), (2.0, 5.0), (5.0, 10.0))
 
 

@@ -17,14 +17,16 @@ from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
 from beaver_ftc_logs.regression import Parts
 from beaver_ftc_logs.vehicle import Vehicle
 
+# Largest `power` if no labels show how often faults occur: an alarm then needs more evidence. The benchmark
+# decided how much; if enough parts are left out, the rate of false alarms decides instead.
 _POWER_UNLABELLED = 0.9
-"""Largest `power` if no labels show how often faults occur: an alarm then needs more evidence. The benchmark
-decided how much; if enough parts are left out, the rate of false alarms decides instead."""
+# Spans of the means that distinguish the drift of the trim from the colour of the residual.
 _TRIM_SPANS_S = (2.0, 8.0)
-"""Spans of the means that distinguish the drift of the trim from the colour of the residual."""
+# `power` of labelled flights: a coloured residual has less information than a white one. Blocked tests
+# decided how much.
 _POWER_LABELLED = 0.8
-"""`power` of labelled flights: a coloured residual has less information than a white one. Blocked tests
-decided how much."""
+# Largest difference of another day: chosen on days that were made from one flight, judged on others
+# (`--other-days`). The drift of the trim is that of the means of the residual over 30 s in that flight.
 _OTHER_DAYS: Document = {
     "trim_sd": 0.1,
     "trim_shift": 0.03,
@@ -33,8 +35,13 @@ _OTHER_DAYS: Document = {
     "gain_time_s": 300.0,
     "own_gain_sd": 0.03,
 }
-"""Largest difference of another day: chosen on days that were made from one flight, judged on others
-(`--other-days`). The drift of the trim is that of the means of the residual over 30 s in that flight."""
+# Variation of the gain of each group under a law and air that the fit has not seen, and the evidence that a
+# name then needs. A law that reacts to what the model lacks ties the command to it. Chosen on simulated
+# flights (`own_logs.py`, seeds 1 to 6).
+#
+# bounds: the posterior mass of 90 % bounds where no labels choose it. For a second or two after a loss most
+# of the mass still claims health: 0.9 of it held the truth at the fault in 0.70 to 0.94 of the samples,
+# fewest of large losses; 0.97 in 0.83 to 0.99, on seeds 401 to 403, which chose it.
 _OTHER_LAWS: Document = {
     "own_gain_sd": 0.05,
     "own_gain_time_s": 20.0,
@@ -43,24 +50,17 @@ _OTHER_LAWS: Document = {
     "one_group": True,
     "bounds": 0.97,
 }
-"""Variation of the gain of each group under a law and air that the fit has not seen, and the evidence that a
-name then needs. A law that reacts to what the model lacks ties the command to it. Chosen on simulated flights
-(`own_logs.py`, seeds 1 to 6).
-
-bounds: the posterior mass of 90 % bounds where no labels choose it. For a second or two after a loss most of
-the mass still claims health: 0.9 of it held the truth at the fault in 0.70 to 0.94 of the samples, fewest of
-large losses; 0.97 in 0.83 to 0.99, on seeds 401 to 403, which chose it."""
+# What of this differs if the fitted flights were in moving air.
 _MOVING_AIR: Document = {"own_gain_sd": 0.08, "own_gain_time_s": 100.0}
-"""What of this differs if the fitted flights were in moving air."""
+# Largest `power` under other laws. A law may feed the noise of a gyro to the surfaces, which doubles the
+# residual, so a sample has less information than in the fit. Chosen on seed 1 of five aircraft.
 _POWER_OTHER_LAWS = 0.4
-"""Largest `power` under other laws. A law may feed the noise of a gyro to the surfaces, which doubles the
-residual, so a sample has less information than in the fit. Chosen on seed 1 of five aircraft."""
+# Delays that the commands of a flight may have beside that of the model, in samples.
 _DELAYS_SAMPLES = (-0.4, 0.0, 0.4)
-"""Delays that the commands of a flight may have beside that of the model, in samples."""
+# Number of samples with quick responses that a flight must have for a mean of their errors.
 _MIN_QUICK_SAMPLES = 10
-"""Number of samples with quick responses that a flight must have for a mean of their errors."""
+# Number of changes that are assumed before the labels are read; half of them are repairs.
 _N_PRIOR_CHANGES = 20
-"""Number of changes that are assumed before the labels are read; half of them are repairs."""
 
 
 def fit_model(parts: Parts, vehicle: Vehicle, settings: FilterSettings | None = None) -> Model:
@@ -162,10 +162,12 @@ def _estimate_trim_walk(parts: Parts, model: Model) -> list[float]:
         return np.vstack([np.diff(mean, axis=0) ** 2 / np.maximum(r, MIN_DIVISOR) for mean, r in means])
 
     n1, n2 = (round(span_s * model.rate_hz) for span_s in _TRIM_SPANS_S)
-    short, long = squared_steps(n1), squared_steps(n2)
+    short = squared_steps(n1)
+    long = squared_steps(n2)
     usual = np.array(FilterSettings().trim_walk)
     if not len(short) or not len(long):
         return usual.tolist()
-    v1, v2 = short.mean(axis=0), long.mean(axis=0)
+    v1 = short.mean(axis=0)
+    v2 = long.mean(axis=0)
     w = 1.5 * (n2 * v2 - n1 * v1) / (n2**2 - n1**2)
     return np.maximum(np.sqrt(np.maximum(w, 0.0)), usual).tolist()

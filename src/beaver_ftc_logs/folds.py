@@ -65,7 +65,8 @@ def fold_qualities(parts: Parts, model: Model) -> list[Document]:
 def prediction_quality(fold: Fold) -> Document:
     """Share of the rates' variance that one-step prediction explains, and the residual, an axis."""
     flight = one_step_innovations(fold.model, fold.held_out)
-    y, e = fold.held_out.samples.rates[flight.rows], flight.e
+    y = fold.held_out.samples.rates[flight.rows]
+    e = flight.e
     if not len(y):
         return {"samples": 0}
     explained = 1.0 - e.var(axis=0) / np.maximum(y.var(axis=0), MIN_DIVISOR)

@@ -7,8 +7,12 @@ from beaver_ftc_logs import regression
 from beaver_ftc_logs.recording import Floats
 from beaver_ftc_logs.regression import Groups, Parts
 
-_WINDOW_S, _MIN_WINDOWS, _MAX_WINDOWS = 2.0, 20, 400
-_MAX_DELAY_S, _MIN_SERVO_LAG_S, _MAX_SERVO_LAG_S = 0.6, 0.005, 1.0
+_WINDOW_S = 2.0
+_MIN_WINDOWS = 20
+_MAX_WINDOWS = 400
+_MAX_DELAY_S = 0.6
+_MIN_SERVO_LAG_S = 0.005
+_MAX_SERVO_LAG_S = 1.0
 
 
 def fit_output_error(parts: Parts, groups: Groups) -> Document:
@@ -23,12 +27,14 @@ def fit_output_error(parts: Parts, groups: Groups) -> Document:
     u, y = _cut_windows(parts, groups, round(_WINDOW_S / dt_s), round(_MAX_DELAY_S / dt_s) + 1)
     if len(y) < _MIN_WINDOWS or not np.ptp(y, axis=(0, 1)).all():
         return {"windows": len(y), "says": "too few gap-free windows in which every rate moves"}
-    fitted, held_out = slice(0, None, 2), slice(1, None, 2)
+    fitted = slice(0, None, 2)
+    held_out = slice(1, None, 2)
     sd = y.std(axis=(0, 1))
     # lag, delay, A, B and c
     guess = np.array([0.1, dt_s, *(0.7 * np.eye(3)).ravel(), *np.full(3 * len(groups), 0.01), *np.zeros(3)])
     free = np.full(len(guess) - 2, np.inf)
-    lower, upper = [_MIN_SERVO_LAG_S, 0.0, *-free], [_MAX_SERVO_LAG_S, _MAX_DELAY_S, *free]
+    lower = [_MIN_SERVO_LAG_S, 0.0, *-free]
+    upper = [_MAX_SERVO_LAG_S, _MAX_DELAY_S, *free]
 
     def error(th: Floats, rows: slice) -> Floats:
         return ((_simulate(th, u[rows], y[rows], dt_s) - y[rows]) / sd).ravel()
@@ -74,7 +80,8 @@ def _simulate(th: Floats, u: Floats, y: Floats, dt_s: float) -> Floats:
     delay, both s, A (3, 3), B (n, 3), c (3,).
     """
     (lag_s, delay_s), A, B, c = np.split(th, [2, 11, len(th) - 3])
-    A, B = A.reshape(3, 3), B.reshape(-1, 3)
+    A = A.reshape(3, 3)
+    B = B.reshape(-1, 3)
     m = y.shape[1]
     past = u.shape[1] - m
     whole, f = divmod(delay_s / dt_s, 1.0)

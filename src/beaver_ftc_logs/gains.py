@@ -19,15 +19,16 @@ from beaver_ftc_logs.orders import RANK_TOLERANCE, centred, parts_of_noise
 from beaver_ftc_logs.recording import Floats
 from beaver_ftc_logs.regression import FitPart, Parts
 
+# Gains differ by flight rather than within it: chosen on seeds 11 and 12, in light turbulence.
 _GAIN_WINDOW_S = 10.0
-"""Gains differ by flight rather than within it: chosen on seeds 11 and 12, in light turbulence."""
-_GYRO_FACTOR, _GUST_FACTOR = 1.7, 2.5
-"""Factors on the variance of the noise, of gyros and of gusts, in moving air under another law, for the gains
-too. Chosen on seeds 71, 73 and 101 to 106: 3 of 240 healthy flights alarmed, and 6 of 150 without the
-factors."""
+# Factors on the variance of the noise, of gyros and of gusts, in moving air under another law, for the gains
+# too. Chosen on seeds 71, 73 and 101 to 106: 3 of 240 healthy flights alarmed, and 6 of 150 without the
+# factors.
+_GYRO_FACTOR = 1.7
+_GUST_FACTOR = 2.5
+# Largest noise factor of a window of ten seconds. If there are few flights, one of them can be far from all
+# others (1,550 in seed 205, otherwise 5).
 _MAX_INFLATION = 200.0
-"""Largest noise factor of a window of ten seconds. If there are few flights, one of them can be far from all
-others (1,550 in seed 205, otherwise 5)."""
 
 
 def gain_overdispersion(parts: Parts, model: Model) -> float:
@@ -58,7 +59,8 @@ def widen_noise(parts: Parts, model: Model) -> Model:
         found.extend(min(error / max(n, 1), _MAX_INFLATION) for error, n in errors)
     colours = []
     for noise in model.colours:
-        ma, wider = tuple(noise.average), 1.0
+        ma = tuple(noise.average)
+        wider = 1.0
         if windows.get(ma):
             wider = max(float(np.mean(windows[ma])), 1.0)
             if model.vehicle.other_laws:
@@ -72,7 +74,8 @@ def _loudness(fold: Fold, others: Parts) -> float:
     """Ratio of the variance that the filter finds in a flight left out to that of the loudest other flight of
     the same noise; 1 if it is not louder, or if the law is the same. The filter widens its noise by this
     ratio itself (`recent_scale`), so it is not counted again."""
-    model, ma = fold.model, fold.held_out.samples.noise_ma_coefficients
+    model = fold.model
+    ma = fold.held_out.samples.noise_ma_coefficients
     if not model.vehicle.other_laws:
         return 1.0
 
@@ -98,11 +101,13 @@ def _gain_errors(fold: Fold, window_s: float | None = None, loudness: float = 1.
         return []
     P = build_states(fold.model, flight.noise).initial_covariance[3:, 3:]
     S = P[0, 0] + np.diag(np.diag(P)[1:][known])
-    F, n = F[:, :, known], 1
+    F = F[:, :, known]
+    n = 1
     if window_s is None:
         F = F.sum(axis=3)
     else:
-        F, S = F.reshape(*e.shape, -1), np.kron(S, np.ones((3, 3)))
+        F = F.reshape(*e.shape, -1)
+        S = np.kron(S, np.ones((3, 3)))
         n = max(round(len(e) * fold.held_out.samples.dt_s / window_s), 1)
     errors = []
     for rows in np.array_split(np.arange(len(e)), n):
@@ -130,7 +135,8 @@ def squared_deviations(fold: Fold) -> Floats:
 def _gains(F: Floats, e: Floats) -> tuple[Floats, Floats, Floats]:
     """F' F, F' e, and the errors g of the gains by least squares, of e (n, 3) = F g + noise, F (n, 3, m)."""
     X = F.reshape(e.size, F.shape[2])
-    FF, Fe = X.T @ X, X.T @ e.ravel()
+    FF = X.T @ X
+    Fe = X.T @ e.ravel()
     return FF, Fe, np.asarray(np.linalg.lstsq(FF, Fe, rcond=RANK_TOLERANCE)[0])
 
 

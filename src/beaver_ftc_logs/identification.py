@@ -32,12 +32,12 @@ from beaver_ftc_logs.samples import (
 from beaver_ftc_logs.vehicle import Vehicle
 
 SCORES = ("classes", "healthy_or_faulty", "mean_error", "held_by_bounds")
+# By how much a criterion must be less: odds of 150 to 1 [Kass1995, section 3.2].
 _DECISIVE_BIC = 10.0
-"""By how much a criterion must be less: odds of 150 to 1 [Kass1995, section 3.2]."""
+# Powers of the airspeed that the effect of a surface may follow instead of the square.
 _AIRSPEED_POWERS = (0.0, 1.0, 3.0)
-"""Powers of the airspeed that the effect of a surface may follow instead of the square."""
+# Rounds in which the noise models of the flights and their common fit are found, at most.
 _MAX_ROUNDS = 8
-"""Rounds in which the noise models of the flights and their common fit are found, at most."""
 
 
 def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
@@ -181,7 +181,8 @@ def expect_another_day(folds: list[Document], model: Model) -> Document:
         key: {"mean": float(np.mean(each)), "worst": float((max if key == "mean_error" else min)(each))}
         for key, each in values.items()
     }
-    tail, threshold = model.fitted.tail, model.settings.threshold
+    tail = model.fitted.tail
+    threshold = model.settings.threshold
     rate = model.settings.false_alarms_per_hour
     if tail is None or threshold is None or rate is None:
         return expected
@@ -215,7 +216,8 @@ def scale_if_better(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Seque
             powers = best.airspeed_powers | {names[i]: power for i in group}
             candidate = best.model_copy(update={"airspeed_powers": powers})
             if (bic := _min_bic(_scaled(flights, candidate, white), candidate)) < least:
-                least, best = bic, candidate
+                least = bic
+                best = candidate
     found = {key: getattr(best, key) for key in ("reference_airspeed_mps", "airspeed_powers")}
     return _scaled(flights, best), vehicle.model_copy(update=found)
 
@@ -225,7 +227,8 @@ def _scaled(
 ) -> list[Samples]:
     """The flights with the command of each surface times its power of V / V0, whitened like the flights
     `white`, if these are given."""
-    V0, powers = vehicle.reference_airspeed_mps or 0.0, vehicle.surface_airspeed_powers
+    V0 = vehicle.reference_airspeed_mps or 0.0
+    powers = vehicle.surface_airspeed_powers
     scaled = [scale_by_airspeed(flight, V0, powers) for flight in flights]
     if white is None:
         return scaled
@@ -262,7 +265,8 @@ def check_explained(folds: list[Document], parts: Parts, model: Model) -> None:
 
 def _check_units(flights: Sequence[Samples], vehicle: Vehicle) -> None:
     """Raise BadInput where a flight's command is in another unit than that of the first."""
-    commands, rates = trust.central_ranges(flights[0].commands), trust.central_ranges(flights[0].rates)
+    commands = trust.central_ranges(flights[0].commands)
+    rates = trust.central_ranges(flights[0].rates)
     first = FittedRanges(commands=commands, rates=rates)
     for flight in flights[1:]:
         refuse_command_unit(flight.name, flight.commands, flight.rates, first, list(vehicle.surfaces))

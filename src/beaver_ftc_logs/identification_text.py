@@ -58,7 +58,8 @@ def _output_error_text(output: Document) -> str:
 
 def _collinear_text(collinear: list[Document]) -> str:
     """The line on regressors that others nearly make up; the worst comes first."""
-    worst, n = collinear[0], len(collinear)
+    worst = collinear[0]
+    n = len(collinear)
     are = "regressors are" if n > 1 else "regressor is"
     factor = worst["inflation"]
     times = "made up by the others" if factor is None else f"{factor:.0f} times"

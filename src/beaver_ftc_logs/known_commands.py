@@ -20,6 +20,8 @@ _UNIT = rf"(_({_SHARE_UNIT}|rad|deg|us))?"
 _SURFACE = rf"(({_SIDE_WORD})_?)*({_SURFACE_WORD})(_?({_SIDE_WORD}))*"
 _AXIS = r"(roll|pitch|yaw)"
 
+# Patterns of the words of commands in plain tables, in lower case, with `_` between two words; each with
+# examples.
 _PLAIN_COMMANDS = (
     rf"(delta_|d_)?{_SURFACE}(_({_COMMAND_WORD}))*{_UNIT}",  # elevator, left_aileron_command_norm
     rf"({_COMMAND_WORD})_{_SURFACE}{_UNIT}",  # cmd_elevon_left
@@ -27,9 +29,9 @@ _PLAIN_COMMANDS = (
     rf"servo_?\d+(_({_PLAIN_WORD}|pwm))?(_us)?",  # servo3
     r"d(elta)?_?[aer](_(cmd|rad|deg|norm))?",  # da
 )
-"""Patterns of the words of commands in plain tables, in lower case, with `_` between two words; each with
-examples."""
 
+# Patterns of whole names, in lower case, of columns that carry commands of surfaces, each with an example.
+# Columns of plain tables are judged by their words (`_is_plain_command_name`).
 KNOWN_COMMANDS = {
     # PX4 message actuator_controls: control 0 to 2 of groups 0 and 1 are roll, pitch, yaw
     r"actuator_controls_[01]\.control\[[0-2]\]": "actuator_controls_0.control[0] (PX4)",
@@ -46,8 +48,6 @@ KNOWN_COMMANDS = {
     # Betaflight and INAV blackbox fields: output to each servo
     r"servo\[\d\](_us)?": "servo[0] (blackbox)",
 }
-"""Patterns of whole names, in lower case, of columns that carry commands of surfaces, each with an example.
-Columns of plain tables are judged by their words (`_is_plain_command_name`)."""
 
 
 def is_command_name(column_name: str) -> bool:
@@ -66,16 +66,16 @@ def _is_plain_command_name(name: str) -> bool:
     return any(re.fullmatch(pattern, words) for pattern in _PLAIN_COMMANDS)
 
 
+# MAV_TYPE of vehicles that rotors alone move [MAVLink, common.xml: MAV_TYPE].
 _PX4_ROTARY_WINGS = {2: "quadrotor", 3: "coaxial helicopter", 4: "helicopter", 13: "hexarotor",
                           14: "octorotor", 15: "tricopter", 29: "dodecarotor"}  # fmt: skip
-"""MAV_TYPE of vehicles that rotors alone move [MAVLink, common.xml: MAV_TYPE]."""
+# MAV_TYPE of aircraft that take off vertically and fly on a wing [MAVLink, common.xml: MAV_TYPE].
 _PX4_VTOL_TYPES = range(19, 26)
-"""MAV_TYPE of aircraft that take off vertically and fly on a wing [MAVLink, common.xml: MAV_TYPE]."""
+# SYS_AUTOSTART of multicopters [PX4, airframes reference].
 _PX4_COPTERS = range(4000, 13000)
-"""SYS_AUTOSTART of multicopters [PX4, airframes reference]."""
 _COPTER_PARAMETERS = ("MOT_SPIN_ARM", "MOT_SPIN_ARMED", "MOT_SPIN_MIN", "MOT_THST_EXPO")
+# Parameters of ArduCopter, of any release; one of ArduPlane, which ArduCopter has not.
 _PLANE_PARAMETER = "Q_ENABLE"
-"""Parameters of ArduCopter, of any release; one of ArduPlane, which ArduCopter has not."""
 _MIN_ROTORS = 3
 
 
@@ -100,7 +100,8 @@ def multicopter_reason(params: Parameters, names: Collection[str]) -> str | None
     return None
 
 
-VTOL_MODE, _ON_ITS_WING = "vehicle_status.vehicle_type", 2.0
+VTOL_MODE = "vehicle_status.vehicle_type"
+_ON_ITS_WING = 2.0
 
 
 def hovers_throughout(params: Parameters, columns: Columns) -> bool:

@@ -16,11 +16,11 @@ import numpy as np
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats, Ints
 from beaver_ftc_logs.runs import runs_between
 
+# Least eigenvalue of X' X that counts, over the largest, or over the number of samples.
 EIGENVALUE_FLOOR = 1e-10
-"""Least eigenvalue of X' X that counts, over the largest, or over the number of samples."""
 _RANK_TOLERANCE = 1e-12
+# Median of the chi-squared law with three degrees of freedom.
 _MEDIAN_CHI2 = 2.366
-"""Median of the chi-squared law with three degrees of freedom."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,8 @@ def fit_ols(Z: Floats, y: Floats, stretch: Ints, lag: int) -> Regression:
 def _newey_west(X: Floats, e: Floats, P: Floats, stretch: Ints, lag: int) -> Floats:
     """Standard errors (m,) that hold for autocorrelated residuals e (n,), the root of diag(P S P): S sums the
     products of the scores X e with Bartlett's weights over `lag` lags."""
-    scores, w = X * e[:, None], lag + 1
+    scores = X * e[:, None]
+    w = lag + 1
     S = np.zeros((X.shape[1], X.shape[1]))
     for begin, end in runs_between(np.diff(stretch) != 0):
         # Bartlett's weights are those of products of running sums

@@ -63,7 +63,9 @@ def _read_flight_for_fit(path: Path, vehicle: Vehicle, reader: str | None) -> Sa
     fit takes, every second of them is dropped, and from then on half as many are kept.
     """
     kept: list[Samples] = []
-    every, n_seen, until_s = 1, 0, -np.inf
+    every = 1
+    n_seen = 0
+    until_s = -np.inf
     for part, log in enumerate(read_vehicle_parts(path, vehicle, reader), 1):
         samples = resample(log, vehicle)
         first = int(np.searchsorted(samples.t_s, until_s, side="right"))
@@ -72,7 +74,8 @@ def _read_flight_for_fit(path: Path, vehicle: Vehicle, reader: str | None) -> Sa
                 kept.append(select_rows(samples, slice(begin, begin + _FIT_SAMPLES)))
             n_seen += 1
         while len(kept) * _FIT_SAMPLES > MAX_FIT_SAMPLES and part > 1:
-            kept, every = kept[::2], 2 * every
+            kept = kept[::2]
+            every = 2 * every
         until_s = samples.t_s[-1]
     return samples if part == 1 else _concatenate_samples(path.stem, kept, part)
 

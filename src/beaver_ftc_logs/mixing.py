@@ -27,6 +27,8 @@ from beaver_ftc_logs.vehicle import Vehicle, read_vehicle_document
 
 Weights = dict[str, float]
 
+# SERVOn_FUNCTION of a surface: its name; its share of aileron, elevator and rudder, None where the mixer of
+# the autopilot is not linear; whether MIXING_GAIN and MIXING_OFFSET change it.
 _ARDUPILOT_SURFACES: Mapping[int, tuple[str, tuple[float, float, float] | None, bool]] = {
     4: ("aileron", (1.0, 0.0, 0.0), False),
     16: ("left_spoiler_outer", None, False),
@@ -42,26 +44,29 @@ _ARDUPILOT_SURFACES: Mapping[int, tuple[str, tuple[float, float, float] | None, 
     86: ("left_spoiler_inner", None, False),
     87: ("right_spoiler_inner", None, False),
 }
-"""SERVOn_FUNCTION of a surface: its name; its share of aileron, elevator and rudder, None where the mixer of
-the autopilot is not linear; whether MIXING_GAIN and MIXING_OFFSET change it."""
 _FLAPERONS = ("left_flaperon", "right_flaperon")
-_ARDUPILOT_AXIS_COLUMNS, _ARDUPILOT_FULL_COMMAND = ("AETR.Ail", "AETR.Elev", "AETR.Rudd"), 4500.0
+_ARDUPILOT_AXIS_COLUMNS = ("AETR.Ail", "AETR.Elev", "AETR.Rudd")
+_ARDUPILOT_FULL_COMMAND = 4500.0
 _ARDUPILOT_MESSAGES = {14: "RCOU", 18: "RCO2", 32: "RCO3"}
 
+# CA_SV_CSn_TYPE of a surface that moves the aircraft about an axis.
 _PX4_SURFACES = {
     1: "left_aileron", 2: "right_aileron", 3: "elevator", 4: "rudder", 5: "left_elevon", 6: "right_elevon",
     7: "left_vtail", 8: "right_vtail", 12: "custom", 13: "left_atail", 14: "right_atail", 15: "aileron",
 }  # fmt: skip
-"""CA_SV_CSn_TYPE of a surface that moves the aircraft about an axis."""
 _PX4_OUTPUT_PATTERN = r"(PWM_MAIN|PWM_AUX)_FUNC(\d{1,2})"
 _MAX_TORQUE = 1000.0
-_PX4_MAX_SURFACES, _PX4_FIRST_SERVO, _PX4_FIXED_WING = 8, 201, 1
+_PX4_MAX_SURFACES = 8
+_PX4_FIRST_SERVO = 201
+_PX4_FIXED_WING = 1
 _PX4_AXIS_COLUMNS = tuple(f"vehicle_torque_setpoint.xyz[{i}]" for i in range(3))
 
 _ASSUMED_MIN_US = NEUTRAL_PULSE_US - HALF_PULSE_RANGE_US
 _ASSUMED_MAX_US = NEUTRAL_PULSE_US + HALF_PULSE_RANGE_US
 _PULSE_RANGE_US = {"MIN": (500.0, 2200.0), "MAX": (800.0, 2200.0), "TRIM": (800.0, 2200.0)}
-_MIN_MIXING_GAIN, _MAX_MIXING_GAIN, _MAX_MIXING_OFFSET = 0.05, 5.0, 1000.0
+_MIN_MIXING_GAIN = 0.05
+_MAX_MIXING_GAIN = 5.0
+_MAX_MIXING_OFFSET = 1000.0
 _LEAST_WEIGHT = 1e-9
 
 
@@ -111,10 +116,10 @@ class _Surface:
         return f"{self} ({self.reason}), and stays out: {reason}"
 
 
+# Scale and offset from the numbers of a column to the command, and a remark.
 Reading = tuple[float, float, str]
-"""Scale and offset from the numbers of a column to the command, and a remark."""
+# The column of each surface's output, and how it is read.
 _Outputs = list[tuple[str, Reading]]
-"""The column of each surface's output, and how it is read."""
 
 
 @dataclass(frozen=True)
@@ -138,14 +143,15 @@ class _Axes:
         return self.problem or next(iter(missing), "" if weights else "its mix is not known")
 
 
+# The surfaces, the ways in which their outputs can be logged, and the commands before the mixer.
 _Found = tuple[list[_Surface], list[_Outputs], _Axes]
-"""The surfaces, the ways in which their outputs can be logged, and the commands before the mixer."""
 
 
 def mixing_of_log(reader: str, params: Parameters, column_names: Collection[str]) -> Mixing:
     """The mixing by the parameters of a log, with commands from these columns. It has no surfaces if the
     parameters give none, or if the log has none of their commands."""
-    mixing, names = Mixing(), set(column_names)
+    mixing = Mixing()
+    names = set(column_names)
     if reader not in SELECTIVE_READERS:
         return mixing
     read = _Parameters(params, mixing.lines)
@@ -236,13 +242,15 @@ def _ardupilot_mixing(params: _Parameters) -> _Found:
         axis_shares = None if shares is None else np.array(shares)
         if is_mixed and axis_shares is not None:
             axis_shares = None if factors is None else axis_shares * factors
-        full, reason = _full_name(name, channel, kinds), f"SERVO{channel}_FUNCTION {kind}"
+        full = _full_name(name, channel, kinds)
+        reason = f"SERVO{channel}_FUNCTION {kind}"
         mixer = mixer_reason if is_mixed else ""
         surfaces.append(_Surface(full, f"channel {channel}", kind, axis_shares, reason, mixer))
     outputs = []
     for n in kinds:
         message = next((text for last, text in _ARDUPILOT_MESSAGES.items() if n <= last), "RCO?")
-        pulses, place = {part: f"SERVO{n}_{part}" for part in _PULSE_RANGE_US}, f"SERVO{n}_MIN, _TRIM, _MAX"
+        pulses = {part: f"SERVO{n}_{part}" for part in _PULSE_RANGE_US}
+        place = f"SERVO{n}_MIN, _TRIM, _MAX"
         outputs.append((f"{message}.C{n}", _pulse_reading(params, place, pulses, f"SERVO{n}_REVERSED")))
     return surfaces, [outputs], _Axes(_ARDUPILOT_AXIS_COLUMNS, 1.0 / _ARDUPILOT_FULL_COMMAND)
 
@@ -258,7 +266,8 @@ def _ardupilot_mixers(params: _Parameters, kinds: Collection[int]) -> tuple[Floa
     except _BadParameter as problem:
         params.lines.append(f"the mixer of elevons and V-tail stays out: {problem}")
         return None, ""
-    turning, pitching = 1.0 + max(offset, 0.0) / 100.0, 1.0 - min(offset, 0.0) / 100.0
+    turning = 1.0 + max(offset, 0.0) / 100.0
+    pitching = 1.0 - min(offset, 0.0) / 100.0
     factors = gain * np.array([turning, pitching, turning])
     return factors, f", MIXING_GAIN {gain:g}, MIXING_OFFSET {offset:g}"
 
@@ -274,7 +283,8 @@ def _pulse_reading(
     """
     try:
         us = {part: params.number(name, *_PULSE_RANGE_US[part], " us") for part, name in names.items()}
-        low, high = us["MIN"], us["MAX"]
+        low = us["MIN"]
+        high = us["MAX"]
         trim = us.get("TRIM", 0.5 * (low + high))
         if not low < high or not low <= trim <= high:
             raise _BadParameter(f"{place} are {low:g}, {trim:g}, {high:g} us, allowed: ascending")
@@ -367,8 +377,10 @@ def _add_surfaces_by_output(
         if column not in names:
             mixing.lines.append(surface.stays_out(f"{column} is not in the log"))
     used = [(surface, *output) for surface, output in pairs if output[0] in names]
-    surfaces, columns = [surface for surface, *_ in used], [column for _, column, _ in used]
-    rows, own = _rows_of_commands(surfaces), _weights_of_own_columns(surfaces)
+    surfaces = [surface for surface, *_ in used]
+    columns = [column for _, column, _ in used]
+    rows = _rows_of_commands(surfaces)
+    own = _weights_of_own_columns(surfaces)
     basis: list[int] = []
     for k, (surface, column, (scale, offset, text)) in enumerate(used):
         factors = np.linalg.lstsq(rows[basis].T, rows[k], rcond=None)[0] if basis else np.zeros(0)
@@ -446,7 +458,8 @@ def load_vehicle_for_logs(
                 allowed = f"one for all, or {' and '.join(missing)} in {path}"
                 reason = f"its parameters give another mixing than those of {logs[0]}"
                 raise BadInput(f"{log}: {reason}, allowed: {allowed}")
-            first, lines = keys, lines or [f"{log}: {line}" for line in lines_of_log]
+            first = keys
+            lines = lines or [f"{log}: {line}" for line in lines_of_log]
         document.data.update(first)
     return validate(Vehicle, document, path), lines
 

@@ -156,8 +156,8 @@ class FittedRanges(_LastingSection):
     tail: PeakTail | None = None
 
 
+# The ranges of a model whose file states none.
 NOTHING_FITTED = FittedRanges(commands=[], rates=[])
-"""The ranges of a model whose file states none."""
 
 
 class NoiseModel(Section):
@@ -227,7 +227,8 @@ class Model(Section):
     def _check_arrays(self) -> "Model":
         """Refuse arrays and names that do not belong to this vehicle, history and lags."""
         n_signals = len(self.vehicle.regressor_columns) * self.vehicle.n_signal_lags(self.history)
-        n, n_past = len(self.past), 3 * self.history + n_signals
+        n = len(self.past)
+        n_past = 3 * self.history + n_signals
         reason = f"has {n} rows, allowed: {n_past}, as `identify` writes them: identify it again"
         conflicts = [(("past",), reason)] if n != n_past else []
         refuse([*conflicts, *self._name_mistakes(), *self._shape_mistakes()])
@@ -253,14 +254,16 @@ class Model(Section):
 
     def _shape_mistakes(self) -> Iterator[Conflict]:
         """Arrays whose shape contradicts groups, lags and rates; empty ones that may be are not checked."""
-        G, L = len(self.groups), self.lags
+        G = len(self.groups)
+        L = self.lags
         arrays: list[tuple[Location, Any, tuple[int, ...]]] = [
             (("response",), self.response, (G, L, 3)),
             (("response_sd",), self.response_sd, (G, L, 3)),
             (("past",), self.past, (len(self.past), 3)),
         ]
         for i, noise in enumerate(self.colours):
-            at, n_ar = ("colours", i), -(-len(noise.before) // 3) * 3
+            at = ("colours", i)
+            n_ar = -(-len(noise.before) // 3) * 3
             arrays.append(((*at, "before"), noise.before, (n_ar, 3)))
             arrays.append(((*at, "misreads"), noise.misreads, (G,)))
             if noise.average[0] != 1.0:

@@ -27,25 +27,26 @@ from beaver_ftc_logs.runs import constant_stretches
 from beaver_ftc_logs.samples import Samples
 from beaver_ftc_logs.vehicle import Vehicle
 
+# Labels are good to about a second: what lies nearer to a change is not fitted.
 LABEL_MARGIN_S = 1.5
-"""Labels are good to about a second: what lies nearer to a change is not fitted."""
+# A label that holds for less is the edge of another.
 MIN_LABEL_S = 3.0
-"""A label that holds for less is the edge of another."""
 RATE_LAGS = (1, 2, 3, 4)
 COMMAND_LAGS = (2, 3, 4, 6)
 _NEWEY_WEST_S = 2.0
 _MIN_RATE_SD = 1e-6
 _FAILURE_MARGIN_S = 1.0
+# Samples of the AR predictor in the noise model of a flight: chosen on seeds 11 and 12, in light turbulence,
+# and for the evidence that a name needs on seed 11 of a pa28.
 AR_ORDER = 20
-"""Samples of the AR predictor in the noise model of a flight: chosen on seeds 11 and 12, in light turbulence,
-and for the evidence that a name needs on seed 11 of a pa28."""
+# Share of the samples of the fit whose responses count as usual.
 _USUAL_SHARE = 0.9
-"""Share of the samples of the fit whose responses count as usual."""
 RANK_TOLERANCE = 1e-9
-_MIN_EFFECT_POWER, _EFFECT_POWER_CAP = 1e-6, 12.5
-"""Variances of the noise in a sample: a fiftieth of the cap is half a standard deviation."""
+# Variances of the noise in a sample: a fiftieth of the cap is half a standard deviation.
+_MIN_EFFECT_POWER = 1e-6
+_EFFECT_POWER_CAP = 12.5
+# A gain that is known no better than to a third is not known to be there.
 GAIN_SD_CAP = 0.33
-"""A gain that is known no better than to a third is not known to be there."""
 
 
 def fit_parts(flights: Sequence[Samples]) -> list[FitPart]:
@@ -81,7 +82,8 @@ def bic_by_order(parts: Parts, vehicle: Vehicle) -> dict[tuple[int, int], float]
     ZZ = X.T @ X
     Zy = X.T @ y
     yy = y.T @ y
-    bic, n = {}, len(y)
+    bic = {}
+    n = len(y)
     for h, L in product(RATE_LAGS, COMMAND_LAGS):
         cols = _order_columns(vehicle, h, L)
         C = np.linalg.lstsq(ZZ[np.ix_(cols, cols)], Zy[cols], rcond=1e-12)[0]
@@ -91,7 +93,8 @@ def bic_by_order(parts: Parts, vehicle: Vehicle) -> dict[tuple[int, int], float]
 
 def _order_columns(vehicle: Vehicle, h: int, L: int) -> Ints:
     """Columns of the largest design that an order has."""
-    n, most = len(vehicle.regressor_columns), max(RATE_LAGS)
+    n = len(vehicle.regressor_columns)
+    most = max(RATE_LAGS)
     rates = np.arange(1 + 3 * most) < 1 + 3 * h
     signals = np.arange(n * vehicle.n_signal_lags(most)) < n * vehicle.n_signal_lags(h)
     commands = np.tile(np.arange(max(COMMAND_LAGS)) < L, len(regression.group_surfaces(vehicle)))
@@ -115,7 +118,8 @@ def refit(parts: Parts, model: Model) -> Model:
 def fitted_order(parts: Parts, vehicle: Vehicle, h: int, L: int) -> tuple[least_squares.Regression, Model]:
     """Least squares of given order over all flights, and its model. Each fit is made once: every test of a
     model needs the same fits to parts of the flights."""
-    fits, key = parts[0].fits, (vehicle.model_dump_json(), h, L, *map(id, parts))
+    fits = parts[0].fits
+    key = (vehicle.model_dump_json(), h, L, *map(id, parts))
     if key not in fits:
         fit = fit_order(parts, vehicle, h, L)
         # with the parts, which are held: an id is of one object
@@ -143,12 +147,15 @@ def stack_data(parts: Parts, vehicle: Vehicle, h: int, L: int) -> tuple[Floats, 
     """
     groups = regression.group_surfaces(vehicle)
     most = max(RATE_LAGS + COMMAND_LAGS)
-    Z, y, stretches = [], [], []
+    Z = []
+    y = []
+    stretches = []
     for i, part in enumerate(parts):
         X, U, known = regression.build_regressors(part.samples, groups, h, L, True, vehicle.n_signal_lags(h))
         used = part.is_usable & known
         used[:most] = False
-        n, weight = len(X), part.samples.fit_weight
+        n = len(X)
+        weight = part.samples.fit_weight
         Z.append(weight * np.column_stack([np.ones(n), X, U.reshape(n, -1)])[used])
         y.append(weight * part.samples.rates[used])
         stretches.append(np.cumsum(np.diff(np.flatnonzero(used), prepend=0) > 1) + 1_000_000 * i)
@@ -195,7 +202,8 @@ def parts_of_noise(parts: Parts, ma: Sequence[float]) -> list[FitPart]:
 def _fit_noise_model(own: Parts, model: Model) -> NoiseModel:
     """The noise of flights of one moving average, with an AR predictor of the residual, by least squares
     where samples follow one another; without a predictor where too few do."""
-    ma, L = list(own[0].samples.noise_ma_coefficients), AR_ORDER
+    ma = list(own[0].samples.noise_ma_coefficients)
+    L = AR_ORDER
     runs = [run for part in own for run in part.innovations(model).residual_runs()]
     long = [run for run in runs if len(run) > L]
     if sum(len(run) - L for run in long) < 10 * 3 * L:
@@ -241,7 +249,8 @@ def tied_shares(parts: Parts, model: Model) -> Floats:
     The effect y = U_g B_g W is in standard deviations of the noise; e = y - Z b is the part that the other
     columns of the fit do not explain."""
     Z, _, _ = stack_data(parts, model.vehicle, model.history, model.lags)
-    B, W = np.array(model.response), np.linalg.inv(np.linalg.cholesky(np.array(model.noise))).T
+    B = np.array(model.response)
+    W = np.linalg.inv(np.linalg.cholesky(np.array(model.noise))).T
     shares = np.ones(len(B))
     for g, columns in enumerate(np.arange(Z.shape[1])[-B.shape[1] * len(B) :].reshape(len(B), -1)):
         y = Z[:, columns] @ B[g] @ W
@@ -263,7 +272,8 @@ def group_gain_sd(fit: least_squares.Regression, model: Model) -> Floats:
     the standard errors s (L, 3) of the coefficients; b (3,) is the sum over the lags, in standard deviations
     of the noise.
     """
-    n, L = len(model.groups), model.lags
+    n = len(model.groups)
+    L = model.lags
     first = len(fit.coefficients) - n * L
     sd = np.sqrt(np.maximum(np.diag(fit.residual_covariance), MIN_DIVISOR))
     gain_sd = np.zeros(n)

@@ -228,7 +228,8 @@ def _prediction_figure(usable: Parts, model: Model) -> Any:
         axes = part.subplots(3, 1, sharex=True)
         t_s, rates, residual = _liveliest_window(fold, round(_FIGURE_SPAN_S * model.rate_hz))
         for i, axis in enumerate(axes):
-            residuals, rate = np.rad2deg(residual[:, i]), np.rad2deg(rates[:, i])
+            residuals = np.rad2deg(residual[:, i])
+            rate = np.rad2deg(rates[:, i])
             axis.plot(t_s, rate, color="#888888", linewidth=2.2, label="measured")
             axis.plot(t_s, rate - residuals, color=SERIES[0], linewidth=0.9, label="predicted")
             axis.plot(t_s, residuals, color=SERIES[1], linewidth=0.7, label="residual")
@@ -242,9 +243,11 @@ def _prediction_figure(usable: Parts, model: Model) -> Any:
 def _liveliest_window(fold: Fold, n: int) -> tuple[Floats, Floats, Floats]:
     """Times, rates and residual of the window in which the rates known moved most; nan where nothing is
     known, for lines to end."""
-    flight, samples = orders.one_step_innovations(fold.model, fold.held_out), fold.held_out.samples
+    flight = orders.one_step_innovations(fold.model, fold.held_out)
+    samples = fold.held_out.samples
     rates, r = np.full((2, *samples.rates.shape), np.nan)
-    rates[flight.rows], r[flight.rows] = samples.rates[flight.rows], flight.e
+    rates[flight.rows] = samples.rates[flight.rows]
+    r[flight.rows] = flight.e
     total = np.concatenate([[0.0], np.cumsum(np.nansum(rates**2, axis=1))])
     first = int(np.argmax(total[n:] - total[:-n])) if len(rates) > n else 0
     window = slice(first, first + n)

@@ -26,9 +26,9 @@ _CLOSE = 0.95  # between _AGREEING and this a column takes the place of the rate
 _EXACT = 0.99  # above it the angle confirms the rate, if the slope is within _UNIT_RATIO of 1
 _SLOPE_FACTOR = 1.8  # slopes from its inverse to it say nothing: no two units differ by so little
 _UNIT_RATIO = 1.3  # the most by which a slope differs from the factor of a unit that fits
+# Level and north turn with the earth, by 7.3e-5 rad/s, and with the way over it, by 4.7e-5 rad/s at 300 m/s.
+# A change of an angle that is not far above them says nothing of a rate.
 _MIN_RMS_RAD_S = 1e-3
-"""Level and north turn with the earth, by 7.3e-5 rad/s, and with the way over it, by 4.7e-5 rad/s at 300 m/s.
-A change of an angle that is not far above them says nothing of a rate."""
 _GRAVITY_MPS2 = SI_UNITS["g"][1]
 _GRAVITIES_G = (0.5, 2.0)  # a median magnitude along z between these is in m/s2
 _MAX_ANGLE_RAD = 1.02 * 2.0 * np.pi  # a full circle, with 2 % for rounding and filters
@@ -56,7 +56,8 @@ def fit_angle(gyros: Sequence[Column], angles: Sequence[Column | None], axis: in
     Where the nose is steep, roll and yaw are hard to distinguish: such windows are left out for both.
     """
     roll, pitch, _ = angles
-    angle, t = angles[axis], gyros[0].t_s
+    angle = angles[axis]
+    t = gyros[0].t_s
     if roll is None or angle is None:
         return None
     rates = [_interpolate(gyro, t) for gyro in gyros]
@@ -101,7 +102,8 @@ def _changes_by_window(
     n = max(round(_ANGLE_WINDOW_S / max(float(np.median(h)), 1e-9)), 1)
     a = np.arange(0, len(t) - n, n)
     b = a + n
-    y, X = angle[b] - angle[a], S[b] - S[a]
+    y = angle[b] - angle[a]
+    X = S[b] - S[a]
     ok = (t[b] - t[a] < 2.0 * _ANGLE_WINDOW_S) & np.isfinite(y) & np.isfinite(X).all(axis=1)
     if circle is not None:
         y = (y + 0.5 * circle) % circle - 0.5 * circle
@@ -124,7 +126,9 @@ def _fit_first_term(y: Floats, X: Floats) -> tuple[float, float] | None:
     beta = np.linalg.lstsq(X, y, rcond=None)[0]
     v = y - X[:, 1:] @ beta[1:]
     x = X[:, 0]
-    xx, xv, vv = float(x @ x), float(x @ v), float(v @ v)
+    xx = float(x @ x)
+    xv = float(x @ v)
+    vv = float(v @ v)
     if not xx * vv > 0.0:
         return None
     return np.sign(xv) * np.sqrt(vv / xx), xv / np.sqrt(xx * vv)

@@ -21,18 +21,18 @@ from beaver_ftc.documents import BadInput
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Mask = NDArray[np.bool_]
+# For each reason of a doubt its rows, (n,).
 Reasons = dict[str, Mask]
-"""For each reason of a doubt its rows, (n,)."""
+# Columns that are read, all where None.
 Wanted = Collection[str] | None
-"""Columns that are read, all where None."""
+# Parameters of an autopilot by name: its value in the log; if it changes, the first and the last one.
 Parameters = dict[str, tuple[float, ...]]
-"""Parameters of an autopilot by name: its value in the log; if it changes, the first and the last one."""
+# The column of the time and its unit.
 TimeSource = tuple[str, str]
-"""The column of the time and its unit."""
 _S_PER_US = 1e-6
 _N_LISTED_NEAREST_NAMES = 10
+# Least value of a divisor that may be zero.
 MIN_DIVISOR = float(np.sqrt(np.finfo(float).tiny))
-"""Least value of a divisor that may be zero."""
 
 
 def largest_magnitude(values: Floats) -> float:
@@ -50,8 +50,8 @@ class Column:
     note: str = ""
 
 
+# Columns by name.
 Columns = dict[str, Column]
-"""Columns by name."""
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,8 @@ def last_value(parameters: Parameters, name: str) -> float | None:
 
 def nearest_names_text(wanted_name: str, names: Iterable[str]) -> str:
     """The ten names nearest to what was given, and how many there are besides."""
-    wanted, ranked = wanted_name.lower(), sorted(names)
+    wanted = wanted_name.lower()
+    ranked = sorted(names)
     ranked.sort(key=lambda name: -SequenceMatcher(None, name.lower(), wanted).ratio())
     nearest = [name if name.isprintable() else repr(name) for name in ranked[:_N_LISTED_NEAREST_NAMES]]
     n_more = len(ranked) - len(nearest)

@@ -32,10 +32,12 @@ from beaver_ftc_logs.samples import Samples, mixer_matrix, whiten_samples
 from beaver_ftc_logs.vehicle import Vehicle
 
 _PARALLEL_TOLERANCE = 1e-9
-_N_PARTS, _MIN_PART_ROWS, BOUND_MARGIN = 4, 60, 4.0
-"""Parts of a flight, and their rows at least; standard errors."""
+# Parts of a flight, and their rows at least; standard errors.
+_N_PARTS = 4
+_MIN_PART_ROWS = 60
+BOUND_MARGIN = 4.0
+# A response is quick if it differs from its mean over so many seconds.
 _QUICK_SPAN_S = 0.5
-"""A response is quick if it differs from its mean over so many seconds."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +55,8 @@ class FitPart:
         rows = np.flatnonzero(self.is_usable)
         middle = int(rows[len(rows) // 2]) if len(rows) else 0
         is_first = np.arange(len(self.is_usable)) < middle
-        first, second = self.is_usable & is_first, self.is_usable & ~is_first
+        first = self.is_usable & is_first
+        second = self.is_usable & ~is_first
         return FitPart(self.samples, first), FitPart(self.samples, second)
 
     def innovations(self, model: Model) -> "Innovations":
@@ -70,8 +73,8 @@ def usual_step_s(parts: Parts) -> float:
     return float(np.median([part.samples.dt_s for part in parts]))
 
 
+# Surfaces that move together, by their places.
 Groups = list[list[int]]
-"""Surfaces that move together, by their places."""
 
 
 def group_surfaces(vehicle: Vehicle) -> Groups:
@@ -208,7 +211,8 @@ class Innovations:
         b = P @ (X.T @ v)
         e2 = (v - X @ b) ** 2
         margin = BOUND_MARGIN * np.sqrt(np.maximum(np.diag(P), 0.0) * e2.mean() / share)
-        low, high = (b - margin) / s, (b + margin) / s
+        low = (b - margin) / s
+        high = (b + margin) / s
         return low[3:], high[3:], least_squares.noise_scale(e2)
 
     def gains(self) -> Floats:
@@ -240,7 +244,8 @@ def innovations(samples: Samples, model: Model, labelled: bool = False) -> Innov
 
     Summed in the same order whatever the length of the flight, so that a row does not depend on later ones.
     """
-    h, L = model.history, model.lags
+    h = model.history
+    L = model.lags
     f = model.vehicle.n_signal_lags(h)
     X, U, known = build_regressors(samples, group_indices(model), h, L, labelled, f)
     c, A, B = (np.array(values) for values in (model.intercept, model.past, model.response))
@@ -251,7 +256,9 @@ def innovations(samples: Samples, model: Model, labelled: bool = False) -> Innov
     whole = known.copy()
     for lag in range(1, len(ar) + 1):
         whole &= _delay_rows(known, lag, False)
-    y, F, c = np.nan_to_num(y), np.nan_to_num(F), c - c @ ar.sum(axis=0)
+    y = np.nan_to_num(y)
+    F = np.nan_to_num(F)
+    c = c - c @ ar.sum(axis=0)
     return Innovations(np.arange(len(y)), whole, y, F, c, noise)
 
 

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from beaver_ftc_logs.recording import Floats, Ints, Mask
 
+# Begin and end of runs of rows.
 Runs = list[tuple[int, int]]
-"""Begin and end of runs of rows."""
 
 
 def last_true_row(mask: Mask) -> Ints:

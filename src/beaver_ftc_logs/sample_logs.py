@@ -12,16 +12,22 @@ import numpy as np
 from beaver_ftc.documents import parse_yaml
 from beaver_ftc_logs.vehicle import unused_keys_as_comments
 
-SAMPLE_RATE_HZ, HEALTHY_FLIGHT_S, FAULTY_FLIGHT_S = 20.0, 600.0, 180.0
-WEAK_ELEVON_FROM_S, WEAK_ELEVON_EFFECTIVENESS = 90.0, 0.4
+SAMPLE_RATE_HZ = 20.0
+HEALTHY_FLIGHT_S = 600.0
+FAULTY_FLIGHT_S = 180.0
+WEAK_ELEVON_FROM_S = 90.0
+WEAK_ELEVON_EFFECTIVENESS = 0.4
 _RATE_STATE_MATRIX_PER_S = np.array([[-6.0, 0.0, 0.8], [0.0, -4.0, 0.0], [-0.4, 0.0, -1.5]])
+# Angular acceleration by full right and left elevon, rad/s2: the right one rolls right and pitches up.
 _ACCELERATION_BY_FULL_ELEVON_RAD_S2 = np.array([[22.0, 9.0, -1.2], [22.0, -9.0, -1.2]])
-"""Angular acceleration by full right and left elevon, rad/s2: the right one rolls right and pitches up."""
 _TURBULENCE_DRIVING_NOISE = np.array([1.2, 0.8, 0.4])  # rad/s2 per root of a second
 _TURBULENCE_DECAY_PER_S = 2.0
 _GYRO_NOISE_RAD_S = 0.004
-_ATTITUDE_GAIN_PER_RAD, _RATE_GAIN_S_PER_RAD = 1.2, 0.15  # of the law; commands are shares of travel
-_DEMANDED_ATTITUDE_HOLD_S, _ROLL_AMPLITUDE_RAD, _PITCH_AMPLITUDE_RAD = 4.0, 0.5, 0.15
+_ATTITUDE_GAIN_PER_RAD = 1.2  # of the law; commands are shares of travel
+_RATE_GAIN_S_PER_RAD = 0.15
+_DEMANDED_ATTITUDE_HOLD_S = 4.0
+_ROLL_AMPLITUDE_RAD = 0.5
+_PITCH_AMPLITUDE_RAD = 0.15
 VEHICLE_FILE_TEXT = """\
 # The vehicle file of two sample logs: which column is what, and in which unit.
 name: sample-wing

@@ -36,18 +36,20 @@ from beaver_ftc_logs.time_base import (
 )
 from beaver_ftc_logs.vehicle import QuantityColumn, Vehicle
 
-_MAX_NUMBER, _MAX_RATE_RAD_S, _MAX_RATE_SD_RAD_S = 1e6, 60.0, 3.0
+_MAX_NUMBER = 1e6
+_MAX_RATE_RAD_S = 60.0
+_MAX_RATE_SD_RAD_S = 3.0
+# Least and largest dynamic pressure that scales a command, over that at the reference airspeed.
 _QDYN_RATIOS = (0.1, 10.0)
-"""Least and largest dynamic pressure that scales a command, over that at the reference airspeed."""
+# Moving averages of the noise: gusts held within a sample add to the next, gyros' noise takes from it.
 NOISE_MA_CANDIDATES = (
     (1.0,), (1.0, 0.5),
     *((1.0, -2.0 * c, c**2) for c in (0.2, 0.4, 0.5, 0.6, 0.7, 0.8, 0.85, 0.9)),
 )  # fmt: skip
-"""Moving averages of the noise: gusts held within a sample add to the next, gyros' noise takes from it."""
 UNFITTED_MA = NOISE_MA_CANDIDATES[:2]
+# Noise that is tried where no fitted flight had it: gusts of both kinds, and gyros from a laboratory's to a
+# toy's, so close together that none is 1.8 times off.
 UNFITTED_GYROS_RAD_S = tuple(np.geomspace(1e-5, 1e-2, 7).tolist())
-"""Noise that is tried where no fitted flight had it: gusts of both kinds, and gyros from a laboratory's to a
-toy's, so close together that none is 1.8 times off."""
 
 
 @dataclass(frozen=True)
@@ -185,7 +187,8 @@ def whiten_samples(samples: Samples, C: Sequence[float], fit_weight: float = 1.0
     for a, b in runs_between((np.diff(known) != 0) | (np.diff(samples.stretch_number) != 0)):
         x0 = x[a]
         x[a:b] = x0 + lfilter([sum(C)], C, x[a:b] - x0, axis=0)
-    names, ends = ("rates", "commands", "signals"), np.cumsum([array.shape[1] for array in arrays])[:2]
+    names = ("rates", "commands", "signals")
+    ends = np.cumsum([array.shape[1] for array in arrays])[:2]
     white: dict[str, Any] = dict(zip(names, np.split(x, ends, axis=1), strict=True))
     return replace(samples, noise_ma_coefficients=tuple(C), fit_weight=fit_weight, **white)
 

@@ -9,10 +9,13 @@ import numpy as np
 from beaver_ftc_logs.recording import Column, Floats, Ints, Mask
 from beaver_ftc_logs.runs import last_true_row
 
-MIN_STILL_S, MIN_STILL_ROWS = 1.5, 12
-"""A measured rate that repeats for longer than both is frozen."""
-_CLIPPED_IN_TURN, _CLIPPED_IN_ALL = 3, 10
-_SPIKE_RATIO, _MAX_SPIKE_SHARE = 40.0, 0.01
+# A measured rate that repeats for longer than both is frozen.
+MIN_STILL_S = 1.5
+MIN_STILL_ROWS = 12
+_CLIPPED_IN_TURN = 3
+_CLIPPED_IN_ALL = 10
+_SPIKE_RATIO = 40.0
+_MAX_SPIKE_SHARE = 0.01
 
 
 def time_since_change_s(column: Column) -> Floats:
@@ -61,7 +64,8 @@ def find_spike_rows(values: Floats) -> Ints:
 
 def column_defect_texts(name: str, column: Column, is_rate: bool) -> list[str]:
     """Return a line for each mistake in a column over the whole flight. is_rate: a rate, not a command."""
-    values, texts = column.values, [column.note] if column.note else []
+    values = column.values
+    texts = [column.note] if column.note else []
     n = int((~np.isfinite(values)).sum())
     if n:
         texts.append(f"{name}: rows without a number: {n} of {len(values)}")

@@ -31,8 +31,8 @@ LOSS_FAULT_TYPE = "loss_of_effectiveness"
 BOUND_WINDOW_S = 1.0
 _LOSS_TOLERANCE = 1e-9  # of theta: rounding must not empty an intersection of sets that touch
 _TOLERANCE_RAD_S2 = 1e-12  # of |nu - theta Z|: rounding must not exclude a theta on its bound
+# As how many white samples one sample counts in the bounds of the command gains.
 _EFFECTIVE_SAMPLE_SHARE = 0.4
-"""As how many white samples one sample counts in the bounds of the command gains."""
 _ERROR_KEYS = ("fdi", "actuators", "design_model")  # not `substeps`: a frame of a log has one instant
 
 
@@ -103,7 +103,8 @@ def _command_gains(nu: Floats, Z: Floats) -> tuple[Floats, Floats]:
         return np.ones(Z.shape[2]), np.ones(Z.shape[2])
     sd = np.maximum(nu[rows].std(axis=0), MIN_DIVISOR)
     noise = NoiseModel.model_construct(average=[1.0], noise=np.diag(sd**2).tolist())
-    k, known = np.arange(len(nu)), np.ones(len(nu), dtype=bool)
+    k = np.arange(len(nu))
+    known = np.ones(len(nu), dtype=bool)
     frames = Innovations(k, known, nu, Z.transpose(0, 2, 1), np.zeros(3), noise)
     upper = [frames.at(part).gain_bounds(_EFFECTIVE_SAMPLE_SHARE)[1] for part in parts]
     return 1.0 + frames.at(rows).gains(), 1.0 + np.max(upper, axis=0)
@@ -135,7 +136,8 @@ def named_since(t_s: Floats, verdicts: Sequence[Verdict]) -> float | None:
     since_s: float | None = None
     for at_s, verdict in zip(t_s, verdicts, strict=True):
         if verdict.isolated != name:
-            name, since_s = verdict.isolated, float(at_s)
+            name = verdict.isolated
+            since_s = float(at_s)
     return since_s if name else None
 
 

@@ -10,10 +10,11 @@ from beaver_ftc_logs.recording import Column, Floats, Ints, Mask
 from beaver_ftc_logs.runs import last_row_at
 from beaver_ftc_logs.units import TIME_UNITS
 
-MIN_HZ, _MAX_HZ = 4.0, 1e5
+MIN_HZ = 4.0
+_MAX_HZ = 1e5
 _MIN_ROWS = 50
+# A step of more than this many usual steps is a gap: nothing is predicted across it.
 _MIN_GAP_STEPS = 3.5
-"""A step of more than this many usual steps is a gap: nothing is predicted across it."""
 
 
 def sample_times(flight: str, stamps: Floats, max_hz: float) -> tuple[Floats, Ints, float]:
@@ -93,7 +94,8 @@ def latest_values(t_s: Floats, stamps: Floats, values: Floats) -> Floats:
 
 def _means(column: Column, t: Floats, h: float, held: Floats) -> Floats:
     """The mean over the interval of h s that ends at each time t, (n,); held (n,) where it has no row."""
-    ts, total = column.t_s, np.concatenate([[0.0], np.cumsum(column.values)])
+    ts = column.t_s
+    total = np.concatenate([[0.0], np.cumsum(column.values)])
     eps = 1e-6 * h  # of stamps that are meant to fall on the edge
     end = np.searchsorted(ts, t + eps, side="right")
     begin = np.searchsorted(ts, t - h + eps, side="right")

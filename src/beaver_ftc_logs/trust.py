@@ -50,7 +50,8 @@ def compute_fitted_ranges(parts: Parts, tied: Floats, gain_sd: Floats) -> Fitted
     def usable(name: str) -> Floats:
         return np.concatenate([getattr(part.samples, name)[part.is_usable] for part in parts])
 
-    airspeeds, climbs = usable("airspeed"), usable("energy_height_rate_mps")
+    airspeeds = usable("airspeed")
+    climbs = usable("energy_height_rate_mps")
     climbs = climbs[np.isfinite(climbs)]
     is_airspeed_known = np.isfinite(airspeeds).any()
     still: dict[str, float] = {}
@@ -129,7 +130,8 @@ def _rows_out_of_range(samples: Samples, model: Model) -> Reasons:
     for name, values, (lo, hi) in channels:
         below = above = _RANGE_MARGIN_SHARE * (hi - lo) + MIN_DIVISOR
         if name == "airspeed":
-            below, above = _AIRSPEED_MARGIN * lo, _AIRSPEED_MARGIN * hi
+            below = _AIRSPEED_MARGIN * lo
+            above = _AIRSPEED_MARGIN * hi
         outside = (values < lo - below) | (values > hi + above)
         reason = f"{name} is outside {lo:.3g} to {hi:.3g}, where the model was fitted"
         sums, n = trailing_sums(outside, _RANGE_WINDOW_S / samples.dt_s)

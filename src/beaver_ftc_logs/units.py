@@ -4,8 +4,14 @@ from math import pi
 
 from beaver_ftc.aircraft import GRAVITY_MPS2, M_PER_FT
 
-RATE, ANGLE, SPEED, ACCELERATION, LENGTH, SHARE = "rate", "angle", "speed", "acceleration", "length", "share"
+RATE = "rate"
+ANGLE = "angle"
+SPEED = "speed"
+ACCELERATION = "acceleration"
+LENGTH = "length"
+SHARE = "share"
 _RAD_PER_DEG = pi / 180.0
+# Kind of each unit, and its size in the SI unit; of each kind the SI unit first.
 SI_UNITS: dict[str, tuple[str, float]] = {
     "rad/s": (RATE, 1.0), "deg/s": (RATE, _RAD_PER_DEG), "cdeg/s": (RATE, 0.01 * _RAD_PER_DEG),
     "mrad/s": (RATE, 1e-3),
@@ -18,13 +24,13 @@ SI_UNITS: dict[str, tuple[str, float]] = {
     "m": (LENGTH, 1.0), "cm": (LENGTH, 0.01), "ft": (LENGTH, M_PER_FT),
     "1": (SHARE, 1.0), "%": (SHARE, 0.01),
 }  # fmt: skip
-"""Kind of each unit, and its size in the SI unit; of each kind the SI unit first."""
-NEUTRAL_PULSE_US, HALF_PULSE_RANGE_US = 1500.0, 400.0
-"""Usual pulse of a servo at neutral, and from there to either end of its travel."""
+# Usual pulse of a servo at neutral, and from there to either end of its travel.
+NEUTRAL_PULSE_US = 1500.0
+HALF_PULSE_RANGE_US = 400.0
+# Units of the time column.
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-"""Units of the time column."""
+# What mends a column of another sign or unit: degrees for radians, thousandths for one, and the reverse.
 UNIT_FACTORS = (-1.0, 1.0 / _RAD_PER_DEG, 1000.0, _RAD_PER_DEG, 1e-3)
-"""What mends a column of another sign or unit: degrees for radians, thousandths for one, and the reverse."""
 
 
 def nearest_unit(kind: str, si_factor: float, max_ratio: float) -> str | None:

@@ -19,12 +19,12 @@ from beaver_ftc_logs.runs import runs_between
 from beaver_ftc_logs.scoring import score_against_labels
 
 _DEFAULT_FALSE_ALARMS = 1.0
+# Under a law that the fit has not seen, so many times the evidence of theory raises an alarm. Chosen on own
+# flights, as `_POWER_OTHER_LAWS`.
 _LORDEN_FACTOR = 2.0
-"""Under a law that the fit has not seen, so many times the evidence of theory raises an alarm. Chosen on own
-flights, as `_POWER_OTHER_LAWS`."""
 _CREDIBLE_MASSES = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95)
+# Coverage the bounds aim at: 90 % and some of what another day takes away.
 _COVERAGE_GOAL = 0.93
-"""Coverage the bounds aim at: 90 % and some of what another day takes away."""
 
 
 def add_ranges_and_threshold(parts: Parts, model: Model) -> Model:
@@ -92,7 +92,8 @@ def _cross_validate(
 
 def _healthy_peaks(fold: Fold) -> extremes.PeaksAndHours:
     """Return for a part left out the peaks of the alarm statistic in health, and its healthy hours."""
-    bank, samples = build_bank(fold.model), fold.held_out.samples
+    bank = build_bank(fold.model)
+    samples = fold.held_out.samples
     p = bank_posterior(samples, fold.model, bank)
     z = fault_evidence(p, bank)
     answers = p[:, -1] < 0.5

@@ -38,19 +38,20 @@ from beaver_ftc_logs.units import (
 
 _MAX_FILE_BYTES = 1_000_000
 MAX_ALARMS_PER_HOUR = 1000.0
-STILL_AIR_HZ, _MOVING_AIR_HZ = 20.0, 100.0
+STILL_AIR_HZ = 20.0
+_MOVING_AIR_HZ = 100.0
 _BUILT_IN_FOLDER = Path(__file__).parent / "vehicles"
 
 VehicleName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$", max_length=100)]
 _SURFACE_NAME_PATTERN = re.compile(r"[A-Za-z0-9_-]{1,100}")
 ColumnName = Annotated[str, Field(min_length=1, max_length=200)]
 FaultKind = Literal["loss", "stuck"]
+# What the columns below a key measure.
 _KINDS: dict[Location, str] = {
     ("rates",): RATE, ("commands",): "", ("signals",): "", ("attitude",): ANGLE,
     ("acceleration",): ACCELERATION, ("airspeed",): SPEED, ("energy", "altitude"): LENGTH,
     ("energy", "airspeed"): SPEED, ("flow", "alpha_rad"): ANGLE, ("flow", "beta_rad"): ANGLE,
 }  # fmt: skip
-"""What the columns below a key measure."""
 
 
 class QuantityColumn(Section):

@@ -11,12 +11,13 @@ import numpy as np
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs.recording import Column, Floats, RecordedFlight, TimeSource, Wanted
 
+# Rows of a part of a long table.
 ROWS_PER_PART = 100_000
-"""Rows of a part of a long table."""
+# Samples of a part of another long log, 67 min at 100 Hz: `diagnose` needs 1 GB for a part of 480,000.
 SAMPLES_PER_PART = 400_000
-"""Samples of a part of another long log, 67 min at 100 Hz: `diagnose` needs 1 GB for a part of 480,000."""
-LAST_PART_FACTOR, PART_OVERLAP_SHARE = 1.2, 0.1
-"""So many times the rows of a part has the last at most; their share with which the next begins once more."""
+# So many times the rows of a part has the last at most; their share with which the next begins once more.
+LAST_PART_FACTOR = 1.2
+PART_OVERLAP_SHARE = 0.1
 
 
 @dataclass(frozen=True)
@@ -30,31 +31,31 @@ class Reader:
     of_autopilot: bool = False
 
 
+# The formats by name; each has a module here.
 READERS = {
     "table": Reader((".csv", ".tsv", ".txt", ".parquet")),
     "alfa": Reader((), ("%time", "ns")),
     "ulog": Reader((".ulg",), ("timestamp", "us"), of_autopilot=True),
     "ardupilot": Reader((".bin", ".log"), ("TimeUS", "us"), of_autopilot=True),
 }
-"""The formats by name; each has a module here."""
 SELECTIVE_READERS = tuple(name for name, reader in READERS.items() if reader.of_autopilot)
 _READER_OF_SUFFIX = {suffix: name for name, reader in READERS.items() for suffix in reader.suffixes}
 _BLACKBOX_PHRASE = (
     "a raw blackbox log of Betaflight or INAV, allowed: a table of it, which `blackbox_decode FILE` writes"
 )
+# Logs that another program turns into a table: what they are, and how.
 _WAYS_TO_TABLE = {
     ".tlog": "a telemetry log (MAVLink messages that a ground station received), allowed: the autopilot's "
     "own log (.bin, .ulg), or a table of the telemetry, which pymavlink writes: `mavlogdump.py --format csv "
     "--types ATTITUDE,SERVO_OUTPUT_RAW FILE > FILE.csv`",
     ".bbl": _BLACKBOX_PHRASE, ".bfl": _BLACKBOX_PHRASE,
 }  # fmt: skip
-"""Logs that another program turns into a table: what they are, and how."""
 _POINTER_BYTES = 200
+# How pointers begin: the name of the store, and the command that fetches the file.
 _LARGE_FILE_STORES = {
     rb"version https?://(git-lfs|hawser)\.github\.com/spec/": ("Git LFS", "git lfs pull"),
     rb"(\.\./|/)*(\.git/)?annex/objects/": ("git-annex", "git annex get FILE"),
 }
-"""How pointers begin: the name of the store, and the command that fetches the file."""
 
 
 def read_flight(
@@ -84,7 +85,8 @@ def read_parts(
     reader = reader or reader_name_for_path(path)
     if reader not in READERS:
         raise BadInput(f"--reader {reader}: is not known, allowed: {', '.join(READERS)}")
-    module, own_time = import_module(f"beaver_ftc_logs.readers.{reader}"), READERS[reader].time
+    module = import_module(f"beaver_ftc_logs.readers.{reader}")
+    own_time = READERS[reader].time
     if own_time is None:
         yield from module.read_parts(path, time, columns, ROWS_PER_PART if in_parts else None)
         return
@@ -104,14 +106,17 @@ def split_long_recording(log: RecordedFlight, stamps: Floats, ratio: float) -> I
     if len(stamps) <= LAST_PART_FACTOR * part_rows:
         yield log
         return
-    begin, part, is_last = 0, 1, False
+    begin = 0
+    part = 1
+    is_last = False
     while not is_last:
         is_last = len(stamps) - begin <= LAST_PART_FACTOR * part_rows
         end = len(stamps) if is_last else begin + part_rows
         period = stamps[begin], stamps[end - 1]
         columns = {name: _select_period(column, *period) for name, column in log.columns.items()}
         yield replace(log, name=f"{log.name}-part-{part}", columns=columns)
-        begin, part = end - round(PART_OVERLAP_SHARE * part_rows), part + 1
+        begin = end - round(PART_OVERLAP_SHARE * part_rows)
+        part = part + 1
 
 
 def _select_period(column: Column, begin_s: float, end_s: float) -> Column:

@@ -97,7 +97,8 @@ def _read_columns(
 def _add_attitude_errors(columns: Columns) -> None:
     """Commanded less measured attitude, rad: the demand on the surfaces, upstream of what froze."""
     for axis in ("roll", "pitch"):
-        command, measured = columns.get(f"{axis}_command_rad"), columns.get(f"{axis}_rad")
+        command = columns.get(f"{axis}_command_rad")
+        measured = columns.get(f"{axis}_rad")
         if command is not None and measured is not None:
             columns[f"{axis}_error_rad"] = Column(command.t_s, command.values - measured.values, command.note)
 

@@ -63,7 +63,8 @@ class Messages:
         if self.is_text:
             return [_line(self.data, at).split(",")[i + 1].strip() for at in self.begins]
         codes = [FORMAT_TO_STRUCT[code][0] for code in self.format.msg_fmts]
-        size, offset = struct.calcsize(f"<{codes[i]}"), struct.calcsize(f"<{''.join(codes[:i])}")
+        size = struct.calcsize(f"<{codes[i]}")
+        offset = struct.calcsize(f"<{''.join(codes[:i])}")
         windows = np.lib.stride_tricks.sliding_window_view(np.frombuffer(self.data, np.uint8), size)
         kind = f"S{size}" if codes[i].endswith("s") else f"<{codes[i]}"
         return windows[np.array(self.begins) + (_HEADER_BYTES + offset)].view(kind)[:, 0]
@@ -81,7 +82,8 @@ def read_messages(path: Path) -> dict[str, Messages]:
 def _binary_messages(data: mmap) -> Iterator[tuple[Any, array]]:
     """Formats with the places of their messages. The formats are read first, wherever they are: a message may
     stand before its own."""
-    lengths, formats = {_FORMAT_KIND: _FORMAT_BYTES}, {}
+    lengths = {_FORMAT_KIND: _FORMAT_BYTES}
+    formats = {}
     for kind, at in _binary_begins(data, lengths):
         if kind == _FORMAT_KIND:
             described, length, *texts = struct.unpack_from(_FORMAT_LAYOUT, data, at + _HEADER_BYTES)

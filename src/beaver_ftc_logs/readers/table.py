@@ -16,8 +16,9 @@ from beaver_ftc_logs.units import TIME_UNITS
 
 TIME_COLUMN = "t_s"
 _BYTES_PER_NUMBER = 8
-_MAX_ROWS, _MAX_NUMBER_BYTES = 10_000_000, 2_000_000_000
-"""Largest part of a file that is read at once: 2.8 h at 1000 Hz."""
+# Largest part of a file that is read at once: 2.8 h at 1000 Hz.
+_MAX_ROWS = 10_000_000
+_MAX_NUMBER_BYTES = 2_000_000_000
 _BATCH_ROWS = 50_000
 
 NumberTable = dict[str, Floats]
@@ -119,7 +120,8 @@ class _Table:
         self._path = path
         with _read_errors(path):
             self._of = _ParquetTable(path) if path.suffix.lower() == ".parquet" else TextTable.find(path)
-        self.names, self.remarks = self._of.names, self._of.remarks
+        self.names = self._of.names
+        self.remarks = self._of.remarks
 
     def parts(self, columns: Wanted, part_rows: int | None = None) -> Iterator[tuple[TableCells, bool]]:
         """Some columns, all where None, in parts of so many rows, the whole where None, and whether there is
@@ -148,7 +150,8 @@ class _Table:
                 while part_rows is not None and n_held > LAST_PART_FACTOR * part_rows:
                     joined = join_blocks(held)
                     rest = joined.select_rows(part_rows - round(PART_OVERLAP_SHARE * part_rows))
-                    held, n_held = [rest], rest.n_rows
+                    held = [rest]
+                    n_held = rest.n_rows
                     yield joined.select_rows(0, part_rows, with_remarks=True), True
             joined = join_blocks(held)
             self._of.check_broken_lines(self._path, joined)

@@ -19,10 +19,12 @@ from beaver_ftc_logs.readers.time_text import DayCount
 from beaver_ftc_logs.recording import Floats
 
 _DELIMITER_TITLES = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars"}
-_LAYOUT_HEAD_BYTES, _MAX_LAYOUT_LINES, _BLOCK_BYTES = 200_000, 60, 1_000_000
+_LAYOUT_HEAD_BYTES = 200_000
+_MAX_LAYOUT_LINES = 60
+_BLOCK_BYTES = 1_000_000
 _NUMBER_PATTERN = r"^[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$"
+# Share of lines with another number of cells that a table may have.
 _BROKEN_SHARE = 0.1
-"""Share of lines with another number of cells that a table may have."""
 
 
 @dataclass
@@ -129,7 +131,8 @@ class TextTable:
 
     def check_broken_lines(self, path: Path, cells: TableCells) -> None:
         """Raise BadInput where too many lines have another number of cells than the header."""
-        n_broken, n_lines = len(cells.broken_lines), cells.n_rows + len(cells.broken_lines)
+        n_broken = len(cells.broken_lines)
+        n_lines = cells.n_rows + len(cells.broken_lines)
         if n_broken > _BROKEN_SHARE * n_lines:
             reason = f"{n_broken} of {n_lines} lines have another number of cells than the header"
             raise unreadable_error(path, f"{reason}, {len(self.names)}: the first {cells.broken_lines[0]!r}")
@@ -165,7 +168,8 @@ class TextTable:
                 for name in wanted:
                     numbers = _convert_column(block[name], self.decimal_mark, name, cells, days[name])
                     cells.numbers[name] = numbers
-                cells.broken_lines, broken[:] = broken[:], []
+                cells.broken_lines = broken[:]
+                broken[:] = []
                 n_read += block.num_rows
                 yield cells
         yield TableCells({name: np.empty(0) for name in wanted}, 0, n_read, broken_lines=broken)

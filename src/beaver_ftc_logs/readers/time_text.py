@@ -26,7 +26,9 @@ def seconds_of_text(text: str) -> float:
         factors = (factor for unit, factor in _UNIT_SECONDS.items() if match[2].startswith(unit))
         return float(match[1]) * next(factors)
     if match := _CLOCK_PATTERN.fullmatch(text):
-        hours, minutes, seconds = int(match[1] or 0), int(match[2]), float(match[3].replace(",", "."))
+        hours = int(match[1] or 0)
+        minutes = int(match[2])
+        seconds = float(match[3].replace(",", "."))
         return 3600.0 * hours + 60.0 * minutes + seconds
     if _DATE_PATTERN.fullmatch(text):
         try:

@@ -20,8 +20,8 @@ from beaver_ftc_logs.recording import (
 )
 
 _TIME_FIELD = "timestamp"
+# Bytes of a message: its length is written in 16 bits.
 _MAX_MESSAGE_BYTES = 65535
-"""Bytes of a message: its length is written in 16 bits."""
 
 
 def read(path: Path, wanted: Wanted = None) -> RecordedFlight:
@@ -76,5 +76,6 @@ def _min_message_bytes(formats: dict[str, Any], name: str, outer: tuple[str, ...
         raise ValueError(f"a message {name} holds itself")
     if name not in formats:  # a number, or a type that pyulog complains about
         return 1
-    fields, outer = formats[name].fields, (*outer, name)
+    fields = formats[name].fields
+    outer = (*outer, name)
     return sum(max(count, 1) * _min_message_bytes(formats, kind, outer) for kind, count, _ in fields)

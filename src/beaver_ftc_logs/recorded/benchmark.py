@@ -165,7 +165,8 @@ def _score_against_log(held_out: FitPart, rows: LogRows, model: Model) -> Docume
 def labels_in_span(held_out: FitPart) -> np.ndarray:
     """Labels from the first usable row to the last, those of rows between that the fit does not use included:
     they count in the score. NaN elsewhere."""
-    rows, labels = np.flatnonzero(held_out.is_usable), np.full_like(held_out.samples.labels, np.nan)
+    rows = np.flatnonzero(held_out.is_usable)
+    labels = np.full_like(held_out.samples.labels, np.nan)
     if rows.size:
         span = slice(rows[0], rows[-1] + 1)
         labels[span] = held_out.samples.labels[span]
@@ -284,6 +285,7 @@ def _soon_text(row: Document) -> str:
 
 
 LABEL_COLUMNS = {"method": _METHOD} | {title: _share(key) for key, title in LABEL_TITLES.items()}
+# Tables of methods: the head of each column, and its cell of a method's row.
 FAILURE_COLUMNS = {
     "method": _METHOD,
     "precision": _share("precision"),
@@ -301,7 +303,6 @@ FAILURE_COLUMNS = {
     ),
     "wrong group": _ours(lambda row: str(row["wrong_group"])),
 }
-"""Tables of methods: the head of each column, and its cell of a method's row."""
 
 
 def as_text(document: Document) -> str:

@@ -26,7 +26,8 @@ from beaver_ftc_logs.recording import Floats
 from beaver_ftc_logs.regression import FitPart
 from beaver_ftc_logs.samples import Samples, mixer_matrix
 
-TUNING_SEEDS, TEST_SEEDS = range(8), range(8, 16)
+TUNING_SEEDS = range(8)
+TEST_SEEDS = range(8, 16)
 _RIVAL_DETECTOR = "sliding-least-squares"
 _WORST_OF_SCORE = {"mean_error": max}
 _TRIM_MEAN_S = 30.0  # of the mean that is called slow
@@ -63,7 +64,8 @@ def one_change_days(mixer: Floats, commands: list[str]) -> list[DayChanges]:
     days = [unchanged]
     for command, shares in zip(commands, mixer.T, strict=True):
         for shift in (-0.04, 0.04):
-            by, name = shift * shares, f"of {command} {shift:+.2f}"
+            by = shift * shares
+            name = f"of {command} {shift:+.2f}"
             days.append(replace(unchanged, name=f"trim {name}", trim_shift_commands=by))
             days.append(replace(unchanged, name=f"neutral {name}", neutral_shift_commands=by))
     days += [replace(unchanged, name=f"gain {gain:.2f}", common_gain=gain) for gain in (0.85, 1.15)]
@@ -179,7 +181,8 @@ def _score_days(
     kind: str, days: Sequence[DayChanges], folds: Sequence[tuple[Model, FitPart]], whole: Model
 ) -> Iterator[Document]:
     """Yield the scores of each day. whole: the model of all flights."""
-    A, Q = np.array(whole.past), np.array(whole.noise)
+    A = np.array(whole.past)
+    Q = np.array(whole.noise)
     for day in days:
         scores: dict[str, list[Document]] = {OUR_DETECTOR: [], _RIVAL_DETECTOR: []}
         for model, held_out in folds:

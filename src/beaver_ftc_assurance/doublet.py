@@ -65,7 +65,8 @@ def doublet(targets: dict[int, float], at: Situation) -> tuple[np.ndarray, int] 
     The times to the deflection are 1, 4, 16, ... frames, and LONGEST_S. The first time that has a doublet is
     taken, with the least amplitude. A longer time never lacks a doublet that a shorter one has: it can wait.
     """
-    tells, longest = 1, max(int(LONGEST_S / at.dt), 1)
+    tells = 1
+    longest = max(int(LONGEST_S / at.dt), 1)
     while (found := _least_amplitude(targets, at, tells)) is None:
         if tells == longest:
             return None
@@ -92,8 +93,11 @@ def _least_amplitude(targets: dict[int, float], at: Situation, tells: int) -> np
 
     if (np.abs(at.x) > at.rate).any() or not at.alpha_range[0] <= at.alpha <= at.alpha_range[1]:
         return None
-    frames, surfaces = 2 * (tells + at.held - 1), [*targets]
-    n, there, every = len(surfaces), slice(tells - 1, tells + at.held - 1), np.arange(frames)
+    frames = 2 * (tells + at.held - 1)
+    surfaces = [*targets]
+    n = len(surfaces)
+    there = slice(tells - 1, tells + at.held - 1)
+    every = np.arange(frames)
     unknowns = (2 * n + 4) * frames + 1
     blocks = [eye_array(frames, unknowns, k=block * frames, format="csr") for block in range(2 * n + 4)]
     A = csr_array((np.ones(frames), (every, np.full(frames, unknowns - 1))), shape=(frames, unknowns))
@@ -103,7 +107,8 @@ def _least_amplitude(targets: dict[int, float], at: Situation, tells: int) -> np
     equal: list[Any] = []  # rows that are zero
     above: list[tuple[Any, float]] = []  # rows, and what they are at most
     for u, p, s in zip(blocks[:n], blocks[n:], surfaces, strict=False):
-        away, (a, b) = targets[s] - at.u[s], at.remaining_way(s)
+        away = targets[s] - at.u[s]
+        (a, b) = at.remaining_way(s)
         m = b * (before @ p) + (1.0 - b) * u
         equal += [p - a * (before @ p) - (1.0 - a) * u, (u - before @ u)[there][1:]]
         above.append((-np.sign(away) * m[there], -abs(away)))
@@ -113,7 +118,8 @@ def _least_amplitude(targets: dict[int, float], at: Situation, tells: int) -> np
                 above.append((sign * (m - before @ m), at.step[s] * at.instants))
         turning = [row - at.dt * g * m for row, g in zip(turning, at.G[:, s], strict=True)]
     equal += [*turning, pitch - before @ pitch - at.dt * x[1]]
-    stops, rates = [at.stops[:, s] - at.u[s] for s in surfaces], [(-at.rate - x, at.rate - x) for x in at.x]
+    stops = [at.stops[:, s] - at.u[s] for s in surfaces]
+    rates = [(-at.rate - x, at.rate - x) for x in at.x]
     ends = [*stops, *[(-inf, inf)] * n, *rates, np.subtract(at.alpha_range, at.alpha)]
     bounds = np.vstack([np.repeat(ends, frames, axis=0), (0.0, inf)])
     bounds[[(block + 1) * frames - 1 for block in range(2 * n, 2 * n + 3)]] = 0.0  # the last rates

@@ -44,7 +44,8 @@ from beaver_ftc_assurance.certificates.kinds import hypothesis_of_type, travel_r
 from beaver_ftc_assurance.certificates.tape import Recorder, Tape, tape_of_flight_again
 from beaver_ftc_assurance.doublet import LONGEST_S, Situation, doublet
 
-FILE, FLOWN = "separation.json", "flown"
+FILE = "separation.json"
+FLOWN = "flown"
 MARGIN = 1.1  # M: G and B are those of the last frame, and change while the doublet is flown
 LARGEST_RATE_DEG_S = 20.0
 GRID = 801  # deflections tried over the travel
@@ -89,12 +90,14 @@ def separate(scenario: Scenario, rate_deg_s: float = LARGEST_RATE_DEG_S) -> Docu
     if not Declared.of(scenario).servo_errors.is_none:
         says = "fdi.bounds.actuators: where a doublet brings the surfaces is then not certain"
         raise BadInput(f"{scenario.name}: {says}, allowed with separate: none")
-    log, recorder = MemoryLog(), Recorder(scenario)
+    log = MemoryLog()
+    recorder = Recorder(scenario)
     landing = fly(scenario, log, watch=recorder.watch)
     if landing.detection_time_s is None:
         raise BadInput(f"{scenario.name}: no alarm was raised, allowed with separate: a flight with one")
     tape, history = _seen(scenario, log, recorder)
-    situation, left = situation_of(tape, scenario, radians(rate_deg_s)), [*candidates(tape, history)]
+    situation = situation_of(tape, scenario, radians(rate_deg_s))
+    left = [*candidates(tape, history)]
     names = scenario.airframe.surfaces
     if len(left) < 2:
         raise BadInput(f"{scenario.name}: one candidate or none is left, allowed with separate: two at least")
@@ -128,7 +131,8 @@ def _flown(scenario: Scenario, pair: Document, candidates: Sequence[Candidate]) 
         for k in _with_doublet(flight, scenario, pair):
             if k == _frames(scenario) - 1:
                 before = flight.readout.envelope_exits
-        still, both = {*_left(flight.readout.diagnosis)}, zip(candidates, pair["candidates"], strict=True)
+        still = {*_left(flight.readout.diagnosis)}
+        both = zip(candidates, pair["candidates"], strict=True)
         left = [words for one, words in both if (one.surface, one.kind) in still]
         return {"left": left, "envelope_exits": flight.readout.envelope_exits - before}
 
@@ -146,7 +150,8 @@ def _longer(scenario: Scenario, pair: Document) -> Iterator[Stepping]:
 
 def _with_doublet(flight: Stepping, scenario: Scenario, pair: Document) -> Iterator[int]:
     """Fly to the end of the scenario, then the doublet; yields the number of each frame after it is flown."""
-    frames, names = _frames(scenario), list(scenario.airframe.surfaces)
+    frames = _frames(scenario)
+    names = list(scenario.airframe.surfaces)
     yield 0
     for k in range(1, frames):
         flight.step()
@@ -193,8 +198,12 @@ def _seen(scenario: Scenario, log: MemoryLog, recorder: Recorder) -> tuple[Tape,
 
 def situation_of(tape: Tape, scenario: Scenario, rate: float) -> Situation:
     """The aircraft at the end of a flight; rate: largest allowed body rate, rad/s."""
-    frame, aircraft, dt = tape.last, scenario.airframe, 1.0 / scenario.rate_hz
-    bound, declared, actuators = frame.diagnosis.declared_bounds, declared_errors_of(frame), frame.actuators
+    frame = tape.last
+    aircraft = scenario.airframe
+    dt = 1.0 / scenario.rate_hz
+    bound = frame.diagnosis.declared_bounds
+    declared = declared_errors_of(frame)
+    actuators = frame.actuators
     coupled = declared.inertia_coupling * rate**2
     return Situation(
         G=frame.mean_G, u=frame.expected_u_rad, x=frame.rates_rad_s, rate=rate,
@@ -225,7 +234,8 @@ def candidates(tape: Tape, history: History) -> Iterator[Candidate]:
 
 def _left(diagnosis: DiagnosisReadout) -> Iterator[tuple[int, int]]:
     """Surface and type of each fault that is not excluded."""
-    estimators, layout = diagnosis.estimators, diagnosis.layout
+    estimators = diagnosis.estimators
+    layout = diagnosis.layout
     for s, surface in enumerate(diagnosis.surface_fault_types):
         if not diagnosis.diagnoses_all_types:
             e = layout.loss_estimator_index_by_surface[s]
@@ -288,7 +298,8 @@ def _types_apart(one: Candidate, other: Candidate, at: Situation) -> tuple[float
         (2.0 * MARGIN * B / abs(g) for B, g in zip(at.bound, at.G[:, s], strict=True) if g), default=inf
     )
     u = _deflections(at, s)
-    (low, high), (low_too, high_too) = one.deflection(u), other.deflection(u)
+    (low, high) = one.deflection(u)
+    (low_too, high_too) = other.deflection(u)
     gap = np.maximum(low - high_too, low_too - high)
     gap = np.minimum(gap, np.minimum(one.off(u), other.off(u)))  # else health explains the frame
     return _nearest(u, gap, s, at, room, "apart, and off their command,")
@@ -297,7 +308,8 @@ def _types_apart(one: Candidate, other: Candidate, at: Situation) -> tuple[float
 def _surface_shown(one: Candidate, other: Candidate, at: Situation) -> tuple[float | None, Document]:
     """The deflection nearest to the present one at which a fault shows in a direction in which the surface of
     the other one has no effect."""
-    a, b = one.surface, other.surface
+    a = one.surface
+    b = other.surface
     room = min(
         (2.0 * MARGIN * np.abs(d) @ at.bound / abs(d @ at.G[:, a]) for d in _blind_to(b, at, a)), default=inf
     )
@@ -314,7 +326,8 @@ def _blind_to(b: int, at: Situation, a: int) -> Iterator[np.ndarray]:
     """Directions d (3,) with d.G_b = 0, in which surface a has an effect."""
     for i, j in combinations(range(3), 2):
         d = np.zeros(3)
-        d[i], d[j] = at.G[j, b], -at.G[i, b]
+        d[i] = at.G[j, b]
+        d[j] = -at.G[i, b]
         for way in (d, *(np.eye(3)[k] for k in (i, j) if at.G[k, b] == 0.0)):
             if abs(way @ at.G[:, a]) > 1e-9 * np.abs(way).max():
                 yield way
@@ -325,7 +338,8 @@ def _nearest(
 ) -> tuple[float | None, Document]:
     """The deflection nearest to the present one among those of u with off > room, None if there is none; and
     the numbers that decide it. off (n,), rad: the difference at each of u."""
-    most, tells = degrees(off.max()), off > room
+    most = degrees(off.max())
+    tells = off > room
     numbers: Document = {"at_least_deg": degrees(room) if room < inf else None}
     numbers |= {"at_most_deg": most, "now_deg": degrees(at.u[s])}
     if not tells.any():
@@ -344,7 +358,8 @@ def doublets(scenario: Scenario, after_s: float, loss: float) -> dict[tuple[str,
     at = situation_of(
         tape_of_flight_again(healthy, [frames - 1], frames), healthy, radians(LARGEST_RATE_DEG_S)
     )
-    names, found = scenario.airframe.surfaces, {}
+    names = scenario.airframe.surfaces
+    found = {}
     for pair in combinations(scenario.airframe.class_of_losses, 2):
         one, other = (Candidate(names.index(name), LOSS, -loss, -loss) for name in pair)
         apart = tell_apart(one, other, at, names)
@@ -366,7 +381,8 @@ def as_text(document: Document) -> str:
     for pair in document["pairs"]:
         one, other = (f"{each['surface']} {each['type']}" for each in pair["candidates"])
         if pair["separates"]:
-            by, much = " and ".join(pair["commands_rad"]), pair["amplitude_deg"]
+            by = " and ".join(pair["commands_rad"])
+            much = pair["amplitude_deg"]
             moves = f"by {much:.3g} deg" if much > HELD_DEG else "held as now"
             says = f"{by} {moves}, told after {pair['time_s']:.3g} s"
             if "left" in pair:

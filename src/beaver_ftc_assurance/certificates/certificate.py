@@ -51,7 +51,8 @@ from beaver_ftc_assurance.certificates.tape import (
 
 EvidenceColumns = dict[str, "PartialColumn"]  # column of the log -> what stands in it
 Columns = dict[str, np.ndarray]
-FILE_NAME, LOG_NAME = "certificate.json", "log.parquet"
+FILE_NAME = "certificate.json"
+LOG_NAME = "log.parquet"
 MEASURED_MODEL_BOUND = "measured_rad_s", "design_rad_s2", "eta_bar_rad_s2"  # columns of each axis
 _LOGGED_COLUMNS = {"watch_missing"} | {f"{axis}_{of}" for axis in AXES for of in MEASURED_MODEL_BOUND}
 _EVENT_COLUMN = re.compile("detected|fie_.*_excluded")  # columns of the alarm and of exclusions
@@ -72,7 +73,8 @@ def certificate(
     """
     check_scheme(scenario)
     rows = logged_columns(log)
-    n, declares = len(rows["detected"]), to_yaml(scenario) if text is None else text
+    n = len(rows["detected"])
+    declares = to_yaml(scenario) if text is None else text
     document: Document = {
         "format": FORMAT_VERSION, "scenario": scenario.name,
         "scenario_sha256": hashlib.sha256(declares.encode()).hexdigest(),
@@ -141,7 +143,8 @@ class OfRun:
     def __init__(self, scenario: Scenario) -> None:
         """Raises BadInput for a flight whose alarm is not our scheme's."""
         check_scheme(scenario)
-        self._scenario, self._recorder = scenario, Recorder(scenario)
+        self._scenario = scenario
+        self._recorder = Recorder(scenario)
         self.watch = self._recorder.watch
 
     def write(self, folder: Path) -> None:
@@ -212,7 +215,9 @@ class _Flight:
 
     def statements(self, events: dict[str, int]) -> Iterator[Document]:
         """A statement for each event; one without sides says in `because` why it cannot be certified."""
-        alarm, diagnosis, tape = events["detected"], self.tape.alarm.diagnosis, self.tape
+        alarm = events["detected"]
+        diagnosis = self.tape.alarm.diagnosis
+        tape = self.tape
         about: Document = {"what": None, "column": "detected", "frame": alarm}
         ours = scheme_number("adaptive-estimators")
         ours_raised = diagnosis.estimators and diagnosis.enabled and diagnosis.scheme_number == ours
@@ -250,7 +255,8 @@ class _Flight:
 
     def _filter_alarm(self, k: int) -> Document | None:
         """A filter that left its bound at frame k."""
-        tape, every = self.tape, (0, 1, 2)
+        tape = self.tape
+        every = (0, 1, 2)
         if k <= tape.since:
             return None
         filtered = (filters(pole, tape.since, k, every) for pole in self._detection_poles)
@@ -264,7 +270,9 @@ class _Flight:
 
     def _exclusion(self, e: int, alarm: int, k: int) -> Document | None:
         """The test that the fault of estimator e failed at frame k."""
-        tape, config, history = self.tape, self.scenario.fdi, self.history
+        tape = self.tape
+        config = self.scenario.fdi
+        history = self.history
         estimator = tape.alarm.diagnosis.estimators[e]
         if k == 0:  # the first row has no innovation
             return None
@@ -300,7 +308,8 @@ class _Flight:
 
     def _types(self, alarm: int) -> Iterator[Document]:
         """A statement for each excluded type, surface by surface. Its column is one of `evidence_columns`."""
-        tape, history = self.tape, self.history
+        tape = self.tape
+        history = self.history
         if tape.alarm.diagnosis.types_config.frames_per_block > 1:
             tape, history, alarm = in_blocks(tape, history, alarm)
         any_block = len(tape.types) > 0
@@ -352,7 +361,8 @@ class _Flight:
         offset, slope and spread of its fault's effect and the range of its parameter; for each fault type on
         a surface whether it is excluded, and what the type is where the checker does not define it. The
         effects are known in the frames of the tape only."""
-        tape, surfaces = self.tape, self.scenario.airframe.surfaces
+        tape = self.tape
+        surfaces = self.scenario.airframe.surfaces
         found: EvidenceColumns = {}
         of_types = [one["what"].partition(" ")[0] for one in said if one["what"] and " " in one["what"]]
         wanted = {one["what"] for one in said} | {f"{surface}_position" for surface in of_types}

@@ -41,7 +41,8 @@ def alarm_evidence(
     diagnosis = tape.alarm.diagnosis
     b, h = _largest_score(diagnosis.statistical_filters)
     block = diagnosis.statistical_filters[b]
-    hypothesis, slot = block.hypotheses[h], int(np.argmax(block.hypothesis_tests_by_onset.score[h]))
+    hypothesis = block.hypotheses[h]
+    slot = int(np.argmax(block.hypothesis_tests_by_onset.score[h]))
     first = next((r for r in range(k, tape.first, -1) if restarting_slot(r - tape.since) == slot), None)
     if first is None or k - first >= MAX_WRITTEN_FRAMES:
         return None
@@ -103,7 +104,8 @@ def _likelihood_ratio(
     their rate errors, then drifts. known: the declared constants that act on these axes.
     """
     b, h, slot = test
-    dt, diagnosis = history.dt, tape.alarm.diagnosis
+    dt = history.dt
+    diagnosis = tape.alarm.diagnosis
     block = diagnosis.statistical_filters[b]
     span = slice(rows[0] - 1 - tape.first, rows[-1] + 1 - tape.first)
     recorded = {name: tape.filters[name][span] for name in ("bounded", "air", "leap")}

@@ -167,10 +167,16 @@ def is_below_one(value):
     return is_non_negative(value) and value < 1
 
 
-is_vector, is_pair, is_values = is_list_of(is_number, 3), is_list_of(is_number, 2), is_list_of(is_number)
-is_vectors, is_matrix, is_pairs = is_list_of(is_vector), is_list_of(is_values), is_list_of(is_values, 2)
-is_gappy, is_bounds = is_list_of(is_null_or(is_number)), is_list_of(is_non_negative)
-is_block, is_parts = is_list_of(is_row, 3), is_list_of(is_mapping)
+is_vector = is_list_of(is_number, 3)
+is_pair = is_list_of(is_number, 2)
+is_values = is_list_of(is_number)
+is_vectors = is_list_of(is_vector)
+is_matrix = is_list_of(is_values)
+is_pairs = is_list_of(is_values, 2)
+is_gappy = is_list_of(is_null_or(is_number))
+is_bounds = is_list_of(is_non_negative)
+is_block = is_list_of(is_row, 3)
+is_parts = is_list_of(is_mapping)
 # Of each object the fields that it needs, and those that it may have; an event has those of its evidence too.
 FORMS = {
     "certificate": (
@@ -272,7 +278,8 @@ def check_lengths(span, names):
 
 def check_likelihood_form(said):
     """Refuse lists of wrong sizes in a statistical alarm with n axes and m constants."""
-    n, m = len(said["axes"]), len(said["tolerance"])
+    n = len(said["axes"])
+    m = len(said["tolerance"])
     require(n in (1, 2) and len(set(said["axes"])) == n, "axes: one or two different ones are allowed")
     require(len(said["R"]) == n, "R: one variance for each axis")
     require([len(line) for line in said["P"]] == [2 * n] * (2 * n), "P: two states for each axis")
@@ -284,7 +291,8 @@ def check_likelihood_form(said):
         check_form(its, *FORMS["frame"], "frame")
         for name in ("signature", "jitter", "bounded", "air", "foreseen"):
             require(len(its.get(name, [0] * n)) == n, f"{name}: one value for each axis")
-        drift, known = np.array(its["drift"]), its.get("known", [])
+        drift = np.array(its["drift"])
+        known = its.get("known", [])
         require(drift.shape == (n, n) and np.allclose(drift, drift.T), "drift is no covariance")
         require((np.linalg.eigvalsh(drift) >= -1e-9 * np.abs(drift).max()).all(), "drift is no covariance")
         require(len(known) == m and all(len(line) == n for line in known), "known: a value for each constant")
@@ -314,8 +322,10 @@ def declared_at_row(scenario, row_number):
     require(
         isinstance(scenario, dict) and isinstance(scenario.get("fdi"), dict), "the scenario is no scenario"
     )
-    fdi, rate = scenario["fdi"], float(scenario["rate_hz"])
-    sensors, start_row = fdi["bounds"]["sensors"], 0
+    fdi = scenario["fdi"]
+    rate = float(scenario["rate_hz"])
+    sensors = fdi["bounds"]["sensors"]
+    start_row = 0
     for change in scenario.get("changes") or []:
         begins = int(np.ceil((change["at_s"] - 1e-9) * rate))
         if begins <= row_number:
@@ -390,12 +400,16 @@ class Frames:
     """
 
     def __init__(self, document, log, declared, block=None):
-        self.log, self.declared = log, declared
+        self.log = log
+        self.declared = declared
         length, begin, end = block or (1, 0, len(log["t_s"]))
         require(length >= 1 and 0 <= begin < end <= len(log["t_s"]) and (end - begin) % length == 0,
                 "the block has other rows")  # fmt: skip
-        self.length, self.begin, self.rows = length, begin, slice(begin, end)
-        self.dt, instants = declared.dt * length, declared.instants
+        self.length = length
+        self.begin = begin
+        self.rows = slice(begin, end)
+        self.dt = declared.dt * length
+        instants = declared.instants
         self.model_rad_s2, self.eta_bar_rad_s2 = (
             self.mean(self.columns(f"{{}}_{of}_rad_s2")) for of in ("design", "eta_bar")
         )
@@ -449,7 +463,8 @@ def errors_by_row(measured, document):
     c, b, g, o, B, m = (
         np.array([document["declared"][name].get(axis, 0.0) for axis in AXES]) for name in "cbgoBm"
     )
-    x, earth = np.abs(measured), document.get("omega_E", 0.0)
+    x = np.abs(measured)
+    earth = document.get("omega_E", 0.0)
     w = x + (o + m * x) / (1 - m)
     of_earth = earth * ((1 + g) * w.sum(axis=1, keepdims=True) + g * earth)
     return o - B + m * w, c * w[:, [1, 0, 0]] * w[:, [2, 2, 1]] + b + of_earth + ROUNDING_RAD_S2
@@ -469,7 +484,8 @@ def event_column(what, log):
 def check_event(said, log):
     """Refuse an event whose column is not set from the stated row to the end, or was set in the row
     before."""
-    name, k = said["column"], said["frame"]
+    name = said["column"]
+    k = said["frame"]
     require(name == event_column(said["what"], log), f"{name} is another column than that of this event")
     require(name in log, f"the log has no column {name}: it was not written with this certificate")
     values = np.asarray(log[name], float)
@@ -523,9 +539,13 @@ def effect_of_fault(what, frames):
         return Effect(offset, slope, spread, low, high)
     gain, is_share, is_constant, low, high = relation_of(what, frames.log, low, high)
     # G (p - u) of the relation; offset and slope are those of the surface's position: -G u and G
-    h, Z = (1.0 - gain) * offset, -offset if is_share else slope
+    h = (1.0 - gain) * offset
+    Z = -offset if is_share else slope
     if low == high:
-        h, Z, low, high = h + low * Z, np.zeros_like(Z), 0.0, 0.0
+        h = h + low * Z
+        Z = np.zeros_like(Z)
+        low = 0.0
+        high = 0.0
     return Effect(h, Z, spread, low, high, bool(is_constant))
 
 
@@ -544,7 +564,8 @@ def course_of(what, log):
 def relation_of(what, log, low, high):
     """How a type moves the surface (RELATIONS); low, high: the travel, rad. For a type with a course, theta
     is the position of the surface; for a swing, its distance from the command."""
-    kind, course = what.partition(" ")[2], course_of(what, log)
+    kind = what.partition(" ")[2]
+    course = course_of(what, log)
     if course is not None:
         return Relation(float(course[0] == "swing"), False, False, low, high)
     if kind in RELATIONS:
@@ -567,7 +588,8 @@ def constant_value(values):
 
 def term_pairs(said, frames):
     """The sum of `weight` times d.E, and the most that bounds, noise and fault allow."""
-    what, effect = said["what"], effect_of_fault(said["what"], frames)
+    what = said["what"]
+    effect = effect_of_fault(said["what"], frames)
     has_course = what is not None and " " in what and course_of(what, frames.log) is not None
     require(not has_course, "a sum of frames says nothing of this type")
     check_theta(said, effect, frames)
@@ -582,7 +604,8 @@ def check_theta(said, effect, frames):
     """Refuse ends of theta's range that are not the log's, and a constant theta that nothing justifies."""
     for end, known in (("least", effect.theta_low), ("most", effect.theta_high)):
         require(said.get(end, known) == known, f"{end} is not the end of theta's range in the log")
-    fdi, alarm = frames.declared.scenario["fdi"], int(np.argmax(np.asarray(frames.log["detected"]) == 1))
+    fdi = frames.declared.scenario["fdi"]
+    alarm = int(np.argmax(np.asarray(frames.log["detected"]) == 1))
     if said["theta"] == "constant":
         declares = fdi["fault_profile"] == "abrupt" or fdi["thresholds"] == "published"
         require(said["what"] and declares, "the scenario does not declare a constant parameter")
@@ -598,7 +621,8 @@ def check_theta(said, effect, frames):
 def check_term_frames(term, said, frames):
     """Refuse frames `since`, `first` and k of a term that are out of order, later than the event, or before
     the diagnosis started. A term without a pole has one frame, since = k - 1. Returns `since`."""
-    k, first = term["frame"], term["first"]
+    k = term["frame"]
+    first = term["first"]
     since = term.get("since", k - 1)
     begun = frames.declared.start_row if frames.length == 1 else 0
     require(begun <= since < first <= k < len(frames.rates_rad_s), "the frames of a term are not in order")
@@ -622,11 +646,14 @@ def evaluate_term(term, said, frames, effect):
     without theta if theta is constant. The field `fault`, rad/s, is the effect that the filter has summed up
     to frame first - 1; it must be at least the sum of the logged effects there.
     """
-    k, first = term["frame"], term["first"]
-    dt, d = frames.dt, np.array(term["d"])
+    k = term["frame"]
+    first = term["first"]
+    dt = frames.dt
+    d = np.array(term["d"])
     decay = exp(-term["pole_per_s"] * dt) if "pole_per_s" in term else 0.0
     since = check_term_frames(term, said, frames)
-    summed, size = np.arange(since + 1, k + 1), np.abs(d)
+    summed = np.arange(since + 1, k + 1)
+    size = np.abs(d)
     weights = decay ** (k - summed.astype(float))  # of each frame's input, at frame k
     noise = frames.gyro_change_rad_s @ size
     value = weights @ (dt * frames.innovation_rad_s2[summed] @ d)
@@ -664,7 +691,8 @@ def check_logged_values(term, frames, rows):
     logged = {"x": frames.rates_rad_s, "F": frames.model_rad_s2, "eta_bar": frames.eta_bar_rad_s2}
     for name, values in logged.items():
         require(np.allclose(term[name], values[rows], 1e-13, 0), f"{name} is not that of the log")
-    rest, eta_bar = np.array(term.get("rest", np.zeros((1, 3)))), frames.eta_bar_rad_s2[rows]
+    rest = np.array(term.get("rest", np.zeros((1, 3))))
+    eta_bar = frames.eta_bar_rad_s2[rows]
     require((rest >= -1e-13 * eta_bar).all(), "rest: a part of a bound is below zero")
     require(
         np.allclose(frames.stated_bound_rad_s2[rows] + rest, eta_bar, 3e-14, 0),
@@ -726,12 +754,14 @@ def offset_pairs(said, course, frames):
 
     lower - u  >  upper - u_upper,    lower  >  low stop,    high stop  >  upper
     """
-    stops, travel = said["stops"], course.travel
+    stops = said["stops"]
+    travel = course.travel
     require(
         len(stops) == 2 and stops[0] >= travel[0] - 1e-12 and stops[1] <= travel[1] + 1e-12,
         "stops: beyond the travel in the log",
     )
-    lower, upper = course.lower[0], course.upper
+    lower = course.lower[0]
+    upper = course.upper
     return [(lower - course.command[0], upper - course.upper_command), (lower, stops[0]), (stops[1], upper)]
 
 
@@ -782,7 +812,8 @@ def approach_pairs(said, course, frames):
     require(course.upper_frame == course.first, "the bound from above is not of the first frame")
     require(len(said["ordered"]) == len(course.lower), "ordered: frames are missing")
     require(said["near"] >= max(said["ordered"]), "near is nearer than the order itself")
-    ahead, last = course.lower - said["ordered"], course.lower[-1]
+    ahead = course.lower - said["ordered"]
+    last = course.lower[-1]
     come = said.get("step", 0.0) * (course.last - course.first - 1)
     return [(ahead.min(), 0.0), (ahead.sum(), 0.0), (last, course.upper - come), (last, said["near"]),
             (1.0, 0.0)]  # fmt: skip
@@ -858,11 +889,18 @@ def whitened_sums(said, frames):
 
     room = sum f D / (f K_values / dt + K_drifts).|w| + min(sum L.|w - w before| + L.|w last|, sum pace L.|w|)
     """
-    dt, axes, n = frames.dt, said["axes"], len(said["axes"])
+    dt = frames.dt
+    axes = said["axes"]
+    n = len(said["axes"])
     Y, P, R = (array_with_zeros(said[name]) for name in ("Y", "P", "R"))
-    values, drifts = slice(None, n), slice(n, None)
-    sums, stayed, swung, paced = 0.0, 0.0, 0.0, 0.0
-    w, last_swing = np.zeros(n), 0.0
+    values = slice(None, n)
+    drifts = slice(n, None)
+    sums = 0.0
+    stayed = 0.0
+    swung = 0.0
+    paced = 0.0
+    w = np.zeros(n)
+    last_swing = 0.0
     for k, its in enumerate(said["frames"], said["first"]):
         # Prediction: the frame's inputs come in, and the drift forgets a part of itself.
         innovation = frames.innovation_rad_s2[k, axes] - its.get("air", 0)
@@ -875,7 +913,8 @@ def whitened_sums(said, frames):
         # Weights of this frame's innovation.
         inverse = np.linalg.inv(P[values, values] + np.diag(R))
         K = P[:, values] @ inverse
-        before, w = w, inverse @ Y[values, 1]
+        before = w
+        w = inverse @ Y[values, 1]
         sums = sums + w @ np.column_stack([Y[values], its.get("foreseen", np.zeros(n))])
         # Room: a drift that stays at its bound, and one that swings from one end to the other.
         bounded = np.array(its.get("bounded", [0] * n))
@@ -885,7 +924,8 @@ def whitened_sums(said, frames):
         paced += its.get("pace", NO_PACE) * last_swing
         stayed += forgets * bounded / (np.diag(K) * forgets / dt + np.diag(K[drifts])) @ np.abs(w)
         # Correction.
-        Y, P = Y - K @ Y[values], P - K @ P[values]
+        Y = Y - K @ Y[values]
+        P = P - K @ P[values]
     return np.asarray(sums), stayed + min(swung + last_swing, paced)
 
 
@@ -922,7 +962,8 @@ def monitor_pairs(said, frames):
 
     sum of (reading - prediction)  >  sum of (largest difference)    over the entries of `looks`
     """
-    log, k = frames.log, said["frame"]
+    log = frames.log
+    k = said["frame"]
     require(said["what"] is None, "instruments raise an alarm, they exclude no surface")
     require({"watch_share", "watch_test"} <= set(log), "the log has no test between instruments")
     require(TESTS[int(log["watch_test"][k])] == said["test"], "the log has another test in this row")

@@ -82,7 +82,8 @@ class SurfaceBounds:
 
     def _bound_fields(self, held: Hypothesis, frames: range, axis: int, side: int) -> Document:
         """Fields of frames that bound the surface by an axis: from below (side 1), or above (-1)."""
-        first, last = self.first_frame + frames[0], self.first_frame + frames[-1]
+        first = self.first_frame + frames[0]
+        last = self.first_frame + frames[-1]
         d = np.zeros(3)
         d[axis] = side * self.sign * np.sign(held.slope[first - held.first_frame, axis])
         h, Z, r = held.along(d, slice(first, last + 1))
@@ -96,7 +97,8 @@ def _exclude_offset(bounds: SurfaceBounds, grows: bool = False) -> Document | No
 
     At a stop the position says nothing about the offset. The range of the command in a frame of several
     instants brings both stops nearer."""
-    least, most = bounds.lower.max(axis=1), bounds.upper.min(axis=1)
+    least = bounds.lower.max(axis=1)
+    most = bounds.upper.min(axis=1)
     low_stop = bounds.stops[0] + bounds.command_range[:, 0]
     high_stop = bounds.stops[1] - bounds.command_range[:, 1]
     above_stop = bounds.is_unexplained & (least > low_stop + MIN_POSITION_DIFFERENCE_RAD)
@@ -119,7 +121,8 @@ def _exclude_offset(bounds: SurfaceBounds, grows: bool = False) -> Document | No
 
 def _farthest(lower: np.ndarray, upper: np.ndarray) -> tuple[int, int] | None:
     """The frames with the greatest lower and the least upper bound, if these contradict one another."""
-    i, j = int(np.argmax(lower)), int(np.argmin(upper))
+    i = int(np.argmax(lower))
+    j = int(np.argmin(upper))
     return (i, j) if lower[i] > upper[j] + MIN_POSITION_DIFFERENCE_RAD else None
 
 
@@ -136,9 +139,12 @@ def _first_smaller(lower: np.ndarray, upper: np.ndarray) -> tuple[int, int] | No
 def _exclude_runaway(bounds: SurfaceBounds) -> Document | None:
     """Exclude a runaway at its least rate or faster: a later frame shows less travel. In a frame of several
     instants the lower bound may hold only in the last one: the way of one frame is then not counted."""
-    rate, high_stop = bounds.actuator.min_runaway_rate_rad_s, bounds.stops[1]
-    step, late_frames = rate * bounds.config.block_duration_s, int(not bounds.config.single_instant)
-    least, most = bounds.lower.max(axis=1), bounds.upper.min(axis=1)
+    rate = bounds.actuator.min_runaway_rate_rad_s
+    high_stop = bounds.stops[1]
+    step = rate * bounds.config.block_duration_s
+    late_frames = int(not bounds.config.single_instant)
+    least = bounds.lower.max(axis=1)
+    most = bounds.upper.min(axis=1)
     # lower bound of each frame, traced back to frame 0 at the least rate
     traced_back = np.where(bounds.is_unexplained, least - step * np.arange(len(least)), -np.inf)
     below_stop = most < high_stop - MIN_POSITION_DIFFERENCE_RAD
@@ -171,15 +177,19 @@ def _exclude_rate_limit(bounds: SurfaceBounds) -> Document | None:
     """Exclude a reduced rate limit: such a surface approaches its order by at least the least step in each
     instant, until it is so near that its lag makes the steps smaller. In a run of frames beyond all orders, a
     later frame shows a position farther away."""
-    actuator, config = bounds.actuator, bounds.config
+    actuator = bounds.actuator
+    config = bounds.config
     min_approach = config.n_substeps * config.frames_per_block * actuator.slow_step_rad  # of a frame, rad
-    orders, most = bounds.max_order, bounds.upper.min(axis=1)
+    orders = bounds.max_order
+    most = bounds.upper.min(axis=1)
     # upper bound of each frame, traced back to frame 0 at the least approach
     traced_back = most + min_approach * np.arange(len(most))
     for axis, beyond, starts in bounds.runs_beyond(orders):
         for k in np.flatnonzero(starts < np.arange(len(starts))).tolist():
             i = int(starts[k]) + int(np.argmin(traced_back[starts[k] : k]))
-            run, upper, reached = range(i, k + 1), most[i] - min_approach * (k - i - 1), bounds.lower[k, axis]
+            run = range(i, k + 1)
+            upper = most[i] - min_approach * (k - i - 1)
+            reached = bounds.lower[k, axis]
             near = float(orders[i : k + 1].max()) + actuator.lag_distance_rad
             if reached > max(upper, near) + MIN_POSITION_DIFFERENCE_RAD:
                 fields = {"ordered": orders[i : k + 1].tolist(), "near": near}
@@ -208,7 +218,8 @@ def evidence(
 ) -> Document | None:
     """The fields of the statement that excludes a fault type on a surface by its course; None if there is no
     such statement."""
-    held, row = hypothesis_of_type(tape, surface, STUCK), TYPES[fault_type]
+    held = hypothesis_of_type(tape, surface, STUCK)
+    row = TYPES[fault_type]
     for sign in (row.stop_direction,) if row.stop_direction else (1, -1):
         bounds = _surface_bounds(scenario, tape, history, held, surface, alarm_frame, sign)
         found = RULES[row.frames_test](bounds)
@@ -228,7 +239,8 @@ def _surface_bounds(
 ) -> SurfaceBounds:
     """The bounds of the frames from the alarm on in which the diagnosis has tested types. held: hypothesis by
     which a frame bounds the position."""
-    frames, several = np.arange(alarm_frame, tape.end - 1), not history.has_single_instants
+    frames = np.arange(alarm_frame, tape.end - 1)
+    several = not history.has_single_instants
     diagnosis = tape.last.diagnosis
     here = slice(alarm_frame - tape.first, tape.end - 1 - tape.first)
     lower, upper, _ = theta_bounds_by_frame(held, history, frames)

@@ -97,13 +97,15 @@ class History:
     @cached_property
     def gyro_error_change_rad_s(self) -> np.ndarray:
         """n of docs/explanation/detection.md, "Changing error of a gyro", (frames, 3)."""
-        declared, x = self.declared, self.rates_rad_s
+        declared = self.declared
+        x = self.rates_rad_s
         changing = declared.gyro_offset_rad_s - declared.gyro_constant_rad_s
         return np.asarray(changing + declared.gyro_slope * self._largest(x))
 
     def _largest(self, x: np.ndarray) -> np.ndarray:
         """Bound on |true rate| by readings x, (n, 3)."""
-        offset, slope = self.declared.gyro_offset_rad_s, self.declared.gyro_slope
+        offset = self.declared.gyro_offset_rad_s
+        slope = self.declared.gyro_slope
         return np.asarray(np.abs(x) + (offset + slope * np.abs(x)) / (1.0 - slope))
 
     @cached_property
@@ -125,8 +127,10 @@ class History:
     def unstated_bound_rad_s2(self) -> np.ndarray:
         """The part of eta_bar that does not follow from the declared errors, (frames, 3): it is without
         inertia, constant and Earth, at the row before."""
-        declared, rates = self.declared, self._largest(self.x)
-        earth, gain = declared.earth_rad_s, declared.earth_gain
+        declared = self.declared
+        rates = self._largest(self.x)
+        earth = declared.earth_rad_s
+        gain = declared.earth_gain
         by_earth = earth * ((1.0 + gain) * rates.sum(axis=1, keepdims=True) + gain * earth) + ROUNDING_RAD_S2
         stated = declared.inertia_coupling * self.products() + declared.constant_rad_s2 + by_earth
         unstated = self.eta_bar - _row_before(stated) * (1.0 / self.instants)
@@ -176,7 +180,8 @@ def _by_axis(numbers: Mapping[str, np.ndarray]) -> Document:
 
 def declared_errors_of(frame: FrameReadout) -> DeclaredErrors:
     """The declared errors in a flight's record, with the coefficients of inertia that they multiply."""
-    bound, inertia = frame.diagnosis.declared_bounds, frame.inertia
+    bound = frame.diagnosis.declared_bounds
+    inertia = frame.inertia
     size = {name: abs(value) for name, value in inertia._asdict().items()}
     gains = (
         size["Ppq"] + size["Pqr"],

@@ -22,7 +22,9 @@ from beaver_ftc_assurance.certificates.history import ROUNDING_SHARE, History
 N_WRITTEN_FRAMES = 16  # of a filter; what was before them is stated as the filter's state
 MIN_RELATIVE_MARGIN = 1e-9  # by which the left side is larger, over the larger side: summation may do less
 MIN_SLOPE = 1e-12  # of a sum in theta: a smaller one is rounding, as where theta drops out of two terms
-ANY, CONSTANT, CONSTANT_WHILE_SHOWN = "any", "constant", "constant while it shows"  # theta of a statement
+ANY = "any"  # theta of a statement
+CONSTANT = "constant"
+CONSTANT_WHILE_SHOWN = "constant while it shows"
 MEMORY_TIME_CONSTANTS = 16.0  # of a filter: of an older innovation less than e^-16 is left
 
 
@@ -116,8 +118,13 @@ class Inequality:
             noise = n[k] + a^(k-s-1) n[s] + (1-a) sum_{s<j<k} a^(k-1-j) n[j],   n = |change of gyro error|.|d|
 
         s: filter_start; k: last_frame; a: decay of the filter in a frame, 0 for an infinite pole."""
-        of, history, d, dt = self.hypothesis, self.history, term.direction, self.history.dt
-        start, last, first = term.filter_start, term.last_frame, self._first_written_frame(term)
+        of = self.hypothesis
+        history = self.history
+        d = term.direction
+        dt = self.history.dt
+        start = term.filter_start
+        last = term.last_frame
+        first = self._first_written_frame(term)
         a = exp(-term.pole_per_s * dt)
         summed = slice(start + 1, last + 1)
         weights = _filter_weights(a, last - start)
@@ -129,7 +136,8 @@ class Inequality:
         before = _filtered(a, dt, of.max_effects(d, slice(begin, first)), term.effect_before)
         rows = slice(first, last + 1)
         h, Z, r = of.along(d, rows)
-        at_low, at_high = h + of.theta_low * Z, h + of.theta_high * Z
+        at_low = h + of.theta_low * Z
+        at_high = h + of.theta_high * Z
         if of.theta == ANY:
             done = of.max_effects(d, rows)
             slope = 0.0
@@ -146,7 +154,8 @@ class Inequality:
     def _fields_of(self, term: Term, rows: slice, before: float, adds: np.ndarray) -> Document:
         """The fields of a term whose frames `rows` are written out. before: largest effect of the fault
         before them, rad/s; adds (frames,): whether the fault's effect is more than rounding."""
-        history, is_filtered = self.history, not isinf(term.pole_per_s)
+        history = self.history
+        is_filtered = not isinf(term.pole_per_s)
         said: Document = {"weight": term.weight, "d": term.direction.tolist()}
         said |= {"pole_per_s": term.pole_per_s, "since": term.filter_start} if is_filtered else {}
         said |= {"first": rows.start, "frame": term.last_frame}
@@ -168,7 +177,8 @@ class Inequality:
         last = term.last_frame
         if isinf(term.pole_per_s):
             return last
-        of, start = self.hypothesis, term.filter_start
+        of = self.hypothesis
+        start = term.filter_start
         longest = N_WRITTEN_FRAMES if of.theta == ANY else last - start
         remembered = int(MEMORY_TIME_CONSTANTS / (term.pole_per_s * self.history.dt))
         first = last + 1 - max(min(longest, remembered), 1)
@@ -211,7 +221,8 @@ def single_frame_tests(frame: int, hypothesis: Hypothesis) -> Iterator[list[Term
     for i, j in combinations(hypothesis.axes, 2):
         if slope[i] or slope[j]:
             d = np.zeros(3)
-            d[i], d[j] = slope[j], -slope[i]
+            d[i] = slope[j]
+            d[j] = -slope[i]
             d /= np.abs(d).max()
             yield from ([Term(way, inf, frame - 1, frame)] for way in (d, -d))
 
@@ -249,7 +260,8 @@ def constant_theta_tests(hypothesis: Hypothesis, history: History, frames: np.nd
         (np.unravel_index(np.argmin(upper), upper.shape), -1.0, upper.min() < hypothesis.theta_high),
     ):
         if is_bound:  # the term that bounds theta from below, or above
-            frame, direction = int(frames[0] + place[0]), np.zeros(3)
+            frame = int(frames[0] + place[0])
+            direction = np.zeros(3)
             direction[place[1]] = sign * np.sign(slope[place])
             weight = 1.0 / (history.dt * abs(float(slope[place])))
             terms.append(Term(direction, inf, frame - 1, frame, weight))

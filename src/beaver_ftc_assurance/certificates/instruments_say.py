@@ -26,7 +26,8 @@ def alarm_evidence(monitor: SensorMonitor, rows: Mapping[str, np.ndarray], k: in
     monitor: at the alarm, in row k of the log. The certificate's field `looks` lists the comparisons that the
     residual of the test adds up: (reading, prediction, largest difference with sound instruments).
     """
-    number, failed = monitor.worst_test_index, monitor.top_ratio > 1.0
+    number = monitor.worst_test_index
+    failed = monitor.top_ratio > 1.0
     if failed and number >= len(TESTS):
         return {"because": BECAUSE_NO_EQUATION}
     if failed:
@@ -34,7 +35,8 @@ def alarm_evidence(monitor: SensorMonitor, rows: Mapping[str, np.ndarray], k: in
         value = sum(reading - predicted for reading, predicted, _ in compared)
         limit = sum(bound for *_, bound in compared)
         if value < 0.0:  # the checker requires a positive sum: exchange reading and prediction
-            compared, value = [[predicted, reading, bound] for reading, predicted, bound in compared], -value
+            compared = [[predicted, reading, bound] for reading, predicted, bound in compared]
+            value = -value
         if value > limit:
             return {"test": TESTS[number], "looks": compared, "sides": [value, limit]}
         return {"because": BECAUSE_BETWEEN_ROWS}
@@ -53,7 +55,8 @@ def _comparisons(monitor: SensorMonitor) -> Iterator[list[float]]:
     First that of the last sample; for a filtered test then [sum, 0, bound] of all samples before, as the
     filter with the largest ratio of residual to bound keeps them.
     """
-    test, number = monitor.worst_test, monitor.worst_test_index
+    test = monitor.worst_test
+    number = monitor.worst_test_index
     name = TESTS[number]  # of a sensor; else (rotation, density) only the residual is known
     predicted = float(monitor.predicted_reading[SENSORS.index(name)]) if name in SENSORS else 0.0
     if number >= RPM_TEST:  # the tests of the engine are not filtered
@@ -67,7 +70,8 @@ def _comparisons(monitor: SensorMonitor) -> Iterator[list[float]]:
         + test.gust_gain * monitor.gust_change_mps[pole]
     )
     yield [predicted + test.residual, predicted, sample_bound]
-    total, total_bound = test.filtered_residual[pole], test.filtered_bound[pole]
+    total = test.filtered_residual[pole]
+    total_bound = test.filtered_bound[pole]
     earlier = np.array([total - test.residual, total_bound - sample_bound])
     earlier[np.abs(earlier) <= ROUNDING_SHARE * np.array([abs(total), total_bound])] = 0.0
     yield [float(earlier[0]), 0.0, max(float(earlier[1]), 0.0)]

@@ -71,7 +71,8 @@ def travel_rad(tape: Tape, s: int) -> tuple[float, float]:
 def type_definition_columns(tape: Tape, surface: str, s: int, kind: int) -> dict[str, float]:
     """The columns of the log, each with its constant, that define a type which the checker does not
     define."""
-    row, name = TYPES[kind], exclusion_name(surface, kind).replace(" ", "_")
+    row = TYPES[kind]
+    name = exclusion_name(surface, kind).replace(" ", "_")
     if WORDS[kind] in {*RELATIONS, *COURSES}:
         return {}
     if row.frames_test:
@@ -91,18 +92,25 @@ def type_definition_columns(tape: Tape, surface: str, s: int, kind: int) -> dict
 def hypothesis_of_type(tape: Tape, surface: int, fault_type: int) -> Hypothesis:
     """The effect on the innovation of a fault of this type on a surface, G (p - u); p: position of the
     surface, by the relation of the type; u: command in effect, rad. That of `STUCK` bounds the position."""
-    row, diagnosis = TYPES[fault_type], tape.alarm.diagnosis
+    row = TYPES[fault_type]
+    diagnosis = tape.alarm.diagnosis
     assert row.deflection_relation is not None
     gain, theta_is_share, theta_span = row.deflection_relation
     e = diagnosis.layout.position_estimator_index_by_surface[surface]
-    Gu, G, spread = -tape.offset[:, e], tape.slope[:, e], tape.spread[:, e]
+    Gu = -tape.offset[:, e]
+    G = tape.slope[:, e]
+    spread = tape.spread[:, e]
     axes = diagnosis.estimators[e].active_axes
     if diagnosis.types_config.frames_per_block > 1:  # blocks: the axis on which no effect changes its sign
         axes = (diagnosis.layout.dominant_axis_by_surface[surface],)
     low, high = theta_span(*travel_rad(tape, surface))
-    offset, slope = (gain - 1.0) * Gu, Gu if theta_is_share else G
+    offset = (gain - 1.0) * Gu
+    slope = Gu if theta_is_share else G
     if low == high:  # theta is known
-        offset, slope, low, high = offset + low * slope, 0.0 * slope, 0.0, 0.0
+        offset = offset + low * slope
+        slope = 0.0 * slope
+        low = 0.0
+        high = 0.0
     theta = CONSTANT_WHILE_SHOWN if row.has_constant_parameter else ANY
     return Hypothesis(tape.first, offset, slope, spread, low, high, theta, axes)
 

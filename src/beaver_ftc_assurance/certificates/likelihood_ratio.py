@@ -103,7 +103,8 @@ class LikelihoodRatio:
             if not self._is_as(replace(self, tolerance=self.tolerance - one))
         ]
         if len(matters) > MAX_WRITTEN_CONSTANTS:
-            short, matters = short._with_constants_merged(), [0]
+            short = short._with_constants_merged()
+            matters = [0]
         Y = short.Y[:, [0, 1, *(2 + j for j in matters)]]
         series = short.series
         if series.known is not None:

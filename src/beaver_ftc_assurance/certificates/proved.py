@@ -34,7 +34,8 @@ def proved(scenario: Scenario, frames: np.ndarray, flown: Iterable[int]) -> Cert
 def proof(scenario: Scenario, log: Log) -> Proof:
     """The certificate of a flight that kept its log, flown once more. Raises BadInput where another scheme
     than ours diagnosed."""
-    found, whole = certificate(scenario, log), Columns()
+    found = certificate(scenario, log)
+    whole = Columns()
     found.copy_log(whole)
     whole.close()
     return Proof(found.document, dict(whole), found.scenario)
@@ -42,7 +43,8 @@ def proof(scenario: Scenario, log: Log) -> Proof:
 
 def _log(frames: np.ndarray, flown: Iterable[int], scenario: Scenario, recorder: Recorder) -> MemoryLog:
     """A log of all frames, with the columns that a certificate reads."""
-    log, surfaces = MemoryLog(), scenario.airframe.surfaces
+    log = MemoryLog()
+    surfaces = scenario.airframe.surfaces
     names = estimator_names(scenario.fdi.fault_class, scenario.airframe)
     columns = ["t_s", *(f"{axis}_{what}" for what in MEASURED_MODEL_BOUND for axis in AXES), "detected"]
     columns += [f"fie_{name}_excluded" for name in names]

@@ -73,10 +73,12 @@ class _RecordWords:
 
     def read(self, rows: np.ndarray) -> dict[str, np.ndarray]:
         """The quantities, (frames, ...), that were kept as rows (frames, words)."""
-        found, place = {}, 0
+        found = {}
+        place = 0
         for name, (dtype, shape, n) in self._what.items():
             words = np.ascontiguousarray(rows[:, place : place + n])
-            found[name], place = words.view(dtype).reshape(len(rows), *shape), place + n
+            found[name] = words.view(dtype).reshape(len(rows), *shape)
+            place = place + n
         return found
 
 
@@ -96,8 +98,10 @@ class Recorder:
         """Begin to keep frames of the record `frames`, the first of them number 0."""
         numbers = take_memory((1,), frames.dtype)
         _words_of(numbers)[:] = np.arange(frames.nbytes // 8)
-        config, n = self._scenario.fdi, len(FrameReadout(frames[0]).diagnosis.estimators)
-        every_type, statistical = config.fault_class == "all", config.statistical is not None
+        config = self._scenario.fdi
+        n = len(FrameReadout(frames[0]).diagnosis.estimators)
+        every_type = config.fault_class == "all"
+        statistical = config.statistical is not None
         arrays = recorded_arrays(numbers[0], n, every_type, statistical)
         self._always, self._early = map(_RecordWords, arrays)
         self._state = np.array([0, -1, 0, *alarm_flags(numbers[0])])
@@ -105,8 +109,10 @@ class Recorder:
         ring = 1 + (STATISTICAL_FRAMES_BEFORE_ALARM if statistical else FRAMES_BEFORE_ALARM)
         self._ring = np.empty((ring, len(self._early.words)), np.int64)
         self._kept = np.empty((ring + MAX_FRAMES_AFTER_ALARM, len(self._always.words)), np.int64)
-        self._frames, self._alarm = frames, copy_memory(frames)
-        words, alarm = _words_of(frames), _words_of(self._alarm)
+        self._frames = frames
+        self._alarm = copy_memory(frames)
+        words = _words_of(frames)
+        alarm = _words_of(self._alarm)
         places = self._always.words, self._early.words
         self._arguments = words, *places, self._kept, self._ring, alarm, self._state
         self._keep_frame = direct(keep_frame, *self._arguments)
@@ -121,11 +127,14 @@ class Recorder:
 
     def tape(self, events: Sequence[int], rows: int) -> Tape:
         """The frames around `events`. rows: number of frames of the flight."""
-        last, config = FrameReadout(self._last[0]), self._scenario.fdi
+        last = FrameReadout(self._last[0])
+        config = self._scenario.fdi
         seen, alarm, clear = self._state[:3].tolist()
-        ring, raised = len(self._ring), alarm >= 0
+        ring = len(self._ring)
+        raised = alarm >= 0
         alarm, at_alarm = (alarm, FrameReadout(self._alarm[0])) if raised else (seen - 1, last)
-        since, restarted = at_alarm.since, last.since
+        since = at_alarm.since
+        restarted = last.since
         after = round(KEPT_AFTER_EVENT_S * self._scenario.rate_hz) if config.fault_class == "all" else 1
         first = max(min(events) - ring + 1, alarm - ring + 1, since, clear, 0)
         end = min(max(events) + after, rows, alarm + 1 + len(self._kept) - ring)
@@ -151,11 +160,13 @@ def keep_frame(record, always, early, kept, ring, alarm, state):
     state (5,): number of frames; frame of the alarm, or -1; frame in which the last alarm was withdrawn;
     places in the record of the two alarm flags.
     """
-    k, rows = state[0], len(ring)
+    k = state[0]
+    rows = len(ring)
     state[0] = k + 1
     if record[state[3]] == 0 and record[state[4]] == 0:
         if state[1] >= 0:
-            state[1], state[2] = -1, k
+            state[1] = -1
+            state[2] = k
     elif state[1] < 0:
         state[1] = k
         alarm[:] = record

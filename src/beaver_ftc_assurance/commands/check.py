@@ -41,7 +41,8 @@ def command(
     try:
         said, why = check_certificate.check(run, log, scenario)
     except (ArrowException, OSError, ValueError, RecursionError, check_certificate.Refused) as error:
-        said, why = [], [" ".join(f"{file}: cannot be checked: {error}".split())]
+        said = []
+        why = [" ".join(f"{file}: cannot be checked: {error}".split())]
     document = {"holds": not why, "statements": said, "refused": why}
     count = sum(not one.startswith("not certified") for one in said)
     lines = [*said, f"{count} statements hold"] if not why else [*why, "the certificate does not hold"]

@@ -88,7 +88,8 @@ def _replay(plan: "EvidencePlan", arguments: Arguments) -> "Judged":
     scenario, requirements = of_flight(plan, str(arguments.replay))
     out = Path("runs") if arguments.out is None else arguments.out
     document = run(scenario, out, not arguments.no_report)
-    folder, meets = str(out / scenario.name), all(each.passed for each in requirements)
+    folder = str(out / scenario.name)
+    meets = all(each.passed for each in requirements)
     lines = [f"{each.name} {each.actual}" for each in requirements]
     said = document | {"folder": folder, "requirements": lines, "passed": meets}
 

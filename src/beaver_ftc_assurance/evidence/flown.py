@@ -17,7 +17,9 @@ from beaver_ftc.studies.sweep import BAD_INPUT, CRASHED, DEPARTED, FAILED, FLOWN
 from beaver_ftc_assurance.evidence.plan import EvidencePlan, OfHandling, OfMargins, Requirement
 
 Row = dict[str, Any]
-MET, NOT_MET, NOT_SHOWN = "met", "not met", "not shown"
+MET = "met"
+NOT_MET = "not met"
+NOT_SHOWN = "not shown"
 WORST_FIRST = NOT_MET, NOT_SHOWN, MET
 BANDS = 3  # equal bands of airspeed over the envelope
 ALTITUDES_M = (1000.0, 2000.0)  # limits between the altitude bands
@@ -34,7 +36,8 @@ class Watched(Columns):
 
     def open(self, columns: Sequence[str]) -> None:
         """Start; `columns` name the log's columns in order."""
-        self._wanted, self._all = tuple(name for name in columns if name in self._asked), tuple(columns)
+        self._wanted = tuple(name for name in columns if name in self._asked)
+        self._all = tuple(columns)
         self._digest.update(" ".join(columns).encode())
         super().open(columns)
 
@@ -64,7 +67,8 @@ def fly_flight(plan: EvidencePlan, case: tuple[str, int]) -> Row:
 def failed(plan: EvidencePlan, case: tuple[str, int], why: str, status: str = CRASHED) -> Row:
     """The row of a flight that shows nothing."""
     name, run = case
-    source, none = plan.sources[name], part("flight", None, None, NOT_SHOWN, says=why)
+    source = plan.sources[name]
+    none = part("flight", None, None, NOT_SHOWN, says=why)
     assigned = source.assignment(run)
     of_sweep = assigned and row_of_failure(source.what, assigned, status, why)  # type: ignore[arg-type]
     return {
@@ -79,11 +83,13 @@ def _flown(plan: EvidencePlan, name: str, run: int) -> Row:
     from beaver_ftc.loop import fly
 
     source = plan.sources[name]
-    scenario, formulas = source.scenario(run), [plan.formulas.get(each.id) for each in plan.of(name)]
+    scenario = source.scenario(run)
+    formulas = [plan.formulas.get(each.id) for each in plan.of(name)]
     log = Watched(column for formula in formulas if formula for column in formula.columns)
     flight = fly(scenario, log)
     amounts = measure(flight)
-    assigned, lost = source.assignment(run), amounts.departure
+    assigned = source.assignment(run)
+    lost = amounts.departure
     return {
         "flight": source.flight(run), "source": name, "run": run,
         "status": DEPARTED if lost else FLOWN,
@@ -112,7 +118,8 @@ def _judged(
 ) -> list[Row]:
     """The parts of a requirement with their results; none if the requirement is on the statistics of a
     sweep."""
-    bar, formula = requirement.bar, plan.formulas.get(requirement.id)
+    bar = requirement.bar
+    formula = plan.formulas.get(requirement.id)
     if formula is not None:
         return [_of_formula(requirement.formula or "", formula, scenario.rate_hz, found, log)]
     try:
@@ -135,7 +142,8 @@ def _of_formula(text: str, formula: Formula, rate_hz: float, found: Metrics, log
     r = formula.robustness(log, rate_hz)
     lost = found.departure
     if not math.isfinite(r):
-        nan, far = "a column is not a number where it asks", "it looks beyond the log, or at what is infinite"
+        nan = "a column is not a number where it asks"
+        far = "it looks beyond the log, or at what is infinite"
         why = nan if math.isnan(r) else far
         return part("robustness", text, None, NOT_SHOWN, says=why)
     if r >= 0.0 and lost and formula.looks_ahead_s > lost.time_s:
@@ -155,10 +163,8 @@ def _of_handling(bar: OfHandling, scenario: Scenario, found: Metrics, log: Watch
     for limit, each in zip(LIMITS, qualities, strict=True):
         ends = zip(("at_least", "at_most"), limit.levels[bar.level - 1], strict=True)
         asked = {side: end for side, end in ends if not math.isinf(end)} | {"level": bar.level}
-        verdict, inside = (
-            MET if each.level <= bar.level else NOT_MET,
-            finite(limit.margin(each.value, bar.level)),
-        )
+        verdict = MET if each.level <= bar.level else NOT_MET
+        inside = finite(limit.margin(each.value, bar.level))
         says = f"level {each.level}" if each.level <= 3 else "no level"
         parts.append(part(f"{limit.mode} {limit.quantity}", asked, finite(each.value), verdict, inside, says))
     return parts
@@ -179,7 +185,8 @@ def _of_margins(bar: OfMargins, scenario: Scenario) -> list[Row]:
         ("phase margin, deg", bar.phase_deg, [(each.phase_deg, each.fault) for each in found]),
     ):
         least, fault = min(margins)
-        verdict, inside = MET if least >= bound else NOT_MET, finite(least - bound)
+        verdict = MET if least >= bound else NOT_MET
+        inside = finite(least - bound)
         parts.append(part(name, {"at_least": bound}, finite(least), verdict, inside, f"fault: {fault}"))
     return parts
 
@@ -190,7 +197,8 @@ def cells(columns: Mapping[str, np.ndarray], scenario: Scenario) -> list[int]:
     slowest, fastest = scenario.airframe.envelope.airspeed_mps
     since = min((fault.at_s for fault in scenario.faults), default=0.0)
     there = (columns["t_s"] >= since) & (columns["envelope_valid"] > 0.5)
-    V, h = columns["airspeed_mps"][there], columns["altitude_m"][there]
+    V = columns["airspeed_mps"][there]
+    h = columns["altitude_m"][there]
     band = np.floor(BANDS * (V - slowest) / (fastest - slowest)).astype(int)
     inside = (band >= 0) & (band < BANDS)
     of_all = band[inside] * (len(ALTITUDES_M) + 1) + np.searchsorted(ALTITUDES_M, h[inside], side="right")

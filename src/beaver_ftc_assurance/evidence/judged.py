@@ -67,7 +67,8 @@ def command(plan: EvidencePlan, flight: str) -> str:
 
 def _requirement(plan: EvidencePlan, requirement: Requirement, rows: Sequence[Row]) -> Document:
     """A requirement with its verdict and margin, its worst flight, and the flights that do not meet it."""
-    over, of_sweep = plan.over[requirement.id], isinstance(requirement.bar, OfSweep)
+    over = plan.over[requirement.id]
+    of_sweep = isinstance(requirement.bar, OfSweep)
     if isinstance(requirement.bar, OfSweep):
         judged = [one for name in over for one in _of_sweep(plan, requirement.bar, name, rows)]
     else:
@@ -174,10 +175,13 @@ def _levels(bar: OfSweep, but: str = "type") -> SweepExpect:
 
 def _of_bound(found: Document, plain: Document) -> Row:
     """A statistic as a part. plain: the same without the confidence that the bar asks for."""
-    verdict, says = MET, f"{found['of']} flights tell"
+    verdict = MET
+    says = f"{found['of']} flights tell"
     if not found["passed"]:
         verdict = NOT_SHOWN if not found["of"] or plain["passed"] else NOT_MET
-    expected, actual, inside = found["expected"], found["actual"], None
+    expected = found["expected"]
+    actual = found["actual"]
+    inside = None
     if actual is not None:
         inside = actual - expected["at_least"] if "at_least" in expected else expected["at_most"] - actual
     return part(found["name"], expected, actual, verdict, inside, says)
@@ -201,7 +205,8 @@ def _coverage(aircraft: Aircraft, rows: Sequence[Row]) -> Document:
         {"surface": surface, "type": kind, "flights": [counts[surface, kind, k] for k in range(len(bands))]}
         for surface, kind in sorted({key[:2] for key in counts})
     ]
-    types, surfaces = [kind for kind in TYPES if kind not in (DAMAGE, UNANTICIPATED)], list(aircraft.surfaces)
+    types = [kind for kind in TYPES if kind not in (DAMAGE, UNANTICIPATED)]
+    surfaces = list(aircraft.surfaces)
     with_fault = sum(n > 0 and key[0] != "none" for key, n in counts.items())
     return {
         "aircraft": aircraft.name, "cells": bands, "flown": flown, "combinations": with_fault,

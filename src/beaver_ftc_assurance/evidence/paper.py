@@ -9,10 +9,13 @@ from xml.sax.saxutils import escape
 
 from beaver_ftc.studies.present import Heading, Part, Table
 
-MARGIN_PT, FOOT_PT = 45, 24
+MARGIN_PT = 45
+FOOT_PT = 24
 MOST_OF_HEAD = 9  # letters of a column's head that are kept together
 MOST_TOGETHER = 20  # rows of a table that is kept on one page
-MET_COLOUR, MISSED_COLOUR, LINE_COLOUR = "#00614a", "#a33b00", "#d8d8d8"
+MET_COLOUR = "#00614a"
+MISSED_COLOUR = "#a33b00"
+LINE_COLOUR = "#d8d8d8"
 _FONTS = {"Body": "DejaVuSans.ttf", "Bold": "DejaVuSans-Bold.ttf"}  # they come with matplotlib
 
 
@@ -97,7 +100,8 @@ def _table(table: Table, width: float) -> Any:
         ("LEFTPADDING", (0, 0), (-1, -1), 0), ("RIGHTPADDING", (0, 0), (-1, -1), 6),
         ("TOPPADDING", (0, 0), (-1, -1), 1.5), ("BOTTOMPADDING", (0, 0), (-1, -1), 2.5),
     ])  # fmt: skip
-    made.hAlign, made.spaceBefore = "LEFT", 7
+    made.hAlign = "LEFT"
+    made.spaceBefore = 7
     return made
 
 

@@ -54,7 +54,8 @@ from beaver_ftc.scenario import (
 from beaver_ftc.studies.engine import digest_of_aircraft
 from beaver_ftc.studies.sweep import Assignment, Plan, flight_name, scenario_of
 
-MOST_REQUIREMENTS, MOST_FLIGHTS = 500, 100_000
+MOST_REQUIREMENTS = 500
+MOST_FLIGHTS = 100_000
 Text = Annotated[str, StringConstraints(max_length=2000)]
 
 
@@ -188,7 +189,8 @@ class Source:
     @property
     def sha256(self) -> str:
         """SHA-256 of the resolved scenario or sweep, and of the files of its aircraft."""
-        aircraft, left_out = digest_of_aircraft(self.aircraft.folder), {"description", "expect"}
+        aircraft = digest_of_aircraft(self.aircraft.folder)
+        left_out = {"description", "expect"}
         if isinstance(self.what, Sweep):
             file = self.what.file.model_dump(mode="json", exclude=left_out | {"base", "set"})
             text = repr([aircraft, self.what.base, file])
@@ -236,7 +238,10 @@ class _Reading:
     """Reads the sources of all requirements and checks them; mistakes are collected."""
 
     def __init__(self, file: PlanFile, document: Document, path: Path, given: str) -> None:
-        self._file, self._document, self._path, self._given = file, document, path, given
+        self._file = file
+        self._document = document
+        self._path = path
+        self._given = given
         self._problems: list[Problem] = []
         self._elsewhere: list[str] = []  # lines about other files
         self._sources: dict[str, Source | None] = {}  # by what the plan calls them
@@ -357,7 +362,8 @@ class _Reading:
 
     def _fits(self, formula: Formula, source: Source, at: Location) -> None:
         """Note a problem if the logs of a source are too short for a formula, or lack one of its columns."""
-        ahead, most = formula.looks_ahead_s, source.base.duration_s
+        ahead = formula.looks_ahead_s
+        most = source.base.duration_s
         if most < ahead < inf:
             self._problem(at, f"looks {ahead:g} s ahead, allowed over {source.given}: at most its {most:g} s")
         for column in sorted(formula.columns.difference(source.columns)) if source.columns else ():

@@ -249,7 +249,8 @@ def of_flight(plan: EvidencePlan, name: str) -> tuple[Any, tuple[Expectation, ..
         raise BadInput(
             f"--replay: {plan.given} has no flight {name[:100]!r}{suggestion(name, list(named)[:50])}"
         )
-    found, (source, run) = fly_flight(plan, named[name])["found"], named[name]
+    found = fly_flight(plan, named[name])["found"]
+    (source, run) = named[name]
     judged = tuple(
         _expectation(id, said(one["expected"]), one)
         for id, parts in found.items() for one in parts

@@ -13,7 +13,7 @@ import numpy as np
 
 from beaver_ftc_assurance.certificates import certificate
 from beaver_ftc_assurance.certificates import proved as by_frames
-from beaver_ftc_logs.by_aircraft import LogInputs
+from beaver_ftc_logs.aircraft_inputs import LogInputs
 from beaver_ftc_logs.diagnose import LogRows
 
 

@@ -14,21 +14,20 @@ A mistake is there from the first sample to the last, so tests 2 and 3 must find
     ll              log likelihood of a sample
 """
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import replace
-from itertools import combinations, compress
+from collections.abc import Sequence
+from itertools import compress
 from typing import NamedTuple
 
 import numpy as np
 
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs import regression
+from beaver_ftc_logs.corrected_logs import altered_log, corrected_logs
 from beaver_ftc_logs.model import FittedRanges, Model
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
 from beaver_ftc_logs.samples import NOISE_MA_CANDIDATES, Samples, whiten_samples
 from beaver_ftc_logs.trust import central_ranges, known_effects, known_gains, unknown_surfaces
-from beaver_ftc_logs.units import RATE, SI_UNITS, UNIT_FACTORS, nearest_unit
-from beaver_ftc_logs.vehicle import Vehicle
+from beaver_ftc_logs.units import RATE, SI_UNITS, nearest_unit
 
 # The rates are in one unit if their motions, relative to the flights of the model, differ by less.
 _MAX_AXIS_RATIO = 10.0
@@ -228,7 +227,7 @@ def mistake_gains(samples: Samples, model: Model) -> tuple[dict[str, float], flo
     if found is None:
         return {}, 0.0
     without = {
-        signal: _likelihoods(_altered(samples, model.vehicle, {}, {signal: 0.0}), model)
+        signal: _likelihoods(altered_log(samples, model.vehicle, {}, {signal: 0.0}), model)
         for signal in model.vehicle.signal_columns
     }
     gains = {}
@@ -245,59 +244,3 @@ def _likelihoods(samples: Samples, model: Model) -> Floats:
     """Log likelihood of a sample of each part of the flight; minus infinity where a part is too short."""
     found = answers(samples, model, _MAX_COMPARED_SAMPLES)
     return np.array(-np.inf) if found is None else found.likelihood
-
-
-class CorrectedLog(NamedTuple):
-    """A log with one mistake mended.
-
-    correction_text: the mend; samples: the log by it; log_jacobian: log of the factor by which the mend
-    multiplies the rates. The likelihood of a log is that of the rates as they were logged: where a mend
-    multiplies these by a, the density is a times as large. scaled_signal: the signal that the mend scales;
-    empty of another mend.
-    """
-
-    correction_text: str
-    samples: Samples
-    log_jacobian: float = 0.0
-    scaled_signal: str = ""
-
-
-def corrected_logs(samples: Samples, vehicle: Vehicle, unknown: Collection[str]) -> Iterator[CorrectedLog]:
-    """The log with two commands or two rates exchanged, or one rate or signal of another sign or unit. A rate
-    that the attitude confirms stays as it is. unknown: surfaces whose effect the model does not know: that
-    shows nothing of their commands."""
-    surfaces = list(vehicle.surfaces)
-    doubtful = [name for name in vehicle.rate_columns if name not in samples.confirmed_rates]
-    for i, j in combinations([s for s, name in enumerate(surfaces) if name not in unknown], 2):
-        order = list(range(len(surfaces)))
-        order[i] = j
-        order[j] = i
-        exchanged = replace(samples, commands=samples.commands[:, order])
-        yield CorrectedLog(f"the commands of {surfaces[i]} and {surfaces[j]} exchanged", exchanged)
-    for first, second in combinations(doubtful, 2):
-        exchanged = _altered(samples, vehicle, {first: second, second: first}, {})
-        yield CorrectedLog(f"{first} and {second} exchanged", exchanged)
-    for name in [*doubtful, *vehicle.signal_columns]:
-        for factor in UNIT_FACTORS:
-            mended = CorrectedLog(
-                f"`scale: {factor:.4g}` on {name}", _altered(samples, vehicle, {}, {name: factor})
-            )
-            if name in doubtful:
-                yield mended._replace(log_jacobian=float(np.log(abs(factor))))
-            else:
-                yield mended._replace(scaled_signal=name)
-
-
-def _altered(
-    samples: Samples, vehicle: Vehicle, sources: Mapping[str, str], factors: Mapping[str, float]
-) -> Samples:
-    """The log with columns taken from others and multiplied, and what the airspeed makes of them as well."""
-    names = vehicle.rate_columns + vehicle.regressor_columns
-    columns = dict(zip(names, np.column_stack([samples.rates, samples.signals]).T, strict=True))
-    new = []
-    for name in names:
-        logged = name.removesuffix(" by airspeed")
-        suffix = name[len(logged) :]
-        new.append(factors.get(logged, 1.0) * columns[sources.get(logged, logged) + suffix])
-    signals = np.column_stack(new[3:]) if new[3:] else samples.signals
-    return replace(samples, rates=np.column_stack(new[:3]), signals=signals)

@@ -58,11 +58,11 @@ def identify(
         option = "--vehicle" if vehicle is None else "--out"
         raise BadInput(f"identify: {option} is missing, allowed: --vehicle FILE --out MODEL, or --check")
     from beaver_ftc_logs.identification import identify, scale_if_better
+    from beaver_ftc_logs.identification_page import refuse_foreign_file, render_identification
     from beaver_ftc_logs.identification_text import identification_text
     from beaver_ftc_logs.loading import load_flights_for_fit
     from beaver_ftc_logs.mixing import load_vehicle_for_logs
     from beaver_ftc_logs.model import model_file_text
-    from beaver_ftc_logs.pages import refuse_foreign_file, render_identification
     from beaver_ftc_logs.vehicle import with_alarm_rate
 
     given = {path.resolve() for path in (*flights, Path(vehicle))}
@@ -301,7 +301,8 @@ def compare_recorded(folder: Path, out: Path, format: Format, markdown_page: Pat
     """Compare ways to diagnose the recorded flights in a folder; markdown_page: path of a page to update."""
     from beaver_ftc.results import result_folder
     from beaver_ftc.studies.present import write_files
-    from beaver_ftc_logs.recorded.benchmark import as_text, result_files, run_benchmark, update_page
+    from beaver_ftc_logs.recorded.benchmark import run_benchmark
+    from beaver_ftc_logs.recorded.comparison import as_text, result_files, update_page
 
     document = run_benchmark(folder)
     with result_folder(out, "recorded-flights") as result_dir:
@@ -316,7 +317,7 @@ def compare_recorded(folder: Path, out: Path, format: Format, markdown_page: Pat
 
 def compare_other_days(folder: Path, format: Format, markdown_page: Path | None) -> None:
     """The same on other days that are made by changing the labelled flights."""
-    from beaver_ftc_logs.recorded.benchmark import as_text, update_page
+    from beaver_ftc_logs.recorded.comparison import as_text, update_page
     from beaver_ftc_logs.recorded.other_days import run_other_days
 
     document = {"other_days": run_other_days(folder)}

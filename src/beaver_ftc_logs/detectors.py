@@ -3,44 +3,31 @@
     bank-of-filters             the filters of `diagnose`
     sliding-least-squares       effectiveness from the last 20 s, all samples with equal weight
     forgetting-least-squares    effectiveness from all past samples, weights exp(-age / 20 s) [Ljung1999]
-    others                      the detectors of the control loop (`beaver_ftc.diagnosis.Detector`)
+    others                      the detectors of the control loop (`loop_detectors`)
 
 `compare --flights` alone also uses the freeze rule, which needs no model: a servo output that has not moved
 for 6 s is faulty.
-
-A detector of the loop receives the measured rates x, the predicted acceleration, and the part Z of each
-surface in it. Both follow from the identified model, with the residual e of one step, rad/s:
-
-    acceleration[k] = (x[k] - e[k] - x[k-1]) / dt,      Z_g = F_g / dt
-
-The innovation that the detector forms is then e / dt. Its declared error is the standard deviation of e / dt.
-The groups of the vehicle take the places of aileron, elevator and rudder, in this order.
 """
 
 from collections.abc import Callable
-from copy import deepcopy
-from dataclasses import replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 
-from beaver_ftc.design import N_Y, Context, DeclaredErrors
-from beaver_ftc.diagnosis import Detector, Measured, Verdict
 from beaver_ftc.documents import BadInput, suggestion
 from beaver_ftc.plugins import DETECTORS, is_compiled, made, registered
 from beaver_ftc_logs.bank import build_bank
 from beaver_ftc_logs.diagnose import (
-    UNKNOWN_SURFACE,
     LogRows,
     check_log_fits_model,
     diagnose,
     finish_rows,
     join_names,
 )
+from beaver_ftc_logs.loop_detectors import run_loop_detector
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import Floats, RecordedFlight
-from beaver_ftc_logs.regression import expand_groups, group_commands, group_indices, innovations
+from beaver_ftc_logs.regression import expand_groups, innovations
 from beaver_ftc_logs.runs import trailing_sums
 from beaver_ftc_logs.samples import Samples
 from beaver_ftc_logs.time_base import unchanged_s
@@ -51,9 +38,6 @@ MIN_FROZEN_OUTPUT_S = 6.0
 _MIN_LOSS_SD = 5.0  # least loss that is an alarm, in standard deviations of its estimate
 _SD_OF_90_PERCENT = 1.645  # half the width of an interval that holds 90 % of the normal law
 _PRIOR_INFORMATION = 4.0  # 1 / (1/2)^2: a gain of standard deviation 1/2
-LOOP_SURFACES = ("aileron", "elevator", "rudder")
-_N_LOOP = 4  # these and the flap
-_DECLARED_GYRO_RAD_S = 1e-4  # small: the declared error of the model contains the noise of the gyros
 OUR_DETECTOR = "bank-of-filters"
 
 
@@ -119,107 +103,6 @@ def diagnose_by_freeze_rule(log: RecordedFlight, samples: Samples, model: Model)
         frozen[:, surfaces.index(name)] = unchanged_s(column, samples.t_s) > MIN_FROZEN_OUTPUT_S
     a = 1.0 - frozen
     return LogRows.of_names(samples.t_s, join_names(frozen, surfaces), a, a, a)
-
-
-class LinearRateModel:
-    """The identified model as a detector's design model: the effect of the last rates x (..., 3) alone."""
-
-    def __init__(self, past: Floats, dt_s: float) -> None:
-        self._transposed_jacobian = (past[:3] - np.eye(3)) / dt_s
-
-    def f(self, x: Floats, y: Floats) -> Floats:
-        """Angular acceleration by the rates, (..., 3) rad/s2."""
-        return x @ self._transposed_jacobian
-
-    def G(self, y: Floats) -> Floats:
-        """Zeros: the effects of the surfaces, with their lags, are in `contribution`."""
-        return np.zeros((3, _N_LOOP))
-
-
-def loop_detector_inputs(samples: Samples, model: Model) -> list[tuple[Measured, Floats]]:
-    """The inputs of a detector at each row: measurements, and the command u (4,) as shares of travel.
-
-    Z (n, 3, 4), rad/s2: the part of each surface. If the model cannot predict a row (after a gap), the
-    innovation and Z are 0.
-    """
-    members = group_indices(model)
-    if len(members) > len(LOOP_SURFACES):
-        raise BadInput(
-            f"{model.vehicle.name}: {len(members)} groups of surfaces, allowed for a "
-            f"detector of the loop: at most {len(LOOP_SURFACES)}"
-        )
-    flight = innovations(samples, model)
-    dt_s = 1.0 / model.rate_hz
-    rates = np.nan_to_num(samples.rates)
-    before = np.vstack([rates[:1], rates[:-1]])
-    expected = (rates - flight.e - before) / dt_s
-    Z = np.zeros((len(rates), 3, _N_LOOP))
-    u = np.zeros((len(rates), _N_LOOP))
-    F = np.where(flight.is_known[:, None, None], flight.F, 0.0)
-    Z[:, :, : len(members)] = F.transpose(0, 2, 1) / dt_s
-    u[:, : len(members)] = np.nan_to_num(group_commands(samples, members, labelled=False))
-    sd = _model_error_sd_rad_s2(model)
-    t_s = samples.t_s.tolist()
-    frames = [
-        Measured(t_s[k], rates[k], np.zeros(N_Y), expected[k], Z[k], sd.copy()) for k in range(len(t_s))
-    ]
-    return list(zip(frames, u, strict=True))
-
-
-def _model_error_sd_rad_s2(model: Model) -> Floats:
-    """The residual's standard deviation as an error of the model, (3,) rad/s2."""
-    return np.sqrt(np.diag(np.array(model.noise))) / (1.0 / model.rate_hz)
-
-
-def loop_detector_context(model: Model) -> Context:
-    """The context that a detector receives before the flight."""
-    dt_s = 1.0 / model.rate_hz
-    noise = np.zeros(7)
-    noise[:3] = _DECLARED_GYRO_RAD_S
-    design: Any = LinearRateModel(np.array(model.past), dt_s)
-    return Context(
-        dt_s=dt_s, substeps=1, model=design, trim_x=np.zeros(3), trim_y=np.zeros(N_Y),
-        trim_rad=np.zeros(_N_LOOP),
-        travel_rad=np.outer((-1.0, 1.0), np.ones(_N_LOOP)),
-        constant_rad_s2=np.zeros(3), inertia_coupling=np.zeros(3),
-        surfaces=(*LOOP_SURFACES, "flap"),
-        declared=DeclaredErrors(noise=noise, model_rad_s2=_model_error_sd_rad_s2(model)),
-    )  # fmt: skip
-
-
-def run_loop_detector(detector: Detector, samples: Samples, model: Model) -> LogRows:
-    """Step a detector of the loop through a flight. An alarm lasts while its statistic exceeds 1."""
-    inputs = loop_detector_inputs(samples, model)
-    detector.reset(loop_detector_context(model))
-    return rows_of_verdicts([detector.step(*deepcopy(frame)) for frame in inputs], samples, model)
-
-
-def rows_of_verdicts(verdicts: list[Verdict], samples: Samples, model: Model) -> LogRows:
-    """Verdicts as rows. The bounds are 0 to 1 for each surface that the detector may suspect, else 1."""
-    n = len(verdicts)
-    members = group_indices(model)
-    statistic, detected = np.array([(one.statistic, one.detected) for one in verdicts], dtype=float).T
-    # by the statistic, if there is one: `detected` of the loop stays true after its first alarm
-    faulty = np.where(np.isfinite(statistic), statistic > 1.0, detected).astype(np.int64)
-    a, low = np.ones((2, n, len(model.vehicle.surfaces)))
-    names = np.full(n, "", dtype=object)
-    for k in np.flatnonzero(faulty):
-        if verdicts[k].isolated not in LOOP_SURFACES[: len(members)]:
-            names[k] = UNKNOWN_SURFACE
-            low[k] = 0.0
-            continue
-        g = LOOP_SURFACES.index(str(verdicts[k].isolated))
-        names[k] = model.group_names[g]
-        low[k, members[g]] = 0.0
-        a[k, members[g]] = _remaining_effectiveness(verdicts[k], g)
-    p = np.where(np.isnan(statistic), faulty, np.clip(statistic, 0.0, 1.0))
-    return replace(LogRows.of_names(samples.t_s, names, a, low, np.ones_like(low)), fault_probability=p)
-
-
-def _remaining_effectiveness(verdict: Verdict, g: int) -> float:
-    """Effectiveness of a group by a verdict, 0 to 1; a verdict with neither figure counts as no loss."""
-    given = verdict.effectiveness
-    return float(np.clip(1.0 + (verdict.estimate or 0.0) if given is None else given[g], 0.0, 1.0))
 
 
 _FLIGHT_DETECTORS: dict[str, Callable[[Samples, Model], LogRows]] = {

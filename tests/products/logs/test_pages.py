@@ -5,6 +5,7 @@ import pytest
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs import pages
 from beaver_ftc_logs.findings import verdict_document
+from beaver_ftc_logs.identification_page import PAGE_MARK, refuse_foreign_file, render_identification
 from kept import page
 from products.logs import small
 
@@ -40,7 +41,7 @@ def rendered(samples, rows, verdict):
     ("share", "says"), [(0.876, "No fault shows"), (0.1, "No fault"), (0.099, "No verdict")]
 )
 def test_a_page_says_where_nothing_is_said_and_why(monkeypatch, flown, share, says):
-    monkeypatch.setattr(pages, "_encode_png", lambda figure: "QQ==")
+    monkeypatch.setattr(pages, "encode_png", lambda figure: "QQ==")
     samples, rows = flown[0], small.rows([(9, *SOUND)])
     reasons = [{"says": "a rate is <odd>", "share": 0.1234}, {"says": "p stands still", "share": 0.0321}]
     verdict = verdict_document(samples, MODEL, rows) | {"credible": {"share": share, "reasons": reasons}}
@@ -50,7 +51,7 @@ def test_a_page_says_where_nothing_is_said_and_why(monkeypatch, flown, share, sa
 
 
 def test_the_page_of_a_flight(changed, monkeypatch, flown):
-    monkeypatch.setattr(pages, "_encode_png", lambda figure: "QQ==")
+    monkeypatch.setattr(pages, "encode_png", lambda figure: "QQ==")
     samples, rows = flown
     verdict = verdict_document(samples, MODEL, rows) | {"score": {"classes": 0.98765, "rows": 4}}
     assert not changed(page(rendered(samples, rows, verdict)))
@@ -58,15 +59,15 @@ def test_the_page_of_a_flight(changed, monkeypatch, flown):
 
 def test_only_a_page_of_ours_is_written_over(tmp_path):
     path = tmp_path / "page.html"
-    pages.refuse_foreign_file(path)  # there is none
-    most = 2000 - len(pages.PAGE_MARK)
-    path.write_text(" " * most + pages.PAGE_MARK + " " * 5000)
-    pages.refuse_foreign_file(path)
-    path.write_text(" " * (most + 1) + pages.PAGE_MARK)
+    refuse_foreign_file(path)  # there is none
+    most = 2000 - len(PAGE_MARK)
+    path.write_text(" " * most + PAGE_MARK + " " * 5000)
+    refuse_foreign_file(path)
+    path.write_text(" " * (most + 1) + PAGE_MARK)
     with pytest.raises(BadInput, match="it is no page of `identify`, allowed: another --out"):
-        pages.refuse_foreign_file(path)
+        refuse_foreign_file(path)
     with pytest.raises(BadInput, match="will not replace"):
-        pages.refuse_foreign_file(tmp_path)
+        refuse_foreign_file(tmp_path)
 
 
 IDENTIFIED = {
@@ -92,6 +93,6 @@ IDENTIFIED = {
 
 def test_the_page_of_an_identification(changed, monkeypatch):
     """Of one flight of a wing, with all that can be said."""
-    monkeypatch.setattr(pages, "_encode_png", lambda figure: "QQ==")
+    monkeypatch.setattr("beaver_ftc_logs.identification_page.encode_png", lambda figure: "QQ==")
     wing = small.model(identified=IDENTIFIED)
-    assert not changed(page(pages.render_identification([small.flight(wing, 500)], wing)))
+    assert not changed(page(render_identification([small.flight(wing, 500)], wing)))

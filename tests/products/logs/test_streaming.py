@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-from beaver_ftc_logs.detectors import (
-    loop_detector_inputs,
-)
+from beaver_ftc_logs.loop_detectors import loop_detector_inputs
 
 
 @pytest.fixture(scope="module")

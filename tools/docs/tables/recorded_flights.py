@@ -11,7 +11,8 @@ from typing import Any
 from benchmarks import own_logs as own
 
 from beaver_ftc.studies.present.tables import markdown_table
-from beaver_ftc_logs.recorded.benchmark import LABEL_TITLES, SURFACE_KINDS, result_files, run_benchmark
+from beaver_ftc_logs.recorded.benchmark import LABEL_TITLES, SURFACE_KINDS, run_benchmark
+from beaver_ftc_logs.recorded.comparison import result_files
 from tools.docs.tables import aside, picture, shared, table_of
 
 Document = dict[str, Any]

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 from beaver_ftc.cli.main import app
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.detectors import detector_names
-from beaver_ftc_logs.recorded import benchmark, other_days
+from beaver_ftc_logs.recorded import comparison, other_days
 from beaver_ftc_logs.recorded.benchmark import OUR_METHOD_TITLE, load_data_sets
 from products.logs import synthetic
 
@@ -53,7 +53,7 @@ def test_every_method_has_a_row_and_ours_is_right(document):
 
 
 def test_tables_have_a_line_a_method(document):
-    text, page = benchmark.as_text(document), benchmark.as_markdown(document)
+    text, page = comparison.as_text(document), comparison.as_markdown(document)
     for row in document["sets"][0]["rows"]:
         assert row["method"] in text
         assert f"| {row['method']} |" in page

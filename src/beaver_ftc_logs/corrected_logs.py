@@ -1,0 +1,67 @@
+"""The logs that one correction of a column makes of a log: exchanged columns, another sign or unit."""
+
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import replace
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+
+from beaver_ftc_logs.samples import Samples
+from beaver_ftc_logs.units import UNIT_FACTORS
+from beaver_ftc_logs.vehicle import Vehicle
+
+
+class CorrectedLog(NamedTuple):
+    """A log with one mistake mended.
+
+    correction_text: the mend; samples: the log by it; log_jacobian: log of the factor by which the mend
+    multiplies the rates. The likelihood of a log is that of the rates as they were logged: where a mend
+    multiplies these by a, the density is a times as large. scaled_signal: the signal that the mend scales;
+    empty of another mend.
+    """
+
+    correction_text: str
+    samples: Samples
+    log_jacobian: float = 0.0
+    scaled_signal: str = ""
+
+
+def corrected_logs(samples: Samples, vehicle: Vehicle, unknown: Collection[str]) -> Iterator[CorrectedLog]:
+    """The log with two commands or two rates exchanged, or one rate or signal of another sign or unit. A rate
+    that the attitude confirms stays as it is. unknown: surfaces whose effect the model does not know: that
+    shows nothing of their commands."""
+    surfaces = list(vehicle.surfaces)
+    doubtful = [name for name in vehicle.rate_columns if name not in samples.confirmed_rates]
+    for i, j in combinations([s for s, name in enumerate(surfaces) if name not in unknown], 2):
+        order = list(range(len(surfaces)))
+        order[i] = j
+        order[j] = i
+        exchanged = replace(samples, commands=samples.commands[:, order])
+        yield CorrectedLog(f"the commands of {surfaces[i]} and {surfaces[j]} exchanged", exchanged)
+    for first, second in combinations(doubtful, 2):
+        exchanged = altered_log(samples, vehicle, {first: second, second: first}, {})
+        yield CorrectedLog(f"{first} and {second} exchanged", exchanged)
+    for name in [*doubtful, *vehicle.signal_columns]:
+        for factor in UNIT_FACTORS:
+            mended = CorrectedLog(
+                f"`scale: {factor:.4g}` on {name}", altered_log(samples, vehicle, {}, {name: factor})
+            )
+            if name in doubtful:
+                yield mended._replace(log_jacobian=float(np.log(abs(factor))))
+            else:
+                yield mended._replace(scaled_signal=name)
+
+
+def altered_log(
+    samples: Samples, vehicle: Vehicle, sources: Mapping[str, str], factors: Mapping[str, float]
+) -> Samples:
+    """The log with columns of rates and signals taken from others (sources), and then multiplied (factors).
+    The products of the m columns with the airspeed, which follow them where it counts, change alike."""
+    names = vehicle.rate_columns + vehicle.signal_columns
+    order = [names.index(sources.get(name, name)) for name in names]
+    factor = [factors.get(name, 1.0) for name in names]
+    columns = np.column_stack([samples.rates, samples.signals])  # (n, m) or (n, 2 m)
+    altered = columns.reshape(len(columns), -1, len(names))[:, :, order] * factor
+    rates, signals = np.split(altered.reshape(columns.shape), [3], axis=1)
+    return replace(samples, rates=rates, signals=signals)

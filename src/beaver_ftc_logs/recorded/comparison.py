@@ -1,0 +1,183 @@
+"""Tables, page and figure of the benchmark on recorded flights, from its document (`benchmark`)."""
+
+from collections.abc import Callable
+from operator import itemgetter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from beaver_ftc.results import SERIES_COLOURS as SERIES
+from beaver_ftc.results import Document, as_json
+from beaver_ftc.studies.present import GRID, Files, aligned, markdown_table, marker, panels, replace_between
+from beaver_ftc_logs.energy import ENGINE
+from beaver_ftc_logs.recorded.benchmark import LABEL_TITLES, SURFACE_KINDS
+
+HeaderAndRows = tuple[list[str], list[list[str]]]
+Cell = Callable[[Document], str]
+_METHOD: Cell = itemgetter("method")
+_SHOWN_DELAY_S = 30.0
+
+
+def result_files(document: Document) -> Files:
+    """The document, its tables and its figure."""
+    return {
+        "flights.png": draw_comparison_figure(document),
+        "flights.json": as_json(document),
+        "flights.md": as_markdown(document),
+    }
+
+
+def score_tables(document: Document) -> list[tuple[str, HeaderAndRows]]:
+    """A title and a table for each data set."""
+    if "other_days" in document:
+        return _tables_of_other_days(document["other_days"])
+    tables = []
+    for data in document["sets"]:
+        columns = LABEL_COLUMNS if data["scored_by"] == "labels" else FAILURE_COLUMNS
+        rows = [[cell_of(row) for cell_of in columns.values()] for row in (*data["rows"], *data["published"])]
+        tables.append((f"{data['set']}: left out, {data['left_out']}", ([*columns], rows)))
+    return tables
+
+
+def _tables_of_other_days(document: Document) -> list[tuple[str, HeaderAndRows]]:
+    """A title and a table for each data set: every day, then mean and worst of each kind."""
+    columns = LABEL_COLUMNS | {
+        "method": itemgetter("day"),
+        "classes by sliding least squares": _share("beside"),
+    }
+    tables = []
+    for data in document["sets"]:
+        days = [day for day in data["rows"] if day["kind"] == "one change"]
+        for one in data["summary"]:
+            days += [one[key] | {"day": f"{one['kind']}: {key}"} for key in ("mean", "worst")]
+        rows = [[cell_of(day) for cell_of in columns.values()] for day in days]
+        title = f"{data['set']}: other days made of it, halves left out in turn"
+        tables.append((title, (["day", *[*columns][1:]], rows)))
+    return tables
+
+
+def _share(key: str) -> Cell:
+    """A figure of a method; one that its authors did not publish is left empty."""
+    return lambda row: "" if row.get(key) is None else f"{row[key]:.3f}"
+
+
+def _delay(kind: str) -> Cell:
+    """The mean delay of a kind of surface, and of how many failures."""
+
+    def cell_of(row: Document) -> str:
+        delay = row["delay_s"].get(kind, {})
+        if delay.get("mean") is None:
+            return "not found" if delay.get("failures") else ""
+        return f"{delay['mean']:.1f}" + (
+            " ({found} of {failures})".format(**delay) if "found" in delay else ""
+        )
+
+    return cell_of
+
+
+def _ours(text_of: Cell) -> Cell:
+    """A cell of the methods that are flown here."""
+    return lambda row: text_of(row) if "false_alarms_per_hour" in row else ""
+
+
+def _soon_text(row: Document) -> str:
+    delays = [row["delay_s"][kind] for kind in SURFACE_KINDS[:2]]
+    return " of ".join(str(sum(delay[key] for delay in delays)) for key in ("within_5_s", "failures"))
+
+
+LABEL_COLUMNS = {"method": _METHOD} | {title: _share(key) for key, title in LABEL_TITLES.items()}
+# Tables of methods: the head of each column, and its cell of a method's row.
+FAILURE_COLUMNS = {
+    "method": _METHOD,
+    "precision": _share("precision"),
+    "recall": _share("recall"),
+    "accuracy": _share("accuracy"),
+    "mean delay, s: aileron": _delay("aileron"),
+    "rudder": _delay("rudder"),
+    "elevator": _delay("elevator"),
+    "ailerons and rudders within 5 s": _ours(_soon_text),
+    "false alarms an hour (95 %)": _ours(
+        lambda row: "{value:.1f} ({low:.1f} to {high:.1f})".format(**row["false_alarms_per_hour"])
+    ),
+    "healthy flights with an alarm": _ours(
+        lambda row: f"{row['healthy_flights_with_an_alarm']} of {row['healthy_flights']}"
+    ),
+    "wrong group": _ours(lambda row: str(row["wrong_group"])),
+}
+
+
+def as_text(document: Document) -> str:
+    """The tables for a terminal."""
+    return "\n".join(f"{title}\n{aligned([head, *rows])}\n" for title, (head, rows) in score_tables(document))
+
+
+def as_markdown(document: Document) -> str:
+    """The tables for a Markdown page."""
+    tables = score_tables(document)
+    return "\n".join(f"### {title}\n\n{markdown_table(head, rows)}\n" for title, (head, rows) in tables)
+
+
+def update_page(document: Document, page: Path) -> None:
+    """Put the tables between the marks of a Markdown page. Raises BadInput where it has none."""
+    name = "other days" if "other_days" in document else "recorded flights"
+    replace_between(page, f"<!-- {name}: begin -->", f"<!-- {name}: end -->", as_markdown(document))
+
+
+def draw_comparison_figure(document: Document) -> Any:
+    """How late each method found each failure, and how near it came to the labels: a panel a data set."""
+    data_sets = document["sets"]
+    height = sum(0.27 * len(_method_titles(data)) + 1.3 for data in data_sets)
+    figure, axes = panels(len(data_sets), 1, 8.6, height)
+    for axis, data in zip(axes[:, 0], data_sets, strict=True):
+        draw, shown = (
+            (_draw_shares, "rows that are right")
+            if data["scored_by"] == "labels"
+            else (_draw_failure_delays, "delay of each method on each failure")
+        )
+        draw(axis, data)
+        axis.set_title(f"{data['set']}: {shown}", fontsize=10, loc="left")
+        titles = _method_titles(data)
+        axis.set_yticks(range(len(titles)), titles)
+        axis.set_ylim(len(titles) - 0.5, -0.5)
+        axis.tick_params(labelsize=8)
+        axis.grid(color=GRID, linewidth=0.5)
+        axis.set_axisbelow(True)
+        axis.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
+    return figure
+
+
+def _method_titles(data: Document) -> list[str]:
+    """The lines of a panel. Of published methods, only shares are known: not the delay on each failure."""
+    published = data.get("published", ()) if data["scored_by"] == "labels" else ()
+    return [row["method"] for row in (*data["rows"], *published)]
+
+
+def _draw_failure_delays(axis: Any, data: Document) -> None:
+    """A line a method, a mark a failed surface at its delay; right of the line what is not found in time."""
+    titles = _method_titles(data)
+    failed = {entry["left_out"]: entry["failure"] for entry in data["flights"]}
+    failures = [failure for failure in dict.fromkeys(failed.values()) if failure and ENGINE not in failure]
+    for i, failure in enumerate(failures):
+        shift = 0.7 * ((i + 0.5) / len(failures) - 0.5)
+        entries = [one for one in data["flights"] if one["failure"] == failure and one["method"] in titles]
+        delays_s = [np.inf if entry["delay_s"] is None else entry["delay_s"] for entry in entries]
+        delays_s = [min(delay, _SHOWN_DELAY_S + 1.0) for delay in delays_s]
+        heights = [titles.index(entry["method"]) + shift for entry in entries]
+        label = failure.replace("_", " ").replace("+", " + ")
+        axis.plot(delays_s, heights, marker(i), color=SERIES[i], label=label)
+    axis.axvspan(_SHOWN_DELAY_S, _SHOWN_DELAY_S + 2.0, color=GRID)
+    axis.set_xlim(-0.5, _SHOWN_DELAY_S + 2.0)
+    axis.set_xlabel(f"delay, s (grey: not found within {_SHOWN_DELAY_S:g} s)", fontsize=9)
+
+
+def _draw_shares(axis: Any, data: Document) -> None:
+    """A line a method, a mark for each share of the rows that are right; as published where they are."""
+    labels = {"classes": "class", "healthy_or_faulty": "healthy or faulty", "side": "side of the aircraft"}
+    rows = [*data["rows"], *data["published"]]
+    for i, (key, label) in enumerate(labels.items()):
+        scored = [k for k, row in enumerate(rows) if row.get(key) is not None]
+        heights = [k + 0.22 * (i - 1) for k in scored]
+        axis.plot([rows[k][key] for k in scored], heights, marker(i), color=SERIES[i], label=label)
+    axis.set_xlim(0, 1)
+    axis.set_xlabel("share of the rows that are right", fontsize=9)

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
-from beaver_ftc_assurance.certificates import certificate
+from beaver_ftc_assurance.certificates import certified
 from beaver_ftc_assurance.certificates import proved as by_frames
 from beaver_ftc_logs.aircraft_inputs import LogInputs
-from beaver_ftc_logs.diagnose import LogRows
+from beaver_ftc_logs.log_rows import LogRows
 
 
 def write_certificate_and_log(inputs: LogInputs, rows: LogRows, folder: Path) -> None:
@@ -34,5 +34,5 @@ def write_certificate_and_log(inputs: LogInputs, rows: LogRows, folder: Path) ->
     memory, scenario = diagnosis.inside()
     scenario = scenario.model_copy(update={"name": inputs.samples.name})
     found = by_frames.proved(scenario, memory, step())
-    document = certificate.with_digest(found.document | {"begins_s": float(inputs.samples.t_s[begin])})
+    document = certified.with_digest(found.document | {"begins_s": float(inputs.samples.t_s[begin])})
     replace(found, document=document).write(folder)

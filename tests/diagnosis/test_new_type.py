@@ -358,7 +358,7 @@ def check_certificate():
 
 def refused(certificate, log, scenario):
     """Why the checker refuses it."""
-    from beaver_ftc_assurance.certificates.certificate import with_digest
+    from beaver_ftc_assurance.certificates.certified import with_digest
 
     return [*check_certificate().failures(with_digest(certificate), log, scenario)]
 

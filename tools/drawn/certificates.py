@@ -29,7 +29,8 @@ import yaml
 import beaver_ftc as bf
 from beaver_ftc.scenario.builtin import to_yaml
 from beaver_ftc_assurance.certificates import check_certificate as checker
-from beaver_ftc_assurance.certificates.certificate import MEASURED_MODEL_BOUND, as_text, with_digest
+from beaver_ftc_assurance.certificates.certificate import MEASURED_MODEL_BOUND
+from beaver_ftc_assurance.certificates.certified import as_text, with_digest
 from tools.drawn.campaign import AIRCRAFT
 from tools.drawn.compose import OURS, PLAIN, drawn_flights
 

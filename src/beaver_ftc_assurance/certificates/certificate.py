@@ -3,7 +3,6 @@ number it takes. `check_certificate.py` recomputes it from the log, with the col
 """
 
 import hashlib
-import json
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -18,11 +17,17 @@ from beaver_ftc.diagnosis import LOSS, scheme_number
 from beaver_ftc.diagnosis import TYPE_ROWS as TYPES
 from beaver_ftc.diagnosis.detection import filter_poles
 from beaver_ftc.documents import BadInput
-from beaver_ftc.loop import LogSink
-from beaver_ftc.results import Log, ParquetLog, StoredLog
+from beaver_ftc.results import Log, StoredLog
 from beaver_ftc.scenario import Declared, Scenario, to_yaml
 from beaver_ftc_assurance.certificates import chance, courses, instruments_say, kinds
-from beaver_ftc_assurance.certificates.check_certificate import FORMAT_VERSION, digest
+from beaver_ftc_assurance.certificates.certified import (
+    LOG_NAME,
+    Certified,
+    EvidenceColumns,
+    PartialColumn,
+    with_digest,
+)
+from beaver_ftc_assurance.certificates.check_certificate import FORMAT_VERSION
 from beaver_ftc_assurance.certificates.history import (
     Document,
     History,
@@ -49,10 +54,7 @@ from beaver_ftc_assurance.certificates.tape import (
     tape_of_flight_again,
 )
 
-EvidenceColumns = dict[str, "PartialColumn"]  # column of the log -> what stands in it
 Columns = dict[str, np.ndarray]
-FILE_NAME = "certificate.json"
-LOG_NAME = "log.parquet"
 MEASURED_MODEL_BOUND = "measured_rad_s", "design_rad_s2", "eta_bar_rad_s2"  # columns of each axis
 _LOGGED_COLUMNS = {"watch_missing"} | {f"{axis}_{of}" for axis in AXES for of in MEASURED_MODEL_BOUND}
 _EVENT_COLUMN = re.compile("detected|fie_.*_excluded")  # columns of the alarm and of exclusions
@@ -63,7 +65,7 @@ ADDING_POLE_PER_S = 0.1  # slow enough for the filter to add up a block
 
 def certificate(
     scenario: Scenario, log: Log, recorder: Recorder | None = None, text: str | None = None
-) -> "Certified":
+) -> Certified:
     """The certificate of a flight.
 
     recorder: has kept the quantities that the log lacks; without one the scenario is flown again. text:
@@ -126,17 +128,6 @@ def check_scheme(scenario: Scenario) -> None:
         )
 
 
-def with_digest(document: Document) -> Document:
-    """The document with its `digest`: the SHA-256 of its JSON text, keys sorted, without spaces, with an
-    empty `digest`."""
-    return document | {"digest": digest(document)}
-
-
-def as_text(document: Document) -> str:
-    """The file's content."""
-    return json.dumps(document, separators=(",", ":")) + "\n"
-
-
 class OfRun:
     """The certificate of a flight that is about to be flown; `watch` records the quantities that it needs."""
 
@@ -152,50 +143,6 @@ class OfRun:
         columns that prove it to the log."""
         text = (folder / "scenario.yaml").read_text(encoding="utf-8")
         certificate(self._scenario, StoredLog(folder / LOG_NAME), self._recorder, text).write(folder)
-
-
-@dataclass(frozen=True)
-class Certified:
-    """A certificate, and what proves it: the log, the columns that the log lacks, the text of
-    scenario.yaml."""
-
-    document: Document
-    log: Log
-    columns: EvidenceColumns
-    scenario: str
-
-    def copy_log(self, to: LogSink) -> None:
-        """Write the log, with the columns that it lacks, to a sink."""
-        to.open([*self.log.columns, *self.columns])
-        first = 0
-        for chunk in self.log.read_chunks():
-            n = len(chunk["t_s"])
-            further = (one.rows(first, n) for one in self.columns.values())
-            to.write(np.column_stack([*chunk.values(), *further]))
-            first += n
-
-    def write(self, folder: Path) -> None:
-        """Write certificate, log and scenario into a folder."""
-        if self.columns or not (folder / LOG_NAME).exists():
-            extended = folder / f".{LOG_NAME}"
-            with ParquetLog(extended) as log:
-                self.copy_log(log)
-            extended.replace(folder / LOG_NAME)
-        (folder / "scenario.yaml").write_text(self.scenario, encoding="utf-8")
-        (folder / FILE_NAME).write_text(as_text(self.document), encoding="utf-8")
-
-
-@dataclass(frozen=True)
-class PartialColumn:
-    """A column known in the rows from `first` on (`values`). The rows before repeat the first of the values,
-    the rows after the last."""
-
-    first: int
-    values: np.ndarray
-
-    def rows(self, first: int, n: int) -> np.ndarray:
-        """The rows from `first` on, (n,)."""
-        return self.values[np.clip(np.arange(first, first + n) - self.first, 0, len(self.values) - 1)]
 
 
 def history_of(scenario: Scenario, rows: Columns, tape: Tape) -> History:

@@ -11,12 +11,8 @@ from beaver_ftc.loop import FrameReadout
 from beaver_ftc.results import Columns, Log, MemoryLog, Proof
 from beaver_ftc.scenario import Scenario
 from beaver_ftc_assurance.certificates import chance
-from beaver_ftc_assurance.certificates.certificate import (
-    MEASURED_MODEL_BOUND,
-    Certified,
-    certificate,
-    check_scheme,
-)
+from beaver_ftc_assurance.certificates.certificate import MEASURED_MODEL_BOUND, certificate, check_scheme
+from beaver_ftc_assurance.certificates.certified import Certified
 from beaver_ftc_assurance.certificates.tape import Recorder
 
 

@@ -21,7 +21,7 @@ import beaver_ftc as bf
 from beaver_ftc.cli.main import main
 from beaver_ftc.diagnosis.types.registry import DESCRIPTIONS_IN_TYPE_ORDER, N_TYPES, TYPES
 from beaver_ftc_assurance.certificates import check_certificate
-from beaver_ftc_assurance.certificates.certificate import as_text, with_digest
+from beaver_ftc_assurance.certificates.certified import as_text, with_digest
 from beaver_ftc_assurance.certificates.check_certificate import Refused, check_statement_form, failures
 from flying import SINES
 from samples import samples

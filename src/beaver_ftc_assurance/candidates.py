@@ -1,0 +1,208 @@
+"""Certain to distinguish two faults: the deflections at which they differ by more than the bounds hide.
+
+If the parameter of a fault is constant, the data since the alarm leave an interval for it. At a command u,
+the deflection of its surface then lies in an interval too: stuck [c-, c+], floating 0, a loss [e- u, e+ u], a
+bias u + [b-, b+]. B (3,) is the bound on the innovation of a frame at the largest rates that the doublet may
+reach, G_i the effectiveness of surface i, and M a margin.
+
+Two types on one surface are distinguished by a frame in which, on some axis, their deflections differ by more
+than 2 M B / |G_i|, twice what the uncertainty hides. They must differ from the command by as much: a frame
+that health explains says nothing about a fault that may end. Two surfaces a and b are distinguished along a
+direction d with d.G_b = 0, in which b has no effect, by a frame in which a differs from its command by more
+than 2 M |d|.B / |d.G_a|.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from math import degrees, inf
+
+import numpy as np
+
+from beaver_ftc.diagnosis import TYPE_ROWS as TYPES
+from beaver_ftc.diagnosis import UNANTICIPATED, DiagnosisReadout, type_index_of
+from beaver_ftc.results import Document
+from beaver_ftc.scenario import Scenario
+from beaver_ftc_assurance.certificates.history import History, declared_errors_of
+from beaver_ftc_assurance.certificates.inequality import Hypothesis, theta_bounds_by_frame
+from beaver_ftc_assurance.certificates.kinds import hypothesis_of_type, travel_rad
+from beaver_ftc_assurance.certificates.tape import Tape
+from beaver_ftc_assurance.doublet import LONGEST_S, Situation, doublet
+
+MARGIN = 1.1  # M: G and B are those of the last frame, and change while the doublet is flown
+GRID = 801  # deflections tried over the travel
+RELATIONS = {
+    kind: row.deflection_relation
+    for kind, row in enumerate(TYPES)
+    if row.has_constant_parameter and row.deflection_relation
+}
+LOSS = type_index_of("loss_of_effectiveness")  # the only type of the fault class `losses`
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A fault type, one of RELATIONS, on a surface; its parameter lies between low and high."""
+
+    surface: int
+    kind: int
+    low: float
+    high: float
+
+    def deflection(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Least and greatest deflection, rad, of the surface at commands u (n,) rad."""
+        gain, is_share, _ = RELATIONS[self.kind]
+        ends = [(gain + end) * u if is_share else gain * u + end for end in (self.low, self.high)]
+        return np.minimum(*ends), np.maximum(*ends)
+
+    def off(self, u: np.ndarray) -> np.ndarray:
+        """Least distance of the surface from its commands u, (n,) rad."""
+        low, high = self.deflection(u)
+        return np.asarray(np.maximum(0.0, np.maximum(low - u, u - high)))
+
+
+def situation_of(tape: Tape, scenario: Scenario, rate: float) -> Situation:
+    """The aircraft at the end of a flight; rate: largest allowed body rate, rad/s."""
+    frame = tape.last
+    aircraft = scenario.airframe
+    dt = 1.0 / scenario.rate_hz
+    bound = frame.diagnosis.declared_bounds
+    declared = declared_errors_of(frame)
+    actuators = frame.actuators
+    coupled = declared.inertia_coupling * rate**2
+    return Situation(
+        G=frame.mean_G, u=frame.expected_u_rad, x=frame.rates_rad_s, rate=rate,
+        bound=bound.eta_bar_rad_s2 + coupled + 2.0 * bound.changing_gyro_error_bound_rad_s / dt,
+        stops=np.array([actuators.low_rad, actuators.high_rad]), approach=actuators.approach,
+        step=actuators.step_rad, instants=scenario.substeps,
+        in_blocks=frame.diagnosis.types_config.frames_per_block > 1, dt=dt,
+        alpha=frame.alpha_rad, alpha_range=aircraft.alpha_rad,
+    )  # fmt: skip
+
+
+def candidates(tape: Tape, history: History) -> Iterator[Candidate]:
+    """Every fault that is left and has a constant parameter, with the interval of the parameter."""
+    last = tape.last.diagnosis
+    frames = np.arange(round(last.detected_at_s / tape.last.dt_s), tape.end)  # from the alarm on
+    shown = frames[history.is_unexplained(frames)]
+    if last.isolated_estimator == UNANTICIPATED or not len(shown):
+        return
+    for s, kind in faults_left(last):
+        if kind not in RELATIONS:
+            continue
+        low, high = RELATIONS[kind].theta_span(*travel_rad(tape, s))
+        if low < high:
+            low, high = _interval(hypothesis_of_type(tape, s, kind), history, shown)
+        if low <= high:
+            yield Candidate(s, kind, low, high)
+
+
+def faults_left(diagnosis: DiagnosisReadout) -> Iterator[tuple[int, int]]:
+    """Surface and type of each fault that is not excluded."""
+    estimators = diagnosis.estimators
+    layout = diagnosis.layout
+    for s, surface in enumerate(diagnosis.surface_fault_types):
+        if not diagnosis.diagnoses_all_types:
+            e = layout.loss_estimator_index_by_surface[s]
+            if e >= 0 and not estimators[e].is_excluded:
+                yield s, LOSS
+        elif not estimators[layout.position_estimator_index_by_surface[s]].is_excluded:
+            yield from ((s, kind) for kind in np.flatnonzero(~surface.is_type_excluded).tolist())
+
+
+def _interval(of: Hypothesis, history: History, frames: np.ndarray) -> tuple[float, float]:
+    """The interval of a parameter that is constant in all of these frames."""
+    least, most, _ = theta_bounds_by_frame(of, history, frames)
+    return max(of.theta_low, float(least.max())), min(of.theta_high, float(most.min()))
+
+
+def tell_apart(one: Candidate, other: Candidate, at: Situation, names: Sequence[str]) -> Document:
+    """A doublet that is certain to distinguish two candidates, or the reason why there is none."""
+    targets: dict[int, float] = {}
+    needs: Document = {}
+    if one.surface == other.surface and at.in_blocks:
+        return _none("with noisy gyros types are told by blocks of frames, not by one", needs)
+    if one.surface == other.surface:
+        asked = [(one.surface, *_types_apart(one, other, at))]
+    else:
+        asked = [(a.surface, *_surface_shown(a, b, at)) for a, b in ((one, other), (other, one))]
+    for s, target, numbers in asked:
+        needs[names[s]] = numbers
+        if target is None:
+            return _none(numbers["because"], needs)
+        targets[s] = target
+    found = doublet(targets, at)
+    if found is None:
+        says = f"no doublet within {LONGEST_S:g} s keeps the rates below {degrees(at.rate):g} deg/s"
+        return _none(f"{says} and the angle of attack in its range", needs)
+    commands, tells = found
+    return {
+        "separates": True,
+        "time_s": (tells + 2) * at.dt,  # a command is in effect a frame later, a frame judged with the next
+        "duration_s": len(commands) * at.dt,
+        "amplitude_deg": degrees(max(abs(commands[:, [*targets]] - at.u[[*targets]]).max(axis=0))),
+        "needs": needs,
+        "commands_rad": {names[s]: commands[:, s].tolist() for s in targets},
+    }
+
+
+def _none(because: str, needs: Document) -> Document:
+    return {"separates": False, "because": because, "needs": needs}
+
+
+def _types_apart(one: Candidate, other: Candidate, at: Situation) -> tuple[float | None, Document]:
+    """The deflection nearest to the present one at which two types on a surface, and health, all differ."""
+    s = one.surface
+    room = min(
+        (2.0 * MARGIN * B / abs(g) for B, g in zip(at.bound, at.G[:, s], strict=True) if g), default=inf
+    )
+    u = _deflections(at, s)
+    (low, high) = one.deflection(u)
+    (low_too, high_too) = other.deflection(u)
+    gap = np.maximum(low - high_too, low_too - high)
+    gap = np.minimum(gap, np.minimum(one.off(u), other.off(u)))  # else health explains the frame
+    return _nearest(u, gap, s, at, room, "apart, and off their command,")
+
+
+def _surface_shown(one: Candidate, other: Candidate, at: Situation) -> tuple[float | None, Document]:
+    """The deflection nearest to the present one at which a fault shows in a direction in which the surface of
+    the other one has no effect."""
+    a = one.surface
+    b = other.surface
+    room = min(
+        (2.0 * MARGIN * np.abs(d) @ at.bound / abs(d @ at.G[:, a]) for d in _blind_to(b, at, a)), default=inf
+    )
+    u = _deflections(at, a)
+    return _nearest(u, one.off(u), a, at, room, "off its command")
+
+
+def _deflections(at: Situation, s: int) -> np.ndarray:
+    """Deflections to choose from, (GRID + 1,) rad: over the whole travel, and the present one."""
+    return np.append(np.linspace(at.stops[0, s], at.stops[1, s], GRID), np.clip(at.u[s], *at.stops[:, s]))
+
+
+def _blind_to(b: int, at: Situation, a: int) -> Iterator[np.ndarray]:
+    """Directions d (3,) with d.G_b = 0, in which surface a has an effect."""
+    for i, j in combinations(range(3), 2):
+        d = np.zeros(3)
+        d[i] = at.G[j, b]
+        d[j] = -at.G[i, b]
+        for way in (d, *(np.eye(3)[k] for k in (i, j) if at.G[k, b] == 0.0)):
+            if abs(way @ at.G[:, a]) > 1e-9 * np.abs(way).max():
+                yield way
+
+
+def _nearest(
+    u: np.ndarray, off: np.ndarray, s: int, at: Situation, room: float, what: str
+) -> tuple[float | None, Document]:
+    """The deflection nearest to the present one among those of u with off > room, None if there is none; and
+    the numbers that decide it. off (n,), rad: the difference at each of u."""
+    most = degrees(off.max())
+    tells = off > room
+    numbers: Document = {"at_least_deg": degrees(room) if room < inf else None}
+    numbers |= {"at_most_deg": most, "now_deg": degrees(at.u[s])}
+    if not tells.any():
+        asked = f"more than {degrees(room):.3g} deg" if room < inf else "another direction"
+        says = f"they must be {what} by {asked}, and are by {most:.3g} deg at most within the travel"
+        return None, numbers | {"because": says}
+    target = float(u[tells][np.argmin(np.abs(u[tells] - at.u[s]))])
+    return target, numbers | {"target_deg": degrees(target)}

@@ -1,0 +1,70 @@
+"""A certificate with what proves it: the log, the columns that the log lacks, the text of scenario.yaml."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from beaver_ftc.loop import LogSink
+from beaver_ftc.results import Document, Log, ParquetLog
+from beaver_ftc_assurance.certificates.check_certificate import digest
+
+EvidenceColumns = dict[str, "PartialColumn"]  # column of the log -> what stands in it
+FILE_NAME = "certificate.json"
+LOG_NAME = "log.parquet"
+
+
+def with_digest(document: Document) -> Document:
+    """The document with its `digest`: the SHA-256 of its JSON text, keys sorted, without spaces, with an
+    empty `digest`."""
+    return document | {"digest": digest(document)}
+
+
+def as_text(document: Document) -> str:
+    """The file's content."""
+    return json.dumps(document, separators=(",", ":")) + "\n"
+
+
+@dataclass(frozen=True)
+class Certified:
+    """A certificate, and what proves it: the log, the columns that the log lacks, the text of
+    scenario.yaml."""
+
+    document: Document
+    log: Log
+    columns: EvidenceColumns
+    scenario: str
+
+    def copy_log(self, to: LogSink) -> None:
+        """Write the log, with the columns that it lacks, to a sink."""
+        to.open([*self.log.columns, *self.columns])
+        first = 0
+        for chunk in self.log.read_chunks():
+            n = len(chunk["t_s"])
+            further = (one.rows(first, n) for one in self.columns.values())
+            to.write(np.column_stack([*chunk.values(), *further]))
+            first += n
+
+    def write(self, folder: Path) -> None:
+        """Write certificate, log and scenario into a folder."""
+        if self.columns or not (folder / LOG_NAME).exists():
+            extended = folder / f".{LOG_NAME}"
+            with ParquetLog(extended) as log:
+                self.copy_log(log)
+            extended.replace(folder / LOG_NAME)
+        (folder / "scenario.yaml").write_text(self.scenario, encoding="utf-8")
+        (folder / FILE_NAME).write_text(as_text(self.document), encoding="utf-8")
+
+
+@dataclass(frozen=True)
+class PartialColumn:
+    """A column known in the rows from `first` on (`values`). The rows before repeat the first of the values,
+    the rows after the last."""
+
+    first: int
+    values: np.ndarray
+
+    def rows(self, first: int, n: int) -> np.ndarray:
+        """The rows from `first` on, (n,)."""
+        return self.values[np.clip(np.arange(first, first + n) - self.first, 0, len(self.values) - 1)]

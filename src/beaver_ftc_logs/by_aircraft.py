@@ -19,7 +19,8 @@ from beaver_ftc.results import Document
 from beaver_ftc_logs import findings
 from beaver_ftc_logs.aircraft_inputs import DiagnosedAircraft, LogInputs, read_inputs
 from beaver_ftc_logs.column_mistakes import MAX_REVERSED_GAIN
-from beaver_ftc_logs.diagnose import LogRows, reversed_command_error
+from beaver_ftc_logs.diagnose import reversed_command_error
+from beaver_ftc_logs.log_rows import LogRows
 from beaver_ftc_logs.recording import Floats, Reasons, RecordedFlight
 from beaver_ftc_logs.stepped import Replayed, error_sections, named_since, replay_samples, rows_of_replay
 from beaver_ftc_logs.vehicle import Vehicle

@@ -4,102 +4,18 @@ The name of a column says which quantity it is. Its unit follows from the name, 
 and from mechanics: the integral of p is the change of roll, the mean of the acceleration is 1 g.
 """
 
-import re
-from collections.abc import Iterable, Sequence
-from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
 
 import numpy as np
 
 from beaver_ftc.documents import BadInput
 from beaver_ftc.results import Document
 from beaver_ftc_logs import physics
-from beaver_ftc_logs.known_commands import (
-    VTOL_MODE,
-    command_names,
-    hovers_throughout,
-    is_command_name,
-    missing_commands_text,
-    multicopter_reason,
-)
 from beaver_ftc_logs.loading import read_vehicle_parts
-from beaver_ftc_logs.mixing import Mixing, mixing_of_log
-from beaver_ftc_logs.readers import (
-    SELECTIVE_READERS,
-    check_exists,
-    read_flight,
-    read_parts,
-    reader_name_for_path,
-)
-from beaver_ftc_logs.readers.table import (
-    TIME_COLUMN,
-    column_names,
-    first_cells_of_column,
-    text_of_column_phrase,
-)
-from beaver_ftc_logs.recording import (
-    Column,
-    Floats,
-    RecordedFlight,
-    TimeSource,
-    largest_magnitude,
-    nearest_names_text,
-)
+from beaver_ftc_logs.proposal import NoVehicleError, guess_vehicle, rates_agree, read_likely
+from beaver_ftc_logs.recording import RecordedFlight
 from beaver_ftc_logs.samples import convert_to_si, named_angles, resample
-from beaver_ftc_logs.time_base import median_step_s
-from beaver_ftc_logs.units import (
-    ACCELERATION,
-    HALF_PULSE_RANGE_US,
-    NEUTRAL_PULSE_US,
-    RATE,
-    SI_UNITS,
-    TIME_UNITS,
-    nearest_unit,
-)
-from beaver_ftc_logs.vehicle import Vehicle, unused_keys_as_comments
-
-
-def _rate_pattern(rate_name: str, angle: str, axis: str, vector_index: int) -> str:
-    """Return a pattern of the names of a body rate: ours, by its angle, by its axis, by its place in a
-    vector."""
-    return "|".join((
-        rf"(.*_)?{rate_name}_(rad|deg)_?s(ec)?", rate_name, rf"(.*\.)?{angle}_?(rate|speed)\w*",
-        rf".*gyr(o|_)?_?{axis}\w*", rf".*gyro_?(rad|adc)\[{vector_index}\](_deg_s)?",
-        rf"(.*[._])?ang(ular)?_?vel(ocity)?_?({axis}|{rate_name})(_\w+)?", f"w{axis}",
-        f"omega_?{axis}", rf"rate\.{angle[0]}",
-        rf".*velocity\.({axis}|xyz\[{vector_index}\])",
-    ))  # fmt: skip
-
-
-_NAME_PATTERNS = {
-    "p": _rate_pattern("p", "roll", "x", 0),
-    "q": _rate_pattern("q", "pitch", "y", 1),
-    "r": _rate_pattern("r", "yaw", "z", 2),
-    "roll": r"(.*\.)?(roll|phi|bank)(_?(rad|deg|angle))?(_\w+)?",
-    "pitch": r"(.*\.)?(pitch|theta)(_?(rad|deg|angle))?(_\w+)?",
-    "az": r"(.*[._])?(az|acc_?z|accel_?z|acc_?down|linear_acceleration\.z|accelerometer_m_s2\[2\])(_\w+)?",
-    "airspeed": r"(.*\.)?(true_)?(airspeed|[kect]?[tice]as)(_\w+)?",
-    "time": r"(real|totl|total|sim|simulation|utc|gps|log|date|sys|system)_?time|date|datetime|clock|utc|"
-    r"%?t(ime)?(_?(s|ms|us|ns|usec|stamp|boot))?\w*|(milli|micro|nano)?s(ec(ond)?s?)?|millis|micros",
-}
-# Names of setpoints of a quantity, its errors, flags and the like: none of these is the quantity.
-_DERIVED_NAME = (
-    r"innov|test_ratio|varian|timestamp|flag|valid|status|count|setpoint|_sp$|desired|demand|target|bias|"
-    r"integ|error|_err$|_offset|cov(ariance)?\b|temp|noise|(_|^)(cmd|command)"
-)
-_ANGLE_RATE_NAME = r"rate|speed|accel|veloc|dot|_(deg|rad)_?s(ec)?$"
-_UNIT_OF_PART = {"rad_s": "rad/s", "rad/s": "rad/s", "deg_s": "deg/s", "deg/s": "deg/s", "dps": "deg/s"}
-_PWM_RANGE_US = (700.0, 2300.0)
-_LARGEST_RAD_S = 12.0
-_MIN_CORRELATION = 0.7
-_MAX_COMMANDS = 8
-_MAX_READ_COLUMNS = 60
-_LOG_STEPS_S = (1.0 / 2000.0, 1.0 / 4.0)
-
-
-class _NoVehicle(Exception):
-    """No vehicle file can be proposed for a log; the text has the reason."""
+from beaver_ftc_logs.vehicle import Vehicle
 
 
 def check_log(path: Path, vehicle: Vehicle | None, reader: str | None) -> Document:
@@ -111,11 +27,11 @@ def check_log(path: Path, vehicle: Vehicle | None, reader: str | None) -> Docume
     lines: list[str] = []
     guess: Document | None = None
     if vehicle is None:
-        likely = _read_likely(path, reader)
+        likely = read_likely(path, reader)
         lines += likely.remarks
         try:
-            guess = _guess_vehicle(path, likely)
-        except _NoVehicle as reason:
+            guess = guess_vehicle(path, likely)
+        except NoVehicleError as reason:
             lines.append(f"{path}: {reason}")
             return {"log": str(path), "usable": False, "lines": lines, "vehicle": None}
         vehicle = Vehicle.model_validate(guess)
@@ -160,225 +76,10 @@ def _compare_angles(log: RecordedFlight, vehicle: Vehicle) -> list[str]:
         return ["too little moves to compare the rates with the roll angle"]
     return [
         f"the change of {angle[0]} is {fit.slope:.3f} times the integral of {rate} (correlation "
-        f"{fit.correlation:.2f}): {'they agree' if _agrees(fit) else 'they tell nothing of one another'}"
+        f"{fit.correlation:.2f}): {'they agree' if rates_agree(fit) else 'they tell nothing of one another'}"
         for fit, angle, rate in zip(fits, angles, vehicle.rate_columns, strict=True)
         if fit and angle
     ]
-
-
-def _agrees(fit: physics.AngleFit) -> bool:
-    return abs(fit.correlation) > _MIN_CORRELATION
-
-
-class _LikelyLog(NamedTuple):
-    """A log with the columns that may be quantities or commands; of a long table, the first part.
-
-    time: column and unit of the time, None for the usual ones; all_names: the names of all columns; mixing:
-    by the parameters of the log.
-    """
-
-    reader: str
-    time: TimeSource | None
-    log: RecordedFlight
-    all_names: list[str]
-    mixing: Mixing
-
-    @property
-    def remarks(self) -> list[str]:
-        """Lines on the time and the mixing."""
-        if self.time:
-            return [f"time is in column {self.time[0]}, its steps fit {self.time[1]}"]
-        return self.mixing.lines
-
-
-def _read_likely(path: Path, reader: str | None) -> _LikelyLog:
-    """Read a log. Raises BadInput if it cannot be read, or if a table has no time."""
-    check_exists(path)
-    reader = reader or reader_name_for_path(path)
-    if reader in SELECTIVE_READERS:
-        log = read_flight(path, reader, columns=())
-        names = list(log.columns)
-        mixing = mixing_of_log(reader, log.parameters, names)
-        likely = [*_likely_columns(names, None), *mixing.entry_by_column, *({VTOL_MODE} & {*names})]
-        log = read_flight(path, reader, columns=likely)
-        return _LikelyLog(reader, None, log, names, mixing)
-    time = wanted = None
-    if reader == "table":
-        wanted = _likely_columns(column_names(path))
-        time = _find_time(path)
-    log = next(read_parts(path, reader, time, wanted))
-    return _LikelyLog(reader, time, log, list(log.columns), Mixing())
-
-
-def _guess_vehicle(path: Path, likely: _LikelyLog) -> Document:
-    """The keys of a vehicle file for a log. Raises _NoVehicle if it has no rates or no commands."""
-    log = likely.log
-    mixing = likely.mixing
-    names = [name for name, column in log.columns.items() if np.isfinite(column.values).any()]
-    found = _find_quantities(names)
-    if hovers_throughout(log.parameters, log.columns):
-        raise _NoVehicle(
-            f"is the log of a VTOL that hovers throughout ({VTOL_MODE} is never 2), allowed: a log with "
-            "flight on its wing"
-        )
-    if not mixing.surfaces:
-        _add_commands_by_name(likely, names)
-    if missing := [axis for axis in "pqr" if axis not in found]:
-        raise _NoVehicle(
-            f"no column looks like the rate {missing[0]}, allowed: a vehicle file that names it; the log has "
-            + nearest_names_text("rate", likely.all_names)
-        )
-    if not mixing.surfaces:
-        reason = missing_commands_text(likely.all_names)
-        raise _NoVehicle(f"{reason}; the log has {nearest_names_text('command', likely.all_names)}")
-    roll = log.columns[found["roll"]] if "roll" in found else None
-    angle_unit = _guess_angle_unit(found["roll"], roll, likely.reader) if roll else "rad"
-    rate_unit = _guess_rate_unit(log, [found[axis] for axis in "pqr"], roll, SI_UNITS[angle_unit][1])
-    vehicle: Document = {"name": _plain_name(path.stem), "reader": likely.reader}
-    if likely.time:
-        vehicle["time"] = dict(zip(("column", "unit"), likely.time, strict=True))
-    vehicle["rates"] = {axis: _column_entry(found[axis], rate_unit, "rad/s") for axis in "pqr"}
-    vehicle |= {"commands": mixing.commands, "surfaces": mixing.surfaces}
-    if roll:
-        named = [axis for axis in ("roll", "pitch") if axis in found]
-        vehicle["attitude"] = {axis: _column_entry(found[axis], angle_unit, "rad") for axis in named}
-    if az := found.get("az"):
-        median = float(np.nanmedian(np.abs(log.columns[az].values)))
-        if median > 0.0 and (unit := nearest_unit(ACCELERATION, SI_UNITS["g"][1] / median, 2.0)):
-            vehicle["acceleration"] = _column_entry(az, unit, "m/s2")
-    if "airspeed" in found:
-        vehicle["airspeed"] = found["airspeed"]
-    return vehicle
-
-
-def _find_quantities(names: list[str]) -> dict[str, str]:
-    """By quantity, the column that looks like it."""
-    angles = [name for name in names if not re.search(_ANGLE_RATE_NAME, _snake_case(name))]
-    return {
-        quantity: name
-        for quantity, pattern in _NAME_PATTERNS.items()
-        if (name := _shortest_match(pattern, angles if quantity in ("roll", "pitch") else names))
-    }
-
-
-def _add_commands_by_name(likely: _LikelyLog, names: list[str]) -> None:
-    """Add to the mixing a surface for each column that looks like a command. Raises _NoVehicle for a
-    multicopter."""
-    log = likely.log
-    mixing = likely.mixing
-    if rotors := multicopter_reason(log.parameters, likely.all_names):
-        raise _NoVehicle(
-            f"is the log of a multicopter ({rotors}), which has no surfaces, allowed: a log of an aircraft "
-            "with surfaces"
-        )
-    for name in command_names(names, log.parameters)[:_MAX_COMMANDS]:
-        mixing.entry_by_column[name] = _pulse_entry(name, log.columns[name].values)
-        mixing.surfaces[_plain_name(name)] = {name: 1.0}
-
-
-def _likely_columns(names: Iterable[str], max_columns: int | None = _MAX_READ_COLUMNS) -> list[str]:
-    """Columns that may be quantities or commands: a log with many columns is not read as a whole."""
-    pattern = "|".join(f"({part})" for part in _NAME_PATTERNS.values())
-    likely = [name for name in names if re.fullmatch(pattern, _snake_case(name)) or is_command_name(name)]
-    return likely[:max_columns]
-
-
-def _snake_case(name: str) -> str:
-    """The name of a column in the form of the patterns: `Roll rate [deg/s]` is `roll_rate_deg_s`."""
-    text = re.sub(r"\s*[\[(]\s*([^\d\])][^\])]*?)\s*[\])]\s*$", r"_\1", name.strip().lower())
-    return re.sub(r"(?<=\w)_{2,}(?=\w)|[\s/,-]+_*", "_", text).strip("_")
-
-
-def _shortest_match(pattern: str, names: Sequence[str]) -> str | None:
-    """The shortest name that fits a pattern, the first in the alphabet if there are two; None if none
-    fits."""
-    matches = [
-        name
-        for name in names
-        if re.fullmatch(pattern, _snake_case(name)) and not re.search(_DERIVED_NAME, _snake_case(name))
-    ]
-    return min(matches, key=lambda name: (len(name), name), default=None)
-
-
-def _find_time(path: Path) -> TimeSource | None:
-    """The time column of a table and its unit, None for the usual ones. Raises BadInput where no column
-    increases like time."""
-    names = column_names(path)
-    likely = [name for name in names if re.fullmatch(_NAME_PATTERNS["time"], _snake_case(name))]
-    phrases: list[str] = []
-    for name in sorted(likely, key=lambda name: name != TIME_COLUMN):
-        cells = first_cells_of_column(path, name)
-        stamps = cells.numbers[name][np.isfinite(cells.numbers[name])]
-        if phrase := text_of_column_phrase(cells, name):
-            phrases.append(f"{name} holds {phrase.removeprefix(', but ')}")
-        step = median_step_s(stamps)
-        (shortest_s, longest_s) = _LOG_STEPS_S
-        units = [unit for unit, seconds in TIME_UNITS.items() if shortest_s <= step * seconds <= longest_s]
-        if units:
-            unit = next((unit for unit in units if _snake_case(name).endswith(unit)), units[0])
-            return None if (name, unit) == (TIME_COLUMN, "s") else (name, unit)
-    allowed = f"a table with {TIME_COLUMN} in seconds, or another time that increases"
-    phrase = f" ({'; '.join(phrases)})" if phrases else ""
-    nearest = nearest_names_text(TIME_COLUMN, names)
-    raise BadInput(f"{path}: no column of time{phrase}, allowed: {allowed}; it has {nearest}")
-
-
-def _guess_angle_unit(name: str, roll: Column, reader: str) -> str:
-    """The unit of the attitude: degrees for ArduPilot, otherwise by the name, otherwise by the size."""
-    if reader == "ardupilot" or "deg" in name.lower():
-        return "deg"
-    return "deg" if "rad" not in name.lower() and largest_magnitude(roll.values) > 2.0 * np.pi else "rad"
-
-
-def _guess_rate_unit(
-    log: RecordedFlight, rate_names: list[str], roll: Column | None, rad_per_roll_unit: float
-) -> str:
-    """The unit of the rates. If they agree with the roll angle, it is the unit in which they agree, otherwise
-    that of their name, otherwise rad/s. If they do not agree, it is that of their name, otherwise by size.
-
-    rad_per_roll_unit: factor on the numbers of the roll angle.
-    """
-    rates = [log.columns[name] for name in rate_names]
-    named = rate_names[0].lower()
-    found = next((unit for part, unit in _UNIT_OF_PART.items() if part in named), None)
-    if roll is not None:
-        in_rad = replace(roll, values=roll.values * rad_per_roll_unit)
-        fit = physics.fit_angle(rates, (in_rad, None, None), 0)
-        if fit is not None and _agrees(fit):
-            found = nearest_unit(RATE, abs(fit.slope), 1.5) or found or "rad/s"
-    largest = max(largest_magnitude(rate.values) for rate in rates)
-    return found or ("deg/s" if largest > _LARGEST_RAD_S else "rad/s")
-
-
-def _column_entry(name: str, unit: str, si_unit: str) -> Any:
-    return name if unit == si_unit else {"column": name, "unit": unit}
-
-
-def _pulse_entry(name: str, values: Floats) -> Any:
-    """The entry that converts a command to a share of travel: from pulses of 1100 to 1900 us, from per cent,
-    or without a factor."""
-    median = float(np.nanmedian(values))
-    largest = largest_magnitude(values)
-    if _PWM_RANGE_US[0] < median < _PWM_RANGE_US[1]:
-        scale = 1.0 / HALF_PULSE_RANGE_US
-        return {"column": name, "scale": scale, "offset": -scale * NEUTRAL_PULSE_US}
-    return {"column": name, "unit": "%"} if 10.0 < largest <= 105.0 else name
-
-
-def _plain_name(name: str) -> str:
-    return re.sub(r"[^A-Za-z0-9_-]+", "_", name).strip("_")[:100] or "log"
-
-
-def vehicle_file_text(vehicle: Document) -> str:
-    """A vehicle file's text."""
-    import yaml
-
-    head = (
-        "# Proposed by `identify --check`. Check each line. Choose commands that come before any part\n"
-        "# that can fail. A surface may follow several commands: `left: {roll_cmd: 0.5, pitch_cmd: -0.5}`.\n"
-    )
-    yaml_text = str(yaml.safe_dump(vehicle, sort_keys=False, allow_unicode=True, default_flow_style=None))
-    return head + yaml_text + unused_keys_as_comments(vehicle)
 
 
 def as_text(findings: Document) -> str:

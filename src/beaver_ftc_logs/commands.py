@@ -14,7 +14,7 @@ from beaver_ftc.commands import declare
 from beaver_ftc.documents import BadInput
 
 if TYPE_CHECKING:
-    from beaver_ftc_logs.diagnose import LogRows
+    from beaver_ftc_logs.log_rows import LogRows
     from beaver_ftc_logs.pages import Words
     from beaver_ftc_logs.samples import Samples
 
@@ -61,9 +61,9 @@ def identify(
     from beaver_ftc_logs.identification_page import refuse_foreign_file, render_identification
     from beaver_ftc_logs.identification_text import identification_text
     from beaver_ftc_logs.loading import load_flights_for_fit
-    from beaver_ftc_logs.mixing import load_vehicle_for_logs
     from beaver_ftc_logs.model import model_file_text
     from beaver_ftc_logs.vehicle import with_alarm_rate
+    from beaver_ftc_logs.vehicle_of_logs import load_vehicle_for_logs
 
     given = {path.resolve() for path in (*flights, Path(vehicle))}
     if not out.name or out.suffix == ".html" or out.resolve() in given:
@@ -99,8 +99,9 @@ def _check_logs(
 ) -> None:
     """Say of each log whether it can be used, and write the vehicle file that was guessed. Exit status 2
     if one cannot."""
-    from beaver_ftc_logs.check import as_text, check_log, vehicle_file_text
-    from beaver_ftc_logs.mixing import load_vehicle_for_logs
+    from beaver_ftc_logs.check import as_text, check_log
+    from beaver_ftc_logs.proposal import vehicle_file_text
+    from beaver_ftc_logs.vehicle_of_logs import load_vehicle_for_logs
 
     loaded, mixing = load_vehicle_for_logs(vehicle, flights, reader) if vehicle is not None else (None, [])
     if out is not None and (out.exists() or loaded is not None):
@@ -246,10 +247,10 @@ def _diagnose_with_aircraft(options: DiagnoseOptions) -> None:
     from beaver_ftc_logs.by_aircraft import diagnose_aircraft, load_diagnosed
     from beaver_ftc_logs.findings import as_text
     from beaver_ftc_logs.loading import read_vehicle_parts, refuse_equal_names
-    from beaver_ftc_logs.mixing import load_vehicle_for_logs
     from beaver_ftc_logs.pages import words_of_aircraft
     from beaver_ftc_logs.readers import check_exists
     from beaver_ftc_logs.stepped import BOUND_WINDOW_S
+    from beaver_ftc_logs.vehicle_of_logs import load_vehicle_for_logs
 
     if options.certificate:
         from beaver_ftc_logs import certified

@@ -17,13 +17,8 @@ import numpy as np
 from beaver_ftc.documents import BadInput, suggestion
 from beaver_ftc.plugins import DETECTORS, is_compiled, made, registered
 from beaver_ftc_logs.bank import build_bank
-from beaver_ftc_logs.diagnose import (
-    LogRows,
-    check_log_fits_model,
-    diagnose,
-    finish_rows,
-    join_names,
-)
+from beaver_ftc_logs.diagnose import check_log_fits_model, diagnose, finish_rows
+from beaver_ftc_logs.log_rows import LogRows, join_names
 from beaver_ftc_logs.loop_detectors import run_loop_detector
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import Floats, RecordedFlight

@@ -15,9 +15,9 @@ import numpy as np
 from beaver_ftc.results import Document
 from beaver_ftc_logs import trust
 from beaver_ftc_logs.bank import HypothesisBank, build_bank
-from beaver_ftc_logs.diagnose import UNKNOWN_SURFACE, LogRows
-from beaver_ftc_logs.energy import ENGINE
+from beaver_ftc_logs.energy import ENGINE, UNKNOWN_SURFACE
 from beaver_ftc_logs.least_squares import left_by
+from beaver_ftc_logs.log_rows import LogRows
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
 from beaver_ftc_logs.regression import innovations

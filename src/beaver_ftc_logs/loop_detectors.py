@@ -18,10 +18,8 @@ import numpy as np
 from beaver_ftc.design import N_Y, Context, DeclaredErrors
 from beaver_ftc.diagnosis import Detector, Measured, Verdict
 from beaver_ftc.documents import BadInput
-from beaver_ftc_logs.diagnose import (
-    UNKNOWN_SURFACE,
-    LogRows,
-)
+from beaver_ftc_logs.energy import UNKNOWN_SURFACE
+from beaver_ftc_logs.log_rows import LogRows
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import Floats
 from beaver_ftc_logs.regression import group_commands, group_indices, innovations

@@ -12,18 +12,14 @@ import math
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from beaver_ftc.documents import BadInput
-from beaver_ftc.documents import validate_model as validate
 from beaver_ftc.results import Document
-from beaver_ftc_logs.readers import SELECTIVE_READERS, check_exists, read_flight, reader_name_for_path
+from beaver_ftc_logs.readers import SELECTIVE_READERS
 from beaver_ftc_logs.recording import Floats, Parameters, last_value
 from beaver_ftc_logs.units import HALF_PULSE_RANGE_US, NEUTRAL_PULSE_US
-from beaver_ftc_logs.vehicle import Vehicle, read_vehicle_document
 
 Weights = dict[str, float]
 
@@ -439,58 +435,3 @@ def _command_entry(column: str, scale: float, offset: float) -> Any:
         return column
     entry = {"column": column, "scale": float(f"{scale:.10g}")}
     return entry | ({"offset": float(f"{offset:.10g}")} if offset else {})
-
-
-def load_vehicle_for_logs(
-    vehicle: str | Path, logs: Sequence[Path], reader: str | None
-) -> tuple[Vehicle, list[str]]:
-    """The vehicle in a file. If the file leaves out `commands` or `surfaces`, they follow from the
-    parameters of the logs, with remarks in the lines. Raises ScenarioError and BadInput with one line for
-    each mistake."""
-    document, path = read_vehicle_document(vehicle)
-    missing = [key for key in ("commands", "surfaces") if key not in document.data]
-    lines: list[str] = []
-    if missing and logs:
-        first: Document = {}
-        for log in logs:
-            keys, lines_of_log = _missing_keys_of_log(log, reader, document.data, missing)
-            if first and keys != first:
-                allowed = f"one for all, or {' and '.join(missing)} in {path}"
-                reason = f"its parameters give another mixing than those of {logs[0]}"
-                raise BadInput(f"{log}: {reason}, allowed: {allowed}")
-            first = keys
-            lines = lines or [f"{log}: {line}" for line in lines_of_log]
-        document.data.update(first)
-    return validate(Vehicle, document, path), lines
-
-
-def _missing_keys_of_log(
-    log: Path, reader: str | None, data: Mapping[str, Any], missing: Sequence[str]
-) -> tuple[Document, list[str]]:
-    """The keys that a vehicle file leaves out, by the parameters of a log, if its format has parameters."""
-    check_exists(log)
-    used_reader = reader or data.get("reader") or reader_name_for_path(log)
-    if used_reader not in SELECTIVE_READERS:
-        return {}, []
-    recording = read_flight(log, used_reader, columns=())
-    own = _columns_in_file(data)
-    column_names = set(recording.columns) if own is None else own & set(recording.columns)
-    mixing = mixing_of_log(used_reader, recording.parameters, column_names)
-    if not mixing.surfaces:
-        raise BadInput(f"{log}: {'; '.join(mixing.lines)}, allowed: {' and '.join(missing)} in the file")
-    keys = {"commands": mixing.commands, "surfaces": mixing.surfaces}
-    if own is not None and "commands" in missing:
-        keys["commands"] = [mixing.entry_by_column.get(column, column) for column in sorted(own)]
-    return {key: keys[key] for key in missing}, mixing.lines
-
-
-def _columns_in_file(data: Mapping[str, Any]) -> set[str] | None:
-    """The columns of the commands that a vehicle file names in one of the two keys, None if it has neither.
-    The check of the file reports entries that are no names."""
-    if isinstance(commands := data.get("commands"), list):
-        columns = [entry.get("column") if isinstance(entry, dict) else entry for entry in commands]
-        return {column for column in columns if isinstance(column, str)}
-    if isinstance(surfaces := data.get("surfaces"), dict):
-        tables = [weights for weights in surfaces.values() if isinstance(weights, dict)]
-        return {column for weights in tables for column in weights if isinstance(column, str)}
-    return None

@@ -14,8 +14,8 @@ from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.results import SERIES_COLOURS as SERIES
 from beaver_ftc.results import Document, as_json, result_folder
 from beaver_ftc.studies.present import GRID, panels
-from beaver_ftc_logs.diagnose import LogRows
 from beaver_ftc_logs.findings import MAX_BRIEF_EVENT_S, MIN_CREDIBLE_SHARE, duration_text, events_to_show
+from beaver_ftc_logs.log_rows import LogRows
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.runs import true_runs
 from beaver_ftc_logs.samples import Samples

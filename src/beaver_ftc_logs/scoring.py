@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from beaver_ftc.results import Document, Onset
-from beaver_ftc_logs.diagnose import UNKNOWN_SURFACE, LogRows
+from beaver_ftc_logs.energy import UNKNOWN_SURFACE
+from beaver_ftc_logs.log_rows import LogRows
 from beaver_ftc_logs.recording import Floats, LoggedFailure
 from beaver_ftc_logs.runs import last_row_at
 from beaver_ftc_logs.samples import Samples

@@ -18,7 +18,8 @@ import numpy as np
 from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.loop import FLOW, Diagnosis
 from beaver_ftc.results import Document
-from beaver_ftc_logs.diagnose import UNKNOWN_SURFACE, LogRows
+from beaver_ftc_logs.energy import UNKNOWN_SURFACE
+from beaver_ftc_logs.log_rows import LogRows
 from beaver_ftc_logs.model import NoiseModel
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
 from beaver_ftc_logs.regression import Innovations, split_parts

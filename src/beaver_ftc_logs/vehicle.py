@@ -26,15 +26,7 @@ from beaver_ftc.documents import (
 )
 from beaver_ftc.documents import validate_model as validate
 from beaver_ftc.scenario import looks_like_a_path
-from beaver_ftc_logs.units import (
-    ACCELERATION,
-    ANGLE,
-    LENGTH,
-    RATE,
-    SI_UNITS,
-    SPEED,
-    TIME_UNITS,
-)
+from beaver_ftc_logs.units import ACCELERATION, ANGLE, LENGTH, RATE, SI_UNITS, SPEED, TIME_UNITS
 
 _MAX_FILE_BYTES = 1_000_000
 MAX_ALARMS_PER_HOUR = 1000.0

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc_logs import scoring
-from beaver_ftc_logs.diagnose import LogRows
+from beaver_ftc_logs.log_rows import LogRows
 from beaver_ftc_logs.recording import LoggedFailure
 from products.logs import small
 

@@ -21,7 +21,7 @@ from beaver_ftc.studies.mismatch.sources import SOURCES
 from beaver_ftc.studies.present.tables import markdown_table
 from beaver_ftc.studies.sweep.columns import columns_of
 from beaver_ftc.studies.sweep.one_flight import FIXED
-from beaver_ftc_logs.diagnose import LogRows
+from beaver_ftc_logs.log_rows import LogRows
 
 TEXTS = Path(__file__).with_name("columns.yaml")
 NUMBER, TEXT, FLAG = "number", "text", "flag"

@@ -1,0 +1,93 @@
+"""The surfaces of an ArduPilot log, by its parameters.
+
+Output n has SERVOn_FUNCTION, _MIN, _MAX, _TRIM and _REVERSED. The mixers of elevons and V-tails have
+MIXING_GAIN and MIXING_OFFSET.
+"""
+
+import re
+from collections.abc import Collection, Mapping
+
+import numpy as np
+
+from beaver_ftc_logs.mixing_parts import (
+    PULSE_RANGE_US,
+    Axes,
+    BadParameterError,
+    CheckedParameters,
+    Found,
+    Surface,
+    full_name,
+    pulse_reading,
+)
+from beaver_ftc_logs.recording import Floats
+
+# SERVOn_FUNCTION of a surface: its name; its share of aileron, elevator and rudder, None where the mixer of
+# the autopilot is not linear; whether MIXING_GAIN and MIXING_OFFSET change it.
+_SURFACES: Mapping[int, tuple[str, tuple[float, float, float] | None, bool]] = {
+    4: ("aileron", (1.0, 0.0, 0.0), False),
+    16: ("left_spoiler_outer", None, False),
+    17: ("right_spoiler_outer", None, False),
+    19: ("elevator", (0.0, 1.0, 0.0), False),
+    21: ("rudder", (0.0, 0.0, 1.0), False),
+    24: ("left_flaperon", (1.0, 0.0, 0.0), False),
+    25: ("right_flaperon", (1.0, 0.0, 0.0), False),
+    77: ("left_elevon", (-1.0, 1.0, 0.0), True),
+    78: ("right_elevon", (1.0, 1.0, 0.0), True),
+    79: ("left_vtail", (0.0, 1.0, 1.0), True),
+    80: ("right_vtail", (0.0, 1.0, -1.0), True),
+    86: ("left_spoiler_inner", None, False),
+    87: ("right_spoiler_inner", None, False),
+}
+# The commands of aileron, elevator and rudder, from -4500 to 4500.
+_AXIS_COLUMNS = ("AETR.Ail", "AETR.Elev", "AETR.Rudd")
+_FULL_COMMAND = 4500.0
+# The message with the pulses of the outputs up to each number.
+_MESSAGES = {14: "RCOU", 18: "RCO2", 32: "RCO3"}
+# Allowed values of MIXING_GAIN, and largest magnitude of MIXING_OFFSET, %.
+_MIN_MIXING_GAIN = 0.05
+_MAX_MIXING_GAIN = 5.0
+_MAX_MIXING_OFFSET = 1000.0
+
+
+def ardupilot_mixing(params: CheckedParameters) -> Found:
+    """The surfaces by SERVOn_FUNCTION, the pulse of the output of each, and the commands of the axes. What
+    stays out is noted in the lines of params."""
+    matches = (re.fullmatch(r"SERVO(\d{1,2})_FUNCTION", name) for name in params.values_by_name)
+    names = {int(match[1]): match[0] for match in matches if match}
+    if not names:
+        params.lines.append("SERVOn_FUNCTION is not in the log")
+    kinds = params.kinds("channel", dict(sorted(names.items())), _SURFACES, "is no surface", (-1, 0))
+    factors, mixer_reason = _ardupilot_mixers(params, kinds.values())
+    surfaces = []
+    for channel, kind in kinds.items():
+        name, shares, is_mixed = _SURFACES[kind]
+        of_mixer = factors if is_mixed else 1.0
+        axis_shares = None if shares is None or of_mixer is None else np.array(shares) * of_mixer
+        full = full_name(name, channel, kinds)
+        reason = f"SERVO{channel}_FUNCTION {kind}"
+        mixer = mixer_reason if is_mixed else ""
+        surfaces.append(Surface(full, f"channel {channel}", kind, axis_shares, reason, mixer))
+    outputs = []
+    for n in kinds:
+        message = next((text for last, text in _MESSAGES.items() if n <= last), "RCO?")
+        pulses = {part: f"SERVO{n}_{part}" for part in PULSE_RANGE_US}
+        place = f"SERVO{n}_MIN, _TRIM, _MAX"
+        outputs.append((f"{message}.C{n}", pulse_reading(params, place, pulses, f"SERVO{n}_REVERSED")))
+    return surfaces, [outputs], Axes(_AXIS_COLUMNS, 1.0 / _FULL_COMMAND)
+
+
+def _ardupilot_mixers(params: CheckedParameters, kinds: Collection[int]) -> tuple[Floats | None, str]:
+    """The factors of the mixers on aileron, elevator and rudder, None if they are not known, and a text with
+    the parameters [ArduPlane, servos.cpp: channel_function_mixer]."""
+    if not any(_SURFACES[kind][2] for kind in kinds):
+        return None, ""
+    try:
+        gain = params.number("MIXING_GAIN", _MIN_MIXING_GAIN, _MAX_MIXING_GAIN)
+        offset = params.number("MIXING_OFFSET", -_MAX_MIXING_OFFSET, _MAX_MIXING_OFFSET)
+    except BadParameterError as problem:
+        params.lines.append(f"the mixer of elevons and V-tail stays out: {problem}")
+        return None, ""
+    turning = 1.0 + max(offset, 0.0) / 100.0
+    pitching = 1.0 - min(offset, 0.0) / 100.0
+    factors = gain * np.array([turning, pitching, turning])
+    return factors, f", MIXING_GAIN {gain:g}, MIXING_OFFSET {offset:g}"

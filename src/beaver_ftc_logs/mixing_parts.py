@@ -1,0 +1,170 @@
+"""What a mixing is made of: surfaces, their outputs, the commands of the axes; and checked parameters.
+
+A pulse, us, is the width of the signal to a servo. A share is a factor, -1 to 1, on a command of an axis.
+"""
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from beaver_ftc_logs.recording import Floats, Parameters, last_value
+from beaver_ftc_logs.units import HALF_PULSE_RANGE_US, NEUTRAL_PULSE_US
+
+# By column of the log its share in a surface.
+Weights = dict[str, float]
+# The range that an output has if its parameters are not known, us.
+_ASSUMED_MIN_US = NEUTRAL_PULSE_US - HALF_PULSE_RANGE_US
+_ASSUMED_MAX_US = NEUTRAL_PULSE_US + HALF_PULSE_RANGE_US
+# Least and greatest allowed value of the parameters MIN, MAX and TRIM of an output, us.
+PULSE_RANGE_US = {"MIN": (500.0, 2200.0), "MAX": (800.0, 2200.0), "TRIM": (800.0, 2200.0)}
+LEAST_WEIGHT = 1e-9  # a smaller share is rounding
+
+
+class BadParameterError(Exception):
+    """A parameter is missing, or its value is not allowed; the text has the reason."""
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A surface by its parameters.
+
+    place: its channel or number; kind: surfaces of one kind get the same command; axis_shares: shares of the
+    roll, pitch and yaw command, None if they are not known; reason, mixer_reason: text with the parameters.
+    """
+
+    name: str
+    place: str
+    kind: int
+    axis_shares: Floats | None
+    reason: str
+    mixer_reason: str = ""
+
+    def __str__(self) -> str:
+        spoken = self.name.replace("_", " ").replace("vtail", "V-tail").replace("atail", "A-tail")
+        return f"{self.place} is the {spoken}"
+
+    def stays_out(self, reason: str) -> str:
+        """The remark that the surface is not used."""
+        return f"{self} ({self.reason}), and stays out: {reason}"
+
+
+# Scale and offset from the numbers of a column to the command, and a remark.
+Reading = tuple[float, float, str]
+# The column of each surface's output, and how it is read.
+Outputs = list[tuple[str, Reading]]
+
+
+@dataclass(frozen=True)
+class Axes:
+    """The columns of the roll, pitch and yaw command, and their scale. problem: reason not to use them."""
+
+    columns: Sequence[str]
+    scale: float
+    problem: str = ""
+
+    def weights(self, surface: Surface) -> Weights:
+        """The surface as a mix of these commands; empty if the mix is not known."""
+        if surface.axis_shares is None:
+            return {}
+        return tidy(dict(zip(self.columns, surface.axis_shares.tolist(), strict=True)))
+
+    def problem_of(self, surface: Surface, names: set[str]) -> str:
+        """The reason why a surface cannot be a mix of these commands; empty if it can."""
+        weights = self.weights(surface)
+        missing = [f"{column} is not either" for column in weights if column not in names]
+        return self.problem or next(iter(missing), "" if weights else "its mix is not known")
+
+
+# The surfaces, the ways in which their outputs can be logged, and the commands before the mixer.
+Found = tuple[list[Surface], list[Outputs], Axes]
+
+
+@dataclass
+class CheckedParameters:
+    """Checked access to the parameters of a log. lines: receive a remark on each that stays out."""
+
+    values_by_name: Parameters
+    lines: list[str]
+    lines_on_changes: list[str] = field(default_factory=list)
+
+    def number(self, name: str, low: float, high: float, unit: str = "") -> float:
+        """The last value of a parameter. Raises BadParameterError for one that is missing or out of range."""
+        allowed = f"allowed: {low:g} to {high:g}{unit}"
+        value = last_value(self.values_by_name, name)
+        if value is None:
+            raise BadParameterError(f"{name} is not in the log, {allowed}")
+        if not (math.isfinite(value) and low <= value <= high):
+            raise BadParameterError(f"{name} is {value:g}, {allowed}")
+        line = f"{name} changes in the log: its last value, {value:g}, is used"
+        if len(self.values_by_name[name]) > 1 and line not in self.lines_on_changes:
+            self.lines_on_changes.append(line)
+        return value
+
+    def whole_number(self, name: str, low: int, high: int) -> int:
+        """The same of a parameter that must be a whole number."""
+        value = self.number(name, low, high)
+        if value != round(value):
+            raise BadParameterError(f"{name} is {value:g}, allowed: a whole number")
+        return round(value)
+
+    def kinds(
+        self,
+        place: str,
+        names: Mapping[int, str],
+        known: Collection[int],
+        other: str,
+        unused: Collection[int],
+    ) -> dict[int, int]:
+        """The kind by number, of the parameters with these names. A remark is added for each unknown kind,
+        except for unused ones."""
+        kinds: dict[int, int] = {}
+        for number, name in names.items():
+            try:
+                kind = self.whole_number(name, min(unused, default=0), 1000)
+            except BadParameterError as problem:
+                self.lines.append(f"{place} {number} stays out: {problem}")
+                continue
+            if kind in known:
+                kinds[number] = kind
+            elif kind not in unused:
+                self.lines.append(f"{place} {number} stays out: {name} {kind} {other}")
+        return kinds
+
+
+def full_name(name: str, number: int, kinds: Mapping[int, int]) -> str:
+    """The name of a surface, with its number if there are several of its kind."""
+    return name if [*kinds.values()].count(kinds[number]) == 1 else f"{name}_{number}"
+
+
+def pulse_reading(
+    params: CheckedParameters, place: str, names: Mapping[str, str], reverse: str, bit: int | None = None
+) -> Reading:
+    """Scale and offset from a pulse, us, to the command, and a text: full travel is half of the range.
+
+    names: of the parameters MIN, MAX and, where there is one, TRIM, else the middle is neutral; place: of
+    them in a text. reverse: parameter of the direction, of several outputs if it has a bit of each [PX4,
+    mixer_module.cpp].
+    """
+    try:
+        us = {part: params.number(name, *PULSE_RANGE_US[part], " us") for part, name in names.items()}
+        low = us["MIN"]
+        high = us["MAX"]
+        trim = us.get("TRIM", 0.5 * (low + high))
+        if not low < high or not low <= trim <= high:
+            raise BadParameterError(f"{place} are {low:g}, {trim:g}, {high:g} us, allowed: ascending")
+        mask = params.whole_number(reverse, 0, 1 if bit is None else 2**16 - 1)
+    except BadParameterError as problem:
+        scale = 1.0 / HALF_PULSE_RANGE_US
+        assumed = f"{_ASSUMED_MIN_US:g} to {_ASSUMED_MAX_US:g} us"
+        text = f"; range and sign stay out ({problem}), assumed: {assumed}"
+        return scale, -NEUTRAL_PULSE_US * scale, text
+    is_reversed = mask >> (bit or 0) & 1
+    scale = (-2.0 if is_reversed else 2.0) / (high - low)
+    text = f", {low:g} to {high:g} us, neutral at {trim:g} us{', reversed' if is_reversed else ''}"
+    return scale, -trim * scale, text
+
+
+def tidy(weights: Weights) -> Weights:
+    """The weights without those of rounding, each to ten digits."""
+    kept = {column: weight for column, weight in weights.items() if abs(weight) > LEAST_WEIGHT}
+    return {column: float(f"{weight:.10g}") for column, weight in kept.items()}

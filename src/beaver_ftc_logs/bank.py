@@ -14,6 +14,7 @@ Letters as in `filtering`: g a group of n, B (n, L, 3) its response and R (3, 3)
 rad/s and (rad/s)2 a sample.
 """
 
+from collections.abc import Iterator
 from itertools import combinations, product
 from typing import NamedTuple
 
@@ -24,10 +25,12 @@ from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
 from beaver_ftc_logs.trust import known_effects
 
 HEALTHY, GROUP_LOSS, PAIR_LOSS, UNKNOWN_OFFSET, NO_RESPONSE = range(5)
+# Shares of the changes of hypothesis that lead to a loss of two groups, to an unknown offset, to no response.
 _PAIR_SHARE = 0.02
 _OFFSET_SHARE = 0.05
 _SILENT_SHARE = 0.02
 _PAIR_LEVELS = (0.25, 0.5, 0.75)
+# Probabilities before the flight.
 _PRIOR_HEALTHY = 0.7
 _PRIOR_NO_RESPONSE = 0.2
 _MAX_SQUARE = 30.0  # of a whitened flight: the predictor needs a fraction of a second to adapt to a fault
@@ -74,16 +77,10 @@ def build_bank(model: Model) -> HypothesisBank:
     known = known_effects(model)
     groups = [g for g in range(n) if known[g] or not any(known)]
     rows: list[HypothesisRow] = [(np.ones(n), HEALTHY, settings.repair_share, np.zeros(3))]
-    n_surfaces = sum(len(model.groups[g]) for g in groups)
     stuck = "stuck" in model.vehicle.faults
     pairs = len(groups) > 1
     single = 1.0 - (_PAIR_SHARE if pairs else 0.0) - (_OFFSET_SHARE if stuck else 0.0)
-    for g in groups:
-        levels, shares = _levels_and_shares(model, g)
-        per_kind = single * len(model.groups[g]) / n_surfaces / len(model.vehicle.faults)
-        for offset in _offset_variances(model, g):
-            for level, share in zip(levels, shares, strict=True):
-                rows.append((_effect_row(n, {g: level}), GROUP_LOSS, per_kind * share, offset))
+    rows += _single_hypotheses(model, groups, single)
     rows += _pair_hypotheses(n, groups)
     if stuck:
         anywhere = np.diag(np.array(model.noise)) * settings.jam_sd**2
@@ -96,7 +93,20 @@ def build_bank(model: Model) -> HypothesisBank:
     return HypothesisBank(effectiveness, kind, change, offset, _prior_probabilities(kind, change), rate, own)
 
 
+def _single_hypotheses(model: Model, groups: list[int], share: float) -> Iterator[HypothesisRow]:
+    """One group at each of its levels, without and with an offset of the rates. share: of all changes of
+    hypothesis; each surface has the same, and each fault kind of it."""
+    n_surfaces = sum(len(model.groups[g]) for g in groups)
+    for g in groups:
+        levels, level_shares = _levels_and_shares(model, g)
+        per_kind = share * len(model.groups[g]) / n_surfaces / len(model.vehicle.faults)
+        for offset in _offset_variances(model, g):
+            for level, of_level in zip(levels, level_shares, strict=True):
+                yield _effect_row(len(model.groups), {g: level}), GROUP_LOSS, per_kind * of_level, offset
+
+
 def _effect_row(n: int, levels: dict[int, float]) -> Floats:
+    """Effectiveness of each of n groups, (n,): these levels, else 1."""
     row = np.ones(n)
     for g, level in levels.items():
         row[g] = level
@@ -119,7 +129,8 @@ def _levels_and_shares(model: Model, g: int) -> tuple[Floats, Floats]:
 
 def _offset_variances(model: Model, g: int) -> list[Floats]:
     """Variances of the rates' offset that may come with a loss, (3,) each: none, or that of the group stuck
-    anywhere within its travel, along the axes it moves most."""
+    anywhere within its travel, along the axes it moves most: diag(R) (jam_sd ratio)^2, ratio the group's
+    effect on each axis over its largest, both in sd of the noise."""
     B = np.array(model.response)
     R = np.array(model.noise)
     total = np.abs(B[g]).sum(axis=0) / np.sqrt(np.diag(R))

@@ -16,13 +16,16 @@ ENGINE = "engine"
 UNKNOWN_SURFACE = "unknown"
 # Share of healthy flight in which the energy height falls as fast as without power.
 UNPOWERED_SHARE = 0.15
-_WINDOW_S = 5.0
+_WINDOW_S = 5.0  # over which the rate of the energy height is taken
 _NAMING_DELAY_S = 3.0
 
 
 def energy_climb_mps(t: Floats, h: Floats, V: Floats, stretch: np.ndarray) -> Floats:
     """Rate of the energy height E = h + V^2 / 2g over the last seconds, m/s, (n,); nan before they have
-    passed. Time t, s, altitude h, m, airspeed V, m/s, and number of the gap-free stretch, (n,) each."""
+    passed. Time t, s, altitude h, m, airspeed V, m/s, and number of the gap-free stretch, (n,) each.
+
+    (E - E[i]) / (t - t[i]),    i: the last row at least _WINDOW_S before, in the same stretch
+    """
     E = h + V**2 / (2.0 * GRAVITY_MPS2)
     i = np.searchsorted(t, t - _WINDOW_S, side="right") - 1
     whole = (i >= 0) & (stretch[np.maximum(i, 0)] == stretch)
@@ -39,18 +42,21 @@ def withdraw_surfaces(
     time at which the evidence for the alarm of each row began to increase, s.
 
     An engine may have failed while the window of the energy height begins before that time, and from the
-    row in which the energy height falls as without power until it rises. A row uses nothing later than its
-    time.
+    row in which the energy height falls as without power until it rises. It is `engine` once the energy
+    height has fallen so in more than half of the rows of an alarm that has lasted for _NAMING_DELAY_S. A row
+    uses nothing later than its time.
     """
     named = names.copy()
     for begin, end in true_runs(faulty == 1):
         first = int(np.searchsorted(t, start[begin]))
         falling = climb[first:end] <= unpowered
         rising = climb[first:end] > 0.0
-        failed = (last_true_row(falling) > last_true_row(rising))[begin - first :]
-        share = np.cumsum(falling[begin - first :]) / np.arange(1, end - begin + 1)
-        sure = failed & (share > 0.5) & (t[begin:end] - t[begin] >= _NAMING_DELAY_S)
-        engine = np.where(np.logical_or.accumulate(sure) & failed, ENGINE, UNKNOWN_SURFACE)
-        young = t[begin:end] - t[first] < _WINDOW_S
-        named[begin:end] = np.where(failed | young, engine, names[begin:end])
+        may_have_failed = (last_true_row(falling) > last_true_row(rising))[begin - first :]
+        fallen_share = np.cumsum(falling[begin - first :]) / np.arange(1, end - begin + 1)
+        has_lasted = t[begin:end] - t[begin] >= _NAMING_DELAY_S
+        has_failed = np.logical_or.accumulate(may_have_failed & (fallen_share > 0.5) & has_lasted)
+        is_young = t[begin:end] - t[first] < _WINDOW_S
+        of_alarm = named[begin:end]  # a view
+        of_alarm[may_have_failed | is_young] = UNKNOWN_SURFACE
+        of_alarm[may_have_failed & has_failed] = ENGINE
     return named

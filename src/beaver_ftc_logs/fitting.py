@@ -158,8 +158,10 @@ def _estimate_trim_walk(parts: Parts, model: Model) -> list[float]:
     runs = [(run, np.diag(flight.R)) for flight in flights for run in flight.residual_runs()]
 
     def squared_steps(n: int) -> Floats:
-        means = ((run[: len(run) // n * n].reshape(-1, n, 3).mean(axis=1), r) for run, r in runs)
-        return np.vstack([np.diff(mean, axis=0) ** 2 / np.maximum(r, MIN_DIVISOR) for mean, r in means])
+        """Squares of the steps from one mean of n samples to the next, in variances r, (.., 3)."""
+        means = [run[: len(run) // n * n].reshape(-1, n, 3).mean(axis=1) for run, _ in runs]
+        steps = (np.diff(mean, axis=0) for mean in means)
+        return np.vstack([d**2 / np.maximum(r, MIN_DIVISOR) for d, (_, r) in zip(steps, runs, strict=True)])
 
     n1, n2 = (round(span_s * model.rate_hz) for span_s in _TRIM_SPANS_S)
     short = squared_steps(n1)

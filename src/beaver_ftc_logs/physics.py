@@ -9,8 +9,9 @@ t (n,) s are the stamps of the rates; p, q, r (n,) and the angles have the unit 
 are in rad. gyros: the columns of p, q and r.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 
@@ -31,8 +32,9 @@ _UNIT_RATIO = 1.3  # the most by which a slope differs from the factor of a unit
 _MIN_RMS_RAD_S = 1e-3
 _GRAVITY_MPS2 = SI_UNITS["g"][1]
 _GRAVITIES_G = (0.5, 2.0)  # a median magnitude along z between these is in m/s2
-_MAX_ANGLE_RAD = 1.02 * 2.0 * np.pi  # a full circle, with 2 % for rounding and filters
-_MAX_PITCH_RAD = 1.02 * 0.5 * np.pi  # a quarter of it, likewise
+_CIRCLE_SLACK = 1.02  # an angle exceeds its full circle by 2 % at most, by rounding and filters
+_MAX_ANGLE_RAD = _CIRCLE_SLACK * 2.0 * np.pi
+_MAX_PITCH_RAD = _CIRCLE_SLACK * 0.5 * np.pi  # a quarter of the circle
 _FAST_RAD_S = 12.0  # no vehicle turns so fast
 _STEEP_PITCH_RAD = 1.0  # above it roll and yaw are hard to distinguish
 
@@ -61,7 +63,6 @@ def fit_angle(gyros: Sequence[Column], angles: Sequence[Column | None], axis: in
     if roll is None or angle is None:
         return None
     rates = [_interpolate(gyro, t) for gyro in gyros]
-    # The circle is known whatever the unit.
     circle = _full_circle(roll.values)
     phi = _interpolate(roll, t, circle) * 2.0 * np.pi / circle
     theta = np.zeros(len(t))
@@ -154,10 +155,12 @@ def _interpolate(column: Column, t: Floats, circle: float | None = None) -> Floa
 def _full_circle(angle: Floats) -> float:
     """A full circle in the unit that the angles seem to have: the least of rad, deg and cdeg that fits."""
     largest = largest_magnitude(angle)
-    return next((circle for circle in (2.0 * np.pi, 360.0) if largest <= 1.02 * circle), 36000.0)
+    return next((circle for circle in (2.0 * np.pi, 360.0) if largest <= _CIRCLE_SLACK * circle), 36000.0)
 
 
+# Name of a column, and the column.
 NamedColumn = tuple[str, Column]
+# By axis.
 _RATE_TITLES = ("roll rate", "pitch rate", "yaw rate")
 
 
@@ -165,32 +168,41 @@ def attitude_mistake(named: Columns, angles: Sequence[NamedColumn | None], other
     """Describe a mistake in the rates (p, q, r by column) or the angles: roll, pitch and yaw, None where one
     is not known. The first that is wrong; None where nothing is. others: what may have taken the place of a
     rate."""
-    for axis, (rate, angle) in enumerate(zip(named, angles, strict=True)):
-        if angle is None:
-            continue
-        if axis == 1 and (remark := _pitch_remark(*angle)):
-            return remark
-        fit = _fit_with(named, angles, axis, named[rate])
-        if fit is None:
-            continue
-        for name, column in (named | others).items():
-            trial = _fit_with(named, angles, axis, column)
-            if trial is not None and abs(trial.correlation) > _replacing_correlation(fit, name in named):
-                return (
-                    f"{angle[0]} does not follow {rate} (correlation {fit.correlation:.2f}) "
-                    f"but {name} ({trial.correlation:.2f}): {name} is the {_RATE_TITLES[axis]}"
-                )
-        if remark := _factor_remark(fit, rate, angle[0]):
-            return remark
+    places = range(len(_RATE_TITLES))
+    return next(chain.from_iterable(_mistakes_of_axis(named, angles, others, axis) for axis in places), None)
+
+
+def _mistakes_of_axis(
+    named: Columns, angles: Sequence[NamedColumn | None], others: Columns, axis: int
+) -> Iterator[str]:
+    """Yield the mistakes in one rate and its angle, the surest first."""
+    angle = angles[axis]
+    rate = [*named][axis]
+    if angle is None:
+        return
+    if axis == 1 and (remark := _pitch_remark(*angle)):
+        yield remark
+    fit = _fit_with(named, angles, axis, named[rate])
+    if fit is None:
+        return
+    for name, column in (named | others).items():
+        trial = _fit_with(named, angles, axis, column)
+        if trial is not None and abs(trial.correlation) > _replacing_correlation(fit, name in named):
+            yield (
+                f"{angle[0]} does not follow {rate} (correlation {fit.correlation:.2f}) "
+                f"but {name} ({trial.correlation:.2f}): {name} is the {_RATE_TITLES[axis]}"
+            )
+    if remark := _factor_remark(fit, rate, angle[0]):
+        yield remark
+    if abs(fit.correlation) < _AGREEING:
         # in a banked flight a yaw rate in another unit does not even correlate with the angle: q turns it too
-        for factor in UNIT_FACTORS if abs(fit.correlation) < _AGREEING else ():
+        for factor in UNIT_FACTORS:
             scaled = replace(named[rate], values=factor * named[rate].values)
             if _is_exact(_fit_with(named, angles, axis, scaled)):
-                return (
+                yield (
                     f"the {_RATE_TITLES[axis]} {rate} does not make the change of its angle "
                     f"(correlation {fit.correlation:.2f}): a factor of {factor:.4g} on {rate} fits"
                 )
-    return None
 
 
 def _fit_with(
@@ -208,6 +220,7 @@ def confirmed_rates(named: Columns, angles: Sequence[NamedColumn | None]) -> fro
 
 
 def _is_exact(fit: AngleFit | None) -> bool:
+    """Whether the angle confirms the rate, in sign and unit too."""
     return fit is not None and fit.correlation > _EXACT and 1.0 / _UNIT_RATIO < fit.slope < _UNIT_RATIO
 
 
@@ -241,6 +254,7 @@ def _factor_remark(fit: AngleFit, rate: str, angle: str) -> str | None:
 
 
 def _unit_text(unit: str) -> str:
+    """Which unit a column is in, for a remark."""
     return f"is in {unit}, a factor of {SI_UNITS[unit][1]:.4g} fits"
 
 

@@ -9,7 +9,6 @@ reads the files.
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
@@ -110,7 +109,7 @@ def resample(log: RecordedFlight, vehicle: Vehicle) -> Samples:
     stamps = log.columns[rate_names[0]].t_s
     t_s, stretch, step_s = sample_times(log.name, stamps, vehicle.max_sample_rate_hz)
     held = {name: sample_column(log.columns[name], t_s, step_s) for name in used}
-    for name in rate_names:
+    for name in rate_names:  # a rate from before a gap is none; a command holds until the next
         values, age_s = held[name]
         held[name] = np.where(is_held_value_stale(log.columns[name], t_s, step_s), np.nan, values), age_s
 
@@ -180,17 +179,21 @@ def whiten_samples(samples: Samples, C: Sequence[float], fit_weight: float = 1.0
     after a gap, and where a number is missing."""
     from scipy.signal import lfilter
 
-    arrays = (samples.rates, samples.commands, samples.signals)
-    x = np.hstack(arrays)
+    x = np.hstack([samples.rates, samples.commands, samples.signals])
     known = np.isfinite(x).all(axis=1)
     x[~known] = np.nan
     for a, b in runs_between((np.diff(known) != 0) | (np.diff(samples.stretch_number) != 0)):
         x0 = x[a]
         x[a:b] = x0 + lfilter([sum(C)], C, x[a:b] - x0, axis=0)
-    names = ("rates", "commands", "signals")
-    ends = np.cumsum([array.shape[1] for array in arrays])[:2]
-    white: dict[str, Any] = dict(zip(names, np.split(x, ends, axis=1), strict=True))
-    return replace(samples, noise_ma_coefficients=tuple(C), fit_weight=fit_weight, **white)
+    rates, commands, signals = np.split(x, [3, 3 + samples.commands.shape[1]], axis=1)
+    return replace(
+        samples,
+        rates=rates,
+        commands=commands,
+        signals=signals,
+        noise_ma_coefficients=tuple(C),
+        fit_weight=fit_weight,
+    )
 
 
 def _defects(log: RecordedFlight, used: list[str], rate_names: list[str]) -> Iterator[str]:
@@ -206,22 +209,24 @@ def _check_attitude(log: RecordedFlight, vehicle: Vehicle) -> frozenset[str]:
     """The columns of rates that the angles confirm. Raises BadInput where rates, angles and gravity
     contradict one another: what is in another unit."""
     columns = log.columns
-    mistake: str | None = None
-    confirmed = frozenset[str]()
     rates = {name: columns[name] for name in vehicle.rate_columns}
-    if not signals.find_clipped_rows(next(iter(rates.values())).values).any():
-        angles = named_angles(columns, vehicle)
-        flow = [quantity.column for quantity in vehicle.flow.values()]
-        possible = dict.fromkeys([*vehicle.signal_columns, *flow, *vehicle.command_columns])
-        candidates = {name: columns[name] for name in possible if name in columns}
-        mistake = physics.attitude_mistake(rates, angles, candidates)
-        confirmed = physics.confirmed_rates(rates, angles)
+    angles = named_angles(columns, vehicle)
+    # the integral of a clipped rate is not the change of its angle
+    is_clipped = signals.find_clipped_rows(columns[vehicle.rate_columns[0]].values).any()
+    mistake = None if is_clipped else physics.attitude_mistake(rates, angles, _possible_rates(log, vehicle))
     acceleration = vehicle.acceleration
     if not mistake and acceleration and (az := columns.get(acceleration.column)):
         mistake = physics.gravity_remark(az, acceleration.column)
     if mistake:
         raise BadInput(f"{log.name}: {mistake}, allowed: what the vehicle file says, or its `unit` mended")
-    return confirmed
+    return frozenset() if is_clipped else physics.confirmed_rates(rates, angles)
+
+
+def _possible_rates(log: RecordedFlight, vehicle: Vehicle) -> Columns:
+    """The other columns of a log that may have taken the place of a rate: signals, flow and commands."""
+    flow = [quantity.column for quantity in vehicle.flow.values()]
+    names = dict.fromkeys([*vehicle.signal_columns, *flow, *vehicle.command_columns])
+    return {name: log.columns[name] for name in names if name in log.columns}
 
 
 def named_angles(columns: Columns, vehicle: Vehicle) -> list[NamedColumn | None]:

@@ -4,6 +4,8 @@ A measured quantity does not repeat for long to the last bit. A command may: the
 fitted to show for how long.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from beaver_ftc_logs.recording import Column, Floats, Ints, Mask
@@ -11,11 +13,12 @@ from beaver_ftc_logs.runs import last_true_row
 
 # A measured rate that repeats for longer than both is frozen.
 MIN_STILL_S = 1.5
-MIN_STILL_ROWS = 12
+MIN_STILL_ROWS = 12  # rows that a signal needs, too, for its spikes to be found
+# Rows in turn, and in all, at the largest value of a clipped signal.
 _CLIPPED_IN_TURN = 3
 _CLIPPED_IN_ALL = 10
-_SPIKE_RATIO = 40.0
-_MAX_SPIKE_SHARE = 0.01
+_SPIKE_RATIO = 40.0  # of the steps to and from a spike, over the usual step
+_MAX_SPIKE_SHARE = 0.01  # of the rows: with more, the signal is noisy
 
 
 def time_since_change_s(column: Column) -> Floats:
@@ -34,7 +37,7 @@ def find_clipped_rows(values: Floats) -> Mask:
     """Rows (n,) at the largest value so far, of either sign, if it has lasted for three rows and has been
     reached in ten rows.
 
-    Uses nothing later than the row.
+    Uses nothing later than the row. v (n,): the values with either sign; top: the largest of them so far.
     """
     clipped = np.zeros(len(values), dtype=bool)
     for v in (values, -values):
@@ -69,14 +72,23 @@ def column_defect_texts(name: str, column: Column, is_rate: bool) -> list[str]:
     n = int((~np.isfinite(values)).sum())
     if n:
         texts.append(f"{name}: rows without a number: {n} of {len(values)}")
-    still_s = float(time_since_change_s(column).max(initial=0.0))
-    if is_rate and still_s > MIN_STILL_S:
-        texts.append(f"{name}: frozen, the same to the last bit for {still_s:.1f} s")
-    if not is_rate and values.size and np.nanmin(values) == np.nanmax(values):
+    if is_rate:
+        return [*texts, *_rate_defect_texts(name, column)]
+    if values.size and np.nanmin(values) == np.nanmax(values):
         texts.append(f"{name}: does not move, nothing can be said of what it moves alone")
-    if is_rate and (clipped := find_clipped_rows(values)).any():
-        texts.append(f"{name}: clipped at {np.abs(values[clipped]).max():.4g} in {clipped.sum()} rows")
-    if is_rate and len(spikes := find_spike_rows(values)):
-        jumps = "1 jump" if len(spikes) == 1 else f"{len(spikes)} jumps"
-        texts.append(f"{name}: {jumps}, the first at {column.t_s[spikes[0]]:.2f} s")
     return texts
+
+
+def _rate_defect_texts(name: str, column: Column) -> Iterator[str]:
+    """Yield a line for each mistake that only a measured rate shows: frozen, clipped, with spikes."""
+    values = column.values
+    still_s = float(time_since_change_s(column).max(initial=0.0))
+    if still_s > MIN_STILL_S:
+        yield f"{name}: frozen, the same to the last bit for {still_s:.1f} s"
+    clipped = find_clipped_rows(values)
+    if clipped.any():
+        yield f"{name}: clipped at {np.abs(values[clipped]).max():.4g} in {clipped.sum()} rows"
+    spikes = find_spike_rows(values)
+    if len(spikes):
+        jumps = "1 jump" if len(spikes) == 1 else f"{len(spikes)} jumps"
+        yield f"{name}: {jumps}, the first at {column.t_s[spikes[0]]:.2f} s"

@@ -12,26 +12,21 @@ from beaver_ftc_logs.units import TIME_UNITS
 
 MIN_HZ = 4.0
 _MAX_HZ = 1e5
-_MIN_ROWS = 50
+_MIN_ROWS = 50  # of the rates; the first of them give the usual step
+_ALIKE_RATIO = 1.05  # a log that is faster than its largest sample rate by less is not averaged
 # A step of more than this many usual steps is a gap: nothing is predicted across it.
 _MIN_GAP_STEPS = 3.5
 
 
 def sample_times(flight: str, stamps: Floats, max_hz: float) -> tuple[Floats, Ints, float]:
-    """Times of the samples and the number of the gap-free stretch of each, (n,), and the usual step, s."""
+    """Times of the samples, s, and the number of the gap-free stretch of each, (n,), and the usual step, s:
+    the stamps themselves, or even times of a log that is faster than max_hz. Raises BadInput where they are
+    too few, too slow or too fast."""
     if (n := len(stamps)) < _MIN_ROWS:
         raise BadInput(f"{flight}: has {n} samples of the rates, allowed: at least {_MIN_ROWS}")
     step_s = median_step_s(stamps)
-    rate_hz = 1.0 / step_s
-    logged = f"{flight}: rates are logged at {rate_hz:.2g} Hz"
-    if rate_hz < MIN_HZ:
-        units = {unit: rate_hz / seconds for unit, seconds in TIME_UNITS.items() if unit != "s"}
-        hints = [f" (time in {unit} would be {hz:.3g} Hz)" for unit, hz in units.items() if 10 <= hz <= 1000]
-        reason = f"to tell a surface's effect from the vehicle's own motion{''.join(hints[:1])}"
-        raise BadInput(f"{logged}, allowed: at least {MIN_HZ:g} Hz {reason}")
-    if rate_hz > _MAX_HZ:
-        raise BadInput(f"{logged}, allowed: up to {_MAX_HZ:g} Hz, time in seconds")
-    if rate_hz <= 1.05 * max_hz:
+    _refuse_rate(flight, 1.0 / step_s)
+    if 1.0 / step_s <= _ALIKE_RATIO * max_hz:
         return stamps, np.cumsum(np.diff(stamps, prepend=stamps[0]) > _MIN_GAP_STEPS * step_s), step_s
     even = _even_times(stamps, 1.0 / max_hz)
     if len(even[0]) < _MIN_ROWS:
@@ -41,8 +36,24 @@ def sample_times(flight: str, stamps: Floats, max_hz: float) -> tuple[Floats, In
     return even
 
 
+def _refuse_rate(flight: str, rate_hz: float) -> None:
+    """Raise BadInput for a log whose rates are too slow, or faster than any log's."""
+    logged = f"{flight}: rates are logged at {rate_hz:.2g} Hz"
+    if rate_hz < MIN_HZ:
+        units = {unit: rate_hz / seconds for unit, seconds in TIME_UNITS.items() if unit != "s"}
+        hints = [f" (time in {unit} would be {hz:.3g} Hz)" for unit, hz in units.items() if 10 <= hz <= 1000]
+        reason = f"to tell a surface's effect from the vehicle's own motion{''.join(hints[:1])}"
+        raise BadInput(f"{logged}, allowed: at least {MIN_HZ:g} Hz {reason}")
+    if rate_hz > _MAX_HZ:
+        raise BadInput(f"{logged}, allowed: up to {_MAX_HZ:g} Hz, time in seconds")
+
+
 def _even_times(stamps: Floats, step_s: float) -> tuple[Floats, Ints, float]:
-    """Samples a step apart over each stretch of the log, from its first stamp on: as `sample_times`."""
+    """Samples a step apart over each stretch of the log, from its first stamp on: as `sample_times`.
+
+    begin, last: the rows of the log at the ends of each stretch; counts: its samples; index (n,): the number
+    of each sample in its stretch.
+    """
     begin = np.flatnonzero(np.diff(stamps, prepend=-np.inf) > _MIN_GAP_STEPS * step_s)
     last = np.append(begin[1:], len(stamps)) - 1
     counts = np.ceil((stamps[last] - stamps[begin]) / step_s + 0.5).astype(np.int64)

@@ -24,7 +24,7 @@ SI_UNITS: dict[str, tuple[str, float]] = {
     "m": (LENGTH, 1.0), "cm": (LENGTH, 0.01), "ft": (LENGTH, M_PER_FT),
     "1": (SHARE, 1.0), "%": (SHARE, 0.01),
 }  # fmt: skip
-# Usual pulse of a servo at neutral, and from there to either end of its travel.
+# Usual pulse of a servo at neutral, and from there to either end of its travel, us.
 NEUTRAL_PULSE_US = 1500.0
 HALF_PULSE_RANGE_US = 400.0
 # Units of the time column.
@@ -35,7 +35,7 @@ UNIT_FACTORS = (-1.0, 1.0 / _RAD_PER_DEG, 1000.0, _RAD_PER_DEG, 1e-3)
 
 def nearest_unit(kind: str, si_factor: float, max_ratio: float) -> str | None:
     """The unit of a kind whose size in SI is this factor, within so many times; None where none is."""
-    sizes = {name: size for name, (one, size) in SI_UNITS.items() if one == kind}
+    sizes = {name: size for name, (its_kind, size) in SI_UNITS.items() if its_kind == kind}
     ratios = {name: max(si_factor / size, size / si_factor) for name, size in sizes.items()}
     nearest = min(ratios, key=lambda name: ratios[name])
     return nearest if ratios[nearest] <= max_ratio else None

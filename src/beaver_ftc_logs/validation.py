@@ -14,6 +14,7 @@ from beaver_ftc_logs.folds import Fold, fold_qualities, held_out_folds
 from beaver_ftc_logs.gains import squared_deviations
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.orders import GAIN_SD_CAP, fit_of, group_gain_sd, tied_shares
+from beaver_ftc_logs.recording import Floats
 from beaver_ftc_logs.regression import Parts
 from beaver_ftc_logs.runs import runs_between
 from beaver_ftc_logs.scoring import score_against_labels
@@ -33,14 +34,8 @@ def add_ranges_and_threshold(parts: Parts, model: Model) -> Model:
     BadInput if they are too short to tell that."""
     folds = list(held_out_folds(parts, model))
     peaks = [_healthy_peaks(fold) for fold in folds]
-    variance = group_gain_sd(fit_of(parts, model), model) ** 2
-    if model.vehicle.other_laws:
-        # how far another flight's gains are at most before any is left out counts as one flight
-        hidden = [noise.misreads for noise in model.colours] or [[0.0] * len(model.groups)]
-        deviations = [squared_deviations(fold) for fold in folds] if len(parts) > 1 else []
-        variance += np.nanmean([3.0 * np.max(hidden, axis=0) ** 2, *deviations], axis=0)
-    gain_sd = np.minimum(np.sqrt(variance), GAIN_SD_CAP)
     tail = extremes.fit_peak_tail(peaks)
+    gain_sd = _gain_sd(parts, model, folds)
     ranges = trust.compute_fitted_ranges(parts, tied_shares(parts, model), gain_sd).model_copy(
         update={"tail": tail}
     )
@@ -62,9 +57,22 @@ def add_ranges_and_threshold(parts: Parts, model: Model) -> Model:
     )
 
 
+def _gain_sd(parts: Parts, model: Model, folds: Sequence[Fold]) -> Floats:
+    """Standard error of the gain of each group, (G,), 1 in the model: that of the fit and, under other laws,
+    the root mean square of the deviations in the flights left out. The largest error by which a fit may
+    misread a gain, sqrt(3) times its standard deviation, counts as the deviation of one more flight."""
+    variance = group_gain_sd(fit_of(parts, model), model) ** 2
+    if model.vehicle.other_laws:
+        misreads = [noise.misreads for noise in model.colours] or [[0.0] * len(model.groups)]
+        deviations = [squared_deviations(fold) for fold in folds] if len(parts) > 1 else []
+        variance += np.nanmean([3.0 * np.max(misreads, axis=0) ** 2, *deviations], axis=0)
+    return np.minimum(np.sqrt(variance), GAIN_SD_CAP)
+
+
 def _choose_threshold(tail: extremes.PeakTail | None, target: float, model: Model) -> float:
-    """Threshold for `target` false alarms an hour: by the tail, or by theory if there is no tail. Under laws
-    of which the parts left out say nothing, by theory if that asks for more."""
+    """Threshold for `target` false alarms an hour, natural logarithm of odds: by the tail, or by theory
+    (`extremes.lorden_threshold`) if there is no tail. Under laws of which the parts left out say nothing, by
+    theory if that asks for more; factor: of the threshold by theory."""
     factor = 1.0 if tail is None or model.vehicle.other_laws else 0.0
     if model.vehicle.other_laws and not model.vehicle.moving_air:
         factor = _LORDEN_FACTOR
@@ -76,7 +84,7 @@ def _cross_validate(
     flights: Sequence[extremes.PeaksAndHours], target: float | None, model: Model
 ) -> Document:
     """Test the threshold on parts left out: how many would have alarmed, each at the threshold that the
-    others ask for, and how often."""
+    others ask for, and how often. Empty where no rate is asked for, or too few peaks give a threshold."""
     tails = [extremes.fit_peak_tail([*flights[:i], *flights[i + 1 :]]) for i in range(len(flights))]
     if target is None or len(flights) < 2 or not all(tails):
         return {}
@@ -91,7 +99,11 @@ def _cross_validate(
 
 
 def _healthy_peaks(fold: Fold) -> extremes.PeaksAndHours:
-    """Return for a part left out the peaks of the alarm statistic in health, and its healthy hours."""
+    """Return for a part left out the peaks of the alarm statistic in health, and its healthy hours.
+
+    p (n, H): probabilities of the hypotheses, of which the last is that nothing answers the commands; z (n,):
+    evidence for a fault; rows: healthy ones in which something answers.
+    """
     bank = build_bank(fold.model)
     samples = fold.held_out.samples
     p = bank_posterior(samples, fold.model, bank)

@@ -18,15 +18,8 @@ import numpy as np
 
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs.readers.table import read_numbers
-from beaver_ftc_logs.recording import (
-    Column,
-    Columns,
-    Floats,
-    Ints,
-    LoggedFailure,
-    RecordedFlight,
-    rows_with_increasing_time,
-)
+from beaver_ftc_logs.readers.topics import rows_with_increasing_time
+from beaver_ftc_logs.recording import Column, Columns, Floats, Ints, LoggedFailure, RecordedFlight
 from beaver_ftc_logs.time_base import latest_values
 from beaver_ftc_logs.units import HALF_PULSE_RANGE_US, NEUTRAL_PULSE_US
 

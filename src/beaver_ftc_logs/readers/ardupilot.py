@@ -13,15 +13,8 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc.documents import BadInput
-from beaver_ftc_logs.recording import (
-    Parameters,
-    RecordedFlight,
-    Topic,
-    Wanted,
-    add_parameter,
-    columns_of_topics,
-    package_errors_as_bad_input,
-)
+from beaver_ftc_logs.readers.topics import Topic, columns_of_topics, package_errors_as_bad_input
+from beaver_ftc_logs.recording import Parameters, RecordedFlight, Wanted, add_parameter
 
 _TIME_FIELD = "TimeUS"
 _INSTANCE_FIELDS = ("I", "C", "Instance")

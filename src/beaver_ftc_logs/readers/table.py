@@ -1,6 +1,5 @@
 """A CSV or Parquet table with a time column `t_s`, or another: one row a sample, one column a quantity."""
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,16 +9,12 @@ import numpy as np
 
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs.readers import LAST_PART_FACTOR, PART_OVERLAP_SHARE, check_is_log_itself
+from beaver_ftc_logs.readers.parquet_table import BATCH_ROWS, MAX_ROWS, ParquetTable
 from beaver_ftc_logs.readers.text import TableCells, TextTable, join_blocks, unreadable_error
 from beaver_ftc_logs.recording import Column, Floats, RecordedFlight, TimeSource, Wanted, nearest_names_text
 from beaver_ftc_logs.units import TIME_UNITS
 
 TIME_COLUMN = "t_s"
-_BYTES_PER_NUMBER = 8
-# Largest part of a file that is read at once: 2.8 h at 1000 Hz.
-_MAX_ROWS = 10_000_000
-_MAX_NUMBER_BYTES = 2_000_000_000
-_BATCH_ROWS = 50_000
 
 NumberTable = dict[str, Floats]
 
@@ -86,7 +81,7 @@ def column_names(path: Path) -> list[str]:
 
 def first_cells_of_column(path: Path, name: str) -> TableCells:
     """The first cells of a column."""
-    return next(_Table(path).parts([name], _BATCH_ROWS))[0]
+    return next(_Table(path).parts([name], BATCH_ROWS))[0]
 
 
 def check_time(path: Path, t_s: Floats, time: str = TIME_COLUMN, n_rows_before: int = 0) -> None:
@@ -119,7 +114,7 @@ class _Table:
         check_is_log_itself(path)
         self._path = path
         with _read_errors(path):
-            self._of = _ParquetTable(path) if path.suffix.lower() == ".parquet" else TextTable.find(path)
+            self._of = ParquetTable(path) if path.suffix.lower() == ".parquet" else TextTable.find(path)
         self.names = self._of.names
         self.remarks = self._of.remarks
 
@@ -144,8 +139,8 @@ class _Table:
             for block in blocks:
                 held.append(block)
                 n_held = sum(held_block.n_rows for held_block in held)
-                if part_rows is None and n_held > _MAX_ROWS:
-                    reason = f"has more than {_MAX_ROWS:,} rows, allowed: up to {_MAX_ROWS:,}"
+                if part_rows is None and n_held > MAX_ROWS:
+                    reason = f"has more than {MAX_ROWS:,} rows, allowed: up to {MAX_ROWS:,}"
                     raise BadInput(f"{self._path}: {reason}")
                 while part_rows is not None and n_held > LAST_PART_FACTOR * part_rows:
                     joined = join_blocks(held)
@@ -161,58 +156,3 @@ class _Table:
         """All columns, those that were not read nan."""
         blank = np.broadcast_to(np.nan, cells.n_rows)
         return {name: cells.numbers.get(name, blank) for name in self.names}
-
-
-class _ParquetTable:
-    """The table in a Parquet file. readable_names: its columns of numbers; the others are not even looked
-    into, a list in a cell may be any size."""
-
-    def __init__(self, path: Path) -> None:
-        import pyarrow as pa
-        from pyarrow import parquet
-
-        with parquet.ParquetFile(path) as file:
-            schema = file.schema_arrow
-        self.names = list(schema.names)
-        self.doubled_names = {name for name, n in Counter(self.names).items() if n > 1}
-        is_number = [pa.types.is_integer(field.type) or pa.types.is_floating(field.type) for field in schema]
-        self.readable_names = [name for name, of in zip(self.names, is_number, strict=True) if of]
-
-    def remarks(self, cells: TableCells) -> Iterator[str]:
-        """Nothing."""
-        return iter(())
-
-    def check_broken_lines(self, path: Path, cells: TableCells) -> None:
-        """Nothing."""
-
-    def blocks(self, path: Path, names: Sequence[str]) -> Iterator[TableCells]:
-        """The rows of some columns, batch by batch, none last."""
-        from pyarrow import parquet
-
-        file = parquet.ParquetFile(path)
-        _check_parquet_size(path, file.metadata, names)
-        return _parquet_batches(file, names)
-
-
-def _parquet_batches(file: Any, names: Sequence[str]) -> Iterator[TableCells]:
-    """Yield the cells of a file in batches; the last is empty."""
-    n_read = 0
-    with file:
-        for batch in file.iter_batches(_BATCH_ROWS, columns=list(names)):
-            numbers = {name: np.asarray(batch[name].to_numpy(), dtype=float) for name in names}
-            yield TableCells(numbers, batch.num_rows, n_read)
-            n_read += batch.num_rows
-    yield TableCells({name: np.empty(0) for name in names}, 0, n_read)
-
-
-def _check_parquet_size(path: Path, metadata: Any, names: Sequence[str]) -> None:
-    """Raise BadInput for more rows or numbers than a flight has: a few bytes may stand for billions."""
-    if metadata.num_rows > _MAX_ROWS:
-        raise BadInput(f"{path}: has {metadata.num_rows:,} rows, allowed: up to {_MAX_ROWS:,}")
-    groups = [metadata.row_group(i) for i in range(metadata.num_row_groups)]
-    chunks = [group.column(i) for group in groups for i in range(group.num_columns)]
-    total = sum(chunk.total_uncompressed_size for chunk in chunks if chunk.path_in_schema in names)
-    size = max(total, _BYTES_PER_NUMBER * metadata.num_rows * len(names))
-    if size > _MAX_NUMBER_BYTES:
-        allowed = f"up to {_MAX_NUMBER_BYTES / 1e9:g} GB"
-        raise BadInput(f"{path}: holds {size / 1e9:,.1f} GB of numbers, allowed: {allowed}")

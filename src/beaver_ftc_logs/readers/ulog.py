@@ -8,16 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from beaver_ftc.documents import BadInput
-from beaver_ftc_logs.recording import (
-    Parameters,
-    RecordedFlight,
+from beaver_ftc_logs.readers.topics import (
     Topic,
-    Wanted,
-    add_parameter,
     columns_of_topics,
     names_of_topics,
     package_errors_as_bad_input,
 )
+from beaver_ftc_logs.recording import Parameters, RecordedFlight, Wanted, add_parameter
 
 _TIME_FIELD = "timestamp"
 # Bytes of a message: its length is written in 16 bits.

@@ -152,7 +152,7 @@ def test_parts_of_a_long_log_hold_every_row_and_say_what_the_whole_says(
     """A tenth of each part once more. Blocks of a table are smaller than its parts, and end anywhere."""
     for module, limit, rows in (
         ("", "ROWS_PER_PART", 500), ("", "SAMPLES_PER_PART", 500),
-        (".text", "_BLOCK_BYTES", 9000), (".table", "_BATCH_ROWS", 70),
+        (".text", "_BLOCK_BYTES", 9000), (".parquet_table", "BATCH_ROWS", 70),
     ):  # fmt: skip
         monkeypatch.setattr(f"{readers.__name__}{module}.{limit}", rows)
     reader.write(path, synthetic.fly(240.0, parts=((100, 240, 1.0, 0.3),), seed=5))

@@ -6,7 +6,7 @@ import pytest
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc_logs.diagnose import diagnose
 from beaver_ftc_logs.findings import as_text, verdict_document
-from beaver_ftc_logs.recording import rows_with_increasing_time
+from beaver_ftc_logs.readers.topics import rows_with_increasing_time
 from products.logs import limited, synthetic
 
 JUMP_S = 1e6

@@ -1,0 +1,72 @@
+"""The table in a Parquet file, batch by batch."""
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from beaver_ftc.documents import BadInput
+from beaver_ftc_logs.readers.text import TableCells
+
+_BYTES_PER_NUMBER = 8
+# Largest part of a file that is read at once: 2.8 h at 1000 Hz, and the bytes of its numbers.
+MAX_ROWS = 10_000_000
+_MAX_NUMBER_BYTES = 2_000_000_000
+BATCH_ROWS = 50_000
+
+
+class ParquetTable:
+    """The table in a Parquet file. readable_names: its columns of numbers; the others are not even looked
+    into, a list in a cell may be any size."""
+
+    def __init__(self, path: Path) -> None:
+        import pyarrow as pa
+        from pyarrow import parquet
+
+        with parquet.ParquetFile(path) as file:
+            schema = file.schema_arrow
+        self.names = list(schema.names)
+        self.doubled_names = {name for name, n in Counter(self.names).items() if n > 1}
+        is_number = [pa.types.is_integer(field.type) or pa.types.is_floating(field.type) for field in schema]
+        self.readable_names = [name for name, of in zip(self.names, is_number, strict=True) if of]
+
+    def remarks(self, cells: TableCells) -> Iterator[str]:
+        """Nothing."""
+        return iter(())
+
+    def check_broken_lines(self, path: Path, cells: TableCells) -> None:
+        """Nothing."""
+
+    def blocks(self, path: Path, names: Sequence[str]) -> Iterator[TableCells]:
+        """The rows of some columns, batch by batch, none last."""
+        from pyarrow import parquet
+
+        file = parquet.ParquetFile(path)
+        _check_parquet_size(path, file.metadata, names)
+        return _parquet_batches(file, names)
+
+
+def _parquet_batches(file: Any, names: Sequence[str]) -> Iterator[TableCells]:
+    """Yield the cells of a file in batches; the last is empty."""
+    n_read = 0
+    with file:
+        for batch in file.iter_batches(BATCH_ROWS, columns=list(names)):
+            numbers = {name: np.asarray(batch[name].to_numpy(), dtype=float) for name in names}
+            yield TableCells(numbers, batch.num_rows, n_read)
+            n_read += batch.num_rows
+    yield TableCells({name: np.empty(0) for name in names}, 0, n_read)
+
+
+def _check_parquet_size(path: Path, metadata: Any, names: Sequence[str]) -> None:
+    """Raise BadInput for more rows or numbers than a flight has: a few bytes may stand for billions."""
+    if metadata.num_rows > MAX_ROWS:
+        raise BadInput(f"{path}: has {metadata.num_rows:,} rows, allowed: up to {MAX_ROWS:,}")
+    groups = [metadata.row_group(i) for i in range(metadata.num_row_groups)]
+    chunks = [group.column(i) for group in groups for i in range(group.num_columns)]
+    total = sum(chunk.total_uncompressed_size for chunk in chunks if chunk.path_in_schema in names)
+    size = max(total, _BYTES_PER_NUMBER * metadata.num_rows * len(names))
+    if size > _MAX_NUMBER_BYTES:
+        allowed = f"up to {_MAX_NUMBER_BYTES / 1e9:g} GB"
+        raise BadInput(f"{path}: holds {size / 1e9:,.1f} GB of numbers, allowed: {allowed}")

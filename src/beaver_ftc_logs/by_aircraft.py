@@ -21,7 +21,7 @@ from beaver_ftc_logs.aircraft_inputs import DiagnosedAircraft, LogInputs, read_i
 from beaver_ftc_logs.column_mistakes import MAX_REVERSED_GAIN
 from beaver_ftc_logs.diagnose import reversed_command_error
 from beaver_ftc_logs.log_rows import LogRows
-from beaver_ftc_logs.recording import Floats, Reasons, RecordedFlight
+from beaver_ftc_logs.recording import Floats, Mask, Reasons, RecordedFlight
 from beaver_ftc_logs.stepped import Replayed, error_sections, named_since, replay_samples, rows_of_replay
 from beaver_ftc_logs.vehicle import Vehicle
 
@@ -129,35 +129,42 @@ def _doubtful_rows(inputs: LogInputs, replay: Replayed, rows: LogRows) -> Reason
     """For each reason the rows (n,) for which there is no verdict."""
     aircraft = inputs.aircraft
     missing = inputs.has_missing_value
-    (low_mps, high_mps) = aircraft.envelope.airspeed_mps
-    (low, high) = aircraft.alpha_rad
+    low_mps, high_mps = aircraft.envelope.airspeed_mps
+    low, high = aircraft.alpha_rad
     flow = dict(zip(FLOW, inputs.input_arrays.signals.T, strict=False))  # the aircraft's own signals follow
     alpha = flow["alpha_rad"]
     airspeed = flow["airspeed_mps"]
-    unexplained = np.zeros(len(alpha), dtype=bool)
-    after = np.zeros_like(unexplained)
-    outside = np.ones_like(unexplained)
+    outside = np.ones(len(alpha), dtype=bool)
     for begin, end in inputs.gap_free_stretches:
         outside[begin:end] = False
-        t_s = rows.t_s[begin:end]
-        first_verdicts = replay.verdicts[begin : begin + int(np.searchsorted(t_s, t_s[0] + _START_WINDOW_S))]
-        if any(verdict.isolated == "unanticipated" for verdict in first_verdicts):
-            detected = [verdict.detected for verdict in first_verdicts]
-            unexplained[begin + detected.index(True) : end] = True
     cause = "another aircraft or loading, or undeclared errors"
     reasons = {
         "a number is missing": missing,
         "samples are not evenly spaced": outside & ~missing,
         f"airspeed is outside {low_mps:g} to {high_mps:g} m/s": (airspeed < low_mps) | (airspeed > high_mps),
         f"angle of attack is outside {low:.3g} to {high:.3g} rad": (alpha < low) | (alpha > high),
-        f"no fault explains it from the first second on: {cause}": unexplained,
+        f"no fault explains it from the first second on: {cause}": _unexplained_rows(inputs, replay),
     }
     has_reason = np.logical_or.reduce(list(reasons.values()))
+    after = np.zeros_like(outside)
     for begin, end in inputs.gap_free_stretches:
         alarms = begin + np.flatnonzero(rows.faulty[begin:end])
         if alarms.size and has_reason[alarms[0]]:
             after[alarms[0] : end] = True
     return reasons | {"the alarm was raised where nothing can be said": after & ~has_reason}
+
+
+def _unexplained_rows(inputs: LogInputs, replay: Replayed) -> Mask:
+    """The rows (n,) of each stretch whose first second has a fault of no type, from its alarm on."""
+    t_s = inputs.samples.t_s
+    unexplained = np.zeros(len(t_s), dtype=bool)
+    for begin, end in inputs.gap_free_stretches:
+        started = int(np.searchsorted(t_s[begin:end], t_s[begin] + _START_WINDOW_S))
+        first_verdicts = replay.verdicts[begin : begin + started]
+        if any(verdict.isolated == "unanticipated" for verdict in first_verdicts):
+            detected = [verdict.detected for verdict in first_verdicts]
+            unexplained[begin + detected.index(True) : end] = True
+    return unexplained
 
 
 def _verdict_document(

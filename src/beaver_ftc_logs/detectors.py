@@ -69,7 +69,7 @@ def _memory_sums(x: Floats, dt_s: float, fades: bool) -> Floats:
 def _rows_of_estimate(samples: Samples, model: Model, a: Floats, sd: Floats) -> LogRows:
     """Rows of an estimate a of the effectiveness with standard deviation sd, (n, G) each. If the model has
     labelled levels, the nearest level is the estimate, and one below 1 is a fault. Otherwise an estimate
-    below 1 by more than _MIN_LOSS_SD standard deviations is a fault."""
+    below 1 by more than _MIN_LOSS_SD standard deviations is a fault. low, high: the interval of 90 %."""
     bank = build_bank(model)
     low, high = (np.clip(a + sign * _SD_OF_90_PERCENT * sd, 0.0, 1.0) for sign in (-1.0, 1.0))
     nearest = np.clip(a, 0.0, 1.0)

@@ -27,13 +27,13 @@ from beaver_ftc_logs.regression import expand_groups, innovations
 from beaver_ftc_logs.runs import last_true_row, trailing_sums
 from beaver_ftc_logs.samples import Samples
 
-_LOG_RATE_TOLERANCE = 0.25
+_LOG_RATE_TOLERANCE = 0.25  # of the sample rate, from that of the model
 # Share of the fault's probability above which a group is named.
 _NAME_SHARE = 0.5
 # Chance of a name without the surface at fault: a likelihood ratio of two groups passes 1000 against the true
 # one with that chance at most (Markov's inequality), where the model is right.
 _EXCLUSION_RISK = 0.001
-_DIRECTION_WINDOW_S = 1.0
+_DIRECTION_WINDOW_S = 1.0  # over which the direction of the residual is judged
 # Share of travel that a command moves by rounding alone.
 _COMMAND_ROUNDING = 1e-6
 # Probability that nothing answers the commands above which nothing is said of any surface.
@@ -169,11 +169,13 @@ def rows_of_posterior(
     samples: Samples, model: Model, bank: HypothesisBank, P: Floats, mass: float | None = None
 ) -> LogRows:
     """The rows that follow from the probabilities P (n, H). mass: probability inside the bounds; that of the
-    model's settings if None."""
-    p_silent = P[:, -1]
+    model's settings if None.
+
+    mu, mu_name: evidence for an alarm and for a name, natural logarithm of odds. If the model has none, the
+    probability p_fault (n,) of any fault decides both.
+    """
     p_fault = P[:, bank.is_fault_hypothesis].sum(axis=1)
-    P_live = P[:, :-1] / np.maximum(1.0 - p_silent, MIN_DIVISOR)[:, None]
-    calm = P[:, 0] + p_silent > 0.5
+    calm = P[:, 0] + P[:, -1] > 0.5
     mu = model.settings.threshold
     steps = fault_evidence(P, bank)
     evidence = page_cusum(steps, mu or np.inf)
@@ -184,14 +186,7 @@ def rows_of_posterior(
         nameable = (page_cusum(steps, mu_name) >= mu_name) & ~calm
     faulty = _latched(alarmed, calm).astype(np.int64)
     start = np.maximum(last_true_row(evidence <= 0.0), 0)
-    per_group = [
-        _group_bounds(bank, P_live, g, model, mass or model.settings.bounds) for g in range(len(model.groups))
-    ]
-    a, low, high = (np.column_stack(column) for column in zip(*per_group, strict=True))
-    silent = p_silent > _NO_RESPONSE_LIMIT
-    a[silent] = 1.0
-    low[silent] = 0.0
-    high[silent] = 1.0
+    a, low, high = _effectiveness(model, bank, P, mass or model.settings.bounds)
     if model.vehicle.other_laws:  # health is not excluded before an alarm excludes it
         high[faulty == 0] = 1.0
     return LogRows(
@@ -204,6 +199,20 @@ def rows_of_posterior(
         fault_probability=p_fault,
         evidence_start_time_s=samples.t_s[start],
     )
+
+
+def _effectiveness(model: Model, bank: HypothesisBank, P: Floats, mass: float) -> tuple[Floats, ...]:
+    """The median effectiveness of each group, and bounds with this probability between them, (n, G) each; 1,
+    and 0 and 1, where nothing answers the commands."""
+    p_silent = P[:, -1]
+    P_live = P[:, :-1] / np.maximum(1.0 - p_silent, MIN_DIVISOR)[:, None]
+    per_group = [_group_bounds(bank, P_live, g, model, mass) for g in range(len(model.groups))]
+    a, low, high = (np.column_stack(column) for column in zip(*per_group, strict=True))
+    silent = p_silent > _NO_RESPONSE_LIMIT
+    a[silent] = 1.0
+    low[silent] = 0.0
+    high[silent] = 1.0
+    return a, low, high
 
 
 def _group_bounds(
@@ -232,7 +241,8 @@ def _latched(alarmed: Mask, calm: Mask) -> Mask:
 
 
 def _group_levels(bank: HypothesisBank, P_live: Floats, g: int) -> tuple[Floats, Floats]:
-    """The levels of a group (L,), of which the last is 1, and the probability of each (n, L)."""
+    """The levels of a group (L,), of which the last is 1, and the probability of each (n, L): the sum of
+    P_live (n, H - 1), of the hypotheses in which something answers, over those with this level."""
     levels, level_of = np.unique(bank.effectiveness[:-1, g], return_inverse=True)
     p = np.zeros((len(P_live), len(levels)))
     for h, j in enumerate(level_of):
@@ -241,7 +251,8 @@ def _group_levels(bank: HypothesisBank, P_live: Floats, g: int) -> tuple[Floats,
 
 
 def _credible_bounds(levels: Floats, p: Floats, mass: float) -> tuple[Floats, Floats]:
-    """The range of the fewest levels with this probability in sum, half a step wider on both sides."""
+    """Low and high (n,): the range of the fewest levels with this probability in sum, half a step wider on
+    both sides. levels (L,), p (n, L)."""
     order = np.argsort(-p, axis=1, kind="stable")
     ranked = np.take_along_axis(p, order, axis=1)
     chosen = np.cumsum(ranked, axis=1) - ranked < mass
@@ -255,7 +266,11 @@ def _credible_bounds(levels: Floats, p: Floats, mass: float) -> tuple[Floats, Fl
 def _surfaces_at_fault(model: Model, bank: HypothesisBank, P: Floats, faulty: Ints, nameable: Mask) -> Names:
     """The named surfaces by row, those of the likely groups. A row without a name while the alarm stands is
     `unknown`. A name stays while the fault is rather an unknown offset, until another has stood for
-    `rename_s`, and, with `one_group`, if another adds surfaces."""
+    `rename_s`, and, with `one_group`, if another adds surfaces.
+
+    names, named (n,): by the probabilities of the row alone, and with those that stay; new, old: the first of
+    this row, and the second of the row before; n_same: rows before in turn with the same new name.
+    """
     p_fault = np.maximum(P[:, bank.is_fault_hypothesis].sum(axis=1), MIN_DIVISOR)
     likely = _likely_groups(model, bank, P, p_fault)
     names = join_names(likely & nameable[:, None], model.group_names)

@@ -77,7 +77,8 @@ def fault_events(rows: LogRows, surfaces: list[str]) -> list[Document]:
 
 def _join_runs(rows: LogRows, runs: Runs) -> Runs:
     """The runs, in which an alarm joins the alarm just before it if it is brief, if both are alike, or if the
-    one before is brief and has no name."""
+    one before is brief and has no name. before: the last run that was joined, from its row `first` on; empty
+    at the begin."""
     joined: Runs = []
     for begin, end in runs:
         before = joined[-1] if joined else (begin, begin)
@@ -95,6 +96,7 @@ def _join_runs(rows: LogRows, runs: Runs) -> Runs:
 
 
 def _is_brief(rows: LogRows, begin: int, end: int) -> bool:
+    """Whether a run of rows lasts for less than MAX_BRIEF_EVENT_S."""
     return bool(rows.t_s[end - 1] - rows.t_s[begin] < MAX_BRIEF_EVENT_S)
 
 
@@ -222,7 +224,10 @@ def _own_information(F: Floats, g: int) -> float:
 
 def _alarm_odds(model: Model, bank: HypothesisBank, g: int, dt_s: float) -> float:
     """Log odds that the evidence for a loss of this group must exceed to reach the alarm's probability, for
-    the median of its levels; inf if the bank has no such loss."""
+    the median of its levels; inf if the bank has no such loss.
+
+    log(alarm / (1 - alarm)) - log(p),    p: probability that a sample begins a loss of the median level
+    """
     settings = model.settings
     shares = bank.transition_share[bank.is_fault_of_group(g)]
     if not len(shares):
@@ -241,7 +246,8 @@ def _smallest_losses(J: float, odds: float) -> dict[str, float | None]:
 
 
 def _alike_pairs(F: Floats, model: Model) -> list[Document]:
-    """Pairs of groups whose effects in this flight were nearly proportional."""
+    """Each pair of groups with the cosine between their effects in this flight, f_g.f_h / |f_g| |f_h|, and
+    whether it is far enough from +-1 to distinguish the two. F (n, G, 3)."""
     pairs = []
     for g, h in combinations(range(len(model.groups)), 2):
         f_g = F[:, g].ravel()
@@ -268,6 +274,7 @@ def isolability_sentences(isolable: Document) -> list[str]:
 
 
 def _smallest_loss_text(losses: dict[str, float | None]) -> str:
+    """The smallest losses by horizon in words."""
     texts = [f"{loss:.0%} within {horizon} s" for horizon, loss in losses.items() if loss is not None]
     if not texts:
         within = f"within {DETECTION_HORIZONS_S[-1]:g} s by the mean of this flight's commands"

@@ -124,6 +124,9 @@ def assume_law_and_air(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Ve
 def whiten_flights(flights: Sequence[Samples], vehicle: Vehicle) -> list[Samples]:
     """The flights, in moving air whitened by the likeliest moving average of each.
 
+    alone, white: of each flight its residual by moving average, by its own fit and by the common fit.
+    colours: the moving average of each flight. C: coefficients of the common fit.
+
     A law feeds the noise of the rates to the surfaces. If the residual is not white, a fit attributes noise
     to the surfaces [Ljung1999, section 13.4]. The moving averages follow from the residuals of one fit to all
     flights, and this fit follows from the moving averages: both are repeated until the averages stay.

@@ -104,7 +104,11 @@ def run_loop_detector(detector: Detector, samples: Samples, model: Model) -> Log
 
 
 def rows_of_verdicts(verdicts: list[Verdict], samples: Samples, model: Model) -> LogRows:
-    """Verdicts as rows. The bounds are 0 to 1 for each surface that the detector may suspect, else 1."""
+    """Verdicts as rows. The bounds are 0 to 1 for each surface that the detector may suspect, else 1. A name
+    that is none of the vehicle's groups is `unknown`, of any surface.
+
+    a, low (n, S): effectiveness and its lower bound; members: the surfaces of each group.
+    """
     n = len(verdicts)
     members = group_indices(model)
     statistic, detected = np.array([(one.statistic, one.detected) for one in verdicts], dtype=float).T

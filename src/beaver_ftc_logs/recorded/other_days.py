@@ -100,8 +100,15 @@ def random_days(n: int, seeds: range) -> list[DayChanges]:
 
 
 def apply_day_changes(day: DayChanges, samples: Samples, A: Floats, Q: Floats) -> Samples:
-    """The flight as it might have been on that day. A (3 h, 3): how its model's rates answer their own past,
-    Q (3, 3) (rad/s)2: covariance of its noise. e (n, S): effectiveness."""
+    """The flight as it might have been on that day, with commands u (n, S) and rates x (n, 3):
+
+        u <- mean(u) + motion (u - mean(u)) / gain + neutral + (trim + drift) / e
+        x <- mean(x) + motion (x - mean(x)) + extra noise
+
+    mean: running mean over _TRIM_MEAN_S; motion, gain, neutral, trim, drift: of the day; e (n, S):
+    effectiveness. A (3 h, 3): how its model's rates answer their own past, Q (3, 3) (rad/s)2: covariance of
+    its noise. extra: the noise that `motion` leaves out of the day's noise ratio.
+    """
     rng = np.random.default_rng(20)
     e = np.where(np.isfinite(samples.labels), samples.labels, 1.0)
     commands = _shifted(samples.commands, day.command_delay_s / samples.dt_s)

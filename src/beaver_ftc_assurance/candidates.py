@@ -146,11 +146,13 @@ def tell_apart(one: Candidate, other: Candidate, at: Situation, names: Sequence[
 
 
 def _none(because: str, needs: Document) -> Document:
+    """The document of two candidates without a doublet."""
     return {"separates": False, "because": because, "needs": needs}
 
 
 def _types_apart(one: Candidate, other: Candidate, at: Situation) -> tuple[float | None, Document]:
-    """The deflection nearest to the present one at which two types on a surface, and health, all differ."""
+    """The deflection nearest to the present one at which two types on a surface, and health, all differ: gap,
+    the least distance of two of the three positions, rad, exceeds room = 2 M B / |G_i| of the best axis."""
     s = one.surface
     room = min(
         (2.0 * MARGIN * B / abs(g) for B, g in zip(at.bound, at.G[:, s], strict=True) if g), default=inf
@@ -165,7 +167,7 @@ def _types_apart(one: Candidate, other: Candidate, at: Situation) -> tuple[float
 
 def _surface_shown(one: Candidate, other: Candidate, at: Situation) -> tuple[float | None, Document]:
     """The deflection nearest to the present one at which a fault shows in a direction in which the surface of
-    the other one has no effect."""
+    the other one has no effect: it exceeds room = 2 M |d|.B / |d.G_a| of the best direction, rad."""
     a = one.surface
     b = other.surface
     room = min(

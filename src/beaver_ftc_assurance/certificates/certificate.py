@@ -23,11 +23,10 @@ from beaver_ftc_assurance.certificates import chance, courses, instruments_say, 
 from beaver_ftc_assurance.certificates.certified import (
     LOG_NAME,
     Certified,
-    EvidenceColumns,
-    PartialColumn,
     with_digest,
 )
 from beaver_ftc_assurance.certificates.check_certificate import FORMAT_VERSION
+from beaver_ftc_assurance.certificates.evidence_columns import evidence_columns
 from beaver_ftc_assurance.certificates.history import (
     Document,
     History,
@@ -93,7 +92,7 @@ def certificate(
         document["without" if "because" in said else "statements"].append(said)
     if document["statements"]:
         document |= flight.declared_fields(document["statements"])
-    columns = flight.evidence_columns(document["statements"])
+    columns = evidence_columns(tape, scenario.airframe.surfaces, document["statements"])
     return Certified(with_digest(document), log, columns, declares)
 
 
@@ -201,7 +200,7 @@ class _Flight:
         return by_chance or {"because": chance.ALARM_NOT_STATED}
 
     def _filter_alarm(self, k: int) -> Document | None:
-        """A filter that left its bound at frame k."""
+        """A filter that left its bound at frame k; None if none did, or before the diagnosis began."""
         tape = self.tape
         every = (0, 1, 2)
         if k <= tape.since:
@@ -216,7 +215,8 @@ class _Flight:
         return list(filter_poles(self.scenario.fdi, Declared.of(self.scenario)))
 
     def _exclusion(self, e: int, alarm: int, k: int) -> Document | None:
-        """The test that the fault of estimator e failed at frame k."""
+        """The test that the fault of estimator e failed at frame k: with any theta in each frame, of the
+        frame alone, or of a filter; else with one theta since the alarm, where the scenario declares so."""
         tape = self.tape
         config = self.scenario.fdi
         history = self.history
@@ -244,7 +244,8 @@ class _Flight:
         self, e: int, across: np.ndarray, axes: tuple[int, ...], k: int
     ) -> Iterator[list[Term]]:
         """The tests of the detection filters, each with the bound on the fault's effect before the first
-        frame."""
+        frame. across (3,): a direction in which the fault has no effect, zeros where there is none; its reach
+        is the last of four, after those of the axes."""
         tape = self.tape
         ways = [([*axis_directions((i,))], i) for i in axes]
         ways += [([across, -across], 3)] if across.any() and len(axes) == 3 else []
@@ -303,38 +304,6 @@ class _Flight:
             about |= {"instants": self.scenario.substeps, "omega_E": self.history.declared.earth_rad_s}
         return about
 
-    def evidence_columns(self, said: list[Document]) -> EvidenceColumns:
-        """The columns of the log by which these statements are checked: for each estimator that they speak of
-        offset, slope and spread of its fault's effect and the range of its parameter; for each fault type on
-        a surface whether it is excluded, and what the type is where the checker does not define it. The
-        effects are known in the frames of the tape only."""
-        tape = self.tape
-        surfaces = self.scenario.airframe.surfaces
-        found: EvidenceColumns = {}
-        of_types = [one["what"].partition(" ")[0] for one in said if one["what"] and " " in one["what"]]
-        wanted = {one["what"] for one in said} | {f"{surface}_position" for surface in of_types}
-        for e, name in enumerate(tape.names):
-            if name not in wanted:
-                continue
-            for quantity, unit in (("offset", "_rad_s2"), ("slope", ""), ("spread", "_rad_s2")):
-                known = np.pad(getattr(tape, quantity)[:, e], ((1, 1), (0, 0)), constant_values=np.nan)
-                for axis, values in zip(AXES, known.T, strict=True):
-                    found[f"fie_{name}_{axis}_{quantity}{unit}"] = PartialColumn(tape.first - 1, values)
-            estimator = tape.alarm.diagnosis.estimators[e]
-            found |= _constants({
-                f"fie_{name}_theta_low": estimator.theta_min, f"fie_{name}_theta_high": estimator.theta_max,
-            })  # fmt: skip
-        for surface in dict.fromkeys(of_types):
-            low, high = kinds.travel_rad(tape, surfaces.index(surface))
-            found |= _constants({f"{surface}_travel_low_rad": low, f"{surface}_travel_high_rad": high})
-        for s, kind, _ in kinds.excluded_types(tape):
-            if surfaces[s] in of_types:
-                flags = np.append(0.0, tape.types[:, s, kind] > 0)
-                column = PartialColumn(tape.first - 1, flags)
-                found[kinds.exclusion_column(surfaces[s], kind)] = column
-                found |= _constants(kinds.type_definition_columns(tape, surfaces[s], s, kind))
-        return found
-
 
 def _is_unexplained(history: History, one: Document, span: Document) -> bool:
     """Whether health explains none of the frames of a statement's term, or bound, if it says so."""
@@ -343,8 +312,3 @@ def _is_unexplained(history: History, one: Document, span: Document) -> bool:
     length, begin, _ = one.get("block", (1, 0, 0))
     seen = replace(history, length=length, begin=begin)
     return bool(seen.is_unexplained(np.arange(span["first"], span["frame"] + 1)).all())
-
-
-def _constants(values: dict[str, float]) -> EvidenceColumns:
-    """Columns with the same value in every row."""
-    return {name: PartialColumn(0, np.array([value])) for name, value in values.items()}

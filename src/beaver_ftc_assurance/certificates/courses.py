@@ -95,8 +95,11 @@ def _exclude_offset(bounds: SurfaceBounds, grows: bool = False) -> Document | No
     """Exclude a constant offset: its lower bound by one frame exceeds its upper bound by another. Exclude an
     offset that grows and keeps its sign: a positive one is smaller in a later frame.
 
-    At a stop the position says nothing about the offset. The range of the command in a frame of several
-    instants brings both stops nearer."""
+        lower = least - command,    upper = most - command,    excluded if lower[i] > upper[j]
+
+    least, most (n,): bounds on the position p, rad, of the axis that bounds it most. At a stop the position
+    says nothing about the offset. The range of the command in a frame of several instants brings both stops
+    nearer."""
     least = bounds.lower.max(axis=1)
     most = bounds.upper.min(axis=1)
     low_stop = bounds.stops[0] + bounds.command_range[:, 0]
@@ -137,8 +140,12 @@ def _first_smaller(lower: np.ndarray, upper: np.ndarray) -> tuple[int, int] | No
 
 
 def _exclude_runaway(bounds: SurfaceBounds) -> Document | None:
-    """Exclude a runaway at its least rate or faster: a later frame shows less travel. In a frame of several
-    instants the lower bound may hold only in the last one: the way of one frame is then not counted."""
+    """Exclude a runaway at its least rate or faster: a later frame shows less travel.
+
+        excluded if least[i] + step (j - i - late_frames) > most[j],    step = rate dt
+
+    In a frame of several instants the lower bound may hold only in the last one: late_frames, the way of one
+    frame, is then not counted."""
     rate = bounds.actuator.min_runaway_rate_rad_s
     high_stop = bounds.stops[1]
     step = rate * bounds.config.block_duration_s
@@ -175,8 +182,11 @@ def _exclude_oscillation(bounds: SurfaceBounds) -> Document | None:
 
 def _exclude_rate_limit(bounds: SurfaceBounds) -> Document | None:
     """Exclude a reduced rate limit: such a surface approaches its order by at least the least step in each
-    instant, until it is so near that its lag makes the steps smaller. In a run of frames beyond all orders, a
-    later frame shows a position farther away."""
+    instant, until it is so near that its lag makes the steps smaller. In a run of frames i ... k beyond all
+    orders, a later frame shows a position farther away:
+
+        excluded if lower[k] > max(most[i] - min_approach (k - i - 1), near)
+    """
     actuator = bounds.actuator
     config = bounds.config
     min_approach = config.n_substeps * config.frames_per_block * actuator.slow_step_rad  # of a frame, rad

@@ -179,7 +179,12 @@ def _by_axis(numbers: Mapping[str, np.ndarray]) -> Document:
 
 
 def declared_errors_of(frame: FrameReadout) -> DeclaredErrors:
-    """The declared errors in a flight's record, with the coefficients of inertia that they multiply."""
+    """The declared errors in a flight's record, with the coefficients of inertia that they multiply.
+
+    The Earth's rate adds to the body rates in pdot = Ppq p q + Pqr q r, qdot = Qpp p^2 + Qpr p r + Qrr r^2
+    and rdot = Rpq p q + Rqr q r. earth_gain is the size of these coefficients in sum, of a square twice:
+    |Ppq| + |Pqr|, |Qpr| + 2 max(|Qpp|, |Qrr|), |Rpq| + |Rqr|, at least 1.
+    """
     bound = frame.diagnosis.declared_bounds
     inertia = frame.inertia
     size = {name: abs(value) for name, value in inertia._asdict().items()}

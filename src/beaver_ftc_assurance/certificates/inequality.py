@@ -117,7 +117,9 @@ class Inequality:
             limit = sum_{s<j<=k} a^(k-j) dt eta_bar[j].|d| + noise + largest effect of the fault
             noise = n[k] + a^(k-s-1) n[s] + (1-a) sum_{s<j<k} a^(k-1-j) n[j],   n = |change of gyro error|.|d|
 
-        s: filter_start; k: last_frame; a: decay of the filter in a frame, 0 for an infinite pole."""
+        s: filter_start; k: last_frame; a: decay of the filter in a frame, 0 for an infinite pole. h, Z, r:
+        the fault's effect along d in the frames that are written out, from `first` on; before, rad/s: the
+        largest that the filter has of it from the frames before them."""
         of = self.hypothesis
         history = self.history
         d = term.direction

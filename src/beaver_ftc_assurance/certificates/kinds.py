@@ -91,7 +91,13 @@ def type_definition_columns(tape: Tape, surface: str, s: int, kind: int) -> dict
 
 def hypothesis_of_type(tape: Tape, surface: int, fault_type: int) -> Hypothesis:
     """The effect on the innovation of a fault of this type on a surface, G (p - u); p: position of the
-    surface, by the relation of the type; u: command in effect, rad. That of `STUCK` bounds the position."""
+    surface, u: command in effect, rad. That of `STUCK` bounds the position. By the relation of the type
+
+        p = gain u + theta           G (p - u) = (gain - 1) G u + theta G
+        p = (gain + theta) u         G (p - u) = (gain - 1) G u + theta G u        if theta is a share
+
+    The position estimator of the surface has -G u as its offset, and G as its slope.
+    """
     row = TYPES[fault_type]
     diagnosis = tape.alarm.diagnosis
     assert row.deflection_relation is not None

@@ -147,15 +147,19 @@ class LikelihoodRatio:
         room.
         """
         n = len(self.axes)
-        # Y has minus the drift, and no rows of a second axis if there is one axis
+        # a filter has two axes, and the drifts themselves; Y has minus the drifts, of its n axes alone
         states = np.zeros((self.Y.shape[1], 4))
         states[:, :n] = self.Y[:n].T
         states[:, 2 : 2 + n] = -self.Y[n:].T
         sums = np.zeros(len(states))
         none = np.zeros_like(self.innovation)
         ones = np.ones(len(none))
-        neutral = Inputs(none, none, none, none, NO_PACE * ones, ones, none[:, None][:, :0], none, none)
-        series = Inputs(*(zero if of is None else of for of, zero in zip(self.series, neutral, strict=True)))
+        neutral = {
+            "bounded": none, "pace": NO_PACE * ones, "keep": ones, "known": none[:, None][:, :0], "air": none,
+            "foreseen": none,
+        }  # fmt: skip
+        left_out = {name: zero for name, zero in neutral.items() if getattr(self.series, name) is None}
+        series = self.series._replace(**left_out)
         nu = self.innovation - series.air
         inputs = np.concatenate([nu[:, None], series.signature[:, None], series.known], axis=1)
         Q_x = series.jitter / (self.dt * self.dt)
@@ -175,6 +179,7 @@ class LikelihoodRatio:
 
 
 def _null_for_zero(values: np.ndarray) -> list[float | None]:
+    """The numbers as the certificate writes them."""
     return [value or None for value in values.tolist()]
 
 

@@ -24,6 +24,7 @@ from beaver_ftc.scenario import Scenario
 
 FRAMES_BEFORE_ALARM = 40  # frames kept before the alarm: what was before them is in the filters
 STATISTICAL_FRAMES_BEFORE_ALARM = 2**N_SLOTS + 2  # with the statistical detector: its oldest onset
+SEEN, ALARM, CLEAR, FLAG, OTHER_FLAG = range(5)  # places in the state of `keep_frame`
 KEPT_AFTER_EVENT_S = 10.0  # after the last event, where types are excluded one by one
 MAX_FRAMES_AFTER_ALARM = 1 << 16  # frames kept after the alarm; memory is taken as they come
 
@@ -33,9 +34,11 @@ class Tape:
     """Frames `first` to `first + frames - 1` of the flight, rows of its log.
 
     alarm, last: the flight at the alarm and at its end. since: the frame with which the diagnosis began.
-    kept, by frame: of each isolation estimator the offset (rad/s2), slope and spread (rad/s2 per unit of its
-    parameter) of its fault's effect (estimators, 3); what is excluded; the orders to the surfaces. filters:
-    the filter states of the statistical detector, by frame up to the alarm. reach_low, reach_high
+    kept, by frame: of each isolation estimator `offset` (rad/s2), `slope` (rad/s2 per unit of its parameter)
+    and `spread` (rad/s2) of its fault's effect, (estimators, 3); `excluded` (estimators,) and `types`
+    (surfaces, types), above 0 for what is excluded; and, rad, of every type of fault `command_low` and
+    `command_high`, the orders to the surfaces, `least` and `greatest`, the positions of healthy ones.
+    filters: the filter states of the statistical detector, by frame up to the alarm. reach_low, reach_high
     (estimators, poles, 4): bounds on the effect of a fault in the filters before the first frame.
     """
 
@@ -129,7 +132,7 @@ class Recorder:
         """The frames around `events`. rows: number of frames of the flight."""
         last = FrameReadout(self._last[0])
         config = self._scenario.fdi
-        seen, alarm, clear = self._state[:3].tolist()
+        seen, alarm, clear = self._state[[SEEN, ALARM, CLEAR]].tolist()
         ring = len(self._ring)
         raised = alarm >= 0
         alarm, at_alarm = (alarm, FrameReadout(self._alarm[0])) if raised else (seen - 1, last)
@@ -157,20 +160,20 @@ def keep_frame(record, always, early, kept, ring, alarm, state):
     into a ring of rows, after it into the rows of `kept` behind the ring. At the alarm `alarm` becomes a copy
     of the record.
 
-    state (5,): number of frames; frame of the alarm, or -1; frame in which the last alarm was withdrawn;
-    places in the record of the two alarm flags.
+    state (5,), by place: SEEN, number of frames; ALARM, frame of the alarm, or -1; CLEAR, frame in which the
+    last alarm was withdrawn; FLAG and OTHER_FLAG, places in the record of the two alarm flags.
     """
-    k = state[0]
+    k = state[SEEN]
     rows = len(ring)
-    state[0] = k + 1
-    if record[state[3]] == 0 and record[state[4]] == 0:
-        if state[1] >= 0:
-            state[1] = -1
-            state[2] = k
-    elif state[1] < 0:
-        state[1] = k
+    state[SEEN] = k + 1
+    if record[state[FLAG]] == 0 and record[state[OTHER_FLAG]] == 0:
+        if state[ALARM] >= 0:
+            state[ALARM] = -1
+            state[CLEAR] = k
+    elif state[ALARM] < 0:
+        state[ALARM] = k
         alarm[:] = record
-    after = k - state[1] if state[1] >= 0 else 0
+    after = k - state[ALARM] if state[ALARM] >= 0 else 0
     row = k % rows if after == 0 else rows - 1 + after
     if row >= len(kept):
         return

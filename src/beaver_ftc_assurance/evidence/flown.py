@@ -14,7 +14,8 @@ from beaver_ftc.results import margin_of_expectation as margin
 from beaver_ftc.scenario import Scenario, to_yaml
 from beaver_ftc.studies.present import finite
 from beaver_ftc.studies.sweep import BAD_INPUT, CRASHED, DEPARTED, FAILED, FLOWN, row_of, row_of_failure
-from beaver_ftc_assurance.evidence.plan import EvidencePlan, OfHandling, OfMargins, Requirement
+from beaver_ftc_assurance.evidence.plan import EvidencePlan
+from beaver_ftc_assurance.evidence.plan_file import OfHandling, OfMargins, Requirement
 
 Row = dict[str, Any]
 MET = "met"

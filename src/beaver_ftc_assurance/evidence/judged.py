@@ -29,7 +29,8 @@ from beaver_ftc_assurance.evidence.flown import (
     Row,
     part,
 )
-from beaver_ftc_assurance.evidence.plan import EvidencePlan, OfSweep, Requirement
+from beaver_ftc_assurance.evidence.plan import EvidencePlan
+from beaver_ftc_assurance.evidence.plan_file import OfSweep, Requirement
 
 MOST_NAMED = 50  # flights that are listed as not meeting a requirement
 Judged = tuple[str, Row]  # name of a flight, and one `part` of its result

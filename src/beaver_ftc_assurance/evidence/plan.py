@@ -5,38 +5,26 @@ import hashlib
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
 from math import inf
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Any
 
-from pydantic import Field, StringConstraints, model_validator
-
-from beaver_ftc.aircraft import Aircraft
 from beaver_ftc.documents import (
     BadInput,
     Document,
     Location,
-    Number,
     Problem,
     ScenarioError,
-    Section,
-    Whole,
-    deny,
-    entry,
     inside,
-    number,
     parse_document,
     suggestion,
     validate_model,
 )
 from beaver_ftc.results import Formula, FormulaError, parse_formula
 from beaver_ftc.scenario import (
-    NAME_PATTERN,
     Expect,
     Scenario,
     Sweep,
-    SweepExpect,
     builtin_names,
     builtin_sweeps,
     checked_against,
@@ -51,152 +39,15 @@ from beaver_ftc.scenario import (
     validate_scenario,
     validate_sweep,
 )
-from beaver_ftc.studies.engine import digest_of_aircraft
-from beaver_ftc.studies.sweep import Assignment, Plan, flight_name, scenario_of
+from beaver_ftc_assurance.evidence.plan_file import OfSweep, PlanFile, Requirement
+from beaver_ftc_assurance.evidence.source import Source
 
-MOST_REQUIREMENTS = 500
 MOST_FLIGHTS = 100_000
-Text = Annotated[str, StringConstraints(max_length=2000)]
-
-
-class OfSweep(SweepExpect):
-    """Conditions as in `expect` of a sweep file."""
-
-    type: Literal["sweep"]
-
-
-class OfHandling(Section):
-    """Level of handling qualities of MIL-F-8785C: at the end of a flight with a fault, otherwise in trim."""
-
-    type: Literal["handling_qualities"]
-    level: Whole = number(1, "1", "worst allowed level, 1: best", ge=1, le=3)
-
-
-class OfMargins(Section):
-    """Stability margins of the loop of each surface, healthy and after each loss for which the default law
-    is designed."""
-
-    type: Literal["margins"]
-    gain_db: Number = number(6.0, "dB", "smallest gain margin", ge=0, le=100)
-    phase_deg: Number = number(45.0, "deg", "smallest phase margin", ge=0, le=180)
-
-
-Bar = Annotated[OfSweep | OfHandling | OfMargins, Field(discriminator="type")]
-
-
-class Requirement(Section):
-    """One requirement, with exactly one of `expect`, `formula` and `bar`.
-
-    id: name of the requirement: letters, digits, - and _
-    text: the requirement in words
-    clause: clause of the regulation or standard
-    over: flights that must meet it: names from `flights`, built-in names, or files
-    expect: conditions that each flight must meet, as in `expect` of a scenario
-    formula: formula of signal temporal logic over columns of the log, times in s. Operators: `always`,
-    `eventually`, `until`, `once`, `historically`, `not`, `and`, `or`, `implies`
-    bar: limit that the result of a study must meet
-    """
-
-    id: str = entry(..., pattern=NAME_PATTERN, max_length=40, examples=["JAM-1"])
-    text: Text = entry("", examples=["No jam loses the aircraft."])
-    clause: Text = entry("", examples=["CS 25.671(c)(3)"])
-    over: tuple[str, ...] = entry(..., min_length=1, max_length=200, examples=[["elevator-stuck"]])
-    expect: dict[str, Any] | None = entry(None, min_length=1, examples=[{"no_departure": True}])
-    formula: str | None = entry(None, max_length=4000, examples=["always(abs(q_rad_s) <= 0.5)"])
-    bar: Bar | None = None
-
-    @model_validator(mode="after")
-    def _one_kind(self) -> Self:
-        given = [key for key in ("expect", "formula", "bar") if getattr(self, key) is not None]
-        if len(given) != 1:
-            said = " and ".join(given) or "nothing that can be judged"
-            deny(f"has {said}, allowed: exactly one of expect, formula, bar")
-        return self
-
-
-class PlanFile(Section, title="beaver-ftc plan of evidence"):
-    """Requirements, and the flights that are flown for them.
-
-    name: name of the plan: letters, digits, - and _
-    description: purpose of the plan
-    flights: scenarios and sweeps of this plan, by name
-    requirements: list of the requirements
-    """
-
-    name: str = entry(..., pattern=NAME_PATTERN, max_length=70, examples=["flight-controls"])
-    description: str = entry("", max_length=4000, examples=["The flight controls after one failure."])
-    flights: dict[Annotated[str, StringConstraints(pattern=NAME_PATTERN, max_length=70)], dict[str, Any]] = (
-        entry(dict, max_length=200, examples=[{"own": {"duration_s": 30}}])
-    )
-    requirements: tuple[Requirement, ...] = entry(..., min_length=1, max_length=MOST_REQUIREMENTS)
 
 
 def plan_json_schema() -> dict[str, Any]:
     """The JSON Schema of a plan, for editors."""
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **PlanFile.model_json_schema()}
-
-
-@dataclass(frozen=True)
-class Source:
-    """A scenario or a sweep (`what`) to fly. given: its name or path in the plan."""
-
-    name: str
-    given: str
-    what: Scenario | Sweep
-
-    @property
-    def flights(self) -> int:
-        """How many flights it has."""
-        return self.what.flights if isinstance(self.what, Sweep) else 1
-
-    @property
-    def aircraft(self) -> Aircraft:
-        """The aircraft of all its flights."""
-        return self.what.aircraft if isinstance(self.what, Sweep) else self.what.airframe
-
-    def assignment(self, run: int) -> Assignment | None:
-        """The varied values of one flight of a sweep; None for a scenario."""
-        return Plan(self.what).assignments([run])[0] if isinstance(self.what, Sweep) else None
-
-    def flight(self, run: int) -> str:
-        """The name of one flight."""
-        return flight_name(self.what, run) if isinstance(self.what, Sweep) else self.name
-
-    def scenario(self, run: int) -> Scenario:
-        """One flight. Raises BadInput if its values contradict each other."""
-        if not isinstance(self.what, Sweep):
-            return self.what
-        assigned = self.assignment(run)
-        assert assigned is not None
-        return scenario_of(self.what, assigned)
-
-    @property
-    def base(self) -> Scenario:
-        """The scenario of all its flights, without variations."""
-        return self.what.scenario({}) if isinstance(self.what, Sweep) else self.what
-
-    @cached_property
-    def columns(self) -> tuple[str, ...]:
-        """The columns of its logs; none if it cannot fly, which the row of the flight reports."""
-        from beaver_ftc.loop import Loop
-
-        with contextlib.suppress(BadInput):
-            loop = Loop(self.base)
-            loop.release()
-            return loop.columns
-        return ()
-
-    @property
-    def sha256(self) -> str:
-        """SHA-256 of the resolved scenario or sweep, and of the files of its aircraft."""
-        aircraft = digest_of_aircraft(self.aircraft.folder)
-        left_out = {"description", "expect"}
-        if isinstance(self.what, Sweep):
-            file = self.what.file.model_dump(mode="json", exclude=left_out | {"base", "set"})
-            text = repr([aircraft, self.what.base, file])
-        else:
-            text = repr([aircraft, self.what.model_dump(mode="json", exclude=left_out)])
-        return hashlib.sha256(text.encode()).hexdigest()
 
 
 @dataclass(frozen=True)

@@ -30,6 +30,7 @@ from beaver_ftc_logs.units import ACCELERATION, ANGLE, LENGTH, RATE, SI_UNITS, S
 
 _MAX_FILE_BYTES = 1_000_000
 MAX_ALARMS_PER_HOUR = 1000.0
+# Largest sample rate of a log, left out in the file.
 STILL_AIR_HZ = 20.0
 _MOVING_AIR_HZ = 100.0
 _BUILT_IN_FOLDER = Path(__file__).parent / "vehicles"
@@ -38,7 +39,7 @@ VehicleName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$", max_length=100)]
 _SURFACE_NAME_PATTERN = re.compile(r"[A-Za-z0-9_-]{1,100}")
 ColumnName = Annotated[str, Field(min_length=1, max_length=200)]
 FaultKind = Literal["loss", "stuck"]
-# What the columns below a key measure.
+# What the columns below a key measure; empty: any quantity.
 _KINDS: dict[Location, str] = {
     ("rates",): RATE, ("commands",): "", ("signals",): "", ("attitude",): ANGLE,
     ("acceleration",): ACCELERATION, ("airspeed",): SPEED, ("energy", "altitude"): LENGTH,
@@ -216,8 +217,8 @@ class Vehicle(Section):
 
     @model_validator(mode="after")
     def _check_names(self) -> "Vehicle":
-        """Refuse names of surfaces that no column may have, names that the file does not define, units of
-        another kind, and a column that is read in two ways."""
+        """Refuse names of surfaces that no column may have, names that the file does not define, and wrong
+        units."""
         # the name of a surface is part of a column's
         reason = "a surface's name has letters, digits, - and _ only, allowed: one"
         bad = [name for name in self.surfaces if not _SURFACE_NAME_PATTERN.fullmatch(name)]
@@ -238,18 +239,22 @@ class Vehicle(Section):
         }
         for key, values in tables.items():
             mistakes += _unknown_name_conflicts((key,), values, "surface", self.surfaces)
+        refuse([*mistakes, *self._unit_mistakes()])
+        return self
+
+    def _unit_mistakes(self) -> Iterator[Conflict]:
+        """Units of another kind than their column's; the first column that is read in two ways."""
         first: dict[str, QuantityColumn] = {}
         two_ways: list[Conflict] = []
         for location, kind, quantity in self.located_quantities():
             if kind and quantity.unit is not None and SI_UNITS[quantity.unit][0] != kind:
-                units = [name for name, (of, _) in SI_UNITS.items() if of == kind]
+                units = [name for name, (its_kind, _) in SI_UNITS.items() if its_kind == kind]
                 reason = f"{quantity.unit!r} is no unit of it, allowed: {', '.join(units)}"
-                mistakes.append(((*location, "unit"), reason))
+                yield (*location, "unit"), reason
             if kind is not None and first.setdefault(quantity.column, quantity) != quantity:
                 reason = f"{quantity.column!r} is read in two ways, allowed: one unit, scale and offset"
                 two_ways.append((location, reason))
-        refuse([*mistakes, *two_ways[:1]])
-        return self
+        yield from two_ways[:1]
 
     def located_quantities(self) -> list[tuple[Location, str | None, QuantityColumn]]:
         """Every column but those of labels and outputs: where it stands in the file, and its kind.

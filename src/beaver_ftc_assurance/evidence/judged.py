@@ -98,10 +98,12 @@ def _requirement(plan: EvidencePlan, requirement: Requirement, rows: Sequence[Ro
 
 
 def _counts(verdicts: Iterable[str]) -> dict[str, int]:
+    """How often each verdict is among these."""
     return dict.fromkeys((MET, NOT_MET, NOT_SHOWN), 0) | Counter(verdicts)
 
 
 def _worst_of(verdicts: Iterable[str]) -> str:
+    """The worst of these verdicts; not shown, of none."""
     return min(verdicts, key=WORST_FIRST.index, default=NOT_SHOWN)
 
 
@@ -143,7 +145,10 @@ def _of_sweep(plan: EvidencePlan, bar: OfSweep, name: str, rows: Sequence[Row]) 
 
 
 def _worst(flights: Flights, name: str) -> int:
-    """Number of the flight with the worst contribution to a statistic."""
+    """Number of the flight with the worst contribution to a statistic, such as `tracking_ratio.p`.
+
+    bad (flights,): a number for each flight, the larger the worse; a flag counts 1.
+    """
     quantity, _, axis = name.partition(".")
     against: dict[str, Callable[[], np.ndarray]] = {
         "detection_rate": lambda: flights.faulted & ~flights.detected,

@@ -98,7 +98,7 @@ class _Reading:
         self._sources: dict[str, Source | None] = {}  # by what the plan calls them
 
     def plan(self, sha256: str) -> EvidencePlan:
-        """The plan; its mistakes are raised together."""
+        """The plan; its mistakes are raised together. over, expect, formulas: as in `EvidencePlan`."""
         over: dict[str, tuple[str, ...]] = {}
         expect: dict[str, Expect] = {}
         formulas: dict[str, Formula] = {}
@@ -128,9 +128,11 @@ class _Reading:
         return EvidencePlan(self._file, sources_by_name, over, expect, formulas, self._given, sha256)
 
     def _problem(self, at: Location, says: str) -> None:
+        """Note a mistake in the plan's own file."""
         self._problems.append(Problem(self._document.line(at), at, says))
 
     def _raise(self) -> None:
+        """Raise BadInput with a line for each mistake, if there is one."""
         lines = list(ScenarioError(str(self._path), self._problems).lines) if self._problems else []
         if lines or self._elsewhere:
             raise BadInput("\n".join(dict.fromkeys([*lines, *self._elsewhere])))
@@ -150,6 +152,7 @@ class _Reading:
         return found
 
     def _unused(self) -> None:
+        """Note flights of the plan that no requirement is over, and read them for their own mistakes."""
         for name in self._file.flights:
             if name not in self._sources:
                 self._source(name, ("flights", name))
@@ -203,6 +206,7 @@ class _Reading:
         return Source(found.name, name, found)
 
     def _formula(self, requirement: Requirement, at: Location) -> Formula | None:
+        """The formula of a requirement, None if it has none, or one with a mistake, which is noted."""
         if requirement.formula is None:
             return None
         try:

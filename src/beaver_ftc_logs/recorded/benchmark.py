@@ -35,7 +35,7 @@ LABEL_TITLES = {
     "mean_error": "mean error", "held_by_bounds": "held by 90 % bounds",
 }  # fmt: skip
 PUBLISHED_SCORES_FILE = Path(__file__).with_name("published.json")  # of each data set: what others found
-MAX_SHORT_DELAY_S = 5.0
+MAX_SHORT_DELAY_S = 5.0  # as in the key `within_5_s`
 SURFACE_KINDS = ("aileron", "rudder", "elevator")
 _KIND_OF_SURFACE = {"left_aileron": "aileron", "right_aileron": "aileron"}
 OUR_METHOD_TITLE = "bank of filters (ours)"

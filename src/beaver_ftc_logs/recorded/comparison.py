@@ -13,10 +13,12 @@ from beaver_ftc.studies.present import GRID, Files, aligned, markdown_table, mar
 from beaver_ftc_logs.energy import ENGINE
 from beaver_ftc_logs.recorded.benchmark import LABEL_TITLES, SURFACE_KINDS
 
+# A table: the heads of its columns, and the cells of each row.
 HeaderAndRows = tuple[list[str], list[list[str]]]
+# The text of a cell, by a row of the document.
 Cell = Callable[[Document], str]
 _METHOD: Cell = itemgetter("method")
-_SHOWN_DELAY_S = 30.0
+_SHOWN_DELAY_S = 30.0  # the longest delay that has a place of its own in the figure
 
 
 def result_files(document: Document) -> Files:
@@ -82,6 +84,7 @@ def _ours(text_of: Cell) -> Cell:
 
 
 def _soon_text(row: Document) -> str:
+    """How many failures of ailerons and rudders were found within 5 s, of all of them."""
     delays = [row["delay_s"][kind] for kind in SURFACE_KINDS[:2]]
     return " of ".join(str(sum(delay[key] for delay in delays)) for key in ("within_5_s", "failures"))
 

@@ -118,19 +118,27 @@ def _least_amplitude(targets: dict[int, float], at: Situation, tells: int) -> np
                 above.append((sign * (m - before @ m), at.step[s] * at.instants))
         turning = [row - at.dt * g * m for row, g in zip(turning, at.G[:, s], strict=True)]
     equal += [*turning, pitch - before @ pitch - at.dt * x[1]]
-    stops = [at.stops[:, s] - at.u[s] for s in surfaces]
-    rates = [(-at.rate - x, at.rate - x) for x in at.x]
-    ends = [*stops, *[(-inf, inf)] * n, *rates, np.subtract(at.alpha_range, at.alpha)]
-    bounds = np.vstack([np.repeat(ends, frames, axis=0), (0.0, inf)])
-    bounds[[(block + 1) * frames - 1 for block in range(2 * n, 2 * n + 3)]] = 0.0  # the last rates
     most = np.repeat([limit for _, limit in above], [rows.shape[0] for rows, _ in above])
     rows = vstack([rows for rows, _ in above], format="csc")
-    found = _solved(rows, most, vstack(equal, format="csc"), bounds)
+    found = _solved(rows, most, vstack(equal, format="csc"), _limits(at, surfaces, frames))
     if found is None:
         return None
     commands = np.tile(at.u, (frames, 1))
     commands[:, surfaces] += found[: n * frames].reshape(n, frames).T
     return commands
+
+
+def _limits(at: Situation, surfaces: list[int], frames: int) -> np.ndarray:
+    """Least and greatest value of each unknown, (unknowns, 2): a command within the travel, a deflection
+    anywhere, a rate within at.rate, and 0 in the last frame, the pitch angle such that the angle of attack
+    stays in its range, A at least 0."""
+    n = len(surfaces)
+    stops = [at.stops[:, s] - at.u[s] for s in surfaces]
+    rates = [(-at.rate - x, at.rate - x) for x in at.x]
+    ends = [*stops, *[(-inf, inf)] * n, *rates, np.subtract(at.alpha_range, at.alpha)]
+    limits = np.vstack([np.repeat(ends, frames, axis=0), (0.0, inf)])
+    limits[[(block + 1) * frames - 1 for block in range(2 * n, 2 * n + 3)]] = 0.0
+    return limits
 
 
 def _solved(above: Any, most: np.ndarray, equal: Any, bounds: np.ndarray) -> np.ndarray | None:

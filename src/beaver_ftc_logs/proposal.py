@@ -166,19 +166,25 @@ def guess_vehicle(path: Path, likely: LikelyLog) -> Document:
     if not mixing.surfaces:
         reason = missing_commands_text(likely.all_names)
         raise NoVehicleError(f"{reason}; the log has {nearest_names_text('command', likely.all_names)}")
-    roll = log.columns[found["roll"]] if "roll" in found else None
+    return {"name": _plain_name(path.stem), "reader": likely.reader, **_quantity_keys(likely, found)}
+
+
+def _quantity_keys(likely: LikelyLog, found: dict[str, str]) -> Document:
+    """The keys of the vehicle file on time, rates, commands and further quantities. found: by quantity its
+    column, p, q and r among them."""
+    roll = likely.log.columns[found["roll"]] if "roll" in found else None
     angle_unit = _guess_angle_unit(found["roll"], roll, likely.reader) if roll else "rad"
-    rate_unit = _guess_rate_unit(log, [found[axis] for axis in "pqr"], roll, SI_UNITS[angle_unit][1])
-    vehicle: Document = {"name": _plain_name(path.stem), "reader": likely.reader}
+    rate_unit = _guess_rate_unit(likely.log, [found[axis] for axis in "pqr"], roll, SI_UNITS[angle_unit][1])
+    vehicle: Document = {}
     if likely.time:
         vehicle["time"] = dict(zip(("column", "unit"), likely.time, strict=True))
     vehicle["rates"] = {axis: _column_entry(found[axis], rate_unit, "rad/s") for axis in "pqr"}
-    vehicle |= {"commands": mixing.commands, "surfaces": mixing.surfaces}
+    vehicle |= {"commands": likely.mixing.commands, "surfaces": likely.mixing.surfaces}
     if roll:
         named = [axis for axis in ("roll", "pitch") if axis in found]
         vehicle["attitude"] = {axis: _column_entry(found[axis], angle_unit, "rad") for axis in named}
     if az := found.get("az"):
-        median = float(np.nanmedian(np.abs(log.columns[az].values)))
+        median = float(np.nanmedian(np.abs(likely.log.columns[az].values)))
         if median > 0.0 and (unit := nearest_unit(ACCELERATION, SI_UNITS["g"][1] / median, 2.0)):
             vehicle["acceleration"] = _column_entry(az, unit, "m/s2")
     if "airspeed" in found:

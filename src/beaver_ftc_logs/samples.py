@@ -35,9 +35,9 @@ from beaver_ftc_logs.time_base import (
 )
 from beaver_ftc_logs.vehicle import QuantityColumn, Vehicle
 
-_MAX_NUMBER = 1e6
-_MAX_RATE_RAD_S = 60.0
-_MAX_RATE_SD_RAD_S = 3.0
+_MAX_NUMBER = 1e6  # a larger one in a log is damaged
+_MAX_RATE_RAD_S = 60.0  # larger rates are in another unit
+_MAX_RATE_SD_RAD_S = 3.0  # a larger standard deviation is remarked on
 # Least and largest dynamic pressure that scales a command, over that at the reference airspeed.
 _QDYN_RATIOS = (0.1, 10.0)
 # Moving averages of the noise: gusts held within a sample add to the next, gyros' noise takes from it.
@@ -100,7 +100,11 @@ class Samples:
 
 
 def resample(log: RecordedFlight, vehicle: Vehicle) -> Samples:
-    """Put a log on one time base. Raises BadInput with the reason where the log cannot be used."""
+    """Put a log on one time base. Raises BadInput with the reason where the log cannot be used.
+
+    used: the columns of rates, commands and signals; held: the values of each at the samples, and their mean
+    age, s, None of a column that has the stamps of the rates.
+    """
     rate_names = vehicle.rate_columns
     used = list(dict.fromkeys([*rate_names, *vehicle.command_columns, *vehicle.signal_columns]))
     log = convert_to_si(log, vehicle)
@@ -109,12 +113,13 @@ def resample(log: RecordedFlight, vehicle: Vehicle) -> Samples:
     stamps = log.columns[rate_names[0]].t_s
     t_s, stretch, step_s = sample_times(log.name, stamps, vehicle.max_sample_rate_hz)
     held = {name: sample_column(log.columns[name], t_s, step_s) for name in used}
+    values = {name: column for name, (column, _) in held.items()}
     for name in rate_names:  # a rate from before a gap is none; a command holds until the next
-        values, age_s = held[name]
-        held[name] = np.where(is_held_value_stale(log.columns[name], t_s, step_s), np.nan, values), age_s
+        is_stale = is_held_value_stale(log.columns[name], t_s, step_s)
+        values[name] = np.where(is_stale, np.nan, values[name])
 
     def stacked_columns(names: list[str]) -> Floats:
-        return np.column_stack([held[name][0] for name in names]) if names else np.empty((len(t_s), 0))
+        return np.column_stack([values[name] for name in names]) if names else np.empty((len(t_s), 0))
 
     def sampled(quantity: QuantityColumn | None) -> Floats:
         column = log.columns.get(quantity.column) if quantity else None

@@ -19,9 +19,9 @@ from beaver_ftc_logs.readers.time_text import DayCount
 from beaver_ftc_logs.recording import Floats
 
 _DELIMITER_TITLES = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars"}
-_LAYOUT_HEAD_BYTES = 200_000
-_MAX_LAYOUT_LINES = 60
-_BLOCK_BYTES = 1_000_000
+_LAYOUT_HEAD_BYTES = 200_000  # of a file, in which its layout is looked for
+_MAX_LAYOUT_LINES = 60  # in them
+_BLOCK_BYTES = 1_000_000  # that are read at once
 _NUMBER_PATTERN = r"^[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$"
 # Share of lines with another number of cells that a table may have.
 _BROKEN_SHARE = 0.1
@@ -102,14 +102,16 @@ class TextTable:
 
     @classmethod
     def _with_delimiter(cls, lines: Sequence[str], delimiter: str) -> "TextTable | None":
-        """The table that lines hold if this is what is between cells; None if they hold none."""
+        """The table that lines hold if this is what is between cells; None if they hold none: no line of
+        names with numbers in one of the next four lines, nor a first line of names alone."""
         rows = [_split_cells(line_text, delimiter) for line_text in lines]
         for line, header in enumerate(rows):
             below = [row for row in rows[line + 1 :] if row][:4]
             whole = [row for row in below if len(row) == len(header)]
             numbers = [cell for row in whole for cell in row if _is_number_cell(cell)]
-            is_header = len(header) > 1 and not any(_is_number_cell(name) for name in header)
-            if not ((is_header and numbers) or (len(header) > 1 and not below and line == 0)):
+            has_names = len(header) > 1 and not any(_is_number_cell(name) for name in header)
+            is_without_rows = len(header) > 1 and not below and line == 0
+            if not (has_names and numbers) and not is_without_rows:
                 continue
             comma = delimiter != "," and any("," in cell for cell in numbers)
             names = [name.strip() for name in (header[0].lstrip("# "), *header[1:])]
@@ -181,6 +183,7 @@ def unreadable_error(path: Path, reason: str) -> BadInput:
 
 
 def _split_cells(line: str, delimiter: str) -> list[str]:
+    """The cells of a line, none of one that cannot be read."""
     try:
         return next(csv_lines.reader([line], delimiter=delimiter), [])
     except csv_lines.Error:  # a cell longer than any
@@ -188,6 +191,7 @@ def _split_cells(line: str, delimiter: str) -> list[str]:
 
 
 def _is_number_cell(cell: str) -> bool:
+    """Whether a cell holds a number, with a decimal point or comma."""
     return bool(re.match(_NUMBER_PATTERN, cell.strip().replace(",", ".")))
 
 

@@ -96,6 +96,7 @@ def read_inputs(log: RecordedFlight, vehicle: Vehicle, given: DiagnosedAircraft)
     ages = dict(samples.held_age_s)
 
     def sampled_at(name: str) -> Floats:
+        """A column at the samples; the age of one that is held is noted."""
         values, age_s = sample_column(columns[name], samples.t_s, samples.dt_s)
         if age_s is not None:
             ages[name] = age_s

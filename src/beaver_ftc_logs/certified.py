@@ -26,6 +26,7 @@ def write_certificate_and_log(inputs: LogInputs, rows: LogRows, folder: Path) ->
     diagnosis = inputs.diagnosis
 
     def step() -> Iterator[int]:
+        """Step the diagnosis through the stretch; yields the number of each frame."""
         for k, sample in enumerate(zip(*arrays, strict=True)):
             diagnosis.step(*sample)
             yield k

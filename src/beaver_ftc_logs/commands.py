@@ -121,6 +121,7 @@ def _check_logs(
 
 
 def _write_file(path: Path, text: str) -> None:
+    """Write a file whole or not at all."""
     from beaver_ftc.results import clear_disk_errors
     from beaver_ftc.studies.engine import write_whole
 

@@ -128,6 +128,7 @@ def _excess_for_rate(tail: PeakTail, rate: float) -> float:
     mean = float(_rate_quantiles(tail).mean())
 
     def over(z: float) -> float:
+        """By how much the mean rate at an excess z is over the requested one, 1/h."""
         return mean * float(_exceedance(z, xi, sigma) @ p) - rate
 
     if over(0.0) <= 0.0:

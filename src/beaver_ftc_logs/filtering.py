@@ -48,9 +48,8 @@ _MIN_PROBABILITY = 1e-15
 _MIN_NOISE_SCALE = 0.3
 _MAX_NOISE_SCALE = 6.0
 _SQUARE_CLIP = 3.0
-# Spans over which a residual is summed, and the window in which its variance is taken.
-_SUM_SPANS_S = (0.0, 0.1)
-_VARIANCE_WINDOW_S = 2.0
+_SUM_SPANS_S = (0.0, 0.1)  # over which a residual is summed
+_VARIANCE_WINDOW_S = 2.0  # in which the variance of the sums is taken
 # Mean of the clipped square of a residual per axis when the scale is right.
 _MEAN_SQUARE = 0.93
 # Probability of a noise model below which it is left out.

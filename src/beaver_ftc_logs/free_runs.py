@@ -37,6 +37,7 @@ def fit_output_error(parts: Parts, groups: Groups) -> Document:
     upper = [_MAX_SERVO_LAG_S, _MAX_DELAY_S, *free]
 
     def error(th: Floats, rows: slice) -> Floats:
+        """Error of the free runs of some windows, in standard deviations of the rates."""
         return ((_simulate(th, u[rows], y[rows], dt_s) - y[rows]) / sd).ravel()
 
     found = least_squares(error, guess, bounds=(lower, upper), args=(fitted,), loss="soft_l1", max_nfev=40)

@@ -80,6 +80,7 @@ def _loudness(fold: Fold, others: Parts) -> float:
         return 1.0
 
     def scale(part: FitPart) -> float:
+        """Mean ratio of the variance in a part to that of the noise, 1 without a sample."""
         _, e = _standardized(model, part.innovations(model))
         scales = recent_scale(e, np.ones(len(e), dtype=bool), model.rate_hz)
         return float(scales.mean()) if len(scales) else 1.0

@@ -137,9 +137,11 @@ def whiten_flights(flights: Sequence[Samples], vehicle: Vehicle) -> list[Samples
 
     def stacked(flights: Sequence[Samples]) -> tuple[Floats, Floats]:
         # the commands get as many lags as the rates, not as many as they have at most: the results rest on it
+        """Regressors and rates of flights, of the largest order of the rates."""
         return orders.stack_data(orders.fit_parts(flights), vehicle, *[max(orders.RATE_LAGS)] * 2)[:2]
 
     def own_residual(flight: Samples, ma: tuple[float, ...]) -> Floats:
+        """Residual (n, 3) of the fit to one flight, whitened by a moving average."""
         Z, y = stacked([whiten_samples(flight, ma)])
         if len(y) < 2:
             known = f"{len(y)} samples known to be healthy"

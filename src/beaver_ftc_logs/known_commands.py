@@ -73,10 +73,10 @@ _PX4_ROTARY_WINGS = {2: "quadrotor", 3: "coaxial helicopter", 4: "helicopter", 1
 _PX4_VTOL_TYPES = range(19, 26)
 # SYS_AUTOSTART of multicopters [PX4, airframes reference].
 _PX4_COPTERS = range(4000, 13000)
+# Parameters of ArduCopter, of any release, and one of ArduPlane, which ArduCopter has not.
 _COPTER_PARAMETERS = ("MOT_SPIN_ARM", "MOT_SPIN_ARMED", "MOT_SPIN_MIN", "MOT_THST_EXPO")
-# Parameters of ArduCopter, of any release; one of ArduPlane, which ArduCopter has not.
 _PLANE_PARAMETER = "Q_ENABLE"
-_MIN_ROTORS = 3
+_MIN_ROTORS = 3  # columns of motors, of a vehicle without servos
 
 
 def multicopter_reason(params: Parameters, names: Collection[str]) -> str | None:

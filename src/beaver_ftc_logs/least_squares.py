@@ -18,7 +18,7 @@ from beaver_ftc_logs.runs import runs_between
 
 # Least eigenvalue of X' X that counts, over the largest, or over the number of samples.
 EIGENVALUE_FLOOR = 1e-10
-_RANK_TOLERANCE = 1e-12
+_RANK_TOLERANCE = 1e-12  # of a column or an eigenvalue, over the largest: a smaller one is rounding
 # Median of the chi-squared law with three degrees of freedom.
 _MEDIAN_CHI2 = 2.366
 

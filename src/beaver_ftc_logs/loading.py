@@ -39,6 +39,7 @@ def read_vehicle_parts(path: Path, vehicle: Vehicle, reader: str | None = None) 
 def _read_vehicle_log(
     path: Path, vehicle: Vehicle, reader: str | None, in_parts: bool
 ) -> Iterator[RecordedFlight]:
+    """A log with the columns of a vehicle file, a long table in parts."""
     time = (vehicle.time.column, vehicle.time.unit) if vehicle.time else None
     return read_parts(path, reader or vehicle.reader, time, vehicle.column_names(), in_parts)
 

@@ -33,7 +33,7 @@ LABEL_MARGIN_S = 1.5
 MIN_LABEL_S = 3.0
 RATE_LAGS = (1, 2, 3, 4)
 COMMAND_LAGS = (2, 3, 4, 6)
-_NEWEY_WEST_S = 2.0
+_NEWEY_WEST_S = 2.0  # over which residuals may be correlated
 _MIN_RATE_SD = 1e-6
 _FAILURE_MARGIN_S = 1.0
 # Samples of the AR predictor in the noise model of a flight: chosen on seeds 11 and 12, in light turbulence,
@@ -42,7 +42,8 @@ AR_ORDER = 20
 # Share of the samples of the fit whose responses count as usual.
 _USUAL_SHARE = 0.9
 RANK_TOLERANCE = 1e-9
-# Variances of the noise in a sample: a fiftieth of the cap is half a standard deviation.
+# Powers of a group's effect, in variances of the noise in a sample: a smaller one is no motion; a larger one
+# counts as the cap, a fiftieth of which is half a standard deviation.
 _MIN_EFFECT_POWER = 1e-6
 _EFFECT_POWER_CAP = 12.5
 # A gain that is known no better than to a third is not known to be there.

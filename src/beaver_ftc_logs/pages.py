@@ -128,6 +128,7 @@ def label_axis(axis: Any, label: str, **grid_options: Any) -> None:
 
 
 def _draw_lines(axis: Any, t_s: np.ndarray, values: np.ndarray, names: list[str], y_label: str) -> None:
+    """A line for each column of values (n, k), at most _PLOTTED_POINTS points of it."""
     shown = slice(None, None, max(len(t_s) // _PLOTTED_POINTS, 1))
     for i, name in enumerate(names):
         axis.plot(t_s[shown], values[shown, i], color=SERIES[i % len(SERIES)], linewidth=0.7, label=name)
@@ -136,6 +137,7 @@ def _draw_lines(axis: Any, t_s: np.ndarray, values: np.ndarray, names: list[str]
 
 
 def _draw_effectiveness(axis: Any, rows: LogRows, s: int, label: str) -> None:
+    """The effectiveness of surface s, and its bounds as an area with this label."""
     shown = slice(None, None, max(len(rows.t_s) // _PLOTTED_POINTS, 1))
     axis.fill_between(
         rows.t_s[shown], rows.effectiveness_low[shown, s],

@@ -292,6 +292,7 @@ def _guess_rate_unit(
 
 
 def _column_entry(name: str, unit: str, si_unit: str) -> Any:
+    """A column as the vehicle file names it."""
     return name if unit == si_unit else {"column": name, "unit": unit}
 
 
@@ -307,6 +308,7 @@ def _pulse_entry(name: str, values: Floats) -> Any:
 
 
 def _plain_name(name: str) -> str:
+    """A name with the signs that a name in the vehicle file may have."""
     return re.sub(r"[^A-Za-z0-9_-]+", "_", name).strip("_")[:100] or "log"
 
 

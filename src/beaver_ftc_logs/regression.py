@@ -32,10 +32,9 @@ from beaver_ftc_logs.samples import Samples, mixer_matrix, whiten_samples
 from beaver_ftc_logs.vehicle import Vehicle
 
 _PARALLEL_TOLERANCE = 1e-9
-# Parts of a flight, and their rows at least; standard errors.
-_N_PARTS = 4
+_N_PARTS = 4  # of a flight
 _MIN_PART_ROWS = 60
-BOUND_MARGIN = 4.0
+BOUND_MARGIN = 4.0  # standard errors from a gain to its bounds
 # A response is quick if it differs from its mean over so many seconds.
 _QUICK_SPAN_S = 0.5
 

@@ -54,6 +54,7 @@ def files() -> dict[str, str]:
 
 
 def _table_text(duration_s: float, seed: int, weak_from_s: float = inf) -> str:
+    """A table as CSV, with the units in its head."""
     header = "time_ms,gyro_x,gyro_y,gyro_z,roll_cmd,pitch_cmd,roll_rad,pitch_rad"
     rows = _simulate_rows(duration_s, np.random.default_rng(seed), weak_from_s)
     return "\n".join([header, *(",".join(f"{cell:.7g}" for cell in row) for row in rows)]) + "\n"

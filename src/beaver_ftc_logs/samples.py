@@ -119,9 +119,11 @@ def resample(log: RecordedFlight, vehicle: Vehicle) -> Samples:
         values[name] = np.where(is_stale, np.nan, values[name])
 
     def stacked_columns(names: list[str]) -> Floats:
+        """Columns side by side, (n, columns)."""
         return np.column_stack([values[name] for name in names]) if names else np.empty((len(t_s), 0))
 
     def sampled(quantity: QuantityColumn | None) -> Floats:
+        """A quantity at the samples, (n,); nan where it is not named or not logged."""
         column = log.columns.get(quantity.column) if quantity else None
         return sample_column(column, t_s, step_s)[0] if column else np.full(len(t_s), np.nan)
 

@@ -48,6 +48,7 @@ def compute_fitted_ranges(parts: Parts, tied: Floats, gain_sd: Floats) -> Fitted
     """
 
     def usable(name: str) -> Floats:
+        """A field of the samples that the fit used, of all parts."""
         return np.concatenate([getattr(part.samples, name)[part.is_usable] for part in parts])
 
     airspeeds = usable("airspeed")

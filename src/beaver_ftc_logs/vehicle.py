@@ -64,9 +64,9 @@ class QuantityColumn(Section):
 
     @model_validator(mode="after")
     def _check_scale_not_zero(self) -> "QuantityColumn":
-        refuse(
-            [(("scale",), "0 leaves nothing of the column, allowed: any other number")] * (self.scale == 0)
-        )
+        """Refuse a scale that makes every number the same."""
+        if self.scale == 0:
+            refuse([(("scale",), "0 leaves nothing of the column, allowed: any other number")])
         return self
 
     @model_serializer(mode="wrap")

@@ -82,6 +82,7 @@ def likelihood_shares(diagnosis: DiagnosisReadout, surfaces: Sequence[str]) -> d
 
 
 def _share_column(of: StatisticalHypothesis, surfaces: Sequence[str]) -> str:
+    """The log's column of a hypothesis."""
     name = f"{AXES[of.axis]}_step" if of.hypothesis_kind == STEP else f"{surfaces[of.surface]}_loss"
     return f"{name}_likelihood_share"
 

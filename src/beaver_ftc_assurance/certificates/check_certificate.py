@@ -726,16 +726,7 @@ def course_pairs(said, frames):
     effect = effect_of_fault(said["what"], frames)
     comparison, stop = course_of(said["what"], frames.log) or ("", 0)
     require(comparison, "this is no type with a course")
-    low: dict = {}
-    high: dict = {}
-    signs = set()
-    for bound in said["bounds"]:
-        for place, k in enumerate(range(bound["first"], bound["frame"] + 1)):
-            theta, command, sign = position_bound(bound, place, k, frames, effect)
-            signs.add(sign)
-            (low if bound["Z"][place] > 0 else high)[k] = theta, command
-    require(len(signs) == 1, "a surface deflects one way")
-    (sign,) = signs
+    low, high, sign = bounds_by_frame(said, frames, effect)
     require(
         low and sorted(low) == list(range(min(low), max(low) + 1)), "the frames do not follow one another"
     )
@@ -747,6 +738,21 @@ def course_pairs(said, frames):
     travel = sorted((sign * effect.theta_low, sign * effect.theta_high))
     course = Course(min(low), max(low), lower, command, upper_frame, upper, upper_command, travel)
     return COMPARISONS[comparison](said, course, frames)
+
+
+def bounds_by_frame(said, frames, effect):
+    """Position and command (theta, u) by frame that bounds theta from below, and from above, and the sign by
+    which all of them are turned."""
+    low: dict = {}
+    high: dict = {}
+    signs = set()
+    for bound in said["bounds"]:
+        for place, k in enumerate(range(bound["first"], bound["frame"] + 1)):
+            theta, command, sign = position_bound(bound, place, k, frames, effect)
+            signs.add(sign)
+            (low if bound["Z"][place] > 0 else high)[k] = theta, command
+    require(len(signs) == 1, "a surface deflects one way")
+    return low, high, signs.pop()
 
 
 def offset_pairs(said, course, frames):

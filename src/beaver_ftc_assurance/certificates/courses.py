@@ -248,7 +248,12 @@ def _surface_bounds(
     sign: int,
 ) -> SurfaceBounds:
     """The bounds of the frames from the alarm on in which the diagnosis has tested types. held: hypothesis by
-    which a frame bounds the position."""
+    which a frame bounds the position: theta is the position p, so that its offset is -G u and its slope G,
+    and the command u = -offset / slope.
+
+    reach (n, 2): least and greatest position of a healthy surface in each frame; orders (n, 3): orders to the
+    surface, of which a frame of one instant has the last alone.
+    """
     frames = np.arange(alarm_frame, tape.end - 1)
     several = not history.has_single_instants
     diagnosis = tape.last.diagnosis

@@ -172,6 +172,7 @@ def _levels(bar: OfSweep, but: str = "type") -> SweepExpect:
     """The conditions of a bar, without the key `but` at any level."""
 
     def less(said: Any) -> Any:
+        """The same without the keys, at any level."""
         if not isinstance(said, dict):
             return said
         return {key: less(value) for key, value in said.items() if key not in ("type", but)}

@@ -32,6 +32,7 @@ def as_pdf(title: str, parts: Sequence[Part], foot: str) -> bytes:
     )  # fmt: skip
 
     def below(canvas: Any, _: Any) -> None:
+        """Draw the foot of a page."""
         canvas.setFont("Body", 7)
         canvas.drawString(MARGIN_PT, FOOT_PT, foot)
         canvas.drawRightString(A4[0] - MARGIN_PT, FOOT_PT, str(canvas.getPageNumber()))
@@ -42,6 +43,7 @@ def as_pdf(title: str, parts: Sequence[Part], foot: str) -> bytes:
 
 @cache
 def _register() -> None:
+    """Register the fonts, once."""
     import matplotlib
     from reportlab.pdfbase import pdfmetrics
     from reportlab.pdfbase.ttfonts import TTFont
@@ -106,6 +108,7 @@ def _table(table: Table, width: float) -> Any:
 
 
 def _cell(cell: str, size: float, table: Table) -> Any:
+    """A cell of a table; a verdict in its colour, with a mark."""
     if cell not in table.verdicts:
         return _text(cell, size, before=0)
     good = table.verdicts[cell]

@@ -69,6 +69,7 @@ class Requirement(Section):
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
+        """Refuse a requirement with none or several of the three kinds."""
         given = [key for key in ("expect", "formula", "bar") if getattr(self, key) is not None]
         if len(given) != 1:
             said = " and ".join(given) or "nothing that can be judged"

@@ -49,16 +49,19 @@ def run_plan(
 
 
 def _html(document: Document) -> str:
+    """The document as a page."""
     return as_html(_title(document), list(page(document)), {})
 
 
 def _pdf(document: Document) -> bytes:
+    """The same as PDF."""
     from beaver_ftc_assurance.evidence.paper import as_pdf
 
     return as_pdf(_title(document), list(page(document)), f"{document['plan']} · {document['date']}")
 
 
 def _title(document: Document) -> str:
+    """The title of both."""
     return f"Evidence: {document['plan']}"
 
 
@@ -117,6 +120,7 @@ def _summary(requirements: list[Document]) -> Table:
 
 
 def _short(text: str) -> str:
+    """A text, cut to MOST_LETTERS."""
     return text if len(text) <= MOST_LETTERS else f"{text[: MOST_LETTERS - 3]}..."
 
 
@@ -166,6 +170,7 @@ def _requirement(each: Document) -> Iterator[Part]:
 
 
 def _asked(asked: Document) -> str:
+    """What a requirement asks for: a formula, a bar or expectations, in words."""
     if "formula" in asked:
         return str(asked["formula"])
     if "bar" in asked:

@@ -15,9 +15,8 @@ from beaver_ftc_logs.recording import Column, Floats, RecordedFlight, TimeSource
 ROWS_PER_PART = 100_000
 # Samples of a part of another long log, 67 min at 100 Hz: `diagnose` needs 1 GB for a part of 480,000.
 SAMPLES_PER_PART = 400_000
-# So many times the rows of a part has the last at most; their share with which the next begins once more.
-LAST_PART_FACTOR = 1.2
-PART_OVERLAP_SHARE = 0.1
+LAST_PART_FACTOR = 1.2  # so many times the rows of a part has the last at most
+PART_OVERLAP_SHARE = 0.1  # of the rows of a part, with which the next begins once more
 
 
 @dataclass(frozen=True)
@@ -120,6 +119,7 @@ def split_long_recording(log: RecordedFlight, stamps: Floats, ratio: float) -> I
 
 
 def _select_period(column: Column, begin_s: float, end_s: float) -> Column:
+    """The rows of a column in a period, s, and the last one before it."""
     first = max(int(np.searchsorted(column.t_s, begin_s, side="right")) - 1, 0)
     end_row = int(np.searchsorted(column.t_s, end_s, side="right"))
     return Column(column.t_s[first:end_row], column.values[first:end_row], column.note)

@@ -106,6 +106,7 @@ def _add_airspeed_from_wind(columns: Columns) -> None:
     stamps = columns[names[0]].t_s
 
     def held(name: str) -> Floats:
+        """The last value of a component, m/s, at each stamp."""
         column = columns[f"{name}_m_s"]
         return latest_values(stamps, column.t_s, column.values)
 

@@ -134,5 +134,6 @@ def _text_messages(data: mmap) -> Iterator[tuple[Any, array]]:
 
 
 def _line(data: mmap, at: int) -> str:
+    """The line of a log as text that begins at a place."""
     end = data.find(b"\n", at)
     return data[at : end if end >= 0 else len(data)].rstrip().decode()

@@ -82,6 +82,7 @@ def _load_data_set(path: Path) -> DataSet | None:
 
 
 def _read_data_set(name: str, vehicle: Vehicle, paths: list[Path]) -> DataSet:
+    """The data set of some logs."""
     recordings = tuple(read_vehicle_columns(path, vehicle) for path in paths)
     return DataSet(name, vehicle, recordings, tuple(resample(log, vehicle) for log in recordings))
 
@@ -140,6 +141,7 @@ def settings_of_single(usable: list[FitPart], data: DataSet) -> FilterSettings |
 
 
 def _score_against_log(held_out: FitPart, rows: LogRows, model: Model) -> Document:
+    """The scores by the labels of a log or, without labels, by its failures."""
     if np.isfinite(held_out.samples.labels).any():
         return scoring.score_against_labels(rows, labels_in_span(held_out))
     return scoring.score_against_failures(rows, held_out.samples.logged_failures, model.groups)

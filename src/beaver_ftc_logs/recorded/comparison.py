@@ -89,8 +89,8 @@ def _soon_text(row: Document) -> str:
     return " of ".join(str(sum(delay[key] for delay in delays)) for key in ("within_5_s", "failures"))
 
 
-LABEL_COLUMNS = {"method": _METHOD} | {title: _share(key) for key, title in LABEL_TITLES.items()}
 # Tables of methods: the head of each column, and its cell of a method's row.
+LABEL_COLUMNS = {"method": _METHOD} | {title: _share(key) for key, title in LABEL_TITLES.items()}
 FAILURE_COLUMNS = {
     "method": _METHOD,
     "precision": _share("precision"),

@@ -106,6 +106,11 @@ def _relative_motion(values: Floats, fitted: Sequence[Sequence[float]]) -> Float
     return spans[0] / np.maximum(spans[1], MIN_DIVISOR)
 
 
+# By the kind of a mistake (_COMMAND_MISTAKES) and the group: the motion of the command over that in the
+# flights of the model, and its gain.
+CommandMistakes = dict[tuple[str, str], tuple[float, float]]
+
+
 class Answers(NamedTuple):
     """The response to the commands in each of four parts of a flight.
 
@@ -137,26 +142,34 @@ def answers(samples: Samples, model: Model, most: int | None = None) -> Answers 
 def refuse_columns(samples: Samples, model: Model) -> None:
     """Raise BadInput if tests 2 or 3 find a mistake in the columns of a flight.
 
-    A law's response to gusts or to gyro noise can look like a command with the opposite effect. A mistake
-    therefore counts only if test 2 finds it with each likelier moving average of the noise, too. A model
-    that knows the effect of no surface refuses no flight.
+    A model that knows the effect of no surface refuses no flight.
     """
     if not any(known_effects(model)):
         return
     flight, likeliest = _whiten_likeliest(samples, model)
-    if (found := answers(flight, likeliest)) is None:
+    measured = answers(flight, likeliest)
+    if measured is None:
         return
-    mistakes = _command_mistakes(samples, model, found)
-    for ma in NOISE_MA_CANDIDATES if mistakes else ():
-        likelier = answers(whiten_samples(samples, ma), model)
-        if likelier is not None and likelier.likelihood.mean() > found.likelihood.mean():
-            again = _command_mistakes(samples, model, likelier)
-            mistakes = {key: sizes for key, sizes in mistakes.items() if key in again}
+    mistakes = _lasting_mistakes(samples, model, measured)
     texts = (_COMMAND_MISTAKES[kind].format(group, *sizes) for (kind, group), sizes in mistakes.items())
     text = next(texts, None) or _likelier_mistake(flight, likeliest)
     if text is not None:
         allowed = "allowed: columns, signs and units as in the flights of the model"
         raise BadInput(f"{samples.name}: {text}, {allowed}")
+
+
+def _lasting_mistakes(samples: Samples, model: Model, measured: Answers) -> CommandMistakes:
+    """Those of `_command_mistakes` that are found with each likelier moving average of the noise, too: a
+    law's response to gusts or to gyro noise can look like a command with the opposite effect."""
+    mistakes = _command_mistakes(samples, model, measured)
+    if not mistakes:
+        return mistakes
+    for ma in NOISE_MA_CANDIDATES:
+        likelier = answers(whiten_samples(samples, ma), model)
+        if likelier is not None and likelier.likelihood.mean() > measured.likelihood.mean():
+            again = _command_mistakes(samples, model, likelier)
+            mistakes = {key: sizes for key, sizes in mistakes.items() if key in again}
+    return mistakes
 
 
 def _whiten_likeliest(samples: Samples, model: Model) -> tuple[Samples, Model]:
@@ -176,11 +189,8 @@ def find_reversed(samples: Samples, model: Model) -> list[list[str]]:
     return list(compress(model.groups, is_reversed))
 
 
-def _command_mistakes(
-    samples: Samples, model: Model, found: Answers
-) -> dict[tuple[str, str], tuple[float, float]]:
-    """The commands with the wrong sign or in another unit: by the kind of the mistake and the group, the
-    motion of the command over that in the flights of the model, and its gain."""
+def _command_mistakes(samples: Samples, model: Model, found: Answers) -> CommandMistakes:
+    """The commands with the wrong sign or in another unit."""
     mistakes = {}
     surfaces = list(model.vehicle.surfaces)
     fitted = model.fitted.commands

@@ -174,7 +174,12 @@ class StateModel(NamedTuple):
 
 def build_states(model: Model, noise: NoiseModel) -> StateModel:
     """The prior and the limits of trim and gains, from a model's settings: mean x (N,), covariance P (N, N),
-    retention a (N,) = exp(-1 / (rate return_s)) a sample, and walk (N,) = (1 - a^2) diag(P)."""
+    retention a (N,) = exp(-1 / (rate return_s)) a sample, and walk (N,) = (1 - a^2) diag(P).
+
+    States 0 to 2 are the trim, 3 the common gain, 4 to 3 + n the own gains of the n groups. r (3,): variance
+    of the noise, (rad/s)2; shift (n, 3): trim by a shift of each group's command, rad/s; drift, hidden (n,):
+    variance of an own gain that returns in time, and of what the fit misreads.
+    """
     settings = model.settings
     n = len(model.groups)
     r = noise.wider * np.diag(np.array(noise.noise))

@@ -24,6 +24,7 @@ NOT_SHOWN = "not shown"
 WORST_FIRST = NOT_MET, NOT_SHOWN, MET
 BANDS = 3  # equal bands of airspeed over the envelope
 ALTITUDES_M = (1000.0, 2000.0)  # limits between the altitude bands
+# Columns that are kept of every flight.
 _ALWAYS_WATCHED = ("t_s", "airspeed_mps", "altitude_m", "envelope_valid")
 
 

@@ -9,8 +9,8 @@ from xml.sax.saxutils import escape
 
 from beaver_ftc.studies.present import Heading, Part, Table
 
-MARGIN_PT = 45
-FOOT_PT = 24
+MARGIN_PT = 45  # of a page
+FOOT_PT = 24  # from the edge of a page to its foot
 MOST_OF_HEAD = 9  # letters of a column's head that are kept together
 MOST_TOGETHER = 20  # rows of a table that is kept on one page
 MET_COLOUR = "#00614a"

@@ -35,7 +35,7 @@ from beaver_ftc_assurance.certificates.tape import Recorder, Tape, tape_of_fligh
 
 FILE = "separation.json"
 FLOWN = "flown"
-LARGEST_RATE_DEG_S = 20.0
+LARGEST_RATE_DEG_S = 20.0  # that a doublet may reach
 HELD_DEG = 1e-9  # by less no surface is moved
 
 

@@ -18,12 +18,12 @@ from beaver_ftc_logs.samples import Samples, convert_to_si, named_angles, resamp
 from beaver_ftc_logs.time_base import sample_column
 from beaver_ftc_logs.vehicle import Vehicle
 
-_MAX_HZ = 1000.0
-_MIN_HZ = 20.0
-_STEP_JITTER = 0.1
-_MIN_SAMPLES = 50
-_DENSITIES_KG_M3 = (0.2, 1.6)
-_STOP_RATIO = 1.1
+_MAX_HZ = 1000.0  # of a log
+_MIN_HZ = 20.0  # a slower frame is too long for the aircraft's model
+_STEP_JITTER = 0.1  # of a step: the samples are not evenly spaced beyond it
+_MIN_SAMPLES = 50  # of a stretch
+_DENSITIES_KG_M3 = (0.2, 1.6)  # of air, at any height: others show another unit
+_STOP_RATIO = 1.1  # a command that exceeds its stop by more is in another unit
 _ATTITUDE_ANGLE_NAMES = ("roll", "pitch", "yaw")
 # The aircraft whose flights are diagnosed, and the errors declared for it: arguments of `Diagnosis`.
 DiagnosedAircraft = tuple[Aircraft, Document]

@@ -29,7 +29,7 @@ HEALTHY, GROUP_LOSS, PAIR_LOSS, UNKNOWN_OFFSET, NO_RESPONSE = range(5)
 _PAIR_SHARE = 0.02
 _OFFSET_SHARE = 0.05
 _SILENT_SHARE = 0.02
-_PAIR_LEVELS = (0.25, 0.5, 0.75)
+_PAIR_LEVELS = (0.25, 0.5, 0.75)  # a coarse grid, for the time of `diagnose`
 # Probabilities before the flight.
 _PRIOR_HEALTHY = 0.7
 _PRIOR_NO_RESPONSE = 0.2

@@ -25,7 +25,7 @@ from beaver_ftc_logs.recording import Floats, Mask, Reasons, RecordedFlight
 from beaver_ftc_logs.stepped import Replayed, error_sections, named_since, replay_samples, rows_of_replay
 from beaver_ftc_logs.vehicle import Vehicle
 
-_START_WINDOW_S = 1.0
+_START_WINDOW_S = 1.0  # of a stretch: an alarm in it that no fault explains is none of a fault
 
 
 def load_diagnosed(aircraft_name: str, scenario: str | None = None) -> DiagnosedAircraft:

@@ -32,16 +32,16 @@ _SHAPE_SD = 0.2
 _SHAPE_GRID = np.linspace(-0.5, 0.5, 41)
 # Grid of the scale over the mean excess.
 _SCALE_RATIOS = np.geomspace(0.2, 5.0, 61)
-_RATE_QUANTILES = (np.arange(40) + 0.5) / 40.0
+_RATE_QUANTILES = (np.arange(40) + 0.5) / 40.0  # probabilities
 _MIN_PEAKS = 10
 # Peaks over the level: _PEAKS_PER_ROOT times the root of the number of all peaks, at least _MIN_PEAKS.
 _PEAKS_PER_ROOT = 2.0
-_INTERVAL = (0.05, 0.95)
+_INTERVAL = (0.05, 0.95)  # probabilities of the bounds of the rate
 # Chance that the declared rate itself raises more alarms in the held-out flights than are permitted.
 _MORE_ALARMS_CHANCE = 0.05
 # -ln 0.05: with no alarm in so many of the hours asked for one, the rate is shown without a tail.
 RULED_OUT_COUNT = 3.0
-_MAX_EXCESS = 1e4
+_MAX_EXCESS = 1e4  # end of the search, natural logarithm of odds
 # Of a sum of probabilities: a quantile between two rates must not hang on its last digits.
 _PROBABILITY_ROUNDING = 1e-9
 

@@ -43,11 +43,11 @@ from beaver_ftc_logs.regression import Innovations, by_noise, innovations
 from beaver_ftc_logs.runs import trailing_sums
 from beaver_ftc_logs.samples import Samples
 
-_EVIDENCE_MEMORY_S = 600.0
-_MIN_PROBABILITY = 1e-15
+_EVIDENCE_MEMORY_S = 600.0  # in which delays and noise models are compared
+_MIN_PROBABILITY = 1e-15  # rounding of a sum of probabilities
 _MIN_NOISE_SCALE = 0.3
 _MAX_NOISE_SCALE = 6.0
-_SQUARE_CLIP = 3.0
+_SQUARE_CLIP = 3.0  # of d2 per axis, for the running scale
 _SUM_SPANS_S = (0.0, 0.1)  # over which a residual is summed
 _VARIANCE_WINDOW_S = 2.0  # in which the variance of the sums is taken
 # Mean of the clipped square of a residual per axis when the scale is right.

@@ -24,9 +24,9 @@ from beaver_ftc_logs.regression import innovations
 from beaver_ftc_logs.runs import Runs, constant_stretches
 from beaver_ftc_logs.samples import Samples
 
-MAX_BRIEF_EVENT_S = 3.0
-DETECTION_HORIZONS_S = (5.0, 20.0, 60.0)
-_ALIKE_COSINE = 0.9
+MAX_BRIEF_EVENT_S = 3.0  # a shorter alarm is brief
+DETECTION_HORIZONS_S = (5.0, 20.0, 60.0)  # by which the smallest loss is stated
+_ALIKE_COSINE = 0.9  # of two effects: above it they are not separable
 # Share of credible rows below which there is no verdict.
 MIN_CREDIBLE_SHARE = 0.1
 _ONE_GROUP_NOTE = (

@@ -16,7 +16,7 @@ from beaver_ftc_logs.orders import fit_of, group_gain_sd, one_step_innovations, 
 from beaver_ftc_logs.recording import MIN_DIVISOR
 from beaver_ftc_logs.regression import FitPart, Parts
 
-_MAX_SPLITS = 12
+_MAX_SPLITS = 12  # for the time of `identify`
 
 
 class Fold(NamedTuple):

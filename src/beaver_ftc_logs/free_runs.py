@@ -7,10 +7,10 @@ from beaver_ftc_logs import regression
 from beaver_ftc_logs.recording import Floats
 from beaver_ftc_logs.regression import Groups, Parts
 
-_WINDOW_S = 2.0
-_MIN_WINDOWS = 20
-_MAX_WINDOWS = 400
-_MAX_DELAY_S = 0.6
+_WINDOW_S = 2.0  # of a free run
+_MIN_WINDOWS = 20  # with fewer nothing is fitted
+_MAX_WINDOWS = 400  # of more, so many are spread over the flights
+_MAX_DELAY_S = 0.6  # of the search, as the limits of the lag
 _MIN_SERVO_LAG_S = 0.005
 _MAX_SERVO_LAG_S = 1.0
 

@@ -20,7 +20,7 @@ from beaver_ftc_logs.regression import Parts, regressor_names
 from beaver_ftc_logs.samples import Samples
 
 PAGE_MARK = '<meta name="generator" content="beaver-ftc identify">'
-_FIGURE_SPAN_S = 40.0
+_FIGURE_SPAN_S = 40.0  # of a flight that is drawn
 _MAX_SHOWN_FLIGHTS = 3
 
 

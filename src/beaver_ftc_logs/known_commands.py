@@ -101,7 +101,7 @@ def multicopter_reason(params: Parameters, names: Collection[str]) -> str | None
 
 
 VTOL_MODE = "vehicle_status.vehicle_type"
-_ON_ITS_WING = 2.0
+_ON_ITS_WING = 2.0  # value of VTOL_MODE
 
 
 def hovers_throughout(params: Parameters, columns: Columns) -> bool:

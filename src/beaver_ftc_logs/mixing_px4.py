@@ -31,7 +31,7 @@ _SURFACES = {
 # Parameter of the function of an output: driver, number.
 _OUTPUT_PATTERN = r"(PWM_MAIN|PWM_AUX)_FUNC(\d{1,2})"
 _MAX_TORQUE = 1000.0  # of CA_SV_CSn_TRQ_R, _P and _Y, in the unit of the log
-_MAX_SURFACES = 8
+_MAX_SURFACES = 8  # CA_SV_CS_COUNT
 _FIRST_SERVO = 201  # the function of an output that moves surface 0
 _FIXED_WING = 1  # CA_AIRFRAME
 _AXIS_COLUMNS = tuple(f"vehicle_torque_setpoint.xyz[{i}]" for i in range(3))

@@ -31,17 +31,17 @@ from beaver_ftc_logs.vehicle import Vehicle
 LABEL_MARGIN_S = 1.5
 # A label that holds for less is the edge of another.
 MIN_LABEL_S = 3.0
-RATE_LAGS = (1, 2, 3, 4)
+RATE_LAGS = (1, 2, 3, 4)  # h and L that are tried
 COMMAND_LAGS = (2, 3, 4, 6)
 _NEWEY_WEST_S = 2.0  # over which residuals may be correlated
-_MIN_RATE_SD = 1e-6
-_FAILURE_MARGIN_S = 1.0
+_MIN_RATE_SD = 1e-6  # rad/s, less than any gyro resolves
+_FAILURE_MARGIN_S = 1.0  # before a logged failure, that is not fitted
 # Samples of the AR predictor in the noise model of a flight: chosen on seeds 11 and 12, in light turbulence,
 # and for the evidence that a name needs on seed 11 of a pa28.
 AR_ORDER = 20
 # Share of the samples of the fit whose responses count as usual.
 _USUAL_SHARE = 0.9
-RANK_TOLERANCE = 1e-9
+RANK_TOLERANCE = 1e-9  # of an eigenvalue over the largest: a smaller one is rounding
 # Powers of a group's effect, in variances of the noise in a sample: a smaller one is no motion; a larger one
 # counts as the cap, a fiftieth of which is half a standard deviation.
 _MIN_EFFECT_POWER = 1e-6

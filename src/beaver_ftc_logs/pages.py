@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from jinja2 import Template
 
 _TEMPLATE_FOLDER = Path(__file__).parent / "templates"
-_PLOTTED_POINTS = 6000
+_PLOTTED_POINTS = 6000  # of a line, at most twice as many
 
 
 @cache
@@ -128,7 +128,7 @@ def label_axis(axis: Any, label: str, **grid_options: Any) -> None:
 
 
 def _draw_lines(axis: Any, t_s: np.ndarray, values: np.ndarray, names: list[str], y_label: str) -> None:
-    """A line for each column of values (n, k), at most _PLOTTED_POINTS points of it."""
+    """A line for each column of values (n, k), of about _PLOTTED_POINTS points."""
     shown = slice(None, None, max(len(t_s) // _PLOTTED_POINTS, 1))
     for i, name in enumerate(names):
         axis.plot(t_s[shown], values[shown, i], color=SERIES[i % len(SERIES)], linewidth=0.7, label=name)

@@ -88,12 +88,12 @@ _DERIVED_NAME = (
 )
 _ANGLE_RATE_NAME = r"rate|speed|accel|veloc|dot|_(deg|rad)_?s(ec)?$"
 _UNIT_OF_PART = {"rad_s": "rad/s", "rad/s": "rad/s", "deg_s": "deg/s", "deg/s": "deg/s", "dps": "deg/s"}
-_PWM_RANGE_US = (700.0, 2300.0)
-_LARGEST_RAD_S = 12.0
-_MIN_CORRELATION = 0.7
-_MAX_COMMANDS = 8
-_MAX_READ_COLUMNS = 60
-_LOG_STEPS_S = (1.0 / 2000.0, 1.0 / 4.0)
+_PWM_RANGE_US = (700.0, 2300.0)  # a command whose median is between these is a pulse
+_LARGEST_RAD_S = 12.0  # larger rates are in deg/s
+_MIN_CORRELATION = 0.7  # of a rate and its angle that belong together
+_MAX_COMMANDS = 8  # that are proposed
+_MAX_READ_COLUMNS = 60  # of a log
+_LOG_STEPS_S = (1.0 / 2000.0, 1.0 / 4.0)  # shortest and longest usual step of a log
 
 
 class NoVehicleError(Exception):

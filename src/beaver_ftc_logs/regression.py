@@ -31,7 +31,7 @@ from beaver_ftc_logs.runs import runs_between, trailing_sums
 from beaver_ftc_logs.samples import Samples, mixer_matrix, whiten_samples
 from beaver_ftc_logs.vehicle import Vehicle
 
-_PARALLEL_TOLERANCE = 1e-9
+_PARALLEL_TOLERANCE = 1e-9  # of the squared cosine of two rows of the mixer: rounding
 _N_PARTS = 4  # of a flight
 _MIN_PART_ROWS = 60
 BOUND_MARGIN = 4.0  # standard errors from a gain to its bounds

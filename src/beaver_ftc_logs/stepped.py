@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from beaver_ftc.scenario import Scenario
 
 LOSS_FAULT_TYPE = "loss_of_effectiveness"
-BOUND_WINDOW_S = 1.0
+BOUND_WINDOW_S = 1.0  # for which the effectiveness is taken as constant
 _LOSS_TOLERANCE = 1e-9  # of theta: rounding must not empty an intersection of sets that touch
 _TOLERANCE_RAD_S2 = 1e-12  # of |nu - theta Z|: rounding must not exclude a theta on its bound
 # As how many white samples one sample counts in the bounds of the command gains.

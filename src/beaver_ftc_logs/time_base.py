@@ -10,8 +10,8 @@ from beaver_ftc_logs.recording import Column, Floats, Ints, Mask
 from beaver_ftc_logs.runs import last_row_at
 from beaver_ftc_logs.units import TIME_UNITS
 
-MIN_HZ = 4.0
-_MAX_HZ = 1e5
+MIN_HZ = 4.0  # of the rates
+_MAX_HZ = 1e5  # a faster log has another unit of time
 _MIN_ROWS = 50  # of the rates; the first of them give the usual step
 _ALIKE_RATIO = 1.05  # a log that is faster than its largest sample rate by less is not averaged
 # A step of more than this many usual steps is a gap: nothing is predicted across it.

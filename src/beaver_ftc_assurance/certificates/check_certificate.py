@@ -26,7 +26,7 @@ import yaml
 from pyarrow.parquet import read_table
 
 AXES = "pqr"
-FORMAT_VERSION = 5
+FORMAT_VERSION = 5  # of the certificate
 NOISE_LIMIT_SIGMA = 4.0  # noise of a sensor is cut off here
 EARTH_RATE_RAD_S = 2.0 * pi / 86164.0905
 ROUNDING_RAD_S2 = 1e-11  # the part of every bound that covers rounding

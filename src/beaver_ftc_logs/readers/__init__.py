@@ -49,7 +49,7 @@ _WAYS_TO_TABLE = {
     "--types ATTITUDE,SERVO_OUTPUT_RAW FILE > FILE.csv`",
     ".bbl": _BLACKBOX_PHRASE, ".bfl": _BLACKBOX_PHRASE,
 }  # fmt: skip
-_POINTER_BYTES = 200
+_POINTER_BYTES = 200  # of a file, in which a pointer is looked for
 # How pointers begin: the name of the store, and the command that fetches the file.
 _LARGE_FILE_STORES = {
     rb"version https?://(git-lfs|hawser)\.github\.com/spec/": ("Git LFS", "git lfs pull"),

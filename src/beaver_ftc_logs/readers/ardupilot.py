@@ -17,7 +17,7 @@ from beaver_ftc_logs.readers.topics import Topic, columns_of_topics, package_err
 from beaver_ftc_logs.recording import Parameters, RecordedFlight, Wanted, add_parameter
 
 _TIME_FIELD = "TimeUS"
-_INSTANCE_FIELDS = ("I", "C", "Instance")
+_INSTANCE_FIELDS = ("I", "C", "Instance")  # number of an instance, by message
 _IGNORED_MESSAGES = {"FMT", "FMTU", "UNIT", "MULT", "PARM", "MSG"}
 
 

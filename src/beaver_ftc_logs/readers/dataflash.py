@@ -24,7 +24,7 @@ _HEADER = b"\xa3\x95"
 _HEADER_BYTES = 3  # these two and the kind of the message
 _FORMAT_KIND = 0x80  # of the messages that describe a format: its kind, length, name, codes and columns
 _FORMAT_LAYOUT = "<BB4s16s64s"
-_FORMAT_BYTES = 89
+_FORMAT_BYTES = 89  # header and layout
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ _BYTES_PER_NUMBER = 8
 # Largest part of a file that is read at once: 2.8 h at 1000 Hz, and the bytes of its numbers.
 MAX_ROWS = 10_000_000
 _MAX_NUMBER_BYTES = 2_000_000_000
-BATCH_ROWS = 50_000
+BATCH_ROWS = 50_000  # that are read at once
 
 
 class ParquetTable:

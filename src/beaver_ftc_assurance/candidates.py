@@ -1,4 +1,4 @@
-"""Certain to distinguish two faults: the deflections at which they differ by more than the bounds hide.
+"""The faults left at the end of a flight, and the deflections that distinguish two of them for certain.
 
 If the parameter of a fault is constant, the data since the alarm leave an interval for it. At a command u,
 the deflection of its surface then lies in an interval too: stuck [c-, c+], floating 0, a loss [e- u, e+ u], a

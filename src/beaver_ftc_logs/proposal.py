@@ -70,6 +70,7 @@ def _rate_pattern(rate_name: str, angle: str, axis: str, vector_index: int) -> s
     ))  # fmt: skip
 
 
+# By quantity the pattern of its names, in the form of `_snake_case`.
 _NAME_PATTERNS = {
     "p": _rate_pattern("p", "roll", "x", 0),
     "q": _rate_pattern("q", "pitch", "y", 1),
@@ -86,7 +87,9 @@ _DERIVED_NAME = (
     r"innov|test_ratio|varian|timestamp|flag|valid|status|count|setpoint|_sp$|desired|demand|target|bias|"
     r"integ|error|_err$|_offset|cov(ariance)?\b|temp|noise|(_|^)(cmd|command)"
 )
+# Names of rates and accelerations of an angle: none of these is the angle.
 _ANGLE_RATE_NAME = r"rate|speed|accel|veloc|dot|_(deg|rad)_?s(ec)?$"
+# The unit of a rate, by a part of its name.
 _UNIT_OF_PART = {"rad_s": "rad/s", "rad/s": "rad/s", "deg_s": "deg/s", "deg/s": "deg/s", "dps": "deg/s"}
 _PWM_RANGE_US = (700.0, 2300.0)  # a command whose median is between these is a pulse
 _LARGEST_RAD_S = 12.0  # larger rates are in deg/s

@@ -13,7 +13,7 @@ from beaver_ftc.cli import failure_of
 from beaver_ftc.cli import main as command_line
 from beaver_ftc.commands import files_of_commands
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.results.writer import FILES_OF_A_RUN
+from beaver_ftc.results.folder import FILES_OF_A_RUN
 
 
 @pytest.fixture

@@ -9,8 +9,8 @@ import beaver_ftc as bf
 from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.results import writer
 from beaver_ftc.results.flight import Flight as Opened
+from beaver_ftc.results.folder import refuse_foreign, result_folder
 from beaver_ftc.results.metrics import metrics
-from beaver_ftc.results.writer import refuse_foreign, result_folder
 
 
 @pytest.mark.parametrize(

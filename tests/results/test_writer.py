@@ -5,12 +5,12 @@ import sys
 import pytest
 
 from beaver_ftc.documents.errors import SimulationFailed
-from beaver_ftc.results.writer import result_folder
+from beaver_ftc.results.folder import result_folder
 
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from beaver_ftc.results.writer import result_folder
+from beaver_ftc.results.folder import result_folder
 with result_folder(Path(sys.argv[1]), "case") as folder:
     (folder / "log.parquet").write_text("half")
     os.kill(os.getpid(), signal.SIGKILL)

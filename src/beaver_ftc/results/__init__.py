@@ -8,6 +8,7 @@ if TYPE_CHECKING:
     from beaver_ftc.results.expectations import evaluate as evaluate_expectations
     from beaver_ftc.results.expectations import margin as margin_of_expectation
     from beaver_ftc.results.flight import Flight, Proof
+    from beaver_ftc.results.folder import clear_disk_errors, result_folder
     from beaver_ftc.results.log import Columns, Log, MemoryLog, ParquetLog, SpooledLog, StoredLog
     from beaver_ftc.results.metrics import Onset, as_json, faults_of, measure, versions
     from beaver_ftc.results.model import DeclaredFault, Document, Expectation, Judged, Metrics, read_metrics
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from beaver_ftc.results.temporal import Formula, FormulaError
     from beaver_ftc.results.temporal import parse as parse_formula
     from beaver_ftc.results.verdict import verdict_text
-    from beaver_ftc.results.writer import add_report, clear_disk_errors, result_folder
+    from beaver_ftc.results.writer import add_report
     from beaver_ftc.results.writer import run as run_scenario
 else:
     __getattr__, __dir__ = lazily(__name__)

@@ -9,7 +9,8 @@ ULog: https://docs.px4.io/main/en/dev_log/ulog_file_format; dataflash: FMT messa
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from functools import partial
 from math import ceil, cos, degrees, radians
 from pathlib import Path
 
@@ -20,7 +21,7 @@ from beaver_ftc.aircraft import AXES, Aircraft, load
 from beaver_ftc.aircraft.aircraft import EARTH_RADIUS_M
 from beaver_ftc.plant.adapter import START_LATITUDE_DEG
 from beaver_ftc.results import log
-from beaver_ftc.results.model import Metrics
+from beaver_ftc.results.model import Document, Metrics
 from beaver_ftc.results.style import marks
 
 ACMI_RATE_HZ = 25.0  # smooth to look at; a viewer interpolates
@@ -86,6 +87,29 @@ _DYNAMIC_PRESSURE_COLUMN = "qdyn_pa"
 _FLOW_COLUMNS = ("alpha_rad", "beta_rad", _DYNAMIC_PRESSURE_COLUMN)
 _FIRST_STAMP_US = 1_000_000
 """A clock on board does not start with the log."""
+
+
+def exports_of(
+    folder: Path, aircraft: Aircraft, document: Document, kinds: Collection[str], recording: str | None
+) -> dict[str, Callable[[], None]]:
+    """By its name, the function that writes each export of a result folder that has its log.
+
+    document: the metrics, empty if there are none: then there is no ACMI. kinds: of "csv" and "acmi".
+    recording: of RECORDING_FILE_OF_KIND.
+    """
+    log_path = folder / "log.parquet"
+    exports: dict[str, Callable[[], None]] = {}
+    if "csv" in kinds:
+        exports["log.csv"] = partial(write_csv, log_path, folder / "log.csv")
+    if "acmi" in kinds and document:
+        to = folder / "flight.acmi"
+        exports["flight.acmi"] = partial(write_acmi, log_path, Metrics.of(document), to, aircraft)
+    if recording is not None:
+        stops_rad = {s: max(abs(at.min_rad), abs(at.max_rad)) for s, at in aircraft.travel.items()}
+        exports[f"the recording ({recording})"] = partial(
+            write_recording, log_path, stops_rad, recording, folder, tuple(aircraft.signals)
+        )
+    return exports
 
 
 def write_csv(log_path: Path, path: Path) -> None:

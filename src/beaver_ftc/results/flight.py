@@ -187,7 +187,8 @@ class Flight:
         If writing fails, no partial folder remains. Raises BadInput for a flight without a log, and
         SimulationFailed if the folder cannot be written.
         """
-        from beaver_ftc.results.writer import result_folder, write_documents, write_report_files
+        from beaver_ftc.results.folder import result_folder
+        from beaver_ftc.results.writer import write_documents, write_report_files
 
         kept = self._log_or_raise()
         with result_folder(Path(out), self.name) as folder:

@@ -160,9 +160,9 @@ def figure_of(runs: Sequence[Run]) -> "Figure":
 
 def write_runs(out: Path, folders: Sequence[Path]) -> list[Run]:
     """Write `out/runs/` (figure, JSON, report) of finished runs; return what was read of them."""
+    from beaver_ftc.results.folder import result_folder
     from beaver_ftc.results.metrics import as_json
     from beaver_ftc.results.report import write_report
-    from beaver_ftc.results.writer import result_folder
     from beaver_ftc.studies.mismatch.tables import show_in_reports
 
     runs = read_runs(folders)

@@ -18,9 +18,9 @@ from typing import IO, Any, Protocol
 from beaver_ftc.documents.errors import BadInput, SimulationFailed, say_once
 from beaver_ftc.documents.files import data_root, read_json
 from beaver_ftc.plugins import SERVICES, folders
+from beaver_ftc.results.folder import clear_disk_errors, sync
 from beaver_ftc.results.metrics import versions
 from beaver_ftc.results.model import Document
-from beaver_ftc.results.writer import clear_disk_errors, sync
 
 LOCK = ".lock"
 DAMAGED = ".damaged"  # at the end of the name of what was set aside

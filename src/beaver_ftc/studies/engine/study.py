@@ -18,7 +18,7 @@ from typing import Any
 
 from beaver_ftc.documents.errors import SimulationFailed, say_once
 from beaver_ftc.documents.files import Document
-from beaver_ftc.results.writer import clear_disk_errors, result_folder
+from beaver_ftc.results.folder import clear_disk_errors, result_folder
 from beaver_ftc.studies.engine import store
 from beaver_ftc.studies.engine.workers import (
     Batch,

@@ -19,10 +19,11 @@ import yaml
 from beaver_ftc.aircraft import AXES, load
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.loop.loop import fly
+from beaver_ftc.results.folder import result_folder
 from beaver_ftc.results.log import ParquetLog, StoredLog
 from beaver_ftc.results.metrics import as_json, measure
 from beaver_ftc.results.model import Document, Metrics
-from beaver_ftc.results.writer import result_folder, write_documents, write_report_files
+from beaver_ftc.results.writer import write_documents, write_report_files
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.engine.study import Progress, Study
 from beaver_ftc.studies.mismatch import charts

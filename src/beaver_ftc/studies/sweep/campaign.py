@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError, SimulationFailed
 from beaver_ftc.documents.files import read_json
+from beaver_ftc.results.folder import clear_disk_errors
 from beaver_ftc.results.metrics import as_json, versions
 from beaver_ftc.results.model import Document
-from beaver_ftc.results.writer import clear_disk_errors
 from beaver_ftc.scenario.sweeps import Sweep
 from beaver_ftc.studies.engine.processes import cores
 from beaver_ftc.studies.engine.store import batches_of, write_whole

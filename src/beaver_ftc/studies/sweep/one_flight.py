@@ -183,7 +183,8 @@ def warm_up(sweep: Sweep) -> None:
 
 def keep_flight(sweep: Sweep, assignment: Assignment, keep: Keep, report: bool = False) -> None:
     """Fly one flight as `run` would, into a result folder of its own; of a failure, keep the scenario."""
-    from beaver_ftc.results.writer import NotAllWritten, result_folder, run
+    from beaver_ftc.results.folder import result_folder
+    from beaver_ftc.results.writer import NotAllWritten, run
     from beaver_ftc.scenario.builtin import to_yaml
 
     try:

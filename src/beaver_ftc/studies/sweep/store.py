@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, Self
 
 from beaver_ftc.documents.errors import BadInput, SimulationFailed
+from beaver_ftc.results.folder import clear_disk_errors, refuse_foreign, sync
 from beaver_ftc.results.model import Document
-from beaver_ftc.results.writer import clear_disk_errors, refuse_foreign, sync
 from beaver_ftc.scenario.sweeps import Sweep
 from beaver_ftc.studies.engine import store as files
 from beaver_ftc.studies.engine.workers import Number

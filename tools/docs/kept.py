@@ -10,7 +10,7 @@ from hashlib import sha256
 from pathlib import Path
 
 from beaver_ftc.documents.files import cache_base
-from beaver_ftc.studies.engine.store import write_whole
+from beaver_ftc.studies.engine.files import write_whole
 from tools.docs.commands import Output
 from tools.docs.pages import ROOT
 

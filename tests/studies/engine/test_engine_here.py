@@ -8,27 +8,27 @@ from types import SimpleNamespace
 import pytest
 
 from beaver_ftc.documents.errors import SimulationFailed
-from beaver_ftc.studies.engine import processes, ray_workers, store
+from beaver_ftc.studies.engine import files, processes, ray_workers
 from beaver_ftc.studies.engine.workers import Batch, Outcome, Work
 
 
 def test_a_file_is_whole_or_as_it_was(tmp_path):
     file = tmp_path / "file"
-    store.write_whole(file, b"old")
+    files.write_whole(file, b"old")
 
     def half(stream):
         stream.write(b"ne")
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        store.replace_whole(file, half)
+        files.replace_whole(file, half)
     assert (file.read_bytes(), os.listdir(tmp_path)) == (b"old", ["file"])
-    store.replace_whole(file, lambda stream: stream.write(b"new"))
+    files.replace_whole(file, lambda stream: stream.write(b"new"))
     assert file.read_bytes() == b"new"
     (tmp_path / "deep").mkdir()
     for name in (".x.partial", "deep/.y.partial", "z.partial"):
         (tmp_path / name).touch()
-    store.remove_leftovers(tmp_path)
+    files.remove_leftovers(tmp_path)
     assert sorted(os.listdir(tmp_path)) == ["deep", "file", "z.partial"]
     assert os.listdir(tmp_path / "deep") == []
 

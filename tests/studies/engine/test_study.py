@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from beaver_ftc.documents.errors import SimulationFailed, say_once
-from beaver_ftc.studies.engine.store import PACKAGE, hashed_files
+from beaver_ftc.studies.engine.identity import PACKAGE, hashed_files
 from beaver_ftc.studies.engine.study import Study, flown, fly_all, run_study
 
 
@@ -120,7 +120,7 @@ def test_rows_of_another_question_or_other_code_are_not_used(tmp_path, monkeypat
         rows_of(tmp_path / "study", range(6), fly, follows_from=1, progress=stopped_after(4))
     log.unlink()
     if change == "code":
-        monkeypatch.setattr("beaver_ftc.studies.engine.store.fingerprint", lambda: "edited")
+        monkeypatch.setattr("beaver_ftc.studies.engine.identity.fingerprint", lambda: "edited")
     cases = range(1, 7) if change == "cases" else range(6)
     rows_of(tmp_path / "study", cases, fly, follows_from=2 if change == "asked" else 1)
     assert log.read_text().split() == [str(case) for case in cases]

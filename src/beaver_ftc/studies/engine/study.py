@@ -19,7 +19,7 @@ from typing import Any
 from beaver_ftc.documents.errors import SimulationFailed, say_once
 from beaver_ftc.documents.files import Document
 from beaver_ftc.results.folder import clear_disk_errors, result_folder
-from beaver_ftc.studies.engine import store
+from beaver_ftc.studies.engine import files, identity, store
 from beaver_ftc.studies.engine.workers import (
     Batch,
     LocalWorkers,
@@ -229,7 +229,7 @@ def _keeping(study: Study, out: Path) -> Iterator[store.Parts]:
     new = not out.exists()
     with clear_disk_errors(kept):
         kept.mkdir(parents=True, exist_ok=True)
-    with store.locked(kept):
+    with files.locked(kept):
         parts = _begin(kept, study)
         try:
             yield parts
@@ -266,17 +266,17 @@ def _workers(work: Work, workers: int, cases: int) -> Workers:
 def _begin(kept: Path, study: Study) -> store.Parts:
     """The parts of this very study; those of another, or of other versions, are of no use to it."""
     asked = {"cases": repr(list(study.cases)), "asked": repr(study.follows_from)}
-    identity = store.identity("study", asked)
+    mine = identity.of("study", asked)
     manifest = kept / "study.json"
     parts = store.Parts(kept / "parts", store.RowsAsJson(study.row), GO_ON)
-    there = store.known(manifest)
+    there = identity.known(manifest, "study")
     with clear_disk_errors(kept):
         if there is None and parts:  # nothing says whose they are
-            store.set_aside(parts.folder, f"{manifest.name} {store.UNREADABLE}")
-        if there != identity:
+            files.set_aside(parts.folder, f"{manifest.name} {files.UNREADABLE}")
+        if there != mine:
             parts.remove()
-            store.write_whole(manifest, json.dumps(identity).encode())
-        store.remove_leftovers(kept)
+            files.write_whole(manifest, json.dumps(mine).encode())
+        files.remove_leftovers(kept)
         parts.folder.mkdir(exist_ok=True)
     return parts
 

@@ -12,7 +12,8 @@ from beaver_ftc.documents.errors import BadInput, SimulationFailed
 from beaver_ftc.results.folder import clear_disk_errors, refuse_foreign, sync
 from beaver_ftc.results.model import Document
 from beaver_ftc.scenario.sweeps import Sweep
-from beaver_ftc.studies.engine import store as files
+from beaver_ftc.studies.engine import files, identity
+from beaver_ftc.studies.engine.store import KEPT, Parts
 from beaver_ftc.studies.engine.workers import Number
 from beaver_ftc.studies.sweep.one_flight import schema_of, table_of
 
@@ -27,7 +28,6 @@ OWN_FILES = frozenset({
 ROWS_PER_GROUP = 8192
 # A sweep is read whole, so that statistics of row groups help nobody; most columns are numbers.
 _WRITE_OPTIONS: dict[str, Any] = {"compression": "snappy", "write_statistics": False, "use_dictionary": False}
-_IDENTITY = ("sweep", "versions")  # the parts of sweep.json
 # Words, verdicts, and what the resolved base says better: no flight follows from them.
 _NOT_FLOWN = ("description", "expect", "base", "set")
 
@@ -36,9 +36,9 @@ def identity_of(sweep: Sweep, search: str | None = None) -> Document:
     """The identity of a sweep on this machine, as in `sweep.json`."""
     file = sweep.file.model_dump(mode="json", exclude_none=True)
     asked = {key: value for key, value in file.items() if key not in _NOT_FLOWN}
-    aircraft = files.digest_of_aircraft(sweep.aircraft.folder)
+    aircraft = identity.digest_of_aircraft(sweep.aircraft.folder)
     flown = {"runs": sweep.flights, "base": sweep.base, "aircraft": aircraft, "search": search}
-    return files.identity("sweep", {**asked, **flown})
+    return identity.of("sweep", {**asked, **flown})
 
 
 class RowsAsParquet:
@@ -71,7 +71,7 @@ class Store:
         self._codec = RowsAsParquet(sweep)
         self.folder = folder
         self.schema = self._codec.schema
-        self.parts = files.Parts(folder / "parts", self._codec)
+        self.parts = Parts(folder / "parts", self._codec)
         self.results = folder / "results.parquet"
         self._manifest = folder / "sweep.json"
         self._open = contextlib.ExitStack()
@@ -86,18 +86,17 @@ class Store:
     def __exit__(self, *_: object) -> None:
         self._open.close()
 
-    def begin(self, identity: Document, resume: bool) -> None:
+    def begin(self, mine: Document, resume: bool) -> None:
         """Make the folder this sweep's. Raises BadInput where flights in it would be lost or mixed.
 
         A finished sweep is replaced unless it is to be resumed; an unfinished one never is.
         """
-        there = self._identity()
+        there = identity.known(self._manifest, "sweep")
         flown = self.results.exists() or bool(self.parts)
-        if there is None:
-            if flown or self._manifest.exists():  # nothing says whose the flights are
-                self._refuse_or_set_aside(resume)
-        elif resume:
-            files.refuse_other(identity, there, self.folder)
+        if there is None and (flown or self._manifest.exists()):
+            self._refuse_or_set_aside(resume)
+        elif there is not None and resume:
+            identity.refuse_other(mine, there, self.folder)
         elif flown and not (self.folder / "summary.json").exists():
             raise BadInput(
                 f"{self.folder}: holds an unfinished sweep, allowed: --resume to go on with it, "
@@ -107,7 +106,7 @@ class Store:
             if there is None or not resume:
                 self._clear()
             self.parts.folder.mkdir(exist_ok=True)
-            files.write_whole(self._manifest, json.dumps(identity, indent=2).encode() + b"\n")
+            files.write_whole(self._manifest, json.dumps(mine, indent=2).encode() + b"\n")
             sync(self.folder.parent)
             files.remove_leftovers(self.folder)
 
@@ -146,18 +145,13 @@ class Store:
 
     def compact(self, batches: Iterable["pa.Table"]) -> None:
         """Make `results.parquet` of all batches, in order; the parts are still there."""
-        with clear_disk_errors(self.folder, files.KEPT):
+        with clear_disk_errors(self.folder, KEPT):
             files.replace_whole(self.results, lambda file: write_tables(file, batches, self.schema))
 
     def write(self, name: str, text: str) -> None:
         """Write a file of the folder, whole or not at all."""
         with clear_disk_errors(self.folder):
             files.write_whole(self.folder / name, text.encode("utf-8"))
-
-    def _identity(self) -> Document | None:
-        """Whose flights these are; None where no file says so, or it is damaged."""
-        there = files.known(self._manifest) or {}
-        return there if all(isinstance(there.get(key), dict) for key in _IDENTITY) else None
 
     def _refuse_or_set_aside(self, resume: bool) -> None:
         """Raise BadInput, since nothing says whose flights these are; if the sweep is resumed, rename all."""

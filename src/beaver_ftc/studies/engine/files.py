@@ -1,0 +1,75 @@
+"""The files of a study's folder: each is written as a whole or not at all, by one process at a time."""
+
+import contextlib
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import IO
+
+from beaver_ftc.documents.errors import SimulationFailed, say_once
+from beaver_ftc.results.folder import sync
+
+LOCK = ".lock"
+DAMAGED = ".damaged"  # at the end of the name of what was set aside
+UNREADABLE = "is damaged and cannot be read"
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file atomically: after a crash it has its new content or its old content."""
+    replace_whole(path, lambda file: file.write(content))
+
+
+def replace_whole(path: Path, fill: Callable[[IO[bytes]], object]) -> None:
+    """Write a file atomically, as `write_whole` does: `fill` writes its content."""
+    partial = path.with_name(f".{path.name}.partial")
+    try:
+        with partial.open("wb") as file:
+            fill(file)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(partial, path)
+    except BaseException:
+        partial.unlink(missing_ok=True)
+        raise
+    sync(path.parent)
+
+
+def remove_leftovers(folder: Path) -> None:
+    """Remove incomplete files that a killed process has left."""
+    for partial in folder.rglob(".*.partial"):
+        partial.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Hold a folder for this process alone. The lock ends with the block or the process.
+
+    Raises SimulationFailed where another process has it.
+    """
+    from filelock import FileLock, Timeout
+
+    lock = FileLock(folder / LOCK)
+    try:
+        lock.acquire(timeout=0)
+    except Timeout:
+        raise SimulationFailed(
+            f"cannot write {folder}: another beaver-ftc is flying into it; "
+            "wait for it or choose another --out"
+        ) from None
+    try:
+        yield
+    finally:
+        (folder / LOCK).unlink(missing_ok=True)  # while it is held: the next one makes its own
+        lock.release()
+
+
+def set_aside(path: Path, why: str) -> Path:
+    """Rename a damaged file, so that nothing of it is lost, and print one line. Returns its new path."""
+    name = f"{path.name}{DAMAGED}"
+    n = 1
+    while (path.parent / name).exists():
+        n += 1
+        name = f"{path.name}{DAMAGED}-{n}"
+    path.rename(path.parent / name)
+    say_once(f"{path}: {why}: set aside as {name}; what was in it is flown again")
+    return path.parent / name

@@ -135,14 +135,15 @@ def test_what_is_stopped_goes_on_where_it_was(drift, tmp_path, monkeypatch):
     whole = study.run_study(rare_study(drift, TRACKED), tmp_path / "whole")
     flown = []
     stops = [16]
+    fly = rare.Event.fly
 
-    def stopped(*case):
+    def stopped(event, case):
         flown.append(case)
         if len(flown) in stops:  # of the first round's twenty, twelve have landed
             raise KeyboardInterrupt
-        return rare.score_of(rare.scenario_at(drift, *case[2]), case[1])
+        return fly(event, case)
 
-    monkeypatch.setattr(rare, "_fly", lambda sweep, name, case: {"score": stopped(sweep, name, case)})
+    monkeypatch.setattr(rare.Event, "fly", stopped)
     with pytest.raises(KeyboardInterrupt):
         study.run_study(rare_study(drift, TRACKED), tmp_path / "parts")
     flown.clear()

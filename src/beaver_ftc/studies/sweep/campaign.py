@@ -2,7 +2,7 @@
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -14,7 +14,7 @@ from beaver_ftc.documents.files import read_json
 from beaver_ftc.results.folder import clear_disk_errors
 from beaver_ftc.results.metrics import as_json, versions
 from beaver_ftc.results.model import Document
-from beaver_ftc.scenario.sweeps import Sweep
+from beaver_ftc.scenario.sweeps import Sweep, SweepExpect
 from beaver_ftc.studies.engine.files import write_whole
 from beaver_ftc.studies.engine.processes import cores
 from beaver_ftc.studies.engine.store import batches_of
@@ -22,8 +22,8 @@ from beaver_ftc.studies.engine.study import Flying
 from beaver_ftc.studies.engine.workers import LocalWorkers, Number, Work, Workers
 from beaver_ftc.studies.sweep import one_flight
 from beaver_ftc.studies.sweep.one_flight import Keep, counts_of
-from beaver_ftc.studies.sweep.sampling import Assignment, Plan
-from beaver_ftc.studies.sweep.search import found, generations, members
+from beaver_ftc.studies.sweep.sampling import Assignment, Plan, Round
+from beaver_ftc.studies.sweep.search import found, generations
 from beaver_ftc.studies.sweep.store import Store, identity_of
 
 if TYPE_CHECKING:
@@ -57,10 +57,12 @@ class Options:
 
 
 def named_for(sweep: Sweep, search: str | None) -> Sweep:
-    """The sweep under the name of its result folder: a search has its own."""
+    """The sweep under the name of its result folder. A search has its own, and nothing is expected of it: its
+    rates say nothing about the flights in general."""
     if search is None:
         return sweep
-    return replace(sweep, file=sweep.file.model_copy(update={"name": f"{sweep.name}-search-{search}"}))
+    changed = {"name": f"{sweep.name}-search-{search}", "expect": SweepExpect()}
+    return replace(sweep, file=sweep.file.model_copy(update=changed))
 
 
 def run_sweep(
@@ -96,7 +98,8 @@ def run_sweep(
                     f"{sweep.name}: stopped, {so_far['done']} of {so_far['total']} flights are kept; "
                     "go on with the same command and --resume"
                 )
-            store.compact(store.landed(*batch) for batch in _batches(sweep, options))
+            rounds = _rounds(sweep, options, store)
+            store.compact(store.landed(*batch) for batches, _ in rounds for batch in batches)
         store.parts.remove()
         return conclude(sweep, options, store)
 
@@ -104,26 +107,26 @@ def run_sweep(
 def _fly_missing(
     sweep: Sweep, options: Options, store: Store, there: There, stopped: Callable[[], bool]
 ) -> None:
-    """Fly what is not there; of a search each generation once the one before has landed."""
+    """Fly what is not there, each round once the one before has landed."""
     make = partial(_workers, sweep, options)
     lost = partial(one_flight.lost, sweep)
     with closing(Flying(store.landed, store.parts.land, make, lost)) as flying:
-        if not options.search:
-            flying.fly(_batches(sweep, options), Plan(sweep).assignments, there, stopped)
-            return
-        for number, runs, cases in generations(sweep, options.search, store):
-            flying.fly([(number, runs)], {runs: cases}.__getitem__, there, stopped)
+        for batches, cases_of in _rounds(sweep, options, store):
+            flying.fly(batches, cases_of, there, stopped)
 
 
-def _batches(sweep: Sweep, options: Options) -> Iterator[tuple[int, range]]:
-    """(number, runs) of each batch, from the sweep alone, so that a resumed sweep has the same batches. Of a
-    search each is a generation."""
+def _rounds(sweep: Sweep, options: Options, store: Store) -> Iterable[Round]:
+    """One round of all flights; of a search a round for each generation, once those before have landed.
+
+    The batches follow from the sweep alone, so that a resumed sweep has the same batches.
+    """
     if options.search:
-        return batches_of(sweep.flights, members(len(sweep.keys)))
+        return generations(sweep, options.search, store)
     scenario = sweep.scenario({})
     frames = scenario.duration_s * scenario.rate_hz * scenario.substeps
     size = max(1, min(MOST_A_BATCH, round(FRAMES_A_BATCH / frames)))
-    return batches_of(sweep.flights, max(size, math.ceil(sweep.flights / MOST_BATCHES)))
+    size = max(size, math.ceil(sweep.flights / MOST_BATCHES))
+    return [Round(list(batches_of(sweep.flights, size)), Plan(sweep).assignments)]
 
 
 def _workers(sweep: Sweep, options: Options, flights: int) -> Workers:
@@ -138,19 +141,9 @@ def _workers(sweep: Sweep, options: Options, flights: int) -> Workers:
 def conclude(sweep: Sweep, options: Options, store: Store) -> Document:
     """Write what the flights of a complete `results.parquet` show; `summary.json`, last, says all is done."""
     from beaver_ftc.studies.sweep.outcomes import Flights
-    from beaver_ftc.studies.sweep.summary import evaluate, summarise
-    from beaver_ftc.studies.sweep.worst import replay_command, worst_flights
 
     flights = Flights(store.results, sweep)
-    document = summarise(flights, sweep)
-    if options.search:
-        document["search"] = found(options.search, store.results, sweep)
-    command = replay_command(options.source, options.out, options.search)
-    document["worst"] = worst_flights(flights, sweep, command)
-    # the rates of a search say nothing about the flights in general
-    document["expectations"] = [] if options.search else evaluate(sweep.file.expect, flights)
-    document["passed"] = all(expectation["passed"] for expectation in document["expectations"])
-    document["versions"] = dict(versions())
+    document = _summary(sweep, options, flights, store.results)
     if options.keep.policy == "worst":
         for flight in document["worst"]:
             kept = assignment_of(sweep, options, flight["run"])
@@ -161,6 +154,23 @@ def conclude(sweep: Sweep, options: Options, store: Store) -> Document:
     if not flights.measured.any():
         raise SimulationFailed(f"{sweep.name}: no flight could be flown: {document['reasons'][0]['reason']}")
     return document
+
+
+def _summary(sweep: Sweep, options: Options, flights: "Flights", results: Path) -> Document:
+    """The content of `summary.json`."""
+    from beaver_ftc.studies.sweep.summary import evaluate, summarise
+    from beaver_ftc.studies.sweep.worst import replay_command, worst_flights
+
+    command = replay_command(options.source, options.out, options.search)
+    expectations = evaluate(sweep.file.expect, flights)
+    return {
+        **summarise(flights, sweep),
+        **({"search": found(options.search, results, sweep)} if options.search else {}),
+        "worst": worst_flights(flights, sweep, command),
+        "expectations": expectations,
+        "passed": all(expectation["passed"] for expectation in expectations),
+        "versions": dict(versions()),
+    }
 
 
 def _draw(sweep: Sweep, flights: "Flights", document: Document, store: Store) -> None:
@@ -176,11 +186,9 @@ def assignment_of(sweep: Sweep, options: Options, index: int) -> Assignment:
     """The values of one flight of a sweep, or of a search as far as it has come. Raises BadInput."""
     if not 0 <= index < sweep.flights:
         raise BadInput(f"{sweep.name}: there is no flight {index}, allowed: 0 to {sweep.flights - 1}")
-    if options.search is None:
-        return Plan(sweep).assignments([index])[0]
-    for _, runs, cases in generations(sweep, options.search, Store(options.out / sweep.name, sweep)):
-        if index in runs:
-            return cases[index - runs[0]]
+    for batches, cases_of in _rounds(sweep, options, Store(options.out / sweep.name, sweep)):
+        if any(index in runs for _, runs in batches):
+            return cases_of([index])[0]
     raise BadInput(f"flight {index} of {sweep.name} is not known yet: the search has not come so far")
 
 

@@ -7,6 +7,7 @@ again, so sensors and air are part of the chain.
 import hashlib
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
 from statistics import NormalDist
 
@@ -29,6 +30,7 @@ from beaver_ftc.studies.sweep.store import identity_of
 from beaver_ftc.studies.sweep.subset_simulation import MEMBERS, RUNS, Chains, Scores
 
 _BEFORE = -1e-12  # the score of what has just not happened
+NO_EVENT: Document = {"score": -math.inf}  # the row of a flight that cannot be flown
 _NORMAL = NormalDist()
 
 
@@ -82,76 +84,86 @@ def score_of(scenario: Scenario, expectation: str) -> float:
     return min(score, _BEFORE) if found.passed else max(score, 0.0)
 
 
-def values_of(sweep: Sweep, point: Sequence[float]) -> Document:
-    """The varied keys at a point of standard normals."""
-    return values_at(sweep.file.vary.items(), (min(_NORMAL.cdf(u), MAX_U) for u in point))
+@dataclass(frozen=True)
+class Event:
+    """An expectation that a flight of a sweep does not meet. A point (keys,) has a standard normal for each
+    varied key."""
 
+    sweep: Sweep
+    expectation: str
 
-def scenario_at(sweep: Sweep, run: int, point: Sequence[float]) -> Scenario:
-    """The flight at a point of standard normals; its number gives its seed."""
-    return scenario_of(sweep, Assignment(run, values_of(sweep, point)))
+    @property
+    def name(self) -> str:
+        """The name of the result folder."""
+        return f"{self.sweep.name}-rare-{self.expectation.replace('.', '-')}"
 
+    def values_at(self, point: Sequence[float]) -> Document:
+        """The varied keys at a point."""
+        return values_at(self.sweep.file.vary.items(), (min(_NORMAL.cdf(u), MAX_U) for u in point))
 
-def _fly(sweep: Sweep, expectation: str, case: tuple[int, list[float]]) -> Document:
-    """The row of one flight; one that cannot be flown has the score -inf, so that it is no event."""
-    try:
-        return {"score": score_of(scenario_at(sweep, *case), expectation)}
-    except BeaverFtcError:
-        return {"score": -math.inf}
+    def fly(self, case: tuple[int, Sequence[float]]) -> Document:
+        """The row of a flight: its number, which gives its seed, and its point."""
+        run, point = case
+        try:
+            scenario = scenario_of(self.sweep, Assignment(run, self.values_at(point)))
+            return {"score": score_of(scenario, self.expectation)}
+        except BeaverFtcError:
+            return NO_EVENT
+
+    def lost(self, case: object, why: str) -> Document:
+        """The row of a flight that ends its process each time."""
+        say_once(f"{self.name}: of a flight {why}; such flights count as no event")
+        return NO_EVENT
+
+    def rounds(self, fly_round: FlyRound, tell: Callable[[str], None]) -> Document:
+        """Fly the chains, and conclude. Raises SimulationFailed if none of the first round can be flown."""
+        chains = Chains(len(self.sweep.keys), self.sweep.file.seed)
+
+        def fly(points: np.ndarray) -> Scores:
+            rows = fly_round([(chains.flights + i, point.tolist()) for i, point in enumerate(points)])
+            scores = np.array([row["score"] for row in rows])
+            if not chains.flights and np.isneginf(scores).all():
+                raise SimulationFailed(f"{self.sweep.name}: no flight could be flown")
+            tell(f"{self.name}: {chains.flights + len(rows)} flights, level {chains.levels}")
+            return scores
+
+        chains.go(fly)
+        return self.document(chains)
+
+    def document(self, chains: Chains) -> Document:
+        """The content of rare.json."""
+        found = chains.estimate()
+        plain = all_finite(found.pop("plain"))
+        likeliest = None
+        if chains.design is not None:
+            distance, run, point = chains.design
+            likeliest = {"run": run, "distance": distance, "values": self.values_at(point.tolist())}
+        return {
+            "sweep": self.sweep.name, "expectation": self.expectation, "confidence": CONFIDENCE,
+            **all_finite(found), "plain": plain,
+            "failed": chains.failed, "likeliest": likeliest,
+            "sweep_sha256": hashlib.sha256(repr(self.sweep.file).encode()).hexdigest(),
+            "versions": dict(versions()),
+        }  # fmt: skip
+
+    def likeliest(self, document: Document) -> str | None:
+        """The content of flight.yaml: the scenario of the likeliest event that was flown."""
+        found = document["likeliest"]
+        return found and to_yaml(scenario_of(self.sweep, Assignment(found["run"], found["values"])))
 
 
 def rare_study(sweep: Sweep, expectation: str, tell: Callable[[str], None] = lambda _: None) -> Study:
     """The probability that a sweep's flights do not meet an expectation of its base scenario.
 
-    tell: takes a line of progress after each round. Raises BadInput if the base does not expect this; when it
-    is flown, SimulationFailed if none of the first round can be flown.
+    tell: takes a line of progress after each round. Raises BadInput if the base does not expect this.
     """
     check(sweep, expectation)
-    name = f"{sweep.name}-rare-{expectation.replace('.', '-')}"
-
-    def rounds(flies: FlyRound) -> Document:
-        chains = Chains(len(sweep.keys), sweep.file.seed)
-
-        def fly(points: np.ndarray) -> Scores:
-            rows = flies([(chains.flights + i, point.tolist()) for i, point in enumerate(points)])
-            scores = np.array([row["score"] for row in rows])
-            if not chains.flights and np.isneginf(scores).all():
-                raise SimulationFailed(f"{sweep.name}: no flight could be flown")
-            tell(f"{name}: {chains.flights + len(rows)} flights, level {chains.levels}")
-            return scores
-
-        chains.go(fly)
-        return _document(sweep, expectation, chains)
-
-    def likeliest(document: Document) -> str | None:
-        """The scenario of the likeliest event that was flown."""
-        found = document["likeliest"]
-        return found and to_yaml(scenario_of(sweep, Assignment(found["run"], found["values"])))
-
-    def lost(case: object, why: str) -> Document:
-        say_once(f"{name}: of a flight {why}; such flights count as no event")
-        return {"score": -math.inf}
-
+    event = Event(sweep, expectation)
     return Study(
-        name, (), partial(_fly, sweep, expectation), dict, {"rare.json": as_json, "flight.yaml": likeliest},
-        follows_from=[identity_of(sweep, expectation), RUNS, MEMBERS], lost=lost,
-        warm_up=partial(warm_up, sweep), rounds=rounds,
+        event.name, (), event.fly, dict, {"rare.json": as_json, "flight.yaml": event.likeliest},
+        follows_from=[identity_of(sweep, expectation), RUNS, MEMBERS], lost=event.lost,
+        warm_up=partial(warm_up, sweep), rounds=partial(event.rounds, tell=tell),
     )  # fmt: skip
-
-
-def _document(sweep: Sweep, expectation: str, chains: Chains) -> Document:
-    found = chains.estimate()
-    plain = all_finite(found.pop("plain"))
-    likeliest = None
-    if chains.design is not None:
-        distance, run, point = chains.design
-        likeliest = {"run": run, "distance": distance, "values": values_of(sweep, point.tolist())}
-    return {
-        "sweep": sweep.name, "expectation": expectation, "confidence": CONFIDENCE,
-        **all_finite(found), "plain": plain,
-        "failed": chains.failed, "likeliest": likeliest,
-        "sweep_sha256": hashlib.sha256(repr(sweep.file).encode()).hexdigest(), "versions": dict(versions()),
-    }  # fmt: skip
 
 
 def as_text(document: Document) -> str:
@@ -159,11 +171,11 @@ def as_text(document: Document) -> str:
     plain = document["plain"]
     likeliest = document["likeliest"]
     p = document["probability"]
-    said = f"{p:.2g}" if p is not None else f"not known: {document['why']}"
+    known = f"not known: {document['why']}" if p is None else f"{p:.2g}"
     lines = [
         f"{document['sweep']}: {document['expectation']} not met",
-        f"  probability  {said}, {_between(document)}, {document['flights']} flights",
-        "  plain        {events} of {of} flights, ".format(**plain) + _between(plain),
+        f"  probability  {known}, {_interval(document)}, {document['flights']} flights",
+        f"  plain        {plain['events']} of {plain['of']} flights, {_interval(plain)}",
     ]
     if document["failed"]:
         lines.append(f"  not flown    {document['failed']} flights, counted as no event")
@@ -176,5 +188,5 @@ def as_text(document: Document) -> str:
     return "\n".join([*lines, f"\nresults: {document['folder']}"])
 
 
-def _between(found: Document) -> str:
-    return "95 % {low:.2g} to {high:.2g}".format(**found)
+def _interval(found: Document) -> str:
+    return f"95 % {found['low']:.2g} to {found['high']:.2g}"

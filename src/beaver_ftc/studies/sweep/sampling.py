@@ -7,7 +7,8 @@ from.
 
 import math
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from functools import lru_cache
 from statistics import NormalDist
 from typing import Any, NamedTuple
 
@@ -21,10 +22,14 @@ from beaver_ftc.studies.engine.draws import generator_of
 MIN_U = 2.0**-53
 MAX_U = 1.0 - MIN_U
 
-# What the numbers are for: the last word of a spawn key. The keys are (index,) of a flight's own seed,
-# (index, OF_VALUES), (0, OF_DESIGN), of a search (generation, 0, OF_SEARCH), and (0, 0, OF_RARE). Keys of two
-# words differ from keys of three: OF_DESIGN and OF_SEARCH may be the same number.
-OF_VALUES, OF_DESIGN, OF_SEARCH, OF_RARE = 1, 2, 2, 3
+# Random numbers of a sweep are distinguished by their spawn key. A key differs in its words or their number:
+#     (index,)                    the seed of a flight
+#     (index, OF_VALUES)          the values of a flight
+#     (0, OF_DESIGN)              the points of a Latin hypercube, or the scrambling of Sobol points
+#     (generation, 0, OF_SEARCH)  a generation of a search
+#     (0, 0, OF_RARE)             subset simulation
+OF_VALUES, OF_DESIGN = 1, 2
+OF_SEARCH, OF_RARE = 2, 3
 
 
 class Assignment(NamedTuple):
@@ -32,6 +37,13 @@ class Assignment(NamedTuple):
 
     run: int
     values: Document
+
+
+class Round(NamedTuple):
+    """Batches to be flown in any order: (number, runs) of each, and the function from runs to assignments."""
+
+    batches: Sequence[tuple[int, range]]
+    cases_of: Callable[[Sequence[int]], Sequence[Assignment]]
 
 
 def flight_seed(sweep_seed: int, index: int) -> int:
@@ -42,16 +54,14 @@ def flight_seed(sweep_seed: int, index: int) -> int:
 
 def value_at(how: Variation, u: float) -> Any:
     """The value a variation has at a number u in [0, 1): the inverse of its distribution function."""
-    if how.uniform is not None:
-        low, high = how.uniform
-        return low + u * (high - low)
-    if how.loguniform is not None:
-        low, high = how.loguniform
-        return min(max(low * (high / low) ** u, low), high)
-    if how.normal is not None:
-        return _normal(NormalDist(*how.normal), how.within, u)
-    assert how.count is not None
-    return counted_value(how, min(int(u * how.count), how.count - 1))
+    if how.count is not None:
+        return counted_value(how, min(int(u * how.count), how.count - 1))
+    first, second = getattr(how, how.kind)
+    if how.kind == "normal":
+        return _normal(NormalDist(first, second), how.within, u)
+    if how.kind == "uniform":
+        return first + u * (second - first)
+    return min(max(first * (second / first) ** u, first), second)
 
 
 def _normal(distribution: NormalDist, within: tuple[float, float] | None, u: float) -> float:
@@ -69,10 +79,10 @@ def values_at(vary: Iterable[tuple[str, Variation]], point: Iterable[float]) -> 
 
 def counted_value(how: Variation, position: int) -> Any:
     """The value at a position of a `linspace` or a `choice`."""
-    if how.choice is not None:
-        return how.choice[position]
-    assert how.linspace is not None
-    first, last, count = how.linspace
+    values = getattr(how, how.kind)
+    if how.kind == "choice":
+        return values[position]
+    first, last, count = values
     return last if position == count - 1 else first + position * (last - first) / (count - 1)
 
 
@@ -84,7 +94,6 @@ class Plan:
         vary = sweep.file.vary.items()
         self._in_turn = [(key, how) for key, how in vary if _is_in_turn(sweep.file, how)]
         self._drawn = [(key, how) for key, how in vary if not _is_in_turn(sweep.file, how)]
-        self._latin = _latin_hypercube(sweep.file, len(self._drawn)) if sweep.file.sampling == "lhs" else None
 
     def assignments(self, indices: Sequence[int]) -> list[Assignment]:
         """The values of these flights; the indices are in order."""
@@ -100,8 +109,8 @@ class Plan:
         dimensions = len(self._drawn)
         if not dimensions or not indices.size:
             return np.empty((indices.size, dimensions))
-        if self._latin is not None:
-            return self._latin[indices]
+        if self._file.sampling == "lhs":
+            return _latin_hypercube(seed, dimensions, self._file.flights)[indices]
         if self._file.sampling == "sobol":
             return _sobol(seed, dimensions, indices)
         return np.array(
@@ -120,17 +129,18 @@ def _is_in_turn(file: SweepFile, how: Variation) -> bool:
     return file.sampling == "grid" or how.linspace is not None
 
 
-def _latin_hypercube(file: SweepFile, dimensions: int) -> np.ndarray:
-    """One flight in each of `flights` equal slices of every key [McKay, Beckman, Conover 1979].
+@lru_cache(maxsize=1)  # a sweep needs it for every batch
+def _latin_hypercube(seed: int, dimensions: int, flights: int) -> np.ndarray:
+    """Points (flights, dimensions): one in each of `flights` equal slices of every key [McKay, Beckman,
+    Conover 1979].
 
     Not scipy's `qmc.LatinHypercube`: it draws other numbers, and a seed gives the same flights for good.
     """
-    generator = generator_of(file.seed, 0, OF_DESIGN)
+    generator = generator_of(seed, 0, OF_DESIGN)
     columns = [
-        (generator.permutation(file.flights) + generator.random(file.flights)) / file.flights
-        for _ in range(dimensions)
+        (generator.permutation(flights) + generator.random(flights)) / flights for _ in range(dimensions)
     ]
-    return np.column_stack(columns) if columns else np.empty((file.flights, 0))
+    return np.column_stack(columns)
 
 
 def _sobol(seed: int, dimensions: int, indices: np.ndarray) -> np.ndarray:

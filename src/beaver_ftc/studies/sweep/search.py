@@ -7,7 +7,8 @@ is interrupted goes on exactly as it would have, and any number of workers finds
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from operator import itemgetter
 from pathlib import Path
 from typing import Any
@@ -20,10 +21,9 @@ from beaver_ftc.documents.files import Document
 from beaver_ftc.scenario.sweeps import Sweep
 from beaver_ftc.studies.engine.draws import generator_of
 from beaver_ftc.studies.engine.store import batches_of
-from beaver_ftc.studies.engine.workers import Batch
 from beaver_ftc.studies.present.tables import finite
 from beaver_ftc.studies.sweep.one_flight import DEPARTED
-from beaver_ftc.studies.sweep.sampling import MAX_U, OF_SEARCH, Assignment, values_at
+from beaver_ftc.studies.sweep.sampling import MAX_U, OF_SEARCH, Assignment, Round, values_at
 from beaver_ftc.studies.sweep.store import Store
 
 WEIGHT = 0.7  # [Storn1997] recommend 0.4 to 1
@@ -111,7 +111,7 @@ class Evolution:
         self.generation += 1
 
 
-def generations(sweep: Sweep, objective: str, store: Store) -> Iterator[Batch]:
+def generations(sweep: Sweep, objective: str, store: Store) -> Iterator[Round]:
     """One generation after the other; the next one once this one has landed in the store."""
     if not sweep.keys:
         raise BadInput(f"{sweep.name}: vary: nothing varies, allowed in a search: at least one key")
@@ -119,11 +119,15 @@ def generations(sweep: Sweep, objective: str, store: Store) -> Iterator[Batch]:
     for number, runs in batches_of(sweep.flights, evolution.members):
         trials = evolution.trials()[: len(runs)]
         values = [values_at(sweep.file.vary.items(), x) for x in trials]
-        yield Batch(number, runs, list(map(Assignment, runs, values)))
+        yield Round([(number, runs)], partial(_flights_of, dict(zip(runs, values, strict=True))))
         table = store.landed(number, runs)
         if table is None:
             return
         evolution.select(trials, np.array([score(objective, row) for row in table.to_pylist()]))
+
+
+def _flights_of(values: Mapping[int, Document], runs: Sequence[int]) -> list[Assignment]:
+    return [Assignment(run, values[run]) for run in runs]
 
 
 def found(objective: str, results: Path, sweep: Sweep) -> Document:

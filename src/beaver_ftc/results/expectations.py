@@ -6,6 +6,7 @@ was premature or withdrawn, or if there were frames in which the diagnosis could
 """
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from beaver_ftc.results.model import Expectation, Metrics
@@ -15,19 +16,16 @@ from beaver_ftc.scenario.warnings import OF_DIAGNOSIS
 MOTION_OF_AXIS = {"p": "roll", "q": "pitch", "r": "yaw"}
 
 
-class Rule(NamedTuple):
-    """An expectation that a value of the metrics equals.
-
-    path: of the value in the metrics. words: its name; a `Limit` has its unit as well, a `Flag` a text for
-    true and one for false.
-    """
+@dataclass(frozen=True)
+class Rule:
+    """An expectation that a value of the metrics equals. path: of the value. says: its name in words."""
 
     path: str
-    words: tuple[str, ...]
+    says: str
 
-    def actual(self, expected: Any, metrics: Metrics) -> Any:
-        """The value in the metrics; if a list of names is expected, all names given in flight."""
-        found = metrics.at("isolation.names" if isinstance(expected, list) else self.path)
+    def actual(self, metrics: Metrics) -> Any:
+        """The value in the metrics."""
+        found = metrics.at(self.path)
         return list(found) if isinstance(found, tuple) else found
 
     def is_met(self, actual: Any, expected: Any) -> bool:
@@ -37,9 +35,8 @@ class Rule(NamedTuple):
     def texts(self, said: Expectation) -> tuple[str, str]:
         """Expected and actual value in words; the latter empty if it is the same."""
         is_as_expected = said.passed and said.actual == said.expected
-        return f"{self.words[0]} {value_text(said.expected)}", "" if is_as_expected else value_text(
-            said.actual
-        )
+        actual = "" if is_as_expected else value_text(said.actual)
+        return f"{self.says} {value_text(said.expected)}", actual
 
 
 class Among(Rule):
@@ -50,8 +47,11 @@ class Among(Rule):
         return any(expected == candidate.rpartition(":")[2] for candidate in actual)
 
 
+@dataclass(frozen=True)
 class Limit(Rule):
-    """An expectation that the size of a value is at most a limit. words: quantity and unit."""
+    """An expectation that the size of a value is at most a limit, in this unit."""
+
+    unit: str
 
     def is_met(self, actual: Any, expected: Any) -> bool:
         """Whether the value exists, and is within the limit."""
@@ -59,53 +59,57 @@ class Limit(Rule):
 
     def texts(self, said: Expectation) -> tuple[str, str]:
         """The limit, and the value with its share of the limit."""
-        quantity, unit = self.words
         share = _share_of_limit(said)
         of_limit = "" if share is None else f" ({three_digits(100 * share)} % of the limit)"
-        actual = value_text(said.actual) + ("" if said.actual is None else f" {unit}{of_limit}")
-        return f"{quantity} ≤ {value_text(said.expected)} {unit}", actual
+        actual = value_text(said.actual) + ("" if said.actual is None else f" {self.unit}{of_limit}")
+        return f"{self.says} ≤ {value_text(said.expected)} {self.unit}", actual
 
 
+@dataclass(frozen=True)
 class Flag(Rule):
-    """An expectation of true or false. words: for true, and for false."""
+    """An expectation of true or false. says, says_not: the words for true, and for false."""
+
+    says_not: str
 
     def texts(self, said: Expectation) -> tuple[str, str]:
         """The expected words, and the opposite if that came out."""
+        words = (self.says_not, self.says)
         is_as_expected = said.passed or said.actual is None
-        return self.words[not said.expected], "" if is_as_expected else self.words[not said.actual]
+        return words[said.expected], "" if is_as_expected else words[said.actual]
 
 
 class Absence(Flag):
     """An expectation that something did not happen: true if the value of the metrics is false, 0 or None."""
 
-    def actual(self, expected: Any, metrics: Metrics) -> bool:
+    def actual(self, metrics: Metrics) -> bool:
         """True if it did not happen."""
         return not metrics.at(self.path)
 
 
+ALL_NAMES = Rule("isolation.names", "isolated fault")  # in place of "isolated_as", if a list is expected
 RULES: dict[str, Rule] = {
-    "detected_within_s": Limit("detection.delay_s", ("detection delay", "s")),
-    "isolated_within_s": Limit("isolation.delay_s", ("isolation delay", "s")),
-    "isolated_as": Rule("isolation.fault", ("isolated fault",)),
-    "isolated_type": Rule("isolation.type", ("fault type",)),
-    "candidate_type": Among("isolation.candidates", ("possible fault types include",)),
-    "no_false_alarm": Absence("false_alarm", ("no false alarm", "a false alarm")),
-    "no_departure": Absence("departure", ("no departure", "a departure")),
-    "stays_in_envelope": Absence("envelope.exits", ("stays in the envelope", "leaves the envelope")),
-    "altitude_within_m": Limit("profile.altitude_m", ("altitude deviation", "m")),
-    "airspeed_within_mps": Limit("profile.airspeed_mps", ("airspeed deviation (10 s mean)", "m/s")),
+    "detected_within_s": Limit("detection.delay_s", "detection delay", "s"),
+    "isolated_within_s": Limit("isolation.delay_s", "isolation delay", "s"),
+    "isolated_as": Rule("isolation.fault", "isolated fault"),
+    "isolated_type": Rule("isolation.type", "fault type"),
+    "candidate_type": Among("isolation.candidates", "possible fault types include"),
+    "no_false_alarm": Absence("false_alarm", "no false alarm", "a false alarm"),
+    "no_departure": Absence("departure", "no departure", "a departure"),
+    "stays_in_envelope": Absence("envelope.exits", "stays in the envelope", "leaves the envelope"),
+    "altitude_within_m": Limit("profile.altitude_m", "altitude deviation", "m"),
+    "airspeed_within_mps": Limit("profile.airspeed_mps", "airspeed deviation (10 s mean)", "m/s"),
     "airspeed_within_limits_mps": Limit(
-        "profile.airspeed_limited_mps", ("deviation from the limited airspeed (10 s mean)", "m/s")
+        "profile.airspeed_limited_mps", "deviation from the limited airspeed (10 s mean)", "m/s"
     ),
-    "heading_within_deg": Limit("profile.heading_deg", ("heading deviation", "deg")),
-    "arrives.altitude_m": Limit("arrival.altitude_m", ("altitude deviation at the end", "m")),
-    "arrives.airspeed_mps": Limit("arrival.airspeed_mps", ("airspeed deviation at the end", "m/s")),
-    "arrives.heading_deg": Limit("arrival.heading_deg", ("heading deviation at the end", "deg")),
+    "heading_within_deg": Limit("profile.heading_deg", "heading deviation", "deg"),
+    "arrives.altitude_m": Limit("arrival.altitude_m", "altitude deviation at the end", "m"),
+    "arrives.airspeed_mps": Limit("arrival.airspeed_mps", "airspeed deviation at the end", "m/s"),
+    "arrives.heading_deg": Limit("arrival.heading_deg", "heading deviation at the end", "deg"),
     "arrives.in_envelope": Flag(
-        "arrival.in_envelope", ("inside the envelope at the end", "outside the envelope at the end")
+        "arrival.in_envelope", "inside the envelope at the end", "outside the envelope at the end"
     ),
     **{
-        f"{key}.{axis}": Limit(f"tracking.{key}.{axis}", (f"{name} rate RMS {when} the fault", "deg/s"))
+        f"{key}.{axis}": Limit(f"tracking.{key}.{axis}", f"{name} rate RMS {when} the fault", "deg/s")
         for key, when in (("pre_fault_rms_deg_s", "before"), ("post_fault_rms_deg_s", "after"))
         for axis, name in MOTION_OF_AXIS.items()
     },
@@ -133,10 +137,10 @@ def expected_of(expect: Any) -> Iterator[tuple[str, Any]]:
 
 
 def _judged(name: str, expected: Any, metrics: Metrics) -> Expectation:
-    rule = RULES[name]
-    actual = rule.actual(expected, metrics)
-    is_of_one_name = rule.path.startswith("isolation.") and not isinstance(expected, list)
-    is_early = is_of_one_name and bool(metrics.at("isolation.premature"))  # a list holds no premature name
+    rule = ALL_NAMES if isinstance(expected, list) else RULES[name]
+    actual = rule.actual(metrics)
+    is_of_a_name = rule.path.startswith("isolation.") and rule is not ALL_NAMES  # which has no early name
+    is_early = is_of_a_name and bool(metrics.at("isolation.premature"))
     passed = rule.is_met(actual, expected) and not is_early
     reason = None
     if not passed and name in OF_DIAGNOSIS:
@@ -193,7 +197,7 @@ def expectations_in_words(metrics: Metrics) -> list[ExpectationInWords]:
 
 
 def _in_words(said: Expectation) -> ExpectationInWords:
-    rule = RULES.get(said.name) or Rule("", (without_underscores(said.name),))
+    rule = RULES.get(said.name) or Rule("", without_underscores(said.name))
     limit, actual = rule.texts(said)
     reason = said.reason if actual or not said.passed else ""
     share = _share_of_limit(said) if isinstance(rule, Limit) else None

@@ -54,13 +54,16 @@ from beaver_ftc.studies.compare.trial import (
 )
 from beaver_ftc.studies.margins import Margin
 
+# Of a detector.
 DELAY_S = 1.0  # an alarm this late costs half of a missed one
-LOST = 100.0  # times e_oracle
-EFFORT = 1.1  # times the default law's
+# Of a law. Shares of 1.
+LOST = 100.0  # of e_oracle: the error of a flight that loses the aircraft; above every flight that does not
+EFFORT = 1.1  # of the RMS surface rate of the default law
+LEAST_FLIGHTS = 4  # that a mean of a trial needs, before it ends the trial
+HOPELESS = 1.5  # of the lowest J
+# In place of J.
 INADMISSIBLE = 1e3  # above every J
 FAILED = 1e6  # of a candidate that cannot be flown at all
-LEAST_FLIGHTS = 4
-HOPELESS = 1.5  # times the lowest J
 
 Values = Mapping[str, float]
 
@@ -86,7 +89,8 @@ class _FalseAlarm(Exception):
 
 
 def _end_with_false_alarm(loop: Loop) -> Callable[[], None]:
-    """Watch a flight (`fly`): end it with the first false alarm of its plug-in. At its end nothing is due."""
+    """Watch a flight (`fly`): end it with the first false alarm of its plug-in. What is returned is called at
+    its end, and changes nothing then."""
     plugins = loop.plugin_frame
     is_false = Truth.of(loop.scenario).onset.is_false
 
@@ -95,7 +99,7 @@ def _end_with_false_alarm(loop: Loop) -> Callable[[], None]:
             raise _FalseAlarm
 
     loop.after_frame = after_frame if plugins is not None else None
-    return lambda: None
+    return after_frame
 
 
 def flown(case: SetFlight, entry: Entry, group: str, values: Values) -> Result:

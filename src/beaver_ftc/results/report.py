@@ -34,24 +34,26 @@ if TYPE_CHECKING:
     from jinja2 import Template
 
 ReportSection = Callable[[Path], str]
+"""What a study shows of a result folder, as HTML; empty if it has found nothing there."""
 
 _TEMPLATE_FOLDER = Path(__file__).parent / "templates"
-_REGISTERED_SECTIONS: list[ReportSection] = []  # studies that add to a run's report register theirs
 AROUND_S = 2.5  # before and after the events, s
 AT_FULL_RATE = 10_000  # points of that at full rate
 _FLIGHT_PATH_COLUMNS = ("north_m", "east_m", "altitude_m", "phi_rad", "theta_rad", "psi_rad")
 
 
-def write_report(path: Path, folders: Sequence[Path], names: Sequence[str] = ()) -> None:
+def write_report(
+    path: Path, folders: Sequence[Path], names: Sequence[str] = (), sections: Sequence[ReportSection] = ()
+) -> None:
     """Write the report of the runs in these result folders, side by side, as one HTML file.
 
     Each folder holds `scenario.yaml`, `metrics.json` and `log.parquet`. names: what to call the runs, if not
-    by their scenarios' names.
+    by their scenarios' names. sections: of studies.
     """
-    path.write_text(render(folders, names), encoding="utf-8")
+    path.write_text(render(folders, names, sections), encoding="utf-8")
 
 
-def render(folders: Sequence[Path], names: Sequence[str] = ()) -> str:
+def render(folders: Sequence[Path], names: Sequence[str] = (), sections: Sequence[ReportSection] = ()) -> str:
     """The report as HTML text.
 
     The legend has one entry for each name of a mark (fault, detection, ...) that any run has: the mark of the
@@ -68,15 +70,8 @@ def render(folders: Sequence[Path], names: Sequence[str] = ()) -> str:
         marks=last_marks,
         first_mark_s=next((mark.time_s for mark in last_marks), 0.0),
         **script_style_and_data(folders, documents, names),
-        # what studies have found in a folder, if they have been there
-        sections=[Markup("".join(section(folder) for section in _REGISTERED_SECTIONS)) for folder in folders],
+        sections=[Markup(section(folder)) for folder in folders for section in sections],
     )
-
-
-def register_section(section: ReportSection) -> None:
-    """Have every report from now on show what `section` makes of its result folder: HTML, or nothing."""
-    if section not in _REGISTERED_SECTIONS:
-        _REGISTERED_SECTIONS.append(section)
 
 
 def _verdict_entry(metrics: Document, folder: Path) -> Document:

@@ -26,6 +26,7 @@ from beaver_ftc.results.model import Document, Metrics
 if TYPE_CHECKING:
     from beaver_ftc.plant.adapter import Plant
     from beaver_ftc.results.painters import Painters
+    from beaver_ftc.results.report import ReportSection
     from beaver_ftc.scenario.schema import Scenario
 
 CERTIFICATE_FILE = "certificate.json"
@@ -141,11 +142,12 @@ def write_report_files(
     to: Path | None = None,
     painters: "Painters" = (),
     formats: Sequence[str] = ("png",),
+    sections: "Sequence[ReportSection]" = (),
 ) -> None:
     """Draw the figures and the report of a result folder that holds its log and its scenario.
 
     to: where to, if not into that folder. painters: who draws the figures, if not this process. formats: of
-    the figures.
+    the figures. sections: of studies, for the report.
     """
     from beaver_ftc.results.figures import pictures_of
     from beaver_ftc.results.painters import drawing
@@ -156,7 +158,7 @@ def write_report_files(
         (to / "figures").mkdir(exist_ok=True)
     pictures = pictures_of(folder / "log.parquet", Metrics.of(document), to / "figures", formats)
     with drawing(pictures, painters):
-        write_report(to / "report.html", [folder])
+        write_report(to / "report.html", [folder], sections=sections)
 
 
 def add_report(folder: Path, document: Document) -> str:

@@ -163,14 +163,13 @@ def write_runs(out: Path, folders: Sequence[Path]) -> list[Run]:
     from beaver_ftc.results.folder import result_folder
     from beaver_ftc.results.metrics import as_json
     from beaver_ftc.results.report import write_report
-    from beaver_ftc.studies.mismatch.tables import show_in_reports
+    from beaver_ftc.studies.mismatch.tables import mismatch_section
 
     runs = read_runs(folders)
-    show_in_reports()
     with result_folder(out, "runs") as folder:
         documents = [run.document for run in runs]
         write_files(folder, {"runs.png": figure_of(runs), "runs.json": as_json(documents)})
-        write_report(folder / "runs.html", folders, labels(runs))
+        write_report(folder / "runs.html", folders, labels(runs), [mismatch_section])
     return runs
 
 

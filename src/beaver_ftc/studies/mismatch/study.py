@@ -40,7 +40,7 @@ from beaver_ftc.studies.mismatch.split import (
     split_flight,
 )
 from beaver_ftc.studies.mismatch.states import LOGGED
-from beaver_ftc.studies.mismatch.tables import show_in_reports
+from beaver_ftc.studies.mismatch.tables import mismatch_section
 from beaver_ftc.studies.present.page import Files, write_files
 from beaver_ftc.studies.present.tables import as_csv, finite
 
@@ -83,9 +83,8 @@ def run_mismatch(
         write_documents(folder, scenario, flown.document())
         write_files(folder, _as_files(found, csv_rows(found)))
         if report:
-            show_in_reports()
             write_files(folder / "figures", charts.figures(folder, found, flown, analysis))
-            write_report_files(folder, flown.document())
+            write_report_files(folder, flown.document(), sections=[mismatch_section])
     return found, kept.smallest_constant
 
 

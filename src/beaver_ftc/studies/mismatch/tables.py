@@ -7,7 +7,6 @@ from beaver_ftc.aircraft import AXES
 from beaver_ftc.documents.files import read_json
 from beaver_ftc.results.expectations import value_text, without_underscores
 from beaver_ftc.results.model import Document
-from beaver_ftc.results.report import register_section
 from beaver_ftc.results.verdict import printed
 from beaver_ftc.studies.present import page
 from beaver_ftc.studies.present.tables import number, plain, seconds, tabulated
@@ -156,11 +155,6 @@ def comparison_text(entries: list[Document], recommended: Document, folder: str,
     caption = "worst share of the bound / smallest constant bound in rad/s2"
     table = printed([plain(caption, *tabulated(RUNS, entries))], WIDTH, colour)
     return "\n".join([table, "", *_advice(recommended), f"results      {folder}", ""])
-
-
-def show_in_reports() -> None:
-    """Add the section to the reports of folders that hold a mismatch."""
-    register_section(mismatch_section)
 
 
 def mismatch_section(folder: Path) -> str:

@@ -3,6 +3,7 @@
 What is flown, declared and asked for is the same; only who diagnoses and who controls differs.
 """
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -55,12 +56,12 @@ def false_alarm_of(setting: Changed) -> float:
 def document_of(flights: Mapping[tuple[str, str], Flown], alarms: Sequence[float]) -> Document:
     """A row a case and scheme, and the false alarms of each; alarms: of each of healthy_settings."""
     rows = [_row(case, whose, flown) for (case, whose), flown in flights.items()]
-    each = len(EDGES)
-    counts = [int(sum(alarms[i : i + each])) for i in range(0, len(alarms), each)]
+    settings = zip(healthy_settings(), alarms, strict=True)
+    alarmed = Counter(whose for (whose, _), alarm in settings if alarm)
     return {
         "rows": rows,
-        "healthy_flights": each,
-        "false_alarms": dict(zip(WHOSE, counts, strict=True)),
+        "healthy_flights": len(EDGES),
+        "false_alarms": {whose: alarmed[whose] for whose in WHOSE},
         "paper_better": _better(rows),
     }
 

@@ -4,7 +4,7 @@ Do the conclusions hang on what the paper leaves open? Every choice is changed, 
 statement held against the flights again.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -212,25 +212,21 @@ def _fly(name: str, keys: Mapping[str, Any]) -> Flown:
     return Flown(measure(flight), log, flight.scenario)
 
 
-class LazyFlights(Mapping[str, Flown]):
-    """The published cases in a setting, each flown when a measure asks for it; flown: by keys, shared."""
+class LazyFlights(dict[str, Flown]):
+    """The published cases in a setting, by name, each flown when a measure asks for it. flown: the flights of
+    all settings by their keys, so that a flight that two settings share is flown once."""
 
     def __init__(self, changes: Mapping[str, Any], flown: dict[str, Flown]) -> None:
+        super().__init__()
         self._changes = changes
         self._flown = flown
 
-    def __getitem__(self, name: str) -> Flown:
+    def __missing__(self, name: str) -> Flown:
         keys = keys_of(CASES[name], self._changes)
         known = repr(sorted(keys.items()))
         if known not in self._flown:
             self._flown[known] = _fly(name, keys)
         return self._flown[known]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(CASES)
-
-    def __len__(self) -> int:
-        return len(CASES)
 
 
 def _apt(changes: Mapping[str, Any]) -> Document:

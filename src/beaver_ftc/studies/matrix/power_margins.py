@@ -51,20 +51,25 @@ def about_trim(airspeed_mps: float) -> tuple[LinearModel, np.ndarray, float]:
 
 
 def with_law(A: np.ndarray, power: np.ndarray) -> tuple[np.ndarray, ...]:
-    """The aircraft, the smoothed airspeed, its slow mean and the attitude missed: system matrix F (7, 7), the
-    column b (7,) of manifold pressure in inHg, and the pressure k (7,) that the law asks for."""
-    F = np.zeros((7, 7))
-    F[:4, :4] = A
-    b = np.zeros(7)
-    b[:4] = power
-    F[4, [0, 4]] = np.array([1.0, -1.0]) / POWER.smoothing_s
-    F[5, [4, 5]] = np.array([1.0, -1.0]) / POWER.washout_s
-    F[6, [2, 6]] = 1.0, -1.0 / POWER.attitude_memory_s
-    speed_gain = POWER.speed_gain_inhg_per_mps
-    attitude_gain = np.rad2deg(POWER.attitude_gain_inhg_per_deg)
-    k = np.zeros(7)
-    k[4:] = -speed_gain, speed_gain, attitude_gain
-    return F, b, k
+    """The aircraft x' = A x + power u and the law that commands u, inHg, with the time constants s, w, m and
+    the gains a, c of POWER:
+
+        v' = (V - v) / s,    v0' = (v - v0) / w,    e' = q - e / m,    u = a (v0 - v) + c e
+
+    v: smoothed airspeed; v0: its slow mean; e: missed attitude. Of the states (x, v, v0, e): system matrix
+    F (7, 7), column b (7,) of u, and row k (7,) of the law, u = k (x, v, v0, e).
+    """
+    V, q = STATES.index("airspeed"), STATES.index("q")
+    n = len(STATES)
+    v, v0, e = range(n, n + 3)
+    F = np.zeros((n + 3, n + 3))
+    F[:n, :n] = A
+    F[v, [V, v]] = np.array([1.0, -1.0]) / POWER.smoothing_s
+    F[v0, [v, v0]] = np.array([1.0, -1.0]) / POWER.washout_s
+    F[e, [q, e]] = 1.0, -1.0 / POWER.attitude_memory_s
+    a = POWER.speed_gain_inhg_per_mps
+    c = np.rad2deg(POWER.attitude_gain_inhg_per_deg)
+    return F, np.append(power, np.zeros(3)), np.append(np.zeros(n), (-a, a, c))
 
 
 def loop_response(F: np.ndarray, b: np.ndarray, k: np.ndarray) -> np.ndarray:

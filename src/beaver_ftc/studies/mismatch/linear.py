@@ -13,7 +13,7 @@ import numpy as np
 from beaver_ftc.design import fdc
 from beaver_ftc.design.engine import engine_power_kw, slipstream
 from beaver_ftc.design.model import design_of, jacobian
-from beaver_ftc.design.table import ALPHA
+from beaver_ftc.design.table import AIRSPEED, ALPHA
 from beaver_ftc.documents.files import Document
 from beaver_ftc.plant.adapter import FlightState
 from beaver_ftc.plant.conditions import trimmed
@@ -22,7 +22,10 @@ from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.linear_systems import CHANNELS, CLASSICAL, MODES, Mode, deviation, modes, zeros
 
-_STEP = 1e-30  # complex
+_STEP = 1e-30  # of complex steps
+_V, _FLOW_AT, _RATES_AT, _H = map(fdc.STATES.index, ("airspeed", "alpha", "p", "altitude"))
+_FLOW = slice(_FLOW_AT, _FLOW_AT + 2)  # alpha, beta
+_RATES = slice(_RATES_AT, _RATES_AT + 3)  # p, q, r
 
 
 @dataclass(frozen=True)
@@ -85,16 +88,16 @@ def in_fdc(point: FlightState) -> tuple[np.ndarray, np.ndarray, fdc.Engine]:
 
 
 def designed(scenario: Scenario, point: FlightState, equations: LinearModel) -> LinearModel:
-    """The equations with the rows of p, q and r as the designer holds them."""
+    """The equations with the rows of p, q and r as the designer holds them. Airspeed and altitude act through
+    the air data, of which a complex step gives the derivatives."""
     f_x, f_y, G = designed_derivatives(scenario, point)
     A, B = equations.A.copy(), equations.B.copy()
-    turning = slice(3, 6)
-    A[turning] = 0.0
-    A[turning, 3:6] = f_x
-    A[turning, 1:3] = f_y[:, :2]
-    B[turning] = G
-    for column, step in ((0, (1j * _STEP, 0j)), (11, (0j, 1j * _STEP))):  # airspeed, altitude
-        A[turning, column] = f_y[:, 2:] @ (air_data(point, *step).imag / _STEP)
+    A[_RATES] = 0.0
+    A[_RATES, _RATES] = f_x
+    A[_RATES, _FLOW] = f_y[:, :AIRSPEED]
+    B[_RATES] = G
+    for column, step in ((_V, (1j * _STEP, 0j)), (_H, (0j, 1j * _STEP))):
+        A[_RATES, column] = f_y[:, AIRSPEED:] @ (air_data(point, *step).imag / _STEP)
     return replace(equations, A=A, B=B)
 
 

@@ -164,8 +164,8 @@ class Models:
 
 
 def fault_effects(m: Models, states: States, G: np.ndarray, healthy: np.ndarray) -> Contributions:
-    """The angular acceleration (n, 3) rad/s2 of each fault, weighed with G (n, 3, 4); healthy (n, 4) rad is
-    where they found the surfaces."""
+    """The angular acceleration (n, 3) rad/s2 of each fault of a surface, weighed with G (n, 3, 4); healthy
+    (n, 4) rad is where they found the surfaces."""
     effects: Contributions = {}
     for s, surface in enumerate(SURFACES):
         here = [fault for fault in m.scenario.faults if getattr(fault, "actuator", "") == surface]
@@ -174,6 +174,12 @@ def fault_effects(m: Models, states: States, G: np.ndarray, healthy: np.ndarray)
         for fault, by_rad in moved:
             name = name_of(fault)
             effects[name] = effects.get(name, 0.0) + G[:, :, s] * by_rad[:, None]
+    return effects
+
+
+def unanticipated_effects(m: Models, states: States) -> Contributions:
+    """The angular acceleration (n, 3) rad/s2 of each unanticipated fault: a pitching moment."""
+    effects: Contributions = {}
     for fault in m.scenario.faults:
         if fault.type == UNANTICIPATED:
             extra: Any = fault
@@ -254,27 +260,28 @@ def instantaneous(m: Models, s: States) -> tuple[Contributions, dict[str, Contri
     """All sources but the integration at every frame, and the single faults and single coefficients."""
     healthy = healthy_positions(m.scenario, s.u)
     _, G = responses_at(m.design, s.x, s.y)
-    faults = fault_effects(m, s, G, healthy)
+    moments = unanticipated_effects(m, s)
+    faults = fault_effects(m, s, G, healthy) | moments
     nothing = np.zeros_like(s.x)
     measured = acceleration_at(m.design, s.x_measured, s.y_measured, s.u)
-    ways = (m.design, m.untied, m.whole, m.turning, m.truth)
-    on_the_way = [acceleration_at(model, s.x, s.y, s.effective) for model in ways]
-    simplification, engine, coefficients, inertia = np.diff(on_the_way, axis=0)
-    extra = sum((effect for name, effect in faults.items() if name.startswith("unanticipated")), nothing)
+    tied, untied, whole, turning, truth = (
+        acceleration_at(model, s.x, s.y, s.effective)
+        for model in (m.design, m.untied, m.whole, m.turning, m.truth)
+    )
+    # the truth's inertia turns the extra moment of an unanticipated fault, too
+    extra = sum(moments.values(), nothing) * (m.truth["Qm"] / m.design["Qm"] - 1.0)
     contributions = {
         "sensors": acceleration_at(m.design, s.x, s.y, s.u) - measured,
         "actuators": np.einsum("kas,ks->ka", G, healthy - s.u),
         "fault": sum(faults.values(), nothing),
-        "simplification": simplification,
-        "engine": engine,
-        "coefficients": coefficients,
-        "inertia": inertia + extra * (m.truth["Qm"] / m.design["Qm"] - 1.0),  # of the extra moment, too
+        "simplification": untied - tied,
+        "engine": whole - untied,
+        "coefficients": turning - whole,
+        "inertia": truth - turning + extra,
         "inertia_coupling": inertia_coupling(m, s),
         "sinusoids": sinusoids(m, s),
         "wind_turbulence": wind_turbulence(m, s),
         "earth_rotation": earth(m, s),
     }
-    errors = {
-        name: acceleration_at(one, s.x, s.y, s.effective) - on_the_way[2] for name, one in m.parts.items()
-    }
+    errors = {name: acceleration_at(one, s.x, s.y, s.effective) - whole for name, one in m.parts.items()}
     return contributions, {"fault": faults, "coefficients": errors}

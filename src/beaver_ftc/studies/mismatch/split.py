@@ -8,6 +8,7 @@ import numpy as np
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.design.model import acceleration_at
+from beaver_ftc.design.table import AIRSPEED, ALPHA
 from beaver_ftc.documents.files import Document
 from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import Columns
@@ -150,7 +151,7 @@ def split(scenario: Scenario, log: Log) -> Split:
         details=details,
         eta_bar=np.concatenate([s.eta_bar[1:], s.eta_bar[-1:]]),
         constant=np.array(Declared.of(scenario).constant_rad_s2),
-        place=np.column_stack([s.y[:, 2], s.altitude_m, s.y[:, 0]]),
+        place=np.column_stack([s.y[:, AIRSPEED], s.altitude_m, s.y[:, ALPHA]]),
         frame_s=1.0 / scenario.rate_hz,
     )
 

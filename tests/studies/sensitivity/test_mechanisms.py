@@ -1,6 +1,7 @@
 """`sensitivity --mechanisms`: what is removed, what pairs amount to, and which false alarms have a reason."""
 
 import json
+from functools import partial
 
 import numpy as np
 import pytest
@@ -65,7 +66,7 @@ def test_both_flights_of_a_pair_have_the_same_healthy_loop(mechanism):
     rows = []
     for scenario, withheld in ((healthy, ""), (without_mechanism(healthy, mechanism), mechanism.withheld)):
         log = Columns(*(f"{surface}_cmd_rad" for surface in healthy.airframe.surfaces))
-        fly(scenario, log, watch=mechanisms.watch_of(withheld))
+        fly(scenario, log, watch=partial(mechanisms.withhold, withheld))
         rows.append([*log.values()])
     assert np.array_equal(*rows)
 
@@ -76,7 +77,7 @@ def test_both_flights_of_a_pair_have_the_same_healthy_loop(mechanism):
 ])  # fmt: skip
 def test_what_is_withheld_from_the_law_it_does_not_use(withheld, modes):
     log = Columns("t_s", "flap_cmd_rad")
-    flight = fly(scenario_of(ELEVATOR, 7, DEFAULT), log, watch=mechanisms.watch_of(withheld))
+    flight = fly(scenario_of(ELEVATOR, 7, DEFAULT), log, watch=partial(mechanisms.withhold, withheld))
     found = measure(flight)
     assert found.isolation.correct
     assert [change.mode for change in found.supervisor] == modes

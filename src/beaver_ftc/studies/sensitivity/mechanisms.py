@@ -6,6 +6,7 @@ combinations of fault, bandwidth of the law, undeclared error and instruments; e
 """
 
 from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from itertools import product
 from math import hypot
 from typing import Any, NamedTuple
@@ -184,31 +185,35 @@ def without_key(mechanism: Mechanism) -> str:
     return f"without {mechanism.key}" if mechanism.without or mechanism.withheld else mechanism.system
 
 
-def system_of(key: str) -> str:
-    """The system of an outcome's key: "default" of "default" and of "without default: bank of poles"."""
-    return key.partition(": ")[0].rpartition(" ")[2]
+class Outfit(NamedTuple):
+    """What was flown, in words: a system, and which of its mechanisms."""
+
+    system: str
+    mechanisms: str = "all"
 
 
-def mechanisms_of(key: str) -> str:
-    """The mechanisms of an outcome's key: "without bank of poles"; "all" if it names the system alone."""
-    first, _, rest = key.partition(" ")
-    return f"{first} {rest.partition(': ')[2]}" if rest else "all"
+FLOWN = {  # by the key of its outcome
+    **{with_key(each): Outfit(each.system, f"with {each.name}") for each in MECHANISMS},
+    **{without_key(each): Outfit(each.system, f"without {each.name}") for each in MECHANISMS},
+    **{system: Outfit(system) for system in SYSTEMS},  # also of mechanisms that are there anyway
+}
 
 
-def watch_of(withheld: str) -> Callable[[Loop], Callable[[], None]] | None:
-    """A function for `fly` that withholds something from the law as the flight begins; None for nothing."""
-
-    def begin(loop: Loop) -> Callable[[], None]:
+def withhold(withheld: str, loop: Loop) -> Callable[[], None]:
+    """Watch a flight (`fly`): withhold something from its law as it begins. Nothing is due at its end."""
+    if withheld:
         withhold_from_law(loop.frames[0], withheld)
-        return lambda: None
+    return _do_nothing
 
-    return begin if withheld else None
+
+def _do_nothing() -> None:
+    """At the end of a flight."""
 
 
 def outcome_of(scenario: Scenario, withheld: str = "") -> Document:
     """The outcome of a flight. withheld: from the law, as in `withhold_from_law`."""
     try:
-        found = measure(fly(scenario, watch=watch_of(withheld)))
+        found = measure(fly(scenario, watch=partial(withhold, withheld)))
     except BeaverFtcError as error:
         return FAILED | {"error": str(error)}
     detection = found.detection

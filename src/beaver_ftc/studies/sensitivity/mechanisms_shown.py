@@ -9,7 +9,7 @@ from beaver_ftc.results.model import Document
 from beaver_ftc.studies.present.figures import GRID, SERIES, draw_estimates, label_edges, panels
 from beaver_ftc.studies.present.page import Heading, Part, Pictures, Table, study_files, table, versions_line
 from beaver_ftc.studies.present.tables import Columns, bare_percent, estimate, number, number_or_never
-from beaver_ftc.studies.sensitivity.mechanisms import mechanisms_of, system_of
+from beaver_ftc.studies.sensitivity.mechanisms import FLOWN
 from beaver_ftc.studies.sensitivity.systems import DEFAULT, PAPER
 
 if TYPE_CHECKING:
@@ -146,7 +146,8 @@ MEDIANS = (
     *_with_interval("error ratio", "tracking_ratio"),
 )
 ALARMS = (
-    ("system", "flown", system_of), ("mechanisms", "flown", mechanisms_of), ("false alarms", "count"),
+    ("system", lambda row: FLOWN[row["flown"]].system),
+    ("mechanisms", lambda row: FLOWN[row["flown"]].mechanisms), ("false alarms", "count"),
     ("with an undeclared error", "undeclared"), ("certified", _certified),
     ("unexplained", lambda row: str(row["unexplained"]) if row["worst_case"] else "-"),
 )  # fmt: skip

@@ -50,6 +50,10 @@ _ACMI_COLUMNS = (
 
 ColumnsByTopic = dict[str, log.Values]
 """Fields of each message; every message has the stamps `t_s`."""
+Stamps = NDArray[np.int64]
+"""Time of each row, us."""
+Exports = dict[str, Callable[[], None]]
+"""By the name of an export the function that writes it."""
 
 RECORDING_FILE_OF_KIND = {"table": "flight.csv", "ulog": "flight.ulg", "ardupilot": "flight.bin"}
 # What each kind calls what it records, in its order: `topic.field`, or the column of a table. i: place from 0
@@ -91,14 +95,14 @@ _FIRST_STAMP_US = 1_000_000
 
 def exports_of(
     folder: Path, aircraft: Aircraft, document: Document, kinds: Collection[str], recording: str | None
-) -> dict[str, Callable[[], None]]:
+) -> Exports:
     """By its name, the function that writes each export of a result folder that has its log.
 
     document: the metrics, empty if there are none: then there is no ACMI. kinds: of "csv" and "acmi".
     recording: of RECORDING_FILE_OF_KIND.
     """
     log_path = folder / "log.parquet"
-    exports: dict[str, Callable[[], None]] = {}
+    exports: Exports = {}
     if "csv" in kinds:
         exports["log.csv"] = partial(write_csv, log_path, folder / "log.csv")
     if "acmi" in kinds and document:
@@ -233,14 +237,14 @@ def _flow_mapping(entries: Mapping[str, object], form: str) -> str:
     return f"{{{', '.join(f'{key}: {form.format(value)}' for key, value in entries.items())}}}"
 
 
-def _write_table(path: Path, t_us: NDArray[np.int64], topics: ColumnsByTopic) -> None:
+def _write_table(path: Path, t_us: Stamps, topics: ColumnsByTopic) -> None:
     import pyarrow as pa
     from pyarrow import csv
 
     csv.write_csv(pa.table({"t_s": (t_us - _FIRST_STAMP_US) * 1e-6, **topics[""]}), path)
 
 
-def _write_ulog(path: Path, t_us: NDArray[np.int64], topics: ColumnsByTopic) -> None:
+def _write_ulog(path: Path, t_us: Stamps, topics: ColumnsByTopic) -> None:
     """Definitions and subscriptions, then every message in the order of time."""
     head = [b"ULog\x01\x12\x35\x01" + np.uint64(t_us[0]).tobytes()]
     for topic, fields in topics.items():
@@ -268,7 +272,7 @@ def _ulog_message(kind: str, body: bytes) -> bytes:
     return np.uint16(len(body)).tobytes() + kind.encode() + body
 
 
-def _write_dataflash(path: Path, t_us: NDArray[np.int64], topics: ColumnsByTopic) -> None:
+def _write_dataflash(path: Path, t_us: Stamps, topics: ColumnsByTopic) -> None:
     """FMT messages (the first describes FMT itself), then every message in the order of time."""
     head = [_dataflash_fmt_message(128, 89, "FMT", "BBnNZ", "Type,Length,Name,Format,Columns")]
     packed = []
@@ -286,7 +290,7 @@ def _dataflash_fmt_message(number: int, length: int, name: str, layout: str, lab
     return bytes([0xA3, 0x95, 128, number, length]) + b"".join(padded)
 
 
-def _packed_messages(head: bytes, t_us: NDArray[np.int64], fields: log.Values) -> np.ndarray:
+def _packed_messages(head: bytes, t_us: Stamps, fields: log.Values) -> np.ndarray:
     """The messages of one topic: each its head, the stamp, and the fields as doubles."""
     layout = [("head", "u1", (len(head),)), ("t", "<u8"), ("v", "<f8", (len(fields),))]
     rows = np.zeros(len(t_us), dtype=layout)
@@ -302,6 +306,6 @@ def _interleave_messages(topics: Sequence[np.ndarray]) -> bytes:
     return np.hstack(rows).tobytes()
 
 
-_WRITER_OF_KIND: dict[str, Callable[[Path, NDArray[np.int64], ColumnsByTopic], None]] = {
+_WRITER_OF_KIND: dict[str, Callable[[Path, Stamps, ColumnsByTopic], None]] = {
     "table": _write_table, "ulog": _write_ulog, "ardupilot": _write_dataflash,
 }  # fmt: skip

@@ -251,11 +251,15 @@ def surfaces_by_kind(names: Sequence[str]) -> dict[str, list[str]]:
     return found
 
 
-def _labels_and_roles_by_kind(names: Sequence[str]) -> dict[str, list[tuple[str, str, str]]]:
+Labelled = dict[str, list[tuple[str, str, str]]]
+"""By kind of surface: name, what to call it, and its role."""
+
+
+def _labels_and_roles_by_kind(names: Sequence[str]) -> Labelled:
     """By kind, or all in one where each may have a look of its own: name, what to call it, and its role."""
     if names and len(names) <= len(SURFACE_ROLES):
         return {"": [(name, name, role) for name, role in zip(names, SURFACE_ROLES, strict=False)]}
-    said: dict[str, list[tuple[str, str, str]]] = {}
+    said: Labelled = {}
     for kind, alike in surfaces_by_kind(names).items():
         for name, role in zip(alike, SURFACE_ROLES * len(alike), strict=False):
             others = " ".join(word for word in name.split("_") if word != kind)

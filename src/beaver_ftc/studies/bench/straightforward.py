@@ -28,6 +28,8 @@ LEAST_EFFECTIVENESS = 0.1
 MAX_DEFLECTION_RAD = 0.44  # of aileron, elevator and rudder alike: about 25 deg
 
 
+Signals = dict[str, float]  # true signals by their name in the log
+
 # xdot = I^-1 (M - x cross I x), x rad/s. M, N m: a sum of terms, each a value times powers of SIGNALS, into
 # one coefficient (Cl, Cm, Cn), alone or as the factor of a surface.
 INERTIA = np.array(
@@ -45,7 +47,7 @@ INTO = np.array([  # (coefficient, none or surface, term): 1 where a term goes
 ], float)  # fmt: skip
 
 
-def f_and_G(x: np.ndarray, truth: dict[str, float]) -> tuple[np.ndarray, np.ndarray]:
+def f_and_G(x: np.ndarray, truth: Signals) -> tuple[np.ndarray, np.ndarray]:
     """f (3,) rad/s2 and G (3, 4) rad/s2 per rad at the rates x (3,) rad/s."""
     rates = x * LENGTHS_M / truth["airspeed_mps"] * np.array([0.5, 1.0, 0.5])
     signals = np.array([truth["alpha_rad"], truth["beta_rad"], *rates, truth["dpt"]])
@@ -220,7 +222,7 @@ class Straightforward:
         self.u = np.array(list(self.start.commands.values()))
         self.law.model[0] = [getattr(self.start.state, f"{axis}_rad_s") for axis in AXES]
         self.then: tuple[np.ndarray, ...] | None = None
-        self.log: list[dict[str, float]] = []
+        self.log: list[Signals] = []
 
     def fly(self, frames: int) -> None:
         """Fly on."""
@@ -253,7 +255,7 @@ class Straightforward:
         earth = EARTH_RATE_RAD_S * (2.0 * np.abs(x).sum() + EARTH_RATE_RAD_S)
         return np.array(declared.coupling) * np.abs(COUPLING * cross) + declared.constant_rad_s2 + earth
 
-    def row(self, truth: dict[str, float], x: np.ndarray, reference: np.ndarray) -> dict[str, float]:
+    def row(self, truth: Signals, x: np.ndarray, reference: np.ndarray) -> Signals:
         """A row of the log."""
         e = self.estimators
         row = truth | {f"{s}_cmd_rad": u for s, u in zip(SURFACES, self.u, strict=True)}

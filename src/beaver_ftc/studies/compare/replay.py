@@ -21,12 +21,17 @@ from beaver_ftc.plugins import DETECTORS, made
 from beaver_ftc.results.metrics import Onset, Truth
 from beaver_ftc.scenario.schema import Scenario
 
+Rises = tuple[tuple[float, float], ...]
+"""(time s, value) of each value that is larger than all before it."""
+Seen = list[tuple[Measured, np.ndarray]]
+"""What a detector is shown in each frame: the measured signals, and the command (surfaces,) rad."""
+
 
 class Recorder:
     """A detector that keeps what it is shown and never raises an alarm."""
 
     def __init__(self) -> None:
-        self.seen: list[tuple[Measured, np.ndarray]] = []
+        self.seen: Seen = []
 
     def reset(self, context: Context) -> None:
         """Keep the context as well: a detector that replays the flight needs it."""
@@ -48,10 +53,10 @@ class Trace:
     """
 
     before: float
-    records: tuple[tuple[float, float], ...]
+    records: Rises
     faulted: bool
     healthy_s: float
-    rises: tuple[tuple[float, float], ...] = ()
+    rises: Rises = ()
 
     def fault_free_s(self, level: float) -> float:
         """Time in which an alarm would have been false: until the fault, the end or the alarm itself."""
@@ -82,7 +87,7 @@ class Recording:
     """
 
     context: Context
-    seen: list[tuple[Measured, np.ndarray]]
+    seen: Seen
     built_in: np.ndarray
     onset: Onset
     known: np.ndarray
@@ -138,7 +143,7 @@ def replay_together(recordings: Sequence[Recording], scheme: str) -> list[Trace]
     return traces
 
 
-def _statistics(detector: Detector, seen: Sequence[tuple[Measured, np.ndarray]]) -> list[float]:
+def _statistics(detector: Detector, seen: Seen) -> list[float]:
     """The statistic of each frame, of which alone the detector is shown a copy; that of a detector with an
     alarm alone is well above the level, or well below."""
     verdicts = [detector.step(*deepcopy(shown)) for shown in seen]
@@ -172,7 +177,7 @@ def trace(recording: Recording, statistic: np.ndarray) -> Trace:
     )  # fmt: skip
 
 
-def _records(t: np.ndarray, values: np.ndarray) -> tuple[tuple[float, float], ...]:
+def _records(t: np.ndarray, values: np.ndarray) -> Rises:
     """(time, value) of each value (n,) that is larger than all before it."""
     largest = np.maximum.accumulate(values) if values.size else values
     news = np.flatnonzero(np.diff(largest, prepend=-inf) > 0.0)

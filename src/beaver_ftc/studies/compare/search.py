@@ -35,6 +35,7 @@ LITTLE = 0.01  # share of the lowest cost
 
 Values = dict[str, float]
 Cost = Callable[[Values], float]
+Ranges = Mapping[str, Range]
 
 
 @dataclass(frozen=True)
@@ -75,15 +76,13 @@ _SCALES: Mapping[str, tuple[Callable[[float], float], Callable[[float], float]]]
 }
 
 
-def on_edge(values: Values, ranges: Mapping[str, Range]) -> dict[str, bool]:
+def on_edge(values: Values, ranges: Ranges) -> dict[str, bool]:
     """Parameters that lie within `EDGE` of a limit of their range: whether it is the upper one."""
     places = {name: on_scale(of, values[name]) for name, of in ranges.items()}
     return {name: place > 0.5 for name, place in places.items() if not EDGE < place < 1.0 - EDGE}
 
 
-def search(
-    cost: Cost, ranges: Mapping[str, Range], start: Values, trials: int, seed: int, restarts: int
-) -> Found:
+def search(cost: Cost, ranges: Ranges, start: Values, trials: int, seed: int, restarts: int) -> Found:
     """The values with the lowest cost, by searches of so many trials each. restarts: the most after the
     first; a widened range does not count. Raises SimulationFailed if one has to be widened too often."""
     ranges = dict(ranges)
@@ -119,7 +118,7 @@ def widen(of: Range, upper: bool) -> Range:
 
 
 def _searched(
-    cost: Cost, ranges: Mapping[str, Range], start: Values, known: float | None, trials: int, seed: int
+    cost: Cost, ranges: Ranges, start: Values, known: float | None, trials: int, seed: int
 ) -> tuple[Values, float, list[float]]:
     """One search, as the module says: the values of the lowest cost (of several within `TIE` of it, those
     nearest the middle), that cost, and the costs of all trials. known: the cost of the start, if it has been

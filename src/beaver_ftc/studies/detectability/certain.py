@@ -35,6 +35,8 @@ SETTLED_S = 2.0  # the start of a reference is a step of its own
 BISECTIONS = 16  # magnitudes to 2^-16
 AMPLITUDES = ("amplitude_deg_s", "values_deg_s")  # parameters of a reference
 MAGNITUDES = ("detected", "detected_median", "isolated", "isolated_median")
+Log = Mapping[str, np.ndarray]
+"""Values (n,) by column, or (n, 3) rad/s2 by surface."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +46,7 @@ class Excitation:
     rad/s2 per rad.
     """
 
-    moment: Mapping[str, np.ndarray]
+    moment: Log
     bound: np.ndarray
     dt: float
     G: np.ndarray = field(default_factory=lambda: np.zeros((3, 0)))
@@ -80,9 +82,7 @@ def excitation(scenario: Scenario) -> Excitation:
     return Excitation(of, bound[first:], 1.0 / scenario.rate_hz, G[first])
 
 
-def moments_of(
-    scenario: Scenario, log: Mapping[str, np.ndarray]
-) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray]:
+def moments_of(scenario: Scenario, log: Log) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray]:
     """Along a flight of n frames, by the design model: the moment of each surface that leads an axis, (n, 3)
     rad/s2 by its name; the bound (n, 3) rad/s2; and G (n, 3, surfaces) rad/s2 per rad."""
     aircraft = scenario.airframe
@@ -97,7 +97,7 @@ def moments_of(
     return of, bound, G
 
 
-def _side_by_side(log: Mapping[str, np.ndarray], *names: str) -> np.ndarray:
+def _side_by_side(log: Log, *names: str) -> np.ndarray:
     return np.column_stack([log[name] for name in names])
 
 

@@ -180,14 +180,18 @@ def _comparison(rows: Sequence[Row]) -> list[Document]:
     return compared
 
 
-def _found_by_seed(rows: Sequence[Row], within_s: float) -> dict[int, int]:
+BySeed = dict[int, int]
+"""Number of faults found, by seed."""
+
+
+def _found_by_seed(rows: Sequence[Row], within_s: float) -> BySeed:
     return {
         seed: sum(or_never(row["delay_s"]) <= within_s + 1e-9 for row in of)
         for (seed,), of in grouped(rows, "seed").items()
     }
 
 
-def _duel(ours: dict[int, int], theirs: dict[int, int]) -> Document:
+def _duel(ours: BySeed, theirs: BySeed) -> Document:
     pairs = [(found, theirs[seed]) for seed, found in ours.items() if seed in theirs]
     wins, losses, p = duel(pairs)
     verdict = "even" if p >= SIGNIFICANT else "better" if wins > losses else "worse"

@@ -58,6 +58,10 @@ class Block(NamedTuple):
     seed: int
 
 
+Faults = tuple[tuple[str, float], ...]
+"""Surface and magnitude of each loss."""
+
+
 @dataclass(frozen=True)
 class Grid:
     """The survey. blocks: flights with a fault a cell; healthy_h: without one, a condition; per_h: false
@@ -75,7 +79,7 @@ class Grid:
     where: Document = field(default_factory=dict, hash=False)
 
     @property
-    def faults(self) -> tuple[tuple[str, float], ...]:
+    def faults(self) -> Faults:
         """Every surface with every magnitude."""
         return tuple(product(self.surfaces, self.magnitudes))
 
@@ -221,7 +225,7 @@ class Watched:
     """
 
     block: Block
-    faults: tuple[tuple[str, float], ...] = ()
+    faults: Faults = ()
     traces: dict[str, list[Trace]] = field(default_factory=dict)
     deflections: list[list[float]] = field(default_factory=list)
     failures: list[str] = field(default_factory=list)

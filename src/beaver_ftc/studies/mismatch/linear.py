@@ -28,6 +28,10 @@ _FLOW = slice(_FLOW_AT, _FLOW_AT + 2)  # alpha, beta
 _RATES = slice(_RATES_AT, _RATES_AT + 3)  # p, q, r
 
 
+ByMode = dict[str, float]
+"""A number for each of MODES."""
+
+
 @dataclass(frozen=True)
 class LinearAnalysis:
     """Linear models over the eight classical states: by name, the models and their modes; a second opinion.
@@ -38,14 +42,14 @@ class LinearAnalysis:
     point: FlightState
     models: dict[str, LinearModel]
     modes: dict[str, dict[str, Mode]]
-    own_deviation: dict[str, float]
+    own_deviation: ByMode
 
     def channel(self, name: str, surface: str, rate: str) -> tuple[np.ndarray, np.ndarray, int]:
         """A of a model, the column of a surface, and the place of a rate among the states."""
         model = self.models[name]
         return model.A, model.B[:, model.inputs.index(surface)], model.states.index(rate)
 
-    def deviation(self, name: str) -> dict[str, float]:
+    def deviation(self, name: str) -> ByMode:
         """How far each mode of a model is from the truth's, as a share of its magnitude."""
         truth = self.modes["truth"]
         return {mode: deviation(self.modes[name][mode].pole, truth[mode].pole) for mode in MODES}
@@ -64,7 +68,7 @@ def analyse(scenario: Scenario) -> LinearAnalysis:
     return LinearAnalysis(point, models, by_name, own_deviation(scenario, point))
 
 
-def own_deviation(scenario: Scenario, point: FlightState) -> dict[str, float]:
+def own_deviation(scenario: Scenario, point: FlightState) -> ByMode:
     """JSBSim's own linearisation against the FDC equations, per mode, at `point` without its sideslip."""
     straight = replace(point, beta_rad=0.0)
     found, reference = (modes(model(scenario, straight).of(CLASSICAL).A) for model in (own, fdc_model))

@@ -75,6 +75,9 @@ SOURCES = (
 LOSS = "loss_of_effectiveness"
 ENGINE_TERMS = tuple(term.name for term in load().moments if "dpt" in dict(term.of))
 Contributions = dict[str, np.ndarray]
+"""Angular acceleration (n, 3) rad/s2 by source, or by part of a source."""
+Parts = Iterator[tuple[Any, np.ndarray]]
+"""Each fault of a surface, and its part of the deflection (n,) rad."""
 
 
 def healthy_positions(scenario: Scenario, commands: np.ndarray) -> np.ndarray:
@@ -200,7 +203,7 @@ def share(fault: Any, t_s: np.ndarray) -> np.ndarray:
     return np.where(is_in_force(fault, t_s), grown, 0.0)
 
 
-def _lost(faults: list, states: States, position: np.ndarray) -> Iterator[tuple[Any, np.ndarray]]:
+def _lost(faults: list, states: States, position: np.ndarray) -> Parts:
     """The part of the effective deflection that each loss takes, (n,) rad, after those before it."""
     remaining = np.ones_like(position)
     for fault in faults:
@@ -210,7 +213,7 @@ def _lost(faults: list, states: States, position: np.ndarray) -> Iterator[tuple[
             yield fault, -taken * position
 
 
-def _displaced(faults: list, t_s: np.ndarray, way: np.ndarray) -> Iterator[tuple[Any, np.ndarray]]:
+def _displaced(faults: list, t_s: np.ndarray, way: np.ndarray) -> Parts:
     """The way of the surface, (n,) rad, by the other fault that moves it: the one that struck last, also if
     its effect remains after a repair."""
     order = sorted((fault for fault in faults if fault.type != LOSS), key=lambda fault: fault.at_s)

@@ -63,9 +63,13 @@ def seconds(value: float | None, none: str = "never") -> str:
     return none if value is None else f"{value:.2f} s"
 
 
-def grouped(rows: Iterable[Document], *names: str) -> dict[tuple[Any, ...], list[Document]]:
+Groups = dict[tuple[Any, ...], list[Document]]
+"""Rows by the values of some of their columns."""
+
+
+def grouped(rows: Iterable[Document], *names: str) -> Groups:
     """Rows by the values of some columns, in order of appearance."""
-    groups: dict[tuple[Any, ...], list[Document]] = {}
+    groups: Groups = {}
     for row in rows:
         groups.setdefault(tuple(row[name] for name in names), []).append(row)
     return groups

@@ -31,12 +31,16 @@ AFTER_S = 18.0  # flown on after the fault, s
 SETTLED_S = 2.0  # from rest, or from a fault, to steady tracking: four error time constants
 
 
+Changes = Mapping[str, Any]
+"""Values by dotted scenario key."""
+
+
 @dataclass(frozen=True)
 class Changed:
     """A change of the published setting, as dotted scenario keys, and where the paper shows it."""
 
     name: str
-    changes: Mapping[str, Any]
+    changes: Changes
     shown_in: str
 
 
@@ -45,7 +49,7 @@ PUBLISHED, VARIANTS = (
     tuple(Changed(name, changes, _FILE["shown_in"].get(name, "")) for name, changes in _FILE[these].items())
     for these in ("published", "variants")
 )
-OURS: Mapping[str, Any] = _FILE["ours"]  # what makes the published setting our default scheme and law
+OURS: Changes = _FILE["ours"]  # what makes the published setting our default scheme and law
 GAINS = tuple(  # every gain of the published scheme and law, halved and doubled
     Changed(f"{gain.key.split('.')[0]} {gain.name} {how}", {gain.key: share * gain.default}, gain.name)
     for gain in gains()
@@ -186,12 +190,12 @@ class Flown:
         return float(alone.sum() * self.frame_s)
 
 
-def fly_case(case: Changed, changes: Mapping[str, Any] | None = None) -> Flown:
+def fly_case(case: Changed, changes: Changes | None = None) -> Flown:
     """Fly a case, with further changes to the choices."""
     return _fly(case.name, keys_of(case, changes or {}))
 
 
-def keys_of(case: Changed, changes: Mapping[str, Any]) -> Document:
+def keys_of(case: Changed, changes: Changes) -> Document:
     """The dotted keys of a case with further changes: two with the same keys are the same flight."""
     merged = _apt({**case.changes, **changes})
     size = merged.pop(SIZE, PUBLISHED_LOSS)
@@ -201,12 +205,12 @@ def keys_of(case: Changed, changes: Mapping[str, Any]) -> Document:
     return merged | ({"faults": faults} if "faults" in merged else {}) | later
 
 
-def _struck(fault: Mapping[str, Any], size: float, at_s: float) -> Document:
+def _struck(fault: Changes, size: float, at_s: float) -> Document:
     """The size and instant of a fault; a slight loss, and what is no loss, keep theirs."""
     return {"at_s": at_s} | ({"magnitude": size} if fault.get("magnitude") == PUBLISHED_LOSS else {})
 
 
-def _fly(name: str, keys: Mapping[str, Any]) -> Flown:
+def _fly(name: str, keys: Changes) -> Flown:
     log = Columns()
     flight = fly(scenario(name, keys), log)
     return Flown(measure(flight), log, flight.scenario)
@@ -216,7 +220,7 @@ class LazyFlights(dict[str, Flown]):
     """The published cases in a setting, by name, each flown when a measure asks for it. flown: the flights of
     all settings by their keys, so that a flight that two settings share is flown once."""
 
-    def __init__(self, changes: Mapping[str, Any], flown: dict[str, Flown]) -> None:
+    def __init__(self, changes: Changes, flown: dict[str, Flown]) -> None:
         super().__init__()
         self._changes = changes
         self._flown = flown
@@ -229,7 +233,7 @@ class LazyFlights(dict[str, Flown]):
         return self._flown[known]
 
 
-def _apt(changes: Mapping[str, Any]) -> Document:
+def _apt(changes: Changes) -> Document:
     """The changes without options of the published scheme or law where another one flies."""
     others = [
         f"{options}."

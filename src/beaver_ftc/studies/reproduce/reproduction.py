@@ -139,6 +139,7 @@ def document_of(rows: Sequence[Document]) -> Summary:
 
 Pairs = list[tuple[float, float]]
 """Of each of MEASURED its number in a setting, and that without its mechanism."""
+BySetting = Mapping[str, Pairs]
 
 
 def _judged(claim: Claim, by_setting: Mapping[str, tuple[float, float]]) -> Document:
@@ -212,7 +213,7 @@ def _ablations(claims: list[Document]) -> list[Document]:
     return rows
 
 
-def _gains(found: Mapping[str, Pairs]) -> list[Document]:
+def _gains(found: BySetting) -> list[Document]:
     """A row a gain: the claims that no longer hold when it is halved and doubled. found: by setting."""
     rows = []
     for gain in gains():
@@ -221,7 +222,7 @@ def _gains(found: Mapping[str, Pairs]) -> list[Document]:
     return rows
 
 
-def _sensitivity(found: Mapping[str, Pairs]) -> list[Document]:
+def _sensitivity(found: BySetting) -> list[Document]:
     """A row a setting of ELSEWHERE: the claims that no longer hold, and those that hold without their
     mechanism as well. found: by setting."""
     return [
@@ -235,7 +236,7 @@ def _sensitivity(found: Mapping[str, Pairs]) -> list[Document]:
     ]
 
 
-def _also_without(found: Mapping[str, Pairs], setting: str) -> list[Document]:
+def _also_without(found: BySetting, setting: str) -> list[Document]:
     """The testable claims that hold in a setting without their mechanism as well, but not as published."""
     pairs = zip(MEASURED, found[setting], found[AS_PUBLISHED.name], strict=True)
     return [
@@ -255,7 +256,7 @@ def _claim_row(claim: Claim, number: float) -> Document:
     }
 
 
-def _missed(found: Mapping[str, Pairs], setting: str) -> list[Document]:
+def _missed(found: BySetting, setting: str) -> list[Document]:
     """The claims that hold as published and no longer in a setting, with the number there."""
     pairs = zip(MEASURED, found[AS_PUBLISHED.name], found[setting], strict=True)
     return [

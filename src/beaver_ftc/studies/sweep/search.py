@@ -30,8 +30,11 @@ WEIGHT = 0.7  # [Storn1997] recommend 0.4 to 1
 CROSSOVER = 0.9  # and, for few dependent keys, 0.9
 DEPARTED_DEG_S = 1e6  # above all tracking errors: the score of a flight that loses the aircraft at its start
 
+Row = Mapping[str, Any]
+"""A flight of the table, by column."""
 
-def delay_score(row: Mapping[str, Any]) -> float:
+
+def delay_score(row: Row) -> float:
     """Detection delay, s; of a missed fault, the time it stayed undetected."""
     at_s = row["fault.at_s"]
     if row["detection.delay_s"] is not None:
@@ -41,7 +44,7 @@ def delay_score(row: Mapping[str, Any]) -> float:
     return row["flown_s"] - at_s
 
 
-def tracking_score(row: Mapping[str, Any]) -> float:
+def tracking_score(row: Row) -> float:
     """Largest RMS tracking error after the fault, deg/s; losing the aircraft is worse, the earlier."""
     if row["status"] == DEPARTED:
         return DEPARTED_DEG_S - row["flown_s"]
@@ -49,14 +52,14 @@ def tracking_score(row: Mapping[str, Any]) -> float:
     return -math.inf if None in after else max(after)
 
 
-OBJECTIVES: dict[str, Callable[[Mapping[str, Any]], float]] = {
+OBJECTIVES: dict[str, Callable[[Row], float]] = {
     "delay": delay_score,
     "false_alarm": itemgetter("worst_residual_ratio"),  # 1 is a false alarm
     "tracking": tracking_score,
 }
 
 
-def score(objective: str, row: Mapping[str, Any]) -> float:
+def score(objective: str, row: Row) -> float:
     """The number that the search maximises; minus infinity for a flight without metrics."""
     return -math.inf if row["frames"] is None else float(OBJECTIVES[objective](row))
 

@@ -13,6 +13,9 @@ from beaver_ftc.studies.sweep.outcomes import Flights
 
 OF_EACH_KIND = 3
 
+Candidates = Iterator[tuple[int, str]]
+"""Position of each flight, and what is bad about it."""
+
 
 def worst_flights(flights: Flights, sweep: Sweep, command: str) -> list[Document]:
     """A few flights of each bad kind, each once: `run`, `name`, `why` (all that is bad), `replay`."""
@@ -39,7 +42,7 @@ def replay_command(source: str, out: Path, search: str | None = None) -> str:
     return shlex.join(words)
 
 
-def _candidates(flights: Flights) -> Iterator[tuple[int, str]]:
+def _candidates(flights: Flights) -> Candidates:
     """(position, what is bad about it), the worst kind first."""
     faulted = flights.faulted
     named = flights["isolation.fault"]
@@ -59,11 +62,11 @@ def _candidates(flights: Flights) -> Iterator[tuple[int, str]]:
     yield from _largest(ratio, lambda i: f"residual {ratio[i]:.4g} of its threshold without a fault")
 
 
-def _first(which: np.ndarray, why: Callable[[int], str]) -> Iterator[tuple[int, str]]:
+def _first(which: np.ndarray, why: Callable[[int], str]) -> Candidates:
     return ((i, why(i)) for i in np.flatnonzero(which)[:OF_EACH_KIND].tolist())
 
 
-def _largest(values: np.ndarray, why: Callable[[int], str]) -> Iterator[tuple[int, str]]:
+def _largest(values: np.ndarray, why: Callable[[int], str]) -> Candidates:
     largest = np.argsort(-values, kind="stable")[:OF_EACH_KIND]
     for i in largest[np.isfinite(values[largest])].tolist():
         alike = int(np.isclose(values, values[i], rtol=1e-9, atol=0.0).sum())

@@ -177,7 +177,7 @@ def _rows_at_acmi_rate(source: log.Log, columns: tuple[str, ...]) -> Iterator[di
 
 
 def write_recording(
-    log_path: Path, travel_rad: dict[str, float], kind: str, folder: Path, signals: Sequence[str] = ()
+    log_path: Path, travel_rad: dict[str, float], kind: str, folder: Path, signals: Sequence[str]
 ) -> None:
     """Write a flight's log as `kind` (of RECORDING_FILE_OF_KIND) with its vehicle.yaml into a folder.
 

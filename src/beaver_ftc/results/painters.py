@@ -25,9 +25,9 @@ Painters = Sequence[Connection]
 
 
 @contextmanager
-def painters(wanted: bool = True) -> Iterator[Painters]:
-    """Processes that draw until the end of the block; none where figures are not wanted or not drawn so."""
-    if not wanted or not _can_fork():
+def painters() -> Iterator[Painters]:
+    """Processes that draw until the end of the block; none where this process cannot be forked."""
+    if not _can_fork():
         yield ()
         return
     fork = multiprocessing.get_context("fork")

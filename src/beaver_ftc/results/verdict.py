@@ -291,7 +291,7 @@ def _outside_class_text(metrics: Metrics) -> str:
     return f"{outside}: outside the declared class, so that it cannot be named; {cure}"
 
 
-def _fault_text(fault: Fault | None, faults: Sequence[DeclaredFault] = ()) -> str:
+def _fault_text(fault: Fault | None, faults: Sequence[DeclaredFault]) -> str:
     """A fault with its size and times, and when others of `faults` mask it. Documents of earlier versions
     have neither size nor end."""
     if fault is None:

@@ -1,17 +1,20 @@
 """The cost of the flights of sweeps, by kind and by part of a flight."""
 
 import time
-from typing import NamedTuple
+from collections import deque
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from beaver_ftc.loop.loop import Loop
+from beaver_ftc.loop.outcome import Landing
 from beaver_ftc.plant import conditions
 from beaver_ftc.results.metrics import measure
 from beaver_ftc.results.model import Document
 from beaver_ftc.scenario.sweeps import Sweep, load_sweep
 from beaver_ftc.studies.sweep.one_flight import row_of, scenario_of
-from beaver_ftc.studies.sweep.sampling import Plan
+from beaver_ftc.studies.sweep.sampling import Assignment, Plan
 
 STAGES = ("scenario", "aircraft, trim, record", "frames", "metrics and row")
 Taken = tuple[np.ndarray, int, float]
@@ -68,7 +71,7 @@ def by_kind(rounds: int) -> dict[str, Document]:
 
 
 def _flown(sweep: Sweep, kind: Kind, run: int) -> Taken:
-    """Seconds of each part of one flight, JSBSim frames flown, and seconds of as many by JSBSim alone.
+    """Seconds of each of STAGES of one flight, JSBSim frames flown, and seconds of as many by JSBSim alone.
 
     All that `sweep` does for a flight. Its trim is a new one each time, or kept where flights begin alike.
     """
@@ -76,28 +79,38 @@ def _flown(sweep: Sweep, kind: Kind, run: int) -> Taken:
     conditions.forget_trims()
     if kind.alike:
         conditions.find_trim(scenario_of(sweep, assignment))
-    marks = [time.process_time()]
-    scenario = scenario_of(sweep, assignment)
-    marks.append(time.process_time())
+    took_s: list[float] = []
+
+    def timed(stage: Callable[[], Any]) -> Any:
+        began_s = time.process_time()
+        made = stage()
+        took_s.append(time.process_time() - began_s)
+        return made
+
+    scenario = timed(lambda: scenario_of(sweep, assignment))
     if kind.changes:  # not a part of a flight that a sweep makes
         scenario = scenario.with_(kind.changes)
-        marks = [marks[0] + time.process_time() - marks[1], time.process_time()]
-    loop = Loop(scenario)
-    marks.append(time.process_time())
-    for _ in loop.chunks():
-        pass
-    marks.append(time.process_time())
+    loop = timed(lambda: Loop(scenario))
+    timed(lambda: deque(loop.chunks(), maxlen=0))
+    flight = timed(lambda: _landed(loop, assignment))
+    runs = flight.frames * scenario.substeps
+    timed(lambda: _run(loop.plant.run, runs))
+    loop.release()
+    *stages_s, alone_s = took_s
+    return np.array(stages_s), runs, alone_s
+
+
+def _run(frame: Callable[[], object], runs: int) -> None:
+    """Run JSBSim alone."""
+    for _ in range(runs):
+        frame()
+
+
+def _landed(loop: Loop, assignment: Assignment) -> Landing:
+    """The flight, whose metrics and row of the table have been made."""
     flight = loop.land()
     row_of(assignment, measure(flight), flight)
-    marks.append(time.process_time())
-    alone = loop.plant.run
-    runs = flight.frames * scenario.substeps
-    began = time.process_time()
-    for _ in range(runs):
-        alone()
-    alone_s = time.process_time() - began
-    loop.release()
-    return np.diff(marks), runs, alone_s
+    return flight
 
 
 def _medians(rows: list[Taken]) -> Document:

@@ -179,7 +179,7 @@ def _draw_ratios(axis: "Axes", part: Document) -> None:
 
 
 def comparison_study(
-    name: str, cases: Sequence[SetFlight], entries: Sequence[Entry], chosen: TunedValuesByGrade | None = None
+    name: str, cases: Sequence[SetFlight], entries: Sequence[Entry], chosen: TunedValuesByGrade | None
 ) -> Study:
     """Every case with every entry; chosen: values of schemes and laws, as in trial.py."""
     files = page.study_files("comparison", partial(page_of, name=name), {}, {"comparison": figure_of})

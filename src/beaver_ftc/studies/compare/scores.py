@@ -43,8 +43,7 @@ def line_of(
     rate = wilson(detected, n)
     ratios = [m.rms_deg_s / o.rms_deg_s for m, o in flown if o.error is None and 0 < o.rms_deg_s < inf]
     return {
-        "scheme": entry.scheme,
-        "law": entry.law,
+        **vars(entry),
         "flights": len(mine),
         "failed": len(results) - len(mine),
         "false_alarms": alarms,

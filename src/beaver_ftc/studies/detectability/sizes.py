@@ -79,7 +79,7 @@ class _Flown:
         return [row[key] for row in self.of(variant, runs, size)]
 
 
-def sizes_study(scenario: Scenario, asked: Asked, tell: Callable[[str], None] = lambda line: None) -> Study:
+def sizes_study(scenario: Scenario, asked: Asked, tell: Callable[[str], None]) -> Study:
     """The study of a scenario and surface; tell: takes a line a round. Raises BadInput where the scenario
     cannot answer."""
     check(scenario, asked)

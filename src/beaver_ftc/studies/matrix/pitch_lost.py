@@ -90,7 +90,7 @@ def _outcome(scenario: Scenario) -> Document:
     }
 
 
-def pitch_lost_study(airspeeds_mps: tuple[float, ...] | None = None) -> Study:
+def pitch_lost_study(airspeeds_mps: tuple[float, ...] | None) -> Study:
     """Every pair of faults at these airspeeds under both laws."""
     airspeeds_mps = airspeeds_mps or AIRSPEEDS_MPS
     cases = [PitchCase(name, V, law) for law in LAWS for name in LOST for V in airspeeds_mps]

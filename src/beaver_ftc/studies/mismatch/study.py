@@ -61,7 +61,7 @@ VARIANTS: dict[str, Document] = {
 
 
 def run_mismatch(
-    scenario: Scenario, out: Path, report: bool = True, progress: Progress | None = None
+    scenario: Scenario, out: Path, report: bool, progress: Progress | None
 ) -> tuple[Document, np.ndarray]:
     """Fly `scenario` and write `out/<name>/`: a run's result folder with the mismatch in it. Return its
     document, and the constant part (3,) rad/s2 of a bound that would have covered the flight.

@@ -31,7 +31,7 @@ def percent(share: float | None) -> str:
     return f"{value:.0f} %" if value >= 9.95 else f"{value:.2g} %"
 
 
-def mismatch_text(found: Document, folder: str, colour: bool = False) -> str:
+def mismatch_text(found: Document, folder: str, colour: bool) -> str:
     """One flight: the sources, the bound, what to declare, the modes."""
     shown = printed([plain(*table) for table in tables(found)], WIDTH, colour)
     return "\n".join([shown, "", *findings(found), f"results      {folder}", ""])
@@ -150,7 +150,7 @@ def _row(name: str, per_axis: list[Document]) -> list[str]:
     return row
 
 
-def comparison_text(entries: list[Document], recommended: Document, folder: str, colour: bool = False) -> str:
+def comparison_text(entries: list[Document], recommended: Document, folder: str, colour: bool) -> str:
     """Several flights side by side, and the bound that covers them all."""
     caption = "worst share of the bound / smallest constant bound in rad/s2"
     table = printed([plain(caption, *tabulated(RUNS, entries))], WIDTH, colour)

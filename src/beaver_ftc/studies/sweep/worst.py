@@ -34,7 +34,7 @@ def worst_flights(flights: Flights, sweep: Sweep, command: str) -> list[Document
     ]
 
 
-def replay_command(source: str, out: Path, search: str | None = None) -> str:
+def replay_command(source: str, out: Path, search: str | None) -> str:
     """The command line that replays a flight, but for its index."""
     words = ["beaver-ftc", "sweep", source]
     words += ["--search", search] if search else []

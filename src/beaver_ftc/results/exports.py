@@ -190,19 +190,16 @@ def write_recording(
         "airspeed": {"airspeed": "airspeed_mps"},
         "flow": {name: name for name in (*_FLOW_COLUMNS, *signals)},
     }
-    wanted = ["t_s", *(column for part in source_of.values() for column in part.values())]
-    known = log.StoredLog(log_path).read(list(dict.fromkeys(wanted)))
-    named = {
-        part: {
-            name: pattern.format(name=name, title=name.title(), i=i, n=i + 1, axis="XYZ"[i % 3])
-            for i, name in enumerate(source_of[part])
-        }
-        for part, pattern in _NAMES_OF_KIND[kind].items()
-    }
+    wanted = {"t_s", *(column for part in source_of.values() for column in part.values())}
+    known = log.StoredLog(log_path).read(list(wanted))
+    named: dict[str, dict[str, str]] = {}
     topics: ColumnsByTopic = {}
-    for part, names in named.items():
-        for name, recorded in names.items():
-            values = known[source_of[part][name]]
+    for part, pattern in _NAMES_OF_KIND[kind].items():
+        named[part] = {}
+        for i, (name, column) in enumerate(source_of[part].items()):
+            recorded = pattern.format(name=name, title=name.title(), i=i, n=i + 1, axis="XYZ"[i % 3])
+            named[part][name] = recorded
+            values = known[column]
             if part == "commands":
                 values = values / travel_rad[name]
             elif part == "attitude" and kind == "ardupilot":

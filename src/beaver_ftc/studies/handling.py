@@ -8,7 +8,7 @@ the addition for large ratios of bank to sideslip (3.3.1.1, above 20 rad2/s2) is
 """
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from math import inf, log
 from pathlib import Path
 
@@ -25,7 +25,7 @@ from beaver_ftc.plant.linear import LinearModel, differences
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.linear_systems import CLASSICAL, Mode, modes
 from beaver_ftc.studies.margins import N_AIRSPEEDS, over_envelope
-from beaver_ftc.studies.present.tables import aligned, all_finite, grouped, number
+from beaver_ftc.studies.present.tables import aligned, grouped, number
 
 WORSE = 4  # than level 3
 _STATES = ("alpha_rad", "beta_rad", "p_rad_s", "q_rad_s", "r_rad_s", "phi_rad", "theta_rad", "psi_rad")
@@ -138,11 +138,6 @@ def over_airspeeds(scenario: Scenario) -> list[Quality]:
         if fly(scenario, log).departure is None:
             found += where_ended(scenario, dict(zip(log.columns, log.rows[-1].tolist(), strict=True)))
     return found
-
-
-def as_rows(found: list[Quality]) -> list[Document]:
-    """For `--format json`; what never happens is null."""
-    return [all_finite(asdict(each)) for each in found]
 
 
 def as_text(rows: list[Document]) -> str:

@@ -1,6 +1,6 @@
 """The command `linearise`: margins of the closed loop, and handling qualities of the aircraft alone."""
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Annotated
 
 import typer
@@ -8,6 +8,7 @@ import typer
 from beaver_ftc.commands import Document, Reporter, StudyCommand
 from beaver_ftc.scenario.schema import load
 from beaver_ftc.studies import handling, margins
+from beaver_ftc.studies.present.tables import all_finite
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,9 @@ class Linearise(StudyCommand):
         scenario = load({} if self.scenario is None else self.scenario)
         asked = scenario.control.gain_margin_db, scenario.control.phase_margin_deg
         document = margins.as_document(margins.study(scenario), asked)
-        return document | {"handling": handling.as_rows(handling.over_airspeeds(scenario))}
+        return document | {
+            "handling": [all_finite(asdict(each)) for each in handling.over_airspeeds(scenario)]
+        }
 
     def as_text(self, document: Document, colour: bool) -> str:
         """A line a fault and surface, then a line a flight condition."""

@@ -222,11 +222,11 @@ def leader(
         alike = [name for name in rivals if badness[name] == badness[ours]]
         return f"{what}: {ours} and {', '.join(alike)} are equally good: {said(ours)}."
     duel = rows[best]["against_ours"]
-    pair = [(best, "better"), (ours, "worse")]
-    (first, wins), (second, losses) = sorted(pair, key=lambda each: badness[each[0]])
+    wins = {best: duel["better"], ours: duel["worse"]}
+    first, second = sorted(wins, key=badness.__getitem__)
     sure = "" if duel["p"] < SIGNIFICANT else ", so this may be chance"
     return (
-        f"{what}: {said(first)} is better than {said(second)}; wins: {duel[wins]} against {duel[losses]}, "
+        f"{what}: {said(first)} is better than {said(second)}; wins: {wins[first]} against {wins[second]}, "
         f"p = {duel['p']:.2g}{sure}."
     )
 

@@ -244,7 +244,8 @@ def estimate_of(flights: Flights, name: str, level: Level) -> tuple[int, float, 
     """(number of flights, estimate, its bounds) of a named quantity."""
     if isinstance(level, QuantileLevel):
         quantity, _, axis = name.partition(".")
-        ordered = _told(_DELAYS_AND_ERRORS[quantity](flights, axis)[flights.faulted])
+        values = getattr(flights, quantity)  # an array, or a function of the axis
+        ordered = _told((values(axis) if axis else values)[flights.faulted])
         found = quantile(ordered, level.quantile)
         return ordered.size, found, partial(statistics.quantile_bound, ordered, level.quantile)
     if name in _RATES:
@@ -255,12 +256,6 @@ def estimate_of(flights: Flights, name: str, level: Level) -> tuple[int, float, 
     return told, statistics.poisson(count, hours).value, partial(statistics.poisson_bound, count, hours)
 
 
-_DELAYS_AND_ERRORS: dict[str, Callable[[Flights, str], np.ndarray]] = {
-    "detection_delay_s": lambda flights, axis: flights.detection_delay_s,
-    "isolation_delay_s": lambda flights, axis: flights.isolation_delay_s,
-    "post_fault_rms_deg_s": lambda flights, axis: flights.post_fault_rms_deg_s(axis),
-    "tracking_ratio": lambda flights, axis: flights.tracking_ratio(axis),
-}
 _RATES: dict[str, Callable[[Flights], tuple[np.ndarray, np.ndarray]]] = {
     "detection_rate": lambda flights: (flights.detected, flights.faulted),
     "isolation_rate": lambda flights: (flights.isolated, flights.faulted),

@@ -18,6 +18,8 @@ from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.adapter import FlightState, Plant
 from beaver_ftc.scenario.schema import Scenario
 
+MAIN, FLAP = slice(3), 3  # places in SURFACES: aileron, elevator and rudder; the flap
+
 
 class Contender(Protocol):
     """Something that flies a number of frames."""
@@ -168,11 +170,11 @@ class ProportionalInversion:
     def reset(self, context: Context) -> None:
         """Keep the model and the trim."""
         self._model = context.model
-        self._flap_rad = context.trim_rad[3]
+        self._flap_rad = context.trim_rad[FLAP]
 
     def step(self, measured: Measured, reference: Reference, verdict: Verdict) -> np.ndarray:
         """Ask the three main surfaces for what the reference model does, and for what is missing."""
         G = self._model.G(measured.y)
         feedback = self._FEEDBACK_PER_S * (reference.rate - measured.x)
         wanted = reference.acceleration + feedback - self._model.f(measured.x, measured.y)
-        return np.append(np.linalg.solve(G[:, :3], wanted - G[:, 3] * self._flap_rad), self._flap_rad)
+        return np.append(np.linalg.solve(G[:, MAIN], wanted - G[:, FLAP] * self._flap_rad), self._flap_rad)

@@ -20,11 +20,12 @@ from beaver_ftc.plant import channels as ch
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.signals import sample
-from beaver_ftc.studies.bench.contenders import take_over
+from beaver_ftc.studies.bench.contenders import FLAP, MAIN, take_over
 
 AXES = "pqr"
 SIGNALS = ("alpha", "beta", "ph", "qh", "rh", "dpt")  # of the terms of moments
 LEAST_EFFECTIVENESS = 0.1
+MOST_VARIANCE = 1.0 / 12.0  # of theta: that of a number which is anywhere from -1 to 0
 MAX_DEFLECTION_RAD = 0.44  # of aileron, elevator and rudder alike: about 25 deg
 
 
@@ -77,18 +78,15 @@ class Estimators:
         self.fie_decay = np.exp(-fdi.isolation_pole_per_s * dt)
         self.forgetting = np.exp(-dt / fdi.forgetting_time_s)
         self.pole = fdi.detection_pole_per_s
-        self.x_hat = np.zeros(3)
-        self.threshold = np.zeros(3)
-        self.residual = np.zeros(3)
+        # arrays are replaced in each frame, but for weights and excluded: they may begin as one
+        self.x_hat = self.threshold = self.residual = np.zeros(3)
         self.weights = np.zeros((3, N_BASIS))
         self.basis = np.zeros(N_BASIS)
         self.detected = False
         self.excluded = np.zeros(3, bool)
-        self.fie = np.zeros((3, 3))
-        self.Om, self.R_pos, self.R_neg, self.B = (np.zeros((3, 3)) for _ in range(4))
-        self.theta = np.zeros((3, 3))
-        self.P = np.full((3, 3), 1.0 / 12.0)
-        self.fie_residual, self.lower, self.upper = (np.full((3, 3), np.nan) for _ in range(3))
+        self.fie = self.theta = self.Om = self.R_pos = self.R_neg = self.B = np.zeros((3, 3))
+        self.P = np.full((3, 3), MOST_VARIANCE)
+        self.fie_residual = self.lower = self.upper = np.full((3, 3), np.nan)
 
     def predict(self, x: np.ndarray, rate: np.ndarray, Z: np.ndarray, eta_bar: np.ndarray) -> None:
         """One frame on, each axis.
@@ -104,7 +102,7 @@ class Estimators:
             outside = np.sign(self.residual) * np.maximum(np.abs(self.residual) - self.threshold, 0.0)
             self.weights += self.dt * self.gain * np.outer(outside, self.basis)
             self.weights *= self.keep if self.isolated is not None else 1.0
-        believed = rate + self.weights @ self.basis + (self.effectiveness[:3] - 1.0) @ Z
+        believed = rate + self.weights @ self.basis + (self.effectiveness[MAIN] - 1.0) @ Z
         self.x_hat = x + self.dt * believed + self.decay * (self.x_hat - x)
         self.threshold = self.decay * self.threshold + self.dt * eta_bar
 
@@ -112,7 +110,7 @@ class Estimators:
         """The same for the isolation estimators, by least squares projected onto [-1, 0].
 
         D  = clip(theta + P Om eps / (B^2 + Om^2 P), -1, 0) - theta,  eps = x - x_hat
-        P  <- min(P B^2 / (B^2 + Om^2 P) / forgetting, 1/12)
+        P  <- min(P B^2 / (B^2 + Om^2 P) / forgetting, MOST_VARIANCE)
         Om <- a Om + dt Z,  x_hat <- x + dt (rate + Z theta) + a (x_hat - x) + Om D,  theta <- theta + D
         R+ <- a R+ + dt max(Z, 0),  R- <- a R- + dt min(Z, 0),  B <- a B + dt eta_bar
         """
@@ -121,7 +119,7 @@ class Estimators:
         gain = np.divide(self.P * self.Om, scale, out=np.zeros((3, 3)), where=scale > 0)
         theta = np.clip(self.theta + gain * self.fie_residual, -1.0, 0.0)
         share = np.divide(noise, scale, out=np.ones((3, 3)), where=scale > 0)
-        self.P = np.minimum(self.P * share / self.forgetting, 1.0 / 12.0)
+        self.P = np.minimum(self.P * share / self.forgetting, MOST_VARIANCE)
         Om = a * self.Om + dt * Z
         self.fie = x + dt * (rate + Z * self.theta) + a * (self.fie - x) + Om * (theta - self.theta)
         self.Om = Om
@@ -197,7 +195,7 @@ class FeedbackLinearisation:
         error = self.model[0] - x
         self.integral += self.dt * error
         demand = self.model[1] + self.Kp * error + self.Ki * self.integral - f - unknown
-        three = np.linalg.solve(G[:, :3], demand - G[:, 3] * self.flap_rad)
+        three = np.linalg.solve(G[:, MAIN], demand - G[:, FLAP] * self.flap_rad)
         self.model = self.A @ self.model + np.outer(self.B, reference)
         return np.append(np.clip(three, -MAX_DEFLECTION_RAD, MAX_DEFLECTION_RAD), self.flap_rad)
 
@@ -242,7 +240,7 @@ class Straightforward:
         else:
             estimators.predict(*self.then)
         estimators.judge(x, truth["alpha_rad"], truth["beta_rad"])
-        self.then = (x, f + G @ self.u, (G * self.u)[:, :3].T, self.bound(x))
+        self.then = (x, f + G @ self.u, (G * self.u)[:, MAIN].T, self.bound(x))
         self.u = self.law.command(x, f, G * estimators.effectiveness, estimators.unknown, reference)
         for surface, deflection in zip(SURFACES, self.u, strict=True):
             fdm[f"fcs/{surface}-cmd-rad"] = deflection

@@ -9,9 +9,8 @@ from typing import NamedTuple
 
 from beaver_ftc.results.model import Document
 from beaver_ftc.studies.present.tables import number
-from beaver_ftc.studies.reproduce.cases import AXIS, CASES, EDGES, OURS, Changed, Flown, fly_case
+from beaver_ftc.studies.reproduce.cases import AXIS, CASES, EDGES, HEALTHY, OURS, Changed, Flown, fly_case
 
-HEALTHY = Changed("fault-free", {}, "")
 SHOWN = (HEALTHY, *(CASES[name] for name in ("elevator", "aileron", "rudder", "unanticipated")))
 WHOSE: Mapping[str, Mapping[str, object]] = {"paper": {}, "ours": OURS}
 BETTER = "Where the paper's is better, by more than 1 %:"
@@ -42,7 +41,7 @@ def fly_beside() -> dict[tuple[str, str], Flown]:
 def healthy_settings() -> list[tuple[str, Changed]]:
     """The corners and edges of the published uncertainty, for both: (whose, the setting)."""
     return [
-        (whose, Changed(corner.name, {**how, **corner.changes}, ""))
+        (whose, Changed(corner.name, {**how, **corner.changes}))
         for whose, how in WHOSE.items()
         for corner in EDGES
     ]

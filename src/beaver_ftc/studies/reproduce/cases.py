@@ -37,11 +37,11 @@ Changes = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Changed:
-    """A change of the published setting, as dotted scenario keys, and where the paper shows it."""
+    """A change of the published setting, and where the paper shows it, if it does."""
 
     name: str
     changes: Changes
-    shown_in: str
+    shown_in: str = ""
 
 
 _FILE = parse(Path(__file__).with_name("cases.yaml").read_text(encoding="utf-8")).data
@@ -51,18 +51,19 @@ PUBLISHED, VARIANTS = (
 )
 OURS: Changes = _FILE["ours"]  # what makes the published setting our default scheme and law
 GAINS = tuple(  # every gain of the published scheme and law, halved and doubled
-    Changed(f"{gain.key.split('.')[0]} {gain.name} {how}", {gain.key: share * gain.default}, gain.name)
+    Changed(f"{gain.key.split('.')[0]} {gain.name} {how}", {gain.key: share * gain.default})
     for gain in gains()
     for how, share in (("halved", 0.5), ("doubled", 2.0))
 )
 CASES = {case.name: case for case in PUBLISHED}
+HEALTHY = Changed("fault-free", {})
 AIRSPEEDS_MPS = (32.0, 36.0, 40.0, 43.0, 47.0, 54.0)
 SIZES = (0.1, 0.2, 0.6, 0.8, 1.0)  # share of the effectiveness that a published loss takes
 INSTANTS_S = (10.75, 13.0, 14.5)  # of the fault; at each the references are elsewhere in their periods
 SIZE, AT = "published loss", "instant of the fault"  # not keys of a scenario: they change its faults
 EDGES = tuple(
     Changed("theta " + ", ".join(f"{theta:+g}" for theta in corner),
-            {"uncertainty.inertia_coupling": dict(zip(AXES, corner, strict=True))}, "")
+            {"uncertainty.inertia_coupling": dict(zip(AXES, corner, strict=True))})
     for corner in product((-0.25, 0.0, 0.25), repeat=3)
 )  # fmt: skip
 CORNERS = tuple(  # the uncertainty's corners, and none
@@ -72,9 +73,9 @@ CORNERS = tuple(  # the uncertainty's corners, and none
 )
 BEYOND = (
     *CORNERS,
-    *(Changed(f"airspeed {v:g} m/s", {"initial.airspeed_mps": v}, "") for v in AIRSPEEDS_MPS),
-    *(Changed(f"losses of {size:.0%}".replace("%", " %"), {SIZE: size}, "") for size in SIZES),
-    *(Changed(f"fault at {at_s:g} s", {AT: at_s}, "") for at_s in INSTANTS_S),
+    *(Changed(f"airspeed {v:g} m/s", {"initial.airspeed_mps": v}) for v in AIRSPEEDS_MPS),
+    *(Changed(f"losses of {size:.0%}".replace("%", " %"), {SIZE: size}) for size in SIZES),
+    *(Changed(f"fault at {at_s:g} s", {AT: at_s}) for at_s in INSTANTS_S),
 )
 
 

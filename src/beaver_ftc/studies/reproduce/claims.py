@@ -23,7 +23,7 @@ VERDICTS = (STRONGER, BORNE_OUT, NOT_BORNE_OUT, CANNOT_BE_JUDGED)
 _FILE = parse(Path(__file__).with_name("claims.yaml").read_text(encoding="utf-8")).data
 REASONS: dict[str, str] = _FILE["reasons"]
 TAKES: dict[str, str] = {name: row["takes"] for name, row in _FILE["ablations"].items()}
-ABLATIONS = tuple(Changed(name, row["changes"], "") for name, row in _FILE["ablations"].items())
+ABLATIONS = tuple(Changed(name, row["changes"]) for name, row in _FILE["ablations"].items())
 
 
 class Measure(NamedTuple):

@@ -41,7 +41,7 @@ from beaver_ftc.studies.reproduce.published_figures import figures_of
 from beaver_ftc.studies.reproduce.words import NAME, as_html, as_markdown, as_text
 
 NUMBERS, ABLATED, SAME, FALSE_ALARM = "numbers", "without", "same", "false alarm"
-AS_PUBLISHED = Changed("as published", {}, "")
+AS_PUBLISHED = Changed("as published", {})
 ELSEWHERE = (*BEYOND, *VARIANTS, *GAINS)  # wherever the paper did not fly
 SETTINGS = (AS_PUBLISHED, *ELSEWHERE)
 WITHOUT: Mapping[str, Changed] = {ablation.name: ablation for ablation in ABLATIONS}

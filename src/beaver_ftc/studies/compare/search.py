@@ -15,7 +15,7 @@ on a parameter, the parameter does not drift to a limit. A range with the result
 widened there, and the search goes on.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
 from math import exp, log
@@ -120,9 +120,9 @@ def widen(of: Range, upper: bool) -> Range:
 def _searched(
     cost: Cost, ranges: Ranges, start: Values, known: float | None, trials: int, seed: int
 ) -> tuple[Values, float, list[float]]:
-    """One search, as the module says: the values of the lowest cost (of several within `TIE` of it, those
-    nearest the middle), that cost, and the costs of all trials. known: the cost of the start, if it has been
-    tried: the search is a restart. A trial is at a point (n,) of the unit cube."""
+    """One search, as the module says: the values found, their cost, and the costs of all trials. known: the
+    cost of the start, if it has been tried: the search is a restart. A trial is at a point (n,) of the unit
+    cube."""
     from scipy.optimize import minimize
     from scipy.stats.qmc import LatinHypercube
 
@@ -157,6 +157,12 @@ def _searched(
         corners = np.vstack((begin, begin + steps))
         options = {"maxfev": left, "initial_simplex": corners, "xatol": 1e-3, "fatol": 1e-5}
         minimize(attempt, begin, method="Nelder-Mead", bounds=[(0.0, 1.0)] * n, options=options)
-    ties = np.flatnonzero(np.array(costs) <= min(costs) + TIE * abs(min(costs)))
-    nearest = ties[int(np.argmin([np.abs(points[i] - 0.5).max() for i in ties]))]
-    return values_at(points[nearest]), costs[nearest], costs
+    chosen = _chosen(points, costs)
+    return values_at(points[chosen]), costs[chosen], costs
+
+
+def _chosen(points: Sequence[np.ndarray], costs: Sequence[float]) -> int:
+    """Of the trials within `TIE` of the lowest cost, the one nearest the middle of the ranges."""
+    lowest = min(costs)
+    ties = np.flatnonzero(np.array(costs) <= lowest + TIE * abs(lowest)).tolist()
+    return min(ties, key=lambda i: np.abs(points[i] - 0.5).max())

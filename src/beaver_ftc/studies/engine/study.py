@@ -75,8 +75,9 @@ class Flying:
         """Fly what is missing; once `stopped`, only what is in the air. cases_of: these runs. there: takes
         the number and the rows of each batch, once they are there.
 
-        Meanwhile: batches still _coming, with the cases _left in them; tasks _waiting for a worker, and how
-        many are _flying; by number the batches begun and their rows so far, _flown; _losses of each task."""
+        Meanwhile: _coming: batches of which no task is waiting yet; _left: cases in these. _waiting: tasks
+        for the next free worker; _flying: how many tasks workers have. _flown: by number, each batch begun
+        and its rows by run so far. _losses: by the runs of a task, how often a worker was lost over it."""
         missing: dict[Number, Sequence[int]] = {}
         for number, runs in batches:
             rows = self.landed(number, runs)
@@ -248,12 +249,15 @@ def _keeping(study: Study, out: Path) -> Iterator[store.Parts]:
 def fly_all(fly: Fly, cases: Sequence[Any], workers: int, progress: Progress | None = None) -> list[Any]:
     """fly(case) of every case, in order, kept nowhere."""
 
-    def nothing(number: Number, of: Any) -> None:
-        """None is there, and none is kept."""
+    def is_new(number: Number, runs: Sequence[int]) -> None:
+        """No rows have landed before."""
+
+    def forget(number: Number, rows: Any) -> None:
+        """Rows are not kept."""
 
     make = partial(_workers, Work(fly), workers)
     pieces = store.batches_of(len(cases), 1)
-    with contextlib.closing(Flying(nothing, nothing, make, _fail)) as flying:
+    with contextlib.closing(Flying(is_new, forget, make, _fail)) as flying:
         found = _fly_pieces(flying, dict(pieces), cases, progress)
     return [found[n][0] for n in range(len(cases))]
 

@@ -298,22 +298,17 @@ def _fault_text(fault: Fault | None, faults: Sequence[DeclaredFault]) -> str:
         return "none"
     place = f"sensor {fault.sensor}" if fault.sensor else fault.actuator or ""
     what = f"{place} {without_underscores(fault.type)}".strip()
-    at = f"at {_seconds_text(fault.at_s)}"
     if not isinstance(fault, DeclaredFault):
-        return f"{what} {at}"
-    size = ", ".join(_fault_size_texts(fault))
-    until = f" to {_seconds_text(fault.end_s)}" if fault.end_s else ""
-    return f"{what}{' (' + size + ')' if size else ''} {at}{until}{_masked_text(fault, faults)}"
+        return f"{what} at {_seconds_text(fault.at_s)}"
+    if size := ", ".join(_fault_size_texts(fault)):
+        what += f" ({size})"
+    return f"{what} at {_span_text(fault.at_s, fault.end_s)}{_masked_text(fault, faults)}"
 
 
 def _masked_text(fault: DeclaredFault, faults: Sequence[DeclaredFault]) -> str:
     """The times in which other faults mask a fault."""
     later = [one for one in faults if one.at_s > fault.at_s and masking(fault, faults, one.at_s) is one]
-    spells = [
-        f"from {_seconds_text(one.at_s)}{'' if one.end_s is None else f' to {_seconds_text(one.end_s)}'} "
-        f"({without_underscores(one.type)})"
-        for one in later
-    ]
+    spells = [f"from {_span_text(one.at_s, one.end_s)} ({without_underscores(one.type)})" for one in later]
     return f", without effect {' and '.join(spells)}" if spells else ""
 
 
@@ -358,7 +353,8 @@ def _true_size_text(isolation: Named, metrics: Metrics) -> str:
     """The true size at the time of the estimate, if the named fault was injected; with this time, unless the
     size is constant."""
     faults = [fault for fault in metrics.faults if fault.actuator == isolation.fault]
-    if isolation.estimate is None or all(fault.type != isolation.type for fault in faults):
+    kind = isolation.type
+    if isolation.estimate is None or kind not in [fault.type for fault in faults]:
         return ""
     flown = metrics.flight
     at_s = isolation.estimate_at_s
@@ -366,12 +362,12 @@ def _true_size_text(isolation: Named, metrics: Metrics) -> str:
         at_s = flown.flown_s - 1.0 / flown.rate_hz if flown and flown.rate_hz else math.inf
     lasts = faults[0].end_s is None and faults[0].profile == "abrupt" and len(faults) == 1
     when = "" if lasts and isolation.estimate_at_s is None else f" at {_seconds_text(at_s)}"
-    size = size_at(isolation.type, faults, at_s)
+    size = size_at(kind, faults, at_s)
     if size is None:
-        is_over = all(fault.type != isolation.type for fault in acting_at(faults, at_s))
+        is_over = kind not in [fault.type for fault in acting_at(faults, at_s)]
         return f"{when} (the fault is over then)" if is_over else when
     if isolation.estimate_deg is None:
-        return f"{when} (true {TYPES[str(isolation.type)].size_in_words(size)})"
+        return f"{when} (true {TYPES[str(kind)].size_in_words(size)})"
     return f"{when} (true {value_text(math.degrees(size))} deg)"
 
 
@@ -416,7 +412,7 @@ def _withdrawn_texts(heading: str, gone: Sequence[Withdrawn]) -> list[str]:
     for name, each in spells.items():
         total = _seconds_text(sum(one.to_s - one.from_s for one in each))
         often = f" {len(each)} times, for {total} in all," if len(each) > 1 else ""
-        when = f"from {_seconds_text(each[0].from_s)} to {_seconds_text(each[-1].to_s)}"
+        when = f"from {_span_text(each[0].from_s, each[-1].to_s)}"
         why = f", withdrawn because {each[-1].because}" if each[-1].because else ""
         said.append(f"{name}{often} {when}{why}")
     return [f"{heading}: {'; '.join(said)}"] if said else []
@@ -434,8 +430,7 @@ def _named_fault_text(isolation: Named, metrics: Metrics) -> str:
 
 
 def _probing_text(span_s: tuple[float, float]) -> str:
-    began, ended = map(_seconds_text, span_s)
-    return f"flap and elevator moved from {began} to {ended}"
+    return f"flap and elevator moved from {_span_text(*span_s)}"
 
 
 def _type_text(isolation: Named) -> str:
@@ -443,7 +438,7 @@ def _type_text(isolation: Named) -> str:
     if str(isolation.fault).startswith("sensor "):
         return ""
     if isolation.type is None:
-        return f", {_open_types_text(isolation.candidates) if isolation.candidates else 'of no known type'}"
+        return ", " + (_open_types_text(isolation.candidates) if isolation.candidates else "of no known type")
     return "" if isolation.type == "unanticipated" else f", {without_underscores(isolation.type)}"
 
 
@@ -514,6 +509,12 @@ def _link_text(link: Link) -> str:
         f", {getattr(link, name)} {words}" for name, words in _LINK_COUNT_WORDS.items() if getattr(link, name)
     )
     return _filled(_LINK_FORM, link, odd=odd)
+
+
+def _span_text(begin_s: float, end_s: float | None) -> str:
+    """A span of time; its begin alone if it has no end."""
+    begin = _seconds_text(begin_s)
+    return begin if end_s is None else f"{begin} to {_seconds_text(end_s)}"
 
 
 def _seconds_text(seconds: float | None) -> str:

@@ -113,7 +113,7 @@ def geometry(pairs: Sequence[Document]) -> list[str]:
     for pair in pairs:
         apart = {name: x for name, x in pair["told_apart_from_deg"].items() if x is not None}
         told = " or ".join(f"{name} is at least {x:.2g} deg off its command" for name, x in apart.items())
-        never = f"never distinguish them{', accelerometers do' if pair['by_forces'] else ''}"
+        never = "never distinguish them" + (", accelerometers do" if pair["by_forces"] else "")
         says = f"distinguish them if {told}" if told else never
         lines.append(f"{' and '.join(pair['surfaces'])} have similar effects on the rates: the rates {says}")
     return lines
@@ -124,8 +124,8 @@ def of_engines(failures: Sequence[Document]) -> list[str]:
     return [
         f"{of['engine']} failed to idle accelerates the aircraft by {max(of['turns_rad_s2']):.2g} rad/s2, "
         f"{of['shows']:.2g} times the detection limit of one frame"
-        f"{'; the design model knows its moment' if of['known'] else ''}"
-        f"{' and monitors it against the thrust' if of['held'] else ''}"
+        + ("; the design model knows its moment" if of["known"] else "")
+        + (" and monitors it against the thrust" if of["held"] else "")
         for of in failures
     ]
 

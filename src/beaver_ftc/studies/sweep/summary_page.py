@@ -137,7 +137,7 @@ def summary_text(summary: Document, colour: bool = False) -> str:
 def _flights(summary: Document) -> str:
     statuses = [(count, name.replace("_", " ")) for name, count in summary["statuses"].items()]
     others = ", ".join(f"{count} {name}" for count, name in statuses if name != "flown")
-    return f"{summary['flights']}, {summary['flown_h']:.3g} h in the air{f' ({others})' if others else ''}"
+    return f"{summary['flights']}, {summary['flown_h']:.3g} h in the air" + (f" ({others})" if others else "")
 
 
 def _search(summary: Document) -> str:

@@ -36,6 +36,9 @@ PAPER_DPI = 300
 PAPER_FONT = 8  # points
 
 
+Options = dict[str, Any]  # keyword arguments of matplotlib
+
+
 @dataclass(frozen=True)
 class Picture:
     """A view to be drawn into a file, with what it shows."""
@@ -81,7 +84,7 @@ def save(picture: Picture) -> None:
 
 
 # No date: the same flight gives the same file.
-_SAVE_OPTIONS_OF_FORMAT: dict[str, Any] = {
+_SAVE_OPTIONS_OF_FORMAT: Options = {
     # a tenth larger than with zlib's level 6, in two thirds of the time
     "png": {"metadata": {"Software": SOFTWARE_MARK}, "pil_kwargs": {"compress_level": 1}},
     "pdf": {"metadata": {"Creator": SOFTWARE_MARK, "CreationDate": None}},
@@ -125,7 +128,7 @@ def _restyle_for_paper(figure: "Figure") -> "Figure":
         legend.remove()
     figure.set_layout_engine("constrained", h_pad=0.02, w_pad=0.02)
     shown = _legend_handle_of_label(figure.axes)
-    where: dict[str, Any] = {"loc": "outside lower center", "ncols": 2, "fontsize": PAPER_FONT - 2}
+    where: Options = {"loc": "outside lower center", "ncols": 2, "fontsize": PAPER_FONT - 2}
     figure.legend(shown.values(), shown.keys(), frameon=False, **where)
     return figure
 
@@ -303,9 +306,9 @@ def _max_legend_columns(labels: Sequence[str], width: float) -> int:
     return 1
 
 
-def _legend_handle_of_label(grid: Sequence["Axes"]) -> dict[str, Any]:
+def _legend_handle_of_label(grid: Sequence["Axes"]) -> Options:
     """Label and handle of what a legend is to hold."""
-    entries: dict[str, Any] = {}
+    entries: Options = {}
     for axes in grid:
         handles, labels = axes.get_legend_handles_labels()
         entries = entries | dict(zip(labels, handles, strict=True)) | entries

@@ -22,6 +22,8 @@ Document = files.Document
 Span = tuple[float, float]
 
 
+Quantity = float | None
+"""A number; None if the quantity does not exist."""
 Value = TypeVar("Value")
 _KNOWN = "a key that the document has only where its value is known"
 Known = Annotated[Value | None, _KNOWN]
@@ -160,7 +162,7 @@ class DeclaredFault(Fault):
     """A declared fault, with which the names given by the diagnosis are compared. size: the parameters that
     only its type has."""
 
-    end_s: float | None = None
+    end_s: Quantity = None
     profile: str = "abrupt"
     size: dict[str, Any] = field(default_factory=dict)
 
@@ -203,7 +205,7 @@ class Statistical(Part):
     - `closest_approach`: largest score before a fault, divided by the alarm level.
     """
 
-    time_s: float | None
+    time_s: Quantity
     alarm_level: float
     closest_approach: float
 
@@ -236,10 +238,10 @@ class Detection(Part):
     """
 
     detected: bool
-    time_s: float | None
-    delay_s: float | None
+    time_s: Quantity
+    delay_s: Quantity
     axis: str | None
-    guaranteed_delay_s: float | None
+    guaranteed_delay_s: Quantity
     statistical: Statistical | None
     inconclusive: Inconclusive | None
 
@@ -269,16 +271,16 @@ class Named(Part):
 
     fault: str | None
     type: str | None
-    time_s: float | None
-    delay_s: float | None
+    time_s: Quantity
+    delay_s: Quantity
     correct: bool | None
     candidates: tuple[str, ...]
     type_correct: bool | None
-    type_delay_s: float | None
-    estimate: float | None
-    estimate_deg: float | None
+    type_delay_s: Quantity
+    estimate: Quantity
+    estimate_deg: Quantity
     estimate_interval: Span | None
-    frequency_rad_s: float | None
+    frequency_rad_s: Quantity
     so_far: bool | None
     premature: bool | None
     _: KW_ONLY
@@ -294,7 +296,7 @@ class NameInWindow(Named):
     """
 
     _: KW_ONLY
-    true_size: float | None = None
+    true_size: Quantity = None
 
 
 @dataclass(frozen=True)
@@ -313,8 +315,8 @@ class Window(Part):
     to_s: float
     faults: tuple[int, ...]
     detected: bool
-    time_s: float | None
-    delay_s: float | None
+    time_s: Quantity
+    delay_s: Quantity
     isolation: tuple[NameInWindow, ...]
 
 
@@ -366,9 +368,9 @@ class Isolation(Named):
 class Rates(Part):
     """One number for each axis, deg/s."""
 
-    p: float | None
-    q: float | None
-    r: float | None
+    p: Quantity
+    q: Quantity
+    r: Quantity
 
 
 @dataclass(frozen=True)
@@ -412,7 +414,7 @@ class ChangeInFlight(Part):
     law: str | None
     scheme: str | None
     sensors: bool
-    detection_time_s: float | None
+    detection_time_s: Quantity
     isolated: str | None
     _: KW_ONLY
     false_alarm: Known[bool] = None
@@ -503,10 +505,10 @@ class EnginePowerUse(Part):
 class Deviations(Part):
     """Deviations from the commanded profile by channel; None for a channel without a command."""
 
-    altitude_m: float | None
-    airspeed_mps: float | None
-    heading_deg: float | None
-    bank_deg: float | None
+    altitude_m: Quantity
+    airspeed_mps: Quantity
+    heading_deg: Quantity
+    bank_deg: Quantity
 
 
 @dataclass(frozen=True)
@@ -517,8 +519,8 @@ class ProfileDeviations(Deviations):
     - `airspeed_at_one_instant_mps`: of the airspeed itself, without a mean.
     """
 
-    airspeed_limited_mps: float | None
-    airspeed_at_one_instant_mps: float | None
+    airspeed_limited_mps: Quantity
+    airspeed_at_one_instant_mps: Quantity
 
 
 @dataclass(frozen=True)
@@ -626,7 +628,7 @@ class Link(Part):
     latency_ms: LatencyMs
     interval_ms: PacketIntervalMs
     longest_silence_s: float
-    diagnosed_from_s: float | None
+    diagnosed_from_s: Quantity
     speed: float
     late_ms: float
     said: tuple[Document, ...]
@@ -680,7 +682,7 @@ class Metrics(Part):
         return Judged(self.scenario, self.passed, self.expectations)
 
     @property
-    def fault_found_s(self) -> float | None:
+    def fault_found_s(self) -> Quantity:
         """Delay from the fault to its alarm, s; None without an alarm, or after a false alarm."""
         return None if self.false_alarm else self.detection.delay_s
 

@@ -69,7 +69,10 @@ class Quality:
     level: int
 
 
-def of_model(linear: LinearModel, airspeed_mps: float, where: str) -> list[Quality]:
+Qualities = list[Quality]
+
+
+def of_model(linear: LinearModel, airspeed_mps: float, where: str) -> Qualities:
     """The handling qualities of a linear aircraft."""
     alpha = linear.states.index("alpha")
     g_per_rad = -linear.A[alpha, alpha] * airspeed_mps / GRAVITY_MPS2
@@ -100,13 +103,13 @@ def _double_s(real: float) -> float:
     return log(2.0) / real if real > 0.0 else inf
 
 
-def where_trimmed(scenario: Scenario) -> list[Quality]:
+def where_trimmed(scenario: Scenario) -> Qualities:
     """The qualities of a scenario's healthy aircraft in trim. Raises BadInput as a trim does."""
     plant, point = trimmed(scenario)
     return of_model(differences(plant, point), point.airspeed_mps, "trimmed")
 
 
-def where_ended(scenario: Scenario, end: Mapping[str, float]) -> list[Quality]:
+def where_ended(scenario: Scenario, end: Mapping[str, float]) -> Qualities:
     """The qualities of its aircraft where a flight ended, with the surfaces as effective as they are then.
     end: the last row of the log by column.
 
@@ -126,7 +129,7 @@ def where_ended(scenario: Scenario, end: Mapping[str, float]) -> list[Quality]:
     return of_model(linear, there.airspeed_mps, "at the end")
 
 
-def over_airspeeds(scenario: Scenario) -> list[Quality]:
+def over_airspeeds(scenario: Scenario) -> Qualities:
     """The qualities of its healthy aircraft over the airspeeds of the envelope; and, if the scenario has a
     fault, where its flight ends."""
     from beaver_ftc.loop.loop import fly

@@ -7,6 +7,7 @@ Flight number i of a seed is the same whatever else is flown, by whom, and in wh
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.random import Generator
 
 from beaver_ftc.aircraft import AXES, load
 from beaver_ftc.documents.files import Document
@@ -54,18 +55,18 @@ class Draw:
         })  # fmt: skip
 
 
-def _log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
+def _log_uniform(rng: Generator, low: float, high: float) -> float:
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
-def _fault(rng: np.random.Generator) -> Document:
+def _fault(rng: Generator) -> Document:
     fault = loss(str(rng.choice(load().primary)), rng.uniform(*_MAGNITUDE), rng.uniform(*_FAULT_AT_S))
     if rng.random() < 0.5:
         fault |= {"profile": "incipient", "kappa_per_s": _log_uniform(rng, *_KAPPA_PER_S)}
     return fault
 
 
-def _signal(rng: np.random.Generator) -> Document:
+def _signal(rng: Generator) -> Document:
     """Zero on average, or the attitude would run away under open outer loops."""
     amplitude = {"amplitude_deg_s": rng.uniform(0.5, 5.0)}
     wave = {**amplitude, "frequency_hz": _log_uniform(rng, 0.1, 0.7), "phase_deg": rng.uniform(0, 360)}
@@ -78,12 +79,12 @@ def _signal(rng: np.random.Generator) -> Document:
     return {str(kind): wave}
 
 
-def _within(rng: np.random.Generator, bound: float) -> float:
+def _within(rng: Generator, bound: float) -> float:
     """Anywhere within the bound, and often right at it."""
     return bound if rng.random() < _AT_THE_BOUND else rng.uniform(0.0, bound)
 
 
-def _uncertainty(rng: np.random.Generator) -> Document:
+def _uncertainty(rng: Generator) -> Document:
     """All that the published bounds admit [Zhang2005, sec. VII]."""
     sign = {axis: rng.choice([-1.0, 1.0]) for axis in AXES}
     coupling = {axis: sign[axis] * _within(rng, _INERTIA) for axis in AXES}

@@ -23,10 +23,10 @@ from beaver_ftc.studies.engine.statistics import (
 )
 from beaver_ftc.studies.present.tables import all_finite, finite, percent
 
+Results = Sequence[Result]  # of one entry, a flight after the other
 
-def line_of(
-    entry: Entry, results: Sequence[Result], oracle: Sequence[Result], ours: Sequence[Result] = ()
-) -> Document:
+
+def line_of(entry: Entry, results: Results, oracle: Results, ours: Results = ()) -> Document:
     """Tally one entry over one set; oracle, ours: results of the yardstick, and of our entry if there are
     any, in the same flights, in the same order.
 
@@ -73,7 +73,7 @@ def line_of(
     }
 
 
-def _duel(entry: Entry, mine: Sequence[Result], ours: Sequence[Result]) -> Document:
+def _duel(entry: Entry, mine: Results, ours: Results) -> Document:
     """In how many flights with a fault an entry is better or worse than ours, and the probability of so
     uneven a result between equals. Of schemes: whether the fault is detected; of laws: the tracking error."""
 

@@ -20,6 +20,7 @@ from beaver_ftc.studies.present.tables import grouped, percent, seconds
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+Rows = Sequence[Document]
 CERTAIN = (
     "From the smallest loss at the best place to that at the worst, of so many places where some loss is\n"
     "certain to be detected and isolated in time, whenever it starts and at half of the start times.\n"
@@ -52,25 +53,25 @@ def _times(scale: float) -> str:
     return f"{scale:g} x reference"
 
 
-def _spans(rows: Sequence[Document], key: str) -> Line:
+def _spans(rows: Rows, key: str) -> Line:
     return {"certain from": _span(rows, key), "half of onsets from": _span(rows, f"{key}_median")}
 
 
-def _span(rows: Sequence[Document], key: str, form: Callable[[float], str] = percent) -> str:
+def _span(rows: Rows, key: str, form: Callable[[float], str] = percent) -> str:
     """From the least to the largest value over the places that have one, and how many these are."""
     known = [row[key] for row in rows if row[key] is not None]
     ends = dict.fromkeys(map(form, (min(known), max(known)))) if known else ["-"]
     return f"{' to '.join(ends)} ({len(known)}/{len(rows)})"
 
 
-def conclusions(rows: Sequence[Document]) -> list[str]:
+def conclusions(rows: Rows) -> list[str]:
     """One sentence a fault, at the excitation nearest to the scenario's own references."""
     scale = min((row["excitation"] for row in rows), key=lambda of: abs(of - 1.0))
     chosen = [row for row in rows if row["excitation"] == scale]
     return [_conclusion(fault, scale, of) for (fault,), of in grouped(chosen, "fault").items()]
 
 
-def _conclusion(fault: str, scale: float, rows: Sequence[Document]) -> str:
+def _conclusion(fault: str, scale: float, rows: Rows) -> str:
     certain = [row["isolated"] for row in rows if row["isolated"] is not None]
     reference = "the scenario's references" if scale == 1.0 else f"{scale:g} times the scenario's references"
     if not certain:
@@ -107,7 +108,7 @@ def upwards(magnitude: float) -> str:
     return f"{ceil(100.0 * magnitude - 1e-9)} %"
 
 
-def geometry(pairs: Sequence[Document]) -> list[str]:
+def geometry(pairs: Rows) -> list[str]:
     """A sentence a pair of surfaces, of those that `in_trim.alike` finds."""
     lines = []
     for pair in pairs:
@@ -119,7 +120,7 @@ def geometry(pairs: Sequence[Document]) -> list[str]:
     return lines
 
 
-def of_engines(failures: Sequence[Document]) -> list[str]:
+def of_engines(failures: Rows) -> list[str]:
     """A sentence an engine, of those of `in_trim.engine_failures`."""
     return [
         f"{of['engine']} failed to idle accelerates the aircraft by {max(of['turns_rad_s2']):.2g} rad/s2, "

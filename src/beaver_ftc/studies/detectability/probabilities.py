@@ -36,6 +36,7 @@ def _counted(traces: Sequence[Trace], level: float) -> Document:
 
 
 Row = Document
+Rows = Sequence[Row]
 COLUMNS = (
     "sensors", "turbulence", "excitation_deg_s", "seed", "surface", "magnitude", "scheme", "false_alarm",
     "delay_s", "own_false_alarm", "own_delay_s", *(f"deflection_{s:g}" for s in WITHIN_S),
@@ -74,7 +75,7 @@ def rows_of(faulted: Iterable[Watched], levels: dict[Key, float]) -> list[Row]:
     ]  # fmt: skip
 
 
-def summary(rows: Sequence[Row], own: bool = False) -> Document:
+def summary(rows: Rows, own: bool = False) -> Document:
     """Detection probability within each of WITHIN_S, with exact limits, and the median delay.
 
     own: at the level each scheme ships with. Flights with an alarm before the fault do not count.
@@ -90,7 +91,7 @@ def summary(rows: Sequence[Row], own: bool = False) -> Document:
     }
 
 
-def limit(rows: Sequence[Row], per_h: float) -> Document:
+def limit(rows: Rows, per_h: float) -> Document:
     """Shares of the same flights in which an informed test detects the fault, within each of WITHIN_S."""
     one_each = {(row["excitation_deg_s"], row["seed"], row["surface"], row["magnitude"]): row for row in rows}
     flights = list(one_each.values())
@@ -155,14 +156,12 @@ def title_of(sensors: str, turbulence: str) -> str:
     return f"{sensors} sensors, {air}"
 
 
-def _lines(
-    rows: Sequence[Row], names: Sequence[str], what: Callable[[Sequence[Row]], Document]
-) -> list[Document]:
+def _lines(rows: Rows, names: Sequence[str], what: Callable[[Rows], Document]) -> list[Document]:
     """A row for each group of rows that are alike in these columns."""
     return [{**dict(zip(names, key, strict=True)), **what(of)} for key, of in grouped(rows, *names).items()]
 
 
-def _comparison(rows: Sequence[Row]) -> list[Document]:
+def _comparison(rows: Rows) -> list[Document]:
     """Our schemes against every other on the same flights, by how many faults each finds in each of DUELS_S.
 
     Flights of a seed share their noise, so a seed counts once: for who finds more of its faults.
@@ -184,7 +183,7 @@ BySeed = dict[int, int]
 """Number of faults found, by seed."""
 
 
-def _found_by_seed(rows: Sequence[Row], within_s: float) -> BySeed:
+def _found_by_seed(rows: Rows, within_s: float) -> BySeed:
     return {
         seed: sum(or_never(row["delay_s"]) <= within_s + 1e-9 for row in of)
         for (seed,), of in grouped(rows, "seed").items()

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.random import Generator
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.documents.files import Document
@@ -10,12 +11,12 @@ from beaver_ftc.documents.files import Document
 FREQUENCY_HZ = {"p": 0.25, "q": 0.2, "r": 0.15}
 
 
-def generator_of(seed: int, *spawn_key: int) -> np.random.Generator:
+def generator_of(seed: int, *spawn_key: int) -> Generator:
     """Random numbers that a spawn key distinguishes from the others of a seed."""
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=spawn_key))
 
 
-def sines(rng: np.random.Generator, amplitude_deg_s: float) -> Document:
+def sines(rng: Generator, amplitude_deg_s: float) -> Document:
     """A reference on every axis, with a random phase."""
     phases_deg = rng.uniform(-180.0, 180.0, len(AXES)).tolist()
     return {
@@ -29,9 +30,7 @@ def loss(surface: str, magnitude: float, at_s: float) -> Document:
     return {"type": "loss_of_effectiveness", "actuator": surface, "magnitude": magnitude, "at_s": at_s}
 
 
-def swings(
-    rng: np.random.Generator, sizes_rad_s2: Sequence[float], limits_rad_s: tuple[float, float]
-) -> Document:
+def swings(rng: Generator, sizes_rad_s2: Sequence[float], limits_rad_s: tuple[float, float]) -> Document:
     """An unstructured acceleration on every axis, of these sizes, with frequencies within the limits."""
     slowest, fastest = np.log(limits_rad_s)
     frequencies = np.exp(rng.uniform(slowest, fastest, len(AXES))).tolist()

@@ -44,6 +44,9 @@ FAULTS: tuple[tuple[str, Document], ...] = tuple(
 )
 
 
+Rows = list[Document]  # of flights
+
+
 class FaultCase(NamedTuple):
     """One cell of the matrix at one airspeed."""
 
@@ -195,7 +198,7 @@ def _tracking(flight: Landing, oracle: Landing, case: FaultCase) -> Document:
     }
 
 
-def document_of(rows: list[Document]) -> Document:
+def document_of(rows: Rows) -> Document:
     """The whole matrix as a document: cells, single flights, and what went wrong anywhere."""
     surfaces = dict.fromkeys(row["surface"] for row in rows)
     told = [row for row in rows if "told_chance" in row]
@@ -215,7 +218,7 @@ def document_of(rows: list[Document]) -> Document:
     }
 
 
-def beside_told(rows: list[Document]) -> Document:
+def beside_told(rows: Rows) -> Document:
     """The outcome of the flights in which a test that knows the fault detects it.
 
     named: the right surface, whether or not its type is still open; type_kept: the right type is named or
@@ -237,7 +240,7 @@ def beside_told(rows: list[Document]) -> Document:
     }
 
 
-def _cell(fault: str, surface: str, rows: list[Document]) -> Document:
+def _cell(fault: str, surface: str, rows: Rows) -> Document:
     here = [row for row in rows if (row["fault"], row["surface"]) == (fault, surface)]
     delays = [row["delay_s"] for row in here]
     return {
@@ -255,7 +258,7 @@ def _cell(fault: str, surface: str, rows: list[Document]) -> Document:
     }
 
 
-def _reason(lost: list[Document]) -> str:
+def _reason(lost: Rows) -> str:
     """Why the aircraft is lost, as the flights of the oracle show it."""
     beyond_s = max(row["oracle_beyond_s"] for row in lost)
     if beyond_s > 0.0:
@@ -266,7 +269,7 @@ def _reason(lost: list[Document]) -> str:
     return f"{lost[0]['departure_signal']} diverged"
 
 
-def _remark(here: list[Document]) -> str:
+def _remark(here: Rows) -> str:
     """How many flights lose the aircraft, and why; or that the fault has no effect in any of them."""
     lost = [row for row in here if row["departure_s"] is not None]
     if lost:

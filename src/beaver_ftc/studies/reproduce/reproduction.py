@@ -40,6 +40,7 @@ from beaver_ftc.studies.reproduce.claims import (
 from beaver_ftc.studies.reproduce.published_figures import figures_of
 from beaver_ftc.studies.reproduce.words import NAME, as_html, as_markdown, as_text
 
+Rows = list[Document]
 NUMBERS, ABLATED, SAME, FALSE_ALARM = "numbers", "without", "same", "false alarm"
 AS_PUBLISHED = Changed("as published", {})
 ELSEWHERE = (*BEYOND, *VARIANTS, *GAINS)  # wherever the paper did not fly
@@ -201,7 +202,7 @@ def _counted_apart(claims: Sequence[Document]) -> Document:
     }  # fmt: skip
 
 
-def _ablations(claims: list[Document]) -> list[Document]:
+def _ablations(claims: Rows) -> Rows:
     """A row an ablation: how it is made, and how many of the statements that speak of it fail without."""
     rows = []
     for ablation in ABLATIONS:
@@ -213,7 +214,7 @@ def _ablations(claims: list[Document]) -> list[Document]:
     return rows
 
 
-def _gains(found: BySetting) -> list[Document]:
+def _gains(found: BySetting) -> Rows:
     """A row a gain: the claims that no longer hold when it is halved and doubled. found: by setting."""
     rows = []
     for gain in gains():
@@ -222,7 +223,7 @@ def _gains(found: BySetting) -> list[Document]:
     return rows
 
 
-def _sensitivity(found: BySetting) -> list[Document]:
+def _sensitivity(found: BySetting) -> Rows:
     """A row a setting of ELSEWHERE: the claims that no longer hold, and those that hold without their
     mechanism as well. found: by setting."""
     return [
@@ -236,7 +237,7 @@ def _sensitivity(found: BySetting) -> list[Document]:
     ]
 
 
-def _also_without(found: BySetting, setting: str) -> list[Document]:
+def _also_without(found: BySetting, setting: str) -> Rows:
     """The testable claims that hold in a setting without their mechanism as well, but not as published."""
     pairs = zip(MEASURED, found[setting], found[AS_PUBLISHED.name], strict=True)
     return [
@@ -256,7 +257,7 @@ def _claim_row(claim: Claim, number: float) -> Document:
     }
 
 
-def _missed(found: BySetting, setting: str) -> list[Document]:
+def _missed(found: BySetting, setting: str) -> Rows:
     """The claims that hold as published and no longer in a setting, with the number there."""
     pairs = zip(MEASURED, found[AS_PUBLISHED.name], found[setting], strict=True)
     return [

@@ -10,6 +10,7 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.random import Generator
 
 from beaver_ftc.aircraft import AXES
 from beaver_ftc.design import SEVERITIES
@@ -30,7 +31,7 @@ _RANDOM = ("noise_std", "quantum")
 _SIGNED = ("bias", "scale_error", "drift")
 _IDEAL = Sensors()
 
-Change = Callable[[float, np.random.Generator], Document]
+Change = Callable[[float, Generator], Document]
 
 
 class Error(NamedTuple):
@@ -65,7 +66,7 @@ def errors_of(scenario: Scenario) -> tuple[Error, ...]:
     return tuple(filter(None, found))
 
 
-def changes_of(errors: Sequence[Error], factors: Mapping[str, float], draws: np.random.Generator) -> Document:
+def changes_of(errors: Sequence[Error], factors: Mapping[str, float], draws: Generator) -> Document:
     """The keys of a truth in which each error is so many times what is declared; those without a factor are
     absent, as is everything that no error makes."""
     truth: Document = {"uncertainty": {}, "sensors": "ideal", "environment": {}}
@@ -82,13 +83,13 @@ def _limits(section: type[Section], key: str) -> tuple[Any, Any]:
     return of.get("minimum"), of.get("maximum")
 
 
-def _signs(draws: np.random.Generator, names: Sequence[str]) -> dict[str, float]:
+def _signs(draws: Generator, names: Sequence[str]) -> dict[str, float]:
     return dict(zip(names, draws.choice((-1.0, 1.0), len(names)).tolist(), strict=True))
 
 
 def signed(
     sizes: Mapping[str, float], usual: float, limits: tuple[float, float], times: float,
-    draws: np.random.Generator,
+    draws: Generator,
 ) -> dict[str, float]:  # fmt: skip
     """The value of each key: usual + times * sign * size, sign drawn, within the limits."""
     signs = _signs(draws, [*sizes])
@@ -120,7 +121,7 @@ def _acceleration(scenario: Scenario, sizes: Sequence[float]) -> Error:
     flown = {axis: getattr(scenario.uncertainty.sinusoid, axis) for axis in AXES}
     known = {axis: wave.frequency_rad_s for axis, wave in flown.items() if wave.amplitude_rad_s2}
 
-    def change(times: float, draws: np.random.Generator) -> Document:
+    def change(times: float, draws: Generator) -> Document:
         drawn = dict(zip(AXES, draws.uniform(*FREQUENCIES_RAD_S, len(AXES)).tolist(), strict=True))
         return {
             "uncertainty.sinusoid": {
@@ -137,7 +138,7 @@ def _servos(declared: Declared) -> Error:
     bounds = {name: bound.model_dump() for name, bound in declared.servo_errors}
     _, widest_deg = _limits(TrueActuator, "dead_band_deg")
 
-    def change(times: float, draws: np.random.Generator) -> Document:
+    def change(times: float, draws: Generator) -> Document:
         truth = {}
         for name, bound in bounds.items():
             shares = {key: bound[key] for key in ("bandwidth", "rate_limit")}
@@ -154,7 +155,7 @@ def _sensors(declared: Mapping[str, Mapping[str, float]]) -> Error:
     """Noise and resolution are so many times as large; biases and slopes too, each with a sign drawn."""
     bounds = declared or PRESETS[UNDECLARED_SENSORS]
 
-    def change(times: float, draws: np.random.Generator) -> Document:
+    def change(times: float, draws: Generator) -> Document:
         truth = {}
         for name, keys in bounds.items():
             signs = _signs(draws, list(keys))
@@ -191,7 +192,7 @@ def _air(declared: str) -> Error:
     is_declared = declared != "none"
     base = SEVERITIES.index(declared if is_declared else UNDECLARED_AIR)
 
-    def change(times: float, draws: np.random.Generator) -> Document:
+    def change(times: float, draws: Generator) -> Document:
         return {"environment": air_of(SEVERITIES[min(int(times * base), len(SEVERITIES) - 1)])}
 
     return Error("turbulence", declared if is_declared else _unknown(UNDECLARED_AIR), change, is_declared)

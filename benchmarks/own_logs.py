@@ -37,7 +37,7 @@ import beaver_ftc as bf
 from beaver_ftc.design.model import DesignFunctions, design_record
 from beaver_ftc.design.table import N_Y
 from beaver_ftc.documents import BadInput
-from beaver_ftc.results.exports import RECORDING_FILE_OF_KIND
+from beaver_ftc.results.recordings import RECORDING_FILE_OF_KIND
 from beaver_ftc.results.writer import run
 from beaver_ftc.studies.present.tables import grouped, markdown_table
 from beaver_ftc_logs.by_aircraft import diagnose_aircraft, load_diagnosed

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
 
 FORMATS = ("png", "pdf", "svg")  # of figures
-Recording = StrEnum("Recording", ["table", "ulog", "ardupilot"])  # the formats of `results.exports`
+Recording = StrEnum("Recording", ["table", "ulog", "ardupilot"])  # the kinds of `results.recordings`
 
 
 @dataclass(frozen=True)

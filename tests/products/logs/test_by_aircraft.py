@@ -13,7 +13,7 @@ from pyarrow import parquet
 import beaver_ftc as bf
 from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc.results.exports import RECORDING_FILE_OF_KIND, write_recording
+from beaver_ftc.results.recordings import RECORDING_FILE_OF_KIND, write_recording
 from beaver_ftc_logs import stepped
 from beaver_ftc_logs.by_aircraft import diagnose_aircraft, load_diagnosed
 from beaver_ftc_logs.loading import read_vehicle_columns

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 import beaver_ftc as bf
 from beaver_ftc.cli.main import app
-from beaver_ftc.results.exports import RECORDING_FILE_OF_KIND, write_recording
+from beaver_ftc.results.recordings import RECORDING_FILE_OF_KIND, write_recording
 from beaver_ftc_assurance.certificates.check_certificate import failures
 from flying import SINES
 

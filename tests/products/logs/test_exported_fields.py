@@ -10,9 +10,10 @@ import pytest
 from pyarrow import parquet
 
 from beaver_ftc.aircraft import load
-from beaver_ftc.results.exports import RECORDING_FILE_OF_KIND, write_acmi, write_recording
+from beaver_ftc.results.exports import write_acmi
 from beaver_ftc.results.log import ParquetLog
 from beaver_ftc.results.metrics import measure
+from beaver_ftc.results.recordings import RECORDING_FILE_OF_KIND, write_recording
 from beaver_ftc_logs.readers import read_flight
 from results.synthetic import landed
 

@@ -3,8 +3,9 @@ import pytest
 
 from beaver_ftc.results.figures import draw, pictures_of
 from beaver_ftc.results.log import StoredLog
+from beaver_ftc.results.series import series_of
 from beaver_ftc.results.style import LOOKS, marks
-from beaver_ftc.results.views import series_of, views
+from beaver_ftc.results.views import views
 
 EVERY = {
     "candidates", "tracking", "surfaces", "detection", "isolation", "ratio", "effectiveness", "supervisor",

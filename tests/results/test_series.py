@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.results.log import ParquetLog, StoredLog
-from beaver_ftc.results.views import series_of
+from beaver_ftc.results.series import series_of
 
 COLUMNS = ("t_s", "x", "psi_rad", "q_residual_rad_s", "q_threshold_rad_s",
            "fie_e_q_residual_rad_s", "fie_e_q_lower_rad_s", "fie_e_q_upper_rad_s")  # fmt: skip

@@ -11,14 +11,13 @@ import numpy as np
 
 from beaver_ftc.results.log import StoredLog, Values
 from beaver_ftc.results.model import Metrics
+from beaver_ftc.results.series import WHOLE_FLIGHT_S, series_of
 from beaver_ftc.results.style import GREY, LOOKS, SHADES, SOFTWARE_MARK, Mark, closeup_window, marks
 from beaver_ftc.results.views import (
     AXIS_QUANTILES,
-    WHOLE_FLIGHT_S,
     Panel,
     Trace,
     View,
-    series_of,
     views_of_flight,
 )
 

@@ -147,8 +147,8 @@ class Flight:
         Raises BadInput for an unknown view or style.
         """
         from beaver_ftc.results.figures import STYLES, draw
+        from beaver_ftc.results.series import WHOLE_FLIGHT_S, series_of
         from beaver_ftc.results.style import closeup_window, marks
-        from beaver_ftc.results.views import WHOLE_FLIGHT_S, series_of
 
         known = self._view_of_name()
         if view not in known:

@@ -18,13 +18,12 @@ import numpy as np
 from beaver_ftc.results import log, verdict
 from beaver_ftc.results.expectations import expectations_in_words
 from beaver_ftc.results.model import Document, Metrics
+from beaver_ftc.results.series import MAX_CURVE_POINTS, series_of
 from beaver_ftc.results.style import LOOKS, MODE_COLOURS, SHADES, closeup_window, marks
 from beaver_ftc.results.views import (
-    MAX_CURVE_POINTS,
     Panel,
     View,
     expected_airspeed_mps,
-    series_of,
     surfaces,
     surfaces_by_kind,
     views,

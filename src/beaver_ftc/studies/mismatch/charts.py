@@ -14,8 +14,8 @@ from beaver_ftc.documents.files import Document
 from beaver_ftc.results.expectations import MOTION_OF_AXIS, without_underscores
 from beaver_ftc.results.log import StoredLog
 from beaver_ftc.results.model import Metrics
+from beaver_ftc.results.series import series_of
 from beaver_ftc.results.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION, Mark, marks
-from beaver_ftc.results.views import series_of
 from beaver_ftc.studies.linear_systems import CHANNELS, response
 from beaver_ftc.studies.mismatch.linear import LinearAnalysis
 from beaver_ftc.studies.mismatch.sources import SOURCES

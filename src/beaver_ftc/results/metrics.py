@@ -243,7 +243,7 @@ def _found(flight: "Landing", truth: Truth) -> Document:
         },
         "changes": [_change(change, truth) for change in flight.changes],
         "mode_changes_left_out": flight.mode_changes - len(flight.supervisor),
-        "envelope": (flight.exits, flight.outside_s, flight.exits - len(flight.envelope_exits)),
+        "envelope": landed | {"exits_left_out": flight.exits - len(flight.envelope_exits)},
         "profile": _deviations(flight.profile),
         "arrival": _arrival(flight),
         "passed": True,
@@ -478,9 +478,10 @@ def _hint_drift(flight: "Landing") -> str:
     if flight.end is None or flight.scenario.autopilot:
         return ""
     initial = flight.scenario.initial
+    airspeed_mps, altitude_m = flight.end
     ends = (
-        ("airspeed", initial.airspeed_mps, flight.end[0], DRIFT_MPS, "m/s"),
-        ("altitude", initial.altitude_m, flight.end[1], DRIFT_M, "m"),
+        ("airspeed", initial.airspeed_mps, airspeed_mps, DRIFT_MPS, "m/s"),
+        ("altitude", initial.altitude_m, altitude_m, DRIFT_M, "m"),
     )
     far = [
         f"{what} {'fell' if b < a else 'rose'} from {a:.0f} to {b:.0f} {unit}"

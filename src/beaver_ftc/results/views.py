@@ -150,7 +150,8 @@ def views(columns: Sequence[str], power: bool = False, within_mps: float | None 
 
 
 def power_column(columns: Sequence[str]) -> str:
-    """The log's column of the engine power commanded along a profile; empty where there is none."""
+    """The log's column of the engine power commanded along a profile; empty where there is none. Its name is
+    the aircraft's; it stands before the first command of the profile, `altitude_command_m`."""
     if BEAVER_POWER_COLUMN in columns:
         return BEAVER_POWER_COLUMN
     if "altitude_command_m" not in columns:

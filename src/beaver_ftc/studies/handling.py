@@ -78,24 +78,31 @@ def of_model(linear: LinearModel, airspeed_mps: float, where: str) -> Qualities:
     g_per_rad = -linear.A[alpha, alpha] * airspeed_mps / GRAVITY_MPS2
     values = _values(modes(linear.of(CLASSICAL).A), float(g_per_rad))
     return [
-        Quality(where, airspeed_mps, limit.mode, limit.quantity, value, limit.level(value))
-        for limit, value in zip(LIMITS, values, strict=True)
+        Quality(where, airspeed_mps, *which, values[which], limit.level(values[which]))
+        for limit in LIMITS
+        for which in [(limit.mode, limit.quantity)]
     ]
 
 
-def _values(found: Mapping[str, Mode], g_per_rad: float) -> list[float]:
-    """The quantities of LIMITS, in their order; g_per_rad: load factor per angle of attack."""
+def _values(found: Mapping[str, Mode], g_per_rad: float) -> dict[tuple[str, str], float]:
+    """Each quantity of LIMITS by mode and name. g_per_rad: load factor per angle of attack."""
     short, dutch, phugoid = found["short_period"], found["dutch_roll"], found["phugoid"]
     roll = found["roll"].pole
     spiral = found["spiral"].pole.real
     cap = short.frequency_rad_s**2 / g_per_rad if g_per_rad > 0.0 else inf
-    swing = dutch.damping * dutch.frequency_rad_s
-    coupled = -roll.real if roll.imag else inf  # then neither is a mode of its own
-    constant_s = 0.0 if roll.imag else -1.0 / roll.real
-    return [
-        short.damping, cap, dutch.damping, swing, dutch.frequency_rad_s, constant_s,
-        inf if roll.imag else _double_s(spiral), phugoid.damping, _double_s(phugoid.pole.real), coupled,
-    ]  # fmt: skip
+    return {
+        ("short period", "damping"): short.damping,
+        ("short period", "CAP"): cap,
+        ("Dutch roll", "damping"): dutch.damping,
+        ("Dutch roll", "damping x frequency"): dutch.damping * dutch.frequency_rad_s,
+        ("Dutch roll", "frequency"): dutch.frequency_rad_s,
+        ("roll", "time constant"): 0.0 if roll.imag else -1.0 / roll.real,
+        ("spiral", "time to double"): inf if roll.imag else _double_s(spiral),
+        ("phugoid", "damping"): phugoid.damping,
+        ("phugoid", "time to double"): _double_s(phugoid.pole.real),
+        # roll and spiral as one oscillation: then neither is a mode of its own
+        ("roll-spiral", "damping x frequency"): -roll.real if roll.imag else inf,
+    }
 
 
 def _double_s(real: float) -> float:

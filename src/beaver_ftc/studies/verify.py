@@ -6,7 +6,7 @@ from functools import partial
 from itertools import product
 from math import ceil
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import typer
 
@@ -107,14 +107,20 @@ def _estimate_error(flight: Landing) -> float | None:
     return abs(flight.estimate + fault.magnitude * grown)
 
 
-# What breaks each promise, in the row of a scheme.
-_BROKEN = {
-    "false_alarms": "false_alarm", "true_fault_exclusions": "excluded", "wrong_isolations": "wrong",
-    "late_detections": "late",
-}  # fmt: skip
-PROMISES = tuple(_BROKEN)
-# The guarantee that each violates, as docs/explanation numbers them; a wrong name follows from G2.
-_GUARANTEES = ("G1", "G2", "G2", "G3")
+class Promise(NamedTuple):
+    """The guarantee that a promise follows from, as docs/explanation numbers them; the key of the row of a
+    scheme that is true if the promise is broken."""
+
+    guarantee: str
+    broken: str
+
+
+PROMISES = {  # by what is counted
+    "false_alarms": Promise("G1", "false_alarm"),
+    "true_fault_exclusions": Promise("G2", "excluded"),
+    "wrong_isolations": Promise("G2", "wrong"),
+    "late_detections": Promise("G3", "late"),
+}
 _SPREADS = {
     "detection delay, s": "delay_s", "isolation delay, s": "isolation_delay_s",
     "delay / guaranteed": "delay_over_guaranteed", "error of the estimate": "estimate_error",
@@ -160,7 +166,7 @@ def _healthy_document(rows: Sequence[Row]) -> Document:
 
 def _scheme(rows: Sequence[Row]) -> Document:
     n = len(rows)
-    counts = {promise: sum(row[broken] for row in rows) for promise, broken in _BROKEN.items()}
+    counts = {promise: sum(row[of.broken] for row in rows) for promise, of in PROMISES.items()}
     certain = [row for row in rows if row["guaranteed_s"] is not None]
     ratios = [row["delay_s"] / row["guaranteed_s"] for row in certain if row["delay_s"]]
     errors = [row["estimate_error"] for row in rows if row["estimate_error"] is not None]
@@ -224,9 +230,9 @@ def _fault_lines(document: Document) -> list[str]:
     if not schemes:
         return []
     lines = [f"{document['faults']} random faults{'':17}" + "".join(f"{name:>18}" for name in schemes)]
-    for guarantee, promise in zip(_GUARANTEES, PROMISES, strict=True):
+    for promise, of in PROMISES.items():
         cells = [f"{s[promise]} (p < {s[promise + '_probability_upper_95']:.1e})" for s in schemes.values()]
-        lines.append(_line(f"{guarantee} {promise.replace('_', ' ')}", cells))
+        lines.append(_line(f"{of.guarantee} {promise.replace('_', ' ')}", cells))
     for key in ("detected", "detection_certain", "isolated"):
         lines.append(_line(key.replace("_", " "), (str(s[key]) for s in schemes.values())))
     for (label, key), which in product(_SPREADS.items(), ("median", "p90")):

@@ -46,6 +46,11 @@ def _free(row: Document) -> str:
     return f"{rate(row['free'])} / {delay(row['free'])}"
 
 
+FLIGHT: Columns = (
+    ("tracking/oracle 50/90 %", _cell("{:.2f}".format, "ratio_median", "ratio_90", none="lost")),
+    ("lost", "departures"),
+    ("us/frame", _cell("{:.0f}".format, "us")),
+)
 DIAGNOSIS: Columns = (
     ("scheme", "scheme"),
     ("false alarms/h (95 %)", _alarms),
@@ -53,13 +58,11 @@ DIAGNOSIS: Columns = (
     ("delay s 50/90 %", _of_faults(_cell("{:.2f}".format, "delay_median_s", "delay_90_s", none="never"))),
     ("isolated %", _cell(bare_percent, "isolation_rate")),
     ("with no false alarm: detected % / delay s", _of_faults(_free)),
-    ("tracking/oracle 50/90 %", _cell("{:.2f}".format, "ratio_median", "ratio_90", none="lost")),
-    ("lost", "departures"),
-    ("us/frame", _cell("{:.0f}".format, "us")),
+    *FLIGHT,
 )
 CONTROL: Columns = (
     ("law", "law"),
-    *DIAGNOSIS[6:],
+    *FLIGHT,
     ("error before, deg/s 50/90 %", _cell("{:.3g}".format, "before_median", "before_90")),
     ("after", _cell("{:.3g}".format, "after_median", "after_90")),
     ("travel deg/s", _cell("{:.3g}".format, "travel_median")),

@@ -60,19 +60,24 @@ def rows_of(faulted: Iterable[Watched], levels: dict[Key, float]) -> list[Row]:
     delay_s at the common level, own_delay_s at the scheme's own; None where there is no alarm. An alarm
     before the fault is a false_alarm and no detection.
     """
-    return [
-        dict(zip(COLUMNS, (
-            *one.block.condition, one.block.excitation_deg_s, one.block.seed, *fault, scheme,
-            *(says for at in (level, 1.0) for says in (trace.false_alarm(at), finite(trace.delay_s(at)))),
-            *deflections,
-        ), strict=True))
-        for one in faulted
-        if one.deflections
-        for scheme, traces in one.traces.items()
-        if (level := levels.get((*one.block.condition, scheme))) is not None
-        for fault, trace, deflections in zip(one.faults, traces, one.deflections, strict=True)
-        if trace.faulted
-    ]  # fmt: skip
+    rows = []
+    for one in faulted:
+        block = one.block
+        for scheme, traces in one.traces.items() if one.deflections else ():
+            level = levels.get((*block.condition, scheme))
+            if level is None:
+                continue
+            for fault, trace, deflections in zip(one.faults, traces, one.deflections, strict=True):
+                if trace.faulted:
+                    place = *block.condition, block.excitation_deg_s, block.seed, *fault, scheme
+                    cells = *place, *_alarm(trace, level), *_alarm(trace, 1.0), *deflections
+                    rows.append(dict(zip(COLUMNS, cells, strict=True)))
+    return rows
+
+
+def _alarm(trace: Trace, level: float) -> tuple[bool, float | None]:
+    """Whether the alarm at a level is a false one, and its delay, s."""
+    return trace.false_alarm(level), finite(trace.delay_s(level))
 
 
 def summary(rows: Rows, own: bool = False) -> Document:

@@ -37,9 +37,13 @@ def columns_of(aircraft: Aircraft) -> Columns:
 
 
 def seen_when_told(scenario: "Scenario", kept: Columns, surface: str) -> Document:
-    """told_deflection: of the fault of a surface since it struck; told_chance: of finding it in that time.
+    """told_deflection: d of the fault of a surface since it struck; told_chance: the probability of finding
+    it in that time.
 
-    If sensors are in doubt, of telling it from the error of any gyro.
+    d is the deflection of phi, what the fault adds to the rates' accelerations, beside what the coefficients
+    of `regressors` with standard deviations `sigma` may add; if sensors are in doubt, the least over an error
+    of any gyro. phi (n, 3) rad/s2; regressors (n, 3, m) rad/s2 per 1; sigma (m,): of an even distribution
+    over the tolerance.
     """
     assert scenario.fdi.statistical is not None
     aircraft = scenario.airframe

@@ -20,7 +20,7 @@ from beaver_ftc.studies.linear_systems import CHANNELS, response
 from beaver_ftc.studies.mismatch.linear import LinearAnalysis
 from beaver_ftc.studies.mismatch.sources import SOURCES
 from beaver_ftc.studies.mismatch.split import CAUSES, ETA_BAR, FAULT, TOTAL, UNEXPLAINED, column
-from beaver_ftc.studies.mismatch.tables import percent
+from beaver_ftc.studies.mismatch.tables import share_text
 from beaver_ftc.studies.present.figures import heat_map, label_edges, panels
 from beaver_ftc.studies.present.page import Files
 
@@ -114,7 +114,9 @@ def bound_figure(found: Document) -> "Figure":
     ]
     shares = [[sources[name]["bound_share"] for name in names] for sources in of_axes]
     values = np.array([[_bar_length(share) for share in row] for row in shares])
-    notes = [[percent(share) if _bar_length(share) > LEAST_SHARE else "" for share in row] for row in shares]
+    notes = [
+        [share_text(share) if _bar_length(share) > LEAST_SHARE else "" for share in row] for row in shares
+    ]
     title = f"Largest share of the bound eta_bar\n{found['scenario']}", "share of eta_bar (1: all of it)"
     size = 11.0, 1.6 + 0.34 * max(len(names), 2)
     ends = LEAST_SHARE, 30.0 * max(values.max(initial=0.0), 1.0)
@@ -133,7 +135,7 @@ def comparison_figure(entries: Sequence[Document]) -> "Figure":
     ratios = np.array([[max(_bar_length(ratio), LEAST_RATIO) for ratio in row] for row in needed])
     notes = [
         [
-            f"{percent(r)} ({without_underscores(each[f'{axis}_dominant'])})"
+            f"{share_text(r)} ({without_underscores(each[f'{axis}_dominant'])})"
             for r, each in zip(row, entries, strict=True)
         ]
         for row, axis in zip(needed, AXES, strict=True)

@@ -21,7 +21,7 @@ PICTURES = {
 Table = tuple[str, list[str], list[list[str]]]  # caption, head, rows
 
 
-def percent(share: float | None) -> str:
+def share_text(share: float | None) -> str:
     """A share as a percentage, of two digits below 10 %; None is a share of nothing."""
     if share is None:
         return "no bound"
@@ -43,7 +43,7 @@ def findings(found: Document) -> list[str]:
     dominant = "nothing: truth and design agree"
     if worst is not None:
         source = without_underscores(worst["source"])
-        dominant = f"{source}: {percent(worst['bound_share'])} of the bound on {worst['axis']}"
+        dominant = f"{source}: {share_text(worst['bound_share'])} of the bound on {worst['axis']}"
     lines = [f"dominant     {dominant}"]
     if found["false_alarm"]:
         detection = found["detection"]
@@ -86,22 +86,23 @@ def _reason(exceedances: list[Document]) -> str:
 
 def _needed(axis: str, entry: Document) -> str:
     """Of the bound on an axis: the largest share used, and the smallest constant that would do, rad/s2."""
-    return f"{percent(entry[f'{axis}_worst_ratio'])} / {entry[f'{axis}_smallest_constant_rad_s2']:.3g}"
+    return f"{share_text(entry[f'{axis}_worst_ratio'])} / {entry[f'{axis}_smallest_constant_rad_s2']:.3g}"
 
 
 _4_DIGITS = "{:.4g}".format
 # An axis against its bound, how far it was used and exceeded, and the smallest that would have done.
 BOUNDS = (
     ("axis", "axis"), ("constant", "constant_rad_s2", _4_DIGITS),
-    ("smallest", "smallest_constant_rad_s2", _4_DIGITS), ("worst", "worst_ratio", percent),
+    ("smallest", "smallest_constant_rad_s2", _4_DIGITS), ("worst", "worst_ratio", share_text),
     ("at", "worst_at_s", seconds), ("exceeded", "exceeded_s", seconds), ("times", "exceeded_times"),
     ("because of", "exceedances", _reason),
 )  # fmt: skip
 # Frequency and damping of a mode, and how far the others are from the truth.
 MODES = (
     ("mode", "mode", without_underscores), ("truth rad/s", "truth.frequency_rad_s", _4_DIGITS),
-    ("damping", "truth.damping", "{:.3g}".format), ("FDC off by", "deviation.fdc", percent),
-    ("design off by", "deviation.design", percent), ("JSBSim's own off by", "jsbsim_own_deviation", percent),
+    ("damping", "truth.damping", "{:.3g}".format), ("FDC off by", "deviation.fdc", share_text),
+    ("design off by", "deviation.design", share_text),
+    ("JSBSim's own off by", "jsbsim_own_deviation", share_text),
 )  # fmt: skip
 # A run: worst share of the bound, smallest constant, reason, alarm and guarantee.
 RUNS = (
@@ -133,7 +134,7 @@ def _sources(found: Document) -> Table:
     caption = f"{found['scenario']}: truth less design (1e-3 rad/s2; share of the bound)"
     head = ["source", *(f"{axis} {what}" for axis in AXES for what in ("rms", "max", "bound"))]
     rows = []
-    for name in found["axes"]["p"]:
+    for name in found["axes"]["p"]:  # as on every axis
         per_axis = [found["axes"][axis][name] for axis in AXES]
         if any(of["max"] > 0.0 for of in per_axis):
             rows.append(_row(without_underscores(name), per_axis))
@@ -145,7 +146,7 @@ def _sources(found: Document) -> Table:
 def _row(name: str, per_axis: list[Document]) -> list[str]:
     row = [name]
     for of in per_axis:
-        shown = number(1e3 * of["rms"]), number(1e3 * of["max"]), percent(of["bound_share"])
+        shown = number(1e3 * of["rms"]), number(1e3 * of["max"]), share_text(of["bound_share"])
         row += ["-"] * len(shown) if of["max"] == 0.0 else shown
     return row
 

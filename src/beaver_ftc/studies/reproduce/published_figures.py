@@ -110,7 +110,9 @@ def _share(claim: Document, number: float | None) -> float:
     known = or_never(number)
     limit = claim["limit"]
     over, under = (limit, known) if claim["at_least"] else (known, limit)
-    return over / under if under else inf if over > 0.0 else 0.0
+    if under:
+        return over / under
+    return inf if over > 0.0 else 0.0
 
 
 def margins_figure(document: Document) -> "Figure":

@@ -102,7 +102,7 @@ def _of_ratios(what: str, section: str, shares: Mapping[str, float], limits: tup
     shares = shares if known else dict.fromkeys(shares, UNDECLARED_SHARE)
     largest = f"{100.0 * max(shares.values()):g} %"
     says = largest if known else _unknown(largest)
-    return Error(what, says, lambda *drawn: {section: signed(shares, 1.0, limits, *drawn)}, known)
+    return Error(what, says, lambda times, draws: {section: signed(shares, 1.0, limits, times, draws)}, known)
 
 
 def _coupling(theta: Sequence[float]) -> Error:
@@ -111,7 +111,7 @@ def _coupling(theta: Sequence[float]) -> Error:
     return Error(
         "inertia coupling",
         f"{max(theta):g}",
-        lambda *drawn: {section: signed(sizes, 0.0, (-1.0, 1.0), *drawn)},
+        lambda times, draws: {section: signed(sizes, 0.0, (-1.0, 1.0), times, draws)},
     )
 
 

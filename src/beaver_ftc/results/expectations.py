@@ -16,6 +16,10 @@ from beaver_ftc.scenario.warnings import OF_DIAGNOSIS
 MOTION_OF_AXIS = {"p": "roll", "q": "pitch", "r": "yaw"}
 
 
+Texts = tuple[str, str]
+"""What is expected, and what came out; the latter empty if it adds nothing."""
+
+
 @dataclass(frozen=True)
 class Rule:
     """An expectation that a value of the metrics equals. path: of the value. says: its name in words."""
@@ -32,7 +36,7 @@ class Rule:
         """Whether the actual value meets the expectation."""
         return bool(actual == expected)
 
-    def texts(self, said: Expectation) -> tuple[str, str]:
+    def texts(self, said: Expectation) -> Texts:
         """Expected and actual value in words; the latter empty if it is the same."""
         is_as_expected = said.passed and said.actual == said.expected
         actual = "" if is_as_expected else value_text(said.actual)
@@ -57,7 +61,7 @@ class Limit(Rule):
         """Whether the value exists, and is within the limit."""
         return actual is not None and abs(actual) <= expected
 
-    def texts(self, said: Expectation) -> tuple[str, str]:
+    def texts(self, said: Expectation) -> Texts:
         """The limit, and the value with its share of the limit."""
         share = _share_of_limit(said)
         of_limit = "" if share is None else f" ({three_digits(100 * share)} % of the limit)"
@@ -71,7 +75,7 @@ class Flag(Rule):
 
     says_not: str
 
-    def texts(self, said: Expectation) -> tuple[str, str]:
+    def texts(self, said: Expectation) -> Texts:
         """The expected words, and the opposite if that came out."""
         words = (self.says_not, self.says)
         is_as_expected = said.passed or said.actual is None

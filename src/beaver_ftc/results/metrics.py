@@ -40,7 +40,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from beaver_ftc.results import model
 from beaver_ftc.results.expectations import evaluate
-from beaver_ftc.results.model import DeclaredFault, Document, Metrics, rounded
+from beaver_ftc.results.model import DeclaredFault, Document, Metrics, Quantity, rounded
 from beaver_ftc.scenario.diagnosis import failing, of_several
 from beaver_ftc.scenario.faults import UNANTICIPATED, Damage, acting_at, is_share, size_at
 from beaver_ftc.scenario.signals import TIME_TOLERANCE_S, first_frame_s, is_before, is_in_force
@@ -60,8 +60,8 @@ class Onset:
     """The instant from which events are judged. at_s: as declared, None where nothing breaks. rate_hz: of the
     frames, None where the truth has none (a recorded log)."""
 
-    at_s: float | None
-    rate_hz: float | None = None
+    at_s: Quantity
+    rate_hz: Quantity = None
 
     @property
     def first_frame_with_fault_s(self) -> float:
@@ -74,7 +74,7 @@ class Onset:
         """Whether an alarm at a time, or at each of several, is a false one: there is no fault yet."""
         return is_before(time_s, inf if self.at_s is None else self.at_s)
 
-    def delay_s(self, time_s: float | None) -> float | None:
+    def delay_s(self, time_s: Quantity) -> Quantity:
         """From the fault's first frame to an event; None without one, or if it came before the fault."""
         if time_s is None or self.is_false(time_s):
             return None
@@ -139,16 +139,14 @@ class Truth:
         outside = self.outside_class_from_second_fault if len(surfaces) > 1 else None
         return replace(self, faults=tuple(acting), outside_class_from_second_fault=outside)
 
-    def against(self, name: str | None, time_s: float | None) -> DeclaredFault | None:
+    def against(self, name: str | None, time_s: Quantity) -> DeclaredFault | None:
         """The fault that a name given then is held against: the first one in force of those that it names
         rightly, or the first one that strikes."""
         meant = self.faults_named_rightly_by(name, time_s)
         now = (fault for fault in meant if time_s is not None and is_in_force(fault, time_s))
         return next(now, meant[0] if meant else None)
 
-    def is_type_right(
-        self, fault: DeclaredFault | None, kind: str | None, time_s: float | None
-    ) -> bool | None:
+    def is_type_right(self, fault: DeclaredFault | None, kind: str | None, time_s: Quantity) -> bool | None:
         """Whether a type decided then is that of `fault`, or of another one that acts on its surface then."""
         if fault is None:
             return None if kind is None else False
@@ -156,7 +154,7 @@ class Truth:
         right = [one.is_of_type(kind) for one in (fault, *(alike if fault.actuator else ()))]
         return None if right[0] is None else any(right)
 
-    def faults_named_rightly_by(self, name: str | None, time_s: float | None) -> tuple[DeclaredFault, ...]:
+    def faults_named_rightly_by(self, name: str | None, time_s: Quantity) -> tuple[DeclaredFault, ...]:
         """The declared faults of which a name given then is right, as they strike."""
         candidates = self.faults
         beyond = self.outside_class_from_second_fault
@@ -164,9 +162,7 @@ class Truth:
             candidates += (beyond,)
         return tuple(fault for fault in candidates if fault.is_named_by(name, self.removed_surfaces))
 
-    def is_premature(
-        self, name: str | None, time_s: float | None, fault: DeclaredFault | None
-    ) -> bool | None:
+    def is_premature(self, name: str | None, time_s: Quantity, fault: DeclaredFault | None) -> bool | None:
         """Whether a name was given before the fault it is held against began; None without a name."""
         if name is None or time_s is None:
             return None
@@ -357,7 +353,7 @@ def _named(found: Document, truth: Truth, otherwise: DeclaredFault | None = None
     }
 
 
-def _deviations(off: Mapping[str, float | None] | None) -> Document | None:
+def _deviations(off: Mapping[str, Quantity] | None) -> Document | None:
     """Deviations from the commanded profile, angles in deg; None without an autopilot."""
     angles = ("heading_deg", "bank_deg")
     if off is None:

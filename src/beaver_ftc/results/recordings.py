@@ -21,6 +21,8 @@ ColumnsByTopic = dict[str, log.Values]
 """Fields of each message; every message has the stamps `t_s`."""
 Stamps = NDArray[np.int64]
 """Time of each row, us."""
+Names = dict[str, dict[str, str]]
+"""By part and name, what a recording calls it."""
 RECORDING_FILE_OF_KIND = {"table": "flight.csv", "ulog": "flight.ulg", "ardupilot": "flight.bin"}
 # What each kind calls what it records, in its order: `topic.field`, or the column of a table. i: place from 0
 # on, n: from 1 on.
@@ -78,7 +80,7 @@ def write_recording(
     }
     wanted = {"t_s", *(column for part in source_of.values() for column in part.values())}
     known = log.StoredLog(log_path).read(list(wanted))
-    named: dict[str, dict[str, str]] = {}
+    named: Names = {}
     topics: ColumnsByTopic = {}
     for part, pattern in _NAMES_OF_KIND[kind].items():
         named[part] = {}
@@ -97,7 +99,7 @@ def write_recording(
     (folder / "vehicle.yaml").write_text(_vehicle_file_text(named, travel_rad, kind), encoding="utf-8")
 
 
-def _vehicle_file_text(named: dict[str, dict[str, str]], travel_rad: dict[str, float], kind: str) -> str:
+def _vehicle_file_text(named: Names, travel_rad: dict[str, float], kind: str) -> str:
     """The vehicle file: which column is what."""
     angle = "{{column: {}, unit: deg}}" if kind == "ardupilot" else "{!r}"
     commands = named["commands"]

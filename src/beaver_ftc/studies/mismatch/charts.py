@@ -73,9 +73,10 @@ def sources_figure(frames: Path, found: Document, instants: Sequence[Mark]) -> "
 
 def largest_sources(found: Document, axis: str) -> list[str]:
     """The sources of an axis with the largest peaks, faults aside, largest first."""
-    by_peak = sorted(CAUSES, key=lambda name: -found["axes"][axis][name]["max"])
-    least = LEAST_CURVE * found["axes"][axis][by_peak[0]]["max"]
-    return [name for name in by_peak[:SHOWN_SOURCES] if found["axes"][axis][name]["max"] >= least]
+    peaks = {name: found["axes"][axis][name]["max"] for name in CAUSES}
+    by_peak = sorted(CAUSES, key=lambda name: -peaks[name])
+    least = LEAST_CURVE * peaks[by_peak[0]]
+    return [name for name in by_peak[:SHOWN_SOURCES] if peaks[name] >= least]
 
 
 def _draw_sources(axes: "Axes", series: dict, axis: str, chosen: list[str], instants: Sequence[Mark]) -> None:

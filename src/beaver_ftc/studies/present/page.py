@@ -25,6 +25,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+Drawn = Mapping[str, Path]
+"""Files of pictures by their stems."""
+
+
 class Heading(NamedTuple):
     """A heading below the title."""
 
@@ -103,19 +107,19 @@ def as_text(parts: Sequence[Part]) -> str:
     return "\n".join(lines)
 
 
-def as_html(title: str, parts: Sequence[Part], figures: Mapping[str, Path]) -> str:
+def as_html(title: str, parts: Sequence[Part], figures: Drawn) -> str:
     """The page as HTML; figures: stem to file of the pictures, which go into it."""
     body = html_of(parts, figures)
     page = (Path(__file__).parent / "page.html").read_text(encoding="utf-8")
     return page.format(title=escape(title), body=body)
 
 
-def html_of(parts: Sequence[Part], figures: Mapping[str, Path]) -> str:
+def html_of(parts: Sequence[Part], figures: Drawn) -> str:
     """The parts as HTML, for a page of others."""
     return "\n".join(_html(part, figures) for part in parts if part)
 
 
-def _html(part: Part, figures: Mapping[str, Path]) -> str:
+def _html(part: Part, figures: Drawn) -> str:
     match part:
         case Heading():
             return f"<h2>{escape(part.text)}</h2>"

@@ -31,6 +31,7 @@ _RANDOM = ("noise_std", "quantum")
 _SIGNED = ("bias", "scale_error", "drift")
 _IDEAL = Sensors()
 
+SensorErrors = Mapping[str, Mapping[str, float]]  # by sensor and key
 Change = Callable[[float, Generator], Document]
 
 
@@ -151,7 +152,7 @@ def _servos(declared: Declared) -> Error:
     return Error("actuators", says, change)
 
 
-def _sensors(declared: Mapping[str, Mapping[str, float]]) -> Error:
+def _sensors(declared: SensorErrors) -> Error:
     """Noise and resolution are so many times as large; biases and slopes too, each with a sign drawn."""
     bounds = declared or PRESETS[UNDECLARED_SENSORS]
 
@@ -176,7 +177,7 @@ def _sensors(declared: Mapping[str, Mapping[str, float]]) -> Error:
     return Error("sensor errors", name, change, bool(declared))
 
 
-def _preset(declared: Mapping[str, Mapping[str, float]]) -> str:
+def _preset(declared: SensorErrors) -> str:
     """The name of the preset that declares these errors, zeros left out."""
     used = {
         name: sizes

@@ -35,21 +35,46 @@ def line_of(entry: Entry, results: Results, oracle: Results, ours: Results = ())
     flown = [(mine, best) for mine, best in zip(results, oracle, strict=True) if mine.error is None]
     mine = [result for result, _ in flown]
     faulted = [result for result in mine if result.faulted]
-    alarms = sum(r.false_alarm for r in mine)
-    hours = sum(r.fault_free_s for r in mine) / 3600.0
-    detected = sum(r.delay_s < inf for r in faulted)
-    n = len(faulted)
-    delays_s = [r.delay_s for r in faulted]
-    rate = wilson(detected, n)
     ratios = [m.rms_deg_s / o.rms_deg_s for m, o in flown if o.error is None and 0 < o.rms_deg_s < inf]
     return {
         **vars(entry),
         "flights": len(mine),
         "failed": len(results) - len(mine),
+        **_false_alarms(mine),
+        **_diagnosis(faulted),
+        **_spread("ratio", ratios),
+        **_interval("ratio_median", ratios),
+        "detected": sum(r.delay_s < inf for r in faulted),
+        "isolated": sum(r.correct for r in faulted),
+        "departures": sum(r.departed for r in mine),
+        "us": middle(r.us for r in mine) if mine else 0.0,
+        **_spread("before", [r.before_deg_s for r in mine]),
+        **_spread("after", [r.after_deg_s for r in faulted]),
+        **_spread("travel", [r.travel_deg_s for r in mine], ("median",)),
+        **_spread("energy", [r.energy_deg2_s2 for r in mine], ("median",)),
+        "against_ours": _duel(entry, results, ours),
+    }
+
+
+def _false_alarms(mine: Results) -> Document:
+    """False alarms, and the rate per hour in which an alarm would have been one, with its upper bound."""
+    alarms = sum(r.false_alarm for r in mine)
+    hours = sum(r.fault_free_s for r in mine) / 3600.0
+    return {
         "false_alarms": alarms,
         "healthy_h": hours,
         "false_alarms_per_h": alarms / hours if hours else None,
         "false_alarms_per_h_upper": poisson_bound(alarms, hours, CONFIDENCE, upper=True) if hours else None,
+    }
+
+
+def _diagnosis(faulted: Results) -> Document:
+    """How many faults are detected and named in these flights, and how soon."""
+    n = len(faulted)
+    delays_s = [r.delay_s for r in faulted]
+    detected = sum(delay_s < inf for delay_s in delays_s)
+    rate = wilson(detected, n)
+    return {
         "faults": n,
         "detection_rate": finite(rate.value),
         "detection_rate_lower": wilson_bound(detected, n, CONFIDENCE, upper=False) if n else None,
@@ -59,17 +84,6 @@ def line_of(entry: Entry, results: Results, oracle: Results, ours: Results = ())
         "isolation_rate": sum(r.correct for r in faulted) / n if n else None,
         **_interval("delay_median", delays_s, "_s"),
         "isolation_delay_median_s": share_within([r.isolation_delay_s for r in faulted], 0.5),
-        **_spread("ratio", ratios),
-        **_interval("ratio_median", ratios),
-        "detected": detected,
-        "isolated": sum(r.correct for r in faulted),
-        "departures": sum(r.departed for r in mine),
-        "us": middle(r.us for r in mine) if mine else 0.0,
-        **_spread("before", [r.before_deg_s for r in mine]),
-        **_spread("after", [r.after_deg_s for r in faulted]),
-        **_spread("travel", [r.travel_deg_s for r in mine], ("median",)),
-        **_spread("energy", [r.energy_deg2_s2 for r in mine], ("median",)),
-        "against_ours": _duel(entry, results, ours),
     }
 
 

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 OWN = ", default level"
 INFORMED = "informed test"
+_NO_DUEL = {"seeds_theirs": 0, "seeds_ours": 0, "p": 1.0}
 
 
 def page_of(document: Document) -> tuple[str, Sequence[Part]]:
@@ -79,14 +80,14 @@ def who_is_better(
         place = here | {"surface": surface}
         rows = dict[str, Document]()
         for total in _those(document["totals"], **place):
-            if total["flights"] and (total["scheme"] == BOTH or total["scheme"] not in BUILT_IN):
+            scheme = total["scheme"]
+            if total["flights"] and (scheme == BOTH or scheme not in BUILT_IN):
                 found = total["within"][soon]
-                duel = {"better": 0, "worse": 0, "p": 1.0}
-                against = {"against": total["scheme"], "ours": BOTH, "within_s": within_s}
-                for one in _those(document["comparison"], **place, **against):
-                    duel = {"better": one["seeds_theirs"], "worse": one["seeds_ours"], "p": one["p"]}
+                against = {"against": scheme, "ours": BOTH, "within_s": within_s}
+                one = next(_those(document["comparison"], **place, **against), _NO_DUEL)
+                duel = {"better": one["seeds_theirs"], "worse": one["seeds_ours"], "p": one["p"]}
                 rates = {"rate": found["value"], "rate_low": found["low"], "rate_high": found["high"]}
-                rows[total["scheme"]] = rates | {"against_ours": duel}
+                rows[scheme] = rates | {"against_ours": duel}
         if BOTH in rows:
             yield leader(rows, BOTH, "rate", f"{surface}, found within {soon} s", percent, more=True)
 

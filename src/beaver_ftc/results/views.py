@@ -32,6 +32,9 @@ BEAVER_POWER_COLUMN = "manifold_pressure_inhg"
 AXIS_QUANTILES = 0.005, 0.995  # quantiles that set the axis where spikes would
 MEAN_AIRSPEED_EXPECTATION = "airspeed_within_mps"  # the expectation that reads it
 
+Names = Sequence[str]
+"""Names of columns, surfaces or estimators, in the order of the log or of the aircraft."""
+
 _SHOWN_UNIT = {"rad/s2": "deg/s²", "rad/s": "deg/s", "rad": "deg", "1": ""}  # for people; others as they are
 
 
@@ -109,19 +112,19 @@ def unit_of(column: str) -> tuple[str, float]:
     return _SHOWN_UNIT.get(unit, unit), math.degrees(1.0) if unit.startswith("rad") else 1.0
 
 
-def estimators(columns: Sequence[str]) -> tuple[str, ...]:
+def estimators(columns: Names) -> tuple[str, ...]:
     """Names of the isolation estimators a log has columns of, in the log's order."""
     matches = (re.fullmatch(r"fie_(.+)_excluded", column) for column in columns)
     return tuple(match.group(1) for match in matches if match)
 
 
-def surfaces(columns: Sequence[str]) -> tuple[str, ...]:
+def surfaces(columns: Names) -> tuple[str, ...]:
     """Names of the surfaces a log has columns of, in the aircraft's order."""
     ending = "_cmd_rad"
     return tuple(column.removesuffix(ending) for column in columns if column.endswith(ending))
 
 
-def views_of_flight(columns: Sequence[str], metrics: Metrics) -> tuple[View, ...]:
+def views_of_flight(columns: Names, metrics: Metrics) -> tuple[View, ...]:
     """Every view of a flight whose log has these columns."""
     return views(columns, bool(metrics.engine_power), expected_airspeed_mps(metrics))
 
@@ -133,7 +136,7 @@ def expected_airspeed_mps(metrics: Metrics) -> float | None:
     )
 
 
-def views(columns: Sequence[str], power: bool = False, within_mps: float | None = None) -> tuple[View, ...]:
+def views(columns: Names, power: bool = False, within_mps: float | None = None) -> tuple[View, ...]:
     """Every view that a log with these columns allows; power: the law has used the engine; within_mps: of the
     commanded airspeed, as the scenario expects its mean."""
     known = set(columns)
@@ -149,7 +152,7 @@ def views(columns: Sequence[str], power: bool = False, within_mps: float | None 
     return tuple(view for view in named if view.panels and known.issuperset(source_columns(view.columns)))
 
 
-def power_column(columns: Sequence[str]) -> str:
+def power_column(columns: Names) -> str:
     """The log's column of the engine power commanded along a profile; empty where there is none. Its name is
     the aircraft's; it stands before the first command of the profile, `altitude_command_m`."""
     if BEAVER_POWER_COLUMN in columns:
@@ -216,7 +219,7 @@ def _mean_airspeed_traces(within_mps: float | None) -> list[tuple[Any, ...]]:
     return [*mean, upper, (COMMANDED_AIRSPEED_COLUMN, "", "bound", 1.0, -within_mps)]
 
 
-def surfaces_by_kind(names: Sequence[str]) -> dict[str, list[str]]:
+def surfaces_by_kind(names: Names) -> dict[str, list[str]]:
     """Names of surfaces by kind, in their order: `left_inboard_elevator`, `elevator_2` are elevators."""
     found: dict[str, list[str]] = {}
     for name in names:
@@ -230,7 +233,7 @@ Labelled = dict[str, list[tuple[str, str, str]]]
 """By kind of surface: name, what to call it, and its role."""
 
 
-def _labels_and_roles_by_kind(names: Sequence[str]) -> Labelled:
+def _labels_and_roles_by_kind(names: Names) -> Labelled:
     """By kind, or all in one where each may have a look of its own: name, what to call it, and its role."""
     if names and len(names) <= len(SURFACE_ROLES):
         return {"": [(name, name, role) for name, role in zip(names, SURFACE_ROLES, strict=False)]}
@@ -242,7 +245,7 @@ def _labels_and_roles_by_kind(names: Sequence[str]) -> Labelled:
     return said
 
 
-def _surfaces_view(names: Sequence[str]) -> View:
+def _surfaces_view(names: Names) -> View:
     if len(names) > len(SURFACE_ROLES):
         panels = tuple(
             _panel(f"{kind}: {label}", *((f"{name}_{of}_rad", called, role) for name, called, role in alike))
@@ -301,7 +304,7 @@ _SENSOR_MONITOR = View(
 )
 
 
-def _likelihood_view(columns: Sequence[str]) -> View:
+def _likelihood_view(columns: Names) -> View:
     ending = "_loss_likelihood_share"
     names = [column.removesuffix(ending) for column in columns if column.endswith(ending)]
     losses = {
@@ -320,7 +323,7 @@ def _likelihood_view(columns: Sequence[str]) -> View:
     return View("likelihood", title, panels, closeup=True)
 
 
-def _candidates_view(moved: Sequence[str], names: Sequence[str]) -> View:
+def _candidates_view(moved: Names, names: Names) -> View:
     """One strip: which surfaces may be at fault, from the alarm on, until the last of their estimators is
     excluded."""
     roles = dict(zip(moved, SURFACE_ROLES * len(moved), strict=False))
@@ -336,7 +339,7 @@ def _candidates_view(moved: Sequence[str], names: Sequence[str]) -> View:
     return View("candidates", title, panels, text_without_data="no alarm: no candidates", closeup=True)
 
 
-def _isolation_view(names: Sequence[str]) -> View:
+def _isolation_view(names: Names) -> View:
     panels = tuple(
         isolation_panel(name, axis, f"{without_underscores(name)} estimator: {axis}", "threshold")
         for name in names
@@ -354,7 +357,7 @@ def _isolation_view(names: Sequence[str]) -> View:
     )
 
 
-def _ratio_view(names: Sequence[str]) -> View:
+def _ratio_view(names: Names) -> View:
     stems = [
         ("detection estimator", ""),
         *((f"{without_underscores(name)} estimator", f"fie_{name}_") for name in names),
@@ -370,7 +373,7 @@ def _ratio_view(names: Sequence[str]) -> View:
     return View("ratio", title, panels, n_panel_columns=1 if len(panels) <= 4 else 3)
 
 
-def _effectiveness_view(names: Sequence[str]) -> View:
+def _effectiveness_view(names: Names) -> View:
     panels = tuple(
         _panel(
             f"{kind}: {label}" if kind else label,

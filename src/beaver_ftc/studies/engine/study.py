@@ -6,10 +6,8 @@ command finds them there. Once the result is written they go.
 
 import contextlib
 import json
-import math
 import shutil
-from collections import Counter, deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import count
@@ -20,127 +18,14 @@ from beaver_ftc.documents.errors import SimulationFailed, say_once
 from beaver_ftc.documents.files import Document
 from beaver_ftc.results.folder import clear_disk_errors, result_folder
 from beaver_ftc.studies.engine import files, identity, store
-from beaver_ftc.studies.engine.workers import (
-    Batch,
-    LocalWorkers,
-    Number,
-    Row,
-    ThisProcess,
-    Work,
-    Workers,
-)
+from beaver_ftc.studies.engine.flying import Flying, Lost
+from beaver_ftc.studies.engine.workers import LocalWorkers, Number, ThisProcess, Work, Workers
 from beaver_ftc.studies.present.page import Makers, contents, write_files
 
 Progress = Callable[[float], None]
 Fly = Callable[[Any], Any]
-Lost = Callable[[Any, str], Any]
 GO_ON = "; what has been flown is kept, the same command goes on with it"
-POLL_S = 0.2
-MOST_LOSSES = 3
 OF_A_PART = 32  # cases that a study in rounds keeps together
-TASKS_A_SLOT = 4  # towards the end tasks get smaller, so that no worker is left with a long last one
-LOST = "the process that flies it ends, each time it is tried"
-
-
-@dataclass
-class Flying:
-    """Flies batches of which nothing has landed: workers fly tasks, rows are gathered, whole batches land.
-
-    A lost worker's task is flown again. One that is lost twice is taken apart into single cases, so that the
-    case that kills its process is found: lost alone three times, it is given the row of a case that was lost.
-
-    landed: the rows of a batch by its number and runs, None if they are not there. land: keeps them. make:
-    workers, when the first batch is missing, for so many cases. lost: the row of a case that kills its
-    process.
-    """
-
-    landed: Callable[..., Any]
-    land: Callable[..., Any]
-    make: Callable[[int], Workers]
-    lost: Lost
-    _workers: Workers | None = None
-
-    def close(self) -> None:
-        """Terminate the workers."""
-        if self._workers:
-            self._workers.close()
-
-    def fly(
-        self,
-        batches: Iterable[tuple[Number, Sequence[int]]],
-        cases_of: Callable[[Sequence[int]], Sequence[Any]],
-        there: Callable[[Number, Any], None],
-        stopped: Callable[[], bool] = lambda: False,
-    ) -> None:
-        """Fly what is missing; once `stopped`, only what is in the air. cases_of: these runs. there: takes
-        the number and the rows of each batch, once they are there.
-
-        Meanwhile: _coming: batches of which no task is waiting yet; _left: cases in these. _waiting: tasks
-        for the next free worker; _flying: how many tasks workers have. _flown: by number, each batch begun
-        and its rows by run so far. _losses: by the runs of a task, how often a worker was lost over it."""
-        missing: dict[Number, Sequence[int]] = {}
-        for number, runs in batches:
-            rows = self.landed(number, runs)
-            if rows is None:
-                missing[number] = runs
-            else:
-                there(number, rows)
-        if not missing:
-            return
-        self._coming = (Batch(number, runs, cases_of(runs)) for number, runs in missing.items())
-        self._left = sum(map(len, missing.values()))
-        self._waiting = deque[Batch]()
-        self._flying = 0
-        self._flown: dict[Number, tuple[Batch, dict[int, Row]]] = {}
-        self._losses = Counter[tuple[int, ...]]()
-        workers = self._workers = self._workers or self.make(self._left)
-        while True:
-            self._hand_out(workers, stopped())
-            if not self._flying:
-                return
-            whole = [batch for outcome in workers.outcomes(POLL_S) for batch in self._gather(*outcome)]
-            self._hand_out(workers, stopped())  # first put the workers to work, then see to the disk
-            for batch, by_run in whole:
-                rows = [by_run[run] for run in batch.runs]
-                self.land(batch.number, rows)
-                there(batch.number, rows)
-
-    def _hand_out(self, workers: Workers, stopped: bool) -> None:
-        """Give each worker a task; a batch is taken apart when the tasks of those before are handed out."""
-        while self._flying < workers.slots and not stopped:
-            if not self._waiting and (batch := next(self._coming, None)):
-                self._flown[batch.number] = (batch, {})
-                size = max(1, math.ceil(self._left / (workers.slots * TASKS_A_SLOT)))
-                self._left -= len(batch.cases)
-                self._waiting.extend(_tasks(batch, size))
-            if not self._waiting:
-                return
-            workers.submit(self._waiting.popleft())
-            self._flying += 1
-
-    def _gather(self, task: Batch, rows: list[Row] | None) -> list[tuple[Batch, dict[int, Row]]]:
-        """The batch that these rows complete, if they do."""
-        self._flying -= 1
-        batch, so_far = self._flown[task.number]
-        so_far.update(zip(task.runs, self._fly_again(task) if rows is None else rows, strict=False))
-        if len(so_far) < len(batch.runs):
-            return []
-        return [self._flown.pop(task.number)]
-
-    def _fly_again(self, task: Batch) -> list[Row]:
-        """See to a lost task; the rows that it yields all the same: of one case that is given up."""
-        key = tuple(task.runs)
-        self._losses[key] += 1
-        if len(key) == 1 and self._losses[key] >= MOST_LOSSES:
-            return [self.lost(task.cases[0], LOST)]
-        size = 1 if self._losses[key] > 1 else len(key)
-        self._waiting.extendleft(reversed(_tasks(task, size)))
-        return []
-
-
-def _tasks(batch: Batch, size: int) -> list[Batch]:
-    parts = [slice(i, i + size) for i in range(0, len(batch.runs), size)]
-    return [Batch(batch.number, batch.runs[part], batch.cases[part]) for part in parts]
 
 
 FlyRound = Callable[[Sequence[Any]], list[Any]]

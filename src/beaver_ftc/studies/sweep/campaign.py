@@ -16,9 +16,9 @@ from beaver_ftc.results.metrics import as_json, versions
 from beaver_ftc.results.model import Document
 from beaver_ftc.scenario.sweeps import Sweep, SweepExpect
 from beaver_ftc.studies.engine.files import write_whole
+from beaver_ftc.studies.engine.flying import Flying
 from beaver_ftc.studies.engine.processes import cores
 from beaver_ftc.studies.engine.store import batches_of
-from beaver_ftc.studies.engine.study import Flying
 from beaver_ftc.studies.engine.workers import LocalWorkers, Number, Work, Workers
 from beaver_ftc.studies.sweep import one_flight
 from beaver_ftc.studies.sweep.one_flight import Keep, counts_of

@@ -59,7 +59,8 @@ def engine_failures(scenario: Scenario) -> list[Document]:
         return []
     loop = Loop(short)
     bound = excitation(short).bound[0]
-    setting = loop.trim.settings[power[0]]
+    power_name, _ = power
+    setting = loop.trim.settings[power_name]
     force_n = [
         np.interp(loop.trim.airspeed_mps, thrust.airspeed_mps, f) for f in zip(*thrust.force_n, strict=True)
     ]

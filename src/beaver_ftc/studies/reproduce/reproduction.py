@@ -100,13 +100,7 @@ def document_of(rows: Sequence[Document]) -> Summary:
         setting.name: row for (asked, setting), row in zip(STUDIED, rows, strict=True) if asked == NUMBERS
     }
     found = {name: list(zip(row[NUMBERS], row[ABLATED], strict=True)) for name, row in settings.items()}
-    judged = {
-        claim: _judged(claim, {name: pairs[i] for name, pairs in found.items()})
-        for i, claim in enumerate(MEASURED)
-    }
-    claims = [
-        {"where": c.where, "statement": c.statement, **(judged.get(c) or _unjudged(c.reason))} for c in CLAIMS
-    ]
+    claims = _claims(found)
     counts = Counter(claim["verdict"] for claim in claims)
     document = {
         "passed": all(claim["verdict"] != NOT_BORNE_OUT or claim["because"] for claim in claims),
@@ -141,6 +135,17 @@ def document_of(rows: Sequence[Document]) -> Summary:
 Pairs = list[tuple[float, float]]
 """Of each of MEASURED its number in a setting, and that without its mechanism."""
 BySetting = Mapping[str, Pairs]
+
+
+def _claims(found: BySetting) -> Rows:
+    """A row a claim."""
+    judged = {
+        claim: _judged(claim, {name: pairs[i] for name, pairs in found.items()})
+        for i, claim in enumerate(MEASURED)
+    }
+    return [
+        {"where": c.where, "statement": c.statement, **(judged.get(c) or _unjudged(c.reason))} for c in CLAIMS
+    ]
 
 
 def _judged(claim: Claim, by_setting: Mapping[str, tuple[float, float]]) -> Document:

@@ -24,6 +24,7 @@ Span = tuple[float, float]
 
 Quantity = float | None
 """A number; None if the quantity does not exist."""
+BySurface = dict[str, float]
 Value = TypeVar("Value")
 _KNOWN = "a key that the document has only where its value is known"
 Known = Annotated[Value | None, _KNOWN]
@@ -386,8 +387,8 @@ class Tracking(Part):
 
     pre_fault_rms_deg_s: Rates | None
     post_fault_rms_deg_s: Rates | None
-    surface_travel_deg: dict[str, float]
-    surface_energy_deg2_s: dict[str, float]
+    surface_travel_deg: BySurface
+    surface_energy_deg2_s: BySurface
 
 
 @dataclass(frozen=True)
@@ -665,7 +666,7 @@ class Metrics(Part):
     profile: ProfileDeviations | None
     arrival: ArrivalDeviations | None
     limits: tuple[ProtectionLimit, ...]
-    saturation_s: dict[str, float]
+    saturation_s: BySurface
     hints: tuple[str, ...]
     expectations: tuple[Expectation, ...]
     passed: bool

@@ -66,12 +66,15 @@ class Pictures(NamedTuple):
 Part = str | Heading | Table | Bullets | Links | Pictures
 
 
+Parts = Sequence[Part]  # of a page, from above
+
+
 def table(columns: Columns, rows: Iterable[Any]) -> Table:
     """A table of these columns."""
     return Table(*tabulated(columns, rows))
 
 
-def as_markdown(parts: Sequence[Part], figures: str = "") -> str:
+def as_markdown(parts: Parts, figures: str = "") -> str:
     """The parts as Markdown; figures: the folder of the pictures, as the page sees it."""
     return "\n\n".join(text for part in parts for text in _markdown(part, figures)) + "\n"
 
@@ -91,7 +94,7 @@ def _markdown(part: Part, figures: str) -> Iterator[str]:
             yield part
 
 
-def as_text(parts: Sequence[Part]) -> str:
+def as_text(parts: Parts) -> str:
     """The parts as lines for a terminal, without pictures or links."""
     lines: list[str] = []
     for part in parts:
@@ -107,14 +110,14 @@ def as_text(parts: Sequence[Part]) -> str:
     return "\n".join(lines)
 
 
-def as_html(title: str, parts: Sequence[Part], figures: Drawn) -> str:
+def as_html(title: str, parts: Parts, figures: Drawn) -> str:
     """The page as HTML; figures: stem to file of the pictures, which go into it."""
     body = html_of(parts, figures)
     page = (Path(__file__).parent / "page.html").read_text(encoding="utf-8")
     return page.format(title=escape(title), body=body)
 
 
-def html_of(parts: Sequence[Part], figures: Drawn) -> str:
+def html_of(parts: Parts, figures: Drawn) -> str:
     """The parts as HTML, for a page of others."""
     return "\n".join(_html(part, figures) for part in parts if part)
 
@@ -151,7 +154,7 @@ def drawn_in(folder: Path, stems: Iterable[str]) -> dict[str, Path]:
 
 
 def study_files(
-    name: str, page: Callable[[Any], tuple[str, Sequence[Part]]], rows: Mapping[str, Callable[[Any], Any]],
+    name: str, page: Callable[[Any], tuple[str, Parts]], rows: Mapping[str, Callable[[Any], Any]],
     figures: "Makers",
 ) -> "Makers":  # fmt: skip
     """A study's files: document, rows as CSV, figures, and the page of a title and parts that shows them."""

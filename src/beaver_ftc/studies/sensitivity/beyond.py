@@ -30,6 +30,9 @@ LATER_S = 4.0  # the faults come so much later at most
 LEFT_S = 5.0  # and so long before the end
 
 
+Errors = Sequence[Error]  # of a scenario
+
+
 class Flight(NamedTuple):
     """One flight: which error is how many times as large as declared, and its number."""
 
@@ -38,7 +41,7 @@ class Flight(NamedTuple):
     run: int
 
 
-def cases_of(errors: Sequence[Error], flights: int) -> list[Flight]:
+def cases_of(errors: Errors, flights: int) -> list[Flight]:
     """Every flight; where each error is as declared, all rows share the same ones."""
     declared = {error.name: error.declared for error in errors} | {TOGETHER: True}
     rows = [(TOGETHER, FACTORS[0])]
@@ -51,7 +54,7 @@ def cases_of(errors: Sequence[Error], flights: int) -> list[Flight]:
     return [Flight(*row, run) for row in rows for run in range(flights)]
 
 
-def factors_of(errors: Sequence[Error], flight: Flight) -> dict[str, float]:
+def factors_of(errors: Errors, flight: Flight) -> dict[str, float]:
     """By error: how many times as large as declared it is in a flight."""
     of = {error.name: FACTORS[0] for error in errors if error.declared}
     if flight.error == TOGETHER:
@@ -59,7 +62,7 @@ def factors_of(errors: Sequence[Error], flight: Flight) -> dict[str, float]:
     return of | {flight.error: flight.factor}
 
 
-def scenario_of(scenario: Scenario, errors: Sequence[Error], seed: int, flight: Flight) -> Scenario:
+def scenario_of(scenario: Scenario, errors: Errors, seed: int, flight: Flight) -> Scenario:
     """The scenario of a flight: draws depend on its number alone, so that rows differ by the error. The law
     knows the sensors of the scenario, whatever theirs are in the flight."""
     draws = np.random.default_rng([seed, flight.run])
@@ -106,7 +109,7 @@ def row_of(found: Metrics, bound_used: float) -> Document:
 
 
 def document_of(
-    scenario: Scenario, errors: Sequence[Error], cases: Sequence[Flight], seed: int, rows: Sequence[Document]
+    scenario: Scenario, errors: Errors, cases: Sequence[Flight], seed: int, rows: Sequence[Document]
 ) -> Document:
     """A row an error and factor, of the rows of all flights."""
     flights = (case._asdict() | row for case, row in zip(cases, rows, strict=True))

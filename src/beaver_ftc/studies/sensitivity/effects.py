@@ -16,10 +16,11 @@ from beaver_ftc.studies.sensitivity.systems import MECHANISMS, SYSTEMS, Mechanis
 
 LATE_S = 0.1  # an alarm so much later is late
 WORSE = 1.1  # a tracking error so many times as large is worse
+Outcomes = Sequence[Document]  # of several flights
 Pair = tuple[Document, Document]  # outcomes of a draw with the mechanism and without it
 
 
-def document_of(seed: int, draws: int, rows: Sequence[Document], margins: list[Document]) -> Document:
+def document_of(seed: int, draws: int, rows: Outcomes, margins: list[Document]) -> Document:
     """A row a mechanism; rows: of every case of `cases_of`, in order."""
     cases = cases_of(draws)
     found = [_row_of(mechanism, cases, rows) for mechanism in MECHANISMS]
@@ -40,7 +41,7 @@ def document_of(seed: int, draws: int, rows: Sequence[Document], margins: list[D
     }
 
 
-def _row_of(mechanism: Mechanism, cases: Sequence[Flight], rows: Sequence[Document]) -> Document:
+def _row_of(mechanism: Mechanism, cases: Sequence[Flight], rows: Outcomes) -> Document:
     """The row of a mechanism: its effect in all pairs, and by each value of each factor."""
     pairs = [(row[with_key(mechanism)], row[without_key(mechanism)]) for row in rows]
     by = {
@@ -119,7 +120,7 @@ def _ratio(a: Document, b: Document) -> float:
     return over / under if isfinite(under) else float(not isfinite(over))
 
 
-def _system_row(outcomes: Sequence[Document]) -> Document:
+def _system_row(outcomes: Outcomes) -> Document:
     """The row of a system with all of its mechanisms, in the flights that were flown to their end."""
     flown = [o for o in outcomes if not o["failed"]]
     rates = {
@@ -135,7 +136,7 @@ def _system_row(outcomes: Sequence[Document]) -> Document:
     }
 
 
-def _alarms_of(key: str, rows: Sequence[Document]) -> Document:
+def _alarms_of(key: str, rows: Outcomes) -> Document:
     """False alarms of what was flown, and why they came. worst_case: whether it promises that none comes
     within the declaration. unexplained: alarms without an undeclared error, or without the certificate that
     this scheme has."""

@@ -85,7 +85,8 @@ def of_model(linear: LinearModel, airspeed_mps: float, where: str) -> Qualities:
 
 
 def _values(found: Mapping[str, Mode], g_per_rad: float) -> dict[tuple[str, str], float]:
-    """Each quantity of LIMITS by mode and name. g_per_rad: load factor per angle of attack."""
+    """Each quantity of LIMITS by mode and name. g_per_rad: load factor per angle of attack, n/alpha, 1/rad;
+    the control anticipation parameter CAP is w^2 / (n/alpha), w of the short period, rad/s."""
     short, dutch, phugoid = found["short_period"], found["dutch_roll"], found["phugoid"]
     roll = found["roll"].pole
     spiral = found["spiral"].pole.real

@@ -206,7 +206,8 @@ def _refusal(name: str) -> str | None:
 def deflections(
     recording: Recording, surface: str, magnitude: float, within_s: tuple[float, ...]
 ) -> list[float]:
-    """d of a loss of effectiveness in a recorded flight, as long after it struck."""
+    """The deflection d of a loss of effectiveness in a recorded flight, as long after it struck: how far its
+    effect -magnitude * moment (frames, 3) rad/s2 stands out of the whitened noise, in standard deviations."""
     since = [measured for measured, _ in recording.seen if measured.t_s > recording.fault_at_s + 1e-9]
     if not since:
         return [0.0] * len(within_s)

@@ -42,7 +42,8 @@ def margins(airspeed_mps: float) -> Document:
 
 
 def about_trim(airspeed_mps: float) -> tuple[LinearModel, np.ndarray, float]:
-    """The four longitudinal states, the column (4,) of manifold pressure in inHg, and its trim."""
+    """The linear aircraft over STATES, the effect (4,) of manifold pressure on them, per inHg, and the
+    pressure in trim, inHg."""
     plant = Plant(100)
     point = trim(airspeed_mps, Initial().altitude_m)
     model = differences(plant, point)

@@ -19,9 +19,10 @@ PerAxis = dict[str, float]
 
 
 def recommend(needed: Sequence[np.ndarray], at_least: PerAxis | None = None) -> PerAxis:
-    """The smallest constant parts of eta_bar, rad/s2 per axis, that would have covered every run.
+    """The smallest constant parts of eta_bar, rad/s2 by axis, that would have covered every run.
 
-    needed: of each run (3,). Rounded up to two digits; none below `at_least`.
+    needed: of each run, the constant part (3,) rad/s2 that would have covered it. Each axis has the largest,
+    rounded up to two digits; none is below `at_least`.
     """
     found = dict(at_least or dict.fromkeys(AXES, 0.0))
     for axis, most in zip(AXES, np.max(needed, axis=0).tolist(), strict=True):

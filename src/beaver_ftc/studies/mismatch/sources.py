@@ -105,7 +105,11 @@ def _servo(scenario: Scenario, surface: str, dt: float) -> tuple[float, ...]:
 
 @kernel
 def _follow(commands, share, reach, band, low, high, runs, positions):
-    """Fill positions (n, 4) rad, `runs` JSBSim frames a row."""
+    """Fill positions (n, 4) rad with a, as the head of the file says, `runs` JSBSim frames a row.
+
+    commands (n, 4) rad. Of each surface (4,): share w of the way that is left; rad: reach rate * dt, dead
+    band to each side, and stops low and high.
+    """
     at = np.minimum(np.maximum(commands[0], low), high)
     ideal = (share == 1.0) & (reach == np.inf) & (band == 0.0)
     for k in range(commands.shape[0]):

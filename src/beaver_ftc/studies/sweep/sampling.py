@@ -65,7 +65,10 @@ def value_at(how: Variation, u: float) -> Any:
 
 
 def _normal(distribution: NormalDist, within: tuple[float, float] | None, u: float) -> float:
-    """The normal distribution's inverse, cut to an interval by drawing from the part inside."""
+    """The inverse of a normal distribution F, cut to an interval [low, high] by drawing from the part inside:
+
+    F^-1(F(low) + u (F(high) - F(low)))
+    """
     low, high = within or (-math.inf, math.inf)
     below, above = distribution.cdf(low), distribution.cdf(high)
     share = min(max(below + u * (above - below), MIN_U), MAX_U)

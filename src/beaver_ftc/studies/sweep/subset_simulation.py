@@ -74,7 +74,12 @@ class Chains:
         return level
 
     def _continue(self, going: list[int], levels: np.ndarray, fly: FlyPoints) -> None:
-        """Chains from the flights that reached their level, all runs abreast."""
+        """Chains from the flights that reached their level, all runs abreast:
+
+            x' = STEP x + sqrt(1 - STEP^2) e,  e standard normal,  taken where it reaches the level, too
+
+        x: the points `here` (runs, chains, keys); levels (runs,) of the runs `going`.
+        """
         members = self.scores.shape[1]
         seeds = max(1, round(SHARE * members))
         at = np.array([
@@ -126,7 +131,10 @@ class Chains:
 
 
 def lognormal_mean(values: np.ndarray) -> tuple[float, float, float]:
-    """Mean of some lognormal values (n,) and its two-sided interval, Cox's with Student's t."""
+    """Mean of some lognormal values (n,) and its two-sided interval, Cox's with Student's t:
+
+    exp(m + s/2 -+ t sqrt(s/n + s^2 / (2 (n - 1)))),  m, s: mean and variance of the logarithms
+    """
     from scipy.stats import t
 
     logs = np.log(values)

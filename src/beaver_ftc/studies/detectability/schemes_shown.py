@@ -125,7 +125,7 @@ def _legend(document: Document) -> list[str]:
         f"Losses of {losses} % under references of {references} deg/s. False alarms/h: every scheme at the "
         f"level of its statistic with at most {per_h:g} per hour, on the same {hours:.2f} h of healthy "
         "flight (95 % limits); before faults/h: the same on other flights.",
-        f"By chance alone {per_h * WITHIN_S[-1] / 36.0:.1f} % are detected within {WITHIN_S[-1]:g} s. "
+        f"By chance alone {100.0 * per_h * WATCHED_S / 3600.0:.1f} % are detected within {WATCHED_S:g} s. "
         "Default level: the one that follows from what the scheme declares.",
         f"{INFORMED}: knows surface, magnitude and instant, and the gusts that the vanes show; made once in "
         "that time at the same rate. Plug-ins are given every reading that the statistical scheme uses.",

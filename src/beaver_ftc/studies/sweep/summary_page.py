@@ -91,7 +91,7 @@ def verdict(summary: Document) -> Judged:
     """As of a run, each bound under a name of its own."""
     bounds = (
         Expectation(
-            f"{found['name']}.{'at_least' if 'at_least' in found['expected'] else 'at_most'}",
+            f"{found['name']}.{_side(found['expected'])}",
             found["passed"],
             expected(found["expected"]),
             f"{value(found['actual'])} of {found['of']} flights",
@@ -104,9 +104,17 @@ def verdict(summary: Document) -> Judged:
 def expected(level: Document) -> str:
     """A bound in words: `95 % quantile ≤ 0.5 with 95 % confidence`."""
     part = f"{exact_percent(level['quantile'])} quantile " if "quantile" in level else ""
-    bound = f"≥ {value(level['at_least'])}" if "at_least" in level else f"≤ {value(level['at_most'])}"
+    side = _side(level)
     sure = f" with {exact_percent(level['confidence'])} confidence" if "confidence" in level else ""
-    return f"{part}{bound}{sure}"
+    return f"{part}{_SIGNS[side]} {value(level[side])}{sure}"
+
+
+_SIGNS = {"at_least": "≥", "at_most": "≤"}
+
+
+def _side(level: Document) -> str:
+    """The side of a bound: the key of its limit."""
+    return next(side for side in _SIGNS if side in level)
 
 
 def exact_percent(share: float | None) -> str:

@@ -27,7 +27,7 @@ lowest so far; of a law, once the mean over `LEAST_FLIGHTS` or more flights is `
 far. Its cost is then the mean up to there.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
 from math import exp, inf, isfinite, isnan, log, sqrt
 from statistics import fmean
@@ -112,21 +112,43 @@ def flown(case: SetFlight, entry: Entry, group: str, values: Values) -> Result:
         return Result(entry, True, 0.0, bool(scenario.faults))
 
 
-class DetectorCost:
-    """J of a detector."""
+class Cost:
+    """J over flights of an entry; _lowest: of the best trial so far."""
 
-    def __init__(self, name: str, cases: Sequence[SetFlight]) -> None:
-        self._entry = Entry(name, LAW)
+    def __init__(self, group: str, entry: Entry, cases: Sequence[SetFlight]) -> None:
+        self._group = group
+        self._entry = entry
         self._cases = cases
         self._lowest = inf
+
+    def parts(self, values: Values) -> list[float]:
+        """The part of each flight in J with these values."""
+        return [part for _, part in self._flights(values)]
+
+    def _flights(self, values: Values) -> Iterator[tuple[Result, float]]:
+        """Fly one after the other; the result of each, and its part in J."""
+        for n, case in enumerate(self._cases):
+            result = flown(case, self._entry, self._group, values)
+            yield result, self._part(n, result)
+
+    def _part(self, n: int, result: Result) -> float:
+        """The part of flight n in J."""
+        raise NotImplementedError
+
+
+class DetectorCost(Cost):
+    """J of a detector: the sum of all parts."""
+
+    def __init__(self, name: str, cases: Sequence[SetFlight]) -> None:
+        super().__init__(DETECTORS, Entry(name, LAW), cases)
         self._faulted = sum(bool(case.scenario.faults) for case in cases)
 
     def __call__(self, values: Values) -> float:
         """J with these values."""
         total = 0.0
         try:
-            for n, case in enumerate(self._cases, 1):
-                total += self._of_flight(flown(case, self._entry, DETECTORS, values))
+            for n, (_, part) in enumerate(self._flights(values), 1):
+                total += part
                 if total > self._lowest:
                     return total * len(self._cases) / n
         except BeaverFtcError:
@@ -134,12 +156,8 @@ class DetectorCost:
         self._lowest = total
         return total
 
-    def parts(self, values: Values) -> list[float]:
-        """The part of each flight in J with these values."""
-        return [self._of_flight(flown(case, self._entry, DETECTORS, values)) for case in self._cases]
-
-    def _of_flight(self, result: Result) -> float:
-        """The part of one flight in J."""
+    def _part(self, n: int, result: Result) -> float:
+        """Of a false alarm, and of a fault its delay and a wrong name."""
         cost = result.false_alarm / len(self._cases)
         if result.faulted:
             d = result.delay_s
@@ -148,14 +166,13 @@ class DetectorCost:
         return cost
 
 
-class LawCost:
-    """J of a law, with what makes a candidate inadmissible."""
+class LawCost(Cost):
+    """J of a law, exp(mean of all parts), with what makes a candidate inadmissible."""
 
     def __init__(self, name: str, grade: str, most: int | None, draw: int, draws: int = 1) -> None:
-        self._entry = Entry(SCHEME, name)
-        self._cases = [case for case in flights(grade, most, draw, draws) if case.scenario.faults]
+        cases = [case for case in flights(grade, most, draw, draws) if case.scenario.faults]
+        super().__init__(LAWS, Entry(SCHEME, name), cases)
         self._oracle, self._effort_allowed = yardsticks(grade, most, draw, draws)
-        self._lowest = inf
 
     def __call__(self, values: Values) -> float:
         """J with these values."""
@@ -164,11 +181,6 @@ class LawCost:
             return INADMISSIBLE * (1.0 + short) if short else self._tracking(values)
         except BeaverFtcError:
             return FAILED
-
-    def parts(self, values: Values) -> list[float]:
-        """The logarithm of the error over the oracle's in each flight with these values: J is exp(mean)."""
-        results = [flown(case, self._entry, LAWS, values) for case in self._cases]
-        return [log(_ratio(result, best)) for result, best in zip(results, self._oracle, strict=True)]
 
     def margins(self, values: Values) -> list[Margin]:
         """The margins of the healthy loop."""
@@ -184,9 +196,9 @@ class LawCost:
     def _tracking(self, values: Values) -> float:
         results = list[Result]()
         logs = list[float]()
-        for case, best in zip(self._cases, self._oracle, strict=True):
-            results.append(flown(case, self._entry, LAWS, values))
-            logs.append(log(_ratio(results[-1], best)))
+        for result, part in self._flights(values):
+            results.append(result)
+            logs.append(part)
             if len(logs) >= LEAST_FLIGHTS and exp(fmean(logs)) > HOPELESS * self._lowest:
                 break
         excess = effort(results) / (EFFORT * self._effort_allowed)
@@ -198,9 +210,10 @@ class LawCost:
         self._lowest = min(self._lowest, cost)
         return cost
 
-
-def _ratio(result: Result, oracle_deg_s: float) -> float:
-    return min(result.rms_deg_s / oracle_deg_s, LOST) if isfinite(result.rms_deg_s) else LOST
+    def _part(self, n: int, result: Result) -> float:
+        """The logarithm of the error over the oracle's."""
+        rms_deg_s = result.rms_deg_s
+        return log(min(rms_deg_s / self._oracle[n], LOST) if isfinite(rms_deg_s) else LOST)
 
 
 @cache

@@ -16,7 +16,7 @@ import numpy as np
 
 from beaver_ftc.plugins import DETECTORS
 from beaver_ftc.results.model import Document
-from beaver_ftc.studies.compare.criteria import DetectorCost, LawCost, Values, flights
+from beaver_ftc.studies.compare.criteria import Cost, DetectorCost, LawCost, Values, flights
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, Estimate
 
 JUDGED = 12  # draws on which both settings fly; with 4, a detector's interval is 20 % wide to each side
@@ -27,7 +27,7 @@ Size = Callable[..., np.ndarray]  # of the parts (..., n) of a cost along an axi
 def gain_of(group: str, name: str, grade: str, settings: Sequence[Values], first: int) -> Document:
     """Both costs, and the gain of the second setting over the first, on `JUDGED` draws from the first on."""
     draws = range(first, first + JUDGED)
-    costs: Sequence[DetectorCost | LawCost]
+    costs: Sequence[Cost]
     size: Size
     if group == DETECTORS:
         cases = [case for each in draws for case in flights(grade, None, each)]
@@ -51,7 +51,7 @@ def gain_of(group: str, name: str, grade: str, settings: Sequence[Values], first
     }
 
 
-def _parts(costs: Sequence[DetectorCost | LawCost], values: Values) -> np.ndarray:
+def _parts(costs: Sequence[Cost], values: Values) -> np.ndarray:
     return np.concatenate([one.parts(values) for one in costs])
 
 

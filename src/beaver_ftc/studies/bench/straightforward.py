@@ -7,6 +7,7 @@ the modules of the loop have the sources.
 
 import numpy as np
 
+from beaver_ftc.aircraft import AXES
 from beaver_ftc.aircraft.aircraft import EARTH_RATE_RAD_S
 from beaver_ftc.control.laws.reference import discretise
 from beaver_ftc.design.fdc import GEOMETRY, MASS, MOMENTS, SURFACES, TERMS
@@ -22,7 +23,6 @@ from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.signals import sample
 from beaver_ftc.studies.bench.contenders import FLAP, MAIN, take_over
 
-AXES = "pqr"
 SIGNALS = ("alpha", "beta", "ph", "qh", "rh", "dpt")  # of the terms of moments
 LEAST_EFFECTIVENESS = 0.1
 MOST_VARIANCE = 1.0 / 12.0  # of theta: that of a number which is anywhere from -1 to 0

@@ -19,7 +19,6 @@ from beaver_ftc.studies.engine.statistics import or_never
 from beaver_ftc.studies.reproduce.cases import ESTIMATORS, SETTLED_S, Flown
 from beaver_ftc.studies.reproduce.choices import AMPLITUDE_DEG_S
 
-RATES = ("p", "q", "r")  # among the states of a linear aircraft
 TRANSIENT_S = 3.0  # from the fault on: detection, isolation and hand-over
 GOOD = 0.1  # the limit `good` of claims.yaml
 TAKEN_OVER = 0.2  # the limit `taken-over`
@@ -244,7 +243,7 @@ def separation(flown: Flown) -> float:
     group's poles are those with the states of the other group held."""
     plant, trim = trimmed(flown.scenario)
     linear = differences(plant, trim)
-    is_rate = np.isin(linear.states, RATES)
+    is_rate = np.isin(linear.states, AXES)
     rates, others = (np.abs(np.linalg.eigvals(linear.A[np.ix_(of, of)])) for of in (is_rate, ~is_rate))
     return float(rates.min() / others.max())
 

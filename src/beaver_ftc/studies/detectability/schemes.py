@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from pydantic import TypeAdapter
 
-from beaver_ftc.aircraft import DEFAULT
+from beaver_ftc.aircraft import AXES, DEFAULT
 from beaver_ftc.diagnosis.informed_test import WhiteningFilter
 from beaver_ftc.diagnosis.rivals.gust import VaneGust
 from beaver_ftc.documents.errors import BadInput, BeaverFtcError
@@ -173,12 +173,13 @@ def _draws(block: Block, purpose: int) -> np.random.Generator:
 
 
 def _uncertainty(block: Block) -> Document:
-    """Inside the published bound [Zhang2005, sec. VII]: half of it at the bound, whatever the frequency."""
+    """Inside the published bound [Zhang2005, sec. VII]: couplings anywhere up to 0.25, and sinusoids of its
+    whole 0.02 rad/s2, whatever their frequency."""
     draws = _draws(block, 1)
-    coupling = draws.uniform(-0.25, 0.25, 3).tolist()
+    coupling = draws.uniform(-0.25, 0.25, len(AXES)).tolist()
     return {
-        "inertia_coupling": dict(zip("pqr", coupling, strict=True)),
-        "sinusoid": swings(draws, [0.02] * 3, (1.0, UNEXPLAINED_UP_TO_RAD_S)),
+        "inertia_coupling": dict(zip(AXES, coupling, strict=True)),
+        "sinusoid": swings(draws, [0.02] * len(AXES), (1.0, UNEXPLAINED_UP_TO_RAD_S)),
     }
 
 

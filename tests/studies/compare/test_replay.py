@@ -8,12 +8,7 @@ import pytest
 
 from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.loop.loop import fly
-from beaver_ftc.studies.compare.replay import (
-    record,
-    replay,
-    replay_together,
-    trace,
-)
+from beaver_ftc.studies.compare.replay import record, replay, trace
 from flying import loss, scenario
 
 FAULT = loss("elevator", 0.5, 6.0)
@@ -42,19 +37,6 @@ def test_a_detector_is_shown_a_copy_of_one_frame(recorded, monkeypatch):
     monkeypatch.setattr("beaver_ftc.studies.compare.replay.made", lambda *_: peeking)
     replay(recorded, "peeking")
     assert views == [None] * 900
-
-
-@pytest.mark.parametrize("scheme", ["augmented-ekf", "observer-constant", "multiple-models", "rls-monitor"])
-def test_flights_played_together_are_as_if_played_alone(recorded, scheme):
-    """Up to the fault one detector, then one each: nothing of one fault gets into another's."""
-    faults = [FAULT | {"actuator": surface, "magnitude": 1.0} for surface in ("aileron", "rudder")]
-    others = [record(scenario(duration_s=9, faults=[fault])) for fault in faults]
-    together = replay_together([recorded, *others], scheme)
-    for alone, seen in zip([recorded, *others], together, strict=True):
-        expected = replay(alone, scheme)
-        assert (seen.before, seen.records) == (expected.before, expected.records)
-        assert (seen.faulted, seen.healthy_s) == (expected.faulted, expected.healthy_s)
-    assert len({seen.records for seen in together}) > 1
 
 
 def test_the_statistical_detector_alarms_on_the_recording_as_in_flight():

@@ -125,43 +125,11 @@ def replay(recording: Recording, scheme: str, options: Mapping[str, float] | Non
     return trace(recording, np.array(_statistics(detector, recording.seen)))
 
 
-def replay_together(recordings: Sequence[Recording], scheme: str) -> list[Trace]:
-    """The traces of a plugged-in scheme over flights that are the same until their faults strike.
-
-    What they have in common is played once; from there on each has a copy of the detector.
-    """
-    common = _frames_in_common(recordings)
-    context = replace(recordings[0].context, options={})
-    detector: Detector = made(DETECTORS, scheme)
-    detector.reset(context)
-    before = _statistics(detector, recordings[0].seen[:common])
-    traces = []
-    for recording in recordings:
-        apart = deepcopy(detector, {id(context): context, id(context.model): context.model})
-        after = _statistics(apart, recording.seen[common:])
-        traces.append(trace(recording, np.array(before + after)))
-    return traces
-
-
 def _statistics(detector: Detector, seen: Seen) -> list[float]:
     """The statistic of each frame, of which alone the detector is shown a copy; that of a detector with an
     alarm alone is well above the level, or well below."""
     verdicts = [detector.step(*deepcopy(shown)) for shown in seen]
     return [1e6 * each.detected if isnan(each.statistic) else each.statistic for each in verdicts]
-
-
-def _frames_in_common(recordings: Sequence[Recording]) -> int:
-    """Frames before any fault in which all flights are the same, to the bit; zero if they differ.
-
-    Only the last of these frames is compared. That is enough: the flights follow from trim and seed, so if
-    one differs from another in some frame, their states differ in every later frame as well.
-    """
-    count = min(
-        sum(recording.onset.is_false(measured.t_s) for measured, _ in recording.seen)
-        for recording in recordings
-    )
-    last = [np.concatenate((r.seen[count - 1][0].x, r.seen[count - 1][0].y)) for r in recordings if count]
-    return count if all(np.array_equal(last[0], other) for other in last[1:]) else 0
 
 
 def trace(recording: Recording, statistic: np.ndarray) -> Trace:

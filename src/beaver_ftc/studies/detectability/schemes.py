@@ -255,7 +255,7 @@ def _watch(watched: Watched, flights: Sequence[Scenario], schemes: Sequence[str]
                     seen = recordings
                 traces = [replay.trace(recording, recording.built_in) for recording in recordings]
             elif seen:
-                traces = replay.replay_together(seen, scheme)
+                traces = [replay.replay(recording, scheme) for recording in seen]
             else:  # why our own could not fly them has been said
                 continue
             watched.traces[scheme] = traces

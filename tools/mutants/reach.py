@@ -27,10 +27,10 @@ from tools.mutants.scope import COMPILED, PLAIN, ROOT, SOURCES, assigned, runs_a
 from tools.mutants.trial import SURVIVED, in_a_child, processor_s, pytest_quietly, turn_to
 
 SLOW_S = {
-    PLAIN: 6.0,
+    PLAIN: 40.0,
     COMPILED: 10.0,
 }  # of processor, counting lines; a test that takes longer is none for this
-WAITS_S = 20.0  # nor is what waits so long, for other processes
+WAITS_S = 120.0  # nor is what waits so long, for other processes
 HANGS_S = 900.0  # of processor for the tests of one file, far more than the limits allow
 EXAMPLES = 4
 APART = ("beaver_ftc.compiled",)

@@ -94,6 +94,19 @@ def test_what_is_no_sample_is_refused_and_not_taken(published):
         assert diagnosis.step(*good) == published.verdicts[k]
 
 
+def test_a_refused_sample_leaves_attitude_and_altitude(published):
+    """Those of the sample before count again."""
+    diagnosis, (first, second) = published.diagnosis(), published.samples[:2]
+    diagnosis.step(*first, 1000.0)
+    for attitude, altitude in (([np.nan] * 3, None), (None, np.nan)):
+        with pytest.raises(bf.BadInput):
+            diagnosis.step(*second[:3], attitude, altitude)
+    diagnosis.step(*second[:3])
+    measured = diagnosis.inside()[0]["measured"][0]
+    assert measured["altitude"] == 1000.0
+    assert np.array_equal(measured["attitude"], first[3])
+
+
 def test_a_start_that_is_not_finite_or_lacks_an_array_is_refused():
     sample = [0, 0, 0], [0.1, 0, 45, 1000, 1], [0] * 4
     for start in (sample[:2], (*sample[:2], [np.nan] * 4)):

@@ -27,10 +27,10 @@ from beaver_ftc.diagnosis.types import GIVE_UP, SCALE_COMMAND
 from beaver_ftc.scenario.diagnosis import MODES, ControlConfig
 
 MODE_NOMINAL, MODE_ADAPTIVE, MODE_REALLOCATED, MODE_UNANTICIPATED = range(len(MODES))
-MAX_EVENTS = 64  # of modes, and of exits from the envelope, that a flight records
+MAX_EVENTS = 64  # number of modes, and of exits from the envelope, that a flight records
 
-# mode now, and whether the law in charge is informed; how many modes there were, since when, s, and which:
-# the first ones and the last.
+# mode: now; informed: whether the law in charge is informed. n_modes: number of modes there were; mode_at_s,
+# mode_is: since when, s, and which, for the first ones and the last.
 SUPERVISOR = record(mode=int, informed=int, n_modes=int, mode_at_s=MAX_EVENTS, mode_is=(int, MAX_EVENTS))
 
 
@@ -80,15 +80,16 @@ def supervise(supervisor, wanted, informed, t):
     supervisor.mode, supervisor.informed = mode, informed
 
 
-# The largest change of an effectiveness a frame; the least that a law divides by.
+# effectiveness_step: its largest change in a frame; least_effectiveness: the smallest that a law divides by.
 CONFIG = record(effectiveness_step=float, least_effectiveness=float)
 
 
 @sized
 def output_dtype(n: int) -> np.dtype:
-    """Of n surfaces: effectiveness, on its way to target by at most a step a frame; offset and lag, rad;
-    given_up: by the law's own observer; parked: commanded to its trim. authority_lost: whether a surface is
-    slow or parked in this frame. unknown (3,) rad/s2: acceleration that no known fault explains."""
+    """For each of n surfaces: effectiveness, which moves to target by at most a step a frame; offset and lag,
+    rad; given_up: whether the law's own observer withdraws it; parked: whether it is commanded to its trim.
+    authority_lost: whether a surface is slow or parked in this frame. unknown (3,) rad/s2: acceleration that
+    no known fault explains."""
     return record(
         target=n, effectiveness=n, offset=n, lag=n, given_up=(int, n), parked=(int, n), authority_lost=int,
         unknown=3,
@@ -125,8 +126,7 @@ def accommodate(control, assessment, faults, prediction, measured):
 
 @kernel
 def begin_frame(output, authority_lost):
-    """Nothing is given up or parked yet; authority_lost: whether a surface is slow, if the law uses
-    it."""
+    """Begin a frame with no surface given up or parked; authority_lost: whether a surface is slow."""
     output.given_up[:], output.parked[:], output.authority_lost = 0, 0, authority_lost
 
 
@@ -170,7 +170,7 @@ def approach(surfaces, s, start, target):
 
 @kernel
 def give_up(output, s):
-    """Use surface s no more: without a step, its effectiveness is none."""
+    """Give up surface s: its effectiveness is 0 at once, without the limit of a step."""
     output.given_up[s], output.target[s], output.effectiveness[s] = 1, 0.0, 0.0
 
 
@@ -187,7 +187,8 @@ def estimate_unknown(output, config, assessment, faults, prediction, y):
 
 @kernel
 def usable_effectiveness(surfaces, s):
-    """Effectiveness of surface s that a law divides by: none of a surface that is given up."""
+    """Effectiveness of surface s that a law divides by: 0 for a surface that is given up, below
+    `least_effectiveness`."""
     effectiveness = surfaces.output.effectiveness[s]
     return 0.0 if effectiveness < surfaces.config.least_effectiveness else effectiveness
 

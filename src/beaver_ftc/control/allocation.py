@@ -23,10 +23,10 @@ TINY = 1e-300  # in place of a divisor of zero
 
 @sized
 def layout_dtype(n: int) -> np.dtype:
-    """Configuration of n surfaces: the one that leads each axis, who stands in for pitch's, or -1; trim and
-    stops, rad. is_backup: which of them wait until pitch is handed over; authority: what part of the
-    authority about each axis is whose, backups without part in pitch. general: there are more than lead or
-    stand in first."""
+    """Configuration of n surfaces. main (3,): the surface that leads each axis; stand_in: the one that takes
+    the place of pitch's, or -1. trim, low, high, rad: trim and stops. is_backup: whether a surface waits
+    until pitch is handed over. authority (3, n): share of each surface in the authority about each axis;
+    backups have none in pitch. general: see `_is_general`."""
     return record(
         main=(int, 3), stand_in=int, trim=n, low=n, high=n, general=int, is_backup=(int, n), authority=(3, n)
     )
@@ -34,18 +34,18 @@ def layout_dtype(n: int) -> np.dtype:
 
 @sized
 def axes_dtype(n: int) -> np.dtype:
-    """What the surfaces are to do, by axis. G (3, n) rad/s2 per rad: with the effectiveness of each surface
-    in it. rad/s2, by the law: demand, and hold, what of it only holds the rates, both less the offsets of
-    surfaces; disturbance, that its observer finds, if it has one; shortfall: what of the demand was not
-    given; beyond: whether not even the rates can be held."""
+    """What the surfaces are to do about each axis. G (3, n) rad/s2 per rad: times the effectiveness of each
+    surface. From the law, rad/s2: demand; hold, the part of it that only holds the rates; both less the
+    moments of offsets; disturbance, which the law's observer finds, if it has one. shortfall, rad/s2: the
+    part of the demand that was not given; beyond: whether not even the rates can be held."""
     return record(G=(3, n), demand=3, hold=3, disturbance=3, shortfall=3, beyond=(int, 3))
 
 
 @sized
 def allocation_dtype(n: int) -> np.dtype:
-    """hand_over_step: change of hand_over in a frame. Of n surfaces, the command, rad, and which stand at a
-    stop; hand_over: how far pitch is handed over to its stand-in, 0 to 1; lost_share: what part of pitch the
-    main surface has lost; transfer_share: the part of pitch that the stand-in carries now."""
+    """hand_over_step: change of hand_over in a frame. command (n,) rad; saturated (n,): whether a surface
+    stands at a stop. hand_over: how far pitch is handed over to its stand-in, 0 to 1; lost_share: the part of
+    pitch that the main surface has lost; transfer_share: the part of pitch that the stand-in carries now."""
     return record(
         config=record(hand_over_step=float), memory=record(problem=problem_dtype(n)),
         output=record(command=n, saturated=(int, n), hand_over=float, lost_share=float, transfer_share=float),
@@ -75,8 +75,9 @@ def _is_general(aircraft: Aircraft) -> bool:
 
 
 def _authority(declared: Declared, layout: np.void) -> np.ndarray:
-    """(3, n): what part of the authority about each axis is whose, of the surfaces that turn most about it;
-    where one leads each, or none turns most about it, the one that leads has all."""
+    """Share (3, n) of each surface in the authority about each axis: |G_is| travel_s over their sum, for the
+    surfaces whose largest effect is about this axis. If one surface leads each axis, or none has its largest
+    effect about it, the one that leads has the share 1."""
     aircraft = declared.aircraft
     shares = np.zeros((3, aircraft.n))
     if not _is_general(aircraft):
@@ -94,7 +95,7 @@ def _authority(declared: Declared, layout: np.void) -> np.ndarray:
 
 @kernel
 def remaining(layout, effectiveness, i):
-    """What part of the authority about axis i is left; effectiveness (n,)."""
+    """Remaining share of the authority about axis i, 0 to 1: sum_s authority_is effectiveness_s."""
     left = 0.0
     for s in range(effectiveness.size):
         left += layout.authority[i, s] * effectiveness[s]
@@ -117,21 +118,20 @@ def clip(output, layout, s, deflection):
 
 @kernel
 def divide(moment, effectiveness):
-    """moment / effectiveness; a surface given up (no effectiveness left) is not asked for anything."""
+    """moment / effectiveness, and 0 for a surface that is given up (effectiveness 0)."""
     return moment / effectiveness if effectiveness != 0.0 else 0.0
 
 
 @kernel
 def set_demand(axes, i, demand, hold, disturbance):
-    """What a law demands about axis i, what of it only holds the rates, and the disturbance that its observer
-    finds, rad/s2."""
+    """Set what a law demands about axis i, the part that only holds the rates, and the disturbance that its
+    observer finds, rad/s2."""
     axes.demand[i], axes.hold[i], axes.disturbance[i] = demand, hold, disturbance
 
 
 @kernel
 def subtract_offsets(axes, offset, G):
-    """Take the moments of the surfaces' offsets (n,) rad off what the law demands; G (3, n) rad/s2 per
-    rad."""
+    """Subtract G offset from demand and hold of the law; offset (n,) rad, G (3, n) rad/s2 per rad."""
     for i in range(3):
         for s in range(G.shape[1]):
             axes.demand[i] -= G[i, s] * offset[s]
@@ -140,8 +140,8 @@ def subtract_offsets(axes, offset, G):
 
 @kernel
 def form_effectiveness_matrix(axes, G, surfaces, uses_verdict):
-    """Fill axes.G (3, n) rad/s2 per rad: the design model's G, of a law that uses the verdict times the
-    surfaces' `usable_effectiveness`."""
+    """Fill axes.G (3, n) rad/s2 per rad: the design model's G, times the `usable_effectiveness` of each
+    surface if the law uses the verdict."""
     if not uses_verdict:
         axes.G[:] = G
         return
@@ -301,9 +301,9 @@ def lead_compensate(output, layout, lead, u):
 def hand_over_pitch(allocation, reallocated, at_once, remains, least):
     """Hand the pitch demand to the flap, or back as soon as it is `reallocated` no longer, by the same step.
 
-    at_once: the lost part goes at once, after a jam. remains: effectiveness of the main surface; less than
-    `least` is none. While pitch is handed back, the loss of before counts: the main surface may be estimated
-    whole at once, and nothing is to leap.
+    at_once: whether the lost part is handed over in one frame, as after a jam. remains: effectiveness of the
+    main surface; less than `least` counts as 0. While pitch is handed back, lost_share stays: the estimate of
+    the main surface may return to 1 in one frame, but the command must not jump.
 
         transfer_share = smoothstep(hand_over) lost_share,    lost_share = 1 - remains; 1 below `least`
     """
@@ -338,12 +338,11 @@ def attainable(G, layout, engine_authority, i):
 
 @kernel
 def note_shortfall(axes, command, layout, lag, engine_authority):
-    """What was demanded and is not given by the command u (n,) rad; and whether the rates could at least be
-    held: `hold` is attainable.
+    """Fill the shortfall of the command u (n,) rad, and `beyond`, whether `hold` is not attainable:
 
         shortfall = demand - G (u + lag),    rad/s2
 
-    lag (n,) rad: of surfaces behind their command; engine_authority: as in `attainable`.
+    lag (n,) rad: position less command of a slow surface; engine_authority: as in `attainable`.
     """
     G = axes.G
     for i in range(3):

@@ -34,9 +34,9 @@ from beaver_ftc.design.table import AIRSPEED, DPT, QDYN
 from beaver_ftc.diagnosis.state import PITCH, YAW
 from beaver_ftc.scenario.declared import Declared
 
-LEAST_LACK_RAD_S2 = 0.05  # of pitch acceleration: what 2 to 3 inHg give
-WHOLE_RANGE_S = 5.0  # in which a lever goes from stop to stop
-YAW_SHARE = 0.5  # of the rudder, that engine power may claim: the rest is there to fly with
+LEAST_LACK_RAD_S2 = 0.05  # smallest shortfall in pitch that counts: 2 to 3 inHg give so much
+WHOLE_RANGE_S = 5.0  # time in which a lever goes from stop to stop
+YAW_SHARE = 0.5  # share of the rudder's travel that engine power may need; the rest is there to fly with
 
 # impatience, forgiveness: see `engage`; speed_gain, attitude_gain: K_V, K_theta; smoothing, washout, leak: 1
 # - exp(-dt / tau) of the lag of V, of V_bar and of theta_m; trim, low, high, step: in the units of the
@@ -49,10 +49,12 @@ POWER_CONFIG = record(
 )  # fmt: skip
 # base: the setting unless engaged, in trim or by the autopilot.
 SETPOINT = record(base=float)
-# lost: see `engage`; engaged: whether the law holds; moved: whether it has left the setting, and returns.
+# lost: see `engage`; engaged: whether this law sets the power; moved: whether the power differs from `base`.
+# speed, usual_speed, attitude: V, V_bar, theta_m.
 POWER_MEMORY = record(lost=float, engaged=int, moved=int, speed=float, usual_speed=float, attitude=float)
-# command: of all engines, then what each that is an effector has beside it (engines.py); in_use: whether the
-# levers are commanded; what is reported: since when and how long engaged, the lowest and highest setting.
+# command: the common lever, then what each engine that is an effector has in addition (engines.py); in_use:
+# whether the levers are commanded. For the report: from_s, frames, since when and how long engaged; least,
+# greatest, the lowest and highest setting.
 POWER_OUTPUT = record(command=MAX_LEVERS, in_use=int, from_s=float, frames=int, least=float, greatest=float)
 POWER = record(config=POWER_CONFIG, setpoint=SETPOINT, memory=POWER_MEMORY, output=POWER_OUTPUT)
 
@@ -237,9 +239,9 @@ def follow_autopilot(power, setting, airspeed):
 
 @kernel
 def move_differences(power, difference, n, step):
-    """Move what each of n engines has beside the common lever towards `difference` (n,), by at most a
-    step."""
+    """Move the command of each of n engines, which is added to the common lever's, towards `difference` (n,),
+    by at most a `step`, in units of the setting."""
     output = power.output
-    for e in range(n):
-        output.command[1 + e] = moved(output.command[1 + e], difference[e], step)
-        output.in_use = output.in_use or output.command[1 + e] != 0.0
+    for k in range(n):
+        output.command[1 + k] = moved(output.command[1 + k], difference[k], step)
+        output.in_use = output.in_use or output.command[1 + k] != 0.0

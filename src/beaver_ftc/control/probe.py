@@ -10,7 +10,8 @@ import numpy as np
 from beaver_ftc.compiled import fill, kernel, record
 from beaver_ftc.scenario.diagnosis import Probing
 
-# Of the flap's movement. amplitude rad; step: rad of phase a frame; frames: how many at most, 0 for no probe.
+# amplitude rad: largest deflection of the flap; step rad: change of the phase in a frame; frames: largest
+# number of frames of the movement, 0 for no probe.
 CONFIG = record(amplitude=float, step=float, frames=int)
 # deflection rad of the flap; probed: frames of the present movement; from_s, to_s: when it began and ended.
 MEMORY = record(deflection=float, probed=int, from_s=float, to_s=float)

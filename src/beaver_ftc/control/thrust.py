@@ -18,8 +18,8 @@ from beaver_ftc.aircraft.schema import MAX_THRUST
 from beaver_ftc.compiled import kernel, record
 from beaver_ftc.design.table import DPT, QDYN
 
-LEAST_PUSH = 1e-3  # m/s2 per inHg
-LEAST_RISE = 1e-4  # m/s2 from one setting to the next, so that each has its own
+LEAST_PUSH = 1e-3  # smallest push, m/s2 per inHg
+LEAST_RISE = 1e-4  # added from one setting to the next, m/s2, so that no two settings have the same thrust
 
 # The table of an engine; `settings` is 0 if there is none.
 ENGINE = record(
@@ -42,7 +42,7 @@ def set_up_engine(engine: np.void, thrust: Any, mass_kg: float) -> None:
 
 @kernel
 def between(at, n, x, y):
-    """y (n,) at `at`, linear between the rising x (n,); beyond its ends the nearest:
+    """y at x = `at`, linear between the points (x, y) (n,) with rising x; beyond the ends the nearest y:
 
     y_k + (at - x_k) / (x_k+1 - x_k) (y_k+1 - y_k),    x_k <= at <= x_k+1
     """

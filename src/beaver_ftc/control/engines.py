@@ -1,21 +1,24 @@
 """Engines as effectors: they take what surfaces no longer reach.
 
-Each engine turns the aircraft by its arms. A surface about an axis that is given up or at its stop leaves a
-part of the demand, the shortfall e. The engines are to give its integral w,
+If the surface that leads an axis is given up or at its stop, it leaves a part of the demand, the shortfall
+e. The engines are to give the integral w of the shortfall. With the lag of the engines, the loop is damped by
+0.7:
 
-    w' = e / T,   T = 2 lag            over the engines' own lag: w / demand = 1 / (T s (lag s + 1) + 1)
+    w' = e / T,   T = 2 lag,        w / demand = 1 / (T s (lag s + 1) + 1)
 
-which is damped by 0.7: they take the slow part; the fast one, which they could only answer late, is left to
-the aircraft's own damping [Burcham1997]. Their moment is in the design model, by the moments of the engines
-among its signals, or the law's observer finds it: e is then what is left. Once the surfaces reach, w fades.
+So the engines take the slow part. The fast part, which they could only answer late, is left to the aircraft's
+own damping [Burcham1997]. The design model contains the moments of the engines (as signals), or the law's
+observer finds them: e is then only what the engines do not give yet. Once the surface reaches the demand
+again, w fades.
 
-Which engine gives what is constrained least squares (least_squares.py) over the accelerations u (m/s2 of the
-whole aircraft's thrust over mass) that the power left above and below the common lever gives; B has
+Constrained least squares (least_squares.py) find which engine gives what. The unknowns are the accelerations
+u_k that engine k gives beyond the common lever, m/s2: thrust over mass of the aircraft. Column k of B is
 
-    share mass (0, down / Iy, -right / Iz)                       of a force along the body's x axis
+    share mass (0, down / Iy, -right / Iz)        rad/s2 per m/s2, for a force along the body's x axis
 
-with the inertia's coupling of yaw into roll. The lever that gives u is found in the table of thrust. Roll is
-not asked of them: they roll by sideslip, which the outer loops ask for.
+and the inertia's coupling of yaw into roll. share: of engine k in the thrust; down, right, m: its distances
+from the centre of gravity. The table of thrust gives the lever for u_k. Engines are not asked for roll: the
+outer loops ask for sideslip, which rolls the aircraft.
 """
 
 import numpy as np
@@ -31,20 +34,20 @@ from beaver_ftc.design.model import inertia_coefficients
 from beaver_ftc.diagnosis.state import PITCH, YAW
 from beaver_ftc.scenario.declared import Declared
 
-LEAST_LAG_S = 0.5  # of an engine that the file gives less lag: the law then integrates no faster
+LEAST_LAG_S = 0.5  # The law assumes at least this lag, so that it integrates no faster.
 RELEASE_S = 20.0  # time constant with which w fades
 
-# n: how many; low, high: of the setting, step: in a frame; integral_gain, release: shares a frame.
-# B (3, n) rad/s2 per m/s2.
+# n: number of engines. low, high: range of the setting; step: its largest change in a frame, in units of the
+# setting. integral_gain: dt / T; release: dt / RELEASE_S. B (3, n): rad/s2 per m/s2.
 ENGINES_CONFIG = record(
     n=int, low=float, high=float, step=float, integral_gain=float, release=float, B=(3, MAX_EFFECTORS)
 )  # fmt: skip
-# serving: rows of B of the axes they serve now; wanted (3,) rad/s2: w.
+# serving (3, n): B, with a row of zeros for an axis that needs no engine now; wanted (3,) rad/s2: w.
 ENGINES_MEMORY = record(
     thrust=ENGINE, serving=(3, MAX_EFFECTORS), wanted=3, problem=problem_dtype(MAX_EFFECTORS),
 )  # fmt: skip
-# difference: of each engine's setting from the common lever; authority (2, 3) rad/s2: the least and the
-# greatest that all give about each axis.
+# difference (n,): setting of each engine less that of the common lever; authority (2, 3) rad/s2: the least
+# and the greatest acceleration that all engines together give about each axis.
 ENGINES_OUTPUT = record(difference=MAX_EFFECTORS, authority=(2, 3))
 ENGINES = record(config=ENGINES_CONFIG, memory=ENGINES_MEMORY, output=ENGINES_OUTPUT)
 
@@ -62,17 +65,17 @@ def configure_engines(engines: np.void, declared: Declared) -> None:
         config, n=len(aircraft.effectors), low=low, high=high, step=(high - low) / WHOLE_RANGE_S * dt,
         integral_gain=dt / T, release=dt / RELEASE_S,
     )  # fmt: skip
-    mass, i = declared.mass, inertia_coefficients(declared.mass)
+    mass, inertia = declared.mass, inertia_coefficients(declared.mass)
     set_up_engine(engines["memory"]["thrust"], thrust, mass.mass_kg)
-    for e, of in enumerate(aircraft.effectors.values()):
-        force_n = of.share * mass.mass_kg
-        pitching, yawing = of.down_m * force_n, -of.right_m * force_n
-        config["B"][:, e] = i.Pn * yawing, i.Qm * pitching, i.Rn * yawing
-        engines["memory"]["problem"]["weight"][e] = 1.0
+    for k, engine in enumerate(aircraft.effectors.values()):
+        force_n = engine.share * mass.mass_kg
+        pitching, yawing = engine.down_m * force_n, -engine.right_m * force_n
+        config["B"][:, k] = inertia.Pn * yawing, inertia.Qm * pitching, inertia.Rn * yawing
+        engines["memory"]["problem"]["weight"][k] = 1.0
 
 
 def effects_of_engines(declared: Declared) -> np.ndarray:
-    """B (3, engines): rad/s2 about each axis per m/s2 of each engine that is an effector; of none (3, 0)."""
+    """B (3, n): rad/s2 about each axis per m/s2 of each engine that is an effector; (3, 0) without any."""
     engines = np.zeros(1, ENGINES)[0]
     configure_engines(engines, declared)
     return np.array(engines["config"]["B"][:, : engines["config"]["n"]])
@@ -80,63 +83,78 @@ def effects_of_engines(declared: Declared) -> np.ndarray:
 
 @kernel
 def surface_reaches_demand(layout, saturated, surfaces, i):
-    """Whether the surface that leads axis i is neither given up nor at its stop; saturated (n,): which
-    are."""
-    least = surfaces.config.least_effectiveness
-    given_up = remaining(layout, surfaces.output.effectiveness, i) < least
+    """Whether the surface that leads axis i is neither given up nor at its stop; saturated (surfaces,):
+    whether each is at its stop."""
+    given_up = remaining(layout, surfaces.output.effectiveness, i) < surfaces.config.least_effectiveness
     return not given_up and saturated[layout.main[i]] == 0
 
 
 @kernel
 def update_engine_demand(config, memory, axes, layout, saturated, surfaces):
-    """Advance w (3,) rad/s2 by a frame: w <- w - release w where the surface reaches, else w + integral_gain
-    e, e the shortfall. serving: rows of B of the axes whose w is not 0."""
+    """Bring w (3,) rad/s2 to this frame, in pitch and yaw; fill `serving`, the rows i of B with w_i not 0:
+
+    w_i <- w_i - release w_i              if `surface_reaches_demand`
+    w_i <- w_i + integral_gain e_i        otherwise        e (3,) rad/s2: axes.shortfall
+    """
+    w = memory.wanted
     for i in (PITCH, YAW):
         if surface_reaches_demand(layout, saturated, surfaces, i):
-            memory.wanted[i] -= config.release * memory.wanted[i]
+            w[i] -= config.release * w[i]
         else:
-            memory.wanted[i] += config.integral_gain * axes.shortfall[i]
-        for e in range(config.n):
-            memory.serving[i, e] = config.B[i, e] if memory.wanted[i] != 0.0 else 0.0
+            w[i] += config.integral_gain * axes.shortfall[i]
+        for k in range(config.n):
+            memory.serving[i, k] = config.B[i, k] if w[i] != 0.0 else 0.0
 
 
 @kernel
 def limit(config, memory, authority, base):
-    """How far each goes from the common lever `base`, |u| <= most, m/s2, and what all give about each axis
-    at most, `authority` (2, 3) = -+ sum |B_ie most|, rad/s2: as far up as down, so that their sum, which
-    holds the airspeed, stays."""
+    """Limit u_k, m/s2, around the setting `base` of the common lever, and fill `authority` (2, 3) rad/s2:
+
+        |u_k| <= most = min(gain up to config.high, loss down to config.low)
+        authority_i = -+ sum_k |B_ik| most
+
+    The limits up and down are equal. To yaw, two engines on opposite sides then give opposite u, also at
+    their limits, and the sum of the thrust, which holds the airspeed, stays.
+    """
     problem, table = memory.problem, memory.thrust
     authority[:] = 0.0
+    # no push (thrust.py): an aircraft with such engines has a table
     most = min(gained(table, 0.0, base, config.high), -gained(table, 0.0, base, config.low))
-    for e in range(config.n):
-        problem.low[e], problem.high[e] = -most, most
+    for k in range(config.n):
+        problem.low[k], problem.high[k] = -most, most
         for i in (PITCH, YAW):
-            reach = abs(config.B[i, e] * most)
+            reach = abs(config.B[i, k] * most)
             authority[0, i] -= reach
             authority[1, i] += reach
 
 
 @apart
-def steer_by_engines(engines, power, axes, layout, saturated, surfaces, airspeed):
-    """Fill output.difference, the setting of each engine less that of the common lever: of the accelerations
-    u (n,) m/s2 that give w best within the limits. airspeed m/s."""
-    config, memory, output = engines.config, engines.memory, engines.output
-    look_up(memory.thrust, airspeed)
-    base = power.output.command[0]
+def steer_by_engines(control, airspeed):
+    """Fill `difference`, for the u (n,) m/s2 within the limits that give w best, at an airspeed m/s:
+
+        u = argmin |B u - w|^2,    difference_k = setting for u_k - setting of the common lever
+        w <- B u        (anti-windup: the integral keeps only what the engines give)
+
+    B: its rows in `serving`.
+    """
+    config, memory, output = control.engines.config, control.engines.memory, control.engines.output
+    w, table, base = memory.wanted, memory.thrust, control.power.output.command[0]
+    saturated = control.allocation.output.saturated
+    look_up(table, airspeed)
     limit(config, memory, output.authority, base)
-    update_engine_demand(config, memory, axes, layout, saturated, surfaces)
-    least_squares.solve(memory.problem, memory.serving, memory.wanted)
-    memory.wanted[:] = 0.0  # what cannot be given is not integrated
-    for e in range(config.n):
-        u = memory.problem.u[e]
+    update_engine_demand(config, memory, control.axes, control.layout, saturated, control.surfaces)
+    least_squares.solve(memory.problem, memory.serving, w)
+    w[:] = 0.0
+    for k in range(config.n):
+        u = memory.problem.u[k]
         for i in (PITCH, YAW):
-            memory.wanted[i] += memory.serving[i, e] * u
-        output.difference[e] = power_for(memory.thrust, 0.0, base, u) - base
+            w[i] += memory.serving[i, k] * u
+        output.difference[k] = power_for(table, 0.0, base, u) - base  # no push, as in `limit`
 
 
 @kernel
 def release_engines(engines):
-    """Want nothing of the engines; `move_differences` brings them back to the common lever, step by step."""
+    """Ask the engines for nothing; `move_differences` (power.py) brings them back to the common lever."""
     engines.memory.wanted[:] = 0.0
     engines.output.difference[:] = 0.0
     engines.output.authority[:] = 0.0

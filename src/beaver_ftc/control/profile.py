@@ -96,13 +96,15 @@ def record_deviations(autopilot, altitude_m, airspeed_mps, heading, bank, t):
 def record_airspeed_deviations(autopilot, airspeed_mps, away):
     """Update the largest deviation at one instant, of `away` m/s, and that of the mean from the airspeed to
     fly."""
-    largest = max(autopilot.largest_instant_airspeed_deviation, abs(away))
-    autopilot.largest_instant_airspeed_deviation = largest
+    autopilot.largest_instant_airspeed_deviation = max(
+        autopilot.largest_instant_airspeed_deviation, abs(away)
+    )
     mean = autopilot.mean_deviation_from_airspeed_to_fly
     mean += autopilot.dt / MEAN_S * (airspeed_mps - autopilot.airspeed_to_fly - mean)
     autopilot.mean_deviation_from_airspeed_to_fly = mean
-    largest = max(autopilot.largest_deviation_from_airspeed_to_fly, abs(mean))
-    autopilot.largest_deviation_from_airspeed_to_fly = largest
+    autopilot.largest_deviation_from_airspeed_to_fly = max(
+        autopilot.largest_deviation_from_airspeed_to_fly, abs(mean)
+    )
 
 
 def set_up_profile(autopilot: np.void, declared: Declared) -> None:

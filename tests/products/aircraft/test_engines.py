@@ -95,12 +95,10 @@ def records(jet, lag_s):
 def answer(control, demand, lag_s, frames):
     """The yaw acceleration (frames,) that engines with a lag give for a constant demand, rad/s2."""
     given, out, parts, power = 0.0, np.empty(frames), control["engines"], control["power"]
-    saturated, config = control["allocation"]["output"]["saturated"], control["engines"]["config"]
+    config = parts["config"]
     for k in range(frames):
         control["axes"]["shortfall"][YAW] = demand - given
-        engines.steer_by_engines(
-            parts, power, control["axes"], control["layout"], saturated, control["surfaces"], 139.0,
-        )  # fmt: skip
+        engines.steer_by_engines(control, 139.0)
         move_differences(power, parts["output"]["difference"], config["n"], config["step"])
         given += DT / lag_s * (float(parts["memory"]["wanted"][YAW]) - given)
         out[k] = given

@@ -1,9 +1,14 @@
-"""The control laws of ours, one a file, and what those that invert the design model share: which surfaces
-carry pitch, from a demand to the command, and what is missing then.
+"""The control laws of ours, one a file, and what those that invert the design model share: they decide which
+surfaces carry pitch, turn a demand into the command, and compute what of the demand is then missing.
 
     prepare -> the law's own demand -> command_surfaces -> the law's own integrators -> complete
 
-`control/state.py` has the table of the laws, reference.py what they follow.
+`control/state.py` has the table of the laws, reference.py what they follow. Words for a surface at fault:
+
+    given up    a law divides by no effectiveness of it: less is left than `least_effectiveness`
+    withdrawn   given up by the default law's own observer, perhaps for a while (`withdraw`, rejecting.py)
+    parked      commanded to its trim, because it does not follow its command or is withdrawn
+    lost        of pitch: no surface can give it (`pitch_is_lost`); of authority: a surface is slow or parked
 """
 
 from beaver_ftc.compiled import apart
@@ -13,22 +18,23 @@ from beaver_ftc.control.probe import advance_probe
 from beaver_ftc.design.table import AIRSPEED
 from beaver_ftc.diagnosis.state import PITCH
 
+WITH_OBSERVER, WITHOUT_OBSERVER = True, False  # `by_observer` of command_surfaces
+
 
 @apart
 def prepare(control, assessment, prediction, mode, t):
     """Bring the effectiveness matrix, the hand-over of pitch and the probe to this frame, t s. mode: the
     supervisor's.
 
-    Pitch is handed over at once where a surface is or was slow or parked (the reference is governed,
-    reference.py), or where the diagnosis of all types has found that less than least_effectiveness is left of
-    the main surface.
+    Pitch is handed over at once if a surface is or was slow or parked (the reference is then governed,
+    reference.py), or if the diagnosis of all types has found that the main surface is to be given up.
     """
     surfaces, config = control.surfaces, control.config
     output, least = surfaces.output, surfaces.config.least_effectiveness
     allocation.form_effectiveness_matrix(control.axes, prediction.G, surfaces, config.uses_verdict)
     remains = allocation.remaining(control.layout, output.effectiveness, PITCH)
-    useless = remains < least and assessment.diagnoses_all_types
-    at_once = control.reference.memory.active or output.authority_lost or useless
+    given_up = remains < least and assessment.diagnoses_all_types
+    at_once = control.reference.memory.active or output.authority_lost or given_up
     allocation.hand_over_pitch(control.allocation, mode == MODE_REALLOCATED, at_once, remains, least)
     if control.probe.config.frames > 0:
         wanted = assessment.pitch_undecided and config.uses_verdict and not config.informed
@@ -37,14 +43,15 @@ def prepare(control, assessment, prediction, mode, t):
 
 @apart
 def command_surfaces(control, assessment, faults, prediction, by_observer):
-    """From the law's demand, in control.axes, to the command u (n,) rad of each surface:
+    """Turn the law's demand, in control.axes, into the command u (n,) rad of each surface:
 
         demand <- demand - G offset         if the law uses the verdict
         G u = demand                        as far as the travels allow
-        u = trim                            of a surface that is parked
+        u = trim                            for a surface that is parked
 
-    by_observer: whether the law's observer finds what a surface does not do; the stand-in then carries what
-    the main surface has lost, and the flap takes what an elevator at its stop leaves.
+    by_observer: whether the law has an observer, which finds what a surface does not do. The stand-in then
+    carries only what the main surface has lost, and from the alarm on the flap takes what an elevator at its
+    stop leaves.
     """
     axes, layout, surfaces, out = control.axes, control.layout, control.surfaces, control.allocation.output
     uses_verdict, effectiveness = control.config.uses_verdict, surfaces.output.effectiveness
@@ -66,22 +73,22 @@ def command_surfaces(control, assessment, faults, prediction, by_observer):
 
 @apart
 def complete(control, assessment, measured, t):
-    """Note whether the demand is met; what is missing in pitch and yaw is left to the engines, at t s.
+    """Fill the shortfall of the demand, and leave it to the engines in pitch and yaw, at t s.
 
-    engines_serve: whether they may, from the alarm on, and at any time for a law that is informed of the
-    truth.
+    engines_serve: whether engines may act, from the alarm on, and at any time for a law that is informed of
+    the truth. power_stage: the common lever; engine_stage: the engines that are effectors.
     """
     out, surfaces, axes, layout = control.allocation.output, control.surfaces, control.axes, control.layout
-    lever, engine = control.power, control.engines
+    power_stage, engine_stage = control.power, control.engines
+    config, output = engine_stage.config, engine_stage.output
     engines_serve = assessment.detected or control.config.informed
-    allocation.note_shortfall(axes, out.command, layout, surfaces.output.lag, engine.output.authority)
-    if lever.config.enabled:
+    allocation.note_shortfall(axes, out.command, layout, surfaces.output.lag, output.authority)
+    if power_stage.config.enabled:
         lost = power.pitch_is_lost(layout, surfaces, out.saturated, axes.shortfall)
-        power.steer_by_power(lever, control.reference, measured.x, measured.y, engines_serve, lost, t)
-    if engine.config.n > 0:
+        power.steer_by_power(power_stage, control.reference, measured.x, measured.y, engines_serve, lost, t)
+    if config.n > 0:
         if engines_serve:
-            airspeed = measured.y[AIRSPEED]
-            engines.steer_by_engines(engine, lever, axes, layout, out.saturated, surfaces, airspeed)
+            engines.steer_by_engines(control, measured.y[AIRSPEED])
         else:
-            engines.release_engines(engine)
-        power.move_differences(lever, engine.output.difference, engine.config.n, engine.config.step)
+            engines.release_engines(engine_stage)
+        power.move_differences(power_stage, output.difference, config.n, config.step)

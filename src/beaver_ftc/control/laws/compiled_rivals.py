@@ -16,8 +16,9 @@ from beaver_ftc.control.allocation import take_command
 CONFIG = record(
     incremental=int, K=(3, 6), A=(3, 3), B_inverse=(3, 3), trim_x=3, Kp=float, Ki=float, keep=float
 )
-# Of incremental inversion: the rates of the frame before, and the filters of the measured acceleration and of
-# the surfaces' share of it. inherited (3,) rad/s2: what the law before attributed to no model.
+# integral (3,) rad: of the tracking error. saturated: number of surfaces at a stop. Incremental inversion has
+# x_before (3,) rad/s, the rates of the frame before, and the filters of the measured acceleration and of the
+# surfaces' share of it, rad/s2. inherited (3,) rad/s2: what the law before attributed to no model.
 MEMORY = record(
     integral=3, saturated=int, begun=int, x_before=3, rate_filter=(2, 3), surface_filter=(2, 3), inherited=3
 )
@@ -33,7 +34,7 @@ def rival_dtype(n: int) -> np.dtype:
 def command(control, assessment, faults, prediction, measured, mode, t):
     """From what is measured to the command of each surface (control.CompiledLaw)."""
     law, reference, layout = control.compiled_rivals, control.reference, control.layout
-    memory, allocated, target = law.memory, control.allocation.output, reference.output
+    allocated, target = control.allocation.output, reference.output
     u = allocated.command
     u[:] = layout.trim
     add_command(
@@ -41,7 +42,7 @@ def command(control, assessment, faults, prediction, measured, mode, t):
         prediction.means.Gu, prediction.G, control.axes.demand, u,
     )  # fmt: skip
     take_command(allocated, layout, u)
-    memory.saturated = allocated.saturated.sum()
+    law.memory.saturated = allocated.saturated.sum()
 
 
 @kernel

@@ -1,15 +1,19 @@
-"""Effectiveness of the surface that leads an axis, from the innovation of the default law's observer.
+"""What the default law finds of a surface at fault by itself: how effective it is, and whether to use it.
 
-A surface with effectiveness 1 + theta gives theta G u more than a healthy one. theta is the least-squares fit
-of G u, as the observer filters it (psi), to the innovation e of an observer that assumes a healthy surface
-[Ljung1999, ch. 13: a prediction error in a closed loop]:
+*Effectiveness* of the surface that leads an axis, from the innovation of the law's observer. A surface with
+effectiveness 1 + theta gives theta G u more than a healthy one. theta is the least-squares fit of psi, the
+observer's answer to G u, to the innovation e of an observer that assumes a healthy surface [Ljung1999, ch.
+13: a prediction error in a closed loop]:
 
     theta = (sum psi e + lam (diagnosed - 1)) / (sum psi^2 + lam),   lam = mean e^2 / UNSURE^2
 
-The last MEMORY_S count; lam is the weight of the effectiveness `diagnosed`. An equation error in a closed
-loop estimates a surface as weaker than it is, since the command answers the gust that hides it. This estimate
-errs the other way, with what the gyro's noise commands. The law uses the larger of both: a loop is then no
-faster than its margins allow.
+The sums fade over MEMORY_S; lam is the weight of `diagnosed`, the diagnosis' estimate of the effectiveness.
+The diagnosis estimates by an equation error. In a closed loop this estimate is too low in gusts, because the
+command answers the gust, which hides what the surface gives. The fit is too high with a noisy gyro, because
+the noise is in the command as well as in the innovation. The law divides by the larger of both, so that a
+loop is no faster than its margins allow.
+
+*Use.* The law withdraws a surface that is of doubtful use and stays at its stop (`withdraw`).
 """
 
 from math import exp
@@ -18,14 +22,20 @@ from beaver_ftc.compiled import kernel, record
 from beaver_ftc.control.laws.effectiveness_estimator import observer_response
 from beaver_ftc.diagnosis.state import PITCH
 
-MEMORY_S = 5.0  # of the effectiveness seen by the observer: a slow reference's swing
-UNSURE = 0.2  # standard deviation of the diagnosis' estimate that is assumed: it settles the start
-# An effectiveness below it counts as a lost surface: half of the default `least_effectiveness`, whatever a
-# scenario sets
+MEMORY_S = 5.0  # time constant of the sums: the swing of a slow reference
+UNSURE = 0.2  # assumed standard deviation of the diagnosis' estimate, which the law takes before it has sums
+# A surface with less effectiveness counts as lost: half of the default `least_effectiveness`, also if a
+# scenario sets another one.
 NOTHING_LEFT = 0.05
+# A doubtful surface is withdrawn after so long at its stop: the first if another surface takes its place.
+PATIENCE_S, LONG_PATIENCE_S = 0.5, 1.0
+RETRY_S = 20.0  # If another surface takes its place, a withdrawn one is used again after this time.
+# A frame off the stop takes STOP_RECOVERY - 1 frames from the time at the stop: a command that swings leaves
+# the stop only briefly.
+STOP_RECOVERY = 1.5
 
-# Of the main surface of each axis, fading sums over frames: of psi e, psi^2 and e^2, (rad/s)^2, and of 1.
-# named: whether the diagnosis has ever named it.
+# Fading sums over frames (3,), for the main surface of each axis: product of psi e, square of psi^2,
+# innovation of e^2, (rad/s)^2, and frames of 1. named: whether the diagnosis has named the surface before.
 SUMS = record(product=3, square=3, innovation=3, frames=3, named=(int, 3))
 
 
@@ -41,20 +51,9 @@ def is_replaced(layout, s):
 
 
 @kernel
-def clamp_to_observer_estimate(sums, layout, s, target, least):
-    """Effectiveness of surface s: of a loss reported as `target`, of a main surface that nothing replaces, no
-    less than the observer sees. least: of the effectiveness that is used."""
-    for i in range(3):
-        if s == layout.main[i] and target < 1.0 and not is_replaced(layout, s):
-            forget_health(sums, i)
-            target = larger_estimate(sums, target, i, least)
-    return target
-
-
-@kernel
-def forget_health(sums, i):
-    """At the first naming of the main surface of axis i, what was seen of it when healthy no longer
-    counts."""
+def restart_at_naming(sums, i):
+    """When the main surface of axis i is named for the first time, restart the sums of psi e and psi^2, which
+    come from its healthy time. The noise level, sum e^2 / frames, is kept."""
     if not sums.named[i]:
         sums.named[i], sums.product[i], sums.square[i] = 1, 0.0, 0.0
 
@@ -88,7 +87,8 @@ def effectiveness_seen(sums, i, diagnosed):
 @kernel
 def is_effective(sums, main, s, least):
     """Whether the law's observer sees surface s act, enough to be divided by: theta = product / square
-    exceeds least - 1. False for a surface that leads no axis. main (3,); least: of the effectiveness."""
+    exceeds least - 1. False for a surface that leads no axis. main (3,): surface that leads each axis; least:
+    the smallest effectiveness that a law uses."""
     for i in range(3):
         if s == main[i] and sums.product[i] > (least - 1.0) * sums.square[i]:
             return True
@@ -97,18 +97,67 @@ def is_effective(sums, main, s, least):
 
 @kernel
 def accumulate(config, memory, i, effectiveness, moment, innovation):
-    """Add this frame to the sums of axis i, sum <- sum + term - fading sum, for psi e, psi^2, e^2 and 1.
+    """Add this frame to the sums of axis i, for the terms psi e, psi^2, e^2 and 1:
 
-    psi, e, rad/s: the observer's answers to moment and to innovation + (effectiveness - 1) moment; innovation
-    rad/s: of the law's observer; effectiveness: that the law assumes, of the main surface; moment: G u of a
-    healthy one, rad/s2.
+        sum <- sum + term - fading sum
+        psi = observer(moment),    e = innovation + observer((effectiveness - 1) moment)        rad/s
+
+    observer: `observer_response`; innovation rad/s: that of the law's observer; effectiveness: what the law
+    assumes of the main surface; moment rad/s2: G u of a healthy main surface.
     """
     sums, fading, dt = memory.sums, config.fading, config.dt
     L_rate, L_disturbance = memory.L_rate[i], memory.L_disturbance[i]
     assumed = (effectiveness - 1.0) * moment
     psi = observer_response(memory.healthy, i, moment, L_rate, L_disturbance, dt)
     e = innovation + observer_response(memory.assumed, i, assumed, L_rate, L_disturbance, dt)
-    sums.product[i] += psi * e - fading * sums.product[i]
-    sums.square[i] += psi * psi - fading * sums.square[i]
-    sums.innovation[i] += e * e - fading * sums.innovation[i]
-    sums.frames[i] += 1.0 - fading * sums.frames[i]
+    for total, term in (
+        (sums.product, psi * e),
+        (sums.square, psi * psi),
+        (sums.innovation, e * e),
+        (sums.frames, 1.0),
+    ):
+        total[i] += term - fading * total[i]
+
+
+@kernel
+def is_doubtful(assessment, sums, layout, s, target, least):
+    """Whether surface s, which is named, may be of no use: another surface can take its place; or the
+    observer does not see it act either, and its type is open or its effectiveness `target` below `least`."""
+    if is_replaced(layout, s):
+        return True
+    is_open = assessment.diagnoses_all_types and assessment.accommodation_mode[s] < 0
+    return (is_open or target < least) and not is_effective(sums, layout.main, s, least)
+
+
+@kernel
+def withdraw(memory, layout, s, saturated, suspected, dt):
+    """Withdraw surface s if it is suspected of a fault and has stood at its stop for a while.
+
+    Such a surface does not follow its command, and at its stop the command does not show why: jams, offsets
+    and losses look alike. In trim the reason shows. So a surface that another one replaces is tried again.
+    T, s: at_stop_s, the time at the stop; t, s: out_of_use_s, the time in trim since it was withdrawn.
+
+        state       condition                               T                      t          next state
+        any         not suspected                           0                      0          in use
+        withdrawn   t > RETRY_S, another takes its place    0                      0          in use
+        withdrawn   otherwise                               0                      t + dt     withdrawn
+        in use      not saturated                           max(T + dt - k dt, 0)  0          in use
+        in use      saturated, T > patience                 0                      0          withdrawn
+        in use      saturated, otherwise                    T + dt                 0          in use
+
+    T, t in a condition count this frame. patience: PATIENCE_S if another surface takes its place, else
+    LONG_PATIENCE_S. k: STOP_RECOVERY.
+    """
+    T, t = memory.at_stop_s, memory.out_of_use_s
+    if not suspected:
+        memory.withdrawn[s], T[s], t[s] = 0, 0.0, 0.0
+    elif memory.withdrawn[s]:
+        t[s] += dt
+        if t[s] > RETRY_S and is_replaced(layout, s):
+            memory.withdrawn[s], t[s] = 0, 0.0
+    else:
+        T[s] += dt
+        if not saturated:
+            T[s] = max(T[s] - STOP_RECOVERY * dt, 0.0)
+        elif T[s] > (PATIENCE_S if is_replaced(layout, s) else LONG_PATIENCE_S):
+            memory.withdrawn[s], T[s] = 1, 0.0

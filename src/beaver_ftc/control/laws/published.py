@@ -43,7 +43,7 @@ def command_by(law, fhat, control, assessment, faults, prediction, measured, mod
     axes, reference = control.axes, control.reference
     laws.prepare(control, assessment, prediction, mode, t)
     demand(law, axes, reference.output, measured.x, prediction.f, fhat)
-    laws.command_surfaces(control, assessment, faults, prediction, False)
+    laws.command_surfaces(control, assessment, faults, prediction, laws.WITHOUT_OBSERVER)
     integrate(law, axes, reference, control.allocation.output.command, measured.x)
     laws.complete(control, assessment, measured, t)
 

@@ -2,13 +2,16 @@
 
     xm'' = wn^2 (ref - xm) - 2 zeta wn xm'
 
-Second order, so that xm' needs no differentiation; discretised exactly for a reference held over the
-frame.
+The model is of second order, so that xm' needs no differentiation. It is discretised exactly for a reference
+that is held over the frame.
 
-Once authority is lost, the reference is governed, in two ways. It is hedged [Johnson2000]: what was demanded
-and could not be given is subtracted from the model's acceleration, so that model and integrator wait for the
-aircraft instead of winding up. And it is scaled: to follow only the half of a swing that is within reach
-would ratchet the attitude, so what is missed on one side is asked for on neither.
+Once authority is lost, the reference is governed, in two ways:
+
+- It is hedged [Johnson2000]: the acceleration that was demanded and not given is subtracted from the model's,
+  that is, dt shortfall from xm. So the model and the law's integrator wait for the aircraft instead of
+  winding up.
+- It is scaled: if only one half of a swing is within reach, the attitude would drift with every swing. So the
+  commanded rate is scaled down in both directions.
 """
 
 import numpy as np
@@ -16,14 +19,16 @@ import numpy as np
 from beaver_ftc.compiled import fill, kernel, record
 from beaver_ftc.scenario.diagnosis import ControlConfig
 
-MISSED_RAD_S = 0.1  # a rate missed in all by this much: the reference is given up
-RECOVERY_S = 30.0  # and asked for again within this time: several periods of a slow reference
+MISSED_RAD_S = 0.1  # integral of the shortfall that brings the scale from 1 to 0
+RECOVERY_S = 30.0  # time constant with which the scale returns to 1: several periods of a slow reference
 
-# The model A, B over dt s; steered: whether outer loops ask for the rates.
+# A (2, 2), B (2,): the model over a frame of dt s; steered: whether outer loops command the rates.
 REFERENCE_CONFIG = record(dt=float, A=(2, 2), B=2, steered=int)
-# active: whether the reference is governed, from the first loss of authority on; scale: of what is commanded.
+# active: whether the reference is governed, from the first loss of authority on; scale (3,): factor of the
+# commanded rate, 0 to 1.
 GOVERNOR = record(active=int, scale=3)
-# The commanded rate, the model's answer to it and the governed one that the law follows: rad/s, rad/s2.
+# Rates (3,) rad/s and accelerations (3,) rad/s2: the commanded rate, the model's answer to it (xm, xm'), and
+# the governed answer, which the law follows.
 REFERENCE_OUTPUT = record(
     commanded_rate=3, model_rate=3, model_acceleration=3, governed_rate=3, governed_acceleration=3
 )
@@ -60,30 +65,33 @@ def advance(config, rate, acceleration, wanted):
     (xm, xm') <- A (xm, xm') + B ref
     """
     A, B = config.A, config.B
-    following = A[0, 0] * rate + A[0, 1] * acceleration + B[0] * wanted
-    return following, A[1, 0] * rate + A[1, 1] * acceleration + B[1] * wanted
+    return (
+        A[0, 0] * rate + A[0, 1] * acceleration + B[0] * wanted,
+        A[1, 0] * rate + A[1, 1] * acceleration + B[1] * wanted,
+    )
 
 
 @kernel
 def follow(config, output, commanded):
-    """Advance the model by one frame towards `commanded` (3,) rad/s."""
+    """Advance the model, xm and xm' (3,), by one frame towards `commanded` (3,) rad/s."""
     output.commanded_rate[:] = commanded
+    xm, dxm = output.model_rate, output.model_acceleration
     for i in range(3):
-        rate, acceleration = output.model_rate[i], output.model_acceleration[i]
-        rate, acceleration = advance(config, rate, acceleration, commanded[i])
-        output.model_rate[i], output.model_acceleration[i] = rate, acceleration
+        xm[i], dxm[i] = advance(config, xm[i], dxm[i], commanded[i])
 
 
 @kernel
 def govern(reference, commanded, shortfall, authority_lost):
-    """Bring what the law follows, xm and xm', to the next frame: the model's, until the reference is
-    governed, then
+    """Bring what the law follows, xm and xm' (3,), to the next frame: those of the model, until the reference
+    is governed, then
 
-        scale <- scale - dt |shortfall| / MISSED_RAD_S,    then scale + dt / RECOVERY_S (1 - scale), 0 or more
+        scale <- scale - dt |shortfall| / MISSED_RAD_S
+        scale <- max(scale + dt / RECOVERY_S (1 - scale), 0)
         (xm, xm') <- A (xm, xm') + B scale commanded,    xm <- xm - dt shortfall
 
-    commanded (3,) rad/s; shortfall (3,) rad/s2: what was demanded and not given. authority_lost: whether a
-    surface is slow or parked now: from then on the reference is governed.
+    The scale stays while outer loops steer, since they ask again for what was missed. commanded (3,) rad/s;
+    shortfall (3,) rad/s2: what was demanded and not given. authority_lost: whether a surface is slow or
+    parked now; from then on the reference is governed.
     """
     config, governor, output = reference.config, reference.memory, reference.output
     if authority_lost:
@@ -92,12 +100,10 @@ def govern(reference, commanded, shortfall, authority_lost):
         output.governed_rate[:] = output.model_rate
         output.governed_acceleration[:] = output.model_acceleration
         return
-    dt = config.dt
+    dt, xm, dxm = config.dt, output.governed_rate, output.governed_acceleration
     for i in range(3):
-        scale = governor.scale[i] - dt * abs(shortfall[i]) / MISSED_RAD_S
-        if not config.steered:  # where outer loops steer, they ask again for what was missed
+        if not config.steered:
+            scale = governor.scale[i] - dt * abs(shortfall[i]) / MISSED_RAD_S
             governor.scale[i] = max(scale + dt / RECOVERY_S * (1.0 - scale), 0.0)
-        rate, acceleration = output.governed_rate[i], output.governed_acceleration[i]
-        rate, acceleration = advance(config, rate, acceleration, governor.scale[i] * commanded[i])
-        output.governed_rate[i] = rate - dt * shortfall[i]
-        output.governed_acceleration[i] = acceleration
+        xm[i], dxm[i] = advance(config, xm[i], dxm[i], governor.scale[i] * commanded[i])
+        xm[i] -= dt * shortfall[i]

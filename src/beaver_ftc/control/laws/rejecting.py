@@ -11,15 +11,15 @@
     w_o, Kp       1/s             bandwidth of the observer, feedback
 
 d is what the model does not explain: rotation of the air, wrong coefficients, a fault that is not named
-yet. u is where the actuators are, not their command, so that neither their lag nor their stops count as a
-disturbance: there is nothing that could wind up. The command acts one JSBSim frame from now, and xm is taken
-there too.
+yet. u is where the actuators are, not their command. So neither their lag nor their stops count as a
+disturbance, and nothing can wind up. The command acts one JSBSim frame from now, and xm is taken at that
+instant too.
 
-Gains. Kp = s and w_o = RATIO s of a loop: loop_design.py derives s from what is declared.
+Gains. A loop has Kp = s and w_o = RATIO s; loop_design.py derives s, 1/s, from what is declared.
 
-Effectiveness of a surface at fault: the diagnosis' estimate, or what the observer's innovation shows of it if
-that is larger (evidence.py). Once no known fault fits, the law estimates all surfaces at once
-(effectiveness_estimator.py).
+Effectiveness of a surface at fault. The law takes the diagnosis' estimate, or that from the observer's
+innovation if it is larger, and withdraws a surface that stays at its stop (evidence.py). Once no known fault
+fits, the law estimates all surfaces at once (effectiveness_estimator.py).
 """
 
 from math import exp, sqrt
@@ -40,10 +40,12 @@ from beaver_ftc.control.laws.effectiveness_estimator import (
 from beaver_ftc.control.laws.evidence import (
     SUMS,
     accumulate,
-    clamp_to_observer_estimate,
     derive_fading,
-    is_effective,
+    is_doubtful,
     is_replaced,
+    larger_estimate,
+    restart_at_naming,
+    withdraw,
 )
 from beaver_ftc.control.laws.loop_design import Loop, corrections, fastest, lead_of
 from beaver_ftc.control.laws.reference import advance
@@ -57,56 +59,57 @@ from beaver_ftc.diagnosis.types import GIVE_UP
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.sensors import RateGyro
 
-N_POINTS = 5  # of the schedule over dynamic pressure
+N_POINTS = 5  # points of the schedule over dynamic pressure
 N_LOOPS = 4  # rows of the tables of gains: roll, pitch, yaw, and pitch by the surface that stands in
 STAND_IN = 3  # the last of these rows
-# How long a suspected surface stands at its stop until it is given up
-PATIENCE_S = 0.5  # if another replaces it
-LONG_PATIENCE_S = 1.0  # otherwise
-RETRY_S = 20.0  # after which it is tried again
-# Frames subtracted from the time at the stop in a frame off it, which itself adds one: a command that swings
-# leaves the stop only briefly
-STOP_RECOVERY = 1.5
 
 
 def configure(law: np.void, control: np.void, prediction: np.void, declared: Declared, y: np.ndarray) -> None:
-    """Derive the leads, and the gains of each loop at each point of the schedule (control.CompiledLaw).
+    """Fill the leads, and the gains of each loop at each point of the schedule (control.CompiledLaw).
 
-    y (n_y,): the measured signals in trim. A gyro's noise may move a surface at this share of its rate limit:
-
-        noise_share sqrt(D / D_max)        D: own damping of the axis, 1/s; D_max: of the most damped
+    y (n_y,): the signals measured in trim. A loop is an axis and the surface s that moves it. Each surface
+    goes the share `approach` of the way to its command in a frame.
     """
-    config = law["config"]
-    wanted = declared.control
-    layout = control["layout"]
-    design = prediction["design"]
-    dt = 1.0 / declared.rate_hz
-    share = 1.0 / declared.substeps
+    config, layout, design = law["config"], control["layout"], prediction["design"]
+    dt, share = 1.0 / declared.rate_hz, 1.0 / declared.substeps
     points = schedule_points(declared, y)
-    G = [control_effectiveness(design, point) for point in points]
-    way = 1.0 - (1.0 - prediction["actuators"]["approach"]) ** declared.substeps  # of a frame
-    lead = [lead_of(float(part)) for part in way]
+    G = np.array([control_effectiveness(design, point) for point in points])
+    approach = 1.0 - (1.0 - prediction["actuators"]["approach"]) ** declared.substeps
+    lead = [lead_of(float(of_surface)) for of_surface in approach]
     fill(config, dt=dt, share=share, qdyn=points[:, QDYN], fading=derive_fading(dt), lead=lead)
     loops = list(enumerate(layout["main"].tolist()))
     if layout["stand_in"] >= 0:
         loops.append((PITCH, int(layout["stand_in"])))
-    D = np.abs(own_damping(design, y))
-    part = {s: sqrt(D[axis] / D.max()) for axis, s in loops}  # one that leads two axes has that of the latter
-    limits_rad_s = servo_data(declared)["rate_limit_rad_s"]
-    margin = wanted.gain_margin_db, wanted.phase_margin_deg
+    speed_rad_s = allowed_speeds(declared, loops, np.abs(own_damping(design, y)))
+    margin = declared.control.gain_margin_db, declared.control.phase_margin_deg
     for row, (axis, s) in enumerate(loops):
         gyro: RateGyro = getattr(declared.instruments, AXES[axis])
         keep = exp(-gyro.bandwidth_rad_s * dt) if gyro.bandwidth_rad_s else 0.0
-        loop = Loop(dt, share, float(way[s]), config["lead"][s], gyro.delay_s, keep)
-        speed_rad_s = wanted.noise_share * part[s] * float(limits_rad_s[s] or DEFAULT_RATE_RAD_S)
+        loop = Loop(dt, share, float(approach[s]), config["lead"][s], gyro.delay_s, keep)
         for j in range(N_POINTS):
-            Kp = fastest(loop, margin, gyro.random_error, float(G[j][axis, s]), speed_rad_s)
+            Kp = fastest(loop, margin, gyro.random_error, float(G[j, axis, s]), speed_rad_s[s])
             config["Kp_at"][row, j] = Kp
             config["L_rate_at"][row, j], config["L_disturbance_at"][row, j] = corrections(Kp, dt)
 
 
+def allowed_speeds(declared: Declared, loops: list[tuple[int, int]], D: np.ndarray) -> dict[int, float]:
+    """The speed, rad/s, at which a gyro's noise may move the surface s of each loop (axis, s):
+
+        noise_share sqrt(D_axis / D_max) rate limit        D (3,) 1/s: own damping of the axes; D_max: largest
+
+    A surface that leads two axes has the speed of the second one.
+    """
+    limits_rad_s = servo_data(declared)["rate_limit_rad_s"]
+    return {
+        s: declared.control.noise_share
+        * sqrt(D[axis] / D.max())
+        * float(limits_rad_s[s] or DEFAULT_RATE_RAD_S)
+        for axis, s in loops
+    }
+
+
 def schedule_points(declared: Declared, y: np.ndarray) -> np.ndarray:
-    """The signals at the points of the schedule, (N_POINTS, n_y): those in trim, y (n_y,), but for airspeed V
+    """The signals at the points of the schedule, (N_POINTS, n_y): those in trim, y (n_y,), except airspeed V
     m/s, which spans the envelope, and dynamic pressure, Pa, which goes with V^2."""
     points = np.tile(y, (N_POINTS, 1))
     points[:, AIRSPEED] = V = np.linspace(*declared.aircraft.envelope.airspeed_mps, N_POINTS)
@@ -114,16 +117,17 @@ def schedule_points(declared: Declared, y: np.ndarray) -> np.ndarray:
     return points
 
 
-# begun: whether rate (3,) rad/s and disturbance (3,) rad/s2 are estimates; a change of law keeps it.
+# xhat and d: rate (3,) rad/s, disturbance (3,) rad/s2. begun: whether they are estimates yet. A change of law
+# keeps this record.
 OBSERVER = record(begun=int, rate=3, disturbance=3)
 
 
 @sized
 def config_dtype(n: int) -> np.dtype:
-    """qdyn (N_POINTS,) Pa: the schedule's points, ascending. Kp_at 1/s, L_rate_at 1, L_disturbance_at 1/s
-    (N_LOOPS, N_POINTS): feedback, and the observer's gains. share: of a frame until a command acts. lead
-    (n,): command beyond the actuator's position over what is wanted beyond it. fading: share of SUMS that
-    goes in a frame."""
+    """dt s: length of a frame. share: part of a frame that passes until a command acts. qdyn (N_POINTS,) Pa:
+    the schedule's points, ascending. Kp_at 1/s, L_rate_at 1, L_disturbance_at 1/s (N_LOOPS, N_POINTS): gains
+    of feedback and observer. lead (n,): command beyond the actuator's position over what is wanted beyond it.
+    fading: share of SUMS that is forgotten in a frame."""
     table = (N_LOOPS, N_POINTS)
     return record(
         dt=float, share=float, fading=float, qdyn=N_POINTS, Kp_at=table, L_rate_at=table,
@@ -133,12 +137,13 @@ def config_dtype(n: int) -> np.dtype:
 
 @sized
 def memory_dtype(n: int) -> np.dtype:
-    """Kp, L_rate, L_disturbance (3,): the gains of this frame. ahead (3,) rad/s: the rate when the command
-    acts. innovation (3,) rad/s. at_stop_s, withdrawn (n,): see `withdraw`. healthy, assumed: the observer's
-    errors for the moments of healthy main surfaces and for those that the law assumes."""
+    """Kp, L_rate, L_disturbance (3,): the gains of this frame. ahead (3,) rad/s: x+. innovation (3,) rad/s:
+    e. at_stop_s, out_of_use_s, withdrawn (n,): see `withdraw`. healthy, assumed: answers of the observer to
+    the moments of healthy main surfaces, and to what the law assumes less of them; sums: see `accumulate`."""
     return record(
-        Kp=3, L_rate=3, L_disturbance=3, ahead=3, innovation=3, at_stop_s=n, withdrawn=(int, n),
-        healthy=OBSERVER_ERROR, assumed=OBSERVER_ERROR, sums=SUMS, estimator=estimator_dtype(n),
+        Kp=3, L_rate=3, L_disturbance=3, ahead=3, innovation=3, at_stop_s=n, out_of_use_s=n,
+        withdrawn=(int, n), healthy=OBSERVER_ERROR, assumed=OBSERVER_ERROR, sums=SUMS,
+        estimator=estimator_dtype(n),
     )  # fmt: skip
 
 
@@ -152,8 +157,12 @@ def rejecting_dtype(n: int) -> np.dtype:
 def accommodate(control, assessment, faults, prediction, measured):
     """Bring the effectiveness of all surfaces to this frame (control.CompiledLaw).
 
-    It is the diagnosis' estimate; where the law is not informed of the truth, also what its observer sees by
-    sound sensors.
+    A law that is informed takes the truth. Otherwise the target is the diagnosis' estimate, except that
+
+    - the estimator gives it once no known fault fits (`no_target`);
+    - for a loss of a surface that leads an axis and that no other replaces, the observer's estimate is taken
+      if it is larger (`larger_estimate`), unless the diagnosis gives the surface up or holds its estimates;
+    - a surface that is withdrawn is given up.
     """
     if control.config.informed:
         accommodation.accommodate(control, assessment, faults, prediction, measured)
@@ -170,7 +179,10 @@ def accommodate(control, assessment, faults, prediction, measured):
         if assessment.no_target and memory.estimator.active:
             target = effectiveness_of(memory.estimator, s)
         elif assessment.accommodation_mode[s] != GIVE_UP and not assessment.held:
-            target = clamp_to_observer_estimate(memory.sums, layout, s, target, least)
+            for i in range(3):
+                if s == layout.main[i] and target < 1.0 and not is_replaced(layout, s):
+                    restart_at_naming(memory.sums, i)
+                    target = larger_estimate(memory.sums, target, i, least)
         named = assessment.detected and s == assessment.isolated_surface
         suspected = named and is_doubtful(assessment, memory.sums, layout, s, target, least)
         withdraw(memory, layout, s, control.allocation.output.saturated[s], suspected, dt)
@@ -185,17 +197,18 @@ def command(control, assessment, faults, prediction, measured, mode, t):
     """From what is measured to the command of each surface (control.CompiledLaw)."""
     laws.prepare(control, assessment, prediction, mode, t)
     demand(control, prediction, measured)
-    laws.command_surfaces(control, assessment, faults, prediction, True)
+    laws.command_surfaces(control, assessment, faults, prediction, laws.WITH_OBSERVER)
     laws.complete(control, assessment, measured, t)
-    lead = control.rejecting.config.lead
-    allocation.lead_compensate(control.allocation.output, control.layout, lead, prediction.u)
+    config = control.rejecting.config
+    allocation.lead_compensate(control.allocation.output, control.layout, config.lead, prediction.u)
 
 
 @kernel
 def schedule(config, memory, qdyn, transfer_share):
-    """Fill the gains at a dynamic pressure qdyn, Pa; beyond the schedule those at its end.
+    """Fill the gains (3,) of the axes at a dynamic pressure qdyn, Pa; beyond the schedule, take those at its
+    end. In pitch
 
-        gains_q <- gains_q + transfer_share (gains of the stand-in - gains_q)        in pitch
+        gain <- gain + transfer_share (gain of the stand-in - gain)
 
     transfer_share: the part of pitch that the stand-in carries.
     """
@@ -212,52 +225,9 @@ def schedule(config, memory, qdyn, transfer_share):
 
 
 @kernel
-def is_doubtful(assessment, sums, layout, s, target, least):
-    """Whether surface s, which is named, may be of no use: another can take its place, or its type is open or
-    its effectiveness `target` below `least`, and the observer does not see it act either."""
-    if is_replaced(layout, s):
-        return True
-    is_open = assessment.diagnoses_all_types and assessment.accommodation_mode[s] < 0
-    useless = is_open or target < least
-    return useless and not is_effective(sums, layout.main, s, least)
-
-
-@kernel
-def withdraw(memory, layout, s, saturated, suspected, dt):
-    """Give up surface s if it is suspected of a fault and has stood at its stop for a while.
-
-    It does not follow its command, and at its stop the command shows nothing of the reason: jams, offsets and
-    losses look alike. In trim the reason shows; where another surface takes its place, it is tried again.
-    T: at_stop_s, the time at the stop, or in trim since it was given up, s.
-
-        state       condition                               T                           next state
-        any         not suspected                           0                           in use
-        withdrawn   T > RETRY_S, another takes its place    0                           in use
-        withdrawn   otherwise                               T + dt                      withdrawn
-        in use      not saturated                           max(T + dt - k dt, 0)       in use
-        in use      saturated, T > patience                 0                           withdrawn
-        in use      saturated, otherwise                    T + dt                      in use
-
-    T in a condition counts this frame. patience: PATIENCE_S if another surface takes its place, else
-    LONG_PATIENCE_S. k: STOP_RECOVERY.
-    """
-    memory.at_stop_s[s] += dt
-    retries = memory.withdrawn[s] and memory.at_stop_s[s] > RETRY_S and is_replaced(layout, s)
-    if retries or not suspected:
-        memory.withdrawn[s] = 0
-        memory.at_stop_s[s] = 0.0
-    elif memory.withdrawn[s]:
-        return
-    elif not saturated:
-        memory.at_stop_s[s] = max(memory.at_stop_s[s] - STOP_RECOVERY * dt, 0.0)
-    elif memory.at_stop_s[s] > (PATIENCE_S if is_replaced(layout, s) else LONG_PATIENCE_S):
-        memory.withdrawn[s] = 1
-        memory.at_stop_s[s] = 0.0
-
-
-@kernel
 def start_or_end_estimator(memory, layout, detected, dt):
-    """From the alarm on estimate which surfaces act, where more move than lead an axis or stand in."""
+    """Let the estimator be active from the alarm on, if more surfaces move than lead an axis or stand in. Its
+    noise model is that of the innovation up to the alarm."""
     if not (detected and layout.general and memory.estimator.found.size > 1):
         memory.estimator.active = 0
     elif not memory.estimator.active:
@@ -265,29 +235,30 @@ def start_or_end_estimator(memory, layout, detected, dt):
 
 
 @kernel
-def explained(surfaces, i, design, moments, G):
+def explained(output, i, design, moments, G):
     """Acceleration of axis i that the law assumes, f + G u with the faults in it, rad/s2:
 
         design_i + sum_s (effectiveness_s - 1) moments_is + G_is offset_s
 
-    design (3,): f + G u of healthy surfaces; moments (3, n): of each, G u, rad/s2; surfaces: the output of
-    accommodation.py.
+    design (3,): f + G u of healthy surfaces; moments (3, n): of each, G u, rad/s2; output: that of
+    accommodation.py, with effectiveness and offset (n,) rad.
     """
     total = design[i]
     for s in range(G.shape[1]):
-        total += (surfaces.effectiveness[s] - 1.0) * moments[i, s] + G[i, s] * surfaces.offset[s]
+        total += (output.effectiveness[s] - 1.0) * moments[i, s] + G[i, s] * output.offset[s]
     return total
 
 
 @kernel
-def observe(law, surfaces, main, x, design, moments, G):
+def observe(law, output, main, x, design, moments, G):
     """Bring the observer's rate xhat (3,) rad/s and disturbance d (3,) rad/s2 to this frame:
 
         xhat <- xhat + dt (f + G u + d),    e = x - xhat
         xhat <- xhat + L_rate e,    d <- d + L_disturbance e        L: `loop_design.corrections`
 
-    x (3,) rad/s: measured; e: the innovation, rad/s. f + G u is `explained`, a mean over the elapsed frame,
-    as are design (3,), moments (3, n) and G (3, n), which give it.
+    x (3,) rad/s: measured; e: the innovation, rad/s, which also enters the sums of evidence.py. f + G u is
+    `explained`, a mean over the elapsed frame, as are design (3,), moments (3, n) and G (3, n); output: that
+    of accommodation.py.
     """
     observer, memory = law.observer, law.memory
     xhat, d = observer.rate, observer.disturbance
@@ -296,34 +267,35 @@ def observe(law, surfaces, main, x, design, moments, G):
         xhat[:] = x
         return
     for i in range(3):
-        xhat[i] += law.config.dt * (explained(surfaces, i, design, moments, G) + d[i])
+        xhat[i] += law.config.dt * (explained(output, i, design, moments, G) + d[i])
         e = memory.innovation[i] = x[i] - xhat[i]
-        accumulate(law.config, memory, i, surfaces.effectiveness[main[i]], moments[i, main[i]], e)
+        accumulate(law.config, memory, i, output.effectiveness[main[i]], moments[i, main[i]], e)
         xhat[i] += memory.L_rate[i] * e
         d[i] += memory.L_disturbance[i] * e
 
 
 @kernel
 def demand(control, prediction, measured):
-    """Fill the law's demand G u_c, hold and disturbance d of the axes, (3,) rad/s2:
+    """Bring gains, observer and estimator to this frame; fill the law's demand G u_c, hold and disturbance d
+    of the axes, (3,) rad/s2:
 
         demand = xm' + Kp (xm - x+) - f - d,    hold = -f - d
 
-    xm: `target`, of the instant at which the command acts; xm' = (after - target) / dt, `after` a frame
-    later; x+: `memory.ahead`.
+    xm: `target`, at the instant from which the command acts; xm' = (after - target) / dt, with xm a frame
+    later, `after`; x+: `memory.ahead`.
     """
-    law, surfaces = control.rejecting, control.surfaces.output
+    law, output = control.rejecting, control.surfaces.output
     config, memory, means = law.config, law.memory, prediction.means
     schedule(config, memory, measured.y[QDYN], control.allocation.output.transfer_share)
-    observe(law, surfaces, control.layout.main, measured.x, means.F, means.Gu, means.G)
+    observe(law, output, control.layout.main, measured.x, means.F, means.Gu, means.G)
     if memory.estimator.active:
         estimate(
             memory.estimator, memory.innovation, memory.L_rate, memory.L_disturbance, config.dt, measured.x,
-            measured.y, surfaces.effectiveness, means.Gu,
+            measured.y, output.effectiveness, means.Gu,
         )  # fmt: skip
     for i in range(3):
         d = law.observer.disturbance[i]
-        look_ahead(law, surfaces, i, prediction.f, prediction.G, prediction.u)
+        look_ahead(law, output, i, prediction.f, prediction.G, prediction.u)
         target, after = targets(control.reference, i, config.share)
         feedback = memory.Kp[i] * (target - memory.ahead[i])
         hold = -prediction.f[i] - d
@@ -331,23 +303,23 @@ def demand(control, prediction, measured):
 
 
 @kernel
-def look_ahead(law, surfaces, i, f, G, u):
-    """Fill x+ of axis i, the rate when the command acts, rad/s, `share` of a frame from now:
+def look_ahead(law, output, i, f, G, u):
+    """Fill x+ of axis i, rad/s, the rate when the command acts, a `share` of a frame from now:
 
         x+ = xhat + share dt (f + d + sum_s G_is (effectiveness_s u_s + offset_s))
 
-    f (3,), G (3, n), u (n,) rad: of this instant; surfaces: the output of accommodation.py.
+    f (3,) rad/s2, G (3, n) rad/s2 per rad, u (n,) rad: of this instant; output: that of accommodation.py.
     """
     now = f[i] + law.observer.disturbance[i]
     for s in range(u.size):
-        now += G[i, s] * (surfaces.effectiveness[s] * u[s] + surfaces.offset[s])
+        now += G[i, s] * (output.effectiveness[s] * u[s] + output.offset[s])
     law.memory.ahead[i] = law.observer.rate[i] + law.config.share * law.config.dt * now
 
 
 @kernel
 def targets(reference, i, share):
-    """The reference of axis i, rad/s, when the command acts, `share` of a frame from now, and a frame later:
-    between the frames linear."""
+    """xm of axis i, rad/s, when the command acts, a `share` of a frame from now, and a frame later. Between
+    two frames xm is taken as linear."""
     config, output = reference.config, reference.output
     rate, acceleration = output.governed_rate[i], output.governed_acceleration[i]
     wanted = reference.memory.scale[i] * output.commanded_rate[i]

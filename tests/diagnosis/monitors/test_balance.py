@@ -28,7 +28,7 @@ def aircraft(signals, knows_engines=True):
 def test_a_monitor_of_engines_reads_their_signals_where_the_aircraft_has_them(signals, thrust, turning):
     """y has alpha, beta, airspeed and dynamic pressure first."""
     config = np.zeros(1, engine_monitor.ENGINE_MONITOR_RECORD)[0]["config"]
-    engine_monitor.configure_balance(config, aircraft(signals))
+    engine_monitor.configure_engine_monitor(config, aircraft(signals))
     assert config.tolist() == pytest.approx((3, thrust, turning, -0.95 / 12.0, 0.05 / 12.0))
 
 
@@ -39,7 +39,7 @@ def test_a_monitor_of_engines_reads_their_signals_where_the_aircraft_has_them(si
 )  # fmt: skip
 def test_where_the_symmetry_of_engines_is_not_measured_nothing_is_monitored(signals, knows_engines):
     config = np.zeros(1, engine_monitor.ENGINE_MONITOR_RECORD)[0]["config"]
-    engine_monitor.configure_balance(config, aircraft(signals, knows_engines))
+    engine_monitor.configure_engine_monitor(config, aircraft(signals, knows_engines))
     assert not any(config.tolist())
 
 

@@ -24,11 +24,11 @@ from beaver_ftc.compiled import fill, kernel, record
 from beaver_ftc.design.table import DPT
 
 THRUST_SIGNAL, YAW_SIGNAL = "thrust", "engines_n"  # signals: CT and Cn
-MAX_OFFSET_M = 0.05  # of the centre of gravity to one side, by fuel
+MAX_OFFSET_M = 0.05  # largest distance of the centre of gravity from the plane of symmetry, by fuel
 
 # n_engines: number of engines, 0 if they are not monitored. i_T, i_n: places of CT and Cn in y.
-# yaw_per_thrust: a, as the function of this name returns it. slack: MAX_OFFSET_M / b. levers_apart: a law has
-# moved one lever away from the others.
+# yaw_per_thrust: a, as the function of this name returns it. slack: MAX_OFFSET_M / b. levers_apart: whether a
+# law has moved one lever away from the others. engine_failed: whether an engine has failed; it stays set.
 ENGINE_MONITOR_RECORD = record(
     config=record(n_engines=int, i_T=int, i_n=int, yaw_per_thrust=float, slack=float),
     memory=record(levers_apart=int), output=record(engine_failed=int),
@@ -41,7 +41,7 @@ def yaw_per_thrust(aircraft: Aircraft) -> float:
     return -moment / aircraft.geometry.span_m
 
 
-def configure_balance(config: np.void, aircraft: Aircraft) -> None:
+def configure_engine_monitor(config: np.void, aircraft: Aircraft) -> None:
     """Fill `config` of the record; it stays empty where the symmetry of the engines is not measured."""
     error_map, signals = aircraft.file.model_error_map, list(aircraft.signals)
     if error_map is None or not error_map.knows_engines or not {THRUST_SIGNAL, YAW_SIGNAL} <= set(signals):
@@ -63,8 +63,11 @@ def disable_if_apart(mon, levers):
 
 @kernel
 def detect_engine_failure(mon, asymmetry, y):
-    """Whether an engine has failed, by the signals y of this frame or of one before; asymmetry: `bound` in
-    the box of the map where the aircraft is.
+    """Latch `engine_failed` if the signals y (n_y,) of this frame exceed the limit, and return it:
+
+        |Cn - a CT| > asymmetry + slack |CT|
+
+    asymmetry: `bound` in the box of the map where the aircraft is.
     """
     c = mon.config
     if c.n_engines > 0 and not mon.memory.levers_apart:

@@ -58,10 +58,10 @@ class ConstantThresholdObserver(RivalDetector):
         """No residual."""
         pole, context = self.options["pole_per_s"], self.context
         self.a = exp(-pole * self.dt)
-        self.threshold = np.maximum(context.constant_rad_s2, _LEAST_BOUND_RAD_S2) / pole
+        level = np.maximum(context.constant_rad_s2, _LEAST_BOUND_RAD_S2) / pole
         if context.declared.errors:
-            self.threshold = healthy_residual_std(context, self.a)
-        self.threshold = self.options["alarm"] * self.threshold
+            level = healthy_residual_std(context, self.a)
+        self.threshold = self.options["alarm"] * level
         self.fade = exp(-self.dt / self.options["window_s"])
         self.filtered, self.sums, self.weight = np.zeros((3, 5)), np.zeros((4, 4)), 0.0
         self.previous: np.ndarray | None = None

@@ -5,9 +5,9 @@ prediction is compared with the errors before, and the alarm is a score z = (err
 beyond a limit [Keipour2019]. The pair that raises the alarm is what is isolated. Departures: two past
 samples of input and output instead of a longer window; mean and deviation fade exponentially.
 
-Learnt by recursive least squares with exponential forgetting [Ljung1999, sec. 11.2]:
+The model y = w' phi is learnt by recursive least squares with exponential forgetting [Ljung1999, sec. 11.2]:
 
-    K = P phi / (lam + phi' P phi),   w += K (y - w' phi),   P = (P - K phi' P) / lam
+    K = P phi / (lam + phi' P phi),   w <- w + K (y - w' phi),   P <- (P - K phi' P) / lam
 """
 
 from collections.abc import Mapping
@@ -21,10 +21,10 @@ from beaver_ftc.diagnosis.rivals.rival import RivalDetector
 
 
 class RecursiveLeastSquaresFit:
-    """y = w' phi, learnt sample by sample.
+    """The model y = w' phi, learnt sample by sample; w, phi (n,), P (n, n).
 
-    lam in (0, 1]: forgetting. prior: variance of the parameters at the start; it also bounds P, which would
-    otherwise grow without excitation.
+    lam: forgetting factor of a sample, in (0, 1]. prior: variance of the weights w at the start. It is also
+    the upper limit of the diagonal of P, which would otherwise grow without excitation.
     """
 
     def __init__(self, n: int, lam: float, prior: float) -> None:
@@ -32,7 +32,7 @@ class RecursiveLeastSquaresFit:
         self._lam, self._prior = lam, prior
 
     def step(self, phi: np.ndarray, y: float) -> float:
-        """Learn from one sample; returns the error of the prediction made before it."""
+        """Update w and P by one sample; return y - w' phi with the w before it, in the unit of y."""
         Pphi = self.P @ phi
         K = Pphi / (self._lam + phi @ Pphi)
         error = y - float(self.weights @ phi)
@@ -43,16 +43,25 @@ class RecursiveLeastSquaresFit:
 
 
 class InputOutputPredictionTest:
-    """Test of the prediction of one output by one input: y[k] from y[k-1], y[k-2], u[k-1], u[k-2] and a
-    constant. lam: forgetting of the model; fade: of mean and variance of its error; least: deviation."""
+    """Test of the prediction of one output by one input: y[k] from phi = (y[k-1], y[k-2], u[k-1], u[k-2], 1).
+
+    lam: forgetting factor of the model. fade: share of mean and variance that remains after a sample.
+    least: smallest standard deviation of the error, in the unit of y.
+    """
 
     def __init__(self, lam: float, fade: float, least: float) -> None:
-        self._model, self._fade, self._least = RecursiveLeastSquaresFit(5, lam, 1e4), fade, least
+        self._model = RecursiveLeastSquaresFit(5, lam, 1e4)
+        self._fade = fade
+        self._least = least
         self._phi = np.array([0.0, 0.0, 0.0, 0.0, 1.0])
         self.mean, self.variance = 0.0, 0.0
 
     def step(self, u: float, y: float) -> float:
-        """Return |z| of the newest output, then learn from it."""
+        """Return |z| of the output y, with mean m and variance v before it; then update the model, m and v:
+
+        |z| = |error - m| / sqrt(v + least^2)
+        m <- m + (1 - fade) (error - m),    v <- fade v + (1 - fade) (error - m)^2        with the new m
+        """
         error = self._model.step(self._phi, y)
         score = abs(error - self.mean) / sqrt(self.variance + self._least**2)
         self.mean += (1.0 - self._fade) * (error - self.mean)

@@ -72,7 +72,7 @@ def configure_diagnosis(fdi: np.void, pred: np.void, declared: Declared, travel:
     bounds.configure_bound(fdi["bound"], declared, pred["design"])
     filters.configure_bank(fdi["bank"], config, declared, dt)
     fdae.configure_fdae(fdi["fdae"], declared)
-    engine_monitor.configure_balance(fdi["engine_monitor"]["config"], aircraft)
+    engine_monitor.configure_engine_monitor(fdi["engine_monitor"]["config"], aircraft)
     if config.is_published:
         zhang2005.reconfigure(fdi, declared, travel)
     records.configure_types(fdi["types"], fdi["layout"], pred["actuators"], declared, travel)

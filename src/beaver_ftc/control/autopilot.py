@@ -109,15 +109,15 @@ AUTOPILOT = record(
 MOST_PATH_RAD = 0.15
 MOST_SIDESLIP_RAD = 0.14
 LEAST_COS_BANK = 0.1  # where the turn rate divides: 84 deg, beyond any bank that is asked for
-MOST_MISSING = 0.1  # rad of path angle, and times gravity of acceleration
-MOST_DRIFT_RAD_S = 0.1  # of turning that a bank without a turn stands for
-RECENT_AIRSPEED_S = 20.0  # over which the recent airspeed is averaged
+MOST_MISSING = 0.1  # largest M of the path angle, rad, and, times gravity, of the acceleration
+MOST_DRIFT_RAD_S = 0.1  # largest M of the turn rate: a bank that is held without a turn
+RECENT_AIRSPEED_S = 20.0  # time constant with which the recent airspeed is averaged
 MAX_FROM_RECENT_MPS = 3.0  # power alone can hold an airspeed within so much of the recent one
 CUT_INHG_S, RAISE_INHG_S = 8.0, 1.0  # about as fast as the engine follows; and slower than a gust lasts
 BANK_LOST_WITH_ROLL, BANK_LOST_WITH_YAW = 0.5, 0.2  # shares of the bank limit without ailerons, rudder
 KEPT_ASIDE = 0.15  # of the power's range at either end, for engines that alone yaw the aircraft
 LOOP_GAIN_SHARE_BY_POWER = 0.25  # of the loops of bank and heading where engines alone yaw the aircraft
-BY_POWER_S = 5.0  # since when that counts
+BY_POWER_S = 5.0  # time constant of the share of the time in which engines alone yaw the aircraft
 
 
 @kernel

@@ -34,9 +34,9 @@ from beaver_ftc.design.table import AIRSPEED, QDYN
 from beaver_ftc.diagnosis.state import PITCH, ROLL, YAW
 from beaver_ftc.scenario.declared import Declared
 
-ACTING_S = 4.0  # over which the balance is averaged: gusts pitch within a second
-HOLD_SETTLED_S = 0.5  # and before which nothing is concluded from it
-NOTED_MPS, NOTED_RAD = 0.5, 0.02  # a limit that takes so much is announced
+ACTING_S = 4.0  # time constant of the mean balance: gusts pitch within a second
+HOLD_SETTLED_S = 0.5  # time of averaging before which no airspeed is limited
+NOTED_MPS, NOTED_RAD = 0.5, 0.02  # A limit that changes the command by so much is in force.
 MOST_BANK_DEG = 30.0  # of a healthy aircraft
 # Of 0, 0.7, 1.5 and 3 deg kept of the flap at the end of the airspeeds that can be held, the one with which
 # most jams were kept; and how fast a limit moves the command: about as fast as drag slows the aircraft down.
@@ -72,13 +72,13 @@ def limit_airspeed_to_fly(autopilot, layout, surfaces, u, unexplained, y, t):
     """
     hold, e, f = autopilot.holding, layout.main[PITCH], layout.stand_in
     hold.fastest, hold.slowest = np.inf, 0.0
-    effectiveness, offset = surfaces.output.effectiveness, surfaces.output.offset
+    effectiveness = surfaces.output.effectiveness
     left = effectiveness[e]
     whole = left >= 1.0 and (f < 0 or effectiveness[f] >= 1.0)
     if whole or not hold.has_table:
         hold.n_averaged_frames = 0
     else:
-        average_acting_elevator(hold, autopilot.dt, offset[e], left * u[e], unexplained)
+        average_acting_elevator(hold, autopilot.dt, surfaces.output.offset[e], left * u[e], unexplained)
         if hold.n_averaged_frames * autopilot.dt > HOLD_SETTLED_S:
             find_airspeeds_that_can_be_held(hold, layout, surfaces, y)
     approach_airspeed_to_fly(autopilot)
@@ -117,24 +117,24 @@ def find_airspeeds_that_can_be_held(hold, layout, surfaces, y):
     if flap_left < surfaces.config.least_effectiveness:
         up = down = within_stops(layout, f, surfaces.output.offset[f])
     per_pa = 2.0 * y[QDYN] / y[AIRSPEED] ** 2
-    hold.fastest = np.sqrt(2.0 * dynamic_pressure_limit(hold, up, greatest, True) / per_pa)
-    hold.slowest = np.sqrt(2.0 * dynamic_pressure_limit(hold, down, least, False) / per_pa)
+    hold.fastest = np.sqrt(2.0 * dynamic_pressure_limit(hold, up, greatest, FASTEST) / per_pa)
+    hold.slowest = np.sqrt(2.0 * dynamic_pressure_limit(hold, down, least, SLOWEST) / per_pa)
 
 
 @kernel
-def dynamic_pressure_limit(hold, flap, elevator, highest):
-    """The highest (or lowest) dynamic pressure, Pa, of level flight with flap and elevator (rad): where the
-    elevator it takes is the one there is. Infinite (or zero) where the table does not bound it."""
+def dynamic_pressure_limit(hold, flap, elevator, limit):
+    """The highest (limit FASTEST) or lowest (SLOWEST) dynamic pressure, Pa, of level flight with this flap
+    and elevator, rad, by the table. Infinite or 0 if the table does not bound it."""
     before = between(flap, N_FLAP, hold.flap, row_of(hold.elevator, 0))
     if before > elevator:
-        return hold.qdyn[0] if highest else 0.0
+        return hold.qdyn[0] if limit == FASTEST else 0.0
     for j in range(1, N_QDYN):
         after = between(flap, N_FLAP, hold.flap, row_of(hold.elevator, j))
         if after > elevator:
             part = (elevator - before) / (after - before)
             return hold.qdyn[j - 1] + part * (hold.qdyn[j] - hold.qdyn[j - 1])
         before = after
-    return np.inf if highest else hold.qdyn[N_QDYN - 1]
+    return np.inf if limit == FASTEST else hold.qdyn[N_QDYN - 1]
 
 
 @kernel
@@ -145,8 +145,7 @@ def approach_airspeed_to_fly(autopilot):
     if wanted == command and not hold.limits_airspeed:
         autopilot.airspeed_to_fly, autopilot.airspeed_to_fly_rate = command, autopilot.command_rate[SPEED]
         return
-    most = hold.max_airspeed_rate_mps2 * autopilot.dt
-    step = clamp(wanted - autopilot.airspeed_to_fly, most)
+    step = clamp(wanted - autopilot.airspeed_to_fly, hold.max_airspeed_rate_mps2 * autopilot.dt)
     autopilot.airspeed_to_fly += step
     autopilot.airspeed_to_fly_rate = step / autopilot.dt
     hold.limits_airspeed = autopilot.airspeed_to_fly != command

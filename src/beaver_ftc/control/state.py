@@ -38,11 +38,12 @@ _COMMANDS = [of.command for of in FILES.values()]
 command = one_of(dict(enumerate(_COMMANDS[1:], 1)), _COMMANDS[0])
 
 
-# law: place of its file in FILES; what the law is given: see plugins.yaml.
+# law: place of its file in FILES. uses_verdict, reallocates, informed: what plugins.yaml says of the law.
 CONFIG = record(law=int, uses_verdict=int, reallocates=int, informed=int)
 
-# What a law takes over from the one before: how the reference stands, where the surfaces and the engine are;
-# and what is known of the surfaces, unless the one before knew it from the truth. All else restarts.
+# Records that a law takes over from the law before it. KEPT: the state of the reference, the positions of
+# surfaces and engine. KNOWN: what the law before found of the surfaces, unless it was informed of the truth.
+# All other records restart.
 KEPT = ("reference", "output"), ("allocation", "output"), ("probe", "memory"), ("power", "output")
 KNOWN = ("surfaces", "output"), ("power", "memory")
 

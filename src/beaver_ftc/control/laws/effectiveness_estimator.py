@@ -27,20 +27,22 @@ from beaver_ftc.design.table import ALPHA, BETA
 
 OBSERVER_ERROR = record(rate=3, disturbance=3)  # e and dd of one acceleration
 _SIGNALS = 5  # in y: alpha, beta, p, q, r
-_FEW = 4  # surfaces: of so few each leads an axis or stands in, and rejecting.py estimates one at a time
-_UNSURE = 0.5  # standard deviation of a surface's theta before anything is seen
-_AIRFRAME = np.array([30.0, 30.0, 3.0, 3.0, 3.0])  # of A, in the order of y: 1/s2 and 1/s
-_CORRELATED = 10.0  # what is missed is no white noise: so many frames count as one
-_LEAST_NOISE_RAD_S2 = 0.05
-_FORGOTTEN_S = 30.0  # what is not seen again in that time may have changed
+_FEW = 4  # Of so few surfaces, each leads an axis or stands in, and evidence.py estimates one at a time.
+_UNSURE = 0.5  # standard deviation of a surface's theta at the start
+_AIRFRAME = np.array([30.0, 30.0, 3.0, 3.0, 3.0])  # standard deviations of A at the start, 1/s2 and 1/s, as y
+_CORRELATED = 10.0  # So many frames of the innovation count as one, since it is no white noise.
+_LEAST_NOISE_RAD_S2 = 0.05  # smallest standard deviation of the noise, as an acceleration over a frame
+_FORGOTTEN_S = (
+    30.0  # time in which a variance returns to that of the start, if nothing is seen of its parameter
+)
 
 
 @sized
 def estimator_dtype(n: int) -> np.dtype:
-    """Memory for n surfaces. active: whether it estimates; found (N,): theta of each, then A row by row; P
-    (N, N): their covariance; errors: of the observer, for each surface's moment, each signal and the moments
-    that the law assumes; noise (3,) (rad/s)2: of the innovation in health; unsure (N,): variances begun
-    with; h, Ph (N,): for the update."""
+    """Memory for n surfaces. active: whether the estimator runs. found (N,): theta of each surface, then A
+    row by row; P (N, N): covariance of found; unsure (N,): its variances at the start. errors: answers of the
+    observer to the moment of each surface, to each signal, and to the assumed moments minus the healthy ones.
+    noise (3,) (rad/s)2: variance of the innovation in health. h, Ph (N,): for the update."""
     many = n > _FEW
     size, errors = (n + 3 * _SIGNALS, n + _SIGNALS + 1) if many else (Room(1), Room(1))
     return record(

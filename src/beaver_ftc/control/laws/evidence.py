@@ -121,8 +121,8 @@ def accumulate(config, memory, i, effectiveness, moment, innovation):
 
 @kernel
 def is_doubtful(assessment, sums, layout, s, target, least):
-    """Whether surface s, which is named, may be of no use: another surface can take its place; or the
-    observer does not see it act either, and its type is open or its effectiveness `target` below `least`."""
+    """Whether surface s, which is named, may be of no use: another surface can take its place; or its type is
+    open or its effectiveness `target` below `least`, and the observer does not see it act either."""
     if is_replaced(layout, s):
         return True
     is_open = assessment.diagnoses_all_types and assessment.accommodation_mode[s] < 0

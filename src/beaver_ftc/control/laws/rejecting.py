@@ -139,7 +139,7 @@ def config_dtype(n: int) -> np.dtype:
 def memory_dtype(n: int) -> np.dtype:
     """Kp, L_rate, L_disturbance (3,): the gains of this frame. ahead (3,) rad/s: x+. innovation (3,) rad/s:
     e. at_stop_s, out_of_use_s, withdrawn (n,): see `withdraw`. healthy, assumed: answers of the observer to
-    the moments of healthy main surfaces, and to what the law assumes less of them; sums: see `accumulate`."""
+    the moments of healthy main surfaces, and to the assumed moments minus these; sums: see `accumulate`."""
     return record(
         Kp=3, L_rate=3, L_disturbance=3, ahead=3, innovation=3, at_stop_s=n, out_of_use_s=n,
         withdrawn=(int, n), healthy=OBSERVER_ERROR, assumed=OBSERVER_ERROR, sums=SUMS,

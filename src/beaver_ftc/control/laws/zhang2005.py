@@ -30,8 +30,8 @@ from beaver_ftc.diagnosis.detection.state_network import (
 from beaver_ftc.plugins import LAWS, settings
 from beaver_ftc.scenario.declared import Declared
 
-# adapts: whether anything does; networks: and a network. gain: of effectiveness, s2/rad2. integral_weight: c.
-# least, most: of an effectiveness, projection P, or infinite.
+# adapts: whether any part adapts; networks: whether the second part does too. gain: gamma, s2/rad2.
+# integral_weight: c, 1/s. least, most: limits of an effectiveness, the projection P; infinite without it.
 CONFIG = record(adapts=int, networks=int, gain=float, integral_weight=float, least=float, most=float)
 MEMORY = record(signal=3)  # -s, rad/s, that both parts learn from
 
@@ -64,7 +64,7 @@ def configure(law: np.void, control: np.void, prediction: np.void, declared: Dec
 
 @apart
 def accommodate(control, assessment, faults, prediction, measured):
-    """Bring both parts to this frame: what surfaces and the unknown are taken for (control.CompiledLaw)."""
+    """Bring both parts, effectiveness and network, to this frame (control.CompiledLaw)."""
     law, surfaces, main, x = control.zhang2005, control.surfaces, control.layout.main, measured.x
     begin_frame(surfaces.output, False)
     if assessment.detected and law.config.adapts:
@@ -76,7 +76,7 @@ def accommodate(control, assessment, faults, prediction, measured):
 
 @kernel
 def adapt(law, surfaces, main, saturated, error, G, u, dt):
-    """Both parts, by a step of dt s, with signal = -s (3,), rad/s:
+    """Advance both parts by a step of dt s, with signal = -s (3,), rad/s:
 
         s = e + c int e,    effectiveness_s <- P(effectiveness_s + dt gamma sum_i signal_i G_is u_s)
 

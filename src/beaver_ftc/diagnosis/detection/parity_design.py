@@ -39,11 +39,12 @@ YAW_PLANE = (YAW, SIDE_FORCE)
 class ParityDirection(NamedTuple):
     """A parity direction as it is set up.
 
-    nulled: the index of the surface to whose column of G the direction is orthogonal; VANE_VIEW + i if it is
-    orthogonal to the effect of an error of the vane of force i (SIDE_INDEX or NORMAL_INDEX); AXIS_VIEW if it
-    is one row by itself.
-    m_0 (5,): the direction at the start, 1 on each row that the view sees: roll, pitch, yaw, side force,
-    normal force. In flight `turn_view` replaces it, unless nulled is AXIS_VIEW.
+    nulled: the index of the surface to whose column of G the direction is orthogonal (`across_surface`);
+    VANE_VIEW + i if it is orthogonal to the effect of an error of the vane of force i, SIDE_INDEX or
+    NORMAL_INDEX (`across_vane`); AXIS_VIEW if it is one row by itself (`is_axis`).
+    rows: the rows on which the direction is 1 at the start (ROLL, PITCH, YAW, SIDE_FORCE, NORMAL_FORCE). The
+    first `turn_view` in flight replaces this start, unless `is_axis`: a view across a lateral surface starts
+    on roll alone, and then combines roll and yaw.
     plane_pair: the two rows in whose plane the direction lies: two rates, or a rate and a force.
     tested_losses: the indices of the surfaces for whose loss the view tests.
     by_inertia: the force is that at the flow angle from inertial motion.
@@ -52,11 +53,26 @@ class ParityDirection(NamedTuple):
     """
 
     nulled: int
-    m_0: tuple[float, ...]
+    rows: tuple[int, ...]
     plane_pair: tuple[int, int]
     tested_losses: list[int]
     by_inertia: bool = False
     uses_vane_gust: bool = False
+
+    @property
+    def is_axis(self) -> bool:
+        """Whether the direction is one row by itself."""
+        return self.nulled == AXIS_VIEW
+
+    @property
+    def across_vane(self) -> bool:
+        """Whether the direction is orthogonal to the effect of an error of a vane."""
+        return self.nulled >= VANE_VIEW
+
+    @property
+    def by_force(self) -> bool:
+        """Whether the view sees a force, which is then the last of its rows."""
+        return self.rows[-1] >= SIDE_FORCE
 
 
 def list_directions(aircraft: Aircraft, with_forces: bool = False) -> Iterator[ParityDirection]:
@@ -67,28 +83,23 @@ def list_directions(aircraft: Aircraft, with_forces: bool = False) -> Iterator[P
     """
     pitch = [s for s, axis in enumerate(aircraft.dominant_axis) if axis == PITCH]
     lateral = [s for s, axis in enumerate(aircraft.dominant_axis) if axis != PITCH]
-    yield ParityDirection(AXIS_VIEW, _ones_at((PITCH,)), PITCH_PLANE, pitch, uses_vane_gust=True)
-    yield ParityDirection(AXIS_VIEW, _ones_at((ROLL,)), ROLL_YAW_PLANE, lateral)
-    yield ParityDirection(AXIS_VIEW, _ones_at((YAW,)), ROLL_YAW_PLANE, lateral, uses_vane_gust=True)
+    yield ParityDirection(AXIS_VIEW, (PITCH,), PITCH_PLANE, pitch, uses_vane_gust=True)
+    yield ParityDirection(AXIS_VIEW, (ROLL,), ROLL_YAW_PLANE, lateral)
+    yield ParityDirection(AXIS_VIEW, (YAW,), ROLL_YAW_PLANE, lateral, uses_vane_gust=True)
     for s in lateral:
         rolls = aircraft.dominant_axis[s] == ROLL  # then the direction across its column is mainly yaw
         others = [other for other in lateral if other != s]
-        yield ParityDirection(s, _ones_at((ROLL,)), ROLL_YAW_PLANE, others, uses_vane_gust=rolls)
+        yield ParityDirection(s, (ROLL,), ROLL_YAW_PLANE, others, uses_vane_gust=rolls)
     if not with_forces:
         return
     for i, plane, tested in ((NORMAL_INDEX, PITCH_PLANE, pitch), (SIDE_INDEX, YAW_PLANE, lateral)):
         separable = aircraft.separated_by_force(FORCE_NAMES[i])
         for s in separable:
             pair = aircraft.dominant_axis[s], plane[1]
-            yield ParityDirection(s, _ones_at(pair), pair, [other for other in tested if other != s])
+            yield ParityDirection(s, pair, pair, [other for other in tested if other != s])
         if separable:
-            yield ParityDirection(VANE_VIEW + i, _ones_at(plane), plane, tested)
-            yield ParityDirection(AXIS_VIEW, _ones_at(plane[1:]), plane, tested, by_inertia=True)
-
-
-def _ones_at(ones: tuple[int, ...]) -> tuple[float, ...]:
-    """A direction m_0 (5,) that is 1 on these rows and 0 on the others."""
-    return tuple(float(i in ones) for i in range(NORMAL_FORCE + 1))
+            yield ParityDirection(VANE_VIEW + i, plane, plane, tested)
+            yield ParityDirection(AXIS_VIEW, plane[1:], plane, tested, by_inertia=True)
 
 
 def required_size(aircraft: Aircraft) -> StatisticalSize:
@@ -137,7 +148,7 @@ def configure_parity_views(stat: np.void, aircraft: Aircraft) -> None:
     for view, d in zip(stat["views"][: len(directions)], directions, strict=True):
         # The view of an axis may raise an alarm, and the gust estimate uses accelerometers: no alarm may
         # depend on accelerometers that may break.
-        vaned = subtracts and d.uses_vane_gust and not (d.nulled == AXIS_VIEW and accelerometers_may_break)
+        vaned = subtracts and d.uses_vane_gust and not (d.is_axis and accelerometers_may_break)
         _configure_view(view, d, gusty, vaned)
         rates = stat["block"][PITCH_BLOCK if d.plane_pair == PITCH_PLANE else LATERAL_BLOCK]
         _configure_filter(view["block"], d, rates)
@@ -152,22 +163,24 @@ def _configure_view(view: np.void, d: ParityDirection, gusty: bool, vaned: bool)
     vaned: whether the gust estimate of the vanes is subtracted from a view that sees no force. A view that
     sees a force always has it subtracted, unless that view excludes the vane.
     """
-    is_axis, across_vane, by_force = d.nulled == AXIS_VIEW, d.nulled >= VANE_VIEW, any(d.m_0[SIDE_FORCE:])
-    i, j = d.plane_pair
-    # In moving air a view across the error of the side vane is orthogonal to the rolling gust as well.
-    across_gust = across_vane and d.plane_pair == YAW_PLANE and gusty
+    first, second = d.plane_pair
     if d.by_inertia:
         source = INERTIAL
-    elif across_vane:
+    elif d.across_vane:
         source = VANELESS
     else:
-        source = VANED if vaned or by_force else RAW
+        source = VANED if vaned or d.by_force else RAW
     view["block"]["source"] = source
+    places = first, -1, second
+    if d.across_vane and d.plane_pair == YAW_PLANE and gusty:
+        # In moving air a view across the error of the side vane is orthogonal to the rolling gust as well.
+        places = ROLL, YAW, second
+    alarm_axis = d.rows[0] if d.is_axis and not d.by_inertia else first  # a force alone names its rate's axis
+    # The force of the view's own plane confirms it; the side force confirms a view of roll and yaw.
+    force = SIDE_FORCE if d.plane_pair == ROLL_YAW_PLANE else second
+    confirmer = force if d.by_force or vaned else -1
     fill(
-        view, nulled=d.nulled, by_force=by_force, places=(ROLL, YAW, j) if across_gust else (i, -1, j),
-        alarm_axis=d.m_0.index(1.0) if is_axis and not d.by_inertia else i,
-        # the row of a force is the last; the side force confirms a view of roll and yaw
-        confirmer=max(j, SIDE_FORCE) if by_force or vaned else -1,
+        view, nulled=d.nulled, by_force=d.by_force, places=places, alarm_axis=alarm_axis, confirmer=confirmer,
     )  # fmt: skip
 
 
@@ -175,7 +188,8 @@ def _configure_filter(b: np.void, d: ParityDirection, rates: np.void) -> None:
     """Fill direction and filter of a view's block from the block of the rates that the view combines."""
     same = {name: rates[name] for name in ("alarm_level", "noise_share", "eta_rate")}
     fill(b, n=1, a=1.0, Q_scale=1.0, any_position=1, **same)
-    b["m"][0], b["P_xx"][0, 0], b["P_dd"][0, 0] = d.m_0, rates["R_y"].max(), likelihood.DRIFT_PRIOR_RAD_S2**2
+    b["m"][0, d.rows], b["P_xx"][0, 0] = 1.0, rates["R_y"].max()
+    b["P_dd"][0, 0] = likelihood.DRIFT_PRIOR_RAD_S2**2
 
 
 def _configure_columns(
@@ -185,14 +199,14 @@ def _configure_columns(
     motion, and the leak, which is worked out in flight.
     """
     b, columns = view["block"], list(rates["columns"][: rates["n_Z"]])
-    if not columns and not view["by_force"]:
+    if not columns and not d.by_force:
         return
-    if view["by_force"]:
+    if d.by_force:
         i = d.plane_pair[1] - SIDE_FORCE
         first = int(rows["first"][i])
         columns += range(first, first + int(forces["component"][i]["n_Z"]) + d.by_inertia)
     set_columns(b, rows, columns)
-    if d.nulled != AXIS_VIEW:
+    if not d.is_axis:
         b["tol"][b["n_Z"]] = 1.0
         b["n_Z"] += 1
 
@@ -203,7 +217,7 @@ def _configure_hypotheses(b: np.void, d: ParityDirection, gusty: bool) -> None:
     # and to the noise of the vanes, before the gyros measure a pitching effect. The effect of the elevator
     # then correlates with the noise of the view: with the whole gust, or, if the gust estimate of the vanes
     # is subtracted, with the noise of that estimate and the gust that it leaves.
-    lost = [] if gusty and d.m_0[PITCH] else d.tested_losses
+    lost = [] if gusty and PITCH in d.rows else d.tested_losses
     kinds = [STEP_FAULT, *(LOSS for _ in lost)]
     b["n_h"] = len(kinds)
     hyps = b["hypothesis"][: len(kinds)]

@@ -28,7 +28,6 @@ from beaver_ftc.diagnosis.detection.likelihood import (
     N_SLOTS,
     STEP_FAULT,
 )
-from beaver_ftc.diagnosis.detection.parity import AXIS_VIEW, VANE_VIEW
 from beaver_ftc.diagnosis.detection.parity_design import (
     ROLL_YAW_PLANE,
     ParityDirection,
@@ -41,7 +40,7 @@ from beaver_ftc.diagnosis.detection.tones import N_TONES, configure_tones
 from beaver_ftc.diagnosis.deviations import coefficient_bounds, moment_axis
 from beaver_ftc.diagnosis.gusts import MIN_UNMEASURED_SHARES
 from beaver_ftc.diagnosis.gusts_design import add_gust_noise, configure_gust, configure_gust_speed
-from beaver_ftc.diagnosis.state import LOSS, PITCH, SIDE_FORCE
+from beaver_ftc.diagnosis.state import LOSS, PITCH
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.diagnosis import Statistical
 
@@ -88,10 +87,10 @@ def count_tests(aircraft: Aircraft, *directions: ParityDirection) -> int:
     kinds = [entry.kind for _, entries in hypotheses_by_block(aircraft) for entry in entries if entry.alarms]
     n_tones = 0
     for d in directions:
-        if 0 <= d.nulled < VANE_VIEW and any(d.m_0[SIDE_FORCE:]):
+        if d.by_force and not (d.is_axis or d.across_vane):
             kinds += [STEP_FAULT, *(LOSS for _ in d.tested_losses)]
             n_tones += N_TONES
-        elif d.nulled == AXIS_VIEW and not d.by_inertia:
+        elif d.is_axis and not d.by_inertia:
             n_tones += N_TONES
     return N_SLOTS * sum(1 if likelihood.SIGN_OF_KIND[kind] else 2 for kind in kinds) + n_tones
 

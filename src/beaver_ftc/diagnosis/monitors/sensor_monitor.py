@@ -133,17 +133,19 @@ INITIAL_WINDOW_S = 1.0  # an alarm of the surfaces within this time from the sta
 ANGLES, FORCES = (PHI, THETA, PSI), (AX, AX + 1, AX + 2)
 
 
-# Of an axis. shown, shown_past, rad/s: error of the gyro if the attitude is right, as this frame begins and
-# as the one before began; most, least: of its size in the other samples of this frame, of the one before
-# (most_past, least_past), of the one before that. gap, B_gap (poles,) rad: filtered difference of the turn
-# that the attitude and w show, and its bound; beyond it no gyro can be broken. replaced: its reading.
+# One gyro. shown, shown_past, rad/s: its error if the attitude is right, as this frame begins and as the one
+# before began; most, least: the largest and smallest size of the error in the other samples of this frame, of
+# the one before (most_past, least_past), and the largest in the one before that (most_older). gap, B_gap
+# (poles,) rad: filtered difference of the turn that the attitude and w show, and its bound; beyond it no gyro
+# can be broken. verdict: GYRO_OPEN, GYRO_CONFIRMED or GYRO_REFUTED. replaced: whether its reading is.
 GYRO_RECORD = record(
     shown=float, shown_past=float, most=float, most_past=float, most_older=float,
     least=float, least_past=float, gap=N_POLES, B_gap=N_POLES, verdict=int, replaced=int,
 )  # fmt: skip
 
-# Of speed, incidence or sideslip, since the alarm: sums of the residuals, of the part of sound sensors, of
-# the part of an initial error; range of the reading.
+# One flow sensor (speed, incidence or sideslip) since the alarm. r_sum, B_sum, H_sum: sums of the residuals,
+# of the bound on the part of sound sensors, and on that of an error from the start, in the unit of the
+# residual; y_min, y_max: range of the reading.
 FLOW_RECORD = record(r_sum=float, B_sum=float, H_sum=float, y_min=float, y_max=float)
 
 # What isolation keeps, in the record of the monitor.
@@ -270,9 +272,9 @@ def latch_exceeded(mon):
     """
     exceeded = mon.exceeded
     for j in range(N_TESTS):
-        least = 0.0
-        for i in range(j - j % 3, j - j % 3 + 3):
-            least = max(least, COUPLING_SHARE * abs(mon.r[i, 0])) if j < SPEED_TEST else -1.0
+        least = -1.0
+        if j < SPEED_TEST:  # the largest of the three axes, or angles, of this test
+            least = COUPLING_SHARE * np.abs(mon.r[j - j % 3 : j - j % 3 + 3, 0]).max()
         exceeded[j] |= mon.ratio[j] > 1.0 and abs(mon.r[j, 0]) > least
     latch_refuted(mon, exceeded)
 
@@ -289,14 +291,15 @@ def name_gyro(mon, found, i, t):
 
 @kernel
 def has_alarm(mon):
-    """Whether the monitor has raised its alarm: no surface is isolated then."""
-    return mon.config.enabled and mon.output.alarmed
+    """Whether the monitor has raised its alarm, as only an enabled one does: no surface is isolated then."""
+    return mon.output.alarmed
 
 
 @kernel
 def doubts_gyros(mon):
-    """Whether a gyro may be the cause of the alarm of the surfaces."""
-    return mon.config.enabled == 1 and mon.config.noisy == 1 and mon.gyros_excluded == 0
+    """Whether a gyro may be the cause of the alarm of the surfaces; of a monitor that is not enabled `noisy`
+    is 0."""
+    return mon.config.noisy == 1 and mon.gyros_excluded == 0
 
 
 @kernel
@@ -395,7 +398,7 @@ def advance_gyro_estimate(mon, nu, eta, dt):
     nu, eta (3,): innovation and its bound, rad/s2.
     """
     w, B = mon.w, mon.w_bound
-    w0, B0 = (w[0], w[1], w[2]), (B[0], B[1], B[2])
+    w0, B0 = np.copy(w), np.copy(B)
     for i in range(3):
         w[i] = dt * nu[i]
         B[i] = dt * eta[i]
@@ -408,8 +411,7 @@ def advance_gyro_estimate(mon, nu, eta, dt):
 @kernel
 def follow_gyro_errors(mon):
     """Keep what the attitude shows of each gyro's error, rad/s, if it is right itself: -residual / h."""
-    for i in range(3):
-        g = mon.gyro[i]
+    for i, g in enumerate(mon.gyro):
         w = -mon.residual[i] / mon.h
         if mon.substep == 0:
             g.shown_past, g.shown = g.shown, w
@@ -426,8 +428,8 @@ def restart_comparison(mon):
     """
     mon.stage = 1
     mon.beyond[:] = mon.swing[:] = mon.c_max[:] = 0.0
-    for i in range(3):
-        mon.gyro[i].gap[:] = mon.gyro[i].B_gap[:] = 0.0
+    for g in mon.gyro:
+        g.gap[:] = g.B_gap[:] = 0.0
 
 
 @kernel
@@ -438,8 +440,8 @@ def advance_stage(mon):
     if mon.stage < FULL_STAGE and mon.substep == 0:
         mon.stage += 1
         if mon.stage < FULL_STAGE:
-            for i in range(3):
-                mon.w_bound[i] += abs(mon.gyro[i].shown)
+            for i, g in enumerate(mon.gyro):
+                mon.w_bound[i] += abs(g.shown)
 
 
 @kernel
@@ -451,8 +453,7 @@ def exclude_gyros(mon):
 
     Where the attitude is noisy, a surface is isolated only after that.
     """
-    for i in range(3):
-        g = mon.gyro[i]
+    for i, g in enumerate(mon.gyro):
         w = mon.w[i]
         leak(g.gap, mon.decay, mon.residual[i] + mon.h * w)
         leak(g.B_gap, mon.decay, mon.h * (mon.w_bound[i] + attitude.DAMPING_TOLERANCE * abs(w)))
@@ -508,8 +509,7 @@ def judge_gyros(mon, bank, bound, dt):
     innovation contains the errors as the frames begin, and the attitude shows those of the samples before.
     """
     nu = bank.output.innovation
-    for i in range(3):
-        g = mon.gyro[i]
+    for i, g in enumerate(mon.gyro):
         if g.verdict != GYRO_OPEN:
             continue
         estimate, B = abs(mon.w[i]), mon.w_bound[i]
@@ -585,8 +585,7 @@ def sum_flow(mon, y):
     alpha: error of the incidence that the sums leave unexplained, rad: r_sum beyond B_sum + H_sum; climb: its
     effect on the altitude, m, filtered.
     """
-    for n in range(3):
-        f = mon.flow[n]
+    for n, f in enumerate(mon.flow):
         j = SPEED_TEST + n
         now = y[SENSOR_OF[j]]
         if mon.n_since == 0:
@@ -599,7 +598,8 @@ def sum_flow(mon, y):
             f.H_sum += mon.initial.E_alarm[n] * mon.initial.H[n, j]
             f.y_min, f.y_max = min(f.y_min, now), max(f.y_max, now)
     f = mon.flow[ALPHA_TEST - SPEED_TEST]
-    alpha = f.r_sum - min(max(f.r_sum, -f.B_sum - f.H_sum), f.B_sum + f.H_sum)
+    most = f.B_sum + f.H_sum
+    alpha = f.r_sum - min(max(f.r_sum, -most), most)
     leak(mon.climb, mon.decay, mon.h * y[I_AIRSPEED] * alpha * np.cos(y[PHI]) * np.cos(y[THETA]))
     mon.n_since += 1
 

@@ -60,8 +60,8 @@ def restart_surface(srf):
     """Nothing is known of this surface yet."""
     srf.sets.excluded[:] = 0
     srf.last.lo, srf.last.hi = srf.actuator.reach_lo, srf.actuator.reach_hi
-    srf.evidence.k_first = -1
-    srf.evidence.n_anomalous = srf.evidence.n_rest = srf.evidence.n_unhidden = 0
+    ev = srf.evidence
+    ev.k_first, ev.n_anomalous, ev.n_rest, ev.n_unhidden = -1, 0, 0, 0
     for h in range(N_TYPES):
         put_set(srf, h, parameter_range(h, srf, h))
         reset_memory(h, srf, h)
@@ -80,8 +80,10 @@ def record_commands(types, u, ext):
         if types.block.n_so_far == 0:
             for b in range(N_KEPT - 1, 0, -1):
                 cmd.history[b, :n] = cmd.history[b - 1, :n]
-                cmd.cmd_min[b], cmd.cmd_max[b] = (cmd.cmd_min[b - 1], cmd.cmd_max[b - 1])
-            cmd.u_min[1], cmd.u_max[1] = cmd.u_min[0], cmd.u_max[0]
+                for ends in (cmd.cmd_min, cmd.cmd_max):
+                    ends[b] = ends[b - 1]
+            for ends in (cmd.u_min, cmd.u_max):
+                ends[1] = ends[0]
             cmd.cmd_min[0] = cmd.u_min[0] = cmd.G_min = np.inf
             cmd.cmd_max[0] = cmd.u_max[0] = cmd.G_max = -np.inf
         p = clip_travel(srf, u[s])
@@ -138,8 +140,9 @@ def judge_frame(types):
     c, k = types.config, types.frame_index - 1
     returns = c.returns_lagged and types.frame_index > 0
     for s, srf in enumerate(types.surface):
-        rests = c.abrupt and srf.accommodation.mode == GIVE_UP and not srf.judged.anomalous
-        judges = srf.judged.anomalous and (c.single_instant or (srf.earlier.anomalous and srf.last.anomalous))
+        now = srf.judged
+        rests = c.abrupt and srf.accommodation.mode == GIVE_UP and not now.anomalous
+        judges = now.anomalous and (c.single_instant or (srf.earlier.anomalous and srf.last.anomalous))
         for h in range(N_TYPES):
             see_frame(h, c, srf, h, k, not (rests or judges))
             if returns and HOLDS[h]:
@@ -154,7 +157,7 @@ def judge_frame(types):
         for h in range(N_TYPES):
             if returns and HOLDS[h]:
                 release.advance_returns(c, srf, h)
-        if srf.judged.hides[0] or srf.judged.hides[1]:
+        if now.hides[0] or now.hides[1]:
             srf.evidence.n_unhidden = 0
     types.frame_index += 1
 
@@ -187,9 +190,8 @@ def extend_block(types, layout, est, nu, bound):
     for i in range(3):
         block.nu[i] += share * nu[i]
         block.nu_bound[i] += share * bound.eta_bar[i]
-        if block.n_so_far == c.frames_per_block:
-            block.nu_bound[i] += (block.n_start[i] + bound.n_gyro[i]) / c.block_duration_s
     if block.n_so_far == c.frames_per_block:
+        block.nu_bound[:] += (block.n_start + bound.n_gyro) / c.block_duration_s
         block.n_so_far = 0
         observe_surfaces(types, layout, est, block.nu, block.nu_bound)
         judge_frame(types)

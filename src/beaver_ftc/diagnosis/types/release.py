@@ -92,14 +92,22 @@ def simulate_return(c, srf, p0, end, anywhere=False):
 
 
 @kernel
+def simulate_ends(c, srf, lo, hi, anywhere=False):
+    """`simulate_return` from both ends of an interval (lo, hi) rad, as far as it can go to that side: the
+    means, by how much each may be off, the positions at the end of the frame; each (of lo, of hi), rad."""
+    low, lo, tol_low = simulate_return(c, srf, lo, -1.0, anywhere)
+    high, hi, tol_high = simulate_return(c, srf, hi, 1.0, anywhere)
+    return (low, high), (tol_low, tol_high), (lo, hi)
+
+
+@kernel
 def release_explains(c, srf, h):
     """Whether a release at an instant of the judged block explains the block."""
     lo, hi = srf.release.held_lo[h], srf.release.held_hi[h]
     if c.frames_per_block == 1 or lo > hi:
         return False
-    low, _, tol_low = simulate_return(c, srf, lo, -1.0, True)
-    high, _, tol_high = simulate_return(c, srf, hi, 1.0, True)
-    return low - tol_low <= srf.judged.hi and high + tol_high >= srf.judged.lo
+    (low, high), tol, _ = simulate_ends(c, srf, lo, hi, True)
+    return low - tol[0] <= srf.judged.hi and high + tol[1] >= srf.judged.lo
 
 
 @kernel
@@ -125,16 +133,14 @@ def narrow_return(c, srf, b, h):
     The mean over the frame rises with where the return began, and by no more than that, if the actuator is
     known. low, high: means of the returns from the ends of the interval.
     """
-    rel, seen = srf.release, srf.judged
-    low, _, tol_low = simulate_return(c, srf, rel.back_lo[b, h], -1.0)
-    high, _, tol_high = simulate_return(c, srf, rel.back_hi[b, h], 1.0)
-    tol = max(tol_low, tol_high)
+    seen, lo, hi = srf.judged, srf.release.back_lo[b, h], srf.release.back_hi[b, h]
+    (low, high), tols, _ = simulate_ends(c, srf, lo, hi)
+    tol = max(tols)
     healthy = max(abs(low - tol - seen.u), abs(high + tol - seen.u)) <= HEALTHY_RAD
     if healthy or low - tol > seen.hi or high + tol < seen.lo:
         return False
     if not srf.actuator.uncertain:
-        lo, hi = rel.back_lo[b, h], rel.back_hi[b, h]
-        set_return(rel, b, h, lo + max(seen.lo - low - tol, 0.0), hi - max(high - tol - seen.hi, 0.0))
+        set_return(srf.release, b, h, lo + max(seen.lo - low - tol, 0.0), hi - max(high - tol - seen.hi, 0.0))
     return True
 
 
@@ -164,9 +170,9 @@ def begin_release(c, srf, h, lo, hi, stop):
     """
     rel, seen = srf.release, srf.judged if c.single_instant else srf.earlier
     if is_position(srf, h) and not may_return(rel, EARLIER, h):
-        rel.back_lo[EARLIER, h], rel.back_hi[EARLIER, h] = rel.back_lo[LATER, h], rel.back_hi[LATER, h]
+        for ends in (rel.back_lo, rel.back_hi, rel.set_lo, rel.set_hi):
+            ends[EARLIER, h] = ends[LATER, h]
         forget_return(rel, LATER, h)
-        rel.set_lo[EARLIER, h], rel.set_hi[EARLIER, h] = rel.set_lo[LATER, h], rel.set_hi[LATER, h]
         rel.set_lo[LATER, h], rel.set_hi[LATER, h] = srf.sets.low[h], srf.sets.high[h]
     rel.held_lo[h], rel.held_hi[h] = EMPTY_SET
     if max(lo, seen.lo) <= min(hi, seen.hi) and not rel.released[h]:
@@ -193,14 +199,12 @@ def advance_returns(c, srf, h):
     rel = srf.release
     for b in (LATER, EARLIER):
         if may_return(rel, b, h):
-            _, lo, _ = simulate_return(c, srf, rel.back_lo[b, h], -1.0)
-            _, hi, _ = simulate_return(c, srf, rel.back_hi[b, h], 1.0)
-            set_return(rel, b, h, lo, hi)
+            _, _, ends = simulate_ends(c, srf, rel.back_lo[b, h], rel.back_hi[b, h])
+            set_return(rel, b, h, *ends)
             if not srf.judged.anomalous:
                 put_set(srf, h, (rel.set_lo[b, h], rel.set_hi[b, h]))
     if not srf.judged.anomalous:
         rel.released[h] = 0
     if c.frames_per_block > 1 and rel.held_lo[h] <= rel.held_hi[h]:
-        _, lo, _ = simulate_return(c, srf, rel.held_lo[h], -1.0, True)
-        _, hi, _ = simulate_return(c, srf, rel.held_hi[h], 1.0, True)
-        widen_later(rel, h, lo, hi)
+        _, _, ends = simulate_ends(c, srf, rel.held_lo[h], rel.held_hi[h], True)
+        widen_later(rel, h, *ends)

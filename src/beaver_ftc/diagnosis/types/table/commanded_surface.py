@@ -158,7 +158,7 @@ def mean_with_offset(srf, b, u_end):
 def bias_interval(fdi: np.void, s: int, h: int) -> tuple[float, float] | None:
     """Return the interval of the offset, rad; None while one end is open."""
     lo, hi = feasible_set(fdi, s, h)
-    return (lo, hi) if np.isfinite(lo) and np.isfinite(hi) else None
+    return (lo, hi) if np.isfinite(hi - lo) else None
 
 
 @kernel

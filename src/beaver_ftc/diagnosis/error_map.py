@@ -36,10 +36,11 @@ def map_dtype(n: int, boxes: int = MAX_BOXES) -> np.dtype:
     """The map of the error of an aircraft's model, with n surfaces.
 
     one_free: one surface may be anywhere in its travel; two_free: more than one may. lo, hi: ends of each
-    box; share: of the travel, by level; e: error by row of time, box, level and axis, rad/s2. outside:
-    whether the state is outside all boxes; box, row: where it is in the map; e_now: error there, rad/s2.
-    u_old: deflections in the frame before, rad. Cn, Cn_now: bound on the coefficient of the yawing moment of
-    healthy engines, by box and here.
+    box; share: the share of the travel, by level; e: error by row of time, box, level and axis, rad/s2.
+    stop_lo, stop_hi: the stops, rad, of a stand-in times its share. outside: whether the state is outside all
+    boxes; box, row: where it is in the map, of no meaning if outside; e_now: error there, rad/s2. Cn, Cn_now:
+    bound on the coefficient of the yawing moment of healthy engines, by box and here. Other stages write
+    time_s, the flight time, s, and u_old, the deflections in the frame before, rad.
     """
     return record(
         n_boxes=int, n_levels=int, n_rows=int, one_free=int, two_free=int, outside=int, box=int, row=int,
@@ -55,11 +56,11 @@ def fill_map(emap: np.void, aircraft: Aircraft, one_free: bool, two_free: bool) 
     if declared is None:
         return
     n_levels, n_rows = len(declared.travel_share), len(declared.until_s)
-    share = np.array([declared.stand_ins if s in aircraft.stand_ins else 1.0 for s in aircraft.surfaces])
+    of_travel = np.array([declared.stand_ins if s in aircraft.stand_ins else 1.0 for s in aircraft.surfaces])
     lo, hi = np.transpose([(travel.min_rad, travel.max_rad) for travel in aircraft.travel.values()])
     fill(
         emap, one_free=one_free, two_free=two_free, n_boxes=len(declared.boxes), n_levels=n_levels,
-        n_rows=n_rows, stop_lo=share * lo, stop_hi=share * hi,
+        n_rows=n_rows, stop_lo=of_travel * lo, stop_hi=of_travel * hi,
     )  # fmt: skip
     emap["until_s"][:n_rows] = declared.until_s
     emap["share"][:n_levels] = declared.travel_share

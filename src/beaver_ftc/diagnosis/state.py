@@ -14,7 +14,9 @@ from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.diagnosis import FdiConfig
 
 NOT_ISOLATED, UNANTICIPATED = -1, -2  # in place of an estimator: no fault isolated; one outside the class
-DAMAGE_EXCLUDES = 2  # value of `weak`: declared damage may have excluded the others
+# Of an estimator's `weak` (isolation.py): 0 not weakly excluded; 1 weakly excluded; this value the same,
+# because declared damage may have excluded the other estimators.
+DAMAGE_EXCLUDES = 2
 INTERVAL_THRESHOLD, PUBLISHED_THRESHOLD, CONSTANT_THRESHOLD = 0, 1, 2  # of a residual: isolation.py
 EITHER_DETECTOR, WORST_CASE_DETECTOR, STATISTICAL_DETECTOR = 0, 1, 2  # whose alarms, or exclusions, count
 AUTHORITIES = {
@@ -25,14 +27,18 @@ AUTHORITIES = {
 # Schemes: ours, the published one, none; and that of a plug-in, whose verdict replaces ours.
 ADAPTIVE_SCHEME, PUBLISHED_SCHEME, NO_SCHEME, PLUGIN_SCHEME = range(4)
 _SCHEMES = {"adaptive-estimators": ADAPTIVE_SCHEME, "zhang2005": PUBLISHED_SCHEME, "none": NO_SCHEME}
-LOSS, POSITION_HYPOTHESIS = 0, 1  # kinds of hypothesis: isolation.py
+# Kinds of hypothesis (isolation.py): a surface has lost effectiveness; it is anywhere in its travel. LOSS of
+# types/table is a fault type, and not this number.
+LOSS, POSITION_HYPOTHESIS = 0, 1
 PITCH_GROUP, LATERAL_GROUP = 0, 1  # groups of surfaces
 ROLL, PITCH, YAW, SIDE_FORCE, NORMAL_FORCE = range(5)  # axes, and components of the force: forces.py
 
 
 @sized
 def plugin_verdict_dtype(n: int) -> np.dtype:
-    """A plug-in's verdict. isolated: a surface, NOT_ISOLATED or UNANTICIPATED."""
+    """A plug-in's verdict. isolated: a surface, NOT_ISOLATED or UNANTICIPATED; axis: on which it has an
+    alarm; theta: its estimate of the fault parameter; effectiveness (n,): of each surface, of use only if
+    has_effectiveness."""
     return record(detected=int, axis=int, isolated=int, theta=float, has_effectiveness=int, effectiveness=n)
 
 
@@ -77,7 +83,8 @@ def whose_exclusions(config: FdiConfig) -> int:
 
 
 def configure_layout(layout: np.void, rows: Sequence[tuple[str, int, int]], aircraft: Aircraft) -> None:
-    """Fill in axes, groups and estimators of the surfaces; rows: of isolation.py."""
+    """Fill in axes, groups and estimators of the surfaces; rows: (name, kind of hypothesis, surface) of each
+    estimator of isolation.py."""
     index = {name: k for k, name in enumerate(aircraft.surfaces)}
     groups = [PITCH_GROUP if axis == PITCH else LATERAL_GROUP for axis in aircraft.dominant_axis]
     fill(

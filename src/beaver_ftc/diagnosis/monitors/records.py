@@ -30,7 +30,7 @@ from beaver_ftc.scenario.sensors import frames_apart, sensor_words
 
 ERRORS = {"e_zero": "worst", "e_slope": "slope", "const": "steady"}  # of a reading, by their declared names
 MAX_AIRSPEED_OVER_TRIM = 1.4  # largest airspeed of a flight, as a share of that in trim
-# at which the attitude corrects a replaced rate, if its noise is declared
+# Rate at which the attitude corrects a replaced body rate, if the attitude's noise is declared
 RATE_GAIN_PER_S = 3.0
 # So many identical samples a sound sensor never gives: one without resolution, and one with a noise of more
 # than a quarter of its resolution.
@@ -40,7 +40,7 @@ UNANTICIPATED_DELAY_S = 1.0  # from the alarm; a sensor not isolated by then mak
 MONITOR_CONFIG_RECORD = record(
     enabled=int, substeps=int, has_engine=int, y_trim=N_SENSORS,
     rate_gain=float,  # share of its error that a replaced rate corrects in one sample
-    noisy=int,  # the attitude: then a surface is isolated only once no gyro can be the cause
+    noisy=int,  # whether the attitude is: then a surface is isolated only once no gyro can be the cause
     n_frozen=(int, N_SENSORS),  # number of identical samples from which a reading counts as frozen
     D=(3, 3),  # 1/s: body rates decay with rate' = -D rate
 )  # fmt: skip

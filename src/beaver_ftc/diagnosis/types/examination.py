@@ -1,8 +1,8 @@
 """The examination of a frame by every fault type.
 
 In each frame, or block of frames: where was each surface, and was anything wrong? A frame is judged one frame
-later: with several JSBSim frames in one of ours a fault may begin or end within a frame, which then shows a
-part of it; such a frame, next to a healthy one, is skipped.
+later: in a frame of several JSBSim steps a fault may begin or end within the frame, which then shows a part
+of it; such a frame, next to a healthy one, is skipped.
 
 Where the noise of a gyro makes single frames uninformative, frames are examined in blocks. Summed over a
 block the innovation holds the noise of its two ends alone, n[k+N] - n[k]. So the mean over N frames has the
@@ -12,8 +12,8 @@ bound
 
 which gives the mean position of the surface, weighted by its effectiveness G, whose sign stays. The weighted
 mean of a constant position, offset or effectiveness is exact; that of a varying one lies between its
-extremes. To the types a block is like a frame that consists of several JSBSim frames: a block next to a
-healthy one is skipped.
+extremes. To the types a block is like a frame of several JSBSim steps: a block next to a healthy one is
+skipped.
 
 types: of `fault_types_dtype`. estimators: those of the isolation, by the layout. bound: of `bound_dtype`.
 """
@@ -69,30 +69,32 @@ def restart_surface(srf):
 
 
 @kernel
-def record_commands(types, u, ext):
-    """Add a frame to the commands u (n,) rad of the surfaces; with the first frame of a block, the record
-    moves on by a block. ext: extremes, within the frame, of where healthy surfaces were and of G, of a
-    `model_prediction.frame_means_dtype`.
+def record_commands(types, commands, ext):
+    """Add a frame to the commands (n,) rad of the surfaces; with the first frame of a block, the record moves
+    on by a block.
+
+    cmd: command of a surface, limited by its stops, rad. ext: of a `model_prediction.frame_means_dtype`: the
+    extremes, within the frame, of u, where a healthy surface was, rad, and of G, rad/s2 per rad.
     """
     n = types.config.frames_per_block
     for s, srf in enumerate(types.surface):
-        cmd = srf.commands
+        kept = srf.commands
         if types.block.n_so_far == 0:
             for b in range(N_KEPT - 1, 0, -1):
-                cmd.history[b, :n] = cmd.history[b - 1, :n]
-                for ends in (cmd.cmd_min, cmd.cmd_max):
+                kept.history[b, :n] = kept.history[b - 1, :n]
+                for ends in (kept.cmd_min, kept.cmd_max):
                     ends[b] = ends[b - 1]
-            for ends in (cmd.u_min, cmd.u_max):
+            for ends in (kept.u_min, kept.u_max):
                 ends[1] = ends[0]
-            cmd.cmd_min[0] = cmd.u_min[0] = cmd.G_min = np.inf
-            cmd.cmd_max[0] = cmd.u_max[0] = cmd.G_max = -np.inf
-        p = clip_travel(srf, u[s])
-        cmd.history[0, types.block.n_so_far] = p
-        cmd.cmd_min[0], cmd.cmd_max[0] = (min(cmd.cmd_min[0], p), max(cmd.cmd_max[0], p))
-        cmd.u_min[0] = min(cmd.u_min[0], ext.u_min[s])
-        cmd.u_max[0] = max(cmd.u_max[0], ext.u_max[s])
-        cmd.G_min = min(cmd.G_min, ext.G_min[s])
-        cmd.G_max = max(cmd.G_max, ext.G_max[s])
+            kept.cmd_min[0] = kept.u_min[0] = kept.G_min = np.inf
+            kept.cmd_max[0] = kept.u_max[0] = kept.G_max = -np.inf
+        cmd = clip_travel(srf, commands[s])
+        kept.history[0, types.block.n_so_far] = cmd
+        kept.cmd_min[0], kept.cmd_max[0] = (min(kept.cmd_min[0], cmd), max(kept.cmd_max[0], cmd))
+        kept.u_min[0] = min(kept.u_min[0], ext.u_min[s])
+        kept.u_max[0] = max(kept.u_max[0], ext.u_max[s])
+        kept.G_min = min(kept.G_min, ext.G_min[s])
+        kept.G_max = max(kept.G_max, ext.G_max[s])
 
 
 @kernel
@@ -132,10 +134,18 @@ def judge_types(c, srf, k):
 
 @kernel
 def judge_frame(types):
-    """Judge the frame before the elapsed one, k, surface by surface:
+    """Judge the frame before the elapsed one, k, of each surface in these steps:
 
-    rests     given up, and nothing wrong (of a fault declared to stay)    `count_rest`
-    judges    something wrong in it; with several instants a frame also in the one before and after
+        1  Every type sees the frame: its memory widens before it is compared.
+        2  A type that holds the surface may release it. It takes the sets as they were before this frame is
+           judged, and where the type holds the surface as the release begins: in frame k if a frame has one
+           instant, else in frame k - 1.
+        3  rests: `count_rest`. judges: count the anomaly, and test every type with the releases of step 2.
+        4  Returns after a release that step 3 has left move on to the end of the frame.
+        5  A frame in which a stop may hide a swing restarts `n_unhidden`.
+
+    rests: given up, and nothing wrong in the frame (of a fault declared to stay). judges: something wrong in
+    it; with several instants a frame also in the frame before and in the one after.
     """
     c, k = types.config, types.frame_index - 1
     returns = c.returns_lagged and types.frame_index > 0
@@ -153,7 +163,7 @@ def judge_frame(types):
         if judges:
             count_anomaly(srf)
             judge_types(c, srf, k)
-        # the judgement needs the positions with which the judged frame began; from here on those of the next
+        # The judgement needs positions at the beginning of the judged frame; from here on those at its end.
         for h in range(N_TYPES):
             if returns and HOLDS[h]:
                 release.advance_returns(c, srf, h)
@@ -200,9 +210,14 @@ def extend_block(types, layout, est, nu, bound):
 @kernel
 def count_rest(types, s):
     """A surface given up, and commanded to where it happens to be, shows by its quiet that it does not swing.
+    The fault must be declared to stay: of one that may go, the quiet may be that of health.
 
-    That is evidence against the other surfaces too, as far as only one of them all is in question. It takes a
-    fault that is declared to stay: of one that may go, the quiet may be that of health.
+        surface agrees (`agrees_at_rest`)             the frame counts as an anomaly of it
+        and another surface, each may be the sole     it counts as an anomaly of the other: with one fault,
+        one at fault                                  that rest is this fault's
+        and it has rested for more than half_frames   a fault that swings would have shown: types of
+        (half of the slowest cycle)                   REST_EXCLUDES_TYPE are excluded, unless errors of the
+                                                      surfaces' effects (has_eG) could hide the swing
     """
     srf = types.surface[s]
     if not agrees_at_rest(srf):

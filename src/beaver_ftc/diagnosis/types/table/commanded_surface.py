@@ -117,10 +117,14 @@ MAX_GROWTH_RATIO = 1.8
 
 @kernel
 def bias_of_frame(c, srf, h, k):
-    """b = p - u of the surface in the judged frame, (lo, hi) rad: unlimited at a stop.
+    """b = p - u of the surface in the judged frame, (lo, hi) rad; open at a stop:
 
-    A surface that was at its stop at any instant of the frame may have a larger offset than it shows. An
-    offset takes no surface beyond its stop: NO_THETA.
+        lo = seen.lo - u    -inf if seen.lo - max(u - u_min, 0) <= stop_lo
+        hi = seen.hi - u    +inf if seen.hi + max(u_max - u, 0) >= stop_hi
+
+    u_min, u_max: extremes of u within the frame: p was at most u - u_min below its mean. A surface that was
+    at its stop at any instant of the frame may have a larger offset than it shows. An offset takes no surface
+    beyond its stop: NO_THETA.
     """
     seen, cmd, act = srf.judged, srf.commands, srf.actuator
     if seen.hi < act.stop_lo or seen.lo > act.stop_hi:
@@ -205,7 +209,12 @@ def narrow_offset(c, srf, lo, hi):
 
 @kernel
 def update_growing(c, srf, h, k):
-    """The offset keeps its sign and does not shrink; at a stop it may be larger than it shows."""
+    """The offset keeps its sign and does not shrink; at a stop it may be larger than it shows.
+
+    up <- max(up, lo)    down <- min(down, hi)        (lo, hi): `bias_of_frame`, not open
+    EMPTY_SET if lo > hi, if up > 0 > down, or if the offset is smaller than it was:
+    hi < up after it grew upwards, lo > down after it grew downwards
+    """
     lo, hi = bias_of_frame(c, srf, h, k)
     if lo <= hi:
         narrow_offset(c, srf, lo, hi)
@@ -286,7 +295,10 @@ def add_square(c, srf, h, k, skipped):
 
 @kernel
 def update_swing(c, srf, h, k):
-    """Count half-cycles; a sign that stays for longer than the slowest half-cycle is no oscillation.
+    """Count half-cycles; a sign that stays for longer than the slowest half-cycle is no oscillation:
+    EMPTY_SET if k - since > half_frames. A half-cycle ends where the sign of p - u changes:
+
+        n_half <- n_half + 1,    square_past <- square_past + square from the second half-cycle on
 
     At a stop half of a swing is hidden. If a frame has several instants, the mean of a quick swing over them
     then keeps its sign, so such a frame is no evidence against an oscillation.
@@ -359,7 +371,13 @@ def reset_creep(srf, h):
 def update_creep(c, srf, h, k):
     """A slow surface never moves away from its command, so while it stands on one side it comes nearer.
 
-    If a frame has several JSBSim steps, the first still follows the command of the frame before
+        1  away: the surface was seen farther from its command than (M.lo, M.hi) of the frame before allows
+        2  (M.lo, M.hi) is narrowed by the least motion in this frame (`narrow_creep`)
+        3  and intersected with where the surface was seen
+
+    The order matters: step 1 compares with the bound before this frame's motion, and step 3 gives the bound
+    for the next frame. After a skipped frame, or on the other side, the bound restarts with what is seen. If
+    a frame has several JSBSim steps, the first still follows the command of the frame before
     (`commands_of_frame`).
     """
     seen, M, side, away = srf.judged, srf.rate_limit, side_of_commands(c, srf), False
@@ -397,8 +415,8 @@ def narrow_creep(c, srf, M, side):
 def commands_of_frame(c, srf):
     """The least and greatest command that moved the surface into and within the judged frame, rad.
 
-    If the frame has one instant, only the command of the frame before it has moved the surface; otherwise the
-    commands of both frames have.
+    If the frame has one instant, only the command of the frame before it (index 2) has moved the surface;
+    otherwise the commands of both frames (2 and 1) have.
     """
     cmd, b = srf.commands, 2 if c.single_instant else 1
     return min(cmd.cmd_min[2], cmd.cmd_min[b]), max(cmd.cmd_max[2], cmd.cmd_max[b])

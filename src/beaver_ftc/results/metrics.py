@@ -10,22 +10,8 @@ the fault is there: `at_s`, or up to a frame later. A quantity that does not exi
 holds NaN. Nothing in it depends on the wall clock or the machine's name, so that the same scenario and seed
 give the same file.
 
-`isolation.so_far` is true of a surface that is named because every other fault is excluded: no data have
-excluded this one so far, and nothing within the class proves that a fault outside of it does not look alike.
-It is false of `unanticipated` and of an instrument, null of nothing and of what a plug-in names.
-`isolation.withdrawn`: surfaces that were named before, and from when to when. `isolation.premature` is true
-of a name given before the fault that it names began, or the first one where it names none that was declared:
-such a name is not correct and meets no expectation. Null of nothing. An estimate is that of the last frame,
-unless `estimate_at_s` says another instant.
-
-`windows`, of a flight with several faults or one that ends: each time in which the same faults are in force,
-with the first frame in it in which a detector is beyond its threshold, and the names and sizes that the
-diagnosis gives in its last frame, held against the faults that act then. A name that stands since before
-counts from the fault's first frame on.
-
-`detection.inconclusive`: null, or the frames in which the built-in diagnosis can conclude nothing: their
-`share`, the first of them `from_s`, and `reasons`, each with the `quantity`, its own `share`, the range that
-was `measured`, the range that was `flown` outside of it, and what it `says`.
+The fields of `results/model.py` explain the keys. This module has three parts: how events are judged
+(`Onset`, `Truth`), the document, section by section, and the hints.
 """
 
 import json
@@ -99,6 +85,19 @@ class Truth:
     removed_surfaces: surfaces that damage takes away. outside_class_from_second_fault: an unanticipated fault
     that stands for all faults together, from the instant at which a second surface fails; None if the
     diagnosis looks for pairs. No single fault explains such a flight, so it is outside the fault class.
+
+    A name is compared with one fault. Its delay counts from the first frame with this fault, and is None if
+    the name is premature, that is, given before the fault began:
+
+        the name is right for       compared with                   correct
+        a fault in force then       the first of these              yes
+        other faults only           the first of these              no if premature; yes if it has ended
+        no fault                    the first fault that strikes    no
+        (no name)                   the first fault that strikes    None
+
+    `DeclaredFault.is_named_by` says which names are right. `unanticipated` is also right for the fault
+    outside of the class, once this one has begun. A wrong name in a window, or of several, is compared with
+    no fault.
     """
 
     faults: tuple[DeclaredFault, ...]
@@ -114,10 +113,10 @@ class Truth:
         cases = [fault.case for fault in scenario.faults if isinstance(fault, Damage)]
         removed_surfaces = frozenset(surface for case in cases for surface in damage[case].takes)
         began_s = sorted(failing(scenario).values())
-        beyond = None
+        outside = None
         if not scenario.fdi.pairs and len(began_s) > 1:
-            beyond = DeclaredFault(None, UNANTICIPATED, began_s[1])
-        return cls(tuple(faults), scenario.rate_hz, removed_surfaces, beyond)
+            outside = DeclaredFault(None, UNANTICIPATED, began_s[1])
+        return cls(tuple(faults), scenario.rate_hz, removed_surfaces, outside)
 
     @property
     def first(self) -> DeclaredFault | None:
@@ -140,30 +139,31 @@ class Truth:
         return replace(self, faults=tuple(acting), outside_class_from_second_fault=outside)
 
     def against(self, name: str | None, time_s: Quantity) -> DeclaredFault | None:
-        """The fault that a name given then is held against: the first one in force of those that it names
-        rightly, or the first one that strikes."""
-        meant = self.faults_named_rightly_by(name, time_s)
-        now = (fault for fault in meant if time_s is not None and is_in_force(fault, time_s))
-        return next(now, meant[0] if meant else None)
+        """The fault with which a name given at `time_s` is compared: of the faults for which it is right, the
+        first one in force then, otherwise the first one that strikes; None if it is right for no fault."""
+        faults = self.faults_named_rightly_by(name, time_s)
+        in_force = (fault for fault in faults if time_s is not None and is_in_force(fault, time_s))
+        return next(in_force, faults[0] if faults else None)
 
     def is_type_right(self, fault: DeclaredFault | None, kind: str | None, time_s: Quantity) -> bool | None:
-        """Whether a type decided then is that of `fault`, or of another one that acts on its surface then."""
+        """Whether a type named at `time_s` is that of `fault`, or of another fault that acts on the same
+        surface then; None if `fault` has no type to name."""
         if fault is None:
             return None if kind is None else False
-        alike = [one for one in acting_at(self.faults, time_s or 0.0) if one.actuator == fault.actuator]
-        right = [one.is_of_type(kind) for one in (fault, *(alike if fault.actuator else ()))]
+        alike = [other for other in acting_at(self.faults, time_s or 0.0) if other.actuator == fault.actuator]
+        right = [other.is_of_type(kind) for other in (fault, *(alike if fault.actuator else ()))]
         return None if right[0] is None else any(right)
 
     def faults_named_rightly_by(self, name: str | None, time_s: Quantity) -> tuple[DeclaredFault, ...]:
-        """The declared faults of which a name given then is right, as they strike."""
+        """The faults for which a name given at `time_s` is right, in the order in which they strike."""
         candidates = self.faults
-        beyond = self.outside_class_from_second_fault
-        if beyond is not None and time_s is not None and not self.onset_of(beyond).is_false(time_s):
-            candidates += (beyond,)
+        outside = self.outside_class_from_second_fault
+        if outside is not None and time_s is not None and not self.onset_of(outside).is_false(time_s):
+            candidates += (outside,)
         return tuple(fault for fault in candidates if fault.is_named_by(name, self.removed_surfaces))
 
     def is_premature(self, name: str | None, time_s: Quantity, fault: DeclaredFault | None) -> bool | None:
-        """Whether a name was given before the fault it is held against began; None without a name."""
+        """Whether a name was given before `fault` began, with which it is compared; None without a name."""
         if name is None or time_s is None:
             return None
         return fault is not None and self.onset_of(fault).is_false(time_s)
@@ -184,10 +184,10 @@ def metrics(flight: "Landing") -> Document:
 def measure(flight: "Landing") -> Metrics:
     """The metrics of a flight."""
     truth = Truth.of(flight.scenario)
-    found = Metrics.of(rounded(_found(flight, truth)) | _declared(flight, truth))
-    found = replace(found, hints=tuple(hints(flight, found)))
-    expectations = tuple(evaluate(flight.scenario.expect, found))
-    return replace(found, expectations=expectations, passed=all(one.passed for one in expectations))
+    amounts = Metrics.of(rounded(_measured(flight, truth)) | _declared(flight, truth))
+    amounts = replace(amounts, hints=tuple(hints(flight, amounts)))
+    expectations = tuple(evaluate(flight.scenario.expect, amounts))
+    return replace(amounts, expectations=expectations, passed=all(bound.passed for bound in expectations))
 
 
 def _declared(flight: "Landing", truth: Truth) -> Document:
@@ -213,9 +213,17 @@ def _declared(flight: "Landing", truth: Truth) -> Document:
     }  # fmt: skip
 
 
-def _found(flight: "Landing", truth: Truth) -> Document:
-    """The sections that are measured. A key of a section, or of the document, that has the name of a field of
-    the landing has its value, unless it stands below."""
+def _measured(flight: "Landing", truth: Truth) -> Document:
+    """The sections that are measured. `Metrics.of` takes only the keys that a section has, so that these are
+    the values of the landing, by the same names:
+
+        the document   frames, supervisor, envelope_exits, departure, authority, engine_power, limits,
+                       saturation_s
+        detection      guaranteed_delay_s, statistical, inconclusive
+        isolation      candidates, estimate_interval, frequency_rad_s, so_far, estimate_at_s, withdrawn,
+                       probing_s
+        envelope       exits, outside_s
+    """
     landed = vars(flight)
     onset = truth.onset
     at_once = truth.first is not None and truth.first.at_s <= 0  # then nothing was measured before it
@@ -265,20 +273,21 @@ def faults_of(scenario: "Scenario") -> list[Document]:
 
 
 def _isolation(flight: "Landing", truth: Truth) -> Document:
+    """The section `isolation`: the name at the end, all names, and each of several named faults."""
     return _named(vars(flight), truth, truth.first) | {
         "isolated": flight.isolated is not None,
         "names": _names_given_in_flight(flight, truth),
-        "faults": [_named(found, truth) for found in flight.faults],
+        "faults": [_named(finding, truth) for finding in flight.faults],
         "types_withdrawn": flight.withdrawn_types or None,
     }
 
 
 def _windows(flight: "Landing", truth: Truth) -> list[Document] | None:
     """The alarm and the names in each window; None if one window lasts to the end of the flight."""
-    known = flight.windows
+    windows = flight.windows
     end_s = flight.frames / truth.rate_hz
-    if len(known) > 1 or any(window["to_s"] < end_s for window in known):
-        return [_window(rounded(window), truth) for window in known]
+    if len(windows) > 1 or any(window["to_s"] < end_s for window in windows):
+        return [_window(rounded(window), truth) for window in windows]
     return None
 
 
@@ -286,60 +295,66 @@ def _window(window: Document, truth: Truth) -> Document:
     """One window. A name given before a fault of the window began counts from the begin of this fault."""
     last_frame_s = window["to_s"] - 1.0 / truth.rate_hz
     alarm_s = window["alarm_s"]
-    found = window["found"]
+    finding = window["found"]
     acting = acting_at(truth.faults, last_frame_s)
-    here = truth.within(acting)
+    truth_within = truth.within(acting)
     return window | {
         "faults": [i for i, fault in enumerate(truth.faults) if fault in acting],
         "detected": alarm_s is not None,
         "time_s": alarm_s,
         "delay_s": Onset(window["from_s"], truth.rate_hz).delay_s(alarm_s),
-        "isolation": [_name_in_window(one, here, last_frame_s) for one in found.get("faults") or (found,)],
+        "isolation": [
+            _name_in_window(name, truth_within, last_frame_s) for name in finding.get("faults") or (finding,)
+        ],
     }
 
 
-def _name_in_window(found: Document, truth: Truth, last_frame_s: float) -> Document:
-    against = truth.against(found["isolated"], last_frame_s)
-    if against is not None:
-        begins_s = truth.onset_of(against).first_frame_with_fault_s
-        times = {key: found.get(key) for key in ("isolation_time_s", "type_time_s")}
-        found = found | {key: max(time, begins_s) for key, time in times.items() if time is not None}
-    at_s = found.get("estimate_at_s") or last_frame_s
-    on_place = [fault for fault in truth.faults if fault.actuator == found["isolated"]]
-    has_size = on_place and found.get("estimate") is not None
-    true_size = size_at(found["isolation_type"], on_place, at_s) if has_size else None
-    return _named(found | {"estimate_at_s": at_s}, truth) | {"true_size": true_size}
+def _name_in_window(finding: Document, truth: Truth, last_frame_s: float) -> Document:
+    """A name in the last frame of a window, with the true size. truth: that of the window."""
+    fault = truth.against(finding["isolated"], last_frame_s)
+    if fault is not None:
+        begins_s = truth.onset_of(fault).first_frame_with_fault_s
+        times = {key: finding.get(key) for key in ("isolation_time_s", "type_time_s")}
+        finding = finding | {key: max(time, begins_s) for key, time in times.items() if time is not None}
+    at_s = finding.get("estimate_at_s") or last_frame_s
+    on_place = [fault for fault in truth.faults if fault.actuator == finding["isolated"]]
+    has_size = on_place and finding.get("estimate") is not None
+    true_size = size_at(finding["isolation_type"], on_place, at_s) if has_size else None
+    return _named(finding | {"estimate_at_s": at_s}, truth) | {"true_size": true_size}
 
 
 def _names_given_in_flight(flight: "Landing", truth: Truth) -> tuple[str, ...]:
     """All names given in flight that were not premature, also withdrawn ones, each once: in the order of the
     faults that they name, then of time."""
-    given = [(gone["fault"], gone["from_s"]) for gone in flight.withdrawn]
-    given += [(one["isolated"], one["isolation_time_s"]) for one in flight.faults or (vars(flight),)]
-    said = []
+    given = [(withdrawn["fault"], withdrawn["from_s"]) for withdrawn in flight.withdrawn]
+    given += [(name["isolated"], name["isolation_time_s"]) for name in flight.faults or (vars(flight),)]
+    names = []  # at_s of the fault, time of the name, name
     for name, time_s in given:
-        meant = truth.faults_named_rightly_by(name, time_s)
-        of = meant[0] if meant else truth.first
-        if name is not None and not truth.is_premature(name, time_s, of):
-            said.append((of.at_s if of else 0.0, time_s, name))
-    return tuple(dict.fromkeys(name for _, _, name in sorted(said)))
+        faults = truth.faults_named_rightly_by(name, time_s)
+        fault = faults[0] if faults else truth.first
+        if name is not None and not truth.is_premature(name, time_s, fault):
+            names.append((fault.at_s if fault else 0.0, time_s, name))
+    return tuple(dict.fromkeys(name for _, _, name in sorted(names)))
 
 
-def _named(found: Document, truth: Truth, otherwise: DeclaredFault | None = None) -> Document:
-    """A named fault; `fault` is None while several candidates remain. otherwise: the fault with which a wrong
-    name is compared."""
-    name = found["isolated"]
-    kind = found["isolation_type"]
-    time_s = found["isolation_time_s"]
-    estimate = found.get("estimate")
-    type_time_s = found.get("type_time_s")
+def _named(finding: Document, truth: Truth, otherwise: DeclaredFault | None = None) -> Document:
+    """A named fault, judged as the table in `Truth` says; `fault` is None while several candidates remain.
+
+    finding: name, type, size and their times, as the diagnosis has them. otherwise: the fault with which a
+    wrong name, or none, is compared.
+    """
+    name = finding["isolated"]
+    kind = finding["isolation_type"]
+    time_s = finding["isolation_time_s"]
+    estimate = finding.get("estimate")
+    type_time_s = finding.get("type_time_s")
     right = truth.against(name, time_s)
     fault = right or otherwise
     onset = truth.onset_of(fault)
     premature = truth.is_premature(name, time_s, fault)
     type_is_right = truth.is_type_right(fault, kind, type_time_s)
-    # several are named by our diagnosis alone, which excludes all others
-    return {"so_far": None if name is None else True, **found} | {
+    # a finding without `so_far` is one of several, which our diagnosis alone names, by exclusion
+    return {"so_far": None if name is None else True, **finding} | {
         "fault": name,
         "type": kind,
         "time_s": time_s,
@@ -353,25 +368,28 @@ def _named(found: Document, truth: Truth, otherwise: DeclaredFault | None = None
     }
 
 
-def _deviations(off: Mapping[str, Quantity] | None) -> Document | None:
-    """Deviations from the commanded profile, angles in deg; None without an autopilot."""
+def _deviations(by_channel: Mapping[str, Quantity] | None) -> Document | None:
+    """Deviations from the commanded profile, angles in deg; None without an autopilot. by_channel: the same
+    with angles in rad."""
     angles = ("heading_deg", "bank_deg")
-    if off is None:
+    if by_channel is None:
         return None
     return {
-        name: math.degrees(away) if name in angles and away is not None else away
-        for name, away in off.items()
+        name: math.degrees(deviation) if name in angles and deviation is not None else deviation
+        for name, deviation in by_channel.items()
     }
 
 
 def _arrival(flight: "Landing") -> Document | None:
     """Deviations from the profile at the end; None without an autopilot, or if the aircraft is lost."""
-    off = _deviations(flight.arrival)
-    return None if off is None or flight.departure else off | {"in_envelope": not flight.outside_at_end}
+    deviations = _deviations(flight.arrival)
+    if deviations and not flight.departure:
+        return deviations | {"in_envelope": not flight.outside_at_end}
+    return None
 
 
 def _in_deg(angles: Any) -> Any:
-    """Angles by name, or of each axis, in deg."""
+    """Angles in rad by name, or of each axis, in deg; None of None."""
     if isinstance(angles, dict):
         return {name: math.degrees(angle) for name, angle in angles.items()}
     return angles and tuple(map(math.degrees, angles))
@@ -404,19 +422,20 @@ def hints(flight: "Landing", flight_metrics: Metrics) -> list[str]:
         "" if scenario.fdi.pairs else of_several(scenario),
         _hint_fault_too_small(scenario, flight_metrics),
     )
-    said = (
+    sentences = (
         *(of_diagnosis if scenario.fdi.diagnoses else ()),
         _hint_residual_near_threshold(flight),
         _hint_late_reallocation(flight_metrics),
         _hint_drift(flight),
     )
-    return [sentence for sentence in said if sentence]
+    return [sentence for sentence in sentences if sentence]
 
 
 def _hint_fault_too_small(scenario: "Scenario", flight_metrics: Metrics) -> str:
+    """A fault without an alarm, and without an instant from which an alarm was certain."""
     detection = flight_metrics.detection
-    found = detection.detected or detection.guaranteed_delay_s is not None
-    if not scenario.faults or found or detection.inconclusive:  # the last has a line of its own
+    is_detectable = detection.detected or detection.guaranteed_delay_s is not None
+    if not scenario.faults or is_detectable or detection.inconclusive:  # the last has a line of its own
         return ""
     return (
         "no alarm, and no alarm was guaranteed: the effect of the fault stayed within the uncertainty that "
@@ -443,12 +462,12 @@ def _hint_alarm_in_one_frame(scenario: "Scenario", flight_metrics: Metrics) -> s
 def _hint_residual_near_threshold(flight: "Landing") -> str:
     """The residual nearly reaches its threshold in healthy flight: a slightly larger error than declared
     would exceed it."""
-    used = max(flight.closest_approach, default=0.0)
-    if not NEAR_THRESHOLD_SHARE <= used <= 1.0:
+    share = max(flight.closest_approach, default=0.0)
+    if not NEAR_THRESHOLD_SHARE <= share <= 1.0:
         return ""
     before = " before the fault" if flight.scenario.faults else ""
     return (
-        f"the residual already reaches {math.floor(1000.0 * used) / 10.0:g} % of its threshold{before}: a "
+        f"the residual already reaches {math.floor(1000.0 * share) / 10.0:g} % of its threshold{before}: a "
         "slightly larger error would raise a false alarm"
     )
 
@@ -457,14 +476,14 @@ def _hint_late_reallocation(flight_metrics: Metrics) -> str:
     """Why the demand of a named surface was reallocated late: only a surface that is certainly weak or stuck
     is replaced. No hint for several faults, as the modes do not say which surface was replaced."""
     isolation = flight_metrics.isolation
-    taken_s = [change.time_s for change in flight_metrics.supervisor if change.mode == TAKEN_OVER]
-    if not taken_s or isolation.faults or isolation.time_s is None:
+    begun_s = [change.time_s for change in flight_metrics.supervisor if change.mode == TAKEN_OVER]
+    if not begun_s or isolation.faults or isolation.time_s is None:
         return ""
-    if taken_s[0] - isolation.time_s < LONG_S:
+    if begun_s[0] - isolation.time_s < LONG_S:
         return ""
     return (
         f"{isolation.fault} was named at {isolation.time_s:.2f} s; its demand was reallocated at "
-        f"{taken_s[0]:.2f} s, when it was certain that the surface is weak or stuck. The law would have "
+        f"{begun_s[0]:.2f} s, when it was certain that the surface is weak or stuck. The law would have "
         "corrected an offset or a slow surface without reallocation"
     )
 
@@ -479,9 +498,9 @@ def _hint_drift(flight: "Landing") -> str:
         ("airspeed", initial.airspeed_mps, airspeed_mps, DRIFT_MPS, "m/s"),
         ("altitude", initial.altitude_m, altitude_m, DRIFT_M, "m"),
     )
-    far = [
-        f"{what} {'fell' if b < a else 'rose'} from {a:.0f} to {b:.0f} {unit}"
-        for what, a, b, most, unit in ends
-        if abs(b - a) > most
+    drifts = [
+        f"{what} {'fell' if end < begin else 'rose'} from {begin:.0f} to {end:.0f} {unit}"
+        for what, begin, end, limit, unit in ends
+        if abs(end - begin) > limit
     ]
-    return f"{' and '.join(far)} (only the body rates are controlled in this scenario)" if far else ""
+    return f"{' and '.join(drifts)} (only the body rates are controlled in this scenario)" if drifts else ""

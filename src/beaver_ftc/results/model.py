@@ -217,7 +217,8 @@ class Inconclusive(Part):
 
     - `share`: number of these frames divided by the number of all frames, 0 to 1.
     - `from_s`: time of the first of these frames, s.
-    - `reasons`: one mapping for each reason.
+    - `reasons`: one mapping for each reason: the `quantity`, its own `share` of the frames, the range that
+      was `measured`, the range that was `flown` outside of it, and what it `says`.
     """
 
     share: float

@@ -33,14 +33,14 @@ from beaver_ftc_assurance.evidence.plan import EvidencePlan
 from beaver_ftc_assurance.evidence.plan_file import OfSweep, Requirement
 
 MOST_NAMED = 50  # flights that are listed as not meeting a requirement
-Judged = tuple[str, Row]  # name of a flight, and one `part` of its result
+JudgedFlight = tuple[str, Row]  # name of a flight, and one `part` of its result
 
 
 def document_of(plan: EvidencePlan, rows: Sequence[Row], date: str) -> Document:
     """The document evidence.json. date: the only difference between two documents of the same plan."""
-    requirements = [_requirement(plan, each, rows) for each in plan.file.requirements]
+    requirements = [_requirement(plan, requirement, rows) for requirement in plan.file.requirements]
     aircraft = {source.aircraft.name: source.aircraft for source in plan.sources.values()}
-    counts = _counts(each["verdict"] for each in requirements)
+    counts = _counts(requirement["verdict"] for requirement in requirements)
     return {
         "plan": plan.file.name,
         "description": plan.file.description,
@@ -48,10 +48,10 @@ def document_of(plan: EvidencePlan, rows: Sequence[Row], date: str) -> Document:
         "passed": counts[MET] == len(requirements),
         "counts": counts,
         "requirements": requirements,
-        "coverage": [_coverage(each, rows) for each in aircraft.values()],
+        "coverage": [_coverage(flown, rows) for flown in aircraft.values()],
         "sources": [
-            {"name": each.name, "given": each.given, "flights": each.flights, "sha256": each.sha256}
-            for each in plan.sources.values()
+            {"name": source.name, "given": source.given, "flights": source.flights, "sha256": source.sha256}
+            for source in plan.sources.values()
         ],
         "flights": [
             {key: row[key] for key in ("flight", "status", "why", "scenario", "log")} for row in rows
@@ -68,28 +68,27 @@ def command(plan: EvidencePlan, flight: str) -> str:
 
 def _requirement(plan: EvidencePlan, requirement: Requirement, rows: Sequence[Row]) -> Document:
     """A requirement with its verdict and margin, its worst flight, and the flights that do not meet it."""
-    over = plan.over[requirement.id]
-    of_sweep = isinstance(requirement.bar, OfSweep)
+    sources = plan.over[requirement.id]
     if isinstance(requirement.bar, OfSweep):
-        judged = [one for name in over for one in _of_sweep(plan, requirement.bar, name, rows)]
+        results = [result for name in sources for result in _of_sweep(plan, requirement.bar, name, rows)]
     else:
-        judged = [(row["flight"], one) for row in rows for one in row["found"].get(requirement.id, ())]
+        results = [(row["flight"], result) for row in rows for result in row["found"].get(requirement.id, ())]
     verdicts: dict[str, str] = {}
-    for flight, one in judged:
-        verdicts[flight] = _worst_of([verdicts.get(flight, MET), one["verdict"]])
-    flight, least = min(judged, key=lambda one: _rank(one[1]), default=("", part("", None, None, NOT_SHOWN)))
+    for flight, result in results:
+        verdicts[flight] = _worst_of([verdicts.get(flight, MET), result["verdict"]])
+    flight, worst = min(results, key=lambda of: _rank(of[1]), default=("", part("", None, None, NOT_SHOWN)))
     return {
         "id": requirement.id,
         "text": requirement.text,
         "clause": requirement.clause,
         "asked": requirement.model_dump(mode="json", include={"expect", "formula", "bar"}, exclude_none=True),
         "verdict": _worst_of(verdicts.values()),
-        "margin": least["margin"],
-        "margin_of": least["name"],
-        "worst": {"flight": flight, "command": command(plan, flight) if flight else None, **least},
-        "over": [plan.sources[name].given for name in over],
-        "flights": sum(row["source"] in over for row in rows),
-        "counts": {} if of_sweep else _counts(verdicts.values()),
+        "margin": worst["margin"],
+        "margin_of": worst["name"],
+        "worst": {"flight": flight, "command": command(plan, flight) if flight else None, **worst},
+        "over": [plan.sources[name].given for name in sources],
+        "flights": sum(row["source"] in sources for row in rows),
+        "counts": {} if isinstance(requirement.bar, OfSweep) else _counts(verdicts.values()),
         "failing": [
             {"flight": name, "verdict": verdict, "command": command(plan, name)}
             for name, verdict in verdicts.items() if verdict != MET
@@ -107,12 +106,13 @@ def _worst_of(verdicts: Iterable[str]) -> str:
     return min(verdicts, key=WORST_FIRST.index, default=NOT_SHOWN)
 
 
-def _rank(one: Row) -> tuple[int, float]:
-    """The worst first: by verdict, then by margin over the limit's size."""
-    order = WORST_FIRST.index(one["verdict"])
-    if one["margin"] is None:
-        return order, -inf if one["verdict"] == NOT_MET else inf
-    return order, one["margin"] / _size(one["expected"])
+def _rank(result: Row) -> tuple[int, float]:
+    """The worst first: by verdict, then by margin over the limit's size. A result that is not met and has no
+    margin is the worst of its verdict, any other without a margin the best."""
+    order = WORST_FIRST.index(result["verdict"])
+    if result["margin"] is None:
+        return order, -inf if result["verdict"] == NOT_MET else inf
+    return order, result["margin"] / _size(result["expected"])
 
 
 def _size(expected: Any) -> float:
@@ -123,9 +123,10 @@ def _size(expected: Any) -> float:
     return abs(float(expected)) or 1.0 if number else 1.0
 
 
-def _of_sweep(plan: EvidencePlan, bar: OfSweep, name: str, rows: Sequence[Row]) -> list[Judged]:
-    """The statistics of a sweep, compared with a bar. One is not shown if no flight gives it, or if, with a
-    confidence, its estimate keeps the limit and the bound of the estimate does not."""
+def _of_sweep(plan: EvidencePlan, bar: OfSweep, name: str, rows: Sequence[Row]) -> list[JudgedFlight]:
+    """The statistics of a sweep, each with its worst flight, compared with a bar. A statistic is not shown if
+    no flight gives it, or if the bar has a confidence, and the estimate keeps the limit, but its bound at
+    this confidence does not."""
     from beaver_ftc.studies.sweep import schema_of, table_of, write_tables
 
     source = plan.sources[name]
@@ -133,24 +134,25 @@ def _of_sweep(plan: EvidencePlan, bar: OfSweep, name: str, rows: Sequence[Row]) 
     assert isinstance(sweep, Sweep)
     schema = schema_of(sweep)
     table = table_of(sweep, schema, [row["row"] for row in rows if row["source"] == name])
-    file = io.BytesIO()
+    file = io.BytesIO()  # `Flights` reads the file of a sweep, whose columns differ from those of the rows
     write_tables(file, [table], schema)
     flights = Flights(file, sweep)
-    found = evaluate(_levels(bar), flights)
-    plain = evaluate(_levels(bar, "confidence"), flights)
+    bounded = evaluate(_conditions(bar, "type"), flights)
+    estimated = evaluate(_conditions(bar, "type", "confidence"), flights)
     return [
-        (source.flight(_worst(flights, one["name"])), _of_bound(one, other))
-        for one, other in zip(found, plain, strict=True)
+        (source.flight(_worst(flights, bound["name"])), _of_statistic(bound, estimate))
+        for bound, estimate in zip(bounded, estimated, strict=True)
     ]
 
 
 def _worst(flights: Flights, name: str) -> int:
-    """Number of the flight with the worst contribution to a statistic, such as `tracking_ratio.p`.
+    """Number of the flight with the worst contribution to a statistic, such as `tracking_ratio.p`;
+    that of the first flight if none contributes.
 
-    bad (flights,): a number for each flight, the larger the worse; a flag counts 1.
+    bad (flights,): a number for each flight, the larger the worse; a flag counts 1, an unknown number -inf.
     """
     quantity, _, axis = name.partition(".")
-    against: dict[str, Callable[[], np.ndarray]] = {
+    contributions: dict[str, Callable[[], np.ndarray]] = {
         "detection_rate": lambda: flights.faulted & ~flights.detected,
         "isolation_rate": lambda: flights.faulted & ~flights.isolated,
         "false_alarms_per_hour": lambda: flights["false_alarm"],
@@ -163,35 +165,36 @@ def _worst(flights: Flights, name: str) -> int:
     if quantity.endswith("_delay_s"):
         bad = np.where(flights.faulted, getattr(flights, quantity), -np.inf)
     else:
-        bad = against[quantity]().astype(float)
+        bad = contributions[quantity]().astype(float)
     bad = np.nan_to_num(bad, nan=-np.inf, posinf=np.inf, neginf=-np.inf)
     return int(flights["run"][np.argmax(bad)])
 
 
-def _levels(bar: OfSweep, but: str = "type") -> SweepExpect:
-    """The conditions of a bar, without the key `but` at any level."""
+def _conditions(bar: OfSweep, *without: str) -> SweepExpect:
+    """The conditions of a bar, without these keys at any level."""
 
-    def less(said: Any) -> Any:
-        """The same without the keys, at any level."""
-        if not isinstance(said, dict):
-            return said
-        return {key: less(value) for key, value in said.items() if key not in ("type", but)}
+    def reduced(section: Any) -> Any:
+        """A section, or a value, without the keys."""
+        if not isinstance(section, dict):
+            return section
+        return {key: reduced(value) for key, value in section.items() if key not in without}
 
-    return SweepExpect.model_validate(less(bar.model_dump(exclude_none=True)))
+    return SweepExpect.model_validate(reduced(bar.model_dump(exclude_none=True)))
 
 
-def _of_bound(found: Document, plain: Document) -> Row:
-    """A statistic as a part. plain: the same without the confidence that the bar asks for."""
+def _of_statistic(bound: Document, estimate: Document) -> Row:
+    """A statistic as a part. bound: its bound at the bar's confidence, or the estimate if the bar has none,
+    compared with the limit. estimate: the estimate, compared with the same limit."""
     verdict = MET
-    says = f"{found['of']} flights tell"
-    if not found["passed"]:
-        verdict = NOT_SHOWN if not found["of"] or plain["passed"] else NOT_MET
-    expected = found["expected"]
-    actual = found["actual"]
-    inside = None
+    says = f"{bound['of']} flights tell"
+    if not bound["passed"]:
+        verdict = NOT_SHOWN if not bound["of"] or estimate["passed"] else NOT_MET
+    expected = bound["expected"]
+    actual = bound["actual"]
+    margin = None
     if actual is not None:
-        inside = actual - expected["at_least"] if "at_least" in expected else expected["at_most"] - actual
-    return part(found["name"], expected, actual, verdict, inside, says)
+        margin = actual - expected["at_least"] if "at_least" in expected else expected["at_most"] - actual
+    return part(bound["name"], expected, actual, verdict, margin, says)
 
 
 def _coverage(aircraft: Aircraft, rows: Sequence[Row]) -> Document:

@@ -130,14 +130,15 @@ def tell_apart(one: Candidate, other: Candidate, at: Situation, names: Sequence[
         if target is None:
             return _none(numbers["because"], needs)
         targets[s] = target
-    found = doublet(targets, at)
-    if found is None:
+    separating = doublet(targets, at)
+    if separating is None:
         says = f"no doublet within {LONGEST_S:g} s keeps the rates below {degrees(at.rate):g} deg/s"
         return _none(f"{says} and the angle of attack in its range", needs)
-    commands, tells = found
+    commands, frames = separating
     return {
         "separates": True,
-        "time_s": (tells + 2) * at.dt,  # a command is in effect a frame later, a frame judged with the next
+        # a command is in effect a frame later, a frame judged with the next
+        "time_s": (frames + 2) * at.dt,
         "duration_s": len(commands) * at.dt,
         "amplitude_deg": degrees(max(abs(commands[:, [*targets]] - at.u[[*targets]]).max(axis=0))),
         "needs": needs,

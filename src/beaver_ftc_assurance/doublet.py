@@ -18,12 +18,20 @@ LONGEST_S = 0.5  # until the frame in which the surfaces are there
 class Situation:
     """The aircraft at the end of a flight, with n surfaces, and what limits a doublet that begins there.
 
-    G (3, n), rad/s2 per rad: effectiveness of the surfaces. u (n,), rad: their deflections. x (3,), rad/s:
-    body rates. rate, rad/s: largest allowed size of a body rate. bound (3,), rad/s2: on the innovation of a
-    frame without a fault, as long as the rates stay below `rate`. stops (2, n), rad: ends of travel. In a
-    JSBSim frame, of which a frame has `instants`, an actuator goes the share `approach` (n,) of its way, and
-    `step` (n,) rad at most. in_blocks: whether types are tested by blocks of frames. dt, s: length of a
-    frame. alpha, alpha_range, rad: angle of attack and its range.
+    G (3, n)        effectiveness of the surfaces, rad/s2 per rad
+    u (n,)          deflections of the surfaces, rad
+    x (3,)          body rates, rad/s
+    rate            largest allowed size of a body rate, rad/s
+    bound (3,)      on the innovation of a frame without a fault, while the rates stay below `rate`, rad/s2
+    stops (2, n)    ends of travel, rad
+    approach (n,)   share of the way to its command that an actuator goes in a JSBSim frame
+    step (n,)       largest movement of an actuator in a JSBSim frame, rad; infinite without a rate limit
+    instants        JSBSim frames in a frame
+    in_blocks       whether types are tested by blocks of frames; `tell_apart` then asks for no doublet that
+                    distinguishes types
+    dt              length of a frame, s
+    alpha           angle of attack, rad
+    alpha_range     its range, rad
     """
 
     G: np.ndarray
@@ -41,7 +49,7 @@ class Situation:
     alpha_range: tuple[float, float]
 
     @property
-    def held(self) -> int:
+    def frames_held(self) -> int:
         """Number of frames for which the deflection must hold: 3 if a frame has several JSBSim frames, as
         `History.is_unexplained` then requires the frames before and after too."""
         return 1 if self.instants == 1 else 3
@@ -57,25 +65,27 @@ class Situation:
 
 
 def doublet(targets: dict[int, float], at: Situation) -> tuple[np.ndarray, int] | None:
-    """Commands (frames, n), rad, that bring surfaces to these deflections and back, and the frame in which
-    they are there; None if no doublet does within the limits.
+    """Commands (frames, n), rad, that bring surfaces to these deflections and back, and the number of frames
+    to the last one in which they hold, counted from 1; None if no doublet does within the limits.
 
     targets: deflection, rad, by place of the surface.
 
     The times to the deflection are 1, 4, 16, ... frames, and LONGEST_S. The first time that has a doublet is
-    taken, with the least amplitude. A longer time never lacks a doublet that a shorter one has: it can wait.
+    taken, with the least amplitude. If a shorter time has a doublet, a longer one has it too, as the commands
+    may begin later.
     """
-    tells = 1
+    frames_to_target = 1
     longest = max(int(LONGEST_S / at.dt), 1)
-    while (found := _least_amplitude(targets, at, tells)) is None:
-        if tells == longest:
+    while (commands := _least_amplitude(targets, at, frames_to_target)) is None:
+        if frames_to_target == longest:
             return None
-        tells = min(4 * tells, longest)
-    return found, tells + at.held - 1
+        frames_to_target = min(4 * frames_to_target, longest)
+    return commands, frames_to_target + at.frames_held - 1
 
 
-def _least_amplitude(targets: dict[int, float], at: Situation, tells: int) -> np.ndarray | None:
-    """Commands (frames, n), rad, of the doublet that is there in frame `tells` - 1; None if there is none.
+def _least_amplitude(targets: dict[int, float], at: Situation, frames_to_target: int) -> np.ndarray | None:
+    """Commands (frames, n), rad, of the doublet at its target from this frame on, counted from 1; None
+    if there is none.
 
     The linear programme. Its unknowns are blocks, one value a frame k, each less the present value: of each
     surface the command u; of each its deflection p at the end of the frame; the rates x = p, q, r; the pitch
@@ -93,38 +103,41 @@ def _least_amplitude(targets: dict[int, float], at: Situation, tells: int) -> np
 
     if (np.abs(at.x) > at.rate).any() or not at.alpha_range[0] <= at.alpha <= at.alpha_range[1]:
         return None
-    frames = 2 * (tells + at.held - 1)
+    frames = 2 * (frames_to_target + at.frames_held - 1)
     surfaces = [*targets]
     n = len(surfaces)
-    there = slice(tells - 1, tells + at.held - 1)
+    hold = slice(frames_to_target - 1, frames_to_target + at.frames_held - 1)
     every = np.arange(frames)
     unknowns = (2 * n + 4) * frames + 1
     blocks = [eye_array(frames, unknowns, k=block * frames, format="csr") for block in range(2 * n + 4)]
     A = csr_array((np.ones(frames), (every, np.full(frames, unknowns - 1))), shape=(frames, unknowns))
     before = eye_array(frames, k=-1, format="csr")  # times a block: its values a frame earlier, 0 at first
     *x, pitch = blocks[2 * n :]
-    turning = [rate - before @ rate for rate in x]
+    dx = [rate - before @ rate for rate in x]  # x[k] - x[k-1], less dt G m[k], surface by surface
     equal: list[Any] = []  # rows that are zero
-    above: list[tuple[Any, float]] = []  # rows, and what they are at most
+    above: list[tuple[Any, float]] = []  # rows, and their limits
     for u, p, s in zip(blocks[:n], blocks[n:], surfaces, strict=False):
         away = targets[s] - at.u[s]
         (a, b) = at.remaining_way(s)
         m = b * (before @ p) + (1.0 - b) * u
-        equal += [p - a * (before @ p) - (1.0 - a) * u, (u - before @ u)[there][1:]]
-        above.append((-np.sign(away) * m[there], -abs(away)))
+        equal += [
+            p - a * (before @ p) - (1.0 - a) * u,  # p[k] = a p[k-1] + (1 - a) u[k]
+            (u - before @ u)[hold][1:],  # u[k] constant while the deflection holds
+        ]
+        above.append((-np.sign(away) * m[hold], -abs(away)))  # |m[k]| >= |target|, on its side
         for sign in (1.0, -1.0):
-            above.append((sign * u - A, 0.0))
+            above.append((sign * u - A, 0.0))  # |u[k]| <= A
             if np.isfinite(at.step[s]):
-                above.append((sign * (m - before @ m), at.step[s] * at.instants))
-        turning = [row - at.dt * g * m for row, g in zip(turning, at.G[:, s], strict=True)]
-    equal += [*turning, pitch - before @ pitch - at.dt * x[1]]
-    most = np.repeat([limit for _, limit in above], [rows.shape[0] for rows, _ in above])
+                above.append((sign * (m - before @ m), at.step[s] * at.instants))  # |m[k] - m[k-1]|
+        dx = [row - at.dt * g * m for row, g in zip(dx, at.G[:, s], strict=True)]
+    equal += [*dx, pitch - before @ pitch - at.dt * x[1]]  # pitch[k] = pitch[k-1] + dt q[k]
+    limits = np.repeat([limit for _, limit in above], [rows.shape[0] for rows, _ in above])
     rows = vstack([rows for rows, _ in above], format="csc")
-    found = _solved(rows, most, vstack(equal, format="csc"), _limits(at, surfaces, frames))
-    if found is None:
+    solution = _solved(rows, limits, vstack(equal, format="csc"), _limits(at, surfaces, frames))
+    if solution is None:
         return None
     commands = np.tile(at.u, (frames, 1))
-    commands[:, surfaces] += found[: n * frames].reshape(n, frames).T
+    commands[:, surfaces] += solution[: n * frames].reshape(n, frames).T
     return commands
 
 
@@ -141,15 +154,15 @@ def _limits(at: Situation, surfaces: list[int], frames: int) -> np.ndarray:
     return limits
 
 
-def _solved(above: Any, most: np.ndarray, equal: Any, bounds: np.ndarray) -> np.ndarray | None:
-    """The unknowns with the least amplitude, of which rows `above` give at most `most`, and `equal` zero;
+def _solved(above: Any, limits: np.ndarray, equal: Any, bounds: np.ndarray) -> np.ndarray | None:
+    """The unknowns with the least amplitude, of which rows `above` give at most `limits`, and `equal` zero;
     None where there are none within the limits.
     """
     from scipy.optimize import linprog
 
     weight = np.r_[np.zeros(len(bounds) - 1), 1.0]
     for method in ("highs-ds", "highs-ipm"):  # the second where rounding stops the first
-        result = linprog(weight, above, most, equal, np.zeros(equal.shape[0]), bounds, method=method)
+        result = linprog(weight, above, limits, equal, np.zeros(equal.shape[0]), bounds, method=method)
         if result.status in (0, 2):  # solved, or infeasible
             break
     return np.asarray(result.x) if result.status == 0 else None

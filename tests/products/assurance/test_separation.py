@@ -119,7 +119,7 @@ def test_a_doublet_is_there_and_back_within_every_limit(target, instants, approa
         seen.append(mean)
     assert abs(rates) == pytest.approx(0.0, abs=1e-6)
     assert (abs(commands) <= 0.3 + 1e-7).all()
-    there = np.array(seen[tells - at.held : tells]) * np.sign(target)
+    there = np.array(seen[tells - at.frames_held : tells]) * np.sign(target)
     assert (there >= abs(target) - 1e-7).all()
 
 

@@ -17,7 +17,6 @@ widened there, and the search goes on.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import count
 from math import exp, log
 
 import numpy as np
@@ -40,7 +39,11 @@ Ranges = Mapping[str, Range]
 
 @dataclass(frozen=True)
 class Found:
-    """The result of a search: the cost at the start, the lowest, the values found, the ranges, trials made.
+    """The result of a search: the cost at the start, the values found and their cost, the ranges as widened,
+    the names of widened ranges, one a widening, and the number of trials.
+
+    cost: that of the chosen tie, at most the share `TIE` above the lowest of its last search. A restart
+    begins there, so that the cost may rise by as much at each restart.
 
     restarts: searches after the first. settled: whether the last of them gained nothing; if not, the budget
     ended the search, and a longer one may find more.
@@ -54,6 +57,13 @@ class Found:
     trials: int
     restarts: int
     settled: bool
+
+
+# The scale of a range: from a value to the scale, and back.
+_SCALES: Mapping[str, tuple[Callable[[float], float], Callable[[float], float]]] = {
+    "log": (log, exp),
+    "odds": (lambda x: log(x / (1.0 - x)), lambda y: 1.0 / (1.0 + exp(-y))),
+}
 
 
 def on_scale(of: Range, value: float) -> float:
@@ -70,12 +80,6 @@ def value_at(of: Range, place: float) -> float:
     return float(f"{value:.6g}") if of.scale == "log" else value
 
 
-_SCALES: Mapping[str, tuple[Callable[[float], float], Callable[[float], float]]] = {
-    "log": (log, exp),
-    "odds": (lambda x: log(x / (1.0 - x)), lambda y: 1.0 / (1.0 + exp(-y))),
-}
-
-
 def on_edge(values: Values, ranges: Ranges) -> dict[str, bool]:
     """Parameters that lie within `EDGE` of a limit of their range: whether it is the upper one."""
     places = {name: on_scale(of, values[name]) for name, of in ranges.items()}
@@ -87,28 +91,32 @@ def search(cost: Cost, ranges: Ranges, start: Values, trials: int, seed: int, re
     first; a widened range does not count. Raises SimulationFailed if one has to be widened too often."""
     ranges = dict(ranges)
     widened = list[str]()
-    best = dict(start)
-    lowest = None
+    values = dict(start)
+    cost_now = None
     start_cost = 0.0
-    made = widenings = quiet = done = 0
-    for number in count(seed):
-        before = lowest
-        best, lowest, costs = _searched(cost, ranges, best, before, trials, number)
-        start_cost = costs[0] if before is None else start_cost
-        made += len(costs) - (before is not None)  # the best so far is not tried again
-        if edges := on_edge(best, ranges):
+    # made: trials. widenings: searches that ended on an edge. done: restarts. quiet: restarts in a row that
+    # gained nothing.
+    made = widenings = done = quiet = 0
+    while True:
+        cost_before = cost_now
+        values, cost_now, costs = _searched(cost, ranges, values, cost_before, trials, seed)
+        seed += 1
+        start_cost = costs[0] if cost_before is None else start_cost
+        made += len(costs) - (cost_before is not None)  # a restart does not try its start again
+        if edges := on_edge(values, ranges):
             if widenings == WIDENINGS:
-                break
+                raise SimulationFailed(
+                    f"on the edge of its range after {WIDENINGS} widenings: {', '.join(edges)}"
+                )
             widenings += 1
             widened += edges
             ranges |= {name: widen(ranges[name], upper) for name, upper in edges.items()}
             continue
-        gains = before is None or lowest < before - LITTLE * abs(before)
+        gains = cost_before is None or cost_now < cost_before - LITTLE * abs(cost_before)
         quiet = 0 if gains else quiet + 1
         if quiet == SETTLED or done == restarts:
-            return Found(start_cost, lowest, best, ranges, tuple(widened), made, done, quiet == SETTLED)
+            return Found(start_cost, cost_now, values, ranges, tuple(widened), made, done, quiet == SETTLED)
         done += 1
-    raise SimulationFailed(f"on the edge of its range after {WIDENINGS} widenings: {', '.join(edges)}")
 
 
 def widen(of: Range, upper: bool) -> Range:
@@ -144,14 +152,14 @@ def _searched(
     step = FIRST_STEP
     if known is None:
         attempt(first)
-    else:  # every other point is near the start
+    else:  # every other point of a restart is near its start, which is not tried again
         points.append(first)
         costs.append(known)
         spread[::2] = np.clip(first + NEAR * (2.0 * spread[::2] - 1.0), 0.0, 1.0)
         step = NEAR
     for point in spread:
         attempt(point)
-    while (left := trials - len(costs)) > n:
+    while (left := trials - len(costs)) > n:  # Nelder-Mead again, from the best so far
         begin = points[int(np.argmin(costs))]
         steps = np.diag(np.where(begin < 0.5, step, -step))  # towards the middle of each range
         corners = np.vstack((begin, begin + steps))

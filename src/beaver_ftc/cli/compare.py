@@ -139,7 +139,7 @@ def _compare_runs(folders: list[Path], out: Path, format: Format) -> None:
     from beaver_ftc.studies.compare.runs import as_text, labels, write_runs
 
     runs = write_runs(out, folders)
-    document = {"runs": dict(zip(labels(runs), (run.document for run in runs), strict=True))}
+    document = {"runs": dict(zip(labels(runs), (run.entry for run in runs), strict=True))}
     answer(format, document, lambda: f"{as_text(runs)}\n\nreport: {out / 'runs' / 'runs.html'}")
 
 

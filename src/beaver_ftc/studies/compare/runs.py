@@ -26,21 +26,21 @@ _ALLOWED = "allowed: a result folder of beaver-ftc run"
 
 @dataclass(frozen=True)
 class Run:
-    """A finished run. metrics, flown: its metrics.json and scenario.yaml as they are."""
+    """A finished run. document, scenario: its metrics.json and scenario.yaml as they are."""
 
     folder: Path
-    metrics: Document
-    flown: Document
+    document: Document
+    scenario: Document
 
     @cached_property
-    def found(self) -> Metrics:
+    def metrics(self) -> Metrics:
         """The metrics, typed."""
-        return Metrics.of(self.metrics)
+        return Metrics.of(self.document)
 
     @property
-    def document(self) -> Document:
-        """All of it, as `runs.json` has it."""
-        return self.metrics | {"folder": str(self.folder), "flown": self.flown}
+    def entry(self) -> Document:
+        """The run as `runs.json` has it."""
+        return self.document | {"folder": str(self.folder), "flown": self.scenario}
 
 
 def read_runs(folders: Sequence[Path]) -> list[Run]:
@@ -60,48 +60,52 @@ def read_runs(folders: Sequence[Path]) -> list[Run]:
 
 
 def _read(folder: Path) -> Run:
+    """The run in a result folder. Raises OSError if a file is missing, and ValueError, KeyError, TypeError or
+    AttributeError if one has not the form that `rows_of` needs."""
     import yaml
 
     document = read_metrics(folder / "metrics.json")
-    (folder / "log.parquet").stat()
+    (folder / "log.parquet").stat()  # raises FileNotFoundError: the figure needs the log
     try:
-        flown = yaml.safe_load((folder / "scenario.yaml").read_text(encoding="utf-8"))
+        scenario = yaml.safe_load((folder / "scenario.yaml").read_text(encoding="utf-8"))
     except (yaml.YAMLError, RecursionError) as error:
         raise ValueError("no YAML") from error
-    run = Run(folder, document, flown)
+    run = Run(folder, document, scenario)
     rows_of(run)  # a document that lacks a section is refused here
     return run
 
 
-DIAGNOSED = {  # what it is called, and where it is in the metrics
-    "detection delay, s": "detection.delay_s", "guaranteed delay, s": "detection.guaranteed_delay_s",
-    "isolated": "isolation.fault", "isolation delay, s": "isolation.delay_s",
+DIAGNOSED = {  # label of a row -> path in the metrics
+    "detection delay, s": "detection.delay_s",
+    "guaranteed delay, s": "detection.guaranteed_delay_s",
+    "isolated": "isolation.fault",
+    "isolation delay, s": "isolation.delay_s",
     "estimate": "isolation.estimate",
-}  # fmt: skip
+}
 
 
 def rows_of(run: Run) -> dict[str, str]:
     """The rows of a run, name -> text: what was flown, then what came of it."""
-    found = run.found
-    flown = run.flown
-    departure = run.found.departure
+    metrics = run.metrics
+    scenario = run.scenario
+    departure = metrics.departure
     return {
-        "scenario": found.scenario,
-        "law": flown["control"]["law"],
-        "scheme": flown["fdi"]["scheme"],
-        "flight condition": "{airspeed_mps:g} m/s, {altitude_m:g} m".format(**flown["initial"]),
-        "seed": str(found.seed),
-        "faults": "; ".join(map(fault_words, flown.get("faults", []))) or NOTHING,
-        **{says: number(found.at(path)) for says, path in DIAGNOSED.items()},
-        "false alarm": "yes" if found.false_alarm else "no",
+        "scenario": metrics.scenario,
+        "law": scenario["control"]["law"],
+        "scheme": scenario["fdi"]["scheme"],
+        "flight condition": "{airspeed_mps:g} m/s, {altitude_m:g} m".format(**scenario["initial"]),
+        "seed": str(metrics.seed),
+        "faults": "; ".join(map(fault_words, scenario.get("faults", []))) or NOTHING,
+        **{label: number(metrics.at(path)) for label, path in DIAGNOSED.items()},
+        "false alarm": "yes" if metrics.false_alarm else "no",
         **{
-            f"{when} RMS {axis}, deg/s": number(found.at(f"tracking.{when}_fault_rms_deg_s.{axis}"))
+            f"{when} RMS {axis}, deg/s": number(metrics.at(f"tracking.{when}_fault_rms_deg_s.{axis}"))
             for when in ("pre", "post")
             for axis in AXES
         },
-        "outside the envelope, s": number(found.envelope.outside_s),
+        "outside the envelope, s": number(metrics.envelope.outside_s),
         "departure": f"{departure.signal} at {departure.time_s:.2f} s" if departure else NOTHING,
-        "passed": "yes" if found.passed else "no",
+        "passed": "yes" if metrics.passed else "no",
     }
 
 
@@ -114,8 +118,8 @@ def fault_words(fault: Document) -> str:
     ]
     where = fault.get("actuator") or fault.get("sensor") or fault.get("case")
     end = "" if fault.get("end_s") is None else f"to {fault['end_s']:g} s"
-    said = where, fault["type"].replace("_", " "), *sizes, f"at {fault['at_s']:g} s", end
-    return " ".join(filter(None, said))
+    words = where, fault["type"].replace("_", " "), *sizes, f"at {fault['at_s']:g} s", end
+    return " ".join(filter(None, words))
 
 
 def as_text(runs: Sequence[Run]) -> str:
@@ -142,7 +146,7 @@ def figure_of(runs: Sequence[Run]) -> "Figure":
     axes = grid[:, 0]
     for run, label in zip(runs, labels(runs), strict=True):
         _draw(axes, run.folder, label)
-    struck = sorted({run.found.fault.at_s for run in runs if run.found.fault})
+    struck = sorted({run.metrics.fault.at_s for run in runs if run.metrics.fault})
     for axis, letter in zip(axes, AXES, strict=True):
         for at_s in struck:
             axis.axvline(at_s, color=BLACK, linewidth=0.9, linestyle=":")
@@ -167,7 +171,7 @@ def write_runs(out: Path, folders: Sequence[Path]) -> list[Run]:
 
     runs = read_runs(folders)
     with result_folder(out, "runs") as folder:
-        documents = [run.document for run in runs]
+        documents = [run.entry for run in runs]
         write_files(folder, {"runs.png": figure_of(runs), "runs.json": as_json(documents)})
         write_report(folder / "runs.html", folders, labels(runs), [mismatch_section])
     return runs

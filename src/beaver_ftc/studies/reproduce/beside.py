@@ -53,7 +53,8 @@ def false_alarm_of(setting: Changed) -> float:
 
 
 def document_of(flights: Mapping[tuple[str, str], Flown], alarms: Sequence[float]) -> Document:
-    """A row a case and scheme, and the false alarms of each; alarms: of each of healthy_settings."""
+    """A row a case and scheme, and the false alarms of each. alarms: one for each of `healthy_settings`, in
+    their order."""
     rows = [_row(case, whose, flown) for (case, whose), flown in flights.items()]
     settings = zip(healthy_settings(), alarms, strict=True)
     alarmed = Counter(whose for (whose, _), alarm in settings if alarm)
@@ -66,29 +67,32 @@ def document_of(flights: Mapping[tuple[str, str], Flown], alarms: Sequence[float
 
 
 def _row(case: str, whose: str, flown: Flown) -> Document:
-    found = flown.metrics
+    """The row of a flight. case: its name; the healthy case has no axis of its own and is shown in pitch."""
+    metrics = flown.metrics
     axis = AXIS.get(case, "q")
-    tracked = found.tracking
+    tracking = metrics.tracking
     return {
         "case": case,
         "flown_by": whose,
-        "scheme": found.flight.scheme,
-        "law": found.flight.law,
-        "detected_s": found.detection.delay_s,
-        "named": found.isolation.fault,
-        "isolated_s": found.isolation.delay_s,
+        "scheme": metrics.flight.scheme,
+        "law": metrics.flight.law,
+        "detected_s": metrics.detection.delay_s,
+        "named": metrics.isolation.fault,
+        "isolated_s": metrics.isolation.delay_s,
         "axis": axis,
-        "before_deg_s": found.at(f"tracking.pre_fault_rms_deg_s.{axis}"),
-        "after_deg_s": found.at(f"tracking.post_fault_rms_deg_s.{axis}"),
-        "travel_deg": sum(tracked.surface_travel_deg.values()),
-        "work_deg2_per_s": sum(tracked.surface_energy_deg2_s.values()),
-        "departed": found.departure is not None,
+        "before_deg_s": metrics.at(f"tracking.pre_fault_rms_deg_s.{axis}"),
+        "after_deg_s": metrics.at(f"tracking.post_fault_rms_deg_s.{axis}"),
+        "travel_deg": sum(tracking.surface_travel_deg.values()),
+        "work_deg2_per_s": sum(tracking.surface_energy_deg2_s.values()),
+        "departed": metrics.departure is not None,
     }
 
 
 def _better(rows: Sequence[Document]) -> list[Document]:
     """Where the paper's scheme or law does better than ours."""
-    pairs = zip(rows[::2], rows[1::2], strict=True)
+    pairs = zip(
+        rows[::2], rows[1::2], strict=True
+    )  # `fly_beside` flies each case by the paper's, then by ours
     return [
         {
             "case": paper["case"],
@@ -103,8 +107,9 @@ def _better(rows: Sequence[Document]) -> list[Document]:
     ]
 
 
-def _less(one: float | None, other: float | None) -> bool:
-    return one is not None and (other is None or one < (1.0 - MATTERS) * other)
+def _less(paper: float | None, ours: float | None) -> bool:
+    """Whether the paper's number is less by more than `MATTERS`; None is more than any number."""
+    return paper is not None and (ours is None or paper < (1.0 - MATTERS) * ours)
 
 
 def _after(row: Document) -> str:
@@ -130,8 +135,8 @@ def sentences(document: Document) -> list[str]:
 
 def alarms_sentence(document: Document) -> str:
     """The false alarms in a sentence."""
-    said = ", ".join(f"{count} with {whose}" for whose, count in document["false_alarms"].items())
+    alarms = document["false_alarms"]
     return (
         f"False alarms in {document['healthy_flights']} healthy flights at the corners and edges of the "
-        f"published uncertainty: {said.replace('with paper', 'with the scheme of the paper')}."
+        f"published uncertainty: {alarms['paper']} with the scheme of the paper, {alarms['ours']} with ours."
     )

@@ -32,7 +32,8 @@ if TYPE_CHECKING:
 
 SENSITIVITY = "sensitivity"
 _LEAST, _MOST = 1e-3, 10.0  # of its axis: what is smaller is nothing, what is larger never happens
-_GROUPS = (NOT_BORNE_OUT, CANNOT_BE_JUDGED, BORNE_OUT, STRONGER)  # from above
+# From above; a statement that cannot be judged holds without its mechanism, too.
+_GROUPS = (NOT_BORNE_OUT, CANNOT_BE_JUDGED, BORNE_OUT, STRONGER)
 _LINE = 60  # characters
 _CLIPPED = {_LEAST: "<", _MOST: ">"}
 WHOLE = (0.0, np.inf)
@@ -40,6 +41,7 @@ CLOSE = (FAULT_AT_S - 0.5, FAULT_AT_S + 5.0)
 
 
 def _pair(label: str, target: tuple[str, str, str], actual: str) -> Panel:
+    """A signal with its target. target: column, label, look; actual: column."""
     return Panel(label, (Trace(*target), Trace(actual, "actual", "actual")))
 
 
@@ -87,7 +89,7 @@ FIGURES: tuple[tuple[View, str, tuple[float, float]], ...] = tuple(  # view, cas
 
 def figures_of(document: Summary) -> Files:
     """Every figure by the name of its file: a figure for each published one, and the sensitivity study's.
-    document: with the published cases, flown, behind it."""
+    document: `behind` it are the flights by the names of their cases."""
     drawn = {f"{view.name}.png": _drawn(view, document.behind[case], span) for view, case, span in FIGURES}
     return {**drawn, f"{SENSITIVITY}.png": margins_figure(document)}
 
@@ -101,22 +103,25 @@ def _drawn(view: View, flown: Flown, span: tuple[float, float]) -> "Figure":
 
 
 def shares(claim: Document) -> tuple[float, float, float]:
-    """(lowest, ours, highest) number as shares of the limit, each at most 1 where the statement holds."""
+    """(lowest, ours, highest) number as shares of the limit, each at most 1 where the statement holds.
+    If the number is to be at least the limit, its lowest value has the highest share."""
     low, ours, high = (_share(claim, claim[key]) for key in ("lowest", "number", "highest"))
     return min(low, ours, high), ours, max(low, ours, high)
 
 
 def _share(claim: Document, number: float | None) -> float:
-    known = or_never(number)
+    """number / limit, or limit / number if the number is to be at least the limit: 1 or less keeps the limit.
+    0 / 0 is 0. A number that is None never comes, and counts as infinite."""
+    size = or_never(number)
     limit = claim["limit"]
-    over, under = (limit, known) if claim["at_least"] else (known, limit)
-    if under:
-        return over / under
-    return inf if over > 0.0 else 0.0
+    numerator, denominator = (limit, size) if claim["at_least"] else (size, limit)
+    if denominator:
+        return numerator / denominator
+    return inf if numerator > 0.0 else 0.0
 
 
 def margins_figure(document: Document) -> "Figure":
-    """A row a statement that can be tested, by verdict: its number's range over the changes, and ours."""
+    """A row a statement that has a number, by verdict: the range of the number over the changes, and ours."""
     from matplotlib.figure import Figure
 
     claims = [claim for claim in document["claims"] if not claim["reason"] and not claim["construction"]]

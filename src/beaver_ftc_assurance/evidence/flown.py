@@ -75,7 +75,7 @@ def failed(plan: EvidencePlan, case: tuple[str, int], why: str, status: str = CR
     of_sweep = assigned and row_of_failure(source.what, assigned, status, why)  # type: ignore[arg-type]
     return {
         "flight": source.flight(run), "source": name, "run": run, "status": status, "why": why,
-        "found": {each.id: [none] for each in plan.of(name)}, "row": of_sweep,
+        "found": {requirement.id: [none] for requirement in plan.of(name)}, "row": of_sweep,
         "scenario": None, "log": None, "aircraft": None, "faults": [], "cells": [],
     }  # fmt: skip
 
@@ -86,7 +86,7 @@ def _flown(plan: EvidencePlan, name: str, run: int) -> Row:
 
     source = plan.sources[name]
     scenario = source.scenario(run)
-    formulas = [plan.formulas.get(each.id) for each in plan.of(name)]
+    formulas = [plan.formulas.get(requirement.id) for requirement in plan.of(name)]
     log = Watched(column for formula in formulas if formula for column in formula.columns)
     flight = fly(scenario, log)
     amounts = measure(flight)
@@ -96,12 +96,15 @@ def _flown(plan: EvidencePlan, name: str, run: int) -> Row:
         "flight": source.flight(run), "source": name, "run": run,
         "status": DEPARTED if lost else FLOWN,
         "why": f"lost: {lost.signal} at {lost.time_s:g} s" if lost else "",
-        "found": {each.id: _judged(plan, each, scenario, amounts, log) for each in plan.of(name)},
+        "found": {
+            requirement.id: _judged(plan, requirement, scenario, amounts, log)
+            for requirement in plan.of(name)
+        },
         "row": assigned and row_of(assigned, amounts, flight),
         "scenario": hashlib.sha256(to_yaml(scenario).encode()).hexdigest(),
         "log": log.sha256,
         "aircraft": scenario.airframe.name,
-        "faults": [[each.get("actuator"), each["type"]] for each in faults_of(scenario)],
+        "faults": [[fault.get("actuator"), fault["type"]] for fault in faults_of(scenario)],
         "cells": cells(log, scenario),
     }  # fmt: skip
 
@@ -116,17 +119,17 @@ def part(
 
 
 def _judged(
-    plan: EvidencePlan, requirement: Requirement, scenario: Scenario, found: Metrics, log: Watched
+    plan: EvidencePlan, requirement: Requirement, scenario: Scenario, amounts: Metrics, log: Watched
 ) -> list[Row]:
     """The parts of a requirement with their results; none if the requirement is on the statistics of a
     sweep."""
     bar = requirement.bar
     formula = plan.formulas.get(requirement.id)
     if formula is not None:
-        return [_of_formula(requirement.formula or "", formula, scenario.rate_hz, found, log)]
+        return [_of_formula(requirement.formula or "", formula, scenario.rate_hz, amounts, log)]
     try:
         if isinstance(bar, OfHandling):
-            return _of_handling(bar, scenario, found, log)
+            return _of_handling(bar, scenario, amounts, log)
         if isinstance(bar, OfMargins):
             return _of_margins(bar, scenario)
     except BeaverFtcError as error:  # the study has nothing to say of it, such as of another law
@@ -134,15 +137,15 @@ def _judged(
     if requirement.expect is None:
         return []
     return [
-        part(one.name, one.expected, one.actual, MET if one.passed else NOT_MET, margin(one))
-        for one in evaluate(plan.expect[requirement.id], found)
+        part(bound.name, bound.expected, bound.actual, MET if bound.passed else NOT_MET, margin(bound))
+        for bound in evaluate(plan.expect[requirement.id], amounts)
     ]
 
 
-def _of_formula(text: str, formula: Formula, rate_hz: float, found: Metrics, log: Watched) -> Row:
+def _of_formula(text: str, formula: Formula, rate_hz: float, amounts: Metrics, log: Watched) -> Row:
     """The robustness of a formula; not shown where the log ends before what it asks for."""
     r = formula.robustness(log, rate_hz)
-    lost = found.departure
+    lost = amounts.departure
     if not math.isfinite(r):
         nan = "a column is not a number where it asks"
         far = "it looks beyond the log, or at what is infinite"
@@ -153,22 +156,24 @@ def _of_formula(text: str, formula: Formula, rate_hz: float, found: Metrics, log
     return part("robustness", text, r, MET if r >= 0.0 else NOT_MET, r)
 
 
-def _of_handling(bar: OfHandling, scenario: Scenario, found: Metrics, log: Watched) -> list[Row]:
+def _of_handling(bar: OfHandling, scenario: Scenario, amounts: Metrics, log: Watched) -> list[Row]:
     """A part for each mode: its level of handling qualities."""
     from beaver_ftc.studies import HANDLING_LIMITS as LIMITS
     from beaver_ftc.studies import where_ended, where_trimmed
 
-    if found.departure:
+    if amounts.departure:
         return [part("handling qualities", bar.level, None, NOT_SHOWN, says="the aircraft was lost")]
     qualities = where_ended(scenario, log.end) if scenario.faults else where_trimmed(scenario)
     parts = []
-    for limit, each in zip(LIMITS, qualities, strict=True):
+    for limit, quality in zip(LIMITS, qualities, strict=True):
         ends = zip(("at_least", "at_most"), limit.levels[bar.level - 1], strict=True)
         asked = {side: end for side, end in ends if not math.isinf(end)} | {"level": bar.level}
-        verdict = MET if each.level <= bar.level else NOT_MET
-        inside = finite(limit.margin(each.value, bar.level))
-        says = f"level {each.level}" if each.level <= 3 else "no level"
-        parts.append(part(f"{limit.mode} {limit.quantity}", asked, finite(each.value), verdict, inside, says))
+        verdict = MET if quality.level <= bar.level else NOT_MET
+        inside = finite(limit.margin(quality.value, bar.level))
+        says = f"level {quality.level}" if quality.level <= 3 else "no level"
+        parts.append(
+            part(f"{limit.mode} {limit.quantity}", asked, finite(quality.value), verdict, inside, says)
+        )
     return parts
 
 
@@ -178,18 +183,18 @@ def _of_margins(bar: OfMargins, scenario: Scenario) -> list[Row]:
     from beaver_ftc.studies import refuse_laws_without_margins as refuse_other_laws
 
     refuse_other_laws(scenario)
-    found = list(at(scenario))
-    if not found:
+    loops = list(at(scenario))
+    if not loops:
         return [part("margins", None, None, NOT_SHOWN, says="no surface has a loop to speak of")]
     parts = []
     for name, bound, margins in (
-        ("gain margin, dB", bar.gain_db, [(min(each.up_db, each.down_db), each.fault) for each in found]),
-        ("phase margin, deg", bar.phase_deg, [(each.phase_deg, each.fault) for each in found]),
+        ("gain margin, dB", bar.gain_db, [(min(loop.up_db, loop.down_db), loop.fault) for loop in loops]),
+        ("phase margin, deg", bar.phase_deg, [(loop.phase_deg, loop.fault) for loop in loops]),
     ):
-        least, fault = min(margins)
-        verdict = MET if least >= bound else NOT_MET
-        inside = finite(least - bound)
-        parts.append(part(name, {"at_least": bound}, finite(least), verdict, inside, f"fault: {fault}"))
+        smallest, fault = min(margins)
+        verdict = MET if smallest >= bound else NOT_MET
+        inside = finite(smallest - bound)
+        parts.append(part(name, {"at_least": bound}, finite(smallest), verdict, inside, f"fault: {fault}"))
     return parts
 
 
@@ -198,9 +203,9 @@ def cells(columns: Mapping[str, np.ndarray], scenario: Scenario) -> list[int]:
     cell is (number of altitude bands) * (airspeed band) + (altitude band)."""
     slowest, fastest = scenario.airframe.envelope.airspeed_mps
     since = min((fault.at_s for fault in scenario.faults), default=0.0)
-    there = (columns["t_s"] >= since) & (columns["envelope_valid"] > 0.5)
-    V = columns["airspeed_mps"][there]
-    h = columns["altitude_m"][there]
+    counted = (columns["t_s"] >= since) & (columns["envelope_valid"] > 0.5)
+    V = columns["airspeed_mps"][counted]
+    h = columns["altitude_m"][counted]
     band = np.floor(BANDS * (V - slowest) / (fastest - slowest)).astype(int)
     inside = (band >= 0) & (band < BANDS)
     of_all = band[inside] * (len(ALTITUDES_M) + 1) + np.searchsorted(ALTITUDES_M, h[inside], side="right")

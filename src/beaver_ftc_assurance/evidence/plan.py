@@ -72,7 +72,7 @@ class EvidencePlan:
 
     def of(self, source: str) -> Iterator[Requirement]:
         """The requirements that a source is flown for."""
-        return (each for each in self.file.requirements if source in self.over[each.id])
+        return (asked for asked in self.file.requirements if source in self.over[asked.id])
 
 
 def load_plan(path_or_name: str) -> EvidencePlan:
@@ -139,17 +139,17 @@ class _Reading:
 
     def _by_name(self) -> dict[str, Source]:
         """The sources by their own names, which must differ."""
-        found: dict[str, Source] = {}
+        sources: dict[str, Source] = {}
         for source in filter(None, self._sources.values()):
-            if source.name in found:
-                both = f"{source.given} and {found[source.name].given}"
+            if source.name in sources:
+                both = f"{source.given} and {sources[source.name].given}"
                 says = f"{both} are both named {source.name}, allowed: each name once"
                 self._problem(("requirements",), says)
-            found[source.name] = source
-        flights = sum(source.flights for source in found.values())
+            sources[source.name] = source
+        flights = sum(source.flights for source in sources.values())
         if flights > MOST_FLIGHTS:
             self._problem(("requirements",), f"{flights} flights, allowed: at most {MOST_FLIGHTS}")
-        return found
+        return sources
 
     def _unused(self) -> None:
         """Note flights of the plan that no requirement is over, and read them for their own mistakes."""

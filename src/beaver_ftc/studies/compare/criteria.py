@@ -73,15 +73,15 @@ def flights(grade: str, most: int | None, draw: int = 0, draws: int = 1) -> tupl
     """The flights that a grade's methods are tuned on; kinds of flights take turns. draw: see `of_sweep`.
     draws: so many from this one on, together."""
     of_kind: dict[str, list[SetFlight]] = {}
-    for each in range(draw, draw + draws):
-        for case in of_set(CALIBRATION + grade, most, each):
+    for number in range(draw, draw + draws):
+        for case in of_set(CALIBRATION + grade, most, number):
             of_kind.setdefault(case.scenario.name.rpartition("-")[0], []).append(case)
     placed = [
         ((i + 0.5) / len(cases), k, case)
         for k, cases in enumerate(of_kind.values())
         for i, case in enumerate(cases)
     ]
-    return tuple(case for _, _, case in sorted(placed, key=lambda each: each[:2]))
+    return tuple(case for _, _, case in sorted(placed, key=lambda place: place[:2]))
 
 
 class _FalseAlarm(Exception):
@@ -229,7 +229,7 @@ def effort(results: Sequence[Result]) -> float:
     return sqrt(fmean(result.energy_deg2_s2 for result in results))
 
 
-def least_margins(found: Sequence[Margin]) -> tuple[float, float]:
+def least_margins(margins: Sequence[Margin]) -> tuple[float, float]:
     """The smallest gain margin, dB, and phase margin, deg; NaN if any is."""
-    gains_db = [gain_db for margin in found for gain_db in (margin.up_db, margin.down_db)]
-    return float(np.min(gains_db)), float(np.min([margin.phase_deg for margin in found]))
+    gains_db = [gain_db for margin in margins for gain_db in (margin.up_db, margin.down_db)]
+    return float(np.min(gains_db)), float(np.min([margin.phase_deg for margin in margins]))

@@ -225,22 +225,22 @@ def _fly(scenario: Scenario, entry: Entry, chosen: TunedValuesByGrade) -> Result
 
 def result_of(flight: Landing, entry: Entry, us: float) -> Result:
     """The result of a flight. us: processor time of a frame, microseconds."""
-    found = measure(flight)
-    fault = found.fault
-    tracking = found.tracking
+    metrics = measure(flight)
+    fault = metrics.fault
+    tracking = metrics.tracking
     end_s = flight.frames / flight.scenario.rate_hz
-    departed = found.departure is not None
+    departed = metrics.departure is not None
     faulted = fault is not None and strikes_within(fault.at_s, end_s)
     before, after = _size(tracking.pre_fault_rms_deg_s), _size(tracking.post_fault_rms_deg_s)
     whole = before if tracking.post_fault_rms_deg_s is None else after
     return Result(
         entry=entry,
-        false_alarm=found.false_alarm,
-        fault_free_s=found.fault_free_s,
+        false_alarm=metrics.false_alarm,
+        fault_free_s=metrics.fault_free_s,
         faulted=faulted,
-        delay_s=or_never(found.detection.delay_s),
-        correct=found.fault_named,
-        isolation_delay_s=or_never(found.isolation.delay_s) if found.fault_named else inf,
+        delay_s=or_never(metrics.detection.delay_s),
+        correct=metrics.fault_named,
+        isolation_delay_s=or_never(metrics.isolation.delay_s) if metrics.fault_named else inf,
         rms_deg_s=inf if departed else whole,
         before_deg_s=inf if departed and not faulted else before,
         after_deg_s=inf if departed else after,

@@ -75,7 +75,7 @@ def _fields_of(part: Any) -> dict[str, tuple[Any, bool]]:
     """The type of each field of a section, and whether the document has it only where it is known; in the
     document's order."""
     hints, marks = get_type_hints(part), get_type_hints(part, include_extras=True)
-    others = [one.name for one in fields(part) if one.name not in part._first + part._last]
+    others = [own.name for own in fields(part) if own.name not in part._first + part._last]
     named = (*part._first, *others, *part._last)
     return {name: (hints[name], _KNOWN in get_args(marks[name])) for name in named}
 
@@ -84,7 +84,7 @@ def without_none(hint: Any) -> Any:
     """The type of a field that may be None, without that."""
     if get_origin(hint) not in (Union, UnionType):
         return hint
-    return next(one for one in get_args(hint) if one is not type(None))
+    return next(kind for kind in get_args(hint) if kind is not type(None))
 
 
 @cache
@@ -100,9 +100,9 @@ def _read(hint: Any, value: Any) -> Any:
     if value is None and (may_be_none or kind not in (tuple, dict)):
         return None
     if kind is tuple:
-        return tuple(_read(of[0], each) for each in value or ())
+        return tuple(_read(of[0], entry) for entry in value or ())
     if kind is dict:
-        return {key: _read(of[1], each) for key, each in (value or {}).items()}
+        return {key: _read(of[1], entry) for key, entry in (value or {}).items()}
     if isinstance(kind, type) and issubclass(kind, Part):
         return kind.of(value)
     return tuple(value) if isinstance(value, list) else value

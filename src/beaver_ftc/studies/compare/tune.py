@@ -132,21 +132,21 @@ def tune_method(method: Method, how: Search) -> Document:
     on = method.grade, how.most, how.draw, how.draws
     cost = DetectorCost(method.name, flights(*on)) if method.group == DETECTORS else LawCost(method.name, *on)
     start = method.start()
-    found = search(cost, method.ranges(), start, how.trials, how.seed, how.restarts)
-    gains = found.cost < (1.0 - LEAST_GAIN) * found.start_cost
-    values = found.found if gains else start
+    result = search(cost, method.ranges(), start, how.trials, how.seed, how.restarts)
+    gains = result.cost < (1.0 - LEAST_GAIN) * result.start_cost
+    values = result.found if gains else start
     row: Document = {
         "grade": method.grade,
         "kind": TUNED_FILE_KEY_BY_PLUGIN_GROUP[method.group],
         "name": method.name,
-        **asdict(found),
+        **asdict(result),
         "values": values,
         "flights": len(flights(*on)),
     }
     if isinstance(cost, LawCost):
         row["gain_margin_db"], row["phase_margin_deg"] = least_margins(cost.margins(values))
-    if how.draw and min(found.cost, found.start_cost) < INADMISSIBLE:
-        row |= gain_of(method.group, method.name, method.grade, (start, found.found), how.draw + how.draws)
+    if how.draw and min(result.cost, result.start_cost) < INADMISSIBLE:
+        row |= gain_of(method.group, method.name, method.grade, (start, result.found), how.draw + how.draws)
     return row
 
 
@@ -175,12 +175,12 @@ def as_text(document: Document) -> str:
     """A line a method and grade; then where ranges were widened, and which searches the budget ended."""
     columns = (*COLUMNS, *(GAINS if document["draw"] else ()), VALUES)
     table, rows = tabulated(columns, document["methods"])
-    said = [sentence for row in document["methods"] for sentence in _remarks(row)]
+    remarks = [sentence for row in document["methods"] for sentence in _remarks(row)]
     head = (
         f"up to {document['trials']} trials a search, seed {document['seed']}, "
         f"up to {document['restarts']} restarts for each method and grade"
     )
-    return "\n".join([head, "", aligned([table, *rows]), *said])
+    return "\n".join([head, "", aligned([table, *rows]), *remarks])
 
 
 def _remarks(row: Document) -> Iterator[str]:

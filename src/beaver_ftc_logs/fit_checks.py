@@ -20,12 +20,25 @@ def collinear_names(parts: Parts, model: Model) -> list[Document]:
     inflation of a regressor is None where the others determine it."""
     Z, _, _ = orders.stack_data(parts, model.vehicle, model.history, model.lags)
     factors = variance_inflation(Z[:, 1:]).tolist()
-    named = zip(factors, regression.regressor_names(model), strict=True)
+    named = zip(factors, regressor_names(model), strict=True)
     return [
         {"regressor": name, "inflation": factor if isfinite(factor) else None}
         for factor, name in sorted(named, key=lambda pair: -pair[0])
         if factor > LEAST_INFLATION
     ]
+
+
+def regressor_names(model: Model) -> list[str]:
+    """Names of the columns of the fit after the constant, in their order."""
+    h = model.history
+    signals = model.vehicle.regressor_columns
+    commands = [(f"command of {'+'.join(group)}",) for group in model.groups]
+    lagged = [
+        ("pqr", h),
+        (signals, model.vehicle.n_signal_lags(h)),
+        *((command, model.lags) for command in commands),
+    ]
+    return [f"{name}[-{k}]" for names, n_lags in lagged for k in range(1, n_lags + 1) for name in names]
 
 
 def median_inflation(parts: Parts, model: Model) -> dict[str, float]:

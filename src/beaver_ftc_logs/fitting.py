@@ -17,44 +17,44 @@ from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
 from beaver_ftc_logs.regression import Parts
 from beaver_ftc_logs.vehicle import Vehicle
 
-# Largest `power` if no labels show how often faults occur: an alarm then needs more evidence. The benchmark
-# decided how much; if enough parts are left out, the rate of false alarms decides instead.
-_POWER_UNLABELLED = 0.9
-# Spans of the means that distinguish the drift of the trim from the colour of the residual.
-_TRIM_SPANS_S = (2.0, 8.0)
-# `power` of labelled flights: a coloured residual has less information than a white one. Blocked tests
-# decided how much.
-_POWER_LABELLED = 0.8
-# Largest difference of another day: chosen on days that were made from one flight, judged on others
-# (`--other-days`). The drift of the trim is that of the means of the residual over 30 s in that flight.
+# Three tables of settings that healthy flights do not show, in the units of `FilterSettings`; then values of
+# `power`, the information of a sample as a share of that of white noise. docs/results/choices.md has the
+# flights on which each was chosen, and those on which it was judged.
+
+# Labelled flights of other days: drift of trim and gains between days.
+# trim_walk: the drift, in one flight, of the means of the residual over 30 s.
 _OTHER_DAYS: Document = {
-    "trim_sd": 0.1,
-    "trim_shift": 0.03,
-    "trim_walk": [2.5e-3, 6e-4, 2e-3],
+    "trim_sd": 0.1,  # residual sd
+    "trim_shift": 0.03,  # share of travel
+    "trim_walk": [2.5e-3, 6e-4, 2e-3],  # residual sd a sample; p, q, r
     "gain_sd": 0.1,
     "gain_time_s": 300.0,
     "own_gain_sd": 0.03,
 }
-# Variation of the gain of each group under a law and air that the fit has not seen, and the evidence that a
-# name then needs. A law that reacts to what the model lacks ties the command to it. Chosen on simulated
-# flights (`own_logs.py`, seeds 1 to 6).
-#
-# bounds: the posterior mass of 90 % bounds where no labels choose it. For a second or two after a loss most
-# of the mass still claims health: 0.9 of it held the truth at the fault in 0.70 to 0.94 of the samples,
-# fewest of large losses; 0.97 in 0.83 to 0.99, on seeds 401 to 403, which chose it.
+# Flights under other laws: a law that reacts to what the model lacks ties the commands to it. So the gain of
+# each group varies more, and a name needs more evidence.
+# bounds: for a second or two after a loss most of the posterior mass still claims health. A mass of 0.9 held
+# the truth at the fault in 0.70 to 0.94 of the samples, fewest of large losses; 0.97 in 0.83 to 0.99.
 _OTHER_LAWS: Document = {
     "own_gain_sd": 0.05,
     "own_gain_time_s": 20.0,
-    "name_evidence": 2.0,
+    "name_evidence": 2.0,  # times the threshold of the alarm
     "rename_s": 1.0,
     "one_group": True,
     "bounds": 0.97,
 }
-# What of this differs if the fitted flights were in moving air.
+# Flights under other laws in moving air: what differs from `_OTHER_LAWS`.
 _MOVING_AIR: Document = {"own_gain_sd": 0.08, "own_gain_time_s": 100.0}
-# Largest `power` under other laws. A law may feed the noise of a gyro to the surfaces, which doubles the
-# residual, so a sample has less information than in the fit. Chosen on seed 1 of five aircraft.
+# `power` of labelled flights: their residual is coloured.
+_POWER_LABELLED = 0.8
+# Largest `power` without labels under the law of the fit: nothing shows how often faults occur, so an alarm
+# needs more evidence.
+_POWER_UNLABELLED = 0.9
+# Largest `power` under other laws: a law may feed the noise of a gyro to the surfaces, which doubles the
+# residual.
 _POWER_OTHER_LAWS = 0.4
+# Spans of the means that distinguish the drift of the trim from the colour of the residual, s.
+_TRIM_SPANS_S = (2.0, 8.0)
 # Delays that the commands of a flight may have beside that of the model, in samples.
 _DELAYS_SAMPLES = (-0.4, 0.0, 0.4)
 # Number of samples with quick responses that a flight must have for a mean of their errors.
@@ -72,21 +72,35 @@ def fit_model(parts: Parts, vehicle: Vehicle, settings: FilterSettings | None = 
 
 
 def estimate_filter_settings(parts: Parts, model: Model) -> FilterSettings:
-    """The settings of the filter for later flights. Labels that show a fault give the rate of changes and the
-    levels; without one, the parts left out give the drift of the trim and the information of a sample."""
-    moving = model.vehicle.moving_air
+    """The settings of the filter for later flights. Of two rows that give one setting, the lower one decides.
+
+        if                           settings                                          power
+        labels show a fault          _OTHER_DAYS                                       _POWER_LABELLED
+        moving air / still           no extra delay / _DELAYS_SAMPLES
+        other laws may fly           _OTHER_LAWS
+            in moving air            _MOVING_AIR
+            noise models are fitted  quick_error, of parts left out
+        labels show a fault          levels, changes_per_hour, repair_share            as above
+        no label shows one           trim_walk, of parts left out                      min(limit, 1 / s)
+
+    s: overdispersion of the gains in parts left out, with these settings. limit: _POWER_UNLABELLED; if other
+    laws may fly, _POWER_OTHER_LAWS in still air and 1 in moving air.
+    """
+    vehicle = model.vehicle
+    moving = vehicle.moving_air
     settings: Document = {"delays_s": [0.0] if moving else [d / model.rate_hz for d in _DELAYS_SAMPLES]}
-    max_power = _POWER_UNLABELLED
-    if model.vehicle.other_laws:
+    if vehicle.other_laws:
         settings |= _OTHER_LAWS | (_MOVING_AIR if moving else {})
-        max_power = 1.0 if moving else _POWER_OTHER_LAWS
         if model.colours:
             settings["quick_error"] = quick_error_share(parts, model)
     if labelled := _labelled_faults(parts, model):
         return FilterSettings(**(_OTHER_DAYS | settings | labelled), power=_POWER_LABELLED)
+    limit = _POWER_UNLABELLED
+    if vehicle.other_laws:
+        limit = 1.0 if moving else _POWER_OTHER_LAWS
     settings["trim_walk"] = _estimate_trim_walk(parts, model)
     drifting = model.model_copy(update={"settings": FilterSettings(**settings)})
-    return FilterSettings(**settings, power=min(max_power, 1.0 / gain_overdispersion(parts, drifting)))
+    return FilterSettings(**settings, power=min(limit, 1.0 / gain_overdispersion(parts, drifting)))
 
 
 def _labelled_faults(parts: Parts, model: Model) -> Document:
@@ -103,9 +117,11 @@ def _labelled_faults(parts: Parts, model: Model) -> Document:
     levels: dict[str, list[float]] = {}
     changed_to: list[float] = []
     for name in [group[0] for group in model.groups if len(group) == 1]:
-        flights = _label_levels(parts, surfaces.index(name))
-        changed_to += [level for flight in flights for level in flight[1:]]
-        if faults := {level for flight in flights for level in flight if level < 1}:
+        faults: set[float] = set()
+        for flight_levels in _label_levels(parts, surfaces.index(name)):
+            changed_to += flight_levels[1:]
+            faults |= {level for level in flight_levels if level < 1}
+        if faults:
             levels[name] = sorted(faults)
     if not levels:
         return {}
@@ -117,8 +133,8 @@ def _labelled_faults(parts: Parts, model: Model) -> Document:
 
 
 def _label_levels(parts: Parts, i: int) -> list[list[float]]:
-    """The levels of the label of surface i in their order, each once until it changes, of each flight; NaN at
-    an edge is left out."""
+    """The levels of the label of surface i in their order, for each flight: the labels NaN, 1, 1, 0.6, 0.6, 1
+    have the levels 1, 0.6, 1. A label is NaN where none is known."""
     labels = [part.samples.labels[:, i][part.is_usable] for part in parts]
     return [[round(level, 6) for level, _ in groupby(c[np.isfinite(c)].tolist())] for c in labels]
 

@@ -261,11 +261,16 @@ def check_explained(folds: list[Document], parts: Parts, model: Model) -> None:
         notes = [note for part in parts for note in part.samples.notes if note.startswith(prefixes)]
         raise BadInput(
             f"identify: on parts it was not fitted on the model explains less of {', '.join(unexplained)} "
-            f"than the mean does ({regression.axis_text(unexplained)}), allowed: a model that explains more; "
+            f"than the mean does ({axis_text(unexplained)}), allowed: a model that explains more; "
             f"what would help: more than these {minutes:.1f} min, commands that move more ({stillest} has a "
             f"standard deviation of {sds[stillest]:.2g}), or the commands that this vehicle follows"
             + "".join(f"; {note}" for note in notes)
         )
+
+
+def axis_text(values: dict[str, float]) -> str:
+    """The numbers of p, q and r as text."""
+    return ", ".join(f"{axis} {value:.3f}" for axis, value in values.items())
 
 
 def _check_units(flights: Sequence[Samples], vehicle: Vehicle) -> None:

@@ -11,12 +11,13 @@ from beaver_ftc.documents import BadInput
 from beaver_ftc.results import SERIES_COLOURS as SERIES
 from beaver_ftc.studies.present import panels
 from beaver_ftc_logs import orders
+from beaver_ftc_logs.fit_checks import regressor_names
 from beaver_ftc_logs.folds import Fold, held_out_folds
 from beaver_ftc_logs.least_squares import Regression, spectral_density
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.pages import encode_png, label_axis, load_template
 from beaver_ftc_logs.recording import Floats
-from beaver_ftc_logs.regression import Parts, regressor_names
+from beaver_ftc_logs.regression import Parts
 from beaver_ftc_logs.samples import Samples
 
 PAGE_MARK = '<meta name="generator" content="beaver-ftc identify">'
@@ -34,6 +35,8 @@ def refuse_foreign_file(path: Path) -> None:
 def render_identification(flights: Sequence[Samples], model: Model) -> str:
     """The page as HTML text."""
     usable = orders.fit_parts(flights)
+    # The model keeps the standard errors of its responses only. The page shows those of all coefficients and
+    # their correlation, in a fit to the flights as they are, not whitened.
     fit = orders.fit_order(usable, model.vehicle, model.history, model.lags)
     names = ["constant", *regressor_names(model)]
     return load_template("model.html.j2").render(
@@ -54,10 +57,10 @@ def _prediction_figure(usable: Parts, model: Model) -> Any:
 
     used = (fold for fold in held_out_folds(usable, model, None) if fold.held_out.is_usable.any())
     folds = list(islice(used, _MAX_SHOWN_FLIGHTS))
-    n = max(len(folds), 1)
+    n = max(len(folds), 1)  # without a fold: an empty figure
     figure = Figure(figsize=(11, 4.6 * n), layout="constrained", dpi=110)
     parts = figure.subfigures(n, squeeze=False)[:, 0]
-    for part, fold in zip(parts, folds, strict=False):
+    for part, fold in zip(parts, folds, strict=False):  # one part more where there is no fold
         axes = part.subplots(3, 1, sharex=True)
         t_s, rates, residual = _liveliest_window(fold, round(_FIGURE_SPAN_S * model.rate_hz))
         for i, axis in enumerate(axes):
@@ -74,17 +77,17 @@ def _prediction_figure(usable: Parts, model: Model) -> Any:
 
 
 def _liveliest_window(fold: Fold, n: int) -> tuple[Floats, Floats, Floats]:
-    """Times, rates and residual of the window in which the rates known moved most; nan where nothing is
-    known, for lines to end."""
-    flight = orders.one_step_innovations(fold.model, fold.held_out)
+    """Times (n,), s, rates and residual (n, 3), rad/s, of the n samples with the largest sum of squared known
+    rates; NaN where a rate is not known: the drawn line ends there. The whole flight if it is shorter."""
     samples = fold.held_out.samples
-    rates, r = np.full((2, *samples.rates.shape), np.nan)
-    rates[flight.rows] = samples.rates[flight.rows]
-    r[flight.rows] = flight.e
-    total = np.concatenate([[0.0], np.cumsum(np.nansum(rates**2, axis=1))])
-    first = int(np.argmax(total[n:] - total[:-n])) if len(rates) > n else 0
+    known = orders.one_step_innovations(fold.model, fold.held_out)
+    rates, residual = np.full((2, *samples.rates.shape), np.nan)
+    rates[known.rows] = samples.rates[known.rows]
+    residual[known.rows] = known.e
+    energy = np.concatenate([[0.0], np.cumsum(np.nansum(rates**2, axis=1))])
+    first = int(np.argmax(energy[n:] - energy[:-n])) if len(rates) > n else 0
     window = slice(first, first + n)
-    return samples.t_s[window], rates[window], r[window]
+    return samples.t_s[window], rates[window], residual[window]
 
 
 def _spectrum_figure(usable: Parts, model: Model) -> Any:

@@ -2,9 +2,8 @@
 
 from beaver_ftc.results import Document
 from beaver_ftc_logs.fit_checks import LEAST_INFLATION
-from beaver_ftc_logs.identification import SCORES
+from beaver_ftc_logs.identification import SCORES, axis_text
 from beaver_ftc_logs.model import Model
-from beaver_ftc_logs.regression import axis_text
 from beaver_ftc_logs.trust import unknown_sentences
 
 

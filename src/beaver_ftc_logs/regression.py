@@ -3,15 +3,19 @@
 
     rates[k] = c + A' x[k] + sum over groups g of a_g F_g[k] + noise,      F_g[k] = sum_j B_gj u_g[k-j]
 
-    n, G, h, L, f   samples; groups; past samples of the rates, of the commands, of the X signals
+    n, G, S, D      number of samples; of groups; of surfaces; of signals
+    h, L, f         number of past samples of the rates; of the commands; of the signals
     c               intercept (3,), rad/s
-    x, A            the past: rates[k-1..k-h], signals[k-1..k-f], (3 h + X f,); its coefficients (.., 3)
-    u, U            command of a group, a share of its travel; of all groups at lags 1 to L (n, G, L)
+    x, X            the past of a sample: rates[k-1..k-h], signals[k-1..k-f], (3 h + D f,); of all samples
+    A               coefficients of the past (3 h + D f, 3)
+    u, U            commands of the groups, shares of travel, (n, G); the same at the lags 1 to L (n, G, L)
     a               effectiveness of each group (G,)
     B, F            response (G, L, 3), rad/s; what the groups do while they are healthy (n, G, 3), rad/s
     y               rates that the past leaves unexplained (n, 3), rad/s
     e, R, W         residual (n, 3), rad/s; its covariance (3, 3), (rad/s)2; whitening matrix: e W is white
-    ma, ar          moving average of the noise, 1 first; its predictor from those before, (.., 3, 3)
+    Z, v            whitened regressors of c and a (3 n, 3 + G), whitened y (3 n,): three rows a sample
+    ma              moving average of the noise, 1 first
+    p, ar           residuals before one that predict it; matrices of this prediction (p, 3, 3), latest first
 
 Surfaces whose commands are proportional to one another move together while they are healthy: their effects
 cannot be distinguished by any fit, so they form one group with one response.
@@ -41,8 +45,10 @@ _QUICK_SPAN_S = 0.5
 
 @dataclass(frozen=True)
 class FitPart:
-    """A flight (or half of one) and which of its samples the fit may use, is_usable (n,). fits: to this
-    flight and others."""
+    """A flight (or half of one) and which of its samples the fit may use, is_usable (n,).
+
+    fits: what `orders.fitted_order` has fitted to lists of parts that begin with this one.
+    """
 
     samples: Samples
     is_usable: Mask
@@ -94,28 +100,28 @@ def group_surfaces(vehicle: Vehicle) -> Groups:
 def build_regressors(
     samples: Samples, groups: Groups, h: int, L: int, labelled: bool, f: int
 ) -> tuple[Floats, Floats, Mask]:
-    """The regressors of each sample: the past x (n, 3 h + X f), the commands U (n, G, L) of the groups, and
+    """The regressors of each sample: the past X (n, 3 h + D f), the commands U (n, G, L) of the groups, and
     whether all of it is known and no gap lies within, (n,).
 
     labelled: as of `group_commands`.
     """
-    v = group_commands(samples, groups, labelled)
+    u = group_commands(samples, groups, labelled)
     rates = [_delay_rows(samples.rates, k, np.nan) for k in range(1, h + 1)]
     X = np.column_stack([*rates, *(_delay_rows(samples.signals, k, np.nan) for k in range(1, f + 1))])
-    U = np.stack([_delay_rows(v, k, np.nan) for k in range(1, L + 1)], axis=2)
-    ok = np.isfinite(X).all(axis=1) & np.isfinite(U).all(axis=(1, 2))
-    ok &= np.isfinite(samples.rates).all(axis=1)
-    ok &= samples.stretch_number == _delay_rows(samples.stretch_number, max(h, L), -1)
-    return X, U, ok
+    U = np.stack([_delay_rows(u, k, np.nan) for k in range(1, L + 1)], axis=2)
+    known = np.isfinite(X).all(axis=1) & np.isfinite(U).all(axis=(1, 2))
+    known &= np.isfinite(samples.rates).all(axis=1)
+    known &= samples.stretch_number == _delay_rows(samples.stretch_number, max(h, L), -1)
+    return X, U, known
 
 
 def group_commands(samples: Samples, groups: Groups, labelled: bool) -> Floats:
     """The command of each group, (n, G); labelled: each surface's times its labelled effectiveness, 1 where
     there is no label."""
-    u = samples.commands
+    commands = samples.commands
     if labelled:
-        u = u * np.where(np.isfinite(samples.labels), samples.labels, 1.0)
-    return np.column_stack([u[:, group].sum(axis=1) for group in groups])
+        commands = commands * np.where(np.isfinite(samples.labels), samples.labels, 1.0)
+    return np.column_stack([commands[:, group].sum(axis=1) for group in groups])
 
 
 def _delay_rows(values: np.ndarray, lag: int, fill: float) -> np.ndarray:
@@ -171,7 +177,10 @@ class Innovations:
 
     @property
     def log_size(self) -> float:
-        """Logarithm of the size of a sample's noise before it was whitened, log det(R)^1/2 - 3 log sum ma."""
+        """Logarithm of the size of a sample's noise before it was whitened, log det(R)^1/2 - 3 log sum(ma).
+
+        The filter sum(ma) / ma(z), which whitens, multiplies the white noise of each of 3 axes by sum(ma).
+        """
         return 0.5 * float(np.linalg.slogdet(self.R)[1]) - 3.0 * float(np.log(sum(self.noise.average)))
 
     def residual_runs(self) -> list[Floats]:
@@ -189,45 +198,46 @@ class Innovations:
         return (np.concatenate([trim, self.F], axis=1) @ self.W).transpose(0, 2, 1)
 
     def regression(self) -> tuple[Floats, Floats]:
-        """Regressors Z (3 n, 3 + G) of trim and responses, and the rates v (3 n,), whitened."""
+        """Z (3 n, 3 + G), of trim and responses, and v (3 n,)."""
         return self.columns().reshape(3 * len(self.F), -1), (self.y @ self.W).ravel()
 
     def gain_bounds(self, share: float) -> tuple[Floats, Floats, float]:
         """By least squares of v on Z, as of `regression`: the gain that each response surely is not below,
         and not above, (G,) each, 1 as in the model; and the scale of the noise, in variances of it.
 
-            X = Z / s,   P = (X' X + eps n I)^-1,   b = P X' v,   e = v - X b
-            bounds = (b -+ BOUND_MARGIN sqrt(diag(P) mean(e^2) / share)) / s
+            N = Z / d,   P = (N' N + eps 3 n I)^-1,   b = P N' v,   r = v - N b
+            bounds = (b -+ BOUND_MARGIN sqrt(diag(P) mean(r^2) / share)) / d
 
-        eps: a small number, which keeps the bounds finite and far apart where columns make one another up.
-        share: as how many white samples one counts.
+        d: root mean squares of the columns of Z (3 + G,); b: coefficients of N (3 + G,); r: what they leave
+        (3 n,). eps: EIGENVALUE_FLOOR, which keeps the bounds finite and far apart where columns make one
+        another up. share: as how many white samples one counts.
         """
         Z, v = self.regression()
-        s = least_squares.rms_of_columns(Z)
-        X = Z / s
-        ridge = least_squares.EIGENVALUE_FLOOR * len(X) * np.eye(X.shape[1])
-        P = np.linalg.inv(X.T @ X + ridge)
-        b = P @ (X.T @ v)
-        e2 = (v - X @ b) ** 2
-        margin = BOUND_MARGIN * np.sqrt(np.maximum(np.diag(P), 0.0) * e2.mean() / share)
-        low = (b - margin) / s
-        high = (b + margin) / s
-        return low[3:], high[3:], least_squares.noise_scale(e2)
+        d = least_squares.rms_of_columns(Z)
+        N = Z / d
+        ridge = least_squares.EIGENVALUE_FLOOR * len(N) * np.eye(N.shape[1])
+        P = np.linalg.inv(N.T @ N + ridge)
+        b = P @ (N.T @ v)
+        r2 = (v - N @ b) ** 2
+        margin = BOUND_MARGIN * np.sqrt(np.maximum(np.diag(P), 0.0) * r2.mean() / share)
+        low = (b - margin) / d
+        high = (b + margin) / d
+        return low[3:], high[3:], least_squares.noise_scale(r2)  # the first 3 are the trim
 
     def gains(self) -> Floats:
         """The gain of each response, (G,), by least squares of y on trim and responses."""
         return np.asarray(np.linalg.lstsq(*self.regression(), rcond=None)[0][3:])
 
     def quick_power(self, rate_hz: float) -> Floats:
-        """Power of the quick part of the responses an axis, in variances of the noise, (n,): of the
-        difference from their mean over the last half second."""
-        sums, n = trailing_sums(self.F, _QUICK_SPAN_S * rate_hz)
-        quick = (self.F - sums / n[:, None, None]) @ self.W
+        """Power of the quick part of the responses an axis, in variances of the noise, (n,): of their
+        difference from their mean over the last _QUICK_SPAN_S."""
+        sums, counts = trailing_sums(self.F, _QUICK_SPAN_S * rate_hz)
+        quick = (self.F - sums / counts[:, None, None]) @ self.W
         return (quick**2).sum(axis=(1, 2)) / 3.0
 
     def quick_scale(self, model: Model) -> Floats:
-        """Variance q of the residual over that of the noise, (n,): above 1 where the responses are quicker
-        than usual in the fit, since a share of the quick part may be missing, or be too much.
+        """Variance of the residual over that of the noise, (n,): above 1 where the responses are quicker than
+        usual in the fit, since a share of the quick part may be missing, or be too much.
 
         Slow commands of healthy flight hardly show how a surface responds to a step. The error after a step
         is no noise: it has the same sign in many samples.
@@ -252,7 +262,7 @@ def innovations(samples: Samples, model: Model, labelled: bool = False) -> Innov
     ar = noise.ar
     y = subtract_noise(samples.rates - np.einsum("nm,mr->nr", X, A), ar)
     F = subtract_noise(np.einsum("ngl,glr->ngr", U, B), ar)
-    whole = known.copy()
+    whole = known.copy()  # a row that is not known makes the p next ones unknown: `ar` predicts these from it
     for lag in range(1, len(ar) + 1):
         whole &= _delay_rows(known, lag, False)
     y = np.nan_to_num(y)
@@ -275,37 +285,26 @@ def by_axis(values: Floats) -> dict[str, float]:
     return dict(zip("pqr", values.tolist(), strict=True))
 
 
-def axis_text(values: dict[str, float]) -> str:
-    """The numbers of p, q and r as text."""
-    return ", ".join(f"{axis} {value:.3f}" for axis, value in values.items())
-
-
 def subtract_noise(values: Floats, ar: Floats) -> Floats:
-    """Values v (n, ..., 3) less their prediction: v[k] - sum_j ar[j-1]' v[k-j], with ar (p, 3, 3)."""
+    """Values s (n, .., 3) less their prediction by ar, t (n, .., 3): as of residuals, for each of the
+    quantities g in the middle; zero before the first row.
+
+        t[k, g] = s[k, g] - sum over lags l = 1..p of ar[l-1]' s[k-l, g]
+
+    For each entry (i, j) of the matrices, from axis i of s to axis j of t, the sum is a convolution in time.
+    A NaN spreads over the p next rows at most.
+    """
     rest = values.copy()
     if not len(ar) or not values.size:
         return rest
-    sources, targets = (np.moveaxis(a.reshape(len(values), -1, 3), 0, -1) for a in (values, rest))
-    for (i, j), taps in zip(np.ndindex(3, 3), ar.reshape(-1, 9).T, strict=True):
-        for source, target in zip(np.ascontiguousarray(sources[:, i]), targets[:, j], strict=True):
-            target[1:] -= np.convolve(source, taps)[: len(source) - 1]
+    s = values.reshape(len(values), -1, 3)
+    t = rest.reshape(s.shape)  # a view: what is subtracted from it, is subtracted from `rest`
+    for i, j, g in np.ndindex(3, 3, s.shape[1]):
+        t[1:, g, j] -= np.convolve(s[:, g, i], ar[:, i, j])[: len(s) - 1]
     return rest
 
 
 def split_parts(rows: Ints) -> list[Ints] | None:
-    """The rows of a flight in its parts; None where one is too short."""
+    """The rows of a flight in _N_PARTS parts; None if one has less than _MIN_PART_ROWS rows."""
     parts = np.array_split(rows, _N_PARTS)
     return parts if min(map(len, parts)) >= _MIN_PART_ROWS else None
-
-
-def regressor_names(model: Model) -> list[str]:
-    """Names of the columns of the fit after the constant, in their order."""
-    h = model.history
-    signals = model.vehicle.regressor_columns
-    commands = [(f"command of {'+'.join(group)}",) for group in model.groups]
-    lagged = [
-        ("pqr", h),
-        (signals, model.vehicle.n_signal_lags(h)),
-        *((one, model.lags) for one in commands),
-    ]
-    return [f"{name}[-{k}]" for names, most in lagged for k in range(1, most + 1) for name in names]

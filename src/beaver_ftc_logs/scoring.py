@@ -21,8 +21,8 @@ def score_diagnosis(samples: Samples, rows: LogRows, groups: list[list[str]]) ->
     """All figures that the log allows: by its labels, or by its failure if it has no labels.
 
     Where the log has more rows than samples, each row is compared with the label of the last sample up to its
-    time. The effectiveness of surfaces without a label is left out, but an alarm that names
-    one counts in healthy_or_faulty.
+    time. A surface without a label is left out of all scores of effectiveness. An alarm that names such a
+    surface still counts in healthy_or_faulty.
     """
     labelled = np.isfinite(samples.labels).any(axis=0)
     if not labelled.any():
@@ -75,8 +75,14 @@ def nearest_setting(e: Floats, levels: Floats) -> np.ndarray:
 def score_against_failures(
     rows: LogRows, failures: tuple[LoggedFailure, ...], groups: list[list[str]]
 ) -> Document:
-    """Scores against the first failure in the log. Alarms that begin before it are false. The delay delay_s,
-    s, is that of the first row with an alarm from the failure on.
+    """Scores against the first failure in the log.
+
+    failure, failure_s   surfaces that failed, joined by +, and time of the first failure, s; None without one
+    healthy_s            time from the first row to the last one before the failure, s
+    false_alarms         number of alarms that begin before the failure
+    detected, delay_s    whether a row from the failure on has an alarm; time of the first one after it, s
+    named                share of these rows by the isolated surfaces
+    right_group          whether the most frequent name is right, as of `_is_main_name_right`
 
     An alarm that lasts over the failure counts as both: it is false, and it detects with the delay 0 s.
     """
@@ -104,9 +110,11 @@ def _is_main_name_right(
     shares: dict[str, float], surfaces: list[str], groups: list[list[str]]
 ) -> bool | None:
     """Whether the most frequent name after the failure of some surfaces is a group that failed; None without
-    a failure or name.
+    a name, or if no group has failed. A name of several groups is right if all of them failed.
 
-    A log may name a kind of surface for one of them: a failed `aileron` is right_aileron or left_aileron.
+    A log may name a kind of surface for one of them: a failed `aileron` is right_aileron or left_aileron. Of
+    the groups [right_aileron], [left_aileron] and [elevator], the names right_aileron and
+    right_aileron+left_aileron are right then, elevator and right_aileron+elevator are not.
     """
     suffixes = tuple(f"_{surface}" for surface in surfaces)
     has_failed = [any(name in surfaces or name.endswith(suffixes) for name in group) for group in groups]

@@ -73,7 +73,7 @@ def bank_posterior(samples: Samples, model: Model, bank: HypothesisBank) -> Floa
         runs = [run_flight(flight, model, bank) for flight in flights]
         weights = model_weights([ll for _, ll in runs], model.rate_hz)
         return (weights[:, :, None] * np.array([p for p, _ in runs])).sum(axis=0)
-    pairs = [(innovations(white, one), one) for white, one in by_noise(samples, model)]
+    pairs = [(innovations(white, own_model), own_model) for white, own_model in by_noise(samples, model)]
     weights = model_weights([_noise_likelihood(*pair) for pair in pairs], model.rate_hz)
     kept = np.where(weights < _MIN_NOISE_WEIGHT, 0.0, weights)
     kept /= kept.sum(axis=0)

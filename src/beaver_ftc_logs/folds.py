@@ -50,9 +50,9 @@ def validation_folds(parts: Parts, most: int | None = None) -> list[tuple[list[F
         return [([first], second, "second half"), ([second], first, "first half")]
     n = min(len(parts), most or len(parts))
     return [
-        ([part for i, part in enumerate(parts) if i % n != k], one, one.samples.name)
+        ([part for i, part in enumerate(parts) if i % n != k], left_out, left_out.samples.name)
         for k in range(n)
-        for one in parts[k::n]
+        for left_out in parts[k::n]
     ]
 
 

@@ -40,18 +40,18 @@ def fit_output_error(parts: Parts, groups: Groups) -> Document:
         """Error of the free runs of some windows, in standard deviations of the rates."""
         return ((_simulate(th, u[rows], y[rows], dt_s) - y[rows]) / sd).ravel()
 
-    found = least_squares(error, guess, bounds=(lower, upper), args=(fitted,), loss="soft_l1", max_nfev=40)
-    P = np.linalg.pinv(found.jac.T @ found.jac)
-    errors = np.sqrt(np.maximum(np.diag(P), 0.0) * float(found.fun @ found.fun) / len(found.fun))
-    e = error(found.x, held_out).reshape(-1, 3) * sd
+    optimum = least_squares(error, guess, bounds=(lower, upper), args=(fitted,), loss="soft_l1", max_nfev=40)
+    P = np.linalg.pinv(optimum.jac.T @ optimum.jac)
+    errors = np.sqrt(np.maximum(np.diag(P), 0.0) * float(optimum.fun @ optimum.fun) / len(optimum.fun))
+    e = error(optimum.x, held_out).reshape(-1, 3) * sd
     explained = 1.0 - e.var(axis=0) / y[held_out].reshape(-1, 3).var(axis=0)
     return {
         "windows": len(y),
-        "servo_lag_s": float(found.x[0]),
+        "servo_lag_s": float(optimum.x[0]),
         "servo_lag_sd_s": float(errors[0]),
-        "delay_s": float(found.x[1]),
+        "delay_s": float(optimum.x[1]),
         "delay_sd_s": float(errors[1]),
-        "shorter_than_can_be_told": bool(found.x[0] < 2.0 * _MIN_SERVO_LAG_S),
+        "shorter_than_can_be_told": bool(optimum.x[0] < 2.0 * _MIN_SERVO_LAG_S),
         "explained_of_windows_not_fitted": regression.by_axis(explained),
     }
 

@@ -55,8 +55,8 @@ def widen_noise(parts: Parts, model: Model) -> Model:
     for fold in held_out_folds(parts, model):
         loudness = _loudness(fold, fold.fitted if len(parts) > 1 else parts)
         errors = _gain_errors(fold, _GAIN_WINDOW_S, loudness)
-        found = windows.setdefault(fold.held_out.samples.noise_ma_coefficients, [])
-        found.extend(min(error / max(n, 1), _MAX_INFLATION) for error, n in errors)
+        inflations = windows.setdefault(fold.held_out.samples.noise_ma_coefficients, [])
+        inflations.extend(min(error / max(n, 1), _MAX_INFLATION) for error, n in errors)
     colours = []
     for noise in model.colours:
         ma = tuple(noise.average)

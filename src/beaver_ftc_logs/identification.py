@@ -156,14 +156,14 @@ def whiten_flights(flights: Sequence[Samples], vehicle: Vehicle) -> list[Samples
         C = np.linalg.lstsq(Z, y, rcond=None)[0]
         left = [y - Z @ C for Z, y in (stacked([flight]) for flight in flights)]
         white = [{ma: lfilter([sum(ma)], ma, e, axis=0) for ma in NOISE_MA_CANDIDATES} for e in left]
-        found = [_likeliest_ma(residuals) for residuals in white]
-        if (new := [ma for _, ma in found]) == colours:
+        likeliest = [_likeliest_ma(residuals) for residuals in white]
+        if (new := [ma for _, ma in likeliest]) == colours:
             break
-        mean = np.mean([log_det for log_det, _ in found])
+        mean = np.mean([log_det for log_det, _ in likeliest])
         colours = new
         whitened = [
             whiten_samples(flight, ma, float(np.exp((mean - log_det) / 6.0)))
-            for flight, (log_det, ma) in zip(flights, found, strict=True)
+            for flight, (log_det, ma) in zip(flights, likeliest, strict=True)
         ]
     return whitened
 
@@ -183,8 +183,8 @@ def expect_another_day(folds: list[Document], model: Model) -> Document:
     scores = [fold["score"] for fold in folds if "score" in fold]
     values = {key: [score[key] for score in scores] for key in SCORES if scores}
     expected: Document = {
-        key: {"mean": float(np.mean(each)), "worst": float((max if key == "mean_error" else min)(each))}
-        for key, each in values.items()
+        key: {"mean": float(np.mean(by_fold)), "worst": float((max if key == "mean_error" else min)(by_fold))}
+        for key, by_fold in values.items()
     }
     tail = model.fitted.tail
     threshold = model.settings.threshold
@@ -215,16 +215,16 @@ def scale_if_better(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Seque
     if best.other_laws:
         # the criterion counts every sample as independent, which holds for white noise only
         white = whiten_flights(_scaled(flights, best), best) if best.moving_air else None
-        least = _min_bic(_scaled(flights, best, white), best) - _DECISIVE_BIC
+        lowest = _min_bic(_scaled(flights, best, white), best) - _DECISIVE_BIC
         names = list(best.surfaces)
         for group, power in product(regression.group_surfaces(best), _AIRSPEED_POWERS):
             powers = best.airspeed_powers | {names[i]: power for i in group}
             candidate = best.model_copy(update={"airspeed_powers": powers})
-            if (bic := _min_bic(_scaled(flights, candidate, white), candidate)) < least:
-                least = bic
+            if (bic := _min_bic(_scaled(flights, candidate, white), candidate)) < lowest:
+                lowest = bic
                 best = candidate
-    found = {key: getattr(best, key) for key in ("reference_airspeed_mps", "airspeed_powers")}
-    return _scaled(flights, best), vehicle.model_copy(update=found)
+    scaling = {key: getattr(best, key) for key in ("reference_airspeed_mps", "airspeed_powers")}
+    return _scaled(flights, best), vehicle.model_copy(update=scaling)
 
 
 def _scaled(
@@ -238,7 +238,10 @@ def _scaled(
     if white is None:
         return scaled
     pairs = zip(scaled, white, strict=True)
-    return [whiten_samples(flight, one.noise_ma_coefficients, one.fit_weight) for flight, one in pairs]
+    return [
+        whiten_samples(flight, whitened.noise_ma_coefficients, whitened.fit_weight)
+        for flight, whitened in pairs
+    ]
 
 
 def _min_bic(flights: Sequence[Samples], vehicle: Vehicle) -> float:

@@ -111,7 +111,9 @@ def rows_of_verdicts(verdicts: list[Verdict], samples: Samples, model: Model) ->
     """
     n = len(verdicts)
     members = group_indices(model)
-    statistic, detected = np.array([(one.statistic, one.detected) for one in verdicts], dtype=float).T
+    statistic, detected = np.array(
+        [(verdict.statistic, verdict.detected) for verdict in verdicts], dtype=float
+    ).T
     # by the statistic, if there is one: `detected` of the loop stays true after its first alarm
     faulty = np.where(np.isfinite(statistic), statistic > 1.0, detected).astype(np.int64)
     a, low = np.ones((2, n, len(model.vehicle.surfaces)))

@@ -53,7 +53,7 @@ def mixing_of_log(reader: str, params: Parameters, column_names: Collection[str]
     surfaces, outputs, axes = ardupilot_mixing(read) if reader == "ardupilot" else px4_mixing(read, names)
     if surfaces:
         # surfaces by the commands that the log has of most of them: of their outputs first, else of the axes
-        n_logged = [sum(column in names for column, _ in one) for one in outputs]
+        n_logged = [sum(column in names for column, _ in columns) for columns in outputs]
         n_by_output = max(n_logged)
         if n_by_output and n_by_output >= sum(not axes.problem_of(surface, names) for surface in surfaces):
             _add_surfaces_by_output(mixing, surfaces, outputs[n_logged.index(n_by_output)], names)

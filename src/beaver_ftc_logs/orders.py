@@ -95,9 +95,9 @@ def bic_by_order(parts: Parts, vehicle: Vehicle) -> dict[tuple[int, int], float]
 def _order_columns(vehicle: Vehicle, h: int, L: int) -> Ints:
     """Columns of the largest design that an order has."""
     n = len(vehicle.regressor_columns)
-    most = max(RATE_LAGS)
-    rates = np.arange(1 + 3 * most) < 1 + 3 * h
-    signals = np.arange(n * vehicle.n_signal_lags(most)) < n * vehicle.n_signal_lags(h)
+    max_lag = max(RATE_LAGS)
+    rates = np.arange(1 + 3 * max_lag) < 1 + 3 * h
+    signals = np.arange(n * vehicle.n_signal_lags(max_lag)) < n * vehicle.n_signal_lags(h)
     commands = np.tile(np.arange(max(COMMAND_LAGS)) < L, len(regression.group_surfaces(vehicle)))
     return np.flatnonzero(np.concatenate([rates, signals, commands]))
 
@@ -147,14 +147,14 @@ def stack_data(parts: Parts, vehicle: Vehicle, h: int, L: int) -> tuple[Floats, 
     Columns of the regressors: one, the past, the commands of each group by lag.
     """
     groups = regression.group_surfaces(vehicle)
-    most = max(RATE_LAGS + COMMAND_LAGS)
+    max_lag = max(RATE_LAGS + COMMAND_LAGS)
     Z = []
     y = []
     stretches = []
     for i, part in enumerate(parts):
         X, U, known = regression.build_regressors(part.samples, groups, h, L, True, vehicle.n_signal_lags(h))
         used = part.is_usable & known
-        used[:most] = False
+        used[:max_lag] = False
         n = len(X)
         weight = part.samples.fit_weight
         Z.append(weight * np.column_stack([np.ones(n), X, U.reshape(n, -1)])[used])
@@ -230,10 +230,10 @@ def _with_errors(own: Parts, model: Model, noise: NoiseModel) -> NoiseModel:
     r = np.diag(np.array(noise.noise))
     p = np.vstack([centred(flight.F) ** 2 for flight in flights]).mean(axis=0) / r
     q = np.maximum(one_step_residuals(own, model).var(axis=0) / r - 1.0, 0.0)
-    most = np.minimum(np.sqrt(p @ q) / np.maximum(p.sum(axis=1), MIN_DIVISOR), GAIN_SD_CAP)
+    misread = np.minimum(np.sqrt(p @ q) / np.maximum(p.sum(axis=1), MIN_DIVISOR), GAIN_SD_CAP)
     powers = np.concatenate([flight.quick_power(model.rate_hz) for flight in flights])
     usual = float(np.quantile(powers, _USUAL_SHARE))
-    return noise.model_copy(update={"misreads": (most / np.sqrt(3.0)).tolist(), "quick": usual})
+    return noise.model_copy(update={"misreads": (misread / np.sqrt(3.0)).tolist(), "quick": usual})
 
 
 def centred(values: Floats) -> Floats:

@@ -51,7 +51,7 @@ def _replay_verdict(path: Path, scenario: Any, log: dict[str, Floats], verdicts:
     from beaver_ftc_logs.stepped import named_since
 
     t_s = log["t_s"]
-    detected = [float(at_s) for at_s, one in zip(t_s, verdicts, strict=True) if one.detected]
+    detected = [float(at_s) for at_s, verdict in zip(t_s, verdicts, strict=True) if verdict.detected]
     detection_s = detected[0] if detected else None
     isolation_s = named_since(t_s, verdicts)
     pairs = zip(log.get("detected", []), verdicts, strict=False)
@@ -64,7 +64,7 @@ def _replay_verdict(path: Path, scenario: Any, log: dict[str, Floats], verdicts:
         "detection_s": detection_s,
         "isolation_s": isolation_s,
         "isolated": verdicts[-1].isolated,
-        "rows_that_differ": sum(bool(flag) != one.detected for flag, one in pairs),
+        "rows_that_differ": sum(bool(flag) != verdict.detected for flag, verdict in pairs),
         "left_out": _lacking_inputs(scenario),
         "as_flown": _is_as_flown(path, detection_s, isolation_s),
     }
@@ -73,8 +73,8 @@ def _replay_verdict(path: Path, scenario: Any, log: dict[str, Floats], verdicts:
 def _lacking_inputs(scenario: Any) -> list[str]:
     """Return the inputs that the diagnosis had in flight and the log lacks."""
     ideal = type(scenario.sensors)()
-    flown = [scenario.sensors, *(each.sensors for each in scenario.changes if each.sensors)]
-    errors = {name for each in flown for name, settings in each if settings != getattr(ideal, name)}
+    flown = [scenario.sensors, *(change.sensors for change in scenario.changes if change.sensors)]
+    errors = {name for sensors in flown for name, settings in sensors if settings != getattr(ideal, name)}
     broken = {fault.sensor for fault in scenario.faults if of_a_sensor(fault)}
     return [
         f"the {what} of {name}: the log has the true value"

@@ -183,5 +183,7 @@ def rows_of_replay(t_s: Floats, replay: Replayed, surfaces: Sequence[str], fdi: 
         if is_loss and verdict.estimate is not None and verdict.isolated in surfaces:
             s = surfaces.index(verdict.isolated)
             e[k, s] = min(max(1.0 + float(verdict.estimate), low[k, s]), high[k, s])
-    isolated = [one.isolated if one.isolated in surfaces else UNKNOWN_SURFACE for one in replay.verdicts]
+    isolated = [
+        verdict.isolated if verdict.isolated in surfaces else UNKNOWN_SURFACE for verdict in replay.verdicts
+    ]
     return LogRows.of_names(t_s, np.where(faulty, np.array(isolated, dtype=object), ""), e, low, high)

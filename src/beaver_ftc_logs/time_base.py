@@ -77,12 +77,12 @@ def sample_column(column: Column, t_s: Floats, step_s: float) -> tuple[Floats, f
         return column.values, None
     is_faster = median_step_s(column.t_s) < 0.6 * step_s
     column = _finite_rows(column)
-    held = latest_values(t_s, column.t_s, column.values)
+    latest = latest_values(t_s, column.t_s, column.values)
     if is_faster:
-        return _means(column, t_s, step_s, held), 0.5 * step_s
+        return _means(column, t_s, step_s, latest), 0.5 * step_s
     age_s = _held_age_s(column, t_s)
     age_s = age_s[np.isfinite(age_s)]
-    return held, float(age_s.mean()) if age_s.size else float("nan")
+    return latest, float(age_s.mean()) if age_s.size else float("nan")
 
 
 def _finite_rows(column: Column) -> Column:

@@ -76,8 +76,8 @@ def _choose_threshold(tail: extremes.PeakTail | None, target: float, model: Mode
     factor = 1.0 if tail is None or model.vehicle.other_laws else 0.0
     if model.vehicle.other_laws and not model.vehicle.moving_air:
         factor = _LORDEN_FACTOR
-    least = factor * extremes.lorden_threshold(model.rate_hz, target)
-    return max(extremes.threshold_for_rate(tail, target), least) if tail is not None else least
+    theoretical = factor * extremes.lorden_threshold(model.rate_hz, target)
+    return max(extremes.threshold_for_rate(tail, target), theoretical) if tail is not None else theoretical
 
 
 def _cross_validate(

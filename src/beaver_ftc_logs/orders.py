@@ -118,12 +118,15 @@ def refit(parts: Parts, model: Model) -> Model:
 
 def fitted_order(parts: Parts, vehicle: Vehicle, h: int, L: int) -> tuple[least_squares.Regression, Model]:
     """Least squares of given order over all flights, and its model. Each fit is made once: every test of a
-    model needs the same fits to parts of the flights."""
+    model needs the same fits to parts of the flights.
+
+    fits, of the first part: (vehicle as JSON, h, L, id of each part) -> (fit, model, parts).
+    """
     fits = parts[0].fits
     key = (vehicle.model_dump_json(), h, L, *map(id, parts))
     if key not in fits:
         fit = fit_order(parts, vehicle, h, L)
-        # with the parts, which are held: an id is of one object
+        # The entry keeps its parts alive, so that no other object gets the id of one of them.
         fits[key] = fit, _model_of_fit(fit, parts, vehicle, h, L), tuple(parts)
     return fits[key][:2]
 

@@ -54,8 +54,12 @@ def test_the_limits_are_where_the_elevator_there_is_just_suffices(elevator_deg, 
     hold = table().view(np.recarray)[0].holding
     speeds = np.linspace(30.0, 55.0, 2001)
     can = np.radians(-20.0 + 0.4 * speeds) + 0.3 * flap <= np.radians(elevator_deg)  # at this end or beyond
-    fastest = np.sqrt(2.0 * holding.dynamic_pressure_limit(hold, flap, np.radians(elevator_deg), True))
-    slowest = np.sqrt(2.0 * holding.dynamic_pressure_limit(hold, flap, np.radians(elevator_deg), False))
+    fastest = np.sqrt(
+        2.0 * holding.dynamic_pressure_limit(hold, flap, np.radians(elevator_deg), holding.FASTEST)
+    )
+    slowest = np.sqrt(
+        2.0 * holding.dynamic_pressure_limit(hold, flap, np.radians(elevator_deg), holding.SLOWEST)
+    )
     if can.all():
         assert fastest == np.inf
     else:

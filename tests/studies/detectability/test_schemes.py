@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from beaver_ftc.diagnosis import Verdict
 from beaver_ftc.diagnosis.informed_test import detection_probability
 from beaver_ftc.documents.errors import BadInput
 from beaver_ftc.studies.compare.replay import Trace, alarms_at, record
@@ -248,6 +249,9 @@ class Raises:
     def step(self, measured, command):
         raise ZeroDivisionError("no such luck")
 
+    def __deepcopy__(self, memo):
+        raise AssertionError("now the fault begins")
+
 
 class TestContenders:
     def test_a_scheme_that_is_none_is_refused(self):
@@ -262,6 +266,11 @@ class TestContenders:
         assert set(one.traces) == set(BUILT_IN)
         assert len(one.failures) == 1
         assert one.failures[0].startswith(f"{broken}: plug-in {broken}: not registered")
+
+    def test_no_copy_tells_a_plug_in_that_the_fault_begins(self, monkeypatch):
+        monkeypatch.setattr(Raises, "step", lambda *_: Verdict())
+        monkeypatch.setattr("beaver_ftc.studies.compare.replay.made", lambda *_: Raises())
+        assert not fly_block((SMALL.faulted()[0], True), SMALL, [*contenders([]), "quiet"]).failures
 
 
 def test_a_grid_elsewhere_is_of_another_aircraft_and_one_surface():

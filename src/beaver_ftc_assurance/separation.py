@@ -24,12 +24,12 @@ from beaver_ftc_assurance.candidates import (
 )
 from beaver_ftc_assurance.certificates import proved
 from beaver_ftc_assurance.certificates.certificate import (
-    Certified,
     check_scheme,
     history_of,
     logged_columns,
     row_set_to_end,
 )
+from beaver_ftc_assurance.certificates.certified import Certified
 from beaver_ftc_assurance.certificates.history import History
 from beaver_ftc_assurance.certificates.tape import Recorder, Tape, tape_of_flight_again
 

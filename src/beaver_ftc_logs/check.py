@@ -1,8 +1,5 @@
-"""Check a log before a fit: columns, units, gaps, dead signals, and a vehicle file for it.
-
-The name of a column says which quantity it is. Its unit follows from the name, from the size of its numbers,
-and from mechanics: the integral of p is the change of roll, the mean of the acceleration is 1 g.
-"""
+"""Check a log before a fit: columns, units, gaps, dead signals. Without a vehicle file, `proposal` proposes
+one."""
 
 from pathlib import Path
 

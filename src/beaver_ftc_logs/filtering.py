@@ -44,7 +44,7 @@ from beaver_ftc_logs.runs import trailing_sums
 from beaver_ftc_logs.samples import Samples
 
 _EVIDENCE_MEMORY_S = 600.0  # in which delays and noise models are compared
-_MIN_PROBABILITY = 1e-15  # rounding of a sum of probabilities
+_MIN_PROBABILITY = 1e-15  # the least of a hypothesis, and the rounding of a sum
 _MIN_NOISE_SCALE = 0.3
 _MAX_NOISE_SCALE = 6.0
 _SQUARE_CLIP = 3.0  # of d2 per axis, for the running scale

@@ -136,8 +136,8 @@ def whiten_flights(flights: Sequence[Samples], vehicle: Vehicle) -> list[Samples
     from scipy.signal import lfilter
 
     def stacked(flights: Sequence[Samples]) -> tuple[Floats, Floats]:
-        # the commands get as many lags as the rates, not as many as they have at most: the results rest on it
         """Regressors and rates of flights, of the largest order of the rates."""
+        # the commands get as many lags as the rates, not as many as they have at most: the results rest on it
         return orders.stack_data(orders.fit_parts(flights), vehicle, *[max(orders.RATE_LAGS)] * 2)[:2]
 
     def own_residual(flight: Samples, ma: tuple[float, ...]) -> Floats:

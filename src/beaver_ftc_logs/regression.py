@@ -286,8 +286,8 @@ def by_axis(values: Floats) -> dict[str, float]:
 
 
 def subtract_noise(values: Floats, ar: Floats) -> Floats:
-    """Values s (n, .., 3) less their prediction by ar, t (n, .., 3): as of residuals, for each of the
-    quantities g in the middle; zero before the first row.
+    """t (n, .., 3): values s (n, .., 3) less their prediction by ar, for each quantity g of the middle axes.
+    Values before the first row count as 0.
 
         t[k, g] = s[k, g] - sum over lags l = 1..p of ar[l-1]' s[k-l, g]
 

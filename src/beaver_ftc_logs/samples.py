@@ -192,12 +192,12 @@ def whiten_samples(samples: Samples, C: Sequence[float], fit_weight: float = 1.0
     for a, b in runs_between((np.diff(known) != 0) | (np.diff(samples.stretch_number) != 0)):
         x0 = x[a]
         x[a:b] = x0 + lfilter([sum(C)], C, x[a:b] - x0, axis=0)
-    rates, commands, signals = np.split(x, [3, 3 + samples.commands.shape[1]], axis=1)
+    rates, commands, others = np.split(x, [3, 3 + samples.commands.shape[1]], axis=1)
     return replace(
         samples,
         rates=rates,
         commands=commands,
-        signals=signals,
+        signals=others,
         noise_ma_coefficients=tuple(C),
         fit_weight=fit_weight,
     )

@@ -20,8 +20,8 @@ from beaver_ftc_logs.runs import runs_between
 from beaver_ftc_logs.scoring import score_against_labels
 
 _DEFAULT_FALSE_ALARMS = 1.0  # 1/h, if the vehicle file states no rate
-# Under a law that the fit has not seen, so many times the evidence of theory raises an alarm. Chosen on own
-# flights, as `_POWER_OTHER_LAWS`.
+# Under a law that the fit has not seen, so many times the evidence of theory raises an alarm.
+# docs/results/choices.md has the flights that chose it.
 _LORDEN_FACTOR = 2.0
 _CREDIBLE_MASSES = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95)  # that are tried
 # Coverage the bounds aim at: 90 % and some of what another day takes away.

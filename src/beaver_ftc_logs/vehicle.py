@@ -30,7 +30,7 @@ from beaver_ftc_logs.units import ACCELERATION, ANGLE, LENGTH, RATE, SI_UNITS, S
 
 _MAX_FILE_BYTES = 1_000_000
 MAX_ALARMS_PER_HOUR = 1000.0
-# Largest sample rate of a log, left out in the file.
+# Largest sample rate of a log if the file leaves out max_rate_hz: in still air, and in moving air.
 STILL_AIR_HZ = 20.0
 _MOVING_AIR_HZ = 100.0
 _BUILT_IN_FOLDER = Path(__file__).parent / "vehicles"

@@ -214,9 +214,9 @@ def set_problem(problem, G, layout, effectiveness, prediction, share, probe):
         low, high = u -+ reach, within the stops        reach: by the rate limit in a frame, rad
         u_preferred = trim / effectiveness, within the stops
         weight = half^2,  of a backup half^2 ratio      half: half the travel, rad
-        ratio = share own / ((1 - share) waiting)       own, waiting: sum of half^2 G_pitch^2 of those that
-        are
-                                                        no backups, and of all that are
+        ratio = share own / ((1 - share) waiting)
+
+    own, waiting: sums of half^2 G_pitch^2 over the surfaces that are no backups, and over the backups.
 
     A backup gives `share` of what pitch demands beyond the trimmed moments: of two that move pitch alone
     that is the published hand-over. A probe is held, and the others give what it does not leave.

@@ -105,9 +105,9 @@ def find_airspeeds_that_can_be_held(hold, layout, surfaces, y):
 
         fixed + left u,    u in its travel        fixed, rad: acts without a command; left: its effectiveness
 
-    and the limits are V = sqrt(2 qdyn / rho), rho of the air by readings; the flap up and the
-    elevator's greatest give the fastest, the flap down and its least the slowest. A flap of no use stands
-    where it is off.
+    and the limits are V = sqrt(2 qdyn / rho), rho kg/m3: of the air, by readings. The flap up and the
+    elevator's greatest give the fastest, the flap down and its least the slowest. A flap that is
+    given up stands at its offset.
     """
     e, f = layout.main[PITCH], layout.stand_in
     elevator_left, flap_left = surfaces.output.effectiveness[e], surfaces.output.effectiveness[f]

@@ -327,7 +327,7 @@ def certificate_arrays(
 
         offset, slope, spread     h, Z, r of each estimator's fault, (n_estimators, 3) rad/s2
         excluded, types           whether each estimator, and each type on each surface, is excluded
-        command_low, _high        of faults of every type: least and greatest command of a surface, rad
+        command_low, _high        fault class `all` only: least and greatest command of each surface, rad
         least, greatest           the same of the position of a healthy surface, rad
 
     Up to the alarm:

@@ -36,8 +36,9 @@ class Tape:
     alarm, last: the flight at the alarm and at its end. since: the frame with which the diagnosis began.
     kept, by frame: of each isolation estimator `offset` (rad/s2), `slope` (rad/s2 per unit of its parameter)
     and `spread` (rad/s2) of its fault's effect, (estimators, 3); `excluded` (estimators,) and `types`
-    (surfaces, types), above 0 for what is excluded; and, rad, of every type of fault `command_low` and
-    `command_high`, the orders to the surfaces, `least` and `greatest`, the positions of healthy ones.
+    (surfaces, types), above 0 for what is excluded; and, if the fault class is `all`, of each surface, rad,
+    `command_low` and `command_high`, the least and greatest command, `least` and `greatest`, the same of the
+    position of a healthy surface.
     filters: the filter states of the statistical detector, by frame up to the alarm. reach_low, reach_high
     (estimators, poles, 4): bounds on the effect of a fault in the filters before the first frame.
     """

@@ -103,7 +103,8 @@ class TextTable:
     @classmethod
     def _with_delimiter(cls, lines: Sequence[str], delimiter: str) -> "TextTable | None":
         """The table that lines hold if this is what is between cells; None if they hold none: no line of
-        names with numbers in one of the next four lines, nor a first line of names alone."""
+        names above a line of as many cells with a number, among the next four that are not empty; nor a
+        first line of several cells with nothing below."""
         rows = [_split_cells(line_text, delimiter) for line_text in lines]
         for line, header in enumerate(rows):
             below = [row for row in rows[line + 1 :] if row][:4]

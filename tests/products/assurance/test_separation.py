@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 
 import beaver_ftc as bf
 from beaver_ftc.cli.main import main
+from beaver_ftc_assurance.candidates import Candidate, tell_apart
 from beaver_ftc_assurance.doublet import Situation, doublet
-from beaver_ftc_assurance.separation import Candidate, as_text, separate, tell_apart
+from beaver_ftc_assurance.separation import as_text, separate
 from fault_kinds import BIAS, CONSTANT_LOSS, FLOAT, STUCK
 from samples import samples
 

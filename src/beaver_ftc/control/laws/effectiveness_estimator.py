@@ -32,9 +32,7 @@ _UNSURE = 0.5  # standard deviation of a surface's theta at the start
 _AIRFRAME = np.array([30.0, 30.0, 3.0, 3.0, 3.0])  # standard deviations of A at the start, 1/s2 and 1/s, as y
 _CORRELATED = 10.0  # So many frames of the innovation count as one, since it is no white noise.
 _LEAST_NOISE_RAD_S2 = 0.05  # smallest standard deviation of the noise, as an acceleration over a frame
-_FORGOTTEN_S = (
-    30.0  # time in which a variance returns to that of the start, if nothing is seen of its parameter
-)
+_FORGOTTEN_S = 30.0  # time in which the variance of a parameter that is not seen returns to its first value
 
 
 @sized

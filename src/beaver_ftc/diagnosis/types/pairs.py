@@ -131,10 +131,10 @@ def isolate_lateral(types, layout, t):
     """Set the isolation of the surfaces of roll and yaw; returns whether the fault of this plane is outside
     the class: neither alone can be faulty (`both`), and both together are refuted.
 
-        isolated       a surface, if the other alone cannot be faulty
-        none           before the plane's alarm; if neither alone can be faulty, and deflections out of reach
-        or
-                       all types excluded refute both together, or a type that has to show itself has not
+        isolated    a surface, if the other alone cannot be faulty
+        none        before the plane's alarm; and if neither alone can be faulty, but both together are
+                    refuted (by deflections out of reach, or since all types of one are excluded), or a type
+                    that has to show itself has not
     """
     roll, yaw = types.surface[layout.main[ROLL]], types.surface[layout.main[YAW]]
     both = not can_be_faulty(roll) and not can_be_faulty(yaw)

@@ -55,7 +55,7 @@ def exports_of(
         exports["log.csv"] = partial(write_csv, log_path, folder / "log.csv")
     if "acmi" in kinds and document:
         to = folder / "flight.acmi"
-        exports["flight.acmi"] = partial(write_acmi, log_path, Metrics.of(document), to, aircraft)
+        exports["flight.acmi"] = lambda: write_acmi(log_path, Metrics.of(document), to, aircraft)
     if recording is not None:
         stops_rad = {s: max(abs(at.min_rad), abs(at.max_rad)) for s, at in aircraft.travel.items()}
         exports[f"the recording ({recording})"] = partial(

@@ -305,9 +305,9 @@ def _max_legend_columns(labels: Sequence[str], width: float) -> int:
     return 1
 
 
-def _legend_handle_of_label(grid: Sequence["Axes"]) -> Options:
+def _legend_handle_of_label(grid: Sequence["Axes"]) -> dict[str, Any]:
     """Label and handle of what a legend is to hold."""
-    entries: Options = {}
+    entries: dict[str, Any] = {}
     for axes in grid:
         handles, labels = axes.get_legend_handles_labels()
         entries = entries | dict(zip(labels, handles, strict=True)) | entries

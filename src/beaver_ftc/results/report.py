@@ -32,7 +32,6 @@ from beaver_ftc.results.views import (
 if TYPE_CHECKING:
     from jinja2 import Template
 
-Names = Sequence[str]  # of runs, or of columns
 ReportSection = Callable[[Path], str]
 """What a study shows of a result folder, as HTML; empty if it has found nothing there."""
 
@@ -43,7 +42,7 @@ _FLIGHT_PATH_COLUMNS = ("north_m", "east_m", "altitude_m", "phi_rad", "theta_rad
 
 
 def write_report(
-    path: Path, folders: Sequence[Path], names: Names = (), sections: Sequence[ReportSection] = ()
+    path: Path, folders: Sequence[Path], names: Sequence[str] = (), sections: Sequence[ReportSection] = ()
 ) -> None:
     """Write the report of the runs in these result folders, side by side, as one HTML file.
 
@@ -53,7 +52,7 @@ def write_report(
     path.write_text(render(folders, names, sections), encoding="utf-8")
 
 
-def render(folders: Sequence[Path], names: Names = (), sections: Sequence[ReportSection] = ()) -> str:
+def render(folders: Sequence[Path], names: Sequence[str] = (), sections: Sequence[ReportSection] = ()) -> str:
     """The report as HTML text.
 
     The legend has one entry for each name of a mark (fault, detection, ...) that any run has: the mark of the
@@ -94,7 +93,7 @@ def _verdict_entry(metrics: Document, folder: Path) -> Document:
 def script_style_and_data(
     folders: Sequence[Path],
     documents: Sequence[Document],
-    names: Names = (),
+    names: Sequence[str] = (),
     shown: Sequence[View] | None = None,
 ) -> Document:
     """Script, style and data of a page that replays flights.
@@ -114,7 +113,7 @@ def script_style_and_data(
 def _page_data(
     folders: Sequence[Path],
     documents: Sequence[Document],
-    names: Names,
+    names: Sequence[str],
     shown: Sequence[View] | None,
 ) -> Document:
     """The runs with their curves and marks, the views, and the looks, from which the script draws the page.
@@ -149,7 +148,7 @@ def _common_views(logs: Sequence[log.Log], flown: Sequence[Metrics]) -> tuple[Vi
     return tuple(view for view in first if all(view in other for other in rest))
 
 
-def _run_entry(source: log.Log, metrics: Metrics, columns: Names, name: str, points: int) -> Document:
+def _run_entry(source: log.Log, metrics: Metrics, columns: Sequence[str], name: str, points: int) -> Document:
     event_marks = marks(metrics)
     window = closeup_window(event_marks)
     levels = [series_of(source, columns, max_points=points)]

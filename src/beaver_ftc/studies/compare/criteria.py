@@ -56,8 +56,8 @@ from beaver_ftc.studies.margins import Margin
 
 # Of a detector.
 DELAY_S = 1.0  # an alarm this late costs half of a missed one
-# Of a law. Shares of 1.
-LOST = 100.0  # of e_oracle: the error of a flight that loses the aircraft; above every flight that does not
+# Of a law: shares of 1, but for LEAST_FLIGHTS.
+LOST = 100.0  # of e_oracle: the error of a flight that loses the aircraft, and the largest of any flight
 EFFORT = 1.1  # of the RMS surface rate of the default law
 LEAST_FLIGHTS = 4  # that a mean of a trial needs, before it ends the trial
 HOPELESS = 1.5  # of the lowest J

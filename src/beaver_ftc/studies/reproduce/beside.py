@@ -90,9 +90,8 @@ def _row(case: str, whose: str, flown: Flown) -> Document:
 
 def _better(rows: Sequence[Document]) -> list[Document]:
     """Where the paper's scheme or law does better than ours."""
-    pairs = zip(
-        rows[::2], rows[1::2], strict=True
-    )  # `fly_beside` flies each case by the paper's, then by ours
+    # `fly_beside` flies each case by the paper's, then by ours
+    pairs = zip(rows[::2], rows[1::2], strict=True)
     return [
         {
             "case": paper["case"],

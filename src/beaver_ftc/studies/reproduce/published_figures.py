@@ -121,7 +121,7 @@ def _share(claim: Document, number: float | None) -> float:
 
 
 def margins_figure(document: Document) -> "Figure":
-    """A row a statement that has a number, by verdict: the range of the number over the changes, and ours."""
+    """A row a statement that can be tested, by verdict: the range of its number over changes, and ours."""
     from matplotlib.figure import Figure
 
     claims = [claim for claim in document["claims"] if not claim["reason"] and not claim["construction"]]

@@ -92,27 +92,29 @@ def run_sweep(
                 so_far.update(counts_of(rows))
                 progress(so_far)
 
-            _fly_missing(sweep, options, store, there, stopped)
+            flown = _fly_missing(sweep, options, store, there, stopped)
             if so_far["done"] < so_far["total"]:
                 raise SweepStopped(
                     f"{sweep.name}: stopped, {so_far['done']} of {so_far['total']} flights are kept; "
                     "go on with the same command and --resume"
                 )
-            rounds = _rounds(sweep, options, store)
-            store.compact(store.landed(*batch) for batches, _ in rounds for batch in batches)
+            store.compact(store.landed(*batch) for batch in flown)
         store.parts.remove()
         return conclude(sweep, options, store)
 
 
 def _fly_missing(
     sweep: Sweep, options: Options, store: Store, there: There, stopped: Callable[[], bool]
-) -> None:
-    """Fly what is not there, each round once the one before has landed."""
+) -> list[tuple[int, range]]:
+    """Fly what is not there, each round once the one before has landed; returns the batches of all rounds."""
+    batches_flown: list[tuple[int, range]] = []
     make = partial(_workers, sweep, options)
     lost = partial(one_flight.lost, sweep)
     with closing(Flying(store.landed, store.parts.land, make, lost)) as flying:
         for batches, cases_of in _rounds(sweep, options, store):
             flying.fly(batches, cases_of, there, stopped)
+            batches_flown += batches
+    return batches_flown
 
 
 def _rounds(sweep: Sweep, options: Options, store: Store) -> Iterable[Round]:

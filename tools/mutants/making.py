@@ -4,6 +4,7 @@ import ast
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
 # Operators of Python's syntax tree, and what could stand in their place.
@@ -75,8 +76,8 @@ def _parsed(text: str) -> ast.Module:
     tree = ast.parse(text)
     for node in ast.walk(tree):
         match node:
-            case ast.Tuple(elts=[ast.Constant(value=str()), _, shape]):
-                for inner in ast.walk(shape):
+            case ast.Call(func=ast.Name("record"), keywords=fields):
+                for inner in chain.from_iterable(ast.walk(field) for field in fields):
                     inner.is_length = True  # type: ignore[attr-defined]
     return tree
 

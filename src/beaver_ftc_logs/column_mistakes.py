@@ -10,8 +10,8 @@ A large residual may come from a fault, from the air, or from such a mistake. Th
 
 A mistake is there from the first sample to the last, so tests 2 and 3 must find it in each of four parts.
 
-    lo, hi          least and largest gain of a group, 1 in the model
-    ll              log likelihood of a sample
+    lo, hi          lowest lower and highest upper bound of a group's gain over the parts, 1 in the model
+    ll              log likelihood of a sample (4,), a mean over each part
 """
 
 from collections.abc import Sequence
@@ -29,17 +29,19 @@ from beaver_ftc_logs.samples import NOISE_MA_CANDIDATES, Samples, whiten_samples
 from beaver_ftc_logs.trust import central_ranges, known_effects, known_gains, unknown_surfaces
 from beaver_ftc_logs.units import RATE, SI_UNITS, nearest_unit
 
-# The rates are in one unit if their motions, relative to the flights of the model, differ by less.
+# All rates are in the same unit if their motions, relative to the flights of the model, differ by less than
+# this factor.
 _MAX_AXIS_RATIO = 10.0
-# Square root of the largest error of a unit that is guessed from the motions.
-_UNIT_FACTOR_ROOT = 1.6
+# Largest factor by which the motions may differ from those of a unit that is guessed from them.
+_MAX_UNIT_ERROR = 1.6**2
 # A motion differs between flights by this factor at most.
 _MAX_ALIKE_FACTOR = 3.0
 # Another unit changes a motion by this factor at least.
 _MIN_UNIT_FACTOR = 12.0
 _COMMAND_UNIT_HINT = ": one unit (57.3 is deg for rad, 100 percent: `unit`, `scale`)"
 _CHANGED_EFFECT = "the command of {} moves {:.3g} times as much as in the flights of the model, and does "
-# By the kind of a mistake its text: of the group, the motion over that of the model's flights, the gain.
+# The text of each kind of mistake. Its fields: name of the group, motion over that in the flights of the
+# model, gain.
 _COMMAND_MISTAKES = {
     "sign": "the rates answer the command of {} the other way round in all of it (does `scale: -1` fit?)",
     "weak": f"{_CHANGED_EFFECT}at most {{:.2g}} of what it did{_COMMAND_UNIT_HINT}",
@@ -54,7 +56,7 @@ _MIN_COMMAND_GAIN = 0.2
 _REVERSED_GAIN_LIMIT = -0.5
 # Probability with which chance alone may look like a mistake in the columns.
 _FALSE_MISTAKE_CHANCE = 0.001
-# Of a longer flight, about so many samples are compared (computing time).
+# A longer flight is reduced to about so many samples, to save computing time.
 _MAX_COMPARED_SAMPLES = 8000
 
 
@@ -64,7 +66,7 @@ def refuse_rate_unit(samples: Samples, ranges: FittedRanges) -> None:
     if not ranges.rates:
         return
     ratios = _relative_motion(samples.rates, ranges.rates)
-    if not ratios.max() < _MAX_AXIS_RATIO * ratios.min():  # an axis without a number does not move
+    if not ratios.max() < _MAX_AXIS_RATIO * ratios.min():  # also if an axis has no number: its ratio is 0
         return
     ratio = float(np.exp(np.mean(np.log(ratios))))
     hints = (
@@ -72,7 +74,7 @@ def refuse_rate_unit(samples: Samples, ranges: FittedRanges) -> None:
         (ratio, "a factor of {from_si:.4g} fits: the model's own were in {unit}?"),
     )
     for size, hint in hints:
-        unit = nearest_unit(RATE, size, _UNIT_FACTOR_ROOT**2)
+        unit = nearest_unit(RATE, size, _MAX_UNIT_ERROR)
         if unit not in (None, "rad/s"):
             to_si = SI_UNITS[unit][1]
             text = hint.format(to_si=to_si, from_si=1.0 / to_si, unit=unit)
@@ -83,10 +85,15 @@ def refuse_rate_unit(samples: Samples, ranges: FittedRanges) -> None:
 def refuse_command_unit(
     name: str, commands: Floats, rates: Floats, ranges: FittedRanges, surfaces: Sequence[str]
 ) -> None:
-    """Raise BadInput where a command moves so much more or less than in the flights of the model, while every
-    rate moves alike, that it is in another unit; or so much more than any rate does.
+    """Raise BadInput where the motion of a command, over that in the flights of the model, shows another
+    unit.
 
-    Shapes: commands (n, S), rates (n, 3).
+    rates                               motion of the command that is refused
+    each between 1 / 3 and 3 times      below 1 / 12, or above 12 times
+    otherwise                           above 12 times the largest motion of a rate, or 12 if that is larger
+
+    The factors are _MAX_ALIKE_FACTOR and _MIN_UNIT_FACTOR. A motion beyond 1e-4 to 1e4 is not judged here.
+    commands (n, S), rates (n, 3).
     """
     rate_ratios = _relative_motion(rates, ranges.rates)
     alike = rate_ratios.min() > 1.0 / _MAX_ALIKE_FACTOR and rate_ratios.max() < _MAX_ALIKE_FACTOR
@@ -106,8 +113,8 @@ def _relative_motion(values: Floats, fitted: Sequence[Sequence[float]]) -> Float
     return spans[0] / np.maximum(spans[1], MIN_DIVISOR)
 
 
-# By the kind of a mistake (_COMMAND_MISTAKES) and the group: the motion of the command over that in the
-# flights of the model, and its gain.
+# Key: kind of the mistake (_COMMAND_MISTAKES), and name of the group. Value: motion of the command over that
+# in the flights of the model, and its gain.
 CommandMistakes = dict[tuple[str, str], tuple[float, float]]
 
 
@@ -115,7 +122,8 @@ class Answers(NamedTuple):
     """The response to the commands in each of four parts of a flight.
 
     lower, upper (4, G): bounds of the gain of each group, 1 in the model. likelihood (4,): mean log
-    likelihood of a sample, without a constant. n_white: as how many white samples the shortest part counts.
+    likelihood of a sample, without a constant. n_white: number of white samples that have the information of
+    the shortest part.
     """
 
     lower: Floats
@@ -125,8 +133,10 @@ class Answers(NamedTuple):
 
 
 def answers(samples: Samples, model: Model, most: int | None = None) -> Answers | None:
-    """The responses in the parts of a flight; None if a part is too short. most: of a longer flight, every
-    k-th sample is used, so that about this many are left."""
+    """The responses in the parts of a flight; None if a part is too short.
+
+    most: about the largest number of samples to use. Of a longer flight, only every `step`-th is used.
+    """
     flight = regression.innovations(samples, model)
     rows = np.flatnonzero(flight.is_known)
     step = max(len(rows) // most, 1) if most else 1
@@ -134,7 +144,7 @@ def answers(samples: Samples, model: Model, most: int | None = None) -> Answers 
         return None
     share = model.settings.power / flight.noise.wider
     bounds = [flight.at(part).gain_bounds(share) for part in parts]
-    lower, upper, scales = (np.array(each) for each in zip(*bounds, strict=True))
+    lower, upper, scales = (np.array(values) for values in zip(*bounds, strict=True))
     likelihood = -flight.log_size - 1.5 * np.log(scales)
     return Answers(lower, upper, likelihood, share * min(map(len, parts)))
 
@@ -159,8 +169,9 @@ def refuse_columns(samples: Samples, model: Model) -> None:
 
 
 def _lasting_mistakes(samples: Samples, model: Model, measured: Answers) -> CommandMistakes:
-    """Those of `_command_mistakes` that are found with each likelier moving average of the noise, too: a
-    law's response to gusts or to gyro noise can look like a command with the opposite effect."""
+    """The mistakes by `_command_mistakes` that remain if the flight is whitened by any other moving average
+    that makes it likelier. A law's response to gusts or to gyro noise can look like a command with the
+    opposite effect."""
     mistakes = _command_mistakes(samples, model, measured)
     if not mistakes:
         return mistakes
@@ -173,8 +184,7 @@ def _lasting_mistakes(samples: Samples, model: Model, measured: Answers) -> Comm
 
 
 def _whiten_likeliest(samples: Samples, model: Model) -> tuple[Samples, Model]:
-    """Return the flight whitened by the noise of the model that makes it likeliest, and the model with this
-    noise alone."""
+    """The flight whitened by the noise model that makes it likeliest, and the model with this noise alone."""
     return max(regression.by_noise(samples, model), key=lambda pair: _likelihoods(*pair).mean())
 
 
@@ -189,14 +199,22 @@ def find_reversed(samples: Samples, model: Model) -> list[list[str]]:
     return list(compress(model.groups, is_reversed))
 
 
-def _command_mistakes(samples: Samples, model: Model, found: Answers) -> CommandMistakes:
-    """The commands with the wrong sign or in another unit."""
+def _command_mistakes(samples: Samples, model: Model, measured: Answers) -> CommandMistakes:
+    """The commands with the wrong sign or in another unit.
+
+    kind        condition
+    sign        hi < MAX_REVERSED_GAIN
+    weak        hi < _MIN_COMMAND_GAIN, and the command moves more than _MAX_ALIKE_FACTOR times as much
+    strong      lo > 1 / _MIN_COMMAND_GAIN, and the command moves, but less than 1 / _MAX_ALIKE_FACTOR as much
+
+    Kinds weak and strong require that the gain is known (`known_gains`).
+    """
     mistakes = {}
     surfaces = list(model.vehicle.surfaces)
     fitted = model.fitted.commands
     motions = _relative_motion(samples.commands, fitted) if fitted else np.zeros(len(surfaces))
-    highest = found.upper.max(axis=0)
-    lowest = found.lower.min(axis=0)
+    highest = measured.upper.max(axis=0)
+    lowest = measured.lower.min(axis=0)
     for group, is_known, hi, lo in zip(model.groups, known_gains(model), highest, lowest, strict=True):
         name = "+".join(group)
         motion = max(motions[surfaces.index(surface)] for surface in group)
@@ -210,15 +228,17 @@ def _command_mistakes(samples: Samples, model: Model, found: Answers) -> Command
 
 
 def _likelier_mistake(samples: Samples, model: Model) -> str | None:
-    """The correction that makes every part of a flight likelier, if there is one.
+    """The text of the correction that makes the flight likeliest; None if none makes every part decisively
+    likelier.
 
     If the model is correct, a wrong correction makes the log K times as likely with a probability of at most
-    1 / K (Markov's inequality). With N corrections, K = N / `_FALSE_MISTAKE_CHANCE`.
+    1 / K (Markov's inequality). With N corrections, K = N / _FALSE_MISTAKE_CHANCE. A part is K times as
+    likely if gain n > log K, with n white samples in it.
     """
     gains, n = mistake_gains(samples, model)
     if not gains:
         return None
-    text, gain = max(gains.items(), key=lambda one: one[1])
+    text, gain = max(gains.items(), key=lambda item: item[1])
     if gain * n <= np.log(len(gains) / _FALSE_MISTAKE_CHANCE):
         return None
     log10 = gain * n / np.log(10.0)
@@ -227,14 +247,14 @@ def _likelier_mistake(samples: Samples, model: Model) -> str | None:
 
 def mistake_gains(samples: Samples, model: Model) -> tuple[dict[str, float], float]:
     """For each correction of the columns, the gain of the log likelihood of a sample, in the part of the
-    flight with the least gain; and as how many white samples a part counts.
+    flight with the least gain; and the number of white samples that a part counts as.
 
-    A corrected signal must also be likelier than no signal, by as much in the sum over the parts. Where the
-    model errs in the effect of a signal, a smaller or reversed effect may be likelier than the modelled one,
-    and no effect likelier still.
+    A corrected signal must also be likelier than no signal: its gain is at most the gain over a log without
+    the signal, in the sum over the parts. Where the model errs in the effect of a signal, a smaller or
+    reversed effect may be likelier than the modelled one, and no effect likelier still.
     """
-    found = answers(samples, model, _MAX_COMPARED_SAMPLES)
-    if found is None:
+    measured = answers(samples, model, _MAX_COMPARED_SAMPLES)
+    if measured is None:
         return {}, 0.0
     without = {
         signal: _likelihoods(altered_log(samples, model.vehicle, {}, {signal: 0.0}), model)
@@ -243,14 +263,14 @@ def mistake_gains(samples: Samples, model: Model) -> tuple[dict[str, float], flo
     gains = {}
     for log in corrected_logs(samples, model.vehicle, unknown_surfaces(model)):
         ll = _likelihoods(log.samples, model) + log.log_jacobian
-        gain = float((ll - found.likelihood).min())
+        gain = float((ll - measured.likelihood).min())
         if signal := log.scaled_signal:
             gain = min(gain, float((ll - without[signal]).sum()))
         gains[log.correction_text] = gain
-    return gains, found.n_white
+    return gains, measured.n_white
 
 
 def _likelihoods(samples: Samples, model: Model) -> Floats:
     """Log likelihood of a sample of each part of the flight; minus infinity where a part is too short."""
-    found = answers(samples, model, _MAX_COMPARED_SAMPLES)
-    return np.array(-np.inf) if found is None else found.likelihood
+    measured = answers(samples, model, _MAX_COMPARED_SAMPLES)
+    return np.array(-np.inf) if measured is None else measured.likelihood

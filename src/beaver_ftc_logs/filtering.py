@@ -2,14 +2,14 @@
 
 Under hypothesis h, with effectiveness a_h of the groups, the part of the rates unexplained by the past is
 
-    y = b + s (c + sum_g a_hg F_g) + sum_g d_g k_hg F_g + noise = C_h' x + noise,      noise ~ t(0, q r R)
+    y = b + s (c + sum_g a_hg F_g) + sum_g d_g kappa_hg F_g + noise = C_h' x + noise,      noise ~ t(0, q r R)
 
     n, H, G         samples, hypotheses, groups; N = 4 + G states
     y, F, c         unexplained rates (n, 3), healthy responses (n, G, 3), intercept (3,), rad/s, as in
                     `regression`
-    a, k            effectiveness (H, G), and share of a response that the group's own gain multiplies (H, G)
+    a, kappa        effectiveness (H, G), and share of a response that the group's own gain multiplies (H, G)
     x, P            state: trim b (3,) rad/s, common gain s, gain d (G,) of each group; its covariance
-    C               what the states do to y, (N, 3)
+    C               effect of the states on y, (N, 3)
     p               probability of each hypothesis (H,)
     R               covariance of the noise (3, 3), (rad/s)2; W whitens it
     nu              degrees of freedom of the t distribution of the noise
@@ -20,11 +20,11 @@ Under hypothesis h, with effectiveness a_h of the groups, the part of the rates 
     ll              log likelihood of a sample
 
 The states belong to the flight: each hypothesis estimates them with a Kalman filter. The common gain
-multiplies the intercept and all responses, whose sum vanishes in trimmed flight: it shows in the motion about
-trim, as the dynamic pressure does, and not in the trim. One hypothesis changes to another at random times
-(interacting multiple models [Blom1988]); the new one inherits trim and gains, plus an offset of the rates if
-a surface may be stuck. The last hypothesis is that nothing answers the commands, as on the ground: it
-estimates no trim and no gain.
+multiplies the sum of the intercept and all responses. This sum vanishes in trimmed flight. So the common gain
+changes the motion about the trim, as the dynamic pressure does, and not the trim. One hypothesis changes to
+another at random times (interacting multiple models [Blom1988]). The new one takes over trim and gains, plus
+an offset of the rates if a surface may be stuck. The last hypothesis is that nothing answers the commands, as
+on the ground: it estimates no trim and no gain.
 
 The pass is repeated for each delay of the commands that the flight may have; the results are averaged with
 the probabilities of the delays.
@@ -43,29 +43,31 @@ from beaver_ftc_logs.regression import Innovations, by_noise, innovations
 from beaver_ftc_logs.runs import trailing_sums
 from beaver_ftc_logs.samples import Samples
 
-_EVIDENCE_MEMORY_S = 600.0  # in which delays and noise models are compared
-_MIN_PROBABILITY = 1e-15  # the least of a hypothesis, and the rounding of a sum
+_EVIDENCE_MEMORY_S = 600.0  # memory of the comparison of delays or noise models
+# Least probability of a hypothesis; also the rounding error of a sum of probabilities.
+_MIN_PROBABILITY = 1e-15
 _MIN_NOISE_SCALE = 0.3
 _MAX_NOISE_SCALE = 6.0
-_SQUARE_CLIP = 3.0  # of d2 per axis, for the running scale
-_SUM_SPANS_S = (0.0, 0.1)  # over which a residual is summed
-_VARIANCE_WINDOW_S = 2.0  # in which the variance of the sums is taken
-# Mean of the clipped square of a residual per axis when the scale is right.
+_SQUARE_CLIP = 3.0  # limit of d2 per axis in the running scale
+_SUM_SPANS_S = (0.0, 0.1)  # `recent_scale` sums the residual over each of these
+_VARIANCE_WINDOW_S = 2.0  # `recent_scale` takes the variance of the sums over the last 2 s
+# Mean of the clipped d2 per axis if the running scale is right.
 _MEAN_SQUARE = 0.93
 # Probability of a noise model below which it is left out.
 _MIN_NOISE_WEIGHT = 1e-3
 
-# As `run_bank` returns it.
+# The two results of `run_bank`: probabilities (n, H) and log likelihoods (n,).
 BankRun = tuple[Floats, Floats]
 
 
 def bank_posterior(samples: Samples, model: Model, bank: HypothesisBank) -> Floats:
     """Probability of each hypothesis by sample, (n, H).
 
-    It is the average over the command delays of the model's settings or, if the flight is not yet whitened,
-    over its noise models. The weights are their probabilities given the last minutes. A noise model is run up
-    to the last sample at which its weight is not negligible: within a second most become far less likely than
-    another, and stay so.
+    It is a weighted average of several runs of the bank. If the model has noise models (`colours`) and the
+    flight is not yet whitened, there is a run for each noise model, otherwise for each command delay of the
+    settings. The weights are the probabilities of the runs given the last minutes (`model_weights`). A noise
+    model is run only up to the last sample at which its weight is not negligible: within a second most become
+    far less likely than another, and stay so.
     """
     if not model.colours or samples.noise_ma_coefficients:
         delays = model.settings.delays_s
@@ -78,16 +80,20 @@ def bank_posterior(samples: Samples, model: Model, bank: HypothesisBank) -> Floa
     kept = np.where(weights < _MIN_NOISE_WEIGHT, 0.0, weights)
     kept /= kept.sum(axis=0)
     mean = np.zeros((len(samples.t_s), len(bank.transition_share)))
-    for w, (flight, one) in zip(kept, pairs, strict=True):
+    for w, (flight, own_model) in zip(kept, pairs, strict=True):
         if n := int(np.flatnonzero(w).max(initial=-1)) + 1:
-            p, _ = run_flight(flight.at(slice(n)), one, bank)
+            p, _ = run_flight(flight.at(slice(n)), own_model, bank)
             mean[:n] += w[:n, None] * p
     return mean
 
 
 def _noise_likelihood(flight: Innovations, model: Model) -> Floats:
-    """Log likelihood (n,) of the model's noise for a flight that is whitened by it, with all surfaces
-    healthy; by the covariance of the fit, without its inflation."""
+    """Log likelihood of each sample (n,) if all surfaces are healthy, for a flight that is whitened by the
+    model's noise; 0 where the sample is not known. R is the covariance of the fit, without its inflation:
+
+        power (-((nu + 3) log(1 + d2 / nu) + 3 log q) / 2 - log det(R)^1/2 + 3 log sum(ma)),   d2 = |e W|^2 /
+        q
+    """
     q = flight.quick_scale(model)
     d2 = ((flight.e @ flight.W) ** 2).sum(axis=1) / q
     nu = model.settings.tail
@@ -96,8 +102,14 @@ def _noise_likelihood(flight: Innovations, model: Model) -> Floats:
 
 
 def fault_evidence(p: Floats, bank: HypothesisBank) -> Floats:
-    """Return the increase of the log odds of any fault by each sample, beyond that by the prior of a change,
-    (n,), from the probabilities p (n, H). Its sum is the logarithm of a likelihood ratio."""
+    """Increase of the log odds of any fault by each sample, (n,), from the probabilities p (n, H):
+
+        z[k] = log odds(f[k]) - log odds((1 - change) f[k-1] + entry)
+
+    f: probability of any fault; change: probability that the hypothesis changes within a sample; entry: the
+    probability of a change to a fault. Before the first sample, the prior probability of a fault is used. The
+    sum of z is the logarithm of a likelihood ratio.
+    """
     is_fault = bank.is_fault_hypothesis
     share = bank.transition_share
     change = bank.change_probability_per_sample
@@ -109,45 +121,46 @@ def fault_evidence(p: Floats, bank: HypothesisBank) -> Floats:
 
 @kernel
 def page_cusum(z, top):
-    """Page's sum of the evidence z (n,), never below zero, where it starts again, and never above top:
+    """Page's sum of the evidence z (n,), limited to 0 and top:
 
-    S[k] = min(max(S[k-1] + z[k], 0), top)
+    sums[k] = min(max(sums[k-1] + z[k], 0), top)
     """
-    s = 0.0
-    S = np.zeros(len(z))
+    page = 0.0
+    sums = np.zeros(len(z))
     for k in range(len(z)):
-        s = min(max(s + z[k], 0.0), top)
-        S[k] = s
-    return S
+        page = min(max(page + z[k], 0.0), top)
+        sums[k] = page
+    return sums
 
 
 def _with_command_delay(samples: Samples, delay_s: float) -> Samples:
     """The flight with commands that act delay_s later than in the model; at most a sample, may be negative.
 
-    The model uses commands from one sample before the rates, so a negative delay needs no later command than
-    that of the same sample.
+    A delayed command is interpolated between two samples. The model uses commands from one sample before the
+    rates, so a negative delay needs no later command than that of the same sample.
     """
     if delay_s == 0.0:
         return samples
-    a = min(abs(delay_s) / samples.dt_s, 1.0)
+    share = min(abs(delay_s) / samples.dt_s, 1.0)
     u = samples.commands
-    other = np.vstack([u[:1], u[:-1]] if delay_s > 0 else [u[1:], u[-1:]])
-    return replace(samples, commands=(1.0 - a) * u + a * other)
+    neighbour = np.vstack([u[:1], u[:-1]] if delay_s > 0 else [u[1:], u[-1:]])
+    return replace(samples, commands=(1.0 - share) * u + share * neighbour)
 
 
 def model_weights(ll: Sequence[Floats], rate_hz: float) -> Floats:
-    """Probability of each alternative model (D of them) at each sample, (D, n), from its log likelihoods ll
-    (n,), forgotten exponentially within minutes."""
+    """Probability of each of J alternative models at each sample, (J, n), from their log likelihoods ll, (n,)
+    each. Older samples are forgotten exponentially, with the time constant _EVIDENCE_MEMORY_S."""
     from scipy.signal import lfilter
 
-    a = np.exp(-1.0 / (_EVIDENCE_MEMORY_S * rate_hz))
-    sums = lfilter([1.0], [1.0, -a], np.array(ll), axis=1)
+    pole = np.exp(-1.0 / (_EVIDENCE_MEMORY_S * rate_hz))
+    sums = lfilter([1.0], [1.0, -pole], np.array(ll), axis=1)
     p = np.exp(sums - sums.max(axis=0))
     return p / p.sum(axis=0)
 
 
 def run_flight(flight: Innovations, model: Model, bank: HypothesisBank) -> BankRun:
-    """The result of `run_bank` for one flight."""
+    """The result of `run_bank` for one flight. Under other laws, the scale of the noise has the lower bound
+    of `recent_scale`."""
     q = flight.quick_scale(model)
     r_min = np.zeros(len(q))
     if model.vehicle.other_laws:
@@ -161,9 +174,11 @@ def run_flight(flight: Innovations, model: Model, bank: HypothesisBank) -> BankR
 
 
 def recent_scale(g: Floats, ok: np.ndarray, rate_hz: float) -> Floats:
-    """Return the ratio of the variance of a flight's residual g (n, 3), in standard deviations of the fitted
-    noise, in the last seconds to that of this noise, (n,): of single samples, or of sums of several if that
-    is larger. ok (n,): which samples count.
+    """Variance of a flight's residual over the last _VARIANCE_WINDOW_S, over that of the fitted noise, (n,):
+
+        max over the spans of the mean of |sum of g over the span|^2 / (3 number of samples in the span)
+
+    g (n, 3): residual in standard deviations of the fitted noise. ok (n,): which samples count.
 
     Air, gyros or a law that no fitted flight had leave a larger residual, and evidence must then count less
     at once. A fault leaves a larger residual, too; the right hypothesis explains it.
@@ -172,8 +187,8 @@ def recent_scale(g: Floats, ok: np.ndarray, rate_hz: float) -> Floats:
     for span_s in _SUM_SPANS_S:
         sums, _ = trailing_sums(np.column_stack([g, ok]), span_s * rate_hz)
         squares = (sums[:, :3] ** 2).sum(axis=1) / (3.0 * np.maximum(sums[:, 3], 1.0))
-        total, n = trailing_sums(squares, _VARIANCE_WINDOW_S * rate_hz)
-        ratio = np.maximum(ratio, total / n)
+        total, n_sums = trailing_sums(squares, _VARIANCE_WINDOW_S * rate_hz)
+        ratio = np.maximum(ratio, total / n_sums)
     return ratio
 
 
@@ -182,8 +197,12 @@ def run_bank(y, F, ok, bank, states, noise, r_min, q):
     """Posterior probabilities (n, H) and ll (n,): the log likelihood of a sample given all before it, times
     effective_sample_share.
 
-    ok (n,): the sample may be used. bank: HypothesisBank, states: StateModel, noise: ResidualNoise, as in
-    `bank`; r_min (n,): lower bound of the scale of the noise; q (n,).
+    ok (n,): whether the sample may be used. bank: HypothesisBank, states: StateModel, noise: ResidualNoise,
+    as in `bank`; r_min (n,): lower bound of the scale of the noise; q (n,). After each sample that is used
+
+        r <- r exp((1 - p_none) (d2 / 3 - _MEAN_SQUARE) / scale_memory_samples)
+
+    with the probability p_none that nothing answers, and d2 clipped and averaged over the hypotheses.
     """
     n = len(y)
     H = len(bank.transition_share)
@@ -200,7 +219,7 @@ def run_bank(y, F, ok, bank, states, noise, r_min, q):
     for k in range(n):
         prior = _mix(p, x, P, bank, states.random_walk_variance)
         _relax(x, P, states)
-        x[last] = states.initial_mean  # while nothing answers, nothing is learnt
+        x[last] = states.initial_mean  # the hypothesis that nothing answers estimates no state
         P[last] = states.initial_covariance
         if ok[k]:
             p, d2, ll[k] = _correct(prior, x, P, y[k], F[k], bank, noise, q[k] * max(r, r_min[k]))
@@ -218,7 +237,10 @@ def _mix(p, x, P, bank, walk):
     """Interaction of the hypotheses: each may change to any other. x (H, N) and P (H, N, N) are replaced.
     Returns the prior probabilities (H,):
 
-        prior_h = (1 - change) p_h + change share_h,    m, M: mean and covariance of the mixture of all
+        prior_h = (1 - change) p_h + change share_h
+        m = sum_h p_h x_h,    M = sum_h p_h (P_h + (x_h - m)(x_h - m)')
+
+    m (N,), M (N, N): mean and covariance of the mixture of all hypotheses.
     """
     H, N = x.shape
     change = bank.change_probability_per_sample
@@ -238,14 +260,14 @@ def _merge(w, x, P, m, M, offset, walk):
     """Replace two Gaussians by one with the same moments: (x, P) of the hypothesis, with weight w, and (m, M)
     of the mixture of all hypotheses, with weight v = 1 - w:
 
-        x <- w x + v m,    P <- w P + v (M + offset) + w v (x - m)(x - m)' + walk
+        x <- w x + v m,    P <- w P + v (M + offset) + w v dx dx' + walk,    dx = x - m
 
     x (N,) and P (N, N) are replaced. offset (3,): variance of the offset of the rates that comes with a
     change to this hypothesis; walk (N,): variance added a sample.
     """
     v = 1.0 - w
-    d = x - m
-    P[:] = w * P + v * M + (w * v) * np.outer(d, d)
+    dx = x - m
+    P[:] = w * P + v * M + (w * v) * np.outer(dx, dx)
     x[:] = w * x + v * m
     for i in range(len(walk)):
         P[i, i] += walk[i]
@@ -255,14 +277,14 @@ def _merge(w, x, P, m, M, offset, walk):
 
 @kernel
 def _relax(x, P, states):
-    """Move all trims and gains towards those m of the model, by one sample, with the retention a (N,):
+    """Move all trims and gains towards those m of the model, by one sample, with the retention rho (N,):
 
-    x <- m + a (x - m),    P_ij <- a_i a_j P_ij,    x (H, N) and P (H, N, N) are replaced
+    x <- m + rho (x - m),    P_ij <- rho_i rho_j P_ij,    x (H, N) and P (H, N, N) are replaced
     """
     m = states.initial_mean
-    a = states.deviation_retention
-    x[:] = m + a * (x - m)
-    P *= np.outer(a, a)
+    rho = states.deviation_retention
+    x[:] = m + rho * (x - m)
+    P *= np.outer(rho, rho)
 
 
 @kernel
@@ -295,14 +317,20 @@ def _correct(prior, x, P, y, F, bank, noise, r):
 
 
 @kernel
-def _sensitivities(a, k, F, c, N):
-    """What the states do to the unexplained rates, C (N, 3): the trim; the common gain, which multiplies
-    c + sum_g a_g F_g; each group's own gain, which multiplies k_g F_g. a, k (G,); F (G, 3); c (3,)."""
+def _sensitivities(a, kappa, F, c, N):
+    """Effect of the states on the unexplained rates, C (N, 3):
+
+        rows 0 to 2     1                           trim
+        row 3           c + sum_g a_g F_g           common gain
+        row 4 + g       kappa_g F_g                 own gain of group g
+
+    a, kappa (G,): those of one hypothesis; F (G, 3), c (3,).
+    """
     C = np.zeros((N, 3))
     C[:3] = np.eye(3)
     C[3] = c
     for g in range(len(a)):
-        C[4 + g] = k[g] * F[g]
+        C[4 + g] = kappa[g] * F[g]
         C[3] += a[g] * F[g]
     return C
 
@@ -311,10 +339,11 @@ def _sensitivities(a, k, F, c, N):
 def _update(x, P, y, C, R, noise):
     """Correct one Gaussian, x (N,) and P (N, N), by y (3,) = C' x + noise of covariance R; both are replaced:
 
-        e = y - C' x,   D = P C,   S = R + C' D,   K = D S^-1,   x <- x + K e,   P <- P - K D'
+        e = y - C' x,   D = P C,   S = R + C' D,   d2 = e' S^-1 e,   K = D S^-1 min(1, (nu + 3) / (nu + d2))
+        x <- x + K e,   P <- P - K D'
 
-    Returns d2 and log(det S). K is reduced for a residual in the tail of the t distribution, and 0 above
-    max_squared_residual.
+    The last factor of K reduces it for a residual in the tail of the t distribution. K is 0 if d2 is at least
+    max_squared_residual. Returns d2 and log(det S).
     """
     nu = noise.t_degrees_of_freedom
     D = P @ C
@@ -331,12 +360,17 @@ def _update(x, P, y, C, R, noise):
 
 @kernel
 def _invert(S):
-    """Inverse and determinant of a symmetric matrix S (3, 3), by its cofactors A."""
+    """Inverse and determinant of a symmetric matrix S (3, 3), by its cofactors A:
+
+        A_i = S_i+1 x S_i+2  (rows, cyclically),    det S = S_0.A_0,    S^-1 = A / det S, since A = A'
+
+    A negative index of an array counts from its end: i - 2 and i - 1 are i + 1 and i + 2 modulo 3.
+    """
     A = np.empty((3, 3))
     for i in range(3):
-        a = S[i - 2]  # the next rows, cyclically
-        b = S[i - 1]
+        u = S[i - 2]
+        v = S[i - 1]
         for j in range(3):
-            A[i, j] = a[j - 2] * b[j - 1] - a[j - 1] * b[j - 2]
+            A[i, j] = u[j - 2] * v[j - 1] - u[j - 1] * v[j - 2]
     det = S[0] @ A[0]
     return A / det, det

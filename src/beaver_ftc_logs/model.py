@@ -1,6 +1,7 @@
-"""The model file: what `identify` has found about a vehicle, and what `diagnose` filters a flight with.
+"""The model file, in JSON: `identify` writes it, and `diagnose` filters a flight with it.
 
-JSON; every key is checked when it is read, as in any other file a user names.
+Every key is checked when the file is read, as in any other file that a user names. The docstrings of the
+sections have a line for each key.
 """
 
 from collections.abc import Iterator, Sequence
@@ -17,10 +18,10 @@ from beaver_ftc_logs.vehicle import Vehicle
 
 _MAX_FILE_BYTES = 20_000_000
 
-_MAX_COEF = 1e6  # of any coefficient: those of logs are below 100
+_MAX_COEF = 1e6  # largest magnitude of a coefficient: those of logs are below 100
 _MAX_SURFACE_GROUPS = 24  # the filter tries all pairs
-_MAX_CONDITION_NUMBER = 1e12  # of a covariance
-# keys of `fitted` and `settings` in files of release 1.0.0
+_MAX_CONDITION_NUMBER = 1e12  # largest condition number of a covariance
+# Keys of `fitted` and `settings` in files of release 1.0.0 that nothing reads any more.
 _DEAD_KEYS = ("correlation", "scale", "minutes", "column_sd", "misread", "spread", "hold_s")
 
 Coefficient = Annotated[Number, Field(ge=-_MAX_COEF, le=_MAX_COEF)]
@@ -43,7 +44,8 @@ def _shape(lists: Any) -> tuple[int, ...] | None:
 
 
 def _check_covariance(rows: CoefRows) -> CoefRows:
-    """The rows of a covariance (3, 3). Refuses one that is none, or that 64 bits cannot invert."""
+    """The rows of a covariance (3, 3). Refuses another shape, an asymmetric matrix, and a matrix that is not
+    positive definite or that 64-bit numbers cannot invert."""
     if _shape(rows) != (3, 3):
         deny("has another shape, allowed: 3 x 3 numbers")
     R = np.array(rows)
@@ -64,7 +66,7 @@ class _LastingSection(Section):
     @model_validator(mode="before")
     @classmethod
     def _drop_dead_keys(cls, data: object) -> object:
-        """Model files of release 1.0.0 have keys that nothing reads any more."""
+        """The data without the keys of release 1.0.0 that nothing reads any more."""
         if not isinstance(data, dict):
             return data
         return {key: value for key, value in data.items() if key not in _DEAD_KEYS}
@@ -182,7 +184,7 @@ class NoiseModel(Section):
 
     @property
     def usual_quick_power(self) -> float:
-        """`quick`; infinite where that is not known."""
+        """`quick`; infinite if it is unknown, so that no response counts as unusually quick."""
         return float("inf") if self.quick is None else self.quick
 
     @property
@@ -218,25 +220,25 @@ class Model(Section):
     noise: Covariance
     colours: list[NoiseModel] = Field([])
     settings: FilterSettings = FilterSettings()
-    fitted: Annotated[FittedRanges, BeforeValidator(lambda of: NOTHING_FITTED if of is None else of)] = (
-        NOTHING_FITTED
-    )
+    fitted: Annotated[
+        FittedRanges, BeforeValidator(lambda value: NOTHING_FITTED if value is None else value)
+    ] = NOTHING_FITTED
     identified: dict[str, object] = Field({})
 
     @model_validator(mode="after")
     def _check_arrays(self) -> "Model":
         """Refuse arrays and names that do not belong to this vehicle, history and lags."""
         n_signals = len(self.vehicle.regressor_columns) * self.vehicle.n_signal_lags(self.history)
-        n = len(self.past)
+        n_rows = len(self.past)
         n_past = 3 * self.history + n_signals
-        reason = f"has {n} rows, allowed: {n_past}, as `identify` writes them: identify it again"
-        conflicts = [(("past",), reason)] if n != n_past else []
+        reason = f"has {n_rows} rows, allowed: {n_past}, as `identify` writes them: identify it again"
+        conflicts = [(("past",), reason)] if n_rows != n_past else []
         refuse([*conflicts, *self._name_mistakes(), *self._shape_mistakes()])
         return self
 
     def _name_mistakes(self) -> Iterator[Conflict]:
-        """Names that are no surface of the vehicle's, or are in two groups; levels of no group; delays that
-        are too long."""
+        """Names in groups that are no surface of the vehicle, or are in two groups; levels of an unknown
+        group; delays that are longer than a sample."""
         seen: set[str] = set()
         for i, group in enumerate(self.groups):
             for k, name in enumerate(group):
@@ -253,7 +255,8 @@ class Model(Section):
                 yield ("settings", "delays_s", k), f"{delay_s:g} is too long, allowed: up to a sample, s"
 
     def _shape_mistakes(self) -> Iterator[Conflict]:
-        """Arrays whose shape contradicts groups, lags and rates; empty ones that may be are not checked."""
+        """Arrays whose shape contradicts the groups, the lags or the number of rates. An empty array is not
+        checked: where it is forbidden, its field says so."""
         G = len(self.groups)
         L = self.lags
         arrays: list[tuple[Location, Any, tuple[int, ...]]] = [
@@ -263,7 +266,7 @@ class Model(Section):
         ]
         for i, noise in enumerate(self.colours):
             at = ("colours", i)
-            n_ar = -(-len(noise.before) // 3) * 3
+            n_ar = -(-len(noise.before) // 3) * 3  # the number of rows, rounded up to a multiple of 3
             arrays.append(((*at, "before"), noise.before, (n_ar, 3)))
             arrays.append(((*at, "misreads"), noise.misreads, (G,)))
             if noise.average[0] != 1.0:
@@ -281,10 +284,8 @@ class Model(Section):
         return ["+".join(group) for group in self.groups]
 
     def noise_of(self, average: Sequence[float]) -> NoiseModel:
-        """The noise fitted for flights of this moving average; that of all flights where none was fitted.
-
-        average: 1, c1, ..., the moving-average model of the residual's noise, newest first.
-        """
+        """The noise model that was fitted to flights of this moving average; if there is none, the noise of
+        all flights. average: 1, c1, ..., newest first; empty for a flight that is not whitened."""
         fitted = [noise for noise in self.colours if noise.average == list(average)]
         return fitted[0] if fitted else NoiseModel(average=list(average) or [1.0], noise=self.noise)
 

@@ -5,8 +5,9 @@ the faulty rows too, with the commands multiplied by the effectiveness. The Baye
 chooses the number of past samples.
 
     parts           flights, or halves of one, with the samples that the fit may use
-    h, L            past samples of the rates, and of the commands
+    h, L            number of past samples of the rates, and of the commands
     Z, y            regressors (n, m) and rates (n, 3), rad/s
+    G, B            number of groups of surfaces; response of the rates to their commands (G, L, 3), rad/s
     e, F, R, W      residual (n, 3), responses (n, G, 3), covariance of the noise (3, 3), whitening matrix, as
                     in `regression`
     ma, ar          moving average of the noise; predictor of a residual from those before
@@ -27,26 +28,27 @@ from beaver_ftc_logs.runs import constant_stretches
 from beaver_ftc_logs.samples import Samples
 from beaver_ftc_logs.vehicle import Vehicle
 
-# Labels are good to about a second: what lies nearer to a change is not fitted.
+# A label is exact to about a second: samples nearer to a change than this are not fitted.
 LABEL_MARGIN_S = 1.5
-# A label that holds for less is the edge of another.
+# A label that holds for a shorter time belongs to the edge of another, and its samples are not fitted.
 MIN_LABEL_S = 3.0
-RATE_LAGS = (1, 2, 3, 4)  # h and L that are tried
-COMMAND_LAGS = (2, 3, 4, 6)
-_NEWEY_WEST_S = 2.0  # over which residuals may be correlated
+RATE_LAGS = (1, 2, 3, 4)  # values of h that are tried
+COMMAND_LAGS = (2, 3, 4, 6)  # values of L that are tried
+_NEWEY_WEST_S = 2.0  # the standard errors allow for correlated residuals over this time
 _MIN_RATE_SD = 1e-6  # rad/s, less than any gyro resolves
-_FAILURE_MARGIN_S = 1.0  # before a logged failure, that is not fitted
-# Samples of the AR predictor in the noise model of a flight: chosen on seeds 11 and 12, in light turbulence,
-# and for the evidence that a name needs on seed 11 of a pa28.
+_FAILURE_MARGIN_S = 1.0  # the samples in this time before a logged failure are not fitted
+# Number of earlier residuals in the AR predictor of a noise model: chosen on seeds 11 and 12 in light
+# turbulence, and, for the evidence that a name needs, on seed 11 of a pa28.
 AR_ORDER = 20
-# Share of the samples of the fit whose responses count as usual.
+# In this share of the samples of the fit, the power of the quick responses counts as usual.
 _USUAL_SHARE = 0.9
-RANK_TOLERANCE = 1e-9  # of an eigenvalue over the largest: a smaller one is rounding
-# Powers of a group's effect, in variances of the noise in a sample: a smaller one is no motion; a larger one
-# counts as the cap, a fiftieth of which is half a standard deviation.
+RANK_TOLERANCE = 1e-9  # an eigenvalue that is smaller, over the largest, is rounding
+# Limits of the power of a group's effect, in variances of the noise in a sample. A smaller power is no
+# motion. A larger one counts as the cap: a fiftieth of the cap is 0.25, the square of half a standard
+# deviation.
 _MIN_EFFECT_POWER = 1e-6
 _EFFECT_POWER_CAP = 12.5
-# A gain that is known no better than to a third is not known to be there.
+# Largest standard error of a gain: with a third, `trust.known_gains` no longer takes the gain as known.
 GAIN_SD_CAP = 0.33
 
 
@@ -56,7 +58,8 @@ def fit_parts(flights: Sequence[Samples]) -> list[FitPart]:
 
 
 def usable_mask(samples: Samples) -> Mask:
-    """Which samples are known to be healthy, or faulty by a known amount, (n,)."""
+    """Which samples are known to be healthy, or faulty by a known amount, (n,): those before the first logged
+    failure and, if a surface has labels, those with all these labels, away from their changes."""
     first_s = min((failure.t_s for failure in samples.logged_failures), default=np.inf)
     usable = samples.t_s < first_s - _FAILURE_MARGIN_S
     labelled = np.isfinite(samples.labels).any(axis=0)
@@ -75,29 +78,33 @@ def usable_mask(samples: Samples) -> Mask:
 def bic_by_order(parts: Parts, vehicle: Vehicle) -> dict[tuple[int, int], float]:
     """The Bayesian information criterion of each number of past samples of rates and commands.
 
-    Every order's regressors are among those of the largest: one matrix of products serves all. With the
-    coefficients C of m regressors on n samples, it is n log det((y' y - (Z' y)' C) / n) + 3 m log n.
+    With N = Z / d, the root mean squares d (m,) of the columns of Z, and the m columns of an order:
+
+        beta = (N' N)^-1 N' y,    BIC = n log det((y' y - (N' y)' beta) / n) + 3 m log n
+
+    The regressors of each order are among those of the largest, so N' N and N' y are computed once.
     """
     Z, y, _ = stack_data(parts, vehicle, max(RATE_LAGS), max(COMMAND_LAGS))
-    X = Z / least_squares.rms_of_columns(Z)
-    ZZ = X.T @ X
-    Zy = X.T @ y
+    N = Z / least_squares.rms_of_columns(Z)
+    NN = N.T @ N
+    Ny = N.T @ y
     yy = y.T @ y
     bic = {}
     n = len(y)
     for h, L in product(RATE_LAGS, COMMAND_LAGS):
         cols = _order_columns(vehicle, h, L)
-        C = np.linalg.lstsq(ZZ[np.ix_(cols, cols)], Zy[cols], rcond=1e-12)[0]
-        bic[h, L] = n * np.linalg.slogdet((yy - Zy[cols].T @ C) / n)[1] + 3 * len(cols) * np.log(n)
+        beta = np.linalg.lstsq(NN[np.ix_(cols, cols)], Ny[cols], rcond=1e-12)[0]
+        bic[h, L] = n * np.linalg.slogdet((yy - Ny[cols].T @ beta) / n)[1] + 3 * len(cols) * np.log(n)
     return bic
 
 
 def _order_columns(vehicle: Vehicle, h: int, L: int) -> Ints:
-    """Columns of the largest design that an order has."""
-    n = len(vehicle.regressor_columns)
+    """Positions of the regressors of an order among those of the largest order: one, rates by lag, signals by
+    lag, commands of each group by lag."""
+    n_signals = len(vehicle.regressor_columns)
     max_lag = max(RATE_LAGS)
     rates = np.arange(1 + 3 * max_lag) < 1 + 3 * h
-    signals = np.arange(n * vehicle.n_signal_lags(max_lag)) < n * vehicle.n_signal_lags(h)
+    signals = np.arange(n_signals * vehicle.n_signal_lags(max_lag)) < n_signals * vehicle.n_signal_lags(h)
     commands = np.tile(np.arange(max(COMMAND_LAGS)) < L, len(regression.group_surfaces(vehicle)))
     return np.flatnonzero(np.concatenate([rates, signals, commands]))
 
@@ -108,7 +115,8 @@ def fit_of(parts: Parts, model: Model) -> least_squares.Regression:
 
 
 def refit(parts: Parts, model: Model) -> Model:
-    """A model of the same order and settings, fitted to other flights."""
+    """A model of the same order and settings, fitted to other flights. Its noise models take over the
+    variance inflation (`wider`) of the given model."""
     refitted = fitted_order(parts, model.vehicle, model.history, model.lags)[1]
     colours = [
         noise.model_copy(update={"wider": model.noise_of(noise.average).wider}) for noise in refitted.colours
@@ -117,10 +125,10 @@ def refit(parts: Parts, model: Model) -> Model:
 
 
 def fitted_order(parts: Parts, vehicle: Vehicle, h: int, L: int) -> tuple[least_squares.Regression, Model]:
-    """Least squares of given order over all flights, and its model. Each fit is made once: every test of a
-    model needs the same fits to parts of the flights.
+    """Least squares of a given order over all flights, and its model. Every test of a model needs the same
+    fits to parts of the flights, so each fit is made once and kept in the first part:
 
-    fits, of the first part: (vehicle as JSON, h, L, id of each part) -> (fit, model, parts).
+        fits: (vehicle as JSON, h, L, id of each part) -> (fit, model, parts)
     """
     fits = parts[0].fits
     key = (vehicle.model_dump_json(), h, L, *map(id, parts))
@@ -132,7 +140,8 @@ def fitted_order(parts: Parts, vehicle: Vehicle, h: int, L: int) -> tuple[least_
 
 
 def fit_order(parts: Parts, vehicle: Vehicle, h: int, L: int) -> least_squares.Regression:
-    """Least squares of given order over all flights."""
+    """Least squares of a given order over all flights. Raises BadInput if they have fewer than ten samples a
+    coefficient, or if a rate does not move."""
     Z, y, stretch = stack_data(parts, vehicle, h, L)
     if len(y) < 10 * Z.shape[1]:
         allowed = f"at least {10 * Z.shape[1]} to fit {Z.shape[1]} coefficients an axis"
@@ -145,7 +154,8 @@ def fit_order(parts: Parts, vehicle: Vehicle, h: int, L: int) -> least_squares.R
 
 
 def stack_data(parts: Parts, vehicle: Vehicle, h: int, L: int) -> tuple[Floats, Floats, Ints]:
-    """Regressors, rates and run number over all flights. Every order leaves out the same first samples.
+    """Regressors Z (n, m), rates y (n, 3) and number of the gap-free run (n,) over all flights, each sample
+    times the weight of its flight. Every order leaves out the same first samples, so that all have equal n.
 
     Columns of the regressors: one, the past, the commands of each group by lag.
     """
@@ -167,8 +177,8 @@ def stack_data(parts: Parts, vehicle: Vehicle, h: int, L: int) -> tuple[Floats, 
 
 
 def _model_of_fit(fit: least_squares.Regression, parts: Parts, vehicle: Vehicle, h: int, L: int) -> Model:
-    """The model file of a fit, with a noise model for each moving average. Raises BadInput where a number
-    of the fit is none that a file can hold."""
+    """The model of a fit, with a noise model for each moving average of its flights. Raises BadInput if a
+    model file cannot hold a number of the fit."""
     names = list(vehicle.surfaces)
     groups = regression.group_surfaces(vehicle)
     first = len(fit.coefficients) - len(groups) * L
@@ -192,9 +202,9 @@ def _model_of_fit(fit: least_squares.Regression, parts: Parts, vehicle: Vehicle,
         raise BadInput(f"identify: {reason}, allowed: {allowed}") from None
     noises = []
     for ma in sorted({part.samples.noise_ma_coefficients for part in parts} - {()}):
-        own = parts_of_noise(parts, ma)
-        noise = _fit_noise_model(own, model)
-        noises.append(_with_errors(own, model, noise) if vehicle.other_laws else noise)
+        alike = parts_of_noise(parts, ma)
+        noise = _fit_noise_model(alike, model)
+        noises.append(_with_errors(alike, model, noise) if vehicle.other_laws else noise)
     return model.model_copy(update={"colours": noises})
 
 
@@ -203,36 +213,44 @@ def parts_of_noise(parts: Parts, ma: Sequence[float]) -> list[FitPart]:
     return [part for part in parts if part.samples.noise_ma_coefficients == tuple(ma)]
 
 
-def _fit_noise_model(own: Parts, model: Model) -> NoiseModel:
-    """The noise of flights of one moving average, with an AR predictor of the residual, by least squares
-    where samples follow one another; without a predictor where too few do."""
-    ma = list(own[0].samples.noise_ma_coefficients)
-    L = AR_ORDER
-    runs = [run for part in own for run in part.innovations(model).residual_runs()]
-    long = [run for run in runs if len(run) > L]
-    if sum(len(run) - L for run in long) < 10 * 3 * L:
-        return NoiseModel(average=ma, noise=np.cov(np.vstack(runs).T).tolist())
-    Z = np.vstack([np.hstack([run[L - lag : -lag] for lag in range(1, L + 1)]) for run in long])
-    y = np.vstack([run[L:] for run in long])
-    ar = np.linalg.lstsq(Z, y, rcond=None)[0]
-    return NoiseModel(average=ma, before=ar.tolist(), noise=np.cov((y - Z @ ar).T).tolist())
+def _fit_noise_model(alike: Parts, model: Model) -> NoiseModel:
+    """The noise of flights of one moving average, with an AR predictor of the residual from the p before it,
+    by least squares on runs of samples without a gap:
 
+        e[k] = [e[k-1] ... e[k-p]] ar + noise,    ar (3 p, 3)
 
-def _with_errors(own: Parts, model: Model, noise: NoiseModel) -> NoiseModel:
-    """The noise of some flights with how far a fit may misread the effect of each group in it, as a share,
-    (G,): the standard deviation of an error that is anywhere below the largest; and with the power of the
-    quick part of the responses that the flights exceed in a tenth of their samples, in variances of the
-    noise.
-
-    What the past predicts of a residual is no noise, but what the model lacks. A law that feeds it to the
-    surfaces makes it look like their effect. On an axis with the power q of what is lacking and p of the
-    effect, both in variances of the noise, the effect is then misread by sqrt(q / p) of itself at most; over
-    axes, that least squares weighs by p, by sqrt(sum q p) / sum p. A law that feeds back otherwise shows it.
+    Without a predictor if the runs have fewer than ten samples a coefficient of an axis.
     """
-    flights = [part.innovations(model.model_copy(update={"colours": [noise]})) for part in own]
+    ma = list(alike[0].samples.noise_ma_coefficients)
+    p = AR_ORDER
+    runs = [run for part in alike for run in part.innovations(model).residual_runs()]
+    long = [run for run in runs if len(run) > p]
+    if sum(len(run) - p for run in long) < 10 * 3 * p:
+        return NoiseModel(average=ma, noise=np.cov(np.vstack(runs).T).tolist())
+    E = np.vstack([np.hstack([run[p - lag : -lag] for lag in range(1, p + 1)]) for run in long])
+    e = np.vstack([run[p:] for run in long])
+    ar = np.linalg.lstsq(E, e, rcond=None)[0]
+    return NoiseModel(average=ma, before=ar.tolist(), noise=np.cov((e - E @ ar).T).tolist())
+
+
+def _with_errors(alike: Parts, model: Model, noise: NoiseModel) -> NoiseModel:
+    """The noise model of some flights with two more fields:
+
+        misreads (G,)   share by which a fit may misread the effect of each group: the standard deviation of
+        an
+                        error that is uniform between plus and minus the largest, i.e. largest / sqrt(3)
+        quick           power of the quick part of the responses that the flights exceed in a tenth of their
+                        samples, in variances of the noise
+
+    The part of a residual that the past predicts is no noise: the model lacks it. A law that feeds it back to
+    the surfaces makes it look like their effect. Let q be the power of this part on an axis and p that of the
+    effect, both in variances of the noise. The effect is then misread by at most the share sqrt(q / p). Least
+    squares weighs the axes by p, so over all axes the share is at most sqrt(sum q p) / sum p.
+    """
+    flights = [part.innovations(model.model_copy(update={"colours": [noise]})) for part in alike]
     r = np.diag(np.array(noise.noise))
     p = np.vstack([centred(flight.F) ** 2 for flight in flights]).mean(axis=0) / r
-    q = np.maximum(one_step_residuals(own, model).var(axis=0) / r - 1.0, 0.0)
+    q = np.maximum(one_step_residuals(alike, model).var(axis=0) / r - 1.0, 0.0)
     misread = np.minimum(np.sqrt(p @ q) / np.maximum(p.sum(axis=1), MIN_DIVISOR), GAIN_SD_CAP)
     powers = np.concatenate([flight.quick_power(model.rate_hz) for flight in flights])
     usual = float(np.quantile(powers, _USUAL_SHARE))
@@ -240,48 +258,56 @@ def _with_errors(own: Parts, model: Model, noise: NoiseModel) -> NoiseModel:
 
 
 def centred(values: Floats) -> Floats:
-    """Values (n, ...) less their mean over n; none of none."""
+    """Values (n, ...) less their mean over n; an empty array stays as it is."""
     return values - values.mean(axis=0) if len(values) else values
 
 
 def tied_shares(parts: Parts, model: Model) -> Floats:
-    """Share of the effect of each group on the rates that past, signals and the other groups explain, (G,).
-    If it is near 1, the law ties the group to the quantities that it controls, and its effect is not
-    identifiable; it is 1 if the group never moved. If the effect is far above the noise, the unexplained part
-    decides: the share may be larger.
+    """Share of the effect of each group on the rates that past, signals and the other groups explain, (G,):
 
-    The effect y = U_g B_g W is in standard deviations of the noise; e = y - Z b is the part that the other
-    columns of the fit do not explain."""
+        f = U_g B_g W less its mean,   u = f - Z b,   share = max(1 - mean |u|^2 / min(mean |f|^2, cap), 0)
+
+    U_g (n, L): columns of the group in the regressors; f, u (n, 3): its effect in standard deviations of the
+    noise, and the part that the other columns Z of the fit do not explain. cap: _EFFECT_POWER_CAP.
+
+    If the share is near 1, the law ties the group to the quantities that it controls, and its effect is not
+    identifiable. The share is 1 if the group never moved. If the effect is far above the noise, the power of
+    the unexplained part decides alone, because of the cap.
+    """
     Z, _, _ = stack_data(parts, model.vehicle, model.history, model.lags)
     B = np.array(model.response)
     W = np.linalg.inv(np.linalg.cholesky(np.array(model.noise))).T
     shares = np.ones(len(B))
     for g, columns in enumerate(np.arange(Z.shape[1])[-B.shape[1] * len(B) :].reshape(len(B), -1)):
-        y = Z[:, columns] @ B[g] @ W
-        y = y - y.mean(axis=0)
-        power = float((y**2).sum()) / len(y)
+        f = Z[:, columns] @ B[g] @ W
+        f = f - f.mean(axis=0)
+        power = float((f**2).sum()) / len(f)
         if power > _MIN_EFFECT_POWER:
-            e = least_squares.left_by(np.delete(Z, columns, axis=1), y)
-            shares[g] = max(1.0 - float((e**2).sum()) / len(y) / min(power, _EFFECT_POWER_CAP), 0.0)
+            u = least_squares.left_by(np.delete(Z, columns, axis=1), f)
+            shares[g] = max(1.0 - float((u**2).sum()) / len(f) / min(power, _EFFECT_POWER_CAP), 0.0)
     return shares
 
 
 def group_gain_sd(fit: least_squares.Regression, model: Model) -> Floats:
-    """Standard error of the gain of each group, (G,), with the colour of the residual. The gain is that of
-    the response summed over the lags, weighted by the noise, or, with `other_laws`, the factor of the whole
-    response: if the past explains the slow effect of a surface, as alpha does for an elevator, the sum is not
-    known, but the factor is.
+    """Standard error of the gain of each group, (G,), with the colour of the residual; at most GAIN_SD_CAP.
 
-    A response z with errors of covariance C determines its factor with the variance 1 / (z' C^-1 z), both in
-    the standard errors s (L, 3) of the coefficients; b (3,) is the sum over the lags, in standard deviations
-    of the noise.
+    s (L, 3)    standard errors of the group's coefficients, in standard deviations of the noise
+    C (L, L)    correlation of their errors
+    b (3,)      sum of the coefficients over the lags, in standard deviations of the noise
+    v (3,)      variance of b: s' C s by axis
+    z (L, 3)    coefficients in their standard errors
+
+    The gain is that of the response summed over the lags, with the variance (b^2).v / |b|^4. With
+    `other_laws`, it is the factor of the whole response, with the variance 1 / (z' C^-1 z), the sum over all
+    pairs of axes: if the past explains the slow effect of a surface, as alpha does for an elevator, the sum
+    over the lags is not known, but the factor is.
     """
-    n = len(model.groups)
+    G = len(model.groups)
     L = model.lags
-    first = len(fit.coefficients) - n * L
+    first = len(fit.coefficients) - G * L
     sd = np.sqrt(np.maximum(np.diag(fit.residual_covariance), MIN_DIVISOR))
-    gain_sd = np.zeros(n)
-    for g in range(n):
+    gain_sd = np.zeros(G)
+    for g in range(G):
         rows = slice(first + g * L, first + (g + 1) * L)
         C = fit.coefficient_error_correlation[rows, rows]
         s = fit.standard_errors[rows] / sd
@@ -297,7 +323,7 @@ def group_gain_sd(fit: least_squares.Regression, model: Model) -> Floats:
 
 
 def one_step_innovations(model: Model, part: FitPart) -> regression.Innovations:
-    """The usable samples by a model without its noise models."""
+    """The innovations of the usable samples by a model without its noise models."""
     return part.innovations(model.model_copy(update={"colours": []}))
 
 

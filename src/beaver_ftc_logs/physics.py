@@ -6,7 +6,8 @@ and the median magnitude of the acceleration along z is 1 g.
     psi' = (q sin(phi) + r cos(phi)) / cos(theta)
 
 t (n,) s are the stamps of the rates; p, q, r (n,) and the angles have the unit of the log; phi and theta (n,)
-are in rad. gyros: the columns of p, q and r.
+are in rad. gyros: the columns of p, q and r. axis: 0, 1 and 2 are p with roll, q with pitch and r with yaw.
+named: the columns of p, q and r by name, in this order.
 """
 
 from collections.abc import Iterator, Sequence
@@ -18,20 +19,22 @@ import numpy as np
 from beaver_ftc_logs.recording import Column, Columns, Floats, largest_magnitude
 from beaver_ftc_logs.units import ACCELERATION, ANGLE, RATE, SI_UNITS, UNIT_FACTORS, nearest_unit
 
-_ANGLE_WINDOW_S = 1.0  # over which the change of an angle is compared with the integral of its rate
-_MIN_WINDOWS = 8  # with fewer windows nothing is compared
+_ANGLE_WINDOW_S = 1.0  # the change of an angle is compared with the integral of its rate in windows of 1 s
+_MIN_WINDOWS = 8  # with fewer windows, angle and rate are not compared
 # Magnitudes of the correlation of an angle's change with the integral of a rate:
-_EXCHANGED = 0.2  # below it the rate is that of another axis
-_AGREEING = 0.7  # above it the two belong together, whatever the unit of the rate
-_CLOSE = 0.95  # between _AGREEING and this a column takes the place of the rate only if it is _EXACT
-_EXACT = 0.99  # above it the angle confirms the rate, if the slope is within _UNIT_RATIO of 1
-_SLOPE_FACTOR = 1.8  # slopes from its inverse to it say nothing: no two units differ by so little
+_EXCHANGED = 0.2  # below this the rate is that of another axis
+_AGREEING = 0.7  # above this the two belong together, whatever the unit of the rate
+# From _AGREEING to this, another column replaces the rate only if its correlation is above _EXACT
+_CLOSE = 0.95
+_EXACT = 0.99  # above this the angle confirms the rate, if the slope is within _UNIT_RATIO of 1
+# Slopes between its inverse and itself show no other unit: no two units differ by so little
+_SLOPE_FACTOR = 1.8
 _UNIT_RATIO = 1.3  # the most by which a slope differs from the factor of a unit that fits
-# Level and north turn with the earth, by 7.3e-5 rad/s, and with the way over it, by 4.7e-5 rad/s at 300 m/s.
-# A change of an angle that is not far above them says nothing of a rate.
+# The directions of level and north turn with the Earth, by 7.3e-5 rad/s, and with the motion over it, by
+# 4.7e-5 rad/s at 300 m/s. A change of an angle must be far above these to test a rate.
 _MIN_RMS_RAD_S = 1e-3
 _GRAVITY_MPS2 = SI_UNITS["g"][1]
-_GRAVITIES_G = (0.5, 2.0)  # a median magnitude along z between these is in m/s2
+_GRAVITIES_G = (0.5, 2.0)  # a column whose median magnitude along z is between these is in m/s2
 _CIRCLE_SLACK = 1.02  # an angle exceeds its full circle by 2 % at most, by rounding and filters
 _MAX_ANGLE_RAD = _CIRCLE_SLACK * 2.0 * np.pi
 _MAX_PITCH_RAD = _CIRCLE_SLACK * 0.5 * np.pi  # a quarter of the circle
@@ -52,9 +55,9 @@ class AngleFit:
 
 
 def fit_angle(gyros: Sequence[Column], angles: Sequence[Column | None], axis: int) -> AngleFit | None:
-    """Fit the angle of an axis to the rates, all in the unit of the log, the rates in one unit; None if too
-    little moves, or if this angle or roll is not known.
+    """Fit the angle of an axis to the rates; None if too little moves, or if this angle or roll is not known.
 
+    Rates and angles are in the units of the log, all rates in one unit. Without a pitch angle, theta is 0.
     Where the nose is steep, roll and yaw are hard to distinguish: such windows are left out for both.
     """
     roll, pitch, _ = angles
@@ -63,21 +66,22 @@ def fit_angle(gyros: Sequence[Column], angles: Sequence[Column | None], axis: in
     if roll is None or angle is None:
         return None
     rates = [_interpolate(gyro, t) for gyro in gyros]
-    circle = _full_circle(roll.values)
-    phi = _interpolate(roll, t, circle) * 2.0 * np.pi / circle
+    roll_circle = _full_circle(roll.values)
+    phi = _interpolate(roll, t, roll_circle) * 2.0 * np.pi / roll_circle
     theta = np.zeros(len(t))
     if pitch is not None:
         # Pitch goes up to a quarter of the circle only.
-        circle = _full_circle(np.append(4.0 * pitch.values, roll.values))
-        theta = _interpolate(pitch, t) * 2.0 * np.pi / circle
+        pitch_circle = _full_circle(np.append(4.0 * pitch.values, roll.values))
+        theta = _interpolate(pitch, t) * 2.0 * np.pi / pitch_circle
     terms = _terms_of_change(rates, phi, theta, axis)
-    whole = None if axis == 1 else _full_circle(angle.values)
-    fit = _fit_first_term(*_changes_by_window(t, _interpolate(angle, t, whole), terms, theta, whole))
+    circle = None if axis == 1 else _full_circle(angle.values)
+    fit = _fit_first_term(*_changes_by_window(t, _interpolate(angle, t, circle), terms, theta, circle))
     return fit and AngleFit(*fit, largest_magnitude(angle.values), largest_magnitude(rates[axis]))
 
 
 def _terms_of_change(rates: list[Floats], phi: Floats, theta: Floats, axis: int) -> list[Floats]:
-    """The terms (n,) whose sum is the rate of change of an angle, that of its own rate first."""
+    """The terms (n,) whose sum is the rate of change of an angle (equations above), that of its own rate
+    first; for yaw the two terms are summed."""
     p, q, r = rates
     if axis == 1:
         return [q * np.cos(phi), -r * np.sin(phi)]
@@ -92,9 +96,9 @@ def _changes_by_window(
 
         y = angle(b) - angle(a),   X = S(b) - S(a)
 
-    A window with a gap or without a number is left out. circle: a full circle in the unit of the angle, which
-    may go round; None for pitch. Where it is given, windows in which the pitch angle theta (n,) is steep are
-    left out too.
+    A window with a gap or without a number is left out. circle: a full circle in the unit of the angle, and y
+    is then the change within half a circle; None for pitch, which does not go round. With a circle, windows
+    in which the pitch angle theta (n,) is steep are left out too.
     """
     h = np.diff(t)
     means = [np.nan_to_num(0.5 * (term[1:] + term[:-1])) for term in terms]
@@ -119,8 +123,8 @@ def _fit_first_term(y: Floats, X: Floats) -> tuple[float, float] | None:
         y = X beta + error,   v = y - X[:, 1:] beta[1:],   x = X[:, 0]
         slope = sign(x' v) sqrt(v' v / x' x),   correlation = x' v / sqrt(x' x v' v)
 
-    The other columns may be in whatever unit they are. The slope is a ratio of sizes and not x' v / x' x,
-    which noise in the rate would bring nearer to 0.
+    The other columns of X may have any unit. The slope is a ratio of sizes and not x' v / x' x, because noise
+    in the rate makes x' v / x' x smaller than the true slope.
     """
     if len(y) < _MIN_WINDOWS or y @ y < len(y) * (_MIN_RMS_RAD_S * _ANGLE_WINDOW_S) ** 2:
         return None
@@ -153,29 +157,35 @@ def _interpolate(column: Column, t: Floats, circle: float | None = None) -> Floa
 
 
 def _full_circle(angle: Floats) -> float:
-    """A full circle in the unit that the angles seem to have: the least of rad, deg and cdeg that fits."""
+    """A full circle in the unit of the angles: the first of rad, deg and cdeg whose circle holds all of
+    them."""
     largest = largest_magnitude(angle)
     return next((circle for circle in (2.0 * np.pi, 360.0) if largest <= _CIRCLE_SLACK * circle), 36000.0)
 
 
-# Name of a column, and the column.
+# The name of a column, and the column.
 NamedColumn = tuple[str, Column]
-# By axis.
+# Words for the rate of each axis.
 _RATE_TITLES = ("roll rate", "pitch rate", "yaw rate")
 
 
 def attitude_mistake(named: Columns, angles: Sequence[NamedColumn | None], others: Columns) -> str | None:
-    """Describe a mistake in the rates (p, q, r by column) or the angles: roll, pitch and yaw, None where one
-    is not known. The first that is wrong; None where nothing is. others: what may have taken the place of a
-    rate."""
-    places = range(len(_RATE_TITLES))
-    return next(chain.from_iterable(_mistakes_of_axis(named, angles, others, axis) for axis in places), None)
+    """Text of the first mistake in the rates or the angles of roll, pitch and yaw; None if there is none.
+
+    angles: None where one is not known. others: columns that may have been exchanged with a rate.
+    """
+    axes = range(len(_RATE_TITLES))
+    return next(chain.from_iterable(_mistakes_of_axis(named, angles, others, axis) for axis in axes), None)
 
 
 def _mistakes_of_axis(
     named: Columns, angles: Sequence[NamedColumn | None], others: Columns, axis: int
 ) -> Iterator[str]:
-    """Yield the mistakes in one rate and its angle, the surest first."""
+    """Yield the texts of mistakes in one rate and its angle, the surest first:
+
+    1. the size of a pitch angle, 2. another column follows the angle, 3. the slope, 4. another unit of the
+    rate.
+    """
     angle = angles[axis]
     rate = [*named][axis]
     if angle is None:
@@ -195,7 +205,8 @@ def _mistakes_of_axis(
     if remark := _factor_remark(fit, rate, angle[0]):
         yield remark
     if abs(fit.correlation) < _AGREEING:
-        # in a banked flight a yaw rate in another unit does not even correlate with the angle: q turns it too
+        # In a banked flight, q turns the yaw angle too, so a yaw rate in another unit need not correlate with
+        # it.
         for factor in UNIT_FACTORS:
             scaled = replace(named[rate], values=factor * named[rate].values)
             if _is_exact(_fit_with(named, angles, axis, scaled)):
@@ -208,15 +219,15 @@ def _mistakes_of_axis(
 def _fit_with(
     named: Columns, angles: Sequence[NamedColumn | None], axis: int, rate: Column
 ) -> AngleFit | None:
-    """How the angle of a place follows the rates with this one in its place."""
+    """Fit of the angle of an axis to the rates, with the column `rate` as the rate of this axis."""
     gyros = [rate if i == axis else gyro for i, gyro in enumerate(named.values())]
     return fit_angle(gyros, [angle and angle[1] for angle in angles], axis)
 
 
 def confirmed_rates(named: Columns, angles: Sequence[NamedColumn | None]) -> frozenset[str]:
     """The columns of p, q and r whose integral is the change of roll, pitch and yaw, in sign and unit too."""
-    places = enumerate(named.items())
-    return frozenset(n for axis, (n, rate) in places if _is_exact(_fit_with(named, angles, axis, rate)))
+    axes = enumerate(named.items())
+    return frozenset(name for axis, (name, rate) in axes if _is_exact(_fit_with(named, angles, axis, rate)))
 
 
 def _is_exact(fit: AngleFit | None) -> bool:
@@ -225,7 +236,16 @@ def _is_exact(fit: AngleFit | None) -> bool:
 
 
 def _replacing_correlation(fit: AngleFit, is_rate: bool) -> float:
-    """How well another column has to agree with an angle to be its rate, where the one named agrees so."""
+    """Correlation above which another column, rather than the named one, is the rate of an angle.
+
+        correlation of the named rate        another column is the rate above
+        below _EXCHANGED                     _AGREEING if it is a named rate, otherwise _CLOSE
+        below _AGREEING                      _CLOSE
+        below _CLOSE                         _EXACT
+        otherwise                            never
+
+    fit: of the named rate. is_rate: whether the other column is a named rate, too.
+    """
     corr = abs(fit.correlation)
     if is_rate and corr < _EXCHANGED:
         return _AGREEING
@@ -233,18 +253,18 @@ def _replacing_correlation(fit: AngleFit, is_rate: bool) -> float:
 
 
 def _factor_remark(fit: AngleFit, rate: str, angle: str) -> str | None:
-    """Describe a mistake in a rate or its angle by their proportion, and which factor fits; None where
-    nothing is. rate, angle: their columns.
+    """Text of a mistake in a rate or its angle by the slope, with the factor that fits; None if there is
+    none. rate, angle: names of their columns.
 
-    Either may be wrong. It is the angle if it exceeds a full circle; else the rate if no vehicle turns so
-    fast.
+    Either may be wrong: the angle if it exceeds a full circle; otherwise the rate if no vehicle turns so
+    fast; otherwise the text offers both.
     """
     slope = abs(fit.slope)
-    near = 1.0 / _SLOPE_FACTOR < slope < _SLOPE_FACTOR
-    if abs(fit.correlation) < _AGREEING or (near and fit.slope > 0.0):
+    is_near_one = 1.0 / _SLOPE_FACTOR < slope < _SLOPE_FACTOR
+    if abs(fit.correlation) < _AGREEING or (is_near_one and fit.slope > 0.0):
         return None
     ratio = f"the change of {angle} is {fit.slope:.4g} times the integral of {rate}"
-    if near:
+    if is_near_one:
         return f"{ratio}: one of them has the other sign, `scale: -1` fits"
     if fit.max_angle_magnitude > _MAX_ANGLE_RAD and (unit := nearest_unit(ANGLE, 1.0 / slope, _UNIT_RATIO)):
         return f"{ratio}: {angle} {_unit_text(unit)}"
@@ -254,13 +274,13 @@ def _factor_remark(fit: AngleFit, rate: str, angle: str) -> str | None:
 
 
 def _unit_text(unit: str) -> str:
-    """Which unit a column is in, for a remark."""
+    """Words for a column that is in this unit, with the factor to SI."""
     return f"is in {unit}, a factor of {SI_UNITS[unit][1]:.4g} fits"
 
 
 def _pitch_remark(name: str, pitch: Column) -> str | None:
-    """Describe a mistake in a pitch angle by its size, and which unit fits; None where nothing is: it says
-    what no comparison can, where rates and angles are scaled alike."""
+    """Text of a mistake in a pitch angle by its size, with the unit that fits; None if there is none. No
+    comparison with rates shows this mistake if rates and angles are scaled alike."""
     largest = largest_magnitude(pitch.values)
     if largest <= _MAX_PITCH_RAD:
         return None
@@ -270,12 +290,12 @@ def _pitch_remark(name: str, pitch: Column) -> str | None:
 
 
 def gravity_remark(az: Column, name: str) -> str | None:
-    """Describe a mistake in the acceleration along z by its median magnitude, and which unit fits; None where
-    nothing is."""
+    """Text of a mistake in the acceleration along z by its median magnitude, with the unit that fits; None if
+    there is none."""
     known = az.values[np.isfinite(az.values)]
-    g = float(np.median(np.abs(known))) if known.size else 0.0
-    if _GRAVITIES_G[0] < g / _GRAVITY_MPS2 < _GRAVITIES_G[1]:
+    median = float(np.median(np.abs(known))) if known.size else 0.0
+    if _GRAVITIES_G[0] < median / _GRAVITY_MPS2 < _GRAVITIES_G[1]:
         return None
-    unit = nearest_unit(ACCELERATION, _GRAVITY_MPS2 / g, 2.0) if g > 0.0 else None
+    unit = nearest_unit(ACCELERATION, _GRAVITY_MPS2 / median, 2.0) if median > 0.0 else None
     hint = f"it {_unit_text(unit)}" if unit else "no unit fits: is 1 g in it?"
-    return f"{name}: its median magnitude is {g:.4g} m/s2, 1 g is {_GRAVITY_MPS2:.4g}: {hint}"
+    return f"{name}: its median magnitude is {median:.4g} m/s2, 1 g is {_GRAVITY_MPS2:.4g}: {hint}"

@@ -59,8 +59,10 @@ from beaver_ftc_logs.vehicle import unused_keys_as_comments
 
 
 def _rate_pattern(rate_name: str, angle: str, axis: str, vector_index: int) -> str:
-    """Return a pattern of the names of a body rate: ours, by its angle, by its axis, by its place in a
-    vector."""
+    """Pattern of the names of a body rate, in the form of `_snake_case`.
+
+    rate_name: p, q or r; angle: roll, pitch or yaw; axis: x, y or z; vector_index: 0, 1 or 2.
+    """
     return "|".join((
         rf"(.*_)?{rate_name}_(rad|deg)_?s(ec)?", rate_name, rf"(.*\.)?{angle}_?(rate|speed)\w*",
         rf".*gyr(o|_)?_?{axis}\w*", rf".*gyro_?(rad|adc)\[{vector_index}\](_deg_s)?",
@@ -70,7 +72,7 @@ def _rate_pattern(rate_name: str, angle: str, axis: str, vector_index: int) -> s
     ))  # fmt: skip
 
 
-# By quantity the pattern of its names, in the form of `_snake_case`.
+# Quantity -> pattern of the names of its column, in the form of `_snake_case`.
 _NAME_PATTERNS = {
     "p": _rate_pattern("p", "roll", "x", 0),
     "q": _rate_pattern("q", "pitch", "y", 1),
@@ -82,20 +84,20 @@ _NAME_PATTERNS = {
     "time": r"(real|totl|total|sim|simulation|utc|gps|log|date|sys|system)_?time|date|datetime|clock|utc|"
     r"%?t(ime)?(_?(s|ms|us|ns|usec|stamp|boot))?\w*|(milli|micro|nano)?s(ec(ond)?s?)?|millis|micros",
 }
-# Names of setpoints of a quantity, its errors, flags and the like: none of these is the quantity.
+# A column with one of these in its name is a setpoint, an error, a flag or the like, and not the quantity.
 _DERIVED_NAME = (
     r"innov|test_ratio|varian|timestamp|flag|valid|status|count|setpoint|_sp$|desired|demand|target|bias|"
     r"integ|error|_err$|_offset|cov(ariance)?\b|temp|noise|(_|^)(cmd|command)"
 )
-# Names of rates and accelerations of an angle: none of these is the angle.
+# A column with one of these in its name is a rate or an acceleration of an angle, and not the angle.
 _ANGLE_RATE_NAME = r"rate|speed|accel|veloc|dot|_(deg|rad)_?s(ec)?$"
-# The unit of a rate, by a part of its name.
+# Part of the name of a rate -> its unit.
 _UNIT_OF_PART = {"rad_s": "rad/s", "rad/s": "rad/s", "deg_s": "deg/s", "deg/s": "deg/s", "dps": "deg/s"}
 _PWM_RANGE_US = (700.0, 2300.0)  # a command whose median is between these is a pulse
 _LARGEST_RAD_S = 12.0  # larger rates are in deg/s
-_MIN_CORRELATION = 0.7  # of a rate and its angle that belong together
-_MAX_COMMANDS = 8  # that are proposed
-_MAX_READ_COLUMNS = 60  # of a log
+_MIN_CORRELATION = 0.7  # a rate and its angle belong together if their correlation is larger
+_MAX_COMMANDS = 8  # largest number of proposed commands
+_MAX_READ_COLUMNS = 60  # largest number of columns that are read of a table
 _LOG_STEPS_S = (1.0 / 2000.0, 1.0 / 4.0)  # shortest and longest usual step of a log
 
 
@@ -109,10 +111,11 @@ def rates_agree(fit: physics.AngleFit) -> bool:
 
 
 class LikelyLog(NamedTuple):
-    """A log with the columns that may be quantities or commands; of a long table, the first part.
+    """A log with the columns that may be quantities or commands; of a long table, only the first part.
 
-    time: column and unit of the time, None for the usual ones; all_names: the names of all columns; mixing:
-    by the parameters of the log.
+    time: column and unit of the time, None for the column `t_s` in seconds. all_names: names of all columns.
+    mixing: commands and surfaces by the parameters of the log, empty if it has none; `guess_vehicle` adds
+    commands by their names.
     """
 
     reader: str
@@ -123,7 +126,7 @@ class LikelyLog(NamedTuple):
 
     @property
     def remarks(self) -> list[str]:
-        """Lines on the time and the mixing."""
+        """Lines on an unusual time, or on the mixing."""
         if self.time:
             return [f"time is in column {self.time[0]}, its steps fit {self.time[1]}"]
         return self.mixing.lines
@@ -140,11 +143,11 @@ def read_likely(path: Path, reader: str | None) -> LikelyLog:
         likely = [*_likely_columns(names, None), *mixing.entry_by_column, *({VTOL_MODE} & {*names})]
         log = read_flight(path, reader, columns=likely)
         return LikelyLog(reader, None, log, names, mixing)
-    time = wanted = None
+    time = columns = None
     if reader == "table":
-        wanted = _likely_columns(column_names(path))
+        columns = _likely_columns(column_names(path))
         time = _find_time(path)
-    log = next(read_parts(path, reader, time, wanted))
+    log = next(read_parts(path, reader, time, columns))
     return LikelyLog(reader, time, log, list(log.columns), Mixing())
 
 
@@ -153,7 +156,7 @@ def guess_vehicle(path: Path, likely: LikelyLog) -> Document:
     log = likely.log
     mixing = likely.mixing
     names = [name for name, column in log.columns.items() if np.isfinite(column.values).any()]
-    found = _find_quantities(names)
+    column_of = _find_quantities(names)
     if hovers_throughout(log.parameters, log.columns):
         raise NoVehicleError(
             f"is the log of a VTOL that hovers throughout ({VTOL_MODE} is never 2), allowed: a log with "
@@ -161,7 +164,7 @@ def guess_vehicle(path: Path, likely: LikelyLog) -> Document:
         )
     if not mixing.surfaces:
         _add_commands_by_name(likely, names)
-    if missing := [axis for axis in "pqr" if axis not in found]:
+    if missing := [axis for axis in "pqr" if axis not in column_of]:
         raise NoVehicleError(
             f"no column looks like the rate {missing[0]}, allowed: a vehicle file that names it; the log has "
             + nearest_names_text("rate", likely.all_names)
@@ -169,34 +172,36 @@ def guess_vehicle(path: Path, likely: LikelyLog) -> Document:
     if not mixing.surfaces:
         reason = missing_commands_text(likely.all_names)
         raise NoVehicleError(f"{reason}; the log has {nearest_names_text('command', likely.all_names)}")
-    return {"name": _plain_name(path.stem), "reader": likely.reader, **_quantity_keys(likely, found)}
+    return {"name": _plain_name(path.stem), "reader": likely.reader, **_quantity_keys(likely, column_of)}
 
 
-def _quantity_keys(likely: LikelyLog, found: dict[str, str]) -> Document:
-    """The keys of the vehicle file on time, rates, commands and further quantities. found: by quantity its
-    column, p, q and r among them."""
-    roll = likely.log.columns[found["roll"]] if "roll" in found else None
-    angle_unit = _guess_angle_unit(found["roll"], roll, likely.reader) if roll else "rad"
-    rate_unit = _guess_rate_unit(likely.log, [found[axis] for axis in "pqr"], roll, SI_UNITS[angle_unit][1])
+def _quantity_keys(likely: LikelyLog, column_of: dict[str, str]) -> Document:
+    """The keys of the vehicle file on time, rates, commands and further quantities. column_of: the column of
+    each quantity that the log has; p, q and r are among them."""
+    roll = likely.log.columns[column_of["roll"]] if "roll" in column_of else None
+    angle_unit = _guess_angle_unit(column_of["roll"], roll, likely.reader) if roll else "rad"
+    rate_unit = _guess_rate_unit(
+        likely.log, [column_of[axis] for axis in "pqr"], roll, SI_UNITS[angle_unit][1]
+    )
     vehicle: Document = {}
     if likely.time:
         vehicle["time"] = dict(zip(("column", "unit"), likely.time, strict=True))
-    vehicle["rates"] = {axis: _column_entry(found[axis], rate_unit, "rad/s") for axis in "pqr"}
+    vehicle["rates"] = {axis: _column_entry(column_of[axis], rate_unit, "rad/s") for axis in "pqr"}
     vehicle |= {"commands": likely.mixing.commands, "surfaces": likely.mixing.surfaces}
     if roll:
-        named = [axis for axis in ("roll", "pitch") if axis in found]
-        vehicle["attitude"] = {axis: _column_entry(found[axis], angle_unit, "rad") for axis in named}
-    if az := found.get("az"):
+        named = [axis for axis in ("roll", "pitch") if axis in column_of]
+        vehicle["attitude"] = {axis: _column_entry(column_of[axis], angle_unit, "rad") for axis in named}
+    if az := column_of.get("az"):
         median = float(np.nanmedian(np.abs(likely.log.columns[az].values)))
         if median > 0.0 and (unit := nearest_unit(ACCELERATION, SI_UNITS["g"][1] / median, 2.0)):
             vehicle["acceleration"] = _column_entry(az, unit, "m/s2")
-    if "airspeed" in found:
-        vehicle["airspeed"] = found["airspeed"]
+    if "airspeed" in column_of:
+        vehicle["airspeed"] = column_of["airspeed"]
     return vehicle
 
 
 def _find_quantities(names: list[str]) -> dict[str, str]:
-    """By quantity, the column that looks like it."""
+    """Quantity -> the column that looks like it."""
     angles = [name for name in names if not re.search(_ANGLE_RATE_NAME, _snake_case(name))]
     return {
         quantity: name
@@ -221,7 +226,8 @@ def _add_commands_by_name(likely: LikelyLog, names: list[str]) -> None:
 
 
 def _likely_columns(names: Iterable[str], max_columns: int | None = _MAX_READ_COLUMNS) -> list[str]:
-    """Columns that may be quantities or commands: a log with many columns is not read as a whole."""
+    """The first columns that may be quantities or commands, at most max_columns: a log with many columns is
+    not read as a whole."""
     pattern = "|".join(f"({part})" for part in _NAME_PATTERNS.values())
     likely = [name for name in names if re.fullmatch(pattern, _snake_case(name)) or is_command_name(name)]
     return likely[:max_columns]
@@ -245,8 +251,11 @@ def _shortest_match(pattern: str, names: Sequence[str]) -> str | None:
 
 
 def _find_time(path: Path) -> TimeSource | None:
-    """The time column of a table and its unit, None for the usual ones. Raises BadInput where no column
-    increases like time."""
+    """The time column of a table and its unit, None for the column `t_s` in seconds, which is tried first.
+    Raises BadInput where the usual step of no column is that of a log (_LOG_STEPS_S) in any unit.
+
+    If several units fit, the one at the end of the column's name is taken, otherwise the first in TIME_UNITS.
+    """
     names = column_names(path)
     likely = [name for name in names if re.fullmatch(_NAME_PATTERNS["time"], _snake_case(name))]
     phrases: list[str] = []
@@ -268,7 +277,8 @@ def _find_time(path: Path) -> TimeSource | None:
 
 
 def _guess_angle_unit(name: str, roll: Column, reader: str) -> str:
-    """The unit of the attitude: degrees for ArduPilot, otherwise by the name, otherwise by the size."""
+    """The unit of the attitude: degrees for ArduPilot, otherwise by the name, otherwise by the size: degrees
+    if an angle exceeds 2 pi."""
     if reader == "ardupilot" or "deg" in name.lower():
         return "deg"
     return "deg" if "rad" not in name.lower() and largest_magnitude(roll.values) > 2.0 * np.pi else "rad"
@@ -277,31 +287,34 @@ def _guess_angle_unit(name: str, roll: Column, reader: str) -> str:
 def _guess_rate_unit(
     log: RecordedFlight, rate_names: list[str], roll: Column | None, rad_per_roll_unit: float
 ) -> str:
-    """The unit of the rates. If they agree with the roll angle, it is the unit in which they agree, otherwise
-    that of their name, otherwise rad/s. If they do not agree, it is that of their name, otherwise by size.
+    """The unit of the rates, the first of a row that is known:
+
+        rates and roll angle agree    unit in which they agree, unit by the name, rad/s
+        they do not, or no roll       unit by the name, deg/s above _LARGEST_RAD_S, rad/s
 
     rad_per_roll_unit: factor on the numbers of the roll angle.
     """
     rates = [log.columns[name] for name in rate_names]
     named = rate_names[0].lower()
-    found = next((unit for part, unit in _UNIT_OF_PART.items() if part in named), None)
+    unit = next((unit_of_part for part, unit_of_part in _UNIT_OF_PART.items() if part in named), None)
     if roll is not None:
         in_rad = replace(roll, values=roll.values * rad_per_roll_unit)
         fit = physics.fit_angle(rates, (in_rad, None, None), 0)
         if fit is not None and rates_agree(fit):
-            found = nearest_unit(RATE, abs(fit.slope), 1.5) or found or "rad/s"
+            unit = nearest_unit(RATE, abs(fit.slope), 1.5) or unit or "rad/s"
     largest = max(largest_magnitude(rate.values) for rate in rates)
-    return found or ("deg/s" if largest > _LARGEST_RAD_S else "rad/s")
+    return unit or ("deg/s" if largest > _LARGEST_RAD_S else "rad/s")
 
 
 def _column_entry(name: str, unit: str, si_unit: str) -> Any:
-    """A column as the vehicle file names it."""
+    """The entry of a column in the vehicle file: its name alone if it is in the SI unit."""
     return name if unit == si_unit else {"column": name, "unit": unit}
 
 
 def _pulse_entry(name: str, values: Floats) -> Any:
-    """The entry that converts a command to a share of travel: from pulses of 1100 to 1900 us, from per cent,
-    or without a factor."""
+    """The entry that converts a command to a share of travel: from pulses of 1100 to 1900 us if the median is
+    that of a pulse, from per cent if the largest magnitude is between 10 and 105, otherwise without a factor.
+    """
     median = float(np.nanmedian(values))
     largest = largest_magnitude(values)
     if _PWM_RANGE_US[0] < median < _PWM_RANGE_US[1]:
@@ -311,12 +324,12 @@ def _pulse_entry(name: str, values: Floats) -> Any:
 
 
 def _plain_name(name: str) -> str:
-    """A name with the signs that a name in the vehicle file may have."""
+    """A name in which each run of characters that a vehicle file forbids in names is one underscore."""
     return re.sub(r"[^A-Za-z0-9_-]+", "_", name).strip("_")[:100] or "log"
 
 
 def vehicle_file_text(vehicle: Document) -> str:
-    """A vehicle file's text."""
+    """The text of a vehicle file: a head, the keys, and the further keys as comments."""
     import yaml
 
     head = (

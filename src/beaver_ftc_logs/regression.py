@@ -1,5 +1,5 @@
 """The one regression of a flight: the regressors of the next sample's rates, what a model leaves of them
-(`Innovations`), and least squares on both. What identifies, doubts, detects and bounds selects from it.
+(`Innovations`), and least squares on both. Identification, checks, detection and bounds all use it.
 
     rates[k] = c + A' x[k] + sum over groups g of a_g F_g[k] + noise,      F_g[k] = sum_j B_gj u_g[k-j]
 
@@ -15,7 +15,8 @@
     e, R, W         residual (n, 3), rad/s; its covariance (3, 3), (rad/s)2; whitening matrix: e W is white
     Z, v            whitened regressors of c and a (3 n, 3 + G), whitened y (3 n,): three rows a sample
     ma              moving average of the noise, 1 first
-    p, ar           residuals before one that predict it; matrices of this prediction (p, 3, 3), latest first
+    p, ar           number of residuals that predict the next; matrices of this prediction (p, 3, 3), the
+                    latest residual first
 
 Surfaces whose commands are proportional to one another move together while they are healthy: their effects
 cannot be distinguished by any fit, so they form one group with one response.
@@ -47,7 +48,8 @@ _QUICK_SPAN_S = 0.5
 class FitPart:
     """A flight (or half of one) and which of its samples the fit may use, is_usable (n,).
 
-    fits: what `orders.fitted_order` has fitted to lists of parts that begin with this one.
+    fits: the cache of `orders.fitted_order`, which describes its keys and values: fits to lists of parts that
+    begin with this one.
     """
 
     samples: Samples
@@ -65,7 +67,8 @@ class FitPart:
         return FitPart(self.samples, first), FitPart(self.samples, second)
 
     def innovations(self, model: Model) -> "Innovations":
-        """The samples in use by a model, commands as effective as labels say."""
+        """The innovations of the usable samples by a model. Commands are multiplied by the labelled
+        effectiveness."""
         flight = innovations(self.samples, model, labelled=True)
         return flight.at(np.flatnonzero(self.is_usable & flight.is_known))
 
@@ -78,12 +81,16 @@ def usual_step_s(parts: Parts) -> float:
     return float(np.median([part.samples.dt_s for part in parts]))
 
 
-# Surfaces that move together, by their places.
+# Each group is a list of positions in `Vehicle.surfaces`: these surfaces move together.
 Groups = list[list[int]]
 
 
 def group_surfaces(vehicle: Vehicle) -> Groups:
-    """Surfaces by what excites them: those in one group get proportional commands."""
+    """The surfaces in groups whose commands are proportional. m and f, the rows of the mixer of a surface and
+    of the first surface of a group, are proportional if, but for rounding,
+
+        (m.f)^2 = |m|^2 |f|^2
+    """
     M = mixer_matrix(vehicle)
     groups: Groups = []
     for i, m in enumerate(M):
@@ -100,10 +107,10 @@ def group_surfaces(vehicle: Vehicle) -> Groups:
 def build_regressors(
     samples: Samples, groups: Groups, h: int, L: int, labelled: bool, f: int
 ) -> tuple[Floats, Floats, Mask]:
-    """The regressors of each sample: the past X (n, 3 h + D f), the commands U (n, G, L) of the groups, and
-    whether all of it is known and no gap lies within, (n,).
+    """The regressors of each sample: the past X (n, 3 h + D f) and the commands U (n, G, L) of the groups;
+    and known (n,), whether rates and regressors are finite and no gap in the log lies between them.
 
-    labelled: as of `group_commands`.
+    labelled: as in `group_commands`.
     """
     u = group_commands(samples, groups, labelled)
     rates = [_delay_rows(samples.rates, k, np.nan) for k in range(1, h + 1)]
@@ -116,8 +123,8 @@ def build_regressors(
 
 
 def group_commands(samples: Samples, groups: Groups, labelled: bool) -> Floats:
-    """The command of each group, (n, G); labelled: each surface's times its labelled effectiveness, 1 where
-    there is no label."""
+    """The command of each group, (n, G): the sum of those of its surfaces. labelled: whether the command of
+    each surface is first multiplied by its labelled effectiveness, 1 where there is no label."""
     commands = samples.commands
     if labelled:
         commands = commands * np.where(np.isfinite(samples.labels), samples.labels, 1.0)
@@ -125,7 +132,7 @@ def group_commands(samples: Samples, groups: Groups, labelled: bool) -> Floats:
 
 
 def _delay_rows(values: np.ndarray, lag: int, fill: float) -> np.ndarray:
-    """The rows `lag` samples later, `fill` where there is no past."""
+    """Values (n, ...) delayed by `lag` samples: row k has those of row k - lag, and `fill` if k < lag."""
     lag = min(lag, len(values))
     return np.concatenate([np.full((lag, *values.shape[1:]), fill), values[: len(values) - lag]])
 
@@ -137,7 +144,8 @@ def group_indices(model: Model) -> Groups:
 
 
 def expand_groups(values: Floats | Mask, model: Model) -> Floats:
-    """Each surface's column (n, S) of those of the groups (n, G): its group's, 1 where it is in none."""
+    """Columns of groups (n, G) as columns of surfaces (n, S): the column of the surface's group, 1 if it has
+    none."""
     index = np.full(len(model.vehicle.surfaces), -1)
     for g, group in enumerate(group_indices(model)):
         index[group] = g
@@ -148,9 +156,9 @@ def expand_groups(values: Floats | Mask, model: Model) -> Floats:
 class Innovations:
     """What the past does not explain of a flight's rates, a row a sample: y = c + sum_g F_g + e in health.
 
-    rows (n,): place of each row in the flight. is_known (n,): whether all of the past is there; else a row
-    of e is 0. y (n, 3), F (n, G, 3), c (3,) rad/s: as in the head of this file, less what earlier residuals
-    predict of them. noise: of the flight.
+    rows (n,): place of each row in the flight. is_known (n,): whether the whole past of the row is known; if
+    not, its row of e is 0. y (n, 3), F (n, G, 3), c (3,) rad/s: as in the head of this file, less the part
+    that earlier residuals predict (`subtract_noise`). noise: noise model of the flight.
     """
 
     rows: Ints
@@ -188,29 +196,29 @@ class Innovations:
         return [self.e[begin:end] for begin, end in runs_between(np.diff(self.rows) > 1)]
 
     def at(self, rows: Ints | slice) -> "Innovations":
-        """Some of the rows."""
+        """The innovations of some rows only. rows: positions in these arrays."""
         chosen = {name: getattr(self, name)[rows] for name in ("rows", "is_known", "y", "F")}
         return replace(self, **chosen)
 
     def columns(self) -> Floats:
-        """Effects of trim and responses in standard deviations of the noise, (n, 3, 3 + G)."""
+        """Effects of trim and responses in standard deviations of the noise, W' [1, F'], (n, 3, 3 + G)."""
         trim = np.broadcast_to(np.eye(3), (len(self.F), 3, 3))
         return (np.concatenate([trim, self.F], axis=1) @ self.W).transpose(0, 2, 1)
 
     def regression(self) -> tuple[Floats, Floats]:
-        """Z (3 n, 3 + G), of trim and responses, and v (3 n,)."""
+        """Z (3 n, 3 + G), the regressors of trim and responses, and v (3 n,), both whitened by W."""
         return self.columns().reshape(3 * len(self.F), -1), (self.y @ self.W).ravel()
 
     def gain_bounds(self, share: float) -> tuple[Floats, Floats, float]:
-        """By least squares of v on Z, as of `regression`: the gain that each response surely is not below,
-        and not above, (G,) each, 1 as in the model; and the scale of the noise, in variances of it.
+        """Lower and upper bound on the gain of each response, (G,) each, where the model has the gain 1, and
+        the scale of the noise, in variances of it; by least squares of v on Z (`regression`):
 
             N = Z / d,   P = (N' N + eps 3 n I)^-1,   b = P N' v,   r = v - N b
             bounds = (b -+ BOUND_MARGIN sqrt(diag(P) mean(r^2) / share)) / d
 
-        d: root mean squares of the columns of Z (3 + G,); b: coefficients of N (3 + G,); r: what they leave
-        (3 n,). eps: EIGENVALUE_FLOOR, which keeps the bounds finite and far apart where columns make one
-        another up. share: as how many white samples one counts.
+        d: root mean squares of the columns of Z (3 + G,); b: coefficients of N (3 + G,); r: residual (3 n,).
+        eps: EIGENVALUE_FLOOR; it keeps the bounds finite, and far apart, where the columns depend on one
+        another. share: number of white samples that have the information of one sample.
         """
         Z, v = self.regression()
         d = least_squares.rms_of_columns(Z)
@@ -229,15 +237,21 @@ class Innovations:
         return np.asarray(np.linalg.lstsq(*self.regression(), rcond=None)[0][3:])
 
     def quick_power(self, rate_hz: float) -> Floats:
-        """Power of the quick part of the responses an axis, in variances of the noise, (n,): of their
-        difference from their mean over the last _QUICK_SPAN_S."""
+        """Power of the quick part of the responses, a mean over the axes, in variances of the noise, (n,):
+
+            sum over g of |(F_g - mean of F_g over the last _QUICK_SPAN_S) W|^2 / 3
+
+        The quick part is the difference of a response from its mean.
+        """
         sums, counts = trailing_sums(self.F, _QUICK_SPAN_S * rate_hz)
         quick = (self.F - sums / counts[:, None, None]) @ self.W
         return (quick**2).sum(axis=(1, 2)) / 3.0
 
     def quick_scale(self, model: Model) -> Floats:
-        """Variance of the residual over that of the noise, (n,): above 1 where the responses are quicker than
-        usual in the fit, since a share of the quick part may be missing, or be too much.
+        """Variance of the residual over that of the noise, (n,), above 1 where the quick part of the
+        responses has more power than was usual in the fit:
+
+            q = 1 + quick_error^2 max(quick power - usual quick power, 0)
 
         Slow commands of healthy flight hardly show how a surface responds to a step. The error after a step
         is no noise: it has the same sign in many samples.
@@ -247,11 +261,11 @@ class Innovations:
 
 
 def innovations(samples: Samples, model: Model, labelled: bool = False) -> Innovations:
-    """A flight by a model, every sample a row; labelled: as in `build_regressors`. Where the model knows the
-    flight's noise, less the prediction of each residual from those before it: a healthy flight leaves a white
-    residual.
+    """The innovations of a flight by a model, one row a sample; labelled: as in `group_commands`. If the
+    model has an AR predictor for the noise of the flight, the predicted part is subtracted from y, F and c,
+    so that a healthy flight has a white residual.
 
-    Summed in the same order whatever the length of the flight, so that a row does not depend on later ones.
+    `einsum` sums in the same order for any length of the flight, so a row does not depend on later rows.
     """
     h = model.history
     L = model.lags
@@ -262,18 +276,18 @@ def innovations(samples: Samples, model: Model, labelled: bool = False) -> Innov
     ar = noise.ar
     y = subtract_noise(samples.rates - np.einsum("nm,mr->nr", X, A), ar)
     F = subtract_noise(np.einsum("ngl,glr->ngr", U, B), ar)
-    whole = known.copy()  # a row that is not known makes the p next ones unknown: `ar` predicts these from it
+    is_known = known.copy()  # a row that is not known makes the p next ones unknown: `ar` uses it for them
     for lag in range(1, len(ar) + 1):
-        whole &= _delay_rows(known, lag, False)
+        is_known &= _delay_rows(known, lag, False)
     y = np.nan_to_num(y)
     F = np.nan_to_num(F)
     c = c - c @ ar.sum(axis=0)
-    return Innovations(np.arange(len(y)), whole, y, F, c, noise)
+    return Innovations(np.arange(len(y)), is_known, y, F, c, noise)
 
 
 def by_noise(samples: Samples, model: Model) -> list[tuple[Samples, Model]]:
-    """A flight whitened by each noise of a model, and the model with this noise alone; both as they are where
-    the model has none."""
+    """For each noise model of a model: the flight whitened by it, and the model with this noise model alone.
+    If there is none: the one pair of the flight and the model as they are."""
     return [
         (whiten_samples(samples, noise.average), model.model_copy(update={"colours": [noise]}))
         for noise in model.colours
@@ -281,12 +295,12 @@ def by_noise(samples: Samples, model: Model) -> list[tuple[Samples, Model]]:
 
 
 def by_axis(values: Floats) -> dict[str, float]:
-    """The numbers of p, q and r by name."""
+    """Three values, of p, q and r, by the name of the axis."""
     return dict(zip("pqr", values.tolist(), strict=True))
 
 
 def subtract_noise(values: Floats, ar: Floats) -> Floats:
-    """t (n, .., 3): values s (n, .., 3) less their prediction by ar, for each quantity g of the middle axes.
+    """t (n, .., 3): values s (n, .., 3) less their prediction by ar, for each index g of the middle axes.
     Values before the first row count as 0.
 
         t[k, g] = s[k, g] - sum over lags l = 1..p of ar[l-1]' s[k-l, g]
@@ -294,14 +308,14 @@ def subtract_noise(values: Floats, ar: Floats) -> Floats:
     For each entry (i, j) of the matrices, from axis i of s to axis j of t, the sum is a convolution in time.
     A NaN spreads over the p next rows at most.
     """
-    rest = values.copy()
+    result = values.copy()
     if not len(ar) or not values.size:
-        return rest
+        return result
     s = values.reshape(len(values), -1, 3)
-    t = rest.reshape(s.shape)  # a view: what is subtracted from it, is subtracted from `rest`
+    t = result.reshape(s.shape)  # a view: a subtraction from t changes `result`
     for i, j, g in np.ndindex(3, 3, s.shape[1]):
         t[1:, g, j] -= np.convolve(s[:, g, i], ar[:, i, j])[: len(s) - 1]
-    return rest
+    return result
 
 
 def split_parts(rows: Ints) -> list[Ints] | None:

@@ -1,7 +1,8 @@
-"""The vehicle file: which columns of a log are rates and commands, and what each surface makes of these.
+"""The vehicle file: which columns of a log are rates and commands, and how each surface follows the commands.
 
-It names columns, not code. Unknown keys and every other mistake are refused with one line each:
-`FILE:LINE: key: what is wrong, what is allowed`.
+The file names columns, and has no code. Unknown keys and every other mistake are refused with one line each:
+`FILE:LINE: key: what is wrong, what is allowed`. The docstrings of the sections have a line for each key,
+which error messages and the reference quote.
 """
 
 import re
@@ -39,7 +40,7 @@ VehicleName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$", max_length=100)]
 _SURFACE_NAME_PATTERN = re.compile(r"[A-Za-z0-9_-]{1,100}")
 ColumnName = Annotated[str, Field(min_length=1, max_length=200)]
 FaultKind = Literal["loss", "stuck"]
-# What the columns below a key measure; empty: any quantity.
+# Key -> kind of unit of the columns below it; empty: a unit of any kind.
 _KINDS: dict[Location, str] = {
     ("rates",): RATE, ("commands",): "", ("signals",): "", ("attitude",): ANGLE,
     ("acceleration",): ACCELERATION, ("airspeed",): SPEED, ("energy", "altitude"): LENGTH,
@@ -71,18 +72,18 @@ class QuantityColumn(Section):
 
     @model_serializer(mode="wrap")
     def _serialize_plain(self, serialize: Any) -> Any:
-        """A name is enough where nothing else is said."""
+        """The name of the column alone, if unit, scale and offset are the defaults."""
         is_plain = self.unit is None and self.scale == 1.0 and self.offset == 0.0
         return self.column if is_plain else serialize(self)
 
     def to_si(self, values: Any) -> Any:
-        """The column's numbers in SI."""
+        """The column's numbers in SI: (scale values + offset) times the size of the unit in SI."""
         factor = self.scale * (SI_UNITS[self.unit][1] if self.unit else 1.0)
         return values * factor + self.offset * factor / self.scale
 
 
 ColumnSpec = Annotated[
-    QuantityColumn, BeforeValidator(lambda of: {"column": of} if isinstance(of, str) else of)
+    QuantityColumn, BeforeValidator(lambda value: {"column": value} if isinstance(value, str) else value)
 ]
 
 
@@ -219,13 +220,13 @@ class Vehicle(Section):
     def _check_names(self) -> "Vehicle":
         """Refuse names of surfaces that no column may have, names that the file does not define, and wrong
         units."""
-        # the name of a surface is part of a column's
+        # The name of a surface becomes a part of names of columns in diagnosis.parquet.
         reason = "a surface's name has letters, digits, - and _ only, allowed: one"
         bad = [name for name in self.surfaces if not _SURFACE_NAME_PATTERN.fullmatch(name)]
         mistakes: list[Conflict] = [(("surfaces", name), f"{name!r}: {reason}") for name in bad]
         commands = self.command_columns
-        again = [i for i, column in enumerate(commands) if column in commands[:i]]
-        mistakes += [(("commands", i), f"{commands[i]!r} stands twice, allowed: each once") for i in again]
+        repeated = [i for i, column in enumerate(commands) if column in commands[:i]]
+        mistakes += [(("commands", i), f"{commands[i]!r} stands twice, allowed: each once") for i in repeated]
         for surface, weights in self.surfaces.items():
             at = ("surfaces", surface)
             mistakes += _unknown_name_conflicts(at, weights, "command", commands)
@@ -243,7 +244,10 @@ class Vehicle(Section):
         return self
 
     def _unit_mistakes(self) -> Iterator[Conflict]:
-        """Units of another kind than their column's; the first column that is read in two ways."""
+        """Units of another kind than that of their key; the first column that is read in two ways.
+
+        first: for each column its first place in the file, with which later places must agree.
+        """
         first: dict[str, QuantityColumn] = {}
         two_ways: list[Conflict] = []
         for location, kind, quantity in self.located_quantities():
@@ -257,11 +261,13 @@ class Vehicle(Section):
         yield from two_ways[:1]
 
     def located_quantities(self) -> list[tuple[Location, str | None, QuantityColumn]]:
-        """Every column but those of labels and outputs: where it stands in the file, and its kind.
+        """Every column but those of labels and outputs: its place in the file, the kind of its unit, itself.
 
-        The kind is empty where any unit may be right, None of a flow that only the aircraft's model knows."""
-        found = _columns_below((), {key: value for key, value in self if key not in ("labels", "outputs")})
-        return [(at, _KINDS.get(at, _KINDS.get(at[:1])), quantity) for at, quantity in found]
+        The kind is empty where any unit may be right, and None of a flow that only the aircraft's model
+        knows.
+        """
+        located = _columns_below((), {key: value for key, value in self if key not in ("labels", "outputs")})
+        return [(at, _KINDS.get(at, _KINDS.get(at[:1])), quantity) for at, quantity in located]
 
     @property
     def rate_columns(self) -> list[str]:
@@ -280,56 +286,59 @@ class Vehicle(Section):
 
     @property
     def max_sample_rate_hz(self) -> float:
-        """The rate above which a log is averaged. Within an average a law may answer what the same average
-        shows, and no fit tells that from what the surface does: of other laws every sample is wanted."""
+        """The rate above which a log is averaged, Hz. In moving air it is higher: a law can react to a gust
+        within the interval of an average, and a fit cannot distinguish this reaction from the effect of the
+        surface."""
         still = self.moving_air is False or (self.moving_air is None and self.labels)
         default_hz = STILL_AIR_HZ if still else _MOVING_AIR_HZ
         return float(self.max_rate_hz or default_hz)
 
     def n_signal_lags(self, n_rate_lags: int) -> int:
-        """Past samples of the signals, of so many of the rates: noise that is coloured is whitened by
-        filtering all that comes in alike."""
+        """Number of past samples of the signals, for this number of past samples of the rates: as many in
+        moving air, otherwise one. Coloured noise is whitened by the same filter on rates, commands and
+        signals, which gives all of them further lags."""
         return n_rate_lags if self.moving_air else 1
 
     @property
     def surface_airspeed_powers(self) -> list[float]:
-        """The power of the airspeed with which each surface's command counts."""
+        """Exponent n of (airspeed / V0)^n on the command of each surface, (S,)."""
         return [float(self.airspeed_powers.get(name, 2.0)) for name in self.surfaces]
 
     @property
     def regressor_columns(self) -> list[str]:
-        """Return the regressors besides the rates' own past: signals, and the products of both with the
-        airspeed (`samples.scale_by_airspeed`)."""
+        """The further signals of a fit: those in the file and, with a reference airspeed, the products of
+        rates and signals with the airspeed (`samples.scale_by_airspeed`)."""
         scaled = self.rate_columns + self.signal_columns if self.reference_airspeed_mps is not None else []
         return self.signal_columns + [f"{name} by airspeed" for name in scaled]
 
     def column_names(self) -> list[str]:
-        """Every column of a log that the vehicle may want, its time aside."""
+        """Every column of a log that the vehicle file names, except the time."""
         return list(dict.fromkeys(quantity.column for _, quantity in _columns_below((), self)))
 
 
 def _columns_below(location: Location, value: Any) -> Iterator[tuple[Location, QuantityColumn]]:
-    """Every column that a value holds, and where it stands."""
+    """Every column in a value of the file, and its place; location: place of the value."""
     if isinstance(value, QuantityColumn):
         yield location, value
     elif isinstance(value, list):
-        for i, one in enumerate(value):
-            yield from _columns_below((*location, i), one)
+        for i, item in enumerate(value):
+            yield from _columns_below((*location, i), item)
     elif isinstance(value, Section | dict):
-        for key, one in dict(value).items():
-            yield from _columns_below((*location, key), one)
+        for key, item in dict(value).items():
+            yield from _columns_below((*location, key), item)
 
 
 def _unknown_name_conflicts(
     location: Location, names: Iterable[str], name_kind: str, known: Collection[str]
 ) -> list[Conflict]:
-    """One mistake for each name below a location that is not known."""
+    """One mistake for each unknown name below a location. name_kind: word for the kind of name in the
+    text."""
     unknown = [name for name in names if name not in known]
     return [((*location, name), f"{name!r} is no {name_kind}{suggestion(name, known)}") for name in unknown]
 
 
 def unused_keys_as_comments(used_keys: Collection[str]) -> str:
-    """Comments for the end of a vehicle file: each key that it has not, with an example, and what it says."""
+    """Comments for the end of a vehicle file: each unused key with its description and an example."""
     lines = ["# Further keys:"]
     for name, field in Vehicle.model_fields.items():
         if name not in used_keys:
@@ -346,20 +355,20 @@ def load_vehicle(vehicle: str | Path) -> Vehicle:
 
 def read_vehicle_document(vehicle: str | Path) -> tuple[Document, str]:
     """The text of a vehicle file as data that is not checked yet, and its path. Raises ScenarioError."""
-    given = str(vehicle)
+    place = str(vehicle)
     built_in = sorted(path.stem for path in _BUILT_IN_FOLDER.glob("*.yaml"))
-    if looks_like_a_path(given):
-        text = text_of(given, _MAX_FILE_BYTES)
+    if looks_like_a_path(place):
+        text = text_of(place, _MAX_FILE_BYTES)
     else:
-        given = str(_BUILT_IN_FOLDER / f"{given}.yaml") if given in built_in else given
-        unknown = f"no such file or built-in vehicle{suggestion(given, built_in)}"
-        text = text_of(given, _MAX_FILE_BYTES, lambda: unknown)
-    path = str(Path(given))
+        place = str(_BUILT_IN_FOLDER / f"{place}.yaml") if place in built_in else place
+        unknown = f"no such file or built-in vehicle{suggestion(place, built_in)}"
+        text = text_of(place, _MAX_FILE_BYTES, lambda: unknown)
+    path = str(Path(place))
     return parse_document(text, path), path
 
 
 def with_alarm_rate(vehicle: Vehicle, false_alarms_per_hour: float) -> Vehicle:
-    """The vehicle with a rate of false alarms that is accepted. Raises BadInput for one that is none."""
+    """The vehicle with another accepted rate of false alarms, 1/h. Raises BadInput if it is out of range."""
     if not 0.0 < false_alarms_per_hour <= MAX_ALARMS_PER_HOUR:
         allowed = f"allowed: more than 0, up to {MAX_ALARMS_PER_HOUR:g} an hour"
         raise BadInput(f"identify: --false-alarms-per-hour {false_alarms_per_hour:g}: {allowed}")

@@ -65,8 +65,8 @@ def identify(
     from beaver_ftc_logs.vehicle import with_alarm_rate
     from beaver_ftc_logs.vehicle_of_logs import load_vehicle_for_logs
 
-    given = {path.resolve() for path in (*flights, Path(vehicle))}
-    if not out.name or out.suffix == ".html" or out.resolve() in given:
+    input_paths = {path.resolve() for path in (*flights, Path(vehicle))}
+    if not out.name or out.suffix == ".html" or out.resolve() in input_paths:
         allowed = "a name such as wing.json, of no log or vehicle file; the page is wing.html"
         raise BadInput(f"identify: --out {out}: allowed: {allowed}")
     page = out.with_suffix(".html")
@@ -86,19 +86,21 @@ def identify(
         "identified": model.identified,
         "settings": model.settings.model_dump(),
     }
-    long = [f"  {samples.name}: {samples.notes[0]}" for samples in logs if samples.n_log_parts > 1]
+    part_lines = [f"  {samples.name}: {samples.notes[0]}" for samples in logs if samples.n_log_parts > 1]
     answer(
         format,
         document,
-        lambda: "\n".join([*mixing, identification_text(model), *long, f"model: {out}", f"page: {page}"]),
+        lambda: "\n".join(
+            [*mixing, identification_text(model), *part_lines, f"model: {out}", f"page: {page}"]
+        ),
     )
 
 
 def _check_logs(
     flights: list[Path], vehicle: str | None, out: Path | None, reader: str | None, format: Format
 ) -> None:
-    """Say of each log whether it can be used, and write the vehicle file that was guessed. Exit status 2
-    if one cannot."""
+    """Report for each log whether it can be used, and print or write the first proposed vehicle file. Exit
+    status 2 if a log cannot be used."""
     from beaver_ftc_logs.check import as_text, check_log
     from beaver_ftc_logs.proposal import vehicle_file_text
     from beaver_ftc_logs.vehicle_of_logs import load_vehicle_for_logs
@@ -202,7 +204,8 @@ def _write_diagnosis(
     words: "Words",
     extra: Callable[[Path], None] | None = None,
 ) -> Document:
-    """The verdict with its score and the folder into which table, page and `extra` are written."""
+    """Write table, verdict and page of a flight into a folder. Returns the verdict with its score, if asked
+    for, and with the folder. extra: writes further files into this folder."""
     from beaver_ftc_logs.pages import render_diagnosis, write_results
     from beaver_ftc_logs.scoring import score_diagnosis
 
@@ -215,7 +218,14 @@ def _write_diagnosis(
 
 
 def _check_options_agree(options: DiagnoseOptions) -> None:
-    """Raise BadInput for options that contradict one another, or that would change nothing."""
+    """Raise BadInput for options that contradict one another, or that would change nothing.
+
+    option                                 allowed with
+    --model                                without --aircraft
+    --scenario, --vehicle, --certificate   --aircraft
+    --score, --reader                      --model or --aircraft
+    --detector                             --model
+    """
     own_detector = options.detector == "bank-of-filters"
     by_aircraft = options.aircraft is not None
     by_model = options.model is not None
@@ -234,17 +244,18 @@ def _check_options_agree(options: DiagnoseOptions) -> None:
         "--detector": None if own_detector else options.detector,
         "--reader": options.reader,
     }
-    for given, is_allowed, allowed in (
+    for options_given, is_allowed, allowed in (
         (aircraft_only, by_aircraft, "only with --aircraft NAME"),
         (diagnosis_only, by_aircraft or by_model, "only with --model MODEL or --aircraft NAME"),
     ):
-        for option, value in given.items():
+        for option, value in options_given.items():
             if value is not None and not is_allowed:
                 raise BadInput(f"diagnose: {option}: allowed: {allowed}")
 
 
 def _diagnose_with_aircraft(options: DiagnoseOptions) -> None:
-    """Diagnose logs by the model of an aircraft; the vehicle file may lie beside a log."""
+    """Diagnose logs by the model of an aircraft. The vehicle file is that of --vehicle, otherwise
+    vehicle.yaml in the folder of the log."""
     from beaver_ftc_logs.by_aircraft import diagnose_aircraft, load_diagnosed
     from beaver_ftc_logs.findings import as_text
     from beaver_ftc_logs.loading import read_vehicle_parts, refuse_equal_names
@@ -257,7 +268,7 @@ def _diagnose_with_aircraft(options: DiagnoseOptions) -> None:
         from beaver_ftc_logs import certified
 
     refuse_equal_names(path.stem for path in options.flights)
-    given = aircraft, _ = load_diagnosed(str(options.aircraft), options.scenario)
+    diagnosed = aircraft, _ = load_diagnosed(str(options.aircraft), options.scenario)
     words = words_of_aircraft(aircraft, BOUND_WINDOW_S)
     groups = [[name] for name in words.surfaces]
     verdicts: list[Document] = []
@@ -270,7 +281,7 @@ def _diagnose_with_aircraft(options: DiagnoseOptions) -> None:
         loaded, mixing = load_vehicle_for_logs(options.vehicle or str(beside), [path], options.reader)
         texts += mixing
         for log in read_vehicle_parts(path, loaded, options.reader):
-            inputs, rows, verdict = diagnose_aircraft(log, loaded, given)
+            inputs, rows, verdict = diagnose_aircraft(log, loaded, diagnosed)
             writer = None
             if options.certificate:
                 writer = partial(certified.write_certificate_and_log, inputs, rows)
@@ -281,15 +292,15 @@ def _diagnose_with_aircraft(options: DiagnoseOptions) -> None:
 
 
 def _replay_run_logs(flights: list[Path], out: Path, format: Format) -> None:
-    """Replay logs of our own runs, each with its scenario beside it."""
+    """Replay logs of `beaver-ftc run`, each with its scenario.yaml in the same folder."""
     from beaver_ftc_logs.loading import refuse_equal_names
     from beaver_ftc_logs.pages import write_results
     from beaver_ftc_logs.replay import as_text, is_log_of_run, replay_run_log
 
-    others = [path for path in flights if not is_log_of_run(path)]
-    if others:
+    foreign = [path for path in flights if not is_log_of_run(path)]
+    if foreign:
         reason = "--model is missing, allowed without one: log.parquet beside its scenario.yaml"
-        raise BadInput(f"diagnose: {others[0]}: {reason}")
+        raise BadInput(f"diagnose: {foreign[0]}: {reason}")
     replays = [replay_run_log(path) for path in flights]
     refuse_equal_names(verdict["flight"] for _, verdict in replays)
     verdicts = [
@@ -300,7 +311,7 @@ def _replay_run_logs(flights: list[Path], out: Path, format: Format) -> None:
 
 
 def compare_recorded(folder: Path, out: Path, format: Format, markdown_page: Path | None) -> None:
-    """Compare ways to diagnose the recorded flights in a folder; markdown_page: path of a page to update."""
+    """Compare the methods of diagnosis on the recorded flights in a folder. markdown_page: page to update."""
     from beaver_ftc.results import result_folder
     from beaver_ftc.studies.present import write_files
     from beaver_ftc_logs.recorded.benchmark import run_benchmark
@@ -318,7 +329,7 @@ def compare_recorded(folder: Path, out: Path, format: Format, markdown_page: Pat
 
 
 def compare_other_days(folder: Path, format: Format, markdown_page: Path | None) -> None:
-    """The same on other days that are made by changing the labelled flights."""
+    """Test the diagnosis on other days, which are made by changing the labelled flights in a folder."""
     from beaver_ftc_logs.recorded.comparison import as_text, update_page
     from beaver_ftc_logs.recorded.other_days import run_other_days
 

@@ -2,9 +2,12 @@
 
 A row uses only samples up to its own time.
 
-    P           probability of each hypothesis of the bank (n, H)
+    P           probability of each hypothesis of the bank (n, H); hypothesis 0: all healthy; the last:
+    nothing
+                answers the commands
     levels, p   levels of effectiveness of one group (L,), ascending, and their probabilities (n, L)
     a           effectiveness of each group (n, G), with bounds low and high
+    faulty      whether the alarm stands (n,), 0 or 1
     alarmed     whether the evidence is enough for an alarm (n,)
     nameable    whether it is enough for a name (n,)
     calm        whether no fault, or no response to any command, has a probability above 1/2 (n,)
@@ -27,22 +30,23 @@ from beaver_ftc_logs.regression import expand_groups, innovations
 from beaver_ftc_logs.runs import last_true_row, trailing_sums
 from beaver_ftc_logs.samples import Samples
 
-_LOG_RATE_TOLERANCE = 0.25  # of the sample rate, from that of the model
-# Share of the fault's probability above which a group is named.
+_LOG_RATE_TOLERANCE = 0.25  # largest relative difference between the sample rate of a log and of the model
+# A group is named if the probability of its faults exceeds this share of the probability of any fault.
 _NAME_SHARE = 0.5
-# Chance of a name without the surface at fault: a likelihood ratio of two groups passes 1000 against the true
-# one with that chance at most (Markov's inequality), where the model is right.
+# Largest probability that the name leaves out the surface at fault: if the model is right, the likelihood
+# ratio of another group to the true one exceeds 1 / 0.001 with at most this probability (Markov's
+# inequality).
 _EXCLUSION_RISK = 0.001
-_DIRECTION_WINDOW_S = 1.0  # over which the direction of the residual is judged
-# Share of travel that a command moves by rounding alone.
+_DIRECTION_WINDOW_S = 1.0  # the direction of the residual is judged over this time
+# Largest motion of a command, a share of travel, that may be rounding.
 _COMMAND_ROUNDING = 1e-6
-# Probability that nothing answers the commands above which nothing is said of any surface.
+# If the probability that nothing answers the commands is larger, there is no verdict on any surface.
 _NO_RESPONSE_LIMIT = 0.5
 
 
 def diagnose(samples: Samples, model: Model) -> LogRows:
-    """The diagnosis of each sample. Raises BadInput where the log's rate, columns or units are not the
-    model's."""
+    """The diagnosis of each sample. Raises BadInput where the log's rate, columns or units are not those of
+    the model, or where a credible alarm vanishes if the command of a group has the other sign."""
     check_log_fits_model(samples, model)
     rows = _diagnose_checked_log(samples, model)
     if rows.has_credible_alarm():
@@ -63,7 +67,7 @@ def reversed_command_error(flight: str, surface: str, allowed: str) -> BadInput:
 
 
 def _diagnose_checked_log(samples: Samples, model: Model) -> LogRows:
-    """The rows of a flight whose columns fit the model."""
+    """The rows of a flight whose columns fit the model. silent (n,): where nothing answers the commands."""
     bank = build_bank(model)
     known = trust.without_dead_rows(samples, model)
     P = bank_posterior(known, model, bank)
@@ -127,12 +131,12 @@ def _withdraw_by_engine(samples: Samples, model: Model, rows: LogRows) -> LogRow
     return replace(rows.without_estimate(named != rows.isolated_surfaces), isolated_surfaces=named)
 
 
-def _withdraw_contradicted(samples: Samples, model: Model, rows: LogRows, least: float) -> LogRows:
+def _withdraw_contradicted(samples: Samples, model: Model, rows: LogRows, threshold: float) -> LogRows:
     """Rows with the name `unknown` where the residual of the last second lies along another group.
 
     A faulty surface (stuck, biased or oscillating) changes the rates along the direction of its healthy
-    effect. A name is withdrawn if the direction of another group explains more of the residual, by at least
-    the log likelihood `least`. Not used in moving air, since gusts have directions too.
+    effect. A name is withdrawn if the direction of another group explains more of the residual, by more than
+    the log likelihood `threshold`. Not used in moving air, since gusts have directions too.
 
         gain_g = power / 2 sum over the last second of (r' m_g / |m_g|)^2
 
@@ -142,13 +146,13 @@ def _withdraw_contradicted(samples: Samples, model: Model, rows: LogRows, least:
     r = flight.e @ flight.W
     m = (np.array(model.response).sum(axis=1) @ flight.W).T
     norms = np.linalg.norm(m, axis=0)
-    p = (r @ (m / np.maximum(norms, MIN_DIVISOR))) ** 2
-    gain = 0.5 * model.settings.power * trailing_sums(p, _DIRECTION_WINDOW_S * model.rate_hz)[0]
+    square = (r @ (m / np.maximum(norms, MIN_DIVISOR))) ** 2
+    gain = 0.5 * model.settings.power * trailing_sums(square, _DIRECTION_WINDOW_S * model.rate_hz)[0]
     best = gain.max(axis=1)
     wrong = np.zeros(len(r), dtype=bool)
     for g, group in enumerate(model.groups):
         names_group = [not set(group).isdisjoint(name.split("+")) for name in rows.isolated_surfaces]
-        wrong |= np.array(names_group, dtype=bool) & (best - gain[:, g] > least)
+        wrong |= np.array(names_group, dtype=bool) & (best - gain[:, g] > threshold)
     names = np.where(wrong, UNKNOWN_SURFACE, rows.isolated_surfaces)
     return replace(rows.without_estimate(wrong), isolated_surfaces=names)
 
@@ -171,8 +175,12 @@ def rows_of_posterior(
     """The rows that follow from the probabilities P (n, H). mass: probability inside the bounds; that of the
     model's settings if None.
 
-    mu, mu_name: evidence for an alarm and for a name, natural logarithm of odds. If the model has none, the
-    probability p_fault (n,) of any fault decides both.
+                    threshold mu of the evidence       no threshold
+        alarmed     Page's sum >= mu, and not calm     p_fault >= alarm
+        nameable    the same with mu_name              as alarmed
+
+    mu, mu_name: evidence for an alarm and for a name, natural logarithm of odds; p_fault (n,): probability of
+    any fault; alarm: of the settings. Alarm and name stand until a calm row (`_latched`).
     """
     p_fault = P[:, bank.is_fault_hypothesis].sum(axis=1)
     calm = P[:, 0] + P[:, -1] > 0.5
@@ -202,8 +210,8 @@ def rows_of_posterior(
 
 
 def _effectiveness(model: Model, bank: HypothesisBank, P: Floats, mass: float) -> tuple[Floats, ...]:
-    """The median effectiveness of each group, and bounds with this probability between them, (n, G) each; 1,
-    and 0 and 1, where nothing answers the commands."""
+    """The median effectiveness of each group, and bounds with the probability `mass` between them, (n, G)
+    each. Where nothing answers the commands, the effectiveness is 1 and the bounds are 0 and 1."""
     p_silent = P[:, -1]
     P_live = P[:, :-1] / np.maximum(1.0 - p_silent, MIN_DIVISOR)[:, None]
     per_group = [_group_bounds(bank, P_live, g, model, mass) for g in range(len(model.groups))]
@@ -218,10 +226,10 @@ def _effectiveness(model: Model, bank: HypothesisBank, P: Floats, mass: float) -
 def _group_bounds(
     bank: HypothesisBank, P_live: Floats, g: int, model: Model, mass: float
 ) -> tuple[Floats, ...]:
-    """The median effectiveness of a group, and bounds with this probability between them, (n,) each.
+    """The median effectiveness of a group, and bounds with the probability `mass` between them, (n,) each.
 
     If surfaces move together, one of them may have lost everything and the others nothing: the bounds of a
-    group with a loss are then 0 and 1.
+    group of several surfaces with a loss are then 0 and 1.
     """
     levels, p = _group_levels(bank, P_live, g)
     if model.vehicle.other_laws:  # all levels are equally probable before the flight
@@ -231,7 +239,7 @@ def _group_bounds(
     if len(model.groups[g]) > 1:
         low = np.where(low < levels[-2:].mean(), 0.0, low)
         high = np.ones_like(high)
-    # the median, with half of the probability on either side: the least mean absolute error
+    # The median has the least mean absolute error. 1e-12: rounding of the sum must not skip a level.
     return levels[(np.cumsum(p, axis=1) >= 0.5 - 1e-12).argmax(axis=1)], low, high
 
 
@@ -251,8 +259,8 @@ def _group_levels(bank: HypothesisBank, P_live: Floats, g: int) -> tuple[Floats,
 
 
 def _credible_bounds(levels: Floats, p: Floats, mass: float) -> tuple[Floats, Floats]:
-    """Low and high (n,): the range of the fewest levels with this probability in sum, half a step wider on
-    both sides. levels (L,), p (n, L)."""
+    """Low and high (n,): the range of the most probable levels, as few as have the probability `mass` in sum,
+    half a step wider on both sides. levels (L,), p (n, L)."""
     order = np.argsort(-p, axis=1, kind="stable")
     ranked = np.take_along_axis(p, order, axis=1)
     chosen = np.cumsum(ranked, axis=1) - ranked < mass
@@ -264,12 +272,16 @@ def _credible_bounds(levels: Floats, p: Floats, mass: float) -> tuple[Floats, Fl
 
 
 def _surfaces_at_fault(model: Model, bank: HypothesisBank, P: Floats, faulty: Ints, nameable: Mask) -> Names:
-    """The named surfaces by row, those of the likely groups. A row without a name while the alarm stands is
-    `unknown`. A name stays while the fault is rather an unknown offset, until another has stood for
-    `rename_s`, and, with `one_group`, if another adds surfaces.
+    """The named surfaces of each row, (n,): those of the likely groups (`_likely_groups`). While the alarm
+    stands, a row without a name is `unknown`. The name of the row before stays
 
-    names, named (n,): by the probabilities of the row alone, and with those that stay; new, old: the first of
-    this row, and the second of the row before; n_same: rows before in turn with the same new name.
+        if an unknown offset is likelier than a fault of known surfaces; or, if it is not `unknown`,
+        if the new name has stood for less than `rename_s`,
+        if, with `one_group`, the new name has all its surfaces and more, or is `unknown`.
+
+    names (n,): by the probabilities of each row alone; named (n,): the result. new: name of this row by
+    `names`; old: name of the row before by `named`; n_same: number of rows directly before that have the same
+    new name.
     """
     p_fault = np.maximum(P[:, bank.is_fault_hypothesis].sum(axis=1), MIN_DIVISOR)
     likely = _likely_groups(model, bank, P, p_fault)
@@ -282,7 +294,7 @@ def _surfaces_at_fault(model: Model, bank: HypothesisBank, P: Floats, faulty: In
         new = names[k] or UNKNOWN_SURFACE
         old = named[k - 1] if k else ""
         n_same = n_same + 1 if k and new == (names[k - 1] or UNKNOWN_SURFACE) else 0
-        # an excluded surface stays excluded: Ville's inequality bounds the chance of a wrong exclusion
+        # An excluded surface stays excluded: Ville's inequality bounds the probability of a wrong exclusion.
         named_again = new == UNKNOWN_SURFACE or set(old.split("+")) <= set(new.split("+"))
         waits = n_same < n_hold or (model.settings.one_group and named_again)
         keeps = old and (offset[k] or (old != UNKNOWN_SURFACE and waits))
@@ -291,8 +303,13 @@ def _surfaces_at_fault(model: Model, bank: HypothesisBank, P: Floats, faulty: In
 
 
 def _likely_groups(model: Model, bank: HypothesisBank, P: Floats, p_fault: Floats) -> Mask:
-    """The groups, (n, G), with more than half of the fault's probability p_fault (n,). If only one group may
-    be at fault (`one_group`): all that are not excluded, and none where none is."""
+    """The groups (n, G) that the name of a row may have.
+
+    one_group false     the groups whose faults have more than half of the probability p_fault (n,)
+    one_group true      the groups whose loss is not excluded, i.e. more than _EXCLUSION_RISK times as
+    probable
+                        as the likeliest loss; none in a row that excludes no group
+    """
     faults = [bank.is_fault_of_group(g) for g in range(len(model.groups))]
     if not model.settings.one_group:
         p_groups = [P[:, of_group].sum(axis=1) / p_fault for of_group in faults]

@@ -6,6 +6,7 @@ a loss shows after the time T for which d^2 J T / 2 exceeds the prior odds again
 
     F       response of each group in standard deviations of the noise (n, G, 3), n samples, G groups
     J       information about one group, 1/s
+    d, T    loss of effectiveness, and time in which it shows, s
 """
 
 from itertools import combinations
@@ -25,8 +26,8 @@ from beaver_ftc_logs.runs import Runs, constant_stretches
 from beaver_ftc_logs.samples import Samples
 
 MAX_BRIEF_EVENT_S = 3.0  # a shorter alarm is brief
-DETECTION_HORIZONS_S = (5.0, 20.0, 60.0)  # by which the smallest loss is stated
-_ALIKE_COSINE = 0.9  # of two effects: above it they are not separable
+DETECTION_HORIZONS_S = (5.0, 20.0, 60.0)  # values of T for which the smallest loss is stated
+_ALIKE_COSINE = 0.9  # two effects with a larger cosine are not separable
 # Share of credible rows below which there is no verdict.
 MIN_CREDIBLE_SHARE = 0.1
 _ONE_GROUP_NOTE = (
@@ -76,9 +77,14 @@ def fault_events(rows: LogRows, surfaces: list[str]) -> list[Document]:
 
 
 def _join_runs(rows: LogRows, runs: Runs) -> Runs:
-    """The runs, in which an alarm joins the alarm just before it if it is brief, if both are alike, or if the
-    one before is brief and has no name. before: the last run that was joined, from its row `first` on; empty
-    at the begin."""
+    """The runs of rows, in which an alarm that follows another one directly joins it if
+
+        the alarm is brief, or
+        both have the same name and effectiveness, or
+        the other one is brief and its name is `unknown`.
+
+    before: the last run of those joined so far, which begins at row `first`; empty for the first run.
+    """
     joined: Runs = []
     for begin, end in runs:
         before = joined[-1] if joined else (begin, begin)
@@ -103,20 +109,20 @@ def _is_brief(rows: LogRows, begin: int, end: int) -> bool:
 def _fault_event_entry(rows: LogRows, begin: int, end: int, surfaces: list[str]) -> Document:
     """One event, with its most frequent name and the medians of the effectiveness."""
     names, counts = np.unique(rows.isolated_surfaces[begin:end].astype(str), return_counts=True)
-    main = str(names[counts.argmax()])
-    shown = surfaces if main in (UNKNOWN_SURFACE, ENGINE) else main.split("+")
+    most_frequent = str(names[counts.argmax()])
+    shown_surfaces = surfaces if most_frequent in (UNKNOWN_SURFACE, ENGINE) else most_frequent.split("+")
     columns = {"estimate": rows.effectiveness, "low": rows.effectiveness_low, "high": rows.effectiveness_high}
     medians = {key: np.median(values[begin:end], axis=0) for key, values in columns.items()}
     return {
         "from_s": float(rows.t_s[begin]),
         "to_s": float(rows.t_s[end - 1]),
         "brief": _is_brief(rows, begin, end),
-        "named": main,
+        "named": most_frequent,
         "probability": float(rows.fault_probability[begin:end].max()),
         "effectiveness": {
             name: {key: float(median[i]) for key, median in medians.items()}
             for i, name in enumerate(surfaces)
-            if name in shown
+            if name in shown_surfaces
         },
     }
 
@@ -127,7 +133,7 @@ def events_to_show(events: list[Document]) -> list[Document]:
 
 
 def as_text(verdict: Document) -> str:
-    """The verdict in lines for people."""
+    """The verdict as lines of text."""
     shown = events_to_show(verdict["events"])
     n_events = len(verdict["events"])
     summary = f"{len(shown)} event{'s' if len(shown) > 1 else ''}" if shown else _no_event_text(verdict)
@@ -143,7 +149,7 @@ def as_text(verdict: Document) -> str:
 
 
 def _no_event_text(verdict: Document) -> str:
-    """No event: because no fault shows, or because nothing can be said."""
+    """The words for a flight without events: no fault shows, or too few rows are credible for a verdict."""
     share = verdict["credible"]["share"]
     if share < MIN_CREDIBLE_SHARE:
         return "no verdict"
@@ -151,7 +157,7 @@ def _no_event_text(verdict: Document) -> str:
 
 
 def credibility_lines(verdict: Document) -> list[str]:
-    """Return lines on the parts of a flight without a statement, and the reasons."""
+    """Lines on the rows that are not credible, with the reasons; none if all rows are credible."""
     credible = verdict["credible"]
     if credible["share"] >= 1.0:
         return []
@@ -161,7 +167,7 @@ def credibility_lines(verdict: Document) -> list[str]:
 
 
 def duration_text(verdict: Document) -> str:
-    """How much flight was diagnosed, in words: a gap in the log is no flight."""
+    """Words for the duration of the diagnosed flight, without the gaps in the log."""
     if not (n_gaps := verdict["gaps"]):
         return f"{verdict['duration_s']:.0f} s"
     return f"{verdict['recorded_s']:.0f} s, {n_gaps} gap{'s' if n_gaps > 1 else ''} in the log left out"
@@ -178,7 +184,8 @@ def _event_text(event: Document) -> str:
 
 
 def isolability_document(samples: Samples, model: Model) -> Document:
-    """Which faults this flight can separate and which not, and the smallest loss that would show by when."""
+    """Which groups this flight can separate, and the smallest loss of each that would show within each of
+    DETECTION_HORIZONS_S."""
     bank = build_bank(model)
     flight = innovations(samples, model)
     F = flight.F[flight.is_known] @ flight.W * np.sqrt(model.settings.power)
@@ -198,7 +205,8 @@ def isolability_document(samples: Samples, model: Model) -> Document:
 
 
 def _group_entry(F: Floats, g: int, model: Model, bank: HypothesisBank, dt_s: float) -> Document:
-    """Information a second about one group's effectiveness, and the smallest loss seen within some times."""
+    """Information about one group's effectiveness, 1/s, and its smallest losses; both also by
+    `_own_information` (`..._of_its_motion`, `..._by_motion_alone`)."""
     odds = _alarm_odds(model, bank, g, dt_s)
     if not len(F):
         return {"information_per_s": 0.0, "smallest_loss": _smallest_losses(0.0, odds)}
@@ -274,7 +282,7 @@ def isolability_sentences(isolable: Document) -> list[str]:
 
 
 def _smallest_loss_text(losses: dict[str, float | None]) -> str:
-    """The smallest losses by horizon in words."""
+    """Words for the smallest loss of a group within each horizon."""
     texts = [f"{loss:.0%} within {horizon} s" for horizon, loss in losses.items() if loss is not None]
     if not texts:
         within = f"within {DETECTION_HORIZONS_S[-1]:g} s by the mean of this flight's commands"

@@ -1,6 +1,7 @@
 """Fit: from recorded flights to a model with the settings of the filter that diagnoses later flights.
 
-Letters as in `orders`; r is the variance of the noise.
+Letters as in `orders`; r is the variance of the noise. A *part left out* is a flight, or half of one, that a
+fit did not use (`folds`).
 """
 
 from itertools import groupby
@@ -83,8 +84,8 @@ def estimate_filter_settings(parts: Parts, model: Model) -> FilterSettings:
         labels show a fault          levels, changes_per_hour, repair_share            as above
         no label shows one           trim_walk, of parts left out                      min(limit, 1 / s)
 
-    s: overdispersion of the gains in parts left out, with these settings. limit: _POWER_UNLABELLED; if other
-    laws may fly, _POWER_OTHER_LAWS in still air and 1 in moving air.
+    s: overdispersion of the gains in parts left out, with the settings of the rows above. limit:
+    _POWER_UNLABELLED; if other laws may fly, _POWER_OTHER_LAWS in still air and 1 in moving air.
     """
     vehicle = model.vehicle
     moving = vehicle.moving_air
@@ -109,9 +110,10 @@ def _labelled_faults(parts: Parts, model: Model) -> Document:
 
         changes_per_hour = sqrt(usual (n + 1) / hours),      repair_share = (m + n0 / 2) / (n + n0)
 
-    n, m: changes of the labels, and those among them that restore health; n0: _N_PRIOR_CHANGES; hours: of all
-    flights. A flight may be tested less hard than these, so the rate is the geometric mean of theirs and the
-    usual one.
+    n, m: number of changes of the labels, and of those that restore health; n0: _N_PRIOR_CHANGES; hours:
+    usable time of all flights, h; usual: the default of `FilterSettings`, 1/h. Labelled flights are often
+    tests with many faults, and later flights may have fewer: so the rate is the geometric mean of theirs and
+    the usual one.
     """
     surfaces = list(model.vehicle.surfaces)
     levels: dict[str, list[float]] = {}
@@ -136,12 +138,12 @@ def _label_levels(parts: Parts, i: int) -> list[list[float]]:
     """The levels of the label of surface i in their order, for each flight: the labels NaN, 1, 1, 0.6, 0.6, 1
     have the levels 1, 0.6, 1. A label is NaN where none is known."""
     labels = [part.samples.labels[:, i][part.is_usable] for part in parts]
-    return [[round(level, 6) for level, _ in groupby(c[np.isfinite(c)].tolist())] for c in labels]
+    return [[round(level, 6) for level, _ in groupby(label[np.isfinite(label)].tolist())] for label in labels]
 
 
 def quick_error_share(parts: Parts, model: Model) -> float:
-    """Estimate the error of unusually quick responses, as a share of them, at most 1: the largest of the
-    flights left out; 1 if none of them has such responses enough.
+    """Error of unusually quick responses, as a share of them, between 0 and 1: the largest of the flights
+    left out; 1 if none of them has _MIN_QUICK_SAMPLES samples with such responses.
 
     In variances of the noise of the fit, the residual of a sample has the variance r (1 + share^2 power):
 
@@ -163,10 +165,12 @@ def quick_error_share(parts: Parts, model: Model) -> float:
 
 
 def _estimate_trim_walk(parts: Parts, model: Model) -> list[float]:
-    """Drift of the trim a sample, in residual sd, that parts left out show; the usual at least.
+    """Drift of the trim in a sample that parts left out show, in residual sd, for p, q and r; at least the
+    usual.
 
-    Means of n samples of a random walk, with steps of variance w, and of noise whose mean has the variance
-    c / n, differ from the next with the variance v. Two n tell w from c:
+    The residual is the sum of a random walk, with steps of variance w, and of noise whose mean over n samples
+    has the variance c / n. The difference between two successive means of n samples has the variance v. Two
+    values of n give w and c:
 
         v = 2 c / n + 2 n w / 3,      w = 3 (n2 v2 - n1 v1) / (2 (n2^2 - n1^2))
     """
@@ -174,7 +178,7 @@ def _estimate_trim_walk(parts: Parts, model: Model) -> list[float]:
     runs = [(run, np.diag(flight.R)) for flight in flights for run in flight.residual_runs()]
 
     def squared_steps(n: int) -> Floats:
-        """Squares of the steps from one mean of n samples to the next, in variances r, (.., 3)."""
+        """Squares of the differences between successive means of n samples, in variances r, (.., 3)."""
         means = [run[: len(run) // n * n].reshape(-1, n, 3).mean(axis=1) for run, _ in runs]
         steps = (np.diff(mean, axis=0) for mean in means)
         return np.vstack([d**2 / np.maximum(r, MIN_DIVISOR) for d, (_, r) in zip(steps, runs, strict=True)])

@@ -1,10 +1,10 @@
 """A recording on one time base: rates, surface commands, further signals and labels, sample by sample.
 
-The time base is the stamps of the roll rate. A column with other stamps is held: its value at t is the last
-one received up to t, never a later one; the age that this adds is stated. A log faster than the vehicle's
-`max_rate_hz` is averaged over the past interval first. A gap ends a stretch: there are no samples in it, so
-that a log has as many as its rows ask for, whatever its clock does. `time_base` has these rules, `loading`
-reads the files.
+The time base is the stamps of the roll rate. A column with other stamps is held: its value at time t is the
+last one received up to t, never a later one, and its mean age is stated. If a log is faster than the
+vehicle's `max_rate_hz`, each sample is the average over the past interval. A gap in the stamps ends a
+*stretch*. There are no samples in a gap, so a jump of the clock does not add any. `time_base` has these
+rules, `loading` reads the files.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -35,19 +35,21 @@ from beaver_ftc_logs.time_base import (
 )
 from beaver_ftc_logs.vehicle import QuantityColumn, Vehicle
 
-_MAX_NUMBER = 1e6  # a larger one in a log is damaged
+_MAX_NUMBER = 1e6  # a larger number in a log is damaged
 _MAX_RATE_RAD_S = 60.0  # larger rates are in another unit
-_MAX_RATE_SD_RAD_S = 3.0  # a larger standard deviation is remarked on
-# Least and largest dynamic pressure that scales a command, over that at the reference airspeed.
+_MAX_RATE_SD_RAD_S = 3.0  # a larger standard deviation of a rate causes a remark
+# Limits of the dynamic pressure that scales a command, over that at the reference airspeed.
 _QDYN_RATIOS = (0.1, 10.0)
-# Moving averages of the noise: gusts held within a sample add to the next, gyros' noise takes from it.
+# Moving averages of the noise. A gust that is held within a sample adds to the next one (positive
+# coefficients), the noise of a gyro subtracts from it (negative ones).
 NOISE_MA_CANDIDATES = (
     (1.0,), (1.0, 0.5),
     *((1.0, -2.0 * c, c**2) for c in (0.2, 0.4, 0.5, 0.6, 0.7, 0.8, 0.85, 0.9)),
 )  # fmt: skip
 UNFITTED_MA = NOISE_MA_CANDIDATES[:2]
-# Noise that is tried where no fitted flight had it: gusts of both kinds, and gyros from a laboratory's to a
-# toy's, so close together that none is 1.8 times off.
+# Noise that is tried even if no fitted flight had it: the moving averages of gusts, and the noise of gyros
+# from that of a laboratory to that of a toy, in steps of a factor of 3.2, so that none is more than 1.8 times
+# off.
 UNFITTED_GYROS_RAD_S = tuple(np.geomspace(1e-5, 1e-2, 7).tolist())
 
 
@@ -102,8 +104,8 @@ class Samples:
 def resample(log: RecordedFlight, vehicle: Vehicle) -> Samples:
     """Put a log on one time base. Raises BadInput with the reason where the log cannot be used.
 
-    used: the columns of rates, commands and signals; held: the values of each at the samples, and their mean
-    age, s, None of a column that has the stamps of the rates.
+    used: the columns of rates, commands and signals. held: the values of each at the samples, and their mean
+    age, s, or None for a column that has the stamps of the rates.
     """
     rate_names = vehicle.rate_columns
     used = list(dict.fromkeys([*rate_names, *vehicle.command_columns, *vehicle.signal_columns]))
@@ -114,7 +116,7 @@ def resample(log: RecordedFlight, vehicle: Vehicle) -> Samples:
     t_s, stretch, step_s = sample_times(log.name, stamps, vehicle.max_sample_rate_hz)
     held = {name: sample_column(log.columns[name], t_s, step_s) for name in used}
     values = {name: column for name, (column, _) in held.items()}
-    for name in rate_names:  # a rate from before a gap is none; a command holds until the next
+    for name in rate_names:  # a rate from before a gap is unknown; a command holds until the next one
         is_stale = is_held_value_stale(log.columns[name], t_s, step_s)
         values[name] = np.where(is_stale, np.nan, values[name])
 
@@ -127,9 +129,9 @@ def resample(log: RecordedFlight, vehicle: Vehicle) -> Samples:
         column = log.columns.get(quantity.column) if quantity else None
         return sample_column(column, t_s, step_s)[0] if column else np.full(len(t_s), np.nan)
 
-    height = vehicle.energy
-    altitude_m = sampled(height.altitude if height else None)
-    airspeed_mps = sampled(height.airspeed if height else None)
+    energy_columns = vehicle.energy
+    altitude_m = sampled(energy_columns.altitude if energy_columns else None)
+    airspeed_mps = sampled(energy_columns.airspeed if energy_columns else None)
     samples = Samples(
         name=log.name,
         t_s=t_s,
@@ -171,9 +173,14 @@ def _is_rate_clipped(rates: Sequence[Column], t_s: Floats) -> Mask:
 
 
 def scale_by_airspeed(samples: Samples, V0: float, powers: Sequence[float]) -> Samples:
-    """The flight with what the airspeed V does of its own: commands times (V / V0)^n, n the power of each
-    surface, (S,), and, as further signals, rates and signals times V / V0 - 1, since damping and
-    stability grow with it. V = V0 m/s where the airspeed is unknown; (V / V0)^2 is limited to 0.1 to 10."""
+    """The flight scaled with the airspeed V, m/s:
+
+        u <- u (V / V0)^n,    signals <- [signals, (rates, signals) (V / V0 - 1)]
+
+    u: commands; n (S,): power of each surface (powers). The products are further signals, since damping and
+    stability grow with the airspeed. V = V0 where the airspeed is unknown. (V / V0)^2 is limited to
+    _QDYN_RATIOS.
+    """
     ratio = np.clip(np.nan_to_num(samples.airspeed / V0, nan=1.0) ** 2, *_QDYN_RATIOS)[:, None]
     products = np.column_stack([samples.rates, samples.signals]) * (np.sqrt(ratio) - 1.0)
     joined = np.column_stack([samples.signals, products])
@@ -181,30 +188,32 @@ def scale_by_airspeed(samples: Samples, V0: float, powers: Sequence[float]) -> S
 
 
 def whiten_samples(samples: Samples, C: Sequence[float], fit_weight: float = 1.0) -> Samples:
-    """The flight with rates, commands and signals filtered by C(1) / C(z), C the moving average of the noise
-    (1, c1, ...): what is left of an autoregressive model is then white [Ljung1999, section 4.2]. Begins again
-    after a gap, and where a number is missing."""
+    """The flight with rates, commands and signals x filtered by C(1) / C(z), so that an autoregressive model
+    leaves a white residual [Ljung1999, section 4.2]. C: moving average of the noise (1, c1, ...).
+
+    The filter restarts from rest at the first row x0 of each run [begin, end) of known rows without a gap.
+    """
     from scipy.signal import lfilter
 
     x = np.hstack([samples.rates, samples.commands, samples.signals])
     known = np.isfinite(x).all(axis=1)
     x[~known] = np.nan
-    for a, b in runs_between((np.diff(known) != 0) | (np.diff(samples.stretch_number) != 0)):
-        x0 = x[a]
-        x[a:b] = x0 + lfilter([sum(C)], C, x[a:b] - x0, axis=0)
-    rates, commands, others = np.split(x, [3, 3 + samples.commands.shape[1]], axis=1)
+    for begin, end in runs_between((np.diff(known) != 0) | (np.diff(samples.stretch_number) != 0)):
+        x0 = x[begin]
+        x[begin:end] = x0 + lfilter([sum(C)], C, x[begin:end] - x0, axis=0)
+    rates, commands, white_signals = np.split(x, [3, 3 + samples.commands.shape[1]], axis=1)
     return replace(
         samples,
         rates=rates,
         commands=commands,
-        signals=others,
+        signals=white_signals,
         noise_ma_coefficients=tuple(C),
         fit_weight=fit_weight,
     )
 
 
 def _defects(log: RecordedFlight, used: list[str], rate_names: list[str]) -> Iterator[str]:
-    """Yield a line for each mistake in the columns that are used."""
+    """Yield a line for each defect of the columns that are used."""
     for name in used:
         yield from signals.column_defect_texts(name, log.columns[name], is_rate=name in rate_names)
         if name in rate_names and (sd := float(np.nanstd(log.columns[name].values))) > _MAX_RATE_SD_RAD_S:
@@ -214,7 +223,7 @@ def _defects(log: RecordedFlight, used: list[str], rate_names: list[str]) -> Ite
 
 def _check_attitude(log: RecordedFlight, vehicle: Vehicle) -> frozenset[str]:
     """The columns of rates that the angles confirm. Raises BadInput where rates, angles and gravity
-    contradict one another: what is in another unit."""
+    contradict one another, with the column that seems to be in another unit."""
     columns = log.columns
     rates = {name: columns[name] for name in vehicle.rate_columns}
     angles = named_angles(columns, vehicle)
@@ -230,20 +239,21 @@ def _check_attitude(log: RecordedFlight, vehicle: Vehicle) -> frozenset[str]:
 
 
 def _possible_rates(log: RecordedFlight, vehicle: Vehicle) -> Columns:
-    """The other columns of a log that may have taken the place of a rate: signals, flow and commands."""
+    """The other columns of a log that may have been exchanged with a rate: signals, flow and commands."""
     flow = [quantity.column for quantity in vehicle.flow.values()]
     names = dict.fromkeys([*vehicle.signal_columns, *flow, *vehicle.command_columns])
     return {name: log.columns[name] for name in names if name in log.columns}
 
 
 def named_angles(columns: Columns, vehicle: Vehicle) -> list[NamedColumn | None]:
-    """The columns of roll, pitch and yaw; None of an angle that is not named or not logged."""
-    angles = [getattr(vehicle.attitude, angle, None) for angle in ("roll", "pitch", "yaw")]
-    return [(of.column, columns[of.column]) if of and of.column in columns else None for of in angles]
+    """The columns of roll, pitch and yaw with their names; None for an angle that is not named or not logged."""
+    keys = [getattr(vehicle.attitude, angle, None) for angle in ("roll", "pitch", "yaw")]
+    return [(key.column, columns[key.column]) if key and key.column in columns else None for key in keys]
 
 
 def convert_to_si(log: RecordedFlight, vehicle: Vehicle) -> RecordedFlight:
-    """A log with the columns that a vehicle names in SI."""
+    """A log in which the columns that the vehicle file names are in SI. If two keys name a column, the first
+    in the file decides: reversed, so that it is the last to enter the table."""
     columns = dict(log.columns)
     quantities = {quantity.column: quantity for *_, quantity in reversed(vehicle.located_quantities())}
     for name, quantity in quantities.items():
@@ -253,7 +263,7 @@ def convert_to_si(log: RecordedFlight, vehicle: Vehicle) -> RecordedFlight:
 
 
 def mixer_matrix(vehicle: Vehicle) -> Floats:
-    """Return the share of each command in each surface, (surfaces, commands)."""
+    """The share of each command in each surface, (S, C)."""
     mixer_rows = [
         [shares.get(name, 0.0) for name in vehicle.command_columns] for shares in vehicle.surfaces.values()
     ]
@@ -261,8 +271,8 @@ def mixer_matrix(vehicle: Vehicle) -> Floats:
 
 
 def _mixed_commands(flight: str, logged_commands: Floats, vehicle: Vehicle) -> Floats:
-    """Return the deflection that the commands (n, C) ask of each surface, (n, S). Raises BadInput where a
-    weight makes one larger than a logged number may be."""
+    """The command of each surface, the weighted sum of the logged commands (n, C), (n, S). Raises BadInput if
+    a weight makes one larger than _MAX_NUMBER."""
     with np.errstate(over="ignore", invalid="ignore"):
         commands: Floats = np.einsum("nc,sc->ns", logged_commands, mixer_matrix(vehicle))
     too_large = (np.isinf(commands) | (np.abs(commands) > _MAX_NUMBER)).any(axis=0)
@@ -274,8 +284,8 @@ def _mixed_commands(flight: str, logged_commands: Floats, vehicle: Vehicle) -> F
 
 
 def _refuse_columns(log: RecordedFlight, used: list[str], rate_names: list[str]) -> None:
-    """Raise BadInput where a column is missing, or holds nothing; rates that no vehicle turns at are in
-    another unit."""
+    """Raise BadInput where a column is missing, or has no number or a damaged one, or where a rate is so
+    large that it is in another unit."""
     log.check_has(used)
     for name in used:
         values = log.columns[name].values

@@ -2,7 +2,7 @@
 
 The file names columns, and has no code. Unknown keys and every other mistake are refused with one line each:
 `FILE:LINE: key: what is wrong, what is allowed`. The docstrings of the sections have a line for each key,
-which error messages and the reference quote.
+which becomes its description.
 """
 
 import re

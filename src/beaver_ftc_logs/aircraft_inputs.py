@@ -1,4 +1,4 @@
-"""A log as inputs of the diagnosis of an aircraft: what of it the diagnosis can step through."""
+"""A log as inputs of the diagnosis of an aircraft, and the stretches that the diagnosis can step through."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -18,11 +18,11 @@ from beaver_ftc_logs.samples import Samples, convert_to_si, named_angles, resamp
 from beaver_ftc_logs.time_base import sample_column
 from beaver_ftc_logs.vehicle import Vehicle
 
-_MAX_HZ = 1000.0  # of a log
-_MIN_HZ = 20.0  # a slower frame is too long for the aircraft's model
-_STEP_JITTER = 0.1  # of a step: the samples are not evenly spaced beyond it
-_MIN_SAMPLES = 50  # of a stretch
-_DENSITIES_KG_M3 = (0.2, 1.6)  # of air, at any height: others show another unit
+_MAX_HZ = 1000.0  # largest sample rate of a log
+_MIN_HZ = 20.0  # least sample rate: a longer frame is too long for the aircraft's model
+_STEP_JITTER = 0.1  # if a step differs from the usual one by a larger share, samples are not evenly spaced
+_MIN_SAMPLES = 50  # least number of samples in a stretch
+_DENSITIES_KG_M3 = (0.2, 1.6)  # range of the density of air at any height: a value outside shows another unit
 _STOP_RATIO = 1.1  # a command that exceeds its stop by more is in another unit
 _ATTITUDE_ANGLE_NAMES = ("roll", "pitch", "yaw")
 # The aircraft whose flights are diagnosed, and the errors declared for it: arguments of `Diagnosis`.
@@ -30,9 +30,12 @@ DiagnosedAircraft = tuple[Aircraft, Document]
 
 
 class InputArrays(NamedTuple):
-    """What the diagnosis reads at each of n samples: measured rates p, q, r (n, 3), rad/s; signals, of FLOW
-    and of the aircraft's design model (n, ...); commands (n, S), rad; attitude angles (n, 3), rad, 0 where no
-    turbulence is declared."""
+    """The inputs of the diagnosis at each of n samples.
+
+    rates (n, 3): measured p, q, r, rad/s. signals (n, ...): those of FLOW, then those of the aircraft's
+    design model. commands (n, S), rad. attitude (n, 3): roll, pitch, yaw, rad; 0 if no turbulence is
+    declared.
+    """
 
     rates: Floats
     signals: Floats
@@ -44,8 +47,9 @@ class InputArrays(NamedTuple):
 class LogInputs:
     """A log as inputs of the diagnosis of an aircraft.
 
-    held_age_s: mean age of the values of each column that is held. full_deflection_rad (S,): what a command
-    of 1 is in the log."""
+    held_age_s: mean age of the values of each column that is held. full_deflection_rad (S,): deflection of
+    each surface for the command 1 in the log.
+    """
 
     samples: Samples
     aircraft: Aircraft
@@ -73,19 +77,21 @@ class LogInputs:
         return replace(self, input_arrays=self.input_arrays._replace(commands=commands))
 
     def stretches(self) -> Iterator[list[Floats]]:
-        """The arrays of each stretch, each after a reset of the diagnosis."""
+        """The arrays of each stretch. Before each stretch, the diagnosis is reset."""
         for begin, end in self.gap_free_stretches:
             self.diagnosis.reset()
             yield [np.ascontiguousarray(array[begin:end]) for array in self.input_arrays]
 
     def raises_any_alarm(self) -> bool:
-        """Whether an alarm is raised in any stretch; nothing after it is replayed."""
+        """Whether an alarm is raised in any stretch. The replay ends with the first alarm."""
         steps = (zip(*arrays, strict=True) for arrays in self.stretches())
         return any(self.diagnosis.step(*sample).detected for stretch in steps for sample in stretch)
 
 
 def read_inputs(log: RecordedFlight, vehicle: Vehicle, given: DiagnosedAircraft) -> LogInputs:
-    """Read what the diagnosis is given. Raises BadInput for what the log lacks."""
+    """The inputs of the diagnosis from a log. given: the aircraft and the declared errors. Raises BadInput if
+    the vehicle file or the log lacks an input, if the size of one shows another unit, or if no stretch is
+    long enough."""
     aircraft, declared_errors = given
     flow_columns = _flow_columns(log, vehicle, aircraft)
     changes = {"max_rate_hz": _MAX_HZ, "reference_airspeed_mps": None}
@@ -96,7 +102,7 @@ def read_inputs(log: RecordedFlight, vehicle: Vehicle, given: DiagnosedAircraft)
     ages = dict(samples.held_age_s)
 
     def sampled_at(name: str) -> Floats:
-        """A column at the samples; the age of one that is held is noted."""
+        """A column at the samples; if it is held, its mean age is added to `ages`."""
         values, age_s = sample_column(columns[name], samples.t_s, samples.dt_s)
         if age_s is not None:
             ages[name] = age_s
@@ -153,7 +159,8 @@ def _attitude_columns(flight: str, columns: dict[str, Column], vehicle: Vehicle)
 
 
 def _log_rate_hz(samples: Samples) -> float:
-    """Sample rate of the first samples, so that a log that was cut short has the same; four digits."""
+    """Sample rate, Hz, to four digits, of the first _MIN_SAMPLES samples, so that a log that was cut short
+    has the same rate."""
     steps_s = np.diff(samples.t_s[:_MIN_SAMPLES])
     even_s = steps_s[np.abs(steps_s / samples.dt_s - 1.0) < _STEP_JITTER]
     rate_hz = float(f"{1.0 / (even_s.mean() if len(even_s) else samples.dt_s):.4g}")

@@ -5,13 +5,13 @@ offset of the rates; nothing answers the commands. Their prior probabilities fol
 the levels in labelled flights, and the rate of changes.
 
 Trim, common gain and each group's own gain may differ from the model. They start from it and are bounded, so
-that the filter does not adapt to a fault that is there from the start. The trim differs as another loading or
-rigging would change it (a shift of each group's command), and it drifts. Gains return to those of the model
-in time, since the airspeed varies about that of the fitted flights. If the standard error of a group's gain
-is larger than a step between levels, the excess is added to the variance of its own gain.
+that the filter does not adapt to a fault that exists from the start. The trim differs as another loading or
+rigging would change it, which is like a shift of each group's command, and it drifts. Gains return to those
+of the model in time, since the airspeed varies about that of the fitted flights. If the standard error of a
+group's gain is larger than a step between levels, the excess is added to the variance of its own gain.
 
-Letters as in `filtering`: g a group of n, B (n, L, 3) its response and R (3, 3) the covariance of the noise,
-rad/s and (rad/s)2 a sample.
+Letters as in `filtering`: n groups, B (n, L, 3) the responses and R (3, 3) the covariance of the noise, in
+rad/s and (rad/s)2 for one sample. Index g is a group.
 """
 
 from collections.abc import Iterator
@@ -25,7 +25,7 @@ from beaver_ftc_logs.recording import MIN_DIVISOR, Floats
 from beaver_ftc_logs.trust import known_effects
 
 HEALTHY, GROUP_LOSS, PAIR_LOSS, UNKNOWN_OFFSET, NO_RESPONSE = range(5)
-# Shares of the changes of hypothesis that lead to a loss of two groups, to an unknown offset, to no response.
+# Shares of all changes of hypothesis that lead to a loss of two groups, to an unknown offset, to no response.
 _PAIR_SHARE = 0.02
 _OFFSET_SHARE = 0.05
 _SILENT_SHARE = 0.02
@@ -33,10 +33,12 @@ _PAIR_LEVELS = (0.25, 0.5, 0.75)  # a coarse grid, for the time of `diagnose`
 # Probabilities before the flight.
 _PRIOR_HEALTHY = 0.7
 _PRIOR_NO_RESPONSE = 0.2
-_MAX_SQUARE = 30.0  # of a whitened flight: the predictor needs a fraction of a second to adapt to a fault
+# Largest squared residual that counts if the noise has an AR predictor: the predictor needs a fraction of a
+# second to adapt to a fault.
+_MAX_SQUARE = 30.0
 
 
-# Effectiveness of each group, kind, transition share, variance of the rate offset.
+# A hypothesis: effectiveness of each group (G,), kind, transition share, variance of the rate offset (3,).
 HypothesisRow = tuple[Floats, int, float, Floats]
 
 
@@ -94,19 +96,20 @@ def build_bank(model: Model) -> HypothesisBank:
 
 
 def _single_hypotheses(model: Model, groups: list[int], share: float) -> Iterator[HypothesisRow]:
-    """One group at each of its levels, without and with an offset of the rates. share: of all changes of
-    hypothesis; each surface has the same, and each fault kind of it."""
+    """One group at each of its levels, for each fault kind of the vehicle (`_offset_variances`). share: share
+    of all changes of hypothesis that lead to one of these; each surface has an equal part of it, and each
+    fault kind an equal part of this."""
     n_surfaces = sum(len(model.groups[g]) for g in groups)
     for g in groups:
-        levels, level_shares = _levels_and_shares(model, g)
+        levels, shares = _levels_and_shares(model, g)
         per_kind = share * len(model.groups[g]) / n_surfaces / len(model.vehicle.faults)
         for offset in _offset_variances(model, g):
-            for level, of_level in zip(levels, level_shares, strict=True):
-                yield _effect_row(len(model.groups), {g: level}), GROUP_LOSS, per_kind * of_level, offset
+            for level, level_share in zip(levels, shares, strict=True):
+                yield _effect_row(len(model.groups), {g: level}), GROUP_LOSS, per_kind * level_share, offset
 
 
 def _effect_row(n: int, levels: dict[int, float]) -> Floats:
-    """Effectiveness of each of n groups, (n,): these levels, else 1."""
+    """Effectiveness of each of n groups, (n,): the level of a group in `levels`, otherwise 1."""
     row = np.ones(n)
     for g, level in levels.items():
         row[g] = level
@@ -114,7 +117,9 @@ def _effect_row(n: int, levels: dict[int, float]) -> Floats:
 
 
 def _levels_and_shares(model: Model, g: int) -> tuple[Floats, Floats]:
-    """Levels of effectiveness below 1, and the share of each among the group's faults."""
+    """Levels of effectiveness below 1, and the share of each among the group's faults: a grid with the step
+    level_step, and the labelled levels. The labelled levels share `level_share` equally, the others the rest;
+    if none or all are labelled, all have equal shares."""
     settings = model.settings
     labelled = settings.levels.get(model.group_names[g], [])
     grid = np.arange(0.0, 1.0 - 0.5 * settings.level_step, settings.level_step)
@@ -128,13 +133,17 @@ def _levels_and_shares(model: Model, g: int) -> tuple[Floats, Floats]:
 
 
 def _offset_variances(model: Model, g: int) -> list[Floats]:
-    """Variances of the rates' offset that may come with a loss, (3,) each: none, or that of the group stuck
-    anywhere within its travel, along the axes it moves most: diag(R) (jam_sd ratio)^2, ratio the group's
-    effect on each axis over its largest, both in sd of the noise."""
+    """For each fault kind of the vehicle the variance (3,) of the rates' offset that comes with a loss: 0 for
+    a plain loss, and for a group that is stuck anywhere within its travel
+
+        diag(R) (jam_sd ratio)^2
+
+    ratio (3,): effect of the group on each axis over its largest effect, both in sd of the noise, 0.3 to 1.
+    """
     B = np.array(model.response)
     R = np.array(model.noise)
-    total = np.abs(B[g]).sum(axis=0) / np.sqrt(np.diag(R))
-    ratio = np.clip(total / max(total.max(), MIN_DIVISOR), 0.3, 1.0)
+    effect = np.abs(B[g]).sum(axis=0) / np.sqrt(np.diag(R))
+    ratio = np.clip(effect / max(effect.max(), MIN_DIVISOR), 0.3, 1.0)
     stuck = np.diag(R) * (model.settings.jam_sd * ratio) ** 2
     return [stuck if kind == "stuck" else np.zeros(3) for kind in model.vehicle.faults]
 
@@ -147,8 +156,8 @@ def _pair_hypotheses(n: int, groups: list[int]) -> list[HypothesisRow]:
 
 
 def _prior_probabilities(kind: np.ndarray, share: Floats) -> Floats:
-    """Probability of each hypothesis before the flight, (H,): mostly healthy, any fault allowed. share (H,):
-    of all changes of hypothesis."""
+    """Probability of each hypothesis before the flight, (H,): _PRIOR_HEALTHY, _PRIOR_NO_RESPONSE, and the
+    remainder for the faults in proportion to share (H,), their shares of all changes of hypothesis."""
     fault = (kind != HEALTHY) & (kind != NO_RESPONSE)
     p = share * (1.0 - _PRIOR_HEALTHY - _PRIOR_NO_RESPONSE) / share[fault].sum()
     p[0] = _PRIOR_HEALTHY

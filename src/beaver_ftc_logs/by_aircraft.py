@@ -1,9 +1,9 @@
-"""Diagnose a recorded flight with the design model of its aircraft: the diagnosis of the control loop, on the
-measurements of the log.
+"""Diagnose a recorded flight with the design model of its aircraft: the diagnosis of the control loop runs on
+the measurements of the log.
 
-If the aircraft is known, no model is identified. A scenario declares the errors. As long as they hold, the
-log has the guarantees of the loop: no alarm in a healthy flight, no true fault excluded. There is no verdict
-outside the aircraft's envelope, after a gap, and where a number is missing.
+No model is identified. A scenario declares the errors. As long as they hold, the diagnosis has the guarantees
+of the loop: no alarm in a healthy flight, no true fault excluded. There is no verdict outside the aircraft's
+envelope, where a number is missing, or where samples are not evenly spaced.
 """
 
 from collections.abc import Iterator
@@ -25,12 +25,14 @@ from beaver_ftc_logs.recording import Floats, Mask, Reasons, RecordedFlight
 from beaver_ftc_logs.stepped import Replayed, error_sections, named_since, replay_samples, rows_of_replay
 from beaver_ftc_logs.vehicle import Vehicle
 
-_START_WINDOW_S = 1.0  # of a stretch: an alarm in it that no fault explains is none of a fault
+# If no fault explains an alarm in this first part of a stretch, the model or the declared errors are wrong.
+_START_WINDOW_S = 1.0
 
 
 def load_diagnosed(aircraft_name: str, scenario: str | None = None) -> DiagnosedAircraft:
     """The aircraft with this name, and the errors that a scenario (file or name) declares; without a scenario
-    the default ones. Raises BadInput if the scenario has another aircraft."""
+    the default ones. Raises BadInput if there is no such aircraft, or if the scenario has another aircraft,
+    no scheme, or the setting `sensor_monitor: always`."""
     from beaver_ftc.aircraft import UnknownAircraft
     from beaver_ftc.scenario import find_aircraft, load_scenario
 
@@ -58,8 +60,9 @@ def load_diagnosed(aircraft_name: str, scenario: str | None = None) -> Diagnosed
 def diagnose_aircraft(
     log: RecordedFlight, vehicle: Vehicle, given: DiagnosedAircraft
 ) -> tuple[LogInputs, LogRows, Document]:
-    """The inputs, the rows and the document of verdict.json. Raises BadInput for what the log lacks, and if
-    it has no alarm once the sign of a command is changed, or two commands are exchanged."""
+    """The inputs, the rows and the document of verdict.json. given: the aircraft and the declared errors.
+    Raises BadInput for an input that the log lacks, and if an alarm vanishes once the sign of a command is
+    changed or two commands are exchanged."""
     inputs = read_inputs(log, vehicle, given)
     replay = _replay(inputs)
     rows = _credible_rows(inputs, replay)
@@ -71,11 +74,12 @@ def diagnose_aircraft(
 
 
 def _replay(inputs: LogInputs) -> Replayed:
-    """The verdicts of all samples. Rows between stretches have no alarm and bounds 0 and 1. Raises BadInput
-    if a command has the other sign in every part of a stretch."""
+    """The verdicts of all samples. Rows between stretches have no alarm and bounds 0 and 1. The gains and
+    their upper bounds are the least of all stretches. Raises BadInput if a command has the opposite
+    effect."""
     replays = [replay_samples(inputs.diagnosis, arrays, inputs.rate_hz) for arrays in inputs.stretches()]
     upper = np.min([replay.command_gain_bounds for replay in replays], axis=0)
-    if not inputs.diagnosis.declared.air.moves:  # a law that answers gusts opposes what they turn
+    if not inputs.diagnosis.declared.air.moves:  # a law that reacts to gusts commands against their effect
         _refuse_reversed(inputs, upper)
     n = len(inputs.samples.t_s)
     verdicts = [Verdict()] * n
@@ -90,8 +94,8 @@ def _replay(inputs: LogInputs) -> Replayed:
 
 
 def _refuse_reversed(inputs: LogInputs, upper: Floats) -> None:
-    """Raise BadInput for a surface whose command has surely the opposite effect. upper (S,): upper bounds of
-    the gains, 1 in the aircraft's model."""
+    """Raise BadInput for a surface whose command certainly has the opposite effect. upper (S,): upper bounds
+    of the gains, 1 in the aircraft's model."""
     name = inputs.aircraft.name
     for surface, bound in zip(inputs.aircraft.surfaces, upper, strict=True):
         if bound < MAX_REVERSED_GAIN:
@@ -107,8 +111,9 @@ def _credible_rows(inputs: LogInputs, replay: Replayed) -> LogRows:
 
 
 def _corrected_inputs(inputs: LogInputs, replay: Replayed) -> Iterator[tuple[LogInputs, BadInput]]:
-    """The inputs with one mistake in the commands mended, and the error that says so. With a fault a changed
-    sign leaves a larger innovation, since no surface has a negative effectiveness."""
+    """The inputs with one mistake in the commands mended, and the error for this mistake: the sign of a
+    command with a negative gain, or two commands whose exchange clears every alarm. In a flight with a fault,
+    a changed sign makes the innovation larger, since no surface has a negative effectiveness."""
     flight = inputs.samples.name
     aircraft = inputs.aircraft
     for s in np.flatnonzero(replay.command_gains < 0.0):
@@ -126,7 +131,8 @@ def _corrected_inputs(inputs: LogInputs, replay: Replayed) -> Iterator[tuple[Log
 
 
 def _doubtful_rows(inputs: LogInputs, replay: Replayed, rows: LogRows) -> Reasons:
-    """For each reason the rows (n,) for which there is no verdict."""
+    """Reason -> rows (n,) for which there is no verdict. If the alarm of a stretch was raised in such a row,
+    all later rows of the stretch are without a verdict too."""
     aircraft = inputs.aircraft
     missing = inputs.has_missing_value
     low_mps, high_mps = aircraft.envelope.airspeed_mps
@@ -146,21 +152,22 @@ def _doubtful_rows(inputs: LogInputs, replay: Replayed, rows: LogRows) -> Reason
         f"no fault explains it from the first second on: {cause}": _unexplained_rows(inputs, replay),
     }
     has_reason = np.logical_or.reduce(list(reasons.values()))
-    after = np.zeros_like(outside)
+    later_rows = np.zeros_like(outside)
     for begin, end in inputs.gap_free_stretches:
         alarms = begin + np.flatnonzero(rows.faulty[begin:end])
         if alarms.size and has_reason[alarms[0]]:
-            after[alarms[0] : end] = True
-    return reasons | {"the alarm was raised where nothing can be said": after & ~has_reason}
+            later_rows[alarms[0] : end] = True
+    return reasons | {"the alarm was raised where nothing can be said": later_rows & ~has_reason}
 
 
 def _unexplained_rows(inputs: LogInputs, replay: Replayed) -> Mask:
-    """The rows (n,) of each stretch whose first second has a fault of no type, from its alarm on."""
+    """Whether no fault type explains the innovation (n,): the rows from the alarm on in each stretch whose
+    verdict is `unanticipated` within _START_WINDOW_S of its begin."""
     t_s = inputs.samples.t_s
     unexplained = np.zeros(len(t_s), dtype=bool)
     for begin, end in inputs.gap_free_stretches:
-        started = int(np.searchsorted(t_s[begin:end], t_s[begin] + _START_WINDOW_S))
-        first_verdicts = replay.verdicts[begin : begin + started]
+        n_first = int(np.searchsorted(t_s[begin:end], t_s[begin] + _START_WINDOW_S))
+        first_verdicts = replay.verdicts[begin : begin + n_first]
         if any(verdict.isolated == "unanticipated" for verdict in first_verdicts):
             detected = [verdict.detected for verdict in first_verdicts]
             unexplained[begin + detected.index(True) : end] = True

@@ -1,8 +1,8 @@
 """The certificate of a recorded flight that an aircraft's own model diagnosed.
 
-A log from elsewhere has no columns of residuals and bounds. So the diagnosis writes a log of its own beside
-the certificate, with the columns of a simulated flight: for the first stretch with an alarm, from its first
-sample on.
+A certificate refers to columns of residuals and bounds, which a recorded log does not have. So a log with the
+columns of a simulated flight is written with the certificate. It has the first stretch with an alarm, or the
+first stretch of all if there is no alarm.
 """
 
 from collections.abc import Iterator
@@ -18,8 +18,8 @@ from beaver_ftc_logs.log_rows import LogRows
 
 
 def write_certificate_and_log(inputs: LogInputs, rows: LogRows, folder: Path) -> None:
-    """Write certificate.json, and log.parquet that proves it, into a folder. Raises BadInput where another
-    scheme than ours diagnosed."""
+    """Write certificate.json, and the log.parquet to which it refers, into a folder. Raises BadInput if the
+    scheme of the diagnosis is not ours."""
     alarmed = (stretch for stretch in inputs.gap_free_stretches if rows.faulty[stretch[0] : stretch[1]].any())
     begin, end = next(alarmed, inputs.gap_free_stretches[0])
     arrays = [np.ascontiguousarray(array[begin:end]) for array in inputs.input_arrays]
@@ -34,6 +34,6 @@ def write_certificate_and_log(inputs: LogInputs, rows: LogRows, folder: Path) ->
     diagnosis.reset()
     memory, scenario = diagnosis.inside()
     scenario = scenario.model_copy(update={"name": inputs.samples.name})
-    found = by_frames.proved(scenario, memory, step())
-    document = certified.with_digest(found.document | {"begins_s": float(inputs.samples.t_s[begin])})
-    replace(found, document=document).write(folder)
+    proof = by_frames.proved(scenario, memory, step())
+    document = certified.with_digest(proof.document | {"begins_s": float(inputs.samples.t_s[begin])})
+    replace(proof, document=document).write(folder)

@@ -16,7 +16,7 @@ from beaver_ftc_logs.vehicle import Vehicle
 
 
 def check_log(path: Path, vehicle: Vehicle | None, reader: str | None) -> Document:
-    """The document of a log: a description in `lines`, and `vehicle`, the proposal if none is given.
+    """The document on a log: remarks in `lines`, and the proposed vehicle file in `vehicle` if none is given.
 
     usable: whether the log can be identified or diagnosed with the vehicle. Raises BadInput if the log cannot
     be read at all.
@@ -61,7 +61,8 @@ def _check_recording(log: RecordedFlight, vehicle: Vehicle) -> tuple[bool, list[
 
 
 def _compare_angles(log: RecordedFlight, vehicle: Vehicle) -> list[str]:
-    """Lines on the agreement of rates and angles, both in SI, or the reason why they cannot be compared."""
+    """A line for each pair of rate and angle, both in SI, whether they agree; or one line with the reason why
+    they cannot be compared."""
     columns = convert_to_si(log, vehicle).columns
     angles = named_angles(columns, vehicle)
     if angles[0] is None:

@@ -1,4 +1,4 @@
-"""The logs that one correction of a column makes of a log: exchanged columns, another sign or unit."""
+"""A log with one correction of its columns: two columns exchanged, or a column with another sign or unit."""
 
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
@@ -13,12 +13,12 @@ from beaver_ftc_logs.vehicle import Vehicle
 
 
 class CorrectedLog(NamedTuple):
-    """A log with one mistake mended.
+    """A log after one correction.
 
-    correction_text: the mend; samples: the log by it; log_jacobian: log of the factor by which the mend
-    multiplies the rates. The likelihood of a log is that of the rates as they were logged: where a mend
-    multiplies these by a, the density is a times as large. scaled_signal: the signal that the mend scales;
-    empty of another mend.
+    correction_text: words for the correction. samples: the corrected log. log_jacobian: log |a| if a rate was
+    multiplied by a. Likelihoods are compared for the rates as they were logged, and the density of these is
+    |a| times that of the corrected rates. scaled_signal: the signal that was multiplied; empty for another
+    correction.
     """
 
     correction_text: str
@@ -28,9 +28,9 @@ class CorrectedLog(NamedTuple):
 
 
 def corrected_logs(samples: Samples, vehicle: Vehicle, unknown: Collection[str]) -> Iterator[CorrectedLog]:
-    """The log with two commands or two rates exchanged, or one rate or signal of another sign or unit. A rate
-    that the attitude confirms stays as it is. unknown: surfaces whose effect the model does not know: that
-    shows nothing of their commands."""
+    """The log with two commands or two rates exchanged, or one rate or signal with another sign or unit. A
+    rate that the attitude confirms is not changed. unknown: surfaces whose effect the model does not know;
+    the log shows nothing about their commands, so these are not exchanged."""
     surfaces = list(vehicle.surfaces)
     doubtful = [name for name in vehicle.rate_columns if name not in samples.confirmed_rates]
     for i, j in combinations([s for s, name in enumerate(surfaces) if name not in unknown], 2):
@@ -44,20 +44,24 @@ def corrected_logs(samples: Samples, vehicle: Vehicle, unknown: Collection[str])
         yield CorrectedLog(f"{first} and {second} exchanged", exchanged)
     for name in [*doubtful, *vehicle.signal_columns]:
         for factor in UNIT_FACTORS:
-            mended = CorrectedLog(
+            corrected = CorrectedLog(
                 f"`scale: {factor:.4g}` on {name}", altered_log(samples, vehicle, {}, {name: factor})
             )
             if name in doubtful:
-                yield mended._replace(log_jacobian=float(np.log(abs(factor))))
+                yield corrected._replace(log_jacobian=float(np.log(abs(factor))))
             else:
-                yield mended._replace(scaled_signal=name)
+                yield corrected._replace(scaled_signal=name)
 
 
 def altered_log(
     samples: Samples, vehicle: Vehicle, sources: Mapping[str, str], factors: Mapping[str, float]
 ) -> Samples:
-    """The log with columns of rates and signals taken from others (sources), and then multiplied (factors).
-    The products of the m columns with the airspeed, which follow them where it counts, change alike."""
+    """The log in which a column of rates or signals has the values of another one (sources: name -> other
+    name) and is then multiplied (factors: name -> factor). Columns that are not named stay.
+
+    With a reference airspeed, the m columns are followed by their m products with the airspeed
+    (`samples.scale_by_airspeed`), which change alike.
+    """
     names = vehicle.rate_columns + vehicle.signal_columns
     order = [names.index(sources.get(name, name)) for name in names]
     factor = [factors.get(name, 1.0) for name in names]

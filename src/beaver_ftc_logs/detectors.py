@@ -30,7 +30,7 @@ from beaver_ftc_logs.trust import without_dead_rows
 
 LEAST_SQUARES_MEMORY_S = 20.0
 MIN_FROZEN_OUTPUT_S = 6.0
-_MIN_LOSS_SD = 5.0  # least loss that is an alarm, in standard deviations of its estimate
+_MIN_LOSS_SD = 5.0  # least loss that raises an alarm, in standard deviations of its estimate
 _SD_OF_90_PERCENT = 1.645  # half the width of an interval that holds 90 % of the normal law
 _PRIOR_INFORMATION = 4.0  # 1 / (1/2)^2: a gain of standard deviation 1/2
 OUR_DETECTOR = "bank-of-filters"
@@ -41,9 +41,10 @@ def _least_squares(samples: Samples, model: Model, fades: bool) -> LogRows:
 
         theta = (M0 + sum X' X)^-1 sum X' r,   a_g = 1 + theta[3 + g],   P = (M0 + sum X' X)^-1
 
-    The sums are over the memory of the detector. theta (3 + G,): trim in standard deviations of the noise,
-    and a_g - 1. X (n, 3, 3 + G): their whitened effects on the rates. r (n, 3): of a healthy vehicle.
-    M0: prior information, with a standard deviation of 1/2 for a_g. P: covariance of theta.
+    The sums are over the memory of the detector (`_memory_sums`), b = sum X' r. theta (3 + G,): trim in
+    standard deviations of the noise, and a_g - 1. X (n, 3, 3 + G): their whitened effects on the rates. r (n,
+    3): residual of a healthy vehicle. M0: prior information, with a standard deviation of 1/2 for a_g. P:
+    covariance of theta.
     """
     flight = innovations(samples, model)
     sd = [*np.sqrt(np.diag(flight.R)), *np.ones(len(model.groups))]
@@ -67,9 +68,15 @@ def _memory_sums(x: Floats, dt_s: float, fades: bool) -> Floats:
 
 
 def _rows_of_estimate(samples: Samples, model: Model, a: Floats, sd: Floats) -> LogRows:
-    """Rows of an estimate a of the effectiveness with standard deviation sd, (n, G) each. If the model has
-    labelled levels, the nearest level is the estimate, and one below 1 is a fault. Otherwise an estimate
-    below 1 by more than _MIN_LOSS_SD standard deviations is a fault. low, high: the interval of 90 %."""
+    """Rows of an estimate a of the effectiveness with standard deviation sd, (n, G) each.
+
+        levels in the settings    estimate                    a fault is
+        yes                       level nearest to a          an estimate below 1
+        no                        a, limited to 0 and 1       a + _MIN_LOSS_SD sd < 1
+
+    low, high: the 90 % interval of a, extended to the estimate. A group without labelled levels has those of
+    the bank.
+    """
     bank = build_bank(model)
     low, high = (np.clip(a + sign * _SD_OF_90_PERCENT * sd, 0.0, 1.0) for sign in (-1.0, 1.0))
     nearest = np.clip(a, 0.0, 1.0)
@@ -87,7 +94,8 @@ def _rows_of_estimate(samples: Samples, model: Model, a: Floats, sd: Floats) -> 
 
 
 def diagnose_by_freeze_rule(log: RecordedFlight, samples: Samples, model: Model) -> LogRows | None:
-    """The freeze rule on the logged servo outputs; None where the vehicle file names none."""
+    """Rows by the freeze rule on the logged servo outputs; None if the vehicle file names none, or none is
+    logged."""
     surfaces = list(model.vehicle.surfaces)
     named = {name: output.column for name, output in model.vehicle.outputs.items()}
     outputs = {name: log.columns[column] for name, column in named.items() if column in log.columns}
@@ -107,13 +115,14 @@ _FLIGHT_DETECTORS: dict[str, Callable[[Samples, Model], LogRows]] = {
 
 
 def detector_names() -> list[str]:
-    """The names of all detectors for recorded flights; the compiled ones of the loop need a simulation."""
+    """The names of all detectors for recorded flights. The compiled detectors of the loop are not among them:
+    they need a simulation."""
     of_the_loop = [name for name in registered(DETECTORS) if not is_compiled(DETECTORS, name)]
     return [OUR_DETECTOR, *_FLIGHT_DETECTORS, *of_the_loop]
 
 
 def check_detector_name(name: str) -> None:
-    """Raise BadInput for a detector that recorded flights do not know."""
+    """Raise BadInput for a name that is no detector for recorded flights."""
     known = detector_names()
     if name not in known:
         raise BadInput(f"--detector {name}: is not known{suggestion(name, known)}")

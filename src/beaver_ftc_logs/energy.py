@@ -1,9 +1,9 @@
 """Distinguish an engine failure from a surface fault: both change trim and motion.
 
-Without power the energy height altitude + V^2 / 2g falls at the rate at which drag takes energy; lift takes
-none, whatever the surfaces do. If the energy height, since the evidence for an alarm began, has fallen as
-fast as in the parts of healthy flight with the engine idling, no surface is named. The name is `unknown`, and
-`engine` if the fall goes on.
+Without power, the energy height, altitude + V^2 / 2g, falls at the rate at which drag takes energy. Lift
+takes no energy, whatever the surfaces do. If the energy height has fallen as fast as with the engine idling
+since the evidence for an alarm began, no surface is named. The name is then `unknown`, and `engine` if the
+fall goes on.
 """
 
 import numpy as np
@@ -16,15 +16,17 @@ ENGINE = "engine"
 UNKNOWN_SURFACE = "unknown"
 # Share of healthy flight in which the energy height falls as fast as without power.
 UNPOWERED_SHARE = 0.15
-_WINDOW_S = 5.0  # over which the rate of the energy height is taken
-_NAMING_DELAY_S = 3.0
+_WINDOW_S = 5.0  # the rate of the energy height is a mean over this time
+_NAMING_DELAY_S = 3.0  # an alarm that is younger is not named `engine`
 
 
 def energy_climb_mps(t: Floats, h: Floats, V: Floats, stretch: np.ndarray) -> Floats:
-    """Rate of the energy height E = h + V^2 / 2g over the last seconds, m/s, (n,); nan before they have
-    passed. Time t, s, altitude h, m, airspeed V, m/s, and number of the gap-free stretch, (n,) each.
+    """Rate of the energy height E = h + V^2 / 2g, m/s, (n,):
 
-    (E - E[i]) / (t - t[i]),    i: the last row at least _WINDOW_S before, in the same stretch
+        (E - E[i]) / (t - t[i]),    i: the last row that is at least _WINDOW_S earlier
+
+    NaN if row i is in another gap-free stretch or missing. Time t, s, altitude h, m, airspeed V, m/s, and
+    number of the stretch, (n,) each.
     """
     E = h + V**2 / (2.0 * GRAVITY_MPS2)
     i = np.searchsorted(t, t - _WINDOW_S, side="right") - 1
@@ -41,10 +43,16 @@ def withdraw_surfaces(
     t (n,): time, s. climb (n,): rate of the energy height, m/s; unpowered: that without power. start (n,):
     time at which the evidence for the alarm of each row began to increase, s.
 
-    An engine may have failed while the window of the energy height begins before that time, and from the
-    row in which the energy height falls as without power until it rises. It is `engine` once the energy
-    height has fallen so in more than half of the rows of an alarm that has lasted for _NAMING_DELAY_S. A row
-    uses nothing later than its time.
+    name        rows of an alarm
+    unknown     while the evidence is younger than _WINDOW_S, since the rate is then partly from before it;
+    and from
+                a row in which the energy height falls as without power until one in which it rises
+    engine      of the latter, those after the alarm has lasted for _NAMING_DELAY_S and the energy height has
+    fallen
+                so in more than half of its rows
+
+    A name depends on no later row. falling, rising: from the begin of the evidence on; the others: of the
+    alarm.
     """
     named = names.copy()
     for begin, end in true_runs(faulty == 1):
@@ -56,7 +64,7 @@ def withdraw_surfaces(
         has_lasted = t[begin:end] - t[begin] >= _NAMING_DELAY_S
         has_failed = np.logical_or.accumulate(may_have_failed & (fallen_share > 0.5) & has_lasted)
         is_young = t[begin:end] - t[first] < _WINDOW_S
-        of_alarm = named[begin:end]  # a view
+        of_alarm = named[begin:end]  # a view: it changes `named`
         of_alarm[may_have_failed | is_young] = UNKNOWN_SURFACE
         of_alarm[may_have_failed & has_failed] = ENGINE
     return named

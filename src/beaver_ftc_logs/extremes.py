@@ -7,15 +7,16 @@ Poisson process, and their excess over u has the generalised Pareto distribution
     rate of x and more, an hour = rate(u) (1 + xi z / sigma)^(-1 / xi),      z = x - u
 
     u, z            level of the tail, and excess of a peak over it, natural logarithms of odds
-    xi, sigma, p    shape and scale of the Pareto distribution, and their posterior probability, of each point
-                    of a grid (g,)
+    xi, sigma, p    at each point of a grid (g,): shape and scale of the Pareto distribution, and their
+    posterior
+                    probability
     rate            false alarms an hour
     flights         peaks and healthy hours of each held-out flight
 
 The posterior of shape, scale and rate is computed on a grid. The threshold for a requested rate is the x at
 which the posterior mean of the rate is that rate. If the model is right, a log likelihood ratio has an
 exponential tail, xi = 0 [Wald1945], so the prior of the shape is centred there. If flights differ by more
-than chance, they count for fewer.
+than chance, their number of peaks is divided by this ratio (`dispersion`).
 """
 
 from collections.abc import Sequence
@@ -30,19 +31,20 @@ from beaver_ftc_logs.runs import true_runs
 # Standard deviation of the prior of the shape, whose mean is 0.
 _SHAPE_SD = 0.2
 _SHAPE_GRID = np.linspace(-0.5, 0.5, 41)
-# Grid of the scale over the mean excess.
+# Grid of the scale, as a multiple of the mean excess.
 _SCALE_RATIOS = np.geomspace(0.2, 5.0, 61)
-_RATE_QUANTILES = (np.arange(40) + 0.5) / 40.0  # probabilities
-_MIN_PEAKS = 10
-# Peaks over the level: _PEAKS_PER_ROOT times the root of the number of all peaks, at least _MIN_PEAKS.
+# probabilities at which the posterior of the rate is evaluated
+_RATE_QUANTILES = (np.arange(40) + 0.5) / 40.0
+_MIN_PEAKS = 10  # least number of peaks in the tail
+# Number of peaks over the level: this times the root of the number of all peaks, at least _MIN_PEAKS.
 _PEAKS_PER_ROOT = 2.0
 _INTERVAL = (0.05, 0.95)  # probabilities of the bounds of the rate
-# Chance that the declared rate itself raises more alarms in the held-out flights than are permitted.
+# Probability that the requested rate itself raises more alarms in the held-out flights than are permitted.
 _MORE_ALARMS_CHANCE = 0.05
-# -ln 0.05: with no alarm in so many of the hours asked for one, the rate is shown without a tail.
+# -ln 0.05: no alarm in this many times the requested hours for one alarm shows the rate without a tail.
 RULED_OUT_COUNT = 3.0
 _MAX_EXCESS = 1e4  # end of the search, natural logarithm of odds
-# Of a sum of probabilities: a quantile between two rates must not hang on its last digits.
+# Tolerance of a sum of probabilities: its rounding must not decide which of two rates is a quantile.
 _PROBABILITY_ROUNDING = 1e-9
 
 # Peaks (k,) of the alarm statistic in one held-out flight, and its healthy hours.
@@ -104,11 +106,15 @@ def false_alarm_rate(tail: PeakTail, threshold: float) -> dict[str, float]:
 
 
 def threshold_for_rate(tail: PeakTail, rate: float) -> float:
-    """The threshold at which this rate of false alarms is expected, but not below any peak by which the
-    held-out flights raise more alarms than the rate does by chance; the level of the tail if that is higher.
+    """The threshold for a requested rate of false alarms, 1/h, natural logarithm of odds: the largest of
 
-    If a few flights are far from the others, no Pareto tail fits them: it expects fewer alarms than there
-    were.
+        the level of the tail,
+        the threshold at which the posterior mean of the rate is the requested one,
+        the highest peak that is not among the n highest.
+
+    n: number of alarms in the held-out flights that the requested rate exceeds with a probability of at most
+    _MORE_ALARMS_CHANCE. If a few flights are far from the others, no Pareto tail fits them, and the tail
+    alone would expect fewer alarms than there were.
     """
     from scipy.stats import poisson
 
@@ -120,34 +126,36 @@ def threshold_for_rate(tail: PeakTail, rate: float) -> float:
 
 
 def _excess_for_rate(tail: PeakTail, rate: float) -> float:
-    """Excess over the level of the tail at which the posterior mean of the rate is this; 0 if the rate at the
-    level is lower. A tail that is still more frequent beyond _MAX_EXCESS has the end of the search."""
+    """Excess z over the level of the tail at which the posterior mean of the rate is the requested one; 0 if
+    the rate at the level is lower, and the end of the search if it is still higher there (about
+    _MAX_EXCESS)."""
     from scipy.optimize import brentq
 
     xi, sigma, p = _pareto_posterior(tail)
     mean = float(_rate_quantiles(tail).mean())
 
-    def over(z: float) -> float:
-        """By how much the mean rate at an excess z is over the requested one, 1/h."""
+    def excess_rate(z: float) -> float:
+        """Posterior mean of the rate at an excess z less the requested rate, 1/h."""
         return mean * float(_exceedance(z, xi, sigma) @ p) - rate
 
-    if over(0.0) <= 0.0:
+    if excess_rate(0.0) <= 0.0:
         return 0.0
     hi = 1.0
-    while over(hi) > 0.0 and hi < _MAX_EXCESS:
+    while excess_rate(hi) > 0.0 and hi < _MAX_EXCESS:
         hi *= 2.0
-    return float(brentq(over, 0.0, hi)) if over(hi) <= 0.0 else hi
+    return float(brentq(excess_rate, 0.0, hi)) if excess_rate(hi) <= 0.0 else hi
 
 
 def lorden_threshold(rate_hz: float, rate: float) -> float:
-    """The threshold at which the rate of false alarms is at most this, if the model is right, whatever the
-    tail: Page's sum of a log likelihood ratio passes h on average at most once in exp(h) samples
-    [Lorden1971]. rate_hz: samples a second."""
+    """The threshold h at which the rate of false alarms, 1/h, is at most the given one for any tail, if the
+    model is right: Page's sum of a log likelihood ratio exceeds h on average at most once in exp(h) samples
+    [Lorden1971]. So h = log(3600 rate_hz / rate), at least 0. rate_hz: sample rate."""
     return float(np.log(max(3600.0 * rate_hz / rate, 1.0)))
 
 
 def _rate_quantiles(tail: PeakTail) -> Floats:
-    """Quantiles of the posterior of the number of peaks over the level in an hour, at even probabilities."""
+    """Quantiles of the posterior of the rate of peaks over the level, 1/h, at _RATE_QUANTILES: a gamma
+    distribution with shape (number of peaks) / dispersion + 1/2."""
     from scipy.stats import gamma
 
     shape = len(tail.excess) / tail.dispersion + 0.5
@@ -155,7 +163,8 @@ def _rate_quantiles(tail: PeakTail) -> Floats:
 
 
 def _pareto_posterior(tail: PeakTail) -> tuple[Floats, Floats, Floats]:
-    """xi, sigma and p of each point of the grid."""
+    """xi, sigma and p at each point of the grid: the likelihood of the excess, to the power 1 / dispersion,
+    times the normal prior of the shape."""
     from scipy.stats import genpareto
 
     z = np.array(tail.excess)

@@ -1,7 +1,7 @@
 """Fit models with a part left out in turn, and predict that part.
 
-Every figure of merit comes from such parts: the two halves of a single flight in turn, or each of several
-flights in turn. Letters as in `orders`; a fold has the model that was fitted without `held_out`.
+Every figure of merit comes from parts left out: the two halves of a single flight in turn, or each of several
+flights in turn. Letters as in `orders`. A *fold* is a part left out with the model of the others.
 """
 
 from collections.abc import Iterator
@@ -16,12 +16,12 @@ from beaver_ftc_logs.orders import fit_of, group_gain_sd, one_step_innovations, 
 from beaver_ftc_logs.recording import MIN_DIVISOR
 from beaver_ftc_logs.regression import FitPart, Parts
 
-_MAX_SPLITS = 12  # for the time of `identify`
+_MAX_SPLITS = 12  # largest number of refits, to limit the time of `identify`
 
 
 class Fold(NamedTuple):
-    """A part that is left out (`held_out`), its name, the parts that are fitted, and their model, with the
-    standard errors of its gains."""
+    """A part left out (`held_out`), its name, the other parts (`fitted`) and their model. Of the ranges of
+    the model (`model.fitted`), only the standard errors of the gains and the tied shares are set."""
 
     model: Model
     held_out: FitPart
@@ -34,7 +34,7 @@ class Fold(NamedTuple):
 
 
 def held_out_folds(parts: Parts, model: Model, most: int | None = _MAX_SPLITS) -> Iterator[Fold]:
-    """Yield the folds. Of more than `most` flights, every `most`-th is left out at once."""
+    """Yield the folds. most: largest number of refits, as in `validation_folds`."""
     tied = tied_shares(parts, model).tolist()
     for fitted, held_out, name in validation_folds(parts, most):
         gain_sd = group_gain_sd(fit_of(fitted, model), model).tolist()
@@ -44,7 +44,8 @@ def held_out_folds(parts: Parts, model: Model, most: int | None = _MAX_SPLITS) -
 
 def validation_folds(parts: Parts, most: int | None = None) -> list[tuple[list[FitPart], FitPart, str]]:
     """The fitted flights, the held-out one and its name, for each fold: the halves of one flight, or each of
-    several flights. Of more than `most` flights, every `most`-th is left out at once."""
+    several flights. If there are more than `most` flights, every `most`-th flight is left out of the same
+    refit, so that there are `most` refits."""
     if len(parts) == 1:
         first, second = parts[0].halves
         return [([first], second, "second half"), ([second], first, "first half")]
@@ -57,13 +58,14 @@ def validation_folds(parts: Parts, most: int | None = None) -> list[tuple[list[F
 
 
 def fold_qualities(parts: Parts, model: Model) -> list[Document]:
-    """Compute the explained variance of parts left out, one entry a fold."""
+    """The name and the `prediction_quality` of each part left out."""
     folds = held_out_folds(parts, model, None)
     return [{"left_out": fold.name, **prediction_quality(fold)} for fold in folds]
 
 
 def prediction_quality(fold: Fold) -> Document:
-    """Share of the rates' variance that one-step prediction explains, and the residual, an axis."""
+    """For each axis the share of the rates' variance that one-step prediction explains, 1 - var(e) / var(y),
+    and the standard deviation of the residual e, rad/s; y: the rates."""
     flight = one_step_innovations(fold.model, fold.held_out)
     y = fold.held_out.samples.rates[flight.rows]
     e = flight.e

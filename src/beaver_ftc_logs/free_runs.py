@@ -1,4 +1,9 @@
-"""Servo lag and delay of the vehicle: the output error of free runs from the recorded rates."""
+"""Servo lag and delay of the vehicle, fitted to free runs from the recorded rates.
+
+A *free run* starts at a recorded rate and then predicts all rates of a window from the commands alone. The
+*output error* is the difference between these and the recorded rates. W: number of windows; n: number of
+samples in a window; G: number of groups of surfaces.
+"""
 
 import numpy as np
 
@@ -7,19 +12,20 @@ from beaver_ftc_logs import regression
 from beaver_ftc_logs.recording import Floats
 from beaver_ftc_logs.regression import Groups, Parts
 
-_WINDOW_S = 2.0  # of a free run
-_MIN_WINDOWS = 20  # with fewer nothing is fitted
-_MAX_WINDOWS = 400  # of more, so many are spread over the flights
-_MAX_DELAY_S = 0.6  # of the search, as the limits of the lag
+_WINDOW_S = 2.0  # length of a free run
+_MIN_WINDOWS = 20  # with fewer windows, lag and delay are not fitted
+_MAX_WINDOWS = 400  # if there are more windows, about this many, spread over the flights, are used
+_MAX_DELAY_S = 0.6  # limit of the search, as are the next two
 _MIN_SERVO_LAG_S = 0.005
 _MAX_SERVO_LAG_S = 1.0
 
 
 def fit_output_error(parts: Parts, groups: Groups) -> Document:
     """Fit on every other window, test on the rest. Returns servo lag and delay in s, their standard errors,
-    and the share of the rates' variance explained over free-running windows not fitted, an axis.
+    and the share of the rates' variance that is explained in windows not fitted, for each axis.
 
-    th: parameters, as in `_simulate`; P: inverse of their information.
+    th: parameters, as in `_simulate`; P = (J' J)^-1, with the Jacobian J of the weighted errors; the standard
+    errors are sqrt(diag(P) mean of the squared errors).
     """
     from scipy.optimize import least_squares
 
@@ -30,7 +36,7 @@ def fit_output_error(parts: Parts, groups: Groups) -> Document:
     fitted = slice(0, None, 2)
     held_out = slice(1, None, 2)
     sd = y.std(axis=(0, 1))
-    # lag, delay, A, B and c
+    # The initial values of lag, delay, A, B and c.
     guess = np.array([0.1, dt_s, *(0.7 * np.eye(3)).ravel(), *np.full(3 * len(groups), 0.01), *np.zeros(3)])
     free = np.full(len(guess) - 2, np.inf)
     lower = [_MIN_SERVO_LAG_S, 0.0, *-free]
@@ -57,12 +63,16 @@ def fit_output_error(parts: Parts, groups: Groups) -> Document:
 
 
 def _cut_windows(parts: Parts, groups: Groups, n: int, past: int) -> tuple[Floats, Floats]:
-    """Commands u (W, past + n, G) with their past, scaled by labels, and rates y (W, n, 3), of W windows."""
+    """Commands u (W, past + n, G), from `past` samples before each window on, times the labelled
+    effectiveness; and rates y (W, n, 3). Only windows of usable samples without a gap are used.
+
+    cut (.., past + n, 4 + G): three rates, the number of the stretch, and the commands.
+    """
     windows = []
     for part in parts:
         samples = part.samples
-        v = regression.group_commands(samples, groups, labelled=True)
-        rows = np.column_stack([samples.rates, samples.stretch_number, v])[:-1]
+        commands = regression.group_commands(samples, groups, labelled=True)
+        rows = np.column_stack([samples.rates, samples.stretch_number, commands])[:-1]
         rows[~part.is_usable[:-1]] = np.nan
         begin = np.arange(0, len(rows) - past - n + 1, n)
         cut = rows[begin[:, None] + np.arange(past + n)]
@@ -73,18 +83,19 @@ def _cut_windows(parts: Parts, groups: Groups, n: int, past: int) -> tuple[Float
 
 
 def _simulate(th: Floats, u: Floats, y: Floats, dt_s: float) -> Floats:
-    """Free runs X (W, m, 3) of all windows at once, rad/s, from the first of the rates y (W, m, 3):
+    """Free runs X (W, n, 3) of all windows at once, rad/s, from the first of the rates y (W, n, 3):
 
         x[k+1] = A x[k] + B' s[k] + c,    s[k+1] = a s[k] + (1 - a) v[k],    a = exp(-dt / lag)
 
-    s (W, n): positions of the servos; v (W, n): commands u (W, past + m, n) a delay before. th: lag and
-    delay, both s, A (3, 3), B (n, 3), c (3,).
+    s (W, G): positions of the servos; v (W, G): the commands u (W, past + n, G) a delay before, interpolated
+    between two samples, whole + f samples before. The servos follow the commands from the past on; the rates
+    run from the window on. th: lag and delay, both in s, A (3, 3), B (G, 3), c (3,), one after the other.
     """
     (lag_s, delay_s), A, B, c = np.split(th, [2, 11, len(th) - 3])
     A = A.reshape(3, 3)
     B = B.reshape(-1, 3)
-    m = y.shape[1]
-    past = u.shape[1] - m
+    n = y.shape[1]
+    past = u.shape[1] - n
     whole, f = divmod(delay_s / dt_s, 1.0)
     a = np.exp(-dt_s / lag_s)
     x = y[:, 0].copy()

@@ -3,9 +3,9 @@
 Letters as in `orders`, and
 
     e, F            residual (n, 3) and responses (n, 3, G, 3), in standard deviations of the noise, without
-                    means: after `_standardized`
-    g, S            error of the groups' gains (G,), and their covariance that the filter leaves free (G, G)
-    known           which groups have an effect that is known (G,)
+                    means, from `_standardized`. The last axis of F is the axis of the response
+    g, S            errors of the groups' gains (G,), and covariance of the gains in the filter's prior (G, G)
+    known           whether the effect of each group is known (G,)
 """
 
 import numpy as np
@@ -19,26 +19,25 @@ from beaver_ftc_logs.orders import RANK_TOLERANCE, centred, parts_of_noise
 from beaver_ftc_logs.recording import Floats
 from beaver_ftc_logs.regression import FitPart, Parts
 
-# Gains differ by flight rather than within it: chosen on seeds 11 and 12, in light turbulence.
+# Length of the windows in which the gains are estimated: chosen on seeds 11 and 12, in light turbulence.
 _GAIN_WINDOW_S = 10.0
-# Factors on the variance of the noise, of gyros and of gusts, in moving air under another law, for the gains
-# too. Chosen on seeds 71, 73 and 101 to 106: 3 of 240 healthy flights alarmed, and 6 of 150 without the
-# factors.
+# Further factors on the variance of the noise of gyros and of gusts, in moving air under another law. Chosen
+# on seeds 71, 73 and 101 to 106: 3 of 240 healthy flights alarmed, and 6 of 150 without the factors.
 _GYRO_FACTOR = 1.7
 _GUST_FACTOR = 2.5
-# Largest noise factor of a window of ten seconds. If there are few flights, one of them can be far from all
-# others (1,550 in seed 205, otherwise 5).
+# Largest noise factor of a window. If there are few flights, one of them can be far from all others (a factor
+# of 1,550 in seed 205, otherwise 5).
 _MAX_INFLATION = 200.0
 
 
 def gain_overdispersion(parts: Parts, model: Model) -> float:
     """Ratio of the squared errors of the gains of parts left out to those that the filter expects.
 
-    In a part, least squares of the residual e = F (g - 1) + noise gives the gains g of the groups; trims are
-    removed. If the noise were white and all flights alike, the sum of the squares of g - 1, each in the
-    covariance (F' F)^-1 + S, would on average equal the number of gains. Differences between flights and the
-    colour of the noise make it larger. By this ratio, a sample has less information about an effectiveness
-    [McCullagh1989, section 4.5]. One further part with the ratio 1 is counted.
+    In a part, least squares of the residual e = F g + noise gives the errors g of the gains (`_gain_errors`).
+    If the noise were white and all flights alike, the square of g in the covariance (F' F)^-1 + S would on
+    average equal the number of gains. Differences between flights and the colour of the noise make it larger.
+    The information of a sample about an effectiveness is smaller by this ratio [McCullagh1989, section 4.5].
+    One further part with the ratio 1 is counted.
     """
     errors = [(float(len(model.groups)), len(model.groups))]
     for fold in held_out_folds(parts, model):
@@ -48,9 +47,10 @@ def gain_overdispersion(parts: Parts, model: Model) -> float:
 
 
 def widen_noise(parts: Parts, model: Model) -> Model:
-    """The model with an inflated noise of each colour. The factor is the mean ratio of the squared errors of
-    the gains in windows of ten seconds left out to the expected ones, with a gain for each axis of a
-    response. Flights with quiet gyros show the errors of the model itself."""
+    """The model whose noise models have a variance inflation (`wider`), at least 1: the mean over all windows
+    of _GAIN_WINDOW_S in parts left out of the squared errors of the gains over the expected ones, with a gain
+    for each axis of a response; under other laws, times _GYRO_FACTOR or _GUST_FACTOR. In flights with quiet
+    gyros, the errors of the model itself decide."""
     windows: dict[tuple[float, ...], list[float]] = {}
     for fold in held_out_folds(parts, model):
         loudness = _loudness(fold, fold.fitted if len(parts) > 1 else parts)
@@ -64,16 +64,17 @@ def widen_noise(parts: Parts, model: Model) -> Model:
         if windows.get(ma):
             wider = max(float(np.mean(windows[ma])), 1.0)
             if model.vehicle.other_laws:
-                # a gyro's noise takes from the next sample what it added to one
+                # The noise of a gyro subtracts from the next sample what it added to one: its ma[1] is
+                # negative.
                 wider *= _GYRO_FACTOR if len(ma) > 1 and ma[1] < 0.0 else _GUST_FACTOR
         colours.append(noise.model_copy(update={"wider": wider}))
     return model.model_copy(update={"colours": colours})
 
 
 def _loudness(fold: Fold, others: Parts) -> float:
-    """Ratio of the variance that the filter finds in a flight left out to that of the loudest other flight of
-    the same noise; 1 if it is not louder, or if the law is the same. The filter widens its noise by this
-    ratio itself (`recent_scale`), so it is not counted again."""
+    """Ratio of the variance of the residual in a flight left out to that in the loudest other flight of the
+    same noise; 1 if it is not louder, or if no other laws fly. The filter widens its noise by this ratio
+    itself (`recent_scale`), so `_gain_errors` divides F and e by its root."""
     model = fold.model
     ma = fold.held_out.samples.noise_ma_coefficients
     if not model.vehicle.other_laws:
@@ -89,11 +90,14 @@ def _loudness(fold: Fold, others: Parts) -> float:
 
 
 def _gain_errors(fold: Fold, window_s: float | None = None, loudness: float = 1.0) -> list[tuple[float, int]]:
-    """The square of the errors g of the gains in a part left out, in their covariance plus S, and the number
-    of gains; for each window, with a gain for each axis of a response, if there are windows. loudness: ratio
-    of the variance of the noise, by which the filter widens its noise itself.
+    """The square of the errors g of the gains in a part left out, and the number of gains:
 
         g = (F' F)^-1 F' e,    square = g' ((F' F)^-1 + S)^-1 g = (F' e)' (1 + S F' F)^-1 g
+
+    Without window_s: one pair, with a gain for each group; the effects of its axes are added. With window_s:
+    a pair for each window of about this length, with a gain for each axis of each group. The gains of the
+    three axes of a group then have the same prior error. loudness: ratio of variances by which the filter
+    widens its noise itself (`_loudness`).
     """
     known = trust.known_effects(fold.model)
     flight = fold.innovations()

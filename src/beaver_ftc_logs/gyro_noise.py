@@ -6,11 +6,11 @@ covariance Q and gyros of variance s2 the residual is
     w[k] = e[k] + v[k] - A1 v[k-1] - ... - Ah v[k-h]
 
 a moving average whose autocovariance is known. The predictor of w[k] from earlier residuals solves the
-Yule-Walker equations; a white residual is left, which no command of the past is correlated with, whatever the
-law feeds back [Ljung1999, section 13.4].
+Yule-Walker equations. Its own residual is white, so no past command is correlated with it, whatever the law
+feeds back [Ljung1999, section 13.4].
 
-Q (3, 3) (rad/s)2. s rad/s: standard deviation of a gyro. A (h, 3, 3), M (h + 1, 3, 3) = (1, -A1, ..., -Ah).
-Of the model, rows 3 (j - 1) to 3 j of `past` are Aj', since it multiplies from the right.
+Q (3, 3): (rad/s)2. s: standard deviation of a gyro, rad/s. A (h, 3, 3). M (h + 1, 3, 3) = (1, -A1, ..., -Ah).
+Rows 3 (j - 1) to 3 j of the model's `past` are Aj', since `past` multiplies from the right.
 """
 
 import numpy as np
@@ -21,18 +21,18 @@ from beaver_ftc_logs.recording import Floats
 
 def yule_walker_predictor(model: Model, Q: Floats, s: float, L: int) -> tuple[Floats, Floats]:
     """Coefficients B (3 L, 3), latest lag first, that predict the residual from L earlier ones, and the
-    covariance (3, 3) of the rest, (rad/s)2:
+    covariance (3, 3) of the prediction error, (rad/s)2:
 
-        P B = S,   rest = R[0] - S' B
+        P B = S,   covariance = R[0] - S' B
 
-    P (3 L, 3 L): covariance of the earlier residuals, (rad/s)2. S (3 L, 3): covariance of these with the
-    residual, (rad/s)2. B has no unit.
+    R (L + 1, 3, 3): autocovariance of the residual. P (3 L, 3 L): covariance of the earlier residuals,
+    (rad/s)2. S (3 L, 3): covariance of these with the residual, (rad/s)2. B has no unit.
     """
     R = _autocovariance(model, Q, s, L)
-    both = np.concatenate([R[:0:-1].transpose(0, 2, 1), R])  # at lags -L to L
+    R_two_sided = np.concatenate([R[:0:-1].transpose(0, 2, 1), R])  # R at lags -L to L: R[-t] = R[t]'
     lags = np.arange(L)
-    P = both[L + lags - lags[:, None]].transpose(0, 2, 1, 3).reshape(3 * L, 3 * L)
-    S = both[L - 1 - lags].reshape(3 * L, 3)
+    P = R_two_sided[L + lags - lags[:, None]].transpose(0, 2, 1, 3).reshape(3 * L, 3 * L)
+    S = R_two_sided[L - 1 - lags].reshape(3 * L, 3)
     B = np.linalg.solve(P, S)
     return B, R[0] - S.T @ B
 

@@ -1,9 +1,9 @@
-"""Plain least squares, and statistics of what it leaves.
+"""Plain least squares, and statistics of its residual.
 
 y = Z b + e,    X = Z / s,    b = P X' y / s
 
 n, m    samples; columns
-Z, y    regressors (n, m); what they explain, (n,) or (n, k)
+Z, y    regressors (n, m); the values to explain, (n,) or (n, k)
 s, X    root mean square of each column (m,); the columns divided by it
 b, e    coefficients (m,) or (m, k); residuals (n,) or (n, k)
 P       inverse of X' X (m, m); the pseudo-inverse in `fit_ols`, where columns may depend on one another
@@ -16,18 +16,23 @@ import numpy as np
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats, Ints
 from beaver_ftc_logs.runs import runs_between
 
-# Least eigenvalue of X' X that counts, over the largest, or over the number of samples.
+# Floor of the eigenvalues of X' X. `fit_ols` takes those that are smaller, over the largest, as 0;
+# `Innovations.gain_bounds` adds the floor times the number of rows to each.
 EIGENVALUE_FLOOR = 1e-10
-_RANK_TOLERANCE = 1e-12  # of a column or an eigenvalue, over the largest: a smaller one is rounding
+_RANK_TOLERANCE = 1e-12  # a column or an eigenvalue that is smaller, over the largest, is rounding
 # Median of the chi-squared law with three degrees of freedom.
 _MEDIAN_CHI2 = 2.366
 
 
 @dataclass(frozen=True)
 class Regression:
-    """coefficients (m, 3); residual_covariance (3, 3); standard_errors (m, 3); standard_error_inflation: the
-    factor by which the residuals' colour widens them over those of white ones, (m, 3);
-    coefficient_error_correlation (m, m): of the coefficients' errors, alike on every axis."""
+    """The result of `fit_ols`.
+
+    coefficients (m, 3). residual_covariance (3, 3). standard_errors (m, 3) of the coefficients.
+    standard_error_inflation (m, 3): standard errors over those for a white residual.
+    coefficient_error_correlation (m, m): correlation of the errors of the coefficients, the same on each
+    axis.
+    """
 
     coefficients: Floats
     residual_covariance: Floats
@@ -41,9 +46,9 @@ def fit_ols(Z: Floats, y: Floats, stretch: Ints, lag: int) -> Regression:
 
         X = Z / s,   P = (X' X)^+,   b = P X' y,   e = y - X b,   R = e' e / (n - m)
 
-    stretch (n,): products of e over up to `lag` samples are formed within one gap-free stretch only.
-    Directions that Z does not excite get the least coefficients that fit, and a column of nothing but
-    rounding gets 0.
+    stretch (n,): number of the gap-free stretch of each row; the standard errors use products of residuals
+    that are up to `lag` samples apart, within one stretch only. Where the columns of Z depend on one another,
+    b is the smallest of all solutions; a column that is only rounding gets 0.
     """
     rms = rms_of_columns(Z)
     s = np.where(rms > _RANK_TOLERANCE * rms.max(), rms, np.inf)
@@ -61,13 +66,17 @@ def fit_ols(Z: Floats, y: Floats, stretch: Ints, lag: int) -> Regression:
 
 
 def _newey_west(X: Floats, e: Floats, P: Floats, stretch: Ints, lag: int) -> Floats:
-    """Standard errors (m,) that hold for autocorrelated residuals e (n,), the root of diag(P S P): S sums the
-    products of the scores X e with Bartlett's weights over `lag` lags."""
+    """Standard errors (m,) that hold for autocorrelated residuals e (n,), with the weights of Bartlett:
+
+        sqrt(diag(P S P)),    S = sum over l = -lag..lag of (1 - |l| / w) sum_k g[k] g[k-l]',    w = lag + 1
+
+    g[k] = X[k] e[k] (m,): score of a sample. With sums G[k] of w successive scores, S is sum_k G[k] G[k]' /
+    w.
+    """
     scores = X * e[:, None]
     w = lag + 1
     S = np.zeros((X.shape[1], X.shape[1]))
     for begin, end in runs_between(np.diff(stretch) != 0):
-        # Bartlett's weights are those of products of running sums
         sums = np.cumsum(np.pad(scores[begin:end], ((w, w - 1), (0, 0))), axis=0)
         windows = sums[w:] - sums[:-w]
         S += windows.T @ windows / w
@@ -80,19 +89,22 @@ def rms_of_columns(Z: Floats) -> Floats:
 
 
 def left_by(Z: Floats, y: Floats) -> Floats:
-    """What least squares on Z (n, m) leaves of y (n,) or (n, k)."""
+    """Residual of the least squares of y, (n,) or (n, k), on Z (n, m)."""
     return y - Z @ np.linalg.lstsq(Z, y, rcond=None)[0]
 
 
 def noise_scale(e2: Floats) -> float:
-    """The scale of the noise by the squares of what is left, (3 n,), which faults of few samples do not
-    change."""
+    """Scale of the variance of the noise, by the squares (3 n,) of a whitened residual. Faults of few samples
+    do not change it, because it is the median of the sums over three axes, over that of chi-squared."""
     return float(np.median(e2.reshape(-1, 3).sum(axis=1)) / _MEDIAN_CHI2)
 
 
 def variance_inflation(Z: Floats) -> Floats:
-    """How much the variance of each column's coefficient is inflated by the other columns of Z (n, m): 1
-    alone, inf dependent. That is the diagonal of the inverse of the correlation C = V lam V'."""
+    """Factor (m,) by which the other columns of Z (n, m) inflate the variance of each coefficient: 1 if a
+    column is independent of the others, inf if they determine it.
+
+        diag(C^-1) = sum over j of V[:, j]^2 / lam_j,    C = V diag(lam) V': correlation of the columns
+    """
     X = Z - Z.mean(axis=0)
     norms = np.sqrt((X**2).sum(axis=0))
     factors = np.full(Z.shape[1], np.inf)

@@ -1,4 +1,7 @@
-"""Rows of a log: runs of them, the last one up to a row or a time, sums over the last ones."""
+"""Rows of a log: runs of rows, the last row up to another row or a time, and sums over the last rows.
+
+A run is a pair (begin, end) of row numbers; end is the number after the last row.
+"""
 
 from itertools import pairwise
 from typing import Any
@@ -8,39 +11,40 @@ from numpy.typing import NDArray
 
 from beaver_ftc_logs.recording import Floats, Ints, Mask
 
-# Begin and end of runs of rows.
+# Each run as (begin, end).
 Runs = list[tuple[int, int]]
 
 
 def last_true_row(mask: Mask) -> Ints:
-    """The last row up to each at which a mask (n,) is true, (n,); -1 before the first."""
+    """For each row the last row up to it at which a mask (n,) is true, (n,); -1 before the first such row."""
     return np.maximum.accumulate(np.where(mask, np.arange(len(mask)), -1))
 
 
 def last_row_at(stamps: Floats, t_s: Floats) -> Ints:
-    """The row of the last stamp up to each time; the first before it."""
+    """For each time the row of the last stamp up to it; row 0 before the first stamp."""
     return np.maximum(np.searchsorted(stamps, t_s, side="right") - 1, 0)
 
 
 def runs_between(is_edge: Mask) -> Runs:
-    """Begin and end of each run of n rows; is_edge (n - 1,): whether one ends behind the row."""
+    """The runs of n rows; is_edge (n - 1,): whether a run ends with the row."""
     return list(pairwise([0, *(np.flatnonzero(is_edge) + 1).tolist(), len(is_edge) + 1]))
 
 
 def true_runs(mask: Mask) -> Runs:
-    """Begin and end of each run of rows at which a mask (n,) is true."""
+    """The runs of rows at which a mask (n,) is true."""
     edges = np.flatnonzero(np.diff(mask.astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
     return [(begin, end) for begin, end in edges.tolist()]
 
 
 def constant_stretches(values: Floats) -> Runs:
-    """Begin and end of each stretch of equal rows; nan is equal to nan."""
+    """The runs of equal rows of values (n, k). NaN is equal to NaN: it is read as -1."""
     known = np.nan_to_num(values, nan=-1.0)
     return runs_between(np.any(np.diff(known, axis=0) != 0.0, axis=1))
 
 
 def trailing_sums(x: NDArray[Any], n: float) -> tuple[Floats, Ints]:
-    """Sums of x (k, ...) over the last n rows, each row's own included, and how many rows these are, (k,)."""
+    """For each row the sum of x (k, ...) over the last n rows, itself included, and the number of these rows,
+    (k,): fewer than n at the begin, and at least one."""
     end = np.arange(1, len(x) + 1)
     begin = np.maximum(end - max(round(n), 1), 0)
     sums = np.concatenate([np.zeros((1, *x.shape[1:])), np.cumsum(x, axis=0)])

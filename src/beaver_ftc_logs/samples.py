@@ -246,7 +246,8 @@ def _possible_rates(log: RecordedFlight, vehicle: Vehicle) -> Columns:
 
 
 def named_angles(columns: Columns, vehicle: Vehicle) -> list[NamedColumn | None]:
-    """The columns of roll, pitch and yaw with their names; None for an angle that is not named or not logged."""
+    """The columns of roll, pitch and yaw with their names; None for an angle that is not named or not
+    logged."""
     keys = [getattr(vehicle.attitude, angle, None) for angle in ("roll", "pitch", "yaw")]
     return [(key.column, columns[key.column]) if key and key.column in columns else None for key in keys]
 

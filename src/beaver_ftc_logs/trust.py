@@ -2,8 +2,10 @@
 
 `FittedRanges` has the ranges in which a model was fitted. A row is credible if the commands, the rates and
 the airspeed of the last seconds are in these ranges, and no signal is frozen or clipped. Other rows have no
-name, and bounds of 0 and 1. The size of the residual does not count, since a fault makes it large too. A row
-uses nothing later than its time.
+name, and bounds of 0 and 1. The size of the residual does not count, since a fault makes it large too.
+Whether a row is credible depends on no later row.
+
+The word *judged* after a constant means that we chose it by judgement, *derived* that it follows from others.
 """
 
 from dataclasses import replace
@@ -26,16 +28,15 @@ _RANGE_MARGIN_SHARE = 0.5
 # An airspeed is outside if it passes the least or the largest by more than this share of it; judged: the
 # effect of a surface, which grows with the square of the airspeed, changes by at most 32 %.
 _AIRSPEED_MARGIN = 0.15
-# A row is outside if more than a share of these last seconds is; the length is judged.
+# A row is outside if more than half of the samples in this time before it are; the length is judged.
 _RANGE_WINDOW_S = 5.0
-# This share; derived: most of the seconds.
 _MIN_OUTSIDE_SHARE = 0.5
 # A column may stand still this many times as long as it did in the flights of the model; judged.
 _MAX_STILL_FACTOR = 3.0
 # Rows are not credible for this time after a rate was clipped; judged.
 _CLIPPING_MEMORY_S = 30.0
-# Nothing is said of a group if other quantities explain this share of its effect or more; judged: a fiftieth
-# of the effect is left.
+# There is no verdict on a group if other quantities explain this share of its effect or more; judged: a
+# fiftieth of the effect remains.
 _MAX_TIED_SHARE = 0.98
 
 
@@ -48,7 +49,7 @@ def compute_fitted_ranges(parts: Parts, tied: Floats, gain_sd: Floats) -> Fitted
     """
 
     def usable(name: str) -> Floats:
-        """A field of the samples that the fit used, of all parts."""
+        """A field of the samples that the fit used, from all parts."""
         return np.concatenate([getattr(part.samples, name)[part.is_usable] for part in parts])
 
     airspeeds = usable("airspeed")
@@ -71,7 +72,8 @@ def compute_fitted_ranges(parts: Parts, tied: Floats, gain_sd: Floats) -> Fitted
 
 
 def central_ranges(values: Floats) -> list[list[float]]:
-    """Least and largest of each column but for the rarest, [0, 0] where nothing is known."""
+    """[low, high] of each column of values (n, k): its quantiles _RANGE_QUANTILES; [0, 0] for a column
+    without a number."""
     if not values.shape[1]:
         return []
     known = np.where(np.isfinite(values).any(axis=0), values, 0.0)
@@ -79,12 +81,13 @@ def central_ranges(values: Floats) -> list[list[float]]:
 
 
 def known_effects(model: Model) -> Mask:
-    """Whether anything is said of each group, (G,)."""
+    """Whether the effect of each group is known, so that there can be a verdict on it, (G,)."""
     return np.array(model.fitted.tied or [0.0] * len(model.groups)) < _MAX_TIED_SHARE
 
 
 def known_gains(model: Model) -> Mask:
-    """Whether the effect of each group is known under any law, (G,): the model may not err by all of it."""
+    """Whether the effect of each group is known under any law, (G,). With other laws, BOUND_MARGIN standard
+    errors of its gain must be less than the whole effect."""
     known = known_effects(model)
     if not model.fitted.gain_sd or not model.vehicle.other_laws:
         return known
@@ -92,12 +95,12 @@ def known_gains(model: Model) -> Mask:
 
 
 def unknown_surfaces(model: Model) -> set[str]:
-    """The surfaces of which nothing is said."""
+    """The surfaces whose effect is unknown."""
     return {name for group in compress(model.groups, ~known_effects(model)) for name in group}
 
 
 def unknown_sentences(model: Model) -> list[str]:
-    """Why nothing is said of some groups."""
+    """A sentence for each group whose effect is unknown, with the reason."""
     start = "of what {} does, {:.1%} follows from the rates, signals and other surfaces of the flights fitted"
     rows = zip(model.group_names, model.fitted.tied, known_effects(model), strict=False)
     return [
@@ -108,7 +111,7 @@ def unknown_sentences(model: Model) -> list[str]:
 
 
 def untrusted_rows(samples: Samples, model: Model) -> Reasons:
-    """Rows that are not credible, by reason."""
+    """Reason -> rows (n,) that are not credible for it."""
     reasons: Reasons = _still_rows(samples, model)
     n = np.floor(_CLIPPING_MEMORY_S / samples.dt_s) + 1.0
     recent, _ = trailing_sums(samples.is_rate_clipped, n)
@@ -117,8 +120,8 @@ def untrusted_rows(samples: Samples, model: Model) -> Reasons:
 
 
 def _rows_out_of_range(samples: Samples, model: Model) -> Reasons:
-    """Rows in which a command, a rate or the airspeed was outside for most of the last seconds, or of the
-    flight so far, by reason."""
+    """Reason -> rows (n,) in which a command, a rate or the airspeed was outside its range for most of the
+    last _RANGE_WINDOW_S, or of the flight so far if that is shorter."""
     ranges = model.fitted
     commands = [f"command of {surface}" for surface in model.vehicle.surfaces]
     channels = [
@@ -141,8 +144,8 @@ def _rows_out_of_range(samples: Samples, model: Model) -> Reasons:
 
 
 def _still_rows(samples: Samples, model: Model) -> Reasons:
-    """Rows in which a column has stood still for longer than its limit, by reason. still_s: the longest time
-    for which it stood still in the flights of the model.
+    """Reason -> rows (n,) in which a column has stood still for longer than its limit. still_s: the longest
+    time for which it stood still in the flights of the model.
 
         column                  limit, s
         a rate, still_s known   max(MIN_STILL_S / 3, _MAX_STILL_FACTOR still_s)
@@ -161,7 +164,8 @@ def _still_rows(samples: Samples, model: Model) -> Reasons:
 
 
 def without_dead_rows(samples: Samples, model: Model) -> Samples:
-    """The flight with nothing known where a signal does not live: the filter is not to learn from it."""
+    """The flight without rates in rows in which a column stands still or a rate is clipped, so that the
+    filter estimates nothing from them."""
     dead = np.any([*_still_rows(samples, model).values(), samples.is_rate_clipped], axis=0)
     if not dead.any():
         return samples

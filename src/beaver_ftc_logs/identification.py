@@ -1,7 +1,8 @@
 """Identify a vehicle: prepare its flights, fit a model to them, and test the model on parts left out.
 
 Z, y, e     regressors (n, m) and rates (n, 3) of a fit, rad/s, and its residual (n, 3), rad/s
-ma          moving average of the noise, 1 first
+C           coefficients of a fit (m, 3)
+ma          moving average of the noise, 1 first; a flight is *whitened* by it (`samples.whiten_samples`)
 V, V0       airspeed, m/s, and the airspeed at which a command has the effect of the model, m/s
 """
 
@@ -32,11 +33,12 @@ from beaver_ftc_logs.samples import (
 from beaver_ftc_logs.vehicle import Vehicle
 
 SCORES = ("classes", "healthy_or_faulty", "mean_error", "held_by_bounds")
-# By how much a criterion must be less: odds of 150 to 1 [Kass1995, section 3.2].
+# A model is decisively better if its information criterion is less by this: odds of 150 to 1 [Kass1995,
+# section 3.2].
 _DECISIVE_BIC = 10.0
-# Powers of the airspeed that the effect of a surface may follow instead of the square.
+# Powers of the airspeed that are tried for the effect of a surface, besides the square.
 _AIRSPEED_POWERS = (0.0, 1.0, 3.0)
-# Rounds in which the noise models of the flights and their common fit are found, at most.
+# Largest number of rounds of `whiten_flights`.
 _MAX_ROUNDS = 8
 
 
@@ -72,15 +74,19 @@ def identify(flights: Sequence[Samples], vehicle: Vehicle) -> Model:
 
 
 def add_unseen_noise(model: Model, flights: Sequence[Samples]) -> Model:
-    """The model with further noise models, in moving air: the moving averages of gusts that no fitted flight
-    had, and noisier gyros, whose noise follows from the model (`gyro_noise`). `diagnose` chooses among all
-    noise models by their likelihood in the suspect flight."""
+    """The model with further noise models, in moving air: one for each moving average of gusts that no fitted
+    flight had, and one for each noise of noisier gyros, which follows from the model (`gyro_noise`).
+    `diagnose` chooses among all noise models by their likelihood in the suspect flight.
+
+    The new noise models take over the largest inflation and misreading, and the least usual quick power, of
+    all.
+    """
     if not model.colours:
         return model
     known = [tuple(noise.average) for noise in model.colours]
     quietest = min((np.array(noise.noise) for noise in model.colours), key=np.linalg.det)
     powers = [noise.quick for noise in model.colours if noise.quick is not None]
-    same: Document = {
+    shared_fields: Document = {
         "wider": max(noise.wider for noise in model.colours),
         "misreads": np.max([noise.misreads for noise in model.colours], axis=0).tolist(),
         "quick": min(powers, default=None),
@@ -90,18 +96,19 @@ def add_unseen_noise(model: Model, flights: Sequence[Samples]) -> Model:
         if ma not in known:
             parts = orders.fit_parts([whiten_samples(flight, ma) for flight in flights])
             e = orders.one_step_residuals(parts, model)
-            models.append(NoiseModel(average=list(ma), noise=np.cov(e.T).tolist(), **same))
+            models.append(NoiseModel(average=list(ma), noise=np.cov(e.T).tolist(), **shared_fields))
     for gyro_sd in UNFITTED_GYROS_RAD_S:
         ar, R = gyro_noise.yule_walker_predictor(model, quietest, gyro_sd, orders.AR_ORDER)
-        models.append(NoiseModel(average=[1.0], before=ar.tolist(), noise=R.tolist(), **same))
+        models.append(NoiseModel(average=[1.0], before=ar.tolist(), noise=R.tolist(), **shared_fields))
     return model.model_copy(update={"colours": models})
 
 
 def assume_law_and_air(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Vehicle, list[str]]:
     """The vehicle with the keys `other_laws` and `moving_air` that its file leaves out, and a line on each.
 
-    Healthy flights show neither which law nor which air a later flight has, so both keys are true. That costs
-    evidence, but raises no false alarm. With labelled faults, the later flights are assumed to be as these.
+    Healthy flights show neither which law nor which air a later flight has, so both keys become true. An
+    alarm then needs more evidence, but is not false. If labels show faults, later flights are assumed to be
+    as these: both become false.
     """
     labelled = any(np.isfinite(flight.labels).any() for flight in flights)
     reason = "labels show faults under it" if labelled else "logs of healthy flight do not tell"
@@ -122,22 +129,31 @@ def assume_law_and_air(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Ve
 
 
 def whiten_flights(flights: Sequence[Samples], vehicle: Vehicle) -> list[Samples]:
-    """The flights, in moving air whitened by the likeliest moving average of each.
+    """The flights; in moving air, whitened by the likeliest moving average of each.
 
-    alone, white: of each flight its residual by moving average, by its own fit and by the common fit.
-    colours: the moving average of each flight. C: coefficients of the common fit.
+    A law feeds the noise of the rates back to the surfaces. If the residual is not white, a fit attributes
+    noise to the surfaces [Ljung1999, section 13.4]. The moving averages follow from the residuals of one
+    common fit to all flights, and this fit follows from the moving averages:
 
-    A law feeds the noise of the rates to the surfaces. If the residual is not white, a fit attributes noise
-    to the surfaces [Ljung1999, section 13.4]. The moving averages follow from the residuals of one fit to all
-    flights, and this fit follows from the moving averages: both are repeated until the averages stay.
+        1. the first averages: for each flight the likeliest by a fit to this flight alone
+        2. a common fit to all flights, whitened by their averages
+        3. for each flight the likeliest average by the residual of the common fit; stop if none has changed
+        4. whiten again, with weights that give all flights the same noise; continue with step 2,
+           for at most _MAX_ROUNDS rounds
+
+    Likelihoods are those of `_likeliest_ma`.
+
+    own_residuals, common_residuals: for each flight, moving average -> residual, by step 1 and 3. averages:
+    the moving average of each flight.
     """
     if not vehicle.moving_air:
         return list(flights)
     from scipy.signal import lfilter
 
     def stacked(flights: Sequence[Samples]) -> tuple[Floats, Floats]:
-        """Regressors and rates of flights, of the largest order of the rates."""
-        # the commands get as many lags as the rates, not as many as they have at most: the results rest on it
+        """Regressors and rates of flights for the largest order of the rates."""
+        # The commands have as many lags as the rates, not their largest number: the kept results depend on
+        # it.
         return orders.stack_data(orders.fit_parts(flights), vehicle, *[max(orders.RATE_LAGS)] * 2)[:2]
 
     def own_residual(flight: Samples, ma: tuple[float, ...]) -> Floats:
@@ -148,19 +164,21 @@ def whiten_flights(flights: Sequence[Samples], vehicle: Vehicle) -> list[Samples
             raise BadInput(f"identify: {flight.name}: {known}, allowed: at least 2")
         return left_by(Z, y)
 
-    alone = [{ma: own_residual(flight, ma) for ma in NOISE_MA_CANDIDATES} for flight in flights]
-    colours = [_likeliest_ma(residuals)[1] for residuals in alone]
-    whitened = [whiten_samples(flight, ma) for flight, ma in zip(flights, colours, strict=True)]
+    own_residuals = [{ma: own_residual(flight, ma) for ma in NOISE_MA_CANDIDATES} for flight in flights]
+    averages = [_likeliest_ma(residuals)[1] for residuals in own_residuals]
+    whitened = [whiten_samples(flight, ma) for flight, ma in zip(flights, averages, strict=True)]
     for _ in range(_MAX_ROUNDS):
         Z, y = stacked(whitened)
         C = np.linalg.lstsq(Z, y, rcond=None)[0]
-        left = [y - Z @ C for Z, y in (stacked([flight]) for flight in flights)]
-        white = [{ma: lfilter([sum(ma)], ma, e, axis=0) for ma in NOISE_MA_CANDIDATES} for e in left]
-        likeliest = [_likeliest_ma(residuals) for residuals in white]
-        if (new := [ma for _, ma in likeliest]) == colours:
+        unwhitened = [y - Z @ C for Z, y in (stacked([flight]) for flight in flights)]
+        common_residuals = [
+            {ma: lfilter([sum(ma)], ma, e, axis=0) for ma in NOISE_MA_CANDIDATES} for e in unwhitened
+        ]
+        likeliest = [_likeliest_ma(residuals) for residuals in common_residuals]
+        if (new := [ma for _, ma in likeliest]) == averages:
             break
         mean = np.mean([log_det for log_det, _ in likeliest])
-        colours = new
+        averages = new
         whitened = [
             whiten_samples(flight, ma, float(np.exp((mean - log_det) / 6.0)))
             for flight, (log_det, ma) in zip(flights, likeliest, strict=True)
@@ -169,9 +187,12 @@ def whiten_flights(flights: Sequence[Samples], vehicle: Vehicle) -> list[Samples
 
 
 def _likeliest_ma(residuals: dict[tuple[float, ...], Floats]) -> tuple[float, tuple[float, ...]]:
-    """The log determinant of the residual's covariance by the likeliest moving average, and this average.
-    residuals: of a flight, whitened by each, (n, 3). Whitening by C(1) / C(z) multiplies the noise by the sum
-    C(1) of the average, so the profile likelihood is that of log det - 6 log C(1)."""
+    """For the likeliest moving average: log det R of the residual's covariance R, and this average.
+    residuals: moving average -> residual (n, 3) of a flight that was whitened by it.
+
+    Whitening by C(1) / C(z) multiplies the noise by C(1) = sum of the average. So the likeliest average has
+    the least log det R - 6 log C(1): the variance of each of the 3 axes is multiplied by C(1)^2.
+    """
     log_dets = {ma: float(np.linalg.slogdet(np.cov(e.T))[1]) for ma, e in residuals.items()}
     best = min(log_dets, key=lambda ma: log_dets[ma] - 6.0 * float(np.log(sum(ma))))
     return log_dets[best], best
@@ -179,12 +200,14 @@ def _likeliest_ma(residuals: dict[tuple[float, ...], Floats]) -> tuple[float, tu
 
 def expect_another_day(folds: list[Document], model: Model) -> Document:
     """The errors to expect on a day that was not fitted: mean and worst score of the parts left out, the rate
-    of false alarms with its bounds, 1/h, and how many minutes are missing to show it without a tail."""
+    of false alarms with its bounds, 1/h, and the minutes of healthy flight that are missing to show this rate
+    without a fitted tail. The worst of `mean_error` is the largest, of all other scores the least.
+    """
     scores = [fold["score"] for fold in folds if "score" in fold]
-    values = {key: [score[key] for score in scores] for key in SCORES if scores}
+    scores_by_key = {key: [score[key] for score in scores] for key in SCORES if scores}
     expected: Document = {
         key: {"mean": float(np.mean(by_fold)), "worst": float((max if key == "mean_error" else min)(by_fold))}
-        for key, by_fold in values.items()
+        for key, by_fold in scores_by_key.items()
     }
     tail = model.fitted.tail
     threshold = model.settings.threshold
@@ -201,8 +224,12 @@ def expect_another_day(folds: list[Document], model: Model) -> Document:
 
 def scale_if_better(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Sequence[Samples], Vehicle]:
     """The flights with commands times (V / V0)^2, and the vehicle with V0, if this factor explains decisively
-    more; otherwise both as they are. Where other laws may fly, each group of surfaces has the power of V / V0
-    that explains most; another power than 2 must explain decisively more."""
+    more; otherwise both as they are.
+
+    Where other laws may fly, each group of surfaces has the power of V / V0 that explains most; another power
+    than 2 must explain decisively more. V0: median of the known airspeeds. lowest: criterion that a power
+    must undercut.
+    """
     V = np.concatenate([flight.airspeed for flight in flights])
     V = V[np.isfinite(V)]
     V0 = float(np.median(V)) if V.size else 0.0
@@ -230,8 +257,9 @@ def scale_if_better(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Seque
 def _scaled(
     flights: Sequence[Samples], vehicle: Vehicle, white: Sequence[Samples] | None = None
 ) -> list[Samples]:
-    """The flights with the command of each surface times its power of V / V0, whitened like the flights
-    `white`, if these are given."""
+    """The flights with the command of each surface times its power of V / V0; if flights `white` are given,
+    each is also whitened as its counterpart in `white`.
+    """
     V0 = vehicle.reference_airspeed_mps or 0.0
     powers = vehicle.surface_airspeed_powers
     scaled = [scale_by_airspeed(flight, V0, powers) for flight in flights]
@@ -245,12 +273,17 @@ def _scaled(
 
 
 def _min_bic(flights: Sequence[Samples], vehicle: Vehicle) -> float:
-    """The least Bayesian information criterion of any order."""
+    """The least Bayesian information criterion over all orders."""
     return min(orders.bic_by_order(orders.fit_parts(flights), vehicle).values())
 
 
 def check_explained(folds: list[Document], parts: Parts, model: Model) -> None:
-    """Raise BadInput if a model predicts a rate less well than its mean value does, on parts left out."""
+    """Raise BadInput if, on parts left out, the model predicts a rate less well than the mean of the rate
+    does. The message also names the time, the stillest command and the remarks on the rates.
+
+    shares: explained share of the variance of p, q and r in each part; means: their means, weighted by
+    samples.
+    """
     known = [fold for fold in folds if fold["samples"]]
     counts = [fold["samples"] for fold in known]
     shares = np.array([[fold["explained"][axis] for axis in "pqr"] for fold in known])
@@ -272,12 +305,12 @@ def check_explained(folds: list[Document], parts: Parts, model: Model) -> None:
 
 
 def axis_text(values: dict[str, float]) -> str:
-    """The numbers of p, q and r as text."""
+    """The values of p, q and r as text."""
     return ", ".join(f"{axis} {value:.3f}" for axis, value in values.items())
 
 
 def _check_units(flights: Sequence[Samples], vehicle: Vehicle) -> None:
-    """Raise BadInput where a flight's command is in another unit than that of the first."""
+    """Raise BadInput if a command of a flight is in another unit than in the first flight."""
     commands = trust.central_ranges(flights[0].commands)
     rates = trust.central_ranges(flights[0].rates)
     first = FittedRanges(commands=commands, rates=rates)

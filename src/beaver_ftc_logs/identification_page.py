@@ -21,12 +21,12 @@ from beaver_ftc_logs.regression import Parts
 from beaver_ftc_logs.samples import Samples
 
 PAGE_MARK = '<meta name="generator" content="beaver-ftc identify">'
-_FIGURE_SPAN_S = 40.0  # of a flight that is drawn
+_FIGURE_SPAN_S = 40.0  # length of the part of a flight that is drawn
 _MAX_SHOWN_FLIGHTS = 3
 
 
 def refuse_foreign_file(path: Path) -> None:
-    """Raise BadInput where the page would take the place of a file that is not a page of ours."""
+    """Raise BadInput if the page would replace a file that is no page of `identify`."""
     is_page = path.is_file() and PAGE_MARK in path.read_text("utf-8", errors="replace")[:2000]
     if path.exists() and not is_page:
         raise BadInput(f"will not replace {path}: it is no page of `identify`, allowed: another --out")
@@ -52,7 +52,9 @@ def render_identification(flights: Sequence[Samples], model: Model) -> str:
 
 
 def _prediction_figure(usable: Parts, model: Model) -> Any:
-    """Measured and predicted rates over the liveliest part of each flight (or half) that was left out."""
+    """Measured and predicted rates of up to _MAX_SHOWN_FLIGHTS flights (or halves) left out, each over the
+    part in which the rates move most.
+    """
     from matplotlib.figure import Figure
 
     used = (fold for fold in held_out_folds(usable, model, None) if fold.held_out.is_usable.any())
@@ -91,7 +93,7 @@ def _liveliest_window(fold: Fold, n: int) -> tuple[Floats, Floats, Floats]:
 
 
 def _spectrum_figure(usable: Parts, model: Model) -> Any:
-    """Density of the residual, and what white noise of the same variance would have."""
+    """Density of the residual by frequency, and that of white noise of the same variance."""
     residual = orders.one_step_residuals(usable, model)
     f_hz, power = spectral_density(residual, model.rate_hz)
     figure, ((axis,),) = panels(1, 1, 7.5, 3.2)
@@ -107,7 +109,7 @@ def _spectrum_figure(usable: Parts, model: Model) -> Any:
 
 
 def _correlation_figure(fit: Regression, names: list[str]) -> Any:
-    """Correlation of the errors of the coefficients."""
+    """Correlation of the errors of the coefficients of a fit; names: of the coefficients."""
     side = 2.5 + 0.19 * len(names)
     figure, ((axis,),) = panels(1, 1, side + 0.8, side)
     image = axis.imshow(fit.coefficient_error_correlation, cmap="RdBu_r", vmin=-1.0, vmax=1.0)

@@ -8,7 +8,7 @@ from beaver_ftc_logs.trust import unknown_sentences
 
 
 def identification_text(model: Model) -> str:
-    """Return the identification as lines of text: the fit, and one indented line for each finding."""
+    """The identification as text: a line on the fit, and an indented line for each finding."""
     results: Document = dict(model.identified)
     flights = results["flights"]
     lines = [
@@ -31,7 +31,7 @@ def identification_text(model: Model) -> str:
 
 
 def _model_lines(model: Model) -> list[str]:
-    """Return lines on the groups of surfaces, on their dynamic pressure and on the noise."""
+    """Lines on the groups of surfaces, on their powers of the airspeed and on the noise models."""
     lines = [f"together, not distinguishable: {', '.join(group)}" for group in model.groups if len(group) > 1]
     vehicle = model.vehicle
     if (V0 := vehicle.reference_airspeed_mps) is not None:
@@ -56,7 +56,7 @@ def _output_error_text(output: Document) -> str:
 
 
 def _collinear_text(collinear: list[Document]) -> str:
-    """The line on regressors that others nearly make up; the worst comes first."""
+    """The line on regressors that the others nearly determine. collinear: the worst comes first."""
     worst = collinear[0]
     n = len(collinear)
     are = "regressors are" if n > 1 else "regressor is"
@@ -69,7 +69,9 @@ def _collinear_text(collinear: list[Document]) -> str:
 
 
 def _day_lines(expected: Document, n_flights: int) -> list[str]:
-    """Return lines on flights that were not fitted; one flight informs on its halves, not on another day."""
+    """Lines on flights that were not fitted. With a single flight, its halves are left out: they show nothing
+    about another day.
+    """
     unit = "another half of this day, not of another day"
     if n_flights > 1:
         unit = "another day, each left out in turn"
@@ -96,7 +98,7 @@ def _day_lines(expected: Document, n_flights: int) -> list[str]:
 
 
 def _fold_text(fold: Document) -> str:
-    """The line of a part that was left out: how well the others explain it."""
+    """The line on a part left out: how well the model of the others explains it."""
     if not fold["samples"]:
         return f"without {fold['left_out']}: nothing in it is known"
     line = f"without {fold['left_out']}: explains {axis_text(fold['explained'])} of it"

@@ -20,7 +20,7 @@ _UNIT = rf"(_({_SHARE_UNIT}|rad|deg|us))?"
 _SURFACE = rf"(({_SIDE_WORD})_?)*({_SURFACE_WORD})(_?({_SIDE_WORD}))*"
 _AXIS = r"(roll|pitch|yaw)"
 
-# Patterns of the words of commands in plain tables, in lower case, with `_` between two words; each with
+# Patterns of the names of commands in plain tables: words in lower case with `_` between them; each with
 # examples.
 _PLAIN_COMMANDS = (
     rf"(delta_|d_)?{_SURFACE}(_({_COMMAND_WORD}))*{_UNIT}",  # elevator, left_aileron_command_norm
@@ -30,8 +30,8 @@ _PLAIN_COMMANDS = (
     r"d(elta)?_?[aer](_(cmd|rad|deg|norm))?",  # da
 )
 
-# Patterns of whole names, in lower case, of columns that carry commands of surfaces, each with an example.
-# Columns of plain tables are judged by their words (`_is_plain_command_name`).
+# Pattern of a whole name, in lower case, of a column with the command of a surface -> example for messages.
+# Names in plain tables are compared word by word instead (`_is_plain_command_name`).
 KNOWN_COMMANDS = {
     # PX4 message actuator_controls: control 0 to 2 of groups 0 and 1 are roll, pitch, yaw
     r"actuator_controls_[01]\.control\[[0-2]\]": "actuator_controls_0.control[0] (PX4)",
@@ -57,9 +57,10 @@ def is_command_name(column_name: str) -> bool:
 
 
 def _is_plain_command_name(name: str) -> bool:
-    """Whether each word of a name in a plain table is of a surface's command, as in `Left aileron command
-    (norm)`. With another word, as in `elevator_position`, or a message that is in no table, as in `CMD.Lat`,
-    it is another quantity."""
+    """Whether all words of a name in a plain table are words of a surface's command, as in `Left aileron
+    command (norm)`. A name with another word, as `elevator_position`, or with a message before a dot, as
+    `CMD.Lat`, is another quantity.
+    """
     if "." in name or "/" in re.sub(r"[\[(].*", "", name):
         return False
     words = "_".join(re.findall(r"[a-z0-9%]+", name))
@@ -73,10 +74,10 @@ _PX4_ROTARY_WINGS = {2: "quadrotor", 3: "coaxial helicopter", 4: "helicopter", 1
 _PX4_VTOL_TYPES = range(19, 26)
 # SYS_AUTOSTART of multicopters [PX4, airframes reference].
 _PX4_COPTERS = range(4000, 13000)
-# Parameters of ArduCopter, of any release, and one of ArduPlane, which ArduCopter has not.
+# Parameters that ArduCopter has in some release, and one that only ArduPlane has.
 _COPTER_PARAMETERS = ("MOT_SPIN_ARM", "MOT_SPIN_ARMED", "MOT_SPIN_MIN", "MOT_THST_EXPO")
 _PLANE_PARAMETER = "Q_ENABLE"
-_MIN_ROTORS = 3  # columns of motors, of a vehicle without servos
+_MIN_ROTORS = 3  # number of columns of motors that show a multicopter, if no column is a command of a surface
 
 
 def multicopter_reason(params: Parameters, names: Collection[str]) -> str | None:
@@ -111,8 +112,9 @@ def hovers_throughout(params: Parameters, columns: Columns) -> bool:
 
 
 def command_names(names: Sequence[str], params: Parameters) -> list[str]:
-    """The columns that carry commands of surfaces. Several messages have the commands of the same surfaces,
-    so only the columns of the first message count; of a VTOL, only those for flight on its wing."""
+    """The columns with commands of surfaces. Several messages have the commands of the same surfaces, so only
+    the columns of the first message count. For a VTOL, messages that command the hover are left out.
+    """
     commands = [name for name in names if is_command_name(name)]
     if last_value(params, "MAV_TYPE") in _PX4_VTOL_TYPES:
         hovering = r"(actuator_controls_0|vehicle_torque_setpoint)\."
@@ -127,15 +129,15 @@ _OUTPUT_PATTERN = r"RCO[2-4U]\.C|actuator_outputs(_\d)?\.output\[|SERVO_OUTPUT_R
 
 
 def missing_commands_text(names: Collection[str]) -> str:
-    """Which known command messages are missing, and how a vehicle file names others."""
+    """Text on a log without known commands: examples of known ones, and how a vehicle file names others."""
     examples = ", ".join(KNOWN_COMMANDS.values())
     outputs = [name for name in names if re.match(_OUTPUT_PATTERN, name)]
-    found = ""
+    outputs_text = ""
     if outputs:
         reason = "outputs to servos and to motors, and the log does not state which moves a surface"
-        found = f"; {outputs[0]} and its like are {reason}"
+        outputs_text = f"; {outputs[0]} and its like are {reason}"
     return (
-        f"no column is known to carry the command of a surface{found}, allowed: {examples}, words "
+        f"no column is known to carry the command of a surface{outputs_text}, allowed: {examples}, words "
         "such as elevator_cmd, or a vehicle file that names it: commands: [COLUMN], "
         "surfaces: {elevator: {COLUMN: 1}}"
     )

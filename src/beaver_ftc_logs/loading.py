@@ -1,4 +1,5 @@
-"""From files to samples: the columns that a vehicle names, a long log in parts, what a fit takes of it."""
+"""From files to samples: the columns that a vehicle file names, long logs in parts, and the samples for a
+fit."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -15,21 +16,22 @@ from beaver_ftc_logs.samples import Samples, resample
 from beaver_ftc_logs.time_base import median_step_s
 from beaver_ftc_logs.vehicle import Vehicle
 
-MAX_FIT_SAMPLES = 200_000  # that a fit takes at most of a log read in parts
-_FIT_SAMPLES = 5000  # of these in turn
+MAX_FIT_SAMPLES = 200_000  # largest number of samples for a fit from a log that is read in parts
+_FIT_SAMPLES = 5000  # length of each stretch of these samples
 
 
 def read_vehicle_columns(path: Path, vehicle: Vehicle) -> RecordedFlight:
-    """Read the columns of a log that a vehicle file names. Raises BadInput with the reason where it cannot be
-    used."""
+    """The columns of a log that a vehicle file names. Raises BadInput if the log cannot be used."""
     return next(_read_vehicle_log(path, vehicle, None, in_parts=False))
 
 
 def read_vehicle_parts(path: Path, vehicle: Vehicle, reader: str | None = None) -> Iterator[RecordedFlight]:
-    """The same, a long log in parts."""
+    """The columns of a log that a vehicle file names, a long log in parts: a table by its rows, another log
+    by the number of samples after averaging.
+    """
     for log in _read_vehicle_log(path, vehicle, reader, in_parts=True):
         column = log.columns.get(vehicle.rates.p.column)
-        if column is None:  # said where the columns are used
+        if column is None:  # the caller reports a missing column
             yield log
             continue
         ratio = 1.0 / (median_step_s(column.t_s) * vehicle.max_sample_rate_hz)
@@ -45,8 +47,9 @@ def _read_vehicle_log(
 
 
 def stream_flights(paths: Sequence[Path], vehicle: Vehicle, reader: str | None = None) -> Iterator[Samples]:
-    """The flights, one by one, a long one in parts. Raises BadInput before the first with a line for each
-    that cannot be used."""
+    """The flights one by one, a long one in parts. Raises BadInput before the first flight, with a line for
+    each log that cannot be used.
+    """
     loaded = load_flights_for_fit(paths, vehicle, reader)
     flights = [flight if flight.n_log_parts == 1 else None for flight in loaded]
     del loaded  # a long log is read again below: its stretches need not stay in memory
@@ -58,10 +61,10 @@ def stream_flights(paths: Sequence[Path], vehicle: Vehicle, reader: str | None =
 
 
 def _read_flight_for_fit(path: Path, vehicle: Vehicle, reader: str | None) -> Samples:
-    """A flight; of a long one stretches that are spread over it evenly.
+    """A flight; if it is long, stretches of _FIT_SAMPLES samples that are spread over it evenly.
 
-    Of the stretches seen so far, each of `_FIT_SAMPLES`, every `every`-th is kept. Once they exceed what a
-    fit takes, every second of them is dropped, and from then on half as many are kept.
+    Of the stretches so far, every `every`-th is kept. If the kept ones exceed MAX_FIT_SAMPLES, every second
+    of them is dropped, and `every` doubles. until_s: end of the part before, since parts overlap.
     """
     kept: list[Samples] = []
     every = 1
@@ -87,7 +90,8 @@ def select_rows(samples: Samples, rows: slice) -> Samples:
 
 
 def _rebuilt(parts: list[Samples], join: Callable[[list[Any]], Any]) -> Samples:
-    """Samples whose arrays are made of those of others."""
+    """Samples whose arrays `join` makes of the arrays of the parts; all other fields are those of the first
+    part."""
     first = parts[0]
     names = [name for name, value in vars(first).items() if isinstance(value, np.ndarray)]
     fields = {name: join([getattr(part, name) for part in parts]) for name in names}
@@ -97,7 +101,7 @@ def _rebuilt(parts: list[Samples], join: Callable[[list[Any]], Any]) -> Samples:
 
 
 def _concatenate_samples(name: str, stretches: list[Samples], n_parts: int) -> Samples:
-    """Samples of stretches one after the other, with a gap between."""
+    """The samples of stretches one after the other, each a gap-free stretch of its own. name: of the log."""
     joined = _rebuilt(stretches, np.concatenate)
     is_begin = np.diff(joined.stretch_number, prepend=joined.stretch_number[0]) != 0
     is_begin[np.cumsum([len(stretch.t_s) for stretch in stretches])[:-1]] = True
@@ -114,8 +118,9 @@ def _concatenate_samples(name: str, stretches: list[Samples], n_parts: int) -> S
 
 
 def load_flights_for_fit(paths: Sequence[Path], vehicle: Vehicle, reader: str | None = None) -> list[Samples]:
-    """The flights, each on one time base, of a long one what a fit wants of it. Raises BadInput with a line
-    for each that cannot be used."""
+    """The flights, each on one time base; of a long one the stretches for a fit. Raises BadInput with a line
+    for each log that cannot be used.
+    """
     flights: list[Samples] = []
     mistakes: list[str] = []
     for path in paths:

@@ -44,8 +44,9 @@ class LogRows:
         return np.where(is_doubtful, 0, 1)
 
     def table(self, surfaces: Iterable[str], with_probability: bool = False) -> Document:
-        """The columns of diagnosis.parquet. Where nothing is said of a surface's effectiveness, its
-        bounds are 0 and 1."""
+        """The columns of diagnosis.parquet. Where there is no statement on the effectiveness of a surface,
+        its bounds are 0 and 1.
+        """
         columns: Document = {"t_s": self.t_s, "faulty": self.faulty}
         columns["named"] = self.isolated_surfaces.tolist()
         for i, surface in enumerate(surfaces):
@@ -61,14 +62,16 @@ class LogRows:
         return bool(((self.faulty == 1) & (self.credible == 1)).any())
 
     def clears_alarm(self, other: "LogRows") -> bool:
-        """Whether there is no alarm in these rows, and each credible row of `other`, of the same log with
-        other columns, is credible here too."""
+        """Whether these rows have no credible alarm, and each row that is credible in `other` is credible
+        here too. other: rows of the same log with other columns.
+        """
         return not self.has_credible_alarm() and bool((self.credible >= other.credible).all())
 
     @classmethod
     def of_names(cls, t_s: Floats, names: Names, a: Floats, low: Floats, high: Floats) -> "LogRows":
-        """Rows of a diagnosis without probabilities, with estimate a and bounds, (n, S) each: faulty where a
-        surface is named."""
+        """Rows of a diagnosis without probabilities: a row is faulty if it names a surface. a, low, high (n,
+        S): effectiveness and its bounds.
+        """
         faulty = (names != "").astype(np.int64)
         return cls(t_s, faulty, names, a, low, high, faulty.astype(float), t_s)
 
@@ -86,13 +89,14 @@ class LogRows:
         return replace(self, **changed)
 
     def without_estimate(self, removed: Mask) -> "LogRows":
-        """The rows with effectiveness 1 and bounds 0 and 1 where removed (n,) or (n, S) is true."""
+        """The rows with effectiveness 1 and bounds 0 and 1 where removed, (n,) or (n, S), is true."""
         mask = removed if removed.ndim == 2 else removed[:, None]
         return self._where(mask, effectiveness=1.0, effectiveness_low=0.0, effectiveness_high=1.0)
 
     def without_verdict(self, reasons: Reasons) -> "LogRows":
-        """The rows without alarm, name and bounds, and not credible, where one of the reasons, (n,) each, is
-        true; reasons without a row are left out."""
+        """The rows without alarm, name and bounds, and not credible, where the rows (n,) of a reason are
+        true. A reason without any row is left out.
+        """
         reasons = {reason: mask for reason, mask in reasons.items() if mask.any()}
         rows = replace(self, doubtful_rows=reasons)
         removed = rows.credible == 0
@@ -101,7 +105,7 @@ class LogRows:
 
 
 def join_names(flags: Mask, names: Sequence[str]) -> Names:
-    """The names that are flagged in flags (n, K), joined by +, (n,) text."""
+    """For each row of flags (n, K) the names of the true columns, joined by +, (n,)."""
     return np.array(["+".join(compress(names, row)) for row in flags], dtype=object)
 
 

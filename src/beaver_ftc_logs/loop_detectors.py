@@ -1,7 +1,8 @@
 """Detectors of the control loop on recorded flights.
 
-A detector of the loop receives the measured rates x, the predicted acceleration, and the part Z of each
-surface in it. Both follow from the identified model, with the residual e of one step, rad/s:
+A detector of the loop receives the measured rates x, the predicted acceleration, and the contribution Z of
+each surface to it. Both follow from the identified model, with the residual e of one step, rad/s, and the
+responses F of the groups, rad/s:
 
     acceleration[k] = (x[k] - e[k] - x[k-1]) / dt,      Z_g = F_g / dt
 
@@ -26,12 +27,13 @@ from beaver_ftc_logs.regression import group_commands, group_indices, innovation
 from beaver_ftc_logs.samples import Samples
 
 LOOP_SURFACES = ("aileron", "elevator", "rudder")
-_N_LOOP = 4  # these and the flap
-_DECLARED_GYRO_RAD_S = 1e-4  # small: the declared error of the model contains the noise of the gyros
+_N_LOOP = 4  # number of surfaces of the loop: these and the flap
+_DECLARED_GYRO_RAD_S = 1e-4  # small, because the declared error of the model contains the noise of the gyros
 
 
 class LinearRateModel:
-    """The identified model as a detector's design model: the effect of the last rates x (..., 3) alone."""
+    """The identified model as the design model of a detector: only the effect of the last rates x (...,
+    3)."""
 
     def __init__(self, past: Floats, dt_s: float) -> None:
         self._transposed_jacobian = (past[:3] - np.eye(3)) / dt_s
@@ -46,10 +48,11 @@ class LinearRateModel:
 
 
 def loop_detector_inputs(samples: Samples, model: Model) -> list[tuple[Measured, Floats]]:
-    """The inputs of a detector at each row: measurements, and the command u (4,) as shares of travel.
+    """The inputs of a detector at each row: measurements, and the command u (4,) as shares of travel. The
+    groups of the vehicle are the first columns of Z and u; the other columns are 0.
 
-    Z (n, 3, 4), rad/s2: the part of each surface. If the model cannot predict a row (after a gap), the
-    innovation and Z are 0.
+    Z (n, 3, 4), rad/s2: the contribution of each surface. If the model cannot predict a row, as after a gap,
+    the innovation and Z are 0.
     """
     members = group_indices(model)
     if len(members) > len(LOOP_SURFACES):
@@ -76,7 +79,7 @@ def loop_detector_inputs(samples: Samples, model: Model) -> list[tuple[Measured,
 
 
 def _model_error_sd_rad_s2(model: Model) -> Floats:
-    """The residual's standard deviation as an error of the model, (3,) rad/s2."""
+    """Standard deviation of the residual over a time step, an error of the model, (3,) rad/s2."""
     return np.sqrt(np.diag(np.array(model.noise))) / (1.0 / model.rate_hz)
 
 
@@ -104,8 +107,8 @@ def run_loop_detector(detector: Detector, samples: Samples, model: Model) -> Log
 
 
 def rows_of_verdicts(verdicts: list[Verdict], samples: Samples, model: Model) -> LogRows:
-    """Verdicts as rows. The bounds are 0 to 1 for each surface that the detector may suspect, else 1. A name
-    that is none of the vehicle's groups is `unknown`, of any surface.
+    """Verdicts as rows. The bounds are 0 and 1 for each surface that the detector may suspect, otherwise 1. A
+    name that is no group of the vehicle becomes `unknown`, and any surface is suspected.
 
     a, low (n, S): effectiveness and its lower bound; members: the surfaces of each group.
     """
@@ -114,7 +117,8 @@ def rows_of_verdicts(verdicts: list[Verdict], samples: Samples, model: Model) ->
     statistic, detected = np.array(
         [(verdict.statistic, verdict.detected) for verdict in verdicts], dtype=float
     ).T
-    # by the statistic, if there is one: `detected` of the loop stays true after its first alarm
+    # If there is a statistic, it decides: `detected` of a detector of the loop stays true after its first
+    # alarm.
     faulty = np.where(np.isfinite(statistic), statistic > 1.0, detected).astype(np.int64)
     a, low = np.ones((2, n, len(model.vehicle.surfaces)))
     names = np.full(n, "", dtype=object)
@@ -132,6 +136,8 @@ def rows_of_verdicts(verdicts: list[Verdict], samples: Samples, model: Model) ->
 
 
 def _remaining_effectiveness(verdict: Verdict, g: int) -> float:
-    """Effectiveness of a group by a verdict, 0 to 1; a verdict with neither figure counts as no loss."""
+    """Effectiveness of group g by a verdict, 0 to 1: that of the verdict, otherwise 1 + its estimate of the
+    loss, otherwise 1.
+    """
     given = verdict.effectiveness
     return float(np.clip(1.0 + (verdict.estimate or 0.0) if given is None else given[g], 0.0, 1.0))

@@ -1,4 +1,4 @@
-"""Which output moves which surface, by the parameters that an autopilot's log carries.
+"""The *mixing* of a vehicle, i.e. which command moves which surface, by the parameters in an autopilot's log.
 
 `mixing_ardupilot` and `mixing_px4` read the parameters.
 
@@ -19,16 +19,16 @@ from beaver_ftc_logs.mixing_px4 import px4_mixing
 from beaver_ftc_logs.readers import SELECTIVE_READERS
 from beaver_ftc_logs.recording import Floats, Parameters
 
-# Flaps move both alike, the aileron command moves them against one another.
+# The flap command moves both in the same direction, the aileron command in opposite directions.
 _FLAPERONS = ("left_flaperon", "right_flaperon")
 
 
 @dataclass
 class Mixing:
-    """The surfaces by the parameters of a log, in the form of the vehicle file.
+    """The commands and surfaces by the parameters of a log, in the form of the vehicle file.
 
-    entry_by_column: entry of `commands` by column; surfaces: as the key of the file; lines: remarks on what
-    was found, and on what stays out.
+    entry_by_column: column -> its entry of the key `commands`. surfaces: as the key of the file. lines:
+    remarks on the surfaces that are used, and on those that are left out.
     """
 
     entry_by_column: Document = field(default_factory=dict)
@@ -37,14 +37,16 @@ class Mixing:
 
     @property
     def commands(self) -> list[Any]:
-        """The entries of the columns that a surface follows."""
+        """The entries of the columns that the surfaces follow, each once."""
         used = dict.fromkeys(column for weights in self.surfaces.values() for column in weights)
         return [self.entry_by_column.get(column, column) for column in used]
 
 
 def mixing_of_log(reader: str, params: Parameters, column_names: Collection[str]) -> Mixing:
-    """The mixing by the parameters of a log, with commands from these columns. It has no surfaces if the
-    parameters give none, or if the log has none of their commands."""
+    """The mixing by the parameters of a log, with commands out of these columns. It has no surfaces if the
+    parameters give none, or if the log has none of their commands. outputs: the ways in which the outputs can
+    be logged; n_logged: for each way, the number of surfaces whose output is in the log.
+    """
     mixing = Mixing()
     names = set(column_names)
     if reader not in SELECTIVE_READERS:
@@ -52,7 +54,8 @@ def mixing_of_log(reader: str, params: Parameters, column_names: Collection[str]
     read = CheckedParameters(params, mixing.lines)
     surfaces, outputs, axes = ardupilot_mixing(read) if reader == "ardupilot" else px4_mixing(read, names)
     if surfaces:
-        # surfaces by the commands that the log has of most of them: of their outputs first, else of the axes
+        # The surfaces follow their outputs if the log has those of at least as many surfaces as follow the
+        # axes.
         n_logged = [sum(column in names for column, _ in columns) for columns in outputs]
         n_by_output = max(n_logged)
         if n_by_output and n_by_output >= sum(not axes.problem_of(surface, names) for surface in surfaces):
@@ -68,10 +71,11 @@ def mixing_of_log(reader: str, params: Parameters, column_names: Collection[str]
 def _add_surfaces_by_output(
     mixing: Mixing, all_surfaces: Sequence[Surface], outputs: Outputs, names: set[str]
 ) -> None:
-    """Each surface follows the command of its own output.
+    """Add each surface with the command of its own output.
 
-    A command that is a combination of earlier ones is not used: its surface follows that combination, since a
-    fit cannot distinguish commands that move together. basis: numbers of the commands that are used.
+    If the shares of roll, pitch and yaw in a command are a linear combination of those in earlier commands,
+    the command is not used: its surface follows the same combination of the earlier commands, since a fit
+    cannot distinguish commands that move together. basis: positions of the commands that are used.
     """
     pairs = [*zip(all_surfaces, outputs, strict=True)]
     for surface, (column, _) in pairs:
@@ -81,15 +85,15 @@ def _add_surfaces_by_output(
     surfaces = [surface for surface, *_ in used]
     columns = [column for _, column, _ in used]
     rows = _rows_of_commands(surfaces)
-    own = _weights_of_own_columns(surfaces)
+    own_weights = _weights_of_own_columns(surfaces)
     basis: list[int] = []
     for k, (surface, column, (scale, offset, text)) in enumerate(used):
         factors = np.linalg.lstsq(rows[basis].T, rows[k], rcond=None)[0] if basis else np.zeros(0)
         if basis and np.allclose(factors @ rows[basis], rows[k], atol=1e-6):
-            shares = factors @ own[basis]
+            shares = factors @ own_weights[basis]
         else:
             basis.append(k)
-            shares = own[k]
+            shares = own_weights[k]
         weights = tidy(dict(zip(columns, shares.tolist(), strict=True)))
         mixing.surfaces[surface.name] = weights
         mixing.entry_by_column[column] = _command_entry(column, scale, offset)
@@ -98,18 +102,21 @@ def _add_surfaces_by_output(
 
 
 def _weights_of_own_columns(surfaces: Sequence[Surface]) -> Floats:
-    """The command of each surface by itself, a row of shares of the columns. Flaps are added to one flaperon
-    and taken from the other: half the sum of both is the command without flaps."""
-    own = np.eye(len(surfaces))
+    """For each surface a row of shares of the outputs (k, k), as if each follows its own output alone. The
+    flap command adds to one flaperon and subtracts from the other, so half of the sum of both outputs is the
+    command without flaps.
+    """
+    weights = np.eye(len(surfaces))
     flaps = [k for k, surface in enumerate(surfaces) if surface.name in _FLAPERONS]
     if len(flaps) == len(_FLAPERONS):
-        own[np.ix_(flaps, flaps)] = 0.5
-    return own
+        weights[np.ix_(flaps, flaps)] = 0.5
+    return weights
 
 
 def _rows_of_commands(surfaces: Sequence[Surface]) -> Floats:
-    """The shares of roll, pitch and yaw in each surface; if one is not known, a direction for each kind of
-    surface instead."""
+    """Shares of roll, pitch and yaw in each surface, (k, 3). If those of a surface are unknown: a row for
+    each surface with 1 in the column of its kind, so that only surfaces of one kind move together.
+    """
     known = [surface.axis_shares for surface in surfaces if surface.axis_shares is not None]
     if len(known) == len(surfaces):
         return np.array(known)
@@ -118,7 +125,8 @@ def _rows_of_commands(surfaces: Sequence[Surface]) -> Floats:
 
 
 def _add_surfaces_by_axis(mixing: Mixing, surfaces: Sequence[Surface], axes: Axes, names: set[str]) -> None:
-    """Each surface is a mix of the commands of roll, pitch and yaw, in a log without commands of outputs."""
+    """Add each surface as a mix of the commands of roll, pitch and yaw, for a log without commands of
+    outputs."""
     for surface in surfaces:
         if problem := axes.problem_of(surface, names):
             mixing.lines.append(surface.stays_out(f"its output is not in the log, and {problem}"))
@@ -131,7 +139,8 @@ def _add_surfaces_by_axis(mixing: Mixing, surfaces: Sequence[Surface], axes: Axe
 
 
 def _command_entry(column: str, scale: float, offset: float) -> Any:
-    """The entry of a column in `commands` of a vehicle file."""
+    """The entry of a column in `commands` of a vehicle file: the name alone if scale and offset are 1 and
+    0."""
     if (scale, offset) == (1.0, 0.0):
         return column
     entry = {"column": column, "scale": float(f"{scale:.10g}")}

@@ -21,8 +21,8 @@ from beaver_ftc_logs.mixing_parts import (
 )
 from beaver_ftc_logs.recording import Floats
 
-# SERVOn_FUNCTION of a surface: its name; its share of aileron, elevator and rudder, None where the mixer of
-# the autopilot is not linear; whether MIXING_GAIN and MIXING_OFFSET change it.
+# SERVOn_FUNCTION of a surface -> its name; its shares of aileron, elevator and rudder, None if the mixer of
+# the autopilot is not linear; whether MIXING_GAIN and MIXING_OFFSET change the shares.
 _SURFACES: Mapping[int, tuple[str, tuple[float, float, float] | None, bool]] = {
     4: ("aileron", (1.0, 0.0, 0.0), False),
     16: ("left_spoiler_outer", None, False),
@@ -41,7 +41,7 @@ _SURFACES: Mapping[int, tuple[str, tuple[float, float, float] | None, bool]] = {
 # The commands of aileron, elevator and rudder, from -4500 to 4500.
 _AXIS_COLUMNS = ("AETR.Ail", "AETR.Elev", "AETR.Rudd")
 _FULL_COMMAND = 4500.0
-# The message with the pulses of the outputs up to each number.
+# Largest number of an output -> message with the pulses of the outputs up to this number.
 _MESSAGES = {14: "RCOU", 18: "RCO2", 32: "RCO3"}
 # Allowed values of MIXING_GAIN, and largest magnitude of MIXING_OFFSET, %.
 _MIN_MIXING_GAIN = 0.05
@@ -50,8 +50,9 @@ _MAX_MIXING_OFFSET = 1000.0
 
 
 def ardupilot_mixing(params: CheckedParameters) -> Found:
-    """The surfaces by SERVOn_FUNCTION, the pulse of the output of each, and the commands of the axes. What
-    stays out is noted in the lines of params."""
+    """The surfaces by SERVOn_FUNCTION, the pulse of the output of each, and the commands of the axes. The
+    lines of params receive a remark on each part that is left out.
+    """
     matches = (re.fullmatch(r"SERVO(\d{1,2})_FUNCTION", name) for name in params.values_by_name)
     names = {int(match[1]): match[0] for match in matches if match}
     if not names:
@@ -61,24 +62,35 @@ def ardupilot_mixing(params: CheckedParameters) -> Found:
     surfaces = []
     for channel, kind in kinds.items():
         name, shares, is_mixed = _SURFACES[kind]
-        of_mixer = factors if is_mixed else 1.0
-        axis_shares = None if shares is None or of_mixer is None else np.array(shares) * of_mixer
+        mixer_factors = factors if is_mixed else 1.0
+        axis_shares = None if shares is None or mixer_factors is None else np.array(shares) * mixer_factors
         full = full_name(name, channel, kinds)
         reason = f"SERVO{channel}_FUNCTION {kind}"
         mixer = mixer_reason if is_mixed else ""
         surfaces.append(Surface(full, f"channel {channel}", kind, axis_shares, reason, mixer))
     outputs = []
-    for n in kinds:
-        message = next((text for last, text in _MESSAGES.items() if n <= last), "RCO?")
-        pulses = {part: f"SERVO{n}_{part}" for part in PULSE_RANGE_US}
-        place = f"SERVO{n}_MIN, _TRIM, _MAX"
-        outputs.append((f"{message}.C{n}", pulse_reading(params, place, pulses, f"SERVO{n}_REVERSED")))
+    for channel_number in kinds:
+        message = next((text for last, text in _MESSAGES.items() if channel_number <= last), "RCO?")
+        pulses = {part: f"SERVO{channel_number}_{part}" for part in PULSE_RANGE_US}
+        place = f"SERVO{channel_number}_MIN, _TRIM, _MAX"
+        outputs.append(
+            (
+                f"{message}.C{channel_number}",
+                pulse_reading(params, place, pulses, f"SERVO{channel_number}_REVERSED"),
+            )
+        )
     return surfaces, [outputs], Axes(_AXIS_COLUMNS, 1.0 / _FULL_COMMAND)
 
 
 def _ardupilot_mixers(params: CheckedParameters, kinds: Collection[int]) -> tuple[Floats | None, str]:
-    """The factors of the mixers on aileron, elevator and rudder, None if they are not known, and a text with
-    the parameters [ArduPlane, servos.cpp: channel_function_mixer]."""
+    """The factors (3,) of the mixers on aileron, elevator and rudder, and a text with the parameters
+    [ArduPlane, servos.cpp: channel_function_mixer]:
+
+        gain (1 + max(offset, 0) / 100, 1 - min(offset, 0) / 100, 1 + max(offset, 0) / 100)
+
+    gain: MIXING_GAIN; offset: MIXING_OFFSET, %. None and no text if they are unknown, or if no kind has a
+    mixer.
+    """
     if not any(_SURFACES[kind][2] for kind in kinds):
         return None, ""
     try:

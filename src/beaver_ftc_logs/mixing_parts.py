@@ -1,4 +1,4 @@
-"""What a mixing is made of: surfaces, their outputs, the commands of the axes; and checked parameters.
+"""Parts of a mixing: surfaces, their outputs, the commands of the axes; and checked access to parameters.
 
 A pulse, us, is the width of the signal to a servo. A share is a factor, -1 to 1, on a command of an axis.
 """
@@ -10,14 +10,14 @@ from dataclasses import dataclass, field
 from beaver_ftc_logs.recording import Floats, Parameters, last_value
 from beaver_ftc_logs.units import HALF_PULSE_RANGE_US, NEUTRAL_PULSE_US
 
-# By column of the log its share in a surface.
+# Column of the log -> its share in a surface.
 Weights = dict[str, float]
-# The range that an output has if its parameters are not known, us.
+# The assumed range of an output whose parameters are unknown, us.
 _ASSUMED_MIN_US = NEUTRAL_PULSE_US - HALF_PULSE_RANGE_US
 _ASSUMED_MAX_US = NEUTRAL_PULSE_US + HALF_PULSE_RANGE_US
 # Least and greatest allowed value of the parameters MIN, MAX and TRIM of an output, us.
 PULSE_RANGE_US = {"MIN": (500.0, 2200.0), "MAX": (800.0, 2200.0), "TRIM": (800.0, 2200.0)}
-LEAST_WEIGHT = 1e-9  # a smaller share is rounding
+LEAST_WEIGHT = 1e-9  # a smaller magnitude of a share is rounding
 
 
 class BadParameterError(Exception):
@@ -28,8 +28,9 @@ class BadParameterError(Exception):
 class Surface:
     """A surface by its parameters.
 
-    place: its channel or number; kind: surfaces of one kind get the same command; axis_shares: shares of the
-    roll, pitch and yaw command, None if they are not known; reason, mixer_reason: text with the parameters.
+    place: words for its channel or number. kind: surfaces of the same kind get the same command. axis_shares
+    (3,): shares of the roll, pitch and yaw command, None if they are unknown. reason, mixer_reason: text with
+    the parameters that give surface and shares.
     """
 
     name: str
@@ -44,19 +45,20 @@ class Surface:
         return f"{self.place} is the {spoken}"
 
     def stays_out(self, reason: str) -> str:
-        """The remark that the surface is not used."""
+        """The remark that the surface is left out."""
         return f"{self} ({self.reason}), and stays out: {reason}"
 
 
-# Scale and offset from the numbers of a column to the command, and a remark.
+# Scale and offset, command = scale x number of the column + offset; and a remark.
 Reading = tuple[float, float, str]
-# The column of each surface's output, and how it is read.
+# For each surface the column of its output, and the reading of this column.
 Outputs = list[tuple[str, Reading]]
 
 
 @dataclass(frozen=True)
 class Axes:
-    """The columns of the roll, pitch and yaw command, and their scale. problem: reason not to use them."""
+    """The columns of the roll, pitch and yaw command, and their scale. problem: reason why they cannot be
+    used."""
 
     columns: Sequence[str]
     scale: float
@@ -75,20 +77,23 @@ class Axes:
         return self.problem or next(iter(missing), "" if weights else "its mix is not known")
 
 
-# The surfaces, the ways in which their outputs can be logged, and the commands before the mixer.
+# The surfaces; the ways in which their outputs can be logged, each with an entry a surface; and the commands
+# of the axes, before the mixer.
 Found = tuple[list[Surface], list[Outputs], Axes]
 
 
 @dataclass
 class CheckedParameters:
-    """Checked access to the parameters of a log. lines: receive a remark on each that stays out."""
+    """Checked access to the parameters of a log. lines: receive a remark on each part that is left out."""
 
     values_by_name: Parameters
     lines: list[str]
     lines_on_changes: list[str] = field(default_factory=list)
 
     def number(self, name: str, low: float, high: float, unit: str = "") -> float:
-        """The last value of a parameter. Raises BadParameterError for one that is missing or out of range."""
+        """The last value of a parameter. Raises BadParameterError if it is missing or out of range. If the
+        value changes in the log, a remark is added once.
+        """
         allowed = f"allowed: {low:g} to {high:g}{unit}"
         value = last_value(self.values_by_name, name)
         if value is None:
@@ -101,7 +106,7 @@ class CheckedParameters:
         return value
 
     def whole_number(self, name: str, low: int, high: int) -> int:
-        """The same of a parameter that must be a whole number."""
+        """As `number`, for a parameter that must be a whole number."""
         value = self.number(name, low, high)
         if value != round(value):
             raise BadParameterError(f"{name} is {value:g}, allowed: a whole number")
@@ -115,8 +120,10 @@ class CheckedParameters:
         other: str,
         unused: Collection[int],
     ) -> dict[int, int]:
-        """The kind by number, of the parameters with these names. A remark is added for each unknown kind,
-        except for unused ones."""
+        """Number -> kind, the value of the parameter with this name (names: number -> name). Only known kinds
+        are returned; for another one a remark with the words `other` is added, except for the unused ones.
+        place: word for the number.
+        """
         kinds: dict[int, int] = {}
         for number, name in names.items():
             try:
@@ -132,18 +139,20 @@ class CheckedParameters:
 
 
 def full_name(name: str, number: int, kinds: Mapping[int, int]) -> str:
-    """The name of a surface, with its number if there are several of its kind."""
+    """The name of a surface, with its number if several surfaces have its kind."""
     return name if [*kinds.values()].count(kinds[number]) == 1 else f"{name}_{number}"
 
 
 def pulse_reading(
     params: CheckedParameters, place: str, names: Mapping[str, str], reverse: str, bit: int | None = None
 ) -> Reading:
-    """Scale and offset from a pulse, us, to the command, and a text: full travel is half of the range.
+    """The reading of a pulse, us, as a command in which full travel is half of the range of the pulse:
 
-    names: of the parameters MIN, MAX and, where there is one, TRIM, else the middle is neutral; place: of
-    them in a text. reverse: parameter of the direction, of several outputs if it has a bit of each [PX4,
-    mixer_module.cpp].
+        command = (pulse - trim) 2 / (max - min),    negative if the output is reversed
+
+    names: MIN, MAX and perhaps TRIM -> name of the parameter; without TRIM it is the middle. place: words for
+    these. reverse: parameter of the direction; of several outputs, if it has a bit for each [PX4,
+    mixer_module.cpp]. Without valid parameters the usual range is assumed.
     """
     try:
         us = {part: params.number(name, *PULSE_RANGE_US[part], " us") for part, name in names.items()}
@@ -165,6 +174,6 @@ def pulse_reading(
 
 
 def tidy(weights: Weights) -> Weights:
-    """The weights without those of rounding, each to ten digits."""
+    """The weights without those that are rounding, each to ten digits."""
     kept = {column: weight for column, weight in weights.items() if abs(weight) > LEAST_WEIGHT}
     return {column: float(f"{weight:.10g}") for column, weight in kept.items()}

@@ -23,25 +23,25 @@ from beaver_ftc_logs.mixing_parts import (
 )
 from beaver_ftc_logs.recording import last_value
 
-# CA_SV_CSn_TYPE of a surface that moves the aircraft about an axis.
+# CA_SV_CSn_TYPE of a surface that moves the aircraft about an axis -> name of the surface.
 _SURFACES = {
     1: "left_aileron", 2: "right_aileron", 3: "elevator", 4: "rudder", 5: "left_elevon", 6: "right_elevon",
     7: "left_vtail", 8: "right_vtail", 12: "custom", 13: "left_atail", 14: "right_atail", 15: "aileron",
 }  # fmt: skip
-# Parameter of the function of an output: driver, number.
+# Name of the parameter with the function of an output; groups: driver, number.
 _OUTPUT_PATTERN = r"(PWM_MAIN|PWM_AUX)_FUNC(\d{1,2})"
-_MAX_TORQUE = 1000.0  # of CA_SV_CSn_TRQ_R, _P and _Y, in the unit of the log
-_MAX_SURFACES = 8  # CA_SV_CS_COUNT
-_FIRST_SERVO = 201  # the function of an output that moves surface 0
-_FIXED_WING = 1  # CA_AIRFRAME
+_MAX_TORQUE = 1000.0  # largest magnitude of CA_SV_CSn_TRQ_R, _P and _Y, in the unit of the log
+_MAX_SURFACES = 8  # largest CA_SV_CS_COUNT
+_FIRST_SERVO = 201  # function of an output that moves surface 0; that for surface n is larger by n
+_FIXED_WING = 1  # CA_AIRFRAME of a fixed wing
 _AXIS_COLUMNS = tuple(f"vehicle_torque_setpoint.xyz[{i}]" for i in range(3))
 
 
 def px4_mixing(params: CheckedParameters, column_names: set[str]) -> Found:
-    """The surfaces by CA_SV_CSn_TYPE, their shares by the torques; the ways in which their outputs may be
-    logged; the commands of the axes. What stays out is noted in the lines of params.
+    """The surfaces by CA_SV_CSn_TYPE, with shares by their torques; the ways in which their outputs may be
+    logged; the commands of the axes. The lines of params receive a remark on each part that is left out.
 
-    drivers: by number of the surface, the parameters that give it an output.
+    drivers: number of the surface -> the parameters that give it an output, such as PWM_MAIN_FUNC3.
     """
     try:
         n = params.whole_number("CA_SV_CS_COUNT", 1, _MAX_SURFACES)
@@ -58,23 +58,24 @@ def px4_mixing(params: CheckedParameters, column_names: set[str]) -> Found:
             params.lines.append(f"surface {i} stays out: CA_SV_CS{i}_TRQ_R, _P and _Y are 0")
             continue
         servo = _FIRST_SERVO + i
-        found = [name for name, values in params.values_by_name.items() if values[-1] == servo]
-        drivers[i] = [name for name in found if re.fullmatch(_OUTPUT_PATTERN, name)]
+        with_this_servo = [name for name, values in params.values_by_name.items() if values[-1] == servo]
+        drivers[i] = [name for name in with_this_servo if re.fullmatch(_OUTPUT_PATTERN, name)]
         reason = f"CA_SV_CS{i}_TYPE {kind}{''.join(f', {name} {servo}' for name in drivers[i])}"
         full = full_name(_SURFACES[kind], i, kinds)
         surfaces.append(Surface(full, f"surface {i}", i, shares[i], reason))
     outputs = [[(f"actuator_servos.control[{i}]", (1.0, 0.0, "")) for i in drivers]]
-    if "actuator_outputs_1.output[0]" not in column_names:  # else it is unknown which of the two is MAIN
+    if "actuator_outputs_1.output[0]" not in column_names:  # with it, it is unknown which of the two is MAIN
         outputs += _px4_pulses(params, [*drivers.values()])
-    # of several torque setpoints, as a vehicle that can hover has, it is unknown which one is of these
+    # A vehicle that can hover has several torque setpoints, and it is unknown which one moves the surfaces.
     is_fixed_wing = last_value(params.values_by_name, "CA_AIRFRAME") == _FIXED_WING
     reason = "" if is_fixed_wing else "CA_AIRFRAME is not 1 (fixed wing)"
     return surfaces, outputs, Axes(_AXIS_COLUMNS, 1.0, reason)
 
 
 def _px4_axis_shares(params: CheckedParameters, indices: Collection[int]) -> dict[int, Any]:
-    """The share of each torque command in each surface: the pseudo-inverse of the torques of all surfaces
-    [PX4, ControlAllocationPseudoInverse]. None for every surface if a torque is not known."""
+    """The shares (3,) of the torque commands in each surface: the rows of the pseudo-inverse of the torques
+    of all surfaces [PX4, ControlAllocationPseudoInverse]. None for every surface if a torque is unknown.
+    """
     try:
         torques = [
             [params.number(f"CA_SV_CS{i}_TRQ_{axis}", -_MAX_TORQUE, _MAX_TORQUE) for axis in "RPY"]
@@ -88,10 +89,10 @@ def _px4_axis_shares(params: CheckedParameters, indices: Collection[int]) -> dic
 
 
 def _px4_pulses(params: CheckedParameters, drivers: Sequence[list[str]]) -> list[Outputs]:
-    """The pulses of the first output of each surface; none if a surface has no output, or if there are two
-    drivers.
+    """The pulse of the first output of each surface, as one way to log all outputs; no way if a surface has
+    no output, or if the outputs have different drivers.
 
-    drivers: of each surface the parameters that give it an output, such as PWM_MAIN_FUNC3.
+    drivers: for each surface the parameters that give it an output, such as PWM_MAIN_FUNC3.
     """
     matches = [re.fullmatch(_OUTPUT_PATTERN, names[0]) for names in drivers if names]
     outputs = [(match[1], int(match[2])) for match in matches if match]

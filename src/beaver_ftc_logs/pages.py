@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from jinja2 import Template
 
 _TEMPLATE_FOLDER = Path(__file__).parent / "templates"
-_PLOTTED_POINTS = 6000  # of a line, at most twice as many
+_PLOTTED_POINTS = 6000  # a drawn line has about this many points, and fewer than twice as many
 
 
 @cache
@@ -38,8 +38,11 @@ def load_template(name: str) -> "Template":
 
 @dataclass(frozen=True)
 class Words:
-    """What a flight's page says of its diagnosis: of which surfaces, what its bounds are called, what is said
-    without an event, and of the model."""
+    """Words of a page that depend on the kind of model.
+
+    surfaces: names of the surfaces. bounds: label of the bounds. quiet: sentence for a flight without an
+    event. predicts: sentence about the model.
+    """
 
     surfaces: Sequence[str]
     bounds: str
@@ -48,7 +51,7 @@ class Words:
 
 
 def words_of_model(model: Model) -> Words:
-    """Of an identified model."""
+    """The words for an identified model."""
     return Words(
         list(model.vehicle.surfaces),
         "90 % bounds",
@@ -59,7 +62,9 @@ def words_of_model(model: Model) -> Words:
 
 
 def words_of_aircraft(aircraft: Aircraft, window_s: float) -> Words:
-    """Of an aircraft's own model. window_s: for how long a fault has to stand for its bounds to hold."""
+    """The words for the design model of an aircraft. window_s: time for which a fault must last so that its
+    bounds hold, s.
+    """
     return Words(
         aircraft.surfaces,
         "bounds",
@@ -106,7 +111,8 @@ def flight_figure(samples: Samples, rows: LogRows, words: Words) -> Any:
     axes = grid[:, 0]
     _draw_lines(axes[0], samples.t_s, np.rad2deg(samples.rates), ["p", "q", "r"], "rates, deg/s")
     limit = float(np.rad2deg(np.nanpercentile(np.abs(samples.rates), 99.9))) * 1.3
-    axes[0].set_ylim(-max(limit, 1.0), max(limit, 1.0))  # a landing's spike does not flatten the flight
+    # The limits leave out a tenth of a percent, so that a spike at landing does not flatten the rest
+    axes[0].set_ylim(-max(limit, 1.0), max(limit, 1.0))
     _draw_lines(axes[1], samples.t_s, samples.commands, list(surfaces), "healthy surfaces'\nshare of travel")
     _draw_lines(axes[2], rows.t_s, rows.fault_probability[:, None], ["a fault"], "probability")
     axes[2].set_ylim(-0.05, 1.05)
@@ -121,14 +127,14 @@ def flight_figure(samples: Samples, rows: LogRows, words: Words) -> Any:
 
 
 def label_axis(axis: Any, label: str, **grid_options: Any) -> None:
-    """Axis label, ticks and grid."""
+    """Set the label, the size of the ticks and the grid of an axis."""
     axis.set_ylabel(label, fontsize=8)
     axis.tick_params(labelsize=8)
     axis.grid(color=GRID, linewidth=0.5, **grid_options)
 
 
 def _draw_lines(axis: Any, t_s: np.ndarray, values: np.ndarray, names: list[str], y_label: str) -> None:
-    """A line for each column of values (n, k), of about _PLOTTED_POINTS points."""
+    """Draw a line for each column of values (n, k), with about _PLOTTED_POINTS points each."""
     shown = slice(None, None, max(len(t_s) // _PLOTTED_POINTS, 1))
     for i, name in enumerate(names):
         axis.plot(t_s[shown], values[shown, i], color=SERIES[i % len(SERIES)], linewidth=0.7, label=name)
@@ -137,7 +143,7 @@ def _draw_lines(axis: Any, t_s: np.ndarray, values: np.ndarray, names: list[str]
 
 
 def _draw_effectiveness(axis: Any, rows: LogRows, s: int, label: str) -> None:
-    """The effectiveness of surface s, and its bounds as an area with this label."""
+    """Draw the effectiveness of surface s, and its bounds as an area with this label."""
     shown = slice(None, None, max(len(rows.t_s) // _PLOTTED_POINTS, 1))
     axis.fill_between(
         rows.t_s[shown], rows.effectiveness_low[shown, s],
@@ -149,7 +155,7 @@ def _draw_effectiveness(axis: Any, rows: LogRows, s: int, label: str) -> None:
 
 
 def _shade_alarms(axis: Any, rows: LogRows) -> None:
-    """Shade the time in which the alarm stands."""
+    """Shade the times at which the alarm stands."""
     for begin, end in true_runs(rows.faulty == 1):
         end_s = rows.t_s[min(end, len(rows.t_s) - 1)]
         axis.axvspan(rows.t_s[begin], end_s, color="#f4d6cc", alpha=0.45, linewidth=0)
@@ -163,7 +169,9 @@ def write_results(
     page: str | None = None,
     extra: Callable[[Path], None] | None = None,
 ) -> Path:
-    """Write `parent/<name>` whole or not at all: diagnosis.parquet, verdict.json and report.html."""
+    """Write the folder `parent/<name>` whole or not at all: diagnosis.parquet, verdict.json, report.html if
+    there is a page, and the files that `extra` writes. Returns the folder.
+    """
     import pyarrow as pa
     from pyarrow import parquet
 
@@ -178,7 +186,7 @@ def write_results(
 
 
 def encode_png(figure: Any) -> str:
-    """A figure as PNG in base64, as a page holds it."""
+    """A figure as PNG in base64, for a page."""
     buffer = BytesIO()
     figure.savefig(buffer, format="png")
     return b64encode(buffer.getvalue()).decode()

@@ -13,41 +13,42 @@ from beaver_ftc.documents import BadInput
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Mask = NDArray[np.bool_]
-# For each reason of a doubt its rows, (n,).
+# Reason -> rows (n,) that are not credible for it.
 Reasons = dict[str, Mask]
-# Columns that are read, all where None.
+# Names of the columns that are read; all columns if None.
 Wanted = Collection[str] | None
-# Parameters of an autopilot by name: its value in the log; if it changes, the first and the last one.
+# Name of a parameter of an autopilot -> its value in the log; if it changes, its first and its last value.
 Parameters = dict[str, tuple[float, ...]]
 # The column of the time and its unit.
 TimeSource = tuple[str, str]
 _N_LISTED_NEAREST_NAMES = 10
-# Least value of a divisor that may be zero.
+# Least value of a divisor that could otherwise be 0; its square is still a normal number.
 MIN_DIVISOR = float(np.sqrt(np.finfo(float).tiny))
 
 
 def largest_magnitude(values: Floats) -> float:
-    """The largest of the numbers without sign, 0 of none."""
+    """The largest magnitude of the numbers, nan left out; 0 without a number."""
     return float(np.nanmax(np.abs(values), initial=0.0))
 
 
 @dataclass(frozen=True)
 class Column:
-    """One logged quantity. t_s (n,) s, increasing; values (n,) in the unit its name carries; note: a line on
-    rows that were left out."""
+    """One logged quantity. t_s (n,) s, increasing; values (n,) in the unit that the name states; note: a line
+    on rows that were left out.
+    """
 
     t_s: Floats
     values: Floats
     note: str = ""
 
 
-# Columns by name.
+# Name -> column.
 Columns = dict[str, Column]
 
 
 @dataclass(frozen=True)
 class LoggedFailure:
-    """A failure that the log itself states: for scoring only, `diagnose` never reads it."""
+    """A failure that the log itself states, only for scores: `diagnose` never reads it."""
 
     t_s: float
     surface: str
@@ -55,11 +56,11 @@ class LoggedFailure:
 
 @dataclass(frozen=True)
 class RecordedFlight:
-    """One flight: its columns by name, what went wrong by the log's own word, remarks on the reading, and the
-    autopilot's parameters that the log carries.
+    """One flight: its columns by name, the failures that the log states, remarks on the reading, and the
+    parameters of the autopilot in the log.
 
-    unread_column_names: names of columns of the log, those that were not read among them, for the message
-    that a wanted column is missing. A reader of wanted columns gives them where the log lacks one of these.
+    unread_column_names: names of all columns of the log, also of those that were not read. A reader that
+    reads only wanted columns sets them if one of these is missing; the error message lists them.
     """
 
     name: str
@@ -70,7 +71,7 @@ class RecordedFlight:
     unread_column_names: tuple[str, ...] = ()
 
     def check_has(self, names: Iterable[str]) -> None:
-        """Raise BadInput, with the names nearest to it, where the log lacks a column."""
+        """Raise BadInput, with the nearest names, if a column is missing."""
         for name in names:
             if name not in self.columns:
                 nearest = nearest_names_text(name, {*self.columns, *self.unread_column_names})
@@ -79,7 +80,7 @@ class RecordedFlight:
 
 
 def add_parameter(values_by_name: Parameters, name: str, value: float) -> None:
-    """Note a value that a log gives to a parameter."""
+    """Add a value of a parameter in the log: as its first value, or as its last one if it has changed."""
     values = values_by_name.get(name, ())
     is_as_before = bool(values) and (values[-1] == value or (isnan(values[-1]) and isnan(value)))
     if not is_as_before:
@@ -87,13 +88,13 @@ def add_parameter(values_by_name: Parameters, name: str, value: float) -> None:
 
 
 def last_value(parameters: Parameters, name: str) -> float | None:
-    """The last value of a parameter, None where the log does not give it."""
+    """The last value of a parameter, None if the log has none."""
     values = parameters.get(name)
     return values[-1] if values else None
 
 
 def nearest_names_text(wanted_name: str, names: Iterable[str]) -> str:
-    """The ten names nearest to what was given, and how many there are besides."""
+    """The _N_LISTED_NEAREST_NAMES names nearest to the wanted one, and the number of further names."""
     wanted = wanted_name.lower()
     ranked = sorted(names)
     ranked.sort(key=lambda name: -SequenceMatcher(None, name.lower(), wanted).ratio())

@@ -1,8 +1,7 @@
-"""A flight of our own once more through the diagnosis that flew it: its log.parquet, without JSBSim.
+"""Replay a log of `beaver-ftc run` through the diagnosis of its scenario, without JSBSim.
 
-What the log has are the measured rates, the commands and the flow as the aircraft had it: where no sensor
-but the gyros had errors or broke, that is what the diagnosis was given, and the verdicts are the same to the
-bit.
+The log.parquet has the measured rates, the commands, and the true flow. If no other sensor than the gyros had
+errors or failed, these were the inputs of the diagnosis in flight, and the verdicts are the same to the bit.
 """
 
 from itertools import chain
@@ -20,13 +19,14 @@ from beaver_ftc_logs.recording import Floats
 
 
 def is_log_of_run(path: Path) -> bool:
-    """Whether a path is the log of one of our runs, with its scenario beside it."""
+    """Whether a path is a log of `beaver-ftc run`, with its scenario in the same folder."""
     return path.name == "log.parquet" and path.with_name("scenario.yaml").is_file()
 
 
 def replay_run_log(path: Path) -> tuple[Document, Document]:
-    """Step the diagnosis through a log: columns of diagnosis.parquet by name, and the document of
-    verdict.json. Raises BadInput where the flight's diagnosis was none of ours."""
+    """Step the diagnosis through a log. Returns the columns of diagnosis.parquet by name, and the document of
+    verdict.json. Raises BadInput if the log lacks an input of the diagnosis.
+    """
     from beaver_ftc.loop import Diagnosis
     from beaver_ftc.scenario import load_scenario
     from beaver_ftc_logs import stepped
@@ -47,7 +47,9 @@ def replay_run_log(path: Path) -> tuple[Document, Document]:
 
 
 def _replay_verdict(path: Path, scenario: Any, log: dict[str, Floats], verdicts: list[Any]) -> Document:
-    """Times of detection and isolation, and whether metrics.json and the log of the flight say the same."""
+    """The document of verdict.json: times of detection and isolation, and whether they agree with
+    metrics.json and the log of the flight.
+    """
     from beaver_ftc_logs.stepped import named_since
 
     t_s = log["t_s"]
@@ -71,7 +73,7 @@ def _replay_verdict(path: Path, scenario: Any, log: dict[str, Floats], verdicts:
 
 
 def _lacking_inputs(scenario: Any) -> list[str]:
-    """Return the inputs that the diagnosis had in flight and the log lacks."""
+    """A line for each error or fault of a sensor that the diagnosis had in flight and the log lacks."""
     ideal = type(scenario.sensors)()
     flown = [scenario.sensors, *(change.sensors for change in scenario.changes if change.sensors)]
     errors = {name for sensors in flown for name, settings in sensors if settings != getattr(ideal, name)}
@@ -85,8 +87,9 @@ def _lacking_inputs(scenario: Any) -> list[str]:
 
 
 def _is_as_flown(path: Path, *times_s: float | None) -> bool | None:
-    """Whether detection and isolation are those of metrics.json, whose times are rounded otherwise; None if
-    there is none beside the log."""
+    """Whether the times of detection and isolation are those of metrics.json, which are rounded otherwise;
+    None if there is no metrics.json beside the log.
+    """
     metrics_path = path.with_name("metrics.json")
     if not metrics_path.is_file():
         return None
@@ -102,7 +105,7 @@ def _is_as_flown(path: Path, *times_s: float | None) -> bool | None:
 
 
 def as_text(verdict: Document) -> str:
-    """The verdict of a replay in lines for people."""
+    """The verdict of a replay as lines of text."""
     at_s = verdict["detection_s"]
     outcome = "nothing detected" if at_s is None else f"detected at {at_s:.2f} s"
     if verdict["isolated"]:

@@ -1,6 +1,6 @@
-"""Two logs to follow the first steps with: a small flying wing, healthy, and with a weak left elevon.
+"""Two logs for the first steps: a small flying wing, healthy, and with a weak left elevon.
 
-The wing is no real one: its rates follow the elevons with one lag, a law holds roll and pitch angles that
+The wing is invented: its rates follow the elevons with one lag, a law holds roll and pitch angles that
 change every few seconds, and the attitude follows the rates by Euler's kinematics [SL03, eq. 1.4-4].
 """
 
@@ -23,9 +23,9 @@ _ACCELERATION_BY_FULL_ELEVON_RAD_S2 = np.array([[22.0, 9.0, -1.2], [22.0, -9.0, 
 _TURBULENCE_DRIVING_NOISE = np.array([1.2, 0.8, 0.4])  # rad/s2 per root of a second
 _TURBULENCE_DECAY_PER_S = 2.0
 _GYRO_NOISE_RAD_S = 0.004
-_ATTITUDE_GAIN_PER_RAD = 1.2  # of the law; commands are shares of travel
+_ATTITUDE_GAIN_PER_RAD = 1.2  # gain of the law, share of travel for 1 rad
 _RATE_GAIN_S_PER_RAD = 0.15
-_DEMANDED_ATTITUDE_HOLD_S = 4.0  # for which the law holds one attitude
+_DEMANDED_ATTITUDE_HOLD_S = 4.0  # the law holds each demanded attitude for this time
 _ROLL_AMPLITUDE_RAD = 0.5
 _PITCH_AMPLITUDE_RAD = 0.15
 VEHICLE_FILE_TEXT = """\
@@ -54,7 +54,7 @@ def files() -> dict[str, str]:
 
 
 def _table_text(duration_s: float, seed: int, weak_from_s: float = inf) -> str:
-    """A table as CSV, with the units in its head."""
+    """A log as a CSV table with a header. weak_from_s: time from which the left elevon is weak, s."""
     header = "time_ms,gyro_x,gyro_y,gyro_z,roll_cmd,pitch_cmd,roll_rad,pitch_rad"
     rows = _simulate_rows(duration_s, np.random.default_rng(seed), weak_from_s)
     return "\n".join([header, *(",".join(f"{cell:.7g}" for cell in row) for row in rows)]) + "\n"
@@ -66,8 +66,8 @@ def _simulate_rows(duration_s: float, rng: np.random.Generator, weak_from_s: flo
         w' = A w + B e + d,     d' = -D d + noise
         phi' = p + tan(theta) (q sin(phi) + r cos(phi)),     theta' = q cos(phi) - r sin(phi)
 
-    w (3,) rad/s: rates p, q, r; e (2,): right and left elevon, shares of travel, as far as they act; d (3,)
-    rad/s2: turbulence; phi, theta rad: roll and pitch angle.
+    w (3,) rad/s: rates p, q, r; e (2,): right and left elevon times their effectiveness, shares of travel; d
+    (3,) rad/s2: turbulence; phi, theta rad: roll and pitch angle.
     """
     dt_s = 1.0 / SAMPLE_RATE_HZ
     rates = np.zeros(3)

@@ -1,6 +1,7 @@
 """Compare a diagnosis with what the log states: labels of effectiveness, or time and surface of a failure.
 
-Used after the diagnosis (`--score`, the benchmark, the tests of an identification), never by the filter.
+The scores are computed after the diagnosis (`--score`, the benchmark, the tests of an identification). The
+filter never uses them.
 """
 
 from dataclasses import replace
@@ -51,7 +52,9 @@ def score_against_labels(rows: LogRows, labels: Floats) -> Document:
         keys = ("classes", "healthy_or_faulty", "side", "mean_error", "held_by_bounds")
         return {"rows": 0, "settings": [], **dict.fromkeys(keys)}
     truth = labels[known]
-    e, low, high = (x[known] for x in (rows.effectiveness, rows.effectiveness_low, rows.effectiveness_high))
+    e, low, high = (
+        values[known] for values in (rows.effectiveness, rows.effectiveness_low, rows.effectiveness_high)
+    )
     levels, counts = np.unique(truth, axis=0, return_counts=True)
     frequent = levels[counts >= min(0.005 * len(truth), counts.max())]
     faulty = (truth < 1.0).any(axis=1)

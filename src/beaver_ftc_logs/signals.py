@@ -1,7 +1,7 @@
 """Checks of a logged signal: how long it has been constant, whether it is clipped, where it has spikes.
 
-A measured quantity does not repeat for long to the last bit. A command may: the flights that a model was
-fitted to show for how long.
+A measured quantity does not keep the same value, to the last bit, for long. A command may keep it: for how
+long, the flights to which a model was fitted show.
 """
 
 from collections.abc import Iterator
@@ -11,14 +11,14 @@ import numpy as np
 from beaver_ftc_logs.recording import Column, Floats, Ints, Mask
 from beaver_ftc_logs.runs import last_true_row
 
-# A measured rate that repeats for longer than both is frozen.
+# A measured rate is frozen if its value stays for longer than both.
 MIN_STILL_S = 1.5
-MIN_STILL_ROWS = 12  # rows that a signal needs, too, for its spikes to be found
-# Rows in turn, and in all, at the largest value of a clipped signal.
+MIN_STILL_ROWS = 12  # also the least number of rows in which spikes are searched
+# Least number of successive rows, and of all rows, at the largest value of a clipped signal.
 _CLIPPED_IN_TURN = 3
 _CLIPPED_IN_ALL = 10
-_SPIKE_RATIO = 40.0  # of the steps to and from a spike, over the usual step
-_MAX_SPIKE_SHARE = 0.01  # of the rows: with more, the signal is noisy
+_SPIKE_RATIO = 40.0  # the steps to and from a spike exceed this times the usual step
+_MAX_SPIKE_SHARE = 0.01  # if a larger share of the rows are spikes, the signal is noisy and has none
 
 
 def time_since_change_s(column: Column) -> Floats:
@@ -34,10 +34,12 @@ def _changed_rows(values: Floats) -> Mask:
 
 
 def find_clipped_rows(values: Floats) -> Mask:
-    """Rows (n,) at the largest value so far, of either sign, if it has lasted for three rows and has been
-    reached in ten rows.
+    """Rows (n,) at the largest value so far, of either sign, once the value has lasted for _CLIPPED_IN_TURN
+    rows in turn and has been reached in _CLIPPED_IN_ALL rows in all.
 
-    Uses nothing later than the row. v (n,): the values with either sign; top: the largest of them so far.
+    The result for a row depends on no later row. v (n,): the values with either sign; top: the largest of
+    them so far; since: the last row that is not at the top or has just changed; before: number of rows at the
+    top before it became so large.
     """
     clipped = np.zeros(len(values), dtype=bool)
     for v in (values, -values):
@@ -45,15 +47,17 @@ def find_clipped_rows(values: Floats) -> Mask:
         at_top = (v == top) & (v > 0.0)
         since = last_true_row(_changed_rows(v) | ~at_top)
         total = np.cumsum(at_top)
-        before = (total - at_top)[last_true_row(_changed_rows(top))]  # a larger value begins the count again
+        before = (total - at_top)[last_true_row(_changed_rows(top))]  # a larger value restarts the count
         lasts = np.arange(len(v)) - since >= _CLIPPED_IN_TURN - 1
         clipped |= at_top & lasts & (total - before >= _CLIPPED_IN_ALL)
     return clipped
 
 
 def find_spike_rows(values: Floats) -> Ints:
-    """Indices of single rows that differ from both neighbours by more than 40 times the usual step; none if
-    they are more than 1 % of the rows."""
+    """Positions of single rows that differ from both neighbours, in the same direction, by more than
+    _SPIKE_RATIO times the usual step; none if they are more than _MAX_SPIKE_SHARE of the rows. usual: median
+    magnitude of the steps that are not 0.
+    """
     finite = np.flatnonzero(np.isfinite(values))
     if len(finite) < MIN_STILL_ROWS:
         return finite[:0]
@@ -66,7 +70,8 @@ def find_spike_rows(values: Floats) -> Ints:
 
 
 def column_defect_texts(name: str, column: Column, is_rate: bool) -> list[str]:
-    """Return a line for each mistake in a column over the whole flight. is_rate: a rate, not a command."""
+    """A line for each defect of a column in the whole flight. is_rate: whether it is a rate, not a
+    command."""
     values = column.values
     texts = [column.note] if column.note else []
     n = int((~np.isfinite(values)).sum())
@@ -80,7 +85,7 @@ def column_defect_texts(name: str, column: Column, is_rate: bool) -> list[str]:
 
 
 def _rate_defect_texts(name: str, column: Column) -> Iterator[str]:
-    """Yield a line for each mistake that only a measured rate shows: frozen, clipped, with spikes."""
+    """Yield a line for each defect that only a measured rate shows: frozen, clipped, with spikes."""
     values = column.values
     still_s = float(time_since_change_s(column).max(initial=0.0))
     if still_s > MIN_STILL_S:

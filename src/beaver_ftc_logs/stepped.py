@@ -29,10 +29,10 @@ if TYPE_CHECKING:
     from beaver_ftc.scenario import Scenario
 
 LOSS_FAULT_TYPE = "loss_of_effectiveness"
-BOUND_WINDOW_S = 1.0  # for which the effectiveness is taken as constant
-_LOSS_TOLERANCE = 1e-9  # of theta: rounding must not empty an intersection of sets that touch
-_TOLERANCE_RAD_S2 = 1e-12  # of |nu - theta Z|: rounding must not exclude a theta on its bound
-# As how many white samples one sample counts in the bounds of the command gains.
+BOUND_WINDOW_S = 1.0  # the effectiveness is assumed constant for this time
+_LOSS_TOLERANCE = 1e-9  # tolerance of theta: rounding must not empty an intersection of sets that touch
+_TOLERANCE_RAD_S2 = 1e-12  # tolerance of |nu - theta Z|: rounding must not exclude a theta on its bound
+# Number of white samples with the information of one sample, in the bounds of the command gains.
 _EFFECTIVE_SAMPLE_SHARE = 0.4
 _ERROR_KEYS = ("fdi", "actuators", "design_model")  # not `substeps`: a frame of a log has one instant
 
@@ -54,14 +54,13 @@ class Replayed:
 
 
 def error_sections(scenario: "Scenario") -> Document:
-    """Return the errors that a scenario declares, as `Diagnosis` takes it."""
+    """The sections of a scenario that declare errors, as arguments of `Diagnosis`."""
     values = scenario.model_dump(mode="json", exclude_unset=True)
     return {key: values[key] for key in _ERROR_KEYS if key in values}
 
 
 def input_columns(aircraft: "Aircraft") -> tuple[list[str], ...]:
-    """Return the columns of our log that the diagnosis reads at each sample: rates, signals, commands,
-    attitude."""
+    """The columns of our log that the diagnosis reads at each sample: rates, signals, commands, attitude."""
     return (
         [f"{axis}_measured_rad_s" for axis in "pqr"],
         [*FLOW, *aircraft.signals],
@@ -87,7 +86,7 @@ def replay_samples(diagnosis: Diagnosis, arrays: Sequence[Floats], rate_hz: floa
     n = max(round(BOUND_WINDOW_S * rate_hz), 1)
     low = 1.0 + _sliding_maximum(lo, n)
     high = 1.0 - _sliding_maximum(-hi, n)
-    # If no constant loss explains a window, it says nothing.
+    # If no constant loss explains a window, its bounds are 0 and 1.
     empty = low > high
     return Replayed(verdicts, np.where(empty, 0.0, low), np.where(empty, 1.0, high), *_command_gains(nu, Z))
 
@@ -96,8 +95,8 @@ def _command_gains(nu: Floats, Z: Floats) -> tuple[Floats, Floats]:
     """The gains and their upper bounds (S,) of `Replayed`: 1 + beta of nu = constant + Z beta, each axis in
     standard deviations of nu.
 
-    `Innovations` does this regression; here it holds rad/s2 instead of rad/s. Its noise only weights the
-    axes: it is built without the checks and the other fields of a noise that was fitted.
+    `Innovations` does this regression; here it has rad/s2 instead of rad/s. Its noise model only weights the
+    axes, so it is built without checks (`model_construct`) and has no other field.
     """
     rows = np.flatnonzero(np.isfinite(nu).all(axis=1) & (np.arange(len(nu)) > 0))
     if (parts := split_parts(rows)) is None:
@@ -112,8 +111,10 @@ def _command_gains(nu: Floats, Z: Floats) -> tuple[Floats, Floats]:
 
 
 def _explaining_losses(nu: Floats, eta: Floats, Z: Floats) -> tuple[Floats, Floats]:
-    """Least and greatest theta (n, S) of a loss with |nu - theta Z| <= eta on every axis of the frame;
-    least above greatest where none does."""
+    """Least and greatest theta (n, S) of a loss with |nu - theta Z| <= eta on every axis of the frame, each
+    in [-1, 0]; the least is above the greatest if no theta fulfils it. On an axis without effect, Z = 0,
+    every theta fulfils it or none.
+    """
     eta = eta + _TOLERANCE_RAD_S2
     acts = np.abs(Z) > MIN_DIVISOR
     Z1 = np.where(acts, Z, 1.0)
@@ -125,7 +126,7 @@ def _explaining_losses(nu: Floats, eta: Floats, Z: Floats) -> tuple[Floats, Floa
 
 
 def _sliding_maximum(x: Floats, n: int) -> Floats:
-    """For each column the maximum over each sample and the `n - 1` samples before it."""
+    """For each column of x (k, S) the maximum over each row and the `n - 1` rows before it."""
     from scipy.ndimage import maximum_filter1d
 
     return maximum_filter1d(x, n, axis=0, mode="constant", cval=-np.inf, origin=(n - 1) // 2)
@@ -145,11 +146,18 @@ def named_since(t_s: Floats, verdicts: Sequence[Verdict]) -> float | None:
 def _bounds(
     verdict: Verdict, alone_low: Floats, alone_high: Floats, surfaces: Sequence[str]
 ) -> tuple[Floats, Floats]:
-    """Bounds (S,) on the effectiveness at a sample, if at most one surface is at fault. alone_low and
-    alone_high (S,): as `Replayed`.
+    """Bounds low, high (S,) on the effectiveness at a sample, if at most one surface is at fault. alone_low
+    and alone_high (S,): as in `Replayed`.
 
-    An isolated surface has these bounds only if the type of its fault is a loss. A fault of another type, or
-    of none, may be no loss: its bounds are 0 and 1.
+        verdict                                surface            low          high
+        no alarm                               any                alone_low    1
+        an alarm, candidates are surfaces      candidate          alone_low    1
+                                               other              1            1
+        isolated, type is a loss               isolated           alone_low    alone_high
+        isolated, another type or none         isolated           0            1
+        no candidate, or one that is no surface any            0            1
+
+    A fault of another type, or of none, may be no loss.
     """
     healthy = np.ones(len(surfaces))
     if not verdict.detected:
@@ -167,10 +175,10 @@ def _bounds(
 
 
 def rows_of_replay(t_s: Floats, replay: Replayed, surfaces: Sequence[str], fdi: Any) -> LogRows:
-    """The rows of a flight. fdi: this section of the scenario. A rival's scheme and verdicts of pairs have
-    bounds of 0 and 1, since the bounds assume that one surface is faulty.
+    """The rows of a flight. fdi: this section of the scenario. With the scheme of a rival, or verdicts on
+    pairs of surfaces, the bounds are 0 and 1, since `_bounds` assumes that one surface is faulty.
 
-    The estimate of a fault without a type is read as theta of a loss; its bounds stay 0 and 1.
+    The estimate of a fault without a type is taken as theta of a loss; its bounds stay 0 and 1.
     """
     faulty = np.array([verdict.detected for verdict in replay.verdicts])
     low = np.zeros_like(replay.alone_low)

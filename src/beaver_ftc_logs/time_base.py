@@ -10,18 +10,19 @@ from beaver_ftc_logs.recording import Column, Floats, Ints, Mask
 from beaver_ftc_logs.runs import last_row_at
 from beaver_ftc_logs.units import TIME_UNITS
 
-MIN_HZ = 4.0  # of the rates
+MIN_HZ = 4.0  # least sample rate of the body rates
 _MAX_HZ = 1e5  # a faster log has another unit of time
-_MIN_ROWS = 50  # of the rates; the first of them give the usual step
-_ALIKE_RATIO = 1.05  # a log that is faster than its largest sample rate by less is not averaged
-# A step of more than this many usual steps is a gap: nothing is predicted across it.
+_MIN_ROWS = 50  # least number of rows of the body rates; the first so many give the usual step
+_ALIKE_RATIO = 1.05  # a log is averaged only if it is faster than its largest sample rate by this factor
+# A longer step, as a multiple of the usual step, is a gap: no rate is predicted across it.
 _MIN_GAP_STEPS = 3.5
 
 
 def sample_times(flight: str, stamps: Floats, max_hz: float) -> tuple[Floats, Ints, float]:
-    """Times of the samples, s, and the number of the gap-free stretch of each, (n,), and the usual step, s:
-    the stamps themselves, or even times of a log that is faster than max_hz. Raises BadInput where they are
-    too few, too slow or too fast."""
+    """Times of the samples, s, number of the gap-free stretch of each, (n,), and the usual step, s. The times
+    are the stamps themselves, or evenly spaced ones if the log is faster than max_hz. Raises BadInput if the
+    stamps are too few, too slow or too fast.
+    """
     if (n := len(stamps)) < _MIN_ROWS:
         raise BadInput(f"{flight}: has {n} samples of the rates, allowed: at least {_MIN_ROWS}")
     step_s = median_step_s(stamps)
@@ -37,7 +38,7 @@ def sample_times(flight: str, stamps: Floats, max_hz: float) -> tuple[Floats, In
 
 
 def _refuse_rate(flight: str, rate_hz: float) -> None:
-    """Raise BadInput for a log whose rates are too slow, or faster than any log's."""
+    """Raise BadInput if the rates are logged more slowly than MIN_HZ or faster than _MAX_HZ."""
     logged = f"{flight}: rates are logged at {rate_hz:.2g} Hz"
     if rate_hz < MIN_HZ:
         units = {unit: rate_hz / seconds for unit, seconds in TIME_UNITS.items() if unit != "s"}
@@ -49,10 +50,10 @@ def _refuse_rate(flight: str, rate_hz: float) -> None:
 
 
 def _even_times(stamps: Floats, step_s: float) -> tuple[Floats, Ints, float]:
-    """Samples a step apart over each stretch of the log, from its first stamp on: as `sample_times`.
+    """As `sample_times`: samples one step apart in each stretch of the log, from its first stamp on.
 
-    begin, last: the rows of the log at the ends of each stretch; counts: its samples; index (n,): the number
-    of each sample in its stretch.
+    begin, last: first and last row of each stretch in the log; counts: number of its samples; index (n,):
+    number of each sample in its stretch.
     """
     begin = np.flatnonzero(np.diff(stamps, prepend=-np.inf) > _MIN_GAP_STEPS * step_s)
     last = np.append(begin[1:], len(stamps)) - 1
@@ -63,15 +64,18 @@ def _even_times(stamps: Floats, step_s: float) -> tuple[Floats, Ints, float]:
 
 
 def median_step_s(stamps: Floats) -> float:
-    """The usual step of the first stamps, s: a log cut short later has the same."""
+    """The usual step of the first _MIN_ROWS stamps, s, so that a log that was cut short has the same; inf for
+    a single stamp.
+    """
     return float(np.median(np.diff(stamps[:_MIN_ROWS]))) if len(stamps) > 1 else float("inf")
 
 
 def sample_column(column: Column, t_s: Floats, step_s: float) -> tuple[Floats, float | None]:
-    """A column's values at given times, and how old they are on average, s; None: it has these very times.
+    """The values of a column at given times, and their mean age, s, or None if the column has these very
+    times.
 
-    The value is the last one up to the time, nan before the first; of a column that is logged much faster,
-    the mean over the step that ends at the time, which is half a step old.
+    The value is the last one up to the time, nan before the first. If the column is logged much faster, the
+    value is the mean over the step that ends at the time, and half a step old.
     """
     if np.array_equal(column.t_s, t_s):
         return column.values, None
@@ -92,7 +96,7 @@ def _finite_rows(column: Column) -> Column:
 
 
 def _held_age_s(column: Column, t_s: Floats) -> Floats:
-    """How old the last row of a column is at each time, s, nan before the first."""
+    """The age of the last row of a column at each time, s, nan before the first row."""
     return t_s - latest_values(t_s, column.t_s, column.t_s)
 
 
@@ -104,10 +108,15 @@ def latest_values(t_s: Floats, stamps: Floats, values: Floats) -> Floats:
 
 
 def _means(column: Column, t: Floats, h: float, held: Floats) -> Floats:
-    """The mean over the interval of h s that ends at each time t, (n,); held (n,) where it has no row."""
+    """The mean over the interval of h s that ends at each time t, (n,); `held` (n,) if there is no row in it:
+
+        mean of the values with stamps ts in (t - h + eps, t + eps]
+
+    eps: tolerance for stamps that are meant to fall on the end of an interval.
+    """
     ts = column.t_s
     total = np.concatenate([[0.0], np.cumsum(column.values)])
-    eps = 1e-6 * h  # of stamps that are meant to fall on the edge
+    eps = 1e-6 * h
     end = np.searchsorted(ts, t + eps, side="right")
     begin = np.searchsorted(ts, t - h + eps, side="right")
     count = end - begin
@@ -116,15 +125,17 @@ def _means(column: Column, t: Floats, h: float, held: Floats) -> Floats:
 
 
 def unchanged_s(column: Column, t_s: Floats) -> Floats:
-    """For how long a column has been the same at each sample, s, its age included: rows without a number
-    stand still."""
+    """For how long a column has had the same value at each time, s, including the age of the value. Rows
+    without a number do not change it.
+    """
     column = _finite_rows(column)
     since_s = latest_values(t_s, column.t_s, signals.time_since_change_s(column))
     return np.nan_to_num(since_s + _held_age_s(column, t_s))
 
 
 def is_held_value_stale(column: Column, t_s: Floats, step_s: float) -> Mask:
-    """Whether at each sample a gap has opened since the last number of a column."""
+    """Whether the last number of a column is older than the longest step without a gap, at each time,
+    (n,)."""
     column = _finite_rows(column)
     usual_step_s = max(median_step_s(column.t_s), step_s) if len(column.t_s) > 1 else step_s
     return _held_age_s(column, t_s) > _MIN_GAP_STEPS * usual_step_s

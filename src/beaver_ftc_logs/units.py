@@ -1,4 +1,4 @@
-"""Units that a vehicle file may name, and what they are in SI; a share of travel has 1."""
+"""Units that a vehicle file may name, and their sizes in SI; a share of travel has the unit 1."""
 
 from math import pi
 
@@ -11,7 +11,7 @@ ACCELERATION = "acceleration"
 LENGTH = "length"
 SHARE = "share"
 _RAD_PER_DEG = pi / 180.0
-# Kind of each unit, and its size in the SI unit; of each kind the SI unit first.
+# Unit -> its kind, and its size in the SI unit. The SI unit is the first of each kind.
 SI_UNITS: dict[str, tuple[str, float]] = {
     "rad/s": (RATE, 1.0), "deg/s": (RATE, _RAD_PER_DEG), "cdeg/s": (RATE, 0.01 * _RAD_PER_DEG),
     "mrad/s": (RATE, 1e-3),
@@ -24,18 +24,20 @@ SI_UNITS: dict[str, tuple[str, float]] = {
     "m": (LENGTH, 1.0), "cm": (LENGTH, 0.01), "ft": (LENGTH, M_PER_FT),
     "1": (SHARE, 1.0), "%": (SHARE, 0.01),
 }  # fmt: skip
-# Usual pulse of a servo at neutral, and from there to either end of its travel, us.
+# Usual pulse of a servo at neutral, and difference from it to either end of the travel, us.
 NEUTRAL_PULSE_US = 1500.0
 HALF_PULSE_RANGE_US = 400.0
-# Units of the time column.
+# Unit of the time column -> its size, s.
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-# What mends a column of another sign or unit: degrees for radians, thousandths for one, and the reverse.
+# Factors that correct another sign or unit of a column: radians as degrees, ones as thousandths, and the
+# reverse.
 UNIT_FACTORS = (-1.0, 1.0 / _RAD_PER_DEG, 1000.0, _RAD_PER_DEG, 1e-3)
 
 
 def nearest_unit(kind: str, si_factor: float, max_ratio: float) -> str | None:
-    """The unit of a kind whose size in SI is this factor, within so many times; None where none is."""
-    sizes = {name: size for name, (its_kind, size) in SI_UNITS.items() if its_kind == kind}
+    """The unit of a kind whose size in SI is nearest to si_factor by ratio; None if the ratio exceeds
+    max_ratio."""
+    sizes = {name: size for name, (unit_kind, size) in SI_UNITS.items() if unit_kind == kind}
     ratios = {name: max(si_factor / size, size / si_factor) for name, size in sizes.items()}
     nearest = min(ratios, key=lambda name: ratios[name])
     return nearest if ratios[nearest] <= max_ratio else None

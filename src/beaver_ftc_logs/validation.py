@@ -20,18 +20,20 @@ from beaver_ftc_logs.runs import runs_between
 from beaver_ftc_logs.scoring import score_against_labels
 
 _DEFAULT_FALSE_ALARMS = 1.0  # 1/h, if the vehicle file states no rate
-# Under a law that the fit has not seen, so many times the evidence of theory raises an alarm.
+# Under a law that the fit has not seen, an alarm needs this multiple of the evidence by theory.
 # docs/results/choices.md has the flights that chose it.
 _LORDEN_FACTOR = 2.0
-_CREDIBLE_MASSES = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95)  # that are tried
-# Coverage the bounds aim at: 90 % and some of what another day takes away.
+_CREDIBLE_MASSES = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95)  # masses that are tried
+# Share of labels that the bounds are to contain: 90 %, and a reserve for the changes of another day.
 _COVERAGE_GOAL = 0.93
 
 
 def add_ranges_and_threshold(parts: Parts, model: Model) -> Model:
-    """The model with what it was fitted on, and how it did on parts that were left out in turn: at which
-    evidence of a fault they would alarm as often as the vehicle file asks for, or as is usual. Raises
-    BadInput if they are too short to tell that."""
+    """The model with the ranges in which it was fitted, and with the threshold of the alarm. At this
+    threshold, parts left out would alarm as often as the vehicle file requests. Without a request, the rate
+    is _DEFAULT_FALSE_ALARMS, or there is no threshold if labels show faults (settings.levels). Raises
+    BadInput if a rate is requested and the parts are too short to estimate it.
+    """
     folds = list(held_out_folds(parts, model))
     peaks = [_healthy_peaks(fold) for fold in folds]
     tail = extremes.fit_peak_tail(peaks)
@@ -70,9 +72,15 @@ def _gain_sd(parts: Parts, model: Model, folds: Sequence[Fold]) -> Floats:
 
 
 def _choose_threshold(tail: extremes.PeakTail | None, target: float, model: Model) -> float:
-    """Threshold for `target` false alarms an hour, natural logarithm of odds: by the tail, or by theory
-    (`extremes.lorden_threshold`) if there is no tail. Under laws of which the parts left out say nothing, by
-    theory if that asks for more; factor: of the threshold by theory."""
+    """Threshold for `target` false alarms an hour, natural logarithm of odds: the larger of the threshold by
+    the tail and of factor times that by theory (`extremes.lorden_threshold`).
+
+        other laws may fly    tail      factor
+        no                    known     0
+        no                    unknown   1 (no threshold by the tail)
+        in moving air         any       1
+        in still air          any       _LORDEN_FACTOR
+    """
     factor = 1.0 if tail is None or model.vehicle.other_laws else 0.0
     if model.vehicle.other_laws and not model.vehicle.moving_air:
         factor = _LORDEN_FACTOR
@@ -83,8 +91,10 @@ def _choose_threshold(tail: extremes.PeakTail | None, target: float, model: Mode
 def _cross_validate(
     flights: Sequence[extremes.PeaksAndHours], target: float | None, model: Model
 ) -> Document:
-    """Test the threshold on parts left out: how many would have alarmed, each at the threshold that the
-    others ask for, and how often. Empty where no rate is asked for, or too few peaks give a threshold."""
+    """Test of the threshold on parts left out: how many would have alarmed, each at the threshold by the tail
+    of the others, and how often. Empty if no rate is requested, if there is a single part, or if the others
+    of a part have too few peaks.
+    """
     tails = [extremes.fit_peak_tail([*flights[:i], *flights[i + 1 :]]) for i in range(len(flights))]
     if target is None or len(flights) < 2 or not all(tails):
         return {}
@@ -99,10 +109,11 @@ def _cross_validate(
 
 
 def _healthy_peaks(fold: Fold) -> extremes.PeaksAndHours:
-    """Return for a part left out the peaks of the alarm statistic in health, and its healthy hours.
+    """The peaks of the alarm statistic in the healthy rows of a part left out, and the duration of these
+    rows, h.
 
     p (n, H): probabilities of the hypotheses, of which the last is that nothing answers the commands; z (n,):
-    evidence for a fault; rows: healthy ones in which something answers.
+    evidence for a fault; rows: numbers of the healthy rows in which something answers.
     """
     bank = build_bank(fold.model)
     samples = fold.held_out.samples
@@ -116,7 +127,10 @@ def _healthy_peaks(fold: Fold) -> extremes.PeaksAndHours:
 
 
 def score_folds(parts: Parts, model: Model) -> tuple[list[Document], float]:
-    """One entry a fold, and the posterior mass with which the bounds hold the labels as they should."""
+    """An entry with qualities and score for each fold; and the posterior mass of the bounds, out of
+    _CREDIBLE_MASSES, with which their mean share of contained labels is nearest to _COVERAGE_GOAL. Without
+    labels: the usual mass.
+    """
     entries = fold_qualities(parts, model)
     usual = model.settings.bounds
     coverage: list[list[float]] = []

@@ -11,26 +11,30 @@ import numpy as np
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs.recording import Column, Floats, RecordedFlight, TimeSource, Wanted
 
-# Rows of a part of a long table.
+# Number of rows in a part of a long table.
 ROWS_PER_PART = 100_000
-# Samples of a part of another long log, 67 min at 100 Hz: `diagnose` needs 1 GB for a part of 480,000.
+# Number of samples in a part of another long log, 67 min at 100 Hz: `diagnose` needs 1 GB for 480,000
+# samples.
 SAMPLES_PER_PART = 400_000
-LAST_PART_FACTOR = 1.2  # so many times the rows of a part has the last at most
-PART_OVERLAP_SHARE = 0.1  # of the rows of a part, with which the next begins once more
+LAST_PART_FACTOR = 1.2  # the last part has at most this many times the rows of another part
+PART_OVERLAP_SHARE = 0.1  # the next part begins with the last rows of a part once more: this share of them
 
 
 @dataclass(frozen=True)
 class Reader:
-    """A format of logs. suffixes: of its files; time: its own column of the time and its unit, None where the
-    vehicle file names it; of_autopilot: whether a log has parameters, and so many columns that only those
-    wanted are read, the names alone where there are none of these."""
+    """A format of logs.
+
+    suffixes: suffixes of its files. time: column of the time and its unit, None if the vehicle file names
+    them. of_autopilot: whether a log has parameters, and so many columns that only the wanted ones are read.
+    If the log has none of the wanted columns, only the names of all columns are read.
+    """
 
     suffixes: tuple[str, ...]
     time: TimeSource | None = None
     of_autopilot: bool = False
 
 
-# The formats by name; each has a module here.
+# Name of a format -> the format; the module of this folder with the same name reads it.
 READERS = {
     "table": Reader((".csv", ".tsv", ".txt", ".parquet")),
     "alfa": Reader((), ("%time", "ns")),
@@ -42,15 +46,16 @@ _READER_OF_SUFFIX = {suffix: name for name, reader in READERS.items() for suffix
 _BLACKBOX_PHRASE = (
     "a raw blackbox log of Betaflight or INAV, allowed: a table of it, which `blackbox_decode FILE` writes"
 )
-# Logs that another program turns into a table: what they are, and how.
+# Suffix of a log that another program must convert into a table -> words for the log and the way to convert
+# it.
 _WAYS_TO_TABLE = {
     ".tlog": "a telemetry log (MAVLink messages that a ground station received), allowed: the autopilot's "
     "own log (.bin, .ulg), or a table of the telemetry, which pymavlink writes: `mavlogdump.py --format csv "
     "--types ATTITUDE,SERVO_OUTPUT_RAW FILE > FILE.csv`",
     ".bbl": _BLACKBOX_PHRASE, ".bfl": _BLACKBOX_PHRASE,
 }  # fmt: skip
-_POINTER_BYTES = 200  # of a file, in which a pointer is looked for
-# How pointers begin: the name of the store, and the command that fetches the file.
+_POINTER_BYTES = 200  # number of bytes of a file in which the begin of a pointer is searched
+# Begin of a pointer -> name of the store, and command that fetches the file.
 _LARGE_FILE_STORES = {
     rb"version https?://(git-lfs|hawser)\.github\.com/spec/": ("Git LFS", "git lfs pull"),
     rb"(\.\./|/)*(\.git/)?annex/objects/": ("git-annex", "git annex get FILE"),
@@ -63,11 +68,10 @@ def read_flight(
     time: TimeSource | None = None,
     columns: Wanted = None,
 ) -> RecordedFlight:
-    """The recorded flight in a file or folder.
+    """The recorded flight in a file or folder. Raises BadInput with one line: why the log cannot be used.
 
-    reader: one of READERS; by the path's own form where None. time: of a table.
-    columns: those that a log is read for, and holds in memory, all where None. Raises BadInput with one line:
-    why the log cannot be used.
+    reader: one of READERS; if None, by the form of the path. time: column of the time of a table and its
+    unit. columns: the columns that are read and held in memory; all if None.
     """
     return next(read_parts(path, reader, time, columns, in_parts=False))
 
@@ -79,7 +83,7 @@ def read_parts(
     columns: Wanted = None,
     in_parts: bool = True,
 ) -> Iterator[RecordedFlight]:
-    """The same, a long table in parts."""
+    """As `read_flight`, but a long table in several parts, unless in_parts is false."""
     check_exists(path)
     reader = reader or reader_name_for_path(path)
     if reader not in READERS:
@@ -96,10 +100,11 @@ def read_parts(
 
 
 def split_long_recording(log: RecordedFlight, stamps: Floats, ratio: float) -> Iterator[RecordedFlight]:
-    """A log in parts as those of a long table: numbered, each begins with the end of the one before.
+    """A log in parts like those of a long table: numbered, and each begins with the end of the part before.
 
-    stamps: of the rows that are counted, increasing, of which so many are one sample later. A column of
-    a part begins with its last value before, if it has no value at the first of these rows.
+    stamps: increasing stamps of the rows that are counted, s. ratio: number of these rows for one sample. If
+    a column has no value at the first row of a part, the part of the column begins with its last value
+    before.
     """
     part_rows = round(SAMPLES_PER_PART * ratio)
     if len(stamps) <= LAST_PART_FACTOR * part_rows:
@@ -119,21 +124,22 @@ def split_long_recording(log: RecordedFlight, stamps: Floats, ratio: float) -> I
 
 
 def _select_period(column: Column, begin_s: float, end_s: float) -> Column:
-    """The rows of a column in a period, s, and the last one before it."""
+    """The rows of a column in a period, s, and the last row before it."""
     first = max(int(np.searchsorted(column.t_s, begin_s, side="right")) - 1, 0)
     end_row = int(np.searchsorted(column.t_s, end_s, side="right"))
     return Column(column.t_s[first:end_row], column.values[first:end_row], column.note)
 
 
 def check_exists(path: Path) -> None:
-    """Raise BadInput where there is no log, or only a pointer to one."""
+    """Raise BadInput if there is no log, or only a pointer to one (`check_is_log_itself`)."""
     if not path.exists():
         raise BadInput(f"{path}: no such file or folder, allowed: a recorded flight")
     check_is_log_itself(path)
 
 
 def check_is_log_itself(path: Path) -> None:
-    """Raise BadInput for the few bytes that stand in a repository for a large file kept elsewhere."""
+    """Raise BadInput for a pointer: the few bytes in a repository that stand for a large file in another
+    store."""
     if not path.is_file():
         return
     with path.open("rb") as file:
@@ -147,13 +153,13 @@ def check_is_log_itself(path: Path) -> None:
 
 
 def reader_name_for_path(path: Path) -> str:
-    """The reader that a path asks for by its form. Raises BadInput where none does."""
+    """The name of the reader for a path, by its form. Raises BadInput if there is none."""
     if path.is_dir():
         return "alfa"
     if path.suffix.lower() in _WAYS_TO_TABLE:
         raise BadInput(f"{path}: is {_WAYS_TO_TABLE[path.suffix.lower()]}")
-    reader = _READER_OF_SUFFIX.get(path.suffix.lower())
-    if reader is None:
+    name = _READER_OF_SUFFIX.get(path.suffix.lower())
+    if name is None:
         allowed = f"{', '.join(sorted(_READER_OF_SUFFIX))}, or --reader {', '.join(READERS)}"
         raise BadInput(f"{path}: what kind of log this is cannot be seen, allowed: {allowed}")
-    return reader
+    return name

@@ -1,8 +1,8 @@
 """A flight of the ALFA data set in its processed form: a folder of CSV files, one a topic [ALFA2021].
 
-The diagnosis reads what is upstream of the frozen output: commanded and measured roll and pitch
-(`mavros-nav_info-*`), never `mavros-rc-out`, whose failed channel stands still from the fault on. The outputs
-are read for the freeze rule of the benchmark alone.
+The diagnosis reads the commanded and the measured roll and pitch (`mavros-nav_info-*`), which are upstream of
+a frozen output. It never reads `mavros-rc-out`, whose failed channel stands still from the fault on. The
+outputs are read only for the freeze rule of the benchmark.
 
 Time counts from the first row of `mavros-imu-data_raw`. A fault begins at the first row of a
 `failure_status-*` topic.
@@ -40,8 +40,9 @@ _CONVERSION_OF_UNIT: dict[str, Callable[[Floats], Floats]] = {
 
 @cache
 def _alfa_names() -> dict[str, dict[str, Any]]:
-    """columns: of each its topic, its field and the unit there, empty for the column's own; failures: of a
-    status' part and code, what has failed."""
+    """The tables in alfa.json. columns: name of a column -> topic, field, and unit in the topic, empty if it
+    is already that of the column. failures: part and code of a failure status -> name of the failed part.
+    """
     sections: dict[str, dict[str, Any]] = json.loads(Path(__file__).with_name("alfa.json").read_text("utf-8"))
     return sections
 
@@ -66,7 +67,7 @@ def read(path: Path, _wanted: Any = None) -> RecordedFlight:
 
 
 def _read_topic_tables(path: Path) -> Iterator[tuple[str, TopicTable]]:
-    """Yield each topic of a flight that is wanted, or says a failure, with its table."""
+    """Yield each topic with wanted columns or a failure status, and its table."""
     wanted = {topic for topic, _, _ in _alfa_names()["columns"].values()}
     for file in sorted(path.glob("*.csv")):
         topic = file.stem.removeprefix(path.name).removeprefix("-")
@@ -79,7 +80,7 @@ def _read_topic_tables(path: Path) -> Iterator[tuple[str, TopicTable]]:
 def _read_columns(
     tables: dict[str, TopicTable], kept: dict[str, tuple[Ints, str]], zero_ns: float
 ) -> Iterator[tuple[str, Column]]:
-    """Yield the columns in our units, each with the rows kept of its topic."""
+    """Yield each column in our units; kept: for each topic the rows that are kept and a note."""
     for name, (topic, field, unit) in _alfa_names()["columns"].items():
         if field in tables.get(topic, {}):
             rows, note = kept[topic]
@@ -88,7 +89,7 @@ def _read_columns(
 
 
 def _add_attitude_errors(columns: Columns) -> None:
-    """Commanded less measured attitude, rad: the demand on the surfaces, upstream of what froze."""
+    """Add commanded less measured attitude, rad: the demand on the surfaces, upstream of a frozen output."""
     for axis in ("roll", "pitch"):
         command = columns.get(f"{axis}_command_rad")
         measured = columns.get(f"{axis}_rad")
@@ -97,8 +98,9 @@ def _add_attitude_errors(columns: Columns) -> None:
 
 
 def _add_airspeed_from_wind(columns: Columns) -> None:
-    """Ground speed less the wind last estimated, m/s, nan before the first estimate: most flights have no
-    airspeed of their own."""
+    """Add the magnitude of ground speed less the last estimate of the wind, m/s, nan before the first
+    estimate: most flights have no measured airspeed.
+    """
     directions = ("north", "east")
     names = [f"{vector}_{direction}_m_s" for direction in directions for vector in ("ground", "wind")]
     if any(name not in columns or not len(columns[name].t_s) for name in names):

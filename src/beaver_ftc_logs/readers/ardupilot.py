@@ -17,15 +17,16 @@ from beaver_ftc_logs.readers.topics import Topic, columns_of_topics, package_err
 from beaver_ftc_logs.recording import Parameters, RecordedFlight, Wanted, add_parameter
 
 _TIME_FIELD = "TimeUS"
-_INSTANCE_FIELDS = ("I", "C", "Instance")  # number of an instance, by message
+# The first of these fields that a message has holds the number of its instance.
+_INSTANCE_FIELDS = ("I", "C", "Instance")
 _IGNORED_MESSAGES = {"FMT", "FMTU", "UNIT", "MULT", "PARM", "MSG"}
 
 
 def read(path: Path, wanted: Wanted = None) -> RecordedFlight:
     """The flight in a dataflash log. Raises BadInput where it is none, or pymavlink is missing.
 
-    wanted: the columns that are kept in memory, all where None. Where the log has none of them, all
-    columns are returned, without numbers: their names are known then.
+    wanted: the columns that are kept in memory, all if None. If the log has none of them, all columns are
+    returned without numbers, so that the caller knows their names.
     """
     params: Parameters = {}
     with package_errors_as_bad_input(path, "dataflash log", "pymavlink", "ArduPilot's .bin or .log"):
@@ -33,15 +34,15 @@ def read(path: Path, wanted: Wanted = None) -> RecordedFlight:
         from beaver_ftc_logs.readers import dataflash
 
         messages = dataflash.read_messages(path)
-        of = messages.get("PARM")
-        if of and "Name" in of.format.colhash and "Value" in of.fields:
-            for name, value in zip(of.texts("Name"), of.numbers("Value").tolist(), strict=True):
+        settings = messages.get("PARM")
+        if settings and "Name" in settings.format.colhash and "Value" in settings.fields:
+            for name, value in zip(settings.texts("Name"), settings.numbers("Value").tolist(), strict=True):
                 add_parameter(params, name, value)
         topics = {
             topic: part
-            for name, of in messages.items()
-            if name not in _IGNORED_MESSAGES and _TIME_FIELD in of.fields
-            for topic, part in _topics_of_instances(name, of)
+            for name, of_name in messages.items()
+            if name not in _IGNORED_MESSAGES and _TIME_FIELD in of_name.fields
+            for topic, part in _topics_of_instances(name, of_name)
         }
         if not topics:
             reason = "holds no message with a time stamp, allowed: a dataflash log of a flight"
@@ -51,7 +52,7 @@ def read(path: Path, wanted: Wanted = None) -> RecordedFlight:
 
 
 def _topics_of_instances(name: str, messages: Any) -> Iterator[tuple[str, Topic]]:
-    """The messages of each instance as a topic of its own."""
+    """For each instance of a message, its name and its messages as a topic."""
     stamps = messages.numbers(_TIME_FIELD)
     fields = [field for field in messages.fields if field != _TIME_FIELD]
     key = next((field for field in _INSTANCE_FIELDS if messages.fields.get(field) is int), None)

@@ -1,8 +1,8 @@
 """Messages of a dataflash log by name: where each one is, and its numbers field by field.
 
 A binary log has messages of fixed length behind a header, a log as text (.log) has a line a message.
-pymavlink knows what the codes of a format mean. A log's file is mapped into memory; the numbers of a field
-are gathered when they are asked for.
+pymavlink has the meaning of the codes of a format. The file is mapped into memory; the numbers of a field are
+read when a caller requires them.
 """
 
 import struct
@@ -21,15 +21,16 @@ from pymavlink.DFReader import FORMAT_TO_STRUCT, DFFormat, null_term
 from beaver_ftc_logs.recording import Floats
 
 _HEADER = b"\xa3\x95"
-_HEADER_BYTES = 3  # these two and the kind of the message
-_FORMAT_KIND = 0x80  # of the messages that describe a format: its kind, length, name, codes and columns
+_HEADER_BYTES = 3  # these two bytes and the kind of the message
+# A message of this kind describes a format: its kind, length, name, codes and columns.
+_FORMAT_KIND = 0x80
 _FORMAT_LAYOUT = "<BB4s16s64s"
-_FORMAT_BYTES = 89  # header and layout
+_FORMAT_BYTES = 89  # length of such a message: header and layout
 
 
 @dataclass(frozen=True)
 class Messages:
-    """All messages of one format. begins: where each is in the data of the log."""
+    """All messages of one format. begins: position of each in the data of the log, bytes."""
 
     data: mmap
     format: Any
@@ -38,7 +39,9 @@ class Messages:
 
     @cached_property
     def fields(self) -> dict[str, type]:
-        """The fields that hold numbers, in their order, int or float; in text a flight mode (M) is a word."""
+        """The fields that hold numbers, in their order, with int or float. In a log as text, a flight mode
+        (code M) is a word and not a number.
+        """
         types = dict(enumerate(self.format.msg_types))
         codes = self.format.msg_fmts
         words = {i for i, code in enumerate(codes) if self.is_text and code == "M"}
@@ -52,13 +55,14 @@ class Messages:
         return values if factor is None or self.is_text else values / (1.0 / factor)
 
     def texts(self, field: str) -> list[str]:
-        """The words of a field."""
+        """The field as text, for each message."""
         if self.is_text:
             return list(self.cells(field))
         return [cell.partition(b"\0")[0].decode("ascii", "replace") for cell in self.cells(field)]
 
     def cells(self, field: str) -> Any:
-        """The field in each message as it is written: numbers or bytes, texts in a log as text."""
+        """The field as it is stored, for each message: numbers or bytes in a binary log, texts in a log as
+        text."""
         i = self.format.colhash[field]
         if self.is_text:
             return [_line(self.data, at).split(",")[i + 1].strip() for at in self.begins]
@@ -71,17 +75,18 @@ class Messages:
 
 
 def read_messages(path: Path) -> dict[str, Messages]:
-    """The messages of a log by name, in the order in which they first come."""
+    """Name -> messages of a log, in the order of the first message of each name."""
     with path.open("rb") as file:
         data = mmap(file.fileno(), 0, access=ACCESS_READ)
     is_text = path.suffix.lower() == ".log"
-    found = _text_messages(data) if is_text else _binary_messages(data)
-    return {fmt.name: Messages(data, fmt, begins, is_text) for fmt, begins in found if begins}
+    formats = _text_messages(data) if is_text else _binary_messages(data)
+    return {fmt.name: Messages(data, fmt, begins, is_text) for fmt, begins in formats if begins}
 
 
 def _binary_messages(data: mmap) -> Iterator[tuple[Any, array]]:
-    """Formats with the places of their messages. The formats are read first, wherever they are: a message may
-    stand before its own."""
+    """Each format with the positions of its messages. A message may precede the message that describes its
+    format, so all formats are read first.
+    """
     lengths = {_FORMAT_KIND: _FORMAT_BYTES}
     formats = {}
     for kind, at in _binary_begins(data, lengths):
@@ -95,14 +100,14 @@ def _binary_messages(data: mmap) -> Iterator[tuple[Any, array]]:
     begins: defaultdict[int, array] = defaultdict(lambda: array("q"))
     for kind, at in _binary_begins(data, lengths):
         begins[kind].append(at)
-    for kind, places in begins.items():
+    for kind, positions in begins.items():
         fmt = formats.get(kind)
         if fmt is not None and struct.calcsize(fmt.msg_struct) + _HEADER_BYTES == fmt.len:
-            yield fmt, places
+            yield fmt, positions
 
 
 def _binary_begins(data: mmap, lengths: dict[int, int]) -> Iterator[tuple[int, int]]:
-    """Kind and place of each whole message; bytes that begin none are passed over."""
+    """Kind and position of each complete message. Bytes that begin no message are skipped."""
     at = 0
     while at + _HEADER_BYTES <= len(data):
         head = data[at : at + _HEADER_BYTES]
@@ -113,7 +118,9 @@ def _binary_begins(data: mmap, lengths: dict[int, int]) -> Iterator[tuple[int, i
 
 
 def _text_messages(data: mmap) -> Iterator[tuple[Any, array]]:
-    """The same of a log as text: lines with fewer cells than their format are left out."""
+    """Each format of a log as text with the positions of its messages. Lines with fewer cells than their
+    format are left out.
+    """
     begins: defaultdict[str, array] = defaultdict(lambda: array("q"))
     formats = {}
     at = data.find(b"FMT,")
@@ -127,13 +134,13 @@ def _text_messages(data: mmap) -> Iterator[tuple[Any, array]]:
             formats[name] = DFFormat(int(number), name, int(length), codes, plain)
         end = data.find(b"\n", at)
         at = end + 1 if end >= 0 else len(data)
-    for kind, places in begins.items():
+    for kind, positions in begins.items():
         if fmt := formats.get(kind):
-            whole = (at for at in places if _line(data, at).count(",") >= len(fmt.format))
+            whole = (at for at in positions if _line(data, at).count(",") >= len(fmt.format))
             yield fmt, array("q", whole)
 
 
 def _line(data: mmap, at: int) -> str:
-    """The line of a log as text that begins at a place."""
+    """The line of a log as text that begins at a position."""
     end = data.find(b"\n", at)
     return data[at : end if end >= 0 else len(data)].rstrip().decode()

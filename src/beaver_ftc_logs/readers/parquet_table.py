@@ -11,15 +11,18 @@ from beaver_ftc.documents import BadInput
 from beaver_ftc_logs.readers.text import TableCells
 
 _BYTES_PER_NUMBER = 8
-# Largest part of a file that is read at once: 2.8 h at 1000 Hz, and the bytes of its numbers.
+# Largest number of rows, 2.8 h at 1000 Hz, and of bytes of numbers in memory.
 MAX_ROWS = 10_000_000
 _MAX_NUMBER_BYTES = 2_000_000_000
-BATCH_ROWS = 50_000  # that are read at once
+BATCH_ROWS = 50_000  # number of rows that are read at once
 
 
 class ParquetTable:
-    """The table in a Parquet file. readable_names: its columns of numbers; the others are not even looked
-    into, a list in a cell may be any size."""
+    """The table in a Parquet file.
+
+    readable_names: its columns of numbers. Other columns are never read, since a list in a cell may have any
+    size.
+    """
 
     def __init__(self, path: Path) -> None:
         import pyarrow as pa
@@ -30,17 +33,17 @@ class ParquetTable:
         self.names = list(schema.names)
         self.doubled_names = {name for name, n in Counter(self.names).items() if n > 1}
         is_number = [pa.types.is_integer(field.type) or pa.types.is_floating(field.type) for field in schema]
-        self.readable_names = [name for name, of in zip(self.names, is_number, strict=True) if of]
+        self.readable_names = [name for name, readable in zip(self.names, is_number, strict=True) if readable]
 
     def remarks(self, cells: TableCells) -> Iterator[str]:
-        """Nothing."""
+        """No remarks: a Parquet file has one layout."""
         return iter(())
 
     def check_broken_lines(self, path: Path, cells: TableCells) -> None:
-        """Nothing."""
+        """Nothing to check: a Parquet file has no lines."""
 
     def blocks(self, path: Path, names: Sequence[str]) -> Iterator[TableCells]:
-        """The rows of some columns, batch by batch, none last."""
+        """The rows of some columns in batches. The last batch is empty."""
         from pyarrow import parquet
 
         file = parquet.ParquetFile(path)
@@ -60,7 +63,9 @@ def _parquet_batches(file: Any, names: Sequence[str]) -> Iterator[TableCells]:
 
 
 def _check_parquet_size(path: Path, metadata: Any, names: Sequence[str]) -> None:
-    """Raise BadInput for more rows or numbers than a flight has: a few bytes may stand for billions."""
+    """Raise BadInput for more rows or numbers than a flight has. The size comes from the metadata, since a
+    few bytes of a file may stand for billions of rows.
+    """
     if metadata.num_rows > MAX_ROWS:
         raise BadInput(f"{path}: has {metadata.num_rows:,} rows, allowed: up to {MAX_ROWS:,}")
     groups = [metadata.row_group(i) for i in range(metadata.num_row_groups)]

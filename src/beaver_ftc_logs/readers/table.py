@@ -1,4 +1,5 @@
-"""A CSV or Parquet table with a time column `t_s`, or another: one row a sample, one column a quantity."""
+"""A CSV or Parquet table with a column of the time, `t_s` or another: one row a sample, one column a
+quantity."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -25,11 +26,13 @@ def read_parts(
     columns: Wanted = None,
     part_rows: int | None = None,
 ) -> Iterator[RecordedFlight]:
-    """The flight in a table, one of more than 1.2 times so many rows in parts of so many, numbered, each of
-    which begins with the end of the one before: memory does not grow with the file.
+    """The flight in a table. A table of more than LAST_PART_FACTOR times part_rows rows is returned in parts
+    of part_rows rows, so that memory does not grow with the file. The parts are numbered, and each begins
+    with the end of the part before.
 
-    Columns and cells that hold no number are nan. time: the column of the time and its unit, `t_s` in s where
-    None. columns: what is read, all where None; the others are nan.
+    Cells without a number, and columns that are not read, are nan. time: column of the time and its unit,
+    `t_s` in s if None. columns: the columns that are read, all if None. part_rows: if None, the table is one
+    part.
     """
     name, unit = time or (TIME_COLUMN, "s")
     table = _Table(path)
@@ -51,7 +54,7 @@ def read_parts(
 
 
 def _timed_rows(path: Path, time: str, t_s: Floats, cells: TableCells) -> tuple[Any, list[str]]:
-    """Rows whose time is a number, and a line on the others."""
+    """The rows whose time is a number, and a line on the others. time: name of the column."""
     n_bad = int(np.isnan(t_s).sum())
     if not n_bad:
         return slice(None), []
@@ -62,30 +65,32 @@ def _timed_rows(path: Path, time: str, t_s: Floats, cells: TableCells) -> tuple[
 
 
 def text_of_column_phrase(cells: TableCells, name: str) -> str:
-    """`, but text such as '7 ticks'` for a column with cells of text, else nothing."""
+    """`, but text such as '7 ticks'` for a column with cells of text; empty for another one."""
     return f", but text such as {cells.text_cells[name][2][:30]!r}" if name in cells.text_cells else ""
 
 
 def read_numbers(path: Path, columns: Sequence[str] | None = None) -> NumberTable:
-    """The columns of a table, or those named that it has, nan where there is no number. Raises BadInput where
-    it is no table, or larger than any flight."""
+    """The numbers of the columns of a table, nan where there is none: of all columns, or of those named that
+    the table has. Raises BadInput if the file is no table, or larger than any flight.
+    """
     table = _Table(path)
     numbers = table.whole(next(table.parts(columns))[0])
     return {name: values for name, values in numbers.items() if columns is None or name in columns}
 
 
 def column_names(path: Path) -> list[str]:
-    """The names of a table's columns. Raises BadInput where it is no table."""
+    """The names of the columns of a table. Raises BadInput if the file is no table."""
     return list(_Table(path).names)
 
 
 def first_cells_of_column(path: Path, name: str) -> TableCells:
-    """The first cells of a column."""
+    """The first BATCH_ROWS cells of a column, or a few more."""
     return next(_Table(path).parts([name], BATCH_ROWS))[0]
 
 
 def check_time(path: Path, t_s: Floats, time: str = TIME_COLUMN, n_rows_before: int = 0) -> None:
-    """Raise BadInput unless the stamps, of rows with so many before them, are finite and increase."""
+    """Raise BadInput unless the stamps are finite and increase. n_rows_before: rows of the table before the
+    first."""
     if len(t_s) < 2:
         raise BadInput(f"{path}: has {len(t_s)} rows, allowed: at least 2")
     wrong = np.flatnonzero(~np.isfinite(t_s) | (np.diff(t_s, prepend=-np.inf) <= 0))
@@ -96,44 +101,48 @@ def check_time(path: Path, t_s: Floats, time: str = TIME_COLUMN, n_rows_before: 
 
 @contextmanager
 def _read_errors(path: Path) -> Iterator[None]:
-    """Within this a table is read. Raises BadInput where it is none."""
+    """Context in which a table is read: errors of the packages become BadInput."""
     import pyarrow as pa
 
     try:
         yield
     except (pa.ArrowException, OSError, ValueError) as error:
-        told = getattr(error, "strerror", None)
-        reason = told.lower() if told else " ".join(str(error).split())[:200]
+        system_text = getattr(error, "strerror", None)
+        reason = system_text.lower() if system_text else " ".join(str(error).split())[:200]
         raise unreadable_error(path, reason) from None
 
 
 class _Table:
-    """A file's table: its names, and its cells in parts. Raises BadInput where it is none."""
+    """The table in a file: its names, and its cells in parts. Raises BadInput if the file is no table."""
 
     def __init__(self, path: Path) -> None:
         check_is_log_itself(path)
         self._path = path
         with _read_errors(path):
-            self._of = ParquetTable(path) if path.suffix.lower() == ".parquet" else TextTable.find(path)
-        self.names = self._of.names
-        self.remarks = self._of.remarks
+            self._file_table = (
+                ParquetTable(path) if path.suffix.lower() == ".parquet" else TextTable.find(path)
+            )
+        self.names = self._file_table.names
+        self.remarks = self._file_table.remarks
 
     def parts(self, columns: Wanted, part_rows: int | None = None) -> Iterator[tuple[TableCells, bool]]:
-        """Some columns, all where None, in parts of so many rows, the whole where None, and whether there is
-        more. Raises BadInput for a wanted name that several columns have."""
-        doubled = self._of.doubled_names
+        """The columns that are wanted, all if None, in parts of part_rows rows, one part if None; and whether
+        there are further parts. Raises BadInput for a wanted name that several columns have.
+        """
+        doubled = self._file_table.doubled_names
         ambiguous = sorted(name for name in doubled if columns is not None and name in columns)
         if ambiguous:
             raise BadInput(f"{self._path}: has two columns {ambiguous[0]}, allowed: one of a name")
-        readable = [name for name in self._of.readable_names if name not in doubled]
+        readable = [name for name in self._file_table.readable_names if name not in doubled]
         wanted = [name for name in readable if columns is None or name in columns]
-        return self._join_blocks(self._of.blocks(self._path, wanted), part_rows)
+        return self._join_blocks(self._file_table.blocks(self._path, wanted), part_rows)
 
     def _join_blocks(
         self, blocks: Iterator[TableCells], part_rows: int | None
     ) -> Iterator[tuple[TableCells, bool]]:
-        """Yield the table in parts that overlap, and whether more follows; whole, if no `part_rows` are
-        given."""
+        """Yield the table in parts that overlap, and whether further parts follow; in one part if part_rows
+        is None. held: blocks that are not yet part of a complete part.
+        """
         held: list[TableCells] = []
         with _read_errors(self._path):
             for block in blocks:
@@ -144,15 +153,15 @@ class _Table:
                     raise BadInput(f"{self._path}: {reason}")
                 while part_rows is not None and n_held > LAST_PART_FACTOR * part_rows:
                     joined = join_blocks(held)
-                    rest = joined.select_rows(part_rows - round(PART_OVERLAP_SHARE * part_rows))
-                    held = [rest]
-                    n_held = rest.n_rows
+                    remainder = joined.select_rows(part_rows - round(PART_OVERLAP_SHARE * part_rows))
+                    held = [remainder]
+                    n_held = remainder.n_rows
                     yield joined.select_rows(0, part_rows, with_remarks=True), True
             joined = join_blocks(held)
-            self._of.check_broken_lines(self._path, joined)
+            self._file_table.check_broken_lines(self._path, joined)
             yield joined, False
 
     def whole(self, cells: TableCells) -> NumberTable:
-        """All columns, those that were not read nan."""
+        """The cells of all columns; a column that was not read is nan."""
         blank = np.broadcast_to(np.nan, cells.n_rows)
         return {name: cells.numbers.get(name, blank) for name in self.names}

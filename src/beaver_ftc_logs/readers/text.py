@@ -1,7 +1,7 @@
 """A CSV table as people write it: commas, semicolons or tabs, a decimal comma, a header below other lines.
 
-Read in blocks, the columns wanted alone. A cell that holds no number costs itself, a line with too few or too
-many cells costs itself; both are counted.
+Only the wanted columns are read, in blocks. A cell without a number becomes nan, and a line with too few or
+too many cells is left out. Both are counted.
 """
 
 import csv as csv_lines
@@ -19,19 +19,22 @@ from beaver_ftc_logs.readers.time_text import DayCount
 from beaver_ftc_logs.recording import Floats
 
 _DELIMITER_TITLES = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars"}
-_LAYOUT_HEAD_BYTES = 200_000  # of a file, in which its layout is looked for
-_MAX_LAYOUT_LINES = 60  # in them
-_BLOCK_BYTES = 1_000_000  # that are read at once
+_LAYOUT_HEAD_BYTES = 200_000  # the layout of a file is found from its first bytes,
+_MAX_LAYOUT_LINES = 60  # and from these lines of them at most
+_BLOCK_BYTES = 1_000_000  # number of bytes that are read at once
 _NUMBER_PATTERN = r"^[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$"
-# Share of lines with another number of cells that a table may have.
+# Largest share of lines with another number of cells than the header.
 _BROKEN_SHARE = 0.1
 
 
 @dataclass
 class TableCells:
-    """Cells that were read: numbers by column, nan where there is none; of each column its cells of text, the
-    first of them with its row; the lines left out, by their beginnings; how many rows there are, and
-    before."""
+    """Cells that were read.
+
+    numbers: name of a column -> its numbers, nan where there is none. n_rows, n_rows_before: number of these
+    rows, and of rows of the table before them. text_cells: name of a column -> number of its cells of text,
+    and row and text of the first one. broken_lines: the first letters of each line that was left out.
+    """
 
     numbers: dict[str, Floats]
     n_rows: int
@@ -40,13 +43,16 @@ class TableCells:
     broken_lines: list[str] = field(default_factory=list)
 
     def select_rows(self, first: int, end_row: int | None = None, with_remarks: bool = False) -> "TableCells":
-        """The rows from `first` to before `end_row`; with_remarks: and what is said of the whole."""
+        """The rows from `first` to before `end_row`. with_remarks: keep the cells of text and the broken
+        lines."""
         numbers = {name: values[first:end_row].copy() for name, values in self.numbers.items()}
-        said = (self.text_cells, self.broken_lines) if with_remarks else ()
-        return TableCells(numbers, len(range(self.n_rows)[first:end_row]), self.n_rows_before + first, *said)
+        remarks = (self.text_cells, self.broken_lines) if with_remarks else ()
+        return TableCells(
+            numbers, len(range(self.n_rows)[first:end_row]), self.n_rows_before + first, *remarks
+        )
 
     def notes(self) -> dict[str, str]:
-        """For each column that holds numbers, too, a line on its cells of text."""
+        """For each column with numbers and cells of text, a line on the latter."""
         return {
             name: f"{name}: {'1 cell holds' if n == 1 else f'{n} cells hold'} no number, the first in row "
             f"{row}: {cell[:30]!r}"
@@ -56,7 +62,7 @@ class TableCells:
 
 
 def join_blocks(blocks: Sequence[TableCells]) -> TableCells:
-    """Blocks that follow one another as one; they are used up."""
+    """Successive blocks as one. The blocks lose their numbers, to save memory."""
     first = blocks[0]
     column_names = list(first.numbers)
     numbers = {name: np.concatenate([block.numbers.pop(name) for block in blocks]) for name in column_names}
@@ -71,10 +77,12 @@ def join_blocks(blocks: Sequence[TableCells]) -> TableCells:
 
 @dataclass(frozen=True)
 class TextTable:
-    """How a table is written: the place of the line with the names, what is between cells and in numbers.
+    """The layout of a table.
 
-    names: each once. Columns that share a name, one of doubled_names, have their places with it:
-    `p (column 2)`."""
+    header_line_index: position of the line with the names. names: each occurs once; columns that share a
+    name, one of doubled_names, get their positions: `p (column 2)`. delimiter: between cells. decimal_mark:
+    in numbers.
+    """
 
     header_line_index: int
     names: tuple[str, ...]
@@ -89,7 +97,9 @@ class TextTable:
 
     @classmethod
     def find(cls, path: Path) -> "TextTable":
-        """The table in a file, by its first lines. Raises BadInput with what was found instead."""
+        """The table in a file, by its first lines: of the delimiters that fit, the one with most columns.
+        Raises BadInput with a description of another content.
+        """
         with path.open("rb") as file:
             head = file.read(_LAYOUT_HEAD_BYTES)
         if head[:2] in (b"\xff\xfe", b"\xfe\xff"):
@@ -102,28 +112,31 @@ class TextTable:
 
     @classmethod
     def _with_delimiter(cls, lines: Sequence[str], delimiter: str) -> "TextTable | None":
-        """The table that lines hold if this is what is between cells; None if they hold none: no line of
-        names above a line of as many cells with a number, among the next four that are not empty; nor a
-        first line of several cells with nothing below."""
+        """The table in the lines if this delimiter is between cells; None if there is none. The header is the
+        first line of several cells that are no numbers, with
+
+            a line of as many cells, one of them a number, among the next four lines that are not empty, or
+            no further line, if it is the first line.
+        """
         rows = [_split_cells(line_text, delimiter) for line_text in lines]
         for line, header in enumerate(rows):
-            below = [row for row in rows[line + 1 :] if row][:4]
-            whole = [row for row in below if len(row) == len(header)]
-            numbers = [cell for row in whole for cell in row if _is_number_cell(cell)]
+            next_rows = [row for row in rows[line + 1 :] if row][:4]
+            full_rows = [row for row in next_rows if len(row) == len(header)]
+            numbers = [cell for row in full_rows for cell in row if _is_number_cell(cell)]
             has_names = len(header) > 1 and not any(_is_number_cell(name) for name in header)
-            is_without_rows = len(header) > 1 and not below and line == 0
+            is_without_rows = len(header) > 1 and not next_rows and line == 0
             if not (has_names and numbers) and not is_without_rows:
                 continue
             comma = delimiter != "," and any("," in cell for cell in numbers)
             names = [name.strip() for name in (header[0].lstrip("# "), *header[1:])]
             doubled = frozenset(name for name, n in Counter(names).items() if n > 1)
-            places = enumerate(names, 1)
-            unique = (f"{name} (column {i})".strip() if name in doubled else name for i, name in places)
+            positions = enumerate(names, 1)
+            unique = (f"{name} (column {i})".strip() if name in doubled else name for i, name in positions)
             return cls(line, tuple(unique), delimiter, "," if comma else ".", doubled)
         return None
 
     def remarks(self, cells: TableCells) -> Iterator[str]:
-        """Yield a line for all that is unusual about the table."""
+        """Yield a line for each unusual property of the table."""
         if self.header_line_index:
             yield f"names are in line {self.header_line_index + 1}, what is above is left out"
         if self.delimiter != ",":
@@ -133,7 +146,7 @@ class TextTable:
             yield f"lines with too few or too many cells, left out: {len(cells.broken_lines)}"
 
     def check_broken_lines(self, path: Path, cells: TableCells) -> None:
-        """Raise BadInput where too many lines have another number of cells than the header."""
+        """Raise BadInput if too many lines have another number of cells than the header."""
         n_broken = len(cells.broken_lines)
         n_lines = cells.n_rows + len(cells.broken_lines)
         if n_broken > _BROKEN_SHARE * n_lines:
@@ -141,8 +154,9 @@ class TextTable:
             raise unreadable_error(path, f"{reason}, {len(self.names)}: the first {cells.broken_lines[0]!r}")
 
     def blocks(self, path: Path, wanted: Sequence[str]) -> Iterator[TableCells]:
-        """The numbers of some columns, block by block, one at least. Every cell is read as text: which of
-        them hold numbers is found out here, and not by the first block."""
+        """The numbers of some columns in blocks, at least one. Every cell is read as text and then converted
+        here, so that the type of a column does not depend on its first block.
+        """
         import pyarrow as pa
         from pyarrow import csv
 
@@ -179,15 +193,15 @@ class TextTable:
 
 
 def unreadable_error(path: Path, reason: str) -> BadInput:
-    """The error of a file that holds no table."""
+    """The error for a file without a readable table."""
     return BadInput(f"{path}: is no table that can be read ({reason}), allowed: CSV or Parquet")
 
 
 def _split_cells(line: str, delimiter: str) -> list[str]:
-    """The cells of a line, none of one that cannot be read."""
+    """The cells of a line; none if the line cannot be read."""
     try:
         return next(csv_lines.reader([line], delimiter=delimiter), [])
-    except csv_lines.Error:  # a cell longer than any
+    except csv_lines.Error:  # a cell is longer than the reader allows
         return []
 
 
@@ -210,7 +224,9 @@ def _describe_unreadable(lines: Sequence[str]) -> str:
 
 
 def _convert_column(cells: Any, mark: str, name: str, table: TableCells, days: DayCount) -> Floats:
-    """A block's column as numbers, a time in words as its seconds; other text in it is counted."""
+    """A column of a block as numbers. Times as text become seconds (`DayCount`); other text is nan, and is
+    counted in the table's text_cells. mark: decimal mark.
+    """
     import pyarrow as pa
     from pyarrow import compute
 

@@ -1,4 +1,4 @@
-"""Times that are written as text: a number with its unit, a clock, a date with a clock (ISO 8601)."""
+"""Times as text: a number with a unit, a time of day, or a date with a time of day (ISO 8601)."""
 
 import re
 from datetime import UTC, datetime
@@ -19,8 +19,12 @@ _S_PER_DAY = 86400.0
 
 
 def seconds_of_text(text: str) -> float:
-    """The time that a cell states, s: `0.05 sec`; `12:30:01.5` since midnight; an ISO date since 1970, UTC
-    where it names no zone. nan where it states none."""
+    """The time in a cell, s; nan if there is none.
+
+    0.05 sec                 the number in s
+    12:30:01.5, 59:59.5      since midnight, or since the full hour
+    2026-11-30T12:30:01      since 1970, in UTC if no zone is given
+    """
     text = text.strip()
     if match := _UNIT_PATTERN.fullmatch(text):
         factors = (factor for unit, factor in _UNIT_SECONDS.items() if match[2].startswith(unit))
@@ -40,16 +44,18 @@ def seconds_of_text(text: str) -> float:
 
 
 class DayCount:
-    """The midnights that a column of clocks has passed: a step back by more than half a day is one.
+    """Counter of the midnights in a column of times of day: a step back by more than half a day is a
+    midnight.
 
-    A column of minutes and seconds alone (59:59.5, 00:00.0) returns to 0 each hour. It is not continued."""
+    A column of only minutes and seconds (59:59.5, 00:00.0) returns to 0 each hour, and is not continued.
+    """
 
     def __init__(self) -> None:
         self._days = 0
         self._last = 0.0
 
     def seconds_of_text(self, text: str) -> float:
-        """The time that a cell states, s: of a clock since the first midnight."""
+        """The time in a cell, s; a time of day counts from the first midnight."""
         seconds = seconds_of_text(text)
         if not _CLOCK_PATTERN.fullmatch(text.strip()):
             return seconds

@@ -1,4 +1,5 @@
-"""The topics of an autopilot's log as columns: which of its rows are in order, and a line on the others."""
+"""The topics of an autopilot's log as columns. Rows whose stamps are out of order are left out, with a line
+on them."""
 
 from bisect import bisect_left
 from collections.abc import Callable, Iterator, Mapping
@@ -20,10 +21,10 @@ _S_PER_US = 1e-6
 def package_errors_as_bad_input(
     path: Path, log_kind: str, package: str, valid_log_file_text: str
 ) -> Iterator[None]:
-    """Within this an autopilot's log is read with a package of others: what it prints of damaged files stays
-    here. Raises BadInput where the package is missing, or the file is none that it can read.
+    """Context in which a third-party package reads an autopilot's log: its printed messages on damaged files
+    are discarded. Raises BadInput if the package is missing or cannot read the file.
 
-    log_kind: what such a log is called; valid_log_file_text: which files hold one.
+    log_kind: words for such a log; valid_log_file_text: words for the files that hold one.
     """
     try:
         with redirect_stdout(StringIO()):
@@ -35,7 +36,7 @@ def package_errors_as_bad_input(
         raise BadInput(f"{path}: {missing_package_text}") from None
     except BadInput:
         raise
-    except Exception as error:  # these packages raise whatever a damaged file makes them stumble over
+    except Exception as error:  # these packages raise errors of any type for a damaged file
         reason = " ".join(str(error).split()) or type(error).__name__
         raise BadInput(
             f"{path}: is no {log_kind} that can be read ({reason}), allowed: {valid_log_file_text}"
@@ -44,9 +45,9 @@ def package_errors_as_bad_input(
 
 @dataclass(frozen=True)
 class Topic:
-    """What an autopilot's log has of one topic.
+    """One topic of an autopilot's log.
 
-    stamps_us (n,). fields: the names of the others. values: gives the numbers of a field, (n,).
+    stamps_us (n,). fields: names of the other fields. values: function from a field to its numbers, (n,).
     """
 
     stamps_us: Floats
@@ -60,8 +61,9 @@ def names_of_topics(topics: Mapping[str, Topic]) -> tuple[str, ...]:
 
 
 class TopicColumns(NamedTuple):
-    """The columns of a log by name; the names of all its columns; the stamp, s, from which the times count,
-    None if no row has one."""
+    """The columns of a log by name; the names of all its columns; and the stamp, s, from which the times
+    count, None if no row has one.
+    """
 
     columns: Columns
     all_names: tuple[str, ...]
@@ -73,9 +75,9 @@ def columns_of_topics(
 ) -> TopicColumns:
     """The columns `topic.field` of a log: those of the wanted names, all of `topics` if wanted is None.
 
-    topics: the topics that were read, those of the wanted columns among them. all_topics: gives names only.
-    It is `topics` itself if these have every wanted column, or are all that the log has. A reader that reads
-    some topics passes all topics of the log if a wanted column is missing, for the message that says so.
+    topics: the topics that were read, those of the wanted columns among them. all_topics: topics whose names
+    are returned. It is `topics` itself if they have every wanted column. If one is missing, it is all topics
+    of the log, whose names the message about the missing column lists.
 
     The origin of the times is the earliest stamp of `topics`. If all_topics has none of the wanted names, the
     columns are all of its names, without rows.
@@ -99,10 +101,10 @@ def columns_of_topics(
 
 
 def rows_with_increasing_time(topic: str, stamps: Floats) -> tuple[Ints, str]:
-    """Places of the rows whose stamps increase, as many as can be, and a line on those left out.
+    """Positions of as many rows as possible whose stamps increase, and a line on the rows that are left out.
 
-    One damaged stamp costs its own row, not all rows after it. Of rows with one stamp the first is kept, and
-    nothing is said: autopilots write a stamp twice.
+    One damaged stamp removes its own row, not all rows after it. Of several rows with the same stamp, only
+    the first is kept, without a remark: autopilots write a stamp twice.
     """
     if (np.diff(stamps) >= 0).all() and np.isfinite(stamps).all():
         return np.flatnonzero(np.diff(stamps, prepend=-np.inf)), ""
@@ -119,11 +121,14 @@ def rows_with_increasing_time(topic: str, stamps: Floats) -> tuple[Ints, str]:
 
 
 def _longest_increasing_rows(stamps: Floats) -> Ints:
-    """Places of a longest strictly increasing subsequence, by patience sorting from the end.
+    """Positions of a longest strictly increasing subsequence, by patience sorting from the end.
 
-    From the end, so that of a row and one that comes late behind it the late one is left out.
+    From the end, because then a row that comes late is left out, and not the row before it.
+
+    next_rows: for each row the next row in the longest subsequence that begins with it, -1 for none.
     """
-    # by length of a subsequence: its largest first stamp, negated, and the row of that
+    # Entry i: the largest first stamp, negated, of a subsequence of length i + 1 so far, and the row of this
+    # stamp.
     first_stamps: list[float] = []
     first_rows: list[int] = []
     next_rows = np.full(len(stamps), -1)

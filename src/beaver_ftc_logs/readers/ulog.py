@@ -17,16 +17,16 @@ from beaver_ftc_logs.readers.topics import (
 from beaver_ftc_logs.recording import Parameters, RecordedFlight, Wanted, add_parameter
 
 _TIME_FIELD = "timestamp"
-# Bytes of a message: its length is written in 16 bits.
+# Largest number of bytes of a message: its length is written in 16 bits.
 _MAX_MESSAGE_BYTES = 65535
 
 
 def read(path: Path, wanted: Wanted = None) -> RecordedFlight:
     """The flight in a .ulg file. Raises BadInput where it is none, or pyulog is missing.
 
-    wanted: the columns that are returned, all where None; their topics are in memory while the log is read.
-    Where the log has none of them, all columns are returned, without numbers. Where it lacks one, the log is
-    read once more for the names of all.
+    wanted: the columns that are returned, all if None; their topics are in memory while the log is read. If
+    the log has none of them, all columns are returned without numbers. If one is missing, the log is read
+    once more for the names of all columns.
     """
     params: Parameters = {}
     with package_errors_as_bad_input(path, "ULog", "pyulog", "a .ulg file of PX4"):
@@ -41,15 +41,16 @@ def read(path: Path, wanted: Wanted = None) -> RecordedFlight:
 
 
 def _read_topics(path: Path, wanted: Wanted, params: Parameters) -> dict[str, Topic]:
-    """The topics of the wanted columns, of any instance; all where the log has none of these.
+    """The topics of the wanted columns, of any instance; all topics if the log has none of these.
 
-    params: receives those of the log. Raises ValueError for a message too large.
+    params: receives the parameters of the log. Raises ValueError for a message that is too large.
     """
     from pyulog import ULog
 
     formats = ULog(str(path), parse_header_only=True).message_formats
     for name in formats:
-        if _min_message_bytes(formats, name, ()) > _MAX_MESSAGE_BYTES:  # pyulog writes every field of one out
+        # pyulog would expand each of its fields
+        if _min_message_bytes(formats, name, ()) > _MAX_MESSAGE_BYTES:
             raise ValueError(f"a message {name} would have more than {_MAX_MESSAGE_BYTES} bytes")
     names = {column.partition(".")[0] for column in wanted or ()}
     names |= {re.sub(r"_\d+$", "", name) for name in names}
@@ -59,16 +60,18 @@ def _read_topics(path: Path, wanted: Wanted, params: Parameters) -> dict[str, To
         if isinstance(value, int | float):
             add_parameter(params, name, value)
     topics = {}
-    for of in log.data_list:
-        if _TIME_FIELD in of.data:
-            fields = [field for field in of.data if field != _TIME_FIELD]
-            name = f"{of.name}_{of.multi_id}" if of.multi_id else of.name
-            topics[name] = Topic(of.data[_TIME_FIELD].astype(float), fields, of.data.__getitem__)
+    for part in log.data_list:
+        if _TIME_FIELD in part.data:
+            fields = [field for field in part.data if field != _TIME_FIELD]
+            name = f"{part.name}_{part.multi_id}" if part.multi_id else part.name
+            topics[name] = Topic(part.data[_TIME_FIELD].astype(float), fields, part.data.__getitem__)
     return topics
 
 
 def _min_message_bytes(formats: dict[str, Any], name: str, outer: tuple[str, ...]) -> int:
-    """Bytes of a message at least, its nested messages in it."""
+    """Least number of bytes of a message, with its nested messages. outer: the messages in which it is
+    nested. A field of a number counts one byte.
+    """
     if name in outer:
         raise ValueError(f"a message {name} holds itself")
     if name not in formats:  # a number, or a type that pyulog complains about

@@ -1,8 +1,9 @@
-"""The benchmark on recorded flights: leave one out, identify from the others, diagnose the one.
+"""The benchmark on recorded flights: leave one flight out, identify from the others, diagnose the one left
+out.
 
-The data sets of a folder are ENAC's tables beside their vehicle file and ALFA's folders of topics. Every
-setting is frozen before the flight that is left out is looked at. Of a single flight, each half is left out
-in turn, with settings fitted to the whole flight. Rivals stand beside ours.
+The data sets of a folder are ENAC's tables with their vehicle file, and ALFA's folders of topics. Every
+setting is fixed before the flight left out is read. Of a single flight, each half is left out in turn, with
+settings fitted to the whole flight. Other detectors are compared with ours.
 """
 
 import json
@@ -34,8 +35,8 @@ LABEL_TITLES = {
     "classes": "classes", "healthy_or_faulty": "healthy or faulty", "side": "side",
     "mean_error": "mean error", "held_by_bounds": "held by 90 % bounds",
 }  # fmt: skip
-PUBLISHED_SCORES_FILE = Path(__file__).with_name("published.json")  # of each data set: what others found
-MAX_SHORT_DELAY_S = 5.0  # as in the key `within_5_s`
+PUBLISHED_SCORES_FILE = Path(__file__).with_name("published.json")  # published results for each data set
+MAX_SHORT_DELAY_S = 5.0  # the limit of the key `within_5_s`
 SURFACE_KINDS = ("aileron", "rudder", "elevator")
 _KIND_OF_SURFACE = {"left_aileron": "aileron", "right_aileron": "aileron"}
 OUR_METHOD_TITLE = "bank of filters (ours)"
@@ -77,7 +78,7 @@ def _load_data_set(path: Path) -> DataSet | None:
     if (path / VEHICLE_FILE).is_file():
         paths = sorted([*path.glob("*.csv"), *path.glob("*.parquet")])
         return _read_data_set(path.name, load_vehicle(path / VEHICLE_FILE), paths) if paths else None
-    folders = sorted(each for each in path.iterdir() if each.is_dir() and any(each.glob(_ALFA_GYRO_FILES)))
+    folders = sorted(sub for sub in path.iterdir() if sub.is_dir() and any(sub.glob(_ALFA_GYRO_FILES)))
     return _read_data_set(path.name, load_vehicle("alfa"), folders) if folders else None
 
 
@@ -88,7 +89,7 @@ def _read_data_set(name: str, vehicle: Vehicle, paths: list[Path]) -> DataSet:
 
 
 def run_benchmark(folder: Path) -> Document:
-    """The document of the benchmark: a part a data set, a row a method."""
+    """The document of the benchmark: an entry for each data set, with a row for each method."""
     return {"sets": [_compare_methods(data) for data in load_data_sets(folder)]}
 
 
@@ -119,7 +120,7 @@ def _compare_methods(data: DataSet) -> Document:
 
 
 def _diagnose_each(log: RecordedFlight, held_out: FitPart, model: Model) -> Iterator[tuple[str, LogRows]]:
-    """Every detector's rows, and the freeze rule's where the log has servo outputs."""
+    """For each detector its title and its rows; also for the freeze rule if the log has servo outputs."""
     for name in detector_names():
         title = METHOD_TITLES.get(name, f"{name}, of the loop")
         yield title, diagnose_with_detector(name, held_out.samples, model)
@@ -129,8 +130,9 @@ def _diagnose_each(log: RecordedFlight, held_out: FitPart, model: Model) -> Iter
 
 
 def settings_of_single(usable: list[FitPart], data: DataSet) -> FilterSettings | None:
-    """Return the settings fitted to the whole of a single flight, half of which is judged: levels, rate of
-    change, and the mass of the bounds. Neither half has all levels. None if there are other flights to fit.
+    """The settings for a data set of a single flight, whose halves are judged in turn: levels, rate of
+    changes and mass of the bounds, all fitted to the whole flight, since neither half has all levels. None if
+    there are several flights.
     """
     if len(data.flights) > 1:
         return None
@@ -148,8 +150,9 @@ def _score_against_log(held_out: FitPart, rows: LogRows, model: Model) -> Docume
 
 
 def labels_in_span(held_out: FitPart) -> np.ndarray:
-    """Labels from the first usable row to the last, those of rows between that the fit does not use included:
-    they count in the score. NaN elsewhere."""
+    """Labels from the first usable row to the last, and NaN elsewhere. Rows between them count in the score,
+    even if the fit does not use them.
+    """
     rows = np.flatnonzero(held_out.is_usable)
     labels = np.full_like(held_out.samples.labels, np.nan)
     if rows.size:
@@ -159,8 +162,15 @@ def labels_in_span(held_out: FitPart) -> np.ndarray:
 
 
 def summarize_failures(scores: Sequence[Document]) -> Document:
-    """From each flight's score against its failure. A flight whose surface failed is found if an alarm comes
-    after; a flight with an alarm before its failure, or without any failure, counts as a false one."""
+    """Summary of the scores of flights against their failures.
+
+    found       flights with a failed surface and an alarm after the failure
+    false       flights with an alarm before their failure, or without any failure
+    quiet       flights without a failure and without an alarm
+
+    precision = found / (found + false), recall = found / failed, accuracy = (found + quiet) / (failed +
+    healthy). Engine failures are counted apart.
+    """
     failures = [score for score in scores if score["failure"]]
     engine = [score for score in failures if ENGINE in score["failure"]]
     failed = [score for score in failures if ENGINE not in score["failure"]]
@@ -188,9 +198,12 @@ def summarize_failures(scores: Sequence[Document]) -> Document:
 
 
 def _summarize_delays(failed: Sequence[Document], kind: str) -> Document:
-    """Summarize the delays of a kind of surface. Where several fail in one flight, the first in the alphabet
-    counts: an aileron before a rudder."""
-    kinds = [min(_KIND_OF_SURFACE.get(one, one) for one in score["failure"].split("+")) for score in failed]
+    """Summary of the delays of failures of one kind of surface. If several kinds fail in one flight, the
+    first in the alphabet counts: an aileron before a rudder.
+    """
+    kinds = [
+        min(_KIND_OF_SURFACE.get(name, name) for name in score["failure"].split("+")) for score in failed
+    ]
     delays_s = [score["delay_s"] for score, first in zip(failed, kinds, strict=True) if first == kind]
     found = [delay for delay in delays_s if delay is not None]
     return {
@@ -202,7 +215,7 @@ def _summarize_delays(failed: Sequence[Document], kind: str) -> Document:
 
 
 def summarize_labels(parts: Sequence[Document]) -> Document:
-    """Mean of the figures over the parts that were left out, weighted by their rows; None without rows."""
+    """Means of the scores over the parts left out, weighted by their rows; None without rows."""
     parts = [part for part in parts if part["rows"]]
     if not parts:
         return {**dict.fromkeys(LABEL_TITLES), "rows": 0}

@@ -13,12 +13,12 @@ from beaver_ftc.studies.present import GRID, Files, aligned, markdown_table, mar
 from beaver_ftc_logs.energy import ENGINE
 from beaver_ftc_logs.recorded.benchmark import LABEL_TITLES, SURFACE_KINDS
 
-# A table: the heads of its columns, and the cells of each row.
+# A table: the headers of its columns, and the cells of each row.
 HeaderAndRows = tuple[list[str], list[list[str]]]
-# The text of a cell, by a row of the document.
+# Function from a row of the document to the text of a cell.
 Cell = Callable[[Document], str]
 _METHOD: Cell = itemgetter("method")
-_SHOWN_DELAY_S = 30.0  # the longest delay that has a place of its own in the figure
+_SHOWN_DELAY_S = 30.0  # longer delays share one place at the right of the figure
 
 
 def result_files(document: Document) -> Files:
@@ -51,8 +51,8 @@ def _tables_of_other_days(document: Document) -> list[tuple[str, HeaderAndRows]]
     tables = []
     for data in document["sets"]:
         days = [day for day in data["rows"] if day["kind"] == "one change"]
-        for one in data["summary"]:
-            days += [one[key] | {"day": f"{one['kind']}: {key}"} for key in ("mean", "worst")]
+        for summary in data["summary"]:
+            days += [summary[key] | {"day": f"{summary['kind']}: {key}"} for key in ("mean", "worst")]
         rows = [[cell_of(day) for cell_of in columns.values()] for day in days]
         title = f"{data['set']}: other days made of it, halves left out in turn"
         tables.append((title, (["day", *[*columns][1:]], rows)))
@@ -60,12 +60,13 @@ def _tables_of_other_days(document: Document) -> list[tuple[str, HeaderAndRows]]
 
 
 def _share(key: str) -> Cell:
-    """A figure of a method; one that its authors did not publish is left empty."""
+    """Cells of a score with three digits; empty if its authors did not publish it."""
     return lambda row: "" if row.get(key) is None else f"{row[key]:.3f}"
 
 
 def _delay(kind: str) -> Cell:
-    """The mean delay of a kind of surface, and of how many failures."""
+    """Cells of the mean delay for a kind of surface, with the numbers of failures that were found and of
+    all."""
 
     def cell_of(row: Document) -> str:
         delay = row["delay_s"].get(kind, {})
@@ -79,17 +80,17 @@ def _delay(kind: str) -> Cell:
 
 
 def _ours(text_of: Cell) -> Cell:
-    """A cell of the methods that are flown here."""
+    """Cells only for methods that the benchmark ran; empty for published ones."""
     return lambda row: text_of(row) if "false_alarms_per_hour" in row else ""
 
 
 def _soon_text(row: Document) -> str:
-    """How many failures of ailerons and rudders were found within 5 s, of all of them."""
+    """How many failures of ailerons and rudders (SURFACE_KINDS[:2]) were found within 5 s, of all of them."""
     delays = [row["delay_s"][kind] for kind in SURFACE_KINDS[:2]]
     return " of ".join(str(sum(delay[key] for delay in delays)) for key in ("within_5_s", "failures"))
 
 
-# Tables of methods: the head of each column, and its cell of a method's row.
+# Tables of methods: header of a column -> function from the row of a method to the cell.
 LABEL_COLUMNS = {"method": _METHOD} | {title: _share(key) for key, title in LABEL_TITLES.items()}
 FAILURE_COLUMNS = {
     "method": _METHOD,
@@ -128,7 +129,9 @@ def update_page(document: Document, page: Path) -> None:
 
 
 def draw_comparison_figure(document: Document) -> Any:
-    """How late each method found each failure, and how near it came to the labels: a panel a data set."""
+    """A panel for each data set: the delay of each method on each failure or, for labelled flights, the
+    shares of rows that are right.
+    """
     data_sets = document["sets"]
     height = sum(0.27 * len(_method_titles(data)) + 1.3 for data in data_sets)
     figure, axes = panels(len(data_sets), 1, 8.6, height)
@@ -151,19 +154,23 @@ def draw_comparison_figure(document: Document) -> Any:
 
 
 def _method_titles(data: Document) -> list[str]:
-    """The lines of a panel. Of published methods, only shares are known: not the delay on each failure."""
+    """The methods of a panel. For published methods only scores are known, not the delay on each failure, so
+    a panel of delays leaves them out.
+    """
     published = data.get("published", ()) if data["scored_by"] == "labels" else ()
     return [row["method"] for row in (*data["rows"], *published)]
 
 
 def _draw_failure_delays(axis: Any, data: Document) -> None:
-    """A line a method, a mark a failed surface at its delay; right of the line what is not found in time."""
+    """Draw a line for each method, with a mark for each failed surface at its delay. The grey area at the
+    right has the failures that were not found within _SHOWN_DELAY_S.
+    """
     titles = _method_titles(data)
     failed = {entry["left_out"]: entry["failure"] for entry in data["flights"]}
     failures = [failure for failure in dict.fromkeys(failed.values()) if failure and ENGINE not in failure]
     for i, failure in enumerate(failures):
         shift = 0.7 * ((i + 0.5) / len(failures) - 0.5)
-        entries = [one for one in data["flights"] if one["failure"] == failure and one["method"] in titles]
+        entries = [row for row in data["flights"] if row["failure"] == failure and row["method"] in titles]
         delays_s = [np.inf if entry["delay_s"] is None else entry["delay_s"] for entry in entries]
         delays_s = [min(delay, _SHOWN_DELAY_S + 1.0) for delay in delays_s]
         heights = [titles.index(entry["method"]) + shift for entry in entries]
@@ -175,7 +182,8 @@ def _draw_failure_delays(axis: Any, data: Document) -> None:
 
 
 def _draw_shares(axis: Any, data: Document) -> None:
-    """A line a method, a mark for each share of the rows that are right; as published where they are."""
+    """Draw a line for each method, published ones included, with a mark for each share of the rows that are
+    right."""
     labels = {"classes": "class", "healthy_or_faulty": "healthy or faulty", "side": "side of the aircraft"}
     rows = [*data["rows"], *data["published"]]
     for i, (key, label) in enumerate(labels.items()):

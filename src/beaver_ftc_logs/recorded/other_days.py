@@ -1,10 +1,10 @@
-"""Other days, made of a flight we have: what changes between two flights of one vehicle, put into its log.
+"""Other days, made from a recorded flight: changes between two flights of one vehicle are put into its log.
 
-The rates are kept and the commands changed to those that would have given them, or the other way round: the
-log satisfies the equation of motion of the vehicle. Labels stay as they are. A model is identified from one
-half of a labelled flight and scored on the other half, altered; of several flights, from all but one. The
-levels of effectiveness are fitted to the whole of a single flight. The settings were chosen on the first
-drawn days (TUNING_SEEDS); the result is that of the others (TEST_SEEDS).
+Either the rates are kept and the commands are changed to those that would have caused them, or the other way
+round, so that the log satisfies the equation of motion of the vehicle. Labels stay as they are. A model is
+identified from one half of a labelled flight and scored on the other half, altered; if there are several
+flights, from all but one. The levels of effectiveness are fitted to the whole of a single flight. The
+settings were chosen on the first drawn days (TUNING_SEEDS); the result is that of the others (TEST_SEEDS).
 """
 
 from collections.abc import Iterator, Sequence
@@ -30,7 +30,7 @@ TUNING_SEEDS = range(8)
 TEST_SEEDS = range(8, 16)
 _RIVAL_DETECTOR = "sliding-least-squares"
 _WORST_OF_SCORE = {"mean_error": max}
-_TRIM_MEAN_S = 30.0  # of the mean that is called slow
+_TRIM_MEAN_S = 30.0  # the running mean over this time is the trim
 
 
 @dataclass(frozen=True)
@@ -58,18 +58,21 @@ class DayChanges:
 
 
 def one_change_days(mixer: Floats, commands: list[str]) -> list[DayChanges]:
-    """One thing changed at a time. mixer (S, C): share of each command in each surface."""
+    """The recorded day, and days on which one thing is changed. mixer (S, C): share of each command in each
+    surface."""
     n = len(mixer)
     unchanged = DayChanges("as it was", np.zeros(n), np.zeros(n), np.ones(n))
     days = [unchanged]
     for command, shares in zip(commands, mixer.T, strict=True):
         for shift in (-0.04, 0.04):
-            by = shift * shares
+            shift_of_surfaces = shift * shares
             name = f"of {command} {shift:+.2f}"
-            days.append(replace(unchanged, name=f"trim {name}", trim_shift_commands=by))
-            days.append(replace(unchanged, name=f"neutral {name}", neutral_shift_commands=by))
+            days.append(replace(unchanged, name=f"trim {name}", trim_shift_commands=shift_of_surfaces))
+            days.append(replace(unchanged, name=f"neutral {name}", neutral_shift_commands=shift_of_surfaces))
     days += [replace(unchanged, name=f"gain {gain:.2f}", common_gain=gain) for gain in (0.85, 1.15)]
-    days += [replace(unchanged, name=f"commands {by:+.2f} s", command_delay_s=by) for by in (-0.04, 0.04)]
+    days += [
+        replace(unchanged, name=f"commands {delay:+.2f} s", command_delay_s=delay) for delay in (-0.04, 0.04)
+    ]
     days += [replace(unchanged, name=f"excitation {scale:.1f}", motion_scale=scale) for scale in (0.6, 1.5)]
     days.append(replace(unchanged, name="noise 1.5", noise_ratio=1.5))
     days.append(replace(unchanged, name="trim drifts", trim_drift_sd_commands=0.01))
@@ -81,7 +84,7 @@ def one_change_days(mixer: Floats, commands: list[str]) -> list[DayChanges]:
 
 
 def random_days(n: int, seeds: range) -> list[DayChanges]:
-    """Days on which everything differs a little from the recorded one."""
+    """Days on which everything differs a little from the recorded day. n: number of surfaces."""
     draws = [(seed, np.random.default_rng([20, seed]).standard_normal) for seed in seeds]
     return [
         DayChanges(
@@ -124,13 +127,13 @@ def apply_day_changes(day: DayChanges, samples: Samples, A: Floats, Q: Floats) -
 
 
 def _shifted(values: Floats, n: float) -> Floats:
-    """Values that act `n` samples later than these: logged earlier by as much, (n, S)."""
+    """Values (n_rows, S) that act `n` samples later than these, i.e. that were logged n samples earlier."""
     rows = np.arange(len(values)) + n
     return np.column_stack([np.interp(rows, np.arange(len(values)), column) for column in values.T])
 
 
 def _running_mean(values: Floats, n: int) -> Floats:
-    """Centred running mean, (n, S)."""
+    """Centred running mean over n rows, (n_rows, S)."""
     from scipy.ndimage import uniform_filter1d
 
     return uniform_filter1d(values, n, axis=0, mode="nearest")
@@ -147,8 +150,11 @@ def _coloured_noise(rng: np.random.Generator, shape: tuple[int, ...], n: float) 
 
 
 def _response_to_noise(rng: np.random.Generator, A: Floats, Q: Floats, n: int) -> Floats:
-    """Return the rates (n, 3), rad/s, under white moments w of the model's noise:
-    x[k] = A' (x[k-1], ..., x[k-h]) + w[k]."""
+    """The rates x (n, 3), rad/s, of the model without commands, under white noise w (n, 3) of covariance Q,
+    rad/s:
+
+        x[k] = A' (x[k-1], ..., x[k-h]) + w[k]
+    """
     w = rng.standard_normal((n, 3)) @ np.linalg.cholesky(Q).T
     h = len(A) // 3
     x = np.zeros((n + h, 3))
@@ -158,7 +164,8 @@ def _response_to_noise(rng: np.random.Generator, A: Floats, Q: Floats, n: int) -
 
 
 def run_other_days(folder: Path) -> Document:
-    """The document: of each labelled data set a part, a row a day. Raises BadInput where none has labels."""
+    """The document: an entry for each labelled data set, with a row for each day. Raises BadInput without
+    labels."""
     all_sets = benchmark.load_data_sets(folder)
     labelled = [data for data in all_sets if np.isfinite(data.flights[0].labels).any()]
     if not labelled:
@@ -187,7 +194,9 @@ def _test_data_set(data: benchmark.DataSet) -> Document:
 def _score_days(
     kind: str, days: Sequence[DayChanges], folds: Sequence[tuple[Model, FitPart]], whole: Model
 ) -> Iterator[Document]:
-    """Yield the scores of each day. whole: the model of all flights."""
+    """Yield the scores of each day, with those of the rival detector under `beside`. whole: the model of all
+    flights, whose past and noise make the additional noise.
+    """
     A = np.array(whole.past)
     Q = np.array(whole.noise)
     for day in days:
@@ -203,7 +212,11 @@ def _score_days(
 
 
 def _summarize_days(kind: str, days: Sequence[Document]) -> Document:
-    """Mean and worst of each figure."""
+    """Mean and worst of each score over the days of a kind."""
     values = {key: [day[key] for day in days] for key in (*benchmark.LABEL_TITLES, "beside")}
-    worst = {key: _WORST_OF_SCORE.get(key, min)(one) for key, one in values.items()}
-    return {"kind": kind, "mean": {key: float(np.mean(one)) for key, one in values.items()}, "worst": worst}
+    worst = {key: _WORST_OF_SCORE.get(key, min)(of_days) for key, of_days in values.items()}
+    return {
+        "kind": kind,
+        "mean": {key: float(np.mean(of_days)) for key, of_days in values.items()},
+        "worst": worst,
+    }

@@ -1,5 +1,9 @@
-"""certificate.json: for the alarm and for each exclusion the inequality that the data violated, with every
-number it takes. `check_certificate.py` recomputes it from the log, with the columns of `evidence_columns`.
+"""certificate.json: for the alarm and for each exclusion a *statement*, i.e. the inequality that the data
+violated, with every number it needs. `check_certificate.py` recomputes it from the log, with the columns of
+`evidence_columns`.
+
+An *event* is the alarm or an exclusion that is in force at the end of the flight. Its row is that in which it
+was set.
 """
 
 import hashlib
@@ -54,12 +58,13 @@ from beaver_ftc_assurance.certificates.tape import (
 )
 
 Columns = dict[str, np.ndarray]
-MEASURED_MODEL_BOUND = "measured_rad_s", "design_rad_s2", "eta_bar_rad_s2"  # columns of each axis
-_LOGGED_COLUMNS = {"watch_missing"} | {f"{axis}_{of}" for axis in AXES for of in MEASURED_MODEL_BOUND}
+# Ends of the names of columns by axis.
+MEASURED_MODEL_BOUND = "measured_rad_s", "design_rad_s2", "eta_bar_rad_s2"
+_LOGGED_COLUMNS = {"watch_missing"} | {f"{axis}_{end}" for axis in AXES for end in MEASURED_MODEL_BOUND}
 _EVENT_COLUMN = re.compile("detected|fie_.*_excluded")  # columns of the alarm and of exclusions
-_SHARE_SUFFIX = "_likelihood_share"  # of columns: share of the alarm level
+_SHARE_SUFFIX = "_likelihood_share"  # end of the name of a column with a share of the alarm level
 TOO_LATE = f"more than {MAX_FRAMES_AFTER_ALARM} frames after the alarm, or with another diagnosis restarted"
-ADDING_POLE_PER_S = 0.1  # slow enough for the filter to add up a block
+ADDING_POLE_PER_S = 0.1  # so slow that the filter is nearly the sum over a block
 
 
 def certificate(
@@ -67,37 +72,37 @@ def certificate(
 ) -> Certified:
     """The certificate of a flight.
 
-    recorder: has kept the quantities that the log lacks; without one the scenario is flown again. text:
-    content of the file scenario.yaml beside the log, if it differs from `to_yaml(scenario)`.
+    recorder: has the quantities that the log lacks; without it, the scenario is flown again. text: content of
+    the file scenario.yaml beside the log, if it differs from `to_yaml(scenario)`.
 
     Raises BadInput if another scheme than ours diagnosed.
     """
     check_scheme(scenario)
     rows = logged_columns(log)
     n = len(rows["detected"])
-    declares = to_yaml(scenario) if text is None else text
+    scenario_text = to_yaml(scenario) if text is None else text
     document: Document = {
         "format": FORMAT_VERSION, "scenario": scenario.name,
-        "scenario_sha256": hashlib.sha256(declares.encode()).hexdigest(),
+        "scenario_sha256": hashlib.sha256(scenario_text.encode()).hexdigest(),
         "rows": n, "statements": [], "without": [],
     }  # fmt: skip
     if not (events := event_rows(rows)):
-        return Certified(with_digest(document), log, {}, declares)
+        return Certified(with_digest(document), log, {}, scenario_text)
     known = [events["detected"], *events.values()]
     tape = recorder.tape(known, n) if recorder else tape_of_flight_again(scenario, known, n)
     flight = _Flight(scenario, rows, tape, history_of(scenario, rows, tape))
-    for said in flight.statements(events):
-        if "because" in said:  # no number stands there, since nothing could prove it
-            del said["frame"]
-        document["without" if "because" in said else "statements"].append(said)
+    for statement in flight.statements(events):
+        if "because" in statement:  # not certified: without a row, since nothing can prove it
+            del statement["frame"]
+        document["without" if "because" in statement else "statements"].append(statement)
     if document["statements"]:
         document |= flight.declared_fields(document["statements"])
     columns = evidence_columns(tape, scenario.airframe.surfaces, document["statements"])
-    return Certified(with_digest(document), log, columns, declares)
+    return Certified(with_digest(document), log, columns, scenario_text)
 
 
 def logged_columns(log: Log) -> Columns:
-    """The columns of a log that a certificate reads, each (rows,)."""
+    """The columns of a log that a certificate needs, each (rows,)."""
     return log.read([
         name for name in log.columns
         if name in _LOGGED_COLUMNS or _EVENT_COLUMN.fullmatch(name) or name.endswith(_SHARE_SUFFIX)
@@ -105,7 +110,8 @@ def logged_columns(log: Log) -> Columns:
 
 
 def event_rows(rows: Columns) -> dict[str, int]:
-    """Column of the log, and row, of the alarm and of each exclusion that is in force at the end."""
+    """Column of the log -> row of the event, for the alarm and each exclusion that are in force at the
+    end."""
     return {
         name: row_set_to_end(flags) for name, flags in rows.items()
         if _EVENT_COLUMN.fullmatch(name) and flags[-1] > 0.0
@@ -119,7 +125,7 @@ def row_set_to_end(flags: np.ndarray) -> int:
 
 
 def check_scheme(scenario: Scenario) -> None:
-    """Raise BadInput for a scenario that another scheme than ours diagnoses."""
+    """Raise BadInput if the scheme of the scenario is not ours."""
     if not scenario.fdi.is_ours:
         says = f"{scenario.fdi.scheme!r} states no bounds that can be recomputed"
         raise BadInput(
@@ -128,10 +134,11 @@ def check_scheme(scenario: Scenario) -> None:
 
 
 class OfRun:
-    """The certificate of a flight that is about to be flown; `watch` records the quantities that it needs."""
+    """The certificate of a flight before it is flown. The flight calls `watch`, which records the quantities
+    that the log lacks."""
 
     def __init__(self, scenario: Scenario) -> None:
-        """Raises BadInput for a flight whose alarm is not our scheme's."""
+        """Raises BadInput if the scheme of the scenario is not ours."""
         check_scheme(scenario)
         self._scenario = scenario
         self._recorder = Recorder(scenario)
@@ -146,13 +153,16 @@ class OfRun:
 
 def history_of(scenario: Scenario, rows: Columns, tape: Tape) -> History:
     """Rates, model and bound from the log, and the declared errors from the tape."""
-    x, F, eta_bar = (np.column_stack([rows[f"{axis}_{of}"] for axis in AXES]) for of in MEASURED_MODEL_BOUND)
+    x, F, eta_bar = (
+        np.column_stack([rows[f"{axis}_{end}"] for axis in AXES]) for end in MEASURED_MODEL_BOUND
+    )
     return History(1.0 / scenario.rate_hz, scenario.substeps, x, F, eta_bar, declared_errors_of(tape.alarm))
 
 
 @dataclass(frozen=True)
 class _Flight:
-    """A flight whose log has events: the log's columns, and what was kept of it."""
+    """A flight with events: columns of its log, and the recorded quantities (`Tape`). Letters: e number of an
+    isolation estimator, s of a surface, k of a frame, m of a detection filter."""
 
     scenario: Scenario
     rows: Columns
@@ -160,14 +170,15 @@ class _Flight:
     history: History
 
     def statements(self, events: dict[str, int]) -> Iterator[Document]:
-        """A statement for each event; one without sides says in `because` why it cannot be certified."""
+        """A statement for each event. If an event cannot be certified, its statement has no sides, and the
+        reason in `because`."""
         alarm = events["detected"]
         diagnosis = self.tape.alarm.diagnosis
         tape = self.tape
-        about: Document = {"what": None, "column": "detected", "frame": alarm}
+        alarm_fields: Document = {"what": None, "column": "detected", "frame": alarm}
         ours = scheme_number("adaptive-estimators")
         ours_raised = diagnosis.estimators and diagnosis.enabled and diagnosis.scheme_number == ours
-        of_alarm = about | self._alarm(alarm, bool(ours_raised))
+        of_alarm = alarm_fields | self._alarm(alarm, bool(ours_raised))
         yield of_alarm
         if not ours_raised:
             return
@@ -176,20 +187,27 @@ class _Flight:
             if column not in events:
                 continue
             k = events[column]
-            said: Document = {"because": TOO_LATE}
+            evidence: Document = {"because": TOO_LATE}
             if k < tape.end:
-                said = self._exclusion(e, alarm, k) or chance.exclusion_by_alarm(tape, e, of_alarm)
-            yield {"what": name, "column": column, "frame": k} | said
+                evidence = self._exclusion(e, alarm, k) or chance.exclusion_by_alarm(tape, e, of_alarm)
+            yield {"what": name, "column": column, "frame": k} | evidence
         if self.scenario.fdi.fault_class == "all":
             yield from self._types(max(alarm, 1))  # the first row has no innovation
 
     def _alarm(self, k: int, is_ours: bool) -> Document:
-        """Evidence of the alarm at row k, from the first source that has it: a filter beyond its bound,
-        sensors that disagree, the statistical detector."""
+        """Evidence of the alarm at row k. is_ours: whether our scheme raised it. The first source that has
+        evidence:
+
+            a detection filter beyond its bound, if our scheme raised the alarm
+            the sensor monitor, if it raised the alarm
+            the statistical detector, if our scheme raised the alarm and the scenario declares this detector
+
+        If none has, the reason.
+        """
         monitor = self.tape.alarm.diagnosis.sensor_monitor
-        found = self._filter_alarm(k) if is_ours else None
-        if found is not None:
-            return found
+        evidence = self._filter_alarm(k) if is_ours else None
+        if evidence is not None:
+            return evidence
         if monitor.has_raised_alarm:
             return instruments_say.alarm_evidence(monitor, self.rows, k)
         if not is_ours:
@@ -200,14 +218,15 @@ class _Flight:
         return by_chance or {"because": chance.ALARM_NOT_STATED}
 
     def _filter_alarm(self, k: int) -> Document | None:
-        """A filter that left its bound at frame k; None if none did, or before the diagnosis began."""
+        """Evidence that a detection filter exceeded its bound at frame k; None if none did, or if the
+        diagnosis had not begun before."""
         tape = self.tape
-        every = (0, 1, 2)
+        all_axes = (0, 1, 2)
         if k <= tape.since:
             return None
-        filtered = (filters(pole, tape.since, k, every) for pole in self._detection_poles)
+        filtered = (filters(pole, tape.since, k, all_axes) for pole in self._detection_poles)
         health = no_fault(tape.first, tape.end - tape.first)
-        return first_violated(chain(filters(inf, k - 1, k, every), *filtered), health, self.history)
+        return first_violated(chain(filters(inf, k - 1, k, all_axes), *filtered), health, self.history)
 
     @property
     def _detection_poles(self) -> list[float]:
@@ -215,24 +234,32 @@ class _Flight:
         return list(filter_poles(self.scenario.fdi, Declared.of(self.scenario)))
 
     def _exclusion(self, e: int, alarm: int, k: int) -> Document | None:
-        """The test that the fault of estimator e failed at frame k: with any theta in each frame, of the
-        frame alone, or of a filter; else with one theta since the alarm, where the scenario declares so."""
+        """Evidence against the fault of estimator e at frame k, the first of these inequalities that is
+        violated:
+
+            theta may change in each frame     frame k alone, detection filters, isolation filter since the
+            alarm theta is constant                  two frames since the alarm, for a loss and
+            `fault_profile: abrupt`;
+                                               isolation filter since the alarm, for `thresholds: published`
+        """
         tape = self.tape
         config = self.scenario.fdi
         history = self.history
         estimator = tape.alarm.diagnosis.estimators[e]
         if k == 0:  # the first row has no innovation
             return None
-        of = Hypothesis(
+        hypothesis = Hypothesis(
             tape.first, tape.offset[:, e], tape.slope[:, e], tape.spread[:, e], estimator.theta_min,
             estimator.theta_max, axes=estimator.active_axes,
         )  # fmt: skip
-        since_alarm = [*filters(config.isolation_pole_per_s, alarm, k, of.axes)] if k > alarm else []
-        memory = self._filter_tests(e, estimator.parity_direction, of.axes, k)
-        found = first_violated(chain(single_frame_tests(k, of), memory, since_alarm), of, history)
-        if found is not None:
-            return found
-        lasting = replace(of, theta=CONSTANT)
+        since_alarm = [*filters(config.isolation_pole_per_s, alarm, k, hypothesis.axes)] if k > alarm else []
+        memory = self._filter_tests(e, estimator.parity_direction, hypothesis.axes, k)
+        evidence = first_violated(
+            chain(single_frame_tests(k, hypothesis), memory, since_alarm), hypothesis, history
+        )
+        if evidence is not None:
+            return evidence
+        lasting = replace(hypothesis, theta=CONSTANT)
         candidates: list[list[Term]] = []
         if estimator.hypothesis_kind == LOSS and config.fault_profile == "abrupt":
             candidates = [constant_theta_tests(lasting, history, np.arange(alarm, k + 1))]
@@ -243,19 +270,22 @@ class _Flight:
     def _filter_tests(
         self, e: int, across: np.ndarray, axes: tuple[int, ...], k: int
     ) -> Iterator[list[Term]]:
-        """The tests of the detection filters, each with the bound on the fault's effect before the first
-        frame. across (3,): a direction in which the fault has no effect, zeros where there is none; its reach
-        is the last of four, after those of the axes."""
+        """Inequalities of the detection filters, each with a bound on the fault's effect in the filter before
+        the first kept frame (reach). across (3,): direction in which the fault has no effect, zeros if there
+        is none. The last axis of `reach_low` and `reach_high` has the three axes, and this direction as the
+        fourth."""
         tape = self.tape
-        ways = [([*axis_directions((i,))], i) for i in axes]
-        ways += [([across, -across], 3)] if across.any() and len(axes) == 3 else []
+        directions = [([*axis_directions((i,))], i) for i in axes]
+        directions += [([across, -across], 3)] if across.any() and len(axes) == 3 else []
         for m, pole in enumerate(self._detection_poles):
-            for both, i in ways:
-                for d, reach in zip(both, (tape.reach_high, -tape.reach_low), strict=True):
+            for both_ways, i in directions:
+                for d, reach in zip(both_ways, (tape.reach_high, -tape.reach_low), strict=True):
                     yield [Term(d, pole, tape.since, k, effect_before=float(reach[e, m, i]))]
 
     def _types(self, alarm: int) -> Iterator[Document]:
-        """A statement for each excluded type, surface by surface. Its column is one of `evidence_columns`."""
+        """A statement for each excluded type, surface by surface. Its column is one of `evidence_columns`. If
+        types are tested by blocks of frames, tape, history and alarm are those by blocks; without a complete
+        block, no type is certified."""
         tape = self.tape
         history = self.history
         if tape.alarm.diagnosis.types_config.frames_per_block > 1:
@@ -265,50 +295,66 @@ class _Flight:
             surface = self.scenario.airframe.surfaces[s]
             row = self.tape.first + row_set_to_end(self.tape.types[:, s, kind])
             because = kinds.reason_not_certified(tape, kind) if any_block else kinds.EXCLUDED_BY_MANY_FRAMES
-            found = None if because else self._type(tape, history, s, kind, alarm, k)
+            evidence = None if because else self._type(tape, history, s, kind, alarm, k)
             yield {
                 "what": kinds.exclusion_name(surface, kind),
                 "column": kinds.exclusion_column(surface, kind), "frame": row,
-            } | (found or {"because": because or kinds.EXCLUDED_BY_MANY_FRAMES})  # fmt: skip
+            } | (evidence or {"because": because or kinds.EXCLUDED_BY_MANY_FRAMES})  # fmt: skip
 
     def _type(self, tape: Tape, history: History, s: int, kind: int, alarm: int, k: int) -> Document | None:
-        """Evidence against a type on surface s at frame k; tape and history: perhaps by blocks."""
+        """Evidence against a type on surface s at frame k; None if there is none. tape, history, alarm, k: by
+        frames or, if types are tested by blocks, by blocks."""
         if TYPES[kind].frames_test:
             return courses.evidence(self.scenario, tape, history, s, kind, alarm)
-        of = kinds.hypothesis_of_type(tape, s, kind)
-        if history.length == 1 or of.theta != ANY:
-            return first_violated(kinds.candidate_inequalities(of, history, alarm, k), of, history)
+        hypothesis = kinds.hypothesis_of_type(tape, s, kind)
+        if history.length == 1 or hypothesis.theta != ANY:
+            return first_violated(
+                kinds.candidate_inequalities(hypothesis, history, alarm, k), hypothesis, history
+            )
         return self._sum_of_block(kinds.hypothesis_of_type(self.tape, s, kind), history, k)
 
-    def _sum_of_block(self, of: Hypothesis, blocks: History, k: int) -> Document | None:
-        """Block k, or the one before, by frames, in which theta may differ. A block is left out if it begins
-        before the effects of a fault are kept."""
+    def _sum_of_block(self, hypothesis: Hypothesis, blocks: History, k: int) -> Document | None:
+        """Evidence of block k, or of the block before, as a sum over its frames, in which theta may differ. A
+        block is left out if it begins before the first frame whose effects of a fault are kept."""
         L = blocks.length
         starts = [blocks.begin + block * L - 1 for block in (k - 1, k)]
-        kept = (start for start in starts if start >= of.first_frame)
-        candidates = (filters(ADDING_POLE_PER_S, start, start + L, of.axes) for start in kept)
-        return first_violated(chain.from_iterable(candidates), of, self.history)
+        kept = (start for start in starts if start >= hypothesis.first_frame)
+        candidates = (filters(ADDING_POLE_PER_S, start, start + L, hypothesis.axes) for start in kept)
+        return first_violated(chain.from_iterable(candidates), hypothesis, self.history)
 
-    def declared_fields(self, said: list[Document]) -> Document:
-        """The fields of the certificate that all statements share: declared errors, times, Earth's rate."""
-        of = [(one, span) for one in said for span in (*one.get("terms", ()), *one.get("bounds", ()))]
-        asked = np.any([np.array(span["d"]) != 0.0 for _, span in of], axis=0) if of else np.zeros(3, bool)
-        history = self.history.with_constant_gyro_errors_on(asked)
-        if not all(_is_unexplained(history, one, span) for one, span in of):
+    def declared_fields(self, statements: list[Document]) -> Document:
+        """The fields of the certificate that all statements share: declared errors, times, Earth's rate. The
+        constant part of a gyro's error is stated only on axes that a statement uses, if all statements hold
+        with it.
+
+        spans: each term or bound of a statement, with the statement. on_axes (3,): whether a span uses the
+        axis.
+        """
+        spans = [
+            (statement, span)
+            for statement in statements
+            for span in (*statement.get("terms", ()), *statement.get("bounds", ()))
+        ]
+        on_axes = (
+            np.any([np.array(span["d"]) != 0.0 for _, span in spans], axis=0) if spans else np.zeros(3, bool)
+        )
+        history = self.history.with_constant_gyro_errors_on(on_axes)
+        if not all(_is_unexplained(history, statement, span) for statement, span in spans):
             history = self.history
-        rows = np.concatenate([log_rows_of(one, span) for one, span in of]) if of else None
-        about: Document = {"declared": history.declared_fields(rows)}
-        if not all("looks" in one or "missing" in one for one in said):
-            about["dt_s"] = self.history.dt
-        if of:
-            about |= {"instants": self.scenario.substeps, "omega_E": self.history.declared.earth_rad_s}
-        return about
+        rows = np.concatenate([log_rows_of(statement, span) for statement, span in spans]) if spans else None
+        fields: Document = {"declared": history.declared_fields(rows)}
+        if not all("looks" in statement or "missing" in statement for statement in statements):
+            fields["dt_s"] = self.history.dt
+        if spans:
+            fields |= {"instants": self.scenario.substeps, "omega_E": self.history.declared.earth_rad_s}
+        return fields
 
 
-def _is_unexplained(history: History, one: Document, span: Document) -> bool:
-    """Whether health explains none of the frames of a statement's term, or bound, if it says so."""
-    if "shows" not in one["theta"] and "bounds" not in one:
+def _is_unexplained(history: History, statement: Document, span: Document) -> bool:
+    """Whether health explains none of the frames of a span, i.e. a term or bound of a statement; true if the
+    statement does not require it. history: by frames; the statement's block makes it one by blocks."""
+    if "shows" not in statement["theta"] and "bounds" not in statement:
         return True
-    length, begin, _ = one.get("block", (1, 0, 0))
-    seen = replace(history, length=length, begin=begin)
-    return bool(seen.is_unexplained(np.arange(span["first"], span["frame"] + 1)).all())
+    length, begin, _ = statement.get("block", (1, 0, 0))
+    blocks = replace(history, length=length, begin=begin)
+    return bool(blocks.is_unexplained(np.arange(span["first"], span["frame"] + 1)).all())

@@ -10,26 +10,26 @@ from beaver_ftc.loop import LogSink
 from beaver_ftc.results import Document, Log, ParquetLog
 from beaver_ftc_assurance.certificates.check_certificate import digest
 
-EvidenceColumns = dict[str, "PartialColumn"]  # column of the log -> what stands in it
+EvidenceColumns = dict[str, "PartialColumn"]  # name of a column of the log -> its values
 FILE_NAME = "certificate.json"
 LOG_NAME = "log.parquet"
 
 
 def with_digest(document: Document) -> Document:
-    """The document with its `digest`: the SHA-256 of its JSON text, keys sorted, without spaces, with an
-    empty `digest`."""
+    """The document with its `digest`: the SHA-256 of its JSON text with sorted keys, without spaces, and with
+    an empty `digest`.
+    """
     return document | {"digest": digest(document)}
 
 
 def as_text(document: Document) -> str:
-    """The file's content."""
+    """The text of the file."""
     return json.dumps(document, separators=(",", ":")) + "\n"
 
 
 @dataclass(frozen=True)
 class Certified:
-    """A certificate, and what proves it: the log, the columns that the log lacks, the text of
-    scenario.yaml."""
+    """A certificate and its proof: the log, the columns that the log lacks, and the text of scenario.yaml."""
 
     document: Document
     log: Log
@@ -37,12 +37,12 @@ class Certified:
     scenario: str
 
     def copy_log(self, to: LogSink) -> None:
-        """Write the log, with the columns that it lacks, to a sink."""
+        """Write the log with the additional columns to a sink."""
         to.open([*self.log.columns, *self.columns])
         first = 0
         for chunk in self.log.read_chunks():
             n = len(chunk["t_s"])
-            further = (one.rows(first, n) for one in self.columns.values())
+            further = (column.rows(first, n) for column in self.columns.values())
             to.write(np.column_stack([*chunk.values(), *further]))
             first += n
 
@@ -59,8 +59,9 @@ class Certified:
 
 @dataclass(frozen=True)
 class PartialColumn:
-    """A column known in the rows from `first` on (`values`). The rows before repeat the first of the values,
-    the rows after the last."""
+    """A column whose `values` begin with row `first`. The rows before have the first value, the rows after
+    the values have the last one.
+    """
 
     first: int
     values: np.ndarray

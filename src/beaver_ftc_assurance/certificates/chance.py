@@ -1,8 +1,9 @@
 """Evidence of an alarm by the statistical detector: the likelihood ratio of a fault from its onset to the
-alarm, read from the recorded frames. likelihood_ratio.py evaluates and shortens it.
+alarm.
 
-docs/explanation/statistical.md derives it. The log lacks its inputs (signature, regressors of declared
-constants, variances); the recorder keeps them frame by frame (tape.py).
+docs/explanation/statistical.md derives the ratio, and likelihood_ratio.py evaluates and shortens it. Here its
+inputs (signature, regressors of declared constants, variances) are read from the recorded frames (tape.py),
+since the log lacks them. Numbers: b of a block of filters, h of a hypothesis in it, slot of an onset.
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,8 +23,8 @@ from beaver_ftc_assurance.certificates.history import Document, History
 from beaver_ftc_assurance.certificates.likelihood_ratio import Inputs, LikelihoodRatio
 from beaver_ftc_assurance.certificates.tape import Tape
 
-LOGGED_SCORE_TOLERANCE = 1e-5  # relative; more than all that a certificate leaves out changes the score by
-MAX_WRITTEN_FRAMES = 520  # with more a certificate would have over 200 kB
+LOGGED_SCORE_TOLERANCE = 1e-5  # relative; the numbers that a certificate leaves out change the score by less
+MAX_WRITTEN_FRAMES = 520  # with more frames, a certificate would exceed 200 kB
 EXCLUSION_NOT_STATED = (
     "chance excluded it, weighing every onset of every fault: more than a certificate can hold"
 )
@@ -33,10 +34,11 @@ ALARM_NOT_STATED = "chance raised it: an onset long before, a tone, or a force"
 def alarm_evidence(
     tape: Tape, history: History, surfaces: Sequence[str], rows: Mapping[str, np.ndarray], k: int
 ) -> Document | None:
-    """The evidence of a statistical alarm at row k; None if its onset is too old, or no single onset explains
-    it.
+    """The evidence of a statistical alarm at row k; None if its onset is too old, or if the ratio from the
+    frames differs from the score of the detector.
 
-    rows: the log, which has the largest share of the level over all views: at least that of this evidence.
+    rows: the log, whose column has the largest share of the alarm level over all blocks of a hypothesis, so
+    at least the share of this evidence. first: the last row at which the slot of the largest score restarted.
     """
     diagnosis = tape.alarm.diagnosis
     b, h = _largest_score(diagnosis.statistical_filters)
@@ -59,8 +61,8 @@ def alarm_evidence(
 
 
 def exclusion_by_alarm(tape: Tape, e: int, alarm: Document) -> Document:
-    """The evidence that the statistical alarm came on axes that the fault of estimator e does not move; the
-    reason why there is none, if it moves one of them."""
+    """The evidence that the statistical alarm was on axes that the fault of estimator e does not move; if it
+    moves one of them, the reason why there is no evidence."""
     if "likelihood" in alarm:
         span = slice(alarm["first"] - 1 - tape.first, alarm["frame"] + 1 - tape.first)
         moved = (values[span, e][:, alarm["axes"]] for values in (tape.slope, tape.offset, tape.spread))
@@ -70,39 +72,44 @@ def exclusion_by_alarm(tape: Tape, e: int, alarm: Document) -> Document:
 
 
 def likelihood_shares(diagnosis: DiagnosisReadout, surfaces: Sequence[str]) -> dict[str, float]:
-    """Column, and largest share of the alarm level, of each hypothesis that raises alarms."""
-    found: dict[str, float] = {}
+    """Column of the log -> largest share of the alarm level, for the hypotheses that may raise alarms."""
+    shares: dict[str, float] = {}
     for block in diagnosis.statistical_filters:
         for hypothesis in block.hypotheses:
             if hypothesis.may_raise_alarm:
                 column = _share_column(hypothesis, surfaces)
                 share = hypothesis.score_in_std / diagnosis.statistical_alarm_level
-                found[column] = max(found.get(column, 0.0), share)
-    return found
+                shares[column] = max(shares.get(column, 0.0), share)
+    return shares
 
 
-def _share_column(of: StatisticalHypothesis, surfaces: Sequence[str]) -> str:
-    """The log's column of a hypothesis."""
-    name = f"{AXES[of.axis]}_step" if of.hypothesis_kind == STEP else f"{surfaces[of.surface]}_loss"
+def _share_column(hypothesis: StatisticalHypothesis, surfaces: Sequence[str]) -> str:
+    """The column of the log for a hypothesis."""
+    name = (
+        f"{AXES[hypothesis.axis]}_step"
+        if hypothesis.hypothesis_kind == STEP
+        else f"{surfaces[hypothesis.surface]}_loss"
+    )
     return f"{name}_likelihood_share"
 
 
 def _largest_score(blocks: Sequence[StatisticalBlock]) -> tuple[int, int]:
-    """Block and hypothesis of the largest score that raises alarms."""
-    places = [(b, h) for b, block in enumerate(blocks) for h, of in enumerate(block.hypotheses)
-              if of.may_raise_alarm]  # fmt: skip
+    """Block and hypothesis of the largest score, out of those that may raise alarms."""
+    places = [(b, h) for b, block in enumerate(blocks) for h, hypothesis in enumerate(block.hypotheses)
+              if hypothesis.may_raise_alarm]  # fmt: skip
     return max(places, key=lambda bh: blocks[bh[0]].hypotheses[bh[1]].score_in_std, default=(0, 0))
 
 
 def _likelihood_ratio(
     tape: Tape, history: History, test: tuple[int, int, int], rows: range
 ) -> LikelihoodRatio:
-    """The ratio of a test (block, hypothesis, slot of the onset: their numbers) from first to last row.
+    """The ratio of a test (b, h, slot) over the given rows.
 
-    before, now: quantities recorded at the end of the row before each, and of the row. The detector prepares
-    noise, decay, bound and rate of change of the drift at the end of the row before; it fills inputs and
-    responses in the row itself. moved: places in the block of the axes that the fault moves; states: of
-    their rate errors, then drifts. known: the declared constants that act on these axes.
+    before, now: quantities at the end of the row before each row, and of the row itself. The detector
+    prepares noise, decay, bound and rate of change of the drift at the end of the row before; it fills inputs
+    and responses in the row itself. moved: positions in the block of the axes that the fault moves. states:
+    positions of their rate errors, then of their drifts, in the states of the block. known: numbers of the
+    declared constants that act on these axes.
     """
     b, h, slot = test
     dt = history.dt
@@ -112,7 +119,9 @@ def _likelihood_ratio(
     recorded = {name: tape.filters[name][span] for name in ("bounded", "air", "leap")}
     recorded |= {name: tape.filters[name][span, b] for name in RECORDED_BLOCK_FIELDS}
     recorded["signature"] = tape.filters["signature"][span, b, h]
-    before, now = ({name: one[part] for name, one in recorded.items()} for part in (np.s_[:-1], np.s_[1:]))
+    before, now = (
+        {name: values[part] for name, values in recorded.items()} for part in (np.s_[:-1], np.s_[1:])
+    )
     moved = _affected_axes(recorded, now["signature"], len(block.axis_indices))
     states = [*moved, *(2 + i for i in moved)]
     axes = [block.axis_indices[i] for i in moved]
@@ -144,12 +153,14 @@ def _likelihood_ratio(
 
 
 def _a_frame_later(drift: np.ndarray) -> np.ndarray:
-    """The detector adds Q_d after the decay of the drift, `add_whitened_frames` before it."""
+    """Covariances drift (frames, n, n) one frame later, because the detector adds them after the decay of the
+    drift, and `add_whitened_frames` before it."""
     return np.concatenate([np.zeros_like(drift[:1]), drift[:-1]])
 
 
 def _supporting_parts(block: StatisticalBlock, h: int, slot: int) -> list[str]:
-    """Those parts of the innovation that can be foreseen and whose correlation supports the fault."""
+    """The recorded quantities of the predictable parts of the innovation whose correlation supports the
+    fault."""
     tests = block.hypothesis_tests_by_onset
     predictable = {
         "p": tests.correlation_predictable_in_calm_air,
@@ -160,16 +171,18 @@ def _supporting_parts(block: StatisticalBlock, h: int, slot: int) -> list[str]:
 
 
 def _states_of(
-    one: Mapping[str, np.ndarray], states: list[int], known: list[int]
+    quantities: Mapping[str, np.ndarray], states: list[int], known: list[int]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Y and P of `LikelihoodRatio` from the quantities of one row."""
-    Y = np.array([one["state"][states], np.zeros(len(states)), *one["x_Z"][known][:, states]]).T
+    """Y and P of `LikelihoodRatio` from the quantities of one row. Y has minus the drifts."""
+    Y = np.array([quantities["state"][states], np.zeros(len(states)), *quantities["x_Z"][known][:, states]]).T
     Y[len(states) // 2 :] *= -1.0
-    P = np.block([[one["P_xx"], one["P_xd"]], [one["P_xd"].T, one["P_dd"]]])[np.ix_(states, states)]
-    return Y, 0.5 * (P + P.T)  # the checker refuses rounding
+    P = np.block([[quantities["P_xx"], quantities["P_xd"]], [quantities["P_xd"].T, quantities["P_dd"]]])[
+        np.ix_(states, states)
+    ]
+    return Y, 0.5 * (P + P.T)  # exactly symmetric, as the checker requires
 
 
 def _affected_axes(recorded: dict[str, np.ndarray], signature: np.ndarray, n: int) -> list[int]:
-    """Places of the axes of a block of n that the fault moves; both if their covariances are not zero."""
+    """Positions, in a block of n axes, of the axes that the fault moves; both if the axes are correlated."""
     together = n > 1 and any(recorded[name][..., 0, 1].any() for name in ("P_xx", "P_xd", "P_dd", "Q_d"))
     return [i for i in range(n) if together or signature[:, i].any()]

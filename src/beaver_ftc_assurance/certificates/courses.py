@@ -1,9 +1,13 @@
-"""Exclusions of fault types by their course: bounds of single frames on the surface's position, compared.
+"""Exclusions of fault types by their *course*, i.e. the surface's position over several frames.
 
-Each frame that health does not explain bounds the surface's position from below, or above; a fault type
-forbids some pairs of such bounds. A rule takes the bounds (`SurfaceBounds`), and returns what it can state:
-pairs (greater, less), where the type requires greater <= less. docs/explanation/certificates.md, "Types that
-pairs exclude", has the pairs of each rule, in order.
+Each frame that health does not explain bounds the position of the surface from below, or from above. A fault
+type forbids some pairs of such bounds. A rule takes the bounds (`SurfaceBounds`), and returns the statement
+of an exclusion, with pairs (greater, less): the type requires greater <= less in at least one of them, and in
+the flight greater > less in all. docs/explanation/certificates.md, "Types that pairs exclude", has the pairs
+of each rule, in order. Each rule is written for the sign 1; for the sign -1, positions are multiplied by -1.
+
+Words: the *command* is the position of a healthy surface; an *order* is a command before the actuator. A
+*frame* here is a block of frames if types are tested by blocks; dt is its length, s.
 """
 
 from collections.abc import Callable, Iterator
@@ -21,24 +25,24 @@ from beaver_ftc_assurance.certificates.inequality import Hypothesis, theta_bound
 from beaver_ftc_assurance.certificates.kinds import STUCK, hypothesis_of_type, travel_rad
 from beaver_ftc_assurance.certificates.tape import Tape
 
-MIN_POSITION_DIFFERENCE_RAD = 1e-9  # two positions that differ by less are not compared
+MIN_POSITION_DIFFERENCE_RAD = 1e-9  # a smaller difference between two positions is rounding
 Pair = tuple[float, float]  # greater, less: rad, or frames
 
 
 @dataclass(frozen=True)
 class SurfaceBounds:
-    """Bounds on a surface's position p, and its commands, in frames first_frame, first_frame + 1, ...; rad.
+    """Bounds on a surface's position p, and its commands, in n frames first_frame, first_frame + 1, ...; rad.
 
-    For sign -1 all positions, commands and stops are multiplied by -1, so that a type needs one rule. Shapes,
-    with n frames and the axes p, q, r:
+    For sign -1 all positions, commands and stops are multiplied by -1, so that a type needs one rule. Columns
+    are the axes of roll, pitch and yaw:
 
     lower, upper (n, 3): bounds on p by the innovation of one axis; infinite where that axis bounds nothing.
     command (n,): position of a healthy surface, as the axis on which the surface acts most has it.
     axis_commands (n, 3): the same as each axis has it; they differ if the effectiveness changes in a frame.
     command_range (n, 2): how far below and above `command` the commands of the frame's instants reach, >= 0.
-    is_unexplained (n,): health does not explain the frame. max_order (n,): largest command in effect in the
-    frame. stops (2,): low and high end of travel. held: the hypothesis by which a frame bounds the position.
-    slowest_rad_s: of an oscillation.
+    is_unexplained (n,): health does not explain the frame. max_order (n,): largest order in effect in the
+    frame. stops (2,): low and high end of travel. held: hypothesis by which a frame bounds the position.
+    slowest_rad_s: frequency of the slowest oscillation.
     """
 
     first_frame: int
@@ -57,31 +61,36 @@ class SurfaceBounds:
     slowest_rad_s: float
 
     def runs_beyond(self, reference: np.ndarray) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
-        """By axis: the axis; how far each frame shows the surface beyond `reference` (n,), rad; the first
-        frame of the unbroken run of frames beyond that ends with frame k, k + 1 if k is none of them."""
-        places = np.arange(len(reference))
+        """For each axis: the axis; distance (n,) by which each frame shows the surface beyond `reference`
+        (n,), rad; and starts (n,). A frame is *beyond* if this distance is positive and health does not
+        explain the frame. starts[k]: first frame of the unbroken run of frames beyond that ends with frame k;
+        k + 1 if frame k is not beyond."""
+        numbers = np.arange(len(reference))
         for axis, lower in enumerate(self.lower.T):
             beyond = self.is_unexplained & (lower > reference + MIN_POSITION_DIFFERENCE_RAD)
-            yield axis, lower - reference, np.maximum.accumulate(np.where(beyond, 0, places + 1))
+            yield axis, lower - reference, np.maximum.accumulate(np.where(beyond, 0, numbers + 1))
 
     def statement(
         self, lower: range, upper: int | None, pairs: list[Pair], fields: Document, axis: int | None = None
     ) -> Document:
-        """What is stated of lower bounds, by number from first_frame on, that are compared with the upper
-        bound of a frame, None if there is none. axis: of the lower bounds, None for that of the largest;
-        fields: further ones of the statement."""
+        """The fields of a statement. lower: numbers, from first_frame on, of the frames whose lower bounds
+        are compared with the upper bound of frame `upper`, None if there is none. axis: of the lower bounds;
+        if None, the axis with the largest bound in the first of these frames. fields: further fields of the
+        statement."""
         held = self.held
         if upper is None:  # an oscillation: theta is the distance from the command
             held = replace(held, offset=np.zeros_like(held.offset))
         axis = int(self.lower[lower[0]].argmax()) if axis is None else axis
-        said = [self._bound_fields(held, lower, axis, 1)]
+        entries = [self._bound_fields(held, lower, axis, 1)]
         if upper is not None:
-            of_upper = int(self.upper[upper].argmin())
-            said.append(self._bound_fields(held, range(upper, upper + 1), of_upper, -1))
-        return {"theta": "course", **fields, "bounds": said, "sides": np.array(pairs, float).T.tolist()}
+            upper_axis = int(self.upper[upper].argmin())
+            entries.append(self._bound_fields(held, range(upper, upper + 1), upper_axis, -1))
+        return {"theta": "course", **fields, "bounds": entries, "sides": np.array(pairs, float).T.tolist()}
 
     def _bound_fields(self, held: Hypothesis, frames: range, axis: int, side: int) -> Document:
-        """Fields of frames that bound the surface by an axis: from below (side 1), or above (-1)."""
+        """The entry of frames that bound the position by an axis, from below (side 1) or above (-1):
+        direction d along which the effect G (p - u) grows with the bound, first and last frame, and h, Z, r
+        of the hypothesis along d."""
         first = self.first_frame + frames[0]
         last = self.first_frame + frames[-1]
         d = np.zeros(3)
@@ -97,9 +106,11 @@ def _exclude_offset(bounds: SurfaceBounds, grows: bool = False) -> Document | No
 
         lower = least - command,    upper = most - command,    excluded if lower[i] > upper[j]
 
-    least, most (n,): bounds on the position p, rad, of the axis that bounds it most. At a stop the position
-    says nothing about the offset. The range of the command in a frame of several instants brings both stops
-    nearer."""
+    least, most (n,): bounds on the position p, rad, by the axis that bounds it most. The lower bound counts
+    only above the low stop, the upper bound only below the high stop: a surface at a stop may have any larger
+    offset. The range of the command in a frame of several instants brings both stops nearer. With grows, j
+    must be later than i, and the offset positive.
+    """
     least = bounds.lower.max(axis=1)
     most = bounds.upper.min(axis=1)
     low_stop = bounds.stops[0] + bounds.command_range[:, 0]
@@ -116,7 +127,8 @@ def _exclude_offset(bounds: SurfaceBounds, grows: bool = False) -> Document | No
     pairs = [(greater, less), (least[i], low_stop[i]), (high_stop[j], most[j])]
     if grows:
         pairs = [(greater, 0.0), *pairs, (bounds.first_frame + j, bounds.first_frame + i)]
-    if not all(more > limit for more, limit in pairs):  # by the commands of single axes
+    # The pairs use the commands of single axes, so one may fail.
+    if not all(more > limit for more, limit in pairs):
         return None
     stops = [float(low_stop[i]), float(high_stop[j])]
     return bounds.statement(range(i, i + 1), j, pairs, {"stops": stops})
@@ -130,8 +142,9 @@ def _farthest(lower: np.ndarray, upper: np.ndarray) -> tuple[int, int] | None:
 
 
 def _first_smaller(lower: np.ndarray, upper: np.ndarray) -> tuple[int, int] | None:
-    """The frame with the greatest lower bound so far, if it is positive, and the first one later whose upper
-    bound contradicts it."""
+    """(i, j): frame i has the greatest lower bound so far, which is positive, and j is the first later frame
+    whose upper bound is less; None if there is none.
+    """
     for j in np.flatnonzero(upper < np.inf).tolist():
         i = int(np.argmax(lower[: j + 1]))
         if i < j and lower[i] > max(upper[j], 0.0) + MIN_POSITION_DIFFERENCE_RAD:
@@ -140,12 +153,13 @@ def _first_smaller(lower: np.ndarray, upper: np.ndarray) -> tuple[int, int] | No
 
 
 def _exclude_runaway(bounds: SurfaceBounds) -> Document | None:
-    """Exclude a runaway at its least rate or faster: a later frame shows less travel.
+    """Exclude a runaway: a surface that runs away from frame i at its least rate, or faster, would be farther
+    in frame j.
 
         excluded if least[i] + step (j - i - late_frames) > most[j],    step = rate dt
 
-    In a frame of several instants the lower bound may hold only in the last one: late_frames, the way of one
-    frame, is then not counted."""
+    In a frame of several instants, the lower bound may hold only in the last instant. late_frames: 1 then,
+    otherwise 0. The surface must not be at its high stop in frame j."""
     rate = bounds.actuator.min_runaway_rate_rad_s
     high_stop = bounds.stops[1]
     step = rate * bounds.config.block_duration_s
@@ -169,8 +183,8 @@ def _exclude_runaway(bounds: SurfaceBounds) -> Document | None:
 
 
 def _exclude_oscillation(bounds: SurfaceBounds) -> Document | None:
-    """Exclude an oscillation about the command: the surface is on one side of the command for longer than
-    half of the slowest period."""
+    """Exclude an oscillation about the command: the surface is on one side of the command for more frames
+    than half of the slowest period, pi / (slowest_rad_s dt)."""
     for axis, beyond, starts in bounds.runs_beyond(bounds.command):
         for k in np.flatnonzero(np.arange(len(starts)) - starts > bounds.config.half_blocks)[:1].tolist():
             run = range(int(starts[k]), k + 1)
@@ -181,11 +195,14 @@ def _exclude_oscillation(bounds: SurfaceBounds) -> Document | None:
 
 
 def _exclude_rate_limit(bounds: SurfaceBounds) -> Document | None:
-    """Exclude a reduced rate limit: such a surface approaches its order by at least the least step in each
+    """Exclude a reduced rate limit. Such a surface approaches its order by at least the least step in each
     instant, until it is so near that its lag makes the steps smaller. In a run of frames i ... k beyond all
-    orders, a later frame shows a position farther away:
+    orders, frame k shows a position farther away:
 
-        excluded if lower[k] > max(most[i] - min_approach (k - i - 1), near)
+        excluded if lower[k] > max(most[i] - min_approach (k - i - 1), near),
+        near = max(orders[i..k]) + lag distance
+
+    most (n,): least upper bound of each frame. min_approach: least approach in a frame, rad.
     """
     actuator = bounds.actuator
     config = bounds.config
@@ -210,12 +227,13 @@ def _exclude_rate_limit(bounds: SurfaceBounds) -> Document | None:
 
 
 def _positive_pairs(distance: np.ndarray, run: range) -> list[Pair]:
-    """Pairs that hold if the distance is positive in every frame of the run: the smallest, and the sum."""
+    """Pairs with greater > less if the distance (n,) is positive in every frame of the run: for the smallest
+    distance, and for the sum."""
     of_run = distance[run[0] : run[-1] + 1]
     return [(of_run.min(), 0.0), (of_run.sum(), 0.0)]
 
 
-# By the course that a type's row names.
+# Course in the row of a type (`FaultType.frames_test`) -> rule.
 RULES: dict[str, Callable[[SurfaceBounds], Document | None]] = {
     "runaway": _exclude_runaway, "offset": _exclude_offset,
     "growing offset": partial(_exclude_offset, grows=True), "swing": _exclude_oscillation,
@@ -227,14 +245,14 @@ def evidence(
     scenario: Scenario, tape: Tape, history: History, surface: int, fault_type: int, alarm_frame: int
 ) -> Document | None:
     """The fields of the statement that excludes a fault type on a surface by its course; None if there is no
-    such statement."""
+    such statement. Both signs are tried, unless the type has a direction of its own."""
     held = hypothesis_of_type(tape, surface, STUCK)
-    row = TYPES[fault_type]
-    for sign in (row.stop_direction,) if row.stop_direction else (1, -1):
+    fault_type_row = TYPES[fault_type]
+    for sign in (fault_type_row.stop_direction,) if fault_type_row.stop_direction else (1, -1):
         bounds = _surface_bounds(scenario, tape, history, held, surface, alarm_frame, sign)
-        found = RULES[row.frames_test](bounds)
-        if found is not None:
-            return history.statement_fields | found
+        statement = RULES[fault_type_row.frames_test](bounds)
+        if statement is not None:
+            return history.statement_fields | statement
     return None
 
 
@@ -248,29 +266,35 @@ def _surface_bounds(
     sign: int,
 ) -> SurfaceBounds:
     """The bounds of the frames from the alarm on in which the diagnosis has tested types. held: hypothesis by
-    which a frame bounds the position: theta is the position p, so that its offset is -G u and its slope G,
-    and the command u = -offset / slope.
+    which a frame bounds the position: theta is the position p, its offset is -G u and its slope G, so that
+    the command is u = -offset / slope.
 
-    reach (n, 2): least and greatest position of a healthy surface in each frame; orders (n, 3): orders to the
-    surface, of which a frame of one instant has the last alone.
+    reach (n, 2): least and greatest position of a healthy surface in each frame. orders (n, 3): largest
+    orders to the surface; in a frame of one instant only the last column is in effect, otherwise the last
+    two.
     """
     frames = np.arange(alarm_frame, tape.end - 1)
-    several = not history.has_single_instants
+    has_instants = not history.has_single_instants
     diagnosis = tape.last.diagnosis
-    here = slice(alarm_frame - tape.first, tape.end - 1 - tape.first)
+    tape_rows = slice(alarm_frame - tape.first, tape.end - 1 - tape.first)
     lower, upper, _ = theta_bounds_by_frame(held, history, frames)
     if sign < 0:
         lower, upper = -upper, -lower
-    slope = held.slope[here]
-    axis_commands = -sign * held.offset[here] / np.where(slope == 0.0, np.inf, slope)
+    slope = held.slope[tape_rows]
+    axis_commands = -sign * held.offset[tape_rows] / np.where(slope == 0.0, np.inf, slope)
     command = axis_commands[:, np.abs(slope).sum(axis=0).argmax()]
-    reach = np.column_stack([tape.least[here, surface, 0], tape.greatest[here, surface, 0]])[:, ::sign] * sign
-    command_range = np.maximum(0.0, (command[:, None] - reach) * (1.0, -1.0)) * several
-    orders = (tape.command_high if sign > 0 else -tape.command_low)[here.start + 1 : here.stop + 1, surface]
+    reach = (
+        np.column_stack([tape.least[tape_rows, surface, 0], tape.greatest[tape_rows, surface, 0]])[:, ::sign]
+        * sign
+    )
+    command_range = np.maximum(0.0, (command[:, None] - reach) * (1.0, -1.0)) * has_instants
+    orders = (tape.command_high if sign > 0 else -tape.command_low)[
+        tape_rows.start + 1 : tape_rows.stop + 1, surface
+    ]
     return SurfaceBounds(
         alarm_frame, sign, lower, upper, command, axis_commands, command_range,
         is_unexplained=history.is_unexplained(frames),
-        max_order=np.maximum(orders[:, 2], orders[:, 1 if several else 2]),
+        max_order=np.maximum(orders[:, 2], orders[:, 1 if has_instants else 2]),
         stops=np.sort(sign * np.array(travel_rad(tape, surface))), held=held,
         actuator=diagnosis.surface_fault_types[surface].actuator, config=diagnosis.types_config,
         slowest_rad_s=scenario.fdi.slowest_oscillation_rad_s,

@@ -1,4 +1,11 @@
-"""The log by frames, or by blocks of frames: innovation, its bound, and what was declared."""
+"""The log of a flight by frames, or by blocks of frames: innovation, its bound, and the declared errors.
+
+x (3,) rad/s: measured body rates; F (3,) rad/s2: angular acceleration by the design model; eta_bar (3,)
+rad/s2: bound on the error of F; nu (3,) rad/s2: innovation; n (3,) rad/s: bound on the changing error of the
+gyros. Without a fault
+
+    nu[k] = (x[k] - x[k-1]) / dt - F[k],    |nu[k]| <= eta_bar[k] + (n[k] + n[k-1]) / dt
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -13,8 +20,8 @@ from beaver_ftc.loop import FrameReadout
 from beaver_ftc.results import Document
 from beaver_ftc_assurance.certificates.tape import Tape
 
-ROUNDING_SHARE = 4e-15  # of a bound: a smaller part of it is rounding
-# Quantities of a tape that a block has the mean of; of all others it has the value of its last frame
+ROUNDING_SHARE = 4e-15  # a smaller share of a bound is rounding
+# Quantities of a tape of which a block has the mean; of all others it has the value of its last frame.
 AVERAGED_QUANTITIES = "offset", "slope", "spread"
 
 
@@ -23,9 +30,11 @@ class DeclaredErrors:
     """Declared errors that the bound on the model's error contains, by axis (3,).
 
     inertia_coupling: largest error of the model's coefficient of a product of two rates, 1/rad.
-    constant_rad_s2: constant part. earth_rad_s: rate of the Earth, which the model leaves out; earth_gain:
-    largest coefficient of a product with it, 1/rad, at least 1. Error of a gyro's reading: at most
-    gyro_offset_rad_s + gyro_slope |rate|, of which gyro_constant_rad_s does not change.
+    constant_rad_s2: constant part of the bound. earth_rad_s: rate of the Earth, which the model leaves out.
+    earth_gain:
+    bound on the coefficients of products with the Earth's rate, 1/rad, at least 1 (`declared_errors_of`). The
+    error of a gyro is at most gyro_offset_rad_s + gyro_slope |rate|; gyro_constant_rad_s is the part of it
+    that does not change.
     """
 
     inertia_coupling: np.ndarray
@@ -42,9 +51,10 @@ class History:
     """Columns of a log, (rows, 3) by axis: measured body rates x rad/s; acceleration F of the design model
     and bound eta_bar on its error, rad/s2, of the frame that ends with the row.
 
-    row_dt: s between two rows. instants: JSBSim frames between them. Types are tested by blocks of `length`
-    rows where gyros are noisy (diagnosis/types/registry.py); the first begins with row `begin`. A block
-    counts as one frame of several instants, whose bound has the gyro noise of its two ends alone.
+    row_dt: time between two rows, s. instants: number of JSBSim frames in this time. If gyros are noisy,
+    types are tested by blocks of `length` rows (diagnosis/types/registry.py); the first block begins with row
+    `begin`. A block counts as one frame of several instants. Its bound has the noise of the gyros at its two
+    ends only.
     """
 
     row_dt: float
@@ -68,7 +78,8 @@ class History:
 
     @property
     def statement_fields(self) -> Document:
-        """Rows in a block, the first row, and the one after the last; of single rows nothing."""
+        """The field `block` of a statement: rows in a block, first row, and the row after the last; without
+        blocks, no field."""
         if self.length == 1:
             return {}
         return {"block": [self.length, self.begin, self.begin + self.length * len(self.rates_rad_s)]}
@@ -96,14 +107,17 @@ class History:
 
     @cached_property
     def gyro_error_change_rad_s(self) -> np.ndarray:
-        """n of docs/explanation/detection.md, "Changing error of a gyro", (frames, 3)."""
+        """n of docs/explanation/detection.md, "Changing error of a gyro", (frames, 3):
+
+        n = offset - constant + slope |largest true rate|
+        """
         declared = self.declared
         x = self.rates_rad_s
         changing = declared.gyro_offset_rad_s - declared.gyro_constant_rad_s
         return np.asarray(changing + declared.gyro_slope * self._largest(x))
 
     def _largest(self, x: np.ndarray) -> np.ndarray:
-        """Bound on |true rate| by readings x, (n, 3)."""
+        """Bound on |true rate| by readings x, (n, 3): |x| + (offset + slope |x|) / (1 - slope)."""
         offset = self.declared.gyro_offset_rad_s
         slope = self.declared.gyro_slope
         return np.asarray(np.abs(x) + (offset + slope * np.abs(x)) / (1.0 - slope))
@@ -125,8 +139,12 @@ class History:
 
     @cached_property
     def unstated_bound_rad_s2(self) -> np.ndarray:
-        """The part of eta_bar that does not follow from the declared errors, (frames, 3): it is without
-        inertia, constant and Earth, at the row before."""
+        """The part of eta_bar that does not follow from the declared errors, (frames, 3), with w the largest
+        true rates at the row before, g the earth_gain and Omega the rate of the Earth:
+
+            eta_bar - (inertia_coupling (products of w) + constant
+                       + Omega ((1 + g) sum w + g Omega) + ROUNDING_RAD_S2) / instants
+        """
         declared = self.declared
         rates = self._largest(self.x)
         earth = declared.earth_rad_s
@@ -137,8 +155,9 @@ class History:
         return self.mean(unstated[self.begin :])
 
     def is_unexplained(self, frames: np.ndarray) -> np.ndarray:
-        """Whether health does not explain each of consecutive frames >= 1, (frames,). In frames of several
-        instants, health must not explain the frames before and after either: a fault may begin within one."""
+        """Whether health does not explain each of the given consecutive frames >= 1, (frames,): |nu| exceeds
+        its bound on an axis. If a frame has several instants, this must hold for the frames before and after,
+        too, because a fault may begin within a frame."""
         rows = slice(int(frames[0]) - 1, min(int(frames[-1]) + 2, len(self.rates_rad_s)))
         exceeds = (np.abs(self.innovation_rad_s2[rows]) > self.innovation_bound(rows)).any(axis=1)
         padded = np.r_[exceeds, np.zeros(len(frames) + 2 - len(exceeds), bool)]
@@ -154,24 +173,27 @@ class History:
 
     def declared_fields(self, rows: np.ndarray | None) -> Document:
         """The field `declared` of a certificate, by letter and axis (docs/explanation/certificates.md, "The
-        fields"): what is not zero, and adds to the bounds of these rows."""
-        of = self.declared
-        gyro = {"o": of.gyro_offset_rad_s, "B": of.gyro_constant_rad_s, "m": of.gyro_slope}
+        fields"): the errors that are not zero and add to the bounds of these rows. rows: those of all terms
+        and bounds, None if there are none."""
+        errors = self.declared
+        gyro = {"o": errors.gyro_offset_rad_s, "B": errors.gyro_constant_rad_s, "m": errors.gyro_slope}
         if rows is None:
             return _by_axis(gyro | dict.fromkeys("cbg", np.zeros(len(AXES))))
-        added = of.inertia_coupling * self.products()[rows - 1] * (1.0 / self.instants)
+        added = errors.inertia_coupling * self.products()[rows - 1] * (1.0 / self.instants)
         decides = (added > ROUNDING_SHARE * self.eta_bar[rows]).any(axis=0)
-        gain = of.earth_gain * (of.earth_rad_s > 0.0)
-        return _by_axis(gyro | {"c": of.inertia_coupling * decides, "b": of.constant_rad_s2, "g": gain})
+        gain = errors.earth_gain * (errors.earth_rad_s > 0.0)
+        return _by_axis(
+            gyro | {"c": errors.inertia_coupling * decides, "b": errors.constant_rad_s2, "g": gain}
+        )
 
 
 def _row_before(values: np.ndarray) -> np.ndarray:
-    """In each row the values (rows, 3) of the row before; NaN in the first."""
+    """Values (rows, 3) one row later: each row has those of the row before, NaN in the first."""
     return np.concatenate([np.full_like(values[:1], nan), values[:-1]])
 
 
 def _by_axis(numbers: Mapping[str, np.ndarray]) -> Document:
-    """By name and axis the numbers that are not zero."""
+    """Name -> axis -> number, without the numbers that are zero."""
     return {
         name: {axis: float(v) for axis, v in zip(AXES, values, strict=True) if v}
         for name, values in numbers.items()
@@ -204,7 +226,8 @@ def declared_errors_of(frame: FrameReadout) -> DeclaredErrors:
 
 
 def in_blocks(tape: Tape, history: History, alarm_frame: int) -> tuple[Tape, History, int]:
-    """Tape, history and frame of the alarm by the blocks that types were tested with."""
+    """Tape, history and frame of the alarm by blocks, the same blocks by which the diagnosis tested types.
+    The tape begins with the first whole block in it."""
     diagnosis = tape.alarm.diagnosis
     length = diagnosis.types_config.frames_per_block
     begin = (alarm_frame + 1 - diagnosis.n_frames_in_block_so_far) % length
@@ -222,7 +245,7 @@ def in_blocks(tape: Tape, history: History, alarm_frame: int) -> tuple[Tape, His
     return block_tape, blocks, alarm_block
 
 
-def log_rows_of(said: Document, span: Document) -> np.ndarray:
-    """The log's rows of a term or bound, `span`, of a statement."""
-    length, begin, _ = said.get("block", (1, 0, 0))
+def log_rows_of(statement: Document, span: Document) -> np.ndarray:
+    """The rows of the log in a span, i.e. a term or a bound, of a statement."""
+    length, begin, _ = statement.get("block", (1, 0, 0))
     return np.arange(begin + span["first"] * length, begin + (span["frame"] + 1) * length)

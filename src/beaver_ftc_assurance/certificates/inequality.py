@@ -1,11 +1,14 @@
-"""The inequality that an alarm or an exclusion is, and the search for it.
+"""The inequality of an alarm or of an exclusion, and the search for it.
 
-    c_1 (d_1 . E_1[k_1]) + c_2 (d_2 . E_2[k_2]) + ... > the most that hypothesis and declared errors allow
+    c_1 (d_1 . E_1[k_1]) + c_2 (d_2 . E_2[k_2]) + ... > the largest value under hypothesis and declared errors
 
-E[k] rad/s: the innovation through a filter of pole lam up to frame k; for an infinite pole the innovation of
-frame k alone, times dt. d (3,): a direction; c > 0: a weight. With one term the fault's parameter theta may
-take any value in its range in every frame, or the fault be absent; where theta is constant it is one number
+E[k] (3,) rad/s: the innovation up to frame k through a filter; if its pole is infinite, the innovation of
+frame k alone, times dt. d (3,): a direction; c > 0: a weight. The parameter theta of the fault either may
+have any value of its range in every frame, and the fault may be absent; or it is constant, i.e. one number
 for all terms. docs/explanation/certificates.md, "The inequality", derives it.
+
+Letters: nu innovation and eta_bar its declared bound (frames, 3) rad/s2; h, Z, r the fault's effect along d,
+i.e. between h + theta Z - r and h + theta Z + r, rad/s2.
 """
 
 from collections.abc import Iterable, Iterator
@@ -19,13 +22,14 @@ from beaver_ftc.results import Document
 from beaver_ftc_assurance.certificates.check_certificate import MIN_EFFECT_RAD_S2
 from beaver_ftc_assurance.certificates.history import ROUNDING_SHARE, History
 
-N_WRITTEN_FRAMES = 16  # of a filter; what was before them is stated as the filter's state
-MIN_RELATIVE_MARGIN = 1e-9  # by which the left side is larger, over the larger side: summation may do less
-MIN_SLOPE = 1e-12  # of a sum in theta: a smaller one is rounding, as where theta drops out of two terms
-ANY = "any"  # theta of a statement
+N_WRITTEN_FRAMES = 16  # last frames of a filter that are written out; earlier ones are in the filter's state
+MIN_RELATIVE_MARGIN = 1e-9  # least margin of the left side over the larger side: rounding of sums is smaller
+MIN_SLOPE = 1e-12  # a smaller factor of theta in a sum is rounding, as where theta drops out of two terms
+# Values of the field theta of a statement, as in `Hypothesis`.
+ANY = "any"
 CONSTANT = "constant"
 CONSTANT_WHILE_SHOWN = "constant while it shows"
-MEMORY_TIME_CONSTANTS = 16.0  # of a filter: of an older innovation less than e^-16 is left
+MEMORY_TIME_CONSTANTS = 16.0  # a filter forgets an innovation after this time: its weight is then below e^-16
 
 
 @dataclass(frozen=True)
@@ -33,9 +37,14 @@ class Hypothesis:
     """A fault's effect on the innovation: offset + theta slope, within +-spread, rad/s2; theta in
     [theta_low, theta_high]. Arrays (frames, 3), from frame first_frame on, before which none is kept.
 
-    theta: `any` in each frame, one that is `constant`, or `constant while it shows`: one in frames that
-    health does not explain, while elsewhere the fault may be absent. axes: those of the innovation that the
-    hypothesis is tested on.
+    theta is
+        any                       in each frame any value of the range, or the fault is absent
+        constant                  one value in all frames
+        constant while it shows   one value in the frames that health does not explain; elsewhere the fault
+        may be
+                                  absent
+
+    axes: axes of the innovation on which the hypothesis is tested.
     """
 
     first_frame: int
@@ -54,7 +63,8 @@ class Hypothesis:
         return self.offset[here] @ direction, self.slope[here] @ direction, self.spread[here] @ size
 
     def max_effects(self, direction: np.ndarray, frames: slice) -> np.ndarray:
-        """Largest effect of a fault that may be absent, (frames,); one of no more than rounding is none."""
+        """Largest effect of a fault that may be absent, max(h + theta Z, 0) + r, (frames,). An effect up to
+        MIN_EFFECT_RAD_S2 is rounding, and counts as 0."""
         h, Z, r = self.along(direction, frames)
         ends = np.maximum(h + self.theta_low * Z, h + self.theta_high * Z)
         return np.where(ends > MIN_EFFECT_RAD_S2, ends, 0.0) + r
@@ -83,15 +93,19 @@ class Term:
 
 @dataclass(frozen=True)
 class Inequality:
-    """A sum over filters, and the hypothesis that allows no more than its limit."""
+    """A sum over filters, and the hypothesis under which it is at most a limit."""
 
     terms: list[Term]
     hypothesis: Hypothesis
     history: History
 
     def statement(self) -> Document | None:
-        """The fields of a statement: every number that the inequality takes, and none that decides nothing.
-        None unless the data exceed the limit of the hypothesis by more than rounding."""
+        """The fields of a statement: every number that the inequality needs, and no other. None unless the
+        data exceed the limit of the hypothesis by more than rounding.
+
+        by_theta: the largest part of a constant theta in the limit, rad/s. decides (2,): whether the least,
+        and the greatest, theta is needed.
+        """
         of = self.hypothesis
         said, sums, deciding = zip(*map(self._evaluate, self.terms), strict=True)
         value, limit, slope = np.sum(sums, axis=0).tolist()
@@ -103,23 +117,24 @@ class Inequality:
         if of.theta != ANY:
             decides = np.array([slope < 0.0, slope > 0.0]) & bool(by_theta)
             if abs(slope) > MIN_SLOPE and not by_theta:  # the end of the range that counts is zero: no effect
-                said = [{name: entry for name, entry in one.items() if name != "Z"} for one in said]
+                said = [{name: entry for name, entry in fields.items() if name != "Z"} for fields in said]
         ends = dict(compress({"least": of.theta_low, "most": of.theta_high}.items(), decides))
         about = {**self.history.statement_fields, "theta": of.theta, **ends}
         return {**about, "terms": list(said), "sides": [value, limit]}
 
     def _evaluate(self, term: Term) -> tuple[Document, np.ndarray, tuple[bool, bool]]:
         """Fields of a term; sums (3,): weighted value, and limit without a constant theta, rad/s, and the
-        factor of a constant theta in that limit; whether the least, and the greatest, theta decides in any
-        frame.
+        factor of a constant theta in that limit; and whether the least, and the greatest, theta gives the
+        largest effect in any frame.
 
             E     = sum_{s<j<=k} a^(k-j) dt nu[j].d
             limit = sum_{s<j<=k} a^(k-j) dt eta_bar[j].|d| + noise + largest effect of the fault
             noise = n[k] + a^(k-s-1) n[s] + (1-a) sum_{s<j<k} a^(k-1-j) n[j],   n = |change of gyro error|.|d|
 
         s: filter_start; k: last_frame; a: decay of the filter in a frame, 0 for an infinite pole. h, Z, r:
-        the fault's effect along d in the frames that are written out, from `first` on; before, rad/s: the
-        largest that the filter has of it from the frames before them."""
+        the fault's effect along d in the frames that are written out, from `first` on. before, rad/s: largest
+        value of the filter at frame first - 1 that the fault can cause. adds (frames,): whether the effect is
+        more than rounding."""
         of = self.hypothesis
         history = self.history
         d = term.direction
@@ -141,14 +156,14 @@ class Inequality:
         at_low = h + of.theta_low * Z
         at_high = h + of.theta_high * Z
         if of.theta == ANY:
-            done = of.max_effects(d, rows)
+            effects = of.max_effects(d, rows)
             slope = 0.0
             adds = np.maximum(at_low, at_high) > MIN_EFFECT_RAD_S2
         else:
-            done = h + r
+            effects = h + r
             slope = float(dt * _filter_weights(a, len(Z)) @ Z)
             adds = np.ones(len(h), bool)
-        limit += _filtered(a, dt, done, before)
+        limit += _filtered(a, dt, effects, before)
         decides = bool((adds & (at_low > at_high)).any()), bool((adds & (at_high > at_low)).any())
         sums = term.weight * np.array([value, limit, slope])
         return self._fields_of(term, rows, before, adds), sums, decides
@@ -158,24 +173,25 @@ class Inequality:
         before them, rad/s; adds (frames,): whether the fault's effect is more than rounding."""
         history = self.history
         is_filtered = not isinf(term.pole_per_s)
-        said: Document = {"weight": term.weight, "d": term.direction.tolist()}
-        said |= {"pole_per_s": term.pole_per_s, "since": term.filter_start} if is_filtered else {}
-        said |= {"first": rows.start, "frame": term.last_frame}
-        said |= {"fault": before} if is_filtered and before else {}
+        fields: Document = {"weight": term.weight, "d": term.direction.tolist()}
+        fields |= {"pole_per_s": term.pole_per_s, "since": term.filter_start} if is_filtered else {}
+        fields |= {"first": rows.start, "frame": term.last_frame}
+        fields |= {"fault": before} if is_filtered and before else {}
         logged = {"x": history.rates_rad_s, "F": history.model_rad_s2, "eta_bar": history.eta_bar_rad_s2}
-        said |= {name: values[rows].tolist() for name, values in logged.items()}
+        fields |= {name: values[rows].tolist() for name, values in logged.items()}
         rest = history.unstated_bound_rad_s2[rows]
         rest = np.where(np.abs(rest) < ROUNDING_SHARE * history.eta_bar_rad_s2[rows], 0.0, rest)
-        said |= {"rest": rest.tolist()} if rest.any() else {}
+        fields |= {"rest": rest.tolist()} if rest.any() else {}
         h, Z, r = self.hypothesis.along(term.direction, rows)
         for name, values in (("h", h), ("Z", Z)):
             if (values * adds).any():
-                said[name] = [float(v) if there else None for v, there in zip(values, adds, strict=True)]
-        return said | ({"r": r.tolist()} if r.any() else {})
+                fields[name] = [float(v) if there else None for v, there in zip(values, adds, strict=True)]
+        return fields | ({"r": r.tolist()} if r.any() else {})
 
     def _first_written_frame(self, term: Term) -> int:
-        """The first frame that is written out: what the filter has forgotten would decide nothing. A constant
-        theta needs all frames that the filter remembers."""
+        """The first frame that is written out, of those that the filter has not forgotten: the last
+        N_WRITTEN_FRAMES, or, for a constant theta, all. None is earlier than the filter or the kept
+        effects."""
         last = term.last_frame
         if isinf(term.pole_per_s):
             return last
@@ -188,12 +204,15 @@ class Inequality:
 
 
 def _filter_weights(decay: float, n: int) -> np.ndarray:
-    """Weights of the last n frames in a filter, (n,), the last of them 1."""
+    """Weights of the last n frames in a filter, decay^(n - 1), ..., decay, 1, (n,)."""
     return np.asarray(decay ** np.arange(n - 1.0, -1.0, -1.0))
 
 
 def _filtered(decay: float, dt: float, effects: np.ndarray, before: float) -> float:
-    """A filter of effects (n,) rad/s2 that begins with `before`, rad/s."""
+    """Value of a filter, rad/s, after effects (n,) rad/s2, if its value before them was `before`, rad/s:
+
+    decay^n before + dt sum_j decay^(n - 1 - j) effects[j]
+    """
     if not len(effects):
         return before
     weights = _filter_weights(decay, len(effects))
@@ -202,8 +221,8 @@ def _filtered(decay: float, dt: float, effects: np.ndarray, before: float) -> fl
 
 def first_violated(candidates: Iterable[list[Term]], of: Hypothesis, history: History) -> Document | None:
     """The statement of the first inequality that the data violate; None if there is none."""
-    said = (Inequality(terms, of, history).statement() for terms in candidates if terms)
-    return next(filter(None, said), None)
+    statements = (Inequality(terms, of, history).statement() for terms in candidates if terms)
+    return next(filter(None, statements), None)
 
 
 def axis_directions(axes: tuple[int, ...]) -> Iterator[np.ndarray]:
@@ -212,12 +231,13 @@ def axis_directions(axes: tuple[int, ...]) -> Iterator[np.ndarray]:
 
 
 def filters(pole_per_s: float, start: int, last: int, axes: tuple[int, ...]) -> Iterator[list[Term]]:
-    """Inequalities of one filter, both ways along each axis."""
+    """Inequalities of one filter, in both directions along each axis."""
     return ([Term(d, pole_per_s, start, last)] for d in axis_directions(axes))
 
 
 def single_frame_tests(frame: int, hypothesis: Hypothesis) -> Iterator[list[Term]]:
-    """The inequalities of one frame: along each axis; across two of them such that theta drops out."""
+    """The inequalities of one frame: along each axis; and for each two axes in the direction, and its
+    opposite, that is perpendicular to the slope, so that theta drops out."""
     yield from filters(inf, frame - 1, frame, hypothesis.axes)
     slope = hypothesis.slope[frame - hypothesis.first_frame]
     for i, j in combinations(hypothesis.axes, 2):
@@ -232,16 +252,21 @@ def single_frame_tests(frame: int, hypothesis: Hypothesis) -> Iterator[list[Term
 def theta_bounds_by_frame(
     hypothesis: Hypothesis, history: History, frames: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Bounds on theta by each frame and axis: lower, upper, and the slope they come from; (n, 3), for the n
-    frames from the first to the last of `frames`. Infinite, with a slope of 1, in frames that are not
-    among `frames`, on axes that are not the hypothesis's, and where the slope is zero."""
+    """Bounds on theta by each frame and axis, and the slope from which they follow; (n, 3), for the n frames
+    from the first to the last of `frames`:
+
+        |nu - offset - theta slope| <= bound on |nu| of health + spread
+
+    Infinite, with a slope of 1, in frames that are not among `frames`, on axes on which the hypothesis is not
+    tested, and where the slope is 0.
+    """
     rows = slice(int(frames[0]), int(frames[-1]) + 1)
     is_bound = np.zeros((rows.stop - rows.start, 3), bool)
     is_bound[np.ix_(frames - rows.start, np.array(hypothesis.axes))] = True
-    here = slice(rows.start - hypothesis.first_frame, rows.stop - hypothesis.first_frame)
-    slope = hypothesis.slope[here]
-    tolerance = history.innovation_bound(rows) + hypothesis.spread[here]
-    effect = history.innovation_rad_s2[rows] - hypothesis.offset[here]
+    kept_rows = slice(rows.start - hypothesis.first_frame, rows.stop - hypothesis.first_frame)
+    slope = hypothesis.slope[kept_rows]
+    tolerance = history.innovation_bound(rows) + hypothesis.spread[kept_rows]
+    effect = history.innovation_rad_s2[rows] - hypothesis.offset[kept_rows]
     is_bound &= slope != 0.0
     size = np.where(is_bound, np.abs(slope), 1.0)
     middle = effect * np.sign(slope) / size
@@ -251,8 +276,10 @@ def theta_bounds_by_frame(
 
 
 def constant_theta_tests(hypothesis: Hypothesis, history: History, frames: np.ndarray) -> list[Term]:
-    """Terms of two frames that no one theta explains, or of one that no theta in its range does; empty if
-    there are no frames to choose from."""
+    """The terms of two frames that no single theta explains: the one with the largest lower bound and the one
+    with the least upper bound. A term is left out if the end of the range bounds theta as much; empty without
+    frames.
+    """
     if not len(frames):
         return []
     lower, upper, slope = theta_bounds_by_frame(hypothesis, history, frames)

@@ -1,5 +1,5 @@
-"""Evidence of an alarm of the sensor monitor: a reading that differs from its prediction by the other sensors
-more than sound sensors allow (docs/explanation/instruments.md).
+"""Evidence of an alarm of the sensor monitor: a reading differs from its prediction by other sensors by more
+than sound sensors allow, or a reading is missing (docs/explanation/instruments.md).
 """
 
 from collections.abc import Iterator, Mapping
@@ -15,16 +15,19 @@ from beaver_ftc_assurance.certificates.check_certificate import TESTS
 
 BECAUSE_BETWEEN_ROWS = "instruments raised it between two rows of the log"
 BECAUSE_NO_EQUATION = "a sensor raised it that no equation of the checker uses"
-ROUNDING_SHARE = 1e-13  # of a limit: a smaller number is rounding
+ROUNDING_SHARE = 1e-13  # a smaller share of a limit is rounding
 
 
 def alarm_evidence(monitor: SensorMonitor, rows: Mapping[str, np.ndarray], k: int) -> Document:
-    """The test that sound instruments would have passed, or the reading that the log's column `watch_missing`
-    says is missing; why there is no evidence where the row shows neither. The sides of a missing reading: the
-    number of missing readings, and the number that sound instruments leave out.
+    """The evidence of an alarm in row k, the first of
 
-    monitor: at the alarm, in row k of the log. The certificate's field `looks` lists the comparisons that the
-    residual of the test adds up: (reading, prediction, largest difference with sound instruments).
+        a test failed, and the row shows it                        the test with its comparisons
+        a reading is missing, and the log's `watch_missing` says so   the sensor
+        otherwise                                                  the reason why there is no evidence
+
+    monitor: at the alarm. The field `looks` lists the comparisons whose sum is the residual of the test:
+    [reading, prediction, largest difference with sound instruments]. The sides of a missing reading are the
+    number of missing readings, 1, and the number with sound instruments, 0.
     """
     number = monitor.worst_test_index
     failed = monitor.top_ratio > 1.0
@@ -50,14 +53,15 @@ def alarm_evidence(monitor: SensorMonitor, rows: Mapping[str, np.ndarray], k: in
 
 
 def _comparisons(monitor: SensorMonitor) -> Iterator[list[float]]:
-    """Comparisons [reading, prediction, largest difference with sound instruments] in the residual's unit.
+    """Comparisons [reading, prediction, largest difference with sound instruments] in the unit of the
+    residual.
 
-    First that of the last sample; for a filtered test then [sum, 0, bound] of all samples before, as the
-    filter with the largest ratio of residual to bound keeps them.
+    The first is that of the last sample. For a filtered test, the second is [sum, 0, bound] of all samples
+    before, in the filter with the largest ratio of residual to bound.
     """
     test = monitor.worst_test
     number = monitor.worst_test_index
-    name = TESTS[number]  # of a sensor; else (rotation, density) only the residual is known
+    name = TESTS[number]  # a sensor; of other tests (rotation, density) only the residual is known
     predicted = float(monitor.predicted_reading[SENSORS.index(name)]) if name in SENSORS else 0.0
     if number >= RPM_TEST:  # the tests of the engine are not filtered
         bound = float(monitor.reading_bound[SENSORS.index(name)]) + COMPARISON_ROUNDING

@@ -1,8 +1,10 @@
-"""Exclusions of fault types whose parameter is one number: two frames that no such number explains.
+"""Exclusions of fault types with a relation: the command and one parameter theta give the deflection
+(`FaultType`).
 
-The relation of a type (`FaultType`) says where a surface at fault is, in frames that health does not explain.
-A type whose row names a course is excluded by comparing many frames (courses.py). Where an actuator may bring
-a surface back over several frames, an exclusion is not certified.
+A single frame excludes such a type if no theta explains the frame. If theta is constant while the fault
+shows, two frames that no single theta explains exclude it, too. A type whose row names a course is excluded
+by a comparison of many frames (courses.py). If an actuator may bring a surface back over several frames, an
+exclusion is not certified.
 """
 
 from collections.abc import Iterator
@@ -33,7 +35,7 @@ STUCK = type_index_of("stuck")
 
 
 def excluded_types(tape: Tape) -> Iterator[tuple[int, int, int]]:
-    """(surface, type, frame) of each type excluded on a surface that can be at fault."""
+    """(surface, type, frame) of each excluded type, on surfaces whose position estimator is not excluded."""
     layout = tape.alarm.diagnosis.layout
     for s, kinds in enumerate(tape.types[-1]):
         if tape.excluded[-1][layout.position_estimator_index_by_surface[s]]:
@@ -43,7 +45,7 @@ def excluded_types(tape: Tape) -> Iterator[tuple[int, int, int]]:
 
 
 def reason_not_certified(tape: Tape, kind: int) -> str | None:
-    """Why an exclusion of this type cannot be certified, None if it can."""
+    """Why an exclusion of this type cannot be certified; None if it can."""
     config = tape.alarm.diagnosis.types_config
     if TYPES[kind].has_shown is not None and not config.single_instant:
         return OSCILLATION_AT_STOP
@@ -53,24 +55,26 @@ def reason_not_certified(tape: Tape, kind: int) -> str | None:
 
 
 def exclusion_name(surface: str, kind: int) -> str:
-    """What is excluded, in words."""
+    """Words for the excluded type on a surface."""
     return f"{surface} {WORDS[kind]}"
 
 
 def exclusion_column(surface: str, kind: int) -> str:
-    """The column of the log that says whether it is excluded."""
+    """The column of the log with the flag of an exclusion."""
     return f"{exclusion_name(surface, kind).replace(' ', '_')}_excluded"
 
 
 def travel_rad(tape: Tape, s: int) -> tuple[float, float]:
-    """The travel of a surface, low and high."""
+    """Low and high end of the travel of a surface, rad."""
     actuator = tape.alarm.diagnosis.surface_fault_types[s].actuator
     return actuator.travel_low_rad, actuator.travel_high_rad
 
 
 def type_definition_columns(tape: Tape, surface: str, s: int, kind: int) -> dict[str, float]:
-    """The columns of the log, each with its constant, that define a type which the checker does not
-    define."""
+    """Name -> value of the columns of the log that define a type for the checker; none if the checker defines
+    the type itself. A type with a course has the direction of its stop in a column whose name has the course;
+    a type with a relation has the fields of `Relation`.
+    """
     row = TYPES[kind]
     name = exclusion_name(surface, kind).replace(" ", "_")
     if WORDS[kind] in {*RELATIONS, *COURSES}:
@@ -79,24 +83,25 @@ def type_definition_columns(tape: Tape, surface: str, s: int, kind: int) -> dict
         return {f"{name}_course_{row.frames_test.replace(' ', '_')}": row.stop_direction}
     if row.deflection_relation is None:
         return {}
-    its = row.deflection_relation
+    type_relation = row.deflection_relation
     relation = Relation(
-        its.command_gain,
-        its.theta_is_share,
+        type_relation.command_gain,
+        type_relation.theta_is_share,
         row.has_constant_parameter,
-        *its.theta_span(*travel_rad(tape, s)),
+        *type_relation.theta_span(*travel_rad(tape, s)),
     )
     return {f"{name}_{column}": float(value) for column, value in relation._asdict().items()}
 
 
 def hypothesis_of_type(tape: Tape, surface: int, fault_type: int) -> Hypothesis:
-    """The effect on the innovation of a fault of this type on a surface, G (p - u); p: position of the
-    surface, u: command in effect, rad. That of `STUCK` bounds the position. By the relation of the type
+    """The effect G (p - u) on the innovation of a fault of this type on a surface; p: position of the
+    surface, u: command in effect, rad; G: effectiveness. By the relation of the type
 
         p = gain u + theta           G (p - u) = (gain - 1) G u + theta G
         p = (gain + theta) u         G (p - u) = (gain - 1) G u + theta G u        if theta is a share
 
-    The position estimator of the surface has -G u as its offset, and G as its slope.
+    For `STUCK`, theta is the position. The position estimator of the surface has -G u as its offset, and G as
+    its slope.
     """
     row = TYPES[fault_type]
     diagnosis = tape.alarm.diagnosis
@@ -124,8 +129,10 @@ def hypothesis_of_type(tape: Tape, surface: int, fault_type: int) -> Hypothesis:
 def candidate_inequalities(
     hypothesis: Hypothesis, history: History, alarm_frame: int, last_frame: int
 ) -> Iterator[list[Term]]:
-    """Inequalities that may exclude a hypothesis by frames up to last_frame. None takes a frame before the
-    hypothesis's first, of which no effect is known."""
+    """Inequalities that may exclude a hypothesis by frames up to last_frame: of single frames, if theta may
+    change in each; otherwise of two frames since the alarm that one theta does not explain, or of one of the
+    last three. None needs a frame before the hypothesis's first, because no effect is known there.
+    """
     if hypothesis.theta == ANY:
         for frame in range(max(last_frame - 1, hypothesis.first_frame), last_frame + 1):
             yield from single_frame_tests(frame, hypothesis)

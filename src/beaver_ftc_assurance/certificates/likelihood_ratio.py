@@ -5,11 +5,13 @@
 
     room     = sum of eta_0 |w| + min(sum of eta_r |w - w before| + eta_r |w last|, sum of pace eta_r |w|)
 
-w = S^-1 g of the signature, g: whitened, 1/(rad/s) and rad/s. The evidence is that of sense "either".
-room: the most that a model error within its bound adds: what is constant, and the lesser of what swings
-between the ends of the bound and what changes at the rate `pace`. eta_0, eta_r, rad/s: the effect of a
-constant bound on g, and of one that swings; sums are over the frames and the axes.
-docs/explanation/statistical.md derives all of it.
+g, rad/s: the whitened innovation, signature or regressor of a constant. w = S^-1 g of the signature,
+1/(rad/s), with the covariance S of the whitened innovation. This evidence is that of the sense "either".
+
+room: the largest contribution of a model error within its bound. It is the sum of that of a constant error,
+and of the lesser of those of an error that swings between the ends of the bound and of one that changes at
+the rate `pace`. eta_0, eta_r, rad/s: effect on g of an error at its bound, if it is constant, and if it
+swings. Sums are over the frames and the axes. docs/explanation/statistical.md derives the equations.
 """
 
 from collections import namedtuple
@@ -29,8 +31,9 @@ from beaver_ftc.diagnosis.detection import (
 from beaver_ftc_assurance.certificates.check_certificate import NO_PACE
 from beaver_ftc_assurance.certificates.history import Document
 
-NEGLIGIBLE_SHARE_OF_LIMIT = 1e-7  # what changes evidence and limit by less is left out
-MAX_WRITTEN_CONSTANTS = 6  # in each frame: with more a certificate would have over 200 kB
+# A number that changes evidence and limit by a smaller share of it is left out.
+NEGLIGIBLE_SHARE_OF_LIMIT = 1e-7
+MAX_WRITTEN_CONSTANTS = 6  # largest number in a frame: with more, a certificate would exceed 200 kB
 
 
 class Inputs(namedtuple("Inputs", "signature jitter drift bounded pace keep known air foreseen")):
@@ -76,8 +79,10 @@ class LikelihoodRatio:
 
     @property
     def fields(self) -> Document:
-        """The fields of the statement, with null for zero."""
-        written = {name: of.tolist() for name, of in self.series._asdict().items() if of is not None}
+        """The fields of the statement; zeros of R, Y and P are null."""
+        written = {
+            name: values.tolist() for name, values in self.series._asdict().items() if values is not None
+        }
         return {
             "level": self.level, "axes": self.axes, "sense": self.sense, "tolerance": self.tolerance.tolist(),
             "R": _null_for_zero(self.R), "Y": [*map(_null_for_zero, self.Y)],
@@ -86,39 +91,45 @@ class LikelihoodRatio:
         }  # fmt: skip
 
     def without_negligible(self) -> "LikelihoodRatio":
-        """The same ratio without the numbers that change evidence and limit by no more than a negligible
-        share.
+        """The same ratio without numbers that are negligible, one kind after the other:
 
-        Each constant, and each number of Y, P and R, is left out of the ratio alone to see what it changes.
-        All that is left out together changes the score by less than LOGGED_SCORE_TOLERANCE, which
+            1. the inputs bounded, pace and foreseen, each as a whole
+            2. constants; if more than MAX_WRITTEN_CONSTANTS remain, all are merged into one
+            3. numbers of Y, then of P and of R
+
+        Each constant, and each number of Y, P and R, is left out by itself to find its effect. All numbers
+        that are left out change the score together by less than LOGGED_SCORE_TOLERANCE, which
         `alarm_evidence` checks.
         """
-        short = self
+        shortened = self
         for name in ("bounded", "pace", "foreseen"):
-            without = replace(short, series=short.series._replace(**{name: None}))
-            short = without if short._is_as(without) else short
+            without = replace(shortened, series=shortened.series._replace(**{name: None}))
+            shortened = without if shortened._is_as(without) else shortened
         matters = [
             j
-            for j, one in enumerate(np.diag(self.tolerance))
-            if not self._is_as(replace(self, tolerance=self.tolerance - one))
+            for j, tolerance_j in enumerate(np.diag(self.tolerance))
+            if not self._is_as(replace(self, tolerance=self.tolerance - tolerance_j))
         ]
         if len(matters) > MAX_WRITTEN_CONSTANTS:
-            short = short._with_constants_merged()
+            shortened = shortened._with_constants_merged()
             matters = [0]
-        Y = short.Y[:, [0, 1, *(2 + j for j in matters)]]
-        series = short.series
+        Y = shortened.Y[:, [0, 1, *(2 + j for j in matters)]]
+        series = shortened.series
         if series.known is not None:
             series = series._replace(known=series.known[:, matters])
-        short = replace(short, tolerance=short.tolerance[matters], Y=Y, series=series)
-        short = replace(short, Y=short._without_negligible_numbers("Y"))
+        shortened = replace(shortened, tolerance=shortened.tolerance[matters], Y=Y, series=series)
+        shortened = replace(shortened, Y=shortened._without_negligible_numbers("Y"))
         return replace(
-            short, P=short._without_negligible_numbers("P"), R=short._without_negligible_numbers("R")
+            shortened,
+            P=shortened._without_negligible_numbers("P"),
+            R=shortened._without_negligible_numbers("R"),
         )
 
     def _without_negligible_numbers(self, name: str) -> np.ndarray:
-        """R, Y or P, with zero for each negligible number; in P, which is symmetric, for both of a pair."""
+        """R, Y or P, with zero for each negligible number; in P, which is symmetric, for both numbers of a
+        pair."""
         values = getattr(self, name)
-        kept = values.copy()  # self keeps its numbers: each change is compared with it
+        kept = values.copy()  # a copy, since each change is compared with self
         for place in np.ndindex(values.shape):
             without_one = values.copy()
             without_one[place] = 0.0
@@ -134,38 +145,41 @@ class LikelihoodRatio:
         return bool((change <= NEGLIGIBLE_SHARE_OF_LIMIT * self.sides[1]).all())
 
     def _with_constants_merged(self) -> "LikelihoodRatio":
-        """The same ratio with one constant instead of many. The sums are linear in the constants, so that all
-        of them at their worst act as one."""
+        """The same ratio with one constant instead of many. The sums are linear in the constants, so the
+        constants at their worst ends, tolerance sign(sum), act as a single one."""
         # Copies are in C order: the last digits of a product depend on the order in memory.
         worst = self.tolerance * np.sign(self.sums()[0][2:])
         Y = np.column_stack([self.Y[:, :2], [worst @ row for row in self.Y[:, 2:].copy()]])
-        known = np.array([[worst @ of_frame] for of_frame in self.series.known.copy()])
+        known = np.array([[worst @ regressors] for regressors in self.series.known.copy()])
         return replace(self, tolerance=np.ones(1), Y=Y, series=self.series._replace(known=known))
 
     def sums(self) -> tuple[np.ndarray, float, float]:
         """The sums over the frames of w.g for each column of Y, (2 + m,); N_f, the sum of w.foreseen; and the
         room.
+
+        neutral: the value of each input that the certificate may lack.
         """
         n = len(self.axes)
-        # a filter has two axes, and the drifts themselves; Y has minus the drifts, of its n axes alone
+        # The states of a filter are those of two axes: rate errors, then drifts. Y has n axes, and minus the
+        # drifts.
         states = np.zeros((self.Y.shape[1], 4))
         states[:, :n] = self.Y[:n].T
         states[:, 2 : 2 + n] = -self.Y[n:].T
         sums = np.zeros(len(states))
-        none = np.zeros_like(self.innovation)
-        ones = np.ones(len(none))
+        zeros = np.zeros_like(self.innovation)
+        ones = np.ones(len(zeros))
         neutral = {
-            "bounded": none, "pace": NO_PACE * ones, "keep": ones, "known": none[:, None][:, :0], "air": none,
-            "foreseen": none,
+            "bounded": zeros, "pace": NO_PACE * ones, "keep": ones, "known": zeros[:, None][:, :0],
+            "air": zeros, "foreseen": zeros,
         }  # fmt: skip
-        left_out = {name: zero for name, zero in neutral.items() if getattr(self.series, name) is None}
-        series = self.series._replace(**left_out)
+        replacements = {name: zero for name, zero in neutral.items() if getattr(self.series, name) is None}
+        series = self.series._replace(**replacements)
         nu = self.innovation - series.air
         inputs = np.concatenate([nu[:, None], series.signature[:, None], series.known], axis=1)
         Q_x = series.jitter / (self.dt * self.dt)
         of_frames = inputs, series.drift, Q_x, series.bounded, series.foreseen, series.keep, series.pace
-        given = map(np.ascontiguousarray, of_frames)
-        N_f, room = add_whitened_frames(new_filter_block(self.P, self.R), *given, states, sums, self.dt)
+        arrays = map(np.ascontiguousarray, of_frames)
+        N_f, room = add_whitened_frames(new_filter_block(self.P, self.R), *arrays, states, sums, self.dt)
         return sums, N_f, room
 
     @property
@@ -179,19 +193,22 @@ class LikelihoodRatio:
 
 
 def _null_for_zero(values: np.ndarray) -> list[float | None]:
-    """The numbers as the certificate writes them."""
+    """The numbers for the certificate, null for zero."""
     return [value or None for value in values.tolist()]
 
 
 @kernel
 def add_whitened_frames(blocks, inputs, drift, jitter, bounded, foreseen, keep, pace, states, sums, dt):
     """Run a filter, blocks (1,), over the frames of a `LikelihoodRatio`, and add w.g of each frame to `sums`
-    (columns,): g, the whitened innovation of each column, w = S^-1 g of the second, the signature. See
+    (columns,): g, the whitened input of each column; w = S^-1 g of column 1, the signature. See
     `likelihood.accumulate_tests`.
 
-    inputs (frames, columns, n); drift (frames, n, n); jitter, bounded, foreseen (frames, n): of n axes.
-    states (columns, 4): advanced in place. Returns N_f, the sum of w.foreseen, and the room (module
-    docstring): e_0 + min(e_tv + last, e_w).
+    inputs (frames, columns, n); drift (frames, n, n); jitter, bounded, foreseen (frames, n): of n axes; keep,
+    pace (frames,). states (columns, 4): advanced in place. Returns N_f, the sum of w.foreseen, and the room
+    of the head of this file: e_0 + min(e_tv + last, e_w), with the sums
+
+        e_0 of eta_0 |w|,   e_tv of eta_r |w - w before|,   e_w of pace eta_r |w|,   last: eta_r |w| of the
+        last frame
     """
     block = blocks[0]
     g = np.zeros((len(states), 2))

@@ -1,5 +1,6 @@
-"""The certificate of frames that other code advances: of a recorded log, of a flight with a doublet; and that
-of a finished flight, which is flown again."""
+"""Certificates of frames that other code advances, i.e. of a recorded log or of a flight with a doublet; and
+of a finished flight, which is flown again.
+"""
 
 from collections.abc import Iterable
 
@@ -17,8 +18,9 @@ from beaver_ftc_assurance.certificates.tape import Recorder
 
 
 def proved(scenario: Scenario, frames: np.ndarray, flown: Iterable[int]) -> Certified:
-    """The certificate of frames. frames: the record (1,), of `frame_dtype`. flown: yields the number of each
-    frame once the record holds it. Raises BadInput if another scheme than ours diagnosed."""
+    """The certificate of frames. frames: the record (1,) of `frame_dtype`. flown: yields the number of each
+    frame once the record holds it. Raises BadInput if the scheme is not ours.
+    """
     check_scheme(scenario)
     recorder = Recorder(scenario)
     recorder.begin(frames)
@@ -28,21 +30,22 @@ def proved(scenario: Scenario, frames: np.ndarray, flown: Iterable[int]) -> Cert
 
 
 def proof(scenario: Scenario, log: Log) -> Proof:
-    """The certificate of a flight that kept its log, flown once more. Raises BadInput where another scheme
-    than ours diagnosed."""
-    found = certificate(scenario, log)
-    whole = Columns()
-    found.copy_log(whole)
-    whole.close()
-    return Proof(found.document, dict(whole), found.scenario)
+    """The certificate of a flight with a log; the flight is flown again. Raises BadInput if the scheme is not
+    ours."""
+    certified = certificate(scenario, log)
+    columns = Columns()
+    certified.copy_log(columns)
+    columns.close()
+    return Proof(certified.document, dict(columns), certified.scenario)
 
 
 def _log(frames: np.ndarray, flown: Iterable[int], scenario: Scenario, recorder: Recorder) -> MemoryLog:
-    """A log of all frames, with the columns that a certificate reads."""
+    """A log of all frames, with the columns that a certificate needs. Advances the frames and records
+    them."""
     log = MemoryLog()
     surfaces = scenario.airframe.surfaces
     names = estimator_names(scenario.fdi.fault_class, scenario.airframe)
-    columns = ["t_s", *(f"{axis}_{what}" for what in MEASURED_MODEL_BOUND for axis in AXES), "detected"]
+    columns = ["t_s", *(f"{axis}_{end}" for end in MEASURED_MODEL_BOUND for axis in AXES), "detected"]
     columns += [f"fie_{name}_excluded" for name in names]
     shares: dict[str, float] = {}
     rows = []
@@ -50,14 +53,15 @@ def _log(frames: np.ndarray, flown: Iterable[int], scenario: Scenario, recorder:
         recorder.keep()
         frame = FrameReadout(frames[0])
         diagnosis = frame.diagnosis
-        of_frame = frame.rates_rad_s, frame.model_rad_s2, diagnosis.declared_bounds.eta_bar_rad_s2
+        vectors = frame.rates_rad_s, frame.model_rad_s2, diagnosis.declared_bounds.eta_bar_rad_s2
         if scenario.fdi.statistical:
             shares = chance.likelihood_shares(diagnosis, surfaces)
         if diagnosis.sensor_monitor.enabled:
             monitor = diagnosis.sensor_monitor
             shares |= {"watch_share": monitor.top_ratio, "watch_test": monitor.worst_test_index}
-        values = [frame.alarmed, *diagnosis.is_estimator_excluded, *shares.values()]  # as in a log of ours
-        rows.append(np.concatenate([[k / scenario.rate_hz], *of_frame, values]))
+        # The order of the columns.
+        numbers = [frame.alarmed, *diagnosis.is_estimator_excluded, *shares.values()]
+        rows.append(np.concatenate([[k / scenario.rate_hz], *vectors, numbers]))
     log.open([*columns, *shares])
     log.write(np.array(rows))
     return log

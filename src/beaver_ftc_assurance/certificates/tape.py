@@ -1,5 +1,7 @@
-"""Records the internal quantities of the diagnosis while it flies: a ring buffer of the last frames before
-the alarm, and every frame after it.
+"""Record internal quantities of the diagnosis during a flight: in a ring buffer of the last frames up to the
+alarm, and of every frame after it.
+
+The quantities are copied as *words* of 8 bytes out of the flight's record, an array (1,) of `frame_dtype`.
 """
 
 from collections.abc import Callable, Sequence
@@ -22,11 +24,12 @@ from beaver_ftc.loop import (
 )
 from beaver_ftc.scenario import Scenario
 
-FRAMES_BEFORE_ALARM = 40  # frames kept before the alarm: what was before them is in the filters
-STATISTICAL_FRAMES_BEFORE_ALARM = 2**N_SLOTS + 2  # with the statistical detector: its oldest onset
-SEEN, ALARM, CLEAR, FLAG, OTHER_FLAG = range(5)  # places in the state of `keep_frame`
-KEPT_AFTER_EVENT_S = 10.0  # after the last event, where types are excluded one by one
-MAX_FRAMES_AFTER_ALARM = 1 << 16  # frames kept after the alarm; memory is taken as they come
+FRAMES_BEFORE_ALARM = 40  # frames kept before the alarm; the filters contain the effects of earlier ones
+STATISTICAL_FRAMES_BEFORE_ALARM = 2**N_SLOTS + 2  # with the statistical detector: from its oldest onset on
+SEEN, ALARM, CLEAR, FLAG, OTHER_FLAG = range(5)  # positions in the state of `keep_frame`
+# Time after the last event if fault types are tested, each of which may be excluded later.
+KEPT_AFTER_EVENT_S = 10.0
+MAX_FRAMES_AFTER_ALARM = 1 << 16  # frames kept after the alarm; the memory is used as they come
 
 
 @dataclass
@@ -34,13 +37,21 @@ class Tape:
     """Frames `first` to `first + frames - 1` of the flight, rows of its log.
 
     alarm, last: the flight at the alarm and at its end. since: the frame with which the diagnosis began.
-    kept, by frame: of each isolation estimator `offset` (rad/s2), `slope` (rad/s2 per unit of its parameter)
-    and `spread` (rad/s2) of its fault's effect, (estimators, 3); `excluded` (estimators,) and `types`
-    (surfaces, types), above 0 for what is excluded; and, if the fault class is `all`, of each surface, rad,
-    `command_low` and `command_high`, the least and greatest command, `least` and `greatest`, the same of the
-    position of a healthy surface.
-    filters: the filter states of the statistical detector, by frame up to the alarm. reach_low, reach_high
-    (estimators, poles, 4): bounds on the effect of a fault in the filters before the first frame.
+    names: of the isolation estimators. kept: name -> quantity (frames, ...), which is also an attribute of
+    the tape:
+
+        offset, slope, spread (estimators, 3)   of the effect of each estimator's fault: rad/s2; rad/s2 per
+        unit of its
+                                                parameter; rad/s2
+        excluded (estimators,)                  above 0 for an excluded fault
+        types (surfaces, types)                 above 0 for an excluded type
+        command_low, command_high               least and greatest command of each surface, rad, if the fault
+        class
+                                                is `all`
+        least, greatest                         the same of the position of a healthy surface
+
+    filters: name -> filter state of the statistical detector, by frame up to the alarm. reach_low, reach_high
+    (estimators, poles, 4): bounds on the effect of a fault in the detection filters before the first frame.
     """
 
     first: int
@@ -62,44 +73,51 @@ class Tape:
 
     @property
     def end(self) -> int:
-        """The frame after the last."""
+        """The number of the frame after the last."""
         return self.first + self.frames
 
 
 class _RecordWords:
-    """The places of quantities in a record, as numbers of its words (8 bytes); reads them back from rows."""
+    """The positions of quantities in a record, as numbers of its words; reads the quantities back from copied
+    words."""
 
     def __init__(self, views: dict[str, np.ndarray]) -> None:
-        """views: of a record each word of which is its own number."""
-        found = {name: np.ascontiguousarray(view) for name, view in views.items()}
-        self.words = np.concatenate([view.view(np.int64).ravel() for view in found.values()])
-        self._what = {name: (view.dtype, view.shape, view.nbytes // 8) for name, view in found.items()}
+        """views: name -> the quantity in a record in which each word holds its own number."""
+        quantities = {name: np.ascontiguousarray(view) for name, view in views.items()}
+        self.words = np.concatenate([view.view(np.int64).ravel() for view in quantities.values()])
+        self._what = {name: (view.dtype, view.shape, view.nbytes // 8) for name, view in quantities.items()}
 
     def read(self, rows: np.ndarray) -> dict[str, np.ndarray]:
-        """The quantities, (frames, ...), that were kept as rows (frames, words)."""
-        found = {}
-        place = 0
+        """Name -> quantity (frames, ...), from the words that were copied in each frame, rows (frames,
+        words)."""
+        quantities = {}
+        first_word = 0
         for name, (dtype, shape, n) in self._what.items():
-            words = np.ascontiguousarray(rows[:, place : place + n])
-            found[name] = words.view(dtype).reshape(len(rows), *shape)
-            place = place + n
-        return found
+            words = np.ascontiguousarray(rows[:, first_word : first_word + n])
+            quantities[name] = words.view(dtype).reshape(len(rows), *shape)
+            first_word = first_word + n
+        return quantities
 
 
 class Recorder:
-    """Copies the quantities of a `Tape` from a flight's record, (1,) of `frame_dtype`, at each `keep`."""
+    """Copies the quantities of a `Tape` from the record of a flight at each `keep`."""
 
     def __init__(self, scenario: Scenario) -> None:
         self._scenario = scenario
 
     def watch(self, loop: Loop) -> Callable[[], None]:
-        """Keep every frame of a flight. Returns the function to call when the flight ends."""
+        """Copy every frame of a flight. Returns the function that the flight calls at its end."""
         self.begin(loop.frames)
         loop.after_frame = self.keep
         return self.land
 
     def begin(self, frames: np.ndarray) -> None:
-        """Begin to keep frames of the record `frames`, the first of them number 0."""
+        """Begin to copy frames of the record `frames`, the first of them number 0.
+
+        numbers: a record in which each word holds its own number. _ring: rows of the ring for the words that
+        are kept up to the alarm only (`early`); _kept: rows of the ring, then of the frames after the alarm,
+        for those that are kept `always`.
+        """
         numbers = take_memory((1,), frames.dtype)
         _words_of(numbers)[:] = np.arange(frames.nbytes // 8)
         config = self._scenario.fdi
@@ -122,15 +140,18 @@ class Recorder:
         self._keep_frame = direct(keep_frame, *self._arguments)
 
     def land(self) -> None:
-        """Keep the record as it is at the end."""
+        """Copy the whole record at the end of the flight."""
         self._last = copy_memory(self._frames)
 
     def keep(self) -> None:
-        """Keep what stands in the record."""
+        """Copy the quantities of the present frame."""
         self._keep_frame(*self._arguments)
 
     def tape(self, events: Sequence[int], rows: int) -> Tape:
-        """The frames around `events`. rows: number of frames of the flight."""
+        """The tape of the frames around `events`, as far as they were copied without a restart of the
+        diagnosis. rows: number of frames of the flight. before: rows of the ring with the frames up to the
+        alarm.
+        """
         last = FrameReadout(self._last[0])
         config = self._scenario.fdi
         seen, alarm, clear = self._state[[SEEN, ALARM, CLEAR]].tolist()
@@ -157,12 +178,12 @@ class Recorder:
 
 @kernel
 def keep_frame(record, always, early, kept, ring, alarm, state):
-    """Copy the words `always` of a record (words,) and, up to the alarm, the words `early`: up to the alarm
-    into a ring of rows, after it into the rows of `kept` behind the ring. At the alarm `alarm` becomes a copy
-    of the record.
+    """Copy words of a record (words,): those `always` in every frame, those `early` up to the alarm. Up to
+    the alarm they go into a ring of rows, as the first rows of `kept` and of `ring`; after it into the rows
+    of `kept` behind the ring. At the alarm, `alarm` becomes a copy of the record.
 
-    state (5,), by place: SEEN, number of frames; ALARM, frame of the alarm, or -1; CLEAR, frame in which the
-    last alarm was withdrawn; FLAG and OTHER_FLAG, places in the record of the two alarm flags.
+    state (5,), by position: SEEN, number of frames so far; ALARM, frame of the alarm, or -1; CLEAR, frame in
+    which the last alarm was withdrawn; FLAG and OTHER_FLAG, positions in the record of the two alarm flags.
     """
     k = state[SEEN]
     rows = len(ring)
@@ -192,7 +213,7 @@ def _words_of(frames: np.ndarray) -> np.ndarray:
 
 
 def tape_of_flight_again(scenario: Scenario, events: Sequence[int], rows: int) -> Tape:
-    """`Recorder.tape` of a scenario that is flown again for it."""
+    """`Recorder.tape` of a scenario, which is flown again for it."""
     recorder = Recorder(scenario)
     fly(scenario, watch=recorder.watch)
     return recorder.tape(events, rows)

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Arguments:
-    """What is wanted of it, as `command` says."""
+    """The options; `command` documents them."""
 
     plan: Annotated[str, typer.Argument(metavar="PLAN")]
     out: Path | None = None
@@ -66,7 +66,7 @@ def command(arguments: Arguments) -> None:
 
 
 def _fly(plan: "EvidencePlan", arguments: Arguments) -> "Judged":
-    """Fly and judge all of it."""
+    """Fly and judge all flights of a plan, and print the result."""
     from beaver_ftc.results import Judged
     from beaver_ftc.studies.engine import cores
     from beaver_ftc_assurance.evidence.shown import as_expectations, as_text, run_plan
@@ -74,13 +74,13 @@ def _fly(plan: "EvidencePlan", arguments: Arguments) -> "Judged":
     folder = Path("runs") / plan.file.name if arguments.out is None else arguments.out
     with progress_bar(plan.file.name) as progress:
         document = run_plan(plan, folder.absolute(), arguments.workers or cores(), progress)
-    said = document | {"folder": str(folder)}
-    answer(arguments.format, said, lambda: as_text(document, str(folder)))
+    answered = document | {"folder": str(folder)}
+    answer(arguments.format, answered, lambda: as_text(document, str(folder)))
     return Judged(plan.file.name, document["passed"], as_expectations(document))
 
 
 def _replay(plan: "EvidencePlan", arguments: Arguments) -> "Judged":
-    """Fly one flight into a result folder of its own, and judge it."""
+    """Fly one flight into a result folder of its own, judge it, and print the result."""
     from beaver_ftc.results import Judged, Metrics, verdict_text
     from beaver_ftc.results import run_scenario as run
     from beaver_ftc_assurance.evidence.shown import of_flight
@@ -89,12 +89,12 @@ def _replay(plan: "EvidencePlan", arguments: Arguments) -> "Judged":
     out = Path("runs") if arguments.out is None else arguments.out
     document = run(scenario, out, not arguments.no_report)
     folder = str(out / scenario.name)
-    meets = all(each.passed for each in requirements)
-    lines = [f"{each.name} {each.actual}" for each in requirements]
-    said = document | {"folder": folder, "requirements": lines, "passed": meets}
+    meets = all(requirement.passed for requirement in requirements)
+    lines = [f"{requirement.name} {requirement.actual}" for requirement in requirements]
+    answered = document | {"folder": folder, "requirements": lines, "passed": meets}
 
     def text() -> str:
         return "\n".join([verdict_text(Metrics.of(document), folder, sys.stdout.isatty()).rstrip(), *lines])
 
-    answer(arguments.format, said, text)
+    answer(arguments.format, answered, text)
     return Judged(scenario.name, meets, requirements)

@@ -1,4 +1,8 @@
-"""One flight of a plan, and its result for each requirement: a row."""
+"""Fly one flight of a plan: its row has the result of each requirement of the plan.
+
+A requirement has one or several *parts* (`part`), each with an expected and an actual value, a verdict and a
+margin.
+"""
 
 import hashlib
 import math
@@ -22,14 +26,16 @@ MET = "met"
 NOT_MET = "not met"
 NOT_SHOWN = "not shown"
 WORST_FIRST = NOT_MET, NOT_SHOWN, MET
-BANDS = 3  # equal bands of airspeed over the envelope
+BANDS = 3  # number of equal bands of airspeed over the envelope
 ALTITUDES_M = (1000.0, 2000.0)  # limits between the altitude bands
-# Columns that are kept of every flight.
+# Columns of the log that are kept in every flight.
 _ALWAYS_WATCHED = ("t_s", "airspeed_mps", "altitude_m", "envelope_valid")
 
 
 class Watched(Columns):
-    """A log sink that keeps a few columns, the last row, and a digest of all of them."""
+    """A log sink that keeps the columns of `_ALWAYS_WATCHED` and some more, the last row (`end`), and a
+    digest of all columns.
+    """
 
     def __init__(self, columns: Iterable[str]) -> None:
         super().__init__()
@@ -44,30 +50,31 @@ class Watched(Columns):
         super().open(columns)
 
     def write(self, rows: np.ndarray) -> None:
-        """Take rows (n, columns)."""
+        """Add rows (n, columns)."""
         self._digest.update(np.ascontiguousarray(rows).tobytes())
         self.end = dict(zip(self._all, rows[-1].tolist(), strict=True))
         super().write(rows)
 
     @property
     def sha256(self) -> str:
-        """Of the columns' names and every number."""
+        """SHA-256 of the names of the columns and of every number."""
         return self._digest.hexdigest()
 
 
 def fly_flight(plan: EvidencePlan, case: tuple[str, int]) -> Row:
-    """The row of one flight; if the flight fails, the row has the reason."""
+    """The row of one flight; if the flight fails, the row has the reason. case: source, and number of the
+    flight."""
     try:
         return _flown(plan, *case)
     except BadInput as error:
         return failed(plan, case, str(error), BAD_INPUT)
-    except Exception as error:  # a plug-in may raise anything: one flight's end, not the plan's
+    except Exception as error:  # a plug-in may raise any error, which must end one flight and not the plan
         ours = isinstance(error, BeaverFtcError)
         return failed(plan, case, str(error) if ours else f"{type(error).__name__}: {error}", FAILED)
 
 
 def failed(plan: EvidencePlan, case: tuple[str, int], why: str, status: str = CRASHED) -> Row:
-    """The row of a flight that shows nothing."""
+    """The row of a flight that failed: each requirement is not shown. why: the reason."""
     name, run = case
     source = plan.sources[name]
     none = part("flight", None, None, NOT_SHOWN, says=why)
@@ -81,7 +88,7 @@ def failed(plan: EvidencePlan, case: tuple[str, int], why: str, status: str = CR
 
 
 def _flown(plan: EvidencePlan, name: str, run: int) -> Row:
-    """The row of a flight that is flown and measured."""
+    """The row of a flight that is flown and measured. name, run: source, and number of the flight."""
     from beaver_ftc.loop import fly
 
     source = plan.sources[name]
@@ -112,8 +119,8 @@ def _flown(plan: EvidencePlan, name: str, run: int) -> Row:
 def part(
     name: str, expected: Any, actual: Any, verdict: str, inside: float | None = None, says: str = ""
 ) -> Row:
-    """One condition of a requirement on a flight. inside: its margin, negative if the condition is not
-    met."""
+    """One condition of a requirement on a flight. inside: margin, negative if the condition is not met. says:
+    remark."""
     return {"name": name, "expected": expected, "actual": actual, "verdict": verdict, "margin": inside,
             "says": says}  # fmt: skip
 
@@ -121,8 +128,7 @@ def part(
 def _judged(
     plan: EvidencePlan, requirement: Requirement, scenario: Scenario, amounts: Metrics, log: Watched
 ) -> list[Row]:
-    """The parts of a requirement with their results; none if the requirement is on the statistics of a
-    sweep."""
+    """The parts of a requirement on a flight; none if the requirement is on the statistics of a sweep."""
     bar = requirement.bar
     formula = plan.formulas.get(requirement.id)
     if formula is not None:
@@ -132,7 +138,7 @@ def _judged(
             return _of_handling(bar, scenario, amounts, log)
         if isinstance(bar, OfMargins):
             return _of_margins(bar, scenario)
-    except BeaverFtcError as error:  # the study has nothing to say of it, such as of another law
+    except BeaverFtcError as error:  # the study does not cover the flight, for example because of its law
         return [part("the study", None, None, NOT_SHOWN, says=str(error))]
     if requirement.expect is None:
         return []
@@ -143,7 +149,13 @@ def _judged(
 
 
 def _of_formula(text: str, formula: Formula, rate_hz: float, amounts: Metrics, log: Watched) -> Row:
-    """The robustness of a formula; not shown where the log ends before what it asks for."""
+    """The part of a formula of signal temporal logic. r: its robustness, at least 0 if the formula holds.
+
+    not a number, or infinite                            not shown
+    r >= 0, the aircraft was lost before the formula's end    not shown
+    r >= 0                                               met
+    r < 0                                                not met
+    """
     r = formula.robustness(log, rate_hz)
     lost = amounts.departure
     if not math.isfinite(r):
@@ -157,7 +169,7 @@ def _of_formula(text: str, formula: Formula, rate_hz: float, amounts: Metrics, l
 
 
 def _of_handling(bar: OfHandling, scenario: Scenario, amounts: Metrics, log: Watched) -> list[Row]:
-    """A part for each mode: its level of handling qualities."""
+    """A part for each mode of motion: whether its level of handling qualities is good enough."""
     from beaver_ftc.studies import HANDLING_LIMITS as LIMITS
     from beaver_ftc.studies import where_ended, where_trimmed
 
@@ -178,7 +190,7 @@ def _of_handling(bar: OfHandling, scenario: Scenario, amounts: Metrics, log: Wat
 
 
 def _of_margins(bar: OfMargins, scenario: Scenario) -> list[Row]:
-    """The least gain margin and the least phase margin over all surfaces and losses."""
+    """The least gain margin and the least phase margin over all surfaces and losses, a part each."""
     from beaver_ftc.studies import margins_at as at
     from beaver_ftc.studies import refuse_laws_without_margins as refuse_other_laws
 

@@ -1,5 +1,10 @@
 """The document evidence.json: for each requirement its verdict, margin and worst flight; the coverage of the
 envelope by flights; sources and versions.
+
+A *part* is one condition of a requirement with its result (`flown.part`). A requirement on each flight has
+parts of each flight. A requirement on a sweep (`bar` of type sweep) has a part for each statistic of the
+sweep, which counts as a part of the flight that contributes the worst value. The worst part decides the
+verdict and the margin.
 """
 
 import io
@@ -32,12 +37,12 @@ from beaver_ftc_assurance.evidence.flown import (
 from beaver_ftc_assurance.evidence.plan import EvidencePlan
 from beaver_ftc_assurance.evidence.plan_file import OfSweep, Requirement
 
-MOST_NAMED = 50  # flights that are listed as not meeting a requirement
+MOST_NAMED = 50  # largest number of flights that are listed as not meeting a requirement
 JudgedFlight = tuple[str, Row]  # name of a flight, and one `part` of its result
 
 
 def document_of(plan: EvidencePlan, rows: Sequence[Row], date: str) -> Document:
-    """The document evidence.json. date: the only difference between two documents of the same plan."""
+    """The document evidence.json. Two documents of the same plan differ only in their date."""
     requirements = [_requirement(plan, requirement, rows) for requirement in plan.file.requirements]
     aircraft = {source.aircraft.name: source.aircraft for source in plan.sources.values()}
     counts = _counts(requirement["verdict"] for requirement in requirements)
@@ -76,7 +81,11 @@ def _requirement(plan: EvidencePlan, requirement: Requirement, rows: Sequence[Ro
     verdicts: dict[str, str] = {}
     for flight, result in results:
         verdicts[flight] = _worst_of([verdicts.get(flight, MET), result["verdict"]])
-    flight, worst = min(results, key=lambda of: _rank(of[1]), default=("", part("", None, None, NOT_SHOWN)))
+    flight, worst = min(
+        results,
+        key=lambda flight_and_part: _rank(flight_and_part[1]),
+        default=("", part("", None, None, NOT_SHOWN)),
+    )
     return {
         "id": requirement.id,
         "text": requirement.text,
@@ -97,18 +106,23 @@ def _requirement(plan: EvidencePlan, requirement: Requirement, rows: Sequence[Ro
 
 
 def _counts(verdicts: Iterable[str]) -> dict[str, int]:
-    """How often each verdict is among these."""
+    """How often each verdict occurs."""
     return dict.fromkeys((MET, NOT_MET, NOT_SHOWN), 0) | Counter(verdicts)
 
 
 def _worst_of(verdicts: Iterable[str]) -> str:
-    """The worst of these verdicts; not shown, of none."""
+    """The worst of some verdicts; not shown, if there is none."""
     return min(verdicts, key=WORST_FIRST.index, default=NOT_SHOWN)
 
 
 def _rank(result: Row) -> tuple[int, float]:
-    """The worst first: by verdict, then by margin over the limit's size. A result that is not met and has no
-    margin is the worst of its verdict, any other without a margin the best."""
+    """Key that sorts parts, the worst first: by verdict, then by margin over the size of the limit.
+
+    margin      verdict     second key
+    known       any         margin / size of the limit
+    unknown     not met     -inf, the worst of this verdict
+    unknown     another     inf, the best of this verdict
+    """
     order = WORST_FIRST.index(result["verdict"])
     if result["margin"] is None:
         return order, -inf if result["verdict"] == NOT_MET else inf
@@ -116,7 +130,7 @@ def _rank(result: Row) -> tuple[int, float]:
 
 
 def _size(expected: Any) -> float:
-    """The size of the limit by which a margin is divided; 1 if there is none."""
+    """Magnitude of the limit by which a margin is divided; 1 if there is no limit, or if it is 0."""
     if isinstance(expected, dict):
         expected = next((abs(expected[side]) for side in ("at_least", "at_most") if expected.get(side)), 1.0)
     number = isinstance(expected, int | float) and not isinstance(expected, bool)
@@ -124,9 +138,12 @@ def _size(expected: Any) -> float:
 
 
 def _of_sweep(plan: EvidencePlan, bar: OfSweep, name: str, rows: Sequence[Row]) -> list[JudgedFlight]:
-    """The statistics of a sweep, each with its worst flight, compared with a bar. A statistic is not shown if
-    no flight gives it, or if the bar has a confidence, and the estimate keeps the limit, but its bound at
-    this confidence does not."""
+    """The statistics of a sweep as parts, each with its worst flight. name: of the sweep among the sources.
+
+    The limits are compared twice: `bounded`, with the bound at the confidence of the bar, and `estimated`,
+    with the estimate itself. If the bar has no confidence, both are the same. `_of_statistic` takes the
+    verdict from the two.
+    """
     from beaver_ftc.studies.sweep import schema_of, table_of, write_tables
 
     source = plan.sources[name]
@@ -146,10 +163,11 @@ def _of_sweep(plan: EvidencePlan, bar: OfSweep, name: str, rows: Sequence[Row]) 
 
 
 def _worst(flights: Flights, name: str) -> int:
-    """Number of the flight with the worst contribution to a statistic, such as `tracking_ratio.p`;
-    that of the first flight if none contributes.
+    """Number of the flight with the worst contribution to a statistic, such as `tracking_ratio.p`; that of
+    the first flight if none contributes.
 
-    bad (flights,): a number for each flight, the larger the worse; a flag counts 1, an unknown number -inf.
+    bad (flights,): contribution of each flight, the larger the worse; a flag counts 1, an unknown number
+    -inf.
     """
     quantity, _, axis = name.partition(".")
     contributions: dict[str, Callable[[], np.ndarray]] = {
@@ -171,10 +189,10 @@ def _worst(flights: Flights, name: str) -> int:
 
 
 def _conditions(bar: OfSweep, *without: str) -> SweepExpect:
-    """The conditions of a bar, without these keys at any level."""
+    """The conditions of a bar, without the keys `without` at any level."""
 
     def reduced(section: Any) -> Any:
-        """A section, or a value, without the keys."""
+        """The section without the keys; a value that is no section, as it is."""
         if not isinstance(section, dict):
             return section
         return {key: reduced(value) for key, value in section.items() if key not in without}
@@ -183,8 +201,15 @@ def _conditions(bar: OfSweep, *without: str) -> SweepExpect:
 
 
 def _of_statistic(bound: Document, estimate: Document) -> Row:
-    """A statistic as a part. bound: its bound at the bar's confidence, or the estimate if the bar has none,
-    compared with the limit. estimate: the estimate, compared with the same limit."""
+    """The part of a statistic.
+
+        bound keeps the limit    estimate keeps it    verdict
+        yes                      any                  met
+        no                       yes, or no flight    not shown
+        no                       no                   not met
+
+    bound, estimate: `evaluate` with and without the confidence of the bar.
+    """
     verdict = MET
     says = f"{bound['of']} flights tell"
     if not bound["passed"]:
@@ -198,7 +223,13 @@ def _of_statistic(bound: Document, estimate: Document) -> Row:
 
 
 def _coverage(aircraft: Aircraft, rows: Sequence[Row]) -> Document:
-    """For one aircraft: the number of flights with each fault on each surface, by cell of the envelope."""
+    """For one aircraft: the number of flights with each fault on each surface, by cell of the envelope. Cell
+    k has the airspeed band k // (number of altitude bands) and the altitude band k % (number of altitude
+    bands), as in `flown.cells`.
+
+    counts: (surface, fault type, cell) -> number of flights; surface and type of a flight without a fault are
+    `none`.
+    """
     slowest, fastest = aircraft.envelope.airspeed_mps
     width = (fastest - slowest) / BANDS
     ends_m = (None, *ALTITUDES_M, None)

@@ -9,10 +9,10 @@ from xml.sax.saxutils import escape
 
 from beaver_ftc.studies.present import Heading, Part, Table
 
-MARGIN_PT = 45  # of a page
-FOOT_PT = 24  # from the edge of a page to its foot
-MOST_OF_HEAD = 9  # letters of a column's head that are kept together
-MOST_TOGETHER = 20  # rows of a table that is kept on one page
+MARGIN_PT = 45  # margin of a page, points
+FOOT_PT = 24  # distance from the edge of a page to its foot, points
+MOST_OF_HEAD = 9  # number of letters of a column's header that its width allows for
+MOST_TOGETHER = 20  # a table with fewer rows is kept on one page
 MET_COLOUR = "#00614a"
 MISSED_COLOUR = "#a33b00"
 LINE_COLOUR = "#d8d8d8"
@@ -20,7 +20,7 @@ _FONTS = {"Body": "DejaVuSans.ttf", "Bold": "DejaVuSans-Bold.ttf"}  # they come 
 
 
 def as_pdf(title: str, parts: Sequence[Part], foot: str) -> bytes:
-    """The page as PDF; the same parts give the same bytes. foot: stands below every page, with its number."""
+    """The page as PDF; the same parts give the same bytes. foot: text below every page, beside the number."""
     from reportlab.lib.pagesizes import A4
     from reportlab.platypus import SimpleDocTemplate
 
@@ -54,7 +54,7 @@ def _register() -> None:
 
 
 def _flowables(title: str, parts: Sequence[Part], width: float) -> Iterator[Any]:
-    """The parts of the page; the first heading begins a new page."""
+    """Title and parts of the page as reportlab's flowables; the first heading begins a new page."""
     from reportlab.platypus import KeepTogether, PageBreak
 
     yield _text(title, 15, bold=True, before=0)
@@ -66,8 +66,8 @@ def _flowables(title: str, parts: Sequence[Part], width: float) -> Iterator[Any]
             first = False
             yield _text(part.text, 12, bold=True, keep=True)
         elif isinstance(part, Table):
-            made = _table(part, width)
-            yield KeepTogether([made]) if len(part.rows) < MOST_TOGETHER else made
+            table = _table(part, width)
+            yield KeepTogether([table]) if len(part.rows) < MOST_TOGETHER else table
         elif isinstance(part, str):
             yield _text(part, 8.5)
         else:
@@ -77,7 +77,9 @@ def _flowables(title: str, parts: Sequence[Part], width: float) -> Iterator[Any]
 def _text(
     text: str, size: float, bold: bool = False, colour: str = "#111111", keep: bool = False, before: float = 7
 ) -> Any:
-    """A paragraph, `before` points below the previous one. Text of a plan is escaped: it is never markup."""
+    """A paragraph, `before` points below the previous one. size: of the letters, points. Text of a plan is
+    escaped, so that it is never markup.
+    """
     from reportlab.lib.styles import ParagraphStyle
     from reportlab.platypus import Paragraph
 
@@ -89,26 +91,26 @@ def _text(
 
 
 def _table(table: Table, width: float) -> Any:
-    """A table that begins each page with its head."""
+    """A table that repeats its header on each page. A table with many columns has smaller letters."""
     from reportlab.platypus import LongTable
 
     wide = len(table.head) > 6
     size = 5.8 if wide else 7.5
     cells = [[_text(cell, size, bold=True, before=0) for cell in table.head]]
     cells += [[_cell(cell, size, table) for cell in row] for row in table.rows]
-    made = LongTable(cells, colWidths=_widths(table, width), repeatRows=1)
-    made.setStyle([
+    flowable = LongTable(cells, colWidths=_widths(table, width), repeatRows=1)
+    flowable.setStyle([
         ("VALIGN", (0, 0), (-1, -1), "TOP"), ("LINEBELOW", (0, 0), (-1, -1), 0.4, LINE_COLOUR),
         ("LEFTPADDING", (0, 0), (-1, -1), 0), ("RIGHTPADDING", (0, 0), (-1, -1), 6),
         ("TOPPADDING", (0, 0), (-1, -1), 1.5), ("BOTTOMPADDING", (0, 0), (-1, -1), 2.5),
     ])  # fmt: skip
-    made.hAlign = "LEFT"
-    made.spaceBefore = 7
-    return made
+    flowable.hAlign = "LEFT"
+    flowable.spaceBefore = 7
+    return flowable
 
 
 def _cell(cell: str, size: float, table: Table) -> Any:
-    """A cell of a table; a verdict in its colour, with a mark."""
+    """A cell of a table; a verdict with its colour and a mark."""
     if cell not in table.verdicts:
         return _text(cell, size, before=0)
     good = table.verdicts[cell]
@@ -117,8 +119,9 @@ def _cell(cell: str, size: float, table: Table) -> Any:
 
 
 def _widths(table: Table, width: float) -> list[float]:
-    """Widths of the columns, points, in proportion to the longest cell of each, at most 40 letters, and of a
-    head MOST_OF_HEAD. Of two columns the first is narrow."""
+    """Widths of the columns, points, in proportion to the longest cell of each, at most 40 letters, and the
+    first MOST_OF_HEAD letters of its header. Of two columns, the first has 17 % of the width.
+    """
     columns = list(zip(table.head, *table.rows, strict=True))
     if len(columns) == 2:
         return [0.17 * width, 0.83 * width]

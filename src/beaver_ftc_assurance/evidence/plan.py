@@ -1,4 +1,7 @@
-"""The plan of evidence: requirements on scenarios and sweeps. Reading it reports every mistake at once."""
+"""The plan of evidence: requirements on scenarios and sweeps. All mistakes of its file are reported at once.
+
+A *source* is a scenario or a sweep, out of the plan itself, built in, or from another file.
+"""
 
 import contextlib
 import hashlib
@@ -42,7 +45,7 @@ from beaver_ftc.scenario import (
 from beaver_ftc_assurance.evidence.plan_file import OfSweep, PlanFile, Requirement
 from beaver_ftc_assurance.evidence.source import Source
 
-MOST_FLIGHTS = 100_000
+MOST_FLIGHTS = 100_000  # largest number of flights of a plan
 
 
 def plan_json_schema() -> dict[str, Any]:
@@ -52,9 +55,11 @@ def plan_json_schema() -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class EvidencePlan:
-    """A plan ready to fly. expect, formulas: by requirement; over: the names of its sources, by requirement.
+    """A plan ready to fly.
 
-    given: as the command line names it. sha256: of the file's text.
+    sources: name -> source. expect, formulas: id of a requirement -> its expectations, or its formula. over:
+    id of a requirement -> names of its sources. given: name or path of the plan on the command line. sha256:
+    of its text.
     """
 
     file: PlanFile
@@ -67,11 +72,11 @@ class EvidencePlan:
 
     @property
     def cases(self) -> list[tuple[str, int]]:
-        """Every flight once: its source and its number there."""
+        """Each flight once, as (name of its source, number in the source)."""
         return [(source.name, run) for source in self.sources.values() for run in range(source.flights)]
 
     def of(self, source: str) -> Iterator[Requirement]:
-        """The requirements that a source is flown for."""
+        """The requirements for which a source is flown."""
         return (asked for asked in self.file.requirements if source in self.over[asked.id])
 
 
@@ -86,7 +91,8 @@ def load_plan(path_or_name: str) -> EvidencePlan:
 
 
 class _Reading:
-    """Reads the sources of all requirements and checks them; mistakes are collected."""
+    """Reads the sources of all requirements and checks them. Mistakes are collected, and raised together by
+    `plan`."""
 
     def __init__(self, file: PlanFile, document: Document, path: Path, given: str) -> None:
         self._file = file
@@ -94,8 +100,9 @@ class _Reading:
         self._path = path
         self._given = given
         self._problems: list[Problem] = []
-        self._elsewhere: list[str] = []  # lines about other files
-        self._sources: dict[str, Source | None] = {}  # by what the plan calls them
+        self._elsewhere: list[str] = []  # lines on mistakes in other files
+        # Name or path in the plan -> source, None if it has a mistake.
+        self._sources: dict[str, Source | None] = {}
 
     def plan(self, sha256: str) -> EvidencePlan:
         """The plan; its mistakes are raised together. over, expect, formulas: as in `EvidencePlan`."""
@@ -119,16 +126,16 @@ class _Reading:
                 if formula:
                     self._fits(formula, source, (*at, "formula"))
                 if requirement.expect is not None:
-                    judged = self._expect(requirement.expect, source, (*at, "expect"))
-                    if judged:  # the same for each source: a source only adds problems
-                        expect[requirement.id] = judged
+                    checked = self._expect(requirement.expect, source, (*at, "expect"))
+                    if checked:  # the same for each source: a source only adds problems
+                        expect[requirement.id] = checked
         self._unused()
         sources_by_name = self._by_name()
         self._raise()
         return EvidencePlan(self._file, sources_by_name, over, expect, formulas, self._given, sha256)
 
     def _problem(self, at: Location, says: str) -> None:
-        """Note a mistake in the plan's own file."""
+        """Add a mistake in the file of the plan, with its place and a text."""
         self._problems.append(Problem(self._document.line(at), at, says))
 
     def _raise(self) -> None:
@@ -138,7 +145,8 @@ class _Reading:
             raise BadInput("\n".join(dict.fromkeys([*lines, *self._elsewhere])))
 
     def _by_name(self) -> dict[str, Source]:
-        """The sources by their own names, which must differ."""
+        """Name -> source, for all sources that could be read. Equal names and too many flights are
+        mistakes."""
         sources: dict[str, Source] = {}
         for source in filter(None, self._sources.values()):
             if source.name in sources:
@@ -152,7 +160,8 @@ class _Reading:
         return sources
 
     def _unused(self) -> None:
-        """Note flights of the plan that no requirement is over, and read them for their own mistakes."""
+        """Add a mistake for each entry of `flights` that no requirement names. The entry is read, too, for
+        its own mistakes."""
         for name in self._file.flights:
             if name not in self._sources:
                 self._source(name, ("flights", name))
@@ -161,7 +170,7 @@ class _Reading:
                 )
 
     def _source(self, given: str, at: Location) -> Source | None:
-        """The source of this name, read once; its mistakes are noted."""
+        """The source of this name or path, read once; None if it has a mistake, which is added."""
         if given not in self._sources:
             self._sources[given] = None
             try:
@@ -174,12 +183,15 @@ class _Reading:
         return self._sources[given]
 
     def _read(self, given: str, at: Location) -> Source:
-        """The scenario or sweep that a name or path stands for. Raises ScenarioError where there is none."""
+        """The source of a name or path: of the plan, built in, or a file. Raises ScenarioError if there is
+        none."""
         if given in self._file.flights:
             return self._own(given)
         if given in builtin_names() or given in builtin_sweeps():
-            found: Scenario | Sweep = load_sweep(given) if given in builtin_sweeps() else load_scenario(given)
-            return Source(found.name, given, found)
+            built_in: Scenario | Sweep = (
+                load_sweep(given) if given in builtin_sweeps() else load_scenario(given)
+            )
+            return Source(built_in.name, given, built_in)
         path = inside(self._path.parent, given)
         if path is None:
             says = f"{given[:100]!r} is outside, allowed: a file in the plan's own folder or below it"
@@ -189,24 +201,24 @@ class _Reading:
         else:
             with contextlib.suppress(OSError):
                 if path.is_file():
-                    read = load_sweep(path) if is_sweep(path) else load_scenario(path)
-                    return Source(read.name, given, read)
+                    loaded = load_sweep(path) if is_sweep(path) else load_scenario(path)
+                    return Source(loaded.name, given, loaded)
             says = f"no such file: {given[:100]!r}, allowed: a scenario or sweep file"
         raise ScenarioError(str(self._path), [Problem(self._document.line(at), at, says)])
 
     def _own(self, name: str) -> Source:
-        """A scenario or sweep written into the plan."""
-        own = self._document.below("flights", name)
-        own.data = {"name": name, **own.data}
-        read = validate_sweep if is_of_a_sweep(own.data) else validate_scenario
+        """The source of a scenario or sweep in the plan itself."""
+        content = self._document.below("flights", name)
+        content.data = {"name": name, **content.data}
+        validate = validate_sweep if is_of_a_sweep(content.data) else validate_scenario
         try:
-            found = read(own, str(self._path), self._path.parent)
+            source = validate(content, str(self._path), self._path.parent)
         except ScenarioError as error:
             raise error.below(str(self._path), "flights", name) from None
-        return Source(found.name, name, found)
+        return Source(source.name, name, source)
 
     def _formula(self, requirement: Requirement, at: Location) -> Formula | None:
-        """The formula of a requirement, None if it has none, or one with a mistake, which is noted."""
+        """The formula of a requirement; None if it has none, or one with a mistake, which is added."""
         if requirement.formula is None:
             return None
         try:
@@ -216,17 +228,21 @@ class _Reading:
             return None
 
     def _fits(self, formula: Formula, source: Source, at: Location) -> None:
-        """Note a problem if the logs of a source are too short for a formula, or lack one of its columns."""
+        """Add a mistake if the logs of a source are too short for a formula, or lack one of its columns."""
         ahead = formula.looks_ahead_s
-        most = source.base.duration_s
-        if most < ahead < inf:
-            self._problem(at, f"looks {ahead:g} s ahead, allowed over {source.given}: at most its {most:g} s")
+        duration_s = source.base.duration_s
+        if duration_s < ahead < inf:
+            self._problem(
+                at, f"looks {ahead:g} s ahead, allowed over {source.given}: at most its {duration_s:g} s"
+            )
         for column in sorted(formula.columns.difference(source.columns)) if source.columns else ():
             says = f"{column[:60]!r} is no column of {source.given}'s log{suggestion(column, source.columns)}"
             self._problem(at, says)
 
     def _expect(self, given: dict[str, Any], source: Source, at: Location) -> Expect | None:
-        """The expectations, checked against the base scenario of a source; None if they have a mistake."""
+        """The expectations, checked with the base scenario of a source; None if they have a mistake, which is
+        added. lines: the lines of the plan in which the keys of `expect` stand.
+        """
         base = source.base
         data = base.model_dump(mode="json", by_alias=True, exclude_unset=True) | {"expect": given}
         lines = {("expect", *where): n for where, n in self._document.below(*at).lines.items()}
@@ -234,7 +250,7 @@ class _Reading:
             with checked_against(base.airframe, base.aircraft):
                 return validate_model(Scenario, Document(data, lines), "", None, conflicts).expect
         except ScenarioError as error:
-            for one in error.problems:
-                if one.location[:1] == ("expect",):
-                    self._problem((*at, *one.location[1:]), one.says)
+            for problem in error.problems:
+                if problem.location[:1] == ("expect",):
+                    self._problem((*at, *problem.location[1:]), problem.says)
             return None

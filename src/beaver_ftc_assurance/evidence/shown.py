@@ -15,9 +15,10 @@ from beaver_ftc_assurance.evidence.flown import MET, NOT_MET, NOT_SHOWN, WORST_F
 from beaver_ftc_assurance.evidence.judged import Document, document_of
 from beaver_ftc_assurance.evidence.plan import EvidencePlan
 
-ON_THE_SUMMARY = 24  # requirements: what one page holds
-MOST_LETTERS = 90  # of a requirement's text there
-MOST_SHOWN = 10  # flights of a requirement that fail
+ON_THE_SUMMARY = 24  # largest number of requirements in the summary, which fills one page
+MOST_LETTERS = 90  # longest text of a requirement in the summary
+MOST_SHOWN = 10  # largest number of failing flights that are named for a requirement
+# Verdict -> whether it is shown as good.
 VERDICTS = {MET: True, NOT_MET: False, NOT_SHOWN: False}
 NO_APPROVAL = (
     "Clauses are quoted by number, with our reading of them. This document records flights of a simulation; "
@@ -30,7 +31,7 @@ def run_plan(
 ) -> Document:
     """Fly a plan, write evidence.json, .html and .pdf into a folder, and return the document.
 
-    Raises BadInput where what writes PDF is not installed: before anything flies.
+    Raises BadInput before any flight if reportlab, which writes the PDF, is not installed.
     """
     if find_spec("reportlab") is None:
         raise BadInput("evidence.pdf is written by reportlab, allowed: pip install 'beaver-ftc[evidence]'")
@@ -49,19 +50,19 @@ def run_plan(
 
 
 def _html(document: Document) -> str:
-    """The document as a page."""
+    """The document as an HTML page."""
     return as_html(_title(document), list(page(document)), {})
 
 
 def _pdf(document: Document) -> bytes:
-    """The same as PDF."""
+    """The document as PDF, with the parts of the HTML page."""
     from beaver_ftc_assurance.evidence.paper import as_pdf
 
     return as_pdf(_title(document), list(page(document)), f"{document['plan']} · {document['date']}")
 
 
 def _title(document: Document) -> str:
-    """The title of both."""
+    """The title of HTML page and PDF."""
     return f"Evidence: {document['plan']}"
 
 
@@ -69,7 +70,8 @@ FILES: Makers = {"evidence.json": as_json, "evidence.html": _html, "evidence.pdf
 
 
 def page(document: Document) -> Iterator[Part]:
-    """The parts of the page: the summary, which fills a page of the PDF, then all under headings."""
+    """The parts of the page: the summary, which fills the first page of the PDF, then all results under
+    headings."""
     if document["description"]:
         yield document["description"].strip()
     flights = len(document["flights"])
@@ -78,26 +80,26 @@ def page(document: Document) -> Iterator[Part]:
     yield NO_APPROVAL
     yield f"Plan {document['hashes']['plan'][:16]}, flight code {document['hashes']['flight code']}."
     yield Heading("Requirements")
-    for each in document["requirements"]:
-        yield from _requirement(each)
+    for requirement in document["requirements"]:
+        yield from _requirement(requirement)
     yield Heading("Coverage")
-    for each in document["coverage"]:
-        yield from _coverage(each)
+    for coverage in document["coverage"]:
+        yield from _coverage(coverage)
     yield Heading("What it follows from")
     yield f"Plan {document['hashes']['plan']}; flight code {document['hashes']['flight code']}."
     yield versions_line(document["versions"])
     yield Table(
         ("flown", "as the plan names it", "flights", "SHA-256"),
         [
-            (each["name"], each["given"], str(each["flights"]), each["sha256"][:32])
-            for each in document["sources"]
+            (source["name"], source["given"], str(source["flights"]), source["sha256"][:32])
+            for source in document["sources"]
         ],
     )
     yield "Of each flight evidence.json has the SHA-256 of its scenario and of its log."
 
 
 def counted(document: Document) -> str:
-    """The number of requirements, in all and by verdict."""
+    """Words for the number of requirements, of all and by verdict."""
     counts = document["counts"]
     return f"{sum(counts.values())} requirements: " + ", ".join(
         f"{n} {verdict}" for verdict, n in counts.items()
@@ -105,17 +107,20 @@ def counted(document: Document) -> str:
 
 
 def _summary(requirements: list[Document]) -> Table:
-    """The table of requirements. If there are more than a page holds, those not met come first, and the last
-    line counts the others."""
-    shown = requirements
-    if len(shown) > ON_THE_SUMMARY:
-        shown = sorted(shown, key=lambda each: WORST_FIRST.index(each["verdict"]))[:ON_THE_SUMMARY]
+    """The table of requirements. If one page does not hold all, those not met come first, and the last line
+    has the number of the others.
+    """
+    requirements_shown = requirements
+    if len(requirements_shown) > ON_THE_SUMMARY:
+        requirements_shown = sorted(requirements_shown, key=lambda row: WORST_FIRST.index(row["verdict"]))[
+            :ON_THE_SUMMARY
+        ]
     rows = [
-        (each["id"], _short(each["text"]), each["verdict"], margin_of(each), each["worst"]["flight"])
-        for each in shown
+        (row["id"], _short(row["text"]), row["verdict"], margin_of(row), row["worst"]["flight"])
+        for row in requirements_shown
     ]
-    left = len(requirements) - len(shown)
-    rows += [("", f"{left} more", "", "", "")] if left else []
+    n_left = len(requirements) - len(requirements_shown)
+    rows += [("", f"{n_left} more", "", "", "")] if n_left else []
     return Table(("", "requirement", "verdict", "margin", "worst flight"), rows, VERDICTS)
 
 
@@ -125,7 +130,8 @@ def _short(text: str) -> str:
 
 
 def margin_of(requirement: Document) -> str:
-    """A requirement's margin and what it is of, or what its worst flight says."""
+    """Words for the margin of a requirement and the part that has it; without a margin, for the worst
+    flight."""
     worst = requirement["worst"]
     if requirement["margin"] is None:
         return worst["says"] or f"{worst['name']}: {said(worst['actual'])}"
@@ -138,9 +144,9 @@ def signed(value: float) -> str:
 
 
 def said(value: Any) -> str:
-    """An expected or actual value in words."""
+    """Words for an expected or actual value."""
     if isinstance(value, dict):
-        return ", ".join(f"{key.replace('_', ' ')} {said(each)}" for key, each in value.items())
+        return ", ".join(f"{key.replace('_', ' ')} {said(entry)}" for key, entry in value.items())
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, list):
@@ -148,29 +154,30 @@ def said(value: Any) -> str:
     return value if isinstance(value, str) else number(value, none="none")
 
 
-def _requirement(each: Document) -> Iterator[Part]:
+def _requirement(requirement: Document) -> Iterator[Part]:
     """The table of a requirement."""
-    worst = each["worst"]
+    worst = requirement["worst"]
     rows = [
-        ("verdict", each["verdict"]),
-        ("clause", each["clause"]),
-        ("asked", _asked(each["asked"])),
-        ("over", f"{', '.join(each['over'])} ({each['flights']} flights)"),
-        ("flights", ", ".join(f"{n} {verdict}" for verdict, n in each["counts"].items() if n)),
+        ("verdict", requirement["verdict"]),
+        ("clause", requirement["clause"]),
+        ("asked", _asked(requirement["asked"])),
+        ("over", f"{', '.join(requirement['over'])} ({requirement['flights']} flights)"),
+        ("flights", ", ".join(f"{n} {verdict}" for verdict, n in requirement["counts"].items() if n)),
         ("worst flight", worst["flight"]),
         ("there", _found(worst)),
-        ("margin", "" if each["margin"] is None else signed(each["margin"])),
+        ("margin", "" if requirement["margin"] is None else signed(requirement["margin"])),
         ("flies it again", worst["command"] or ""),
     ]
-    failing = [one["flight"] for one in each["failing"]]
+    failing = [flight["flight"] for flight in requirement["failing"]]
     if len(failing) > 1:
         more = f" and {len(failing) - MOST_SHOWN} more" if len(failing) > MOST_SHOWN else ""
         rows.append(("do not meet it", ", ".join(failing[:MOST_SHOWN]) + more))
-    yield Table((each["id"], each["text"]), [row for row in rows if row[1]], VERDICTS)
+    yield Table((requirement["id"], requirement["text"]), [row for row in rows if row[1]], VERDICTS)
 
 
 def _asked(asked: Document) -> str:
-    """What a requirement asks for: a formula, a bar or expectations, in words."""
+    """Words for the condition of a requirement: its formula, bar or expectations. asked: field of the
+    document."""
     if "formula" in asked:
         return str(asked["formula"])
     if "bar" in asked:
@@ -180,7 +187,7 @@ def _asked(asked: Document) -> str:
 
 
 def _found(worst: Document) -> str:
-    """What the worst flight shows, with what was asked."""
+    """Words for the result of a part, with the limit. worst: a part of a requirement on its worst flight."""
     if worst["name"] == "robustness":
         return " ".join(filter(None, (f"robustness {said(worst['actual'])}", worst["says"])))
     allowed = "" if worst["expected"] is None else f", asked {said(worst['expected'])}"
@@ -188,27 +195,29 @@ def _found(worst: Document) -> str:
     return f"{worst['name'].replace('_', ' ')}: {said(worst['actual'])}{allowed}{says}"
 
 
-def _coverage(each: Document) -> Iterator[Part]:
-    """The fault types of each surface by cell of the envelope, and those never flown."""
+def _coverage(coverage: Document) -> Iterator[Part]:
+    """The number of flights with each fault type on each surface by cell of the envelope, and the types never
+    flown."""
     yield (
-        f"{each['aircraft']}: {each['combinations']} of {each['of']} combinations of surface, fault type and "
-        "cell of the envelope flown. Numbers are flights that were in the cell after the fault had struck."
+        f"{coverage['aircraft']}: {coverage['combinations']} of {coverage['of']} combinations of surface, "
+        "fault type and cell of the envelope flown. Numbers are flights that were in the cell after the "
+        "fault had struck."
     )
-    head = ["surface", "fault", *(_cell(cell) for cell in each["cells"])]
+    head = ["surface", "fault", *(_cell(cell) for cell in coverage["cells"])]
     rows = [
-        [one["surface"], one["type"].replace("_", " "), *(str(n) if n else "·" for n in one["flights"])]
-        for one in each["flown"]
+        [row["surface"], row["type"].replace("_", " "), *(str(n) if n else "·" for n in row["flights"])]
+        for row in coverage["flown"]
     ]
     yield Table(head, rows)
-    never = {surface: [kind.replace("_", " ") for s, kind in each["never"] if s == surface]
-             for surface, _ in each["never"]}  # fmt: skip
+    never = {surface: [kind.replace("_", " ") for s, kind in coverage["never"] if s == surface]
+             for surface, _ in coverage["never"]}  # fmt: skip
     if never:
         lacking = (f"{surface}: {', '.join(kinds)}" for surface, kinds in never.items())
         yield f"Never flown: {'; '.join(lacking)}."
 
 
 def _cell(cell: Document) -> str:
-    """The airspeeds and altitudes of a cell of the envelope."""
+    """Words for the airspeeds and altitudes of a cell of the envelope."""
     slow, fast = cell["airspeed_mps"]
     low, high = cell["altitude_m"]
     if low is None:
@@ -219,33 +228,38 @@ def _cell(cell: Document) -> str:
 
 
 def as_text(document: Document, folder: str) -> str:
-    """The text for a terminal."""
+    """The text for a terminal: the table of requirements, and the commands that repeat the worst flight of
+    each requirement that is not met.
+    """
     table = _summary(document["requirements"])
     lines = aligned([[row[0], *row[2:]] for row in (table.head, *table.rows)])
     again = [
-        f"{each['id']} {each['verdict']}: {each['worst']['command']}"
-        for each in document["requirements"]
-        if each["verdict"] != MET and each["worst"]["command"]
+        f"{requirement['id']} {requirement['verdict']}: {requirement['worst']['command']}"
+        for requirement in document["requirements"]
+        if requirement["verdict"] != MET and requirement["worst"]["command"]
     ]
     return "\n\n".join(filter(None, (lines, "\n".join(again), counted(document), f"results: {folder}")))
 
 
 def as_expectations(document: Document) -> tuple[Expectation, ...]:
-    """The requirements for JUnit XML, each by its worst flight."""
-    asked = ((each["id"], _asked(each["asked"]), each["worst"]) for each in document["requirements"])
-    return tuple(_expectation(*each) for each in asked)
+    """The requirements for JUnit XML, each with its worst flight."""
+    rows = ((row["id"], _asked(row["asked"]), row["worst"]) for row in document["requirements"])
+    return tuple(_expectation(*row) for row in rows)
 
 
-def _expectation(name: str, expected: str, found: Document) -> Expectation:
-    """What a flight shows of a requirement, with the command that repeats the flight if one is known."""
-    again = f"; again: {found['command']}" if found.get("command") else ""
-    return Expectation(name, found["verdict"] == MET, expected, f"{found['verdict']}: {_found(found)}{again}")
+def _expectation(name: str, expected: str, worst: Document) -> Expectation:
+    """The result of a part as an expectation for JUnit XML, with the command that repeats the flight if it is
+    known. name: of the requirement; expected: words for its condition.
+    """
+    again = f"; again: {worst['command']}" if worst.get("command") else ""
+    return Expectation(name, worst["verdict"] == MET, expected, f"{worst['verdict']}: {_found(worst)}{again}")
 
 
 def of_flight(plan: EvidencePlan, name: str) -> tuple[Any, tuple[Expectation, ...]]:
-    """The scenario of a flight, by the name of the flight, and all parts of its requirements.
+    """The scenario of a flight, by the name of the flight, and the results of all parts of its requirements.
+    The flight is flown again. Raises BadInput for a name that the plan does not have.
 
-    Raises BadInput for a name that the plan does not have.
+    named: name of each flight -> its source and its number there.
     """
     from beaver_ftc.documents import suggestion
 
@@ -254,10 +268,10 @@ def of_flight(plan: EvidencePlan, name: str) -> tuple[Any, tuple[Expectation, ..
         raise BadInput(
             f"--replay: {plan.given} has no flight {name[:100]!r}{suggestion(name, list(named)[:50])}"
         )
-    found = fly_flight(plan, named[name])["found"]
+    results = fly_flight(plan, named[name])["found"]
     (source, run) = named[name]
     judged = tuple(
-        _expectation(id, said(one["expected"]), one)
-        for id, parts in found.items() for one in parts
+        _expectation(id, said(part["expected"]), part)
+        for id, parts in results.items() for part in parts
     )  # fmt: skip
     return plan.sources[source].scenario(run), judged

@@ -19,7 +19,7 @@ from beaver_ftc.studies.sweep import Assignment, Plan, flight_name, scenario_of
 
 @dataclass(frozen=True)
 class Source:
-    """A scenario or a sweep (`what`) to fly. given: its name or path in the plan."""
+    """A scenario or a sweep (`what`) that a plan flies. given: its name or path in the plan."""
 
     name: str
     given: str
@@ -27,7 +27,7 @@ class Source:
 
     @property
     def flights(self) -> int:
-        """How many flights it has."""
+        """Number of its flights."""
         return self.what.flights if isinstance(self.what, Sweep) else 1
 
     @property
@@ -44,7 +44,7 @@ class Source:
         return flight_name(self.what, run) if isinstance(self.what, Sweep) else self.name
 
     def scenario(self, run: int) -> Scenario:
-        """One flight. Raises BadInput if its values contradict each other."""
+        """The scenario of one flight. Raises BadInput if the varied values contradict each other."""
         if not isinstance(self.what, Sweep):
             return self.what
         assigned = self.assignment(run)
@@ -53,7 +53,7 @@ class Source:
 
     @property
     def base(self) -> Scenario:
-        """The scenario of all its flights, without variations."""
+        """The scenario of all its flights, without the variations."""
         return self.what.scenario({}) if isinstance(self.what, Sweep) else self.what
 
     @cached_property

@@ -1,15 +1,17 @@
-"""The faults left at the end of a flight, and the deflections that distinguish two of them for certain.
+"""The *candidates*, i.e. faults that are not excluded at the end of a flight, and the deflections that are
+certain to distinguish two of them.
 
-If the parameter of a fault is constant, the data since the alarm leave an interval for it. At a command u,
-the deflection of its surface then lies in an interval too: stuck [c-, c+], floating 0, a loss [e- u, e+ u], a
-bias u + [b-, b+]. B (3,) is the bound on the innovation of a frame at the largest rates that the doublet may
-reach, G_i the effectiveness of surface i, and M a margin.
+If the parameter of a fault is constant, the data since the alarm give an interval for it. At a command u, the
+deflection of its surface is then in an interval, too: stuck [c-, c+], floating 0, a loss [e- u, e+ u], a bias
+u + [b-, b+], rad. B (3,), rad/s2, is the bound on the innovation of a frame at the largest rates that the
+doublet may reach; G (3, n), rad/s2 per rad, the effectiveness of the surfaces; M a margin.
 
-Two types on one surface are distinguished by a frame in which, on some axis, their deflections differ by more
-than 2 M B / |G_i|, twice what the uncertainty hides. They must differ from the command by as much: a frame
-that health explains says nothing about a fault that may end. Two surfaces a and b are distinguished along a
-direction d with d.G_b = 0, in which b has no effect, by a frame in which a differs from its command by more
-than 2 M |d|.B / |d.G_a|.
+Two types on one surface s are distinguished by a frame in which, on some axis i, their deflections differ by
+more than 2 M B_i / |G_is|, twice the difference that the uncertainty can hide. They must differ from the
+command by as much, because a frame that health explains does not exclude a fault that may end.
+
+Two surfaces a and b are distinguished along a direction d with d.G_b = 0, in which b has no effect, by a
+frame in which a differs from its command by more than 2 M |d|.B / |d.G_a|.
 """
 
 from collections.abc import Iterator, Sequence
@@ -30,7 +32,8 @@ from beaver_ftc_assurance.certificates.tape import Tape
 from beaver_ftc_assurance.doublet import LONGEST_S, Situation, doublet
 
 MARGIN = 1.1  # M: G and B are those of the last frame, and change while the doublet is flown
-GRID = 801  # deflections tried over the travel
+GRID = 801  # number of deflections that are tried over the travel
+# Type with a constant parameter -> its relation.
 RELATIONS = {
     kind: row.deflection_relation
     for kind, row in enumerate(TYPES)
@@ -41,7 +44,7 @@ LOSS = type_index_of("loss_of_effectiveness")  # the only type of the fault clas
 
 @dataclass(frozen=True)
 class Candidate:
-    """A fault type, one of RELATIONS, on a surface; its parameter lies between low and high."""
+    """A fault type, one of RELATIONS, on a surface; its parameter is between low and high."""
 
     surface: int
     kind: int
@@ -49,7 +52,8 @@ class Candidate:
     high: float
 
     def deflection(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Least and greatest deflection, rad, of the surface at commands u (n,) rad."""
+        """Least and greatest deflection, rad, of the surface at commands u (n,) rad, by the relation of its
+        type: (gain + theta) u if theta is a share, otherwise gain u + theta."""
         gain, is_share, _ = RELATIONS[self.kind]
         ends = [(gain + end) * u if is_share else gain * u + end for end in (self.low, self.high)]
         return np.minimum(*ends), np.maximum(*ends)
@@ -61,7 +65,9 @@ class Candidate:
 
 
 def situation_of(tape: Tape, scenario: Scenario, rate: float) -> Situation:
-    """The aircraft at the end of a flight; rate: largest allowed body rate, rad/s."""
+    """The aircraft at the end of a flight; rate: largest allowed body rate, rad/s. Its bound is that of the
+    last frame, plus the largest error of the inertia coupling at this rate, plus the noise of the gyros at
+    both ends of a frame."""
     frame = tape.last
     aircraft = scenario.airframe
     dt = 1.0 / scenario.rate_hz
@@ -80,7 +86,8 @@ def situation_of(tape: Tape, scenario: Scenario, rate: float) -> Situation:
 
 
 def candidates(tape: Tape, history: History) -> Iterator[Candidate]:
-    """Every fault that is left and has a constant parameter, with the interval of the parameter."""
+    """Every fault that is not excluded and has a constant parameter, with the interval of the parameter; none
+    if the diagnosis reports a fault of no known type, or if health explains all frames since the alarm."""
     last = tape.last.diagnosis
     frames = np.arange(round(last.detected_at_s / tape.last.dt_s), tape.end)  # from the alarm on
     shown = frames[history.is_unexplained(frames)]
@@ -97,7 +104,7 @@ def candidates(tape: Tape, history: History) -> Iterator[Candidate]:
 
 
 def faults_left(diagnosis: DiagnosisReadout) -> Iterator[tuple[int, int]]:
-    """Surface and type of each fault that is not excluded."""
+    """Surface and type of each fault that is not excluded. The fault class `losses` has one type."""
     estimators = diagnosis.estimators
     layout = diagnosis.layout
     for s, surface in enumerate(diagnosis.surface_fault_types):
@@ -109,35 +116,39 @@ def faults_left(diagnosis: DiagnosisReadout) -> Iterator[tuple[int, int]]:
             yield from ((s, kind) for kind in np.flatnonzero(~surface.is_type_excluded).tolist())
 
 
-def _interval(of: Hypothesis, history: History, frames: np.ndarray) -> tuple[float, float]:
-    """The interval of a parameter that is constant in all of these frames."""
-    least, most, _ = theta_bounds_by_frame(of, history, frames)
-    return max(of.theta_low, float(least.max())), min(of.theta_high, float(most.min()))
+def _interval(hypothesis: Hypothesis, history: History, frames: np.ndarray) -> tuple[float, float]:
+    """The interval of a parameter that is constant in these frames: the intersection of those of frames and
+    axes."""
+    least, most, _ = theta_bounds_by_frame(hypothesis, history, frames)
+    return max(hypothesis.theta_low, float(least.max())), min(hypothesis.theta_high, float(most.min()))
 
 
 def tell_apart(one: Candidate, other: Candidate, at: Situation, names: Sequence[str]) -> Document:
-    """A doublet that is certain to distinguish two candidates, or the reason why there is none."""
+    """A doublet that is certain to distinguish two candidates, or the reason why there is none.
+
+    targets: surface -> deflection that it must reach. Of two surfaces, each must show its own fault.
+    """
     targets: dict[int, float] = {}
     needs: Document = {}
     if one.surface == other.surface and at.in_blocks:
         return _none("with noisy gyros types are told by blocks of frames, not by one", needs)
     if one.surface == other.surface:
-        asked = [(one.surface, *_types_apart(one, other, at))]
+        requirements = [(one.surface, *_types_apart(one, other, at))]
     else:
-        asked = [(a.surface, *_surface_shown(a, b, at)) for a, b in ((one, other), (other, one))]
-    for s, target, numbers in asked:
+        requirements = [(a.surface, *_surface_shown(a, b, at)) for a, b in ((one, other), (other, one))]
+    for s, target, numbers in requirements:
         needs[names[s]] = numbers
         if target is None:
             return _none(numbers["because"], needs)
         targets[s] = target
-    separating = doublet(targets, at)
-    if separating is None:
+    solution = doublet(targets, at)
+    if solution is None:
         says = f"no doublet within {LONGEST_S:g} s keeps the rates below {degrees(at.rate):g} deg/s"
         return _none(f"{says} and the angle of attack in its range", needs)
-    commands, frames = separating
+    commands, frames = solution
     return {
         "separates": True,
-        # a command is in effect a frame later, a frame judged with the next
+        # A command is in effect one frame later, and a frame is judged together with the next one.
         "time_s": (frames + 2) * at.dt,
         "duration_s": len(commands) * at.dt,
         "amplitude_deg": degrees(max(abs(commands[:, [*targets]] - at.u[[*targets]]).max(axis=0))),
@@ -147,13 +158,18 @@ def tell_apart(one: Candidate, other: Candidate, at: Situation, names: Sequence[
 
 
 def _none(because: str, needs: Document) -> Document:
-    """The document of two candidates without a doublet."""
+    """The document of two candidates without a doublet. needs: numbers for each surface, as far as known."""
     return {"separates": False, "because": because, "needs": needs}
 
 
 def _types_apart(one: Candidate, other: Candidate, at: Situation) -> tuple[float | None, Document]:
-    """The deflection nearest to the present one at which two types on a surface, and health, all differ: gap,
-    the least distance of two of the three positions, rad, exceeds room = 2 M B / |G_i| of the best axis."""
+    """The deflection nearest to the present one at which the positions by two types on a surface and by
+    health all differ; None if there is none; and the numbers of `_nearest`.
+
+        gap > room,    room = least over the axes i of 2 M B_i / |G_is|
+
+    gap (GRID + 1,): least distance, rad, between two of the three positions at each deflection.
+    """
     s = one.surface
     room = min(
         (2.0 * MARGIN * B / abs(g) for B, g in zip(at.bound, at.G[:, s], strict=True) if g), default=inf
@@ -162,13 +178,17 @@ def _types_apart(one: Candidate, other: Candidate, at: Situation) -> tuple[float
     (low, high) = one.deflection(u)
     (low_too, high_too) = other.deflection(u)
     gap = np.maximum(low - high_too, low_too - high)
-    gap = np.minimum(gap, np.minimum(one.off(u), other.off(u)))  # else health explains the frame
+    # Health must not explain the frame.
+    gap = np.minimum(gap, np.minimum(one.off(u), other.off(u)))
     return _nearest(u, gap, s, at, room, "apart, and off their command,")
 
 
 def _surface_shown(one: Candidate, other: Candidate, at: Situation) -> tuple[float | None, Document]:
-    """The deflection nearest to the present one at which a fault shows in a direction in which the surface of
-    the other one has no effect: it exceeds room = 2 M |d|.B / |d.G_a| of the best direction, rad."""
+    """The deflection nearest to the present one at which fault `one`, on surface a, shows in a direction in
+    which surface b of the other fault has no effect; None if there is none; and the numbers of `_nearest`.
+
+        distance from the command > room,    room = least over the directions d of 2 M |d|.B / |d.G_a|
+    """
     a = one.surface
     b = other.surface
     room = min(
@@ -179,33 +199,35 @@ def _surface_shown(one: Candidate, other: Candidate, at: Situation) -> tuple[flo
 
 
 def _deflections(at: Situation, s: int) -> np.ndarray:
-    """Deflections to choose from, (GRID + 1,) rad: over the whole travel, and the present one."""
+    """Deflections that are tried, (GRID + 1,) rad: over the whole travel, and the present one."""
     return np.append(np.linspace(at.stops[0, s], at.stops[1, s], GRID), np.clip(at.u[s], *at.stops[:, s]))
 
 
 def _blind_to(b: int, at: Situation, a: int) -> Iterator[np.ndarray]:
-    """Directions d (3,) with d.G_b = 0, in which surface a has an effect."""
+    """Directions d (3,) with d.G_b = 0, in which surface a has an effect: for each two axes the direction
+    perpendicular to G_b, and each axis on which b has no effect."""
     for i, j in combinations(range(3), 2):
         d = np.zeros(3)
         d[i] = at.G[j, b]
         d[j] = -at.G[i, b]
-        for way in (d, *(np.eye(3)[k] for k in (i, j) if at.G[k, b] == 0.0)):
-            if abs(way @ at.G[:, a]) > 1e-9 * np.abs(way).max():
-                yield way
+        for direction in (d, *(np.eye(3)[k] for k in (i, j) if at.G[k, b] == 0.0)):
+            if abs(direction @ at.G[:, a]) > 1e-9 * np.abs(direction).max():
+                yield direction
 
 
 def _nearest(
     u: np.ndarray, off: np.ndarray, s: int, at: Situation, room: float, what: str
 ) -> tuple[float | None, Document]:
-    """The deflection nearest to the present one among those of u with off > room, None if there is none; and
-    the numbers that decide it. off (n,), rad: the difference at each of u."""
-    most = degrees(off.max())
-    tells = off > room
+    """The deflection of u (n,) nearest to the present one with off > room, None if there is none; and the
+    numbers that decide it. off (n,), rad: the difference at each of u, in words `what`. room, rad, infinite
+    if no direction shows the fault."""
+    largest_deg = degrees(off.max())
+    is_enough = off > room
     numbers: Document = {"at_least_deg": degrees(room) if room < inf else None}
-    numbers |= {"at_most_deg": most, "now_deg": degrees(at.u[s])}
-    if not tells.any():
-        asked = f"more than {degrees(room):.3g} deg" if room < inf else "another direction"
-        says = f"they must be {what} by {asked}, and are by {most:.3g} deg at most within the travel"
+    numbers |= {"at_most_deg": largest_deg, "now_deg": degrees(at.u[s])}
+    if not is_enough.any():
+        needed = f"more than {degrees(room):.3g} deg" if room < inf else "another direction"
+        says = f"they must be {what} by {needed}, and are by {largest_deg:.3g} deg at most within the travel"
         return None, numbers | {"because": says}
-    target = float(u[tells][np.argmin(np.abs(u[tells] - at.u[s]))])
+    target = float(u[is_enough][np.argmin(np.abs(u[is_enough] - at.u[s]))])
     return target, numbers | {"target_deg": degrees(target)}

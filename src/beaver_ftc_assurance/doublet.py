@@ -1,8 +1,8 @@
 """The doublet of least amplitude that brings surfaces to given deflections and back, within every limit.
 
-Over a short horizon the rates follow dx/dt = G u. Travel, actuators, rates and angle of attack are then
-linear in the commands, and a linear programme finds the least amplitude. The horizon is the shortest of a few
-that has a solution.
+Over a short time the rates follow dx/dt = G m, with the deflections m less the present ones. Deflections,
+rates and angle of attack are then linear in the commands, and a linear programme finds the least amplitude.
+The time to the target is the shortest of a few for which there is a solution.
 """
 
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-LONGEST_S = 0.5  # until the frame in which the surfaces are there
+LONGEST_S = 0.5  # longest time until the surfaces have their target deflections
 
 
 @dataclass(frozen=True)
@@ -55,9 +55,13 @@ class Situation:
         return 1 if self.instants == 1 else 3
 
     def remaining_way(self, s: int) -> tuple[float, float]:
-        """Shares of the way to its command that surface s has not gone, if its rate limit does not act: at
-        the end of a frame, and on average over the frame. In the first of several instants the surface is
-        where it was."""
+        """Shares of the way to its command that surface s has still to go, if its rate limit does not act: at
+        the end of a frame, and on average over its instants j:
+
+            (1 - approach)^instants,    mean over j = 0 .. instants - 1 of (1 - approach)^j
+
+        With one instant, both are 1 - approach.
+        """
         stays = 1.0 - self.approach[s]
         if self.instants == 1:
             return stays, stays
@@ -68,11 +72,11 @@ def doublet(targets: dict[int, float], at: Situation) -> tuple[np.ndarray, int] 
     """Commands (frames, n), rad, that bring surfaces to these deflections and back, and the number of frames
     to the last one in which they hold, counted from 1; None if no doublet does within the limits.
 
-    targets: deflection, rad, by place of the surface.
+    targets: number of the surface -> deflection, rad.
 
-    The times to the deflection are 1, 4, 16, ... frames, and LONGEST_S. The first time that has a doublet is
-    taken, with the least amplitude. If a shorter time has a doublet, a longer one has it too, as the commands
-    may begin later.
+    The times to the target that are tried are 1, 4, 16, ... frames, and LONGEST_S. The first one with a
+    doublet is taken. It needs no finer search: if there is a doublet for a time, there is one for each longer
+    time, because the commands may begin later.
     """
     frames_to_target = 1
     longest = max(int(LONGEST_S / at.dt), 1)
@@ -84,17 +88,17 @@ def doublet(targets: dict[int, float], at: Situation) -> tuple[np.ndarray, int] 
 
 
 def _least_amplitude(targets: dict[int, float], at: Situation, frames_to_target: int) -> np.ndarray | None:
-    """Commands (frames, n), rad, of the doublet at its target from this frame on, counted from 1; None
-    if there is none.
+    """Commands (frames, n), rad, of the doublet of least amplitude that has its target from frame
+    frames_to_target on, counted from 1; None if there is none.
 
-    The linear programme. Its unknowns are blocks, one value a frame k, each less the present value: of each
-    surface the command u; of each its deflection p at the end of the frame; the rates x = p, q, r; the pitch
-    angle. After them the amplitude A, which is least. In the code, each letter is the matrix that takes it
-    from the unknowns. With the shares a, b of `Situation.remaining_way`, and the mean deflection m over a
-    frame:
+    The unknowns of the linear programme are blocks of one value for each frame k, less the present value: for
+    each surface the command u; for each surface the deflection p at the end of the frame; the body rates x
+    (3,); the pitch angle. The last unknown is the amplitude A, which is minimised. In the code, each letter
+    is the matrix that selects its block from the unknowns. With the shares a, b of `Situation.remaining_way`,
+    and the mean deflection m over a frame:
 
         p[k] = a p[k-1] + (1 - a) u[k]            m[k] = b p[k-1] + (1 - b) u[k]
-        x[k] = x[k-1] + dt G m[k]                 pitch[k] = pitch[k-1] + dt q[k]
+        x[k] = x[k-1] + dt G m[k]                 pitch[k] = pitch[k-1] + dt x_2[k]
         |m[k] - m[k-1]| <= instants step          |u[k]| <= A
         |m[k]| >= |target|, u[k] constant         in the frames in which the deflection must hold
         x = 0                                     in the last frame
@@ -111,11 +115,12 @@ def _least_amplitude(targets: dict[int, float], at: Situation, frames_to_target:
     unknowns = (2 * n + 4) * frames + 1
     blocks = [eye_array(frames, unknowns, k=block * frames, format="csr") for block in range(2 * n + 4)]
     A = csr_array((np.ones(frames), (every, np.full(frames, unknowns - 1))), shape=(frames, unknowns))
-    before = eye_array(frames, k=-1, format="csr")  # times a block: its values a frame earlier, 0 at first
+    # before @ block: the block one frame earlier, 0 in the first
+    before = eye_array(frames, k=-1, format="csr")
     *x, pitch = blocks[2 * n :]
     dx = [rate - before @ rate for rate in x]  # x[k] - x[k-1], less dt G m[k], surface by surface
-    equal: list[Any] = []  # rows that are zero
-    above: list[tuple[Any, float]] = []  # rows, and their limits
+    equal: list[Any] = []  # rows of equations: row @ unknowns = 0
+    above: list[tuple[Any, float]] = []  # rows of inequalities with their limits: row @ unknowns <= limit
     for u, p, s in zip(blocks[:n], blocks[n:], surfaces, strict=False):
         away = targets[s] - at.u[s]
         (a, b) = at.remaining_way(s)
@@ -130,7 +135,7 @@ def _least_amplitude(targets: dict[int, float], at: Situation, frames_to_target:
             if np.isfinite(at.step[s]):
                 above.append((sign * (m - before @ m), at.step[s] * at.instants))  # |m[k] - m[k-1]|
         dx = [row - at.dt * g * m for row, g in zip(dx, at.G[:, s], strict=True)]
-    equal += [*dx, pitch - before @ pitch - at.dt * x[1]]  # pitch[k] = pitch[k-1] + dt q[k]
+    equal += [*dx, pitch - before @ pitch - at.dt * x[1]]  # pitch[k] = pitch[k-1] + dt x_2[k]
     limits = np.repeat([limit for _, limit in above], [rows.shape[0] for rows, _ in above])
     rows = vstack([rows for rows, _ in above], format="csc")
     solution = _solved(rows, limits, vstack(equal, format="csc"), _limits(at, surfaces, frames))
@@ -142,9 +147,14 @@ def _least_amplitude(targets: dict[int, float], at: Situation, frames_to_target:
 
 
 def _limits(at: Situation, surfaces: list[int], frames: int) -> np.ndarray:
-    """Least and greatest value of each unknown, (unknowns, 2): a command within the travel, a deflection
-    anywhere, a rate within at.rate, and 0 in the last frame, the pitch angle such that the angle of attack
-    stays in its range, A at least 0."""
+    """Least and greatest value of each unknown, (unknowns, 2), all but A less the present value:
+
+    command         within the travel
+    deflection      free
+    body rate       within +-at.rate; in the last frame as at present
+    pitch angle     so that the angle of attack stays in its range
+    A               at least 0
+    """
     n = len(surfaces)
     stops = [at.stops[:, s] - at.u[s] for s in surfaces]
     rates = [(-at.rate - x, at.rate - x) for x in at.x]
@@ -155,13 +165,13 @@ def _limits(at: Situation, surfaces: list[int], frames: int) -> np.ndarray:
 
 
 def _solved(above: Any, limits: np.ndarray, equal: Any, bounds: np.ndarray) -> np.ndarray | None:
-    """The unknowns with the least amplitude, of which rows `above` give at most `limits`, and `equal` zero;
-    None where there are none within the limits.
+    """The unknowns y within `bounds` with the least amplitude, the last of them, so that above @ y <= limits
+    and equal @ y = 0; None if there are none.
     """
     from scipy.optimize import linprog
 
     weight = np.r_[np.zeros(len(bounds) - 1), 1.0]
-    for method in ("highs-ds", "highs-ipm"):  # the second where rounding stops the first
+    for method in ("highs-ds", "highs-ipm"):  # the second method is used if rounding stops the first
         result = linprog(weight, above, limits, equal, np.zeros(equal.shape[0]), bounds, method=method)
         if result.status in (0, 2):  # solved, or infeasible
             break

@@ -1,4 +1,8 @@
-"""The study `separate`: doublets that distinguish the candidates left for certain, or why there are none."""
+"""The study `separate`: doublets that are certain to distinguish the remaining candidates, or why there are
+none.
+
+A *pair* is an entry of the document: two candidates with the doublet, or with the reason why there is none.
+"""
 
 import json
 from collections.abc import Iterator, Sequence
@@ -35,14 +39,15 @@ from beaver_ftc_assurance.certificates.tape import Recorder, Tape, tape_of_fligh
 
 FILE = "separation.json"
 FLOWN = "flown"
-LARGEST_RATE_DEG_S = 20.0  # that a doublet may reach
-HELD_DEG = 1e-9  # by less no surface is moved
+LARGEST_RATE_DEG_S = 20.0  # largest body rate during a doublet
+HELD_DEG = 1e-9  # a doublet of a smaller amplitude moves no surface
 
 
 def separate(scenario: Scenario, rate_deg_s: float = LARGEST_RATE_DEG_S) -> Document:
-    """Fly a scenario, and propose a doublet for each two of the candidates that are left at its end.
+    """Fly a scenario, and propose a doublet for each two of the candidates that remain at its end.
 
-    rate_deg_s: largest allowed body rate, deg/s. Raises BadInput if fewer than two candidates are left.
+    rate_deg_s: largest allowed body rate, deg/s. Raises BadInput if no alarm was raised, if fewer than two
+    candidates remain, or if the scenario does not determine where a doublet brings the surfaces.
     """
     check_scheme(scenario)
     if scenario.fdi.pairs:
@@ -63,7 +68,9 @@ def separate(scenario: Scenario, rate_deg_s: float = LARGEST_RATE_DEG_S) -> Docu
         raise BadInput(f"{scenario.name}: one candidate or none is left, allowed with separate: two at least")
     pairs = []
     for both in combinations(left, 2):
-        pair = {"candidates": [_words(each, names) for each in both]} | tell_apart(*both, situation, names)
+        pair = {"candidates": [_words(candidate, names) for candidate in both]} | tell_apart(
+            *both, situation, names
+        )
         if scenario.fdi.probing is not None and pair["separates"]:
             pair |= _flown(scenario, pair, both)
         pairs.append(pair)
@@ -84,22 +91,22 @@ def _frames(scenario: Scenario) -> int:
 
 
 def _flown(scenario: Scenario, pair: Document, candidates: Sequence[Candidate]) -> Document:
-    """Which of two candidates are left after the flight with the doublet, and how often the doublet led out
-    of the envelope."""
+    """The candidates of a pair that remain after the flight with the doublet, and how often the aircraft left
+    its envelope during the doublet."""
     with _longer(scenario, pair) as flight:
-        before = 0
+        exits_before = 0
         for k in _with_doublet(flight, scenario, pair):
             if k == _frames(scenario) - 1:
-                before = flight.readout.envelope_exits
-        still = {*faults_left(flight.readout.diagnosis)}
+                exits_before = flight.readout.envelope_exits
+        remaining = {*faults_left(flight.readout.diagnosis)}
         both = zip(candidates, pair["candidates"], strict=True)
-        left = [words for one, words in both if (one.surface, one.kind) in still]
-        return {"left": left, "envelope_exits": flight.readout.envelope_exits - before}
+        left = [words for candidate, words in both if (candidate.surface, candidate.kind) in remaining]
+        return {"left": left, "envelope_exits": flight.readout.envelope_exits - exits_before}
 
 
 @contextmanager
 def _longer(scenario: Scenario, pair: Document) -> Iterator[Stepping]:
-    """The flight, with time for the doublet."""
+    """The flight of a scenario, longer by the duration of the doublet and ten frames."""
     spare_s = pair["duration_s"] + 10.0 / scenario.rate_hz
     flight = Stepping(scenario.model_copy(update={"duration_s": scenario.duration_s + spare_s}))
     try:
@@ -109,7 +116,9 @@ def _longer(scenario: Scenario, pair: Document) -> Iterator[Stepping]:
 
 
 def _with_doublet(flight: Stepping, scenario: Scenario, pair: Document) -> Iterator[int]:
-    """Fly to the end of the scenario, then the doublet; yields the number of each frame after it is flown."""
+    """Fly to the end of the scenario, and then the doublet. Yields the number of each frame after it is
+    flown. rest: commands at the end of the scenario, of the surfaces that the doublet does not move (any
+    more)."""
     frames = _frames(scenario)
     names = list(scenario.airframe.surfaces)
     yield 0
@@ -127,14 +136,14 @@ def _with_doublet(flight: Stepping, scenario: Scenario, pair: Document) -> Itera
 
 
 def certified(scenario: Scenario, pair: Document) -> Certified:
-    """The certificate of the flight with its doublet."""
+    """The certificate of the flight with the doublet of a pair."""
     with _longer(scenario, pair) as flight:
         return proved.proved(scenario, flight.records, _with_doublet(flight, scenario, pair))
 
 
 def write(document: Document, scenario: Scenario, out: Path) -> Path:
-    """Write the result folder, and return its path: separation.json, and log and certificate of the flight
-    with each doublet that was flown, in flown/N/ for the pair N of the document."""
+    """Write the result folder, and return its path. It has separation.json and, for each pair N whose doublet
+    was flown, log and certificate of this flight in flown/N/."""
     name = f"{document['scenario'][:88]}-separation"
     with result_folder(out, name) as folder:
         for place, pair in enumerate(document["pairs"]):
@@ -146,7 +155,7 @@ def write(document: Document, scenario: Scenario, out: Path) -> Path:
 
 
 def _seen(scenario: Scenario, log: MemoryLog, recorder: Recorder) -> tuple[Tape, History]:
-    """Tape and history of a flight since its alarm."""
+    """Tape and history of a flight from its alarm to its end. Raises BadInput if it ends with the alarm."""
     rows = logged_columns(log)
     detected = rows["detected"]
     alarm = row_set_to_end(detected)
@@ -157,49 +166,57 @@ def _seen(scenario: Scenario, log: MemoryLog, recorder: Recorder) -> tuple[Tape,
 
 
 def open_courses(tape: Tape, names: Sequence[str]) -> list[str]:
-    """The faults left without a constant parameter: only a comparison of many frames distinguishes them."""
+    """Words for the remaining faults without a constant parameter: only a comparison of many frames
+    distinguishes them."""
     left = faults_left(tape.last.diagnosis)
     return sorted(f"{names[s]} {NAMES[kind]}" for s, kind in left if kind not in RELATIONS)
 
 
 def doublets(scenario: Scenario, after_s: float, loss: float) -> dict[tuple[str, str], Document]:
-    """For each two surfaces of the class of losses: the doublet that distinguishes a loss of the share `loss`
-    on one from that on the other, `after_s` after the start of a healthy flight, or why there is none."""
+    """For each two surfaces of the fault class `losses`, in either order: amplitude and time of the doublet
+    that distinguishes the loss of the share `loss` on one from that on the other, `after_s` after the start
+    of a healthy flight, or the reason why there is none."""
     healthy = scenario.model_copy(update={"faults": (), "duration_s": after_s})
     frames = _frames(healthy)
     at = situation_of(
         tape_of_flight_again(healthy, [frames - 1], frames), healthy, radians(LARGEST_RATE_DEG_S)
     )
     names = scenario.airframe.surfaces
-    found = {}
+    doublets_of_pairs = {}
     for pair in combinations(scenario.airframe.class_of_losses, 2):
         one, other = (Candidate(names.index(name), LOSS, -loss, -loss) for name in pair)
-        apart = tell_apart(one, other, at, names)
-        asked = apart.get("amplitude_deg"), apart.get("time_s"), apart.get("because", "")
-        found[pair] = found[pair[::-1]] = dict(zip(DOUBLET_COLUMNS, asked, strict=True))
-    return found
+        result = tell_apart(one, other, at, names)
+        numbers = result.get("amplitude_deg"), result.get("time_s"), result.get("because", "")
+        doublets_of_pairs[pair] = doublets_of_pairs[pair[::-1]] = dict(
+            zip(DOUBLET_COLUMNS, numbers, strict=True)
+        )
+    return doublets_of_pairs
 
 
-def _words(one: Candidate, names: Sequence[str]) -> Document:
-    """A candidate as in the document: angles in deg, a loss as theta."""
-    is_share = RELATIONS[one.kind].theta_is_share
+def _words(candidate: Candidate, names: Sequence[str]) -> Document:
+    """A candidate for the document. The interval of its parameter is in deg, that of a loss as theta."""
+    is_share = RELATIONS[candidate.kind].theta_is_share
     scale, unit = (1.0, "theta") if is_share else (degrees(1.0), "deg")
-    return {"surface": names[one.surface], "type": NAMES[one.kind], unit: [scale * one.low, scale * one.high]}
+    return {
+        "surface": names[candidate.surface],
+        "type": NAMES[candidate.kind],
+        unit: [scale * candidate.low, scale * candidate.high],
+    }
 
 
 def as_text(document: Document) -> str:
-    """The text for a terminal: a line for each two candidates."""
+    """The text for a terminal, with a line for each pair."""
     lines = [f"{document['scenario']}, {document['time_s']:g} s: if {document['assumes']}"]
     for pair in document["pairs"]:
-        one, other = (f"{each['surface']} {each['type']}" for each in pair["candidates"])
+        one, other = (f"{words['surface']} {words['type']}" for words in pair["candidates"])
         if pair["separates"]:
-            by = " and ".join(pair["commands_rad"])
-            much = pair["amplitude_deg"]
-            moves = f"by {much:.3g} deg" if much > HELD_DEG else "held as now"
-            says = f"{by} {moves}, told after {pair['time_s']:.3g} s"
+            surfaces = " and ".join(pair["commands_rad"])
+            amplitude_deg = pair["amplitude_deg"]
+            moves = f"by {amplitude_deg:.3g} deg" if amplitude_deg > HELD_DEG else "held as now"
+            says = f"{surfaces} {moves}, told after {pair['time_s']:.3g} s"
             if "left" in pair:
-                words = " and ".join(f"{each['surface']} {each['type']}" for each in pair["left"])
-                says += f"; flown, left: {words or 'neither'}"
+                remaining = " and ".join(f"{words['surface']} {words['type']}" for words in pair["left"])
+                says += f"; flown, left: {remaining or 'neither'}"
         else:
             says = f"none: {pair['because']}"
         lines.append(f"  {one} or {other}: {says}")

@@ -6,10 +6,10 @@
 Exit status 0 if every statement holds, 1 if not. `beaver-ftc check RUN` runs this same file. It imports
 NumPy, the reader of the log's file, the reader of the scenario's file (PyYAML) and the standard library.
 
-The flight's log and its scenario are taken as true. Numbers of the certificate that are in neither are only
-tested as Table 2 of docs/explanation/certificates.md says. A statement is accepted if the log's own column
-shows the event in the row that the statement names, and if the inequality, computed again from the log and
-from the bounds that the scenario declares, is violated as stated.
+The flight's log and its scenario are taken as true. Numbers of the certificate that are in neither of them
+are tested as far as Table 2 of docs/explanation/certificates.md describes. A statement is accepted if the
+log's own column shows the event in the row that the statement names, and if the inequality, computed again
+from the log and from the bounds that the scenario declares, is violated as stated.
 """
 
 import sys
@@ -26,18 +26,18 @@ import yaml
 from pyarrow.parquet import read_table
 
 AXES = "pqr"
-FORMAT_VERSION = 5  # of the certificate
-NOISE_LIMIT_SIGMA = 4.0  # noise of a sensor is cut off here
+FORMAT_VERSION = 5  # version of the form of a certificate
+NOISE_LIMIT_SIGMA = 4.0  # the noise of a sensor is limited to this, in standard deviations
 EARTH_RATE_RAD_S = 2.0 * pi / 86164.0905
 ROUNDING_RAD_S2 = 1e-11  # the part of every bound that covers rounding
 MIN_EFFECT_RAD_S2 = 1e-12  # a smaller effect of a fault is rounding
-MAX_RELATIVE_DIFFERENCE = 1e-12  # of a stated side from the recomputed one: order of summation
-MAX_RELATIVE_DIFFERENCE_OF_EFFECT = 1e-9  # of what is stated from what the log has
-MAX_RELATIVE_DIFFERENCE_OF_SHARE = 1e-5  # of the log's share of a level from the recomputed one
-MIN_RELATIVE_EXCESS = 1e-10  # of a sum of frames over its limit, as a share of the larger
-DEFAULT_RATE_RAD_S = pi / 3  # of an actuator with no rate limit: beaver_ftc/diagnosis/model_prediction.py
-RINGING_FACTOR = 1.2  # of an estimated drift, as beaver_ftc/diagnosis/detection/likelihood.py explains
-NO_PACE = 1e9  # of a bounded drift that may change at any rate
+MAX_RELATIVE_DIFFERENCE = 1e-12  # between a stated and the recomputed side, by the order of summation
+MAX_RELATIVE_DIFFERENCE_OF_EFFECT = 1e-9  # between a stated effect and that in the log
+MAX_RELATIVE_DIFFERENCE_OF_SHARE = 1e-5  # between the log's share of a level and the recomputed one
+MIN_RELATIVE_EXCESS = 1e-10  # least excess of a sum of frames over its limit, as a share of the larger
+DEFAULT_RATE_RAD_S = pi / 3  # rate of an actuator without limit: beaver_ftc/diagnosis/model_prediction.py
+RINGING_FACTOR = 1.2  # factor on an estimated drift: beaver_ftc/diagnosis/detection/likelihood.py explains it
+NO_PACE = 1e9  # pace of a bounded drift that may change at any rate
 TESTS = (
     "turning p", "turning q", "turning r", "phi", "theta", "psi", "V", "alpha", "beta", "density", "altitude",
     "engine_rpm", "manifold_pressure",
@@ -55,14 +55,16 @@ class Relation(NamedTuple):
     theta_high: float
 
 
-# Relation of a type, from the travel low, high (rad). The log's columns define types that are in no table.
+# Type -> function from the travel low, high (rad) to its relation. Columns of the log define types in no
+# table.
 RELATIONS = {
     "stuck": lambda low, high: Relation(0.0, False, True, low, high),
     "float": lambda low, high: Relation(0.0, False, True, *2 * (min(max(0.0, low), high),)),
     "loss_of_effectiveness": lambda low, high: Relation(1.0, True, True, -1.0, 0.0),
     "loss_of_effectiveness that varies": lambda low, high: Relation(1.0, True, False, -1.0, 0.0),
 }
-# Types that many frames exclude: the comparison (section 7 below), and the stop that the surface runs to.
+# Type that many frames exclude -> comparison (section 7 below), and stop to which the surface runs, 0 for
+# none.
 COURSES = {
     "bias": ("offset", 0), "bias that grows": ("growing_offset", 0), "hardover up": ("runaway", 1),
     "hardover down": ("runaway", -1), "oscillatory": ("swing", 0), "rate_limit": ("approach", 0),
@@ -177,7 +179,7 @@ is_gappy = is_list_of(is_null_or(is_number))
 is_bounds = is_list_of(is_non_negative)
 is_block = is_list_of(is_row, 3)
 is_parts = is_list_of(is_mapping)
-# Of each object the fields that it needs, and those that it may have; an event has those of its evidence too.
+# Object -> fields that it needs, and fields that it may have. An event also has the fields of its evidence.
 FORMS = {
     "certificate": (
         {"format": is_row, "scenario": is_text, "scenario_sha256": is_text, "rows": is_row,
@@ -203,7 +205,7 @@ FORMS = {
          "air": is_values, "foreseen": is_values},
     ),
 }  # fmt: skip
-# By the field that says which kind of evidence a statement has.
+# Field that shows the kind of evidence of a statement -> fields that this needs, and fields that it may have.
 EVIDENCE = {
     "terms": (
         {"theta": is_one_of("any", "constant", "constant while it shows"), "terms": is_parts,
@@ -239,31 +241,31 @@ def check_form(document, needed, allowed, where):
         require(fields[name](value), f"{where}: {name} is not allowed, allowed: {fields[name].__doc__}")
 
 
-def evidence_kind(said):
-    """Which kind of evidence a statement has."""
-    found = [name for name in EVIDENCE if name in said]
-    require(len(found) == 1, "the statement has no evidence, or more than one kind of it")
-    return found[0]
+def evidence_kind(statement):
+    """The kind of evidence of a statement, a key of EVIDENCE."""
+    kinds = [name for name in EVIDENCE if name in statement]
+    require(len(kinds) == 1, "the statement has no evidence, or more than one kind of it")
+    return kinds[0]
 
 
-def check_statement_form(said):
+def check_statement_form(statement):
     """Refuse a statement with wrong fields or lists of wrong lengths. Returns its `evidence_kind`."""
-    kind = evidence_kind(said)
+    kind = evidence_kind(statement)
     needed, allowed = EVIDENCE[kind]
-    check_form(said, FORMS["event"][0] | needed, allowed, "statement")
-    for term in said.get("terms", []):
+    check_form(statement, FORMS["event"][0] | needed, allowed, "statement")
+    for term in statement.get("terms", []):
         check_form(term, *FORMS["term"], "term")
         check_lengths(term, ("x", "F", "eta_bar", "rest", "h", "Z", "r"))
         require(("pole_per_s" in term) == ("since" in term), "a pole needs the frame since which it filters")
         require("fault" not in term or "pole_per_s" in term, "a frame by itself has no past")
-    for bound in said.get("bounds", []):
+    for bound in statement.get("bounds", []):
         check_form(bound, *FORMS["bound"], "bound")
         check_lengths(bound, ("h", "Z", "r"))
         require(all(bound["Z"]), "the surface does not act along this direction")
     if kind in ("terms", "bounds", "looks"):
-        require(len(said[kind]) > 0, "the evidence is empty")
+        require(len(statement[kind]) > 0, "the evidence is empty")
     if kind == "likelihood":
-        check_likelihood_form(said)
+        check_likelihood_form(statement)
     return kind
 
 
@@ -276,27 +278,27 @@ def check_lengths(span, names):
             require(len(span[name]) == span["frame"] + 1 - span["first"], f"{name}: frames are missing")
 
 
-def check_likelihood_form(said):
+def check_likelihood_form(statement):
     """Refuse lists of wrong sizes in a statistical alarm with n axes and m constants."""
-    n = len(said["axes"])
-    m = len(said["tolerance"])
-    require(n in (1, 2) and len(set(said["axes"])) == n, "axes: one or two different ones are allowed")
-    require(len(said["R"]) == n, "R: one variance for each axis")
-    require([len(line) for line in said["P"]] == [2 * n] * (2 * n), "P: two states for each axis")
-    require([len(line) for line in said["Y"]] == [2 + m] * (2 * n), "Y: two states for each axis")
-    P = np.array([[value or 0.0 for value in line] for line in said["P"]])
+    n = len(statement["axes"])
+    m = len(statement["tolerance"])
+    require(n in (1, 2) and len(set(statement["axes"])) == n, "axes: one or two different ones are allowed")
+    require(len(statement["R"]) == n, "R: one variance for each axis")
+    require([len(line) for line in statement["P"]] == [2 * n] * (2 * n), "P: two states for each axis")
+    require([len(line) for line in statement["Y"]] == [2 + m] * (2 * n), "Y: two states for each axis")
+    P = np.array([[value or 0.0 for value in line] for line in statement["P"]])
     require(np.array_equal(P, P.T) and (P.diagonal() >= 0).all(), "P is no covariance")
-    require(said["first"] >= 1 and said["frames"], "frames are missing")
-    for its in said["frames"]:
-        check_form(its, *FORMS["frame"], "frame")
+    require(statement["first"] >= 1 and statement["frames"], "frames are missing")
+    for fields in statement["frames"]:
+        check_form(fields, *FORMS["frame"], "frame")
         for name in ("signature", "jitter", "bounded", "air", "foreseen"):
-            require(len(its.get(name, [0] * n)) == n, f"{name}: one value for each axis")
-        drift = np.array(its["drift"])
-        known = its.get("known", [])
+            require(len(fields.get(name, [0] * n)) == n, f"{name}: one value for each axis")
+        drift = np.array(fields["drift"])
+        known = fields.get("known", [])
         require(drift.shape == (n, n) and np.allclose(drift, drift.T), "drift is no covariance")
         require((np.linalg.eigvalsh(drift) >= -1e-9 * np.abs(drift).max()).all(), "drift is no covariance")
         require(len(known) == m and all(len(line) == n for line in known), "known: a value for each constant")
-        require(set(its) == set(said["frames"][0]), "the frames have different fields")
+        require(set(fields) == set(statement["frames"][0]), "the frames have different fields")
 
 
 # --- 2. What the scenario declares -----------------------------------------------------------------------
@@ -304,9 +306,12 @@ def check_likelihood_form(said):
 
 @dataclass
 class Declared:
-    """What a scenario declares at some row: length of a frame, s; JSBSim steps in a frame; by axis the errors
-    of a gyro (offset rad/s, constant part of it rad/s, slope), the constant bound rad/s2, and the share of
-    inertia coupling; the row with which the diagnosis started last; the scenario."""
+    """The declarations of a scenario that are in force at some row.
+
+    dt: length of a frame, s. instants: JSBSim steps in a frame. By axis: gyro_errors (offset rad/s, constant
+    part of it rad/s, slope), constant_bounds rad/s2, inertia_shares: share of inertia coupling. start_row:
+    row with which the diagnosis started last. scenario: all keys.
+    """
 
     dt: float
     instants: int
@@ -318,7 +323,7 @@ class Declared:
 
 
 def declared_at_row(scenario, row_number):
-    """What a resolved scenario declares, as it is in force at a row."""
+    """The declarations of a resolved scenario that are in force at a row."""
     require(
         isinstance(scenario, dict) and isinstance(scenario.get("fdi"), dict), "the scenario is no scenario"
     )
@@ -327,11 +332,11 @@ def declared_at_row(scenario, row_number):
     sensors = fdi["bounds"]["sensors"]
     start_row = 0
     for change in scenario.get("changes") or []:
-        begins = int(np.ceil((change["at_s"] - 1e-9) * rate))
-        if begins <= row_number:
+        first_row = int(np.ceil((change["at_s"] - 1e-9) * rate))
+        if first_row <= row_number:
             sensors = change.get("declared_sensors") or sensors
             restarted = any(change.get(name) is not None for name in ("scheme", "declared_sensors"))
-            start_row = begins if restarted else start_row
+            start_row = first_row if restarted else start_row
     gyro_errors = {}
     for axis in AXES:
         gyro = sensors[axis]
@@ -453,9 +458,9 @@ class Frames:
 
 
 def errors_by_row(measured, document):
-    """By row (rows, 3) the bound n on the changing error of the gyros, rad/s, and the stated part of the
-    bound on the model's error, rad/s2, from the measured rates x. y, z: the two other axes. The fields of the
-    certificate explain the other letters (docs/explanation/certificates.md, "The fields").
+    """For each row the bound n on the changing error of the gyros, rad/s, and the stated part of the bound on
+    the model's error, rad/s2, (rows, 3) each, from the measured rates x. y, z: the two other axes. The other
+    letters are fields of the certificate (docs/explanation/certificates.md, "The fields").
 
     w = |x| + (o + m |x|) / (1 - m), as large as the true rates can be;    n = o - B + m w
     bound = c w_y w_z + b + omega_E ((1 + g) (w_p + w_q + w_r) + g omega_E) + rounding
@@ -474,19 +479,19 @@ def errors_by_row(measured, document):
 
 
 def event_column(what, log):
-    """The log's column of an exclusion; that of the alarm if `what` is None."""
+    """The column of the log for an exclusion; for the alarm if `what` is None."""
     if what is None:
         return "detected"
     estimator = f"fie_{what}_excluded"
     return estimator if estimator in log else f"{what.replace(' ', '_')}_excluded"
 
 
-def check_event(said, log):
+def check_event(statement, log):
     """Refuse an event whose column is not set from the stated row to the end, or was set in the row
     before."""
-    name = said["column"]
-    k = said["frame"]
-    require(name == event_column(said["what"], log), f"{name} is another column than that of this event")
+    name = statement["column"]
+    k = statement["frame"]
+    require(name == event_column(statement["what"], log), f"{name} is another column than that of this event")
     require(name in log, f"the log has no column {name}: it was not written with this certificate")
     values = np.asarray(log[name], float)
     require(k < len(values), f"the log has no row {k}")
@@ -523,7 +528,8 @@ class Effect:
 
 
 def effect_of_fault(what, frames):
-    """The effect of the excluded fault, from the log's columns; for an alarm, which is no fault's, zero."""
+    """The effect of the excluded fault, from columns of the log; zero for an alarm, which concerns no single
+    fault."""
     if what is None:
         zero = np.zeros_like(frames.rates_rad_s)
         return Effect(zero, zero, zero, 0.0, 0.0)
@@ -554,16 +560,16 @@ def course_of(what, log):
     kind = what.partition(" ")[2]
     if kind in RELATIONS or kind in COURSES:
         return COURSES.get(kind)
-    begins = f"{what.replace(' ', '_')}_course_"
-    found = [
-        (name.removeprefix(begins), constant_value(log[name])) for name in log if name.startswith(begins)
+    prefix = f"{what.replace(' ', '_')}_course_"
+    courses = [
+        (name.removeprefix(prefix), constant_value(log[name])) for name in log if name.startswith(prefix)
     ]
-    return found[0] if found else None
+    return courses[0] if courses else None
 
 
 def relation_of(what, log, low, high):
-    """How a type moves the surface (RELATIONS); low, high: the travel, rad. For a type with a course, theta
-    is the position of the surface; for a swing, its distance from the command."""
+    """The relation of a type. low, high: the travel, rad. For a type with a course, theta is the position of
+    the surface; for a swing, theta is the distance of the surface from the command."""
     kind = what.partition(" ")[2]
     course = course_of(what, log)
     if course is not None:
@@ -576,49 +582,51 @@ def relation_of(what, log, low, high):
 
 
 def constant_value(values):
-    """The value of a column that is constant, or not a number, in each row."""
+    """The value of a column that is constant in all rows in which it is a number."""
     values = np.asarray(values, float)
-    found = np.unique(values[np.isfinite(values)])
-    require(len(found) == 1, "a column that must be constant is not")
-    return float(found[0])
+    numbers = np.unique(values[np.isfinite(values)])
+    require(len(numbers) == 1, "a column that must be constant is not")
+    return float(numbers[0])
 
 
 # --- 6. The sum over filters (docs/explanation/certificates.md, "The inequality") ---------------------
 
 
-def term_pairs(said, frames):
-    """The sum of `weight` times d.E, and the most that bounds, noise and fault allow."""
-    what = said["what"]
-    effect = effect_of_fault(said["what"], frames)
+def term_pairs(statement, frames):
+    """The sum of `weight` times d.E, and its largest value by bounds, noise and fault."""
+    what = statement["what"]
+    effect = effect_of_fault(what, frames)
     has_course = what is not None and " " in what and course_of(what, frames.log) is not None
     require(not has_course, "a sum of frames says nothing of this type")
-    check_theta(said, effect, frames)
-    sums = [term["weight"] * evaluate_term(term, said, frames, effect) for term in said["terms"]]
+    check_theta(statement, effect, frames)
+    sums = [term["weight"] * evaluate_term(term, statement, frames, effect) for term in statement["terms"]]
     value, limit, slope = np.sum(sums, axis=0)
-    if said["theta"] != "any" and abs(slope) > MIN_EFFECT_RAD_S2:
+    if statement["theta"] != "any" and abs(slope) > MIN_EFFECT_RAD_S2:
         limit += max(effect.theta_low * slope, effect.theta_high * slope)
     return [(value, limit)]
 
 
-def check_theta(said, effect, frames):
+def check_theta(statement, effect, frames):
     """Refuse ends of theta's range that are not the log's, and a constant theta that nothing justifies."""
     for end, known in (("least", effect.theta_low), ("most", effect.theta_high)):
-        require(said.get(end, known) == known, f"{end} is not the end of theta's range in the log")
+        require(statement.get(end, known) == known, f"{end} is not the end of theta's range in the log")
     fdi = frames.declared.scenario["fdi"]
     alarm = int(np.argmax(np.asarray(frames.log["detected"]) == 1))
-    if said["theta"] == "constant":
+    if statement["theta"] == "constant":
         declares = fdi["fault_profile"] == "abrupt" or fdi["thresholds"] == "published"
-        require(said["what"] and declares, "the scenario does not declare a constant parameter")
-        since = [term.get("since", term["frame"]) for term in said["terms"]]
-        require("block" not in said and min(since) >= alarm, "a frame before the alarm may be healthy")
-    if said["theta"] == "constant while it shows":
-        require(said["what"] and " " in said["what"], "only a fault type is at fault where health fails")
+        require(statement["what"] and declares, "the scenario does not declare a constant parameter")
+        since = [term.get("since", term["frame"]) for term in statement["terms"]]
+        require("block" not in statement and min(since) >= alarm, "a frame before the alarm may be healthy")
+    if statement["theta"] == "constant while it shows":
+        require(
+            statement["what"] and " " in statement["what"], "only a fault type is at fault where health fails"
+        )
         require(effect.theta_is_constant, "theta of this type is not one number")
-    if said["what"] is None:
-        require("block" not in said, "an alarm is raised by frames, not by blocks")
+    if statement["what"] is None:
+        require("block" not in statement, "an alarm is raised by frames, not by blocks")
 
 
-def check_term_frames(term, said, frames):
+def check_term_frames(term, statement, frames):
     """Refuse frames `since`, `first` and k of a term that are out of order, later than the event, or before
     the diagnosis started. A term without a pole has one frame, since = k - 1. Returns `since`."""
     k = term["frame"]
@@ -626,13 +634,15 @@ def check_term_frames(term, said, frames):
     since = term.get("since", k - 1)
     begun = frames.declared.start_row if frames.length == 1 else 0
     require(begun <= since < first <= k < len(frames.rates_rad_s), "the frames of a term are not in order")
-    require(frames.row_of(k) <= said["frame"], "a frame after the event cannot have caused it")
+    require(frames.row_of(k) <= statement["frame"], "a frame after the event cannot have caused it")
     require("pole_per_s" in term or first == k, "without a pole a term has one frame")
-    require(said["theta"] != "constant while it shows" or frames.is_unexplained[k], "health explains a frame")
+    require(
+        statement["theta"] != "constant while it shows" or frames.is_unexplained[k], "health explains a frame"
+    )
     return since
 
 
-def evaluate_term(term, said, frames, effect):
+def evaluate_term(term, statement, frames, effect):
     """One filter along d: its value E, the limit on E without theta, and the slope that a constant theta
     multiplies. E and the limit are in rad/s.
 
@@ -651,7 +661,7 @@ def evaluate_term(term, said, frames, effect):
     dt = frames.dt
     d = np.array(term["d"])
     decay = exp(-term["pole_per_s"] * dt) if "pole_per_s" in term else 0.0
-    since = check_term_frames(term, said, frames)
+    since = check_term_frames(term, statement, frames)
     summed = np.arange(since + 1, k + 1)
     size = np.abs(d)
     weights = decay ** (k - summed.astype(float))  # of each frame's input, at frame k
@@ -660,19 +670,19 @@ def evaluate_term(term, said, frames, effect):
     limit = weights @ (dt * frames.eta_bar_rad_s2[summed] @ size + (1 - decay) * noise[summed - 1])
     limit += decay * weights[0] * noise[since] + noise[k]
     stated = {"h", "Z", "r", "fault"} & set(term)
-    require(said["what"] is not None or not stated, "an alarm has no effect of a fault")
+    require(statement["what"] is not None or not stated, "an alarm has no effect of a fault")
     h, Z, r = effect.along(d, summed)
     before = first - summed[0]  # frames that are not written
     check_stated_effect(term, {"h": h[before:], "Z": Z[before:], "r": r[before:]})
-    most = effect.max_effect(h, Z, r)
-    known = np.isfinite(most[:before])
-    least = dt * decay ** (first - 1.0 - summed[:before][known]) @ most[:before][known]
+    largest = effect.max_effect(h, Z, r)
+    known = np.isfinite(largest[:before])
+    least_before = dt * decay ** (first - 1.0 - summed[:before][known]) @ largest[:before][known]
     stated = term.get("fault", 0.0)
-    require(stated >= least * (1 - MAX_RELATIVE_DIFFERENCE_OF_EFFECT) - 1e-15,
+    require(stated >= least_before * (1 - MAX_RELATIVE_DIFFERENCE_OF_EFFECT) - 1e-15,
             "the effect before the written frames is too small")  # fmt: skip
-    done = most if said["theta"] == "any" else h + r
-    limit += weights[before:] @ (dt * done[before:]) + decay ** (k + 1.0 - first) * stated
-    slope = dt * weights[before:] @ Z[before:] if said["theta"] != "any" else 0.0
+    effects = largest if statement["theta"] == "any" else h + r
+    limit += weights[before:] @ (dt * effects[before:]) + decay ** (k + 1.0 - first) * stated
+    slope = dt * weights[before:] @ Z[before:] if statement["theta"] != "any" else 0.0
     check_logged_values(term, frames, slice(first, k + 1))
     return np.array([value, limit, slope])
 
@@ -721,12 +731,12 @@ class Course(NamedTuple):
     travel: list
 
 
-def course_pairs(said, frames):
+def course_pairs(statement, frames):
     """Pairs (greater, less) of the bounds of single frames; the fault type allows only greater <= less."""
-    effect = effect_of_fault(said["what"], frames)
-    comparison, stop = course_of(said["what"], frames.log) or ("", 0)
+    effect = effect_of_fault(statement["what"], frames)
+    comparison, stop = course_of(statement["what"], frames.log) or ("", 0)
     require(comparison, "this is no type with a course")
-    low, high, sign = bounds_by_frame(said, frames, effect)
+    low, high, sign = bounds_by_frame(statement, frames, effect)
     require(
         low and sorted(low) == list(range(min(low), max(low) + 1)), "the frames do not follow one another"
     )
@@ -737,16 +747,16 @@ def course_pairs(said, frames):
     upper_frame, (upper, upper_command) = next(iter(high.items()), (min(low), (np.nan, np.nan)))
     travel = sorted((sign * effect.theta_low, sign * effect.theta_high))
     course = Course(min(low), max(low), lower, command, upper_frame, upper, upper_command, travel)
-    return COMPARISONS[comparison](said, course, frames)
+    return COMPARISONS[comparison](statement, course, frames)
 
 
-def bounds_by_frame(said, frames, effect):
-    """Position and command (theta, u) by frame that bounds theta from below, and from above, and the sign by
-    which all of them are turned."""
+def bounds_by_frame(statement, frames, effect):
+    """Frame -> (theta, u), a bound on the position and the command, for the frames that bound theta from
+    below, and for those that bound it from above; and the sign by which all of them are multiplied."""
     low: dict = {}
     high: dict = {}
     signs = set()
-    for bound in said["bounds"]:
+    for bound in statement["bounds"]:
         for place, k in enumerate(range(bound["first"], bound["frame"] + 1)):
             theta, command, sign = position_bound(bound, place, k, frames, effect)
             signs.add(sign)
@@ -755,12 +765,12 @@ def bounds_by_frame(said, frames, effect):
     return low, high, signs.pop()
 
 
-def offset_pairs(said, course, frames):
+def offset_pairs(statement, course, frames):
     """A constant offset p - u from the command u, unless a stop hides it:
 
     lower - u  >  upper - u_upper,    lower  >  low stop,    high stop  >  upper
     """
-    stops = said["stops"]
+    stops = statement["stops"]
     travel = course.travel
     require(
         len(stops) == 2 and stops[0] >= travel[0] - 1e-12 and stops[1] <= travel[1] + 1e-12,
@@ -771,44 +781,46 @@ def offset_pairs(said, course, frames):
     return [(lower - course.command[0], upper - course.upper_command), (lower, stops[0]), (stops[1], upper)]
 
 
-def growing_offset_pairs(said, course, frames):
+def growing_offset_pairs(statement, course, frames):
     """An offset that grows and keeps its sign: the pairs of a constant one, the upper bound in a later frame;
 
     lower - u  >  0,    upper_frame  >  first
     """
-    pairs = offset_pairs(said, course, frames)
+    pairs = offset_pairs(statement, course, frames)
     return [(pairs[0][0], 0.0), *pairs, (course.upper_frame, course.first)]
 
 
-def runaway_pairs(said, course, frames):
-    """A runaway to a stop at half the rate limit or faster; in a later frame the surface is nearer:
+def runaway_pairs(statement, course, frames):
+    """A runaway to a stop at half the rate limit or faster. In a later frame the surface is less far than
+    that:
 
     stop  >  upper,    upper_frame  >  first,    lower + pace dt (upper_frame - first - late frames)  >  upper
     """
-    require(said["stops"] == [course.travel[1]], "the stop is not that of the log")
+    require(statement["stops"] == [course.travel[1]], "the stop is not that of the log")
     scenario = frames.declared.scenario
-    known = scenario.get("design_model", {}).get("actuators") or scenario["actuators"]
-    rate = radians(known[said["what"].partition(" ")[0]]["rate_limit_deg_s"]) or DEFAULT_RATE_RAD_S
-    require(is_same(said["pace_rad_s"], rate / 2), "pace_rad_s is not half the rate limit")
+    actuators = scenario.get("design_model", {}).get("actuators") or scenario["actuators"]
+    rate = radians(actuators[statement["what"].partition(" ")[0]]["rate_limit_deg_s"]) or DEFAULT_RATE_RAD_S
+    require(is_same(statement["pace_rad_s"], rate / 2), "pace_rad_s is not half the rate limit")
     later = course.upper_frame - course.first - frames.late_frames
-    went = course.lower[0] + said["pace_rad_s"] * frames.dt * later
-    return [(course.travel[1], course.upper), (course.upper_frame, course.first), (went, course.upper)]
+    reached = course.lower[0] + statement["pace_rad_s"] * frames.dt * later
+    return [(course.travel[1], course.upper), (course.upper_frame, course.first), (reached, course.upper)]
 
 
-def swing_pairs(said, course, frames):
-    """An oscillation about the command: beyond it for longer than half of the slowest period; theta is p - u.
+def swing_pairs(statement, course, frames):
+    """An oscillation about the command. The surface is beyond the command for longer than half of the slowest
+    period; theta is p - u:
 
     last - first  >  pi / (slowest_rad_s dt),    min lower  >  0,    sum lower  >  0
     """
     slowest = frames.declared.scenario["fdi"]["slowest_oscillation_rad_s"]
-    require(said["slowest_rad_s"] == slowest, "slowest_rad_s is not that of the scenario")
+    require(statement["slowest_rad_s"] == slowest, "slowest_rad_s is not that of the scenario")
     longest = pi / slowest / frames.dt
     return [(course.last - course.first, longest), (course.lower.min(), 0.0), (course.lower.sum(), 0.0)]
 
 
-def approach_pairs(said, course, frames):
-    """A slow surface comes nearer to its order by a step in each frame, until it is near. Here it is beyond
-    all orders, and farther away in a later frame. lower_n: of the last frame.
+def approach_pairs(statement, course, frames):
+    """A slow surface approaches its order by a step in each frame, until it is near. Here it is beyond all
+    orders, and farther away in a later frame. lower_n: lower bound of the last frame.
 
     min (lower - ordered)  >  0,    sum (lower - ordered)  >  0
     lower_n  >  upper - step (last - first - 1),    lower_n  >  near,    1  >  0
@@ -816,13 +828,13 @@ def approach_pairs(said, course, frames):
     The last pair belongs to the format alone: it is always true.
     """
     require(course.upper_frame == course.first, "the bound from above is not of the first frame")
-    require(len(said["ordered"]) == len(course.lower), "ordered: frames are missing")
-    require(said["near"] >= max(said["ordered"]), "near is nearer than the order itself")
-    ahead = course.lower - said["ordered"]
+    require(len(statement["ordered"]) == len(course.lower), "ordered: frames are missing")
+    require(statement["near"] >= max(statement["ordered"]), "near is nearer than the order itself")
+    ahead = course.lower - statement["ordered"]
     last = course.lower[-1]
-    come = said.get("step", 0.0) * (course.last - course.first - 1)
-    return [(ahead.min(), 0.0), (ahead.sum(), 0.0), (last, course.upper - come), (last, said["near"]),
-            (1.0, 0.0)]  # fmt: skip
+    approach = statement.get("step", 0.0) * (course.last - course.first - 1)
+    return [(ahead.min(), 0.0), (ahead.sum(), 0.0), (last, course.upper - approach),
+            (last, statement["near"]), (1.0, 0.0)]  # fmt: skip
 
 
 COMPARISONS = {
@@ -832,11 +844,11 @@ COMPARISONS = {
 
 
 def position_bound(bound, place, k, frames, effect):
-    """The bound on theta that frame k gives, the command -h/Z, and the sign by which theta is turned.
+    """The bound on theta by frame k, the command -h/Z, and the sign by which theta is multiplied.
 
-    |nu.d - h - theta Z| <= eta_bar'.|d| + r, eta_bar' the bound on the innovation, bounds the position theta
-    from below where Z > 0, from above where Z < 0. Downwards is upwards with every sign of theta turned: the
-    stated Z has the turned sign.
+    |nu.d - h - theta Z| <= eta_bar'.|d| + r, with the bound eta_bar' on the innovation, bounds the position
+    theta from below if Z > 0, and from above if Z < 0. A deflection downwards is treated as one upwards:
+    theta and the stated Z are then multiplied by -1.
     """
     require(k < len(frames.rates_rad_s) and frames.is_unexplained[k], "health explains a frame")
     d = np.array(bound["d"])
@@ -851,42 +863,47 @@ def position_bound(bound, place, k, frames, effect):
 # --- 8. A statistical alarm (docs/explanation/certificates.md, "A statistical alarm") -----------------
 
 
-def likelihood_pairs(said, frames):
-    """Evidence against its limit; and the log's share of the level against the ratio of the two.
+def likelihood_pairs(statement, frames):
+    """The evidence and its limit; and the log's share of the level and the ratio of the two.
 
     N = sum w.g and D = sum w.g_s, see `whitened_sums`; limit: max(z sqrt D, room + z/2 sqrt D).
     """
-    check_level(said, frames)
-    (N, D, *of_constants, foreseen), room = whitened_sums(said, frames)
+    check_level(statement, frames)
+    (N, D, *of_constants, foreseen), room = whitened_sums(statement, frames)
     require(D >= 0, "the evidence has a negative variance")
-    evidence = -N - max(0.0, -foreseen) if said["sense"] == "less" else abs(N)
+    evidence = -N - max(0.0, -foreseen) if statement["sense"] == "less" else abs(N)
     if of_constants:
-        evidence -= said["tolerance"] @ np.abs(of_constants)
-    z = said["level"]
+        evidence -= statement["tolerance"] @ np.abs(of_constants)
+    z = statement["level"]
     limit = max(z * D**0.5, room + z / 2 * D**0.5)
-    require(said["likelihood"] in frames.log, f"the log has no column {said['likelihood']}")
-    logged = float(frames.log[said["likelihood"]][said["frame"]]) * (1 + MAX_RELATIVE_DIFFERENCE_OF_SHARE)
+    require(statement["likelihood"] in frames.log, f"the log has no column {statement['likelihood']}")
+    logged = float(frames.log[statement["likelihood"]][statement["frame"]]) * (
+        1 + MAX_RELATIVE_DIFFERENCE_OF_SHARE
+    )
     return [(evidence, limit), (logged, evidence / limit)]
 
 
-def check_level(said, frames):
+def check_level(statement, frames):
     """Refuse unless the scenario has the statistical detector, its rate of false alarms allows the level, and
     no frame is missing."""
     statistical = frames.declared.scenario["fdi"].get("statistical")
-    require(statistical and said["what"] is None, "the scenario declares no statistical detector")
+    require(statistical and statement["what"] is None, "the scenario declares no statistical detector")
     one_test = statistical["false_alarms_per_h"] / (3600 / frames.dt)
     least = -NormalDist().inv_cdf(one_test)
     require(
-        said["level"] >= least * (1 - MAX_RELATIVE_DIFFERENCE_OF_EFFECT),
+        statement["level"] >= least * (1 - MAX_RELATIVE_DIFFERENCE_OF_EFFECT),
         "level: the declared rate allows no smaller one",
     )
-    last = said["first"] + len(said["frames"]) - 1
-    require(last == said["frame"], "frames are missing")
-    require(said["likelihood"].endswith("_likelihood_share"), "likelihood: this is no share of the level")
+    last = statement["first"] + len(statement["frames"]) - 1
+    require(last == statement["frame"], "frames are missing")
+    require(
+        statement["likelihood"].endswith("_likelihood_share"), "likelihood: this is no share of the level"
+    )
 
 
-def whitened_sums(said, frames):
-    """Sums over the frames of w.g for each column g, and the room that a bounded drift needs.
+def whitened_sums(statement, frames):
+    """Sums over the frames of w.g for each column g, and the room, i.e. the largest contribution of a bounded
+    drift.
 
     A Kalman filter with the stated variances whitens the columns of Y: innovation, signature g_s, constants.
     It has two states for each axis, a value and its drift. w = S^-1 g_s, S = P_values + R: covariance of the
@@ -896,9 +913,9 @@ def whitened_sums(said, frames):
     room = sum f D / (f K_values / dt + K_drifts).|w| + min(sum L.|w - w before| + L.|w last|, sum pace L.|w|)
     """
     dt = frames.dt
-    axes = said["axes"]
-    n = len(said["axes"])
-    Y, P, R = (array_with_zeros(said[name]) for name in ("Y", "P", "R"))
+    axes = statement["axes"]
+    n = len(statement["axes"])
+    Y, P, R = (array_with_zeros(statement[name]) for name in ("Y", "P", "R"))
     values = slice(None, n)
     drifts = slice(n, None)
     sums = 0.0
@@ -907,13 +924,13 @@ def whitened_sums(said, frames):
     paced = 0.0
     w = np.zeros(n)
     last_swing = 0.0
-    for k, its in enumerate(said["frames"], said["first"]):
-        # Prediction: the frame's inputs come in, and the drift forgets a part of itself.
-        innovation = frames.innovation_rad_s2[k, axes] - its.get("air", 0)
-        inputs = np.stack([innovation, its["signature"], *its.get("known", [])], 1)
-        forgets = 1 - its.get("keep", 1)
+    for k, fields in enumerate(statement["frames"], statement["first"]):
+        # Prediction: the inputs of the frame are added, and the drift decays.
+        innovation = frames.innovation_rad_s2[k, axes] - fields.get("air", 0)
+        inputs = np.stack([innovation, fields["signature"], *fields.get("known", [])], 1)
+        forgets = 1 - fields.get("keep", 1)
         transition = np.kron([[1, dt], [0, 1 - forgets]], np.eye(n))
-        noise = np.pad(np.diag(its["jitter"]), (0, n)) + np.pad(its["drift"], (n, 0))
+        noise = np.pad(np.diag(fields["jitter"]), (0, n)) + np.pad(fields["drift"], (n, 0))
         Y = transition @ Y + dt * np.eye(2 * n, n) @ inputs
         P = transition @ (P + noise) @ transition.T
         # Weights of this frame's innovation.
@@ -921,13 +938,13 @@ def whitened_sums(said, frames):
         K = P[:, values] @ inverse
         before = w
         w = inverse @ Y[values, 1]
-        sums = sums + w @ np.column_stack([Y[values], its.get("foreseen", np.zeros(n))])
+        sums = sums + w @ np.column_stack([Y[values], fields.get("foreseen", np.zeros(n))])
         # Room: a drift that stays at its bound, and one that swings from one end to the other.
-        bounded = np.array(its.get("bounded", [0] * n))
+        bounded = np.array(fields.get("bounded", [0] * n))
         swing = RINGING_FACTOR * np.abs(np.linalg.pinv(K[drifts])) @ bounded
         swung += swing @ np.abs(w - before)
         last_swing = swing @ np.abs(w)
-        paced += its.get("pace", NO_PACE) * last_swing
+        paced += fields.get("pace", NO_PACE) * last_swing
         stayed += forgets * bounded / (np.diag(K) * forgets / dt + np.diag(K[drifts])) @ np.abs(w)
         # Correction.
         Y = Y - K @ Y[values]
@@ -940,12 +957,12 @@ def array_with_zeros(values):
     return np.array([array_with_zeros(one) if isinstance(one, list) else one or 0.0 for one in values])
 
 
-def check_exclusion_by_alarm(said, document, frames):
+def check_exclusion_by_alarm(statement, document, frames):
     """Refuse unless an earlier statistical alarm came on axes that this fault does not move."""
     alarm = document["statements"][0]
     require(alarm.get("what", "") is None and "likelihood" in alarm, "there is no statistical alarm before")
-    require(alarm["frame"] <= said["frame"] and said["what"] is not None, "the alarm came later")
-    effect = effect_of_fault(said["what"], frames)
+    require(alarm["frame"] <= statement["frame"] and statement["what"] is not None, "the alarm came later")
+    effect = effect_of_fault(statement["what"], frames)
     rows = slice(max(alarm["first"] - 1, 0), alarm["frame"] + 1)
     moved = np.abs([effect.offset[rows], effect.slope[rows], effect.spread[rows]])[..., alarm["axes"]]
     require(moved.max() == 0, "this fault moves the axes of the alarm")
@@ -954,28 +971,30 @@ def check_exclusion_by_alarm(said, document, frames):
 # --- 9. An alarm between instruments (docs/explanation/certificates.md, same heading) ----------------
 
 
-def missing_pairs(said, frames):
+def missing_pairs(statement, frames):
     """The pair 1 > 0 of a missing reading; the log's column `watch_missing` must name the same sensor."""
-    k = said["frame"]
-    require(said["what"] is None, "instruments raise an alarm, they exclude no surface")
-    require(np.asarray(frames.log.get("watch_missing", []), float)[k : k + 1].tolist() == said["missing"],
-            "the log says that another reading is missing, or none")  # fmt: skip
+    k = statement["frame"]
+    require(statement["what"] is None, "instruments raise an alarm, they exclude no surface")
+    require(
+        np.asarray(frames.log.get("watch_missing", []), float)[k : k + 1].tolist() == statement["missing"],
+        "the log says that another reading is missing, or none",
+    )
     return [(1.0, 0.0)]
 
 
-def monitor_pairs(said, frames):
+def monitor_pairs(statement, frames):
     """Residual and bound of the test; the log's share in that row is at least as large as their ratio.
 
     sum of (reading - prediction)  >  sum of (largest difference)    over the entries of `looks`
     """
     log = frames.log
-    k = said["frame"]
-    require(said["what"] is None, "instruments raise an alarm, they exclude no surface")
+    k = statement["frame"]
+    require(statement["what"] is None, "instruments raise an alarm, they exclude no surface")
     require({"watch_share", "watch_test"} <= set(log), "the log has no test between instruments")
-    require(TESTS[int(log["watch_test"][k])] == said["test"], "the log has another test in this row")
-    require(all(most >= 0 for _, _, most in said["looks"]), "looks: a bound is below zero")
-    residual = sum(z - other for z, other, _ in said["looks"])
-    bound = sum(most for *_, most in said["looks"])
+    require(TESTS[int(log["watch_test"][k])] == statement["test"], "the log has another test in this row")
+    require(all(difference >= 0 for _, _, difference in statement["looks"]), "looks: a bound is below zero")
+    residual = sum(reading - predicted for reading, predicted, _ in statement["looks"])
+    bound = sum(difference for *_, difference in statement["looks"])
     logged = log["watch_share"][k] * (1 + MAX_RELATIVE_DIFFERENCE_OF_EFFECT)
     require(bound > 0 and logged > residual / bound, "the log's share is smaller")
     return [(residual, bound)]
@@ -990,16 +1009,16 @@ PAIRS = {
 }  # fmt: skip
 
 
-def check_statement(said, document, log, declared):
+def check_statement(statement, document, log, declared):
     """Raise Refused unless the statement follows from log and scenario."""
-    kind = check_statement_form(said)
-    check_event(said, log)
-    frames = Frames(document, log, declared, said.get("block"))
+    kind = check_statement_form(statement)
+    check_event(statement, log)
+    frames = Frames(document, log, declared, statement.get("block"))
     if kind == "as":
-        check_exclusion_by_alarm(said, document, frames)
+        check_exclusion_by_alarm(statement, document, frames)
         return
-    sides = np.array(PAIRS[kind](said, frames), float).T
-    stated = np.reshape(said["sides"], (2, -1))  # a single pair is written without inner lists
+    sides = np.array(PAIRS[kind](statement, frames), float).T
+    stated = np.reshape(statement["sides"], (2, -1))  # a single pair is written without inner lists
     require(np.isfinite(sides).all() and sides.shape == stated.shape, "the sides are no numbers")
     excess = (
         sides[0] - sides[1] - (MIN_RELATIVE_EXCESS * np.abs(sides).max(axis=0) if kind == "terms" else 0.0)
@@ -1017,7 +1036,8 @@ def digest(document):
 
 
 def failures(document, log, scenario=""):
-    """A sentence for each reason to refuse; log: column -> values, scenario: the text of scenario.yaml."""
+    """Yield a sentence for each reason to refuse. log: column -> values; scenario: the text of
+    scenario.yaml."""
     try:
         declared = check_document(document, log, scenario)
     except Refused as why:
@@ -1026,17 +1046,18 @@ def failures(document, log, scenario=""):
     except (*UNREADABLE, yaml.YAMLError) as why:
         yield f"certificate, log and scenario do not fit together: {type(why).__name__}: {why}"
         return
-    for said in document["statements"]:
+    for statement in document["statements"]:
         try:
-            check_statement(said, document, log, declared)
+            check_statement(statement, document, log, declared)
         except Refused as why:
-            yield f"{statement_name(said)}: {why}"
+            yield f"{statement_name(statement)}: {why}"
         except UNREADABLE as why:
-            yield f"{statement_name(said)}: the numbers do not fit the log: {type(why).__name__}: {why}"
+            yield f"{statement_name(statement)}: the numbers do not fit the log: {type(why).__name__}: {why}"
 
 
 def check_document(document, log, scenario):
-    """Refuse the document that belongs to another log or scenario; returns what the scenario declares."""
+    """Refuse a document that belongs to another log or scenario. Returns the declarations of the scenario,
+    None if there are no statements."""
     check_form(document, *FORMS["certificate"], "certificate")
     require(
         document["format"] == FORMAT_VERSION,
@@ -1057,7 +1078,7 @@ def check_document(document, log, scenario):
     )
     if not document["statements"]:
         return None
-    events = [said.get("frame") for said in document["statements"]]
+    events = [statement.get("frame") for statement in document["statements"]]
     require(all(map(is_row, events)), "statement: the field frame is missing, or no row")
     declared = declared_at_row(yaml.safe_load(scenario), min(events))
     check_declared(document, declared)
@@ -1068,31 +1089,32 @@ def check_document(document, log, scenario):
     return declared
 
 
-def statement_name(said):
-    """What a statement is about, in words."""
-    what = said.get("what")
+def statement_name(statement):
+    """Words for the event of a statement."""
+    what = statement.get("what")
     return "alarm" if what is None else f"{what} excluded"
 
 
 def sentences(document, log):
-    """What the certificate states, a sentence for each statement."""
-    for said in document["statements"]:
-        at = f"{statement_name(said)} at {log['t_s'][said['frame']]:.3f} s (row {said['frame']})"
-        kind = (said.get("what") or "").partition(" ")[2]
+    """Yield a sentence for each statement of the certificate."""
+    for statement in document["statements"]:
+        row = statement["frame"]
+        at = f"{statement_name(statement)} at {log['t_s'][row]:.3f} s (row {row})"
+        kind = (statement.get("what") or "").partition(" ")[2]
         if kind and kind not in {*RELATIONS, *COURSES}:
             at += f", {kind} being what the log defines"
-        if "as" in said:
+        if "as" in statement:
             yield f"{at}: the statistical alarm came on axes that this fault does not move"
-        elif "missing" in said:
-            yield f"{at}: instrument {said['missing'][0]} gave no reading"
-        elif "bounds" in said:
+        elif "missing" in statement:
+            yield f"{at}: instrument {statement['missing'][0]} gave no reading"
+        elif "bounds" in statement:
             yield f"{at}: the surface moved as this type cannot"
-        elif "likelihood" in said:
-            (value, _), (limit, _) = said["sides"]
+        elif "likelihood" in statement:
+            (value, _), (limit, _) = statement["sides"]
             yield f"{at}: evidence {value:.4g} is more than {limit:.4g} at the declared rate of false alarms"
         else:
-            unit = "" if said.get("theta", "any") != "any" or said.get("test") else " rad/s"
-            value, limit = said["sides"]
+            unit = "" if statement.get("theta", "any") != "any" or statement.get("test") else " rad/s"
+            value, limit = statement["sides"]
             yield f"{at}: {value:.4g}{unit} is more than {limit:.4g}{unit}, the most that bounds allow"
 
 
@@ -1104,7 +1126,8 @@ def refuse_json_constant(name):
 def check(certificate, log=None, scenario=None):
     """Read the files and check them. Returns the statements in sentences, and the reasons to refuse.
 
-    certificate: the folder of a run, or the file; log, scenario: where they lie elsewhere.
+    certificate: the folder of a run, or the file; log, scenario: their paths if they are not in the same
+    folder.
     """
     file = Path(certificate, "certificate.json") if Path(certificate).is_dir() else Path(certificate)
     log = Path(log) if log else file.parent / "log.parquet"
@@ -1121,16 +1144,16 @@ def check(certificate, log=None, scenario=None):
 
 
 def main(arguments):
-    """Print the statements, or why they are refused; returns the exit status."""
+    """Print the statements, or the reasons to refuse them. Returns the exit status."""
     try:
-        said, why = check(*arguments)
+        lines, why = check(*arguments)
     except (OSError, TypeError, ValueError, LookupError, RecursionError, Refused) as error:
         print(f"no certificate at FOLDER, or CERTIFICATE LOG [SCENARIO]: {error}", file=sys.stderr)
         return 1
     print(*why, sep="\n", end="\n" * bool(why), file=sys.stderr)
-    print(*said, sep="\n", end="\n" * bool(said))
+    print(*lines, sep="\n", end="\n" * bool(lines))
     if not why:
-        print(f"{sum(not one.startswith('not certified') for one in said)} statements hold")
+        print(f"{sum(not line.startswith('not certified') for line in lines)} statements hold")
     return int(bool(why))
 
 

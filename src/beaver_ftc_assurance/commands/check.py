@@ -39,12 +39,16 @@ def command(
     if not file.is_file():
         raise BadInput(f"{file}: no such file, allowed: the folder of a run with --certificate")
     try:
-        said, why = check_certificate.check(run, log, scenario)
+        sentences, reasons = check_certificate.check(run, log, scenario)
     except (ArrowException, OSError, ValueError, RecursionError, check_certificate.Refused) as error:
-        said = []
-        why = [" ".join(f"{file}: cannot be checked: {error}".split())]
-    document = {"holds": not why, "statements": said, "refused": why}
-    count = sum(not one.startswith("not certified") for one in said)
-    lines = [*said, f"{count} statements hold"] if not why else [*why, "the certificate does not hold"]
+        sentences = []
+        reasons = [" ".join(f"{file}: cannot be checked: {error}".split())]
+    document = {"holds": not reasons, "statements": sentences, "refused": reasons}
+    count = sum(not sentence.startswith("not certified") for sentence in sentences)
+    lines = (
+        [*sentences, f"{count} statements hold"]
+        if not reasons
+        else [*reasons, "the certificate does not hold"]
+    )
     answer(format, document, lambda: "\n".join(lines))
-    raise typer.Exit(int(bool(why)))
+    raise typer.Exit(int(bool(reasons)))

@@ -119,23 +119,25 @@ def faults_left(diagnosis: DiagnosisReadout) -> Iterator[tuple[int, int]]:
 def _interval(hypothesis: Hypothesis, history: History, frames: np.ndarray) -> tuple[float, float]:
     """The interval of a parameter that is constant in these frames: the intersection of those of frames and
     axes."""
-    least, most, _ = theta_bounds_by_frame(hypothesis, history, frames)
-    return max(hypothesis.theta_low, float(least.max())), min(hypothesis.theta_high, float(most.min()))
+    lower, upper, _ = theta_bounds_by_frame(hypothesis, history, frames)
+    return max(hypothesis.theta_low, float(lower.max())), min(hypothesis.theta_high, float(upper.min()))
 
 
-def tell_apart(one: Candidate, other: Candidate, at: Situation, names: Sequence[str]) -> Document:
+def tell_apart(fault_a: Candidate, fault_b: Candidate, at: Situation, names: Sequence[str]) -> Document:
     """A doublet that is certain to distinguish two candidates, or the reason why there is none.
 
     targets: surface -> deflection that it must reach. Of two surfaces, each must show its own fault.
     """
     targets: dict[int, float] = {}
     needs: Document = {}
-    if one.surface == other.surface and at.in_blocks:
+    if fault_a.surface == fault_b.surface and at.in_blocks:
         return _none("with noisy gyros types are told by blocks of frames, not by one", needs)
-    if one.surface == other.surface:
-        requirements = [(one.surface, *_types_apart(one, other, at))]
+    if fault_a.surface == fault_b.surface:
+        requirements = [(fault_a.surface, *_types_apart(fault_a, fault_b, at))]
     else:
-        requirements = [(a.surface, *_surface_shown(a, b, at)) for a, b in ((one, other), (other, one))]
+        requirements = [
+            (a.surface, *_surface_shown(a, b, at)) for a, b in ((fault_a, fault_b), (fault_b, fault_a))
+        ]
     for s, target, numbers in requirements:
         needs[names[s]] = numbers
         if target is None:
@@ -143,8 +145,8 @@ def tell_apart(one: Candidate, other: Candidate, at: Situation, names: Sequence[
         targets[s] = target
     solution = doublet(targets, at)
     if solution is None:
-        says = f"no doublet within {LONGEST_S:g} s keeps the rates below {degrees(at.rate):g} deg/s"
-        return _none(f"{says} and the angle of attack in its range", needs)
+        text = f"no doublet within {LONGEST_S:g} s keeps the rates below {degrees(at.rate):g} deg/s"
+        return _none(f"{text} and the angle of attack in its range", needs)
     commands, frames = solution
     return {
         "separates": True,
@@ -162,7 +164,7 @@ def _none(because: str, needs: Document) -> Document:
     return {"separates": False, "because": because, "needs": needs}
 
 
-def _types_apart(one: Candidate, other: Candidate, at: Situation) -> tuple[float | None, Document]:
+def _types_apart(fault_a: Candidate, fault_b: Candidate, at: Situation) -> tuple[float | None, Document]:
     """The deflection nearest to the present one at which the positions by two types on a surface and by
     health all differ; None if there is none; and the numbers of `_nearest`.
 
@@ -170,32 +172,32 @@ def _types_apart(one: Candidate, other: Candidate, at: Situation) -> tuple[float
 
     gap (GRID + 1,): least distance, rad, between two of the three positions at each deflection.
     """
-    s = one.surface
+    s = fault_a.surface
     room = min(
         (2.0 * MARGIN * B / abs(g) for B, g in zip(at.bound, at.G[:, s], strict=True) if g), default=inf
     )
     u = _deflections(at, s)
-    (low, high) = one.deflection(u)
-    (low_too, high_too) = other.deflection(u)
-    gap = np.maximum(low - high_too, low_too - high)
+    (low, high) = fault_a.deflection(u)
+    (low_b, high_b) = fault_b.deflection(u)
+    gap = np.maximum(low - high_b, low_b - high)
     # Health must not explain the frame.
-    gap = np.minimum(gap, np.minimum(one.off(u), other.off(u)))
+    gap = np.minimum(gap, np.minimum(fault_a.off(u), fault_b.off(u)))
     return _nearest(u, gap, s, at, room, "apart, and off their command,")
 
 
-def _surface_shown(one: Candidate, other: Candidate, at: Situation) -> tuple[float | None, Document]:
-    """The deflection nearest to the present one at which fault `one`, on surface a, shows in a direction in
+def _surface_shown(fault_a: Candidate, fault_b: Candidate, at: Situation) -> tuple[float | None, Document]:
+    """The deflection nearest to the present one at which fault_a, on surface a, shows in a direction in
     which surface b of the other fault has no effect; None if there is none; and the numbers of `_nearest`.
 
         distance from the command > room,    room = least over the directions d of 2 M |d|.B / |d.G_a|
     """
-    a = one.surface
-    b = other.surface
+    a = fault_a.surface
+    b = fault_b.surface
     room = min(
         (2.0 * MARGIN * np.abs(d) @ at.bound / abs(d @ at.G[:, a]) for d in _blind_to(b, at, a)), default=inf
     )
     u = _deflections(at, a)
-    return _nearest(u, one.off(u), a, at, room, "off its command")
+    return _nearest(u, fault_a.off(u), a, at, room, "off its command")
 
 
 def _deflections(at: Situation, s: int) -> np.ndarray:
@@ -216,18 +218,18 @@ def _blind_to(b: int, at: Situation, a: int) -> Iterator[np.ndarray]:
 
 
 def _nearest(
-    u: np.ndarray, off: np.ndarray, s: int, at: Situation, room: float, what: str
+    u: np.ndarray, difference: np.ndarray, s: int, at: Situation, room: float, words: str
 ) -> tuple[float | None, Document]:
-    """The deflection of u (n,) nearest to the present one with off > room, None if there is none; and the
-    numbers that decide it. off (n,), rad: the difference at each of u, in words `what`. room, rad, infinite
+    """The deflection of u (n,) nearest to the present one with difference > room, None if there is none; and
+    the numbers that decide it. difference (n,), rad: at each of u, with `words` for it. room, rad, infinite
     if no direction shows the fault."""
-    largest_deg = degrees(off.max())
-    is_enough = off > room
+    largest_deg = degrees(difference.max())
+    is_enough = difference > room
     numbers: Document = {"at_least_deg": degrees(room) if room < inf else None}
     numbers |= {"at_most_deg": largest_deg, "now_deg": degrees(at.u[s])}
     if not is_enough.any():
         needed = f"more than {degrees(room):.3g} deg" if room < inf else "another direction"
-        says = f"they must be {what} by {needed}, and are by {largest_deg:.3g} deg at most within the travel"
-        return None, numbers | {"because": says}
+        text = f"they must be {words} by {needed}, and are by {largest_deg:.3g} deg at most within the travel"
+        return None, numbers | {"because": text}
     target = float(u[is_enough][np.argmin(np.abs(u[is_enough] - at.u[s]))])
     return target, numbers | {"target_deg": degrees(target)}

@@ -115,7 +115,7 @@ def _least_amplitude(targets: dict[int, float], at: Situation, frames_to_target:
     unknowns = (2 * n + 4) * frames + 1
     blocks = [eye_array(frames, unknowns, k=block * frames, format="csr") for block in range(2 * n + 4)]
     A = csr_array((np.ones(frames), (every, np.full(frames, unknowns - 1))), shape=(frames, unknowns))
-    # before @ block: the block one frame earlier, 0 in the first
+    # The product before @ block is the block one frame earlier, 0 in the first frame.
     before = eye_array(frames, k=-1, format="csr")
     *x, pitch = blocks[2 * n :]
     dx = [rate - before @ rate for rate in x]  # x[k] - x[k-1], less dt G m[k], surface by surface

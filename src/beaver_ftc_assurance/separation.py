@@ -53,8 +53,8 @@ def separate(scenario: Scenario, rate_deg_s: float = LARGEST_RATE_DEG_S) -> Docu
     if scenario.fdi.pairs:
         raise BadInput(f"{scenario.name}: fdi.pairs: two faults leave no one parameter, allowed: false")
     if not Declared.of(scenario).servo_errors.is_none:
-        says = "fdi.bounds.actuators: where a doublet brings the surfaces is then not certain"
-        raise BadInput(f"{scenario.name}: {says}, allowed with separate: none")
+        text = "fdi.bounds.actuators: where a doublet brings the surfaces is then not certain"
+        raise BadInput(f"{scenario.name}: {text}, allowed with separate: none")
     log = MemoryLog()
     recorder = Recorder(scenario)
     landing = fly(scenario, log, watch=recorder.watch)
@@ -117,7 +117,7 @@ def _longer(scenario: Scenario, pair: Document) -> Iterator[Stepping]:
 
 def _with_doublet(flight: Stepping, scenario: Scenario, pair: Document) -> Iterator[int]:
     """Fly to the end of the scenario, and then the doublet. Yields the number of each frame after it is
-    flown. rest: commands at the end of the scenario, of the surfaces that the doublet does not move (any
+    flown. held_rad: commands at the end of the scenario, of the surfaces that the doublet does not move (any
     more)."""
     frames = _frames(scenario)
     names = list(scenario.airframe.surfaces)
@@ -125,12 +125,12 @@ def _with_doublet(flight: Stepping, scenario: Scenario, pair: Document) -> Itera
     for k in range(1, frames):
         flight.step()
         yield k
-    rest = flight.readout.expected_u_rad
+    held_rad = flight.readout.expected_u_rad
     for k in range(round(pair["time_s"] * scenario.rate_hz) + 1):
-        command = rest.copy()
-        for name, course in pair["commands_rad"].items():
-            if k < len(course):
-                command[names.index(name)] = course[k]
+        command = held_rad.copy()
+        for name, deflections in pair["commands_rad"].items():
+            if k < len(deflections):
+                command[names.index(name)] = deflections[k]
         flight.step(command)
         yield frames + k
 
@@ -184,8 +184,8 @@ def doublets(scenario: Scenario, after_s: float, loss: float) -> dict[tuple[str,
     names = scenario.airframe.surfaces
     doublets_of_pairs = {}
     for pair in combinations(scenario.airframe.class_of_losses, 2):
-        one, other = (Candidate(names.index(name), LOSS, -loss, -loss) for name in pair)
-        result = tell_apart(one, other, at, names)
+        first, second = (Candidate(names.index(name), LOSS, -loss, -loss) for name in pair)
+        result = tell_apart(first, second, at, names)
         numbers = result.get("amplitude_deg"), result.get("time_s"), result.get("because", "")
         doublets_of_pairs[pair] = doublets_of_pairs[pair[::-1]] = dict(
             zip(DOUBLET_COLUMNS, numbers, strict=True)
@@ -208,18 +208,18 @@ def as_text(document: Document) -> str:
     """The text for a terminal, with a line for each pair."""
     lines = [f"{document['scenario']}, {document['time_s']:g} s: if {document['assumes']}"]
     for pair in document["pairs"]:
-        one, other = (f"{words['surface']} {words['type']}" for words in pair["candidates"])
+        first, second = (f"{words['surface']} {words['type']}" for words in pair["candidates"])
         if pair["separates"]:
             surfaces = " and ".join(pair["commands_rad"])
             amplitude_deg = pair["amplitude_deg"]
             moves = f"by {amplitude_deg:.3g} deg" if amplitude_deg > HELD_DEG else "held as now"
-            says = f"{surfaces} {moves}, told after {pair['time_s']:.3g} s"
+            text = f"{surfaces} {moves}, told after {pair['time_s']:.3g} s"
             if "left" in pair:
                 remaining = " and ".join(f"{words['surface']} {words['type']}" for words in pair["left"])
-                says += f"; flown, left: {remaining or 'neither'}"
+                text += f"; flown, left: {remaining or 'neither'}"
         else:
-            says = f"none: {pair['because']}"
-        lines.append(f"  {one} or {other}: {says}")
+            text = f"none: {pair['because']}"
+        lines.append(f"  {first} or {second}: {text}")
     if document["not_constant"]:
         lines.append(f"  a course over many frames tells: {', '.join(document['not_constant'])}")
     return "\n".join(lines)

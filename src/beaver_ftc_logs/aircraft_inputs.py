@@ -88,11 +88,11 @@ class LogInputs:
         return any(self.diagnosis.step(*sample).detected for stretch in steps for sample in stretch)
 
 
-def read_inputs(log: RecordedFlight, vehicle: Vehicle, given: DiagnosedAircraft) -> LogInputs:
-    """The inputs of the diagnosis from a log. given: the aircraft and the declared errors. Raises BadInput if
-    the vehicle file or the log lacks an input, if the size of one shows another unit, or if no stretch is
-    long enough."""
-    aircraft, declared_errors = given
+def read_inputs(log: RecordedFlight, vehicle: Vehicle, diagnosed: DiagnosedAircraft) -> LogInputs:
+    """The inputs of the diagnosis from a log. diagnosed: the aircraft and the declared errors. Raises
+    BadInput if the vehicle file or the log lacks an input, if the size of one shows another unit, or if no
+    stretch is long enough."""
+    aircraft, declared_errors = diagnosed
     flow_columns = _flow_columns(log, vehicle, aircraft)
     changes = {"max_rate_hz": _MAX_HZ, "reference_airspeed_mps": None}
     samples = resample(log, vehicle.model_copy(update=changes))

@@ -81,18 +81,26 @@ def build_bank(model: Model) -> HypothesisBank:
     rows: list[HypothesisRow] = [(np.ones(n), HEALTHY, settings.repair_share, np.zeros(3))]
     stuck = "stuck" in model.vehicle.faults
     pairs = len(groups) > 1
-    single = 1.0 - (_PAIR_SHARE if pairs else 0.0) - (_OFFSET_SHARE if stuck else 0.0)
-    rows += _single_hypotheses(model, groups, single)
+    single_share = 1.0 - (_PAIR_SHARE if pairs else 0.0) - (_OFFSET_SHARE if stuck else 0.0)
+    rows += _single_hypotheses(model, groups, single_share)
     rows += _pair_hypotheses(n, groups)
     if stuck:
-        anywhere = np.diag(np.array(model.noise)) * settings.jam_sd**2
-        rows.append((np.ones(n), UNKNOWN_OFFSET, _OFFSET_SHARE, anywhere))
+        stuck_variance = np.diag(np.array(model.noise)) * settings.jam_sd**2
+        rows.append((np.ones(n), UNKNOWN_OFFSET, _OFFSET_SHARE, stuck_variance))
     rows.append((np.zeros(n), NO_RESPONSE, _SILENT_SHARE, np.zeros(3)))
-    effectiveness, kind, change, offset = (np.array(values) for values in zip(*rows, strict=True))
-    change[1:] *= (1.0 - settings.repair_share) / change[1:].sum()
+    effectiveness, kind, transition_share, offset = (np.array(values) for values in zip(*rows, strict=True))
+    transition_share[1:] *= (1.0 - settings.repair_share) / transition_share[1:].sum()
     rate = settings.changes_per_hour / (3600.0 * model.rate_hz)
-    own = np.ones_like(effectiveness) if model.vehicle.other_laws else effectiveness
-    return HypothesisBank(effectiveness, kind, change, offset, _prior_probabilities(kind, change), rate, own)
+    own_gain_share = np.ones_like(effectiveness) if model.vehicle.other_laws else effectiveness
+    return HypothesisBank(
+        effectiveness,
+        kind,
+        transition_share,
+        offset,
+        _prior_probabilities(kind, transition_share),
+        rate,
+        own_gain_share,
+    )
 
 
 def _single_hypotheses(model: Model, groups: list[int], share: float) -> Iterator[HypothesisRow]:

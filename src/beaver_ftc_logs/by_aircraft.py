@@ -58,19 +58,19 @@ def load_diagnosed(aircraft_name: str, scenario: str | None = None) -> Diagnosed
 
 
 def diagnose_aircraft(
-    log: RecordedFlight, vehicle: Vehicle, given: DiagnosedAircraft
+    log: RecordedFlight, vehicle: Vehicle, diagnosed: DiagnosedAircraft
 ) -> tuple[LogInputs, LogRows, Document]:
-    """The inputs, the rows and the document of verdict.json. given: the aircraft and the declared errors.
+    """The inputs, the rows and the document of verdict.json. diagnosed: the aircraft and the declared errors.
     Raises BadInput for an input that the log lacks, and if an alarm vanishes once the sign of a command is
     changed or two commands are exchanged."""
-    inputs = read_inputs(log, vehicle, given)
+    inputs = read_inputs(log, vehicle, diagnosed)
     replay = _replay(inputs)
     rows = _credible_rows(inputs, replay)
     if rows.has_credible_alarm():
         for corrected, error in _corrected_inputs(inputs, replay):
             if _credible_rows(corrected, _replay(corrected)).clears_alarm(rows):
                 raise error
-    return inputs, rows, _verdict_document(inputs, rows, replay, given[1])
+    return inputs, rows, _verdict_document(inputs, rows, replay, diagnosed[1])
 
 
 def _replay(inputs: LogInputs) -> Replayed:

@@ -132,14 +132,14 @@ class Answers(NamedTuple):
     n_white: float
 
 
-def answers(samples: Samples, model: Model, most: int | None = None) -> Answers | None:
+def answers(samples: Samples, model: Model, max_samples: int | None = None) -> Answers | None:
     """The responses in the parts of a flight; None if a part is too short.
 
-    most: about the largest number of samples to use. Of a longer flight, only every `step`-th is used.
+    max_samples: about the largest number of samples to use. Of a longer flight, only every `step`-th is used.
     """
     flight = regression.innovations(samples, model)
     rows = np.flatnonzero(flight.is_known)
-    step = max(len(rows) // most, 1) if most else 1
+    step = max(len(rows) // max_samples, 1) if max_samples else 1
     if (parts := regression.split_parts(rows[::step])) is None:
         return None
     share = model.settings.power / flight.noise.wider

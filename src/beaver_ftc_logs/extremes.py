@@ -33,7 +33,7 @@ _SHAPE_SD = 0.2
 _SHAPE_GRID = np.linspace(-0.5, 0.5, 41)
 # Grid of the scale, as a multiple of the mean excess.
 _SCALE_RATIOS = np.geomspace(0.2, 5.0, 61)
-# probabilities at which the posterior of the rate is evaluated
+# Probabilities at which the posterior of the rate is evaluated.
 _RATE_QUANTILES = (np.arange(40) + 0.5) / 40.0
 _MIN_PEAKS = 10  # least number of peaks in the tail
 # Number of peaks over the level: this times the root of the number of all peaks, at least _MIN_PEAKS.

@@ -33,23 +33,23 @@ class Fold(NamedTuple):
         return self.held_out.innovations(self.model)
 
 
-def held_out_folds(parts: Parts, model: Model, most: int | None = _MAX_SPLITS) -> Iterator[Fold]:
-    """Yield the folds. most: largest number of refits, as in `validation_folds`."""
+def held_out_folds(parts: Parts, model: Model, max_splits: int | None = _MAX_SPLITS) -> Iterator[Fold]:
+    """Yield the folds. max_splits: largest number of refits, as in `validation_folds`."""
     tied = tied_shares(parts, model).tolist()
-    for fitted, held_out, name in validation_folds(parts, most):
+    for fitted, held_out, name in validation_folds(parts, max_splits):
         gain_sd = group_gain_sd(fit_of(fitted, model), model).tolist()
         ranges = FittedRanges(commands=[], rates=[], gain_sd=gain_sd, tied=tied)
         yield Fold(refit(fitted, model).model_copy(update={"fitted": ranges}), held_out, name, fitted)
 
 
-def validation_folds(parts: Parts, most: int | None = None) -> list[tuple[list[FitPart], FitPart, str]]:
+def validation_folds(parts: Parts, max_splits: int | None = None) -> list[tuple[list[FitPart], FitPart, str]]:
     """The fitted flights, the held-out one and its name, for each fold: the halves of one flight, or each of
-    several flights. If there are more than `most` flights, every `most`-th flight is left out of the same
-    refit, so that there are `most` refits."""
+    several flights. If there are more than `max_splits` flights, every `max_splits`-th flight is left out of
+    the same refit, so that there are `max_splits` refits."""
     if len(parts) == 1:
         first, second = parts[0].halves
         return [([first], second, "second half"), ([second], first, "first half")]
-    n = min(len(parts), most or len(parts))
+    n = min(len(parts), max_splits or len(parts))
     return [
         ([part for i, part in enumerate(parts) if i % n != k], left_out, left_out.samples.name)
         for k in range(n)

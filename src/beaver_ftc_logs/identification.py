@@ -240,7 +240,7 @@ def scale_if_better(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Seque
     if _min_bic(flights, assumed) - _min_bic(_scaled(flights, best), best) < _DECISIVE_BIC:
         return flights, vehicle
     if best.other_laws:
-        # the criterion counts every sample as independent, which holds for white noise only
+        # The criterion counts every sample as independent, which holds for white noise only.
         white = whiten_flights(_scaled(flights, best), best) if best.moving_air else None
         lowest = _min_bic(_scaled(flights, best, white), best) - _DECISIVE_BIC
         names = list(best.surfaces)

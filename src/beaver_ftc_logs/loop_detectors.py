@@ -139,5 +139,7 @@ def _remaining_effectiveness(verdict: Verdict, g: int) -> float:
     """Effectiveness of group g by a verdict, 0 to 1: that of the verdict, otherwise 1 + its estimate of the
     loss, otherwise 1.
     """
-    given = verdict.effectiveness
-    return float(np.clip(1.0 + (verdict.estimate or 0.0) if given is None else given[g], 0.0, 1.0))
+    effectiveness = verdict.effectiveness
+    return float(
+        np.clip(1.0 + (verdict.estimate or 0.0) if effectiveness is None else effectiveness[g], 0.0, 1.0)
+    )

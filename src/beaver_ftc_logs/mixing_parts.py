@@ -117,12 +117,12 @@ class CheckedParameters:
         place: str,
         names: Mapping[int, str],
         known: Collection[int],
-        other: str,
+        unknown_text: str,
         unused: Collection[int],
     ) -> dict[int, int]:
         """Number -> kind, the value of the parameter with this name (names: number -> name). Only known kinds
-        are returned; for another one a remark with the words `other` is added, except for the unused ones.
-        place: word for the number.
+        are returned; for another one a remark with the words `unknown_text` is added, except for the unused
+        ones. place: word for the number.
         """
         kinds: dict[int, int] = {}
         for number, name in names.items():
@@ -134,7 +134,7 @@ class CheckedParameters:
             if kind in known:
                 kinds[number] = kind
             elif kind not in unused:
-                self.lines.append(f"{place} {number} stays out: {name} {kind} {other}")
+                self.lines.append(f"{place} {number} stays out: {name} {kind} {unknown_text}")
         return kinds
 
 

@@ -36,9 +36,9 @@ from beaver_ftc_logs.runs import runs_between, trailing_sums
 from beaver_ftc_logs.samples import Samples, mixer_matrix, whiten_samples
 from beaver_ftc_logs.vehicle import Vehicle
 
-_PARALLEL_TOLERANCE = 1e-9  # of the squared cosine of two rows of the mixer: rounding
-_N_PARTS = 4  # of a flight
-_MIN_PART_ROWS = 60
+_PARALLEL_TOLERANCE = 1e-9  # rounding of the squared cosine of two rows of the mixer
+_N_PARTS = 4  # number of parts in `split_parts`
+_MIN_PART_ROWS = 60  # least number of rows in each
 BOUND_MARGIN = 4.0  # standard errors from a gain to its bounds
 # A response is quick if it differs from its mean over so many seconds.
 _QUICK_SPAN_S = 0.5

@@ -79,8 +79,8 @@ def _lacking_inputs(scenario: Any) -> list[str]:
     errors = {name for sensors in flown for name, settings in sensors if settings != getattr(ideal, name)}
     broken = {fault.sensor for fault in scenario.faults if of_a_sensor(fault)}
     return [
-        f"the {what} of {name}: the log has the true value"
-        for what, names in (("declared errors", errors), ("fault", broken))
+        f"the {words} of {name}: the log has the true value"
+        for words, names in (("declared errors", errors), ("fault", broken))
         for name, _ in scenario.sensors
         if name in names and name not in ("p", "q", "r")
     ]

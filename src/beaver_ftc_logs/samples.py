@@ -227,7 +227,7 @@ def _check_attitude(log: RecordedFlight, vehicle: Vehicle) -> frozenset[str]:
     columns = log.columns
     rates = {name: columns[name] for name in vehicle.rate_columns}
     angles = named_angles(columns, vehicle)
-    # the integral of a clipped rate is not the change of its angle
+    # The integral of a clipped rate is not the change of its angle.
     is_clipped = signals.find_clipped_rows(columns[vehicle.rate_columns[0]].values).any()
     mistake = None if is_clipped else physics.attitude_mistake(rates, angles, _possible_rates(log, vehicle))
     acceleration = vehicle.acceleration

@@ -136,26 +136,28 @@ def is_one_of(*words):
     return described(f"One of: {', '.join(map(str, words))}.", lambda value: value in words)
 
 
-def is_null_or(of):
+def is_null_or(is_allowed):
     """Such a value, or null."""
-    return described(f"Null, or: {of.__doc__}", lambda value: value is None or of(value))
+    return described(f"Null, or: {is_allowed.__doc__}", lambda value: value is None or is_allowed(value))
 
 
-def is_list_of(of, length=None):
+def is_list_of(is_allowed, length=None):
     """A list of such values, of this length if one is given."""
     return described(
-        f"A list of {length or 'any number of'} values, each: {of.__doc__}",
+        f"A list of {length or 'any number of'} values, each: {is_allowed.__doc__}",
         lambda value: (
-            isinstance(value, list) and len(value) == (length or len(value)) and all(map(of, value))
+            isinstance(value, list) and len(value) == (length or len(value)) and all(map(is_allowed, value))
         ),
     )
 
 
-def is_by_axis(of):
+def is_by_axis(is_allowed):
     """Such a value for some of the axes p, q, r."""
     return described(
-        f"A mapping from some of p, q, r to a value, each: {of.__doc__}",
-        lambda value: isinstance(value, dict) and set(value) <= set(AXES) and all(map(of, value.values())),
+        f"A mapping from some of p, q, r to a value, each: {is_allowed.__doc__}",
+        lambda value: (
+            isinstance(value, dict) and set(value) <= set(AXES) and all(map(is_allowed, value.values()))
+        ),
     )
 
 
@@ -422,7 +424,7 @@ class Frames:
         self.rates_rad_s = self.last_rows(measured)
         gyro_change, stated_bound = errors_by_row(measured, document)
         self.gyro_change_rad_s = self.last_rows(gyro_change)
-        stated_bound = np.roll(stated_bound, 1, axis=0) / instants  # of the row with which the frame began
+        stated_bound = np.roll(stated_bound, 1, axis=0) / instants  # at the row with which the frame began
         stated_bound[0] = np.nan
         self.stated_bound_rad_s2 = self.mean(stated_bound)
         before = np.roll(self.rates_rad_s, 1, axis=0)
@@ -664,7 +666,7 @@ def evaluate_term(term, statement, frames, effect):
     since = check_term_frames(term, statement, frames)
     summed = np.arange(since + 1, k + 1)
     size = np.abs(d)
-    weights = decay ** (k - summed.astype(float))  # of each frame's input, at frame k
+    weights = decay ** (k - summed.astype(float))  # weight of each frame's input at frame k
     noise = frames.gyro_change_rad_s @ size
     value = weights @ (dt * frames.innovation_rad_s2[summed] @ d)
     limit = weights @ (dt * frames.eta_bar_rad_s2[summed] @ size + (1 - decay) * noise[summed - 1])
@@ -954,7 +956,9 @@ def whitened_sums(statement, frames):
 
 def array_with_zeros(values):
     """An array of a list, or of a list of lists, null as 0."""
-    return np.array([array_with_zeros(one) if isinstance(one, list) else one or 0.0 for one in values])
+    return np.array(
+        [array_with_zeros(value) if isinstance(value, list) else value or 0.0 for value in values]
+    )
 
 
 def check_exclusion_by_alarm(statement, document, frames):
@@ -1136,11 +1140,14 @@ def check(certificate, log=None, scenario=None):
     require(isinstance(document, dict), f"{file}: this is no certificate")
     table = read_table(log)
     columns = {name: table[name].to_numpy() for name in table.column_names}
-    why = list(failures(document, columns, scenario.read_text(encoding="utf-8")))
-    if why:
-        return [], why
-    left = [f"not certified: {statement_name(one)}: {one.get('because')}" for one in document["without"]]
-    return [*sentences(document, columns), *left], []
+    reasons = list(failures(document, columns, scenario.read_text(encoding="utf-8")))
+    if reasons:
+        return [], reasons
+    not_certified = [
+        f"not certified: {statement_name(statement)}: {statement.get('because')}"
+        for statement in document["without"]
+    ]
+    return [*sentences(document, columns), *not_certified], []
 
 
 def main(arguments):

@@ -166,7 +166,7 @@ def _exclude_runaway(bounds: SurfaceBounds) -> Document | None:
     late_frames = int(not bounds.config.single_instant)
     least = bounds.lower.max(axis=1)
     most = bounds.upper.min(axis=1)
-    # lower bound of each frame, traced back to frame 0 at the least rate
+    # The lower bound of each frame, traced back to frame 0 at the least rate.
     traced_back = np.where(bounds.is_unexplained, least - step * np.arange(len(least)), -np.inf)
     below_stop = most < high_stop - MIN_POSITION_DIFFERENCE_RAD
     for j in np.flatnonzero(bounds.is_unexplained & below_stop).tolist():
@@ -206,10 +206,10 @@ def _exclude_rate_limit(bounds: SurfaceBounds) -> Document | None:
     """
     actuator = bounds.actuator
     config = bounds.config
-    min_approach = config.n_substeps * config.frames_per_block * actuator.slow_step_rad  # of a frame, rad
+    min_approach = config.n_substeps * config.frames_per_block * actuator.slow_step_rad  # in a frame, rad
     orders = bounds.max_order
     most = bounds.upper.min(axis=1)
-    # upper bound of each frame, traced back to frame 0 at the least approach
+    # The upper bound of each frame, traced back to frame 0 at the least approach.
     traced_back = most + min_approach * np.arange(len(most))
     for axis, beyond, starts in bounds.runs_beyond(orders):
         for k in np.flatnonzero(starts < np.arange(len(starts))).tolist():

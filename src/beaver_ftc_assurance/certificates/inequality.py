@@ -106,21 +106,25 @@ class Inequality:
         by_theta: the largest part of a constant theta in the limit, rad/s. decides (2,): whether the least,
         and the greatest, theta is needed.
         """
-        of = self.hypothesis
-        said, sums, deciding = zip(*map(self._evaluate, self.terms), strict=True)
-        value, limit, slope = np.sum(sums, axis=0).tolist()
-        by_theta = max(of.theta_low * slope, of.theta_high * slope) if abs(slope) > MIN_SLOPE else 0.0
+        hypothesis = self.hypothesis
+        terms, weighted_sums, deciding = zip(*map(self._evaluate, self.terms), strict=True)
+        value, limit, slope = np.sum(weighted_sums, axis=0).tolist()
+        by_theta = (
+            max(hypothesis.theta_low * slope, hypothesis.theta_high * slope)
+            if abs(slope) > MIN_SLOPE
+            else 0.0
+        )
         limit += by_theta
         if not value - limit > MIN_RELATIVE_MARGIN * max(abs(limit), abs(value)):
             return None
         decides = np.any(deciding, axis=0)
-        if of.theta != ANY:
+        if hypothesis.theta != ANY:
             decides = np.array([slope < 0.0, slope > 0.0]) & bool(by_theta)
             if abs(slope) > MIN_SLOPE and not by_theta:  # the end of the range that counts is zero: no effect
-                said = [{name: entry for name, entry in fields.items() if name != "Z"} for fields in said]
-        ends = dict(compress({"least": of.theta_low, "most": of.theta_high}.items(), decides))
-        about = {**self.history.statement_fields, "theta": of.theta, **ends}
-        return {**about, "terms": list(said), "sides": [value, limit]}
+                terms = [{name: entry for name, entry in fields.items() if name != "Z"} for fields in terms]
+        ends = dict(compress({"least": hypothesis.theta_low, "most": hypothesis.theta_high}.items(), decides))
+        common = {**self.history.statement_fields, "theta": hypothesis.theta, **ends}
+        return {**common, "terms": list(terms), "sides": [value, limit]}
 
     def _evaluate(self, term: Term) -> tuple[Document, np.ndarray, tuple[bool, bool]]:
         """Fields of a term; sums (3,): weighted value, and limit without a constant theta, rad/s, and the
@@ -135,7 +139,7 @@ class Inequality:
         the fault's effect along d in the frames that are written out, from `first` on. before, rad/s: largest
         value of the filter at frame first - 1 that the fault can cause. adds (frames,): whether the effect is
         more than rounding."""
-        of = self.hypothesis
+        hypothesis = self.hypothesis
         history = self.history
         d = term.direction
         dt = self.history.dt
@@ -149,14 +153,14 @@ class Inequality:
         noise = history.gyro_error_change_rad_s @ np.abs(d)
         gyro = a * weights[0] * noise[start] + (1.0 - a) * weights @ noise[start:last] + noise[last]
         limit = dt * weights @ (history.eta_bar_rad_s2[summed] @ np.abs(d)) + gyro
-        begin = min(max(start, of.first_frame) + 1, first)
-        before = _filtered(a, dt, of.max_effects(d, slice(begin, first)), term.effect_before)
+        begin = min(max(start, hypothesis.first_frame) + 1, first)
+        before = _filtered(a, dt, hypothesis.max_effects(d, slice(begin, first)), term.effect_before)
         rows = slice(first, last + 1)
-        h, Z, r = of.along(d, rows)
-        at_low = h + of.theta_low * Z
-        at_high = h + of.theta_high * Z
-        if of.theta == ANY:
-            effects = of.max_effects(d, rows)
+        h, Z, r = hypothesis.along(d, rows)
+        at_low = h + hypothesis.theta_low * Z
+        at_high = h + hypothesis.theta_high * Z
+        if hypothesis.theta == ANY:
+            effects = hypothesis.max_effects(d, rows)
             slope = 0.0
             adds = np.maximum(at_low, at_high) > MIN_EFFECT_RAD_S2
         else:
@@ -179,9 +183,9 @@ class Inequality:
         fields |= {"fault": before} if is_filtered and before else {}
         logged = {"x": history.rates_rad_s, "F": history.model_rad_s2, "eta_bar": history.eta_bar_rad_s2}
         fields |= {name: values[rows].tolist() for name, values in logged.items()}
-        rest = history.unstated_bound_rad_s2[rows]
-        rest = np.where(np.abs(rest) < ROUNDING_SHARE * history.eta_bar_rad_s2[rows], 0.0, rest)
-        fields |= {"rest": rest.tolist()} if rest.any() else {}
+        unstated = history.unstated_bound_rad_s2[rows]
+        unstated = np.where(np.abs(unstated) < ROUNDING_SHARE * history.eta_bar_rad_s2[rows], 0.0, unstated)
+        fields |= {"rest": unstated.tolist()} if unstated.any() else {}
         h, Z, r = self.hypothesis.along(term.direction, rows)
         for name, values in (("h", h), ("Z", Z)):
             if (values * adds).any():
@@ -195,12 +199,12 @@ class Inequality:
         last = term.last_frame
         if isinf(term.pole_per_s):
             return last
-        of = self.hypothesis
+        hypothesis = self.hypothesis
         start = term.filter_start
-        longest = N_WRITTEN_FRAMES if of.theta == ANY else last - start
+        longest = N_WRITTEN_FRAMES if hypothesis.theta == ANY else last - start
         remembered = int(MEMORY_TIME_CONSTANTS / (term.pole_per_s * self.history.dt))
         first = last + 1 - max(min(longest, remembered), 1)
-        return max(first, start + 1, of.first_frame + 1)
+        return max(first, start + 1, hypothesis.first_frame + 1)
 
 
 def _filter_weights(decay: float, n: int) -> np.ndarray:
@@ -219,9 +223,11 @@ def _filtered(decay: float, dt: float, effects: np.ndarray, before: float) -> fl
     return float(decay * weights[0] * before + dt * weights @ effects)
 
 
-def first_violated(candidates: Iterable[list[Term]], of: Hypothesis, history: History) -> Document | None:
+def first_violated(
+    candidates: Iterable[list[Term]], hypothesis: Hypothesis, history: History
+) -> Document | None:
     """The statement of the first inequality that the data violate; None if there is none."""
-    statements = (Inequality(terms, of, history).statement() for terms in candidates if terms)
+    statements = (Inequality(terms, hypothesis, history).statement() for terms in candidates if terms)
     return next(filter(None, statements), None)
 
 

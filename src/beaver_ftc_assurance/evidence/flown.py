@@ -179,12 +179,12 @@ def _of_handling(bar: OfHandling, scenario: Scenario, amounts: Metrics, log: Wat
     parts = []
     for limit, quality in zip(LIMITS, qualities, strict=True):
         ends = zip(("at_least", "at_most"), limit.levels[bar.level - 1], strict=True)
-        asked = {side: end for side, end in ends if not math.isinf(end)} | {"level": bar.level}
+        limits = {side: end for side, end in ends if not math.isinf(end)} | {"level": bar.level}
         verdict = MET if quality.level <= bar.level else NOT_MET
         inside = finite(limit.margin(quality.value, bar.level))
-        says = f"level {quality.level}" if quality.level <= 3 else "no level"
+        remark = f"level {quality.level}" if quality.level <= 3 else "no level"
         parts.append(
-            part(f"{limit.mode} {limit.quantity}", asked, finite(quality.value), verdict, inside, says)
+            part(f"{limit.mode} {limit.quantity}", limits, finite(quality.value), verdict, inside, remark)
         )
     return parts
 
@@ -220,5 +220,7 @@ def cells(columns: Mapping[str, np.ndarray], scenario: Scenario) -> list[int]:
     h = columns["altitude_m"][counted]
     band = np.floor(BANDS * (V - slowest) / (fastest - slowest)).astype(int)
     inside = (band >= 0) & (band < BANDS)
-    of_all = band[inside] * (len(ALTITUDES_M) + 1) + np.searchsorted(ALTITUDES_M, h[inside], side="right")
-    return [int(cell) for cell in np.unique(of_all)]
+    cell_numbers = band[inside] * (len(ALTITUDES_M) + 1) + np.searchsorted(
+        ALTITUDES_M, h[inside], side="right"
+    )
+    return [int(cell) for cell in np.unique(cell_numbers)]

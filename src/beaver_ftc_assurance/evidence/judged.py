@@ -211,7 +211,7 @@ def _of_statistic(bound: Document, estimate: Document) -> Row:
     bound, estimate: `evaluate` with and without the confidence of the bar.
     """
     verdict = MET
-    says = f"{bound['of']} flights tell"
+    remark = f"{bound['of']} flights tell"
     if not bound["passed"]:
         verdict = NOT_SHOWN if not bound["of"] or estimate["passed"] else NOT_MET
     expected = bound["expected"]
@@ -219,7 +219,7 @@ def _of_statistic(bound: Document, estimate: Document) -> Row:
     margin = None
     if actual is not None:
         margin = actual - expected["at_least"] if "at_least" in expected else expected["at_most"] - actual
-    return part(bound["name"], expected, actual, verdict, margin, says)
+    return part(bound["name"], expected, actual, verdict, margin, remark)
 
 
 def _coverage(aircraft: Aircraft, rows: Sequence[Row]) -> Document:

@@ -77,7 +77,7 @@ class EvidencePlan:
 
     def of(self, source: str) -> Iterator[Requirement]:
         """The requirements for which a source is flown."""
-        return (asked for asked in self.file.requirements if source in self.over[asked.id])
+        return (requirement for requirement in self.file.requirements if source in self.over[requirement.id])
 
 
 def load_plan(path_or_name: str) -> EvidencePlan:
@@ -110,23 +110,25 @@ class _Reading:
         expect: dict[str, Expect] = {}
         formulas: dict[str, Formula] = {}
         for i, requirement in enumerate(self._file.requirements):
-            at = ("requirements", i)
+            place = ("requirements", i)
             if requirement.id in over:
-                self._problem((*at, "id"), f"{requirement.id} is there twice, allowed: each id once")
-            found = [self._source(name, (*at, "over", k)) for k, name in enumerate(requirement.over)]
-            sources = [source for source in found if source is not None]
+                self._problem((*place, "id"), f"{requirement.id} is there twice, allowed: each id once")
+            sources_or_none = [
+                self._source(name, (*place, "over", k)) for k, name in enumerate(requirement.over)
+            ]
+            sources = [source for source in sources_or_none if source is not None]
             over[requirement.id] = tuple(dict.fromkeys(source.name for source in sources))
-            formula = self._formula(requirement, at)
+            formula = self._formula(requirement, place)
             if formula:
                 formulas[requirement.id] = formula
             for k, source in enumerate(sources):
                 if isinstance(requirement.bar, OfSweep) and not isinstance(source.what, Sweep):
-                    says = f"{source.given} is a scenario, allowed with a bar of type sweep: sweeps"
-                    self._problem((*at, "over", k), says)
+                    text = f"{source.given} is a scenario, allowed with a bar of type sweep: sweeps"
+                    self._problem((*place, "over", k), text)
                 if formula:
-                    self._fits(formula, source, (*at, "formula"))
+                    self._fits(formula, source, (*place, "formula"))
                 if requirement.expect is not None:
-                    checked = self._expect(requirement.expect, source, (*at, "expect"))
+                    checked = self._expect(requirement.expect, source, (*place, "expect"))
                     if checked:  # the same for each source: a source only adds problems
                         expect[requirement.id] = checked
         self._unused()
@@ -151,8 +153,8 @@ class _Reading:
         for source in filter(None, self._sources.values()):
             if source.name in sources:
                 both = f"{source.given} and {sources[source.name].given}"
-                says = f"{both} are both named {source.name}, allowed: each name once"
-                self._problem(("requirements",), says)
+                text = f"{both} are both named {source.name}, allowed: each name once"
+                self._problem(("requirements",), text)
             sources[source.name] = source
         flights = sum(source.flights for source in sources.values())
         if flights > MOST_FLIGHTS:
@@ -194,17 +196,17 @@ class _Reading:
             return Source(built_in.name, given, built_in)
         path = inside(self._path.parent, given)
         if path is None:
-            says = f"{given[:100]!r} is outside, allowed: a file in the plan's own folder or below it"
+            text = f"{given[:100]!r} is outside, allowed: a file in the plan's own folder or below it"
         elif not looks_like_a_path(given):
             known = [*self._file.flights, *builtin_names(), *builtin_sweeps()]
-            says = f"{given[:100]!r} is no flight of the plan and not built in{suggestion(given, known)}"
+            text = f"{given[:100]!r} is no flight of the plan and not built in{suggestion(given, known)}"
         else:
             with contextlib.suppress(OSError):
                 if path.is_file():
                     loaded = load_sweep(path) if is_sweep(path) else load_scenario(path)
                     return Source(loaded.name, given, loaded)
-            says = f"no such file: {given[:100]!r}, allowed: a scenario or sweep file"
-        raise ScenarioError(str(self._path), [Problem(self._document.line(at), at, says)])
+            text = f"no such file: {given[:100]!r}, allowed: a scenario or sweep file"
+        raise ScenarioError(str(self._path), [Problem(self._document.line(at), at, text)])
 
     def _own(self, name: str) -> Source:
         """The source of a scenario or sweep in the plan itself."""
@@ -236,8 +238,8 @@ class _Reading:
                 at, f"looks {ahead:g} s ahead, allowed over {source.given}: at most its {duration_s:g} s"
             )
         for column in sorted(formula.columns.difference(source.columns)) if source.columns else ():
-            says = f"{column[:60]!r} is no column of {source.given}'s log{suggestion(column, source.columns)}"
-            self._problem(at, says)
+            text = f"{column[:60]!r} is no column of {source.given}'s log{suggestion(column, source.columns)}"
+            self._problem(at, text)
 
     def _expect(self, given: dict[str, Any], source: Source, at: Location) -> Expect | None:
         """The expectations, checked with the base scenario of a source; None if they have a mistake, which is

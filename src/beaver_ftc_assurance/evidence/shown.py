@@ -134,7 +134,7 @@ def margin_of(requirement: Document) -> str:
     flight."""
     worst = requirement["worst"]
     if requirement["margin"] is None:
-        return worst["says"] or f"{worst['name']}: {said(worst['actual'])}"
+        return worst["says"] or f"{worst['name']}: {in_words(worst['actual'])}"
     return f"{signed(requirement['margin'])} ({requirement['margin_of']})"
 
 
@@ -143,14 +143,14 @@ def signed(value: float) -> str:
     return f"{value:+.3g}" if abs(value) < 1000 else f"{value:+.0f}"
 
 
-def said(value: Any) -> str:
+def in_words(value: Any) -> str:
     """Words for an expected or actual value."""
     if isinstance(value, dict):
-        return ", ".join(f"{key.replace('_', ' ')} {said(entry)}" for key, entry in value.items())
+        return ", ".join(f"{key.replace('_', ' ')} {in_words(entry)}" for key, entry in value.items())
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, list):
-        return ", ".join(map(said, value)) or "none"
+        return ", ".join(map(in_words, value)) or "none"
     return value if isinstance(value, str) else number(value, none="none")
 
 
@@ -160,11 +160,11 @@ def _requirement(requirement: Document) -> Iterator[Part]:
     rows = [
         ("verdict", requirement["verdict"]),
         ("clause", requirement["clause"]),
-        ("asked", _asked(requirement["asked"])),
+        ("asked", _condition_in_words(requirement["asked"])),
         ("over", f"{', '.join(requirement['over'])} ({requirement['flights']} flights)"),
         ("flights", ", ".join(f"{n} {verdict}" for verdict, n in requirement["counts"].items() if n)),
         ("worst flight", worst["flight"]),
-        ("there", _found(worst)),
+        ("there", _result_in_words(worst)),
         ("margin", "" if requirement["margin"] is None else signed(requirement["margin"])),
         ("flies it again", worst["command"] or ""),
     ]
@@ -175,24 +175,24 @@ def _requirement(requirement: Document) -> Iterator[Part]:
     yield Table((requirement["id"], requirement["text"]), [row for row in rows if row[1]], VERDICTS)
 
 
-def _asked(asked: Document) -> str:
+def _condition_in_words(condition: Document) -> str:
     """Words for the condition of a requirement: its formula, bar or expectations. asked: field of the
     document."""
-    if "formula" in asked:
-        return str(asked["formula"])
-    if "bar" in asked:
-        kind = asked["bar"]["type"].replace("_", " ")
-        return f"{kind}: {said({key: value for key, value in asked['bar'].items() if key != 'type'})}"
-    return said(asked["expect"])
+    if "formula" in condition:
+        return str(condition["formula"])
+    if "bar" in condition:
+        kind = condition["bar"]["type"].replace("_", " ")
+        return f"{kind}: {in_words({key: value for key, value in condition['bar'].items() if key != 'type'})}"
+    return in_words(condition["expect"])
 
 
-def _found(worst: Document) -> str:
+def _result_in_words(worst: Document) -> str:
     """Words for the result of a part, with the limit. worst: a part of a requirement on its worst flight."""
     if worst["name"] == "robustness":
-        return " ".join(filter(None, (f"robustness {said(worst['actual'])}", worst["says"])))
-    allowed = "" if worst["expected"] is None else f", asked {said(worst['expected'])}"
-    says = f" ({worst['says']})" if worst["says"] else ""
-    return f"{worst['name'].replace('_', ' ')}: {said(worst['actual'])}{allowed}{says}"
+        return " ".join(filter(None, (f"robustness {in_words(worst['actual'])}", worst["says"])))
+    allowed = "" if worst["expected"] is None else f", asked {in_words(worst['expected'])}"
+    remark = f" ({worst['says']})" if worst["says"] else ""
+    return f"{worst['name'].replace('_', ' ')}: {in_words(worst['actual'])}{allowed}{remark}"
 
 
 def _coverage(coverage: Document) -> Iterator[Part]:
@@ -243,7 +243,7 @@ def as_text(document: Document, folder: str) -> str:
 
 def as_expectations(document: Document) -> tuple[Expectation, ...]:
     """The requirements for JUnit XML, each with its worst flight."""
-    rows = ((row["id"], _asked(row["asked"]), row["worst"]) for row in document["requirements"])
+    rows = ((row["id"], _condition_in_words(row["asked"]), row["worst"]) for row in document["requirements"])
     return tuple(_expectation(*row) for row in rows)
 
 
@@ -252,7 +252,9 @@ def _expectation(name: str, expected: str, worst: Document) -> Expectation:
     known. name: of the requirement; expected: words for its condition.
     """
     again = f"; again: {worst['command']}" if worst.get("command") else ""
-    return Expectation(name, worst["verdict"] == MET, expected, f"{worst['verdict']}: {_found(worst)}{again}")
+    return Expectation(
+        name, worst["verdict"] == MET, expected, f"{worst['verdict']}: {_result_in_words(worst)}{again}"
+    )
 
 
 def of_flight(plan: EvidencePlan, name: str) -> tuple[Any, tuple[Expectation, ...]]:
@@ -271,7 +273,7 @@ def of_flight(plan: EvidencePlan, name: str) -> tuple[Any, tuple[Expectation, ..
     results = fly_flight(plan, named[name])["found"]
     (source, run) = named[name]
     judged = tuple(
-        _expectation(id, said(part["expected"]), part)
+        _expectation(id, in_words(part["expected"]), part)
         for id, parts in results.items() for part in parts
     )  # fmt: skip
     return plan.sources[source].scenario(run), judged

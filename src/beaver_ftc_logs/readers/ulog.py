@@ -49,7 +49,7 @@ def _read_topics(path: Path, wanted: Wanted, params: Parameters) -> dict[str, To
 
     formats = ULog(str(path), parse_header_only=True).message_formats
     for name in formats:
-        # pyulog would expand each of its fields
+        # pyulog would expand each field of such a message.
         if _min_message_bytes(formats, name, ()) > _MAX_MESSAGE_BYTES:
             raise ValueError(f"a message {name} would have more than {_MAX_MESSAGE_BYTES} bytes")
     names = {column.partition(".")[0] for column in wanted or ()}

@@ -32,8 +32,8 @@ from beaver_ftc_logs.units import RATE, SI_UNITS, nearest_unit
 # All rates are in the same unit if their motions, relative to the flights of the model, differ by less than
 # this factor.
 _MAX_AXIS_RATIO = 10.0
-# Largest factor by which the motions may differ from those of a unit that is guessed from them.
-_MAX_UNIT_ERROR = 1.6**2
+# The motions may differ by the square of this factor from those of the unit that is guessed from them.
+_UNIT_FACTOR_ROOT = 1.6
 # A motion differs between flights by this factor at most.
 _MAX_ALIKE_FACTOR = 3.0
 # Another unit changes a motion by this factor at least.
@@ -74,7 +74,7 @@ def refuse_rate_unit(samples: Samples, ranges: FittedRanges) -> None:
         (ratio, "a factor of {from_si:.4g} fits: the model's own were in {unit}?"),
     )
     for size, hint in hints:
-        unit = nearest_unit(RATE, size, _MAX_UNIT_ERROR)
+        unit = nearest_unit(RATE, size, _UNIT_FACTOR_ROOT**2)
         if unit not in (None, "rad/s"):
             to_si = SI_UNITS[unit][1]
             text = hint.format(to_si=to_si, from_si=1.0 / to_si, unit=unit)

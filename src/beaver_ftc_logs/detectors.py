@@ -18,11 +18,12 @@ from beaver_ftc.documents import BadInput, suggestion
 from beaver_ftc.plugins import DETECTORS, is_compiled, made, registered
 from beaver_ftc_logs.bank import build_bank
 from beaver_ftc_logs.diagnose import check_log_fits_model, diagnose, finish_rows
+from beaver_ftc_logs.groups import expand_groups
 from beaver_ftc_logs.log_rows import LogRows, join_names
 from beaver_ftc_logs.loop_detectors import run_loop_detector
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import Floats, RecordedFlight
-from beaver_ftc_logs.regression import expand_groups, innovations
+from beaver_ftc_logs.regression import innovations
 from beaver_ftc_logs.runs import trailing_sums
 from beaver_ftc_logs.samples import Samples
 from beaver_ftc_logs.time_base import unchanged_s

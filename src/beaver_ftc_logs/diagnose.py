@@ -23,10 +23,11 @@ from beaver_ftc_logs import column_mistakes, energy, trust
 from beaver_ftc_logs.bank import GROUP_LOSS, UNKNOWN_OFFSET, HypothesisBank, build_bank
 from beaver_ftc_logs.energy import UNKNOWN_SURFACE
 from beaver_ftc_logs.filtering import bank_posterior, fault_evidence, page_cusum
+from beaver_ftc_logs.groups import expand_groups
 from beaver_ftc_logs.log_rows import LogRows, Names, at_log_stamps, join_names
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats, Ints, Mask
-from beaver_ftc_logs.regression import expand_groups, innovations
+from beaver_ftc_logs.regression import innovations
 from beaver_ftc_logs.runs import last_true_row, trailing_sums
 from beaver_ftc_logs.samples import Samples
 

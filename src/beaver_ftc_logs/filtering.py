@@ -166,10 +166,9 @@ def run_flight(flight: Innovations, model: Model, bank: HypothesisBank) -> BankR
     if model.vehicle.other_laws:
         white = flight.e @ flight.W / np.sqrt(flight.noise.wider * q[:, None])
         r_min = recent_scale(white, flight.is_known, model.rate_hz)
-    y, F = (np.ascontiguousarray(values) for values in (flight.y, flight.F))
     states = build_states(model, flight.noise)
     noise = build_noise(model, flight.noise, flight.c)
-    run: BankRun = run_bank(y, F, flight.is_known, bank, states, noise, r_min, q)
+    run: BankRun = run_bank(flight.y, flight.F, flight.is_known, bank, states, noise, r_min, q)
     return run
 
 

@@ -9,8 +9,9 @@ import numpy as np
 
 from beaver_ftc.results import Document
 from beaver_ftc_logs import regression
+from beaver_ftc_logs.groups import Groups, group_commands
 from beaver_ftc_logs.recording import Floats
-from beaver_ftc_logs.regression import Groups, Parts
+from beaver_ftc_logs.regression import Parts
 
 _WINDOW_S = 2.0  # length of a free run
 _MIN_WINDOWS = 20  # with fewer windows, lag and delay are not fitted
@@ -71,7 +72,7 @@ def _cut_windows(parts: Parts, groups: Groups, n: int, past: int) -> tuple[Float
     windows = []
     for part in parts:
         samples = part.samples
-        commands = regression.group_commands(samples, groups, labelled=True)
+        commands = group_commands(samples, groups, labelled=True)
         rows = np.column_stack([samples.rates, samples.stretch_number, commands])[:-1]
         rows[~part.is_usable[:-1]] = np.nan
         begin = np.arange(0, len(rows) - past - n + 1, n)

@@ -18,10 +18,11 @@ from beaver_ftc_logs.column_mistakes import refuse_command_unit
 from beaver_ftc_logs.fit_checks import collinear_names, density_ratios, median_inflation
 from beaver_ftc_logs.folds import fold_qualities
 from beaver_ftc_logs.free_runs import fit_output_error
+from beaver_ftc_logs.groups import group_indices, group_surfaces
 from beaver_ftc_logs.least_squares import left_by
 from beaver_ftc_logs.model import FittedRanges, Model, NoiseModel
 from beaver_ftc_logs.recording import Floats
-from beaver_ftc_logs.regression import Parts, group_indices
+from beaver_ftc_logs.regression import Parts
 from beaver_ftc_logs.samples import (
     NOISE_MA_CANDIDATES,
     UNFITTED_GYROS_RAD_S,
@@ -244,7 +245,7 @@ def scale_if_better(flights: Sequence[Samples], vehicle: Vehicle) -> tuple[Seque
         white = whiten_flights(_scaled(flights, best), best) if best.moving_air else None
         lowest = _min_bic(_scaled(flights, best, white), best) - _DECISIVE_BIC
         names = list(best.surfaces)
-        for group, power in product(regression.group_surfaces(best), _AIRSPEED_POWERS):
+        for group, power in product(group_surfaces(best), _AIRSPEED_POWERS):
             powers = best.airspeed_powers | {names[i]: power for i in group}
             candidate = best.model_copy(update={"airspeed_powers": powers})
             if (bic := _min_bic(_scaled(flights, candidate, white), candidate)) < lowest:
@@ -293,7 +294,7 @@ def check_explained(folds: list[Document], parts: Parts, model: Model) -> None:
         commands = np.vstack([part.samples.commands[part.is_usable] for part in parts])
         sds = dict(zip(model.vehicle.surfaces, np.nanstd(commands, axis=0).tolist(), strict=True))
         stillest = min(sds, key=lambda name: sds[name])
-        prefixes = tuple(f"{getattr(model.vehicle.rates, axis).column}:" for axis in "pqr")
+        prefixes = tuple(f"{column}:" for column in model.vehicle.rate_columns)
         notes = [note for part in parts for note in part.samples.notes if note.startswith(prefixes)]
         raise BadInput(
             f"identify: on parts it was not fitted on the model explains less of {', '.join(unexplained)} "

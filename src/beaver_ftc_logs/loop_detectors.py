@@ -20,10 +20,11 @@ from beaver_ftc.design import N_Y, Context, DeclaredErrors
 from beaver_ftc.diagnosis import Detector, Measured, Verdict
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs.energy import UNKNOWN_SURFACE
+from beaver_ftc_logs.groups import group_commands, group_indices
 from beaver_ftc_logs.log_rows import LogRows
 from beaver_ftc_logs.model import Model
 from beaver_ftc_logs.recording import Floats
-from beaver_ftc_logs.regression import group_commands, group_indices, innovations
+from beaver_ftc_logs.regression import innovations
 from beaver_ftc_logs.samples import Samples
 
 LOOP_SURFACES = ("aileron", "elevator", "rudder")

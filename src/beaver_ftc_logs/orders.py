@@ -21,6 +21,7 @@ from pydantic import ValidationError
 
 from beaver_ftc.documents import BadInput
 from beaver_ftc_logs import least_squares, regression
+from beaver_ftc_logs.groups import group_surfaces
 from beaver_ftc_logs.model import Model, NoiseModel
 from beaver_ftc_logs.recording import MIN_DIVISOR, Floats, Ints, Mask
 from beaver_ftc_logs.regression import FitPart, Parts
@@ -105,7 +106,7 @@ def _order_columns(vehicle: Vehicle, h: int, L: int) -> Ints:
     max_lag = max(RATE_LAGS)
     rates = np.arange(1 + 3 * max_lag) < 1 + 3 * h
     signals = np.arange(n_signals * vehicle.n_signal_lags(max_lag)) < n_signals * vehicle.n_signal_lags(h)
-    commands = np.tile(np.arange(max(COMMAND_LAGS)) < L, len(regression.group_surfaces(vehicle)))
+    commands = np.tile(np.arange(max(COMMAND_LAGS)) < L, len(group_surfaces(vehicle)))
     return np.flatnonzero(np.concatenate([rates, signals, commands]))
 
 
@@ -159,7 +160,7 @@ def stack_data(parts: Parts, vehicle: Vehicle, h: int, L: int) -> tuple[Floats, 
 
     Columns of the regressors: one, the past, the commands of each group by lag.
     """
-    groups = regression.group_surfaces(vehicle)
+    groups = group_surfaces(vehicle)
     max_lag = max(RATE_LAGS + COMMAND_LAGS)
     Z = []
     y = []
@@ -180,7 +181,7 @@ def _model_of_fit(fit: least_squares.Regression, parts: Parts, vehicle: Vehicle,
     """The model of a fit, with a noise model for each moving average of its flights. Raises BadInput if a
     model file cannot hold a number of the fit."""
     names = list(vehicle.surfaces)
-    groups = regression.group_surfaces(vehicle)
+    groups = group_surfaces(vehicle)
     first = len(fit.coefficients) - len(groups) * L
     shape = (len(groups), L, 3)
     try:

@@ -18,8 +18,7 @@
     p, ar           number of residuals that predict the next; matrices of this prediction (p, 3, 3), the
                     latest residual first
 
-Surfaces whose commands are proportional to one another move together while they are healthy: their effects
-cannot be distinguished by any fit, so they form one group with one response.
+Groups of surfaces are those of `groups`: their surfaces move together and have one response.
 """
 
 from collections.abc import Sequence
@@ -30,13 +29,12 @@ from typing import Any
 import numpy as np
 
 from beaver_ftc_logs import least_squares
+from beaver_ftc_logs.groups import Groups, group_commands, group_indices
 from beaver_ftc_logs.model import Model, NoiseModel
 from beaver_ftc_logs.recording import Floats, Ints, Mask
 from beaver_ftc_logs.runs import runs_between, trailing_sums
-from beaver_ftc_logs.samples import Samples, mixer_matrix, whiten_samples
-from beaver_ftc_logs.vehicle import Vehicle
+from beaver_ftc_logs.samples import Samples, whiten_samples
 
-_PARALLEL_TOLERANCE = 1e-9  # rounding of the squared cosine of two rows of the mixer
 _N_PARTS = 4  # number of parts in `split_parts`
 _MIN_PART_ROWS = 60  # least number of rows in each
 BOUND_MARGIN = 4.0  # standard errors from a gain to its bounds
@@ -81,29 +79,6 @@ def usual_step_s(parts: Parts) -> float:
     return float(np.median([part.samples.dt_s for part in parts]))
 
 
-# Each group is a list of positions in `Vehicle.surfaces`: these surfaces move together.
-Groups = list[list[int]]
-
-
-def group_surfaces(vehicle: Vehicle) -> Groups:
-    """The surfaces in groups whose commands are proportional. m and f, the rows of the mixer of a surface and
-    of the first surface of a group, are proportional if, but for rounding,
-
-        (m.f)^2 = |m|^2 |f|^2
-    """
-    M = mixer_matrix(vehicle)
-    groups: Groups = []
-    for i, m in enumerate(M):
-        for group in groups:
-            first = M[group[0]]
-            if (m @ first) ** 2 >= (1.0 - _PARALLEL_TOLERANCE) * (m @ m) * (first @ first):
-                group.append(i)
-                break
-        else:
-            groups.append([i])
-    return groups
-
-
 def build_regressors(
     samples: Samples, groups: Groups, h: int, L: int, labelled: bool, f: int
 ) -> tuple[Floats, Floats, Mask]:
@@ -122,34 +97,10 @@ def build_regressors(
     return X, U, known
 
 
-def group_commands(samples: Samples, groups: Groups, labelled: bool) -> Floats:
-    """The command of each group, (n, G): the sum of those of its surfaces. labelled: whether the command of
-    each surface is first multiplied by its labelled effectiveness, 1 where there is no label."""
-    commands = samples.commands
-    if labelled:
-        commands = commands * np.where(np.isfinite(samples.labels), samples.labels, 1.0)
-    return np.column_stack([commands[:, group].sum(axis=1) for group in groups])
-
-
 def _delay_rows(values: np.ndarray, lag: int, fill: float) -> np.ndarray:
     """Values (n, ...) delayed by `lag` samples: row k has those of row k - lag, and `fill` if k < lag."""
     lag = min(lag, len(values))
     return np.concatenate([np.full((lag, *values.shape[1:]), fill), values[: len(values) - lag]])
-
-
-def group_indices(model: Model) -> Groups:
-    """The model's groups as positions of their surfaces."""
-    names = list(model.vehicle.surfaces)
-    return [[names.index(name) for name in group] for group in model.groups]
-
-
-def expand_groups(values: Floats | Mask, model: Model) -> Floats:
-    """Columns of groups (n, G) as columns of surfaces (n, S): the column of the surface's group, 1 if it has
-    none."""
-    index = np.full(len(model.vehicle.surfaces), -1)
-    for g, group in enumerate(group_indices(model)):
-        index[group] = g
-    return np.take(np.column_stack([values, np.ones(len(values))]), index, axis=1)
 
 
 @dataclass(frozen=True)

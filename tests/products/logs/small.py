@@ -4,9 +4,9 @@ import numpy as np
 from typer.testing import CliRunner
 
 from beaver_ftc.cli.main import app
+from beaver_ftc_logs.groups import group_surfaces
 from beaver_ftc_logs.log_rows import LogRows
 from beaver_ftc_logs.model import Model
-from beaver_ftc_logs.regression import group_surfaces
 from beaver_ftc_logs.samples import Samples, mixer_matrix
 from beaver_ftc_logs.vehicle import Vehicle
 

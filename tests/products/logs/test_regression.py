@@ -19,7 +19,7 @@ def test_surfaces_whose_commands_are_proportional_are_one_group(off, together):
         "d": {"pitch": 0.1},
     }
     vehicle = small.vehicle(small.WING, surfaces=table, labels={})
-    assert regression.group_surfaces(vehicle) == ([[0, 2], [1, 3]] if together else [[0], [1, 3], [2]])
+    assert small.group_surfaces(vehicle) == ([[0, 2], [1, 3]] if together else [[0], [1, 3], [2]])
 
 
 @pytest.mark.parametrize(("history", "lags"), [(1, 1), (2, 3), (4, 1)])

@@ -2,9 +2,8 @@
 
 A row uses only samples up to its own time.
 
-    P           probability of each hypothesis of the bank (n, H); hypothesis 0: all healthy; the last:
-    nothing
-                answers the commands
+    P           probability of each hypothesis of the bank (n, H); of the first all is healthy, of the last
+                nothing answers the commands
     levels, p   levels of effectiveness of one group (L,), ascending, and their probabilities (n, L)
     a           effectiveness of each group (n, G), with bounds low and high
     faulty      whether the alarm stands (n,), 0 or 1
@@ -306,10 +305,10 @@ def _surfaces_at_fault(model: Model, bank: HypothesisBank, P: Floats, faulty: In
 def _likely_groups(model: Model, bank: HypothesisBank, P: Floats, p_fault: Floats) -> Mask:
     """The groups (n, G) that the name of a row may have.
 
-    one_group false     the groups whose faults have more than half of the probability p_fault (n,)
-    one_group true      the groups whose loss is not excluded, i.e. more than _EXCLUSION_RISK times as
-    probable
-                        as the likeliest loss; none in a row that excludes no group
+    one_group   groups
+    false       those whose faults have more than half of the probability p_fault (n,)
+    true        those whose loss is more than _EXCLUSION_RISK times as probable as the likeliest loss;
+                none in a row in which these are all of several groups that can have a loss
     """
     faults = [bank.is_fault_of_group(g) for g in range(len(model.groups))]
     if not model.settings.one_group:

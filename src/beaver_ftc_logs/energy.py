@@ -44,12 +44,10 @@ def withdraw_surfaces(
     time at which the evidence for the alarm of each row began to increase, s.
 
     name        rows of an alarm
-    unknown     while the evidence is younger than _WINDOW_S, since the rate is then partly from before it;
-    and from
-                a row in which the energy height falls as without power until one in which it rises
-    engine      of the latter, those after the alarm has lasted for _NAMING_DELAY_S and the energy height has
-    fallen
-                so in more than half of its rows
+    unknown     while the evidence is younger than _WINDOW_S, as the rate is then partly from before it;
+                and from a row in which the energy height falls as without power until one in which it rises
+    engine      the latter rows, once the alarm has lasted for _NAMING_DELAY_S and the energy height has
+                fallen so in more than half of its rows
 
     A name depends on no later row. falling, rising: from the begin of the evidence on; the others: of the
     alarm.

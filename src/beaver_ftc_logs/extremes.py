@@ -7,9 +7,8 @@ Poisson process, and their excess over u has the generalised Pareto distribution
     rate of x and more, an hour = rate(u) (1 + xi z / sigma)^(-1 / xi),      z = x - u
 
     u, z            level of the tail, and excess of a peak over it, natural logarithms of odds
-    xi, sigma, p    at each point of a grid (g,): shape and scale of the Pareto distribution, and their
-    posterior
-                    probability
+    xi, sigma, p    shape and scale of the Pareto distribution at each point of a grid (g,), and their
+                    posterior probability
     rate            false alarms an hour
     flights         peaks and healthy hours of each held-out flight
 

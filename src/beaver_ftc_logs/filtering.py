@@ -89,10 +89,11 @@ def bank_posterior(samples: Samples, model: Model, bank: HypothesisBank) -> Floa
 
 def _noise_likelihood(flight: Innovations, model: Model) -> Floats:
     """Log likelihood of each sample (n,) if all surfaces are healthy, for a flight that is whitened by the
-    model's noise; 0 where the sample is not known. R is the covariance of the fit, without its inflation:
+    model's noise; 0 where the sample is not known:
 
-        power (-((nu + 3) log(1 + d2 / nu) + 3 log q) / 2 - log det(R)^1/2 + 3 log sum(ma)),   d2 = |e W|^2 /
-        q
+        -power ((nu + 3) log(1 + d2 / nu) + 3 log q + log det R) / 2 + power 3 log sum(ma),   d2 = |e W|^2 / q
+
+    R: covariance of the noise in the fit, without its inflation. ma: moving average of the noise.
     """
     q = flight.quick_scale(model)
     d2 = ((flight.e @ flight.W) ** 2).sum(axis=1) / q

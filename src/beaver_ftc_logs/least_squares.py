@@ -70,8 +70,8 @@ def _newey_west(X: Floats, e: Floats, P: Floats, stretch: Ints, lag: int) -> Flo
 
         sqrt(diag(P S P)),    S = sum over l = -lag..lag of (1 - |l| / w) sum_k g[k] g[k-l]',    w = lag + 1
 
-    g[k] = X[k] e[k] (m,): score of a sample. With sums G[k] of w successive scores, S is sum_k G[k] G[k]' /
-    w.
+    g[k] = X[k] e[k] (m,): score of a sample. S is also the sum of windows[k] windows[k]' / w, with the sums
+    windows[k] of w successive scores in a stretch.
     """
     scores = X * e[:, None]
     w = lag + 1

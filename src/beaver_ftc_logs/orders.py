@@ -237,9 +237,8 @@ def _fit_noise_model(alike: Parts, model: Model) -> NoiseModel:
 def _with_errors(alike: Parts, model: Model, noise: NoiseModel) -> NoiseModel:
     """The noise model of some flights with two more fields:
 
-        misreads (G,)   share by which a fit may misread the effect of each group: the standard deviation of
-        an
-                        error that is uniform between plus and minus the largest, i.e. largest / sqrt(3)
+        misreads (G,)   share by which a fit may misread the effect of each group: largest / sqrt(3), the
+                        standard deviation of an error that is uniform between plus and minus the largest
         quick           power of the quick part of the responses that the flights exceed in a tenth of their
                         samples, in variances of the noise
 
@@ -292,16 +291,16 @@ def tied_shares(parts: Parts, model: Model) -> Floats:
 def group_gain_sd(fit: least_squares.Regression, model: Model) -> Floats:
     """Standard error of the gain of each group, (G,), with the colour of the residual; at most GAIN_SD_CAP.
 
-    s (L, 3)    standard errors of the group's coefficients, in standard deviations of the noise
-    C (L, L)    correlation of their errors
-    b (3,)      sum of the coefficients over the lags, in standard deviations of the noise
-    v (3,)      variance of b: s' C s by axis
-    z (L, 3)    coefficients in their standard errors
+        s (L, 3)    standard errors of the group's coefficients, in standard deviations of the noise
+        C (L, L)    correlation of their errors
+        b (3,)      sum of the coefficients over the lags, in standard deviations of the noise
+        v (3,)      variance of b: s' C s by axis
+        z (L, 3)    coefficients in their standard errors
 
     The gain is that of the response summed over the lags, with the variance (b^2).v / |b|^4. With
-    `other_laws`, it is the factor of the whole response, with the variance 1 / (z' C^-1 z), the sum over all
-    pairs of axes: if the past explains the slow effect of a surface, as alpha does for an elevator, the sum
-    over the lags is not known, but the factor is.
+    `other_laws`, it is the factor of the whole response, with the variance 1 / (sum over the axes of z' C^-1
+    z): if the past explains the slow effect of a surface, as alpha does for an elevator, the sum over the
+    lags is not known, but the factor is.
     """
     G = len(model.groups)
     L = model.lags

@@ -155,7 +155,7 @@ def _bounds(
                                                other              1            1
         isolated, type is a loss               isolated           alone_low    alone_high
         isolated, another type or none         isolated           0            1
-        no candidate, or one that is no surface any            0            1
+        none, or a name that is no surface     any                0            1
 
     A fault of another type, or of none, may be no loss.
     """

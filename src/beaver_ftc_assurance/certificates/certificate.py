@@ -237,10 +237,12 @@ class _Flight:
         """Evidence against the fault of estimator e at frame k, the first of these inequalities that is
         violated:
 
-            theta may change in each frame     frame k alone, detection filters, isolation filter since the
-            alarm theta is constant                  two frames since the alarm, for a loss and
-            `fault_profile: abrupt`;
-                                               isolation filter since the alarm, for `thresholds: published`
+            theta may change in each frame    of frame k alone, of the detection filters, of the isolation
+            filter theta is constant                 of two frames, for a loss and `fault_profile: abrupt`; of
+            the
+                                              isolation filter, for `thresholds: published`
+
+        The isolation filter, and the two frames, begin with the alarm.
         """
         tape = self.tape
         config = self.scenario.fdi

@@ -109,7 +109,9 @@ class History:
     def gyro_error_change_rad_s(self) -> np.ndarray:
         """n of docs/explanation/detection.md, "Changing error of a gyro", (frames, 3):
 
-        n = offset - constant + slope |largest true rate|
+            n = offset - constant + slope |largest true rate|
+
+        offset, constant, slope: declared errors of the gyros.
         """
         declared = self.declared
         x = self.rates_rad_s

@@ -37,12 +37,11 @@ class Hypothesis:
     """A fault's effect on the innovation: offset + theta slope, within +-spread, rad/s2; theta in
     [theta_low, theta_high]. Arrays (frames, 3), from frame first_frame on, before which none is kept.
 
-    theta is
+    theta:
         any                       in each frame any value of the range, or the fault is absent
         constant                  one value in all frames
-        constant while it shows   one value in the frames that health does not explain; elsewhere the fault
-        may be
-                                  absent
+        constant while it shows   one value in the frames that health does not explain, while in others the
+                                  fault may be absent
 
     axes: axes of the innovation on which the hypothesis is tested.
     """

@@ -21,9 +21,9 @@ ROUNDING_SHARE = 1e-13  # a smaller share of a limit is rounding
 def alarm_evidence(monitor: SensorMonitor, rows: Mapping[str, np.ndarray], k: int) -> Document:
     """The evidence of an alarm in row k, the first of
 
-        a test failed, and the row shows it                        the test with its comparisons
-        a reading is missing, and the log's `watch_missing` says so   the sensor
-        otherwise                                                  the reason why there is no evidence
+        the test with its comparisons        if a test failed, and the row shows it
+        the sensor without a reading         if the log's column `watch_missing` has it in row k
+        the reason why there is no evidence
 
     monitor: at the alarm. The field `looks` lists the comparisons whose sum is the residual of the test:
     [reading, prediction, largest difference with sound instruments]. The sides of a missing reading are the

@@ -207,8 +207,9 @@ def add_whitened_frames(blocks, inputs, drift, jitter, bounded, foreseen, keep, 
     pace (frames,). states (columns, 4): advanced in place. Returns N_f, the sum of w.foreseen, and the room
     of the head of this file: e_0 + min(e_tv + last, e_w), with the sums
 
-        e_0 of eta_0 |w|,   e_tv of eta_r |w - w before|,   e_w of pace eta_r |w|,   last: eta_r |w| of the
-        last frame
+        e_0 of eta_0 |w|,   e_tv of eta_r |w - w before|,   e_w of pace eta_r |w|
+
+    and last: eta_r |w| of the last frame.
     """
     block = blocks[0]
     g = np.zeros((len(states), 2))

@@ -40,15 +40,14 @@ class Tape:
     names: of the isolation estimators. kept: name -> quantity (frames, ...), which is also an attribute of
     the tape:
 
-        offset, slope, spread (estimators, 3)   of the effect of each estimator's fault: rad/s2; rad/s2 per
-        unit of its
-                                                parameter; rad/s2
+        offset, slope, spread (estimators, 3)   effect of each estimator's fault, rad/s2; slope: for a unit
+                                                of the fault's parameter
         excluded (estimators,)                  above 0 for an excluded fault
         types (surfaces, types)                 above 0 for an excluded type
-        command_low, command_high               least and greatest command of each surface, rad, if the fault
-        class
-                                                is `all`
-        least, greatest                         the same of the position of a healthy surface
+        command_low, command_high               least and greatest command of each surface, rad
+        least, greatest                         the same of the position of a healthy surface, rad
+
+    The last four are kept only if the fault class is `all`.
 
     filters: name -> filter state of the statistical detector, by frame up to the alarm. reach_low, reach_high
     (estimators, poles, 4): bounds on the effect of a fault in the detection filters before the first frame.

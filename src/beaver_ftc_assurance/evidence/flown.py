@@ -149,12 +149,13 @@ def _judged(
 
 
 def _of_formula(text: str, formula: Formula, rate_hz: float, amounts: Metrics, log: Watched) -> Row:
-    """The part of a formula of signal temporal logic. r: its robustness, at least 0 if the formula holds.
+    """The part of a formula of signal temporal logic. r: its robustness, at least 0 if the formula holds. The
+    first of these rows that applies gives the verdict:
 
-    not a number, or infinite                            not shown
-    r >= 0, the aircraft was lost before the formula's end    not shown
-    r >= 0                                               met
-    r < 0                                                not met
+        r is not a number, or infinite                                   not shown
+        r >= 0, but the formula looks beyond the loss of the aircraft    not shown
+        r >= 0                                                           met
+        r < 0                                                            not met
     """
     r = formula.robustness(log, rate_hz)
     lost = amounts.departure

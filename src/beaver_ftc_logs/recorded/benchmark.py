@@ -169,7 +169,7 @@ def summarize_failures(scores: Sequence[Document]) -> Document:
     quiet       flights without a failure and without an alarm
 
     precision = found / (found + false), recall = found / failed, accuracy = (found + quiet) / (failed +
-    healthy). Engine failures are counted apart.
+    healthy). Failures of the engine are counted apart.
     """
     failures = [score for score in scores if score["failure"]]
     engine = [score for score in failures if ENGINE in score["failure"]]

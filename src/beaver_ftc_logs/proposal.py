@@ -1,11 +1,11 @@
 """Propose a vehicle file for a log: which columns are rates, commands and angles, and in which unit.
 
-The name of a column says which quantity it is. Its unit follows from the name, from the size of its numbers,
-and from mechanics: the integral of p is the change of roll, the mean of the acceleration is 1 g.
+The name of a column shows which quantity it is (`known_quantities`). Its unit follows from the name, from the
+size of its numbers, and from mechanics: the integral of p is the change of roll, the mean of the acceleration
+is 1 g.
 """
 
 import re
-from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -19,10 +19,10 @@ from beaver_ftc_logs.known_commands import (
     VTOL_MODE,
     command_names,
     hovers_throughout,
-    is_command_name,
     missing_commands_text,
     multicopter_reason,
 )
+from beaver_ftc_logs.known_quantities import NAME_PATTERNS, find_quantities, likely_columns, plain_form
 from beaver_ftc_logs.mixing import Mixing, mixing_of_log
 from beaver_ftc_logs.readers import (
     SELECTIVE_READERS,
@@ -57,47 +57,12 @@ from beaver_ftc_logs.units import (
 )
 from beaver_ftc_logs.vehicle import unused_keys_as_comments
 
-
-def _rate_pattern(rate_name: str, angle: str, axis: str, vector_index: int) -> str:
-    """Pattern of the names of a body rate, in the form of `_snake_case`.
-
-    rate_name: p, q or r; angle: roll, pitch or yaw; axis: x, y or z; vector_index: 0, 1 or 2.
-    """
-    return "|".join((
-        rf"(.*_)?{rate_name}_(rad|deg)_?s(ec)?", rate_name, rf"(.*\.)?{angle}_?(rate|speed)\w*",
-        rf".*gyr(o|_)?_?{axis}\w*", rf".*gyro_?(rad|adc)\[{vector_index}\](_deg_s)?",
-        rf"(.*[._])?ang(ular)?_?vel(ocity)?_?({axis}|{rate_name})(_\w+)?", f"w{axis}",
-        f"omega_?{axis}", rf"rate\.{angle[0]}",
-        rf".*velocity\.({axis}|xyz\[{vector_index}\])",
-    ))  # fmt: skip
-
-
-# Quantity -> pattern of the names of its column, in the form of `_snake_case`.
-_NAME_PATTERNS = {
-    "p": _rate_pattern("p", "roll", "x", 0),
-    "q": _rate_pattern("q", "pitch", "y", 1),
-    "r": _rate_pattern("r", "yaw", "z", 2),
-    "roll": r"(.*\.)?(roll|phi|bank)(_?(rad|deg|angle))?(_\w+)?",
-    "pitch": r"(.*\.)?(pitch|theta)(_?(rad|deg|angle))?(_\w+)?",
-    "az": r"(.*[._])?(az|acc_?z|accel_?z|acc_?down|linear_acceleration\.z|accelerometer_m_s2\[2\])(_\w+)?",
-    "airspeed": r"(.*\.)?(true_)?(airspeed|[kect]?[tice]as)(_\w+)?",
-    "time": r"(real|totl|total|sim|simulation|utc|gps|log|date|sys|system)_?time|date|datetime|clock|utc|"
-    r"%?t(ime)?(_?(s|ms|us|ns|usec|stamp|boot))?\w*|(milli|micro|nano)?s(ec(ond)?s?)?|millis|micros",
-}
-# A column with one of these in its name is a setpoint, an error, a flag or the like, and not the quantity.
-_DERIVED_NAME = (
-    r"innov|test_ratio|varian|timestamp|flag|valid|status|count|setpoint|_sp$|desired|demand|target|bias|"
-    r"integ|error|_err$|_offset|cov(ariance)?\b|temp|noise|(_|^)(cmd|command)"
-)
-# A column with one of these in its name is a rate or an acceleration of an angle, and not the angle.
-_ANGLE_RATE_NAME = r"rate|speed|accel|veloc|dot|_(deg|rad)_?s(ec)?$"
 # Part of the name of a rate -> its unit.
 _UNIT_OF_PART = {"rad_s": "rad/s", "rad/s": "rad/s", "deg_s": "deg/s", "deg/s": "deg/s", "dps": "deg/s"}
 _PWM_RANGE_US = (700.0, 2300.0)  # a command whose median is between these is a pulse
 _LARGEST_RAD_S = 12.0  # larger rates are in deg/s
 _MIN_CORRELATION = 0.7  # a rate and its angle belong together if their correlation is larger
 _MAX_COMMANDS = 8  # largest number of proposed commands
-_MAX_READ_COLUMNS = 60  # largest number of columns that are read of a table
 _LOG_STEPS_S = (1.0 / 2000.0, 1.0 / 4.0)  # shortest and longest usual step of a log
 
 
@@ -140,12 +105,12 @@ def read_likely(path: Path, reader: str | None) -> LikelyLog:
         log = read_flight(path, reader, columns=())
         names = list(log.columns)
         mixing = mixing_of_log(reader, log.parameters, names)
-        likely = [*_likely_columns(names, None), *mixing.entry_by_column, *({VTOL_MODE} & {*names})]
-        log = read_flight(path, reader, columns=likely)
+        wanted = [*likely_columns(names, None), *mixing.entry_by_column, *({VTOL_MODE} & {*names})]
+        log = read_flight(path, reader, columns=wanted)
         return LikelyLog(reader, None, log, names, mixing)
     time = columns = None
     if reader == "table":
-        columns = _likely_columns(column_names(path))
+        columns = likely_columns(column_names(path))
         time = _find_time(path)
     log = next(read_parts(path, reader, time, columns))
     return LikelyLog(reader, time, log, list(log.columns), Mixing())
@@ -156,7 +121,7 @@ def guess_vehicle(path: Path, likely: LikelyLog) -> Document:
     log = likely.log
     mixing = likely.mixing
     names = [name for name, column in log.columns.items() if np.isfinite(column.values).any()]
-    column_of = _find_quantities(names)
+    column_of = find_quantities(names)
     if hovers_throughout(log.parameters, log.columns):
         raise NoVehicleError(
             f"is the log of a VTOL that hovers throughout ({VTOL_MODE} is never 2), allowed: a log with "
@@ -200,16 +165,6 @@ def _quantity_keys(likely: LikelyLog, column_of: dict[str, str]) -> Document:
     return vehicle
 
 
-def _find_quantities(names: list[str]) -> dict[str, str]:
-    """Quantity -> the column that looks like it."""
-    angles = [name for name in names if not re.search(_ANGLE_RATE_NAME, _snake_case(name))]
-    return {
-        quantity: name
-        for quantity, pattern in _NAME_PATTERNS.items()
-        if (name := _shortest_match(pattern, angles if quantity in ("roll", "pitch") else names))
-    }
-
-
 def _add_commands_by_name(likely: LikelyLog, names: list[str]) -> None:
     """Add to the mixing a surface for each column that looks like a command. Raises NoVehicleError for a
     multicopter."""
@@ -225,31 +180,6 @@ def _add_commands_by_name(likely: LikelyLog, names: list[str]) -> None:
         mixing.surfaces[_plain_name(name)] = {name: 1.0}
 
 
-def _likely_columns(names: Iterable[str], max_columns: int | None = _MAX_READ_COLUMNS) -> list[str]:
-    """The first columns that may be quantities or commands, at most max_columns: a log with many columns is
-    not read as a whole."""
-    pattern = "|".join(f"({part})" for part in _NAME_PATTERNS.values())
-    likely = [name for name in names if re.fullmatch(pattern, _snake_case(name)) or is_command_name(name)]
-    return likely[:max_columns]
-
-
-def _snake_case(name: str) -> str:
-    """The name of a column in the form of the patterns: `Roll rate [deg/s]` is `roll_rate_deg_s`."""
-    text = re.sub(r"\s*[\[(]\s*([^\d\])][^\])]*?)\s*[\])]\s*$", r"_\1", name.strip().lower())
-    return re.sub(r"(?<=\w)_{2,}(?=\w)|[\s/,-]+_*", "_", text).strip("_")
-
-
-def _shortest_match(pattern: str, names: Sequence[str]) -> str | None:
-    """The shortest name that fits a pattern, the first in the alphabet if there are two; None if none
-    fits."""
-    matches = [
-        name
-        for name in names
-        if re.fullmatch(pattern, _snake_case(name)) and not re.search(_DERIVED_NAME, _snake_case(name))
-    ]
-    return min(matches, key=lambda name: (len(name), name), default=None)
-
-
 def _find_time(path: Path) -> TimeSource | None:
     """The time column of a table and its unit, None for the column `t_s` in seconds, which is tried first.
     Raises BadInput where the usual step of no column is that of a log (_LOG_STEPS_S) in any unit.
@@ -257,9 +187,9 @@ def _find_time(path: Path) -> TimeSource | None:
     If several units fit, the one at the end of the column's name is taken, otherwise the first in TIME_UNITS.
     """
     names = column_names(path)
-    likely = [name for name in names if re.fullmatch(_NAME_PATTERNS["time"], _snake_case(name))]
+    time_names = [name for name in names if re.fullmatch(NAME_PATTERNS["time"], plain_form(name))]
     phrases: list[str] = []
-    for name in sorted(likely, key=lambda name: name != TIME_COLUMN):
+    for name in sorted(time_names, key=lambda name: name != TIME_COLUMN):
         cells = first_cells_of_column(path, name)
         stamps = cells.numbers[name][np.isfinite(cells.numbers[name])]
         if phrase := text_of_column_phrase(cells, name):
@@ -268,7 +198,7 @@ def _find_time(path: Path) -> TimeSource | None:
         (shortest_s, longest_s) = _LOG_STEPS_S
         units = [unit for unit, seconds in TIME_UNITS.items() if shortest_s <= step * seconds <= longest_s]
         if units:
-            unit = next((unit for unit in units if _snake_case(name).endswith(unit)), units[0])
+            unit = next((unit for unit in units if plain_form(name).endswith(unit)), units[0])
             return None if (name, unit) == (TIME_COLUMN, "s") else (name, unit)
     allowed = f"a table with {TIME_COLUMN} in seconds, or another time that increases"
     phrase = f" ({'; '.join(phrases)})" if phrases else ""

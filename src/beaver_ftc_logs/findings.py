@@ -135,11 +135,10 @@ def events_to_show(events: list[Document]) -> list[Document]:
 def as_text(verdict: Document) -> str:
     """The verdict as lines of text."""
     shown = events_to_show(verdict["events"])
-    n_events = len(verdict["events"])
     summary = f"{len(shown)} event{'s' if len(shown) > 1 else ''}" if shown else _no_event_text(verdict)
     lines = [f"{verdict['flight']}: {summary} in {duration_text(verdict)}", *map(_event_text, shown)]
     lines += credibility_lines(verdict)
-    if n := n_events - len(shown):
+    if n := len(verdict["events"]) - len(shown):
         lines.append(f"  and {n} brief alarm{'s' if n > 1 else ''} of under {MAX_BRIEF_EVENT_S:g} s")
     lines += [f"  {text}" for text in (*verdict["can_separate"], *verdict["notes"])]
     for key, value in verdict.get("score", {}).items():

@@ -1,7 +1,7 @@
 """Which columns of a log are measured quantities (rates, angles, airspeed, time), by their names.
 
-Names are compared in *plain form*: lower case with underscores (`plain_form`). `known_commands` has the names of
-commands.
+Names are compared in *plain form*, i.e. in lower case with underscores (`plain_form`). The names of commands
+are in `known_commands`.
 """
 
 import re

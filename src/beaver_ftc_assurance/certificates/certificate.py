@@ -88,7 +88,7 @@ def certificate(
     }  # fmt: skip
     if not (events := event_rows(rows)):
         return Certified(with_digest(document), log, {}, scenario_text)
-    known = [events["detected"], *events.values()]
+    known = [*events.values()]
     tape = recorder.tape(known, n) if recorder else tape_of_flight_again(scenario, known, n)
     flight = _Flight(scenario, rows, tape, history_of(scenario, rows, tape))
     for statement in flight.statements(events):

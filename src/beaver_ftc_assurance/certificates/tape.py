@@ -123,8 +123,7 @@ class Recorder:
         n = len(FrameReadout(frames[0]).diagnosis.estimators)
         every_type = config.fault_class == "all"
         statistical = config.statistical is not None
-        arrays = recorded_arrays(numbers[0], n, every_type, statistical)
-        self._always, self._early = map(_RecordWords, arrays)
+        self._always, self._early = map(_RecordWords, recorded_arrays(numbers[0], n, every_type, statistical))
         self._state = np.array([0, -1, 0, *alarm_flags(numbers[0])])
         give_back_memory(numbers)
         ring = 1 + (STATISTICAL_FRAMES_BEFORE_ALARM if statistical else FRAMES_BEFORE_ALARM)
@@ -132,10 +131,10 @@ class Recorder:
         self._kept = np.empty((ring + MAX_FRAMES_AFTER_ALARM, len(self._always.words)), np.int64)
         self._frames = frames
         self._alarm = copy_memory(frames)
-        words = _words_of(frames)
-        alarm = _words_of(self._alarm)
-        places = self._always.words, self._early.words
-        self._arguments = words, *places, self._kept, self._ring, alarm, self._state
+        self._arguments = (
+            _words_of(frames), self._always.words, self._early.words, self._kept, self._ring,
+            _words_of(self._alarm), self._state,
+        )  # fmt: skip
         self._keep_frame = direct(keep_frame, *self._arguments)
 
     def land(self) -> None:

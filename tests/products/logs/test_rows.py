@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from beaver_ftc.documents.errors import BadInput
-from beaver_ftc_logs import diagnose
+from beaver_ftc_logs import diagnose, posterior_rows
 from beaver_ftc_logs.bank import UNKNOWN_OFFSET, build_bank
 from products.logs import small
 
@@ -50,7 +50,7 @@ def posterior(bank, *shares):
 def test_a_loss_of_surfaces_that_move_together_has_no_lower_bound():
     tail = small.model(small.TAIL, settings=SETTINGS)
     bank, samples = build_bank(tail), small.flight(tail, 1)
-    found = diagnose.rows_of_posterior(samples, tail, bank, posterior(bank, {(0.5, 1.0): 1.0}))
+    found = posterior_rows.rows_of_posterior(samples, tail, bank, posterior(bank, {(0.5, 1.0): 1.0}))
     assert found.effectiveness_low[0, [0, 2]].tolist() == [0.0, 0.0]
 
 
@@ -65,13 +65,15 @@ def test_names_under_other_laws(monkeypatch):
     model = WING.model_copy(update={"settings": asks})
     reach = round(WING.rate_hz)
     gained = np.concatenate([[1.0, 1.0, 5.0, 1.0], np.zeros(2 * reach + 2)])
-    monkeypatch.setattr(diagnose, "fault_evidence", lambda posterior, bank: gained)
+    monkeypatch.setattr(posterior_rows, "fault_evidence", lambda posterior, bank: gained)
     shares = [{LEFT: 1.0}] * 4 + [{BOTH: 0.6, LEFT: 0.4}] + [{RIGHT: 1.0}] * (2 * reach + 1)
     bank = build_bank(model)
 
     def named_by(of):
-        found = diagnose.rows_of_posterior(small.flight(of, len(shares)), of, bank, posterior(bank, *shares))
-        assert found.faulty.tolist() == [0, 1] + [1] * (len(shares) - 2)
+        found = posterior_rows.rows_of_posterior(
+            small.flight(of, len(shares)), of, bank, posterior(bank, *shares)
+        )
+        assert found.faulty.tolist() == [0] + [1] * (len(shares) - 1)
         return found.isolated_surfaces.tolist()
 
     assert named_by(model) == ["", "unknown", "unknown", *["left"] * (2 + reach), *["right"] * (reach + 1)]

@@ -7,8 +7,8 @@ import pytest
 
 from beaver_ftc_logs.bank import build_bank
 from beaver_ftc_logs.diagnose import diagnose
-from beaver_ftc_logs.findings import isolability_document, isolability_sentences
 from beaver_ftc_logs.identification import identify
+from beaver_ftc_logs.isolability import isolability_document, isolability_sentences
 from beaver_ftc_logs.vehicle import load_vehicle
 from products.logs import synthetic
 

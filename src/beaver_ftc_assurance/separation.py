@@ -47,7 +47,7 @@ def separate(scenario: Scenario, rate_deg_s: float = LARGEST_RATE_DEG_S) -> Docu
     """Fly a scenario, and propose a doublet for each two of the candidates that remain at its end.
 
     rate_deg_s: largest allowed body rate, deg/s. Raises BadInput if no alarm was raised, if fewer than two
-    candidates remain, or if the scenario does not determine where a doublet brings the surfaces.
+    candidates remain, or if the scenario declares pairs of faults or errors of the servos.
     """
     check_scheme(scenario)
     if scenario.fdi.pairs:

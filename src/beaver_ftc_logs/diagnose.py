@@ -52,7 +52,8 @@ def reversed_command_error(flight: str, surface: str, allowed: str) -> BadInput:
 
 
 def _diagnose_checked_log(samples: Samples, model: Model) -> LogRows:
-    """The rows of a flight whose columns fit the model. silent (n,): where nothing answers the commands."""
+    """The rows of a flight whose columns fit the model. P (n, H): probabilities of the hypotheses, of which
+    the last is that nothing answers the commands; silent (n,): where this is likely."""
     bank = build_bank(model)
     known = trust.without_dead_rows(samples, model)
     P = bank_posterior(known, model, bank)

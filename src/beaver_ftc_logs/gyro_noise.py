@@ -6,8 +6,8 @@ covariance Q and gyros of variance s2 the residual is
     w[k] = e[k] + v[k] - A1 v[k-1] - ... - Ah v[k-h]
 
 a moving average whose autocovariance is known. The predictor of w[k] from earlier residuals solves the
-Yule-Walker equations. Its own residual is white, so no past command is correlated with it, whatever the law
-feeds back [Ljung1999, section 13.4].
+Yule-Walker equations. The residual of this prediction is white, so no past command is correlated with it,
+whatever the law feeds back [Ljung1999, section 13.4].
 
 Q (3, 3): (rad/s)2. s: standard deviation of a gyro, rad/s. A (h, 3, 3). M (h + 1, 3, 3) = (1, -A1, ..., -Ah).
 Rows 3 (j - 1) to 3 j of the model's `past` are Aj', since `past` multiplies from the right.

@@ -74,7 +74,7 @@ _PX4_ROTARY_WINGS = {2: "quadrotor", 3: "coaxial helicopter", 4: "helicopter", 1
 _PX4_VTOL_TYPES = range(19, 26)
 # SYS_AUTOSTART of multicopters [PX4, airframes reference].
 _PX4_COPTERS = range(4000, 13000)
-# Parameters that ArduCopter has in some release, and one that only ArduPlane has.
+# Parameters that ArduCopter has in some release, and one that ArduPlane has and ArduCopter has not.
 _COPTER_PARAMETERS = ("MOT_SPIN_ARM", "MOT_SPIN_ARMED", "MOT_SPIN_MIN", "MOT_THST_EXPO")
 _PLANE_PARAMETER = "Q_ENABLE"
 _MIN_ROTORS = 3  # number of columns of motors that show a multicopter, if no column is a command of a surface

@@ -112,11 +112,12 @@ class TextTable:
 
     @classmethod
     def _with_delimiter(cls, lines: Sequence[str], delimiter: str) -> "TextTable | None":
-        """The table in the lines if this delimiter is between cells; None if there is none. The header is the
-        first line of several cells that are no numbers, with
+        """The table in the lines if this delimiter is between cells; None if there is none.
 
-            a line of as many cells, one of them a number, among the next four lines that are not empty, or
-            no further line, if it is the first line.
+        The header is the first line of several cells that
+
+        - are no numbers, if one of the next four lines that are not empty has as many cells, one of them a
+        number; - or are all that the lines hold, i.e. it is the first line, with nothing below.
         """
         rows = [_split_cells(line_text, delimiter) for line_text in lines]
         for line, header in enumerate(rows):

@@ -237,10 +237,9 @@ class _Flight:
         """Evidence against the fault of estimator e at frame k, the first of these inequalities that is
         violated:
 
-            theta may change in each frame    of frame k alone, of the detection filters, of the isolation
-            filter theta is constant                 of two frames, for a loss and `fault_profile: abrupt`; of
-            the
-                                              isolation filter, for `thresholds: published`
+            theta may change in each frame   of frame k, the detection filters, the isolation filter
+            theta is constant                of two frames, for a loss and `fault_profile: abrupt`;
+                                             of the isolation filter, for `thresholds: published`
 
         The isolation filter, and the two frames, begin with the alarm.
         """

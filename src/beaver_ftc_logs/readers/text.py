@@ -116,8 +116,8 @@ class TextTable:
 
         The header is the first line of several cells that
 
-        - are no numbers, if one of the next four lines that are not empty has as many cells, one of them a
-        number; - or are all that the lines hold, i.e. it is the first line, with nothing below.
+        - are no numbers, if one of the next four lines that are not empty has as many cells, with a number;
+        - or are all that the lines hold, i.e. it is the first line, with nothing below.
         """
         rows = [_split_cells(line_text, delimiter) for line_text in lines]
         for line, header in enumerate(rows):

@@ -88,8 +88,12 @@ def certificate(
     }  # fmt: skip
     if not (events := event_rows(rows)):
         return Certified(with_digest(document), log, {}, scenario_text)
-    known = [*events.values()]
-    tape = recorder.tape(known, n) if recorder else tape_of_flight_again(scenario, known, n)
+    frames_of_events = [*events.values()]
+    tape = (
+        recorder.tape(frames_of_events, n)
+        if recorder
+        else tape_of_flight_again(scenario, frames_of_events, n)
+    )
     flight = _Flight(scenario, rows, tape, history_of(scenario, rows, tape))
     for statement in flight.statements(events):
         if "because" in statement:  # not certified: without a row, since nothing can prove it

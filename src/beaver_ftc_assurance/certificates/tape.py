@@ -146,9 +146,12 @@ class Recorder:
         self._keep_frame(*self._arguments)
 
     def tape(self, events: Sequence[int], rows: int) -> Tape:
-        """The tape of the frames around `events`, as far as they were copied without a restart of the
-        diagnosis. rows: number of frames of the flight. before: rows of the ring with the frames up to the
-        alarm.
+        """The tape of the frames around `events`. rows: number of frames of the flight.
+
+        first: the first frame that is in the ring for the first event and for the alarm, not before the
+        diagnosis began or the last alarm was withdrawn. end: the frame after the last one, `after` frames
+        from the last event on, not after a restart of the diagnosis. before: rows of the ring with the frames
+        up to the alarm.
         """
         last = FrameReadout(self._last[0])
         config = self._scenario.fdi

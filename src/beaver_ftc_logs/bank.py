@@ -64,11 +64,11 @@ class HypothesisBank(NamedTuple):
 
     @property
     def is_fault_hypothesis(self) -> np.ndarray:
-        """Which hypotheses say that some surface has lost effectiveness, (H,)."""
+        """Whether a hypothesis is a loss of effectiveness of one or two groups, (H,)."""
         return (self.hypothesis_kind == GROUP_LOSS) | (self.hypothesis_kind == PAIR_LOSS)
 
     def is_fault_of_group(self, g: int) -> np.ndarray:
-        """Which hypotheses say that a group has lost effectiveness, (H,)."""
+        """Whether a hypothesis contains a loss of effectiveness of group g, (H,)."""
         return (self.effectiveness[:, g] < 1.0) & (self.hypothesis_kind != NO_RESPONSE)
 
 
@@ -195,7 +195,7 @@ def build_states(model: Model, noise: NoiseModel) -> StateModel:
 
     States 0 to 2 are the trim, 3 the common gain, 4 to 3 + n the own gains of the n groups. r (3,): variance
     of the noise, (rad/s)2; shift (n, 3): trim by a shift of each group's command, rad/s; drift, hidden (n,):
-    variance of an own gain that returns in time, and of what the fit misreads.
+    variance of an own gain that returns in time, and of the share that the fit misreads.
     """
     settings = model.settings
     n = len(model.groups)

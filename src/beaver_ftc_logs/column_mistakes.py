@@ -54,7 +54,7 @@ MAX_REVERSED_GAIN = -0.3
 _MIN_COMMAND_GAIN = 0.2
 # Half-way from the gain of a wrong sign, -1, to that of a lost surface, 0.
 _REVERSED_GAIN_LIMIT = -0.5
-# Probability with which chance alone may look like a mistake in the columns.
+# Largest probability that a correct log seems to have a mistake in its columns.
 _FALSE_MISTAKE_CHANCE = 0.001
 # A longer flight is reduced to about so many samples, to save computing time.
 _MAX_COMPARED_SAMPLES = 8000

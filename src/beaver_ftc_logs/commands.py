@@ -1,4 +1,5 @@
-"""`beaver-ftc identify` and `diagnose`: from recorded flights to a model, and to what broke in a flight."""
+"""`beaver-ftc identify` and `diagnose`: from recorded flights to a model, and with it to the faults of a
+flight."""
 
 import os
 from collections.abc import Callable

@@ -156,7 +156,7 @@ def duration_text(verdict: Document) -> str:
 
 
 def _event_text(event: Document) -> str:
-    """The line of an event: when it lasted, what was named, and the effectiveness."""
+    """The line of an event: begin and end, name, and effectiveness."""
     text = ", ".join(
         f"{name} {bounds['estimate']:.2f} ({bounds['low']:.2f} to {bounds['high']:.2f})"
         for name, bounds in event["effectiveness"].items()

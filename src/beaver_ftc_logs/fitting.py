@@ -32,10 +32,10 @@ _OTHER_DAYS: Document = {
     "gain_time_s": 300.0,
     "own_gain_sd": 0.03,
 }
-# Flights under other laws: a law that reacts to what the model lacks ties the commands to it. So the gain of
-# each group varies more, and a name needs more evidence.
-# bounds: for a second or two after a loss most of the posterior mass still claims health. A mass of 0.9 held
-# the truth at the fault in 0.70 to 0.94 of the samples, fewest of large losses; 0.97 in 0.83 to 0.99.
+# Flights under other laws. A law reacts to motion that the model does not explain, so the commands depend on
+# this motion. The gain of each group then varies more, and a name needs more evidence. bounds: for a second
+# or two after a loss most of the posterior mass still claims health. A mass of 0.9 held the truth at the
+# fault in 0.70 to 0.94 of the samples, fewest of large losses; 0.97 in 0.83 to 0.99.
 _OTHER_LAWS: Document = {
     "own_gain_sd": 0.05,
     "own_gain_time_s": 20.0,
@@ -44,7 +44,7 @@ _OTHER_LAWS: Document = {
     "one_group": True,
     "bounds": 0.97,
 }
-# Flights under other laws in moving air: what differs from `_OTHER_LAWS`.
+# Flights under other laws in moving air: the settings that differ from `_OTHER_LAWS`.
 _MOVING_AIR: Document = {"own_gain_sd": 0.08, "own_gain_time_s": 100.0}
 # `power` of labelled flights: their residual is coloured.
 _POWER_LABELLED = 0.8

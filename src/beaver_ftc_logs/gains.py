@@ -117,7 +117,7 @@ def _gain_errors(fold: Fold, window_s: float | None = None, loudness: float = 1.
     errors = []
     for rows in np.array_split(np.arange(len(e)), n):
         FF, Fe, g = _gains(*(centred(values[rows]) / np.sqrt(loudness) for values in (F, e)))
-        A = np.eye(len(g)) + S @ FF  # singular by rounding where nothing tells a gain
+        A = np.eye(len(g)) + S @ FF  # singular by rounding if no effect shows a gain
         error = max(float(Fe @ np.linalg.lstsq(A, g, rcond=RANK_TOLERANCE)[0]), 0.0)
         errors.append((error, int(np.linalg.matrix_rank(FF, tol=RANK_TOLERANCE * np.trace(FF)))))
     return errors

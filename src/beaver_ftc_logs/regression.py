@@ -1,4 +1,4 @@
-"""The one regression of a flight: the regressors of the next sample's rates, what a model leaves of them
+"""The one regression of a flight: the regressors of the next sample's rates, the residuals of a model
 (`Innovations`), and least squares on both. Identification, checks, detection and bounds all use it.
 
     rates[k] = c + A' x[k] + sum over groups g of a_g F_g[k] + noise,      F_g[k] = sum_j B_gj u_g[k-j]
@@ -10,7 +10,7 @@
     A               coefficients of the past (3 h + D f, 3)
     u, U            commands of the groups, shares of travel, (n, G); the same at the lags 1 to L (n, G, L)
     a               effectiveness of each group (G,)
-    B, F            response (G, L, 3), rad/s; what the groups do while they are healthy (n, G, 3), rad/s
+    B, F            response (G, L, 3), rad/s; effect of the healthy groups (n, G, 3), rad/s
     y               rates that the past leaves unexplained (n, 3), rad/s
     e, R, W         residual (n, 3), rad/s; its covariance (3, 3), (rad/s)2; whitening matrix: e W is white
     Z, v            whitened regressors of c and a (3 n, 3 + G), whitened y (3 n,): three rows a sample
@@ -105,7 +105,8 @@ def _delay_rows(values: np.ndarray, lag: int, fill: float) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Innovations:
-    """What the past does not explain of a flight's rates, a row a sample: y = c + sum_g F_g + e in health.
+    """The part of a flight's rates that the past does not explain, one row for each sample: y = c + sum_g F_g
+    + e in health.
 
     rows (n,): place of each row in the flight. is_known (n,): whether the whole past of the row is known; if
     not, its row of e is 0. y (n, 3), F (n, G, 3), c (3,) rad/s: as in the head of this file, less the part

@@ -1,4 +1,4 @@
-"""Compare a diagnosis with what the log states: labels of effectiveness, or time and surface of a failure.
+"""Compare a diagnosis with the log's own truth: labels of effectiveness, or time and surface of a failure.
 
 The scores are computed after the diagnosis (`--score`, the benchmark, the tests of an identification). The
 filter never uses them.
@@ -85,7 +85,7 @@ def score_against_failures(
     false_alarms         number of alarms that begin before the failure
     detected, delay_s    whether a row from the failure on has an alarm; time of the first one after it, s
     named                share of these rows by the isolated surfaces
-    right_group          whether the most frequent name is right, as of `_is_main_name_right`
+    right_group          whether the most frequent name is right (`_is_main_name_right`)
 
     An alarm that lasts over the failure counts as both: it is false, and it detects with the delay 0 s.
     """

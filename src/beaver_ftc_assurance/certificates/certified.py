@@ -1,4 +1,4 @@
-"""A certificate with what proves it: the log, the columns that the log lacks, the text of scenario.yaml."""
+"""A certificate with its proof: the log, the columns that the log lacks, and the text of scenario.yaml."""
 
 import json
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""The likelihood ratio of a fault from its onset to an alarm: evidence, limit, and what can be left out.
+"""The likelihood ratio of a fault from its onset to an alarm: evidence, limit, and a shorter equivalent.
 
     evidence = |sum of w.g of the innovation| - sum over the constants of tolerance |sum of w.g of a constant|
     limit    = max(level sqrt(D), room + LEVEL_NOISE_SHARE level sqrt(D)),   D = sum of w.g of the signature

@@ -1,4 +1,4 @@
-"""`beaver-ftc evidence`: fly a plan of requirements, and write what it shows."""
+"""`beaver-ftc evidence`: fly a plan of requirements, and write the evidence."""
 
 import sys
 from dataclasses import dataclass

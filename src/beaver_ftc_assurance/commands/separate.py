@@ -1,4 +1,4 @@
-"""`beaver-ftc separate`: what would tell the candidates left apart."""
+"""`beaver-ftc separate`: propose doublets that distinguish the remaining candidates."""
 
 from pathlib import Path
 from typing import Annotated

@@ -1,1 +1,1 @@
-"""Evidence: a plan of requirements, flown and judged one by one, and the document that says so."""
+"""Evidence: fly and judge a plan of requirements, and write a document on the results."""

@@ -176,8 +176,8 @@ def _requirement(requirement: Document) -> Iterator[Part]:
 
 
 def _condition_in_words(condition: Document) -> str:
-    """Words for the condition of a requirement: its formula, bar or expectations. asked: field of the
-    document."""
+    """Words for the condition of a requirement: its formula, bar or expectations. condition: the field
+    `asked`."""
     if "formula" in condition:
         return str(condition["formula"])
     if "bar" in condition:

@@ -17,30 +17,33 @@ MOTION_OF_AXIS = {"p": "roll", "q": "pitch", "r": "yaw"}
 
 
 Texts = tuple[str, str]
-"""What is expected, and what came out; the latter empty if it adds nothing."""
+"""Two texts: the expected value, and the actual value; the second is empty if it adds nothing."""
 
 
 @dataclass(frozen=True)
 class Rule:
-    """An expectation that a value of the metrics equals. path: of the value. says: its name in words."""
+    """An expectation that a value of the metrics equals.
+
+    path: keys that lead to the value, such as `detection.delay_s`. says: the name of the value in words.
+    """
 
     path: str
     says: str
 
     def actual(self, metrics: Metrics) -> Any:
         """The value in the metrics."""
-        found = metrics.at(self.path)
-        return list(found) if isinstance(found, tuple) else found
+        value = metrics.at(self.path)
+        return list(value) if isinstance(value, tuple) else value
 
     def is_met(self, actual: Any, expected: Any) -> bool:
         """Whether the actual value meets the expectation."""
         return bool(actual == expected)
 
-    def texts(self, said: Expectation) -> Texts:
-        """Expected and actual value in words; the latter empty if it is the same."""
-        is_as_expected = said.passed and said.actual == said.expected
-        actual = "" if is_as_expected else value_text(said.actual)
-        return f"{self.says} {value_text(said.expected)}", actual
+    def texts(self, result: Expectation) -> Texts:
+        """Expected and actual value in words; the second text is empty if both are equal."""
+        is_as_expected = result.passed and result.actual == result.expected
+        actual = "" if is_as_expected else value_text(result.actual)
+        return f"{self.says} {value_text(result.expected)}", actual
 
 
 class Among(Rule):
@@ -53,7 +56,7 @@ class Among(Rule):
 
 @dataclass(frozen=True)
 class Limit(Rule):
-    """An expectation that the size of a value is at most a limit, in this unit."""
+    """An expectation |value| <= limit, both in `unit`."""
 
     unit: str
 
@@ -61,25 +64,25 @@ class Limit(Rule):
         """Whether the value exists, and is within the limit."""
         return actual is not None and abs(actual) <= expected
 
-    def texts(self, said: Expectation) -> Texts:
+    def texts(self, result: Expectation) -> Texts:
         """The limit, and the value with its share of the limit."""
-        share = _share_of_limit(said)
+        share = _share_of_limit(result)
         of_limit = "" if share is None else f" ({three_digits(100 * share)} % of the limit)"
-        actual = value_text(said.actual) + ("" if said.actual is None else f" {self.unit}{of_limit}")
-        return f"{self.says} ≤ {value_text(said.expected)} {self.unit}", actual
+        actual = value_text(result.actual) + ("" if result.actual is None else f" {self.unit}{of_limit}")
+        return f"{self.says} ≤ {value_text(result.expected)} {self.unit}", actual
 
 
 @dataclass(frozen=True)
 class Flag(Rule):
-    """An expectation of true or false. says, says_not: the words for true, and for false."""
+    """An expectation of true or false. says: the words for true; says_not: the words for false."""
 
     says_not: str
 
-    def texts(self, said: Expectation) -> Texts:
-        """The expected words, and the opposite if that came out."""
+    def texts(self, result: Expectation) -> Texts:
+        """The words for the expected value, and those for the actual value if it is the opposite."""
         words = (self.says_not, self.says)
-        is_as_expected = said.passed or said.actual is None
-        return words[said.expected], "" if is_as_expected else words[said.actual]
+        is_as_expected = result.passed or result.actual is None
+        return words[result.expected], "" if is_as_expected else words[result.actual]
 
 
 class Absence(Flag):
@@ -90,7 +93,8 @@ class Absence(Flag):
         return not metrics.at(self.path)
 
 
-ALL_NAMES = Rule("isolation.names", "isolated fault")  # in place of "isolated_as", if a list is expected
+# The rule of the key `isolated_as` if the scenario expects a list of names.
+ALL_NAMES = Rule("isolation.names", "isolated fault")
 RULES: dict[str, Rule] = {
     "detected_within_s": Limit("detection.delay_s", "detection delay", "s"),
     "isolated_within_s": Limit("isolation.delay_s", "isolation delay", "s"),
@@ -121,8 +125,8 @@ RULES: dict[str, Rule] = {
 
 
 def evaluate(expect: Any, metrics: Metrics) -> list[Expectation]:
-    """One record for each expectation set in `expect`, in its fields' order; with `reason`, where one is
-    known."""
+    """One record for each expectation that is set in `expect`, in the order of its fields. A record has a
+    `reason` if the reason of a failure is known."""
     return [_judged(name, expected, metrics) for name, expected in expected_of(expect)]
 
 
@@ -132,7 +136,8 @@ def expectation_names(expect: Any) -> list[str]:
 
 
 def expected_of(expect: Any) -> Iterator[tuple[str, Any]]:
-    """(name, value) of each expectation set in `expect`, those of a section one by one."""
+    """(name, value) of each expectation that is set in `expect`. An entry of a section has the name
+    `section.key`."""
     for name, expected in expect.model_dump(exclude_none=True).items() if expect else ():
         if isinstance(expected, dict):
             yield from ((f"{name}.{part}", limit) for part, limit in expected.items())
@@ -141,9 +146,11 @@ def expected_of(expect: Any) -> Iterator[tuple[str, Any]]:
 
 
 def _judged(name: str, expected: Any, metrics: Metrics) -> Expectation:
+    """One expectation compared with the metrics. A premature name meets no expectation about a name."""
     rule = ALL_NAMES if isinstance(expected, list) else RULES[name]
     actual = rule.actual(metrics)
-    is_of_a_name = rule.path.startswith("isolation.") and rule is not ALL_NAMES  # which has no early name
+    # `isolation.names` leaves out premature names: ALL_NAMES needs no test for them
+    is_of_a_name = rule.path.startswith("isolation.") and rule is not ALL_NAMES
     is_early = is_of_a_name and bool(metrics.at("isolation.premature"))
     passed = rule.is_met(actual, expected) and not is_early
     reason = None
@@ -159,9 +166,11 @@ def _reason_not_met(expected: Any, is_early: bool, metrics: Metrics) -> str | No
     isolation = metrics.isolation
     if is_early:
         return f"{isolation.fault} was named at {isolation.time_s:g} s, before the fault began"
-    for last in reversed(isolation.withdrawn if isolation else ()):
-        if last.fault == expected:
-            return f"{expected} was named at {last.from_s:g} s, and the name withdrawn at {last.to_s:g} s"
+    for earlier in reversed(isolation.withdrawn if isolation else ()):
+        if earlier.fault == expected:
+            return (
+                f"{expected} was named at {earlier.from_s:g} s, and the name withdrawn at {earlier.to_s:g} s"
+            )
     inconclusive = detection and detection.inconclusive
     return in_words(inconclusive.document()) if inconclusive else None
 
@@ -179,8 +188,8 @@ def margin(found: Expectation) -> float | None:
 class ExpectationInWords(NamedTuple):
     """An expectation compared with the flight.
 
-    limit: what is expected. actual: what the flight gave, empty if it adds nothing. share_of_limit: actual
-    over limit, None if the expectation is no limit.
+    limit: the expected value. actual: the actual value; empty if it adds nothing. share_of_limit: |actual| /
+    limit; None if the expectation is no limit.
     """
 
     name: str
@@ -197,23 +206,28 @@ class ExpectationInWords(NamedTuple):
 
 def expectations_in_words(metrics: Metrics) -> list[ExpectationInWords]:
     """Each expectation in words."""
-    return [_in_words(found) for found in metrics.expectations]
+    return [_in_words(expectation) for expectation in metrics.expectations]
 
 
-def _in_words(said: Expectation) -> ExpectationInWords:
-    rule = RULES.get(said.name) or Rule("", without_underscores(said.name))
-    limit, actual = rule.texts(said)
-    reason = said.reason if actual or not said.passed else ""
-    share = _share_of_limit(said) if isinstance(rule, Limit) else None
-    return ExpectationInWords(said.name, limit, "; ".join(filter(None, (actual, reason))), said.passed, share)
+def _in_words(result: Expectation) -> ExpectationInWords:
+    rule = RULES.get(result.name) or Rule("", without_underscores(result.name))
+    limit, actual = rule.texts(result)
+    reason = result.reason if actual or not result.passed else ""
+    share = _share_of_limit(result) if isinstance(rule, Limit) else None
+    return ExpectationInWords(
+        result.name, limit, "; ".join(filter(None, (actual, reason))), result.passed, share
+    )
 
 
-def _share_of_limit(said: Expectation) -> float | None:
-    return abs(float(said.actual)) / said.expected if said.expected and said.actual is not None else None
+def _share_of_limit(result: Expectation) -> float | None:
+    """|actual| / expected; None if there is no actual value, or if 0 is expected."""
+    return (
+        abs(float(result.actual)) / result.expected if result.expected and result.actual is not None else None
+    )
 
 
 def value_text(value: Any) -> str:
-    """A value of the metrics for people: what is expected, and what came out, of any key of `expect:`."""
+    """An expected or actual value of any key of `expect:` as text."""
     if value is None or value == ():
         return "none"
     if isinstance(value, bool):

@@ -1,4 +1,5 @@
-"""The log for other tools: as CSV, as a flight recording for Tacview, and as a recorder on board has it."""
+"""The log for other tools: as CSV, as a flight recording for Tacview, and as a recorder on board writes
+it."""
 
 from collections.abc import Callable, Collection, Iterator
 from functools import partial
@@ -13,10 +14,10 @@ from beaver_ftc.results.model import Document, Metrics
 from beaver_ftc.results.recordings import write_recording
 from beaver_ftc.results.style import marks
 
-ACMI_RATE_HZ = 25.0  # smooth to look at; a viewer interpolates
-FLAP = "flap"  # a surface of this name is shown as a share of its travel
+ACMI_RATE_HZ = 25.0  # at most so many frames in a second of the recording: a viewer interpolates
+FLAP = "flap"  # a surface of this name is recorded as a share of its travel
 _FLAP_COLUMN = "flap_pos_rad"
-# Any time will do as reference; it is the same for every run, so that runs overlay.
+# The reference time is arbitrary. All runs have the same one, so that a viewer can overlay them.
 _ACMI_HEAD = """\
 FileType=text/acmi/tacview
 FileVersion=2.2
@@ -26,7 +27,7 @@ FileVersion=2.2
 0,Title={scenario}
 b1,Type=Air+FixedWing,Name={aircraft},Color=Blue
 """
-# Longitude, latitude (deg), altitude (m), roll, pitch, yaw (deg); air data (m/s, deg).
+# A frame: longitude, latitude (deg), altitude (m), roll, pitch, yaw (deg); air data (m/s, deg).
 _ACMI_FRAME = (
     "#{t_s:.3f}\n"
     "b1,T={longitude:.8f}|{latitude:.8f}|{altitude_m:.3f}|{phi_deg:.3f}|{theta_deg:.3f}|{psi_deg:.3f},"
@@ -44,10 +45,10 @@ Exports = dict[str, Callable[[], None]]
 def exports_of(
     folder: Path, aircraft: Aircraft, document: Document, kinds: Collection[str], recording: str | None
 ) -> Exports:
-    """By its name, the function that writes each export of a result folder that has its log.
+    """By the name of each export, the function that writes it. The result folder has its log.
 
-    document: the metrics, empty if there are none: then there is no ACMI. kinds: of "csv" and "acmi".
-    recording: a kind of recordings.py.
+    document: the metrics; if it is empty, ACMI is left out. kinds: any of "csv" and "acmi". recording: a key
+    of `RECORDING_FILE_OF_KIND` in recordings.py; None for no recording.
     """
     log_path = folder / "log.parquet"
     exports: Exports = {}
@@ -68,7 +69,7 @@ def write_csv(log_path: Path, path: Path) -> None:
     """The log as CSV: one header line with the columns' names, then a line a frame."""
     from pyarrow.csv import CSVWriter, WriteOptions
 
-    # pyarrow quotes the names in its header whatever it is told: ours is written by hand
+    # pyarrow quotes the names in its header with any quoting style, so the header is written here
     options = WriteOptions(include_header=False, quoting_style="none")
     with log.open_parquet_log(log_path) as source:
         schema = source.schema_arrow
@@ -94,31 +95,36 @@ def _escape_acmi_text(text: str) -> str:
 
 
 def _acmi_frames(log_path: Path, metrics: Metrics, aircraft: Aircraft) -> Iterator[str]:
-    """A frame of the recording at ACMI_RATE_HZ at most, each event in the first frame not before it."""
+    """The frames of the recording. An event stands behind the first frame whose time is not before it.
+
+    On a sphere of radius R (m), which touches the first frame: latitude = latitude_0 + north / R, longitude =
+    east / (R cos(latitude_0)), both in rad.
+    """
     events = sorted(marks(metrics), key=lambda mark: mark.time_s)
-    full_rad = None
+    full_flap_rad = None
     if FLAP in aircraft.surfaces:
-        full_rad = aircraft.travel[FLAP].max_rad or aircraft.travel[FLAP].min_rad
-    columns = _ACMI_COLUMNS if full_rad is None else (*_ACMI_COLUMNS, _FLAP_COLUMN)
+        full_flap_rad = aircraft.travel[FLAP].max_rad or aircraft.travel[FLAP].min_rad
+    columns = _ACMI_COLUMNS if full_flap_rad is None else (*_ACMI_COLUMNS, _FLAP_COLUMN)
     radius_m = 0.0
     flaps = ""
     for row in _rows_at_acmi_rate(log.StoredLog(log_path), columns):
-        radius_m = radius_m or EARTH_RADIUS_M + row["altitude_m"]  # of the first
+        radius_m = radius_m or EARTH_RADIUS_M + row["altitude_m"]  # R, from the first row alone
         latitude = START_LATITUDE_DEG + degrees(row["north_m"] / radius_m)
         longitude = degrees(row["east_m"] / (radius_m * cos(radians(START_LATITUDE_DEG))))
         angles = {name.replace("_rad", "_deg"): degrees(row[name]) for name in row if name.endswith("_rad")}
-        if full_rad is not None:
-            flaps = f",Flaps={row[_FLAP_COLUMN] / full_rad:.4f}"
+        if full_flap_rad is not None:
+            flaps = f",Flaps={row[_FLAP_COLUMN] / full_flap_rad:.4f}"
         yield _ACMI_FRAME.format(**row, **angles, latitude=latitude, longitude=longitude, flaps=flaps)
         while events and events[0].time_s <= row["t_s"] + 1e-9:
             yield f"0,Event=Bookmark|b1|{_escape_acmi_text(events.pop(0).label)}\n"
 
 
 def _rows_at_acmi_rate(source: log.Log, columns: tuple[str, ...]) -> Iterator[dict[str, float]]:
-    every = max(1, ceil(1.0 / (ACMI_RATE_HZ * source.frame_s) - 1e-9))
-    seen = 0
+    """Rows of the log by column: row 0, and every n-th one, for at most ACMI_RATE_HZ."""
+    step = max(1, ceil(1.0 / (ACMI_RATE_HZ * source.frame_s) - 1e-9))
+    rows_before = 0
     for chunk in source.read_chunks(columns):
         rows = len(chunk["t_s"])
-        for i in range(-seen % every, rows, every):
+        for i in range(-rows_before % step, rows, step):
             yield {name: float(values[i]) for name, values in chunk.items()}
-        seen += rows
+        rows_before += rows

@@ -26,11 +26,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DPI = 110
-LEFT, STEPS_LEFT, RIGHT, TOP, BOTTOM, GAP = 0.75, 1.2, 0.2, 0.9, 0.85, 0.42  # inches
-LEGEND_LINE_INCHES = 0.17  # inches, of one more line of the legend
-MIN_SHOWN_RATIO = 0.1  # of a logarithmic axis: what is smaller is noise
+# Margins of a figure and the gap between its panels, inches. STEPS_LEFT: left margin beside names of steps.
+LEFT, STEPS_LEFT, RIGHT, TOP, BOTTOM, GAP = 0.75, 1.2, 0.2, 0.9, 0.85, 0.42
+LEGEND_LINE_INCHES = 0.17  # height of one more line of the legend, inches
+MIN_SHOWN_RATIO = 0.1  # lower end of a logarithmic axis: smaller ratios are noise
 STYLES = ("screen", "paper")
-PAPER_WIDTH = 8.4 / 2.54  # inches: a column of a journal
+PAPER_WIDTH = 8.4 / 2.54  # inches: 8.4 cm, a column of a journal
 PAPER_DPI = 300
 PAPER_FONT = 8  # points
 
@@ -40,7 +41,7 @@ Options = dict[str, Any]  # keyword arguments of matplotlib
 
 @dataclass(frozen=True)
 class Picture:
-    """A view to be drawn into a file, with what it shows."""
+    """A view to be drawn into a file: its series (points,) by column, the event marks and the subtitle."""
 
     path: Path
     view: View
@@ -52,26 +53,27 @@ class Picture:
 def pictures_of(
     log_path: Path, metrics: Metrics, folder: Path, formats: Sequence[str] = ("png",)
 ) -> list[Picture]:
-    """All pictures of a log: every view over the whole flight, some around the fault as well.
+    """All pictures of a log: every view over the whole flight, and those with `closeup` also around the
+    fault.
 
-    formats: png, pdf, svg; PDF and SVG are drawn for papers.
+    formats: png, pdf, svg; PDF and SVG are drawn in the style of a paper.
     """
     source = StoredLog(log_path)
     shown = views_of_flight(source.columns, metrics)
     event_marks = marks(metrics)
     window = closeup_window(event_marks)
-    asked = [(shown, WHOLE_FLIGHT_S, "")]
+    wanted = [(shown, WHOLE_FLIGHT_S, "")]
     if window:
-        asked.append((tuple(view for view in shown if view.closeup), window, "-closeup"))
-    found = []
-    for drawn, span, ending in asked:
-        series = series_of(source, [name for view in drawn for name in view.columns], span)
-        for view in drawn:
-            own = {name: series[name] for name in ("t_s", *view.columns)}
+        wanted.append((tuple(view for view in shown if view.closeup), window, "-closeup"))
+    pictures = []
+    for group, span, ending in wanted:
+        series = series_of(source, [name for view in group for name in view.columns], span)
+        for view in group:
+            view_series = {name: series[name] for name in ("t_s", *view.columns)}
             for kind in formats:
                 path = folder / f"{view.name}{ending}.{kind}"
-                found.append(Picture(path, view, own, event_marks, metrics.scenario))
-    return found
+                pictures.append(Picture(path, view, view_series, event_marks, metrics.scenario))
+    return pictures
 
 
 def save(picture: Picture) -> None:
@@ -84,7 +86,7 @@ def save(picture: Picture) -> None:
 
 # No date: the same flight gives the same file.
 _SAVE_OPTIONS_OF_FORMAT: Options = {
-    # a tenth larger than with zlib's level 6, in two thirds of the time
+    # level 1 of zlib: files are a tenth larger than with level 6, in two thirds of the time
     "png": {"metadata": {"Software": SOFTWARE_MARK}, "pil_kwargs": {"compress_level": 1}},
     "pdf": {"metadata": {"Creator": SOFTWARE_MARK, "CreationDate": None}},
     "svg": {"metadata": {"Creator": SOFTWARE_MARK, "Date": None}},
@@ -94,22 +96,23 @@ _SAVE_OPTIONS_OF_FORMAT: Options = {
 def draw(
     view: View, series: Values, event_marks: Sequence[Mark], subtitle: str, style: str = "screen"
 ) -> "Figure":
-    """One view as a matplotlib figure, over the time that `series` covers; style: of STYLES."""
+    """One view as a matplotlib figure, over the time that `series` covers. style: one of STYLES."""
     figure, grid = _empty_figure_and_axes(view, figure_class())
-    every = list(grid.flat)
-    for axes, panel in zip(every, view.panels, strict=False):
+    all_axes = list(grid.flat)
+    for axes, panel in zip(all_axes, view.panels, strict=False):
         _draw_panel(axes, panel, series, event_marks)
-    _write_absent_text(view, series, every)
+    _write_absent_text(view, series, all_axes)
     for axes in grid[-1]:
         axes.set_xlabel("time (s)", fontsize=9)
     top = 1 - 0.12 / figure.get_figheight()
     figure.suptitle(f"{view.title}\n{subtitle}", fontsize=11, y=top, va="top")
-    _draw_legend(figure, every)
+    _draw_legend(figure, all_axes)
     return _restyle_for_paper(figure) if style == "paper" else figure
 
 
 def _restyle_for_paper(figure: "Figure") -> "Figure":
-    """As wide as a column of a journal, letters of 8 points and less; no title, which the caption has."""
+    """Shrink a figure to the width of a column of a journal, with letters of at most PAPER_FONT. The title
+    goes: the caption of the paper has it."""
     from matplotlib.text import Text
 
     shrink = PAPER_WIDTH / figure.get_figwidth()
@@ -134,7 +137,7 @@ def _restyle_for_paper(figure: "Figure") -> "Figure":
 
 @cache
 def figure_class() -> "type[Figure]":
-    """matplotlib's Figure, made to show itself in a notebook without pyplot and its global state."""
+    """A subclass of matplotlib's Figure that a notebook can show without pyplot and its global state."""
     from matplotlib.figure import Figure
 
     class NotebookFigure(Figure):
@@ -149,7 +152,11 @@ def figure_class() -> "type[Figure]":
 
 
 def _empty_figure_and_axes(view: View, new_figure: Any) -> tuple["Figure", Any]:
-    """An empty figure with its grid of axes, laid out in inches: a solver would double the time."""
+    """An empty figure with its grid of axes (rows, columns). The layout is computed here, in inches: the
+    layout engine of matplotlib would double the time.
+
+    Row heights, inches: 0.25 + 0.25 for each step; 1.75 of a single column; 1.5 of several.
+    """
     first_of_rows = view.panels[:: view.n_panel_columns]
     down = len(first_of_rows)
     is_single = view.n_panel_columns == 1
@@ -180,7 +187,7 @@ def _draw_panel(axes: "Axes", panel: Panel, series: Values, event_marks: Sequenc
     _draw_shade(axes, panel, series)
     _draw_event_marks(axes, event_marks, series["t_s"])
     title = panel.label if panel.steps or not panel.unit else f"{panel.label} ({panel.unit})"
-    axes.set_title(title, fontsize=9, y=1.0)  # at this height: looking for one takes a third of the time
+    axes.set_title(title, fontsize=9, y=1.0)  # without y, matplotlib searches a height: a third of the time
     axes.tick_params(labelsize=8)
     axes.grid(visible=True, color="#dddddd", linewidth=0.6)
     axes.ticklabel_format(axis="x", useOffset=False)
@@ -200,8 +207,8 @@ def _draw_panel(axes: "Axes", panel: Panel, series: Values, event_marks: Sequenc
 
 
 def _set_log_scale(axes: "Axes") -> None:
-    """A logarithmic scale from MIN_SHOWN_RATIO on. Matplotlib warns of data without a positive number, unless
-    the limits are set before: the residual of a flight that alarms in its first frame is 0 throughout."""
+    """A logarithmic scale from MIN_SHOWN_RATIO on. Matplotlib warns of data without a positive number unless
+    the limits are set first: the residual is 0 throughout in a flight with the alarm in its first frame."""
     extent = axes.dataLim
     if np.isfinite(extent.y1) and not np.isfinite(extent.minposy):
         axes.set_ylim(MIN_SHOWN_RATIO, 10.0)
@@ -225,22 +232,24 @@ def _draw_trace(axes: "Axes", trace: Trace, series: Values, stepped: bool) -> No
 
 
 def _draw_bars(axes: "Axes", panel: Panel, series: Values) -> None:
-    """A row a label: a bar while one of its traces is 0, a thin line while all that are there are 1."""
-    for place, row in enumerate(panel.steps):
-        of = [trace for trace in panel.traces if trace.label == row]
-        values = np.array([series[trace.column] for trace in of])
-        asked = series[panel.bars_during_column] == 1
+    """A row for each label: a bar while one of its traces is 0 (a candidate), a thin line while all traces
+    that have a value are 1 (excluded). Both are drawn only while `bars_during_column` is 1."""
+    for height, row in enumerate(panel.steps):
+        traces = [trace for trace in panel.traces if trace.label == row]
+        values = np.array([series[trace.column] for trace in traces])
+        shown = series[panel.bars_during_column] == 1
         candidate = (values == 0).any(axis=0)
-        excluded = asked & (values == 1).any(axis=0) & ~candidate
-        for where, half, colour in (
-            (asked & candidate, 0.36, LOOKS[of[0].role].colour), (excluded, 0.04, GREY)
+        excluded = shown & (values == 1).any(axis=0) & ~candidate
+        for where, half_height, colour in (
+            (shown & candidate, 0.36, LOOKS[traces[0].role].colour), (excluded, 0.04, GREY)
         ):  # fmt: skip
-            rows = series["t_s"], place - half, place + half
+            rows = series["t_s"], height - half_height, height + half_height
             axes.fill_between(*rows, where=where, step="post", color=colour, linewidth=0)
 
 
 def _limit_axis_to_quantiles(axes: "Axes", panel: Panel, series: Values) -> None:
-    """Set the axis by all but the spikes; an arrow and its value mark the largest of those."""
+    """Set the limits of the axis by the AXIS_QUANTILES of the values; an arrow with its value marks the
+    largest spike beyond each limit."""
     values = np.concatenate([trace.factor * series[trace.column] for trace in panel.traces])
     values = values[np.isfinite(values)]
     if not values.size:
@@ -260,7 +269,7 @@ def _limit_axis_to_quantiles(axes: "Axes", panel: Panel, series: Values) -> None
 
 
 def _linestyle(dash: tuple[float, ...]) -> Any:
-    """Dashes in points as matplotlib takes them (which counts in line widths: about 1.5 points)."""
+    """Dashes (points) as matplotlib takes them: as multiples of the line width, which is about 1.5 points."""
     return (0, tuple(length / 1.5 for length in dash)) if dash else "-"
 
 
@@ -289,7 +298,7 @@ def _draw_event_marks(axes: "Axes", event_marks: Sequence[Mark], t_s: np.ndarray
 
 
 def _write_absent_text(view: View, series: Values, grid: Iterable["Axes"]) -> None:
-    """Say so where a view has nothing to show, rather than leaving empty axes to be wondered at."""
+    """Write the text of a view whose columns have no data into its empty axes."""
     if view.text_without_data and all(np.isnan(series[column]).all() for column in view.columns):
         for axes in grid:
             where: Any = {"transform": axes.transAxes, "ha": "center", "va": "center"}
@@ -297,7 +306,8 @@ def _write_absent_text(view: View, series: Values, grid: Iterable["Axes"]) -> No
 
 
 def _max_legend_columns(labels: Sequence[str], width: float) -> int:
-    """The most columns of these labels that a figure, so many inches wide, has room for."""
+    """The largest number of legend columns for which these labels fit into a width, inches. A column takes
+    0.45 inches, and 0.06 for each letter of its longest label."""
     for n in range(min(len(labels), 12 if width > 11 else 9), 1, -1):
         longest = (max(map(len, part)) for part in np.array_split(labels, n))
         if sum(0.45 + 0.06 * letters for letters in longest) < width:
@@ -306,7 +316,8 @@ def _max_legend_columns(labels: Sequence[str], width: float) -> int:
 
 
 def _legend_handle_of_label(grid: Sequence["Axes"]) -> dict[str, Any]:
-    """Label and handle of what a legend is to hold."""
+    """By label, the handle of each legend entry; the first axes with a label decide. A single curve whose
+    panel title names it has no entry."""
     entries: dict[str, Any] = {}
     for axes in grid:
         handles, labels = axes.get_legend_handles_labels()
@@ -316,16 +327,17 @@ def _legend_handle_of_label(grid: Sequence["Axes"]) -> dict[str, Any]:
 
 
 def _draw_legend(figure: "Figure", grid: Sequence["Axes"]) -> None:
-    """One legend for the figure: each label once, but for the single curves that panel titles name."""
+    """One legend below the figure. Each further line of the legend lowers the panels by
+    LEGEND_LINE_INCHES."""
     shown = _legend_handle_of_label(grid)
     columns = _max_legend_columns(list(shown), figure.get_figwidth())
-    tall = figure.get_figheight()
-    more = LEGEND_LINE_INCHES * (-(-len(shown) // columns) - 1) / tall
-    top = 1 - TOP / tall
-    share = 1 - more * tall / (tall - TOP - BOTTOM)
-    for axes in grid if more else ():  # lower, to make room
-        old = axes.get_position()
-        axes.set_position((old.x0, top - share * (top - old.y0), old.width, share * old.height))
+    height = figure.get_figheight()
+    added = LEGEND_LINE_INCHES * (-(-len(shown) // columns) - 1) / height
+    top = 1 - TOP / height
+    scale = 1 - added * height / (height - TOP - BOTTOM)
+    for axes in grid if added else ():  # shrink towards the top, to make room below
+        box = axes.get_position()
+        axes.set_position((box.x0, top - scale * (top - box.y0), box.width, scale * box.height))
     figure.legend(
         shown.values(),
         shown.keys(),

@@ -1,4 +1,4 @@
-"""A flight as Python has it: its log as a table, its metrics as a document and typed, its figures."""
+"""A flight in Python: its log as a table, its metrics as a document and as records, its figures."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -97,17 +97,17 @@ class Flight:
 
     @property
     def isolation(self) -> model.Isolation:
-        """What was named."""
+        """The fault that the diagnosis named."""
         return self._typed_metrics.isolation
 
     @property
     def tracking(self) -> model.Tracking:
-        """How well the rates were followed."""
+        """The tracking errors, and the movement of the surfaces."""
         return self._typed_metrics.tracking
 
     @property
     def supervisor(self) -> tuple[model.ModeChange, ...]:
-        """Who was in charge, change by change."""
+        """The changes of the mode of the supervisor."""
         return self._typed_metrics.supervisor
 
     @property
@@ -117,7 +117,7 @@ class Flight:
 
     @property
     def expectations(self) -> tuple[model.Expectation, ...]:
-        """What the scenario expects, and what came out."""
+        """The expectations of the scenario, each with its result."""
         return self._typed_metrics.expectations
 
     @property
@@ -175,8 +175,8 @@ class Flight:
         The `Proof` has the fields `certificate`, `log` and `scenario`. The log has more columns than
         log.parquet. The scenario is the text of scenario.yaml.
         """
-        found: Proof = required("proof", "certificate")(self.scenario, self._log_or_raise())
-        return found
+        proof: Proof = required("proof", "certificate")(self.scenario, self._log_or_raise())
+        return proof
 
     def save(self, out: str | PathLike[str] = "runs", *, report: bool = True) -> Path:
         """Write the result folder `out/<name>/` as `beaver-ftc run` does, and return its path.
@@ -190,12 +190,12 @@ class Flight:
         from beaver_ftc.results.folder import result_folder
         from beaver_ftc.results.writer import write_documents, write_report_files
 
-        kept = self._log_or_raise()
+        log = self._log_or_raise()
         with result_folder(Path(out), self.name) as folder:
-            kept.copy_to(folder / "log.parquet")
+            log.copy_to(folder / "log.parquet")
             write_documents(folder, self.scenario, self.metrics)
             if report:
-                # After Ctrl-C somebody waits: the report draws its own curves at once, figures take seconds.
+                # After Ctrl-C the user waits: figures take seconds, and the report draws curves without them.
                 interrupted = self._typed_metrics.interrupted_s is not None
                 write_report_files(folder, self.metrics, formats=() if interrupted else ("png",))
         return Path(out) / self.name
@@ -280,12 +280,13 @@ def open_run(folder: str | PathLike[str]) -> Flight:
         raise BadInput(
             f"{path}: no metrics.json can be read there, allowed: the result folder of a run"
         ) from error
-    kept = path / "log.parquet"
-    return Flight(load(path / "scenario.yaml"), document, StoredLog(kept) if kept.exists() else None)
+    log_path = path / "log.parquet"
+    return Flight(load(path / "scenario.yaml"), document, StoredLog(log_path) if log_path.exists() else None)
 
 
 def check_plug_in(what: str, plug_in: object) -> None:
-    """Refuse what is no detector or law before it flies."""
+    """Raise BadInput unless a plug-in is None or an object with `reset` and `step`. what: `detector` or
+    `law`."""
     if plug_in is None:
         return
     lacking = [name for name in ("reset", "step") if not callable(getattr(plug_in, name, None))]

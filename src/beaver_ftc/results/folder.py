@@ -1,8 +1,8 @@
 """The result folder of a run: it appears whole or not at all.
 
 Everything is written into a hidden sibling of the final folder, which is renamed into place at the end. A
-killed run leaves only the hidden folder; it is locked while in use, so the next run knows it for stale and
-removes it.
+killed run leaves only the hidden folder. A hidden folder is locked while in use: if the next run can lock it,
+it is stale, and the run removes it.
 """
 
 import contextlib
@@ -22,25 +22,25 @@ try:
 except ImportError:  # not a POSIX system: nothing can be locked, so nothing is taken for stale
     fcntl = None  # type: ignore[assignment]
 
-# What a run leaves; what else lies in a result folder is declared by the commands that write it.
+# The files of a run. Commands that write other files into a result folder declare these themselves.
 FILES_OF_A_RUN = frozenset({
     "scenario.yaml", "log.parquet", "metrics.json", "report.html", "figures", "aircraft",
     "log.csv", "flight.acmi", "flight.csv", "flight.ulg", "flight.bin", "vehicle.yaml",
 })  # fmt: skip
-AIRCRAFT = "aircraft"  # an own aircraft, to fly it again
-MODEL_FILES = frozenset({".xml", ".yaml"})  # of it
-_PICTURE_END_BYTES = 2048  # of a picture: its metadata come first, those of a PDF last
-# Of Linux' renameat2: paths are relative to the working directory; swap the two in one step.
+AIRCRAFT = "aircraft"  # folder with the copy of an own aircraft, to fly it again
+MODEL_FILES = frozenset({".xml", ".yaml"})  # endings of the files of an aircraft
+_PICTURE_END_BYTES = 2048  # read at each end of a picture: metadata come first, those of a PDF last
+# Arguments of Linux' renameat2: paths are relative to the working directory; swap the two in one step.
 _AT_FDCWD = -100
 _RENAME_EXCHANGE = 2
 
 
 @contextlib.contextmanager
 def result_folder(out: Path, name: str, files: Iterable[str] = ()) -> Iterator[Path]:
-    """Yield an empty folder to fill; on success it becomes `out/name`, on any failure it vanishes.
+    """Yield an empty folder to fill. On success it becomes `out/name`; on any failure it is removed.
 
-    files: the names that an earlier result of this kind has. Raises SimulationFailed where the folder cannot
-    be written, or `out/name` is not a result of ours.
+    files: names that an earlier result of this kind may have. Raises SimulationFailed if the folder cannot be
+    written, or if `out/name` is not a result of ours.
     """
     final = out / name
     before = "the result that was there is as it was" if final.is_dir() else "nothing is left there"
@@ -48,15 +48,15 @@ def result_folder(out: Path, name: str, files: Iterable[str] = ()) -> Iterator[P
         refuse_foreign(final, files)
         created = _make_parents(out)
         _remove_stale(out, name)
-        own = uuid4().hex
-        unnamed = out / f".beaver-ftc-{own}"
-        hidden = out / f"{partial_prefix(name)}{own}"
+        token = uuid4().hex
+        unnamed = out / f".beaver-ftc-{token}"
+        hidden = out / f"{partial_prefix(name)}{token}"
         unnamed.mkdir()
         try:
-            with locked(unnamed):  # before it bears the name by which another run would look for stale ones
+            with locked(unnamed):  # lock first: under its hidden name, another run would take it for stale
                 unnamed.rename(hidden)
                 yield hidden
-                for path in (*hidden.rglob("*"), hidden):  # on the disk before its name says that it is
+                for path in (*hidden.rglob("*"), hidden):  # the content reaches the disk before the name
                     sync(path)
                 _move_into_place(hidden, final, files)
         except BaseException:
@@ -68,9 +68,9 @@ def result_folder(out: Path, name: str, files: Iterable[str] = ()) -> Iterator[P
 
 
 def refuse_foreign(folder: Path, files: Iterable[str] = ()) -> None:
-    """Raise SimulationFailed if `folder` exists and holds anything that is not a result: it would be lost.
+    """Raise SimulationFailed if `folder` exists and holds a file that is no result: it would be lost.
 
-    files: names that are known to be of a result, beside those that commands declare.
+    files: names of result files beside those that commands declare.
     """
     if not os.path.lexists(folder):
         return
@@ -85,7 +85,8 @@ def refuse_foreign(folder: Path, files: Iterable[str] = ()) -> None:
 
 
 def _foreign_files_in(folder: Path, files: Iterable[str]) -> list[str]:
-    """The files of a result folder that are none of ours, by their name or beside our pictures."""
+    """The files of a result folder that no command of ours writes: unknown names, pictures without our mark,
+    and in the copy of the aircraft all that is no model file."""
     unknown = {entry.name for entry in folder.iterdir()} - FILES_OF_A_RUN - {*files}
     if unknown:
         from beaver_ftc.commands import files_of_commands
@@ -98,7 +99,7 @@ def _foreign_files_in(folder: Path, files: Iterable[str]) -> list[str]:
 
 
 def _is_our_picture(path: Path) -> bool:
-    """Whether it bears the mark that every picture of ours is saved with."""
+    """Whether a file has the mark in its metadata with which all our pictures are saved."""
     from beaver_ftc.results.style import SOFTWARE_MARK
 
     if path.is_symlink() or not path.is_file():
@@ -111,7 +112,7 @@ def _is_our_picture(path: Path) -> bool:
 
 @contextlib.contextmanager
 def clear_disk_errors(folder: Path, but: str = "") -> Iterator[None]:
-    """Turn an operating system's error into one line, which may end with a word of comfort."""
+    """Turn an error of the operating system into SimulationFailed with one line, which ends with `but`."""
     try:
         yield
     except OSError as error:
@@ -119,24 +120,27 @@ def clear_disk_errors(folder: Path, but: str = "") -> Iterator[None]:
 
 
 def disk_error_text(error: OSError) -> str:
+    """The reason of an error, with a small first letter."""
     reason = os.strerror(error.errno) if error.errno else str(error)
     return f"{reason[:1].lower()}{reason[1:]}"
 
 
 def partial_prefix(name: str) -> str:
+    """The begin of the name of the hidden folders of a run."""
     return f".{name}.partial-"
 
 
 def _make_parents(folder: Path) -> list[Path]:
     """Create `folder` with its parents; return those that were missing, deepest first."""
-    missing = list(takewhile(lambda one: not one.exists(), (folder, *folder.parents)))
+    missing_folders = list(takewhile(lambda one: not one.exists(), (folder, *folder.parents)))
     folder.mkdir(parents=True, exist_ok=True)
-    return missing
+    return missing_folders
 
 
 @contextlib.contextmanager
 def locked(folder: Path) -> Iterator[bool]:
-    """Lock a folder meanwhile. False where another process has it, or nothing can be locked there."""
+    """Lock a folder during the block; yield whether it is locked. False: another process holds it, or this
+    system cannot lock."""
     if not fcntl:
         yield False
         return
@@ -153,7 +157,7 @@ def locked(folder: Path) -> Iterator[bool]:
 
 
 def _remove_stale(out: Path, name: str) -> None:
-    """Remove what killed runs of this scenario left behind."""
+    """Remove the hidden folders that killed runs of this name have left."""
     for leftover in out.glob(f"{partial_prefix(name)}*"):
         with contextlib.suppress(OSError), locked(leftover) as stale:
             if stale:
@@ -170,9 +174,10 @@ def sync(path: Path) -> None:
 
 
 def _move_into_place(hidden: Path, final: Path, files: Iterable[str]) -> None:
+    """Rename the hidden folder; an older result is swapped with it, or renamed away, and then removed."""
     refuse_foreign(final, files)
     try:
-        hidden.rename(final)  # tried, not asked first: another run of this name may end in between
+        hidden.rename(final)  # without a test first: another run of this name may end in between
         return
     except OSError:
         if not final.exists():
@@ -186,13 +191,13 @@ def _move_into_place(hidden: Path, final: Path, files: Iterable[str]) -> None:
         shutil.rmtree(retired, ignore_errors=True)
 
 
-def _swap_folders(one: Path, other: Path) -> bool:
-    """Swap two folders in one step, as Linux can; False where the system or the file system cannot."""
+def _swap_folders(first: Path, second: Path) -> bool:
+    """Swap two folders in one step, which Linux can; False if the system or the file system cannot."""
     try:
         rename = ctypes.CDLL(None, use_errno=True).renameat2
     except (AttributeError, OSError, TypeError):
         return False
-    done = rename(_AT_FDCWD, os.fsencode(one), _AT_FDCWD, os.fsencode(other), _RENAME_EXCHANGE) == 0
-    if not done and ctypes.get_errno() not in (errno.ENOSYS, errno.EINVAL, errno.EOPNOTSUPP):
+    swapped = rename(_AT_FDCWD, os.fsencode(first), _AT_FDCWD, os.fsencode(second), _RENAME_EXCHANGE) == 0
+    if not swapped and ctypes.get_errno() not in (errno.ENOSYS, errno.EINVAL, errno.EOPNOTSUPP):
         raise OSError(ctypes.get_errno(), os.strerror(ctypes.get_errno()))
-    return done
+    return swapped

@@ -1,7 +1,8 @@
-"""Runs as JUnit XML, which CI systems show: a test suite a scenario or sweep, a test case an expectation.
+"""Runs as JUnit XML, which CI systems show: a test suite for each scenario or sweep, a test case for each
+expectation.
 
-All cases of a suite are answered by the same flights: each has an equal part of the time these took, so that
-the cases add up to the suite and the suites to what the command took.
+The same flights answer all cases of a suite. Each case has an equal part of their time, so that cases add up
+to the suite, and suites to the time of the command.
 """
 
 from collections import Counter
@@ -17,7 +18,7 @@ _MAX_LINE_CHARACTERS = 10_000  # characters of one line
 
 
 def write_junit(runs: Sequence[Judged], path: Path) -> None:
-    """Write what has been judged, or could not be flown."""
+    """Write the runs, also those that could not be flown."""
     took_s = sum(run.took_s for run in runs)
     root = ElementTree.Element("testsuites", name="beaver-ftc", time=_seconds_text(took_s))
     for run in runs:
@@ -31,26 +32,26 @@ def write_junit(runs: Sequence[Judged], path: Path) -> None:
 
 
 def _add_suite(root: ElementTree.Element, run: Judged) -> None:
-    asked = list(_cases(run))
-    kinds = Counter(kind for _, kind, _, why in asked if why is not None)
-    counts = {"tests": len(asked), "failures": kinds["failure"], "errors": kinds["error"]}
-    name_of_run = _xml_safe_text(run.name)  # that of a file, if it could not be read
+    cases = list(_cases(run))
+    kinds = Counter(kind for _, kind, _, why in cases if why is not None)
+    counts = {"tests": len(cases), "failures": kinds["failure"], "errors": kinds["error"]}
+    name_of_run = _xml_safe_text(run.name)  # a file that could not be read has the name of the file
     about = {"name": name_of_run} | {name: str(count) for name, count in counts.items()}
     suite = ElementTree.SubElement(root, "testsuite", about, time=_seconds_text(run.took_s))
-    each_s = _seconds_text(run.took_s / len(asked))
-    for name, kind, what, why in asked:
+    each_s = _seconds_text(run.took_s / len(cases))
+    for name, kind, kind_of_failure, why in cases:
         case = ElementTree.SubElement(suite, "testcase", classname=name_of_run, name=name, time=each_s)
         if why is not None:
-            ElementTree.SubElement(case, kind, message=_xml_safe_text(why), type=what)
+            ElementTree.SubElement(case, kind, message=_xml_safe_text(why), type=kind_of_failure)
 
 
 def _cases(run: Judged) -> Iterator[tuple[str, str, str, str | None]]:
-    """(name, element, type, why) of each expectation; of a scenario that expects nothing, or could not be
-    flown, whether it completes. why: None where all is well."""
-    for one in run.expectations:
-        reason = f": {one.reason}" if one.reason else ""
-        missed = None if one.passed else f"{one.expected_and_actual_text}{reason}"
-        yield one.name, "failure", "ExpectationMissed", missed
+    """(name, element, type, why) of each expectation. A scenario that expects nothing, or could not be flown,
+    has one case: whether it completes. why: the text of the failure; None if the case passes."""
+    for expectation in run.expectations:
+        reason = f": {expectation.reason}" if expectation.reason else ""
+        why = None if expectation.passed else f"{expectation.expected_and_actual_text}{reason}"
+        yield expectation.name, "failure", "ExpectationMissed", why
     if not run.expectations:
         yield "completes", "error", "NotFlown", run.error
 
@@ -59,6 +60,6 @@ def _seconds_text(took_s: float) -> str:
     return f"{took_s:.6f}"
 
 
-def _xml_safe_text(said: str) -> str:
-    """Text that XML can hold: it has no control characters, nor halves of letters, not even escaped."""
-    return "\n".join(one_line(line, _MAX_LINE_CHARACTERS) for line in said.splitlines())
+def _xml_safe_text(text: str) -> str:
+    """Text that XML can hold: without control characters and lone surrogates, which XML cannot escape."""
+    return "\n".join(one_line(line, _MAX_LINE_CHARACTERS) for line in text.splitlines())

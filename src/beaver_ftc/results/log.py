@@ -1,7 +1,10 @@
 """The log of a flight as a parquet file: one row a frame, written in row groups to keep memory bounded.
 
-Columns are plain float64, snappy-compressed and without dictionaries: what PlotJuggler, pandas and every
-other reader opens as it is, and what costs the loop least.
+Columns are plain float64, snappy-compressed and without dictionaries. PlotJuggler, pandas and other readers
+open this form directly, and writing it costs the loop least.
+
+    written by a flight (`LogSink`)     ParquetLog (file), MemoryLog, Columns (some columns), SpooledLog
+    read (`Log`)                        MemoryLog, StoredLog (file)
 """
 
 import contextlib
@@ -24,8 +27,8 @@ Values = dict[str, np.ndarray]
 """Values (rows,) by the name of their column."""
 
 ROWS_PER_GROUP = 16384  # 12 MB of 90 columns: large enough to compress well, small enough to hold
-_ROWS_PER_BLOCK = 256  # rows turned into columns at a time: they fit the processor's cache, four times faster
-_MAX_ROWS_PER_GROUP = 1_000_000
+_ROWS_PER_BLOCK = 256  # rows transposed at a time: a block fits the cache of the processor, four times faster
+_MAX_ROWS_PER_GROUP = 1_000_000  # a file with more is refused: a run writes ROWS_PER_GROUP
 _UNIT_OF_NAME_ENDING = (  # ending of a column's name, unit; the longest endings first
     ("_rad_s2", "rad/s2"), ("_deg2_s", "deg2/s"), ("_deg_s", "deg/s"), ("_rad_s", "rad/s"),
     ("_per_s", "1/s"), ("_rad", "rad"), ("_deg", "deg"), ("_mps", "m/s"), ("_inhg", "inHg"), ("_pa", "Pa"),
@@ -34,7 +37,10 @@ _UNIT_OF_NAME_ENDING = (  # ending of a column's name, unit; the longest endings
 
 
 class ParquetLog:
-    """A `LogSink` that writes a parquet file. `close` completes it; before that the file is unreadable."""
+    """A `LogSink` that writes a parquet file. `close` completes it; before that the file is unreadable.
+
+    _buffer (columns, rows_per_group): the row group that is being filled; _used: how many of its rows are.
+    """
 
     def __init__(self, path: Path, rows_per_group: int = ROWS_PER_GROUP) -> None:
         self._path = path
@@ -51,7 +57,7 @@ class ParquetLog:
         from pyarrow.parquet import ParquetWriter
 
         self._schema = pa.schema([pa.field(name, pa.float64(), nullable=False) for name in columns])
-        # Opened here: Arrow itself takes no path that is not UTF-8.
+        # The file is opened here, because Arrow refuses a path that is not UTF-8.
         self._file = self._path.open("wb")
         self._writer = ParquetWriter(
             self._file, self._schema, compression="snappy", use_dictionary=False, write_statistics=False
@@ -70,7 +76,7 @@ class ParquetLog:
                 self._flush(self._writer)
 
     def close(self) -> None:
-        """Write what is left and complete the file."""
+        """Write the rows of the last, shorter group and complete the file."""
         if self._writer is None:
             return
         writer = self._writer
@@ -87,13 +93,13 @@ class ParquetLog:
 
     def __exit__(self, kind: type[BaseException] | None, *about: object) -> None:
         if kind is not None:
-            self._used = 0  # the file is to be thrown away: do not spend time on it
+            self._used = 0  # after an exception the caller removes the file: do not write the rest
         self.close()
 
     def _flush(self, writer: Any) -> None:
         import pyarrow as pa
 
-        # Not pa.array: it imports pandas, if that is installed, only to see whether it was given a series.
+        # pa.array would import pandas, if it is installed, to test whether its argument is a series.
         used = self._used
         float64 = pa.float64()
         arrays = [
@@ -168,10 +174,10 @@ class MemoryLog(Log):
         """A second log with a copy of the rows. Rows that are later written to the first log are not added to
         the second.
         """
-        now = MemoryLog()
-        now.columns = self.columns
-        now._chunks = list(self._chunks)
-        return now
+        copy = MemoryLog()
+        copy.columns = self.columns
+        copy._chunks = list(self._chunks)
+        return copy
 
     def copy_to(self, path: Path) -> None:
         """Write the rows into a file with the format of the log.parquet of `run`."""
@@ -195,9 +201,9 @@ class MemoryLog(Log):
 
 
 class Columns(dict[str, np.ndarray]):
-    """A `LogSink` that is, once the flight is over, name -> values (frames,).
+    """A `LogSink` that maps names of columns to values (frames,) once the flight is over.
 
-    names: the columns to keep; without any, all.
+    names: the columns to keep; if there are none, all columns are kept.
     """
 
     def __init__(self, *names: str) -> None:
@@ -211,17 +217,17 @@ class Columns(dict[str, np.ndarray]):
         self._chunks: list[np.ndarray] = []
 
     def write(self, rows: np.ndarray) -> None:
-        """Take in rows (n, columns)."""
-        # A copy, since the memory of rows is used again; at once by column: most flights need no other.
+        """Append a copy of the kept columns of `rows` (n, columns)."""
+        # A copy, because the loop reuses the memory of `rows`; transposed at once, to read by column.
         self._chunks.append(np.ascontiguousarray(rows.T[self._places]))
 
     def close(self) -> None:
         """The flight is over."""
-        whole = np.concatenate([np.empty((len(self._names), 0)), *self._chunks], axis=1)
-        self.update(zip(self._names, whole, strict=True))
+        values = np.concatenate([np.empty((len(self._names), 0)), *self._chunks], axis=1)
+        self.update(zip(self._names, values, strict=True))
 
     def since(self, from_s: float) -> Values:
-        """Every column from an instant on."""
+        """Every column from an instant on, `t_s` >= from_s."""
         late = self["t_s"] >= from_s
         return {name: column[late] for name, column in self.items()}
 
@@ -231,9 +237,9 @@ class SpooledLog:
     them."""
 
     def open(self, columns: Sequence[str]) -> None:
-        """Start again; what `frozen_copy` gave before stays readable."""
+        """Start an empty log in a new file. Earlier copies of `frozen_copy` stay readable."""
         self.columns = tuple(columns)
-        self._file = tempfile.TemporaryFile()  # noqa: SIM115 -- gone with this log, or the process
+        self._file = tempfile.TemporaryFile()  # noqa: SIM115 -- removed with this log, or with the process
         self._frames = 0
 
     def write(self, rows: np.ndarray) -> None:
@@ -245,18 +251,18 @@ class SpooledLog:
         """The file stays open for copies."""
 
     def frozen_copy(self) -> MemoryLog:
-        """The log as it is now, read from the file as it is asked for."""
-        now = MemoryLog()
-        now.columns = self.columns
+        """The log as it is now. The values are read from the file when they are used."""
+        copy = MemoryLog()
+        copy.columns = self.columns
         if self._frames:
             self._file.flush()
             shape = self._frames, len(self.columns)
-            now._chunks = [np.memmap(self._file, np.float64, "r", shape=shape)]
-        return now
+            copy._chunks = [np.memmap(self._file, np.float64, "r", shape=shape)]
+        return copy
 
 
 class StoredLog(Log):
-    """The log in a parquet file, read when asked for."""
+    """The log in a parquet file. Each call reads the file."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -283,7 +289,7 @@ class StoredLog(Log):
 
 @contextlib.contextmanager
 def open_parquet_log(path: Path) -> Iterator[Any]:
-    """A log, open. Raises BadInput where it is none, or only a part of one."""
+    """Open a log during the block. Raises BadInput if the file is no log of a run, or only a part of one."""
     from pyarrow import ArrowException, float64
     from pyarrow.parquet import ParquetFile
 
@@ -292,21 +298,21 @@ def open_parquet_log(path: Path) -> Iterator[Any]:
             with ParquetFile(content, pre_buffer=False) as file:
                 groups = (file.metadata.row_group(i) for i in range(file.num_row_groups))
                 largest = max((group.num_rows for group in groups), default=0)
-                if largest > _MAX_ROWS_PER_GROUP:  # than a run writes: a few bytes may stand for billions
-                    has = f"has {largest:,} rows in a row group"
-                    raise BadInput(f"{path}: {has}, allowed: up to {_MAX_ROWS_PER_GROUP:,}")
+                if largest > _MAX_ROWS_PER_GROUP:  # a few bytes may stand for billions of equal rows
+                    too_long = f"has {largest:,} rows in a row group"
+                    raise BadInput(f"{path}: {too_long}, allowed: up to {_MAX_ROWS_PER_GROUP:,}")
                 if {*file.schema_arrow.types} - {float64()}:
                     raise BadInput(f"{path}: has other numbers than a run writes, allowed: float64 alone")
                 yield file
         except (ArrowException, OSError) as error:
             if getattr(error, "errno", None) is not None:
-                raise  # of the disk, not of the file
-            says = "is damaged or cut short, allowed: a log that a run has written"
-            raise BadInput(f"{path}: {says}") from error
+                raise  # an error of the disk, not of the content
+            damage = "is damaged or cut short, allowed: a log that a run has written"
+            raise BadInput(f"{path}: {damage}") from error
 
 
 def _column_values(column: Any) -> np.ndarray:
-    """A column without nulls. Not its own to_numpy: that imports pandas, if installed, for nothing."""
+    """The values of a column (rows,) without nulls. The method to_numpy of the column would import pandas."""
     parts = [
         np.frombuffer(part.buffers()[1], np.float64, len(part), 8 * part.offset) for part in column.chunks
     ]
@@ -319,14 +325,16 @@ def units(columns: Iterable[str]) -> dict[str, str]:
 
 
 def unit_of(column: str) -> str:
-    """The unit of a column, read off its name or the section's it is in; "1" for a pure number."""
+    """The unit of a column, from the ending of its name, or else of the section in front of it; "1" for a
+    pure number. `tracking.surface_travel_deg.aileron` has the unit deg.
+    """
     parts = reversed(column.split("."))
     return next(
         (unit for part in parts for ending, unit in _UNIT_OF_NAME_ENDING if part.endswith(ending)), "1"
     )
 
 
-def log_dataframe(log: "Log", found: Metrics) -> "DataFrame":
+def log_dataframe(log: "Log", metrics: Metrics) -> "DataFrame":
     """The log as a DataFrame, float64, with scenario, seed, verdict and units in `attrs`."""
     from pandas import DataFrame
 
@@ -334,15 +342,15 @@ def log_dataframe(log: "Log", found: Metrics) -> "DataFrame":
         table = DataFrame(np.asfortranarray(log.rows), columns=list(log.columns), copy=False)
     else:
         table = DataFrame(log.read())
-    detection = found.detection
-    isolation = found.isolation
+    detection = metrics.detection
+    isolation = metrics.isolation
     verdict = {
-        "passed": found.passed, "false_alarm": found.false_alarm,
+        "passed": metrics.passed, "false_alarm": metrics.false_alarm,
         "detected": detection.detected, "detection_delay_s": detection.delay_s,
         "isolated": isolation.fault, "type": isolation.type, "isolation_delay_s": isolation.delay_s,
-        "departed": found.departure is not None,
+        "departed": metrics.departure is not None,
     }  # fmt: skip
     table.attrs = {
-        "scenario": found.scenario, "seed": found.seed, "verdict": verdict, "units": units(log.columns),
+        "scenario": metrics.scenario, "seed": metrics.seed, "verdict": verdict, "units": units(log.columns),
     }  # fmt: skip
     return table

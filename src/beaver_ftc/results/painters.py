@@ -1,9 +1,11 @@
 """Figures drawn by processes beside this one, which import matplotlib while the flight is flown.
 
-The first is forked before anything heavy is there, and the second from the first, once it has imported
-matplotlib: it is imported once. They end when the process that began them closes the connection, or ends.
-The figures are drawn in this process, and are the same, where it cannot be forked, has one core or other
-threads (whose locks a fork would copy), or where a painter has died.
+The first painter is forked before this process has imported anything large. It imports matplotlib, and the
+second painter is forked from it, so that matplotlib is imported once. Painters end when the process that
+started them closes the connection, or ends.
+
+This process draws the same figures itself if it cannot be forked, has one core or several threads (a fork
+would copy locks that they hold), or if a painter has died.
 """
 
 import gc
@@ -20,13 +22,14 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from beaver_ftc.results.figures import Picture
 
-N_PAINTERS = 2  # one for each of two cores: the process that flies waits for them
+N_PAINTERS = 2  # one for each of two cores: the process that flies waits while they draw
 Painters = Sequence[Connection]
 
 
 @contextmanager
 def painters() -> Iterator[Painters]:
-    """Processes that draw until the end of the block; none where this process cannot be forked."""
+    """Yield connections to processes that draw until the end of the block; none if this process cannot
+    fork."""
     if not _can_fork():
         yield ()
         return
@@ -35,14 +38,14 @@ def painters() -> Iterator[Painters]:
     ours, theirs = zip(*pairs, strict=True)
     first = fork.Process(target=_paint, args=(theirs, ours), daemon=True)
     first.start()
-    for there in theirs:
-        there.close()
+    for end in theirs:
+        end.close()
     try:
         yield ours
     finally:
-        for here in ours:
-            here.close()
-        first.kill()  # one that has just begun would still handle SIGTERM as this process does
+        for connection in ours:
+            connection.close()
+        first.kill()  # not SIGTERM: a painter that has just begun still has the handlers of this process
         first.join()
 
 
@@ -55,28 +58,29 @@ def _can_fork() -> bool:
 
 @contextmanager
 def drawing(pictures: "Sequence[Picture]", connections: Painters) -> Iterator[None]:
-    """Have the pictures drawn during the block: they are there at its end. Raises what went wrong."""
+    """Let painters draw pictures during the block. At its end all files are written. Raises the exception of
+    a painter."""
     if not connections:
         yield
         save_all(pictures)
         return
-    asked: list[tuple[Connection, list[Picture]]] = []
+    sent: list[tuple[Connection, list[Picture]]] = []
     left: list[Picture] = []
-    for painter, own in zip(connections, shares_of_equal_work(pictures, len(connections)), strict=True):
+    for painter, share in zip(connections, shares_of_equal_work(pictures, len(connections)), strict=True):
         try:
-            painter.send(own)
-            asked.append((painter, own))
+            painter.send(share)
+            sent.append((painter, share))
         except OSError:  # it was killed
-            left += own
+            left += share
     failures = []
     try:
         yield
-    finally:  # whatever fails meanwhile: nobody draws into a folder that is given up
-        for painter, own in asked:
+    finally:  # also if the block fails: wait, so that no painter writes into a folder that is removed
+        for painter, share in sent:
             try:
                 failures.append(painter.recv())
             except (EOFError, OSError):  # it was killed
-                left += own
+                left += share
     save_all(left)
     for failure in filter(None, failures):
         raise failure
@@ -95,9 +99,9 @@ def _paint(connections: Sequence[Connection], other_ends: Sequence[Connection]) 
     """Import matplotlib, fork the other painters, and draw."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process ends this one
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    for each in other_ends:
-        each.close()
-    gc.disable()  # a seventh of the time; what a dozen figures leave behind is small
+    for end in other_ends:
+        end.close()
+    gc.disable()  # saves a seventh of the time; the garbage of a dozen figures is small
     from beaver_ftc.results.figures import figure_class
 
     figure_class()
@@ -114,7 +118,8 @@ def _paint(connections: Sequence[Connection], other_ends: Sequence[Connection]) 
 
 
 def _draw_until_closed(connection: Connection) -> None:
-    """Draw what is asked for until the other end is closed: by its process, or with it."""
+    """Draw each list of pictures that is received, and send None or the exception, until the other end is
+    closed."""
     while True:
         try:
             pictures = connection.recv()
@@ -128,7 +133,8 @@ def _draw_until_closed(connection: Connection) -> None:
 
 
 def shares_of_equal_work(pictures: "Sequence[Picture]", among: int) -> "list[list[Picture]]":
-    """As much to draw for each. Greedy: the largest picture first, to the process that has least."""
+    """Divide pictures among so many processes. Greedy: each picture, the largest first, goes to the process
+    with the least work; the work of a picture is 1 + its number of panels."""
     shares: list[list[Picture]] = [[] for _ in range(among)]
     for picture in sorted(pictures, key=lambda each: -len(each.view.panels)):
         min(shares, key=lambda given: sum(1 + len(each.view.panels) for each in given)).append(picture)

@@ -1,8 +1,8 @@
 """The log as a recorder on board would have written it: a table, a PX4 ULog or a dataflash log.
 
-It has only what an autopilot records: rates with the errors of the gyros, attitude, flow and what else the
-aircraft measures as perfect instruments have them, since the log has no other readings, and the commands to
-the surfaces as shares of travel. `vehicle.yaml` beside it names the columns for `identify` and `diagnose`.
+A recording has only the signals that an autopilot records. The rates have the errors of the gyros. Attitude,
+flow and other signals of the aircraft are exact, since the log has no measured ones. Commands to the surfaces
+are shares of travel. The file `vehicle.yaml` names the columns for `identify` and `diagnose`.
 
 ULog: https://docs.px4.io/main/en/dev_log/ulog_file_format; dataflash: FMT messages, then packed ones.
 """
@@ -22,10 +22,10 @@ ColumnsByTopic = dict[str, log.Values]
 Stamps = NDArray[np.int64]
 """Time of each row, us."""
 Names = dict[str, dict[str, str]]
-"""By part and name, what a recording calls it."""
+"""By part (`rates`, `commands`, ...) and name of a signal, its name in the recording."""
 RECORDING_FILE_OF_KIND = {"table": "flight.csv", "ulog": "flight.ulg", "ardupilot": "flight.bin"}
-# What each kind calls what it records, in its order: `topic.field`, or the column of a table. i: place from 0
-# on, n: from 1 on.
+# By kind and part, the pattern of the names: `topic.field`, or the column of a table. In a pattern, i counts
+# the signals of the part from 0 on, and n from 1 on.
 _NAMES_OF_KIND = {
     "table": {
         "rates": "{name}_rad_s", "commands": "{name}_command", "attitude": "{name}_rad",
@@ -58,18 +58,19 @@ _COLUMN_OF_ANGLE = {"roll": "phi_rad", "pitch": "theta_rad", "yaw": "psi_rad"}
 _DYNAMIC_PRESSURE_COLUMN = "qdyn_pa"
 _FLOW_COLUMNS = ("alpha_rad", "beta_rad", _DYNAMIC_PRESSURE_COLUMN)
 _FIRST_STAMP_US = 1_000_000
-"""A clock on board does not start with the log."""
+"""Time of the first row: a clock on board runs before the log starts."""
 _ULOG_MAGIC = b"ULog\x01\x12\x35\x01"  # the last byte is the version
-_DATAFLASH_HEAD = b"\xa3\x95"  # of each message, before the number of its type
-_FMT = 128  # the type that describes types
+_DATAFLASH_HEAD = b"\xa3\x95"  # first bytes of each message; the number of its type follows
+_FMT = 128  # type of the FMT messages, which describe the other types
 
 
 def write_recording(
     log_path: Path, travel_rad: dict[str, float], kind: str, folder: Path, signals: Sequence[str]
 ) -> None:
-    """Write a flight's log as `kind` (of RECORDING_FILE_OF_KIND) with its vehicle.yaml into a folder.
+    """Write the log of a flight as `kind` (of RECORDING_FILE_OF_KIND) with its vehicle.yaml into a folder.
 
-    travel_rad: the farther stop of each surface. signals: what the aircraft measures beside rates and flow.
+    travel_rad: the farther stop of each surface; a command of 1 is this deflection. signals: what the
+    aircraft measures beside rates and flow.
     """
     source_of = {
         "rates": {axis: f"{axis}_measured_rad_s" for axis in AXES},
@@ -78,8 +79,8 @@ def write_recording(
         "airspeed": {"airspeed": "airspeed_mps"},
         "flow": {name: name for name in (*_FLOW_COLUMNS, *signals)},
     }
-    wanted = {"t_s", *(column for part in source_of.values() for column in part.values())}
-    known = log.StoredLog(log_path).read(list(wanted))
+    columns = {"t_s", *(column for part in source_of.values() for column in part.values())}
+    series = log.StoredLog(log_path).read(list(columns))
     named: Names = {}
     topics: ColumnsByTopic = {}
     for part, pattern in _NAMES_OF_KIND[kind].items():
@@ -87,20 +88,20 @@ def write_recording(
         for i, (name, column) in enumerate(source_of[part].items()):
             recorded = pattern.format(name=name, title=name.title(), i=i, n=i + 1, axis="XYZ"[i % 3])
             named[part][name] = recorded
-            values = known[column]
+            values = series[column]
             if part == "commands":
                 values = values / travel_rad[name]
             elif part == "attitude" and kind == "ardupilot":
                 values = np.rad2deg(values)
             topic, _, field = recorded.rpartition(".")
             topics.setdefault(topic, {})[field] = values
-    t_us = np.round(known["t_s"] * 1e6).astype(np.int64) + _FIRST_STAMP_US
+    t_us = np.round(series["t_s"] * 1e6).astype(np.int64) + _FIRST_STAMP_US
     _WRITER_OF_KIND[kind](folder / RECORDING_FILE_OF_KIND[kind], t_us, topics)
     (folder / "vehicle.yaml").write_text(_vehicle_file_text(named, travel_rad, kind), encoding="utf-8")
 
 
 def _vehicle_file_text(named: Names, travel_rad: dict[str, float], kind: str) -> str:
-    """The vehicle file: which column is what."""
+    """The text of vehicle.yaml. Angles of a dataflash log are in deg, all others in rad."""
     angle = "{{column: {}, unit: deg}}" if kind == "ardupilot" else "{!r}"
     commands = named["commands"]
     flow = named["flow"]
@@ -123,6 +124,7 @@ def _flow_mapping(entries: Mapping[str, object], form: str) -> str:
 
 
 def _write_table(path: Path, t_us: Stamps, topics: ColumnsByTopic) -> None:
+    """A CSV file; its columns are the fields of the one topic without a name."""
     import pyarrow as pa
     from pyarrow import csv
 
@@ -137,15 +139,15 @@ def _write_ulog(path: Path, t_us: Stamps, topics: ColumnsByTopic) -> None:
         head.append(_ulog_message("F", layout.encode()))
     packed = []
     for number, (topic, fields) in enumerate(topics.items()):
-        of_topic = np.uint16(number).tobytes()
-        head.append(_ulog_message("A", b"\x00" + of_topic + topic.encode()))
-        length = np.uint16(10 + 8 * len(fields)).tobytes()  # of number, stamp and fields
-        packed.append(_packed_messages(length + b"D" + of_topic, t_us, fields))
+        number_bytes = np.uint16(number).tobytes()
+        head.append(_ulog_message("A", b"\x00" + number_bytes + topic.encode()))
+        length = np.uint16(10 + 8 * len(fields)).tobytes()  # bytes: number 2, stamp 8, each field 8
+        packed.append(_packed_messages(length + b"D" + number_bytes, t_us, fields))
     path.write_bytes(b"".join(head) + _interleave_messages(packed))
 
 
 def _ulog_field_declarations(fields: Sequence[str]) -> str:
-    """Fields of one format; `xyz[0]`, `xyz[1]`, ... are one array."""
+    """Declarations of the fields of a topic; `xyz[0]`, `xyz[1]`, ... are one array."""
     arrays = Counter(field.partition("[")[0] for field in fields)
     return "".join(
         f"double[{count}] {name};" if f"{name}[0]" in fields else f"double {name};"
@@ -154,6 +156,7 @@ def _ulog_field_declarations(fields: Sequence[str]) -> str:
 
 
 def _ulog_message(kind: str, body: bytes) -> bytes:
+    """A ULog message: length of the body, kind, body."""
     return np.uint16(len(body)).tobytes() + kind.encode() + body
 
 
@@ -161,10 +164,10 @@ def _write_dataflash(path: Path, t_us: Stamps, topics: ColumnsByTopic) -> None:
     """FMT messages (the first describes FMT itself), then every message in the order of time."""
     head = [_dataflash_fmt_message(_FMT, 89, "FMT", "BBnNZ", "Type,Length,Name,Format,Columns")]
     packed = []
-    for number, (name, fields) in enumerate(topics.items(), start=140):  # above that of FMT
-        rows = _packed_messages(bytes([*_DATAFLASH_HEAD, number]), t_us, fields)
+    for type_number, (name, fields) in enumerate(topics.items(), start=140):  # above 128, the number of FMT
+        rows = _packed_messages(bytes([*_DATAFLASH_HEAD, type_number]), t_us, fields)
         layout, labels = "Q" + "d" * len(fields), ",".join(["TimeUS", *fields])
-        head.append(_dataflash_fmt_message(number, rows.dtype.itemsize, name, layout, labels))
+        head.append(_dataflash_fmt_message(type_number, rows.dtype.itemsize, name, layout, labels))
         packed.append(rows)
     path.write_bytes(b"".join(head) + _interleave_messages(packed))
 
@@ -176,7 +179,7 @@ def _dataflash_fmt_message(number: int, length: int, name: str, layout: str, lab
 
 
 def _packed_messages(head: bytes, t_us: Stamps, fields: log.Values) -> np.ndarray:
-    """The messages of one topic: each its head, the stamp, and the fields as doubles."""
+    """The messages of one topic, a structured array (rows,): head, stamp (us), and the fields as doubles."""
     layout = [("head", "u1", (len(head),)), ("t", "<u8"), ("v", "<f8", (len(fields),))]
     rows = np.zeros(len(t_us), dtype=layout)
     rows["head"] = list(head)
@@ -186,7 +189,8 @@ def _packed_messages(head: bytes, t_us: Stamps, fields: log.Values) -> np.ndarra
 
 
 def _interleave_messages(topics: Sequence[np.ndarray]) -> bytes:
-    """Records of several topics, one of each a stamp."""
+    """The bytes of the messages of several topics in the order of time: each row has one message of each
+    topic."""
     rows = [topic.view(np.uint8).reshape(len(topic), -1) for topic in topics]
     return np.hstack(rows).tobytes()
 

@@ -1,8 +1,9 @@
 """The report of one or more runs as one HTML file that needs nothing else: no network, no other file.
 
-The page draws the same views as the figures, from the log's numbers inside it: whole flight, and around
-the fault up to 10 000 points of full resolution. It draws them itself (report.js): a plotting library would
-add one to four megabytes to every report and still lack the marks, shades and mode bands of the figures.
+The page draws the same views as the figures, from numbers of the log that it contains: the whole flight, and
+up to 10 000 points at the full rate around the fault. Its script (report.js) draws them. A plotting library
+would add one to four megabytes to every report, and has no marks, shades and mode bands like those of the
+figures.
 """
 
 import base64
@@ -33,11 +34,12 @@ if TYPE_CHECKING:
     from jinja2 import Template
 
 ReportSection = Callable[[Path], str]
-"""What a study shows of a result folder, as HTML; empty if it has found nothing there."""
+"""A function from a result folder to the section of a study as HTML; empty if the folder has no such
+results."""
 
 _TEMPLATE_FOLDER = Path(__file__).parent / "templates"
-AROUND_S = 2.5  # before and after the events, s
-AT_FULL_RATE = 10_000  # points of that at full rate
+AROUND_S = 2.5  # shown at the full rate before and after the events, s
+AT_FULL_RATE = 10_000  # most points of each curve at the full rate
 _FLIGHT_PATH_COLUMNS = ("north_m", "east_m", "altitude_m", "phi_rad", "theta_rad", "psi_rad")
 
 
@@ -73,19 +75,20 @@ def render(folders: Sequence[Path], names: Sequence[str] = (), sections: Sequenc
     )
 
 
-def _verdict_entry(metrics: Document, folder: Path) -> Document:
+def _verdict_entry(document: Document, folder: Path) -> Document:
+    """The verdict of a run as the template shows it. document: its metrics."""
     import yaml
 
-    found = Metrics.of(metrics)
+    records = Metrics.of(document)
     scenario = (folder / "scenario.yaml").read_text(encoding="utf-8")
     return {
-        "metrics": metrics,
-        "title": verdict.title(found),
-        "outcome_class": verdict.outcome_class(found),
+        "metrics": document,
+        "title": verdict.title(records),
+        "outcome_class": verdict.outcome_class(records),
         "description": yaml.safe_load(scenario).get("description", ""),
-        "facts": verdict.verdict_lines(found),
-        "tracking": verdict.tracking_rms_in_words(found),
-        "expectations": expectations_in_words(found),
+        "facts": verdict.verdict_lines(records),
+        "tracking": verdict.tracking_rms_in_words(records),
+        "expectations": expectations_in_words(records),
         "scenario": scenario,
     }
 
@@ -138,17 +141,19 @@ def _page_data(
 
 
 def _common_views(logs: Sequence[log.Log], flown: Sequence[Metrics]) -> tuple[View, ...]:
-    """Every view that all runs have; with what is expected of the airspeed, if that is the same in all."""
+    """Every view that all runs have. The views show the expected airspeed deviation if it is the same in all
+    runs."""
     within_mps = {expected_airspeed_mps(metrics) for metrics in flown}
     common = within_mps.pop() if len(within_mps) == 1 else None
-    first, *rest = (
+    first, *others = (
         views(source.columns, bool(metrics.engine_power), common)
         for source, metrics in zip(logs, flown, strict=True)
     )
-    return tuple(view for view in first if all(view in other for other in rest))
+    return tuple(view for view in first if all(view in views_of_run for views_of_run in others))
 
 
 def _run_entry(source: log.Log, metrics: Metrics, columns: Sequence[str], name: str, points: int) -> Document:
+    """A run for the script: name, marks, damage, and its curves at one or two levels of detail."""
     event_marks = marks(metrics)
     window = closeup_window(event_marks)
     levels = [series_of(source, columns, max_points=points)]
@@ -173,11 +178,12 @@ def _run_entry(source: log.Log, metrics: Metrics, columns: Sequence[str], name: 
 
 
 def _base64_floats(name: str, values: np.ndarray) -> str:
-    """Values as base64 of little-endian floats: double for time, single for what is only looked at."""
+    """Values as base64 of little-endian floats: double precision for time, single for curves."""
     return base64.b64encode(values.astype("<f8" if name == "t_s" else "<f4").tobytes()).decode("ascii")
 
 
 def _panel_entry(panel: Panel) -> Document:
+    """A panel for the script: its fields, and the properties that are computed from them."""
     return asdict(panel) | {
         "unit": panel.unit,
         "steps": panel.steps,

@@ -1,7 +1,12 @@
-"""The curves of a log: its columns and columns derived from them, as few points as a figure or page needs.
+"""The curves of a log: its columns and columns derived from them, thinned to the points that a page needs.
 
-A long log is cut into stretches of time, and each is reduced to its lowest and highest values. The log is
-read a row group at a time, so that a flight of ten hours fits into memory.
+A long log is cut into stretches of equal length, and each stretch is reduced to its lowest and its highest
+value. The log is read a row group at a time, so that a flight of ten hours fits into memory.
+
+    derived column              value
+    ..._ratio                   |residual| / threshold on the side of the residual
+    ..._unlike_rad              position of a surface where it differs from the effective deflection, else NaN
+    airspeed_mean_mps           commanded airspeed + mean deviation over 10 s (`_add_mean_airspeed`)
 """
 
 import math
@@ -13,18 +18,17 @@ import numpy as np
 from beaver_ftc.results import log
 from beaver_ftc.scenario.signals import MEAN_S
 
-MAX_CURVE_POINTS = 4000  # of a curve
+MAX_CURVE_POINTS = 4000
 WHOLE_FLIGHT_S = (-math.inf, math.inf)
-RATIO_ENDING = "_ratio"  # ends the name of a derived column: |residual| / threshold
-UNLIKE_ENDING = "_unlike_rad"  # and of a position where it is not what the aerodynamics see, else no number
-MIN_UNLIKE_RAD = math.radians(0.05)
+RATIO_ENDING = "_ratio"
+UNLIKE_ENDING = "_unlike_rad"
+MIN_UNLIKE_RAD = math.radians(0.05)  # a smaller difference of position and effective deflection is not shown
 COMMANDED_AIRSPEED_COLUMN, FLOWN_AIRSPEED_COLUMN = "airspeed_command_mps", "airspeed_mps"
-# Derived: the commanded airspeed, and the mean deviation from it over 10 s.
 MEAN_AIRSPEED_COLUMN = "airspeed_mean_mps"
 
 
 def source_columns(columns: Iterable[str]) -> tuple[str, ...]:
-    """The log columns that columns to be shown, some of them derived, are made from."""
+    """The log columns from which the shown columns, some of them derived, are computed."""
     return tuple(dict.fromkeys(source for column in columns for source in _source_columns_of(column)))
 
 
@@ -48,26 +52,26 @@ def series_of(
 ) -> log.Values:
     """`t_s` and the named columns within a window of time, each of shape (points,), about max_points at most.
 
-    A longer log is cut into stretches of equal length; each gives two points at its first two instants, the
-    lowest value and the highest in the order in which they occur, so that no peak is lost.
+    A longer log is cut into stretches of equal length. Each gives two points, its lowest and its highest
+    value, so that no peak is lost.
     """
     wanted = tuple(dict.fromkeys(("t_s", *columns)))
     rows = min(source.row_count(), (window_s[1] - window_s[0]) / source.frame_s)
     stretch = 1 if rows <= max_points else math.ceil(2 * rows / max_points)
-    whole = _unwrap_heading(source.read_chunks(source_columns(wanted)))
-    whole = _add_mean_airspeed(whole, source.frame_s) if MEAN_AIRSPEED_COLUMN in wanted else whole
+    chunks = _unwrap_heading(source.read_chunks(source_columns(wanted)))
+    chunks = _add_mean_airspeed(chunks, source.frame_s) if MEAN_AIRSPEED_COLUMN in wanted else chunks
     parts = []
-    for chunk in whole:
+    for chunk in chunks:
         first, last = np.searchsorted(chunk["t_s"], window_s, side="left")
         if first < last:
-            here = {name: values[first:last] for name, values in chunk.items()}
-            shown = {name: here[name] if name in here else _derived_column(here, name) for name in wanted}
+            cut = {name: values[first:last] for name, values in chunk.items()}
+            shown = {name: cut[name] if name in cut else _derived_column(cut, name) for name in wanted}
             parts.append(shown if stretch == 1 else _extremes_by_stretch(shown, stretch))
     return {name: np.concatenate([part[name] for part in parts] or [np.empty(0)]) for name in wanted}
 
 
 def _unwrap_heading(chunks: Iterable[log.Values]) -> Iterator[log.Values]:
-    """Heading without its jumps of a whole turn."""
+    """The chunks with the heading psi unwrapped: without its jumps of 2 pi, also between chunks."""
     last = np.empty(0)
     for chunk in chunks:
         if "psi_rad" in chunk:
@@ -77,22 +81,23 @@ def _unwrap_heading(chunks: Iterable[log.Values]) -> Iterator[log.Values]:
 
 
 def _add_mean_airspeed(chunks: Iterable[log.Values], frame_s: float) -> Iterator[log.Values]:
-    """The mean as the autopilot judges it: deviations from the command c m/s through a lag of MEAN_S,
+    """The chunks with the mean airspeed, as the autopilot judges it: the deviation of the airspeed V (m/s)
+    from its command c (m/s) through a lag of MEAN_S, m = 0 at the start,
 
-    m <- m + (frame_s / MEAN_S) (V - c - m),    mean airspeed c + m
+    m <- m + (frame_s / MEAN_S) (d - m),    mean airspeed c + m
     """
     share = frame_s / MEAN_S if math.isfinite(frame_s) else 1.0
     last = 0.0
     for chunk in chunks:
         off = np.nan_to_num(chunk[FLOWN_AIRSPEED_COLUMN] - chunk[COMMANDED_AIRSPEED_COLUMN]).tolist()
-        means = [*accumulate(off, lambda mean, one: mean + share * (one - mean), initial=last)][1:]
+        means = [*accumulate(off, lambda mean, d: mean + share * (d - mean), initial=last)][1:]
         last = means[-1] if means else last
         yield chunk | {MEAN_AIRSPEED_COLUMN: chunk[COMMANDED_AIRSPEED_COLUMN] + means}
 
 
 def _derived_column(chunk: log.Values, name: str) -> np.ndarray:
-    """A position where it is unlike what the aerodynamics see; or |residual| / threshold, the threshold on
-    the residual's side. NaN elsewhere, and where there is no threshold."""
+    """A column ..._unlike_rad or ..._ratio, as the table of the module says; NaN where there is no
+    threshold."""
     values, *others = (chunk[source] for source in _source_columns_of(name))
     if name.endswith(UNLIKE_ENDING):
         return np.where(np.abs(values - others[0]) > MIN_UNLIKE_RAD, values, np.nan)

@@ -1,4 +1,4 @@
-"""A flight step by step, with its log and its verdict so far."""
+"""A flight step by step, with its log and its verdict up to the last frame."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -70,7 +70,7 @@ class Simulation(Stepping):
 
     @property
     def log(self) -> "DataFrame":
-        """The log so far, as `Flight.log`. Raises BadInput with log=False."""
+        """The log up to the last frame, as `Flight.log`. Raises BadInput with log=False."""
         return self.land().log
 
     def snapshot(self) -> "Snapshot":
@@ -80,10 +80,10 @@ class Simulation(Stepping):
         numbers.
         """
         plugged = tuple(
-            name for name, of in zip(PLUG_IN_NAMES, self._plug_ins, strict=True) if of is not None
+            name for name, plug_in in zip(PLUG_IN_NAMES, self._plug_ins, strict=True) if plug_in is not None
         )
-        made = partial(type(self), self._given, log=self._kept is not None, prepare=self._prepare)
-        return Snapshot(self.frames, self.t_s, tuple(self._asked), made, plugged)
+        make_simulation = partial(type(self), self._given, log=self._kept is not None, prepare=self._prepare)
+        return Snapshot(self.frames, self.t_s, tuple(self._asked), make_simulation, plugged)
 
     def clone(self) -> Self:
         """A second flight in the same state, independent of the first flight. The call is the same as
@@ -133,8 +133,8 @@ class Snapshot:
         use.
         """
         if set(plug_ins) != set(self.plugged):
-            asked = " and ".join(self.plugged) or "no plug-in"
-            raise BadInput(f"resume: a flight with {asked} is resumed, allowed: new objects of just that")
+            needed = " and ".join(self.plugged) or "no plug-in"
+            raise BadInput(f"resume: a flight with {needed} is resumed, allowed: new objects of just that")
         flight = self._make_simulation(**plug_ins)
         flight._do_again(self._asked, self.frames)
         return flight

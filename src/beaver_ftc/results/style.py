@@ -12,13 +12,14 @@ from beaver_ftc.results.model import Metrics
 BLACK, ORANGE, SKY, GREEN, BLUE, VERMILION, PURPLE, GREY = (
     "#000000", "#e69f00", "#56b4e9", "#009e73", "#0072b2", "#d55e00", "#cc79a7", "#8a8a8a",
 )  # fmt: skip
-SOFTWARE_MARK = "beaver-ftc"  # the software that a picture of ours names in its metadata
-SERIES = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, GREY, BLACK)  # of curves that are just several
+SOFTWARE_MARK = "beaver-ftc"  # name of the software in the metadata of our pictures
+SERIES = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, GREY, BLACK)  # colours of curves without a role
 
 
 @dataclass(frozen=True)
 class Look:
-    """How a role is drawn: colour, dashes (on, off, ... in points; none is a solid line), width, and rank."""
+    """How a role is drawn. dash: lengths on, off, ..., points; empty is a solid line. width: points. z_order:
+    a curve with a larger one covers the others."""
 
     colour: str
     dash: tuple[float, ...] = ()
@@ -30,7 +31,7 @@ LOOKS = {
     "actual": Look(BLUE, (), 1.4, 4),
     "target": Look("#444444", (7, 3), 1.4, 5),
     "command": Look(GREY, (1.5, 2), 1.4, 3),
-    "demand": Look("#b9b9b9", (), 1.0, 1),  # a band where it is thinned to its extremes
+    "demand": Look("#b9b9b9", (), 1.0, 1),  # pale: thinned to its extremes it is a band
     "unlike": Look(VERMILION, (1.5, 1.5), 1.2, 5),
     "residual": Look(BLACK, (), 1.2, 4),
     "bound": Look(VERMILION, (5, 3), 1.3, 3),
@@ -48,16 +49,16 @@ LOOKS = {
     "surface 6": Look(BLACK, (4, 2), 1.4, 2),
     "surface 7": Look(GREY, (), 2.2, 1),
 }
-LOOKS |= {f"effective {i}": Look(LOOKS[f"surface {i}"].colour, (), 1.5, 3) for i in range(8)}  # one a panel
-SHADES = {"saturated": "#faf6cf", "excluded": "#e4e4e4"}  # of a stretch of time, by what it means
+LOOKS |= {f"effective {i}": Look(LOOKS[f"surface {i}"].colour, (), 1.5, 3) for i in range(8)}
+SHADES = {"saturated": "#faf6cf", "excluded": "#e4e4e4"}  # background of a stretch of time, by its meaning
 PLUM = "#8f4a74"  # a darker purple, for letters and thin lines
-CRIMSON = "#7d0a1e"  # the loss of the aircraft, and of nothing else
+CRIMSON = "#7d0a1e"  # for the loss of the aircraft alone
 MODE_COLOURS = {"nominal": "#bfe5d9", "adaptive": SKY, "reallocated": ORANGE, "unanticipated": PURPLE}
 
 
 @dataclass(frozen=True)
 class Mark:
-    """An instant shown wherever time runs: a line over the panel and a symbol at its edge."""
+    """An instant that is marked on each time axis: a line over the panel and a symbol at its edge."""
 
     name: str
     time_s: float
@@ -89,9 +90,10 @@ def marks(metrics: Metrics) -> list[Mark]:
 
 
 def closeup_window(event_marks: Sequence[Mark]) -> tuple[float, float] | None:
-    """Where to look closely: from 0.5 s before the fault (or alarm) to 2 s after the last event, at most 12 s
-    after the first. A departure does not count."""
+    """Begin and end, s, of the closer view: from 0.5 s before the first event to 2 s after the last one, but
+    at most 12 s after the first. A departure counts only if there is no other event. None without an
+    event."""
     if not event_marks:
         return None
-    times = [mark.time_s for mark in event_marks if mark.name != "departure"] or [event_marks[0].time_s]
-    return min(times) - 0.5, min(max(times), min(times) + 10.0) + 2.0
+    times_s = [mark.time_s for mark in event_marks if mark.name != "departure"] or [event_marks[0].time_s]
+    return min(times_s) - 0.5, min(max(times_s), min(times_s) + 10.0) + 2.0

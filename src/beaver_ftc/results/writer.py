@@ -1,4 +1,4 @@
-"""What a run leaves in its result folder: log and scenario, then metrics, certificate, report and exports."""
+"""Write the result folder of a run: log and scenario, then metrics, certificate, report and exports."""
 
 import contextlib
 import os
@@ -48,12 +48,13 @@ def run(
 ) -> Document:
     """Fly `scenario`, write `out/<name>/`, and return the metrics document.
 
-    A flight that is not completed leaves nothing. Once it is, log and scenario are kept whatever else fails.
+    A flight that is not completed leaves no files. After a completed flight, log and scenario are kept even
+    if another file cannot be written.
 
-    exports: of "csv" and "acmi". prepare: called with the trimmed plant just before the flight. recording:
-    table, ulog or ardupilot, to write the log as a recorder on board would have. certified: write the
-    certificate of its alarm and exclusions. painters: who draws the figures, if not this process.
-    figures: their formats.
+    exports: any of "csv" and "acmi". prepare: called with the trimmed plant just before the flight.
+    recording: table, ulog or ardupilot, to write the log as a recorder on board does. certified: write the
+    certificate of the alarm and the exclusions. painters: the processes that draw the figures; without them
+    this process draws. figures: formats of the figures.
 
     Raises BadInput for a flight that cannot be trimmed or certified, SimulationFailed for one not completed
     or kept, NotAllWritten where the log is kept but another file could not be written.
@@ -98,7 +99,8 @@ class NotAllWritten(SimulationFailed):
 
 @contextlib.contextmanager
 def _note_failure_and_go_on(failed: list[Exception], folder: Path, what: str) -> Iterator[None]:
-    """Write one part of the results; where that fails, note why and leave nothing of that part."""
+    """Write one part of the results in the block. If it fails, add the reason to `failed` and remove the new
+    files of this part. what: name of the part."""
     before = set(folder.iterdir())
     try:
         yield
@@ -106,7 +108,7 @@ def _note_failure_and_go_on(failed: list[Exception], folder: Path, what: str) ->
         for left in set(folder.iterdir()) - before:
             shutil.rmtree(left) if left.is_dir() else left.unlink()
         says = f"{type(error).__name__}: {error}"
-        if isinstance(error, OSError) and error.errno and not error.filename:  # of the disk
+        if isinstance(error, OSError) and error.errno and not error.filename:  # an error of the disk
             says = disk_error_text(error)
         reason = SimulationFailed(f"{what} could not be written: {says}")
         reason.__cause__ = error
@@ -114,16 +116,18 @@ def _note_failure_and_go_on(failed: list[Exception], folder: Path, what: str) ->
 
 
 def write_documents(folder: Path, scenario: "Scenario", document: Document) -> None:
-    """Write what was flown and what came out of it into a result folder."""
+    """Write scenario.yaml and metrics.json into a result folder."""
     write_scenario(folder, scenario)
     (folder / "metrics.json").write_text(as_json(document), encoding="utf-8")
 
 
 def write_scenario(folder: Path, scenario: "Scenario") -> None:
-    """Write what was flown into a result folder."""
+    """Write scenario.yaml, and a copy of an own aircraft, into a result folder."""
     from beaver_ftc.scenario.builtin import to_yaml
 
-    if str(scenario.aircraft).startswith("./"):  # the user's own, copied: it can be flown again from here
+    if str(scenario.aircraft).startswith(
+        "./"
+    ):  # an own aircraft is copied, so that the folder alone can be flown again
         shutil.copytree(
             scenario.airframe.folder, folder / AIRCRAFT, ignore=_files_not_of_model, dirs_exist_ok=True
         )
@@ -132,7 +136,7 @@ def write_scenario(folder: Path, scenario: "Scenario") -> None:
 
 
 def _files_not_of_model(folder: str, names: list[str]) -> set[str]:
-    """The files that are no part of a JSBSim model and of its description."""
+    """The names of files that belong neither to a JSBSim model nor to its description."""
     return {n for n in names if Path(folder, n).is_file() and Path(n).suffix not in MODEL_FILES}
 
 
@@ -146,8 +150,8 @@ def write_report_files(
 ) -> None:
     """Draw the figures and the report of a result folder that holds its log and its scenario.
 
-    to: where to, if not into that folder. painters: who draws the figures, if not this process. formats: of
-    the figures. sections: of studies, for the report.
+    to: another folder to write into. painters: the processes that draw the figures; without them this process
+    draws. formats: of the figures. sections: sections of studies in the report.
     """
     from beaver_ftc.results.figures import pictures_of
     from beaver_ftc.results.painters import drawing
@@ -162,8 +166,11 @@ def write_report_files(
 
 
 def add_report(folder: Path, document: Document) -> str:
-    """Draw figures and report of a result folder that is there already; why not, if that fails: then the
-    folder is as it was. They appear whole, and in no folder that has taken its place meanwhile."""
+    """Draw figures and report of an existing result folder. Returns an empty text; if drawing fails, the
+    reason, and the folder stays as it was.
+
+    Both are drawn in a hidden folder, and renamed only if the result folder has not been replaced meanwhile.
+    """
     failed: list[Exception] = []
     with (
         TemporaryDirectory(prefix=partial_prefix(folder.name), dir=folder.parent) as hidden,

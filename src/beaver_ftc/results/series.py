@@ -84,7 +84,7 @@ def _add_mean_airspeed(chunks: Iterable[log.Values], frame_s: float) -> Iterator
     """The chunks with the mean airspeed, as the autopilot judges it: the deviation of the airspeed V (m/s)
     from its command c (m/s) through a lag of MEAN_S, m = 0 at the start,
 
-    m <- m + (frame_s / MEAN_S) (d - m),    mean airspeed c + m
+    d = V - c (0 where it is NaN),    m <- m + (frame_s / MEAN_S) (d - m),    mean airspeed c + m
     """
     share = frame_s / MEAN_S if math.isfinite(frame_s) else 1.0
     last = 0.0

@@ -1,6 +1,7 @@
 """The verdict of a flight in words, for the terminal and the head of the report.
 
-All words are computed from the metrics, so that they cannot disagree with metrics.json.
+All words are computed from the metrics, so that they cannot disagree with metrics.json. A line of the verdict
+is a pair (name, text); a function returns an empty text if there is nothing to say, and the line is left out.
 """
 
 import io
@@ -41,12 +42,12 @@ from beaver_ftc.scenario.warnings import wider
 if TYPE_CHECKING:
     from rich.table import Table
 
-MIN_SHOWN_BEYOND_S = 0.1
-Lines = Iterable[tuple[str, str]]
+MIN_SHOWN_BEYOND_S = 0.1  # a shorter time without sufficient authority is not printed
+Lines = Iterable[tuple[str, str]]  # name and text
 
 
 def title(metrics: Metrics) -> str:
-    """The scenario's name, whether it did as expected, and whether the aircraft was lost."""
+    """The name of the scenario, whether its expectations are met, and whether the aircraft was lost."""
     lost = ", the aircraft was LOST" if metrics.departure else ""
     if metrics.interrupted_s is not None:
         return f"{metrics.scenario}: INTERRUPTED at {metrics.interrupted_s:.2f} s, not passed{lost}"
@@ -64,13 +65,16 @@ def verdict_lines(metrics: Metrics) -> list[tuple[str, str]]:
     """(name, text) of each line of the verdict, in the order of events."""
     declared = metrics.faults or (metrics.fault,)
     isolation = metrics.isolation
-    said = (
+    lines = (
         ("flight", _if_there(_condition_text, metrics.flight)),
         *(("" if i else "fault", _fault_text(fault, metrics.faults)) for i, fault in enumerate(declared)),
         ("assumed", ", ".join(_ASSUMPTION_TEXT.get(name, name) for name in metrics.assumes)),
         ("outside", _outside_class_text(metrics)),
         ("detection", _detection_text(metrics)),
-        ("inconclusive", _if_there(lambda found: in_words(found.document()), metrics.detection.inconclusive)),
+        (
+            "inconclusive",
+            _if_there(lambda section: in_words(section.document()), metrics.detection.inconclusive),
+        ),
         ("statistical", _if_there(_statistical_text, metrics.detection.statistical)),
         ("isolation", _isolation_text(metrics)),
         *(
@@ -95,7 +99,7 @@ def verdict_lines(metrics: Metrics) -> list[tuple[str, str]]:
         ("saturation", ", ".join(f"{s} {_seconds_text(t)}" for s, t in metrics.saturation_s.items() if t)),
         *(("note", hint) for hint in metrics.hints),
     )
-    return [(what, how) for what, how in said if how]
+    return [(name, text) for name, text in lines if text]
 
 
 def _if_there(text_of: Callable[[Any], str], section: Any) -> str:
@@ -104,11 +108,14 @@ def _if_there(text_of: Callable[[Any], str], section: Any) -> str:
 
 
 def _filled(form: str, section: Part | None, **more: str) -> str:
-    """A form filled with the fields of a section, times as text; empty if the flight has no such section."""
+    """A form filled with the fields of a section and of `more`; a field that ends in `_s` is written as a
+    time. Empty if the flight has no such section."""
     if section is None:
         return ""
-    known = {name: _seconds_text(of) if name.endswith("_s") else of for name, of in vars(section).items()}
-    return form.format(**known, **more)
+    values = {
+        name: _seconds_text(value) if name.endswith("_s") else value for name, value in vars(section).items()
+    }
+    return form.format(**values, **more)
 
 
 _CONDITION_FORM = (
@@ -134,18 +141,18 @@ _LIMIT_FORM_OF_QUANTITY = {
 def _window_text(window: Window, metrics: Metrics) -> str:
     """The alarm and the names in one window."""
     alarm = f"alarm after {_seconds_text(window.delay_s)}" if window.detected else "no alarm"
-    found = [_found_text(one, metrics, "not isolated") for one in window.isolation]
-    return _filled("{from_s} to {to_s}: {found}", window, found="; ".join([alarm, *found]))
+    names = [_found_text(name, metrics, "not isolated") for name in window.isolation]
+    return _filled("{from_s} to {to_s}: {found}", window, found="; ".join([alarm, *names]))
 
 
-def _found_text(found: Named, metrics: Metrics, otherwise: str) -> str:
-    """A named fault, or the candidates; `otherwise` if there are none."""
-    if found.fault:
-        return _named_fault_text(found, metrics)
-    return _candidates_text(found.candidates) if found.candidates else otherwise
+def _found_text(named: Named, metrics: Metrics, otherwise: str) -> str:
+    """A named fault, or else the candidates; `otherwise` if there are no candidates."""
+    if named.fault:
+        return _named_fault_text(named, metrics)
+    return _candidates_text(named.candidates) if named.candidates else otherwise
 
 
-MAX_LISTED_CANDIDATES = 4  # places, or types: more are counted
+MAX_LISTED_CANDIDATES = 4  # more surfaces are counted, not listed
 
 
 def _candidates_text(candidates: Sequence[str]) -> str:
@@ -153,24 +160,24 @@ def _candidates_text(candidates: Sequence[str]) -> str:
 
 
 def candidates_in_words(candidates: Sequence[str]) -> str:
-    """The candidates, each `surface` or `surface:type`, in words: first the surfaces, then the types. Many
-    surfaces are counted; the metrics document lists all."""
+    """The candidates, each `place` or `place:type`, in words: first the surfaces, then other places, then the
+    types. More than MAX_LISTED_CANDIDATES surfaces are counted; the metrics document lists all."""
     places: dict[str, list[str]] = {}
     for candidate in candidates:
         place, _, kind = candidate.partition(":")
         places.setdefault(place, []).extend([kind] if kind else [])
     surfaces = [place for place, kinds in places.items() if place not in _TEXT_OF_OTHER_CANDIDATE]
-    said = [_surfaces_text(surfaces)] if surfaces else []
-    said += [_TEXT_OF_OTHER_CANDIDATE[place] for place in places if place in _TEXT_OF_OTHER_CANDIDATE]
+    words = [_surfaces_text(surfaces)] if surfaces else []
+    words += [_TEXT_OF_OTHER_CANDIDATE[place] for place in places if place in _TEXT_OF_OTHER_CANDIDATE]
     open_types = list(dict.fromkeys(kind for kinds in places.values() for kind in kinds))
     types = f"; {_open_types_text(open_types)}" if open_types else ""
-    return f"still possible: {' or '.join(said) or 'nothing'}{types}"
+    return f"still possible: {' or '.join(words) or 'nothing'}{types}"
 
 
 _TEXT_OF_OTHER_CANDIDATE = {
     "damage": "damage", "unanticipated": "a fault outside the class", "unknown": "a fault outside the class",
 }  # fmt: skip
-# What an aircraft's surfaces are called, and where on it they are.
+# Words in the names of surfaces, and the part of the aircraft where such a surface is.
 _AIRCRAFT_PART_OF_SURFACE_WORD = {
     "aileron": "wing", "flap": "wing", "spoiler": "wing", "slat": "wing", "elevon": "wing",
     "elevator": "tail", "rudder": "tail", "stabilator": "tail", "stabilizer": "tail", "canard": "canard",
@@ -196,13 +203,14 @@ def _open_types_text(kinds: Sequence[str]) -> str:
 
 
 def _count_and_noun(n: int, what: str) -> str:
+    """A number with its noun, such as `1 time` and `2 times`."""
     return f"{n} {what}{'' if n == 1 else 's'}"
 
 
 def tracking_rms_in_words(metrics: Metrics) -> list[tuple[str, str, str, str]]:
-    """(when, p, q, r): the RMS tracking errors in deg/s, before and after the fault."""
-    of = metrics.tracking
-    tracked = ("before", of.pre_fault_rms_deg_s), ("after", of.post_fault_rms_deg_s)
+    """(`before` or `after`, p, q, r): the RMS tracking errors before and after the fault, deg/s."""
+    tracking = metrics.tracking
+    tracked = ("before", tracking.pre_fault_rms_deg_s), ("after", tracking.post_fault_rms_deg_s)
     return [(when, value_text(rms.p), value_text(rms.q), value_text(rms.r)) for when, rms in tracked if rms]
 
 
@@ -212,30 +220,33 @@ def verdict_text(metrics: Metrics, folder: str, colour: bool = False) -> str:
     lines = verdict_lines(metrics)
     for i, (when, p, q, r) in enumerate(tracking_rms_in_words(metrics)):
         lines.append(("" if i else "tracking RMS", f"p {p}  q {q}  r {r} deg/s {when} the fault"))
-    held = [(one.passed, one.sentence) for one in expectations_in_words(metrics)]
+    expectations = [
+        (expectation.passed, expectation.sentence) for expectation in expectations_in_words(metrics)
+    ]
     certificate = _if_there(partial(_certificate_text, folder), metrics.certificate)
-    last = [("certificate", certificate)] if certificate else []
-    table = verdict_table((title(metrics), style), lines, held, [*last, ("results", folder)])
+    last_lines = [("certificate", certificate)] if certificate else []
+    table = verdict_table((title(metrics), style), lines, expectations, [*last_lines, ("results", folder)])
     return f"{printed([table], colour=colour)}\n"
 
 
 def verdict_table(
-    headline: tuple[str, str], lines: Lines, held: Iterable[tuple[bool, str]], last: Lines
+    headline: tuple[str, str], lines: Lines, expectations: Iterable[tuple[bool, str]], last: Lines
 ) -> "Table":
-    """A headline in its style, lines of (name, text), whether each expectation is met, and the last lines."""
+    """The table of a verdict: headline (text, style), lines, expectations (met, sentence), and the last
+    lines."""
     from rich.table import Table
     from rich.text import Text
 
     table = Table(title=Text(*headline), title_justify="left", show_header=False, box=None)
     table.add_column(style="bold", no_wrap=True)
     table.add_column(overflow="fold")
-    for what, how in lines:
-        table.add_row(what, how)
-    for passed, said in held:
+    for name, text in lines:
+        table.add_row(name, text)
+    for passed, sentence in expectations:
         mark = Text("met   " if passed else "MISSED", "green" if passed else "bold red")
-        table.add_row("expected", Text.assemble(mark, f" {said}"))
-    for what, how in last:
-        table.add_row(what, how)
+        table.add_row("expected", Text.assemble(mark, f" {sentence}"))
+    for name, text in last:
+        table.add_row(name, text)
     return table
 
 
@@ -261,20 +272,21 @@ def _certificate_text(folder: str, written: CertificateCounts) -> str:
 
 
 def _change_text(change: ChangeInFlight) -> str:
-    """A change in flight, and the result of the diagnosis that it ended."""
-    to = [f"{key} {name}" for key in ("law", "scheme") if (name := getattr(change, key))]
+    """A change in flight, and the result of the diagnosis that was replaced."""
+    changed = [f"{key} {name}" for key in ("law", "scheme") if (name := getattr(change, key))]
     if change.sensors:
-        to.append("sensors")
+        changed.append("sensors")
     form = "{what} at {time_s}"
     alarm = "FALSE ALARM" if change.false_alarm else "alarm"
     if change.detection_time_s is not None:
         form += "; the diagnosis before: {alarm} at {detection_time_s}, {named}"
-    what = ", ".join(to) or "declared sensors"
+    what = ", ".join(changed) or "declared sensors"
     named = change.isolated or "not isolated"
     return _filled(form, change, what=what, alarm=alarm, named=named)
 
 
 def _condition_text(flown: FlightCondition) -> str:
+    """Airspeed, altitude, time, scheme and law."""
     of_every_type = ", every fault type" if flown.fault_class == "all" else ""
     return _filled(_CONDITION_FORM, flown, of_every_type=of_every_type)
 
@@ -283,7 +295,7 @@ _ASSUMPTION_TEXT = {"sensors-sound": "sensors are sound (A11)"}
 
 
 def _outside_class_text(metrics: Metrics) -> str:
-    """The faults that the diagnosis cannot name, as its class does not have them."""
+    """The faults that the diagnosis cannot name, because its class does not contain them."""
     if not metrics.outside_class:
         return ""
     outside = " and ".join(metrics.outside_class)
@@ -292,8 +304,8 @@ def _outside_class_text(metrics: Metrics) -> str:
 
 
 def _fault_text(fault: Fault | None, faults: Sequence[DeclaredFault]) -> str:
-    """A fault with its size and times, and when others of `faults` mask it. Documents of earlier versions
-    have neither size nor end."""
+    """A fault with its size and times, and the times at which other faults mask it. A `Fault`, of documents
+    of earlier versions, has neither size nor end."""
     if fault is None:
         return "none"
     place = f"sensor {fault.sensor}" if fault.sensor else fault.actuator or ""
@@ -306,17 +318,21 @@ def _fault_text(fault: Fault | None, faults: Sequence[DeclaredFault]) -> str:
 
 
 def _masked_text(fault: DeclaredFault, faults: Sequence[DeclaredFault]) -> str:
-    """The times in which other faults mask a fault."""
-    later = [one for one in faults if one.at_s > fault.at_s and masking(fault, faults, one.at_s) is one]
-    spells = [f"from {_span_text(one.at_s, one.end_s)} ({without_underscores(one.type)})" for one in later]
-    return f", without effect {' and '.join(spells)}" if spells else ""
+    """The times at which a later fault masks a fault, so that it has no effect."""
+    masks = [
+        other for other in faults if other.at_s > fault.at_s and masking(fault, faults, other.at_s) is other
+    ]
+    spans = [
+        f"from {_span_text(other.at_s, other.end_s)} ({without_underscores(other.type)})" for other in masks
+    ]
+    return f", without effect {' and '.join(spans)}" if spans else ""
 
 
 _FORM_OF_SENSOR_FAULT = {"bias": "{:+g} {}", "noise": "{:g} {}", "scale": "{:+.0%}"}
 
 
 def _fault_size_texts(fault: DeclaredFault) -> list[str]:
-    """The size of an injected fault in words, that of an instrument's in the unit of the instrument."""
+    """The size of an injected fault in words. The fault of an instrument has the unit of the instrument."""
     if fault.sensor:
         unit = QUANTITIES[fault.sensor].unit
         size = fault.size.get("magnitude")
@@ -335,12 +351,12 @@ _DEVIATION_FORMAT_OF_CHANNEL = {
 def _profile_text(profile: ProfileDeviations) -> str:
     """Largest deviations from the commanded profile."""
     instant = value_text(profile.airspeed_at_one_instant_mps)
-    off = [
-        form.format(value_text(by), instant)
+    deviations = [
+        form.format(value_text(deviation), instant)
         for name, form in _DEVIATION_FORMAT_OF_CHANNEL.items()
-        if (by := getattr(profile, name)) is not None
+        if (deviation := getattr(profile, name)) is not None
     ]
-    return f"largest deviation: {', '.join(off)}" if off else ""
+    return f"largest deviation: {', '.join(deviations)}" if deviations else ""
 
 
 def _protection_limit_text(limit: ProtectionLimit) -> str:
@@ -350,8 +366,11 @@ def _protection_limit_text(limit: ProtectionLimit) -> str:
 
 
 def _true_size_text(isolation: Named, metrics: Metrics) -> str:
-    """The true size at the time of the estimate, if the named fault was injected; with this time, unless the
-    size is constant."""
+    """The true size at the time of the estimate, if a fault of the named type was injected on this surface.
+
+    The time of the estimate is `estimate_at_s`, or else the last frame. It is written unless the only fault
+    of the surface is abrupt and lasts to the end, and the estimate belongs to the last frame.
+    """
     faults = [fault for fault in metrics.faults if fault.actuator == isolation.fault]
     kind = isolation.type
     if isolation.estimate is None or kind not in [fault.type for fault in faults]:
@@ -385,42 +404,46 @@ def _detection_text(metrics: Metrics) -> str:
     return _filled(form, detection, source=source)
 
 
-def _statistical_text(said: Statistical) -> str:
+def _statistical_text(statistical: Statistical) -> str:
     """When the statistical detector alone would have raised the alarm."""
-    alarm = "no alarm" if said.time_s is None else f"alarm at {_seconds_text(said.time_s)}"
-    return _filled(_STATISTICAL_FORM, said, alarm=alarm)
+    alarm = "no alarm" if statistical.time_s is None else f"alarm at {_seconds_text(statistical.time_s)}"
+    return _filled(_STATISTICAL_FORM, statistical, alarm=alarm)
 
 
 def _isolation_text(metrics: Metrics) -> str:
+    """The name, the candidates or `none`; then the names and types that were withdrawn."""
     isolation = metrics.isolation
-    found = "none"
+    text = "none"
     if isolation.isolated:
-        found = _named_fault_text(isolation, metrics)
+        text = _named_fault_text(isolation, metrics)
     elif metrics.detection.detected and isolation.candidates:
-        found = _candidates_text(isolation.candidates)
-    gone = _withdrawn_texts("named before", isolation.withdrawn)
-    return "; ".join([found, *gone, *_withdrawn_texts("type named before", isolation.types_withdrawn or ())])
+        text = _candidates_text(isolation.candidates)
+    withdrawn = _withdrawn_texts("named before", isolation.withdrawn)
+    return "; ".join(
+        [text, *withdrawn, *_withdrawn_texts("type named before", isolation.types_withdrawn or ())]
+    )
 
 
-def _withdrawn_texts(heading: str, gone: Sequence[Withdrawn]) -> list[str]:
-    """The names given before, each once: when, how often, and why it was withdrawn the last time."""
-    spells: dict[str, list[Withdrawn]] = {}
-    for one in gone:
-        kind = f" ({without_underscores(one.type)})" if one.type else ""
-        spells.setdefault(f"{one.fault}{kind}", []).append(one)
-    said = []
-    for name, each in spells.items():
-        total = _seconds_text(sum(one.to_s - one.from_s for one in each))
-        often = f" {len(each)} times, for {total} in all," if len(each) > 1 else ""
-        when = f"from {_span_text(each[0].from_s, each[-1].to_s)}"
-        why = f", withdrawn because {each[-1].because}" if each[-1].because else ""
-        said.append(f"{name}{often} {when}{why}")
-    return [f"{heading}: {'; '.join(said)}"] if said else []
+def _withdrawn_texts(heading: str, withdrawn: Sequence[Withdrawn]) -> list[str]:
+    """The withdrawn names, each once: how often it was given, from the first time to the last, in all, and
+    the reason of the last withdrawal."""
+    entries_of_name: dict[str, list[Withdrawn]] = {}
+    for entry in withdrawn:
+        kind = f" ({without_underscores(entry.type)})" if entry.type else ""
+        entries_of_name.setdefault(f"{entry.fault}{kind}", []).append(entry)
+    texts = []
+    for name, entries in entries_of_name.items():
+        total = _seconds_text(sum(entry.to_s - entry.from_s for entry in entries))
+        often = f" {len(entries)} times, for {total} in all," if len(entries) > 1 else ""
+        when = f"from {_span_text(entries[0].from_s, entries[-1].to_s)}"
+        why = f", withdrawn because {entries[-1].because}" if entries[-1].because else ""
+        texts.append(f"{name}{often} {when}{why}")
+    return [f"{heading}: {'; '.join(texts)}"] if texts else []
 
 
 def _named_fault_text(isolation: Named, metrics: Metrics) -> str:
-    """One named fault. The only remaining candidate may still be excluded by later data."""
-    left = " (only remaining candidate)" if isolation.so_far else ""
+    """One named fault: its name, the delay, whether it is right, type, estimated and true size."""
+    left = " (only remaining candidate)" if isolation.so_far else ""  # later data may exclude it, too
     when = "" if isolation.delay_s is None else f" after {_seconds_text(isolation.delay_s)}"
     right = "correct" if isolation.correct and isolation.type_correct is not False else "WRONG"
     if isolation.premature:
@@ -434,7 +457,8 @@ def _probing_text(span_s: tuple[float, float]) -> str:
 
 
 def _type_text(isolation: Named) -> str:
-    """The type, or those still possible; nothing where the class knows no other."""
+    """The type, or the types that remain. No text for an instrument or an unanticipated fault, which have no
+    type."""
     if str(isolation.fault).startswith("sensor "):
         return ""
     if isolation.type is None:
@@ -443,6 +467,7 @@ def _type_text(isolation: Named) -> str:
 
 
 def _estimate_text(isolation: Named) -> str:
+    """The estimated size: an angle in deg, any other size in the words of its fault type."""
     if isolation.estimate is None:
         return ""
     if isolation.estimate_deg is None:
@@ -451,17 +476,19 @@ def _estimate_text(isolation: Named) -> str:
 
 
 def _supervisor_text(metrics: Metrics) -> str:
+    """The modes with their times; before the last one, how many are left out."""
     changes = [f"{change.mode} {_seconds_text(change.time_s)}" for change in metrics.supervisor]
     if metrics.mode_changes_left_out:
         changes.insert(-1, f"({metrics.mode_changes_left_out} more)")
     return " → ".join(changes)
 
 
-MAX_SHOWN_AUTHORITY_SHARE = 0.995  # of an axis: nothing to be said
+MAX_SHOWN_AUTHORITY_SHARE = 0.995  # an axis with a larger share has lost nothing worth saying
 
 
 def _insufficient_authority_text(authority: Authority) -> str:
-    """For how long no law could have held each rate; without times shorter than MIN_SHOWN_BEYOND_S."""
+    """For how long no deflection could hold the rate of each axis; times below MIN_SHOWN_BEYOND_S are left
+    out."""
     beyond = ", ".join(
         f"{axis} for {_seconds_text(given.beyond_s)}"
         for axis, given in vars(authority).items()
@@ -471,23 +498,26 @@ def _insufficient_authority_text(authority: Authority) -> str:
 
 
 def _remaining_authority_text(authority: Authority) -> str:
-    """Remaining control authority of each axis that has lost some, as a share of the healthy aircraft's."""
-    said = []
-    for axis, of in vars(authority).items():
-        if of.least_rad_s2 is None:
+    """Remaining control authority of each axis that has lost some: range of acceleration at the end over that
+    of the healthy aircraft, (greatest - least) / (greatest - least, healthy). An axis with power of the
+    engines is always shown."""
+    texts = []
+    for axis, entry in vars(authority).items():
+        if entry.least_rad_s2 is None:
             continue
-        left = of.greatest_rad_s2 - of.least_rad_s2
-        most = of.engines_greatest_rad_s2
-        healthy = of.healthy_greatest_rad_s2 - of.healthy_least_rad_s2
-        share = left / healthy if healthy else 1.0  # no surface acts about the axis: none was lost
-        if share < MAX_SHOWN_AUTHORITY_SHARE or most:
-            engines = f", engines {of.engines_least_rad_s2:.2g} to {most:.2g}" if most else ""
-            span = f"{of.least_rad_s2:.2g} to {of.greatest_rad_s2:.2g} rad/s2{engines}"
-            said.append(f"{MOTION_OF_AXIS[axis]} authority {100 * share:.0f} % ({span})")
-    return "; ".join(said)
+        remaining = entry.greatest_rad_s2 - entry.least_rad_s2
+        power = entry.engines_greatest_rad_s2
+        healthy = entry.healthy_greatest_rad_s2 - entry.healthy_least_rad_s2
+        share = remaining / healthy if healthy else 1.0  # 0: no surface acts about this axis
+        if share < MAX_SHOWN_AUTHORITY_SHARE or power:
+            engines = f", engines {entry.engines_least_rad_s2:.2g} to {power:.2g}" if power else ""
+            span = f"{entry.least_rad_s2:.2g} to {entry.greatest_rad_s2:.2g} rad/s2{engines}"
+            texts.append(f"{MOTION_OF_AXIS[axis]} authority {100 * share:.0f} % ({span})")
+    return "; ".join(texts)
 
 
 def _envelope_text(metrics: Metrics) -> str:
+    """How often, how long and when first the flight left the validated envelope."""
     if not metrics.envelope_exits:
         return ""
     times = _count_and_noun(metrics.envelope.exits, "time")
@@ -512,7 +542,7 @@ def _link_text(link: Link) -> str:
 
 
 def _span_text(begin_s: float, end_s: float | None) -> str:
-    """A span of time; its begin alone if it has no end."""
+    """A span of time, s; only the begin if it has no end."""
     begin = _seconds_text(begin_s)
     return begin if end_s is None else f"{begin} to {_seconds_text(end_s)}"
 

@@ -26,22 +26,24 @@ from beaver_ftc.scenario.diagnosis import MODES
 AXIS_NAMES = {axis: f"{motion} rate {axis}" for axis, motion in MOTION_OF_AXIS.items()}
 
 SIDES = ("left", "right")
-SURFACE_ROLES = tuple(f"surface {i}" for i in range(8))  # looks of the surfaces, in the aircraft's order
+SURFACE_ROLES = tuple(f"surface {i}" for i in range(8))  # roles of the surfaces, in the order of the aircraft
 ATTAINABLE_AIRSPEED_COLUMN = "airspeed_limited_mps"  # the commanded airspeed, as far as it can be held
 BEAVER_POWER_COLUMN = "manifold_pressure_inhg"
-AXIS_QUANTILES = 0.005, 0.995  # quantiles that set the axis where spikes would
-MEAN_AIRSPEED_EXPECTATION = "airspeed_within_mps"  # the expectation that reads it
+AXIS_QUANTILES = 0.005, 0.995  # these quantiles set an axis that clips spikes
+MEAN_AIRSPEED_EXPECTATION = "airspeed_within_mps"  # the expectation about the mean airspeed
 
 Names = Sequence[str]
 """Names of columns, surfaces or estimators, in the order of the log or of the aircraft."""
 
-_SHOWN_UNIT = {"rad/s2": "deg/s²", "rad/s": "deg/s", "rad": "deg", "1": ""}  # for people; others as they are
+_SHOWN_UNIT = {"rad/s2": "deg/s²", "rad/s": "deg/s", "rad": "deg", "1": ""}  # other units are shown unchanged
 
 
 @dataclass(frozen=True)
 class Trace:
-    """One curve: a column of the log, its label, and its role, which determines its look (style.py). Shown is
-    factor * column + offset."""
+    """One curve: a column of the log, its label, and its role, which determines its look (style.py).
+
+    The shown value is factor * column + offset; offset has the shown unit.
+    """
 
     column: str
     label: str
@@ -66,16 +68,15 @@ class Panel:
     value_names: tuple[str, ...] = ()  # names of the values 0, 1, 2, ... of a discrete quantity
     shade_column: str = ""  # a 0/1 column: the panel is shaded while it is 1
     shade_label: str = ""
-    line_at: float | None = None  # a value worth a line across
-    clips_spikes: bool = (
-        False  # spikes beyond the quantiles AXIS_QUANTILES do not set the axis; an arrow marks them
-    )
-    bars: bool = False  # a row for each label, with a bar while one of its traces is 0,
-    bars_during_column: str = ""  # as long as this column is 1
+    line_at: float | None = None  # a horizontal line is drawn at this value
+    clips_spikes: bool = False  # AXIS_QUANTILES set the axis; an arrow marks spikes beyond them
+    bars: bool = False  # a row for each label, with a bar while one of its traces is 0
+    bars_during_column: str = ""  # a 0/1 column: bars are drawn only while it is 1
 
     @property
     def steps(self) -> tuple[str, ...]:
-        """The names along the axis: of a discrete quantity's values, or of the rows of a panel of bars."""
+        """The names along the axis: of the values of a discrete quantity, or of the rows of a panel of
+        bars."""
         return tuple(dict.fromkeys(trace.label for trace in self.traces)) if self.bars else self.value_names
 
     @property
@@ -92,9 +93,9 @@ class View:
     title: str
     panels: tuple[Panel, ...]
     n_panel_columns: int = 1
-    text_without_data: str = ""  # what to say where the log holds nothing of this
-    closeup: bool = False  # worth a second look around the fault
-    folded: bool = False  # details: the report shows it when asked
+    text_without_data: str = ""  # written into the panels if the columns have no data
+    closeup: bool = False  # also drawn around the fault
+    folded: bool = False  # details: the report shows them after a click
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -107,19 +108,19 @@ class View:
 
 
 def unit_of(column: str) -> tuple[str, float]:
-    """Unit to show a log column in, and the factor from the column's own unit to it."""
+    """The shown unit of a log column, and the factor from the unit of the column to it."""
     unit = log.unit_of(column)
     return _SHOWN_UNIT.get(unit, unit), math.degrees(1.0) if unit.startswith("rad") else 1.0
 
 
 def estimators(columns: Names) -> tuple[str, ...]:
-    """Names of the isolation estimators a log has columns of, in the log's order."""
+    """Names of the isolation estimators whose columns a log has, in the order of the log."""
     matches = (re.fullmatch(r"fie_(.+)_excluded", column) for column in columns)
     return tuple(match.group(1) for match in matches if match)
 
 
 def surfaces(columns: Names) -> tuple[str, ...]:
-    """Names of the surfaces a log has columns of, in the aircraft's order."""
+    """Names of the surfaces whose columns a log has, in the order of the aircraft."""
     ending = "_cmd_rad"
     return tuple(column.removesuffix(ending) for column in columns if column.endswith(ending))
 
@@ -130,31 +131,40 @@ def views_of_flight(columns: Names, metrics: Metrics) -> tuple[View, ...]:
 
 
 def expected_airspeed_mps(metrics: Metrics) -> float | None:
-    """How far the mean airspeed may be from the command; None where the scenario does not say."""
+    """Largest deviation of the mean airspeed from the command that the scenario expects, m/s; None without
+    such an expectation."""
     return next(
-        (found.expected for found in metrics.expectations if found.name == MEAN_AIRSPEED_EXPECTATION), None
+        (
+            expectation.expected
+            for expectation in metrics.expectations
+            if expectation.name == MEAN_AIRSPEED_EXPECTATION
+        ),
+        None,
     )
 
 
 def views(columns: Names, power: bool = False, within_mps: float | None = None) -> tuple[View, ...]:
-    """Every view that a log with these columns allows; power: the law has used the engine; within_mps: of the
-    commanded airspeed, as the scenario expects its mean."""
+    """Every view whose columns a log has. power: whether the law has used the engine. within_mps: as
+    `expected_airspeed_mps` returns it."""
     known = set(columns)
     moved = surfaces(columns)
     engine = power_column(columns)
     isolating = estimators(columns)
-    named = (
+    all_views = (
         _TRACKING, _profile_view(ATTAINABLE_AIRSPEED_COLUMN in known, engine, within_mps),
         _surfaces_view(moved), _DETECTION, _SENSOR_MONITOR, _likelihood_view(columns),
         _candidates_view(moved, isolating), _isolation_view(isolating), _ratio_view(isolating),
         _effectiveness_view(moved), _SUPERVISOR, *((_ENGINE,) if power else ()), _STATES,
     )  # fmt: skip
-    return tuple(view for view in named if view.panels and known.issuperset(source_columns(view.columns)))
+    return tuple(view for view in all_views if view.panels and known.issuperset(source_columns(view.columns)))
 
 
 def power_column(columns: Names) -> str:
-    """The log's column of the engine power commanded along a profile; empty where there is none. Its name is
-    the aircraft's; it stands before the first command of the profile, `altitude_command_m`."""
+    """The log column of the engine power that is commanded along a profile; empty if there is none.
+
+    Its name depends on the aircraft. It stands directly before `altitude_command_m`, the first command of the
+    profile; without such a column, `detected` or `watch_test` stands there.
+    """
     if BEAVER_POWER_COLUMN in columns:
         return BEAVER_POWER_COLUMN
     if "altitude_command_m" not in columns:
@@ -164,12 +174,14 @@ def power_column(columns: Names) -> str:
 
 
 def _panel(label: str, *traces: tuple[Any, ...], **how: Any) -> Panel:
-    """A panel of traces, each (column, label, role) and what else a `Trace` has."""
+    """A panel of traces. traces: fields of each `Trace`, (column, label, role) and optionally more. how:
+    further fields of the panel."""
     return Panel(label, tuple(Trace(*trace) for trace in traces), **how)
 
 
 def _ratio_panel(label: str, *traces: tuple[str, str, str]) -> Panel:
-    """A panel of what stays below 1 as long as all is well."""
+    """A panel of ratios, on a logarithmic scale with a line at 1, which a healthy aircraft does not
+    exceed."""
     return _panel(label, *traces, log_scale=True, line_at=1.0)
 
 
@@ -189,6 +201,8 @@ _TRACKING = View(
 
 
 def _profile_view(limited: bool, power: str, within_mps: float | None) -> View:
+    """Commanded and flown altitude, airspeed, heading and bank, and engine power. limited: whether the log
+    has the attainable airspeed. power: its column, or empty."""
     flown = (
         ("altitude", "altitude_command_m", "altitude_m"),
         ("airspeed", "airspeed_command_mps", "airspeed_mps"),
@@ -196,10 +210,10 @@ def _profile_view(limited: bool, power: str, within_mps: float | None) -> View:
         ("bank φ", "bank_command_rad", "phi_rad"),
     )
     mean = _mean_airspeed_traces(within_mps)
-    more = {"airspeed": [(ATTAINABLE_AIRSPEED_COLUMN, "attainable", "command")] if limited else []}
+    further = {"airspeed": [(ATTAINABLE_AIRSPEED_COLUMN, "attainable", "command")] if limited else []}
     panels = [
         _panel(
-            label, (command, "commanded", "target"), *more.get(label, ()), (actual, "flown", "actual"),
+            label, (command, "commanded", "target"), *further.get(label, ()), (actual, "flown", "actual"),
             *(mean if label == "airspeed" else ()),
         )
         for label, command, actual in flown
@@ -210,7 +224,7 @@ def _profile_view(limited: bool, power: str, within_mps: float | None) -> View:
 
 
 def _mean_airspeed_traces(within_mps: float | None) -> list[tuple[Any, ...]]:
-    """The mean of the airspeed that is judged, and what the scenario expects of it."""
+    """Traces of the mean airspeed, and of the limits that the scenario expects of it."""
     mean = [(MEAN_AIRSPEED_COLUMN, "10 s mean", "residual")]
     if within_mps is None:
         return [*mean]
@@ -221,31 +235,33 @@ def _mean_airspeed_traces(within_mps: float | None) -> list[tuple[Any, ...]]:
 
 def surfaces_by_kind(names: Names) -> dict[str, list[str]]:
     """Names of surfaces by kind, in their order: `left_inboard_elevator`, `elevator_2` are elevators."""
-    found: dict[str, list[str]] = {}
+    by_kind: dict[str, list[str]] = {}
     for name in names:
         words = name.split("_")
         is_one_of_many = words[-1].isdigit() or words[-1] in SIDES
-        found.setdefault(words[0 if is_one_of_many else -1], []).append(name)
-    return found
+        by_kind.setdefault(words[0 if is_one_of_many else -1], []).append(name)
+    return by_kind
 
 
 Labelled = dict[str, list[tuple[str, str, str]]]
-"""By kind of surface: name, what to call it, and its role."""
+"""By kind of surface, (name, label, role) of each surface."""
 
 
 def _labels_and_roles_by_kind(names: Names) -> Labelled:
-    """By kind, or all in one where each may have a look of its own: name, what to call it, and its role."""
+    """(name, label, role) of each surface by its kind. If there are at most as many surfaces as roles, all
+    are of one kind without a name, so that each has a look of its own."""
     if names and len(names) <= len(SURFACE_ROLES):
         return {"": [(name, name, role) for name, role in zip(names, SURFACE_ROLES, strict=False)]}
-    said: Labelled = {}
+    labelled: Labelled = {}
     for kind, alike in surfaces_by_kind(names).items():
         for name, role in zip(alike, SURFACE_ROLES * len(alike), strict=False):
             others = " ".join(word for word in name.split("_") if word != kind)
-            said.setdefault(kind, []).append((name, others or kind, role))
-    return said
+            labelled.setdefault(kind, []).append((name, others or kind, role))
+    return labelled
 
 
 def _surfaces_view(names: Names) -> View:
+    """A panel for each surface; of many surfaces, two panels for each kind."""
     if len(names) > len(SURFACE_ROLES):
         panels = tuple(
             _panel(f"{kind}: {label}", *((f"{name}_{of}_rad", called, role) for name, called, role in alike))
@@ -314,8 +330,8 @@ def _likelihood_view(columns: Names) -> View:
     steps = [(f"{axis}_step_likelihood_share", f"{axis}'", axis) for axis in AXES]
     panels = (
         *(
-            _ratio_panel(f"loss of {kind or 'a surface'}: test / alarm level", *of)
-            for kind, of in losses.items()
+            _ratio_panel(f"loss of {kind or 'a surface'}: test / alarm level", *traces)
+            for kind, traces in losses.items()
         ),
         _ratio_panel("step or tone of an acceleration, or its force: test / alarm level", *steps),
     )
@@ -323,15 +339,18 @@ def _likelihood_view(columns: Names) -> View:
     return View("likelihood", title, panels, closeup=True)
 
 
-def _candidates_view(moved: Names, names: Names) -> View:
-    """One strip: which surfaces may be at fault, from the alarm on, until the last of their estimators is
-    excluded."""
-    roles = dict(zip(moved, SURFACE_ROLES * len(moved), strict=False))
+def _candidates_view(surface_names: Names, estimator_names: Names) -> View:
+    """One panel of bars: a surface has a bar from the alarm until all of its estimators are excluded.
+
+    An estimator belongs to the surface with the longest name that its own name begins with.
+    """
+    roles = dict(zip(surface_names, SURFACE_ROLES * len(surface_names), strict=False))
     traces = [
         (f"fie_{name}_excluded", without_underscores(surface), roles[surface])
-        for surface in moved
-        for name in names
-        if surface == max((of for of in moved if f"{name}_".startswith(f"{of}_")), key=len, default="")
+        for surface in surface_names
+        for name in estimator_names
+        if surface
+        == max((other for other in surface_names if f"{name}_".startswith(f"{other}_")), key=len, default="")
     ]
     panel = _panel("surfaces that may be at fault", *traces, bars=True, bars_during_column="detected")
     panels = (panel,) if traces else ()

@@ -1,17 +1,19 @@
 """The metrics of a flight: the document metrics.json, with the expectations of the scenario (`expect:`).
 
-This module alone decides whether an alarm is false, how late it is, and whether a name is correct. A fault is
-in force in the first frame whose time is not before `at_s`. An alarm in that very frame, or later, is no
-false alarm; its delay counts from that frame. A name given before its fault began is premature, and is not
-correct, whatever it says.
+This module alone decides whether an alarm is false, how late it is, and whether a name is correct:
 
-Times are seconds from the start of the flight, rates deg/s. Delays are seconds from the first frame in which
-the fault is there: `at_s`, or up to a frame later. A quantity that does not exist is null: a document never
-holds NaN. Nothing in it depends on the wall clock or the machine's name, so that the same scenario and seed
-give the same file.
+    term         meaning
+    in force     a fault is in force from the first frame whose time is not before `at_s`, until it ends
+    false        an alarm before the first fault is in force
+    delay, s     time from the first frame with the fault to an event
+    premature    a name that is given before its fault began; such a name is never correct
 
-The fields of `results/model.py` explain the keys. This module has three parts: how events are judged
-(`Onset`, `Truth`), the document, section by section, and the hints.
+Times are in s from the start of the flight, rates in deg/s. A quantity that does not exist is null: a
+document never holds NaN. Nothing in the document depends on the wall clock or on the name of the machine, so
+that the same scenario and seed give the same file.
+
+The fields of `results/model.py` explain the keys. This module has three parts: the judgement of events
+(`Onset`, `Truth`), the sections of the document (`measure`), and the hints (`hints`).
 """
 
 import json
@@ -38,43 +40,50 @@ if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario
 
 
-_TIME_DECIMALS = 9  # of a second: without the rounding of frame times
+_TIME_DECIMALS = (
+    9  # times are rounded to so many decimals of a second, which removes the rounding of frame times
+)
 
 
 @dataclass(frozen=True)
 class Onset:
-    """The instant from which events are judged. at_s: as declared, None where nothing breaks. rate_hz: of the
-    frames, None where the truth has none (a recorded log)."""
+    """The instant from which events are judged.
+
+    at_s: begin of the fault as declared; None without a fault. rate_hz: rate of the frames; None for a
+    recorded log, whose fault begins between frames.
+    """
 
     at_s: Quantity
     rate_hz: Quantity = None
 
     @property
     def first_frame_with_fault_s(self) -> float:
-        """Time of the first frame with the fault; infinite where nothing breaks."""
+        """Time of the first frame with the fault, s; infinite without a fault."""
         if self.at_s is None:
             return inf
         return self.at_s if self.rate_hz is None else first_frame_s(self.at_s, self.rate_hz)
 
     def is_false(self, time_s: Any) -> Any:
-        """Whether an alarm at a time, or at each of several, is a false one: there is no fault yet."""
+        """Whether an alarm at a time, or at each time of an array, is false: the fault has not begun."""
         return is_before(time_s, inf if self.at_s is None else self.at_s)
 
     def delay_s(self, time_s: Quantity) -> Quantity:
-        """From the fault's first frame to an event; None without one, or if it came before the fault."""
+        """Time from the first frame with the fault to an event, s; None without an event, or for one before
+        the fault."""
         if time_s is None or self.is_false(time_s):
             return None
         return round(max(time_s - self.first_frame_with_fault_s, 0.0), _TIME_DECIMALS)
 
 
 def strikes_within(at_s: Any, flown_s: Any) -> Any:
-    """Whether a fault, or each of several, comes before its flight ends; NaN: there is none."""
+    """Whether a fault, or each fault of an array, begins before its flight ends. NaN, no fault, gives
+    False."""
     return at_s < flown_s
 
 
 def is_late(delay_s: Any, guaranteed_delay_s: Any, frame_s: Any) -> Any:
-    """Whether a detection, or each of several, came more than a frame after the instant from which it was
-    certain."""
+    """Whether a detection, or each one of an array, came more than a frame after the instant from which it
+    was certain: delay > guaranteed delay + frame, s."""
     return delay_s > guaranteed_delay_s + frame_s + TIME_TOLERANCE_S
 
 
@@ -83,8 +92,8 @@ class Truth:
     """The faults that are injected in a flight, in the order in which they strike.
 
     removed_surfaces: surfaces that damage takes away. outside_class_from_second_fault: an unanticipated fault
-    that stands for all faults together, from the instant at which a second surface fails; None if the
-    diagnosis looks for pairs. No single fault explains such a flight, so it is outside the fault class.
+    that stands for all faults together. It begins when a second surface fails, since no single fault explains
+    the flight from then on. None if one surface fails at most, or if the diagnosis tests pairs of faults.
 
     A name is compared with one fault. Its delay counts from the first frame with this fault, and is None if
     the name is premature, that is, given before the fault began:
@@ -107,7 +116,7 @@ class Truth:
 
     @classmethod
     def of(cls, scenario: Any) -> Self:
-        """That of a `schema.Scenario`."""
+        """The truth of a `schema.Scenario`."""
         faults = sorted(map(DeclaredFault.of_scenario, scenario.faults), key=lambda fault: fault.at_s)
         damage = scenario.airframe.damage
         cases = [fault.case for fault in scenario.faults if isinstance(fault, Damage)]
@@ -125,34 +134,37 @@ class Truth:
 
     @property
     def onset(self) -> Onset:
-        """When the flight ceases to be healthy."""
+        """The begin of the first fault."""
         return self.onset_of(self.first)
 
     def onset_of(self, fault: DeclaredFault | None) -> Onset:
-        """When a fault begins."""
+        """The begin of a fault; without a fault, an onset that never comes."""
         return Onset(None if fault is None else fault.at_s, self.rate_hz)
 
     def within(self, acting: Sequence[DeclaredFault]) -> Self:
-        """That of a window in which these faults act."""
+        """The truth of a window in which these faults act."""
         surfaces = {fault.actuator for fault in acting if fault.actuator is not None}
         outside = self.outside_class_from_second_fault if len(surfaces) > 1 else None
         return replace(self, faults=tuple(acting), outside_class_from_second_fault=outside)
 
     def against(self, name: str | None, time_s: Quantity) -> DeclaredFault | None:
-        """The fault with which a name given at `time_s` is compared: of the faults for which it is right, the
-        first one in force then, otherwise the first one that strikes; None if it is right for no fault."""
+        """The fault with which a name given at `time_s` is compared. Among the faults for which the name is
+        right: the first one in force then, or else the first one that strikes. None if there is no such
+        fault."""
         faults = self.faults_named_rightly_by(name, time_s)
         in_force = (fault for fault in faults if time_s is not None and is_in_force(fault, time_s))
         return next(in_force, faults[0] if faults else None)
 
     def is_type_right(self, fault: DeclaredFault | None, kind: str | None, time_s: Quantity) -> bool | None:
-        """Whether a type named at `time_s` is that of `fault`, or of another fault that acts on the same
-        surface then; None if `fault` has no type to name."""
+        """Whether a type named at `time_s` is the type of `fault`, or of another fault that acts on the same
+        surface then. None if no type is named, or if `fault` has no type that can be named."""
         if fault is None:
             return None if kind is None else False
-        alike = [other for other in acting_at(self.faults, time_s or 0.0) if other.actuator == fault.actuator]
-        right = [other.is_of_type(kind) for other in (fault, *(alike if fault.actuator else ()))]
-        return None if right[0] is None else any(right)
+        others = [
+            other for other in acting_at(self.faults, time_s or 0.0) if other.actuator == fault.actuator
+        ]
+        verdicts = [other.is_of_type(kind) for other in (fault, *(others if fault.actuator else ()))]
+        return None if verdicts[0] is None else any(verdicts)
 
     def faults_named_rightly_by(self, name: str | None, time_s: Quantity) -> tuple[DeclaredFault, ...]:
         """The faults for which a name given at `time_s` is right, in the order in which they strike."""
@@ -163,26 +175,27 @@ class Truth:
         return tuple(fault for fault in candidates if fault.is_named_by(name, self.removed_surfaces))
 
     def is_premature(self, name: str | None, time_s: Quantity, fault: DeclaredFault | None) -> bool | None:
-        """Whether a name was given before `fault` began, with which it is compared; None without a name."""
+        """Whether a name was given before `fault` began. fault: the one with which the name is compared. None
+        without a name."""
         if name is None or time_s is None:
             return None
         return fault is not None and self.onset_of(fault).is_false(time_s)
 
 
-# When a hint is given:
-TAKEN_OVER = "reallocated"  # this mode begins
-LONG_S = 1.0  # so long after the name, or longer
-NEAR_THRESHOLD_SHARE = 0.9  # the residual in healthy flight exceeds this share of its threshold
-DRIFT_MPS, DRIFT_M = 5.0, 300.0  # airspeed, or altitude, changes by more over the flight
+# Conditions of the hints.
+TAKEN_OVER = "reallocated"  # mode that replaces the named surface
+LONG_S = 1.0  # a reallocation that begins so long after the name is late
+NEAR_THRESHOLD_SHARE = 0.9  # a residual of a healthy flight beyond this share of its threshold is near it
+DRIFT_MPS, DRIFT_M = 5.0, 300.0  # a larger change of airspeed or altitude over the flight is a drift
 
 
 def metrics(flight: "Landing") -> Document:
-    """The document of a flight, key by key in the order documented."""
+    """The document of a flight, with its keys in the order of `model.Metrics`."""
     return measure(flight).document()
 
 
 def measure(flight: "Landing") -> Metrics:
-    """The metrics of a flight."""
+    """The metrics of a flight. Hints follow from the other metrics, and expectations are evaluated last."""
     truth = Truth.of(flight.scenario)
     amounts = Metrics.of(rounded(_measured(flight, truth)) | _declared(flight, truth))
     amounts = replace(amounts, hints=tuple(hints(flight, amounts)))
@@ -214,8 +227,8 @@ def _declared(flight: "Landing", truth: Truth) -> Document:
 
 
 def _measured(flight: "Landing", truth: Truth) -> Document:
-    """The sections that are measured. `Metrics.of` takes only the keys that a section has, so that these are
-    the values of the landing, by the same names:
+    """The sections that are measured. `Metrics.of` takes only the keys that a section has. Values that keep
+    their name are therefore taken from all values of the landing, `landed`:
 
         the document   frames, supervisor, envelope_exits, departure, authority, engine_power, limits,
                        saturation_s
@@ -226,7 +239,7 @@ def _measured(flight: "Landing", truth: Truth) -> Document:
     """
     landed = vars(flight)
     onset = truth.onset
-    at_once = truth.first is not None and truth.first.at_s <= 0  # then nothing was measured before it
+    at_once = truth.first is not None and truth.first.at_s <= 0  # no frame is before the fault
     return landed | {
         "detection": landed | {
             "detected": flight.detection_time_s is not None,
@@ -236,7 +249,7 @@ def _measured(flight: "Landing", truth: Truth) -> Document:
         },
         "isolation": _isolation(flight, truth),
         "windows": _windows(flight, truth),
-        # the alarm is latched: there is one a diagnosis
+        # the alarm is latched, so that each diagnosis has one alarm
         "false_alarm": any(onset.is_false(time_s) for time_s in _alarm_times_s(flight)),
         "fault_free_s": fault_free_s(flight),
         "tracking": {
@@ -257,7 +270,9 @@ def _measured(flight: "Landing", truth: Truth) -> Document:
 def as_json(document: Any) -> str:
     """`document` as JSON text, keys in the order given; raises ValueError on NaN or infinity."""
     text = json.dumps(document, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
-    return text.encode(errors="backslashreplace").decode()  # a path that is not UTF-8: JSON's own escapes
+    return text.encode(
+        errors="backslashreplace"
+    ).decode()  # a path that is not UTF-8 is written with escapes of JSON
 
 
 @cache
@@ -268,7 +283,7 @@ def versions() -> Document:
 
 
 def faults_of(scenario: "Scenario") -> list[Document]:
-    """Every declared fault, in the order in which they strike: what, when, and how large."""
+    """Every declared fault as a document, in the order in which the faults strike."""
     return [fault.document() for fault in Truth.of(scenario).faults]
 
 
@@ -292,7 +307,8 @@ def _windows(flight: "Landing", truth: Truth) -> list[Document] | None:
 
 
 def _window(window: Document, truth: Truth) -> Document:
-    """One window. A name given before a fault of the window began counts from the begin of this fault."""
+    """One window. A name that was given before a fault of the window began is counted from the begin of this
+    fault."""
     last_frame_s = window["to_s"] - 1.0 / truth.rate_hz
     alarm_s = window["alarm_s"]
     finding = window["found"]
@@ -310,7 +326,7 @@ def _window(window: Document, truth: Truth) -> Document:
 
 
 def _name_in_window(finding: Document, truth: Truth, last_frame_s: float) -> Document:
-    """A name in the last frame of a window, with the true size. truth: that of the window."""
+    """A name in the last frame of a window, with the true size. truth: the faults that act in the window."""
     fault = truth.against(finding["isolated"], last_frame_s)
     if fault is not None:
         begins_s = truth.onset_of(fault).first_frame_with_fault_s
@@ -324,8 +340,8 @@ def _name_in_window(finding: Document, truth: Truth, last_frame_s: float) -> Doc
 
 
 def _names_given_in_flight(flight: "Landing", truth: Truth) -> tuple[str, ...]:
-    """All names given in flight that were not premature, also withdrawn ones, each once: in the order of the
-    faults that they name, then of time."""
+    """All names given in flight that were not premature, withdrawn ones included, each once. They are ordered
+    by the begin of the fault that they name, then by time."""
     given = [(withdrawn["fault"], withdrawn["from_s"]) for withdrawn in flight.withdrawn]
     given += [(name["isolated"], name["isolation_time_s"]) for name in flight.faults or (vars(flight),)]
     names = []  # at_s of the fault, time of the name, name
@@ -338,10 +354,10 @@ def _names_given_in_flight(flight: "Landing", truth: Truth) -> tuple[str, ...]:
 
 
 def _named(finding: Document, truth: Truth, otherwise: DeclaredFault | None = None) -> Document:
-    """A named fault, judged as the table in `Truth` says; `fault` is None while several candidates remain.
+    """A named fault, judged by the table of `Truth`. The key `fault` is None while several candidates remain.
 
-    finding: name, type, size and their times, as the diagnosis has them. otherwise: the fault with which a
-    wrong name, or none, is compared.
+    finding: name, type, size and their times, as the diagnosis reports them. otherwise: the fault with which
+    a wrong or missing name is compared.
     """
     name = finding["isolated"]
     kind = finding["isolation_type"]
@@ -353,7 +369,7 @@ def _named(finding: Document, truth: Truth, otherwise: DeclaredFault | None = No
     onset = truth.onset_of(fault)
     premature = truth.is_premature(name, time_s, fault)
     type_is_right = truth.is_type_right(fault, kind, type_time_s)
-    # a finding without `so_far` is one of several, which our diagnosis alone names, by exclusion
+    # only the built-in diagnosis names several faults, by exclusion: their findings have no `so_far`
     return {"so_far": None if name is None else True, **finding} | {
         "fault": name,
         "type": kind,
@@ -370,7 +386,7 @@ def _named(finding: Document, truth: Truth, otherwise: DeclaredFault | None = No
 
 def _deviations(by_channel: Mapping[str, Quantity] | None) -> Document | None:
     """Deviations from the commanded profile, angles in deg; None without an autopilot. by_channel: the same
-    with angles in rad."""
+    deviations, angles in rad also under the names that end in `_deg`."""
     angles = ("heading_deg", "bank_deg")
     if by_channel is None:
         return None
@@ -389,7 +405,7 @@ def _arrival(flight: "Landing") -> Document | None:
 
 
 def _in_deg(angles: Any) -> Any:
-    """Angles in rad by name, or of each axis, in deg; None of None."""
+    """Angles (rad) by name, or of each axis, in deg; None stays None."""
     if isinstance(angles, dict):
         return {name: math.degrees(angle) for name, angle in angles.items()}
     return angles and tuple(map(math.degrees, angles))
@@ -402,20 +418,20 @@ def _alarm_times_s(flight: "Landing") -> list[float]:
 
 
 def fault_free_s(flight: "Landing") -> float:
-    """Time under observation in which an alarm is a false one: until the first fault, the first alarm of any
-    diagnosis, or the end. Rates of false alarms are per this time."""
+    """Time in which an alarm would be false, s: until the first fault, the first alarm of any diagnosis, or
+    the end. Rates of false alarms are per this time."""
     faults = [fault.at_s for fault in flight.scenario.faults]
     return min([flight.frames / flight.scenario.rate_hz, *_alarm_times_s(flight), *faults])
 
 
 def _change(change: Document, truth: Truth) -> Document:
-    """A change in flight, and whether the alarm of the diagnosis that it ended was a false one."""
+    """A change in flight; if it ended a diagnosis with an alarm, also whether this alarm was false."""
     alarm_s = change.get("detection_time_s")
     return change if alarm_s is None else change | {"false_alarm": truth.onset.is_false(alarm_s)}
 
 
 def hints(flight: "Landing", flight_metrics: Metrics) -> list[str]:
-    """Notes without which a reader would misread the verdict: one sentence each."""
+    """Notes without which a reader could misunderstand the verdict, a sentence each."""
     scenario = flight.scenario
     of_diagnosis = (
         _hint_alarm_in_one_frame(scenario, flight_metrics),
@@ -435,7 +451,7 @@ def _hint_fault_too_small(scenario: "Scenario", flight_metrics: Metrics) -> str:
     """A fault without an alarm, and without an instant from which an alarm was certain."""
     detection = flight_metrics.detection
     is_detectable = detection.detected or detection.guaranteed_delay_s is not None
-    if not scenario.faults or is_detectable or detection.inconclusive:  # the last has a line of its own
+    if not scenario.faults or is_detectable or detection.inconclusive:  # `inconclusive` has its own line
         return ""
     return (
         "no alarm, and no alarm was guaranteed: the effect of the fault stayed within the uncertainty that "
@@ -444,7 +460,7 @@ def _hint_fault_too_small(scenario: "Scenario", flight_metrics: Metrics) -> str:
 
 
 def _hint_alarm_in_one_frame(scenario: "Scenario", flight_metrics: Metrics) -> str:
-    """An alarm in the first frame: of no meaning for flights with errors, noise or wind."""
+    """An alarm in the first frame of the fault shows nothing about flights with errors, noise or wind."""
     delay_s = flight_metrics.detection.delay_s
     frame_s = 1.0 / scenario.rate_hz
     if delay_s is None or delay_s > frame_s + TIME_TOLERANCE_S:
@@ -489,7 +505,7 @@ def _hint_late_reallocation(flight_metrics: Metrics) -> str:
 
 
 def _hint_drift(flight: "Landing") -> str:
-    """Airspeed or altitude changed a lot, as no autopilot held them."""
+    """Airspeed or altitude changed by more than DRIFT_MPS or DRIFT_M, because no autopilot held them."""
     if flight.end is None or flight.scenario.autopilot:
         return ""
     initial = flight.scenario.initial
@@ -499,8 +515,8 @@ def _hint_drift(flight: "Landing") -> str:
         ("altitude", initial.altitude_m, altitude_m, DRIFT_M, "m"),
     )
     drifts = [
-        f"{what} {'fell' if end < begin else 'rose'} from {begin:.0f} to {end:.0f} {unit}"
-        for what, begin, end, limit, unit in ends
+        f"{quantity} {'fell' if end < begin else 'rose'} from {begin:.0f} to {end:.0f} {unit}"
+        for quantity, begin, end, limit, unit in ends
         if abs(end - begin) > limit
     ]
     return f"{' and '.join(drifts)} (only the body rates are controlled in this scenario)" if drifts else ""

@@ -1,9 +1,11 @@
-"""The document metrics.json as records; the columns of a sweep and the attributes of a `Flight` are of it
-too.
+"""The document metrics.json as records. The columns of a sweep and the attributes of a `Flight` are parts of
+it.
 
-The fields of a record are the keys of its section of the document, in their order. Times are s since the
-start of the flight, delays s since the first frame with the fault, rates deg/s. None: the quantity does not
-exist.
+The module has two parts. `Part` converts a section of the document into a record and back, from the fields of
+the record. The records follow, one for each section, in the order of the document.
+
+The fields of a record are the keys of its section, in their order. Times are in s from the start of the
+flight, delays in s from the first frame with the fault, rates in deg/s. None: the quantity does not exist.
 """
 
 import math
@@ -25,16 +27,19 @@ Span = tuple[float, float]
 Quantity = float | None
 """A number; None if the quantity does not exist."""
 BySurface = dict[str, float]
+"""A number for each surface, by its name."""
 Value = TypeVar("Value")
 _KNOWN = "a key that the document has only where its value is known"
 Known = Annotated[Value | None, _KNOWN]
+"""A field whose key is left out of the document if its value is None. Other fields are then null."""
 
 
 @dataclass(frozen=True)
 class Part:
     """A section of the document, its keys in the order of its fields.
 
-    _first, _last: keys that stand elsewhere than their fields.
+    _first, _last: keys that the document has before and after all others. Inherited fields come first in a
+    record, so that the places of its fields do not always give the order of the document.
     """
 
     _first: ClassVar[tuple[str, ...]] = ()
@@ -42,8 +47,8 @@ class Part:
 
     @classmethod
     def of(cls, found: Any) -> Self:
-        """The record of a section of JSON, or of a tuple of its values. A missing key gives None, or an empty
-        list or mapping."""
+        """The record of a section of JSON, of a tuple of its values, or of such a record. A missing key gives
+        None, or an empty tuple or mapping; a key that the record does not have is ignored."""
         part: Any = cls
         if isinstance(found, cls):
             return found
@@ -61,27 +66,26 @@ class Part:
         }
 
     def at(self, path: str) -> Any:
-        """The value at a path such as `detection.delay_s`; None where a section on the way to it is."""
-        here: Any = self
+        """The value at a path such as `detection.delay_s`; None if a section on the way is None."""
+        value: Any = self
         for key in path.split("."):
-            if here is None:
+            if value is None:
                 break
-            here = here.get(key) if isinstance(here, dict) else getattr(here, key)
-        return here
+            value = value.get(key) if isinstance(value, dict) else getattr(value, key)
+        return value
 
 
 @cache
 def _fields_of(part: Any) -> dict[str, tuple[Any, bool]]:
-    """The type of each field of a section, and whether the document has it only where it is known; in the
-    document's order."""
+    """(type, whether it is `Known`) of each field of a section, in the order of the document."""
     hints, marks = get_type_hints(part), get_type_hints(part, include_extras=True)
-    others = [own.name for own in fields(part) if own.name not in part._first + part._last]
-    named = (*part._first, *others, *part._last)
-    return {name: (hints[name], _KNOWN in get_args(marks[name])) for name in named}
+    others = [item.name for item in fields(part) if item.name not in part._first + part._last]
+    names = (*part._first, *others, *part._last)
+    return {name: (hints[name], _KNOWN in get_args(marks[name])) for name in names}
 
 
 def without_none(hint: Any) -> Any:
-    """The type of a field that may be None, without that."""
+    """The type of a field without None: `float` of `float | None`."""
     if get_origin(hint) not in (Union, UnionType):
         return hint
     return next(kind for kind in get_args(hint) if kind is not type(None))
@@ -89,26 +93,28 @@ def without_none(hint: Any) -> Any:
 
 @cache
 def _kind_of(hint: Any) -> tuple[Any, Any, bool]:
-    """The type of a field without None, the types of its entries, and whether it may be None."""
+    """The class of a field, the types of its entries, and whether it may be None: (tuple, (str, ...), True)
+    of `tuple[str, ...] | None`."""
     bare = without_none(hint)
     return get_origin(bare) or bare, get_args(bare), bare is not hint
 
 
 def _read(hint: Any, value: Any) -> Any:
     """A value of JSON as a field of this type."""
-    kind, of, may_be_none = _kind_of(hint)
+    kind, entry_types, may_be_none = _kind_of(hint)
     if value is None and (may_be_none or kind not in (tuple, dict)):
         return None
     if kind is tuple:
-        return tuple(_read(of[0], entry) for entry in value or ())
+        return tuple(_read(entry_types[0], entry) for entry in value or ())
     if kind is dict:
-        return {key: _read(of[1], entry) for key, entry in (value or {}).items()}
+        return {key: _read(entry_types[1], entry) for key, entry in (value or {}).items()}
     if isinstance(kind, type) and issubclass(kind, Part):
         return kind.of(value)
     return tuple(value) if isinstance(value, list) else value
 
 
 def _as_json_value(value: Any) -> Any:
+    """A value of a field as JSON: records and mappings as mappings, tuples as lists."""
     if isinstance(value, Part):
         return value.document()
     if isinstance(value, Mapping):
@@ -119,7 +125,7 @@ def _as_json_value(value: Any) -> Any:
 def rounded(value: Any) -> Any:
     """A value with each number rounded to nine decimals, which removes the rounding of frame times; None for
     a number that is not finite."""
-    if isinstance(value, float):  # first, as most are
+    if isinstance(value, float):  # the most frequent type is tested first
         return round(float(value), 9) if math.isfinite(value) else None
     if isinstance(value, dict):
         return {key: rounded(entry) for key, entry in value.items()}
@@ -128,7 +134,7 @@ def rounded(value: Any) -> Any:
 
 @dataclass(frozen=True)
 class FlightCondition(Part):
-    """The flight condition, the scheme of the diagnosis and the control law."""
+    """The flight condition, the scheme of the diagnosis and the control law. flown_s: duration, s."""
 
     airspeed_mps: float
     altitude_m: float
@@ -155,13 +161,16 @@ class Fault(Part):
     at_s: float
 
 
-_NO_SIZE = {"actuator", "sensor", "type", "at_s", "end_s", "profile"}
+_NO_SIZE = {"actuator", "sensor", "type", "at_s", "end_s", "profile"}  # keys of a fault that are not its size
 
 
 @dataclass(frozen=True)
 class DeclaredFault(Fault):
-    """A declared fault, with which the names given by the diagnosis are compared. size: the parameters that
-    only its type has."""
+    """A declared fault, with which names given by the diagnosis are compared.
+
+    end_s: time at which it ends, s; None if it lasts to the end. profile: how it grows, as in a scenario
+    file. size: the parameters that only its type has.
+    """
 
     end_s: Quantity = None
     profile: str = "abrupt"
@@ -169,7 +178,7 @@ class DeclaredFault(Fault):
 
     @classmethod
     def of_scenario(cls, fault: Any) -> Self:
-        """One of the faults of a `schema.Scenario`."""
+        """The record of a fault of a `schema.Scenario`."""
         return cls(
             getattr(fault, "actuator", None),
             fault.type,
@@ -181,15 +190,23 @@ class DeclaredFault(Fault):
         )
 
     def is_named_by(self, name: str | None, removed_surfaces: frozenset[str] = frozenset()) -> bool:
-        """Whether a name is right. removed_surfaces: surfaces that damage takes away."""
-        if self.sensor is not None:  # outside the class of surface faults is right as well
+        """Whether a name is right. removed_surfaces: surfaces that damage takes away.
+
+        fault              right names
+        of an instrument   the instrument, `unanticipated`
+        damage             `unanticipated`, each removed surface
+        unanticipated      `unanticipated`
+        of a surface       the surface
+        """
+        if self.sensor is not None:
             return name in (sensor_words(self.sensor), UNANTICIPATED)
-        if self.type == DAMAGE:  # outside of every class, unless a surface that it takes
+        if self.type == DAMAGE:
             return name == UNANTICIPATED or name in removed_surfaces
         return name is not None and name == (UNANTICIPATED if self.type == UNANTICIPATED else self.actuator)
 
     def is_of_type(self, kind: str | None) -> bool | None:
-        """Whether a type is right; None while none is named, as an instrument's never is."""
+        """Whether a type is right; None if no type is named, and for a fault of an instrument, which has
+        none."""
         if self.sensor is not None:
             return None
         if self.type == DAMAGE:  # a surface that is gone has lost all its effect
@@ -408,8 +425,10 @@ class ModeChange(Part):
 class ChangeInFlight(Part):
     """A change of law, scheme or sensors in flight.
 
-    If the change restarted the diagnosis (`renewed`): time of the alarm, and name, of the diagnosis before,
-    and whether that alarm was a false one.
+    - `law`, `scheme`: the new law and scheme; None if unchanged. `sensors`: True if the sensors changed.
+    - `renewed`: True if the change restarted the diagnosis. Only then the document has the next two keys.
+    - `detection_time_s`, `isolated`: time of the alarm, s, and name of the fault of the diagnosis before.
+    - `false_alarm`: True if that alarm was false.
     """
 
     time_s: float
@@ -423,20 +442,20 @@ class ChangeInFlight(Part):
     renewed: bool = True
 
     def document(self) -> Document:
-        """The section, without alarm and name if the diagnosis went on."""
-        found = super().document()
-        of_it = () if found.pop("renewed") else ("detection_time_s", "isolated")
-        return {key: value for key, value in found.items() if key not in of_it}
+        """The section, without alarm and name if the diagnosis was not restarted."""
+        section = super().document()
+        left_out = () if section.pop("renewed") else ("detection_time_s", "isolated")
+        return {key: value for key, value in section.items() if key not in left_out}
 
     @classmethod
     def of(cls, found: Any) -> Self:
-        """The record of a section of JSON."""
+        """The record of a section of JSON, which has an alarm if the diagnosis was restarted."""
         return super().of({**found, "renewed": "detection_time_s" in found})
 
 
 @dataclass(frozen=True)
 class EnvelopeExit(Part):
-    """A time outside the validated envelope."""
+    """A time outside the validated envelope, from start_s to end_s."""
 
     start_s: float
     end_s: float
@@ -444,7 +463,10 @@ class EnvelopeExit(Part):
 
 @dataclass(frozen=True)
 class EnvelopeExitTotals(Part):
-    """Number and sum of the times outside the envelope; exits_left_out: how many the list lacks."""
+    """Number and sum of the times outside the envelope.
+
+    exits_left_out: how many of them are not in the list `envelope_exits`.
+    """
 
     exits: int
     outside_s: float
@@ -469,8 +491,9 @@ class AxisAuthority(Part):
 
     - `given_share`: share of the demanded angular acceleration that the surfaces gave.
     - `beyond_s`: time for which the surfaces could not hold the rate, s.
-    - `least_rad_s2`, `greatest_rad_s2`: range of the acceleration that all surfaces can give at the end, as
-      the law knows them; `healthy_...`: of the healthy aircraft; `engines_...`: of the engines.
+    - `least_rad_s2`, `greatest_rad_s2`: range of the angular acceleration that all surfaces can give at the
+      end, with the effectiveness that the law assumes.
+    - `healthy_...`, `engines_...`: the same range of the healthy aircraft, and of the engines.
     """
 
     given_share: float
@@ -495,7 +518,11 @@ class Authority(Part):
 
 @dataclass(frozen=True)
 class EnginePowerUse(Part):
-    """From when and for how long the engine controlled pitch, s; the range of the manifold pressure, inHg."""
+    """Control of pitch by engine power.
+
+    - `from_s`: time at which it began, s. `in_charge_s`: sum of its times, s.
+    - `lowest_inhg`, `highest_inhg`: range of the manifold pressure, inHg.
+    """
 
     from_s: float
     in_charge_s: float
@@ -505,7 +532,7 @@ class EnginePowerUse(Part):
 
 @dataclass(frozen=True)
 class Deviations(Part):
-    """Deviations from the commanded profile by channel; None for a channel without a command."""
+    """Deviations from the commanded profile by channel; None if the channel has no command."""
 
     altitude_m: Quantity
     airspeed_mps: Quantity
@@ -515,10 +542,11 @@ class Deviations(Part):
 
 @dataclass(frozen=True)
 class ProfileDeviations(Deviations):
-    """The largest deviations. Those of the airspeed are of a mean over 10 s.
+    """The largest deviations. Airspeeds are means over 10 s.
 
-    - `airspeed_limited_mps`: from the commanded airspeed as limited to what the aircraft can hold.
-    - `airspeed_at_one_instant_mps`: of the airspeed itself, without a mean.
+    - `airspeed_limited_mps`: deviation from the commanded airspeed, limited to speeds that the aircraft can
+      hold.
+    - `airspeed_at_one_instant_mps`: largest deviation of the airspeed itself, without a mean.
     """
 
     airspeed_limited_mps: Quantity
@@ -527,15 +555,22 @@ class ProfileDeviations(Deviations):
 
 @dataclass(frozen=True)
 class ArrivalDeviations(Deviations):
-    """The mean deviations at the end of the flight, with signs, and whether it ends in the envelope."""
+    """The mean deviations at the end of the flight, with signs.
+
+    - `in_envelope`: True if the flight ends in the validated envelope.
+    """
 
     in_envelope: bool
 
 
 @dataclass(frozen=True)
 class ProtectionLimit(Part):
-    """A limit of the envelope protection: from when, on which command, on which side, its value and
-    reason."""
+    """A limit that the envelope protection sets to a command.
+
+    - `time_s`: time from which it is active, s. `in_force`: True if it is active at the end.
+    - `limits`, `side`, `value`: the limited command, the side and the limit in the unit of the command.
+    - `because`: reason of the limit.
+    """
 
     time_s: float
     limits: str
@@ -571,8 +606,10 @@ class Expectation(Part):
 
 @dataclass(frozen=True)
 class Judged:
-    """Whether a flight, a sweep or a plan met its expectations. error: why it could not be flown. took_s: its
-    computing time, s."""
+    """Whether a flight, a sweep or a plan met its expectations.
+
+    error: the reason why it could not be flown, or None. took_s: its computing time, s.
+    """
 
     name: str
     passed: bool = False
@@ -583,7 +620,8 @@ class Judged:
 
 @dataclass(frozen=True)
 class CertificateCounts(Part):
-    """The counts of a certificate: statements that it proves, and alarms or exclusions without a proof."""
+    """The counts of a certificate. statements: those with a proof. without: alarms or exclusions without a
+    proof."""
 
     statements: int
     without: int
@@ -591,7 +629,7 @@ class CertificateCounts(Part):
 
 @dataclass(frozen=True)
 class LatencyMs(Part):
-    """From a packet to its answer, ms."""
+    """Time from a packet to its answer, ms."""
 
     median: float
     p99: float
@@ -600,7 +638,7 @@ class LatencyMs(Part):
 
 @dataclass(frozen=True)
 class PacketIntervalMs(Part):
-    """Between two packets, ms."""
+    """Time between two packets, ms."""
 
     mean: float
     jitter_rms: float
@@ -609,10 +647,12 @@ class PacketIntervalMs(Part):
 
 @dataclass(frozen=True)
 class Link(Part):
-    """The link to an autopilot: rates, counts of packets (beaver_ftc_links/sitl/link.py) and times.
+    """The link to an autopilot: rates, counts of packets and times. beaver_ftc_links/sitl/link.py counts
+    them.
 
-    diagnosed_from_s: begin of the diagnosis. speed: multiple of real time; late_ms: delay behind it. said:
-    messages to the ground station.
+    - `diagnosed_from_s`: begin of the diagnosis, s.
+    - `speed`: simulated time over real time. `late_ms`: delay behind real time, ms.
+    - `said`: messages to the ground station.
     """
 
     protocol: str
@@ -638,10 +678,15 @@ class Link(Part):
 
 @dataclass(frozen=True)
 class Metrics(Part):
-    """The document metrics.json. assumes: what the diagnosis assumes of the truth (`sensors-sound`).
-    outside_class: faults of surfaces and sensors that the declared class does not have. Under an autopilot:
-    link, and interrupted_s of a flight ended before its time. certificate: of a flight whose
-    certificate was asked for."""
+    """The document metrics.json.
+
+    - `assumes`: assumptions of the diagnosis about the truth, such as `sensors-sound`.
+    - `outside_class`: faults of surfaces and sensors that the declared class does not contain.
+    - `fault_free_s`: time in which an alarm would be false, s.
+    - `saturation_s`: a mapping from surface to the time for which it was saturated, s.
+    - `link`: only under an autopilot. `interrupted_s`: time at which such a flight was interrupted, s.
+    - `certificate`: only of a flight with a certificate.
+    """
 
     scenario: str
     seed: int
@@ -685,7 +730,7 @@ class Metrics(Part):
 
     @property
     def fault_found_s(self) -> Quantity:
-        """Delay from the fault to its alarm, s; None without an alarm, or after a false alarm."""
+        """Delay from the fault to the alarm, s; None without an alarm, or if the alarm was false."""
         return None if self.false_alarm else self.detection.delay_s
 
     @property

@@ -1,15 +1,25 @@
-"""Signal temporal logic over the columns of a log: what a formula says, and by how much a flight keeps it.
+"""Signal temporal logic over the columns of a log: formulas, and by how much a flight fulfils them.
 
     always[0:10](abs(q_rad_s) <= 0.2)      eventually(detected >= 1)      (a >= 0) until[1:2] (b >= 0)
 
-Comparisons of sums, differences, products and quotients of columns and numbers, joined by `not`, `and`, `or`,
-`implies` (or `->`), `until`, `always`, `eventually`, and for the past `once`, `historically`; intervals in
-seconds, both ends included; without one, to the end of the log. Its robustness is the quantitative semantics
-at the first frame [Donze2010] in discrete time: positive where the formula is kept, negative where it is not,
-and its size the least change of a signal that would turn it over.
+A formula compares sums, differences, products and quotients of columns and numbers. Comparisons are joined by
+`not`, `and`, `or`, `implies` (or `->`), `until`, `always` and `eventually`, and for the past by `once` and
+`historically`. An interval is in s, both ends included; without an interval, an operator reaches to the end
+of the log.
 
-The grammar is part of rtamt's, which gives the same numbers (tests). rtamt itself holds the parser's runtime
-to a release of 2017 and Python below 3.13, so it is a check beside this and not what flights are judged by.
+The robustness rho of a formula at frame k [Donze2010], in discrete time, is positive if the formula is
+fulfilled and negative if not. Its size is the least change of a signal that would change the result. K:
+frames k + begin to k + end of the interval; backwards for the past.
+
+    a <= b                          b - a
+    not f, f and g, f or g          -rho(f), min(rho(f), rho(g)), max(rho(f), rho(g))
+    f implies g                     max(-rho(f), rho(g))
+    always f, historically f        min of rho(f) over K
+    eventually f, once f            max of rho(f) over K
+    f until g                       max over j in K of min(rho(g) at j, min of rho(f) over k .. j - 1)
+
+The grammar is a part of that of rtamt, which gives the same numbers in the tests. rtamt needs a release of
+its parser of 2017 and Python below 3.13, so flights are not judged with it.
 """
 
 import re
@@ -20,13 +30,13 @@ from typing import NamedTuple
 import numpy as np
 
 MOST_CHARACTERS = 4000
-MOST_DEPTH = 40
+MOST_DEPTH = 40  # levels of operands in operands
 MOST_SECONDS = 360_000  # a hundred hours
 
 _TOKEN_PATTERN = re.compile(
     r"\s*(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+(?:[eE][-+]?\d+)?|[A-Za-z_][\w.]*|->|<=|>=|[-+*/()<>\[\]:,])"
 )
-_BINDING_POWER = {  # how tightly each binds what stands on its left
+_BINDING_POWER = {  # an operator with a larger power takes its operands first
     "->": 1, "implies": 1, "or": 2, "and": 3, "until": 4,
     "<=": 5, ">=": 5, "<": 5, ">": 5, "+": 6, "-": 6, "*": 7, "/": 7,
 }  # fmt: skip
@@ -41,11 +51,14 @@ class FormulaError(ValueError):
 
 
 Interval = tuple[float, float] | None
-"""From and to, s; None for all that is to come."""
+"""Begin and end, s from the present frame; None for all frames to the end of the log."""
 
 
 class Formula(NamedTuple):
-    """An operator with its parts; column_or_number: name or value of an operator `column` or `number`."""
+    """An operator with its operands, the parts.
+
+    column_or_number: name or value of an operator `column` or `number`, which has no parts.
+    """
 
     operator: str
     parts: tuple["Formula", ...] = ()
@@ -54,20 +67,22 @@ class Formula(NamedTuple):
 
     @property
     def columns(self) -> frozenset[str]:
-        """The columns it is about."""
+        """The columns that the formula reads."""
         own = {str(self.column_or_number)} if self.operator == "column" else set()
         return frozenset(own.union(*(part.columns for part in self.parts)))
 
     @property
     def looks_ahead_s(self) -> float:
-        """How far it looks; infinite where it looks to the end of the log."""
+        """How far after the present frame the formula reads, s; infinite if it reads to the end of the
+        log."""
         ahead = 0.0
         if self.operator in ("always", "eventually", "until"):
             ahead = self.interval[1] if self.interval else np.inf
         return ahead + max((part.looks_ahead_s for part in self.parts), default=0.0)
 
     def robustness(self, columns: Mapping[str, np.ndarray], rate_hz: float) -> float:
-        """At the first frame of these columns (frames,); NaN where a column it depends on is not a number."""
+        """The robustness at the first frame of these columns (frames,); NaN if it depends on a NaN of a
+        column."""
         frames = len(next(iter(columns.values())))
         return float(_robustness_by_frame(self, columns, rate_hz, frames)[0])
 
@@ -76,13 +91,14 @@ def parse(text: str) -> Formula:
     """The formula in a text. Raises FormulaError."""
     if len(text) > MOST_CHARACTERS:
         raise FormulaError(f"has {len(text)} characters, allowed: at most {MOST_CHARACTERS}")
-    found = _Parser(list(_tokens(text))).parse_all()
-    if found.operator in _NUMERIC_OPERATORS:
+    formula = _Parser(list(_tokens(text))).parse_all()
+    if formula.operator in _NUMERIC_OPERATORS:
         raise FormulaError("says nothing that can be true, allowed: a comparison such as abs(q_rad_s) <= 0.2")
-    return found
+    return formula
 
 
 def _tokens(text: str) -> Iterator[str]:
+    """The tokens of a text. Raises FormulaError for a character that no token has."""
     at = 0
     while text[at:].strip():
         match = _TOKEN_PATTERN.match(text, at)
@@ -94,7 +110,8 @@ def _tokens(text: str) -> Iterator[str]:
 
 
 class _Parser:
-    """Operators by their power; bounded in depth, so that no text can exhaust the stack."""
+    """A parser by binding power. It takes tokens from the left; its depth is limited, so that no text can
+    exhaust the stack. The last token is empty and marks the end."""
 
     def __init__(self, tokens: list[str]) -> None:
         self._tokens = [*tokens, ""]
@@ -102,16 +119,19 @@ class _Parser:
         self._depth = 0
 
     def parse_all(self) -> Formula:
-        found = self._parse_operand(0)
+        """The formula of all tokens."""
+        formula = self._parse_operand(0)
         if self._next_token:
             raise FormulaError(f"{self._next_token!r} is one too many, allowed: the end of the formula")
-        return found
+        return formula
 
     @property
     def _next_token(self) -> str:
         return self._tokens[self._at]
 
     def _take_token(self, expected: str = "") -> str:
+        """The next token, which is then behind the parser. Raises FormulaError unless it is `expected`, if
+        given."""
         token = self._next_token
         if expected and token != expected:
             raise FormulaError(f"{token or 'the end'!r} where {expected!r} is due")
@@ -119,6 +139,7 @@ class _Parser:
         return token
 
     def _parse_operand(self, power: int) -> Formula:
+        """An operand: a prefix, and all operators behind it whose binding power is above `power`."""
         self._depth += 1
         if self._depth > MOST_DEPTH:
             raise FormulaError(f"is nested too deeply, allowed: {MOST_DEPTH} levels")
@@ -126,7 +147,7 @@ class _Parser:
         while _BINDING_POWER.get(self._next_token, 0) > power:
             operator = self._take_token()
             interval = self._parse_interval() if operator == "until" else None
-            if operator in ("->", "implies"):  # a - b - c is (a - b) - c, but a -> b -> c is a -> (b -> c)
+            if operator in ("->", "implies"):  # from the right: a -> b -> c is a -> (b -> c)
                 left = _formula("implies", left, self._parse_operand(0))
             else:
                 right = self._parse_operand(_BINDING_POWER[operator])
@@ -135,6 +156,8 @@ class _Parser:
         return left
 
     def _parse_prefix(self) -> Formula:
+        """A formula that begins with its own token: in parentheses, -a, abs(a), not, temporal, number,
+        column."""
         token = self._take_token()
         if token == "(":
             return self._parse_rest_of_parentheses()
@@ -156,11 +179,12 @@ class _Parser:
         return Formula("column", column_or_number=token)
 
     def _parse_rest_of_parentheses(self) -> Formula:
-        found = self._parse_operand(0)
+        formula = self._parse_operand(0)
         self._take_token(")")
-        return found
+        return formula
 
     def _parse_interval(self) -> Interval:
+        """`[begin:end]` or `[begin,end]`, s; None if no bracket follows."""
         if self._next_token != "[":
             return None
         self._take_token("[")
@@ -185,14 +209,15 @@ class _Parser:
 
 
 def _formula(operator: str, *parts: Formula, interval: Interval = None) -> Formula:
-    """An operator of these parts, which are what it is of: numbers, or what is true or false."""
+    """An operator with these parts. Raises FormulaError if a part is a number where the operator needs a
+    truth value, or a truth value where it needs a number."""
     of_numbers = operator in ("-", "abs") or _BINDING_POWER.get(operator, 0) >= _BINDING_POWER["<="]
     if any((part.operator in _NUMERIC_OPERATORS) != of_numbers for part in parts):
         if of_numbers:
-            says = "of numbers, and is given what is true or false, allowed: columns and numbers"
+            mistake = "of numbers, and is given what is true or false, allowed: columns and numbers"
         else:
-            says = "of what is true or false, allowed: a comparison, in parentheses"
-        raise FormulaError(f"{operator!r} is {says}")
+            mistake = "of what is true or false, allowed: a comparison, in parentheses"
+        raise FormulaError(f"{operator!r} is {mistake}")
     return Formula(operator, parts, interval)
 
 
@@ -223,14 +248,18 @@ def _robustness_by_frame(
     if operator == "until":
         return _until_robustness(parts[0], parts[1], begin, min(end, frames))
     sign = 1.0 if operator in ("always", "historically") else -1.0
-    # the past is the future of the flight backwards
+    # in a flight backwards the past is the future
     along = -1 if operator in ("once", "historically") else 1
     return sign * _future_minimum(sign * parts[0][::along], begin, end)[::along]
 
 
 def _future_minimum(values: np.ndarray, begin: int, end: int) -> np.ndarray:
-    """min(values[k + begin : k + end + 1]) at each k, infinite where that is beyond the log: twice as long a
-    stretch at each step."""
+    """min(values[k + begin : k + end + 1]) at each k, (frames,); infinite where these frames are beyond the
+    log.
+
+    least[k] is the minimum of `span` values from k on. Two of them give the minimum of 2 span values, until
+    two overlapping ones cover the whole width.
+    """
     frames = len(values)
     width = min(end, frames) - begin + 1
     if width < 1:
@@ -244,14 +273,14 @@ def _future_minimum(values: np.ndarray, begin: int, end: int) -> np.ndarray:
 
 
 def _until_robustness(held: np.ndarray, reached: np.ndarray, begin: int, end: int) -> np.ndarray:
-    """max over j in begin..end of min(reached[k + j], min(held[k : k + j])) at each k."""
+    """max over j in begin..end of min(reached[k + j], min(held[k : k + j])) at each k, (frames,)."""
     frames = len(held)
-    best, so_far = np.full(frames, -np.inf), np.full(frames, np.inf)
+    best, least_held = np.full(frames, -np.inf), np.full(frames, np.inf)
     for j in range(end + 1):
-        left = frames - j
-        if left <= 0:
+        n = frames - j
+        if n <= 0:
             break
         if j >= begin:
-            best[:left] = np.maximum(best[:left], np.minimum(so_far[:left], reached[j:]))
-        so_far[:left] = np.minimum(so_far[:left], held[j:])
+            best[:n] = np.maximum(best[:n], np.minimum(least_held[:n], reached[j:]))
+        least_held[:n] = np.minimum(least_held[:n], held[j:])
     return best

@@ -18,23 +18,25 @@ from beaver_ftc.plant import channels as ch
 from beaver_ftc.plant.adapter import FlightState, Plant
 from beaver_ftc.scenario.schema import Scenario
 
-MAIN, FLAP = slice(3), 3  # places in SURFACES: aileron, elevator and rudder; the flap
+MAIN, FLAP = slice(3), 3  # places in SURFACES: aileron, elevator and rudder, and the flap
 
 
 class Contender(Protocol):
-    """Something that flies a number of frames."""
+    """A way to fly a number of frames that is timed."""
 
     def prepare(self) -> None:
-        """Go back to where every round starts; not timed."""
+        """Return to the state in which every round starts; not timed."""
 
     def fly(self, frames: int) -> None:
         """Fly that many frames; timed."""
 
 
 def interleave(contenders: Sequence[Contender], rounds: int, frames: int) -> np.ndarray:
-    """Time all contenders in turn, A B C then C B A; microseconds a frame, (rounds, contenders).
+    """Time all contenders in turn, A B C in one round, C B A in the next; microseconds for a frame, (rounds,
+    contenders).
 
-    What is to be compared is formed within a round, which lasts some milliseconds, and condensed afterwards.
+    Differences and ratios are formed within a round, which lasts some milliseconds, so that a change of the
+    speed of the machine cancels. Medians over the rounds are taken afterwards.
     """
     us = np.empty((rounds, len(contenders)))
     order = list(range(len(contenders)))
@@ -55,19 +57,22 @@ def interleave(contenders: Sequence[Contender], rounds: int, frames: int) -> np.
 
 
 def state_of(plant: Plant) -> FlightState:
-    """Where an aircraft with ideal actuators is now: its surfaces as they were in the run just flown."""
+    """The present state of an aircraft with ideal actuators. Surfaces: their positions in the last JSBSim
+    frame."""
     truth = {name: plant.read(property_) * factor for name, property_, factor in ch.TRUTH}
     values: dict[str, Any] = {n: truth[n] for n in FlightState.__dataclass_fields__ if n in truth}
     surfaces_rad = {s: truth[f"{s}_pos_rad"] for s in SURFACES}
-    settings = {name: plant.read(of.property) for name, of in plant.aircraft.engine.settings.items()}
+    settings = {
+        name: plant.read(setting.property) for name, setting in plant.aircraft.engine.settings.items()
+    }
     return FlightState(**values, surfaces_rad=surfaces_rad, settings=settings)
 
 
 @dataclass(frozen=True)
 class Moment:
-    """An instant between two frames of a flight, to come back to.
+    """An instant between two frames of a flight, to which the aircraft can return.
 
-    state: the aircraft's, of the frame just flown. commands: by property, for the frame to come.
+    state: state of the aircraft after the last frame. commands: commands for the next frame, by property.
     """
 
     plant: Plant
@@ -76,18 +81,18 @@ class Moment:
 
     @classmethod
     def of(cls, plant: Plant) -> "Moment":
-        """The present."""
+        """The present instant of a plant."""
         return cls(plant, state_of(plant), {name: plant.read(name) for name in ch.COMMANDS})
 
     def come_back(self) -> None:
-        """Put the aircraft there again."""
+        """Put the aircraft into the state of this instant."""
         self.plant.start(self.state)
         for name, deflection_rad in self.commands.items():
             self.plant.write(name, deflection_rad)
 
 
 class ClosedLoop:
-    """The loop itself, from `at_s` on. detector, law: plug-ins in Python."""
+    """The closed loop of the package, from `at_s` on. detector, law: plug-ins in Python."""
 
     def __init__(
         self, scenario: Scenario, at_s: float, detector: Detector | None = None, law: Law | None = None
@@ -101,7 +106,7 @@ class ClosedLoop:
         self._fly_on = self.loop.fly_on if self.loop.fly_frame is None else None
 
     def with_frame(self, compiled_frame: Callable[..., int]) -> "ClosedLoop":
-        """The same loop and aircraft, with another compiled frame: one with parts taken out."""
+        """The same loop and aircraft with another compiled frame, from which parts are taken out."""
         other = copy(self)
         other._fly_on = self.loop.direct(compiled_frame)
         return other
@@ -120,8 +125,8 @@ class ClosedLoop:
 
 @dataclass(frozen=True)
 class Bare:
-    """JSBSim alone: an aircraft from a moment on, surfaces held, nothing read, nothing written; `runs` JSBSim
-    frames to each frame."""
+    """JSBSim alone, from a moment on: surfaces are held, and no property is read or written. runs: JSBSim
+    frames in a frame of the loop."""
 
     moment: Moment
     runs: int
@@ -138,23 +143,23 @@ class Bare:
 
 
 def take_over(scenario: Scenario, at_s: float) -> Moment:
-    """The aircraft of a flight, with its faults, at `at_s`: for someone else to fly."""
+    """The aircraft of a flight, with its faults, at `at_s`, to be flown by another loop."""
     loop = Loop(scenario)
     loop.fly_chunk(0, round(at_s * scenario.rate_hz))
     return Moment.of(loop.plant)
 
 
 class InnovationDetector:
-    """Alarms when the rates do what neither the design model nor its declared error explains."""
+    """Alarm if |xdot - model| > eta_bar on an axis, rad/s2: xdot the difference of the rates over a frame."""
 
     def reset(self, context: Context) -> None:
-        """Nothing seen yet."""
+        """Forget the rates and the alarm."""
         self._dt_s = context.dt_s
         self._before: np.ndarray | None = None
         self._detected = False
 
     def step(self, measured: Measured, command: np.ndarray) -> Verdict:
-        """Compare the frame that has elapsed with the model's."""
+        """Compare the acceleration over the elapsed frame with that of the design model."""
         if self._before is not None:
             innovation = (measured.x - self._before) / self._dt_s - measured.acceleration
             self._detected = self._detected or bool((np.abs(innovation) > measured.eta_bar).any())
@@ -163,7 +168,8 @@ class InnovationDetector:
 
 
 class ProportionalInversion:
-    """Inverts the design model on a proportional feedback, with the flap left in trim."""
+    """G u = reference acceleration + K (reference rate - x) - f, with the flap in trim; K:
+    _FEEDBACK_PER_S."""
 
     _FEEDBACK_PER_S = 3.0
 
@@ -173,7 +179,7 @@ class ProportionalInversion:
         self._flap_rad = context.trim_rad[FLAP]
 
     def step(self, measured: Measured, reference: Reference, verdict: Verdict) -> np.ndarray:
-        """Ask the three main surfaces for what the reference model does, and for what is missing."""
+        """Solve for the three main surfaces; return the deflections (4,) rad."""
         G = self._model.G(measured.y)
         feedback = self._FEEDBACK_PER_S * (reference.rate - measured.x)
         wanted = reference.acceleration + feedback - self._model.f(measured.x, measured.y)

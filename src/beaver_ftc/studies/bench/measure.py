@@ -36,17 +36,17 @@ from beaver_ftc.studies.engine.processes import cores, environment
 
 SCENARIO = "elevator-partial-loss"
 BEFORE_ALARM_S, AFTER_ALARM_S = 1.0, 14.0  # the fault strikes at 12 s
-FRAMES = 1000  # a block: 6 ms, short against changes of the pace of the machine, long against the clock
+FRAMES = 1000  # frames timed at once: 6 ms, in which the machine keeps its speed; long against the clock
 LONG_FLIGHT_S = 330.0  # three row groups of the log file
 
 Say = Callable[[str], None]
 
 
 def bench(rounds: int, with_parts: bool, say: Say = lambda text: None) -> Document:
-    """Time everything; the document of `bench --format json`. `say` is told what is being done.
+    """Time everything; the document of `bench --format json`. say: takes a line for each step.
 
-    The figures at the top are those after the alarm: every estimator, the network and the fault-tolerant law
-    at work.
+    The numbers at the top level are those after the alarm, when all estimators, the network and the
+    fault-tolerant law work.
     """
     scenario = load_scenario(SCENARIO)
     say("the closed loop after the alarm, part by part")
@@ -76,6 +76,7 @@ def machine() -> Document:
 
 
 def _processor() -> str:
+    """Name of the processor on Linux; elsewhere its architecture."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
@@ -85,14 +86,15 @@ def _processor() -> str:
 
 
 def _phase(scenario: Scenario, at_s: float, rounds: int, with_parts: bool) -> Document:
-    """The bare aircraft, the loop, the loop with ever more of its parts; all in one aircraft, one memory.
+    """Time of the bare aircraft, of the loop, and of the loop with one more part at each step. All fly the
+    same aircraft in the same memory.
 
-    us: time of a frame, microseconds, in each round (rounds,); before: that without the part.
+    us (rounds,): time of a frame with a part, microseconds; before (rounds,): the time without this part.
     """
     names = ["calling", *PARTS] if with_parts else []
-    whole = ClosedLoop(scenario, at_s)
-    stages = [whole.with_frame(frame_with(i)) for i in range(len(names))]
-    contenders: list[Contender] = [Bare(whole.moment, scenario.substeps), whole, *stages]
+    whole_loop = ClosedLoop(scenario, at_s)
+    stages = [whole_loop.with_frame(frame_with(i)) for i in range(len(names))]
+    contenders: list[Contender] = [Bare(whole_loop.moment, scenario.substeps), whole_loop, *stages]
     bare, loop, *steps = interleave(contenders, rounds, FRAMES).T
     parts = {
         name: _figures("us", us) | _figures("adds_us", us - before) | _figures("ratio", us / bare)
@@ -102,7 +104,7 @@ def _phase(scenario: Scenario, at_s: float, rounds: int, with_parts: bool) -> Do
 
 
 def _against(bare: np.ndarray, loop: np.ndarray) -> Document:
-    """Two contenders side by side, (rounds,) each: their times, and the ratio formed round by round."""
+    """Medians of two times (rounds,), microseconds, and of their ratio in each round."""
     return {**_figures("bare_us", bare), **_figures("closed_loop_us", loop), **_figures("ratio", loop / bare)}
 
 
@@ -113,7 +115,7 @@ def _figures(name: str, values: np.ndarray) -> Document:
 
 
 def _alternatives(scenario: Scenario, rounds: int) -> Document:
-    """The loop as a user might write it, and the loop with a user's detector or law in it."""
+    """Times of a loop as a user might write it, and of our loop with a detector or law in Python."""
     at_s = AFTER_ALARM_S
     contenders: dict[str, Contender] = {
         "straightforward": Straightforward(scenario, at_s, FRAMES),
@@ -132,26 +134,28 @@ def _alternatives(scenario: Scenario, rounds: int) -> Document:
 
 
 def _whole_flights(scenario: Scenario, rounds: int) -> Document:
-    """From loading the aircraft to the last row of the log, over tens of thousands of frames."""
-    long = scenario.model_copy(update={"duration_s": LONG_FLIGHT_S, "faults": ()})
+    """Time of whole flights, from loading the aircraft to the last row of the log."""
+    long_flight = scenario.model_copy(update={"duration_s": LONG_FLIGHT_S, "faults": ()})
     frames = round(LONG_FLIGHT_S * scenario.rate_hz)
     with tempfile.TemporaryDirectory() as folder:
-        with_file = WholeFlight(long, Path(folder) / "log.parquet")
-        alone = Bare(take_over(long, 0.0), long.substeps)
-        bare, loop, logged = interleave([alone, WholeFlight(long), with_file], rounds, frames).T
+        with_file = WholeFlight(long_flight, Path(folder) / "log.parquet")
+        bare_aircraft = Bare(take_over(long_flight, 0.0), long_flight.substeps)
+        bare, loop, logged = interleave(
+            [bare_aircraft, WholeFlight(long_flight), with_file], rounds, frames
+        ).T
     figures = _figures("with_log_file_us", logged) | _figures("with_log_file_ratio", logged / bare)
     return {"frames": frames, **_against(bare, loop), **figures}
 
 
 @dataclass(frozen=True)
 class WholeFlight:
-    """`fly`, without a log or, given a file, with the log on disk."""
+    """A flight by `fly`. log: the file of its log; None for no log."""
 
     scenario: Scenario
     log: Path | None = None
 
     def prepare(self) -> None:
-        """Every flight is new."""
+        """There is no state to return to: every flight is a new one."""
 
     def fly(self, frames: int) -> None:
         """Fly the scenario, which must last that many frames."""

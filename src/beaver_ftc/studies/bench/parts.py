@@ -1,7 +1,8 @@
 """The compiled frame with parts of it taken out, for timing.
 
-A part is a set of kernels. Taken out, each is replaced by a stand-in that does nothing, and everything that
-calls it is compiled again from the same source: what is timed is the frame itself, less that part.
+A part is a set of kernels. To take it out, each of its kernels is replaced by a stand-in that does nothing.
+All kernels that call it are then compiled again from the same source, so that the frame itself without this
+part is timed.
 """
 
 import hashlib
@@ -17,25 +18,25 @@ from beaver_ftc import compiled
 
 Kernel = Callable[..., Any]
 
-UNLIMITED_RAD_S = 1e9  # a threshold nothing reaches, finite so that what is computed from it stays a number
+UNLIMITED_RAD_S = 1e9  # a threshold that no residual reaches; finite, so that results of it are finite too
 
 
 def nothing(*arguments):
-    """Stands in for a kernel that fills its arguments."""
+    """Stand-in for a kernel that fills its arguments."""
 
 
 def flying(value, ground_m, slow_mps):
-    """Stands in for `sensing.flight_status`: it flies."""
+    """Stand-in for `sensing.flight_status`; 0: the aircraft flies."""
     return 0
 
 
 def unlimited(e, eta, a, dt, n=0.0):
-    """Stands in for `filters.advance_bound`."""
+    """Stand-in for `filters.advance_bound`."""
     return UNLIMITED_RAD_S
 
 
 def all_residuals(*arguments):
-    """Stands in for the thresholds of isolation: (lower, upper)."""
+    """Stand-in for the thresholds of isolation (lower, upper)."""
     return -UNLIMITED_RAD_S, UNLIMITED_RAD_S
 
 
@@ -68,7 +69,7 @@ PARTS: dict[str, dict[str, Kernel]] = {
         "diagnosis.detection.fdae.train_network": nothing,
         "diagnosis.detection.fdae.evaluate_network": nothing,
     },
-    # who is in charge
+    # the mode of the flight
     "supervisor": {"loop.frame.decide": nothing},
     # the command, into the aircraft's properties
     "writing": {"plant.channels.write_nodes": nothing},
@@ -80,18 +81,19 @@ PARTS: dict[str, dict[str, Kernel]] = {
 
 
 def frame_with(switched_on: int) -> Kernel:
-    """`stepping.fly_on` with the first so many of PARTS; compiled once, into a cache of its own."""
+    """`stepping.fly_on` with the first `switched_on` parts of PARTS. Each is compiled once, into a cache of
+    its own, whose name has a digest of this file."""
     if switched_on == len(PARTS):
         return import_module("beaver_ftc.loop.stepping").fly_on
-    out: dict[str, Kernel] = {}
+    stand_ins: dict[str, Kernel] = {}
     for kernels in [*PARTS.values()][switched_on:]:
-        out |= kernels
+        stand_ins |= kernels
     source = hashlib.sha256(Path(__file__).read_bytes()).hexdigest()[:8]
-    return frame_without(out, f"parts-{switched_on}-{source}")
+    return frame_without(stand_ins, f"parts-{switched_on}-{source}")
 
 
 def frame_without(stand_ins: Mapping[str, Kernel], name: str) -> Kernel:
-    """A private `stepping.fly_on` with stand-ins for the kernels named; `name` names its cache."""
+    """A private `stepping.fly_on`. stand_ins: by name of a kernel, its stand-in. name: of the cache."""
     used: set[str] = set()
     folder = compiled.cache_folder()
 
@@ -110,9 +112,8 @@ def frame_without(stand_ins: Mapping[str, Kernel], name: str) -> Kernel:
 
 @contextmanager
 def _fresh_kernel_modules(kernel: Callable[..., Kernel]) -> Iterator[None]:
-    """Within this, importing a module of kernels makes a new one, decorated by `kernel`.
-
-    The old ones come back afterwards.
+    """During the block, an import of a module of kernels makes a new module, whose kernels `kernel`
+    decorates. At the end, the old modules return.
     """
     usual = compiled.kernel
     modules = {
@@ -120,7 +121,7 @@ def _fresh_kernel_modules(kernel: Callable[..., Kernel]) -> Iterator[None]:
         for name, module in sys.modules.items()
         if name.startswith("beaver_ftc.") and module is not compiled and getattr(module, "kernel", 0) is usual
     }
-    # taken down before any module goes: some packages have kernels themselves
+    # packages are listed before a module is removed, because some packages have kernels themselves
     packages = {name: sys.modules[name.rpartition(".")[0]] for name in modules}
     for name, package in packages.items():
         del sys.modules[name]

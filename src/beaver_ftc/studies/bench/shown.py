@@ -58,6 +58,8 @@ def _rows(phase: Document) -> list[list[str]]:
 
 
 def _row(what: str, figures: Document, us: str = "us") -> list[str]:
+    """A row: name, median and quartiles of the time under the key `us`, ratio to the bare aircraft, added
+    time."""
     low, high = figures[f"{us}_quartiles"]
     adds = f"{figures['adds_us']:+.3f}" if "adds_us" in figures else ""
     return [what, f"{figures[us]:.3f}", f"[{low:.3f}, {high:.3f}]", f"{figures['ratio']:.3f} x", adds]

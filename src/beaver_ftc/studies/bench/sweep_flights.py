@@ -18,11 +18,12 @@ from beaver_ftc.studies.sweep.sampling import Assignment, Plan
 
 STAGES = ("scenario", "aircraft, trim, record", "frames", "metrics and row")
 Taken = tuple[np.ndarray, int, float]
+"""Times of STAGES (4,), s; JSBSim frames; time of as many frames of JSBSim alone, s."""
 
 
 class Kind(NamedTuple):
-    """Flights of a built-in sweep. changes: keys that they have besides. alike: they begin alike, as those
-    of `matrix`, so that one trim is for all."""
+    """Flights of a built-in sweep. changes: further keys of their scenarios. alike: whether all begin in the
+    same trim, as those of `matrix` do."""
 
     sweep: str
     changes: Document | None = None
@@ -58,22 +59,24 @@ KINDS = {
 def by_kind(rounds: int) -> dict[str, Document]:
     """The cost of a flight of each kind, all kinds in each round.
 
-    Processor time: `parts_ms` by part, `bare_ms` for JSBSim's frames alone, `frames_ratio` and `flight_ratio`
-    to those, `frame_us`, the loop's time for one of JSBSim's frames, and `own_part_us`, the loop's own part
-    of it. Ratios are formed within a round; all are medians over the rounds.
+    Medians of processor times over the rounds; ratios are formed within a round:
+
+        parts_ms                       each of STAGES
+        bare_ms                        the JSBSim frames of the flight alone
+        frames_ratio, flight_ratio     the stage `frames`, and all stages, over the time of bare_ms
+        frame_us, own_part_us          the stage `frames` for each JSBSim frame; the same less JSBSim
     """
     sweeps = {name: load_sweep(kind.sweep) for name, kind in KINDS.items()}
-    seen: dict[str, list[Taken]] = {name: [] for name in KINDS}
+    taken: dict[str, list[Taken]] = {name: [] for name in KINDS}
     for run in (0, *range(rounds)):  # the first is the warm-up
         for name, kind in KINDS.items():
-            seen[name].append(_flown(sweeps[name], kind, run))
-    return {name: _medians(rows[1:]) for name, rows in seen.items()}
+            taken[name].append(_flown(sweeps[name], kind, run))
+    return {name: _medians(rows[1:]) for name, rows in taken.items()}
 
 
 def _flown(sweep: Sweep, kind: Kind, run: int) -> Taken:
-    """Seconds of each of STAGES of one flight, JSBSim frames flown, and seconds of as many by JSBSim alone.
-
-    All that `sweep` does for a flight. Its trim is a new one each time, or kept where flights begin alike.
+    """The times of one flight, with all that `sweep` does for it. The trim is computed again for each flight,
+    or once before if all flights begin alike.
     """
     (assignment,) = Plan(sweep).assignments([0 if kind.alike else run])
     conditions.forget_trims()
@@ -83,12 +86,12 @@ def _flown(sweep: Sweep, kind: Kind, run: int) -> Taken:
 
     def timed(stage: Callable[[], Any]) -> Any:
         began_s = time.process_time()
-        made = stage()
+        result = stage()
         took_s.append(time.process_time() - began_s)
-        return made
+        return result
 
     scenario = timed(lambda: scenario_of(sweep, assignment))
-    if kind.changes:  # not a part of a flight that a sweep makes
+    if kind.changes:  # not timed: a sweep has these keys in its base
         scenario = scenario.with_(kind.changes)
     loop = timed(lambda: Loop(scenario))
     timed(lambda: deque(loop.chunks(), maxlen=0))
@@ -101,19 +104,20 @@ def _flown(sweep: Sweep, kind: Kind, run: int) -> Taken:
 
 
 def _run(frame: Callable[[], object], runs: int) -> None:
-    """Run JSBSim alone."""
+    """Run so many JSBSim frames."""
     for _ in range(runs):
         frame()
 
 
 def _landed(loop: Loop, assignment: Assignment) -> Landing:
-    """The flight, whose metrics and row of the table have been made."""
+    """The outcome of the flight, after its metrics and its row of the table are computed."""
     flight = loop.land()
     row_of(assignment, measure(flight), flight)
     return flight
 
 
 def _medians(rows: list[Taken]) -> Document:
+    """The document of a kind, from the times in all rounds."""
     parts, runs, alone = (np.array(column) for column in zip(*rows, strict=True))
     frames_s = parts[:, STAGES.index("frames")]
     return {

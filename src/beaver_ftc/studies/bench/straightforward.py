@@ -1,8 +1,8 @@
 """The loop as one writes it first: properties by name, published equations in NumPy, a dictionary a frame.
 
 It flies the published scheme: the detection estimator with its network, three isolation estimators with
-interval thresholds, and feedback linearisation. It is here to be compared with, in time and in its verdict;
-the modules of the loop have the sources.
+interval thresholds, and feedback linearisation. The bench compares the time and the verdict of the loop with
+it. The modules of the loop have the sources of the equations.
 """
 
 import numpy as np
@@ -23,16 +23,17 @@ from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.signals import sample
 from beaver_ftc.studies.bench.contenders import FLAP, MAIN, take_over
 
-SIGNALS = ("alpha", "beta", "ph", "qh", "rh", "dpt")  # of the terms of moments
-LEAST_EFFECTIVENESS = 0.1
-MOST_VARIANCE = 1.0 / 12.0  # of theta: that of a number which is anywhere from -1 to 0
-MAX_DEFLECTION_RAD = 0.44  # of aileron, elevator and rudder alike: about 25 deg
+SIGNALS = ("alpha", "beta", "ph", "qh", "rh", "dpt")  # whose powers the terms of the moments contain
+LEAST_EFFECTIVENESS = 0.1  # that the law assumes of a weak surface
+MOST_VARIANCE = 1.0 / 12.0  # variance of a theta that is evenly distributed from -1 to 0
+MAX_DEFLECTION_RAD = 0.44  # of aileron, elevator and rudder: about 25 deg
 
 
 Signals = dict[str, float]  # true signals by their name in the log
 
-# xdot = I^-1 (M - x cross I x), x rad/s. M, N m: a sum of terms, each a value times powers of SIGNALS, into
-# one coefficient (Cl, Cm, Cn), alone or as the factor of a surface.
+# xdot = I^-1 (M - x cross I x), x (3,) rad/s. The moments M (3,), N m, are q S L C: dynamic pressure, wing
+# area, LENGTHS_M, coefficients Cl, Cm, Cn. A coefficient is a sum of terms; each term is a value times powers
+# of SIGNALS, and for a term of a surface times its deflection.
 INERTIA = np.array(
     [[MASS.Ix_kg_m2, 0, -MASS.Jxz_kg_m2], [0, MASS.Iy_kg_m2, 0], [-MASS.Jxz_kg_m2, 0, MASS.Iz_kg_m2]]
 )
@@ -42,14 +43,14 @@ LENGTHS_M = np.array([GEOMETRY.span_m, GEOMETRY.chord_m, GEOMETRY.span_m])
 OF_MOMENTS = [term for term in TERMS.values() if term.coefficient in MOMENTS]
 VALUES = np.array([term.value for term in OF_MOMENTS])
 POWERS = np.array([[dict(term.of).get(signal, 0) for signal in SIGNALS] for term in OF_MOMENTS])
-INTO = np.array([  # (coefficient, none or surface, term): 1 where a term goes
+INTO = np.array([  # (coefficient, none or surface, term): 1 if the term belongs there
     [[(term.coefficient, term.surface) == (of, by) for term in OF_MOMENTS] for by in (None, *SURFACES)]
     for of in MOMENTS
 ], float)  # fmt: skip
 
 
 def f_and_G(x: np.ndarray, truth: Signals) -> tuple[np.ndarray, np.ndarray]:
-    """f (3,) rad/s2 and G (3, 4) rad/s2 per rad at the rates x (3,) rad/s."""
+    """f (3,) rad/s2 and G (3, 4) rad/s2 per rad at the rates x (3,) rad/s, of xdot = f + G u."""
     rates = x * LENGTHS_M / truth["airspeed_mps"] * np.array([0.5, 1.0, 0.5])
     signals = np.array([truth["alpha_rad"], truth["beta_rad"], *rates, truth["dpt"]])
     coefficients = INTO @ (VALUES * (signals**POWERS).prod(axis=1))
@@ -78,7 +79,7 @@ class Estimators:
         self.fie_decay = np.exp(-fdi.isolation_pole_per_s * dt)
         self.forgetting = np.exp(-dt / fdi.forgetting_time_s)
         self.pole = fdi.detection_pole_per_s
-        # arrays are replaced in each frame, but for weights and excluded: they may begin as one
+        # only weights and excluded are changed in place: the other arrays may share their initial values
         self.x_hat = self.threshold = self.residual = np.zeros(3)
         self.weights = np.zeros((3, N_BASIS))
         self.basis = np.zeros(N_BASIS)
@@ -89,30 +90,35 @@ class Estimators:
         self.fie_residual = self.lower = self.upper = np.full((3, 3), np.nan)
 
     def predict(self, x: np.ndarray, rate: np.ndarray, Z: np.ndarray, eta_bar: np.ndarray) -> None:
-        """One frame on, each axis.
+        """Advance the detection estimator by a frame, each axis.
 
             x_hat     <- x + dt (rate + w.basis + (effectiveness - 1) Z) + decay (x_hat - x)
             threshold <- decay threshold + dt eta_bar
             w         <- keep (w + dt gain outside basis),  outside: the residual beyond its threshold
 
-        x (3,) rad/s as it began; rad/s2: rate (3,) = f + G u, Z (3, 3) what each surface gives of it.
+        x (3,) rad/s: rates at the begin of the frame. rate (3,) rad/s2: f + G u. Z (surface, axis) rad/s2:
+        the part of G u of each surface. eta_bar (3,) rad/s2: the bound on the uncertainty. effectiveness: of
+        the surfaces. keep is 1 as long as no fault is isolated; w changes only after the alarm.
         """
         if self.detected:
             self.adapt(x, rate, Z, eta_bar)
             outside = np.sign(self.residual) * np.maximum(np.abs(self.residual) - self.threshold, 0.0)
             self.weights += self.dt * self.gain * np.outer(outside, self.basis)
             self.weights *= self.keep if self.isolated is not None else 1.0
-        believed = rate + self.weights @ self.basis + (self.effectiveness[MAIN] - 1.0) @ Z
-        self.x_hat = x + self.dt * believed + self.decay * (self.x_hat - x)
+        predicted = rate + self.weights @ self.basis + (self.effectiveness[MAIN] - 1.0) @ Z
+        self.x_hat = x + self.dt * predicted + self.decay * (self.x_hat - x)
         self.threshold = self.decay * self.threshold + self.dt * eta_bar
 
     def adapt(self, x: np.ndarray, rate: np.ndarray, Z: np.ndarray, eta_bar: np.ndarray) -> None:
-        """The same for the isolation estimators, by least squares projected onto [-1, 0].
+        """Advance the isolation estimators by a frame: least squares, projected onto theta in [-1, 0].
 
         D  = clip(theta + P Om eps / (B^2 + Om^2 P), -1, 0) - theta,  eps = x - x_hat
         P  <- min(P B^2 / (B^2 + Om^2 P) / forgetting, MOST_VARIANCE)
         Om <- a Om + dt Z,  x_hat <- x + dt (rate + Z theta) + a (x_hat - x) + Om D,  theta <- theta + D
         R+ <- a R+ + dt max(Z, 0),  R- <- a R- + dt min(Z, 0),  B <- a B + dt eta_bar
+
+        a: the decay of a frame. All right sides have the values before this frame, except that x_hat
+        has the new Om.
         """
         a, dt, noise = self.fie_decay, self.dt, self.B**2
         scale = noise + self.Om**2 * self.P
@@ -129,7 +135,7 @@ class Estimators:
         self.B = a * self.B + dt * eta_bar
 
     def judge(self, x: np.ndarray, alpha: float, beta: float) -> None:
-        """Compare with the measured x (3,) rad/s: raise the alarm, exclude faults.
+        """Compare the estimates with the measured x (3,) rad/s: raise the alarm, exclude faults.
 
         alarm: |x - x_hat| > threshold;  not excluded: -R+ - Om theta - B <= eps <= -R- - Om theta + B
         """
@@ -147,18 +153,20 @@ class Estimators:
 
     @property
     def isolated(self) -> int | None:
-        """The one estimator left, if there is but one."""
+        """The index of the only estimator that is not excluded, after the alarm; None if there are several or
+        none."""
         left = np.flatnonzero(~self.excluded)
         return int(left[0]) if self.detected and left.size == 1 else None
 
     @property
     def unknown(self) -> np.ndarray:
-        """The unknown acceleration, as far as it has been learnt since the alarm, (3,) rad/s2."""
+        """The unknown acceleration w . basis + pole residual, (3,) rad/s2; 0 before the alarm."""
         return self.weights @ self.basis + self.pole * self.residual if self.detected else np.zeros(3)
 
     @property
     def effectiveness(self) -> np.ndarray:
-        """The estimated effectiveness of the surfaces, (4,): 1 but for the isolated one."""
+        """The effectiveness of the surfaces, (4,): 1 + theta of the isolated one, at least
+        LEAST_EFFECTIVENESS; 1 of all others."""
         believed = np.ones(4)
         isolated = self.isolated
         if isolated is not None:
@@ -167,16 +175,20 @@ class Estimators:
 
 
 def _basis(alpha: float, beta: float) -> np.ndarray:
-    """Normalised radial basis functions along alpha and along beta, each as wide as its spacing."""
-    both = np.concatenate([
+    """Radial basis functions of alpha and of beta (rad), (N_BASIS,), exp(-((value - centre) / spacing)^2 /
+    2), divided by their norm."""
+    phi = np.concatenate([
         np.exp(-0.5 * ((value - centres) / (centres[1] - centres[0])) ** 2)
         for value, centres in ((alpha, ALPHA_CENTRES_RAD), (beta, BETA_CENTRES_RAD))
     ])  # fmt: skip
-    return both / np.linalg.norm(both)
+    return phi / np.linalg.norm(phi)
 
 
 class FeedbackLinearisation:
-    """Reference model, proportional-integral feedback; a weak surface is asked for more, the flap never."""
+    """Reference model and proportional-integral feedback. The flap stays in trim.
+
+    error = x_model - x,   I <- I + dt error,   u = G^-1 (xdot_model + Kp error + Ki I - f - unknown)
+    """
 
     def __init__(self, scenario: Scenario, dt: float, flap_rad: float) -> None:
         control = scenario.control
@@ -191,7 +203,8 @@ class FeedbackLinearisation:
     def command(
         self, x: np.ndarray, f: np.ndarray, G: np.ndarray, unknown: np.ndarray, reference: np.ndarray
     ) -> np.ndarray:
-        """The deflections (4,) rad; G (3, 4) includes what is believed of the surfaces."""
+        """The deflections (4,) rad. G (3, 4) includes the estimated effectiveness: a weak surface gets a
+        larger command. reference (3,) rad/s."""
         error = self.model[0] - x
         self.integral += self.dt * error
         demand = self.model[1] + self.Kp * error + self.Ki * self.integral - f - unknown
@@ -201,7 +214,10 @@ class FeedbackLinearisation:
 
 
 class Straightforward:
-    """A contender: flies a scenario from `at_s` on, as the loop does."""
+    """A contender that flies a scenario from `at_s` on.
+
+    then: arguments of `Estimators.predict` for the next frame; None in the first frame.
+    """
 
     def __init__(self, scenario: Scenario, at_s: float, frames: int) -> None:
         self.scenario = scenario
@@ -212,7 +228,7 @@ class Straightforward:
         self.prepare()
 
     def prepare(self) -> None:
-        """Back to the start, with nothing detected."""
+        """Return to the start, with new estimators and an empty log."""
         self.start.come_back()
         dt = 1.0 / self.scenario.rate_hz
         self.estimators = Estimators(self.scenario, dt)
@@ -228,7 +244,7 @@ class Straightforward:
             self.step(self.references[k])
 
     def step(self, reference: np.ndarray) -> None:
-        """One frame; reference (3,) rad/s."""
+        """Fly one frame: run, measure, predict, judge, command, log. reference (3,) rad/s."""
         fdm = self.plant.fdm
         estimators = self.estimators
         fdm.run()
@@ -247,21 +263,22 @@ class Straightforward:
         self.log.append(self.row(truth, x, reference))
 
     def bound(self, x: np.ndarray) -> np.ndarray:
-        """The bound on the uncertainty, (3,) rad/s2: as published, and for the turning Earth."""
+        """The bound on the uncertainty, (3,) rad/s2: the published one, and W (2 sum |x| + W) for the turning
+        Earth, W its rate."""
         declared = Declared.of(self.scenario)
         cross = np.array([x[1] * x[2], x[0] * x[2], x[0] * x[1]])
         earth = EARTH_RATE_RAD_S * (2.0 * np.abs(x).sum() + EARTH_RATE_RAD_S)
         return np.array(declared.coupling) * np.abs(COUPLING * cross) + declared.constant_rad_s2 + earth
 
     def row(self, truth: Signals, x: np.ndarray, reference: np.ndarray) -> Signals:
-        """A row of the log."""
+        """A row of the log, by column."""
         e = self.estimators
         row = truth | {f"{s}_cmd_rad": u for s, u in zip(SURFACES, self.u, strict=True)}
         of_axes = {
             "measured": x, "reference": reference, "model": self.law.model[0], "residual": e.residual,
             "threshold": e.threshold,
         }  # fmt: skip
-        row |= {f"{AXES[i]}_{name}_rad_s": of[i] for name, of in of_axes.items() for i in range(3)}
-        for name, of in (("residual", e.fie_residual), ("lower", e.lower), ("upper", e.upper)):
-            row |= {f"fie_{SURFACES[s]}_{AXES[i]}_{name}_rad_s": of[s, i] for s, i in np.ndindex(3, 3)}
+        row |= {f"{AXES[i]}_{name}_rad_s": values[i] for name, values in of_axes.items() for i in range(3)}
+        for name, values in (("residual", e.fie_residual), ("lower", e.lower), ("upper", e.upper)):
+            row |= {f"fie_{SURFACES[s]}_{AXES[i]}_{name}_rad_s": values[s, i] for s, i in np.ndindex(3, 3)}
         return row | {"detected": e.detected}

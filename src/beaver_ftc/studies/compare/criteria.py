@@ -1,30 +1,30 @@
-"""The costs by which methods are tuned, ours and rivals alike: what the tables of benchmark.md show.
+"""The costs J by which our methods and rivals are tuned, and which the tables of benchmark.md show.
 
-A detector flies with our default law, over faulted flights F and healthy flights H:
+A detector flies with our default law, in faulted flights F and healthy flights H:
 
     J = mean over F of [ d / (d + 1 s) + w ] / 2  +  mean over F and H of a
 
-d is the delay of its alarm, infinite for a fault that it misses; w is 1 if the name at the end is wrong or
-missing, a is 1 for an alarm without a fault. 0 is the best, 2 the worst.
+d: delay of the alarm, s; infinite for a missed fault. w: 1 if the name at the end is wrong or missing, else
+0. a: 1 for a false alarm, else 0. The best J is 0, the worst 2.
 
 A law flies with our default scheme, over faulted flights:
 
     J = geometric mean of e / e_oracle
 
-e is the RMS tracking error of all axes after the fault, and e_oracle that of the oracle in the same flight.
-An aircraft that is lost counts `LOST`. A candidate is admissible if
+e: RMS tracking error of all axes after the fault, deg/s. e_oracle: that of the oracle in the same flight. A
+lost aircraft counts as e / e_oracle = `LOST`. A candidate is admissible if
 
-    - healthy, it keeps the gain and phase margins that the scenario asks of the default law, at every surface
-      that leads an axis, over the airspeeds of the envelope;
+    - without a fault, it keeps the gain and phase margins that the scenario requires of the default law, at
+      every surface that leads an axis, over the airspeeds of the envelope;
     - the RMS rate of all surfaces together, over the same flights, is at most `EFFORT` times that of the
       default law.
 
-One that is not admissible costs `INADMISSIBLE` and more, the more the further it is from it.
+A candidate that is not admissible costs `INADMISSIBLE` or more; the cost grows with the violation.
 
-A flight of a plug-in ends with a false alarm, after which it costs the most whatever follows. A trial is
-ended early once it cannot win: of a detector, whose costs only add up, once the sum exceeds the
-lowest so far; of a law, once the mean over `LEAST_FLIGHTS` or more flights is `HOPELESS` times the lowest so
-far. Its cost is then the mean up to there.
+The flight of a plug-in ends with a false alarm, because nothing after it changes its cost. A trial ends early
+once it cannot win. The trial of a detector, whose parts only add up, ends when the sum exceeds the lowest J
+so far. The trial of a law ends when J over `LEAST_FLIGHTS` or more flights is `HOPELESS` times the lowest J
+so far. The cost of such a trial is that of the flights until then.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -54,43 +54,46 @@ from beaver_ftc.studies.compare.trial import (
 )
 from beaver_ftc.studies.margins import Margin
 
-# Of a detector.
-DELAY_S = 1.0  # an alarm this late costs half of a missed one
-# Of a law: shares of 1, but for LEAST_FLIGHTS.
-LOST = 100.0  # of e_oracle: the error of a flight that loses the aircraft, and the largest of any flight
-EFFORT = 1.1  # of the RMS surface rate of the default law
-LEAST_FLIGHTS = 4  # that a mean of a trial needs, before it ends the trial
-HOPELESS = 1.5  # of the lowest J
-# In place of J.
+# Cost of a detector.
+DELAY_S = 1.0  # an alarm with this delay costs half as much as a missed fault
+# Cost of a law.
+LOST = 100.0  # e / e_oracle of a flight that loses the aircraft, and the largest of any flight
+EFFORT = 1.1  # largest RMS surface rate over that of the default law
+LEAST_FLIGHTS = 4  # a trial flies at least so many flights
+HOPELESS = 1.5  # J over the lowest J so far at which a trial ends
+# Costs in place of J.
 INADMISSIBLE = 1e3  # above every J
-FAILED = 1e6  # of a candidate that cannot be flown at all
+FAILED = 1e6  # of a candidate that cannot be flown
 
 Values = Mapping[str, float]
 
 
 @cache
 def flights(grade: str, most: int | None, draw: int = 0, draws: int = 1) -> tuple[SetFlight, ...]:
-    """The flights that a grade's methods are tuned on; kinds of flights take turns. draw: see `of_sweep`.
-    draws: so many from this one on, together."""
-    of_kind: dict[str, list[SetFlight]] = {}
+    """The flights on which the methods of a grade are tuned. Kinds of flights take turns, evenly spread, so
+    that the first few flights contain all kinds.
+
+    most: flights of each sweep; None is all. draw: the first draw, as in `of_sweep`. draws: number of draws.
+    """
+    by_kind: dict[str, list[SetFlight]] = {}
     for number in range(draw, draw + draws):
         for case in of_set(CALIBRATION + grade, most, number):
-            of_kind.setdefault(case.scenario.name.rpartition("-")[0], []).append(case)
-    placed = [
+            by_kind.setdefault(case.scenario.name.rpartition("-")[0], []).append(case)
+    turns = [
         ((i + 0.5) / len(cases), k, case)
-        for k, cases in enumerate(of_kind.values())
+        for k, cases in enumerate(by_kind.values())
         for i, case in enumerate(cases)
     ]
-    return tuple(case for _, _, case in sorted(placed, key=lambda place: place[:2]))
+    return tuple(case for _, _, case in sorted(turns, key=lambda turn: turn[:2]))
 
 
 class _FalseAlarm(Exception):
-    """A plug-in has raised an alarm without a fault: nothing that follows changes what its flight costs."""
+    """A plug-in has raised an alarm without a fault: nothing after it changes the cost of its flight."""
 
 
 def _end_with_false_alarm(loop: Loop) -> Callable[[], None]:
-    """Watch a flight (`fly`): end it with the first false alarm of its plug-in. What is returned is called at
-    its end, and changes nothing then."""
+    """Watch a flight, as an argument of `fly`: end it with the first false alarm of its plug-in. The returned
+    function is called after each frame, and once more at the end, when it has no effect."""
     plugins = loop.plugin_frame
     is_false = Truth.of(loop.scenario).onset.is_false
 
@@ -103,7 +106,7 @@ def _end_with_false_alarm(loop: Loop) -> Callable[[], None]:
 
 
 def flown(case: SetFlight, entry: Entry, group: str, values: Values) -> Result:
-    """One flight of an entry with these values of its detector or law."""
+    """The result of one flight of an entry. values: of its detector or law. group: DETECTORS or LAWS."""
     scenario = with_values(with_entry(case.scenario, entry), group, values)
     watch = _end_with_false_alarm if group == DETECTORS else None
     try:
@@ -113,7 +116,7 @@ def flown(case: SetFlight, entry: Entry, group: str, values: Values) -> Result:
 
 
 class Cost:
-    """J over flights of an entry; _lowest: of the best trial so far."""
+    """J of an entry over flights. _lowest: the lowest J of all trials so far."""
 
     def __init__(self, group: str, entry: Entry, cases: Sequence[SetFlight]) -> None:
         self._group = group
@@ -126,7 +129,7 @@ class Cost:
         return [part for _, part in self._flights(values)]
 
     def _flights(self, values: Values) -> Iterator[tuple[Result, float]]:
-        """Fly one after the other; the result of each, and its part in J."""
+        """Fly all flights in turn; yield the result of each, and its part in J."""
         for n, case in enumerate(self._cases):
             result = flown(case, self._entry, self._group, values)
             yield result, self._part(n, result)
@@ -157,7 +160,7 @@ class DetectorCost(Cost):
         return total
 
     def _part(self, n: int, result: Result) -> float:
-        """Of a false alarm, and of a fault its delay and a wrong name."""
+        """(d / (d + DELAY_S) + w) / 2 over the number of faulted flights, plus a over that of all flights."""
         cost = result.false_alarm / len(self._cases)
         if result.faulted:
             d = result.delay_s
@@ -167,7 +170,7 @@ class DetectorCost(Cost):
 
 
 class LawCost(Cost):
-    """J of a law, exp(mean of all parts), with what makes a candidate inadmissible."""
+    """J of a law, exp(mean of all parts), or the cost of a candidate that is not admissible."""
 
     def __init__(self, name: str, grade: str, most: int | None, draw: int, draws: int = 1) -> None:
         cases = [case for case in flights(grade, most, draw, draws) if case.scenario.faults]
@@ -187,13 +190,15 @@ class LawCost(Cost):
         return margins_of(with_values(with_entry(self._cases[0].scenario, self._entry), LAWS, values))
 
     def shortfall(self, values: Values) -> float:
-        """By which share the worst margin is too small; zero if all are kept. One that is NaN is none."""
-        asked = self._cases[0].scenario.control
+        """The share by which the worst margin is too small, 1 - margin / required; 0 if all are kept. A NaN
+        counts as a margin of 0."""
+        required = self._cases[0].scenario.control
         gain_db, phase_deg = least_margins(self.margins(values))
-        shares = gain_db / asked.gain_margin_db, phase_deg / asked.phase_margin_deg
+        shares = gain_db / required.gain_margin_db, phase_deg / required.phase_margin_deg
         return max(0.0, *(1.0 if isnan(share) else 1.0 - share for share in shares))
 
     def _tracking(self, values: Values) -> float:
+        """J, or the cost of a candidate whose surfaces move too fast."""
         results = list[Result]()
         logs = list[float]()
         for result, part in self._flights(values):
@@ -211,21 +216,21 @@ class LawCost(Cost):
         return cost
 
     def _part(self, n: int, result: Result) -> float:
-        """The logarithm of the error over the oracle's."""
+        """log(e / e_oracle), with at most LOST in the logarithm."""
         rms_deg_s = result.rms_deg_s
         return log(min(rms_deg_s / self._oracle[n], LOST) if isfinite(rms_deg_s) else LOST)
 
 
 @cache
 def yardsticks(grade: str, most: int | None, draw: int, draws: int) -> tuple[tuple[float, ...], float]:
-    """The oracle's error in each faulted flight, deg/s; and the default law's RMS surface rate, deg/s."""
+    """e_oracle in each faulted flight, deg/s; and the RMS surface rate of the default law, deg/s."""
     cases = [case for case in flights(grade, most, draw, draws) if case.scenario.faults]
     oracle = tuple(flown(case, Entry(SCHEME, ORACLE), LAWS, {}).rms_deg_s for case in cases)
     return oracle, effort([flown(case, Entry(SCHEME, LAW), LAWS, {}) for case in cases])
 
 
 def effort(results: Sequence[Result]) -> float:
-    """RMS rate of all surfaces over flights, deg/s; of a flight that is lost, up to there."""
+    """RMS rate of all surfaces over flights, deg/s; a lost flight counts up to the loss."""
     return sqrt(fmean(result.energy_deg2_s2 for result in results))
 
 

@@ -19,44 +19,47 @@ from beaver_ftc.results.model import Document
 from beaver_ftc.studies.compare.criteria import Cost, DetectorCost, LawCost, Values, flights
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, Estimate
 
-JUDGED = 12  # draws on which both settings fly; with 4, a detector's interval is 20 % wide to each side
-RESAMPLES = 4000
-Size = Callable[..., np.ndarray]  # of the parts (..., n) of a cost along an axis: the cost
+JUDGED = 12  # draws on which both settings fly; with 4, the interval of a detector is 20 % wide to each side
+RESAMPLES = 4000  # of the bootstrap
+Size = Callable[..., np.ndarray]
+"""From the parts (..., n) of a cost, along an axis, to the cost (...)."""
 
 
 def gain_of(group: str, name: str, grade: str, settings: Sequence[Values], first: int) -> Document:
-    """Both costs, and the gain of the second setting over the first, on `JUDGED` draws from the first on."""
+    """The costs of two settings, and the gain of the second, on `JUDGED` draws from the draw `first` on."""
     draws = range(first, first + JUDGED)
     costs: Sequence[Cost]
     size: Size
     if group == DETECTORS:
-        cases = [case for each in draws for case in flights(grade, None, each)]
+        cases = [case for draw in draws for case in flights(grade, None, draw)]
         costs = [DetectorCost(name, cases)]
         size = np.sum
     else:
-        costs = [LawCost(name, grade, None, each) for each in draws]
+        costs = [LawCost(name, grade, None, draw) for draw in draws]
         size = geometric_mean
     before, after = settings
     built_in = _parts(costs, before)
-    found = built_in if after == before else _parts(costs, after)
-    gain = relative_gain(built_in, found, size)
+    retuned = built_in if after == before else _parts(costs, after)
+    gain = relative_gain(built_in, retuned, size)
     return {
         "built_in": float(size(built_in, axis=-1)),
-        "retuned": float(size(found, axis=-1)),
+        "retuned": float(size(retuned, axis=-1)),
         "gain": gain.value,
         "gain_low": gain.low,
         "gain_high": gain.high,
-        "flights": len(found),
+        "flights": len(retuned),
         "judged": len(draws),
     }
 
 
 def _parts(costs: Sequence[Cost], values: Values) -> np.ndarray:
-    return np.concatenate([one.parts(values) for one in costs])
+    """The parts of all flights (n,) in these costs."""
+    return np.concatenate([cost.parts(values) for cost in costs])
 
 
 def relative_gain(before: np.ndarray, after: np.ndarray, size: Size) -> Estimate:
-    """1 - size(after) / size(before), parts (n,) of the same flights; nothing is gained where both are 0."""
+    """1 - size(after) / size(before) with its interval. before, after: parts (n,) of the same flights. Gain 0
+    if both sizes are 0; -inf if only the first is."""
     from scipy.stats import bootstrap
 
     def gain(before: np.ndarray, after: np.ndarray, axis: int = -1) -> np.ndarray:
@@ -65,11 +68,11 @@ def relative_gain(before: np.ndarray, after: np.ndarray, size: Size) -> Estimate
         return np.where(first > 0.0, 1.0 - second / np.where(first > 0.0, first, 1.0), none)
 
     with np.errstate(invalid="ignore"):  # scipy's standard error of gains of -inf, which is not used here
-        drawn = bootstrap(
+        resampled = bootstrap(
             (before, after), gain, paired=True, n_resamples=RESAMPLES, confidence_level=CONFIDENCE,
             method="percentile", rng=1,
         )  # fmt: skip
-    limits = drawn.confidence_interval
+    limits = resampled.confidence_interval
     return Estimate(float(gain(before, after)), float(limits.low), float(limits.high))
 
 

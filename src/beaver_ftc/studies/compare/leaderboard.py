@@ -23,22 +23,24 @@ Cell = Callable[[Document], str]
 
 
 def _cell(form: Callable[[Any], str], *keys: str, none: str = "-") -> Cell:
-    """Numbers of a row, a slash between; `none` where there is none."""
+    """A cell with the numbers under these keys, a slash between them; `none` in place of a missing number."""
     return lambda row: " / ".join(none if row.get(key) is None else form(row[key]) for key in keys)
 
 
 def _of_faults(cell: Cell) -> Cell:
+    """The cell, or `-` in a row without faulted flights."""
     return lambda row: cell(row) if row["faults"] else "-"
 
 
 def _alarms(row: Document) -> str:
+    """The rate of false alarms and its upper bound."""
     rate = row["false_alarms_per_h"]
     upper = row["false_alarms_per_h_upper"]
     return "-" if rate is None else f"{rate:.3g} (<{float(f'{upper:.2g}'):g})"
 
 
 def _free(row: Document) -> str:
-    """The rate and delay of a scheme at the most sensitive level without a false alarm."""
+    """Detection rate and median delay of a scheme at its most sensitive level without a false alarm."""
     if row.get("free") is None:
         return "-"
     rate = _cell(bare_percent, "detection_rate")
@@ -71,8 +73,8 @@ CONTROL: Columns = (
 
 
 def sections(part: Document) -> list[tuple[list[str], list[list[str]], list[str]]]:
-    """(header, rows, sentences) of the schemes with our law, and of the laws with our scheme. A sentence says
-    who is better; there is none where no flight has a fault."""
+    """(header, rows, sentences) of the schemes with our law, and of the laws with our scheme. The sentence
+    says which is better; there is none if no flight has a fault."""
     lines = [row | {"free": part["without_false_alarm"].get(row["scheme"])} for row in part["lines"]]
     schemes = [row for row in lines if row["law"] == LAW]
     laws = [row for row in lines if row["scheme"] == SCHEME]
@@ -84,7 +86,7 @@ def sections(part: Document) -> list[tuple[list[str], list[list[str]], list[str]
 
 
 def as_text(document: Document) -> str:
-    """For a terminal."""
+    """The comparison for a terminal."""
     blocks = []
     for name, part in document["sets"].items():
         blocks.append(f"{name}: {part['flights']} flights")
@@ -112,13 +114,14 @@ def page_of(document: Document, name: str) -> tuple[str, list[page.Part]]:
 
 
 def write_leaderboard(document: Document, path: Path) -> None:
-    """Replace what stands below the mark; what stands above it was written by hand and stays."""
+    """Replace the part of a page below MARK. The part above it is written by hand and stays."""
     above = path.read_text(encoding="utf-8").partition(MARK)[0] if path.exists() else "# Benchmark\n\n"
     made = f"Made with {page.versions_line(document['versions'])}."
     path.write_text(above + page.as_markdown([MARK, made, *_sets(document)]), encoding="utf-8")
 
 
 def _sets(document: Document) -> Iterator[page.Part]:
+    """Heading, tables and sentences of each set."""
     for name, part in document["sets"].items():
         yield page.Heading(f"{name}: {part['flights']} flights")
         for header, rows, first in sections(part):
@@ -130,7 +133,7 @@ def _sets(document: Document) -> Iterator[page.Part]:
 
 
 def figure_of(document: Document) -> "Figure":
-    """A row a set."""
+    """A row for each set: detection rate and delay against false alarms, and tracking ratios."""
     sets = document["sets"]
     figure, axes = panels(len(sets), 3, 13.0, 3.4 * len(sets), dpi=120)
     for row, (name, part) in zip(axes, sets.items(), strict=True):
@@ -142,15 +145,16 @@ def figure_of(document: Document) -> "Figure":
 
 
 def _draw_curves(rate: "Axes", delay: "Axes", part: Document) -> None:
+    """The curves of each scheme over its levels; a marker at level 1, with which it ships."""
     for index, (scheme, points) in enumerate(part["trade_off"].items()):
         look = curve_look(index)
         alarms = [point["false_alarms_per_h"] for point in points]
-        own = next(point for point in points if point["level"] == 1.0)
+        shipped = next(point for point in points if point["level"] == 1.0)
         for axis, key in ((rate, "detection_rate"), (delay, "delay_median_s")):
             values = [float("nan") if point[key] is None else point[key] for point in points]
             axis.plot(alarms, values, label=scheme, drawstyle="steps-post", **look)
-            if own[key] is not None:
-                axis.plot(own["false_alarms_per_h"], own[key], marker(index), color=look["color"])
+            if shipped[key] is not None:
+                axis.plot(shipped["false_alarms_per_h"], shipped[key], marker(index), color=look["color"])
     for axis, label in ((rate, "detection rate"), (delay, "median detection delay, s")):
         axis.set(xlabel="false alarms per hour", ylabel=label)
         axis.set_xscale("symlog", linthresh=10.0)
@@ -162,14 +166,15 @@ def _draw_curves(rate: "Axes", delay: "Axes", part: Document) -> None:
 
 
 def _draw_ratios(axis: "Axes", part: Document) -> None:
+    """A line for each law, from the median to the 90 % quantile of its tracking ratio."""
     rows = [row for row in part["lines"] if row["scheme"] == SCHEME and row["law"] != ORACLE]
     for place, row in enumerate(rows):
-        median, most = row["ratio_median"], row["ratio_90"]
+        median, upper = row["ratio_median"], row["ratio_90"]
         colour = BLUE if row["law"] == LAW else GREY
         if median is not None:
-            axis.plot([median, median if most is None else most], [place, place], color=colour, linewidth=3)
+            axis.plot([median, median if upper is None else upper], [place, place], color=colour, linewidth=3)
             axis.plot(median, place, "o", color=colour)
-        if most is None:
+        if upper is None:
             axis.annotate(
                 "aircraft lost", (1.0, place), fontsize=7, xytext=(4, 5), textcoords="offset points"
             )
@@ -184,7 +189,7 @@ def _draw_ratios(axis: "Axes", part: Document) -> None:
 def comparison_study(
     name: str, cases: Sequence[SetFlight], entries: Sequence[Entry], chosen: TunedValuesByGrade | None
 ) -> Study:
-    """Every case with every entry; chosen: values of schemes and laws, as in trial.py."""
+    """The study of all cases with all entries. chosen: tuned values of schemes and laws, as in trial.py."""
     files = page.study_files("comparison", partial(page_of, name=name), {}, {"comparison": figure_of})
     return Study(
         name, cases, partial(fly_case, entries=tuple(entries), chosen=chosen),
@@ -194,5 +199,5 @@ def comparison_study(
 
 
 def lost(case: SetFlight, why: str) -> Trial:
-    """The trial of a case that ends its process: no results, and why."""
+    """The trial of a case that ends its process: no results, but the reason."""
     return Trial(case.set, failures=[f"{case.scenario.name}: {why}"])

@@ -2,12 +2,11 @@
 
     L_s = -(v - d) / v
 
-A surface s is moved by a pulse d of one frame beside what the law commands, in trim. v is its position minus
-that of the same flight without the pulse. The difference of the two flights is linear in a small d, and the
-ratio of the two transforms is the loop broken at that surface with all other loops closed, as in
-studies/margins.py, which has the default law's loop in closed form: tests hold the two together. The
-actuators are as declared, and the sensors keep their lag and delay. Noise and air are left out, and no scheme
-diagnoses.
+In trim, a pulse d of one frame is added to the command of surface s. v: position of the surface minus that in
+the same flight without the pulse. v is linear in a small d. L_s, of the transforms of v and d, is the loop
+broken at this surface with all other loops closed. studies/margins.py has the same loop of the default law in
+closed form, and tests compare the two. The actuators are as declared, and the sensors keep their lag and
+delay. Noise and moving air are left out, and no scheme diagnoses.
 """
 
 from collections.abc import Iterator
@@ -28,9 +27,9 @@ PULSE_DEG = 0.1
 PULSE_AT_S = 0.5
 DURATION_S = 4.0
 N_AIRSPEEDS = 2  # the slowest and the fastest of the envelope
-DECAYED = 0.2  # of the pulse: more than that at the end, and the loop is unstable
+DECAYED = 0.2  # a loop is unstable if |v| / |d| is larger than this in the last fifth of the flight
 LAG_KEYS = ("delay_s", "bandwidth_rad_s")
-NO_MARGIN = 0.0, 0.0, 0.0
+NO_MARGIN = 0.0, 0.0, 0.0  # gain up, gain down, phase
 
 
 def margins_of(scenario: Scenario) -> list[Margin]:
@@ -47,6 +46,7 @@ def margins_of(scenario: Scenario) -> list[Margin]:
 
 
 def _measured(scenario: Scenario) -> Iterator[Margin]:
+    """The margins at one flight condition, from a flight without a pulse and one for each surface."""
     trimmed = in_trim(scenario)
     still = _positions(trimmed)
     omega = frequencies(1.0 / scenario.rate_hz)
@@ -72,13 +72,14 @@ def in_trim(scenario: Scenario) -> Scenario:
 
 
 def _pulsed(scenario: Scenario, surface: str) -> Scenario:
+    """The scenario with the pulse, a bias fault that lasts one frame."""
     end_s = PULSE_AT_S + 1.0 / scenario.rate_hz
     pulse = {"actuator": surface, "type": "bias", "bias_deg": PULSE_DEG, "at_s": PULSE_AT_S, "end_s": end_s}
     return scenario.with_({"faults": [pulse]})
 
 
 def _positions(scenario: Scenario) -> dict[str, np.ndarray]:
-    """Position of each surface, rad, (frames,)."""
+    """The position of each primary surface in a flight, (frames,) rad."""
     loop = Loop(scenario)
     rows = np.concatenate([chunk.copy() for chunk in loop.chunks()])
     places = {name: loop.columns.index(f"{name}_pos_rad") for name in scenario.airframe.primary}
@@ -87,22 +88,26 @@ def _positions(scenario: Scenario) -> dict[str, np.ndarray]:
 
 
 def _margins(still: np.ndarray, moved: np.ndarray, omega: np.ndarray, dt: float) -> tuple[float, ...]:
-    """Gain margins up and down, dB, and phase margin, deg; zero of a loop that is unstable, of a surface at a
-    stop, and where a flight has ended in a departure."""
+    """Gain margins up and down, dB, and phase margin, deg. All are 0 if the loop is unstable, if the surface
+    is at a stop, and if a flight has ended in a departure. still, moved (frames,) rad: positions without and
+    with the pulse."""
     if len(still) != len(moved):
         return NO_MARGIN  # one of the flights has ended in a departure
     v = moved - still
     pulse = np.zeros(len(still))
     pulse[ceil(PULSE_AT_S / dt - 1e-9)] = np.radians(PULSE_DEG)
-    at_a_stop = not v.any()  # there is no loop
+    at_a_stop = not v.any()  # the pulse does not move the surface
     if at_a_stop or not np.abs(v[-len(v) // 5 :]).max() < DECAYED * np.radians(PULSE_DEG):
         return NO_MARGIN
-    v_jw, d_jw = (_transform(np.diff(each), omega * dt) for each in (v, pulse))
+    v_jw, d_jw = (_transform(np.diff(positions), omega * dt) for positions in (v, pulse))
     return tuple(map(float, margins(-(v_jw - d_jw) / v_jw)))
 
 
 def _transform(values: np.ndarray, angles: np.ndarray) -> np.ndarray:
-    """The transform of values (n,) that are zero before and after, at angles (m,) of the unit circle. Changes
-    from frame to frame are transformed instead of positions: an integrator leaves the position elsewhere."""
+    """sum over k of values[k] exp(-i angle k), (m,), of values (n,) that are zero before and after.
+
+    The caller transforms changes from frame to frame. Positions would not return to zero behind an
+    integrator.
+    """
     transform: np.ndarray = np.exp(-1j * np.outer(angles, np.arange(len(values)))) @ values
     return transform

@@ -1,8 +1,8 @@
-"""A flight under the nominal law, and what any detector would have made of it.
+"""A flight under the nominal law, played back to any detector.
 
-The nominal law reads no verdict, so one flight under it serves all detectors: it is recorded once and played
-back to each. What is kept of a detector's statistic is exact and short: its largest value before
-the fault, and each value after it that was larger than all before.
+The nominal law reads no verdict, so that one recorded flight serves all detectors. Of the statistic of a
+detector, `Trace` keeps the values that decide about alarms at any level: the largest value before the fault,
+and after it each value that is larger than all before.
 """
 
 from collections.abc import Mapping, Sequence
@@ -24,32 +24,33 @@ from beaver_ftc.scenario.schema import Scenario
 Rises = tuple[tuple[float, float], ...]
 """(time s, value) of each value that is larger than all before it."""
 Seen = list[tuple[Measured, np.ndarray]]
-"""What a detector is shown in each frame: the measured signals, and the command (surfaces,) rad."""
+"""The arguments of a detector in each frame: the measured signals, and the command (surfaces,) rad."""
 
 
 class Recorder:
-    """A detector that keeps what it is shown and never raises an alarm."""
+    """A detector that keeps its arguments and never raises an alarm."""
 
     def __init__(self) -> None:
         self.seen: Seen = []
 
     def reset(self, context: Context) -> None:
-        """Keep the context as well: a detector that replays the flight needs it."""
+        """Keep the context, which a detector that replays the flight needs."""
         self.context = context
 
     def step(self, measured: Measured, command: np.ndarray) -> Verdict:
-        """Keep, say nothing."""
+        """Keep the arguments."""
         self.seen.append((measured, command))
         return Verdict()
 
 
 @dataclass(frozen=True)
 class Trace:
-    """A detector's statistic over one flight; alarm where it exceeds 1.
+    """The statistic of a detector over one flight, which alarms above the level 1.
 
-    before: largest value before the fault (or in all of a healthy flight). records: (delay s, value), each
-    larger than all before it since the fault. healthy_s: time without a fault. rises: (time s, value), each
-    larger than all before it, while there is no fault.
+    - before: largest value before the fault, or in a whole healthy flight.
+    - records: (delay s, value) of each value since the fault that is larger than all since the fault.
+    - faulted: whether the flight has a fault. healthy_s: time without a fault.
+    - rises: (time s, value) of each value before the fault that is larger than all before it.
     """
 
     before: float
@@ -59,31 +60,35 @@ class Trace:
     rises: Rises = ()
 
     def fault_free_s(self, level: float) -> float:
-        """Time in which an alarm would have been false: until the fault, the end or the alarm itself."""
+        """Time in which an alarm would have been false, s: until the fault, the end or the alarm at this
+        level."""
         return next((at_s for at_s, value in self.rises if value > level), self.healthy_s)
 
     def false_alarm(self, level: float) -> bool:
-        """Whether it raises an alarm without a fault, at this level of the statistic."""
+        """Whether the detector raises an alarm without a fault, at this level of the statistic."""
         return self.before > level
 
     def delay_s(self, level: float = 1.0) -> float:
-        """From the fault to the alarm at this level; infinite where there is none, or was one before."""
+        """Time from the fault to the alarm at this level, s; infinite without an alarm, or after a false
+        one."""
         at_s = (at_s for at_s, value in self.records if value > level)
         return inf if self.false_alarm(level) else next(at_s, inf)
 
 
 def alarms_at(traces: Sequence[Trace], level: float) -> tuple[int, float]:
-    """False alarms at a level of the statistic, and the hours until they were raised."""
+    """Number of false alarms at a level of the statistic, and the hours in which an alarm would have been
+    false."""
     hours = sum(trace.fault_free_s(level) for trace in traces) / 3600.0
     return sum(trace.false_alarm(level) for trace in traces), hours
 
 
 @dataclass
 class Recording:
-    """A flight under the nominal law as a detector sees it, with the built-in statistic beside it.
+    """A flight under the nominal law: the context and the arguments of a detector in each frame.
 
-    known (frames,): whether the flight is inside the aircraft's map of the model's error; error (frames, 3)
-    rad/s2: the bound that the map gives there.
+    built_in (frames,): the statistic of the scheme that was flown. onset: begin of the fault. known
+    (frames,): whether the flight is inside the map of the model error. error (frames, 3) rad/s2: the bound of
+    this map.
     """
 
     context: Context
@@ -95,12 +100,12 @@ class Recording:
 
     @property
     def fault_at_s(self) -> float:
-        """When the fault begins, as declared; infinite where nothing breaks."""
+        """Begin of the fault as declared, s; infinite without a fault."""
         return inf if self.onset.at_s is None else self.onset.at_s
 
 
 def record(scenario: Scenario) -> Recording:
-    """Fly a scenario under the nominal law and keep what a detector would see."""
+    """Fly a scenario under the nominal law and record the arguments of a detector."""
     nominal = scenario.control.model_copy(update={"law": "nominal"})
     recorder = Recorder()
     loop = Loop(scenario.model_copy(update={"control": nominal}), recorder)
@@ -117,7 +122,8 @@ def record(scenario: Scenario) -> Recording:
 
 
 def replay(recording: Recording, scheme: str, options: Mapping[str, float] | None = None) -> Trace:
-    """The trace of a scheme, built in or plugged in, over a recorded flight."""
+    """The trace of a scheme over a recorded flight. The statistic of our own scheme is in the recording; a
+    plug-in is run over it."""
     if scheme == "adaptive-estimators":
         return trace(recording, recording.built_in)
     detector: Detector = made(DETECTORS, scheme)
@@ -126,22 +132,22 @@ def replay(recording: Recording, scheme: str, options: Mapping[str, float] | Non
 
 
 def _statistics(detector: Detector, seen: Seen) -> list[float]:
-    """The statistic of each frame, of which alone the detector is shown a copy; that of a detector with an
-    alarm alone is well above the level, or well below."""
-    verdicts = [detector.step(*deepcopy(shown)) for shown in seen]
-    return [1e6 * each.detected if isnan(each.statistic) else each.statistic for each in verdicts]
+    """The statistic of each frame. A detector without a statistic counts as 1e6 with an alarm, else 0. The
+    detector receives copies, so that it cannot change the recording."""
+    verdicts = [detector.step(*deepcopy(arguments)) for arguments in seen]
+    return [1e6 * verdict.detected if isnan(verdict.statistic) else verdict.statistic for verdict in verdicts]
 
 
 def trace(recording: Recording, statistic: np.ndarray) -> Trace:
-    """Boil a statistic (frames,) down to what decides about alarms at any level."""
-    t = np.array([measured.t_s for measured, _ in recording.seen])
-    healthy = recording.onset.is_false(t)
+    """The trace of a statistic (frames,)."""
+    times_s = np.array([measured.t_s for measured, _ in recording.seen])
+    healthy = recording.onset.is_false(times_s)
     early = statistic[healthy]
-    since = np.array([recording.onset.delay_s(one) for one in t[~healthy]])
+    since = np.array([recording.onset.delay_s(time_s) for time_s in times_s[~healthy]])
     return Trace(
         before=float(early.max(initial=0.0)), records=_records(since, statistic[~healthy]),
         faulted=not healthy.all(), healthy_s=float(healthy.sum()) * recording.context.dt_s,
-        rises=_records(t[healthy], early),
+        rises=_records(times_s[healthy], early),
     )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""Finished runs side by side: what `beaver-ftc compare RUN...` shows."""
+"""Finished runs side by side, as `beaver-ftc compare RUN...` shows them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ _ALLOWED = "allowed: a result folder of beaver-ftc run"
 
 @dataclass(frozen=True)
 class Run:
-    """A finished run. document, scenario: its metrics.json and scenario.yaml as they are."""
+    """A finished run. document, scenario: the contents of its metrics.json and scenario.yaml."""
 
     folder: Path
     document: Document
@@ -44,7 +44,8 @@ class Run:
 
 
 def read_runs(folders: Sequence[Path]) -> list[Run]:
-    """The runs in result folders. Raises BadInput with a line a folder that is none."""
+    """The runs in result folders. Raises BadInput with a line for each folder that is not the result of a
+    run."""
     runs = []
     mistakes = []
     for folder in folders:
@@ -85,7 +86,7 @@ DIAGNOSED = {  # label of a row -> path in the metrics
 
 
 def rows_of(run: Run) -> dict[str, str]:
-    """The rows of a run, name -> text: what was flown, then what came of it."""
+    """The rows of a run, label -> text: first the scenario, then the results."""
     metrics = run.metrics
     scenario = run.scenario
     departure = metrics.departure
@@ -110,7 +111,7 @@ def rows_of(run: Run) -> dict[str, str]:
 
 
 def fault_words(fault: Document) -> str:
-    """A fault as declared: surface, sensor or case of damage, type, sizes, and when."""
+    """A fault as declared: surface, sensor or case of damage, type, sizes, begin and end."""
     sizes = [
         f"{key} {value:g}"
         for key, value in fault.items()
@@ -123,7 +124,7 @@ def fault_words(fault: Document) -> str:
 
 
 def as_text(runs: Sequence[Run]) -> str:
-    """A column a run; what differs between them is marked with a star."""
+    """A table with a column for each run; a star marks the rows that differ."""
     columns = [rows_of(run) for run in runs]
     table = [["", *labels(runs)]]
     for name in columns[0]:
@@ -133,26 +134,27 @@ def as_text(runs: Sequence[Run]) -> str:
 
 
 def labels(runs: Sequence[Run]) -> list[str]:
-    """The label of each run: its folder's name, or the whole path where names repeat."""
+    """The label of each run: the name of its folder, or of all runs the path if two names are the same."""
     names = [run.folder.resolve().name for run in runs]
     distinct = len(set(names)) == len(names)
     return [one_line(name, 200) for name in (names if distinct else [str(run.folder) for run in runs])]
 
 
 def figure_of(runs: Sequence[Run]) -> "Figure":
-    """Tracking errors of all runs over time, one axis above the other; dotted: a fault begins."""
+    """Tracking errors of all runs over time, a panel for each axis. A dotted line: the first fault of a run
+    begins."""
     figure, grid = panels(3, 1, 11.0, 9.0, dpi=120, sharex=True)
     figure.suptitle(f"Tracking errors of {', '.join(labels(runs))}", fontsize=11, wrap=True)
     axes = grid[:, 0]
     for run, label in zip(runs, labels(runs), strict=True):
         _draw(axes, run.folder, label)
-    struck = sorted({run.metrics.fault.at_s for run in runs if run.metrics.fault})
+    begins_s = sorted({run.metrics.fault.at_s for run in runs if run.metrics.fault})
     for axis, letter in zip(axes, AXES, strict=True):
-        for at_s in struck:
+        for at_s in begins_s:
             axis.axvline(at_s, color=BLACK, linewidth=0.9, linestyle=":")
         axis.set_ylabel(f"{letter} tracking error, deg/s")
         axis.grid(alpha=0.3)
-    for at_s in struck:
+    for at_s in begins_s:
         axes[0].annotate(
             f"fault {at_s:g} s", (at_s, 1.0), xycoords=("data", "axes fraction"), xytext=(3, -10),
             textcoords="offset points", fontsize=8,
@@ -163,7 +165,7 @@ def figure_of(runs: Sequence[Run]) -> "Figure":
 
 
 def write_runs(out: Path, folders: Sequence[Path]) -> list[Run]:
-    """Write `out/runs/` (figure, JSON, report) of finished runs; return what was read of them."""
+    """Write figure, JSON and report of finished runs into `out/runs/`; return the runs."""
     from beaver_ftc.results.folder import result_folder
     from beaver_ftc.results.metrics import as_json
     from beaver_ftc.results.report import write_report
@@ -178,13 +180,14 @@ def write_runs(out: Path, folders: Sequence[Path]) -> list[Run]:
 
 
 def _draw(axes: Any, folder: Path, label: str) -> None:
+    """The tracking errors of a run, at most about 20 000 points of each curve."""
     import numpy as np
 
     from beaver_ftc.results.log import StoredLog
 
     names = ["t_s", *(f"{a}_{what}_rad_s" for a in AXES for what in ("model", "measured"))]
     log = StoredLog(folder / "log.parquet").read(names)
-    every = max(1, len(log["t_s"]) // 20_000)
+    step = max(1, len(log["t_s"]) // 20_000)
     for axis, letter in zip(axes, AXES, strict=True):
         error = np.degrees(log[f"{letter}_model_rad_s"] - log[f"{letter}_measured_rad_s"])
-        axis.plot(log["t_s"][::every], error[::every], linewidth=1.0, label=label)
+        axis.plot(log["t_s"][::step], error[::step], linewidth=1.0, label=label)

@@ -1,5 +1,5 @@
-"""From the results of many flights to one line an entry, with the uncertainty of counting, and one document:
-what tables, figure, page and `--format json` are made from.
+"""From the results of many flights to one line for each entry, with intervals of its counts, and to the
+document of the comparison, from which tables, figure and page are made.
 """
 
 from collections import defaultdict
@@ -23,14 +23,14 @@ from beaver_ftc.studies.engine.statistics import (
 )
 from beaver_ftc.studies.present.tables import all_finite, finite, percent
 
-Results = Sequence[Result]  # of one entry, a flight after the other
+Results = Sequence[Result]  # of one entry, in the order of the flights
 
 
 def line_of(entry: Entry, results: Results, oracle: Results, ours: Results = ()) -> Document:
-    """Tally one entry over one set; oracle, ours: results of the yardstick, and of our entry if there are
-    any, in the same flights, in the same order.
+    """The line of one entry over one set. oracle: results of the oracle in the same flights, in the same
+    order. ours: the same of our entry, if it flew.
 
-    What never comes is infinite; None where there was nothing to count.
+    The delay of an event that never comes is infinite. None: there was nothing to count.
     """
     flown = [(mine, best) for mine, best in zip(results, oracle, strict=True) if mine.error is None]
     mine = [result for result, _ in flown]
@@ -57,7 +57,8 @@ def line_of(entry: Entry, results: Results, oracle: Results, ours: Results = ())
 
 
 def _false_alarms(mine: Results) -> Document:
-    """False alarms, and the rate per hour in which an alarm would have been one, with its upper bound."""
+    """Number and rate of false alarms, per hour in which an alarm would be false, with the upper bound of the
+    rate."""
     alarms = sum(r.false_alarm for r in mine)
     hours = sum(r.fault_free_s for r in mine) / 3600.0
     return {
@@ -69,7 +70,7 @@ def _false_alarms(mine: Results) -> Document:
 
 
 def _diagnosis(faulted: Results) -> Document:
-    """How many faults are detected and named in these flights, and how soon."""
+    """Rates and delays of detection and isolation in these flights."""
     n = len(faulted)
     delays_s = [r.delay_s for r in faulted]
     detected = sum(delay_s < inf for delay_s in delays_s)
@@ -88,8 +89,9 @@ def _diagnosis(faulted: Results) -> Document:
 
 
 def _duel(entry: Entry, mine: Results, ours: Results) -> Document:
-    """In how many flights with a fault an entry is better or worse than ours, and the probability of so
-    uneven a result between equals. Of schemes: whether the fault is detected; of laws: the tracking error."""
+    """In how many flights with a fault an entry is worse or better than ours, and the probability p of a
+    result at least as uneven between equals. Schemes are compared by whether the fault is detected, laws by
+    the tracking error."""
 
     def badness(result: Result) -> float:
         return result.rms_deg_s if entry.law != LAW else float(result.delay_s == inf)
@@ -100,39 +102,45 @@ def _duel(entry: Entry, mine: Results, ours: Results) -> Document:
 
 
 def _spread(name: str, values: Sequence[float], which: Sequence[str] = ("median", "90")) -> Document:
+    """Median and 90 % quantile of values, or one of them."""
     shares = {"median": 0.5, "90": 0.9}
     return {f"{name}_{part}": share_within(values, shares[part]) if values else None for part in which}
 
 
 def _interval(name: str, values: Sequence[float], unit: str = "") -> Document:
-    """The two-sided interval of a median, free of any distribution."""
-    found = median(values)
-    return {f"{name}_{side}{unit}": found[side] for side in ("low", "high")} if values else {}
+    """The two-sided interval of a median, which assumes no distribution."""
+    estimate = median(values)
+    return {f"{name}_{side}{unit}": estimate[side] for side in ("low", "high")} if values else {}
 
 
 def _results(trials: Iterable[Trial], entry: Entry) -> list[Result]:
+    """The results of an entry in all trials."""
     return [result for trial in trials for result in trial.results if result.entry == entry]
 
 
 def trade_off(traces: Sequence[Trace]) -> list[Document]:
-    """Every level at which the number of false alarms changes, from the strictest; and the scheme's own,
-    1."""
+    """The points at each level at which the number of false alarms changes, and at level 1, with which the
+    scheme ships; from the highest level to the lowest."""
     levels = sorted({1.0, *(trace.before for trace in traces if trace.before > 0.0)}, reverse=True)
     return [point_at(traces, level) for level in levels]
 
 
 def point_at(traces: Sequence[Trace], level: float) -> Document:
-    """The false alarms of a scheme at a level of its statistic, and its detections.
+    """False alarms and detections of a scheme at a level of its statistic.
 
-    Detections and delays are of the flights in which the fault was still to be detected: no false alarm
-    before it.
+    Detections and delays are counted in the flights without a false alarm before the fault.
     """
     alarms, hours = alarms_at(traces, level)
     delays = [trace.delay_s(level) for trace in traces if trace.faulted and not trace.false_alarm(level)]
-    rate = sum(delay < inf for delay in delays) / len(delays) if delays else 0.0
+    detection_rate = sum(delay < inf for delay in delays) / len(delays) if delays else 0.0
     per_h = alarms / hours if hours else 0.0
     median_s = share_within(delays, 0.5)
-    return {"level": level, "false_alarms_per_h": per_h, "detection_rate": rate, "delay_median_s": median_s}
+    return {
+        "level": level,
+        "false_alarms_per_h": per_h,
+        "detection_rate": detection_rate,
+        "delay_median_s": median_s,
+    }
 
 
 def matched(points: Sequence[Document]) -> Document:
@@ -140,7 +148,7 @@ def matched(points: Sequence[Document]) -> Document:
     return min((p for p in points if p["false_alarms_per_h"] <= 0.0), key=itemgetter("level"))
 
 
-# What is held against ours in `better_than_ours`: of each key of a line, what it is called.
+# The keys of a line in which `better_than_ours` compares rivals with ours, and their names.
 MATCHED = {"detection_rate": "detection rate", "delay_median_s": "median detection delay, s"}
 COMPARED = {
     "false_alarms_per_h": "false alarms per hour",
@@ -173,31 +181,39 @@ def document_of(trials: Sequence[Trial], entries: Sequence[Entry]) -> Document:
 
 
 def _set(trials: Sequence[Trial], entries: Sequence[Entry]) -> Document:
+    """The part of the document of one set of flights."""
     traces = defaultdict[str, list[Trace]](list)
     for trial in trials:
         for scheme, trace in trial.traces.items():
             traces[scheme].append(trace)
     oracle, ours = (_results(trials, Entry(SCHEME, law)) for law in (ORACLE, LAW))
     lines = [all_finite(line_of(entry, _results(trials, entry), oracle, ours)) for entry in entries]
-    points = {s: [all_finite(point) for point in trade_off(of)] for s, of in traces.items()}
-    free = {s: matched(of) for s, of in points.items()}
+    points = {
+        s: [all_finite(point) for point in trade_off(points_of_scheme)]
+        for s, points_of_scheme in traces.items()
+    }
+    without_false_alarm = {s: matched(points_of_scheme) for s, points_of_scheme in points.items()}
     failed = {result.error for trial in trials for result in trial.results if result.error}
     return {
         "flights": len(trials),
         "lines": lines,
         "trade_off": points,
-        "without_false_alarm": free,
+        "without_false_alarm": without_false_alarm,
         "who_is_better": who_is_better(lines),
-        "better_than_ours": better_than_ours(lines, free if any(line["faults"] for line in lines) else {}),
+        "better_than_ours": better_than_ours(
+            lines, without_false_alarm if any(line["faults"] for line in lines) else {}
+        ),
         "errors": sorted({error for trial in trials for error in trial.failures} | failed),
     }
 
 
-YARDSTICKS = ("none", ORACLE, "oracle-published", "fault-tolerant-published")  # and parts of ours
+# Schemes and laws that are no rivals: yardsticks and parts of ours.
+YARDSTICKS = ("none", ORACLE, "oracle-published", "fault-tolerant-published")
 
 
 def who_is_better(lines: Sequence[Document]) -> Document:
-    """A sentence on the schemes, and one on the laws: who is best, with intervals, and how sure that is."""
+    """A sentence about the schemes, and one about the laws: the best of them, with intervals and
+    significance."""
     if not any(row["faults"] for row in lines):
         return {}
     schemes = {row["scheme"]: row for row in lines if row["law"] == LAW and row["scheme"] not in YARDSTICKS}
@@ -213,64 +229,67 @@ def who_is_better(lines: Sequence[Document]) -> Document:
 def leader(
     rows: Mapping[str, Document], ours: str, key: str, what: str, cell: Callable[[float], str], more: bool
 ) -> str:
-    """One sentence: who has the best number of this key, with its interval, and ours with its own.
+    """One sentence that compares the best rival with ours, each number with its interval.
 
-    rows: by name, each with `against_ours`: how often it is better and worse than ours, and how likely that
-    is between equals.
+    rows: lines by name, each with the duel `against_ours`. ours: begin of our names. key: of the number; the
+    keys `<key>_low` and `<key>_high` are its interval. what: its name. cell: its format. more: whether a
+    larger number is better.
     """
     sign = -1.0 if more else 1.0
     badness = {name: inf if row.get(key) is None else sign * row[key] for name, row in rows.items()}
 
-    def said(name: str) -> str:
+    def text_of(name: str) -> str:
+        """The name, its number and the interval of this number."""
         value, low, high = (
-            none if rows[name].get(key + end) is None else cell(rows[name][key + end])
-            for end, none in (("", "none"), ("_low", "no limit"), ("_high", "no limit"))
+            missing if rows[name].get(key + end) is None else cell(rows[name][key + end])
+            for end, missing in (("", "none"), ("_low", "no limit"), ("_high", "no limit"))
         )
         return f"{name} {value} ({low} to {high})"
 
     rivals = [name for name in rows if not name.startswith(ours)]
     if not rivals:
-        return f"{what}: {said(ours)}."
+        return f"{what}: {text_of(ours)}."
     best = min(rivals, key=badness.__getitem__)
     if badness[best] == badness[ours]:
         alike = [name for name in rivals if badness[name] == badness[ours]]
-        return f"{what}: {ours} and {', '.join(alike)} are equally good: {said(ours)}."
+        return f"{what}: {ours} and {', '.join(alike)} are equally good: {text_of(ours)}."
     duel = rows[best]["against_ours"]
     wins = {best: duel["better"], ours: duel["worse"]}
     first, second = sorted(wins, key=badness.__getitem__)
-    sure = "" if duel["p"] < SIGNIFICANT else ", so this may be chance"
+    doubt = "" if duel["p"] < SIGNIFICANT else ", so this may be chance"
     return (
-        f"{what}: {said(first)} is better than {said(second)}; wins: {wins[first]} against {wins[second]}, "
-        f"p = {duel['p']:.2g}{sure}."
+        f"{what}: {text_of(first)} is better than {text_of(second)}; wins: {wins[first]} against "
+        f"{wins[second]}, p = {duel['p']:.2g}{doubt}."
     )
 
 
 def better_than_ours(lines: Sequence[Document], free: Document) -> list[str]:
-    """Where a rival does better than our scheme or our law: one sentence each.
+    """One sentence for each number in which a rival is better than our scheme or our law.
 
-    free: of each scheme, the most sensitive level without a false alarm.
+    free: by scheme, the point at its most sensitive level without a false alarm.
     """
     ours = next(row for row in lines if (row["scheme"], row["law"]) == (SCHEME, LAW))
     schemes = [row for row in lines if row["law"] == LAW and row["scheme"] not in (SCHEME, "none")]
     laws = [row for row in lines if row["scheme"] == SCHEME and row["law"] not in (LAW, ORACLE)]
-    said = [s for row in schemes for s in _better(row, ours, COMPARED | TRACKING, row["scheme"])]
-    said += [
+    sentences = [s for row in schemes for s in _better(row, ours, COMPARED | TRACKING, row["scheme"])]
+    sentences += [
         f"with no false alarm, {sentence}"
         for scheme, point in free.items()
         if scheme != SCHEME and SCHEME in free
         for sentence in _better(point, free[SCHEME], MATCHED, scheme)
     ]
-    return said + [s for row in laws for s in _better(row, ours, TRACKING | EFFORT, row["law"])]
+    return sentences + [s for row in laws for s in _better(row, ours, TRACKING | EFFORT, row["law"])]
 
 
 def _better(row: Document, ours: Document, compared: Mapping[str, str], name: str) -> Iterator[str]:
-    """None is the worst there is: a delay that never ends, a rate of nothing."""
-    for key, what in compared.items():
+    """The sentences of one rival. None is the worst value of each number: an infinite delay, an unknown
+    rate."""
+    for key, name_of_number in compared.items():
         value = row.get(key)
-        than = ours.get(key)
+        our_value = ours.get(key)
         if value is None:
             continue
         sign = 1 if key in MORE_IS_BETTER else -1
-        if than is None or sign * value > sign * than + 1e-9:
-            against = "never" if than is None else f"{than:.3g}"
-            yield f"{name} has the better {what}: {value:.3g} against {against}"
+        if our_value is None or sign * value > sign * our_value + 1e-9:
+            our_text = "never" if our_value is None else f"{our_value:.3g}"
+            yield f"{name} has the better {name_of_number}: {value:.3g} against {our_text}"

@@ -1,18 +1,18 @@
-"""A bounded search over a method's parameters: seeded, the same for everyone, restarted until nothing gains.
+"""A bounded search over the parameters of a method. The same seed gives the same search for all methods.
 
     trial 1                  the values that the search starts with
-    half of the rest         a Latin hypercube over all ranges; of a restart, half of it over the
-                             neighbourhood of the best so far, `NEAR` of a range to each side
-    the other half           Nelder-Mead [Nelder1965] from the best of these, again where it has converged
+    half of the others       a Latin hypercube over all ranges; in a restart, every second point is moved
+                             near the start, within `NEAR` of a range to each side
+    the other half           Nelder-Mead [Nelder1965] from the best of these; restarted when it has converged
 
-A search of few trials often ends where another seed would not. It is therefore restarted, from the best so
-far and with the next seed, until `SETTLED` restarts in a row gain less than `LITTLE`, or the budget of
-restarts is spent; the result says which.
+The result of a short search depends on its seed. The search is therefore restarted, from the best values so
+far and with the next seed, until `SETTLED` restarts in a row gain less than `LITTLE`, or until the budget of
+restarts is spent. `Found.settled` says which.
 
-Every parameter is searched on the scale of its range (0 to 1 between its limits). Of the trials whose cost is
-within `TIE` of the lowest, the one nearest the middle of the ranges is taken: where the cost does not depend
-on a parameter, the parameter does not drift to a limit. A range with the result within `EDGE` of a limit is
-widened there, and the search goes on.
+Every parameter is searched on the scale of its range, 0 to 1 between its limits. Among the trials whose cost
+is within `TIE` of the lowest, the one nearest the middle of the ranges is taken. A parameter on which the
+cost does not depend therefore does not drift to a limit. If the result is within `EDGE` of a limit, the range
+is widened there, and the search continues.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -24,13 +24,13 @@ import numpy as np
 from beaver_ftc.documents.errors import SimulationFailed
 from beaver_ftc.plugins import Range
 
-EDGE = 0.02  # of a range on its own scale: a result so near a limit is on the edge
-WIDENINGS = 3
-TIE = 0.005  # share of the lowest cost
-FIRST_STEP = 0.1  # of Nelder-Mead in the first search, share of a range
-NEAR = 0.05  # of a restart: share of a range to each side, and its first step
-SETTLED = 2  # restarts in a row
-LITTLE = 0.01  # share of the lowest cost
+EDGE = 0.02  # share of a range on its scale: a result so near a limit is on the edge
+WIDENINGS = 3  # at most
+TIE = 0.005  # share of the lowest cost by which a tie may cost more
+FIRST_STEP = 0.1  # first step of Nelder-Mead in the first search, share of a range
+NEAR = 0.05  # share of a range: neighbourhood of the start of a restart, and first step of its Nelder-Mead
+SETTLED = 2  # so many restarts in a row without a gain end the search
+LITTLE = 0.01  # share of the cost: a smaller decrease is no gain
 
 Values = dict[str, float]
 Cost = Callable[[Values], float]
@@ -59,25 +59,25 @@ class Found:
     settled: bool
 
 
-# The scale of a range: from a value to the scale, and back.
+# Scales of a range: the function from a value to the scale, and its inverse.
 _SCALES: Mapping[str, tuple[Callable[[float], float], Callable[[float], float]]] = {
     "log": (log, exp),
     "odds": (lambda x: log(x / (1.0 - x)), lambda y: 1.0 / (1.0 + exp(-y))),
 }
 
 
-def on_scale(of: Range, value: float) -> float:
+def on_scale(range_: Range, value: float) -> float:
     """Where in its range a value lies, 0 to 1 between its limits."""
-    forward = _SCALES[of.scale][0]
-    return (forward(value) - forward(of.low)) / (forward(of.high) - forward(of.low))
+    forward = _SCALES[range_.scale][0]
+    return (forward(value) - forward(range_.low)) / (forward(range_.high) - forward(range_.low))
 
 
-def value_at(of: Range, place: float) -> float:
+def value_at(range_: Range, place: float) -> float:
     """The value at a place (0 to 1) of a range."""
-    forward, back = _SCALES[of.scale]
-    low, high = forward(of.low), forward(of.high)
+    forward, back = _SCALES[range_.scale]
+    low, high = forward(range_.low), forward(range_.high)
     value = back(low + place * (high - low))
-    return float(f"{value:.6g}") if of.scale == "log" else value
+    return float(f"{value:.6g}") if range_.scale == "log" else value
 
 
 def on_edge(values: Values, ranges: Ranges) -> dict[str, bool]:
@@ -87,8 +87,9 @@ def on_edge(values: Values, ranges: Ranges) -> dict[str, bool]:
 
 
 def search(cost: Cost, ranges: Ranges, start: Values, trials: int, seed: int, restarts: int) -> Found:
-    """The values with the lowest cost, by searches of so many trials each. restarts: the most after the
-    first; a widened range does not count. Raises SimulationFailed if one has to be widened too often."""
+    """The values with the lowest cost. trials: of each search. restarts: the largest number of searches after
+    the first; a search in a widened range does not count. Raises SimulationFailed after WIDENINGS
+    widenings."""
     ranges = dict(ranges)
     widened = list[str]()
     values = dict(start)
@@ -119,18 +120,20 @@ def search(cost: Cost, ranges: Ranges, start: Values, trials: int, seed: int, re
         done += 1
 
 
-def widen(of: Range, upper: bool) -> Range:
-    """A range that reaches half as far again, on its own scale, at one end."""
-    limit = value_at(of, 1.5 if upper else -0.5)
-    return replace(of, high=limit) if upper else replace(of, low=limit)
+def widen(range_: Range, upper: bool) -> Range:
+    """A range with one limit moved outwards by half of the range, on its scale."""
+    limit = value_at(range_, 1.5 if upper else -0.5)
+    return replace(range_, high=limit) if upper else replace(range_, low=limit)
 
 
 def _searched(
     cost: Cost, ranges: Ranges, start: Values, known: float | None, trials: int, seed: int
 ) -> tuple[Values, float, list[float]]:
-    """One search, as the module says: the values found, their cost, and the costs of all trials. known: the
-    cost of the start, if it has been tried: the search is a restart. A trial is at a point (n,) of the unit
-    cube."""
+    """One search: the values found, their cost, and the costs of all trials.
+
+    known: the cost of the start, if it has been tried; the search is then a restart. A trial is at a point
+    (n,) of the unit cube.
+    """
     from scipy.optimize import minimize
     from scipy.stats.qmc import LatinHypercube
 
@@ -170,7 +173,8 @@ def _searched(
 
 
 def _chosen(points: Sequence[np.ndarray], costs: Sequence[float]) -> int:
-    """Of the trials within `TIE` of the lowest cost, the one nearest the middle of the ranges."""
+    """The index of the trial nearest the middle of the ranges, among those within `TIE` of the lowest
+    cost."""
     lowest = min(costs)
     ties = np.flatnonzero(np.array(costs) <= lowest + TIE * abs(lowest)).tolist()
     return min(ties, key=lambda i: np.abs(points[i] - 0.5).max())

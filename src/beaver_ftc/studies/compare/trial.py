@@ -1,4 +1,4 @@
-"""Fly one case with every scheme and every law that is compared, and say what came of each."""
+"""Fly one case with every scheme and law that is compared, and return the result of each."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -28,8 +28,8 @@ from beaver_ftc.studies.engine.statistics import or_never
 
 SCHEME, LAW, ORACLE = "adaptive-estimators", "fault-tolerant", "oracle"
 STATISTICAL = f"{SCHEME} with fdi.statistical"  # our scheme with its statistical detector beside it
-CALIBRATION = "calibration-"  # then the grade: name of a set that methods are tuned on
-DRAW = 1000  # step of the seed from one draw of a set to the next: the seeds of all sets are smaller
+CALIBRATION = "calibration-"  # begin of the names of the sets for tuning; the grade follows
+DRAW = 1000  # added to the seed for each draw of a set; the seeds of all sets are smaller
 
 
 @dataclass(frozen=True)
@@ -43,9 +43,9 @@ class SetFlight:
 def of_sweep(
     path: str | Path, set_name: str | None = None, most: int | None = None, draw: int = 0
 ) -> list[SetFlight]:
-    """The flights of a sweep file, the first `most` of them. Raises BadInput for what is wrong with it.
+    """The first `most` flights of a sweep file. Raises BadInput for a wrong file.
 
-    draw: 0 has the seed of the file; each other number has a seed, and so flights, of its own.
+    draw: 0 flies with the seed of the file; each other number flies with another seed, and so other flights.
     """
     from beaver_ftc.scenario.sweeps import load_sweep
     from beaver_ftc.studies.sweep.one_flight import scenario_of
@@ -63,18 +63,18 @@ def of_sweep(
 
 
 def benchmark_folder() -> Path:
-    """Where the standard sets are: a folder a set, sweep files in it."""
+    """The folder of the standard sets. Each set is a folder of sweep files."""
     return data_root() / "scenarios" / "benchmark"
 
 
 def set_names() -> list[str]:
-    """The standard sets that are compared, not those for tuning."""
+    """The names of the standard sets, without those for tuning."""
     folders = sorted(path.name for path in benchmark_folder().iterdir() if path.is_dir())
     return [name for name in folders if not name.startswith(CALIBRATION)]
 
 
 def of_set(name: str, most: int | None = None, draw: int = 0) -> list[SetFlight]:
-    """The flights of a standard set; of each of its sweeps, the first `most`. draw: see `of_sweep`."""
+    """The flights of a standard set: the first `most` of each of its sweeps. draw: as in `of_sweep`."""
     folder = benchmark_folder() / name
     if not folder.is_dir():
         allowed = ", ".join([*set_names(), *(CALIBRATION + grade for grade in FLIGHT_GRADES)])
@@ -92,13 +92,17 @@ class Entry:
 
 @dataclass(frozen=True)
 class Result:
-    """The result of an entry in a case. Times in s, errors in deg/s; infinite where there is none.
+    """The result of an entry in a case. A time or an error that does not exist is infinite.
 
-    fault_free_s: time under observation without a fault, until the first alarm. rms_deg_s: over all axes,
-    after the fault (all the flight without one), and infinite after a departure. before_deg_s, after_deg_s:
-    the same before and after it. travel_deg_s: path of all surfaces over the time flown.
-    energy_deg2_s2: mean square of their speeds, (deg/s)2, summed over the surfaces: proportional to the power
-    that viscous friction takes. us: processor time of a frame, microseconds.
+    - fault_free_s: time in which an alarm would be false, s. faulted: whether the fault begins in the flight.
+    - delay_s, isolation_delay_s: from the fault to the alarm, and to its right name, s. correct: whether the
+      name at the end is right.
+    - rms_deg_s: RMS tracking error of all axes after the fault, or of the whole flight without a fault;
+      infinite after a departure. before_deg_s, after_deg_s: the same before and after the fault.
+    - travel_deg_s: path of all surfaces over the time flown.
+    - energy_deg2_s2: mean square of the speeds, (deg/s)2, summed over the surfaces; proportional to the power
+      that viscous friction takes.
+    - us: processor time of a frame, microseconds. error: why the flight failed, or None.
     """
 
     entry: Entry
@@ -120,7 +124,7 @@ class Result:
 
 @dataclass
 class Trial:
-    """All results of one case of a set; traces by scheme; failures: why a trace is missing."""
+    """The results of one case of a set. traces: by scheme. failures: for each missing trace, the reason."""
 
     set: str
     results: list[Result] = field(default_factory=list)
@@ -129,42 +133,45 @@ class Trial:
 
 
 def entries_of(schemes: Sequence[str], laws: Sequence[str]) -> list[Entry]:
-    """Every scheme with our law, every law with our scheme, and the oracle as the yardstick."""
+    """Every scheme with our law, every law with our scheme, our own pair, and the oracle with our scheme."""
     pairs = [Entry(scheme, LAW) for scheme in schemes] + [Entry(SCHEME, law) for law in laws]
     return list(dict.fromkeys([*pairs, Entry(SCHEME, LAW), Entry(SCHEME, ORACLE)]))
 
 
 def with_entry(scenario: Scenario, entry: Entry, chosen: TunedValuesByGrade | None = None) -> Scenario:
-    """The scenario with this scheme and this law, each with the values chosen for it on such flights.
+    """The scenario with this scheme and law, each with the values that were tuned for it on flights of this
+    grade.
 
-    chosen: values as in tuned.json; without them, each flies with its defaults. Options in the scenario count
-    for the scheme or law that the scenario names alone, and replace the chosen values.
+    chosen: tuned values as in tuned.json; without them, each flies with its defaults. Options in the scenario
+    belong to the scheme and the law that the scenario names. For these, they replace the tuned values.
     """
     scheme = SCHEME if entry.scheme == STATISTICAL else entry.scheme
-    of_scheme = scenario.fdi.options if scheme == scenario.fdi.scheme else {}
-    fdi = scenario.fdi.with_scheme(scheme, dict(of_scheme))
+    scheme_options = scenario.fdi.options if scheme == scenario.fdi.scheme else {}
+    fdi = scenario.fdi.with_scheme(scheme, dict(scheme_options))
     if entry.scheme == STATISTICAL and fdi.statistical is None:
         fdi = fdi.model_copy(update={"statistical": Statistical()})
-    of_law = scenario.control.options if entry.law == scenario.control.law else {}
-    control = scenario.control.model_copy(update={"law": entry.law, "options": of_law})
+    law_options = scenario.control.options if entry.law == scenario.control.law else {}
+    control = scenario.control.model_copy(update={"law": entry.law, "options": law_options})
     flown = scenario.model_copy(update={"fdi": fdi, "control": control})
     grade = grade_of(scenario)
-    for group, name, options in ((DETECTORS, entry.scheme, of_scheme), (LAWS, entry.law, of_law)):
+    for group, name, options in ((DETECTORS, entry.scheme, scheme_options), (LAWS, entry.law, law_options)):
         values = tuned_values(chosen or {}, grade, group, name)
-        free = {k: v for k, v in values.items() if k not in options and not _says(scenario, k, group)}
-        flown = with_values(flown, group, free)
+        tuned = {k: v for k, v in values.items() if k not in options and not _says(scenario, k, group)}
+        flown = with_values(flown, group, tuned)
     return flown
 
 
 def _says(scenario: Scenario, key: str, group: str) -> bool:
-    """Whether the scenario itself sets a parameter that is a key with dots."""
+    """Whether the scenario itself sets a parameter. Only a key with dots, such as
+    `fdi.statistical.misnaming`, can be set there."""
     name = "fdi" if group == DETECTORS else "control"
-    of, _, below = key.partition(".")
-    return of == name and below.split(".")[0] in getattr(scenario, name).model_fields_set
+    section, _, subkey = key.partition(".")
+    return section == name and subkey.split(".")[0] in getattr(scenario, name).model_fields_set
 
 
 def with_values(scenario: Scenario, group: str, values: Mapping[str, float]) -> Scenario:
-    """The scenario with these values of its detector or law: of options, and of keys with dots in them."""
+    """The scenario with these values of its detector or law. A key with dots is a key of the scenario; any
+    other is an option of the detector or law."""
     options = "fdi.options" if group == DETECTORS else "control.options"
     keys = {key if "." in key else f"{options}.{key}": value for key, value in values.items()}
     return scenario.with_(keys) if keys else scenario
@@ -181,10 +188,10 @@ def fly_case(
     chosen: TunedValuesByGrade | None = None,
     trade_off: bool = True,
 ) -> Trial:
-    """Fly a case with every entry; record it under the nominal law for the trade-off of each scheme.
+    """Fly a case with every entry, and record it under the nominal law for the trade-off of each scheme.
 
-    chosen: tuned values of schemes and laws; if None, the values that ship with the package. trade_off:
-    whether to record the case, and so fill `traces`.
+    chosen: tuned values of schemes and laws; None is the values that ship with the package. trade_off:
+    whether to record the case, which fills `traces`.
     """
     chosen = load_tuned_values() if chosen is None else chosen
     trial = Trial(case.set, [_fly(case.scenario, entry, chosen) for entry in entries])
@@ -199,17 +206,18 @@ def fly_case(
         try:
             fdi = with_entry(case.scenario, Entry(scheme, LAW), chosen).fdi
             if scheme != SCHEME and (scheme == STATISTICAL or is_compiled(DETECTORS, scheme)):
-                # The compiled frame alone has this statistic: the case is flown again with the scheme.
+                # only a flight with this compiled scheme has its statistic: the case is flown again
                 with_scheme = record(case.scenario.model_copy(update={"fdi": fdi}))
                 trial.traces[scheme] = trace(with_scheme, with_scheme.built_in)
             else:
                 trial.traces[scheme] = replay(recording, scheme, fdi.options)
-        except Exception as error:  # what a plug-in fails over is not the end of the comparison
+        except Exception as error:  # a plug-in may raise anything, and the comparison continues
             trial.failures.append(f"{scheme}, on a recorded flight: {type(error).__name__}: {error}")
     return trial
 
 
 def _fly(scenario: Scenario, entry: Entry, chosen: TunedValuesByGrade) -> Result:
+    """The result of an entry; its `error` has the reason if the flight fails."""
     try:
         loop = Loop(with_entry(scenario, entry, chosen))
         began = thread_time()
@@ -232,7 +240,7 @@ def result_of(flight: Landing, entry: Entry, us: float) -> Result:
     departed = metrics.departure is not None
     faulted = fault is not None and strikes_within(fault.at_s, end_s)
     before, after = _size(tracking.pre_fault_rms_deg_s), _size(tracking.post_fault_rms_deg_s)
-    whole = before if tracking.post_fault_rms_deg_s is None else after
+    whole_flight = before if tracking.post_fault_rms_deg_s is None else after
     return Result(
         entry=entry,
         false_alarm=metrics.false_alarm,
@@ -241,7 +249,7 @@ def result_of(flight: Landing, entry: Entry, us: float) -> Result:
         delay_s=or_never(metrics.detection.delay_s),
         correct=metrics.fault_named,
         isolation_delay_s=or_never(metrics.isolation.delay_s) if metrics.fault_named else inf,
-        rms_deg_s=inf if departed else whole,
+        rms_deg_s=inf if departed else whole_flight,
         before_deg_s=inf if departed and not faulted else before,
         after_deg_s=inf if departed else after,
         travel_deg_s=sum(tracking.surface_travel_deg.values()) / end_s,

@@ -1,14 +1,16 @@
 """`beaver-ftc compare --tune`: one procedure that chooses the parameters of every detector and law.
 
-The same search (search.py) with the same number of trials from the same seed, by the costs of criteria.py, on
-flights of the sets `calibration-GRADE`, whose seeds are in no set that is compared. Each grade of flights is
-tuned by itself: exact sensors and ideal actuators; actuators that lag; errors of sensors and air. What may be
-tuned is `tunable` in plugins.yaml, or in the class of a plug-in. A method keeps the values that it starts
-with unless the search finds some that cost `LEAST_GAIN` less. The rule is the same for ours and for rivals.
-With `Search.draw`, a method is tuned on other draws, and its row has what that gains (gain.py). The record of
-the values that ship, benchmarks/tuning.json, lists the gains of these later searches as `again`.
+All methods, ours and rivals, have the same search (search.py) with the same number of trials and the same
+seed, and the costs of criteria.py. They are tuned on the sets `calibration-GRADE`, whose seeds are in no set
+that is compared. Each grade of flights is tuned separately: exact sensors and ideal actuators; actuators that
+lag; errors of sensors and air. The key `tunable` in plugins.yaml, or in the class of a plug-in, names the
+parameters. A method keeps the values with which it starts unless the search finds values that cost
+`LEAST_GAIN` less.
 
-Two files are written: `tuned.json` has the values to fly with, and `tuning.json` how they were found.
+With `Search.draw`, a method is tuned on other draws, and its row has the gain (gain.py). The record of the
+values that ship, benchmarks/tuning.json, lists the gains of these later searches as `again`.
+
+Two files are written: `tuned.json` has the values to fly with, `tuning.json` the record of the searches.
 """
 
 import json
@@ -69,21 +71,23 @@ class Method:
         return OF_STATISTICAL if self.name == STATISTICAL else tunable(self.group, self.name)
 
     def start(self) -> Values:
-        """The values it starts with: those it ships with, its defaults, or the middle of their ranges."""
+        """The values with which the search starts: the shipped ones, or else the defaults, or else the middle
+        of the ranges."""
         shipped = tuned_values(load_tuned_values(), self.grade, self.group, self.name)
-        return {key: shipped.get(key, self._default(key, of)) for key, of in self.ranges().items()}
+        return {key: shipped.get(key, self._default(key, range_)) for key, range_ in self.ranges().items()}
 
-    def _default(self, key: str, of: Range) -> float:
-        if "." in key:  # of the scenario; `fdi.statistical` is none by default, so it is asked for here
+    def _default(self, key: str, range_: Range) -> float:
+        """The default of a parameter; of a plug-in without defaults the middle of the range."""
+        if "." in key:  # a key of the scenario, whose `fdi.statistical` must exist to have defaults
             return float(attrgetter(key)(Scenario(name="defaults", fdi={"statistical": {}})))
         if is_compiled(self.group, self.name):
             return float(options_of(self.group, self.name)[key]["default"])
         defaults = getattr(plugin_class(self.group, self.name), "defaults", {})
-        return float(defaults.get(key, value_at(of, 0.5)))
+        return float(defaults.get(key, value_at(range_, 0.5)))
 
 
 def methods_of(schemes: Sequence[str], laws: Sequence[str], grades: Sequence[str]) -> list[Method]:
-    """Those of the methods that have something to tune, on each grade."""
+    """The methods with tunable parameters, on each grade."""
     named = [(DETECTORS, name) for name in schemes] + [(LAWS, name) for name in laws]
     methods = [Method(group, name, grade) for grade in grades for group, name in named]
     return [method for method in methods if method.ranges()]
@@ -91,9 +95,13 @@ def methods_of(schemes: Sequence[str], laws: Sequence[str], grades: Sequence[str
 
 @dataclass(frozen=True)
 class Search:
-    """How to search. trials: of each search. restarts: searches after the first, at most. most: flights of
-    each calibration sweep; None is all of them. draw: of the calibration sets; 0 chooses the values that
-    ship, another number measures the gain over them. draws: so many from this one on, together."""
+    """How to search.
+
+    - trials: of each search. restarts: largest number of searches after the first.
+    - most: flights of each calibration sweep; None is all.
+    - draw: first draw of the calibration sets. 0 chooses the values that ship; another number measures the
+      gain over them. draws: number of draws, which are flown together.
+    """
 
     trials: int
     seed: int
@@ -124,13 +132,18 @@ def tune(methods: Sequence[Method], how: Search, workers: int, progress: Progres
 
 
 def tune_method(method: Method, how: Search) -> Document:
-    """A row: the values chosen, the fields of `Found` (search.py), flights of a trial, and a law's margins.
+    """The row of a method: the chosen values, the fields of `Found` (search.py), the number of flights of a
+    trial, and the margins of a law.
 
-    On a draw that does not choose what ships, the fields of `gain_of` are added: how much the values found
-    gain, small or large. `flights` is then the number of parts of the costs that are compared.
+    On another draw than 0, the row also has the gain of the values found, with the fields of `gain_of`.
+    `flights` is then the number of flights on which both settings are compared.
     """
-    on = method.grade, how.most, how.draw, how.draws
-    cost = DetectorCost(method.name, flights(*on)) if method.group == DETECTORS else LawCost(method.name, *on)
+    flown_on = method.grade, how.most, how.draw, how.draws
+    cost = (
+        DetectorCost(method.name, flights(*flown_on))
+        if method.group == DETECTORS
+        else LawCost(method.name, *flown_on)
+    )
     start = method.start()
     result = search(cost, method.ranges(), start, how.trials, how.seed, how.restarts)
     gains = result.cost < (1.0 - LEAST_GAIN) * result.start_cost
@@ -141,7 +154,7 @@ def tune_method(method: Method, how: Search) -> Document:
         "name": method.name,
         **asdict(result),
         "values": values,
-        "flights": len(flights(*on)),
+        "flights": len(flights(*flown_on)),
     }
     if isinstance(cost, LawCost):
         row["gain_margin_db"], row["phase_margin_deg"] = least_margins(cost.margins(values))
@@ -172,7 +185,8 @@ def read_tuned(path: Path) -> Document:
 
 
 def as_text(document: Document) -> str:
-    """A line a method and grade; then where ranges were widened, and which searches the budget ended."""
+    """A line for each method and grade; then remarks about widened ranges and searches that the budget
+    ended."""
     columns = (*COLUMNS, *(GAINS if document["draw"] else ()), VALUES)
     table, rows = tabulated(columns, document["methods"])
     remarks = [sentence for row in document["methods"] for sentence in _remarks(row)]
@@ -184,6 +198,7 @@ def as_text(document: Document) -> str:
 
 
 def _remarks(row: Document) -> Iterator[str]:
+    """What a reader should know about a search, a sentence each."""
     who = f"{row['name']}, {row['grade']}"
     if row["widened"]:
         yield f"{who}: on the edge of its range, widened: {', '.join(row['widened'])}"
@@ -194,6 +209,7 @@ def _remarks(row: Document) -> Iterator[str]:
 
 
 def _cost_text(cost: float) -> str:
+    """A cost as text; in words for a candidate that is inadmissible or cannot be flown."""
     if cost >= FAILED:
         return "cannot fly"
     if cost >= INADMISSIBLE:
@@ -202,7 +218,7 @@ def _cost_text(cost: float) -> str:
 
 
 def _if_any(form: Callable[[float], str], key: str) -> Callable[[Document], str]:
-    """The cell of a number that not every row has."""
+    """The cell of a number; `-` in a row that does not have it."""
     return lambda row: form(row[key]) if key in row else "-"
 
 
@@ -216,7 +232,7 @@ COLUMNS: Columns = (
     ("margins dB, deg", lambda row: "{gain_margin_db:.1f}, {phase_margin_deg:.0f}".format(**row)
      if "gain_margin_db" in row else "-"),
 )  # fmt: skip
-# Of a method that was tuned again: both costs on other flights, and the gain with its interval.
+# Columns of methods that were tuned again: both costs on other flights, and the gain with its interval.
 GAINS: Columns = (
     ("cost, built in", _if_any(_cost_text, "built_in")), ("cost, retuned", _if_any(_cost_text, "retuned")),
     ("gain, %", _if_any(_percent, "gain")), ("from, %", _if_any(_percent, "gain_low")),

@@ -1,4 +1,5 @@
-"""The command `detectability`: what is certain, what a share of flights finds, and what schemes find."""
+"""The command `detectability`: losses that are certain to be found, that most flights find, and that schemes
+find."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -49,7 +50,7 @@ def schemes_study(grid: Grid, names: Sequence[str]) -> Study:
     cases = [*((block, False) for block in healthy), *((block, True) for block in grid.faulted())]
     return Study(
         NAME, cases, partial(schemes.fly_block, grid=grid, schemes=names),
-        lambda seen: probabilities.document_of(grid, seen[: len(healthy)], seen[len(healthy) :]),
+        lambda watched: probabilities.document_of(grid, watched[: len(healthy)], watched[len(healthy) :]),
         schemes_shown.FILES, row=Watched, follows_from=(grid, names), lost=schemes.lost,
     )  # fmt: skip
 
@@ -115,7 +116,7 @@ class Detectability(StudyCommand):
     FILES = tuple(places_shown.FILES)
 
     def run(self, reporter: Reporter) -> Document:
-        """By the method that was asked for."""
+        """Run the chosen method."""
         self._refuse_contradictions()
         if self.grid is not None:
             return self._of_schemes(self.grid, reporter)
@@ -128,6 +129,7 @@ class Detectability(StudyCommand):
         return self._of_places(scenario, reporter)
 
     def _refuse_contradictions(self) -> None:
+        """Raise BadInput for options that exclude each other."""
         where = (self.airspeed or (), self.altitude or ())
         for wrong, allowed in (
             ((self.scenario is None) is (self.grid is None), "exactly one of SCENARIO and --grid"),
@@ -144,25 +146,25 @@ class Detectability(StudyCommand):
                 raise BadInput(f"detectability: allowed: {allowed}")
 
     def _of_places(self, scenario: Scenario, reporter: Reporter) -> Document:
-        """Over every place; of one surface with the answers in words."""
+        """The certain losses at each place; for one surface also sentences."""
         known = scenario.airframe.class_of_losses
         if self.surface is not None and self.surface not in known:
             raise BadInput(f"--surface {self.surface!r:.60}: allowed: {', '.join(known)}")
         study = places.places_study(scenario, self.airspeed or (), self.altitude or ())
-        found = run_into(study, self.out, self.processes, reporter.progress)
-        folder = found.pop("folder")  # the last key but the engines
+        document = run_into(study, self.out, self.processes, reporter.progress)
+        folder = document.pop("folder")  # the last key but the engines
         if self.surface is not None:
-            found |= {
-                part: [row for row in found[part] if row["fault"] == self.surface] for part in places.PARTS
+            document |= {
+                part: [row for row in document[part] if row["fault"] == self.surface] for part in places.PARTS
             }
-            answers = [places_shown.answer(scenario, row) for row in found["points"]]
-            return found | {"answers": answers, "folder": folder}
+            answers = [places_shown.answer(scenario, row) for row in document["points"]]
+            return document | {"answers": answers, "folder": folder}
         failures = in_trim.engine_failures(scenario)
-        found |= {"alike": in_trim.alike(scenario), "folder": folder}
-        return found | ({"engines": failures} if failures else {})
+        document |= {"alike": in_trim.alike(scenario), "folder": folder}
+        return document | ({"engines": failures} if failures else {})
 
     def _of_schemes(self, grid: GridName, reporter: Reporter) -> Document:
-        """Over the grid."""
+        """The share of losses that each scheme finds in the flights of a grid."""
         chosen = schemes.contenders(None if self.schemes is None else listed(self.schemes))
         airspeed_mps, altitude_m = (
             values[0] if values else None for values in (self.airspeed, self.altitude)
@@ -172,7 +174,7 @@ class Detectability(StudyCommand):
         return run_into(schemes_study(flown, chosen), self.out, self.processes, reporter.progress)
 
     def as_text(self, document: Document, colour: bool) -> str:
-        """The answers in words, else sentences and table; and where the files are."""
+        """The sentences, or else the page as text; and the folder of the files."""
         shown = schemes_shown if self.grid else places_shown if self.within is None else sizes_shown
         lines = document.get("answers") or [
             as_text(shown.page_of(document)[1]), *places_shown.geometry(document.get("alike", ())),

@@ -19,37 +19,45 @@ from beaver_ftc.studies.detectability.certain import (
 )
 from beaver_ftc.studies.present.tables import all_finite
 
-ALIKE_DEG = 3.0  # distinguished only from this deflection on: similar effects on the rates
+ALIKE_DEG = 3.0  # surfaces that need a larger deflection to be distinguished have similar effects
 
 
 def alike(scenario: Scenario) -> list[Document]:
-    """Pairs of surfaces with similar effects on the rates: the deflection, deg, from which each is certain to
-    be distinguished from the other, None where none is; and whether accelerometers distinguish them."""
-    seen = excitation(_short(scenario))
+    """Pairs of surfaces with similar effects on the rates. told_apart_from_deg: by surface, the deflection
+    (deg) from which it is certain to be distinguished from the other; None if no deflection is. by_forces:
+    whether accelerometers distinguish the two."""
+    flight = excitation(_short(scenario))
     aircraft = scenario.airframe
     by_force = [{*aircraft.separated_by_force(force)} for force in ("CY", "CZ")]
-    found = []
+    pairs = []
     for s, other in combinations(range(aircraft.n), 2):
         from_deg = {
-            aircraft.surfaces[i]: degrees(least_distinguished_rad(seen.G[:, i], seen.G[:, j], seen.bound[0]))
+            aircraft.surfaces[i]: degrees(
+                least_distinguished_rad(flight.G[:, i], flight.G[:, j], flight.bound[0])
+            )
             for i, j in ((s, other), (other, s))
         }
         if max(from_deg.values()) > ALIKE_DEG:
-            forces = any({s, other} <= weighed for weighed in by_force)
-            told = {"told_apart_from_deg": all_finite(from_deg), "by_forces": forces}
-            found.append({"surfaces": tuple(from_deg), **told})
-    return found
+            forces = any({s, other} <= separated for separated in by_force)
+            limits = {"told_apart_from_deg": all_finite(from_deg), "by_forces": forces}
+            pairs.append({"surfaces": tuple(from_deg), **limits})
+    return pairs
 
 
 def _short(scenario: Scenario) -> Scenario:
-    """Its beginning, long enough to weigh the surfaces in trim."""
+    """The begin of the scenario, without faults, long enough for an `Excitation`."""
     return scenario.model_copy(update={"duration_s": SETTLED_S + 1.0, "faults": ()})
 
 
 def engine_failures(scenario: Scenario) -> list[Document]:
-    """A row for each engine that is an effector: how a failure to idle turns the aircraft in trim, rad/s2;
-    the same over the detection limit of a frame; whether its moment is a signal, so that the design model
-    knows it, and whether that is held against the thrust of all."""
+    """A row for each engine that is an effector.
+
+    - turns_rad_s2 (3,): size of the angular acceleration by a failure to idle in trim: effect of the engine
+      for each m/s2 of push times push, force at the setting in trim over mass.
+    - shows: the same over the detection limit of one frame.
+    - known: whether its moment is a signal, which the design model contains. held: whether the diagnosis also
+      compares this signal with the thrust of all engines.
+    """
     aircraft = scenario.airframe
     thrust = aircraft.engine.thrust
     power = aircraft.file.power_setting
@@ -64,18 +72,18 @@ def engine_failures(scenario: Scenario) -> list[Document]:
     force_n = [
         np.interp(loop.trim.airspeed_mps, thrust.airspeed_mps, f) for f in zip(*thrust.force_n, strict=True)
     ]
-    gained = np.interp(setting, thrust.setting, force_n) / aircraft.mass.mass_kg
+    push_mps2 = np.interp(setting, thrust.setting, force_n) / aircraft.mass.mass_kg
     loop.release()
     known = any(name in ENGINE_SIGNALS for name in aircraft.signals)
     mapped = aircraft.file.model_error_map
-    turns = np.abs(effects.T) * gained
+    turns = np.abs(effects.T) * push_mps2
     return [
         {
             "engine": name,
-            "turns_rad_s2": of.tolist(),
-            "shows": 1.0 / float(detection_magnitude(of[None], bound[None])[0]),
+            "turns_rad_s2": acceleration.tolist(),
+            "shows": 1.0 / float(detection_magnitude(acceleration[None], bound[None])[0]),
             "known": known,
             "held": known and mapped is not None and mapped.knows_engines,
         }
-        for name, of in zip(aircraft.effectors, turns, strict=True)
+        for name, acceleration in zip(aircraft.effectors, turns, strict=True)
     ]

@@ -1,10 +1,10 @@
-"""The map of isolability: from which size on a loss of one surface excludes another surface, and how soon.
+"""The map of isolability: the smallest loss of one surface that excludes another surface, and the delay.
 
-A pair is a surface that loses effectiveness and another surface that could explain the innovation. For each
-pair the map has, along a flight: the smallest loss for which the other surface is excluded in time, and the
-time until a total loss excludes it; for every instant at which the loss may begin, and for half of them. It
-also has the doublet that is certain to distinguish losses of the two surfaces in straight flight, as
-`separate` finds it.
+A pair is a surface that loses effectiveness and another surface that could explain the innovation. Along a
+flight, the map has for each pair the smallest loss for which the other surface is excluded in time, and the
+time until a total loss excludes it. Both are given for every instant at which the loss may begin, and for
+half of them. The map also has the doublet that is certain to distinguish losses of the two surfaces in
+straight flight, as `separate` finds it.
 """
 
 from collections.abc import Sequence
@@ -30,9 +30,10 @@ DISTINGUISHED_LOSS = 0.5  # share of effectiveness lost: of both losses that a d
 def loss_limits(excluded: np.ndarray, frames: int, dt: float) -> Document:
     """Limits of one pair along a flight, by LOSS_COLUMNS; None for a limit that no loss reaches.
 
-    excluded (n,): smallest loss, a share of 1, for which the frame alone excludes the other surface; inf
-    where no loss does. frames: number of frames within which the other surface has to be excluded. dt s: of a
-    frame. A delay includes the frame in which the loss begins.
+    excluded (n,): smallest loss, 0 to 1, for which the frame alone excludes the other surface; infinite where
+    no loss does. frames: number of frames within which the other surface has to be excluded. dt: length of a
+    frame, s. A delay includes the frame in which the loss begins. next_exclusion (n,): from each frame on,
+    the first frame in which a total loss excludes the other surface; n if there is none.
     """
     least = best_in_window(excluded, frames)
     n = len(excluded)
@@ -44,12 +45,12 @@ def loss_limits(excluded: np.ndarray, frames: int, dt: float) -> Document:
 
 
 def best_in_window(values: np.ndarray, frames: int) -> np.ndarray:
-    """The smallest of each run of so many values, (n - frames + 1,)."""
+    """The smallest of each window of so many values (n,), (n - frames + 1,)."""
     return np.lib.stride_tricks.sliding_window_view(values, frames).min(axis=1)
 
 
 def largest_and_median(values: np.ndarray, most: float = inf) -> list[float | None]:
-    """The largest of values (n,) and their median, None for one that is beyond `most` or infinite."""
+    """The largest of values (n,) and their median; None for one that is above `most` or infinite."""
     ordered = np.sort(values)
     both = float(ordered[-1]), quantile(ordered, 0.5)
     return [finite(value) if value <= most else None for value in both]

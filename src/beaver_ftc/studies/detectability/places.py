@@ -1,4 +1,5 @@
-"""The survey of what is certain: a scenario flown at each of several airspeeds, altitudes and excitations."""
+"""The survey of losses that are certain to be found: a scenario at several airspeeds, altitudes,
+excitations."""
 
 from collections.abc import Collection, Mapping, Sequence
 from functools import partial
@@ -28,12 +29,12 @@ from beaver_ftc.studies.engine.study import Study
 
 SPEEDS_MPS = (36.0, 40.0, 44.0, 48.0, 52.0)
 ALTITUDES_M = (0.0, 1000.0, 2000.0, 3000.0)
-SHARES = (0.9, 1.0, 1.1)  # of the speed another aircraft starts with
-EXCITATIONS = (0.25, 0.5, 1.0, 2.0)  # of the scenario's references
+SHARES = (0.9, 1.0, 1.1)  # of the usual airspeed of another aircraft
+EXCITATIONS = (0.25, 0.5, 1.0, 2.0)  # factors on the references of the scenario
 PLACE = ("airspeed_mps", "altitude_m", "excitation")
 TOO_SHORT = "the flight ends before a fault could be isolated"
 COLUMNS = (*PLACE, "fault", *MAGNITUDES, "confused_with", "why")
-PARTS = ("points", "pairs")  # of the document: a row a fault, and a row a fault and another
+PARTS = ("points", "pairs")  # of the document: rows for each fault, and for each fault and other fault
 PAIRS = (*PLACE, "fault", "other", *isolability.LOSS_COLUMNS, *isolability.DOUBLET_COLUMNS)
 
 
@@ -43,8 +44,8 @@ def places_study(
     altitudes_m: Sequence[float] = (),
     excitations: Sequence[float] = EXCITATIONS,
 ) -> Study:
-    """The survey of a scenario at these places: a row for each fault and place, and for each fault, other
-    surface and place.
+    """The survey of a scenario at all combinations of these airspeeds, altitudes and excitations. Empty: the
+    usual ones.
 
     Raises BadInput if another scheme than the sharpened one diagnoses.
     """
@@ -58,7 +59,7 @@ def places_study(
     start_m = scenario.airframe.file.start.altitude_m
     if not speeds_mps:
         speeds_mps = usual_airspeeds(scenario.airframe, SPEEDS_MPS)
-    if not altitudes_m:  # another aircraft's error is known about the one it starts at
+    if not altitudes_m:  # the model error of another aircraft is known near its start altitude
         altitudes_m = ALTITUDES_M if start_m is None else (start_m,)
     return Study(
         f"{scenario.name[:86]}-{NAME}", list(product(speeds_mps, altitudes_m, excitations)),
@@ -68,49 +69,49 @@ def places_study(
 
 
 def usual_airspeeds(aircraft: Aircraft, of_the_beaver: tuple[float, ...]) -> tuple[float, ...]:
-    """These of the built-in aircraft, m/s, or about where another one starts."""
+    """These airspeeds (m/s) for the built-in aircraft; for another one, SHARES of its usual airspeed."""
     if aircraft is load():
         return of_the_beaver
     return tuple(round(share * aircraft.usual_airspeed_mps, 1) for share in SHARES)
 
 
 def with_aircraft(scenario: Scenario, reference: str) -> Scenario:
-    """The scenario with another aircraft, which starts where its flights do; a folder is looked for in the
-    working directory. What is wrong with the other aircraft's truth is not with this one's."""
+    """The scenario with another aircraft in its own start condition. Faults and errors of the truth belong to
+    the first aircraft and are left out. A folder is looked for in the working directory."""
     find_aircraft(reference, Path())
     given = {"aircraft": reference, "initial": {}, "uncertainty": {}, "actuators": "ideal"}
     return Scenario.model_validate(_without_faults(scenario) | given)
 
 
 def _without_faults(scenario: Scenario) -> Document:
-    """The keys of a scenario without its faults, what is expected of them, and bounds on its own servos."""
+    """The keys of a scenario without faults, expectations and bounds on servos."""
     document = scenario.model_dump(mode="json", exclude_none=True)
     del document["fdi"]["bounds"]["actuators"]
     return {**document, "faults": [], "expect": {}}
 
 
 def look_at(scenario: Scenario, point: tuple[float, float, float]) -> dict[str, list[Document]]:
-    """The rows of each of PARTS at a place: without a result, why there is none."""
+    """The rows of each of PARTS at a place. If the flight fails, they have the reason in place of results."""
     place = dict(zip(PLACE, point, strict=True))
-    there = at(scenario, *point)
+    flown = at(scenario, *point)
     faults = scenario.airframe.class_of_losses
     try:
-        seen = excitation(there)
-        if len(seen.bound) < seen.windows[1]:
+        flight = excitation(flown)
+        if len(flight.bound) < flight.windows[1]:
             raise SimulationFailed(TOO_SHORT)
-        doublets = isolability.smallest_doublets(at(there, *point[:2], 0.0), SETTLED_S)
+        doublets = isolability.smallest_doublets(at(flown, *point[:2], 0.0), SETTLED_S)
     except BeaverFtcError as error:
-        none = dict.fromkeys((*MAGNITUDES, "confused_with")) | {"why": str(error)}
-        points = [{"fault": fault, **none} for fault in faults]
+        no_result = dict.fromkeys((*MAGNITUDES, "confused_with")) | {"why": str(error)}
+        points = [{"fault": fault, **no_result} for fault in faults]
         pairs = isolability.rows_without_result(faults, str(error))
     else:
-        points = [{"fault": fault, **judge(seen, fault)} for fault in seen.moment]
-        pairs = [row | doublets[row["fault"], row["other"]] for row in pairs_of(seen)]
+        points = [{"fault": fault, **judge(flight, fault)} for fault in flight.moment]
+        pairs = [row | doublets[row["fault"], row["other"]] for row in pairs_of(flight)]
     return {"points": [place | row for row in points], "pairs": [place | row for row in pairs]}
 
 
 def at(scenario: Scenario, speed_mps: float, altitude_m: float, excitation: float) -> Scenario:
-    """The scenario flown elsewhere, its references scaled."""
+    """The scenario at another airspeed and altitude, with its references times `excitation`."""
     document = _without_faults(scenario)
     document["initial"] |= {"airspeed_mps": speed_mps, "altitude_m": altitude_m}
     document["reference"] = {
@@ -120,11 +121,12 @@ def at(scenario: Scenario, speed_mps: float, altitude_m: float, excitation: floa
 
 
 def scaled(signals: Sequence[Document], keys: Collection[str], times: float) -> list[Document]:
-    """Reference signals with these of their parameters multiplied."""
+    """Reference signals; their parameters with these keys are multiplied by `times`."""
     return [
         {
-            name: of | {key: (np.asarray(of[key]) * times).tolist() for key in of.keys() & {*keys}}
-            for name, of in signal.items()
+            name: parameters
+            | {key: (np.asarray(parameters[key]) * times).tolist() for key in parameters.keys() & {*keys}}
+            for name, parameters in signal.items()
         }
         for signal in signals
     ]
@@ -136,5 +138,5 @@ def document_of(name: str, points: Sequence[Mapping[str, Sequence[Document]]]) -
         "scenario": name,
         "detect_within_s": DETECT_WITHIN_S,
         "isolate_within_s": ISOLATE_WITHIN_S,
-        **{what: [row for point in points for row in point[what]] for what in PARTS},
+        **{part: [row for point in points for row in point[part]] for part in PARTS},
     }

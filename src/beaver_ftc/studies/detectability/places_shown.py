@@ -31,47 +31,52 @@ CERTAIN = (
 
 def page_of(document: Document) -> tuple[str, Sequence[Part]]:
     """The title, and the parts of the page: sentences, table, notes and picture."""
-    of_faults = sorted(document["points"], key=itemgetter("fault"))
-    points = grouped(of_faults, "fault", "excitation").items()
+    points_by_fault = sorted(document["points"], key=itemgetter("fault"))
+    points = grouped(points_by_fault, "fault", "excitation").items()
     lines = [
-        {"loss of": fault, "flown": _times(scale)} | _spans(of, "isolated") for (fault, scale), of in points
+        {"loss of": fault, "flown": _times(scale)} | _spans(rows, "isolated")
+        for (fault, scale), rows in points
     ]
-    of_pairs = sorted(document["pairs"], key=itemgetter("fault", "other"))
-    for (fault, other, scale), of in grouped(of_pairs, "fault", "other", "excitation").items():
-        shown = _spans(of, "magnitude") | {
-            "delay": _span(of, "longest_s", seconds), "half: delay": _span(of, "median_s", seconds),
-            "doublet": _span(of, "doublet_deg", lambda deg: f"{deg:.1f} deg"),
-            "doublet time": _span(of, "doublet_s", seconds),
+    pairs = sorted(document["pairs"], key=itemgetter("fault", "other"))
+    for (fault, other, scale), rows in grouped(pairs, "fault", "other", "excitation").items():
+        cells = _spans(rows, "magnitude") | {
+            "delay": _span(rows, "longest_s", seconds), "half: delay": _span(rows, "median_s", seconds),
+            "doublet": _span(rows, "doublet_deg", lambda deg: f"{deg:.1f} deg"),
+            "doublet time": _span(rows, "doublet_s", seconds),
         }  # fmt: skip
-        lines.append({"loss of": fault, "taken for": other, "flown": _times(scale), **shown})
-    drawn = Pictures([("smallest loss that is distinguished from each other surface", NAME)])
-    said = conclusions(document["points"])
-    return f"Detectability: {document['scenario']}", [*said, table(lines), CERTAIN, drawn]
+        lines.append({"loss of": fault, "taken for": other, "flown": _times(scale), **cells})
+    picture = Pictures([("smallest loss that is distinguished from each other surface", NAME)])
+    sentences = conclusions(document["points"])
+    return f"Detectability: {document['scenario']}", [*sentences, table(lines), CERTAIN, picture]
 
 
 def _times(scale: float) -> str:
+    """The excitation in words."""
     return f"{scale:g} x reference"
 
 
 def _spans(rows: Rows, key: str) -> Line:
+    """The cells of a size at every instant, and at half of the instants."""
     return {"certain from": _span(rows, key), "half of onsets from": _span(rows, f"{key}_median")}
 
 
 def _span(rows: Rows, key: str, form: Callable[[float], str] = percent) -> str:
-    """From the least to the largest value over the places that have one, and how many these are."""
+    """The smallest and the largest value over the places that have one; then (places with a value / all
+    places)."""
     known = [row[key] for row in rows if row[key] is not None]
     ends = dict.fromkeys(map(form, (min(known), max(known)))) if known else ["-"]
     return f"{' to '.join(ends)} ({len(known)}/{len(rows)})"
 
 
 def conclusions(rows: Rows) -> list[str]:
-    """One sentence a fault, at the excitation nearest to the scenario's own references."""
+    """One sentence for each fault, at the excitation nearest to the references of the scenario."""
     scale = min((row["excitation"] for row in rows), key=lambda of: abs(of - 1.0))
     chosen = [row for row in rows if row["excitation"] == scale]
     return [_conclusion(fault, scale, of) for (fault,), of in grouped(chosen, "fault").items()]
 
 
 def _conclusion(fault: str, scale: float, rows: Rows) -> str:
+    """The loss that is certain at all places with a result, and how many these are."""
     certain = [row["isolated"] for row in rows if row["isolated"] is not None]
     reference = "the scenario's references" if scale == 1.0 else f"{scale:g} times the scenario's references"
     if not certain:
@@ -85,54 +90,56 @@ def _conclusion(fault: str, scale: float, rows: Rows) -> str:
 
 
 def answer(scenario: Scenario, row: Document) -> str:
-    """The loss from which on a surface's fault is certain to be found at a place, in words."""
+    """The smallest loss that is certain to be detected, and isolated, at a place, in words."""
     axis = axis_of(scenario, row["fault"])
     shapes = (signal.shape for signal in getattr(scenario.reference, axis))
     sizes = (np.abs(getattr(shape, key, 0.0)).max() for shape in shapes for key in AMPLITUDES)
-    asked = f"{row['excitation'] * float(sum(sizes)):g} deg/s of {MOTION_OF_AXIS[axis]}"
-    place = f"at {row['airspeed_mps']:g} m/s and {row['altitude_m']:g} m, {asked}"
+    reference = f"{row['excitation'] * float(sum(sizes)):g} deg/s of {MOTION_OF_AXIS[axis]}"
+    place = f"at {row['airspeed_mps']:g} m/s and {row['altitude_m']:g} m, {reference}"
     fault = row["fault"]
     detected = row["detected"]
     isolated = row["isolated"]
-    soon = f"is certain to be detected within {DETECT_WITHIN_S:g} s"
+    in_time = f"is certain to be detected within {DETECT_WITHIN_S:g} s"
     if detected is None:
-        return f"{place}: not even a total loss of {fault} {soon} ({row['why']})"
+        return f"{place}: not even a total loss of {fault} {in_time} ({row['why']})"
     named = "none is certain to be isolated"
     if isolated is not None:
         named = f"isolated within {ISOLATE_WITHIN_S:g} s from {upwards(isolated)} on"
-    return f"{place}: a loss of {fault} of {upwards(detected)} and more {soon}, {named}"
+    return f"{place}: a loss of {fault} of {upwards(detected)} and more {in_time}, {named}"
 
 
 def upwards(magnitude: float) -> str:
-    """A magnitude for which the promise holds: rounded up to per cent."""
+    """A magnitude in per cent, rounded up, so that the guarantee holds for the printed number."""
     return f"{ceil(100.0 * magnitude - 1e-9)} %"
 
 
 def geometry(pairs: Rows) -> list[str]:
-    """A sentence a pair of surfaces, of those that `in_trim.alike` finds."""
+    """A sentence for each pair of surfaces that `in_trim.alike` returns."""
     lines = []
     for pair in pairs:
-        apart = {name: x for name, x in pair["told_apart_from_deg"].items() if x is not None}
-        told = " or ".join(f"{name} is at least {x:.2g} deg off its command" for name, x in apart.items())
+        limits_deg = {name: x for name, x in pair["told_apart_from_deg"].items() if x is not None}
+        conditions = " or ".join(
+            f"{name} is at least {x:.2g} deg off its command" for name, x in limits_deg.items()
+        )
         never = "never distinguish them" + (", accelerometers do" if pair["by_forces"] else "")
-        says = f"distinguish them if {told}" if told else never
-        lines.append(f"{' and '.join(pair['surfaces'])} have similar effects on the rates: the rates {says}")
+        verb = f"distinguish them if {conditions}" if conditions else never
+        lines.append(f"{' and '.join(pair['surfaces'])} have similar effects on the rates: the rates {verb}")
     return lines
 
 
 def of_engines(failures: Rows) -> list[str]:
-    """A sentence an engine, of those of `in_trim.engine_failures`."""
+    """A sentence for each engine of `in_trim.engine_failures`."""
     return [
-        f"{of['engine']} failed to idle accelerates the aircraft by {max(of['turns_rad_s2']):.2g} rad/s2, "
-        f"{of['shows']:.2g} times the detection limit of one frame"
-        + ("; the design model knows its moment" if of["known"] else "")
-        + (" and monitors it against the thrust" if of["held"] else "")
-        for of in failures
+        f"{row['engine']} failed to idle accelerates the aircraft by {max(row['turns_rad_s2']):.2g} rad/s2, "
+        f"{row['shows']:.2g} times the detection limit of one frame"
+        + ("; the design model knows its moment" if row["known"] else "")
+        + (" and monitors it against the thrust" if row["held"] else "")
+        for row in failures
     ]
 
 
 def draw_pairs(document: Document) -> "Figure":
-    """A panel an excitation: rows what loses effectiveness, columns what it could be taken for."""
+    """A panel for each excitation. Rows: the surface that loses effectiveness; columns: the other surface."""
     pairs = grouped(document["pairs"], "excitation")
     faults = [*dict.fromkeys(row["fault"] for row in document["pairs"])]
     title = (
@@ -144,11 +151,11 @@ def draw_pairs(document: Document) -> "Figure":
     for axes, ((scale,), rows) in zip(grid[0], pairs.items(), strict=True):
         values = np.full((len(faults), len(faults)), np.nan)
         texts = {}
-        for (fault, other), of in grouped(rows, "fault", "other").items():
+        for (fault, other), places in grouped(rows, "fault", "other").items():
             at = (faults.index(fault), faults.index(other))
-            half = [row["magnitude_median"] for row in of]
-            values[at] = np.nan if None in half else max(half)
-            texts[at] = "\n".join(reversed(_spans(of, "magnitude").values())), "black"
+            at_half = [row["magnitude_median"] for row in places]
+            values[at] = np.nan if None in at_half else max(at_half)
+            texts[at] = "\n".join(reversed(_spans(places, "magnitude").values())), "black"
         look: dict[str, Any] = {"cmap": "viridis_r", "vmin": 0.0, "vmax": 1.0, "alpha": 0.6}
         image = heat_map(axes, values, texts, faults, faults, 7, **look)
         axes.set_title(_times(scale), fontsize=9)

@@ -1,4 +1,9 @@
-"""From traces to alarm levels at an equal false-alarm rate, rows, probabilities, and one document."""
+"""From the traces of a survey to its document.
+
+Alarm levels are chosen on the healthy flights, so that all schemes have the same rate of false alarms. At
+these levels, each faulted flight gives a row for each scheme. Groups of rows give probabilities of detection,
+and pairs of schemes are compared.
+"""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict
@@ -17,7 +22,8 @@ from beaver_ftc.studies.present.tables import finite, grouped
 
 
 def level_for(healthy: Sequence[Trace], per_h: float) -> float:
-    """The most sensitive level with no more false alarms than this; a flight raises one at most."""
+    """The lowest level with at most `per_h` false alarms per hour. A flight has at most one, when its
+    statistic before the fault exceeds the level: only these values, `before`, can be the level."""
     best, *others = sorted({trace.before for trace in healthy}, reverse=True)
     for level in others:
         alarms, hours = alarms_at(healthy, level)
@@ -28,7 +34,7 @@ def level_for(healthy: Sequence[Trace], per_h: float) -> float:
 
 
 def _counted(traces: Sequence[Trace], level: float) -> Document:
-    """The false alarms of a level, over the time until they were raised, with exact limits."""
+    """False alarms at a level, and their rate with exact limits."""
     alarms, hours = alarms_at(traces, level)
     rates = vars(poisson(alarms, hours)).values()
     names = ("per_h", "per_h_low", "per_h_high")
@@ -41,33 +47,34 @@ COLUMNS = (
     "sensors", "turbulence", "excitation_deg_s", "seed", "surface", "magnitude", "scheme", "false_alarm",
     "delay_s", "own_false_alarm", "own_delay_s", *(f"deflection_{s:g}" for s in WITHIN_S),
 )  # fmt: skip
-Key = tuple[str, str, str]  # sensors, turbulence, scheme
+Key = tuple[str, str, str]
+"""Sensors, turbulence and scheme."""
 
 
 def _by_condition(watched: Iterable[Watched]) -> dict[Key, list[Trace]]:
-    """The first trace of each block: its flights are the same as long as there is no fault."""
+    """The first trace of each block and scheme. All flights of a block are the same before the fault."""
     traces: dict[Key, list[Trace]] = {}
-    for one in watched:
-        for scheme, of in one.traces.items():
-            traces.setdefault((*one.block.condition, scheme), []).append(of[0])
+    for block in watched:
+        for scheme, traces_of_scheme in block.traces.items():
+            traces.setdefault((*block.block.condition, scheme), []).append(traces_of_scheme[0])
     return traces
 
 
 def rows_of(faulted: Iterable[Watched], levels: dict[Key, float]) -> list[Row]:
-    """One row a flight and scheme, of schemes with a level, and of blocks that our own could fly: what the
-    others lack is among the failures.
+    """A row for each flight and scheme. Schemes without a level, and blocks that our own schemes could not
+    fly, have no rows: the failures have the reasons.
 
-    delay_s at the common level, own_delay_s at the scheme's own; None where there is no alarm. An alarm
-    before the fault is a false_alarm and no detection.
+    delay_s: at the level of the common rate. own_delay_s: at level 1, with which the scheme ships. None
+    without an alarm. An alarm before the fault is a false_alarm and no detection.
     """
     rows = []
-    for one in faulted:
-        block = one.block
-        for scheme, traces in one.traces.items() if one.deflections else ():
+    for outcome in faulted:
+        block = outcome.block
+        for scheme, traces in outcome.traces.items() if outcome.deflections else ():
             level = levels.get((*block.condition, scheme))
             if level is None:
                 continue
-            for fault, trace, deflections in zip(one.faults, traces, one.deflections, strict=True):
+            for fault, trace, deflections in zip(outcome.faults, traces, outcome.deflections, strict=True):
                 if trace.faulted:
                     place = *block.condition, block.excitation_deg_s, block.seed, *fault, scheme
                     cells = *place, *_alarm(trace, level), *_alarm(trace, 1.0), *deflections
@@ -76,30 +83,33 @@ def rows_of(faulted: Iterable[Watched], levels: dict[Key, float]) -> list[Row]:
 
 
 def _alarm(trace: Trace, level: float) -> tuple[bool, float | None]:
-    """Whether the alarm at a level is a false one, and its delay, s."""
+    """Whether the alarm at a level is false; its delay, s, or None."""
     return trace.false_alarm(level), finite(trace.delay_s(level))
 
 
 def summary(rows: Rows, own: bool = False) -> Document:
-    """Detection probability within each of WITHIN_S, with exact limits, and the median delay.
+    """Probability of detection within each of WITHIN_S, with exact limits, and the median delay.
 
-    own: at the level each scheme ships with. Flights with an alarm before the fault do not count.
+    own: at the level with which each scheme ships. Flights with an alarm before the fault are left out.
     """
     prefix = "own_" if own else ""
     flights = [row[f"{prefix}delay_s"] for row in rows if not row[f"{prefix}false_alarm"]]
     delays = [*map(or_never, flights)]
-    found = {s: sum(delay <= s + 1e-9 for delay in delays) for s in WITHIN_S} if delays else {}
+    counts = {s: sum(delay <= s + 1e-9 for delay in delays) for s in WITHIN_S} if delays else {}
     return {
         "flights": len(delays),
-        "within": {f"{s:g}": vars(binomial(count, len(delays))) for s, count in found.items()},
+        "within": {f"{s:g}": vars(binomial(count, len(delays))) for s, count in counts.items()},
         "median_delay_s": finite(share_within(delays, 0.5)),
     }
 
 
 def limit(rows: Rows, per_h: float) -> Document:
-    """Shares of the same flights in which an informed test detects the fault, within each of WITHIN_S."""
-    one_each = {(row["excitation_deg_s"], row["seed"], row["surface"], row["magnitude"]): row for row in rows}
-    flights = list(one_each.values())
+    """Mean probability that an informed test detects the faults of these flights, within each of WITHIN_S.
+    per_h: its rate of false alarms."""
+    row_of_flight = {
+        (row["excitation_deg_s"], row["seed"], row["surface"], row["magnitude"]): row for row in rows
+    }
+    flights = list(row_of_flight.values())
     return {
         f"{within_s:g}": fmean(
             detection_probability(row[f"deflection_{within_s:g}"], within_s, per_h) for row in flights
@@ -110,22 +120,21 @@ def limit(rows: Rows, per_h: float) -> Document:
 
 PLACE = ("sensors", "turbulence", "surface")
 CELL = (*PLACE, "excitation_deg_s", "magnitude", "scheme")
-SIGNIFICANT = 0.05
-JUDGED_S = 1.0
+SIGNIFICANT = 0.05  # a smaller p is no chance
+JUDGED_S = 1.0  # the delay within which figures show the share detected
 DUELS_S = (JUDGED_S, WATCHED_S)
 
 
 def document_of(grid: Grid, healthy: Sequence[Watched], faulted: Sequence[Watched]) -> Summary:
-    """The document, with the rows of `rows_of` behind it. Raises BadInput where not one flight could be
-    judged."""
-    watched, struck = _by_condition(healthy), _by_condition(faulted)
-    failures = sorted({failure for one in (*healthy, *faulted) for failure in one.failures})
+    """The document, with the rows of `rows_of` behind it. Raises BadInput if no flight could be judged."""
+    watched, faulted_traces = _by_condition(healthy), _by_condition(faulted)
+    failures = sorted({failure for outcome in (*healthy, *faulted) for failure in outcome.failures})
     if failures and not watched:
         raise BadInput(f"detectability: no flight could be judged: {failures[0]}")
     levels = {key: level_for(traces, grid.per_h) for key, traces in watched.items()}
     rows = rows_of(faulted, levels)
     document = {
-        "grid": {  # nothing of a place where it is the usual one
+        "grid": {  # `where` only if it is not the usual place
             "bouts" if key == "blocks" else key: value
             for key, value in asdict(grid).items()
             if key != "where" or value
@@ -137,17 +146,17 @@ def document_of(grid: Grid, healthy: Sequence[Watched], faulted: Sequence[Watche
                 **dict(zip(("sensors", "turbulence", "scheme"), key, strict=True)),
                 "level": level,
                 "calibration": _counted(watched[key], level),
-                # on flights that had no part in setting it
-                "before_faults": _counted(struck[key], level) if key in struck else None,
+                # on flights that did not set the level
+                "before_faults": _counted(faulted_traces[key], level) if key in faulted_traces else None,
                 "own_level": _counted(watched[key], 1.0),
             }
             for key, level in levels.items()
         ],
         "totals": _lines(
-            rows, (*PLACE, "scheme"), lambda of: summary(of) | {"own_level": summary(of, own=True)}
+            rows, (*PLACE, "scheme"), lambda group: summary(group) | {"own_level": summary(group, own=True)}
         ),
         "cells": _lines(rows, CELL, summary),
-        "limits": _lines(rows, PLACE, lambda of: {"within": limit(of, grid.per_h)}),
+        "limits": _lines(rows, PLACE, lambda group: {"within": limit(group, grid.per_h)}),
         "comparison": _comparison(rows),
         "failures": failures,
         "versions": dict(versions()),
@@ -156,26 +165,31 @@ def document_of(grid: Grid, healthy: Sequence[Watched], faulted: Sequence[Watche
 
 
 def title_of(sensors: str, turbulence: str) -> str:
-    """A condition in words."""
+    """Sensors and turbulence in words."""
     air = "still air" if turbulence == "none" else f"{turbulence} turbulence"
     return f"{sensors} sensors, {air}"
 
 
 def _lines(rows: Rows, names: Sequence[str], what: Callable[[Rows], Document]) -> list[Document]:
-    """A row for each group of rows that are alike in these columns."""
-    return [{**dict(zip(names, key, strict=True)), **what(of)} for key, of in grouped(rows, *names).items()]
+    """A line for each group of rows with the same values in these columns: the values, and `what` of the
+    group."""
+    return [
+        {**dict(zip(names, key, strict=True)), **what(group)} for key, group in grouped(rows, *names).items()
+    ]
 
 
 def _comparison(rows: Rows) -> list[Document]:
-    """Our schemes against every other on the same flights, by how many faults each finds in each of DUELS_S.
+    """Each of our schemes against each other scheme in the same flights, by the faults found within each of
+    DUELS_S.
 
-    Flights of a seed share their noise, so a seed counts once: for who finds more of its faults.
+    The flights of a seed have the same noise. A seed therefore counts once, for the scheme that finds more of
+    its faults.
     """
     compared = []
-    for place, here in grouped(rows, *PLACE).items():
+    for place, rows_of_place in grouped(rows, *PLACE).items():
         for within_s in DUELS_S:
-            of_each = grouped(here, "scheme").items()
-            found = {scheme: _found_by_seed(of, within_s) for (scheme,), of in of_each}
+            by_scheme = grouped(rows_of_place, "scheme").items()
+            found = {scheme: _found_by_seed(group, within_s) for (scheme,), group in by_scheme}
             others = [scheme for scheme in found if scheme not in BUILT_IN]
             for ours, scheme in product([scheme for scheme in BUILT_IN if scheme in found], others):
                 duel = {**dict(zip(PLACE, place, strict=True)), "ours": ours, "against": scheme}
@@ -189,13 +203,15 @@ BySeed = dict[int, int]
 
 
 def _found_by_seed(rows: Rows, within_s: float) -> BySeed:
+    """The faults that a scheme finds in time, by seed."""
     return {
-        seed: sum(or_never(row["delay_s"]) <= within_s + 1e-9 for row in of)
-        for (seed,), of in grouped(rows, "seed").items()
+        seed: sum(or_never(row["delay_s"]) <= within_s + 1e-9 for row in group)
+        for (seed,), group in grouped(rows, "seed").items()
     }
 
 
 def _duel(ours: BySeed, theirs: BySeed) -> Document:
+    """The seeds for each of two schemes, p between equals, and the verdict on ours."""
     pairs = [(found, theirs[seed]) for seed, found in ours.items() if seed in theirs]
     wins, losses, p = duel(pairs)
     verdict = "even" if p >= SIGNIFICANT else "better" if wins > losses else "worse"

@@ -1,6 +1,10 @@
 """The flights of the survey, and the statistic of every scheme in them.
 
-A block is flown once for each fault; every scheme watches the same flights.
+    condition   sensors and turbulence, which a designer knows: each scheme has an alarm level for each
+    condition block       a condition, an excitation and a seed: flights that are the same until the fault
+    begins grid        the conditions, excitations, faults and numbers of blocks of a survey
+
+A block is flown once for each fault of the grid. All schemes diagnose the same flights.
 """
 
 from collections.abc import Mapping, Sequence
@@ -25,33 +29,33 @@ from beaver_ftc.studies.compare import replay
 from beaver_ftc.studies.compare.replay import Recording, Trace
 from beaver_ftc.studies.engine.draws import loss, sines, swings
 
-STRIKES_S = (8.0, 10.0)  # a fault strikes at random in between
-WATCHED_S = 5.0  # after it
-WITHIN_S = (0.5, 1.0, WATCHED_S)  # how soon is soon
+STRIKES_S = (8.0, 10.0)  # a fault begins at a random time between these
+WATCHED_S = 5.0  # time that is flown after the begin of the fault
+WITHIN_S = (0.5, 1.0, WATCHED_S)  # delays within which detections are counted
 _RATE_HZ = 100.0
-UNEXPLAINED_UP_TO_RAD_S = 15.0  # the faster of the published sinusoids, and what is declared of them
+UNEXPLAINED_UP_TO_RAD_S = 15.0  # frequency of the faster of the published sinusoids
 
 ESTIMATORS = "adaptive-estimators"
 STATISTICAL, BOTH = "statistical", "both"
-# Schemes of which the statistic comes with the flight itself, and what its `fdi` says beside the bounds.
+# Our schemes, whose statistic comes with a flight of their own, and keys of `fdi` that select each of them.
 BUILT_IN: dict[str, Document] = {
     ESTIMATORS: {},
     STATISTICAL: {"statistical": {}, "authority": "statistical"},
     BOTH: {"statistical": {}},
 }
-# The same of the published scheme, which is not ours.
+# All schemes that need a flight of their own: ours, and the published one.
 FLOWN_THEMSELVES = BUILT_IN | {"zhang2005": {"scheme": "zhang2005"}}
 
 
 class Condition(NamedTuple):
-    """The instruments and the air that a designer knows, and may set an alarm level for."""
+    """Names of the sensors and of the severity of turbulence."""
 
     sensors: str
     turbulence: str
 
 
 class Block(NamedTuple):
-    """One condition, one excitation, one seed: flights that are the same until the fault strikes."""
+    """One condition, one amplitude of the references, one seed."""
 
     condition: Condition
     excitation_deg_s: float
@@ -64,8 +68,14 @@ Faults = tuple[tuple[str, float], ...]
 
 @dataclass(frozen=True)
 class Grid:
-    """The survey. blocks: flights with a fault a cell; healthy_h: without one, a condition; per_h: false
-    alarms per hour at which the schemes are compared."""
+    """The survey.
+
+    - conditions, surfaces, magnitudes, excitations_deg_s: all combinations are flown.
+    - blocks: flights of each combination. healthy_h: hours without a fault for each condition;
+      healthy_flight_s: length of such a flight, s.
+    - per_h: false alarms per hour at which the schemes are compared.
+    - where: further keys of the scenarios, such as another aircraft and its start.
+    """
 
     conditions: tuple[Condition, ...]
     surfaces: tuple[str, ...]
@@ -75,7 +85,6 @@ class Grid:
     healthy_h: float
     healthy_flight_s: float
     per_h: float
-    # what its scenarios say besides: another aircraft, and where it starts
     where: Document = field(default_factory=dict, hash=False)
 
     @property
@@ -84,34 +93,35 @@ class Grid:
         return tuple(product(self.surfaces, self.magnitudes))
 
     def only(self, sensors: str | None, turbulence: str | None) -> "Grid":
-        """The same flights under some of the conditions. Raises BadInput if there are none."""
+        """The same flights under the conditions with these sensors and this turbulence; None is any. Raises
+        BadInput if there is no such condition."""
         kept = tuple(
-            one
-            for one in self.conditions
-            if sensors in (None, one.sensors) and turbulence in (None, one.turbulence)
+            condition
+            for condition in self.conditions
+            if sensors in (None, condition.sensors) and turbulence in (None, condition.turbulence)
         )
         if not kept:
-            there = "; ".join(map(", ".join, self.conditions))
-            raise BadInput(f"detectability: this grid has no such condition, allowed: {there}")
+            allowed = "; ".join(map(", ".join, self.conditions))
+            raise BadInput(f"detectability: this grid has no such condition, allowed: {allowed}")
         return replace(self, conditions=kept)
 
     def elsewhere(
         self, aircraft: str | None, airspeed_mps: float | None, altitude_m: float | None, surface: str | None
     ) -> "Grid":
-        """The same flights with another aircraft, elsewhere, of one surface. Raises BadInput for one that the
-        aircraft has not, or whose loss is outside the class."""
+        """The same flights with another aircraft, airspeed or altitude, or with losses of one surface; None
+        is as before. Raises BadInput for a surface that is not in the class of losses."""
         known = find_aircraft(aircraft or DEFAULT, Path()).class_of_losses
         if surface is not None and surface not in known:
             raise BadInput(f"--surface {surface!r:.60}: allowed: {', '.join(known)}")
         given = {"airspeed_mps": airspeed_mps, "altitude_m": altitude_m}
         initial = {name: value for name, value in given.items() if value is not None}
-        said = {"initial": initial, "aircraft": aircraft}
-        where = {key: value for key, value in said.items() if value}
+        keys = {"initial": initial, "aircraft": aircraft}
+        where = {key: value for key, value in keys.items() if value}
         surfaces = self.surfaces if aircraft is None else known
         return replace(self, where=where, surfaces=(surface,) if surface else surfaces)
 
     def faulted(self) -> list[Block]:
-        """The blocks with faults; each flies all of them. The same seeds in every condition."""
+        """The blocks with faults; each flies all faults. The seeds are the same in every condition."""
         return [
             Block(condition, excitation, 1000 * i + seed)
             for condition in self.conditions
@@ -120,7 +130,7 @@ class Grid:
         ]
 
     def healthy(self) -> list[Block]:
-        """The blocks without a fault, which set the levels; seeds of their own."""
+        """The blocks without a fault, which set the levels. Their seeds differ from those with faults."""
         count = round(self.healthy_h * 3600.0 / self.healthy_flight_s)
         excitations = self.excitations_deg_s
         return [
@@ -139,11 +149,13 @@ def scenario_of(
     faults: Sequence[Document] = (),
     where: Mapping[str, Any] = MappingProxyType({}),
 ) -> Scenario:
-    """A flight of a block: everything in it but the fault and where it is flown follows from the block.
-    Another aircraft than the Beaver has the error of its own model, and none is added."""
+    """A flight of a block. Everything in it follows from the block, except duration, faults and `where`.
+
+    Model errors are added to the Beaver alone: another aircraft has the error of its own model.
+    """
     sensors, turbulence = block.condition
     aircraft = where.get("aircraft", DEFAULT)
-    find_aircraft(aircraft, Path())  # a folder in the working directory, in each process
+    find_aircraft(aircraft, Path())  # each process registers a folder in the working directory
     return Scenario.model_validate(
         {
             "name": "power",
@@ -163,18 +175,19 @@ def scenario_of(
 
 
 def strikes_at_s(block: Block) -> float:
-    """When the faults of a block strike, on a frame."""
+    """The begin of the faults of a block, at a frame, s."""
     return round(_draws(block, 2).uniform(*STRIKES_S) * _RATE_HZ) / _RATE_HZ
 
 
 def _draws(block: Block, purpose: int) -> np.random.Generator:
-    """Random numbers of a seed, the same in every condition."""
+    """Random numbers of a block for one purpose: 0 references, 1 model errors, 2 begin of the fault. They
+    depend on the seed alone, and are the same in every condition."""
     return np.random.default_rng([block.seed, purpose])
 
 
 def _uncertainty(block: Block) -> Document:
-    """Inside the published bound [Zhang2005, sec. VII]: couplings anywhere up to 0.25, and sinusoids of its
-    whole 0.02 rad/s2, whatever their frequency."""
+    """Model errors within the published bound [Zhang2005, sec. VII]: random couplings up to 0.25, and
+    sinusoids with the largest amplitude, 0.02 rad/s2, and a random frequency."""
     draws = _draws(block, 1)
     coupling = draws.uniform(-0.25, 0.25, len(AXES)).tolist()
     return {
@@ -184,36 +197,41 @@ def _uncertainty(block: Block) -> Document:
 
 
 def contenders(names: list[str] | None = None) -> tuple[str, ...]:
-    """The schemes to compare: those named, ours first; without names all. Raises BadInput, a line a name."""
+    """The schemes to compare: ours, then those named, or all that can be compared. Raises BadInput with a
+    line for each wrong name."""
     if names is None:
         known = registered(DETECTORS)
         names = [name for name in known if name in FLOWN_THEMSELVES or not is_compiled(DETECTORS, name)]
     names = list(dict.fromkeys([*BUILT_IN, *names]))
-    wrong = [f"--schemes: {says}" for name in names if (says := _refusal(name)) is not None]
-    if wrong:
-        raise BadInput("\n".join(wrong))
+    mistakes = [f"--schemes: {mistake}" for name in names if (mistake := _refusal(name)) is not None]
+    if mistakes:
+        raise BadInput("\n".join(mistakes))
     return tuple(names)
 
 
 def _refusal(name: str) -> str | None:
+    """Why a scheme cannot be compared; None if it can."""
     if name in FLOWN_THEMSELVES:
         return None
     if is_compiled(DETECTORS, name):
-        there = ", ".join(FLOWN_THEMSELVES)
-        return f"scheme {name!r} detects nothing, allowed: {there}, a registered detector"
+        allowed = ", ".join(FLOWN_THEMSELVES)
+        return f"scheme {name!r} detects nothing, allowed: {allowed}, a registered detector"
     return refusal(DETECTORS, name)
 
 
 def deflections(
     recording: Recording, surface: str, magnitude: float, within_s: tuple[float, ...]
 ) -> list[float]:
-    """The deflection d of a loss of effectiveness in a recorded flight, as long after it struck: how far its
-    effect -magnitude * moment (frames, 3) rad/s2 stands out of the whitened noise, in standard deviations."""
-    since = [measured for measured, _ in recording.seen if measured.t_s > recording.fault_at_s + 1e-9]
-    if not since:
+    """The deflection d of a loss of effectiveness in a recorded flight, each of these times after its begin:
+    the size of its effect -magnitude * moment, (frames, 3) rad/s2, in the whitened noise, in standard
+    deviations."""
+    frames_with_fault = [
+        measured for measured, _ in recording.seen if measured.t_s > recording.fault_at_s + 1e-9
+    ]
+    if not frames_with_fault:
         return [0.0] * len(within_s)
     place = recording.context.surfaces.index(surface)
-    moment = np.array([measured.contribution[:, place] for measured in since])
+    moment = np.array([measured.contribution[:, place] for measured in frames_with_fault])
     d = WhiteningFilter(VaneGust(recording.context).context).deflection_by_frame(-magnitude * moment)
     frames = [round(s / recording.context.dt_s) for s in within_s]
     return [float(d[min(n, len(d)) - 1]) for n in frames]
@@ -221,9 +239,11 @@ def deflections(
 
 @dataclass
 class Watched:
-    """The outcome of a block: by scheme, a trace for each of its flights, in order; why one is missing.
+    """The outcome of a block.
 
-    deflections: how far each fault stands out of the noise, after each of WITHIN_S (probabilities.py).
+    - faults: of its flights, in order; empty without faults. traces: by scheme, a trace for each flight.
+    - deflections: for each fault, the deflection after each of WITHIN_S.
+    - failures: for each missing scheme, the reason.
     """
 
     block: Block
@@ -246,34 +266,36 @@ def fly_block(case: tuple[Block, bool], grid: Grid, schemes: Sequence[str]) -> W
 
 
 def _watch(watched: Watched, flights: Sequence[Scenario], schemes: Sequence[str]) -> Watched:
-    seen: list[Recording] = []  # what plug-ins are shown of the flights
+    """Fill the outcome of a block. Plug-ins replay the recordings of the last of our schemes, which come
+    first."""
+    recorded: list[Recording] = []
     for scheme in schemes:
         try:
             if scheme in FLOWN_THEMSELVES:
                 recordings = [replay.record(with_fdi(flight, scheme)) for flight in flights]
                 if scheme in BUILT_IN:
-                    seen = recordings
+                    recorded = recordings
                 traces = [replay.trace(recording, recording.built_in) for recording in recordings]
-            elif seen:
-                traces = [replay.replay(recording, scheme) for recording in seen]
-            else:  # why our own could not fly them has been said
+            elif recorded:
+                traces = [replay.replay(recording, scheme) for recording in recorded]
+            else:  # our schemes could not fly them: the failures already have the reason
                 continue
             watched.traces[scheme] = traces
         except BeaverFtcError as error:
             watched.failures.append(f"{scheme}: {error}")
-        except Exception as error:  # a plug-in may raise anything: not the end of the comparison
+        except Exception as error:  # a plug-in may raise anything, and the comparison continues
             watched.failures.append(f"{scheme}: {type(error).__name__}: {error}")
-    struck = zip(seen, watched.faults, strict=False)  # a healthy flight has none
-    watched.deflections = [deflections(recording, *fault, WITHIN_S) for recording, fault in struck]
+    faulted = zip(recorded, watched.faults, strict=False)  # without faults there are no pairs
+    watched.deflections = [deflections(recording, *fault, WITHIN_S) for recording, fault in faulted]
     return watched
 
 
 def with_fdi(flight: Scenario, scheme: str) -> Scenario:
-    """The flight with what a scheme of ours wants of the built-in diagnosis."""
+    """The flight with the keys of `fdi` that select one of FLOWN_THEMSELVES."""
     return flight.with_({f"fdi.{key}": value for key, value in FLOWN_THEMSELVES[scheme].items()})
 
 
 def lost(case: tuple[Block, ...], why: str) -> Watched:
-    """A block that ends its process: nothing was watched, and why."""
+    """The outcome of a block that ends its process: no traces, but the reason."""
     block = case[0]
     return Watched(block, failures=[f"{' '.join(block.condition)}, seed {block.seed}: {why}"])

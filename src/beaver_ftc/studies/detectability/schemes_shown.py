@@ -37,78 +37,97 @@ _NO_DUEL = {"seeds_theirs": 0, "seeds_ours": 0, "p": 1.0}
 def page_of(document: Document) -> tuple[str, Sequence[Part]]:
     """The title, and the parts of the page: sentences, picture, table and notes."""
     conditions = document["grid"]["conditions"]
-    said = [f"{title_of(*where)}, {one}" for where in conditions for one in who_is_better(document, *where)]
-    said += comparison(document)
-    said += [f"could not be judged: {failure}" for failure in document["failures"]]
+    sentences = [
+        f"{title_of(*where)}, {sentence}"
+        for where in conditions
+        for sentence in who_is_better(document, *where)
+    ]
+    sentences += comparison(document)
+    sentences += [f"could not be judged: {failure}" for failure in document["failures"]]
     lines = [line for condition in conditions for line in _scheme_lines(document, *condition)]
-    drawn = Pictures([("share of the losses that each scheme detects", NAME)])
-    return "Detectability: schemes on the same flights", [*said, drawn, table(lines), *_legend(document)]
+    picture = Pictures([("share of the losses that each scheme detects", NAME)])
+    return "Detectability: schemes on the same flights", [
+        *sentences,
+        picture,
+        table(lines),
+        *_legend(document),
+    ]
 
 
 def _scheme_lines(document: Document, sensors: str, turbulence: str) -> Iterator[Line]:
-    """A line a surface and scheme; ours of both detectors also at its default level."""
-    here = {"sensors": sensors, "turbulence": turbulence}
+    """A line for each surface and scheme under a condition, our schemes also at their default level; then the
+    informed test."""
+    condition = {"sensors": sensors, "turbulence": turbulence}
     for surface in document["grid"]["surfaces"]:
         place = {"loss of": surface, "flown": title_of(sensors, turbulence)}
-        for level in _those(document["levels"], **here):
-            found = next(_those(document["totals"], **here, scheme=level["scheme"], surface=surface), None)
+        for level in _those(document["levels"], **condition):
+            total = next(
+                _those(document["totals"], **condition, scheme=level["scheme"], surface=surface), None
+            )
             row = place | {"scheme": level["scheme"], "false alarms/h": _rate(level["calibration"])}
-            yield row | {"before faults/h": _rate(level["before_faults"])} | _soon(found)
+            yield row | {"before faults/h": _rate(level["before_faults"])} | _soon(total)
             if level["scheme"] in BUILT_IN:
                 row |= {"scheme": f"{level['scheme']}{OWN}", "false alarms/h": _rate(level["own_level"])}
-                yield row | _soon(found and found["own_level"])
-        for known in _those(document["limits"], **here, surface=surface):
-            shares = "/".join(map(bare_percent, known["within"].values()))
+                yield row | _soon(total and total["own_level"])
+        for informed in _those(document["limits"], **condition, surface=surface):
+            shares = "/".join(map(bare_percent, informed["within"].values()))
             yield place | {"scheme": INFORMED, SOON: shares}
 
 
-def _soon(found: Document | None) -> Line:
-    """Per cent found within each delay, and the median delay."""
-    if not found or not found["flights"]:
+def _soon(total: Document | None) -> Line:
+    """The shares found within each of WITHIN_S in per cent, the median delay and the number of flights."""
+    if not total or not total["flights"]:
         return {SOON: "-"}
-    shares = "/".join(bare_percent(found["within"][f"{within_s:g}"]["value"]) for within_s in WITHIN_S)
-    return {SOON: shares, "median delay": seconds(found["median_delay_s"]), "flights": str(found["flights"])}
+    shares = "/".join(bare_percent(total["within"][f"{within_s:g}"]["value"]) for within_s in WITHIN_S)
+    return {SOON: shares, "median delay": seconds(total["median_delay_s"]), "flights": str(total["flights"])}
 
 
 def who_is_better(
     document: Document, sensors: str, turbulence: str, within_s: float = WATCHED_S
 ) -> Iterator[str]:
-    """A sentence for each surface under a condition: the scheme that finds most faults so soon."""
-    here = {"sensors": sensors, "turbulence": turbulence}
+    """A sentence for each surface under a condition: the scheme that finds most faults within `within_s`."""
+    condition = {"sensors": sensors, "turbulence": turbulence}
     soon = f"{within_s:g}"
     for surface in document["grid"]["surfaces"]:
-        place = here | {"surface": surface}
+        place = condition | {"surface": surface}
         rows = dict[str, Document]()
         for total in _those(document["totals"], **place):
             scheme = total["scheme"]
             if total["flights"] and (scheme == BOTH or scheme not in BUILT_IN):
-                found = total["within"][soon]
-                against = {"against": scheme, "ours": BOTH, "within_s": within_s}
-                one = next(_those(document["comparison"], **place, **against), _NO_DUEL)
+                estimate = total["within"][soon]
+                pair = {"against": scheme, "ours": BOTH, "within_s": within_s}
+                one = next(_those(document["comparison"], **place, **pair), _NO_DUEL)
                 duel = {"better": one["seeds_theirs"], "worse": one["seeds_ours"], "p": one["p"]}
-                rates = {"rate": found["value"], "rate_low": found["low"], "rate_high": found["high"]}
+                rates = {
+                    "rate": estimate["value"],
+                    "rate_low": estimate["low"],
+                    "rate_high": estimate["high"],
+                }
                 rows[scheme] = rates | {"against_ours": duel}
         if BOTH in rows:
             yield leader(rows, BOTH, "rate", f"{surface}, found within {soon} s", percent, more=True)
 
 
 def comparison(document: Document) -> list[str]:
-    """How often each of our schemes finds more or fewer faults than others, and is unlikely to by chance."""
-    said = []
+    """In how many comparisons each of our schemes finds significantly more or fewer faults than another
+    scheme."""
+    sentences = []
     for (ours, within_s), duels in grouped(document["comparison"], "ours", "within_s").items():
-        ends = Counter(duel["verdict"] for duel in duels)
-        said.append(
+        n = Counter(duel["verdict"] for duel in duels)
+        sentences.append(
             f"{ours}, faults found within {within_s:g} s, {len(duels)} comparisons: better in "
-            f"{ends['better']}, worse in {ends['worse']}, no difference at p < {SIGNIFICANT:g} in the rest"
+            f"{n['better']}, worse in {n['worse']}, no difference at p < {SIGNIFICANT:g} in the rest"
         )
-    return said
+    return sentences
 
 
 def _those(lines: Sequence[Document], **where: Any) -> Iterator[Document]:
+    """The lines with these values."""
     return (line for line in lines if where.items() <= line.items())
 
 
 def _rate(alarms: Document | None) -> str:
+    """A rate of false alarms with its interval, 1/h."""
     if alarms is None or alarms["per_h"] is None:
         return "-"
     high = "" if alarms["per_h_high"] is None else f" to {alarms['per_h_high']:.0f}"
@@ -116,6 +135,7 @@ def _rate(alarms: Document | None) -> str:
 
 
 def _legend(document: Document) -> list[str]:
+    """The notes below the table."""
     grid = document["grid"]
     per_h = document["false_alarms_per_h"]
     hours = min((level["calibration"]["hours"] for level in document["levels"]), default=0.0)
@@ -133,26 +153,27 @@ def _legend(document: Document) -> list[str]:
 
 
 def draw_schemes(document: Summary) -> "Figure":
-    """Rows air, columns surfaces; in each, a line of dots a scheme: the share detected, a dot a magnitude."""
+    """A row of panels for each condition, a column for each surface. In a panel, each scheme has a line of
+    dots: the share detected of each magnitude."""
     rows: Sequence[Row] = document.behind
     surfaces = document["grid"]["surfaces"]
     conditions = document["grid"]["conditions"]
     names = [*dict.fromkeys(row["scheme"] for row in rows), INFORMED]
-    most = f"at most {document['false_alarms_per_h']:g} false alarms per hour"
+    rate = f"at most {document['false_alarms_per_h']:g} false alarms per hour"
     figure, axes = panels(
         len(conditions), len(surfaces), 2.3 * len(surfaces) + 1.7,
-        (0.3 * len(names) + 0.6) * len(conditions) + 1.2, f"Loss of effectiveness, {most}, all references",
+        (0.3 * len(names) + 0.6) * len(conditions) + 1.2, f"Loss of effectiveness, {rate}, all references",
         dpi=120, sharex=True, sharey=True,
     )  # fmt: skip
-    here = grouped(rows, "sensors", "turbulence", "surface")
+    rows_of_panel = grouped(rows, "sensors", "turbulence", "surface")
     for panel, (condition, surface) in zip(axes.flat, product(conditions, surfaces), strict=True):
-        _draw(panel, here.get((*condition, surface), []), names, document)
+        _draw(panel, rows_of_panel.get((*condition, surface), []), names, document)
     label_edges(
         axes, f"detected within {JUDGED_S:g} s, %",
         [title_of(*condition).replace(", ", ",\n") for condition in conditions], surfaces,
     )  # fmt: skip
-    each = len(document["grid"]["excitations_deg_s"])
-    flights = [each * cell["flights"] for cell in document["cells"]]
+    n_excitations = len(document["grid"]["excitations_deg_s"])
+    flights = [n_excitations * cell["flights"] for cell in document["cells"]]
     figure.legend(
         *axes[0][0].get_legend_handles_labels(), loc="outside lower center",
         ncols=len(document["grid"]["magnitudes"]), fontsize=8, frameon=False, title_fontsize=8,
@@ -162,17 +183,18 @@ def draw_schemes(document: Summary) -> "Figure":
 
 
 def _draw(panel: "Axes", rows: Sequence[Row], names: Sequence[str], document: Document) -> None:
-    """The share that each scheme detects with its exact 95 % interval, magnitudes below one another."""
+    """The share that each scheme detects, with its exact 95 % interval. Magnitudes are drawn below one
+    another, `apart` from line to line."""
     magnitudes = document["grid"]["magnitudes"]
     within = f"{JUDGED_S:g}"
     apart = 0.6 / len(magnitudes)
     for place, magnitude in enumerate(magnitudes):
-        here = [row for row in rows if row["magnitude"] == magnitude]
-        found = {scheme: summary(of) for (scheme,), of in grouped(here, "scheme").items()}
-        shares = {scheme: cell["within"][within] for scheme, cell in found.items() if cell["flights"]}
-        if here:
-            found_by_it = limit(here, document["false_alarms_per_h"])[within]
-            shares[INFORMED] = {"value": found_by_it, "low": found_by_it, "high": found_by_it}
+        rows_of_magnitude = [row for row in rows if row["magnitude"] == magnitude]
+        cells = {scheme: summary(of) for (scheme,), of in grouped(rows_of_magnitude, "scheme").items()}
+        shares = {scheme: cell["within"][within] for scheme, cell in cells.items() if cell["flights"]}
+        if rows_of_magnitude:
+            informed = limit(rows_of_magnitude, document["false_alarms_per_h"])[within]
+            shares[INFORMED] = {"value": informed, "low": informed, "high": informed}
         lines = [names.index(of) + apart * (place - 0.5 * (len(magnitudes) - 1)) for of in shares]
         draw_estimates(
             panel, lines, [*shares.values()], 100.0, across=True, linestyle="none", marker=marker(place),

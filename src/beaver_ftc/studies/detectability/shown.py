@@ -1,4 +1,4 @@
-"""The table that all answers of `detectability` share: its columns, and the name of the files."""
+"""The table of all answers of `detectability`: its columns, and the name of its files."""
 
 from collections.abc import Sequence
 
@@ -12,10 +12,11 @@ HEAD = (
     "doublet", "doublet time", "found in 90 % from", "95 % interval", "flights", "false alarms/h",
     "before faults/h", SOON, "median delay",
 )  # fmt: skip
-Line = dict[str, str]  # cells by their column of HEAD
+Line = dict[str, str]
+"""The cells of a row by their column of HEAD."""
 
 
 def table(lines: Sequence[Line]) -> Table:
-    """The one table, of the columns that these lines have."""
+    """The table with those columns of HEAD that at least one line has."""
     head = [name for name in HEAD if any(name in line for line in lines)]
     return Table(head, [[line.get(name, "") for name in head] for line in lines])

@@ -1,12 +1,14 @@
-"""The flights that show how small a loss is found in time, and what limits it.
+"""The flights that show the smallest loss that is detected in time, and what limits it.
 
-A flight is the scenario without its own faults, with a loss of one surface: its seed and the instant of the
-loss are drawn, its size is asked for. The loss strikes anywhere between the start, once the references have
-settled, and the end. What is found: an alarm within the time asked for. What is certain: that the condition
-of guaranteed detection (loop/accounts.py, `guaranteed_delay_s` of the metrics) holds within that time.
+A flight is the scenario without its own faults, with a loss of one surface. Seed and begin of the loss are
+random; its size is given. The loss begins between SETTLED_S, when the references have settled, and the end.
 
-The same flights, with one thing left out of scenario and declaration, say what limits the answer; with
-another reference, what would help.
+    found      an alarm within the requested time certain    the condition of guaranteed detection
+    (`guaranteed_delay_s` of the metrics) holds within this time
+
+A variant has the same flights with one change. If one error is left out of scenario and declaration, the
+variant shows how much this error limits the detection. With another reference, it shows whether the reference
+helps.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -33,18 +35,19 @@ from beaver_ftc.studies.engine.statistics import CONFIDENCE, counted, or_never
 from beaver_ftc.studies.engine.study import FlyRound, Study
 from beaver_ftc.studies.present.tables import finite
 
-SHARE = 0.9  # of flights
+SHARE = 0.9  # of the flights in which a loss of the size is found
 AS_IT_IS = "as it is"
 NOTHING = {"p": 0.0, "q": 0.0, "r": 0.0}
-# Of a sine, where an axis has no reference.
+# The sine that is added to an axis without a reference.
 ADDED_DEG_S = 3.0
 ADDED_HZ = 0.25
-FIRST = STAGES[:1]  # flights of a comparison, and of the size that is certain
+FIRST = STAGES[:1]  # number of flights of a comparison, and of the size that is certain
 
 
 @dataclass(frozen=True)
 class Asked:
-    """surface: that loses effectiveness. within_s: from the loss to the alarm. seed: of all that is drawn."""
+    """The request. surface: loses effectiveness. within_s: longest time from the loss to the alarm, s. seed:
+    of all random draws."""
 
     surface: str
     within_s: float
@@ -52,7 +55,7 @@ class Asked:
 
 
 class Flight(NamedTuple):
-    """One flight: of which variant of the scenario, its number, and the size of the loss, per cent."""
+    """One flight: name of the variant, number of the draw, and size of the loss, per cent."""
 
     variant: str
     run: int
@@ -61,13 +64,15 @@ class Flight(NamedTuple):
 
 @dataclass
 class _Flown:
-    """Flights as they are flown, each once; fly: a round of them."""
+    """The rows of all flights so far; each flight is flown once. fly: flies a round. tell: takes a line of
+    progress."""
 
     fly: FlyRound
     tell: Callable[[str], None]
     rows: dict[Flight, Document] = field(default_factory=dict)
 
     def of(self, variant: str, runs: Sequence[int], size: int) -> list[Document]:
+        """The rows of these flights; those that are missing are flown."""
         wanted = [Flight(variant, run, size) for run in runs]
         missing = [flight for flight in wanted if flight not in self.rows]
         if missing:
@@ -76,12 +81,13 @@ class _Flown:
         return [self.rows[flight] for flight in wanted]
 
     def says(self, variant: str, key: str, runs: Sequence[int], size: int) -> list[bool]:
+        """The flag `key` of each of these flights."""
         return [row[key] for row in self.of(variant, runs, size)]
 
 
 def sizes_study(scenario: Scenario, asked: Asked, tell: Callable[[str], None]) -> Study:
-    """The study of a scenario and surface; tell: takes a line a round. Raises BadInput where the scenario
-    cannot answer."""
+    """The study of a scenario and surface. tell: takes a line for each round. Raises BadInput for a scenario
+    that cannot answer the request."""
     check(scenario, asked)
     variants = dict(variants_of(scenario, asked.surface))
     return Study(
@@ -92,7 +98,7 @@ def sizes_study(scenario: Scenario, asked: Asked, tell: Callable[[str], None]) -
 
 
 def check(scenario: Scenario, asked: Asked) -> None:
-    """Raise BadInput for what cannot be answered."""
+    """Raise BadInput if the surface is unknown, nothing is diagnosed, or the flight is too short."""
     surfaces = scenario.airframe.surfaces
     if asked.surface not in surfaces:
         raise BadInput(f"--surface {asked.surface!r:.60}: allowed: {', '.join(surfaces)}")
@@ -112,36 +118,38 @@ def fly_one(variants: dict[str, Scenario], asked: Asked, flight: Flight) -> Docu
     at_s = frames / scenario.rate_hz
     fault = loss(asked.surface, flight.size / LARGEST, at_s)
     flown = scenario.with_({"seed": seed, "faults": [fault], "expect": {}})
-    ends_s = min(at_s + asked.within_s + 2.0 / scenario.rate_hz, scenario.duration_s)
+    end_s = min(at_s + asked.within_s + 2.0 / scenario.rate_hz, scenario.duration_s)
     try:
-        landing = fly(flown.model_copy(update={"duration_s": ends_s}))
-        found = measure(landing)
+        landing = fly(flown.model_copy(update={"duration_s": end_s}))
+        metrics = measure(landing)
     except BeaverFtcError:
         return _row(failed=True)
     within_s = asked.within_s + TIME_TOLERANCE_S
-    detection = found.detection
+    detection = metrics.detection
     return _row(
         found=or_never(detection.delay_s) <= within_s,
         certain=or_never(detection.guaranteed_delay_s) <= within_s,
-        false_alarm=found.false_alarm,
+        false_alarm=metrics.false_alarm,
         inconclusive=detection.inconclusive.reasons[0]["says"] if detection.inconclusive else None,
         bound_used=max(landing.closest_approach, default=0.0),
     )
 
 
 def _row(**known: Any) -> Document:
+    """The row of a flight. Flags that are not given are False."""
     flags = dict.fromkeys(("found", "certain", "false_alarm", "failed"), False)
     return {**flags, "inconclusive": None, "bound_used": 0.0, **known}
 
 
 def variants_of(scenario: Scenario, surface: str) -> Iterator[tuple[str, Scenario]]:
-    """The scenario, and the same with one thing left out or changed, by what that is."""
+    """(name, scenario) of each variant; the first is the scenario as it is."""
     for name, change in ((AS_IT_IS, {}), *_left_out(scenario), *_other_references(scenario, surface)):
         yield name, scenario.with_({"faults": [], "expect": {}, **change})
 
 
 def _left_out(scenario: Scenario) -> Iterator[tuple[str, Document]]:
-    """Effects that may hide a fault, left out of the flight and of the declaration."""
+    """(name, changed keys) of variants without an error that may hide a fault, in flight and in the
+    declaration."""
     declared = Declared.of(scenario)
     environment = scenario.environment
     if environment.is_turbulent or environment.gusts or declared.air.moves:
@@ -152,31 +160,37 @@ def _left_out(scenario: Scenario) -> Iterator[tuple[str, Document]]:
             {"sensors": "ideal", "fdi.bounds.sensors": "ideal", "design_model.sensors": None},
         )
     if not (scenario.actuators.is_ideal and declared.servo_errors.is_none):
-        known = {"fdi.bounds.deflection_deg": 0.0, "fdi.bounds.actuators": {}, "design_model.actuators": None}
-        yield "with perfect servos", {"actuators": "ideal", "uncertainty.actuators": {}, **known}
+        no_errors = {
+            "fdi.bounds.deflection_deg": 0.0,
+            "fdi.bounds.actuators": {},
+            "design_model.actuators": None,
+        }
+        yield "with perfect servos", {"actuators": "ideal", "uncertainty.actuators": {}, **no_errors}
     exact = {"coefficients": 0.0, "inertia": 0.0, "inertia_coupling": NOTHING, "constant_rad_s2": NOTHING}
-    none = {f"fdi.bounds.{key}": value for key, value in exact.items()}
-    yield "without uncertainty of the model", {"uncertainty": {}, **none}
+    no_bounds = {f"fdi.bounds.{key}": value for key, value in exact.items()}
+    yield "without uncertainty of the model", {"uncertainty": {}, **no_bounds}
 
 
 def _other_references(scenario: Scenario, surface: str) -> Iterator[tuple[str, Document]]:
-    """References that move the surface more: on the axis on which it shows."""
+    """(name, changed keys) of variants whose reference moves the surface more, on the axis of its largest
+    effect."""
     axis = axis_of(scenario, surface)
     signals = scenario.model_dump(mode="json", exclude_none=True)["reference"].get(axis, [])
-    for what, keys in (("amplitude", AMPLITUDES), ("frequency", _FREQUENCIES)):
+    for quantity, keys in (("amplitude", AMPLITUDES), ("frequency", _FREQUENCIES)):
         if (twice := scaled(signals, keys, 2.0)) != signals:
-            yield f"with twice the {what} of reference.{axis}", {f"reference.{axis}": twice}
+            yield f"with twice the {quantity} of reference.{axis}", {f"reference.{axis}": twice}
     if not signals:
         sine = {"amplitude_deg_s": ADDED_DEG_S, "frequency_hz": ADDED_HZ}
-        says = f"with a sine of {ADDED_DEG_S:g} deg/s and {ADDED_HZ:g} Hz as reference.{axis}"
-        yield says, {f"reference.{axis}": [{"sine": sine}]}
+        label = f"with a sine of {ADDED_DEG_S:g} deg/s and {ADDED_HZ:g} Hz as reference.{axis}"
+        yield label, {f"reference.{axis}": [{"sine": sine}]}
 
 
 _FREQUENCIES = ("frequency_hz", "start_frequency_hz", "end_frequency_hz")
 
 
 def _document(scenario: Scenario, asked: Asked, variants: dict[str, Scenario], flown: _Flown) -> Document:
-    whole = _answer(AS_IT_IS, flown, STAGES)
+    """Fly all variants; the answer for the scenario as it is, compared with the others."""
+    answer = _answer(AS_IT_IS, flown, STAGES)
     compared = [_answer(name, flown, FIRST) for name in variants if name != AS_IT_IS]
     rows = [row for flight, row in flown.rows.items() if flight.variant == AS_IT_IS]
     reasons = sorted({row["inconclusive"] for row in rows} - {None})
@@ -188,7 +202,7 @@ def _document(scenario: Scenario, asked: Asked, variants: dict[str, Scenario], f
         "share": SHARE,
         "confidence": CONFIDENCE,
         "seed": asked.seed,
-        **whole,
+        **answer,
         "compared": compared,
         "inconclusive": reasons,
         "bound_used": float(np.median([row["bound_used"] for row in rows])),
@@ -198,18 +212,19 @@ def _document(scenario: Scenario, asked: Asked, variants: dict[str, Scenario], f
 
 
 def _answer(variant: str, flown: _Flown, stages: Sequence[int]) -> Document:
-    """The two sizes of one variant, as shares of the effectiveness (null: not even a total loss), and what a
-    total loss comes to."""
-    found = threshold(partial(flown.says, variant, "found"), SHARE, stages)
-    certain = of_all(partial(flown.says, variant, "certain"), stages[0])
-    total = flown.of(variant, range(found.flights), LARGEST)
-    sure = sum(flown.says(variant, "certain", range(stages[0]), LARGEST))
+    """The answer for one variant: the sizes that are found and certain, as shares of the effectiveness (null:
+    not even a total loss), and the results of a total loss. stages: as in `threshold`."""
+    found_size = threshold(partial(flown.says, variant, "found"), SHARE, stages)
+    certain_size = of_all(partial(flown.says, variant, "certain"), stages[0])
+    total = flown.of(variant, range(found_size.flights), LARGEST)
+    n_certain = sum(flown.says(variant, "certain", range(stages[0]), LARGEST))
     return {
         "variant": variant,
         "found": {
-            key: size if key == "flights" else finite(size / LARGEST) for key, size in vars(found).items()
+            key: size if key == "flights" else finite(size / LARGEST)
+            for key, size in vars(found_size).items()
         },
-        "certain": {"size": finite(certain / LARGEST), "flights": stages[0], "at_total_loss": sure},
+        "certain": {"size": finite(certain_size / LARGEST), "flights": stages[0], "at_total_loss": n_certain},
         "total_loss": counted(sum(row["found"] for row in total), len(total)),
         "false_alarms": sum(row["false_alarm"] for row in total),
         "failed": sum(row["failed"] for row in total),

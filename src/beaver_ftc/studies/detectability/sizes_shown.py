@@ -9,7 +9,7 @@ from beaver_ftc.studies.detectability.shown import NAME, table
 from beaver_ftc.studies.present.page import Makers, Part, study_files
 from beaver_ftc.studies.present.tables import bare_percent, percent
 
-NOT_FOUND = (  # key of a number of flights; what is said of one flight, and of several
+NOT_FOUND = (  # key of a number of flights; the end of the sentence about one flight, and about several
     (
         "false_alarms",
         "with a total loss has an alarm before the loss: it counts as not found.",
@@ -40,11 +40,13 @@ def page_of(document: Document) -> tuple[str, Sequence[Part]]:
 
 
 def _variants(document: Document) -> list[Document]:
+    """The answers for all variants; the document itself is the answer for the scenario as it is."""
     return [document, *document["compared"]]
 
 
 def _sentences(document: Document) -> Iterator[str]:
-    """The sizes that are certain and found, doubts about them, their limit, and a remedy, a sentence each."""
+    """Sentences about the sizes, about doubts, about the largest limit, and about a reference that would
+    help."""
     yield from _sizes(document)
     yield from _doubts(document)
     none = "makes a difference outside of the intervals"
@@ -55,6 +57,7 @@ def _sentences(document: Document) -> Iterator[str]:
 
 
 def _sizes(document: Document) -> Iterator[str]:
+    """A sentence about the size that is certain, and one about the size that most flights find."""
     certain, found, total, surface = (document[key] for key in ("certain", "found", "total_loss", "surface"))
     within = f"within {document['within_s']:g} s"
     nothing = f"not even a total loss of {surface}"
@@ -76,6 +79,7 @@ def _sizes(document: Document) -> Iterator[str]:
 
 
 def _doubts(document: Document) -> Iterator[str]:
+    """Sentences about flights in which the sizes mean less than they seem to."""
     for why in document["inconclusive"]:
         yield f"Nothing can be concluded in part of these flights: {why}."
     if document["bound_used"] >= NEAR_THRESHOLD_SHARE:
@@ -89,25 +93,27 @@ def _doubts(document: Document) -> Iterator[str]:
             yield f"1 flight {one}" if count == 1 else f"{count} flights {many}"
 
 
-def _is_better(other: Document, document: Document) -> bool:
-    """Whether a variant finds smaller losses, by intervals that do not overlap; where no loss is found often
-    enough, whether a total one is found more often."""
-    found = other["found"]
+def _is_better(variant: Document, document: Document) -> bool:
+    """Whether a variant finds smaller losses than the scenario as it is, so that the intervals do not
+    overlap. If the scenario finds no loss often enough: whether the variant finds a total loss more often."""
+    found = variant["found"]
     base = document["found"]
     if base["size"] is None:
-        return bool(other["total_loss"]["low"] > document["total_loss"]["high"])
+        return bool(variant["total_loss"]["low"] > document["total_loss"]["high"])
     return found["high"] is not None and base["low"] is not None and bool(found["high"] < base["low"])
 
 
 def _best(document: Document, references: bool) -> Document | None:
-    """The variant that helps most, of those that change a reference (sizes.py says so in their names), or of
-    the others."""
-    some = [
+    """The variant with the smallest size, among those that are better. references: whether to choose from the
+    variants with another reference, whose names contain this word, or from the others."""
+    better = [
         row
         for row in document["compared"]
         if ("reference" in row["variant"]) is references and _is_better(row, document)
     ]
-    return min(some, key=lambda row: (row["found"]["size"] or inf, -row["total_loss"]["value"]), default=None)
+    return min(
+        better, key=lambda row: (row["found"]["size"] or inf, -row["total_loss"]["value"]), default=None
+    )
 
 
 def _effect(row: Document | None, none: str) -> str:
@@ -122,6 +128,7 @@ def _effect(row: Document | None, none: str) -> str:
 
 
 def _interval(found: Document) -> str:
+    """The interval of a size in words; None is beyond a total loss."""
     if found["low"] is None:
         return "more than a total loss"
     if found["low"] == found["high"]:

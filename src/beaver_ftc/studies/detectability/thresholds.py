@@ -1,19 +1,20 @@
-"""The size that a given share of flights find, with an interval that assumes no shape of the curve.
+"""The size of a fault that a given share of flights finds, with an interval that assumes no shape of the
+curve.
 
-Each flight i has a smallest size X_i at which its fault is found: its noise, its air and the instant of the
-fault are kept while the size changes. The share of flights in which size m is found is P(X <= m), so the size
-found in 90 % of flights is the 0.9 quantile of X, whatever the curve of that share over m looks like. An
-order statistic of n flights bounds it, free of any distribution [Wilks1941; studies/engine/statistics.py].
+Each flight i has a smallest size X_i at which its fault is found. Its noise, its air and the begin of the
+fault are kept while the size changes. The share of flights that find size m is P(X <= m). The size that 90 %
+of the flights find is therefore the 0.9 quantile of X, whatever the shape of P(X <= m). Order statistics of n
+flights bound it without an assumption about the distribution [Wilks1941; studies/engine/statistics.py].
 
-X_i itself is not needed, only three order statistics. Each is found by bisection over the size, as in
-quickselect: once a flight has found size a, it is not flown at larger ones, and once it has missed b not at
-smaller ones. So a flight far from the quantile flies once or twice.
+Only three order statistics of X are needed, not each X_i. Each is found by bisection over the size, as in
+quickselect. A flight that has found size a is not flown at larger sizes, and one that has missed size b not
+at smaller ones. A flight far from the quantile is therefore flown once or twice.
 
 Flights are added in stages until the interval is narrow. The error probability is divided equally among the
-stages: by the union bound, the interval covers the quantile with the declared confidence however the stage at
-which it stops follows from the flights.
+stages. By the union bound, the interval then covers the quantile with the declared confidence, although the
+number of stages depends on the flights.
 
-Sizes are whole per cent; a size is the smallest of these at which the fault is found.
+Sizes are in whole per cent: a size is the smallest of these at which the fault is found.
 """
 
 from collections.abc import Callable, Sequence
@@ -25,10 +26,10 @@ import numpy as np
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, quantile, quantile_bound
 
 LARGEST = 100  # per cent: a total loss
-NEVER = LARGEST + 1  # not even that is found
-STAGES = (60, 120, 240, 480)  # flights in all after each stage
-RELATIVE_WIDTH = 0.15  # of an interval that is narrow enough, over its size
-LEAST_WIDTH = 2.0  # per cent: of one that is narrow enough whatever its size
+NEVER = LARGEST + 1  # in place of a size: not even a total loss is found
+STAGES = (60, 120, 240, 480)  # number of flights after each stage
+RELATIVE_WIDTH = 0.15  # an interval is narrow if its width is at most this share of the size
+LEAST_WIDTH = 2.0  # per cent: such an interval is narrow whatever the size
 
 IsFound = Callable[[Sequence[int], int], Sequence[bool]]
 """Whether each of these flights finds its fault at this size, per cent."""
@@ -36,8 +37,8 @@ IsFound = Callable[[Sequence[int], int], Sequence[bool]]
 
 @dataclass(frozen=True)
 class Threshold:
-    """A size with its interval, per cent; infinite where not even a total loss is found. flights: of the
-    answer."""
+    """A size with its interval, per cent; infinite if not even a total loss is found. flights: their
+    number."""
 
     size: float
     low: float
@@ -46,15 +47,16 @@ class Threshold:
 
     @property
     def is_narrow(self) -> bool:
-        """Whether more flights are not worth it; a size beyond every loss cannot be told more exactly."""
+        """Whether the interval is narrow enough. A size above a total loss is, if its lower end is above it,
+        too."""
         if isinf(self.size):
             return isinf(self.low)
         return self.high - self.low <= max(RELATIVE_WIDTH * self.size, LEAST_WIDTH)
 
 
 class Sizes:
-    """Limits of the smallest size at which each flight finds its fault: it is above `_missed`, and at most
-    `_found`. flights: how many of them count."""
+    """What is known of X: _missed < X_i <= _found for each flight i, (most,) per cent. flights: the first so
+    many count."""
 
     def __init__(self, is_found: IsFound, most: int) -> None:
         self._is_found = is_found
@@ -63,7 +65,7 @@ class Sizes:
         self._found = np.full(most, NEVER)
 
     def count(self, size: int) -> int:
-        """How many flights find this size; those of which it is not known are flown."""
+        """How many flights find this size. Flights for which this is not known are flown."""
         missed = self._missed[: self.flights]
         found = self._found[: self.flights]
         unknown = np.flatnonzero((missed < size) & (size < found))
@@ -74,7 +76,8 @@ class Sizes:
         return int((found <= size).sum())
 
     def ordered(self, rank: int) -> float:
-        """The rank-th smallest size, of 1 to the number of flights."""
+        """The order statistic X_(rank), rank from 1 to the number of flights, per cent; infinite above a
+        total loss."""
         if self.count(LARGEST) < rank:
             return inf
         low, high = 0, LARGEST
@@ -94,12 +97,12 @@ def threshold(is_found: IsFound, share: float, stages: Sequence[int] = STAGES) -
         bounds = [quantile_bound(ranks, share, one_sided, upper) for upper in (False, True)]
         low, high = (sizes.ordered(int(rank)) if np.isfinite(rank) else rank for rank in bounds)
         size = sizes.ordered(int(quantile(ranks, share)))
-        found = Threshold(size, max(low, 0.0), high, flights)
-        if found.is_narrow:
+        result = Threshold(size, max(low, 0.0), high, flights)
+        if result.is_narrow:
             break
-    return found
+    return result
 
 
 def of_all(is_found: IsFound, flights: int) -> float:
-    """The size from which on every one of so many flights finds its fault, per cent; infinite if none is."""
+    """The smallest size that all of so many flights find, per cent; infinite if there is none."""
     return Sizes(is_found, flights).ordered(flights)

@@ -1,10 +1,10 @@
 """Handling qualities: short period, phugoid, Dutch roll, roll and spiral mode against MIL-F-8785C's levels.
 
-Of the aircraft with its controls fixed, the truth linearised by differences: healthy where it is trimmed,
-degraded where a flight with a failure ends, its surfaces where the failure and the law have brought them. A
-law that holds rates leaves none of these modes to judge; they are what a pilot is left with when the law
-lets go. Class I, flight phase category B (light aircraft; climb, cruise, descent). Of the Dutch roll's limits
-the addition for large ratios of bank to sideslip (3.3.1.1, above 20 rad2/s2) is left out.
+The modes are those of the aircraft with fixed controls, whose truth is linearised by differences: healthy in
+trim, and degraded where a flight with a failure ends, with the surfaces at their positions then. A law that
+controls the rates changes all of these modes. They matter to a pilot who flies without the law. Requirements:
+class I, flight phase category B (light aircraft; climb, cruise, descent). The addition to the limits of the
+Dutch roll for large ratios of bank to sideslip (3.3.1.1, above 20 rad2/s2) is left out.
 """
 
 from collections.abc import Mapping
@@ -27,23 +27,24 @@ from beaver_ftc.studies.linear_systems import CLASSICAL, Mode, modes
 from beaver_ftc.studies.margins import N_AIRSPEEDS, over_envelope
 from beaver_ftc.studies.present.tables import aligned, grouped, number
 
-WORSE = 4  # than level 3
+WORSE = 4  # in place of a level: worse than level 3
 _STATES = ("alpha_rad", "beta_rad", "p_rad_s", "q_rad_s", "r_rad_s", "phi_rad", "theta_rad", "psi_rad")
 
 
 @dataclass(frozen=True)
 class Limit:
-    """The requirements of levels 1 to 3 on one quantity of a mode: (least, most) each [MIL-F-8785C]."""
+    """The requirements of levels 1 to 3 on one quantity of a mode [MIL-F-8785C]. levels: (least, most) of
+    each level. clause: of the specification, and its table or figure."""
 
     mode: str
     quantity: str
     clause: str
     levels: tuple[tuple[float, float], ...]
     unit: str = ""
-    table: str = ""  # or figure
+    table: str = ""
 
     def level(self, value: float) -> int:
-        """The best level whose limits the value keeps."""
+        """The best level whose limits contain the value; WORSE if there is none."""
         kept = (i for i, (least, most) in enumerate(self.levels, 1) if least <= value <= most)
         return next(kept, WORSE)
 
@@ -59,7 +60,8 @@ LIMITS = TypeAdapter(tuple[Limit, ...]).validate_python(parse(_FILE).data)
 
 @dataclass(frozen=True)
 class Quality:
-    """One quantity of one mode; value: infinite where a mode does not diverge."""
+    """One quantity of one mode, its value and level. where: `trimmed` or `at the end`. A time to double is
+    infinite if the mode does not diverge."""
 
     where: str
     airspeed_mps: float
@@ -73,7 +75,7 @@ Qualities = list[Quality]
 
 
 def of_model(linear: LinearModel, airspeed_mps: float, where: str) -> Qualities:
-    """The handling qualities of a linear aircraft."""
+    """The handling qualities of a linear aircraft. n/alpha = -A[alpha, alpha] V / g, 1/rad."""
     alpha = linear.states.index("alpha")
     g_per_rad = -linear.A[alpha, alpha] * airspeed_mps / GRAVITY_MPS2
     values = _values(modes(linear.of(CLASSICAL).A), float(g_per_rad))
@@ -84,12 +86,12 @@ def of_model(linear: LinearModel, airspeed_mps: float, where: str) -> Qualities:
     ]
 
 
-def _values(found: Mapping[str, Mode], g_per_rad: float) -> dict[tuple[str, str], float]:
+def _values(by_name: Mapping[str, Mode], g_per_rad: float) -> dict[tuple[str, str], float]:
     """Each quantity of LIMITS by mode and name. g_per_rad: load factor per angle of attack, n/alpha, 1/rad;
     the control anticipation parameter CAP is w^2 / (n/alpha), w of the short period, rad/s."""
-    short, dutch, phugoid = found["short_period"], found["dutch_roll"], found["phugoid"]
-    roll = found["roll"].pole
-    spiral = found["spiral"].pole.real
+    short, dutch, phugoid = by_name["short_period"], by_name["dutch_roll"], by_name["phugoid"]
+    roll = by_name["roll"].pole
+    spiral = by_name["spiral"].pole.real
     cap = short.frequency_rad_s**2 / g_per_rad if g_per_rad > 0.0 else inf
     return {
         ("short period", "damping"): short.damping,
@@ -101,13 +103,14 @@ def _values(found: Mapping[str, Mode], g_per_rad: float) -> dict[tuple[str, str]
         ("spiral", "time to double"): inf if roll.imag else _double_s(spiral),
         ("phugoid", "damping"): phugoid.damping,
         ("phugoid", "time to double"): _double_s(phugoid.pole.real),
-        # roll and spiral as one oscillation: then neither is a mode of its own
+        # roll and spiral mode may be one oscillation: then neither has values of its own
         ("roll-spiral", "damping x frequency"): -roll.real if roll.imag else inf,
     }
 
 
 def _double_s(real: float) -> float:
-    """Time in which a mode doubles, s; infinite if it does not diverge. real: part of its pole, 1/s."""
+    """Time in which a mode doubles, s: log(2) / real; infinite if it does not diverge. real: part of its
+    pole, 1/s."""
     return log(2.0) / real if real > 0.0 else inf
 
 
@@ -118,51 +121,56 @@ def where_trimmed(scenario: Scenario) -> Qualities:
 
 
 def where_ended(scenario: Scenario, end: Mapping[str, float]) -> Qualities:
-    """The qualities of its aircraft where a flight ended, with the surfaces as effective as they are then.
-    end: the last row of the log by column.
+    """The qualities of the aircraft at the end of a flight, with the effective deflections of its surfaces
+    then. end: the last row of the log by column.
 
-    Raises SimulationFailed where nothing can be linearised there.
+    Raises SimulationFailed if the aircraft cannot be linearised there.
     """
     plant, point = trimmed(scenario)
     states: Document = {name: float(end[name]) for name in _STATES}
     surfaces = {surface: float(end[f"{surface}_effective_rad"]) for surface in scenario.airframe.surfaces}
     settings = {name: float(end.get(name, value)) for name, value in point.settings.items()}
-    there = FlightState(
+    state = FlightState(
         float(end["airspeed_mps"]), float(end["altitude_m"]),
         surfaces_rad=surfaces, settings=settings, **states,
     )  # fmt: skip
-    linear = differences(plant, there)
+    linear = differences(plant, state)
     if not np.isfinite(linear.A).all():
         raise SimulationFailed(f"{scenario.name}: nothing can be linearised where it ended")
-    return of_model(linear, there.airspeed_mps, "at the end")
+    return of_model(linear, state.airspeed_mps, "at the end")
 
 
 def over_airspeeds(scenario: Scenario) -> Qualities:
-    """The qualities of its healthy aircraft over the airspeeds of the envelope; and, if the scenario has a
-    fault, where its flight ends."""
+    """The qualities of the healthy aircraft over the airspeeds of the envelope. If the scenario has a fault,
+    also those at the end of its flight, unless the aircraft is lost."""
     from beaver_ftc.loop.loop import fly
     from beaver_ftc.results.log import MemoryLog
 
-    found = [quality for flight in over_envelope(scenario, N_AIRSPEEDS) for quality in where_trimmed(flight)]
+    qualities = [
+        quality for flight in over_envelope(scenario, N_AIRSPEEDS) for quality in where_trimmed(flight)
+    ]
     if scenario.faults:
         log = MemoryLog()
         if fly(scenario, log).departure is None:
-            found += where_ended(scenario, dict(zip(log.columns, log.rows[-1].tolist(), strict=True)))
-    return found
+            qualities += where_ended(scenario, dict(zip(log.columns, log.rows[-1].tolist(), strict=True)))
+    return qualities
 
 
 def as_text(rows: list[Document]) -> str:
-    """A line a flight condition, a column a quantity, the level in brackets; then the worst level."""
+    """A line for each flight condition, a column for each quantity, with the level in brackets; the last
+    column has the worst level."""
     head = [["aircraft alone,", *(limit.mode for limit in LIMITS), ""]]
-    head += [["airspeed, m/s", *(f"{each.quantity} {each.unit}".strip() for each in LIMITS), "level"]]
+    head += [["airspeed, m/s", *(f"{row.quantity} {row.unit}".strip() for row in LIMITS), "level"]]
     lines = []
-    for (where, airspeed_mps), of in grouped(rows, "where", "airspeed_mps").items():
+    for (where, airspeed_mps), rows_of_condition in grouped(rows, "where", "airspeed_mps").items():
         ended = " at the end" if where == "at the end" else ""
-        cells = [f"{number(each['value'], none='never')} ({said(each['level'])})" for each in of]
-        lines.append([f"{airspeed_mps:.1f}{ended}", *cells, said(max(each["level"] for each in of))])
-    clauses = ", ".join(dict.fromkeys(f"{each.clause} {each.table}".strip() for each in LIMITS))
-    says = f"in brackets: level of MIL-F-8785C, class I, category B:\n{clauses}"
-    return f"{aligned([*head, *lines])}\n\n{says}"
+        cells = [f"{number(row['value'], none='never')} ({said(row['level'])})" for row in rows_of_condition]
+        lines.append(
+            [f"{airspeed_mps:.1f}{ended}", *cells, said(max(row["level"] for row in rows_of_condition))]
+        )
+    clauses = ", ".join(dict.fromkeys(f"{row.clause} {row.table}".strip() for row in LIMITS))
+    legend = f"in brackets: level of MIL-F-8785C, class I, category B:\n{clauses}"
+    return f"{aligned([*head, *lines])}\n\n{legend}"
 
 
 def said(level: int) -> str:

@@ -33,14 +33,14 @@ class Linearise(StudyCommand):
     scenario: Annotated[str | None, typer.Argument(metavar="SCENARIO")] = None
 
     def run(self, reporter: Reporter) -> Document:
-        """The margins over the airspeeds, and the modes."""
+        """The margins and the handling qualities over the airspeeds."""
         scenario = load({} if self.scenario is None else self.scenario)
-        asked = scenario.control.gain_margin_db, scenario.control.phase_margin_deg
-        document = margins.as_document(margins.study(scenario), asked)
+        required = scenario.control.gain_margin_db, scenario.control.phase_margin_deg
+        document = margins.as_document(margins.study(scenario), required)
         return document | {
-            "handling": [all_finite(asdict(each)) for each in handling.over_airspeeds(scenario)]
+            "handling": [all_finite(asdict(quality)) for quality in handling.over_airspeeds(scenario)]
         }
 
     def as_text(self, document: Document, colour: bool) -> str:
-        """A line a fault and surface, then a line a flight condition."""
+        """A line for each fault and surface, then a line for each flight condition."""
         return f"{margins.as_text(document)}\n\n{handling.as_text(document['handling'])}"

@@ -1,9 +1,10 @@
-"""Margins of the default law on the whole aircraft: what `beaver-ftc linearise` shows.
+"""Margins of the default law on the whole aircraft, as `beaver-ftc linearise` shows them.
 
-Every surface's loop (margins_loop.py) over the envelope, healthy and with each fault that is accommodated.
-The aircraft is the truth linearised by differences (plant/linear.py), held over a frame; the law is that of
-control/laws/loop_design.py with the design model's own derivatives. A loss of effectiveness that is known
-scales the surface and what the law takes it for alike; of a surface that is given up nothing is asked.
+The loop of each surface (margins_loop.py) is judged over the envelope, healthy and with each fault that the
+law accommodates. The aircraft is the truth linearised by differences (plant/linear.py), with inputs held over
+a frame. The law is that of control/laws/loop_design.py with the derivatives of the design model. A known loss
+of effectiveness scales both the surface and the effectiveness that the law assumes. A surface that is given
+up gets no demand.
 """
 
 from collections.abc import Iterator
@@ -32,14 +33,15 @@ from beaver_ftc.studies.margins_loop import OpenLoop, frequencies, loops
 from beaver_ftc.studies.present.tables import aligned, all_finite, grouped
 
 N_AIRSPEEDS = 5
-NUMBERS = ("up_db", "down_db", "phase_deg")
+NUMBERS = ("up_db", "down_db", "phase_deg")  # keys of the margins in a row
 REMAINING = (0.5, 0.1, 0.0)  # effectiveness after the losses that are judged; 0: given up
-LEAST_LOOP = 1e-3  # of a surface that hardly moves there is no loop to speak of
+LEAST_LOOP = 1e-3  # a surface with a smaller |L| at all frequencies has no loop worth judging
 
 
 @dataclass(frozen=True)
 class Margin:
-    """The margins of one surface's loop: of its gain, upwards and downwards, dB, and of its phase, deg."""
+    """The margins of the loop of one surface: gain margins upwards and downwards, dB, and phase margin,
+    deg."""
 
     airspeed_mps: float
     fault: str
@@ -49,27 +51,27 @@ class Margin:
     phase_deg: float
 
     def keeps(self, gain_db: float, phase_deg: float) -> bool:
-        """Whether all are at least these."""
+        """Whether all margins are at least these."""
         return min(self.up_db, self.down_db) >= gain_db and self.phase_deg >= phase_deg
 
 
 def study(scenario: Scenario) -> list[Margin]:
-    """The margins of a scenario's default law with its actuators, sensors and frame rate.
+    """The margins of the default law over the envelope, with actuators, sensors and frame rate of a scenario.
 
-    Raises BadInput for another law: its loop is not this one.
+    Raises BadInput for another law.
     """
     refuse_other_laws(scenario)
     return [margin for flight in over_envelope(scenario, N_AIRSPEEDS) for margin in at(flight)]
 
 
 def over_envelope(scenario: Scenario, count: int) -> Iterator[Scenario]:
-    """The scenario at so many airspeeds of the envelope, evenly spaced from its slowest to its fastest."""
+    """The scenario at `count` airspeeds, evenly spaced from the slowest to the fastest of the envelope."""
     ends_mps = scenario.airframe.envelope.airspeed_mps
     return (scenario.with_({"initial.airspeed_mps": float(V)}) for V in np.linspace(*ends_mps, count))
 
 
 def refuse_other_laws(scenario: Scenario) -> None:
-    """Raise BadInput unless the law is one whose loop this is."""
+    """Raise BadInput unless the scenario flies a law with the loop of the default law."""
     allowed = flown_by("rejecting")
     if scenario.control.law not in allowed:
         raise BadInput(
@@ -79,7 +81,7 @@ def refuse_other_laws(scenario: Scenario) -> None:
 
 
 def at(scenario: Scenario) -> Iterator[Margin]:
-    """The margins at a scenario's flight condition."""
+    """The margins at the flight condition of a scenario; those without a fault come first."""
     plant, point = trimmed(scenario)
     linear = differences(plant, point)
     frame = FrameReadout(Loop(scenario).frames[0])
@@ -104,7 +106,10 @@ def cases(main: np.ndarray, surfaces: tuple[str, ...]) -> Iterator[tuple[str, np
 def open_loop(
     scenario: Scenario, frame: FrameReadout, linear: LinearModel, y: np.ndarray, effectiveness: np.ndarray
 ) -> OpenLoop:
-    """The loop with this effectiveness (n,), the law knowing it; y: the measured signals in trim."""
+    """The loop with this effectiveness (n,), which the law knows. y: measured signals in trim.
+
+    approach = 1 - (1 - share of the way of an actuator in a JSBSim frame)^substeps, in a frame of the loop.
+    """
     law = frame.control
     dt = 1.0 / scenario.rate_hz
     _, G, f_x, f_y = jacobian(frame.design, np.zeros(3), y, law.trim_rad)
@@ -122,17 +127,19 @@ def open_loop(
 
 
 def interpolated(law: DefaultLaw, qdyn: float, lost: float) -> np.ndarray:
-    """Kp, L_rate and L_disturbance, (3, 3) over the axes, of the law's schedule at a dynamic pressure (Pa), a
-    share `lost` of pitch handed over. The twin of `schedule` in control/laws/rejecting.py."""
+    """Kp, L_rate and L_disturbance, rows of (3, 3) over the axes, at a dynamic pressure (Pa). lost: share of
+    pitch that is handed over to the stand-in, 0 to 1. `schedule` in control/laws/rejecting.py computes the
+    same."""
     schedules = law.Kp, law.L_rate, law.L_disturbance
-    found = np.array([[np.interp(qdyn, law.qdyn_pa, row) for row in rows] for rows in schedules])
-    found[:, PITCH] += lost * (found[:, STAND_IN] - found[:, PITCH])
-    return found[:, :3]
+    values = np.array([[np.interp(qdyn, law.qdyn_pa, row) for row in rows] for rows in schedules])
+    values[:, PITCH] += lost * (values[:, STAND_IN] - values[:, PITCH])
+    return values[:, :3]
 
 
 def allocation(G: np.ndarray, main: np.ndarray, stand_in: int, lost: float) -> np.ndarray:
-    """Commands per demanded acceleration, (n, 3), within the travels. The twin of `allocate` in
-    control/allocation.py."""
+    """Commands for each demanded acceleration, (n, 3) rad per rad/s2, within the travels. G (3, n); main:
+    surface of each axis. Aileron and rudder solve roll and yaw together; the stand-in takes the share `lost`
+    of pitch, the elevator the rest. `allocate` in control/allocation.py computes the same."""
     commands = np.zeros((G.shape[1], 3))
     a, e, r = main[[ROLL, PITCH, YAW]]
     flap = lost if stand_in >= 0 else 0.0
@@ -149,41 +156,48 @@ def allocation(G: np.ndarray, main: np.ndarray, stand_in: int, lost: float) -> n
 
 
 def outputs(states: tuple[str, ...], y: np.ndarray) -> np.ndarray:
-    """The measured signals, (7 + declared signals, states): rates, alpha, beta, V, qdyn, and those of V.
+    """C (7 + declared signals, states) of the measured signals: rates, alpha, beta, V, qdyn and the declared
+    signals.
 
-    qdyn goes with V^2, the slipstream (the Beaver's one declared signal) with V^-3; with altitude neither.
+    d qdyn / dV = 2 qdyn / V, as qdyn ~ V^2. d dpt / dV = -3 dpt / V of the slipstream, the one declared
+    signal of the Beaver, which is ~ V^-3. Their dependence on altitude is left out.
     """
     C = np.zeros((3 + len(y), len(states)))
     for row, name in enumerate((*AXES, "alpha", "beta", "airspeed")):
         C[row, states.index(name)] = 1.0
-    C_V = C[3:, states.index("airspeed")]  # of y
+    C_V = C[3:, states.index("airspeed")]  # a view: d y / dV
     C_V[QDYN] = 2.0 * y[QDYN] / y[AIRSPEED]
     C_V[DPT:] = -3.0 * y[DPT:] / y[AIRSPEED]
     return C
 
 
 def sensors(scenario: Scenario, m: int, dt: float) -> np.ndarray:
-    """Delay, s, and pole of the lag of each measured signal, (2, m); declared signals have neither."""
-    found = np.zeros((2, m))
+    """Delay, s, and pole exp(-bandwidth dt) of the lag of each measured signal, (2, m); 0 without one.
+    Declared signals have neither."""
+    delay_and_pole = np.zeros((2, m))
     for i, name in enumerate((*AXES, "alpha", "beta", "V", "qdyn")):
         sensor = getattr(scenario.sensors, name)
-        found[:, i] = sensor.delay_s, exp(-sensor.bandwidth_rad_s * dt) if sensor.bandwidth_rad_s else 0.0
-    return found
+        delay_and_pole[:, i] = (
+            sensor.delay_s,
+            exp(-sensor.bandwidth_rad_s * dt) if sensor.bandwidth_rad_s else 0.0,
+        )
+    return delay_and_pole
 
 
 def as_document(found: list[Margin], required: tuple[float, float]) -> Document:
-    """For `--format json`; a margin without end is null."""
+    """The document of `--format json`. An infinite margin is null."""
     rows = [all_finite(asdict(margin)) | {"keeps": margin.keeps(*required)} for margin in found]
     return {"gain_margin_db": required[0], "phase_margin_deg": required[1], "margins": rows}
 
 
 def as_text(document: Document) -> str:
-    """A line for each fault and surface, the least over the airspeeds."""
+    """A line for each fault and surface with the smallest margins over the airspeeds; last, how many are too
+    small."""
     table = [["fault", "surface", "gain up, dB", "down, dB", "phase, deg", "least at, m/s"]]
     for place, rows in grouped(document["margins"], "fault", "surface").items():
-        numbers = {of: [inf if row[of] is None else row[of] for row in rows] for of in NUMBERS}
+        numbers = {key: [inf if row[key] is None else row[key] for row in rows] for key in NUMBERS}
         least = rows[int(np.argmin(numbers["phase_deg"]))]
         table.append([*place, *(f"{min(n):.1f}" for n in numbers.values()), f"{least['airspeed_mps']:.0f}"])
     short = sum(not row["keeps"] for row in document["margins"])
-    asked = f"{document['gain_margin_db']:g} dB or {document['phase_margin_deg']:g} deg"
-    return f"{aligned(table)}\n\n{len(document['margins'])} loops, {short} with less than {asked}"
+    required = f"{document['gain_margin_db']:g} dB or {document['phase_margin_deg']:g} deg"
+    return f"{aligned(table)}\n\n{len(document['margins'])} loops, {short} with less than {required}"

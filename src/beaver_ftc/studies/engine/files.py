@@ -1,4 +1,4 @@
-"""The files of a study's folder: each is written as a whole or not at all, by one process at a time."""
+"""The files of the folder of a study. Each is written as a whole or not at all, by one process at a time."""
 
 import contextlib
 import os
@@ -10,7 +10,7 @@ from beaver_ftc.documents.errors import SimulationFailed, say_once
 from beaver_ftc.results.folder import sync
 
 LOCK = ".lock"
-DAMAGED = ".damaged"  # at the end of the name of what was set aside
+DAMAGED = ".damaged"  # end of the name of a file that was set aside
 UNREADABLE = "is damaged and cannot be read"
 
 
@@ -42,9 +42,9 @@ def remove_leftovers(folder: Path) -> None:
 
 @contextlib.contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Hold a folder for this process alone. The lock ends with the block or the process.
+    """Lock a folder for this process during the block. The lock also ends with the process.
 
-    Raises SimulationFailed where another process has it.
+    Raises SimulationFailed if another process holds it.
     """
     from filelock import FileLock, Timeout
 
@@ -59,12 +59,13 @@ def locked(folder: Path) -> Iterator[None]:
     try:
         yield
     finally:
-        (folder / LOCK).unlink(missing_ok=True)  # while it is held: the next one makes its own
+        (folder / LOCK).unlink(missing_ok=True)  # removed while locked: the next process makes a new file
         lock.release()
 
 
 def set_aside(path: Path, why: str) -> Path:
-    """Rename a damaged file, so that nothing of it is lost, and print one line. Returns its new path."""
+    """Rename a damaged file, so that its content is not lost, and print one line with the reason `why`.
+    Returns the new path."""
     name = f"{path.name}{DAMAGED}"
     n = 1
     while (path.parent / name).exists():

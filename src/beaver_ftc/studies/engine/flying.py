@@ -1,7 +1,12 @@
-"""Batches of cases flown by workers, as tasks that get smaller towards the end; lost ones are flown again.
+"""Batches of cases are flown by workers, as tasks that get smaller towards the end.
 
-A lost worker's task is flown again. One that is lost twice is taken apart into single cases, so that the case
-that kills its process is found: lost alone three times, it is given the row of a case that was lost.
+    case     one flight or one unit of a study, which gives one row
+    batch    cases whose rows are kept together, in one file
+    task     a batch, or some cases of it, that one worker flies in turn
+    landed   the rows of a batch are complete and kept
+
+The task of a lost worker is flown again. A task that is lost twice is divided into single cases, so that the
+case that kills its process is found. A case that is lost alone three times gets the row of a lost case.
 """
 
 import math
@@ -13,19 +18,21 @@ from typing import Any
 from beaver_ftc.studies.engine.workers import Batch, Number, Row, Workers
 
 Lost = Callable[[Any, str], Row]
-POLL_S = 0.2
-MOST_LOSSES = 3
-TASKS_A_SLOT = 4  # tasks that the cases left are divided into: no worker is left with a long last one
+"""From a case that kills its process, and the reason, to its row."""
+POLL_S = 0.2  # longest wait for a task, after which `stopped` is tested again
+MOST_LOSSES = 3  # a single case that is lost so often is given up
+TASKS_A_SLOT = 4  # the remaining cases make so many tasks for each slot, so that the last tasks are short
 LOST = "the process that flies it ends, each time it is tried"
 
 
 class _Tasks:
     """The tasks of batches, and the rows of each batch so far.
 
-    _coming: batches of which no task is waiting yet; _left: cases in these. _waiting: tasks for the next free
-    worker; flying: how many tasks workers have. _flown: by number, each batch begun and its rows by run.
-    _losses: by the runs of a task, how often a worker was lost over it. _lost: the row of a case that kills
-    its process.
+    - _coming: batches that are not yet divided into tasks. _left: number of cases in these.
+    - _waiting: tasks for the next free worker. flying: number of tasks that workers have.
+    - _flown: by number, each batch that has begun, and its rows by run.
+    - _losses: by the runs of a task, how often its worker was lost.
+    - _lost: makes the row of a case that kills its process.
     """
 
     def __init__(self, batches: Iterator[Batch], cases: int, lost: Lost) -> None:
@@ -38,7 +45,8 @@ class _Tasks:
         self._losses = Counter[tuple[int, ...]]()
 
     def hand_out(self, workers: Workers) -> None:
-        """Give each worker a task; a batch is taken apart when the tasks of those before are handed out."""
+        """Give tasks to workers until all slots are filled. A batch is divided once all tasks of earlier
+        batches are with workers."""
         while self.flying < workers.slots:
             if not self._waiting and (batch := next(self._coming, None)):
                 self._flown[batch.number] = (batch, {})
@@ -51,18 +59,19 @@ class _Tasks:
             self.flying += 1
 
     def gather(self, task: Batch, rows: Sequence[Row] | None) -> tuple[Batch, list[Row]] | None:
-        """Take the rows of a task, None if its worker was lost; the batch that they complete, with all of its
-        rows."""
+        """Take the rows of a task; None: its worker was lost. Returns the batch that is complete with these
+        rows, and all rows of it; otherwise None."""
         self.flying -= 1
-        batch, so_far = self._flown[task.number]
-        so_far.update(zip(task.runs, self._fly_again(task) if rows is None else rows, strict=False))
-        if len(so_far) < len(batch.runs):
+        batch, rows_by_run = self._flown[task.number]
+        rows_by_run.update(zip(task.runs, self._fly_again(task) if rows is None else rows, strict=False))
+        if len(rows_by_run) < len(batch.runs):
             return None
         del self._flown[task.number]
-        return batch, [so_far[run] for run in batch.runs]
+        return batch, [rows_by_run[run] for run in batch.runs]
 
     def _fly_again(self, task: Batch) -> list[Row]:
-        """See to a lost task; the rows that it yields all the same: of one case that is given up."""
+        """Put a lost task back into the queue, in single cases from the second loss on. Returns the row of a
+        case that is given up, otherwise no rows."""
         key = tuple(task.runs)
         self._losses[key] += 1
         if len(key) == 1 and self._losses[key] >= MOST_LOSSES:
@@ -73,18 +82,19 @@ class _Tasks:
 
 
 def _apart(batch: Batch, size: int) -> list[Batch]:
-    """A batch in tasks of so many cases."""
+    """Divide a batch into tasks of so many cases."""
     parts = [slice(i, i + size) for i in range(0, len(batch.runs), size)]
     return [Batch(batch.number, batch.runs[part], batch.cases[part]) for part in parts]
 
 
 @dataclass
 class Flying:
-    """Flies batches of which nothing has landed: workers fly tasks, rows are gathered, whole batches land.
+    """Flies the batches that have not landed: workers fly tasks, rows are gathered, complete batches land.
 
-    landed: the rows of a batch by its number and runs, None if they are not there. land: keeps them. make:
-    workers, when the first batch is missing, for so many cases. lost: the row of a case that kills its
-    process.
+    - landed: from the number and runs of a batch to its rows; None if it has not landed.
+    - land: keeps the rows of a batch.
+    - make: makes workers for so many cases; it is called when the first batch is missing.
+    - lost: makes the row of a case that kills its process.
     """
 
     landed: Callable[[Number, Sequence[int]], Any]
@@ -105,8 +115,12 @@ class Flying:
         there: Callable[[Number, Any], None],
         stopped: Callable[[], bool] = lambda: False,
     ) -> None:
-        """Fly what is missing; once `stopped`, only what is in the air. cases_of: these runs. there: takes
-        the number and the rows of each batch, once they are there."""
+        """Fly the batches that have not landed. Once `stopped` is true, only the tasks that workers have are
+        completed.
+
+        cases_of: from runs to their cases. there: called with the number and the rows of each batch, when
+        these are known.
+        """
         missing: dict[Number, Sequence[int]] = {}
         for number, runs in batches:
             rows = self.landed(number, runs)
@@ -125,9 +139,9 @@ class Flying:
                 tasks.hand_out(workers)
             if not tasks.flying:
                 return
-            whole = [tasks.gather(*outcome) for outcome in workers.outcomes(POLL_S)]
-            if not stopped():  # first put the workers to work, then see to the disk
+            complete = [tasks.gather(*outcome) for outcome in workers.outcomes(POLL_S)]
+            if not stopped():  # before the disk is written, so that no worker waits for it
                 tasks.hand_out(workers)
-            for batch, rows in filter(None, whole):
+            for batch, rows in filter(None, complete):
                 self.land(batch.number, rows)
                 there(batch.number, rows)

@@ -1,7 +1,7 @@
-"""Work done beside this process by others, each forked for its piece with all that this one has just then.
+"""Pieces of work that forked processes do, each with a copy of all that this process has at that moment.
 
-Such a process inherits what can neither be sent nor made again alike: a simulation in the middle of a
-flight. Where this process cannot be forked, or has one core, it does the work itself.
+A forked process inherits what can neither be sent to another process nor made again: a simulation in the
+middle of a flight. If this process cannot fork, or has one core, it does the work itself.
 """
 
 import multiprocessing
@@ -21,10 +21,12 @@ KILLED = "a process that was forked for a part of the work has ended before it w
 
 
 class Forks:
-    """Pieces of work, as many at once as there are cores; `results` has what they return, in their order.
+    """Pieces of work, as many at once as there are cores. `results` returns their results in order.
 
-    wanted: whether other processes may do them. Such a process has a copy of all that is here. The changes
-    that a piece makes to the copy are lost with the process.
+    wanted: whether other processes may do them. The changes that a piece makes to its copy of this process
+    are lost.
+
+    _busy: by connection, the place of the result and the process.
     """
 
     def __init__(self, wanted: bool = True) -> None:
@@ -41,11 +43,11 @@ class Forks:
             process.join()
 
     def submit(self, piece: Piece, then_here: Callable[[], None] = lambda: None) -> None:
-        """Do a piece: in a process that is forked now, or else in this one. Raises what an earlier piece has
-        raised.
+        """Do a piece, in a process that is forked now or in this one. Raises the exception of an earlier
+        piece.
 
-        then_here: called in this process if another does the piece. It makes the changes of the piece that
-        later pieces start from.
+        then_here: called in this process if another one does the piece. It makes those changes of the piece
+        with which later pieces begin.
         """
         if not self._at_once:
             self._results.append(piece())
@@ -61,22 +63,24 @@ class Forks:
         return self._results
 
     def _fork(self, piece: Piece) -> None:
+        """Start a process for a piece, whose result is the next one."""
         fork = multiprocessing.get_context("fork")
         here, there = fork.Pipe(duplex=False)
         process = fork.Process(target=_do, args=(piece, there), daemon=True)
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # Python's, of threads; those of libraries allow a fork
+            warnings.simplefilter("ignore")  # Python warns of threads; those of our libraries allow a fork
             process.start()
         there.close()
         self._busy[here] = len(self._results), process
 
     def _wait(self, left: int) -> None:
-        """Wait until at most so many processes are at work."""
+        """Wait until at most `left` processes are busy."""
         while len(self._busy) > left:
             for here in wait([*self._busy]):
                 self._take(here)  # type: ignore[arg-type]  # a connection, as all of them
 
     def _take(self, here: Connection) -> None:
+        """Receive the result of a process, or raise its exception."""
         place, process = self._busy.pop(here)
         with here:
             try:
@@ -89,7 +93,8 @@ class Forks:
 
 
 def _do(piece: Piece, there: Connection) -> None:
-    """In the forked process do the piece and send its result, or what it raises. Signals end the process."""
+    """Do the piece in the forked process, and send (result, None) or (None, exception). Signals end the
+    process."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_DFL)
     try:

@@ -1,6 +1,6 @@
-"""The identity of a study: the request, the versions and the code that its rows follow from.
+"""The identity of a study: the request, the versions and the code, which determine its rows.
 
-A study resumes only if its identity is the same, so that old and new rows may stand in one table.
+A study resumes only with the same identity, so that old and new rows belong into one table.
 """
 
 import hashlib
@@ -16,29 +16,31 @@ from beaver_ftc.results.metrics import versions
 from beaver_ftc.results.model import Document
 
 PACKAGE = Path(__file__).resolve().parents[2]
-# Folders and modules of a package whose code starts studies or prints rows: no number in a row depends on it.
+# Folders and modules of a package whose code only starts studies or prints rows. No number of a row depends
+# on them.
 NO_ROWS = ("cli", "commands", "pytest_plugin")
 
 
 def of(what: str, asked: Document) -> Document:
-    """The identity of a study: the resolved request `asked` under the key `what`, then the versions of this
-    machine's packages and the fingerprint of its code."""
+    """The identity of a study. what: `study` or `sweep`, the key of the resolved request `asked`. It also has
+    the versions of the packages of this machine, and the fingerprint of the code."""
     document = {what: asked, "versions": {**versions(), **plug_ins(), "flight code": fingerprint()}}
     return json.loads(json.dumps(document))
 
 
 def known(manifest: Path, what: str) -> Document | None:
-    """The identity under the key `what` in a file; None if there is no such file, or if it is damaged."""
+    """The identity of a `what` in a file; None if the file does not exist or is damaged."""
     try:
-        there = read_json(manifest)
-        is_one = isinstance(there[what], dict) and isinstance(there["versions"], dict)
+        document = read_json(manifest)
+        is_one = isinstance(document[what], dict) and isinstance(document["versions"], dict)
     except (OSError, ValueError, KeyError, TypeError):
         return None
-    return there if is_one else None
+    return document if is_one else None
 
 
 def refuse_other(mine: Document, there: Document, folder: Path) -> None:
-    """Raise BadInput if the flights in a folder follow from another identity than mine."""
+    """Raise BadInput unless the flights in a folder have my identity. there: the identity of these
+    flights."""
     what = next(iter(mine))
     changed = differences(there.get(what, {}), mine[what])
     if changed:
@@ -57,12 +59,12 @@ def refuse_other(mine: Document, there: Document, folder: Path) -> None:
 
 
 def differences(then: Document, now: Document) -> list[str]:
-    """The keys whose values differ, those that have gone included."""
+    """The keys whose values differ, with keys that only one of the two has."""
     return [name for name in dict.fromkeys([*now, *then]) if then.get(name) != now.get(name)]
 
 
 def plug_ins() -> dict[str, str]:
-    """Versions of the other packages whose detectors and laws may fly."""
+    """Versions of the packages of third parties with registered detectors or laws."""
     from importlib.metadata import PackageNotFoundError, version
 
     from beaver_ftc.plugins import DETECTORS, LAWS, OURS, registered
@@ -78,7 +80,7 @@ def plug_ins() -> dict[str, str]:
 
 
 def hashed_files() -> list[Path]:
-    """The sources and data that rows may depend on: those of the core and of each package that offers it a
+    """The files on which rows may depend: sources and data of the core and of each package that offers it a
     service, without NO_ROWS, and all files of the aircraft."""
     sources = [
         path
@@ -93,20 +95,20 @@ def hashed_files() -> list[Path]:
 
 @cache
 def fingerprint() -> str:
-    """A digest of `hashed_files`, because a version number does not change with an edit."""
+    """A digest of `hashed_files`. A version number alone would not change with an edit of the code."""
     return digest(hashed_files())[:16]
 
 
 def digest_of_aircraft(folder: Path) -> str:
-    """A digest of an aircraft's files: another aircraft of the same name has another digest."""
+    """A digest of the files of an aircraft, which distinguishes aircraft with the same name."""
     return digest(
         path for path in sorted(folder.rglob("*")) if path.suffix in (".xml", ".yaml") and path.is_file()
     )
 
 
 def digest(paths: Iterable[Path]) -> str:
-    """A digest of files, names and contents."""
-    found = hashlib.sha256()
+    """A digest of the names and contents of files."""
+    sha256 = hashlib.sha256()
     for path in paths:
-        found.update(path.name.encode() + path.read_bytes())
-    return found.hexdigest()
+        sha256.update(path.name.encode() + path.read_bytes())
+    return sha256.hexdigest()

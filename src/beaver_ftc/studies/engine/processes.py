@@ -1,7 +1,8 @@
 """Processes on this machine: how many, how they are started, their environment, and their output.
 
-Workers are forked from a clean process that has everything imported, the fork server. Importing takes it half
-a second; started early, it does so while this process still reads its input. Nothing heavy is imported here.
+Workers are forked from the fork server, a process that has imported all modules they need. These imports take
+half a second. If the server is started early, it imports while this process still reads its input. This
+module imports nothing large.
 """
 
 import contextlib
@@ -12,26 +13,27 @@ from collections.abc import Iterator, Mapping
 from multiprocessing import forkserver, resource_tracker
 from typing import Any
 
-# What the process that workers are forked from imports; this process need not.
+# The modules that the fork server imports.
 _PRELOAD = [
     f"{__package__}.workers",
     "beaver_ftc.studies.sweep.one_flight",
     "beaver_ftc.loop.loop",
     "beaver_ftc.results.metrics",
 ]
-# Environment of a worker: one thread for linear algebra, since the cores are taken by the flights.
+# Environment of a worker: one thread for linear algebra, because each core has a worker.
 ONE_THREAD_EACH = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
 )
 
 
 def cores() -> int:
-    """The cores this process may use."""
+    """The number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def context() -> Any:
-    """The way to start workers here; where they cannot be forked, they start afresh."""
+    """The context of `multiprocessing` that starts workers: by the fork server, or as new processes if it
+    does not exist."""
     if "forkserver" not in multiprocessing.get_all_start_methods():
         return multiprocessing.get_context("spawn")
     chosen = multiprocessing.get_context("forkserver")
@@ -40,15 +42,15 @@ def context() -> Any:
 
 
 def start_early() -> None:
-    """Let the process that workers are forked from begin its imports."""
+    """Start the fork server, so that it begins its imports."""
     if context().get_start_method() == "forkserver":
         with single_threaded():
             forkserver.ensure_running()
 
 
 def kill_fork_server() -> None:
-    """Kill the process that workers are forked from, after Ctrl-C: else it still forks a worker for which
-    nothing waits, and that prints a traceback, since its pipes are closed. The next study starts another."""
+    """Kill the fork server after Ctrl-C. Otherwise it could fork one more worker, whose pipes are closed, and
+    which then prints a traceback. The next study starts a new server."""
     pid = getattr(getattr(forkserver, "_forkserver", None), "_forkserver_pid", None)
     if pid is not None:
         with contextlib.suppress(ProcessLookupError):
@@ -57,13 +59,13 @@ def kill_fork_server() -> None:
 
 @contextlib.contextmanager
 def single_threaded() -> Iterator[None]:
-    """Processes started meanwhile have one thread each, and do not receive Ctrl-C from the terminal, not even
-    while they import: this process does, and ends them.
+    """Processes that start during the block have one thread each, and do not receive Ctrl-C from the
+    terminal, not even while they import. This process receives it and ends them.
     """
     blocks = hasattr(signal, "pthread_sigmask")
     with environment(ONE_THREAD_EACH):
-        if blocks:  # Ctrl-C waits meanwhile, which what is started inherits
-            resource_tracker.ensure_running()  # it would unblock what is blocked here
+        if blocks:  # SIGINT is blocked during the block, and new processes inherit the mask
+            resource_tracker.ensure_running()  # started before: its start would reset the mask
             before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             yield
@@ -74,7 +76,7 @@ def single_threaded() -> Iterator[None]:
 
 @contextlib.contextmanager
 def environment(values: Mapping[str, str]) -> Iterator[None]:
-    """These variables of the environment meanwhile have these values."""
+    """Set variables of the environment during the block."""
     before = {name: os.environ[name] for name in values if name in os.environ}
     os.environ.update(values)
     try:
@@ -86,7 +88,8 @@ def environment(values: Mapping[str, str]) -> Iterator[None]:
 
 
 def silence_this_process() -> dict[int, int]:
-    """Send whatever a library prints, on whatever level, nowhere. Returns copies of the two streams."""
+    """Discard all output of this process on file descriptors 1 and 2, also that of C libraries. Returns a
+    copy of each descriptor; a worker never uses them, `silence` restores and closes them."""
     kept = {stream: os.dup(stream) for stream in (1, 2)}
     nowhere = os.open(os.devnull, os.O_WRONLY)
     for stream in kept:
@@ -97,7 +100,7 @@ def silence_this_process() -> dict[int, int]:
 
 @contextlib.contextmanager
 def silence() -> Iterator[None]:
-    """Whatever a library prints meanwhile goes nowhere: the output is the study's own."""
+    """Discard all output of this process during the block."""
     kept = silence_this_process()
     try:
         yield

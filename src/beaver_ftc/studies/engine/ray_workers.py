@@ -1,7 +1,7 @@
-"""A Ray cluster as workers: each task a Ray task, a few in the queue for each CPU so that none waits.
+"""A Ray cluster as workers. Each task is a Ray task; QUEUED_A_CPU tasks for each CPU are in the queue, so
+that no CPU waits.
 
-Whether a lost task is flown again is the campaign's to decide, as with local processes; Ray itself does not
-retry.
+Ray does not retry a lost task: flying.py decides whether it is flown again, as for local processes.
 """
 
 import contextlib
@@ -20,7 +20,12 @@ QUEUED_A_CPU = 2
 
 
 class RayWorkers:
-    """The CPUs of a Ray cluster: one that runs already, one at an address, or one started on this machine."""
+    """The CPUs of a Ray cluster: of one that this process has joined already, of one at an address, or of a
+    new one on this machine.
+
+    _ours: whether this object joined the cluster, and so leaves it. _most: largest number of tasks, or None.
+    _diverted: the redirection of standard output, once a task has been submitted.
+    """
 
     def __init__(self, work: Work, address: str | None, workers: int | None) -> None:
         try:
@@ -39,12 +44,12 @@ class RayWorkers:
 
     @property
     def slots(self) -> int:
-        """Follows the cluster as nodes come and go."""
+        """The number of tasks to submit; it changes with the nodes of the cluster."""
         cpus = max(1, int(self._ray.cluster_resources().get("CPU", 1)))
         return self._most or QUEUED_A_CPU * cpus
 
     def submit(self, task: Batch) -> None:
-        if self._diverted is None:  # Ray prints of workers that die, where a document may be due
+        if self._diverted is None:  # Ray prints lost workers on standard output, which may be a document
             self._diverted = contextlib.redirect_stdout(sys.stderr)
             self._diverted.__enter__()
         self._tasks[self._fly.remote(self._work, self._versions, task.cases)] = task
@@ -63,7 +68,8 @@ class RayWorkers:
             self._diverted = None
 
     def _rows(self, reference: Any) -> list[Row] | None:
-        """The rows, or None if the worker or its node was lost. SimulationFailed if the code failed."""
+        """The rows of a task; None if its worker or node was lost. Raises SimulationFailed if the code
+        failed."""
         try:
             return self._ray.get(reference)
         except self._ray.exceptions.RayTaskError as error:
@@ -73,7 +79,7 @@ class RayWorkers:
 
 
 def fly_task(work: Work, driver_versions: dict[str, str], cases: Sequence[Any]) -> list[Row]:
-    """Fly a task on whatever node it is, if that has what the others have."""
+    """Fly a task on a node. Raises SimulationFailed if its versions differ from those of the driver."""
     own = versions()
     changed = [
         f"{name} {own.get(name)} instead of {theirs}"
@@ -89,7 +95,7 @@ def fly_task(work: Work, driver_versions: dict[str, str], cases: Sequence[Any]) 
 
 
 def _join(ray: Any, address: str | None) -> bool:
-    """Join a cluster, or start one; whether it is this process that joined."""
+    """Join the cluster at an address, or start one. False if this process has joined one before."""
     if ray.is_initialized():
         return False
     options: dict[str, Any] = {} if address else {"include_dashboard": False}

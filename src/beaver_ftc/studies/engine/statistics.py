@@ -1,6 +1,6 @@
-"""Conclusions from a number of flights, with confidence: bounds for rates, counts and quantiles.
+"""Bounds, with a confidence, for rates, counts and quantiles that are estimated from a number of flights.
 
-All are functions of counts alone. A bound that the flights do not give is infinite.
+All functions depend on counts or ordered values alone. A bound that the flights do not give is infinite.
 """
 
 import functools
@@ -26,12 +26,12 @@ class Estimate:
 
 
 def wilson(successes: int, trials: int, confidence: float = CONFIDENCE) -> Estimate:
-    """A rate with its two-sided score interval [Wilson1927]."""
+    """successes / trials with its two-sided score interval [Wilson1927]."""
     return _rate(successes, trials, confidence, "wilson")
 
 
 def binomial(events: int, trials: int, confidence: float = CONFIDENCE) -> Estimate:
-    """A probability with its two-sided exact interval [ClopperPearson1934]."""
+    """events / trials with its two-sided exact interval [ClopperPearson1934]."""
     return _rate(events, trials, confidence, "exact")
 
 
@@ -46,34 +46,35 @@ def _rate(count: int, trials: int, confidence: float, method: str) -> Estimate:
 
 
 def counted(events: int, trials: int) -> Document:
-    """A count for a document, as a share with its exact interval."""
+    """A count for a document: count, trials, and the share with its exact interval."""
     return {"count": events, "of": trials, **all_finite(vars(binomial(events, trials)))}
 
 
 def wilson_bound(successes: int, trials: int, confidence: float, upper: bool) -> float:
-    """The rate's one-sided score bound."""
-    found = wilson(successes, trials, 2.0 * confidence - 1.0)
-    return found.high if upper else found.low
+    """The one-sided score bound of a rate: a limit of the two-sided interval with confidence 2 c - 1."""
+    estimate = wilson(successes, trials, 2.0 * confidence - 1.0)
+    return estimate.high if upper else estimate.low
 
 
 def duel(pairs: Iterable[tuple[float, float]]) -> tuple[int, int, float]:
-    """In how many pairs the first number is the larger, in how many the smaller, and the probability of a
-    result at least as uneven between equals, two-sided and exact [Conover1999]."""
+    """The sign test: in how many pairs the first number is larger, in how many it is smaller, and the
+    probability of a result at least as uneven between equals, two-sided and exact [Conover1999]. Ties are
+    left out."""
     from scipy.stats import binomtest
 
     larger = [a > b for a, b in pairs if a != b]
-    more = sum(larger)
+    n_larger = sum(larger)
     n = len(larger)
-    return more, n - more, float(binomtest(more, n).pvalue) if n else 1.0
+    return n_larger, n - n_larger, float(binomtest(n_larger, n).pvalue) if n else 1.0
 
 
 def or_never(value: float | None) -> float:
-    """A time or an error; None is infinite."""
+    """A number; infinite for None, which stands for an event that never comes."""
     return math.inf if value is None else value
 
 
 def poisson(events: int, exposure: float) -> Estimate:
-    """Events per unit of exposure with their two-sided exact interval [Garwood1936]."""
+    """events / exposure with its two-sided exact interval [Garwood1936]."""
     if exposure <= 0:
         return Estimate(math.nan, 0.0, math.inf)
     low, high = (poisson_bound(events, exposure, (1.0 + CONFIDENCE) / 2, upper) for upper in (False, True))
@@ -81,7 +82,12 @@ def poisson(events: int, exposure: float) -> Estimate:
 
 
 def poisson_bound(events: int, exposure: float, confidence: float, upper: bool) -> float:
-    """The rate's one-sided exact bound: the mean at which so few (so many) events get improbable."""
+    """The one-sided exact bound of a rate, mu / exposure, with N of a Poisson distribution of mean mu:
+
+        upper:  P(N <= events) = 1 - confidence        lower:  P(N >= events) = 1 - confidence
+
+    A quantile of the gamma distribution solves both. The lower bound without an event is 0.
+    """
     from scipy.stats import gamma
 
     if exposure <= 0:
@@ -92,14 +98,16 @@ def poisson_bound(events: int, exposure: float, confidence: float, upper: bool) 
 
 
 def quantile(ordered: np.ndarray, q: float) -> float:
-    """The q quantile of ordered values (n,): the smallest one that a share q does not exceed."""
+    """The q quantile of ordered values (n,): the smallest value that at least a share q of the values do not
+    exceed."""
     if not ordered.size:
         return math.nan
     return float(ordered[max(0, math.ceil(q * ordered.size - 1e-9) - 1)])
 
 
 def median(values: Iterable[float | None]) -> dict[str, float | None]:
-    """A median for a document with its two-sided interval; None is infinite, as it is of none."""
+    """A median for a document with its two-sided interval. A value None counts as infinite; an infinite
+    result is None."""
     ordered = np.sort([*map(or_never, values)])
     ends = [quantile_bound(ordered, 0.5, (1.0 + CONFIDENCE) / 2, upper) for upper in (False, True)]
     found = quantile(ordered, 0.5), *ends
@@ -107,13 +115,14 @@ def median(values: Iterable[float | None]) -> dict[str, float | None]:
 
 
 def share_within(values: Iterable[float | None], share: float) -> float:
-    """The smallest value that at least this share do not exceed; None is infinite, as it is of none."""
+    """The smallest value that at least this share of the values do not exceed. A value None counts as
+    infinite; without values the result is infinite."""
     ordered = np.sort([*map(or_never, values)])
     return quantile(ordered, share) if ordered.size else math.inf
 
 
 def quantile_bound(ordered: np.ndarray, q: float, confidence: float, upper: bool) -> float:
-    """The quantile's one-sided bound, free of any distribution: an order statistic.
+    """The one-sided bound of a quantile, an order statistic, without an assumption about the distribution.
 
     The r-th smallest of n values is at or above the q quantile with probability P(Binomial(n, q) < r), and at
     or below it with probability P(Binomial(n, q) >= r) [Wilks1941].

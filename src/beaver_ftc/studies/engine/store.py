@@ -1,4 +1,4 @@
-"""How a study keeps the rows of the flights that it has flown: a file for each batch of cases."""
+"""How a study keeps the rows of its flights: a file for each batch of cases."""
 
 import contextlib
 import json
@@ -23,12 +23,13 @@ class Codec(Protocol):
         """Fill a file with rows."""
 
     def read(self, path: Path, runs: Sequence[int]) -> Any:
-        """The rows of these runs; any exception, or None, for a file that holds anything else."""
+        """The rows of these runs. For a file with another content: None, or any exception."""
 
 
 @dataclass(frozen=True)
 class Parts:
-    """A folder of batches of rows, one file for each. kept: the end of the message about a full disk."""
+    """A folder of batches of rows, one file for each. codec: format of the files. kept: end of the message
+    about a full disk."""
 
     folder: Path
     codec: Codec
@@ -39,12 +40,13 @@ class Parts:
         return self.folder.is_dir() and any(self.folder.glob(f"*{self.codec.suffix}"))
 
     def land(self, batch: int | str, rows: Any) -> None:
-        """Write a batch. Raises SimulationFailed if the disk does not take it."""
+        """Write a batch. Raises SimulationFailed if the disk fails."""
         with clear_disk_errors(self.folder.parent, self.kept):
             replace_whole(self._path(batch), lambda file: self.codec.write(rows, file))
 
     def landed(self, batch: int | str, runs: Sequence[int]) -> Any:
-        """The rows of a batch, None if it has no file. A file that cannot be read is set aside: None, too."""
+        """The rows of a batch; None if it has no file. A file that cannot be read is set aside, and gives
+        None, too."""
         path = self._path(batch)
         rows = None
         if path.exists():
@@ -85,6 +87,6 @@ class RowsAsJson:
 
 
 def batches_of(count: int, size: int) -> Iterator[tuple[int, range]]:
-    """(number, runs) of each batch of `size` of so many cases."""
+    """(number, runs) of each batch of at most `size` cases, of `count` cases in all."""
     for number in range(-(-count // size)):
         yield number, range(number * size, min((number + 1) * size, count))

@@ -1,7 +1,12 @@
-"""A study's cases flown on all cores, kept as they land: what is stopped or killed goes on where it was.
+"""The cases of a study are flown on all cores and kept as they land, so that an interrupted study can
+continue.
 
-While a study is under way its rows are in a hidden folder beside the result, `.<name>.flown`. The same
-command finds them there. Once the result is written they go.
+As long as a study is not complete, its rows are in a hidden folder beside the result, `.<name>.flown`. The
+same command reads them there and flies the other cases. The folder is removed when the result is written.
+
+    Study       what to fly, and what to make of the rows
+    _keeping    the hidden folder, locked, for this study alone
+    flown       all rows: flying.py flies the cases that are missing, store.py keeps them
 """
 
 import contextlib
@@ -25,24 +30,28 @@ from beaver_ftc.studies.present.page import Makers, contents, write_files
 Progress = Callable[[float], None]
 Fly = Callable[[Any], Any]
 GO_ON = "; what has been flown is kept, the same command goes on with it"
-OF_A_PART = 32  # cases that a study in rounds keeps together
+OF_A_PART = 32  # cases in a file of a study in rounds
 
 
 FlyRound = Callable[[Sequence[Any]], list[Any]]
-"""Flies one round of cases after the other, and gives their rows in order."""
+"""Flies a round of cases and returns their rows in order."""
 
 
 @dataclass(frozen=True)
 class Study:
     """A study: its cases, how each is flown, the document of all their rows, and its files.
 
-    name: of the result folder. fly: from a case to its row, a value of the type `row`; it can be pickled, as
-    the cases can. document: of all rows. files: their names, with what makes the content of each from the
-    document; None is no file. follows_from: what the rows follow from beside the cases. lost: the row of a
-    case that kills its process each time; without it that is a SimulationFailed. warm_up: of the workers.
-    part: how many cases are kept together; by default one, and OF_A_PART of a round. rounds: in place of
-    `cases`, where the next case follows from the rows before: flies round after round, and gives what the
-    document is of.
+    - name: of the result folder. cases: can be pickled, as `fly` can.
+    - fly: from a case to its row, a value of the type `row`.
+    - document: from all rows, in the order of the cases, to the document.
+    - files: by name, the function from the document to the content of a file; a content None is no file.
+    - follows_from: all that determines the rows beside the cases. If it changes, the kept rows are not used.
+    - lost: makes the row of a case that kills its process each time; without it, such a case raises
+      SimulationFailed.
+    - warm_up: called once in each worker.
+    - part: number of cases in a file; by default one, in rounds OF_A_PART.
+    - rounds: in place of `cases`, if later cases follow from earlier rows. It receives a function that flies
+      a round, and returns the argument of `document`.
     """
 
     name: str
@@ -67,15 +76,18 @@ def run_study(study: Study, out: Path, workers: int = 1, progress: Progress | No
 
 
 def run_into(study: Study, out: Path, workers: int = 1, progress: Progress | None = None) -> Document:
-    """The same; the document with the folder that it is kept in, as commands answer it."""
+    """Fly a study and write its folder; return its document with the path of the folder, as the answer of a
+    command."""
     return run_study(study, out, workers, progress) | {"folder": str(out / study.name)}
 
 
 @contextlib.contextmanager
 def flown(study: Study, out: Path, workers: int = 1, progress: Progress | None = None) -> Iterator[Any]:
-    """Yield the rows of all cases, in their order whatever the number of workers; or what `rounds` gives.
-    They are kept as they land, a part of cases at a time, and read from there: the same rows, whenever they
-    were flown. On success they go."""
+    """Yield the rows of all cases, in the order of the cases, or the result of `rounds`.
+
+    Rows are always read from the files in which they are kept, so that a resumed study has exactly the same
+    rows. The files are removed at the end of the block, unless it raises.
+    """
     make = partial(_workers, Work(study.fly, study.warm_up), workers)
     with (
         _keeping(study, out) as parts,
@@ -96,43 +108,45 @@ def flown(study: Study, out: Path, workers: int = 1, progress: Progress | None =
 def _fly_pieces(
     flying: Flying, pieces: Mapping[Any, range], cases: Sequence[Any], progress: Progress | None
 ) -> dict[Number, Any]:
-    """Fly cases by the piece; the rows of each."""
-    found: dict[Number, Any] = {}
+    """Fly cases; return the rows of each piece. pieces: the runs of each, by name. progress: takes the share
+    of pieces that have landed."""
+    rows_of_piece: dict[Number, Any] = {}
 
     def there(piece: Number, rows: Any) -> None:
-        found[piece] = rows
+        rows_of_piece[piece] = rows
         if progress:
-            progress(len(found) / len(pieces))
+            progress(len(rows_of_piece) / len(pieces))
 
     flying.fly(pieces.items(), lambda runs: [cases[n] for n in runs], there)
-    return found
+    return rows_of_piece
 
 
 @contextlib.contextmanager
 def _keeping(study: Study, out: Path) -> Iterator[store.Parts]:
-    """The parts of a study while it is under way; on success they go, without any so does the folder."""
-    kept = out / f".{study.name}.flown"
-    new = not out.exists()
-    with clear_disk_errors(kept):
-        kept.mkdir(parents=True, exist_ok=True)
-    with files.locked(kept):
-        parts = _begin(kept, study)
+    """Yield the parts of a study, in its hidden folder, which is locked. The folder is removed at the end of
+    the block, also if the block raises and no part has landed."""
+    hidden = out / f".{study.name}.flown"
+    is_new = not out.exists()
+    with clear_disk_errors(hidden):
+        hidden.mkdir(parents=True, exist_ok=True)
+    with files.locked(hidden):
+        parts = _begin(hidden, study)
         try:
             yield parts
         except BaseException as ended:
             if parts and GO_ON not in str(ended):
                 say_once(f"{study.name}: stopped{GO_ON}")
-            if not parts:  # nothing to go on with
-                shutil.rmtree(kept, ignore_errors=True)
+            if not parts:  # no rows to continue with
+                shutil.rmtree(hidden, ignore_errors=True)
                 with contextlib.suppress(OSError):
-                    if new:
+                    if is_new:
                         out.rmdir()
             raise
-        shutil.rmtree(kept, ignore_errors=True)
+        shutil.rmtree(hidden, ignore_errors=True)
 
 
 def fly_all(fly: Fly, cases: Sequence[Any], workers: int, progress: Progress | None = None) -> list[Any]:
-    """fly(case) of every case, in order, kept nowhere."""
+    """fly(case) of every case, in order. No row is kept in a file."""
 
     def is_new(number: Number, runs: Sequence[int]) -> None:
         """No rows have landed before."""
@@ -143,32 +157,34 @@ def fly_all(fly: Fly, cases: Sequence[Any], workers: int, progress: Progress | N
     make = partial(_workers, Work(fly), workers)
     pieces = store.batches_of(len(cases), 1)
     with contextlib.closing(Flying(is_new, forget, make, _fail)) as flying:
-        found = _fly_pieces(flying, dict(pieces), cases, progress)
-    return [found[n][0] for n in range(len(cases))]
+        rows_of_piece = _fly_pieces(flying, dict(pieces), cases, progress)
+    return [rows_of_piece[n][0] for n in range(len(cases))]
 
 
 def _workers(work: Work, workers: int, cases: int) -> Workers:
-    """This process if but one worker is asked for."""
+    """Worker processes; this process if one worker is requested."""
     return LocalWorkers(work, min(workers, cases)) if workers > 1 else ThisProcess(work)
 
 
-def _begin(kept: Path, study: Study) -> store.Parts:
-    """The parts of this very study; those of another, or of other versions, are of no use to it."""
+def _begin(hidden: Path, study: Study) -> store.Parts:
+    """The parts of this study. Parts of another study, or of other versions, are removed; parts without a
+    readable manifest are set aside."""
     asked = {"cases": repr(list(study.cases)), "asked": repr(study.follows_from)}
     mine = identity.of("study", asked)
-    manifest = kept / "study.json"
-    parts = store.Parts(kept / "parts", store.RowsAsJson(study.row), GO_ON)
-    there = identity.known(manifest, "study")
-    with clear_disk_errors(kept):
-        if there is None and parts:  # nothing says whose they are
+    manifest = hidden / "study.json"
+    parts = store.Parts(hidden / "parts", store.RowsAsJson(study.row), GO_ON)
+    earlier = identity.known(manifest, "study")
+    with clear_disk_errors(hidden):
+        if earlier is None and parts:  # they may belong to another study
             files.set_aside(parts.folder, f"{manifest.name} {files.UNREADABLE}")
-        if there != mine:
+        if earlier != mine:
             parts.remove()
             files.write_whole(manifest, json.dumps(mine).encode())
-        files.remove_leftovers(kept)
+        files.remove_leftovers(hidden)
         parts.folder.mkdir(exist_ok=True)
     return parts
 
 
 def _fail(case: Any, why: str) -> Any:
+    """In place of the row of a lost case, raise SimulationFailed."""
     raise SimulationFailed(f"{case}: {why}{GO_ON}")

@@ -1,10 +1,12 @@
-"""Workers that fly: the contract of a backend, worker processes on this machine, and this very process.
+"""Workers that fly: the contract of a backend, worker processes on this machine, and this process as a
+worker.
 
-A task is a batch, or some of its cases. Workers fly tasks and hand back their rows, or say that one was lost
-over it.
+A task is a batch, or some of its cases. Workers fly tasks and return their rows, or report that a worker was
+lost.
 
-Each worker is a pool of its own. In one pool of several, Python's or loky's, one that is killed takes the
-tasks of all the others with it (loky: TerminatedWorkerError in each), so nothing tells which case kills.
+Each worker is a process pool with one process. In a pool of several processes, Python's or loky's, a killed
+process ends the tasks of all others (loky: TerminatedWorkerError in each), so that the case that kills cannot
+be found.
 """
 
 import contextlib
@@ -28,17 +30,18 @@ from beaver_ftc.studies.engine.processes import (
     start_early,
 )
 
-MAX_JOIN_S = 5.0  # how long to wait for a pool's thread; it ends milliseconds after its worker
-# Starts of a worker, each later, should the process that it is forked from be killed meanwhile: one that is
-# killed closes its pipe before the system says that it has ended, so what comes at once finds it still there.
+MAX_JOIN_S = 5.0  # longest wait for the thread of a pool, which ends milliseconds after its worker
+# Pauses before the attempts to start a worker, in case the fork server is killed. A killed server closes its
+# pipe before the system reports its end, so that an attempt without a pause would use it again.
 STARTS_AFTER_S = (0.0, 0.1, 1.0)
 
 Row = Any
-Number = int | str  # of a batch: what its file is called
+Number = int | str  # of a batch; it names its file
 
 
 class Batch(NamedTuple):
-    """Cases that land together, or those of them that one worker flies in turn; runs: their places."""
+    """Cases that land together, or a task: some of these cases, which one worker flies in turn. runs: their
+    numbers."""
 
     number: Number
     runs: Sequence[int]
@@ -46,35 +49,36 @@ class Batch(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """The outcome of a task: its rows, or None if the worker was lost over it."""
+    """The outcome of a task: its rows, or None if its worker was lost."""
 
     task: Batch
     rows: list[Row] | None
 
 
 class Work(NamedTuple):
-    """The work of a worker: to fly a case; and once, before its first, to warm up. Both can be pickled."""
+    """The work of a worker. fly: from a case to its row. warm_up: called once before the first case. Both can
+    be pickled."""
 
     fly: Callable[[Any], Row]
     warm_up: Callable[[], None] | None = None
 
     def all(self, cases: Sequence[Any]) -> list[Row]:
-        """Fly one after the other."""
+        """Fly cases in turn."""
         return [self.fly(case) for case in cases]
 
 
 class Workers(Protocol):
-    """A backend."""
+    """A backend: several workers that fly tasks."""
 
     @property
     def slots(self) -> int:
-        """How many tasks to keep in its hands, so that no worker waits."""
+        """The largest number of submitted tasks; with so many, no worker waits."""
 
     def submit(self, task: Batch) -> None:
-        """Take a task; never more at a time than `slots`."""
+        """Take a task. The caller submits at most `slots` at a time."""
 
     def outcomes(self, timeout_s: float) -> list[Outcome]:
-        """The tasks that have ended, as soon as there is one, or none when the time is over."""
+        """The outcomes of tasks that have ended: waits for the first one, but at most timeout_s."""
 
     def close(self) -> None:
         """Terminate all workers, whatever they are doing."""
@@ -82,7 +86,7 @@ class Workers(Protocol):
 
 @dataclass
 class ThisProcess:
-    """The one worker that needs no other process, and so does not survive a flight that kills it."""
+    """This process as the only worker. A case that kills its process kills the study."""
 
     work: Work
     slots = 1
@@ -98,19 +102,20 @@ class ThisProcess:
 
 
 class _Worker:
-    """A process of its own: one that dies takes nobody else's task with it."""
+    """A worker process with a pool of its own."""
 
     def __init__(self, work: Work) -> None:
         for pause_s in STARTS_AFTER_S:
             time.sleep(pause_s)
             self._pool = ProcessPoolExecutor(1, mp_context=context(), initializer=_begin, initargs=(work,))
-            with contextlib.suppress(EOFError, ConnectionError):  # what it is forked from was killed: again
+            with contextlib.suppress(EOFError, ConnectionError):  # the fork server was killed: try again
                 self.pid = self._started()
                 return
         raise SimulationFailed("a worker process cannot start: what it is forked from is ended, each time")
 
     def _started(self) -> "Future[int]":
-        # What the worker is forked from is deaf to Ctrl-C; to wait for it, for its imports, is not.
+        """The process id of the started worker. Ctrl-C while this process waits kills the fork server, which
+        itself ignores Ctrl-C."""
         start_early()
         forked = context().get_start_method() == "forkserver"
         try:
@@ -124,9 +129,11 @@ class _Worker:
         return self._pool.submit(_fly, task.cases)
 
     def end(self) -> None:
-        """Terminate it, started or not. Its futures are left to fail: a pool that breaks cannot fail
-        cancelled ones, and says so in a traceback. Its thread is waited for: an interpreter that exits while
-        the thread closes its pipe writes to that, and says so too.
+        """Terminate the process, started or not.
+
+        Futures are not cancelled: a broken pool prints a traceback if it cannot fail a cancelled future. The
+        thread of the pool is joined: an interpreter that exits while this thread closes its pipe prints a
+        traceback, too.
         """
         running = [*(self._pool._processes or {}).values()]
         thread: Any = self._pool._executor_manager_thread
@@ -138,7 +145,7 @@ class _Worker:
 
 
 class LocalWorkers:
-    """Processes on this machine. One that dies is replaced, and its task handed back as lost."""
+    """Processes on this machine. A process that dies is replaced, and its task is returned as lost."""
 
     def __init__(self, work: Work, workers: int) -> None:
         self._work = work
@@ -147,8 +154,8 @@ class LocalWorkers:
         self._idle: list[_Worker] = []
         try:
             for n in range(workers):
-                self._idle.append(_Worker(work))  # one by one: an exception ends those that are there
-                # the first compiles, should that be needed; the others find it done
+                self._idle.append(_Worker(work))  # one at a time: `close` ends those that have started
+                # the first one compiles the kernels, if necessary, before the others start
                 if n == 0 and self._idle[0].pid.exception():
                     raise SimulationFailed("a worker process cannot start: it ended before its first flight")
         except BaseException as error:
@@ -181,19 +188,20 @@ class LocalWorkers:
             rows = flown.result()
         except BrokenProcessPool:
             worker = _Worker(self._work)
-        except Exception as error:  # not a flight's: those are in their rows
+        except Exception as error:  # of the worker; the error of a flight is in its row
             raise SimulationFailed(f"a worker cannot go on: {error}") from error
         finally:
             self._idle.append(worker)
         return Outcome(task, rows)
 
 
-_OF_THIS_PROCESS: list[Work] = []  # a worker's only one
+_OF_THIS_PROCESS: list[Work] = []  # in a worker process, its work
 
 
 def _begin(work: Work) -> None:
-    """Make this process a worker: silent, deaf to the terminal's Ctrl-C, and warm."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # it is for the process that gives the orders
+    """Make this process a worker: without output and Ctrl-C of the terminal, ending with its parent, and
+    warm."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent, which ends its workers
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     silence_this_process()
@@ -203,7 +211,7 @@ def _begin(work: Work) -> None:
 
 
 def _end_with_parent() -> None:
-    """A worker whose parent has been killed has nobody to fly for."""
+    """Wait for the end of the parent process, then end this process."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()

@@ -1,7 +1,8 @@
 """The informed test: whether a test that knows the fault detects it, at the same rate of false alarms.
 
-What the fault adds to the accelerations is known from the truth: where the surface was, less where a healthy
-one would have been under the same commands. Coefficients are unknown constants, even over their tolerance.
+The test knows the acceleration phi that the fault adds. phi follows from the effective deflection of the
+surface in the truth less that of a healthy surface with the same commands. Coefficients are unknown
+constants, evenly distributed over their tolerance.
 """
 
 from math import sqrt
@@ -31,19 +32,19 @@ COLUMNS = (
 
 
 def columns_of(aircraft: Aircraft) -> Columns:
-    """The columns that the test needs of a flight, still empty."""
-    surfaces = [f"{s}_{of_it}_rad" for s in aircraft.surfaces for of_it in ("cmd", "effective")]
+    """An empty log with the columns of a flight that the test needs."""
+    surfaces = [f"{s}_{which}_rad" for s in aircraft.surfaces for which in ("cmd", "effective")]
     return Columns(*COLUMNS, *aircraft.signals, *surfaces)
 
 
 def seen_when_told(scenario: "Scenario", kept: Columns, surface: str) -> Document:
-    """told_deflection: d of the fault of a surface since it struck; told_chance: the probability of finding
-    it in that time.
+    """told_deflection: deflection d of the fault of a surface from its begin to the end of the flight.
+    told_chance: the probability of detecting it in this time.
 
-    d is the deflection of phi, what the fault adds to the rates' accelerations, beside what the coefficients
-    of `regressors` with standard deviations `sigma` may add; if sensors are in doubt, the least over an error
-    of any gyro. phi (n, 3) rad/s2; regressors (n, 3, m) rad/s2 per 1; sigma (m,): of an even distribution
-    over the tolerance.
+    d: size of phi (n, 3) rad/s2 in the whitened noise, in standard deviations, if the unknown coefficients
+    may add regressors @ c. regressors (n, 3, m) rad/s2 per 1; c (m,) with standard deviations sigma (m,),
+    tolerance / sqrt(3) of an even distribution. If the diagnosis monitors the sensors, d is the smallest
+    value over an error of each gyro.
     """
     assert scenario.fdi.statistical is not None
     aircraft = scenario.airframe
@@ -53,21 +54,25 @@ def seen_when_told(scenario: "Scenario", kept: Columns, surface: str) -> Documen
     off_rad = np.where(
         struck, kept[f"{surface}_effective_rad"] - healthy_positions(context, kept, surface), 0.0
     )
-    own = [term for term in aircraft.moments if term.surface == surface]
-    phi = np.sum([term.value * term_acceleration(aircraft, term, kept, off_rad) for term in own], axis=0)
+    own_terms = [term for term in aircraft.moments if term.surface == surface]
+    phi = np.sum(
+        [term.value * term_acceleration(aircraft, term, kept, off_rad) for term in own_terms], axis=0
+    )
     unknown = [(t, c) for t, c in zip(aircraft.moments, coefficients, strict=True) if c > 0.0]
     regressors = [term_acceleration(aircraft, t, kept, kept.get(f"{t.surface}_cmd_rad")) for t, _ in unknown]
     sigma = np.array([c for _, c in unknown]) / sqrt(3.0)
-    beside = np.stack(regressors, axis=-1) if unknown else np.zeros((*phi.shape, 0))
-    gyros = range(3) if Declared.of(scenario).monitors_sensors else (None,)  # which may have any error
-    d = min(WhiteningFilter(context, gyro).deflection_with_unknowns(phi, beside, sigma) for gyro in gyros)
+    stacked = np.stack(regressors, axis=-1) if unknown else np.zeros((*phi.shape, 0))
+    gyros = (
+        range(3) if Declared.of(scenario).monitors_sensors else (None,)
+    )  # the gyro that may have any error
+    d = min(WhiteningFilter(context, gyro).deflection_with_unknowns(phi, stacked, sigma) for gyro in gyros)
     rate = scenario.fdi.statistical.false_alarms_per_h
     return {"told_deflection": d, "told_chance": detection_probability(d, scenario.duration_s - at_s, rate)}
 
 
 def _declared(scenario: "Scenario") -> tuple[Context, np.ndarray]:
-    """The declaration of a flight without the coefficients, the air as the vanes show it if they do; and the
-    tolerances of the coefficients, absolute."""
+    """The context of a flight with exact coefficients, and the absolute tolerances of the coefficients. If
+    the diagnosis subtracts the gust that the vanes measure, the context has the measured gust."""
     from beaver_ftc.loop.loop import Loop
     from beaver_ftc.loop.plugin_frame import context_of
     from beaver_ftc.loop.readout import FrameReadout

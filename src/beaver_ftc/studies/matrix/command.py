@@ -74,6 +74,7 @@ class Matrix(StudyCommand):
         return run_into(study, self.out, self.processes, reporter.progress)
 
     def _check(self) -> None:
+        """Raise BadInput for options that exclude each other."""
         if self.pitch_lost and self.declared:
             raise BadInput("--pitch-lost and --declared exclude each other, allowed: one of them")
         if self.pitch_lost and self.aircraft:
@@ -85,6 +86,6 @@ class Matrix(StudyCommand):
             raise BadInput("--turbulence is only flown where it is declared, allowed: with --declared")
 
     def as_text(self, document: Document, colour: bool) -> str:
-        """Table, remarks and totals, and where the files are."""
+        """Table, remarks and totals, and the folder of the files."""
         shown = lost.as_text if self.pitch_lost else matrix_shown.as_text
         return f"{shown(document)}\n\nresults: {document['folder']}"

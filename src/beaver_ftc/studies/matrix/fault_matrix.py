@@ -1,7 +1,14 @@
 """Every fault type on every surface: the verdict of the diagnosis, and the tracking of the flight.
 
-Each flight is flown with the fault-tolerant law and with the oracle; a cell of the matrix is a fault on a
-surface, the worst of its airspeeds.
+Each case is flown with the fault-tolerant law and with the oracle. A cell of the matrix is a fault on a
+surface, with the worst result over the airspeeds.
+
+    verdict    meaning, the best first
+    named      surface and type are right
+    surface    the surface is right, and its type is not determined, but not excluded
+    open       no name, and the fault is among the candidates
+    unseen     no alarm
+    WRONG      a false alarm, a wrong name or type, or the fault is excluded
 """
 
 from collections import Counter
@@ -28,23 +35,24 @@ from beaver_ftc.studies.matrix.clairvoyant import columns_of, seen_when_told
 from beaver_ftc.studies.matrix.matrix_shown import FILES, NAME, VERDICTS
 from beaver_ftc.studies.reproduce.choices import SETTING
 
-TOLERANCE = 0.05
+TOLERANCE = 0.05  # of the coefficients, with declared errors
 SENSORS = "tactical-grade"
 AIRSPEEDS_MPS = (38.0, 45.0, 52.0)
-AT_S = 12.0
+AT_S = 12.0  # begin of the fault
 DURATION_S = 30.0
-NAMED = ("surface", "named")
-DECLARED = "fault-matrix-declared"  # the name of the folder, as NAME
-LIKELY = 0.5  # a test that finds a fault more often than not sees it
+NAMED = ("surface", "named")  # verdicts with the right surface
+DECLARED = "fault-matrix-declared"  # name of the folder with declared errors, in place of NAME
+LIKELY = 0.5  # the informed test detects a fault with a larger probability
 REFERENCE, UNCERTAINTY = SETTING["reference"], SETTING["uncertainty"]
 
-# Name in the table, and the fault; off_deg: a jam this far off the trimmed command.
+# Name in the table, and keys of the fault. off_deg: a jam at this angle from the trimmed deflection.
 FAULTS: tuple[tuple[str, Document], ...] = tuple(
     (name, {"type": kind, **keys}) for kind, row in TYPES.items() for name, keys in row.examples
 )
 
 
-Rows = list[Document]  # of flights
+Rows = list[Document]
+"""Rows of flights."""
 
 
 class FaultCase(NamedTuple):
@@ -53,18 +61,18 @@ class FaultCase(NamedTuple):
     fault: str
     surface: str
     airspeed_mps: float
-    declared: bool = False  # with the errors of `declared`
+    declared: bool = False  # whether it has the errors of `declared`
     aircraft: str = DEFAULT
     turbulence: str = "none"  # flown and declared, with `declared`
 
 
 def airspeeds_of(reference: str) -> tuple[float, ...]:
-    """Airspeeds to fly an aircraft at, m/s."""
+    """The airspeeds of the cases of an aircraft, m/s."""
     return usual_airspeeds(aircraft_of(reference), AIRSPEEDS_MPS)
 
 
 def aircraft_of(reference: str) -> Aircraft:
-    """The aircraft of that name; a folder is looked for in the working directory."""
+    """The aircraft with this name. A folder is looked for in the working directory."""
     return find_aircraft(reference, Path())
 
 
@@ -82,14 +90,15 @@ def cases(
 
 
 def declared(turbulence: str = "none", aircraft: str = DEFAULT) -> Document:
-    """Real sensors, servos, air, and coefficients at the ends of their tolerance by turns, where the truth
-    lets them be wrong: all of it declared.
+    """Keys of a scenario with errors of sensors, servos, air and coefficients, all of them declared.
+    Coefficients are in turn at the lower and the upper end of their tolerance, if the truth has a factor for
+    them.
     """
     names = adjustable_terms(aircraft)
-    wrong = {name: 1.0 + (TOLERANCE if i % 2 else -TOLERANCE) for i, name in enumerate(names)}
-    bounds = {"coefficients": TOLERANCE if wrong else 0.0, "sensors": SENSORS, "turbulence": turbulence}
+    factors = {name: 1.0 + (TOLERANCE if i % 2 else -TOLERANCE) for i, name in enumerate(names)}
+    bounds = {"coefficients": TOLERANCE if factors else 0.0, "sensors": SENSORS, "turbulence": turbulence}
     return {
-        "uncertainty": UNCERTAINTY | {"coefficients": wrong} if wrong else {},
+        "uncertainty": UNCERTAINTY | {"coefficients": factors} if factors else {},
         "sensors": SENSORS,
         "actuators": "servo",
         "environment": air_of(turbulence),
@@ -103,14 +112,14 @@ def declared(turbulence: str = "none", aircraft: str = DEFAULT) -> Document:
 
 @lru_cache
 def adjustable_terms(aircraft: str) -> tuple[str, ...]:
-    """Names of an aircraft's terms that its truth lets be wrong; none of a derived one."""
+    """Names of the terms of an aircraft whose truth has a factor for them; a derived aircraft has none."""
     flown = aircraft_of(aircraft)
     plant = Plant(100, aircraft=flown)
     return tuple(t.name for t in flown.moments if plant.has(f"uncertainty/{t.name}-scale"))
 
 
 def scenario_of(case: FaultCase, law: str, trimmed_deg: float) -> Scenario:
-    """The flight of a case under a law; trimmed_deg: the surface's deflection in trim."""
+    """The flight of a case with a law. trimmed_deg: deflection of the surface in trim."""
     fault = dict(dict(FAULTS)[case.fault])
     if "off_deg" in fault:
         fault["position_deg"] = trimmed_deg + fault.pop("off_deg")
@@ -132,7 +141,7 @@ def scenario_of(case: FaultCase, law: str, trimmed_deg: float) -> Scenario:
 
 @lru_cache
 def trimmed_deg(airspeed_mps: float, surface: str, aircraft: str = DEFAULT) -> float:
-    """Deflection of a surface in the trim the cases start from."""
+    """Deflection of a surface, deg, in the trim with which the cases start."""
     flown = aircraft_of(aircraft)
     altitude_m = initial_of(flown)().altitude_m
     point = trim(airspeed_mps, altitude_m, plant=Plant(100, aircraft=flown))
@@ -140,16 +149,17 @@ def trimmed_deg(airspeed_mps: float, surface: str, aircraft: str = DEFAULT) -> f
 
 
 def fly_case(case: FaultCase) -> Document:
-    """The row of a case: fault, verdict, tracking beside the oracle's, and why it was lost, if so."""
+    """The row of a case: fault, verdict, tracking with both laws, and the informed test if errors are
+    declared."""
     off_deg = trimmed_deg(case.airspeed_mps, case.surface, case.aircraft)
     ours, best = (scenario_of(case, law, off_deg) for law in ("fault-tolerant-published", "oracle-published"))
-    kept = columns_of(ours.airframe) if case.declared else None
-    flight, oracle = fly(ours, kept), fly(best)
-    seen = {} if kept is None else seen_when_told(ours, kept, case.surface)
-    return {**case._asdict(), **_diagnosis(flight, case), **_tracking(flight, oracle, case), **seen}
+    log = columns_of(ours.airframe) if case.declared else None
+    flight, oracle = fly(ours, log), fly(best)
+    informed = {} if log is None else seen_when_told(ours, log, case.surface)
+    return {**case._asdict(), **_diagnosis(flight, case), **_tracking(flight, oracle, case), **informed}
 
 
-DIAGNOSED = {  # by key of a row where it is in the metrics
+DIAGNOSED = {  # key of a row: path in the metrics
     "detected": "detection.detected", "delay_s": "detection.delay_s", "false_alarm": "false_alarm",
     "isolated": "isolation.fault", "isolation_delay_s": "isolation.delay_s", "type": "isolation.type",
     "candidates": "isolation.candidates", "estimate": "isolation.estimate",
@@ -157,22 +167,24 @@ DIAGNOSED = {  # by key of a row where it is in the metrics
 
 
 def _diagnosis(flight: Landing, case: FaultCase) -> Document:
-    found = measure(flight)
-    row = {key: found.at(path) for key, path in DIAGNOSED.items()}
+    """The part of a row about the diagnosis."""
+    metrics = measure(flight)
+    row = {key: metrics.at(path) for key, path in DIAGNOSED.items()}
     row["candidates"] = list(row["candidates"])
-    return row | {"verdict": verdict(found, case.surface, flight.scenario.faults[0].type)}
+    return row | {"verdict": verdict(metrics, case.surface, flight.scenario.faults[0].type)}
 
 
-def verdict(found: Metrics, surface: str, true_type: str) -> str:
-    """named (surface and type right), surface (right, type open), open (still possible), unseen or WRONG."""
-    isolation = found.isolation
-    if not found.detection.detected:
+def verdict(metrics: Metrics, surface: str, true_type: str) -> str:
+    """The verdict on a flight, as the table of the module says. true_type: type of the fault of the
+    surface."""
+    isolation = metrics.isolation
+    if not metrics.detection.detected:
         return "unseen"
-    if found.false_alarm:
+    if metrics.false_alarm:
         return "WRONG"
     if isolation.fault is None:
-        left = isolation.candidates
-        return "open" if surface in left or f"{surface}:{true_type}" in left else "WRONG"
+        candidates = isolation.candidates
+        return "open" if surface in candidates or f"{surface}:{true_type}" in candidates else "WRONG"
     if not isolation.correct or isolation.type_correct is False:
         return "WRONG"
     if isolation.type is None:
@@ -181,8 +193,12 @@ def verdict(found: Metrics, surface: str, true_type: str) -> str:
 
 
 def _tracking(flight: Landing, oracle: Landing, case: FaultCase) -> Document:
+    """The part of a row about tracking, on the axis of the largest effect of the surface, and about
+    departures."""
     axis = axis_of(flight.scenario, case.surface)
-    rms_rad_s = [(one.post_fault_rms_rad_s or (0.0,) * 3)[AXES.index(axis)] for one in (flight, oracle)]
+    rms_rad_s = [
+        (outcome.post_fault_rms_rad_s or (0.0,) * 3)[AXES.index(axis)] for outcome in (flight, oracle)
+    ]
     ours, best = map(degrees, rms_rad_s)
     departure_s, signal = flight.departure or (None, None)
     return {
@@ -199,9 +215,10 @@ def _tracking(flight: Landing, oracle: Landing, case: FaultCase) -> Document:
 
 
 def document_of(rows: Rows) -> Document:
-    """The whole matrix as a document: cells, single flights, and what went wrong anywhere."""
+    """The document of the matrix: cells, flights, wrong names and false alarms, and aircraft that only our
+    law lost."""
     surfaces = dict.fromkeys(row["surface"] for row in rows)
-    told = [row for row in rows if "told_chance" in row]
+    informed = [row for row in rows if "told_chance" in row]
     wrong = sum(row["verdict"] == "WRONG" for row in rows)
     false_alarms = sum(row["false_alarm"] for row in rows)
     return {
@@ -214,19 +231,19 @@ def document_of(rows: Rows) -> Document:
             row for row in rows if row["departure_s"] is not None and row["oracle_departure_s"] is None
         ],
         "passed": not wrong and not false_alarms,
-        **({"told": beside_told(told)} if told else {}),
+        **({"told": beside_told(informed)} if informed else {}),
     }
 
 
 def beside_told(rows: Rows) -> Document:
-    """The outcome of the flights in which a test that knows the fault detects it.
+    """The results of the flights in which the informed test detects the fault with a probability above
+    LIKELY.
 
-    named: the right surface, whether or not its type is still open; type_kept: the right type is named or
-    among the candidates.
+    named: the right surface is named. type_kept: the right type is named or among the candidates.
     """
     seen = [row for row in rows if row["told_chance"] > LIKELY]
     named = [row for row in seen if row["verdict"] in NAMED]
-    seen_on, named_on = (Counter(row["surface"] for row in of_it) for of_it in (seen, named))
+    n_seen, n_named = (Counter(row["surface"] for row in group) for group in (seen, named))
     surfaces = dict.fromkeys(row["surface"] for row in rows)
     return {
         "flights": len(rows),
@@ -235,12 +252,13 @@ def beside_told(rows: Rows) -> Document:
         "named": len(named),
         "share": len(named) / len(seen) if seen else None,
         "type_kept": sum(row["detected"] and row["verdict"] != "WRONG" for row in seen),
-        "by_surface": {s: {"seen": seen_on[s], "named": named_on[s]} for s in surfaces},
+        "by_surface": {s: {"seen": n_seen[s], "named": n_named[s]} for s in surfaces},
         "detected_but_not_told": sum(row["detected"] and row["told_chance"] <= LIKELY for row in rows),
     }
 
 
 def _cell(fault: str, surface: str, rows: Rows) -> Document:
+    """The worst results of a fault on a surface over the airspeeds."""
     here = [row for row in rows if (row["fault"], row["surface"]) == (fault, surface)]
     delays = [row["delay_s"] for row in here]
     return {
@@ -259,7 +277,7 @@ def _cell(fault: str, surface: str, rows: Rows) -> Document:
 
 
 def _reason(lost: Rows) -> str:
-    """Why the aircraft is lost, as the flights of the oracle show it."""
+    """The reason of the loss of the aircraft, from the flights of the oracle."""
     beyond_s = max(row["oracle_beyond_s"] for row in lost)
     if beyond_s > 0.0:
         return f"for {beyond_s:.1f} s no deflection could hold the {lost[0]['axis']} rate"
@@ -270,11 +288,11 @@ def _reason(lost: Rows) -> str:
 
 
 def _remark(here: Rows) -> str:
-    """How many flights lose the aircraft, and why; or that the fault has no effect in any of them."""
+    """How many flights lose the aircraft, and the reason; or that no flight has an alarm."""
     lost = [row for row in here if row["departure_s"] is not None]
     if lost:
-        also = sum(row["oracle_departure_s"] is not None for row in lost)
-        return f"lost in {len(lost)} of {len(here)} flights, the oracle in {also}: {_reason(lost)}"
+        oracle_lost = sum(row["oracle_departure_s"] is not None for row in lost)
+        return f"lost in {len(lost)} of {len(here)} flights, the oracle in {oracle_lost}: {_reason(lost)}"
     if all(not row["detected"] for row in here):
         return "no effect beyond the declared uncertainty: tracking is as before"
     return ""
@@ -284,7 +302,7 @@ def matrix_study(
     airspeeds_mps: tuple[float, ...] | None = None, declared: bool = False, aircraft: str = DEFAULT,
     turbulence: str = "none",
 ) -> Study:  # fmt: skip
-    """The matrix of an aircraft, with errors or without, in such air."""
+    """The study of an aircraft, with declared errors or without, and with this severity of turbulence."""
     name = DECLARED if declared else NAME
     folder = name if turbulence == "none" else f"{name}-{turbulence}"
     all_cases = cases(airspeeds_mps or airspeeds_of(aircraft), declared, aircraft, turbulence)

@@ -1,4 +1,4 @@
-"""The fault matrix as a text and a heat map: a row a fault, a column a surface."""
+"""The fault matrix as a text and as a heat map: a row for each fault, a column for each surface."""
 
 from typing import TYPE_CHECKING
 
@@ -18,9 +18,9 @@ NAME = "fault-matrix"
 SHOWN = {
     "WRONG": "WRONG", "unseen": "not detected", "open": "ambiguous", "surface": "surface", "named": "named"
 }  # fmt: skip
-"""Verdicts of the document, and the words for people."""
+"""Words for the verdicts of the document."""
 
-LOOKS = {  # symbol and colour; lightness orders them in grey
+LOOKS = {  # symbol and colour of each verdict; in grey, the lightness orders them
     "WRONG": ("\u2718", VERMILION), "unseen": ("\u2013", "#c9c9c9"), "open": ("?", "#f3d27f"),
     "surface": ("\u25d1", "#c3e1f4"), "named": ("\u2714", "#d3f0e5"),
 }  # fmt: skip
@@ -43,7 +43,10 @@ def as_text(document: Document) -> str:
     surfaces, rows = _table(document)
     width = max(map(len, rows))
     texts = {"": surfaces} | {fault: map(_cell_text, cells) for fault, cells in rows.items()}
-    table = [f"{name:{width}}" + "".join(f"  {text:26}" for text in of) for name, of in texts.items()]
+    table = [
+        f"{name:{width}}" + "".join(f"  {text:26}" for text in texts_of_row)
+        for name, texts_of_row in texts.items()
+    ]
     lost = [cell for cell in document["cells"] if cell["lost"]]
     remarks = ["* {surface} {fault}: {remark}".format(**cell) for cell in lost]
     totals = (
@@ -51,39 +54,42 @@ def as_text(document: Document) -> str:
         f"{document['false_alarms']} false alarms, "
         f"{len(document['lost_though_the_oracle_was_not'])} aircraft lost although the law oracle kept it"
     )
-    told = document.get("told")
-    legend, share = (LEGEND + TOLD_LEGEND, [_told(told)]) if told else (LEGEND, [])
-    said = [*remarks, ""] if remarks else []
-    return "\n".join([*map(str.rstrip, table), "", legend, "", *said, totals, *share])
+    informed = document.get("told")
+    legend, share = (LEGEND + TOLD_LEGEND, [_told(informed)]) if informed else (LEGEND, [])
+    remark_lines = [*remarks, ""] if remarks else []
+    return "\n".join([*map(str.rstrip, table), "", legend, "", *remark_lines, totals, *share])
 
 
 def _table(document: Document) -> tuple[list[str], dict[str, list[Document]]]:
-    """The surfaces, and of each fault the cells, in the order of the surfaces."""
+    """The surfaces; and by fault, its cells in the order of the surfaces."""
     rows = {fault: cells for (fault,), cells in grouped(document["cells"], "fault").items()}
     return [cell["surface"] for cell in next(iter(rows.values()))], rows
 
 
 def _cell_text(cell: Document) -> str:
+    """Verdict, delay, tracking ratio and marks of a cell."""
     delay = "     -" if cell["delay_s"] is None else f"{cell['delay_s']:4.2f} s"
     ratio = "" if cell["ratio"] is None else f"{cell['ratio']:.1f}x"
     unseen = "o" if cell.get("told") == 0 else ""
     return f"{SHOWN[cell['verdict']]:12} {delay} {ratio:>5}{'*' if cell['lost'] else ''}{unseen}"
 
 
-def _told(told: Document) -> str:
-    """How many of the faults that can be seen are named."""
-    if not told["seen"]:
+def _told(test: Document) -> str:
+    """How many faults the informed test detects, and how many of these the diagnosis detects and names."""
+    if not test["seen"]:
         return "the informed test, which knows the fault, detects none of them"
-    surfaces = ", ".join(f"{s} {of['named']} of {of['seen']}" for s, of in told["by_surface"].items())
+    surfaces = ", ".join(
+        f"{s} {counts['named']} of {counts['seen']}" for s, counts in test["by_surface"].items()
+    )
     return (
-        f"the informed test, which knows the fault, detects {told['seen']} of {told['flights']}. Of these "
-        f"the diagnosis detects {told['detected']},\nnames the right surface in {told['named']} "
-        f"({percent(told['share'])}: {surfaces}), and keeps the right type in {told['type_kept']}"
+        f"the informed test, which knows the fault, detects {test['seen']} of {test['flights']}. Of these "
+        f"the diagnosis detects {test['detected']},\nnames the right surface in {test['named']} "
+        f"({percent(test['share'])}: {surfaces}), and keeps the right type in {test['type_kept']}"
     )
 
 
 def heat_map_of(document: Document) -> "Figure":
-    """Colour and symbol give the verdict, the line below delay and tracking."""
+    """Colour and symbol show the verdict; the line below them has delay and tracking ratio."""
     from matplotlib.colors import ListedColormap
 
     surfaces, rows = _table(document)
@@ -91,8 +97,8 @@ def heat_map_of(document: Document) -> "Figure":
     labels = {(i, j): _label(cell) for i, cells in enumerate(rows.values()) for j, cell in enumerate(cells)}
     figure, panel = panels(1, 1, 11.0, 0.5 * len(rows) + 1.8)
     colours = ListedColormap([LOOKS[verdict][1] for verdict in VERDICTS])
-    most = len(VERDICTS) - 0.5
-    heat_map(panel[0, 0], grid, labels, surfaces, [*rows], cmap=colours, vmin=-0.5, vmax=most)
+    upper = len(VERDICTS) - 0.5
+    heat_map(panel[0, 0], grid, labels, surfaces, [*rows], cmap=colours, vmin=-0.5, vmax=upper)
     label_edges(panel, titles=["Each fault on each surface: alarm delay, tracking RMS / the informed law's"])
     return figure
 

@@ -24,10 +24,10 @@ from beaver_ftc.studies.present.tables import aligned, tabulated
 NAME = "pitch-lost"
 DURATION_S = 100.0
 COLUMNS = ("t_s", "q_rad_s", "theta_rad", "phi_rad", "airspeed_mps", "envelope_valid")
-SETTLED_S = 30.0  # from here on the swing is judged: what the fault itself throws off is over
+SETTLED_S = 30.0  # the swing is measured from this time on, when the transient of the faults is over
 LAWS = ("fault-tolerant-published", "oracle-published")
 
-# Elevator's jam off its trim in deg (None: it floats), flap's position in deg.
+# Jam of the elevator, deg from its trim (None: it floats), and position of the flap, deg.
 LOST: dict[str, tuple[float | None, float]] = {
     "elevator at trim": (0.0, 0.0), "elevator +1 deg": (1.0, 0.0), "elevator -1 deg": (-1.0, 0.0),
     "elevator +2 deg": (2.0, 0.0), "elevator -2 deg": (-2.0, 0.0), "elevator floats": (None, 0.0),
@@ -67,26 +67,27 @@ def scenario_of(case: PitchCase, enabled: bool) -> Scenario:
 
 
 def fly_case(case: PitchCase) -> Document:
-    """The row of a case: what came of it without engine power and with it."""
+    """The row of a case: the outcomes without engine power on pitch and with it."""
     without, powered = (_outcome(scenario_of(case, enabled)) for enabled in (False, True))
     return {**case._asdict(), "without": without, "with": powered}
 
 
 def _outcome(scenario: Scenario) -> Document:
-    """RMS pitch rate and swing of the attitude once settled, null if the aircraft was lost; airspeed, bank
-    and stay outside the validated envelope since the fault."""
-    kept = Columns(*COLUMNS)
-    found = metrics(fly(scenario, kept))
-    late, after = kept.since(SETTLED_S), kept.since(AT_S)
-    lost = found["departure"] is not None
+    """The outcome of a flight. RMS pitch rate and swing of the pitch attitude are from SETTLED_S on, null if
+    the aircraft was lost. Range of airspeed, largest bank and share of time outside the validated envelope
+    are from the fault on."""
+    log = Columns(*COLUMNS)
+    document = metrics(fly(scenario, log))
+    late, after = log.since(SETTLED_S), log.since(AT_S)
+    lost = document["departure"] is not None
     return {
         "q_rms_deg_s": None if lost else degrees(float(np.sqrt(np.mean(late["q_rad_s"] ** 2)))),
         "theta_swing_deg": None if lost else degrees(float(np.ptp(late["theta_rad"]))),
         "airspeed_mps": [float(after["airspeed_mps"].min()), float(after["airspeed_mps"].max())],
         "bank_deg": degrees(float(np.abs(after["phi_rad"]).max())),
         "outside_share": float(np.mean(after["envelope_valid"] < 0.5)),
-        "departure": found["departure"],
-        "engine_power": found["engine_power"],
+        "departure": document["departure"],
+        "engine_power": document["engine_power"],
     }
 
 
@@ -98,7 +99,8 @@ def pitch_lost_study(airspeeds_mps: tuple[float, ...] | None) -> Study:
 
 
 def document_of(rows: list[Document], airspeeds_mps: Sequence[float]) -> Document:
-    """All flights, the linear margins, and whether power lost an aircraft that was kept without it."""
+    """All flights, the linear margins, and how many aircraft engine power saved, or lost that were kept
+    without it."""
     harmed = [row for row in rows if row["with"]["departure"] and not row["without"]["departure"]]
     return {
         "margins": [margins(V) for V in airspeeds_mps],
@@ -117,7 +119,7 @@ LEGEND = (
 
 
 def as_text(document: Document) -> str:
-    """A table for each law, then what the linear model says, and the totals."""
+    """A table for each law, the margins of the linear model, and the totals."""
     speeds = [found["airspeed_mps"] for found in document["margins"]]
     flights = {(row["law"], row["lost"], row["airspeed_mps"]): row for row in document["flights"]}
     tables = [
@@ -140,11 +142,13 @@ FILES: Makers = {f"{NAME}.json": as_json, f"{NAME}.txt": lambda document: as_tex
 
 
 def _cell(row: Document) -> str:
+    """Both outcomes of a case."""
     star = "*" if row["with"]["outside_share"] > 0.0 else ""
     return f"{_half(row['without'])} > {_half(row['with'])}{star}"
 
 
 def _half(outcome: Document) -> str:
+    """One outcome: RMS pitch rate and swing, or the time of the loss."""
     if outcome["departure"]:
         return f"lost {outcome['departure']['time_s']:.1f} s"
     return "{q_rms_deg_s:.2f} {theta_swing_deg:4.1f}".format(**outcome)

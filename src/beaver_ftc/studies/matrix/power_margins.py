@@ -15,29 +15,32 @@ from beaver_ftc.studies.present.tables import finite
 POWER = EnginePower()
 STATES = ("airspeed", "alpha", "q", "theta")
 FREQUENCIES_RAD_S = np.geomspace(1e-3, 1e2, 20001)
-SLOW_RAD_S = 1.0  # the phugoid is slower than this, the short period faster
+SLOW_RAD_S = 1.0  # the phugoid is slower, the short period faster
 
 
 def margins(airspeed_mps: float) -> Document:
     """The margins of the loop through engine power at one airspeed, with elevator and flap at rest.
 
-    phugoid_damping: without and with the law. gain_margin_db, phase_margin_deg: the least of all crossings,
-    null where there is none. attitude_zero_rad_s: the right-half-plane zero from power to attitude.
-    worth_deg: pitching moment of the throttle closed and opened, in deg of elevator.
+    - phugoid_damping: without and with the law.
+    - gain_margin_db, phase_margin_deg: the smallest over all crossings, null if there is none.
+    - attitude_zero_rad_s: the right-half-plane zero from power to pitch attitude.
+    - worth_deg: pitching moment of the lowest and the highest power less that in trim, in deg of elevator.
     """
     model, power, trim_inhg = about_trim(airspeed_mps)
     A = model.A
     F, b, k = with_law(A, power)
     q = STATES.index("q")
     upper_db, lower_db, phase_deg = margins_of(loop_response(F, b, k))
-    ends = np.array([POWER.lowest_inhg, POWER.highest_inhg]) - trim_inhg
+    from_trim_inhg = np.array([POWER.lowest_inhg, POWER.highest_inhg]) - trim_inhg
     return {
         "airspeed_mps": airspeed_mps,
         "phugoid_damping": [_phugoid_damping(system) for system in (A, F + np.outer(b, k))],
         "gain_margin_db": finite(float(min(upper_db, lower_db))),
         "phase_margin_deg": finite(float(phase_deg)),
         "attitude_zero_rad_s": float(zeros(A, power, STATES.index("theta")).real.max()),
-        "worth_deg": np.rad2deg(ends * power[q] / model.B[q, model.inputs.index("elevator")]).tolist(),
+        "worth_deg": np.rad2deg(
+            from_trim_inhg * power[q] / model.B[q, model.inputs.index("elevator")]
+        ).tolist(),
     }
 
 

@@ -1,6 +1,10 @@
-"""Truth against design: where the design model is wrong, by how much, and what that costs the diagnosis.
+"""Truth against design: the errors of the design model, their size, and their cost for the diagnosis.
 
-`models` reads the log, `sources` takes the causes from differences of models, `split` holds their sum against
-the bound, `bound` recommends one, `linear` is about the trim. `study` flies, wrong designs too; `tables` and
-`charts` show what was found.
+states     the columns of a log as arrays
+sources    the part of each cause in truth less design, from differences of models
+split      the sum of the causes, compared with the bound
+bound      the bound that is recommended
+linear     truth and design linearised about the trim
+study      flights, also with wrong designs, and their files
+tables, charts    the results for people
 """

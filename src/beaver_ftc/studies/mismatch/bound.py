@@ -1,4 +1,4 @@
-"""The bound recommended for a set of runs, and what it costs the guarantee of detection."""
+"""The bound that is recommended for a set of runs, and its effect on the guaranteed detection."""
 
 from collections.abc import Sequence
 from math import ceil, floor, log10
@@ -13,9 +13,10 @@ from beaver_ftc.scenario.schema import Scenario, load_scenario
 from beaver_ftc.studies.mismatch.split import split_flight
 
 PUBLISHED_CASE = "elevator-partial-loss"
-MAX_ROUNDS = 10  # of flights with a larger bound
-LEAST_RAD_S2 = 1e-4  # of a bound that is widened
+MAX_ROUNDS = 10  # of flights, each with a larger bound
+LEAST_RAD_S2 = 1e-4  # smallest bound that is widened
 PerAxis = dict[str, float]
+"""Constant part of eta_bar, rad/s2, by axis."""
 
 
 def recommend(needed: Sequence[np.ndarray], at_least: PerAxis | None = None) -> PerAxis:
@@ -24,14 +25,14 @@ def recommend(needed: Sequence[np.ndarray], at_least: PerAxis | None = None) -> 
     needed: of each run, the constant part (3,) rad/s2 that would have covered it. Each axis has the largest,
     rounded up to two digits; none is below `at_least`.
     """
-    found = dict(at_least or dict.fromkeys(AXES, 0.0))
-    for axis, most in zip(AXES, np.max(needed, axis=0).tolist(), strict=True):
-        found[axis] = max(found[axis], rounded_up(most))
-    return found
+    bound_of_axis = dict(at_least or dict.fromkeys(AXES, 0.0))
+    for axis, largest in zip(AXES, np.max(needed, axis=0).tolist(), strict=True):
+        bound_of_axis[axis] = max(bound_of_axis[axis], rounded_up(largest))
+    return bound_of_axis
 
 
 def widened(constant_rad_s2: PerAxis) -> PerAxis:
-    """A fifth more: for an alarm although nothing was exceeded, as rounding and noise may raise it."""
+    """The bound times 1.2, for alarms without an exceeded bound, which rounding and noise may cause."""
     return {axis: rounded_up(max(1.2 * c, LEAST_RAD_S2)) for axis, c in constant_rad_s2.items()}
 
 
@@ -45,9 +46,9 @@ def rounded_up(value: float) -> float:
 
 
 def guarantee_with(constant_rad_s2: PerAxis, like: Scenario) -> Document:
-    """The published elevator case, flown with this bound and the design model of `like`.
+    """The results of the published elevator case with this bound and the design model of `like`.
 
-    Delays are in s from the fault's first frame, None for never.
+    Delays are in s from the first frame with the fault; None: never.
     """
     flight = fly(published_case(constant_rad_s2, like))
     onset = Truth.of(flight.scenario).onset
@@ -67,18 +68,20 @@ def published_case(constant_rad_s2: PerAxis, like: Scenario) -> Scenario:
 
 
 def with_bound(scenario: Scenario, constant_rad_s2: PerAxis) -> Scenario:
-    """The scenario with another constant part of the bound."""
+    """The scenario with this constant part of the bound."""
     return scenario.with_({"fdi.bounds.constant_rad_s2": constant_rad_s2})
 
 
 def recommended_for(scenarios: Sequence[Scenario], needed: Sequence[np.ndarray]) -> Document:
-    """The bound that covers these flights, and the published elevator case flown with it and the design.
+    """The bound that covers these flights, and the published elevator case with this bound and their design
+    model.
 
-    The case is one of the flights to be covered: a bound that suits calmer air alone would raise a false
-    alarm in it, and guarantee nothing.
+    scenarios: the flights. needed: for each, the constant part (3,) rad/s2 that would have covered it. The
+    published case is covered, too: with a bound for calmer air alone, it would have a false alarm and
+    guarantee nothing.
 
-    coverage: the chance that one more run of the same kind stays within it, runs / (runs + 1): it is as
-    likely as any other to be the worst of all.
+    coverage: probability that one more run of the same kind stays within the bound, runs / (runs + 1), since
+    each of runs + 1 runs is equally likely to be the worst.
     """
     first = scenarios[0]
     runs = len(scenarios)
@@ -96,18 +99,21 @@ def recommended_for(scenarios: Sequence[Scenario], needed: Sequence[np.ndarray])
 
 
 def settle(scenarios: Sequence[Scenario], needed: Sequence[np.ndarray]) -> tuple[PerAxis, bool]:
-    """The recommended bound, flown with until no flight exceeds it or alarms falsely; whether so.
+    """The recommended bound, and whether no flight with it exceeds it or has a false alarm, within
+    MAX_ROUNDS.
 
-    A bound too small raises an alarm, after which another law flies; without that alarm the flight, and its
-    mismatch, is another. So every flight is flown again with what is recommended.
+    A too small bound raises an alarm, after which the law changes. Without this alarm, the flight and its
+    mismatch differ. All flights are therefore flown again with each recommended bound.
     """
     constant = recommend(needed)
     for _ in range(MAX_ROUNDS):
         again = (split_flight(with_bound(scenario, constant)) for scenario in scenarios)
-        short = [flight.smallest_constant for flight, flown in again if flight.exceeded or flown.false_alarm]
-        if not short:
+        larger_needed = [
+            flight.smallest_constant for flight, flown in again if flight.exceeded or flown.false_alarm
+        ]
+        if not larger_needed:
             return constant, True
-        needed = [*needed, *short]
+        needed = [*needed, *larger_needed]
         larger = recommend(needed, constant)
         constant = larger if larger != constant else widened(larger)
     return constant, False

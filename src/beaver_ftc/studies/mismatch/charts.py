@@ -30,12 +30,12 @@ if TYPE_CHECKING:
 
 
 AXIS_NAMES = [f"{motion} {axis}" for axis, motion in MOTION_OF_AXIS.items()]
-LONGEST_BAR = 1e6  # of a share of a bound of nothing
-SHOWN_SOURCES = 4  # curves an eye can follow in one panel
-LEAST_CURVE = 1e-3  # of the largest source: a smaller one is a line at zero
-LEAST_RATIO = 1e-6  # what is smaller is drawn as this
-LEAST_SHARE = 1e-5  # of the bound: what is smaller is not drawn
-# Of two sources with one colour no flight is known to show both.
+LONGEST_BAR = 1e6  # length of a share of a bound that is zero
+SHOWN_SOURCES = 4  # curves in a panel
+LEAST_CURVE = 1e-3  # share of the peak of the largest source: a smaller source would be a line at zero
+LEAST_RATIO = 1e-6  # a smaller ratio is drawn with this length
+LEAST_SHARE = 1e-5  # a smaller share of the bound is not drawn
+# Colour and dashes of each source. No flight is known in whose figure two sources have the same colour.
 SOURCE_LOOKS: dict[str, tuple[str, tuple[float, ...]]] = {
     "sensors": (SKY, (4, 1)), "actuators": (PURPLE, (6, 2, 1, 2)), "simplification": (VERMILION, ()),
     "engine": (VERMILION, (7, 2)), "coefficients": (GREEN, ()), "inertia": (PURPLE, (3, 1)),
@@ -59,7 +59,8 @@ def figures(folder: Path, found: Document, flown: Metrics, analysis: LinearAnaly
 
 
 def sources_figure(frames: Path, found: Document, instants: Sequence[Mark]) -> "Figure":
-    """The largest sources and what they add up to without the fault, over the bound, per axis."""
+    """A panel for each axis: the largest sources, and the sum of all without the fault, in front of the
+    bound."""
     chosen = {axis: largest_sources(found, axis) for axis in AXES}
     names = {axis: [TOTAL, FAULT, ETA_BAR, *chosen[axis]] for axis in AXES}
     series = series_of(StoredLog(frames), [column(axis, name) for axis in AXES for name in names[axis]])
@@ -72,7 +73,7 @@ def sources_figure(frames: Path, found: Document, instants: Sequence[Mark]) -> "
 
 
 def largest_sources(found: Document, axis: str) -> list[str]:
-    """The sources of an axis with the largest peaks, faults aside, largest first."""
+    """The sources of an axis with the largest peaks, without faults, the largest first."""
     peaks = {name: found["axes"][axis][name]["max"] for name in CAUSES}
     by_peak = sorted(CAUSES, key=lambda name: -peaks[name])
     least = LEAST_CURVE * peaks[by_peak[0]]
@@ -80,6 +81,7 @@ def largest_sources(found: Document, axis: str) -> list[str]:
 
 
 def _draw_sources(axes: "Axes", series: dict, axis: str, chosen: list[str], instants: Sequence[Mark]) -> None:
+    """The bound, the sum, the chosen sources and the event marks of one axis."""
     t = series["t_s"]
     bound = series[column(axis, ETA_BAR)]
     axes.fill_between(t, -bound, bound, color=SKY, alpha=0.25, linewidth=0, label="± bound eta_bar")
@@ -93,7 +95,7 @@ def _draw_sources(axes: "Axes", series: dict, axis: str, chosen: list[str], inst
         axes.axvline(mark.time_s, color=mark.colour, linewidth=0.9, linestyle=(0, mark.dash or (1, 0)))
         axes.annotate(
             mark.letter, (mark.time_s, 1.0), xycoords=("data", "axes fraction"), textcoords="offset points",
-            xytext=(0, 2 + 9 * (i % 2)), fontsize=8,  # neighbours do not collide
+            xytext=(0, 2 + 9 * (i % 2)), fontsize=8,  # neighbours at two heights
         )  # fmt: skip
     _dress(axes)
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8, frameon=False)
@@ -106,14 +108,14 @@ def _dress(axes: "Axes") -> None:
 
 
 def bound_figure(found: Document) -> "Figure":
-    """How much of the bound each source has used at most, per axis, on a logarithmic scale."""
-    of_axes = [found["axes"][axis] for axis in AXES]
+    """Bars of the largest share of the bound that each source has used, a panel for each axis."""
+    sources_of_axes = [found["axes"][axis] for axis in AXES]
     names = [
         name
         for name in (*SOURCES, UNEXPLAINED)
-        if any(_bar_length(sources[name]["bound_share"]) > LEAST_SHARE for sources in of_axes)
+        if any(_bar_length(sources[name]["bound_share"]) > LEAST_SHARE for sources in sources_of_axes)
     ]
-    shares = [[sources[name]["bound_share"] for name in names] for sources in of_axes]
+    shares = [[sources[name]["bound_share"] for name in names] for sources in sources_of_axes]
     values = np.array([[_bar_length(share) for share in row] for row in shares])
     notes = [
         [share_text(share) if _bar_length(share) > LEAST_SHARE else "" for share in row] for row in shares
@@ -126,41 +128,42 @@ def bound_figure(found: Document) -> "Figure":
 
 
 def _bar_length(share: float | None) -> float:
-    """A share of the bound as a number; None, a share of a bound of nothing, is the longest bar."""
+    """A share of the bound as a length. None, a share of a bound that is zero, has the longest bar."""
     return LONGEST_BAR if share is None else share
 
 
 def comparison_figure(entries: Sequence[Document]) -> "Figure":
-    """How much of the bound each flight has needed, per axis, on a logarithmic scale."""
-    needed = [[each[f"{axis}_worst_ratio"] for each in entries] for axis in AXES]
+    """Bars of the largest mismatch over the bound in each flight, a panel for each axis."""
+    needed = [[entry[f"{axis}_worst_ratio"] for entry in entries] for axis in AXES]
     ratios = np.array([[max(_bar_length(ratio), LEAST_RATIO) for ratio in row] for row in needed])
     notes = [
         [
-            f"{share_text(r)} ({without_underscores(each[f'{axis}_dominant'])})"
-            for r, each in zip(row, entries, strict=True)
+            f"{share_text(r)} ({without_underscores(entry[f'{axis}_dominant'])})"
+            for r, entry in zip(row, entries, strict=True)
         ]
         for row, axis in zip(needed, AXES, strict=True)
     ]
     title = "Mismatch at its worst, faults aside, over the bound", "largest mismatch / eta_bar"
     size = 12.0, 1.6 + 0.38 * max(len(entries), 2)
     ends = min(0.1, 0.5 * ratios.min()), 60.0 * max(ratios.max(), 1.0)
-    return _bars(size, title, [each["scenario"] for each in entries], ratios, notes, ends)
+    return _bars(size, title, [entry["scenario"] for entry in entries], ratios, notes, ends)
 
 
 def _bars(
     size: tuple[float, float], titles: tuple[str, str], names: Sequence[str], values: np.ndarray,
     notes: list[list[str]], ends: tuple[float, float], grey: str = "",
 ) -> "Figure":  # fmt: skip
-    """Horizontal bars (axes, names), what is said beside each, red beyond 1; on a logarithmic scale.
+    """Horizontal bars on a logarithmic scale, a panel for each axis; a bar above 1 is red.
 
-    titles: above and below. grey: the bar that has neither colour.
+    titles: above and below the panels. values (axes, names): lengths. notes: text beside each bar. ends: of
+    the scale. grey: name of a bar that is grey.
     """
     figure, grid = panels(1, 3, *size, titles[0], sharey=True, sharex=True)
-    for axes, of_axis, said in zip(grid[0], values, notes, strict=True):
-        red = [VERMILION if value > 1.0 else BLUE for value in of_axis]
+    for axes, lengths, texts in zip(grid[0], values, notes, strict=True):
+        red = [VERMILION if value > 1.0 else BLUE for value in lengths]
         colours = [GREY if name == grey else colour for name, colour in zip(names, red, strict=True)]
-        axes.barh(range(len(names)), of_axis, height=0.7, color=colours)
-        for place, (value, text) in enumerate(zip(of_axis, said, strict=True)):
+        axes.barh(range(len(names)), lengths, height=0.7, color=colours)
+        for place, (value, text) in enumerate(zip(lengths, texts, strict=True)):
             axes.annotate(f" {text}", (value, place), va="center", fontsize=7.5)
         axes.axvline(1.0, color=BLACK, linewidth=1.0, dashes=(4, 2))
         axes.set_xscale("log")
@@ -174,7 +177,7 @@ def _bars(
 
 
 def linear_figure(analysis: LinearAnalysis, name: str) -> "Figure":
-    """Poles, and the frequency responses from each surface to its rate."""
+    """The poles of all models, and the frequency responses from each surface to its rate."""
     at = f"{analysis.point.airspeed_mps:g} m/s and {analysis.point.altitude_m:g} m"
     title = f"Linear models at trim, {at}\n{name}"
     figure, grid = panels(2, 4, 14.0, 6.4, title, width_ratios=[1.4, 1, 1, 1])
@@ -194,6 +197,7 @@ def linear_figure(analysis: LinearAnalysis, name: str) -> "Figure":
 
 
 def _draw_poles(axes: "Axes", analysis: LinearAnalysis) -> None:
+    """The poles of each model in the complex plane."""
     for model, (mark, look) in MODEL_LOOKS.items():
         poles = np.linalg.eigvals(analysis.models[model].A)
         seen = {"color": look["color"], "label": look["label"], "alpha": look.get("alpha", 1.0)}
@@ -203,7 +207,8 @@ def _draw_poles(axes: "Axes", analysis: LinearAnalysis) -> None:
 
 
 def _draw_bode(magnitude: "Axes", phase: "Axes", analysis: LinearAnalysis, surface: str, rate: str) -> None:
-    w = np.geomspace(0.01, 50.0, 300)  # rad/s
+    """Magnitude (dB) and phase (deg) from a surface to a rate, over the frequency w in rad/s."""
+    w = np.geomspace(0.01, 50.0, 300)
     for model, (_, look) in MODEL_LOOKS.items():
         H = response(*analysis.channel(model, surface, rate), w)
         magnitude.semilogx(w, 20.0 * np.log10(np.abs(H)), **look)
@@ -213,9 +218,10 @@ def _draw_bode(magnitude: "Axes", phase: "Axes", analysis: LinearAnalysis, surfa
 
 
 def map_figure(entries: Sequence[Document], name: str) -> "Figure":
-    """The worst share of the bound against speed and altitude, per axis; hatched where there is no trim.
+    """The largest mismatch over the bound against airspeed and altitude, a panel for each axis; hatched
+    without a trim.
 
-    entries: in the order of altitudes, at each of airspeeds, at each of axes.
+    entries: for each altitude in order, for each airspeed, for each axis. The reshape relies on this order.
     """
     from matplotlib.colors import LogNorm
 
@@ -235,7 +241,7 @@ def map_figure(entries: Sequence[Document], name: str) -> "Figure":
 
 
 def _ratios(grid: np.ndarray, norm: Any) -> dict[Any, tuple[str, str]]:
-    """The text on each cell of a map, and its colour."""
+    """The text of each cell of a map, and its colour."""
     labels = dict.fromkeys(np.ndindex(grid.shape), ("no trim", "black"))
     for at, ratio in np.ndenumerate(grid):
         if np.isfinite(ratio):

@@ -1,8 +1,9 @@
-"""The truth's linear model beside the design model's, at the trim a scenario starts from.
+"""Linear models of the truth and of the design, at the trim with which a scenario starts.
 
-truth: JSBSim's accelerations differenced about the trim. fdc: the FDC equations, by complex steps, an
-independent road. design: the FDC equations with the moments the designer holds. own: JSBSim's own
-linearisation, at the same condition without its sideslip, against the FDC equations there.
+truth     differences of the accelerations of JSBSim about the trim fdc       the FDC equations,
+differentiated by complex steps: an independent computation design    the FDC equations with the moments
+of the design model own       the linearisation of JSBSim itself, compared with the FDC equations at the
+same condition without sideslip
 """
 
 from dataclasses import dataclass, replace
@@ -22,7 +23,7 @@ from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.studies.linear_systems import CHANNELS, CLASSICAL, MODES, Mode, deviation, modes, zeros
 
-_STEP = 1e-30  # of complex steps
+_STEP = 1e-30  # size of a complex step: f'(x) = Im f(x + i h) / h without cancellation
 _V, _FLOW_AT, _RATES_AT, _H = map(fdc.STATES.index, ("airspeed", "alpha", "p", "altitude"))
 _FLOW = slice(_FLOW_AT, _FLOW_AT + 2)  # alpha, beta
 _RATES = slice(_RATES_AT, _RATES_AT + 3)  # p, q, r
@@ -34,9 +35,11 @@ ByMode = dict[str, float]
 
 @dataclass(frozen=True)
 class LinearAnalysis:
-    """Linear models over the eight classical states: by name, the models and their modes; a second opinion.
+    """Linear models over the eight classical states.
 
-    own_deviation: per mode, JSBSim's own linearisation against the FDC equations, both with no sideslip.
+    - point: the trim. models, modes: the models `truth`, `fdc` and `design`, and their modes, by name.
+    - own_deviation: by mode, deviation of the linearisation of JSBSim itself from the FDC equations, without
+      sideslip.
     """
 
     point: FlightState
@@ -45,18 +48,19 @@ class LinearAnalysis:
     own_deviation: ByMode
 
     def channel(self, name: str, surface: str, rate: str) -> tuple[np.ndarray, np.ndarray, int]:
-        """A of a model, the column of a surface, and the place of a rate among the states."""
+        """Arguments of `response` and `zeros`: A of a model, the column of B of a surface, and the row of a
+        rate."""
         model = self.models[name]
         return model.A, model.B[:, model.inputs.index(surface)], model.states.index(rate)
 
     def deviation(self, name: str) -> ByMode:
-        """How far each mode of a model is from the truth's, as a share of its magnitude."""
+        """Distance of each pole of a model from that of the truth, over the magnitude of the latter."""
         truth = self.modes["truth"]
         return {mode: deviation(self.modes[name][mode].pole, truth[mode].pole) for mode in MODES}
 
 
 def analyse(scenario: Scenario) -> LinearAnalysis:
-    """Linearise the scenario's truth and what the designer holds, at its trim."""
+    """Linearise truth, FDC equations and design model of a scenario at its trim."""
     plant, point = trimmed(scenario)
     equations = fdc_model(scenario, point)
     models = {
@@ -69,20 +73,21 @@ def analyse(scenario: Scenario) -> LinearAnalysis:
 
 
 def own_deviation(scenario: Scenario, point: FlightState) -> ByMode:
-    """JSBSim's own linearisation against the FDC equations, per mode, at `point` without its sideslip."""
+    """By mode, deviation of the linearisation of JSBSim itself from the FDC equations, at `point` without
+    sideslip."""
     straight = replace(point, beta_rad=0.0)
     found, reference = (modes(model(scenario, straight).of(CLASSICAL).A) for model in (own, fdc_model))
     return {name: deviation(found[name].pole, reference[name].pole) for name in MODES}
 
 
 def fdc_model(scenario: Scenario, point: FlightState) -> LinearModel:
-    """The FDC equations with the truth's declared coefficients, twelve states."""
+    """The FDC equations with the coefficients of the truth, twelve states."""
     ratio = scenario.uncertainty.coefficients
     return LinearModel(*fdc.linearise(*in_fdc(point), ratio), fdc.STATES, fdc.SURFACES)
 
 
 def in_fdc(point: FlightState) -> tuple[np.ndarray, np.ndarray, fdc.Engine]:
-    """A flight condition as the FDC equations take it: state (12,), deflections (4,) rad, engine setting."""
+    """The arguments of the FDC equations: state (12,) SI and rad, deflections (4,) rad, engine setting."""
     state = np.array([
         point.airspeed_mps, point.alpha_rad, point.beta_rad, point.p_rad_s, point.q_rad_s, point.r_rad_s,
         point.phi_rad, point.theta_rad, point.psi_rad, 0.0, 0.0, point.altitude_m,
@@ -92,8 +97,8 @@ def in_fdc(point: FlightState) -> tuple[np.ndarray, np.ndarray, fdc.Engine]:
 
 
 def designed(scenario: Scenario, point: FlightState, equations: LinearModel) -> LinearModel:
-    """The equations with the rows of p, q and r as the designer holds them. Airspeed and altitude act through
-    the air data, of which a complex step gives the derivatives."""
+    """The equations, with the rows of p, q and r from the design model. Airspeed and altitude act on the
+    moments through the air data, whose derivatives follow from a complex step."""
     f_x, f_y, G = designed_derivatives(scenario, point)
     A, B = equations.A.copy(), equations.B.copy()
     A[_RATES] = 0.0
@@ -106,7 +111,8 @@ def designed(scenario: Scenario, point: FlightState, equations: LinearModel) -> 
 
 
 def designed_derivatives(scenario: Scenario, point: FlightState) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """f_x (3, 3), f_y (3, 5) and G (3, 4) of the design model at a trim, where it is frozen or linearised."""
+    """f_x (3, 3), f_y (3, 5) and G (3, 4) of the design model at a trim. With `frozen_alpha`, alpha has no
+    effect."""
     design = design_of(Declared.of(scenario))[0]
     y = np.array([point.alpha_rad, point.beta_rad, *air_data(point)])
     _, G, f_x, f_y = jacobian(design, np.zeros(3), y, in_fdc(point)[1])
@@ -116,22 +122,24 @@ def designed_derivatives(scenario: Scenario, point: FlightState) -> tuple[np.nda
 
 
 def air_data(point: FlightState, faster_mps: Any = 0.0, higher_m: Any = 0.0) -> np.ndarray:
-    """V, qdyn, dpt (3,) with the point's engine setting, there or a step away, real or complex."""
+    """V m/s, qdyn Pa and dpt, (3,), at a point or a step away, with the engine setting of the point. Steps
+    may be complex."""
     V, density = point.airspeed_mps + faster_mps, fdc.air_density(point.altitude_m + higher_m)
     power = engine_power_kw(point.engine_rpm, point.manifold_pressure_inhg, density)
     return np.array([V, 0.5 * density * V**2, slipstream(power, density, V)])
 
 
 def linear_document(analysis: LinearAnalysis) -> Document:
-    """Modes side by side, how far the models are apart, zeros of the surface-to-rate channels."""
-    apart = {name: analysis.deviation(name) for name in analysis.models if name != "truth"}
+    """The document: modes of all models, deviations from the truth, and zeros from each surface to its
+    rate."""
+    deviations = {name: analysis.deviation(name) for name in analysis.models if name != "truth"}
     return {
         "airspeed_mps": analysis.point.airspeed_mps,
         "altitude_m": analysis.point.altitude_m,
         "modes": {
             mode: {
                 **{name: _mode(found[mode]) for name, found in analysis.modes.items()},
-                "deviation": {name: each[mode] for name, each in apart.items()},
+                "deviation": {name: each[mode] for name, each in deviations.items()},
                 "jsbsim_own_deviation": analysis.own_deviation[mode],
             }
             for mode in MODES

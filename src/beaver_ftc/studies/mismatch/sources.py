@@ -1,8 +1,7 @@
-"""The sources of mismatch: what each adds to truth minus design, (n, 3) rad/s2.
+"""The sources of mismatch: the part of each in truth less design, (n, 3) rad/s2.
 
-They are the steps from the design model, at what was measured and commanded, to the truth: each changes
-one thing and leaves the rest as the steps before it left it, so that all of them together make the whole
-difference.
+The sources are steps from the design model, at the measured state and the command, to the truth. Each step
+changes one thing and keeps the changes of the steps before it, so that their sum is the whole difference.
 
     f + G u  at the measured state and the command
       sensors            at the true state
@@ -18,25 +17,30 @@ difference.
       earth_rotation     on a turning Earth
       integration        as JSBSim's integration moves the rates
 
-Healthy actuators are driven by the logged command: what the surfaces would have done with no fault,
+Healthy actuators follow the logged commands, as the surfaces would without a fault. With the position a
+(rad), in each JSBSim frame of length dt (s), within the stops,
 
-    a' = a + min(max(w e, -rate dt), rate dt),  w = 1 - exp(-bandwidth dt),  e = demand - a
+    a <- a + min(max(w e, -rate dt), rate dt),  w = 1 - exp(-bandwidth dt),  e = demand - a less the dead band
 
-every JSBSim frame of dt, within the stops; e without what the dead band takes of it. With neither lag, rate
-limit nor dead band a is the demand. The command of a row was in force in all JSBSim frames that led to it; at
-the start the actuator rests at its command.
+An actuator without lag, rate limit and dead band has a = demand. The command of a row was in force in all
+JSBSim frames that led to it. At the start, the actuator rests at its command.
 
-A declared fault is weighed with the design's G, as in theory. A loss of effectiveness is what it takes from
-the surface where the surface is: the product of all losses, taken one after the other. A fault of the
-mechanism (jam, runaway, bias, ...) is the way from where the healthy actuator would be to where the surface
-is; of several on one surface at once the latest to strike has it. The unanticipated one is its own moment.
+The effects of faults are computed with G of the design, as in the theory:
 
-Moments turn the body against inertial space; its rates are reported against the Earth. With w the
-reported rates, W the Earth's rotation in body axes and w_i = w + W,
+    loss of effectiveness                the lost share of the position; of several losses, each takes its
+    share of
+                                         the effectiveness that those before it leave
+    mechanism (jam, runaway, bias, ...)  position of the surface less that of the healthy actuator; of several
+    faults
+                                         on one surface, the fault that began last has all of it
+    unanticipated                        its own pitching moment
+
+Moments change the rates relative to inertial space, but rates are reported relative to the Earth. With the
+reported rates w, the rotation W of the Earth in body axes and w_i = w + W, all (3,) rad/s,
 
     wdot = J^-1 (M - w_i x J w_i) + w_i x W            [SL03, sec. 1.5]
 
-The design model has J^-1 (M - w x J w): the difference is all that the Earth adds, and J enters by itself.
+The design model has J^-1 (M - w x J w). The difference is the source `earth_rotation`.
 """
 
 from collections.abc import Iterator
@@ -68,20 +72,20 @@ from beaver_ftc.scenario.schema import Scenario
 from beaver_ftc.scenario.signals import grown_share, is_before, is_in_force
 from beaver_ftc.studies.mismatch.states import States
 
-SOURCES = (
+SOURCES = (  # in the order of the steps
     "sensors", "actuators", "fault", "simplification", "engine", "coefficients", "inertia",
     "inertia_coupling", "sinusoids", "wind_turbulence", "earth_rotation", "integration",
 )  # fmt: skip
 LOSS = "loss_of_effectiveness"
 ENGINE_TERMS = tuple(term.name for term in load().moments if "dpt" in dict(term.of))
 Contributions = dict[str, np.ndarray]
-"""Angular acceleration (n, 3) rad/s2 by source, or by part of a source."""
+"""Angular accelerations (n, 3) rad/s2 by source, or by part of a source."""
 Parts = Iterator[tuple[Any, np.ndarray]]
-"""Each fault of a surface, and its part of the deflection (n,) rad."""
+"""(fault, its part of the deflection (n,) rad) of faults of a surface."""
 
 
 def healthy_positions(scenario: Scenario, commands: np.ndarray) -> np.ndarray:
-    """Positions (n, 4) rad of a scenario's healthy actuators at rows with these commands (n, 4) rad."""
+    """Positions (n, 4) rad of healthy actuators at the rows of a log with these commands (n, 4) rad."""
     dt = 1.0 / (scenario.rate_hz * scenario.substeps)
     share, reach, band, low, high = np.array([_servo(scenario, surface, dt) for surface in SURFACES]).T
     positions = np.empty_like(commands)
@@ -90,25 +94,26 @@ def healthy_positions(scenario: Scenario, commands: np.ndarray) -> np.ndarray:
 
 
 def _servo(scenario: Scenario, surface: str, dt: float) -> tuple[float, ...]:
-    """The servo of a surface in a JSBSim frame: share of the way, reach, dead band and stops, rad."""
+    """The servo of a surface in a JSBSim frame of dt s: share w, then reach = rate dt, dead band, lower and
+    upper stop, rad."""
     servo = getattr(scenario.actuators, surface)
-    off = getattr(scenario.uncertainty.actuators, surface)
-    bandwidth = servo.bandwidth_rad_s * off.bandwidth
-    rate = servo.rate_limit_deg_s * off.rate_limit
+    errors = getattr(scenario.uncertainty.actuators, surface)
+    bandwidth = servo.bandwidth_rad_s * errors.bandwidth
+    rate = servo.rate_limit_deg_s * errors.rate_limit
     stops = TRAVEL[surface].min_rad, TRAVEL[surface].max_rad
     if servo.travel_deg is not None:
         stops = radians(servo.travel_deg[0]), radians(servo.travel_deg[1])
     share = 1.0 - exp(-bandwidth * dt) if bandwidth else 1.0
     reach = radians(rate) * dt if rate else inf
-    return share, reach, radians(off.dead_band_deg), *stops
+    return share, reach, radians(errors.dead_band_deg), *stops
 
 
 @kernel
 def _follow(commands, share, reach, band, low, high, runs, positions):
-    """Fill positions (n, 4) rad with a, as the head of the file says, `runs` JSBSim frames a row.
+    """Fill positions (n, 4) rad with a, by the recursion of the module. runs: JSBSim frames in a row.
 
-    commands (n, 4) rad. Of each surface (4,): share w of the way that is left; rad: reach rate * dt, dead
-    band to each side, and stops low and high.
+    commands (n, 4) rad. For each surface (4,): share w; reach = rate dt, dead band to each side, and stops
+    low and high, rad.
     """
     at = np.minimum(np.maximum(commands[0], low), high)
     ideal = (share == 1.0) & (reach == np.inf) & (band == 0.0)
@@ -123,10 +128,12 @@ def _follow(commands, share, reach, band, low, high, runs, positions):
 
 
 def earth_in_body(attitude: np.ndarray, latitude: np.ndarray) -> np.ndarray:
-    """The Earth's rotation in body axes (n, 3) rad/s; attitude (n, 3) phi, theta, psi, latitude (n,), rad."""
+    """The rotation W of the Earth in body axes, (n, 3) rad/s: (cos(latitude), 0, -sin(latitude)) times its
+    rate in north, east, down, turned by psi, theta and phi. attitude (n, 3) phi, theta, psi rad; latitude
+    (n,) rad."""
     phi, theta, psi = attitude.T
     north, down = EARTH_RATE_RAD_S * np.cos(latitude), -EARTH_RATE_RAD_S * np.sin(latitude)
-    ahead, right = north * np.cos(psi), -north * np.sin(psi)  # turned into the heading
+    ahead, right = north * np.cos(psi), -north * np.sin(psi)  # after the turn by psi
     forward = ahead * np.cos(theta) - down * np.sin(theta)
     below = ahead * np.sin(theta) + down * np.cos(theta)
     return np.column_stack([
@@ -137,18 +144,22 @@ def earth_in_body(attitude: np.ndarray, latitude: np.ndarray) -> np.ndarray:
 def earth_rotation(
     inertia: InertiaCoefficients, x: np.ndarray, attitude: np.ndarray, latitude: np.ndarray
 ) -> np.ndarray:
-    """The part of the angular acceleration that comes from the Earth's rotation, (n, 3) rad/s2."""
+    """The source `earth_rotation`, (n, 3) rad/s2: -J^-1 (w_i x J w_i) + J^-1 (w x J w) + w_i x W. x (n, 3)
+    rad/s: w."""
     W = earth_in_body(attitude, latitude)
     inertial_rate = x + W
     return inertial(inertia, inertial_rate) - inertial(inertia, x) + np.cross(inertial_rate, W)
 
 
 class Models:
-    """The moment models of a flight, from the one in use to the truth, each with one error less.
+    """The models of the moments, from the design model to the truth. Each has one error less than the one
+    before:
 
-    design: in use, tied to the trim where it is linearised or frozen. untied: without that. whole: with the
-    engine's terms, as in the table. turning: with the truth's coefficients. truth: with its inertia as well.
-    parts: `whole` with one of the truth's coefficients that differ, by name.
+    - design: the design model, which may be linearised about the trim or have a frozen alpha.
+    - untied: neither linearised nor frozen. whole: with the terms of the engine. turning: with the
+      coefficients of the truth. truth: with its mass and inertia.
+    - parts: by name of each coefficient that differs, `whole` with this coefficient of the truth.
+    - inertia: inertia coefficients of the truth.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -171,21 +182,21 @@ class Models:
 
 
 def fault_effects(m: Models, states: States, G: np.ndarray, healthy: np.ndarray) -> Contributions:
-    """The angular acceleration (n, 3) rad/s2 of each fault of a surface, weighed with G (n, 3, 4); healthy
-    (n, 4) rad is where they found the surfaces."""
+    """The angular acceleration G (n, 3, 4) times its part of the deflection, (n, 3) rad/s2, of each fault of
+    a surface. healthy (n, 4) rad: positions of healthy actuators."""
     effects: Contributions = {}
     for s, surface in enumerate(SURFACES):
-        here = [fault for fault in m.scenario.faults if getattr(fault, "actuator", "") == surface]
+        faults = [fault for fault in m.scenario.faults if getattr(fault, "actuator", "") == surface]
         position = states.position[:, s]
-        moved = *_lost(here, states, position), *_displaced(here, states.t_s, position - healthy[:, s])
-        for fault, by_rad in moved:
+        parts = *_lost(faults, states, position), *_displaced(faults, states.t_s, position - healthy[:, s])
+        for fault, by_rad in parts:
             name = name_of(fault)
             effects[name] = effects.get(name, 0.0) + G[:, :, s] * by_rad[:, None]
     return effects
 
 
 def unanticipated_effects(m: Models, states: States) -> Contributions:
-    """The angular acceleration (n, 3) rad/s2 of each unanticipated fault: a pitching moment."""
+    """The angular acceleration (n, 3) rad/s2 of each unanticipated fault, which is a pitching moment."""
     effects: Contributions = {}
     for fault in m.scenario.faults:
         if fault.type == UNANTICIPATED:
@@ -196,19 +207,19 @@ def unanticipated_effects(m: Models, states: States) -> Contributions:
 
 
 def name_of(fault: Any) -> str:
-    """A name of a fault's own: surface, type and time."""
+    """A unique name of a fault: surface, type and time."""
     place = "" if place_of(fault) == fault.type else f"{place_of(fault)} "
     return f"{place}{fault.type.replace('_', ' ')} at {fault.at_s:g} s"
 
 
 def share(fault: Any, t_s: np.ndarray) -> np.ndarray:
-    """B(t - T0) (n,): how far a fault has grown, 0 where it is not there."""
+    """B(t - T0) (n,): the share to which a fault has grown, 0 where it is not in force."""
     grown = np.array([grown_share(fault, t) for t in t_s])
     return np.where(is_in_force(fault, t_s), grown, 0.0)
 
 
 def _lost(faults: list, states: States, position: np.ndarray) -> Parts:
-    """The part of the effective deflection that each loss takes, (n,) rad, after those before it."""
+    """The deflection (n,) rad that each loss takes, after the losses before it."""
     remaining = np.ones_like(position)
     for fault in faults:
         if fault.type == LOSS:
@@ -218,37 +229,41 @@ def _lost(faults: list, states: States, position: np.ndarray) -> Parts:
 
 
 def _displaced(faults: list, t_s: np.ndarray, way: np.ndarray) -> Parts:
-    """The way of the surface, (n,) rad, by the other fault that moves it: the one that struck last, also if
-    its effect remains after a repair."""
+    """The displacement of the surface, (n,) rad, of the fault that causes it. Among the faults that are in
+    force, it is the one that began last. If none is in force, it is the last that began, whose effect may
+    remain after a repair."""
     order = sorted((fault for fault in faults if fault.type != LOSS), key=lambda fault: fault.at_s)
-    struck = [~is_before(t_s, fault.at_s) for fault in order]
-    there = [is_in_force(fault, t_s) for fault in order]
+    begun = [~is_before(t_s, fault.at_s) for fault in order]
+    in_force = [is_in_force(fault, t_s) for fault in order]
     owner = np.full(t_s.size, -1)
-    for of in (struck, there):  # who is there now goes before who has been
-        for i, mask in enumerate(of):
+    for masks in (begun, in_force):  # faults in force are written last, over those that have ended
+        for i, mask in enumerate(masks):
             owner[mask] = i
     for i, fault in enumerate(order):
         yield fault, np.where(owner == i, way, 0.0)
 
 
 def inertia_coupling(m: Models, s: States) -> np.ndarray:
-    """The declared relative errors of the rate products [Zhang2005, sec. VII]."""
+    """The source `inertia_coupling`, (n, 3) rad/s2: theta times the rate products [Zhang2005, sec. VII]."""
     p, q, r = s.x.T
     theta = m.scenario.uncertainty.inertia_coupling
-    of = m.inertia
-    return np.column_stack([theta.p * of.Pqr * q * r, theta.q * of.Qpr * p * r, theta.r * of.Rpq * p * q])
+    inertia = m.inertia
+    return np.column_stack(
+        [theta.p * inertia.Pqr * q * r, theta.q * inertia.Qpr * p * r, theta.r * inertia.Rpq * p * q]
+    )
 
 
 def sinusoids(m: Models, s: States) -> np.ndarray:
-    """The declared sinusoids [Zhang2005, sec. VII]."""
+    """The source `sinusoids`, (n, 3) rad/s2: amplitude sin(frequency t) [Zhang2005, sec. VII]."""
     declared = [getattr(m.scenario.uncertainty.sinusoid, axis) for axis in AXES]
     return np.column_stack([d.amplitude_rad_s2 * np.sin(d.frequency_rad_s * s.t_s) for d in declared])
 
 
 def wind_turbulence(m: Models, s: States) -> np.ndarray:
-    """The damping terms at the rates relative to the turning air, less the same at the body rates.
+    """The source `wind_turbulence`, (n, 3) rad/s2: moments with the rates relative to the turning air less
+    those with the body rates.
 
-    Wind that does not turn reaches the moments only through alpha, beta and V, which are measured.
+    Wind that does not turn acts on the moments only through alpha, beta and V, which are measured.
     """
     in_air, over_earth = (
         acceleration_at(m.truth, rates, s.y, s.effective) - inertial(m.inertia, rates)
@@ -258,13 +273,15 @@ def wind_turbulence(m: Models, s: States) -> np.ndarray:
 
 
 def earth(m: Models, s: States) -> np.ndarray:
-    """The Earth's rotation on the flight's path; real gravity makes no moment about the centre of gravity."""
+    """The source `earth_rotation` along the flight, whose latitude follows from the way to the north. Gravity
+    has no moment about the centre of gravity."""
     latitude = radians(START_LATITUDE_DEG) + s.north_m / (EARTH_RADIUS_M + m.scenario.initial.altitude_m)
     return earth_rotation(m.inertia, s.x, s.attitude, latitude)
 
 
 def instantaneous(m: Models, s: States) -> tuple[Contributions, dict[str, Contributions]]:
-    """All sources but the integration at every frame, and the single faults and single coefficients."""
+    """All sources but `integration`, and the parts of `fault` and `coefficients`: each fault and each
+    coefficient."""
     healthy = healthy_positions(m.scenario, s.u)
     _, G = responses_at(m.design, s.x, s.y)
     moments = unanticipated_effects(m, s)
@@ -275,7 +292,7 @@ def instantaneous(m: Models, s: States) -> tuple[Contributions, dict[str, Contri
         acceleration_at(model, s.x, s.y, s.effective)
         for model in (m.design, m.untied, m.whole, m.turning, m.truth)
     )
-    # the truth's inertia turns the extra moment of an unanticipated fault, too
+    # the inertia of the truth applies to the moment of an unanticipated fault, too; Qm: 1 / Iy
     extra = sum(moments.values(), nothing) * (m.truth["Qm"] / m.design["Qm"] - 1.0)
     contributions = {
         "sensors": acceleration_at(m.design, s.x, s.y, s.u) - measured,

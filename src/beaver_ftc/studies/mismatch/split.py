@@ -1,4 +1,4 @@
-"""The mismatch of a flight, frame by frame, split into its sources: RMS, peaks, shares of the bound,
+"""The mismatch of a flight in each frame, split into its sources: RMS, peaks, shares of the bound,
 exceedances."""
 
 from dataclasses import dataclass
@@ -21,8 +21,8 @@ from beaver_ftc.studies.mismatch.states import Log, states_of
 from beaver_ftc.studies.present.tables import finite
 
 UNEXPLAINED, TOTAL, ETA_BAR, FAULT = "unexplained", "total", "eta_bar", "fault"
-MAX_EXCEEDANCES = 100  # kept with their times, per axis; all are counted
-CAUSES = tuple(name for name in SOURCES if name != FAULT)  # what eta_bar shall bound
+MAX_EXCEEDANCES = 100  # of each axis with their times; all are counted
+CAUSES = tuple(name for name in SOURCES if name != FAULT)  # the sources whose sum eta_bar must bound
 NAMES = (TOTAL, *SOURCES, UNEXPLAINED, ETA_BAR)
 
 
@@ -38,10 +38,10 @@ COLUMNS = ("t_s", *(column(axis, name) for axis in AXES for name in NAMES))
 class Split:
     """A flight of n frames; all accelerations (n, 3) rad/s2 over p, q, r.
 
-    total: JSBSim's angular acceleration over each frame less the design model's f + G u. contributions:
-    what each of SOURCES adds to it. details: single faults and single coefficients, under the name of their
-    source. eta_bar: the bound in force over the same frames; constant (3,): the constant part of it. place
-    (n, 3): airspeed m/s, altitude m, alpha rad. frame_s: length of a frame.
+    - total: angular acceleration of JSBSim over each frame less f + G u of the design model.
+    - contributions: part of each of SOURCES in it. details: each fault and each coefficient, by source.
+    - eta_bar: the bound in the same frames. constant (3,): its constant part.
+    - place (n, 3): airspeed m/s, altitude m, alpha rad. frame_s: length of a frame, s.
     """
 
     t_s: np.ndarray
@@ -55,49 +55,52 @@ class Split:
 
     @cached_property
     def named(self) -> Contributions:
-        """All that adds up: the whole, its sources, and what is left, by name."""
-        rest = self.total - sum(self.contributions[name] for name in SOURCES)
-        return {TOTAL: self.total, **self.contributions, UNEXPLAINED: rest}
+        """By name: the total, its sources, and `unexplained`, the total less the sum of the sources."""
+        unexplained = self.total - sum(self.contributions[name] for name in SOURCES)
+        return {TOTAL: self.total, **self.contributions, UNEXPLAINED: unexplained}
 
     @cached_property
     def uncertainty(self) -> np.ndarray:
-        """The mismatch without the faults, (n, 3) rad/s2: the eta that eta_bar shall bound."""
+        """eta, the mismatch without the faults, which eta_bar must bound, (n, 3) rad/s2."""
         return self.total - self.contributions[FAULT]
 
     @property
     def smallest_constant(self) -> np.ndarray:
-        """The constant part (3,) rad/s2 of a bound that would have covered the flight."""
+        """The smallest constant part of a bound that would have covered the flight, (3,) rad/s2: max of |eta|
+        - (eta_bar - constant)."""
         return (np.abs(self.uncertainty) - (self.eta_bar - self.constant)).max(axis=0, initial=0.0)
 
     @cached_property
     def ratios(self) -> np.ndarray:
-        """The uncertainty as a share of its bound, (n, 3)."""
+        """|eta| / eta_bar (n, 3)."""
         return self.shares(self.uncertainty)
 
     @property
     def exceeded(self) -> bool:
-        """Whether the uncertainty was above its bound on any axis."""
+        """Whether |eta| was above eta_bar in any frame on any axis."""
         return bool((self.ratios > 1.0).any())
 
     def shares(self, values: np.ndarray) -> np.ndarray:
-        """Values as shares of the bound, (n, 3); the share of nothing is 0, also of a bound of nothing."""
+        """|values| / eta_bar (n, 3); 0 / 0 is 0."""
         size = np.abs(values)
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.where(size > 0.0, size / self.eta_bar, 0.0)
 
     def magnitudes(self, values: np.ndarray, axis: int) -> Document:
-        """RMS and largest magnitude of an acceleration on an axis, rad/s2; its share of the whole, and the
-        largest of the bound."""
-        rms, whole = (float(np.sqrt(np.mean(each[:, axis] ** 2))) for each in (values, self.total))
+        """RMS and largest magnitude of an acceleration on an axis, rad/s2; its RMS over that of the total;
+        and its largest share of the bound."""
+        rms, total_rms = (
+            float(np.sqrt(np.mean(acceleration[:, axis] ** 2))) for acceleration in (values, self.total)
+        )
         return {
             "rms": rms,
             "max": float(np.abs(values[:, axis]).max()),
-            "share": rms / whole if whole > 0.0 else 0.0,
+            "share": rms / total_rms if total_rms > 0.0 else 0.0,
             "bound_share": finite(float(self.shares(values)[:, axis].max())),
         }
 
     def bound(self, axis: int) -> Document:
-        """An axis against its bound, and the first stays above it."""
+        """The mismatch of an axis compared with its bound, and the first MAX_EXCEEDANCES exceedances."""
         ratio = self.ratios[:, axis]
         stays = _runs(ratio > 1.0)
         worst = int(ratio.argmax())
@@ -112,6 +115,8 @@ class Split:
         }
 
     def _stay(self, ratio: np.ndarray, axis: int, first: int, after: int) -> Document:
+        """An exceedance from frame `first` to before frame `after`: its times, its peak, and the largest
+        source there. ratio (n,): |eta| / eta_bar of the axis."""
         peak = first + int(ratio[first:after].argmax())
         names = ("airspeed_mps", "altitude_m", "alpha_rad")
         return {
@@ -124,9 +129,9 @@ class Split:
         }
 
     def rows(self) -> np.ndarray:
-        """Every frame, by COLUMNS."""
-        found = self.named | {ETA_BAR: self.eta_bar}
-        values = np.stack([found[name] for name in NAMES], axis=-1)  # (n, axis, name)
+        """A row for each frame, (n, COLUMNS)."""
+        by_name = self.named | {ETA_BAR: self.eta_bar}
+        values = np.stack([by_name[name] for name in NAMES], axis=-1)  # (n, axis, name)
         return np.column_stack([self.t_s, values.reshape(len(values), -1)])
 
 
@@ -136,7 +141,8 @@ def split(scenario: Scenario, log: Log) -> Split:
     total[k] = (x[k+1] - x[k]) rate_hz - design_mean[k+1],     sampled[k] = xdot[k] - (f + G u)[k]
     integration = total - sampled
 
-    At the flight's last row, which nothing follows, total is sampled.
+    The last row has no next one, and total = sampled there. design_mean[k+1]: mean of f + G u over the frame
+    that ends at row k + 1, as the diagnosis computes it.
     """
     m = Models(scenario)
     s = states_of(log)
@@ -157,7 +163,7 @@ def split(scenario: Scenario, log: Log) -> Split:
 
 
 def split_flight(scenario: Scenario) -> tuple[Split, Metrics]:
-    """Fly and split, keeping no log: the split and the flight's metrics."""
+    """Fly a scenario without a log file: its split, and its metrics."""
     log = Columns()
     flight = fly(scenario, log)
     return split(scenario, log), measure(flight)

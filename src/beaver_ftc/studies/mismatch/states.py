@@ -12,8 +12,8 @@ Log = Mapping[str, np.ndarray]
 
 
 def column_of(how: str, column: str) -> str:
-    """The log column of a true one as `measured` by a sensor, or of a rate relative to the turning `air`:
-    `alpha_rad` is `alpha_measured_rad`, `p_rad_s` is `p_air_rad_s`."""
+    """The column of a signal as measured by a sensor (how: `measured`), or of a rate relative to the turning
+    air (`air`): `alpha_measured_rad` of `alpha_rad`, `p_air_rad_s` of `p_rad_s`."""
     stem, _, unit = column.partition("_")
     return f"{stem}_{how}_{unit}".rstrip("_")
 
@@ -23,8 +23,8 @@ _Y = ("alpha_rad", "beta_rad", "airspeed_mps", "qdyn_pa", "dpt")  # the design m
 _X_MEASURED, _X_AIR = (tuple(column_of(how, column) for column in _X) for how in ("measured", "air"))
 _Y_MEASURED = tuple(column_of("measured", column) for column in _Y)
 _TRUE = dict(zip((*_X_MEASURED, *_X_AIR, *_Y_MEASURED), (*_X, *_X, *_Y), strict=True))
-_ALONE = ("t_s", "north_m", "altitude_m")
-_TOGETHER = {
+_ALONE = ("t_s", "north_m", "altitude_m")  # fields of `States` with one column
+_TOGETHER = {  # fields with several columns
     "x": _X, "x_measured": _X_MEASURED, "x_air": _X_AIR, "y": _Y, "y_measured": _Y_MEASURED,
     "u": tuple(f"{surface}_cmd_rad" for surface in SURFACES),
     "position": tuple(f"{surface}_pos_rad" for surface in SURFACES),
@@ -41,7 +41,7 @@ LOGGED = frozenset((*_ALONE, *(column for columns in _TOGETHER.values() for colu
 
 @dataclass(frozen=True)
 class States:
-    """Frames of a flight; n of them. SI and rad."""
+    """The n frames of a flight, SI and rad. f + G u: acceleration by the design model."""
 
     t_s: np.ndarray
     x: np.ndarray  # (n, 3) body rates p, q, r relative to the Earth
@@ -61,7 +61,8 @@ class States:
 
 
 def states_of(log: Log) -> States:
-    """The states in log columns (name -> (n,)). A log without a measured column measured the truth."""
+    """The states from log columns (n,). If a log has no measured column, the true column is taken: the sensor
+    was ideal."""
     together = {
         name: np.column_stack([log[column if column in log else _TRUE[column]] for column in columns])
         for name, columns in _TOGETHER.items()

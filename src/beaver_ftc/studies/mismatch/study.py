@@ -1,11 +1,12 @@
-"""Fly a scenario, split its mismatch, keep the results beside the run's own; several of them, and a map.
+"""Fly scenarios, split their mismatch, and write the results: one flight, several flights compared, or a map.
 
-`mismatch.json` and its CSV: accelerations in rad/s2. `share` is a source's RMS over the RMS of the total:
-sources may cancel, so shares need not add up to 1. `bound_share` is the largest part of the bound eta_bar
-that a source has used at any frame. A map is the scenario, without faults, flown at each speed and altitude.
-
-A variant differs in `design_model` alone: a name of VARIANTS, or key=value pairs of `design_model`, joined
-by +: `engine-neglected`, `mass=1.1`, `linearised+coefficients.Cm_alpha=0.9`. `declared` is as it is.
+mismatch.json, .csv    accelerations in rad/s2 share                  RMS of a source over the RMS of the
+total; sources may cancel, so that shares need not add up
+                       to 1
+bound_share            largest share of the bound eta_bar that a source has used in any frame map
+the scenario without faults, flown at each airspeed and altitude variant                a scenario with
+another `design_model`: a name of VARIANTS, or key=value of `design_model`, or
+                       several joined by +, such as `linearised+coefficients.Cm_alpha=0.9`
 """
 
 import re
@@ -48,6 +49,8 @@ COMPARISON = "mismatch-comparison"
 MAP = "mismatch-map"
 AIRSPEEDS_MPS = (30.0, 35.0, 40.0, 45.0, 50.0, 55.0)  # the validated envelope
 ALTITUDES_M = (0.0, 1000.0, 2000.0, 3000.0, 4000.0)
+# Keys of an axis in an entry of the comparison, and of the map; the first two of the map are those of the
+# bound.
 _OF_BOUND = ("worst_ratio", "smallest_constant_rad_s2", "exceeded_s")
 _OF_MAP = ("worst_ratio", "smallest_constant_rad_s2", "dominant", "false_alarm")
 DECLARED = "declared"
@@ -71,7 +74,7 @@ def run_mismatch(
     with result_folder(out, scenario.name) as folder:
         with ParquetLog(folder / "log.parquet") as log:
             flight = fly(scenario, log, progress)
-        flown = measure(flight)
+        metrics = measure(flight)
         stored = StoredLog(folder / "log.parquet")
         kept = split(scenario, stored.read([name for name in stored.columns if name in LOGGED]))
         with ParquetLog(folder / "mismatch.parquet") as frames:
@@ -79,17 +82,18 @@ def run_mismatch(
             frames.write(kept.rows())
         analysis = analyse(scenario)
         recommended = recommended_for([scenario], [kept.smallest_constant])
-        found = document(scenario, kept, flown) | recommended | {"linear": linear_document(analysis)}
-        write_documents(folder, scenario, flown.document())
+        found = document(scenario, kept, metrics) | recommended | {"linear": linear_document(analysis)}
+        write_documents(folder, scenario, metrics.document())
         write_files(folder, _as_files(found, csv_rows(found)))
         if report:
-            write_files(folder / "figures", charts.figures(folder, found, flown, analysis))
-            write_report_files(folder, flown.document(), sections=[mismatch_section])
+            write_files(folder / "figures", charts.figures(folder, found, metrics, analysis))
+            write_report_files(folder, metrics.document(), sections=[mismatch_section])
     return found, kept.smallest_constant
 
 
 def refuse_other_aircraft(scenarios: Iterable[Scenario]) -> None:
-    """The study compares with a second set of equations, which there is of the built-in aircraft only."""
+    """Raise BadInput for another aircraft than the built-in one, since only the latter has a second set of
+    equations."""
     for scenario in scenarios:
         if scenario.airframe is not load():
             raise BadInput(
@@ -116,16 +120,19 @@ def document(scenario: Scenario, flight: Split, metrics: Metrics) -> Document:
 
 
 def _axis(flight: Split, i: int) -> Document:
+    """The numbers of each source on one axis, with those of its parts."""
     named = flight.named
-    found = {name: flight.magnitudes(named[name], i) for name in (*SOURCES, UNEXPLAINED, TOTAL)}
+    numbers = {name: flight.magnitudes(named[name], i) for name in (*SOURCES, UNEXPLAINED, TOTAL)}
     for source, details in flight.details.items():
         if details:
-            found[source]["parts"] = {name: flight.magnitudes(values, i) for name, values in details.items()}
-    return found
+            numbers[source]["parts"] = {
+                name: flight.magnitudes(values, i) for name, values in details.items()
+            }
+    return numbers
 
 
 def dominant(flight: Split) -> Document | None:
-    """The source, faults aside, that has used most of a bound: the reason for most of the threshold."""
+    """The source, without faults, with the largest share of the bound, and its axis; None if all are zero."""
     used = np.array([flight.shares(flight.contributions[name]).max(axis=0) for name in CAUSES])
     if not used.any():
         return None
@@ -133,18 +140,18 @@ def dominant(flight: Split) -> Document | None:
     return {"source": CAUSES[which], "axis": AXES[i], "bound_share": finite(float(used[which, i]))}
 
 
-# Columns of mismatch.csv: which part of which source, and what of it under which key of the document.
+# Columns of mismatch.csv: those of the place, and those with numbers, each with its key in the document.
 PLACE = ("scenario", "axis", "source", "part")
 FIGURES = {"rms_rad_s2": "rms", "max_rad_s2": "max", "share": "share", "bound_share": "bound_share"}
 
 
 def csv_rows(found: Document) -> Iterator[Document]:
-    """One row per axis, source and part of a document."""
+    """A row for each axis, source and part of a document; a whole source has an empty part."""
     for axis, sources in found["axes"].items():
         for source, figures in sources.items():
-            for part, of in [("", figures), *figures.get("parts", {}).items()]:
+            for part, numbers in [("", figures), *figures.get("parts", {}).items()]:
                 place = dict(zip(PLACE, (found["scenario"], axis, source, part), strict=True))
-                yield place | {column: of[key] for column, key in FIGURES.items()}
+                yield place | {column: numbers[key] for column, key in FIGURES.items()}
 
 
 def _as_files(found: Document, table: Iterable[Document]) -> Files:
@@ -152,7 +159,7 @@ def _as_files(found: Document, table: Iterable[Document]) -> Files:
 
 
 def entry(found: Document) -> Document:
-    """One flight's line of the comparison."""
+    """The entry of one flight in the comparison."""
     recommended = found["guarantee"]["recommended"]
     return {
         "scenario": found["scenario"],
@@ -174,8 +181,9 @@ def write_comparison(out: Path, entries: list[Document], recommended: Document, 
 
 
 def map_study(scenario: Scenario, report: bool = True) -> Study:
-    """The map of a scenario: an entry an axis, speed and altitude, with the worst share of the bound, the
-    smallest constant, and why. report: whether it is drawn."""
+    """The map of a scenario: an entry for each altitude, airspeed and axis, with the largest share of the
+    bound, the smallest constant that covers it, and the dominant source. report: whether a figure is
+    drawn."""
 
     def drawn(found: Document) -> Files | None:
         return {f"{MAP}.png": charts.map_figure(found["map"], scenario.name)} if report else None
@@ -190,7 +198,7 @@ def map_study(scenario: Scenario, report: bool = True) -> Study:
 
 
 def _cell(scenario: Scenario, condition: tuple[float, float]) -> list[Document]:
-    """A row per axis of a flight that starts there, without faults; no figures where there is no trim."""
+    """The entries of one condition, for a flight without faults; without a trim, all values are None."""
     airspeed_mps, altitude_m = condition
     place = {"airspeed_mps": airspeed_mps, "altitude_m": altitude_m}
     there = {"initial": scenario.initial.model_copy(update=place), "faults": ()}
@@ -218,7 +226,7 @@ def variant_of(scenario: Scenario, text: str) -> Scenario:
     if text != DECLARED:
         ending = re.sub(r"[^\w-]", "-", text)
         changes["name"] = f"{scenario.name}-{ending}"[:100]
-    changes["expect"] = {}  # what was expected of the scenario's own design need not hold for another
+    changes["expect"] = {}  # expectations hold for the declared design model alone
     try:
         return scenario.with_(changes)
     except BadInput as error:
@@ -226,7 +234,7 @@ def variant_of(scenario: Scenario, text: str) -> Scenario:
 
 
 def _changes(piece: str) -> Document:
-    """Dotted keys of `design_model` and their values."""
+    """Keys of `design_model` and values, of a name of VARIANTS or of a text `key=value`."""
     if piece in VARIANTS:
         return VARIANTS[piece]
     key, equals, text = piece.partition("=")

@@ -22,7 +22,7 @@ Table = tuple[str, list[str], list[list[str]]]  # caption, head, rows
 
 
 def share_text(share: float | None) -> str:
-    """A share as a percentage, of two digits below 10 %; None is a share of nothing."""
+    """A share in per cent, with two digits below 10 %. None: the bound is zero."""
     if share is None:
         return "no bound"
     value = 100.0 * share
@@ -32,13 +32,13 @@ def share_text(share: float | None) -> str:
 
 
 def mismatch_text(found: Document, folder: str, colour: bool) -> str:
-    """One flight: the sources, the bound, what to declare, the modes."""
+    """The results of one flight for the terminal: tables of sources, bound and modes, then sentences."""
     shown = printed([plain(*table) for table in tables(found)], WIDTH, colour)
     return "\n".join([shown, "", *findings(found), f"results      {folder}", ""])
 
 
 def findings(found: Document) -> list[str]:
-    """The result in sentences, for the terminal and the page."""
+    """The results in sentences, for the terminal and the page."""
     worst = found["dominant"]
     dominant = "nothing: truth and design agree"
     if worst is not None:
@@ -52,7 +52,7 @@ def findings(found: Document) -> list[str]:
 
 
 def _advice(found: Document) -> list[str]:
-    """The bound to declare, and what becomes of the published elevator case with it."""
+    """The recommended bound, and the published elevator case with the declared and the recommended bound."""
     recommended = found["recommended"]
     guarantee = found["guarantee"]
     constant = "  ".join(f"{axis} {recommended['constant_rad_s2'][axis]:g}" for axis in AXES)
@@ -69,6 +69,7 @@ def _advice(found: Document) -> list[str]:
 
 
 def _case(case: Document) -> str:
+    """The outcome of the published elevator case."""
     if case["false_alarm"]:
         return "FALSE ALARM before the fault"
     detected, certain = case["detection_delay_s"], case["guaranteed_delay_s"]
@@ -78,33 +79,36 @@ def _case(case: Document) -> str:
 
 
 def _reason(exceedances: list[Document]) -> str:
-    """The source of the exceedance of the bound that went furthest."""
+    """The source of the largest exceedance."""
     if not exceedances:
         return "-"
-    return without_underscores(max(exceedances, key=lambda one: one["peak_ratio"] or 0.0)["source"])
+    return without_underscores(
+        max(exceedances, key=lambda exceedance: exceedance["peak_ratio"] or 0.0)["source"]
+    )
 
 
 def _needed(axis: str, entry: Document) -> str:
-    """Of the bound on an axis: the largest share used, and the smallest constant that would do, rad/s2."""
+    """The largest share of the bound on an axis, and the smallest constant that covers the flight, rad/s2."""
     return f"{share_text(entry[f'{axis}_worst_ratio'])} / {entry[f'{axis}_smallest_constant_rad_s2']:.3g}"
 
 
 _4_DIGITS = "{:.4g}".format
-# An axis against its bound, how far it was used and exceeded, and the smallest that would have done.
+# Columns of an axis: its bound, the smallest that covers the flight, the largest share, and exceedances.
 BOUNDS = (
     ("axis", "axis"), ("constant", "constant_rad_s2", _4_DIGITS),
     ("smallest", "smallest_constant_rad_s2", _4_DIGITS), ("worst", "worst_ratio", share_text),
     ("at", "worst_at_s", seconds), ("exceeded", "exceeded_s", seconds), ("times", "exceeded_times"),
     ("because of", "exceedances", _reason),
 )  # fmt: skip
-# Frequency and damping of a mode, and how far the others are from the truth.
+# Columns of a mode: frequency and damping of the truth, and deviations of the other models.
 MODES = (
     ("mode", "mode", without_underscores), ("truth rad/s", "truth.frequency_rad_s", _4_DIGITS),
     ("damping", "truth.damping", "{:.3g}".format), ("FDC off by", "deviation.fdc", share_text),
     ("design off by", "deviation.design", share_text),
     ("JSBSim's own off by", "jsbsim_own_deviation", share_text),
 )  # fmt: skip
-# A run: worst share of the bound, smallest constant, reason, alarm and guarantee.
+# Columns of a run: largest share of the bound and smallest constant of each axis, source, alarm and
+# guarantee.
 RUNS = (
     ("run", "scenario"), *((axis, partial(_needed, axis)) for axis in AXES),
     ("dominant", "dominant", lambda source: without_underscores(source or "-")),
@@ -119,8 +123,8 @@ RUNS = (
 def tables(found: Document) -> list[Table]:
     """The sources, the bound and the modes, for the terminal and the page."""
     linear = found["linear"]
-    bounds = [{"axis": axis} | of for axis, of in found["bound"].items()]
-    modes = [{"mode": name} | of for name, of in linear["modes"].items()]
+    bounds = [{"axis": axis} | numbers for axis, numbers in found["bound"].items()]
+    modes = [{"mode": name} | numbers for name, numbers in linear["modes"].items()]
     place = "modes at trim, {airspeed_mps:g} m/s and {altitude_m:g} m".format(**linear)
     return [
         _sources(found),
@@ -130,36 +134,37 @@ def tables(found: Document) -> list[Table]:
 
 
 def _sources(found: Document) -> Table:
-    """RMS, largest value and share of the bound of every source that there is, and of its parts."""
+    """RMS, largest value and share of the bound of every source that is not zero, and of its parts."""
     caption = f"{found['scenario']}: truth less design (1e-3 rad/s2; share of the bound)"
     head = ["source", *(f"{axis} {what}" for axis in AXES for what in ("rms", "max", "bound"))]
     rows = []
     for name in found["axes"]["p"]:  # as on every axis
         per_axis = [found["axes"][axis][name] for axis in AXES]
-        if any(of["max"] > 0.0 for of in per_axis):
+        if any(numbers["max"] > 0.0 for numbers in per_axis):
             rows.append(_row(without_underscores(name), per_axis))
         for part in per_axis[0].get("parts", {}):
-            rows.append(_row(f"  {part}", [of["parts"][part] for of in per_axis]))
+            rows.append(_row(f"  {part}", [numbers["parts"][part] for numbers in per_axis]))
     return caption, head, rows
 
 
 def _row(name: str, per_axis: list[Document]) -> list[str]:
+    """A row of a source or part, three cells for each axis."""
     row = [name]
-    for of in per_axis:
-        shown = number(1e3 * of["rms"]), number(1e3 * of["max"]), share_text(of["bound_share"])
-        row += ["-"] * len(shown) if of["max"] == 0.0 else shown
+    for numbers in per_axis:
+        shown = number(1e3 * numbers["rms"]), number(1e3 * numbers["max"]), share_text(numbers["bound_share"])
+        row += ["-"] * len(shown) if numbers["max"] == 0.0 else shown
     return row
 
 
 def comparison_text(entries: list[Document], recommended: Document, folder: str, colour: bool) -> str:
-    """Several flights side by side, and the bound that covers them all."""
+    """Several flights side by side, and the bound that covers all of them."""
     caption = "worst share of the bound / smallest constant bound in rad/s2"
     table = printed([plain(caption, *tabulated(RUNS, entries))], WIDTH, colour)
     return "\n".join([table, "", *_advice(recommended), f"results      {folder}", ""])
 
 
 def mismatch_section(folder: Path) -> str:
-    """The section of a result folder as HTML; empty where the folder holds no mismatch."""
+    """The section of a result folder as HTML; empty if the folder has no mismatch.json."""
     path = folder / "mismatch.json"
     if not path.exists():
         return ""

@@ -1,8 +1,8 @@
 """The flights of the survey, and the statistic of every scheme in them.
 
-    condition   sensors and turbulence, which a designer knows: each scheme has an alarm level for each
-    condition block       a condition, an excitation and a seed: flights that are the same until the fault
-    begins grid        the conditions, excitations, faults and numbers of blocks of a survey
+    condition   sensors and turbulence, which a designer knows; a scheme has an alarm level for each condition
+    block       a condition, an excitation and a seed: flights that are the same until the fault begins
+    grid        the conditions, excitations, faults and numbers of blocks of a survey
 
 A block is flown once for each fault of the grid. All schemes diagnose the same flights.
 """

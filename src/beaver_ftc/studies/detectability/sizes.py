@@ -3,8 +3,8 @@
 A flight is the scenario without its own faults, with a loss of one surface. Seed and begin of the loss are
 random; its size is given. The loss begins between SETTLED_S, when the references have settled, and the end.
 
-    found      an alarm within the requested time certain    the condition of guaranteed detection
-    (`guaranteed_delay_s` of the metrics) holds within this time
+    found      an alarm within the requested time
+    certain    within this time, detection is guaranteed (`guaranteed_delay_s` of the metrics)
 
 A variant has the same flights with one change. If one error is left out of scenario and declaration, the
 variant shows how much this error limits the detection. With another reference, it shows whether the reference

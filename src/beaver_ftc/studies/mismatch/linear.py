@@ -1,9 +1,10 @@
 """Linear models of the truth and of the design, at the trim with which a scenario starts.
 
-truth     differences of the accelerations of JSBSim about the trim fdc       the FDC equations,
-differentiated by complex steps: an independent computation design    the FDC equations with the moments
-of the design model own       the linearisation of JSBSim itself, compared with the FDC equations at the
-same condition without sideslip
+truth     differences of the accelerations of JSBSim about the trim
+fdc       the FDC equations, differentiated by complex steps: an independent computation
+design    the FDC equations with the moments of the design model
+own       the linearisation of JSBSim itself; it is compared with the FDC equations at the same condition
+          without sideslip
 """
 
 from dataclasses import dataclass, replace

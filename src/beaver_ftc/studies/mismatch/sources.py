@@ -27,13 +27,11 @@ JSBSim frames that led to it. At the start, the actuator rests at its command.
 
 The effects of faults are computed with G of the design, as in the theory:
 
-    loss of effectiveness                the lost share of the position; of several losses, each takes its
-    share of
-                                         the effectiveness that those before it leave
-    mechanism (jam, runaway, bias, ...)  position of the surface less that of the healthy actuator; of several
-    faults
-                                         on one surface, the fault that began last has all of it
-    unanticipated                        its own pitching moment
+    loss of effectiveness   the lost share of the position; of several losses, each takes its share of the
+                            effectiveness that those before it leave
+    mechanism (jam, ...)    position of the surface less that of the healthy actuator; of several faults on
+                            one surface, the fault that began last has all of it
+    unanticipated           its own pitching moment
 
 Moments change the rates relative to inertial space, but rates are reported relative to the Earth. With the
 reported rates w, the rotation W of the Earth in body axes and w_i = w + W, all (3,) rad/s,

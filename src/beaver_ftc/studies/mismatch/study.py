@@ -1,12 +1,13 @@
 """Fly scenarios, split their mismatch, and write the results: one flight, several flights compared, or a map.
 
-mismatch.json, .csv    accelerations in rad/s2 share                  RMS of a source over the RMS of the
-total; sources may cancel, so that shares need not add up
-                       to 1
-bound_share            largest share of the bound eta_bar that a source has used in any frame map
-the scenario without faults, flown at each airspeed and altitude variant                a scenario with
-another `design_model`: a name of VARIANTS, or key=value of `design_model`, or
-                       several joined by +, such as `linearised+coefficients.Cm_alpha=0.9`
+mismatch.json, .csv    accelerations in rad/s2
+share                  RMS of a source over the RMS of the total; sources may cancel, so that shares need
+                       not add up to 1
+bound_share            largest share of the bound eta_bar that a source has used in any frame
+map                    the scenario without faults, flown at each airspeed and altitude
+variant                a scenario with another `design_model`: a name of VARIANTS, or key=value of
+                       `design_model`, or several of these joined by +, such as
+                       `linearised+coefficients.Cm_alpha=0.9`
 """
 
 import re

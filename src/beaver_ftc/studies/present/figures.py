@@ -1,4 +1,4 @@
-"""How figures of a study are begun, and what they have in common."""
+"""Parts that all figures of studies share: panels, looks of curves, heat maps, values with intervals."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -13,14 +13,15 @@ if TYPE_CHECKING:
 
 DPI = 110
 DASHES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (2, 2)), (0, (6, 2, 1, 2)), (0, (1, 1)))
-MARKS = "os^DXPv<>*h"  # eleven beside eight colours: no two of 88 curves have both alike
+MARKS = "os^DXPv<>*h"  # eleven markers and eight colours: 88 curves differ in at least one of the two
 GRID = "#dddddd"
 
 
 def panels(
     down: int, across: int, width: float, height: float, title: str = "", dpi: int = DPI, **subplots: Any
 ) -> tuple["Figure", Any]:
-    """A figure, inches, without matplotlib's global state, with its panels (down, across)."""
+    """A figure of this width and height, inches, without the global state of matplotlib, and its panels
+    (down, across)."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(width, height), dpi=dpi, layout="constrained")
@@ -30,7 +31,8 @@ def panels(
 
 
 def label_edges(grid: Any, x: str | None = None, y: Sequence[str] = (), titles: Sequence[str] = ()) -> None:
-    """Write along the edges of panels (down, across): below, to the left of each row, above each column."""
+    """Label the edges of panels (down, across): x below the last row, y to the left of each row, titles above
+    each column."""
     for axes in grid[-1]:
         axes.set_xlabel(x or "", fontsize=9)
     for axes, text in zip(grid[:, 0], y, strict=False):
@@ -40,12 +42,12 @@ def label_edges(grid: Any, x: str | None = None, y: Sequence[str] = (), titles: 
 
 
 def curve_look(place: int) -> dict[str, Any]:
-    """Colour and dashes of one of several curves."""
+    """Colour and dashes of the curve at a place among several."""
     return {"color": SERIES[place % len(SERIES)], "linestyle": DASHES[place % len(DASHES)]}
 
 
 def marker(place: int) -> str:
-    """The marker of one of several curves."""
+    """The marker of the curve at a place among several."""
     return MARKS[place % len(MARKS)]
 
 
@@ -58,8 +60,8 @@ def heat_map(
     fontsize: float = 8,
     **image: Any,
 ) -> Any:
-    """An image of values (rows, columns) with a (text, colour) on some of its cells; returns the image. Cells
-    with a text and no value are hatched."""
+    """Draw an image of values (rows, columns), and return it. labels: by (row, column), the text and its
+    colour. A cell with a text and the value NaN is hatched."""
     from matplotlib.patches import Rectangle
 
     look: dict[str, Any] = {"facecolor": GRID, "edgecolor": "white", "hatch": "////", "linewidth": 0.0}
@@ -76,8 +78,14 @@ def draw_estimates(
     axes: "Axes", places: Sequence[float], found: Sequence[Mapping[str, Any]], times: float = 1.0,
     across: bool = False, **look: Any,
 ) -> None:  # fmt: skip
-    """Values with bars for their intervals at places of the other axis. across: values to the right."""
-    ends = np.array([[of["value"], of["low"], of["high"]] for of in found], dtype=float).reshape(-1, 3).T
+    """Draw values with bars for their intervals. places: on the other axis. found: `value`, `low` and `high`
+    of each, None or NaN for none. times: factor on the values. across: the values are on the horizontal
+    axis."""
+    ends = (
+        np.array([[estimate["value"], estimate["low"], estimate["high"]] for estimate in found], dtype=float)
+        .reshape(-1, 3)
+        .T
+    )
     value, low, high = times * ends
     bars = np.maximum(value - low, 0.0), np.maximum(high - value, 0.0)
     if across:

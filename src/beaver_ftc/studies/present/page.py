@@ -1,4 +1,5 @@
-"""A page from its parts, as Markdown and as one HTML file that needs nothing else; a study's files."""
+"""A page from its parts, as Markdown, text, or one HTML file without other files; and the files of a
+study."""
 
 from base64 import b64encode
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 
 
 Drawn = Mapping[str, Path]
-"""Files of pictures by their stems."""
+"""Files of pictures, by the stems of their names."""
 
 
 class Heading(NamedTuple):
@@ -36,7 +37,7 @@ class Heading(NamedTuple):
 
 
 class Table(NamedTuple):
-    """A table. verdicts: which cells are a verdict, and whether it is a good one."""
+    """A table. verdicts: by text of a cell that is a verdict, whether it is a good one."""
 
     head: Sequence[str]
     rows: Rows
@@ -44,14 +45,14 @@ class Table(NamedTuple):
 
 
 class Bullets(NamedTuple):
-    """Sentences, one below the other."""
+    """A list of sentences below a lead."""
 
     lead: str
     sentences: Sequence[str]
 
 
 class Links(NamedTuple):
-    """Links in a line of an HTML page: (text, address)."""
+    """Links (text, address) in a line of an HTML page, behind a lead."""
 
     lead: str
     links: Sequence[tuple[str, str]]
@@ -66,20 +67,22 @@ class Pictures(NamedTuple):
 Part = str | Heading | Table | Bullets | Links | Pictures
 
 
-Parts = Sequence[Part]  # of a page, from above
+Parts = Sequence[Part]
+"""The parts of a page from top to bottom. An empty text is left out."""
 
 
 def table(columns: Columns, rows: Iterable[Any]) -> Table:
-    """A table of these columns."""
+    """A table of rows with these columns."""
     return Table(*tabulated(columns, rows))
 
 
 def as_markdown(parts: Parts, figures: str = "") -> str:
-    """The parts as Markdown; figures: the folder of the pictures, as the page sees it."""
+    """The parts as Markdown. figures: path of the folder of the pictures, relative to the page."""
     return "\n\n".join(text for part in parts for text in _markdown(part, figures)) + "\n"
 
 
 def _markdown(part: Part, figures: str) -> Iterator[str]:
+    """The paragraphs of a part; links have none."""
     match part:
         case Heading():
             yield f"## {part.text}"
@@ -111,14 +114,14 @@ def as_text(parts: Parts) -> str:
 
 
 def as_html(title: str, parts: Parts, figures: Drawn) -> str:
-    """The page as HTML; figures: stem to file of the pictures, which go into it."""
+    """The page as HTML, which contains the pictures."""
     body = html_of(parts, figures)
     page = (Path(__file__).parent / "page.html").read_text(encoding="utf-8")
     return page.format(title=escape(title), body=body)
 
 
 def html_of(parts: Parts, figures: Drawn) -> str:
-    """The parts as HTML, for a page of others."""
+    """The parts as HTML, as a section of another page."""
     return "\n".join(_html(part, figures) for part in parts if part)
 
 
@@ -143,12 +146,13 @@ def _html(part: Part, figures: Drawn) -> str:
 
 
 def _picture(title: str, path: Path) -> str:
+    """An HTML image that contains a PNG file."""
     data = b64encode(path.read_bytes()).decode("ascii")
     return f'<img alt="{escape(title)}" src="data:image/png;base64,{data}">'
 
 
 def drawn_in(folder: Path, stems: Iterable[str]) -> dict[str, Path]:
-    """The pictures of a result folder that are there, by their stems."""
+    """The existing pictures of a result folder, by their stems."""
     files = {stem: folder / "figures" / f"{stem}.png" for stem in stems}
     return {stem: file for stem, file in files.items() if file.exists()}
 
@@ -157,7 +161,12 @@ def study_files(
     name: str, page: Callable[[Any], tuple[str, Parts]], rows: Mapping[str, Callable[[Any], Any]],
     figures: "Makers",
 ) -> "Makers":  # fmt: skip
-    """A study's files: document, rows as CSV, figures, and the page of a title and parts that shows them."""
+    """The files of a study: document, CSV, figures and page.
+
+    name: of document and page. page: from the document to title and parts. rows: by name of a CSV file, the
+    function from the document to its rows. figures: by name, the function that draws one. The page is the
+    last file, because it reads the figures from the folder.
+    """
 
     def html(document: Any) -> Content:
         return lambda folder: as_html(*page(document), {stem: folder / f"{stem}.png" for stem in figures})
@@ -171,7 +180,7 @@ def study_files(
 
 
 class Summary(dict[str, Any]):
-    """A document, and what is behind it: its files show that too, but the document does not have it."""
+    """A document, and data behind it, which figures and CSV files show but the document does not contain."""
 
     def __init__(self, document: Document, behind: Any) -> None:
         super().__init__(document)
@@ -183,24 +192,28 @@ def _csv(rows_of: Callable[[Any], Any], document: Any) -> str:
 
 
 def replace_between(path: Path, begin: str, end: str, text: str) -> None:
-    """Put text between two marks of a page, whose other parts stay. Raises BadInput unless it has both, the
-    first before the second."""
+    """Replace the text between two marks of a page. Raises BadInput unless the page has both marks in this
+    order."""
     page = path.read_text(encoding="utf-8") if path.is_file() else ""
-    before, _, rest = page.partition(begin)
-    _, found, after = rest.partition(end)
-    if not found:
+    before, _, behind = page.partition(begin)
+    _, has_end, after = behind.partition(end)
+    if not has_end:
         raise BadInput(f"{path}: has no place for the tables, allowed: a page with {begin} and {end}")
     path.write_text(f"{before}{begin}\n{text}{end}{after}", encoding="utf-8")
 
 
 def versions_line(versions: Mapping[str, str]) -> str:
-    """The versions that made the numbers, in a line."""
+    """Names and versions of the packages, in a line."""
     return ", ".join(f"{name} {version}" for name, version in versions.items())
 
 
-Content = Any  # text, bytes, a figure, a folder of these, or a function that makes one, given the folder
+Content = Any
+"""A text, bytes, a figure, a mapping (a folder of these), None (no file), or a function from the folder to
+one."""
 Files = Mapping[str, Content]
-Makers = Mapping[str, Callable[[Any], Content]]  # by the name of a file what makes its content of a document
+"""Contents by name of the file."""
+Makers = Mapping[str, Callable[[Any], Content]]
+"""By name of a file, the function from the document to its content."""
 
 
 def contents(files: Makers, document: Any) -> Files:
@@ -209,7 +222,7 @@ def contents(files: Makers, document: Any) -> Files:
 
 
 def write_files(folder: Path, files: Files) -> None:
-    """Write each file of a folder, in order; a content of None is no file."""
+    """Write the files of a folder in their order. A content None is no file."""
     folder.mkdir(exist_ok=True)
     for name, content in files.items():
         _write(folder / name, content)

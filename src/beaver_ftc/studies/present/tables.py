@@ -1,4 +1,4 @@
-"""Numbers as people read them, and tables of them for a terminal, Markdown, HTML and CSV."""
+"""Numbers as text, and tables for a terminal, Markdown, HTML and CSV."""
 
 import csv
 import io
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 Rows = Sequence[Sequence[str]]
-LEAST = 1e-3  # what is smaller is said to be so: nobody reads 2.29e-07 deg/s
+LEAST = 1e-3  # a smaller number is written as <0.001
 
 
 def finite(value: Any) -> Any:
@@ -28,14 +28,15 @@ def all_finite(row: Mapping[str, Any]) -> Document:
 
 
 def number(value: Any, unit: str = "", none: str = "-", digits: int = 3) -> str:
-    """A number with the digits worth reading, without an exponent, and its unit; None is `none`, and a text
-    stays."""
+    """A number with so many significant digits, without an exponent, and its unit. None is `none`; a text
+    stays as it is."""
     if value is None or isinstance(value, str):
         return value or none
     return f"{_digits(float(value), digits)} {unit}".rstrip()
 
 
 def _digits(value: float, digits: int) -> str:
+    """A number as text; an infinite one is `never`."""
     if not isfinite(value):
         return "never"
     if 0.0 < abs(value) < LEAST:
@@ -48,12 +49,12 @@ def percent(share: float | None, unit: str = " %") -> str:
     return "none" if share is None else f"{100.0 * share:.0f}{unit}"
 
 
-bare_percent = partial(percent, unit="")  # below a head that has the unit
+bare_percent = partial(percent, unit="")  # in a column whose head has the unit
 number_or_never = partial(number, none="never")
 
 
 def estimate(found: Mapping[str, Any], form: Callable[[Any], str] = number_or_never) -> tuple[str, str]:
-    """The value of an estimate, and its interval, each number in this form."""
+    """The value of an estimate and its interval as texts. form: from a number to its text."""
     value, low, high = (form(found[key]) for key in ("value", "low", "high"))
     return value, f"{low} to {high}"
 
@@ -78,8 +79,8 @@ def grouped(rows: Iterable[Document], *names: str) -> Groups:
 class Column(NamedTuple):
     """A column of a table: its head, and its cell of a row.
 
-    of: a function from a row to its cell; or the key of the value in the row, `part.key` for a value inside a
-    part. form: a function from that value to its cell, or the unit of a number.
+    of: a function from a row to its cell, or the key of a value in the row; `part.key` is a key inside a
+    part. form: a function from the value to its cell, or the unit of a number.
     """
 
     head: str
@@ -96,13 +97,14 @@ class Column(NamedTuple):
         return number(value, self.form) if isinstance(self.form, str) else self.form(value)
 
 
-Columns = Sequence[tuple[Any, ...]]  # the fields of each Column
+Columns = Sequence[tuple[Any, ...]]
+"""The fields of each `Column`."""
 
 
 def tabulated(columns: Columns, rows: Iterable[Any]) -> tuple[list[str], list[list[str]]]:
     """Head and rows of a table."""
-    made = [Column(*each) for each in columns]
-    return [each.head for each in made], [[each.cell(row) for each in made] for row in rows]
+    columns_ = [Column(*column) for column in columns]
+    return [column.head for column in columns_], [[column.cell(row) for column in columns_] for row in rows]
 
 
 def aligned(rows: Rows) -> str:
@@ -113,8 +115,9 @@ def aligned(rows: Rows) -> str:
 
 
 def as_csv(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Rows of equal keys as CSV with a header; None is an empty cell, and each key of a part a column.
-    Without a row there are no columns either: the text is empty."""
+    """Rows with the same keys as CSV with a header. None is an empty cell. A part, a mapping in a row, has a
+    column `name_key` for each of its keys. The text is empty without rows, since the columns are then
+    unknown."""
     if not rows:
         return ""
     text = io.StringIO()
@@ -126,6 +129,7 @@ def as_csv(rows: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _flat(row: Mapping[str, Any]) -> dict[str, Any]:
+    """A row with the keys of its parts as `name_key`."""
     flat: dict[str, Any] = {}
     for name, value in row.items():
         parts = value if isinstance(value, dict) else {"": value}
@@ -148,12 +152,13 @@ def html_table(head: Sequence[str], rows: Rows) -> str:
 
 
 def _cell(text: str) -> str:
+    """A cell of an HTML table."""
     kind = {"✓": ' class="met"', "✗": ' class="missed"'}.get(text[:1], "")
     return f"<td{kind}>{escape(text)}</td>"
 
 
 def plain(title: str, head: Sequence[str], rows: Rows) -> "Table":
-    """A table of rich: the first column to the left, the others to the right."""
+    """A table of rich with the first column aligned to the left, the others to the right."""
     from rich.table import Table
 
     table = Table(title=title, title_justify="left", box=None, pad_edge=False)

@@ -1,6 +1,6 @@
-"""The published cases by the paper's scheme and law and by our defaults, side by side.
+"""The published cases with the scheme and law of the paper, and with our default ones, side by side.
 
-What is flown, declared and asked for is the same; only who diagnoses and who controls differs.
+Flights, declarations and references are the same; only scheme and law differ.
 """
 
 from collections import Counter
@@ -14,11 +14,11 @@ from beaver_ftc.studies.reproduce.cases import AXIS, CASES, EDGES, HEALTHY, OURS
 SHOWN = (HEALTHY, *(CASES[name] for name in ("elevator", "aileron", "rudder", "unanticipated")))
 WHOSE: Mapping[str, Mapping[str, object]] = {"paper": {}, "ours": OURS}
 BETTER = "Where the paper's is better, by more than 1 %:"
-MATTERS = 0.01  # a smaller share of a number is no difference
+MATTERS = 0.01  # a difference by a smaller share does not count
 
 
 class Quantity(NamedTuple):
-    """A number of which less is better: its key in a row, what it is called, its unit."""
+    """A number whose smaller value is better: key in a row, name, unit."""
 
     key: str
     called: str
@@ -34,12 +34,12 @@ QUANTITIES = (
 
 
 def fly_beside() -> dict[tuple[str, str], Flown]:
-    """Every case of SHOWN, flown by both: (case, whose)."""
+    """The flights of each case of SHOWN with both schemes, by (case, whose)."""
     return {(case.name, whose): fly_case(case, how) for case in SHOWN for whose, how in WHOSE.items()}
 
 
 def healthy_settings() -> list[tuple[str, Changed]]:
-    """The corners and edges of the published uncertainty, for both: (whose, the setting)."""
+    """(whose, setting) for each corner and edge of the published uncertainty."""
     return [
         (whose, Changed(corner.name, {**how, **corner.changes}))
         for whose, how in WHOSE.items()
@@ -53,8 +53,8 @@ def false_alarm_of(setting: Changed) -> float:
 
 
 def document_of(flights: Mapping[tuple[str, str], Flown], alarms: Sequence[float]) -> Document:
-    """A row a case and scheme, and the false alarms of each. alarms: one for each of `healthy_settings`, in
-    their order."""
+    """The document: a row for each case and scheme, and the false alarms of each scheme. alarms: 1 or 0 for
+    each of `healthy_settings`, in their order."""
     rows = [_row(case, whose, flown) for (case, whose), flown in flights.items()]
     settings = zip(healthy_settings(), alarms, strict=True)
     alarmed = Counter(whose for (whose, _), alarm in settings if alarm)
@@ -89,8 +89,8 @@ def _row(case: str, whose: str, flown: Flown) -> Document:
 
 
 def _better(rows: Sequence[Document]) -> list[Document]:
-    """Where the paper's scheme or law does better than ours."""
-    # `fly_beside` flies each case by the paper's, then by ours
+    """The numbers that are better with the scheme and law of the paper."""
+    # `fly_beside` has each case with the paper's scheme first, then with ours
     pairs = zip(rows[::2], rows[1::2], strict=True)
     return [
         {
@@ -107,11 +107,13 @@ def _better(rows: Sequence[Document]) -> list[Document]:
 
 
 def _less(paper: float | None, ours: float | None) -> bool:
-    """Whether the paper's number is less by more than `MATTERS`; None is more than any number."""
+    """Whether the number of the paper is smaller by more than the share `MATTERS`; None is larger than any
+    number."""
     return paper is not None and (ours is None or paper < (1.0 - MATTERS) * ours)
 
 
 def _after(row: Document) -> str:
+    """The RMS error after the fault, or that the aircraft is lost."""
     return "aircraft lost" if row["departed"] else number(row["after_deg_s"], "deg/s")
 
 
@@ -124,7 +126,7 @@ COLUMNS = (  # a row a flight
 
 
 def sentences(document: Document) -> list[str]:
-    """Where the paper's does better, a sentence a case and quantity."""
+    """A sentence for each number that is better with the scheme and law of the paper."""
     return [
         f"{row['case']}: {row['quantity']} {number(row['paper'], row['unit'])}, ours "
         f"{number(row['ours'], row['unit'], none='never')}"

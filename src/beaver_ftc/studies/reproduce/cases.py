@@ -1,7 +1,11 @@
-"""The flights of the published study, a few beside them for comparison, and what is changed in all of them.
+"""The flights of the published study, further ones for comparison, and the changes of their setting.
 
-Do the conclusions hang on what the paper leaves open? Every choice is changed, one at a time, and every
-statement held against the flights again.
+    case      a published flight: a change of the published setting, such as a fault, by name
+    setting   a change for all cases: a choice that the paper leaves open, another condition, another gain
+    flown     a case in a setting, with its log and measures
+
+Each choice that the paper leaves open is changed, one at a time, and all statements are tested again, to show
+whether the conclusions depend on the choices.
 """
 
 from collections.abc import Mapping
@@ -25,19 +29,19 @@ from beaver_ftc.studies.engine.statistics import or_never
 from beaver_ftc.studies.reproduce.choices import FAULT_AT_S, GIVEN, gains, scenario
 
 ESTIMATORS = ("aileron", "elevator", "rudder")
-AXIS = {"aileron": "p", "elevator": "q", "rudder": "r", "unanticipated": "q"}  # where a fault shows
-PUBLISHED_LOSS = 0.4  # of the effectiveness
-AFTER_S = 18.0  # flown on after the fault, s
-SETTLED_S = 2.0  # from rest, or from a fault, to steady tracking: four error time constants
+AXIS = {"aileron": "p", "elevator": "q", "rudder": "r", "unanticipated": "q"}  # axis of the effect of a fault
+PUBLISHED_LOSS = 0.4  # share of the effectiveness
+AFTER_S = 18.0  # time that is flown after the fault
+SETTLED_S = 2.0  # from the start or a fault to steady tracking: four time constants of the error
 
 
 Changes = Mapping[str, Any]
-"""Values by dotted scenario key."""
+"""Values by dotted key of a scenario."""
 
 
 @dataclass(frozen=True)
 class Changed:
-    """A change of the published setting, and where the paper shows it, if it does."""
+    """A change of the published setting. shown_in: its place in the paper, or empty."""
 
     name: str
     changes: Changes
@@ -49,7 +53,7 @@ PUBLISHED, VARIANTS = (
     tuple(Changed(name, changes, _FILE["shown_in"].get(name, "")) for name, changes in _FILE[these].items())
     for these in ("published", "variants")
 )
-OURS: Changes = _FILE["ours"]  # what makes the published setting our default scheme and law
+OURS: Changes = _FILE["ours"]  # selects our default scheme and law
 GAINS = tuple(  # every gain of the published scheme and law, halved and doubled
     Changed(f"{gain.key.split('.')[0]} {gain.name} {how}", {gain.key: share * gain.default})
     for gain in gains()
@@ -59,14 +63,14 @@ CASES = {case.name: case for case in PUBLISHED}
 HEALTHY = Changed("fault-free", {})
 AIRSPEEDS_MPS = (32.0, 36.0, 40.0, 43.0, 47.0, 54.0)
 SIZES = (0.1, 0.2, 0.6, 0.8, 1.0)  # share of the effectiveness that a published loss takes
-INSTANTS_S = (10.75, 13.0, 14.5)  # of the fault; at each the references are elsewhere in their periods
-SIZE, AT = "published loss", "instant of the fault"  # not keys of a scenario: they change its faults
+INSTANTS_S = (10.75, 13.0, 14.5)  # begins of the fault, at different phases of the references
+SIZE, AT = "published loss", "instant of the fault"  # keys of a setting that change the faults of a case
 EDGES = tuple(
     Changed("theta " + ", ".join(f"{theta:+g}" for theta in corner),
             {"uncertainty.inertia_coupling": dict(zip(AXES, corner, strict=True))})
     for corner in product((-0.25, 0.0, 0.25), repeat=3)
 )  # fmt: skip
-CORNERS = tuple(  # the uncertainty's corners, and none
+CORNERS = tuple(  # the corners of the uncertainty, and no uncertainty
     edge
     for edge in EDGES
     if set(map(abs, edge.changes["uncertainty.inertia_coupling"].values())) in ({0.25}, {0.0})
@@ -89,32 +93,32 @@ class Flown:
 
     @property
     def fault_at_s(self) -> float:
-        """When the fault strikes, s; of a healthy flight, when it would."""
+        """Begin of the fault, s; in a healthy flight, that of the other flights."""
         return self.metrics.fault.at_s if self.metrics.fault else FAULT_AT_S
 
     @property
     def struck(self) -> str:
-        """The surface that the fault is of; of an unanticipated one its type."""
+        """The surface with the fault; `unanticipated` for a fault without a surface."""
         return place_of(self.scenario.faults[0])
 
     @property
     def axis(self) -> str:
-        """The axis on which the fault shows."""
+        """The axis of the effect of the fault."""
         return AXIS[self.struck]
 
     @property
     def alarm_s(self) -> float:
-        """When the alarm is raised, s; infinite if it never is."""
+        """Time of the alarm, s; infinite without an alarm."""
         return or_never(self.metrics.detection.time_s)
 
     @property
     def rightly_named_s(self) -> float:
-        """When the fault gets its name, s; infinite if anything else is named in the end."""
+        """Time at which the fault was named, s; infinite if the name at the end is wrong or missing."""
         isolation = self.metrics.isolation
         return or_never(isolation.time_s if isolation.correct else None)
 
     def mode_at_s(self, mode: str) -> float:
-        """When the supervisor first enters a mode, s; infinite if it never does."""
+        """Time at which the supervisor first enters a mode, s; infinite if it never does."""
         return next((change.time_s for change in self.metrics.supervisor if change.mode == mode), np.inf)
 
     @property
@@ -148,15 +152,18 @@ class Flown:
         return (self.log["t_s"] >= start_s) & (self.log["t_s"] < end_s)
 
     def excluded_at_s(self, estimator: str) -> float:
-        """When an isolation estimator was excluded, s; infinite if it never was, or was not there at all."""
+        """Time at which an isolation estimator was excluded, s; infinite if it was not, or if the scheme has
+        no such estimator."""
         return self.first_s((self.log[f"fie_{estimator}_excluded"] == 1) & self.has(estimator))
 
     def has(self, estimator: str) -> bool:
-        """Whether an isolation estimator is there: one left out is excluded from the first frame on."""
+        """Whether the scheme has an isolation estimator: one that is left out is excluded from the first
+        frame on."""
         return bool(self.log[f"fie_{estimator}_excluded"][0] != 1)
 
     def shares_of(self, estimator: str) -> np.ndarray:
-        """|residual| / threshold of an isolation estimator, on the residual's side, (3, frames)."""
+        """|residual| / threshold on the side of the residual, of an isolation estimator, (3, frames); 0 / 0
+        is 0, and all are 0 if the scheme has no such estimator."""
         residual, lower, upper = (
             np.array([self.log[f"fie_{estimator}_{axis}_{what}_rad_s"] for axis in AXES])
             for what in ("residual", "lower", "upper")
@@ -166,7 +173,8 @@ class Flown:
         return np.nan_to_num(np.where(residual == 0, 0.0, ratio), posinf=np.inf) * self.has(estimator)
 
     def shares(self) -> np.ndarray:
-        """|residual| / threshold of the detection estimator, (3, frames); both start from zero."""
+        """|residual| / threshold of the detection estimator, (3, frames); 0 / 0 is 0, as both start from
+        0."""
         residual, threshold = (
             np.array([self.log[f"{axis}_{what}_rad_s"] for axis in AXES])
             for what in ("residual", "threshold")
@@ -174,30 +182,34 @@ class Flown:
         return np.abs(residual) / np.where(residual == 0, 1.0, threshold)
 
     def residuals_of(self, estimator: str) -> np.ndarray:
-        """The residuals of an isolation estimator, (3, frames) rad/s; zero while it is not at work."""
+        """The residuals of an isolation estimator, (3, frames) rad/s; 0 as long as it does not work."""
         residuals = [self.log[f"fie_{estimator}_{axis}_residual_rad_s"] for axis in AXES]
         return np.nan_to_num(residuals) * self.has(estimator)
 
     def unexplained_rad_s2(self, axis: str) -> np.ndarray:
-        """The acceleration of each frame that the design model does not explain, (frames,) rad/s2."""
+        """Acceleration over each frame less that of the design model, (frames,) rad/s2."""
         rate = self.log[f"{axis}_rad_s"]
         return np.diff(rate, prepend=rate[0]) / self.frame_s - self.log[f"{axis}_design_rad_s2"]
 
     def named_s(self, estimator: str) -> float:
-        """Time for which this was the only estimator left, s."""
+        """Time after the alarm in which this was the only estimator not excluded, s."""
         others = [self.log[f"fie_{name}_excluded"] == 1 for name in ESTIMATORS if name != estimator]
-        alone = np.all(others, axis=0) & (self.log[f"fie_{estimator}_excluded"] != 1)
-        alone &= self.log["detected"] == 1
-        return float(alone.sum() * self.frame_s)
+        is_alone = np.all(others, axis=0) & (self.log[f"fie_{estimator}_excluded"] != 1)
+        is_alone &= self.log["detected"] == 1
+        return float(is_alone.sum() * self.frame_s)
 
 
 def fly_case(case: Changed, changes: Changes | None = None) -> Flown:
-    """Fly a case, with further changes to the choices."""
+    """Fly a case in a setting. changes: of the setting."""
     return _fly(case.name, keys_of(case, changes or {}))
 
 
 def keys_of(case: Changed, changes: Changes) -> Document:
-    """The dotted keys of a case with further changes: two with the same keys are the same flight."""
+    """The keys of the scenario of a case in a setting. Cases with the same keys are the same flight.
+
+    A setting that changes the begin of the fault also changes the duration, so that AFTER_S are flown after
+    it.
+    """
     merged = _apt({**case.changes, **changes})
     size = merged.pop(SIZE, PUBLISHED_LOSS)
     at_s = merged.pop(AT, FAULT_AT_S)
@@ -207,19 +219,22 @@ def keys_of(case: Changed, changes: Changes) -> Document:
 
 
 def _struck(fault: Changes, size: float, at_s: float) -> Document:
-    """The size and instant of a fault; a slight loss, and what is no loss, keep theirs."""
+    """The changed keys of a fault: its begin, and its size if it is the published loss."""
     return {"at_s": at_s} | ({"magnitude": size} if fault.get("magnitude") == PUBLISHED_LOSS else {})
 
 
 def _fly(name: str, keys: Changes) -> Flown:
+    """Fly the published setting with these keys."""
     log = Columns()
     flight = fly(scenario(name, keys), log)
     return Flown(measure(flight), log, flight.scenario)
 
 
 class LazyFlights(dict[str, Flown]):
-    """The published cases in a setting, by name, each flown when a measure asks for it. flown: the flights of
-    all settings by their keys, so that a flight that two settings share is flown once."""
+    """The published cases in a setting, by name. A case is flown when it is first used.
+
+    flown: flights of all settings by their keys, so that a flight that two settings share is flown once.
+    """
 
     def __init__(self, changes: Changes, flown: dict[str, Flown]) -> None:
         super().__init__()
@@ -228,17 +243,17 @@ class LazyFlights(dict[str, Flown]):
 
     def __missing__(self, name: str) -> Flown:
         keys = keys_of(CASES[name], self._changes)
-        known = repr(sorted(keys.items()))
-        if known not in self._flown:
-            self._flown[known] = _fly(name, keys)
-        return self._flown[known]
+        key = repr(sorted(keys.items()))
+        if key not in self._flown:
+            self._flown[key] = _fly(name, keys)
+        return self._flown[key]
 
 
 def _apt(changes: Changes) -> Document:
-    """The changes without options of the published scheme or law where another one flies."""
-    others = [
+    """The changes, without options of the published scheme or law if the changes select another one."""
+    unused = [
         f"{options}."
         for chosen, options in (("fdi.scheme", "fdi.options"), ("control.law", "control.options"))
         if changes.get(chosen, GIVEN[chosen]) != GIVEN[chosen]
     ]
-    return {key: value for key, value in changes.items() if not key.startswith(tuple(others))}
+    return {key: value for key, value in changes.items() if not key.startswith(tuple(unused))}

@@ -1,4 +1,4 @@
-"""The setting that [Zhang2005] gives, and our choices for all that it leaves open, each with its reason."""
+"""The setting of [Zhang2005], and our choices for all that the paper leaves open, each with its reason."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,9 +11,9 @@ from beaver_ftc.scenario.schema import Scenario
 
 FAULT_AT_S = 12.0
 AMPLITUDE_DEG_S = 3.0
-ABLATION = "ablation"  # the origin of an option that takes a part of the scheme out
+ABLATION = "ablation"  # `origin` of an option that removes a part of the scheme
 
-# Section VII: the sinusoids of eta, the uncertainty's bound, and thresholds by the norm bound.
+# Given in section VII: the sinusoids of eta, the bound on the uncertainty, scheme and law.
 GIVEN: Mapping[str, Any] = {
     "uncertainty.sinusoid.p": {"amplitude_rad_s2": 0.02, "frequency_rad_s": 10},
     "uncertainty.sinusoid.q": {"amplitude_rad_s2": 0.02, "frequency_rad_s": 15},
@@ -27,7 +27,7 @@ GIVEN: Mapping[str, Any] = {
 
 @dataclass(frozen=True)
 class Choice:
-    """A scenario key the paper leaves open, what it is set to, and why."""
+    """A key of the scenario that the paper leaves open, our value, and the reason."""
 
     key: str
     value: Any
@@ -68,7 +68,7 @@ CHOICES = (
 )
 
 
-# Of scheme and law, beside the gains: their defaults, and what they are.
+# Options of scheme and law that are no gains, with their defaults.
 OPTIONS = (
     Choice(
         "fdi.options.initial_theta",
@@ -80,8 +80,8 @@ OPTIONS = (
 
 
 class Gain(NamedTuple):
-    """An option of the published scheme or law that is a number to choose: its dotted key and its name, its
-    default, what it is, and how it was chosen."""
+    """A number to choose in the published scheme or law. key: of the scenario. says: its meaning. origin: how
+    it was chosen."""
 
     key: str
     name: str
@@ -91,7 +91,8 @@ class Gain(NamedTuple):
 
 
 def gains() -> list[Gain]:
-    """Every such option, from the scheme's and the law's own tables; those that take a part out are not."""
+    """The gains, from the tables of options of scheme and law, without options that remove a part or are
+    0."""
     tables = (
         ("fdi.options", options_of(DETECTORS, GIVEN["fdi.scheme"])),
         ("control.options", options_of(LAWS, GIVEN["control.law"])),
@@ -104,13 +105,13 @@ def gains() -> list[Gain]:
     ]
 
 
-# Both together, as the sections of a scenario.
+# GIVEN and CHOICES together, as the sections of a scenario.
 SETTING: Document = with_values(
     {}, {parse_key(key): value for key, value in {**GIVEN, **{c.key: c.value for c in CHOICES}}.items()}
 )
 
 
 def scenario(name: str, changes: Mapping[str, Any]) -> Scenario:
-    """The published setting with our choices and `changes`, dotted keys, as a scenario."""
+    """The scenario of the published setting with our choices. changes: values by dotted key."""
     places = {parse_key(key): value for key, value in changes.items()}
     return Scenario.model_validate(with_values({"name": name, **SETTING}, places))

@@ -1,9 +1,13 @@
-"""Each statement of [Zhang2005], how it is read as a number, and what becomes of it.
+"""The statements of [Zhang2005]: the number that measures each, its limit, and the verdict.
 
-A statement holds if its number keeps its limit. That alone says little: it is borne out only if it fails in
-the same flights once the mechanism it speaks of is taken out, its ablation; and borne out in a setting only
-if the ablation fails in that setting. Statements that the code makes true by its construction, or that give
-nothing to measure, are counted apart.
+    holds            the number keeps its limit
+    ablation         the same flights without the mechanism to which the statement refers
+    borne out        the statement holds, and does not hold in its ablation
+    stronger         it is also borne out in each setting that the paper did not fly
+    cannot be judged it holds also in its ablation, or there is nothing to measure
+
+That a number keeps its limit alone would not show that the mechanism is the reason. Statements that are true
+by the construction of the code are counted separately.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -27,8 +31,12 @@ ABLATIONS = tuple(Changed(name, row["changes"]) for name, row in _FILE["ablation
 
 
 class Measure(NamedTuple):
-    """How a number is measured, its quantity and unit, whether it is to be at least its limit, and the word
-    for an infinite one. beside: how the names of the flights end that these are compared with, if any."""
+    """How a number is measured.
+
+    - of: the function of flights and axes. quantity, unit: of the number. at_least: whether it must be at
+      least its limit, otherwise at most. none: the word for an infinite number.
+    - beside: ending of the names of flights with which the flights of a claim are compared; empty for none.
+    """
 
     of: Callable[..., float]
     quantity: str
@@ -41,15 +49,18 @@ class Measure(NamedTuple):
 MEASURES = {name: Measure(getattr(measures, name), **row) for name, row in _FILE["measures"].items()}
 
 
-NO_MEASURE = Measure(lambda: nan, "")
+NO_MEASURE = Measure(lambda: nan, "")  # of a statement with nothing to measure
 
 
 class Claim(NamedTuple):
-    """A published statement: what is measured in which flights, and of which axis, its limit with where that
-    comes from, and the ablation, of ABLATIONS, in which it must fail.
+    """A published statement.
 
-    reason: why nothing is measured, for those without a measure. because: why it does not hold; such a claim
-    is flown in the published setting alone. construction: whether the code makes it true by its construction.
+    - where, statement: its place in the paper, and its words.
+    - measure, names: the measure, and its arguments: names of cases, and axes.
+    - limit, source: the limit of the number, and its origin. ablation: name of the ablation.
+    - reason: of a statement without a measure, why nothing is measured.
+    - because: why it does not hold. Such a claim is flown in the published setting alone.
+    - construction: whether it is true by the construction of the code.
     """
 
     where: str
@@ -71,21 +82,22 @@ class Claim(NamedTuple):
     def number(self, flights: Mapping[str, Flown]) -> float:
         """The number that is measured in the flights."""
         beside = [name + self.measure.beside for name in self.names if self.measure.beside]
-        of = (name if name in AXES else flights[name] for name in (*self.names, *beside))
-        return float(self.measure.of(*of))
+        arguments = (name if name in AXES else flights[name] for name in (*self.names, *beside))
+        return float(self.measure.of(*arguments))
 
     def holds(self, number: float) -> bool:
         """Whether the number keeps the limit."""
         return bool(number >= self.limit if self.measure.at_least else number <= self.limit)
 
     def is_borne_out(self, number: float, without: float) -> bool:
-        """Whether it holds, and does not without its mechanism; a number that was not flown fails."""
+        """Whether the claim holds, and not in its ablation, whose number is `without`. A number that was not
+        flown is nan, and keeps no limit."""
         return self.holds(number) and not self.holds(without)
 
     def verdict(self, number: float, without: float, elsewhere: Sequence[tuple[float, float]]) -> str:
-        """One of VERDICTS. number: as flown; without: in the ablation's flights; elsewhere: both in every
-        setting that the paper did not fly (ELSEWHERE of reproduction.py). Of a construction, only whether it
-        holds there."""
+        """One of VERDICTS. number: in the published setting. without: in its ablation. elsewhere: both
+        numbers in each setting that the paper did not fly (ELSEWHERE of reproduction.py). A statement that is
+        true by construction must only hold there."""
         if not self.holds(number):
             return NOT_BORNE_OUT
         if self.holds(without):
@@ -95,6 +107,7 @@ class Claim(NamedTuple):
 
 
 def _claim(row: dict) -> Claim:
+    """A claim from its row in claims.yaml."""
     if "reason" in row:
         return Claim(row["where"], row["says"], reason=REASONS[row["reason"]])
     what, *names = row["measure"]

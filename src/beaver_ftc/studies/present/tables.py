@@ -103,8 +103,8 @@ Columns = Sequence[tuple[Any, ...]]
 
 def tabulated(columns: Columns, rows: Iterable[Any]) -> tuple[list[str], list[list[str]]]:
     """Head and rows of a table."""
-    columns_ = [Column(*column) for column in columns]
-    return [column.head for column in columns_], [[column.cell(row) for column in columns_] for row in rows]
+    typed = [Column(*column) for column in columns]
+    return [column.head for column in typed], [[column.cell(row) for column in typed] for row in rows]
 
 
 def aligned(rows: Rows) -> str:

@@ -1,6 +1,6 @@
-"""How the statements of [Zhang2005] are read as numbers: the measures of `claims.yaml`, functions of flights.
+"""The measures of `claims.yaml`: functions from flights to the numbers of the statements of [Zhang2005].
 
-The time to an event that never happens is infinite, and so is an error over a part that the flight does not
+The time to an event that never happens is infinite, and so is the error of a part that a flight does not
 have. claims.yaml has the unit of each measure under `measures`.
 """
 
@@ -19,23 +19,25 @@ from beaver_ftc.studies.engine.statistics import or_never
 from beaver_ftc.studies.reproduce.cases import ESTIMATORS, SETTLED_S, Flown
 from beaver_ftc.studies.reproduce.choices import AMPLITUDE_DEG_S
 
-TRANSIENT_S = 3.0  # from the fault on: detection, isolation and hand-over
+TRANSIENT_S = 3.0  # time after the fault that contains detection, isolation and hand-over
 GOOD = 0.1  # the limit `good` of claims.yaml
 TAKEN_OVER = 0.2  # the limit `taken-over`
 
 
 def _after(earlier_s: float, later_s: float) -> float:
-    """From an earlier event to a later one, s, both at instants in s; infinite if either is missing."""
+    """Time from an earlier event to a later one, s; infinite if one of them never happens. earlier_s,
+    later_s: times of the events."""
     return round(later_s - earlier_s, 9) if np.isfinite([earlier_s, later_s]).all() else np.inf
 
 
 def _frames(flown: Flown, span_s: float) -> float:
-    """A span of time in frames, without its sign: the later event may come first."""
+    """The size of a span of time, in frames. Its sign is dropped, because a lag must be near 0 in both
+    directions."""
     return abs(round(span_s / flown.frame_s)) if np.isfinite(span_s) else np.inf
 
 
 def _ratio(error: float, other: float) -> float:
-    """The first error over the other; infinite if the first is, even if the other is too."""
+    """error / other; infinite if `error` is, even if `other` is infinite too."""
     return error / other if np.isfinite(error) else np.inf
 
 
@@ -43,17 +45,17 @@ def _ratio(error: float, other: float) -> float:
 
 
 def detection(flown: Flown) -> float:
-    """From the fault to the alarm, s."""
+    """Time from the fault to the alarm, s."""
     return or_never(flown.metrics.detection.delay_s)
 
 
 def detected(*flights: Flown) -> float:
-    """Number of faults that raise the alarm."""
+    """Number of faults that raise an alarm."""
     return sum(map(np.isfinite, map(detection, flights)))
 
 
 def isolation(flown: Flown) -> float:
-    """From the alarm to the right name, s; infinite if anything else is named in the end."""
+    """Time from the alarm to the right name, s; infinite if the name at the end is wrong or missing."""
     return _after(flown.alarm_s, flown.rightly_named_s)
 
 
@@ -68,7 +70,8 @@ def handled(*flights: Flown) -> float:
 
 
 def order(*flights: Flown) -> float:
-    """The fewest frames between fault and detection, or detection and isolation; 0 if one never happens."""
+    """The smallest number of frames from fault to detection, and from detection to isolation; 0 if one never
+    happens."""
     steps = [step(flown) for flown in flights for step in (detection, isolation)]
     return _frames(flights[0], min(steps)) if np.isfinite(steps).all() else 0.0
 
@@ -79,17 +82,18 @@ def before_fault(flown: Flown) -> float:
 
 
 def own_estimator(*flights: Flown) -> float:
-    """Largest |residual| / threshold of the isolation estimators of the true faults; above 1 excludes one."""
+    """Largest |residual| / threshold of the isolation estimator of the true fault; above 1 it is excluded."""
     return max(float(np.max(flown.shares_of(flown.struck))) for flown in flights)
 
 
 def alarm_lag(flown: Flown) -> float:
-    """From the first residual beyond its threshold to the alarm, frames."""
+    """Time from the first residual beyond its threshold to the alarm, frames."""
     return _frames(flown, _after(flown.first_beyond_s(flown.shares()), flown.alarm_s))
 
 
 def exclusion_lag(flown: Flown) -> float:
-    """From a residual beyond its threshold to the exclusion, frames, of the slowest that does not fit."""
+    """Time from the first residual beyond its threshold to the exclusion, frames; the largest of the
+    estimators that do not fit the fault."""
     return max(
         _frames(flown, _after(flown.first_beyond_s(flown.shares_of(other)), flown.excluded_at_s(other)))
         for other in _others(flown)
@@ -102,26 +106,26 @@ def _others(flown: Flown) -> list[str]:
 
 
 def _last_exclusion_s(flown: Flown) -> float:
-    """When the last estimator that does not fit the fault was excluded, s."""
+    """Time at which the last estimator that does not fit the fault was excluded, s."""
     return max(map(flown.excluded_at_s, _others(flown)))
 
 
 def last_to_go(flown: Flown) -> float:
-    """From the alarm to the exclusion of the last estimator that does not fit, s."""
+    """Time from the alarm to the exclusion of the last estimator that does not fit the fault, s."""
     return _after(flown.alarm_s, _last_exclusion_s(flown))
 
 
 def conclusion_lag(flown: Flown) -> float:
-    """From the exclusion of the last estimator that does not fit to the right name, frames."""
+    """Time from the exclusion of the last estimator that does not fit the fault to the right name, frames."""
     return _frames(flown, _after(_last_exclusion_s(flown), flown.rightly_named_s))
 
 
 def estimators(flown: Flown) -> float:
-    """Number of estimators at work: the detection estimator, each isolation estimator with a residual."""
+    """Number of estimators at work: the detection estimator, and each isolation estimator with a residual."""
     return 1.0 + sum(bool(flown.residuals_of(other).any()) for other in ESTIMATORS)
 
 
-at_work = estimators  # claims.yaml limits this one from above, and `estimators` from below
+at_work = estimators  # the same number: claims.yaml limits `at_work` from above, `estimators` from below
 
 
 def residuals(flown: Flown) -> float:
@@ -130,22 +134,25 @@ def residuals(flown: Flown) -> float:
 
 
 def activation(flown: Flown) -> float:
-    """Between the alarm and the first residual of any isolation estimator, frames."""
+    """Time between the alarm and the first residual of any isolation estimator, frames."""
     begun = np.any([flown.residuals_of(other).any(axis=0) for other in ESTIMATORS], axis=0)
     return _frames(flown, _after(flown.alarm_s, flown.first_s(begun)))
 
 
 def generalised(*flights: Flown) -> float:
-    """Number of pairs of flight and estimator in which it is excluded exactly if the fault is not its own."""
+    """Number of pairs (flight, isolation estimator) in which the estimator works, and is excluded if and only
+    if it does not fit the fault."""
     return sum(
-        bool(flown.residuals_of(e).any()) and np.isfinite(flown.excluded_at_s(e)) == (e != flown.struck)
+        bool(flown.residuals_of(estimator).any())
+        and np.isfinite(flown.excluded_at_s(estimator)) == (estimator != flown.struck)
         for flown in flights
-        for e in ESTIMATORS
+        for estimator in ESTIMATORS
     )
 
 
 def named(flown: Flown) -> float:
-    """Time with exactly one known fault left, s: a wrong name, as the flight has an unknown fault."""
+    """Time with exactly one estimator not excluded, s. In a flight with an unknown fault, this is a wrong
+    name."""
     return round(sum(map(flown.named_s, ESTIMATORS)), 9)
 
 
@@ -155,10 +162,11 @@ def left(flown: Flown) -> float:
 
 
 def after_mismatch(*flights: Flown) -> float:
-    """The most frames from the alarm, or from a mismatch above 1 if that is later, to an exclusion. An
-    estimator whose mismatch stays at 1 or below is not counted; infinite if none is counted.
+    """The largest number of frames from the alarm, or from a mismatch above 1 if this comes later, to the
+    exclusion of an estimator. Estimators whose mismatch never exceeds 1 are not counted; infinite if none is
+    counted.
 
-    The mismatch is M_sj of detectability/certain.py, along the flight itself.
+    The mismatch is M_sj of detectability/certain.py along the flight itself.
     """
     lags = [
         _frames(flown, _after(certain_s, max(certain_s, flown.excluded_at_s(other))))
@@ -169,18 +177,18 @@ def after_mismatch(*flights: Flown) -> float:
 
 
 def _certain_at_s(flown: Flown) -> Iterator[tuple[str, float]]:
-    """Each other fault whose mismatch with the flight's loss exceeds 1, and when: the later one of the first
-    such instant after the loss and of the alarm, s. Nothing if the fault is no loss."""
+    """(other fault, time s) for each other fault whose mismatch with the loss exceeds 1. The time is the
+    first such instant after the loss, or the alarm if this comes later. Nothing if the fault is no loss."""
     fault = flown.scenario.faults[0]
     if not isinstance(fault, LossOfEffectiveness):
         return
     moment, bound, _ = moments_of(flown.scenario, flown.log)
     z = fault.magnitude * moment.pop(flown.struck)
-    since = flown.between(flown.fault_at_s)
-    for other, of in moment.items():
-        beyond = since & (mismatch(z, of, bound) > 1.0)
-        if beyond.any():
-            yield other, max(flown.alarm_s, flown.first_s(beyond))
+    after_fault = flown.between(flown.fault_at_s)
+    for other, z_other in moment.items():
+        exceeds = after_fault & (mismatch(z, z_other, bound) > 1.0)
+        if exceeds.any():
+            yield other, max(flown.alarm_s, flown.first_s(exceeds))
 
 
 # Estimation
@@ -193,8 +201,8 @@ def learnt_before(flown: Flown) -> float:
 
 
 def unapproximated(flown: Flown) -> float:
-    """Pitching that neither the design model nor the detection estimator's network explains, over that which
-    the model alone does not explain: RMS accelerations, from SETTLED_S after the fault on."""
+    """RMS pitch acceleration that neither the design model nor the network of the detection estimator
+    explains, over that which the model alone does not explain, from SETTLED_S after the fault on."""
     after = flown.between(flown.fault_at_s + SETTLED_S)
     if flown.metrics.departure or not after.any():
         return np.inf
@@ -204,9 +212,10 @@ def unapproximated(flown: Flown) -> float:
 
 
 def learning(*flights: Flown) -> float:
-    """RMS tracking error from 13 s after the fault on over that of its first 5 s; the largest of several.
+    """RMS tracking error from 13 s after the fault on, over that of the first 5 s after it; the largest of
+    the flights.
 
-    These flights last 18 s after the fault (cases.AFTER_S), so both spans are 5 s long.
+    The flights last 18 s after the fault (cases.AFTER_S), so that both spans are 5 s long.
     """
     return max(
         _ratio(
@@ -218,20 +227,26 @@ def learning(*flights: Flown) -> float:
 
 
 def outside(*flights: Flown) -> float:
-    """Largest distance of an estimate of theta = effectiveness - 1, of diagnosis or law, from [-1, 0]."""
+    """Largest distance of theta = effectiveness - 1 from [-1, 0], of the estimates of the diagnosis and those
+    that the law uses."""
     columns = [f"{surface}_effectiveness_{what}" for surface in ESTIMATORS for what in ("estimate", "used")]
     effectiveness = np.concatenate([flown.log[column] for flown in flights for column in columns])
     return float(np.nanmax(np.maximum(effectiveness - 1.0, -effectiveness).clip(0.0)))
 
 
 def unbounded(flown: Flown) -> float:
-    """Excess of the model error before the fault over the bound of the paper, ppm of this bound; below 0 if
-    the error stays within. Our thresholds also contain `ours`, for the Earth's rotation and rounding; the
-    paper's bound does not. It is that of bounds.add_published_bound, whose kappa is 1 for the Beaver."""
+    """1e6 (max |error| / bound - 1): excess of the model error before the fault over the bound of the paper,
+    ppm; negative if the error stays within.
+
+    The logged eta_bar is the bound of the paper plus `added`, rad/s2, for the rotation W of the Earth and
+    rounding: W (2 sum |rates| + W) + ROUNDING, as bounds.add_published_bound adds it with kappa = 1 for the
+    Beaver.
+    """
     healthy = flown.between(SETTLED_S, flown.fault_at_s)
-    rates = np.roll(sum(np.abs(flown.log[f"{axis}_rad_s"]) for axis in AXES), 1)  # of the row before
-    ours = EARTH_RATE_RAD_S * (2.0 * rates + EARTH_RATE_RAD_S) + ROUNDING_RAD_S2
-    shares = [np.abs(flown.unexplained_rad_s2(a)) / (flown.log[f"{a}_eta_bar_rad_s2"] - ours) for a in AXES]
+    # sum of |rates| at the row before, at which the frame begins
+    rates = np.roll(sum(np.abs(flown.log[f"{axis}_rad_s"]) for axis in AXES), 1)
+    added = EARTH_RATE_RAD_S * (2.0 * rates + EARTH_RATE_RAD_S) + ROUNDING_RAD_S2
+    shares = [np.abs(flown.unexplained_rad_s2(a)) / (flown.log[f"{a}_eta_bar_rad_s2"] - added) for a in AXES]
     return 1e6 * (max(float(np.max(share[healthy])) for share in shares) - 1.0)
 
 
@@ -239,12 +254,14 @@ def unbounded(flown: Flown) -> float:
 
 
 def separation(flown: Flown) -> float:
-    """Magnitude of the slowest pole of the rates over that of the fastest pole of the other states. Either
-    group's poles are those with the states of the other group held."""
+    """Magnitude of the slowest pole of the rates over that of the fastest pole of the other states. The poles
+    of each group are computed with constant states of the other group."""
     plant, trim = trimmed(flown.scenario)
     linear = differences(plant, trim)
     is_rate = np.isin(linear.states, AXES)
-    rates, others = (np.abs(np.linalg.eigvals(linear.A[np.ix_(of, of)])) for of in (is_rate, ~is_rate))
+    rates, others = (
+        np.abs(np.linalg.eigvals(linear.A[np.ix_(group, group)])) for group in (is_rate, ~is_rate)
+    )
     return float(rates.min() / others.max())
 
 
@@ -255,7 +272,7 @@ def tracking(flown: Flown, axis: str) -> float:
 
 
 def worst_tracking(*flights: Flown) -> float:
-    """The largest `tracking` of several faults, each on the axis where it shows."""
+    """The largest `tracking` of several faults, each on the axis of its effect."""
     return max(tracking(flown, flown.axis) for flown in flights)
 
 
@@ -271,7 +288,8 @@ def deterioration(flown: Flown) -> float:
 
 def _beside(flights: tuple[Flown, ...], after_s: float) -> float:
     """RMS error from after_s after the fault on, over that of another law; the largest of several faults,
-    each on the axis where it shows. The second half of the flights has the same faults with the other law."""
+    each on the axis of its effect. flights: those with our law, then those with the other law, in the same
+    order of faults."""
     half = len(flights) // 2
     ratios = []
     for ours, other in zip(flights[:half], flights[half:], strict=True):
@@ -287,7 +305,7 @@ def beside_passive(*flights: Flown) -> float:
 
 
 def transient(*flights: Flown) -> float:
-    """RMS pitch rate error of the first TRANSIENT_S after the fault, over that with a sudden hand-over."""
+    """RMS pitch rate error in the first TRANSIENT_S after the fault, over that with a sudden hand-over."""
     gradual, sudden = (
         flown.rms_deg_s("q", flown.fault_at_s, flown.fault_at_s + TRANSIENT_S) for flown in flights
     )
@@ -300,33 +318,35 @@ def beside_nominal(*flights: Flown) -> float:
 
 
 def flown_on(flown: Flown) -> float:
-    """Time that the aircraft flies after the fault, s."""
+    """Time that the aircraft flies after the begin of the fault, s."""
     return float(flown.log["t_s"][-1] - flown.fault_at_s)
 
 
 def in_charge(flown: Flown) -> float:
-    """From the alarm to the adaptive law, s."""
+    """Time from the alarm to the adaptive mode, s."""
     return _after(flown.alarm_s, flown.mode_at_s("adaptive"))
 
 
 def activated_near_10(flown: Flown) -> float:
-    """Time between 10 s of the flight and the instant at which the adaptive law takes over, s."""
+    """Distance of the begin of the adaptive mode from 10 s, s."""
     return abs(_after(10.0, flown.mode_at_s("adaptive")))
 
 
 def reallocation(flown: Flown) -> float:
-    """From the name to the reallocation, s."""
+    """Time from the name to the reallocation, s."""
     return _after(or_never(flown.metrics.isolation.time_s), flown.mode_at_s("reallocated"))
 
 
 def decisions(flown: Flown) -> float:
-    """Number of decisions taken, of two: the adaptive law took over; the flap carries the demand."""
+    """Number of decisions taken, of two: the adaptive mode began; the flap has taken over the demand of the
+    elevator."""
     adaptive = np.isfinite(flown.mode_at_s("adaptive"))
     return float(adaptive) + float(share_of_elevator(flown) <= TAKEN_OVER)
 
 
 def share_of_elevator(flown: Flown) -> float:
-    """Range of the elevator's command over that of the flap's, from TRANSIENT_S after the fault on."""
+    """Range of the command of the elevator over that of the flap, from TRANSIENT_S after the fault on;
+    infinite if the flap does not move."""
     after = flown.between(flown.fault_at_s + TRANSIENT_S)
     if not after.any():
         return np.inf
@@ -335,6 +355,6 @@ def share_of_elevator(flown: Flown) -> float:
 
 
 def flap_rate(flown: Flown) -> float:
-    """Largest rate of the flap's command, deg/s."""
+    """Largest rate of the command of the flap, deg/s."""
     rates = np.diff(flown.log["flap_cmd_rad"]) / np.diff(flown.log["t_s"])
     return float(np.max(np.abs(np.degrees(rates))))

@@ -1,6 +1,6 @@
-"""One figure for each published figure, with its panels, in the looks of every other figure here.
+"""One figure for each published figure, with its panels, in the same looks as all other figures.
 
-Beside them the sensitivity study in one: how far each number stays from its limit, whatever is changed.
+A further figure shows the sensitivity: the ratio of each number and its limit over all settings.
 """
 
 from math import inf
@@ -31,32 +31,34 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SENSITIVITY = "sensitivity"
-_LEAST, _MOST = 1e-3, 10.0  # of its axis: what is smaller is nothing, what is larger never happens
-# From above; a statement that cannot be judged holds without its mechanism, too.
+_LEAST, _MOST = 1e-3, 10.0  # ends of the axis of this figure; ratios beyond are drawn at the ends as arrows
+# Verdicts in the order of the rows from above. Testable statements that cannot be judged hold in their
+# ablation.
 _GROUPS = (NOT_BORNE_OUT, CANNOT_BE_JUDGED, BORNE_OUT, STRONGER)
-_LINE = 60  # characters
+_LINE = 60  # characters of a line of a label
 _CLIPPED = {_LEAST: "<", _MOST: ">"}
 WHOLE = (0.0, np.inf)
 CLOSE = (FAULT_AT_S - 0.5, FAULT_AT_S + 5.0)
 
 
 def _pair(label: str, target: tuple[str, str, str], actual: str) -> Panel:
-    """A signal with its target. target: column, label, look; actual: column."""
+    """A panel of a signal and its target. target: column, label, look. actual: column of the signal."""
     return Panel(label, (Trace(*target), Trace(actual, "actual", "actual")))
 
 
 def _tracking(surfaces: tuple[str, str], axis: str) -> tuple[Panel, ...]:
-    """Two surfaces above, below them the errors of all rates, and one rate."""
-    above = (
+    """Four panels: two surfaces, the errors of all rates, and the rate of one axis."""
+    surface_panels = (
         _pair(f"{name} deflection", (f"{name}_cmd_rad", "command", "command"), f"{name}_effective_rad")
         for name in surfaces
     )
     errors = tuple(Trace(f"{axis}_error_rad_s", f"error of {axis}", axis) for axis in AXES)
     rate = _pair(AXIS_NAMES[axis], (f"{axis}_model_rad_s", "reference", "target"), f"{axis}_rad_s")
-    return (*above, Panel("tracking errors", errors), rate)
+    return (*surface_panels, Panel("tracking errors", errors), rate)
 
 
 def _isolation(estimator: str) -> tuple[Panel, ...]:
+    """The residuals of an isolation estimator within their thresholds, a panel for each axis."""
     return tuple(isolation_panel(estimator, axis, f"{AXIS_NAMES[axis]}: residual") for axis in AXES)
 
 
@@ -88,14 +90,13 @@ FIGURES: tuple[tuple[View, str, tuple[float, float]], ...] = tuple(  # view, cas
 
 
 def figures_of(document: Summary) -> Files:
-    """Every figure by the name of its file: a figure for each published one, and the sensitivity study's.
-    document: `behind` it are the flights by the names of their cases."""
+    """The figures by name of their files. document.behind: the flights by name of their case."""
     drawn = {f"{view.name}.png": _drawn(view, document.behind[case], span) for view, case, span in FIGURES}
     return {**drawn, f"{SENSITIVITY}.png": margins_figure(document)}
 
 
 def _drawn(view: View, flown: Flown, span: tuple[float, float]) -> "Figure":
-    """A view of the log within a span of time, with the tracking errors."""
+    """A view of the log within a span of time, s. Tracking errors are added to the columns of the log."""
     shown = flown.between(*span)
     errors = {f"{axis}_error_rad_s": np.radians(flown.error_deg_s(axis)) for axis in AXES}
     series = {name: values[shown] for name, values in {**flown.log, **errors}.items()}
@@ -103,10 +104,11 @@ def _drawn(view: View, flown: Flown, span: tuple[float, float]) -> "Figure":
 
 
 def shares(claim: Document) -> tuple[float, float, float]:
-    """(lowest, ours, highest) number as shares of the limit, each at most 1 where the statement holds.
-    If the number is to be at least the limit, its lowest value has the highest share."""
-    low, ours, high = (_share(claim, claim[key]) for key in ("lowest", "number", "highest"))
-    return min(low, ours, high), ours, max(low, ours, high)
+    """The lowest ratio, the ratio in the published setting, and the highest ratio of number and limit; at
+    most 1 where the statement holds. If the number must be at least the limit, its lowest value has the
+    highest ratio."""
+    low, published, high = (_share(claim, claim[key]) for key in ("lowest", "number", "highest"))
+    return min(low, published, high), published, max(low, published, high)
 
 
 def _share(claim: Document, number: float | None) -> float:
@@ -121,7 +123,8 @@ def _share(claim: Document, number: float | None) -> float:
 
 
 def margins_figure(document: Document) -> "Figure":
-    """A row a statement that can be tested, by verdict: the range of its number over changes, and ours."""
+    """A row for each testable statement, ordered by verdict: the range of its ratio over all settings, and
+    the ratio in the published setting."""
     from matplotlib.figure import Figure
 
     claims = [claim for claim in document["claims"] if not claim["reason"] and not claim["construction"]]
@@ -129,10 +132,10 @@ def margins_figure(document: Document) -> "Figure":
     figure = Figure(figsize=(9.0, 1.2 + 0.31 * len(claims)), dpi=110)
     axes = figure.subplots(gridspec_kw={"left": 0.5, "right": 0.97, "top": 0.97, "bottom": 0.075})
     for row, claim in enumerate(claims):
-        low, ours, high = (min(max(share, _LEAST), _MOST) for share in shares(claim))
+        low, published, high = (min(max(share, _LEAST), _MOST) for share in shares(claim))
         colour, width = (BLUE, 2.5) if high <= 1 else (VERMILION, 6.0)
         axes.plot([low, high], [row, row], color=colour, linewidth=width, alpha=0.55)
-        axes.plot(ours, row, _CLIPPED.get(ours, "o"), color=BLACK, markersize=5)
+        axes.plot(published, row, _CLIPPED.get(published, "o"), color=BLACK, markersize=5)
         if row and claim["verdict"] != claims[row - 1]["verdict"]:
             axes.axhline(row - 0.5, color=GREY, linewidth=1.0)
     axes.axvline(1.0, color=BLACK, linewidth=1.0)
@@ -154,5 +157,5 @@ def margins_figure(document: Document) -> "Figure":
 
 
 def _label(claim: Document) -> str:
-    """Where a statement is in the paper, and what it says, in at most two lines."""
+    """The place of a statement in the paper, and its words, in at most two lines."""
     return fill(f"{claim['where']}: {claim['statement']}", _LINE, max_lines=2, placeholder=" ...")

@@ -1,4 +1,9 @@
-"""Fly the published study and say what became of its statements: the document, and its files."""
+"""Fly the published study and judge its statements: the document, and its files.
+
+A setting is a change of the published setting (cases.py). For each setting, a row has the numbers of all
+measured claims, in the order of MEASURED, and the numbers in their ablations. The document has the verdicts
+that follow.
+"""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -43,27 +48,32 @@ from beaver_ftc.studies.reproduce.words import NAME, as_html, as_markdown, as_te
 Rows = list[Document]
 NUMBERS, ABLATED, SAME, FALSE_ALARM = "numbers", "without", "same", "false alarm"
 AS_PUBLISHED = Changed("as published", {})
-ELSEWHERE = (*BEYOND, *VARIANTS, *GAINS)  # wherever the paper did not fly
+ELSEWHERE = (*BEYOND, *VARIANTS, *GAINS)  # settings that the paper did not fly
 SETTINGS = (AS_PUBLISHED, *ELSEWHERE)
 WITHOUT: Mapping[str, Changed] = {ablation.name: ablation for ablation in ABLATIONS}
 FAULTY = ("elevator", "aileron", "rudder", "unanticipated")
 NO_ADAPTATION = {"fdi.options.adaptation_gain": 0.0}  # of the isolation estimators
-STUDIED: tuple[tuple[str, Changed], ...] = (  # what is asked of a setting, and the setting
+STUDIED: tuple[tuple[str, Changed], ...] = (  # kind of the row, and setting
     *((NUMBERS, setting) for setting in SETTINGS),
     *((FALSE_ALARM, setting) for _, setting in beside.healthy_settings()),
 )
 
 
 def row_of(studied: tuple[str, Changed]) -> Document:
-    """The row of a setting: the numbers of the claims, or whether a healthy flight alarms."""
-    asked, setting = studied
-    return claims_row(setting) if asked == NUMBERS else {FALSE_ALARM: beside.false_alarm_of(setting)}
+    """The row of a setting: the numbers of the claims, or whether a healthy flight has a false alarm."""
+    kind, setting = studied
+    return claims_row(setting) if kind == NUMBERS else {FALSE_ALARM: beside.false_alarm_of(setting)}
 
 
 def claims_row(setting: Changed) -> Document:
-    """The number of every measured claim in a setting, in their order, the same without the mechanism, and in
-    how many flights adaptation changes no alarm and no name. A number that no verdict needs is not flown:
-    it is nan, which keeps no limit."""
+    """The row of a setting:
+
+        numbers    the number of each of MEASURED
+        without    the number of each in its ablation
+        same       in how many flights of FAULTY adaptation changes neither alarm nor name nor their times
+
+    A number that no verdict needs is not flown. It is nan, which keeps no limit.
+    """
     flown: dict[str, Flown] = {}
     flights = LazyFlights(setting.changes, flown)
     is_published = setting.name == AS_PUBLISHED.name
@@ -83,24 +93,25 @@ def claims_row(setting: Changed) -> Document:
 
 
 def _verdict_in(flight: Flown) -> tuple[float | None, str | None, float | None]:
+    """Time of the alarm, name, and time of the name."""
     metrics = flight.metrics
     return metrics.detection.time_s, metrics.isolation.fault, metrics.isolation.time_s
 
 
 def fly_published() -> dict[str, Flown]:
-    """The published cases, by name."""
+    """The flights of the published cases, by name."""
     return {case.name: fly_case(case) for case in PUBLISHED}
 
 
 def document_of(rows: Sequence[Document]) -> Summary:
-    """Judge the published cases, and fly what is shown beside them; rows: of every setting of STUDIED. Behind
-    it: the published cases, flown, by name."""
+    """The document: the verdicts, and further flights for comparison. rows: of each setting of STUDIED, in
+    order. Behind the document are the flights of the published cases, by name."""
     published = fly_published()
     settings = {
-        setting.name: row for (asked, setting), row in zip(STUDIED, rows, strict=True) if asked == NUMBERS
+        setting.name: row for (kind, setting), row in zip(STUDIED, rows, strict=True) if kind == NUMBERS
     }
-    found = {name: list(zip(row[NUMBERS], row[ABLATED], strict=True)) for name, row in settings.items()}
-    claims = _claims(found)
+    pairs_of = {name: list(zip(row[NUMBERS], row[ABLATED], strict=True)) for name, row in settings.items()}
+    claims = _claims(pairs_of)
     counts = Counter(claim["verdict"] for claim in claims)
     document = {
         "passed": all(claim["verdict"] != NOT_BORNE_OUT or claim["because"] for claim in claims),
@@ -117,8 +128,8 @@ def document_of(rows: Sequence[Document]) -> Summary:
         ),
         "truth_and_design": truth_and_design.document_of(truth_and_design.fly_designs()),
         "choices": [asdict(choice) for choice in (*CHOICES, *OPTIONS)],
-        "gains": _gains(found),
-        "sensitivity": _sensitivity(found),
+        "gains": _gains(pairs_of),
+        "sensitivity": _sensitivity(pairs_of),
         "cases": [
             {
                 "case": case.name,
@@ -133,14 +144,15 @@ def document_of(rows: Sequence[Document]) -> Summary:
 
 
 Pairs = list[tuple[float, float]]
-"""Of each of MEASURED its number in a setting, and that without its mechanism."""
+"""(number, number in the ablation) of each of MEASURED in a setting."""
 BySetting = Mapping[str, Pairs]
+"""The pairs by name of the setting."""
 
 
-def _claims(found: BySetting) -> Rows:
-    """A row a claim."""
+def _claims(pairs_of: BySetting) -> Rows:
+    """A row for each claim."""
     judged = {
-        claim: _judged(claim, {name: pairs[i] for name, pairs in found.items()})
+        claim: _judged(claim, {name: pairs[i] for name, pairs in pairs_of.items()})
         for i, claim in enumerate(MEASURED)
     }
     return [
@@ -149,7 +161,7 @@ def _claims(found: BySetting) -> Rows:
 
 
 def _judged(claim: Claim, by_setting: Mapping[str, tuple[float, float]]) -> Document:
-    """A measured claim. by_setting: its pair of numbers by name of setting."""
+    """The row of a measured claim. by_setting: its pair of numbers by name of the setting."""
     number, without = by_setting[AS_PUBLISHED.name]
     elsewhere = [] if claim.because else [by_setting[setting.name] for setting in ELSEWHERE]
     measure, verdict = claim.measure, claim.verdict(number, without, elsewhere)
@@ -181,15 +193,15 @@ def _judged(claim: Claim, by_setting: Mapping[str, tuple[float, float]]) -> Docu
 
 
 def _unjudged(reason: str) -> Document:
-    """A claim that gives nothing to measure."""
+    """The row of a claim without a measure."""
     return {
         "verdict": CANNOT_BE_JUDGED, "reason": reason, "because": "", "number": None, "construction": False,
     }  # fmt: skip
 
 
 def _counted_apart(claims: Sequence[Document]) -> Document:
-    """How many statements flights can contradict, and what became of them; how many the code makes true by
-    its construction, and how many give nothing to measure."""
+    """Counts of the statements that can be tested, with their verdicts; of those that are true by
+    construction; and of those without a measure."""
     tested = Counter(c["verdict"] for c in claims if not c["reason"] and not c["construction"])
     built = [c for c in claims if c["construction"]]
     return {
@@ -208,7 +220,8 @@ def _counted_apart(claims: Sequence[Document]) -> Document:
 
 
 def _ablations(claims: Rows) -> Rows:
-    """A row an ablation: how it is made, and how many of the statements that speak of it fail without."""
+    """A row for each ablation: its changes, how many statements refer to its mechanism, and how many fail
+    without it."""
     rows = []
     for ablation in ABLATIONS:
         fails = [c["fails_without"] for c in claims if c.get("ablation") == ablation.name]
@@ -219,32 +232,33 @@ def _ablations(claims: Rows) -> Rows:
     return rows
 
 
-def _gains(found: BySetting) -> Rows:
-    """A row a gain: the claims that no longer hold when it is halved and doubled. found: by setting."""
+def _gains(pairs_of: BySetting) -> Rows:
+    """A row for each gain: the claims that no longer hold if the gain is halved, and if it is doubled."""
     rows = []
     for gain in gains():
-        halved, doubled = (_missed(found, s.name) for s in GAINS if gain.key in s.changes)
+        halved, doubled = (_missed(pairs_of, s.name) for s in GAINS if gain.key in s.changes)
         rows.append({**gain._asdict(), "halved": halved, "doubled": doubled})
     return rows
 
 
-def _sensitivity(found: BySetting) -> Rows:
-    """A row a setting of ELSEWHERE: the claims that no longer hold, and those that hold without their
-    mechanism as well. found: by setting."""
+def _sensitivity(pairs_of: BySetting) -> Rows:
+    """A row for each setting of ELSEWHERE: the claims that no longer hold, and those that hold in their
+    ablation, too."""
     return [
         {
             "variant": setting.name,
             "changes": dict(setting.changes),
-            "missed": _missed(found, setting.name),
-            "also_without": _also_without(found, setting.name),
+            "missed": _missed(pairs_of, setting.name),
+            "also_without": _also_without(pairs_of, setting.name),
         }
         for setting in ELSEWHERE
     ]
 
 
-def _also_without(found: BySetting, setting: str) -> Rows:
-    """The testable claims that hold in a setting without their mechanism as well, but not as published."""
-    pairs = zip(MEASURED, found[setting], found[AS_PUBLISHED.name], strict=True)
+def _also_without(pairs_of: BySetting, setting: str) -> Rows:
+    """The claims that hold in a setting and in its ablation, but do not hold in the ablation of the published
+    setting."""
+    pairs = zip(MEASURED, pairs_of[setting], pairs_of[AS_PUBLISHED.name], strict=True)
     return [
         _claim_row(c, without) | {"without": TAKES[c.ablation]}
         for c, (number, without), (_, published) in pairs
@@ -253,6 +267,7 @@ def _also_without(found: BySetting, setting: str) -> Rows:
 
 
 def _claim_row(claim: Claim, number: float) -> Document:
+    """A claim with its number in a setting."""
     return {
         "where": claim.where,
         "statement": claim.statement,
@@ -262,9 +277,9 @@ def _claim_row(claim: Claim, number: float) -> Document:
     }
 
 
-def _missed(found: BySetting, setting: str) -> Rows:
-    """The claims that hold as published and no longer in a setting, with the number there."""
-    pairs = zip(MEASURED, found[AS_PUBLISHED.name], found[setting], strict=True)
+def _missed(pairs_of: BySetting, setting: str) -> Rows:
+    """The claims that hold in the published setting but not in this setting, with their numbers there."""
+    pairs = zip(MEASURED, pairs_of[AS_PUBLISHED.name], pairs_of[setting], strict=True)
     return [
         _claim_row(c, number)
         for c, (published, _), (number, _) in pairs
@@ -316,5 +331,5 @@ class Reproduce(StudyCommand):
         return run_into(study, self.out, self.processes, reporter.progress)
 
     def as_text(self, document: Document, colour: bool) -> str:
-        """The tables, and what the sensitivity study says."""
+        """The tables, and sentences about the sensitivity."""
         return as_text(document, document["folder"], colour)

@@ -1,4 +1,4 @@
-"""The truth that flies beside the design model: eq. (2) of [Zhang2005] as printed omits the engine."""
+"""The terms of truth and design model: eq. (2) of [Zhang2005] as printed omits the engine."""
 
 from collections.abc import Mapping
 from functools import partial
@@ -10,7 +10,11 @@ from beaver_ftc.results.model import Document
 from beaver_ftc.studies.present.tables import number, seconds
 from beaver_ftc.studies.reproduce.cases import CASES, HEALTHY, Flown, fly_case
 
-COVERED = {"p": 0.05, "q": 0.3, "r": 0.06}  # rad/s2: more than the engine's moments, `beaver-ftc mismatch`
+COVERED = {
+    "p": 0.05,
+    "q": 0.3,
+    "r": 0.06,
+}  # rad/s2: above the moments of the engine, as `beaver-ftc mismatch` measures
 _PRINTED: Document = {"design_model.engine_terms": False}
 _WIDE = {**_PRINTED, "fdi.bounds.constant_rad_s2": COVERED}
 DESIGNS: tuple[tuple[str, str, Mapping[str, Any]], ...] = (  # name, bound, changes
@@ -21,23 +25,25 @@ DESIGNS: tuple[tuple[str, str, Mapping[str, Any]], ...] = (  # name, bound, chan
 
 
 def terms() -> list[Document]:
-    """Moment by moment: the terms of the truth, and which of them eq. (2) has."""
+    """A row for each moment: the terms of the truth, and those that eq. (2) omits."""
     aircraft = load()
     rows = []
     for moment in MOMENTS:
-        of = [term for term in aircraft.moments if term.coefficient == moment]
-        engine = [term.name for term in of if any(signal in aircraft.signals for signal, _ in term.of)]
-        rows.append({"moment": moment, "truth": [term.name for term in of], "omitted": engine})
+        terms_of_moment = [term for term in aircraft.moments if term.coefficient == moment]
+        engine = [
+            term.name for term in terms_of_moment if any(signal in aircraft.signals for signal, _ in term.of)
+        ]
+        rows.append({"moment": moment, "truth": [term.name for term in terms_of_moment], "omitted": engine})
     return rows
 
 
 def fly_designs() -> list[tuple[Flown, Flown]]:
-    """Every design of DESIGNS: a healthy flight, and one with the published elevator fault."""
+    """For each of DESIGNS, a healthy flight, and one with the published elevator fault."""
     return [(fly_case(HEALTHY, changes), fly_case(CASES["elevator"], changes)) for _, _, changes in DESIGNS]
 
 
 def document_of(flights: list[tuple[Flown, Flown]]) -> Document:
-    """The terms, and a row a design."""
+    """The document: the terms, and a row for each design."""
     return {
         "terms": terms(),
         "designs": [
@@ -47,19 +53,22 @@ def document_of(flights: list[tuple[Flown, Flown]]) -> Document:
 
 
 def _row(name: str, bound: str, healthy: Flown, faulty: Flown) -> Document:
-    found = faulty.metrics
+    """A design: alarm and |residual| / threshold in the healthy flight, detection and name in the faulty
+    one."""
+    metrics = faulty.metrics
     return {
         "design": name,
         "bound": bound,
         "alarm_s": healthy.metrics.detection.time_s,
         "share": {axis: float(share) for axis, share in zip(AXES, healthy.shares().max(axis=1), strict=True)},
-        "detected_s": found.fault_found_s,
-        "false_alarm": found.false_alarm,
-        "named": found.isolation.fault,
+        "detected_s": metrics.fault_found_s,
+        "false_alarm": metrics.false_alarm,
+        "named": metrics.isolation.fault,
     }
 
 
 def _printed(row: Document) -> str:
+    """The terms of eq. (2) as printed."""
     return ", ".join(name for name in row["truth"] if name not in row["omitted"])
 
 

@@ -22,43 +22,44 @@ WIDTH = 132
 VERDICT_HEAD = ("Published", "Statement", "Our number", "Limit", "Without", "Verdict", "Remark")
 _SAYS = parse(Path(__file__).with_name("page.yaml").read_text(encoding="utf-8")).data
 ELSEWHERE_TOO = "borne out, elsewhere too"
-SHOWN_AS = {STRONGER: ELSEWHERE_TOO}  # the verdict in words: of where it was flown, not of its strength
+SHOWN_AS = {STRONGER: ELSEWHERE_TOO}  # words for a verdict whose name in the document says too much
 DEVIATIONS: list[str] = _SAYS["deviations from the paper"]
 _STYLE = {STRONGER: "green", BORNE_OUT: "green", NOT_BORNE_OUT: "bold red"}
 _GOOD = {ELSEWHERE_TOO: True, BORNE_OUT: True, NOT_BORNE_OUT: False}
 
 
 def number(value: float | None, unit: str = "", none: str = "never") -> str:
-    """A number in three digits with its unit; shares of something in percent."""
+    """A number with three digits and its unit. A number whose unit begins with `of ` is a share, and in per
+    cent."""
     if value is not None and unit.startswith("of "):
         return f"{100 * value:.1f} % {unit}"
     return tables.number(value, unit, none=none)
 
 
 def _found(claim: Document, key: str = "number") -> str:
-    """A number of a claim."""
+    """A number of a claim as text. key: of the number in the row of the claim."""
     return number(claim[key], claim["unit"], claim["none"])
 
 
 def ours(claim: Document) -> str:
-    """Quantity and number."""
+    """Quantity and number of a claim."""
     return f"{claim['quantity']} {_found(claim)}"
 
 
 def limit(claim: Document) -> str:
     """The limit that the number must keep."""
     share = claim["unit"].startswith("of ")
-    said = f"{100 * claim['limit']:.0f} %" if share else tables.number(claim["limit"], claim["unit"])
-    return f"{'at least' if claim['at_least'] else 'at most'} {said}"
+    text = f"{100 * claim['limit']:.0f} %" if share else tables.number(claim["limit"], claim["unit"])
+    return f"{'at least' if claim['at_least'] else 'at most'} {text}"
 
 
 def without(claim: Document) -> str:
-    """The mechanism that is taken out, and the number then."""
+    """The mechanism that is removed, and the number without it."""
     return f"{claim['without']}: {_found(claim, 'number_without')}"
 
 
 def verdict_rows(document: Document) -> list[tuple[str, ...]]:
-    """One row a statement, for VERDICT_HEAD."""
+    """A row for each statement, below VERDICT_HEAD."""
     return [
         (claim["where"], claim["statement"], "-", "-", "-", said(claim), claim["reason"])
         if claim["reason"]
@@ -72,18 +73,19 @@ def verdict_rows(document: Document) -> list[tuple[str, ...]]:
 
 
 def said(claim: Document) -> str:
-    """The verdict in words."""
+    """The verdict on a claim in words."""
     verdict: str = claim["verdict"]
     return SHOWN_AS.get(verdict, verdict)
 
 
 def remark(claim: Document) -> str:
-    """The reason of a verdict, where it is not plain; that a statement is true by construction."""
-    built = ["true by the construction of the code"] if claim["construction"] else []
-    return "; ".join([*built, *filter(None, [_remark(claim)])])
+    """The reason of a verdict, unless it is obvious; and whether a statement is true by construction."""
+    construction = ["true by the construction of the code"] if claim["construction"] else []
+    return "; ".join([*construction, *filter(None, [_remark(claim)])])
 
 
 def _remark(claim: Document) -> str:
+    """The reason of a verdict, or an empty text."""
     if claim["verdict"] == BORNE_OUT and not claim["construction"]:
         return "in {borne_out_in} of {elsewhere} settings that the paper did not fly".format(**claim)
     return "holds without it as well" if claim["verdict"] == CANNOT_BE_JUDGED else claim["because"]
@@ -95,28 +97,34 @@ def measured(document: Document) -> list[Document]:
 
 
 def exceptions(document: Document) -> list[str]:
-    """One sentence for each statement that in a setting does not hold, or holds without its mechanism too."""
+    """A sentence for each statement and setting in which it does not hold, or also holds without its
+    mechanism."""
     return [
         sentence
         for row in document["sensitivity"]
         for sentence in (
             *(f"{row['variant']}: {_said(missed)}" for missed in row["missed"]),
-            *(f"{row['variant']}: {_said(one)}, without {one['without']}" for one in row["also_without"]),
+            *(
+                f"{row['variant']}: {_said(statement)}, without {statement['without']}"
+                for statement in row["also_without"]
+            ),
         )
     ]
 
 
 def _said(missed: Document) -> str:
-    """A statement that does not hold, and its number."""
+    """A statement with its number, without its full stop and with a small first letter."""
     statement = missed["statement"]
     return f"{missed['where']}, {statement[:1].lower()}{statement[1:-1]}: {_found(missed)}"
 
 
 def _all_said(missed: list[Document]) -> str:
+    """Statements with their numbers, in a cell."""
     return "; ".join(map(_said, missed)) or "none"
 
 
 def _value(value: Any) -> str:
+    """A value of a scenario as text."""
     if isinstance(value, dict):
         return ", ".join(f"{key} {_value(part)}" for key, part in value.items())
     if isinstance(value, list):
@@ -125,6 +133,7 @@ def _value(value: Any) -> str:
 
 
 def _changes(changes: Document) -> str:
+    """Changes of a scenario as text."""
     return "; ".join(f"{key}: {_value(value)}" for key, value in changes.items())
 
 
@@ -164,7 +173,7 @@ def headline(document: Document) -> str:
 
 
 def adaptation_sentence(document: Document) -> str:
-    """The effect of the adaptation of the isolation estimators, in a sentence."""
+    """A sentence about the effect of the adaptation of the isolation estimators."""
     return (
         "Each isolation estimator adapts its estimate of the fault in flight. Without this adaptation "
         "(gain 0), the alarm, the named surface and the times stay the same in {same} of {flights} flights "
@@ -173,7 +182,7 @@ def adaptation_sentence(document: Document) -> str:
 
 
 def summary(document: Document) -> str:
-    """The outcome in a few sentences."""
+    """The results in a few sentences."""
     return (
         f"{headline(document)} A statement holds if its number keeps its limit, and no longer does in the "
         f"same setting without its mechanism. {adaptation_sentence(document)}"
@@ -181,24 +190,25 @@ def summary(document: Document) -> str:
 
 
 def as_text(document: Document, folder: str, colour: bool = False) -> str:
-    """The tables, what the sensitivity study says, and where the rest lies."""
-    both = document["beside"]
+    """The results for a terminal: tables, sentences, exceptions, and the path of the page."""
+    comparison = document["beside"]
     unjudged = Counter(c["reason"] for c in document["claims"] if c["reason"])
-    side_by_side = tables.plain("Side by side", *tabulated(beside.COLUMNS, both["rows"]))
+    side_by_side = tables.plain("Side by side", *tabulated(beside.COLUMNS, comparison["rows"]))
     flown = tabulated(truth_and_design.FLOWN, document["truth_and_design"]["designs"])
     designs = tables.plain("Truth and design", *flown)
     lines = [
         printed([_table(document)], WIDTH, colour), "", "Nothing to measure:",
         *(f"  {count:2} {reason}" for reason, count in unjudged.items()), "",
         summary(document), *(f"  except {sentence}" for sentence in exceptions(document)), "",
-        printed([side_by_side], WIDTH, colour), "", beside.alarms_sentence(both), beside.BETTER,
-        *(f"  {sentence}" for sentence in beside.sentences(both) or ["nowhere"]), "",
+        printed([side_by_side], WIDTH, colour), "", beside.alarms_sentence(comparison), beside.BETTER,
+        *(f"  {sentence}" for sentence in beside.sentences(comparison) or ["nowhere"]), "",
         printed([designs], WIDTH, colour), "", f"page: {folder}/reproduction.html",
     ]  # fmt: skip
     return "\n".join(lines)
 
 
 def _table(document: Document) -> "Table":
+    """The measured statements as a table for a terminal."""
     from rich import box
     from rich.table import Table
     from rich.text import Text
@@ -207,18 +217,18 @@ def _table(document: Document) -> "Table":
     for head in ("Published", "Statement", "Our number", "Without", "Verdict"):
         table.add_column(head)
     for claim in measured(document):
-        found = f"{ours(claim)} ({limit(claim)})"
+        cell = f"{ours(claim)} ({limit(claim)})"
         verdict = claim["verdict"]
         more = remark(claim)
         table.add_row(
-            claim["where"], claim["statement"], f"{found}; {more}" if more else found, without(claim),
+            claim["where"], claim["statement"], f"{cell}; {more}" if more else cell, without(claim),
             Text(said(claim), _STYLE.get(verdict, "")),
         )  # fmt: skip
     return table
 
 
 def as_markdown(document: Document, figures: str) -> str:
-    """The page as Markdown; `figures` is the folder of the pictures, as the page sees it."""
+    """The page as Markdown. figures: path of the folder of the pictures, relative to the page."""
     return page.as_markdown([f"# {_SAYS['title']}", *_page(document)], figures)
 
 
@@ -229,8 +239,9 @@ def as_html(document: Document, folder: Path) -> str:
 
 
 def _page(document: Document) -> list[page.Part]:
-    missed = exceptions(document)
-    both = document["beside"]
+    """The parts of the page."""
+    sentences = exceptions(document)
+    comparison = document["beside"]
     designs = document["truth_and_design"]
     changes = "; ".join(row["variant"] for row in document["sensitivity"])
     return [
@@ -238,8 +249,8 @@ def _page(document: Document) -> list[page.Part]:
         page.Table(VERDICT_HEAD, verdict_rows(document), _GOOD),
         _SAYS["ablations"], page.table(ABLATIONS, document["ablations"]),
         page.Heading("Beside ours"), _SAYS["beside"],
-        page.table(beside.COLUMNS, both["rows"]), beside.alarms_sentence(both),
-        page.Bullets(beside.BETTER, beside.sentences(both) or ["nowhere"]),
+        page.table(beside.COLUMNS, comparison["rows"]), beside.alarms_sentence(comparison),
+        page.Bullets(beside.BETTER, beside.sentences(comparison) or ["nowhere"]),
         page.Heading("Truth and design"), _SAYS["truth"],
         page.table(truth_and_design.TERMS, designs["terms"]), _SAYS["designs"],
         page.table(truth_and_design.FLOWN, designs["designs"]),
@@ -248,7 +259,7 @@ def _page(document: Document) -> list[page.Part]:
         page.Heading("What the conclusions hang on"), _SAYS["sensitivity"],
         page.Pictures([(_SAYS["margins"], SENSITIVITY)]),
         page.table(RANGES, measured(document)),
-        *([page.Bullets("Where one does not:", missed)] if missed else []),
+        *([page.Bullets("Where one does not:", sentences)] if sentences else []),
         f"The settings: {changes}.",
         page.Heading("What the paper leaves open"), _SAYS["gains"],
         page.table(GAINS, document["gains"]), _SAYS["choices"], page.table(CHOICES, document["choices"]),

@@ -1,9 +1,9 @@
-"""The flights that show how a verdict decays, and their summary.
+"""The flights with errors larger than declared, and their summary.
 
-A flight is the scenario with its own faults, later by a draw, and a truth whose errors are multiples of what
-`fdi.bounds` declares (`errors.py`). Errors are raised one at a time while the others that are declared stay
-at their limit, and all together. What is counted is what a user of the verdict relies on: alarms before a
-fault, detection, right and wrong names, and how the aircraft is flown.
+A flight is the scenario with its own faults, which begin later by a random time, and with errors that are
+multiples of the errors in `fdi.bounds` (errors.py). Errors are enlarged one at a time, while the other
+declared errors stay at their limit, and all together. The summary counts false alarms, detections, right and
+wrong names and lost aircraft, and has medians of delay and tracking error.
 """
 
 from collections.abc import Sequence
@@ -20,21 +20,22 @@ from beaver_ftc.studies.engine.statistics import CONFIDENCE, counted, median
 from beaver_ftc.studies.present.tables import grouped
 from beaver_ftc.studies.sensitivity.errors import Error, changes_of, errors_of
 
-FACTORS = (1.0, 1.5, 2.0, 4.0)
+FACTORS = (1.0, 1.5, 2.0, 4.0)  # size of an error over the declared size
 TOGETHER = "all together"
 COUNTED = ("false_alarm", "detected", "named", "misnamed", "lost")
 MEASURED = ("delay_s", "tracking_deg_s", "bound_used")
 FAILED = {"failed": True}  # the row of a flight that cannot be flown to its end
-FLIGHTS = 40  # of a row: an event that none of them has is rarer than 9 % (95 %)
-LATER_S = 4.0  # the faults come so much later at most
-LEFT_S = 5.0  # and so long before the end
+FLIGHTS = 40  # of a row; if none has an event, its probability is below 9 % (95 % confidence)
+LATER_S = 4.0  # largest delay of the begin of the faults
+LEFT_S = 5.0  # shortest time from the begin of the faults to the end
 
 
-Errors = Sequence[Error]  # of a scenario
+Errors = Sequence[Error]
+"""The errors of a scenario."""
 
 
 class Flight(NamedTuple):
-    """One flight: which error is how many times as large as declared, and its number."""
+    """One flight: the enlarged error, its factor, and the number of the draw."""
 
     error: str
     factor: float
@@ -42,7 +43,8 @@ class Flight(NamedTuple):
 
 
 def cases_of(errors: Errors, flights: int) -> list[Flight]:
-    """Every flight; where each error is as declared, all rows share the same ones."""
+    """All flights. All errors have the same flights with the factor 1, which are flown once, under
+    TOGETHER."""
     declared = {error.name: error.declared for error in errors} | {TOGETHER: True}
     rows = [(TOGETHER, FACTORS[0])]
     rows += [
@@ -55,23 +57,24 @@ def cases_of(errors: Errors, flights: int) -> list[Flight]:
 
 
 def factors_of(errors: Errors, flight: Flight) -> dict[str, float]:
-    """By error: how many times as large as declared it is in a flight."""
-    of = {error.name: FACTORS[0] for error in errors if error.declared}
+    """The factor of each error in a flight. An error that is not declared has one only if it is the enlarged
+    error."""
+    factors = {error.name: FACTORS[0] for error in errors if error.declared}
     if flight.error == TOGETHER:
-        return dict.fromkeys(of, flight.factor)
-    return of | {flight.error: flight.factor}
+        return dict.fromkeys(factors, flight.factor)
+    return factors | {flight.error: flight.factor}
 
 
 def scenario_of(scenario: Scenario, errors: Errors, seed: int, flight: Flight) -> Scenario:
-    """The scenario of a flight: draws depend on its number alone, so that rows differ by the error. The law
-    knows the sensors of the scenario, whatever theirs are in the flight."""
+    """The scenario of a flight. Random draws depend on its number alone, so that rows differ only by the
+    error. The law always assumes the sensors of the scenario, also if the flight has larger errors."""
     draws = np.random.default_rng([seed, flight.run])
     changes: Document = {"seed": int(draws.integers(2**31)), "expect": {}}
     later = float(draws.uniform())
     changes |= changes_of(errors, factors_of(errors, flight), draws)
     changes["design_model.sensors"] = scenario.known_sensors.model_dump()
-    times = [fault.at_s for fault in scenario.faults]
-    room = min(LATER_S, scenario.duration_s - LEFT_S - max(times, default=0.0))
+    begins_s = [fault.at_s for fault in scenario.faults]
+    room = min(LATER_S, scenario.duration_s - LEFT_S - max(begins_s, default=0.0))
     later_s = round(later * max(room, 0.0) * scenario.rate_hz) / scenario.rate_hz
     for i, fault in enumerate(scenario.faults):
         changes[f"faults[{i}].at_s"] = fault.at_s + later_s
@@ -90,20 +93,23 @@ def fly_one(scenario: Scenario, seed: int, flight: Flight) -> Document:
     return row_of(measure(landing), max(landing.closest_approach, default=0.0))
 
 
-def row_of(found: Metrics, bound_used: float) -> Document:
-    """The row of a flight that was flown."""
-    isolation = found.isolation
-    tracked = found.tracking
-    rms = tracked.post_fault_rms_deg_s if found.fault else tracked.pre_fault_rms_deg_s
+def row_of(metrics: Metrics, bound_used: float) -> Document:
+    """The row of a completed flight. bound_used: largest share of the detection bound that its healthy part
+    used."""
+    isolation = metrics.isolation
+    tracking = metrics.tracking
+    rms = tracking.post_fault_rms_deg_s if metrics.fault else tracking.pre_fault_rms_deg_s
     return {
         "failed": False,
-        "false_alarm": found.false_alarm,
-        "detected": found.fault_found_s is not None,
+        "false_alarm": metrics.false_alarm,
+        "detected": metrics.fault_found_s is not None,
         "named": bool(isolation.correct),
         "misnamed": isolation.isolated and not isolation.correct,
-        "lost": found.departure is not None,
-        "delay_s": found.fault_found_s,
-        "tracking_deg_s": None if found.departure or rms is None else max(rms.p or 0, rms.q or 0, rms.r or 0),
+        "lost": metrics.departure is not None,
+        "delay_s": metrics.fault_found_s,
+        "tracking_deg_s": None
+        if metrics.departure or rms is None
+        else max(rms.p or 0, rms.q or 0, rms.r or 0),
         "bound_used": bound_used,
     }
 
@@ -111,22 +117,23 @@ def row_of(found: Metrics, bound_used: float) -> Document:
 def document_of(
     scenario: Scenario, errors: Errors, cases: Sequence[Flight], seed: int, rows: Sequence[Document]
 ) -> Document:
-    """A row an error and factor, of the rows of all flights."""
+    """The document: a row for each error and factor. rows: of all flights, in the order of the cases."""
     flights = (case._asdict() | row for case, row in zip(cases, rows, strict=True))
-    flown = grouped(flights, "error", "factor")
-    shared = flown[TOGETHER, FACTORS[0]]
-    says = {error.name: error.says for error in errors} | {TOGETHER: "all that are declared"}
+    rows_of = grouped(flights, "error", "factor")
+    as_declared = rows_of[TOGETHER, FACTORS[0]]
+    size_of_error = {error.name: error.says for error in errors} | {TOGETHER: "all that are declared"}
     return {
         "scenario": scenario.name,
         "faults": len(scenario.faults),
         "seed": seed,
-        "flights": len(shared),
+        "flights": len(as_declared),
         "confidence": CONFIDENCE,
         "factors": list(FACTORS),
         "errors": [{"error": e.name, "declared": e.says, "is_declared": e.declared} for e in errors],
         "rows": [
-            {"error": name, "declared": said, "factor": factor} | summary(flown.get((name, factor), shared))
-            for name, said in says.items()
+            {"error": name, "declared": size, "factor": factor}
+            | summary(rows_of.get((name, factor), as_declared))
+            for name, size in size_of_error.items()
             for factor in FACTORS
         ],
         "versions": dict(versions()),
@@ -134,7 +141,7 @@ def document_of(
 
 
 def summary(rows: Sequence[Document]) -> Document:
-    """Counts with their intervals; medians with theirs: of flights whose aircraft is lost, infinite."""
+    """Counts and medians with their intervals. The tracking error of a lost aircraft counts as infinite."""
     flown = [row for row in rows if not row["failed"]]
     counts = {name: sum(row[name] for row in flown) for name in COUNTED}
     return {

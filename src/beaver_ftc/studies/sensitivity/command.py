@@ -26,7 +26,7 @@ from beaver_ftc.studies.sensitivity.mechanisms import (
 
 
 def errors_study(scenario: Scenario, flights: int = beyond.FLIGHTS, seed: int = 1) -> Study:
-    """The study of errors larger than declared. Raises BadInput where nothing is diagnosed."""
+    """The study of errors larger than declared. Raises BadInput if the scenario has no diagnosis."""
     if scenario.fdi.scheme == "none":
         raise BadInput(f"{scenario.name}: fdi.scheme: none diagnoses nothing, allowed: a scheme")
     errors = errors_of(scenario)
@@ -95,7 +95,7 @@ class Sensitivity(StudyCommand):
     FILES = tuple(errors_shown.FILES)
 
     def run(self, reporter: Reporter) -> Document:
-        """Fly every row, or every draw."""
+        """Fly the chosen study."""
         if (self.scenario is None) is not self.mechanisms:
             raise BadInput("sensitivity: allowed: exactly one of SCENARIO and --mechanisms")
         if self.mechanisms:
@@ -105,6 +105,6 @@ class Sensitivity(StudyCommand):
         return run_into(study, self.out, self.processes, reporter.progress)
 
     def as_text(self, document: Document, colour: bool) -> str:
-        """Findings and tables, and where the files are."""
+        """Sentences and tables, and the folder of the files."""
         shown = mechanisms_shown if self.mechanisms else errors_shown
         return f"{as_text(shown.page_of(document)[1])}\n\nresults: {document['folder']}"

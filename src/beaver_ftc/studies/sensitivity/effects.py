@@ -1,7 +1,7 @@
-"""Effect of each mechanism, from pairs of flights with it and without it.
+"""The effect of each mechanism, from pairs of flights with it and without it.
 
-A pair is worse without the mechanism if it then has a false alarm, a late alarm or no right name, or tracks
-worse, and better if the opposite holds. The net share, worse less better, is what the mechanism is worth.
+By each criterion (a false alarm, a late alarm, no right name, worse tracking), a pair may be worse or better
+without the mechanism. The net share of a criterion, worse less better, is the worth of the mechanism.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -14,16 +14,18 @@ from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial, counted, 
 from beaver_ftc.studies.sensitivity.mechanisms import FACTORS, Flight, cases_of, with_key, without_key
 from beaver_ftc.studies.sensitivity.systems import MECHANISMS, SYSTEMS, Mechanism
 
-LATE_S = 0.1  # an alarm so much later is late
-WORSE = 1.1  # a tracking error so many times as large is worse
-Outcomes = Sequence[Document]  # of several flights
-Pair = tuple[Document, Document]  # outcomes of a draw with the mechanism and without it
+LATE_S = 0.1  # an alarm that is later by more than this is late
+WORSE = 1.1  # a tracking error larger by more than this factor is worse
+Outcomes = Sequence[Document]
+"""Outcomes of several flights."""
+Pair = tuple[Document, Document]
+"""Outcomes (a, b) of a draw: a with the mechanism, b without it."""
 
 
 def document_of(seed: int, draws: int, rows: Outcomes, margins: list[Document]) -> Document:
-    """A row a mechanism; rows: of every case of `cases_of`, in order."""
+    """The document: a row for each mechanism. rows: outcomes of each case of `cases_of`, in order."""
     cases = cases_of(draws)
-    found = [_row_of(mechanism, cases, rows) for mechanism in MECHANISMS]
+    effects = [_row_of(mechanism, cases, rows) for mechanism in MECHANISMS]
     alarms = [_alarms_of(key, rows) for key in rows[0]]
     return {
         "passed": not any(row["unexplained"] for row in alarms if row["worst_case"]),
@@ -35,7 +37,7 @@ def document_of(seed: int, draws: int, rows: Outcomes, margins: list[Document]) 
         "worse": WORSE,
         "margins": margins,
         "systems": {system: _system_row([row[system] for row in rows]) for system in SYSTEMS},
-        "mechanisms": found,
+        "mechanisms": effects,
         "false_alarms": alarms,
         "versions": dict(versions()),
     }
@@ -44,7 +46,7 @@ def document_of(seed: int, draws: int, rows: Outcomes, margins: list[Document]) 
 def _row_of(mechanism: Mechanism, cases: Sequence[Flight], rows: Outcomes) -> Document:
     """The row of a mechanism: its effect in all pairs, and by each value of each factor."""
     pairs = [(row[with_key(mechanism)], row[without_key(mechanism)]) for row in rows]
-    by = {
+    by_factor = {
         factor: {
             str(value): effect_of([*compress(pairs, (getattr(case, factor) == value for case in cases))])
             for value in values
@@ -52,12 +54,12 @@ def _row_of(mechanism: Mechanism, cases: Sequence[Flight], rows: Outcomes) -> Do
         for factor, values in FACTORS.items()
     }
     about = {"system": mechanism.system, "mechanism": mechanism.name, "serves": mechanism.serves}
-    return {**about, **effect_of(pairs), "by": by}
+    return {**about, **effect_of(pairs), "by": by_factor}
 
 
 def effect_of(pairs: Sequence[Pair]) -> Document:
-    """The effect of the mechanism in these pairs: shares of flights that are worse without it, less those
-    that are better; and medians of both."""
+    """The effect of the mechanism in these pairs: net shares by criterion, and medians with and without it.
+    Pairs with a failed flight are left out."""
     flown = [pair for pair in pairs if not any(outcome["failed"] for outcome in pair)]
     return {
         "flights": len(flown),
@@ -72,7 +74,8 @@ def effect_of(pairs: Sequence[Pair]) -> Document:
 
 
 def _later(a: Document, b: Document) -> bool:
-    """Whether b's alarm is late beside a's; of flights with a false alarm there is no delay to compare."""
+    """Whether the alarm of b is later than that of a by more than LATE_S. False if one of them has a false
+    alarm, which has no delay."""
     if a["false_alarm"] or b["false_alarm"]:
         return False
     return or_never(b["delay_s"]) > or_never(a["delay_s"]) + LATE_S
@@ -84,14 +87,15 @@ CRITERIA: Mapping[str, Callable[[Document, Document], bool]] = {
     "names": lambda a, b: a["named"] > b["named"],
     "tracking": lambda a, b: or_never(b["tracking_deg_s"]) > WORSE * or_never(a["tracking_deg_s"]),
 }
-"""Whether the second flight of a pair is worse than the first."""
+"""By criterion, whether the second flight b of a pair is worse than the first a."""
 
 
 def net(pairs: Sequence[Pair], worse: Callable[[Document, Document], bool]) -> Document:
     """Share of pairs that are worse without the mechanism, less the share of those that are better.
 
-    Its interval is that of both shares, each exact at half of the error probability: together they hold with
-    the whole confidence, whatever the shares depend on [ClopperPearson1934].
+    Each share has an exact interval with half of the error probability [ClopperPearson1934]. By the union
+    bound, both hold together with CONFIDENCE. The net share then lies between their smallest and largest
+    difference.
     """
     n = len(pairs)
     confidence = (1.0 + CONFIDENCE) / 2.0
@@ -107,6 +111,7 @@ def net(pairs: Sequence[Pair], worse: Callable[[Document, Document], bool]) -> D
 
 
 def _both(pairs: Sequence[Pair], name: str) -> Document:
+    """Medians of a number with and without the mechanism."""
     return {
         "flights": len(pairs),
         "with": median(a[name] for a, _ in pairs),
@@ -115,13 +120,14 @@ def _both(pairs: Sequence[Pair], name: str) -> Document:
 
 
 def _ratio(a: Document, b: Document) -> float:
-    """Tracking error of b over that of a; 1 where both aircraft are lost."""
-    over, under = or_never(b["tracking_deg_s"]), or_never(a["tracking_deg_s"])
-    return over / under if isfinite(under) else float(not isfinite(over))
+    """Tracking error of b over that of a; infinite if only b loses the aircraft, 0 if only a does, 1 if both
+    do."""
+    error_b, error_a = or_never(b["tracking_deg_s"]), or_never(a["tracking_deg_s"])
+    return error_b / error_a if isfinite(error_a) else float(not isfinite(error_b))
 
 
 def _system_row(outcomes: Outcomes) -> Document:
-    """The row of a system with all of its mechanisms, in the flights that were flown to their end."""
+    """The row of a system with all of its mechanisms, over the completed flights."""
     flown = [o for o in outcomes if not o["failed"]]
     rates = {
         "false_alarms": sum(o["false_alarm"] for o in flown),
@@ -137,11 +143,17 @@ def _system_row(outcomes: Outcomes) -> Document:
 
 
 def _alarms_of(key: str, rows: Outcomes) -> Document:
-    """False alarms of what was flown, and why they came. worst_case: whether it promises that none comes
-    within the declaration. unexplained: alarms without an undeclared error, or without the certificate that
-    this scheme has."""
+    """The false alarms of one system with or without a mechanism.
+
+    worst_case: whether it guarantees no false alarm within the declaration; only the statistical detector
+    does not. undeclared: alarms with an undeclared error. certifiable: alarms of a scheme with certificates;
+    certified: those with one. unexplained: alarms without an undeclared error, or of a worst-case scheme with
+    certificates without one.
+    """
     reasons = [row[key]["reason"] for row in rows if row[key]["false_alarm"]]
-    worst_case = key not in [with_key(one) for one in MECHANISMS if "fdi.statistical" in one.present]
+    worst_case = key not in [
+        with_key(mechanism) for mechanism in MECHANISMS if "fdi.statistical" in mechanism.present
+    ]
     explained = [r["undeclared"] > 0 and (r["certified"] is not False or not worst_case) for r in reasons]
     return {
         "flown": key,

@@ -1,8 +1,9 @@
-"""The errors that a scenario declares, and flights in which they are a multiple of what is declared.
+"""The errors that a scenario declares, and the keys of a scenario in which they are multiples of the declared
+size.
 
-Each error is flown at its limit, not within it: every coefficient, inertia and bias is off by the whole
-amount, with a sign that is drawn. An error that is not declared has a unit of its own, and is absent from
-all other flights.
+Each error has exactly the size of its limit, times a factor: every coefficient, inertia and bias is wrong by
+this amount with a random sign. An error that is not declared has a fixed size as its unit, and is absent from
+all flights in which it is not the enlarged error.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -22,24 +23,26 @@ from beaver_ftc.scenario.diagnosis import ActuatorBound
 from beaver_ftc.scenario.schema import Scenario, Sinusoid, TrueInertia
 from beaver_ftc.scenario.sensors import PRESETS, Sensors
 
-FREQUENCIES_RAD_S = (5.0, 15.0)  # of an unstructured acceleration where the scenario flies none
-UNDECLARED_SHARE = 0.01  # of a coefficient or a moment of inertia of which no error is declared
+FREQUENCIES_RAD_S = (5.0, 15.0)  # of an unstructured acceleration, if the scenario has none
+UNDECLARED_SHARE = 0.01  # unit of an error of a coefficient or a moment of inertia that is not declared
 UNDECLARED_SENSORS = "tactical-grade"
 UNDECLARED_AIR = "light"
-FACTOR_LIMITS = (0.1, 10.0)  # of the factors on a coefficient and on an actuator
-_RANDOM = ("noise_std", "quantum")
-_SIGNED = ("bias", "scale_error", "drift")
+FACTOR_LIMITS = (0.1, 10.0)  # limits of the factors on a coefficient and on a bandwidth or rate limit
+_RANDOM = ("noise_std", "quantum")  # begins of keys of a sensor: sizes without a sign
+_SIGNED = ("bias", "scale_error", "drift")  # those with a sign
 _IDEAL = Sensors()
 
-SensorErrors = Mapping[str, Mapping[str, float]]  # by sensor and key
+SensorErrors = Mapping[str, Mapping[str, float]]
+"""Errors by sensor and key."""
 Change = Callable[[float, Generator], Document]
+"""From a factor and a generator for signs to the keys of a scenario."""
 
 
 class Error(NamedTuple):
     """One kind of error.
 
-    says: how much of it is declared, or that it is not. change: the keys of a scenario that make it so many
-    times as large, with signs that are drawn.
+    says: the declared size, or that it is not declared. change: makes the keys of a scenario with this error
+    times a factor, with random signs. declared: whether it is declared.
     """
 
     name: str
@@ -49,13 +52,14 @@ class Error(NamedTuple):
 
 
 def errors_of(scenario: Scenario) -> tuple[Error, ...]:
-    """Every kind of error that the bounds of a scenario may declare, and that a truth may have."""
+    """The kinds of errors that the bounds of a scenario declare, or that a truth may have without a
+    declaration."""
     bounds = scenario.fdi.bounds
     declared = Declared.of(scenario)
     shares = {term.name: declared.coefficients.of(term.name) for term in scenario.airframe.moments}
     inertia = dict.fromkeys(("Ix", "Iy", "Iz"), bounds.inertia)
     constant = declared.constant_rad_s2
-    found = (
+    errors = (
         _of_ratios("moment coefficients", "uncertainty.coefficients", shares, FACTOR_LIMITS),
         _of_ratios("moments of inertia", "uncertainty.inertia", inertia, _limits(TrueInertia, "Ix")),
         _coupling(declared.coupling) if any(declared.coupling) else None,
@@ -64,14 +68,14 @@ def errors_of(scenario: Scenario) -> tuple[Error, ...]:
         _sensors({} if bounds.sensors.is_ideal else bounds.sensors.model_dump()),
         _air(bounds.turbulence),
     )
-    return tuple(filter(None, found))
+    return tuple(filter(None, errors))
 
 
 def changes_of(errors: Sequence[Error], factors: Mapping[str, float], draws: Generator) -> Document:
-    """The keys of a truth in which each error is so many times what is declared; those without a factor are
-    absent, as is everything that no error makes."""
+    """The keys of a truth in which each error has its factor. Errors without a factor are absent. Random
+    numbers are drawn for all errors, so that signs do not depend on the factors."""
     truth: Document = {"uncertainty": {}, "sensors": "ideal", "environment": {}}
-    for error in errors:  # the same signs whatever the factors
+    for error in errors:
         made = error.change(factors.get(error.name, 0.0), draws)
         truth |= made if error.name in factors else {}
     return truth
@@ -79,12 +83,13 @@ def changes_of(errors: Sequence[Error], factors: Mapping[str, float], draws: Gen
 
 @cache
 def _limits(section: type[Section], key: str) -> tuple[Any, Any]:
-    """The least and the largest value that a key of a section may have; None without a limit."""
-    of = section.model_json_schema()["properties"][key]
-    return of.get("minimum"), of.get("maximum")
+    """The smallest and the largest value that a key of a section may have; None without a limit."""
+    schema = section.model_json_schema()["properties"][key]
+    return schema.get("minimum"), schema.get("maximum")
 
 
 def _signs(draws: Generator, names: Sequence[str]) -> dict[str, float]:
+    """A random sign, 1 or -1, for each name."""
     return dict(zip(names, draws.choice((-1.0, 1.0), len(names)).tolist(), strict=True))
 
 
@@ -92,21 +97,26 @@ def signed(
     sizes: Mapping[str, float], usual: float, limits: tuple[float, float], times: float,
     draws: Generator,
 ) -> dict[str, float]:  # fmt: skip
-    """The value of each key: usual + times * sign * size, sign drawn, within the limits."""
+    """The value of each key: usual + times * sign * size, with a random sign, within the limits. times: the
+    factor."""
     signs = _signs(draws, [*sizes])
     return {key: float(np.clip(usual + times * signs[key] * size, *limits)) for key, size in sizes.items()}
 
 
-def _of_ratios(what: str, section: str, shares: Mapping[str, float], limits: tuple[float, float]) -> Error:
-    """Factors of the truth that are off by these shares; by UNDECLARED_SHARE if no share is declared."""
-    known = any(shares.values())
-    shares = shares if known else dict.fromkeys(shares, UNDECLARED_SHARE)
+def _of_ratios(name: str, section: str, shares: Mapping[str, float], limits: tuple[float, float]) -> Error:
+    """The error of factors of the truth, which differ from 1 by these shares; by UNDECLARED_SHARE if none is
+    declared."""
+    is_declared = any(shares.values())
+    shares = shares if is_declared else dict.fromkeys(shares, UNDECLARED_SHARE)
     largest = f"{100.0 * max(shares.values()):g} %"
-    says = largest if known else _unknown(largest)
-    return Error(what, says, lambda times, draws: {section: signed(shares, 1.0, limits, times, draws)}, known)
+    says = largest if is_declared else _unknown(largest)
+    return Error(
+        name, says, lambda times, draws: {section: signed(shares, 1.0, limits, times, draws)}, is_declared
+    )
 
 
 def _coupling(theta: Sequence[float]) -> Error:
+    """The error of the inertia coupling of each axis, of the sizes theta (3,)."""
     sizes = dict(zip(AXES, theta, strict=True))
     section = "uncertainty.inertia_coupling"
     return Error(
@@ -117,17 +127,18 @@ def _coupling(theta: Sequence[float]) -> Error:
 
 
 def _acceleration(scenario: Scenario, sizes: Sequence[float]) -> Error:
-    """A sine on each axis, of the frequency that the scenario flies there, or else of a drawn one."""
+    """A sinusoidal acceleration of each axis, of these sizes (3,) rad/s2, with the frequency of the scenario
+    or a random one."""
     _, most_rad_s2 = _limits(Sinusoid, "amplitude_rad_s2")
     flown = {axis: getattr(scenario.uncertainty.sinusoid, axis) for axis in AXES}
-    known = {axis: wave.frequency_rad_s for axis, wave in flown.items() if wave.amplitude_rad_s2}
+    frequency_of_axis = {axis: wave.frequency_rad_s for axis, wave in flown.items() if wave.amplitude_rad_s2}
 
     def change(times: float, draws: Generator) -> Document:
         drawn = dict(zip(AXES, draws.uniform(*FREQUENCIES_RAD_S, len(AXES)).tolist(), strict=True))
         return {
             "uncertainty.sinusoid": {
                 axis: {"amplitude_rad_s2": min(times * size, most_rad_s2), "frequency_rad_s": at}
-                for (axis, at), size in zip((drawn | known).items(), sizes, strict=True)
+                for (axis, at), size in zip((drawn | frequency_of_axis).items(), sizes, strict=True)
             }
         }
 
@@ -135,7 +146,7 @@ def _acceleration(scenario: Scenario, sizes: Sequence[float]) -> Error:
 
 
 def _servos(declared: Declared) -> Error:
-    """Bandwidths and rate limits, each with a sign drawn, and dead bands."""
+    """Errors of bandwidths and rate limits with random signs, and dead bands, of each actuator."""
     bounds = {name: bound.model_dump() for name, bound in declared.servo_errors}
     _, widest_deg = _limits(TrueActuator, "dead_band_deg")
 
@@ -153,7 +164,7 @@ def _servos(declared: Declared) -> Error:
 
 
 def _sensors(declared: SensorErrors) -> Error:
-    """Noise and resolution are so many times as large; biases and slopes too, each with a sign drawn."""
+    """Errors of all sensors: noise and resolution, and biases, slopes and drifts with random signs."""
     bounds = declared or PRESETS[UNDECLARED_SENSORS]
 
     def change(times: float, draws: Generator) -> Document:
@@ -178,18 +189,18 @@ def _sensors(declared: SensorErrors) -> Error:
 
 
 def _preset(declared: SensorErrors) -> str:
-    """The name of the preset that declares these errors, zeros left out."""
+    """The name of the preset with these errors, zeros left out; `as declared` if there is none."""
     used = {
         name: sizes
-        for name, of in declared.items()
-        if (sizes := {key: value for key, value in of.items() if value})
+        for name, sizes_of_sensor in declared.items()
+        if (sizes := {key: value for key, value in sizes_of_sensor.items() if value})
     }
     return next((name for name, preset in PRESETS.items() if preset == used), "as declared")
 
 
 def _air(declared: str) -> Error:
-    """The strongest severity whose wind at 20 ft is at most so many times that of the one declared. The wind
-    of each severity, 0, 15, 30 and 45 kt, is in proportion to its place in SEVERITIES."""
+    """Turbulence: the strongest severity whose wind at 20 ft is at most the factor times that of the declared
+    one. The winds, 0, 15, 30 and 45 kt, are proportional to the index in SEVERITIES."""
     is_declared = declared != "none"
     base = SEVERITIES.index(declared if is_declared else UNDECLARED_AIR)
 
@@ -200,4 +211,5 @@ def _air(declared: str) -> Error:
 
 
 def _unknown(unit: str) -> str:
+    """The size of an error that is not declared."""
     return f"none; unit {unit}"

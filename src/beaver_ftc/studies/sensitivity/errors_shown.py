@@ -34,24 +34,27 @@ def page_of(document: Document) -> tuple[str, Sequence[Part]]:
 
 
 def error_sentences(document: Document) -> Iterator[str]:
-    """The result as declared, and the least factor at which an error changes the verdict."""
+    """A sentence about the flights with all declared errors, and one for each error: the smallest factor at
+    which it changes the verdict."""
     errors = list(grouped(document["rows"], "error").values())
     alarms, misnamed = _counts(errors[-1][0])
     yield (
         f"{document['scenario']}: with every error at the limit of what is declared, {alarms} flights have a "
         f"false alarm and {misnamed} a wrong name."
     )
-    undeclared = [each["error"] for each in document["errors"] if not each["is_declared"]]
+    undeclared = [error["error"] for error in document["errors"] if not error["is_declared"]]
     for rows in errors:
         yield _onset(rows, rows[0]["error"] not in undeclared)
 
 
 def _counts(row: Document) -> list[str]:
+    """How many flights have a false alarm, and how many a wrong name."""
     return ["{count} of {of}".format(**row[name]) for name in ("false_alarm", "misnamed")]
 
 
 def _onset(rows: Sequence[Document], is_declared: bool) -> str:
-    """The least factor with a false alarm or a wrong name, of one error."""
+    """A sentence about the smallest factor of one error with a false alarm or a wrong name. rows: by
+    increasing factor."""
     size = "the declared size" if is_declared else "the unit"
     head = "{error} ({declared})".format(**rows[0]).replace("(none; ", "(not declared; ", 1)
     broken = next((row for row in rows if row["false_alarm"]["count"] or row["misnamed"]["count"]), None)
@@ -65,15 +68,18 @@ def _onset(rows: Sequence[Document], is_declared: bool) -> str:
 
 
 def _share(found: Document) -> str:
+    """A share with its interval, per cent."""
     return "{} ({})".format(*estimate(found, bare_percent))
 
 
 def _interval(found: Document, form: Callable[[Any], str] = number_or_never) -> str:
+    """A median with its interval, unless the interval has no width."""
     value, limits = estimate(found, form)
     return value if found["value"] is None or found["low"] == found["high"] else f"{value} ({limits})"
 
 
 def _used(found: Document) -> str:
+    """A share of the bound with its interval, per cent."""
     return _interval(found, lambda share: number_or_never(share and 100.0 * share))
 
 
@@ -87,7 +93,7 @@ COLUMNS = (
 
 
 def draw_errors(document: Document) -> "Figure":
-    """A row a quantity, a column an error, over the factor; bars are intervals."""
+    """A row of panels for each quantity, a column for each error, over the factor. Bars are intervals."""
     errors = [*grouped(document["rows"], "error").values()]
     titles = ["{error}\n{declared}".format(**rows[0]) for rows in errors]
     title = f"{document['scenario']}: errors larger than declared"

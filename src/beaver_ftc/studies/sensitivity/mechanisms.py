@@ -1,8 +1,10 @@
-"""The flights that show the worth of a mechanism, and their outcomes.
+"""The flights that show the worth of each mechanism, and their outcomes.
 
-A draw is a flight: fault, airspeed, references, instant, and errors of the model within what is declared.
-Every system flies it, with all of its mechanisms and without each of them. Cells of the survey are all
-combinations of fault, bandwidth of the law, undeclared error and instruments; each has draws of its own.
+    cell       a combination of fault, bandwidth of the law, undeclared error and instruments
+    draw       a random flight of a cell: airspeed, references, begin of the fault, and declared model errors
+    outcome    the results of a system in a draw, with all of its mechanisms or without one of them
+
+Each system flies each draw with all of its mechanisms, and without each of them.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -38,20 +40,20 @@ from beaver_ftc.studies.sensitivity.systems import (
     Mechanism,
 )
 
-SURFACES = ("aileron", "elevator", "rudder")  # draws of a cell take turns
+SURFACES = ("aileron", "elevator", "rudder")  # the draws of a cell take these in turn
 LOSSES = {"loss 20 %": 0.2, "loss 40 %": 0.4, "loss 80 %": 0.8}
 UNANTICIPATED = "unanticipated"
 FAULTS = (*LOSSES, UNANTICIPATED)
-# Bandwidth of the rate loops, Kp in 1/s, and what gives it to the laws: the published one takes it, the
-# default one follows from a gain margin, dB.
+# Bandwidth of the rate loops: Kp of the published law, 1/s, and the gain margin, dB, with which the default
+# law has the same bandwidth.
 BANDWIDTHS: Mapping[str, tuple[float, float]] = {
     "low": (2.3, 20.0),
     "medium": (6.6, 12.0),
     "high": (14.0, 6.0),
 }
-ERRORS = (0.0, 0.005, 0.02, 0.05)  # of every moment coefficient, beyond what is declared
+ERRORS = (0.0, 0.005, 0.02, 0.05)  # undeclared relative error of every moment coefficient
 SENSORS = "tactical-grade"
-# What is flown, and declared: sensors, turbulence, inertia coupling, and unstructured acceleration, rad/s2.
+# Flown and declared: sensors, turbulence, inertia coupling, and unstructured acceleration, rad/s2.
 INSTRUMENTS: Mapping[str, tuple[str, str, float, float]] = {
     "exact sensors": ("ideal", "none", 0.25, 0.02),  # the published bounds
     "real sensors": (SENSORS, "none", 0.0, 0.002),
@@ -62,8 +64,8 @@ FACTORS: Mapping[str, tuple[Any, ...]] = {
 }  # fmt: skip
 DRAWS = 3  # of a cell
 AIRSPEED_MPS = (38.0, 52.0)
-STRIKES_S = (6.0, 9.0)
-AFTER_S = 8.0
+STRIKES_S = (6.0, 9.0)  # begin of the fault
+AFTER_S = 8.0  # time that is flown after it
 RATE_HZ = 100.0
 AMPLITUDE_DEG_S = 3.0
 SWINGS_RAD_S = (1.0, 15.0)  # frequencies of the unstructured acceleration
@@ -85,7 +87,8 @@ def cases_of(draws: int) -> list[Flight]:
 
 
 def scenario_of(flight: Flight, seed: int, system: str) -> Scenario:
-    """The flight of a system with all of its mechanisms. Draws depend on the cell and the run alone."""
+    """The flight of a system with all of its mechanisms. Random numbers depend on the cell and the run alone,
+    so that both systems fly the same."""
     places = (values.index(value) for values, value in zip(FACTORS.values(), flight, strict=False))
     draws = np.random.default_rng([seed, *places, flight.run])
     at_s = round(draws.uniform(*STRIKES_S) * RATE_HZ) / RATE_HZ
@@ -116,13 +119,14 @@ def scenario_of(flight: Flight, seed: int, system: str) -> Scenario:
 
 
 def _fault(flight: Flight, at_s: float) -> Document:
+    """The fault of a draw."""
     if flight.fault == UNANTICIPATED:
         return {"type": "unanticipated", "Cm_alpha3": 10.0, "at_s": at_s}
     return loss(SURFACES[flight.run % len(SURFACES)], LOSSES[flight.fault], at_s)
 
 
 def _errors(coupling: float, swing_rad_s2: float, draws: np.random.Generator) -> Document:
-    """Errors of the model somewhere within what is declared."""
+    """Random model errors within the declaration."""
     thetas = draws.uniform(-coupling, coupling, len(AXES)).tolist()
     sizes = draws.uniform(0.0, swing_rad_s2, len(AXES)).tolist()
     return {
@@ -132,13 +136,15 @@ def _errors(coupling: float, swing_rad_s2: float, draws: np.random.Generator) ->
 
 
 def _undeclared(scenario: Scenario, share: float, draws: np.random.Generator) -> Document:
-    """Every moment coefficient off by a share of it, with a sign that is drawn."""
+    """An error of every moment coefficient by this share, with a random sign."""
     shares = {term.name: share for term in scenario.airframe.moments}
     ratios = signed(shares, 1.0, FACTOR_LIMITS, 1.0, draws) if share else {}
     return {"uncertainty.coefficients": ratios}
 
 
 def _bandwidth(flight: Flight, system: str) -> Changes:
+    """The keys that give the law of a system its bandwidth. Ki = Kp^2 / 4 has two equal poles of the
+    error."""
     Kp, margin_db = BANDWIDTHS[flight.bandwidth]
     if system == PAPER:
         return {"control.proportional_per_s": Kp, "control.integral_per_s2": Kp**2 / 4.0}
@@ -146,10 +152,10 @@ def _bandwidth(flight: Flight, system: str) -> Changes:
 
 
 def without_mechanism(scenario: Scenario, mechanism: Mechanism) -> Scenario:
-    """The scenario without a mechanism; one that is withheld from the law has no key.
+    """The scenario without a mechanism. A mechanism that is withheld from the law changes no key.
 
-    In place of adaptive thresholds stands the least constant that promises the same: the largest value of the
-    adaptive threshold in the same flight as declared and without the fault.
+    Adaptive thresholds are replaced by the smallest constant threshold with the same guarantee: the largest
+    value of the adaptive threshold in the same flight without fault and undeclared errors.
     """
     changed = scenario.with_(mechanism.without)
     if "fdi.options.adaptive_threshold" not in mechanism.without:
@@ -161,71 +167,75 @@ def without_mechanism(scenario: Scenario, mechanism: Mechanism) -> Scenario:
 
 
 def fly_one(seed: int, flight: Flight) -> Document:
-    """The outcome of a draw by what was flown: each system, with and without each of its mechanisms."""
-    flown = {}
+    """The outcomes of a draw, by key: of each system, with and without each of its mechanisms. Equal flights
+    are flown once."""
+    outcomes = {}
     for system in SYSTEMS:
-        whole = scenario_of(flight, seed, system)
-        flown[system] = outcome_of(whole)
+        scenario = scenario_of(flight, seed, system)
+        outcomes[system] = outcome_of(scenario)
         for mechanism in (each for each in MECHANISMS if each.system == system):
-            if with_key(mechanism) not in flown:
-                flown[with_key(mechanism)] = outcome_of(whole.with_(mechanism.present))
-            if without_key(mechanism) not in flown:
-                less = without_mechanism(whole, mechanism)
-                flown[without_key(mechanism)] = outcome_of(less, mechanism.withheld)
-    return flown
+            if with_key(mechanism) not in outcomes:
+                outcomes[with_key(mechanism)] = outcome_of(scenario.with_(mechanism.present))
+            if without_key(mechanism) not in outcomes:
+                without = without_mechanism(scenario, mechanism)
+                outcomes[without_key(mechanism)] = outcome_of(without, mechanism.withheld)
+    return outcomes
 
 
 def with_key(mechanism: Mechanism) -> str:
-    """The outcome of a draw in which the mechanism is there."""
+    """The key of the outcome with a mechanism: that of the whole system, unless the mechanism needs keys to
+    be present."""
     return f"with {mechanism.key}" if mechanism.present else mechanism.system
 
 
 def without_key(mechanism: Mechanism) -> str:
-    """The outcome of a draw without it."""
+    """The key of the outcome without a mechanism: that of the whole system if the system does not have it by
+    itself."""
     return f"without {mechanism.key}" if mechanism.without or mechanism.withheld else mechanism.system
 
 
 class Outfit(NamedTuple):
-    """What was flown, in words: a system, and which of its mechanisms."""
+    """A system and its mechanisms in words."""
 
     system: str
     mechanisms: str = "all"
 
 
-FLOWN = {  # by the key of its outcome
+FLOWN = {  # by key of an outcome
     **{with_key(each): Outfit(each.system, f"with {each.name}") for each in MECHANISMS},
     **{without_key(each): Outfit(each.system, f"without {each.name}") for each in MECHANISMS},
-    **{system: Outfit(system) for system in SYSTEMS},  # also of mechanisms that are there anyway
+    **{system: Outfit(system) for system in SYSTEMS},  # last, in place of equal keys above
 }
 
 
 def withhold(withheld: str, loop: Loop) -> Callable[[], None]:
-    """Watch a flight (`fly`): withhold something from its law as it begins. Nothing is due at its end."""
+    """Watch a flight, as an argument of `fly`: withhold something from its law at the begin. At the end of
+    the flight, the returned function has nothing to do."""
     if withheld:
         withhold_from_law(loop.frames[0], withheld)
     return _do_nothing
 
 
 def _do_nothing() -> None:
-    """At the end of a flight."""
+    """Nothing to do at the end of a flight."""
 
 
 def outcome_of(scenario: Scenario, withheld: str = "") -> Document:
-    """The outcome of a flight. withheld: from the law, as in `withhold_from_law`."""
+    """The outcome of a flight. withheld: what is withheld from the law, as in `withhold_from_law`."""
     try:
-        found = measure(fly(scenario, watch=partial(withhold, withheld)))
+        metrics = measure(fly(scenario, watch=partial(withhold, withheld)))
     except BeaverFtcError as error:
         return FAILED | {"error": str(error)}
-    detection = found.detection
-    isolation = found.isolation
+    detection = metrics.detection
+    isolation = metrics.isolation
     return {
         "failed": False,
-        "false_alarm": found.false_alarm,
-        "delay_s": found.fault_found_s,
-        "named": found.fault_named,
-        "tracking_deg_s": _tracking(found),
+        "false_alarm": metrics.false_alarm,
+        "delay_s": metrics.fault_found_s,
+        "named": metrics.fault_named,
+        "tracking_deg_s": _tracking(metrics),
         "verdict": [detection.time_s, isolation.fault, isolation.time_s],
-        "reason": reason_of(scenario) if found.false_alarm else None,
+        "reason": reason_of(scenario) if metrics.false_alarm else None,
     }
 
 
@@ -235,28 +245,30 @@ FAILED: Document = {
 }  # fmt: skip
 
 
-def _tracking(found: Metrics) -> float | None:
-    """RMS error of all axes after the fault, deg/s; None of an aircraft that is lost."""
-    rms = found.tracking.post_fault_rms_deg_s
-    return None if found.departure or rms is None else hypot(rms.p or 0.0, rms.q or 0.0, rms.r or 0.0)
+def _tracking(metrics: Metrics) -> float | None:
+    """RMS tracking error of all axes after the fault, deg/s; None for a lost aircraft."""
+    rms = metrics.tracking.post_fault_rms_deg_s
+    return None if metrics.departure or rms is None else hypot(rms.p or 0.0, rms.q or 0.0, rms.r or 0.0)
 
 
 def reason_of(scenario: Scenario) -> Document:
-    """The reason of a false alarm: how many errors of the truth are undeclared; and, if the alarms of the
-    scheme have a certificate, whether it proves that the data are outside of the declaration."""
-    beyond = sum(1 for _ in undeclared(scenario))
+    """The reason of a false alarm. undeclared: number of undeclared errors of the truth. certified: whether a
+    certificate proves that the data are outside of the declaration; None for a scheme without
+    certificates."""
+    n_undeclared = sum(1 for _ in undeclared(scenario))
     if not scenario.fdi.is_ours:
-        return {"undeclared": beyond, "certified": None}
+        return {"undeclared": n_undeclared, "certified": None}
     log = MemoryLog()
     fly(scenario, log)
-    stated = required("proof", "mechanisms")(scenario, log).certificate["statements"]
-    # that no healthy aircraft within the declaration gives these data
-    certified = any(statement["column"] == "detected" and "sides" in statement for statement in stated)
-    return {"undeclared": beyond, "certified": certified}
+    statements = required("proof", "mechanisms")(scenario, log).certificate["statements"]
+    # the statement that no healthy aircraft within the declaration gives these data
+    certified = any(statement["column"] == "detected" and "sides" in statement for statement in statements)
+    return {"undeclared": n_undeclared, "certified": certified}
 
 
 def margins_row(cell: tuple[str, str, str]) -> Document:
-    """Margins of a system's healthy loop at a bandwidth, the least over surfaces and airspeeds."""
+    """The smallest margins of the healthy loop of a system over surfaces and airspeeds. cell: system,
+    bandwidth, instruments."""
     system, bandwidth, instruments = cell
     flight = Flight(FACTORS["fault"][0], bandwidth, FACTORS["error"][0], instruments, 0)
     gain_db, phase_deg = least_margins(margins_of(scenario_of(flight, 0, system)))
@@ -270,6 +282,7 @@ def margins_row(cell: tuple[str, str, str]) -> Document:
 
 
 def margin_cells() -> Iterable[tuple[str, str, str]]:
-    """System, bandwidth and instruments of each row of margins; the air is not in a loop."""
-    seen = [name for name, (_, air, *_) in INSTRUMENTS.items() if air == "none"]
-    return product(SYSTEMS, BANDWIDTHS, seen)
+    """System, bandwidth and instruments of each row of margins. Turbulence does not change a loop, so that
+    only instruments without it are used."""
+    instruments = [name for name, (_, air, *_) in INSTRUMENTS.items() if air == "none"]
+    return product(SYSTEMS, BANDWIDTHS, instruments)

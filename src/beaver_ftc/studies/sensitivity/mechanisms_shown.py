@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 NAME = "sensitivity"
-CRITERIA = {  # of effects.py, in the words of tables
+CRITERIA = {  # criteria of effects.py: words in tables
     "false_alarms": "false alarms",
     "late": "late alarms",
     "names": "lost names",
@@ -42,16 +42,16 @@ _FACTOR_WORDS = {
 
 def page_of(document: Document) -> tuple[str, Sequence[Part]]:
     """The title and the parts of the page, and of the text without its pictures."""
-    of_each = tables(document)
+    table_of = tables(document)
     return "What each mechanism is worth", [
         *mechanism_sentences(document), Pictures([(CAPTIONS["net"], NAME)]),
-        *(part for name, says in CAPTIONS.items() for part in (Heading(says), of_each[name])),
+        *(part for name, caption in CAPTIONS.items() for part in (Heading(caption), table_of[name])),
         versions_line(document["versions"]),
     ]  # fmt: skip
 
 
 def mechanism_sentences(document: Document) -> Iterator[str]:
-    """The flights, what each mechanism improves or worsens, and whether false alarms have a reason."""
+    """Sentences about the number of flights, about each mechanism, and about the reasons of false alarms."""
     names = " x ".join(f"{len(values)} {_FACTOR_WORDS[name]}" for name, values in document["factors"].items())
     yield f"{document['draws']} draws over {names}, each flown with and without every mechanism."
     yield from (mechanism_sentence(row) for row in document["mechanisms"])
@@ -72,17 +72,21 @@ def label(row: Document) -> str:
 
 
 def mechanism_sentence(row: Document) -> str:
-    """The changes by the removal of a mechanism, beyond chance."""
+    """A sentence about the criteria that change significantly without a mechanism."""
     flights = row["flights"]
     if row["same_verdict"] == row["same_tracking"] == flights:
         return f"{label(row)}: without it all {flights} flights are the same."
-    certain = {name: row[name] for name in CRITERIA if row[name]["low"] > 0.0 or row[name]["high"] < 0.0}
-    if not certain:
+    changed_criteria = {
+        name: row[name] for name in CRITERIA if row[name]["low"] > 0.0 or row[name]["high"] < 0.0
+    }
+    if not changed_criteria:
         changed = flights - row["same_verdict"]
         differ = f"{changed} of {flights} verdicts differ" if changed else "no verdict differs"
         return f"{label(row)}: without it {differ}, and no criterion changes beyond chance."
-    said = (f"{CRITERIA[name]} {100 * found['value']:+.1f} points" for name, found in certain.items())
-    return f"{label(row)}: without it, {', '.join(said)}."
+    texts = (
+        f"{CRITERIA[name]} {100 * found['value']:+.1f} points" for name, found in changed_criteria.items()
+    )
+    return f"{label(row)}: without it, {', '.join(texts)}."
 
 
 def tables(document: Document) -> dict[str, Table]:
@@ -98,7 +102,7 @@ def tables(document: Document) -> dict[str, Table]:
 
 
 def _systems_table(systems: Document) -> Table:
-    """A row a quantity, a pair of columns a system."""
+    """A row for each quantity, two columns for each system."""
     quantities = [
         ("flights", [(str(row["flights"]), "") for row in systems.values()]),
         *(
@@ -125,6 +129,7 @@ def _with_interval(head: str, key: str, cells: Callable[[Document], tuple[str, s
 
 
 def _certified(row: Document) -> str:
+    """Number of certified alarms; `-` for a scheme without certificates."""
     return str(row["certified"]) if row["certifiable"] or not row["count"] else "-"
 
 
@@ -159,7 +164,8 @@ MARGINS = (
 
 
 def draw_mechanisms(document: Document) -> "Figure":
-    """A panel a criterion, a dot a mechanism with its interval; to the right of 0 the mechanism helps."""
+    """A panel for each criterion, a dot with its interval for each mechanism. To the right of 0, the
+    mechanism helps."""
     rows = document["mechanisms"]
     figure, grid = panels(1, len(CRITERIA), 13.0, 0.28 * len(rows) + 1.4, sharey=True)
     for panel, (name, words) in zip(grid[0], CRITERIA.items(), strict=True):

@@ -1,8 +1,8 @@
 """Two systems, the mechanisms of each, and the switch that removes each mechanism.
 
-A mechanism is removed by keys of the scenario; where there is no key, it is withheld from the law in flight.
-Nothing else differs between the two flights of a pair. The law acts on the diagnosis from the alarm on alone,
-so that both flights of a pair have the same healthy loop, and with it the same stability margins.
+A mechanism is removed by keys of the scenario. If there is no key, it is withheld from the law in flight. The
+two flights of a pair differ in nothing else. The law uses the diagnosis only after the alarm. Both flights of
+a pair therefore have the same healthy loop, and so the same stability margins.
 """
 
 from collections.abc import Mapping
@@ -16,8 +16,8 @@ SYSTEMS: Mapping[str, Changes] = {
     DEFAULT: {"fdi.scheme": "adaptive-estimators", "control.law": "fault-tolerant"},
 }
 DIAGNOSIS, LAW = "diagnosis", "law"
-CONSTANT = "fdi.options.constant_threshold_rad_s"  # its value follows from the flight, see mechanisms.py
-ABRUPT: Changes = MappingProxyType({"fdi.fault_profile": "abrupt"})  # sets are intersected with this alone
+CONSTANT = "fdi.options.constant_threshold_rad_s"  # mechanisms.py computes its value for each flight
+ABRUPT: Changes = MappingProxyType({"fdi.fault_profile": "abrupt"})  # only with this key are sets intersected
 NORM_BOUND: Changes = MappingProxyType({"fdi.thresholds": "published"})
 SUDDEN_S = 0.01  # one frame: the shortest hand-over that a scenario admits
 

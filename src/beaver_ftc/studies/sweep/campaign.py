@@ -1,4 +1,4 @@
-"""A sweep from beginning to end: fly what is missing, then say what it all shows."""
+"""A sweep from begin to end: fly the missing flights, then write the summary of all."""
 
 import math
 from collections import Counter
@@ -29,10 +29,11 @@ from beaver_ftc.studies.sweep.store import Store, identity_of
 if TYPE_CHECKING:
     from beaver_ftc.studies.sweep.outcomes import Flights
 
-There = Callable[[Number, Any], None]  # takes the number and the rows of each batch, once they are there
-FRAMES_A_BATCH = 50_000  # a third of a second of work: little to lose, and a file costs no share worth saying
-MOST_A_BATCH = 256
-MOST_BATCHES = 4_000  # of a sweep of millions: so many files are read again in seconds
+There = Callable[[Number, Any], None]
+"""Called with the number and the rows of each batch when it has landed."""
+FRAMES_A_BATCH = 50_000  # a third of a second of work: little is lost, and writing a file costs little of it
+MOST_A_BATCH = 256  # flights in a batch, unless there would be more than MOST_BATCHES
+MOST_BATCHES = 4_000  # so many files are read again in seconds
 
 
 class SweepStopped(BeaverFtcError):
@@ -43,10 +44,19 @@ class SweepStopped(BeaverFtcError):
 
 @dataclass(frozen=True)
 class Options:
-    """How to fly a sweep; nothing here changes what comes out."""
+    """How to fly a sweep. Only `search` changes the flights.
+
+    - out: folder of the result folder. workers: number of local processes, one for each core by default; for
+      Ray, number of tasks, two for each CPU by default. backend: `local` or `ray`. address: of the Ray
+      cluster.
+    - resume: whether to continue an earlier sweep. keep: which flights leave a folder of their own. report:
+      whether figures and report are written.
+    - search: the objective of a worst-case search, or None. source: the sweep file, as the command line names
+      it.
+    """
 
     out: Path = Path("runs")
-    workers: int | None = None  # of local processes, one a core; of Ray, two tasks a CPU
+    workers: int | None = None
     backend: str = "local"
     address: str | None = None
     resume: bool = False
@@ -57,8 +67,8 @@ class Options:
 
 
 def named_for(sweep: Sweep, search: str | None) -> Sweep:
-    """The sweep under the name of its result folder. A search has its own, and nothing is expected of it: its
-    rates say nothing about the flights in general."""
+    """The sweep with the name of its result folder. A search has another name, and no expectations, because
+    its rates say nothing about flights in general."""
     if search is None:
         return sweep
     changed = {"name": f"{sweep.name}-search-{search}", "expect": SweepExpect()}
@@ -73,11 +83,11 @@ def run_sweep(
 ) -> Document:
     """Fly a sweep into `out/<name>/` and return its summary.
 
-    progress: told of the number of flights in all, `total`, and so far: `done`, `failed` (no metrics),
-    `faulted`, and `detected` of these.
+    progress: called with the numbers of flights: `total` of the sweep, and so far `done`, `failed` (without
+    metrics), `faulted`, and `detected` of these. stopped: whether the user has stopped the sweep.
 
     Raises BadInput for a folder that holds another or an unfinished sweep, SimulationFailed where the folder
-    cannot be written or no flight could be flown, SweepStopped once `stopped` says so.
+    cannot be written or no flight could be flown, SweepStopped once `stopped` is true.
     """
     sweep = named_for(sweep, options.search)
     so_far = Counter(total=sweep.flights)
@@ -86,7 +96,7 @@ def run_sweep(
     with Store(folder, sweep) as store:
         store.begin(identity_of(sweep, options.search), options.resume)
         if not store.is_compacted(sweep.flights):
-            (folder / "summary.json").unlink(missing_ok=True)  # let nobody take the sweep for finished
+            (folder / "summary.json").unlink(missing_ok=True)  # summary.json marks a finished sweep
 
             def there(number: Number, rows: Any) -> None:
                 so_far.update(counts_of(rows))
@@ -106,7 +116,8 @@ def run_sweep(
 def _fly_missing(
     sweep: Sweep, options: Options, store: Store, there: There, stopped: Callable[[], bool]
 ) -> list[tuple[int, range]]:
-    """Fly what is not there, each round once the one before has landed; returns the batches of all rounds."""
+    """Fly the missing batches, each round after the one before has landed. Returns the batches of all
+    rounds."""
     batches_flown: list[tuple[int, range]] = []
     make = partial(_workers, sweep, options)
     lost = partial(one_flight.lost, sweep)
@@ -118,9 +129,9 @@ def _fly_missing(
 
 
 def _rounds(sweep: Sweep, options: Options, store: Store) -> Iterable[Round]:
-    """One round of all flights; of a search a round for each generation, once those before have landed.
+    """One round with all flights; for a search, a round for each generation, once those before have landed.
 
-    The batches follow from the sweep alone, so that a resumed sweep has the same batches.
+    The batches depend on the sweep alone, so that a resumed sweep has the same batches.
     """
     if options.search:
         return generations(sweep, options.search, store)
@@ -132,6 +143,7 @@ def _rounds(sweep: Sweep, options: Options, store: Store) -> Iterable[Round]:
 
 
 def _workers(sweep: Sweep, options: Options, flights: int) -> Workers:
+    """The workers of the backend."""
     work = Work(partial(one_flight.fly_one, sweep, keep=options.keep), partial(one_flight.warm_up, sweep))
     if options.backend == "ray":
         from beaver_ftc.studies.engine.ray_workers import RayWorkers
@@ -141,7 +153,8 @@ def _workers(sweep: Sweep, options: Options, flights: int) -> Workers:
 
 
 def conclude(sweep: Sweep, options: Options, store: Store) -> Document:
-    """Write what the flights of a complete `results.parquet` show; `summary.json`, last, says all is done."""
+    """Write the results of a complete `results.parquet`: kept flights, figures and report; `summary.json`
+    last, since it marks a finished sweep."""
     from beaver_ftc.studies.sweep.outcomes import Flights
 
     flights = Flights(store.results, sweep)
@@ -176,6 +189,7 @@ def _summary(sweep: Sweep, options: Options, flights: "Flights", results: Path) 
 
 
 def _draw(sweep: Sweep, flights: "Flights", document: Document, store: Store) -> None:
+    """Write the figures and the report, which contains them."""
     from beaver_ftc.studies.sweep.pictures import write_figures
     from beaver_ftc.studies.sweep.summary_page import render
 
@@ -185,7 +199,8 @@ def _draw(sweep: Sweep, flights: "Flights", document: Document, store: Store) ->
 
 
 def assignment_of(sweep: Sweep, options: Options, index: int) -> Assignment:
-    """The values of one flight of a sweep, or of a search as far as it has come. Raises BadInput."""
+    """The values of one flight of a sweep, or of a generation of a search that has begun. Raises BadInput for
+    any other flight."""
     if not 0 <= index < sweep.flights:
         raise BadInput(f"{sweep.name}: there is no flight {index}, allowed: 0 to {sweep.flights - 1}")
     for batches, cases_of in _rounds(sweep, options, Store(options.out / sweep.name, sweep)):
@@ -195,7 +210,7 @@ def assignment_of(sweep: Sweep, options: Options, index: int) -> Assignment:
 
 
 def replay(sweep: Sweep, options: Options, index: int) -> Document:
-    """Fly one flight of a sweep again, as `run` would, into `out/<sweep>/flights/`; return its metrics."""
+    """Fly one flight of a sweep again, as `run` does, into `out/<sweep>/flights/`; return its metrics."""
     from beaver_ftc.results.writer import run
     from beaver_ftc.studies.sweep.summary_page import render
 
@@ -203,7 +218,7 @@ def replay(sweep: Sweep, options: Options, index: int) -> Document:
     folder = options.out / sweep.name
     scenario = one_flight.scenario_of(sweep, assignment_of(sweep, options, index))
     document = run(scenario, folder / "flights", options.report, certified=options.keep.certified)
-    if (folder / "report.html").exists():  # let it lead to the flight
+    if (folder / "report.html").exists():  # written again with a link to the flight
         summary = read_json(folder / "summary.json")
         write_whole(folder / "report.html", render(summary, folder).encode("utf-8"))
     return document | {"folder": str(folder / "flights" / scenario.name)}

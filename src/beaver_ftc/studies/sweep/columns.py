@@ -1,6 +1,7 @@
-"""The columns of a sweep's table with the outcome of a flight: its metrics, by path, and a few more.
+"""The columns of the table of a sweep with the results of a flight: paths of its metrics, and derived
+columns.
 
-The type of a path follows from the metrics model.
+The type of a path follows from the records of the metrics.
 """
 
 from collections.abc import Callable, Iterator
@@ -11,7 +12,7 @@ from beaver_ftc.results.model import Metrics, Window, without_none
 
 WORST_RATIO = "worst_residual_ratio"
 Getter = Callable[[Metrics], Any]
-_KINDS = {float: "float", int: "int", bool: "flag", str: "text"}
+_KINDS = {float: "float", int: "int", bool: "flag", str: "text"}  # type of a column by that of its values
 
 
 class Derived(NamedTuple):
@@ -23,7 +24,8 @@ class Derived(NamedTuple):
 
 
 def _pair(path: str, *ends: str) -> Iterator[Derived]:
-    """A column for each of the two values of a pair in the metrics; empty if there is no pair."""
+    """A column for each of the two values of a pair in the metrics, None if there is no pair. ends: their
+    names."""
     for end, name in enumerate(ends):
         yield Derived(f"{path}.{name}", "float", partial(_value_of_pair, path, end))
 
@@ -34,35 +36,35 @@ def _value_of_pair(path: str, end: int, metrics: Metrics) -> float | None:
 
 
 def _faults(metrics: Metrics) -> str:
-    """surface:type of each fault that was named, of several at once."""
-    named = (one for one in metrics.isolation.faults if one.fault)
-    return " ".join(f"{one.fault}:{one.type or 'open'}" for one in named)
+    """`surface:type` of each named fault, if several are named at once."""
+    named = (fault for fault in metrics.isolation.faults if fault.fault)
+    return " ".join(f"{fault.fault}:{fault.type or 'open'}" for fault in named)
 
 
 def _withdrawn(metrics: Metrics) -> str:
-    return " ".join(gone.fault for gone in metrics.isolation.withdrawn)
+    return " ".join(withdrawn.fault for withdrawn in metrics.isolation.withdrawn)
 
 
 def _missed(metrics: Metrics) -> str:
-    return " ".join(one.name for one in metrics.expectations if not one.passed)
+    return " ".join(expectation.name for expectation in metrics.expectations if not expectation.passed)
 
 
 def _in_each_window(holds: Callable[[Window], bool], metrics: Metrics) -> str:
-    """`yes` or `no` of each window, in the order of time; empty without windows."""
-    return " ".join("yes" if holds(one) else "no" for one in metrics.windows or ())
+    """`yes` or `no` for each window, in the order of time; empty without windows."""
+    return " ".join("yes" if holds(window) else "no" for window in metrics.windows or ())
 
 
 def _is_named(window: Window) -> bool:
-    """Whether every name in a window is correct, and every type that is known."""
-    return all(one.correct and one.type_correct is not False for one in window.isolation)
+    """Whether every name in a window is correct, and every named type."""
+    return all(named.correct and named.type_correct is not False for named in window.isolation)
 
 
 def _first_entry(mode: str, metrics: Metrics) -> float | None:
-    """When the supervisor first entered a mode, s."""
+    """Time at which the supervisor first entered a mode, s; None if it did not."""
     return next((change.time_s for change in metrics.supervisor if change.mode == mode), None)
 
 
-# In their order: paths of the metrics, in which * is each surface, and others.
+# The columns in order: paths of the metrics, in which * stands for each surface, and derived columns.
 COLUMNS: tuple[str | Derived, ...] = (
     "frames", Derived("flown_s", "float", lambda metrics: metrics.frames / metrics.flight.rate_hz),
     "fault_free_s", "fault.actuator", "fault.type", "fault.at_s",
@@ -81,7 +83,7 @@ COLUMNS: tuple[str | Derived, ...] = (
     Derived("windows.detected", "text", partial(_in_each_window, lambda window: window.detected)),
     Derived("windows.correct", "text", partial(_in_each_window, _is_named)),
 
-    "false_alarm", Derived(WORST_RATIO, "float", lambda metrics: None),  # which `row_of` has of the landing
+    "false_alarm", Derived(WORST_RATIO, "float", lambda metrics: None),  # `row_of` takes it from the landing
     "tracking.pre_fault_rms_deg_s.p", "tracking.pre_fault_rms_deg_s.q", "tracking.pre_fault_rms_deg_s.r",
     "tracking.post_fault_rms_deg_s.p", "tracking.post_fault_rms_deg_s.q", "tracking.post_fault_rms_deg_s.r",
     "tracking.surface_travel_deg.*", "tracking.surface_energy_deg2_s.*",
@@ -116,19 +118,21 @@ def columns_of(surfaces: tuple[str, ...]) -> dict[str, str]:
             kinds[column.name] = column.kind
         else:
             kind = _kind(column)
-            kinds |= {column.replace("*", one): kind for one in (surfaces if "*" in column else ("",))}
+            kinds |= {
+                column.replace("*", surface): kind for surface in (surfaces if "*" in column else ("",))
+            }
     return kinds
 
 
 def _kind(path: str) -> str:
     """The type of the column at a path of the metrics."""
     hint: Any = Metrics
-    for part in path.split("."):  # a mapping, of surfaces or axes, has values of one type
+    for part in path.split("."):  # the values of a mapping have one type
         hint = get_args(hint)[1] if get_origin(hint) is dict else get_type_hints(hint)[part]
         hint = without_none(hint)
     return _KINDS[hint]
 
 
 def getter_of(name: str) -> Getter:
-    """The function that reads a column from the metrics; it gives None where a section on the way is None."""
+    """The function that reads a column from the metrics. It returns None if a section on the way is None."""
     return _GETTERS.get(name) or (lambda metrics: metrics.at(name))

@@ -1,5 +1,6 @@
-"""The table of a sweep: one row a flight, `run` first, then what varied, then what came of it.
+"""One flight of a sweep: its scenario, its row of the table, and its result folder if it is kept.
 
+A row has the columns `run`, the varied keys, the other columns of FIXED, and the results (columns.py).
 Nothing in it depends on the clock, the worker or the order of the flights: the same sweep gives the same
 bytes.
 """
@@ -35,12 +36,13 @@ Row = Document
 
 FLOWN, DEPARTED, BAD_INPUT, FAILED, CRASHED = "flown", "departed", "bad_input", "failed", "crashed"
 RESULTS = (FLOWN, DEPARTED)  # the statuses of a flight that has metrics
-# Columns of every sweep, and their types: what varies stands behind the first.
+# Columns of every sweep, and their types. The varied keys stand behind the first.
 FIXED = {"run": "int", "seed": "int", "status": "text", "reason": "text"}
 
 
 def kind_of(how: Variation) -> str:
-    """The type of a varied key's column: numbers and texts as they are, sections as JSON."""
+    """The type of the column of a varied key: numbers and flags as they are; all else as text, sections as
+    JSON."""
     if how.choice is None:
         return "float"
     if all(isinstance(value, bool) for value in how.choice):
@@ -50,7 +52,7 @@ def kind_of(how: Variation) -> str:
 
 
 def as_cell(value: Any, kind: str) -> Any:
-    """A varied value as its column holds it."""
+    """A varied value as a cell of its column."""
     if kind == "float":
         return float(value)
     return value if kind == "flag" or isinstance(value, str) else json.dumps(value)
@@ -68,25 +70,26 @@ def row_of(assignment: Assignment, found: Metrics, flight: "Landing") -> Row:
 
 
 def row_of_failure(sweep: Sweep, assignment: Assignment, status: str, reason: str) -> Row:
-    """The row of a flight that has none, and why."""
+    """The row of a flight without metrics. status, reason: why it has none."""
     seed = flight_seed(sweep.file.seed, assignment.run)
     return _row(assignment, seed, status, reason, dict.fromkeys(columns_of(())))
 
 
 def _row(assignment: Assignment, seed: int, status: str, reason: str | None, metrics: Row) -> Row:
+    """A row; metrics: its columns with results."""
     run, values = assignment
     return {"run": run, **values, "seed": seed, "status": status, "reason": reason, **metrics}
 
 
 def schema_of(sweep: "Sweep") -> "pa.Schema":
-    """The table's columns and their types."""
+    """The columns of the table and their types."""
     import pyarrow as pa
 
     types = {"float": pa.float64(), "int": pa.int64(), "flag": pa.bool_(), "text": pa.string()}
-    first, *after = [pa.field(name, types[kind], nullable=name == "reason") for name, kind in FIXED.items()]
+    first, *others = [pa.field(name, types[kind], nullable=name == "reason") for name, kind in FIXED.items()]
     varied = [pa.field(key, types[kind_of(how)]) for key, how in sweep.file.vary.items()]
     metrics = [pa.field(name, types[kind]) for name, kind in columns_of(sweep.aircraft.surfaces).items()]
-    return pa.schema([first, *varied, *after, *metrics])
+    return pa.schema([first, *varied, *others, *metrics])
 
 
 def table_of(sweep: "Sweep", schema: "pa.Schema", rows: Sequence[Row]) -> "pa.Table":
@@ -100,7 +103,7 @@ def table_of(sweep: "Sweep", schema: "pa.Schema", rows: Sequence[Row]) -> "pa.Ta
 
 
 def counts_of(rows: "Sequence[Row] | pa.Table") -> Counter[str]:
-    """How many flights: `done`, `failed` (no metrics), `faulted`, and `detected` of these."""
+    """Numbers of flights: `done`, `failed` (without metrics), `faulted`, and `detected` of these."""
     if not isinstance(rows, Sequence):
         rows = rows.select(["status", "fault.type", "detection.detected"]).to_pylist()
     faulted = [row for row in rows if row["fault.type"] is not None]
@@ -110,12 +113,17 @@ def counts_of(rows: "Sequence[Row] | pa.Table") -> Counter[str]:
     )  # fmt: skip
 
 
-KEEP_POLICIES = ("none", "failed", "missed", "worst", "all")
+KEEP_POLICIES = ("none", "failed", "missed", "worst", "all")  # campaign.py keeps the worst flights at the end
 
 
 @dataclass(frozen=True)
 class Keep:
-    """The flights that leave a result folder of their own, and its place; certified: with certificates."""
+    """Which flights get a result folder of their own.
+
+    - policy: one of KEEP_POLICIES. `failed`: flights that are lost, failed or do not meet expectations.
+      `missed`: also those with a missed fault or a wrong name. runs: further flights.
+    - folder: of the result folders. certified: whether certificates are written.
+    """
 
     policy: str = "none"
     runs: frozenset[int] = field(default_factory=frozenset)
@@ -138,7 +146,7 @@ def flight_name(sweep: Sweep, index: int) -> str:
 
 
 def scenario_of(sweep: Sweep, assignment: Assignment) -> Scenario:
-    """The scenario of one flight. Raises BadInput if its values contradict each other."""
+    """The scenario of one flight. Raises BadInput if its values do not fit together."""
     seed = flight_seed(sweep.file.seed, assignment.run)
     try:
         return sweep.scenario(assignment.values, name=flight_name(sweep, assignment.run), seed=seed)
@@ -149,7 +157,7 @@ def scenario_of(sweep: Sweep, assignment: Assignment) -> Scenario:
 
 
 def fly_one(sweep: Sweep, assignment: Assignment, keep: Keep | None = None) -> Row:
-    """Fly one flight; whatever goes wrong with it is in its row."""
+    """Fly one flight and return its row, also if it fails."""
     from beaver_ftc.loop.loop import fly
     from beaver_ftc.results.metrics import measure
 
@@ -160,7 +168,7 @@ def fly_one(sweep: Sweep, assignment: Assignment, keep: Keep | None = None) -> R
         row = row_of_failure(sweep, assignment, BAD_INPUT, str(error))
     except BeaverFtcError as error:
         row = row_of_failure(sweep, assignment, FAILED, str(error))
-    except Exception as error:  # a plug-in may raise anything: one flight's end, not the sweep's
+    except Exception as error:  # a plug-in may raise anything, and the sweep continues
         row = row_of_failure(sweep, assignment, FAILED, f"{type(error).__name__}: {error}")
     if keep and keep.wants(row):
         keep_flight(sweep, assignment, keep)
@@ -173,16 +181,16 @@ def lost(sweep: Sweep, assignment: Assignment, why: str) -> Row:
 
 
 def warm_up(sweep: Sweep) -> None:
-    """Fly two frames of the base, so that whatever is compiled or loaded once has been."""
+    """Fly two frames of the base scenario, so that all code is compiled and loaded."""
     from beaver_ftc.loop.loop import fly
 
-    with contextlib.suppress(Exception):  # whatever is wrong shows in the flights' rows
+    with contextlib.suppress(Exception):  # an error shows in the rows of the flights
         base = sweep.scenario({})
         fly(base.model_copy(update={"duration_s": 2.0 / base.rate_hz, "faults": ()}))
 
 
 def keep_flight(sweep: Sweep, assignment: Assignment, keep: Keep, report: bool = False) -> None:
-    """Fly one flight as `run` would, into a result folder of its own; of a failure, keep the scenario."""
+    """Fly one flight as `run` does, into a result folder of its own. If it fails, keep its scenario."""
     from beaver_ftc.results.folder import result_folder
     from beaver_ftc.results.writer import NotAllWritten, run
     from beaver_ftc.scenario.builtin import to_yaml
@@ -190,11 +198,11 @@ def keep_flight(sweep: Sweep, assignment: Assignment, keep: Keep, report: bool =
     try:
         scenario = scenario_of(sweep, assignment)
     except BadInput:
-        return  # there is no such scenario: the row says why
+        return  # there is no scenario; the row has the reason
     try:
         run(scenario, keep.folder, report, certified=keep.certified and scenario.fdi.is_ours)
     except NotAllWritten:
         return  # log and scenario are kept
-    except Exception:  # as in its row, which says why
+    except Exception:  # the row has the reason
         with result_folder(keep.folder, scenario.name) as partial:
             (partial / "scenario.yaml").write_text(to_yaml(scenario), encoding="utf-8")

@@ -1,4 +1,4 @@
-"""The flights of a sweep as columns, and the groups of them that statistics are about."""
+"""The flights of a sweep as columns, and the groups of flights over which statistics are formed."""
 
 from functools import cache, cached_property
 from pathlib import Path
@@ -15,9 +15,10 @@ NO_FAULT = "no fault"
 
 
 class Flights:
-    """Columns of a `results.parquet`, or of one in memory, as arrays (flights,), each read when asked for.
+    """Columns of a `results.parquet`, or of such a file in memory, as arrays (flights,). A column is read
+    when it is used.
 
-    Numbers have NaN for null, flags False, texts ''.
+    A null is NaN in numbers, False in flags, and '' in texts. Groups are masks (flights,).
     """
 
     def __init__(self, file: Path | IO[bytes], sweep: Sweep) -> None:
@@ -47,43 +48,44 @@ class Flights:
 
     @cached_property
     def false_alarms(self) -> tuple[int, float]:
-        """How many there were, and in how many hours in which an alarm would have been a false one."""
+        """Number of false alarms, and the hours in which an alarm would have been false."""
         count = int((self["false_alarm"] & self.measured).sum())
         return count, float(np.nansum(self["fault_free_s"][self.measured])) / 3600
 
     @cached_property
     def faulted(self) -> np.ndarray:
-        """Flights that can tell about detection: a fault came, and no alarm before it."""
+        """Flights with a fault and without an alarm before it, in which the fault can be detected."""
         struck = strikes_within(self["fault.at_s"], self["flown_s"])
         return self.measured & struck & ~self["false_alarm"]
 
     @cached_property
     def detected(self) -> np.ndarray:
-        """Faulted flights whose fault raised the alarm."""
+        """Faulted flights with an alarm."""
         return self.faulted & np.isfinite(self["detection.delay_s"])
 
     @cached_property
     def isolated(self) -> np.ndarray:
-        """Faulted flights whose fault was named rightly."""
+        """Faulted flights whose fault is correctly named."""
         return self.detected & self["isolation.correct"]
 
     @cached_property
     def detection_delay_s(self) -> np.ndarray:
-        """From fault to alarm, infinite where there was none; meaningful where faulted."""
+        """Time from the fault to the alarm, s; infinite without an alarm. Valid for faulted flights."""
         return np.where(self.detected, self["detection.delay_s"], np.inf)
 
     @cached_property
     def isolation_delay_s(self) -> np.ndarray:
-        """From fault to its right name, infinite where it never came; meaningful where faulted."""
+        """Time from the fault to its right name, s; infinite without one. Valid for faulted flights."""
         return np.where(self.isolated, self["isolation.delay_s"], np.inf)
 
     def post_fault_rms_deg_s(self, axis: str) -> np.ndarray:
-        """Tracking error after the fault, infinite where the aircraft was lost; NaN without a fault."""
+        """RMS tracking error after the fault, deg/s; infinite if the aircraft was lost, NaN without a
+        fault."""
         rms = self[f"tracking.post_fault_rms_deg_s.{axis}"]
         return np.where(self.departed & self.faulted, np.inf, rms)
 
     def tracking_ratio(self, axis: str) -> np.ndarray:
-        """Tracking error after the fault over before it."""
+        """RMS tracking error after the fault over that before it; NaN if the latter is 0 or missing."""
         before = self[f"tracking.pre_fault_rms_deg_s.{axis}"]
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = self.post_fault_rms_deg_s(axis) / before
@@ -91,12 +93,12 @@ class Flights:
 
     @cached_property
     def worst_rms_deg_s(self) -> np.ndarray:
-        """The largest tracking error after the fault over the three axes."""
+        """The largest RMS tracking error of the three axes after the fault, deg/s."""
         return np.max([self.post_fault_rms_deg_s(axis) for axis in AXES], axis=0)
 
     @cached_property
     def fault_labels(self) -> np.ndarray:
-        """The fault of each flight in words: the surface, with the type where there are several types."""
+        """The fault of each flight in words: the surface, with the type if the sweep has several types."""
         kinds = self["fault.type"]
         actuators = self["fault.actuator"]
         several = len(set(kinds[kinds != ""])) > 1
@@ -104,17 +106,18 @@ class Flights:
         return np.array([_label(kind, actuator, several) for kind, actuator in pairs], dtype=object)
 
     def is_number(self, key: str) -> bool:
-        """Whether a varied key is a number (and not a choice among names)."""
+        """Whether a varied key is a number, not a choice of names."""
         return kind_of(self.vary[key]) == "float"
 
 
 def _array(column) -> np.ndarray:
+    """A column of a table as an array without nulls."""
     import pyarrow as pa
 
     if pa.types.is_boolean(column.type):
         return column.fill_null(False).to_numpy(zero_copy_only=False)
     if pa.types.is_string(column.type):
-        # each text once, however many flights
+        # each text is one object, however many flights have it
         coded = column.fill_null("").combine_chunks().dictionary_encode()
         return np.array(coded.dictionary.to_pylist(), dtype=object)[coded.indices.to_numpy()]
     return column.to_numpy()
@@ -122,6 +125,7 @@ def _array(column) -> np.ndarray:
 
 @cache
 def _label(kind: str, actuator: str, several_types: bool) -> str:
+    """A fault in words."""
     if not kind:
         return NO_FAULT
     if not actuator:

@@ -1,6 +1,7 @@
 """The figures of a sweep as PNG, drawn with matplotlib without its global state.
 
-Each function takes the flights and returns a figure, or None where the flights hold nothing of that kind.
+Each function of FIGURES draws a figure from flights and summary. It returns None if these have no data for
+the figure.
 """
 
 import re
@@ -33,9 +34,9 @@ if TYPE_CHECKING:
 
 Drawer = Callable[[Flights, Document], "Figure | None"]
 
-BINS = 16
-LEAST_A_BIN = 10
-_SEARCHED = {
+BINS = 16  # at most
+LEAST_A_BIN = 10  # flights
+_SEARCHED = {  # label of the score, by objective of the search
     "delay": "detection delay (s)",
     "false_alarm": "residual / threshold without a fault",
     "tracking": "RMS tracking error after the fault (deg/s)",
@@ -45,12 +46,12 @@ _UNITS = {
     "deg_h": "deg/h", "mps2": "m/s2", "mps": "m/s", "inhg_s": "inHg/s", "inhg": "inHg", "deg": "deg",
     "rad": "rad", "hz": "Hz", "rpm": "rpm", "pa": "Pa", "db": "dB", "m": "m", "s": "s",
 }  # fmt: skip
-"""The unit of a key or of its section, by how its name ends."""
+"""The unit of a key, by the ending of its name or of its section."""
 _ENDING = re.compile(rf"_({'|'.join(_UNITS)})(?=\.|$)")
 
 
 def write_figures(flights: Flights, summary: Document, folder: Path) -> list[Path]:
-    """Draw what there is to draw as `<figure>.png`; return the files."""
+    """Draw each figure with data as `<name>.png`, and remove older ones; return the files."""
     folder.mkdir(exist_ok=True)
     for name in FIGURES:
         (folder / f"{name}.png").unlink(missing_ok=True)
@@ -72,10 +73,10 @@ def _axes(
 
 
 def in_words(key: str) -> str:
-    """A varied key for people: `faults[0].at_s` is `fault 1: at (s)`."""
-    said = re.sub(r"faults\[(\d+)\]", lambda found: f"fault {int(found[1]) + 1}", key)
-    unit = _ENDING.search(said)
-    name = _ENDING.sub("", said).replace(".", ": ").replace("_", " ")
+    """A varied key in words: `fault 1: at (s)` of `faults[0].at_s`."""
+    text = re.sub(r"faults\[(\d+)\]", lambda match: f"fault {int(match[1]) + 1}", key)
+    unit = _ENDING.search(text)
+    name = _ENDING.sub("", text).replace(".", ": ").replace("_", " ")
     return f"{name} ({_UNITS[unit[1]]})" if unit else name
 
 
@@ -86,7 +87,8 @@ def _log_of_numbers(axes: "Axes") -> None:
 
 
 def magnitude_key(flights: Flights, summary: Document) -> str | None:
-    """How large the fault is: of the varied numbers of a fault, the one that delays hang on most."""
+    """The varied key that stands for the size of the fault: the number of a fault, else any number, that
+    explains the detection delay best. None if no number varies."""
     ranked = [entry["key"] for entry in summary["sensitivity"]["detection_delay"]]
     numbers = [key for key in (ranked or flights.vary) if flights.is_number(key)]
     of_faults = [key for key in numbers if key.startswith("faults[") and not key.endswith(("at_s", "end_s"))]
@@ -94,7 +96,7 @@ def magnitude_key(flights: Flights, summary: Document) -> str | None:
 
 
 def detection_probability(flights: Flights, summary: Document) -> "Figure | None":
-    """Share detected against the fault's magnitude, a curve a fault, with Wilson intervals."""
+    """Share detected over the size of the fault, a curve for each fault, with Wilson intervals."""
     key = magnitude_key(flights, summary)
     if key is None or not flights.faulted.any():
         return None
@@ -103,9 +105,9 @@ def detection_probability(flights: Flights, summary: Document) -> "Figure | None
         values = flights[key][group]
         hits = flights.detected[group]
         bins = _levels(values) if flights.vary[key].count else _bins(values)
-        found = [vars(wilson(int(hits[bin].sum()), bin.size)) for bin in bins]
+        estimates = [vars(wilson(int(hits[bin].sum()), bin.size)) for bin in bins]
         draw_estimates(
-            axes, [values[bin].mean() for bin in bins], found, label=label, marker=marker(place),
+            axes, [values[bin].mean() for bin in bins], estimates, label=label, marker=marker(place),
             markersize=4.5, elinewidth=0.8, capsize=2, **curve_look(place),
         )  # fmt: skip
     if flights.vary[key].loguniform:
@@ -116,13 +118,13 @@ def detection_probability(flights: Flights, summary: Document) -> "Figure | None
 
 
 def _faults(flights: Flights) -> list[tuple[str, np.ndarray]]:
-    """(label, which flights) of each fault."""
+    """(label, mask of its faulted flights) of each fault."""
     labels = flights.fault_labels
     return [(label, flights.faulted & (labels == label)) for label in sorted(set(labels[flights.faulted]))]
 
 
 def _levels(values: np.ndarray) -> list[np.ndarray]:
-    """Positions of the flights at each value, in order of the values."""
+    """Indices of the flights with each value, in the order of the values; bins if there are many values."""
     levels, group = np.unique(values, return_inverse=True)
     if levels.size > 2 * BINS:
         return _bins(values)
@@ -130,13 +132,15 @@ def _levels(values: np.ndarray) -> list[np.ndarray]:
 
 
 def _bins(values: np.ndarray) -> list[np.ndarray]:
-    """Positions of the values in equally full bins, in order, none with too few flights to say anything."""
+    """Indices of the values in bins with equal numbers of values, in their order, at least LEAST_A_BIN in
+    each."""
     count = min(BINS, max(1, values.size // LEAST_A_BIN))
     return np.array_split(np.argsort(values, kind="stable"), count)
 
 
 def delay_distribution(flights: Flights, summary: Document) -> "Figure | None":
-    """Share of faults detected within a time, a curve a fault; what is missing at the top was missed."""
+    """Share of faults detected within a time, a curve for each fault. The distance of its end from 1 is the
+    share of missed faults."""
     if not flights.detected.any():
         return None
     figure, axes = _axes("", "detection delay (s)", "share of faults detected within the delay")
@@ -160,7 +164,7 @@ def delay_distribution(flights: Flights, summary: Document) -> "Figure | None":
 
 
 def confusion_matrix(flights: Flights, summary: Document) -> "Figure | None":
-    """Declared fault against diagnosis."""
+    """The numbers of flights by true fault and diagnosis."""
     confusion = summary["confusion"]
     counts, rows, columns = np.array(confusion["counts"]), confusion["faults"], confusion["diagnoses"]
     if not counts.size:
@@ -175,12 +179,13 @@ def confusion_matrix(flights: Flights, summary: Document) -> "Figure | None":
 
 
 Place = tuple[int, ...]
+"""Row and column of a cell."""
 
 
 def _shaded(
     title: str, shares: np.ndarray, text: Callable[[Place], str], columns: Sequence[str], rows: Sequence[str]
 ) -> "Figure":
-    """A heat map of shares with a text on each cell."""
+    """A heat map of shares (rows, columns) with a text on each cell."""
     figure, axes = _axes(title, size=(max(7.0, 2.6 + 1.15 * len(columns)), 1.7 + 0.55 * len(rows)))
     axes.grid(visible=False)
     labels = {at: (text(at), "white" if shares[at] > 0.6 else BLACK) for at in np.ndindex(*shares.shape)}
@@ -189,7 +194,7 @@ def _shaded(
 
 
 def sensitivity(flights: Flights, summary: Document) -> "Figure | None":
-    """How much of each outcome each varied key explains."""
+    """The share of each outcome that each varied key explains."""
     rankings = {name: ranking for name, ranking in summary["sensitivity"].items() if ranking}
     if not rankings:
         return None
@@ -202,7 +207,7 @@ def sensitivity(flights: Flights, summary: Document) -> "Figure | None":
 
 
 def search_history(flights: Flights, summary: Document) -> "Figure | None":
-    """The worst flight found so far, generation by generation."""
+    """The worst score so far after each generation of a search."""
     if "search" not in summary:
         return None
     search = summary["search"]

@@ -1,7 +1,8 @@
-"""The varied keys that explain an outcome, by ranks: whatever the shape of the dependence on a key.
+"""The varied keys that explain an outcome, by ranks, so that the shape of the dependence on a key does not
+matter.
 
-Explained is the share of the variance of the outcome's ranks that lies between groups of flights with similar
-values of the key, corrected for chance (Kruskal and Wallis' epsilon squared). Its p-value is that of random
+`explained` is the share of the variance of the ranks of the outcome between groups of flights with similar
+values of the key, corrected for chance (Kruskal and Wallis' epsilon squared). Its p-value is from random
 permutations.
 """
 
@@ -9,35 +10,37 @@ import numpy as np
 
 from beaver_ftc.documents.files import Document
 
-BINS = 8
-MOST_FLIGHTS = 4000  # of more, evenly spaced ones are taken: the ranking does not need them all
+BINS = 8  # groups of a key with more values
+MOST_FLIGHTS = 4000  # of more flights, about so many, evenly spaced, are enough for a ranking
 PERMUTATIONS = 199
 
 Ranking = list[Document]
 
 
 def rank(keys: dict[str, np.ndarray], outcome: np.ndarray) -> Ranking:
-    """The keys by how much of the outcome they explain, most first.
+    """The keys, ordered by the share of the outcome that they explain, the largest first.
 
-    keys: name -> values (n,), numbers or texts; outcome (n,), infinite allowed. Each entry: `key`,
-    `explained` (share of rank variance), `rank_correlation` (Spearman's, null for names), `p_value`.
+    keys: by name, values (n,), numbers or texts. outcome (n,), which may be infinite. An entry has `key`,
+    `explained` (share of the variance of ranks), `rank_correlation` (Spearman's, null for texts) and
+    `p_value`.
     """
     chosen = np.arange(0, outcome.size, max(1, -(-outcome.size // MOST_FLIGHTS)))
     ranks = ranks_of(outcome[chosen])
     if ranks.size < 2 * BINS or ranks.min() == ranks.max():
         return []
-    found = [_entry(key, values[chosen], ranks) for key, values in keys.items()]
-    return sorted(found, key=lambda entry: (-entry["explained"], entry["key"]))
+    entries = [_entry(key, values[chosen], ranks) for key, values in keys.items()]
+    return sorted(entries, key=lambda entry: (-entry["explained"], entry["key"]))
 
 
 def ranks_of(values: np.ndarray) -> np.ndarray:
-    """Ranks from 0, equal values sharing the mean of theirs."""
+    """Ranks from 0; equal values have the mean of their ranks."""
     from scipy.stats import rankdata
 
     return rankdata(values) - 1.0
 
 
 def _entry(key: str, values: np.ndarray, ranks: np.ndarray) -> Document:
+    """The entry of a key. p = (1 + permutations that explain as much) / (1 + permutations)."""
     groups = _groups(values)
     share = _explained(groups, ranks)
     generator = np.random.default_rng(0)
@@ -51,7 +54,7 @@ def _entry(key: str, values: np.ndarray, ranks: np.ndarray) -> Document:
 
 
 def _groups(values: np.ndarray) -> np.ndarray:
-    """Group number of each value: its level, or its bin where there are many levels."""
+    """The number of the group of each value: its level, or its bin if a number has many levels."""
     levels, group = np.unique(values, return_inverse=True)
     if values.dtype == object or levels.size <= BINS:
         return group
@@ -74,9 +77,10 @@ def _explained(groups: np.ndarray, ranks: np.ndarray) -> float:
 
 
 def _spearman(values: np.ndarray, ranks: np.ndarray) -> float | None:
+    """Rank correlation of a key with the outcome; None for texts, and for a constant key."""
     if values.dtype == object:
         return None
-    own = ranks_of(values)
-    if own.min() == own.max():
+    key_ranks = ranks_of(values)
+    if key_ranks.min() == key_ranks.max():
         return None
-    return round(float(np.corrcoef(own, ranks)[0, 1]), 6)
+    return round(float(np.corrcoef(key_ranks, ranks)[0, 1]), 6)

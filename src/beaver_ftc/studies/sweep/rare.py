@@ -1,7 +1,9 @@
-"""The probability that an expectation is not met, where plain flights would take a million to see it once.
+"""The probability that an expectation is not met, if this is so rare that a sweep would need a million
+flights.
 
-Subset simulation in the space of standard normals behind the varied keys. A step draws the flight's own seed
-again, so sensors and air are part of the chain.
+Subset simulation (subset_simulation.py) in the space of standard normals u (keys,). A varied key has the
+value of its distribution at Phi(u). Each step of a chain has a new seed of the flight, so that errors of
+sensors and air vary, too.
 """
 
 import hashlib
@@ -29,13 +31,14 @@ from beaver_ftc.studies.sweep.sampling import MAX_U, Assignment, values_at
 from beaver_ftc.studies.sweep.store import identity_of
 from beaver_ftc.studies.sweep.subset_simulation import MEMBERS, RUNS, Chains, Scores
 
-_BEFORE = -1e-12  # the score of what has just not happened
-NO_EVENT: Document = {"score": -math.inf}  # the row of a flight that cannot be flown
+_BEFORE = -1e-12  # largest score of a flight that meets the expectation
+NO_EVENT: Document = {"score": -math.inf}  # row of a flight that cannot be flown
 _NORMAL = NormalDist()
 
 
 def scored(sweep: Sweep) -> list[str]:
-    """The expectations of a sweep's base scenario whose failure has a score that rises towards it."""
+    """The expectations of the base scenario of a sweep that have a score: the first two of `score_of`, and
+    limits."""
     return [
         name
         for name, expected in expected_of(sweep.scenario({}).expect)
@@ -45,7 +48,7 @@ def scored(sweep: Sweep) -> list[str]:
 
 
 def check(sweep: Sweep, expectation: str) -> None:
-    """Raise BadInput unless the base scenario expects this, it can be scored, and something varies."""
+    """Raise BadInput unless the base scenario has this expectation with a score, and a key varies."""
     known = scored(sweep)
     if expectation not in known:
         allowed = suggestion(expectation, known) if known else ", allowed: a base scenario with `expect`"
@@ -55,7 +58,7 @@ def check(sweep: Sweep, expectation: str) -> None:
 
 
 def score_of(scenario: Scenario, expectation: str) -> float:
-    """Fly, and return a score that rises towards a failure of the expectation:
+    """Fly a scenario, and return a score that rises towards a failure of the expectation:
 
         expectation              score
         no_departure             max |signal| / limit - 1, of all signals and frames
@@ -63,31 +66,31 @@ def score_of(scenario: Scenario, expectation: str) -> float:
         a number                 |actual| / expected - 1, or |actual| if 0 is expected
         the same, not reached    time from the fault to the end of the flight, s: the later, the worse
 
-    It is cut at 0: below 0 if the expectation is met, otherwise 0 or more.
+    The score is then limited, below 0 if the expectation is met, else to 0 or more.
     """
     from beaver_ftc.loop.loop import fly
     from beaver_ftc.plant.sensing import DEPARTURE_LIMITS
 
     log = Columns(*DEPARTURE_LIMITS) if expectation == "no_departure" else None
     flight = fly(scenario, log)
-    amounts = measure(flight)
-    found = next(one for one in amounts.expectations if one.name == expectation)
+    metrics = measure(flight)
+    result = next(one for one in metrics.expectations if one.name == expectation)
     if log is not None:
         shares = (np.abs(log[name]).max() / limit for name, limit in DEPARTURE_LIMITS.items())
         score = float(max(shares)) - 1.0
     elif expectation == "no_false_alarm":
         score = flight.worst_residual_ratio - 1.0
-    elif found.actual is not None:
-        score = abs(found.actual) / found.expected - 1.0 if found.expected else abs(found.actual)
+    elif result.actual is not None:
+        score = abs(result.actual) / result.expected - 1.0 if result.expected else abs(result.actual)
     else:
-        score = max(0.0, flight.frames / scenario.rate_hz - (amounts.fault.at_s if amounts.fault else 0.0))
-    return min(score, _BEFORE) if found.passed else max(score, 0.0)
+        score = max(0.0, flight.frames / scenario.rate_hz - (metrics.fault.at_s if metrics.fault else 0.0))
+    return min(score, _BEFORE) if result.passed else max(score, 0.0)
 
 
 @dataclass(frozen=True)
 class Event:
-    """An expectation that a flight of a sweep does not meet. A point (keys,) has a standard normal for each
-    varied key."""
+    """The event that a flight of a sweep does not meet an expectation. A point (keys,) has a standard normal
+    number for each varied key."""
 
     sweep: Sweep
     expectation: str
@@ -98,11 +101,11 @@ class Event:
         return f"{self.sweep.name}-rare-{self.expectation.replace('.', '-')}"
 
     def values_at(self, point: Sequence[float]) -> Document:
-        """The varied keys at a point."""
+        """The values of the varied keys at a point."""
         return values_at(self.sweep.file.vary.items(), (min(_NORMAL.cdf(u), MAX_U) for u in point))
 
     def fly(self, case: tuple[int, Sequence[float]]) -> Document:
-        """The row of a flight: its number, which gives its seed, and its point."""
+        """The row of a flight. case: its number, which determines the seed, and its point."""
         run, point = case
         try:
             scenario = scenario_of(self.sweep, Assignment(run, self.values_at(point)))
@@ -111,12 +114,13 @@ class Event:
             return NO_EVENT
 
     def lost(self, case: object, why: str) -> Document:
-        """The row of a flight that ends its process each time."""
+        """The row of a flight that ends its process."""
         say_once(f"{self.name}: of a flight {why}; such flights count as no event")
         return NO_EVENT
 
     def rounds(self, fly_round: FlyRound, tell: Callable[[str], None]) -> Document:
-        """Fly the chains, and conclude. Raises SimulationFailed if none of the first round can be flown."""
+        """Fly the chains and return the document. Raises SimulationFailed if no flight of the first round can
+        be flown."""
         chains = Chains(len(self.sweep.keys), self.sweep.file.seed)
 
         def fly(points: np.ndarray) -> Scores:
@@ -132,24 +136,25 @@ class Event:
 
     def document(self, chains: Chains) -> Document:
         """The content of rare.json."""
-        found = chains.estimate()
-        plain = all_finite(found.pop("plain"))
+        estimate = chains.estimate()
+        plain = all_finite(estimate.pop("plain"))
         likeliest = None
         if chains.design is not None:
             distance, run, point = chains.design
             likeliest = {"run": run, "distance": distance, "values": self.values_at(point.tolist())}
         return {
             "sweep": self.sweep.name, "expectation": self.expectation, "confidence": CONFIDENCE,
-            **all_finite(found), "plain": plain,
+            **all_finite(estimate), "plain": plain,
             "failed": chains.failed, "likeliest": likeliest,
             "sweep_sha256": hashlib.sha256(repr(self.sweep.file).encode()).hexdigest(),
             "versions": dict(versions()),
         }  # fmt: skip
 
     def likeliest(self, document: Document) -> str | None:
-        """The content of flight.yaml: the scenario of the likeliest event that was flown."""
-        found = document["likeliest"]
-        return found and to_yaml(scenario_of(self.sweep, Assignment(found["run"], found["values"])))
+        """The content of flight.yaml: the scenario of the likeliest event that was flown, the one nearest to
+        the origin; None without an event."""
+        event = document["likeliest"]
+        return event and to_yaml(scenario_of(self.sweep, Assignment(event["run"], event["values"])))
 
 
 def rare_study(sweep: Sweep, expectation: str, tell: Callable[[str], None] = lambda _: None) -> Study:
@@ -167,7 +172,7 @@ def rare_study(sweep: Sweep, expectation: str, tell: Callable[[str], None] = lam
 
 
 def as_text(document: Document) -> str:
-    """For a terminal."""
+    """The document for a terminal."""
     plain = document["plain"]
     likeliest = document["likeliest"]
     p = document["probability"]
@@ -189,4 +194,5 @@ def as_text(document: Document) -> str:
 
 
 def _interval(found: Document) -> str:
+    """The interval of a probability."""
     return f"95 % {found['low']:.2g} to {found['high']:.2g}"

@@ -1,8 +1,9 @@
-"""The values that each flight of a sweep has: a function of the sweep and the flight's index alone.
+"""The values of the varied keys in each flight of a sweep. They depend on the sweep and the index of the
+flight alone.
 
-`linspace` keys, and all keys of a grid, are gone through in turn, the last key fastest. The others come from
-a point of the unit cube through the inverse of their distribution; the sampling is where those points come
-from.
+`linspace` keys, and all keys of a grid, take their values in turn, the last key fastest. The other keys are
+*drawn*: a point of the unit cube has a number u for each, and its value is the inverse of its distribution
+function at u. The sampling of the sweep (random, Latin hypercube, Sobol) determines the points.
 """
 
 import math
@@ -18,42 +19,42 @@ from beaver_ftc.documents.files import Document
 from beaver_ftc.scenario.sweeps import Sweep, SweepFile, Variation
 from beaver_ftc.studies.engine.draws import generator_of
 
-# The least unit number, and the greatest below 1: a normal distribution is infinite at 0 and 1
+# Limits of u: the inverse of a normal distribution is infinite at 0 and 1.
 MIN_U = 2.0**-53
 MAX_U = 1.0 - MIN_U
 
-# Random numbers of a sweep are distinguished by their spawn key. A key differs in its words or their number:
-#     (index,)                    the seed of a flight
-#     (index, OF_VALUES)          the values of a flight
-#     (0, OF_DESIGN)              the points of a Latin hypercube, or the scrambling of Sobol points
-#     (generation, 0, OF_SEARCH)  a generation of a search
-#     (0, 0, OF_RARE)             subset simulation
+# Random numbers of a sweep for different purposes have different spawn keys, which differ in a word or in
+# their length:     (index,)                    the seed of a flight     (index, OF_VALUES)          the
+# values of a flight     (0, OF_DESIGN)              the points of a Latin hypercube, or the scrambling of
+# Sobol points     (generation, 0, OF_SEARCH)  a generation of a search     (0, 0, OF_RARE)             subset
+# simulation
 OF_VALUES, OF_DESIGN = 1, 2
 OF_SEARCH, OF_RARE = 2, 3
 
 
 class Assignment(NamedTuple):
-    """One flight to be flown: its index and the value of each varied key."""
+    """One flight: its index and the value of each varied key."""
 
     run: int
     values: Document
 
 
 class Round(NamedTuple):
-    """Batches to be flown in any order: (number, runs) of each, and the function from runs to assignments."""
+    """Batches that may be flown in any order. batches: (number, runs) of each. cases_of: from runs to
+    assignments."""
 
     batches: Sequence[tuple[int, range]]
     cases_of: Callable[[Sequence[int]], Sequence[Assignment]]
 
 
 def flight_seed(sweep_seed: int, index: int) -> int:
-    """The seed of one flight, 63 bits, from the sweep's seed and the flight's index."""
+    """The seed of one flight, 63 bits, from the seed of the sweep and the index of the flight."""
     words = np.random.SeedSequence(sweep_seed, spawn_key=(index,)).generate_state(1, np.uint64)
     return int(words[0] >> np.uint64(1))
 
 
 def value_at(how: Variation, u: float) -> Any:
-    """The value a variation has at a number u in [0, 1): the inverse of its distribution function."""
+    """The value of a variation at u in [0, 1): the inverse of its distribution function."""
     if how.count is not None:
         return counted_value(how, min(int(u * how.count), how.count - 1))
     first, second = getattr(how, how.kind)
@@ -65,7 +66,7 @@ def value_at(how: Variation, u: float) -> Any:
 
 
 def _normal(distribution: NormalDist, within: tuple[float, float] | None, u: float) -> float:
-    """The inverse of a normal distribution F, cut to an interval [low, high] by drawing from the part inside:
+    """The inverse at u of a normal distribution F that is truncated to an interval [low, high]:
 
     F^-1(F(low) + u (F(high) - F(low)))
     """
@@ -81,7 +82,7 @@ def values_at(vary: Iterable[tuple[str, Variation]], point: Iterable[float]) -> 
 
 
 def counted_value(how: Variation, position: int) -> Any:
-    """The value at a position of a `linspace` or a `choice`."""
+    """The value at a position of a `linspace` or `choice`; the last value of a `linspace` is exact."""
     values = getattr(how, how.kind)
     if how.kind == "choice":
         return values[position]
@@ -90,7 +91,7 @@ def counted_value(how: Variation, position: int) -> Any:
 
 
 class Plan:
-    """The values of every flight of a sweep."""
+    """The values of each flight of a sweep. _in_turn, _drawn: the two kinds of keys."""
 
     def __init__(self, sweep: Sweep) -> None:
         self._file: SweepFile = sweep.file
@@ -99,7 +100,7 @@ class Plan:
         self._drawn = [(key, how) for key, how in vary if not _is_in_turn(sweep.file, how)]
 
     def assignments(self, indices: Sequence[int]) -> list[Assignment]:
-        """The values of these flights; the indices are in order."""
+        """The values of these flights. indices: increasing."""
         points = self._points(np.array(indices))
         return [
             Assignment(index, self._values(index, point))
@@ -121,6 +122,7 @@ class Plan:
         )
 
     def _values(self, index: int, point: np.ndarray) -> Document:
+        """The values of one flight. point: u of the drawn keys."""
         values = values_at(self._drawn, point)
         for key, how in reversed(self._in_turn):
             index, position = divmod(index, how.count or 1)
@@ -129,15 +131,16 @@ class Plan:
 
 
 def _is_in_turn(file: SweepFile, how: Variation) -> bool:
+    """Whether a key takes its values in turn."""
     return file.sampling == "grid" or how.linspace is not None
 
 
-@lru_cache(maxsize=1)  # a sweep needs it for every batch
+@lru_cache(maxsize=1)  # every batch of a sweep uses it
 def _latin_hypercube(seed: int, dimensions: int, flights: int) -> np.ndarray:
-    """Points (flights, dimensions): one in each of `flights` equal slices of every key [McKay, Beckman,
-    Conover 1979].
+    """Points (flights, dimensions): in each dimension, one in each of `flights` equal intervals [McKay,
+    Beckman, Conover 1979].
 
-    Not scipy's `qmc.LatinHypercube`: it draws other numbers, and a seed gives the same flights for good.
+    `qmc.LatinHypercube` of scipy draws other numbers, and the flights of a seed must not change.
     """
     generator = generator_of(seed, 0, OF_DESIGN)
     columns = [
@@ -147,12 +150,15 @@ def _latin_hypercube(seed: int, dimensions: int, flights: int) -> np.ndarray:
 
 
 def _sobol(seed: int, dimensions: int, indices: np.ndarray) -> np.ndarray:
-    """Scrambled Sobol points [Owen 1995] at these increasing indices."""
+    """Scrambled Sobol points [Owen 1995] at increasing indices, (indices, dimensions). Each stretch of
+    consecutive indices is drawn at once."""
     from scipy.stats import qmc
 
     engine = qmc.Sobol(dimensions, scramble=True, seed=generator_of(seed, 0, OF_DESIGN))
     points = []
-    with warnings.catch_warnings():  # that a sample is no power of 2: the sweep as a whole may be
+    with (
+        warnings.catch_warnings()
+    ):  # scipy warns of a number that is no power of 2; the whole sweep may have one
         warnings.simplefilter("ignore", UserWarning)
         for stretch in np.split(indices, np.flatnonzero(np.diff(indices) > 1) + 1):
             engine.reset()

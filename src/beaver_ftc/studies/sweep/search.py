@@ -1,9 +1,9 @@
-"""Worst-case search: instead of drawing flights, look for the admissible one with the worst outcome.
+"""Worst-case search: find the flight of a sweep with the worst outcome, in place of random flights.
 
-Differential evolution [Storn1997], current-to-best/1/bin, on the unit cube of the varied keys, a
-generation a batch. Each generation follows from the seed and from the outcomes before it alone: a search that
-is interrupted goes on exactly as it would have, and any number of workers finds the same flight. Scipy's
-`differential_evolution` calls the objective itself and keeps no state: it cannot go on.
+Differential evolution [Storn1997], current-to-best/1/bin, on the unit cube of the varied keys. A generation
+is a batch. It depends only on the seed and on the outcomes of earlier generations. An interrupted search
+therefore continues exactly as without the interruption, and any number of workers finds the same flight.
+`differential_evolution` of scipy calls the objective itself and keeps no state, so that it cannot be resumed.
 """
 
 import math
@@ -27,7 +27,7 @@ from beaver_ftc.studies.sweep.sampling import MAX_U, OF_SEARCH, Assignment, Roun
 from beaver_ftc.studies.sweep.store import Store
 
 WEIGHT = 0.7  # [Storn1997] recommend 0.4 to 1
-CROSSOVER = 0.9  # and, for few dependent keys, 0.9
+CROSSOVER = 0.9  # [Storn1997] recommend 0.9 for few dependent keys
 DEPARTED_DEG_S = 1e6  # above all tracking errors: the score of a flight that loses the aircraft at its start
 
 Row = Mapping[str, Any]
@@ -35,7 +35,8 @@ Row = Mapping[str, Any]
 
 
 def delay_score(row: Row) -> float:
-    """Detection delay, s; of a missed fault, the time it stayed undetected."""
+    """Detection delay, s; for a missed fault, the time until the end. Minus infinity without a fault, or
+    after a false alarm."""
     at_s = row["fault.at_s"]
     if row["detection.delay_s"] is not None:
         return row["detection.delay_s"]
@@ -45,7 +46,8 @@ def delay_score(row: Row) -> float:
 
 
 def tracking_score(row: Row) -> float:
-    """Largest RMS tracking error after the fault, deg/s; losing the aircraft is worse, the earlier."""
+    """Largest RMS tracking error after the fault, deg/s. A loss of the aircraft has a larger score, the
+    earlier it is."""
     if row["status"] == DEPARTED:
         return DEPARTED_DEG_S - row["flown_s"]
     after = [row[f"tracking.post_fault_rms_deg_s.{axis}"] for axis in AXES]
@@ -65,12 +67,12 @@ def score(objective: str, row: Row) -> float:
 
 
 def members(keys: int) -> int:
-    """Flights a generation, of so many varied keys."""
+    """The number of flights in a generation, for so many varied keys."""
     return min(64, max(16, 4 * keys))
 
 
 class Evolution:
-    """The population: points of the unit cube (members, keys) and their scores (members,)."""
+    """The population: points of the unit cube (members, keys), and their scores (members,)."""
 
     def __init__(self, seed: int, keys: int) -> None:
         self.members = members(keys)
@@ -81,17 +83,19 @@ class Evolution:
         self._scores = np.empty(0)
 
     def trials(self) -> np.ndarray:
-        """The points to fly in this generation, (members, keys)."""
+        """The points of this generation, (members, keys); of the first, a Latin hypercube."""
         generator = generator_of(self._seed, self.generation, 0, OF_SEARCH)
         if self.generation == 0:
-            slices = [generator.permutation(self.members) for _ in range(self._keys)]
-            return (np.column_stack(slices) + generator.random((self.members, self._keys))) / self.members
+            intervals = [generator.permutation(self.members) for _ in range(self._keys)]
+            return (np.column_stack(intervals) + generator.random((self.members, self._keys))) / self.members
         return self._mutants(generator)
 
     def _mutants(self, generator: np.random.Generator) -> np.ndarray:
-        """x + F (best - x) + F (x_a - x_b), a part of its keys left as they were, reflected into the cube.
+        """x + F (best - x) + F (x_a - x_b), reflected into the cube.
 
-        x, best: points, and that of the largest score; a, b: two permutations of the points; F: WEIGHT.
+        x (members, keys): the points. best: the point with the largest score. a, b: two permutations of the
+        points. F: WEIGHT. A key is changed with the probability CROSSOVER, and at least one key of each point
+        is.
         """
         x = self._points
         n = self.members
@@ -103,7 +107,8 @@ class Evolution:
         return np.minimum(1.0 - np.abs(1.0 - inside % 2.0), MAX_U)
 
     def select(self, trials: np.ndarray, scores: np.ndarray) -> None:
-        """Let each trial that is no worse take its parent's place; a last generation may be cut short."""
+        """Replace each point by its trial if this has at least the same score. The last generation may have
+        fewer trials."""
         if self.generation == 0:
             self._points = trials
             self._scores = scores.copy()
@@ -115,7 +120,7 @@ class Evolution:
 
 
 def generations(sweep: Sweep, objective: str, store: Store) -> Iterator[Round]:
-    """One generation after the other; the next one once this one has landed in the store."""
+    """The rounds of the generations. The next one is made when the one before has landed in the store."""
     if not sweep.keys:
         raise BadInput(f"{sweep.name}: vary: nothing varies, allowed in a search: at least one key")
     evolution = Evolution(sweep.file.seed, len(sweep.keys))
@@ -130,11 +135,12 @@ def generations(sweep: Sweep, objective: str, store: Store) -> Iterator[Round]:
 
 
 def _flights_of(values: Mapping[int, Document], runs: Sequence[int]) -> list[Assignment]:
+    """The assignments of these runs. values: by run."""
     return [Assignment(run, values[run]) for run in runs]
 
 
 def found(objective: str, results: Path, sweep: Sweep) -> Document:
-    """The result of the search: the worst flight, and the worst score after each generation."""
+    """The result of the search: the worst flight, and the worst score so far after each generation."""
     from pyarrow.parquet import read_table
 
     rows = read_table(results).to_pylist()

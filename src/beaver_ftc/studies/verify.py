@@ -1,4 +1,11 @@
-"""The promises of the theory, counted on random flights inside everything the diagnosis declares."""
+"""The guarantees of the theory, tested in random flights within all that the diagnosis declares.
+
+    G1    no false alarm
+    G2    the true fault is not excluded, and no wrong fault is named
+    G3    the alarm comes at most a frame later than guaranteed
+
+A healthy flight tests G1. A faulty flight is flown with each scheme, and tests all three.
+"""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -24,12 +31,12 @@ from beaver_ftc.studies.present.page import Makers
 from beaver_ftc.studies.present.tables import finite, number_or_never
 from beaver_ftc.studies.random_flights import HEALTHY_S, KINDS, Draw
 
-ONE_SIDED = 2.0 * CONFIDENCE - 1.0  # the two-sided confidence whose upper limit has CONFIDENCE
+ONE_SIDED = 2.0 * CONFIDENCE - 1.0  # confidence of a two-sided interval whose upper limit has CONFIDENCE
 PUBLISHED, SHARPENED = "published", "sharpened"
-_CONSTANT_ONLY = "constant"  # for faults that are: one that grows is outside what this step declares
+_CONSTANT_ONLY = "constant"  # this step declares faults of constant size, and is not flown with growing ones
 _OFF = {"pole_bank": False, "memory": False, "shared_effectiveness": False}
 SCHEMES: dict[str, Document] = {PUBLISHED: {"thresholds": "published"}, SHARPENED: {}}
-# From the published scheme to the default, and on to what takes a declaration, one step after the other.
+# The steps from the published scheme to the default one; the last step needs a further declaration.
 STEPS: dict[str, Document] = {
     PUBLISHED: SCHEMES[PUBLISHED],
     "interval": {"sharpen": _OFF},
@@ -39,23 +46,23 @@ STEPS: dict[str, Document] = {
     _CONSTANT_ONLY: {"fault_profile": "abrupt"},
 }
 NAME = "verification"
-TOGETHER = 50  # flights that are kept together
+TOGETHER = 50  # flights in a file of the study
 
 Row = Document
 Schemes = dict[str, Document]
 
 
 def fly_draw(draw: Draw, schemes: Schemes) -> Row:
-    """The row of a flight. A fault is flown once with each scheme, in all else the same flight."""
+    """The row of a flight. A flight with a fault is flown once with each scheme."""
     try:
         return _faulty(draw, schemes) if draw.kind == "faulty" else _healthy(draw)
-    except BadInput as error:  # a draw without a trim: said, not counted
+    except BadInput as error:  # a draw without a trim is reported, but not counted
         return {"index": draw.index, "skipped": str(error)}
 
 
 def _healthy(draw: Draw) -> Row:
-    """The row of a flight without a fault: one for both schemes, as the first filter of the sharpened scheme
-    is the published one."""
+    """The row of a flight without a fault. One flight tests both schemes, since the first filter of the
+    sharpened scheme is that of the published one. closest: largest |residual| / threshold of both."""
     flight = fly(draw.scenario())
     return {
         "index": draw.index,
@@ -68,6 +75,8 @@ def _healthy(draw: Draw) -> Row:
 
 
 def _faulty(draw: Draw, schemes: Schemes) -> Row:
+    """The row of a flight with a fault: an outcome for each scheme, then the fault. A growing fault has the
+    outcome of the sharpened scheme under _CONSTANT_ONLY, so that all steps count the same faults."""
     row: Row = {"index": draw.index}
     for scheme, fdi in schemes.items():
         scenario = draw.scenario(fdi)
@@ -78,13 +87,14 @@ def _faulty(draw: Draw, schemes: Schemes) -> Row:
 
 
 def judge(flight: Landing) -> Row:
-    """The outcome of each promise in a flight with one fault; delays in s from the first frame with it."""
+    """The outcome of a flight with one fault. Delays are in s from the first frame with the fault; late,
+    excluded, wrong: whether a guarantee is violated."""
     truth = Truth.of(flight.scenario)
     guaranteed_s = flight.guaranteed_delay_s
     alarm_s = flight.detection_time_s
     delay_s = truth.onset.delay_s(alarm_s)
-    left = (*flight.candidates, flight.isolated)
-    meant = truth.faults_named_rightly_by(flight.isolated, flight.isolation_time_s)
+    not_excluded = (*flight.candidates, flight.isolated)
+    rightly_named = truth.faults_named_rightly_by(flight.isolated, flight.isolation_time_s)
     return {
         "delay_s": delay_s,
         "false_alarm": alarm_s is not None and truth.onset.is_false(alarm_s),
@@ -92,14 +102,16 @@ def judge(flight: Landing) -> Row:
         "late": guaranteed_s is not None
         and (delay_s is None or is_late(delay_s, guaranteed_s, 1.0 / flight.scenario.rate_hz)),
         "isolation_s": truth.onset.delay_s(flight.isolation_time_s),
-        "excluded": alarm_s is not None and not any(truth.faults[0].is_named_by(name) for name in left),
-        "wrong": flight.isolated is not None and not meant,
-        "estimate_error": _estimate_error(flight) if meant else None,
+        "excluded": alarm_s is not None
+        and not any(truth.faults[0].is_named_by(name) for name in not_excluded),
+        "wrong": flight.isolated is not None and not rightly_named,
+        "estimate_error": _estimate_error(flight) if rightly_named else None,
     }
 
 
 def _estimate_error(flight: Landing) -> float | None:
-    """Distance of the estimated parameter from the true one at the end of the flight."""
+    """|theta_estimated - theta| at the end of the flight, theta = -magnitude times the share to which the
+    loss has grown; None without an estimate, and for another fault."""
     fault = flight.scenario.faults[0]
     if flight.estimate is None or not isinstance(fault, LossOfEffectiveness):
         return None
@@ -108,29 +120,30 @@ def _estimate_error(flight: Landing) -> float | None:
 
 
 class Promise(NamedTuple):
-    """The guarantee that a promise follows from, as docs/explanation numbers them; the key of the row of a
-    scheme that is true if the promise is broken."""
+    """A kind of violation. guarantee: G1, G2 or G3. broken: key of an outcome that is true if it is
+    violated."""
 
     guarantee: str
     broken: str
 
 
-PROMISES = {  # by what is counted
+PROMISES = {  # by name of the count
     "false_alarms": Promise("G1", "false_alarm"),
     "true_fault_exclusions": Promise("G2", "excluded"),
     "wrong_isolations": Promise("G2", "wrong"),
     "late_detections": Promise("G3", "late"),
 }
-_SPREADS = {
+_SPREADS = {  # label and key of the numbers with quantiles
     "detection delay, s": "delay_s", "isolation delay, s": "isolation_delay_s",
     "delay / guaranteed": "delay_over_guaranteed", "error of the estimate": "estimate_error",
 }  # fmt: skip
 
 
 def summarise(rows: dict[str, list[Row]]) -> Document:
-    """The document of all flights; `kept`: whether every promise of the sharpened scheme, the default, held.
+    """The document of all flights. rows: by kind. kept: whether the sharpened scheme, the default, kept all
+    guarantees.
 
-    The published one is there for comparison: its isolation threshold presumes a constant parameter.
+    The published scheme is flown for comparison: its isolation threshold assumes a constant fault.
     """
     healthy, faulty = ([row for row in rows[kind] if "skipped" not in row] for kind in KINDS)
     schemes = [scheme for scheme in STEPS if faulty and scheme in faulty[0]]
@@ -149,6 +162,8 @@ def summarise(rows: dict[str, list[Row]]) -> Document:
 
 
 def _healthy_document(rows: Sequence[Row]) -> Document:
+    """False alarms and flight hours of the healthy flights. `closest` of a row has a value for each of
+    SCHEMES, in their order."""
     hours = sum(row["watched_s"] for row in rows) / 3600.0
     alarms = sum(row["alarm"] for row in rows)
     closest = map(max, zip(*(row["closest"] for row in rows), strict=True))
@@ -165,6 +180,7 @@ def _healthy_document(rows: Sequence[Row]) -> Document:
 
 
 def _scheme(rows: Sequence[Row]) -> Document:
+    """Violations, detections, delays and errors of one scheme. rows: its outcomes."""
     n = len(rows)
     counts = {promise: sum(row[of.broken] for row in rows) for promise, of in PROMISES.items()}
     certain = [row for row in rows if row["guaranteed_s"] is not None]
@@ -187,9 +203,10 @@ def _scheme(rows: Sequence[Row]) -> Document:
 
 
 def _quantiles(values: Iterable[float | None]) -> dict[str, float | None]:
-    """Median and 90th percentile, what never came counting as infinitely late; None stands for infinite."""
-    found = list(values)
-    return {name: finite(share_within(found, share)) for name, share in (("median", 0.5), ("p90", 0.9))}
+    """Median and 90 % quantile. A value None is an event that never came, and infinite; an infinite quantile
+    is None."""
+    all_values = list(values)
+    return {name: finite(share_within(all_values, share)) for name, share in (("median", 0.5), ("p90", 0.9))}
 
 
 def _shorter(schemes: Document) -> float | None:
@@ -204,28 +221,32 @@ def summary_text(document: Document) -> str:
     if document["skipped"]:
         lines.append(f"{document['skipped']} flights drawn could not be trimmed and are not counted")
     flown = bool(document["healthy"]["flights"]), bool(document["schemes"])
-    held = {(True, True): "G1 to G3 hold", (True, False): "G1 holds", (False, True): "G2 and G3 hold"}.get(
-        flown, "Nothing is tested"
-    )
-    lines.append(f"{held} for the sharpened scheme" if document["kept"] else "A GUARANTEE IS VIOLATED")
+    sentence = {
+        (True, True): "G1 to G3 hold",
+        (True, False): "G1 holds",
+        (False, True): "G2 and G3 hold",
+    }.get(flown, "Nothing is tested")
+    lines.append(f"{sentence} for the sharpened scheme" if document["kept"] else "A GUARANTEE IS VIOLATED")
     return "\n".join(lines)
 
 
 def _healthy_lines(healthy: Document) -> list[str]:
+    """The lines about healthy flights."""
     if not healthy["flights"]:
         return []
     closest = ", ".join(f"{name} {share:.6f}" for name, share in healthy["closest_approach"].items())
-    says = (
+    forms = (
         "{hours:.2f} flight hours without a fault: {flights} flights, {hours_outside_envelope:.2f} h outside "
         "the validated envelope, {departures} departures",
         "  G1 false alarms                 {false_alarms} (at most {false_alarms_per_hour_upper_95:.2g} per "
         "hour, 95 % confidence)",
     )
-    lines = [line.format(**healthy) for line in says]
+    lines = [line.format(**healthy) for line in forms]
     return [*lines, f"  closest approach to threshold   {closest}", ""]
 
 
 def _fault_lines(document: Document) -> list[str]:
+    """The lines about faulty flights, a column for each scheme."""
     schemes = document["schemes"]
     if not schemes:
         return []
@@ -243,6 +264,7 @@ def _fault_lines(document: Document) -> list[str]:
 
 
 def _line(label: str, cells: Iterable[str]) -> str:
+    """A label and its cells in columns."""
     return f"  {label:<32}" + "".join(f"{cell:>18}" for cell in cells)
 
 
@@ -283,24 +305,24 @@ class Verify(StudyCommand):
 
     def run(self, reporter: Reporter) -> Document:
         """Fly all hours and all faults."""
-        wanted = {"healthy": ceil(self.hours * 3600.0 / HEALTHY_S), "faulty": self.faults}
-        draws = [Draw(self.seed, kind, i) for kind in KINDS for i in range(wanted[kind])]
+        n_flights = {"healthy": ceil(self.hours * 3600.0 / HEALTHY_S), "faulty": self.faults}
+        draws = [Draw(self.seed, kind, i) for kind in KINDS for i in range(n_flights[kind])]
         if not draws:
             raise BadInput("verify: nothing to fly, allowed: --hours or --faults above 0")
         schemes = STEPS if self.steps else SCHEMES
 
         def document(rows: list[Row]) -> Document:
-            healthy = wanted["healthy"]
+            healthy = n_flights["healthy"]
             return {"seed": self.seed, **summarise({"healthy": rows[:healthy], "faulty": rows[healthy:]})}
 
-        flying = partial(fly_draw, schemes=schemes)
-        study = Study(NAME, draws, flying, document, FILES, follows_from=schemes, part=TOGETHER)
+        fly_one = partial(fly_draw, schemes=schemes)
+        study = Study(NAME, draws, fly_one, document, FILES, follows_from=schemes, part=TOGETHER)
         return run_study(study, self.out, self.processes, reporter.progress)
 
     def as_text(self, document: Document, colour: bool) -> str:
-        """The counts, and whether every promise was kept."""
+        """The counts, and whether the guarantees hold."""
         return summary_text(document)
 
     def passed(self, document: Document) -> bool:
-        """Whether every promise of the default scheme was kept."""
+        """Whether the default scheme kept all guarantees."""
         return bool(document["kept"])

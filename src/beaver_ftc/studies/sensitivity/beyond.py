@@ -43,7 +43,7 @@ class Flight(NamedTuple):
 
 
 def cases_of(errors: Errors, flights: int) -> list[Flight]:
-    """All flights. All errors have the same flights with the factor 1, which are flown once, under
+    """All flights. Declared errors share the flights with the factor 1, which are flown once, under
     TOGETHER."""
     declared = {error.name: error.declared for error in errors} | {TOGETHER: True}
     rows = [(TOGETHER, FACTORS[0])]

@@ -44,8 +44,8 @@ SURFACES = ("aileron", "elevator", "rudder")  # the draws of a cell take these i
 LOSSES = {"loss 20 %": 0.2, "loss 40 %": 0.4, "loss 80 %": 0.8}
 UNANTICIPATED = "unanticipated"
 FAULTS = (*LOSSES, UNANTICIPATED)
-# Bandwidth of the rate loops: Kp of the published law, 1/s, and the gain margin, dB, with which the default
-# law has the same bandwidth.
+# Bandwidth of the rate loops: Kp of the published law, 1/s, and the gain margin, dB, from which the default
+# law computes its bandwidth.
 BANDWIDTHS: Mapping[str, tuple[float, float]] = {
     "low": (2.3, 20.0),
     "medium": (6.6, 12.0),

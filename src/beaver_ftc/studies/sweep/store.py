@@ -1,4 +1,11 @@
-"""The folder of a sweep: parts while it is flown, `results.parquet` at the end, and what is drawn from it."""
+"""The folder of a sweep.
+
+sweep.json         the identity: a folder with it belongs to a sweep
+parts/             a table for each batch, as long as the sweep is not compacted
+results.parquet    the table of all flights, compacted from the parts
+summary.json       the summary: a folder with it has a finished sweep
+figures/, flights/, report.html    drawn from the results, and kept flights
+"""
 
 import contextlib
 import json
@@ -26,9 +33,10 @@ OWN_FILES = frozenset({
     files.LOCK, "sweep.json", "results.parquet", "summary.json", "report.html", *FOLDERS,
 })  # fmt: skip
 ROWS_PER_GROUP = 8192
-# A sweep is read whole, so that statistics of row groups help nobody; most columns are numbers.
+# The whole table is read, so that statistics of row groups are of no use. Most columns are numbers: no
+# dictionaries.
 _WRITE_OPTIONS: dict[str, Any] = {"compression": "snappy", "write_statistics": False, "use_dictionary": False}
-# Words, verdicts, and what the resolved base says better: no flight follows from them.
+# Keys of a sweep file that change no flight. `base` and `set` are replaced by the resolved base.
 _NOT_FLOWN = ("description", "expect", "base", "set")
 
 
@@ -42,7 +50,7 @@ def identity_of(sweep: Sweep, search: str | None = None) -> Document:
 
 
 class RowsAsParquet:
-    """A batch of a sweep as a table."""
+    """The codec of a batch of a sweep, a table in a parquet file."""
 
     suffix = ".parquet"
 
@@ -60,12 +68,12 @@ class RowsAsParquet:
 
     def if_of(self, runs: Sequence[int], table: "pa.Table") -> "pa.Table | None":
         """The table if it has these runs and the columns of the sweep."""
-        same = table.schema.equals(self.schema) and table.column("run").to_pylist() == list(runs)
-        return table if same else None
+        fits = table.schema.equals(self.schema) and table.column("run").to_pylist() == list(runs)
+        return table if fits else None
 
 
 class Store:
-    """The folder of one sweep, locked; a context manager."""
+    """The folder of one sweep, which is locked within the context."""
 
     def __init__(self, folder: Path, sweep: Sweep) -> None:
         self._codec = RowsAsParquet(sweep)
@@ -87,23 +95,29 @@ class Store:
         self._open.close()
 
     def begin(self, mine: Document, resume: bool) -> None:
-        """Make the folder this sweep's. Raises BadInput where flights in it would be lost or mixed.
+        """Prepare the folder for this sweep. mine: its identity.
 
-        A finished sweep is replaced unless it is to be resumed; an unfinished one never is.
+            in the folder                          without --resume     with --resume
+            nothing                                begin                begin
+            flights, but no readable sweep.json    BadInput             set aside, begin
+            an unfinished sweep                    BadInput             continue if the identity is the same
+            a finished sweep                       remove, begin        continue if the identity is the same
+
+        Raises BadInput, too, if the identity differs.
         """
-        there = identity.known(self._manifest, "sweep")
+        earlier = identity.known(self._manifest, "sweep")
         flown = self.results.exists() or bool(self.parts)
-        if there is None and (flown or self._manifest.exists()):
+        if earlier is None and (flown or self._manifest.exists()):
             self._refuse_or_set_aside(resume)
-        elif there is not None and resume:
-            identity.refuse_other(mine, there, self.folder)
+        elif earlier is not None and resume:
+            identity.refuse_other(mine, earlier, self.folder)
         elif flown and not (self.folder / "summary.json").exists():
             raise BadInput(
                 f"{self.folder}: holds an unfinished sweep, allowed: --resume to go on with it, "
                 "another --out, or to remove it first"
             )
         with clear_disk_errors(self.folder):
-            if there is None or not resume:
+            if earlier is None or not resume:
                 self._clear()
             self.parts.folder.mkdir(exist_ok=True)
             files.write_whole(self._manifest, json.dumps(mine, indent=2).encode() + b"\n")
@@ -111,7 +125,7 @@ class Store:
             files.remove_leftovers(self.folder)
 
     def landed(self, batch: Number, runs: Sequence[int]) -> "pa.Table | None":
-        """The table of a batch if it has landed whole: of its part, or else of `results.parquet`."""
+        """The table of a batch from its part, or else from `results.parquet`; None if it has not landed."""
         table = self.parts.landed(batch, runs)
         if table is None and self._compacted is not None:
             return self._codec.if_of(runs, self._compacted.slice(runs[0], len(runs)))
@@ -119,14 +133,16 @@ class Store:
 
     @cached_property
     def _compacted(self) -> "pa.Table | None":
-        """`results.parquet` of an earlier start; one that cannot be read is set aside."""
+        """The table in `results.parquet`, or None. A file that cannot be read is set aside."""
         from pyarrow import ArrowException
         from pyarrow.parquet import read_table
 
         if not self.results.exists():
             return None
         try:
-            with self.results.open("rb") as file:  # a folder Arrow would read as a table of many files
+            with self.results.open(
+                "rb"
+            ) as file:  # opened here: Arrow would read a folder as a table of many files
                 return read_table(file)
         except (ArrowException, OSError, ValueError):
             files.set_aside(self.results, files.UNREADABLE)
@@ -144,7 +160,7 @@ class Store:
             return False
 
     def compact(self, batches: Iterable["pa.Table"]) -> None:
-        """Make `results.parquet` of all batches, in order; the parts are still there."""
+        """Write `results.parquet` from all batches, in order. The parts stay."""
         with clear_disk_errors(self.folder, KEPT):
             files.replace_whole(self.results, lambda file: write_tables(file, batches, self.schema))
 
@@ -154,7 +170,8 @@ class Store:
             files.write_whole(self.folder / name, text.encode("utf-8"))
 
     def _refuse_or_set_aside(self, resume: bool) -> None:
-        """Raise BadInput, since nothing says whose flights these are; if the sweep is resumed, rename all."""
+        """Raise BadInput, since the flights may belong to another sweep. If the sweep is resumed, set all
+        files aside."""
         what = files.UNREADABLE if self._manifest.exists() else "is not there"
         if not resume:
             raise BadInput(
@@ -167,9 +184,10 @@ class Store:
                     files.set_aside(self.folder / name, f"{self._manifest.name} {what}")
 
     def _clear(self) -> None:
-        """Remove what an earlier sweep left; its identity last, by which it is known for ours.
+        """Remove the files of an earlier sweep; `sweep.json` last, since it marks the folder as that of a
+        sweep.
 
-        What a user has put into its folders stays: SimulationFailed for a kept flight that is no longer ours.
+        Other files of the user stay. Raises SimulationFailed if the folder of a kept flight has such a file.
         """
         from beaver_ftc.studies.sweep.pictures import FIGURES
 
@@ -180,7 +198,7 @@ class Store:
                 shutil.rmtree(folder)
         for name in FIGURES:
             (self.folder / "figures" / f"{name}.png").unlink(missing_ok=True)
-        with contextlib.suppress(OSError):  # not empty: somebody else's
+        with contextlib.suppress(OSError):  # a folder with other files stays
             (self.folder / "figures").rmdir()
         for name in sorted(OWN_FILES - FOLDERS - {files.LOCK, self._manifest.name}):
             (self.folder / name).unlink(missing_ok=True)
@@ -188,9 +206,9 @@ class Store:
 
 
 def write_tables(file: IO[bytes], tables: Iterable["pa.Table"], schema: "pa.Schema") -> None:
-    """Write tables one after the other into a parquet file, in row groups worth reading.
+    """Write tables into a parquet file, in row groups of at least ROWS_PER_GROUP rows.
 
-    They are joined into these as they come: the memory they take is bounded.
+    Tables are joined as they come, so that only those of one row group are in memory.
     """
     import pyarrow as pa
     from pyarrow.parquet import ParquetWriter
@@ -207,19 +225,22 @@ def write_tables(file: IO[bytes], tables: Iterable["pa.Table"], schema: "pa.Sche
 
 
 def _is_leftover(name: str) -> bool:
-    """Whether a file of this name was half written, or set aside by us."""
-    return name.endswith(".partial") or any(name.startswith(f"{own}{files.DAMAGED}") for own in OWN_FILES)
+    """Whether a file with this name is incomplete, or was set aside."""
+    return name.endswith(".partial") or any(
+        name.startswith(f"{name_of_file}{files.DAMAGED}") for name_of_file in OWN_FILES
+    )
 
 
 def _refuse_folder(folder: Path) -> None:
-    """Raise SimulationFailed if the folder holds anything that no sweep wrote: it might be lost."""
+    """Raise SimulationFailed if the folder has a file that no sweep wrote, or no mark of a sweep: files could
+    be lost."""
     if not folder.exists():
         return
     if not folder.is_dir():
         raise SimulationFailed(f"cannot write {folder}: it exists and is not a folder")
     names = sorted(entry.name for entry in folder.iterdir())
     foreign = [name for name in names if name not in OWN_FILES and not _is_leftover(name)]
-    marks = {"sweep.json", files.LOCK, "flights"}  # flights are kept before there is a part or a result
+    marks = {"sweep.json", files.LOCK, "flights"}  # kept flights exist before the first part
     is_marked = any(name in marks or _is_leftover(name) for name in names)
     if foreign or (names and not is_marked):
         why = f"{foreign[0]}, which is no part of a sweep" if foreign else "no sweep.json, but other files"

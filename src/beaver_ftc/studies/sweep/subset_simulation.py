@@ -1,9 +1,13 @@
-"""The probability of an event that plain trials would have to be repeated a million times to see once.
+"""The probability of an event that is too rare to be seen in plain trials.
 
-Subset simulation [AuBeck2001]: levels of a score that rises towards the event, each reached by a tenth of the
-flights that reached the one before; these are continued as Markov chains in the space of standard normals, by
-conditional sampling [Papaioannou2015]. It is done in independent runs: their mean is the estimate, and what
-they differ by the interval, that of a lognormal mean [Cox, in Land1972].
+Subset simulation [AuBeck2001] needs a score that rises towards the event, which has a score of 0 or more.
+Each level of the score is reached by a tenth of the flights that reached the level before. From these
+flights, Markov chains in the space of standard normals give further flights above the level, by conditional
+sampling [Papaioannou2015]. With the share p_j of flights that reach level j, the probability is the product
+of all p_j.
+
+This is done in independent runs. The mean of their probabilities is the estimate, and their spread gives the
+interval, that of a lognormal mean [Cox, in Land1972].
 """
 
 import math
@@ -17,23 +21,25 @@ from beaver_ftc.studies.engine.statistics import CONFIDENCE, binomial
 from beaver_ftc.studies.sweep.sampling import OF_RARE
 
 RUNS = 8  # independent runs
-MEMBERS = 220  # flights of each run a level: 10^-5 by a hundredth of 10^6 flights
+MEMBERS = 220  # flights of each run at a level: 10^-5 needs a hundredth of 10^6 flights
 SHARE = 0.1  # of the flights of a level that reach the next one
-STEP = 0.8  # how much of a point a chain's next one keeps
-MOST_LEVELS = 10  # down to 10^-10
+STEP = 0.8  # correlation of the next point of a chain with the present one
+MOST_LEVELS = 10  # for probabilities down to 10^-10
 
 Scores = np.ndarray
 FlyPoints = Callable[[np.ndarray], Scores]
-"""From a round's points (flights, keys), standard normals, to scores (flights,); events from 0."""
+"""From the points of a round (flights, keys), standard normals, to their scores (flights,)."""
 
 
 class Chains:
-    """Independent runs of subset simulation abreast: points (runs, members, keys), scores (runs, members).
+    """Independent runs of subset simulation, level by level: points (runs, members, keys), scores (runs,
+    members).
 
-    share (runs,): probability of the level that a run has reached, the product of its shares so far. reached
-    (runs,): whether that is the event. stuck: whether a run cannot go on. flights, levels: how many so far;
-    failed: flights without a score (-inf).
-    plain: events and flights of the first round. design: of the likeliest event its distance, flight, point.
+    - share (runs,): the product of p_j so far, the probability of the level that a run has reached.
+    - reached (runs,): whether this level is the event. stuck: whether a run cannot continue.
+    - flights, levels: numbers so far. failed: number of flights without a score (-inf).
+    - plain: number of events and of flights in the first round, which is plain sampling.
+    - design: of the event nearest to the origin, the likeliest one: distance, number of the flight, point.
     """
 
     def __init__(self, keys: int, seed: int, runs: int = RUNS, members: int = MEMBERS) -> None:
@@ -49,7 +55,7 @@ class Chains:
         self.design: tuple[float, int, np.ndarray] | None = None
 
     def go(self, fly: FlyPoints) -> None:
-        """Fly until every run has reached the event, or cannot."""
+        """Fly until every run has reached the event, or until a run is stuck."""
         self.scores[:] = self._flown(fly, self.points)
         self.plain = int((self.scores >= 0.0).sum()), self.scores.size
         while True:
@@ -61,48 +67,54 @@ class Chains:
             self._continue(going, np.array([levels[run] for run in going]), fly)
 
     def _level(self, run: int) -> float:
-        """The next level of a run, whose share of flights goes into its probability."""
+        """The next level of a run: the score that the share SHARE of its flights reaches, at most 0.
+        Multiplies `share` by the share that reaches it."""
         scores = self.scores[run]
         level = float(np.sort(scores)[-max(1, round(SHARE * scores.size))])
-        if not math.isfinite(level):  # too few have a score: nothing is known below the level before
+        if not math.isfinite(level):  # too few flights have a score
             self.stuck = True
             return level
         level, self.reached[run] = min(level, 0.0), level >= 0.0
         share = float((scores >= level).mean())
-        self.stuck |= share == 1.0 and not self.reached[run]  # all alike: nothing leads on
+        self.stuck |= (
+            share == 1.0 and not self.reached[run]
+        )  # all scores are equal: no flight is closer to the event
         self.share[run] *= share
         return level
 
     def _continue(self, going: list[int], levels: np.ndarray, fly: FlyPoints) -> None:
-        """Chains from the flights that reached their level, all runs abreast:
+        """Replace the flights of the runs `going` by Markov chains from flights that reached the level of
+        their run:
 
-            x' = STEP x + sqrt(1 - STEP^2) e,  e standard normal,  taken where it reaches the level, too
+            x' = STEP x + sqrt(1 - STEP^2) e,  e standard normal;  x' is accepted if it reaches the level,
+            else x' = x
 
-        x: the points `here` (runs, chains, keys); levels (runs,) of the runs `going`.
+        x (going, chains, keys): present points of the chains. levels (going,).
         """
         members = self.scores.shape[1]
-        seeds = max(1, round(SHARE * members))
-        at = np.array([
-            self._generator.choice(np.flatnonzero(self.scores[run] >= level), seeds, replace=False)
+        n_chains = max(1, round(SHARE * members))
+        chosen = np.array([
+            self._generator.choice(np.flatnonzero(self.scores[run] >= level), n_chains, replace=False)
             for run, level in zip(going, levels, strict=True)
         ])  # fmt: skip
         rows = np.array(going)[:, None]
-        here = self.points[rows, at]
-        scores = self.scores[rows, at]
-        kept = [here]
-        values = [scores]
-        for _ in range(math.ceil(members / seeds) - 1):
-            moved = STEP * here + math.sqrt(1.0 - STEP**2) * self._generator.standard_normal(here.shape)
-            found = self._flown(fly, moved)
-            better = found >= levels[:, None]
-            here = np.where(better[..., None], moved, here)
-            scores = np.where(better, found, scores)
-            kept.append(here)
-            values.append(scores)
-        self.points[going] = np.concatenate(kept, axis=1)[:, :members]
-        self.scores[going] = np.concatenate(values, axis=1)[:, :members]
+        x = self.points[rows, chosen]
+        scores = self.scores[rows, chosen]
+        all_points = [x]
+        all_scores = [scores]
+        for _ in range(math.ceil(members / n_chains) - 1):
+            moved = STEP * x + math.sqrt(1.0 - STEP**2) * self._generator.standard_normal(x.shape)
+            moved_scores = self._flown(fly, moved)
+            accepted = moved_scores >= levels[:, None]
+            x = np.where(accepted[..., None], moved, x)
+            scores = np.where(accepted, moved_scores, scores)
+            all_points.append(x)
+            all_scores.append(scores)
+        self.points[going] = np.concatenate(all_points, axis=1)[:, :members]
+        self.scores[going] = np.concatenate(all_scores, axis=1)[:, :members]
 
     def _flown(self, fly: FlyPoints, points: np.ndarray) -> Scores:
+        """The scores of points (..., keys), (...); counts the flights and notes the likeliest event."""
         flat = points.reshape(-1, points.shape[-1])
         scores = fly(flat)
         for i in np.flatnonzero(scores >= 0.0).tolist():
@@ -114,8 +126,8 @@ class Chains:
         return scores.reshape(points.shape[:-1])
 
     def estimate(self) -> Document:
-        """The result of the runs: a probability with its two-sided interval; why: the reason if it is not
-        known."""
+        """The result: the probability with its two-sided interval, and the numbers of flights. why: the
+        reason if the probability is not known; the interval then ends at the level that was reached."""
         events, of = self.plain
         if self.reached.all():
             probability, low, high = lognormal_mean(self.share)

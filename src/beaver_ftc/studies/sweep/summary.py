@@ -1,6 +1,7 @@
-"""The summary of a sweep: the document `summary.json`.
+"""The summary of a sweep: the document `summary.json`, and the evaluation of its expectations.
 
-A rate comes with its count, what it is of, and its 95 % interval. What the flights do not tell is null.
+A rate has its count, the number of flights `of` which it is a rate, and its 95 % interval. A number that the
+flights do not give is null. Arrays are columns of the flights (flights,), groups are masks of the same shape.
 """
 
 import math
@@ -28,8 +29,8 @@ OUTCOMES = {
     "missed_detection": "missed detection",
     "tracking_error": "tracking error",
     "residual_before_fault": "residual before the fault",
-}  # what keys are ranked by, and its title
-MOST_REASONS = 20
+}  # outcomes by which keys are ranked, and their titles
+MOST_REASONS = 20  # reasons of failed flights that are listed
 _NUMBERS = re.compile(r"-?\d+(\.\d+)?(e[-+]?\d+)?")
 
 
@@ -60,40 +61,42 @@ def summarise(flights: Flights, sweep: Sweep) -> Document:
 
 
 def number(value: float) -> float | None:
-    """A finite number, rounded to what is worth saying, or null."""
+    """A finite number with ten significant digits; None for any other."""
     return float(f"{value:.10g}") if math.isfinite(value) else None
 
 
 def rate(hits: np.ndarray, of: np.ndarray) -> Document:
-    """How many of a group are hits, with Wilson's interval."""
+    """The rate of hits in a group, with Wilson's interval."""
     count, trials = _counts(hits, of)
     return {"count": count, "of": trials, **_estimate("rate", wilson(count, trials))}
 
 
 def _counts(hits: np.ndarray, of: np.ndarray) -> tuple[int, int]:
+    """Number of hits in a group, and of flights in it."""
     return int((hits & of).sum()), int(of.sum())
 
 
-def _estimate(name: str, found: Estimate) -> Document:
-    value, low, high = map(number, vars(found).values())
+def _estimate(name: str, estimate: Estimate) -> Document:
+    """An estimate for the document, its value under `name`."""
+    value, low, high = map(number, vars(estimate).values())
     return {name: value, "low": low, "high": high, "confidence": CONFIDENCE}
 
 
 def quantiles(values: np.ndarray) -> Document:
-    """Quantiles of values (n,); infinity stands for what never came; an infinite quantile is null."""
+    """QUANTILES of values (n,), and their number. An event that never came has an infinite value; an infinite
+    quantile is null."""
     ordered = _told(values)
     return {"of": int(ordered.size), **{name: number(quantile(ordered, q)) for name, q in QUANTILES.items()}}
 
 
 def _told(values: np.ndarray) -> np.ndarray:
-    """The values of the flights that have one, sorted: NaN is left out."""
+    """The values without NaN, sorted."""
     return np.sort(values[~np.isnan(values)])
 
 
 def _reasons(flights: Flights) -> list[Document]:
-    """Why flights have no metrics, the most frequent reason first, said in the words of its first flight.
-
-    Reasons that differ in their numbers alone are one.
+    """The reasons why flights have no metrics, the most frequent first. Reasons that differ only in numbers
+    are counted together, and have the text of their first flight.
     """
     failed = np.flatnonzero(~flights.measured)
     kinds = [_NUMBERS.sub("#", reason) for reason in flights["reason"][failed]]
@@ -109,6 +112,7 @@ def _reasons(flights: Flights) -> list[Document]:
 
 
 def _detection(flights: Flights, group: np.ndarray) -> Document:
+    """Rate of detection in a group, and delays: of all faults, and of the detected ones."""
     return {
         **rate(flights.detected, group),
         "delay_s": quantiles(flights.detection_delay_s[group]),
@@ -117,6 +121,7 @@ def _detection(flights: Flights, group: np.ndarray) -> Document:
 
 
 def _isolation(flights: Flights, group: np.ndarray) -> Document:
+    """Rate of right names in a group, rate of wrong names among all names, and delays."""
     named = group & (flights["isolation.fault"] != "")
     return {
         **rate(flights.isolated, group),
@@ -127,7 +132,7 @@ def _isolation(flights: Flights, group: np.ndarray) -> Document:
 
 
 def _false_alarms(flights: Flights) -> Document:
-    """Alarms without a fault, per hour of flight in which one would have been false."""
+    """False alarms, and their rate per hour in which an alarm would have been false."""
     count, hours = flights.false_alarms
     return {
         "count": count,
@@ -138,7 +143,8 @@ def _false_alarms(flights: Flights) -> Document:
 
 
 def _guarantee(flights: Flights) -> Document:
-    """Whether every fault was detected by the instant from which theory says detection is certain."""
+    """In how many flights detection was guaranteed, and in how many of these it came later than
+    guaranteed."""
     promised = flights.faulted & np.isfinite(flights["detection.guaranteed_delay_s"])
     frame_s = flights["flown_s"] / flights["frames"]
     late = is_late(flights.detection_delay_s, flights["detection.guaranteed_delay_s"], frame_s)
@@ -146,6 +152,7 @@ def _guarantee(flights: Flights) -> Document:
 
 
 def _by_fault(flights: Flights) -> list[Document]:
+    """Detection and isolation of each kind of fault."""
     labels = flights.fault_labels
     groups = {label: labels == label for label in sorted(set(labels[flights.faulted]))}
     return [
@@ -160,22 +167,24 @@ def _by_fault(flights: Flights) -> list[Document]:
 
 
 def _confusion(flights: Flights) -> Document:
-    """Declared fault against diagnosis, of all flights that have metrics."""
+    """The numbers of flights by true fault (rows) and diagnosis (columns). The last columns are no names of
+    surfaces."""
     faults = flights.fault_labels
-    said = flights["isolation.fault"]
-    said = np.where(said != "", said, NOT_ISOLATED)
-    said = np.where(flights["detection.detected"], said, NO_ALARM)
-    said = np.where(flights["false_alarm"] & (faults != NO_FAULT), FALSE_ALARM, said)
-    pairs = Counter(zip(faults[flights.measured], said[flights.measured], strict=True))
+    diagnoses = flights["isolation.fault"]
+    diagnoses = np.where(diagnoses != "", diagnoses, NOT_ISOLATED)
+    diagnoses = np.where(flights["detection.detected"], diagnoses, NO_ALARM)
+    diagnoses = np.where(flights["false_alarm"] & (faults != NO_FAULT), FALSE_ALARM, diagnoses)
+    pairs = Counter(zip(faults[flights.measured], diagnoses[flights.measured], strict=True))
     rows = sorted({fault for fault, _ in pairs})
-    found = {diagnosis for _, diagnosis in pairs}
-    last = [name for name in (UNANTICIPATED, NOT_ISOLATED, NO_ALARM, FALSE_ALARM) if name in found]
-    columns = [*sorted(found.difference(last)), *last]
+    named = {diagnosis for _, diagnosis in pairs}
+    last = [name for name in (UNANTICIPATED, NOT_ISOLATED, NO_ALARM, FALSE_ALARM) if name in named]
+    columns = [*sorted(named.difference(last)), *last]
     counts = [[pairs[row, column] for column in columns] for row in rows]
     return {"faults": rows, "diagnoses": columns, "counts": counts}
 
 
 def _tracking(flights: Flights, axis: str) -> Document:
+    """Quantiles of the tracking errors of an axis, deg/s, and of their ratio after and before the fault."""
     group = flights.faulted
     return {
         "pre_fault_rms_deg_s": quantiles(flights[f"tracking.pre_fault_rms_deg_s.{axis}"][flights.measured]),
@@ -185,7 +194,7 @@ def _tracking(flights: Flights, axis: str) -> Document:
 
 
 def _sensitivity(flights: Flights) -> dict[str, Ranking]:
-    """Outcome -> the varied keys by how much of it they explain."""
+    """By outcome, the ranking of the varied keys."""
     tracked = flights.faulted & ~np.isnan(flights.worst_rms_deg_s)
     outcomes = {
         "detection_delay": (flights.faulted, flights.detection_delay_s),
@@ -199,23 +208,27 @@ def _sensitivity(flights: Flights) -> dict[str, Ranking]:
     }
 
 
-Bound = Callable[[float, bool], float]  # (confidence, upper) -> one-sided bound
+Bound = Callable[[float, bool], float]
+"""From (confidence, upper) to the one-sided bound of an estimate."""
 
 
 def evaluate(expect: SweepExpect, flights: Flights) -> list[Document]:
-    """One {name, passed, expected, actual, of} for each bound set, in the file's order.
+    """A mapping {name, passed, expected, actual, of} for each expected limit, in the order of the file.
 
-    actual: what was held against the bound, null where the flights do not tell; `of` how many flights tell.
+    actual: the number that is compared with the limit, null if the flights do not give it. of: number of
+    flights on which it is based.
     """
     return [_verdict(flights, *bound) for bound in _bounds(expect)]
 
 
 def names(expect: SweepExpect) -> list[str]:
-    """A name for each bound set, `departure_rate.at_most`, in the order of `evaluate`."""
+    """The name of each expected limit, such as `departure_rate.at_most`, in the order of `evaluate`."""
     return [f"{name}.{side}" for name, _, side in _bounds(expect)]
 
 
 def _bounds(expect: SweepExpect) -> Iterator[tuple[str, Level, str]]:
+    """(name, level, side) of each expected limit. side: `at_least` or `at_most`, the key of the limit in the
+    level."""
     for name, level in expect:
         axes = level if isinstance(level, AxisLevels) else ()
         levels = [(f"{name}.{axis}", own) for axis, own in axes] or [(name, level)]
@@ -226,14 +239,16 @@ def _bounds(expect: SweepExpect) -> Iterator[tuple[str, Level, str]]:
 
 
 def _verdict(flights: Flights, name: str, level: Level, side: str) -> Document:
+    """The evaluation of one limit. With a confidence, the one-sided bound of the estimate must keep the
+    limit: the upper bound for `at_most`, the lower one for `at_least`."""
     of, value, bound = estimate_of(flights, name, level)
     limit = getattr(level, side)
     actual = value if level.confidence is None else bound(level.confidence, side == "at_most")
-    kept = actual >= limit if side == "at_least" else actual <= limit
+    passed = actual >= limit if side == "at_least" else actual <= limit
     other = "at_most" if side == "at_least" else "at_least"
     return {
         "name": name,
-        "passed": bool(of > 0 and kept),
+        "passed": bool(of > 0 and passed),
         "expected": level.model_dump(exclude_none=True, exclude={other}),
         "actual": number(actual),
         "of": of,
@@ -241,21 +256,23 @@ def _verdict(flights: Flights, name: str, level: Level, side: str) -> Document:
 
 
 def estimate_of(flights: Flights, name: str, level: Level) -> tuple[int, float, Bound]:
-    """(number of flights, estimate, its bounds) of a named quantity."""
+    """(number of flights, estimate, its bound) of a quantity: a quantile, a rate of _RATES, or
+    `false_alarms_per_hour`."""
     if isinstance(level, QuantileLevel):
         quantity, _, axis = name.partition(".")
-        values = getattr(flights, quantity)  # an array, or a function of the axis
+        values = getattr(flights, quantity)  # a column, or a function from an axis to one
         ordered = _told((values(axis) if axis else values)[flights.faulted])
-        found = quantile(ordered, level.quantile)
-        return ordered.size, found, partial(statistics.quantile_bound, ordered, level.quantile)
+        value = quantile(ordered, level.quantile)
+        return ordered.size, value, partial(statistics.quantile_bound, ordered, level.quantile)
     if name in _RATES:
         count, trials = _counts(*_RATES[name](flights))
         return trials, wilson(count, trials).value, partial(statistics.wilson_bound, count, trials)
-    count, hours = flights.false_alarms  # the one quantity that is left: false_alarms_per_hour
-    told = int(flights.measured.sum()) if hours > 0 else 0
-    return told, statistics.poisson(count, hours).value, partial(statistics.poisson_bound, count, hours)
+    count, hours = flights.false_alarms
+    n = int(flights.measured.sum()) if hours > 0 else 0
+    return n, statistics.poisson(count, hours).value, partial(statistics.poisson_bound, count, hours)
 
 
+# By name of a rate: its hits, and the group in which they are counted.
 _RATES: dict[str, Callable[[Flights], tuple[np.ndarray, np.ndarray]]] = {
     "detection_rate": lambda flights: (flights.detected, flights.faulted),
     "isolation_rate": lambda flights: (flights.isolated, flights.faulted),

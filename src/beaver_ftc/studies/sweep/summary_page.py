@@ -1,6 +1,7 @@
-"""The summary of a sweep in words: for the terminal and at the head of the report.
+"""The summary of a sweep in words, for the terminal and the report.
 
-Everything is said from the summary document, so that the words and `summary.json` cannot disagree.
+All words are computed from the summary document, so that they cannot disagree with `summary.json`. A function
+returns an empty text if there is nothing to say, and its line is left out.
 """
 
 from collections.abc import Mapping, Sequence
@@ -26,11 +27,11 @@ from beaver_ftc.studies.present.tables import Rows, number, tabulated
 from beaver_ftc.studies.sweep.pictures import FIGURES
 from beaver_ftc.studies.sweep.summary import OUTCOMES
 
-MANY = 0.1  # of a sweep's flights
-# Of a key that an outcome is said to follow.
+MANY = 0.1  # share of the flights from which on there is a warning
+# Limits of a key that is said to determine an outcome.
 MAX_P_VALUE = 0.05
 MIN_EXPLAINED = 0.01
-SHOWN = 3  # keys of an outcome, and worst flights
+SHOWN = 3  # number of keys of an outcome, and of worst flights, for the terminal
 _STEERED = "The search steered these flights towards the worst: rates say nothing about flights in general."
 _EXPLAINED = (
     "Share of the ranks of an outcome that a varied key explains (Kruskal and Wallis' epsilon squared), "
@@ -42,17 +43,17 @@ _UNITS = {"delay": " s", "false_alarm": " of the threshold", "tracking": " deg/s
 
 
 def title(summary: Document) -> str:
-    """The sweep's name and whether it shows what it should."""
+    """The name of the sweep, and whether its expectations are met."""
     if not summary["expectations"]:
         return f"{summary['sweep']}: flown, nothing was expected"
     return f"{summary['sweep']}: {'PASSED' if summary['passed'] else 'FAILED'}"
 
 
 def facts(summary: Document) -> list[tuple[str, str]]:
-    """(what, what the flights show) for each thing worth knowing."""
-    lost = summary["departures"]
-    wrong = summary["isolation"]["wrong"]
-    said = (
+    """(name, text) of each line about the flights."""
+    departures = summary["departures"]
+    wrong_names = summary["isolation"]["wrong"]
+    lines = (
         ("flights", _flights(summary)),
         ("searched for", _search(summary)),
         ("detection", _rate(summary["detection"], "faults detected")),
@@ -60,76 +61,85 @@ def facts(summary: Document) -> list[tuple[str, str]]:
         ("inconclusive", _inconclusive(summary["inconclusive"])),
         ("detection delay", _quantiles(summary["detection"]["delay_s"])),
         ("isolation", _rate(summary["isolation"], "faults named rightly")),
-        ("wrongly named", f"{wrong['count']} of {wrong['of']} named" if wrong["count"] else ""),
+        (
+            "wrongly named",
+            f"{wrong_names['count']} of {wrong_names['of']} named" if wrong_names["count"] else "",
+        ),
         ("false alarms", _false_alarms(summary["false_alarms"])),
         ("guarantee", _guarantee(summary["guarantee"])),
-        ("departures", _rate(lost, "flights lost") if lost["count"] else ""),
+        ("departures", _rate(departures, "flights lost") if departures["count"] else ""),
         ("delay follows", _drivers(summary["sensitivity"]["detection_delay"])),
         ("misses follow", _drivers(summary["sensitivity"]["missed_detection"])),
     )
-    return [(what, how) for what, how in said if how]
+    return [(name, text) for name, text in lines if text]
 
 
 def tracking(summary: Document) -> list[tuple[str, str, str, str]]:
-    """(what, p, q, r): medians of the tracking errors, deg/s, and of their ratio."""
+    """(name, p, q, r): medians of the tracking errors before and after the fault, deg/s, and of their
+    ratio."""
     rows = {"before the fault": "pre_fault_rms_deg_s", "after": "post_fault_rms_deg_s", "ratio": "ratio"}
-    medians = {what: [summary["tracking"][a][key]["median"] for a in AXES] for what, key in rows.items()}
+    medians = {name: [summary["tracking"][a][key]["median"] for a in AXES] for name, key in rows.items()}
     return [
-        (what, value(p), value(q), value(r)) for what, (p, q, r) in medians.items() if {p, q, r} != {None}
+        (name, value(p), value(q), value(r)) for name, (p, q, r) in medians.items() if {p, q, r} != {None}
     ]
 
 
 def expectations(summary: Document) -> list[tuple[str, str, str, bool]]:
     """(name, expected, actual, passed) for each expectation."""
     return [
-        (found["name"], expected(found["expected"]), value(found["actual"]), found["passed"])
-        for found in summary["expectations"]
+        (
+            expectation["name"],
+            expected(expectation["expected"]),
+            value(expectation["actual"]),
+            expectation["passed"],
+        )
+        for expectation in summary["expectations"]
     ]
 
 
 def verdict(summary: Document) -> Judged:
-    """As of a run, each bound under a name of its own."""
+    """The judgement of the sweep, like that of a run. Each limit is an expectation with its own name."""
     bounds = (
         Expectation(
-            f"{found['name']}.{_side(found['expected'])}",
-            found["passed"],
-            expected(found["expected"]),
-            f"{value(found['actual'])} of {found['of']} flights",
+            f"{expectation['name']}.{_side(expectation['expected'])}",
+            expectation["passed"],
+            expected(expectation["expected"]),
+            f"{value(expectation['actual'])} of {expectation['of']} flights",
         )
-        for found in summary["expectations"]
+        for expectation in summary["expectations"]
     )
     return Judged(summary["sweep"], summary["passed"], tuple(bounds))
 
 
 def expected(level: Document) -> str:
-    """A bound in words: `95 % quantile ≤ 0.5 with 95 % confidence`."""
-    part = f"{exact_percent(level['quantile'])} quantile " if "quantile" in level else ""
+    """An expected limit in words, such as `95 % quantile ≤ 0.5 with 95 % confidence`."""
+    quantile = f"{exact_percent(level['quantile'])} quantile " if "quantile" in level else ""
     side = _side(level)
-    sure = f" with {exact_percent(level['confidence'])} confidence" if "confidence" in level else ""
-    return f"{part}{_SIGNS[side]} {value(level[side])}{sure}"
+    confidence = f" with {exact_percent(level['confidence'])} confidence" if "confidence" in level else ""
+    return f"{quantile}{_SIGNS[side]} {value(level[side])}{confidence}"
 
 
 _SIGNS = {"at_least": "≥", "at_most": "≤"}
 
 
 def _side(level: Document) -> str:
-    """The side of a bound: the key of its limit."""
+    """The side of a limit, `at_least` or `at_most`: its key in the level."""
     return next(side for side in _SIGNS if side in level)
 
 
 def exact_percent(share: float | None) -> str:
-    """A share in percent, with the digits that matter near 0 and 1."""
+    """A share in per cent, with more digits near 0 and 1."""
     if share is None:
         return "none"
-    rest = min(share, 1.0 - share)
-    digits = 1 if rest >= 0.01 or not rest else max(2, -floor(log10(100.0 * rest)))
+    distance = min(share, 1.0 - share)
+    digits = 1 if distance >= 0.01 or not distance else max(2, -floor(log10(100.0 * distance)))
     text = f"{100 * share:.{digits}f}"
     return f"{text.rstrip('0').rstrip('.')} %"
 
 
 def summary_text(summary: Document, colour: bool = False) -> str:
     """The summary as a table for the terminal."""
-    # commands each on a line of its own to be copied
+    # each command is on its own line, to be copied
     worst = [f" {'; '.join(flight['why'])}:\n   {flight['replay']}" for flight in summary["worst"][:SHOWN]]
     headline = (title(summary), "bold green" if summary["passed"] else "bold red")
     lines = facts(summary)
@@ -137,18 +147,22 @@ def summary_text(summary: Document, colour: bool = False) -> str:
         unit = "" if what == "ratio" else " deg/s"
         label = "tracking RMS, median" if what.startswith("before") else ""
         lines.append((label, f"p {p}  q {q}  r {r}{unit} {what}"))
-    held = [(passed, f"{name} {bound}: {actual}") for name, bound, actual, passed in expectations(summary)]
-    table = verdict_table(headline, lines, held, [("results", summary["folder"])])
+    expected_lines = [
+        (passed, f"{name} {bound}: {actual}") for name, bound, actual, passed in expectations(summary)
+    ]
+    table = verdict_table(headline, lines, expected_lines, [("results", summary["folder"])])
     return "\n".join([printed([table], colour=colour), *worst]) + "\n"
 
 
 def _flights(summary: Document) -> str:
+    """The number of flights, the flown time, and the numbers with other statuses than `flown`."""
     statuses = [(count, name.replace("_", " ")) for name, count in summary["statuses"].items()]
     others = ", ".join(f"{count} {name}" for count, name in statuses if name != "flown")
     return f"{summary['flights']}, {summary['flown_h']:.3g} h in the air" + (f" ({others})" if others else "")
 
 
 def _search(summary: Document) -> str:
+    """The objective of a search, and the worst score."""
     search = summary.get("search")
     if search is None:
         return ""
@@ -157,12 +171,14 @@ def _search(summary: Document) -> str:
 
 
 def _rate(rate: Document, what: str) -> str:
+    """A rate with its interval and counts."""
     if not rate["of"]:
         return ""
     return f"{exact_percent(rate['rate'])} ({_interval(rate)}): {rate['count']} of {rate['of']} {what}"
 
 
 def _quantiles(delays: Document) -> str:
+    """Quantiles of delays."""
     if not delays["of"]:
         return ""
     quantiles = {"median": "median", "p95": "95 %", "p99": "99 %", "max": "max"}
@@ -170,6 +186,7 @@ def _quantiles(delays: Document) -> str:
 
 
 def _false_alarms(found: Document) -> str:
+    """The false alarms, their rate, and the largest residual without a fault."""
     if not found["hours"]:
         return ""
     return (
@@ -180,8 +197,7 @@ def _false_alarms(found: Document) -> str:
 
 
 def _on_the_bound(found: Document) -> str:
-    """That detection shows the uncertainty flown, where the healthy part has used up the bound in many
-    flights."""
+    """A warning if the residual of the healthy flight comes near its threshold in many flights."""
     if not found["of"] or found["rate"] < MANY:
         return ""
     return (
@@ -192,6 +208,7 @@ def _on_the_bound(found: Document) -> str:
 
 
 def _inconclusive(found: Document) -> str:
+    """The number of flights in which the diagnosis could conclude nothing for some time."""
     if not found["count"]:
         return ""
     return (
@@ -201,33 +218,37 @@ def _inconclusive(found: Document) -> str:
 
 
 def _guarantee(found: Document) -> str:
+    """How many faults were detected later than guaranteed."""
     if not found["promised"]:
         return ""
     return "{broken} of {promised} faults detected later than guaranteed".format(**found)
 
 
 def _drivers(ranking: list[Document]) -> str:
-    told = [
+    """The keys that explain an outcome significantly."""
+    keys = [
         entry for entry in ranking if entry["p_value"] <= MAX_P_VALUE and entry["explained"] >= MIN_EXPLAINED
     ][:SHOWN]
     return ", ".join(
-        f"{entry['key']} (explains {exact_percent(entry['explained'])} of the ranks)" for entry in told
+        f"{entry['key']} (explains {exact_percent(entry['explained'])} of the ranks)" for entry in keys
     )
 
 
 def render(summary: Document, folder: Path) -> str:
-    """The report as HTML text, from the summary and the figures and flights in the sweep's folder."""
+    """The report as HTML text, from the summary, and from the figures and flights in the folder of the
+    sweep."""
     figures = drawn_in(folder, FIGURES)
     return as_html(title(summary), _parts(summary, folder, figures), figures)
 
 
 def _parts(summary: Document, folder: Path, figures: Mapping[str, Path]) -> list[Part]:
+    """The parts of the report."""
     judged = [("✓ met" if passed else "✗ MISSED", *row) for *row, passed in expectations(summary)]
-    again = [(each["name"], link) for each in summary["worst"] if (link := _link(folder, each["name"]))]
+    links = [(entry["name"], link) for entry in summary["worst"] if (link := _link(folder, entry["name"]))]
     explained = [
-        each | {"outcome": OUTCOMES[outcome]}
+        entry | {"outcome": OUTCOMES[outcome]}
         for outcome, ranking in summary["sensitivity"].items()
-        for each in ranking
+        for entry in ranking
     ]
     flown = "{flights} flights, sampling {sampling}, seed {seed}".format(**summary)
     return [
@@ -240,7 +261,7 @@ def _parts(summary: Document, folder: Path, figures: Mapping[str, Path]) -> list
         Heading("Figures"),
         Pictures([(FIGURES[name][0], name) for name in figures]),
         *_section("Flights worth a look", *tabulated(WORST, summary["worst"])),
-        Links("Flights that have been flown again: ", again) if again else "",
+        Links("Flights that have been flown again: ", links) if links else "",
         *_section("Flights that could not be flown", *tabulated(FAILED, summary["reasons"])),
         *_section("Sensitivity", *tabulated(EXPLAINED, explained)),
         _EXPLAINED if explained else "",
@@ -249,11 +270,12 @@ def _parts(summary: Document, folder: Path, figures: Mapping[str, Path]) -> list
 
 
 def _section(heading: str, head: Sequence[str], rows: Rows) -> list[Part]:
-    """A heading and its table; nothing without rows."""
+    """A heading and its table; no part without rows."""
     return [Heading(heading), Table(head, rows)] if rows else []
 
 
 def _interval(rate: Document) -> str:
+    """The interval of a rate."""
     return f"{exact_percent(rate['low'])} to {exact_percent(rate['high'])}"
 
 
@@ -273,6 +295,7 @@ FAILED = (("flights", "count"), ("why", "reason"), ("first", "first_run"))
 
 
 def _link(folder: Path, name: str) -> str | None:
-    """Where a kept flight is to be seen, relative to the report."""
-    seen = [f"flights/{name}/{file}" for file in ("report.html", "metrics.json", "scenario.yaml")]
-    return next((path for path in seen if (folder / path).is_file()), None)
+    """The path of the first file of a kept flight that exists, relative to the report; None if there is
+    none."""
+    paths = [f"flights/{name}/{file}" for file in ("report.html", "metrics.json", "scenario.yaml")]
+    return next((path for path in paths if (folder / path).is_file()), None)

@@ -48,49 +48,52 @@ def sweep(
     units. If a flight fails, its row contains the reason. Raises BadInput if a key or value is wrong. The
     message names the key.
     """
-    asked = {"vary": vary, "runs": runs, "seed": seed, "sampling": sampling, "expect": expect or {}}
-    made = _made(scenario, {key: value for key, value in asked.items() if value is not None})
+    requested = {"vary": vary, "runs": runs, "seed": seed, "sampling": sampling, "expect": expect or {}}
+    plan = _made(scenario, {key: value for key, value in requested.items() if value is not None})
     if not isinstance(workers, int) or workers < 1:
         raise BadInput(f"workers: {workers!r:.60} is not usable, allowed: a whole number of at least 1")
-    table = _here(made) if workers == 1 and out is None else _kept(made, workers, out)
+    table = _here(plan) if workers == 1 and out is None else _kept(plan, workers, out)
     frame = table.to_pandas()
     varied = plain(vary)
-    frame.attrs = {"scenario": made.name, "seed": seed, "vary": varied, "units": units(frame.columns)}
+    frame.attrs = {"scenario": plan.name, "seed": seed, "vary": varied, "units": units(frame.columns)}
     return frame
 
 
-def _made(scenario: ScenarioLike, asked: dict[str, Any]) -> Sweep:
+def _made(scenario: ScenarioLike, requested: dict[str, Any]) -> Sweep:
+    """The sweep of a scenario with the requested keys, checked as a sweep file is."""
     base = load(scenario)
     name = re.sub(r"[^A-Za-z0-9_-]", "-", base.name)[:64]
-    given = {"name": f"{name}-sweep", "base": plain(base), **plain(asked)}
+    data = {"name": f"{name}-sweep", "base": plain(base), **plain(requested)}
     with checked_against(base.airframe, base.aircraft):
-        return validate_sweep(Document(given), folder=Path())
+        return validate_sweep(Document(data), folder=Path())
 
 
-def _here(made: Sweep) -> "pa.Table":
-    """Flown one after the other in this process."""
+def _here(plan: Sweep) -> "pa.Table":
+    """The table of a sweep that is flown in this process, without files."""
     from beaver_ftc.studies.sweep.one_flight import fly_one, schema_of, table_of
     from beaver_ftc.studies.sweep.sampling import Plan
 
-    rows = [fly_one(made, flight) for flight in Plan(made).assignments(range(made.flights))]
-    return table_of(made, schema_of(made), rows)
+    rows = [fly_one(plan, flight) for flight in Plan(plan).assignments(range(plan.flights))]
+    return table_of(plan, schema_of(plan), rows)
 
 
-def _kept(made: Sweep, workers: int, out: str | PathLike[str] | None) -> "pa.Table":
-    """Flown by worker processes into a result folder, for good or to be read once."""
+def _kept(plan: Sweep, workers: int, out: str | PathLike[str] | None) -> "pa.Table":
+    """The table of a sweep that worker processes fly into a result folder. out: its parent; None is a
+    temporary folder."""
     import pyarrow.parquet as pq
 
     from beaver_ftc.studies.sweep.campaign import Options, run_sweep
 
     with TemporaryDirectory(prefix="beaver-ftc-") as scratch, _main_hidden():
         folder = Path(scratch if out is None else out)
-        run_sweep(made, Options(out=folder, workers=workers, report=out is not None))
-        return pq.read_table(folder / made.name / "results.parquet")
+        run_sweep(plan, Options(out=folder, workers=workers, report=out is not None))
+        return pq.read_table(folder / plan.name / "results.parquet")
 
 
 @contextlib.contextmanager
 def _main_hidden() -> Iterator[None]:
-    """Workers started meanwhile do not import the caller's script, which would start the sweep again."""
+    """Hide the main module from workers that start during the block. They would import the script of the
+    caller, which would start the sweep again."""
     main = vars(sys.modules["__main__"])
     shown = {name: value for name, value in main.items() if name in ("__file__", "__spec__")}
     main.pop("__file__", None)

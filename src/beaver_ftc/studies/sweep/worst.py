@@ -1,4 +1,4 @@
-"""The flights of a sweep that are worth a look, and the command that flies one again."""
+"""The worst flights of a sweep, and the command that flies one of them again."""
 
 import shlex
 from collections.abc import Callable, Iterator
@@ -11,14 +11,15 @@ from beaver_ftc.scenario.sweeps import Sweep
 from beaver_ftc.studies.sweep.one_flight import flight_name
 from beaver_ftc.studies.sweep.outcomes import Flights
 
-OF_EACH_KIND = 3
+OF_EACH_KIND = 3  # flights of each kind of bad result
 
 Candidates = Iterator[tuple[int, str]]
-"""Position of each flight, and what is bad about it."""
+"""(position of a flight in the table, its bad result in words)."""
 
 
 def worst_flights(flights: Flights, sweep: Sweep, command: str) -> list[Document]:
-    """A few flights of each bad kind, each once: `run`, `name`, `why` (all that is bad), `replay`."""
+    """A few flights with each kind of bad result: `run`, `name`, `why` (all bad results), `values`, and
+    `replay`, the command that flies it again. Each flight is listed once."""
     whys: dict[int, list[str]] = {}
     for position, why in _candidates(flights):
         whys.setdefault(position, []).append(why)
@@ -35,7 +36,7 @@ def worst_flights(flights: Flights, sweep: Sweep, command: str) -> list[Document
 
 
 def replay_command(source: str, out: Path, search: str | None) -> str:
-    """The command line that replays a flight, but for its index."""
+    """The command line that replays a flight, without the index of the flight."""
     words = ["beaver-ftc", "sweep", source]
     words += ["--search", search] if search else []
     words += ["--out", str(out)] if str(out) != "runs" else []
@@ -43,7 +44,7 @@ def replay_command(source: str, out: Path, search: str | None) -> str:
 
 
 def _candidates(flights: Flights) -> Candidates:
-    """(position, what is bad about it), the worst kind first."""
+    """The candidates of all kinds, the worst kind first."""
     faulted = flights.faulted
     named = flights["isolation.fault"]
     reason = flights["reason"]
@@ -63,10 +64,12 @@ def _candidates(flights: Flights) -> Candidates:
 
 
 def _first(which: np.ndarray, why: Callable[[int], str]) -> Candidates:
+    """The first flights of a mask (flights,)."""
     return ((i, why(i)) for i in np.flatnonzero(which)[:OF_EACH_KIND].tolist())
 
 
 def _largest(values: np.ndarray, why: Callable[[int], str]) -> Candidates:
+    """The flights with the largest finite values (flights,), and how many have the same value."""
     largest = np.argsort(-values, kind="stable")[:OF_EACH_KIND]
     for i in largest[np.isfinite(values[largest])].tolist():
         alike = int(np.isclose(values, values[i], rtol=1e-9, atol=0.0).sum())

@@ -175,11 +175,11 @@ def _reason_not_met(expected: Any, is_early: bool, metrics: Metrics) -> str | No
     return in_words(inconclusive.document()) if inconclusive else None
 
 
-def margin(found: Expectation) -> float | None:
+def margin(expectation: Expectation) -> float | None:
     """Distance of a value from its limit, in the unit of the limit, negative if the limit is exceeded. None
     if the expectation has no limit, or the quantity does not exist."""
-    expected = found.expected
-    actual = found.actual
+    expected = expectation.expected
+    actual = expectation.actual
     if isinstance(expected, bool) or not isinstance(expected, int | float) or actual is None:
         return None
     return float(expected - abs(actual))

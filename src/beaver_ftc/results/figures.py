@@ -59,14 +59,14 @@ def pictures_of(
     formats: png, pdf, svg; PDF and SVG are drawn in the style of a paper.
     """
     source = StoredLog(log_path)
-    shown = views_of_flight(source.columns, metrics)
+    views = views_of_flight(source.columns, metrics)
     event_marks = marks(metrics)
     window = closeup_window(event_marks)
-    wanted = [(shown, WHOLE_FLIGHT_S, "")]
+    groups = [(views, WHOLE_FLIGHT_S, "")]
     if window:
-        wanted.append((tuple(view for view in shown if view.closeup), window, "-closeup"))
+        groups.append((tuple(view for view in views if view.closeup), window, "-closeup"))
     pictures = []
-    for group, span, ending in wanted:
+    for group, span, ending in groups:
         series = series_of(source, [name for view in group for name in view.columns], span)
         for view in group:
             view_series = {name: series[name] for name in ("t_s", *view.columns)}
@@ -129,9 +129,9 @@ def _restyle_for_paper(figure: "Figure") -> "Figure":
     for legend in figure.legends:
         legend.remove()
     figure.set_layout_engine("constrained", h_pad=0.02, w_pad=0.02)
-    shown = _legend_handle_of_label(figure.axes)
-    where: Options = {"loc": "outside lower center", "ncols": 2, "fontsize": PAPER_FONT - 2}
-    figure.legend(shown.values(), shown.keys(), frameon=False, **where)
+    entries = _legend_handle_of_label(figure.axes)
+    place: Options = {"loc": "outside lower center", "ncols": 2, "fontsize": PAPER_FONT - 2}
+    figure.legend(entries.values(), entries.keys(), frameon=False, **place)
     return figure
 
 
@@ -167,11 +167,11 @@ def _empty_figure_and_axes(view: View, new_figure: Any) -> tuple["Figure", Any]:
     width = 10.0 if is_single else 12.0
     height = TOP + BOTTOM + sum(heights) + GAP * (down - 1)
     figure = new_figure(figsize=(width, height), dpi=DPI)
-    left = STEPS_LEFT if view.panels[0].steps else LEFT
+    left_margin = STEPS_LEFT if view.panels[0].steps else LEFT
     grid = figure.subplots(
         down, view.n_panel_columns, sharex=True, squeeze=False, height_ratios=heights,
         gridspec_kw={
-            "left": left / width, "right": 1 - RIGHT / width, "top": 1 - TOP / height,
+            "left": left_margin / width, "right": 1 - RIGHT / width, "top": 1 - TOP / height,
             "bottom": BOTTOM / height, "hspace": GAP * down / sum(heights), "wspace": 0.19,
         },
     )  # fmt: skip
@@ -237,11 +237,11 @@ def _draw_bars(axes: "Axes", panel: Panel, series: Values) -> None:
     for height, row in enumerate(panel.steps):
         traces = [trace for trace in panel.traces if trace.label == row]
         values = np.array([series[trace.column] for trace in traces])
-        shown = series[panel.bars_during_column] == 1
+        active = series[panel.bars_during_column] == 1
         candidate = (values == 0).any(axis=0)
-        excluded = shown & (values == 1).any(axis=0) & ~candidate
+        excluded = active & (values == 1).any(axis=0) & ~candidate
         for where, half_height, colour in (
-            (shown & candidate, 0.36, LOOKS[traces[0].role].colour), (excluded, 0.04, GREY)
+            (active & candidate, 0.36, LOOKS[traces[0].role].colour), (excluded, 0.04, GREY)
         ):  # fmt: skip
             rows = series["t_s"], height - half_height, height + half_height
             axes.fill_between(*rows, where=where, step="post", color=colour, linewidth=0)
@@ -301,8 +301,8 @@ def _write_absent_text(view: View, series: Values, grid: Iterable["Axes"]) -> No
     """Write the text of a view whose columns have no data into its empty axes."""
     if view.text_without_data and all(np.isnan(series[column]).all() for column in view.columns):
         for axes in grid:
-            where: Any = {"transform": axes.transAxes, "ha": "center", "va": "center"}
-            axes.text(0.5, 0.5, view.text_without_data, fontsize=9, **where)
+            place: Any = {"transform": axes.transAxes, "ha": "center", "va": "center"}
+            axes.text(0.5, 0.5, view.text_without_data, fontsize=9, **place)
 
 
 def _max_legend_columns(labels: Sequence[str], width: float) -> int:
@@ -329,18 +329,18 @@ def _legend_handle_of_label(grid: Sequence["Axes"]) -> dict[str, Any]:
 def _draw_legend(figure: "Figure", grid: Sequence["Axes"]) -> None:
     """One legend below the figure. Each further line of the legend lowers the panels by
     LEGEND_LINE_INCHES."""
-    shown = _legend_handle_of_label(grid)
-    columns = _max_legend_columns(list(shown), figure.get_figwidth())
+    entries = _legend_handle_of_label(grid)
+    columns = _max_legend_columns(list(entries), figure.get_figwidth())
     height = figure.get_figheight()
-    added = LEGEND_LINE_INCHES * (-(-len(shown) // columns) - 1) / height
+    added = LEGEND_LINE_INCHES * (-(-len(entries) // columns) - 1) / height
     top = 1 - TOP / height
     scale = 1 - added * height / (height - TOP - BOTTOM)
     for axes in grid if added else ():  # shrink towards the top, to make room below
         box = axes.get_position()
         axes.set_position((box.x0, top - scale * (top - box.y0), box.width, scale * box.height))
     figure.legend(
-        shown.values(),
-        shown.keys(),
+        entries.values(),
+        entries.keys(),
         loc="lower center",
         bbox_to_anchor=(0.5, 0.04 / figure.get_figheight()),
         ncols=columns,

@@ -150,15 +150,15 @@ class Flight:
         from beaver_ftc.results.series import WHOLE_FLIGHT_S, series_of
         from beaver_ftc.results.style import closeup_window, marks
 
-        known = self._view_of_name()
-        if view not in known:
-            raise BadInput(f"view: {view!r:.60} is not known{suggestion(str(view), known)}")
+        view_of_name = self._view_of_name()
+        if view not in view_of_name:
+            raise BadInput(f"view: {view!r:.60} is not known{suggestion(str(view), view_of_name)}")
         if style not in STYLES:
             raise BadInput(f"style: {style!r:.60} is not known, allowed: {', '.join(STYLES)}")
         event_marks = marks(self._typed_metrics)
         window = (closeup_window(event_marks) if closeup else None) or WHOLE_FLIGHT_S
-        series = series_of(self._log_or_raise(), known[view].columns, window)
-        return draw(known[view], series, event_marks, self.name, style)
+        series = series_of(self._log_or_raise(), view_of_name[view].columns, window)
+        return draw(view_of_name[view], series, event_marks, self.name, style)
 
     def certificate(self) -> Document:
         """The content of certificate.json: the alarm and the exclusions, each with the inequality that proves
@@ -208,18 +208,18 @@ class Flight:
     def _view_of_name(self) -> dict[str, Any]:
         from beaver_ftc.results.views import views_of_flight
 
-        shown = views_of_flight(self._log_or_raise().columns, self._typed_metrics)
-        return {view.name: view for view in shown}
+        views = views_of_flight(self._log_or_raise().columns, self._typed_metrics)
+        return {view.name: view for view in views}
 
     def __repr__(self) -> str:
-        lines = [f"{what:12} {how}" for what, how in self._verdict_lines()]
+        lines = [f"{name:12} {text}" for name, text in self._verdict_lines()]
         return "\n".join([verdict.title(self._typed_metrics), *(f"  {line}" for line in lines)])
 
     def _repr_html_(self) -> str:
         cell = "style='text-align:left'"
         rows = "".join(
-            f"<tr><th {cell}>{escape(what)}</th><td {cell}>{escape(how)}</td></tr>"
-            for what, how in self._verdict_lines()
+            f"<tr><th {cell}>{escape(name)}</th><td {cell}>{escape(text)}</td></tr>"
+            for name, text in self._verdict_lines()
         )
         return f"<b>{escape(verdict.title(self._typed_metrics))}</b><table>{rows}</table>"
 
@@ -229,9 +229,9 @@ class Flight:
             for when, p, q, r in verdict.tracking_rms_in_words(self._typed_metrics)
         ]
         missed = [
-            ("missed", held.sentence)
-            for held in expectations_in_words(self._typed_metrics)
-            if not held.passed
+            ("missed", expectation.sentence)
+            for expectation in expectations_in_words(self._typed_metrics)
+            if not expectation.passed
         ]
         return [*verdict.verdict_lines(self._typed_metrics), *tracked, *missed]
 
@@ -291,5 +291,7 @@ def check_plug_in(what: str, plug_in: object) -> None:
         return
     lacking = [name for name in ("reset", "step") if not callable(getattr(plug_in, name, None))]
     if isinstance(plug_in, type) or lacking:
-        says = "a class" if isinstance(plug_in, type) else f"{plug_in!r:.60} without {' and '.join(lacking)}"
-        raise BadInput(f"{what}: this is {says}, allowed: an object with reset and step")
+        description = (
+            "a class" if isinstance(plug_in, type) else f"{plug_in!r:.60} without {' and '.join(lacking)}"
+        )
+        raise BadInput(f"{what}: this is {description}, allowed: an object with reset and step")

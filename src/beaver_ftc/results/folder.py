@@ -43,8 +43,8 @@ def result_folder(out: Path, name: str, files: Iterable[str] = ()) -> Iterator[P
     written, or if `out/name` is not a result of ours.
     """
     final = out / name
-    before = "the result that was there is as it was" if final.is_dir() else "nothing is left there"
-    with clear_disk_errors(final, f"; {before}"):
+    state = "the result that was there is as it was" if final.is_dir() else "nothing is left there"
+    with clear_disk_errors(final, f"; {state}"):
         refuse_foreign(final, files)
         created = _make_parents(out)
         _remove_stale(out, name)
@@ -132,7 +132,7 @@ def partial_prefix(name: str) -> str:
 
 def _make_parents(folder: Path) -> list[Path]:
     """Create `folder` with its parents; return those that were missing, deepest first."""
-    missing_folders = list(takewhile(lambda one: not one.exists(), (folder, *folder.parents)))
+    missing_folders = list(takewhile(lambda parent: not parent.exists(), (folder, *folder.parents)))
     folder.mkdir(parents=True, exist_ok=True)
     return missing_folders
 

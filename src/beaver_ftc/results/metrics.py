@@ -342,10 +342,12 @@ def _name_in_window(finding: Document, truth: Truth, last_frame_s: float) -> Doc
 def _names_given_in_flight(flight: "Landing", truth: Truth) -> tuple[str, ...]:
     """All names given in flight that were not premature, withdrawn ones included, each once. They are ordered
     by the begin of the fault that they name, then by time."""
-    given = [(withdrawn["fault"], withdrawn["from_s"]) for withdrawn in flight.withdrawn]
-    given += [(name["isolated"], name["isolation_time_s"]) for name in flight.faults or (vars(flight),)]
+    names_and_times = [(withdrawn["fault"], withdrawn["from_s"]) for withdrawn in flight.withdrawn]
+    names_and_times += [
+        (name["isolated"], name["isolation_time_s"]) for name in flight.faults or (vars(flight),)
+    ]
     names = []  # at_s of the fault, time of the name, name
-    for name, time_s in given:
+    for name, time_s in names_and_times:
         faults = truth.faults_named_rightly_by(name, time_s)
         fault = faults[0] if faults else truth.first
         if name is not None and not truth.is_premature(name, time_s, fault):
@@ -481,9 +483,9 @@ def _hint_residual_near_threshold(flight: "Landing") -> str:
     share = max(flight.closest_approach, default=0.0)
     if not NEAR_THRESHOLD_SHARE <= share <= 1.0:
         return ""
-    before = " before the fault" if flight.scenario.faults else ""
+    when = " before the fault" if flight.scenario.faults else ""
     return (
-        f"the residual already reaches {math.floor(1000.0 * share) / 10.0:g} % of its threshold{before}: a "
+        f"the residual already reaches {math.floor(1000.0 * share) / 10.0:g} % of its threshold{when}: a "
         "slightly larger error would raise a false alarm"
     )
 

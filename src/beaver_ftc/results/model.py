@@ -46,15 +46,15 @@ class Part:
     _last: ClassVar[tuple[str, ...]] = ()
 
     @classmethod
-    def of(cls, found: Any) -> Self:
+    def of(cls, section: Any) -> Self:
         """The record of a section of JSON, of a tuple of its values, or of such a record. A missing key gives
         None, or an empty tuple or mapping; a key that the record does not have is ignored."""
         part: Any = cls
-        if isinstance(found, cls):
-            return found
-        if isinstance(found, tuple):
-            return cls(*found)
-        return cls(**{name: _read(hint, found.get(name)) for name, (hint, _) in _fields_of(part).items()})
+        if isinstance(section, cls):
+            return section
+        if isinstance(section, tuple):
+            return cls(*section)
+        return cls(**{name: _read(hint, section.get(name)) for name, (hint, _) in _fields_of(part).items()})
 
     def document(self) -> Document:
         """The section as a mapping of keys to values."""
@@ -448,9 +448,9 @@ class ChangeInFlight(Part):
         return {key: value for key, value in section.items() if key not in left_out}
 
     @classmethod
-    def of(cls, found: Any) -> Self:
+    def of(cls, section: Any) -> Self:
         """The record of a section of JSON, which has an alarm if the diagnosis was restarted."""
-        return super().of({**found, "renewed": "detection_time_s" in found})
+        return super().of({**section, "renewed": "detection_time_s" in section})
 
 
 @dataclass(frozen=True)
@@ -746,9 +746,9 @@ def read_metrics(path: Path) -> Document:
     """The document metrics.json of a flight. Raises OSError, and ValueError for any other document."""
     document: Document = files.read_json(path)
     try:
-        found = Metrics.of(document)
+        metrics = Metrics.of(document)
     except (AttributeError, TypeError) as error:
         raise ValueError("holds no metrics of a flight") from error
-    if any(getattr(found, section) is None for section in _READ_BY_ALL):
+    if any(getattr(metrics, section) is None for section in _READ_BY_ALL):
         raise ValueError("lacks a section that every flight has")
     return document

@@ -65,13 +65,13 @@ def drawing(pictures: "Sequence[Picture]", connections: Painters) -> Iterator[No
         save_all(pictures)
         return
     sent: list[tuple[Connection, list[Picture]]] = []
-    left: list[Picture] = []
+    not_drawn: list[Picture] = []
     for painter, share in zip(connections, shares_of_equal_work(pictures, len(connections)), strict=True):
         try:
             painter.send(share)
             sent.append((painter, share))
         except OSError:  # it was killed
-            left += share
+            not_drawn += share
     failures = []
     try:
         yield
@@ -80,8 +80,8 @@ def drawing(pictures: "Sequence[Picture]", connections: Painters) -> Iterator[No
             try:
                 failures.append(painter.recv())
             except (EOFError, OSError):  # it was killed
-                left += share
-    save_all(left)
+                not_drawn += share
+    save_all(not_drawn)
     for failure in filter(None, failures):
         raise failure
 
@@ -105,16 +105,16 @@ def _paint(connections: Sequence[Connection], other_ends: Sequence[Connection]) 
     from beaver_ftc.results.figures import figure_class
 
     figure_class()
-    own, *others = connections
+    first, *others = connections
     for other in others:
         if os.fork() == 0:
-            own.close()
+            first.close()
             try:
                 _draw_until_closed(other)
             finally:
                 os._exit(0)
         other.close()
-    _draw_until_closed(own)
+    _draw_until_closed(first)
 
 
 def _draw_until_closed(connection: Connection) -> None:

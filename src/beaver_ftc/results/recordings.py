@@ -81,13 +81,13 @@ def write_recording(
     }
     columns = {"t_s", *(column for part in source_of.values() for column in part.values())}
     series = log.StoredLog(log_path).read(list(columns))
-    named: Names = {}
+    names: Names = {}
     topics: ColumnsByTopic = {}
     for part, pattern in _NAMES_OF_KIND[kind].items():
-        named[part] = {}
+        names[part] = {}
         for i, (name, column) in enumerate(source_of[part].items()):
             recorded = pattern.format(name=name, title=name.title(), i=i, n=i + 1, axis="XYZ"[i % 3])
-            named[part][name] = recorded
+            names[part][name] = recorded
             values = series[column]
             if part == "commands":
                 values = values / travel_rad[name]
@@ -97,20 +97,20 @@ def write_recording(
             topics.setdefault(topic, {})[field] = values
     t_us = np.round(series["t_s"] * 1e6).astype(np.int64) + _FIRST_STAMP_US
     _WRITER_OF_KIND[kind](folder / RECORDING_FILE_OF_KIND[kind], t_us, topics)
-    (folder / "vehicle.yaml").write_text(_vehicle_file_text(named, travel_rad, kind), encoding="utf-8")
+    (folder / "vehicle.yaml").write_text(_vehicle_file_text(names, travel_rad, kind), encoding="utf-8")
 
 
-def _vehicle_file_text(named: Names, travel_rad: dict[str, float], kind: str) -> str:
+def _vehicle_file_text(names: Names, travel_rad: dict[str, float], kind: str) -> str:
     """The text of vehicle.yaml. Angles of a dataflash log are in deg, all others in rad."""
     angle = "{{column: {}, unit: deg}}" if kind == "ardupilot" else "{!r}"
-    commands = named["commands"]
-    flow = named["flow"]
+    commands = names["commands"]
+    flow = names["flow"]
     return _VEHICLE_FILE.format(
         kind=kind,
-        rates=_flow_mapping(named["rates"], "{!r}"),
+        rates=_flow_mapping(names["rates"], "{!r}"),
         commands=", ".join(map(repr, commands.values())),
-        attitude=_flow_mapping(named["attitude"], angle),
-        airspeed=named["airspeed"]["airspeed"],
+        attitude=_flow_mapping(names["attitude"], angle),
+        airspeed=names["airspeed"]["airspeed"],
         surfaces="\n".join(f"  {surface}: {{{command!r}: 1.0}}" for surface, command in commands.items()),
         stops=_flow_mapping(travel_rad, "{!r}"),
         signals=", ".join(column for name, column in flow.items() if name != _DYNAMIC_PRESSURE_COLUMN),

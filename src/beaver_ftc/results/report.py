@@ -131,9 +131,9 @@ def _page_data(
     )
     # fewer points of each curve the more runs there are: the page stays within a few megabytes
     points = MAX_CURVE_POINTS if len(logs) <= 2 else max(600, 2 * MAX_CURVE_POINTS // len(logs))
-    named = zip(logs, found, names or [each.scenario for each in found], strict=True)
+    runs = zip(logs, found, names or [each.scenario for each in found], strict=True)
     return {
-        "runs": [_run_entry(source, metrics, columns, name, points) for source, metrics, name in named],
+        "runs": [_run_entry(source, metrics, columns, name, points) for source, metrics, name in runs],
         "views": [asdict(view) | {"panels": list(map(_panel_entry, view.panels))} for view in shown],
         "looks": {role: asdict(look) for role, look in LOOKS.items()},
         "modes": list(MODE_COLOURS.items()),

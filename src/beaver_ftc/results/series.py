@@ -55,19 +55,19 @@ def series_of(
     A longer log is cut into stretches of equal length. Each gives two points, its lowest and its highest
     value, so that no peak is lost.
     """
-    wanted = tuple(dict.fromkeys(("t_s", *columns)))
+    names = tuple(dict.fromkeys(("t_s", *columns)))
     rows = min(source.row_count(), (window_s[1] - window_s[0]) / source.frame_s)
     stretch = 1 if rows <= max_points else math.ceil(2 * rows / max_points)
-    chunks = _unwrap_heading(source.read_chunks(source_columns(wanted)))
-    chunks = _add_mean_airspeed(chunks, source.frame_s) if MEAN_AIRSPEED_COLUMN in wanted else chunks
+    chunks = _unwrap_heading(source.read_chunks(source_columns(names)))
+    chunks = _add_mean_airspeed(chunks, source.frame_s) if MEAN_AIRSPEED_COLUMN in names else chunks
     parts = []
     for chunk in chunks:
         first, last = np.searchsorted(chunk["t_s"], window_s, side="left")
         if first < last:
             cut = {name: values[first:last] for name, values in chunk.items()}
-            shown = {name: cut[name] if name in cut else _derived_column(cut, name) for name in wanted}
-            parts.append(shown if stretch == 1 else _extremes_by_stretch(shown, stretch))
-    return {name: np.concatenate([part[name] for part in parts] or [np.empty(0)]) for name in wanted}
+            curves = {name: cut[name] if name in cut else _derived_column(cut, name) for name in names}
+            parts.append(curves if stretch == 1 else _extremes_by_stretch(curves, stretch))
+    return {name: np.concatenate([part[name] for part in parts] or [np.empty(0)]) for name in names}
 
 
 def _unwrap_heading(chunks: Iterable[log.Values]) -> Iterator[log.Values]:

@@ -143,17 +143,17 @@ class _Parser:
         self._depth += 1
         if self._depth > MOST_DEPTH:
             raise FormulaError(f"is nested too deeply, allowed: {MOST_DEPTH} levels")
-        left = self._parse_prefix()
+        formula = self._parse_prefix()
         while _BINDING_POWER.get(self._next_token, 0) > power:
             operator = self._take_token()
             interval = self._parse_interval() if operator == "until" else None
             if operator in ("->", "implies"):  # from the right: a -> b -> c is a -> (b -> c)
-                left = _formula("implies", left, self._parse_operand(0))
+                formula = _formula("implies", formula, self._parse_operand(0))
             else:
                 right = self._parse_operand(_BINDING_POWER[operator])
-                left = _formula(operator, left, right, interval=interval)
+                formula = _formula(operator, formula, right, interval=interval)
         self._depth -= 1
-        return left
+        return formula
 
     def _parse_prefix(self) -> Formula:
         """A formula that begins with its own token: in parentheses, -a, abs(a), not, temporal, number,

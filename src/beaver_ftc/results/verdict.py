@@ -202,9 +202,9 @@ def _open_types_text(kinds: Sequence[str]) -> str:
     return f"type not determined ({len(kinds)} remain: {', '.join(map(without_underscores, kinds))})"
 
 
-def _count_and_noun(n: int, what: str) -> str:
+def _count_and_noun(n: int, noun: str) -> str:
     """A number with its noun, such as `1 time` and `2 times`."""
-    return f"{n} {what}{'' if n == 1 else 's'}"
+    return f"{n} {noun}{'' if n == 1 else 's'}"
 
 
 def tracking_rms_in_words(metrics: Metrics) -> list[tuple[str, str, str, str]]:
@@ -280,15 +280,15 @@ def _change_text(change: ChangeInFlight) -> str:
     alarm = "FALSE ALARM" if change.false_alarm else "alarm"
     if change.detection_time_s is not None:
         form += "; the diagnosis before: {alarm} at {detection_time_s}, {named}"
-    what = ", ".join(changed) or "declared sensors"
+    changes = ", ".join(changed) or "declared sensors"
     named = change.isolated or "not isolated"
-    return _filled(form, change, what=what, alarm=alarm, named=named)
+    return _filled(form, change, what=changes, alarm=alarm, named=named)
 
 
-def _condition_text(flown: FlightCondition) -> str:
+def _condition_text(condition: FlightCondition) -> str:
     """Airspeed, altitude, time, scheme and law."""
-    of_every_type = ", every fault type" if flown.fault_class == "all" else ""
-    return _filled(_CONDITION_FORM, flown, of_every_type=of_every_type)
+    of_every_type = ", every fault type" if condition.fault_class == "all" else ""
+    return _filled(_CONDITION_FORM, condition, of_every_type=of_every_type)
 
 
 _ASSUMPTION_TEXT = {"sensors-sound": "sensors are sound (A11)"}
@@ -309,12 +309,12 @@ def _fault_text(fault: Fault | None, faults: Sequence[DeclaredFault]) -> str:
     if fault is None:
         return "none"
     place = f"sensor {fault.sensor}" if fault.sensor else fault.actuator or ""
-    what = f"{place} {without_underscores(fault.type)}".strip()
+    text = f"{place} {without_underscores(fault.type)}".strip()
     if not isinstance(fault, DeclaredFault):
-        return f"{what} at {_seconds_text(fault.at_s)}"
+        return f"{text} at {_seconds_text(fault.at_s)}"
     if size := ", ".join(_fault_size_texts(fault)):
-        what += f" ({size})"
-    return f"{what} at {_span_text(fault.at_s, fault.end_s)}{_masked_text(fault, faults)}"
+        text += f" ({size})"
+    return f"{text} at {_span_text(fault.at_s, fault.end_s)}{_masked_text(fault, faults)}"
 
 
 def _masked_text(fault: DeclaredFault, faults: Sequence[DeclaredFault]) -> str:
@@ -375,10 +375,10 @@ def _true_size_text(isolation: Named, metrics: Metrics) -> str:
     kind = isolation.type
     if isolation.estimate is None or kind not in [fault.type for fault in faults]:
         return ""
-    flown = metrics.flight
+    condition = metrics.flight
     at_s = isolation.estimate_at_s
     if at_s is None:
-        at_s = flown.flown_s - 1.0 / flown.rate_hz if flown and flown.rate_hz else math.inf
+        at_s = condition.flown_s - 1.0 / condition.rate_hz if condition and condition.rate_hz else math.inf
     lasts = faults[0].end_s is None and faults[0].profile == "abrupt" and len(faults) == 1
     when = "" if lasts and isolation.estimate_at_s is None else f" at {_seconds_text(at_s)}"
     size = size_at(kind, faults, at_s)
@@ -443,13 +443,13 @@ def _withdrawn_texts(heading: str, withdrawn: Sequence[Withdrawn]) -> list[str]:
 
 def _named_fault_text(isolation: Named, metrics: Metrics) -> str:
     """One named fault: its name, the delay, whether it is right, type, estimated and true size."""
-    left = " (only remaining candidate)" if isolation.so_far else ""  # later data may exclude it, too
+    remaining = " (only remaining candidate)" if isolation.so_far else ""  # later data may exclude it, too
     when = "" if isolation.delay_s is None else f" after {_seconds_text(isolation.delay_s)}"
     right = "correct" if isolation.correct and isolation.type_correct is not False else "WRONG"
     if isolation.premature:
         right = f"PREMATURE at {_seconds_text(isolation.time_s)}"
     size = _estimate_text(isolation) + _true_size_text(isolation, metrics)
-    return f"{isolation.fault}{left}{when}; {right}{_type_text(isolation)}{size}"
+    return f"{isolation.fault}{remaining}{when}; {right}{_type_text(isolation)}{size}"
 
 
 def _probing_text(span_s: tuple[float, float]) -> str:

@@ -146,17 +146,19 @@ def expected_airspeed_mps(metrics: Metrics) -> float | None:
 def views(columns: Names, power: bool = False, within_mps: float | None = None) -> tuple[View, ...]:
     """Every view whose columns a log has. power: whether the law has used the engine. within_mps: as
     `expected_airspeed_mps` returns it."""
-    known = set(columns)
-    moved = surfaces(columns)
+    known_columns = set(columns)
+    surface_names = surfaces(columns)
     engine = power_column(columns)
     isolating = estimators(columns)
     all_views = (
-        _TRACKING, _profile_view(ATTAINABLE_AIRSPEED_COLUMN in known, engine, within_mps),
-        _surfaces_view(moved), _DETECTION, _SENSOR_MONITOR, _likelihood_view(columns),
-        _candidates_view(moved, isolating), _isolation_view(isolating), _ratio_view(isolating),
-        _effectiveness_view(moved), _SUPERVISOR, *((_ENGINE,) if power else ()), _STATES,
+        _TRACKING, _profile_view(ATTAINABLE_AIRSPEED_COLUMN in known_columns, engine, within_mps),
+        _surfaces_view(surface_names), _DETECTION, _SENSOR_MONITOR, _likelihood_view(columns),
+        _candidates_view(surface_names, isolating), _isolation_view(isolating), _ratio_view(isolating),
+        _effectiveness_view(surface_names), _SUPERVISOR, *((_ENGINE,) if power else ()), _STATES,
     )  # fmt: skip
-    return tuple(view for view in all_views if view.panels and known.issuperset(source_columns(view.columns)))
+    return tuple(
+        view for view in all_views if view.panels and known_columns.issuperset(source_columns(view.columns))
+    )
 
 
 def power_column(columns: Names) -> str:
@@ -264,9 +266,11 @@ def _surfaces_view(names: Names) -> View:
     """A panel for each surface; of many surfaces, two panels for each kind."""
     if len(names) > len(SURFACE_ROLES):
         panels = tuple(
-            _panel(f"{kind}: {label}", *((f"{name}_{of}_rad", called, role) for name, called, role in alike))
+            _panel(
+                f"{kind}: {label}", *((f"{name}_{ending}_rad", called, role) for name, called, role in alike)
+            )
             for kind, alike in _labels_and_roles_by_kind(names).items()
-            for of, label in (("cmd", "commanded"), ("effective", "as the aerodynamics see it"))
+            for ending, label in (("cmd", "commanded"), ("effective", "as the aerodynamics see it"))
         )
         return View("surfaces", "Control surfaces by kind", panels, n_panel_columns=2)
     panels = tuple(

@@ -87,9 +87,9 @@ def run(
             with written(what):
                 write()
     if failed:
-        why = "; ".join(" ".join(str(error).split()) for error in failed)
-        kept = f"{out / scenario.name}: the flight and its log are kept"
-        raise NotAllWritten(f"{kept}, but {why}") from failed[0]
+        reasons = "; ".join(" ".join(str(error).split()) for error in failed)
+        beginning = f"{out / scenario.name}: the flight and its log are kept"
+        raise NotAllWritten(f"{beginning}, but {reasons}") from failed[0]
     return document
 
 
@@ -107,10 +107,10 @@ def _note_failure_and_go_on(failed: list[Exception], folder: Path, what: str) ->
     except Exception as error:
         for left in set(folder.iterdir()) - before:
             shutil.rmtree(left) if left.is_dir() else left.unlink()
-        says = f"{type(error).__name__}: {error}"
+        text = f"{type(error).__name__}: {error}"
         if isinstance(error, OSError) and error.errno and not error.filename:  # an error of the disk
-            says = disk_error_text(error)
-        reason = SimulationFailed(f"{what} could not be written: {says}")
+            text = disk_error_text(error)
+        reason = SimulationFailed(f"{what} could not be written: {text}")
         reason.__cause__ = error
         failed.append(reason)
 

@@ -45,8 +45,8 @@ class Limit:
 
     def level(self, value: float) -> int:
         """The best level whose limits contain the value; WORSE if there is none."""
-        kept = (i for i, (least, most) in enumerate(self.levels, 1) if least <= value <= most)
-        return next(kept, WORSE)
+        levels = (i for i, (least, most) in enumerate(self.levels, 1) if least <= value <= most)
+        return next(levels, WORSE)
 
     def margin(self, value: float, level: int) -> float:
         """Distance of the value from the nearer limit of a level; negative outside."""
@@ -80,9 +80,9 @@ def of_model(linear: LinearModel, airspeed_mps: float, where: str) -> Qualities:
     g_per_rad = -linear.A[alpha, alpha] * airspeed_mps / GRAVITY_MPS2
     values = _values(modes(linear.of(CLASSICAL).A), float(g_per_rad))
     return [
-        Quality(where, airspeed_mps, *which, values[which], limit.level(values[which]))
+        Quality(where, airspeed_mps, *key, values[key], limit.level(values[key]))
         for limit in LIMITS
-        for which in [(limit.mode, limit.quantity)]
+        for key in [(limit.mode, limit.quantity)]
     ]
 
 

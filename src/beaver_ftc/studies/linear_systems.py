@@ -82,7 +82,9 @@ def zeros(A: np.ndarray, b: np.ndarray, row: int) -> np.ndarray:
     system = np.block([[A, b[:, None]], [c[None, :], np.zeros((1, 1))]])
     eigenvalues = eigvals(system, np.diag([1.0] * n + [0.0]))
     finite = eigenvalues[np.isfinite(eigenvalues) & (np.abs(eigenvalues) < MAX_ZERO_PER_S)]
-    size = [float(f"{each:.6g}") for each in np.abs(finite)]  # the last digits of a pair differ by machine
+    size = [
+        float(f"{magnitude:.6g}") for magnitude in np.abs(finite)
+    ]  # the last digits of a pair differ by machine
     return finite[np.lexsort((-finite.imag, size))]
 
 

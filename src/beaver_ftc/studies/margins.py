@@ -98,9 +98,9 @@ def cases(main: np.ndarray, surfaces: tuple[str, ...]) -> Iterator[tuple[str, np
     """The name of each fault, and the effectiveness (n,) that it leaves."""
     healthy = np.ones(len(surfaces))
     yield "none", healthy
-    for s, left in product(main, REMAINING):
-        fault = f"{100 * (1 - left):.0f} % lost" if left else "given up"
-        yield f"{surfaces[s]} {fault}", np.where(np.arange(len(surfaces)) == s, left, healthy)
+    for s, remaining in product(main, REMAINING):
+        fault = f"{100 * (1 - remaining):.0f} % lost" if remaining else "given up"
+        yield f"{surfaces[s]} {fault}", np.where(np.arange(len(surfaces)) == s, remaining, healthy)
 
 
 def open_loop(

@@ -65,22 +65,22 @@ def law_response(loop: OpenLoop, z: np.ndarray) -> np.ndarray:
     """
     n, m, dt = len(loop.effectiveness), len(loop.C), loop.dt_s
     z = z[..., None, None]
-    back = 1.0 / z
-    s = loop.share * back + 1.0 - loop.share
+    z_inv = 1.0 / z
+    s = loop.share * z_inv + 1.0 - loop.share
     approach = loop.approach[:, None]
     a = approach / (z - 1.0 + approach)
-    one = np.eye(3)
+    identity = np.eye(3)
     rates = np.eye(3, m)
     K, L_rate, L_disturbance = map(np.diag, (1.0 - loop.L_rate, loop.L_rate, loop.L_disturbance))
     Kp = np.diag(loop.Kp)
     lead = np.diag(loop.lead)
     D = lead @ loop.demand
-    ahead = one + loop.share * dt * Kp
+    ahead = identity + loop.share * dt * Kp
     moved = D @ Kp @ loop.G * loop.share * dt + lead - np.eye(n)
     # columns: x, d, p; rows: their equations
     M = [
-        [one - K * back, -K * dt * back, -K @ loop.G * dt * s],  # x
-        [L_disturbance * back, one - one * back + L_disturbance * dt * back,
+        [identity - K * z_inv, -K * dt * z_inv, -K @ loop.G * dt * s],  # x
+        [L_disturbance * z_inv, identity - identity * z_inv + L_disturbance * dt * z_inv,
          L_disturbance @ loop.G * dt * s],  # d
         [a * (D @ Kp), a * (D @ ahead), np.eye(n) + a * moved],  # p
     ]  # fmt: skip

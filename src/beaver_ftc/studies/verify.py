@@ -182,7 +182,7 @@ def _healthy_document(rows: Sequence[Row]) -> Document:
 def _scheme(rows: Sequence[Row]) -> Document:
     """Violations, detections, delays and errors of one scheme. rows: its outcomes."""
     n = len(rows)
-    counts = {promise: sum(row[of.broken] for row in rows) for promise, of in PROMISES.items()}
+    counts = {promise: sum(row[kind.broken] for row in rows) for promise, kind in PROMISES.items()}
     certain = [row for row in rows if row["guaranteed_s"] is not None]
     ratios = [row["delay_s"] / row["guaranteed_s"] for row in certain if row["delay_s"]]
     errors = [row["estimate_error"] for row in rows if row["estimate_error"] is not None]
@@ -251,13 +251,15 @@ def _fault_lines(document: Document) -> list[str]:
     if not schemes:
         return []
     lines = [f"{document['faults']} random faults{'':17}" + "".join(f"{name:>18}" for name in schemes)]
-    for promise, of in PROMISES.items():
+    for promise, kind in PROMISES.items():
         cells = [f"{s[promise]} (p < {s[promise + '_probability_upper_95']:.1e})" for s in schemes.values()]
-        lines.append(_line(f"{of.guarantee} {promise.replace('_', ' ')}", cells))
+        lines.append(_line(f"{kind.guarantee} {promise.replace('_', ' ')}", cells))
     for key in ("detected", "detection_certain", "isolated"):
         lines.append(_line(key.replace("_", " "), (str(s[key]) for s in schemes.values())))
-    for (label, key), which in product(_SPREADS.items(), ("median", "p90")):
-        lines.append(_line(f"{label}, {which}", (number_or_never(s[key][which]) for s in schemes.values())))
+    for (label, key), quantile in product(_SPREADS.items(), ("median", "p90")):
+        lines.append(
+            _line(f"{label}, {quantile}", (number_or_never(s[key][quantile]) for s in schemes.values()))
+        )
     if document["delay_shorter_by"] is not None:
         lines += [f"  median detection delay shorter by {document['delay_shorter_by']:.0%}", ""]
     return lines

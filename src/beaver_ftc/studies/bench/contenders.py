@@ -107,9 +107,9 @@ class ClosedLoop:
 
     def with_frame(self, compiled_frame: Callable[..., int]) -> "ClosedLoop":
         """The same loop and aircraft with another compiled frame, from which parts are taken out."""
-        other = copy(self)
-        other._fly_on = self.loop.direct(compiled_frame)
-        return other
+        variant = copy(self)
+        variant._fly_on = self.loop.direct(compiled_frame)
+        return variant
 
     def prepare(self) -> None:
         """Back to `at_s`."""
@@ -182,5 +182,5 @@ class ProportionalInversion:
         """Solve for the three main surfaces; return the deflections (4,) rad."""
         G = self._model.G(measured.y)
         feedback = self._FEEDBACK_PER_S * (reference.rate - measured.x)
-        wanted = reference.acceleration + feedback - self._model.f(measured.x, measured.y)
-        return np.append(np.linalg.solve(G[:, MAIN], wanted - G[:, FLAP] * self._flap_rad), self._flap_rad)
+        demand = reference.acceleration + feedback - self._model.f(measured.x, measured.y)
+        return np.append(np.linalg.solve(G[:, MAIN], demand - G[:, FLAP] * self._flap_rad), self._flap_rad)

@@ -186,7 +186,7 @@ class Bench(StudyCommand):
 
     def run(self, reporter: Reporter) -> Document:
         """Time everything."""
-        return bench(self.rounds, not self.no_parts, say=lambda what: reporter.say(f"timing {what}"))
+        return bench(self.rounds, not self.no_parts, say=lambda step: reporter.say(f"timing {step}"))
 
     def as_text(self, document: Document, colour: bool) -> str:
         """The times."""

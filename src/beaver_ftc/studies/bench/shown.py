@@ -23,7 +23,7 @@ _ALTERNATIVES = {
 
 def text_of(document: Document) -> str:
     """The document of `bench` as text."""
-    whole = document["whole_flight"]
+    whole_flights = document["whole_flight"]
     kinds = [{"kind": kind, **figures} for kind, figures in document["sweep_flights"].items()]
     head, rows = tabulated(SWEEP_FLIGHTS, kinds)
     sections = {
@@ -32,9 +32,13 @@ def text_of(document: Document) -> str:
         "other ways, after the alarm": [
             _row(_ALTERNATIVES[name], figures) for name, figures in document["alternatives"].items()
         ],
-        f"whole flights of {whole['frames']} frames, loading and trim included": [
-            *_rows(whole),
-            _row("with a log file", whole | {"ratio": whole["with_log_file_ratio"]}, "with_log_file_us"),
+        f"whole flights of {whole_flights['frames']} frames, loading and trim included": [
+            *_rows(whole_flights),
+            _row(
+                "with a log file",
+                whole_flights | {"ratio": whole_flights["with_log_file_ratio"]},
+                "with_log_file_us",
+            ),
         ],
         "flights of 15 s in a sweep, ms of processor time; x: of what JSBSim alone takes for its frames": [
             head,
@@ -57,9 +61,9 @@ def _rows(phase: Document) -> list[list[str]]:
     ]
 
 
-def _row(what: str, figures: Document, us: str = "us") -> list[str]:
+def _row(name: str, figures: Document, us: str = "us") -> list[str]:
     """A row: name, median and quartiles of the time under the key `us`, ratio to the bare aircraft, added
     time."""
     low, high = figures[f"{us}_quartiles"]
     adds = f"{figures['adds_us']:+.3f}" if "adds_us" in figures else ""
-    return [what, f"{figures[us]:.3f}", f"[{low:.3f}, {high:.3f}]", f"{figures['ratio']:.3f} x", adds]
+    return [name, f"{figures[us]:.3f}", f"[{low:.3f}, {high:.3f}]", f"{figures['ratio']:.3f} x", adds]

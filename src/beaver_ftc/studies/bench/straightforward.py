@@ -155,8 +155,8 @@ class Estimators:
     def isolated(self) -> int | None:
         """The index of the only estimator that is not excluded, after the alarm; None if there are several or
         none."""
-        left = np.flatnonzero(~self.excluded)
-        return int(left[0]) if self.detected and left.size == 1 else None
+        not_excluded = np.flatnonzero(~self.excluded)
+        return int(not_excluded[0]) if self.detected and not_excluded.size == 1 else None
 
     @property
     def unknown(self) -> np.ndarray:

@@ -64,8 +64,8 @@ def relative_gain(before: np.ndarray, after: np.ndarray, size: Size) -> Estimate
 
     def gain(before: np.ndarray, after: np.ndarray, axis: int = -1) -> np.ndarray:
         first, second = size(before, axis=axis), size(after, axis=axis)
-        none = np.where(second > 0.0, -np.inf, 0.0)
-        return np.where(first > 0.0, 1.0 - second / np.where(first > 0.0, first, 1.0), none)
+        without_cost = np.where(second > 0.0, -np.inf, 0.0)
+        return np.where(first > 0.0, 1.0 - second / np.where(first > 0.0, first, 1.0), without_cost)
 
     with np.errstate(invalid="ignore"):  # scipy's standard error of gains of -inf, which is not used here
         resampled = bootstrap(

@@ -80,8 +80,8 @@ def sections(part: Document) -> list[tuple[list[str], list[list[str]], list[str]
     laws = [row for row in lines if row["scheme"] == SCHEME]
     best = part["who_is_better"]
     return [
-        (*tabulated(columns, rows), [best[which]] if best else [])
-        for which, columns, rows in (("schemes", DIAGNOSIS, schemes), ("laws", CONTROL, laws))
+        (*tabulated(columns, rows), [best[kind]] if best else [])
+        for kind, columns, rows in (("schemes", DIAGNOSIS, schemes), ("laws", CONTROL, laws))
     ]
 
 
@@ -116,8 +116,8 @@ def page_of(document: Document, name: str) -> tuple[str, list[page.Part]]:
 def write_leaderboard(document: Document, path: Path) -> None:
     """Replace the part of a page below MARK. The part above it is written by hand and stays."""
     above = path.read_text(encoding="utf-8").partition(MARK)[0] if path.exists() else "# Benchmark\n\n"
-    made = f"Made with {page.versions_line(document['versions'])}."
-    path.write_text(above + page.as_markdown([MARK, made, *_sets(document)]), encoding="utf-8")
+    origin = f"Made with {page.versions_line(document['versions'])}."
+    path.write_text(above + page.as_markdown([MARK, origin, *_sets(document)]), encoding="utf-8")
 
 
 def _sets(document: Document) -> Iterator[page.Part]:

@@ -117,9 +117,9 @@ def fault_words(fault: Document) -> str:
         for key, value in fault.items()
         if key not in ("at_s", "end_s") and isinstance(value, int | float) and not isinstance(value, bool)
     ]
-    where = fault.get("actuator") or fault.get("sensor") or fault.get("case")
+    place = fault.get("actuator") or fault.get("sensor") or fault.get("case")
     end = "" if fault.get("end_s") is None else f"to {fault['end_s']:g} s"
-    words = where, fault["type"].replace("_", " "), *sizes, f"at {fault['at_s']:g} s", end
+    words = place, fault["type"].replace("_", " "), *sizes, f"at {fault['at_s']:g} s", end
     return " ".join(filter(None, words))
 
 
@@ -185,7 +185,7 @@ def _draw(axes: Any, folder: Path, label: str) -> None:
 
     from beaver_ftc.results.log import StoredLog
 
-    names = ["t_s", *(f"{a}_{what}_rad_s" for a in AXES for what in ("model", "measured"))]
+    names = ["t_s", *(f"{a}_{signal}_rad_s" for a in AXES for signal in ("model", "measured"))]
     log = StoredLog(folder / "log.parquet").read(names)
     step = max(1, len(log["t_s"]) // 20_000)
     for axis, letter in zip(axes, AXES, strict=True):

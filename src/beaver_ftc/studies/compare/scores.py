@@ -96,15 +96,15 @@ def _duel(entry: Entry, mine: Results, ours: Results) -> Document:
     def badness(result: Result) -> float:
         return result.rms_deg_s if entry.law != LAW else float(result.delay_s == inf)
 
-    both = zip(mine, ours, strict=bool(ours))
-    pairs = [(badness(a), badness(b)) for a, b in both if a.faulted and b.faulted]
+    flights = zip(mine, ours, strict=bool(ours))
+    pairs = [(badness(a), badness(b)) for a, b in flights if a.faulted and b.faulted]
     return dict(zip(("worse", "better", "p"), duel(pairs), strict=True))
 
 
-def _spread(name: str, values: Sequence[float], which: Sequence[str] = ("median", "90")) -> Document:
+def _spread(name: str, values: Sequence[float], parts: Sequence[str] = ("median", "90")) -> Document:
     """Median and 90 % quantile of values, or one of them."""
     shares = {"median": 0.5, "90": 0.9}
-    return {f"{name}_{part}": share_within(values, shares[part]) if values else None for part in which}
+    return {f"{name}_{part}": share_within(values, shares[part]) if values else None for part in parts}
 
 
 def _interval(name: str, values: Sequence[float], unit: str = "") -> Document:

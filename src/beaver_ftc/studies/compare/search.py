@@ -82,7 +82,7 @@ def value_at(range_: Range, place: float) -> float:
 
 def on_edge(values: Values, ranges: Ranges) -> dict[str, bool]:
     """Parameters that lie within `EDGE` of a limit of their range: whether it is the upper one."""
-    places = {name: on_scale(of, values[name]) for name, of in ranges.items()}
+    places = {name: on_scale(range_, values[name]) for name, range_ in ranges.items()}
     return {name: place > 0.5 for name, place in places.items() if not EDGE < place < 1.0 - EDGE}
 
 
@@ -127,7 +127,7 @@ def widen(range_: Range, upper: bool) -> Range:
 
 
 def _searched(
-    cost: Cost, ranges: Ranges, start: Values, known: float | None, trials: int, seed: int
+    cost: Cost, ranges: Ranges, start: Values, known_cost: float | None, trials: int, seed: int
 ) -> tuple[Values, float, list[float]]:
     """One search: the values found, their cost, and the costs of all trials.
 
@@ -143,30 +143,30 @@ def _searched(
 
     def values_at(point: np.ndarray) -> Values:
         places = zip(ranges.items(), point, strict=True)
-        return {name: value_at(of, float(place)) for (name, of), place in places}
+        return {name: value_at(range_, float(place)) for (name, range_), place in places}
 
     def attempt(point: np.ndarray) -> float:
         points.append(point.copy())
         costs.append(cost(values_at(point)))
         return costs[-1]
 
-    first = np.clip([on_scale(of, start[name]) for name, of in ranges.items()], 0.0, 1.0)
+    first = np.clip([on_scale(range_, start[name]) for name, range_ in ranges.items()], 0.0, 1.0)
     spread = LatinHypercube(n, rng=seed).random((trials - 1) // 2)
     step = FIRST_STEP
-    if known is None:
+    if known_cost is None:
         attempt(first)
     else:  # every other point of a restart is near its start, which is not tried again
         points.append(first)
-        costs.append(known)
+        costs.append(known_cost)
         spread[::2] = np.clip(first + NEAR * (2.0 * spread[::2] - 1.0), 0.0, 1.0)
         step = NEAR
     for point in spread:
         attempt(point)
-    while (left := trials - len(costs)) > n:  # Nelder-Mead again, from the best so far
+    while (remaining := trials - len(costs)) > n:  # Nelder-Mead again, from the best so far
         begin = points[int(np.argmin(costs))]
         steps = np.diag(np.where(begin < 0.5, step, -step))  # towards the middle of each range
         corners = np.vstack((begin, begin + steps))
-        options = {"maxfev": left, "initial_simplex": corners, "xatol": 1e-3, "fatol": 1e-5}
+        options = {"maxfev": remaining, "initial_simplex": corners, "xatol": 1e-3, "fatol": 1e-5}
         minimize(attempt, begin, method="Nelder-Mead", bounds=[(0.0, 1.0)] * n, options=options)
     chosen = _chosen(points, costs)
     return values_at(points[chosen]), costs[chosen], costs

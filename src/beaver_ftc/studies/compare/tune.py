@@ -88,8 +88,8 @@ class Method:
 
 def methods_of(schemes: Sequence[str], laws: Sequence[str], grades: Sequence[str]) -> list[Method]:
     """The methods with tunable parameters, on each grade."""
-    named = [(DETECTORS, name) for name in schemes] + [(LAWS, name) for name in laws]
-    methods = [Method(group, name, grade) for grade in grades for group, name in named]
+    group_and_name = [(DETECTORS, name) for name in schemes] + [(LAWS, name) for name in laws]
+    methods = [Method(group, name, grade) for grade in grades for group, name in group_and_name]
     return [method for method in methods if method.ranges()]
 
 

@@ -130,16 +130,16 @@ class Detectability(StudyCommand):
 
     def _refuse_contradictions(self) -> None:
         """Raise BadInput for options that exclude each other."""
-        where = (self.airspeed or (), self.altitude or ())
+        conditions = (self.airspeed or (), self.altitude or ())
         for wrong, allowed in (
             ((self.scenario is None) is (self.grid is None), "exactly one of SCENARIO and --grid"),
             (self.within is not None and self.grid is not None, "--within only with SCENARIO"),
             (self.within is not None and self.surface is None, "--within only with --surface"),
             (self.within is None and self.seed != Detectability.seed, "--seed only with --within"),
-            (self.within is not None and any(where), "--airspeed and --altitude only without --within"),
+            (self.within is not None and any(conditions), "--airspeed and --altitude only without --within"),
             (self.grid is None and bool(self.schemes or self.sensors or self.turbulence),
              "--schemes, --sensors and --turbulence only with --grid"),
-            (self.grid is not None and max(map(len, where)) > 1,
+            (self.grid is not None and max(map(len, conditions)) > 1,
              "with --grid at most one --airspeed and one --altitude"),
         ):  # fmt: skip
             if wrong:

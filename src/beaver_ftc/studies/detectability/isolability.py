@@ -35,13 +35,13 @@ def loss_limits(excluded: np.ndarray, frames: int, dt: float) -> Document:
     frame, s. A delay includes the frame in which the loss begins. next_exclusion (n,): from each frame on,
     the first frame in which a total loss excludes the other surface; n if there is none.
     """
-    least = best_in_window(excluded, frames)
+    smallest = best_in_window(excluded, frames)
     n = len(excluded)
     next_exclusion = np.where(excluded <= 1.0, np.arange(n), n)
     next_exclusion = np.minimum.accumulate(next_exclusion[::-1])[::-1]
     delay_s = np.where(next_exclusion < n, (next_exclusion - np.arange(n) + 1) * dt, inf)
-    found = (*largest_and_median(least), *largest_and_median(delay_s[: len(least)]))
-    return dict(zip(LOSS_COLUMNS, found, strict=True))
+    limits = (*largest_and_median(smallest), *largest_and_median(delay_s[: len(smallest)]))
+    return dict(zip(LOSS_COLUMNS, limits, strict=True))
 
 
 def best_in_window(values: np.ndarray, frames: int) -> np.ndarray:
@@ -66,5 +66,5 @@ def smallest_doublets(scenario: Scenario, after_s: float) -> dict[tuple[str, str
 
 def rows_without_result(faults: Sequence[str], why: str) -> list[Document]:
     """The rows, one a pair of surfaces, of a place that has no result, with the reason `why`."""
-    none = dict.fromkeys((*LOSS_COLUMNS, *DOUBLET_COLUMNS)) | {"why": why}
-    return [{"fault": fault, "other": other, **none} for fault, other in permutations(faults, 2)]
+    empty = dict.fromkeys((*LOSS_COLUMNS, *DOUBLET_COLUMNS)) | {"why": why}
+    return [{"fault": fault, "other": other, **empty} for fault, other in permutations(faults, 2)]

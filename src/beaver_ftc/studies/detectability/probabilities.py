@@ -189,12 +189,12 @@ def _comparison(rows: Rows) -> list[Document]:
     for place, rows_of_place in grouped(rows, *PLACE).items():
         for within_s in DUELS_S:
             by_scheme = grouped(rows_of_place, "scheme").items()
-            found = {scheme: _found_by_seed(group, within_s) for (scheme,), group in by_scheme}
-            others = [scheme for scheme in found if scheme not in BUILT_IN]
-            for ours, scheme in product([scheme for scheme in BUILT_IN if scheme in found], others):
+            by_seed_of = {scheme: _found_by_seed(group, within_s) for (scheme,), group in by_scheme}
+            others = [scheme for scheme in by_seed_of if scheme not in BUILT_IN]
+            for ours, scheme in product([scheme for scheme in BUILT_IN if scheme in by_seed_of], others):
                 duel = {**dict(zip(PLACE, place, strict=True)), "ours": ours, "against": scheme}
                 duel["within_s"] = within_s
-                compared.append(duel | _duel(found[ours], found[scheme]))
+                compared.append(duel | _duel(by_seed_of[ours], by_seed_of[scheme]))
     return compared
 
 

@@ -95,29 +95,29 @@ class Grid:
     def only(self, sensors: str | None, turbulence: str | None) -> "Grid":
         """The same flights under the conditions with these sensors and this turbulence; None is any. Raises
         BadInput if there is no such condition."""
-        kept = tuple(
+        conditions = tuple(
             condition
             for condition in self.conditions
             if sensors in (None, condition.sensors) and turbulence in (None, condition.turbulence)
         )
-        if not kept:
+        if not conditions:
             allowed = "; ".join(map(", ".join, self.conditions))
             raise BadInput(f"detectability: this grid has no such condition, allowed: {allowed}")
-        return replace(self, conditions=kept)
+        return replace(self, conditions=conditions)
 
     def elsewhere(
         self, aircraft: str | None, airspeed_mps: float | None, altitude_m: float | None, surface: str | None
     ) -> "Grid":
         """The same flights with another aircraft, airspeed or altitude, or with losses of one surface; None
         is as before. Raises BadInput for a surface that is not in the class of losses."""
-        known = find_aircraft(aircraft or DEFAULT, Path()).class_of_losses
-        if surface is not None and surface not in known:
-            raise BadInput(f"--surface {surface!r:.60}: allowed: {', '.join(known)}")
-        given = {"airspeed_mps": airspeed_mps, "altitude_m": altitude_m}
-        initial = {name: value for name, value in given.items() if value is not None}
+        class_of_losses = find_aircraft(aircraft or DEFAULT, Path()).class_of_losses
+        if surface is not None and surface not in class_of_losses:
+            raise BadInput(f"--surface {surface!r:.60}: allowed: {', '.join(class_of_losses)}")
+        condition = {"airspeed_mps": airspeed_mps, "altitude_m": altitude_m}
+        initial = {name: value for name, value in condition.items() if value is not None}
         keys = {"initial": initial, "aircraft": aircraft}
         where = {key: value for key, value in keys.items() if value}
-        surfaces = self.surfaces if aircraft is None else known
+        surfaces = self.surfaces if aircraft is None else class_of_losses
         return replace(self, where=where, surfaces=(surface,) if surface else surfaces)
 
     def faulted(self) -> list[Block]:
@@ -261,7 +261,9 @@ def fly_block(case: tuple[Block, bool], grid: Grid, schemes: Sequence[str]) -> W
         return _watch(Watched(block), [healthy], schemes)
     at_s = strikes_at_s(block)
     faults = ([loss(*fault, at_s)] for fault in grid.faults)
-    flights = [scenario_of(block, at_s + WATCHED_S, one, grid.where) for one in faults]
+    flights = [
+        scenario_of(block, at_s + WATCHED_S, faults_of_flight, grid.where) for faults_of_flight in faults
+    ]
     return _watch(Watched(block, grid.faults), flights, schemes)
 
 

@@ -96,8 +96,8 @@ def who_is_better(
             if total["flights"] and (scheme == BOTH or scheme not in BUILT_IN):
                 estimate = total["within"][soon]
                 pair = {"against": scheme, "ours": BOTH, "within_s": within_s}
-                one = next(_those(document["comparison"], **place, **pair), _NO_DUEL)
-                duel = {"better": one["seeds_theirs"], "worse": one["seeds_ours"], "p": one["p"]}
+                line = next(_those(document["comparison"], **place, **pair), _NO_DUEL)
+                duel = {"better": line["seeds_theirs"], "worse": line["seeds_ours"], "p": line["p"]}
                 rates = {
                     "rate": estimate["value"],
                     "rate_low": estimate["low"],

@@ -73,12 +73,12 @@ class _Flown:
 
     def of(self, variant: str, runs: Sequence[int], size: int) -> list[Document]:
         """The rows of these flights; those that are missing are flown."""
-        wanted = [Flight(variant, run, size) for run in runs]
-        missing = [flight for flight in wanted if flight not in self.rows]
+        flights = [Flight(variant, run, size) for run in runs]
+        missing = [flight for flight in flights if flight not in self.rows]
         if missing:
             self.rows.update(zip(missing, self.fly(missing), strict=True))
             self.tell(f"{variant}: {len(self.rows)} flights")
-        return [self.rows[flight] for flight in wanted]
+        return [self.rows[flight] for flight in flights]
 
     def says(self, variant: str, key: str, runs: Sequence[int], size: int) -> list[bool]:
         """The flag `key` of each of these flights."""
@@ -104,9 +104,11 @@ def check(scenario: Scenario, asked: Asked) -> None:
         raise BadInput(f"--surface {asked.surface!r:.60}: allowed: {', '.join(surfaces)}")
     if scenario.fdi.scheme == "none":
         raise BadInput(f"{scenario.name}: fdi.scheme: none diagnoses nothing, allowed: a scheme")
-    least = SETTLED_S + 2.0 * asked.within_s
-    if scenario.duration_s < least:
-        raise BadInput(f"{scenario.name}: duration_s: too short for --within, allowed: {least:g} or more")
+    shortest_s = SETTLED_S + 2.0 * asked.within_s
+    if scenario.duration_s < shortest_s:
+        raise BadInput(
+            f"{scenario.name}: duration_s: too short for --within, allowed: {shortest_s:g} or more"
+        )
 
 
 def fly_one(variants: dict[str, Scenario], asked: Asked, flight: Flight) -> Document:
@@ -117,10 +119,10 @@ def fly_one(variants: dict[str, Scenario], asked: Asked, flight: Flight) -> Docu
     frames = round(draws.uniform(SETTLED_S, scenario.duration_s - asked.within_s) * scenario.rate_hz)
     at_s = frames / scenario.rate_hz
     fault = loss(asked.surface, flight.size / LARGEST, at_s)
-    flown = scenario.with_({"seed": seed, "faults": [fault], "expect": {}})
+    faulted = scenario.with_({"seed": seed, "faults": [fault], "expect": {}})
     end_s = min(at_s + asked.within_s + 2.0 / scenario.rate_hz, scenario.duration_s)
     try:
-        landing = fly(flown.model_copy(update={"duration_s": end_s}))
+        landing = fly(faulted.model_copy(update={"duration_s": end_s}))
         metrics = measure(landing)
     except BeaverFtcError:
         return _row(failed=True)

@@ -49,16 +49,18 @@ def _sentences(document: Document) -> Iterator[str]:
     help."""
     yield from _sizes(document)
     yield from _doubts(document)
-    none = "makes a difference outside of the intervals"
-    limit = _effect(_best(document, references=False), f"nothing that was left out alone {none}")
+    no_difference = "makes a difference outside of the intervals"
+    limit = _effect(_best(document, references=False), f"nothing that was left out alone {no_difference}")
     yield f"What limits it most: {limit}."
-    helpful = _effect(_best(document, references=True), f"none of those that were tried {none}")
+    helpful = _effect(_best(document, references=True), f"none of those that were tried {no_difference}")
     yield f"Which reference would help: {helpful}."
 
 
 def _sizes(document: Document) -> Iterator[str]:
     """A sentence about the size that is certain, and one about the size that most flights find."""
-    certain, found, total, surface = (document[key] for key in ("certain", "found", "total_loss", "surface"))
+    certain, frequent, total, surface = (
+        document[key] for key in ("certain", "found", "total_loss", "surface")
+    )
     within = f"within {document['within_s']:g} s"
     nothing = f"not even a total loss of {surface}"
     size = nothing
@@ -69,8 +71,10 @@ def _sizes(document: Document) -> Iterator[str]:
         f"{certain['at_total_loss']} of {certain['flights']} flights)."
     )
     size = nothing
-    if found["size"] is not None:
-        size = f"a loss of {percent(found['size'])} ({_interval(found)}) of the effectiveness of {surface}"
+    if frequent["size"] is not None:
+        size = (
+            f"a loss of {percent(frequent['size'])} ({_interval(frequent)}) of the effectiveness of {surface}"
+        )
     yield (
         f"Found {within} in {percent(document['share'])} of flights: {size} (a total loss: in "
         f"{percent(total['value'])}, {bare_percent(total['low'])} to {percent(total['high'])}; "
@@ -80,27 +84,27 @@ def _sizes(document: Document) -> Iterator[str]:
 
 def _doubts(document: Document) -> Iterator[str]:
     """Sentences about flights in which the sizes mean less than they seem to."""
-    for why in document["inconclusive"]:
-        yield f"Nothing can be concluded in part of these flights: {why}."
+    for reason in document["inconclusive"]:
+        yield f"Nothing can be concluded in part of these flights: {reason}."
     if document["bound_used"] >= NEAR_THRESHOLD_SHARE:
         yield (
             f"Half of these flights use {percent(document['bound_used'])} of the bound or more before the "
             "loss: the size found then measures the uncertainty that the scenario flies with, not the "
             "diagnosis."
         )
-    for key, one, many in NOT_FOUND:
+    for key, of_one, of_several in NOT_FOUND:
         if count := document[key]:
-            yield f"1 flight {one}" if count == 1 else f"{count} flights {many}"
+            yield f"1 flight {of_one}" if count == 1 else f"{count} flights {of_several}"
 
 
 def _is_better(variant: Document, document: Document) -> bool:
     """Whether a variant finds smaller losses than the scenario as it is, so that the intervals do not
     overlap. If the scenario finds no loss often enough: whether the variant finds a total loss more often."""
-    found = variant["found"]
+    size = variant["found"]
     base = document["found"]
     if base["size"] is None:
         return bool(variant["total_loss"]["low"] > document["total_loss"]["high"])
-    return found["high"] is not None and base["low"] is not None and bool(found["high"] < base["low"])
+    return size["high"] is not None and base["low"] is not None and bool(size["high"] < base["low"])
 
 
 def _best(document: Document, references: bool) -> Document | None:
@@ -120,21 +124,21 @@ def _effect(row: Document | None, none: str) -> str:
     """The name of a variant, and the size found in its flights; `none` if there is no such variant."""
     if row is None:
         return none
-    found = row["found"]
+    size = row["found"]
     total = row["total_loss"]
-    if found["size"] is None:
+    if size["size"] is None:
         return f"{row['variant']}, a total loss is found in {percent(total['value'])} of flights"
-    return f"{row['variant']}, it would be {percent(found['size'])} ({_interval(found)})"
+    return f"{row['variant']}, it would be {percent(size['size'])} ({_interval(size)})"
 
 
-def _interval(found: Document) -> str:
+def _interval(size: Document) -> str:
     """The interval of a size in words; None is beyond a total loss."""
-    if found["low"] is None:
+    if size["low"] is None:
         return "more than a total loss"
-    if found["low"] == found["high"]:
-        return percent(found["low"])
-    low = bare_percent(found["low"])
-    return f"{low} % or more" if found["high"] is None else f"{low} to {percent(found['high'])}"
+    if size["low"] == size["high"]:
+        return percent(size["low"])
+    low = bare_percent(size["low"])
+    return f"{low} % or more" if size["high"] is None else f"{low} to {percent(size['high'])}"
 
 
 def rows_of_sizes(document: Document) -> list[Document]:

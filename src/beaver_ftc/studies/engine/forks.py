@@ -65,26 +65,26 @@ class Forks:
     def _fork(self, piece: Piece) -> None:
         """Start a process for a piece, whose result is the next one."""
         fork = multiprocessing.get_context("fork")
-        here, there = fork.Pipe(duplex=False)
-        process = fork.Process(target=_do, args=(piece, there), daemon=True)
+        receiver, sender = fork.Pipe(duplex=False)
+        process = fork.Process(target=_do, args=(piece, sender), daemon=True)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # Python warns of threads; those of our libraries allow a fork
             process.start()
-        there.close()
-        self._busy[here] = len(self._results), process
+        sender.close()
+        self._busy[receiver] = len(self._results), process
 
     def _wait(self, left: int) -> None:
         """Wait until at most `left` processes are busy."""
         while len(self._busy) > left:
-            for here in wait([*self._busy]):
-                self._take(here)  # type: ignore[arg-type]  # a connection, as all of them
+            for receiver in wait([*self._busy]):
+                self._take(receiver)  # type: ignore[arg-type]  # a connection, as all of them
 
-    def _take(self, here: Connection) -> None:
+    def _take(self, receiver: Connection) -> None:
         """Receive the result of a process, or raise its exception."""
-        place, process = self._busy.pop(here)
-        with here:
+        place, process = self._busy.pop(receiver)
+        with receiver:
             try:
-                self._results[place], error = here.recv()
+                self._results[place], error = receiver.recv()
             except EOFError:
                 error = SimulationFailed(KILLED)
         process.join()
@@ -92,12 +92,12 @@ class Forks:
             raise error
 
 
-def _do(piece: Piece, there: Connection) -> None:
+def _do(piece: Piece, sender: Connection) -> None:
     """Do the piece in the forked process, and send (result, None) or (None, exception). Signals end the
     process."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_DFL)
     try:
-        there.send((piece(), None))
+        sender.send((piece(), None))
     except Exception as error:
-        there.send((None, error))
+        sender.send((None, error))

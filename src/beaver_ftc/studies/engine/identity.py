@@ -38,17 +38,17 @@ def known(manifest: Path, what: str) -> Document | None:
     return document if is_one else None
 
 
-def refuse_other(mine: Document, there: Document, folder: Path) -> None:
+def refuse_other(mine: Document, theirs: Document, folder: Path) -> None:
     """Raise BadInput unless the flights in a folder have my identity. there: the identity of these
     flights."""
     what = next(iter(mine))
-    changed = differences(there.get(what, {}), mine[what])
+    changed = differences(theirs.get(what, {}), mine[what])
     if changed:
         raise BadInput(
             f"{folder}: the {what} file has changed since these flights ({', '.join(changed)}): "
             f"resuming would mix two {what}s, allowed: the unchanged file, or another --out"
         )
-    then = there.get("versions", {})
+    then = theirs.get("versions", {})
     now = mine["versions"]
     changed = [f"{name} {then.get(name)} then, {now.get(name)} now" for name in differences(then, now)]
     if changed:
@@ -70,13 +70,13 @@ def plug_ins() -> dict[str, str]:
     from beaver_ftc.plugins import DETECTORS, LAWS, OURS, registered
 
     packages = {entry.package for group in (DETECTORS, LAWS) for entry in registered(group).values()}
-    found = {}
+    version_of = {}
     for package in sorted(packages - {OURS, ""}):
         try:
-            found[package] = version(package)
+            version_of[package] = version(package)
         except PackageNotFoundError:
-            found[package] = "unknown"
-    return found
+            version_of[package] = "unknown"
+    return version_of
 
 
 def hashed_files() -> list[Path]:

@@ -66,45 +66,45 @@ def single_threaded() -> Iterator[None]:
     with environment(ONE_THREAD_EACH):
         if blocks:  # SIGINT is blocked during the block, and new processes inherit the mask
             resource_tracker.ensure_running()  # started before: its start would reset the mask
-            before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+            old_mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             yield
         finally:
             if blocks:
-                signal.pthread_sigmask(signal.SIG_SETMASK, before)
+                signal.pthread_sigmask(signal.SIG_SETMASK, old_mask)
 
 
 @contextlib.contextmanager
 def environment(values: Mapping[str, str]) -> Iterator[None]:
     """Set variables of the environment during the block."""
-    before = {name: os.environ[name] for name in values if name in os.environ}
+    old_values = {name: os.environ[name] for name in values if name in os.environ}
     os.environ.update(values)
     try:
         yield
     finally:
         for name in values:
             del os.environ[name]
-        os.environ.update(before)
+        os.environ.update(old_values)
 
 
 def silence_this_process() -> dict[int, int]:
     """Discard all output of this process on file descriptors 1 and 2, also that of C libraries. Returns a
     copy of each descriptor; a worker never uses them, `silence` restores and closes them."""
-    kept = {stream: os.dup(stream) for stream in (1, 2)}
+    copies = {stream: os.dup(stream) for stream in (1, 2)}
     nowhere = os.open(os.devnull, os.O_WRONLY)
-    for stream in kept:
+    for stream in copies:
         os.dup2(nowhere, stream)
     os.close(nowhere)
-    return kept
+    return copies
 
 
 @contextlib.contextmanager
 def silence() -> Iterator[None]:
     """Discard all output of this process during the block."""
-    kept = silence_this_process()
+    copies = silence_this_process()
     try:
         yield
     finally:
-        for stream, copy in kept.items():
+        for stream, copy in copies.items():
             os.dup2(copy, stream)
             os.close(copy)

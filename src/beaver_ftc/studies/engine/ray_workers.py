@@ -80,11 +80,11 @@ class RayWorkers:
 
 def fly_task(work: Work, driver_versions: dict[str, str], cases: Sequence[Any]) -> list[Row]:
     """Fly a task on a node. Raises SimulationFailed if its versions differ from those of the driver."""
-    own = versions()
+    our_versions = versions()
     changed = [
-        f"{name} {own.get(name)} instead of {theirs}"
+        f"{name} {our_versions.get(name)} instead of {theirs}"
         for name, theirs in driver_versions.items()
-        if own.get(name) != theirs
+        if our_versions.get(name) != theirs
     ]
     if changed:
         raise SimulationFailed(

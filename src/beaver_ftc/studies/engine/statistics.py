@@ -110,8 +110,8 @@ def median(values: Iterable[float | None]) -> dict[str, float | None]:
     result is None."""
     ordered = np.sort([*map(or_never, values)])
     ends = [quantile_bound(ordered, 0.5, (1.0 + CONFIDENCE) / 2, upper) for upper in (False, True)]
-    found = quantile(ordered, 0.5), *ends
-    return {key: finite(value) for key, value in zip(("value", "low", "high"), found, strict=True)}
+    estimate = quantile(ordered, 0.5), *ends
+    return {key: finite(value) for key, value in zip(("value", "low", "high"), estimate, strict=True)}
 
 
 def share_within(values: Iterable[float | None], share: float) -> float:

@@ -175,17 +175,17 @@ class LocalWorkers:
 
     def outcomes(self, timeout_s: float) -> list[Outcome]:
         done, _ = wait(self._busy, timeout_s, FIRST_COMPLETED)
-        return [self._outcome(flown) for flown in done]
+        return [self._outcome(future) for future in done]
 
     def close(self) -> None:
         for worker in (*self._idle, *(worker for worker, _ in self._busy.values())):
             worker.end()
 
-    def _outcome(self, flown: "Future[list[Row]]") -> Outcome:
-        worker, task = self._busy.pop(flown)
+    def _outcome(self, future: "Future[list[Row]]") -> Outcome:
+        worker, task = self._busy.pop(future)
         rows = None
         try:
-            rows = flown.result()
+            rows = future.result()
         except BrokenProcessPool:
             worker = _Worker(self._work)
         except Exception as error:  # of the worker; the error of a flight is in its row

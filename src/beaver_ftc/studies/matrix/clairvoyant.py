@@ -37,7 +37,7 @@ def columns_of(aircraft: Aircraft) -> Columns:
     return Columns(*COLUMNS, *aircraft.signals, *surfaces)
 
 
-def seen_when_told(scenario: "Scenario", kept: Columns, surface: str) -> Document:
+def seen_when_told(scenario: "Scenario", log: Columns, surface: str) -> Document:
     """told_deflection: deflection d of the fault of a surface from its begin to the end of the flight.
     told_chance: the probability of detecting it in this time.
 
@@ -50,16 +50,14 @@ def seen_when_told(scenario: "Scenario", kept: Columns, surface: str) -> Documen
     aircraft = scenario.airframe
     context, coefficients = _declared(scenario)
     at_s = scenario.faults[0].at_s
-    struck = kept["t_s"] > at_s + 0.5 * context.dt_s
+    is_faulty = log["t_s"] > at_s + 0.5 * context.dt_s
     off_rad = np.where(
-        struck, kept[f"{surface}_effective_rad"] - healthy_positions(context, kept, surface), 0.0
+        is_faulty, log[f"{surface}_effective_rad"] - healthy_positions(context, log, surface), 0.0
     )
     own_terms = [term for term in aircraft.moments if term.surface == surface]
-    phi = np.sum(
-        [term.value * term_acceleration(aircraft, term, kept, off_rad) for term in own_terms], axis=0
-    )
+    phi = np.sum([term.value * term_acceleration(aircraft, term, log, off_rad) for term in own_terms], axis=0)
     unknown = [(t, c) for t, c in zip(aircraft.moments, coefficients, strict=True) if c > 0.0]
-    regressors = [term_acceleration(aircraft, t, kept, kept.get(f"{t.surface}_cmd_rad")) for t, _ in unknown]
+    regressors = [term_acceleration(aircraft, t, log, log.get(f"{t.surface}_cmd_rad")) for t, _ in unknown]
     sigma = np.array([c for _, c in unknown]) / sqrt(3.0)
     stacked = np.stack(regressors, axis=-1) if unknown else np.zeros((*phi.shape, 0))
     gyros = (

@@ -113,9 +113,9 @@ def declared(turbulence: str = "none", aircraft: str = DEFAULT) -> Document:
 @lru_cache
 def adjustable_terms(aircraft: str) -> tuple[str, ...]:
     """Names of the terms of an aircraft whose truth has a factor for them; a derived aircraft has none."""
-    flown = aircraft_of(aircraft)
-    plant = Plant(100, aircraft=flown)
-    return tuple(t.name for t in flown.moments if plant.has(f"uncertainty/{t.name}-scale"))
+    airframe = aircraft_of(aircraft)
+    plant = Plant(100, aircraft=airframe)
+    return tuple(t.name for t in airframe.moments if plant.has(f"uncertainty/{t.name}-scale"))
 
 
 def scenario_of(case: FaultCase, law: str, trimmed_deg: float) -> Scenario:
@@ -142,9 +142,9 @@ def scenario_of(case: FaultCase, law: str, trimmed_deg: float) -> Scenario:
 @lru_cache
 def trimmed_deg(airspeed_mps: float, surface: str, aircraft: str = DEFAULT) -> float:
     """Deflection of a surface, deg, in the trim with which the cases start."""
-    flown = aircraft_of(aircraft)
-    altitude_m = initial_of(flown)().altitude_m
-    point = trim(airspeed_mps, altitude_m, plant=Plant(100, aircraft=flown))
+    airframe = aircraft_of(aircraft)
+    altitude_m = initial_of(airframe)().altitude_m
+    point = trim(airspeed_mps, altitude_m, plant=Plant(100, aircraft=airframe))
     return degrees(point.surfaces_rad[surface])
 
 
@@ -259,20 +259,24 @@ def beside_told(rows: Rows) -> Document:
 
 def _cell(fault: str, surface: str, rows: Rows) -> Document:
     """The worst results of a fault on a surface over the airspeeds."""
-    here = [row for row in rows if (row["fault"], row["surface"]) == (fault, surface)]
-    delays = [row["delay_s"] for row in here]
+    flights = [row for row in rows if (row["fault"], row["surface"]) == (fault, surface)]
+    delays = [row["delay_s"] for row in flights]
     return {
         "fault": fault,
         "surface": surface,
-        "verdict": min((row["verdict"] for row in here), key=VERDICTS.index),
+        "verdict": min((row["verdict"] for row in flights), key=VERDICTS.index),
         "delay_s": None if None in delays else max(delays),
-        "candidates": sorted({candidate for row in here for candidate in row["candidates"]}),
-        "ratio": max((row["ratio"] for row in here if row["ratio"] is not None), default=None),
-        "lost": sum(row["departure_s"] is not None for row in here),
-        "oracle_lost": sum(row["oracle_departure_s"] is not None for row in here),
-        "flights": len(here),
-        "remark": _remark(here),
-        **({"told": sum(row["told_chance"] > LIKELY for row in here)} if "told_chance" in here[0] else {}),
+        "candidates": sorted({candidate for row in flights for candidate in row["candidates"]}),
+        "ratio": max((row["ratio"] for row in flights if row["ratio"] is not None), default=None),
+        "lost": sum(row["departure_s"] is not None for row in flights),
+        "oracle_lost": sum(row["oracle_departure_s"] is not None for row in flights),
+        "flights": len(flights),
+        "remark": _remark(flights),
+        **(
+            {"told": sum(row["told_chance"] > LIKELY for row in flights)}
+            if "told_chance" in flights[0]
+            else {}
+        ),
     }
 
 
@@ -287,13 +291,13 @@ def _reason(lost: Rows) -> str:
     return f"{lost[0]['departure_signal']} diverged"
 
 
-def _remark(here: Rows) -> str:
+def _remark(flights: Rows) -> str:
     """How many flights lose the aircraft, and the reason; or that no flight has an alarm."""
-    lost = [row for row in here if row["departure_s"] is not None]
+    lost = [row for row in flights if row["departure_s"] is not None]
     if lost:
         oracle_lost = sum(row["oracle_departure_s"] is not None for row in lost)
-        return f"lost in {len(lost)} of {len(here)} flights, the oracle in {oracle_lost}: {_reason(lost)}"
-    if all(not row["detected"] for row in here):
+        return f"lost in {len(lost)} of {len(flights)} flights, the oracle in {oracle_lost}: {_reason(lost)}"
+    if all(not row["detected"] for row in flights):
         return "no effect beyond the declared uncertainty: tracking is as before"
     return ""
 

@@ -120,7 +120,7 @@ LEGEND = (
 
 def as_text(document: Document) -> str:
     """A table for each law, the margins of the linear model, and the totals."""
-    speeds = [found["airspeed_mps"] for found in document["margins"]]
+    speeds = [margin["airspeed_mps"] for margin in document["margins"]]
     flights = {(row["law"], row["lost"], row["airspeed_mps"]): row for row in document["flights"]}
     tables = [
         aligned([
@@ -154,8 +154,8 @@ def _half(outcome: Document) -> str:
     return "{q_rms_deg_s:.2f} {theta_swing_deg:4.1f}".format(**outcome)
 
 
-def _or_unlimited(says: str, margin: float | None) -> str:
-    return "unlimited" if margin is None else says.format(margin)
+def _or_unlimited(form: str, margin: float | None) -> str:
+    return "unlimited" if margin is None else form.format(margin)
 
 
 MARGINS = (

@@ -107,9 +107,9 @@ def settle(scenarios: Sequence[Scenario], needed: Sequence[np.ndarray]) -> tuple
     """
     constant = recommend(needed)
     for _ in range(MAX_ROUNDS):
-        again = (split_flight(with_bound(scenario, constant)) for scenario in scenarios)
+        flights = (split_flight(with_bound(scenario, constant)) for scenario in scenarios)
         larger_needed = [
-            flight.smallest_constant for flight, flown in again if flight.exceeded or flown.false_alarm
+            flight.smallest_constant for flight, metrics in flights if flight.exceeded or metrics.false_alarm
         ]
         if not larger_needed:
             return constant, True

@@ -49,22 +49,22 @@ MODEL_LOOKS: dict[str, tuple[str, dict[str, Any]]] = {  # marker of a pole, and 
 }
 
 
-def figures(folder: Path, found: Document, flown: Metrics, analysis: LinearAnalysis) -> Files:
+def figures(folder: Path, document: Document, metrics: Metrics, analysis: LinearAnalysis) -> Files:
     """The figures of a result folder that holds `mismatch.parquet`, by the name of their files."""
     return {
-        "mismatch-sources.png": sources_figure(folder / "mismatch.parquet", found, marks(flown)),
-        "mismatch-bound.png": bound_figure(found),
-        "mismatch-linear.png": linear_figure(analysis, found["scenario"]),
+        "mismatch-sources.png": sources_figure(folder / "mismatch.parquet", document, marks(metrics)),
+        "mismatch-bound.png": bound_figure(document),
+        "mismatch-linear.png": linear_figure(analysis, document["scenario"]),
     }
 
 
-def sources_figure(frames: Path, found: Document, instants: Sequence[Mark]) -> "Figure":
+def sources_figure(frames: Path, document: Document, instants: Sequence[Mark]) -> "Figure":
     """A panel for each axis: the largest sources, and the sum of all without the fault, in front of the
     bound."""
-    chosen = {axis: largest_sources(found, axis) for axis in AXES}
+    chosen = {axis: largest_sources(document, axis) for axis in AXES}
     names = {axis: [TOTAL, FAULT, ETA_BAR, *chosen[axis]] for axis in AXES}
     series = series_of(StoredLog(frames), [column(axis, name) for axis in AXES for name in names[axis]])
-    title = f"Truth less design: what it is made of, faults aside\n{found['scenario']}"
+    title = f"Truth less design: what it is made of, faults aside\n{document['scenario']}"
     figure, grid = panels(3, 1, 11.0, 8.0, title, sharex=True)
     for axis, axes in zip(AXES, grid.flat, strict=True):
         _draw_sources(axes, series, axis, chosen[axis], instants)
@@ -72,9 +72,9 @@ def sources_figure(frames: Path, found: Document, instants: Sequence[Mark]) -> "
     return figure
 
 
-def largest_sources(found: Document, axis: str) -> list[str]:
+def largest_sources(document: Document, axis: str) -> list[str]:
     """The sources of an axis with the largest peaks, without faults, the largest first."""
-    peaks = {name: found["axes"][axis][name]["max"] for name in CAUSES}
+    peaks = {name: document["axes"][axis][name]["max"] for name in CAUSES}
     by_peak = sorted(CAUSES, key=lambda name: -peaks[name])
     least = LEAST_CURVE * peaks[by_peak[0]]
     return [name for name in by_peak[:SHOWN_SOURCES] if peaks[name] >= least]
@@ -107,9 +107,9 @@ def _dress(axes: "Axes") -> None:
     axes.margins(x=0.01)
 
 
-def bound_figure(found: Document) -> "Figure":
+def bound_figure(document: Document) -> "Figure":
     """Bars of the largest share of the bound that each source has used, a panel for each axis."""
-    sources_of_axes = [found["axes"][axis] for axis in AXES]
+    sources_of_axes = [document["axes"][axis] for axis in AXES]
     names = [
         name
         for name in (*SOURCES, UNEXPLAINED)
@@ -120,11 +120,11 @@ def bound_figure(found: Document) -> "Figure":
     notes = [
         [share_text(share) if _bar_length(share) > LEAST_SHARE else "" for share in row] for row in shares
     ]
-    title = f"Largest share of the bound eta_bar\n{found['scenario']}", "share of eta_bar (1: all of it)"
+    title = f"Largest share of the bound eta_bar\n{document['scenario']}", "share of eta_bar (1: all of it)"
     size = 11.0, 1.6 + 0.34 * max(len(names), 2)
     ends = LEAST_SHARE, 30.0 * max(values.max(initial=0.0), 1.0)
-    shown = [without_underscores(name) for name in names], np.maximum(values, LEAST_SHARE), notes
-    return _bars(size, title, *shown, ends, grey=FAULT)
+    bars = [without_underscores(name) for name in names], np.maximum(values, LEAST_SHARE), notes
+    return _bars(size, title, *bars, ends, grey=FAULT)
 
 
 def _bar_length(share: float | None) -> float:
@@ -191,8 +191,8 @@ def linear_figure(analysis: LinearAnalysis, name: str) -> "Figure":
     grid[1, 0].set_xlabel("real part (1/s)", fontsize=9)
     grid[0, 1].set_ylabel("magnitude (dB, rad/s per rad)", fontsize=9)
     grid[1, 1].set_ylabel("phase (deg)", fontsize=9)
-    named = grid[0, 1].get_legend_handles_labels()
-    figure.legend(*named, loc="outside lower center", ncols=len(MODEL_LOOKS), fontsize=9, frameon=False)
+    entries = grid[0, 1].get_legend_handles_labels()
+    figure.legend(*entries, loc="outside lower center", ncols=len(MODEL_LOOKS), fontsize=9, frameon=False)
     return figure
 
 
@@ -226,10 +226,10 @@ def map_figure(entries: Sequence[Document], name: str) -> "Figure":
     from matplotlib.colors import LogNorm
 
     speeds, altitudes = (list(dict.fromkeys(e[of] for e in entries)) for of in ("airspeed_mps", "altitude_m"))
-    worst = [np.nan if each["worst_ratio"] is None else each["worst_ratio"] for each in entries]
+    worst = [np.nan if entry["worst_ratio"] is None else entry["worst_ratio"] for entry in entries]
     grids = np.moveaxis(np.reshape(worst, (len(altitudes), len(speeds), len(AXES))), -1, 0)
-    known = grids[grids > 0.0] if (grids > 0.0).any() else np.ones(1)
-    norm = LogNorm(vmin=min(known.min(), 0.99), vmax=max(known.max(), 1.01))
+    positive = grids[grids > 0.0] if (grids > 0.0).any() else np.ones(1)
+    norm = LogNorm(vmin=min(positive.min(), 0.99), vmax=max(positive.max(), 1.01))
     title = f"Largest mismatch over the bound eta_bar, no fault\n{name}"
     figure, panel = panels(1, 3, 14.0, 4.6, title, sharey=True)
     names = [f"{V:g}" for V in speeds], [f"{h:g}" for h in altitudes]

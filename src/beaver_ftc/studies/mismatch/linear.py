@@ -77,8 +77,10 @@ def own_deviation(scenario: Scenario, point: FlightState) -> ByMode:
     """By mode, deviation of the linearisation of JSBSim itself from the FDC equations, at `point` without
     sideslip."""
     straight = replace(point, beta_rad=0.0)
-    found, reference = (modes(model(scenario, straight).of(CLASSICAL).A) for model in (own, fdc_model))
-    return {name: deviation(found[name].pole, reference[name].pole) for name in MODES}
+    modes_of_jsbsim, reference = (
+        modes(model(scenario, straight).of(CLASSICAL).A) for model in (own, fdc_model)
+    )
+    return {name: deviation(modes_of_jsbsim[name].pole, reference[name].pole) for name in MODES}
 
 
 def fdc_model(scenario: Scenario, point: FlightState) -> LinearModel:
@@ -139,8 +141,8 @@ def linear_document(analysis: LinearAnalysis) -> Document:
         "altitude_m": analysis.point.altitude_m,
         "modes": {
             mode: {
-                **{name: _mode(found[mode]) for name, found in analysis.modes.items()},
-                "deviation": {name: each[mode] for name, each in deviations.items()},
+                **{name: _mode(modes_of_model[mode]) for name, modes_of_model in analysis.modes.items()},
+                "deviation": {name: deviation[mode] for name, deviation in deviations.items()},
                 "jsbsim_own_deviation": analysis.own_deviation[mode],
             }
             for mode in MODES

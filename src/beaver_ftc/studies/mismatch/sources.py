@@ -167,15 +167,19 @@ class Models:
         declared = Declared.of(scenario)
         self.design, mass = design_of(declared)[0], declared.mass
         anchor(self.design, *known_trim(declared))
-        kept = {k: v for k, v in model.coefficients.items() if model.engine_terms or k not in ENGINE_TERMS}
+        design_scale = {
+            k: v for k, v in model.coefficients.items() if model.engine_terms or k not in ENGINE_TERMS
+        }
         self.untied = design_record(scale=declared.scale, mass=mass)[0]
-        self.whole, self.turning = (design_record(scale=scale, mass=mass)[0] for scale in (kept, true))
+        self.whole, self.turning = (
+            design_record(scale=scale, mass=mass)[0] for scale in (design_scale, true)
+        )
         self.truth = design_record(scale=true)[0]
         self.inertia = inertia_of(self.truth)
         self.parts = {
-            term.name: design_record(scale=kept | {term.name: true.get(term.name, 1.0)}, mass=mass)[0]
+            term.name: design_record(scale=design_scale | {term.name: true.get(term.name, 1.0)}, mass=mass)[0]
             for term in load().moments
-            if true.get(term.name, 1.0) != kept.get(term.name, 1.0)
+            if true.get(term.name, 1.0) != design_scale.get(term.name, 1.0)
         }
 
 

@@ -77,19 +77,21 @@ def run_mismatch(
             flight = fly(scenario, log, progress)
         metrics = measure(flight)
         stored = StoredLog(folder / "log.parquet")
-        kept = split(scenario, stored.read([name for name in stored.columns if name in LOGGED]))
+        flight_split = split(scenario, stored.read([name for name in stored.columns if name in LOGGED]))
         with ParquetLog(folder / "mismatch.parquet") as frames:
             frames.open(COLUMNS)
-            frames.write(kept.rows())
+            frames.write(flight_split.rows())
         analysis = analyse(scenario)
-        recommended = recommended_for([scenario], [kept.smallest_constant])
-        found = document(scenario, kept, metrics) | recommended | {"linear": linear_document(analysis)}
+        recommended = recommended_for([scenario], [flight_split.smallest_constant])
+        result = (
+            document(scenario, flight_split, metrics) | recommended | {"linear": linear_document(analysis)}
+        )
         write_documents(folder, scenario, metrics.document())
-        write_files(folder, _as_files(found, csv_rows(found)))
+        write_files(folder, _as_files(result, csv_rows(result)))
         if report:
-            write_files(folder / "figures", charts.figures(folder, found, metrics, analysis))
+            write_files(folder / "figures", charts.figures(folder, result, metrics, analysis))
             write_report_files(folder, metrics.document(), sections=[mismatch_section])
-    return found, kept.smallest_constant
+    return result, flight_split.smallest_constant
 
 
 def refuse_other_aircraft(scenarios: Iterable[Scenario]) -> None:
@@ -146,28 +148,28 @@ PLACE = ("scenario", "axis", "source", "part")
 FIGURES = {"rms_rad_s2": "rms", "max_rad_s2": "max", "share": "share", "bound_share": "bound_share"}
 
 
-def csv_rows(found: Document) -> Iterator[Document]:
+def csv_rows(document: Document) -> Iterator[Document]:
     """A row for each axis, source and part of a document; a whole source has an empty part."""
-    for axis, sources in found["axes"].items():
+    for axis, sources in document["axes"].items():
         for source, figures in sources.items():
             for part, numbers in [("", figures), *figures.get("parts", {}).items()]:
-                place = dict(zip(PLACE, (found["scenario"], axis, source, part), strict=True))
+                place = dict(zip(PLACE, (document["scenario"], axis, source, part), strict=True))
                 yield place | {column: numbers[key] for column, key in FIGURES.items()}
 
 
-def _as_files(found: Document, table: Iterable[Document]) -> Files:
-    return {"mismatch.json": as_json(found), "mismatch.csv": as_csv(list(table))}
+def _as_files(document: Document, table: Iterable[Document]) -> Files:
+    return {"mismatch.json": as_json(document), "mismatch.csv": as_csv(list(table))}
 
 
-def entry(found: Document) -> Document:
+def entry(document: Document) -> Document:
     """The entry of one flight in the comparison."""
-    recommended = found["guarantee"]["recommended"]
+    recommended = document["guarantee"]["recommended"]
     return {
-        "scenario": found["scenario"],
-        **{f"{axis}_{key}": found["bound"][axis][key] for key in _OF_BOUND for axis in AXES},
-        **{f"{axis}_dominant": charts.largest_sources(found, axis)[0] for axis in AXES},
-        "dominant": found["dominant"]["source"] if found["dominant"] else None,
-        "false_alarm": found["false_alarm"],
+        "scenario": document["scenario"],
+        **{f"{axis}_{key}": document["bound"][axis][key] for key in _OF_BOUND for axis in AXES},
+        **{f"{axis}_dominant": charts.largest_sources(document, axis)[0] for axis in AXES},
+        "dominant": document["dominant"]["source"] if document["dominant"] else None,
+        "false_alarm": document["false_alarm"],
         "guarantee_void": recommended["false_alarm"],
         "guaranteed_delay_s": recommended["guaranteed_delay_s"],
     }
@@ -202,19 +204,19 @@ def _cell(scenario: Scenario, condition: tuple[float, float]) -> list[Document]:
     """The entries of one condition, for a flight without faults; without a trim, all values are None."""
     airspeed_mps, altitude_m = condition
     place = {"airspeed_mps": airspeed_mps, "altitude_m": altitude_m}
-    there = {"initial": scenario.initial.model_copy(update=place), "faults": ()}
+    changes = {"initial": scenario.initial.model_copy(update=place), "faults": ()}
     try:
-        kept, flight = split_flight(scenario.model_copy(update=there))
+        flight_split, flight = split_flight(scenario.model_copy(update=changes))
     except BadInput:
         return [{**place, "axis": axis, **dict.fromkeys(_OF_MAP)} for axis in AXES]
-    found = document(scenario, kept, flight)
+    result = document(scenario, flight_split, flight)
     return [
         {
             **place,
             "axis": axis,
-            **{key: found["bound"][axis][key] for key in _OF_MAP[:2]},
-            "dominant": charts.largest_sources(found, axis)[0],
-            "false_alarm": found["false_alarm"],
+            **{key: result["bound"][axis][key] for key in _OF_MAP[:2]},
+            "dominant": charts.largest_sources(result, axis)[0],
+            "false_alarm": result["false_alarm"],
         }
         for axis in AXES
     ]

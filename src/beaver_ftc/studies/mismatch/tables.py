@@ -31,30 +31,30 @@ def share_text(share: float | None) -> str:
     return f"{value:.0f} %" if value >= 9.95 else f"{value:.2g} %"
 
 
-def mismatch_text(found: Document, folder: str, colour: bool) -> str:
+def mismatch_text(document: Document, folder: str, colour: bool) -> str:
     """The results of one flight for the terminal: tables of sources, bound and modes, then sentences."""
-    shown = printed([plain(*table) for table in tables(found)], WIDTH, colour)
-    return "\n".join([shown, "", *findings(found), f"results      {folder}", ""])
+    text = printed([plain(*table) for table in tables(document)], WIDTH, colour)
+    return "\n".join([text, "", *findings(document), f"results      {folder}", ""])
 
 
-def findings(found: Document) -> list[str]:
+def findings(document: Document) -> list[str]:
     """The results in sentences, for the terminal and the page."""
-    worst = found["dominant"]
+    worst = document["dominant"]
     dominant = "nothing: truth and design agree"
     if worst is not None:
         source = without_underscores(worst["source"])
         dominant = f"{source}: {share_text(worst['bound_share'])} of the bound on {worst['axis']}"
     lines = [f"dominant     {dominant}"]
-    if found["false_alarm"]:
-        detection = found["detection"]
+    if document["false_alarm"]:
+        detection = document["detection"]
         lines.append(f"FALSE ALARM  at {detection['time_s']:.2f} s on {detection['axis']}")
-    return [*lines, *_advice(found)]
+    return [*lines, *_advice(document)]
 
 
-def _advice(found: Document) -> list[str]:
+def _advice(document: Document) -> list[str]:
     """The recommended bound, and the published elevator case with the declared and the recommended bound."""
-    recommended = found["recommended"]
-    guarantee = found["guarantee"]
+    recommended = document["recommended"]
+    guarantee = document["guarantee"]
     constant = "  ".join(f"{axis} {recommended['constant_rad_s2'][axis]:g}" for axis in AXES)
     doubt = "" if recommended["settled"] else ", still exceeded when flown"
     advised = f"recommended  constant bound {constant} rad/s2, from {recommended['runs']} run(s){doubt}"
@@ -120,26 +120,26 @@ RUNS = (
 )  # fmt: skip
 
 
-def tables(found: Document) -> list[Table]:
+def tables(document: Document) -> list[Table]:
     """The sources, the bound and the modes, for the terminal and the page."""
-    linear = found["linear"]
-    bounds = [{"axis": axis} | numbers for axis, numbers in found["bound"].items()]
+    linear = document["linear"]
+    bounds = [{"axis": axis} | numbers for axis, numbers in document["bound"].items()]
     modes = [{"mode": name} | numbers for name, numbers in linear["modes"].items()]
     place = "modes at trim, {airspeed_mps:g} m/s and {altitude_m:g} m".format(**linear)
     return [
-        _sources(found),
+        _sources(document),
         ("the bound, without the fault (constants in rad/s2)", *tabulated(BOUNDS, bounds)),
         (place, *tabulated(MODES, modes)),
     ]
 
 
-def _sources(found: Document) -> Table:
+def _sources(document: Document) -> Table:
     """RMS, largest value and share of the bound of every source that is not zero, and of its parts."""
-    caption = f"{found['scenario']}: truth less design (1e-3 rad/s2; share of the bound)"
-    head = ["source", *(f"{axis} {what}" for axis in AXES for what in ("rms", "max", "bound"))]
+    caption = f"{document['scenario']}: truth less design (1e-3 rad/s2; share of the bound)"
+    head = ["source", *(f"{axis} {quantity}" for axis in AXES for quantity in ("rms", "max", "bound"))]
     rows = []
-    for name in found["axes"]["p"]:  # as on every axis
-        per_axis = [found["axes"][axis][name] for axis in AXES]
+    for name in document["axes"]["p"]:  # as on every axis
+        per_axis = [document["axes"][axis][name] for axis in AXES]
         if any(numbers["max"] > 0.0 for numbers in per_axis):
             rows.append(_row(without_underscores(name), per_axis))
         for part in per_axis[0].get("parts", {}):
@@ -151,8 +151,8 @@ def _row(name: str, per_axis: list[Document]) -> list[str]:
     """A row of a source or part, three cells for each axis."""
     row = [name]
     for numbers in per_axis:
-        shown = number(1e3 * numbers["rms"]), number(1e3 * numbers["max"]), share_text(numbers["bound_share"])
-        row += ["-"] * len(shown) if numbers["max"] == 0.0 else shown
+        cells = number(1e3 * numbers["rms"]), number(1e3 * numbers["max"]), share_text(numbers["bound_share"])
+        row += ["-"] * len(cells) if numbers["max"] == 0.0 else cells
     return row
 
 
@@ -168,10 +168,10 @@ def mismatch_section(folder: Path) -> str:
     path = folder / "mismatch.json"
     if not path.exists():
         return ""
-    found = read_json(path)
+    document = read_json(path)
     there = page.drawn_in(folder, PICTURES)
-    shown = [part for caption, head, rows in tables(found) for part in (caption, page.Table(head, rows))]
-    heading = page.Heading(f"Truth against design: {found['scenario']}")
+    parts = [part for caption, head, rows in tables(document) for part in (caption, page.Table(head, rows))]
+    heading = page.Heading(f"Truth against design: {document['scenario']}")
     pictures = page.Pictures([(PICTURES[name], name) for name in there])
-    body = page.html_of([heading, *findings(found), *shown, pictures], there)
+    body = page.html_of([heading, *findings(document), *parts, pictures], there)
     return f"<section><style>.figures img {{ max-width: 100% }}</style>{body}</section>"

@@ -75,14 +75,16 @@ def heat_map(
 
 
 def draw_estimates(
-    axes: "Axes", places: Sequence[float], found: Sequence[Mapping[str, Any]], times: float = 1.0,
+    axes: "Axes", places: Sequence[float], estimates: Sequence[Mapping[str, Any]], times: float = 1.0,
     across: bool = False, **look: Any,
 ) -> None:  # fmt: skip
     """Draw values with bars for their intervals. places: on the other axis. found: `value`, `low` and `high`
     of each, None or NaN for none. times: factor on the values. across: the values are on the horizontal
     axis."""
     ends = (
-        np.array([[estimate["value"], estimate["low"], estimate["high"]] for estimate in found], dtype=float)
+        np.array(
+            [[estimate["value"], estimate["low"], estimate["high"]] for estimate in estimates], dtype=float
+        )
         .reshape(-1, 3)
         .T
     )

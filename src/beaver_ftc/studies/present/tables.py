@@ -53,9 +53,9 @@ bare_percent = partial(percent, unit="")  # in a column whose head has the unit
 number_or_never = partial(number, none="never")
 
 
-def estimate(found: Mapping[str, Any], form: Callable[[Any], str] = number_or_never) -> tuple[str, str]:
+def estimate(values: Mapping[str, Any], form: Callable[[Any], str] = number_or_never) -> tuple[str, str]:
     """The value of an estimate and its interval as texts. form: from a number to its text."""
-    value, low, high = (form(found[key]) for key in ("value", "low", "high"))
+    value, low, high = (form(values[key]) for key in ("value", "low", "high"))
     return value, f"{low} to {high}"
 
 

@@ -35,14 +35,14 @@ QUANTITIES = (
 
 def fly_beside() -> dict[tuple[str, str], Flown]:
     """The flights of each case of SHOWN with both schemes, by (case, whose)."""
-    return {(case.name, whose): fly_case(case, how) for case in SHOWN for whose, how in WHOSE.items()}
+    return {(case.name, whose): fly_case(case, changes) for case in SHOWN for whose, changes in WHOSE.items()}
 
 
 def healthy_settings() -> list[tuple[str, Changed]]:
     """(whose, setting) for each corner and edge of the published uncertainty."""
     return [
-        (whose, Changed(corner.name, {**how, **corner.changes}))
-        for whose, how in WHOSE.items()
+        (whose, Changed(corner.name, {**changes, **corner.changes}))
+        for whose, changes in WHOSE.items()
         for corner in EDGES
     ]
 

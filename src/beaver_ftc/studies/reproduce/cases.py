@@ -165,8 +165,8 @@ class Flown:
         """|residual| / threshold on the side of the residual, of an isolation estimator, (3, frames); 0 / 0
         is 0, and all are 0 if the scheme has no such estimator."""
         residual, lower, upper = (
-            np.array([self.log[f"fie_{estimator}_{axis}_{what}_rad_s"] for axis in AXES])
-            for what in ("residual", "lower", "upper")
+            np.array([self.log[f"fie_{estimator}_{axis}_{signal}_rad_s"] for axis in AXES])
+            for signal in ("residual", "lower", "upper")
         )
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = np.abs(residual / np.where(residual < 0, lower, upper))
@@ -176,8 +176,8 @@ class Flown:
         """|residual| / threshold of the detection estimator, (3, frames); 0 / 0 is 0, as both start from
         0."""
         residual, threshold = (
-            np.array([self.log[f"{axis}_{what}_rad_s"] for axis in AXES])
-            for what in ("residual", "threshold")
+            np.array([self.log[f"{axis}_{signal}_rad_s"] for axis in AXES])
+            for signal in ("residual", "threshold")
         )
         return np.abs(residual) / np.where(residual == 0, 1.0, threshold)
 

@@ -165,7 +165,7 @@ def _judged(claim: Claim, by_setting: Mapping[str, tuple[float, float]]) -> Docu
     number, without = by_setting[AS_PUBLISHED.name]
     elsewhere = [] if claim.because else [by_setting[setting.name] for setting in ELSEWHERE]
     measure, verdict = claim.measure, claim.verdict(number, without, elsewhere)
-    everywhere = [there for there, _ in elsewhere] or [number]
+    everywhere = [n for n, _ in elsewhere] or [number]
     return {
         "measure": measure.of.__name__,
         "quantity": measure.quantity,
@@ -183,8 +183,8 @@ def _judged(claim: Claim, by_setting: Mapping[str, tuple[float, float]]) -> Docu
         "construction": claim.construction,
         "lowest": finite(min(everywhere)),
         "highest": finite(max(everywhere)),
-        "held_in": sum(claim.holds(there) for there, _ in elsewhere),
-        "borne_out_in": sum(claim.is_borne_out(*both) for both in elsewhere),
+        "held_in": sum(claim.holds(n) for n, _ in elsewhere),
+        "borne_out_in": sum(claim.is_borne_out(*pair) for pair in elsewhere),
         "elsewhere": len(elsewhere),
         "verdict": verdict,
         "because": claim.because if verdict == NOT_BORNE_OUT else "",

@@ -47,7 +47,8 @@ def document_of(flights: list[tuple[Flown, Flown]]) -> Document:
     return {
         "terms": terms(),
         "designs": [
-            _row(name, bound, *both) for (name, bound, _), both in zip(DESIGNS, flights, strict=True)
+            _row(name, bound, *flights_of_design)
+            for (name, bound, _), flights_of_design in zip(DESIGNS, flights, strict=True)
         ],
     }
 

@@ -157,10 +157,10 @@ def headline(document: Document) -> str:
     tested = document["testable"]
     built = document["construction"]
     settings = len(document["sensitivity"])
-    some = built["hold"]
+    n_hold = built["hold"]
     count = built["statements"]
     background = document["background"]
-    holding = f"All {count} hold" if some == count else f"{some} of these {count} hold"
+    holding = f"All {count} hold" if n_hold == count else f"{n_hold} of these {count} hold"
     return (
         f"The paper has {tested['statements'] + count + background} statements. {tested['statements']} of "
         f"them can be tested: {tested['hold']} hold, {tested['do_not']} do not hold, and "
@@ -219,9 +219,9 @@ def _table(document: Document) -> "Table":
     for claim in measured(document):
         cell = f"{ours(claim)} ({limit(claim)})"
         verdict = claim["verdict"]
-        more = remark(claim)
+        note = remark(claim)
         table.add_row(
-            claim["where"], claim["statement"], f"{cell}; {more}" if more else cell, without(claim),
+            claim["where"], claim["statement"], f"{cell}; {note}" if note else cell, without(claim),
             Text(said(claim), _STYLE.get(verdict, "")),
         )  # fmt: skip
     return table

@@ -67,20 +67,20 @@ def _onset(rows: Sequence[Document], is_declared: bool) -> str:
     )
 
 
-def _share(found: Document) -> str:
+def _share(values: Document) -> str:
     """A share with its interval, per cent."""
-    return "{} ({})".format(*estimate(found, bare_percent))
+    return "{} ({})".format(*estimate(values, bare_percent))
 
 
-def _interval(found: Document, form: Callable[[Any], str] = number_or_never) -> str:
+def _interval(values: Document, form: Callable[[Any], str] = number_or_never) -> str:
     """A median with its interval, unless the interval has no width."""
-    value, limits = estimate(found, form)
-    return value if found["value"] is None or found["low"] == found["high"] else f"{value} ({limits})"
+    value, limits = estimate(values, form)
+    return value if values["value"] is None or values["low"] == values["high"] else f"{value} ({limits})"
 
 
-def _used(found: Document) -> str:
+def _used(values: Document) -> str:
     """A share of the bound with its interval, per cent."""
-    return _interval(found, lambda share: number_or_never(share and 100.0 * share))
+    return _interval(values, lambda share: number_or_never(share and 100.0 * share))
 
 
 COLUMNS = (
@@ -109,9 +109,9 @@ def draw_errors(document: Document) -> "Figure":
     for line, quantity in zip(grid, SHOWN, strict=True):
         times = 1.0 if quantity.endswith("_deg_s") else 100.0
         for panel, rows in zip(line, errors, strict=True):
-            known = [row for row in rows if None not in (row[quantity]["value"], row[quantity]["low"])]
+            drawn_rows = [row for row in rows if None not in (row[quantity]["value"], row[quantity]["low"])]
             draw_estimates(
-                panel, [row["factor"] for row in known], [row[quantity] for row in known], times,
+                panel, [row["factor"] for row in drawn_rows], [row[quantity] for row in drawn_rows], times,
                 color=BLACK, marker="o", markersize=4, linewidth=1.2, capsize=2,
             )  # fmt: skip
             panel.set_xscale("log", base=2)

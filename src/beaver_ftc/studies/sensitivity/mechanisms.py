@@ -173,7 +173,7 @@ def fly_one(seed: int, flight: Flight) -> Document:
     for system in SYSTEMS:
         scenario = scenario_of(flight, seed, system)
         outcomes[system] = outcome_of(scenario)
-        for mechanism in (each for each in MECHANISMS if each.system == system):
+        for mechanism in (candidate for candidate in MECHANISMS if candidate.system == system):
             if with_key(mechanism) not in outcomes:
                 outcomes[with_key(mechanism)] = outcome_of(scenario.with_(mechanism.present))
             if without_key(mechanism) not in outcomes:

@@ -84,7 +84,7 @@ def mechanism_sentence(row: Document) -> str:
         differ = f"{changed} of {flights} verdicts differ" if changed else "no verdict differs"
         return f"{label(row)}: without it {differ}, and no criterion changes beyond chance."
     texts = (
-        f"{CRITERIA[name]} {100 * found['value']:+.1f} points" for name, found in changed_criteria.items()
+        f"{CRITERIA[name]} {100 * effect['value']:+.1f} points" for name, effect in changed_criteria.items()
     )
     return f"{label(row)}: without it, {', '.join(texts)}."
 
@@ -117,15 +117,15 @@ def _systems_table(systems: Document) -> Table:
     )
 
 
-def net_points(found: Document) -> tuple[str, str]:
+def net_points(values: Document) -> tuple[str, str]:
     """A net share and its interval, percentage points."""
-    value, limits = estimate(found, lambda share: f"{100.0 * share:+.1f}")
+    value, limits = estimate(values, lambda share: f"{100.0 * share:+.1f}")
     return "0.0" if value[1:] == "0.0" else value, limits
 
 
 def _with_interval(head: str, key: str, cells: Callable[[Document], tuple[str, str]] = estimate) -> Columns:
     """The columns of an estimate and of its interval."""
-    return (head, key, lambda found: cells(found)[0]), (INTERVAL, key, lambda found: cells(found)[1])
+    return (head, key, lambda values: cells(values)[0]), (INTERVAL, key, lambda values: cells(values)[1])
 
 
 def _certified(row: Document) -> str:
@@ -182,8 +182,8 @@ def draw_mechanisms(document: Document) -> "Figure":
     grid[0][0].set_yticks(range(len(rows)), [label(row) for row in rows], fontsize=8)
     grid[0][0].invert_yaxis()
     label_edges(grid, "worse without it, net points")
-    known = grid[0][0].get_legend_handles_labels()
-    figure.legend(*known, loc="outside lower center", ncols=2, fontsize=9, frameon=False)
+    entries = grid[0][0].get_legend_handles_labels()
+    figure.legend(*entries, loc="outside lower center", ncols=2, fontsize=9, frameon=False)
     return figure
 
 

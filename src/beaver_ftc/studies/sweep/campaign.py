@@ -102,13 +102,13 @@ def run_sweep(
                 so_far.update(counts_of(rows))
                 progress(so_far)
 
-            flown = _fly_missing(sweep, options, store, there, stopped)
+            batches = _fly_missing(sweep, options, store, there, stopped)
             if so_far["done"] < so_far["total"]:
                 raise SweepStopped(
                     f"{sweep.name}: stopped, {so_far['done']} of {so_far['total']} flights are kept; "
                     "go on with the same command and --resume"
                 )
-            store.compact(store.landed(*batch) for batch in flown)
+            store.compact(store.landed(*batch) for batch in batches)
         store.parts.remove()
         return conclude(sweep, options, store)
 
@@ -161,8 +161,8 @@ def conclude(sweep: Sweep, options: Options, store: Store) -> Document:
     document = _summary(sweep, options, flights, store.results)
     if options.keep.policy == "worst":
         for flight in document["worst"]:
-            kept = assignment_of(sweep, options, flight["run"])
-            one_flight.keep_flight(sweep, kept, options.keep, report=True)
+            assignment = assignment_of(sweep, options, flight["run"])
+            one_flight.keep_flight(sweep, assignment, options.keep, report=True)
     if options.report:
         _draw(sweep, flights, document, store)
     store.write("summary.json", as_json(document))

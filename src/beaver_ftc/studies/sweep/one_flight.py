@@ -58,15 +58,15 @@ def as_cell(value: Any, kind: str) -> Any:
     return value if kind == "flag" or isinstance(value, str) else json.dumps(value)
 
 
-def row_of(assignment: Assignment, found: Metrics, flight: "Landing") -> Row:
+def row_of(assignment: Assignment, flight_metrics: Metrics, flight: "Landing") -> Row:
     """The row of a flight that has metrics."""
-    departure = found.departure
+    departure = flight_metrics.departure
     status = DEPARTED if departure else FLOWN
     reason = f"{departure.signal} at {departure.time_s:g} s" if departure else None
     columns = columns_of(flight.scenario.airframe.surfaces)
-    metrics = {name: getter_of(name)(found) for name in columns}
+    metrics = {name: getter_of(name)(flight_metrics) for name in columns}
     metrics[WORST_RATIO] = flight.worst_residual_ratio
-    return _row(assignment, found.seed, status, reason, metrics)
+    return _row(assignment, flight_metrics.seed, status, reason, metrics)
 
 
 def row_of_failure(sweep: Sweep, assignment: Assignment, status: str, reason: str) -> Row:

@@ -55,8 +55,8 @@ class Flights:
     @cached_property
     def faulted(self) -> np.ndarray:
         """Flights with a fault and without an alarm before it, in which the fault can be detected."""
-        struck = strikes_within(self["fault.at_s"], self["flown_s"])
-        return self.measured & struck & ~self["false_alarm"]
+        has_fault = strikes_within(self["fault.at_s"], self["flown_s"])
+        return self.measured & has_fault & ~self["false_alarm"]
 
     @cached_property
     def detected(self) -> np.ndarray:

@@ -150,9 +150,9 @@ def delay_distribution(flights: Flights, summary: Document) -> "Figure | None":
         if delays.size:
             shares = np.arange(1, delays.size + 1) / group.sum()
             axes.step(delays, shares, where="post", label=label, **curve_look(place))
-    for q, says in ((0.5, "half"), (0.95, "95 %")):
+    for q, text in ((0.5, "half"), (0.95, "95 %")):
         axes.axhline(q, color=GREY, linewidth=0.8, linestyle=":")
-        axes.annotate(says, (1.0, q), xycoords=("axes fraction", "data"), ha="right", va="bottom", fontsize=7)
+        axes.annotate(text, (1.0, q), xycoords=("axes fraction", "data"), ha="right", va="bottom", fontsize=7)
     never = (flights.faulted & ~flights.detected).sum()
     axes.set_title(f"never: {never} of {flights.faulted.sum()} →", fontsize=8, loc="right")
     positive = flights.detection_delay_s[flights.detected & (flights.detection_delay_s > 0)]
@@ -200,7 +200,7 @@ def sensitivity(flights: Flights, summary: Document) -> "Figure | None":
         return None
     keys = [entry["key"] for entry in next(iter(rankings.values()))][:12]
     explained = [{entry["key"]: entry["explained"] for entry in ranking} for ranking in rankings.values()]
-    shares = np.array([[of[key] for of in explained] for key in keys])
+    shares = np.array([[share_of[key] for share_of in explained] for key in keys])
     title = "Sensitivity: share of an outcome that a key explains by rank correlation"
     outcomes = [OUTCOMES[name] for name in rankings]
     return _shaded(title, shares, lambda at: f"{shares[at]:.2f}", outcomes, list(map(in_words, keys)))

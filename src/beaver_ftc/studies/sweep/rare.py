@@ -74,7 +74,7 @@ def score_of(scenario: Scenario, expectation: str) -> float:
     log = Columns(*DEPARTURE_LIMITS) if expectation == "no_departure" else None
     flight = fly(scenario, log)
     metrics = measure(flight)
-    result = next(one for one in metrics.expectations if one.name == expectation)
+    result = next(candidate for candidate in metrics.expectations if candidate.name == expectation)
     if log is not None:
         shares = (np.abs(log[name]).max() / limit for name, limit in DEPARTURE_LIMITS.items())
         score = float(max(shares)) - 1.0
@@ -176,10 +176,10 @@ def as_text(document: Document) -> str:
     plain = document["plain"]
     likeliest = document["likeliest"]
     p = document["probability"]
-    known = f"not known: {document['why']}" if p is None else f"{p:.2g}"
+    text = f"not known: {document['why']}" if p is None else f"{p:.2g}"
     lines = [
         f"{document['sweep']}: {document['expectation']} not met",
-        f"  probability  {known}, {_interval(document)}, {document['flights']} flights",
+        f"  probability  {text}, {_interval(document)}, {document['flights']} flights",
         f"  plain        {plain['events']} of {plain['of']} flights, {_interval(plain)}",
     ]
     if document["failed"]:
@@ -193,6 +193,6 @@ def as_text(document: Document) -> str:
     return "\n".join([*lines, f"\nresults: {document['folder']}"])
 
 
-def _interval(found: Document) -> str:
+def _interval(values: Document) -> str:
     """The interval of a probability."""
-    return f"95 % {found['low']:.2g} to {found['high']:.2g}"
+    return f"95 % {values['low']:.2g} to {values['high']:.2g}"

@@ -103,10 +103,10 @@ class Chains:
         all_points = [x]
         all_scores = [scores]
         for _ in range(math.ceil(members / n_chains) - 1):
-            moved = STEP * x + math.sqrt(1.0 - STEP**2) * self._generator.standard_normal(x.shape)
-            moved_scores = self._flown(fly, moved)
+            x_new = STEP * x + math.sqrt(1.0 - STEP**2) * self._generator.standard_normal(x.shape)
+            moved_scores = self._flown(fly, x_new)
             accepted = moved_scores >= levels[:, None]
-            x = np.where(accepted[..., None], moved, x)
+            x = np.where(accepted[..., None], x_new, x)
             scores = np.where(accepted, moved_scores, scores)
             all_points.append(x)
             all_scores.append(scores)
@@ -128,17 +128,19 @@ class Chains:
     def estimate(self) -> Document:
         """The result: the probability with its two-sided interval, and the numbers of flights. why: the
         reason if the probability is not known; the interval then ends at the level that was reached."""
-        events, of = self.plain
+        events, trials = self.plain
         if self.reached.all():
             probability, low, high = lognormal_mean(self.share)
-            why = ""
+            reason = ""
         else:
             probability, low, high = math.nan, 0.0, float(self.share.max())
-            why = "the score stops rising before the event" if self.stuck else "too rare for so many levels"
+            reason = (
+                "the score stops rising before the event" if self.stuck else "too rare for so many levels"
+            )
         return {
             "probability": probability, "low": low, "high": high,
             "flights": self.flights, "levels": self.levels,
-            "plain": {"events": events, "of": of, **vars(binomial(events, of))}, "why": why,
+            "plain": {"events": events, "of": trials, **vars(binomial(events, trials))}, "why": reason,
         }  # fmt: skip
 
 

@@ -65,15 +65,15 @@ def number(value: float) -> float | None:
     return float(f"{value:.10g}") if math.isfinite(value) else None
 
 
-def rate(hits: np.ndarray, of: np.ndarray) -> Document:
+def rate(hits: np.ndarray, group: np.ndarray) -> Document:
     """The rate of hits in a group, with Wilson's interval."""
-    count, trials = _counts(hits, of)
+    count, trials = _counts(hits, group)
     return {"count": count, "of": trials, **_estimate("rate", wilson(count, trials))}
 
 
-def _counts(hits: np.ndarray, of: np.ndarray) -> tuple[int, int]:
+def _counts(hits: np.ndarray, group: np.ndarray) -> tuple[int, int]:
     """Number of hits in a group, and of flights in it."""
-    return int((hits & of).sum()), int(of.sum())
+    return int((hits & group).sum()), int(group.sum())
 
 
 def _estimate(name: str, estimate: Estimate) -> Document:
@@ -241,17 +241,17 @@ def _bounds(expect: SweepExpect) -> Iterator[tuple[str, Level, str]]:
 def _verdict(flights: Flights, name: str, level: Level, side: str) -> Document:
     """The evaluation of one limit. With a confidence, the one-sided bound of the estimate must keep the
     limit: the upper bound for `at_most`, the lower one for `at_least`."""
-    of, value, bound = estimate_of(flights, name, level)
+    n_flights, value, bound = estimate_of(flights, name, level)
     limit = getattr(level, side)
     actual = value if level.confidence is None else bound(level.confidence, side == "at_most")
     passed = actual >= limit if side == "at_least" else actual <= limit
-    other = "at_most" if side == "at_least" else "at_least"
+    other_side = "at_most" if side == "at_least" else "at_least"
     return {
         "name": name,
-        "passed": bool(of > 0 and passed),
-        "expected": level.model_dump(exclude_none=True, exclude={other}),
+        "passed": bool(n_flights > 0 and passed),
+        "expected": level.model_dump(exclude_none=True, exclude={other_side}),
         "actual": number(actual),
-        "of": of,
+        "of": n_flights,
     }
 
 

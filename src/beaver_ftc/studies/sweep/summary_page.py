@@ -143,10 +143,10 @@ def summary_text(summary: Document, colour: bool = False) -> str:
     worst = [f" {'; '.join(flight['why'])}:\n   {flight['replay']}" for flight in summary["worst"][:SHOWN]]
     headline = (title(summary), "bold green" if summary["passed"] else "bold red")
     lines = facts(summary)
-    for what, p, q, r in tracking(summary):
-        unit = "" if what == "ratio" else " deg/s"
-        label = "tracking RMS, median" if what.startswith("before") else ""
-        lines.append((label, f"p {p}  q {q}  r {r}{unit} {what}"))
+    for name, p, q, r in tracking(summary):
+        unit = "" if name == "ratio" else " deg/s"
+        label = "tracking RMS, median" if name.startswith("before") else ""
+        lines.append((label, f"p {p}  q {q}  r {r}{unit} {name}"))
     expected_lines = [
         (passed, f"{name} {bound}: {actual}") for name, bound, actual, passed in expectations(summary)
     ]
@@ -170,11 +170,11 @@ def _search(summary: Document) -> str:
     return f"the worst {search['objective'].replace('_', ' ')}: {score} in flight {search['run']}"
 
 
-def _rate(rate: Document, what: str) -> str:
+def _rate(rate: Document, noun: str) -> str:
     """A rate with its interval and counts."""
     if not rate["of"]:
         return ""
-    return f"{exact_percent(rate['rate'])} ({_interval(rate)}): {rate['count']} of {rate['of']} {what}"
+    return f"{exact_percent(rate['rate'])} ({_interval(rate)}): {rate['count']} of {rate['of']} {noun}"
 
 
 def _quantiles(delays: Document) -> str:
@@ -182,46 +182,46 @@ def _quantiles(delays: Document) -> str:
     if not delays["of"]:
         return ""
     quantiles = {"median": "median", "p95": "95 %", "p99": "99 %", "max": "max"}
-    return ", ".join(f"{says} {_seconds(delays[name])}" for name, says in quantiles.items())
+    return ", ".join(f"{text} {_seconds(delays[name])}" for name, text in quantiles.items())
 
 
-def _false_alarms(found: Document) -> str:
+def _false_alarms(alarms: Document) -> str:
     """The false alarms, their rate, and the largest residual without a fault."""
-    if not found["hours"]:
+    if not alarms["hours"]:
         return ""
     return (
-        f"{found['count']} in {value(found['hours'])} h without a fault: {value(found['per_hour'])}/h "
-        f"({value(found['low'])} to {value(found['high'])}); largest residual/threshold ratio "
-        f"{found['closest_residual_ratio']:.4g}"
+        f"{alarms['count']} in {value(alarms['hours'])} h without a fault: {value(alarms['per_hour'])}/h "
+        f"({value(alarms['low'])} to {value(alarms['high'])}); largest residual/threshold ratio "
+        f"{alarms['closest_residual_ratio']:.4g}"
     )
 
 
-def _on_the_bound(found: Document) -> str:
+def _on_the_bound(rate: Document) -> str:
     """A warning if the residual of the healthy flight comes near its threshold in many flights."""
-    if not found["of"] or found["rate"] < MANY:
+    if not rate["of"] or rate["rate"] < MANY:
         return ""
     return (
-        f"in {found['count']} of {found['of']} flights the residual of the healthy flight already reaches "
+        f"in {rate['count']} of {rate['of']} flights the residual of the healthy flight already reaches "
         f"{exact_percent(NEAR_THRESHOLD_SHARE)} of its threshold or more; the detection of small faults then "
         "measures the scenario's own uncertainty, not the diagnosis"
     )
 
 
-def _inconclusive(found: Document) -> str:
+def _inconclusive(rate: Document) -> str:
     """The number of flights in which the diagnosis could conclude nothing for some time."""
-    if not found["count"]:
+    if not rate["count"]:
         return ""
     return (
         "in {count} of {of} flights the diagnosis could conclude nothing for part or all of the time "
         "(detection.inconclusive.share); the verdict of a kept flight states the reason"
-    ).format(**found)
+    ).format(**rate)
 
 
-def _guarantee(found: Document) -> str:
+def _guarantee(counts: Document) -> str:
     """How many faults were detected later than guaranteed."""
-    if not found["promised"]:
+    if not counts["promised"]:
         return ""
-    return "{broken} of {promised} faults detected later than guaranteed".format(**found)
+    return "{broken} of {promised} faults detected later than guaranteed".format(**counts)
 
 
 def _drivers(ranking: list[Document]) -> str:

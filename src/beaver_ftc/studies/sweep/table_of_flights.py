@@ -95,10 +95,10 @@ def _main_hidden() -> Iterator[None]:
     """Hide the main module from workers that start during the block. They would import the script of the
     caller, which would start the sweep again."""
     main = vars(sys.modules["__main__"])
-    shown = {name: value for name, value in main.items() if name in ("__file__", "__spec__")}
+    hidden = {name: value for name, value in main.items() if name in ("__file__", "__spec__")}
     main.pop("__file__", None)
     main["__spec__"] = None
     try:
         yield
     finally:
-        main.update(shown)
+        main.update(hidden)

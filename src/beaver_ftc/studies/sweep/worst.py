@@ -63,14 +63,14 @@ def _candidates(flights: Flights) -> Candidates:
     yield from _largest(ratio, lambda i: f"residual {ratio[i]:.4g} of its threshold without a fault")
 
 
-def _first(which: np.ndarray, why: Callable[[int], str]) -> Candidates:
+def _first(mask: np.ndarray, why: Callable[[int], str]) -> Candidates:
     """The first flights of a mask (flights,)."""
-    return ((i, why(i)) for i in np.flatnonzero(which)[:OF_EACH_KIND].tolist())
+    return ((i, why(i)) for i in np.flatnonzero(mask)[:OF_EACH_KIND].tolist())
 
 
 def _largest(values: np.ndarray, why: Callable[[int], str]) -> Candidates:
     """The flights with the largest finite values (flights,), and how many have the same value."""
     largest = np.argsort(-values, kind="stable")[:OF_EACH_KIND]
     for i in largest[np.isfinite(values[largest])].tolist():
-        alike = int(np.isclose(values, values[i], rtol=1e-9, atol=0.0).sum())
-        yield i, why(i) + (f", as in {alike - 1} more" if alike > 1 else "")
+        n_equal = int(np.isclose(values, values[i], rtol=1e-9, atol=0.0).sum())
+        yield i, why(i) + (f", as in {n_equal - 1} more" if n_equal > 1 else "")

@@ -164,15 +164,17 @@ def as_text(rows: list[Document]) -> str:
     lines = []
     for (where, airspeed_mps), rows_of_condition in grouped(rows, "where", "airspeed_mps").items():
         ended = " at the end" if where == "at the end" else ""
-        cells = [f"{number(row['value'], none='never')} ({said(row['level'])})" for row in rows_of_condition]
+        cells = [
+            f"{number(row['value'], none='never')} ({level_text(row['level'])})" for row in rows_of_condition
+        ]
         lines.append(
-            [f"{airspeed_mps:.1f}{ended}", *cells, said(max(row["level"] for row in rows_of_condition))]
+            [f"{airspeed_mps:.1f}{ended}", *cells, level_text(max(row["level"] for row in rows_of_condition))]
         )
     clauses = ", ".join(dict.fromkeys(f"{row.clause} {row.table}".strip() for row in LIMITS))
     legend = f"in brackets: level of MIL-F-8785C, class I, category B:\n{clauses}"
     return f"{aligned([*head, *lines])}\n\n{legend}"
 
 
-def said(level: int) -> str:
+def level_text(level: int) -> str:
     """A level in words."""
     return "none" if level == WORSE else str(level)

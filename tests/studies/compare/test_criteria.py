@@ -34,7 +34,7 @@ J = (0.25 + 0.6 + 1.0 + 1.0) / 4 + 2 / 5
 
 def given(monkeypatch, results):
     left = list(results)
-    monkeypatch.setattr(criteria, "flown", lambda *asked: left.pop(0))
+    monkeypatch.setattr(criteria, "fly_entry", lambda *asked: left.pop(0))
 
 
 def test_a_detector_costs_delay_names_and_false_alarms(monkeypatch):

@@ -5,7 +5,7 @@ from math import inf, log
 import numpy as np
 import pytest
 
-from beaver_ftc.studies.detectability.thresholds import STAGES, Sizes, Threshold, of_all, threshold
+from beaver_ftc.studies.detectability.thresholds import STAGES, Sizes, Threshold, size_for_all, threshold
 from beaver_ftc.studies.engine.statistics import binomial
 
 MIDDLE, SLOPE = 30.0, 4.0  # of a logistic curve, per cent
@@ -54,9 +54,9 @@ def test_where_not_even_a_total_loss_is_found_the_size_is_infinite():
 
 def test_certain_is_the_largest_size_of_all():
     sizes = drawn(11, 60)
-    assert of_all(finder(sizes), 60) == np.ceil(sizes.max())
+    assert size_for_all(finder(sizes), 60) == np.ceil(sizes.max())
     sizes[17] = 140.0
-    assert of_all(finder(sizes), 60) == inf
+    assert size_for_all(finder(sizes), 60) == inf
 
 
 @pytest.mark.parametrize(

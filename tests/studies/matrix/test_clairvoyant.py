@@ -10,8 +10,8 @@ from beaver_ftc.loop.loop import fly
 from beaver_ftc.results.log import Columns
 from beaver_ftc.scenario.declared import Declared
 from beaver_ftc.scenario.schema import Scenario
-from beaver_ftc.studies.matrix.clairvoyant import columns_of, seen_when_told
-from beaver_ftc.studies.matrix.fault_matrix import FaultCase, beside_told, scenario_of, trimmed_deg
+from beaver_ftc.studies.matrix.clairvoyant import columns_of, informed_row
+from beaver_ftc.studies.matrix.fault_matrix import FaultCase, informed_counts, scenario_of, trimmed_deg
 from telling import apart
 
 AIRCRAFT = load()
@@ -58,10 +58,10 @@ def test_terms_add_up_to_what_the_design_model_makes_of_a_surface_and_of_none():
 
 def test_a_loss_of_what_stands_at_neutral_is_seen_by_nobody(lost):
     scenario, kept = lost
-    nothing = seen_when_told(*flown("total loss", "flap"), "flap")
+    nothing = informed_row(*flown("total loss", "flap"), "flap")
     assert nothing["told_deflection"] < 1e-6
     assert nothing["told_chance"] < 1e-5
-    assert seen_when_told(scenario, kept, "elevator")["told_chance"] > 0.99
+    assert informed_row(scenario, kept, "elevator")["told_chance"] > 0.99
 
 
 def test_what_is_counted():
@@ -70,7 +70,7 @@ def test_what_is_counted():
             "surface": surface, "told_chance": chance, "verdict": verdict, "detected": verdict != "unseen"
         }  # fmt: skip
 
-    found = beside_told(
+    found = informed_counts(
         [
             row("elevator", 0.9, "named"), row("elevator", 0.8, "surface"), row("elevator", 0.7, "unseen"),
             row("flap", 0.6, "open"), row("flap", 0.1, "open"), row("flap", 0.0, "unseen"),
@@ -81,4 +81,4 @@ def test_what_is_counted():
     assert (found["type_kept"], found["detected_but_not_told"]) == (3, 1)
     assert found["share"] == pytest.approx(0.4)
     assert found["by_surface"]["elevator"] == {"seen": 3, "named": 2}
-    assert beside_told([row("flap", 0.0, "unseen")])["share"] is None
+    assert informed_counts([row("flap", 0.0, "unseen")])["share"] is None

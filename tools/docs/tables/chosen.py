@@ -15,7 +15,7 @@ from beaver_ftc.control.laws import loop_design
 from beaver_ftc.diagnosis.rivals import FLIGHT_GRADES
 from beaver_ftc.documents.document import parse
 from beaver_ftc.plugins import LAWS
-from beaver_ftc.studies.compare.criteria import LawCost, effort, flights, flown, least_margins
+from beaver_ftc.studies.compare.criteria import LawCost, effort, flights, fly_entry, least_margins
 from beaver_ftc.studies.compare.gain import geometric_mean, relative_gain
 from beaver_ftc.studies.compare.trial import CALIBRATION, DRAW, LAW, SCHEME, Entry
 from beaver_ftc.studies.present.tables import markdown_table
@@ -137,7 +137,7 @@ def _effort(grade: str, most: int | None, ratio: float) -> float:
     """RMS rate of all surfaces over the same flights, deg/s."""
     cases = [case for draw in BETTER_DRAWS for case in flights(grade, most, draw) if case.scenario.faults]
     with _observer_ratio(ratio):
-        return effort([flown(case, Entry(SCHEME, LAW), LAWS, {}) for case in cases])
+        return effort([fly_entry(case, Entry(SCHEME, LAW), LAWS, {}) for case in cases])
 
 
 @contextmanager

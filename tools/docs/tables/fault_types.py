@@ -7,7 +7,7 @@ from typing import Any
 
 import beaver_ftc as bf
 from beaver_ftc.studies.engine.study import run_study
-from beaver_ftc.studies.matrix.fault_matrix import beside_told, cases, fly_case, matrix_study
+from beaver_ftc.studies.matrix.fault_matrix import cases, fly_case, informed_counts, matrix_study
 from beaver_ftc.studies.matrix.matrix_shown import SHOWN
 from beaver_ftc.studies.present.tables import markdown_table
 
@@ -58,7 +58,7 @@ def fault_matrix_light() -> str:
 def fault_matrix_light_probe() -> str:
     """As many of these flights, and what the informed test tells of them."""
     rows = _probed(declared=True, turbulence="light")
-    return "\n".join((*map(_closely, rows), _told(beside_told(rows))))
+    return "\n".join((*map(_closely, rows), _told(informed_counts(rows))))
 
 
 def _probed(**instruments: Any) -> list[Document]:

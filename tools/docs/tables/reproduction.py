@@ -141,7 +141,7 @@ def reproduction_probe() -> str:
     """The number of every measured statement in the published flights alone, and ours beside them."""
     published = fly_published()
     said = [f"{claim.statement} {claim.number(published):.6g}" for claim in MEASURED]
-    for (case, whose), flown in beside.fly_beside().items():
+    for (case, whose), flown in beside.fly_both().items():
         travel = flown.metrics.tracking.surface_travel_deg
         said.append(f"{case}, {whose}: {sum(travel.values()):.6g} deg")
     return "\n".join(said)

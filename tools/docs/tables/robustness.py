@@ -18,7 +18,7 @@ from beaver_ftc.studies.detectability.schemes import GRIDS, contenders
 from beaver_ftc.studies.detectability.schemes_shown import who_is_better
 from beaver_ftc.studies.engine.statistics import share_within, wilson
 from beaver_ftc.studies.engine.study import fly_all, run_into, run_study
-from beaver_ftc.studies.matrix.clairvoyant import columns_of, seen_when_told
+from beaver_ftc.studies.matrix.clairvoyant import columns_of, informed_row
 from beaver_ftc.studies.present.tables import markdown_table, tabulated
 from beaver_ftc.studies.sensitivity.beyond import TOGETHER
 from beaver_ftc.studies.sensitivity.command import errors_study
@@ -146,7 +146,7 @@ def _told(surface: str) -> tuple[str, ...]:
         scenario = scenario_of(load_sweep(DOUBTED_SWEEP), one)
         kept = columns_of(scenario.airframe)
         fly(scenario, kept)
-        seen.append(seen_when_told(scenario, kept, surface))
+        seen.append(informed_row(scenario, kept, surface))
     least = min(each["told_deflection"] for each in seen)
     chance = np.mean([each["told_chance"] for each in seen])
     return surface, str(TOLD_FLIGHTS), f"{least:.0f}", f"{100 * chance:.0f}"

@@ -105,7 +105,7 @@ def _end_with_false_alarm(loop: Loop) -> Callable[[], None]:
     return after_frame
 
 
-def flown(case: SetFlight, entry: Entry, group: str, values: Values) -> Result:
+def fly_entry(case: SetFlight, entry: Entry, group: str, values: Values) -> Result:
     """The result of one flight of an entry. values: of its detector or law. group: DETECTORS or LAWS."""
     scenario = with_values(with_entry(case.scenario, entry), group, values)
     watch = _end_with_false_alarm if group == DETECTORS else None
@@ -131,7 +131,7 @@ class Cost:
     def _flights(self, values: Values) -> Iterator[tuple[Result, float]]:
         """Fly all flights in turn; yield the result of each, and its part in J."""
         for n, case in enumerate(self._cases):
-            result = flown(case, self._entry, self._group, values)
+            result = fly_entry(case, self._entry, self._group, values)
             yield result, self._part(n, result)
 
     def _part(self, n: int, result: Result) -> float:
@@ -225,8 +225,8 @@ class LawCost(Cost):
 def yardsticks(grade: str, most: int | None, draw: int, draws: int) -> tuple[tuple[float, ...], float]:
     """e_oracle in each faulted flight, deg/s; and the RMS surface rate of the default law, deg/s."""
     cases = [case for case in flights(grade, most, draw, draws) if case.scenario.faults]
-    oracle = tuple(flown(case, Entry(SCHEME, ORACLE), LAWS, {}).rms_deg_s for case in cases)
-    return oracle, effort([flown(case, Entry(SCHEME, LAW), LAWS, {}) for case in cases])
+    oracle = tuple(fly_entry(case, Entry(SCHEME, ORACLE), LAWS, {}).rms_deg_s for case in cases)
+    return oracle, effort([fly_entry(case, Entry(SCHEME, LAW), LAWS, {}) for case in cases])
 
 
 def effort(results: Sequence[Result]) -> float:

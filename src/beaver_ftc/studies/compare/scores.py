@@ -176,11 +176,11 @@ SIGNIFICANT = 0.05
 def document_of(trials: Sequence[Trial], entries: Sequence[Entry]) -> Document:
     """Tally every set; numbers that do not exist are null."""
     names = list(dict.fromkeys(trial.set for trial in trials))
-    sets = {name: _set([t for t in trials if t.set == name], entries) for name in names}
+    sets = {name: _set_document([t for t in trials if t.set == name], entries) for name in names}
     return {"sets": sets, "versions": dict(versions())}
 
 
-def _set(trials: Sequence[Trial], entries: Sequence[Entry]) -> Document:
+def _set_document(trials: Sequence[Trial], entries: Sequence[Entry]) -> Document:
     """The part of the document of one set of flights."""
     traces = defaultdict[str, list[Trace]](list)
     for trial in trials:

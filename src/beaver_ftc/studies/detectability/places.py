@@ -63,7 +63,7 @@ def places_study(
         altitudes_m = ALTITUDES_M if start_m is None else (start_m,)
     return Study(
         f"{scenario.name[:86]}-{NAME}", list(product(speeds_mps, altitudes_m, excitations)),
-        partial(look_at, scenario), partial(document_of, scenario.name), places_shown.FILES,
+        partial(rows_at_place, scenario), partial(document_of, scenario.name), places_shown.FILES,
         row=dict[str, list[Document]], follows_from=scenario,
     )  # fmt: skip
 
@@ -90,7 +90,7 @@ def _without_faults(scenario: Scenario) -> Document:
     return {**document, "faults": [], "expect": {}}
 
 
-def look_at(scenario: Scenario, point: tuple[float, float, float]) -> dict[str, list[Document]]:
+def rows_at_place(scenario: Scenario, point: tuple[float, float, float]) -> dict[str, list[Document]]:
     """The rows of each of PARTS at a place. If the flight fails, they have the reason in place of results."""
     place = dict(zip(PLACE, point, strict=True))
     flown = at(scenario, *point)

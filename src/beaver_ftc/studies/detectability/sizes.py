@@ -29,7 +29,7 @@ from beaver_ftc.studies.detectability import sizes_shown
 from beaver_ftc.studies.detectability.certain import AMPLITUDES, SETTLED_S, axis_of
 from beaver_ftc.studies.detectability.places import scaled
 from beaver_ftc.studies.detectability.shown import NAME
-from beaver_ftc.studies.detectability.thresholds import LARGEST, STAGES, of_all, threshold
+from beaver_ftc.studies.detectability.thresholds import LARGEST, STAGES, size_for_all, threshold
 from beaver_ftc.studies.engine.draws import loss
 from beaver_ftc.studies.engine.statistics import CONFIDENCE, counted, or_never
 from beaver_ftc.studies.engine.study import FlyRound, Study
@@ -71,7 +71,7 @@ class _Flown:
     tell: Callable[[str], None]
     rows: dict[Flight, Document] = field(default_factory=dict)
 
-    def of(self, variant: str, runs: Sequence[int], size: int) -> list[Document]:
+    def rows_of(self, variant: str, runs: Sequence[int], size: int) -> list[Document]:
         """The rows of these flights; those that are missing are flown."""
         flights = [Flight(variant, run, size) for run in runs]
         missing = [flight for flight in flights if flight not in self.rows]
@@ -80,9 +80,9 @@ class _Flown:
             self.tell(f"{variant}: {len(self.rows)} flights")
         return [self.rows[flight] for flight in flights]
 
-    def says(self, variant: str, key: str, runs: Sequence[int], size: int) -> list[bool]:
+    def flags_of(self, variant: str, key: str, runs: Sequence[int], size: int) -> list[bool]:
         """The flag `key` of each of these flights."""
-        return [row[key] for row in self.of(variant, runs, size)]
+        return [row[key] for row in self.rows_of(variant, runs, size)]
 
 
 def sizes_study(scenario: Scenario, asked: Asked, tell: Callable[[str], None]) -> Study:
@@ -216,10 +216,10 @@ def _document(scenario: Scenario, asked: Asked, variants: dict[str, Scenario], f
 def _answer(variant: str, flown: _Flown, stages: Sequence[int]) -> Document:
     """The answer for one variant: the sizes that are found and certain, as shares of the effectiveness (null:
     not even a total loss), and the results of a total loss. stages: as in `threshold`."""
-    found_size = threshold(partial(flown.says, variant, "found"), SHARE, stages)
-    certain_size = of_all(partial(flown.says, variant, "certain"), stages[0])
-    total = flown.of(variant, range(found_size.flights), LARGEST)
-    n_certain = sum(flown.says(variant, "certain", range(stages[0]), LARGEST))
+    found_size = threshold(partial(flown.flags_of, variant, "found"), SHARE, stages)
+    certain_size = size_for_all(partial(flown.flags_of, variant, "certain"), stages[0])
+    total = flown.rows_of(variant, range(found_size.flights), LARGEST)
+    n_certain = sum(flown.flags_of(variant, "certain", range(stages[0]), LARGEST))
     return {
         "variant": variant,
         "found": {

@@ -103,6 +103,6 @@ def threshold(is_found: IsFound, share: float, stages: Sequence[int] = STAGES) -
     return result
 
 
-def of_all(is_found: IsFound, flights: int) -> float:
+def size_for_all(is_found: IsFound, flights: int) -> float:
     """The smallest size that all of so many flights find, per cent; infinite if there is none."""
     return Sizes(is_found, flights).ordered(flights)

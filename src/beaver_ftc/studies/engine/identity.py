@@ -28,7 +28,7 @@ def of(what: str, asked: Document) -> Document:
     return json.loads(json.dumps(document))
 
 
-def known(manifest: Path, what: str) -> Document | None:
+def read_identity(manifest: Path, what: str) -> Document | None:
     """The identity of a `what` in a file; None if the file does not exist or is damaged."""
     try:
         document = read_json(manifest)

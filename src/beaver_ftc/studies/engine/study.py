@@ -173,7 +173,7 @@ def _begin(hidden: Path, study: Study) -> store.Parts:
     mine = identity.of("study", asked)
     manifest = hidden / "study.json"
     parts = store.Parts(hidden / "parts", store.RowsAsJson(study.row), GO_ON)
-    earlier = identity.known(manifest, "study")
+    earlier = identity.read_identity(manifest, "study")
     with clear_disk_errors(hidden):
         if earlier is None and parts:  # they may belong to another study
             files.set_aside(parts.folder, f"{manifest.name} {files.UNREADABLE}")

@@ -37,7 +37,7 @@ def columns_of(aircraft: Aircraft) -> Columns:
     return Columns(*COLUMNS, *aircraft.signals, *surfaces)
 
 
-def seen_when_told(scenario: "Scenario", log: Columns, surface: str) -> Document:
+def informed_row(scenario: "Scenario", log: Columns, surface: str) -> Document:
     """told_deflection: deflection d of the fault of a surface from its begin to the end of the flight.
     told_chance: the probability of detecting it in this time.
 

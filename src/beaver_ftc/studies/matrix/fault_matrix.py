@@ -31,7 +31,7 @@ from beaver_ftc.scenario.schema import load as load_scenario
 from beaver_ftc.studies.detectability.certain import axis_of
 from beaver_ftc.studies.detectability.places import usual_airspeeds
 from beaver_ftc.studies.engine.study import Study
-from beaver_ftc.studies.matrix.clairvoyant import columns_of, seen_when_told
+from beaver_ftc.studies.matrix.clairvoyant import columns_of, informed_row
 from beaver_ftc.studies.matrix.matrix_shown import FILES, NAME, VERDICTS
 from beaver_ftc.studies.reproduce.choices import SETTING
 
@@ -155,7 +155,7 @@ def fly_case(case: FaultCase) -> Document:
     ours, best = (scenario_of(case, law, off_deg) for law in ("fault-tolerant-published", "oracle-published"))
     log = columns_of(ours.airframe) if case.declared else None
     flight, oracle = fly(ours, log), fly(best)
-    informed = {} if log is None else seen_when_told(ours, log, case.surface)
+    informed = {} if log is None else informed_row(ours, log, case.surface)
     return {**case._asdict(), **_diagnosis(flight, case), **_tracking(flight, oracle, case), **informed}
 
 
@@ -231,11 +231,11 @@ def document_of(rows: Rows) -> Document:
             row for row in rows if row["departure_s"] is not None and row["oracle_departure_s"] is None
         ],
         "passed": not wrong and not false_alarms,
-        **({"told": beside_told(informed)} if informed else {}),
+        **({"told": informed_counts(informed)} if informed else {}),
     }
 
 
-def beside_told(rows: Rows) -> Document:
+def informed_counts(rows: Rows) -> Document:
     """The results of the flights in which the informed test detects the fault with a probability above
     LIKELY.
 

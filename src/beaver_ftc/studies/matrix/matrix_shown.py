@@ -55,7 +55,7 @@ def as_text(document: Document) -> str:
         f"{len(document['lost_though_the_oracle_was_not'])} aircraft lost although the law oracle kept it"
     )
     informed = document.get("told")
-    legend, share = (LEGEND + TOLD_LEGEND, [_told(informed)]) if informed else (LEGEND, [])
+    legend, share = (LEGEND + TOLD_LEGEND, [_informed_text(informed)]) if informed else (LEGEND, [])
     remark_lines = [*remarks, ""] if remarks else []
     return "\n".join([*map(str.rstrip, table), "", legend, "", *remark_lines, totals, *share])
 
@@ -74,7 +74,7 @@ def _cell_text(cell: Document) -> str:
     return f"{SHOWN[cell['verdict']]:12} {delay} {ratio:>5}{'*' if cell['lost'] else ''}{unseen}"
 
 
-def _told(test: Document) -> str:
+def _informed_text(test: Document) -> str:
     """How many faults the informed test detects, and how many of these the diagnosis detects and names."""
     if not test["seen"]:
         return "the informed test, which knows the fault, detects none of them"

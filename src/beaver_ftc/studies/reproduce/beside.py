@@ -33,7 +33,7 @@ QUANTITIES = (
 )  # fmt: skip
 
 
-def fly_beside() -> dict[tuple[str, str], Flown]:
+def fly_both() -> dict[tuple[str, str], Flown]:
     """The flights of each case of SHOWN with both schemes, by (case, whose)."""
     return {(case.name, whose): fly_case(case, changes) for case in SHOWN for whose, changes in WHOSE.items()}
 
@@ -90,7 +90,7 @@ def _row(case: str, whose: str, flown: Flown) -> Document:
 
 def _better(rows: Sequence[Document]) -> list[Document]:
     """The numbers that are better with the scheme and law of the paper."""
-    # `fly_beside` has each case with the paper's scheme first, then with ours
+    # `fly_both` has each case with the paper's scheme first, then with ours
     pairs = zip(rows[::2], rows[1::2], strict=True)
     return [
         {

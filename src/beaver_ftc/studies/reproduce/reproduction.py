@@ -124,7 +124,7 @@ def document_of(rows: Sequence[Document]) -> Summary:
         "claims": claims,
         "ablations": _ablations(claims),
         "beside": beside.document_of(
-            beside.fly_beside(), [row[FALSE_ALARM] for row in rows if FALSE_ALARM in row]
+            beside.fly_both(), [row[FALSE_ALARM] for row in rows if FALSE_ALARM in row]
         ),
         "truth_and_design": truth_and_design.document_of(truth_and_design.fly_designs()),
         "choices": [asdict(choice) for choice in (*CHOICES, *OPTIONS)],

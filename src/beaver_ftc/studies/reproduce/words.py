@@ -36,14 +36,14 @@ def number(value: float | None, unit: str = "", none: str = "never") -> str:
     return tables.number(value, unit, none=none)
 
 
-def _found(claim: Document, key: str = "number") -> str:
+def _number_text(claim: Document, key: str = "number") -> str:
     """A number of a claim as text. key: of the number in the row of the claim."""
     return number(claim[key], claim["unit"], claim["none"])
 
 
-def ours(claim: Document) -> str:
+def quantity_text(claim: Document) -> str:
     """Quantity and number of a claim."""
-    return f"{claim['quantity']} {_found(claim)}"
+    return f"{claim['quantity']} {_number_text(claim)}"
 
 
 def limit(claim: Document) -> str:
@@ -55,24 +55,24 @@ def limit(claim: Document) -> str:
 
 def without(claim: Document) -> str:
     """The mechanism that is removed, and the number without it."""
-    return f"{claim['without']}: {_found(claim, 'number_without')}"
+    return f"{claim['without']}: {_number_text(claim, 'number_without')}"
 
 
 def verdict_rows(document: Document) -> list[tuple[str, ...]]:
     """A row for each statement, below VERDICT_HEAD."""
     return [
-        (claim["where"], claim["statement"], "-", "-", "-", said(claim), claim["reason"])
+        (claim["where"], claim["statement"], "-", "-", "-", verdict_words(claim), claim["reason"])
         if claim["reason"]
         else (
-            claim["where"], claim["statement"], f"{', '.join(claim['flights'])}: {ours(claim)}",
+            claim["where"], claim["statement"], f"{', '.join(claim['flights'])}: {quantity_text(claim)}",
             f"{limit(claim)}: {claim['limit_from']}",
-            without(claim), said(claim), remark(claim),
+            without(claim), verdict_words(claim), remark(claim),
         )
         for claim in document["claims"]
     ]  # fmt: skip
 
 
-def said(claim: Document) -> str:
+def verdict_words(claim: Document) -> str:
     """The verdict on a claim in words."""
     verdict: str = claim["verdict"]
     return SHOWN_AS.get(verdict, verdict)
@@ -103,24 +103,24 @@ def exceptions(document: Document) -> list[str]:
         sentence
         for row in document["sensitivity"]
         for sentence in (
-            *(f"{row['variant']}: {_said(missed)}" for missed in row["missed"]),
+            *(f"{row['variant']}: {_sentence(missed)}" for missed in row["missed"]),
             *(
-                f"{row['variant']}: {_said(statement)}, without {statement['without']}"
+                f"{row['variant']}: {_sentence(statement)}, without {statement['without']}"
                 for statement in row["also_without"]
             ),
         )
     ]
 
 
-def _said(missed: Document) -> str:
+def _sentence(missed: Document) -> str:
     """A statement with its number, without its full stop and with a small first letter."""
     statement = missed["statement"]
-    return f"{missed['where']}, {statement[:1].lower()}{statement[1:-1]}: {_found(missed)}"
+    return f"{missed['where']}, {statement[:1].lower()}{statement[1:-1]}: {_number_text(missed)}"
 
 
-def _all_said(missed: list[Document]) -> str:
+def _sentences(missed: list[Document]) -> str:
     """Statements with their numbers, in a cell."""
-    return "; ".join(map(_said, missed)) or "none"
+    return "; ".join(map(_sentence, missed)) or "none"
 
 
 def _value(value: Any) -> str:
@@ -141,14 +141,14 @@ ABLATIONS = (
     ("Taken out", "takes"), ("By", "changes", _changes), ("Statements that speak of it", "statements"),
     ("Fail without it", "fail"),
 )  # fmt: skip
-RANGES = (  # a row a measured statement: its number's range over the changes
-    ("Published", "where"), ("Statement", "statement"), ("From", partial(_found, key="lowest")),
-    ("To", partial(_found, key="highest")), ("Held", "{held_in} of {elsewhere}".format_map),
+RANGES = (  # columns of a measured statement: the range of its number over all settings
+    ("Published", "where"), ("Statement", "statement"), ("From", partial(_number_text, key="lowest")),
+    ("To", partial(_number_text, key="highest")), ("Held", "{held_in} of {elsewhere}".format_map),
 )  # fmt: skip
 CHOICES = (("Key", "key"), ("Value", "value", _value), ("Reason", "reason"))
 GAINS = (
     ("Option", "key"), ("Default", "default", _value), ("What it is", "says"), ("Chosen by", "origin"),
-    ("Halved: no longer hold", "halved", _all_said), ("Doubled: no longer hold", "doubled", _all_said),
+    ("Halved: no longer hold", "halved", _sentences), ("Doubled: no longer hold", "doubled", _sentences),
 )  # fmt: skip
 
 
@@ -217,12 +217,12 @@ def _table(document: Document) -> "Table":
     for head in ("Published", "Statement", "Our number", "Without", "Verdict"):
         table.add_column(head)
     for claim in measured(document):
-        cell = f"{ours(claim)} ({limit(claim)})"
+        cell = f"{quantity_text(claim)} ({limit(claim)})"
         verdict = claim["verdict"]
         note = remark(claim)
         table.add_row(
             claim["where"], claim["statement"], f"{cell}; {note}" if note else cell, without(claim),
-            Text(said(claim), _STYLE.get(verdict, "")),
+            Text(verdict_words(claim), _STYLE.get(verdict, "")),
         )  # fmt: skip
     return table
 

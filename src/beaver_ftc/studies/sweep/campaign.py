@@ -23,7 +23,7 @@ from beaver_ftc.studies.engine.workers import LocalWorkers, Number, Work, Worker
 from beaver_ftc.studies.sweep import one_flight
 from beaver_ftc.studies.sweep.one_flight import Keep, counts_of
 from beaver_ftc.studies.sweep.sampling import Assignment, Plan, Round
-from beaver_ftc.studies.sweep.search import found, generations
+from beaver_ftc.studies.sweep.search import generations, search_result
 from beaver_ftc.studies.sweep.store import Store, identity_of
 
 if TYPE_CHECKING:
@@ -180,7 +180,7 @@ def _summary(sweep: Sweep, options: Options, flights: "Flights", results: Path) 
     expectations = evaluate(sweep.file.expect, flights)
     return {
         **summarise(flights, sweep),
-        **({"search": found(options.search, results, sweep)} if options.search else {}),
+        **({"search": search_result(options.search, results, sweep)} if options.search else {}),
         "worst": worst_flights(flights, sweep, command),
         "expectations": expectations,
         "passed": all(expectation["passed"] for expectation in expectations),

@@ -139,7 +139,7 @@ def _flights_of(values: Mapping[int, Document], runs: Sequence[int]) -> list[Ass
     return [Assignment(run, values[run]) for run in runs]
 
 
-def found(objective: str, results: Path, sweep: Sweep) -> Document:
+def search_result(objective: str, results: Path, sweep: Sweep) -> Document:
     """The result of the search: the worst flight, and the worst score so far after each generation."""
     from pyarrow.parquet import read_table
 

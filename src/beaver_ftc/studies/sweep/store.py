@@ -105,7 +105,7 @@ class Store:
 
         Raises BadInput, too, if the identity differs.
         """
-        earlier = identity.known(self._manifest, "sweep")
+        earlier = identity.read_identity(self._manifest, "sweep")
         flown = self.results.exists() or bool(self.parts)
         if earlier is None and (flown or self._manifest.exists()):
             self._refuse_or_set_aside(resume)

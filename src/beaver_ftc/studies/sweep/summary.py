@@ -85,11 +85,11 @@ def _estimate(name: str, estimate: Estimate) -> Document:
 def quantiles(values: np.ndarray) -> Document:
     """QUANTILES of values (n,), and their number. An event that never came has an infinite value; an infinite
     quantile is null."""
-    ordered = _told(values)
+    ordered = _sorted_without_nan(values)
     return {"of": int(ordered.size), **{name: number(quantile(ordered, q)) for name, q in QUANTILES.items()}}
 
 
-def _told(values: np.ndarray) -> np.ndarray:
+def _sorted_without_nan(values: np.ndarray) -> np.ndarray:
     """The values without NaN, sorted."""
     return np.sort(values[~np.isnan(values)])
 
@@ -261,7 +261,7 @@ def estimate_of(flights: Flights, name: str, level: Level) -> tuple[int, float, 
     if isinstance(level, QuantileLevel):
         quantity, _, axis = name.partition(".")
         values = getattr(flights, quantity)  # a column, or a function from an axis to one
-        ordered = _told((values(axis) if axis else values)[flights.faulted])
+        ordered = _sorted_without_nan((values(axis) if axis else values)[flights.faulted])
         value = quantile(ordered, level.quantile)
         return ordered.size, value, partial(statistics.quantile_bound, ordered, level.quantile)
     if name in _RATES:

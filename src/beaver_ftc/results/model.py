@@ -26,12 +26,11 @@ Span = tuple[float, float]
 
 Quantity = float | None
 """A number; None if the quantity does not exist."""
-BySurface = dict[str, float]
-"""A number for each surface, by its name."""
+BySurface = dict[str, float]  # A number for each surface, by its name
 Value = TypeVar("Value")
 _KNOWN = "a key that the document has only where its value is known"
+# A field whose key is left out of the document if its value is None. Other fields are then null.
 Known = Annotated[Value | None, _KNOWN]
-"""A field whose key is left out of the document if its value is None. Other fields are then null."""
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,8 @@ from beaver_ftc.studies.sweep.one_flight import row_of, scenario_of
 from beaver_ftc.studies.sweep.sampling import Assignment, Plan
 
 STAGES = ("scenario", "aircraft, trim, record", "frames", "metrics and row")
+# Times of STAGES (4,), s; JSBSim frames; time of as many frames of JSBSim alone, s.
 Taken = tuple[np.ndarray, int, float]
-"""Times of STAGES (4,), s; JSBSim frames; time of as many frames of JSBSim alone, s."""
 
 
 class Kind(NamedTuple):

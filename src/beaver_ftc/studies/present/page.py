@@ -67,8 +67,7 @@ class Pictures(NamedTuple):
 Part = str | Heading | Table | Bullets | Links | Pictures
 
 
-Parts = Sequence[Part]
-"""The parts of a page from top to bottom. An empty text is left out."""
+Parts = Sequence[Part]  # The parts of a page from top to bottom. An empty text is left out
 
 
 def table(columns: Columns, rows: Iterable[Any]) -> Table:
@@ -207,13 +206,11 @@ def versions_line(versions: Mapping[str, str]) -> str:
     return ", ".join(f"{name} {version}" for name, version in versions.items())
 
 
+# A text, bytes, a figure, a mapping (a folder of these), None (no file), or a function from the folder to one.
 Content = Any
-"""A text, bytes, a figure, a mapping (a folder of these), None (no file), or a function from the folder to
-one."""
-Files = Mapping[str, Content]
-"""Contents by name of the file."""
+Files = Mapping[str, Content]  # Contents by name of the file
+# By name of a file, the function from the document to its content.
 Makers = Mapping[str, Callable[[Any], Content]]
-"""By name of a file, the function from the document to its content."""
 
 
 def contents(files: Makers, document: Any) -> Files:

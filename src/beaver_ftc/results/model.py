@@ -26,7 +26,7 @@ Span = tuple[float, float]
 
 Quantity = float | None
 """A number; None if the quantity does not exist."""
-BySurface = dict[str, float]  # A number for each surface, by its name
+BySurface = dict[str, float]  # a number for each surface, by its name
 Value = TypeVar("Value")
 _KNOWN = "a key that the document has only where its value is known"
 # A field whose key is left out of the document if its value is None. Other fields are then null.

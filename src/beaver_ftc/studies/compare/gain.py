@@ -21,7 +21,7 @@ from beaver_ftc.studies.engine.statistics import CONFIDENCE, Estimate
 
 JUDGED = 12  # draws on which both settings fly; with 4, the interval of a detector is 20 % wide to each side
 RESAMPLES = 4000  # of the bootstrap
-Size = Callable[..., np.ndarray]  # From the parts (..., n) of a cost, along an axis, to the cost (...)
+Size = Callable[..., np.ndarray]  # from the parts (..., n) of a cost, along an axis, to the cost (...)
 
 
 def gain_of(group: str, name: str, grade: str, settings: Sequence[Values], first: int) -> Document:

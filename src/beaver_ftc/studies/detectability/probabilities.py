@@ -47,7 +47,7 @@ COLUMNS = (
     "sensors", "turbulence", "excitation_deg_s", "seed", "surface", "magnitude", "scheme", "false_alarm",
     "delay_s", "own_false_alarm", "own_delay_s", *(f"deflection_{s:g}" for s in WITHIN_S),
 )  # fmt: skip
-Key = tuple[str, str, str]  # Sensors, turbulence and scheme
+Key = tuple[str, str, str]  # sensors, turbulence and scheme
 
 
 def _by_condition(watched: Iterable[Watched]) -> dict[Key, list[Trace]]:

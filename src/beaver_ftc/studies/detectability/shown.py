@@ -12,7 +12,7 @@ HEAD = (
     "doublet", "doublet time", "found in 90 % from", "95 % interval", "flights", "false alarms/h",
     "before faults/h", SOON, "median delay",
 )  # fmt: skip
-Line = dict[str, str]  # The cells of a row by their column of HEAD
+Line = dict[str, str]  # the cells of a row by their column of HEAD
 
 
 def table(lines: Sequence[Line]) -> Table:

@@ -17,7 +17,7 @@ from typing import Any
 
 from beaver_ftc.studies.engine.workers import Batch, Number, Row, Workers
 
-Lost = Callable[[Any, str], Row]  # From a case that kills its process, and the reason, to its row
+Lost = Callable[[Any, str], Row]  # from a case that kills its process, and the reason, to its row
 POLL_S = 0.2  # longest wait for a task, after which `stopped` is tested again
 MOST_LOSSES = 3  # a single case that is lost so often is given up
 TASKS_A_SLOT = 4  # the remaining cases make so many tasks for each slot, so that the last tasks are short

@@ -51,7 +51,7 @@ FAULTS: tuple[tuple[str, Document], ...] = tuple(
 )
 
 
-Rows = list[Document]  # Rows of flights
+Rows = list[Document]  # rows of flights
 
 
 class FaultCase(NamedTuple):

@@ -15,7 +15,7 @@ from beaver_ftc.studies.mismatch.split import split_flight
 PUBLISHED_CASE = "elevator-partial-loss"
 MAX_ROUNDS = 10  # of flights, each with a larger bound
 LEAST_RAD_S2 = 1e-4  # smallest bound that is widened
-PerAxis = dict[str, float]  # Constant part of eta_bar, rad/s2, by axis
+PerAxis = dict[str, float]  # constant part of eta_bar, rad/s2, by axis
 
 
 def recommend(needed: Sequence[np.ndarray], at_least: PerAxis | None = None) -> PerAxis:

@@ -67,7 +67,7 @@ class Pictures(NamedTuple):
 Part = str | Heading | Table | Bullets | Links | Pictures
 
 
-Parts = Sequence[Part]  # The parts of a page from top to bottom. An empty text is left out
+Parts = Sequence[Part]  # the parts of a page from top to bottom; an empty text is left out
 
 
 def table(columns: Columns, rows: Iterable[Any]) -> Table:
@@ -206,9 +206,9 @@ def versions_line(versions: Mapping[str, str]) -> str:
     return ", ".join(f"{name} {version}" for name, version in versions.items())
 
 
-# A text, bytes, a figure, a mapping (a folder of these), None (no file), or a function from the folder to one.
+# A text, bytes, a figure, a mapping (a folder of these), None (no file), or a function from a folder to one.
 Content = Any
-Files = Mapping[str, Content]  # Contents by name of the file
+Files = Mapping[str, Content]  # contents by name of the file
 # By name of a file, the function from the document to its content.
 Makers = Mapping[str, Callable[[Any], Content]]
 

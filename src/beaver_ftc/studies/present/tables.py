@@ -97,7 +97,7 @@ class Column(NamedTuple):
         return number(value, self.form) if isinstance(self.form, str) else self.form(value)
 
 
-Columns = Sequence[tuple[Any, ...]]  # The fields of each `Column`
+Columns = Sequence[tuple[Any, ...]]  # the fields of each `Column`
 
 
 def tabulated(columns: Columns, rows: Iterable[Any]) -> tuple[list[str], list[list[str]]]:

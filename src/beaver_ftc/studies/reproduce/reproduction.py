@@ -145,7 +145,7 @@ def document_of(rows: Sequence[Document]) -> Summary:
 
 Pairs = list[tuple[float, float]]
 """(number, number in the ablation) of each of MEASURED in a setting."""
-BySetting = Mapping[str, Pairs]  # The pairs by name of the setting
+BySetting = Mapping[str, Pairs]  # the pairs by name of the setting
 
 
 def _claims(pairs_of: BySetting) -> Rows:

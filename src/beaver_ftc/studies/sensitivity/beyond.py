@@ -30,7 +30,7 @@ LATER_S = 4.0  # largest delay of the begin of the faults
 LEFT_S = 5.0  # shortest time from the begin of the faults to the end
 
 
-Errors = Sequence[Error]  # The errors of a scenario
+Errors = Sequence[Error]  # the errors of a scenario
 
 
 class Flight(NamedTuple):

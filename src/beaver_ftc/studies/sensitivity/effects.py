@@ -16,8 +16,8 @@ from beaver_ftc.studies.sensitivity.systems import MECHANISMS, SYSTEMS, Mechanis
 
 LATE_S = 0.1  # an alarm that is later by more than this is late
 WORSE = 1.1  # a tracking error larger by more than this factor is worse
-Outcomes = Sequence[Document]  # Outcomes of several flights
-Pair = tuple[Document, Document]  # Outcomes (a, b) of a draw: a with the mechanism, b without it
+Outcomes = Sequence[Document]  # outcomes of several flights
+Pair = tuple[Document, Document]  # outcomes (a, b) of a draw: a with the mechanism, b without it
 
 
 def document_of(seed: int, draws: int, rows: Outcomes, margins: list[Document]) -> Document:

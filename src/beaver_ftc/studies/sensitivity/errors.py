@@ -32,7 +32,7 @@ _RANDOM = ("noise_std", "quantum")  # begins of keys of a sensor: sizes without 
 _SIGNED = ("bias", "scale_error", "drift")  # those with a sign
 _IDEAL = Sensors()
 
-SensorErrors = Mapping[str, Mapping[str, float]]  # Errors by sensor and key
+SensorErrors = Mapping[str, Mapping[str, float]]  # errors by sensor and key
 # From a factor and a generator for signs to the keys of a scenario.
 Change = Callable[[float, Generator], Document]
 

@@ -29,7 +29,7 @@ from beaver_ftc.studies.sweep.store import Store, identity_of
 if TYPE_CHECKING:
     from beaver_ftc.studies.sweep.outcomes import Flights
 
-There = Callable[[Number, Any], None]  # Called with the number and the rows of each batch when it has landed
+There = Callable[[Number, Any], None]  # called with the number and the rows of each batch when it has landed
 FRAMES_A_BATCH = 50_000  # a third of a second of work: little is lost, and writing a file costs little of it
 MOST_A_BATCH = 256  # flights in a batch, unless there would be more than MOST_BATCHES
 MOST_BATCHES = 4_000  # so many files are read again in seconds

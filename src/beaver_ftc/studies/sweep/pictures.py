@@ -178,7 +178,7 @@ def confusion_matrix(flights: Flights, summary: Document) -> "Figure | None":
     return _shaded(title, shares, text, columns, rows)
 
 
-Place = tuple[int, ...]  # Row and column of a cell
+Place = tuple[int, ...]  # row and column of a cell
 
 
 def _shaded(

@@ -208,7 +208,7 @@ def _sensitivity(flights: Flights) -> dict[str, Ranking]:
     }
 
 
-Bound = Callable[[float, bool], float]  # From (confidence, upper) to the one-sided bound of an estimate
+Bound = Callable[[float, bool], float]  # from (confidence, upper) to the one-sided bound of an estimate
 
 
 def evaluate(expect: SweepExpect, flights: Flights) -> list[Document]:

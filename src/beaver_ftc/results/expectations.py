@@ -210,6 +210,7 @@ def expectations_in_words(metrics: Metrics) -> list[ExpectationInWords]:
 
 
 def _in_words(result: Expectation) -> ExpectationInWords:
+    """One expectation in words. A key without a rule has the words of its name."""
     rule = RULES.get(result.name) or Rule("", without_underscores(result.name))
     limit, actual = rule.texts(result)
     reason = result.reason if actual or not result.passed else ""

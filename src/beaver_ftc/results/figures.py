@@ -179,6 +179,7 @@ def _empty_figure_and_axes(view: View, new_figure: Any) -> tuple["Figure", Any]:
 
 
 def _draw_panel(axes: "Axes", panel: Panel, series: Values, event_marks: Sequence[Mark]) -> None:
+    """A panel with its traces or bars, shade, marks and axes."""
     if panel.bars:
         _draw_bars(axes, panel, series)
     else:
@@ -218,6 +219,7 @@ def _set_log_scale(axes: "Axes") -> None:
 
 
 def _draw_trace(axes: "Axes", trace: Trace, series: Values, stepped: bool) -> None:
+    """A curve in the look of its role. stepped: whether values are held until the next point."""
     look = LOOKS[trace.role]
     axes.plot(
         series["t_s"],
@@ -274,6 +276,7 @@ def _linestyle(dash: tuple[float, ...]) -> Any:
 
 
 def _draw_shade(axes: "Axes", panel: Panel, series: Values) -> None:
+    """Shade the background while the column of the shade is 1."""
     if not panel.shade_column or not (series[panel.shade_column] == 1).any():
         return
     axes.fill_between(

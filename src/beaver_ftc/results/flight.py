@@ -201,11 +201,13 @@ class Flight:
         return Path(out) / self.name
 
     def _log_or_raise(self) -> Log:
+        """The log. Raises BadInput for a flight without a log."""
         if self._source is None:
             raise BadInput(f"{self.name}: this flight kept no log, allowed: fly it with log=True")
         return self._source
 
     def _view_of_name(self) -> dict[str, Any]:
+        """The views that the log allows, by name."""
         from beaver_ftc.results.views import views_of_flight
 
         views = views_of_flight(self._log_or_raise().columns, self._typed_metrics)
@@ -224,6 +226,7 @@ class Flight:
         return f"<b>{escape(verdict.title(self._typed_metrics))}</b><table>{rows}</table>"
 
     def _verdict_lines(self) -> list[tuple[str, str]]:
+        """(name, text) of the verdict, of the tracking errors and of missed expectations."""
         tracked = [
             ("tracking", f"p {p}  q {q}  r {r} deg/s RMS {when} the fault")
             for when, p, q, r in verdict.tracking_rms_in_words(self._typed_metrics)

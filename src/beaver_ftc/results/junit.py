@@ -32,6 +32,7 @@ def write_junit(runs: Sequence[Judged], path: Path) -> None:
 
 
 def _add_suite(root: ElementTree.Element, run: Judged) -> None:
+    """Add the test suite of a run, with its cases."""
     cases = list(_cases(run))
     kinds = Counter(kind for _, kind, _, why in cases if why is not None)
     counts = {"tests": len(cases), "failures": kinds["failure"], "errors": kinds["error"]}

@@ -97,6 +97,7 @@ class ParquetLog:
         self.close()
 
     def _flush(self, writer: Any) -> None:
+        """Write the filled part of the buffer as a row group."""
         import pyarrow as pa
 
         # pa.array would import pandas, if it is installed, to test whether its argument is a series.

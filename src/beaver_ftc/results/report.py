@@ -194,6 +194,7 @@ def _panel_entry(panel: Panel) -> Document:
 
 @cache
 def _asset_text(name: str) -> Any:
+    """A file of the template folder, which is inserted without escapes."""
     from markupsafe import Markup
 
     return Markup((_TEMPLATE_FOLDER / name).read_text(encoding="utf-8"))

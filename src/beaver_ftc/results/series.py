@@ -33,6 +33,8 @@ def source_columns(columns: Iterable[str]) -> tuple[str, ...]:
 
 
 def _source_columns_of(column: str) -> tuple[str, ...]:
+    """The log columns of one column. Those of a ratio are the residual, then its threshold, or its lower and
+    upper threshold."""
     if column == MEAN_AIRSPEED_COLUMN:
         return (COMMANDED_AIRSPEED_COLUMN, FLOWN_AIRSPEED_COLUMN)
     if column.endswith(UNLIKE_ENDING):

@@ -179,6 +179,7 @@ class _Parser:
         return Formula("column", column_or_number=token)
 
     def _parse_rest_of_parentheses(self) -> Formula:
+        """A formula and the closing parenthesis."""
         formula = self._parse_operand(0)
         self._take_token(")")
         return formula
@@ -200,6 +201,7 @@ class _Parser:
         return begin, end
 
     def _parse_seconds(self) -> float:
+        """A time from 0 to MOST_SECONDS, s."""
         token = self._take_token()
         if not re.fullmatch(r"[\d.].*", token) or float(token) > MOST_SECONDS:
             raise FormulaError(

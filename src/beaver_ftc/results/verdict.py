@@ -548,6 +548,7 @@ def _span_text(begin_s: float, end_s: float | None) -> str:
 
 
 def _seconds_text(seconds: float | None) -> str:
+    """A time as text, with one digit less from 1000 s on."""
     if seconds is None:
         return "none"
     return f"{seconds:.2f} s" if seconds < 1000 else f"{seconds:.1f} s"

@@ -325,6 +325,7 @@ _SENSOR_MONITOR = View(
 
 
 def _likelihood_view(columns: Names) -> View:
+    """A panel for the tests of each kind of surface, and one for those of the axes."""
     ending = "_loss_likelihood_share"
     names = [column.removesuffix(ending) for column in columns if column.endswith(ending)]
     losses = {
@@ -363,6 +364,7 @@ def _candidates_view(surface_names: Names, estimator_names: Names) -> View:
 
 
 def _isolation_view(names: Names) -> View:
+    """A panel for each isolation estimator and axis. names: of the estimators."""
     panels = tuple(
         isolation_panel(name, axis, f"{without_underscores(name)} estimator: {axis}", "threshold")
         for name in names
@@ -381,6 +383,7 @@ def _isolation_view(names: Names) -> View:
 
 
 def _ratio_view(names: Names) -> View:
+    """A panel for the detection estimator and for each isolation estimator. names: of the latter."""
     stems = [
         ("detection estimator", ""),
         *((f"{without_underscores(name)} estimator", f"fie_{name}_") for name in names),
@@ -397,6 +400,7 @@ def _ratio_view(names: Names) -> View:
 
 
 def _effectiveness_view(names: Names) -> View:
+    """Estimated and used effectiveness of the surfaces, two panels for each kind."""
     panels = tuple(
         _panel(
             f"{kind}: {label}" if kind else label,

@@ -98,6 +98,8 @@ def frame_without(stand_ins: Mapping[str, Kernel], name: str) -> Kernel:
     folder = compiled.cache_folder()
 
     def kernel(function, for_size=False):
+        """The decorator in place of `compiled.kernel`: compile a function, or its stand-in, into the own
+        cache."""
         full_name = f"{function.__module__}.{function.__name__}".removeprefix("beaver_ftc.")
         used.add(full_name)
         made_of = stand_ins.get(full_name, function)

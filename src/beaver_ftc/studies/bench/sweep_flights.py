@@ -85,6 +85,7 @@ def _flown(sweep: Sweep, kind: Kind, run: int) -> Taken:
     took_s: list[float] = []
 
     def timed(stage: Callable[[], Any]) -> Any:
+        """The result of a stage, whose processor time is added to the list."""
         began_s = time.process_time()
         result = stage()
         took_s.append(time.process_time() - began_s)

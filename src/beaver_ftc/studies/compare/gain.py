@@ -62,6 +62,7 @@ def relative_gain(before: np.ndarray, after: np.ndarray, size: Size) -> Estimate
     from scipy.stats import bootstrap
 
     def gain(before: np.ndarray, after: np.ndarray, axis: int = -1) -> np.ndarray:
+        """The gain of resampled parts (..., n), along an axis."""
         first, second = size(before, axis=axis), size(after, axis=axis)
         without_cost = np.where(second > 0.0, -np.inf, 0.0)
         return np.where(first > 0.0, 1.0 - second / np.where(first > 0.0, first, 1.0), without_cost)

@@ -146,6 +146,7 @@ def _searched(
         return {name: value_at(range_, float(place)) for (name, range_), place in places}
 
     def attempt(point: np.ndarray) -> float:
+        """The cost at a point (n,), which is noted with its cost."""
         points.append(point.copy())
         costs.append(cost(values_at(point)))
         return costs[-1]

@@ -49,6 +49,7 @@ class RayWorkers:
         return self._most or QUEUED_A_CPU * cpus
 
     def submit(self, task: Batch) -> None:
+        """Submit a task to the cluster."""
         if self._diverted is None:  # Ray prints lost workers on standard output, which may be a document
             self._diverted = contextlib.redirect_stdout(sys.stderr)
             self._diverted.__enter__()
@@ -59,6 +60,7 @@ class RayWorkers:
         return [Outcome(self._tasks.pop(reference), self._rows(reference)) for reference in ready]
 
     def close(self) -> None:
+        """Cancel all tasks, leave the cluster if this object joined it, and restore standard output."""
         for reference in self._tasks:
             self._ray.cancel(reference, force=True)
         if self._ours:

@@ -37,6 +37,7 @@ def binomial(events: int, trials: int, confidence: float = CONFIDENCE) -> Estima
 
 @functools.cache  # a study asks for the same few counts in every table, 3 ms each
 def _rate(count: int, trials: int, confidence: float, method: str) -> Estimate:
+    """count / trials with its two-sided interval by this method of scipy; NaN with (0, 1) without a trial."""
     from scipy.stats import binomtest
 
     if trials == 0:

@@ -97,6 +97,7 @@ def flown(study: Study, out: Path, workers: int = 1, progress: Progress | None =
         part = study.part or (OF_A_PART if study.rounds else 1)
 
         def fly(cases: Sequence[Any]) -> list[Any]:
+            """Fly one round of cases; its pieces have the number of the round in their names."""
             number = next(rounds)
             pieces = {f"{number:06}-{n:06}": runs for n, runs in store.batches_of(len(cases), part)}
             _fly_pieces(flying, pieces, cases, progress)
@@ -113,6 +114,7 @@ def _fly_pieces(
     rows_of_piece: dict[Number, Any] = {}
 
     def there(piece: Number, rows: Any) -> None:
+        """Keep the rows of a piece, and report progress."""
         rows_of_piece[piece] = rows
         if progress:
             progress(len(rows_of_piece) / len(pieces))

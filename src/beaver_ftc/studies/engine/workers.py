@@ -165,6 +165,7 @@ class LocalWorkers:
             raise
 
     def submit(self, task: Batch) -> None:
+        """Give a task to an idle worker."""
         worker = self._idle.pop()
         try:
             flying = worker.fly(task)
@@ -182,6 +183,7 @@ class LocalWorkers:
             worker.end()
 
     def _outcome(self, future: "Future[list[Row]]") -> Outcome:
+        """The outcome of a task that has ended; its worker, or a new one, is idle again."""
         worker, task = self._busy.pop(future)
         rows = None
         try:

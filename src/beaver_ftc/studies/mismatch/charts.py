@@ -102,6 +102,7 @@ def _draw_sources(axes: "Axes", series: dict, axis: str, chosen: list[str], inst
 
 
 def _dress(axes: "Axes") -> None:
+    """The look that all panels with curves share."""
     axes.tick_params(labelsize=8)
     axes.grid(color=GREY, alpha=0.3, linewidth=0.5)
     axes.margins(x=0.01)

@@ -161,6 +161,7 @@ def linear_document(analysis: LinearAnalysis) -> Document:
 
 
 def _mode(mode: Mode) -> Document:
+    """A mode for the document."""
     return {
         "real_per_s": mode.pole.real,
         "imaginary_rad_s": mode.pole.imag,

@@ -125,6 +125,7 @@ def html_of(parts: Parts, figures: Drawn) -> str:
 
 
 def _html(part: Part, figures: Drawn) -> str:
+    """A part as HTML; verdicts in a table get a tick or a cross."""
     match part:
         case Heading():
             return f"<h2>{escape(part.text)}</h2>"
@@ -226,6 +227,7 @@ def write_files(folder: Path, files: Files) -> None:
 
 
 def _write(path: Path, content: Content) -> None:
+    """Write a content to a path, by its type."""
     if isinstance(content, Mapping):
         write_files(path, content)
     elif isinstance(content, str):

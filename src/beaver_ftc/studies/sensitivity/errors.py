@@ -133,6 +133,7 @@ def _acceleration(scenario: Scenario, sizes: Sequence[float]) -> Error:
     frequency_of_axis = {axis: wave.frequency_rad_s for axis, wave in flown.items() if wave.amplitude_rad_s2}
 
     def change(times: float, draws: Generator) -> Document:
+        """The sinusoids of all axes, with amplitudes within the limit of the key."""
         drawn = dict(zip(AXES, draws.uniform(*FREQUENCIES_RAD_S, len(AXES)).tolist(), strict=True))
         return {
             "uncertainty.sinusoid": {
@@ -150,6 +151,7 @@ def _servos(declared: Declared) -> Error:
     _, widest_deg = _limits(TrueActuator, "dead_band_deg")
 
     def change(times: float, draws: Generator) -> Document:
+        """The errors of all actuators."""
         truth = {}
         for name, bound in bounds.items():
             shares = {key: bound[key] for key in ("bandwidth", "rate_limit")}
@@ -167,6 +169,7 @@ def _sensors(declared: SensorErrors) -> Error:
     bounds = declared or PRESETS[UNDECLARED_SENSORS]
 
     def change(times: float, draws: Generator) -> Document:
+        """The errors of all sensors, each key within its limits."""
         truth = {}
         for name, keys in bounds.items():
             signs = _signs(draws, list(keys))

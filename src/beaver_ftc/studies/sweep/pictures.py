@@ -62,6 +62,7 @@ def write_figures(flights: Flights, summary: Document, folder: Path) -> list[Pat
 def _axes(
     title: str, x: str = "", y: str = "", size: tuple[float, float] = (8.0, 4.6)
 ) -> tuple["Figure", "Axes"]:
+    """A figure with one panel: title, labels of its axes, size in inches."""
     figure, grid = panels(1, 1, *size)
     axes = grid[0, 0]
     axes.set_title(title, fontsize=10)

@@ -124,6 +124,7 @@ class Event:
         chains = Chains(len(self.sweep.keys), self.sweep.file.seed)
 
         def fly(points: np.ndarray) -> Scores:
+            """Fly the points of a round; return their scores."""
             rows = fly_round([(chains.flights + i, point.tolist()) for i, point in enumerate(points)])
             scores = np.array([row["score"] for row in rows])
             if not chains.flights and np.isneginf(scores).all():

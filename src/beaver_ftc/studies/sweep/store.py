@@ -59,9 +59,11 @@ class RowsAsParquet:
         self._sweep = sweep
 
     def write(self, rows: Any, file: IO[bytes]) -> None:
+        """Write rows as a table."""
         write_tables(file, [table_of(self._sweep, self.schema, rows)], self.schema)
 
     def read(self, path: Path, runs: Sequence[int]) -> "pa.Table | None":
+        """The table in a file if it has these runs."""
         from pyarrow.parquet import read_table
 
         return self.if_of(runs, read_table(path))

@@ -40,9 +40,7 @@ if TYPE_CHECKING:
     from beaver_ftc.scenario.schema import Scenario
 
 
-_TIME_DECIMALS = (
-    9  # times are rounded to so many decimals of a second, which removes the rounding of frame times
-)
+_TIME_DECIMALS = 9  # decimals of a second: removes the rounding of frame times
 
 
 @dataclass(frozen=True)

@@ -128,8 +128,8 @@ def mismatch(
     for (i, j), sign in product(combinations_with_replacement(range(3), 2), (1.0, -1.0)):
         with np.errstate(all="ignore"):
             corner = (a[:, i] - sign * a[:, j]) / (b[:, i] - sign * b[:, j])
-        share = np.clip(np.nan_to_num(corner, nan=0.0, posinf=0.0, neginf=0.0), *limits)
-        best = np.minimum(best, np.abs(a - share[:, None] * b).max(axis=1))
+        t = np.clip(np.nan_to_num(corner, nan=0.0, posinf=0.0, neginf=0.0), *limits)
+        best = np.minimum(best, np.abs(a - t[:, None] * b).max(axis=1))
     return best
 
 
@@ -168,12 +168,14 @@ def judge(flight: Excitation, fault: str) -> Document:
     z = flight.moment[fault]
     detect, isolate = flight.windows
     detected = best_in_window(detection_magnitude(z, flight.bound), detect)
-    excluded = {other: best_in_window(least, isolate) for other, least in flight.excluding[fault].items()}
+    excluded = {
+        other: best_in_window(magnitude, isolate) for other, magnitude in flight.excluding[fault].items()
+    }
     isolated = np.maximum(detected[: len(z) - isolate + 1], np.max(list(excluded.values()), axis=0))
     rival = max(excluded, key=lambda other: (excluded[other].max(), np.median(excluded[other])))
-    least = (*largest_and_median(detected, 1.0), *largest_and_median(isolated, 1.0))
+    magnitudes = (*largest_and_median(detected, 1.0), *largest_and_median(isolated, 1.0))
     return {
-        **dict(zip(MAGNITUDES, least, strict=True)),
+        **dict(zip(MAGNITUDES, magnitudes, strict=True)),
         "confused_with": rival,
         "why": _why(flight, fault, rival, detected.max(), excluded[rival], isolate),
     }
@@ -182,9 +184,9 @@ def judge(flight: Excitation, fault: str) -> Document:
 def pairs_of(flight: Excitation) -> list[Document]:
     """A row for each fault and other fault: the smallest loss that distinguishes them, and the delay."""
     return [
-        {"fault": fault, "other": other, **loss_limits(least, flight.windows[1], flight.dt)}
+        {"fault": fault, "other": other, **loss_limits(magnitude, flight.windows[1], flight.dt)}
         for fault, others in flight.excluding.items()
-        for other, least in others.items()
+        for other, magnitude in others.items()
     ]
 
 

@@ -60,9 +60,8 @@ def informed_row(scenario: "Scenario", log: Columns, surface: str) -> Document:
     regressors = [term_acceleration(aircraft, t, log, log.get(f"{t.surface}_cmd_rad")) for t, _ in unknown]
     sigma = np.array([c for _, c in unknown]) / sqrt(3.0)
     stacked = np.stack(regressors, axis=-1) if unknown else np.zeros((*phi.shape, 0))
-    gyros = (
-        range(3) if Declared.of(scenario).monitors_sensors else (None,)
-    )  # the gyro that may have any error
+    # the gyro that may have any error; None: no gyro
+    gyros = range(3) if Declared.of(scenario).monitors_sensors else (None,)
     d = min(WhiteningFilter(context, gyro).deflection_with_unknowns(phi, stacked, sigma) for gyro in gyros)
     rate = scenario.fdi.statistical.false_alarms_per_h
     return {"told_deflection": d, "told_chance": detection_probability(d, scenario.duration_s - at_s, rate)}

@@ -125,9 +125,8 @@ def write_scenario(folder: Path, scenario: "Scenario") -> None:
     """Write scenario.yaml, and a copy of an own aircraft, into a result folder."""
     from beaver_ftc.scenario.builtin import to_yaml
 
-    if str(scenario.aircraft).startswith(
-        "./"
-    ):  # an own aircraft is copied, so that the folder alone can be flown again
+    # an own aircraft is copied, so that the folder alone can be flown again
+    if str(scenario.aircraft).startswith("./"):
         shutil.copytree(
             scenario.airframe.folder, folder / AIRCRAFT, ignore=_files_not_of_model, dirs_exist_ok=True
         )

@@ -156,9 +156,8 @@ def _sobol(seed: int, dimensions: int, indices: np.ndarray) -> np.ndarray:
 
     engine = qmc.Sobol(dimensions, scramble=True, seed=generator_of(seed, 0, OF_DESIGN))
     points = []
-    with (
-        warnings.catch_warnings()
-    ):  # scipy warns of a number that is no power of 2; the whole sweep may have one
+    # scipy warns of a number of points that is no power of 2; the whole sweep may have one
+    with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
         for stretch in np.split(indices, np.flatnonzero(np.diff(indices) > 1) + 1):
             engine.reset()

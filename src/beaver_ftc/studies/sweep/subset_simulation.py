@@ -76,9 +76,8 @@ class Chains:
             return level
         level, self.reached[run] = min(level, 0.0), level >= 0.0
         share = float((scores >= level).mean())
-        self.stuck |= (
-            share == 1.0 and not self.reached[run]
-        )  # all scores are equal: no flight is closer to the event
+        # all scores are equal: no flight is closer to the event than the others
+        self.stuck |= share == 1.0 and not self.reached[run]
         self.share[run] *= share
         return level
 

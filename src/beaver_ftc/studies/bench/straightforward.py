@@ -44,8 +44,9 @@ OF_MOMENTS = [term for term in TERMS.values() if term.coefficient in MOMENTS]
 VALUES = np.array([term.value for term in OF_MOMENTS])
 POWERS = np.array([[dict(term.of).get(signal, 0) for signal in SIGNALS] for term in OF_MOMENTS])
 INTO = np.array([  # (coefficient, none or surface, term): 1 if the term belongs there
-    [[(term.coefficient, term.surface) == (of, by) for term in OF_MOMENTS] for by in (None, *SURFACES)]
-    for of in MOMENTS
+    [[(term.coefficient, term.surface) == (coefficient, surface) for term in OF_MOMENTS]
+     for surface in (None, *SURFACES)]
+    for coefficient in MOMENTS
 ], float)  # fmt: skip
 
 
@@ -167,11 +168,11 @@ class Estimators:
     def effectiveness(self) -> np.ndarray:
         """The effectiveness of the surfaces, (4,): 1 + theta of the isolated one, at least
         LEAST_EFFECTIVENESS; 1 of all others."""
-        believed = np.ones(4)
+        effectiveness = np.ones(4)
         isolated = self.isolated
         if isolated is not None:
-            believed[isolated] = max(1.0 + self.theta[isolated, isolated], LEAST_EFFECTIVENESS)
-        return believed
+            effectiveness[isolated] = max(1.0 + self.theta[isolated, isolated], LEAST_EFFECTIVENESS)
+        return effectiveness
 
 
 def _basis(alpha: float, beta: float) -> np.ndarray:

@@ -251,8 +251,8 @@ def leader(
         return f"{what}: {text_of(ours)}."
     best = min(rivals, key=badness.__getitem__)
     if badness[best] == badness[ours]:
-        alike = [name for name in rivals if badness[name] == badness[ours]]
-        return f"{what}: {ours} and {', '.join(alike)} are equally good: {text_of(ours)}."
+        equals = [name for name in rivals if badness[name] == badness[ours]]
+        return f"{what}: {ours} and {', '.join(equals)} are equally good: {text_of(ours)}."
     duel = rows[best]["against_ours"]
     wins = {best: duel["better"], ours: duel["worse"]}
     first, second = sorted(wins, key=badness.__getitem__)

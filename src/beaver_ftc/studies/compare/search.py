@@ -95,15 +95,15 @@ def search(cost: Cost, ranges: Ranges, start: Values, trials: int, seed: int, re
     values = dict(start)
     cost_now = None
     start_cost = 0.0
-    # made: trials. widenings: searches that ended on an edge. done: restarts. quiet: restarts in a row that
-    # gained nothing.
-    made = widenings = done = quiet = 0
+    # tried: trials. widenings: searches that ended on an edge. restarted: restarts. quiet: restarts in a row
+    # that gained nothing.
+    tried = widenings = restarted = quiet = 0
     while True:
         cost_before = cost_now
         values, cost_now, costs = _searched(cost, ranges, values, cost_before, trials, seed)
         seed += 1
         start_cost = costs[0] if cost_before is None else start_cost
-        made += len(costs) - (cost_before is not None)  # a restart does not try its start again
+        tried += len(costs) - (cost_before is not None)  # a restart does not try its start again
         if edges := on_edge(values, ranges):
             if widenings == WIDENINGS:
                 raise SimulationFailed(
@@ -115,9 +115,11 @@ def search(cost: Cost, ranges: Ranges, start: Values, trials: int, seed: int, re
             continue
         gains = cost_before is None or cost_now < cost_before - LITTLE * abs(cost_before)
         quiet = 0 if gains else quiet + 1
-        if quiet == SETTLED or done == restarts:
-            return Found(start_cost, cost_now, values, ranges, tuple(widened), made, done, quiet == SETTLED)
-        done += 1
+        if quiet == SETTLED or restarted == restarts:
+            return Found(
+                start_cost, cost_now, values, ranges, tuple(widened), tried, restarted, quiet == SETTLED
+            )
+        restarted += 1
 
 
 def widen(range_: Range, upper: bool) -> Range:
@@ -131,8 +133,8 @@ def _searched(
 ) -> tuple[Values, float, list[float]]:
     """One search: the values found, their cost, and the costs of all trials.
 
-    known: the cost of the start, if it has been tried; the search is then a restart. A trial is at a point
-    (n,) of the unit cube.
+    known_cost: the cost of the start, if it has been tried; the search is then a restart. A trial is at a
+    point (n,) of the unit cube.
     """
     from scipy.optimize import minimize
     from scipy.stats.qmc import LatinHypercube

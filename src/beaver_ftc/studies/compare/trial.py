@@ -239,8 +239,8 @@ def result_of(flight: Landing, entry: Entry, us: float) -> Result:
     end_s = flight.frames / flight.scenario.rate_hz
     departed = metrics.departure is not None
     faulted = fault is not None and strikes_within(fault.at_s, end_s)
-    before, after = _size(tracking.pre_fault_rms_deg_s), _size(tracking.post_fault_rms_deg_s)
-    whole_flight = before if tracking.post_fault_rms_deg_s is None else after
+    rms_before, rms_after = _size(tracking.pre_fault_rms_deg_s), _size(tracking.post_fault_rms_deg_s)
+    whole_flight = rms_before if tracking.post_fault_rms_deg_s is None else rms_after
     return Result(
         entry=entry,
         false_alarm=metrics.false_alarm,
@@ -250,8 +250,8 @@ def result_of(flight: Landing, entry: Entry, us: float) -> Result:
         correct=metrics.fault_named,
         isolation_delay_s=or_never(metrics.isolation.delay_s) if metrics.fault_named else inf,
         rms_deg_s=inf if departed else whole_flight,
-        before_deg_s=inf if departed and not faulted else before,
-        after_deg_s=inf if departed else after,
+        before_deg_s=inf if departed and not faulted else rms_before,
+        after_deg_s=inf if departed else rms_after,
         travel_deg_s=sum(tracking.surface_travel_deg.values()) / end_s,
         energy_deg2_s2=sum(tracking.surface_energy_deg2_s.values()) / end_s,
         departed=departed,

@@ -74,7 +74,7 @@ def engine_failures(scenario: Scenario) -> list[Document]:
     ]
     push_mps2 = np.interp(setting, thrust.setting, force_n) / aircraft.mass.mass_kg
     loop.release()
-    known = any(name in ENGINE_SIGNALS for name in aircraft.signals)
+    has_engine_signal = any(name in ENGINE_SIGNALS for name in aircraft.signals)
     mapped = aircraft.file.model_error_map
     turns = np.abs(effects.T) * push_mps2
     return [
@@ -82,8 +82,8 @@ def engine_failures(scenario: Scenario) -> list[Document]:
             "engine": name,
             "turns_rad_s2": acceleration.tolist(),
             "shows": 1.0 / float(detection_magnitude(acceleration[None], bound[None])[0]),
-            "known": known,
-            "held": known and mapped is not None and mapped.knows_engines,
+            "known": has_engine_signal,
+            "held": has_engine_signal and mapped is not None and mapped.knows_engines,
         }
         for name, acceleration in zip(aircraft.effectors, turns, strict=True)
     ]

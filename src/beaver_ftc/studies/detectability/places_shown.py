@@ -63,9 +63,9 @@ def _spans(rows: Rows, key: str) -> Line:
 def _span(rows: Rows, key: str, form: Callable[[float], str] = percent) -> str:
     """The smallest and the largest value over the places that have one; then (places with a value / all
     places)."""
-    known = [row[key] for row in rows if row[key] is not None]
-    ends = dict.fromkeys(map(form, (min(known), max(known)))) if known else ["-"]
-    return f"{' to '.join(ends)} ({len(known)}/{len(rows)})"
+    values = [row[key] for row in rows if row[key] is not None]
+    ends = dict.fromkeys(map(form, (min(values), max(values)))) if values else ["-"]
+    return f"{' to '.join(ends)} ({len(values)}/{len(rows)})"
 
 
 def conclusions(rows: Rows) -> list[str]:

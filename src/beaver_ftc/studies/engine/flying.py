@@ -111,13 +111,13 @@ class Flying:
         self,
         batches: Iterable[tuple[Number, Sequence[int]]],
         cases_of: Callable[[Sequence[int]], Sequence[Any]],
-        there: Callable[[Number, Any], None],
+        on_landed: Callable[[Number, Any], None],
         stopped: Callable[[], bool] = lambda: False,
     ) -> None:
         """Fly the batches that have not landed. Once `stopped` is true, only the tasks that workers have are
         completed.
 
-        cases_of: from runs to their cases. there: called with the number and the rows of each batch, when
+        cases_of: from runs to their cases. on_landed: called with the number and the rows of each batch, when
         these are known.
         """
         missing: dict[Number, Sequence[int]] = {}
@@ -126,7 +126,7 @@ class Flying:
             if rows is None:
                 missing[number] = runs
             else:
-                there(number, rows)
+                on_landed(number, rows)
         if not missing:
             return
         cases = sum(map(len, missing.values()))
@@ -143,4 +143,4 @@ class Flying:
                 tasks.hand_out(workers)
             for batch, rows in filter(None, complete):
                 self.land(batch.number, rows)
-                there(batch.number, rows)
+                on_landed(batch.number, rows)

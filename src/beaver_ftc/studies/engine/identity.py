@@ -39,14 +39,14 @@ def read_identity(manifest: Path, what: str) -> Document | None:
 
 
 def refuse_other(mine: Document, theirs: Document, folder: Path) -> None:
-    """Raise BadInput unless the flights in a folder have my identity. there: the identity of these
-    flights."""
-    what = next(iter(mine))
-    changed = differences(theirs.get(what, {}), mine[what])
+    """Raise BadInput unless the flights in a folder have my identity, `mine`. theirs: the identity of these
+    flights, which are in `folder`."""
+    kind = next(iter(mine))
+    changed = differences(theirs.get(kind, {}), mine[kind])
     if changed:
         raise BadInput(
-            f"{folder}: the {what} file has changed since these flights ({', '.join(changed)}): "
-            f"resuming would mix two {what}s, allowed: the unchanged file, or another --out"
+            f"{folder}: the {kind} file has changed since these flights ({', '.join(changed)}): "
+            f"resuming would mix two {kind}s, allowed: the unchanged file, or another --out"
         )
     then = theirs.get("versions", {})
     now = mine["versions"]

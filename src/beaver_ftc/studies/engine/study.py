@@ -113,13 +113,13 @@ def _fly_pieces(
     of pieces that have landed."""
     rows_of_piece: dict[Number, Any] = {}
 
-    def there(piece: Number, rows: Any) -> None:
+    def on_landed(piece: Number, rows: Any) -> None:
         """Keep the rows of a piece, and report progress."""
         rows_of_piece[piece] = rows
         if progress:
             progress(len(rows_of_piece) / len(pieces))
 
-    flying.fly(pieces.items(), lambda runs: [cases[n] for n in runs], there)
+    flying.fly(pieces.items(), lambda runs: [cases[n] for n in runs], on_landed)
     return rows_of_piece
 
 
@@ -171,8 +171,8 @@ def _workers(work: Work, workers: int, cases: int) -> Workers:
 def _begin(hidden: Path, study: Study) -> store.Parts:
     """The parts of this study. Parts of another study, or of other versions, are removed; parts without a
     readable manifest are set aside."""
-    asked = {"cases": repr(list(study.cases)), "asked": repr(study.follows_from)}
-    mine = identity.of("study", asked)
+    contents = {"cases": repr(list(study.cases)), "asked": repr(study.follows_from)}
+    mine = identity.of("study", contents)
     manifest = hidden / "study.json"
     parts = store.Parts(hidden / "parts", store.RowsAsJson(study.row), GO_ON)
     earlier = identity.read_identity(manifest, "study")

@@ -78,14 +78,14 @@ def _outcome(scenario: Scenario) -> Document:
     are from the fault on."""
     log = Columns(*COLUMNS)
     document = metrics(fly(scenario, log))
-    late, after = log.since(SETTLED_S), log.since(AT_S)
+    settled, after_fault = log.since(SETTLED_S), log.since(AT_S)
     lost = document["departure"] is not None
     return {
-        "q_rms_deg_s": None if lost else degrees(float(np.sqrt(np.mean(late["q_rad_s"] ** 2)))),
-        "theta_swing_deg": None if lost else degrees(float(np.ptp(late["theta_rad"]))),
-        "airspeed_mps": [float(after["airspeed_mps"].min()), float(after["airspeed_mps"].max())],
-        "bank_deg": degrees(float(np.abs(after["phi_rad"]).max())),
-        "outside_share": float(np.mean(after["envelope_valid"] < 0.5)),
+        "q_rms_deg_s": None if lost else degrees(float(np.sqrt(np.mean(settled["q_rad_s"] ** 2)))),
+        "theta_swing_deg": None if lost else degrees(float(np.ptp(settled["theta_rad"]))),
+        "airspeed_mps": [float(after_fault["airspeed_mps"].min()), float(after_fault["airspeed_mps"].max())],
+        "bank_deg": degrees(float(np.abs(after_fault["phi_rad"]).max())),
+        "outside_share": float(np.mean(after_fault["envelope_valid"] < 0.5)),
         "departure": document["departure"],
         "engine_power": document["engine_power"],
     }

@@ -75,8 +75,8 @@ def changes_of(errors: Sequence[Error], factors: Mapping[str, float], draws: Gen
     numbers are drawn for all errors, so that signs do not depend on the factors."""
     truth: Document = {"uncertainty": {}, "sensors": "ideal", "environment": {}}
     for error in errors:
-        made = error.change(factors.get(error.name, 0.0), draws)
-        truth |= made if error.name in factors else {}
+        changes = error.change(factors.get(error.name, 0.0), draws)
+        truth |= changes if error.name in factors else {}
     return truth
 
 
@@ -108,9 +108,9 @@ def _of_ratios(name: str, section: str, shares: Mapping[str, float], limits: tup
     is_declared = any(shares.values())
     shares = shares if is_declared else dict.fromkeys(shares, UNDECLARED_SHARE)
     largest = f"{100.0 * max(shares.values()):g} %"
-    says = largest if is_declared else _unknown(largest)
+    size = largest if is_declared else _unknown(largest)
     return Error(
-        name, says, lambda times, draws: {section: signed(shares, 1.0, limits, times, draws)}, is_declared
+        name, size, lambda times, draws: {section: signed(shares, 1.0, limits, times, draws)}, is_declared
     )
 
 
@@ -128,17 +128,17 @@ def _coupling(theta: Sequence[float]) -> Error:
 def _acceleration(scenario: Scenario, sizes: Sequence[float]) -> Error:
     """A sinusoidal acceleration of each axis, of these sizes (3,) rad/s2, with the frequency of the scenario
     or a random one."""
-    _, most_rad_s2 = _limits(Sinusoid, "amplitude_rad_s2")
-    flown = {axis: getattr(scenario.uncertainty.sinusoid, axis) for axis in AXES}
-    frequency_of_axis = {axis: wave.frequency_rad_s for axis, wave in flown.items() if wave.amplitude_rad_s2}
+    _, limit_rad_s2 = _limits(Sinusoid, "amplitude_rad_s2")
+    waves = {axis: getattr(scenario.uncertainty.sinusoid, axis) for axis in AXES}
+    frequency_of_axis = {axis: wave.frequency_rad_s for axis, wave in waves.items() if wave.amplitude_rad_s2}
 
     def change(times: float, draws: Generator) -> Document:
         """The sinusoids of all axes, with amplitudes within the limit of the key."""
-        drawn = dict(zip(AXES, draws.uniform(*FREQUENCIES_RAD_S, len(AXES)).tolist(), strict=True))
+        frequencies = dict(zip(AXES, draws.uniform(*FREQUENCIES_RAD_S, len(AXES)).tolist(), strict=True))
         return {
             "uncertainty.sinusoid": {
-                axis: {"amplitude_rad_s2": min(times * size, most_rad_s2), "frequency_rad_s": at}
-                for (axis, at), size in zip((drawn | frequency_of_axis).items(), sizes, strict=True)
+                axis: {"amplitude_rad_s2": min(times * size, limit_rad_s2), "frequency_rad_s": rad_s}
+                for (axis, rad_s), size in zip((frequencies | frequency_of_axis).items(), sizes, strict=True)
             }
         }
 

@@ -29,7 +29,7 @@ from beaver_ftc.studies.sweep.store import Store, identity_of
 if TYPE_CHECKING:
     from beaver_ftc.studies.sweep.outcomes import Flights
 
-There = Callable[[Number, Any], None]  # called with the number and the rows of each batch when it has landed
+OnLanded = Callable[[Number, Any], None]  # takes the number and the rows of each batch, once it has landed
 FRAMES_A_BATCH = 50_000  # a third of a second of work: little is lost, and writing a file costs little of it
 MOST_A_BATCH = 256  # flights in a batch, unless there would be more than MOST_BATCHES
 MOST_BATCHES = 4_000  # so many files are read again in seconds
@@ -97,11 +97,11 @@ def run_sweep(
         if not store.is_compacted(sweep.flights):
             (folder / "summary.json").unlink(missing_ok=True)  # summary.json marks a finished sweep
 
-            def there(number: Number, rows: Any) -> None:
+            def on_landed(number: Number, rows: Any) -> None:
                 so_far.update(counts_of(rows))
                 progress(so_far)
 
-            batches = _fly_missing(sweep, options, store, there, stopped)
+            batches = _fly_missing(sweep, options, store, on_landed, stopped)
             if so_far["done"] < so_far["total"]:
                 raise SweepStopped(
                     f"{sweep.name}: stopped, {so_far['done']} of {so_far['total']} flights are kept; "
@@ -113,7 +113,7 @@ def run_sweep(
 
 
 def _fly_missing(
-    sweep: Sweep, options: Options, store: Store, there: There, stopped: Callable[[], bool]
+    sweep: Sweep, options: Options, store: Store, on_landed: OnLanded, stopped: Callable[[], bool]
 ) -> list[tuple[int, range]]:
     """Fly the missing batches, each round after the one before has landed. Returns the batches of all
     rounds."""
@@ -122,7 +122,7 @@ def _fly_missing(
     lost = partial(one_flight.lost, sweep)
     with closing(Flying(store.landed, store.parts.land, make, lost)) as flying:
         for batches, cases_of in _rounds(sweep, options, store):
-            flying.fly(batches, cases_of, there, stopped)
+            flying.fly(batches, cases_of, on_landed, stopped)
             batches_flown += batches
     return batches_flown
 

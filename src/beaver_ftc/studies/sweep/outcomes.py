@@ -86,10 +86,10 @@ class Flights:
 
     def tracking_ratio(self, axis: str) -> np.ndarray:
         """RMS tracking error after the fault over that before it; NaN if the latter is 0 or missing."""
-        before = self[f"tracking.pre_fault_rms_deg_s.{axis}"]
+        healthy_rms_deg_s = self[f"tracking.pre_fault_rms_deg_s.{axis}"]
         with np.errstate(divide="ignore", invalid="ignore"):
-            ratio = self.post_fault_rms_deg_s(axis) / before
-        return np.where(before > 0, ratio, np.nan)
+            ratio = self.post_fault_rms_deg_s(axis) / healthy_rms_deg_s
+        return np.where(healthy_rms_deg_s > 0, ratio, np.nan)
 
     @cached_property
     def worst_rms_deg_s(self) -> np.ndarray:

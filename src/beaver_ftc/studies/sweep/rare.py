@@ -49,9 +49,9 @@ def scored(sweep: Sweep) -> list[str]:
 
 def check(sweep: Sweep, expectation: str) -> None:
     """Raise BadInput unless the base scenario has this expectation with a score, and a key varies."""
-    known = scored(sweep)
-    if expectation not in known:
-        allowed = suggestion(expectation, known) if known else ", allowed: a base scenario with `expect`"
+    names = scored(sweep)
+    if expectation not in names:
+        allowed = suggestion(expectation, names) if names else ", allowed: a base scenario with `expect`"
         raise BadInput(f"--rare: {expectation[:60]!r} is nothing that {sweep.name} expects{allowed}")
     if not sweep.keys:
         raise BadInput(f"{sweep.name}: vary: nothing varies, allowed with --rare: at least one key")

@@ -50,8 +50,8 @@ def tracking_score(row: Row) -> float:
     earlier it is."""
     if row["status"] == DEPARTED:
         return DEPARTED_DEG_S - row["flown_s"]
-    after = [row[f"tracking.post_fault_rms_deg_s.{axis}"] for axis in AXES]
-    return -math.inf if None in after else max(after)
+    rms_deg_s = [row[f"tracking.post_fault_rms_deg_s.{axis}"] for axis in AXES]
+    return -math.inf if None in rms_deg_s else max(rms_deg_s)
 
 
 OBJECTIVES: dict[str, Callable[[Row], float]] = {
@@ -147,11 +147,11 @@ def search_result(objective: str, results: Path, sweep: Sweep) -> Document:
     scores = np.array([score(objective, row) for row in rows])
     best = int(scores.argmax())
     ends = [runs[-1] for _, runs in batches_of(scores.size, members(len(sweep.keys)))]
-    after = np.maximum.accumulate(scores)[ends]
+    worst_scores = np.maximum.accumulate(scores)[ends]
     return {
         "objective": objective,
         "run": rows[best]["run"],
         "score": finite(float(scores[best])),
         "values": {key: rows[best][key] for key in sweep.keys},
-        "history": [finite(value) for value in after.tolist()],
+        "history": [finite(value) for value in worst_scores.tolist()],
     }

@@ -43,10 +43,10 @@ _NOT_FLOWN = ("description", "expect", "base", "set")
 def identity_of(sweep: Sweep, search: str | None = None) -> Document:
     """The identity of a sweep on this machine, as in `sweep.json`."""
     file = sweep.file.model_dump(mode="json", exclude_none=True)
-    asked = {key: value for key, value in file.items() if key not in _NOT_FLOWN}
+    of_file = {key: value for key, value in file.items() if key not in _NOT_FLOWN}
     aircraft = identity.digest_of_aircraft(sweep.aircraft.folder)
-    flown = {"runs": sweep.flights, "base": sweep.base, "aircraft": aircraft, "search": search}
-    return identity.of("sweep", {**asked, **flown})
+    of_run = {"runs": sweep.flights, "base": sweep.base, "aircraft": aircraft, "search": search}
+    return identity.of("sweep", {**of_file, **of_run})
 
 
 class RowsAsParquet:
@@ -174,16 +174,16 @@ class Store:
     def _refuse_or_set_aside(self, resume: bool) -> None:
         """Raise BadInput, since the flights may belong to another sweep. If the sweep is resumed, set all
         files aside."""
-        what = files.UNREADABLE if self._manifest.exists() else "is not there"
+        problem = files.UNREADABLE if self._manifest.exists() else "is not there"
         if not resume:
             raise BadInput(
-                f"{self._manifest}: {what}, allowed: --resume, which sets aside what is there and flies "
+                f"{self._manifest}: {problem}, allowed: --resume, which sets aside what is there and flies "
                 "again, or another --out"
             )
         with clear_disk_errors(self.folder):
             for name in sorted(OWN_FILES - {files.LOCK}):
                 if (self.folder / name).exists():
-                    files.set_aside(self.folder / name, f"{self._manifest.name} {what}")
+                    files.set_aside(self.folder / name, f"{self._manifest.name} {problem}")
 
     def _clear(self) -> None:
         """Remove the files of an earlier sweep; `sweep.json` last, since it marks the folder as that of a

@@ -122,10 +122,10 @@ def _detection(flights: Flights, group: np.ndarray) -> Document:
 
 def _isolation(flights: Flights, group: np.ndarray) -> Document:
     """Rate of right names in a group, rate of wrong names among all names, and delays."""
-    named = group & (flights["isolation.fault"] != "")
+    isolated = group & (flights["isolation.fault"] != "")
     return {
         **rate(flights.isolated, group),
-        "wrong": rate(~flights["isolation.correct"], named),
+        "wrong": rate(~flights["isolation.correct"], isolated),
         "delay_s": quantiles(flights.isolation_delay_s[group]),
         "delay_of_isolated_s": quantiles(flights.isolation_delay_s[group & flights.isolated]),
     }
@@ -158,11 +158,11 @@ def _by_fault(flights: Flights) -> list[Document]:
     return [
         {
             "fault": label,
-            "flights": int(alike.sum()),
-            "detection": _detection(flights, flights.faulted & alike),
-            "isolation": _isolation(flights, flights.faulted & alike),
+            "flights": int(has_fault.sum()),
+            "detection": _detection(flights, flights.faulted & has_fault),
+            "isolation": _isolation(flights, flights.faulted & has_fault),
         }
-        for label, alike in groups.items()
+        for label, has_fault in groups.items()
     ]
 
 
@@ -176,9 +176,9 @@ def _confusion(flights: Flights) -> Document:
     diagnoses = np.where(flights["false_alarm"] & (faults != NO_FAULT), FALSE_ALARM, diagnoses)
     pairs = Counter(zip(faults[flights.measured], diagnoses[flights.measured], strict=True))
     rows = sorted({fault for fault, _ in pairs})
-    named = {diagnosis for _, diagnosis in pairs}
-    last = [name for name in (UNANTICIPATED, NOT_ISOLATED, NO_ALARM, FALSE_ALARM) if name in named]
-    columns = [*sorted(named.difference(last)), *last]
+    diagnosed = {diagnosis for _, diagnosis in pairs}
+    last = [name for name in (UNANTICIPATED, NOT_ISOLATED, NO_ALARM, FALSE_ALARM) if name in diagnosed]
+    columns = [*sorted(diagnosed.difference(last)), *last]
     counts = [[pairs[row, column] for column in columns] for row in rows]
     return {"faults": rows, "diagnoses": columns, "counts": counts}
 
@@ -230,11 +230,11 @@ def _bounds(expect: SweepExpect) -> Iterator[tuple[str, Level, str]]:
     level."""
     for name, level in expect:
         axes = level if isinstance(level, AxisLevels) else ()
-        levels = [(f"{name}.{axis}", own) for axis, own in axes] or [(name, level)]
-        for full_name, own in levels:
+        levels = [(f"{name}.{axis}", limits) for axis, limits in axes] or [(name, level)]
+        for full_name, limits in levels:
             for side in ("at_least", "at_most"):
-                if own is not None and getattr(own, side) is not None:
-                    yield full_name, own, side
+                if limits is not None and getattr(limits, side) is not None:
+                    yield full_name, limits, side
 
 
 def _verdict(flights: Flights, name: str, level: Level, side: str) -> Document:

@@ -46,13 +46,13 @@ def replay_command(source: str, out: Path, search: str | None) -> str:
 def _candidates(flights: Flights) -> Candidates:
     """The candidates of all kinds, the worst kind first."""
     faulted = flights.faulted
-    named = flights["isolation.fault"]
+    diagnosis = flights["isolation.fault"]
     reason = flights["reason"]
-    wrong = faulted & (named != "") & ~flights["isolation.correct"]
+    wrong = faulted & (diagnosis != "") & ~flights["isolation.correct"]
     yield from _first(~flights.measured, lambda i: f"{flights['status'][i]}: {reason[i]}")
     yield from _first(flights["false_alarm"] & flights.measured, lambda i: "false alarm")
     yield from _first(flights.departed, lambda i: f"departed: {reason[i]}")
-    yield from _first(wrong, lambda i: f"named {named[i]}")
+    yield from _first(wrong, lambda i: f"named {diagnosis[i]}")
     yield from _first(faulted & ~flights.detected, lambda i: "fault not detected")
     delay = np.where(flights.detected, flights.detection_delay_s, -np.inf)
     yield from _largest(delay, lambda i: f"detected after {delay[i]:.3g} s")

@@ -136,6 +136,6 @@ def shares_of_equal_work(pictures: "Sequence[Picture]", among: int) -> "list[lis
     """Divide pictures among so many processes. Greedy: each picture, the largest first, goes to the process
     with the least work; the work of a picture is 1 + its number of panels."""
     shares: list[list[Picture]] = [[] for _ in range(among)]
-    for picture in sorted(pictures, key=lambda each: -len(each.view.panels)):
-        min(shares, key=lambda given: sum(1 + len(each.view.panels) for each in given)).append(picture)
+    for picture in sorted(pictures, key=lambda picture: -len(picture.view.panels)):
+        min(shares, key=lambda share: sum(1 + len(own.view.panels) for own in share)).append(picture)
     return shares

@@ -124,14 +124,14 @@ def _page_data(
     shown: the views on the page, None for all that the runs have in common.
     """
     logs = [log.StoredLog(folder / "log.parquet") for folder in folders]
-    found = [Metrics.of(document) for document in documents]
-    shown = _common_views(logs, found) if shown is None else shown
+    all_metrics = [Metrics.of(document) for document in documents]
+    shown = _common_views(logs, all_metrics) if shown is None else shown
     columns = tuple(
         dict.fromkeys([*_FLIGHT_PATH_COLUMNS, "mode", *(name for view in shown for name in view.columns)])
     )
     # fewer points of each curve the more runs there are: the page stays within a few megabytes
     points = MAX_CURVE_POINTS if len(logs) <= 2 else max(600, 2 * MAX_CURVE_POINTS // len(logs))
-    runs = zip(logs, found, names or [each.scenario for each in found], strict=True)
+    runs = zip(logs, all_metrics, names or [run_metrics.scenario for run_metrics in all_metrics], strict=True)
     return {
         "runs": [_run_entry(source, metrics, columns, name, points) for source, metrics, name in runs],
         "views": [asdict(view) | {"panels": list(map(_panel_entry, view.panels))} for view in shown],
@@ -140,14 +140,14 @@ def _page_data(
     }
 
 
-def _common_views(logs: Sequence[log.Log], flown: Sequence[Metrics]) -> tuple[View, ...]:
+def _common_views(logs: Sequence[log.Log], all_metrics: Sequence[Metrics]) -> tuple[View, ...]:
     """Every view that all runs have. The views show the expected airspeed deviation if it is the same in all
     runs."""
-    within_mps = {expected_airspeed_mps(metrics) for metrics in flown}
+    within_mps = {expected_airspeed_mps(metrics) for metrics in all_metrics}
     common = within_mps.pop() if len(within_mps) == 1 else None
     first, *others = (
         views(source.columns, bool(metrics.engine_power), common)
-        for source, metrics in zip(logs, flown, strict=True)
+        for source, metrics in zip(logs, all_metrics, strict=True)
     )
     return tuple(view for view in first if all(view in views_of_run for views_of_run in others))
 

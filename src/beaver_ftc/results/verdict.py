@@ -490,9 +490,9 @@ def _insufficient_authority_text(authority: Authority) -> str:
     """For how long no deflection could hold the rate of each axis; times below MIN_SHOWN_BEYOND_S are left
     out."""
     beyond = ", ".join(
-        f"{axis} for {_seconds_text(given.beyond_s)}"
-        for axis, given in vars(authority).items()
-        if given.beyond_s >= MIN_SHOWN_BEYOND_S
+        f"{axis} for {_seconds_text(entry.beyond_s)}"
+        for axis, entry in vars(authority).items()
+        if entry.beyond_s >= MIN_SHOWN_BEYOND_S
     )
     return f"no deflection could hold the rate: {beyond}" if beyond else ""
 

@@ -171,14 +171,14 @@ def power_column(columns: Names) -> str:
         return BEAVER_POWER_COLUMN
     if "altitude_command_m" not in columns:
         return ""
-    before = list(columns)[list(columns).index("altitude_command_m") - 1]
-    return "" if before in ("detected", "watch_test") else before
+    neighbour = list(columns)[list(columns).index("altitude_command_m") - 1]
+    return "" if neighbour in ("detected", "watch_test") else neighbour
 
 
-def _panel(label: str, *traces: tuple[Any, ...], **how: Any) -> Panel:
-    """A panel of traces. traces: fields of each `Trace`, (column, label, role) and optionally more. how:
+def _panel(label: str, *traces: tuple[Any, ...], **fields: Any) -> Panel:
+    """A panel of traces. traces: fields of each `Trace`, (column, label, role) and optionally more. fields:
     further fields of the panel."""
-    return Panel(label, tuple(Trace(*trace) for trace in traces), **how)
+    return Panel(label, tuple(Trace(*trace) for trace in traces), **fields)
 
 
 def _ratio_panel(label: str, *traces: tuple[str, str, str]) -> Panel:
@@ -255,8 +255,8 @@ def _labels_and_roles_by_kind(names: Names) -> Labelled:
     if names and len(names) <= len(SURFACE_ROLES):
         return {"": [(name, name, role) for name, role in zip(names, SURFACE_ROLES, strict=False)]}
     labelled: Labelled = {}
-    for kind, alike in surfaces_by_kind(names).items():
-        for name, role in zip(alike, SURFACE_ROLES * len(alike), strict=False):
+    for kind, group in surfaces_by_kind(names).items():
+        for name, role in zip(group, SURFACE_ROLES * len(group), strict=False):
             others = " ".join(word for word in name.split("_") if word != kind)
             labelled.setdefault(kind, []).append((name, others or kind, role))
     return labelled
@@ -267,9 +267,9 @@ def _surfaces_view(names: Names) -> View:
     if len(names) > len(SURFACE_ROLES):
         panels = tuple(
             _panel(
-                f"{kind}: {label}", *((f"{name}_{ending}_rad", called, role) for name, called, role in alike)
+                f"{kind}: {label}", *((f"{name}_{ending}_rad", called, role) for name, called, role in group)
             )
-            for kind, alike in _labels_and_roles_by_kind(names).items()
+            for kind, group in _labels_and_roles_by_kind(names).items()
             for ending, label in (("cmd", "commanded"), ("effective", "as the aerodynamics see it"))
         )
         return View("surfaces", "Control surfaces by kind", panels, n_panel_columns=2)
@@ -329,8 +329,8 @@ def _likelihood_view(columns: Names) -> View:
     ending = "_loss_likelihood_share"
     names = [column.removesuffix(ending) for column in columns if column.endswith(ending)]
     losses = {
-        kind: [(f"{name}{ending}", f"{called} loss", role) for name, called, role in alike]
-        for kind, alike in _labels_and_roles_by_kind(names).items()
+        kind: [(f"{name}{ending}", f"{called} loss", role) for name, called, role in group]
+        for kind, group in _labels_and_roles_by_kind(names).items()
     }
     steps = [(f"{axis}_step_likelihood_share", f"{axis}'", axis) for axis in AXES]
     panels = (
@@ -404,10 +404,10 @@ def _effectiveness_view(names: Names) -> View:
     panels = tuple(
         _panel(
             f"{kind}: {label}" if kind else label,
-            *((f"{name}_effectiveness_{which}", called, role) for name, called, role in alike),
+            *((f"{name}_effectiveness_{which}", called, role) for name, called, role in group),
             limits=(-0.05, 1.1),
         )
-        for kind, alike in _labels_and_roles_by_kind(names).items()
+        for kind, group in _labels_and_roles_by_kind(names).items()
         for which, label in (("estimate", "estimated (1 healthy)"), ("used", "used by the law"))
     )
     title = "Effectiveness of each surface: estimated by the diagnosis, and used by the law (rate-limited)"
@@ -425,9 +425,9 @@ _SUPERVISOR = View(
 )
 
 
-def _panels_of_columns(*named: tuple[str, str]) -> tuple[Panel, ...]:
+def _panels_of_columns(*columns: tuple[str, str]) -> tuple[Panel, ...]:
     """A panel for each column, under its name."""
-    return tuple(_panel(label, (column, label, "actual")) for column, label in named)
+    return tuple(_panel(label, (column, label, "actual")) for column, label in columns)
 
 
 _ENGINE = View(

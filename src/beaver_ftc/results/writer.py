@@ -101,12 +101,12 @@ class NotAllWritten(SimulationFailed):
 def _note_failure_and_go_on(failed: list[Exception], folder: Path, what: str) -> Iterator[None]:
     """Write one part of the results in the block. If it fails, add the reason to `failed` and remove the new
     files of this part. what: name of the part."""
-    before = set(folder.iterdir())
+    existing = set(folder.iterdir())
     try:
         yield
     except Exception as error:
-        for left in set(folder.iterdir()) - before:
-            shutil.rmtree(left) if left.is_dir() else left.unlink()
+        for new in set(folder.iterdir()) - existing:
+            shutil.rmtree(new) if new.is_dir() else new.unlink()
         text = f"{type(error).__name__}: {error}"
         if isinstance(error, OSError) and error.errno and not error.filename:  # an error of the disk
             text = disk_error_text(error)

@@ -184,9 +184,9 @@ def sensors(scenario: Scenario, m: int, dt: float) -> np.ndarray:
     return delay_and_pole
 
 
-def as_document(found: list[Margin], required: tuple[float, float]) -> Document:
+def as_document(margins: list[Margin], required: tuple[float, float]) -> Document:
     """The document of `--format json`. An infinite margin is null."""
-    rows = [all_finite(asdict(margin)) | {"keeps": margin.keeps(*required)} for margin in found]
+    rows = [all_finite(asdict(margin)) | {"keeps": margin.keeps(*required)} for margin in margins]
     return {"gain_margin_db": required[0], "phase_margin_deg": required[1], "margins": rows}
 
 
@@ -196,8 +196,8 @@ def as_text(document: Document) -> str:
     table = [["fault", "surface", "gain up, dB", "down, dB", "phase, deg", "least at, m/s"]]
     for place, rows in grouped(document["margins"], "fault", "surface").items():
         numbers = {key: [inf if row[key] is None else row[key] for row in rows] for key in NUMBERS}
-        least = rows[int(np.argmin(numbers["phase_deg"]))]
-        table.append([*place, *(f"{min(n):.1f}" for n in numbers.values()), f"{least['airspeed_mps']:.0f}"])
+        worst = rows[int(np.argmin(numbers["phase_deg"]))]
+        table.append([*place, *(f"{min(n):.1f}" for n in numbers.values()), f"{worst['airspeed_mps']:.0f}"])
     short = sum(not row["keeps"] for row in document["margins"])
     required = f"{document['gain_margin_db']:g} dB or {document['phase_margin_deg']:g} deg"
     return f"{aligned(table)}\n\n{len(document['margins'])} loops, {short} with less than {required}"

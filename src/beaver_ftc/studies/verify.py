@@ -220,12 +220,12 @@ def summary_text(document: Document) -> str:
     lines = [*_healthy_lines(document["healthy"]), *_fault_lines(document)]
     if document["skipped"]:
         lines.append(f"{document['skipped']} flights drawn could not be trimmed and are not counted")
-    flown = bool(document["healthy"]["flights"]), bool(document["schemes"])
+    tested = bool(document["healthy"]["flights"]), bool(document["schemes"])
     sentence = {
         (True, True): "G1 to G3 hold",
         (True, False): "G1 holds",
         (False, True): "G2 and G3 hold",
-    }.get(flown, "Nothing is tested")
+    }.get(tested, "Nothing is tested")
     lines.append(f"{sentence} for the sharpened scheme" if document["kept"] else "A GUARANTEE IS VIOLATED")
     return "\n".join(lines)
 

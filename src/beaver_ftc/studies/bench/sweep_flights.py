@@ -119,13 +119,13 @@ def _landed(loop: Loop, assignment: Assignment) -> Landing:
 
 def _medians(rows: list[Taken]) -> Document:
     """The document of a kind, from the times in all rounds."""
-    parts, runs, alone = (np.array(column) for column in zip(*rows, strict=True))
+    parts, runs, bare_s = (np.array(column) for column in zip(*rows, strict=True))
     frames_s = parts[:, STAGES.index("frames")]
     return {
         "parts_ms": dict(zip(STAGES, (1e3 * np.median(parts, axis=0)).round(3).tolist(), strict=True)),
-        "bare_ms": round(1e3 * float(np.median(alone)), 3),
-        "frames_ratio": round(float(np.median(frames_s / alone)), 3),
-        "flight_ratio": round(float(np.median(parts.sum(axis=1) / alone)), 3),
+        "bare_ms": round(1e3 * float(np.median(bare_s)), 3),
+        "frames_ratio": round(float(np.median(frames_s / bare_s)), 3),
+        "flight_ratio": round(float(np.median(parts.sum(axis=1) / bare_s)), 3),
         "frame_us": round(1e6 * float(np.median(frames_s / runs)), 3),
-        "own_part_us": round(1e6 * float(np.median((frames_s - alone) / runs)), 3),
+        "own_part_us": round(1e6 * float(np.median((frames_s - bare_s) / runs)), 3),
     }

@@ -32,10 +32,10 @@ def line_of(entry: Entry, results: Results, oracle: Results, ours: Results = ())
 
     The delay of an event that never comes is infinite. None: there was nothing to count.
     """
-    flown = [(mine, best) for mine, best in zip(results, oracle, strict=True) if mine.error is None]
-    mine = [result for result, _ in flown]
+    completed = [(mine, best) for mine, best in zip(results, oracle, strict=True) if mine.error is None]
+    mine = [result for result, _ in completed]
     faulted = [result for result in mine if result.faulted]
-    ratios = [m.rms_deg_s / o.rms_deg_s for m, o in flown if o.error is None and 0 < o.rms_deg_s < inf]
+    ratios = [m.rms_deg_s / o.rms_deg_s for m, o in completed if o.error is None and 0 < o.rms_deg_s < inf]
     return {
         **vars(entry),
         "flights": len(mine),

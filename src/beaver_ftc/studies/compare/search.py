@@ -74,9 +74,9 @@ def on_scale(range_: Range, value: float) -> float:
 
 def value_at(range_: Range, place: float) -> float:
     """The value at a place (0 to 1) of a range."""
-    forward, back = _SCALES[range_.scale]
+    forward, inverse = _SCALES[range_.scale]
     low, high = forward(range_.low), forward(range_.high)
-    value = back(low + place * (high - low))
+    value = inverse(low + place * (high - low))
     return float(f"{value:.6g}") if range_.scale == "log" else value
 
 

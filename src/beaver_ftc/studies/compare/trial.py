@@ -152,13 +152,13 @@ def with_entry(scenario: Scenario, entry: Entry, chosen: TunedValuesByGrade | No
         fdi = fdi.model_copy(update={"statistical": Statistical()})
     law_options = scenario.control.options if entry.law == scenario.control.law else {}
     control = scenario.control.model_copy(update={"law": entry.law, "options": law_options})
-    flown = scenario.model_copy(update={"fdi": fdi, "control": control})
+    changed = scenario.model_copy(update={"fdi": fdi, "control": control})
     grade = grade_of(scenario)
     for group, name, options in ((DETECTORS, entry.scheme, scheme_options), (LAWS, entry.law, law_options)):
         values = tuned_values(chosen or {}, grade, group, name)
         tuned = {k: v for k, v in values.items() if k not in options and not _says(scenario, k, group)}
-        flown = with_values(flown, group, tuned)
-    return flown
+        changed = with_values(changed, group, tuned)
+    return changed
 
 
 def _says(scenario: Scenario, key: str, group: str) -> bool:

@@ -70,9 +70,9 @@ def _span(rows: Rows, key: str, form: Callable[[float], str] = percent) -> str:
 
 def conclusions(rows: Rows) -> list[str]:
     """One sentence for each fault, at the excitation nearest to the references of the scenario."""
-    scale = min((row["excitation"] for row in rows), key=lambda of: abs(of - 1.0))
+    scale = min((row["excitation"] for row in rows), key=lambda value: abs(value - 1.0))
     chosen = [row for row in rows if row["excitation"] == scale]
-    return [_conclusion(fault, scale, of) for (fault,), of in grouped(chosen, "fault").items()]
+    return [_conclusion(fault, scale, group) for (fault,), group in grouped(chosen, "fault").items()]
 
 
 def _conclusion(fault: str, scale: float, rows: Rows) -> str:
@@ -102,10 +102,10 @@ def answer(scenario: Scenario, row: Document) -> str:
     in_time = f"is certain to be detected within {DETECT_WITHIN_S:g} s"
     if detected is None:
         return f"{place}: not even a total loss of {fault} {in_time} ({row['why']})"
-    named = "none is certain to be isolated"
+    isolation = "none is certain to be isolated"
     if isolated is not None:
-        named = f"isolated within {ISOLATE_WITHIN_S:g} s from {upwards(isolated)} on"
-    return f"{place}: a loss of {fault} of {upwards(detected)} and more {in_time}, {named}"
+        isolation = f"isolated within {ISOLATE_WITHIN_S:g} s from {upwards(isolated)} on"
+    return f"{place}: a loss of {fault} of {upwards(detected)} and more {in_time}, {isolation}"
 
 
 def upwards(magnitude: float) -> str:

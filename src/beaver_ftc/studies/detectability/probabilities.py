@@ -211,7 +211,7 @@ def _found_by_seed(rows: Rows, within_s: float) -> BySeed:
 
 def _duel(ours: BySeed, theirs: BySeed) -> Document:
     """The seeds for each of two schemes, p between equals, and the verdict on ours."""
-    pairs = [(found, theirs[seed]) for seed, found in ours.items() if seed in theirs]
+    pairs = [(our_count, theirs[seed]) for seed, our_count in ours.items() if seed in theirs]
     wins, losses, p = duel(pairs)
     verdict = "even" if p >= SIGNIFICANT else "better" if wins > losses else "worse"
     return {"seeds_ours": wins, "seeds_theirs": losses, "p": p, "verdict": verdict}

@@ -200,8 +200,8 @@ def contenders(names: list[str] | None = None) -> tuple[str, ...]:
     """The schemes to compare: ours, then those named, or all that can be compared. Raises BadInput with a
     line for each wrong name."""
     if names is None:
-        known = registered(DETECTORS)
-        names = [name for name in known if name in FLOWN_THEMSELVES or not is_compiled(DETECTORS, name)]
+        known_names = registered(DETECTORS)
+        names = [name for name in known_names if name in FLOWN_THEMSELVES or not is_compiled(DETECTORS, name)]
     names = list(dict.fromkeys([*BUILT_IN, *names]))
     mistakes = [f"--schemes: {mistake}" for name in names if (mistake := _refusal(name)) is not None]
     if mistakes:

@@ -137,10 +137,10 @@ def fly_one(variants: dict[str, Scenario], asked: Asked, flight: Flight) -> Docu
     )
 
 
-def _row(**known: Any) -> Document:
+def _row(**fields: Any) -> Document:
     """The row of a flight. Flags that are not given are False."""
     flags = dict.fromkeys(("found", "certain", "false_alarm", "failed"), False)
-    return {**flags, "inconclusive": None, "bound_used": 0.0, **known}
+    return {**flags, "inconclusive": None, "bound_used": 0.0, **fields}
 
 
 def variants_of(scenario: Scenario, surface: str) -> Iterator[tuple[str, Scenario]]:

@@ -33,7 +33,7 @@ COLUMNS = (
 
 def columns_of(aircraft: Aircraft) -> Columns:
     """An empty log with the columns of a flight that the test needs."""
-    surfaces = [f"{s}_{which}_rad" for s in aircraft.surfaces for which in ("cmd", "effective")]
+    surfaces = [f"{s}_{kind}_rad" for s in aircraft.surfaces for kind in ("cmd", "effective")]
     return Columns(*COLUMNS, *aircraft.signals, *surfaces)
 
 

@@ -201,8 +201,8 @@ def _draw_poles(axes: "Axes", analysis: LinearAnalysis) -> None:
     """The poles of each model in the complex plane."""
     for model, (mark, look) in MODEL_LOOKS.items():
         poles = np.linalg.eigvals(analysis.models[model].A)
-        seen = {"color": look["color"], "label": look["label"], "alpha": look.get("alpha", 1.0)}
-        axes.scatter(poles.real, poles.imag, s=70, marker=mark, **seen)
+        style = {"color": look["color"], "label": look["label"], "alpha": look.get("alpha", 1.0)}
+        axes.scatter(poles.real, poles.imag, s=70, marker=mark, **style)
     axes.axvline(0.0, color=GREY, linewidth=0.8)
     _dress(axes)
 

@@ -309,5 +309,5 @@ def instantaneous(m: Models, s: States) -> tuple[Contributions, dict[str, Contri
         "wind_turbulence": wind_turbulence(m, s),
         "earth_rotation": earth(m, s),
     }
-    errors = {name: acceleration_at(one, s.x, s.y, s.effective) - whole for name, one in m.parts.items()}
+    errors = {name: acceleration_at(part, s.x, s.y, s.effective) - whole for name, part in m.parts.items()}
     return contributions, {"fault": faults, "coefficients": errors}

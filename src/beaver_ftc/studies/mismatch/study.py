@@ -139,8 +139,8 @@ def dominant(flight: Split) -> Document | None:
     used = np.array([flight.shares(flight.contributions[name]).max(axis=0) for name in CAUSES])
     if not used.any():
         return None
-    which, i = np.unravel_index(int(used.argmax()), used.shape)
-    return {"source": CAUSES[which], "axis": AXES[i], "bound_share": finite(float(used[which, i]))}
+    cause, i = np.unravel_index(int(used.argmax()), used.shape)
+    return {"source": CAUSES[cause], "axis": AXES[i], "bound_share": finite(float(used[cause, i]))}
 
 
 # Columns of mismatch.csv: those of the place, and those with numbers, each with its key in the document.
@@ -188,8 +188,8 @@ def map_study(scenario: Scenario, report: bool = True) -> Study:
     bound, the smallest constant that covers it, and the dominant source. report: whether a figure is
     drawn."""
 
-    def drawn(found: Document) -> Files | None:
-        return {f"{MAP}.png": charts.map_figure(found["map"], scenario.name)} if report else None
+    def drawn(document: Document) -> Files | None:
+        return {f"{MAP}.png": charts.map_figure(document["map"], scenario.name)} if report else None
 
     conditions = [(V, h) for h in ALTITUDES_M for V in AIRSPEEDS_MPS]
     return Study(

@@ -169,9 +169,9 @@ def mismatch_section(folder: Path) -> str:
     if not path.exists():
         return ""
     document = read_json(path)
-    there = page.drawn_in(folder, PICTURES)
+    images = page.drawn_in(folder, PICTURES)
     parts = [part for caption, head, rows in tables(document) for part in (caption, page.Table(head, rows))]
     heading = page.Heading(f"Truth against design: {document['scenario']}")
-    pictures = page.Pictures([(PICTURES[name], name) for name in there])
-    body = page.html_of([heading, *findings(document), *parts, pictures], there)
+    pictures = page.Pictures([(PICTURES[name], name) for name in images])
+    body = page.html_of([heading, *findings(document), *parts, pictures], images)
     return f"<section><style>.figures img {{ max-width: 100% }}</style>{body}</section>"

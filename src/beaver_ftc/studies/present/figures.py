@@ -78,9 +78,9 @@ def draw_estimates(
     axes: "Axes", places: Sequence[float], estimates: Sequence[Mapping[str, Any]], times: float = 1.0,
     across: bool = False, **look: Any,
 ) -> None:  # fmt: skip
-    """Draw values with bars for their intervals. places: on the other axis. found: `value`, `low` and `high`
-    of each, None or NaN for none. times: factor on the values. across: the values are on the horizontal
-    axis."""
+    """Draw values with bars for their intervals. places: on the other axis. estimates: `value`, `low` and
+    `high` of each, None or NaN for none. times: factor on the values. across: the values are on the
+    horizontal axis."""
     ends = (
         np.array(
             [[estimate["value"], estimate["low"], estimate["high"]] for estimate in estimates], dtype=float

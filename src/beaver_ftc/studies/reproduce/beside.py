@@ -55,7 +55,7 @@ def false_alarm_of(setting: Changed) -> float:
 def document_of(flights: Mapping[tuple[str, str], Flown], alarms: Sequence[float]) -> Document:
     """The document: a row for each case and scheme, and the false alarms of each scheme. alarms: 1 or 0 for
     each of `healthy_settings`, in their order."""
-    rows = [_row(case, whose, flown) for (case, whose), flown in flights.items()]
+    rows = [_row(case, whose, flight) for (case, whose), flight in flights.items()]
     settings = zip(healthy_settings(), alarms, strict=True)
     alarmed = Counter(whose for (whose, _), alarm in settings if alarm)
     return {
@@ -66,9 +66,9 @@ def document_of(flights: Mapping[tuple[str, str], Flown], alarms: Sequence[float
     }
 
 
-def _row(case: str, whose: str, flown: Flown) -> Document:
+def _row(case: str, whose: str, flight: Flown) -> Document:
     """The row of a flight. case: its name; the healthy case has no axis of its own and is shown in pitch."""
-    metrics = flown.metrics
+    metrics = flight.metrics
     axis = AXIS.get(case, "q")
     tracking = metrics.tracking
     return {

@@ -102,18 +102,18 @@ class Claim(NamedTuple):
             return NOT_BORNE_OUT
         if self.holds(without):
             return CANNOT_BE_JUDGED
-        there = (self.holds(n) if self.construction else self.is_borne_out(n, w) for n, w in elsewhere)
-        return STRONGER if all(there) else BORNE_OUT
+        outcomes = (self.holds(n) if self.construction else self.is_borne_out(n, w) for n, w in elsewhere)
+        return STRONGER if all(outcomes) else BORNE_OUT
 
 
 def _claim(row: dict) -> Claim:
     """A claim from its row in claims.yaml."""
     if "reason" in row:
         return Claim(row["where"], row["says"], reason=REASONS[row["reason"]])
-    what, *names = row["measure"]
+    measure, *names = row["measure"]
     limit, source = _FILE["limits"][row["limit"]]
     return Claim(
-        row["where"], row["says"], MEASURES[what], tuple(names), limit, source, row["without"],
+        row["where"], row["says"], MEASURES[measure], tuple(names), limit, source, row["without"],
         because=row.get("because", ""), construction=row.get("construction", False),
     )  # fmt: skip
 

@@ -30,10 +30,10 @@ def _after(earlier_s: float, later_s: float) -> float:
     return round(later_s - earlier_s, 9) if np.isfinite([earlier_s, later_s]).all() else np.inf
 
 
-def _frames(flown: Flown, span_s: float) -> float:
+def _frames(flight: Flown, span_s: float) -> float:
     """The size of a span of time, in frames. Its sign is dropped, because a lag must be near 0 in both
     directions."""
-    return abs(round(span_s / flown.frame_s)) if np.isfinite(span_s) else np.inf
+    return abs(round(span_s / flight.frame_s)) if np.isfinite(span_s) else np.inf
 
 
 def _ratio(error: float, other: float) -> float:
@@ -44,9 +44,9 @@ def _ratio(error: float, other: float) -> float:
 # Detection and isolation
 
 
-def detection(flown: Flown) -> float:
+def detection(flight: Flown) -> float:
     """Time from the fault to the alarm, s."""
-    return or_never(flown.metrics.detection.delay_s)
+    return or_never(flight.metrics.detection.delay_s)
 
 
 def detected(*flights: Flown) -> float:
@@ -54,111 +54,111 @@ def detected(*flights: Flown) -> float:
     return sum(map(np.isfinite, map(detection, flights)))
 
 
-def isolation(flown: Flown) -> float:
+def isolation(flight: Flown) -> float:
     """Time from the alarm to the right name, s; infinite if the name at the end is wrong or missing."""
-    return _after(flown.alarm_s, flown.rightly_named_s)
+    return _after(flight.alarm_s, flight.rightly_named_s)
 
 
 def isolated(*flights: Flown) -> float:
     """Number of faults that are detected and rightly named."""
-    return sum(np.isfinite(isolation(flown) + detection(flown)) for flown in flights)
+    return sum(np.isfinite(isolation(flight) + detection(flight)) for flight in flights)
 
 
 def handled(*flights: Flown) -> float:
     """Number of faults that are detected, rightly named, and tracked with an error of at most GOOD."""
-    return sum(isolated(flown) and tracking(flown, flown.axis) <= GOOD for flown in flights)
+    return sum(isolated(flight) and tracking(flight, flight.axis) <= GOOD for flight in flights)
 
 
 def order(*flights: Flown) -> float:
     """The smallest number of frames from fault to detection, and from detection to isolation; 0 if one never
     happens."""
-    steps = [step(flown) for flown in flights for step in (detection, isolation)]
+    steps = [step(flight) for flight in flights for step in (detection, isolation)]
     return _frames(flights[0], min(steps)) if np.isfinite(steps).all() else 0.0
 
 
-def before_fault(flown: Flown) -> float:
+def before_fault(flight: Flown) -> float:
     """Largest |residual| / threshold of the detection estimator before the fault; above 1: a false alarm."""
-    return float(np.max(flown.shares()[:, flown.between(0.0, flown.fault_at_s)]))
+    return float(np.max(flight.shares()[:, flight.between(0.0, flight.fault_at_s)]))
 
 
 def own_estimator(*flights: Flown) -> float:
     """Largest |residual| / threshold of the isolation estimator of the true fault; above 1 it is excluded."""
-    return max(float(np.max(flown.shares_of(flown.struck))) for flown in flights)
+    return max(float(np.max(flight.shares_of(flight.struck))) for flight in flights)
 
 
-def alarm_lag(flown: Flown) -> float:
+def alarm_lag(flight: Flown) -> float:
     """Time from the first residual beyond its threshold to the alarm, frames."""
-    return _frames(flown, _after(flown.first_beyond_s(flown.shares()), flown.alarm_s))
+    return _frames(flight, _after(flight.first_beyond_s(flight.shares()), flight.alarm_s))
 
 
-def exclusion_lag(flown: Flown) -> float:
+def exclusion_lag(flight: Flown) -> float:
     """Time from the first residual beyond its threshold to the exclusion, frames; the largest of the
     estimators that do not fit the fault."""
     return max(
-        _frames(flown, _after(flown.first_beyond_s(flown.shares_of(other)), flown.excluded_at_s(other)))
-        for other in _others(flown)
+        _frames(flight, _after(flight.first_beyond_s(flight.shares_of(other)), flight.excluded_at_s(other)))
+        for other in _others(flight)
     )
 
 
-def _others(flown: Flown) -> list[str]:
+def _others(flight: Flown) -> list[str]:
     """The isolation estimators that do not fit the fault."""
-    return [other for other in ESTIMATORS if other != flown.struck]
+    return [other for other in ESTIMATORS if other != flight.struck]
 
 
-def _last_exclusion_s(flown: Flown) -> float:
+def _last_exclusion_s(flight: Flown) -> float:
     """Time at which the last estimator that does not fit the fault was excluded, s."""
-    return max(map(flown.excluded_at_s, _others(flown)))
+    return max(map(flight.excluded_at_s, _others(flight)))
 
 
-def last_to_go(flown: Flown) -> float:
+def last_to_go(flight: Flown) -> float:
     """Time from the alarm to the exclusion of the last estimator that does not fit the fault, s."""
-    return _after(flown.alarm_s, _last_exclusion_s(flown))
+    return _after(flight.alarm_s, _last_exclusion_s(flight))
 
 
-def conclusion_lag(flown: Flown) -> float:
+def conclusion_lag(flight: Flown) -> float:
     """Time from the exclusion of the last estimator that does not fit the fault to the right name, frames."""
-    return _frames(flown, _after(_last_exclusion_s(flown), flown.rightly_named_s))
+    return _frames(flight, _after(_last_exclusion_s(flight), flight.rightly_named_s))
 
 
-def estimators(flown: Flown) -> float:
+def estimators(flight: Flown) -> float:
     """Number of estimators at work: the detection estimator, and each isolation estimator with a residual."""
-    return 1.0 + sum(bool(flown.residuals_of(other).any()) for other in ESTIMATORS)
+    return 1.0 + sum(bool(flight.residuals_of(other).any()) for other in ESTIMATORS)
 
 
 at_work = estimators  # the same number: claims.yaml limits `at_work` from above, `estimators` from below
 
 
-def residuals(flown: Flown) -> float:
+def residuals(flight: Flown) -> float:
     """Number of residuals that the isolation estimators generate."""
-    return sum(int(flown.residuals_of(other).any(axis=1).sum()) for other in ESTIMATORS)
+    return sum(int(flight.residuals_of(other).any(axis=1).sum()) for other in ESTIMATORS)
 
 
-def activation(flown: Flown) -> float:
+def activation(flight: Flown) -> float:
     """Time between the alarm and the first residual of any isolation estimator, frames."""
-    begun = np.any([flown.residuals_of(other).any(axis=0) for other in ESTIMATORS], axis=0)
-    return _frames(flown, _after(flown.alarm_s, flown.first_s(begun)))
+    begun = np.any([flight.residuals_of(other).any(axis=0) for other in ESTIMATORS], axis=0)
+    return _frames(flight, _after(flight.alarm_s, flight.first_s(begun)))
 
 
 def generalised(*flights: Flown) -> float:
     """Number of pairs (flight, isolation estimator) in which the estimator works, and is excluded if and only
     if it does not fit the fault."""
     return sum(
-        bool(flown.residuals_of(estimator).any())
-        and np.isfinite(flown.excluded_at_s(estimator)) == (estimator != flown.struck)
-        for flown in flights
+        bool(flight.residuals_of(estimator).any())
+        and np.isfinite(flight.excluded_at_s(estimator)) == (estimator != flight.struck)
+        for flight in flights
         for estimator in ESTIMATORS
     )
 
 
-def named(flown: Flown) -> float:
+def named(flight: Flown) -> float:
     """Time with exactly one estimator not excluded, s. In a flight with an unknown fault, this is a wrong
     name."""
-    return round(sum(map(flown.named_s, ESTIMATORS)), 9)
+    return round(sum(map(flight.named_s, ESTIMATORS)), 9)
 
 
-def left(flown: Flown) -> float:
+def left(flight: Flown) -> float:
     """Number of isolation estimators that are not excluded."""
-    return sum(not np.isfinite(flown.excluded_at_s(estimator)) for estimator in ESTIMATORS)
+    return sum(not np.isfinite(flight.excluded_at_s(estimator)) for estimator in ESTIMATORS)
 
 
 def after_mismatch(*flights: Flown) -> float:
@@ -169,45 +169,45 @@ def after_mismatch(*flights: Flown) -> float:
     The mismatch is M_sj of detectability/certain.py along the flight itself.
     """
     lags = [
-        _frames(flown, _after(certain_s, max(certain_s, flown.excluded_at_s(other))))
-        for flown in flights
-        for other, certain_s in _certain_at_s(flown)
+        _frames(flight, _after(certain_s, max(certain_s, flight.excluded_at_s(other))))
+        for flight in flights
+        for other, certain_s in _certain_at_s(flight)
     ]
     return max(lags, default=np.inf)
 
 
-def _certain_at_s(flown: Flown) -> Iterator[tuple[str, float]]:
+def _certain_at_s(flight: Flown) -> Iterator[tuple[str, float]]:
     """(other fault, time s) for each other fault whose mismatch with the loss exceeds 1. The time is the
     first such instant after the loss, or the alarm if this comes later. Nothing if the fault is no loss."""
-    fault = flown.scenario.faults[0]
+    fault = flight.scenario.faults[0]
     if not isinstance(fault, LossOfEffectiveness):
         return
-    moment, bound, _ = moments_of(flown.scenario, flown.log)
-    z = fault.magnitude * moment.pop(flown.struck)
-    after_fault = flown.between(flown.fault_at_s)
+    moment, bound, _ = moments_of(flight.scenario, flight.log)
+    z = fault.magnitude * moment.pop(flight.struck)
+    after_fault = flight.between(flight.fault_at_s)
     for other, z_other in moment.items():
         exceeds = after_fault & (mismatch(z, z_other, bound) > 1.0)
         if exceeds.any():
-            yield other, max(flown.alarm_s, flown.first_s(exceeds))
+            yield other, max(flight.alarm_s, flight.first_s(exceeds))
 
 
 # Estimation
 
 
-def learnt_before(flown: Flown) -> float:
+def learnt_before(flight: Flown) -> float:
     """Largest output of the detection estimator's network before the alarm, rad/s2."""
-    early = flown.log["detected"] == 0
-    return max(float(np.max(np.abs(flown.log[f"{a}_network_rad_s2"][early]))) for a in AXES)
+    early = flight.log["detected"] == 0
+    return max(float(np.max(np.abs(flight.log[f"{a}_network_rad_s2"][early]))) for a in AXES)
 
 
-def unapproximated(flown: Flown) -> float:
+def unapproximated(flight: Flown) -> float:
     """RMS pitch acceleration that neither the design model nor the network of the detection estimator
     explains, over that which the model alone does not explain, from SETTLED_S after the fault on."""
-    after = flown.between(flown.fault_at_s + SETTLED_S)
-    if flown.metrics.departure or not after.any():
+    after = flight.between(flight.fault_at_s + SETTLED_S)
+    if flight.metrics.departure or not after.any():
         return np.inf
-    unexplained = flown.unexplained_rad_s2("q")[after]
-    unlearnt = unexplained - flown.log["q_network_rad_s2"][after]
+    unexplained = flight.unexplained_rad_s2("q")[after]
+    unlearnt = unexplained - flight.log["q_network_rad_s2"][after]
     return float(np.linalg.norm(unlearnt) / np.linalg.norm(unexplained))
 
 
@@ -219,22 +219,22 @@ def learning(*flights: Flown) -> float:
     """
     return max(
         _ratio(
-            flown.kept_deg_s(flown.axis, flown.fault_at_s + 13.0),
-            flown.rms_deg_s(flown.axis, flown.fault_at_s, flown.fault_at_s + 5.0),
+            flight.kept_deg_s(flight.axis, flight.fault_at_s + 13.0),
+            flight.rms_deg_s(flight.axis, flight.fault_at_s, flight.fault_at_s + 5.0),
         )
-        for flown in flights
+        for flight in flights
     )
 
 
 def outside(*flights: Flown) -> float:
     """Largest distance of theta = effectiveness - 1 from [-1, 0], of the estimates of the diagnosis and those
     that the law uses."""
-    columns = [f"{surface}_effectiveness_{what}" for surface in ESTIMATORS for what in ("estimate", "used")]
-    effectiveness = np.concatenate([flown.log[column] for flown in flights for column in columns])
+    columns = [f"{surface}_effectiveness_{kind}" for surface in ESTIMATORS for kind in ("estimate", "used")]
+    effectiveness = np.concatenate([flight.log[column] for flight in flights for column in columns])
     return float(np.nanmax(np.maximum(effectiveness - 1.0, -effectiveness).clip(0.0)))
 
 
-def unbounded(flown: Flown) -> float:
+def unbounded(flight: Flown) -> float:
     """1e6 (max |error| / bound - 1): excess of the model error before the fault over the bound of the paper,
     ppm; negative if the error stays within.
 
@@ -242,21 +242,23 @@ def unbounded(flown: Flown) -> float:
     rounding: W (2 sum |rates| + W) + ROUNDING, as bounds.add_published_bound adds it with kappa = 1 for the
     Beaver.
     """
-    healthy = flown.between(SETTLED_S, flown.fault_at_s)
+    healthy = flight.between(SETTLED_S, flight.fault_at_s)
     # sum of |rates| at the row before, at which the frame begins
-    rates = np.roll(sum(np.abs(flown.log[f"{axis}_rad_s"]) for axis in AXES), 1)
+    rates = np.roll(sum(np.abs(flight.log[f"{axis}_rad_s"]) for axis in AXES), 1)
     added = EARTH_RATE_RAD_S * (2.0 * rates + EARTH_RATE_RAD_S) + ROUNDING_RAD_S2
-    shares = [np.abs(flown.unexplained_rad_s2(a)) / (flown.log[f"{a}_eta_bar_rad_s2"] - added) for a in AXES]
+    shares = [
+        np.abs(flight.unexplained_rad_s2(a)) / (flight.log[f"{a}_eta_bar_rad_s2"] - added) for a in AXES
+    ]
     return 1e6 * (max(float(np.max(share[healthy])) for share in shares) - 1.0)
 
 
 # Control
 
 
-def separation(flown: Flown) -> float:
+def separation(flight: Flown) -> float:
     """Magnitude of the slowest pole of the rates over that of the fastest pole of the other states. The poles
     of each group are computed with constant states of the other group."""
-    plant, trim = trimmed(flown.scenario)
+    plant, trim = trimmed(flight.scenario)
     linear = differences(plant, trim)
     is_rate = np.isin(linear.states, AXES)
     rates, others = (
@@ -265,25 +267,25 @@ def separation(flown: Flown) -> float:
     return float(rates.min() / others.max())
 
 
-def tracking(flown: Flown, axis: str) -> float:
+def tracking(flight: Flown, axis: str) -> float:
     """RMS error of an axis from SETTLED_S after the fault on, as a share of the amplitude of its reference;
     infinite if the aircraft is lost."""
-    return flown.kept_deg_s(axis, flown.fault_at_s + SETTLED_S) / AMPLITUDE_DEG_S
+    return flight.kept_deg_s(axis, flight.fault_at_s + SETTLED_S) / AMPLITUDE_DEG_S
 
 
 def worst_tracking(*flights: Flown) -> float:
     """The largest `tracking` of several faults, each on the axis of its effect."""
-    return max(tracking(flown, flown.axis) for flown in flights)
+    return max(tracking(flight, flight.axis) for flight in flights)
 
 
-def healthy_tracking(flown: Flown) -> float:
+def healthy_tracking(flight: Flown) -> float:
     """RMS error of the worst axis of a healthy flight, as a share of the amplitude of its reference."""
-    return max(flown.kept_deg_s(axis, SETTLED_S) for axis in AXES) / AMPLITUDE_DEG_S
+    return max(flight.kept_deg_s(axis, SETTLED_S) for axis in AXES) / AMPLITUDE_DEG_S
 
 
-def deterioration(flown: Flown) -> float:
+def deterioration(flight: Flown) -> float:
     """RMS pitch rate error from the fault to the end of the flight, over that from SETTLED_S to the fault."""
-    return flown.rms_deg_s("q", flown.fault_at_s) / flown.rms_deg_s("q", SETTLED_S, flown.fault_at_s)
+    return flight.rms_deg_s("q", flight.fault_at_s) / flight.rms_deg_s("q", SETTLED_S, flight.fault_at_s)
 
 
 def _beside(flights: tuple[Flown, ...], after_s: float) -> float:
@@ -293,8 +295,8 @@ def _beside(flights: tuple[Flown, ...], after_s: float) -> float:
     half = len(flights) // 2
     ratios = []
     for ours, other in zip(flights[:half], flights[half:], strict=True):
-        where = ours.axis, ours.fault_at_s + after_s
-        ratios.append(_ratio(ours.kept_deg_s(*where), other.rms_deg_s(*where)))
+        span = ours.axis, ours.fault_at_s + after_s
+        ratios.append(_ratio(ours.kept_deg_s(*span), other.rms_deg_s(*span)))
     return max(ratios)
 
 
@@ -307,7 +309,7 @@ def beside_passive(*flights: Flown) -> float:
 def transient(*flights: Flown) -> float:
     """RMS pitch rate error in the first TRANSIENT_S after the fault, over that with a sudden hand-over."""
     gradual, sudden = (
-        flown.rms_deg_s("q", flown.fault_at_s, flown.fault_at_s + TRANSIENT_S) for flown in flights
+        flight.rms_deg_s("q", flight.fault_at_s, flight.fault_at_s + TRANSIENT_S) for flight in flights
     )
     return gradual / sudden
 
@@ -317,44 +319,44 @@ def beside_nominal(*flights: Flown) -> float:
     return _beside(flights, 0.0)
 
 
-def flown_on(flown: Flown) -> float:
+def flown_on(flight: Flown) -> float:
     """Time that the aircraft flies after the begin of the fault, s."""
-    return float(flown.log["t_s"][-1] - flown.fault_at_s)
+    return float(flight.log["t_s"][-1] - flight.fault_at_s)
 
 
-def in_charge(flown: Flown) -> float:
+def in_charge(flight: Flown) -> float:
     """Time from the alarm to the adaptive mode, s."""
-    return _after(flown.alarm_s, flown.mode_at_s("adaptive"))
+    return _after(flight.alarm_s, flight.mode_at_s("adaptive"))
 
 
-def activated_near_10(flown: Flown) -> float:
+def activated_near_10(flight: Flown) -> float:
     """Distance of the begin of the adaptive mode from 10 s, s."""
-    return abs(_after(10.0, flown.mode_at_s("adaptive")))
+    return abs(_after(10.0, flight.mode_at_s("adaptive")))
 
 
-def reallocation(flown: Flown) -> float:
+def reallocation(flight: Flown) -> float:
     """Time from the name to the reallocation, s."""
-    return _after(or_never(flown.metrics.isolation.time_s), flown.mode_at_s("reallocated"))
+    return _after(or_never(flight.metrics.isolation.time_s), flight.mode_at_s("reallocated"))
 
 
-def decisions(flown: Flown) -> float:
+def decisions(flight: Flown) -> float:
     """Number of decisions taken, of two: the adaptive mode began; the flap has taken over the demand of the
     elevator."""
-    adaptive = np.isfinite(flown.mode_at_s("adaptive"))
-    return float(adaptive) + float(share_of_elevator(flown) <= TAKEN_OVER)
+    adaptive = np.isfinite(flight.mode_at_s("adaptive"))
+    return float(adaptive) + float(share_of_elevator(flight) <= TAKEN_OVER)
 
 
-def share_of_elevator(flown: Flown) -> float:
+def share_of_elevator(flight: Flown) -> float:
     """Range of the command of the elevator over that of the flap, from TRANSIENT_S after the fault on;
     infinite if the flap does not move."""
-    after = flown.between(flown.fault_at_s + TRANSIENT_S)
+    after = flight.between(flight.fault_at_s + TRANSIENT_S)
     if not after.any():
         return np.inf
-    elevator, flap = (float(np.ptp(flown.log[f"{s}_cmd_rad"][after])) for s in ("elevator", "flap"))
+    elevator, flap = (float(np.ptp(flight.log[f"{s}_cmd_rad"][after])) for s in ("elevator", "flap"))
     return elevator / flap if flap else np.inf
 
 
-def flap_rate(flown: Flown) -> float:
+def flap_rate(flight: Flown) -> float:
     """Largest rate of the command of the flap, deg/s."""
-    rates = np.diff(flown.log["flap_cmd_rad"]) / np.diff(flown.log["t_s"])
+    rates = np.diff(flight.log["flap_cmd_rad"]) / np.diff(flight.log["t_s"])
     return float(np.max(np.abs(np.degrees(rates))))

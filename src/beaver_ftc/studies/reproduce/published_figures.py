@@ -95,12 +95,12 @@ def figures_of(document: Summary) -> Files:
     return {**drawn, f"{SENSITIVITY}.png": margins_figure(document)}
 
 
-def _drawn(view: View, flown: Flown, span: tuple[float, float]) -> "Figure":
+def _drawn(view: View, flight: Flown, span: tuple[float, float]) -> "Figure":
     """A view of the log within a span of time, s. Tracking errors are added to the columns of the log."""
-    shown = flown.between(*span)
-    errors = {f"{axis}_error_rad_s": np.radians(flown.error_deg_s(axis)) for axis in AXES}
-    series = {name: values[shown] for name, values in {**flown.log, **errors}.items()}
-    return draw(view, series, marks(flown.metrics), "flown again in JSBSim")
+    is_shown = flight.between(*span)
+    errors = {f"{axis}_error_rad_s": np.radians(flight.error_deg_s(axis)) for axis in AXES}
+    series = {name: values[is_shown] for name, values in {**flight.log, **errors}.items()}
+    return draw(view, series, marks(flight.metrics), "flown again in JSBSim")
 
 
 def shares(claim: Document) -> tuple[float, float, float]:

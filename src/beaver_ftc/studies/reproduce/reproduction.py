@@ -74,14 +74,14 @@ def claims_row(setting: Changed) -> Document:
 
     A number that no verdict needs is not flown. It is nan, which keeps no limit.
     """
-    flown: dict[str, Flown] = {}
-    flights = LazyFlights(setting.changes, flown)
+    flown_so_far: dict[str, Flown] = {}
+    flights = LazyFlights(setting.changes, flown_so_far)
     is_published = setting.name == AS_PUBLISHED.name
 
     def without(claim: Claim) -> float:
-        return claim.number(LazyFlights({**setting.changes, **WITHOUT[claim.ablation].changes}, flown))
+        return claim.number(LazyFlights({**setting.changes, **WITHOUT[claim.ablation].changes}, flown_so_far))
 
-    rigid = LazyFlights({**setting.changes, **NO_ADAPTATION}, flown)
+    rigid = LazyFlights({**setting.changes, **NO_ADAPTATION}, flown_so_far)
     return {
         NUMBERS: [claim.number(flights) if is_published or not claim.because else nan for claim in MEASURED],
         ABLATED: [

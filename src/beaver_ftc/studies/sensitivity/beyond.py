@@ -84,9 +84,9 @@ def scenario_of(scenario: Scenario, errors: Errors, seed: int, flight: Flight) -
 
 def fly_one(scenario: Scenario, seed: int, flight: Flight) -> Document:
     """The row of a flight."""
-    flown = scenario_of(scenario, errors_of(scenario), seed, flight)
+    with_errors = scenario_of(scenario, errors_of(scenario), seed, flight)
     try:
-        landing = fly(flown)
+        landing = fly(with_errors)
     except BeaverFtcError:
         return FAILED
     return row_of(measure(landing), max(landing.closest_approach, default=0.0))
@@ -141,11 +141,11 @@ def document_of(
 
 def summary(rows: Sequence[Document]) -> Document:
     """Counts and medians with their intervals. The tracking error of a lost aircraft counts as infinite."""
-    flown = [row for row in rows if not row["failed"]]
-    counts = {name: sum(row[name] for row in flown) for name in COUNTED}
+    completed = [row for row in rows if not row["failed"]]
+    counts = {name: sum(row[name] for row in completed) for name in COUNTED}
     return {
-        "flights": len(flown),
-        "failed": len(rows) - len(flown),
-        **{name: counted(count, len(flown)) for name, count in counts.items()},
-        **{name: median(row[name] for row in flown) for name in MEASURED},
+        "flights": len(completed),
+        "failed": len(rows) - len(completed),
+        **{name: counted(count, len(completed)) for name, count in counts.items()},
+        **{name: median(row[name] for row in completed) for name in MEASURED},
     }

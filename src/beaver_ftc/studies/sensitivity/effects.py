@@ -58,16 +58,16 @@ def _row_of(mechanism: Mechanism, cases: Sequence[Flight], rows: Outcomes) -> Do
 def effect_of(pairs: Sequence[Pair]) -> Document:
     """The effect of the mechanism in these pairs: net shares by criterion, and medians with and without it.
     Pairs with a failed flight are left out."""
-    flown = [pair for pair in pairs if not any(outcome["failed"] for outcome in pair)]
+    completed = [pair for pair in pairs if not any(outcome["failed"] for outcome in pair)]
     return {
-        "flights": len(flown),
-        "failed": len(pairs) - len(flown),
-        "same_verdict": sum(a["verdict"] == b["verdict"] for a, b in flown),
-        "same_tracking": sum(a["tracking_deg_s"] == b["tracking_deg_s"] for a, b in flown),
-        **{name: net(flown, worse) for name, worse in CRITERIA.items()},
-        "delay_s": _both([p for p in flown if not any(o["false_alarm"] for o in p)], "delay_s"),
-        "tracking_deg_s": _both(flown, "tracking_deg_s"),
-        "tracking_ratio": median(_ratio(a, b) for a, b in flown),
+        "flights": len(completed),
+        "failed": len(pairs) - len(completed),
+        "same_verdict": sum(a["verdict"] == b["verdict"] for a, b in completed),
+        "same_tracking": sum(a["tracking_deg_s"] == b["tracking_deg_s"] for a, b in completed),
+        **{name: net(completed, worse) for name, worse in CRITERIA.items()},
+        "delay_s": _both([p for p in completed if not any(o["false_alarm"] for o in p)], "delay_s"),
+        "tracking_deg_s": _both(completed, "tracking_deg_s"),
+        "tracking_ratio": median(_ratio(a, b) for a, b in completed),
     }
 
 
@@ -126,17 +126,17 @@ def _ratio(a: Document, b: Document) -> float:
 
 def _system_row(outcomes: Outcomes) -> Document:
     """The row of a system with all of its mechanisms, over the completed flights."""
-    flown = [o for o in outcomes if not o["failed"]]
+    completed = [o for o in outcomes if not o["failed"]]
     rates = {
-        "false_alarms": sum(o["false_alarm"] for o in flown),
-        "detected": sum(o["delay_s"] is not None for o in flown),
-        "named": sum(o["named"] for o in flown),
-        "lost": sum(o["tracking_deg_s"] is None for o in flown),
+        "false_alarms": sum(o["false_alarm"] for o in completed),
+        "detected": sum(o["delay_s"] is not None for o in completed),
+        "named": sum(o["named"] for o in completed),
+        "lost": sum(o["tracking_deg_s"] is None for o in completed),
     }
     return {
-        "flights": len(flown),
-        **{name: counted(count, len(flown)) for name, count in rates.items()},
-        "tracking_deg_s": median(o["tracking_deg_s"] for o in flown),
+        "flights": len(completed),
+        **{name: counted(count, len(completed)) for name, count in rates.items()},
+        "tracking_deg_s": median(o["tracking_deg_s"] for o in completed),
     }
 
 

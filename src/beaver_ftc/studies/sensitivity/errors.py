@@ -160,8 +160,8 @@ def _servos(declared: Declared) -> Error:
         return {"uncertainty.actuators": truth}
 
     largest = {key: max(bound[key] for bound in bounds.values()) for key in ActuatorBound.model_fields}
-    says = "{bandwidth:.0%}, {rate_limit:.0%}, {dead_band_deg:g} deg".format(**largest).replace("%", " %")
-    return Error("actuators", says, change)
+    size = "{bandwidth:.0%}, {rate_limit:.0%}, {dead_band_deg:g} deg".format(**largest).replace("%", " %")
+    return Error("actuators", size, change)
 
 
 def _sensors(declared: SensorErrors) -> Error:

@@ -40,14 +40,16 @@ RESULTS = (FLOWN, DEPARTED)  # the statuses of a flight that has metrics
 FIXED = {"run": "int", "seed": "int", "status": "text", "reason": "text"}
 
 
-def kind_of(how: Variation) -> str:
+def kind_of(variation: Variation) -> str:
     """The type of the column of a varied key: numbers and flags as they are; all else as text, sections as
     JSON."""
-    if how.choice is None:
+    if variation.choice is None:
         return "float"
-    if all(isinstance(value, bool) for value in how.choice):
+    if all(isinstance(value, bool) for value in variation.choice):
         return "flag"
-    numbers = all(isinstance(value, int | float) and not isinstance(value, bool) for value in how.choice)
+    numbers = all(
+        isinstance(value, int | float) and not isinstance(value, bool) for value in variation.choice
+    )
     return "float" if numbers else "text"
 
 
@@ -87,7 +89,7 @@ def schema_of(sweep: "Sweep") -> "pa.Schema":
 
     types = {"float": pa.float64(), "int": pa.int64(), "flag": pa.bool_(), "text": pa.string()}
     first, *others = [pa.field(name, types[kind], nullable=name == "reason") for name, kind in FIXED.items()]
-    varied = [pa.field(key, types[kind_of(how)]) for key, how in sweep.file.vary.items()]
+    varied = [pa.field(key, types[kind_of(variation)]) for key, variation in sweep.file.vary.items()]
     metrics = [pa.field(name, types[kind]) for name, kind in columns_of(sweep.aircraft.surfaces).items()]
     return pa.schema([first, *varied, *others, *metrics])
 
@@ -96,7 +98,7 @@ def table_of(sweep: "Sweep", schema: "pa.Schema", rows: Sequence[Row]) -> "pa.Ta
     """Rows in order of `run` as a table."""
     import pyarrow as pa
 
-    kinds = {key: kind_of(how) for key, how in sweep.file.vary.items()}
+    kinds = {key: kind_of(variation) for key, variation in sweep.file.vary.items()}
     ordered = sorted(rows, key=itemgetter("run"))
     cells = [row | {key: as_cell(row[key], kind) for key, kind in kinds.items()} for row in ordered]
     return pa.Table.from_pylist(cells, schema=schema)
@@ -151,8 +153,8 @@ def scenario_of(sweep: Sweep, assignment: Assignment) -> Scenario:
     try:
         return sweep.scenario(assignment.values, name=flight_name(sweep, assignment.run), seed=seed)
     except ValidationError as error:
-        flown = source.Document(sweep.data_with(assignment.values))
-        problem = next(iter(problems_of(error, flown, Scenario.model_json_schema())))
+        data = source.Document(sweep.data_with(assignment.values))
+        problem = next(iter(problems_of(error, data, Scenario.model_json_schema())))
         raise BadInput(f"{key_path(problem.location)}: {problem.says}") from None
 
 

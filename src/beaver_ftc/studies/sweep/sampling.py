@@ -53,14 +53,14 @@ def flight_seed(sweep_seed: int, index: int) -> int:
     return int(words[0] >> np.uint64(1))
 
 
-def value_at(how: Variation, u: float) -> Any:
+def value_at(variation: Variation, u: float) -> Any:
     """The value of a variation at u in [0, 1): the inverse of its distribution function."""
-    if how.count is not None:
-        return counted_value(how, min(int(u * how.count), how.count - 1))
-    first, second = getattr(how, how.kind)
-    if how.kind == "normal":
-        return _normal(NormalDist(first, second), how.within, u)
-    if how.kind == "uniform":
+    if variation.count is not None:
+        return counted_value(variation, min(int(u * variation.count), variation.count - 1))
+    first, second = getattr(variation, variation.kind)
+    if variation.kind == "normal":
+        return _normal(NormalDist(first, second), variation.within, u)
+    if variation.kind == "uniform":
         return first + u * (second - first)
     return min(max(first * (second / first) ** u, first), second)
 
@@ -78,13 +78,13 @@ def _normal(distribution: NormalDist, within: tuple[float, float] | None, u: flo
 
 def values_at(vary: Iterable[tuple[str, Variation]], point: Iterable[float]) -> Document:
     """The value of each key at a point of the unit cube."""
-    return {key: value_at(how, float(u)) for (key, how), u in zip(vary, point, strict=True)}
+    return {key: value_at(variation, float(u)) for (key, variation), u in zip(vary, point, strict=True)}
 
 
-def counted_value(how: Variation, position: int) -> Any:
+def counted_value(variation: Variation, position: int) -> Any:
     """The value at a position of a `linspace` or `choice`; the last value of a `linspace` is exact."""
-    values = getattr(how, how.kind)
-    if how.kind == "choice":
+    values = getattr(variation, variation.kind)
+    if variation.kind == "choice":
         return values[position]
     first, last, count = values
     return last if position == count - 1 else first + position * (last - first) / (count - 1)
@@ -96,8 +96,8 @@ class Plan:
     def __init__(self, sweep: Sweep) -> None:
         self._file: SweepFile = sweep.file
         vary = sweep.file.vary.items()
-        self._in_turn = [(key, how) for key, how in vary if _is_in_turn(sweep.file, how)]
-        self._drawn = [(key, how) for key, how in vary if not _is_in_turn(sweep.file, how)]
+        self._in_turn = [(key, variation) for key, variation in vary if _is_in_turn(sweep.file, variation)]
+        self._drawn = [(key, variation) for key, variation in vary if not _is_in_turn(sweep.file, variation)]
 
     def assignments(self, indices: Sequence[int]) -> list[Assignment]:
         """The values of these flights. indices: increasing."""
@@ -124,15 +124,15 @@ class Plan:
     def _values(self, index: int, point: np.ndarray) -> Document:
         """The values of one flight. point: u of the drawn keys."""
         values = values_at(self._drawn, point)
-        for key, how in reversed(self._in_turn):
-            index, position = divmod(index, how.count or 1)
-            values[key] = counted_value(how, position)
+        for key, variation in reversed(self._in_turn):
+            index, position = divmod(index, variation.count or 1)
+            values[key] = counted_value(variation, position)
         return {key: values[key] for key in self._file.vary}
 
 
-def _is_in_turn(file: SweepFile, how: Variation) -> bool:
+def _is_in_turn(file: SweepFile, variation: Variation) -> bool:
     """Whether a key takes its values in turn."""
-    return file.sampling == "grid" or how.linspace is not None
+    return file.sampling == "grid" or variation.linspace is not None
 
 
 @lru_cache(maxsize=1)  # every batch of a sweep uses it

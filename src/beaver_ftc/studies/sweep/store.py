@@ -108,12 +108,12 @@ class Store:
         Raises BadInput, too, if the identity differs.
         """
         earlier = identity.read_identity(self._manifest, "sweep")
-        flown = self.results.exists() or bool(self.parts)
-        if earlier is None and (flown or self._manifest.exists()):
+        has_flights = self.results.exists() or bool(self.parts)
+        if earlier is None and (has_flights or self._manifest.exists()):
             self._refuse_or_set_aside(resume)
         elif earlier is not None and resume:
             identity.refuse_other(mine, earlier, self.folder)
-        elif flown and not (self.folder / "summary.json").exists():
+        elif has_flights and not (self.folder / "summary.json").exists():
             raise BadInput(
                 f"{self.folder}: holds an unfinished sweep, allowed: --resume to go on with it, "
                 "another --out, or to remove it first"

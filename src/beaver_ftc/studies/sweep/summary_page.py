@@ -250,7 +250,7 @@ def _parts(summary: Document, folder: Path, figures: Mapping[str, Path]) -> list
         for outcome, ranking in summary["sensitivity"].items()
         for entry in ranking
     ]
-    flown = "{flights} flights, sampling {sampling}, seed {seed}".format(**summary)
+    plan_text = "{flights} flights, sampling {sampling}, seed {seed}".format(**summary)
     return [
         summary["description"],
         _STEERED if "search" in summary else "",
@@ -265,7 +265,7 @@ def _parts(summary: Document, folder: Path, figures: Mapping[str, Path]) -> list
         *_section("Flights that could not be flown", *tabulated(FAILED, summary["reasons"])),
         *_section("Sensitivity", *tabulated(EXPLAINED, explained)),
         _EXPLAINED if explained else "",
-        f"{flown}; {versions_line(summary['versions'])}",
+        f"{plan_text}; {versions_line(summary['versions'])}",
     ]
 
 

@@ -265,8 +265,9 @@ def inertia_bounds(tol: float, mass: MassProperties) -> np.ndarray:
     nominal = np.array(inertia_coefficients(mass))
     worst = np.zeros(nominal.size)
     for scales in product((1 - tol, 1 + tol), repeat=4):
-        names = zip(_INERTIA_NAMES, scales, strict=True)
-        inertias = {name: getattr(mass, name) * scale for name, scale in names}
+        inertias = {
+            name: getattr(mass, name) * scale for name, scale in zip(_INERTIA_NAMES, scales, strict=True)
+        }
         changed = np.array(inertia_coefficients(replace(mass, **inertias)))
         worst = np.maximum(worst, np.abs(changed - nominal))
     worst.flags.writeable = False  # kept: the same for every flight of a design
@@ -322,8 +323,7 @@ def fill_engine_errors(err: np.void, declared: Declared) -> None:
     if not (erring and declared.aircraft.has_engine_instruments):
         return
     initial: Any = declared.initial
-    inhg = declared.aircraft.engine.settings["manifold_pressure_inhg"].range[1]
-    largest = initial.engine_rpm, inhg
+    largest = initial.engine_rpm, declared.aircraft.engine.settings["manifold_pressure_inhg"].range[1]
     bounds = [errors[name].of_reading(reading) for name, reading in zip(ENGINE, largest, strict=True)]
     kw0, kw1 = power_error_kw(*largest, *bounds)
     fill(err, engine=1, kw0=kw0, kw1=kw1)

@@ -130,12 +130,14 @@ def with_measured_gust(context: Context, gust_noise: np.ndarray) -> Context:
     declared = context.declared
     if not declared.air:
         return context
-    measured = replace(
-        declared,
-        gust_rad_s=declared.gust_rad_s * np.sqrt(MIN_UNMEASURED_SHARES),
-        model_rad_s2=np.hypot(declared.model_rad_s2, gust_noise),
+    return replace(
+        context,
+        declared=replace(
+            declared,
+            gust_rad_s=declared.gust_rad_s * np.sqrt(MIN_UNMEASURED_SHARES),
+            model_rad_s2=np.hypot(declared.model_rad_s2, gust_noise),
+        ),
     )
-    return replace(context, declared=measured)
 
 
 def detection_probability(d: float, interval_s: float, alarms_per_h: float) -> float:

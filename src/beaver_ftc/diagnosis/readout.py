@@ -384,7 +384,10 @@ def _read_surface(srf: np.void) -> SurfaceFaultTypes:
 
 
 def _read_block(blk: np.void) -> StatisticalBlock:
-    hypotheses = tuple(map(_read_hypothesis, blk["hypothesis"][: blk["n_h"]]))
+    hypotheses = tuple(
+        _read(StatisticalHypothesis, hyp, "kind surface axis alarms score")
+        for hyp in blk["hypothesis"][: blk["n_h"]]
+    )
     n = len(hypotheses)
     tests = (
         blk["tests"][name].reshape(-1, N_SLOTS)[:n].copy()
@@ -396,10 +399,6 @@ def _read_block(blk: np.void) -> StatisticalBlock:
         blk["tol"][: blk["n_Z"]].copy(),
         hypotheses, HypothesisTestsByOnset(*tests),
     )  # fmt: skip
-
-
-def _read_hypothesis(hyp: np.void) -> StatisticalHypothesis:
-    return _read(StatisticalHypothesis, hyp, "kind surface axis alarms score")
 
 
 def _read_sensor_monitor(mon: np.void) -> SensorMonitor:

@@ -6,7 +6,9 @@ from kernels import fill, new_fdi
 from true_flight import UNITS, new_monitor, true_flight
 
 from beaver_ftc.diagnosis.model_prediction import prediction_dtype
-from beaver_ftc.diagnosis.monitors import sensor_monitor
+from beaver_ftc.diagnosis.monitors import gyro_or_attitude, sensor_monitor
+from beaver_ftc.diagnosis.monitors.flow_or_force import FORCES
+from beaver_ftc.diagnosis.monitors.gyro_or_attitude import GYRO_OPEN, GYRO_REFUTED
 from beaver_ftc.diagnosis.monitors.numbering import (
     ALPHA_TEST,
     ANGLE_TEST,
@@ -23,7 +25,7 @@ from beaver_ftc.diagnosis.monitors.numbering import (
     THETA,
     TURN_TEST,
 )
-from beaver_ftc.diagnosis.monitors.sensor_monitor import GYRO_OPEN, GYRO_REFUTED
+from beaver_ftc.diagnosis.monitors.suspects import find_suspects, latch_exceeded
 from beaver_ftc.plant.instruments import (
     ALTITUDE,
     AX,
@@ -37,7 +39,6 @@ from beaver_ftc.plant.instruments import (
 from samples import AT_NIGHT
 
 H, N, FROM = 0.01, 200, 40
-FORCES = (AX, AX + 1, AX + 2)
 D = np.array([[4.0, 0.2, -0.3], [-0.2, 3.0, 0.0], [0.3, 0.1, 1.0]])
 
 
@@ -149,8 +150,8 @@ def suspects(ratios, alarm=None, **fields):
     """The sensors that can have brought the tests here."""
     monitor = with_ratios(ratios, **fields)
     monitor["output"]["alarm_test"] = max(ratios, key=ratios.get) if alarm is None else alarm
-    sensor_monitor.latch_exceeded(monitor)
-    sensor_monitor.find_suspects(monitor)
+    latch_exceeded(monitor)
+    find_suspects(monitor)
     return set(np.flatnonzero(monitor["output"]["suspect"]).tolist())
 
 
@@ -202,7 +203,7 @@ def test_an_error_of_the_attitude_that_has_shown_and_is_gone_is_no_gyros(peak, n
     gyro["most_older"][0], gyro["most_past"][0] = 1.0, peak
     monitor["per_sample"], fdi["bound"]["nu_max"] = noise * H / 4.0, 1.0
     fdi["bank"]["output"]["threshold"][:3] = 1.0
-    sensor_monitor.judge_gyros(monitor, fdi["bank"], fdi["bound"], 0.02)
+    gyro_or_attitude.judge_gyros(monitor, fdi["bank"], fdi["bound"], 0.02)
     assert gyro["verdict"][0] == verdict
 
 

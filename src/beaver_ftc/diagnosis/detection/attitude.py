@@ -122,9 +122,10 @@ def restart(att):
 
 
 @kernel
-def add_turn(att, i, turn):
-    """Add what the attitude has turned about axis i beyond the gyro in a sample, rad."""
-    att.turn[i] += turn
+def add_turn(att, turn):
+    """Add what the attitude has turned beyond the gyros in a sample: turn (3,) or more, rad, by axis."""
+    for i in range(3):
+        att.turn[i] += turn[i]
 
 
 @kernel

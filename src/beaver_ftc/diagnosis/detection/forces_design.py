@@ -35,10 +35,14 @@ def configure_forces(
     """
     stat, err = fdi["statistical"], fdi["bound"]["declared_errors"]
     aircraft, forces = declared.aircraft, stat["forces"]
-    CY_bdot = [t for t in aircraft.forces if t.coefficient == "CY" and t.of == ((SIDESLIP_RATE, 1),)]
+    CY_bdot = sum(
+        declared.terms[term.name]
+        for term in aircraft.forces
+        if term.coefficient == "CY" and term.of == ((SIDESLIP_RATE, 1),)
+    )
     fill(
         forces, c_inv=1.0 / aircraft.geometry.chord_m, q_trim=trim[1][QDYN],
-        CY_bdot=sum(declared.terms[term.name] for term in CY_bdot),
+        CY_bdot=CY_bdot,
         q_noise=declared.sensors["qdyn"].random,
     )  # fmt: skip
     for i in range(2):

@@ -282,8 +282,12 @@ def view_alarm_score(view, views, cfg, forces, gust):
     """
     if view.nulled == AXIS_VIEW:
         return view.tones.score if view.block.source != INERTIAL else 0.0
-    of_force = view.by_force and abs(view.block.m[0, view.places[FORCE_PLACE]]) > MIN_FORCE_PART
-    if of_force and view.block.source == VANED and gust.output.uses_accelerometers == 1:
+    if (
+        gust.output.uses_accelerometers == 1
+        and view.by_force
+        and abs(view.block.m[0, view.places[FORCE_PLACE]]) > MIN_FORCE_PART
+        and view.block.source == VANED
+    ):
         return confirmed_score(view, views, cfg, forces)
     return 0.0
 

@@ -122,8 +122,7 @@ def update_blocks(stat, dt, k, alarmed, may_end=False):
                 likelihood.whiten_calm(b, dt)
             else:  # without gust both blocks of roll and yaw have the same filter
                 b.calm.g[:] = blocks[LATERAL_BLOCK].calm.g
-        hi_decay = cfg.forget if may_end else 0.0
-        likelihood.update_block(b, dt, decay, hi_decay, cfg.mapped)
+        likelihood.update_block(b, dt, decay, cfg.forget if may_end else 0.0, cfg.mapped)
 
 
 @kernel
@@ -250,8 +249,7 @@ def excludes_loss(cfg, blocks, fies, of, s, pitch_ends, abrupt):
         best = max(best_pitch, best_alternative(b, fies, of, s))
         hi = max(hi_pitch, loss_bounds(b, s, False)[HI])
         hi_end = max(hi_end_pitch, loss_bounds(b, s, True)[HI])
-        low = hi < share * best and hi_end < share_end * best
-        if low and best - max(hi, hi_end) > cfg.margin:
+        if hi < share * best and hi_end < share_end * best and best - max(hi, hi_end) > cfg.margin:
             return True
     return False
 

@@ -76,8 +76,7 @@ def within_limits(c, y):
 
     Outside, the tolerances of the tests, which are worked out for trim, do not hold.
     """
-    is_near = c.V_min < y[AIRSPEED] < c.V_max
-    return is_near and abs(y[ALPHA]) < MAX_VANE_RAD and abs(y[BETA]) < MAX_VANE_RAD
+    return c.V_min < y[AIRSPEED] < c.V_max and abs(y[ALPHA]) < MAX_VANE_RAD and abs(y[BETA]) < MAX_VANE_RAD
 
 
 @kernel

@@ -47,9 +47,10 @@ def configure_engine_monitor(config: np.void, aircraft: Aircraft) -> None:
     if error_map is None or not error_map.knows_engines or not {THRUST_SIGNAL, YAW_SIGNAL} <= set(signals):
         return
     i_T, i_n = (DPT + signals.index(name) for name in (THRUST_SIGNAL, YAW_SIGNAL))
-    slack = MAX_OFFSET_M / aircraft.geometry.span_m
-    n = len(aircraft.effectors)
-    fill(config, n_engines=n, yaw_per_thrust=yaw_per_thrust(aircraft), i_T=i_T, i_n=i_n, slack=slack)
+    fill(
+        config, n_engines=len(aircraft.effectors), yaw_per_thrust=yaw_per_thrust(aircraft), i_T=i_T, i_n=i_n,
+        slack=MAX_OFFSET_M / aircraft.geometry.span_m,
+    )  # fmt: skip
 
 
 @kernel

@@ -31,8 +31,9 @@ several tests and for the airspeed. A test refutes a hypothesis with
     r_m > (1 + E + d) B_m + (E + d) H_m     for the airspeed, in SPEED and the tests after it
 
 since a residual is the sum of the effect of sound sensors, at most B_m, and of the effect of the error. So an
-error from the start, of any size, never excludes the broken sensor. Where sensor_monitor.py excludes a sensor
-by the effect that its error would have from now on, the limit is B_m + E_alarm H_m, E_alarm: E at the alarm.
+error from the start, of any size, never excludes the broken sensor. suspects.py and flow_or_force.py exclude
+a sensor by the effect that its error would have from now on. Their limit is B_m + E_alarm H_m, with E_alarm
+the E at the alarm.
 
 What each effect follows from (v m/s: velocity, V its length; a m/s2: acceleration, gravity g included; both
 in body axes; p, q, r rad/s):
@@ -93,7 +94,6 @@ from beaver_ftc.diagnosis.monitors.numbering import (
 )
 from beaver_ftc.diagnosis.monitors.redundancy import MIN_AIRSPEED_MPS, MIN_QDYN_PA, secant, too_steep
 from beaver_ftc.diagnosis.monitors.rotation import down, length, unit, vector
-from beaver_ftc.diagnosis.sets import explain
 from beaver_ftc.plant.instruments import ALTITUDE, PHI
 
 # Largest flow angle of an aircraft whose attitude and flow are tested, to either side
@@ -410,7 +410,8 @@ def tighten_bounds(mon):
                 half = 0.5 * angle_of_chord(E[h])
                 force = own.C_m[FORCE_ON_ALPHA if h == H_ALPHA else FORCE_ON_BETA, m].real
                 c = np.cos(half) * abs(C_m.real) - np.sin(half) * abs(C_m.imag) - force
-            E[h] = explain(0.0, s, EFFECT_LEFT * max(c, 0.0), -E[h], E[h])[1]
+            if c > 0.0:
+                E[h] = min(E[h], s / (EFFECT_LEFT * c))
 
 
 @kernel
@@ -458,8 +459,9 @@ def explains_exceeded(mon, h, alarm):
     """Whether an error that the sensor of a hypothesis has had from the start, and that may change, explains
     all tests exceeded since the alarm.
 
-    If the test that raised the alarm reacts at once to such a change, sensor_monitor.py judges changes: here
-    the error is constant then, and any refuting test counts. Otherwise those that react at once do not count.
+    If the test that raised the alarm reacts at once to a change of this error, the other rules of suspects.py
+    judge changes. The error is then taken as constant here, and any refuting test counts. Otherwise the error
+    may have changed, and the tests that react at once do not count.
     """
     for j in range(N_TESTS):
         if mon.initial.refuted[h, j] and (REACTS[h, alarm] or not REACTS[h, j]):

@@ -28,6 +28,8 @@ N_TESTS = N_EQUATIONS + len(DUPLICATES)
 # the readings, the place of that reading, and the largest difference of the two quantities, SI.
 DUPLICATE = np.array([i for i, _ in DUPLICATES], np.int64)
 COUNTERPART = np.array([SENSORS.index(equal.reading) for _, equal in DUPLICATES], np.int64)
+# The test that an error of that reading exceeds.
+COUNTERPART_TEST = np.array([TEST_NAMES.index(_NAMED[i]) for i in COUNTERPART], np.int64)
 DUPLICATE_TOLERANCE = np.array([equal.within for _, equal in DUPLICATES], float)
 FILTER_POLES_PER_S = (1e6, 10.0, 1.0)  # of the filters of each test; the first is the residual itself
 N_POLES = len(FILTER_POLES_PER_S)

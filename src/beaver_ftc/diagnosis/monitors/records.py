@@ -1,6 +1,7 @@
 """The sensor monitor's record and its configuration, and its finding in words.
 
-redundancy.py, initial_errors.py and sensor_monitor.py declare the parts that they fill; letters as there.
+The files whose kernels fill a part of the record declare it: redundancy.py, initial_errors.py,
+gyro_or_attitude.py, flow_or_force.py and sensor_monitor.py. Letters as there.
 """
 
 from math import exp
@@ -14,10 +15,11 @@ from beaver_ftc.design import Dryden
 from beaver_ftc.design.model import DesignFunctions
 from beaver_ftc.diagnosis.bounds import GUST_LIMIT_SIGMA
 from beaver_ftc.diagnosis.deviations import air_rotation_slopes
+from beaver_ftc.diagnosis.monitors.flow_or_force import N_FROZEN_NEVER
 from beaver_ftc.diagnosis.monitors.initial_errors import INITIAL_RECORD
 from beaver_ftc.diagnosis.monitors.numbering import FILTER_POLES_PER_S, NO_SENSOR
 from beaver_ftc.diagnosis.monitors.redundancy import TEST_FIELDS
-from beaver_ftc.diagnosis.monitors.sensor_monitor import ISOLATION_FIELDS, N_FROZEN_NEVER
+from beaver_ftc.diagnosis.monitors.sensor_monitor import ISOLATION_FIELDS
 from beaver_ftc.plant.instruments import (
     ENGINE_SPEED,
     MANIFOLD,
@@ -70,10 +72,10 @@ def configure_sensor_monitor(monitor: np.void, declared: Declared, design: np.vo
     if not declared.monitors_sensors:
         return
     initial, air = cast("Any", declared.initial), declared.air  # whose keys the aircraft names
-    D = air_rotation_slopes(DesignFunctions(np.array([design])), y)
     engine, h = declared.aircraft.has_engine_instruments, 1.0 / declared.rate_hz / declared.substeps
     gust_max, gust_change = bound_gusts(air, initial.airspeed_mps, h)
-    fill(config, substeps=declared.substeps, has_engine=engine, D=D)
+    fill(config, substeps=declared.substeps, has_engine=engine)
+    config["D"] = air_rotation_slopes(DesignFunctions(np.array([design])), y)
     config["y_trim"][3:7] = y[:4]
     fill(
         monitor, h=h, decay=[exp(-lam * h) for lam in FILTER_POLES_PER_S],
@@ -117,10 +119,9 @@ def bound_gusts(air: Dryden, V: float, h: float) -> tuple[float, np.ndarray]:
     with V_m = MAX_AIRSPEED_OVER_TRIM V; a filter with a pole of lam 1/s keeps T = h / (1 - exp(-2 lam h)) of
     it. V m/s: airspeed in trim; h s: a sample.
     """
-    sigma = air.sigma_mps
     Q = air.velocity_walk(V, MAX_AIRSPEED_OVER_TRIM)
     T = [h / (1.0 - exp(-2.0 * lam * h)) for lam in FILTER_POLES_PER_S]
-    return GUST_LIMIT_SIGMA * sigma, GUST_LIMIT_SIGMA * np.sqrt(Q * np.array(T))
+    return GUST_LIMIT_SIGMA * air.sigma_mps, GUST_LIMIT_SIGMA * np.sqrt(Q * np.array(T))
 
 
 def sensor_monitor_finding(monitor: np.void, t_s: float) -> dict[str, Any] | None:
@@ -134,8 +135,8 @@ def sensor_monitor_finding(monitor: np.void, t_s: float) -> dict[str, Any] | Non
     }  # fmt: skip
     latest = finding["detection_time_s"] + UNANTICIPATED_DELAY_S
     if o["isolated_sensor"] >= 0:
-        name, at_s = sensor_words(SENSORS[int(o["isolated_sensor"])]), float(o["isolated_at_s"])
-        return finding | {"isolated": name, "isolation_time_s": at_s}
+        name = sensor_words(SENSORS[int(o["isolated_sensor"])])
+        return finding | {"isolated": name, "isolation_time_s": float(o["isolated_at_s"])}
     if t_s > latest:
         name = "unanticipated"
         return finding | {"isolated": name, "isolation_type": name, "isolation_time_s": latest}

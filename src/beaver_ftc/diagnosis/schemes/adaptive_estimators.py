@@ -17,7 +17,7 @@ from beaver_ftc.diagnosis import conclusion, gusts, isolation
 from beaver_ftc.diagnosis.detection import attitude, fdae, filters, forces, parity, statistical
 from beaver_ftc.diagnosis.detection.rows import finish_rows, update_forces
 from beaver_ftc.diagnosis.model_prediction import fill_old_effects, innovation_known
-from beaver_ftc.diagnosis.monitors import engine_monitor, sensor_monitor
+from beaver_ftc.diagnosis.monitors import engine_monitor, gyro_or_attitude, sensor_monitor
 from beaver_ftc.diagnosis.state import (
     STATISTICAL_DETECTOR,
     UNANTICIPATED,
@@ -197,7 +197,7 @@ def compare_attitude(fdi, x):
     stat, att, detected = fdi.statistical, fdi.statistical.attitude, fdi.verdict.detected
     attitude.compare_attitude(att, stat.block, stat.rows.eta[0, :3], x, fdi.config.dt, detected)
     if detected and att.score > 1.0:
-        sensor_monitor.rule_out_gyros(fdi.sensor_monitor)
+        gyro_or_attitude.rule_out_gyros(fdi.sensor_monitor)
 
 
 @apart(long_loops=True)

@@ -1,0 +1,230 @@
+"""Accelerometers or flow sensor? The course of the residuals since the alarm says whose error they show.
+
+A test of the flow (airspeed, incidence, sideslip) compares a flow sensor with the accelerometers, so an error
+of either moves it. An error e of an accelerometer, m/s2, integrates into an error e t of the velocity. An
+error of a flow sensor is a step, which its own reading contains. From the alarm on, `clear_sensors` records
+that a sensor cannot be the broken one:
+
+    cleared          if
+    accelerometers   the reading of the flow sensor jumps as the residual does, soon after the alarm, and no
+                     accelerometer has jumped (`flow_jumped`)
+                     the flow sensor is frozen
+                     the alarm is that of the airspeed, and the test of the density is exceeded
+    flow sensor      the residuals add up to many times the range of its reading (`sum_exceeds_range`)
+                     an airspeed, or incidence, of that error would exceed the test of the density, or of the
+                     climb (`contradicted`)
+                     an accelerometer is frozen
+    gyro of an axis  the attitude shows no such turn about the axis (`clear_gyros`)
+
+Whether a sensor is frozen is judged here, too. Letters: redundancy.py and initial_errors.py; f is the record
+of a flow sensor.
+"""
+
+import numpy as np
+
+from beaver_ftc.compiled import kernel, record
+from beaver_ftc.diagnosis.detection.filters import leak
+from beaver_ftc.diagnosis.monitors.initial_errors import speed
+from beaver_ftc.diagnosis.monitors.numbering import (
+    ALPHA_TEST,
+    BETA_TEST,
+    CLIMB_TEST,
+    DENSITY_TEST,
+    I_AIRSPEED,
+    N_POLES,
+    NO_SENSOR,
+    SENSOR_OF,
+    SPEED_TEST,
+    THETA,
+)
+from beaver_ftc.diagnosis.monitors.redundancy import AB_NOW, FORCE_JUMP_M_S2, too_steep
+from beaver_ftc.plant.instruments import AX, N_SENSORS, PHI
+
+# Number of identical samples for a sensor that is never called frozen: its sound reading may repeat, because
+# the steps of its resolution exceed its noise
+N_FROZEN_NEVER = 1_000_000_000
+JUMP_WINDOW_S = 1.0  # a jump counts within this time after the alarm: later, one by chance is too likely
+JUMP_MEMORY_S = 2.0  # time constant with which the largest jump of an accelerometer fades
+MIN_JUMP_SHARE = 0.5  # the flow sensor's own reading jumps by at least this share of the residual
+# Least ratio of summed residuals to the range of the reading: a scale error within 3 % of -1 gives so much
+MIN_SUM_RATIO = 30.0
+CLEAR_FACTOR = 3.0  # an effect clears a sensor only beyond so many times the bound on it
+TIME_ROUNDING_S = 1e-9
+
+FORCES = (AX, AX + 1, AX + 2)
+
+# One flow sensor (speed, incidence or sideslip) since the alarm. r_sum, B_sum, H_sum: sums of the residuals,
+# of the bound on the part of sound sensors, and on that of an error from the start, in the unit of the
+# residual; y_min, y_max: range of the reading.
+FLOW_RECORD = record(r_sum=float, B_sum=float, H_sum=float, y_min=float, y_max=float)
+
+# What the comparison keeps, in the record of the monitor.
+FLOW_FIELDS = {
+    "flow": (FLOW_RECORD, 3),
+    "n_same": (int, N_SENSORS),  # for how many samples each reading has been the very same
+    "cleared": (int, N_SENSORS),  # whether each sensor is cleared
+    "turn_max": float,  # rad: largest turn of the attitude beyond sound gyros, 0 if unknown (attitude.py)
+    "jump": float,  # largest of an accelerometer between two samples, m/s2; it fades
+    "n_since": int,  # samples since the alarm
+    "climb": N_POLES,  # m: filtered effect on the altitude of the error that the incidence's sums show
+}  # fmt: skip
+
+
+@kernel
+def count_same(mon, y):
+    """Count in n_same for how many samples each reading has been the very same; update the largest jump of an
+    accelerometer between two samples, which fades:
+
+        jump <- max((1 - h / JUMP_MEMORY_S) jump, |y_i - y_past_i|)        i: the three accelerometers
+    """
+    mon.jump *= 1.0 - mon.h / JUMP_MEMORY_S
+    for i in range(N_SENSORS):
+        mon.n_same[i] = mon.n_same[i] + 1 if y[i] == mon.y_past[i] else 0
+    for i in FORCES:
+        mon.jump = max(mon.jump, abs(y[i] - mon.y_past[i]))
+
+
+@kernel
+def is_frozen(mon, i):
+    """Whether sensor i is frozen."""
+    return mon.n_same[i] >= mon.config.n_frozen[i]
+
+
+@kernel
+def last_frozen(mon, sensors):
+    """The last of these sensors that is frozen, or NO_SENSOR."""
+    last = NO_SENSOR
+    for i in sensors:
+        last = i if is_frozen(mon, i) else last
+    return last
+
+
+@kernel
+def stands_still(mon, i):
+    """Whether a sensor is frozen at a reading that is not zero: a sound sensor may read zero all the time."""
+    return mon.y_past[i] != 0.0 and is_frozen(mon, i)
+
+
+@kernel
+def clear_sensors(mon, y):
+    """Clear sensors by this sample, that of the alarm or a later one, as the table at the top says."""
+    alarm = mon.output.alarm_test
+    flow = SENSOR_OF[alarm]
+    by_density = alarm == SPEED_TEST and mon.exceeded[DENSITY_TEST]
+    if is_frozen(mon, flow) or flow_jumped(mon, y, flow) or by_density:
+        mon.cleared[AX:] = 1
+    sum_flow(mon, y)
+    is_integrated = sum_exceeds_range(mon.flow[alarm - SPEED_TEST])
+    if is_integrated or contradicted(mon, y) or last_frozen(mon, FORCES) >= 0:
+        mon.cleared[flow] = 1
+    clear_gyros(mon, y)
+
+
+@kernel
+def flow_jumped(mon, y, i):
+    """Whether, soon after the alarm, the residual exceeds any jump of an accelerometer in one sample, and the
+    reading of the flow sensor i jumps with it.
+
+        |r| > B + FORCE_JUMP_M_S2 per_a,    |ddy| >= MIN_JUMP_SHARE |r| > 3/2 jump per_a
+
+    r: residual of the sample, and B its bound, in m/s for the speed, else rad; per_a: residual by an
+    acceleration error of 1 m/s2 in one sample, h or h / V; ddy: second difference of the reading, with which
+    a step shows whatever the slope of the reading is; jump: of `count_same`, m/s2; 3/2: weight of the present
+    acceleration in the integration (redundancy.py).
+    """
+    j = mon.output.alarm_test
+    per_a = mon.h / (1.0 if j == SPEED_TEST else speed(mon.y_past))
+    ddy = abs(y[i] - 2.0 * mon.y_past[i] + mon.y_older[i])
+    r = abs(mon.residual[j])
+    soon = mon.n_since * mon.h < JUMP_WINDOW_S - TIME_ROUNDING_S
+    exceeds_forces = r > mon.B[j, 0] + FORCE_JUMP_M_S2 * per_a
+    return soon and exceeds_forces and ddy >= MIN_JUMP_SHARE * r > AB_NOW * mon.jump * per_a
+
+
+@kernel
+def sum_flow(mon, y):
+    """Add up the residuals of speed, incidence and sideslip since the alarm, with the bounds on their parts,
+    and find the range of each reading.
+
+        r_sum <- r_sum + residual,    B_sum <- B_sum + h per_s,    H_sum <- H_sum + E H
+        alpha = r_sum - clip(r_sum, -(B_sum + H_sum), B_sum + H_sum)        of the incidence
+        climb <- a climb + h V alpha cos(phi) cos(theta)
+
+    E, H: bound on an error from the start, and its effect (initial_errors.py). At the sample of the alarm
+    the sums start: r_sum, H_sum at 0, B_sum at the noise of two samples and the effect of a gust. alpha, rad,
+    is the error of the incidence that sound sensors do not explain; climb, m, is its effect on the altitude
+    through each filter of decay a.
+    """
+    for n, f in enumerate(mon.flow):
+        j = SPEED_TEST + n
+        reading = y[SENSOR_OF[j]]
+        if mon.n_since == 0:
+            f.y_min = f.y_max = reading
+            # noise of the first and of the last sample
+            f.B_sum = 2.0 * mon.per_sample[j] + mon.gust[j] * mon.gust_max
+        else:
+            f.r_sum += mon.residual[j]
+            f.B_sum += mon.h * mon.per_s[j]
+            f.H_sum += mon.initial.E_alarm[n] * mon.initial.H[n, j]
+            f.y_min, f.y_max = min(f.y_min, reading), max(f.y_max, reading)
+    f = mon.flow[ALPHA_TEST - SPEED_TEST]
+    explained = f.B_sum + f.H_sum
+    alpha = f.r_sum - min(max(f.r_sum, -explained), explained)
+    leak(mon.climb, mon.decay, mon.h * y[I_AIRSPEED] * alpha * np.cos(y[PHI]) * np.cos(y[THETA]))
+    mon.n_since += 1
+
+
+@kernel
+def sum_exceeds_range(f):
+    """Whether the residuals add up to more than an error of a flow sensor whose reading has this range:
+
+    |r_sum| > MIN_SUM_RATIO (y_max - y_min) + CLEAR_FACTOR (B_sum + H_sum)
+    """
+    span = f.y_max - f.y_min
+    return span > 0.0 and abs(f.r_sum) > MIN_SUM_RATIO * span + CLEAR_FACTOR * (f.B_sum + f.H_sum)
+
+
+@kernel
+def contradicted(mon, y):
+    """Whether the error that the alarm shows, if it were the flow sensor's, would exceed another test that is
+    within its bound: of the density for the airspeed, of the climb for the incidence.
+
+        effect > CLEAR_FACTOR (B + e H)        for some pole
+
+        incidence    effect = |climb|                              m, of `sum_flow`
+        airspeed     effect = 2 (1 - e) / V (|r| - B_speed)        of log(density)
+
+    r, B_speed m/s: filtered residual of the speed and its bound; B: bound of the other test; e, H: bound on
+    an error of the flow sensor from the start, and its effect on the other test (initial_errors.py).
+    """
+    alarm = mon.output.alarm_test
+    other = DENSITY_TEST if alarm == SPEED_TEST else CLIMB_TEST
+    if alarm == BETA_TEST or mon.exceeded[other]:
+        return False
+    h = alarm - SPEED_TEST
+    e, r, B = mon.initial.E_alarm[h], mon.r[alarm], mon.B[alarm]
+    # log(density) changes by twice the relative change of the airspeed
+    share = 2.0 * (1.0 - min(e, 1.0)) / speed(y)
+    for m, climb in enumerate(mon.climb):
+        effect = abs(climb) if alarm == ALPHA_TEST else share * (abs(r[m]) - B[m])
+        if effect > CLEAR_FACTOR * (mon.B[other, m] + e * mon.initial.H_m[h, other, m]):
+            return True
+    return False
+
+
+@kernel
+def clear_gyros(mon, y):
+    """Clear each gyro i that does not show, in this sample, the error that would explain the test of the
+    incidence, or of the sideslip:
+
+        |residual_i| < turn_max < |residual| - B        residual, B: of the test of the alarm, rad
+
+    turn_max, rad, is the largest turn by noise and constant errors with the declared probability
+    (attitude.py), 0 if unknown. Near the vertical the attitude shows no turn.
+    """
+    alarm = mon.output.alarm_test
+    unexplained = abs(mon.residual[alarm]) - mon.B[alarm, 0]
+    if alarm == SPEED_TEST or too_steep(mon, y) or not 0.0 < mon.turn_max < unexplained:
+        return
+    for i in range(3):
+        mon.cleared[i] |= abs(mon.residual[i]) < mon.turn_max

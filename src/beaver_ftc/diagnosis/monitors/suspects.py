@@ -1,0 +1,291 @@
+"""The suspects: the sensors whose error, one at a time, explains all tests since the alarm.
+
+The test that raised the alarm names the suspects; other tests, and the two comparisons of gyro_or_attitude.py
+and flow_or_force.py, exclude some of them:
+
+    test of the alarm      suspects                     excluded by
+    turning, angles        gyro of an axis, one angle   the dynamics of the rates (gyro_or_attitude.py); tests
+                                                        of other axes and angles
+    speed                  airspeed, accelerometers     being cleared (flow_or_force.py)
+    incidence, sideslip    vane, accelerometers, gyros  being cleared; vane and gyros by the tests of turning
+    density                airspeed, dynamic pressure   for the airspeed its own test; for the pressure any
+                                                        other test
+    climb                  altitude                     any other test
+    engine                 the sensor of the test
+    equation of a row      the sensor of the row
+    equal                  the sensor, the reading      that reading's own test
+                           that it should equal
+    any                    alpha, beta, airspeed, phi,  the tests that an error from the start does not
+                           theta                        explain (initial_errors.py)
+
+Letters: redundancy.py and initial_errors.py. `mon.exceeded` (N_TESTS,): which tests have exceeded their
+bounds since the alarm; alarm: number of the test that raised it.
+"""
+
+import numpy as np
+
+from beaver_ftc.compiled import kernel
+from beaver_ftc.diagnosis.monitors.flow_or_force import (
+    FORCES,
+    N_FROZEN_NEVER,
+    is_frozen,
+    last_frozen,
+    stands_still,
+)
+from beaver_ftc.diagnosis.monitors.gyro_or_attitude import GYRO_CONFIRMED, GYRO_REFUTED, turn_share
+from beaver_ftc.diagnosis.monitors.initial_errors import (
+    H_AIRSPEED,
+    H_PHI,
+    INITIAL_SENSOR,
+    N_INITIAL,
+    exceeds,
+    explains_exceeded,
+    latch_refuted,
+    speed,
+)
+from beaver_ftc.diagnosis.monitors.numbering import (
+    ALPHA_TEST,
+    ANGLE_TEST,
+    COUNTERPART,
+    COUNTERPART_TEST,
+    DENSITY_TEST,
+    DUPLICATE,
+    I_AIRSPEED,
+    I_ALPHA,
+    I_BETA,
+    N_EQUATIONS,
+    N_TESTS,
+    PSI,
+    RPM_TEST,
+    SENSOR_OF,
+    SPEED_TEST,
+    THETA,
+)
+from beaver_ftc.diagnosis.monitors.rotation import unit
+from beaver_ftc.plant.instruments import AX, N_SENSORS, PHI
+
+# A residual below this share of the largest of the three axes, or angles, is taken for the coupling of that
+COUPLING_SHARE = 0.03
+MIN_AXIS_SHARE = 0.5  # least share of the spurious velocity along the axis of a suspected accelerometer
+# A test within its bound B hides an error whose effect is up to this factor times B, because the effect of
+# sound sensors, up to B, may have the other sign. For the gyro that turns the flow by all of its error it is
+# also the margin on the bound of the flow's test.
+HIDDEN_FACTOR = 2.0
+
+
+@kernel
+def latch_exceeded(mon):
+    """Record the tests that have exceeded their bounds since the alarm, and which hypotheses they refute.
+
+    The tests of turning, and those of the angles, come in threes. An error on one axis moves the two others a
+    little, so a residual counts only if it is larger than COUPLING_SHARE times the largest of its three.
+    """
+    exceeded = mon.exceeded
+    for j in range(N_TESTS):
+        coupled = -1.0
+        if j < SPEED_TEST:  # j - j % 3: the first of the three axes, or angles
+            coupled = COUPLING_SHARE * np.abs(mon.r[j - j % 3 : j - j % 3 + 3, 0]).max()
+        exceeded[j] |= mon.ratio[j] > 1.0 and abs(mon.r[j, 0]) > coupled
+    latch_refuted(mon, exceeded)
+
+
+@kernel
+def find_suspects(mon):
+    """Fill suspect (N_SENSORS,): the sensors whose error explains all tests since the alarm.
+
+    Errors from the start come last: another sensor's error from the start does not explain why a suspect is
+    frozen, so none is added to a frozen suspect.
+    """
+    suspect = mon.output.suspect
+    alarm = mon.output.alarm_test
+    suspect[:] = 0
+    if alarm >= N_EQUATIONS:
+        suspect_duplicate(mon, alarm - N_EQUATIONS)
+        return
+    if alarm < SPEED_TEST:
+        suspect_attitude(mon)
+    elif alarm < DENSITY_TEST:
+        suspect_flow(mon, alarm)
+    else:
+        suspect_lone(mon, alarm)
+    for i in range(N_SENSORS):
+        if suspect[i] and stands_still(mon, i):
+            return
+    for h, i in enumerate(INITIAL_SENSOR):
+        suspect[i] |= explains_exceeded(mon, h, alarm)
+
+
+@kernel
+def suspect_duplicate(mon, d):
+    """Suspect duplicate sensor number d, or the reading i that it no longer equals.
+
+        test of the reading   the sensor       the reading
+        exceeded              not suspected    suspected
+        within its bound      suspected        suspected if its error may be hidden, if it is frozen, or if
+                                               both have never agreed (an error from the first sample on)
+
+        hidden    |residual| - B <= HIDDEN_FACTOR max(B_i, e_i)
+
+    residual, B: of the comparison of both; the left side is the least error of the reading that explains it.
+    B_i: bound of the reading's own test; e_i: bound on the error of a sound reading.
+    """
+    suspect = mon.output.suspect
+    i, own_test, j = COUNTERPART[d], COUNTERPART_TEST[d], N_EQUATIONS + d
+    least_error = abs(mon.residual[j]) - mon.B[j, 0]
+    hidden = least_error <= HIDDEN_FACTOR * max(mon.B[own_test, 0], mon.e[i])
+    suspect[DUPLICATE[d]] = not mon.exceeded[own_test]
+    suspect[i] = mon.exceeded[own_test] == 1 or hidden or is_frozen(mon, i) or not mon.agreed[d]
+
+
+@kernel
+def alone(shown, i):
+    """Whether none of these tests but test i shows an error; shown (tests,)."""
+    return shown.sum() == shown[i]
+
+
+@kernel
+def suspect_attitude(mon):
+    """Suspect the gyro of axis i, and the angle i (phi, theta, psi), for each i:
+
+        gyro     if no other test of turning shows an error (a gyro's error may appear in an angle first), the
+                 gyro is not refuted, and no angle is frozen
+        angle    if no test of another angle shows an error that this angle's error from the start does not
+                 explain (of psi: any error), the error explains the tests of turning (`explains_turns`) or
+                 its own test shows it, and the gyro that would be at fault instead is not confirmed
+                 if its reading stands still, but too shortly to call it frozen, and its error explains the
+                 tests of turning
+
+    turns, angles (3,): which tests of turning, and of the angles, have been exceeded; refuted (2, 3): which
+    of the angles' tests refute an error from the start of phi, and of theta; axis: of the gyro that would be
+    at fault instead, that with the largest ratio.
+    """
+    suspect, ratio = mon.output.suspect, mon.ratio[:ANGLE_TEST]
+    turns, angles = mon.exceeded[:ANGLE_TEST], mon.exceeded[ANGLE_TEST:SPEED_TEST]
+    refuted = mon.initial.refuted[H_PHI:, ANGLE_TEST:SPEED_TEST]
+    frozen = last_frozen(mon, (PHI, THETA, PSI)) >= 0
+    worst = np.argmax(ratio)
+    for i in range(3):
+        suspect[i] = alone(turns, i) and mon.gyro[i].verdict != GYRO_REFUTED and not frozen
+        explains = explains_turns(mon, i)
+        k = PHI + i
+        unshared = alone(angles, i) if i == 2 else alone(refuted[i], i)
+        only = unshared and (explains or angles[i] == 1)
+        axis = worst if ratio[worst] > ratio[i] else i
+        early = 0 < mon.n_same[k] < mon.config.n_frozen[k] < N_FROZEN_NEVER
+        suspect[k] = (only and mon.gyro[axis].verdict != GYRO_CONFIRMED) or (explains and early)
+
+
+@kernel
+def explains_turns(mon, i):
+    """Whether an error of angle i (phi, theta, psi) explains the tests of turning. Its size is limited by the
+    residual of the angle's own test: as it is now, or as its residuals since the alarm have shown.
+
+    It does not if for an axis j, whose test has been exceeded, and some pole m both
+
+        now      |r_j| > c (|r_own| + B_own) + B_j + E H
+        since    |beyond_ij| > B_j + E H + c_max B_own + tilt swing_i
+
+    r_own, B_own rad: filtered residual of the angle's own test, and its bound; c: |turn_share| + tilt,
+    rad/rad: the attitude may be off by tilt = e_phi + e_theta, rad; beyond, c_max, swing: of
+    `gyro_or_attitude.filter_beyond`; E, H: bound on an error of the angle from the start, and its effect
+    (initial_errors.py), 0 for psi.
+    """
+    own, h = ANGLE_TEST + i, min(H_PHI + i, N_INITIAL - 1)  # psi has no hypothesis: any h, as initial is 0
+    initial = mon.initial.E_alarm[h] if i < 2 else 0.0
+    tilt = mon.e[PHI] + mon.e[THETA]
+    for j in range(3):
+        r, c = mon.r[j], abs(turn_share(mon.y_past, j, i)) + tilt
+        for m in range(r.size):
+            B = mon.B[own, m]
+            sound = mon.B[j, m] + initial * mon.initial.H_m[h, j, m]
+            now = abs(r[m]) > c * (abs(mon.r[own, m]) + B) + sound
+            since = abs(mon.beyond[i, j, m]) > sound + mon.c_max[i, j] * B + tilt * mon.swing[i, m]
+            if mon.exceeded[j] and now and since:
+                return False
+    return True
+
+
+@kernel
+def suspect_flow(mon, alarm):
+    """Suspect the flow sensor of the test, the accelerometers, and, of the incidence or the sideslip, gyros.
+
+    If a test of turning is exceeded, only a gyro can be the cause, because flow sensors and accelerometers do
+    not move the tests of the attitude. Otherwise a gyro is suspected if its error may be hidden in the test
+    of its axis. Cleared sensors (flow_or_force.py) are no suspects.
+    """
+    suspect, turns = mon.output.suspect, mon.exceeded[:ANGLE_TEST]
+    by_gyro = alarm > SPEED_TEST and turns.any()
+    flow = SENSOR_OF[alarm]
+    for i in range(3 if alarm > SPEED_TEST else 0):
+        suspect[i] = alone(turns, i) if by_gyro else gyro_hidden(mon, alarm, i)
+    if not by_gyro:
+        suspect_accelerometers(mon)
+        suspect[flow] = 1
+    for i in range(N_SENSORS):
+        suspect[i] &= not mon.cleared[i]
+
+
+@kernel
+def gyro_hidden(mon, j, i):
+    """Whether an error of gyro i may explain the test j of the flow while it is hidden in the test of its
+    axis: |r_j| <= k B_j + HIDDEN_FACTOR |share| B_i for each pole.
+
+        alpha' = q - tan(beta) (p cos(alpha) + r sin(alpha)) + ...
+        beta' = p sin(alpha) - r cos(alpha) + ...
+
+    share: of the error of p, q or r in the flow's rate, by these equations. The gyro across the flow (q for
+    the incidence, r for the sideslip) counts with a share of 1 and k = HIDDEN_FACTOR; for the others k = 1,
+    and q does not turn the sideslip.
+    """
+    z, t = unit(mon.y_past[I_ALPHA]), np.tan(mon.y_past[I_BETA])
+    share = (t * z.real, 1.0, t * z.imag)[i] if j == ALPHA_TEST else (z.imag, 0.0, 1.0)[i]
+    across = i == j - SPEED_TEST  # q (1) for the incidence, r (2) for the sideslip
+    k = HIDDEN_FACTOR if across else 1.0
+    return (across or i != 1) and not exceeds(mon.r[j], k, mon.B[j], HIDDEN_FACTOR * abs(share), mon.B[i])
+
+
+@kernel
+def suspect_accelerometers(mon):
+    """Suspect the accelerometers along whose axis most of the spurious velocity dv is, m/s:
+
+        dv_i >= MIN_AXIS_SHARE max(dv) - B,    B = B_V + V (B_alpha + B_beta)        of sound sensors
+
+    If accelerometers are frozen, the last of them is suspected, and no other accelerometer.
+
+    dV, da, db: records of speed, incidence and sideslip; their r_sum, m/s and rad, add up to dv in axes along
+    the flow. plane: dv turned by beta; its imaginary part is along the second body axis. body: then turned by
+    alpha; its parts are along the first and the third body axis.
+    """
+    y, dV, da, db = mon.y_past, mon.flow[0], mon.flow[1], mon.flow[2]
+    V = speed(y)
+    frozen = last_frozen(mon, FORCES)
+    plane = complex(dV.r_sum, V * db.r_sum) * unit(y[I_BETA])
+    body = complex(plane.real, V * np.cos(y[I_BETA]) * da.r_sum) * unit(y[I_ALPHA])
+    dv = abs(body.real), abs(plane.imag), abs(body.imag)
+    least = MIN_AXIS_SHARE * max(dv) - dV.B_sum - V * (da.B_sum + db.B_sum)
+    for i in FORCES:
+        mon.output.suspect[i] = frozen == i or (frozen < 0 and dv[i - AX] >= least)
+
+
+@kernel
+def suspect_lone(mon, alarm):
+    """Suspect the sensor of a test that has a sensor of its own: of the density or the climb if no other test
+    of kinematics is exceeded; of the engine, and of the equations of rows, always.
+
+    The alarm of the density suspects the airspeed, too, unless such an error would exceed the bound of the
+    airspeed's own test while that test shows none:
+
+        |r_density| > 2 HIDDEN_FACTOR (1 + e) / V B_speed + e H        for some pole
+
+    e: bound on an error of the airspeed from the start, a share; H: its effect on the density. The test of a
+    frozen airspeed need not show an error, so an airspeed that stands still is suspected.
+    """
+    suspect = mon.output.suspect
+    suspect[SENSOR_OF[alarm]] = alarm >= RPM_TEST or alone(mon.exceeded[:RPM_TEST], alarm)
+    if alarm == DENSITY_TEST:
+        e = mon.initial.E_alarm[H_AIRSPEED]
+        H = mon.initial.H_m[H_AIRSPEED, alarm]
+        # 2: a relative change of the airspeed changes log(density) by twice as much
+        k = 2.0 * HIDDEN_FACTOR * (1.0 + e) / speed(mon.y_past)
+        hidden = not exceeds(mon.r[alarm], k, mon.B[SPEED_TEST], e, H)
+        suspect[I_AIRSPEED] = mon.exceeded[SPEED_TEST] == 1 or hidden or mon.n_same[I_AIRSPEED] > 0

@@ -129,7 +129,7 @@ def flow_jumped(mon, y, i):
 
     r: residual of the sample, and B its bound, in m/s for the speed, else rad; per_a: residual by an
     acceleration error of 1 m/s2 in one sample, h or h / V; ddy: second difference of the reading, with which
-    a step shows whatever the slope of the reading is; jump: of `count_same`, m/s2; 3/2: weight of the present
+    a step shows at any slope of the reading; jump: of `count_same`, m/s2; 3/2: weight of the present
     acceleration in the integration (redundancy.py).
     """
     j = mon.output.alarm_test
